@@ -1,0 +1,1 @@
+//! TCP error metrics: peak, RMS, settling, overshoot, path axes, contributions

@@ -1,0 +1,279 @@
+//! Straight uniform beam in closed form: stiffness, compliance, consistent mass, mass of a piece.
+//!
+//! Beam axes E: origin at the proximal end A, x along the beam to B, y and z the principal axes of
+//! the section. Components `u_x u_y u_z theta_x theta_y theta_z`, A before B. The static matrices are
+//! exact for loads at the two ends, so one element is enough whatever the length.
+//!
+//! Signs: `theta_z = dv/dx` for the deflection v along y, but `theta_y = -dw/dx` for w along z.
+//!
+//! Not here: distributed loads, buckling, offsets from beam to joint ([`crate::BeamLink`]).
+
+use nalgebra::{Matrix3, Matrix4, Matrix6, Vector3, Vector4};
+use serde::{Deserialize, Serialize};
+
+use crate::error::{FemError, positive};
+use crate::rigid_part::RigidPart;
+use crate::section::Bar;
+use crate::spatial::Matrix12;
+
+/// Whether a beam yields to shear.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum BeamTheory {
+    /// No shear deformation: slender beams.
+    EulerBernoulli,
+    /// With shear deformation `F l/(kGA)`.
+    #[default]
+    Timoshenko,
+}
+
+impl BeamTheory {
+    /// The name that files use.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::EulerBernoulli => "euler-bernoulli",
+            Self::Timoshenko => "timoshenko",
+        }
+    }
+}
+
+/// Straight uniform beam from A to B.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Beam {
+    bar: Bar,
+    length: f64,
+    /// `1/(kGA_y)` and `1/(kGA_z)`, 1/N; zero without shear.
+    shear_y: f64,
+    shear_z: f64,
+}
+
+/// One bending plane: where its deflection and rotation stand, and the sign of the rotation.
+struct Plane {
+    /// Row numbers of the deflection and the rotation at A, then at B.
+    rows: [usize; 4],
+    /// `theta = sign * d(deflection)/dx`.
+    sign: f64,
+    EI: f64,
+    /// Second mass moment per length, kg·m.
+    rotary: f64,
+    /// Ratio of shear to bending compliance, `12 EI/(kGA l²)`.
+    phi: f64,
+}
+
+impl Beam {
+    /// Beam of the given length in m.
+    ///
+    /// # Errors
+    /// [`FemError::OutOfRange`] for the length or a value of the bar; [`FemError::Missing`] where
+    /// Timoshenko's theory lacks a shear stiffness.
+    pub fn new(bar: Bar, theory: BeamTheory, length: f64) -> Result<Self, FemError> {
+        bar.check()?;
+        positive("beam length (m)", length)?;
+        let shear = |kGA: Option<f64>, what| match (theory, kGA) {
+            (BeamTheory::EulerBernoulli, _) => Ok(0.0),
+            (BeamTheory::Timoshenko, Some(kGA)) => Ok(1.0 / kGA),
+            (BeamTheory::Timoshenko, None) => Err(FemError::Missing {
+                what,
+                help: "give it, or choose the theory \"euler-bernoulli\"",
+            }),
+        };
+        Ok(Self {
+            bar,
+            length,
+            shear_y: shear(bar.kGA_y, "the shear stiffness kGA_y of the section")?,
+            shear_z: shear(bar.kGA_z, "the shear stiffness kGA_z of the section")?,
+        })
+    }
+
+    /// Length from A to B, m.
+    pub fn length(&self) -> f64 {
+        self.length
+    }
+
+    fn planes(&self) -> [Plane; 2] {
+        let l = self.length;
+        let plane = |w: usize, theta: usize, sign, EI: f64, rotary, shear: f64| Plane {
+            rows: [w, theta, w + 6, theta + 6],
+            sign,
+            EI,
+            rotary,
+            phi: 12.0 * EI * shear / (l * l),
+        };
+        let bar = &self.bar;
+        [
+            plane(1, 5, 1.0, bar.EI_z, bar.rotary_z, self.shear_y),
+            plane(2, 4, -1.0, bar.EI_y, bar.rotary_y, self.shear_z),
+        ]
+    }
+
+    /// Stiffness of both ends, 12×12, beam axes.
+    ///
+    /// ```text
+    /// F = K [u_A; u_B]
+    /// ```
+    /// [N/m, N/rad; N·m/m, N·m/rad], exactly symmetric, with the six rigid motions as null space.
+    ///
+    /// # Source
+    /// Przemieniecki (1968), *Theory of Matrix Structural Analysis*, eq. (5.116).
+    pub fn stiffness12(&self) -> Matrix12 {
+        let l = self.length;
+        let mut K = Matrix12::zeros();
+        for (row, k) in [(0, self.bar.EA / l), (3, self.bar.GJ / l)] {
+            K[(row, row)] = k;
+            K[(row + 6, row + 6)] = k;
+            K[(row, row + 6)] = -k;
+            K[(row + 6, row)] = -k;
+        }
+        for plane in self.planes() {
+            let phi = plane.phi;
+            let f = plane.EI / (l.powi(3) * (1.0 + phi));
+            let near = (4.0 + phi) * l * l;
+            let far = (2.0 - phi) * l * l;
+            let k = f * Matrix4::new(
+                12.0, 6.0 * l, -12.0, 6.0 * l, //
+                6.0 * l, near, -6.0 * l, far, //
+                -12.0, -6.0 * l, 12.0, -6.0 * l, //
+                6.0 * l, far, -6.0 * l, near,
+            );
+            plane.scatter(&k, &mut K);
+        }
+        K
+    }
+
+    /// Stiffness `K_BB` of the end B with A held, 6×6, at B, beam axes.
+    pub fn tip_stiffness(&self) -> Matrix6<f64> {
+        self.stiffness12().fixed_view::<6, 6>(6, 6).into_owned()
+    }
+
+    /// Compliance `C_BB` of the end B with A held, 6×6, at B, beam axes.
+    ///
+    /// ```text
+    /// stretch  F l/EA            bending by a force   F l³/(3EI) + F l/(kGA),   slope F l²/(2EI)
+    /// twist    T l/GJ            bending by a moment  M l²/(2EI),               slope M l/EI
+    /// ```
+    pub fn tip_compliance(&self) -> Matrix6<f64> {
+        let (bar, l) = (&self.bar, self.length);
+        let mut C = Matrix6::zeros();
+        C[(0, 0)] = l / bar.EA;
+        C[(3, 3)] = l / bar.GJ;
+        for (w, theta, sign, EI, shear) in [
+            (1, 5, 1.0, bar.EI_z, self.shear_y),
+            (2, 4, -1.0, bar.EI_y, self.shear_z),
+        ] {
+            C[(w, w)] = l.powi(3) / (3.0 * EI) + l * shear;
+            C[(theta, theta)] = l / EI;
+            C[(w, theta)] = sign * l * l / (2.0 * EI);
+            C[(theta, w)] = C[(w, theta)];
+        }
+        C
+    }
+
+    /// Consistent mass of both ends, 12×12, beam axes, with the rotary inertia of the section.
+    ///
+    /// ```text
+    /// M = ∫ (rho A Nᵀ N + rho I N_thetaᵀ N_theta) dx
+    /// ```
+    /// with the static shapes of [`Self::stiffness12`]; [kg, kg·m; kg·m, kg·m²]. Exact for rigid
+    /// motions and Guyan's mass for the rest.
+    ///
+    /// # Source
+    /// Shapes: Friedman & Kosmatka (1993), *Computers & Structures* 47(3), eq. (16) to (19).
+    pub fn mass12(&self) -> Matrix12 {
+        let l = self.length;
+        let mut M = Matrix12::zeros();
+        let polar = self.bar.rotary_y + self.bar.rotary_z;
+        for (row, m) in [(0, self.bar.mass_per_length * l), (3, polar * l)] {
+            M[(row, row)] = m / 3.0;
+            M[(row + 6, row + 6)] = m / 3.0;
+            M[(row, row + 6)] = m / 6.0;
+            M[(row + 6, row)] = m / 6.0;
+        }
+        for plane in self.planes() {
+            let mut m = Matrix4::zeros();
+            for (xi, weight) in gauss4() {
+                let (N, N_theta) = plane.shapes(xi, l);
+                m += weight
+                    * l
+                    * (self.bar.mass_per_length * N * N.transpose()
+                        + plane.rotary * N_theta * N_theta.transpose());
+            }
+            plane.scatter(&m, &mut M);
+        }
+        M
+    }
+
+    /// Mass, centre of mass and inertia of the piece between the fractions `from` and `to`.
+    ///
+    /// Uniform bar with the rotary inertia of its section; beam axes, from the end A.
+    ///
+    /// # Errors
+    /// [`FemError::OutOfRange`] unless `0 <= from < to <= 1`.
+    pub fn piece(&self, from: f64, to: f64) -> Result<RigidPart, FemError> {
+        let refuse = |what: &str, found, allowed: String| {
+            let what = format!("{what} of a beam piece (fraction of the length)");
+            Err(FemError::OutOfRange { what, found, allowed })
+        };
+        if !(0.0..1.0).contains(&from) {
+            return refuse("start", from, "from 0 to below 1".into());
+        }
+        if !(to > from && to <= 1.0) {
+            return refuse("end", to, format!("above {from} and up to 1"));
+        }
+        let bar = &self.bar;
+        let l = (to - from) * self.length;
+        let mass = bar.mass_per_length * l;
+        let slender = mass * l * l / 12.0;
+        let moments = Vector3::new(
+            (bar.rotary_y + bar.rotary_z) * l,
+            slender + bar.rotary_y * l,
+            slender + bar.rotary_z * l,
+        );
+        Ok(RigidPart {
+            mass,
+            com: Vector3::new(0.5 * (from + to) * self.length, 0.0, 0.0),
+            inertia: Matrix3::from_diagonal(&moments),
+        })
+    }
+}
+
+impl Plane {
+    /// Adds a 4×4 in (w, dw/dx) at A and B to the 12×12, with the sign of the rotations.
+    fn scatter(&self, k: &Matrix4<f64>, K: &mut Matrix12) {
+        let signs = [1.0, self.sign, 1.0, self.sign];
+        for i in 0..4 {
+            for j in 0..4 {
+                K[(self.rows[i], self.rows[j])] += signs[i] * signs[j] * k[(i, j)];
+            }
+        }
+    }
+
+    /// Deflection and rotation of the section at `xi = x/l` per (w_A, theta_A, w_B, theta_B).
+    fn shapes(&self, xi: f64, l: f64) -> (Vector4<f64>, Vector4<f64>) {
+        let phi = self.phi;
+        let (x2, x3) = (xi * xi, xi * xi * xi);
+        let N = Vector4::new(
+            2.0 * x3 - 3.0 * x2 - phi * xi + 1.0 + phi,
+            l * (x3 - (2.0 + 0.5 * phi) * x2 + (1.0 + 0.5 * phi) * xi),
+            -(2.0 * x3 - 3.0 * x2 - phi * xi),
+            l * (x3 - (1.0 - 0.5 * phi) * x2 - 0.5 * phi * xi),
+        );
+        let N_theta = Vector4::new(
+            6.0 * (x2 - xi) / l,
+            3.0 * x2 - (4.0 + phi) * xi + 1.0 + phi,
+            -6.0 * (x2 - xi) / l,
+            3.0 * x2 - (2.0 - phi) * xi,
+        );
+        (N / (1.0 + phi), N_theta / (1.0 + phi))
+    }
+}
+
+/// Four Gauss points on [0, 1] with their weights: exact to degree 7, the mass needs 6.
+fn gauss4() -> [(f64, f64); 4] {
+    let root = (6.0_f64 / 5.0).sqrt();
+    let inner = (3.0 / 7.0 - 2.0 / 7.0 * root).sqrt();
+    let outer = (3.0 / 7.0 + 2.0 / 7.0 * root).sqrt();
+    let w_inner = (18.0 + 30.0_f64.sqrt()) / 72.0;
+    let w_outer = (18.0 - 30.0_f64.sqrt()) / 72.0;
+    [(-outer, w_outer), (-inner, w_inner), (inner, w_inner), (outer, w_outer)]
+        .map(|(x, w)| (0.5 * (1.0 + x), w))
+}

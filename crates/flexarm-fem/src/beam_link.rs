@@ -1,0 +1,167 @@
+//! A whole link as one beam: from a section, a material and a few frames to a [`ReducedLink`].
+//!
+//! The beam runs along x of its frame E from `X_LE` over `length`; rigid arms tie its two ends to the
+//! joint frames A and B, wherever they are. The link is cut at a fraction of the beam; the elastic
+//! joint sits at the same fraction of the straight line from A to B unless it is put elsewhere.
+//!
+//! ```text
+//! u_E2 = Ad_E2B u_B,    K_BB = Ad_E2Bᵀ K_E2E2 Ad_E2B        E2: distal end of the beam, beam axes
+//! ```
+
+use nalgebra::{Matrix3, Rotation3, Translation3, Vector3};
+
+use crate::beam::{Beam, BeamTheory};
+use crate::error::{FemError, positive};
+use crate::gate::GateLimits;
+use crate::material::Material;
+use crate::reduced::{LinkFrames, Provenance, ReducedLink};
+use crate::rigid_part::RigidPart;
+use crate::section::Section;
+use crate::spatial::{Pose, adjoint};
+
+/// Recipe of a link that is one uniform beam between two joints.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BeamLink {
+    /// Name of the link.
+    pub name: String,
+    /// Cross section.
+    pub section: Section,
+    /// Material; not used by [`Section::Given`].
+    pub material: Material,
+    /// With or without shear deformation.
+    pub theory: BeamTheory,
+    /// Length of the beam, m.
+    pub length: f64,
+    /// Beam frame E: origin at the proximal end, x along the beam, y and z the axes of the section.
+    pub X_LE: Pose,
+    /// Proximal interface.
+    pub X_LA: Pose,
+    /// Distal interface.
+    pub X_LB: Pose,
+    /// Where the link is cut, as a fraction of the beam, between 0 and 1.
+    pub split_fraction: f64,
+    /// Split frame; at `split_fraction` of the line from A to B, in link axes, if not given.
+    pub X_LS: Option<Pose>,
+    /// Mass of the whole link, kg, spread along the beam; that of the section if not given.
+    pub mass: Option<f64>,
+}
+
+impl BeamLink {
+    /// Beam along link x from A at the link origin to B, cut in the middle, Timoshenko's theory.
+    pub fn new(
+        name: impl Into<String>,
+        section: Section,
+        material: Material,
+        length: f64,
+    ) -> Self {
+        Self {
+            name: name.into(),
+            section,
+            material,
+            theory: BeamTheory::default(),
+            length,
+            X_LE: Pose::identity(),
+            X_LA: Pose::identity(),
+            X_LB: Pose::translation(length, 0.0, 0.0),
+            split_fraction: 0.5,
+            X_LS: None,
+            mass: None,
+        }
+    }
+
+    /// The same beam with joints at the link origin and at `length * axis`, and the beam itself
+    /// parallel to that line.
+    ///
+    /// * `axis`: direction of the beam, link axes.
+    /// * `y`: direction of the section's y axis before `roll`; only its part across `axis` counts.
+    /// * `roll`: turn of the section about `axis`, rad.
+    /// * `offset`: from the joint line to the beam, link axes, m.
+    ///
+    /// # Errors
+    /// [`FemError::OutOfRange`] if `axis` is zero or `y` is parallel to it.
+    pub fn along(
+        self,
+        axis: Vector3<f64>,
+        y: Vector3<f64>,
+        roll: f64,
+        offset: Vector3<f64>,
+    ) -> Result<Self, FemError> {
+        let direction = |what: &str, v: Vector3<f64>| {
+            v.try_normalize(1e-9).filter(|v| v.amax().is_finite()).ok_or_else(|| {
+                let (what, found) = (what.to_owned(), v.norm());
+                FemError::OutOfRange { what, found, allowed: "above 1e-9 in length".into() }
+            })
+        };
+        let x = direction("beam axis", axis)?;
+        let y = direction("part of the section axis y across the beam", y - x * x.dot(&y))?;
+        let turned = y * roll.cos() + x.cross(&y) * roll.sin();
+        let R_LE = Matrix3::from_columns(&[x, turned, x.cross(&turned)]);
+        Ok(Self {
+            X_LE: Pose::from_parts(
+                Translation3::from(offset),
+                Rotation3::from_matrix_unchecked(R_LE),
+            ),
+            X_LA: Pose::identity(),
+            X_LB: Pose::from_parts(Translation3::from(x * self.length), Rotation3::identity()),
+            ..self
+        })
+    }
+
+    /// The reduced link, in closed form.
+    ///
+    /// # Errors
+    /// [`FemError::OutOfRange`] for impossible dimensions, materials, fractions and masses,
+    /// [`FemError::Missing`] for a section without shear stiffness in Timoshenko's theory, and the
+    /// gate's errors where levers are so long that the stiffness drowns in rounding.
+    pub fn reduce(&self) -> Result<ReducedLink, FemError> {
+        let frames = LinkFrames::new(self.X_LA, self.X_LB);
+        let frames = match self.X_LS {
+            Some(X_LS) => frames.with_split(X_LS),
+            None => frames.with_split_fraction(self.split_fraction),
+        };
+        let beam = Beam::new(self.section.bar(&self.material)?, self.theory, self.length)?;
+
+        // Stiffness of the distal beam end, carried over the rigid arm to Bo, link axes.
+        let X_LE2 = self.X_LE * Pose::translation(self.length, 0.0, 0.0);
+        let Ad_E2B = adjoint(&(X_LE2.inverse() * Pose::from(self.X_LB.translation)));
+        let K_BB = Ad_E2B.transpose() * beam.tip_stiffness() * Ad_E2B;
+
+        ReducedLink::from_matrix6(
+            &self.name,
+            frames,
+            &K_BB,
+            self.parts(&beam)?,
+            self.provenance(),
+            &GateLimits::default(),
+        )
+    }
+
+    /// The two halves of the beam; the rigid arms weigh nothing.
+    fn parts(&self, beam: &Beam) -> Result<[RigidPart; 2], FemError> {
+        if !(self.split_fraction > 0.0 && self.split_fraction < 1.0) {
+            return Err(FemError::OutOfRange {
+                what: "split_fraction".into(),
+                found: self.split_fraction,
+                allowed: "above 0 and below 1: each part needs a mass (S itself may lie anywhere)".into(),
+            });
+        }
+        let proximal = beam.piece(0.0, self.split_fraction)?;
+        let distal = beam.piece(self.split_fraction, 1.0)?;
+        let factor = match self.mass {
+            Some(mass) => positive("mass of the link (kg)", mass)? / (proximal.mass + distal.mass),
+            None => 1.0,
+        };
+        let place = |part: RigidPart| part.with_mass(part.mass * factor).transformed(&self.X_LE);
+        Ok([place(proximal), place(distal)])
+    }
+
+    fn provenance(&self) -> Provenance {
+        Provenance {
+            source: "uniform beam in closed form".into(),
+            method: format!("beam {}", self.theory.name()),
+            tie: "rigid".into(),
+            units: "m, N, kg, rad".into(),
+            ..Provenance::default()
+        }
+    }
+}

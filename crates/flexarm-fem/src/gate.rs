@@ -1,0 +1,327 @@
+//! The gate that every stiffness matrix passes before it becomes a link.
+//!
+//! All measures are dimensionless: entries are compared with `s_i s_j`, `s_i = sqrt(k_ii)`, which
+//! changes with the units as they do, so a matrix in millimetres passes or fails like one in metres.
+//!
+//! ```text
+//! asymmetry            max |k_ij - k_ji| / (s_i s_j)
+//! rigid_body_residual  max |(K R)_im| / (s_i Σ_k s_k |R_km|),  R: six rigid motions about the middle of AB
+//! block_identity       K_AA - Adᵀ K_BB Ad and K_AB + Adᵀ K_BB, over the size of their terms
+//! min_eigenvalue       smallest eigenvalue of k_ij/(s_i s_j) of K_BB; condition: largest over smallest
+//! ```
+//! A positive definite `K_BB` together with the block identity leaves the 12×12 exactly six zero
+//! eigenvalues and six positive ones, so these are not counted once more.
+//!
+//! Start at [`check_matrix12`] or [`check_matrix6`].
+
+use nalgebra::{Matrix6, SMatrix, SVector, SymmetricEigen, Vector3};
+use serde::{Deserialize, Serialize};
+
+use crate::error::{COMPONENTS, Direction, FemError};
+use crate::spatial::{Matrix12, Pose, adjoint, symmetric_part};
+
+/// How much each measure of the gate may be.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct GateLimits {
+    /// Largest relative asymmetry.
+    pub asymmetry: f64,
+    /// Largest rigid-body residual, also the bound on the block identity.
+    pub rigid_body_residual: f64,
+    /// Rigid-body residual or block identity above which [`GateReport::warnings`] speaks.
+    pub rigid_body_warning: f64,
+    /// Smallest eigenvalue of `K_BB`, scaled to a unit diagonal.
+    pub min_eigenvalue: f64,
+}
+
+impl Default for GateLimits {
+    /// Text with ten or more digits passes; a matrix with a spring to the ground does not.
+    ///
+    /// One's own assembly reaches a residual of 1e-11, printed matrices 3e-10 to 7e-8.
+    fn default() -> Self {
+        Self {
+            asymmetry: 1e-9,
+            rigid_body_residual: 1e-3,
+            rigid_body_warning: 1e-6,
+            min_eigenvalue: 1e-10,
+        }
+    }
+}
+
+/// What the gate measured; see the module for the definitions.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct GateReport {
+    /// Largest relative asymmetry of the source matrix.
+    pub asymmetry: f64,
+    /// Relative force under rigid motions of both interfaces; `None` for a 6×6 source.
+    pub rigid_body_residual: Option<f64>,
+    /// Disagreement of `K_AA`, `K_AB` with `K_BB`; `None` for a 6×6 source.
+    pub block_identity: Option<f64>,
+    /// Smallest eigenvalue of `K_BB` scaled to a unit diagonal.
+    pub min_eigenvalue: f64,
+    /// Condition number of the same scaled matrix.
+    pub condition: f64,
+}
+
+impl GateReport {
+    /// Sentences about measures that pass, but are worth a look.
+    pub fn warnings(&self, limits: &GateLimits) -> Vec<String> {
+        [
+            ("rigid-body residual", self.rigid_body_residual),
+            ("disagreement of the blocks", self.block_identity),
+        ]
+        .into_iter()
+        .filter_map(|(what, value)| Some((what, value?)))
+        .filter(|(_, value)| *value > limits.rigid_body_warning)
+        .map(|(what, value)| {
+            let warn = limits.rigid_body_warning;
+            format!("{what} of the stiffness is {value:.1e}, usual is below {warn:.0e}: few digits?")
+        })
+        .collect()
+    }
+}
+
+/// Checks a 12×12 stiffness (A, then B, link axes) and returns its `K_BB`, made exactly symmetric.
+///
+/// * `p_AB`: from A to B, link axes, m.
+///
+/// # Errors
+/// In this order: [`FemError::NotFinite`], [`FemError::NotPositiveDefinite`] (a diagonal entry that
+/// is not positive), [`FemError::NotSymmetric`], [`FemError::MovesUnderRigidMotion`],
+/// [`FemError::NotPositiveDefinite`] (of `K_BB`), [`FemError::BlocksDisagree`].
+pub fn check_matrix12(
+    K: &Matrix12,
+    p_AB: &Vector3<f64>,
+    limits: &GateLimits,
+) -> Result<(Matrix6<f64>, GateReport), FemError> {
+    const WHAT: &str = "the 12x12 stiffness";
+    check_finite(WHAT, K)?;
+    let s = diagonal_scale(WHAT, K, limits)?;
+    let asymmetry = check_symmetry(WHAT, K, &s, limits)?;
+
+    let residual = rigid_body_residual(K, &s, p_AB);
+    if !(residual.value <= limits.rigid_body_residual) {
+        return Err(FemError::MovesUnderRigidMotion {
+            residual: residual.value,
+            allowed: limits.rigid_body_residual,
+            motion: residual.motion,
+            row: residual.row,
+            p_AB: *p_AB,
+            implied_p_AB: implied_lever(K),
+        });
+    }
+
+    let K_BB = symmetric_part(&K.fixed_view::<6, 6>(6, 6).into_owned());
+    let (min_eigenvalue, condition) = check_definite("K_BB", &K_BB, limits)?;
+    let block_identity = block_identity(K, &K_BB, &s, p_AB);
+    if !(block_identity <= limits.rigid_body_residual) {
+        let (residual, allowed) = (block_identity, limits.rigid_body_residual);
+        return Err(FemError::BlocksDisagree { residual, allowed });
+    }
+    let report = GateReport {
+        asymmetry,
+        rigid_body_residual: Some(residual.value),
+        block_identity: Some(block_identity),
+        min_eigenvalue,
+        condition,
+    };
+    Ok((K_BB, report))
+}
+
+/// Checks a 6×6 stiffness (one interface with the other held, or an elastic joint) and returns it
+/// made exactly symmetric.
+///
+/// * `what`: what to call it in messages.
+///
+/// # Errors
+/// [`FemError::NotFinite`], [`FemError::NotSymmetric`], [`FemError::NotPositiveDefinite`].
+pub fn check_matrix6(
+    what: &'static str,
+    K: &Matrix6<f64>,
+    limits: &GateLimits,
+) -> Result<(Matrix6<f64>, GateReport), FemError> {
+    check_finite(what, K)?;
+    let s = diagonal_scale(what, K, limits)?;
+    let asymmetry = check_symmetry(what, K, &s, limits)?;
+    let K = symmetric_part(K);
+    let (min_eigenvalue, condition) = check_definite(what, &K, limits)?;
+    let report = GateReport {
+        asymmetry,
+        rigid_body_residual: None,
+        block_identity: None,
+        min_eigenvalue,
+        condition,
+    };
+    Ok((K, report))
+}
+
+fn check_finite<const N: usize>(
+    what: &'static str,
+    K: &SMatrix<f64, N, N>,
+) -> Result<(), FemError> {
+    for row in 0..N {
+        for column in 0..N {
+            if !K[(row, column)].is_finite() {
+                return Err(FemError::NotFinite { what, row, column });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// `s_i = sqrt(k_ii)`; a diagonal entry that is not positive already decides the matter.
+fn diagonal_scale<const N: usize>(
+    what: &'static str,
+    K: &SMatrix<f64, N, N>,
+    limits: &GateLimits,
+) -> Result<SVector<f64, N>, FemError> {
+    let diagonal = K.diagonal();
+    if let Some(i) = (0..N).find(|&i| diagonal[i] <= 0.0) {
+        return Err(FemError::NotPositiveDefinite {
+            what,
+            min_eigenvalue: diagonal[i],
+            allowed: limits.min_eigenvalue,
+            direction: Direction::new((0..N).map(|j| f64::from(j == i))),
+        });
+    }
+    Ok(diagonal.map(f64::sqrt))
+}
+
+fn check_symmetry<const N: usize>(
+    what: &'static str,
+    K: &SMatrix<f64, N, N>,
+    s: &SVector<f64, N>,
+    limits: &GateLimits,
+) -> Result<f64, FemError> {
+    let mut worst = (0.0, 0, 0);
+    for row in 0..N {
+        for column in row + 1..N {
+            let difference = (K[(row, column)] - K[(column, row)]).abs();
+            let relative = difference / (s[row] * s[column]);
+            if !(relative <= worst.0) {
+                worst = (relative, row, column);
+            }
+        }
+    }
+    let (asymmetry, row, column) = worst;
+    if asymmetry <= limits.asymmetry {
+        return Ok(asymmetry);
+    }
+    let allowed = limits.asymmetry;
+    Err(FemError::NotSymmetric { what, asymmetry, allowed, row, column })
+}
+
+/// Smallest eigenvalue and condition number of the matrix scaled to a unit diagonal.
+fn check_definite(
+    what: &'static str,
+    K: &Matrix6<f64>,
+    limits: &GateLimits,
+) -> Result<(f64, f64), FemError> {
+    let s = diagonal_scale(what, K, limits)?;
+    let refuse = |min_eigenvalue, direction| {
+        let allowed = limits.min_eigenvalue;
+        Err(FemError::NotPositiveDefinite { what, min_eigenvalue, allowed, direction })
+    };
+    let scaled = Matrix6::from_fn(|i, j| K[(i, j)] / s[i] / s[j]);
+
+    // A pair with |k_ij| >= s_i s_j is indefinite by itself; it may also be too large to decompose.
+    for i in 0..6 {
+        for j in i + 1..6 {
+            if !(scaled[(i, j)].abs() < 1.0) {
+                let mut x = [0.0; 6];
+                (x[i], x[j]) = (1.0 / s[i], -scaled[(i, j)].signum() / s[j]);
+                return refuse(1.0 - scaled[(i, j)].abs(), Direction::new(x));
+            }
+        }
+    }
+    let Some(eigen) = SymmetricEigen::try_new(scaled, f64::EPSILON, 1000) else {
+        return refuse(f64::NAN, Direction::new([0.0; 6]));
+    };
+    let (lowest, min) = eigen.eigenvalues.argmin();
+    if !(min >= limits.min_eigenvalue) {
+        let v = eigen.eigenvectors.column(lowest);
+        return refuse(min, Direction::new((0..6).map(|i| v[i] / s[i])));
+    }
+    Ok((min, eigen.eigenvalues.max() / min))
+}
+
+/// The largest of the relative forces under rigid motions, and where it is.
+struct RigidResidual {
+    value: f64,
+    motion: &'static str,
+    row: String,
+}
+
+fn rigid_body_residual(K: &Matrix12, s: &SVector<f64, 12>, p_AB: &Vector3<f64>) -> RigidResidual {
+    const MOTIONS: [&str; 6] = [
+        "translation along x",
+        "translation along y",
+        "translation along z",
+        "rotation about x",
+        "rotation about y",
+        "rotation about z",
+    ];
+    // Rigid motions about the middle C of AB: neither interface is preferred.
+    let half = Pose::translation(0.5 * p_AB.x, 0.5 * p_AB.y, 0.5 * p_AB.z);
+    let mut R = SMatrix::<f64, 12, 6>::zeros();
+    R.fixed_view_mut::<6, 6>(0, 0).copy_from(&adjoint(&half)); // p_AC = p_AB/2
+    R.fixed_view_mut::<6, 6>(6, 0).copy_from(&adjoint(&half.inverse()));
+
+    let force = K * R;
+    let size = R.abs().transpose() * s;
+    let mut worst = RigidResidual { value: 0.0, motion: MOTIONS[0], row: String::new() };
+    for (m, motion) in MOTIONS.into_iter().enumerate() {
+        for i in 0..12 {
+            let value = force[(i, m)].abs() / (s[i] * size[m]);
+            if !(value <= worst.value) {
+                let side = if i < 6 { "A" } else { "B" };
+                worst = RigidResidual { value, motion, row: format!("{side} {}", COMPONENTS[i % 6]) };
+            }
+        }
+    }
+    worst
+}
+
+/// Disagreement of `K_AA = Adᵀ K_BB Ad` and `K_AB = -Adᵀ K_BB`, `Ad = Ad_BA`.
+fn block_identity(
+    K: &Matrix12,
+    K_BB: &Matrix6<f64>,
+    s: &SVector<f64, 12>,
+    p_AB: &Vector3<f64>,
+) -> f64 {
+    let Ad_BA = lever(p_AB);
+    let K_AB = -Ad_BA.transpose() * K_BB;
+    let K_AA = -K_AB * Ad_BA;
+    let s_B = s.fixed_rows::<6>(6).into_owned();
+    let s_A = Ad_BA.abs().transpose() * s_B;
+    let mut worst: f64 = 0.0;
+    for i in 0..6 {
+        for j in 0..6 {
+            let in_AA = (K[(i, j)] - K_AA[(i, j)]).abs() / (s_A[i] * s_A[j]);
+            let in_AB = (K[(i, j + 6)] - K_AB[(i, j)]).abs() / (s_A[i] * s_B[j]);
+            worst = worst.max(in_AA).max(in_AB);
+        }
+    }
+    worst
+}
+
+/// `Ad_BA` of two frames with parallel axes, `p = p_AB`.
+pub(crate) fn lever(p_AB: &Vector3<f64>) -> Matrix6<f64> {
+    adjoint(&Pose::translation(-p_AB.x, -p_AB.y, -p_AB.z))
+}
+
+/// The vector from A to B that the matrix itself implies through `Ad_BA = -K_BB⁻¹ K_BA`.
+///
+/// `None` where the matrix says nothing of the kind (its blocks are not related by a lever at all).
+fn implied_lever(K: &Matrix12) -> Option<Vector3<f64>> {
+    let K_BB = K.fixed_view::<6, 6>(6, 6).into_owned();
+    let Ad_BA = -K_BB.try_inverse()? * K.fixed_view::<6, 6>(6, 0);
+    let p = Vector3::new(
+        Ad_BA[(1, 5)] - Ad_BA[(2, 4)],
+        Ad_BA[(2, 3)] - Ad_BA[(0, 5)],
+        Ad_BA[(0, 4)] - Ad_BA[(1, 3)],
+    ) * -0.5;
+    let p_AB = -p;
+    let difference = Ad_BA - lever(&p_AB);
+    let size = 1.0 + p_AB.norm();
+    (difference.amax() <= 1e-3 * size).then_some(p_AB)
+}

@@ -1,0 +1,63 @@
+//! Beam elements, reduced link matrices with their checks, and the reduced-link file.
+//!
+//! A robot link that bends is described here once, statically and completely: by the 6×6 stiffness
+//! `K_BB` of its distal interface with the proximal one held, by the frames of the two interfaces,
+//! and by the two rigid parts into which it is cut at the split frame S. Every source ends in the
+//! same [`ReducedLink`]: a beam in closed form ([`BeamLink`]), a 12×12 or 6×6 matrix from an FE
+//! program ([`ReducedLink::from_matrix12`], [`ReducedLink::from_matrix6`]), a `.flex` file
+//! ([`read_flex`]).
+//!
+//! ```
+//! use flexarm_fem::{BeamLink, Material, Section, parse_flex, write_flex};
+//!
+//! // A hollow aluminium arm of 1.095 m; joint frames at its two ends, x along the arm.
+//! let section = Section::Box { width: 0.160, height: 0.120, wall: 0.010 };
+//! let arm = BeamLink::new("lower_arm", section, Material::ALUMINIUM, 1.095).reduce()?;
+//! assert!((arm.mass() - 2700.0 * 5.2e-3 * 1.095).abs() < 1e-9);
+//!
+//! // 1 kN across the tip, along link y, bends it by 0.4 mm.
+//! let u_B = arm.tip_compliance()? * nalgebra::vector![0.0, 1000.0, 0.0, 0.0, 0.0, 0.0];
+//! assert!((u_B[1] - 0.379e-3).abs() < 1e-6);
+//!
+//! // The link as a file, and back, unchanged.
+//! let text = write_flex(&arm);
+//! assert_eq!(parse_flex(&text, "lower_arm.flex")?, arm);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! Frames: L link, A proximal and B distal interface, S split, E the axes of a beam. Order: linear
+//! first, angular second (`u_x u_y u_z theta_x theta_y theta_z`). SI units: m, kg, N, rad.
+//!
+//! Not here: joints, robots, time. Units other than SI exist only inside [`flex_file`].
+#![allow(
+    non_snake_case,
+    reason = "monogram notation: X_LB is the pose of B in L, K_BB a stiffness block, EI_y a product"
+)]
+#![cfg_attr(
+    test,
+    allow(clippy::unwrap_used, reason = "a test stops at the first failure")
+)]
+
+pub mod beam;
+pub mod beam_link;
+pub mod error;
+pub mod flex_file;
+pub mod gate;
+pub mod material;
+pub mod reduced;
+pub mod rigid_part;
+pub mod section;
+pub mod spatial;
+
+pub use beam::{Beam, BeamTheory};
+pub use beam_link::BeamLink;
+pub use error::{Direction, FemError};
+pub use flex_file::{FlexErrorKind, FlexFileError, parse_flex, read_flex, write_flex};
+pub use gate::{GateLimits, GateReport};
+pub use material::Material;
+pub use reduced::{
+    ElasticSplit, LinkFrames, Provenance, ReducedLink, drop_coupling, stiffness_at_split,
+};
+pub use rigid_part::RigidPart;
+pub use section::{Bar, Section, SectionProperties};
+pub use spatial::{Matrix12, Pose};

@@ -1,0 +1,303 @@
+//! The reduced link: everything static about a link with two interfaces, in one 6×6 and two rigid parts.
+//!
+//! ```text
+//! F_B = K_BB u_B        wrench and displacement at Bo, link axes, A held
+//! K_AA = Adᵀ K_BB Ad,   K_AB = -Adᵀ K_BB,   Ad = Ad_BA
+//! K_S = Ad_BSᵀ K_BB Ad_BS
+//! ```
+//! A 12×12 of an FE program therefore holds no more than its `K_BB`, and the elastic joint at the
+//! split frame S gives B exactly the displacement of the FE model under any wrench at B, wherever S
+//! lies. The two parts are rigid, so sag under distributed weight and frequencies are approximate.
+//!
+//! Start at [`ReducedLink::from_matrix12`] and [`ReducedLink::from_matrix6`]; beams come from
+//! [`BeamLink`](crate::BeamLink), files from [`read_flex`](crate::read_flex).
+//!
+//! Not here: more than two interfaces, modes, reduction of meshes.
+
+use nalgebra::{Matrix6, Vector3};
+
+use crate::error::FemError;
+use crate::gate::{GateLimits, GateReport, check_matrix6, check_matrix12, lever};
+use crate::rigid_part::RigidPart;
+use crate::spatial::{Matrix12, Pose, adjoint, symmetric_part};
+
+/// No link is longer than this, m: a larger distance is a mistake in the units.
+const LONGEST_LINK: f64 = 100.0;
+
+/// The three frames of a link, in its own frame L.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LinkFrames {
+    /// Proximal interface.
+    pub X_LA: Pose,
+    /// Distal interface.
+    pub X_LB: Pose,
+    /// Split: where the elastic joint sits, and in whose axes `K_S` is given.
+    pub X_LS: Pose,
+}
+
+/// Elastic joint between the two parts of a link.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ElasticSplit {
+    /// Split frame in the link frame.
+    pub X_LS: Pose,
+    /// Stiffness of the joint at So, in S axes, [N/m, N/rad; N·m/m, N·m/rad].
+    pub K_S: Matrix6<f64>,
+}
+
+/// Where the numbers of a link come from; free text but for `method`.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Provenance {
+    /// Program, drawing or data set.
+    pub source: String,
+    /// How the stiffness was found: "guyan", "beam timoshenko", ...
+    pub method: String,
+    /// How the interfaces are tied: "rigid", "distributing", ...
+    pub tie: String,
+    /// Units of the source before conversion.
+    pub units: String,
+    /// Day of the calculation, ISO 8601.
+    pub date: String,
+    /// Anything else.
+    pub note: String,
+}
+
+/// A link with two interfaces, reduced; what every source delivers. SI units.
+///
+/// The constructors check; afterwards it is plain data.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReducedLink {
+    /// Name of the link.
+    pub name: String,
+    /// Proximal interface A in the link frame.
+    pub X_LA: Pose,
+    /// Distal interface B in the link frame.
+    pub X_LB: Pose,
+    /// Stiffness at Bo with A held, link axes, exactly symmetric.
+    pub K_BB: Matrix6<f64>,
+    /// The same stiffness as an elastic joint at the split.
+    pub split: ElasticSplit,
+    /// Rigid part on the side of A.
+    pub proximal: RigidPart,
+    /// Rigid part on the side of B.
+    pub distal: RigidPart,
+    /// Where the numbers come from.
+    pub provenance: Provenance,
+    /// What the gate measured on the source matrix.
+    pub checks: GateReport,
+}
+
+impl LinkFrames {
+    /// Frames with S midway between A and B, in link axes.
+    pub fn new(X_LA: Pose, X_LB: Pose) -> Self {
+        Self { X_LA, X_LB, X_LS: Pose::identity() }.with_split_fraction(0.5)
+    }
+
+    /// S on the straight line from A to B, in link axes.
+    pub fn with_split_fraction(self, fraction: f64) -> Self {
+        let p_LA = self.X_LA.translation.vector;
+        let p_LS = p_LA + self.p_AB() * fraction;
+        self.with_split(Pose::translation(p_LS.x, p_LS.y, p_LS.z))
+    }
+
+    /// S anywhere.
+    pub fn with_split(self, X_LS: Pose) -> Self {
+        Self { X_LS, ..self }
+    }
+
+    /// From A to B, link axes, m.
+    pub fn p_AB(&self) -> Vector3<f64> {
+        self.X_LB.translation.vector - self.X_LA.translation.vector
+    }
+
+    /// S in the frame with origin Bo and link axes, in which `K_BB` lives.
+    fn X_BS(&self) -> Pose {
+        let p = self.X_LB.translation.vector;
+        Pose::translation(-p.x, -p.y, -p.z) * self.X_LS
+    }
+
+    fn check(&self) -> Result<(), FemError> {
+        for (what, X) in [
+            ("position of interface A (m)", &self.X_LA),
+            ("position of interface B (m)", &self.X_LB),
+            ("position of the split S (m)", &self.X_LS),
+        ] {
+            let far = X.translation.vector.amax();
+            if !(far <= LONGEST_LINK) {
+                return Err(FemError::OutOfRange {
+                    what: what.into(),
+                    found: far,
+                    allowed: format!("up to {LONGEST_LINK} from the link origin; is it in millimetres?"),
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+impl ReducedLink {
+    /// Link from a 12×12 stiffness of its two interfaces, A then B, both in *link axes*.
+    ///
+    /// * `K`: `F = K [u_A; u_B]`, [N/m, N/rad; N·m/m, N·m/rad], at Ao and Bo.
+    /// * `parts`: proximal and distal rigid part.
+    ///
+    /// # Errors
+    /// Those of [`check_matrix12`] (not symmetric, moves under rigid motion, singular, ...),
+    /// [`FemError::OutOfRange`] for frames, and those of [`RigidPart::check`].
+    pub fn from_matrix12(
+        name: impl Into<String>,
+        frames: LinkFrames,
+        K: &Matrix12,
+        parts: [RigidPart; 2],
+        provenance: Provenance,
+        limits: &GateLimits,
+    ) -> Result<Self, FemError> {
+        frames.check()?;
+        let (K_BB, checks) = check_matrix12(K, &frames.p_AB(), limits)?;
+        Self::assemble(name.into(), frames, K_BB, checks, parts, provenance)
+    }
+
+    /// Link from the 6×6 stiffness at Bo with A held, in *link axes*.
+    ///
+    /// Less can be checked than in a 12×12: symmetry and positive definiteness.
+    ///
+    /// # Errors
+    /// As [`Self::from_matrix12`].
+    pub fn from_matrix6(
+        name: impl Into<String>,
+        frames: LinkFrames,
+        K_BB: &Matrix6<f64>,
+        parts: [RigidPart; 2],
+        provenance: Provenance,
+        limits: &GateLimits,
+    ) -> Result<Self, FemError> {
+        frames.check()?;
+        let (K_BB, checks) = check_matrix6("K_BB", K_BB, limits)?;
+        Self::assemble(name.into(), frames, K_BB, checks, parts, provenance)
+    }
+
+    fn assemble(
+        name: String,
+        frames: LinkFrames,
+        K_BB: Matrix6<f64>,
+        checks: GateReport,
+        [proximal, distal]: [RigidPart; 2],
+        provenance: Provenance,
+    ) -> Result<Self, FemError> {
+        proximal.check("the proximal part")?;
+        distal.check("the distal part")?;
+        let split = elastic_split(&frames, &K_BB)?;
+        let LinkFrames { X_LA, X_LB, .. } = frames;
+        Ok(Self { name, X_LA, X_LB, K_BB, split, proximal, distal, provenance, checks })
+    }
+
+    /// The frames of the link.
+    pub fn frames(&self) -> LinkFrames {
+        LinkFrames { X_LA: self.X_LA, X_LB: self.X_LB, X_LS: self.split.X_LS }
+    }
+
+    /// Mass of both parts, kg.
+    pub fn mass(&self) -> f64 {
+        self.proximal.mass + self.distal.mass
+    }
+
+    /// Both parts as one rigid body: the link of the rigid twin.
+    pub fn rigid(&self) -> RigidPart {
+        self.proximal.merged(&self.distal)
+    }
+
+    /// From A to B, link axes, m.
+    pub fn p_AB(&self) -> Vector3<f64> {
+        self.frames().p_AB()
+    }
+
+    /// Compliance `C_BB = K_BB⁻¹` at Bo with A held, link axes.
+    ///
+    /// # Errors
+    /// [`FemError::NotPositiveDefinite`] if `K_BB` was changed into a singular matrix by hand.
+    pub fn tip_compliance(&self) -> Result<Matrix6<f64>, FemError> {
+        let (K_BB, _) = check_matrix6("K_BB", &self.K_BB, &GateLimits::default())?;
+        let scale = K_BB.diagonal().map(|k| 1.0 / k.sqrt());
+        let scaled = K_BB.component_mul(&(scale * scale.transpose()));
+        let inverse = scaled.cholesky().map(|factor| factor.inverse());
+        inverse
+            .map(|C| symmetric_part(&C.component_mul(&(scale * scale.transpose()))))
+            .ok_or_else(|| FemError::NotPositiveDefinite {
+                what: "K_BB",
+                min_eigenvalue: 0.0,
+                allowed: GateLimits::default().min_eigenvalue,
+                direction: crate::Direction(vec![0.0; 6]),
+            })
+    }
+
+    /// Stiffness of both interfaces, 12×12, A then B, link axes: the way back to FE programs.
+    pub fn matrix12(&self) -> Matrix12 {
+        let Ad_BA = lever(&self.p_AB());
+        let K_AB = -Ad_BA.transpose() * self.K_BB;
+        let mut K = Matrix12::zeros();
+        K.fixed_view_mut::<6, 6>(0, 0).copy_from(&symmetric_part(&(-K_AB * Ad_BA)));
+        K.fixed_view_mut::<6, 6>(0, 6).copy_from(&K_AB);
+        K.fixed_view_mut::<6, 6>(6, 0).copy_from(&K_AB.transpose());
+        K.fixed_view_mut::<6, 6>(6, 6).copy_from(&self.K_BB);
+        K
+    }
+
+    /// The same link with its elastic joint moved to another frame. The parts stay as they are cut.
+    ///
+    /// # Errors
+    /// Those of [`stiffness_at_split`].
+    pub fn with_split(&self, X_LS: Pose) -> Result<Self, FemError> {
+        let frames = self.frames().with_split(X_LS);
+        frames.check()?;
+        let split = elastic_split(&frames, &self.K_BB)?;
+        Ok(Self { split, ..self.clone() })
+    }
+
+    /// The link a plain spring model makes of this one: `K_S` reduced to its diagonal.
+    ///
+    /// Only to show what that costs; `K_BB` follows, so that the link stays one consistent thing.
+    pub fn without_coupling(&self) -> Self {
+        let K_S = drop_coupling(&self.split.K_S);
+        let Ad_SB = adjoint(&self.frames().X_BS().inverse());
+        let K_BB = symmetric_part(&(Ad_SB.transpose() * K_S * Ad_SB));
+        let split = ElasticSplit { X_LS: self.split.X_LS, K_S };
+        Self { K_BB, split, ..self.clone() }
+    }
+}
+
+fn elastic_split(frames: &LinkFrames, K_BB: &Matrix6<f64>) -> Result<ElasticSplit, FemError> {
+    let K_S = stiffness_at_split(K_BB, &frames.X_BS())?;
+    Ok(ElasticSplit { X_LS: frames.X_LS, K_S })
+}
+
+/// Stiffness `K_S` of the elastic joint at S that gives the distal end the stiffness `K_BB`.
+///
+/// ```text
+/// u_B = Ad_BS d_S,    K_S = Ad_BSᵀ K_BB Ad_BS
+/// ```
+/// Exact to first order for every wrench at B, wherever S lies. `K_S` couples force and rotation
+/// even where the beam is straight; see [`drop_coupling`] for what ignoring that means.
+///
+/// * `K_BB`: [N/m, N/rad; N·m/m, N·m/rad], at Bo, with A held.
+/// * `X_BS`: pose of S in the frame at Bo in whose axes `K_BB` is given, translation in m.
+///
+/// Returns `K_S`, same units, at So, in S axes, exactly symmetric.
+///
+/// # Errors
+/// [`FemError::NotFinite`], [`FemError::NotSymmetric`], [`FemError::NotPositiveDefinite`].
+///
+/// # Source
+/// Change of reference point and axes of a quadratic form; Fjellstedt (2019), section 4.3.
+pub fn stiffness_at_split(K_BB: &Matrix6<f64>, X_BS: &Pose) -> Result<Matrix6<f64>, FemError> {
+    let (K_BB, _) = check_matrix6("K_BB", K_BB, &GateLimits::default())?;
+    let Ad_BS = adjoint(X_BS);
+    let K_S = symmetric_part(&(Ad_BS.transpose() * K_BB * Ad_BS));
+    // Far levers can make it too large, or bury the translations under rounding.
+    check_matrix6("K_S", &K_S, &GateLimits::default()).map(|_| K_S)
+}
+
+/// The diagonal of `K_S`: six separate springs, as plain spring models have them.
+///
+/// Wrong by tens of per cent wherever `K_S` is coupled; kept only to show that.
+pub fn drop_coupling(K_S: &Matrix6<f64>) -> Matrix6<f64> {
+    Matrix6::from_diagonal(&K_S.diagonal())
+}

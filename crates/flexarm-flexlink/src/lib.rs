@@ -1,0 +1,1 @@
+//! Substitution of rigid links by flexible ones on the tree

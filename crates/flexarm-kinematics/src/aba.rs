@@ -1,0 +1,270 @@
+//! Forward and hybrid dynamics by articulated bodies, O(n).
+//!
+//! Every joint is either free (its force is given, its acceleration wanted) or prescribed (the other way
+//! round). A free elastic joint has a square, invertible motion subspace: it passes on exactly its own
+//! wrench and no inertia, so the tree falls apart there and each piece is solved by itself.
+//!
+//! Source: [Featherstone 2008], Table 7.1 (articulated bodies) and section 9.2 (hybrid dynamics).
+
+use nalgebra::{Cholesky, DVector, Matrix3, Vector3};
+
+use crate::data::{Data, State, add_projection, joint_motion, subspace_times};
+use crate::model::{JointMotion, Model};
+use crate::rnea::nonlinear_effects;
+use crate::spatial::{ArticulatedInertia, Twist, Wrench};
+
+/// Which joints are prescribed; the rest are free.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Roles {
+    prescribed_body: Vec<bool>,
+    free_coordinates: Vec<usize>,
+    /// A free coordinate moves several joints: the recursion does not apply, the mass matrix does.
+    dense: bool,
+}
+
+impl Roles {
+    /// Nothing prescribed.
+    pub fn all_free(model: &Model) -> Self {
+        Self::new(model, |_| false)
+    }
+
+    /// Actuated joints prescribed, elastic ones free.
+    pub fn actuated_prescribed(model: &Model) -> Self {
+        Self::new(model, |k| k < model.n_actuated())
+    }
+
+    /// Coordinates for which `prescribed(index)` holds; all six of an elastic joint follow its first.
+    pub fn new(model: &Model, prescribed: impl Fn(usize) -> bool) -> Self {
+        let mut roles = Self { prescribed_body: vec![false; model.bodies.len()], free_coordinates: vec![], dense: false };
+        for (i, body) in model.bodies.iter().enumerate().skip(1) {
+            roles.prescribed_body[i] = prescribed(body.coordinate);
+        }
+        for (k, coordinate) in model.coordinates().iter().enumerate() {
+            if !roles.prescribed_body[coordinate.body] {
+                roles.free_coordinates.push(k);
+                let movers = model.bodies[1..].iter().filter(|b| b.coordinate == k).count();
+                roles.dense |= movers > 1;
+            }
+        }
+        roles
+    }
+
+    /// Indices of the free coordinates, ascending.
+    pub fn free_coordinates(&self) -> &[usize] {
+        &self.free_coordinates
+    }
+}
+
+/// Accelerations q̈ for the generalised forces `tau` (all joints free). Fills `data.{X_PB, V, A, qddot}`.
+///
+/// O(n), no allocation; with mimic joints O(n³) by the mass matrix.
+pub fn forward_dynamics<'d>(
+    model: &Model,
+    data: &'d mut Data,
+    state: &State,
+    roles_all_free: &Roles,
+    tau: &DVector<f64>,
+) -> &'d DVector<f64> {
+    data.tau.copy_from(tau);
+    solve(model, data, state, roles_all_free);
+    &data.qddot
+}
+
+/// Free accelerations and prescribed forces.
+///
+/// On entry `qddot` holds the accelerations of the prescribed coordinates and `tau` the forces of the free
+/// ones; on return both are complete. External wrenches in `data.F_ext` act. Fills `data.{X_PB, V, A}`.
+/// O(n), no allocation (dense where a free coordinate is mimicked).
+pub fn hybrid_dynamics(
+    model: &Model,
+    data: &mut Data,
+    state: &State,
+    roles: &Roles,
+    qddot: &mut DVector<f64>,
+    tau: &mut DVector<f64>,
+) {
+    data.tau.copy_from(tau);
+    data.qddot.copy_from(qddot);
+    solve(model, data, state, roles);
+    tau.copy_from(&data.tau);
+    qddot.copy_from(&data.qddot);
+}
+
+fn solve(model: &Model, data: &mut Data, state: &State, roles: &Roles) {
+    if roles.dense {
+        solve_dense(model, data, state, roles);
+    } else {
+        solve_articulated(model, data, state.q.as_slice(), state.qdot.as_slice(), &roles.prescribed_body);
+    }
+}
+
+#[inline(always)]
+fn solve_articulated(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], prescribed: &[bool]) {
+    let n = model.bodies.len();
+    data.V[0] = Twist::zeros();
+    for i in 1..n {
+        let body = &model.bodies[i];
+        let (V_PB, bias) = joint_motion(model, data, i, q, qdot);
+        let V = data.V[body.parent].at_child(&data.X_PB[i]) + V_PB;
+        let mut c = bias + V.cross(&V_PB);
+        if prescribed[i] {
+            c += subspace_times(model, data, i, data.qddot.as_slice());
+        }
+        data.V[i] = V;
+        data.bias[i] = c;
+        data.pA[i] = V.cross_force(&body.inertia.mul_twist(&V)) - data.F_ext[i];
+        data.articulated[i] = ArticulatedInertia::from_rigid(&body.inertia);
+    }
+
+    for i in (1..n).rev() {
+        let body = &model.bodies[i];
+        let (pA, c) = (data.pA[i], data.bias[i]);
+        let (passed_inertia, passed_force) = match body.motion {
+            _ if prescribed[i] => {
+                let I = data.articulated[i];
+                (Some(I), pA + I.mul_twist(&c))
+            }
+            JointMotion::Elastic(_) => {
+                let F = elastic_wrench(data, i, body.coordinate);
+                data.F[i] = F;
+                (None, F)
+            }
+            JointMotion::Revolute(axis) => {
+                let I = &data.articulated[i];
+                let U = Wrench::new(I.coupling * axis, I.angular * axis);
+                let d = axis.dot(&U.torque);
+                let u = data.tau[body.coordinate] * body.ratio - axis.dot(&pA.torque);
+                one_dof_inward(data, i, U, d, u, &c, pA)
+            }
+            JointMotion::Prismatic(axis) => {
+                let I = &data.articulated[i];
+                let U = Wrench::new(I.linear * axis, I.coupling.tr_mul(&axis));
+                let d = axis.dot(&U.force);
+                let u = data.tau[body.coordinate] * body.ratio - axis.dot(&pA.force);
+                one_dof_inward(data, i, U, d, u, &c, pA)
+            }
+        };
+        if body.parent > 0 {
+            let X_PB = data.X_PB[i];
+            if let Some(I) = passed_inertia {
+                let I_P = I.at_parent(&X_PB);
+                data.articulated[body.parent] += I_P;
+            }
+            data.pA[body.parent] += passed_force.at_parent(&X_PB);
+        }
+    }
+
+    data.A[0] = Twist::new(-model.gravity, Vector3::zeros());
+    for i in 1..n {
+        if prescribed[i] {
+            data.tau[model.bodies[i].coordinate] = 0.0;
+            if let JointMotion::Elastic(_) = model.bodies[i].motion {
+                data.tau.as_mut_slice()[model.bodies[i].coordinate..][..6].fill(0.0);
+            }
+        }
+    }
+    for i in 1..n {
+        let body = &model.bodies[i];
+        let k = body.coordinate;
+        let A = data.A[body.parent].at_child(&data.X_PB[i]) + data.bias[i];
+        data.A[i] = match body.motion {
+            _ if prescribed[i] => {
+                let F = data.articulated[i].mul_twist(&A) + data.pA[i];
+                let S = data.elastic[i];
+                add_projection(model, &S, i, &F, data.tau.as_mut_slice());
+                A
+            }
+            JointMotion::Revolute(axis) => {
+                let qddot = data.inverse_d[i] * (data.u[i] - A.power(&data.U[i]));
+                data.qddot[k] = qddot / body.ratio;
+                Twist::new(A.linear, A.angular + axis * qddot)
+            }
+            JointMotion::Prismatic(axis) => {
+                let qddot = data.inverse_d[i] * (data.u[i] - A.power(&data.U[i]));
+                data.qddot[k] = qddot / body.ratio;
+                Twist::new(A.linear + axis * qddot, A.angular)
+            }
+            JointMotion::Elastic(_) => {
+                let A_B = solve_inertia(&data.articulated[i], &(data.F[i] - data.pA[i]));
+                let relative = A_B - A;
+                let S = &data.elastic[i];
+                let linear = S.L.tr_mul(&relative.linear);
+                let angular = inverse_3x3(&S.B) * relative.angular;
+                data.qddot.as_mut_slice()[k..k + 3].copy_from_slice(linear.as_slice());
+                data.qddot.as_mut_slice()[k + 3..k + 6].copy_from_slice(angular.as_slice());
+                A_B
+            }
+        };
+    }
+}
+
+/// Inward step over a free one-DoF joint: what it passes to the parent, in B axes.
+#[inline(always)]
+fn one_dof_inward(
+    data: &mut Data,
+    i: usize,
+    U: Wrench,
+    d: f64,
+    u: f64,
+    c: &Twist,
+    pA: Wrench,
+) -> (Option<ArticulatedInertia>, Wrench) {
+    let inverse_d = 1.0 / d;
+    data.U[i] = U;
+    data.inverse_d[i] = inverse_d;
+    data.u[i] = u;
+    let mut I = data.articulated[i];
+    I.rank_one_update(&U, inverse_d);
+    (Some(I), pA + I.mul_twist(c) + U * (u * inverse_d))
+}
+
+/// `F_B = S^-T τ`: the wrench that a free elastic joint puts on B, in B axes.
+#[inline(always)]
+fn elastic_wrench(data: &Data, i: usize, k: usize) -> Wrench {
+    let S = &data.elastic[i];
+    let tau = data.tau.as_slice();
+    // L is a rotation: L^-T = L.
+    let force = S.L * Vector3::new(tau[k], tau[k + 1], tau[k + 2]);
+    let torque = inverse_3x3(&S.B).tr_mul(&Vector3::new(tau[k + 3], tau[k + 4], tau[k + 5]));
+    Wrench::new(force, torque)
+}
+
+/// Inverse by cofactors.
+#[inline(always)]
+fn inverse_3x3(B: &Matrix3<f64>) -> Matrix3<f64> {
+    let (a, b, c) = (B.column(0).into_owned(), B.column(1).into_owned(), B.column(2).into_owned());
+    let (r0, r1, r2) = (b.cross(&c), c.cross(&a), a.cross(&b));
+    let s = 1.0 / a.dot(&r0);
+    Matrix3::from_columns(&[r0 * s, r1 * s, r2 * s]).transpose()
+}
+
+/// `I^-1 F` by block elimination of the linear part.
+#[inline(always)]
+fn solve_inertia(I: &ArticulatedInertia, F: &Wrench) -> Twist {
+    let linear_inverse = inverse_3x3(&I.linear);
+    let G = linear_inverse * I.coupling;
+    let complement = I.angular - I.coupling.tr_mul(&G);
+    let angular = inverse_3x3(&complement) * (F.torque - G.tr_mul(&F.force));
+    Twist::new(linear_inverse * F.force - G * angular, angular)
+}
+
+/// `M_ff q̈_f = τ_f - bias_f - M_fp q̈_p` by Cholesky; then the prescribed forces from RNEA.
+fn solve_dense(model: &Model, data: &mut Data, state: &State, roles: &Roles) {
+    let tau = data.tau.clone();
+    let mut qddot = data.qddot.clone();
+    let free = &roles.free_coordinates;
+    for &k in free {
+        qddot[k] = 0.0;
+    }
+    nonlinear_effects(model, data, state);
+    let bias = data.tau.clone();
+    crate::crba::mass_matrix_at_poses(model, data);
+    let right = &tau - bias - &data.M * &qddot;
+    let M_ff = data.M.select_rows(free).select_columns(free);
+    let solved = Cholesky::new(M_ff).expect("a mass matrix is positive definite").solve(&right.select_rows(free));
+    for (&k, a) in free.iter().zip(solved.iter()) {
+        qddot[k] = *a;
+    }
+    crate::rnea::inverse_dynamics(model, data, state, &qddot);
+    data.qddot.copy_from(&qddot);
+}

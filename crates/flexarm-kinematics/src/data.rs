@@ -1,0 +1,222 @@
+//! State and workspaces: what changes while the model stays.
+//!
+//! [`State`] is small and copyable between steppers; [`Data`] holds results and scratch of every algorithm,
+//! sized once by [`Data::new`], so that no algorithm allocates. Threads share a `Model`, each with its own `Data`.
+
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Vector3, Vector6};
+
+use crate::model::{JointMotion, Model};
+use crate::spatial::{ArticulatedInertia, Pose, SpatialInertia, Twist, Wrench};
+
+/// Positions and velocities of all independent coordinates, in the model's coordinate order.
+#[derive(Clone, Debug, PartialEq)]
+pub struct State {
+    /// Positions [rad or m].
+    pub q: DVector<f64>,
+    /// Velocities [rad/s or m/s].
+    pub qdot: DVector<f64>,
+}
+
+impl State {
+    /// All coordinates zero, at rest.
+    pub fn zeros(model: &Model) -> Self {
+        Self { q: DVector::zeros(model.nv()), qdot: DVector::zeros(model.nv()) }
+    }
+}
+
+/// Motion subspace of an elastic joint in B axes: `V_PB_B = [L d'; B angles']`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ElasticSubspace {
+    /// `R_PBᵀ` on the translation rates.
+    pub(crate) L: Matrix3<f64>,
+    /// Rate map of the angles.
+    pub(crate) B: Matrix3<f64>,
+}
+
+/// Results and workspaces; see the function that fills each field.
+#[derive(Clone, Debug)]
+pub struct Data {
+    /// Pose of each body in its parent.
+    pub X_PB: Vec<Pose>,
+    /// Pose of each body in the world ([`crate::forward_kinematics`]).
+    pub X_WB: Vec<Pose>,
+    /// Twist `V_WB_B` of each body at Bo in B axes.
+    pub V: Vec<Twist>,
+    /// Spatial acceleration `As_WB_B`, minus gravity where the algorithm says so.
+    pub A: Vec<Twist>,
+    /// Wrench that the joint puts on each body, at Bo in B axes ([`crate::inverse_dynamics`]).
+    pub F: Vec<Wrench>,
+    /// External wrench on each body, at Bo in B axes; set by the caller, zero at the start.
+    pub F_ext: Vec<Wrench>,
+    /// Generalised forces.
+    pub tau: DVector<f64>,
+    /// Generalised accelerations.
+    pub qddot: DVector<f64>,
+    /// Mass matrix, both triangles ([`crate::mass_matrix`]).
+    pub M: DMatrix<f64>,
+
+    pub(crate) elastic: Vec<ElasticSubspace>,
+    pub(crate) bias: Vec<Twist>,
+    pub(crate) composite: Vec<SpatialInertia>,
+    pub(crate) articulated: Vec<ArticulatedInertia>,
+    pub(crate) pA: Vec<Wrench>,
+    /// One-DoF joints: U = I S, 1/(Sᵀ U), u.
+    pub(crate) U: Vec<Wrench>,
+    pub(crate) inverse_d: Vec<f64>,
+    pub(crate) u: Vec<f64>,
+    /// Elastic joints: lower Cholesky factor of the articulated inertia; wrench across the joint.
+    pub(crate) factor: Vec<Matrix6<f64>>,
+    pub(crate) columns: Vec<Matrix6<f64>>,
+    pub(crate) V_W: Vec<Twist>,
+    pub(crate) scratch: Vec<f64>,
+    pub(crate) factor_n: Option<nalgebra::Cholesky<f64, nalgebra::Dyn>>,
+}
+
+impl Data {
+    /// Workspaces for a model.
+    pub fn new(model: &Model) -> Self {
+        let n = model.bodies.len();
+        let zero = Twist::zeros();
+        Self {
+            X_PB: vec![Pose::identity(); n],
+            X_WB: vec![Pose::identity(); n],
+            V: vec![zero; n],
+            A: vec![zero; n],
+            F: vec![Wrench::zeros(); n],
+            F_ext: vec![Wrench::zeros(); n],
+            tau: DVector::zeros(model.nv()),
+            qddot: DVector::zeros(model.nv()),
+            M: DMatrix::zeros(model.nv(), model.nv()),
+            elastic: vec![ElasticSubspace { L: Matrix3::identity(), B: Matrix3::identity() }; n],
+            bias: vec![zero; n],
+            composite: vec![SpatialInertia::zeros(); n],
+            articulated: vec![ArticulatedInertia::from_rigid(&SpatialInertia::zeros()); n],
+            pA: vec![Wrench::zeros(); n],
+            U: vec![Wrench::zeros(); n],
+            inverse_d: vec![0.0; n],
+            u: vec![0.0; n],
+            factor: vec![Matrix6::zeros(); n],
+            columns: vec![Matrix6::zeros(); n],
+            V_W: vec![zero; n],
+            scratch: vec![0.0; model.nv()],
+            factor_n: None,
+        }
+    }
+
+    /// Sets all external wrenches to zero.
+    pub fn clear_external_wrenches(&mut self) {
+        self.F_ext.fill(Wrench::zeros());
+    }
+
+    /// Pose of a frame in the world, from the last [`crate::forward_kinematics`].
+    pub fn X_WF(&self, frame: &crate::model::Frame) -> Pose {
+        self.X_WB[frame.body] * frame.X_BF
+    }
+}
+
+/// Joint pose, joint twist and its bias in B axes; fills `X_PB`, `elastic` for one body.
+///
+/// `V_PB_B = S q̇` and `bias = dS/dt q̇` (zero for one-DoF joints).
+#[inline(always)]
+pub(crate) fn joint_motion(model: &Model, data: &mut Data, i: usize, q: &[f64], qdot: &[f64]) -> (Twist, Twist) {
+    let body = &model.bodies[i];
+    let k = body.coordinate;
+    match body.motion {
+        JointMotion::Revolute(axis) => {
+            joint_position(model, data, i, q);
+            (Twist::new(Vector3::zeros(), axis * (body.ratio * qdot[k])), Twist::zeros())
+        }
+        JointMotion::Prismatic(axis) => {
+            joint_position(model, data, i, q);
+            (Twist::new(axis * (body.ratio * qdot[k]), Vector3::zeros()), Twist::zeros())
+        }
+        JointMotion::Elastic(angles) => {
+            let (q, qdot) = (&q[k..k + 6], &qdot[k..k + 6]);
+            let ddot = Vector3::new(qdot[0], qdot[1], qdot[2]);
+            let rates = Vector3::new(qdot[3], qdot[4], qdot[5]);
+            let kin = angles.kinematics(&Vector3::new(q[3], q[4], q[5]), &rates);
+            place_elastic(&mut data.X_PB[i], &body.X_PJ, &kin.R, &Vector3::new(q[0], q[1], q[2]));
+            let L = kin.R.transpose();
+            data.elastic[i] = ElasticSubspace { L, B: kin.B };
+            let V = Twist::new(L * ddot, kin.B * rates);
+            // d(R_PBᵀ)/dt d' = -w × (R_PBᵀ d')
+            (V, Twist::new(V.linear.cross(&V.angular), kin.bias))
+        }
+    }
+}
+
+/// Joint pose alone; fills `X_PB` and `elastic` for one body.
+#[inline(always)]
+pub(crate) fn joint_position(model: &Model, data: &mut Data, i: usize, q: &[f64]) {
+    let body = &model.bodies[i];
+    let k = body.coordinate;
+    match body.motion {
+        JointMotion::Revolute(_) => {
+            let (s, c) = (body.ratio * q[k] + body.offset).sin_cos();
+            let turn = &body.turn;
+            let X = &mut data.X_PB[i];
+            *X.rotation.matrix_mut_unchecked() = turn.K0 + turn.K1 * s + turn.K2 * c;
+            X.translation = body.X_PJ.translation;
+        }
+        JointMotion::Prismatic(axis) => {
+            let X = &mut data.X_PB[i];
+            X.rotation = body.X_PJ.rotation;
+            X.translation.vector =
+                body.X_PJ.translation.vector + body.X_PJ.rotation * (axis * (body.ratio * q[k] + body.offset));
+        }
+        JointMotion::Elastic(angles) => {
+            let kin = angles.kinematics(&Vector3::new(q[k + 3], q[k + 4], q[k + 5]), &Vector3::zeros());
+            place_elastic(&mut data.X_PB[i], &body.X_PJ, &kin.R, &Vector3::new(q[k], q[k + 1], q[k + 2]));
+            data.elastic[i] = ElasticSubspace { L: kin.R.transpose(), B: kin.B };
+        }
+    }
+}
+
+#[inline(always)]
+fn place_elastic(X_PB: &mut Pose, X_PJ: &Pose, R: &Matrix3<f64>, d: &Vector3<f64>) {
+    *X_PB.rotation.matrix_mut_unchecked() = X_PJ.rotation.matrix() * R;
+    X_PB.translation.vector = X_PJ.translation.vector + X_PJ.rotation * d;
+}
+
+/// `S q̈` in B axes.
+#[inline(always)]
+pub(crate) fn subspace_times(model: &Model, data: &Data, i: usize, qddot: &[f64]) -> Twist {
+    let body = &model.bodies[i];
+    let k = body.coordinate;
+    match body.motion {
+        JointMotion::Revolute(axis) => Twist::new(Vector3::zeros(), axis * (body.ratio * qddot[k])),
+        JointMotion::Prismatic(axis) => Twist::new(axis * (body.ratio * qddot[k]), Vector3::zeros()),
+        JointMotion::Elastic(_) => {
+            let S = &data.elastic[i];
+            Twist::new(
+                S.L * Vector3::new(qddot[k], qddot[k + 1], qddot[k + 2]),
+                S.B * Vector3::new(qddot[k + 3], qddot[k + 4], qddot[k + 5]),
+            )
+        }
+    }
+}
+
+/// `tau += Sᵀ F`.
+#[inline(always)]
+pub(crate) fn add_projection(model: &Model, data_elastic: &ElasticSubspace, i: usize, F: &Wrench, tau: &mut [f64]) {
+    let body = &model.bodies[i];
+    let k = body.coordinate;
+    match body.motion {
+        JointMotion::Revolute(axis) => tau[k] += body.ratio * axis.dot(&F.torque),
+        JointMotion::Prismatic(axis) => tau[k] += body.ratio * axis.dot(&F.force),
+        JointMotion::Elastic(_) => {
+            let f = data_elastic.L.tr_mul(&F.force);
+            let t = data_elastic.B.tr_mul(&F.torque);
+            for c in 0..3 {
+                tau[k + c] += f[c];
+                tau[k + 3 + c] += t[c];
+            }
+        }
+    }
+}
+
+/// Six components of a generalised vector as a `Vector6`.
+#[inline(always)]
+pub(crate) fn six(v: &[f64], k: usize) -> Vector6<f64> {
+    Vector6::new(v[k], v[k + 1], v[k + 2], v[k + 3], v[k + 4], v[k + 5])
+}

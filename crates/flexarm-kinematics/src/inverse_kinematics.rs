@@ -1,0 +1,151 @@
+//! Inverse kinematics: joint values that bring a frame to a pose (damped least squares with limits).
+//!
+//! Levenberg-Marquardt on the pose error `[p_target - p; log(R_target Rᵀ)]` in world axes, steps clamped
+//! into the joint limits; joints that a limit holds are left out of the next step when it would push
+//! them further out. Elastic coordinates stay as they are in the start value.
+//!
+//! Source: [Nakamura & Hanafusa 1986], [Wampler 1986]; damping update as in [Marquardt 1963].
+
+use nalgebra::{DMatrix, DVector, Matrix6xX, Vector6};
+
+use crate::data::Data;
+use crate::kinematics::{forward_kinematics, frame_jacobian};
+use crate::model::{Frame, Model};
+use crate::rotation::rotation_vector;
+use crate::spatial::Pose;
+
+/// Tolerances and bounds of the iteration.
+#[derive(Clone, Copy, Debug)]
+pub struct IkOptions {
+    /// Accepted position error [m].
+    pub position_tolerance_m: f64,
+    /// Accepted rotation error [rad].
+    pub rotation_tolerance_rad: f64,
+    /// Most iterations before giving up.
+    pub max_iterations: usize,
+    /// Length that weighs rotation against translation in the damped step [m].
+    pub characteristic_length_m: f64,
+}
+
+impl Default for IkOptions {
+    fn default() -> Self {
+        Self {
+            position_tolerance_m: 1e-10,
+            rotation_tolerance_rad: 1e-10,
+            max_iterations: 300,
+            characteristic_length_m: 0.5,
+        }
+    }
+}
+
+/// No joint values were found.
+#[derive(Debug, Clone, thiserror::Error)]
+#[error(
+    "inverse kinematics of frame {frame:?} stopped after {iterations} iterations {position_m:.3e} m and \
+     {rotation_rad:.3e} rad from the target{}: is it out of reach or near a singular pose?",
+    if at_limit.is_empty() { String::new() } else { format!(" with {at_limit:?} at their limits") }
+)]
+pub struct IkError {
+    /// Frame that was to reach the target.
+    pub frame: String,
+    /// Iterations done.
+    pub iterations: usize,
+    /// Remaining distance [m].
+    pub position_m: f64,
+    /// Remaining angle [rad].
+    pub rotation_rad: f64,
+    /// Joints that sit at a limit.
+    pub at_limit: Vec<String>,
+}
+
+/// Joint values, nv long, that bring `frame` to `X_WT`, starting from `q_start` (also nv long).
+///
+/// # Errors
+/// [`IkError`] when the target is not reached within tolerance.
+pub fn inverse_kinematics(
+    model: &Model,
+    data: &mut Data,
+    frame: &Frame,
+    X_WT: &Pose,
+    q_start: &DVector<f64>,
+    options: &IkOptions,
+) -> Result<DVector<f64>, IkError> {
+    let n = model.n_actuated();
+    let limits: Vec<(f64, f64)> = model.coordinates()[..n].iter().map(|c| (c.limits.lower, c.limits.upper)).collect();
+    let clamp = |q: &mut DVector<f64>| {
+        for (k, (lower, upper)) in limits.iter().enumerate() {
+            q[k] = q[k].max(*lower).min(*upper);
+        }
+    };
+    let mut q = q_start.clone();
+    clamp(&mut q);
+    let mut J = Matrix6xX::zeros(model.nv());
+    let mut error = pose_error(model, data, frame, X_WT, &q);
+    let mut damping = 1e-4;
+    let length = options.characteristic_length_m;
+    let weigh = |e: &Vector6<f64>| Vector6::from_fn(|i, _| if i < 3 { e[i] } else { e[i] * length });
+
+    for iteration in 0..options.max_iterations {
+        let (position_m, rotation_rad) = sizes(&error);
+        if position_m <= options.position_tolerance_m && rotation_rad <= options.rotation_tolerance_rad {
+            return Ok(q);
+        }
+        frame_jacobian(model, data, frame, &mut J);
+        let mut Jw = DMatrix::from_fn(6, n, |r, c| if r < 3 { J[(r, c)] } else { J[(r, c)] * length });
+        let e = weigh(&error);
+        // Joints held by a limit that the gradient pushes outward take no part.
+        let gradient = Jw.tr_mul(&e);
+        for k in 0..n {
+            let held = (q[k] <= limits[k].0 && gradient[k] < 0.0) || (q[k] >= limits[k].1 && gradient[k] > 0.0);
+            if held {
+                Jw.column_mut(k).fill(0.0);
+            }
+        }
+        // Try steps with growing damping until the error shrinks.
+        let scale = Jw.norm_squared().max(1e-12);
+        let mut improved = false;
+        for _ in 0..25 {
+            let A = Jw.tr_mul(&Jw) + DMatrix::identity(n, n) * (damping * scale);
+            let Some(factor) = A.cholesky() else { break };
+            let step = factor.solve(&Jw.tr_mul(&e));
+            let mut trial = q.clone();
+            trial.rows_mut(0, n).zip_apply(&step, |x, s| *x += s.clamp(-0.5, 0.5));
+            clamp(&mut trial);
+            let trial_error = pose_error(model, data, frame, X_WT, &trial);
+            if weigh(&trial_error).norm() < e.norm() {
+                (q, error) = (trial, trial_error);
+                damping = (damping * 0.1).max(1e-14);
+                improved = true;
+                break;
+            }
+            damping = (damping * 10.0).max(1e-14);
+        }
+        if !improved {
+            return Err(failure(model, frame, iteration + 1, &error, &q));
+        }
+    }
+    Err(failure(model, frame, options.max_iterations, &error, &q))
+}
+
+fn pose_error(model: &Model, data: &mut Data, frame: &Frame, X_WT: &Pose, q: &DVector<f64>) -> Vector6<f64> {
+    forward_kinematics(model, data, q);
+    let X = data.X_WF(frame);
+    let p = X_WT.translation.vector - X.translation.vector;
+    let r = rotation_vector((X_WT.rotation * X.rotation.inverse()).matrix());
+    Vector6::new(p.x, p.y, p.z, r.x, r.y, r.z)
+}
+
+fn sizes(e: &Vector6<f64>) -> (f64, f64) {
+    (e.fixed_rows::<3>(0).norm(), e.fixed_rows::<3>(3).norm())
+}
+
+fn failure(model: &Model, frame: &Frame, iterations: usize, error: &Vector6<f64>, q: &DVector<f64>) -> IkError {
+    let (position_m, rotation_rad) = sizes(error);
+    let at_limit = model.coordinates()[..model.n_actuated()]
+        .iter()
+        .enumerate()
+        .filter(|(k, c)| q[*k] <= c.limits.lower || q[*k] >= c.limits.upper)
+        .map(|(_, c)| c.joint.clone())
+        .collect();
+    IkError { frame: frame.name.clone(), iterations, position_m, rotation_rad, at_limit }
+}

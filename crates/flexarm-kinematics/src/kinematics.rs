@@ -1,0 +1,142 @@
+//! Forward kinematics, geometric Jacobian and its time derivative.
+//!
+//! Frames: W world, B a body, T any frame fixed to a body (usually the tool). `J_WT_W` maps `q̇` to the
+//! twist of T: velocity of the point To and angular velocity, both in **world axes** (rows linear first).
+
+use nalgebra::{Matrix6xX, Vector3};
+
+use crate::data::{Data, State, joint_motion, joint_position};
+use crate::model::{Frame, JointMotion, Model};
+use crate::spatial::{Pose, Twist};
+
+/// Poses of all bodies: fills `data.{X_PB, X_WB}`.
+pub fn forward_kinematics(model: &Model, data: &mut Data, q: &nalgebra::DVector<f64>) {
+    for i in 1..model.bodies.len() {
+        joint_position(model, data, i, q.as_slice());
+    }
+    world_poses(model, data);
+}
+
+/// Poses and twists of all bodies: fills `data.{X_PB, X_WB, V}`.
+pub fn forward_kinematics_velocity(model: &Model, data: &mut Data, state: &State) {
+    data.V[0] = Twist::zeros();
+    for i in 1..model.bodies.len() {
+        let (V_PB, bias) = joint_motion(model, data, i, state.q.as_slice(), state.qdot.as_slice());
+        data.bias[i] = bias;
+        data.V[i] = data.V[model.bodies[i].parent].at_child(&data.X_PB[i]) + V_PB;
+    }
+    world_poses(model, data);
+}
+
+/// World poses from the joint poses that the last algorithm left in `data`.
+pub fn world_poses(model: &Model, data: &mut Data) {
+    data.X_WB[0] = Pose::identity();
+    for i in 1..model.bodies.len() {
+        data.X_WB[i] = data.X_WB[model.bodies[i].parent] * data.X_PB[i];
+    }
+}
+
+/// Twist of a frame at its origin in world axes, from the last [`forward_kinematics_velocity`].
+pub fn frame_twist(data: &Data, frame: &Frame) -> Twist {
+    let V = data.V[frame.body].at_child(&frame.X_BF);
+    let R = data.X_WB[frame.body].rotation * frame.X_BF.rotation;
+    Twist::new(R * V.linear, R * V.angular)
+}
+
+/// `J_WT_W`, 6×nv, from the last [`forward_kinematics`]; written into `J`.
+///
+/// # Panics
+/// If `J` does not have nv columns.
+pub fn frame_jacobian(model: &Model, data: &Data, frame: &Frame, J: &mut Matrix6xX<f64>) {
+    assert_eq!(J.ncols(), model.nv(), "the Jacobian needs one column per coordinate");
+    J.fill(0.0);
+    let p_T = (data.X_WB[frame.body] * frame.X_BF).translation.vector;
+    let mut i = frame.body;
+    while i > 0 {
+        let body = &model.bodies[i];
+        let R = data.X_WB[i].rotation.matrix();
+        let r = p_T - data.X_WB[i].translation.vector;
+        let mut add = |k: usize, linear: Vector3<f64>, angular: Vector3<f64>| {
+            let column = linear + angular.cross(&r);
+            for c in 0..3 {
+                J[(c, k)] += column[c];
+                J[(3 + c, k)] += angular[c];
+            }
+        };
+        match body.motion {
+            JointMotion::Revolute(axis) => add(body.coordinate, Vector3::zeros(), R * axis * body.ratio),
+            JointMotion::Prismatic(axis) => add(body.coordinate, R * axis * body.ratio, Vector3::zeros()),
+            JointMotion::Elastic(_) => {
+                let S = &data.elastic[i];
+                let (L, B) = (R * S.L, R * S.B);
+                for c in 0..3 {
+                    add(body.coordinate + c, L.column(c).into(), Vector3::zeros());
+                    add(body.coordinate + 3 + c, Vector3::zeros(), B.column(c).into());
+                }
+            }
+        }
+        i = body.parent;
+    }
+}
+
+/// `dJ_WT_W/dt`, 6×nv, from the last [`forward_kinematics_velocity`] at `state`; written into `Jdot`.
+///
+/// `A_WT = J q̈ + J̇ q̇` is the acceleration of the point To and the angular acceleration, in world axes.
+///
+/// # Panics
+/// If `Jdot` does not have nv columns.
+pub fn frame_jacobian_derivative(
+    model: &Model,
+    data: &Data,
+    state: &State,
+    frame: &Frame,
+    Jdot: &mut Matrix6xX<f64>,
+) {
+    assert_eq!(Jdot.ncols(), model.nv(), "the Jacobian needs one column per coordinate");
+    Jdot.fill(0.0);
+    let p_T = (data.X_WB[frame.body] * frame.X_BF).translation.vector;
+    let v_T = frame_twist(data, frame).linear;
+    let mut i = frame.body;
+    while i > 0 {
+        let body = &model.bodies[i];
+        let R = data.X_WB[i].rotation.matrix();
+        let (v_B, w_B) = (R * data.V[i].linear, R * data.V[i].angular);
+        let (r, rdot) = (p_T - data.X_WB[i].translation.vector, v_T - v_B);
+        // A column fixed in B axes turns with B; `l`, `a` are the column and `ldot`, `adot` its rate in W.
+        let mut add = |k: usize, ldot: Vector3<f64>, a: Vector3<f64>, adot: Vector3<f64>| {
+            let column = ldot + adot.cross(&r) + a.cross(&rdot);
+            for c in 0..3 {
+                Jdot[(c, k)] += column[c];
+                Jdot[(3 + c, k)] += adot[c];
+            }
+        };
+        match body.motion {
+            JointMotion::Revolute(axis) => {
+                let a = R * axis * body.ratio;
+                add(body.coordinate, Vector3::zeros(), a, w_B.cross(&a));
+            }
+            JointMotion::Prismatic(axis) => {
+                let l = R * axis * body.ratio;
+                add(body.coordinate, w_B.cross(&l), Vector3::zeros(), Vector3::zeros());
+            }
+            JointMotion::Elastic(angles) => {
+                let k = body.coordinate;
+                let S = &data.elastic[i];
+                let q = Vector3::new(state.q[k + 3], state.q[k + 4], state.q[k + 5]);
+                let rates = Vector3::new(state.qdot[k + 3], state.qdot[k + 4], state.qdot[k + 5]);
+                let Bdot = angles.rate_map_derivative(&q, &rates);
+                // Translation columns are fixed in P: they turn with P, w_P = w_B - R B rates.
+                let w_P = w_B - R * (S.B * rates);
+                let (L, B) = (R * S.L, R * S.B);
+                let Bdot_W = R * Bdot;
+                for c in 0..3 {
+                    let l: Vector3<f64> = L.column(c).into();
+                    add(k + c, w_P.cross(&l), Vector3::zeros(), Vector3::zeros());
+                    let a: Vector3<f64> = B.column(c).into();
+                    add(k + 3 + c, Vector3::zeros(), a, w_B.cross(&a) + Bdot_W.column(c));
+                }
+            }
+        }
+        i = body.parent;
+    }
+}

@@ -1,0 +1,63 @@
+//! Spatial algebra, the immutable tree model, and the kinematics and dynamics recursions of flexarm.
+//!
+//! A [`Mechanism`] (links and joints by name) becomes a checked [`Model`]; [`Data`] holds workspaces and
+//! results, [`State`] positions and velocities. The algorithms are free functions that bear the name of what
+//! they compute and never allocate. Joints: fixed, revolute, continuous, prismatic, and the six-DoF elastic
+//! joint of a flexible link, at one cost.
+//!
+//! Notation: `X_AB` pose of B in A; `V` twists, `F` wrenches, **linear part first**; see `docs/references.md`
+//! for the sources. Not here: files, flexible-link stiffness, time.
+//!
+//! ```
+//! use flexarm_kinematics::*;
+//! use nalgebra::{DVector, Matrix3, Vector3};
+//!
+//! // A pendulum: 2 kg at 0.5 m below a hinge about y.
+//! let mut pendulum = Mechanism::new("pendulum");
+//! pendulum.links.push(Link { name: "base".into(), inertia: None });
+//! pendulum.links.push(Link {
+//!     name: "bob".into(),
+//!     inertia: Some(LinkInertia { mass: 2.0, com: Vector3::new(0.0, 0.0, -0.5), inertia_com: Matrix3::zeros() }),
+//! });
+//! let hinge = JointKind::Continuous(Vector3::y_axis());
+//! pendulum.joints.push(Joint::new("hinge", hinge, "base", "bob", Pose::identity()));
+//!
+//! let model = Model::new(&pendulum)?;
+//! let (mut data, mut state) = (Data::new(&model), State::zeros(&model));
+//! state.q[0] = std::f64::consts::FRAC_PI_2;
+//! // Horizontal: the hinge carries m g l = 2 * 9.81 * 0.5 N m.
+//! let torque = inverse_dynamics(&model, &mut data, &state, &DVector::zeros(1))[0];
+//! assert!((torque.abs() - 9.81).abs() < 1e-12);
+//! # Ok::<(), ModelError>(())
+//! ```
+#![allow(non_snake_case, reason = "monogram notation: X_WB, p_AoBo_W, M_BBo; see docs/references.md")]
+#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
+
+mod aba;
+mod crba;
+mod data;
+mod energy;
+mod inverse_kinematics;
+mod kinematics;
+mod mechanism;
+mod model;
+mod rnea;
+mod rotation;
+mod spatial;
+
+pub use aba::{Roles, forward_dynamics, hybrid_dynamics};
+pub use crba::{mass_matrix, mass_matrix_at_poses};
+pub use data::{Data, State};
+pub use energy::{
+    center_of_mass, kinetic_energy, kinetic_energy_of, potential_energy, potential_energy_of,
+};
+pub use inverse_kinematics::{IkError, IkOptions, inverse_kinematics};
+pub use kinematics::{
+    forward_kinematics, forward_kinematics_velocity, frame_jacobian, frame_jacobian_derivative, frame_twist,
+    world_poses,
+};
+pub use mechanism::{Joint, JointKind, Limits, Link, LinkInertia, Mechanism, Mimic};
+pub use model::{Body, Coordinate, Frame, JointMotion, Model, ModelError};
+pub use rnea::{gravity_forces, inverse_dynamics, nonlinear_effects};
+pub use rotation::{AngleKinematics, ElasticAngles, rotation_vector};
+pub use spatial::{ArticulatedInertia, Pose, SpatialInertia, Twist, Wrench, adjoint, skew};

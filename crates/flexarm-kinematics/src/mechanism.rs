@@ -1,0 +1,183 @@
+//! A mechanism as a user describes it: links and joints by name, fixed joints included.
+//!
+//! This is the editable form. Readers (URDF) produce it, the flexible-link substitution changes it, and
+//! [`crate::Model::new`] checks it once and turns it into the immutable tree that the recursions read.
+//! Start at [`Mechanism`]. Not here: any computation.
+
+use nalgebra::{Matrix3, Unit, Vector3};
+
+use crate::rotation::ElasticAngles;
+use crate::spatial::{Pose, SpatialInertia};
+
+/// Links joined by joints into one tree. SI units.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mechanism {
+    /// Name of the robot.
+    pub name: String,
+    /// All links, in the order of the source; the one that is no joint's child is the base.
+    pub links: Vec<Link>,
+    /// All joints, in the order of the source.
+    pub joints: Vec<Joint>,
+    /// Acceleration of gravity in world (= base link) axes [m/s²].
+    pub gravity: Vector3<f64>,
+}
+
+/// A rigid body with its frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Link {
+    /// Unique name.
+    pub name: String,
+    /// Mass properties; `None` for a mere frame.
+    pub inertia: Option<LinkInertia>,
+}
+
+/// Mass properties of a link, in link axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LinkInertia {
+    /// Mass [kg].
+    pub mass: f64,
+    /// Centre of mass `p_LoLcm_L` [m].
+    pub com: Vector3<f64>,
+    /// Rotational inertia about the centre of mass [kg m²].
+    pub inertia_com: Matrix3<f64>,
+}
+
+impl LinkInertia {
+    /// As spatial inertia about the link's origin.
+    pub fn spatial(&self) -> SpatialInertia {
+        SpatialInertia::from_com(self.mass, &self.com, &self.inertia_com)
+    }
+}
+
+/// A joint between two links.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Joint {
+    /// Unique name.
+    pub name: String,
+    /// What it lets move.
+    pub kind: JointKind,
+    /// Name of the parent link P.
+    pub parent: String,
+    /// Name of the child link; its frame is the joint frame.
+    pub child: String,
+    /// Pose of the joint frame in the parent link at zero coordinate.
+    pub X_PJ: Pose,
+    /// Position, velocity and effort limits.
+    pub limits: Limits,
+    /// Set when this joint follows another one.
+    pub mimic: Option<Mimic>,
+}
+
+/// What a joint lets move. Axes are unit vectors in the joint frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum JointKind {
+    /// Nothing.
+    Fixed,
+    /// One rotation within limits.
+    Revolute(Unit<Vector3<f64>>),
+    /// One rotation without position limits.
+    Continuous(Unit<Vector3<f64>>),
+    /// One translation.
+    Prismatic(Unit<Vector3<f64>>),
+    /// Six small elastic coordinates: translation in P axes, then three angles.
+    Elastic(ElasticAngles),
+}
+
+impl JointKind {
+    /// Number of coordinates.
+    pub fn degrees_of_freedom(&self) -> usize {
+        match self {
+            Self::Fixed => 0,
+            Self::Revolute(_) | Self::Continuous(_) | Self::Prismatic(_) => 1,
+            Self::Elastic(_) => 6,
+        }
+    }
+
+    /// The word of URDF files.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Fixed => "fixed",
+            Self::Revolute(_) => "revolute",
+            Self::Continuous(_) => "continuous",
+            Self::Prismatic(_) => "prismatic",
+            Self::Elastic(_) => "elastic",
+        }
+    }
+}
+
+/// Limits of a joint; infinite where there is none.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Lowest position [rad or m].
+    pub lower: f64,
+    /// Highest position [rad or m].
+    pub upper: f64,
+    /// Highest speed [rad/s or m/s].
+    pub velocity: f64,
+    /// Highest torque or force [N m or N].
+    pub effort: f64,
+}
+
+impl Limits {
+    /// No limit at all.
+    pub const NONE: Limits = Limits {
+        lower: f64::NEG_INFINITY,
+        upper: f64::INFINITY,
+        velocity: f64::INFINITY,
+        effort: f64::INFINITY,
+    };
+}
+
+/// `q = ratio * q_of(joint) + offset`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mimic {
+    /// Name of the joint that leads.
+    pub joint: String,
+    /// Factor.
+    pub ratio: f64,
+    /// Offset [rad or m].
+    pub offset: f64,
+}
+
+impl Mechanism {
+    /// A mechanism without links, under standard gravity along -z.
+    pub fn new(name: impl Into<String>) -> Self {
+        Self { name: name.into(), links: Vec::new(), joints: Vec::new(), gravity: Vector3::new(0.0, 0.0, -9.81) }
+    }
+
+    /// The link of that name.
+    pub fn link(&self, name: &str) -> Option<&Link> {
+        self.links.iter().find(|l| l.name == name)
+    }
+
+    /// The joint of that name.
+    pub fn joint(&self, name: &str) -> Option<&Joint> {
+        self.joints.iter().find(|j| j.name == name)
+    }
+
+    /// The joints that start at a link, in source order.
+    pub fn child_joints<'a>(&'a self, link: &'a str) -> impl Iterator<Item = &'a Joint> + 'a {
+        self.joints.iter().filter(move |j| j.parent == link)
+    }
+}
+
+impl Joint {
+    /// A joint without limits or mimic.
+    pub fn new(
+        name: impl Into<String>,
+        kind: JointKind,
+        parent: impl Into<String>,
+        child: impl Into<String>,
+        X_PJ: Pose,
+    ) -> Self {
+        Self {
+            name: name.into(),
+            kind,
+            parent: parent.into(),
+            child: child.into(),
+            X_PJ,
+            limits: Limits::NONE,
+            mimic: None,
+        }
+    }
+}

@@ -1,0 +1,456 @@
+//! The immutable tree that the recursions read: bodies in order, parents before children.
+//!
+//! Body 0 is the world (the base link and all that is fixed to it); every other body has exactly one joint
+//! to its parent. Links on fixed joints are lumped into the body that carries them and stay as named
+//! [`Frame`]s. Start at [`Model::new`]. Not here: state and results ([`crate::Data`], [`crate::State`]).
+//!
+//! Coordinates: actuated joints first (in tree order), then six per elastic joint (proximal to distal); only
+//! [`Model::coordinates`] and [`Body::coordinate`] know the offsets.
+
+use std::collections::HashMap;
+
+use nalgebra::{Matrix3, Vector3};
+
+use crate::mechanism::{JointKind, Limits, Mechanism};
+use crate::rotation::ElasticAngles;
+use crate::spatial::{Pose, SpatialInertia, skew};
+
+/// A checked tree of bodies; built once, then only read and shared between threads.
+#[derive(Clone, Debug)]
+pub struct Model {
+    /// Name of the mechanism.
+    pub name: String,
+    pub(crate) bodies: Vec<Body>,
+    frames: Vec<Frame>,
+    frame_by_name: HashMap<String, usize>,
+    coordinates: Vec<Coordinate>,
+    n_actuated: usize,
+    n_elastic: usize,
+    pub(crate) has_mimic: bool,
+    /// Acceleration of gravity in world axes [m/s²].
+    pub gravity: Vector3<f64>,
+}
+
+/// One moving body B (or the world, index 0) with the joint to its parent P.
+#[derive(Clone, Debug)]
+pub struct Body {
+    /// Name of the link whose frame is the body's frame.
+    pub name: String,
+    /// Name of the joint that moves it.
+    pub joint: String,
+    /// Index of the parent body; 0 is the world. Meaningless for body 0.
+    pub parent: usize,
+    /// Joint frame in the parent body at zero coordinate.
+    pub X_PJ: Pose,
+    /// Inertia about Bo in B axes, with everything fixed to the body.
+    pub inertia: SpatialInertia,
+    /// What the joint lets move.
+    pub motion: JointMotion,
+    /// Index of the (first) independent coordinate.
+    pub coordinate: usize,
+    /// Joint value = ratio × coordinate + offset; (1, 0) except for mimic joints.
+    pub ratio: f64,
+    /// See `ratio`.
+    pub offset: f64,
+    pub(crate) turn: RevoluteTable,
+}
+
+/// Motion of a joint in the recursions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum JointMotion {
+    /// Rotation about a unit axis (same components in J and B axes).
+    Revolute(Vector3<f64>),
+    /// Translation along a unit axis.
+    Prismatic(Vector3<f64>),
+    /// Translation in P axes, then angles.
+    Elastic(ElasticAngles),
+}
+
+/// `R_PB(q) = K0 + sin q K1 + cos q K2`: Rodrigues' formula with the placement multiplied in.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RevoluteTable {
+    pub(crate) K0: Matrix3<f64>,
+    pub(crate) K1: Matrix3<f64>,
+    pub(crate) K2: Matrix3<f64>,
+}
+
+impl RevoluteTable {
+    fn new(X_PJ: &Pose, axis: &Vector3<f64>) -> Self {
+        let (R, A) = (X_PJ.rotation.matrix(), skew(axis));
+        let A2 = axis * axis.transpose() - Matrix3::identity();
+        Self { K0: R + R * A2, K1: R * A, K2: -(R * A2) }
+    }
+}
+
+/// A named frame fixed to a body: every link of the mechanism is one.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    /// Name of the link.
+    pub name: String,
+    /// Body that carries it.
+    pub body: usize,
+    /// Pose of the frame in the body.
+    pub X_BF: Pose,
+}
+
+/// One independent coordinate.
+#[derive(Clone, Debug)]
+pub struct Coordinate {
+    /// Joint it belongs to.
+    pub joint: String,
+    /// Component within the joint: 0, or 0..6 for elastic joints.
+    pub component: usize,
+    /// Body that the joint moves.
+    pub body: usize,
+    /// Limits of the joint.
+    pub limits: Limits,
+    /// Word of URDF files for the joint's kind.
+    pub kind: &'static str,
+}
+
+/// Why a mechanism is not a usable tree.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ModelError {
+    /// Nothing there.
+    #[error("mechanism {0:?} has no links: add at least a base link")]
+    NoLinks(String),
+    /// Two things of one name.
+    #[error("{what} {name:?} is defined twice: names must be unique")]
+    Duplicate {
+        /// "link" or "joint".
+        what: &'static str,
+        /// The name.
+        name: String,
+    },
+    /// A joint names a link that is not there.
+    #[error("joint {joint:?} refers to link {link:?}, which does not exist")]
+    UnknownLink {
+        /// The joint.
+        joint: String,
+        /// The missing link.
+        link: String,
+    },
+    /// A link is the child of two joints.
+    #[error("link {link:?} is the child of both joint {first:?} and joint {second:?}: a tree has one parent each")]
+    TwoParents {
+        /// The link.
+        link: String,
+        /// First joint.
+        first: String,
+        /// Second joint.
+        second: String,
+    },
+    /// More than one link without a parent.
+    #[error("the links form {} separate parts with bases {roots:?}: connect them by joints", roots.len())]
+    Disconnected {
+        /// The links without parent.
+        roots: Vec<String>,
+    },
+    /// A loop.
+    #[error("links {links:?} form a loop: open it at one joint")]
+    Cycle {
+        /// The links that cannot be reached from a base.
+        links: Vec<String>,
+    },
+    /// A body that moves without mass.
+    #[error("link {link:?} moves (joint {joint:?}) but has mass {mass} kg with all that is fixed to it: give it a positive mass")]
+    NoMass {
+        /// The link.
+        link: String,
+        /// The joint that moves it.
+        joint: String,
+        /// What was found [kg].
+        mass: f64,
+    },
+    /// Mass properties that no body has.
+    #[error("link {link:?}: {what} is {value}, which no body has")]
+    BadInertia {
+        /// The link.
+        link: String,
+        /// Which quantity.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// Something is NaN or infinite.
+    #[error("{what} of {name:?} has a NaN or infinite entry")]
+    NotFinite {
+        /// Which quantity.
+        what: &'static str,
+        /// Of which link or joint.
+        name: String,
+    },
+    /// A mimic joint without a leader.
+    #[error("joint {joint:?} mimics {leader:?}, which is not a movable, independent joint")]
+    BadMimic {
+        /// The follower.
+        joint: String,
+        /// What it asks for.
+        leader: String,
+    },
+}
+
+impl Model {
+    /// Checks the mechanism and orders it as a tree.
+    ///
+    /// # Errors
+    /// [`ModelError`], with the names of the links or joints that are wrong.
+    pub fn new(mechanism: &Mechanism) -> Result<Self, ModelError> {
+        let base = check_tree(mechanism)?;
+        let mut build = Builder { mechanism, bodies: Vec::new(), frames: Vec::new(), followers: Vec::new() };
+        let world = &mechanism.links[base];
+        build.bodies.push(Body {
+            name: world.name.clone(),
+            joint: String::new(),
+            parent: 0,
+            X_PJ: Pose::identity(),
+            inertia: SpatialInertia::zeros(),
+            motion: JointMotion::Prismatic(Vector3::z()),
+            coordinate: usize::MAX,
+            ratio: 1.0,
+            offset: 0.0,
+            turn: RevoluteTable::new(&Pose::identity(), &Vector3::z()),
+        });
+        build.attach(base, 0, Pose::identity())?;
+        build.finish()
+    }
+
+    /// Number of independent coordinates (positions = velocities: all live in ℝⁿ).
+    pub fn nv(&self) -> usize {
+        self.coordinates.len()
+    }
+
+    /// Number of actuated coordinates; they come first.
+    pub fn n_actuated(&self) -> usize {
+        self.n_actuated
+    }
+
+    /// Number of elastic joints; each has six coordinates after the actuated ones.
+    pub fn n_elastic(&self) -> usize {
+        self.n_elastic
+    }
+
+    /// Bodies, parents before children; body 0 is the world.
+    pub fn bodies(&self) -> &[Body] {
+        &self.bodies
+    }
+
+    /// Named frames: all links.
+    pub fn frames(&self) -> &[Frame] {
+        &self.frames
+    }
+
+    /// The frame of that name.
+    pub fn frame(&self, name: &str) -> Option<&Frame> {
+        self.frame_by_name.get(name).map(|&i| &self.frames[i])
+    }
+
+    /// Independent coordinates in order: actuated, then elastic.
+    pub fn coordinates(&self) -> &[Coordinate] {
+        &self.coordinates
+    }
+
+    /// Whether some joint follows another one.
+    pub fn has_mimic(&self) -> bool {
+        self.has_mimic
+    }
+
+    /// Bodies behind elastic joints, in coordinate order.
+    pub fn elastic_bodies(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.n_elastic).map(|k| self.coordinates[self.n_actuated + 6 * k].body)
+    }
+
+    /// Total mass of all moving bodies [kg].
+    pub fn moving_mass(&self) -> f64 {
+        self.bodies[1..].iter().map(|b| b.inertia.mass).sum()
+    }
+}
+
+/// Names, parents, connectivity; returns the index of the base link.
+fn check_tree(mechanism: &Mechanism) -> Result<usize, ModelError> {
+    if mechanism.links.is_empty() {
+        return Err(ModelError::NoLinks(mechanism.name.clone()));
+    }
+    let mut parent_of: HashMap<&str, Option<&str>> = HashMap::new();
+    for link in &mechanism.links {
+        if parent_of.insert(&link.name, None).is_some() {
+            return Err(ModelError::Duplicate { what: "link", name: link.name.clone() });
+        }
+    }
+    let mut seen = HashMap::new();
+    for joint in &mechanism.joints {
+        if seen.insert(joint.name.as_str(), ()).is_some() {
+            return Err(ModelError::Duplicate { what: "joint", name: joint.name.clone() });
+        }
+        for link in [&joint.parent, &joint.child] {
+            if !parent_of.contains_key(link.as_str()) {
+                return Err(ModelError::UnknownLink { joint: joint.name.clone(), link: link.clone() });
+            }
+        }
+        if let Some(first) = parent_of.insert(&joint.child, Some(&joint.name)).flatten() {
+            return Err(ModelError::TwoParents {
+                link: joint.child.clone(),
+                first: first.to_owned(),
+                second: joint.name.clone(),
+            });
+        }
+    }
+
+    // Whatever cannot be reached from a link without parent lies on a loop.
+    let roots: Vec<usize> =
+        (0..mechanism.links.len()).filter(|&i| parent_of[mechanism.links[i].name.as_str()].is_none()).collect();
+    let mut reached: HashMap<&str, ()> = HashMap::new();
+    let mut open: Vec<&str> = roots.iter().map(|&i| mechanism.links[i].name.as_str()).collect();
+    while let Some(link) = open.pop() {
+        reached.insert(link, ());
+        open.extend(mechanism.child_joints(link).map(|j| j.child.as_str()));
+    }
+    let looped: Vec<String> =
+        mechanism.links.iter().filter(|l| !reached.contains_key(l.name.as_str())).map(|l| l.name.clone()).collect();
+    if !looped.is_empty() {
+        return Err(ModelError::Cycle { links: looped });
+    }
+    if roots.len() > 1 {
+        let roots = roots.iter().map(|&i| mechanism.links[i].name.clone()).collect();
+        return Err(ModelError::Disconnected { roots });
+    }
+    Ok(roots[0])
+}
+
+struct Follower {
+    body: usize,
+    joint: String,
+    leader: String,
+}
+
+struct Builder<'a> {
+    mechanism: &'a Mechanism,
+    bodies: Vec<Body>,
+    frames: Vec<Frame>,
+    followers: Vec<Follower>,
+}
+
+impl Builder<'_> {
+    /// Lumps a link into a body and goes on to its children, depth first.
+    fn attach(&mut self, link: usize, body: usize, X_BL: Pose) -> Result<(), ModelError> {
+        let mechanism = self.mechanism;
+        let link = &mechanism.links[link];
+        if let Some(inertia) = &link.inertia {
+            check_inertia(&link.name, inertia)?;
+            self.bodies[body].inertia += inertia.spatial().at_parent(&X_BL);
+        }
+        self.frames.push(Frame { name: link.name.clone(), body, X_BF: X_BL });
+        for joint in mechanism.child_joints(&link.name) {
+            if !joint.X_PJ.translation.vector.iter().chain(joint.X_PJ.rotation.matrix().iter()).all(|x| x.is_finite()) {
+                return Err(ModelError::NotFinite { what: "origin", name: joint.name.clone() });
+            }
+            let child = mechanism.links.iter().position(|l| l.name == joint.child);
+            let child = child.expect("checked by check_tree");
+            let X_BJ = X_BL * joint.X_PJ;
+            let motion = match joint.kind {
+                JointKind::Fixed => {
+                    self.attach(child, body, X_BJ)?;
+                    continue;
+                }
+                JointKind::Revolute(axis) | JointKind::Continuous(axis) => JointMotion::Revolute(axis.into_inner()),
+                JointKind::Prismatic(axis) => JointMotion::Prismatic(axis.into_inner()),
+                JointKind::Elastic(angles) => JointMotion::Elastic(angles),
+            };
+            let axis = match motion {
+                JointMotion::Revolute(axis) => axis,
+                _ => Vector3::z(),
+            };
+            let (ratio, offset) = joint.mimic.as_ref().map_or((1.0, 0.0), |m| (m.ratio, m.offset));
+            let index = self.bodies.len();
+            if let Some(mimic) = &joint.mimic {
+                let (joint, leader) = (joint.name.clone(), mimic.joint.clone());
+                self.followers.push(Follower { body: index, joint, leader });
+            }
+            self.bodies.push(Body {
+                name: joint.child.clone(),
+                joint: joint.name.clone(),
+                parent: body,
+                X_PJ: X_BJ,
+                inertia: SpatialInertia::zeros(),
+                motion,
+                coordinate: usize::MAX,
+                ratio,
+                offset,
+                turn: RevoluteTable::new(&X_BJ, &axis),
+            });
+            self.attach(child, index, Pose::identity())?;
+            let mass = self.bodies[index].inertia.mass;
+            if mass.is_nan() || mass <= 0.0 {
+                return Err(ModelError::NoMass { link: joint.child.clone(), joint: joint.name.clone(), mass });
+            }
+        }
+        Ok(())
+    }
+
+    /// Numbers the coordinates: actuated, then elastic, then mimic joints take their leader's.
+    fn finish(mut self) -> Result<Model, ModelError> {
+        let follows = |body: usize, followers: &[Follower]| followers.iter().any(|f| f.body == body);
+        let mut coordinates: Vec<Coordinate> = Vec::new();
+        let (mut n_actuated, mut n_elastic) = (0, 0);
+        for elastic in [false, true] {
+            for i in 1..self.bodies.len() {
+                let is_elastic = matches!(self.bodies[i].motion, JointMotion::Elastic(_));
+                if is_elastic != elastic || follows(i, &self.followers) {
+                    continue;
+                }
+                let joint = self.mechanism.joint(&self.bodies[i].joint).expect("body made from this joint");
+                self.bodies[i].coordinate = coordinates.len();
+                let size = joint.kind.degrees_of_freedom();
+                coordinates.extend((0..size).map(|component| Coordinate {
+                    joint: joint.name.clone(),
+                    component,
+                    body: i,
+                    limits: joint.limits,
+                    kind: joint.kind.name(),
+                }));
+                if elastic { n_elastic += 1 } else { n_actuated += size }
+            }
+        }
+        for follower in &self.followers {
+            let leader = coordinates.iter().position(|c| c.joint == follower.leader && c.kind != "elastic");
+            let is_elastic = matches!(self.bodies[follower.body].motion, JointMotion::Elastic(_));
+            match leader {
+                Some(index) if !is_elastic => self.bodies[follower.body].coordinate = index,
+                _ => {
+                    let (joint, leader) = (follower.joint.clone(), follower.leader.clone());
+                    return Err(ModelError::BadMimic { joint, leader });
+                }
+            }
+        }
+        let frame_by_name = self.frames.iter().enumerate().map(|(i, f)| (f.name.clone(), i)).collect();
+        Ok(Model {
+            name: self.mechanism.name.clone(),
+            has_mimic: !self.followers.is_empty(),
+            bodies: self.bodies,
+            frames: self.frames,
+            frame_by_name,
+            coordinates,
+            n_actuated,
+            n_elastic,
+            gravity: self.mechanism.gravity,
+        })
+    }
+}
+
+fn check_inertia(link: &str, inertia: &crate::mechanism::LinkInertia) -> Result<(), ModelError> {
+    let finite = inertia.mass.is_finite()
+        && inertia.com.iter().chain(inertia.inertia_com.iter()).all(|x| x.is_finite());
+    if !finite {
+        return Err(ModelError::NotFinite { what: "inertia", name: link.to_owned() });
+    }
+    if inertia.mass < 0.0 {
+        return Err(ModelError::BadInertia { link: link.to_owned(), what: "mass [kg]", value: inertia.mass });
+    }
+    let smallest = inertia.inertia_com.symmetric_eigenvalues().min();
+    if smallest < -1e-9 * inertia.inertia_com.norm() {
+        let what = "smallest principal moment of inertia [kg m²]";
+        return Err(ModelError::BadInertia { link: link.to_owned(), what, value: smallest });
+    }
+    Ok(())
+}

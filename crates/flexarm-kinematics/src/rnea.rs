@@ -1,0 +1,81 @@
+//! Inverse dynamics: generalised forces of a given motion (recursive Newton-Euler), O(n).
+//!
+//! ```text
+//! Outward pass for body B with parent P; each quantity at its own origin, in its own axes:
+//!   V_WB  = Ad_BP V_WP  + S_B q̇                          (1)  [Featherstone 2008, Table 5.1]
+//!   As_WB = Ad_BP As_WP + S_B q̈ + Ṡ_B q̇ + V_WB × S_B q̇   (2)  (As_W0 = -g: gravity as an upward acceleration)
+//!   F_B   = M_BBo_B As_WB + V_WB ×* M_BBo_B V_WB - F_ext   (3)
+//! Inward pass:
+//!   τ_B   = S_Bᵀ F_B,   F_P += Ad_BPᵀ F_B                  (4)
+//! ```
+//! `Ṡ_B` is the rate of S in B axes: zero for one-DoF joints, not for elastic ones.
+
+use nalgebra::{DVector, Vector3};
+
+use crate::data::{Data, State, add_projection, joint_motion, subspace_times};
+use crate::model::Model;
+use crate::spatial::Twist;
+
+/// Generalised forces `τ = M(q) q̈ + bias(q, q̇)` [N m or N] for the accelerations `qddot`.
+///
+/// Elastic coordinates are treated like any other: their entries of τ are what the elastic joint must
+/// supply. External wrenches in `data.F_ext` are subtracted. Fills `data.{X_PB, V, A, F, tau}`; `A` has
+/// gravity subtracted. O(n), no allocation.
+///
+/// # Source
+/// [Featherstone 2008], Table 5.1.
+pub fn inverse_dynamics<'d>(
+    model: &Model,
+    data: &'d mut Data,
+    state: &State,
+    qddot: &DVector<f64>,
+) -> &'d DVector<f64> {
+    newton_euler(model, data, state.q.as_slice(), state.qdot.as_slice(), Some(qddot.as_slice()));
+    &data.tau
+}
+
+/// Generalised forces at zero acceleration: Coriolis, centrifugal, gravity and external loads.
+pub fn nonlinear_effects<'d>(model: &Model, data: &'d mut Data, state: &State) -> &'d DVector<f64> {
+    newton_euler(model, data, state.q.as_slice(), state.qdot.as_slice(), None);
+    &data.tau
+}
+
+/// Generalised forces that hold the mechanism still at `q`, against gravity and external loads.
+pub fn gravity_forces<'d>(model: &Model, data: &'d mut Data, q: &DVector<f64>) -> &'d DVector<f64> {
+    let mut at_rest = std::mem::take(&mut data.scratch);
+    at_rest.fill(0.0);
+    newton_euler(model, data, q.as_slice(), &at_rest, None);
+    data.scratch = at_rest;
+    &data.tau
+}
+
+#[inline(always)]
+fn newton_euler(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], qddot: Option<&[f64]>) {
+    let n = model.bodies.len();
+    data.V[0] = Twist::zeros();
+    data.A[0] = Twist::new(-model.gravity, Vector3::zeros());
+    for i in 1..n {
+        let body = &model.bodies[i];
+        let (V_PB, bias) = joint_motion(model, data, i, q, qdot);
+        let X_PB = data.X_PB[i];
+        let V = data.V[body.parent].at_child(&X_PB) + V_PB; // (1)
+        let mut A = data.A[body.parent].at_child(&X_PB) + bias + V.cross(&V_PB); // (2)
+        if let Some(qddot) = qddot {
+            A += subspace_times(model, data, i, qddot);
+        }
+        let momentum = body.inertia.mul_twist(&V);
+        data.F[i] = body.inertia.mul_twist(&A) + V.cross_force(&momentum) - data.F_ext[i]; // (3)
+        data.V[i] = V;
+        data.A[i] = A;
+    }
+    data.tau.fill(0.0);
+    for i in (1..n).rev() {
+        let F = data.F[i];
+        add_projection(model, &data.elastic[i], i, &F, data.tau.as_mut_slice()); // (4)
+        let parent = model.bodies[i].parent;
+        if parent > 0 {
+            let F_P = F.at_parent(&data.X_PB[i]);
+            data.F[parent] += F_P;
+        }
+    }
+}

@@ -1,0 +1,162 @@
+//! What a run hands to a recorder: a [`RunHeader`] once, then one [`Sample`] per logged instant.
+//!
+//! All poses are in the world; SI units; six-vectors linear first. "Flexible" is the simulated robot,
+//! "rigid" its twin with every elastic coordinate held at zero.
+
+use std::path::PathBuf;
+
+use flexarm_kinematics::Pose;
+
+/// What stays the same during a run.
+#[derive(Clone, Debug, Default)]
+pub struct RunHeader {
+    /// Name of the robot; first part of entity paths.
+    pub robot: String,
+    /// Name of the trajectory.
+    pub trajectory: String,
+    /// The robot's URDF text, as read.
+    pub urdf: String,
+    /// Names of the actuated joints, in coordinate order.
+    pub joints: Vec<String>,
+    /// Links of the URDF, parents before children; the first is the base.
+    pub links: Vec<LinkInfo>,
+    /// Names of the elastic elements (one per flexible link joint).
+    pub elements: Vec<String>,
+    /// Triangle meshes in link axes.
+    pub meshes: Vec<LinkMesh>,
+    /// Name of the frame that is the tool centre point.
+    pub tcp: String,
+    /// Labelled text: groups such as `flexarm.run` with their key-value pairs.
+    pub metadata: Vec<(String, Vec<(String, String)>)>,
+    /// Files to put into the recording.
+    pub attachments: Vec<Attachment>,
+    /// A Markdown summary of the set-up for the viewer's text panel.
+    pub description: String,
+    /// Whether samples carry a rigid twin.
+    pub has_rigid: bool,
+    /// Samples per second.
+    pub log_rate_hz: f64,
+}
+
+/// A link and the link that carries it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct LinkInfo {
+    /// Name of the link.
+    pub name: String,
+    /// Index of the parent in `RunHeader::links`; `None` for the base.
+    pub parent: Option<usize>,
+    /// Whether the joint to the parent is fixed (and stays so in the flexible robot).
+    pub fixed: bool,
+}
+
+/// A surface fixed to a link, in metres and link axes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LinkMesh {
+    /// Index into `RunHeader::links`.
+    pub link: usize,
+    /// Name, unique per link.
+    pub name: String,
+    /// Corners [m].
+    pub positions: Vec<[f32; 3]>,
+    /// Normals, one per corner.
+    pub normals: Vec<[f32; 3]>,
+    /// Corner indices.
+    pub triangles: Vec<[u32; 3]>,
+    /// Red, green, blue, alpha, 0 to 1.
+    pub color: [f32; 4],
+    /// File it came from, if any.
+    pub file: Option<PathBuf>,
+}
+
+/// A file inside a recording.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Attachment {
+    /// File name.
+    pub name: String,
+    /// Media type, for instance `application/xml`.
+    pub media_type: String,
+    /// Contents.
+    pub bytes: Vec<u8>,
+}
+
+/// One of the two robots at one instant.
+#[derive(Clone, Debug, Default)]
+pub struct TwinSample {
+    /// Positions of the actuated joints [rad or m].
+    pub q: Vec<f64>,
+    /// Velocities.
+    pub qdot: Vec<f64>,
+    /// Forces the drives must supply [N m or N].
+    pub effort: Vec<f64>,
+    /// Pose of each link of the header in the world.
+    pub X_WL: Vec<Pose>,
+    /// Pose of the tool centre point in the world.
+    pub X_WT: Pose,
+}
+
+/// One elastic element at one instant.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ElasticSample {
+    /// Deflection in the proximal face's axes: 3 translations [m], 3 angles [rad].
+    pub deflection: [f64; 6],
+    /// Load on the distal part: force [N], moment [N m].
+    pub load: [f64; 6],
+}
+
+/// Energies of the flexible robot [J].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct EnergySample {
+    /// Kinetic.
+    pub kinetic: f64,
+    /// Gravity, zero at the world origin.
+    pub potential: f64,
+    /// Stored in the elastic elements.
+    pub elastic: f64,
+}
+
+/// One logged instant.
+#[derive(Clone, Debug, Default)]
+pub struct Sample {
+    /// Time since the start [s].
+    pub time_s: f64,
+    /// Steps taken so far.
+    pub step: u64,
+    /// Simulated robot.
+    pub flexible: TwinSample,
+    /// Rigid twin; meaningless unless `RunHeader::has_rigid`.
+    pub rigid: TwinSample,
+    /// TCP error flexible minus rigid, world axes: translation [m], rotation vector [rad].
+    pub error_world: [f64; 6],
+    /// The same in path axes: tangential, normal, binormal.
+    pub error_path: [f64; 6],
+    /// Elastic elements, in header order.
+    pub elastic: Vec<ElasticSample>,
+    /// Energies.
+    pub energy: EnergySample,
+    /// Iterations of the last step (0 for explicit steppers) and residual norm.
+    pub solver: [f64; 2],
+}
+
+/// Writes a run while it goes on.
+pub trait Recorder {
+    /// Starts the file.
+    ///
+    /// # Errors
+    /// [`crate::LogError`] if it cannot be created or written.
+    fn begin(&mut self, header: &RunHeader) -> Result<(), crate::LogError>;
+
+    /// Adds one instant. The recorder flushes on its own, at least once a second of wall time.
+    ///
+    /// # Errors
+    /// [`crate::LogError`] on a write error (full disk).
+    fn record(&mut self, sample: &Sample) -> Result<(), crate::LogError>;
+
+    /// Adds the result figures and closes the file so that every reader accepts it.
+    ///
+    /// # Errors
+    /// [`crate::LogError`] on a write error.
+    fn finish(&mut self, result: &[(String, String)]) -> Result<(), crate::LogError>;
+
+    /// Where it writes.
+    fn path(&self) -> &std::path::Path;
+}

@@ -1,0 +1,1 @@
+//! Joint trajectories as piecewise polynomials: files, splines, point-to-point profiles, limits

@@ -1,0 +1,1 @@
+//! URDF and its meshes to a flexarm mechanism
