@@ -72,10 +72,9 @@ impl Beam {
         let shear = |kGA: Option<f64>, what| match (theory, kGA) {
             (BeamTheory::EulerBernoulli, _) => Ok(0.0),
             (BeamTheory::Timoshenko, Some(kGA)) => Ok(1.0 / kGA),
-            (BeamTheory::Timoshenko, None) => Err(FemError::Missing {
-                what,
-                help: "give it, or choose the theory \"euler-bernoulli\"",
-            }),
+            (BeamTheory::Timoshenko, None) => {
+                Err(FemError::Missing { what, help: "give it, or choose the theory \"euler-bernoulli\"" })
+            }
         };
         Ok(Self {
             bar,
@@ -130,10 +129,22 @@ impl Beam {
             let near = (4.0 + phi) * l * l;
             let far = (2.0 - phi) * l * l;
             let k = f * Matrix4::new(
-                12.0, 6.0 * l, -12.0, 6.0 * l, //
-                6.0 * l, near, -6.0 * l, far, //
-                -12.0, -6.0 * l, 12.0, -6.0 * l, //
-                6.0 * l, far, -6.0 * l, near,
+                12.0,
+                6.0 * l,
+                -12.0,
+                6.0 * l, //
+                6.0 * l,
+                near,
+                -6.0 * l,
+                far, //
+                -12.0,
+                -6.0 * l,
+                12.0,
+                -6.0 * l, //
+                6.0 * l,
+                far,
+                -6.0 * l,
+                near,
             );
             plane.scatter(&k, &mut K);
         }
@@ -156,10 +167,7 @@ impl Beam {
         let mut C = Matrix6::zeros();
         C[(0, 0)] = l / bar.EA;
         C[(3, 3)] = l / bar.GJ;
-        for (w, theta, sign, EI, shear) in [
-            (1, 5, 1.0, bar.EI_z, self.shear_y),
-            (2, 4, -1.0, bar.EI_y, self.shear_z),
-        ] {
+        for (w, theta, sign, EI, shear) in [(1, 5, 1.0, bar.EI_z, self.shear_y), (2, 4, -1.0, bar.EI_y, self.shear_z)] {
             C[(w, w)] = l.powi(3) / (3.0 * EI) + l * shear;
             C[(theta, theta)] = l / EI;
             C[(w, theta)] = sign * l * l / (2.0 * EI);
@@ -177,7 +185,7 @@ impl Beam {
     /// motions and Guyan's mass for the rest.
     ///
     /// # Source
-    /// Shapes: Friedman & Kosmatka (1993), *Computers & Structures* 47(3), eq. (16) to (19).
+    /// Shapes: Friedman & Kosmatka (1993), *Computers & Structures* 47(3).
     pub fn mass12(&self) -> Matrix12 {
         let l = self.length;
         let mut M = Matrix12::zeros();
@@ -194,8 +202,7 @@ impl Beam {
                 let (N, N_theta) = plane.shapes(xi, l);
                 m += weight
                     * l
-                    * (self.bar.mass_per_length * N * N.transpose()
-                        + plane.rotary * N_theta * N_theta.transpose());
+                    * (self.bar.mass_per_length * N * N.transpose() + plane.rotary * N_theta * N_theta.transpose());
             }
             plane.scatter(&m, &mut M);
         }
@@ -223,11 +230,8 @@ impl Beam {
         let l = (to - from) * self.length;
         let mass = bar.mass_per_length * l;
         let slender = mass * l * l / 12.0;
-        let moments = Vector3::new(
-            (bar.rotary_y + bar.rotary_z) * l,
-            slender + bar.rotary_y * l,
-            slender + bar.rotary_z * l,
-        );
+        let moments =
+            Vector3::new((bar.rotary_y + bar.rotary_z) * l, slender + bar.rotary_y * l, slender + bar.rotary_z * l);
         Ok(RigidPart {
             mass,
             com: Vector3::new(0.5 * (from + to) * self.length, 0.0, 0.0),
@@ -274,6 +278,5 @@ fn gauss4() -> [(f64, f64); 4] {
     let outer = (3.0 / 7.0 + 2.0 / 7.0 * root).sqrt();
     let w_inner = (18.0 + 30.0_f64.sqrt()) / 72.0;
     let w_outer = (18.0 - 30.0_f64.sqrt()) / 72.0;
-    [(-outer, w_outer), (-inner, w_inner), (inner, w_inner), (outer, w_outer)]
-        .map(|(x, w)| (0.5 * (1.0 + x), w))
+    [(-outer, w_outer), (-inner, w_inner), (inner, w_inner), (outer, w_outer)].map(|(x, w)| (0.5 * (1.0 + x), w))
 }

@@ -12,9 +12,10 @@ use nalgebra::{Matrix3, Rotation3, Translation3, Vector3};
 
 use crate::beam::{Beam, BeamTheory};
 use crate::error::{FemError, positive};
+use crate::frames::LinkFrames;
 use crate::gate::GateLimits;
 use crate::material::Material;
-use crate::reduced::{LinkFrames, Provenance, ReducedLink};
+use crate::reduced::{Provenance, ReducedLink};
 use crate::rigid_part::RigidPart;
 use crate::section::Section;
 use crate::spatial::{Pose, adjoint};
@@ -48,12 +49,7 @@ pub struct BeamLink {
 
 impl BeamLink {
     /// Beam along link x from A at the link origin to B, cut in the middle, Timoshenko's theory.
-    pub fn new(
-        name: impl Into<String>,
-        section: Section,
-        material: Material,
-        length: f64,
-    ) -> Self {
+    pub fn new(name: impl Into<String>, section: Section, material: Material, length: f64) -> Self {
         Self {
             name: name.into(),
             section,
@@ -79,13 +75,7 @@ impl BeamLink {
     ///
     /// # Errors
     /// [`FemError::OutOfRange`] if `axis` is zero or `y` is parallel to it.
-    pub fn along(
-        self,
-        axis: Vector3<f64>,
-        y: Vector3<f64>,
-        roll: f64,
-        offset: Vector3<f64>,
-    ) -> Result<Self, FemError> {
+    pub fn along(self, axis: Vector3<f64>, y: Vector3<f64>, roll: f64, offset: Vector3<f64>) -> Result<Self, FemError> {
         let direction = |what: &str, v: Vector3<f64>| {
             v.try_normalize(1e-9).filter(|v| v.amax().is_finite()).ok_or_else(|| {
                 let (what, found) = (what.to_owned(), v.norm());
@@ -97,10 +87,7 @@ impl BeamLink {
         let turned = y * roll.cos() + x.cross(&y) * roll.sin();
         let R_LE = Matrix3::from_columns(&[x, turned, x.cross(&turned)]);
         Ok(Self {
-            X_LE: Pose::from_parts(
-                Translation3::from(offset),
-                Rotation3::from_matrix_unchecked(R_LE),
-            ),
+            X_LE: Pose::from_parts(Translation3::from(offset), Rotation3::from_matrix_unchecked(R_LE)),
             X_LA: Pose::identity(),
             X_LB: Pose::from_parts(Translation3::from(x * self.length), Rotation3::identity()),
             ..self

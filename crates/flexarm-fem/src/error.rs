@@ -75,7 +75,8 @@ pub enum FemError {
         "the 12x12 stiffness moves under rigid motion: a {motion} of both interfaces gives a \
          relative force {residual:.1e} in {row}, allowed {allowed:.1e}; the interface frames say \
          p_AB = {}{}; is a support left in the model, or do units, axes or the order of the rows differ?",
-        place(p_AB), implied(implied_p_AB)
+        place(p_AB),
+        implied(implied_p_AB)
     )]
     MovesUnderRigidMotion {
         /// Largest force over the size of the terms that should cancel in it.
@@ -169,19 +170,15 @@ pub(crate) fn positive(what: impl Into<String>, found: f64) -> Result<f64, FemEr
     if found > 0.0 && found.is_finite() {
         return Ok(found);
     }
-    Err(FemError::OutOfRange {
-        what: what.into(),
-        found,
-        allowed: "a positive finite number".into(),
-    })
+    Err(FemError::OutOfRange { what: what.into(), found, allowed: "a positive finite number".into() })
 }
 
 fn place(p: &Vector3<f64>) -> String {
-    format!("({:.6}, {:.6}, {:.6}) m", p.x, p.y, p.z)
+    // Rounded first, so that no -0.000000 is printed.
+    let round = |x: f64| (x * 1e6).round() / 1e6 + 0.0;
+    format!("({:.6}, {:.6}, {:.6}) m", round(p.x), round(p.y), round(p.z))
 }
 
 fn implied(p: &Option<Vector3<f64>>) -> String {
-    p.as_ref()
-        .map(|p| format!(", the matrix itself {}", place(p)))
-        .unwrap_or_default()
+    p.as_ref().map(|p| format!(", the matrix itself {}", place(p))).unwrap_or_default()
 }

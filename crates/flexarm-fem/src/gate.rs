@@ -38,12 +38,7 @@ impl Default for GateLimits {
     ///
     /// One's own assembly reaches a residual of 1e-11, printed matrices 3e-10 to 7e-8.
     fn default() -> Self {
-        Self {
-            asymmetry: 1e-9,
-            rigid_body_residual: 1e-3,
-            rigid_body_warning: 1e-6,
-            min_eigenvalue: 1e-10,
-        }
+        Self { asymmetry: 1e-9, rigid_body_residual: 1e-3, rigid_body_warning: 1e-6, min_eigenvalue: 1e-10 }
     }
 }
 
@@ -65,18 +60,15 @@ pub struct GateReport {
 impl GateReport {
     /// Sentences about measures that pass, but are worth a look.
     pub fn warnings(&self, limits: &GateLimits) -> Vec<String> {
-        [
-            ("rigid-body residual", self.rigid_body_residual),
-            ("disagreement of the blocks", self.block_identity),
-        ]
-        .into_iter()
-        .filter_map(|(what, value)| Some((what, value?)))
-        .filter(|(_, value)| *value > limits.rigid_body_warning)
-        .map(|(what, value)| {
-            let warn = limits.rigid_body_warning;
-            format!("{what} of the stiffness is {value:.1e}, usual is below {warn:.0e}: few digits?")
-        })
-        .collect()
+        [("rigid-body residual", self.rigid_body_residual), ("disagreement of the blocks", self.block_identity)]
+            .into_iter()
+            .filter_map(|(what, value)| Some((what, value?)))
+            .filter(|(_, value)| *value > limits.rigid_body_warning)
+            .map(|(what, value)| {
+                let warn = limits.rigid_body_warning;
+                format!("{what} of the stiffness is {value:.1e}, usual is below {warn:.0e}: few digits?")
+            })
+            .collect()
     }
 }
 
@@ -144,20 +136,11 @@ pub fn check_matrix6(
     let asymmetry = check_symmetry(what, K, &s, limits)?;
     let K = symmetric_part(K);
     let (min_eigenvalue, condition) = check_definite(what, &K, limits)?;
-    let report = GateReport {
-        asymmetry,
-        rigid_body_residual: None,
-        block_identity: None,
-        min_eigenvalue,
-        condition,
-    };
+    let report = GateReport { asymmetry, rigid_body_residual: None, block_identity: None, min_eigenvalue, condition };
     Ok((K, report))
 }
 
-fn check_finite<const N: usize>(
-    what: &'static str,
-    K: &SMatrix<f64, N, N>,
-) -> Result<(), FemError> {
+fn check_finite<const N: usize>(what: &'static str, K: &SMatrix<f64, N, N>) -> Result<(), FemError> {
     for row in 0..N {
         for column in 0..N {
             if !K[(row, column)].is_finite() {
@@ -211,11 +194,7 @@ fn check_symmetry<const N: usize>(
 }
 
 /// Smallest eigenvalue and condition number of the matrix scaled to a unit diagonal.
-fn check_definite(
-    what: &'static str,
-    K: &Matrix6<f64>,
-    limits: &GateLimits,
-) -> Result<(f64, f64), FemError> {
+fn check_definite(what: &'static str, K: &Matrix6<f64>, limits: &GateLimits) -> Result<(f64, f64), FemError> {
     let s = diagonal_scale(what, K, limits)?;
     let refuse = |min_eigenvalue, direction| {
         let allowed = limits.min_eigenvalue;
@@ -282,12 +261,7 @@ fn rigid_body_residual(K: &Matrix12, s: &SVector<f64, 12>, p_AB: &Vector3<f64>) 
 }
 
 /// Disagreement of `K_AA = Adᵀ K_BB Ad` and `K_AB = -Adᵀ K_BB`, `Ad = Ad_BA`.
-fn block_identity(
-    K: &Matrix12,
-    K_BB: &Matrix6<f64>,
-    s: &SVector<f64, 12>,
-    p_AB: &Vector3<f64>,
-) -> f64 {
+fn block_identity(K: &Matrix12, K_BB: &Matrix6<f64>, s: &SVector<f64, 12>, p_AB: &Vector3<f64>) -> f64 {
     let Ad_BA = lever(p_AB);
     let K_AB = -Ad_BA.transpose() * K_BB;
     let K_AA = -K_AB * Ad_BA;
@@ -315,11 +289,8 @@ pub(crate) fn lever(p_AB: &Vector3<f64>) -> Matrix6<f64> {
 fn implied_lever(K: &Matrix12) -> Option<Vector3<f64>> {
     let K_BB = K.fixed_view::<6, 6>(6, 6).into_owned();
     let Ad_BA = -K_BB.try_inverse()? * K.fixed_view::<6, 6>(6, 0);
-    let p = Vector3::new(
-        Ad_BA[(1, 5)] - Ad_BA[(2, 4)],
-        Ad_BA[(2, 3)] - Ad_BA[(0, 5)],
-        Ad_BA[(0, 4)] - Ad_BA[(1, 3)],
-    ) * -0.5;
+    let p = Vector3::new(Ad_BA[(1, 5)] - Ad_BA[(2, 4)], Ad_BA[(2, 3)] - Ad_BA[(0, 5)], Ad_BA[(0, 4)] - Ad_BA[(1, 3)])
+        * -0.5;
     let p_AB = -p;
     let difference = Ad_BA - lever(&p_AB);
     let size = 1.0 + p_AB.norm();

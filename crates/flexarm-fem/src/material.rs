@@ -53,15 +53,13 @@ impl Material {
     /// # Errors
     /// [`FemError::UnknownName`], with all the names there are.
     pub fn named(name: &str) -> Result<Self, FemError> {
-        Self::PRESETS
-            .iter()
-            .find(|(known, _)| *known == name)
-            .map(|(_, material)| *material)
-            .ok_or_else(|| FemError::UnknownName {
+        Self::PRESETS.iter().find(|(known, _)| *known == name).map(|(_, material)| *material).ok_or_else(|| {
+            FemError::UnknownName {
                 what: "material",
                 found: name.to_owned(),
                 known: Self::PRESETS.map(|(known, _)| known).join(", "),
-            })
+            }
+        })
     }
 
     /// Shear modulus, Pa: the given one, or `E / (2 (1 + nu))`.

@@ -17,23 +17,10 @@
 use nalgebra::{Matrix6, Vector3};
 
 use crate::error::FemError;
+use crate::frames::LinkFrames;
 use crate::gate::{GateLimits, GateReport, check_matrix6, check_matrix12, lever};
 use crate::rigid_part::RigidPart;
 use crate::spatial::{Matrix12, Pose, adjoint, symmetric_part};
-
-/// No link is longer than this, m: a larger distance is a mistake in the units.
-const LONGEST_LINK: f64 = 100.0;
-
-/// The three frames of a link, in its own frame L.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LinkFrames {
-    /// Proximal interface.
-    pub X_LA: Pose,
-    /// Distal interface.
-    pub X_LB: Pose,
-    /// Split: where the elastic joint sits, and in whose axes `K_S` is given.
-    pub X_LS: Pose,
-}
 
 /// Elastic joint between the two parts of a link.
 #[derive(Debug, Clone, PartialEq)]
@@ -84,54 +71,6 @@ pub struct ReducedLink {
     pub provenance: Provenance,
     /// What the gate measured on the source matrix.
     pub checks: GateReport,
-}
-
-impl LinkFrames {
-    /// Frames with S midway between A and B, in link axes.
-    pub fn new(X_LA: Pose, X_LB: Pose) -> Self {
-        Self { X_LA, X_LB, X_LS: Pose::identity() }.with_split_fraction(0.5)
-    }
-
-    /// S on the straight line from A to B, in link axes.
-    pub fn with_split_fraction(self, fraction: f64) -> Self {
-        let p_LA = self.X_LA.translation.vector;
-        let p_LS = p_LA + self.p_AB() * fraction;
-        self.with_split(Pose::translation(p_LS.x, p_LS.y, p_LS.z))
-    }
-
-    /// S anywhere.
-    pub fn with_split(self, X_LS: Pose) -> Self {
-        Self { X_LS, ..self }
-    }
-
-    /// From A to B, link axes, m.
-    pub fn p_AB(&self) -> Vector3<f64> {
-        self.X_LB.translation.vector - self.X_LA.translation.vector
-    }
-
-    /// S in the frame with origin Bo and link axes, in which `K_BB` lives.
-    fn X_BS(&self) -> Pose {
-        let p = self.X_LB.translation.vector;
-        Pose::translation(-p.x, -p.y, -p.z) * self.X_LS
-    }
-
-    fn check(&self) -> Result<(), FemError> {
-        for (what, X) in [
-            ("position of interface A (m)", &self.X_LA),
-            ("position of interface B (m)", &self.X_LB),
-            ("position of the split S (m)", &self.X_LS),
-        ] {
-            let far = X.translation.vector.amax();
-            if !(far <= LONGEST_LINK) {
-                return Err(FemError::OutOfRange {
-                    what: what.into(),
-                    found: far,
-                    allowed: format!("up to {LONGEST_LINK} from the link origin; is it in millimetres?"),
-                });
-            }
-        }
-        Ok(())
-    }
 }
 
 impl ReducedLink {
@@ -185,6 +124,7 @@ impl ReducedLink {
     ) -> Result<Self, FemError> {
         proximal.check("the proximal part")?;
         distal.check("the distal part")?;
+        let (proximal, distal) = (proximal.symmetrised(), distal.symmetrised());
         let split = elastic_split(&frames, &K_BB)?;
         let LinkFrames { X_LA, X_LB, .. } = frames;
         Ok(Self { name, X_LA, X_LB, K_BB, split, proximal, distal, provenance, checks })
@@ -219,14 +159,14 @@ impl ReducedLink {
         let scale = K_BB.diagonal().map(|k| 1.0 / k.sqrt());
         let scaled = K_BB.component_mul(&(scale * scale.transpose()));
         let inverse = scaled.cholesky().map(|factor| factor.inverse());
-        inverse
-            .map(|C| symmetric_part(&C.component_mul(&(scale * scale.transpose()))))
-            .ok_or_else(|| FemError::NotPositiveDefinite {
+        inverse.map(|C| symmetric_part(&C.component_mul(&(scale * scale.transpose())))).ok_or_else(|| {
+            FemError::NotPositiveDefinite {
                 what: "K_BB",
                 min_eigenvalue: 0.0,
                 allowed: GateLimits::default().min_eigenvalue,
                 direction: crate::Direction(vec![0.0; 6]),
-            })
+            }
+        })
     }
 
     /// Stiffness of both interfaces, 12×12, A then B, link axes: the way back to FE programs.
@@ -239,6 +179,29 @@ impl ReducedLink {
         K.fixed_view_mut::<6, 6>(6, 0).copy_from(&K_AB.transpose());
         K.fixed_view_mut::<6, 6>(6, 6).copy_from(&self.K_BB);
         K
+    }
+
+    /// Sentences about what was accepted, but looks like a mistake.
+    ///
+    /// Besides those of the gate: `K_S` stiffer in rotation than any lever of the link explains,
+    /// `sqrt(tr K_rr / tr K_tt)` above ten times the distance of its frames. Forces per millimetre
+    /// read as forces per metre look like that, and a 6×6 holds no other trace of its units.
+    pub fn warnings(&self, limits: &GateLimits) -> Vec<String> {
+        let mut warnings = self.checks.warnings(limits);
+        let K_S = self.split.K_S.diagonal();
+        let lever = (K_S.fixed_rows::<3>(3).sum() / K_S.fixed_rows::<3>(0).sum()).sqrt();
+        let p_LS = self.split.X_LS.translation.vector;
+        let size = [self.X_LA, self.X_LB]
+            .iter()
+            .map(|X| (X.translation.vector - p_LS).norm())
+            .fold(self.p_AB().norm(), f64::max);
+        if size > 0.0 && lever > 10.0 * size {
+            warnings.push(format!(
+                "the rotational stiffness is that of a lever of {lever:.3} m in a link of {size:.3} m: \
+                 is the stiffness in other units than declared?"
+            ));
+        }
+        warnings
     }
 
     /// The same link with its elastic joint moved to another frame. The parts stay as they are cut.

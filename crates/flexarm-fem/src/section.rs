@@ -201,10 +201,8 @@ fn rectangle(width: f64, height: f64, nu: f64) -> Result<SectionProperties, FemE
 fn rectangle_torsion(width: f64, height: f64) -> f64 {
     const ZETA_5: f64 = 1.036_927_755_143_37;
     let (a, b) = (width.max(height), width.min(height));
-    let tail: f64 = (0..8)
-        .map(|k| f64::from(2 * k + 1))
-        .map(|n| 2.0 / ((n * PI * a / b).exp() + 1.0) / n.powi(5))
-        .sum();
+    let tail: f64 =
+        (0..8).map(|k| f64::from(2 * k + 1)).map(|n| 2.0 / ((n * PI * a / b).exp() + 1.0) / n.powi(5)).sum();
     let sum = 31.0 / 32.0 * ZETA_5 - tail;
     a * b.powi(3) * (1.0 / 3.0 - 64.0 / PI.powi(5) * (b / a) * sum)
 }
@@ -236,14 +234,7 @@ fn ring(outer: f64, inner: f64, nu: f64) -> Result<SectionProperties, FemError> 
     let m2 = (ri / ro).powi(2);
     let q = (1.0 + m2).powi(2);
     let k = 6.0 * (1.0 + nu) * q / ((7.0 + 6.0 * nu) * q + (20.0 + 12.0 * nu) * m2);
-    Ok(SectionProperties {
-        A: PI * (ro * ro - ri * ri),
-        I_y: I,
-        I_z: I,
-        J: 2.0 * I,
-        k_y: k,
-        k_z: k,
-    })
+    Ok(SectionProperties { A: PI * (ro * ro - ri * ri), I_y: I, I_z: I, J: 2.0 * I, k_y: k, k_z: k })
 }
 
 fn check_wall(wall: f64, smallest: f64) -> Result<(), FemError> {

@@ -3,7 +3,7 @@
 //! [`State`] is small and copyable between steppers; [`Data`] holds results and scratch of every algorithm,
 //! sized once by [`Data::new`], so that no algorithm allocates. Threads share a `Model`, each with its own `Data`.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use crate::model::{JointMotion, Model};
 use crate::spatial::{ArticulatedInertia, Pose, SpatialInertia, Twist, Wrench};
@@ -64,12 +64,7 @@ pub struct Data {
     pub(crate) U: Vec<Wrench>,
     pub(crate) inverse_d: Vec<f64>,
     pub(crate) u: Vec<f64>,
-    /// Elastic joints: lower Cholesky factor of the articulated inertia; wrench across the joint.
-    pub(crate) factor: Vec<Matrix6<f64>>,
-    pub(crate) columns: Vec<Matrix6<f64>>,
-    pub(crate) V_W: Vec<Twist>,
     pub(crate) scratch: Vec<f64>,
-    pub(crate) factor_n: Option<nalgebra::Cholesky<f64, nalgebra::Dyn>>,
 }
 
 impl Data {
@@ -95,11 +90,7 @@ impl Data {
             U: vec![Wrench::zeros(); n],
             inverse_d: vec![0.0; n],
             u: vec![0.0; n],
-            factor: vec![Matrix6::zeros(); n],
-            columns: vec![Matrix6::zeros(); n],
-            V_W: vec![zero; n],
             scratch: vec![0.0; model.nv()],
-            factor_n: None,
         }
     }
 
@@ -213,10 +204,4 @@ pub(crate) fn add_projection(model: &Model, data_elastic: &ElasticSubspace, i: u
             }
         }
     }
-}
-
-/// Six components of a generalised vector as a `Vector6`.
-#[inline(always)]
-pub(crate) fn six(v: &[f64], k: usize) -> Vector6<f64> {
-    Vector6::new(v[k], v[k + 1], v[k + 2], v[k + 3], v[k + 4], v[k + 5])
 }

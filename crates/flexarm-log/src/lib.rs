@@ -1,6 +1,64 @@
-//! Recorders: MCAP, Rerun and CSV.
+//! Recorders: a run of the simulator into CSV, MCAP and Rerun files.
+//!
+//! A run hands over one [`RunHeader`], then [`Sample`]s, then its result figures; every [`Recorder`] takes the
+//! same three calls, and [`RecorderSet`] passes them to several files at once. Start at [`CsvRecorder`] for
+//! tables, `McapRecorder` (feature `mcap`) for ROS 2 tools, Foxglove and PlotJuggler, `RrdRecorder` (feature
+//! `rerun`) for the Rerun viewer with meshes and a layout.
+//!
+//! What all three promise:
+//! * a file is created by [`Recorder::begin`] and replaces an existing one only if told to
+//!   ([`CreateOptions::overwrite`]);
+//! * a killed run loses at most the last moment ([`CreateOptions::flush_every`]), and what is left can be read;
+//! * the same samples give the same bytes, on any day and at any speed: nothing in a file depends on the clock.
+//!
+//! Not here: what the numbers mean (`flexarm-analysis`), running the simulation (`flexarm`).
+//!
+//! ```
+//! use flexarm_log::*;
+//!
+//! let path = std::env::temp_dir().join(format!("flexarm-log-{}.csv", std::process::id()));
+//! let header = RunHeader { joints: vec!["joint_1".into()], ..RunHeader::default() };
+//! let mut recorder = CsvRecorder::create(&path, CreateOptions::default());
+//! recorder.begin(&header)?;
+//! for step in 0..3_u64 {
+//!     let time_s = step as f64 * 1e-3;
+//!     let flexible = TwinSample { q: vec![2.0 * time_s], qdot: vec![2.0], effort: vec![0.5], ..Default::default() };
+//!     recorder.record(&Sample { time_s, step, flexible, ..Sample::default() })?;
+//! }
+//! recorder.finish(&[("tcp.peak_m".into(), "0.0".into())])?;
+//!
+//! let text = std::fs::read_to_string(&path)?;
+//! assert!(text.starts_with("time,flexible_x_m,flexible_y_m,flexible_z_m,joint_1_position_rad,joint_1_effort,"));
+//! assert_eq!(text.lines().count(), 4);
+//!
+//! // A second run does not silently replace the first.
+//! let again = CsvRecorder::create(&path, CreateOptions::default()).begin(&header);
+//! assert!(again.unwrap_err().to_string().contains("--force"));
+//! # std::fs::remove_file(&path)?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 #![allow(non_snake_case, reason = "monogram notation: X_WL, pose of L in W")]
+#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
+mod create;
+mod csv_file;
+mod error;
+#[cfg(feature = "mcap")]
+mod mcap_file;
+mod multi;
 mod record;
+#[cfg(feature = "rerun")]
+mod rrd_file;
+mod shape;
+#[cfg(any(feature = "mcap", feature = "rerun"))]
+mod tail_file;
 
+pub use create::CreateOptions;
+pub use csv_file::CsvRecorder;
+pub use error::LogError;
+#[cfg(feature = "mcap")]
+pub use mcap_file::McapRecorder;
+pub use multi::RecorderSet;
 pub use record::*;
+#[cfg(feature = "rerun")]
+pub use rrd_file::RrdRecorder;

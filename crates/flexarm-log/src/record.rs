@@ -137,8 +137,18 @@ pub struct Sample {
     pub solver: [f64; 2],
 }
 
-/// Writes a run while it goes on.
+/// Writes a run while it goes on: `begin` once, `record` any number of times, `finish` once.
+///
+/// A recorder that is dropped without `finish` closes its file as well as it can, without result figures.
 pub trait Recorder {
+    /// Whether `begin` may create the file, as far as can be told without creating it.
+    ///
+    /// # Errors
+    /// [`crate::LogError::Exists`] if it is there already and overwriting was not asked for.
+    fn check(&self) -> Result<(), crate::LogError> {
+        Ok(())
+    }
+
     /// Starts the file.
     ///
     /// # Errors
@@ -148,7 +158,8 @@ pub trait Recorder {
     /// Adds one instant. The recorder flushes on its own, at least once a second of wall time.
     ///
     /// # Errors
-    /// [`crate::LogError`] on a write error (full disk).
+    /// [`crate::LogError::Shape`] if the sample does not fit the header; [`crate::LogError`] on a write error
+    /// (full disk).
     fn record(&mut self, sample: &Sample) -> Result<(), crate::LogError>;
 
     /// Adds the result figures and closes the file so that every reader accepts it.

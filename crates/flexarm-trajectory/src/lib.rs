@@ -1,1 +1,74 @@
-//! Joint trajectories as piecewise polynomials: files, splines, point-to-point profiles, limits
+//! Joint trajectories `q(t), q̇(t), q̈(t)`: files, splines, point-to-point profiles, limits.
+//!
+//! A [`Trajectory`] is a set of named joints, each a piecewise polynomial of degree five or less. It is built
+//! once, from a file or a [`Plan`], and then only read: [`Trajectory::sample`] allocates nothing.
+//!
+//! ```
+//! use flexarm_trajectory::{JointLimits, Trajectory};
+//!
+//! let text = r#"
+//!     format = 1
+//!     unit = "deg"
+//!     joints = ["shoulder", "elbow"]
+//!     start = [0.0, 0.0]
+//!
+//!     [[move]]
+//!     to = [90.0, -45.0]
+//!     duration = 2.0      # s
+//!     hold = 0.5          # s
+//! "#;
+//! let trajectory = Trajectory::parse_toml(text, "lift.toml", &[])?;
+//! assert_eq!(trajectory.duration(), 2.5);
+//!
+//! // Half-way a quintic move is at its mean, at 15/8 of its mean speed, and free of acceleration.
+//! let (mut q, mut qdot, mut qddot) = ([0.0; 2], [0.0; 2], [0.0; 2]);
+//! trajectory.sample(1.0, &mut q, &mut qdot, &mut qddot);
+//! let half_turn = std::f64::consts::FRAC_PI_2;
+//! assert!((q[0] - half_turn / 2.0).abs() < 1e-15);
+//! assert!((qdot[0] - 15.0 / 8.0 * half_turn / 2.0).abs() < 1e-15);
+//! assert!(qddot[0].abs() < 1e-14);
+//!
+//! // Every limit that is passed is listed, not the first one only.
+//! let limits = JointLimits { upper: 1.0, velocity: 1.4, ..JointLimits::UNLIMITED };
+//! let violations = trajectory.check_limits(&[limits; 2]);
+//! assert_eq!(violations.len(), 2); // the shoulder's position and speed
+//! # Ok::<(), flexarm_trajectory::TrajectoryError>(())
+//! ```
+//!
+//! Where to look:
+//!
+//! * mathematics: [`Trajectory`] (sampling, time scaling, moves and holds), [`Plan`] (quintic, trapezoid and
+//!   S-curve moves, points passed on the way), [`Samples`] (splines through sampled joint values),
+//!   [`JointPeak`], [`LimitViolation`];
+//! * files: [`Trajectory::from_path`], [`Trajectory::parse_csv`], [`Trajectory::parse_toml`],
+//!   [`Trajectory::to_csv`]. The module pages [`csv_file`] and [`waypoints`] describe the two formats.
+//!
+//! Units: s, rad, rad/s, rad/s² (m, m/s, m/s² for a prismatic joint) everywhere except inside the files.
+//! Not here: robots, links and inverse kinematics; a trajectory knows its joints by name only.
+#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test"))]
+
+pub mod csv_file;
+mod csv_write;
+mod error;
+mod file;
+mod leg;
+mod limits;
+mod peak;
+mod plan;
+mod polynomial;
+mod shape;
+mod spline;
+mod trajectory;
+mod via;
+mod warning;
+pub mod waypoints;
+mod waypoints_check;
+mod waypoints_toml;
+
+pub use error::{FileError, PlanError, Problem, SampleError, TrajectoryError};
+pub use limits::{JointLimits, LimitKind, LimitViolation};
+pub use peak::{Extreme, JointPeak};
+pub use plan::{MotionLimits, Plan, PlannedMove, Profile};
+pub use spline::{JointSamples, Samples};
+pub use trajectory::{Move, Trajectory};
+pub use warning::Warning;

@@ -1,1 +1,11 @@
-//! Shared test models.
+//! Models that several crates' tests and benches share: random trees and the reference arm.
+//!
+//! Truth lives in the tests; here are only inputs. Everything is deterministic for given arguments.
+#![allow(non_snake_case, reason = "monogram notation, as in the crates under test")]
+
+pub mod allocations;
+mod random_tree;
+mod reference_arm;
+
+pub use random_tree::{Draw, random_state, random_tree};
+pub use reference_arm::{ReferenceArm, reference_arm, reference_motion};

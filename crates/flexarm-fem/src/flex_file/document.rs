@@ -36,17 +36,17 @@ impl<'d> Document<'d> {
         at: Range<usize>,
         element: &str,
         kind: FlexErrorKind,
-        found: impl Into<String>,
-        expected: impl Into<String>,
-        help: impl Into<String>,
+        found: impl Into<Box<str>>,
+        expected: impl Into<Box<str>>,
+        help: impl Into<Box<str>>,
     ) -> FlexFileError {
         let (line, column) = line_and_column(self.text, at.start);
         FlexFileError {
             kind,
-            origin: self.origin.to_owned(),
+            origin: self.origin.into(),
             line,
             column,
-            element: element.to_owned(),
+            element: element.into(),
             found: found.into(),
             expected: expected.into(),
             help: help.into(),
@@ -113,9 +113,9 @@ impl<'d, 't> Table<'d, 't> {
         &self,
         key: &str,
         kind: FlexErrorKind,
-        found: impl Into<String>,
-        expected: impl Into<String>,
-        help: impl Into<String>,
+        found: impl Into<Box<str>>,
+        expected: impl Into<Box<str>>,
+        help: impl Into<Box<str>>,
     ) -> FlexFileError {
         let element = self.element(key);
         self.document.fail(self.span.clone(), &element, kind, found, expected, help)
@@ -127,9 +127,9 @@ impl<'d, 't> Node<'d, 't> {
     pub(super) fn fail(
         &self,
         kind: FlexErrorKind,
-        found: impl Into<String>,
-        expected: impl Into<String>,
-        help: impl Into<String>,
+        found: impl Into<Box<str>>,
+        expected: impl Into<Box<str>>,
+        help: impl Into<Box<str>>,
     ) -> FlexFileError {
         self.document.fail(self.value.span(), &self.path, kind, found, expected, help)
     }
@@ -198,11 +198,7 @@ impl<'d, 't> Node<'d, 't> {
     /// The entries of an array of any length.
     pub(super) fn list(&self) -> Result<Vec<Self>, FlexFileError> {
         let array = self.value.get_ref().as_array().ok_or_else(|| self.wrong_type("an array"))?;
-        let node = |(i, value)| Node {
-            document: self.document,
-            path: format!("{}[{i}]", self.path),
-            value,
-        };
+        let node = |(i, value)| Node { document: self.document, path: format!("{}[{i}]", self.path), value };
         Ok(array.iter().enumerate().map(node).collect())
     }
 

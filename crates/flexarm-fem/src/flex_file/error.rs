@@ -41,19 +41,19 @@ pub struct FlexFileError {
     /// The sort of mistake.
     pub kind: FlexErrorKind,
     /// File, or the name that was given to the text.
-    pub origin: String,
+    pub origin: Box<str>,
     /// Line, from 1.
     pub line: usize,
     /// Column in characters, from 1.
     pub column: usize,
     /// The element, such as `stiffness.matrix[2][3]` (row and column from 0).
-    pub element: String,
+    pub element: Box<str>,
     /// What stands there.
-    pub found: String,
+    pub found: Box<str>,
     /// What may stand there.
-    pub expected: String,
+    pub expected: Box<str>,
     /// How to mend it; may be empty.
-    pub help: String,
+    pub help: Box<str>,
     /// Why the link was refused, for [`FlexErrorKind::Link`].
     #[source]
     pub source: Option<Box<FemError>>,

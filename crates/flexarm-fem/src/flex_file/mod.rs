@@ -2,6 +2,7 @@
 
 mod document;
 mod error;
+mod frames;
 mod read;
 mod units;
 mod write;

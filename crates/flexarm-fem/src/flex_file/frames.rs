@@ -1,0 +1,64 @@
+//! The frames of a reduced-link file: `[interface.A]`, `[interface.B]`, `[split]`.
+
+use nalgebra::{Matrix3, Rotation3, Translation3};
+
+use super::document::{Node, Table};
+use super::error::{FlexErrorKind, FlexFileError};
+use super::read::{refused, required_table};
+use super::units::Units;
+use crate::frames::LinkFrames;
+use crate::spatial::Pose;
+
+/// Interfaces and split, in SI; the split in the middle where it is not given.
+pub(super) fn read_frames(root: &Table<'_, '_>, units: &Units) -> Result<LinkFrames, FlexFileError> {
+    let node = root.require("interface", "give [interface.A] and [interface.B]")?;
+    let interface = node.table()?;
+    interface.only(&["A", "B"])?;
+    let help = "a link has a proximal interface A and a distal one B";
+    let X_LA = read_pose(&required_table(&interface, "A", help)?, units)?;
+    let X_LB = read_pose(&required_table(&interface, "B", help)?, units)?;
+    let frames = LinkFrames::new(X_LA, X_LB);
+    frames.check().map_err(|cause| refused(&node, cause, "frames in reach of each other"))?;
+
+    let Some(node) = root.get("split") else { return Ok(frames) };
+    let frames = frames.with_split(read_pose(&node.table()?, units)?);
+    frames.check().map_err(|cause| refused(&node, cause, "a frame on or near the link"))?;
+    Ok(frames)
+}
+
+/// Pose from `xyz` and either `rpy`, `rotation` or nothing.
+fn read_pose(table: &Table<'_, '_>, units: &Units) -> Result<Pose, FlexFileError> {
+    table.only(&["xyz", "rpy", "rotation"])?;
+    let p = table.require("xyz", "three numbers, link axes")?.vector()? * units.length;
+    let rotation = match (table.get("rpy"), table.get("rotation")) {
+        (None, None) => Rotation3::identity(),
+        (Some(rpy), None) => {
+            let [roll, pitch, yaw] = rpy.numbers("angles: roll, pitch, yaw")?;
+            Rotation3::from_euler_angles(roll, pitch, yaw)
+        }
+        (None, Some(rotation)) => read_rotation(&rotation)?,
+        (Some(_), Some(rotation)) => {
+            let kind = FlexErrorKind::UnknownKey;
+            return Err(rotation.fail(kind, "rpy and rotation", "one of them", "remove one"));
+        }
+    };
+    Ok(Pose::from_parts(Translation3::from(p), rotation))
+}
+
+fn read_rotation(node: &Node<'_, '_>) -> Result<Rotation3<f64>, FlexFileError> {
+    let mut R = Matrix3::zeros();
+    for (i, row) in node.items(3, "rows")?.iter().enumerate() {
+        let row: [f64; 3] = row.numbers("numbers in each row")?;
+        R.row_mut(i).copy_from_slice(&row);
+    }
+    let error = (R.transpose() * R - Matrix3::identity()).amax();
+    if error <= 1e-9 && R.determinant() > 0.0 {
+        return Ok(Rotation3::from_matrix_unchecked(R));
+    }
+    Err(node.fail(
+        FlexErrorKind::Rotation,
+        format!("a matrix with |RᵀR - 1| = {error:.1e}, determinant {:.6}", R.determinant()),
+        "orthonormal columns to 1e-9 and determinant +1",
+        "print more digits, or give rpy",
+    ))
+}

@@ -1,0 +1,272 @@
+//! Identities between the recursions on random trees: each algorithm is the other's truth.
+#![allow(non_snake_case, reason = "monogram notation")]
+
+use flexarm_kinematics::*;
+use flexarm_testkit::allocations::{CountingAllocator, count_allocations};
+use flexarm_testkit::{Draw, random_state, random_tree};
+use nalgebra::{DVector, Matrix6xX, Vector3};
+use proptest::prelude::*;
+
+#[global_allocator]
+static ALLOCATOR: CountingAllocator = CountingAllocator;
+
+/// Largest difference over the largest entry.
+fn difference(a: &DVector<f64>, b: &DVector<f64>) -> f64 {
+    (a - b).amax() / a.amax().max(b.amax()).max(1e-300)
+}
+
+struct Case {
+    model: Model,
+    data: Data,
+    state: State,
+    qddot: DVector<f64>,
+    draw: Draw,
+}
+
+fn case(seed: u64, n_joints: usize) -> Case {
+    let model = Model::new(&random_tree(seed, n_joints)).expect("random trees are valid");
+    let mut draw = Draw(seed ^ 0xABCD);
+    let state = random_state(&model, &mut draw);
+    let qddot = DVector::from_fn(model.nv(), |_, _| 3.0 * draw.signed());
+    let mut data = Data::new(&model);
+    for F in data.F_ext.iter_mut().skip(1) {
+        *F = Wrench::new(draw.vector(20.0), draw.vector(5.0));
+    }
+    Case { model, data, state, qddot, draw }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 96, ..ProptestConfig::default() })]
+
+    /// τ = M q̈ + bias; measured at most 3e-14.
+    #[test]
+    fn inverse_dynamics_is_mass_times_acceleration_plus_bias(seed in any::<u64>(), n in 1usize..=60) {
+        let Case { model, mut data, state, qddot, .. } = case(seed, n);
+        let tau = inverse_dynamics(&model, &mut data, &state, &qddot).clone();
+        let bias = nonlinear_effects(&model, &mut data, &state).clone();
+        let M = mass_matrix(&model, &mut data, &state.q).clone();
+        prop_assert!(difference(&tau, &(&M * &qddot + &bias)) < 1e-10);
+        prop_assert!((&M - M.transpose()).amax() <= 1e-12 * M.amax());
+        prop_assert!(M.cholesky().is_some());
+    }
+
+    /// Forward dynamics undoes inverse dynamics: the force error of its accelerations; measured at most 4e-12.
+    #[test]
+    fn forward_dynamics_is_the_inverse_of_inverse_dynamics(seed in any::<u64>(), n in 1usize..=60) {
+        let Case { model, mut data, state, qddot, .. } = case(seed, n);
+        let tau = inverse_dynamics(&model, &mut data, &state, &qddot).clone();
+        let roles = Roles::all_free(&model);
+        let back = forward_dynamics(&model, &mut data, &state, &roles, &tau).clone();
+        let tau_back = inverse_dynamics(&model, &mut data, &state, &back).clone();
+        prop_assert!(difference(&tau, &tau_back) < 1e-10, "{:e}", difference(&tau, &tau_back));
+    }
+
+    /// Any split into prescribed and free joints gives back the motion and the forces.
+    #[test]
+    fn hybrid_dynamics_agrees_with_inverse_dynamics(seed in any::<u64>(), n in 1usize..=60) {
+        let Case { model, mut data, state, qddot, mut draw } = case(seed, n);
+        let tau = inverse_dynamics(&model, &mut data, &state, &qddot).clone();
+        let mask: Vec<bool> = (0..model.nv()).map(|_| draw.signed() > 0.0).collect();
+        let roles = Roles::new(&model, |k| mask[k]);
+        let (mut a, mut f) = (qddot.clone(), tau.clone());
+        let free: Vec<usize> = roles.free_coordinates().to_vec();
+        for k in 0..model.nv() {
+            if free.contains(&k) { a[k] = f64::NAN } else { f[k] = f64::NAN }
+        }
+        for &k in &free { a[k] = 0.0; }
+        hybrid_dynamics(&model, &mut data, &state, &roles, &mut a, &mut f);
+        let tau_back = inverse_dynamics(&model, &mut data, &state, &a).clone();
+        prop_assert!(difference(&tau, &tau_back) < 1e-10, "forces of the motion {:e}", difference(&tau, &tau_back));
+        prop_assert!(difference(&tau, &f) < 1e-10, "forces {:e}", difference(&tau, &f));
+    }
+
+    /// dJ/dt against central differences (step 1e-6); measured at most 2e-8 of the largest entry.
+    /// The bound is the differences' own error; exactness to 1e-10 is in `jacobian_derivative_is_the_acceleration_bias`.
+    #[test]
+    fn jacobian_derivative_is_the_rate_of_the_jacobian(seed in any::<u64>(), n in 1usize..=30) {
+        let Case { model, mut data, state, .. } = case(seed, n);
+        let frame = model.frames().last().expect("has frames").clone();
+        let mut at = |t: f64| {
+            let mut J = Matrix6xX::zeros(model.nv());
+            forward_kinematics(&model, &mut data, &(&state.q + &state.qdot * t));
+            frame_jacobian(&model, &data, &frame, &mut J);
+            J
+        };
+        let h = 1e-6;
+        let numeric = (at(h) - at(-h)) / (2.0 * h);
+        let mut Jdot = Matrix6xX::zeros(model.nv());
+        forward_kinematics_velocity(&model, &mut data, &state);
+        frame_jacobian_derivative(&model, &data, &state, &frame, &mut Jdot);
+        prop_assert!((&numeric - &Jdot).amax() <= 2e-7 * (1.0 + Jdot.amax()), "{:e}", (&numeric - &Jdot).amax());
+    }
+
+    /// J q̈ + J̇ q̇ is the acceleration of the frame that the Newton-Euler pass finds; measured at most 1e-13.
+    #[test]
+    fn jacobian_derivative_is_the_acceleration_bias(seed in any::<u64>(), n in 1usize..=60) {
+        let Case { model, mut data, state, qddot, .. } = case(seed, n);
+        let frame = model.frames().last().expect("has frames").clone();
+        forward_kinematics_velocity(&model, &mut data, &state);
+        let (mut J, mut Jdot) = (Matrix6xX::zeros(model.nv()), Matrix6xX::zeros(model.nv()));
+        frame_jacobian(&model, &data, &frame, &mut J);
+        frame_jacobian_derivative(&model, &data, &state, &frame, &mut Jdot);
+        let V = &J * &state.qdot;
+        prop_assert!((V - frame_twist(&data, &frame).to_vector()).amax() <= 1e-11 * (1.0 + V.amax()));
+        let A = &J * &qddot + &Jdot * &state.qdot;
+        inverse_dynamics(&model, &mut data, &state, &qddot);
+        // Spatial acceleration of the frame (gravity taken out), then of the point: + w × v.
+        let X = data.X_WF(&frame);
+        let V_F = data.V[frame.body].at_child(&frame.X_BF);
+        let mut A_F = data.A[frame.body].at_child(&frame.X_BF);
+        A_F.linear += V_F.angular.cross(&V_F.linear);
+        let linear = X.rotation * A_F.linear + model.gravity;
+        let angular = X.rotation * A_F.angular;
+        let scale = 1.0 + A.amax();
+        prop_assert!((linear - A.fixed_rows::<3>(0)).amax() <= 1e-10 * scale);
+        prop_assert!((angular - A.fixed_rows::<3>(3)).amax() <= 1e-10 * scale);
+    }
+
+    /// Kinetic energy is ½ q̇ᵀ M q̇ and gravity is the gradient of the potential energy.
+    #[test]
+    fn energies_agree_with_mass_matrix_and_gravity_forces(seed in any::<u64>(), n in 1usize..=30) {
+        let Case { model, mut data, state, .. } = case(seed, n);
+        data.clear_external_wrenches();
+        let T = kinetic_energy(&model, &mut data, &state);
+        let M = mass_matrix(&model, &mut data, &state.q).clone();
+        prop_assert!((T - 0.5 * state.qdot.dot(&(&M * &state.qdot))).abs() <= 1e-11 * T);
+        let g = gravity_forces(&model, &mut data, &state.q).clone();
+        let h = 1e-5;
+        let up = potential_energy(&model, &mut data, &(&state.q + &state.qdot * h));
+        let down = potential_energy(&model, &mut data, &(&state.q - &state.qdot * h));
+        let slope = g.dot(&state.qdot);
+        prop_assert!(((up - down) / (2.0 * h) - slope).abs() <= 1e-6 * (1.0 + slope.abs()));
+    }
+
+    /// Power balance without differences: d/dt(T + U) = q̇ᵀ τ, by dT/dt = q̇ᵀ(M q̈) + ½ q̇ᵀ Ṁ q̇ along the motion.
+    #[test]
+    fn power_of_the_forces_is_the_rate_of_energy(seed in any::<u64>(), n in 1usize..=20) {
+        let Case { model, mut data, state, qddot, .. } = case(seed, n);
+        data.clear_external_wrenches();
+        let tau = inverse_dynamics(&model, &mut data, &state, &qddot).clone();
+        let h = 1e-5;
+        let mut energy = |t: f64| {
+            let q = &state.q + &state.qdot * t + &qddot * (0.5 * t * t);
+            let moved = State { q, qdot: &state.qdot + &qddot * t };
+            kinetic_energy(&model, &mut data, &moved) + potential_energy(&model, &mut data, &moved.q)
+        };
+        let rate = (energy(h) - energy(-h)) / (2.0 * h);
+        let power = tau.dot(&state.qdot);
+        let scale = tau.amax() * state.qdot.amax() * model.nv() as f64;
+        prop_assert!((rate - power).abs() <= 1e-6 * scale, "{rate} {power}");
+    }
+}
+
+/// No algorithm allocates once `Data` exists.
+#[test]
+fn recursions_do_not_allocate() {
+    let Case { model, mut data, state, qddot, .. } = case(7, 30);
+    let roles = Roles::all_free(&model);
+    let hybrid = Roles::actuated_prescribed(&model);
+    let (mut a, mut f) = (qddot.clone(), qddot.clone());
+    let frame = model.frames().last().expect("has frames").clone();
+    let mut J = Matrix6xX::zeros(model.nv());
+    let allocations = count_allocations(|| {
+        inverse_dynamics(&model, &mut data, &state, &qddot);
+        gravity_forces(&model, &mut data, &state.q);
+        mass_matrix(&model, &mut data, &state.q);
+        forward_dynamics(&model, &mut data, &state, &roles, &qddot);
+        hybrid_dynamics(&model, &mut data, &state, &hybrid, &mut a, &mut f);
+        forward_kinematics_velocity(&model, &mut data, &state);
+        frame_jacobian(&model, &data, &frame, &mut J);
+        frame_jacobian_derivative(&model, &data, &state, &frame, &mut J);
+        kinetic_energy(&model, &mut data, &state);
+    });
+    assert_eq!(allocations, 0);
+}
+
+/// A mimic joint is the same as a hand-made constraint: M, τ and q̈ are Gᵀ M G and so on.
+#[test]
+fn mimic_joints_project_the_dynamics_of_the_unconstrained_tree() {
+    let mut tree = random_tree(11, 0);
+    let mut draw = Draw(5);
+    for i in 0..4 {
+        let axis = nalgebra::Unit::new_normalize(draw.vector(1.0));
+        let parent = tree.links.last().expect("base").name.clone();
+        let joint = Joint::new(format!("j{i}"), JointKind::Revolute(axis), parent, format!("l{i}"), draw.pose(0.4));
+        tree.joints.push(joint);
+        tree.links.push(Link { name: format!("l{i}"), inertia: Some(draw.inertia()) });
+    }
+    let free = Model::new(&tree).expect("valid");
+    tree.joints[2].mimic = Some(Mimic { joint: "j0".into(), ratio: -0.7, offset: 0.2 });
+    let tied = Model::new(&tree).expect("valid");
+    assert_eq!((free.nv(), tied.nv()), (4, 3));
+
+    let mut state = State::zeros(&tied);
+    state.q.copy_from_slice(&[0.4, -0.8, 1.1]);
+    state.qdot.copy_from_slice(&[0.9, 0.3, -0.6]);
+    let qddot = DVector::from_vec(vec![1.0, -2.0, 0.5]);
+    // q_full = G q + b with the third joint following the first.
+    let G = nalgebra::Matrix4x3::new(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, -0.7, 0.0, 0.0, 0.0, 0.0, 1.0);
+    let expand = |v: &DVector<f64>| DVector::from_column_slice((G * Vector3::new(v[0], v[1], v[2])).as_slice());
+    let mut full = State { q: expand(&state.q), qdot: expand(&state.qdot) };
+    full.q[2] += 0.2;
+
+    let (mut d3, mut d4) = (Data::new(&tied), Data::new(&free));
+    let tau = inverse_dynamics(&tied, &mut d3, &state, &qddot).clone();
+    let tau_full = inverse_dynamics(&free, &mut d4, &full, &expand(&qddot)).clone();
+    assert!((G.transpose() * &tau_full - &tau).amax() < 1e-12);
+    let M = mass_matrix(&tied, &mut d3, &state.q).clone();
+    let M_full = mass_matrix(&free, &mut d4, &full.q).clone();
+    assert!((G.transpose() * M_full * G - M).amax() < 1e-12);
+    let back = forward_dynamics(&tied, &mut d3, &state, &Roles::all_free(&tied), &tau).clone();
+    assert!((back - qddot).amax() < 1e-10);
+}
+
+/// Inverse kinematics finds again what forward kinematics gave, within limits.
+#[test]
+fn inverse_kinematics_reaches_a_reachable_pose_within_limits() {
+    let mut tree = flexarm_testkit::reference_arm(false).mechanism;
+    for joint in &mut tree.joints {
+        joint.limits = Limits { lower: -2.6, upper: 2.6, ..Limits::NONE };
+    }
+    let model = Model::new(&tree).expect("valid");
+    let mut data = Data::new(&model);
+    let frame = model.frame("tcp").expect("there").clone();
+    let mut draw = Draw(3);
+    for _ in 0..40 {
+        let q = DVector::from_fn(6, |_, _| 1.2 * draw.signed());
+        forward_kinematics(&model, &mut data, &q);
+        let target = data.X_WF(&frame);
+        let start = &q + DVector::from_fn(6, |_, _| 0.4 * draw.signed());
+        let found = inverse_kinematics(&model, &mut data, &frame, &target, &start, &IkOptions::default());
+        let found = found.expect("reachable");
+        forward_kinematics(&model, &mut data, &found);
+        let X = data.X_WF(&frame);
+        assert!((X.translation.vector - target.translation.vector).norm() < 1e-9);
+        assert!(found.iter().all(|x| (-2.6..=2.6).contains(x)));
+    }
+    let far = Pose::translation(9.0, 0.0, 0.0);
+    let q = DVector::zeros(6);
+    let error = inverse_kinematics(&model, &mut data, &frame, &far, &q, &IkOptions::default()).expect_err("too far");
+    assert!(error.position_m > 5.0);
+}
+
+/// Wrong trees are refused with the names that are wrong.
+#[test]
+fn wrong_trees_are_refused_by_name() {
+    let good = flexarm_testkit::reference_arm(true).mechanism;
+    let error = |change: &dyn Fn(&mut Mechanism)| {
+        let mut tree = good.clone();
+        change(&mut tree);
+        Model::new(&tree).map(|_| "accepted").expect_err("must be refused").to_string()
+    };
+    assert!(error(&|t| t.joints[1].parent = "nowhere".into()).contains("nowhere"));
+    assert!(error(&|t| t.links.push(Link { name: "island".into(), inertia: None })).contains("island"));
+    assert!(error(&|t| t.links[1].name = "base".into()).contains("twice"));
+    assert!(error(&|t| t.joints[0].parent = "link3".into()).contains("loop"));
+    assert!(error(&|t| t.joints[2].child = "link2".into()).contains("joint2"));
+    assert!(error(&|t| t.links[5].inertia = None).contains("mass 0"));
+    assert!(error(&|t| t.links[1].inertia.as_mut().expect("has").mass = -1.0).contains("-1"));
+    assert!(error(&|t| t.links[1].inertia.as_mut().expect("has").com.x = f64::NAN).contains("link1"));
+    let mimic = Mimic { joint: "ghost".into(), ratio: 1.0, offset: 0.0 };
+    assert!(error(&|t| t.joints[0].mimic = Some(mimic.clone())).contains("ghost"));
+}

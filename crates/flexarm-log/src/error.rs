@@ -1,0 +1,93 @@
+//! What can go wrong while a run is written. Every message starts with the file.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// A recording could not be started, continued or closed.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum LogError {
+    /// The file is there already and overwriting was not asked for.
+    #[error("{}: the file exists already; choose another output folder or overwrite it with --force", path.display())]
+    Exists {
+        /// The existing file.
+        path: PathBuf,
+    },
+
+    /// The operating system refused: missing folder, no permission, full disk.
+    #[error("{}: cannot {action}", path.display())]
+    Io {
+        /// The file concerned.
+        path: PathBuf,
+        /// What was attempted.
+        action: &'static str,
+        /// Why it failed.
+        #[source]
+        source: io::Error,
+    },
+
+    /// The format cannot hold what was given to it.
+    #[error("{}: cannot {action}: {cause}", path.display())]
+    Format {
+        /// The file being written.
+        path: PathBuf,
+        /// What was attempted.
+        action: &'static str,
+        /// What the format's library said.
+        cause: String,
+    },
+
+    /// A sample does not fit the header of its run.
+    #[error("{}: sample at t = {time_s} s has {found} entries in {what}, the header says {expected}", path.display())]
+    Shape {
+        /// The file being written.
+        path: PathBuf,
+        /// Time of the sample.
+        time_s: f64,
+        /// The part of the sample that is wrong.
+        what: &'static str,
+        /// Entries it has.
+        found: usize,
+        /// Entries the header asks for.
+        expected: usize,
+    },
+
+    /// A time that the file's time stamps cannot hold.
+    #[error("{}: sample time {time_s} s is not in the range 0 to {limit_s:.0} s of the file's time stamps", path.display())]
+    Time {
+        /// The file being written.
+        path: PathBuf,
+        /// Time of the sample.
+        time_s: f64,
+        /// Largest time this file can hold.
+        limit_s: f64,
+    },
+
+    /// The calls came in the wrong order: `begin`, any number of `record`, `finish`.
+    #[error("{}: {call} was called {problem}", path.display())]
+    Order {
+        /// The file concerned.
+        path: PathBuf,
+        /// Name of the call.
+        call: &'static str,
+        /// Why it cannot be made now.
+        problem: &'static str,
+    },
+}
+
+impl LogError {
+    /// A closure for `map_err` that turns an [`io::Error`] into [`LogError::Io`].
+    pub(crate) fn io(path: &Path, action: &'static str) -> impl FnOnce(io::Error) -> Self {
+        move |source| Self::Io { path: path.to_owned(), action, source }
+    }
+
+    /// `begin` on a recorder that has begun before.
+    pub(crate) fn begun_twice(path: &Path) -> Self {
+        Self::Order { path: path.to_owned(), call: "begin", problem: "a second time" }
+    }
+
+    /// `record` or `finish` on a recorder that is not between `begin` and `finish`.
+    pub(crate) fn not_open(path: &Path, call: &'static str) -> Self {
+        Self::Order { path: path.to_owned(), call, problem: "before begin or after finish" }
+    }
+}

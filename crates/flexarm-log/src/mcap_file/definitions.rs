@@ -1,0 +1,113 @@
+//! Texts of the ROS 2 message definitions that a recording uses.
+//!
+//! The field lists follow the packages `std_msgs`, `geometry_msgs`, `sensor_msgs`, `tf2_msgs` and
+//! `builtin_interfaces` of ROS 2; readers decode messages by them.
+
+/// Line between a message and the definitions it depends on.
+const SEPARATOR: &str = "================================================================================";
+
+/// A message type: name without `/msg`, fields, and all types it needs, directly or not.
+type Definition = (&'static str, &'static str, &'static [&'static str]);
+
+const DEFINITIONS: &[Definition] = &[
+    ("builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n", &[]),
+    ("std_msgs/Header", "builtin_interfaces/Time stamp\nstring frame_id\n", &["builtin_interfaces/Time"]),
+    ("std_msgs/String", "string data\n", &[]),
+    ("std_msgs/MultiArrayDimension", "string label\nuint32 size\nuint32 stride\n", &[]),
+    ("std_msgs/MultiArrayLayout", "MultiArrayDimension[] dim\nuint32 data_offset\n", &["std_msgs/MultiArrayDimension"]),
+    (
+        "std_msgs/Float64MultiArray",
+        "MultiArrayLayout layout\nfloat64[] data\n",
+        &["std_msgs/MultiArrayLayout", "std_msgs/MultiArrayDimension"],
+    ),
+    ("geometry_msgs/Vector3", "float64 x\nfloat64 y\nfloat64 z\n", &[]),
+    ("geometry_msgs/Point", "float64 x\nfloat64 y\nfloat64 z\n", &[]),
+    ("geometry_msgs/Quaternion", "float64 x 0\nfloat64 y 0\nfloat64 z 0\nfloat64 w 1\n", &[]),
+    ("geometry_msgs/Transform", "Vector3 translation\nQuaternion rotation\n", &[]),
+    ("geometry_msgs/Pose", "Point position\nQuaternion orientation\n", &[]),
+    ("geometry_msgs/Twist", "Vector3 linear\nVector3 angular\n", &[]),
+    ("geometry_msgs/Wrench", "Vector3 force\nVector3 torque\n", &[]),
+    (
+        "geometry_msgs/TransformStamped",
+        "std_msgs/Header header\nstring child_frame_id\nTransform transform\n",
+        &[],
+    ),
+    (
+        "geometry_msgs/PoseStamped",
+        "std_msgs/Header header\nPose pose\n",
+        &["std_msgs/Header", "builtin_interfaces/Time", "geometry_msgs/Pose", "geometry_msgs/Point", "geometry_msgs/Quaternion"],
+    ),
+    (
+        "geometry_msgs/TwistStamped",
+        "std_msgs/Header header\nTwist twist\n",
+        &["std_msgs/Header", "builtin_interfaces/Time", "geometry_msgs/Twist", "geometry_msgs/Vector3"],
+    ),
+    (
+        "geometry_msgs/WrenchStamped",
+        "std_msgs/Header header\nWrench wrench\n",
+        &["std_msgs/Header", "builtin_interfaces/Time", "geometry_msgs/Wrench", "geometry_msgs/Vector3"],
+    ),
+    (
+        "tf2_msgs/TFMessage",
+        "geometry_msgs/TransformStamped[] transforms\n",
+        &[
+            "geometry_msgs/TransformStamped",
+            "std_msgs/Header",
+            "builtin_interfaces/Time",
+            "geometry_msgs/Transform",
+            "geometry_msgs/Vector3",
+            "geometry_msgs/Quaternion",
+        ],
+    ),
+    (
+        "sensor_msgs/JointState",
+        "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n",
+        &["std_msgs/Header", "builtin_interfaces/Time"],
+    ),
+];
+
+/// Full text of a message type (`package/Type`) with everything it depends on, in ros2msg form.
+pub(crate) fn schema_text(name: &str) -> String {
+    let (fields, needs) = find(name);
+    let mut text = fields.to_owned();
+    for need in needs {
+        text.push_str(&format!("\n{SEPARATOR}\nMSG: {need}\n{}", find(need).0));
+    }
+    text
+}
+
+fn find(name: &str) -> (&'static str, &'static [&'static str]) {
+    let entry = DEFINITIONS.iter().find(|(known, ..)| *known == name);
+    let (_, fields, needs) = entry.expect("every message type in use is in the table");
+    (fields, needs)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PRIMITIVES: [&str; 4] = ["string", "float64", "int32", "uint32"];
+
+    /// Checks that a reader finds each type named by a field in the schema's own text.
+    #[test]
+    fn every_schema_carries_all_types_it_names() {
+        for (name, ..) in DEFINITIONS.iter().filter(|(name, ..)| used_by_a_topic(name)) {
+            let text = schema_text(name);
+            let mut package = name.split_once('/').unwrap().0;
+            for line in text.lines().filter(|line| !line.is_empty() && *line != SEPARATOR) {
+                if let Some(part) = line.strip_prefix("MSG: ") {
+                    package = part.split_once('/').unwrap().0;
+                    continue;
+                }
+                let kind = line.split_whitespace().next().unwrap().trim_end_matches("[]");
+                let full = if kind.contains('/') { kind.to_owned() } else { format!("{package}/{kind}") };
+                assert!(PRIMITIVES.contains(&kind) || text.contains(&format!("MSG: {full}\n")), "{name} lacks {full}");
+            }
+        }
+    }
+
+    fn used_by_a_topic(name: &str) -> bool {
+        name.ends_with("Stamped") && name != "geometry_msgs/TransformStamped"
+            || ["std_msgs/String", "std_msgs/Float64MultiArray", "tf2_msgs/TFMessage", "sensor_msgs/JointState"].contains(&name)
+    }
+}

@@ -1,0 +1,48 @@
+//! The sizes a header promises, and the check that a sample keeps them.
+
+use std::path::Path;
+
+use crate::{LogError, RunHeader, Sample, TwinSample};
+
+/// Numbers of entries of every sample of a run.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Shape {
+    joints: usize,
+    links: usize,
+    elements: usize,
+    pub(crate) has_rigid: bool,
+}
+
+impl Shape {
+    pub(crate) fn of(header: &RunHeader) -> Self {
+        Self {
+            joints: header.joints.len(),
+            links: header.links.len(),
+            elements: header.elements.len(),
+            has_rigid: header.has_rigid,
+        }
+    }
+
+    /// Checks every list of the sample, so that the writers may index without care.
+    pub(crate) fn check(&self, path: &Path, sample: &Sample) -> Result<(), LogError> {
+        let twin = |twin: &TwinSample| {
+            [
+                ("q", twin.q.len(), self.joints),
+                ("qdot", twin.qdot.len(), self.joints),
+                ("effort", twin.effort.len(), self.joints),
+                ("X_WL", twin.X_WL.len(), self.links),
+            ]
+        };
+        let rigid = self.has_rigid.then(|| twin(&sample.rigid));
+        let elastic = [("elastic", sample.elastic.len(), self.elements)];
+        let lists = twin(&sample.flexible).into_iter().chain(rigid.into_iter().flatten()).chain(elastic);
+
+        for (what, found, expected) in lists {
+            if found != expected {
+                let (path, time_s) = (path.to_owned(), sample.time_s);
+                return Err(LogError::Shape { path, time_s, what, found, expected });
+            }
+        }
+        Ok(())
+    }
+}

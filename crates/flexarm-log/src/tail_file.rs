@@ -1,0 +1,142 @@
+//! A file with a provisional end: what makes a recording safe against a kill without making it depend on time.
+//!
+//! Formats with chunks want large ones, closed at points that only the data decide; whoever watches a run, or
+//! kills it, wants the last second in the file now. [`TailFile`] serves both: committed bytes are final, and
+//! [`TailFile::set_tail`] puts a provisional end behind them, which the next committed bytes overwrite. The
+//! finished file is the committed bytes alone.
+
+use std::fs::File;
+use std::io::{self, Seek, SeekFrom, Write};
+
+/// Committed bytes held back until they are worth a system call.
+const PENDING_LIMIT: usize = 4 << 20;
+
+/// See the module.
+#[derive(Debug)]
+pub(crate) struct TailFile {
+    file: File,
+    /// Committed bytes not yet in the file.
+    pending: Vec<u8>,
+    /// Committed bytes in the file.
+    written: u64,
+    /// Provisional bytes in the file, behind the committed ones.
+    tail: u64,
+}
+
+impl TailFile {
+    /// Around a new, empty file.
+    pub(crate) fn new(file: File) -> Self {
+        Self { file, pending: Vec::new(), written: 0, tail: 0 }
+    }
+
+    /// Number of committed bytes.
+    pub(crate) fn position(&self) -> u64 {
+        self.written + self.pending.len() as u64
+    }
+
+    /// Writes out what is committed, then `tail` behind it, in place of any earlier tail.
+    pub(crate) fn set_tail(&mut self, tail: &[u8]) -> io::Result<()> {
+        let old_end = self.written + self.tail;
+        self.file.seek(SeekFrom::Start(self.written))?;
+        self.file.write_all(&self.pending)?;
+        self.file.write_all(tail)?;
+        self.written += self.pending.len() as u64;
+        self.pending.clear();
+        self.tail = tail.len() as u64;
+
+        // Rest of an earlier, longer tail. Cut last: a reader in between meets rubbish behind good data, no gap.
+        let end = self.written + self.tail;
+        if end < old_end {
+            self.file.set_len(end)?;
+        }
+        Ok(())
+    }
+}
+
+impl Write for TailFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.pending.extend_from_slice(bytes);
+        if self.pending.len() > PENDING_LIMIT {
+            self.flush()?;
+        }
+        Ok(bytes.len())
+    }
+
+    /// Writes out what is committed and removes the tail.
+    fn flush(&mut self) -> io::Result<()> {
+        self.set_tail(&[])
+    }
+}
+
+/// Writers that keep their output to themselves share the file through this handle.
+#[cfg(feature = "mcap")]
+#[derive(Clone, Debug)]
+pub(crate) struct SharedTail(std::sync::Arc<std::sync::Mutex<TailFile>>);
+
+#[cfg(feature = "mcap")]
+impl SharedTail {
+    pub(crate) fn new(file: File) -> Self {
+        Self(std::sync::Arc::new(std::sync::Mutex::new(TailFile::new(file))))
+    }
+
+    pub(crate) fn set_tail(&self, tail: &[u8]) -> io::Result<()> {
+        self.lock().set_tail(tail)
+    }
+
+    pub(crate) fn flush(&self) -> io::Result<()> {
+        self.lock().flush()
+    }
+
+    fn lock(&self) -> std::sync::MutexGuard<'_, TailFile> {
+        self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+    }
+}
+
+#[cfg(feature = "mcap")]
+impl Write for SharedTail {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.lock().write(bytes)
+    }
+
+    /// Nothing: when bytes go to the disk is the recorder's decision, not the format writer's.
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+#[cfg(feature = "mcap")]
+impl Seek for SharedTail {
+    /// Only asks where the end is: committed bytes are never changed.
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        match to {
+            SeekFrom::Current(0) => Ok(self.lock().position()),
+            _ => Err(io::Error::new(io::ErrorKind::Unsupported, "committed bytes cannot be written again")),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Truth: the finished file is the committed bytes, whatever tails were there in between.
+    #[test]
+    fn a_tail_is_seen_until_the_next_bytes_and_leaves_no_trace() {
+        let path = std::env::temp_dir().join(format!("flexarm-tail-{}", std::process::id()));
+        let mut file = TailFile::new(File::create(&path).unwrap());
+        let read = || std::fs::read_to_string(&path).unwrap();
+
+        file.write_all(b"one ").unwrap();
+        assert_eq!((read().as_str(), file.position()), ("", 4));
+        file.set_tail(b"provisional").unwrap();
+        assert_eq!((read().as_str(), file.position()), ("one provisional", 4));
+        file.set_tail(b"longer provisional").unwrap();
+        assert_eq!(read(), "one longer provisional");
+        file.write_all(b"two ").unwrap();
+        file.set_tail(b"end").unwrap();
+        assert_eq!((read().as_str(), file.position()), ("one two end", 8));
+        file.flush().unwrap();
+        assert_eq!(read(), "one two ");
+        std::fs::remove_file(&path).unwrap();
+    }
+}

@@ -1,0 +1,70 @@
+//! Why a simulation stops.
+
+/// A step, a start or a set-up that failed; carries what is needed to understand it.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum StepError {
+    /// The state left every plausible range.
+    #[error(
+        "the simulation diverged at t = {t:.6} s (step {h:e} s): {what}; try a smaller --step, more damping, or --stepper generalized-alpha"
+    )]
+    Diverged {
+        /// Time [s].
+        t: f64,
+        /// Step [s].
+        h: f64,
+        /// What left its range, with the value.
+        what: String,
+    },
+    /// The iteration of an implicit step did not end.
+    #[error(
+        "the step to t = {t:.6} s (step {h:e} s) did not converge in {iterations} iterations; last relative correction {correction:.1e}: try a smaller --step"
+    )]
+    NotConverged {
+        /// Time [s].
+        t: f64,
+        /// Step [s].
+        h: f64,
+        /// Iterations done.
+        iterations: usize,
+        /// Size of the last correction over the size of the acceleration.
+        correction: f64,
+    },
+    /// A matrix that must be positive definite is not.
+    #[error("the {matrix} at t = {t:.6} s is not positive definite: check masses and stiffnesses")]
+    Singular {
+        /// Which matrix.
+        matrix: &'static str,
+        /// Time [s].
+        t: f64,
+    },
+    /// No static equilibrium was found.
+    #[error(
+        "no static equilibrium at t = {t:.6} s: after {iterations} Newton iterations the forces are out of balance by {residual:.1e} (relative); is the structure too soft for its weight? --from-rest undeformed starts without it"
+    )]
+    NoEquilibrium {
+        /// Time [s].
+        t: f64,
+        /// Iterations done.
+        iterations: usize,
+        /// Unbalanced force over applied force.
+        residual: f64,
+    },
+    /// An explicit stepper cannot work with this step.
+    #[error(
+        "{stepper} with step {h:e} s is unstable here: the highest frequency is {highest_hz:.1} Hz, which needs a step below {largest_s:.2e} s; use --step or --stepper generalized-alpha"
+    )]
+    UnstableStep {
+        /// Name of the stepper.
+        stepper: &'static str,
+        /// Step [s].
+        h: f64,
+        /// Highest natural frequency [Hz].
+        highest_hz: f64,
+        /// Largest stable step [s].
+        largest_s: f64,
+    },
+    /// The parts of the arm do not fit together.
+    #[error("{0}")]
+    Setup(String),
+}

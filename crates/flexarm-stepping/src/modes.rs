@@ -1,0 +1,76 @@
+//! Natural frequencies and shapes of the arm about its static pose, drives locked.
+
+use flexarm_kinematics::{Data, State, mass_matrix};
+use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
+
+use crate::arm::FlexibleArm;
+use crate::error::StepError;
+use crate::statics::{static_equilibrium, tangent_stiffness};
+
+/// Modes of `K_t φ = ω² M φ`, mass-normalised, ascending.
+#[derive(Clone, Debug, Default)]
+pub struct Modes {
+    /// Angular frequencies [rad/s].
+    pub omega: Vec<f64>,
+    /// Shapes in the elastic coordinates, one column each; `Φᵀ M Φ = 1`.
+    pub shapes: DMatrix<f64>,
+    /// Elastic coordinates of the static pose.
+    pub equilibrium: DVector<f64>,
+    /// Largest `|K φ - ω² M φ| / |K φ|`: what the eigensolver promises, evaluated.
+    pub residual: f64,
+}
+
+impl Modes {
+    /// Frequencies [Hz], ascending.
+    pub fn frequencies_hz(&self) -> Vec<f64> {
+        self.omega.iter().map(|w| w / std::f64::consts::TAU).collect()
+    }
+}
+
+/// Undamped modes at time `t` of the motion, about static equilibrium, with the stiffness of weight.
+///
+/// # Errors
+/// [`StepError::NoEquilibrium`] or [`StepError::Singular`].
+pub fn modes_at(arm: &FlexibleArm, t: f64) -> Result<Modes, StepError> {
+    let n = arm.n_elastic_coordinates();
+    if n == 0 {
+        return Ok(Modes::default());
+    }
+    let model = &arm.model;
+    let equilibrium = static_equilibrium(arm, t)?;
+    let mut data = Data::new(model);
+    let Kt = tangent_stiffness(arm, &mut data, t, &equilibrium, &arm.stiffness());
+    let (mut state, mut qddot) = (State::zeros(model), DVector::zeros(model.nv()));
+    arm.prescribed_state(t, &mut state, &mut qddot);
+    let na = model.n_actuated();
+    state.q.rows_mut(na, n).copy_from(&equilibrium);
+    let M = mass_matrix(model, &mut data, &state.q).view((na, na), (n, n)).clone_owned();
+
+    // K φ = ω² M φ with K = L Lᵀ: eigenvalues 1/ω² of L^-1 M L^-T, the low modes largest and most accurate.
+    let factor = Cholesky::new(Kt.clone())
+        .ok_or(StepError::Singular { matrix: "static stiffness (with the effect of weight)", t })?;
+    let L = factor.l();
+    let singular = StepError::Singular { matrix: "stiffness factor", t };
+    let half = L.solve_lower_triangular(&M).ok_or(singular.clone())?;
+    let A = L.solve_lower_triangular(&half.transpose()).ok_or(singular.clone())?;
+    let eigen = SymmetricEigen::new((&A + A.transpose()) * 0.5);
+    let mut order: Vec<usize> = (0..n).collect();
+    order.sort_by(|&i, &j| eigen.eigenvalues[j].total_cmp(&eigen.eigenvalues[i]));
+
+    let mut modes =
+        Modes { omega: Vec::with_capacity(n), shapes: DMatrix::zeros(n, n), equilibrium, residual: 0.0 };
+    for (column, &k) in order.iter().enumerate() {
+        let value = eigen.eigenvalues[k];
+        if value.is_nan() || value <= 0.0 {
+            return Err(StepError::Singular { matrix: "mass matrix of the elastic coordinates", t });
+        }
+        let y = eigen.eigenvectors.column(k).clone_owned();
+        let mut phi = L.tr_solve_lower_triangular(&y).ok_or(singular.clone())?;
+        phi /= phi.dot(&(&M * &phi)).sqrt();
+        let Kphi = &Kt * &phi;
+        modes.residual = modes.residual.max((&Kphi - &M * &phi / value).norm() / Kphi.norm());
+        modes.omega.push(1.0 / value.sqrt());
+        modes.shapes.set_column(column, &phi);
+    }
+    Ok(modes)
+}

@@ -1,0 +1,36 @@
+//! Where the prescribed joints are at a given time.
+
+use flexarm_trajectory::Trajectory;
+
+/// Positions, velocities and accelerations of the actuated coordinates as functions of time.
+pub trait PrescribedMotion: Send + Sync {
+    /// Writes the values at `t` [s], in coordinate order: rad or m, per s, per s².
+    fn sample(&self, t: f64, q: &mut [f64], qdot: &mut [f64], qddot: &mut [f64]);
+}
+
+impl PrescribedMotion for Trajectory {
+    fn sample(&self, t: f64, q: &mut [f64], qdot: &mut [f64], qddot: &mut [f64]) {
+        Trajectory::sample(self, t, q, qdot, qddot);
+    }
+}
+
+/// All joints held at fixed positions.
+#[derive(Clone, Debug)]
+pub struct Held(pub Vec<f64>);
+
+impl PrescribedMotion for Held {
+    fn sample(&self, _t: f64, q: &mut [f64], qdot: &mut [f64], qddot: &mut [f64]) {
+        q.copy_from_slice(&self.0);
+        qdot.fill(0.0);
+        qddot.fill(0.0);
+    }
+}
+
+/// A motion given as a function of time.
+pub struct MotionFn<F>(pub F);
+
+impl<F: Fn(f64, &mut [f64], &mut [f64], &mut [f64]) + Send + Sync> PrescribedMotion for MotionFn<F> {
+    fn sample(&self, t: f64, q: &mut [f64], qdot: &mut [f64], qddot: &mut [f64]) {
+        (self.0)(t, q, qdot, qddot);
+    }
+}

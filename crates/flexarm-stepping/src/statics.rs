@@ -1,0 +1,100 @@
+//! Static equilibrium of the elastic coordinates, drives held: Newton on `K e + g_e(q_a, e) = 0`.
+
+use flexarm_kinematics::{Data, State, forward_kinematics, gravity_forces};
+use nalgebra::{DMatrix, DVector};
+
+use crate::arm::FlexibleArm;
+use crate::error::StepError;
+
+/// Accepted unbalanced force over the largest spring or gravity force.
+const TOLERANCE: f64 = 1e-13;
+
+/// Elastic coordinates (6 per element) at which springs carry gravity and the constant loads at time `t`.
+///
+/// Inertia forces are left out: the drives are held where the motion is at `t`.
+///
+/// # Errors
+/// [`StepError::NoEquilibrium`] or [`StepError::Singular`].
+pub fn static_equilibrium(arm: &FlexibleArm, t: f64) -> Result<DVector<f64>, StepError> {
+    let n = arm.n_elastic_coordinates();
+    let mut e = DVector::zeros(n);
+    if n == 0 {
+        return Ok(e);
+    }
+    let mut data = Data::new(&arm.model);
+    let K = arm.stiffness();
+    let mut residual = f64::INFINITY;
+    for iteration in 0..30 {
+        let (g, scale) = unbalanced(arm, &mut data, t, &e);
+        let previous = residual;
+        residual = g.amax() / scale.max(f64::MIN_POSITIVE);
+        // Done, or as good as rounding allows.
+        if residual <= TOLERANCE || (iteration > 2 && residual < 1e-9 && residual >= 0.5 * previous) {
+            return Ok(e);
+        }
+        if !residual.is_finite() {
+            break;
+        }
+        let Kt = tangent_stiffness(arm, &mut data, t, &e, &K);
+        let Some(factor) = Kt.cholesky() else {
+            return Err(StepError::Singular { matrix: "static stiffness (with the effect of weight)", t });
+        };
+        let step = factor.solve(&g);
+        // Far from small deflections the full step may overshoot: no coordinate moves by more than 0.5.
+        let shorten = (0.5 / step.amax()).min(1.0);
+        e -= step * shorten;
+    }
+    Err(StepError::NoEquilibrium { t, iterations: 30, residual })
+}
+
+/// Generalised forces out of balance, and the size of what should balance.
+fn unbalanced(arm: &FlexibleArm, data: &mut Data, t: f64, e: &DVector<f64>) -> (DVector<f64>, f64) {
+    let g = gravity_part(arm, data, t, e);
+    let spring = spring_forces(arm, e);
+    let scale = g.amax().max(spring.amax());
+    (spring + g, scale)
+}
+
+fn spring_forces(arm: &FlexibleArm, e: &DVector<f64>) -> DVector<f64> {
+    let mut f = DVector::zeros(e.len());
+    for (k, element) in arm.elements.iter().enumerate() {
+        let force = element.K_S * e.fixed_rows::<6>(6 * k);
+        f.fixed_rows_mut::<6>(6 * k).copy_from(&force);
+    }
+    f
+}
+
+fn gravity_part(arm: &FlexibleArm, data: &mut Data, t: f64, e: &DVector<f64>) -> DVector<f64> {
+    let model = &arm.model;
+    let (mut state, mut qddot) = (State::zeros(model), DVector::zeros(model.nv()));
+    arm.prescribed_state(t, &mut state, &mut qddot);
+    state.q.rows_mut(model.n_actuated(), e.len()).copy_from(e);
+    if !arm.loads.is_empty() {
+        forward_kinematics(model, data, &state.q);
+        arm.apply_loads(data);
+    }
+    gravity_forces(model, data, &state.q).rows(model.n_actuated(), e.len()).clone_owned()
+}
+
+/// `K + dg/de` by central differences of the gravity forces, symmetrised.
+pub(crate) fn tangent_stiffness(
+    arm: &FlexibleArm,
+    data: &mut Data,
+    t: f64,
+    e: &DVector<f64>,
+    K: &DMatrix<f64>,
+) -> DMatrix<f64> {
+    let n = e.len();
+    let step = 1e-6;
+    let mut G = DMatrix::zeros(n, n);
+    let mut moved = e.clone();
+    for k in 0..n {
+        moved[k] = e[k] + step;
+        let up = gravity_part(arm, data, t, &moved);
+        moved[k] = e[k] - step;
+        let down = gravity_part(arm, data, t, &moved);
+        moved[k] = e[k];
+        G.set_column(k, &((up - down) / (2.0 * step)));
+    }
+    K + (&G + G.transpose()) * 0.5
+}

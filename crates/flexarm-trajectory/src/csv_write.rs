@@ -1,0 +1,61 @@
+//! A trajectory as a CSV file that [`Trajectory::parse_csv`] reads again.
+
+use std::io::Write;
+
+use crate::error::TrajectoryError;
+use crate::trajectory::Trajectory;
+
+/// More rows than this are a mistake in the rate.
+const MOST_ROWS: f64 = 1e8;
+
+impl Trajectory {
+    /// Writes positions, velocities and accelerations in SI units: a row every `1 / rate_hz` s from `t = 0`, and one
+    /// at the end. Numbers are written in full, so that reading gives back the same values.
+    ///
+    /// # Errors
+    /// [`TrajectoryError::BadRate`] or [`TrajectoryError::Write`].
+    pub fn to_csv(&self, rate_hz: f64, mut out: impl Write) -> Result<(), TrajectoryError> {
+        let duration_s = self.duration();
+        let intervals = duration_s * rate_hz;
+        if !(rate_hz > 0.0 && rate_hz.is_finite() && intervals <= MOST_ROWS) {
+            return Err(TrajectoryError::BadRate { rate_hz, duration_s });
+        }
+        writeln!(out, "# unit: rad")?;
+        writeln!(out, "# time: s")?;
+        let mut header = vec!["time".to_owned()];
+        header.extend(self.joints().iter().cloned());
+        header.extend(self.joints().iter().map(|joint| format!("{joint}.vel")));
+        header.extend(self.joints().iter().map(|joint| format!("{joint}.acc")));
+        writeln!(out, "{}", header.iter().map(|name| quoted(name)).collect::<Vec<_>>().join(","))?;
+
+        let n = self.joints().len();
+        let (mut q, mut qdot, mut qddot) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+        // The last regular row gives way to the one at the end when both fall together.
+        let regular = (intervals - 1e-6).ceil().max(1.0) as usize;
+        for k in 0..=regular {
+            let t = if k == regular { duration_s } else { k as f64 / rate_hz };
+            self.sample(t, &mut q, &mut qdot, &mut qddot);
+            write!(out, "{}", number(t))?;
+            for value in q.iter().chain(&qdot).chain(&qddot) {
+                write!(out, ",{}", number(*value))?;
+            }
+            writeln!(out)?;
+        }
+        out.flush()?;
+        Ok(())
+    }
+}
+
+/// Shortest text that reads back as the same number.
+fn number(value: f64) -> String {
+    let magnitude = value.abs();
+    if magnitude == 0.0 || (1e-4..1e15).contains(&magnitude) { format!("{value}") } else { format!("{value:e}") }
+}
+
+/// Quotes a name that holds a separator or starts like a comment.
+fn quoted(name: &str) -> String {
+    if name.contains([',', '"', '\n', '\r']) || name.starts_with('#') {
+        return format!("\"{}\"", name.replace('"', "\"\""));
+    }
+    name.to_owned()
+}

@@ -1,0 +1,155 @@
+//! A trajectory against the limits of its joints: all violations, each with its time and size.
+
+use std::fmt;
+
+use crate::trajectory::{Curve, Trajectory};
+
+/// A limit counts as passed beyond this part of its value: a move planned at the limit must not violate it.
+const RELATIVE_SLACK: f64 = 1e-9;
+/// The same for limits near zero, rad or m (and their rates).
+const ABSOLUTE_SLACK: f64 = 1e-12;
+
+/// What a joint can do; an infinite, NaN or absent entry is not limited.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct JointLimits {
+    /// Least position, rad or m.
+    pub lower: f64,
+    /// Greatest position, rad or m.
+    pub upper: f64,
+    /// Greatest speed, rad/s or m/s.
+    pub velocity: f64,
+    /// Greatest acceleration, rad/s² or m/s².
+    pub acceleration: Option<f64>,
+}
+
+impl JointLimits {
+    /// No limit at all, to be overwritten field by field.
+    pub const UNLIMITED: Self =
+        Self { lower: f64::NEG_INFINITY, upper: f64::INFINITY, velocity: f64::INFINITY, acceleration: None };
+}
+
+impl Default for JointLimits {
+    fn default() -> Self {
+        Self::UNLIMITED
+    }
+}
+
+/// Which limit was passed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LimitKind {
+    /// Position below [`JointLimits::lower`].
+    Lower,
+    /// Position above [`JointLimits::upper`].
+    Upper,
+    /// Speed above [`JointLimits::velocity`].
+    Velocity,
+    /// Acceleration above [`JointLimits::acceleration`].
+    Acceleration,
+}
+
+/// A limit that a joint passes, with the worst value; `Display` gives one line.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LimitViolation {
+    /// Joint name.
+    pub joint: String,
+    /// Which limit.
+    pub kind: LimitKind,
+    /// Time of the worst value, s.
+    pub time_s: f64,
+    /// Time at which the limit is passed for the first time, s.
+    pub since_s: f64,
+    /// The worst value with its sign, rad, rad/s or rad/s² (m, m/s or m/s²).
+    pub value: f64,
+    /// The limit, in the same unit; for speed and acceleration with the sign of `value`.
+    pub limit: f64,
+}
+
+impl fmt::Display for LimitViolation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (what, mend) = match self.kind {
+            LimitKind::Lower => ("position falls below its lower limit", "change the waypoints"),
+            LimitKind::Upper => ("position rises above its upper limit", "change the waypoints"),
+            LimitKind::Velocity => ("velocity exceeds its limit", "allow the move more time"),
+            LimitKind::Acceleration => ("acceleration exceeds its limit", "allow the move more time"),
+        };
+        let Self { joint, time_s, since_s, value, limit, .. } = self;
+        write!(
+            f,
+            "joint {joint:?}: {what} {limit:.4}: {value:.4} at t = {time_s:.4} s, first passed at {since_s:.4} s \
+             (SI units); {mend}"
+        )
+    }
+}
+
+impl Trajectory {
+    /// Every limit that some joint passes, by joint and then in the order of [`LimitKind`]; empty when all hold.
+    ///
+    /// Exact extrema of the polynomials are compared, with a slack of 1e-9 relative and 1e-12 absolute, so that a
+    /// move planned at a limit keeps it.
+    ///
+    /// * `limits`: one entry per joint, in the order of [`Trajectory::joints`].
+    ///
+    /// # Panics
+    /// When `limits` does not have one entry per joint.
+    pub fn check_limits(&self, limits: &[JointLimits]) -> Vec<LimitViolation> {
+        let n = self.joints().len();
+        assert_eq!(limits.len(), n, "check_limits needs one JointLimits per joint of the trajectory");
+        let mut violations = Vec::new();
+        for ((joint, curve), limit) in self.joints().iter().zip(self.curves()).zip(limits) {
+            let acceleration = limit.acceleration.unwrap_or(f64::INFINITY);
+            violations.extend(passed(joint, curve, LimitKind::Lower, limit.lower));
+            violations.extend(passed(joint, curve, LimitKind::Upper, limit.upper));
+            violations.extend(passed(joint, curve, LimitKind::Velocity, limit.velocity));
+            violations.extend(passed(joint, curve, LimitKind::Acceleration, acceleration));
+        }
+        violations
+    }
+}
+
+/// Checks one limit of one joint.
+fn passed(joint: &str, curve: &Curve, kind: LimitKind, limit: f64) -> Option<LimitViolation> {
+    if !limit.is_finite() {
+        return None;
+    }
+    let (order, upper, lower) = match kind {
+        LimitKind::Lower => (0, None, Some(limit)),
+        LimitKind::Upper => (0, Some(limit), None),
+        LimitKind::Velocity => (1, Some(limit), Some(-limit)),
+        LimitKind::Acceleration => (2, Some(limit), Some(-limit)),
+    };
+    let slack = RELATIVE_SLACK * limit.abs() + ABSOLUTE_SLACK;
+
+    // Distance beyond either side; the worse side is reported, the earlier one sets `since_s`.
+    let [least, greatest] = curve.range(order);
+    let beyond_upper = upper.map(|level| (greatest.value - level, greatest, level));
+    let beyond_lower = lower.map(|level| (level - least.value, least, level));
+    let sides: Vec<_> = [beyond_upper, beyond_lower].into_iter().flatten().filter(|side| side.0 > slack).collect();
+    let (_, worst, level) = *sides.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let first = |&(_, _, level): &(f64, _, f64)| first_beyond(curve, order, level, upper == Some(level), slack);
+    let since_s = sides.iter().map(first).fold(worst.time_s, f64::min);
+    Some(LimitViolation {
+        joint: joint.to_owned(),
+        kind,
+        time_s: worst.time_s,
+        since_s,
+        value: worst.value,
+        limit: level,
+    })
+}
+
+/// First time at which derivative `order` lies beyond `level` by more than `slack`.
+fn first_beyond(curve: &Curve, order: usize, level: f64, above: bool, slack: f64) -> f64 {
+    let bound = if above { level + slack } else { level - slack };
+    let is_beyond = |value: f64| if above { value > bound } else { value < bound };
+    for (knot, piece) in curve.knots.iter().zip(&curve.pieces) {
+        if is_beyond(piece.at(0.0)[order]) {
+            return *knot;
+        }
+        let [least, greatest] = piece.range(order);
+        let worst = if above { greatest } else { least };
+        if is_beyond(worst.1) {
+            return knot + piece.first_crossing(order, bound).unwrap_or(worst.0);
+        }
+    }
+    curve.knots[curve.knots.len() - 1]
+}

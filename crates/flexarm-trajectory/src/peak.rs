@@ -1,0 +1,77 @@
+//! Largest positions, speeds, accelerations and jerks of each joint, with their times.
+//!
+//! Exact: each comes from the roots of the next derivative of each polynomial piece, not from samples.
+
+use crate::trajectory::{Curve, Trajectory};
+
+/// A value and the time at which it is taken.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Extreme {
+    /// Time, s.
+    pub time_s: f64,
+    /// Value with its sign, SI.
+    pub value: f64,
+}
+
+/// The largest values of one joint over the whole trajectory.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JointPeak {
+    /// Joint name.
+    pub joint: String,
+    /// Least position, rad or m.
+    pub lower: Extreme,
+    /// Greatest position, rad or m.
+    pub upper: Extreme,
+    /// Velocity of greatest magnitude, rad/s or m/s.
+    pub velocity: Extreme,
+    /// Acceleration of greatest magnitude, rad/s² or m/s².
+    pub acceleration: Extreme,
+    /// Jerk of greatest magnitude within the pieces, rad/s³ or m/s³. A jump of the acceleration is not in it.
+    pub jerk: Extreme,
+    /// Largest jump of the acceleration, rad/s² or m/s²: rounding only, unless a trapezoid is unrounded or the
+    /// data are sampled from something that jumps.
+    pub acceleration_jump: Extreme,
+}
+
+impl Trajectory {
+    /// The largest values of every joint, in the order of [`Trajectory::joints`]; exact up to rounding.
+    pub fn peak(&self) -> Vec<JointPeak> {
+        let peak = |(joint, curve): (&String, &Curve)| {
+            let [lower, upper] = curve.range(0);
+            let jump = curve.jumps().map(|(time_s, jump)| Extreme { time_s, value: jump[2] });
+            JointPeak {
+                joint: joint.clone(),
+                lower,
+                upper,
+                velocity: largest(curve.range(1)),
+                acceleration: largest(curve.range(2)),
+                jerk: largest(curve.range(3)),
+                acceleration_jump: largest(jump),
+            }
+        };
+        self.joints().iter().zip(self.curves()).map(peak).collect()
+    }
+}
+
+impl Curve {
+    /// Least and greatest value of derivative `order` over all pieces.
+    pub(crate) fn range(&self, order: usize) -> [Extreme; 2] {
+        let mut extremes = [f64::INFINITY, f64::NEG_INFINITY].map(|value| Extreme { time_s: 0.0, value });
+        for (knot, piece) in self.knots.iter().zip(&self.pieces) {
+            let [least, greatest] = piece.range(order).map(|(tau, value)| Extreme { time_s: knot + tau, value });
+            if least.value < extremes[0].value {
+                extremes[0] = least;
+            }
+            if greatest.value > extremes[1].value {
+                extremes[1] = greatest;
+            }
+        }
+        extremes
+    }
+}
+
+/// The one of greatest magnitude, the first of several.
+fn largest(extremes: impl IntoIterator<Item = Extreme>) -> Extreme {
+    let zero = Extreme { time_s: 0.0, value: 0.0 };
+    extremes.into_iter().fold(zero, |best, e| if e.value.abs() > best.value.abs() { e } else { best })
+}

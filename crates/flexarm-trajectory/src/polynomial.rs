@@ -1,0 +1,212 @@
+//! One polynomial piece of degree five, its derivatives, and its exact extrema.
+//!
+//! ```text
+//! q(τ) = c0 + c1 τ + c2 τ² + c3 τ³ + c4 τ⁴ + c5 τ⁵,    0 <= τ <= width,   τ in s from the start of the piece
+//! ```
+//! Start at [`Piece::hermite`]; everything else evaluates. Extrema come from the real roots of the next
+//! derivative, isolated between the roots of the derivative after that: no sampling, none is missed.
+
+/// Where a quantity is least and where it is greatest within a piece, as `(τ, value)`.
+pub(crate) type Range = [(f64, f64); 2];
+
+/// A polynomial of degree five on `0 <= τ <= width`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Piece {
+    /// Length in s, positive.
+    pub(crate) width: f64,
+    /// Coefficients of `τ^k`, lowest first.
+    pub(crate) c: [f64; 6],
+}
+
+impl Piece {
+    /// A piece that stays at `q`.
+    pub(crate) fn hold(width: f64, q: f64) -> Self {
+        Self { width, c: [q, 0.0, 0.0, 0.0, 0.0, 0.0] }
+    }
+
+    /// The quintic with position, velocity and acceleration given at both ends.
+    pub(crate) fn hermite(width: f64, [q0, v0, a0]: [f64; 3], [q1, v1, a1]: [f64; 3]) -> Self {
+        let h = width;
+        let step = q1 - q0;
+        let c3 = (20.0 * step - (8.0 * v1 + 12.0 * v0) * h - (3.0 * a0 - a1) * h * h) / (2.0 * h.powi(3));
+        let c4 = (-30.0 * step + (14.0 * v1 + 16.0 * v0) * h + (3.0 * a0 - 2.0 * a1) * h * h) / (2.0 * h.powi(4));
+        let c5 = (12.0 * step - 6.0 * (v1 + v0) * h + (a1 - a0) * h * h) / (2.0 * h.powi(5));
+        Self { width, c: [q0, v0, a0 / 2.0, c3, c4, c5] }
+    }
+
+    /// Position, velocity, acceleration and jerk at `tau`.
+    pub(crate) fn at(&self, tau: f64) -> [f64; 4] {
+        let [c0, c1, c2, c3, c4, c5] = self.c;
+        [
+            c0 + tau * (c1 + tau * (c2 + tau * (c3 + tau * (c4 + tau * c5)))),
+            c1 + tau * (2.0 * c2 + tau * (3.0 * c3 + tau * (4.0 * c4 + tau * 5.0 * c5))),
+            2.0 * c2 + tau * (6.0 * c3 + tau * (12.0 * c4 + tau * 20.0 * c5)),
+            6.0 * c3 + tau * (24.0 * c4 + tau * 60.0 * c5),
+        ]
+    }
+
+    /// `offset + factor * q(τ)`, run through in `stretch` times the time.
+    pub(crate) fn mapped(&self, offset: f64, factor: f64, stretch: f64) -> Self {
+        let mut c = self.c;
+        let mut scale = factor;
+        for coefficient in &mut c {
+            *coefficient *= scale;
+            scale /= stretch;
+        }
+        c[0] += offset;
+        Self { width: self.width * stretch, c }
+    }
+
+    /// Are width and all coefficients finite, and the width positive?
+    pub(crate) fn is_sound(&self) -> bool {
+        self.width > 0.0 && self.width.is_finite() && self.c.iter().all(|c| c.is_finite())
+    }
+
+    /// Bound on how far the piece leaves its starting value.
+    pub(crate) fn excursion_bound(&self) -> f64 {
+        (1..6).map(|k| self.c[k].abs() * self.width.powi(k as i32)).sum()
+    }
+
+    /// Least and greatest value of derivative `order` (0 position ... 3 jerk), exact up to rounding.
+    pub(crate) fn range(&self, order: usize) -> Range {
+        let value = |u: f64| self.at(u * self.width)[order];
+        let (mut least, mut greatest) = ((0.0, value(0.0)), (0.0, value(0.0)));
+        let inner = roots_in_unit_interval(&self.derivative_in_u(order + 1));
+        for u in inner.into_iter().chain([1.0]) {
+            let candidate = (u * self.width, value(u));
+            if candidate.1 < least.1 {
+                least = candidate;
+            }
+            if candidate.1 > greatest.1 {
+                greatest = candidate;
+            }
+        }
+        [least, greatest]
+    }
+
+    /// First `τ` at which derivative `order` equals `level`, if any.
+    pub(crate) fn first_crossing(&self, order: usize, level: f64) -> Option<f64> {
+        let mut p = self.derivative_in_u(order);
+        // The derivative with respect to u = τ / width is width^order times the one with respect to τ.
+        p[0] -= level * self.width.powi(order as i32);
+        roots_in_unit_interval(&p).first().map(|u| u * self.width)
+    }
+
+    /// Coefficients of `d^order q / du^order` in `u = τ / width`, lowest first.
+    fn derivative_in_u(&self, order: usize) -> Vec<f64> {
+        let mut p: Vec<f64> = (0..6).map(|k| self.c[k] * self.width.powi(k as i32)).collect();
+        for _ in 0..order {
+            p = differentiate(&p);
+        }
+        p
+    }
+}
+
+fn differentiate(p: &[f64]) -> Vec<f64> {
+    p.iter().enumerate().skip(1).map(|(k, c)| k as f64 * c).collect()
+}
+
+fn evaluate(p: &[f64], u: f64) -> f64 {
+    p.iter().rev().fold(0.0, |sum, c| sum * u + c)
+}
+
+/// The real roots in `0 <= u <= 1` at which `p` changes sign (or vanishes at an end), ascending.
+///
+/// Between two neighbouring roots of `p'` the polynomial is monotone and has one root at most, so the
+/// recursion over the derivatives finds all of them.
+fn roots_in_unit_interval(p: &[f64]) -> Vec<f64> {
+    if p.len() < 2 {
+        return Vec::new();
+    }
+    let slope = differentiate(p);
+    let mut ends = vec![0.0];
+    ends.extend(roots_in_unit_interval(&slope));
+    ends.push(1.0);
+
+    let mut roots = Vec::new();
+    for pair in ends.windows(2) {
+        let (low, high) = (evaluate(p, pair[0]), evaluate(p, pair[1]));
+        if low == 0.0 {
+            roots.push(pair[0]);
+        } else if low.signum() * high.signum() < 0.0 && high != 0.0 {
+            roots.push(bracketed_root(p, &slope, pair[0], pair[1]));
+        }
+    }
+    if evaluate(p, 1.0) == 0.0 {
+        roots.push(1.0);
+    }
+    roots.dedup();
+    roots
+}
+
+/// Newton's method kept inside a bracket with a change of sign; halves the bracket where Newton leaves it.
+fn bracketed_root(p: &[f64], slope: &[f64], mut low: f64, mut high: f64) -> f64 {
+    let rising = evaluate(p, low) < 0.0;
+    let mut u = 0.5 * (low + high);
+    for _ in 0..80 {
+        let value = evaluate(p, u);
+        if value == 0.0 {
+            return u;
+        }
+        if (value < 0.0) == rising {
+            low = u;
+        } else {
+            high = u;
+        }
+        let newton = u - value / evaluate(slope, u);
+        let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
+        if (next - u).abs() <= 1e-16 {
+            return next;
+        }
+        u = next;
+    }
+    u
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// Truth: (u - 0.2)(u - 0.5)(u - 0.9).
+    #[test]
+    fn all_roots_of_a_cubic_are_found() {
+        let roots = roots_in_unit_interval(&[-0.09, 0.73, -1.6, 1.0]);
+        assert_eq!(roots.len(), 3);
+        for (found, truth) in roots.iter().zip([0.2, 0.5, 0.9]) {
+            assert!((found - truth).abs() < 1e-14); // measured 2.2e-16
+        }
+    }
+
+    proptest! {
+        /// Second algorithm: no sample on a fine grid lies outside the range found from the roots.
+        #[test]
+        fn no_sample_leaves_the_exact_range(
+            ends in prop::array::uniform6(-3.0..3.0_f64),
+            width in 0.01..5.0_f64,
+            order in 0..4_usize,
+        ) {
+            let [q0, v0, a0, q1, v1, a1] = ends;
+            let piece = Piece::hermite(width, [q0, v0, a0], [q1, v1, a1]);
+            let [(t_low, low), (t_high, high)] = piece.range(order);
+            let slack = 1e-12 * (low.abs() + high.abs() + 1.0);
+            for k in 0..=200 {
+                let value = piece.at(width * f64::from(k) / 200.0)[order];
+                prop_assert!(value >= low - slack && value <= high + slack);
+            }
+            prop_assert!((piece.at(t_low)[order] - low).abs() <= slack);
+            prop_assert!((piece.at(t_high)[order] - high).abs() <= slack);
+        }
+
+        #[test]
+        fn hermite_piece_meets_its_end_values(ends in prop::array::uniform6(-3.0..3.0_f64), width in 0.01..5.0_f64) {
+            let [q0, v0, a0, q1, v1, a1] = ends;
+            let [q, v, a, _] = Piece::hermite(width, [q0, v0, a0], [q1, v1, a1]).at(width);
+            // The size of the terms, not of the result, sets the rounding; measured 3e-16 of it.
+            let scale = 50.0 * (q0.abs() + q1.abs() + (v0.abs() + v1.abs()) * width + (a0.abs() + a1.abs()) * width * width);
+            prop_assert!((q - q1).abs() <= 1e-14 * scale);
+            prop_assert!((v - v1).abs() * width <= 1e-14 * scale);
+            prop_assert!((a - a1).abs() * width * width <= 1e-14 * scale);
+        }
+    }
+}

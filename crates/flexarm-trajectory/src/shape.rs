@@ -1,0 +1,264 @@
+//! Shapes of a move: how a way of length 1 is covered from rest to rest.
+//!
+//! A shape is a [`Curve`] `s(t)` from `s(0) = 0` to `s(T) = 1`; a joint that moves by `D` follows `q0 + D s(t)`.
+//! Limits are given per unit of way: a joint with velocity limit `v` that moves by `D` allows `s' <= v / |D|`.
+//!
+//! ```text
+//! quintic      s(u) = u³ (10 - 15 u + 6 u²),  u = t / T;  peaks 15/8 1/T, 10/sqrt(3) 1/T², 60 1/T³
+//! seven-phase  the acceleration rises, stays, falls; cruise; the same backwards
+//!
+//!              a ┐   ________                             t_jerk  rise of the acceleration
+//!                │  /        \                            t_ramp  from rest to the cruise, both t_jerk included
+//!              0 ┼-/          \--------\          /--     T       all of it
+//!                │                      \________/        v = 1 / (T - t_ramp),  a = v / (t_ramp - t_jerk)
+//! ```
+//! Trapezoid and S-curve are both seven-phase: a trapezoid rounds a fixed part of its ramps (`t_jerk = rounding
+//! t_ramp / 2`, none gives jumps of the acceleration), an S-curve rounds by a jerk limit (`t_jerk = a / jerk`).
+
+use crate::polynomial::Piece;
+use crate::trajectory::Curve;
+
+/// Part of the duration that each ramp of a trapezoid takes when only the duration is given.
+const TRAPEZOID_RAMP: f64 = 0.25;
+/// Part of the duration that each ramp of an S-curve takes when only the duration is given.
+const S_CURVE_RAMP: f64 = 1.0 / 3.0;
+/// Part of such a ramp in which the acceleration rises (and again in which it falls).
+const S_CURVE_RISE: f64 = 1.0 / 3.0;
+
+/// Limits of `s'`, `s''` and `s'''`; infinite when there is none.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct ShapeLimits {
+    pub(crate) velocity: f64,
+    pub(crate) acceleration: f64,
+    pub(crate) jerk: f64,
+}
+
+/// Times of a seven-phase shape, s.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Phases {
+    pub(crate) jerk: f64,
+    pub(crate) ramp: f64,
+    pub(crate) total: f64,
+}
+
+/// The quintic of the given duration.
+pub(crate) fn quintic(duration: f64) -> Curve {
+    let c = [0.0, 0.0, 0.0, 10.0, -15.0, 6.0];
+    let unit = Piece { width: 1.0, c };
+    Curve { knots: vec![0.0, duration], pieces: vec![unit.mapped(0.0, 1.0, duration)] }
+}
+
+/// Least duration of a shape with these peaks (for `T = 1`) within the limits.
+pub(crate) fn duration_for_peaks(peaks: [f64; 3], limits: &ShapeLimits) -> f64 {
+    let [velocity, acceleration, jerk] = peaks;
+    let by_velocity = velocity / limits.velocity;
+    let by_acceleration = (acceleration / limits.acceleration).sqrt();
+    by_velocity.max(by_acceleration).max((jerk / limits.jerk).cbrt())
+}
+
+/// Peaks of the quintic with `T = 1`.
+pub(crate) fn quintic_peaks() -> [f64; 3] {
+    [15.0 / 8.0, 10.0 / 3.0_f64.sqrt(), 60.0]
+}
+
+impl Phases {
+    /// The fastest trapezoid within velocity and (finite) acceleration limit; a triangle when the way is short.
+    pub(crate) fn trapezoid(limits: &ShapeLimits, rounding: f64) -> Self {
+        // A rounded ramp reaches the speed of a plain one with this mean acceleration.
+        let mean = limits.acceleration * (1.0 - rounding / 2.0);
+        let ramp = (limits.velocity / mean).min((1.0 / mean).sqrt());
+        let speed = mean * ramp;
+        Self { jerk: rounding * ramp / 2.0, ramp, total: ramp + 1.0 / speed }
+    }
+
+    /// The trapezoid of the given duration that uses the acceleration limit, if there is one and it suffices;
+    /// `None` when even a triangle would exceed it.
+    pub(crate) fn trapezoid_in(duration: f64, acceleration: f64, rounding: f64) -> Option<Self> {
+        let mean = acceleration * (1.0 - rounding / 2.0);
+        // v (T - ramp) = 1 with v = mean ramp: the smaller root.
+        let root = (duration * duration - 4.0 / mean).sqrt();
+        let ramp = 2.0 / (mean * (duration + root)); // = (T - root) / 2 without cancellation
+        (ramp > 0.0).then_some(Self { jerk: rounding * ramp / 2.0, ramp, total: duration })
+    }
+
+    /// The trapezoid of which nothing but the duration is known.
+    pub(crate) fn trapezoid_default(duration: f64, rounding: f64) -> Self {
+        let ramp = TRAPEZOID_RAMP * duration;
+        Self { jerk: rounding * ramp / 2.0, ramp, total: duration }
+    }
+
+    /// The fastest S-curve within velocity, (finite) acceleration and (finite) jerk limit.
+    pub(crate) fn s_curve(limits: &ShapeLimits) -> Self {
+        let ShapeLimits { velocity, acceleration: a, jerk } = *limits;
+        let with_cruise = Self::ramp_to(velocity, a, jerk);
+        if velocity * with_cruise.ramp <= 1.0 {
+            return Self { total: with_cruise.ramp + 1.0 / velocity, ..with_cruise };
+        }
+        // No cruise: v ramp = 1, first as if the acceleration limit were reached, else by the jerk alone.
+        let rise = a / jerk;
+        let ramp = 0.5 * (rise + (rise * rise + 4.0 / a).sqrt());
+        if ramp >= 2.0 * rise {
+            return Self { jerk: rise, ramp, total: 2.0 * ramp };
+        }
+        let rise = (0.5 / jerk).cbrt();
+        Self { jerk: rise, ramp: 2.0 * rise, total: 4.0 * rise }
+    }
+
+    /// The S-curve of the given duration that uses acceleration and jerk limit; `None` when they do not suffice.
+    pub(crate) fn s_curve_in(duration: f64, acceleration: f64, jerk: f64) -> Option<Self> {
+        let unlimited = ShapeLimits { velocity: f64::INFINITY, acceleration, jerk };
+        let fastest = Self::s_curve(&unlimited);
+        if fastest.total > duration * (1.0 + 1e-12) {
+            return None;
+        }
+        // The way covered, v (T - ramp(v)), grows with the cruise speed v up to that of the fastest curve.
+        let (mut low, mut high) = (0.0, 1.0 / fastest.ramp);
+        for _ in 0..100 {
+            let middle = 0.5 * (low + high);
+            if middle * (duration - Self::ramp_to(middle, acceleration, jerk).ramp) < 1.0 {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        Some(Self { total: duration, ..Self::ramp_to(high, acceleration, jerk) })
+    }
+
+    /// The S-curve of which nothing but the duration is known.
+    pub(crate) fn s_curve_default(duration: f64) -> Self {
+        let ramp = S_CURVE_RAMP * duration;
+        Self { jerk: S_CURVE_RISE * ramp, ramp, total: duration }
+    }
+
+    /// Rise and ramp times from rest to speed `v`; the total is not set.
+    fn ramp_to(v: f64, acceleration: f64, jerk: f64) -> Self {
+        let rise = acceleration / jerk;
+        if v >= acceleration * rise {
+            return Self { jerk: rise, ramp: v / acceleration + rise, total: 0.0 };
+        }
+        let rise = (v / jerk).sqrt();
+        Self { jerk: rise, ramp: 2.0 * rise, total: 0.0 }
+    }
+
+    /// The curve with these times; exactly 1 long, whatever the rounding of the times.
+    pub(crate) fn curve(&self) -> Curve {
+        let Self { jerk: rise, ramp, total } = *self;
+        let v = 1.0 / (total - ramp);
+        let a = v / (ramp - rise);
+        let j = if rise > 0.0 { a / rise } else { 0.0 };
+
+        // Each phase: its length, the acceleration at its start, its jerk. The state is carried along.
+        let (plateau, cruise) = (ramp - 2.0 * rise, total - 2.0 * ramp);
+        let phases = [
+            (rise, 0.0, j),
+            (plateau, a, 0.0),
+            (rise, a, -j),
+            (cruise, 0.0, 0.0),
+            (rise, 0.0, -j),
+            (plateau, -a, 0.0),
+            (rise, -a, j),
+        ];
+        let mut curve = Curve { knots: vec![0.0], pieces: Vec::new() };
+        let (mut t, mut s, mut speed) = (0.0, 0.0, 0.0);
+        for (width, acceleration, jerk) in phases {
+            // A phase this short is a rounding error of the times.
+            if width <= 1e-14 * total {
+                continue;
+            }
+            let piece = Piece { width, c: [s, speed, acceleration / 2.0, jerk / 6.0, 0.0, 0.0] };
+            [s, speed, _, _] = piece.at(width);
+            t += width;
+            curve.pieces.push(piece);
+            curve.knots.push(t);
+        }
+        if let Some(last) = curve.knots.last_mut() {
+            *last = total;
+        }
+        curve
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    const LIMITS: ShapeLimits = ShapeLimits { velocity: 0.8, acceleration: 2.0, jerk: 15.0 };
+
+    fn peak(curve: &Curve, order: usize) -> f64 {
+        let [least, greatest] = curve.range(order);
+        greatest.value.max(-least.value)
+    }
+
+    /// Truth: 15/8, 10/sqrt(3) and 60 over the powers of the duration.
+    #[test]
+    fn quintic_peaks_are_those_of_the_closed_form() {
+        let curve = quintic(2.0);
+        let [v, a, j] = quintic_peaks();
+        assert_relative_eq!(peak(&curve, 1), v / 2.0, max_relative = 1e-14); // measured 0
+        assert_relative_eq!(peak(&curve, 2), a / 4.0, max_relative = 1e-14); // measured 3.1e-16
+        assert_relative_eq!(peak(&curve, 3), j / 8.0, max_relative = 1e-14); // measured 0
+    }
+
+    /// Truth: T = 1/v + v/a for a way of 1, and 2/sqrt(a) for one too short to cruise.
+    #[test]
+    fn fastest_plain_trapezoid_is_bang_coast_bang() {
+        let phases = Phases::trapezoid(&LIMITS, 0.0);
+        assert_relative_eq!(phases.total, 1.0 / 0.8 + 0.8 / 2.0, max_relative = 1e-15); // measured 0
+        let fast = ShapeLimits { velocity: 100.0, ..LIMITS };
+        assert_relative_eq!(Phases::trapezoid(&fast, 0.0).total, 2.0 / 2.0_f64.sqrt(), max_relative = 1e-15);
+    }
+
+    /// Truth: T = 1/v + v/a + a/j for a way of 1 that reaches all three limits.
+    #[test]
+    fn fastest_s_curve_reaches_its_limits_and_no_more() {
+        let phases = Phases::s_curve(&LIMITS);
+        assert_relative_eq!(phases.total, 1.0 / 0.8 + 0.8 / 2.0 + 2.0 / 15.0, max_relative = 1e-15); // measured 0
+        let cases = [
+            (LIMITS, [0.8, 2.0, 15.0]),
+            // No time to cruise; no time to reach the acceleration either.
+            (ShapeLimits { velocity: 9.0, ..LIMITS }, [f64::NAN, 2.0, 15.0]),
+            (ShapeLimits { velocity: 9.0, acceleration: 90.0, ..LIMITS }, [f64::NAN, f64::NAN, 15.0]),
+            (ShapeLimits { acceleration: 90.0, ..LIMITS }, [0.8, f64::NAN, 15.0]),
+        ];
+        for (limits, reached) in cases {
+            let curve = Phases::s_curve(&limits).curve();
+            let allowed = [limits.velocity, limits.acceleration, limits.jerk];
+            for order in 0..3 {
+                let value = peak(&curve, order + 1);
+                assert!(value <= allowed[order] * (1.0 + 1e-12)); // measured 4e-16 over
+                if reached[order].is_finite() {
+                    assert_relative_eq!(value, reached[order], max_relative = 1e-12); // measured 9e-16
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn shapes_of_given_duration_use_the_acceleration_they_are_allowed() {
+        let phases = Phases::trapezoid_in(2.0, 2.0, 0.1).unwrap();
+        assert_relative_eq!(peak(&phases.curve(), 2), 2.0, max_relative = 1e-12); // measured 2e-16
+        let phases = Phases::s_curve_in(2.0, 2.0, 15.0).unwrap();
+        assert_relative_eq!(peak(&phases.curve(), 2), 2.0, max_relative = 1e-12); // measured 4e-16
+        assert_relative_eq!(peak(&phases.curve(), 3), 15.0, max_relative = 1e-12); // measured 1e-15
+        assert!(Phases::trapezoid_in(1.0, 2.0, 0.1).is_none());
+        assert!(Phases::s_curve_in(1.0, 2.0, 15.0).is_none());
+    }
+
+    #[test]
+    fn every_shape_ends_at_one_and_at_rest() {
+        let curves = [
+            quintic(1.3),
+            Phases::trapezoid(&LIMITS, 0.0).curve(),
+            Phases::trapezoid(&LIMITS, 1.0).curve(),
+            Phases::trapezoid_default(1.3, 0.1).curve(),
+            Phases::s_curve(&LIMITS).curve(),
+            Phases::s_curve_default(1.3).curve(),
+        ];
+        for curve in curves {
+            let [s, speed, _, _] = curve.end();
+            assert!((s - 1.0).abs() < 1e-14); // measured 4.4e-16
+            assert!(speed.abs() < 1e-14); // measured 2.2e-16
+        }
+    }
+}

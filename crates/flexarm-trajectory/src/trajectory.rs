@@ -1,0 +1,259 @@
+//! The trajectory itself: named piecewise polynomials, sampled, reordered, slowed down, cut into moves.
+//!
+//! Start at [`Trajectory::sample`]. Built by [`crate::Plan`] and [`crate::Samples`], never changed afterwards.
+
+use crate::error::TrajectoryError;
+use crate::polynomial::Piece;
+use crate::warning::Warning;
+
+/// A joint that moves less than this within a piece, in rad or m, is at rest there.
+const REST: f64 = 1e-9;
+
+/// Joint positions, velocities and accelerations as functions of time, from `t = 0` to [`Trajectory::duration`].
+///
+/// Position, velocity and acceleration are continuous everywhere, with three exceptions, each of which shows in
+/// [`Trajectory::warnings`]: an unrounded trapezoid jumps in acceleration; sampled data may start or end in
+/// motion, which makes the velocity jump there; data with velocities or accelerations of its own may do the same.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trajectory {
+    joints: Vec<String>,
+    curves: Vec<Curve>,
+    duration: f64,
+    /// What the reader or planner noticed; see [`Trajectory::warnings`].
+    notes: Vec<Warning>,
+}
+
+/// One joint: `knots[i] <= t < knots[i + 1]` belongs to `pieces[i]`.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Curve {
+    pub(crate) knots: Vec<f64>,
+    pub(crate) pieces: Vec<Piece>,
+}
+
+/// A stretch of time in which at least one joint moves; between two of them nothing does.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Move {
+    /// Time at which the first joint starts, s.
+    pub start: f64,
+    /// Time at which the last joint stops, s.
+    pub end: f64,
+}
+
+impl Trajectory {
+    /// Puts checked curves together.
+    ///
+    /// All curves must cover `0..duration` and have at least one piece.
+    ///
+    /// # Errors
+    /// [`TrajectoryError::OutOfRange`] when a coefficient is not finite: values and times are too extreme for f64.
+    pub(crate) fn from_curves(
+        joints: Vec<String>,
+        curves: Vec<Curve>,
+        duration: f64,
+        notes: Vec<Warning>,
+    ) -> Result<Self, TrajectoryError> {
+        assert_eq!(joints.len(), curves.len(), "one curve per joint");
+        for (joint, curve) in joints.iter().zip(&curves) {
+            assert_eq!(curve.knots.len(), curve.pieces.len() + 1, "a piece between every two knots");
+            // Far from zero, short pieces drown in the rounding of the knots.
+            let spans = curve.knots.windows(2).zip(&curve.pieces);
+            let mut sound = spans.map(|(knot, piece)| {
+                piece.is_sound() && (knot[1] - knot[0] - piece.width).abs() <= 1e-6 * piece.width
+            });
+            if let Some(i) = sound.position(|is_sound| !is_sound) {
+                return Err(TrajectoryError::OutOfRange { joint: joint.clone(), time_s: curve.knots[i] });
+            }
+        }
+        Ok(Self { joints, curves, duration, notes })
+    }
+
+    /// Joint names; all slices follow this order.
+    pub fn joints(&self) -> &[String] {
+        &self.joints
+    }
+
+    /// Time of the last knot in s; the first one is at 0.
+    pub fn duration(&self) -> f64 {
+        self.duration
+    }
+
+    /// Position, velocity and acceleration of every joint at time `t`, in the order of [`Trajectory::joints`].
+    ///
+    /// Before 0 and after the end the joints are held: constant position, zero velocity and acceleration. At a
+    /// knot where the acceleration jumps the value is the one just after it (just before it at the very end).
+    /// Nothing is allocated; the cost is one binary search per joint.
+    ///
+    /// * `t`: s, not NaN.
+    /// * `q`, `qdot`, `qddot`: rad, rad/s, rad/s² (m, m/s, m/s² for a prismatic joint), one entry per joint.
+    ///
+    /// # Panics
+    /// When a slice does not have one entry per joint.
+    pub fn sample(&self, t: f64, q: &mut [f64], qdot: &mut [f64], qddot: &mut [f64]) {
+        let n = self.joints.len();
+        assert!(
+            q.len() == n && qdot.len() == n && qddot.len() == n,
+            "q, qdot and qddot have {}, {} and {} entries, the trajectory has {n} joints",
+            q.len(),
+            qdot.len(),
+            qddot.len()
+        );
+        let held = t < 0.0 || t > self.duration;
+        for (i, curve) in self.curves.iter().enumerate() {
+            let [position, velocity, acceleration, _] = curve.at(t);
+            q[i] = position;
+            qdot[i] = if held { 0.0 } else { velocity };
+            qddot[i] = if held { 0.0 } else { acceleration };
+        }
+    }
+
+    /// The same motion with the joints in the order of `names`.
+    ///
+    /// # Errors
+    /// [`TrajectoryError::JointOrder`] unless `names` holds each joint of the trajectory exactly once; it lists
+    /// every missing and every unknown one.
+    pub fn with_joint_order(&self, names: &[&str]) -> Result<Self, TrajectoryError> {
+        let place = |name: &str| self.joints.iter().position(|joint| joint == name);
+        let mut repeated = names.to_vec();
+        repeated.sort_unstable();
+        let is_repeated = repeated.windows(2).any(|pair| pair[0] == pair[1]);
+
+        let missing: Vec<String> =
+            names.iter().filter(|name| place(name).is_none()).map(|name| (*name).to_owned()).collect();
+        let unknown: Vec<String> =
+            self.joints.iter().filter(|joint| !names.contains(&joint.as_str())).cloned().collect();
+        if !missing.is_empty() || !unknown.is_empty() || is_repeated {
+            return Err(TrajectoryError::JointOrder {
+                missing,
+                unknown,
+                have: self.joints.clone(),
+                want: names.iter().map(|name| (*name).to_owned()).collect(),
+            });
+        }
+
+        let order: Vec<usize> = names.iter().filter_map(|name| place(name)).collect();
+        Ok(Self {
+            joints: order.iter().map(|&i| self.joints[i].clone()).collect(),
+            curves: order.iter().map(|&i| self.curves[i].clone()).collect(),
+            duration: self.duration,
+            notes: self.notes.clone(),
+        })
+    }
+
+    /// The same path run through in `factor` times the time: 2 halves every velocity.
+    ///
+    /// # Errors
+    /// [`TrajectoryError::BadFactor`] unless `factor` is positive and finite;
+    /// [`TrajectoryError::OutOfRange`] when it is too extreme for f64.
+    pub fn scaled(&self, factor: f64) -> Result<Self, TrajectoryError> {
+        if !(factor > 0.0 && factor.is_finite()) {
+            return Err(TrajectoryError::BadFactor { factor });
+        }
+        let stretch = |curve: &Curve| Curve {
+            knots: curve.knots.iter().map(|knot| knot * factor).collect(),
+            pieces: curve.pieces.iter().map(|piece| piece.mapped(0.0, 1.0, factor)).collect(),
+        };
+        let curves = self.curves.iter().map(stretch).collect();
+        // What the planner said about times and limits holds for the unscaled motion only.
+        let notes = self.notes.iter().filter(|note| !note.depends_on_time()).cloned().collect();
+        Self::from_curves(self.joints.clone(), curves, self.duration * factor, notes)
+    }
+
+    /// Times at which the acceleration or the jerk of some joint jumps, ascending: knots that a step of an
+    /// integrator should end at. Includes 0 and the end when the motion does not start or end smoothly.
+    pub fn kinks(&self) -> Vec<f64> {
+        let mut times: Vec<f64> = self.curves.iter().flat_map(Curve::kinks).collect();
+        times.sort_unstable_by(f64::total_cmp);
+        times.dedup_by(|b, a| *b - *a <= 1e-12 * self.duration);
+        times
+    }
+
+    /// The stretches of time in which at least one joint moves, ascending and disjoint.
+    ///
+    /// A joint is at rest in a piece in which it moves less than 1e-9 rad (or m). Two moves that follow each
+    /// other without a hold count as one, because nothing can settle between them.
+    pub fn moves(&self) -> Vec<Move> {
+        let moving = |curve: &Curve| -> Vec<Move> {
+            let spans = curve.knots.windows(2).map(|pair| Move { start: pair[0], end: pair[1] });
+            let pieces = curve.pieces.iter().map(|piece| piece.excursion_bound() > REST);
+            spans.zip(pieces).filter_map(|(span, moves)| moves.then_some(span)).collect()
+        };
+        let mut spans: Vec<Move> = self.curves.iter().flat_map(moving).collect();
+        spans.sort_by(|a, b| a.start.total_cmp(&b.start));
+
+        let mut moves: Vec<Move> = Vec::new();
+        for span in spans {
+            match moves.last_mut() {
+                Some(last) if span.start <= last.end + 1e-12 * self.duration => last.end = last.end.max(span.end),
+                _ => moves.push(span),
+            }
+        }
+        moves
+    }
+
+    /// Largest speed at `t = 0` over all joints, rad/s (or m/s): by how much the velocity jumps at the start.
+    pub fn initial_speed(&self) -> f64 {
+        self.curves.iter().map(|curve| curve.start()[1].abs()).fold(0.0, f64::max)
+    }
+
+    /// Everything about this trajectory that a user should know before trusting a result: velocity jumps at the
+    /// ends, acceleration jumps, and what the file reader or the planner noticed.
+    pub fn warnings(&self) -> Vec<Warning> {
+        let mut warnings = self.notes.clone();
+        for (joint, curve) in self.joints.iter().zip(&self.curves) {
+            warnings.extend(Warning::of_curve(joint, curve));
+        }
+        warnings
+    }
+
+    pub(crate) fn curves(&self) -> &[Curve] {
+        &self.curves
+    }
+
+    /// Adds what a reader noticed about its file.
+    pub(crate) fn with_note(mut self, note: Warning) -> Self {
+        self.notes.push(note);
+        self
+    }
+}
+
+impl Curve {
+    /// Position, velocity, acceleration and jerk at `t`, which is held within the first and last knot.
+    pub(crate) fn at(&self, t: f64) -> [f64; 4] {
+        let last = self.pieces.len() - 1;
+        let i = self.knots[1..=last].partition_point(|&knot| knot <= t);
+        let piece = &self.pieces[i];
+        piece.at((t - self.knots[i]).clamp(0.0, piece.width))
+    }
+
+    pub(crate) fn start(&self) -> [f64; 4] {
+        self.pieces[0].at(0.0)
+    }
+
+    pub(crate) fn end(&self) -> [f64; 4] {
+        let piece = &self.pieces[self.pieces.len() - 1];
+        piece.at(piece.width)
+    }
+
+    /// Jump of position, velocity, acceleration and jerk at each knot, the holds before and after included.
+    pub(crate) fn jumps(&self) -> impl Iterator<Item = (f64, [f64; 4])> + '_ {
+        (0..self.knots.len()).map(|i| {
+            let hold = |q: f64| [q, 0.0, 0.0, 0.0];
+            let before = if i == 0 { hold(self.start()[0]) } else { self.pieces[i - 1].at(self.pieces[i - 1].width) };
+            let after = if i == self.pieces.len() { hold(self.end()[0]) } else { self.pieces[i].at(0.0) };
+            (self.knots[i], std::array::from_fn(|k| after[k] - before[k]))
+        })
+    }
+
+    /// Knots at which acceleration or jerk jumps by more than a millionth of its peak.
+    fn kinks(&self) -> Vec<f64> {
+        let peak = |order: usize| {
+            let ends = self.pieces.iter().flat_map(|piece| [piece.at(0.0)[order], piece.at(piece.width)[order]]);
+            ends.fold(0.0, |peak: f64, value| peak.max(value.abs()))
+        };
+        let (acceleration, jerk) = (peak(2), peak(3));
+        self.jumps()
+            .filter(|(_, jump)| jump[2].abs() > 1e-6 * acceleration || jump[3].abs() > 1e-6 * jerk)
+            .map(|(t, _)| t)
+            .collect()
+    }
+}

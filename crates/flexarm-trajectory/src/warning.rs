@@ -1,0 +1,124 @@
+//! What is worth saying about a trajectory that can be used all the same.
+
+use std::fmt;
+
+use crate::trajectory::Curve;
+
+/// Speeds below this, in rad/s or m/s, are not worth a warning.
+const QUIET_SPEED: f64 = 1e-6;
+/// Jumps below this part of the peak acceleration are rounding.
+const QUIET_JUMP: f64 = 1e-6;
+
+/// Something a user should know before trusting a result; `Display` gives one line with how to mend it.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Warning {
+    /// The velocity jumps at `t = 0`.
+    StartsMoving {
+        /// Joint name.
+        joint: String,
+        /// Velocity at 0, rad/s or m/s.
+        speed: f64,
+    },
+    /// The velocity jumps at the end.
+    EndsMoving {
+        /// Joint name.
+        joint: String,
+        /// Velocity at the end, rad/s or m/s.
+        speed: f64,
+    },
+    /// The acceleration jumps within the motion, or at an end at which the velocity is continuous.
+    AccelerationJumps {
+        /// Joint name.
+        joint: String,
+        /// Time of the largest jump, s.
+        time_s: f64,
+        /// Its size, rad/s² or m/s².
+        jump: f64,
+        /// How many knots have a jump.
+        count: usize,
+    },
+    /// A CSV file without a `# unit:` line holds values that are large for radians.
+    LooksLikeDegrees {
+        /// Joint name.
+        joint: String,
+        /// Largest absolute position as it was read, rad.
+        largest: f64,
+    },
+    /// The duration asked for makes a joint pass an acceleration or jerk limit.
+    ShorterThanLimitsAllow {
+        /// Number of the move, counted from 1.
+        number: usize,
+        /// Joint name.
+        joint: String,
+        /// `"acceleration"` or `"jerk"`.
+        quantity: &'static str,
+        /// Peak in the move, SI.
+        value: f64,
+        /// The limit, SI.
+        limit: f64,
+    },
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::StartsMoving { joint, speed } => write!(
+                f,
+                "joint {joint:?} starts with a velocity of {speed:.3e} instead of 0, a blow that excites every mode: \
+                 put a row with the same positions before the first one, or give its velocity as 0"
+            ),
+            Self::EndsMoving { joint, speed } => write!(
+                f,
+                "joint {joint:?} ends with a velocity of {speed:.3e} and is stopped at once: \
+                 put a row with the same positions after the last one, or give its velocity as 0"
+            ),
+            Self::AccelerationJumps { joint, time_s, jump, count } => write!(
+                f,
+                "the acceleration of joint {joint:?} jumps at {count} times, most at t = {time_s:.4} s by {jump:.3e}, \
+                 which excites every mode: use `rounding`, another profile, or data with continuous accelerations"
+            ),
+            Self::LooksLikeDegrees { joint, largest } => write!(
+                f,
+                "joint {joint:?} reaches {largest:.4} rad in a file that does not state its unit: \
+                 add the line `# unit: deg` or `# unit: rad` at its top"
+            ),
+            Self::ShorterThanLimitsAllow { number, joint, quantity, value, limit } => write!(
+                f,
+                "move {number}: the given duration takes the {quantity} of joint {joint:?} to {value:.4}, over its \
+                 limit of {limit:.4} (SI units): allow more time or drop the limit"
+            ),
+        }
+    }
+}
+
+impl Warning {
+    /// Does a change of speed make this warning wrong?
+    pub(crate) fn depends_on_time(&self) -> bool {
+        matches!(self, Self::ShorterThanLimitsAllow { .. })
+    }
+
+    /// What the curve of one joint gives rise to.
+    pub(crate) fn of_curve(joint: &str, curve: &Curve) -> Vec<Self> {
+        let mut warnings = Vec::new();
+        let (start, end) = (curve.start()[1], curve.end()[1]);
+        if start.abs() > QUIET_SPEED {
+            warnings.push(Self::StartsMoving { joint: joint.to_owned(), speed: start });
+        }
+        if end.abs() > QUIET_SPEED {
+            warnings.push(Self::EndsMoving { joint: joint.to_owned(), speed: end });
+        }
+
+        // Where the velocity jumps already, the acceleration says nothing new.
+        let peak = curve.pieces.iter().flat_map(|piece| [piece.at(0.0)[2], piece.at(piece.width)[2]]);
+        let peak = peak.fold(0.0, |peak: f64, a| peak.max(a.abs()));
+        let is_jump = |jump: &[f64; 4]| jump[1].abs() <= QUIET_SPEED && jump[2].abs() > QUIET_JUMP * peak;
+        let jumps: Vec<(f64, f64)> =
+            curve.jumps().filter(|(_, jump)| is_jump(jump)).map(|(t, jump)| (t, jump[2])).collect();
+        if let Some(&(time_s, jump)) = jumps.iter().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())) {
+            let (joint, count) = (joint.to_owned(), jumps.len());
+            warnings.push(Self::AccelerationJumps { joint, time_s, jump, count });
+        }
+        warnings
+    }
+}

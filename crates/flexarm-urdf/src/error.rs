@@ -1,0 +1,375 @@
+//! Why a robot description was refused: one variant of [`Problem`] for each kind of fault.
+
+use std::fmt;
+use std::path::PathBuf;
+
+use crate::finding::{Finding, Place, Severity};
+
+/// Why a file could not be turned into a robot.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum UrdfError {
+    /// The file cannot be read at all.
+    #[error("{}: cannot be read", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        #[source]
+        source: std::io::Error,
+    },
+    /// The xacro program is missing or refused the file.
+    #[error(transparent)]
+    Xacro(#[from] XacroError),
+    /// The file was read and something is wrong in it. All faults are listed, in the order of the file.
+    #[error("{}", listed(issues))]
+    Invalid {
+        /// At least one.
+        issues: Vec<Issue>,
+    },
+}
+
+impl UrdfError {
+    /// The faults inside the file; empty when it could not be read.
+    pub fn issues(&self) -> &[Issue] {
+        match self {
+            Self::Invalid { issues } => issues,
+            Self::Io { .. } | Self::Xacro(_) => &[],
+        }
+    }
+
+    /// The same as findings, for a report.
+    pub fn findings(&self) -> Vec<Finding> {
+        match self {
+            Self::Invalid { issues } => issues.iter().map(Finding::from).collect(),
+            Self::Io { path, source } => vec![Finding {
+                severity: Severity::Error,
+                code: "unreadable",
+                location: path.display().to_string(),
+                message: format!("the file cannot be read: {source}"),
+                help: "check the path and the permissions".to_owned(),
+            }],
+            Self::Xacro(error) => vec![Finding {
+                severity: Severity::Error,
+                code: "xacro",
+                location: error.path().display().to_string(),
+                message: error.to_string(),
+                help: String::new(),
+            }],
+        }
+    }
+}
+
+fn listed(issues: &[Issue]) -> String {
+    issues.iter().map(Issue::to_string).collect::<Vec<_>>().join("\n")
+}
+
+/// Why a `.xacro` file could not be expanded.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum XacroError {
+    /// There is no such program.
+    #[error(
+        "{}: this is a xacro file and the program {} is not installed; where ROS is, run\n  \
+         xacro {file} > {urdf}\nand use {urdf}",
+        path.display(), program.display(), file = file_name(path), urdf = expanded_name(path)
+    )]
+    NotInstalled {
+        /// The xacro file.
+        path: PathBuf,
+        /// What was looked for.
+        program: PathBuf,
+    },
+    /// The program exists and cannot be started.
+    #[error("{}: {} cannot be started", path.display(), program.display())]
+    NotStarted {
+        /// The xacro file.
+        path: PathBuf,
+        /// What was started.
+        program: PathBuf,
+        /// What the system said.
+        #[source]
+        source: std::io::Error,
+    },
+    /// The program ended with an error.
+    #[error("{}: xacro failed ({status}) and said:\n{}", path.display(), stderr.trim_end())]
+    Failed {
+        /// The xacro file.
+        path: PathBuf,
+        /// How it ended.
+        status: String,
+        /// What it wrote to its standard error.
+        stderr: String,
+    },
+}
+
+impl XacroError {
+    fn path(&self) -> &PathBuf {
+        match self {
+            Self::NotInstalled { path, .. } | Self::NotStarted { path, .. } | Self::Failed { path, .. } => path,
+        }
+    }
+}
+
+fn file_name(path: &std::path::Path) -> String {
+    path.display().to_string()
+}
+
+/// `robot.urdf.xacro` and `robot.xacro` both become `robot.urdf`.
+pub(crate) fn expanded_name(path: &std::path::Path) -> String {
+    let bare = path.with_extension("");
+    let bare = if bare.extension().is_some_and(|e| e == "urdf") { bare } else { bare.with_extension("urdf") };
+    bare.display().to_string()
+}
+
+/// One fault and its place.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Issue {
+    /// Where.
+    pub place: Place,
+    /// What.
+    pub problem: Problem,
+}
+
+impl fmt::Display for Issue {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}\n  help: {}", self.place, self.problem, self.problem.help())
+    }
+}
+
+impl std::error::Error for Issue {}
+
+impl From<&Issue> for Finding {
+    fn from(issue: &Issue) -> Self {
+        Finding {
+            severity: Severity::Error,
+            code: issue.problem.code(),
+            location: format!("{}:{}", issue.place.file.display(), issue.place.line),
+            message: issue.problem.to_string(),
+            help: issue.problem.help(),
+        }
+    }
+}
+
+/// What is wrong in a URDF. Names are those of the file, values in SI units.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+#[allow(missing_docs, reason = "the fields are explained by the message above them")]
+pub enum Problem {
+    /// The bytes are not text.
+    #[error("the byte 0x{byte:02x} is not UTF-8 text")]
+    NotUtf8 { byte: u8 },
+    /// The text is not well-formed XML, or is cut off.
+    #[error("found {found}, expected {expected}")]
+    Malformed { found: String, expected: String },
+    /// Well-formed XML with another root element.
+    #[error("the root element is <{root}>, expected <robot>")]
+    NotUrdf { root: String },
+    /// A xacro file under the name of a URDF.
+    #[error("{found} is xacro, which was not expanded")]
+    UnexpandedXacro { found: String, command: String },
+    /// A robot without any link.
+    #[error("the robot {robot:?} has no <link>")]
+    NoLink { robot: String },
+    /// A child element that URDF demands.
+    #[error("{owner} has no <{element}>")]
+    MissingElement { owner: String, element: &'static str },
+    /// An attribute that URDF demands.
+    #[error("{owner} has no attribute {attribute:?}")]
+    MissingAttribute { owner: String, attribute: &'static str },
+    /// Something else where numbers belong; NaN and infinity count as something else.
+    #[error("{owner}: {attribute}={found:?}, expected {expected}")]
+    NotANumber { owner: String, attribute: &'static str, found: String, expected: &'static str },
+    /// Two links of one name.
+    #[error("link {link:?} is defined twice, first in line {first_line}")]
+    DuplicateLink { link: String, first_line: u32 },
+    /// Two joints of one name.
+    #[error("joint {joint:?} is defined twice, first in line {first_line}")]
+    DuplicateJoint { joint: String, first_line: u32 },
+    /// A joint to or from a link that is not there.
+    #[error("joint {joint:?}: its {role} link {link:?} does not exist")]
+    UnknownLink { joint: String, role: &'static str, link: String, closest: Option<String> },
+    /// A link that is the child of two joints: a closed loop.
+    #[error("link {link:?} is the child of two joints, {first:?} (line {first_line}) and {second:?}")]
+    TwoParents { link: String, first: String, first_line: u32, second: String },
+    /// Links that are each other's ancestors.
+    #[error("the joints {} form a cycle without a base link", quoted(joints))]
+    Cycle { joints: Vec<String> },
+    /// More than one link without a parent.
+    #[error("the links are not connected: {} have no parent joint, expected one base link", quoted(roots))]
+    Disconnected { roots: Vec<String> },
+    /// A joint type that URDF does not have.
+    #[error("joint {joint:?}: unknown type {found:?}")]
+    UnknownJointType { joint: String, found: String, closest: Option<String> },
+    /// A joint type that URDF has and flexarm has not.
+    #[error("joint {joint:?} is of type {kind:?}, which is not supported")]
+    UnsupportedJoint { joint: String, kind: String },
+    /// A revolute or prismatic joint without limits.
+    #[error("{kind} joint {joint:?} has no <limit>")]
+    MissingLimit { joint: String, kind: &'static str },
+    /// Lower above upper.
+    #[error("joint {joint:?}: the lower limit {lower} is above the upper limit {upper}")]
+    LimitsReversed { joint: String, lower: f64, upper: f64 },
+    /// A negative speed or effort.
+    #[error("joint {joint:?}: the {attribute} limit {value} is negative")]
+    NegativeLimit { joint: String, attribute: &'static str, value: f64 },
+    /// An axis without direction.
+    #[error("joint {joint:?}: the axis is the zero vector")]
+    ZeroAxis { joint: String },
+    /// A mimic joint whose leader is not there.
+    #[error("joint {joint:?} mimics {leader:?}, which does not exist")]
+    UnknownMimic { joint: String, leader: String, closest: Option<String> },
+    /// A mimic joint whose leader cannot move, or that cannot move itself.
+    #[error("joint {joint:?} mimics {leader:?}, and {fixed:?} is fixed")]
+    MimicFixed { joint: String, leader: String, fixed: String },
+    /// Joints that mimic each other.
+    #[error("the joints {} mimic each other in a circle", quoted(joints))]
+    MimicCycle { joints: Vec<String> },
+    /// Negative mass.
+    #[error("link {link:?} has the mass {mass} kg, expected a positive one")]
+    NegativeMass { link: String, mass: f64 },
+    /// A moving body whose masses are all zero.
+    #[error("link {link:?} is moved by joint {joint:?} and has no mass{}", lumped_text(lumped))]
+    ZeroMass { link: String, joint: String, lumped: Vec<String> },
+    /// A moving body without any `<inertial>`.
+    #[error("link {link:?} is moved by joint {joint:?} and has no <inertial>{}", lumped_text(lumped))]
+    MissingInertial { link: String, joint: String, lumped: Vec<String>, no_estimate: Option<String> },
+    /// An inertia matrix that no body can have, or of a body without extent.
+    #[error(
+        "the inertia of link {link:?} is not positive definite: principal moments {} kg m^2",
+        moments_text(moments)
+    )]
+    InertiaNotPositiveDefinite { link: String, moments: [f64; 3] },
+    /// A principal moment above the sum of the two others.
+    #[error(
+        "the inertia of link {link:?} breaks the triangle inequality: principal moments {} kg m^2, the \
+         largest is above the sum of the two others by {excess:.2e}",
+        moments_text(moments)
+    )]
+    TriangleInequality { link: String, moments: [f64; 3], excess: f64 },
+    /// A density or a total mass to estimate inertias from that is not positive.
+    #[error("inertia from meshes was asked for with {what} {value}, expected a positive number")]
+    BadEstimate { what: &'static str, value: f64 },
+}
+
+impl Problem {
+    /// Stable short name, the `code` of a [`Finding`].
+    pub fn code(&self) -> &'static str {
+        match self {
+            Self::NotUtf8 { .. } => "not-utf8",
+            Self::Malformed { .. } => "malformed-xml",
+            Self::NotUrdf { .. } => "not-urdf",
+            Self::UnexpandedXacro { .. } => "unexpanded-xacro",
+            Self::NoLink { .. } => "no-link",
+            Self::MissingElement { .. } => "missing-element",
+            Self::MissingAttribute { .. } => "missing-attribute",
+            Self::NotANumber { .. } => "not-a-number",
+            Self::DuplicateLink { .. } => "duplicate-link",
+            Self::DuplicateJoint { .. } => "duplicate-joint",
+            Self::UnknownLink { .. } => "unknown-link",
+            Self::TwoParents { .. } => "two-parents",
+            Self::Cycle { .. } => "cycle",
+            Self::Disconnected { .. } => "disconnected",
+            Self::UnknownJointType { .. } => "unknown-joint-type",
+            Self::UnsupportedJoint { .. } => "unsupported-joint",
+            Self::MissingLimit { .. } => "missing-limit",
+            Self::LimitsReversed { .. } => "limits-reversed",
+            Self::NegativeLimit { .. } => "negative-limit",
+            Self::ZeroAxis { .. } => "zero-axis",
+            Self::UnknownMimic { .. } => "unknown-mimic",
+            Self::MimicFixed { .. } => "mimic-fixed",
+            Self::MimicCycle { .. } => "mimic-cycle",
+            Self::NegativeMass { .. } => "negative-mass",
+            Self::ZeroMass { .. } => "zero-mass",
+            Self::MissingInertial { .. } => "missing-inertial",
+            Self::InertiaNotPositiveDefinite { .. } => "inertia-not-positive-definite",
+            Self::TriangleInequality { .. } => "triangle-inequality",
+            Self::BadEstimate { .. } => "bad-estimate",
+        }
+    }
+
+    /// How to mend it.
+    pub fn help(&self) -> String {
+        match self {
+            Self::NotUtf8 { .. } => "save the file as UTF-8; is it a URDF at all?".into(),
+            Self::Malformed { .. } => "is the file complete? Export or copy it again, or mend it here".into(),
+            Self::NotUrdf { root } => match root.as_str() {
+                "sdf" => "this is an SDF file; export the robot as URDF".into(),
+                "mujoco" => "this is an MJCF file; export the robot as URDF".into(),
+                "COLLADA" => "this is a mesh; give the URDF that refers to it".into(),
+                _ => "give a URDF file".into(),
+            },
+            Self::UnexpandedXacro { command, .. } => format!("run `{command}` and use its output"),
+            Self::NoLink { .. } => "is the file complete? A robot needs at least one <link>".into(),
+            Self::MissingElement { element, .. } => format!("add <{element} .../>"),
+            Self::MissingAttribute { attribute, .. } => format!("add {attribute}=\"...\""),
+            Self::NotANumber { .. } => "write plain decimal numbers such as 0.1 or -1.5e-3, separated by spaces".into(),
+            Self::DuplicateLink { .. } | Self::DuplicateJoint { .. } => "rename or remove one of them".into(),
+            Self::UnknownLink { closest, .. } | Self::UnknownMimic { closest, .. } => match closest {
+                Some(name) => format!("did you mean {name:?}?"),
+                None => "correct the name or define it".into(),
+            },
+            Self::TwoParents { .. } => {
+                "URDF describes trees: remove one of the joints; a closed loop is described with <mimic>".into()
+            }
+            Self::Cycle { .. } => "remove one of these joints or correct its parent".into(),
+            Self::Disconnected { .. } => "add a (fixed) joint between the parts or remove the part not needed".into(),
+            Self::UnknownJointType { closest, .. } => match closest {
+                Some(name) => format!("did you mean {name:?}?"),
+                None => "types are fixed, revolute, continuous and prismatic".into(),
+            },
+            Self::UnsupportedJoint { kind, .. } => match kind.as_str() {
+                "floating" => "the base stands still here: make the joint fixed, or replace it by three prismatic and \
+                               three revolute joints in series"
+                    .into(),
+                "planar" => "replace it by two prismatic and one continuous joint in series".into(),
+                _ => "replace it by three revolute joints in series with links of small mass between".into(),
+            },
+            Self::MissingLimit { kind: "revolute", .. } => {
+                "add <limit lower=\"..\" upper=\"..\" effort=\"..\" velocity=\"..\"/> or make the joint continuous".into()
+            }
+            Self::MissingLimit { .. } => {
+                "add <limit lower=\"..\" upper=\"..\" effort=\"..\" velocity=\"..\"/>".into()
+            }
+            Self::LimitsReversed { .. } => "exchange lower and upper; angles are in radians".into(),
+            Self::NegativeLimit { .. } => "limits of speed and effort are magnitudes; 0 stands for unknown".into(),
+            Self::ZeroAxis { .. } => "write the axis as a unit vector, such as xyz=\"0 0 1\"".into(),
+            Self::MimicFixed { .. } => "remove <mimic> or let the joint move".into(),
+            Self::MimicCycle { .. } => "let one of them go without <mimic>".into(),
+            Self::NegativeMass { .. } => "correct the sign; a counterweight has positive mass too".into(),
+            Self::ZeroMass { .. } => "give the link its mass and inertia; motion of a massless body is undefined".into(),
+            Self::MissingInertial { no_estimate, .. } => match no_estimate {
+                None => "add <inertial> with mass and inertia, or have it estimated from the meshes \
+                         (--inertia-from-mesh density|total-mass)"
+                    .into(),
+                Some(why) => format!("add <inertial> with mass and inertia; it could not be estimated: {why}"),
+            },
+            Self::InertiaNotPositiveDefinite { .. } => {
+                "check signs, units (kg m^2) and that the values are about the centre of mass; if the model means it, \
+                 waive the check for this link"
+                    .into()
+            }
+            Self::TriangleInequality { .. } => {
+                "check the order ixx ixy ixz iyy iyz izz and that the values are about the centre of mass; if the \
+                 model means it, waive the check for this link"
+                    .into()
+            }
+            Self::BadEstimate { .. } => "give a density in kg/m^3 (steel 7850, aluminium 2700) or a mass in kg".into(),
+        }
+    }
+}
+
+fn quoted(names: &[String]) -> String {
+    names.iter().map(|n| format!("{n:?}")).collect::<Vec<_>>().join(", ")
+}
+
+fn lumped_text(lumped: &[String]) -> String {
+    if lumped.is_empty() {
+        return String::new();
+    }
+    format!(", nor have the links fixed to it ({})", quoted(lumped))
+}
+
+fn moments_text(moments: &[f64; 3]) -> String {
+    moments.map(|m| format!("{m:.6e}")).join(", ")
+}

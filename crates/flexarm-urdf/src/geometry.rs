@@ -1,0 +1,185 @@
+//! What a link looks like: shapes and meshes placed on links.
+//!
+//! Frames: L link, V the visual's own frame. Primitives as in URDF: centred at Vo, the cylinder along z.
+
+use std::path::PathBuf;
+
+use flexarm_kinematics::Pose;
+use nalgebra::{Matrix3, Vector3};
+
+use crate::mesh::{MassProperties, MeshError, TriangleMesh, load_mesh};
+
+/// A shape on a link.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Visual {
+    /// Name of the link L.
+    pub link: String,
+    /// Pose of the shape in the link [m].
+    pub X_LV: Pose,
+    /// The shape.
+    pub geometry: Geometry,
+    /// Red, green, blue, alpha from 0 to 1, if the URDF gives one.
+    pub color: Option<[f32; 4]>,
+    /// Name of the visual, if it has one.
+    pub name: Option<String>,
+}
+
+/// A shape in its own frame V. Lengths in m.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Geometry {
+    /// Triangles in a file.
+    Mesh {
+        /// The reference as it stands in the URDF (`package://...`).
+        uri: String,
+        /// The file, if it was found.
+        path: Option<PathBuf>,
+        /// Factors along x, y and z, applied after the unit and the up axis of the file.
+        scale: Vector3<f64>,
+    },
+    /// A box.
+    Box {
+        /// Full edge lengths.
+        size: Vector3<f64>,
+    },
+    /// A cylinder along z.
+    Cylinder {
+        /// Radius.
+        radius: f64,
+        /// Full length.
+        length: f64,
+    },
+    /// A sphere.
+    Sphere {
+        /// Radius.
+        radius: f64,
+    },
+}
+
+/// Corners of the circles that stand for cylinders and spheres.
+const CORNERS: u32 = 48;
+
+impl Geometry {
+    /// The shape as triangles in V, scale applied, outward sides counter-clockwise.
+    ///
+    /// Round shapes are inscribed polyhedra of 48 corners, for drawing; their exact mass properties are
+    /// those of [`Geometry::mass_properties`].
+    ///
+    /// # Errors
+    /// [`MeshError`], for meshes only.
+    pub fn triangles(&self) -> Result<TriangleMesh, MeshError> {
+        Ok(match self {
+            Self::Mesh { path: Some(path), scale, .. } => load_mesh(path)?.scaled(scale),
+            Self::Mesh { uri, path: None, .. } => return Err(MeshError::NotFound { uri: uri.clone() }),
+            Self::Box { size } => box_triangles(size),
+            Self::Cylinder { radius, length } => cylinder_triangles(*radius, *length),
+            Self::Sphere { radius } => sphere_triangles(*radius),
+        })
+    }
+
+    /// Volume, centroid and inertia per unit density in V: closed forms, and exact integrals over meshes.
+    ///
+    /// # Errors
+    /// [`MeshError`], for meshes only.
+    pub fn mass_properties(&self) -> Result<MassProperties, MeshError> {
+        let (volume, second_moments) = match self {
+            Self::Mesh { .. } => return Ok(self.triangles()?.mass_properties()),
+            Self::Box { size: s } => (s.x * s.y * s.z, s.component_mul(s) / 12.0),
+            Self::Cylinder { radius: r, length: l } => {
+                let across = r * r / 4.0;
+                (std::f64::consts::PI * r * r * l, Vector3::new(across, across, l * l / 12.0))
+            }
+            Self::Sphere { radius: r } => (4.0 / 3.0 * std::f64::consts::PI * r.powi(3), Vector3::repeat(r * r / 5.0)),
+        };
+        // I = ∫ (r·r 1 - r rᵀ) dV, all of it on the axes
+        let s = second_moments * volume;
+        Ok(MassProperties {
+            volume,
+            centroid: Vector3::zeros(),
+            inertia: Matrix3::from_diagonal(&Vector3::new(s.y + s.z, s.z + s.x, s.x + s.y)),
+            open_edges: 0,
+            inside_out: false,
+        })
+    }
+}
+
+fn box_triangles(size: &Vector3<f64>) -> TriangleMesh {
+    let mut mesh = TriangleMesh::default();
+    let mut normals = Vec::new();
+    for axis in 0..3 {
+        for side in [-1.0, 1.0] {
+            // u, v and the outward normal are right-handed
+            let normal = Vector3::ith(axis, side);
+            let u = Vector3::ith((axis + 1) % 3, 1.0);
+            let v = normal.cross(&u);
+            let first = mesh.positions.len() as u32;
+            for (a, b) in [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)] {
+                let corner: Vector3<f64> = normal + u * a + v * b;
+                mesh.positions.push(corner.component_mul(size).map(|x| (0.5 * x) as f32).into());
+                normals.push(normal.map(|x| x as f32).into());
+            }
+            mesh.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
+        }
+    }
+    mesh.normals = Some(normals);
+    mesh
+}
+
+fn cylinder_triangles(radius: f64, length: f64) -> TriangleMesh {
+    let mut mesh = TriangleMesh::default();
+    let mut normals: Vec<[f32; 3]> = Vec::new();
+    let half = 0.5 * length;
+    let mut push = |mesh: &mut TriangleMesh, p: [f64; 3], n: [f64; 3]| {
+        mesh.positions.push(p.map(|x| x as f32));
+        normals.push(n.map(|x| x as f32));
+    };
+    for k in 0..CORNERS {
+        let (s, c) = (f64::from(k) * std::f64::consts::TAU / f64::from(CORNERS)).sin_cos();
+        let (x, y) = (radius * c, radius * s);
+        // four rings: wall and cap have normals of their own
+        push(&mut mesh, [x, y, -half], [c, s, 0.0]);
+        push(&mut mesh, [x, y, half], [c, s, 0.0]);
+        push(&mut mesh, [x, y, -half], [0.0, 0.0, -1.0]);
+        push(&mut mesh, [x, y, half], [0.0, 0.0, 1.0]);
+    }
+    for k in 0..CORNERS {
+        let (a, b) = (4 * k, 4 * ((k + 1) % CORNERS));
+        mesh.triangles.extend([[a, b, b + 1], [a, b + 1, a + 1]]);
+        if k > 0 && k + 1 < CORNERS {
+            mesh.triangles.extend([[2, b + 2, a + 2], [3, a + 3, b + 3]]);
+        }
+    }
+    mesh.normals = Some(normals);
+    mesh
+}
+
+fn sphere_triangles(radius: f64) -> TriangleMesh {
+    let rings = CORNERS / 2;
+    let mut mesh = TriangleMesh::default();
+    let mut normals = Vec::new();
+    let mut push = |mesh: &mut TriangleMesh, n: [f64; 3]| {
+        mesh.positions.push(n.map(|x| (x * radius) as f32));
+        normals.push(n.map(|x| x as f32));
+    };
+    push(&mut mesh, [0.0, 0.0, 1.0]);
+    for ring in 1..rings {
+        let (sin_polar, cos_polar) = (f64::from(ring) * std::f64::consts::PI / f64::from(rings)).sin_cos();
+        for k in 0..CORNERS {
+            let (s, c) = (f64::from(k) * std::f64::consts::TAU / f64::from(CORNERS)).sin_cos();
+            push(&mut mesh, [sin_polar * c, sin_polar * s, cos_polar]);
+        }
+    }
+    push(&mut mesh, [0.0, 0.0, -1.0]);
+
+    let at = |ring: u32, k: u32| 1 + (ring - 1) * CORNERS + k % CORNERS;
+    let south = 1 + (rings - 1) * CORNERS;
+    for k in 0..CORNERS {
+        mesh.triangles.push([0, at(1, k), at(1, k + 1)]);
+        mesh.triangles.push([south, at(rings - 1, k + 1), at(rings - 1, k)]);
+        for ring in 1..rings - 1 {
+            let (a, b, c, d) = (at(ring, k), at(ring + 1, k), at(ring + 1, k + 1), at(ring, k + 1));
+            mesh.triangles.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+    mesh.normals = Some(normals);
+    mesh
+}

@@ -1,0 +1,235 @@
+//! Triangle meshes: reading STL, OBJ, COLLADA and glTF, and their mass properties.
+//!
+//! Everything comes out in metres and in the axes of the URDF's visual frame, ready to be drawn:
+//!
+//! | format | unit | up axis | node transforms |
+//! | --- | --- | --- | --- |
+//! | STL, OBJ | none: taken as metres | none | none |
+//! | COLLADA (`.dae`) | `<unit>` applied | `<up_axis>` turned to z | applied |
+//! | glTF (`.glb`, `.gltf`) | metres by definition | taken as it is | applied |
+//!
+//! glTF says that y is up. Robot tools (RViz and others) place the coordinates of a glTF mesh into the link frame
+//! unchanged, and robot descriptions are written for that, so it is done here. The scale of the URDF comes
+//! last ([`TriangleMesh::scaled`]).
+//!
+//! Start at [`load_mesh`]. Not here: finding files (`resolve`), placing shapes on links
+//! ([`crate::Visual`]).
+
+mod collada;
+mod gltf_file;
+mod mass;
+mod obj;
+mod stl;
+
+use std::path::{Path, PathBuf};
+
+use flexarm_kinematics::Pose;
+use nalgebra::Vector3;
+
+pub use mass::MassProperties;
+
+/// Triangles with shared vertices; counter-clockwise seen from outside.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TriangleMesh {
+    /// Vertices [m].
+    pub positions: Vec<[f32; 3]>,
+    /// Unit normals, one for each vertex.
+    pub normals: Option<Vec<[f32; 3]>>,
+    /// Indices of vertices.
+    pub triangles: Vec<[u32; 3]>,
+    /// Diffuse colour of the largest part, red, green, blue, alpha from 0 to 1.
+    pub color: Option<[f32; 4]>,
+}
+
+/// Why a mesh cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum MeshError {
+    /// The reference in the URDF did not lead to a file.
+    #[error("no file was found for {uri:?}")]
+    NotFound {
+        /// The reference.
+        uri: String,
+    },
+    /// The file cannot be read.
+    #[error("{}: cannot be read", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        #[source]
+        source: std::io::Error,
+    },
+    /// Neither the name nor the content is of a known format.
+    #[error("{}: unknown mesh format, expected STL, OBJ, DAE, GLB or GLTF", path.display())]
+    UnknownFormat {
+        /// The file.
+        path: PathBuf,
+    },
+    /// The file breaks the rules of its format.
+    #[error("{}: not a sound {format} file: {reason}", path.display())]
+    Malformed {
+        /// The file.
+        path: PathBuf,
+        /// The format.
+        format: &'static str,
+        /// What is wrong, with the place where the format has one.
+        reason: String,
+    },
+    /// A part of the format that is not read.
+    #[error("{}: {feature} are not supported; export plain triangles", path.display())]
+    Unsupported {
+        /// The file.
+        path: PathBuf,
+        /// The part.
+        feature: String,
+    },
+    /// No triangle in it.
+    #[error("{}: there are no triangles in it", path.display())]
+    Empty {
+        /// The file.
+        path: PathBuf,
+    },
+}
+
+/// Reads a mesh; the format is told by the extension, else by the content.
+///
+/// # Errors
+/// [`MeshError`]; any bytes are refused or read, never a panic.
+pub fn load_mesh(path: impl AsRef<Path>) -> Result<TriangleMesh, MeshError> {
+    load_with_remarks(path.as_ref()).map(|loaded| loaded.mesh)
+}
+
+/// A mesh and what the reader should know about the way it was read.
+#[derive(Debug)]
+pub(crate) struct Loaded {
+    pub(crate) mesh: TriangleMesh,
+    pub(crate) remarks: Vec<String>,
+}
+
+pub(crate) fn load_with_remarks(path: &Path) -> Result<Loaded, MeshError> {
+    let io_error = |source| MeshError::Io { path: path.to_owned(), source };
+    // Not a device or a pipe, which might never end.
+    if !std::fs::metadata(path).map_err(io_error)?.is_file() {
+        return Err(io_error(std::io::Error::other("this is not a file")));
+    }
+    decode(&std::fs::read(path).map_err(io_error)?, path)
+}
+
+/// Bytes of a mesh file; `path` serves the extension, messages and files beside it.
+pub(crate) fn decode(bytes: &[u8], path: &Path) -> Result<Loaded, MeshError> {
+    let mut remarks = Vec::new();
+    let mesh = match format(bytes, path) {
+        Some(Format::Stl) => stl::decode(bytes, path),
+        Some(Format::Obj) => obj::decode(bytes, path),
+        Some(Format::Collada) => collada::decode(bytes, path, &mut remarks),
+        Some(Format::Gltf) => gltf_file::decode(bytes, path),
+        None => Err(MeshError::UnknownFormat { path: path.to_owned() }),
+    }?;
+    check(&mesh, path)?;
+    Ok(Loaded { mesh, remarks })
+}
+
+enum Format {
+    Stl,
+    Obj,
+    Collada,
+    Gltf,
+}
+
+fn format(bytes: &[u8], path: &Path) -> Option<Format> {
+    let extension = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
+    match extension.as_deref() {
+        Some("stl" | "stla" | "stlb") => return Some(Format::Stl),
+        Some("obj") => return Some(Format::Obj),
+        Some("dae") => return Some(Format::Collada),
+        Some("glb" | "gltf") => return Some(Format::Gltf),
+        _ => {}
+    }
+    let head = &bytes[..bytes.len().min(1024)];
+    let contains = |needle: &[u8]| head.windows(needle.len()).any(|w| w == needle);
+    if bytes.starts_with(b"glTF") {
+        Some(Format::Gltf)
+    } else if contains(b"<COLLADA") {
+        Some(Format::Collada)
+    } else if bytes.starts_with(b"solid") || stl::has_binary_size(bytes) {
+        Some(Format::Stl)
+    } else {
+        None
+    }
+}
+
+/// What every reader must have kept: indices within range, numbers finite, something to draw.
+fn check(mesh: &TriangleMesh, path: &Path) -> Result<(), MeshError> {
+    let malformed =
+        |reason: String| MeshError::Malformed { path: path.to_owned(), format: "mesh", reason };
+    if mesh.triangles.is_empty() {
+        return Err(MeshError::Empty { path: path.to_owned() });
+    }
+    let count = mesh.positions.len();
+    if let Some(index) = mesh.triangles.iter().flatten().find(|&&i| i as usize >= count) {
+        return Err(malformed(format!("a triangle uses vertex {index} of {count}")));
+    }
+    if let Some(p) = mesh.positions.iter().find(|p| p.iter().any(|x| !x.is_finite())) {
+        return Err(malformed(format!("the vertex {p:?} is not finite")));
+    }
+    Ok(())
+}
+
+impl TriangleMesh {
+    /// Stretched along the axes; negative factors mirror, and the triangles stay outside out.
+    pub fn scaled(mut self, scale: &Vector3<f64>) -> Self {
+        for p in &mut self.positions {
+            *p = std::array::from_fn(|i| (f64::from(p[i]) * scale[i]) as f32);
+        }
+        if let Some(normals) = &mut self.normals {
+            for n in normals {
+                let stretched = Vector3::from_fn(|i, _| f64::from(n[i]) / scale[i]);
+                *n = unit_normal(stretched);
+            }
+        }
+        if scale.product() < 0.0 {
+            self.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+        }
+        self
+    }
+
+    /// In the axes of A, for this mesh in B and `X_AB`.
+    pub fn transformed(mut self, X_AB: &Pose) -> Self {
+        for p in &mut self.positions {
+            let p_A = X_AB * nalgebra::Point3::from(p.map(f64::from));
+            *p = p_A.coords.map(|x| x as f32).into();
+        }
+        if let Some(normals) = &mut self.normals {
+            for n in normals {
+                *n = (X_AB.rotation * Vector3::from(n.map(f64::from))).map(|x| x as f32).into();
+            }
+        }
+        self
+    }
+
+    /// Lowest and highest corner of the box around all vertices; `None` without vertices.
+    pub fn bounds(&self) -> Option<(Vector3<f64>, Vector3<f64>)> {
+        let mut points = self.positions.iter().map(|p| Vector3::from(p.map(f64::from)));
+        let first = points.next()?;
+        Some(points.fold((first, first), |(low, high), p| (low.inf(&p), high.sup(&p))))
+    }
+}
+
+/// Normalised, or +z where there is no direction.
+fn unit_normal(n: Vector3<f64>) -> [f32; 3] {
+    n.try_normalize(1e-300).filter(|n| n.iter().all(|x| x.is_finite())).unwrap_or_else(Vector3::z).map(|x| x as f32).into()
+}
+
+/// The colour with most triangles.
+fn dominant_color(parts: &[(Option<[f32; 4]>, usize)]) -> Option<[f32; 4]> {
+    let mut totals: Vec<([f32; 4], usize)> = Vec::new();
+    for &(color, count) in parts {
+        let Some(color) = color else { continue };
+        match totals.iter_mut().find(|(c, _)| *c == color) {
+            Some((_, total)) => *total += count,
+            None => totals.push((color, count)),
+        }
+    }
+    totals.into_iter().max_by_key(|(_, total)| *total).map(|(color, _)| color)
+}

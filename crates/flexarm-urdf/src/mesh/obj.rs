@@ -1,0 +1,43 @@
+//! OBJ with the colours of its material files, by `mesh_loader`; and its scenes as one mesh.
+
+use std::path::Path;
+
+use super::{MeshError, TriangleMesh, dominant_color, stl};
+
+pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<TriangleMesh, MeshError> {
+    // Material files only: a name in the file must not make us read a device.
+    let read_file = |file: &Path| match std::fs::metadata(file) {
+        Ok(meta) if meta.is_file() => std::fs::read(file),
+        _ => Err(std::io::Error::other("not a file")),
+    };
+    let scene = mesh_loader::Loader::default().load_obj_from_slice_with_reader(bytes, path, read_file);
+    let scene = scene.map_err(|error| MeshError::Malformed {
+        path: path.to_owned(),
+        format: "OBJ",
+        reason: error.to_string(),
+    })?;
+    merged(scene, path)
+}
+
+/// All parts of a scene as one mesh.
+pub(super) fn merged(scene: mesh_loader::Scene, path: &Path) -> Result<TriangleMesh, MeshError> {
+    let mut mesh = TriangleMesh::default();
+    let mut normals = Vec::new();
+    let mut colors = Vec::new();
+    for (i, part) in scene.meshes.into_iter().enumerate() {
+        let first = u32::try_from(mesh.positions.len()).unwrap_or(u32::MAX);
+        let shifted = part.faces.iter().map(|face| face.map(|index| index.saturating_add(first)));
+        mesh.triangles.extend(shifted);
+        colors.push((scene.materials.get(i).and_then(|m| m.color.diffuse), part.faces.len()));
+        mesh.positions.extend(part.vertices);
+        normals.extend(part.normals);
+    }
+    if mesh.positions.len() > u32::MAX as usize {
+        return Err(MeshError::Unsupported { path: path.to_owned(), feature: "more than 2^32 vertices".to_owned() });
+    }
+    mesh.color = dominant_color(&colors);
+    if normals.len() == mesh.positions.len() {
+        mesh.normals = stl::usable(normals);
+    }
+    Ok(mesh)
+}

@@ -1,0 +1,63 @@
+//! STL, binary and ascii, told apart by size: a binary file has 84 + 50 n bytes, whatever its header says.
+
+use std::path::Path;
+
+use super::{MeshError, TriangleMesh, obj};
+
+const HEADER: usize = 80;
+const RECORD: usize = 50;
+
+/// The size is the one of a binary file with the number of triangles in its header.
+pub(super) fn has_binary_size(bytes: &[u8]) -> bool {
+    triangle_count(bytes).is_some_and(|n| bytes.len() as u64 == size(n))
+}
+
+fn triangle_count(bytes: &[u8]) -> Option<u32> {
+    bytes.get(HEADER..HEADER + 4)?.try_into().ok().map(u32::from_le_bytes)
+}
+
+fn size(triangles: u32) -> u64 {
+    (HEADER + 4) as u64 + RECORD as u64 * u64::from(triangles)
+}
+
+pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<TriangleMesh, MeshError> {
+    let malformed = |reason: String| MeshError::Malformed { path: path.to_owned(), format: "STL", reason };
+    // Many exporters write "solid" into the header of binary files, so the size decides first.
+    let ascii = bytes.trim_ascii_start().starts_with(b"solid") && std::str::from_utf8(bytes).is_ok();
+    if ascii && !has_binary_size(bytes) {
+        let scene = mesh_loader::Loader::default()
+            .load_stl_from_slice(bytes, path)
+            .map_err(|error| malformed(error.to_string()))?;
+        return obj::merged(scene, path);
+    }
+
+    let count = triangle_count(bytes)
+        .ok_or_else(|| malformed(format!("{} bytes, expected at least 84 for a binary file", bytes.len())))?;
+    if (bytes.len() as u64) < size(count) {
+        let needed = size(count);
+        return Err(malformed(format!(
+            "cut off: {} bytes, expected {needed} for the {count} triangles of its header",
+            bytes.len()
+        )));
+    }
+    // Bytes behind the last triangle (line ends, tool data) are left alone.
+    let records = bytes[HEADER + 4..].chunks_exact(RECORD).take(count as usize);
+    let mut mesh = TriangleMesh::default();
+    let mut normals = Vec::new();
+    for record in records {
+        let number = |i: usize| f32::from_le_bytes([record[4 * i], record[4 * i + 1], record[4 * i + 2], record[4 * i + 3]]);
+        let vector = |i: usize| [number(3 * i), number(3 * i + 1), number(3 * i + 2)];
+        let first = mesh.positions.len() as u32;
+        mesh.positions.extend([vector(1), vector(2), vector(3)]);
+        normals.extend([vector(0); 3]);
+        mesh.triangles.push([first, first + 1, first + 2]);
+    }
+    mesh.normals = usable(normals);
+    Ok(mesh)
+}
+
+/// STL files often carry zero normals; then there are none.
+pub(super) fn usable(normals: Vec<[f32; 3]>) -> Option<Vec<[f32; 3]>> {
+    let unit = |n: &[f32; 3]| (n.iter().map(|x| x * x).sum::<f32>() - 1.0).abs() < 1e-2;
+    (!normals.is_empty() && normals.iter().all(unit)).then_some(normals)
+}

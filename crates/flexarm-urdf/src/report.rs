@@ -1,0 +1,53 @@
+//! Collects what the checks find, so that all faults come out at once.
+
+use std::path::PathBuf;
+
+use crate::error::{Issue, Problem};
+use crate::finding::{Finding, Place, Severity};
+
+/// Faults, warnings and notes about one file.
+pub(crate) struct Report {
+    /// The file as the user named it.
+    pub(crate) file: PathBuf,
+    /// Errors.
+    pub(crate) issues: Vec<Issue>,
+    /// Warnings and notes, with the line for sorting.
+    remarks: Vec<(u32, Finding)>,
+}
+
+impl Report {
+    pub(crate) fn new(file: PathBuf) -> Self {
+        Self { file, issues: Vec::new(), remarks: Vec::new() }
+    }
+
+    pub(crate) fn error(&mut self, place: &Place, problem: Problem) {
+        self.issues.push(Issue { place: place.clone(), problem });
+    }
+
+    pub(crate) fn warning(&mut self, place: &Place, code: &'static str, message: String, help: impl Into<String>) {
+        self.remark(Severity::Warning, place, code, message, help.into());
+    }
+
+    pub(crate) fn note(&mut self, place: &Place, code: &'static str, message: String, help: impl Into<String>) {
+        self.remark(Severity::Note, place, code, message, help.into());
+    }
+
+    fn remark(&mut self, severity: Severity, place: &Place, code: &'static str, message: String, help: String) {
+        let location = format!("{}:{}", place.file.display(), place.line);
+        self.remarks.push((place.line, Finding { severity, code, location, message, help }));
+    }
+
+    /// Warnings and notes in the order of the file.
+    pub(crate) fn remarks(&self) -> Vec<Finding> {
+        let mut sorted: Vec<_> = self.remarks.iter().collect();
+        sorted.sort_by_key(|(line, _)| *line);
+        sorted.into_iter().map(|(_, finding)| finding.clone()).collect()
+    }
+
+    /// The errors in the order of the file.
+    pub(crate) fn sorted_issues(&self) -> Vec<Issue> {
+        let mut issues = self.issues.clone();
+        issues.sort_by_key(|issue| (issue.place.line, issue.place.column));
+        issues
+    }
+}

@@ -1,0 +1,184 @@
+//! Well-formedness and positions: what a broken file has instead of what it should have, and where.
+//!
+//! Not here: any meaning of elements ([`crate::document`]).
+
+use std::path::{Path, PathBuf};
+
+use roxmltree::{Document, Error, Node};
+
+use crate::error::{Issue, Problem};
+use crate::finding::Place;
+
+/// Start offsets of all lines, to turn byte offsets into places without reading the text each time.
+pub(crate) struct Lines<'t> {
+    file: PathBuf,
+    text: &'t str,
+    starts: Vec<usize>,
+}
+
+impl<'t> Lines<'t> {
+    pub(crate) fn new(file: &Path, text: &'t str) -> Self {
+        let starts = std::iter::once(0).chain(text.match_indices('\n').map(|(at, _)| at + 1)).collect();
+        Self { file: file.to_owned(), text, starts }
+    }
+
+    /// The place of a byte offset.
+    pub(crate) fn place(&self, offset: usize) -> Place {
+        let row = self.starts.partition_point(|&start| start <= offset) - 1;
+        let before = self.text.get(self.starts[row]..offset).unwrap_or("");
+        Place { file: self.file.clone(), line: row as u32 + 1, column: before.chars().count() as u32 + 1 }
+    }
+
+    /// The place of the start tag of an element.
+    pub(crate) fn of(&self, node: Node<'_, '_>) -> Place {
+        self.place(node.range().start)
+    }
+
+    /// Behind the last character that is not white space: where a truncated file ends.
+    fn end(&self) -> Place {
+        self.place(self.text.trim_end().len())
+    }
+}
+
+/// Bytes to text, without a byte order mark.
+pub(crate) fn decode(bytes: Vec<u8>, file: &Path) -> Result<String, Issue> {
+    let text = String::from_utf8(bytes).map_err(|error| {
+        let at = error.utf8_error().valid_up_to();
+        let bytes = error.as_bytes();
+        let valid = String::from_utf8_lossy(&bytes[..at]);
+        let place = Lines::new(file, &valid).place(at);
+        Issue { place, problem: Problem::NotUtf8 { byte: bytes[at] } }
+    })?;
+    Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
+}
+
+/// The tree of the text, or the first place where it is not XML.
+pub(crate) fn parse<'t>(text: &'t str, lines: &Lines<'_>) -> Result<Document<'t>, Issue> {
+    Document::parse(text).map_err(|error| describe(text, lines, &error))
+}
+
+fn describe(text: &str, lines: &Lines<'_>, error: &Error) -> Issue {
+    // A file that simply ends: name the element that is still open.
+    let cut_off = matches!(error, Error::UnclosedRootNode | Error::UnexpectedEndOfStream | Error::NoRootNode)
+        || position(lines, error).is_none_or(|place| place.line >= lines.end().line && ends_inside(text));
+    if cut_off {
+        let expected = match innermost_open(text) {
+            _ if text.trim().is_empty() => "<robot name=\"...\">".to_owned(),
+            Open::InsideTag(name, at) => {
+                format!("the rest of <{name} ...>, which starts in line {}", lines.place(at).line)
+            }
+            Open::Element(name, at) => format!("</{name}>, which is opened in line {}", lines.place(at).line),
+            Open::Nothing => "an XML element <robot>".to_owned(),
+        };
+        return issue(lines.end(), "the end of the file", expected);
+    }
+
+    let place = position(lines, error).unwrap_or_else(|| lines.place(0));
+    match error {
+        Error::UnexpectedCloseTag(expected, actual, _) => {
+            issue(place, format!("</{actual}>"), format!("</{expected}>"))
+        }
+        Error::InvalidChar(expected, actual, _) => {
+            issue(place, shown(*actual), shown(*expected))
+        }
+        Error::InvalidChar2(expected, actual, _) => issue(place, shown(*actual), *expected),
+        Error::InvalidString(expected, _) => issue(place, "something else", format!("{expected:?}")),
+        Error::DuplicatedAttribute(name, _) => {
+            issue(place, format!("a second attribute {name:?}"), "each attribute once")
+        }
+        Error::UnknownNamespace(name, _) => {
+            issue(place, format!("the undeclared prefix {name:?}"), format!("xmlns:{name}=\"...\" at the root element"))
+        }
+        Error::UnknownEntityReference(name, _) => issue(place, format!("the unknown entity &{name};"), "plain text"),
+        Error::NonXmlChar(c, _) => issue(place, format!("the character {c:?}"), "text"),
+        Error::InvalidAttributeValue(_) => issue(place, "'<' inside an attribute value", "a closing quote before it"),
+        Error::DtdDetected => issue(place, "a document type declaration", "plain XML without <!DOCTYPE>"),
+        other => issue(place, other.to_string(), "well-formed XML"),
+    }
+}
+
+fn issue(place: Place, found: impl Into<String>, expected: impl Into<String>) -> Issue {
+    Issue { place, problem: Problem::Malformed { found: found.into(), expected: expected.into() } }
+}
+
+fn shown(byte: u8) -> String {
+    format!("{:?}", char::from(byte))
+}
+
+/// The place of an error that has one.
+fn position(lines: &Lines<'_>, error: &Error) -> Option<Place> {
+    let without = matches!(
+        error,
+        Error::NoRootNode
+            | Error::UnclosedRootNode
+            | Error::DtdDetected
+            | Error::NodesLimitReached
+            | Error::AttributesLimitReached
+            | Error::NamespacesLimitReached
+            | Error::UnexpectedEndOfStream
+    );
+    let pos = error.pos();
+    (!without).then(|| Place { file: lines.file.clone(), line: pos.row, column: pos.col })
+}
+
+/// True if the text stops within a tag, as a file cut anywhere usually does.
+fn ends_inside(text: &str) -> bool {
+    matches!(innermost_open(text), Open::InsideTag(..))
+}
+
+enum Open<'t> {
+    Nothing,
+    /// An element without its end tag, and the offset of its start tag.
+    Element(&'t str, usize),
+    /// A tag without its '>'.
+    InsideTag(&'t str, usize),
+}
+
+/// What is still open where the text ends; a forgiving scan of tags, comments and CDATA.
+fn innermost_open(text: &str) -> Open<'_> {
+    let mut stack: Vec<(&str, usize)> = Vec::new();
+    let mut at = 0;
+    while let Some(start) = text[at..].find('<').map(|i| at + i) {
+        let rest = &text[start..];
+        let (skip, close) = if rest.starts_with("<!--") {
+            (4, "-->")
+        } else if rest.starts_with("<![CDATA[") {
+            (9, "]]>")
+        } else if rest.starts_with("<?") {
+            (2, "?>")
+        } else {
+            (1, ">")
+        };
+        let name_end = rest[1..]
+            .find(|c: char| c.is_whitespace() || c == '>' || c == '<' || (c == '/' && !rest.starts_with("</")))
+            .map_or(rest.len(), |i| i + 1);
+        let name = rest[1..name_end].trim_start_matches('/');
+        let Some(end) = tag_end(rest, skip, close) else { return Open::InsideTag(name, start) };
+        if close == ">" && !rest.starts_with("<!") {
+            if rest.starts_with("</") {
+                stack.pop();
+            } else if !rest[..end].ends_with("/>") {
+                stack.push((name, start));
+            }
+        }
+        at = start + end;
+    }
+    stack.pop().map_or(Open::Nothing, |(name, at)| Open::Element(name, at))
+}
+
+/// Length of the tag at the start of `rest`, quotes respected.
+fn tag_end(rest: &str, skip: usize, close: &str) -> Option<usize> {
+    if close != ">" {
+        return rest[skip..].find(close).map(|i| skip + i + close.len());
+    }
+    let mut quote = None;
+    for (i, c) in rest.char_indices() {
+        match (quote, c) {
+            (None, '"' | '\'') => quote = Some(c),
+            (None, '>') => return Some(i + 1),
+            (Some(q), c) if q == c => quote = None,
+            _ => {}
+        }
+    }
+    None
+}
