@@ -179,10 +179,13 @@ def beam_link(beam, p_AB, body):
 class Arm:
     """A robot file as a Pinocchio model; `elastic=False` gives the rigid twin."""
 
-    def __init__(self, path, elastic=True, payload=True):
+    def __init__(self, path, elastic=True, payload=True, change=None):
+        """change: function that edits the parsed file before it is used."""
         path = Path(path)
         path = path / "robot.toml" if path.is_dir() else path
         self.file = tomllib.loads(path.read_text())
+        if change:
+            change(self.file)
         self.links, self.joints = read_urdf(path.parent / self.file["urdf"])
         flexible = {f["link"]: f for f in self.file.get("flexible_link", [])} if elastic else {}
         tcp = self.file["tcp"]
@@ -216,6 +219,7 @@ class Arm:
             if link == tcp["link"]:
                 here = X * pin.SE3(rpy_matrix(tcp.get("rpy", [0, 0, 0])), np.array(tcp.get("xyz", [0, 0, 0]), float))
                 self.model.addFrame(pin.Frame("tcp", parent, 0, here, pin.FrameType.OP_FRAME))
+                self.model.addFrame(pin.Frame("tcp_link", parent, 0, X, pin.FrameType.OP_FRAME))
             for j in self.joints:
                 if j["parent"] == link:
                     at = X * j["X"]
@@ -256,8 +260,10 @@ class Arm:
         pin.framesForwardKinematics(self.model, self.data, self.full(q_a, e))
         return self.data.oMf[self.tcp].copy()
 
-    def jacobian(self, q_a, e=0.0):
-        return pin.computeFrameJacobian(self.model, self.data, self.full(q_a, e), self.tcp, pin.LOCAL_WORLD_ALIGNED)
+    def jacobian(self, q_a, e=0.0, frame="tcp"):
+        """6 x n, linear first, at the frame's origin, world axes; frame: tcp or tcp_link."""
+        at = self.model.getFrameId(frame)
+        return pin.computeFrameJacobian(self.model, self.data, self.full(q_a, e), at, pin.LOCAL_WORLD_ALIGNED)
 
     def mass_matrix(self, q_a, e=0.0):
         M = np.triu(pin.crba(self.model, self.data, self.full(q_a, e)))
@@ -287,9 +293,9 @@ class Arm:
         Kt = K + 0.5 * (dg + dg.T)
         return np.sqrt(sl.eigh(Kt, self.mass_matrix(q_a, e)[sub], eigvals_only=True)) / (2 * np.pi)
 
-    def compliance(self, q_a, joint_stiffness=None, links=True):
+    def compliance(self, q_a, joint_stiffness=None, links=True, frame="tcp"):
         """6x6 at the TCP, world axes, m/N ... rad/(N m); without the small softening by gravity."""
-        J, C = self.jacobian(q_a), np.zeros((6, 6))
+        J, C = self.jacobian(q_a, frame=frame), np.zeros((6, 6))
         if links:
             C += J[:, self.elastic] @ np.linalg.solve(self.K, J[:, self.elastic].T)
         if joint_stiffness is not None:

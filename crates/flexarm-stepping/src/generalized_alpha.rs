@@ -180,10 +180,10 @@ impl GeneralizedAlpha {
             if iterations == MAX_ITERATIONS {
                 return Err(StepError::NotConverged { t, h, iterations, correction: correction / size });
             }
-            // Else the contraction of the last iteration already tells that the next correction will be small enough.
+            // Else the contraction seen so far tells whether the next correction would be small enough.
             let contraction = correction / last;
             last = correction;
-            if contraction < 0.1 && correction * contraction <= TOLERANCE * size {
+            if iterations > 1 && contraction < 0.1 && correction * contraction <= TOLERANCE * size {
                 break;
             }
         }

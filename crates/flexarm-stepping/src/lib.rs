@@ -1,1 +1,55 @@
-//! Time steppers for flexible arms: generalised-alpha, SPOOK, RK4, and statics
+//! Time steppers for flexible arms: generalised-alpha, SPOOK, explicit RK4; static equilibrium and modes.
+//!
+//! A [`FlexibleArm`] (tree, springs, damping, motion) goes into [`new_stepper`]; the [`Stepper`] that comes out is
+//! advanced and observed. The integrators for reduced coordinates know only [`SecondOrderSystem`]; SPOOK works on the
+//! bodies themselves. Not here: files, metrics, the substitution of links.
+//!
+//! ```
+//! use std::sync::Arc;
+//! use flexarm_kinematics::*;
+//! use flexarm_stepping::*;
+//! use nalgebra::{Matrix3, Matrix6, Translation3, Vector3};
+//!
+//! // A clamped beam of two halves with 10 kg at its end, as one 6x6 spring.
+//! let mut beam = Mechanism::new("beam");
+//! beam.links.push(Link { name: "clamp".into(), inertia: None });
+//! let inertia = LinkInertia { mass: 10.0, com: Vector3::x() * 0.5, inertia_com: Matrix3::identity() * 0.1 };
+//! beam.links.push(Link { name: "tip".into(), inertia: Some(inertia) });
+//! let elastic = JointKind::Elastic(ElasticAngles::RotationVector);
+//! beam.joints.push(Joint::new("spring", elastic, "clamp", "tip", Pose::identity()));
+//!
+//! let spring = ("spring".to_owned(), Matrix6::identity() * 1e5, Damping::Modal(0.03));
+//! let arm = FlexibleArm::new(Arc::new(Model::new(&beam)?), vec![spring], Arc::new(Held(vec![])))?;
+//! let mut seen = Observation::new(&arm);
+//! let mut stepper = new_stepper(StepperKind::GeneralizedAlpha { rho: 0.9 }, arm, 1e-3, Start::Equilibrium)?;
+//! stepper.step()?;
+//! stepper.observe(&mut seen);
+//! assert!((seen.q[2] + 10.0 * 9.81 / 1e5).abs() < 1e-6); // sag = m g / k
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+#![allow(non_snake_case, reason = "monogram notation: X_WB, K_S, C_S, M; see docs/references.md")]
+#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
+
+mod arm;
+mod error;
+mod generalized_alpha;
+mod modes;
+mod motion;
+mod reduced;
+mod rk4;
+mod spook;
+mod statics;
+mod stepper;
+mod system;
+
+pub use arm::{Damping, ElasticElement, FlexibleArm};
+pub use error::StepError;
+pub use generalized_alpha::GeneralizedAlpha;
+pub use modes::{Modes, modes_at};
+pub use motion::{Held, MotionFn, PrescribedMotion};
+pub use reduced::ReducedArm;
+pub use rk4::{Rk4, STABILITY_LIMIT};
+pub use spook::{ConstraintForm, Spook, SpookPreset, SpookSettings};
+pub use statics::static_equilibrium;
+pub use stepper::{Counts, Observation, Start, Stepper, StepperKind, new_stepper};
+pub use system::SecondOrderSystem;

@@ -1,17 +1,9 @@
-//! Where the prescribed joints are at a given time.
-
-use flexarm_trajectory::Trajectory;
+//! Where the prescribed joints are at a given time. Not here: trajectories and their files.
 
 /// Positions, velocities and accelerations of the actuated coordinates as functions of time.
 pub trait PrescribedMotion: Send + Sync {
     /// Writes the values at `t` [s], in coordinate order: rad or m, per s, per s².
     fn sample(&self, t: f64, q: &mut [f64], qdot: &mut [f64], qddot: &mut [f64]);
-}
-
-impl PrescribedMotion for Trajectory {
-    fn sample(&self, t: f64, q: &mut [f64], qdot: &mut [f64], qddot: &mut [f64]) {
-        Trajectory::sample(self, t, q, qdot, qddot);
-    }
 }
 
 /// All joints held at fixed positions.

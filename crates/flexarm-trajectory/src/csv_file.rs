@@ -23,8 +23,8 @@ use crate::spline::{JointSamples, Samples};
 use crate::trajectory::Trajectory;
 use crate::warning::Warning;
 
-/// A joint of a file without a unit that reaches this is likely to be in degrees: six turns and more.
-const SUSPICIOUS_ANGLE: f64 = 40.0;
+/// A joint of a file without a unit that reaches this is likely to be in degrees: two turns.
+const SUSPICIOUS_ANGLE: f64 = 4.0 * std::f64::consts::PI;
 
 impl Trajectory {
     /// Reads sampled joint values; the page of the module [`crate::csv_file`] describes the format.

@@ -39,7 +39,9 @@ pub enum TrajectoryError {
     /// The joints of the trajectory are not those of the robot.
     #[error(
         "the trajectory's joints do not match: {}it has {}, wanted are {}; rename the joints in the trajectory",
-        mismatch(missing, unknown), list(have), list(want)
+        mismatch(missing, unknown),
+        list(have),
+        list(want)
     )]
     JointOrder {
         /// Wanted, but not in the trajectory.
@@ -52,7 +54,9 @@ pub enum TrajectoryError {
         want: Vec<String>,
     },
     /// Values or times are too extreme for polynomials in f64.
-    #[error("joint {joint:?}, t = {time_s:e} s: values or times are too extreme to be represented; check the units of the file")]
+    #[error(
+        "joint {joint:?}, t = {time_s:e} s: values or times are too extreme to be represented; check the units of the file"
+    )]
     OutOfRange {
         /// Joint name.
         joint: String,
@@ -66,7 +70,9 @@ pub enum TrajectoryError {
         factor: f64,
     },
     /// A sampling rate that is not positive and finite, or that would give more than 100 million rows.
-    #[error("sampling rate {rate_hz} Hz is not possible for {duration_s} s of motion; give a positive rate that makes at most 100 million rows")]
+    #[error(
+        "sampling rate {rate_hz} Hz is not possible for {duration_s} s of motion; give a positive rate that makes at most 100 million rows"
+    )]
     BadRate {
         /// What was given, Hz.
         rate_hz: f64,
@@ -125,7 +131,9 @@ pub enum Problem {
         found: Vec<String>,
     },
     /// Columns are not separated by commas.
-    #[error("the columns are separated by {separator:?}, expected commas (and points in decimal numbers); export the file again or replace them")]
+    #[error(
+        "the columns are separated by {separator:?}, expected commas (and points in decimal numbers); export the file again or replace them"
+    )]
     WrongSeparator {
         /// What separates them.
         separator: char,
@@ -140,7 +148,10 @@ pub enum Problem {
         name: String,
     },
     /// A `.vel` or `.acc` column without its position.
-    #[error("column {column:?} has no position column {joint:?} beside it; the header has {}; add it or correct the name", list(found))]
+    #[error(
+        "column {column:?} has no position column {joint:?} beside it; the header has {}; add it or correct the name",
+        list(found)
+    )]
     NoPositionColumn {
         /// The column.
         column: String,
@@ -261,7 +272,9 @@ pub enum SampleError {
         joint: String,
     },
     /// Times that do not increase.
-    #[error("time {this} s does not follow {previous} s; times must increase from row to row: sort the rows and remove repeated ones")]
+    #[error(
+        "time {this} s does not follow {previous} s; times must increase from row to row: sort the rows and remove repeated ones"
+    )]
     TimeNotIncreasing {
         /// Index of the offending row, from 0.
         row: usize,
@@ -291,7 +304,9 @@ pub enum SampleError {
         expected: usize,
     },
     /// Accelerations without velocities.
-    #[error("joint {joint:?} has accelerations but no velocities; add the column \"{joint}.vel\" or drop \"{joint}.acc\"")]
+    #[error(
+        "joint {joint:?} has accelerations but no velocities; add the column \"{joint}.vel\" or drop \"{joint}.acc\""
+    )]
     AccelerationWithoutVelocity {
         /// Joint name.
         joint: String,
@@ -346,13 +361,17 @@ pub enum PlanError {
         quantity: &'static str,
     },
     /// Points on the way with another profile than the quintic.
-    #[error("move {number} passes points on the way, which only the quintic can; set `profile = \"quintic\"` in this move or drop `via`")]
+    #[error(
+        "move {number} passes points on the way, which only the quintic can; set `profile = \"quintic\"` in this move or drop `via`"
+    )]
     ViaNeedsQuintic {
         /// Number of the move.
         number: usize,
     },
     /// A point on the way that cannot be told from the one before it.
-    #[error("move {number}: point {via} on the way (the goal counts as the last) lies where the one before it is; remove it, or make two moves with a hold")]
+    #[error(
+        "move {number}: point {via} on the way (the goal counts as the last) lies where the one before it is; remove it, or make two moves with a hold"
+    )]
     RepeatedPoint {
         /// Number of the move.
         number: usize,

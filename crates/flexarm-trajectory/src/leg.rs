@@ -127,8 +127,7 @@ impl Leg<'_> {
         // A unit of way is what the speed limit allows in a unit of time, where all limits are known.
         let speed = |i: usize| planned.limits[i].velocity;
         let weighted = moving.iter().all(|&i| speed(i).is_finite());
-        let weights: Vec<f64> =
-            (0..n).map(|i| if weighted && speed(i).is_finite() { speed(i) } else { 1.0 }).collect();
+        let weights: Vec<f64> = (0..n).map(|i| if weighted && speed(i).is_finite() { speed(i) } else { 1.0 }).collect();
         let u = via::passing_times(&points, &weights).map_err(|via| PlanError::RepeatedPoint { number, via })?;
         let unit_curve = |i: usize| {
             let q: Vec<f64> = points.iter().map(|point| point[i]).collect();

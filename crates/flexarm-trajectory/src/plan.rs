@@ -43,8 +43,7 @@ pub struct MotionLimits {
 
 impl MotionLimits {
     /// No limit at all.
-    pub const UNLIMITED: Self =
-        Self { velocity: f64::INFINITY, acceleration: f64::INFINITY, jerk: f64::INFINITY };
+    pub const UNLIMITED: Self = Self { velocity: f64::INFINITY, acceleration: f64::INFINITY, jerk: f64::INFINITY };
 }
 
 /// One move and the hold after it.
@@ -125,7 +124,8 @@ impl Plan {
             None => Ok(()),
             Some(&value) => Err(PlanError::BadNumber { what, number, value, allowed: "a finite number" }),
         };
-        let within = |what: &'static str, number: usize, value: f64, is_good: bool, allowed: &'static str| match is_good {
+        let within = |what: &'static str, number: usize, value: f64, is_good: bool, allowed: &'static str| match is_good
+        {
             true => Ok(()),
             false => Err(PlanError::BadNumber { what, number, value, allowed }),
         };

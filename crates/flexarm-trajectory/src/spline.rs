@@ -98,7 +98,8 @@ impl JointSamples {
         if self.acceleration.is_some() && self.velocity.is_none() {
             return Err(SampleError::AccelerationWithoutVelocity { joint: self.name.clone() });
         }
-        let columns = [("", Some(&self.position)), (".vel", self.velocity.as_ref()), (".acc", self.acceleration.as_ref())];
+        let columns =
+            [("", Some(&self.position)), (".vel", self.velocity.as_ref()), (".acc", self.acceleration.as_ref())];
         for (suffix, column) in columns {
             let Some(column) = column else { continue };
             let what = format!("{}{suffix}", self.name);
@@ -152,9 +153,7 @@ fn accelerations_from_velocities(t: &[f64], q: &[f64], v: &[f64]) -> Vec<f64> {
 fn rates_from_positions(t: &[f64], q: &[f64]) -> Vec<[f64; 2]> {
     let last = q.len() - 1;
     let repeats = |i: usize| q[i] == q[i + 1];
-    let is_hold = |i: usize| {
-        repeats(i) && (i == 0 || i + 1 == last || repeats(i - 1) || repeats(i + 1))
-    };
+    let is_hold = |i: usize| repeats(i) && (i == 0 || i + 1 == last || repeats(i - 1) || repeats(i + 1));
 
     let mut rates = vec![[0.0; 2]; q.len()];
     let mut first = 0;

@@ -57,9 +57,8 @@ impl Trajectory {
             assert_eq!(curve.knots.len(), curve.pieces.len() + 1, "a piece between every two knots");
             // Far from zero, short pieces drown in the rounding of the knots.
             let spans = curve.knots.windows(2).zip(&curve.pieces);
-            let mut sound = spans.map(|(knot, piece)| {
-                piece.is_sound() && (knot[1] - knot[0] - piece.width).abs() <= 1e-6 * piece.width
-            });
+            let mut sound = spans
+                .map(|(knot, piece)| piece.is_sound() && (knot[1] - knot[0] - piece.width).abs() <= 1e-6 * piece.width);
             if let Some(i) = sound.position(|is_sound| !is_sound) {
                 return Err(TrajectoryError::OutOfRange { joint: joint.clone(), time_s: curve.knots[i] });
             }

@@ -83,10 +83,7 @@ pub(crate) fn rest_to_rest_spline(u: &[f64], q: &[f64]) -> Vec<Piece> {
             [-192.0 / h.powi(3) - 192.0 / k.powi(3), 36.0 / (h * h) - 36.0 / (k * k)],
         ];
         let upper = [[24.0 / (k * k), -3.0 / k], [-168.0 / k.powi(3), 24.0 / (k * k)]];
-        let rhs = [
-            60.0 * (right / k.powi(3) - left / h.powi(3)),
-            -360.0 * (right / k.powi(4) + left / h.powi(4)),
-        ];
+        let rhs = [60.0 * (right / k.powi(3) - left / h.powi(3)), -360.0 * (right / k.powi(4) + left / h.powi(4))];
 
         let (previous_e, previous_g) = eliminated[i - 1];
         let lower_e = multiply(&lower, &previous_e);

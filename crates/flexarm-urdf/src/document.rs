@@ -128,13 +128,32 @@ pub(crate) struct RawTransmission {
 const JOINT_TYPES: [&str; 7] = ["fixed", "revolute", "continuous", "prismatic", "floating", "planar", "spherical"];
 /// Children of `<robot>`, `<link>` and `<joint>` that are URDF or a well-known extension.
 const ROBOT_CHILDREN: [&str; 12] = [
-    "link", "joint", "material", "transmission", "gazebo", "ros2_control", "sensor", "gripper", "mujoco", "plugin",
-    "loop_joint", "verbose",
+    "link",
+    "joint",
+    "material",
+    "transmission",
+    "gazebo",
+    "ros2_control",
+    "sensor",
+    "gripper",
+    "mujoco",
+    "plugin",
+    "loop_joint",
+    "verbose",
 ];
 const LINK_CHILDREN: [&str; 8] =
     ["inertial", "visual", "collision", "contact", "self_collision_checking", "sensor", "gazebo", "material"];
 const JOINT_CHILDREN: [&str; 11] = [
-    "origin", "parent", "child", "axis", "limit", "mimic", "dynamics", "calibration", "safety_controller", "physics",
+    "origin",
+    "parent",
+    "child",
+    "axis",
+    "limit",
+    "mimic",
+    "dynamics",
+    "calibration",
+    "safety_controller",
+    "physics",
     "hardwareInterface",
 ];
 

@@ -326,18 +326,19 @@ impl Problem {
                 _ => "replace it by three revolute joints in series with links of small mass between".into(),
             },
             Self::MissingLimit { kind: "revolute", .. } => {
-                "add <limit lower=\"..\" upper=\"..\" effort=\"..\" velocity=\"..\"/> or make the joint continuous".into()
+                "add <limit lower=\"..\" upper=\"..\" effort=\"..\" velocity=\"..\"/> or make the joint continuous"
+                    .into()
             }
-            Self::MissingLimit { .. } => {
-                "add <limit lower=\"..\" upper=\"..\" effort=\"..\" velocity=\"..\"/>".into()
-            }
+            Self::MissingLimit { .. } => "add <limit lower=\"..\" upper=\"..\" effort=\"..\" velocity=\"..\"/>".into(),
             Self::LimitsReversed { .. } => "exchange lower and upper; angles are in radians".into(),
             Self::NegativeLimit { .. } => "limits of speed and effort are magnitudes; 0 stands for unknown".into(),
             Self::ZeroAxis { .. } => "write the axis as a unit vector, such as xyz=\"0 0 1\"".into(),
             Self::MimicFixed { .. } => "remove <mimic> or let the joint move".into(),
             Self::MimicCycle { .. } => "let one of them go without <mimic>".into(),
             Self::NegativeMass { .. } => "correct the sign; a counterweight has positive mass too".into(),
-            Self::ZeroMass { .. } => "give the link its mass and inertia; motion of a massless body is undefined".into(),
+            Self::ZeroMass { .. } => {
+                "give the link its mass and inertia; motion of a massless body is undefined".into()
+            }
             Self::MissingInertial { no_estimate, .. } => match no_estimate {
                 None => "add <inertial> with mass and inertia, or have it estimated from the meshes \
                          (--inertia-from-mesh density|total-mass)"

@@ -1,1 +1,75 @@
-//! URDF and its meshes to a flexarm mechanism
+//! URDF and its meshes to a flexarm mechanism.
+//!
+//! Start at [`read_urdf`], which gives a [`Mechanism`](flexarm_kinematics::Mechanism) with the shapes of its links,
+//! or at [`check_urdf`], which lists everything that is wrong or doubtful. Every error names file, line, what was found
+//! and how to mend it, and all of them come at once. Nothing is printed and, but for
+//! [`search_paths_from_environment`], no environment is read (a xacro program is found by the system).
+//!
+//! ```
+//! use flexarm_urdf::{ReadOptions, check_urdf_text, default_tcp, parse_urdf};
+//!
+//! let text = r#"<robot name="pendulum">
+//!   <link name="base"/>
+//!   <link name="rod">
+//!     <inertial>
+//!       <origin xyz="0 0 -0.5"/>
+//!       <mass value="2.0"/>
+//!       <inertia ixx="0.17" iyy="0.17" izz="0.01" ixy="0" ixz="0" iyz="0"/>
+//!     </inertial>
+//!   </link>
+//!   <link name="tool0"/>
+//!   <joint name="hinge" type="continuous">
+//!     <parent link="base"/> <child link="rod"/> <axis xyz="0 1 0"/>
+//!   </joint>
+//!   <joint name="tip" type="fixed">
+//!     <parent link="rod"/> <child link="tool0"/> <origin xyz="0 0 -1"/>
+//!   </joint>
+//! </robot>"#;
+//!
+//! let robot = parse_urdf(text, "pendulum.urdf", &ReadOptions::default())?;
+//! assert_eq!(default_tcp(&robot.mechanism), Some("tool0"));
+//! assert_eq!(robot.mechanism.link("rod").and_then(|l| l.inertia).map(|i| i.mass), Some(2.0));
+//!
+//! let wrong = text.replace("link=\"rod\"", "link=\"rd\"");
+//! let findings = check_urdf_text(&wrong, "pendulum.urdf", &ReadOptions::default());
+//! assert_eq!(findings[0].location, "pendulum.urdf:11");
+//! assert_eq!(findings[0].help, "did you mean \"rod\"?");
+//! # Ok::<(), flexarm_urdf::UrdfError>(())
+//! ```
+//!
+//! What URDF leaves open is decided so: inertias are turned by the `rpy` of their origin; frames without mass stay
+//! links; an effort or velocity limit of 0 means unknown; a joint's `<dynamics>` is listed and does not act. Meshes
+//! ([`load_mesh`]) come out in metres with the up axis and node transforms of their format applied.
+//!
+//! Notation: `X_PJ` pose of J in P; L link, V visual, I axes of `<inertial>`. SI units.
+//! Not here: SDF and MJCF, collision shapes, textures, the dynamics model (`flexarm-kinematics`).
+#![allow(non_snake_case, reason = "monogram notation: X_PJ, R_LI, T_VG")]
+#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test stops at what it did not expect"))]
+
+mod document;
+mod error;
+mod finding;
+mod geometry;
+mod inertia;
+mod joints;
+pub mod mesh;
+mod read;
+mod report;
+mod resolve;
+mod shapes;
+mod spelling;
+mod tcp;
+mod tree;
+mod xacro;
+mod xml;
+
+pub use error::{Issue, Problem, UrdfError, XacroError};
+pub use finding::{Finding, Place, Severity};
+pub use geometry::{Geometry, Visual};
+pub use mesh::{MassProperties, MeshError, TriangleMesh, load_mesh};
+pub use read::{
+    InertiaEstimate, JointDynamics, ReadOptions, Transmission, UrdfRobot, check_urdf, check_urdf_text, parse_urdf,
+    read_urdf,
+};
+pub use resolve::search_paths_from_environment;
+pub use tcp::{default_tcp, tcp_candidates};

@@ -78,9 +78,7 @@ fn describe(text: &str, lines: &Lines<'_>, error: &Error) -> Issue {
         Error::UnexpectedCloseTag(expected, actual, _) => {
             issue(place, format!("</{actual}>"), format!("</{expected}>"))
         }
-        Error::InvalidChar(expected, actual, _) => {
-            issue(place, shown(*actual), shown(*expected))
-        }
+        Error::InvalidChar(expected, actual, _) => issue(place, shown(*actual), shown(*expected)),
         Error::InvalidChar2(expected, actual, _) => issue(place, shown(*actual), *expected),
         Error::InvalidString(expected, _) => issue(place, "something else", format!("{expected:?}")),
         Error::DuplicatedAttribute(name, _) => {

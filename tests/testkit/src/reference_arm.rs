@@ -100,7 +100,7 @@ pub fn reference_arm(elastic: bool) -> ReferenceArm {
     let (l2, l4) = (0.5 * 1.095, 0.5);
     let half_lower = |z: f64| {
         let about = l2 * l2 / 12.0;
-        let I = Vector3::new(about + lower_i3, about + lower_i2, lower_i2 + lower_i3) * 30.0;
+        let I = Vector3::new(about + lower_i2, about + lower_i3, lower_i2 + lower_i3) * 30.0;
         body(30.0, [0.0, 0.0, z], Matrix3::from_diagonal(&I))
     };
     let half_upper = |x: f64| {

@@ -274,12 +274,11 @@ impl Open {
     fn message(&mut self, channel_id: u16, stamp: Stamp) -> McapResult<()> {
         let header =
             MessageHeader { channel_id, sequence: self.samples, log_time: stamp.0, publish_time: stamp.0 };
-        let data = self.cdr.bytes();
-        let record = message_record(&header, data);
-        if !self.chunk.is_empty() && self.chunk.len() + record.len() > CHUNK_BYTES {
+        let size = MESSAGE_OVERHEAD + self.cdr.bytes().len();
+        if !self.chunk.is_empty() && self.chunk.len() + size > CHUNK_BYTES {
             self.close_chunk()?;
         }
-        self.chunk.extend(record);
+        push_message_record(&mut self.chunk, &header, self.cdr.bytes());
         self.chunk_times = (self.chunk_times.0.min(stamp.0), self.chunk_times.1.max(stamp.0));
         self.writer.write_to_known_channel(&header, self.cdr.bytes())
     }
@@ -346,19 +345,20 @@ fn chunk_record(messages: &[u8], (start, end): (u64, u64)) -> Vec<u8> {
     record
 }
 
-/// A message as it is inside a chunk.
-fn message_record(header: &MessageHeader, data: &[u8]) -> Vec<u8> {
+/// Bytes of a message record besides its data.
+const MESSAGE_OVERHEAD: usize = 1 + 8 + (2 + 4 + 8 + 8);
+
+/// Adds a message as it is inside a chunk.
+fn push_message_record(chunk: &mut Vec<u8>, header: &MessageHeader, data: &[u8]) {
     const OPCODE: u8 = 0x05;
     const HEADER_BYTES: u64 = 2 + 4 + 8 + 8;
-    let mut record = Vec::with_capacity(data.len() + 31);
-    record.push(OPCODE);
-    record.extend((HEADER_BYTES + data.len() as u64).to_le_bytes());
-    record.extend(header.channel_id.to_le_bytes());
-    record.extend(header.sequence.to_le_bytes());
-    record.extend(header.log_time.to_le_bytes());
-    record.extend(header.publish_time.to_le_bytes());
-    record.extend_from_slice(data);
-    record
+    chunk.push(OPCODE);
+    chunk.extend((HEADER_BYTES + data.len() as u64).to_le_bytes());
+    chunk.extend(header.channel_id.to_le_bytes());
+    chunk.extend(header.sequence.to_le_bytes());
+    chunk.extend(header.log_time.to_le_bytes());
+    chunk.extend(header.publish_time.to_le_bytes());
+    chunk.extend_from_slice(data);
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]

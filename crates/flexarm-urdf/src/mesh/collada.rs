@@ -11,7 +11,7 @@ use std::path::Path;
 use nalgebra::{Matrix3, Matrix4, Rotation3, Unit, Vector3, Vector4};
 use roxmltree::{Document, Node};
 
-use super::{MeshError, TriangleMesh, dominant_color, stl, unit_normal};
+use super::{MAX_TRIANGLES, MeshError, TriangleMesh, dominant_color, stl, unit_normal};
 
 /// Nodes below nodes; deeper is taken for a cycle of `<instance_node>`.
 const MAX_DEPTH: usize = 64;
@@ -165,9 +165,8 @@ impl<'a, 'i> Reader<'a, 'i> {
                         return Err(self.malformed(child, "it refers to a geometry that does not exist"));
                     };
                     let bound = child.descendants().filter(|n| n.has_tag_name_of("instance_material"));
-                    let materials = bound
-                        .filter_map(|m| Some((m.attribute("symbol")?, self.target(m, "target")?)))
-                        .collect();
+                    let materials =
+                        bound.filter_map(|m| Some((m.attribute("symbol")?, self.target(m, "target")?))).collect();
                     self.geometry(geometry, T, &materials)?;
                 }
                 "instance_controller" => self.unsupported = Some("instance_controller".to_owned()),
@@ -219,6 +218,9 @@ impl<'a, 'i> Reader<'a, 'i> {
                     let count = self.primitive(primitive, &transform)?;
                     let color = primitive.attribute("material").and_then(|symbol| materials.get(symbol).copied());
                     self.colors.push((color.and_then(|material| self.color(material)), count));
+                    if self.mesh.triangles.len() > MAX_TRIANGLES {
+                        return Err(self.malformed(primitive, "more than 50 million triangles"));
+                    }
                 }
                 kind @ ("polygons" | "trifans" | "tristrips") => self.unsupported = Some(kind.to_owned()),
                 _ => {}

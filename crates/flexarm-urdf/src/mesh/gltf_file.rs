@@ -10,7 +10,7 @@ use gltf::{Accessor, Document, Gltf, Node, Semantic, buffer};
 use nalgebra::{Matrix4, Vector3, Vector4};
 
 use super::collada::Transform;
-use super::{MeshError, TriangleMesh, dominant_color, stl};
+use super::{MAX_TRIANGLES, MeshError, TriangleMesh, dominant_color, stl};
 
 /// Nodes below nodes; deeper is taken for a cycle.
 const MAX_DEPTH: usize = 64;
@@ -171,10 +171,15 @@ impl Reader<'_> {
             if let Some(normals) = normals.filter(|n| n.len() == positions.len()) {
                 self.normals.extend(normals.iter().map(|n| transform.normal(n)));
             }
-            let triangles = indices.chunks_exact(3).map(|t| transform.winding([t[0] + first, t[1] + first, t[2] + first]));
+            let triangles =
+                indices.chunks_exact(3).map(|t| transform.winding([t[0] + first, t[1] + first, t[2] + first]));
             self.mesh.triangles.extend(triangles);
-            let color = primitive.material().index().map(|_| primitive.material().pbr_metallic_roughness().base_color_factor());
+            let color =
+                primitive.material().index().map(|_| primitive.material().pbr_metallic_roughness().base_color_factor());
             self.colors.push((color, indices.len() / 3));
+            if self.mesh.triangles.len() > MAX_TRIANGLES {
+                return Err(self.unsupported("more than 50 million triangles"));
+            }
         }
         Ok(())
     }
@@ -201,13 +206,18 @@ impl Reader<'_> {
     }
 
     /// The elements of `size` bytes each, with all bounds checked.
-    fn elements<T>(&self, accessor: &Accessor<'_>, size: usize, read: impl Fn(&[u8]) -> T) -> Result<Vec<T>, MeshError> {
+    fn elements<T>(
+        &self,
+        accessor: &Accessor<'_>,
+        size: usize,
+        read: impl Fn(&[u8]) -> T,
+    ) -> Result<Vec<T>, MeshError> {
         if accessor.sparse().is_some() {
             return Err(self.unsupported("sparse accessors of glTF"));
         }
         let view = accessor.view().ok_or_else(|| self.unsupported("accessors of glTF without data"))?;
         let buffer = self.buffers.get(view.buffer().index()).map_or(&[][..], Vec::as_slice);
-        let stride = view.stride().unwrap_or(size);
+        let stride = view.stride().unwrap_or(size).max(size);
         let end = view.offset().checked_add(view.length());
         let view_bytes = end.and_then(|end| buffer.get(view.offset()..end));
         let count = accessor.count();

@@ -28,6 +28,9 @@ use nalgebra::Vector3;
 
 pub use mass::MassProperties;
 
+/// A file that places its meshes so often that it has more than this is taken for a trap.
+const MAX_TRIANGLES: usize = 50_000_000;
+
 /// Triangles with shared vertices; counter-clockwise seen from outside.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TriangleMesh {
@@ -161,8 +164,7 @@ fn format(bytes: &[u8], path: &Path) -> Option<Format> {
 
 /// What every reader must have kept: indices within range, numbers finite, something to draw.
 fn check(mesh: &TriangleMesh, path: &Path) -> Result<(), MeshError> {
-    let malformed =
-        |reason: String| MeshError::Malformed { path: path.to_owned(), format: "mesh", reason };
+    let malformed = |reason: String| MeshError::Malformed { path: path.to_owned(), format: "mesh", reason };
     if mesh.triangles.is_empty() {
         return Err(MeshError::Empty { path: path.to_owned() });
     }
@@ -218,7 +220,11 @@ impl TriangleMesh {
 
 /// Normalised, or +z where there is no direction.
 fn unit_normal(n: Vector3<f64>) -> [f32; 3] {
-    n.try_normalize(1e-300).filter(|n| n.iter().all(|x| x.is_finite())).unwrap_or_else(Vector3::z).map(|x| x as f32).into()
+    n.try_normalize(1e-300)
+        .filter(|n| n.iter().all(|x| x.is_finite()))
+        .unwrap_or_else(Vector3::z)
+        .map(|x| x as f32)
+        .into()
 }
 
 /// The colour with most triangles.

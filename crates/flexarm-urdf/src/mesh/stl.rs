@@ -45,7 +45,8 @@ pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<TriangleMesh, MeshErro
     let mut mesh = TriangleMesh::default();
     let mut normals = Vec::new();
     for record in records {
-        let number = |i: usize| f32::from_le_bytes([record[4 * i], record[4 * i + 1], record[4 * i + 2], record[4 * i + 3]]);
+        let number =
+            |i: usize| f32::from_le_bytes([record[4 * i], record[4 * i + 1], record[4 * i + 2], record[4 * i + 3]]);
         let vector = |i: usize| [number(3 * i), number(3 * i + 1), number(3 * i + 2)];
         let first = mesh.positions.len() as u32;
         mesh.positions.extend([vector(1), vector(2), vector(3)]);

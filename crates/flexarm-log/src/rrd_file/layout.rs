@@ -1,0 +1,146 @@
+//! What the viewer shows when it opens a recording: the robots on the left, plots and text on the right.
+//!
+//! Written as the entities of a blueprint store, not with the `rerun` crate's builder, which draws the names of
+//! its parts by chance and cannot set a plot's legend.
+
+use rerun::external::re_sdk_types::blueprint::archetypes::{
+    ContainerBlueprint, PanelBlueprint, PlotLegend, TimeAxis, TimePanelBlueprint, ViewBlueprint, ViewContents,
+    ViewportBlueprint,
+};
+use rerun::external::re_sdk_types::blueprint::components::{
+    ColumnShare, ContainerKind, Corner2D, LinkAxis, LoopMode, PanelState, PlayState, RowShare, TimelineName,
+};
+use rerun::{AsComponents, EntityPath};
+
+/// Entities of the blueprint with their contents.
+pub(crate) type Entities = Vec<(EntityPath, Box<dyn AsComponents>)>;
+
+/// A rectangle of the window.
+pub(crate) enum Part {
+    /// Parts side by side, with their shares of the width.
+    Row(Vec<(f32, Part)>),
+    /// Parts below each other, with their shares of the height.
+    Column(Vec<(f32, Part)>),
+    /// Parts behind each other.
+    Tabs(Vec<Part>),
+    /// A view of entities: kind, title, origin, query.
+    View(View),
+}
+
+/// Something to look at.
+pub(crate) struct View {
+    pub(crate) class: &'static str,
+    pub(crate) title: String,
+    pub(crate) origin: EntityPath,
+    pub(crate) contents: Vec<String>,
+}
+
+impl Part {
+    /// The 3D view of all entities below `origin`.
+    pub(crate) fn space(title: &str, origin: EntityPath) -> Self {
+        Self::view("3D", title, origin)
+    }
+
+    /// A plot of all scalars below `origin`.
+    pub(crate) fn plot(title: &str, origin: EntityPath) -> Self {
+        Self::view("TimeSeries", title, origin)
+    }
+
+    /// A text.
+    pub(crate) fn text(title: &str, origin: EntityPath) -> Self {
+        Self::view("TextDocument", title, origin)
+    }
+
+    fn view(class: &'static str, title: &str, origin: EntityPath) -> Self {
+        Self::View(View { class, title: title.to_owned(), origin, contents: vec!["$origin/**".to_owned()] })
+    }
+}
+
+/// The entities of a layout with `root` as the window, playing on `timeline`.
+pub(crate) fn entities(root: &Part, timeline: &str) -> Entities {
+    let mut layout = Layout { entities: Vec::new(), parts: 0 };
+    let root_id = layout.add(root).id;
+    let viewport = ViewportBlueprint::new()
+        .with_root_container(root_id)
+        .with_auto_layout(false)
+        .with_auto_views(false);
+    layout.log("viewport", viewport);
+    layout.log("blueprint_panel", PanelBlueprint::new().with_state(PanelState::Collapsed));
+    layout.log("selection_panel", PanelBlueprint::new().with_state(PanelState::Collapsed));
+    let time = TimePanelBlueprint::new()
+        .with_state(PanelState::Collapsed)
+        .with_timeline(TimelineName::from(timeline))
+        .with_play_state(PlayState::Playing)
+        .with_loop_mode(LoopMode::All);
+    layout.log("time_panel", time);
+    layout.entities
+}
+
+struct Layout {
+    entities: Entities,
+    parts: u8,
+}
+
+/// A part that has its place in the blueprint.
+struct Placed {
+    id: rerun::datatypes::Uuid,
+    path: String,
+}
+
+impl Layout {
+    fn log(&mut self, path: &str, what: impl AsComponents + 'static) {
+        self.entities.push((EntityPath::from(path), Box::new(what)));
+    }
+
+    /// Adds a part with everything in it.
+    fn add(&mut self, part: &Part) -> Placed {
+        match part {
+            Part::Row(parts) => {
+                let shares: Vec<_> = parts.iter().map(|(share, _)| ColumnShare::from(*share)).collect();
+                let row = ContainerBlueprint::new(ContainerKind::Horizontal).with_col_shares(shares);
+                self.container(row, parts.iter().map(|(_, part)| part))
+            }
+            Part::Column(parts) => {
+                let shares: Vec<_> = parts.iter().map(|(share, _)| RowShare::from(*share)).collect();
+                let column = ContainerBlueprint::new(ContainerKind::Vertical).with_row_shares(shares);
+                self.container(column, parts.iter().map(|(_, part)| part))
+            }
+            Part::Tabs(parts) => self.container(ContainerBlueprint::new(ContainerKind::Tabs), parts),
+            Part::View(view) => self.view(view),
+        }
+    }
+
+    fn container<'p>(&mut self, container: ContainerBlueprint, parts: impl IntoIterator<Item = &'p Part>) -> Placed {
+        let contents: Vec<_> = parts.into_iter().map(|part| self.add(part).path).collect();
+        let placed = self.place("container");
+        self.log(&placed.path, container.with_contents(contents.iter().map(String::as_str)));
+        placed
+    }
+
+    fn view(&mut self, view: &View) -> Placed {
+        let placed = self.place("view");
+        let contents = ViewContents::new(view.contents.iter().map(String::as_str));
+        self.log(&format!("{}/ViewContents", placed.path), contents);
+        if view.class == "TimeSeries" {
+            // All plots zoom together; the legend stays off the newest end of the curves.
+            self.log(&format!("{}/PlotLegend", placed.path), PlotLegend::new().with_corner(Corner2D::LeftTop));
+            self.log(&format!("{}/TimeAxis", placed.path), TimeAxis::new().with_link(LinkAxis::LinkToGlobal));
+        }
+        let blueprint = ViewBlueprint::new(view.class)
+            .with_display_name(view.title.as_str())
+            .with_space_origin(view.origin.to_string());
+        self.log(&placed.path, blueprint);
+        placed
+    }
+
+    /// The next free place. The viewer wants identifiers in the form of a random UUID; these count.
+    fn place(&mut self, kind: &str) -> Placed {
+        self.parts += 1;
+        let mut bytes = [0x40; 16];
+        bytes[8] = 0x80;
+        bytes[15] = self.parts;
+        let hex: String = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
+        let uuid = [&hex[..8], &hex[8..12], &hex[12..16], &hex[16..20], &hex[20..]].join("-");
+        Placed { id: rerun::datatypes::Uuid { bytes }, path: format!("{kind}/{uuid}") }
+    }
+}

@@ -1,0 +1,158 @@
+//! An .rrd file written message by message.
+//!
+//! The `rerun` crate's own file writer runs in a thread of its own, reports a full disk only to its log, and
+//! draws row identifiers from clock and chance. Here messages are encoded with the same building blocks, but
+//! identifiers count up, errors come back, and the end may be provisional ([`TailFile`]).
+
+use std::collections::HashMap;
+use std::fs::File;
+use std::io::{self, Write};
+
+use rerun::external::re_chunk_store::external::re_chunk::Span;
+use rerun::external::re_log_encoding::{
+    CodecError, CrateVersion, Encodable, EncodingOptions, MessageHeader, MessageKind, RRD_FOURCC, RrdFooter,
+    RrdManifestBuilder, StreamFooter, StreamHeader, ToTransport,
+};
+use rerun::external::re_log_types::{BlueprintActivationCommand, SetStoreInfo, StoreInfo, StoreSource};
+use rerun::external::re_tuid::Tuid;
+use rerun::log::{Chunk, ChunkComponents, ChunkError, ChunkId, LogMsg, RowId, TimeColumn};
+use rerun::{AsComponents, EntityPath, SerializationError, SerializedComponentColumn, StoreId, TimePoint};
+
+use crate::tail_file::TailFile;
+
+/// Why a message could not be written.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum StreamError {
+    #[error(transparent)]
+    Io(#[from] io::Error),
+    #[error(transparent)]
+    Codec(#[from] CodecError),
+    #[error(transparent)]
+    Chunk(#[from] ChunkError),
+    #[error(transparent)]
+    Component(#[from] SerializationError),
+}
+
+type Result<T> = std::result::Result<T, StreamError>;
+
+/// Identifiers for chunks and rows, in the order of writing.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Ids(u64);
+
+impl Ids {
+    /// The next chunk's identifier; those of its rows follow it.
+    fn chunk(&mut self) -> ChunkId {
+        self.0 += 1;
+        ChunkId::from_tuid(Tuid::from_nanos_and_inc(self.0, 0))
+    }
+
+    /// A chunk with one row. A `when` without times makes it static: valid always, the last one written wins.
+    pub(crate) fn single(&mut self, path: &EntityPath, when: &TimePoint, what: &dyn AsComponents) -> Result<Chunk> {
+        let id = self.chunk();
+        let row = RowId::from_tuid(id.as_tuid().next());
+        Ok(Chunk::builder_with_id(id, path.clone()).with_archetype(row, when.clone(), what).build()?)
+    }
+
+    /// A chunk with a row for each time.
+    pub(crate) fn columns(
+        &mut self,
+        path: &EntityPath,
+        times: &[TimeColumn],
+        columns: impl Iterator<Item = SerializedComponentColumn>,
+    ) -> Result<Chunk> {
+        let times = times.iter().map(|column| (*column.timeline().name(), column.clone())).collect();
+        Ok(Chunk::from_auto_row_ids(self.chunk(), path.clone(), times, ChunkComponents::from_iter(columns))?)
+    }
+}
+
+/// An .rrd file being written, with the list of its chunks for the footer.
+pub(crate) struct RrdStream {
+    file: TailFile,
+    ids: Ids,
+    /// Per recording or blueprint, in the order of their appearance.
+    manifests: Vec<(StoreId, RrdManifestBuilder)>,
+}
+
+impl RrdStream {
+    /// Starts the file.
+    pub(crate) fn new(file: File) -> Result<Self> {
+        let options = EncodingOptions::PROTOBUF_COMPRESSED;
+        let version = CrateVersion::LOCAL.to_bytes();
+        let mut bytes = Vec::new();
+        StreamHeader { fourcc: RRD_FOURCC, version, options }.to_rrd_bytes(&mut bytes)?;
+        let mut file = TailFile::new(file);
+        file.write_all(&bytes)?;
+        Ok(Self { file, ids: Ids::default(), manifests: Vec::new() })
+    }
+
+    /// Identifiers for the next chunks. Chunks of a provisional end take a copy, so that they leave no gap.
+    pub(crate) fn ids(&mut self) -> &mut Ids {
+        &mut self.ids
+    }
+
+    /// Starts a recording or a blueprint in the file.
+    pub(crate) fn open_store(&mut self, store: &StoreId) -> Result<()> {
+        let source = StoreSource::Other(concat!("flexarm ", env!("CARGO_PKG_VERSION")).to_owned());
+        let info = StoreInfo::new(store.clone(), source);
+        let row_id = self.ids.chunk().as_tuid();
+        self.manifests.push((store.clone(), RrdManifestBuilder::default()));
+        let bytes = encode(&LogMsg::SetStoreInfo(SetStoreInfo { row_id, info }))?.0;
+        Ok(self.file.write_all(&bytes)?)
+    }
+
+    /// Shows a finished blueprint in the viewer, now and by default.
+    pub(crate) fn activate(&mut self, blueprint: &StoreId) -> Result<()> {
+        let blueprint_id = blueprint.clone();
+        let command = BlueprintActivationCommand { blueprint_id, make_active: true, make_default: true };
+        let bytes = encode(&LogMsg::BlueprintActivationCommand(command))?.0;
+        Ok(self.file.write_all(&bytes)?)
+    }
+
+    /// Adds a chunk for good.
+    pub(crate) fn append(&mut self, store: &StoreId, chunk: &Chunk) -> Result<()> {
+        let start = self.file.position() + MessageHeader::ENCODED_SIZE_BYTES as u64;
+        let (bytes, uncompressed) = encode(&LogMsg::ArrowMsg(store.clone(), chunk.to_arrow_msg()?))?;
+        self.file.write_all(&bytes)?;
+
+        let span = Span::from_start_end(start, self.file.position());
+        let manifest = self.manifests.iter_mut().find(|(known, _)| known == store);
+        let (_, manifest) = manifest.expect("a store is opened before chunks are added to it");
+        Ok(manifest.append(&chunk.to_chunk_batch()?, span, uncompressed)?)
+    }
+
+    /// Writes out everything, with these chunks as the provisional end.
+    pub(crate) fn set_tail(&mut self, store: &StoreId, chunks: &[Chunk]) -> Result<()> {
+        let mut tail = Vec::new();
+        for chunk in chunks {
+            tail.extend(encode(&LogMsg::ArrowMsg(store.clone(), chunk.to_arrow_msg()?))?.0);
+        }
+        Ok(self.file.set_tail(&tail)?)
+    }
+
+    /// Ends the file with the list of its chunks.
+    pub(crate) fn finish(&mut self) -> Result<()> {
+        let mut footer = RrdFooter { manifests: HashMap::new() }.to_transport(())?;
+        for (store, manifest) in std::mem::take(&mut self.manifests) {
+            // One by one: the library's own collection of them is in random order.
+            footer.manifests.push(manifest.build(store)?.to_transport(())?);
+        }
+        let mut payload = Vec::new();
+        footer.to_rrd_bytes(&mut payload)?;
+
+        let mut end = Vec::new();
+        MessageHeader { kind: MessageKind::End, len: payload.len() as u64 }.to_rrd_bytes(&mut end)?;
+        let payload_start = self.file.position() + end.len() as u64;
+        end.extend(&payload);
+        StreamFooter::from_rrd_footer_bytes(payload_start, &payload).to_rrd_bytes(&mut end)?;
+        self.file.write_all(&end)?;
+        Ok(self.file.flush()?)
+    }
+}
+
+/// A message with its header, and its size without compression.
+fn encode(message: &LogMsg) -> Result<(Vec<u8>, u64)> {
+    let transport = message.to_transport(EncodingOptions::PROTOBUF_COMPRESSED.compression)?;
+    let mut bytes = Vec::new();
+    transport.to_rrd_bytes(&mut bytes)?;
+    Ok((bytes, transport.byte_size_uncompressed()))
+}

@@ -1,0 +1,357 @@
+//! SPOOK: compliant constraints in maximal coordinates.
+//!
+//! Every body has six degrees of freedom; every joint is six constraint rows with a compliance: `K_S^-1` for an
+//! elastic joint, next to nothing for a rigid one, whose distal frame must follow the proximal frame moved by
+//! the prescribed coordinate. One step solves
+//!
+//! ```text
+//! [ M  -Gᵀ ] [ v⁺ ]   [ M v + h f                             ]
+//! [ G   Σ  ] [ λ  ] = [ -(4/h) Υ g + Υ (G v + g_t) - g_t⁺      ]        x⁺ = x + h v⁺
+//!
+//! Σ = (4/h²) Υ K_S^-1,   Υ = 1/(1 + 4 τ/h)                        τ: damping time, D_S = τ K_S
+//! ```
+//! λ is an impulse; at rest `λ/h = -K g` whatever h and τ. `g_t` is the explicit time rate of a prescribed joint.
+//! The matrix is block tridiagonal (a tree of 6×6 blocks) and eliminated from the leaves to the base, O(bodies).
+//!
+//! Frames: P, Q proximal and distal face of a joint, P = Q when undeformed. [`constraint`] has the rows,
+//! [`solve`] the elimination. Source: [Lacoursière 2007]; theory page, section 4.
+
+mod constraint;
+mod solve;
+
+use flexarm_kinematics::{Data, JointMotion, Pose, State, Twist, forward_kinematics_velocity};
+use nalgebra::{DVector, Matrix3, Matrix6, Rotation3, UnitQuaternion, Vector3, Vector6};
+
+use crate::arm::FlexibleArm;
+use crate::error::StepError;
+use crate::stepper::{Counts, Observation, Stepper};
+use constraint::Rows;
+use solve::TreeSolver;
+
+/// Compliance of a rigid joint [m/N, rad/(N m)]: 1e4 N move it by 1e-13 m.
+const RIGID_COMPLIANCE: f64 = 1e-17;
+
+/// Axes in which the relative motion of an elastic joint is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum ConstraintForm {
+    /// In the proximal frame, with the exact Jacobian: constant stiffness.
+    #[default]
+    Local,
+    /// In world axes, stiffness turned along; equal to the local form to first order in the deflection.
+    Global,
+}
+
+/// How Σ and Υ follow from the damping time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum SpookPreset {
+    /// `Υ = 1/(1 + 4 τ/h)` with the physical damping time of each elastic joint; rigid joints take τ = 2h.
+    #[default]
+    Exact,
+    /// The thesis' choice: τ = 2h everywhere and `1 + 4 τ/h ≈ 4 τ/h`, so Υ = 1/8 and Σ = K^-1/(2 h²).
+    Source,
+}
+
+/// Choices of the method.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub struct SpookSettings {
+    /// Local or global constraint form.
+    pub form: ConstraintForm,
+    /// Exact or source preset.
+    pub preset: SpookPreset,
+}
+
+/// A body of the tree in maximal coordinates.
+#[derive(Clone, Debug)]
+struct BodyState {
+    /// Position of the centre of mass in the world.
+    x: Vector3<f64>,
+    /// Attitude of the body axes.
+    R: UnitQuaternion<f64>,
+    /// Velocity of the centre of mass and angular velocity, world axes.
+    V: Twist,
+    mass: f64,
+    /// Inertia about the centre of mass, body axes.
+    J: Matrix3<f64>,
+    /// Centre of mass in body axes from Bo.
+    com: Vector3<f64>,
+}
+
+impl BodyState {
+    /// Pose of the body frame B.
+    fn X_WB(&self) -> Pose {
+        let R = self.R.to_rotation_matrix();
+        Pose::from_parts((self.x - R * self.com).into(), R)
+    }
+}
+
+/// What a joint's rows are made of.
+#[derive(Clone, Copy, Debug)]
+struct JointCompliance {
+    C: Matrix6<f64>,
+    sigma_factor: f64,
+    upsilon: f64,
+}
+
+/// The stepper; see the module page.
+pub struct Spook {
+    arm: FlexibleArm,
+    h: f64,
+    steps: u64,
+    settings: SpookSettings,
+    /// Index 0 is the world and never moves.
+    bodies: Vec<BodyState>,
+    compliance: Vec<JointCompliance>,
+    rows: Vec<Rows>,
+    lambda: Vec<Vector6<f64>>,
+    solver: TreeSolver,
+    q: DVector<f64>,
+    qdot: DVector<f64>,
+    qdot_next: DVector<f64>,
+    scratch: DVector<f64>,
+    velocities: Vec<Vector6<f64>>,
+    trial: Vec<BodyState>,
+    loads: Vec<Vector6<f64>>,
+}
+
+impl Spook {
+    /// Starts at `t = 0` at rest with elastic coordinates `e`.
+    ///
+    /// # Errors
+    /// [`StepError::Setup`] for mimic joints, which have no place in maximal coordinates here.
+    pub fn new(arm: FlexibleArm, h: f64, settings: SpookSettings, e: &DVector<f64>) -> Result<Self, StepError> {
+        let model = arm.model.clone();
+        if model.has_mimic() {
+            let text = "spook works in maximal coordinates and does not know mimic joints: use generalized-alpha";
+            return Err(StepError::Setup(text.to_owned()));
+        }
+        let (mut state, mut qddot) = (State::zeros(&model), DVector::zeros(model.nv()));
+        arm.prescribed_state(0.0, &mut state, &mut qddot);
+        let na = model.n_actuated();
+        state.q.rows_mut(na, e.len()).copy_from(e);
+        let mut data = Data::new(&model);
+        forward_kinematics_velocity(&model, &mut data, &state);
+
+        let mut bodies = Vec::new();
+        let mut compliance = Vec::new();
+        for (i, body) in model.bodies().iter().enumerate() {
+            let X = data.X_WB[i];
+            let (com, mass) = (body.inertia.com(), body.inertia.mass);
+            let w = X.rotation * data.V[i].angular;
+            let linear = X.rotation * (data.V[i].linear + data.V[i].angular.cross(&com));
+            bodies.push(BodyState {
+                x: X.translation.vector + X.rotation * com,
+                R: UnitQuaternion::from_rotation_matrix(&X.rotation),
+                V: Twist::new(linear, w),
+                mass,
+                J: if mass > 0.0 { body.inertia.inertia_com() } else { Matrix3::zeros() },
+                com,
+            });
+            compliance.push(joint_compliance(&arm, i, h, settings.preset));
+        }
+        let n = bodies.len();
+        let mut loads = vec![Vector6::zeros(); n];
+        for (body, F) in &arm.loads {
+            loads[*body] += F.to_vector();
+        }
+        Ok(Self {
+            solver: TreeSolver::new(model.bodies().iter().map(|b| b.parent).collect()),
+            arm,
+            h,
+            steps: 0,
+            settings,
+            trial: bodies.clone(),
+            bodies,
+            compliance,
+            rows: vec![Rows::zeros(); n],
+            lambda: vec![Vector6::zeros(); n],
+            q: DVector::zeros(na),
+            qdot: DVector::zeros(na),
+            qdot_next: DVector::zeros(na),
+            scratch: DVector::zeros(na),
+            velocities: vec![Vector6::zeros(); n],
+            loads,
+        })
+    }
+
+    fn time_after(&self, steps: u64) -> f64 {
+        steps as f64 * self.h
+    }
+}
+
+fn joint_compliance(arm: &FlexibleArm, body: usize, h: f64, preset: SpookPreset) -> JointCompliance {
+    let element = arm.elements.iter().position(|e| e.body == body);
+    let (C, tau) = match element {
+        Some(k) => (arm.elements[k].C_S, arm.tau[k]),
+        None => (Matrix6::identity() * RIGID_COMPLIANCE, 2.0 * h),
+    };
+    let upsilon = match preset {
+        SpookPreset::Exact => 1.0 / (1.0 + 4.0 * tau / h),
+        SpookPreset::Source => 1.0 / 8.0,
+    };
+    JointCompliance { C, sigma_factor: 4.0 / (h * h) * upsilon, upsilon }
+}
+
+impl Stepper for Spook {
+    fn time(&self) -> f64 {
+        self.time_after(self.steps)
+    }
+
+    fn step(&mut self) -> Result<(), StepError> {
+        let (h, t, t_next) = (self.h, self.time(), self.time_after(self.steps + 1));
+        // Rates at the end of the step belong to the new velocities, positions at its start to g.
+        self.sample(t_next);
+        self.qdot_next.copy_from(&self.qdot);
+        self.sample(t);
+        let model = &self.arm.model;
+        let form = self.settings.form;
+
+        // Rows of every joint, and what its prescribed coordinate does to them.
+        for (i, body) in model.bodies().iter().enumerate().skip(1) {
+            let (parent, child) = (&self.bodies[body.parent], &self.bodies[i]);
+            let (X_WP, X_WQ) = (parent.X_WB() * body.X_PJ, child.X_WB());
+            let (moved, angles) = match body.motion {
+                JointMotion::Elastic(angles) => (X_WP, angles),
+                JointMotion::Revolute(axis) => {
+                    let turn = Rotation3::from_scaled_axis(axis * self.q[body.coordinate]);
+                    (Pose::from_parts(X_WP.translation, X_WP.rotation * turn), Default::default())
+                }
+                JointMotion::Prismatic(axis) => {
+                    (X_WP * Pose::from_parts((axis * self.q[body.coordinate]).into(), Rotation3::identity()), Default::default())
+                }
+            };
+            // Rigid joints have no deflection to speak of: the local form serves both.
+            let form = if matches!(body.motion, JointMotion::Elastic(_)) { form } else { ConstraintForm::Local };
+            self.rows[i] = Rows::new(form, angles, &moved, &parent.x, &X_WQ, &child.x);
+        }
+
+        // Body blocks: mass, momentum, impulse of gravity, gyroscopic moment and loads.
+        for (i, body) in self.bodies.iter().enumerate().skip(1) {
+            let R = body.R.to_rotation_matrix();
+            let J = R.matrix() * body.J * R.matrix().transpose();
+            let M = &mut self.solver.M[i];
+            M.fill(0.0);
+            M.fixed_view_mut::<3, 3>(0, 0).fill_diagonal(body.mass);
+            M.fixed_view_mut::<3, 3>(3, 3).copy_from(&J);
+            let spin = J * body.V.angular;
+            let load = &self.loads[i];
+            let arm = -(R * body.com);
+            let force = model.gravity * body.mass + load.fixed_rows::<3>(0);
+            let torque =
+                load.fixed_rows::<3>(3) + arm.cross(&load.fixed_rows::<3>(0).into_owned()) - body.V.angular.cross(&spin);
+            let b = &mut self.solver.b[i];
+            b.fixed_rows_mut::<3>(0).copy_from(&(body.V.linear * body.mass + force * h));
+            b.fixed_rows_mut::<3>(3).copy_from(&(spin + torque * h));
+        }
+
+        let Self { rows, compliance, bodies, solver, velocities, lambda, q: _, qdot, qdot_next, .. } = self;
+        let right_hand_side = |i: usize| {
+            let (row, c, body) = (&rows[i], &compliance[i], &model.bodies()[i]);
+            let mut sigma = c.C;
+            if matches!(body.motion, JointMotion::Elastic(_)) && form == ConstraintForm::Global {
+                let X_WP = bodies[body.parent].X_WB().rotation * body.X_PJ.rotation;
+                sigma = turn(X_WP.matrix(), &c.C);
+            }
+            let rate = row.G_parent * bodies[body.parent].V.to_vector() + row.G_child * bodies[i].V.to_vector();
+            let (g_t, g_t_next) = explicit_rates(body.motion, |v| v[body.coordinate], qdot, qdot_next);
+            let s = row.g * (-4.0 / h * c.upsilon) + (rate + g_t) * c.upsilon - g_t_next;
+            (&row.G_parent, &row.G_child, sigma * c.sigma_factor, s)
+        };
+        solver
+            .solve(right_hand_side, velocities, lambda)
+            .map_err(|_| StepError::Singular { matrix: "constraint matrix", t })?;
+
+        // New poses; the old ones stay until all are known to be sound.
+        let mut largest = 0.0f64;
+        for ((trial, body), v) in self.trial.iter_mut().zip(&self.bodies).zip(&self.velocities).skip(1) {
+            trial.V = Twist::from_vector(v);
+            trial.x = body.x + trial.V.linear * h;
+            trial.R = UnitQuaternion::from_scaled_axis(trial.V.angular * h) * body.R;
+            trial.R.renormalize_fast();
+            let speed = v.amax();
+            largest = if speed.is_finite() { largest.max(speed) } else { f64::INFINITY };
+        }
+        if largest > 1e5 {
+            let what = format!("a body reached {largest:.1e} m/s or rad/s");
+            return Err(StepError::Diverged { t: t_next, h, what });
+        }
+        std::mem::swap(&mut self.bodies, &mut self.trial);
+        self.steps += 1;
+        Ok(())
+    }
+
+    fn observe(&mut self, out: &mut Observation) {
+        let (h, t) = (self.h, self.time());
+        self.sample(t);
+        let model = self.arm.model.clone();
+        let n = model.n_actuated();
+        out.t = t;
+        out.q.rows_mut(0, n).copy_from(&self.q);
+        out.qdot.rows_mut(0, n).copy_from(&self.qdot);
+        let (mut kinetic, mut potential) = (0.0, 0.0);
+        for (i, state) in self.bodies.iter().enumerate() {
+            out.X_WB[i] = state.X_WB();
+            let w = state.R.inverse() * state.V.angular;
+            kinetic += 0.5 * (state.mass * state.V.linear.norm_squared() + w.dot(&(state.J * w)));
+            potential -= state.mass * model.gravity.dot(&state.x);
+        }
+        for (i, body) in model.bodies().iter().enumerate().skip(1) {
+            // Before the first step there is no impulse yet; the forces are then those of the springs at rest.
+            let force = self.lambda[i] / h;
+            match body.motion {
+                JointMotion::Revolute(axis) => out.drive[body.coordinate] = axis.dot(&force.fixed_rows::<3>(3)),
+                JointMotion::Prismatic(axis) => out.drive[body.coordinate] = axis.dot(&force.fixed_rows::<3>(0)),
+                JointMotion::Elastic(angles) => {
+                    let (parent, child) = (&self.bodies[body.parent], &self.bodies[i]);
+                    let (X_WP, X_WQ) = (parent.X_WB() * body.X_PJ, child.X_WB());
+                    let rows = Rows::new(ConstraintForm::Local, angles, &X_WP, &parent.x, &X_WQ, &child.x);
+                    let rate = rows.G_parent * parent.V.to_vector() + rows.G_child * child.V.to_vector();
+                    out.q.fixed_rows_mut::<6>(body.coordinate).copy_from(&rows.g);
+                    out.qdot.fixed_rows_mut::<6>(body.coordinate).copy_from(&rate);
+                    let k = (body.coordinate - n) / 6;
+                    let element = &self.arm.elements[k];
+                    out.load[k] = -(element.K_S * (rows.g + rate * self.arm.tau[k]));
+                }
+            }
+        }
+        out.energy = [kinetic, potential, self.arm.elastic_energy(&out.q.as_slice()[n..])];
+    }
+
+    fn counts(&self) -> Counts {
+        Counts { steps: self.steps, evaluations: self.steps, factorisations: self.steps }
+    }
+}
+
+impl Spook {
+    /// Prescribed motion at t into `q`, `qdot`.
+    fn sample(&mut self, t: f64) {
+        let Self { arm, q, qdot, scratch, .. } = self;
+        arm.motion.sample(t, q.as_mut_slice(), qdot.as_mut_slice(), scratch.as_mut_slice());
+    }
+}
+
+/// `blkdiag(R, R) C blkdiag(R, R)ᵀ`.
+fn turn(R: &Matrix3<f64>, C: &Matrix6<f64>) -> Matrix6<f64> {
+    let mut turned = Matrix6::zeros();
+    for (i, j) in [(0, 0), (0, 3), (3, 0), (3, 3)] {
+        let block = R * C.fixed_view::<3, 3>(i, j) * R.transpose();
+        turned.fixed_view_mut::<3, 3>(i, j).copy_from(&block);
+    }
+    turned
+}
+
+/// Explicit time rates of a prescribed joint's rows now and at the end of the step.
+///
+/// The proximal frame moves by the prescribed coordinate: its share of `dg/dt` at the undeformed joint.
+fn explicit_rates(
+    motion: JointMotion,
+    rate_of: impl Fn(&DVector<f64>) -> f64,
+    qdot: &DVector<f64>,
+    qdot_next: &DVector<f64>,
+) -> (Vector6<f64>, Vector6<f64>) {
+    let direction = match motion {
+        JointMotion::Revolute(axis) => Vector6::new(0.0, 0.0, 0.0, -axis.x, -axis.y, -axis.z),
+        JointMotion::Prismatic(axis) => Vector6::new(-axis.x, -axis.y, -axis.z, 0.0, 0.0, 0.0),
+        JointMotion::Elastic(_) => return (Vector6::zeros(), Vector6::zeros()),
+    };
+    (direction * rate_of(qdot), direction * rate_of(qdot_next))
+}

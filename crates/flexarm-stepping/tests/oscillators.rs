@@ -1,0 +1,194 @@
+//! The integrators on systems with closed-form answers; none of them knows a robot.
+#![allow(non_snake_case, reason = "monogram notation")]
+
+use std::sync::Arc;
+
+use flexarm_kinematics::{ElasticAngles, Joint, JointKind, Link, LinkInertia, Mechanism, Model, Pose};
+use flexarm_stepping::*;
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Vector3};
+
+/// Linear oscillators `m a + d v + k x = f sin(p t)`, uncoupled.
+struct Oscillators {
+    m: Vec<f64>,
+    d: Vec<f64>,
+    k: Vec<f64>,
+    load: f64,
+    p: f64,
+    factor: Vec<f64>,
+}
+
+impl SecondOrderSystem for Oscillators {
+    fn dimension(&self) -> usize {
+        self.m.len()
+    }
+    fn residual(&mut self, t: f64, x: &DVector<f64>, v: &DVector<f64>, a: &DVector<f64>, r: &mut DVector<f64>) {
+        for i in 0..self.m.len() {
+            r[i] = self.m[i] * a[i] + self.d[i] * v[i] + self.k[i] * x[i] - self.load * (self.p * t).sin();
+        }
+    }
+    fn acceleration(&mut self, t: f64, x: &DVector<f64>, v: &DVector<f64>, a: &mut DVector<f64>) -> Result<(), StepError> {
+        for i in 0..self.m.len() {
+            a[i] = (self.load * (self.p * t).sin() - self.d[i] * v[i] - self.k[i] * x[i]) / self.m[i];
+        }
+        Ok(())
+    }
+    fn factor_iteration_matrix(&mut self, _t: f64, c_D: f64, c_K: f64) -> Result<(), StepError> {
+        self.factor = (0..self.m.len()).map(|i| self.m[i] + c_D * self.d[i] + c_K * self.k[i]).collect();
+        Ok(())
+    }
+    fn solve_iteration(&mut self, r: &mut DVector<f64>) {
+        r.iter_mut().zip(&self.factor).for_each(|(r, f)| *r /= f);
+    }
+}
+
+/// Free vibration `x = e^(-ζωt)(cos w t + ζω/w sin w t)` of one damped oscillator started at 1.
+fn free_vibration_error(run: impl Fn(&mut Oscillators) -> f64) -> f64 {
+    let (omega, zeta, t) = (20.0f64, 0.03, 1.0);
+    let mut system =
+        Oscillators { m: vec![2.0], d: vec![2.0 * 2.0 * zeta * omega], k: vec![2.0 * omega * omega], load: 0.0, p: 0.0, factor: vec![] };
+    let w = omega * (1.0 - zeta * zeta).sqrt();
+    let truth = (-zeta * omega * t).exp() * ((w * t).cos() + zeta * omega / w * (w * t).sin());
+    (run(&mut system) - truth).abs()
+}
+
+fn alpha(h: f64, rho: f64) -> impl Fn(&mut Oscillators) -> f64 {
+    move |s| {
+        let mut g = GeneralizedAlpha::new(s, 0.0, h, rho, DVector::from_element(1, 1.0), DVector::zeros(1)).expect("starts");
+        (0..(1.0 / h).round() as usize).for_each(|_| g.step(s).expect("steps"));
+        g.x[0]
+    }
+}
+
+/// Measured 1.99 to 2.00 for every spectral radius.
+#[test]
+fn generalized_alpha_is_of_second_order() {
+    for rho in [0.0, 0.5, 0.9, 1.0] {
+        let errors = [1e-3, 5e-4].map(|h| free_vibration_error(alpha(h, rho)));
+        let order = (errors[0] / errors[1]).log2();
+        eprintln!("generalized-alpha rho {rho}: error {:.2e} at 1 ms, order {order:.3}", errors[0]);
+        assert!((order - 2.0).abs() < 0.05, "rho {rho}: {order}");
+    }
+}
+
+/// Measured 4.00.
+#[test]
+fn rk4_is_of_fourth_order() {
+    let run = |h: f64| {
+        free_vibration_error(move |s| {
+            let mut g = Rk4::new(s, 0.0, h, DVector::from_element(1, 1.0), DVector::zeros(1)).expect("starts");
+            (0..(1.0 / h).round() as usize).for_each(|_| g.step(s).expect("steps"));
+            g.x[0]
+        })
+    };
+    let errors = [4e-3, 2e-3].map(run);
+    let order = (errors[0] / errors[1]).log2();
+    eprintln!("rk4: error {:.2e} at 4 ms, order {order:.3}", errors[0]);
+    assert!((order - 4.0).abs() < 0.1, "{order}");
+}
+
+/// Energy of an undamped oscillator: kept to rounding for rho = 1 (measured 3e-13), lost for rho < 1.
+#[test]
+fn spectral_radius_one_keeps_the_energy_and_less_loses_it() {
+    let energy_after = |rho: f64| {
+        let mut s = Oscillators { m: vec![1.0], d: vec![0.0], k: vec![1e4], load: 0.0, p: 0.0, factor: vec![] };
+        let mut g = GeneralizedAlpha::new(&mut s, 0.0, 0.02, rho, DVector::from_element(1, 1.0), DVector::zeros(1)).expect("starts");
+        (0..2000).for_each(|_| g.step(&mut s).expect("steps"));
+        (0.5 * g.v[0] * g.v[0] + 0.5e4 * g.x[0] * g.x[0]) / 0.5e4
+    };
+    assert!((energy_after(1.0) - 1.0).abs() < 1e-9, "{}", energy_after(1.0));
+    assert!(energy_after(0.5) < 1e-10);
+}
+
+/// A mode with h ω = 10⁴ dies at the rate rho per step: what the parameter promises.
+#[test]
+fn stiff_modes_shrink_by_the_spectral_radius_each_step() {
+    let rho = 0.6;
+    let mut s = Oscillators { m: vec![1.0], d: vec![0.0], k: vec![1e14], load: 0.0, p: 0.0, factor: vec![] };
+    let mut g = GeneralizedAlpha::new(&mut s, 0.0, 1e-3, rho, DVector::from_element(1, 1e-3), DVector::zeros(1)).expect("starts");
+    (0..40).for_each(|_| g.step(&mut s).expect("steps"));
+    let before = g.x[0].abs().max(1e-3 * g.v[0].abs());
+    (0..20).for_each(|_| g.step(&mut s).expect("steps"));
+    let after = g.x[0].abs().max(1e-3 * g.v[0].abs());
+    let measured = (after / before).powf(1.0 / 20.0);
+    assert!((measured - rho).abs() < 0.03, "{measured}");
+}
+
+/// One body on a 6x6 spring without gravity: the linear oscillator of the SPOOK step.
+fn body_on_spring(k: f64, beta: f64) -> FlexibleArm {
+    let mut tree = Mechanism::new("oscillator");
+    tree.gravity = Vector3::zeros();
+    tree.links.push(Link { name: "base".into(), inertia: None });
+    let inertia = LinkInertia { mass: 3.0, com: Vector3::zeros(), inertia_com: Matrix3::identity() };
+    tree.links.push(Link { name: "body".into(), inertia: Some(inertia) });
+    let kind = JointKind::Elastic(ElasticAngles::RotationVector);
+    tree.joints.push(Joint::new("spring", kind, "base", "body", Pose::identity()));
+    let model = Arc::new(Model::new(&tree).expect("valid"));
+    let spring = ("spring".to_owned(), Matrix6::identity() * k, Damping::StiffnessProportional(beta));
+    FlexibleArm::new(model, vec![spring], Arc::new(Held(vec![]))).expect("valid")
+}
+
+/// `(M + h² K/4)(v⁺ - v) = -h K g - h τ K v⁺` for every step; measured 1e-15 of the largest term.
+#[test]
+fn spook_on_a_linear_oscillator_is_the_known_recurrence() {
+    let (m, k, tau, h) = (3.0, 4e3, 2e-3, 5e-3);
+    let arm = body_on_spring(k, tau);
+    let mut seen = Observation::new(&arm);
+    let e = DVector::from_vec(vec![0.01, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    let mut spook = Spook::new(arm, h, SpookSettings::default(), &e).expect("starts");
+    let (mut x, mut v) = (0.01, 0.0);
+    for _ in 0..200 {
+        spook.step().expect("steps");
+        v = ((m + h * h * k / 4.0) * v - h * k * x) / (m + h * h * k / 4.0 + h * tau * k);
+        x += h * v;
+        spook.observe(&mut seen);
+        assert!((seen.q[0] - x).abs() < 1e-14, "{} {x}", seen.q[0]);
+    }
+}
+
+/// Without damping its frequency error is of second order: `ω_h = (2/h) asin(hω/2 / sqrt(1 + (hω)²/4))`.
+#[test]
+fn spook_frequency_is_accurate_to_second_order() {
+    let (m, k) = (3.0f64, 4e3f64);
+    let omega = (k / m).sqrt();
+    let frequency = |h: f64| {
+        let arm = body_on_spring(k, 0.0);
+        let mut seen = Observation::new(&arm);
+        let e = DVector::from_vec(vec![0.01, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        let mut spook = Spook::new(arm, h, SpookSettings::default(), &e).expect("starts");
+        // Zero crossings, linearly interpolated.
+        let (mut last, mut first, mut latest, mut count) = (0.01, None, 0.0, 0);
+        for _ in 0..(4.0 / h) as usize {
+            spook.step().expect("steps");
+            spook.observe(&mut seen);
+            let x = seen.q[0];
+            if last * x < 0.0 {
+                latest = seen.t - h * x / (x - last);
+                count += 1;
+                first.get_or_insert(latest);
+            }
+            last = x;
+        }
+        std::f64::consts::PI * (count - 1) as f64 / (latest - first.expect("oscillates"))
+    };
+    let errors = [8e-3, 4e-3].map(|h| (frequency(h) / omega - 1.0).abs());
+    let order = (errors[0] / errors[1]).log2();
+    eprintln!("spook: frequency error {:.2e} at 8 ms, order {order:.2}", errors[0]);
+    assert!((order - 2.0).abs() < 0.1, "{order}");
+}
+
+/// Modal damping gives every mode the ratio asked for: from the eigenvalues of the damped system; measured 1e-12.
+#[test]
+fn modal_damping_gives_every_mode_its_ratio() {
+    let reference = flexarm_testkit::reference_arm(true);
+    let model = Arc::new(Model::new(&reference.mechanism).expect("valid"));
+    let springs = reference.K_S.map(|K| ("spring".to_owned(), K, Damping::Modal(0.03)));
+    let arm = FlexibleArm::new(model, springs.to_vec(), Arc::new(Held(vec![0.0; 6]))).expect("valid");
+    let modal: DMatrix<f64> = arm.modes.shapes.transpose() * &arm.D * &arm.modes.shapes;
+    for i in 0..12 {
+        let omega = arm.modes.omega[i];
+        for j in 0..12 {
+            let truth = if i == j { 2.0 * 0.03 * omega } else { 0.0 };
+            assert!((modal[(i, j)] - truth).abs() < 1e-8 * 2.0 * 0.03 * omega, "{i} {j} {}", modal[(i, j)]);
+        }
+    }
+}

@@ -1,0 +1,84 @@
+//! Waypoint files: moves with a profile and holds between them, in TOML.
+//!
+//! ```toml
+//! format = 1
+//! unit = "deg"                 # "deg" or "rad", for every angle, speed, acceleration and jerk in the file
+//! metres = ["rail"]            # optional: prismatic joints, in m, m/s, ... whatever the unit
+//! joints = ["rail", "joint_1", "joint_2"]
+//! start = [0.0, 0.0, 0.0]
+//!
+//! # These six may be set again within a [[move]].
+//! profile = "quintic"          # quintic (default), trapezoid, s-curve
+//! synchronised = true          # default; false: each joint as fast as its own limits allow
+//! speed = 0.5                  # fraction of the velocity limits used by moves without a duration; default 1
+//! acceleration = [2.0, 300.0, 300.0]  # for trapezoid and s-curve; one number, or one per joint
+//! jerk = [20.0, 3000.0, 3000.0]       # for s-curve; likewise
+//! rounding = 0.1               # trapezoid: part of each ramp with a rising or falling acceleration (default 0.1);
+//!                              # 0 is the plain trapezoid, whose acceleration jumps
+//!
+//! [limits]                     # optional; goes before what the robot's description says
+//! joint_1 = { velocity = 120.0, acceleration = 400.0, jerk = 4000.0 }
+//!
+//! [[move]]
+//! to = [0.2, 60.0, 30.0]       # or some joints only: to = { joint_2 = 30.0 }
+//! via = [[0.1, 30.0, 20.0]]    # optional: points passed without a stop; quintic only
+//! duration = 1.2               # s; may be left out where velocity limits are known
+//! hold = 0.8                   # s of rest afterwards; default 0
+//! ```
+//!
+//! A limit is looked up in the move (`acceleration`, `jerk`), then at the top of the file, then in `[limits]`, then
+//! among the limits that the caller gives (the robot's). [`crate::Plan`] tells how the profiles use them, and how a
+//! given duration is divided. Unknown keys are errors.
+//!
+//! A move with `via` is the curve of least squared jerk through the points: quintic pieces with continuous
+//! velocity, acceleration, jerk and snap, at rest at both ends. The points are passed when a straight quintic
+//! would have covered the same fraction of the way; all joints start and stop together. Points on the straight
+//! line from start to goal therefore change nothing.
+//!
+//! Start at [`Trajectory::parse_toml`]. Not here: the mathematics of the moves ([`crate::Plan`]).
+
+use crate::error::{FileError, PlanError, Problem, TrajectoryError};
+use crate::limits::JointLimits;
+use crate::trajectory::Trajectory;
+use crate::waypoints_check::{Checked, check};
+use crate::waypoints_toml::FileToml;
+
+impl Trajectory {
+    /// Reads waypoints; the page of the module [`crate::waypoints`] describes the format.
+    ///
+    /// * `origin`: file name for messages.
+    /// * `limits`: what is known about the robot's joints, by name; joints may be missing and need not occur in the
+    ///   file. A velocity or acceleration that is not positive counts as unknown.
+    ///
+    /// # Errors
+    /// [`TrajectoryError::File`] with line and column of what is wrong and how to mend it.
+    pub fn parse_toml(text: &str, origin: &str, limits: &[(&str, JointLimits)]) -> Result<Self, TrajectoryError> {
+        let fail = |offset: Option<usize>, problem: Problem| {
+            let (line, column) = offset.map(|offset| place(text, offset)).unzip();
+            TrajectoryError::from(FileError { origin: origin.to_owned(), line, column, problem })
+        };
+        let file: FileToml = toml::from_str(text).map_err(|error| {
+            let message = error.message().split_whitespace().collect::<Vec<_>>().join(" ");
+            let message = format!("{message}; the page of the waypoint format lists the keys and their types");
+            fail(error.span().map(|span| span.start), Problem::Toml { message })
+        })?;
+
+        let Checked { plan, move_offsets } = check(&file, limits).map_err(|error| fail(error.offset, error.problem))?;
+        plan.build().map_err(|error| match error {
+            TrajectoryError::Plan(error) => {
+                let offset = PlanError::move_number(&error).and_then(|number| move_offsets.get(number - 1).copied());
+                fail(offset, Problem::Plan(error))
+            }
+            TrajectoryError::OutOfRange { joint, .. } => fail(None, Problem::OutOfRange { joint }),
+            other => other,
+        })
+    }
+}
+
+/// Line and column (in characters) of a byte offset, both from 1.
+fn place(text: &str, offset: usize) -> (usize, usize) {
+    let before = text.as_bytes().get(..offset).map(String::from_utf8_lossy).unwrap_or_default();
+    let line = before.matches('\n').count() + 1;
+    let column = before.rsplit('\n').next().map_or(0, |start| start.chars().count()) + 1;
+    (line, column)
+}

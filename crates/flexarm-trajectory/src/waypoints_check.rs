@@ -1,0 +1,262 @@
+//! From the waypoint file as written to a [`Plan`]: units, defaults, limits, and every check that needs a place.
+//!
+//! Start at [`check`]. The plan checks what is left (missing limits, repeated points) and names the move.
+
+use std::ops::Range;
+
+use toml::Spanned;
+
+use crate::error::Problem;
+use crate::limits::JointLimits;
+use crate::plan::{MotionLimits, Plan, PlannedMove, Profile};
+use crate::waypoints_toml::{FileToml, MoveToml, ProfileToml, Values};
+
+/// Rounding of trapezoids when the file does not say.
+const DEFAULT_ROUNDING: f64 = 0.1;
+
+/// A problem and the byte at which it stands.
+pub(crate) struct Located {
+    pub(crate) offset: Option<usize>,
+    pub(crate) problem: Problem,
+}
+
+/// The plan, and where each move stands in the text.
+pub(crate) struct Checked {
+    pub(crate) plan: Plan,
+    pub(crate) move_offsets: Vec<usize>,
+}
+
+fn located(span: Range<usize>, problem: Problem) -> Located {
+    Located { offset: Some(span.start), problem }
+}
+
+fn bad_value(span: Range<usize>, key: &str, found: impl ToString, expected: &'static str) -> Located {
+    located(span, Problem::Value { key: key.to_owned(), found: found.to_string(), expected })
+}
+
+/// Converts and checks the file.
+pub(crate) fn check(file: &FileToml, known: &[(&str, JointLimits)]) -> Result<Checked, Located> {
+    let format = *file.format.get_ref();
+    if format != 1 {
+        return Err(located(file.format.span(), Problem::Format { found: format }));
+    }
+    let joints = joint_names(file)?;
+    let context = Context { file, scales: scales(file, &joints)?, joints };
+    let robot_limits = context.limits(known)?;
+
+    let start = context.full(&file.start, "start")?;
+    let mut here = start.clone();
+    let mut moves = Vec::with_capacity(file.moves.len());
+    for entry in &file.moves {
+        let planned = context.planned_move(entry.get_ref(), &here, &robot_limits)?;
+        here.clone_from(&planned.to);
+        moves.push(planned);
+    }
+    let move_offsets = file.moves.iter().map(|entry| entry.span().start).collect();
+    Ok(Checked { plan: Plan { joints: context.joints, start, moves }, move_offsets })
+}
+
+fn joint_names(file: &FileToml) -> Result<Vec<String>, Located> {
+    let entries = file.joints.get_ref();
+    if entries.is_empty() {
+        return Err(bad_value(file.joints.span(), "joints", "empty", "at least one joint name"));
+    }
+    let mut names: Vec<String> = Vec::with_capacity(entries.len());
+    for entry in entries {
+        let name = entry.get_ref();
+        if name.is_empty() || names.contains(name) {
+            let found = format!("{name:?}, empty or there already");
+            return Err(bad_value(entry.span(), "joints", found, "different joint names"));
+        }
+        names.push(name.clone());
+    }
+    Ok(names)
+}
+
+/// Factor from the unit of the file to SI, per joint.
+fn scales(file: &FileToml, joints: &[String]) -> Result<Vec<f64>, Located> {
+    let angle = match file.unit.get_ref().as_str() {
+        "rad" => 1.0,
+        "deg" => std::f64::consts::PI / 180.0,
+        found => {
+            let problem = Problem::UnknownUnit { key: "unit", found: found.to_owned(), accepted: "\"rad\", \"deg\"" };
+            return Err(located(file.unit.span(), problem));
+        }
+    };
+    for entry in &file.metres {
+        if !joints.contains(entry.get_ref()) {
+            return Err(unknown_joint(entry, "metres", joints));
+        }
+    }
+    let is_prismatic = |joint: &String| file.metres.iter().any(|entry| entry.get_ref() == joint);
+    Ok(joints.iter().map(|joint| if is_prismatic(joint) { 1.0 } else { angle }).collect())
+}
+
+fn unknown_joint(entry: &Spanned<String>, key: &'static str, joints: &[String]) -> Located {
+    let problem = Problem::UnknownJoint { key, name: entry.get_ref().clone(), joints: joints.to_vec() };
+    located(entry.span(), problem)
+}
+
+/// What all moves share.
+struct Context<'a> {
+    file: &'a FileToml,
+    joints: Vec<String>,
+    scales: Vec<f64>,
+}
+
+impl Context<'_> {
+    /// A value for every joint, in SI.
+    fn full(&self, values: &Spanned<Values>, key: &'static str) -> Result<Vec<f64>, Located> {
+        match values.get_ref() {
+            Values::List(list) => self.list(list, values.span(), key),
+            _ => Err(bad_value(values.span(), key, "not a list", "a list with one number per joint")),
+        }
+    }
+
+    fn list(&self, list: &[f64], span: Range<usize>, key: &'static str) -> Result<Vec<f64>, Located> {
+        if list.len() != self.joints.len() {
+            let (found, expected) = (list.len(), self.joints.len());
+            return Err(located(span, Problem::ListLength { key: key.to_owned(), found, expected }));
+        }
+        match list.iter().find(|value| !value.is_finite()) {
+            Some(value) => Err(bad_value(span, key, value, "finite numbers")),
+            None => Ok(list.iter().zip(&self.scales).map(|(value, scale)| value * scale).collect()),
+        }
+    }
+
+    /// Goal of a move; joints that a table leaves out stay where they are.
+    fn goal(&self, to: &Spanned<Values>, here: &[f64]) -> Result<Vec<f64>, Located> {
+        let Values::Table(table) = to.get_ref() else {
+            return self.full(to, "to");
+        };
+        let mut goal = here.to_vec();
+        for (name, &value) in table {
+            let Some(i) = self.joints.iter().position(|joint| joint == name.get_ref()) else {
+                return Err(unknown_joint(name, "to", &self.joints));
+            };
+            if !value.is_finite() {
+                return Err(bad_value(name.span(), "to", value, "finite numbers"));
+            }
+            goal[i] = value * self.scales[i];
+        }
+        Ok(goal)
+    }
+
+    /// An acceleration or jerk limit for every joint, in SI.
+    fn rates(&self, values: &Spanned<Values>, key: &'static str) -> Result<Vec<f64>, Located> {
+        const EXPECTED: &str = "positive; one number, or one per joint";
+        let span = values.span();
+        let rates = match values.get_ref() {
+            Values::List(list) => self.list(list, span.clone(), key)?,
+            Values::One(_) if self.scales.iter().any(|scale| *scale != self.scales[0]) => {
+                let expected = "a list with one number per joint, because `metres` gives the joints different units";
+                return Err(bad_value(span, key, "one number", expected));
+            }
+            Values::One(value) => self.scales.iter().map(|scale| value * scale).collect(),
+            Values::Table(_) => return Err(bad_value(span, key, "a table", EXPECTED)),
+        };
+        match rates.iter().all(|rate| *rate > 0.0 && rate.is_finite()) {
+            true => Ok(rates),
+            false => Err(bad_value(span, key, "not positive or not finite", EXPECTED)),
+        }
+    }
+
+    /// What is known of each joint without looking at a move: `[limits]` before the limits of the caller.
+    fn limits(&self, known: &[(&str, JointLimits)]) -> Result<Vec<MotionLimits>, Located> {
+        for name in self.file.limits.keys() {
+            if !self.joints.contains(name.get_ref()) {
+                return Err(unknown_joint(name, "limits", &self.joints));
+            }
+        }
+        let usable = |value: f64| if value > 0.0 { value } else { f64::INFINITY };
+        let mut limits = vec![MotionLimits::UNLIMITED; self.joints.len()];
+        for ((limit, joint), scale) in limits.iter_mut().zip(&self.joints).zip(&self.scales) {
+            if let Some((_, robot)) = known.iter().find(|(name, _)| name == joint) {
+                limit.velocity = usable(robot.velocity);
+                limit.acceleration = usable(robot.acceleration.unwrap_or(f64::INFINITY));
+            }
+            let Some((_, written)) = self.file.limits.iter().find(|(name, _)| name.get_ref() == joint) else {
+                continue;
+            };
+            let overwrite = |limit: &mut f64, value: &Option<Spanned<f64>>, key: &str| {
+                if let Some(value) = positive(value, key)? {
+                    *limit = value * scale;
+                }
+                Ok(())
+            };
+            overwrite(&mut limit.velocity, &written.velocity, "velocity")?;
+            overwrite(&mut limit.acceleration, &written.acceleration, "acceleration")?;
+            overwrite(&mut limit.jerk, &written.jerk, "jerk")?;
+        }
+        Ok(limits)
+    }
+
+    fn planned_move(
+        &self,
+        entry: &MoveToml,
+        here: &[f64],
+        robot_limits: &[MotionLimits],
+    ) -> Result<PlannedMove, Located> {
+        let file = self.file;
+        let to = self.goal(&entry.to, here)?;
+        let via = entry.via.iter().map(|point| self.full(point, "via")).collect::<Result<_, _>>()?;
+        let duration = positive(&entry.duration, "duration")?;
+        let hold = match &entry.hold {
+            Some(hold) if !(*hold.get_ref() >= 0.0 && hold.get_ref().is_finite()) => {
+                return Err(bad_value(hold.span(), "hold", hold.get_ref(), "zero or positive, in s"));
+            }
+            hold => hold.as_ref().map_or(0.0, |hold| *hold.get_ref()),
+        };
+
+        // What the move says goes before what the top of the file says.
+        let rounding = entry.rounding.as_ref().or(file.rounding.as_ref());
+        let rounding = match rounding {
+            Some(value) if !(0.0..=1.0).contains(value.get_ref()) => {
+                return Err(bad_value(value.span(), "rounding", value.get_ref(), "from 0 (jumps) to 1"));
+            }
+            value => value.map_or(DEFAULT_ROUNDING, |value| *value.get_ref()),
+        };
+        let profile = match entry.profile.or(file.profile) {
+            None | Some(ProfileToml::Quintic) => Profile::Quintic,
+            Some(ProfileToml::Trapezoid) => Profile::Trapezoid { rounding },
+            Some(ProfileToml::SCurve) => Profile::SCurve,
+        };
+        let synchronised = entry.synchronised.or(file.synchronised).unwrap_or(true);
+        let limits = self.limits_of_move(entry, robot_limits)?;
+        Ok(PlannedMove { to, via, duration, hold, profile, synchronised, limits })
+    }
+
+    fn limits_of_move(&self, entry: &MoveToml, robot_limits: &[MotionLimits]) -> Result<Vec<MotionLimits>, Located> {
+        let speed = entry.speed.as_ref().or(self.file.speed.as_ref());
+        let fraction = match speed {
+            Some(value) if !(*value.get_ref() > 0.0 && *value.get_ref() <= 1.0) => {
+                let expected = "a fraction of the velocity limits, above 0 and up to 1: 0.5 is half speed";
+                return Err(bad_value(value.span(), "speed", value.get_ref(), expected));
+            }
+            value => value.map_or(1.0, |value| *value.get_ref()),
+        };
+        let mut limits = robot_limits.to_vec();
+        for limit in &mut limits {
+            limit.velocity *= fraction;
+        }
+        if let Some(values) = entry.acceleration.as_ref().or(self.file.acceleration.as_ref()) {
+            let rates = self.rates(values, "acceleration")?;
+            limits.iter_mut().zip(rates).for_each(|(limit, rate)| limit.acceleration = rate);
+        }
+        if let Some(values) = entry.jerk.as_ref().or(self.file.jerk.as_ref()) {
+            let rates = self.rates(values, "jerk")?;
+            limits.iter_mut().zip(rates).for_each(|(limit, rate)| limit.jerk = rate);
+        }
+        Ok(limits)
+    }
+}
+
+/// A number that must be positive and finite if it is given.
+fn positive(value: &Option<Spanned<f64>>, key: &str) -> Result<Option<f64>, Located> {
+    match value {
+        Some(value) if !(*value.get_ref() > 0.0 && value.get_ref().is_finite()) => {
+            Err(bad_value(value.span(), key, value.get_ref(), "a positive number"))
+        }
+        value => Ok(value.as_ref().map(|value| *value.get_ref())),
+    }
+}

@@ -1,0 +1,265 @@
+//! CSV files: every way of interpolating, round trips, and every way in which a file can be wrong.
+#![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+
+use std::f64::consts::PI;
+use std::fmt::Write as _;
+
+use flexarm_trajectory::{FileError, Plan, PlannedMove, Problem, SampleError, Trajectory, TrajectoryError, Warning};
+use proptest::prelude::*;
+
+fn parse(text: &str) -> Trajectory {
+    Trajectory::parse_csv(text, "arm.csv").unwrap()
+}
+
+fn problem(text: &str) -> FileError {
+    match Trajectory::parse_csv(text, "arm.csv") {
+        Err(TrajectoryError::File(error)) => error,
+        other => panic!("expected an error with a place in the file, got {other:?}"),
+    }
+}
+
+/// Position, velocity and acceleration of the only joint.
+fn at(trajectory: &Trajectory, t: f64) -> [f64; 3] {
+    let mut state = [0.0; 3];
+    let [q, qdot, qddot] = &mut state;
+    trajectory.sample(t, std::slice::from_mut(q), std::slice::from_mut(qdot), std::slice::from_mut(qddot));
+    state
+}
+
+/// `sin² t` with its derivatives at intervals `h`, as far as asked for, over one period from rest to rest.
+fn sine_file(intervals: u32, derivatives: usize) -> String {
+    let header = ["time,q", "time,q,q.vel", "time,q,q.vel,q.acc"][derivatives];
+    let mut text = format!("{header}\n");
+    for k in 0..=intervals {
+        let t = PI * f64::from(k) / f64::from(intervals);
+        let values = [t.sin().powi(2), (2.0 * t).sin(), 2.0 * (2.0 * t).cos()];
+        write!(text, "{t}").unwrap();
+        for value in &values[..=derivatives] {
+            write!(text, ",{value}").unwrap();
+        }
+        text.push('\n');
+    }
+    text
+}
+
+/// Largest error of the position inside the record (away from the ends, where sin² is not at rest in acceleration).
+fn sine_error(intervals: u32, derivatives: usize) -> f64 {
+    let trajectory = parse(&sine_file(intervals, derivatives));
+    (0..1000)
+        .map(|k| PI * (0.25 + 0.5 * f64::from(k) / 1000.0))
+        .map(|t| (at(&trajectory, t)[0] - t.sin().powi(2)).abs())
+        .fold(0.0, f64::max)
+}
+
+/// Truth: a quintic with exact end values errs by O(h⁶), the estimates from less by O(h⁴).
+#[test]
+fn halving_the_row_spacing_divides_the_error_by_the_order_of_the_spline() {
+    for (derivatives, order) in [(0, 4), (1, 4), (2, 6)] {
+        let ratio = sine_error(32, derivatives) / sine_error(64, derivatives);
+        let expected = 2.0_f64.powi(order);
+        assert!((ratio / expected - 1.0).abs() < 0.1, "{derivatives}: {ratio}"); // measured 16.1, 16.0, 63.8
+    }
+}
+
+#[test]
+fn file_values_are_met_at_the_rows() {
+    let trajectory = parse(&sine_file(16, 2));
+    for k in 0..=16 {
+        let t = PI * f64::from(k) / 16.0;
+        let [q, qdot, qddot] = at(&trajectory, t);
+        // measured 2e-16, 2e-15, 3e-14
+        assert!((q - t.sin().powi(2)).abs() < 1e-13);
+        assert!((qdot - (2.0 * t).sin()).abs() < 1e-12);
+        assert!((qddot - 2.0 * (2.0 * t).cos()).abs() < 1e-11);
+    }
+}
+
+#[test]
+fn accelerations_are_continuous_whatever_is_given() {
+    for derivatives in [0, 1, 2] {
+        let trajectory = parse(&sine_file(20, derivatives));
+        for k in 1..20 {
+            let t = PI * f64::from(k) / 20.0;
+            let (before, after) = (at(&trajectory, t - 1e-9), at(&trajectory, t + 1e-9));
+            assert!((before[2] - after[2]).abs() < 1e-6); // measured 2e-8
+        }
+    }
+}
+
+/// Positions only, with holds: at rest in the holds, exactly, and smooth into and out of them.
+#[test]
+fn a_hold_in_the_positions_stands_still() {
+    let trajectory = parse("time,q\n0,0\n1,0\n2,1\n3,2\n4,2\n5,2\n6,1\n7,0\n8,0\n");
+    for t in [0.5, 3.0, 3.3, 4.7, 5.0, 7.5] {
+        assert_eq!(at(&trajectory, t)[1..], [0.0, 0.0], "t = {t}");
+    }
+    assert_eq!(trajectory.warnings(), []);
+    let moves: Vec<_> = trajectory.moves().iter().map(|span| (span.start, span.end)).collect();
+    assert_eq!(moves, [(1.0, 3.0), (5.0, 7.0)]);
+    assert!(trajectory.peak()[0].acceleration_jump.value.abs() < 1e-12); // measured 9e-16
+}
+
+#[test]
+fn a_turning_point_that_repeats_a_position_is_not_a_hold() {
+    let trajectory = parse("time,q\n0,0\n1,0\n2,1\n3,1\n4,0\n5,0\n");
+    assert!(at(&trajectory, 2.5)[0] > 1.05);
+}
+
+#[test]
+fn a_record_that_starts_in_motion_says_so() {
+    let trajectory = parse("time,q\n0,0\n1,1\n2,2\n");
+    assert!((trajectory.initial_speed() - 1.0).abs() < 1e-15);
+    let warnings = trajectory.warnings();
+    assert!(matches!(warnings[..], [Warning::StartsMoving { .. }, Warning::EndsMoving { .. }]), "{warnings:?}");
+    assert!(warnings[0].to_string().contains("put a row with the same positions before the first one"));
+}
+
+#[test]
+fn a_finely_sampled_move_from_rest_is_taken_to_start_at_rest() {
+    let mut text = "time,q\n".to_owned();
+    for k in 0..=100 {
+        let u = f64::from(k) / 100.0;
+        writeln!(text, "{u},{}", u.powi(3) * (10.0 - 15.0 * u + 6.0 * u * u)).unwrap();
+    }
+    let trajectory = parse(&text);
+    assert_eq!(trajectory.warnings(), []);
+    let [_, speed, _] = at(&trajectory, 0.5);
+    assert!((speed - 15.0 / 8.0).abs() < 1e-6); // measured 7.5e-9
+}
+
+#[test]
+fn degrees_metres_comments_and_a_late_first_time_are_understood() {
+    let text = "\u{feff}# recorded by hand\n#unit: deg\n# time: s\n# metres: rail\n\ntime, axis ,rail,axis.vel\n\
+                10.5,180,1.5,0\n# in between\n11.5,90,2,0\n";
+    let trajectory = parse(text);
+    assert_eq!(trajectory.joints(), ["axis", "rail"]);
+    assert_eq!(trajectory.duration(), 1.0);
+    let (mut q, mut qdot, mut qddot) = ([0.0; 2], [0.0; 2], [0.0; 2]);
+    trajectory.sample(0.0, &mut q, &mut qdot, &mut qddot);
+    assert_eq!(q, [PI, 1.5]);
+    trajectory.sample(1.0, &mut q, &mut qdot, &mut qddot);
+    assert!((q[0] - PI / 2.0).abs() < 1e-15);
+}
+
+#[test]
+fn large_values_without_a_unit_are_questioned() {
+    let text = "time,q\n0,0\n1,0\n2,90\n3,90\n";
+    assert!(matches!(parse(text).warnings()[..], [Warning::LooksLikeDegrees { .. }]));
+    assert_eq!(parse(&format!("# unit: deg\n{text}")).warnings(), []);
+    assert_eq!(parse(&format!("# unit: rad\n{text}")).warnings(), []);
+}
+
+#[test]
+fn each_fault_of_a_file_is_named_with_its_place() {
+    type Check = fn(&Problem) -> bool;
+    let cases: [(&str, Option<usize>, Option<usize>, Check); 20] = [
+        ("", None, None, |p| matches!(p, Problem::Empty)),
+        ("# only\n\n# comments\n", None, None, |p| matches!(p, Problem::Empty)),
+        ("q,w\n0,1\n", Some(1), None, |p| matches!(p, Problem::NoTimeColumn { .. })),
+        ("time;q\n0;1\n", Some(1), None, |p| matches!(p, Problem::WrongSeparator { separator: ';' })),
+        ("time,q,\n0,1,2\n", Some(1), Some(3), |p| matches!(p, Problem::UnnamedColumn)),
+        ("time,q,q\n0,1,2\n", Some(1), Some(3), |p| matches!(p, Problem::RepeatedColumn { .. })),
+        ("time,q,w.vel\n0,1,2\n", Some(1), Some(3), |p| matches!(p, Problem::NoPositionColumn { .. })),
+        ("time,q,q.acc\n0,1,2\n1,2,3\n", Some(1), Some(3), |p| {
+            matches!(p, Problem::Samples(SampleError::AccelerationWithoutVelocity { .. }))
+        }),
+        ("time\n0\n1\n", Some(1), None, |p| matches!(p, Problem::Samples(SampleError::NoJoint))),
+        ("time,q\n", Some(1), None, |p| matches!(p, Problem::Samples(SampleError::TooFew { found: 0 }))),
+        ("time,q\n0,1\n", Some(1), None, |p| matches!(p, Problem::Samples(SampleError::TooFew { found: 1 }))),
+        ("time,q\n0,1\n\n1\n", Some(4), None, |p| matches!(p, Problem::Ragged { found: 1, expected: 2 })),
+        ("time,q\n0,1\n1,2,3\n", Some(3), None, |p| matches!(p, Problem::Ragged { found: 3, expected: 2 })),
+        ("time,q\n0,1\n1,x\n", Some(3), Some(2), |p| matches!(p, Problem::NotANumber { .. })),
+        ("time,q\n0,1\n1,NaN\n", Some(3), Some(2), |p| matches!(p, Problem::NotANumber { .. })),
+        ("time,q\n0,1\ninf,1\n", Some(3), Some(1), |p| matches!(p, Problem::NotANumber { .. })),
+        (
+            "q,time\n1,0\n2,1\n# a comment\n3,1\n",
+            Some(5),
+            Some(2),
+            |p| matches!(p, Problem::Samples(SampleError::TimeNotIncreasing { previous, this, .. }) if *previous == 1.0 && *this == 1.0),
+        ),
+        ("# unit: grad\ntime,q\n0,1\n1,2\n", Some(1), None, |p| matches!(p, Problem::UnknownUnit { key: "unit", .. })),
+        ("# time: ms\ntime,q\n0,1\n1,2\n", Some(1), None, |p| matches!(p, Problem::UnknownUnit { key: "time", .. })),
+        ("time,q\n0,0\n1e-300,1e300\n", Some(2), None, |p| matches!(p, Problem::OutOfRange { .. })),
+    ];
+    for (text, line, column, is_right) in cases {
+        let error = problem(text);
+        assert!(is_right(&error.problem), "{text:?}: {error:?}");
+        assert_eq!((error.line, error.column), (line, column), "{text:?}: {error}");
+        assert_eq!(error.to_string().lines().count(), 1);
+    }
+    let text = "# unit: deg\n# unit: rad\ntime,q\n0,1\n1,2\n";
+    assert!(matches!(problem(text).problem, Problem::ContradictingUnits { .. }));
+    let text = "# metres: z\ntime,q\n0,1\n1,2\n";
+    assert!(matches!(problem(text).problem, Problem::UnknownJoint { .. }));
+}
+
+#[test]
+fn a_message_tells_place_finding_and_remedy_in_one_line() {
+    let message = problem("time,q\n0.0,1\n0.2,1\n0.1,1\n").to_string();
+    let truth = "arm.csv, line 4, column 1: time 0.1 s does not follow 0.2 s; times must increase from row to row: \
+                 sort the rows and remove repeated ones";
+    assert_eq!(message, truth);
+}
+
+proptest! {
+    /// A plan written at a rate that meets its knots comes back as the same curve.
+    #[test]
+    fn written_and_read_again_a_plan_is_the_same_motion(
+        goals in prop::collection::vec(prop::collection::vec(-3.0..3.0_f64, 2), 1..4),
+    ) {
+        let moves = goals.into_iter().map(|to| PlannedMove { hold: 0.5, ..PlannedMove::quintic(to, 1.5) }).collect();
+        let joints = vec!["a, with a comma".to_owned(), "# b".to_owned()];
+        let plan = Plan { joints, start: vec![0.5, -0.5], moves }.build()?;
+        let mut bytes = Vec::new();
+        plan.to_csv(50.0, &mut bytes)?;
+        let text = String::from_utf8(bytes).unwrap();
+        let read = Trajectory::parse_csv(&text, "written.csv")?;
+
+        prop_assert_eq!(read.joints(), plan.joints());
+        prop_assert_eq!(read.duration(), plan.duration());
+        let (mut q, mut qdot, mut qddot) = ([0.0; 2], [0.0; 2], [0.0; 2]);
+        let (mut q2, mut qdot2, mut qddot2) = ([0.0; 2], [0.0; 2], [0.0; 2]);
+        for k in 0..=400 {
+            let t = plan.duration() * f64::from(k) / 400.0;
+            plan.sample(t, &mut q, &mut qdot, &mut qddot);
+            read.sample(t, &mut q2, &mut qdot2, &mut qddot2);
+            for i in 0..2 {
+                // measured 1e-15, 2e-13, 2e-11: rounding divided by the row spacing and its square
+                prop_assert!((q[i] - q2[i]).abs() < 1e-13);
+                prop_assert!((qdot[i] - qdot2[i]).abs() < 1e-11);
+                prop_assert!((qddot[i] - qddot2[i]).abs() < 1e-9);
+            }
+        }
+    }
+
+    #[test]
+    fn no_text_makes_the_reader_panic(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
+        let _ = Trajectory::parse_csv(&String::from_utf8_lossy(&bytes), "noise");
+    }
+
+    /// Noise close enough to the format to get past the header.
+    #[test]
+    fn no_table_makes_the_reader_panic(text in "(# (unit|time|metres): [a-z,]{0,4}\n)?time,a(,a.vel)?(,a.acc)?(,b)?\n([0-9eE.+\\-]{1,6},[0-9eE.+\\-]{0,8}(,[0-9]{1,2})?\n){0,6}") {
+        if let Ok(trajectory) = Trajectory::parse_csv(&text, "noise") {
+            let _ = (trajectory.peak(), trajectory.moves(), trajectory.kinks(), trajectory.warnings());
+        }
+    }
+
+    /// Every number that f64 can hold, in increasing times: an error or a trajectory that can be sampled.
+    #[test]
+    fn no_number_makes_the_reader_panic(
+        rows in prop::collection::vec((any::<f64>(), any::<f64>(), any::<f64>()), 2..6),
+    ) {
+        let mut rows = rows;
+        rows.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut text = "time,a,a.vel,b\n".to_owned();
+        for (t, a, b) in rows {
+            writeln!(text, "{t:e},{a:e},{b:e},{a:e}").unwrap();
+        }
+        if let Ok(trajectory) = Trajectory::parse_csv(&text, "noise") {
+            let (mut q, mut qdot, mut qddot) = ([0.0; 2], [0.0; 2], [0.0; 2]);
+            trajectory.sample(0.5 * trajectory.duration(), &mut q, &mut qdot, &mut qddot);
+            let _ = (trajectory.peak(), trajectory.moves(), trajectory.kinks(), trajectory.warnings());
+        }
+    }
+}

@@ -1,0 +1,224 @@
+//! Waypoint files: what each key does, and every way in which a file can be wrong.
+#![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+
+use std::f64::consts::PI;
+use std::path::Path;
+
+use approx::assert_relative_eq;
+use flexarm_trajectory::{FileError, JointLimits, PlanError, Problem, Trajectory, TrajectoryError};
+use proptest::prelude::*;
+
+const HEAD: &str = "format = 1\nunit = \"deg\"\njoints = [\"a\", \"b\"]\nstart = [0, 10.0]\n";
+
+fn parse(text: &str) -> Trajectory {
+    Trajectory::parse_toml(text, "arm.toml", &[]).unwrap_or_else(|error| panic!("{error}\n{text}"))
+}
+
+fn fault(text: &str) -> FileError {
+    match Trajectory::parse_toml(text, "arm.toml", &[]) {
+        Err(TrajectoryError::File(error)) => error,
+        other => panic!("expected an error with a place in the file, got {other:?}\n{text}"),
+    }
+}
+
+fn position(trajectory: &Trajectory, t: f64) -> Vec<f64> {
+    let n = trajectory.joints().len();
+    let (mut q, mut qdot, mut qddot) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+    trajectory.sample(t, &mut q, &mut qdot, &mut qddot);
+    q
+}
+
+#[test]
+fn a_table_moves_some_joints_and_leaves_the_others() {
+    let trajectory = parse(&format!(
+        "{HEAD}[[move]]\nto = {{ b = 90 }}\nduration = 1\nhold = 0.5\n[[move]]\nto = [45, 0]\nduration = 2"
+    ));
+    assert_eq!(trajectory.duration(), 3.5);
+    let q = position(&trajectory, 1.2);
+    assert_eq!(q, [0.0, PI / 2.0]);
+    assert_relative_eq!(position(&trajectory, 3.5)[0], PI / 4.0, max_relative = 1e-15);
+}
+
+#[test]
+fn prismatic_joints_are_in_metres_in_a_file_of_degrees() {
+    let text = "format = 1\nunit = \"deg\"\nmetres = [\"rail\"]\njoints = [\"rail\", \"axis\"]\nstart = [0.5, 180]\n\
+                acceleration = [2.0, 90.0]\nprofile = \"trapezoid\"\nrounding = 0\n[limits]\nrail = { velocity = 1.0 }\n\
+                axis = { velocity = 90.0 }\n[[move]]\nto = { rail = 1.5 }";
+    let trajectory = parse(text);
+    assert_eq!(position(&trajectory, 0.0), [0.5, PI]);
+    // 1 m at 1 m/s and 2 m/s²: 1 s of cruise and half a second of ramps.
+    assert_relative_eq!(trajectory.duration(), 1.5, max_relative = 1e-15);
+}
+
+/// The limits of the move go before those of the file, these before those of the caller.
+#[test]
+fn the_nearest_limit_counts() {
+    let robot = JointLimits { velocity: PI, acceleration: Some(PI), ..JointLimits::UNLIMITED };
+    let head = "format = 1\nunit = \"deg\"\njoints = [\"a\"]\nstart = [0]\nprofile = \"trapezoid\"\nrounding = 0\n";
+    let duration = |tail: &str| {
+        let known = [("unused", JointLimits::UNLIMITED), ("a", robot)];
+        Trajectory::parse_toml(&format!("{head}{tail}"), "arm.toml", &known).unwrap().duration()
+    };
+    let all = 1e-14;
+    // 360 deg at 180 deg/s: 2 s of cruise plus v / a of ramps.
+    assert_relative_eq!(duration("[[move]]\nto = [360]"), 3.0, max_relative = all);
+    assert_relative_eq!(duration("speed = 0.5\n[[move]]\nto = [360]"), 4.5, max_relative = all);
+    assert_relative_eq!(duration("speed = 0.5\n[[move]]\nspeed = 1.0\nto = [360]"), 3.0, max_relative = all);
+    assert_relative_eq!(duration("acceleration = 360\n[[move]]\nto = [360]"), 2.5, max_relative = all);
+    assert_relative_eq!(
+        duration("acceleration = 360\n[[move]]\nto = [360]\nacceleration = [720]"),
+        2.25,
+        max_relative = all
+    );
+    assert_relative_eq!(duration("[limits]\na = { velocity = 90 }\n[[move]]\nto = [360]"), 4.5, max_relative = all);
+}
+
+#[test]
+fn points_on_the_way_are_passed_without_a_stop() {
+    let trajectory = parse(&format!("{HEAD}[[move]]\nto = [60, 10]\nvia = [[30, 40]]\nduration = 1.0"));
+    assert_eq!(trajectory.moves().len(), 1);
+    let knots = trajectory.kinks();
+    assert_eq!(knots, [0.0, 1.0]); // jerk is continuous at the point on the way
+    let q = position(&trajectory, 0.5);
+    assert!((q[0] - PI / 6.0).abs() < 1e-14 && (q[1] - 40.0 * PI / 180.0).abs() < 1e-14); // measured 1.1e-16
+}
+
+#[test]
+fn every_profile_can_be_chosen_per_move() {
+    let head = "format = 1\nunit = \"rad\"\njoints = [\"a\"]\nstart = [0]\nprofile = \"s-curve\"\n";
+    let trajectory = parse(&format!(
+        "{head}[[move]]\nto = [1]\nduration = 1\n[[move]]\nto = [2]\nduration = 1\nprofile = \"trapezoid\"\n\
+         [[move]]\nto = [3]\nduration = 1\nprofile = \"quintic\"\n"
+    ));
+    // s-curve: 7 pieces, trapezoid: 7 pieces, quintic: 1; each end of a piece is a kink.
+    assert_eq!(trajectory.kinks().len(), 16);
+    assert_eq!(trajectory.warnings(), []);
+}
+
+#[test]
+fn each_fault_of_a_file_is_named_with_its_place() {
+    type Check = fn(&Problem) -> bool;
+    let good_move = "[[move]]\nto = [1, 2]\nduration = 1\n";
+    let replaced = |from: &str, to: &str| format!("{}{good_move}", HEAD.replace(from, to));
+    let value: Check = |p| matches!(p, Problem::Value { .. });
+    let toml: Check = |p| matches!(p, Problem::Toml { .. });
+    let cases: Vec<(String, (usize, usize), Check)> = vec![
+        (replaced("format = 1", "format = 2"), (1, 10), |p| matches!(p, Problem::Format { found: 2 })),
+        (replaced("format = 1\n", ""), (1, 1), toml),
+        (replaced("\"deg\"", "\"gon\""), (2, 8), |p| matches!(p, Problem::UnknownUnit { .. })),
+        (replaced("[\"a\", \"b\"]", "[]"), (3, 10), value),
+        (replaced("\"b\"", "\"a\""), (3, 16), value),
+        (replaced("10.0", "10.0, 3"), (4, 9), |p| matches!(p, Problem::ListLength { found: 3, expected: 2, .. })),
+        (replaced("10.0", "nan"), (4, 9), value),
+        (replaced("10.0", "\"10\""), (4, 13), toml),
+        (replaced("unit", "metres = [\"c\"]\nunit"), (2, 11), |p| matches!(p, Problem::UnknownJoint { .. })),
+        (replaced("unit", "sped = 0.5\nunit"), (2, 1), toml),
+        (replaced("unit", "speed = 50\nunit"), (2, 9), value),
+        (replaced("unit", "profile = \"cubic\"\nunit"), (2, 11), toml),
+        (replaced("unit", "acceleration = -1\nunit"), (2, 16), value),
+        (replaced("unit", "jerk = [1]\nunit"), (2, 8), |p| matches!(p, Problem::ListLength { .. })),
+        (replaced("unit", "rounding = 1.5\nunit"), (2, 12), value),
+        (format!("{HEAD}[limits]\nc = {{}}\n{good_move}"), (6, 1), |p| matches!(p, Problem::UnknownJoint { .. })),
+        (format!("{HEAD}[limits]\na = {{ velocity = 0 }}\n{good_move}"), (6, 18), value),
+        (format!("{HEAD}[limits]\na = {{ torque = 1 }}\n{good_move}"), (6, 7), toml),
+        (format!("{HEAD}[[move]]\nto = [1]\nduration = 1"), (6, 6), |p| matches!(p, Problem::ListLength { .. })),
+        (format!("{HEAD}[[move]]\nto = {{ c = 1 }}\nduration = 1"), (6, 8), |p| {
+            matches!(p, Problem::UnknownJoint { .. })
+        }),
+        (format!("{HEAD}[[move]]\nto = 1\nduration = 1"), (6, 6), value),
+        (format!("{HEAD}[[move]]\nto = [1, 2]\nduration = 0"), (7, 12), value),
+        (format!("{HEAD}[[move]]\nto = [1, 2]\nhold = -1"), (7, 8), value),
+        (format!("{HEAD}[[move]]\nto = [1, 2]"), (5, 1), |p| {
+            matches!(p, Problem::Plan(PlanError::MissingLimit { .. }))
+        }),
+        (format!("{HEAD}[[move]]\nto = [1, 2]\nvia = [[0, 10]]\nduration = 1"), (5, 1), |p| {
+            matches!(p, Problem::Plan(PlanError::RepeatedPoint { number: 1, via: 1 }))
+        }),
+        (format!("{HEAD}[[move]]\nto = [1, 2]\nvia = [[9, 9]]\nduration = 1\nprofile = \"trapezoid\""), (5, 1), |p| {
+            matches!(p, Problem::Plan(PlanError::ViaNeedsQuintic { number: 1 }))
+        }),
+        (format!("{HEAD}[[move]]\nto = [1, 2\n"), (7, 1), toml),
+    ];
+    for (text, place, is_right) in cases {
+        let error = fault(&text);
+        assert!(is_right(&error.problem), "{text}\n{error:?}");
+        assert_eq!((error.line, error.column), (Some(place.0), Some(place.1)), "{text}\n{error}");
+        assert_eq!(error.to_string().lines().count(), 1, "{error}");
+    }
+
+    let error = fault(&format!("{HEAD}move = []"));
+    assert!(matches!(error.problem, Problem::Plan(PlanError::NothingHappens)));
+    let error = fault(&format!("{HEAD}[[move]]\nto = [1e308, 2]\nduration = 1e-300"));
+    assert!(matches!(error.problem, Problem::OutOfRange { .. }));
+}
+
+#[test]
+fn a_message_tells_place_finding_and_remedy_in_one_line() {
+    let message = fault(&HEAD.replace("\"deg\"", "\"degrees\"")).to_string();
+    // The first thing wrong here is that no move follows.
+    assert!(message.starts_with("arm.toml, line 1, column 1: missing field `move`"), "{message}");
+    let text = format!("{}[[move]]\nto = [1, 2]\n", HEAD.replace("\"deg\"", "\"degrees\""));
+    let truth = "arm.toml, line 2, column 8: unit \"degrees\" of `unit` is not known; accepted: \"rad\", \"deg\"";
+    assert_eq!(fault(&text).to_string(), truth);
+}
+
+#[test]
+fn the_ending_of_the_name_chooses_the_reader() {
+    let folder = std::env::temp_dir().join(format!("flexarm-trajectory-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let write = |name: &str, bytes: &[u8]| {
+        let path = folder.join(name);
+        std::fs::write(&path, bytes).unwrap();
+        path
+    };
+    let waypoints = write("a.TOML", format!("{HEAD}[[move]]\nto = [1, 2]\nduration = 1").as_bytes());
+    assert_eq!(Trajectory::from_path(&waypoints, &[]).unwrap().duration(), 1.0);
+    let samples = write("a.csv", b"time,q\n0,0\n2,1\n");
+    assert_eq!(Trajectory::from_path(&samples, &[]).unwrap().duration(), 2.0);
+    let latin = write("b.csv", b"time,q\n0,0\n\xfc,1\n");
+    let message = Trajectory::from_path(&latin, &[]).unwrap_err().to_string();
+    assert!(message.ends_with("b.csv, line 3: the file is not UTF-8 text; save it as UTF-8"), "{message}");
+    let unknown = Trajectory::from_path(Path::new("a.xlsx"), &[]);
+    assert!(matches!(unknown, Err(TrajectoryError::UnknownExtension { .. })));
+    assert!(matches!(Trajectory::from_path(&folder.join("none.csv"), &[]), Err(TrajectoryError::Read { .. })));
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+proptest! {
+    #[test]
+    fn no_text_makes_the_reader_panic(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
+        let _ = Trajectory::parse_toml(&String::from_utf8_lossy(&bytes), "noise", &[]);
+    }
+
+    /// Noise within the format: any number that f64 can hold, any profile.
+    #[test]
+    fn no_number_makes_the_reader_panic(
+        numbers in prop::collection::vec(prop_oneof![any::<f64>(), -2.0..2.0_f64], 8),
+        profile in prop_oneof![Just("quintic"), Just("trapezoid"), Just("s-curve")],
+        has_duration: bool,
+        has_via: bool,
+        synchronised: bool,
+    ) {
+        let n = |i: usize| {
+            let value: f64 = numbers[i];
+            if value.is_nan() { "nan".to_owned() } else if value.is_infinite() { "inf".to_owned() } else { format!("{value:e}") }
+        };
+        let mut text = format!(
+            "format = 1\nunit = \"rad\"\njoints = [\"a\", \"b\"]\nstart = [{}, {}]\nprofile = \"{profile}\"\n\
+             synchronised = {synchronised}\nacceleration = {}\njerk = {}\n[limits]\na = {{ velocity = {} }}\nb = {{ velocity = 1 }}\n\
+             [[move]]\nto = [{}, {}]\n",
+            n(0), n(1), n(2), n(3), n(4), n(5), n(6)
+        );
+        if has_via {
+            text += "profile = \"quintic\"\nvia = [[0.5, 0.25]]\n";
+        }
+        if has_duration {
+            text += &format!("duration = {}\n", n(7));
+        }
+        if let Ok(trajectory) = Trajectory::parse_toml(&text, "noise", &[]) {
+            let (mut q, mut qdot, mut qddot) = ([0.0; 2], [0.0; 2], [0.0; 2]);
+            trajectory.sample(0.5 * trajectory.duration(), &mut q, &mut qdot, &mut qddot);
+            let _ = (trajectory.peak(), trajectory.moves(), trajectory.kinks(), trajectory.warnings());
+        }
+    }
+}

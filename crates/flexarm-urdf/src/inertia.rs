@@ -1,0 +1,298 @@
+//! Masses and inertias: turned into link axes, checked for being a body's, estimated from meshes on request.
+//!
+//! Frames: L link, I the axes of `<inertial>`, R the root link of a moving body (links fixed to each other).
+//!
+//! ```text
+//! c = p_LoLcm_L,   I_com_L = R_LI I_com_I R_LIᵀ
+//! ```
+//! Start at [`link_inertias`]. Checks are about the centre of mass and relative to the largest principal moment.
+
+use flexarm_kinematics::{LinkInertia, SpatialInertia};
+use nalgebra::{Matrix3, Vector3};
+
+use crate::document::{RawInertial, RawRobot};
+use crate::error::Problem;
+use crate::mesh::MassProperties;
+use crate::read::{InertiaEstimate, ReadOptions};
+use crate::report::Report;
+use crate::shapes::LinkShape;
+use crate::tree::Body;
+
+/// Relative tolerance of the checks, that of single-precision files.
+const TOLERANCE: f64 = 1e-6;
+
+/// The inertia of each link; `None` for mere frames. Faults go to the report.
+///
+/// `bodies` is empty where the tree is broken: then no missing mass can be told.
+pub(crate) fn link_inertias(
+    robot: &RawRobot,
+    bodies: &[Body],
+    shapes: &[LinkShape],
+    options: &ReadOptions,
+    report: &mut Report,
+) -> Vec<Option<LinkInertia>> {
+    let mut inertias: Vec<Option<LinkInertia>> =
+        robot.links.iter().map(|l| l.inertial.as_ref().map(in_link_axes)).collect();
+    check_waived_names(robot, options, report);
+    let failures = match options.inertia_from_mesh {
+        Some(estimate) => fill_from_shapes(robot, bodies, shapes, estimate, &mut inertias, report),
+        None => vec![None; robot.links.len()],
+    };
+
+    // Each link for itself. What stands on the base does not matter for motion: a warning will do.
+    let mut moves = vec![true; robot.links.len()];
+    for body in bodies.iter().filter(|b| b.moved_by.is_none()) {
+        body.members.iter().for_each(|&(link, _)| moves[link] = false);
+    }
+    let mut without_extent = vec![false; robot.links.len()];
+    for (i, link) in robot.links.iter().enumerate() {
+        let (Some(raw), Some(inertia)) = (&link.inertial, &inertias[i]) else { continue };
+        if raw.faulty {
+            continue;
+        }
+        if raw.mass < 0.0 {
+            report.error(&raw.place, Problem::NegativeMass { link: link.name.clone(), mass: raw.mass });
+            continue;
+        }
+        if raw.mass == 0.0 && !link.visuals.is_empty() {
+            let message = format!("link {:?} has a shape and no mass", link.name);
+            report.warning(&raw.place, "massless-shape", message, "give the link its mass");
+        }
+        without_extent[i] = check_moments(&link.name, raw, inertia, moves[i], options, report);
+        if raw.mass > 0.0 {
+            plausible(&link.name, raw, inertia, &shapes[i], report);
+        }
+    }
+
+    for body in bodies.iter().filter(|b| b.moved_by.is_some()) {
+        check_body(robot, body, &inertias, &without_extent, &failures, options, report);
+    }
+    // An <inertial> of zeros is a way to write a frame.
+    for inertia in &mut inertias {
+        if inertia.is_some_and(|i| i.mass == 0.0 && i.inertia_com == Matrix3::zeros()) {
+            *inertia = None;
+        }
+    }
+    inertias
+}
+
+fn in_link_axes(raw: &RawInertial) -> LinkInertia {
+    let R_LI = raw.X_LI.rotation.matrix();
+    let inertia = R_LI * raw.inertia_I * R_LI.transpose();
+    LinkInertia {
+        mass: raw.mass,
+        com: raw.X_LI.translation.vector,
+        // the products leave the last bit unsymmetric
+        inertia_com: (inertia + inertia.transpose()) * 0.5,
+    }
+}
+
+fn check_waived_names(robot: &RawRobot, options: &ReadOptions, report: &mut Report) {
+    for name in options.waive.iter().filter(|name| robot.links.iter().all(|l| l.name != **name)) {
+        let message = format!("the inertia check is waived for link {name:?}, which does not exist");
+        let help = crate::spelling::closest(name, robot.links.iter().map(|l| l.name.as_str()));
+        let help = help.map_or_else(String::new, |meant| format!("did you mean {meant:?}?"));
+        report.warning(&robot.place, "waived-unknown-link", message, help);
+    }
+}
+
+/// Principal moments in rising order [kg m²]; NaN if the matrix is not finite.
+fn principal_moments(inertia: &Matrix3<f64>) -> [f64; 3] {
+    // Scaled to one: the squares of huge entries would overflow, and the iteration never end.
+    let scale = inertia.amax();
+    if !scale.is_finite() || inertia.iter().any(|x| x.is_nan()) {
+        return [f64::NAN; 3];
+    }
+    if scale == 0.0 {
+        return [0.0; 3];
+    }
+    let mut moments: [f64; 3] = (inertia / scale).symmetric_eigenvalues().into();
+    moments.sort_by(f64::total_cmp);
+    moments.map(|m| m * scale)
+}
+
+/// Positive definite and triangle inequality. True if the link has no extent in some direction (rank deficient).
+fn check_moments(
+    name: &str,
+    raw: &RawInertial,
+    inertia: &LinkInertia,
+    moves: bool,
+    options: &ReadOptions,
+    report: &mut Report,
+) -> bool {
+    let moments @ [low, middle, high] = principal_moments(&inertia.inertia_com);
+    let scale = low.abs().max(high.abs());
+    let waived = options.waive.iter().any(|n| n == name);
+    let link = name.to_owned();
+    let excess = high - (low + middle);
+    let problem = if low.is_nan() || low < -TOLERANCE * scale {
+        // no waiver: this adds energy where it should take some
+        Problem::InertiaNotPositiveDefinite { link, moments }
+    } else if excess > TOLERANCE * scale && !waived {
+        Problem::TriangleInequality { link, moments, excess }
+    } else {
+        return low <= TOLERANCE * scale;
+    };
+    // Without mass, without motion: nothing follows from it.
+    if moves {
+        report.error(&raw.place, problem);
+    } else {
+        report.warning(&raw.place, problem.code(), problem.to_string(), problem.help());
+    }
+    false
+}
+
+/// A moving body needs mass, and inertia about every axis.
+fn check_body(
+    robot: &RawRobot,
+    body: &Body,
+    inertias: &[Option<LinkInertia>],
+    without_extent: &[bool],
+    failures: &[Option<String>],
+    options: &ReadOptions,
+    report: &mut Report,
+) {
+    let Some(joint) = body.moved_by.map(|j| robot.joints[j].name.clone()) else { return };
+    let root = &robot.links[body.root];
+    let link = root.name.clone();
+    let lumped = || body.members[1..].iter().map(|&(i, _)| robot.links[i].name.clone()).collect();
+    let with_inertia: Vec<usize> = body.members.iter().map(|m| m.0).filter(|&i| inertias[i].is_some()).collect();
+    if with_inertia.is_empty() {
+        let no_estimate = body.members.iter().find_map(|&(i, _)| failures[i].clone());
+        report.error(&root.place, Problem::MissingInertial { link, joint, lumped: lumped(), no_estimate });
+        return;
+    }
+    // Unreadable or negative masses were reported; what follows from them is not.
+    let unsound = |&i: &usize| robot.links[i].inertial.as_ref().is_some_and(|raw| raw.faulty || raw.mass < 0.0);
+    if with_inertia.iter().any(unsound) {
+        return;
+    }
+    let mut M_R = SpatialInertia::zeros();
+    for (i, X_RL) in &body.members {
+        if let Some(inertia) = &inertias[*i] {
+            M_R += inertia.spatial().at_parent(X_RL);
+        }
+    }
+    let place = |i: usize| robot.links[i].inertial.as_ref().map_or(&robot.links[i].place, |raw| &raw.place);
+    if M_R.mass == 0.0 {
+        report.error(place(with_inertia[0]), Problem::ZeroMass { link, joint, lumped: lumped() });
+        return;
+    }
+
+    // A point mass is sound where other links of the same body give it inertia.
+    let thin = with_inertia.iter().copied().filter(|&i| without_extent[i]);
+    let Some(thin) = thin.into_iter().find(|&i| !options.waive.contains(&robot.links[i].name)) else { return };
+    let moments @ [low, _, high] = principal_moments(&M_R.inertia_com());
+    let name = robot.links[thin].name.clone();
+    if low <= TOLERANCE * high {
+        report.error(place(thin), Problem::InertiaNotPositiveDefinite { link: name, moments });
+    } else if robot.links[thin].inertial.as_ref().is_some_and(|raw| raw.mass > 0.0) {
+        let message = format!("link {name:?} has mass and no inertia about some axis: it counts as a point or a rod");
+        report.warning(place(thin), "point-mass", message, "give the inertia about the centre of mass");
+    }
+}
+
+/// Compares radii of gyration and centre of mass with the box around the shapes of the link.
+fn plausible(name: &str, raw: &RawInertial, inertia: &LinkInertia, shape: &LinkShape, report: &mut Report) {
+    let Some((low, high)) = shape.bounds else { return };
+    let diagonal = (high - low).norm();
+    let radius = (principal_moments(&inertia.inertia_com)[2].max(0.0) / inertia.mass).sqrt();
+    let help = "check units (kg, m, kg m^2) of inertia and geometry";
+    if radius > 0.5 * diagonal {
+        // all mass in the corners of the box would give half the diagonal
+        let message = format!(
+            "link {name:?}: the radius of gyration {radius:.3} m does not fit into its geometry, whose diagonal is \
+             {diagonal:.3} m"
+        );
+        report.warning(&raw.place, "inertia-too-large", message, help);
+    } else if radius < 0.02 * diagonal {
+        // a homogeneous rod, the most slender body, has 0.29 of its length
+        let message = format!(
+            "link {name:?}: the radius of gyration {radius:.2e} m is tiny against its geometry, whose diagonal is \
+             {diagonal:.3} m"
+        );
+        report.warning(&raw.place, "inertia-too-small", message, help);
+    }
+    let margin = Vector3::repeat(0.1 * diagonal);
+    let (low, high) = (low - margin, high + margin);
+    if (0..3).any(|i| inertia.com[i] < low[i] || inertia.com[i] > high[i]) {
+        let com = inertia.com;
+        let message = format!(
+            "link {name:?}: the centre of mass ({:.3}, {:.3}, {:.3}) m lies outside its geometry",
+            com.x, com.y, com.z
+        );
+        report.warning(&raw.place, "com-outside", message, "check the <origin> of <inertial> and of <visual>");
+    }
+}
+
+/// Fills links of bodies without any `<inertial>` from their shapes; says for each link why it could not.
+fn fill_from_shapes(
+    robot: &RawRobot,
+    bodies: &[Body],
+    shapes: &[LinkShape],
+    estimate: InertiaEstimate,
+    inertias: &mut [Option<LinkInertia>],
+    report: &mut Report,
+) -> Vec<Option<String>> {
+    let mut failures = vec![None; robot.links.len()];
+    let (what, value) = match estimate {
+        InertiaEstimate::Density(density) => ("the density", density),
+        InertiaEstimate::TotalMass(mass) => ("the total mass", mass),
+    };
+    if !(value > 0.0 && value.is_finite()) {
+        report.error(&robot.place, Problem::BadEstimate { what, value });
+        return failures;
+    }
+
+    // The base is filled too, so that a total mass can be the one of the data sheet.
+    let empty = bodies.iter().filter(|b| b.members.iter().all(|&(i, _)| robot.links[i].inertial.is_none()));
+    let mut filled: Vec<(usize, SpatialInertia)> = Vec::new();
+    for i in empty.flat_map(|b| b.members.iter().map(|m| m.0)) {
+        let link = &robot.links[i];
+        match &shapes[i].solids {
+            Ok(solids) if solids.is_empty() => failures[i] = Some("there is no shape".to_owned()),
+            Ok(solids) => {
+                let open: usize = solids.iter().map(|(_, p)| p.open_edges).sum();
+                if open > 0 {
+                    let message = format!(
+                        "link {:?}: inertia is estimated from a mesh that is not closed ({open} open edges)",
+                        link.name
+                    );
+                    report.warning(&link.place, "open-mesh", message, "close the mesh or give <inertial>");
+                }
+                let M_L = solids.iter().fold(SpatialInertia::zeros(), |mut sum, (X_LV, p)| {
+                    sum += unit_density(p).at_parent(X_LV);
+                    sum
+                });
+                if M_L.mass > 0.0 {
+                    filled.push((i, M_L));
+                } else {
+                    failures[i] = Some("its mesh encloses no volume".to_owned());
+                }
+            }
+            Err(reason) => failures[i] = Some(reason.clone()),
+        }
+    }
+
+    let volume: f64 = filled.iter().map(|(_, M)| M.mass).sum();
+    let density = match estimate {
+        InertiaEstimate::Density(density) => density,
+        InertiaEstimate::TotalMass(mass) => mass / volume,
+    };
+    for (i, M_L) in filled {
+        let inertia =
+            LinkInertia { mass: M_L.mass * density, com: M_L.com(), inertia_com: M_L.inertia_com() * density };
+        let link = &robot.links[i];
+        let message = format!(
+            "link {:?}: mass {:.4} kg and inertia are estimated from its geometry at {density:.0} kg/m^3",
+            link.name, inertia.mass
+        );
+        report.warning(&link.place, "estimated-inertia", message, "replace by measured or CAD values where known");
+        inertias[i] = Some(inertia);
+    }
+    failures
+}
+
+fn unit_density(p: &MassProperties) -> SpatialInertia {
+    SpatialInertia::from_com(p.volume, &p.centroid, &p.inertia)
+}

@@ -1,0 +1,263 @@
+//! The way from a file to a robot: text, elements, tree, joints, shapes, masses.
+
+use std::path::{Path, PathBuf};
+
+use flexarm_kinematics::{Link, Mechanism};
+
+use crate::document::{RawRobot, read_document};
+use crate::error::UrdfError;
+use crate::finding::{Finding, Place, Severity};
+use crate::geometry::Visual;
+use crate::report::Report;
+use crate::resolve::Resolver;
+use crate::tcp::tcp_candidates;
+use crate::{inertia, joints, shapes, tree, xacro, xml};
+
+/// How to read. `ReadOptions::default()` reads files as they are and looks into meshes.
+#[derive(Clone, Debug)]
+pub struct ReadOptions {
+    /// Folders of packages by name, for `package://name/...`.
+    pub packages: Vec<(String, PathBuf)>,
+    /// Folders to look for packages in, after the folders above the URDF; see
+    /// [`crate::search_paths_from_environment`].
+    pub search_paths: Vec<PathBuf>,
+    /// Estimate mass and inertia of moving bodies that have none in the file.
+    pub inertia_from_mesh: Option<InertiaEstimate>,
+    /// Links whose inertia may be rank deficient or break the triangle inequality, as the rotor-only first
+    /// link of the Manutec r3 does. Negative moments are never waived.
+    pub waive: Vec<String>,
+    /// Read the mesh files, to check them and to compare inertias with them. Off, files are only found.
+    pub inspect_meshes: bool,
+    /// The program that expands `.xacro` files; a bare name is looked for by the system.
+    pub xacro_program: PathBuf,
+    /// Arguments for it, such as `"prefix:=left_"`.
+    pub xacro_arguments: Vec<String>,
+}
+
+impl Default for ReadOptions {
+    fn default() -> Self {
+        Self {
+            packages: Vec::new(),
+            search_paths: Vec::new(),
+            inertia_from_mesh: None,
+            waive: Vec::new(),
+            inspect_meshes: true,
+            xacro_program: PathBuf::from("xacro"),
+            xacro_arguments: Vec::new(),
+        }
+    }
+}
+
+/// Masses for bodies without `<inertial>`, from the volume of their visuals taken as homogeneous and solid.
+///
+/// Bodies count as a whole: where one link of several fixed to each other has an `<inertial>`, nothing is added.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum InertiaEstimate {
+    /// The same density everywhere [kg/m³].
+    Density(f64),
+    /// The mass of all estimated links together, the base included [kg]; distributed by volume.
+    TotalMass(f64),
+}
+
+/// A robot description, read and checked.
+#[derive(Clone, Debug)]
+pub struct UrdfRobot {
+    /// Links, joints and masses. Every link of the file is there, frames without mass too.
+    pub mechanism: Mechanism,
+    /// The URDF, expanded if it was xacro.
+    pub text: String,
+    /// What the links look like, in the order of the file.
+    pub visuals: Vec<Visual>,
+    /// Links that may be the tool centre point, the default first.
+    pub tcp_candidates: Vec<String>,
+    /// Warnings and notes; there are no errors.
+    pub warnings: Vec<Finding>,
+    /// Damping and friction of every moving joint; not used in prescribed motion.
+    pub dynamics: Vec<JointDynamics>,
+    /// The `<transmission>` elements.
+    pub transmissions: Vec<Transmission>,
+}
+
+/// `<dynamics>` of one moving joint; zero where the file says nothing.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JointDynamics {
+    /// Name of the joint.
+    pub joint: String,
+    /// Viscous damping [N m s/rad or N s/m].
+    pub damping: f64,
+    /// Static friction [N m or N].
+    pub friction: f64,
+}
+
+/// A `<transmission>`, listed for information.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Transmission {
+    /// Its name.
+    pub name: String,
+    /// Names of its joints.
+    pub joints: Vec<String>,
+    /// Gear ratio, where it is written.
+    pub reduction: Option<f64>,
+}
+
+/// Reads a `.urdf` file, or a `.xacro` file where the xacro program is installed.
+///
+/// # Errors
+/// [`UrdfError`]: unreadable, not expanded, or all faults in it with their lines.
+pub fn read_urdf(path: impl AsRef<Path>, options: &ReadOptions) -> Result<UrdfRobot, UrdfError> {
+    let path = path.as_ref();
+    let (text, shown) = load_text(path, options)?;
+    parse(&text, &shown, folder_of(path), options).0
+}
+
+/// Reads URDF text; `origin_path` serves messages, and its folder relative mesh paths.
+///
+/// # Errors
+/// [`UrdfError::Invalid`] with all faults and their lines.
+pub fn parse_urdf(text: &str, origin_path: impl AsRef<Path>, options: &ReadOptions) -> Result<UrdfRobot, UrdfError> {
+    let path = origin_path.as_ref();
+    parse(text, path, folder_of(path), options).0
+}
+
+/// Everything that can be said about a file: errors, warnings and notes, in the order of the file.
+pub fn check_urdf(path: impl AsRef<Path>, options: &ReadOptions) -> Vec<Finding> {
+    let path = path.as_ref();
+    match load_text(path, options) {
+        Ok((text, shown)) => all_findings(parse(&text, &shown, folder_of(path), options)),
+        Err(error) => error.findings(),
+    }
+}
+
+/// As [`check_urdf`], for text.
+pub fn check_urdf_text(text: &str, origin_path: impl AsRef<Path>, options: &ReadOptions) -> Vec<Finding> {
+    let path = origin_path.as_ref();
+    all_findings(parse(text, path, folder_of(path), options))
+}
+
+fn all_findings((result, report): (Result<UrdfRobot, UrdfError>, Report)) -> Vec<Finding> {
+    let mut findings = match result {
+        Ok(_) => Vec::new(),
+        Err(error) => error.findings(),
+    };
+    findings.extend(report.remarks());
+    // a stable sort: within a line, errors stay before remarks
+    let line = |f: &Finding| f.location.rsplit(':').next().and_then(|l| l.parse::<u32>().ok()).unwrap_or(0);
+    findings.sort_by_key(line);
+    findings
+}
+
+/// Elements nested deeper are left to the readers that can stand it.
+const MAX_DEPTH: usize = 64;
+
+fn folder_of(path: &Path) -> PathBuf {
+    path.parent().map(Path::to_owned).unwrap_or_default()
+}
+
+/// The text and the name under which its lines are cited.
+fn load_text(path: &Path, options: &ReadOptions) -> Result<(String, PathBuf), UrdfError> {
+    let io_error = |source| UrdfError::Io { path: path.to_owned(), source };
+    let meta = std::fs::metadata(path).map_err(io_error)?;
+    if meta.is_dir() {
+        return Err(io_error(std::io::Error::other("this is a folder; name the URDF file in it")));
+    }
+    let (bytes, shown) = if xacro::is_xacro(path) {
+        let expanded = xacro::expand(path, &options.xacro_program, &options.xacro_arguments)?;
+        (expanded, PathBuf::from(format!("{} (expanded)", path.display())))
+    } else {
+        (std::fs::read(path).map_err(io_error)?, path.to_owned())
+    };
+    let text = xml::decode(bytes, &shown).map_err(|issue| UrdfError::Invalid { issues: vec![issue] })?;
+    Ok((text, shown))
+}
+
+fn parse(text: &str, shown: &Path, folder: PathBuf, options: &ReadOptions) -> (Result<UrdfRobot, UrdfError>, Report) {
+    let mut report = Report::new(shown.to_owned());
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let lines = xml::Lines::new(shown, text);
+    let mut deep = false;
+    let raw = match xml::parse(text, &lines) {
+        Ok(document) => {
+            deep = document.descendants().any(|n| n.ancestors().nth(MAX_DEPTH).is_some());
+            read_document(document.root_element(), &lines, &mut report)
+        }
+        Err(issue) => {
+            report.issues.push(issue);
+            None
+        }
+    };
+    let robot = raw.map(|raw| assemble(&raw, text, folder, options, &mut report));
+    let result = match robot {
+        Some(mut robot) if report.issues.is_empty() => {
+            // it recurses, and would overflow the stack
+            if !deep {
+                ask_second_reader(text, &robot.mechanism, &lines.place(0), &mut report);
+            }
+            robot.warnings = report.remarks();
+            Ok(robot)
+        }
+        _ => Err(UrdfError::Invalid { issues: report.sorted_issues() }),
+    };
+    (result, report)
+}
+
+/// All checks, each as far as the ones before it allow, and the robot, which counts only without errors.
+fn assemble(raw: &RawRobot, text: &str, folder: PathBuf, options: &ReadOptions, report: &mut Report) -> UrdfRobot {
+    let faults = report.issues.len();
+    tree::check_names(raw, report);
+    tree::check_tree(raw, report);
+    let sound_tree = report.issues.len() == faults && raw.joints.iter().all(|j| !j.faulty);
+
+    let mut mechanism = Mechanism::new(&raw.name);
+    mechanism.joints = joints::convert_joints(raw, report);
+
+    let resolver = Resolver { folder, packages: &options.packages, search_paths: &options.search_paths };
+    let visuals = shapes::find_visuals(raw, &resolver, report);
+    let shapes = if options.inspect_meshes || options.inertia_from_mesh.is_some() {
+        shapes::inspect(raw, &visuals, report)
+    } else {
+        shapes::unknown(raw)
+    };
+    // Bodies are told only where the tree is sound; else missing masses would be false alarms.
+    let bodies = if sound_tree { tree::moving_bodies(raw) } else { Vec::new() };
+    let inertias = inertia::link_inertias(raw, &bodies, &shapes, options, report);
+    mechanism.links =
+        raw.links.iter().zip(inertias).map(|(link, inertia)| Link { name: link.name.clone(), inertia }).collect();
+
+    let tcp_candidates = tcp_candidates(&mechanism).into_iter().map(str::to_owned).collect();
+    let moving = raw.joints.iter().filter(|j| j.kind != crate::document::RawKind::Fixed);
+    UrdfRobot {
+        text: text.to_owned(),
+        visuals,
+        tcp_candidates,
+        warnings: Vec::new(),
+        dynamics: moving
+            .map(|j| JointDynamics { joint: j.name.clone(), damping: j.damping, friction: j.friction })
+            .collect(),
+        transmissions: raw
+            .transmissions
+            .iter()
+            .map(|t| Transmission { name: t.name.clone(), joints: t.joints.clone(), reduction: t.reduction })
+            .collect(),
+        mechanism,
+    }
+}
+
+/// Rerun and other tools read URDF with `urdf_rs`: say so if it refuses the file or sees another robot.
+fn ask_second_reader(text: &str, mechanism: &Mechanism, place: &Place, report: &mut Report) {
+    let message = match urdf_rs::read_from_string(text) {
+        Ok(other) if other.links.len() == mechanism.links.len() && other.joints.len() == mechanism.joints.len() => {
+            return;
+        }
+        Ok(_) => "urdf-rs sees other links and joints in this file".to_owned(),
+        Err(error) => format!("urdf-rs refuses this file: {error}"),
+    };
+    let help = "flexarm reads it; Rerun and other viewers built on urdf-rs may not show the robot";
+    report.warning(place, "other-readers", message, help);
+}
+
+impl UrdfRobot {
+    /// The warnings without the notes.
+    pub fn warnings_only(&self) -> impl Iterator<Item = &Finding> {
+        self.warnings.iter().filter(|f| f.severity == Severity::Warning)
+    }
+}

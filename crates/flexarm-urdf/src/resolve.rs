@@ -1,0 +1,150 @@
+//! From `package://name/meshes/a.stl` and its kin to a file.
+//!
+//! Order for packages: the caller's map, the folders above the URDF, the caller's search paths. The environment is read
+//! by [`search_paths_from_environment`] alone, which the caller may use or not.
+
+use std::path::{Path, PathBuf};
+
+/// Folders from `ROS_PACKAGE_PATH` and `AMENT_PREFIX_PATH`, for [`crate::ReadOptions::search_paths`].
+///
+/// The one function of this crate that reads the environment.
+pub fn search_paths_from_environment() -> Vec<PathBuf> {
+    ["ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH"]
+        .into_iter()
+        .filter_map(std::env::var_os)
+        .flat_map(|value| std::env::split_paths(&value).collect::<Vec<_>>())
+        .filter(|path| !path.as_os_str().is_empty())
+        .collect()
+}
+
+/// Where to look.
+pub(crate) struct Resolver<'a> {
+    /// Folder of the URDF.
+    pub(crate) folder: PathBuf,
+    pub(crate) packages: &'a [(String, PathBuf)],
+    pub(crate) search_paths: &'a [PathBuf],
+}
+
+/// Why no file was found.
+#[derive(Debug, PartialEq)]
+pub(crate) struct NotFound {
+    pub(crate) reason: String,
+    pub(crate) help: String,
+}
+
+impl Resolver<'_> {
+    pub(crate) fn resolve(&self, uri: &str) -> Result<PathBuf, NotFound> {
+        let not_found = |reason: String, help: &str| Err(NotFound { reason, help: help.to_owned() });
+        if let Some(rest) = uri.strip_prefix("package://").or_else(|| uri.strip_prefix("model://")) {
+            return self.in_package(rest);
+        }
+        if uri.starts_with("http://") || uri.starts_with("https://") {
+            return not_found("meshes are not fetched from the network".into(), "download it beside the URDF");
+        }
+        let path = match uri.strip_prefix("file://") {
+            Some(path) => PathBuf::from(percent_decoded(path)),
+            None => self.folder.join(uri),
+        };
+        existing(&path).ok_or_else(|| NotFound {
+            reason: format!("{} does not exist", path.display()),
+            help: other_case(&path).unwrap_or_else(|| "correct the path; it is relative to the URDF's folder".into()),
+        })
+    }
+
+    fn in_package(&self, rest: &str) -> Result<PathBuf, NotFound> {
+        let (package, inside) = rest.split_once('/').unwrap_or((rest, ""));
+        let mut missing = None;
+        for folder in self.package_folders(package) {
+            let path = folder.join(inside);
+            match existing(&path) {
+                Some(path) => return Ok(path),
+                None => missing = missing.or(Some(path)),
+            }
+        }
+        Err(match missing {
+            Some(path) => NotFound {
+                reason: format!("{} does not exist", path.display()),
+                help: other_case(&path).unwrap_or_else(|| "is the package complete?".into()),
+            },
+            None => NotFound {
+                reason: format!("the package {package:?} was not found"),
+                help: format!("say where it is with --package {package}=FOLDER, or put the URDF inside the package"),
+            },
+        })
+    }
+
+    /// All folders that may be the package, best first.
+    fn package_folders(&self, package: &str) -> Vec<PathBuf> {
+        if package.is_empty() || package == "." || package == ".." {
+            return Vec::new();
+        }
+        let mut folders: Vec<PathBuf> =
+            self.packages.iter().filter(|(name, _)| name == package).map(|(_, path)| path.clone()).collect();
+
+        // Upwards from the URDF: the package itself, or its neighbour in a workspace.
+        let start = std::path::absolute(&self.folder).unwrap_or_else(|_| self.folder.clone());
+        for ancestor in start.ancestors() {
+            if is_package(ancestor, package) {
+                folders.push(ancestor.to_owned());
+            }
+            folders.push(ancestor.join(package));
+        }
+        // Installed packages: PREFIX/share/NAME; workspaces: SRC/NAME and SRC/REPOSITORY/NAME.
+        for path in self.search_paths {
+            if is_package(path, package) {
+                folders.push(path.clone());
+            }
+            folders.extend([path.join("share").join(package), path.join(package)]);
+            let repositories = std::fs::read_dir(path).into_iter().flatten().flatten();
+            let mut nested: Vec<_> = repositories.map(|entry| entry.path().join(package)).collect();
+            nested.sort();
+            folders.extend(nested);
+        }
+        folders.retain(|folder| folder.is_dir());
+        folders
+    }
+}
+
+/// True if the folder bears the package's name or its `package.xml` does.
+fn is_package(folder: &Path, package: &str) -> bool {
+    if folder.file_name().is_some_and(|name| name == package) {
+        return true;
+    }
+    let Ok(manifest) = std::fs::read_to_string(folder.join("package.xml")) else { return false };
+    let Ok(document) = roxmltree::Document::parse(&manifest) else { return false };
+    let name = document.root_element().children().find(|n| n.has_tag_name("name"));
+    name.and_then(|n| n.text()).is_some_and(|name| name.trim() == package)
+}
+
+fn existing(path: &Path) -> Option<PathBuf> {
+    path.is_file().then(|| path.to_owned())
+}
+
+/// Files written on systems that do not care about case.
+fn other_case(path: &Path) -> Option<String> {
+    let wanted = path.file_name()?.to_str()?;
+    let names = std::fs::read_dir(path.parent()?).ok()?.flatten().filter_map(|e| e.file_name().into_string().ok());
+    let mut similar: Vec<String> = names.filter(|name| name.eq_ignore_ascii_case(wanted)).collect();
+    similar.sort();
+    similar.first().map(|name| format!("there is {name:?} in that folder: the case of letters differs"))
+}
+
+fn percent_decoded(text: &str) -> String {
+    let bytes = text.as_bytes();
+    let mut decoded = Vec::with_capacity(bytes.len());
+    let mut at = 0;
+    while at < bytes.len() {
+        let hex = bytes.get(at + 1..at + 3).and_then(|h| std::str::from_utf8(h).ok());
+        match (bytes[at], hex.and_then(|h| u8::from_str_radix(h, 16).ok())) {
+            (b'%', Some(byte)) => {
+                decoded.push(byte);
+                at += 3;
+            }
+            (byte, _) => {
+                decoded.push(byte);
+                at += 1;
+            }
+        }
+    }
+    String::from_utf8_lossy(&decoded).into_owned()
+}

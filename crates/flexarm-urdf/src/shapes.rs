@@ -1,0 +1,170 @@
+//! The visuals of a robot: files found and, if asked for, looked into.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use flexarm_kinematics::Pose;
+use nalgebra::{Point3, Vector3};
+
+use crate::document::{RawGeometry, RawRobot, RawVisual};
+use crate::finding::Place;
+use crate::geometry::{Geometry, Visual};
+use crate::mesh::{MassProperties, TriangleMesh, load_with_remarks};
+use crate::report::Report;
+use crate::resolve::Resolver;
+
+/// Geometry larger than this was probably drawn in millimetres [m].
+const LARGE: f64 = 30.0;
+/// Geometry smaller than this was probably scaled twice [m].
+const SMALL: f64 = 1e-4;
+
+/// What the checks of inertia need to know of a link's shapes.
+pub(crate) struct LinkShape {
+    /// Box around all shapes in link axes; `None` if there are none or one is not known.
+    pub(crate) bounds: Option<(Vector3<f64>, Vector3<f64>)>,
+    /// Poses `X_LV` and mass properties of all shapes, or why one is not known.
+    pub(crate) solids: Result<Vec<(Pose, MassProperties)>, String>,
+}
+
+/// All visuals, with mesh files found.
+pub(crate) fn find_visuals(robot: &RawRobot, resolver: &Resolver<'_>, report: &mut Report) -> Vec<Visual> {
+    let mut visuals = Vec::new();
+    for link in &robot.links {
+        for raw in &link.visuals {
+            let named = raw.material.as_ref().and_then(|name| robot.materials.get(name));
+            visuals.push(Visual {
+                link: link.name.clone(),
+                X_LV: raw.X_LV,
+                geometry: geometry(raw, &link.name, resolver, report),
+                color: raw.color.or(named.copied()),
+                name: raw.name.clone(),
+            });
+        }
+    }
+    visuals
+}
+
+fn geometry(raw: &RawVisual, link: &str, resolver: &Resolver<'_>, report: &mut Report) -> Geometry {
+    match &raw.geometry {
+        RawGeometry::Box { size } => Geometry::Box { size: *size },
+        RawGeometry::Cylinder { radius, length } => Geometry::Cylinder { radius: *radius, length: *length },
+        RawGeometry::Sphere { radius } => Geometry::Sphere { radius: *radius },
+        RawGeometry::Mesh { uri, scale } => {
+            let path = resolver.resolve(uri).map_err(|not_found| {
+                let message = format!("link {link:?}: no mesh for {uri:?}: {}", not_found.reason);
+                report.warning(&raw.place, "missing-mesh", message, not_found.help);
+            });
+            Geometry::Mesh { uri: uri.clone(), path: path.ok(), scale: *scale }
+        }
+    }
+}
+
+/// Bounds and mass properties of every link's shapes. `visuals` are those of [`find_visuals`].
+pub(crate) fn inspect(robot: &RawRobot, visuals: &[Visual], report: &mut Report) -> Vec<LinkShape> {
+    let mut meshes = Meshes::default();
+    let mut visuals = visuals.iter();
+    robot
+        .links
+        .iter()
+        .map(|link| {
+            let mut bounds: Option<(Vector3<f64>, Vector3<f64>)> = None;
+            let mut solids = Ok(Vec::new());
+            for (raw, visual) in link.visuals.iter().zip(visuals.by_ref()) {
+                match meshes.look_into(visual, &raw.place, report) {
+                    Ok((box_of_visual, solid)) => {
+                        bounds = Some(bounds.map_or(box_of_visual, |(low, high)| {
+                            (low.inf(&box_of_visual.0), high.sup(&box_of_visual.1))
+                        }));
+                        if let Ok(solids) = &mut solids {
+                            solids.push((visual.X_LV, solid));
+                        }
+                    }
+                    Err(reason) => solids = Err(reason),
+                }
+            }
+            check_size(&link.name, &link.place, bounds, report);
+            LinkShape { bounds: bounds.filter(|_| solids.is_ok()), solids }
+        })
+        .collect()
+}
+
+/// No look into any file: nothing is known.
+pub(crate) fn unknown(robot: &RawRobot) -> Vec<LinkShape> {
+    let unknown = || LinkShape { bounds: None, solids: Err("meshes were not looked into".to_owned()) };
+    robot.links.iter().map(|_| unknown()).collect()
+}
+
+fn check_size(link: &str, place: &Place, bounds: Option<(Vector3<f64>, Vector3<f64>)>, report: &mut Report) {
+    let Some((low, high)) = bounds else { return };
+    let size = (high - low).norm();
+    if size > LARGE {
+        let message = format!("the geometry of link {link:?} is {size:.0} m large");
+        report.warning(place, "huge-geometry", message, "meshes in millimetres need scale=\"0.001 0.001 0.001\"");
+    } else if size < SMALL {
+        let message = format!("the geometry of link {link:?} is {size:.1e} m small");
+        report.warning(place, "tiny-geometry", message, "was it scaled twice? URDF lengths are metres");
+    }
+}
+
+type Bounds = (Vector3<f64>, Vector3<f64>);
+
+/// Mesh files, each read once.
+#[derive(Default)]
+struct Meshes {
+    loaded: HashMap<PathBuf, Result<TriangleMesh, String>>,
+}
+
+impl Meshes {
+    /// Box in link axes and mass properties in V of one visual.
+    fn look_into(
+        &mut self,
+        visual: &Visual,
+        place: &Place,
+        report: &mut Report,
+    ) -> Result<(Bounds, MassProperties), String> {
+        let (low_V, high_V, properties) = match &visual.geometry {
+            Geometry::Mesh { path: None, uri, .. } => return Err(format!("the mesh {uri:?} was not found")),
+            Geometry::Mesh { path: Some(path), scale, .. } => {
+                let mesh = self.load(path, &visual.link, place, report).as_ref().map_err(String::clone)?;
+                let mesh = mesh.clone().scaled(scale);
+                let (low, high) = mesh.bounds().unwrap_or_default();
+                (low, high, mesh.mass_properties())
+            }
+            shape => {
+                let mesh = shape.triangles().map_err(|e| e.to_string())?;
+                let (low, high) = mesh.bounds().unwrap_or_default();
+                (low, high, shape.mass_properties().map_err(|e| e.to_string())?)
+            }
+        };
+        // the box of the turned box: at most a little larger than that of the shape
+        let corners = (0..8).map(|k| {
+            let corner = Vector3::from_fn(|i, _| if k >> i & 1 == 0 { low_V[i] } else { high_V[i] });
+            (visual.X_LV * Point3::from(corner)).coords
+        });
+        let start = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
+        Ok((corners.fold(start, |(low, high), p| (low.inf(&p), high.sup(&p))), properties))
+    }
+
+    fn load(&mut self, path: &Path, link: &str, place: &Place, report: &mut Report) -> &Result<TriangleMesh, String> {
+        self.loaded.entry(path.to_owned()).or_insert_with(|| match load_with_remarks(path) {
+            Ok(loaded) => {
+                for remark in loaded.remarks {
+                    report.note(place, "mesh-remark", format!("{}: {remark}", path.display()), "");
+                }
+                Ok(loaded.mesh)
+            }
+            Err(error) => {
+                let message = format!("link {link:?}: {}", with_source(&error));
+                report.warning(place, "unreadable-mesh", message, "export the mesh again, as STL for example");
+                Err(with_source(&error))
+            }
+        })
+    }
+}
+
+fn with_source(error: &dyn std::error::Error) -> String {
+    match error.source() {
+        Some(source) => format!("{error}: {source}"),
+        None => error.to_string(),
+    }
+}

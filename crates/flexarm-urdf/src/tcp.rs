@@ -1,0 +1,92 @@
+//! Which link is the tool, where the user does not say.
+
+use std::collections::{HashMap, HashSet};
+
+use flexarm_kinematics::{JointKind, Mechanism};
+
+/// Names of tool frames, best first (ROS-Industrial's REP-199 and common use).
+const TOOL_NAMES: [&str; 3] = ["tool0", "tcp", "flange"];
+
+/// The link whose frame is the tool centre point unless the user chooses another one.
+///
+/// `tool0`, else `tcp`, else `flange`, each also with a prefix (`left_tool0`) if there is only one such link; else the
+/// last link of the chain with most moving joints (then with most links; then the first in the file).
+/// `None` for a mechanism without links.
+pub fn default_tcp(mechanism: &Mechanism) -> Option<&str> {
+    tcp_candidates(mechanism).into_iter().next()
+}
+
+/// All links that may be the tool, the default first: the tool frames by name, then the ends of all chains.
+pub fn tcp_candidates(mechanism: &Mechanism) -> Vec<&str> {
+    let names = || mechanism.links.iter().map(|l| l.name.as_str());
+    let mut candidates: Vec<&str> = Vec::new();
+    let mut ambiguous: Vec<&str> = Vec::new();
+    for tool in TOOL_NAMES {
+        candidates.extend(names().find(|&n| n == tool));
+        let prefixed: Vec<&str> = names().filter(|n| is_prefixed(n, tool)).collect();
+        if let [only] = prefixed[..] { candidates.push(only) } else { ambiguous.extend(prefixed) }
+    }
+
+    let depth = depths(mechanism);
+    let parents: HashSet<&str> = mechanism.joints.iter().map(|j| j.parent.as_str()).collect();
+    let mut ends: Vec<&str> = names().filter(|n| !parents.contains(n)).collect();
+    // a stable sort keeps the order of the file among equals
+    ends.sort_by_key(|n| std::cmp::Reverse(depth.get(n).copied()));
+
+    let mut seen = HashSet::new();
+    candidates.into_iter().chain(ends).chain(ambiguous).filter(|n| seen.insert(*n)).collect()
+}
+
+/// `left_tool0`, `left-tool0`, `left/tool0` for `tool0`.
+fn is_prefixed(name: &str, tool: &str) -> bool {
+    name.strip_suffix(tool).is_some_and(|prefix| prefix.ends_with(['_', '-', '/', ':', '.']))
+}
+
+/// Moving joints and all joints between the base and each link.
+fn depths(mechanism: &Mechanism) -> HashMap<&str, (usize, usize)> {
+    let parent_joint: HashMap<&str, _> = mechanism.joints.iter().map(|j| (j.child.as_str(), j)).collect();
+    let depth = |link: &str| {
+        let (mut moving, mut all, mut at) = (0, 0, link);
+        // the bound stops a mechanism that is no tree
+        while let (Some(joint), true) = (parent_joint.get(at), all < mechanism.joints.len()) {
+            moving += usize::from(joint.kind != JointKind::Fixed);
+            all += 1;
+            at = &joint.parent;
+        }
+        (moving, all)
+    };
+    mechanism.links.iter().map(|l| (l.name.as_str(), depth(&l.name))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flexarm_kinematics::{Joint, Link, Pose};
+    use nalgebra::Vector3;
+
+    fn mechanism(joints: &[(&str, &str, bool)]) -> Mechanism {
+        let mut m = Mechanism::new("m");
+        m.links.push(Link { name: "base".into(), inertia: None });
+        for (parent, child, moves) in joints {
+            m.links.push(Link { name: (*child).into(), inertia: None });
+            let kind = if *moves { JointKind::Revolute(Vector3::z_axis()) } else { JointKind::Fixed };
+            m.joints.push(Joint::new(format!("to_{child}"), kind, *parent, *child, Pose::identity()));
+        }
+        m
+    }
+
+    #[test]
+    fn names_come_before_the_longest_chain() {
+        let mut arm = vec![("base", "l1", true), ("l1", "l2", true), ("l2", "hand", false), ("l1", "camera", false)];
+        assert_eq!(default_tcp(&mechanism(&arm)), Some("hand"));
+        arm.push(("base", "flange", false));
+        assert_eq!(default_tcp(&mechanism(&arm)), Some("flange"));
+        arm.push(("base", "left_tool0", false));
+        assert_eq!(default_tcp(&mechanism(&arm)), Some("left_tool0"));
+        arm.push(("base", "right_tool0", false));
+        assert_eq!(default_tcp(&mechanism(&arm)), Some("flange"), "two arms: no prefix is better than the other");
+        arm.push(("base", "tool0", false));
+        assert_eq!(tcp_candidates(&mechanism(&arm))[..2], ["tool0", "flange"]);
+        assert_eq!(default_tcp(&Mechanism::new("empty")), None);
+    }
+}

@@ -1,0 +1,85 @@
+//! Small robots and a folder for files, shared by the tests.
+#![allow(dead_code, reason = "each test file uses a part of it")]
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use flexarm_urdf::{Problem, ReadOptions, parse_urdf};
+
+/// A folder of its own that is removed at the end.
+pub struct TestFolder(pub PathBuf);
+
+impl TestFolder {
+    pub fn new() -> Self {
+        static NEXT: AtomicU32 = AtomicU32::new(0);
+        let number = NEXT.fetch_add(1, Ordering::Relaxed);
+        let path = std::env::temp_dir().join(format!("flexarm-urdf-{}-{number}", std::process::id()));
+        std::fs::create_dir_all(&path).unwrap();
+        Self(path)
+    }
+
+    pub fn write(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
+        let path = self.0.join(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(&path, content).unwrap();
+        path
+    }
+}
+
+impl Drop for TestFolder {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+impl AsRef<Path> for TestFolder {
+    fn as_ref(&self) -> &Path {
+        &self.0
+    }
+}
+
+/// A sound `<inertial>`.
+pub const INERTIAL: &str =
+    r#"<inertial><mass value="2"/><inertia ixx="0.02" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial>"#;
+
+/// A link with sound mass.
+pub fn link(name: &str) -> String {
+    format!("<link name=\"{name}\">{INERTIAL}</link>\n")
+}
+
+/// A continuous joint about z.
+pub fn hinge(name: &str, parent: &str, child: &str) -> String {
+    format!(
+        "<joint name=\"{name}\" type=\"continuous\"><parent link=\"{parent}\"/><child link=\"{child}\"/><axis xyz=\"0 0 1\"/></joint>\n"
+    )
+}
+
+/// `<robot>` in line 1, the parts from line 2 on.
+pub fn robot(parts: &[&str]) -> String {
+    format!("<robot name=\"r\">\n{}</robot>\n", parts.concat())
+}
+
+/// Two links and a joint, of which one part is given.
+pub fn with_joint(joint: &str) -> String {
+    robot(&[&link("base"), &link("arm"), joint, "\n"])
+}
+
+/// The faults of a text and their lines.
+pub fn problems(text: &str) -> Vec<(u32, Problem)> {
+    problems_with(text, &ReadOptions::default())
+}
+
+pub fn problems_with(text: &str, options: &ReadOptions) -> Vec<(u32, Problem)> {
+    match parse_urdf(text, "robot.urdf", options) {
+        Ok(_) => Vec::new(),
+        Err(error) => error.issues().iter().map(|i| (i.place.line, i.problem.clone())).collect(),
+    }
+}
+
+/// The only fault of a text.
+#[track_caller]
+pub fn problem(text: &str) -> (u32, Problem) {
+    let mut all = problems(text);
+    assert_eq!(all.len(), 1, "{all:?}");
+    all.remove(0)
+}

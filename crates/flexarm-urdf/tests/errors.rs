@@ -1,0 +1,330 @@
+//! Every fault is found, with its line, once, and with a way to mend it.
+#![allow(clippy::unwrap_used, reason = "a test stops at what it did not expect")]
+
+mod common;
+
+use common::{TestFolder, hinge, link, problem, problems, problems_with, robot, with_joint};
+use flexarm_urdf::{
+    Problem, ReadOptions, Severity, UrdfError, XacroError, check_urdf, check_urdf_text, parse_urdf, read_urdf,
+};
+
+#[track_caller]
+fn assert_code(text: &str, line: u32, code: &str) {
+    let (found_line, found) = problem(text);
+    assert_eq!((found.code(), found_line), (code, line), "{found}");
+    assert!(!found.help().is_empty() && !found.to_string().is_empty());
+}
+
+#[test]
+fn malformed_xml_names_what_was_found_and_expected() {
+    let cases = [
+        ("", "the end of the file", "<robot"),
+        ("<robot name='r'>\n<link name='a'>\n", "the end of the file", "</link>, which is opened in line 2"),
+        ("<robot name='r'>\n<link name='a", "the end of the file", "the rest of <link ...>"),
+        ("<robot name='r'><link name='a'></joint></robot>", "</joint>", "</link>"),
+        ("<robot name='r' name='s'/>", "a second attribute \"name\"", "once"),
+        ("<robot><x:link/></robot>", "undeclared prefix", "xmlns:x"),
+        ("<robot>&boo;</robot>", "unknown entity", "plain text"),
+        ("<robot name=r/>", "'r'", "quote"),
+        ("plain text", "", ""),
+    ];
+    for (text, found_part, expected_part) in cases {
+        let (_, fault) = problem(text);
+        let Problem::Malformed { found, expected } = &fault else { panic!("{text:?}: {fault:?}") };
+        assert!(found.contains(found_part), "{text:?}: {found}");
+        assert!(expected.contains(expected_part), "{text:?}: {expected}");
+    }
+    let error = parse_urdf("<robot name='r'>\n  <link name='a'></robot>", "arm.urdf", &ReadOptions::default());
+    let text = error.unwrap_err().to_string();
+    assert!(text.starts_with("arm.urdf:2:18: found </robot>, expected </link>"), "{text}");
+}
+
+#[test]
+fn other_files_are_recognised() {
+    assert_code("<sdf/>", 1, "not-urdf");
+    assert!(problem("<mujoco/>").1.help().contains("MJCF"));
+    let macros = "<robot xmlns:xacro='http://www.ros.org/wiki/xacro'>\n<xacro:macro name='m'/></robot>";
+    assert_code(macros, 2, "unexpanded-xacro");
+    assert_code("<robot name='r'>\n<link name='${prefix}a'/></robot>", 2, "unexpanded-xacro");
+    let folder = TestFolder::new();
+    let path = folder.write("a.urdf", b"<robot name='\xff'/>");
+    let error = read_urdf(&path, &ReadOptions::default()).unwrap_err();
+    assert_eq!(error.issues()[0].problem, Problem::NotUtf8 { byte: 0xff });
+    assert_eq!(error.issues()[0].place.column, 14);
+}
+
+#[test]
+fn unreadable_files_say_so() {
+    let folder = TestFolder::new();
+    let missing = folder.0.join("missing.urdf");
+    assert!(matches!(read_urdf(&missing, &ReadOptions::default()), Err(UrdfError::Io { .. })));
+    assert!(matches!(read_urdf(&folder, &ReadOptions::default()), Err(UrdfError::Io { .. })));
+    assert_eq!(check_urdf(&missing, &ReadOptions::default())[0].code, "unreadable");
+}
+
+#[test]
+fn names_are_unique_and_known() {
+    assert_code("<robot name='r'/>", 1, "no-link");
+    assert_code(&robot(&[&link("a"), &link("b"), &hinge("j", "a", "b"), &link("b")]), 5, "duplicate-link");
+    let twice = robot(&[&link("a"), &link("b"), &link("c"), &hinge("j", "a", "b"), &hinge("j", "b", "c")]);
+    assert_eq!(problem(&twice), (6, Problem::DuplicateJoint { joint: "j".into(), first_line: 5 }));
+
+    let unknown = robot(&[&link("base_link"), &link("arm"), &hinge("j", "base_lnk", "arm")]);
+    let (line, fault) = problem(&unknown);
+    assert_eq!(line, 4);
+    assert_eq!(
+        fault,
+        Problem::UnknownLink {
+            joint: "j".into(),
+            role: "parent",
+            link: "base_lnk".into(),
+            closest: Some("base_link".into())
+        }
+    );
+    assert_eq!(fault.help(), "did you mean \"base_link\"?");
+}
+
+#[test]
+fn the_links_form_one_tree() {
+    let two = robot(&[
+        &link("a"),
+        &link("b"),
+        &link("c"),
+        &hinge("j", "a", "b"),
+        &hinge("k", "a", "c"),
+        &hinge("l", "b", "c"),
+    ]);
+    let two_parents = Problem::TwoParents { link: "c".into(), first: "k".into(), first_line: 6, second: "l".into() };
+    assert_eq!(problem(&two), (7, two_parents));
+
+    let cycle = robot(&[&link("a"), &link("b"), &link("c"), &hinge("j", "b", "c"), &hinge("k", "c", "b")]);
+    let (_, fault) = problem(&cycle);
+    let Problem::Cycle { joints } = fault else { panic!("{fault}") };
+    assert_eq!(joints.len(), 2);
+    assert_code(&robot(&[&link("a"), &hinge("j", "a", "a")]), 3, "cycle");
+
+    let apart = robot(&[&link("a"), &link("b"), &link("c"), &hinge("j", "a", "b")]);
+    assert_eq!(problem(&apart), (4, Problem::Disconnected { roots: vec!["a".into(), "c".into()] }));
+}
+
+#[test]
+fn missing_parts_are_named() {
+    assert_code(&robot(&["<link/>\n", &link("a")]), 2, "missing-attribute");
+    let no_mass =
+        "<link name='a'><inertial><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/></inertial></link>";
+    assert_eq!(
+        problem(&robot(&[no_mass])),
+        (2, Problem::MissingElement { owner: "link \"a\", <inertial>".into(), element: "mass" })
+    );
+    let no_parent = with_joint("<joint name='j' type='continuous'><child link='arm'/></joint>");
+    assert_code(&no_parent, 4, "missing-element");
+    assert_code(&robot(&["<link name='a'><visual><geometry/></visual></link>"]), 2, "missing-element");
+    assert_code(
+        &with_joint("<joint name='j'><parent link='base'/><child link='arm'/></joint>"),
+        4,
+        "missing-attribute",
+    );
+}
+
+#[test]
+fn what_is_not_a_finite_number_is_refused_where_it_stands() {
+    for word in ["NaN", "inf", "1,5", "", "0x10", "1e999", "two"] {
+        let text = robot(&[&link("a").replace("value=\"2\"", &format!("value=\"{word}\""))]);
+        let (line, fault) = problem(&text);
+        let Problem::NotANumber { owner, attribute, found, .. } = fault else { panic!("{word}: {fault}") };
+        assert_eq!((line, owner.as_str(), attribute, found.as_str()), (2, "link \"a\", <mass>", "value", word));
+    }
+    for origin in ["xyz='0 0'", "xyz='0 0 0 0'", "rpy='0 x 0 0'", "rpy='0 0 nan'"] {
+        let joint = hinge("j", "base", "arm").replace("<axis", &format!("\n<origin {origin}/><axis"));
+        assert_code(&with_joint(&joint), 5, "not-a-number");
+    }
+    let limit = "<joint name='j' type='revolute'><parent link='base'/><child link='arm'/>\
+                 <limit lower='-1' upper='one' effort='1' velocity='1'/></joint>";
+    assert_code(&with_joint(limit), 4, "not-a-number");
+}
+
+#[test]
+fn joint_types_and_limits() {
+    let joint = |kind: &str, limit: &str| {
+        let text = format!(
+            "<joint name='j' type='{kind}'><parent link='base'/><child link='arm'/><axis xyz='0 0 1'/>{limit}</joint>"
+        );
+        with_joint(&text)
+    };
+    for kind in ["floating", "planar", "spherical"] {
+        let (line, fault) = problem(&joint(kind, ""));
+        assert_eq!((line, fault.code()), (4, "unsupported-joint"));
+        assert!(fault.to_string().contains(kind) && fault.help().contains("joint"));
+    }
+    let (_, fault) = problem(&joint("revolut", ""));
+    assert_eq!(fault.help(), "did you mean \"revolute\"?");
+    assert_eq!(problem(&joint("revolute", "")), (4, Problem::MissingLimit { joint: "j".into(), kind: "revolute" }));
+    assert_eq!(problem(&joint("prismatic", "")).1.code(), "missing-limit");
+    let reversed = joint("revolute", "<limit lower='1' upper='-1' effort='1' velocity='1'/>");
+    assert_eq!(problem(&reversed).1, Problem::LimitsReversed { joint: "j".into(), lower: 1.0, upper: -1.0 });
+    assert_eq!(
+        problem(&joint("continuous", "<limit effort='-1' velocity='1'/>")).1,
+        Problem::NegativeLimit { joint: "j".into(), attribute: "effort", value: -1.0 }
+    );
+    let zero = joint("continuous", "").replace("0 0 1", "0 0 0");
+    assert_eq!(problem(&zero), (4, Problem::ZeroAxis { joint: "j".into() }));
+}
+
+#[test]
+fn followers_have_a_leader_that_moves() {
+    let follower =
+        |leader: &str| hinge("j", "base", "arm").replace("</joint>", &format!("<mimic joint='{leader}'/></joint>"));
+    let (_, fault) = problem(&with_joint(&follower("jj")));
+    assert_eq!(fault.code(), "unknown-mimic");
+    assert_eq!(problem(&with_joint(&follower("j"))).1, Problem::MimicCycle { joints: vec!["j".into()] });
+    let fixed = "<joint name='f' type='fixed'><parent link='arm'/><child link='tip'/></joint>\n";
+    let text = robot(&[&link("base"), &link("arm"), "<link name='tip'/>\n", &follower("f"), fixed]);
+    assert_eq!(problem(&text), (5, Problem::MimicFixed { joint: "j".into(), leader: "f".into(), fixed: "f".into() }));
+    let second = hinge("k", "arm", "hand").replace("</joint>", "<mimic joint='j'/></joint>");
+    let third = hinge("l", "hand", "tip").replace("</joint>", "<mimic joint='j'/></joint>");
+    let text = robot(&[&link("base"), &link("arm"), &link("hand"), &link("tip"), &follower("k"), &second, &third]);
+    assert_eq!(problem(&text).1, Problem::MimicCycle { joints: vec!["j".into(), "k".into()] });
+}
+
+/// The moving link "arm" with this `<inertial>`, in line 3.
+fn with_inertial(inertial: &str) -> String {
+    let arm = format!("<link name='arm'>{inertial}</link>\n");
+    robot(&[&link("base"), &arm, &hinge("j", "base", "arm")])
+}
+
+fn inertial(mass: f64, moments: [f64; 3]) -> String {
+    let [x, y, z] = moments;
+    format!(
+        "<inertial><mass value='{mass}'/><inertia ixx='{x}' iyy='{y}' izz='{z}' ixy='0' ixz='0' iyz='0'/></inertial>"
+    )
+}
+
+#[test]
+fn a_moving_link_has_the_mass_of_a_body() {
+    let (line, fault) = problem(&with_inertial(""));
+    assert_eq!((line, fault.code()), (3, "missing-inertial"));
+    assert!(fault.to_string().contains("\"arm\" is moved by joint \"j\""), "{fault}");
+    assert!(fault.help().contains("--inertia-from-mesh"));
+    assert_eq!(
+        problem(&with_inertial(&inertial(-1.0, [1.0; 3]))).1,
+        Problem::NegativeMass { link: "arm".into(), mass: -1.0 }
+    );
+    assert_code(&with_inertial(&inertial(0.0, [0.0; 3])), 3, "zero-mass");
+    for moments in [[1.0, 1.0, -1.0], [0.0, 0.0, 0.0], [0.0, 1.0, 1.0], [1.0, 1.0, 1e-7]] {
+        assert_code(&with_inertial(&inertial(1.0, moments)), 3, "inertia-not-positive-definite");
+    }
+    let (_, fault) = problem(&with_inertial(&inertial(1.0, [1.0, 1.0, 2.1])));
+    let Problem::TriangleInequality { excess, .. } = fault else { panic!("{fault}") };
+    approx::assert_relative_eq!(excess, 0.1, max_relative = 1e-12); // measured 9e-16
+    // a flat plate, rounded in the seventh digit, is a body
+    assert_eq!(problems(&with_inertial(&inertial(1.0, [1.0, 1.0, 2.000001]))), []);
+    assert_eq!(
+        problem(&with_inertial(&inertial(1.0, [1e308, 1e308, 1e308]))).1.code(),
+        "inertia-not-positive-definite"
+    );
+}
+
+/// The first link of the Manutec r3 in the Modelica library: a rotor, diag(0, 1.16, 0).
+#[test]
+fn a_rotor_without_extent_passes_where_it_is_waived_by_name() {
+    let text = with_inertial(&inertial(1.0, [0.0, 1.16, 0.0]));
+    assert_eq!(problem(&text).1.code(), "triangle-inequality");
+    let waived = ReadOptions { waive: vec!["arm".into()], ..ReadOptions::default() };
+    assert_eq!(problems_with(&text, &waived), []);
+    let negative = with_inertial(&inertial(1.0, [-0.1, 1.16, 0.0]));
+    assert_eq!(problems_with(&negative, &waived)[0].1.code(), "inertia-not-positive-definite");
+    let misspelt = ReadOptions { waive: vec!["amr".into(), "arm".into()], ..ReadOptions::default() };
+    let findings = check_urdf_text(&text, "r.urdf", &misspelt);
+    assert!(findings.iter().any(|f| f.code == "waived-unknown-link"));
+}
+
+/// Mass may sit on links fixed to the moving one; a point mass there needs no inertia of its own.
+#[test]
+fn the_mass_of_fixed_children_counts() {
+    let fixed = "<joint name='f' type='fixed'><parent link='arm'/><child link='body'/><origin xyz='0 0 1'/></joint>\n";
+    let parts = |body: &str| {
+        let body = format!("<link name='body'>{body}</link>\n");
+        robot(&[&link("base"), "<link name='arm'/>\n", &body, &hinge("j", "base", "arm"), fixed])
+    };
+    assert_eq!(problems(&parts(&inertial(1.0, [1.0; 3]))), []);
+    let (_, fault) = problem(&parts(""));
+    assert!(fault.to_string().contains("nor have the links fixed to it (\"body\")"), "{fault}");
+    assert_eq!(problem(&parts(&inertial(1.0, [0.0; 3]))).1.code(), "inertia-not-positive-definite");
+
+    let point = parts(&inertial(1.0, [0.0; 3])).replace("<link name='arm'/>", link("arm").trim());
+    let findings = check_urdf_text(&point, "r.urdf", &ReadOptions::default());
+    let codes: Vec<_> = findings.iter().map(|f| (f.severity, f.code)).collect();
+    assert_eq!(codes, [(Severity::Warning, "point-mass")]);
+}
+
+#[test]
+fn the_base_may_have_any_inertia() {
+    let text = robot(&[&format!("<link name='base'>{}</link>", inertial(1.0, [1.0, 1.0, 3.0]))]);
+    let findings = check_urdf_text(&text, "r.urdf", &ReadOptions::default());
+    assert_eq!((findings[0].severity, findings[0].code), (Severity::Warning, "triangle-inequality"));
+}
+
+#[test]
+fn all_faults_come_at_once_in_the_order_of_the_file() {
+    let text = robot(&[
+        &link("base"),
+        &link("arm").replace("value=\"2\"", "value=\"-2\""),
+        &link("arm"),
+        &hinge("j", "base", "armm"),
+        &hinge("k", "base", "arm").replace("0 0 1", "0 0 0"),
+        &hinge("l", "arm", "base2").replace("continuous", "floating"),
+    ]);
+    let found: Vec<_> = problems(&text).into_iter().map(|(line, p)| (line, p.code())).collect();
+    assert_eq!(
+        found,
+        [
+            (3, "negative-mass"),
+            (4, "duplicate-link"),
+            (5, "unknown-link"),
+            (6, "zero-axis"),
+            (7, "unsupported-joint"),
+            (7, "unknown-link")
+        ]
+    );
+    let error = parse_urdf(&text, "arm.urdf", &ReadOptions::default()).unwrap_err();
+    assert_eq!(error.to_string().matches("arm.urdf:").count(), 6);
+    assert_eq!(error.to_string().matches("help: ").count(), 6);
+    assert_eq!(error.findings()[0].location, "arm.urdf:3");
+}
+
+#[test]
+fn a_missing_xacro_program_gives_the_command_to_run() {
+    let folder = TestFolder::new();
+    let path = folder.write("robot.urdf.xacro", "<robot/>");
+    let options = ReadOptions { xacro_program: "no-such-xacro".into(), ..ReadOptions::default() };
+    let error = read_urdf(&path, &options).unwrap_err();
+    assert!(matches!(error, UrdfError::Xacro(XacroError::NotInstalled { .. })));
+    let text = error.to_string();
+    let expected = format!("xacro {} > {}", path.display(), folder.0.join("robot.urdf").display());
+    assert!(text.contains(&expected), "{text}");
+    assert_eq!(check_urdf(&path, &options)[0].code, "xacro");
+}
+
+#[cfg(unix)]
+#[test]
+fn xacro_is_run_and_its_complaint_passed_on() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = TestFolder::new();
+    let program = |name: &str, script: &str| {
+        let path = folder.write(name, format!("#!/bin/sh\n{script}\n"));
+        std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o755)).unwrap();
+        ReadOptions { xacro_program: path, xacro_arguments: vec!["side:=left".into()], ..ReadOptions::default() }
+    };
+    let path = folder.write("robot.xacro", "<robot/>");
+    let works = program("works", "echo \"<robot name='$2'><link name='a'/></robot>\"");
+    assert_eq!(read_urdf(&path, &works).unwrap().mechanism.name, "side:=left");
+    let fails = program("fails", "echo 'undefined macro: arm' >&2; exit 2");
+    let error = read_urdf(&path, &fails).unwrap_err();
+    assert!(error.to_string().contains("undefined macro: arm"), "{error}");
+    let broken = program("broken", "echo '<robot'");
+    let error = read_urdf(&path, &broken).unwrap_err();
+    assert!(error.to_string().contains("robot.xacro (expanded):1:"), "{error}");
+    let unstartable = ReadOptions { xacro_program: folder.0.clone(), ..ReadOptions::default() };
+    let error = read_urdf(&path, &unstartable).unwrap_err();
+    assert!(matches!(error, UrdfError::Xacro(XacroError::NotStarted { .. })));
+}
