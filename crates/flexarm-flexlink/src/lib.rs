@@ -1,1 +1,39 @@
-//! Substitution of rigid links by flexible ones on the tree
+//! Substitution of rigid links by flexible ones on the tree.
+//!
+//! A link with a [`ReducedLink`] becomes two links, proximal and distal, joined by a six-DoF elastic joint at the
+//! split frame S. Everything that hangs on the link beyond the split follows the distal part. The result is again a
+//! [`Mechanism`]: the tree model and every algorithm on it stay the same. Start at [`substitute`].
+//!
+//! Frames: L link, A proximal and B distal interface, S split. Not here: where the stiffness comes from
+//! (`flexarm-fem`), damping and time (`flexarm-stepping`).
+//!
+//! ```
+//! use flexarm_fem::{BeamLink, Material, Section};
+//! use flexarm_flexlink::{FlexibleLink, Parts, substitute};
+//! use flexarm_kinematics::*;
+//! use nalgebra::{Matrix3, Vector3};
+//!
+//! let mut arm = Mechanism::new("arm");
+//! arm.links.push(Link { name: "base".into(), inertia: None });
+//! let inertia = LinkInertia { mass: 20.0, com: Vector3::x() * 0.5, inertia_com: Matrix3::from_diagonal_element(2.0) };
+//! arm.links.push(Link { name: "boom".into(), inertia: Some(inertia) });
+//! arm.links.push(Link { name: "tool".into(), inertia: None });
+//! arm.joints.push(Joint::new("slew", JointKind::Continuous(Vector3::z_axis()), "base", "boom", Pose::identity()));
+//! arm.joints.push(Joint::new("weld", JointKind::Fixed, "boom", "tool", Pose::translation(1.0, 0.0, 0.0)));
+//!
+//! let section = Section::Tube { outer_diameter: 0.1, wall: 0.005 };
+//! let reduced = BeamLink::new("boom", section, Material::STEEL, 1.0).reduce()?;
+//! let flexible = substitute(&arm, &[FlexibleLink::new("boom", reduced)])?;
+//! assert_eq!(flexible.springs[0].joint, "boom__elastic");
+//! assert_eq!(Model::new(&flexible.mechanism)?.nv(), 1 + 6);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+#![allow(non_snake_case, reason = "monogram notation: X_LS, K_S, p_AB; see docs/references.md")]
+#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
+
+mod cut;
+mod substitute;
+
+pub use cut::{CutError, cut_inertia};
+pub use flexarm_fem::ReducedLink;
+pub use substitute::{FlexibleLink, Parts, Spring, SubstitutionError, Substituted, distal_joint, substitute};

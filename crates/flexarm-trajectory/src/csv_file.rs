@@ -18,7 +18,8 @@
 //!
 //! Not here: the splines. Start at [`Trajectory::parse_csv`].
 
-use crate::error::{FileError, Problem, SampleError, TrajectoryError};
+use crate::error::{FileError, TrajectoryError};
+use crate::problem::{Problem, SampleError};
 use crate::spline::{JointSamples, Samples};
 use crate::trajectory::Trajectory;
 use crate::warning::Warning;
@@ -35,8 +36,10 @@ impl Trajectory {
     /// [`TrajectoryError::File`] with the line, the number of the column where it matters, what was found and how to
     /// mend it.
     pub fn parse_csv(text: &str, origin: &str) -> Result<Self, TrajectoryError> {
-        let fail = |line, column, problem| FileError { origin: origin.to_owned(), line, column, problem };
-        parse(text.trim_start_matches('\u{feff}')).map_err(|error| fail(error.line, error.column, error.problem).into())
+        parse(text.trim_start_matches('\u{feff}')).map_err(|Located { line, column, problem }| {
+            let (origin, problem) = (origin.to_owned(), *problem);
+            Box::new(FileError { origin, line, column, problem }).into()
+        })
     }
 }
 
@@ -44,11 +47,15 @@ impl Trajectory {
 struct Located {
     line: Option<usize>,
     column: Option<usize>,
-    problem: Problem,
+    problem: Box<Problem>,
 }
 
 fn located(line: usize, column: Option<usize>, problem: Problem) -> Located {
-    Located { line: Some(line), column, problem }
+    Located { line: Some(line), column, problem: Box::new(problem) }
+}
+
+fn nowhere(problem: Problem) -> Located {
+    Located { line: None, column: None, problem: Box::new(problem) }
 }
 
 /// What a column holds.
@@ -68,26 +75,35 @@ fn parse(text: &str) -> Result<Trajectory, Located> {
         .comment(Some(b'#'))
         .trim(csv::Trim::All)
         .from_reader(text.as_bytes());
-    let mut header: Option<(usize, Vec<String>)> = None;
+    let mut header: Option<Header> = None;
     let mut rows: Vec<(usize, Vec<f64>)> = Vec::new();
     for record in reader.records() {
         // The text is UTF-8 and rows may differ in length, so the reader has nothing left to complain about.
-        let record = record.map_err(|_| Located { line: None, column: None, problem: Problem::NotUtf8 })?;
-        let line = record.position().map_or(0, |position| position.line() as usize);
+        let record = record.map_err(|_| nowhere(Problem::NotUtf8))?;
+        let line = record.position().map_or(0, |position| line_of(text, position));
         if record.iter().all(str::is_empty) && record.len() <= 1 {
             continue;
         }
         match &header {
-            None => header = Some((line, record.iter().map(str::to_owned).collect())),
-            Some((_, columns)) => rows.push((line, numbers(&record, line, columns)?)),
+            None => header = Some(Header::new(line, record.iter().map(str::to_owned).collect())?),
+            Some(header) => rows.push((line, numbers(&record, line, &header.columns)?)),
         }
     }
-    let Some((header_line, columns)) = header else {
-        return Err(Located { line: None, column: None, problem: Problem::Empty });
+    let Some(header) = header else {
+        return Err(nowhere(Problem::Empty));
     };
 
-    let (samples, place) = assemble(header_line, &columns, &rows, &units)?;
-    build(&samples, header_line, &rows, &columns, &place, &units)
+    let samples = assemble(&header, &rows, &units)?;
+    let trajectory = samples.interpolate().map_err(|error| placed(error, &samples, &header, &rows))?;
+    Ok(with_doubts(trajectory, &samples, &units))
+}
+
+/// Line of a record, from 1. The position that the reader gives lies before the blank and comment lines that it
+/// skipped to get to the record.
+fn line_of(text: &str, position: &csv::Position) -> usize {
+    let rest = text.get(position.byte() as usize..).unwrap_or_default();
+    let skipped = rest.lines().take_while(|line| line.is_empty() || line.starts_with('#')).count();
+    position.line() as usize + skipped
 }
 
 /// The fields of a row as finite numbers.
@@ -108,25 +124,64 @@ fn numbers(record: &csv::StringRecord, line: usize, columns: &[String]) -> Resul
     Ok(values)
 }
 
-/// Sorts the columns by joint and converts them to SI; also returns the joint and quantity of each column.
-fn assemble(
+/// The line that names the columns.
+struct Header {
     line: usize,
-    columns: &[String],
-    rows: &[(usize, Vec<f64>)],
-    units: &Units,
-) -> Result<(Samples, Vec<(String, Quantity)>), Located> {
-    let place = columns_of(line, columns)?;
-    let names: Vec<String> =
-        place.iter().filter(|(_, quantity)| *quantity == Quantity::Position).map(|(name, _)| name.clone()).collect();
-    for (comment_line, joint) in &units.metres {
-        if !names.contains(joint) {
-            let problem = Problem::UnknownJoint { key: "metres", name: joint.clone(), joints: names };
-            return Err(located(*comment_line, None, problem));
+    columns: Vec<String>,
+    /// Joint (or `time`) and quantity of each column.
+    meaning: Vec<(String, Quantity)>,
+}
+
+impl Header {
+    fn new(line: usize, columns: Vec<String>) -> Result<Self, Located> {
+        let separator = [';', '\t'].into_iter().find(|&separator| columns[0].contains(separator));
+        if let (Some(separator), true) = (separator, columns[0].starts_with("time")) {
+            return Err(located(line, None, Problem::WrongSeparator { separator }));
         }
+        if !columns.iter().any(|column| column == "time") {
+            return Err(located(line, None, Problem::NoTimeColumn { found: columns }));
+        }
+        let mut meaning = Vec::with_capacity(columns.len());
+        for (i, name) in columns.iter().enumerate() {
+            if name.is_empty() {
+                return Err(located(line, Some(i + 1), Problem::UnnamedColumn));
+            }
+            if columns[..i].contains(name) {
+                return Err(located(line, Some(i + 1), Problem::RepeatedColumn { name: name.clone() }));
+            }
+            let (joint, quantity) = match (name.strip_suffix(".vel"), name.strip_suffix(".acc")) {
+                _ if name == "time" => ("time", Quantity::Time),
+                (Some(joint), _) => (joint, Quantity::Velocity),
+                (_, Some(joint)) => (joint, Quantity::Acceleration),
+                _ => (name.as_str(), Quantity::Position),
+            };
+            let is_rate = matches!(quantity, Quantity::Velocity | Quantity::Acceleration);
+            if is_rate && (joint == "time" || !columns.iter().any(|column| column == joint)) {
+                let (column, joint, found) = (name.clone(), joint.to_owned(), columns.clone());
+                return Err(located(line, Some(i + 1), Problem::NoPositionColumn { column, joint, found }));
+            }
+            meaning.push((joint.to_owned(), quantity));
+        }
+        Ok(Self { line, columns, meaning })
+    }
+
+    /// Index of the column that holds a quantity of a joint.
+    fn find(&self, joint: &str, quantity: Quantity) -> Option<usize> {
+        self.meaning.iter().position(|(name, kind)| name == joint && *kind == quantity)
+    }
+}
+
+/// Sorts the columns by joint and converts them to SI.
+fn assemble(header: &Header, rows: &[(usize, Vec<f64>)], units: &Units) -> Result<Samples, Located> {
+    let positions = header.meaning.iter().filter(|(_, quantity)| *quantity == Quantity::Position);
+    let names: Vec<String> = positions.map(|(name, _)| name.clone()).collect();
+    if let Some((line, name)) = units.metres.iter().find(|(_, name)| !names.contains(name)) {
+        let problem = Problem::UnknownJoint { key: "metres", name: name.clone(), joints: names };
+        return Err(located(*line, None, problem));
     }
 
     let column = |joint: &str, quantity: Quantity| {
-        let i = place.iter().position(|(name, kind)| name == joint && *kind == quantity)?;
+        let i = header.find(joint, quantity)?;
         let scale = if quantity == Quantity::Time { 1.0 } else { units.scale(joint) };
         Some(rows.iter().map(|(_, values)| values[i] * scale).collect::<Vec<f64>>())
     };
@@ -137,67 +192,19 @@ fn assemble(
         acceleration: column(name, Quantity::Acceleration),
     };
     let joints = names.iter().map(joint).collect();
-    let times = column("time", Quantity::Time).unwrap_or_default();
-    Ok((Samples { times, joints }, place))
+    Ok(Samples { times: column("time", Quantity::Time).unwrap_or_default(), joints })
 }
 
-/// Joint and quantity of each column of the header.
-fn columns_of(line: usize, columns: &[String]) -> Result<Vec<(String, Quantity)>, Located> {
-    let found = || columns.to_vec();
-    if let (Some(separator), [only]) = ([';', '\t'].into_iter().find(|&s| columns[0].contains(s)), columns) {
-        if only.starts_with("time") {
-            return Err(located(line, None, Problem::WrongSeparator { separator }));
-        }
-    }
-    if !columns.iter().any(|column| column == "time") {
-        return Err(located(line, None, Problem::NoTimeColumn { found: found() }));
-    }
-    let mut place = Vec::with_capacity(columns.len());
-    for (i, name) in columns.iter().enumerate() {
-        if name.is_empty() {
-            return Err(located(line, Some(i + 1), Problem::UnnamedColumn));
-        }
-        if columns[..i].contains(name) {
-            return Err(located(line, Some(i + 1), Problem::RepeatedColumn { name: name.clone() }));
-        }
-        let (joint, quantity) = match (name.strip_suffix(".vel"), name.strip_suffix(".acc")) {
-            _ if name == "time" => ("time", Quantity::Time),
-            (Some(joint), _) => (joint, Quantity::Velocity),
-            (_, Some(joint)) => (joint, Quantity::Acceleration),
-            _ => (name.as_str(), Quantity::Position),
-        };
-        let is_rate = matches!(quantity, Quantity::Velocity | Quantity::Acceleration);
-        if is_rate && (joint == "time" || !columns.iter().any(|column| column == joint)) {
-            let problem = Problem::NoPositionColumn { column: name.clone(), joint: joint.to_owned(), found: found() };
-            return Err(located(line, Some(i + 1), problem));
-        }
-        place.push((joint.to_owned(), quantity));
-    }
-    Ok(place)
-}
-
-/// Interpolates, and gives what is wrong with the samples its line in the file.
-fn build(
-    samples: &Samples,
-    header_line: usize,
-    rows: &[(usize, Vec<f64>)],
-    columns: &[String],
-    place: &[(String, Quantity)],
-    units: &Units,
-) -> Result<Trajectory, Located> {
-    let trajectory = samples.interpolate().map_err(|error| match error {
+/// Gives what is wrong with the samples its place in the file.
+fn placed(error: TrajectoryError, samples: &Samples, header: &Header, rows: &[(usize, Vec<f64>)]) -> Located {
+    match error {
         TrajectoryError::Samples(error) => {
-            let line = match &error {
-                SampleError::TimeNotIncreasing { row, .. } | SampleError::NotFinite { row, .. } => rows[*row].0,
-                _ => header_line,
-            };
-            let column = match &error {
-                SampleError::TimeNotIncreasing { .. } => place.iter().position(|(_, q)| *q == Quantity::Time),
-                SampleError::NotFinite { what, .. } => columns.iter().position(|column| column == what),
+            let (line, column) = match &error {
+                SampleError::TimeNotIncreasing { row, .. } => (rows[*row].0, header.find("time", Quantity::Time)),
                 SampleError::AccelerationWithoutVelocity { joint } => {
-                    place.iter().position(|(name, q)| name == joint && *q == Quantity::Acceleration)
+                    (header.line, header.find(joint, Quantity::Acceleration))
                 }
-                _ => None,
+                _ => (header.line, None),
             };
             located(line, column.map(|i| i + 1), Problem::Samples(error))
         }
@@ -206,20 +213,21 @@ fn build(
             located(rows[row].0, None, Problem::OutOfRange { joint })
         }
         // `interpolate` knows no other error; should it learn one, its text is still passed on.
-        other => located(header_line, None, Problem::Toml { message: other.to_string() }),
-    })?;
+        other => located(header.line, None, Problem::Toml { message: other.to_string() }),
+    }
+}
 
+/// Adds a note for each joint whose values look like degrees in a file that does not state its unit.
+fn with_doubts(trajectory: Trajectory, samples: &Samples, units: &Units) -> Trajectory {
     if units.degrees.is_some() {
-        return Ok(trajectory);
+        return trajectory;
     }
     let largest = |joint: &JointSamples| joint.position.iter().fold(0.0, |peak: f64, q| peak.max(q.abs()));
-    let suspicious = samples
-        .joints
-        .iter()
-        .filter(|joint| largest(joint) > SUSPICIOUS_ANGLE && !units.metres.iter().any(|(_, name)| *name == joint.name));
-    Ok(suspicious.fold(trajectory, |trajectory, joint| {
+    let is_angle = |joint: &JointSamples| !units.metres.iter().any(|(_, name)| *name == joint.name);
+    let doubtful = samples.joints.iter().filter(|joint| largest(joint) > SUSPICIOUS_ANGLE && is_angle(joint));
+    doubtful.fold(trajectory, |trajectory, joint| {
         trajectory.with_note(Warning::LooksLikeDegrees { joint: joint.name.clone(), largest: largest(joint) })
-    }))
+    })
 }
 
 /// What the comments say about units.

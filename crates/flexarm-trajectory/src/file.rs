@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use crate::error::{FileError, Problem, TrajectoryError};
+use crate::error::{FileError, TrajectoryError};
 use crate::limits::JointLimits;
+use crate::problem::Problem;
 use crate::trajectory::Trajectory;
 
 impl Trajectory {
@@ -32,10 +33,10 @@ impl Trajectory {
     }
 }
 
-fn text_of(bytes: Vec<u8>, origin: &str) -> Result<String, FileError> {
+fn text_of(bytes: Vec<u8>, origin: &str) -> Result<String, Box<FileError>> {
     String::from_utf8(bytes).map_err(|error| {
         let good = &error.as_bytes()[..error.utf8_error().valid_up_to()];
         let line = 1 + good.iter().filter(|&&byte| byte == b'\n').count();
-        FileError { origin: origin.to_owned(), line: Some(line), column: None, problem: Problem::NotUtf8 }
+        Box::new(FileError { origin: origin.to_owned(), line: Some(line), column: None, problem: Problem::NotUtf8 })
     })
 }

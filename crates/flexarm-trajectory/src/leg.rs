@@ -2,9 +2,9 @@
 //!
 //! Start at [`Leg::curves`]: unit shapes (`shape`, or `via` through points on the way) times the way of each joint.
 
-use crate::error::PlanError;
 use crate::plan::{MotionLimits, PlannedMove, Profile};
 use crate::polynomial::Piece;
+use crate::problem::PlanError;
 use crate::shape::{self, Phases, ShapeLimits};
 use crate::trajectory::Curve;
 use crate::via;
@@ -209,9 +209,6 @@ impl Curve {
         if self.pieces.is_empty() {
             return [0.0; 3];
         }
-        [1, 2, 3].map(|order| {
-            let [least, greatest] = self.range(order);
-            greatest.value.max(-least.value)
-        })
+        [1, 2, 3].map(|order| self.largest(order))
     }
 }

@@ -38,7 +38,7 @@ impl Trajectory {
     pub fn peak(&self) -> Vec<JointPeak> {
         let peak = |(joint, curve): (&String, &Curve)| {
             let [lower, upper] = curve.range(0);
-            let jump = curve.jumps().map(|(time_s, jump)| Extreme { time_s, value: jump[2] });
+            let jump = curve.jumps().map(|jump| Extreme { time_s: jump.time_s, value: jump.size[2] });
             JointPeak {
                 joint: joint.clone(),
                 lower,

@@ -11,8 +11,9 @@
 //! straight line in joint space) under the strictest limits; otherwise each joint has a shape of its own and the
 //! move lasts as long as its slowest joint.
 
-use crate::error::{PlanError, TrajectoryError};
+use crate::error::TrajectoryError;
 use crate::leg::Leg;
+use crate::problem::PlanError;
 use crate::trajectory::{Curve, Trajectory};
 
 /// How a move gathers and loses speed.

@@ -16,8 +16,9 @@
 //! (zero acceleration), unless the spline is slower there than 2 % of its top speed: then it is taken to be at rest
 //! as well. Otherwise the velocity jumps at that end, which [`crate::Trajectory::warnings`] tells.
 
-use crate::error::{SampleError, TrajectoryError};
+use crate::error::TrajectoryError;
 use crate::polynomial::Piece;
+use crate::problem::SampleError;
 use crate::trajectory::{Curve, Trajectory};
 
 /// An end slower than this part of the top speed is at rest.

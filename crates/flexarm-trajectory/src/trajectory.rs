@@ -42,10 +42,11 @@ pub struct Move {
 impl Trajectory {
     /// Puts checked curves together.
     ///
-    /// All curves must cover `0..duration` and have at least one piece.
+    /// All curves must cover `0..duration`.
     ///
     /// # Errors
-    /// [`TrajectoryError::OutOfRange`] when a coefficient is not finite: values and times are too extreme for f64.
+    /// [`TrajectoryError::OutOfRange`] when a coefficient or a time is not finite, or a piece shorter than the rounding
+    /// of its time: values and times are too extreme for f64.
     pub(crate) fn from_curves(
         joints: Vec<String>,
         curves: Vec<Curve>,
@@ -59,6 +60,9 @@ impl Trajectory {
             let spans = curve.knots.windows(2).zip(&curve.pieces);
             let mut sound = spans
                 .map(|(knot, piece)| piece.is_sound() && (knot[1] - knot[0] - piece.width).abs() <= 1e-6 * piece.width);
+            if curve.pieces.is_empty() || !duration.is_finite() {
+                return Err(TrajectoryError::OutOfRange { joint: joint.clone(), time_s: duration });
+            }
             if let Some(i) = sound.position(|is_sound| !is_sound) {
                 return Err(TrajectoryError::OutOfRange { joint: joint.clone(), time_s: curve.knots[i] });
             }
@@ -233,26 +237,51 @@ impl Curve {
         piece.at(piece.width)
     }
 
-    /// Jump of position, velocity, acceleration and jerk at each knot, the holds before and after included.
-    pub(crate) fn jumps(&self) -> impl Iterator<Item = (f64, [f64; 4])> + '_ {
-        (0..self.knots.len()).map(|i| {
-            let hold = |q: f64| [q, 0.0, 0.0, 0.0];
-            let before = if i == 0 { hold(self.start()[0]) } else { self.pieces[i - 1].at(self.pieces[i - 1].width) };
-            let after = if i == self.pieces.len() { hold(self.end()[0]) } else { self.pieces[i].at(0.0) };
-            (self.knots[i], std::array::from_fn(|k| after[k] - before[k]))
+    /// The jumps at every knot, the holds before and after included.
+    pub(crate) fn jumps(&self) -> impl Iterator<Item = Jump> + '_ {
+        let held = |[q, ..]: [f64; 4]| [q, 0.0, 0.0, 0.0];
+        let last = self.pieces.len();
+        (0..=last).map(move |i| {
+            let left = i.checked_sub(1).map(|i| &self.pieces[i]);
+            let right = self.pieces.get(i);
+            let before = left.map_or_else(|| held(self.start()), |piece| piece.at(piece.width));
+            let after = right.map_or_else(|| held(self.end()), |piece| piece.at(0.0));
+            // Positions are known to a few units in the last place; each derivative divides that by the width.
+            let width = left.into_iter().chain(right).map(|piece| piece.width).fold(f64::INFINITY, f64::min);
+            let rounding = |order: i32| 1e-13 * after[0].abs() / width.powi(order);
+            Jump {
+                time_s: self.knots[i],
+                size: std::array::from_fn(|k| after[k] - before[k]),
+                rounding: [0, 1, 2, 3].map(rounding),
+            }
         })
     }
 
-    /// Knots at which acceleration or jerk jumps by more than a millionth of its peak.
+    /// Knots at which acceleration or jerk jumps by more than rounding and a millionth of its peak.
     fn kinks(&self) -> Vec<f64> {
-        let peak = |order: usize| {
-            let ends = self.pieces.iter().flat_map(|piece| [piece.at(0.0)[order], piece.at(piece.width)[order]]);
-            ends.fold(0.0, |peak: f64, value| peak.max(value.abs()))
-        };
-        let (acceleration, jerk) = (peak(2), peak(3));
-        self.jumps()
-            .filter(|(_, jump)| jump[2].abs() > 1e-6 * acceleration || jump[3].abs() > 1e-6 * jerk)
-            .map(|(t, _)| t)
-            .collect()
+        let (acceleration, jerk) = (self.largest(2), self.largest(3));
+        let kinks = self.jumps().filter(|jump| jump.exceeds(2, 1e-6 * acceleration) || jump.exceeds(3, 1e-6 * jerk));
+        kinks.map(|jump| jump.time_s).collect()
+    }
+
+    /// Largest magnitude of derivative `order`.
+    pub(crate) fn largest(&self, order: usize) -> f64 {
+        let [least, greatest] = self.range(order);
+        greatest.value.max(-least.value)
+    }
+}
+
+/// By how much position, velocity, acceleration and jerk jump at a knot.
+pub(crate) struct Jump {
+    pub(crate) time_s: f64,
+    pub(crate) size: [f64; 4],
+    /// Jumps below this are rounding.
+    rounding: [f64; 4],
+}
+
+impl Jump {
+    /// Is the jump of derivative `order` larger than `level` and than rounding explains?
+    pub(crate) fn exceeds(&self, order: usize, level: f64) -> bool {
+        self.size[order].abs() > level.max(self.rounding[order])
     }
 }

@@ -133,7 +133,7 @@ mod tests {
             for tau in [0.0, 0.3 * piece.width, piece.width] {
                 let t = u0 + tau;
                 let truth = t.powi(3) * (10.0 - 15.0 * t + 6.0 * t * t);
-                assert!((piece.at(tau)[0] - truth).abs() < 1e-13); // measured 3e-16
+                assert!((piece.at(tau)[0] - truth).abs() < 1e-13); // measured 1.1e-15
             }
         }
     }
@@ -156,7 +156,7 @@ mod tests {
                 for order in 0..4 {
                     prop_assert!((left.at(left.width)[order] - right.at(0.0)[order]).abs() <= 1e-11 * scale);
                 }
-                prop_assert!((snap(&left, left.width) - snap(&right, 0.0)).abs() <= 1e-11 * scale); // measured 1e-14
+                prop_assert!((snap(&left, left.width) - snap(&right, 0.0)).abs() <= 1e-11 * scale); // measured 2e-16 of the scale
             }
         }
     }

@@ -110,14 +110,12 @@ impl Warning {
         }
 
         // Where the velocity jumps already, the acceleration says nothing new.
-        let peak = curve.pieces.iter().flat_map(|piece| [piece.at(0.0)[2], piece.at(piece.width)[2]]);
-        let peak = peak.fold(0.0, |peak: f64, a| peak.max(a.abs()));
-        let is_jump = |jump: &[f64; 4]| jump[1].abs() <= QUIET_SPEED && jump[2].abs() > QUIET_JUMP * peak;
-        let jumps: Vec<(f64, f64)> =
-            curve.jumps().filter(|(_, jump)| is_jump(jump)).map(|(t, jump)| (t, jump[2])).collect();
-        if let Some(&(time_s, jump)) = jumps.iter().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())) {
+        let level = QUIET_JUMP * curve.largest(2);
+        let jumps: Vec<_> =
+            curve.jumps().filter(|jump| !jump.exceeds(1, QUIET_SPEED) && jump.exceeds(2, level)).collect();
+        if let Some(most) = jumps.iter().max_by(|a, b| a.size[2].abs().total_cmp(&b.size[2].abs())) {
             let (joint, count) = (joint.to_owned(), jumps.len());
-            warnings.push(Self::AccelerationJumps { joint, time_s, jump, count });
+            warnings.push(Self::AccelerationJumps { joint, time_s: most.time_s, jump: most.size[2], count });
         }
         warnings
     }

@@ -37,8 +37,9 @@
 //!
 //! Start at [`Trajectory::parse_toml`]. Not here: the mathematics of the moves ([`crate::Plan`]).
 
-use crate::error::{FileError, PlanError, Problem, TrajectoryError};
+use crate::error::{FileError, TrajectoryError};
 use crate::limits::JointLimits;
+use crate::problem::{PlanError, Problem};
 use crate::trajectory::Trajectory;
 use crate::waypoints_check::{Checked, check};
 use crate::waypoints_toml::FileToml;
@@ -55,7 +56,7 @@ impl Trajectory {
     pub fn parse_toml(text: &str, origin: &str, limits: &[(&str, JointLimits)]) -> Result<Self, TrajectoryError> {
         let fail = |offset: Option<usize>, problem: Problem| {
             let (line, column) = offset.map(|offset| place(text, offset)).unzip();
-            TrajectoryError::from(FileError { origin: origin.to_owned(), line, column, problem })
+            TrajectoryError::from(Box::new(FileError { origin: origin.to_owned(), line, column, problem }))
         };
         let file: FileToml = toml::from_str(text).map_err(|error| {
             let message = error.message().split_whitespace().collect::<Vec<_>>().join(" ");
@@ -63,7 +64,8 @@ impl Trajectory {
             fail(error.span().map(|span| span.start), Problem::Toml { message })
         })?;
 
-        let Checked { plan, move_offsets } = check(&file, limits).map_err(|error| fail(error.offset, error.problem))?;
+        let Checked { plan, move_offsets } =
+            check(&file, limits).map_err(|error| fail(error.offset, *error.problem))?;
         plan.build().map_err(|error| match error {
             TrajectoryError::Plan(error) => {
                 let offset = PlanError::move_number(&error).and_then(|number| move_offsets.get(number - 1).copied());

@@ -6,9 +6,9 @@ use std::ops::Range;
 
 use toml::Spanned;
 
-use crate::error::Problem;
 use crate::limits::JointLimits;
 use crate::plan::{MotionLimits, Plan, PlannedMove, Profile};
+use crate::problem::Problem;
 use crate::waypoints_toml::{FileToml, MoveToml, ProfileToml, Values};
 
 /// Rounding of trapezoids when the file does not say.
@@ -17,7 +17,7 @@ const DEFAULT_ROUNDING: f64 = 0.1;
 /// A problem and the byte at which it stands.
 pub(crate) struct Located {
     pub(crate) offset: Option<usize>,
-    pub(crate) problem: Problem,
+    pub(crate) problem: Box<Problem>,
 }
 
 /// The plan, and where each move stands in the text.
@@ -27,7 +27,7 @@ pub(crate) struct Checked {
 }
 
 fn located(span: Range<usize>, problem: Problem) -> Located {
-    Located { offset: Some(span.start), problem }
+    Located { offset: Some(span.start), problem: Box::new(problem) }
 }
 
 fn bad_value(span: Range<usize>, key: &str, found: impl ToString, expected: &'static str) -> Located {

@@ -7,14 +7,14 @@ use std::path::PathBuf;
 use flexarm_kinematics::Pose;
 use nalgebra::{Matrix3, Vector3};
 
-use crate::mesh::{MassProperties, MeshError, TriangleMesh, load_mesh};
+use crate::mesh::{MassProperties, MeshError, TriangleMesh, UpAxis, load_mesh_with};
 
 /// A shape on a link.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Visual {
     /// Name of the link L.
     pub link: String,
-    /// Pose of the shape in the link [m].
+    /// Pose of the shape in the link, in m.
     pub X_LV: Pose,
     /// The shape.
     pub geometry: Geometry,
@@ -35,6 +35,8 @@ pub enum Geometry {
         path: Option<PathBuf>,
         /// Factors along x, y and z, applied after the unit and the up axis of the file.
         scale: Vector3<f64>,
+        /// What to do with the up axis of a COLLADA file.
+        up_axis: UpAxis,
     },
     /// A box.
     Box {
@@ -68,7 +70,7 @@ impl Geometry {
     /// [`MeshError`], for meshes only.
     pub fn triangles(&self) -> Result<TriangleMesh, MeshError> {
         Ok(match self {
-            Self::Mesh { path: Some(path), scale, .. } => load_mesh(path)?.scaled(scale),
+            Self::Mesh { path: Some(path), scale, up_axis, .. } => load_mesh_with(path, *up_axis)?.scaled(scale),
             Self::Mesh { uri, path: None, .. } => return Err(MeshError::NotFound { uri: uri.clone() }),
             Self::Box { size } => box_triangles(size),
             Self::Cylinder { radius, length } => cylinder_triangles(*radius, *length),

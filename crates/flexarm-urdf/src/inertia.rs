@@ -10,9 +10,9 @@
 use flexarm_kinematics::{LinkInertia, SpatialInertia};
 use nalgebra::{Matrix3, Vector3};
 
-use crate::document::{RawInertial, RawRobot};
 use crate::error::Problem;
 use crate::mesh::MassProperties;
+use crate::raw::{RawInertial, RawRobot};
 use crate::read::{InertiaEstimate, ReadOptions};
 use crate::report::Report;
 use crate::shapes::LinkShape;

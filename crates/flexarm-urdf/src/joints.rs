@@ -5,8 +5,8 @@ use std::collections::HashMap;
 use flexarm_kinematics::{Joint, JointKind, Limits, Mimic};
 use nalgebra::{Unit, Vector3};
 
-use crate::document::{RawJoint, RawKind, RawLimit, RawRobot};
 use crate::error::Problem;
+use crate::raw::{RawJoint, RawKind, RawLimit, RawRobot};
 use crate::report::Report;
 use crate::spelling::closest;
 
@@ -15,8 +15,14 @@ const UNIT_TOLERANCE: f64 = 1e-4;
 
 /// All joints in the order of the file; faults go to the report.
 pub(crate) fn convert_joints(robot: &RawRobot, report: &mut Report) -> Vec<Joint> {
+    let faults = report.issues.len();
     check_mimics(robot, report);
-    robot.joints.iter().map(|joint| convert(joint, robot.open_limits, report)).collect()
+    let sound_mimics = report.issues.len() == faults;
+    let mut joints: Vec<Joint> = robot.joints.iter().map(|joint| convert(joint, robot.open_limits, report)).collect();
+    if sound_mimics {
+        join_mimic_chains(&mut joints);
+    }
+    joints
 }
 
 fn convert(raw: &RawJoint, open_limits: bool, report: &mut Report) -> Joint {
@@ -89,6 +95,21 @@ fn limits(raw: &RawJoint, limit: &RawLimit, open_limits: bool, report: &mut Repo
     limits.effort = magnitude("effort", "unknown-effort", limit.effort);
     limits.velocity = magnitude("velocity", "unknown-velocity", limit.velocity);
     limits
+}
+
+/// A follower of a follower becomes one of the independent joint: `r (r' q + o') + o = (r r') q + (r o' + o)`.
+fn join_mimic_chains(joints: &mut [Joint]) {
+    let written: HashMap<String, Mimic> =
+        joints.iter().filter_map(|j| Some((j.name.clone(), j.mimic.clone()?))).collect();
+    for mimic in joints.iter_mut().filter_map(|j| j.mimic.as_mut()) {
+        // the bound only guards against joints of one name
+        for _ in 0..written.len() {
+            let Some(next) = written.get(&mimic.joint) else { break };
+            mimic.offset += mimic.ratio * next.offset;
+            mimic.ratio *= next.ratio;
+            mimic.joint.clone_from(&next.joint);
+        }
+    }
 }
 
 /// Followers need a leader that exists and moves; a circle of followers has none.

@@ -39,7 +39,7 @@
 //!
 //! What URDF leaves open is decided so: inertias are turned by the `rpy` of their origin; frames without mass stay
 //! links; an effort or velocity limit of 0 means unknown; a joint's `<dynamics>` is listed and does not act. Meshes
-//! ([`load_mesh`]) come out in metres with the up axis and node transforms of their format applied.
+//! ([`load_mesh`]) come out in metres, z up, with the node transforms of their format applied.
 //!
 //! Notation: `X_PJ` pose of J in P; L link, V visual, I axes of `<inertial>`. SI units.
 //! Not here: SDF and MJCF, collision shapes, textures, the dynamics model (`flexarm-kinematics`).
@@ -53,6 +53,7 @@ mod geometry;
 mod inertia;
 mod joints;
 pub mod mesh;
+mod raw;
 mod read;
 mod report;
 mod resolve;
@@ -66,7 +67,7 @@ mod xml;
 pub use error::{Issue, Problem, UrdfError, XacroError};
 pub use finding::{Finding, Place, Severity};
 pub use geometry::{Geometry, Visual};
-pub use mesh::{MassProperties, MeshError, TriangleMesh, load_mesh};
+pub use mesh::{MassProperties, MeshError, TriangleMesh, UpAxis, load_mesh, load_mesh_with};
 pub use read::{
     InertiaEstimate, JointDynamics, ReadOptions, Transmission, UrdfRobot, check_urdf, check_urdf_text, parse_urdf,
     read_urdf,

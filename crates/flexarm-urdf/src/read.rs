@@ -4,10 +4,12 @@ use std::path::{Path, PathBuf};
 
 use flexarm_kinematics::{Link, Mechanism};
 
-use crate::document::{RawRobot, read_document};
+use crate::document::read_document;
 use crate::error::UrdfError;
 use crate::finding::{Finding, Place, Severity};
 use crate::geometry::Visual;
+use crate::mesh::UpAxis;
+use crate::raw::{RawKind, RawRobot};
 use crate::report::Report;
 use crate::resolve::Resolver;
 use crate::tcp::tcp_candidates;
@@ -28,6 +30,8 @@ pub struct ReadOptions {
     pub waive: Vec<String>,
     /// Read the mesh files, to check them and to compare inertias with them. Off, files are only found.
     pub inspect_meshes: bool,
+    /// What to do with the up axis of COLLADA meshes.
+    pub up_axis: UpAxis,
     /// The program that expands `.xacro` files; a bare name is looked for by the system.
     pub xacro_program: PathBuf,
     /// Arguments for it, such as `"prefix:=left_"`.
@@ -42,6 +46,7 @@ impl Default for ReadOptions {
             inertia_from_mesh: None,
             waive: Vec::new(),
             inspect_meshes: true,
+            up_axis: UpAxis::Declared,
             xacro_program: PathBuf::from("xacro"),
             xacro_arguments: Vec::new(),
         }
@@ -55,7 +60,7 @@ impl Default for ReadOptions {
 pub enum InertiaEstimate {
     /// The same density everywhere [kg/m³].
     Density(f64),
-    /// The mass of all estimated links together, the base included [kg]; distributed by volume.
+    /// The mass of all estimated links together, the base included, in kg; distributed by volume.
     TotalMass(f64),
 }
 
@@ -166,7 +171,7 @@ fn load_text(path: &Path, options: &ReadOptions) -> Result<(String, PathBuf), Ur
     } else {
         (std::fs::read(path).map_err(io_error)?, path.to_owned())
     };
-    let text = xml::decode(bytes, &shown).map_err(|issue| UrdfError::Invalid { issues: vec![issue] })?;
+    let text = xml::decode(bytes, &shown).map_err(|issue| UrdfError::Invalid { issues: vec![*issue] })?;
     Ok((text, shown))
 }
 
@@ -181,7 +186,7 @@ fn parse(text: &str, shown: &Path, folder: PathBuf, options: &ReadOptions) -> (R
             read_document(document.root_element(), &lines, &mut report)
         }
         Err(issue) => {
-            report.issues.push(issue);
+            report.issues.push(*issue);
             None
         }
     };
@@ -211,7 +216,7 @@ fn assemble(raw: &RawRobot, text: &str, folder: PathBuf, options: &ReadOptions, 
     mechanism.joints = joints::convert_joints(raw, report);
 
     let resolver = Resolver { folder, packages: &options.packages, search_paths: &options.search_paths };
-    let visuals = shapes::find_visuals(raw, &resolver, report);
+    let visuals = shapes::find_visuals(raw, &resolver, options.up_axis, report);
     let shapes = if options.inspect_meshes || options.inertia_from_mesh.is_some() {
         shapes::inspect(raw, &visuals, report)
     } else {
@@ -224,7 +229,7 @@ fn assemble(raw: &RawRobot, text: &str, folder: PathBuf, options: &ReadOptions, 
         raw.links.iter().zip(inertias).map(|(link, inertia)| Link { name: link.name.clone(), inertia }).collect();
 
     let tcp_candidates = tcp_candidates(&mechanism).into_iter().map(str::to_owned).collect();
-    let moving = raw.joints.iter().filter(|j| j.kind != crate::document::RawKind::Fixed);
+    let moving = raw.joints.iter().filter(|j| j.kind != RawKind::Fixed);
     UrdfRobot {
         text: text.to_owned(),
         visuals,

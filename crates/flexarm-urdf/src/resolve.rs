@@ -82,12 +82,16 @@ impl Resolver<'_> {
             self.packages.iter().filter(|(name, _)| name == package).map(|(_, path)| path.clone()).collect();
 
         // Upwards from the URDF: the package itself, or its neighbour in a workspace.
-        let start = std::path::absolute(&self.folder).unwrap_or_else(|_| self.folder.clone());
-        for ancestor in start.ancestors() {
-            if is_package(ancestor, package) {
-                folders.push(ancestor.to_owned());
+        // By the name it was given first, then where links lead (installations often link to sources).
+        let named = std::path::absolute(&self.folder).ok();
+        let real = named.as_deref().and_then(|folder| folder.canonicalize().ok());
+        for start in named.iter().chain(real.as_ref().filter(|real| named.as_ref() != Some(real))) {
+            for ancestor in start.ancestors() {
+                if is_package(ancestor, package) {
+                    folders.push(ancestor.to_owned());
+                }
+                folders.push(ancestor.join(package));
             }
-            folders.push(ancestor.join(package));
         }
         // Installed packages: PREFIX/share/NAME; workspaces: SRC/NAME and SRC/REPOSITORY/NAME.
         for path in self.search_paths {

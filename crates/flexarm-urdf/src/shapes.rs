@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use flexarm_kinematics::Pose;
 use nalgebra::{Point3, Vector3};
 
-use crate::document::{RawGeometry, RawRobot, RawVisual};
 use crate::finding::Place;
 use crate::geometry::{Geometry, Visual};
-use crate::mesh::{MassProperties, TriangleMesh, load_with_remarks};
+use crate::mesh::{MassProperties, TriangleMesh, UpAxis, load_with_remarks};
+use crate::raw::{RawGeometry, RawRobot, RawVisual};
 use crate::report::Report;
 use crate::resolve::Resolver;
 
@@ -27,7 +27,12 @@ pub(crate) struct LinkShape {
 }
 
 /// All visuals, with mesh files found.
-pub(crate) fn find_visuals(robot: &RawRobot, resolver: &Resolver<'_>, report: &mut Report) -> Vec<Visual> {
+pub(crate) fn find_visuals(
+    robot: &RawRobot,
+    resolver: &Resolver<'_>,
+    up_axis: UpAxis,
+    report: &mut Report,
+) -> Vec<Visual> {
     let mut visuals = Vec::new();
     for link in &robot.links {
         for raw in &link.visuals {
@@ -35,7 +40,7 @@ pub(crate) fn find_visuals(robot: &RawRobot, resolver: &Resolver<'_>, report: &m
             visuals.push(Visual {
                 link: link.name.clone(),
                 X_LV: raw.X_LV,
-                geometry: geometry(raw, &link.name, resolver, report),
+                geometry: geometry(raw, &link.name, resolver, up_axis, report),
                 color: raw.color.or(named.copied()),
                 name: raw.name.clone(),
             });
@@ -44,7 +49,7 @@ pub(crate) fn find_visuals(robot: &RawRobot, resolver: &Resolver<'_>, report: &m
     visuals
 }
 
-fn geometry(raw: &RawVisual, link: &str, resolver: &Resolver<'_>, report: &mut Report) -> Geometry {
+fn geometry(raw: &RawVisual, link: &str, resolver: &Resolver<'_>, up_axis: UpAxis, report: &mut Report) -> Geometry {
     match &raw.geometry {
         RawGeometry::Box { size } => Geometry::Box { size: *size },
         RawGeometry::Cylinder { radius, length } => Geometry::Cylinder { radius: *radius, length: *length },
@@ -54,7 +59,7 @@ fn geometry(raw: &RawVisual, link: &str, resolver: &Resolver<'_>, report: &mut R
                 let message = format!("link {link:?}: no mesh for {uri:?}: {}", not_found.reason);
                 report.warning(&raw.place, "missing-mesh", message, not_found.help);
             });
-            Geometry::Mesh { uri: uri.clone(), path: path.ok(), scale: *scale }
+            Geometry::Mesh { uri: uri.clone(), path: path.ok(), scale: *scale, up_axis }
         }
     }
 }
@@ -124,8 +129,8 @@ impl Meshes {
     ) -> Result<(Bounds, MassProperties), String> {
         let (low_V, high_V, properties) = match &visual.geometry {
             Geometry::Mesh { path: None, uri, .. } => return Err(format!("the mesh {uri:?} was not found")),
-            Geometry::Mesh { path: Some(path), scale, .. } => {
-                let mesh = self.load(path, &visual.link, place, report).as_ref().map_err(String::clone)?;
+            Geometry::Mesh { path: Some(path), scale, up_axis, .. } => {
+                let mesh = self.load(path, *up_axis, &visual.link, place, report).as_ref().map_err(String::clone)?;
                 let mesh = mesh.clone().scaled(scale);
                 let (low, high) = mesh.bounds().unwrap_or_default();
                 (low, high, mesh.mass_properties())
@@ -145,8 +150,15 @@ impl Meshes {
         Ok((corners.fold(start, |(low, high), p| (low.inf(&p), high.sup(&p))), properties))
     }
 
-    fn load(&mut self, path: &Path, link: &str, place: &Place, report: &mut Report) -> &Result<TriangleMesh, String> {
-        self.loaded.entry(path.to_owned()).or_insert_with(|| match load_with_remarks(path) {
+    fn load(
+        &mut self,
+        path: &Path,
+        up_axis: UpAxis,
+        link: &str,
+        place: &Place,
+        report: &mut Report,
+    ) -> &Result<TriangleMesh, String> {
+        self.loaded.entry(path.to_owned()).or_insert_with(|| match load_with_remarks(path, up_axis) {
             Ok(loaded) => {
                 for remark in loaded.remarks {
                     report.note(place, "mesh-remark", format!("{}: {remark}", path.display()), "");

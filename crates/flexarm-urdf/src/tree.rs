@@ -7,8 +7,8 @@ use std::collections::{HashMap, HashSet};
 
 use flexarm_kinematics::Pose;
 
-use crate::document::{RawJoint, RawKind, RawRobot};
 use crate::error::Problem;
+use crate::raw::{RawJoint, RawKind, RawRobot};
 use crate::report::Report;
 use crate::spelling::closest;
 

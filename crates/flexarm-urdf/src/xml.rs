@@ -41,20 +41,20 @@ impl<'t> Lines<'t> {
 }
 
 /// Bytes to text, without a byte order mark.
-pub(crate) fn decode(bytes: Vec<u8>, file: &Path) -> Result<String, Issue> {
+pub(crate) fn decode(bytes: Vec<u8>, file: &Path) -> Result<String, Box<Issue>> {
     let text = String::from_utf8(bytes).map_err(|error| {
         let at = error.utf8_error().valid_up_to();
         let bytes = error.as_bytes();
         let valid = String::from_utf8_lossy(&bytes[..at]);
         let place = Lines::new(file, &valid).place(at);
-        Issue { place, problem: Problem::NotUtf8 { byte: bytes[at] } }
+        Box::new(Issue { place, problem: Problem::NotUtf8 { byte: bytes[at] } })
     })?;
     Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
 }
 
 /// The tree of the text, or the first place where it is not XML.
-pub(crate) fn parse<'t>(text: &'t str, lines: &Lines<'_>) -> Result<Document<'t>, Issue> {
-    Document::parse(text).map_err(|error| describe(text, lines, &error))
+pub(crate) fn parse<'t>(text: &'t str, lines: &Lines<'_>) -> Result<Document<'t>, Box<Issue>> {
+    Document::parse(text).map_err(|error| Box::new(describe(text, lines, &error)))
 }
 
 fn describe(text: &str, lines: &Lines<'_>, error: &Error) -> Issue {

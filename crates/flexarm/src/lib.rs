@@ -1,1 +1,47 @@
-//! From a robot file and a trajectory to a result: the facade of the flexarm workspace
+//! From a robot file and a trajectory to a result: the facade of the flexarm workspace.
+//!
+//! Data path: robot file → rigid model → substitution → system → stepper → recorder → metrics. [`Robot::load`] does
+//! the first three, [`Motion::load`] reads the trajectory, [`simulate`] runs both robots and returns a [`Summary`].
+//! [`inspect()`] and [`check()`] look at what was loaded. Both faces (command line, Python) use this crate alone.
+//!
+//! ```no_run
+//! use std::ops::ControlFlow;
+//! use flexarm::{LoadOptions, Motion, Outputs, Robot, RunOptions, simulate};
+//!
+//! let robot = Robot::load("robots/kr210".as_ref(), &LoadOptions::default())?;
+//! let motion = Motion::load("trajectories/pick_and_place.toml".as_ref(), &*robot.rigid_model()?)?;
+//! let outputs = Outputs::everything("out/first");
+//! let options = RunOptions::default();
+//! let summary = simulate(&robot, &motion, &options, Some(&outputs), &mut |_, _| ControlFlow::Continue(()))?;
+//! println!("peak TCP error {:.3} mm", 1e3 * summary.tcp.unwrap().peak_m);
+//! # Ok::<(), flexarm::Error>(())
+//! ```
+#![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
+#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
+
+mod beam_entry;
+mod check;
+mod compare;
+mod error;
+mod inspect;
+mod motion;
+mod options;
+mod record;
+mod report;
+mod robot;
+pub mod robot_file;
+mod summary;
+mod twin;
+
+pub use check::{Finding, check};
+pub use compare::{Progress, simulate};
+pub use error::Error;
+pub use inspect::{FlexibleInfo, Inspection, JointInfo, LinkInfo, TcpInfo, inspect, parse_joint_values};
+pub use motion::Motion;
+pub use options::{LinkModel, Outputs, RunOptions};
+pub use report::{markdown, rows};
+pub use robot::{FlexibleRobot, LoadOptions, Robot, TCP_FRAME};
+pub use summary::{Files, LinkFigures, StepperFigures, Summary, TcpFigures};
+
+pub use flexarm_stepping::{ConstraintForm, SpookPreset, SpookSettings, Start, StepError, StepperKind};
+pub use flexarm_urdf::{InertiaEstimate, ReadOptions, search_paths_from_environment};

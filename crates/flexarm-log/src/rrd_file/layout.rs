@@ -4,13 +4,17 @@
 //! its parts by chance and cannot set a plot's legend.
 
 use rerun::external::re_sdk_types::blueprint::archetypes::{
-    ContainerBlueprint, PanelBlueprint, PlotLegend, TimeAxis, TimePanelBlueprint, ViewBlueprint, ViewContents,
+    ContainerBlueprint, EyeControls3D, PanelBlueprint, PlotLegend, TimeAxis, TimePanelBlueprint, ViewBlueprint, ViewContents,
     ViewportBlueprint,
 };
 use rerun::external::re_sdk_types::blueprint::components::{
     ColumnShare, ContainerKind, Corner2D, LinkAxis, LoopMode, PanelState, PlayState, RowShare, TimelineName,
 };
 use rerun::{AsComponents, EntityPath};
+
+const VIEW_3D: &str = "3D";
+const VIEW_PLOT: &str = "TimeSeries";
+const VIEW_TEXT: &str = "TextDocument";
 
 /// Entities of the blueprint with their contents.
 pub(crate) type Entities = Vec<(EntityPath, Box<dyn AsComponents>)>;
@@ -27,6 +31,13 @@ pub(crate) enum Part {
     View(View),
 }
 
+/// Where the 3D view is seen from, and what is in its middle [m, world].
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Eye {
+    pub(crate) position: [f32; 3],
+    pub(crate) target: [f32; 3],
+}
+
 /// Something to look at.
 pub(crate) struct View {
     pub(crate) class: &'static str,
@@ -38,17 +49,17 @@ pub(crate) struct View {
 impl Part {
     /// The 3D view of all entities below `origin`.
     pub(crate) fn space(title: &str, origin: EntityPath) -> Self {
-        Self::view("3D", title, origin)
+        Self::view(VIEW_3D, title, origin)
     }
 
     /// A plot of all scalars below `origin`.
     pub(crate) fn plot(title: &str, origin: EntityPath) -> Self {
-        Self::view("TimeSeries", title, origin)
+        Self::view(VIEW_PLOT, title, origin)
     }
 
     /// A text.
     pub(crate) fn text(title: &str, origin: EntityPath) -> Self {
-        Self::view("TextDocument", title, origin)
+        Self::view(VIEW_TEXT, title, origin)
     }
 
     fn view(class: &'static str, title: &str, origin: EntityPath) -> Self {
@@ -56,9 +67,10 @@ impl Part {
     }
 }
 
-/// The entities of a layout with `root` as the window, playing on `timeline`.
-pub(crate) fn entities(root: &Part, timeline: &str) -> Entities {
-    let mut layout = Layout { entities: Vec::new(), parts: 0 };
+/// The entities of a layout with `root` as the window, playing on `timeline`; without an eye the viewer
+/// chooses one.
+pub(crate) fn entities(root: &Part, timeline: &str, eye: Option<Eye>) -> Entities {
+    let mut layout = Layout { entities: Vec::new(), parts: 0, eye };
     let root_id = layout.add(root).id;
     let viewport = ViewportBlueprint::new()
         .with_root_container(root_id)
@@ -79,6 +91,7 @@ pub(crate) fn entities(root: &Part, timeline: &str) -> Entities {
 struct Layout {
     entities: Entities,
     parts: u8,
+    eye: Option<Eye>,
 }
 
 /// A part that has its place in the blueprint.
@@ -121,10 +134,14 @@ impl Layout {
         let placed = self.place("view");
         let contents = ViewContents::new(view.contents.iter().map(String::as_str));
         self.log(&format!("{}/ViewContents", placed.path), contents);
-        if view.class == "TimeSeries" {
+        if view.class == VIEW_PLOT {
             // All plots zoom together; the legend stays off the newest end of the curves.
             self.log(&format!("{}/PlotLegend", placed.path), PlotLegend::new().with_corner(Corner2D::LeftTop));
             self.log(&format!("{}/TimeAxis", placed.path), TimeAxis::new().with_link(LinkAxis::LinkToGlobal));
+        }
+        if let (VIEW_3D, Some(Eye { position, target })) = (view.class, self.eye) {
+            let eye = EyeControls3D::new().with_position(position).with_look_target(target);
+            self.log(&format!("{}/EyeControls3D", placed.path), eye);
         }
         let blueprint = ViewBlueprint::new(view.class)
             .with_display_name(view.title.as_str())

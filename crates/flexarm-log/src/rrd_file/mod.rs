@@ -10,6 +10,8 @@ mod tracks;
 
 use std::path::{Path, PathBuf};
 
+use nalgebra::{Rotation3, Vector3};
+use rerun::components::MeshFaceRendering;
 use rerun::external::re_log_types::StoreKind;
 use rerun::log::Chunk;
 use rerun::{
@@ -17,7 +19,7 @@ use rerun::{
     ViewCoordinates,
 };
 
-use self::layout::Part;
+use self::layout::{Eye, Part};
 use self::stream::{Ids, RrdStream, StreamError};
 use self::tracks::{PathTrack, PoseTrack, SIM_TIME, ScalarTrack, SkeletonTrack, Times};
 use crate::create::FlushClock;
@@ -33,7 +35,7 @@ const BLUE: u32 = 0x5B_8D_EF_FF;
 const LIGHT: u32 = 0xD8_D8_D8_FF;
 const ORANGE: u32 = 0xF2_A1_3B_FF;
 /// The rigid twin: bluish, mostly transparent.
-const GHOST: u32 = 0x7F_B2_FF_48;
+const GHOST: u32 = 0x7F_B2_FF_60;
 
 /// Writes a run as a Rerun recording.
 ///
@@ -111,6 +113,13 @@ impl Recorder for RrdRecorder {
     }
 }
 
+/// A layout that is still to be written.
+struct Layout {
+    blueprint: StoreId,
+    window: Part,
+    parents: Vec<Option<usize>>,
+}
+
 /// A file between `begin` and `finish`.
 struct Open {
     stream: RrdStream,
@@ -123,6 +132,8 @@ struct Open {
     rigid: Option<TwinTracks>,
     /// In the order of [`push_scalars`].
     scalars: Vec<ScalarTrack>,
+    /// Written with the first sample, which shows where the robot is.
+    layout: Option<Layout>,
     closed: bool,
 }
 
@@ -130,9 +141,14 @@ impl Open {
     /// Starts the recording with everything that does not change, and its layout.
     fn begin(stream: RrdStream, header: &RunHeader, flush: FlushClock) -> Result<Self, StreamError> {
         let id = format!("flexarm-{:016x}", content_hash(header));
+        let layout = Layout {
+            blueprint: StoreId::new(StoreKind::Blueprint, "flexarm", format!("{id}-layout")),
+            window: window(header),
+            parents: header.links.iter().map(|link| link.parent).collect(),
+        };
         let mut open = Self {
             stream,
-            recording: StoreId::new(StoreKind::Recording, "flexarm", id.clone()),
+            recording: StoreId::new(StoreKind::Recording, "flexarm", id),
             shape: Shape::of(header),
             flush,
             description: header.description.clone(),
@@ -140,11 +156,11 @@ impl Open {
             flexible: TwinTracks::new(header, "flexible", ORANGE),
             rigid: header.has_rigid.then(|| TwinTracks::new(header, "rigid", BLUE)),
             scalars: scalar_tracks(header),
+            layout: Some(layout),
             closed: false,
         };
         open.stream.open_store(&open.recording)?;
         open.constants(header)?;
-        open.layout(header, StoreId::new(StoreKind::Blueprint, "flexarm", format!("{id}-layout")))?;
         open.stream.set_tail(&open.recording, &[])?;
         Ok(open)
     }
@@ -163,9 +179,13 @@ impl Open {
 
         // Robots: meshes below their links, axes at the tool.
         for mesh in &header.meshes {
-            self.mesh(header, "flexible", mesh, mesh.color.map(|part| (part.clamp(0.0, 1.0) * 255.0).round() as u8))?;
+            let [red, green, blue, alpha] = mesh.color.map(|part| (part.clamp(0.0, 1.0) * 255.0).round() as u8);
+            let color = Rgba32::from_unmultiplied_rgba(red, green, blue, alpha);
+            self.mesh(header, "flexible", mesh, surface(mesh, color))?;
             if header.has_rigid {
-                self.mesh(header, "rigid", mesh, GHOST.to_be_bytes())?;
+                // Its back faces only: they are hidden wherever the flexible robot is in the same place.
+                let ghost = surface(mesh, Rgba32::from_u32(GHOST)).with_face_rendering(MeshFaceRendering::Back);
+                self.mesh(header, "rigid", mesh, ghost)?;
             }
         }
         const AXIS_LENGTH_M: f32 = 0.1;
@@ -183,15 +203,8 @@ impl Open {
         Ok(())
     }
 
-    fn mesh(&mut self, header: &RunHeader, twin: &str, mesh: &LinkMesh, color: [u8; 4]) -> Result<(), StreamError> {
+    fn mesh(&mut self, header: &RunHeader, twin: &str, mesh: &LinkMesh, surface: Mesh3D) -> Result<(), StreamError> {
         let link = &header.links[mesh.link].name;
-        let [red, green, blue, alpha] = color;
-        let mut surface = Mesh3D::new(mesh.positions.iter().copied())
-            .with_triangle_indices(mesh.triangles.iter().copied())
-            .with_albedo_factor(AlbedoFactor(Rgba32::from_unmultiplied_rgba(red, green, blue, alpha)));
-        if mesh.normals.len() == mesh.positions.len() {
-            surface = surface.with_vertex_normals(mesh.normals.iter().copied());
-        }
         self.constant(&path([&header.robot, twin, link, &mesh.name]), &surface)
     }
 
@@ -213,10 +226,13 @@ impl Open {
         self.stream.append(&self.recording, &chunk)
     }
 
-    fn layout(&mut self, header: &RunHeader, blueprint: StoreId) -> Result<(), StreamError> {
+    /// Writes the layout if that has not happened yet, with the robot of this sample in the picture.
+    fn layout(&mut self, first: Option<&Sample>) -> Result<(), StreamError> {
+        let Some(Layout { blueprint, window, parents }) = self.layout.take() else { return Ok(()) };
+        let eye = first.and_then(|sample| eye(&parents, &sample.flexible));
         let when = TimePoint::default().with(Timeline::new_sequence("blueprint"), 0);
         self.stream.open_store(&blueprint)?;
-        for (at, what) in layout::entities(&window(header), SIM_TIME) {
+        for (at, what) in layout::entities(&window, SIM_TIME, eye) {
             let chunk = self.stream.ids().single(&at, &when, what.as_ref())?;
             self.stream.append(&blueprint, &chunk)?;
         }
@@ -224,6 +240,7 @@ impl Open {
     }
 
     fn sample(&mut self, time_ns: i64, sample: &Sample) -> Result<(), StreamError> {
+        self.layout(Some(sample))?;
         self.times.push(time_ns, i64::try_from(sample.step).unwrap_or(i64::MAX));
         self.flexible.push(&sample.flexible);
         if let Some(rigid) = &mut self.rigid {
@@ -284,6 +301,7 @@ impl Open {
 
     fn finish(&mut self, result: &[(String, String)]) -> Result<(), StreamError> {
         self.closed = true;
+        self.layout(None)?;
         self.commit_rows()?;
         let mut ids = *self.stream.ids();
         let paths = self.paths(&mut ids)?;
@@ -301,6 +319,16 @@ impl Drop for Open {
         if !self.closed {
             let _ = self.finish(&[]);
         }
+    }
+}
+
+fn surface(mesh: &LinkMesh, color: Rgba32) -> Mesh3D {
+    let surface = Mesh3D::new(mesh.positions.iter().copied())
+        .with_triangle_indices(mesh.triangles.iter().copied())
+        .with_albedo_factor(AlbedoFactor(color));
+    match mesh.normals.len() == mesh.positions.len() {
+        true => surface.with_vertex_normals(mesh.normals.iter().copied()),
+        false => surface,
     }
 }
 
@@ -432,8 +460,37 @@ fn window(header: &RunHeader) -> Part {
         right.push((3.0, plot("TCP error [mm], path axes", &["tcp_error_path"])));
     }
     right.push((3.0, Part::Tabs(causes.into_iter().flatten().collect())));
-    right.push((2.0, Part::text("Summary", path(["summary"]))));
+    right.push((3.0, Part::text("Summary", path(["summary"]))));
     Part::Row(vec![(3.0, Part::space("Robot", path([&header.robot]))), (2.0, Part::Column(right))])
+}
+
+/// A place to see the whole robot from, aside of the plane it stands in at first, a little from above.
+fn eye(parents: &[Option<usize>], twin: &TwinSample) -> Option<Eye> {
+    const TURN_RAD: f64 = -1.1;
+    const HEIGHT: f64 = 0.7;
+    const DISTANCE: f64 = 1.05;
+
+    // How far the stretched arm reaches from its base: the way along the links.
+    let base = twin.X_WL.first()?.translation.vector;
+    let mut lengths = vec![0.0; parents.len()];
+    for (link, parent) in parents.iter().enumerate() {
+        let Some(parent) = *parent else { continue };
+        let step = twin.X_WL[link].translation.vector - twin.X_WL[parent].translation.vector;
+        lengths[link] = lengths[parent] + step.norm();
+    }
+    let to_tool = twin.X_WT.translation.vector - base;
+    let reach = lengths.into_iter().fold(to_tool.norm(), f64::max);
+    if !(reach.is_finite() && reach > 0.0) {
+        return None;
+    }
+
+    let flat = Vector3::new(to_tool.x, to_tool.y, 0.0);
+    let ahead = flat.try_normalize(0.05 * reach).unwrap_or_else(Vector3::x);
+    let aside = Rotation3::from_axis_angle(&Vector3::z_axis(), TURN_RAD) * ahead;
+    let target = base + reach * (0.25 * ahead + 0.25 * Vector3::z());
+    let position = target + reach * DISTANCE * (aside + HEIGHT * Vector3::z());
+    let point = |p: Vector3<f64>| p.map(|part| part as f32).into();
+    Some(Eye { position: point(position), target: point(target) })
 }
 
 /// An entity path of parts that may hold any character.

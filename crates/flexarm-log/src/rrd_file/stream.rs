@@ -8,6 +8,7 @@ use std::collections::HashMap;
 use std::fs::File;
 use std::io::{self, Write};
 
+use rerun::external::arrow::datatypes::Schema;
 use rerun::external::re_chunk_store::external::re_chunk::Span;
 use rerun::external::re_log_encoding::{
     CodecError, CrateVersion, Encodable, EncodingOptions, MessageHeader, MessageKind, RRD_FOURCC, RrdFooter,
@@ -133,8 +134,12 @@ impl RrdStream {
     pub(crate) fn finish(&mut self) -> Result<()> {
         let mut footer = RrdFooter { manifests: HashMap::new() }.to_transport(())?;
         for (store, manifest) in std::mem::take(&mut self.manifests) {
-            // One by one: the library's own collection of them is in random order.
-            footer.manifests.push(manifest.build(store)?.to_transport(())?);
+            // The library has manifests, and the fields of their schemas, in random order.
+            let mut manifest = manifest.build(store)?;
+            let mut fields = manifest.sorbet_schema.fields().to_vec();
+            fields.sort();
+            manifest.sorbet_schema = Schema::new(fields);
+            footer.manifests.push(manifest.to_transport(())?);
         }
         let mut payload = Vec::new();
         footer.to_rrd_bytes(&mut payload)?;

@@ -11,7 +11,7 @@ use std::path::Path;
 use nalgebra::{Matrix3, Matrix4, Rotation3, Unit, Vector3, Vector4};
 use roxmltree::{Document, Node};
 
-use super::{MAX_TRIANGLES, MeshError, TriangleMesh, dominant_color, stl, unit_normal};
+use super::{MAX_TRIANGLES, MeshError, TriangleMesh, UpAxis, dominant_color, stl, unit_normal};
 
 /// Nodes below nodes; deeper is taken for a cycle of `<instance_node>`.
 const MAX_DEPTH: usize = 64;
@@ -42,7 +42,12 @@ impl Transform {
     }
 }
 
-pub(super) fn decode(bytes: &[u8], path: &Path, remarks: &mut Vec<String>) -> Result<TriangleMesh, MeshError> {
+pub(super) fn decode(
+    bytes: &[u8],
+    path: &Path,
+    up_axis: UpAxis,
+    remarks: &mut Vec<String>,
+) -> Result<TriangleMesh, MeshError> {
     let malformed = |reason: String| MeshError::Malformed { path: path.to_owned(), format: "COLLADA", reason };
     let text = std::str::from_utf8(bytes).map_err(|error| malformed(error.to_string()))?;
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
@@ -63,10 +68,10 @@ pub(super) fn decode(bytes: &[u8], path: &Path, remarks: &mut Vec<String>) -> Re
         instances: 0,
         unsupported: None,
     };
-    let T_V = asset_transform(root, remarks);
+    let T_V = asset_transform(root, up_axis, remarks);
     let scene = named(root, "scene").and_then(|s| named(s, "instance_visual_scene"));
     match scene.and_then(|s| reader.target(s, "url")) {
-        Some(scene) => reader.children(scene, &T_V, &HashMap::new(), 0)?,
+        Some(scene) => reader.children(scene, &T_V, 0)?,
         // A library without a scene: every geometry once, where it is.
         None => {
             for geometry in root.descendants().filter(|n| n.has_tag_name_of("geometry")) {
@@ -90,7 +95,7 @@ pub(super) fn decode(bytes: &[u8], path: &Path, remarks: &mut Vec<String>) -> Re
 }
 
 /// Unit and up axis of the file: from its coordinates to metres with z up.
-fn asset_transform(root: Node<'_, '_>, remarks: &mut Vec<String>) -> Matrix4<f64> {
+fn asset_transform(root: Node<'_, '_>, up_axis: UpAxis, remarks: &mut Vec<String>) -> Matrix4<f64> {
     let asset = named(root, "asset");
     let meter = asset
         .and_then(|a| named(a, "unit"))
@@ -98,6 +103,9 @@ fn asset_transform(root: Node<'_, '_>, remarks: &mut Vec<String>) -> Matrix4<f64
         .and_then(|m| m.trim().parse::<f64>().ok())
         .filter(|m| m.is_finite() && *m > 0.0)
         .unwrap_or(1.0);
+    if up_axis == UpAxis::Ignored {
+        return Matrix4::new_scaling(meter);
+    }
     let up = asset.and_then(|a| named(a, "up_axis")).and_then(|u| u.text()).map_or("Y_UP", str::trim);
     // x, y, z of the file in V, as columns
     let R = match up {
@@ -107,7 +115,8 @@ fn asset_transform(root: Node<'_, '_>, remarks: &mut Vec<String>) -> Matrix4<f64
     };
     if up != "Z_UP" {
         remarks.push(format!(
-            "it says {up} and is turned to z up; RViz leaves it unturned, so compare the picture with it"
+            "{up} is turned to z up; RViz and Gazebo ignore the up axis: compare pictures, and ignore it too if the \
+             mesh stands wrong"
         ));
     }
     (R * meter).to_homogeneous()
@@ -141,23 +150,17 @@ impl<'a, 'i> Reader<'a, 'i> {
     }
 
     /// Everything below a node or scene, whose own transform is already in `T`.
-    fn children(
-        &mut self,
-        parent: Node<'a, 'i>,
-        T: &Matrix4<f64>,
-        none: &Bindings<'a, 'i>,
-        depth: usize,
-    ) -> Result<(), MeshError> {
+    fn children(&mut self, parent: Node<'a, 'i>, T: &Matrix4<f64>, depth: usize) -> Result<(), MeshError> {
         self.instances += 1;
         if depth > MAX_DEPTH || self.instances > MAX_INSTANCES {
             return Err(self.malformed(parent, "the nodes form a cycle or are far too many"));
         }
         for child in elements(parent) {
             match child.tag_name().name() {
-                "node" => self.children(child, &(T * self.local(child)?), none, depth + 1)?,
+                "node" => self.children(child, &(T * self.local(child)?), depth + 1)?,
                 "instance_node" => {
                     if let Some(node) = self.target(child, "url") {
-                        self.children(node, &(T * self.local(node)?), none, depth + 1)?;
+                        self.children(node, &(T * self.local(node)?), depth + 1)?;
                     }
                 }
                 "instance_geometry" => {

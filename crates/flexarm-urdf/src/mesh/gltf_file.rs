@@ -1,13 +1,16 @@
-//! glTF 2.0, binary or with buffers beside it: triangles of the default scene with node transforms.
+//! glTF 2.0, binary or with buffers beside it: triangles of the default scene, z up, node transforms applied.
 //!
-//! The `gltf` crate reads and checks the structure; the numbers are taken from the buffers here, because its own
-//! iterators panic on accessors that reach beyond them. Not read: textures, skins, sparse or packed accessors.
+//! The `gltf` crate splits the file and reads its structure; indices and ranges are followed here, because its own
+//! validation and iterators panic on those that lead nowhere. Not read: textures, skins, sparse or packed accessors.
 
 use std::path::Path;
 
-use gltf::accessor::{DataType, Dimensions};
-use gltf::{Accessor, Document, Gltf, Node, Semantic, buffer};
-use nalgebra::{Matrix4, Vector3, Vector4};
+use gltf::Semantic;
+use gltf::json::accessor::{Accessor, ComponentType, Type};
+use gltf::json::mesh::Mode;
+use gltf::json::validation::Checked;
+use gltf::json::{Index, Node, Root};
+use nalgebra::{Matrix3, Matrix4, Quaternion, UnitQuaternion, Vector3, Vector4};
 
 use super::collada::Transform;
 use super::{MAX_TRIANGLES, MeshError, TriangleMesh, dominant_color, stl};
@@ -20,27 +23,36 @@ const MAX_INSTANCES: usize = 100_000;
 pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<TriangleMesh, MeshError> {
     let malformed = |reason: String| MeshError::Malformed { path: path.to_owned(), format: "glTF", reason };
     check_lengths(bytes).map_err(malformed)?;
-    let Gltf { document, blob } = Gltf::from_slice(bytes).map_err(|error| malformed(error.to_string()))?;
+    let (json, blob) = if bytes.starts_with(b"glTF") {
+        let glb = gltf::Glb::from_slice(bytes).map_err(|error| malformed(error.to_string()))?;
+        (glb.json, glb.bin)
+    } else {
+        (bytes.into(), None)
+    };
+    let root = Root::from_slice(&json).map_err(|error| malformed(error.to_string()))?;
+    // Extensions of materials do not touch the triangles.
+    let required = root.extensions_required.iter().find(|e| !e.starts_with("KHR_materials") && !e.contains("texture"));
+    if let Some(extension) = required {
+        let feature = format!("files with the glTF extension {extension}");
+        return Err(MeshError::Unsupported { path: path.to_owned(), feature });
+    }
+
     let mut reader = Reader {
         path,
-        buffers: read_buffers(&document, blob, path)?,
+        root: &root,
+        buffers: read_buffers(&root, blob.map(|b| b.into_owned()), path)?,
         mesh: TriangleMesh::default(),
         normals: Vec::new(),
         colors: Vec::new(),
         instances: 0,
     };
-    let scene = document.default_scene().or_else(|| document.scenes().next());
+    // glTF has y up: x, y, z of the file as columns in axes with z up
+    let R = Matrix3::from_columns(&[Vector3::x(), Vector3::z(), -Vector3::y()]);
+    let T_V = R.to_homogeneous();
+    let scene = root.scene.map_or_else(|| root.scenes.first(), |index| root.get(index));
     match scene {
-        Some(scene) => {
-            for node in scene.nodes() {
-                reader.node(&node, &Matrix4::identity(), 0)?;
-            }
-        }
-        None => {
-            for mesh in document.meshes() {
-                reader.mesh(&mesh, &Matrix4::identity())?;
-            }
-        }
+        Some(scene) => scene.nodes.iter().try_for_each(|&node| reader.node(node, &T_V, 0))?,
+        None => root.meshes.iter().try_for_each(|mesh| reader.mesh(mesh, &T_V))?,
     }
     let Reader { mut mesh, normals, colors, .. } = reader;
     mesh.color = dominant_color(&colors);
@@ -64,22 +76,20 @@ fn check_lengths(bytes: &[u8]) -> Result<(), String> {
 }
 
 /// The bytes of all buffers, from the file itself, files beside it, or base64 text.
-fn read_buffers(document: &Document, blob: Option<Vec<u8>>, path: &Path) -> Result<Vec<Vec<u8>>, MeshError> {
-    let mut blob = blob;
+fn read_buffers(root: &Root, mut blob: Option<Vec<u8>>, path: &Path) -> Result<Vec<Vec<u8>>, MeshError> {
+    let missing = |reason: String| MeshError::Malformed { path: path.to_owned(), format: "glTF", reason };
     let mut buffers = Vec::new();
-    for buffer in document.buffers() {
-        let missing = |reason: String| MeshError::Malformed { path: path.to_owned(), format: "glTF", reason };
-        let data = match buffer.source() {
-            buffer::Source::Bin => blob.take().ok_or_else(|| missing("its binary part is missing".to_owned()))?,
-            buffer::Source::Uri(uri) => match uri.strip_prefix("data:") {
+    for buffer in &root.buffers {
+        let data = match buffer.uri.as_deref() {
+            None => blob.take().ok_or_else(|| missing("its binary part is missing".to_owned()))?,
+            Some(uri) => match uri.strip_prefix("data:") {
                 Some(data) => data
                     .split_once(";base64,")
                     .and_then(|(_, text)| decode_base64(text))
                     .ok_or_else(|| missing("a buffer is not base64 text".to_owned()))?,
                 None => {
                     let file = path.with_file_name(uri);
-                    let is_file = std::fs::metadata(&file).is_ok_and(|m| m.is_file());
-                    if !is_file {
+                    if !file.is_file() {
                         return Err(missing(format!("its buffer {uri:?} is not beside it")));
                     }
                     std::fs::read(&file).map_err(|source| MeshError::Io { path: file, source })?
@@ -116,6 +126,7 @@ fn decode_base64(text: &str) -> Option<Vec<u8>> {
 
 struct Reader<'a> {
     path: &'a Path,
+    root: &'a Root,
     buffers: Vec<Vec<u8>>,
     mesh: TriangleMesh,
     normals: Vec<[f32; 3]>,
@@ -123,7 +134,7 @@ struct Reader<'a> {
     instances: usize,
 }
 
-impl Reader<'_> {
+impl<'a> Reader<'a> {
     fn malformed(&self, reason: impl Into<String>) -> MeshError {
         MeshError::Malformed { path: self.path.to_owned(), format: "glTF", reason: reason.into() }
     }
@@ -132,60 +143,72 @@ impl Reader<'_> {
         MeshError::Unsupported { path: self.path.to_owned(), feature: feature.into() }
     }
 
-    fn node(&mut self, node: &Node<'_>, T_parent: &Matrix4<f64>, depth: usize) -> Result<(), MeshError> {
+    /// The element of an index, which may lead nowhere.
+    fn get<T>(&self, index: Index<T>, what: &str) -> Result<&'a T, MeshError>
+    where
+        Root: gltf::json::root::Get<T>,
+    {
+        self.root.get(index).ok_or_else(|| self.malformed(format!("{what} {} does not exist", index.value())))
+    }
+
+    fn node(&mut self, index: Index<Node>, T_parent: &Matrix4<f64>, depth: usize) -> Result<(), MeshError> {
         self.instances += 1;
         if depth > MAX_DEPTH || self.instances > MAX_INSTANCES {
             return Err(self.malformed("its nodes form a cycle or are far too many"));
         }
-        let local = node.transform().matrix();
-        let T = T_parent * Matrix4::from_fn(|row, column| f64::from(local[column][row]));
-        if let Some(mesh) = node.mesh() {
-            self.mesh(&mesh, &T)?;
+        let node = self.get(index, "node")?;
+        let T = T_parent * local_transform(node);
+        if let Some(mesh) = node.mesh {
+            self.mesh(self.get(mesh, "mesh")?, &T)?;
         }
-        node.children().try_for_each(|child| self.node(&child, &T, depth + 1))
+        node.children.iter().flatten().try_for_each(|&child| self.node(child, &T, depth + 1))
     }
 
-    fn mesh(&mut self, mesh: &gltf::Mesh<'_>, T: &Matrix4<f64>) -> Result<(), MeshError> {
+    fn mesh(&mut self, mesh: &gltf::json::Mesh, T: &Matrix4<f64>) -> Result<(), MeshError> {
         let transform = Transform::new(T);
-        for primitive in mesh.primitives() {
-            use gltf::mesh::Mode;
-            match primitive.mode() {
-                Mode::Triangles => {}
-                Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip => continue,
-                mode => return Err(self.unsupported(format!("{mode:?} of glTF"))),
+        for primitive in &mesh.primitives {
+            match primitive.mode {
+                Checked::Valid(Mode::Triangles) => {}
+                Checked::Valid(Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip) => continue,
+                Checked::Valid(mode) => return Err(self.unsupported(format!("{mode:?} of glTF"))),
+                Checked::Invalid => return Err(self.malformed("a primitive has an unknown mode")),
             }
-            let Some(accessor) = primitive.get(&Semantic::Positions) else { continue };
-            let positions = self.vectors(&accessor)?;
-            let normals = primitive.get(&Semantic::Normals).map(|a| self.vectors(&a)).transpose()?;
-            let indices: Vec<u32> = match primitive.indices() {
-                Some(accessor) => self.indices(&accessor)?,
+            let attribute = |semantic| primitive.attributes.get(&Checked::Valid(semantic)).copied();
+            let Some(positions) = attribute(Semantic::Positions) else { continue };
+            let positions = self.vectors(positions)?;
+            let normals = attribute(Semantic::Normals).map(|index| self.vectors(index)).transpose()?;
+            let indices: Vec<u32> = match primitive.indices {
+                Some(index) => self.indices(index)?,
                 None => (0..positions.len() as u32).collect(),
             };
             if let Some(index) = indices.iter().find(|&&i| i as usize >= positions.len()) {
                 return Err(self.malformed(format!("a triangle uses vertex {index} of {}", positions.len())));
             }
-            let first = u32::try_from(self.mesh.positions.len() + positions.len())
-                .map_err(|_| self.unsupported("more than 2^32 vertices"))?
-                - positions.len() as u32;
+
+            let total = self.mesh.positions.len() + positions.len();
+            if total > u32::MAX as usize || self.mesh.triangles.len() > MAX_TRIANGLES {
+                return Err(self.unsupported("more than 50 million triangles"));
+            }
+            let first = self.mesh.positions.len() as u32;
             self.mesh.positions.extend(positions.iter().map(|p| transform.point(p)));
             if let Some(normals) = normals.filter(|n| n.len() == positions.len()) {
                 self.normals.extend(normals.iter().map(|n| transform.normal(n)));
             }
-            let triangles =
-                indices.chunks_exact(3).map(|t| transform.winding([t[0] + first, t[1] + first, t[2] + first]));
+            let triangles = indices.chunks_exact(3).map(|t| transform.winding([t[0], t[1], t[2]].map(|i| i + first)));
             self.mesh.triangles.extend(triangles);
-            let color =
-                primitive.material().index().map(|_| primitive.material().pbr_metallic_roughness().base_color_factor());
+            let material = primitive.material.map(|index| self.get(index, "material")).transpose()?;
+            let color = material.map(|m| m.pbr_metallic_roughness.base_color_factor.0);
             self.colors.push((color, indices.len() / 3));
-            if self.mesh.triangles.len() > MAX_TRIANGLES {
-                return Err(self.unsupported("more than 50 million triangles"));
-            }
         }
         Ok(())
     }
 
-    fn vectors(&self, accessor: &Accessor<'_>) -> Result<Vec<Vector3<f64>>, MeshError> {
-        if (accessor.data_type(), accessor.dimensions()) != (DataType::F32, Dimensions::Vec3) {
+    fn vectors(&self, index: Index<Accessor>) -> Result<Vec<Vector3<f64>>, MeshError> {
+        let accessor = self.get(index, "accessor")?;
+        let (Checked::Valid(component), Checked::Valid(Type::Vec3)) = (accessor.component_type, accessor.type_) else {
+            return Err(self.malformed("positions and normals are not vectors"));
+        };
+        if component.0 != ComponentType::F32 {
             return Err(self.unsupported("packed vertices of glTF"));
         }
         let number = |b: &[u8]| f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]]));
@@ -193,43 +216,60 @@ impl Reader<'_> {
         self.elements(accessor, 12, vector)
     }
 
-    fn indices(&self, accessor: &Accessor<'_>) -> Result<Vec<u32>, MeshError> {
-        if accessor.dimensions() != Dimensions::Scalar {
+    fn indices(&self, index: Index<Accessor>) -> Result<Vec<u32>, MeshError> {
+        let accessor = self.get(index, "accessor")?;
+        let (Checked::Valid(component), Checked::Valid(Type::Scalar)) = (accessor.component_type, accessor.type_)
+        else {
             return Err(self.malformed("its indices are not scalars"));
-        }
-        match accessor.data_type() {
-            DataType::U8 => self.elements(accessor, 1, |b| u32::from(b[0])),
-            DataType::U16 => self.elements(accessor, 2, |b| u32::from(u16::from_le_bytes([b[0], b[1]]))),
-            DataType::U32 => self.elements(accessor, 4, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])),
+        };
+        match component.0 {
+            ComponentType::U8 => self.elements(accessor, 1, |b| u32::from(b[0])),
+            ComponentType::U16 => self.elements(accessor, 2, |b| u32::from(u16::from_le_bytes([b[0], b[1]]))),
+            ComponentType::U32 => self.elements(accessor, 4, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])),
             _ => Err(self.malformed("its indices are not unsigned integers")),
         }
     }
 
     /// The elements of `size` bytes each, with all bounds checked.
-    fn elements<T>(
-        &self,
-        accessor: &Accessor<'_>,
-        size: usize,
-        read: impl Fn(&[u8]) -> T,
-    ) -> Result<Vec<T>, MeshError> {
-        if accessor.sparse().is_some() {
+    fn elements<T>(&self, accessor: &Accessor, size: usize, read: impl Fn(&[u8]) -> T) -> Result<Vec<T>, MeshError> {
+        if accessor.sparse.is_some() {
             return Err(self.unsupported("sparse accessors of glTF"));
         }
-        let view = accessor.view().ok_or_else(|| self.unsupported("accessors of glTF without data"))?;
-        let buffer = self.buffers.get(view.buffer().index()).map_or(&[][..], Vec::as_slice);
-        let stride = view.stride().unwrap_or(size).max(size);
-        let end = view.offset().checked_add(view.length());
-        let view_bytes = end.and_then(|end| buffer.get(view.offset()..end));
-        let count = accessor.count();
-        let span = count.checked_sub(1).map_or(Some(0), |last| last.checked_mul(stride)?.checked_add(size));
-        let end = span.and_then(|span| span.checked_add(accessor.offset()));
-        let bytes = match (view_bytes, end) {
-            (Some(bytes), Some(end)) => bytes.get(accessor.offset()..end),
-            _ => None,
-        };
-        let bytes = bytes.ok_or_else(|| self.malformed("an accessor reaches beyond its buffer"))?;
-        Ok((0..count).map(|i| read(&bytes[i * stride..i * stride + size])).collect())
+        let view = accessor.buffer_view.ok_or_else(|| self.unsupported("accessors of glTF without data"))?;
+        let view = self.get(view, "buffer view")?;
+        let buffer = self.buffers.get(view.buffer.value()).map_or(&[][..], Vec::as_slice);
+        let stride = view.byte_stride.map_or(size, |s| s.0.max(size));
+        let bytes = slice(buffer, view.byte_offset.map_or(0, |o| o.0), view.byte_length.0)
+            .and_then(|bytes| bytes.get(usize::try_from(accessor.byte_offset.map_or(0, |o| o.0)).ok()?..));
+        // the last element need not fill its stride
+        let count = usize::try_from(accessor.count.0).ok();
+        let span =
+            count.and_then(|n| n.checked_sub(1).map_or(Some(0), |last| last.checked_mul(stride)?.checked_add(size)));
+        match (bytes, count, span) {
+            (Some(bytes), Some(count), Some(span)) if span <= bytes.len() => {
+                Ok((0..count).map(|i| read(&bytes[i * stride..i * stride + size])).collect())
+            }
+            _ => Err(self.malformed("an accessor reaches beyond its buffer")),
+        }
     }
+}
+
+fn slice(bytes: &[u8], offset: u64, length: u64) -> Option<&[u8]> {
+    let start = usize::try_from(offset).ok()?;
+    bytes.get(start..start.checked_add(usize::try_from(length).ok()?)?)
+}
+
+/// Matrix, or translation, rotation and scale, of a node.
+fn local_transform(node: &Node) -> Matrix4<f64> {
+    if let Some(matrix) = node.matrix {
+        return Matrix4::from_column_slice(&matrix.map(f64::from));
+    }
+    let vector = |v: Option<[f32; 3]>, default| v.map_or(default, |v| Vector3::from(v.map(f64::from)));
+    let [x, y, z, w] = node.rotation.unwrap_or_default().0.map(f64::from);
+    let q = UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 1e-12).unwrap_or_default();
+    Matrix4::new_translation(&vector(node.translation, Vector3::zeros()))
+        * q.to_homogeneous()
+        * Matrix4::new_nonuniform_scaling(&vector(node.scale, Vector3::repeat(1.0)))
 }
 
 impl Transform {

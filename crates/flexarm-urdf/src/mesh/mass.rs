@@ -9,11 +9,11 @@ use super::TriangleMesh;
 /// Mass properties of a homogeneous body of density 1 kg/m³.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MassProperties {
-    /// Volume [m³].
+    /// Volume in m³.
     pub volume: f64,
-    /// Centroid [m].
+    /// Centroid in m.
     pub centroid: Vector3<f64>,
-    /// Inertia about the centroid per unit density [m⁵].
+    /// Inertia about the centroid per unit density, in m⁵.
     pub inertia: Matrix3<f64>,
     /// Edges that do not have one triangle on each side, with vertices at one place taken as one.
     pub open_edges: usize,

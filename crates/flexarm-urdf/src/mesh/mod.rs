@@ -6,11 +6,12 @@
 //! | --- | --- | --- | --- |
 //! | STL, OBJ | none: taken as metres | none | none |
 //! | COLLADA (`.dae`) | `<unit>` applied | `<up_axis>` turned to z | applied |
-//! | glTF (`.glb`, `.gltf`) | metres by definition | taken as it is | applied |
+//! | glTF (`.glb`, `.gltf`) | metres by definition | y by definition, turned to z | applied |
 //!
-//! glTF says that y is up. Robot tools (RViz and others) place the coordinates of a glTF mesh into the link frame
-//! unchanged, and robot descriptions are written for that, so it is done here. The scale of the URDF comes
-//! last ([`TriangleMesh::scaled`]).
+//! Turning is `(x, y, z) -> (x, -z, y)` for y up. Viewers do not agree on it: for glTF, RViz (since 2025), Drake and
+//! Blender turn, older RViz does not; for COLLADA, RViz and Gazebo ignore `<up_axis>`, and some robot files carry a
+//! wrong one for that reason: [`UpAxis::Ignored`] reads them. The scale of the URDF comes last
+//! ([`TriangleMesh::scaled`]).
 //!
 //! Start at [`load_mesh`]. Not here: finding files (`resolve`), placing shapes on links
 //! ([`crate::Visual`]).
@@ -20,6 +21,8 @@ mod gltf_file;
 mod mass;
 mod obj;
 mod stl;
+#[cfg(test)]
+mod tests;
 
 use std::path::{Path, PathBuf};
 
@@ -34,7 +37,7 @@ const MAX_TRIANGLES: usize = 50_000_000;
 /// Triangles with shared vertices; counter-clockwise seen from outside.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TriangleMesh {
-    /// Vertices [m].
+    /// Vertices in m.
     pub positions: Vec<[f32; 3]>,
     /// Unit normals, one for each vertex.
     pub normals: Option<Vec<[f32; 3]>>,
@@ -95,12 +98,30 @@ pub enum MeshError {
     },
 }
 
-/// Reads a mesh; the format is told by the extension, else by the content.
+/// What to do with the `<up_axis>` of a COLLADA file; other formats have no choice.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum UpAxis {
+    /// Turn the mesh from the axis that the file declares to z, as COLLADA means it.
+    #[default]
+    Declared,
+    /// Take the coordinates as they are, as RViz and Gazebo do.
+    Ignored,
+}
+
+/// Reads a mesh as its format means it; the format is told by the extension, else by the content.
 ///
 /// # Errors
 /// [`MeshError`]; any bytes are refused or read, never a panic.
 pub fn load_mesh(path: impl AsRef<Path>) -> Result<TriangleMesh, MeshError> {
-    load_with_remarks(path.as_ref()).map(|loaded| loaded.mesh)
+    load_mesh_with(path, UpAxis::Declared)
+}
+
+/// As [`load_mesh`], with a choice for COLLADA.
+///
+/// # Errors
+/// As [`load_mesh`].
+pub fn load_mesh_with(path: impl AsRef<Path>, up_axis: UpAxis) -> Result<TriangleMesh, MeshError> {
+    load_with_remarks(path.as_ref(), up_axis).map(|loaded| loaded.mesh)
 }
 
 /// A mesh and what the reader should know about the way it was read.
@@ -110,22 +131,22 @@ pub(crate) struct Loaded {
     pub(crate) remarks: Vec<String>,
 }
 
-pub(crate) fn load_with_remarks(path: &Path) -> Result<Loaded, MeshError> {
+pub(crate) fn load_with_remarks(path: &Path, up_axis: UpAxis) -> Result<Loaded, MeshError> {
     let io_error = |source| MeshError::Io { path: path.to_owned(), source };
     // Not a device or a pipe, which might never end.
     if !std::fs::metadata(path).map_err(io_error)?.is_file() {
         return Err(io_error(std::io::Error::other("this is not a file")));
     }
-    decode(&std::fs::read(path).map_err(io_error)?, path)
+    decode(&std::fs::read(path).map_err(io_error)?, path, up_axis)
 }
 
 /// Bytes of a mesh file; `path` serves the extension, messages and files beside it.
-pub(crate) fn decode(bytes: &[u8], path: &Path) -> Result<Loaded, MeshError> {
+pub(crate) fn decode(bytes: &[u8], path: &Path, up_axis: UpAxis) -> Result<Loaded, MeshError> {
     let mut remarks = Vec::new();
     let mesh = match format(bytes, path) {
         Some(Format::Stl) => stl::decode(bytes, path),
         Some(Format::Obj) => obj::decode(bytes, path),
-        Some(Format::Collada) => collada::decode(bytes, path, &mut remarks),
+        Some(Format::Collada) => collada::decode(bytes, path, up_axis, &mut remarks),
         Some(Format::Gltf) => gltf_file::decode(bytes, path),
         None => Err(MeshError::UnknownFormat { path: path.to_owned() }),
     }?;

@@ -7,10 +7,10 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use flexarm_urdf::{Problem, ReadOptions, parse_urdf};
 
 /// A folder of its own that is removed at the end.
-pub struct TestFolder(pub PathBuf);
+pub(crate) struct TestFolder(pub(crate) PathBuf);
 
 impl TestFolder {
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         static NEXT: AtomicU32 = AtomicU32::new(0);
         let number = NEXT.fetch_add(1, Ordering::Relaxed);
         let path = std::env::temp_dir().join(format!("flexarm-urdf-{}-{number}", std::process::id()));
@@ -18,7 +18,7 @@ impl TestFolder {
         Self(path)
     }
 
-    pub fn write(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
+    pub(crate) fn write(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
         let path = self.0.join(name);
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
         std::fs::write(&path, content).unwrap();
@@ -39,37 +39,37 @@ impl AsRef<Path> for TestFolder {
 }
 
 /// A sound `<inertial>`.
-pub const INERTIAL: &str =
+pub(crate) const INERTIAL: &str =
     r#"<inertial><mass value="2"/><inertia ixx="0.02" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial>"#;
 
 /// A link with sound mass.
-pub fn link(name: &str) -> String {
+pub(crate) fn link(name: &str) -> String {
     format!("<link name=\"{name}\">{INERTIAL}</link>\n")
 }
 
 /// A continuous joint about z.
-pub fn hinge(name: &str, parent: &str, child: &str) -> String {
+pub(crate) fn hinge(name: &str, parent: &str, child: &str) -> String {
     format!(
         "<joint name=\"{name}\" type=\"continuous\"><parent link=\"{parent}\"/><child link=\"{child}\"/><axis xyz=\"0 0 1\"/></joint>\n"
     )
 }
 
 /// `<robot>` in line 1, the parts from line 2 on.
-pub fn robot(parts: &[&str]) -> String {
+pub(crate) fn robot(parts: &[&str]) -> String {
     format!("<robot name=\"r\">\n{}</robot>\n", parts.concat())
 }
 
 /// Two links and a joint, of which one part is given.
-pub fn with_joint(joint: &str) -> String {
+pub(crate) fn with_joint(joint: &str) -> String {
     robot(&[&link("base"), &link("arm"), joint, "\n"])
 }
 
 /// The faults of a text and their lines.
-pub fn problems(text: &str) -> Vec<(u32, Problem)> {
+pub(crate) fn problems(text: &str) -> Vec<(u32, Problem)> {
     problems_with(text, &ReadOptions::default())
 }
 
-pub fn problems_with(text: &str, options: &ReadOptions) -> Vec<(u32, Problem)> {
+pub(crate) fn problems_with(text: &str, options: &ReadOptions) -> Vec<(u32, Problem)> {
     match parse_urdf(text, "robot.urdf", options) {
         Ok(_) => Vec::new(),
         Err(error) => error.issues().iter().map(|i| (i.place.line, i.problem.clone())).collect(),
@@ -78,7 +78,7 @@ pub fn problems_with(text: &str, options: &ReadOptions) -> Vec<(u32, Problem)> {
 
 /// The only fault of a text.
 #[track_caller]
-pub fn problem(text: &str) -> (u32, Problem) {
+pub(crate) fn problem(text: &str) -> (u32, Problem) {
     let mut all = problems(text);
     assert_eq!(all.len(), 1, "{all:?}");
     all.remove(0)

@@ -1,0 +1,121 @@
+//! Cutting a link's own mass properties in two, so that both parts together are exactly the link.
+//!
+//! For a link whose inertia is known (from its URDF) but not how it is spread: the two centres of mass are put at the
+//! middles of the two pieces of the line A-B, the masses follow from the link's centre of mass, and what remains of the
+//! inertia is shared in proportion to mass. For a uniform bar cut in the middle this is the exact answer.
+
+use flexarm_fem::RigidPart;
+use flexarm_kinematics::{LinkInertia, skew};
+use nalgebra::Vector3;
+
+/// Why a link's inertia cannot be cut this way.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum CutError {
+    /// The centre of mass lies too near one end.
+    #[error(
+        "its centre of mass lies at {found:.3} of the line from A to B; cut at {split:.3} the two parts get positive masses \
+         only between {low:.3} and {high:.3}: move the split or give the parts in a .flex file"
+    )]
+    CentreOfMass {
+        /// Fraction of A-B at which the centre of mass lies.
+        found: f64,
+        /// Fraction at which the link is cut.
+        split: f64,
+        /// Lowest workable fraction.
+        low: f64,
+        /// Highest workable fraction.
+        high: f64,
+    },
+    /// The remaining inertia belongs to no body.
+    #[error(
+        "after the masses are placed, {remaining:.3} kg m² remain as smallest principal moment of its inertia, \
+         which must stay positive: use parts = \"uniform\" or give the parts in a .flex file"
+    )]
+    Inertia {
+        /// Smallest principal moment that remains [kg m²].
+        remaining: f64,
+    },
+}
+
+/// Proximal and distal part of a link cut at `split` of the line from `p_LA` to `p_LB` (link axes) [m].
+///
+/// # Errors
+/// [`CutError`] if no two bodies of this kind make up the link.
+pub fn cut_inertia(
+    link: &LinkInertia,
+    p_LA: &Vector3<f64>,
+    p_LB: &Vector3<f64>,
+    split: f64,
+) -> Result<[RigidPart; 2], CutError> {
+    let line = p_LB - p_LA;
+    let found = (link.com - p_LA).dot(&line) / line.norm_squared();
+    let (low, high) = (0.5 * split, 0.5 * (1.0 + split));
+    if !(found > low && found < high) {
+        return Err(CutError::CentreOfMass { found, split, low, high });
+    }
+    let distal_mass = link.mass * (found - low) / (high - low);
+    let masses = [link.mass - distal_mass, distal_mass];
+    // Both parts share the link's offset from the line.
+    let coms = [low, high].map(|fraction| link.com + line * (fraction - found));
+
+    let mut rest = link.inertia_com;
+    for (mass, com) in masses.iter().zip(&coms) {
+        let c = skew(&(com - link.com));
+        rest += c * c * *mass;
+    }
+    let remaining = rest.symmetric_eigenvalues().min();
+    if remaining <= 0.0 {
+        return Err(CutError::Inertia { remaining });
+    }
+    let part = |k: usize| RigidPart { mass: masses[k], com: coms[k], inertia: rest * (masses[k] / link.mass) };
+    Ok([part(0), part(1)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+    use nalgebra::{Matrix3, vector};
+
+    fn bar() -> LinkInertia {
+        let I = 12.0 / 12.0 * 0.64;
+        LinkInertia { mass: 12.0, com: vector![0.4, 0.1, 0.0], inertia_com: Matrix3::from_diagonal(&vector![0.02, I, I]) }
+    }
+
+    /// Truth: two half bars, I = m l²/12 each; measured 1e-16.
+    #[test]
+    fn a_uniform_bar_cut_in_the_middle_gives_two_half_bars() {
+        let [a, b] = cut_inertia(&bar(), &Vector3::zeros(), &vector![0.8, 0.0, 0.0], 0.5).unwrap();
+        for (part, x) in [(a, 0.2), (b, 0.6)] {
+            assert_relative_eq!(part.mass, 6.0, epsilon = 1e-14);
+            assert_relative_eq!(part.com, vector![x, 0.1, 0.0], epsilon = 1e-15);
+            assert_relative_eq!(part.inertia[(1, 1)], 6.0 * 0.16 / 12.0, epsilon = 1e-14);
+        }
+    }
+
+    /// Mass, centre of mass and inertia of both parts together are those of the link; measured 4e-16.
+    #[test]
+    fn both_parts_together_are_exactly_the_link() {
+        let link = bar();
+        for split in [0.3, 0.5, 0.62] {
+            let [a, b] = cut_inertia(&link, &vector![-0.05, 0.0, 0.0], &vector![0.8, 0.0, 0.0], split).unwrap();
+            let whole = a.merged(&b);
+            assert_relative_eq!(whole.mass, link.mass, epsilon = 1e-13);
+            assert_relative_eq!(whole.com, link.com, epsilon = 1e-14);
+            assert_relative_eq!(whole.inertia, link.inertia_com, epsilon = 1e-13);
+        }
+    }
+
+    #[test]
+    fn a_link_that_is_heavy_at_one_end_is_refused_with_the_workable_range() {
+        let mut link = bar();
+        link.com.x = 0.1;
+        let error = cut_inertia(&link, &Vector3::zeros(), &vector![0.8, 0.0, 0.0], 0.5).unwrap_err();
+        assert!(error.to_string().contains("between 0.250 and 0.750"), "{error}");
+        let mut light = bar();
+        light.inertia_com *= 0.1;
+        let error = cut_inertia(&light, &Vector3::zeros(), &vector![0.8, 0.0, 0.0], 0.5).unwrap_err();
+        assert!(matches!(error, CutError::Inertia { .. }));
+    }
+}

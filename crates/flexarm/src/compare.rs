@@ -1,0 +1,299 @@
+//! The main job: rigid and flexible run along one motion, logged while it goes on, measured at the end.
+
+use std::ops::ControlFlow;
+use std::time::Instant;
+
+use flexarm_analysis::{MetricSettings, PathAxes, tcp_error, tcp_metrics};
+use flexarm_kinematics::Frame;
+use flexarm_log::{ElasticSample, EnergySample, RecorderSet, Sample};
+use flexarm_stepping::{FlexibleArm, Observation, StepError, Stepper, new_stepper};
+use nalgebra::Vector6;
+
+use crate::error::Error;
+use crate::motion::Motion;
+use crate::options::{LinkModel, Outputs, RunOptions};
+use crate::record::{header, link_frames, recorders};
+use crate::robot::{FlexibleRobot, Robot, TCP_FRAME};
+use crate::summary::{LinkFigures, StepperFigures, Summary, TcpFigures};
+use crate::twin::RigidTwin;
+
+/// Largest elastic rotation for which the linear elastic model is taken to hold [rad].
+pub(crate) const ROTATION_LIMIT: f64 = 0.05;
+/// Largest engineering strain of a flexible link before a warning.
+const STRAIN_LIMIT: f64 = 1e-3;
+
+/// Called with simulated and total time; breaking off stops the run with readable files.
+pub type Progress<'a> = dyn FnMut(f64, f64) -> ControlFlow<()> + 'a;
+
+/// Runs a motion, writes the recordings and returns the figures.
+///
+/// Everything about the input is checked before the first file is made. If the run stops early, the recordings are
+/// closed so that every reader takes them.
+///
+/// # Errors
+/// [`Error`]; see [`Error::exit_code`].
+pub fn simulate(
+    robot: &Robot,
+    motion: &Motion,
+    options: &RunOptions,
+    outputs: Option<&Outputs>,
+    progress: &mut Progress<'_>,
+) -> Result<Summary, Error> {
+    let started = Instant::now();
+    let cpu = cpu_time::ProcessTime::now();
+    if !motion.violations.is_empty() && !options.ignore_limits {
+        return Err(Error::Limits(motion.violations.iter().map(ToString::to_string).collect()));
+    }
+    let flexible = match options.links {
+        LinkModel::Rigid => robot.rigid_robot()?,
+        LinkModel::Lumped => robot.flexible_robot()?,
+    };
+    let failed = |source: StepError| Error::Step { source, partial: false };
+    let arm = flexible.arm(motion.prescribed()).map_err(failed)?;
+    let stepper = new_stepper(options.stepper, arm.clone(), options.step_s, options.start).map_err(failed)?;
+    if !(options.log_rate_hz.is_finite() && options.log_rate_hz > 0.0) {
+        return Err(Error::Usage(format!("the log rate must be positive, found {} Hz", options.log_rate_hz)));
+    }
+
+    let mut run = Run::new(robot, motion, options, &flexible, arm, stepper);
+    let mut files = recorders(outputs)?;
+    let head = header(robot, motion, options, &run.arm);
+    files.set.begin(&head)?;
+    let end = run.go(&mut files.set, progress);
+
+    let mut summary = run.summary(robot, motion, options);
+    summary.wall_s = started.elapsed().as_secs_f64();
+    summary.cpu_s = cpu.elapsed().as_secs_f64();
+    summary.real_time_factor = summary.duration_s / summary.wall_s.max(1e-9);
+    summary.cpu_s_per_simulated_s = summary.cpu_s / summary.duration_s.max(1e-9);
+    summary.files = files.names.clone();
+    let mut result = summary.labelled();
+    result.push(("end".into(), end.as_ref().map_or_else(ToString::to_string, |()| "complete".into())));
+    files.set.finish(&result)?;
+    if let Some(outputs) = outputs {
+        crate::report::write(outputs, &summary)?;
+    }
+    end.map(|()| summary)
+}
+
+/// A run under way, with what has been seen of it.
+struct Run<'a> {
+    motion: &'a Motion,
+    options: &'a RunOptions,
+    flexible: &'a FlexibleRobot,
+    arm: FlexibleArm,
+    stepper: Box<dyn Stepper>,
+    tcp: Frame,
+    link_frames: Vec<Frame>,
+    twin: RigidTwin,
+    seen: Observation,
+    path: PathAxes,
+    sample: Sample,
+    times: Vec<f64>,
+    errors: Vec<[f64; 6]>,
+    path_errors: Vec<[f64; 6]>,
+    contributions: Vec<f64>,
+    strains: Vec<f64>,
+    rotations: Vec<f64>,
+    peak_drive: Vec<f64>,
+    every: u64,
+    last: u64,
+}
+
+impl<'a> Run<'a> {
+    fn new(
+        robot: &Robot,
+        motion: &'a Motion,
+        options: &'a RunOptions,
+        flexible: &'a FlexibleRobot,
+        arm: FlexibleArm,
+        stepper: Box<dyn Stepper>,
+    ) -> Self {
+        let n = arm.elements.len();
+        let last = (motion.trajectory.duration() / options.step_s - 1e-9).ceil().max(0.0) as u64;
+        Self {
+            motion,
+            options,
+            flexible,
+            tcp: arm.model.frame(TCP_FRAME).expect("added when the robot was loaded").clone(),
+            link_frames: link_frames(robot, &arm.model),
+            twin: RigidTwin::new(&arm),
+            seen: Observation::new(&arm),
+            path: PathAxes::default(),
+            sample: Sample::default(),
+            times: Vec::new(),
+            errors: Vec::new(),
+            path_errors: Vec::new(),
+            contributions: vec![0.0; n],
+            strains: vec![0.0; n],
+            rotations: vec![0.0; n],
+            peak_drive: vec![0.0; arm.model.n_actuated()],
+            every: ((1.0 / (options.log_rate_hz * options.step_s)).round() as u64).max(1),
+            last,
+            arm,
+            stepper,
+        }
+    }
+
+    /// Steps to the end, logging on the way.
+    fn go(&mut self, files: &mut RecorderSet, progress: &mut Progress<'_>) -> Result<(), Error> {
+        let total = self.last as f64 * self.options.step_s;
+        for step in 0..=self.last {
+            if step % self.every == 0 || step == self.last {
+                self.observe(step);
+                files.record(&self.sample)?;
+                if progress(self.stepper.time(), total).is_break() {
+                    return Err(Error::Interrupted { t: self.stepper.time() });
+                }
+            }
+            if step < self.last {
+                self.stepper.step().map_err(|source| Error::Step { source, partial: true })?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Compares with the twin and fills the sample.
+    fn observe(&mut self, step: u64) {
+        let n = self.arm.model.n_actuated();
+        self.stepper.observe(&mut self.seen);
+        let t = self.seen.t;
+        self.twin.update(&self.arm, &self.tcp, t);
+        let X_rigid = self.twin.data.X_WF(&self.tcp);
+        let X_flexible = self.seen.X_WB[self.tcp.body] * self.tcp.X_BF;
+        let error = tcp_error(&X_rigid, &X_flexible);
+        self.path.update(&self.twin.velocity, &self.twin.acceleration);
+        let path_error = self.path.resolve(&error);
+        self.times.push(t);
+        self.errors.push(error);
+        self.path_errors.push(path_error);
+        for (peak, drive) in self.peak_drive.iter_mut().zip(self.seen.drive.iter()) {
+            *peak = peak.max(drive.abs());
+        }
+
+        let sample = &mut self.sample;
+        sample.elastic.resize(self.arm.elements.len(), ElasticSample::default());
+        for (k, element) in self.arm.elements.iter().enumerate() {
+            let e: Vector6<f64> = self.seen.q.fixed_rows::<6>(element.coordinate).into();
+            let at_tcp = self.twin.J.fixed_columns::<6>(element.coordinate) * e;
+            let (spring, _) = &self.flexible.springs[k];
+            self.contributions[k] = self.contributions[k].max(at_tcp.fixed_rows::<3>(0).norm());
+            self.strains[k] = self.strains[k].max(engineering_strain(spring, &e));
+            self.rotations[k] = self.rotations[k].max(e.fixed_rows::<3>(3).norm());
+            sample.elastic[k] = ElasticSample { deflection: e.into(), load: self.seen.load[k].into() };
+        }
+        sample.time_s = t;
+        sample.step = step;
+        sample.error_world = error;
+        sample.error_path = path_error;
+        let [kinetic, potential, elastic] = self.seen.energy;
+        sample.energy = EnergySample { kinetic, potential, elastic };
+        let (iterations, correction) = self.stepper.last_iteration();
+        sample.solver = [iterations as f64, correction];
+
+        let flexible = &mut sample.flexible;
+        flexible.q.clear();
+        flexible.q.extend_from_slice(&self.seen.q.as_slice()[..n]);
+        flexible.qdot.clear();
+        flexible.qdot.extend_from_slice(&self.seen.qdot.as_slice()[..n]);
+        flexible.effort.clear();
+        flexible.effort.extend_from_slice(self.seen.drive.as_slice());
+        flexible.X_WL.clear();
+        flexible.X_WL.extend(self.link_frames.iter().map(|f| self.seen.X_WB[f.body] * f.X_BF));
+        flexible.X_WT = X_flexible;
+
+        let rigid = &mut sample.rigid;
+        rigid.q.clone_from(&flexible.q);
+        rigid.qdot.clone_from(&flexible.qdot);
+        rigid.effort.clear();
+        rigid.effort.extend_from_slice(&self.twin.data.tau.as_slice()[..n]);
+        rigid.X_WL.clear();
+        rigid.X_WL.extend(self.link_frames.iter().map(|f| self.twin.data.X_WF(f)));
+        rigid.X_WT = X_rigid;
+    }
+
+    /// Figures of what was seen so far.
+    fn summary(&self, robot: &Robot, motion: &Motion, options: &RunOptions) -> Summary {
+        let moves: Vec<(f64, f64)> = motion.trajectory.moves().iter().map(|m| (m.start, m.end)).collect();
+        let settings = MetricSettings { settling_band_m: options.settling_band_m, ..MetricSettings::default() };
+        let metrics = tcp_metrics(&self.times, &self.errors, &self.path_errors, &moves, &settings);
+        let links: Vec<LinkFigures> = (0..self.arm.elements.len())
+            .map(|k| LinkFigures {
+                name: self.arm.elements[k].name.clone(),
+                peak_contribution_m: self.contributions[k],
+                engineering_strain: self.strains[k],
+                peak_rotation_rad: self.rotations[k],
+            })
+            .collect();
+        let mut warnings = robot.warnings.clone();
+        warnings.extend(motion.warnings.iter().cloned());
+        warnings.extend(motion.violations.iter().map(|v| format!("joint limit: {v}")));
+        self.validity_warnings(&links, &mut warnings);
+        Summary {
+            robot: robot.name.clone(),
+            trajectory: motion.name.clone(),
+            links_model: options.links.name(),
+            duration_s: self.times.last().copied().unwrap_or(0.0),
+            stepper: StepperFigures::new(options, self.stepper.counts()),
+            tcp: options.with_twin.then(|| TcpFigures::from(&metrics)),
+            frequencies_hz: self.arm.modes.frequencies_hz(),
+            links,
+            drives: self
+                .arm
+                .model
+                .coordinates()
+                .iter()
+                .zip(&self.peak_drive)
+                .map(|(c, peak)| (c.joint.clone(), *peak))
+                .collect(),
+            error_curve: crate::summary::thinned(&self.times, &self.errors),
+            warnings,
+            ..Summary::default()
+        }
+    }
+
+    fn validity_warnings(&self, links: &[LinkFigures], warnings: &mut Vec<String>) {
+        for link in links {
+            if link.peak_rotation_rad > ROTATION_LIMIT {
+                warnings.push(format!(
+                    "link {:?} bends by {:.3} rad, beyond the {ROTATION_LIMIT} rad for which the linear elastic model is good",
+                    link.name, link.peak_rotation_rad
+                ));
+            }
+            if link.engineering_strain > STRAIN_LIMIT {
+                warnings.push(format!(
+                    "link {:?} changes its length by {:.2e} of it, beyond {STRAIN_LIMIT:.0e}: check stiffness and loads",
+                    link.name, link.engineering_strain
+                ));
+            }
+        }
+        for (c, peak) in self.arm.model.coordinates().iter().zip(&self.peak_drive) {
+            if *peak > c.limits.effort {
+                warnings.push(format!(
+                    "joint {:?} needs {peak:.0} N m (or N), its limit is {:.0}: the real drive would not follow",
+                    c.joint, c.limits.effort
+                ));
+            }
+        }
+        if matches!(self.options.stepper, flexarm_stepping::StepperKind::Spook(_)) && !self.arm.proportional {
+            let betas: Vec<String> = self.arm.tau.iter().map(|b| format!("{b:.2e}")).collect();
+            warnings.push(format!(
+                "spook damps each spring in proportion to its stiffness: modal damping became D = beta K with beta = {} s, \
+                 exact for the first mode",
+                betas.join(", ")
+            ));
+        }
+        if self.motion.trajectory.initial_speed() > 1e-6 {
+            warnings.push("the motion starts at speed: the first ringing is an artefact of the sudden start".into());
+        }
+    }
+}
+
+/// Change of the distance between the interfaces over that distance.
+fn engineering_strain(spring: &flexarm_flexlink::Spring, e: &Vector6<f64>) -> f64 {
+    let p_SB = spring.X_LS.inverse() * spring.X_LB.translation.vector;
+    let phi: nalgebra::Vector3<f64> = e.fixed_rows::<3>(3).into();
+    let moved = nalgebra::Rotation3::from_scaled_axis(phi) * p_SB + e.fixed_rows::<3>(0);
+    let p_LB = spring.X_LS.translation.vector + spring.X_LS.rotation * moved;
+    ((p_LB.norm() - spring.length) / spring.length).abs()
+}

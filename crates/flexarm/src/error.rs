@@ -1,0 +1,79 @@
+//! One error type for the faces: what went wrong, and whether the input or the run is to blame.
+
+use std::path::PathBuf;
+
+use crate::robot_file::RobotFileError;
+
+/// Anything that ends a command.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A file or folder that was asked for is not there or not readable.
+    #[error("{}: {what}", path.display())]
+    File {
+        /// The path.
+        path: PathBuf,
+        /// What is wrong and how to mend it.
+        what: String,
+    },
+    /// Something in the robot file.
+    #[error(transparent)]
+    RobotFile(#[from] RobotFileError),
+    /// Something in the URDF.
+    #[error(transparent)]
+    Urdf(#[from] flexarm_urdf::UrdfError),
+    /// The links and joints make no tree.
+    #[error("{}: {source}", path.display())]
+    Model {
+        /// The URDF.
+        path: PathBuf,
+        /// Why.
+        source: flexarm_kinematics::ModelError,
+    },
+    /// A reduced-link file.
+    #[error(transparent)]
+    Flex(#[from] Box<flexarm_fem::FlexFileError>),
+    /// Something in the trajectory.
+    #[error(transparent)]
+    Trajectory(#[from] flexarm_trajectory::TrajectoryError),
+    /// The trajectory asks for more than the joints can do.
+    #[error("the trajectory passes {} joint limits:\n  {}\nslow it down, change it, or go on anyway with --ignore-limits", .0.len(), .0.join("\n  "))]
+    Limits(Vec<String>),
+    /// A value on the command line or in an option.
+    #[error("{0}")]
+    Usage(String),
+    /// The simulation could not start or stopped.
+    #[error("{source}{}", if *partial { "; the log up to there is complete and readable" } else { "" })]
+    Step {
+        /// Why.
+        source: flexarm_stepping::StepError,
+        /// Whether files were written up to the stop.
+        partial: bool,
+    },
+    /// The user stopped it.
+    #[error("stopped at t = {t:.3} s; the log up to there is complete and readable")]
+    Interrupted {
+        /// Simulated time [s].
+        t: f64,
+    },
+    /// A recording could not be written.
+    #[error(transparent)]
+    Log(#[from] flexarm_log::LogError),
+}
+
+impl Error {
+    /// Exit code of a command that ends with this: 2 for bad input, 1 for a run that failed.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Step { source, partial } => match source {
+                flexarm_stepping::StepError::Setup(_) | flexarm_stepping::StepError::UnstableStep { .. } => 2,
+                flexarm_stepping::StepError::Singular { .. } if !partial => 2,
+                _ => 1,
+            },
+            Self::Interrupted { .. } => 1,
+            Self::Log(flexarm_log::LogError::Exists { .. }) => 2,
+            Self::Log(_) => 1,
+            _ => 2,
+        }
+    }
+}

@@ -1,0 +1,219 @@
+//! What was loaded, and its kinematics and dynamics at one pose.
+
+use flexarm_kinematics::{
+    Data, State, forward_kinematics_velocity, frame_jacobian, gravity_forces, mass_matrix, nonlinear_effects,
+};
+use nalgebra::{DMatrix, Matrix6xX, UnitQuaternion};
+use serde::Serialize;
+
+use crate::error::Error;
+use crate::robot::{Robot, TCP_FRAME};
+
+/// Answer of `flexarm inspect`. SI units; the Jacobian's rows are linear first, world axes, at the TCP.
+#[derive(Clone, Debug, Serialize)]
+pub struct Inspection {
+    /// Name of the robot.
+    pub robot: String,
+    /// Movable joints, in coordinate order.
+    pub joints: Vec<JointInfo>,
+    /// Links with their mass properties.
+    pub links: Vec<LinkInfo>,
+    /// Flexible links.
+    pub flexible_links: Vec<FlexibleInfo>,
+    /// Tool centre point at the pose.
+    pub tcp: TcpInfo,
+    /// Pose asked for, in the order of `joints`.
+    pub q: Vec<f64>,
+    /// Velocity asked for.
+    pub velocity: Vec<f64>,
+    /// 6 rows × one column per joint.
+    pub jacobian: Vec<Vec<f64>>,
+    /// Of the rigid robot with its payload.
+    pub mass_matrix: Vec<Vec<f64>>,
+    /// Forces that hold the pose.
+    pub gravity_torque: Vec<f64>,
+    /// `τ = M q̈ + bias`: gravity with centrifugal and Coriolis forces.
+    pub bias: Vec<f64>,
+    /// `bias - gravity_torque`.
+    pub coriolis: Vec<f64>,
+    /// Total mass [kg], payload and base included.
+    pub mass_kg: f64,
+    /// Things worth telling.
+    pub warnings: Vec<String>,
+}
+
+/// A movable joint; limits are null where there are none.
+#[derive(Clone, Debug, Serialize)]
+pub struct JointInfo {
+    /// Name.
+    pub name: String,
+    /// revolute, continuous, prismatic.
+    #[serde(rename = "type")]
+    pub kind: &'static str,
+    /// Lowest position [rad or m].
+    pub lower: Option<f64>,
+    /// Highest position [rad or m].
+    pub upper: Option<f64>,
+    /// Highest speed.
+    pub velocity: Option<f64>,
+    /// Highest force.
+    pub effort: Option<f64>,
+}
+
+/// A link.
+#[derive(Clone, Debug, Serialize)]
+pub struct LinkInfo {
+    /// Name.
+    pub name: String,
+    /// Mass [kg]; 0 for a mere frame.
+    pub mass_kg: f64,
+    /// Centre of mass in link axes [m].
+    pub com_m: [f64; 3],
+    /// `ixx iyy izz ixy ixz iyz` about the centre of mass, link axes [kg m²].
+    pub inertia: [f64; 6],
+}
+
+/// A flexible link.
+#[derive(Clone, Debug, Serialize)]
+pub struct FlexibleInfo {
+    /// Name.
+    pub name: String,
+    /// Where its stiffness comes from.
+    pub method: String,
+    /// Distance of the interfaces [m].
+    pub length_m: f64,
+    /// Masses of the two parts [kg].
+    pub parts_kg: [f64; 2],
+    /// Stiffness at the split, 6×6, linear first.
+    pub stiffness: Vec<Vec<f64>>,
+}
+
+/// Pose of the tool centre point in the world.
+#[derive(Clone, Debug, Serialize)]
+pub struct TcpInfo {
+    /// Link that carries it.
+    pub link: String,
+    /// Position [m].
+    pub position_m: [f64; 3],
+    /// Attitude, w first.
+    pub quaternion_wxyz: [f64; 4],
+}
+
+fn finite(x: f64) -> Option<f64> {
+    x.is_finite().then_some(x)
+}
+
+fn rows(M: &DMatrix<f64>) -> Vec<Vec<f64>> {
+    M.row_iter().map(|r| r.iter().copied().collect()).collect()
+}
+
+/// Reads a joint vector: `v1,v2,...` in coordinate order, or `name=value,...` with the rest zero.
+///
+/// # Errors
+/// [`Error::Usage`] saying which joints there are.
+pub fn parse_joint_values(text: &str, joints: &[&str]) -> Result<Vec<f64>, Error> {
+    let mut values = vec![0.0; joints.len()];
+    let items: Vec<&str> = text.split(',').map(str::trim).filter(|s| !s.is_empty()).collect();
+    let number = |s: &str| {
+        let value: Option<f64> = s.trim().parse().ok().filter(|x: &f64| x.is_finite());
+        value.ok_or_else(|| Error::Usage(format!("joint value {s:?} is not a finite number (rad or m)")))
+    };
+    if items.iter().any(|i| i.contains('=')) {
+        for item in items {
+            let (name, value) = item
+                .split_once('=')
+                .ok_or_else(|| Error::Usage(format!("{item:?}: either all joint values have names or none")))?;
+            let k = joints.iter().position(|j| *j == name.trim()).ok_or_else(|| {
+                Error::Usage(format!("there is no movable joint {:?}; the joints are {joints:?}", name.trim()))
+            })?;
+            values[k] = number(value)?;
+        }
+    } else {
+        if items.len() != joints.len() {
+            return Err(Error::Usage(format!(
+                "{} joint values given, the robot has {} movable joints: {joints:?}",
+                items.len(),
+                joints.len()
+            )));
+        }
+        for (value, item) in values.iter_mut().zip(items) {
+            *value = number(item)?;
+        }
+    }
+    Ok(values)
+}
+
+/// The rigid robot (with payload) at a pose; `at` and `velocity` as for [`parse_joint_values`].
+///
+/// # Errors
+/// [`Error::Usage`] for joint values that do not fit.
+pub fn inspect(robot: &Robot, at: Option<&str>, velocity: Option<&str>) -> Result<Inspection, Error> {
+    let model = robot.rigid_model()?;
+    let names: Vec<&str> = model.coordinates().iter().map(|c| c.joint.as_str()).collect();
+    let values = |text: Option<&str>| text.map_or_else(|| Ok(vec![0.0; names.len()]), |t| parse_joint_values(t, &names));
+    let (q, v) = (values(at)?, values(velocity)?);
+    let mut state = State::zeros(&model);
+    state.q.copy_from_slice(&q);
+    state.qdot.copy_from_slice(&v);
+
+    let mut data = Data::new(&model);
+    let M = mass_matrix(&model, &mut data, &state.q).clone();
+    let gravity = gravity_forces(&model, &mut data, &state.q).clone();
+    let bias = nonlinear_effects(&model, &mut data, &state).clone();
+    forward_kinematics_velocity(&model, &mut data, &state);
+    let tcp = model.frame(TCP_FRAME).expect("added when the robot was loaded");
+    let mut J = Matrix6xX::zeros(model.nv());
+    frame_jacobian(&model, &data, tcp, &mut J);
+    let X = data.X_WF(tcp);
+    let attitude = UnitQuaternion::from_rotation_matrix(&X.rotation);
+
+    let joints = model.coordinates().iter().map(|c| JointInfo {
+        name: c.joint.clone(),
+        kind: c.kind,
+        lower: finite(c.limits.lower),
+        upper: finite(c.limits.upper),
+        velocity: finite(c.limits.velocity),
+        effort: finite(c.limits.effort),
+    });
+    let links = robot.urdf.mechanism.links.iter().map(|l| {
+        let zero = ([0.0; 3], [0.0; 6], 0.0);
+        let (com_m, inertia, mass_kg) = l.inertia.map_or(zero, |i| {
+            let I = i.inertia_com;
+            (i.com.into(), [I[(0, 0)], I[(1, 1)], I[(2, 2)], I[(0, 1)], I[(0, 2)], I[(1, 2)]], i.mass)
+        });
+        LinkInfo { name: l.name.clone(), mass_kg, com_m, inertia }
+    });
+    let flexible = robot.flexible_robot()?;
+    let flexible_links = robot.flexible.iter().filter_map(|(f, _)| {
+        let (spring, _) = flexible.springs.iter().find(|(s, _)| s.link == f.link)?;
+        let part = |name: &str| flexible.model.bodies().iter().find(|b| b.name == name).map_or(0.0, |b| b.inertia.mass);
+        let K = DMatrix::from_iterator(6, 6, spring.K_S.iter().copied());
+        Some(FlexibleInfo {
+            name: f.link.clone(),
+            method: f.reduced.provenance.method.clone(),
+            length_m: spring.length,
+            parts_kg: [part(&spring.link), part(&spring.distal_link)],
+            stiffness: rows(&K),
+        })
+    });
+    Ok(Inspection {
+        robot: robot.name.clone(),
+        joints: joints.collect(),
+        links: links.collect(),
+        flexible_links: flexible_links.collect(),
+        tcp: TcpInfo {
+            link: robot.tcp.0.clone(),
+            position_m: X.translation.vector.into(),
+            quaternion_wxyz: [attitude.w, attitude.i, attitude.j, attitude.k],
+        },
+        q,
+        velocity: v,
+        jacobian: J.row_iter().map(|r| r.iter().copied().collect()).collect(),
+        mass_matrix: rows(&M),
+        coriolis: (&bias - &gravity).as_slice().to_vec(),
+        gravity_torque: gravity.as_slice().to_vec(),
+        bias: bias.as_slice().to_vec(),
+        mass_kg: robot.rigid.links.iter().filter_map(|l| l.inertia).map(|i| i.mass).sum(),
+        warnings: robot.warnings.clone(),
+    })
+}

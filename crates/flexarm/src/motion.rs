@@ -1,0 +1,67 @@
+//! Trajectories for a robot: joints in coordinate order, checked against its limits.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use flexarm_kinematics::Model;
+use flexarm_stepping::PrescribedMotion;
+use flexarm_trajectory::{JointLimits, LimitViolation, Trajectory};
+
+use crate::error::Error;
+
+/// A trajectory whose joints are the model's actuated coordinates.
+#[derive(Clone, Debug)]
+pub struct Motion {
+    /// Name for logs.
+    pub name: String,
+    /// The curves, in coordinate order.
+    pub trajectory: Arc<Trajectory>,
+    /// Limits that it passes.
+    pub violations: Vec<LimitViolation>,
+    /// Things worth telling.
+    pub warnings: Vec<String>,
+}
+
+struct Along(Arc<Trajectory>);
+
+impl PrescribedMotion for Along {
+    fn sample(&self, t: f64, q: &mut [f64], qdot: &mut [f64], qddot: &mut [f64]) {
+        self.0.sample(t, q, qdot, qddot);
+    }
+}
+
+impl Motion {
+    /// Reads a trajectory file for a model.
+    ///
+    /// # Errors
+    /// [`Error::File`] or [`Error::Trajectory`]: format, units, times, joints that are missing or unknown.
+    pub fn load(path: &Path, model: &Model) -> Result<Self, Error> {
+        if !path.is_file() {
+            let what = "there is no such trajectory file; give a .csv or .toml file".into();
+            return Err(Error::File { path: path.to_owned(), what });
+        }
+        let actuated = &model.coordinates()[..model.n_actuated()];
+        let limits: Vec<JointLimits> = actuated
+            .iter()
+            .map(|c| JointLimits {
+                lower: c.limits.lower,
+                upper: c.limits.upper,
+                velocity: c.limits.velocity,
+                acceleration: None,
+            })
+            .collect();
+        let names: Vec<&str> = actuated.iter().map(|c| c.joint.as_str()).collect();
+        let named: Vec<(&str, JointLimits)> = names.iter().copied().zip(limits.iter().copied()).collect();
+        let trajectory = Trajectory::from_path(path, &named)?;
+        let warnings = trajectory.warnings().iter().map(|w| format!("{}: {w}", path.display())).collect();
+        let trajectory = trajectory.with_joint_order(&names)?;
+        let violations = trajectory.check_limits(&limits);
+        let name = path.file_stem().map_or_else(|| "trajectory".into(), |s| s.to_string_lossy().into_owned());
+        Ok(Self { name, trajectory: Arc::new(trajectory), violations, warnings })
+    }
+
+    /// For steppers.
+    pub fn prescribed(&self) -> Arc<dyn PrescribedMotion> {
+        Arc::new(Along(self.trajectory.clone()))
+    }
+}

@@ -1,0 +1,89 @@
+//! Choices of a run, with defaults that work.
+
+use std::path::PathBuf;
+
+use flexarm_stepping::{Start, StepperKind};
+
+/// How links are modelled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum LinkModel {
+    /// All rigid.
+    Rigid,
+    /// Flexible links as two rigid parts with a 6×6 spring.
+    #[default]
+    Lumped,
+}
+
+impl LinkModel {
+    /// The word of the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Rigid => "rigid",
+            Self::Lumped => "lumped",
+        }
+    }
+}
+
+/// Choices of a run.
+#[derive(Clone, Debug)]
+pub struct RunOptions {
+    /// Time stepper.
+    pub stepper: StepperKind,
+    /// Step [s].
+    pub step_s: f64,
+    /// Link model.
+    pub links: LinkModel,
+    /// Logged samples per second; the nearest whole number of steps is used.
+    pub log_rate_hz: f64,
+    /// Start in equilibrium or undeformed.
+    pub start: Start,
+    /// Run although the trajectory passes joint limits; they become warnings.
+    pub ignore_limits: bool,
+    /// Log and measure against the rigid twin.
+    pub with_twin: bool,
+    /// Band of the settling time [m].
+    pub settling_band_m: f64,
+}
+
+impl Default for RunOptions {
+    fn default() -> Self {
+        Self {
+            stepper: StepperKind::GeneralizedAlpha { rho: 0.9 },
+            step_s: 1e-3,
+            links: LinkModel::Lumped,
+            log_rate_hz: 500.0,
+            start: Start::Equilibrium,
+            ignore_limits: false,
+            with_twin: true,
+            settling_band_m: 1e-4,
+        }
+    }
+}
+
+/// Where recordings go.
+#[derive(Clone, Debug)]
+pub struct Outputs {
+    /// Folder; made if it is not there.
+    pub folder: PathBuf,
+    /// Overwrite what is there.
+    pub overwrite: bool,
+    /// Write MCAP (needs the feature `mcap`).
+    pub mcap: bool,
+    /// Write .rrd (needs the feature `rerun`).
+    pub rrd: bool,
+    /// Write CSV.
+    pub csv: bool,
+}
+
+impl Outputs {
+    /// Everything that this build can write, into a folder.
+    pub fn everything(folder: impl Into<PathBuf>) -> Self {
+        Self {
+            folder: folder.into(),
+            overwrite: false,
+            mcap: cfg!(feature = "mcap"),
+            rrd: cfg!(feature = "rerun"),
+            csv: true,
+        }
+    }
+}

@@ -1,0 +1,204 @@
+//! What recordings of a run say once: header, meshes, files.
+
+use flexarm_kinematics::{Frame, JointKind, Model};
+use flexarm_log::{Attachment, CreateOptions, CsvRecorder, LinkInfo, LinkMesh, RecorderSet, RunHeader};
+use flexarm_stepping::FlexibleArm;
+use flexarm_urdf::{Geometry, TriangleMesh};
+
+use crate::error::Error;
+use crate::motion::Motion;
+use crate::options::{Outputs, RunOptions};
+use crate::robot::Robot;
+use crate::summary::Files;
+
+/// Recorders of a run with the names of their files.
+pub(crate) struct Recordings {
+    pub(crate) set: RecorderSet,
+    pub(crate) names: Files,
+}
+
+/// Names of the files in an output folder.
+pub(crate) const RECORDING_FILES: [&str; 5] = ["run.mcap", "run.rrd", "run.csv", "report.md", "summary.json"];
+
+/// Recorders for the outputs; refuses to overwrite before anything is made.
+pub(crate) fn recorders(outputs: Option<&Outputs>) -> Result<Recordings, Error> {
+    let mut recordings = Recordings { set: RecorderSet::new(), names: Files::default() };
+    let Some(outputs) = outputs else { return Ok(recordings) };
+    if !outputs.overwrite
+        && let Some(there) = RECORDING_FILES.iter().map(|f| outputs.folder.join(f)).find(|p| p.exists())
+    {
+        let what = "exists already and is not overwritten: choose another folder with -o or give --force";
+        return Err(Error::File { path: there, what: what.into() });
+    }
+    std::fs::create_dir_all(&outputs.folder).map_err(|e| Error::File {
+        path: outputs.folder.clone(),
+        what: format!("the output folder cannot be made: {e}"),
+    })?;
+    let options = CreateOptions::default().with_overwrite(outputs.overwrite);
+    let path = |name: &str| outputs.folder.join(name);
+    let text = |name: &str| Some(path(name).display().to_string());
+    #[cfg(feature = "mcap")]
+    if outputs.mcap {
+        recordings.set.push(Box::new(flexarm_log::McapRecorder::create(path("run.mcap"), options)));
+        recordings.names.mcap = text("run.mcap");
+    }
+    #[cfg(feature = "rerun")]
+    if outputs.rrd {
+        recordings.set.push(Box::new(flexarm_log::RrdRecorder::create(path("run.rrd"), options)));
+        recordings.names.rrd = text("run.rrd");
+    }
+    if outputs.csv {
+        recordings.set.push(Box::new(CsvRecorder::create(path("run.csv"), options)));
+        recordings.names.csv = text("run.csv");
+    }
+    recordings.names.report = text("report.md");
+    Ok(recordings)
+}
+
+/// Links of the URDF, parents before children.
+fn ordered_links(robot: &Robot) -> Vec<LinkInfo> {
+    let mechanism = &robot.urdf.mechanism;
+    let base = mechanism.links.iter().find(|l| mechanism.joints.iter().all(|j| j.child != l.name));
+    let mut links: Vec<LinkInfo> =
+        base.iter().map(|l| LinkInfo { name: l.name.clone(), parent: None, fixed: true }).collect();
+    let mut next = 0;
+    while next < links.len() {
+        let name = links[next].name.clone();
+        links.extend(mechanism.child_joints(&name).map(|j| LinkInfo {
+            name: j.child.clone(),
+            parent: Some(next),
+            // A fixed joint at the far end of a flexible link moves against the link's frame.
+            fixed: j.kind == JointKind::Fixed && robot.flexible.iter().all(|(f, _)| f.link != name),
+        }));
+        next += 1;
+    }
+    links
+}
+
+/// Frames of the URDF's links in the model, in the order of the header.
+pub(crate) fn link_frames(robot: &Robot, model: &Model) -> Vec<Frame> {
+    let links = ordered_links(robot);
+    links.iter().map(|l| model.frame(&l.name).expect("all links are frames").clone()).collect()
+}
+
+/// Everything about a run that does not change.
+pub(crate) fn header(robot: &Robot, motion: &Motion, options: &RunOptions, arm: &FlexibleArm) -> RunHeader {
+    let model = &arm.model;
+    let links = ordered_links(robot);
+    let group = |name: &str, rows: &[(&str, String)]| {
+        (name.to_owned(), rows.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect::<Vec<_>>())
+    };
+    let stepper = crate::summary::StepperFigures::new(options, Default::default());
+    let elements: Vec<String> = arm.elements.iter().map(|e| e.name.clone()).collect();
+    let methods: Vec<String> =
+        robot.flexible.iter().map(|(f, _)| format!("{}: {}", f.link, f.reduced.provenance.method)).collect();
+    let frequencies: Vec<String> = arm.modes.frequencies_hz().iter().map(|f| format!("{f:.4}")).collect();
+    let metadata = vec![
+        group(
+            "flexarm.run",
+            &[
+                ("version", env!("CARGO_PKG_VERSION").into()),
+                ("robot", robot.name.clone()),
+                ("trajectory", motion.name.clone()),
+                ("stepper", stepper.name.into()),
+                ("step_s", options.step_s.to_string()),
+                ("rho_inf", stepper.rho_inf.map_or_else(String::new, |r| r.to_string())),
+                ("start", format!("{:?}", options.start).to_lowercase()),
+                ("log_rate_hz", options.log_rate_hz.to_string()),
+            ],
+        ),
+        group("flexarm.units", &[("length", "m".into()), ("angle", "rad".into()), ("force", "N".into()), ("time", "s".into())]),
+        group(
+            "flexarm.model",
+            &[
+                ("links", options.links.name().into()),
+                ("elements", elements.join(", ")),
+                ("reduction", methods.join("; ")),
+                ("frequencies_hz", frequencies.join(", ")),
+            ],
+        ),
+    ];
+    let read = |name: &str, media_type: &str, path: &std::path::Path| {
+        std::fs::read(path).ok().map(|bytes| Attachment { name: name.into(), media_type: media_type.into(), bytes })
+    };
+    let mut attachments: Vec<Attachment> = Vec::new();
+    if robot.path != robot.urdf_path {
+        attachments.extend(read("robot.toml", "application/toml", &robot.path));
+    }
+    RunHeader {
+        robot: robot.name.clone(),
+        trajectory: motion.name.clone(),
+        urdf: robot.urdf.text.clone(),
+        joints: model.coordinates()[..model.n_actuated()].iter().map(|c| c.joint.clone()).collect(),
+        meshes: meshes(robot, &links),
+        links,
+        elements,
+        tcp: robot.tcp.0.clone(),
+        metadata,
+        attachments,
+        description: description(robot, motion, options, &frequencies),
+        has_rigid: options.with_twin,
+        log_rate_hz: options.log_rate_hz,
+    }
+}
+
+fn description(robot: &Robot, motion: &Motion, options: &RunOptions, frequencies: &[String]) -> String {
+    let mut text = format!(
+        "# {} on {}\n\nFlexible arm (solid) against its rigid twin (ghost), TCP `{}`.\n\n| | |\n|---|---|\n\
+         | duration | {:.3} s |\n| stepper | {}, step {} s |\n| links | {} |\n",
+        robot.name,
+        motion.name,
+        robot.tcp.0,
+        motion.trajectory.duration(),
+        options.stepper.name(),
+        options.step_s,
+        options.links.name(),
+    );
+    for (f, _) in &robot.flexible {
+        text += &format!("| flexible link | {}: {} |\n", f.link, f.reduced.provenance.method);
+    }
+    if !frequencies.is_empty() {
+        text += &format!("| first frequencies | {} Hz |\n", frequencies[..frequencies.len().min(3)].join(", "));
+    }
+    text
+}
+
+/// Visuals as triangles in link axes; those that cannot be read are left out (the URDF reader has warned).
+fn meshes(robot: &Robot, links: &[LinkInfo]) -> Vec<LinkMesh> {
+    let mut meshes = Vec::new();
+    for (i, visual) in robot.urdf.visuals.iter().enumerate() {
+        let Some(link) = links.iter().position(|l| l.name == visual.link) else { continue };
+        let Ok(mesh) = visual.geometry.triangles() else { continue };
+        let file = match &visual.geometry {
+            Geometry::Mesh { path, .. } => path.clone(),
+            _ => None,
+        };
+        let color = visual.color.or(mesh.color).unwrap_or([0.75, 0.75, 0.78, 1.0]);
+        let moved = mesh.transformed(&visual.X_LV);
+        let normals = moved.normals.clone().unwrap_or_else(|| flat_normals(&moved));
+        meshes.push(LinkMesh {
+            link,
+            name: visual.name.clone().unwrap_or_else(|| format!("visual_{i}")),
+            positions: moved.positions,
+            normals,
+            triangles: moved.triangles,
+            color,
+            file,
+        });
+    }
+    meshes
+}
+
+/// Area-weighted mean of the adjoining triangles' normals.
+fn flat_normals(mesh: &TriangleMesh) -> Vec<[f32; 3]> {
+    use nalgebra::Vector3;
+    let mut sums = vec![Vector3::<f32>::zeros(); mesh.positions.len()];
+    for triangle in &mesh.triangles {
+        let [a, b, c] = triangle.map(|i| Vector3::from(mesh.positions[i as usize]));
+        let n = (b - a).cross(&(c - a));
+        for &i in triangle {
+            sums[i as usize] += n;
+        }
+    }
+    sums.into_iter().map(|n| n.try_normalize(0.0).unwrap_or(Vector3::z()).into()).collect()
+}

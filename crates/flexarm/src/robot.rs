@@ -1,0 +1,417 @@
+//! A robot as loaded: URDF, payload, tool centre point and flexible links, ready to make models from.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use flexarm_fem::{BeamLink, BeamTheory, Material, ReducedLink, Section, read_flex};
+use flexarm_flexlink::{FlexibleLink, Parts, Spring, distal_joint, substitute};
+use flexarm_kinematics::{ElasticAngles, Joint, JointKind, Link, LinkInertia, Mechanism, Model, Pose};
+use flexarm_stepping::{Damping, FlexibleArm, PrescribedMotion, StepError};
+use flexarm_urdf::{ReadOptions, UrdfRobot, default_tcp, read_urdf};
+use nalgebra::{Matrix3, Rotation3, Translation3, Vector3};
+use toml::Spanned;
+
+use crate::beam_entry::beam_section;
+use crate::error::Error;
+use crate::robot_file::{
+    BeamEntry, DampingEntry, FlexibleLinkEntry, PayloadEntry, RobotFile, RobotFileError, Source, parse_robot_file,
+};
+
+/// Name of the frame that is added for the tool centre point.
+pub const TCP_FRAME: &str = "__tcp";
+/// Name of the link that is added for the payload.
+const PAYLOAD_LINK: &str = "__payload";
+
+/// Choices at loading.
+#[derive(Clone, Debug, Default)]
+pub struct LoadOptions {
+    /// Link to use as TCP instead of the file's.
+    pub tcp: Option<String>,
+    /// For the URDF reader.
+    pub urdf: ReadOptions,
+}
+
+/// A loaded robot.
+#[derive(Clone, Debug)]
+pub struct Robot {
+    /// Name.
+    pub name: String,
+    /// The file that was loaded.
+    pub path: PathBuf,
+    /// The URDF.
+    pub urdf: UrdfRobot,
+    /// Path of the URDF.
+    pub urdf_path: PathBuf,
+    /// URDF with TCP frame, payload and gravity: the rigid robot.
+    pub rigid: Mechanism,
+    /// Flexible links with their damping.
+    pub flexible: Vec<(FlexibleLink, Damping)>,
+    /// Link that carries the TCP and pose of the TCP in it.
+    pub tcp: (String, Pose),
+    /// Trajectory for runs without one.
+    pub default_trajectory: Option<PathBuf>,
+    /// Things worth telling.
+    pub warnings: Vec<String>,
+}
+
+/// A robot whose links bend, with its springs in coordinate order.
+#[derive(Clone, Debug)]
+pub struct FlexibleRobot {
+    /// The tree.
+    pub model: Arc<Model>,
+    /// Springs in coordinate order, with damping.
+    pub springs: Vec<(Spring, Damping)>,
+}
+
+impl FlexibleRobot {
+    /// The arm that steppers take, driven along a motion.
+    ///
+    /// # Errors
+    /// As [`FlexibleArm::new`].
+    pub fn arm(&self, motion: Arc<dyn PrescribedMotion>) -> Result<FlexibleArm, StepError> {
+        let springs = self.springs.iter().map(|(s, d)| (s.link.clone(), s.K_S, *d)).collect();
+        FlexibleArm::new(self.model.clone(), springs, motion)
+    }
+}
+
+impl Robot {
+    /// Loads a `robot.toml`, a folder with one, or a bare `.urdf` or `.xacro`.
+    ///
+    /// # Errors
+    /// [`Error`] with file, place, what was found and how to mend it.
+    pub fn load(path: &Path, options: &LoadOptions) -> Result<Self, Error> {
+        let path = if path.is_dir() { path.join("robot.toml") } else { path.to_owned() };
+        if !path.exists() {
+            let what = "there is no such file; give a robot.toml, a folder with one, or a .urdf or .xacro file".into();
+            return Err(Error::File { path, what });
+        }
+        match path.extension().and_then(|e| e.to_str()) {
+            Some("toml") => Self::from_robot_file(&path, options),
+            Some("urdf" | "xacro") => Self::from_urdf(&path, options),
+            _ => {
+                let what = "expected a robot.toml, a folder with one, or a file ending in .urdf or .xacro".into();
+                Err(Error::File { path, what })
+            }
+        }
+    }
+
+    fn from_urdf(path: &Path, options: &LoadOptions) -> Result<Self, Error> {
+        let urdf = read_urdf(path, &options.urdf)?;
+        let name = urdf.mechanism.name.clone();
+        let link = options.tcp.clone().or_else(|| default_tcp(&urdf.mechanism).map(str::to_owned));
+        let link = link.ok_or_else(|| Error::Usage("the robot has no link that could be the TCP: use --tcp".into()))?;
+        let mut robot = Self {
+            name,
+            path: path.to_owned(),
+            urdf_path: path.to_owned(),
+            rigid: urdf.mechanism.clone(),
+            urdf,
+            flexible: Vec::new(),
+            tcp: (link, Pose::identity()),
+            default_trajectory: None,
+            warnings: Vec::new(),
+        };
+        robot.finish(None)?;
+        Ok(robot)
+    }
+
+    fn from_robot_file(path: &Path, options: &LoadOptions) -> Result<Self, Error> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|e| Error::File { path: path.to_owned(), what: format!("cannot be read: {e}") })?;
+        let (file, source) = parse_robot_file(&text, path)?;
+        let folder = path.parent().unwrap_or(Path::new("."));
+        let urdf_path = folder.join(file.urdf.get_ref());
+        if !urdf_path.is_file() {
+            let message = format!("urdf = {:?}: there is no file {}", file.urdf.get_ref(), urdf_path.display());
+            return Err(source.error(file.urdf.span(), message).into());
+        }
+        let mut urdf_options = options.urdf.clone();
+        urdf_options.packages.extend(file.packages.iter().map(|(name, to)| (name.clone(), folder.join(to))));
+        urdf_options.waive.extend(file.waive_inertia.iter().cloned());
+        let urdf = read_urdf(&urdf_path, &urdf_options)?;
+
+        let mut rigid = urdf.mechanism.clone();
+        if let Some(g) = file.gravity {
+            rigid.gravity = g.into();
+        }
+        let tcp = tcp_of(&file, &source, &urdf, options)?;
+        let fallback_name = folder.file_name().map_or_else(|| "robot".into(), |n| n.to_string_lossy().into_owned());
+        let mut robot = Self {
+            name: file.name.clone().unwrap_or(fallback_name),
+            path: path.to_owned(),
+            urdf_path,
+            rigid,
+            urdf,
+            flexible: Vec::new(),
+            tcp,
+            default_trajectory: file.default_trajectory.as_ref().map(|t| folder.join(t)),
+            warnings: Vec::new(),
+        };
+        if let Some(payload) = &file.payload {
+            robot.add_payload(payload, &source)?;
+        }
+        for drive in &file.drive {
+            check_drive(drive, &robot.rigid, &source)?;
+        }
+        for entry in &file.flexible_link {
+            let flexible = flexible_link(entry, &robot.rigid, &source, folder, &mut robot.warnings)?;
+            robot.flexible.push(flexible);
+        }
+        robot.finish(Some((&file, &source)))?;
+        Ok(robot)
+    }
+
+    /// Adds the TCP frame and checks that both trees can be built.
+    fn finish(&mut self, file: Option<(&RobotFile, &Source)>) -> Result<(), Error> {
+        let (link, X_LT) = self.tcp.clone();
+        if self.rigid.link(&link).is_none() {
+            let known: Vec<_> = self.rigid.links.iter().map(|l| l.name.as_str()).collect();
+            return Err(Error::Usage(format!("TCP frame {link:?} is not a link of the robot; its links are {known:?}")));
+        }
+        self.rigid.joints.push(Joint::new("__tcp_joint", JointKind::Fixed, link, TCP_FRAME, X_LT));
+        self.rigid.links.push(Link { name: TCP_FRAME.into(), inertia: None });
+        self.warnings.extend(self.urdf.warnings_only().map(|w| format!("{}: {}", w.location, w.message)));
+        let first_flexible = file.and_then(|(f, s)| f.flexible_link.first().map(|e| (s, e.link.span())));
+        match (self.flexible_robot(), first_flexible) {
+            (Ok(flexible), _) => {
+                for (spring, _) in &flexible.springs {
+                    let (own, parts) = spring.masses;
+                    if own > 0.0 && (parts / own - 1.0).abs() > 1e-6 {
+                        self.warnings.push(format!(
+                            "link {:?}: the two parts weigh {parts:.4} kg, the URDF's link {own:.4} kg; the parts count",
+                            spring.link
+                        ));
+                    }
+                }
+                Ok(())
+            }
+            (Err(Error::Usage(message)), Some((source, span))) => Err(source.error(span, message).into()),
+            (Err(error), _) => Err(error),
+        }
+    }
+
+    fn add_payload(&mut self, payload: &PayloadEntry, source: &Source) -> Result<(), Error> {
+        let link = payload.link.as_ref().map_or_else(|| self.tcp.0.clone(), |l| l.get_ref().clone());
+        if self.rigid.link(&link).is_none() {
+            let span = payload.link.as_ref().map_or(0..0, Spanned::span);
+            return Err(source.error(span, unknown_link("payload", &link, &self.rigid)).into());
+        }
+        let mass = *payload.mass.get_ref();
+        if !(mass.is_finite() && mass > 0.0) {
+            let message = format!("payload mass is {mass} kg, it must be positive; leave the payload out if there is none");
+            return Err(source.error(payload.mass.span(), message).into());
+        }
+        let [xx, yy, zz, xy, xz, yz] = payload.inertia;
+        let inertia_com = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+        if inertia_com.symmetric_eigenvalues().min() < -1e-9 * inertia_com.norm() {
+            let message = "payload inertia has a negative principal moment; the order is ixx iyy izz ixy ixz iyz";
+            return Err(source.error(payload.mass.span(), message).into());
+        }
+        let inertia = LinkInertia { mass, com: payload.com.into(), inertia_com };
+        self.rigid.links.push(Link { name: PAYLOAD_LINK.into(), inertia: Some(inertia) });
+        let joint = Joint::new("__payload_joint", JointKind::Fixed, link, PAYLOAD_LINK, Pose::identity());
+        self.rigid.joints.push(joint);
+        Ok(())
+    }
+
+    /// The rigid robot's tree.
+    ///
+    /// # Errors
+    /// [`Error::Model`].
+    pub fn rigid_model(&self) -> Result<Arc<Model>, Error> {
+        Model::new(&self.rigid)
+            .map(Arc::new)
+            .map_err(|source| Error::Model { path: self.urdf_path.clone(), source })
+    }
+
+    /// The robot with its flexible links in place.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if a link cannot be substituted, [`Error::Model`] if the result is no tree.
+    pub fn flexible_robot(&self) -> Result<FlexibleRobot, Error> {
+        let links: Vec<FlexibleLink> = self.flexible.iter().map(|(f, _)| f.clone()).collect();
+        let substituted = substitute(&self.rigid, &links).map_err(|e| Error::Usage(full_message(&e)))?;
+        let model = Model::new(&substituted.mechanism)
+            .map_err(|source| Error::Model { path: self.urdf_path.clone(), source })?;
+        let mut springs = Vec::new();
+        for body in model.elastic_bodies() {
+            let joint = &model.bodies()[body].joint;
+            let found = substituted.springs.iter().zip(&self.flexible).find(|(s, _)| s.joint == *joint);
+            springs.extend(found.map(|(s, (_, damping))| (s.clone(), *damping)));
+        }
+        Ok(FlexibleRobot { model: Arc::new(model), springs })
+    }
+
+    /// The robot with all links rigid, as an arm without springs.
+    ///
+    /// # Errors
+    /// [`Error::Model`].
+    pub fn rigid_robot(&self) -> Result<FlexibleRobot, Error> {
+        Ok(FlexibleRobot { model: self.rigid_model()?, springs: Vec::new() })
+    }
+}
+
+/// Error text with its causes.
+pub(crate) fn full_message(error: &dyn std::error::Error) -> String {
+    error.to_string()
+}
+
+fn unknown_link(what: &str, link: &str, mechanism: &Mechanism) -> String {
+    let known: Vec<_> = mechanism.links.iter().map(|l| l.name.as_str()).collect();
+    format!("{what} link {link:?} is not a link of the URDF; its links are {known:?}")
+}
+
+fn pose(xyz: [f64; 3], rpy: [f64; 3]) -> Pose {
+    Pose::from_parts(Translation3::from(Vector3::from(xyz)), Rotation3::from_euler_angles(rpy[0], rpy[1], rpy[2]))
+}
+
+fn tcp_of(file: &RobotFile, source: &Source, urdf: &UrdfRobot, options: &LoadOptions) -> Result<(String, Pose), Error> {
+    if let Some(link) = &options.tcp {
+        return Ok((link.clone(), Pose::identity()));
+    }
+    match &file.tcp {
+        Some(tcp) if urdf.mechanism.link(tcp.link.get_ref()).is_none() => {
+            Err(source.error(tcp.link.span(), unknown_link("TCP", tcp.link.get_ref(), &urdf.mechanism)).into())
+        }
+        Some(tcp) => Ok((tcp.link.get_ref().clone(), pose(tcp.xyz, tcp.rpy))),
+        None => {
+            let link = default_tcp(&urdf.mechanism)
+                .ok_or_else(|| Error::Usage("the robot has no link that could be the TCP: add tcp = { link = ... }".into()))?;
+            Ok((link.to_owned(), Pose::identity()))
+        }
+    }
+}
+
+fn check_drive(drive: &crate::robot_file::DriveEntry, mechanism: &Mechanism, source: &Source) -> Result<(), RobotFileError> {
+    let joint = drive.joint.get_ref();
+    if mechanism.joint(joint).is_none_or(|j| j.kind == JointKind::Fixed) {
+        let known: Vec<_> =
+            mechanism.joints.iter().filter(|j| j.kind != JointKind::Fixed).map(|j| j.name.as_str()).collect();
+        let message = format!("drive of joint {joint:?}: the robot has no such movable joint; it has {known:?}");
+        return Err(source.error(drive.joint.span(), message));
+    }
+    match drive.kind.get_ref().as_str() {
+        "prescribed" => Ok(()),
+        other => {
+            let message = format!("drive kind {other:?} is not known; this version drives joints as \"prescribed\" only");
+            Err(source.error(drive.kind.span(), message))
+        }
+    }
+}
+
+fn flexible_link(
+    entry: &FlexibleLinkEntry,
+    mechanism: &Mechanism,
+    source: &Source,
+    folder: &Path,
+    warnings: &mut Vec<String>,
+) -> Result<(FlexibleLink, Damping), Error> {
+    let name = entry.link.get_ref();
+    let at = |span: std::ops::Range<usize>, message: String| source.error(span, message);
+    if let Some(model) = &entry.model
+        && model.get_ref() != "lumped"
+    {
+        let message = format!("model {:?} is not known; this version has \"lumped\"", model.get_ref());
+        return Err(at(model.span(), message).into());
+    }
+    if let Some(segments) = &entry.segments
+        && *segments.get_ref() != 2
+    {
+        let message = format!("segments = {}: this version cuts a link into 2 rigid parts", segments.get_ref());
+        return Err(at(segments.span(), message).into());
+    }
+    let angles = match entry.angles.as_ref().map(|a| a.get_ref().as_str()) {
+        None | Some("rotation-vector") => ElasticAngles::RotationVector,
+        Some("euler-zyx") => ElasticAngles::EulerZyx,
+        Some(other) => {
+            let message = format!("angles {other:?} are not known; use \"rotation-vector\" or \"euler-zyx\"");
+            return Err(at(entry.angles.as_ref().map_or(0..0, Spanned::span), message).into());
+        }
+    };
+    let damping = damping_of(entry.damping.as_ref(), source)?;
+    let distal_name = entry.distal.as_ref().map(|d| d.get_ref().as_str());
+    let distal = distal_joint(mechanism, name, distal_name)
+        .map_err(|e| at(entry.distal.as_ref().map_or(entry.link.span(), Spanned::span), e.to_string()))?;
+
+    let (reduced, parts) = match (&entry.reduced, &entry.beam) {
+        (Some(file), None) => {
+            let path = folder.join(file.get_ref());
+            if !path.is_file() {
+                let message = format!("reduced = {:?}: there is no file {}", file.get_ref(), path.display());
+                return Err(at(file.span(), message).into());
+            }
+            let reduced = read_flex(&path).map_err(Box::new)?;
+            warnings.extend(reduced.warnings(&Default::default()).into_iter().map(|w| format!("link {name:?}: {w}")));
+            (reduced, Parts::Reduced)
+        }
+        (None, Some(beam)) => beam_link(name, beam, distal.X_PJ, mechanism, source)?,
+        _ => {
+            let message = format!("flexible link {name:?} needs either reduced = \"file.flex\" or beam = {{ ... }}");
+            return Err(at(entry.link.span(), message).into());
+        }
+    };
+    let distal = Some(distal.name.clone());
+    Ok((FlexibleLink { link: name.clone(), distal, reduced, parts, angles, coupling: entry.coupling }, damping))
+}
+
+fn damping_of(entry: Option<&Spanned<DampingEntry>>, source: &Source) -> Result<Damping, RobotFileError> {
+    let Some(entry) = entry else { return Ok(Damping::Modal(0.03)) };
+    let (value, damping) = match entry.get_ref() {
+        DampingEntry { modal: Some(zeta), stiffness_beta: None } => (*zeta, Damping::Modal(*zeta)),
+        DampingEntry { modal: None, stiffness_beta: Some(beta) } => (*beta, Damping::StiffnessProportional(*beta)),
+        _ => {
+            let message = "damping takes exactly one of modal = ratio or stiffness_beta = seconds";
+            return Err(source.error(entry.span(), message));
+        }
+    };
+    if !(value.is_finite() && value >= 0.0) {
+        return Err(source.error(entry.span(), format!("damping is {value}, it must be zero or positive")));
+    }
+    if matches!(damping, Damping::Modal(zeta) if zeta >= 1.0) {
+        let message = format!("modal damping is {value}, a ratio below 1 is expected (3 per cent is 0.03)");
+        return Err(source.error(entry.span(), message));
+    }
+    Ok(damping)
+}
+
+fn beam_link(
+    name: &str,
+    entry: &Spanned<BeamEntry>,
+    X_LB: Pose,
+    mechanism: &Mechanism,
+    source: &Source,
+) -> Result<(ReducedLink, Parts), Error> {
+    let beam = entry.get_ref();
+    let fail = |message: String| Error::from(source.error(entry.span(), format!("link {name:?}: {message}")));
+    let (section, material): (Section, Material) = beam_section(beam).map_err(fail)?;
+    let theory = match beam.theory.as_deref() {
+        None | Some("timoshenko") => BeamTheory::Timoshenko,
+        Some("euler-bernoulli") => BeamTheory::EulerBernoulli,
+        Some(other) => return Err(fail(format!("theory {other:?} is not known; use \"timoshenko\" or \"euler-bernoulli\""))),
+    };
+    let axis = X_LB.translation.vector;
+    let length = axis.norm();
+    if length < 1e-6 {
+        return Err(fail("its distal joint lies at the link's origin: a beam needs a length".into()));
+    }
+    // Any direction across the beam will do if none is asked for: the axis that it is farthest from.
+    let y_axis = beam.y_axis.map(Vector3::from).unwrap_or_else(|| {
+        let k = axis.abs().imin();
+        Vector3::from_fn(|i, _| if i == k { 1.0 } else { 0.0 })
+    });
+    let parts = match beam.parts.as_deref() {
+        None | Some("from-link") => Parts::FromLink(beam.split),
+        Some("uniform") => Parts::Reduced,
+        Some(other) => return Err(fail(format!("parts {other:?} are not known; use \"from-link\" or \"uniform\""))),
+    };
+    let mut link = BeamLink::new(name, section, material, length)
+        .along(axis, y_axis, beam.roll, beam.offset.into())
+        .map_err(|e| fail(e.to_string()))?;
+    link.X_LB = X_LB;
+    link.theory = theory;
+    link.split_fraction = beam.split;
+    // The link's own mass spread along the beam; the section's where the URDF gives none.
+    link.mass = mechanism.link(name).and_then(|l| l.inertia).map(|i| i.mass);
+    let reduced = link.reduce().map_err(|e| fail(e.to_string()))?;
+    Ok((reduced, parts))
+}

@@ -1,0 +1,254 @@
+//! The robot file `robot.toml`: what it may say, read into plain structs. [`crate::Robot`] makes sense of it.
+//!
+//! Unknown keys are refused, so that a misspelt one is never ignored. Units are SI; angles in rad.
+
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+use toml::Spanned;
+
+/// The file as written.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RobotFile {
+    /// Version of the format: 1.
+    pub format: Spanned<i64>,
+    /// Name for logs; the folder's name if not given.
+    pub name: Option<String>,
+    /// URDF or xacro file, relative to the robot file.
+    pub urdf: Spanned<PathBuf>,
+    /// Tool centre point.
+    pub tcp: Option<TcpEntry>,
+    /// What the tool carries.
+    pub payload: Option<PayloadEntry>,
+    /// Acceleration of gravity in base axes [m/s²].
+    pub gravity: Option<[f64; 3]>,
+    /// Trajectory for `flexarm compare` without one, relative to the robot file.
+    pub default_trajectory: Option<PathBuf>,
+    /// Where `package://` names lead.
+    #[serde(default)]
+    pub packages: std::collections::BTreeMap<String, PathBuf>,
+    /// Links whose inertia may be one that no body has (published data sometimes do).
+    #[serde(default)]
+    pub waive_inertia: Vec<String>,
+    /// Links that bend.
+    #[serde(default)]
+    pub flexible_link: Vec<FlexibleLinkEntry>,
+    /// How joints are driven.
+    #[serde(default)]
+    pub drive: Vec<DriveEntry>,
+}
+
+/// Pose of the tool centre point in a link.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TcpEntry {
+    /// Link that carries it.
+    pub link: Spanned<String>,
+    /// Position [m].
+    #[serde(default)]
+    pub xyz: [f64; 3],
+    /// Roll, pitch, yaw [rad].
+    #[serde(default)]
+    pub rpy: [f64; 3],
+}
+
+/// A rigid body fixed to a link.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PayloadEntry {
+    /// Link that carries it; that of the TCP if not given.
+    pub link: Option<Spanned<String>>,
+    /// Mass [kg].
+    pub mass: Spanned<f64>,
+    /// Centre of mass in link axes [m].
+    pub com: [f64; 3],
+    /// `ixx iyy izz ixy ixz iyz` about the centre of mass [kg m²].
+    #[serde(default)]
+    pub inertia: [f64; 6],
+}
+
+/// A link that bends.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FlexibleLinkEntry {
+    /// Link of the URDF.
+    pub link: Spanned<String>,
+    /// Joint at the far interface.
+    pub distal: Option<Spanned<String>>,
+    /// `.flex` file, relative to the robot file.
+    pub reduced: Option<Spanned<PathBuf>>,
+    /// Or a beam.
+    pub beam: Option<Spanned<BeamEntry>>,
+    /// `lumped`.
+    pub model: Option<Spanned<String>>,
+    /// Number of rigid parts: 2.
+    pub segments: Option<Spanned<i64>>,
+    /// Damping; 3 % modal if not given.
+    pub damping: Option<Spanned<DampingEntry>>,
+    /// `rotation-vector` or `euler-zyx`.
+    pub angles: Option<Spanned<String>>,
+    /// `false` drops the coupling terms, only to show what that costs.
+    #[serde(default = "yes")]
+    pub coupling: bool,
+}
+
+fn yes() -> bool {
+    true
+}
+
+/// One of the ways to damp.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DampingEntry {
+    /// Ratio to critical, per mode.
+    pub modal: Option<f64>,
+    /// `D = beta K` [s].
+    pub stiffness_beta: Option<f64>,
+}
+
+/// A closed-form beam from the link's frame to the distal joint.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BeamEntry {
+    /// box, rectangle, tube, circle or given.
+    pub section: String,
+    /// Along section axis y [m].
+    pub width: Option<f64>,
+    /// Along section axis z [m].
+    pub height: Option<f64>,
+    /// Thickness [m].
+    pub wall: Option<f64>,
+    /// Of tubes [m].
+    pub outer_diameter: Option<f64>,
+    /// Of circles [m].
+    pub diameter: Option<f64>,
+    /// Stretching stiffness [N].
+    #[serde(rename = "EA")]
+    pub ea: Option<f64>,
+    /// Bending stiffness about y [N m²].
+    #[serde(rename = "EI_y")]
+    pub ei_y: Option<f64>,
+    /// Bending stiffness about z [N m²].
+    #[serde(rename = "EI_z")]
+    pub ei_z: Option<f64>,
+    /// Torsional stiffness [N m²].
+    #[serde(rename = "GJ")]
+    pub gj: Option<f64>,
+    /// Shear stiffness along y [N].
+    #[serde(rename = "kGA_y")]
+    pub kga_y: Option<f64>,
+    /// Shear stiffness along z [N].
+    #[serde(rename = "kGA_z")]
+    pub kga_z: Option<f64>,
+    /// For given sections [kg/m].
+    pub mass_per_length: Option<f64>,
+    /// Rotary inertia about y, `rho I_y`, for given sections [kg m].
+    pub rotary_y: Option<f64>,
+    /// Rotary inertia about z, for given sections [kg m].
+    pub rotary_z: Option<f64>,
+    /// A name or elastic constants.
+    pub material: Option<MaterialEntry>,
+    /// euler-bernoulli or timoshenko.
+    pub theory: Option<String>,
+    /// Direction of the section's y axis in link axes; chosen if not given.
+    pub y_axis: Option<[f64; 3]>,
+    /// Turn of the section about the beam [rad].
+    #[serde(default)]
+    pub roll: f64,
+    /// From the line A-B to the beam, link axes [m].
+    #[serde(default)]
+    pub offset: [f64; 3],
+    /// Where the link is split, as a fraction of A-B.
+    #[serde(default = "half")]
+    pub split: f64,
+    /// from-link or uniform.
+    pub parts: Option<String>,
+}
+
+fn half() -> f64 {
+    0.5
+}
+
+/// Name of a preset, or constants.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(untagged)]
+pub enum MaterialEntry {
+    /// steel, aluminium, cast_iron, ductile_iron.
+    Named(String),
+    /// Elastic constants and density.
+    Given(MaterialConstants),
+}
+
+/// Isotropic material.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MaterialConstants {
+    /// Young's modulus [Pa].
+    #[serde(rename = "E")]
+    pub young: f64,
+    /// Poisson's ratio.
+    pub nu: f64,
+    /// Density [kg/m³].
+    pub rho: f64,
+}
+
+/// Drive of a joint.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DriveEntry {
+    /// Joint of the URDF.
+    pub joint: Spanned<String>,
+    /// prescribed.
+    pub kind: Spanned<String>,
+}
+
+/// What is wrong in a robot file, and where.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{}:{line}:{column}: {message}", path.display())]
+pub struct RobotFileError {
+    /// The file.
+    pub path: PathBuf,
+    /// Line, from 1.
+    pub line: usize,
+    /// Column, from 1.
+    pub column: usize,
+    /// What was found, what was expected, how to mend it.
+    pub message: String,
+}
+
+/// The text of a robot file with its place, to point into it.
+#[derive(Clone, Debug)]
+pub struct Source {
+    /// The file.
+    pub path: PathBuf,
+    text: String,
+}
+
+impl Source {
+    /// An error at a byte range of the text.
+    pub fn error(&self, span: std::ops::Range<usize>, message: impl Into<String>) -> RobotFileError {
+        let before = self.text.get(..span.start).unwrap_or(&self.text);
+        let line = before.matches('\n').count() + 1;
+        let column = before.len() - before.rfind('\n').map_or(0, |i| i + 1) + 1;
+        RobotFileError { path: self.path.clone(), line, column, message: message.into() }
+    }
+}
+
+/// Reads the text of a robot file.
+///
+/// # Errors
+/// [`RobotFileError`] with line and column for anything that is not the format.
+pub fn parse_robot_file(text: &str, path: &Path) -> Result<(RobotFile, Source), RobotFileError> {
+    let source = Source { path: path.to_owned(), text: text.to_owned() };
+    let file: RobotFile = toml::from_str(text).map_err(|error| {
+        let message = error.message().trim().replace('\n', " ");
+        source.error(error.span().unwrap_or(0..0), message)
+    })?;
+    if *file.format.get_ref() != 1 {
+        let found = file.format.get_ref();
+        let message = format!("format is {found}, this program reads format 1: change it or update flexarm");
+        return Err(source.error(file.format.span(), message));
+    }
+    Ok((file, source))
+}

@@ -1,0 +1,204 @@
+//! Figures of a run; the JSON keys are stable.
+
+use std::collections::BTreeMap;
+
+use flexarm_analysis::TcpMetrics;
+use flexarm_stepping::{ConstraintForm, Counts, SpookPreset, StepperKind};
+use serde::Serialize;
+
+use crate::options::RunOptions;
+
+/// Answer of `flexarm compare` and `flexarm run`. SI units.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Summary {
+    /// Name of the robot.
+    pub robot: String,
+    /// Name of the trajectory.
+    pub trajectory: String,
+    /// rigid or lumped.
+    pub links_model: &'static str,
+    /// Simulated time [s].
+    pub duration_s: f64,
+    /// Stepper with its work.
+    pub stepper: StepperFigures,
+    /// Wall-clock time of the run, recordings included [s].
+    pub wall_s: f64,
+    /// Simulated over wall-clock time.
+    pub real_time_factor: f64,
+    /// Processor time, all threads [s].
+    pub cpu_s: f64,
+    /// Processor time per simulated second.
+    pub cpu_s_per_simulated_s: f64,
+    /// Flexible against rigid tool centre point; absent for runs without the twin.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tcp: Option<TcpFigures>,
+    /// Natural frequencies at the start pose, drives locked [Hz].
+    pub frequencies_hz: Vec<f64>,
+    /// Flexible links.
+    pub links: Vec<LinkFigures>,
+    /// Largest force per drive [N m or N].
+    pub drives: BTreeMap<String, f64>,
+    /// Things worth telling.
+    pub warnings: Vec<String>,
+    /// Written files.
+    pub files: Files,
+    /// Size of the TCP error over time, thinned for the terminal.
+    #[serde(skip)]
+    pub error_curve: Vec<f64>,
+}
+
+/// Written files; null where none was written.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Files {
+    /// MCAP recording.
+    pub mcap: Option<String>,
+    /// Rerun recording.
+    pub rrd: Option<String>,
+    /// Table.
+    pub csv: Option<String>,
+    /// Report.
+    pub report: Option<String>,
+}
+
+/// Stepper and its work.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct StepperFigures {
+    /// Word of the command line.
+    pub name: &'static str,
+    /// Step [s].
+    pub h_s: f64,
+    /// Spectral radius (generalised-alpha).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rho_inf: Option<f64>,
+    /// local or global (SPOOK).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub form: Option<&'static str>,
+    /// exact or source (SPOOK).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub preset: Option<&'static str>,
+    /// Steps taken.
+    pub steps: u64,
+    /// Evaluations of the equations of motion.
+    pub evaluations: u64,
+    /// Factorisations.
+    pub factorisations: u64,
+}
+
+impl StepperFigures {
+    pub(crate) fn new(options: &RunOptions, counts: Counts) -> Self {
+        let (mut rho_inf, mut form, mut preset) = (None, None, None);
+        match options.stepper {
+            StepperKind::GeneralizedAlpha { rho } => rho_inf = Some(rho),
+            StepperKind::Spook(s) => {
+                form = Some(if s.form == ConstraintForm::Local { "local" } else { "global" });
+                preset = Some(if s.preset == SpookPreset::Exact { "exact" } else { "source" });
+            }
+            StepperKind::Rk4 => {}
+        }
+        let Counts { steps, evaluations, factorisations } = counts;
+        let (name, h_s) = (options.stepper.name(), options.step_s);
+        Self { name, h_s, rho_inf, form, preset, steps, evaluations, factorisations }
+    }
+}
+
+/// A flexible link's share.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct LinkFigures {
+    /// Name of the link.
+    pub name: String,
+    /// Largest TCP displacement that its deflection alone causes [m].
+    pub peak_contribution_m: f64,
+    /// Largest change of the distance of its interfaces over that distance.
+    pub engineering_strain: f64,
+    /// Largest elastic rotation [rad].
+    pub peak_rotation_rad: f64,
+}
+
+/// Flexible against rigid tool centre point.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct TcpFigures {
+    /// Largest distance [m].
+    pub peak_m: f64,
+    /// When [s].
+    pub t_peak_s: f64,
+    /// Root mean square of the distance [m].
+    pub rms_m: f64,
+    /// Distance at the end [m].
+    pub end_m: f64,
+    /// Distance at rest at the start [m].
+    pub static_sag_m: f64,
+    /// Largest angle [rad].
+    pub peak_rad: f64,
+    /// Root mean square of the angle [rad].
+    pub rms_rad: f64,
+    /// Time from the end of the last move until the error stays within the band of its final value [s].
+    pub settling_s: Option<f64>,
+    /// Largest excursion past the final value after a move [m].
+    pub overshoot_m: f64,
+    /// Strongest frequency of the error [Hz].
+    pub dominant_hz: Option<f64>,
+    /// Largest components along, across and out of the path [m].
+    pub path_peak_m: [f64; 3],
+}
+
+impl From<&TcpMetrics> for TcpFigures {
+    fn from(m: &TcpMetrics) -> Self {
+        Self {
+            peak_m: m.peak_m,
+            t_peak_s: m.t_peak_s,
+            rms_m: m.rms_m,
+            end_m: m.end_m,
+            static_sag_m: m.static_sag_m,
+            peak_rad: m.peak_rad,
+            rms_rad: m.rms_rad,
+            settling_s: m.settling_s,
+            overshoot_m: m.overshoot_m,
+            dominant_hz: m.dominant_hz,
+            path_peak_m: [m.tangential_peak_m, m.normal_peak_m, m.binormal_peak_m],
+        }
+    }
+}
+
+impl Summary {
+    /// Label and value pairs for recordings.
+    pub fn labelled(&self) -> Vec<(String, String)> {
+        let mut rows = vec![
+            ("robot".to_owned(), self.robot.clone()),
+            ("trajectory".into(), self.trajectory.clone()),
+            ("duration_s".into(), self.duration_s.to_string()),
+            ("stepper".into(), format!("{} h = {} s", self.stepper.name, self.stepper.h_s)),
+        ];
+        if let Some(tcp) = &self.tcp {
+            let optional = |x: Option<f64>| x.map_or_else(|| "none".to_owned(), |x| x.to_string());
+            rows.extend([
+                ("tcp.peak_m".to_owned(), tcp.peak_m.to_string()),
+                ("tcp.rms_m".into(), tcp.rms_m.to_string()),
+                ("tcp.end_m".into(), tcp.end_m.to_string()),
+                ("tcp.static_sag_m".into(), tcp.static_sag_m.to_string()),
+                ("tcp.peak_rad".into(), tcp.peak_rad.to_string()),
+                ("tcp.rms_rad".into(), tcp.rms_rad.to_string()),
+                ("tcp.settling_s".into(), optional(tcp.settling_s)),
+                ("tcp.overshoot_m".into(), tcp.overshoot_m.to_string()),
+                ("tcp.dominant_hz".into(), optional(tcp.dominant_hz)),
+            ]);
+        }
+        rows.extend(self.links.iter().map(|l| {
+            (format!("link.{}.peak_contribution_m", l.name), l.peak_contribution_m.to_string())
+        }));
+        if let Some(f) = self.frequencies_hz.first() {
+            rows.push(("first_frequency_hz".into(), f.to_string()));
+        }
+        rows
+    }
+}
+
+/// Largest error in each of 60 equal pieces of the run [m].
+pub(crate) fn thinned(times: &[f64], errors: &[[f64; 6]]) -> Vec<f64> {
+    let pieces = 60.min(times.len());
+    (0..pieces)
+        .map(|k| {
+            let range = k * errors.len() / pieces..((k + 1) * errors.len() / pieces).max(k * errors.len() / pieces + 1);
+            errors[range].iter().map(|e| (e[0] * e[0] + e[1] * e[1] + e[2] * e[2]).sqrt()).fold(0.0, f64::max)
+        })
+        .collect()
+}

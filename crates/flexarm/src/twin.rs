@@ -1,0 +1,47 @@
+//! The rigid twin: the same robot on the same motion with every elastic coordinate held at zero.
+
+use flexarm_kinematics::{Data, Frame, State, frame_jacobian, frame_twist, inverse_dynamics, world_poses};
+use flexarm_stepping::FlexibleArm;
+use nalgebra::{DVector, Matrix6xX, Vector3};
+
+/// Kinematics and required torques of the rigid twin at one time.
+pub(crate) struct RigidTwin {
+    pub(crate) data: Data,
+    pub(crate) state: State,
+    qddot: DVector<f64>,
+    /// Jacobian of the TCP, world axes.
+    pub(crate) J: Matrix6xX<f64>,
+    /// Velocity of the TCP [m/s].
+    pub(crate) velocity: Vector3<f64>,
+    /// Acceleration of the TCP [m/s²].
+    pub(crate) acceleration: Vector3<f64>,
+}
+
+impl RigidTwin {
+    pub(crate) fn new(arm: &FlexibleArm) -> Self {
+        let model = &arm.model;
+        Self {
+            data: Data::new(model),
+            state: State::zeros(model),
+            qddot: DVector::zeros(model.nv()),
+            J: Matrix6xX::zeros(model.nv()),
+            velocity: Vector3::zeros(),
+            acceleration: Vector3::zeros(),
+        }
+    }
+
+    /// Everything at time t; `data.tau` holds the torques that the drives must supply.
+    pub(crate) fn update(&mut self, arm: &FlexibleArm, tcp: &Frame, t: f64) {
+        let model = &arm.model;
+        arm.prescribed_state(t, &mut self.state, &mut self.qddot);
+        inverse_dynamics(model, &mut self.data, &self.state, &self.qddot);
+        world_poses(model, &mut self.data);
+        frame_jacobian(model, &self.data, tcp, &mut self.J);
+        self.velocity = frame_twist(&self.data, tcp).linear;
+        // Acceleration of the point: spatial acceleration + w × v, gravity taken out again.
+        let V = self.data.V[tcp.body].at_child(&tcp.X_BF);
+        let A = self.data.A[tcp.body].at_child(&tcp.X_BF);
+        let R = self.data.X_WB[tcp.body].rotation * tcp.X_BF.rotation;
+        self.acceleration = R * (A.linear + V.angular.cross(&V.linear)) + model.gravity;
+    }
+}
