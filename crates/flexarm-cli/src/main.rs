@@ -1,1 +1,201 @@
-fn main() {}
+//! The `flexarm` command line: arguments, progress, tables, exit codes. The work is done by the crate `flexarm`.
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "printing is what this face is for")]
+
+mod args;
+mod print;
+mod shipped;
+
+use std::io::{IsTerminal, Write};
+use std::ops::ControlFlow;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use args::{CheckArgs, Cli, Command, FormName, InspectArgs, LinksName, PresetName, RobotArgs, RunArgs, StartName, StepperName};
+use clap::{CommandFactory, Parser};
+use flexarm::{
+    ConstraintForm, Error, InertiaEstimate, LinkModel, LoadOptions, Motion, Outputs, ReadOptions, Robot, RunOptions,
+    SpookPreset, SpookSettings, Start, StepperKind,
+};
+use indicatif::{ProgressBar, ProgressStyle};
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    match run(&cli) {
+        Ok(code) => code,
+        Err(error) => {
+            eprintln!("error: {error}");
+            let mut source = std::error::Error::source(&error);
+            while let Some(cause) = source {
+                // Messages that already contain their cause do not say it twice.
+                if !error.to_string().contains(&cause.to_string()) {
+                    eprintln!("  because: {cause}");
+                }
+                source = cause.source();
+            }
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+/// Text for people or JSON for programs; a closed pipe is not an error.
+fn answer(cli: &Cli, json: impl FnOnce() -> String, text: impl FnOnce() -> String) {
+    let out = if cli.json { json() + "\n" } else { text() };
+    let mut stdout = std::io::stdout().lock();
+    let _ = stdout.write_all(out.as_bytes()).and_then(|()| stdout.flush());
+}
+
+fn to_json(value: &impl serde::Serialize) -> String {
+    serde_json::to_string(value).expect("plain numbers and strings")
+}
+
+fn run(cli: &Cli) -> Result<ExitCode, Error> {
+    match &cli.command {
+        Command::Compare(args) => simulate(cli, args, true),
+        Command::Run(args) => simulate(cli, args, false),
+        Command::Inspect(args) => inspect(cli, args),
+        Command::Check(args) => check(cli, args),
+        Command::Completions { shell } => {
+            clap_complete::generate(*shell, &mut Cli::command(), "flexarm", &mut std::io::stdout());
+            Ok(ExitCode::SUCCESS)
+        }
+        Command::Man => {
+            let page = clap_mangen::Man::new(Cli::command());
+            let _ = page.render(&mut std::io::stdout());
+            Ok(ExitCode::SUCCESS)
+        }
+    }
+}
+
+fn load_options(args: &RobotArgs) -> Result<LoadOptions, Error> {
+    let mut urdf = ReadOptions { search_paths: flexarm::search_paths_from_environment(), ..ReadOptions::default() };
+    for package in &args.packages {
+        let (name, folder) = package
+            .split_once('=')
+            .ok_or_else(|| Error::Usage(format!("--package {package:?}: expected NAME=FOLDER")))?;
+        urdf.packages.push((name.to_owned(), folder.into()));
+    }
+    let positive = |x: f64, what: &str| {
+        if x.is_finite() && x > 0.0 { Ok(x) } else { Err(Error::Usage(format!("{what} must be positive, found {x}"))) }
+    };
+    if let Some(density) = args.inertia_from_density {
+        urdf.inertia_from_mesh = Some(InertiaEstimate::Density(positive(density, "--inertia-from-density")?));
+    }
+    if let Some(mass) = args.inertia_from_total_mass {
+        urdf.inertia_from_mesh = Some(InertiaEstimate::TotalMass(positive(mass, "--inertia-from-total-mass")?));
+    }
+    Ok(LoadOptions { tcp: args.tcp.clone(), urdf })
+}
+
+fn run_options(args: &RunArgs, with_twin: bool) -> RunOptions {
+    let stepper = match args.stepper {
+        StepperName::GeneralizedAlpha => StepperKind::GeneralizedAlpha { rho: args.rho_inf },
+        StepperName::Spook => StepperKind::Spook(SpookSettings {
+            form: if args.spook_form == FormName::Local { ConstraintForm::Local } else { ConstraintForm::Global },
+            preset: if args.spook_preset == PresetName::Exact { SpookPreset::Exact } else { SpookPreset::Source },
+        }),
+        StepperName::Rk4 => StepperKind::Rk4,
+    };
+    RunOptions {
+        stepper,
+        step_s: args.step,
+        links: if args.links == LinksName::Rigid { LinkModel::Rigid } else { LinkModel::Lumped },
+        log_rate_hz: args.log_rate,
+        start: if args.from_rest == StartName::Equilibrium { Start::Equilibrium } else { Start::Undeformed },
+        ignore_limits: args.ignore_limits,
+        with_twin,
+        settling_band_m: args.settling_band,
+    }
+}
+
+fn simulate(cli: &Cli, args: &RunArgs, with_twin: bool) -> Result<ExitCode, Error> {
+    let robot = Robot::load(&shipped::robot(args.robot.as_deref()), &load_options(&args.load)?)?;
+    let trajectory = match (&args.trajectory, &robot.default_trajectory) {
+        (Some(given), _) => shipped::trajectory(given),
+        (None, Some(own)) => own.clone(),
+        (None, None) => {
+            let text = "the robot has no default_trajectory: give a .csv or .toml trajectory after the robot";
+            return Err(Error::Usage(text.into()));
+        }
+    };
+    let model = robot.rigid_model()?;
+    let motion = Motion::load(&trajectory, &model)?;
+    let options = run_options(args, with_twin);
+    let outputs = (!args.no_files).then(|| {
+        let stem = format!("{}-{}", robot.name, motion.name);
+        let folder = args.output.clone().unwrap_or_else(|| shipped::new_output_folder(&stem));
+        Outputs { overwrite: args.force, ..Outputs::everything(folder) }
+    });
+
+    let stop = Arc::new(AtomicBool::new(false));
+    let flag = stop.clone();
+    // A second handler cannot be set in one process; the first one then serves.
+    let _ = ctrlc::set_handler(move || flag.store(true, Ordering::SeqCst));
+    let mut bar = Bar::new(cli);
+    let mut progress = |t: f64, total: f64| {
+        bar.show(t, total);
+        if stop.load(Ordering::SeqCst) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    };
+    let result = flexarm::simulate(&robot, &motion, &options, outputs.as_ref(), &mut progress);
+    bar.clear();
+    let summary = result?;
+    if !cli.quiet {
+        for warning in &summary.warnings {
+            eprintln!("warning: {warning}");
+        }
+    }
+    answer(cli, || to_json(&summary), || print::summary(&summary));
+    Ok(ExitCode::SUCCESS)
+}
+
+fn inspect(cli: &Cli, args: &InspectArgs) -> Result<ExitCode, Error> {
+    let robot = Robot::load(&shipped::robot(Some(&args.robot)), &load_options(&args.load)?)?;
+    let inspection = flexarm::inspect(&robot, args.at.as_deref(), args.velocity.as_deref())?;
+    answer(cli, || to_json(&inspection), || print::inspection(&inspection));
+    Ok(ExitCode::SUCCESS)
+}
+
+fn check(cli: &Cli, args: &CheckArgs) -> Result<ExitCode, Error> {
+    let trajectory = args.trajectory.as_deref().map(shipped::trajectory);
+    let robot = shipped::robot(Some(&args.robot));
+    let findings = flexarm::check(&robot, trajectory.as_deref(), &load_options(&args.load)?);
+    let json = || serde_json::json!({ "findings": findings }).to_string();
+    answer(cli, json, || print::findings(&findings));
+    let wrong = findings.iter().any(|f| f.severity == "error");
+    Ok(if wrong { ExitCode::from(2) } else { ExitCode::SUCCESS })
+}
+
+/// A progress bar that shows itself only on a terminal and only for runs over two seconds.
+struct Bar {
+    bar: Option<ProgressBar>,
+    wanted: bool,
+    started: Instant,
+}
+
+impl Bar {
+    fn new(cli: &Cli) -> Self {
+        Self { bar: None, wanted: !cli.quiet && std::io::stderr().is_terminal(), started: Instant::now() }
+    }
+
+    fn show(&mut self, t: f64, total: f64) {
+        if !self.wanted {
+            return;
+        }
+        if self.bar.is_none() && self.started.elapsed() > Duration::from_secs(1) && t < 0.5 * total {
+            let style = ProgressStyle::with_template("{msg} {wide_bar} {percent}% {eta} left");
+            let bar = ProgressBar::new(1000).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+            self.bar = Some(bar);
+        }
+        if let Some(bar) = &self.bar {
+            bar.set_message(format!("{t:.2} of {total:.2} s simulated"));
+            bar.set_position((1000.0 * t / total.max(1e-9)) as u64);
+        }
+    }
+
+    fn clear(&self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}

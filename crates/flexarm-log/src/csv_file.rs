@@ -33,7 +33,7 @@ pub struct CsvRecorder {
 #[derive(Debug)]
 enum State {
     New,
-    Open(Open),
+    Open(Box<Open>),
     Finished,
 }
 
@@ -63,7 +63,8 @@ impl Recorder for CsvRecorder {
         let mut writer = csv::Writer::from_writer(self.options.create(&self.path)?);
         writer.write_record(columns(header)).map_err(csv_error(&self.path, "write the column names"))?;
         writer.flush().map_err(LogError::io(&self.path, "write the column names"))?;
-        self.state = State::Open(Open { writer, shape: Shape::of(header), flush: self.options.flush_clock() });
+        let open = Open { writer, shape: Shape::of(header), flush: self.options.flush_clock() };
+        self.state = State::Open(Box::new(open));
         Ok(())
     }
 

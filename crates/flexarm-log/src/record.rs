@@ -56,7 +56,7 @@ pub struct LinkMesh {
     pub link: usize,
     /// Name, unique per link.
     pub name: String,
-    /// Corners [m].
+    /// Corners (m).
     pub positions: Vec<[f32; 3]>,
     /// Normals, one per corner.
     pub normals: Vec<[f32; 3]>,
@@ -82,11 +82,11 @@ pub struct Attachment {
 /// One of the two robots at one instant.
 #[derive(Clone, Debug, Default)]
 pub struct TwinSample {
-    /// Positions of the actuated joints [rad or m].
+    /// Positions of the actuated joints (rad or m).
     pub q: Vec<f64>,
     /// Velocities.
     pub qdot: Vec<f64>,
-    /// Forces the drives must supply [N m or N].
+    /// Forces the drives must supply (N m or N).
     pub effort: Vec<f64>,
     /// Pose of each link of the header in the world.
     pub X_WL: Vec<Pose>,
@@ -97,13 +97,13 @@ pub struct TwinSample {
 /// One elastic element at one instant.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ElasticSample {
-    /// Deflection in the proximal face's axes: 3 translations [m], 3 angles [rad].
+    /// Deflection in the proximal face's axes: 3 translations (m), 3 angles (rad).
     pub deflection: [f64; 6],
-    /// Load on the distal part: force [N], moment [N m].
+    /// Load on the distal part: force (N), moment (N m).
     pub load: [f64; 6],
 }
 
-/// Energies of the flexible robot [J].
+/// Energies of the flexible robot (J).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EnergySample {
     /// Kinetic.
@@ -117,7 +117,7 @@ pub struct EnergySample {
 /// One logged instant.
 #[derive(Clone, Debug, Default)]
 pub struct Sample {
-    /// Time since the start [s].
+    /// Time since the start (s).
     pub time_s: f64,
     /// Steps taken so far.
     pub step: u64,
@@ -125,7 +125,7 @@ pub struct Sample {
     pub flexible: TwinSample,
     /// Rigid twin; meaningless unless `RunHeader::has_rigid`.
     pub rigid: TwinSample,
-    /// TCP error flexible minus rigid, world axes: translation [m], rotation vector [rad].
+    /// TCP error flexible minus rigid, world axes: translation (m), rotation vector (rad).
     pub error_world: [f64; 6],
     /// The same in path axes: tangential, normal, binormal.
     pub error_path: [f64; 6],

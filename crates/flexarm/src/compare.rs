@@ -3,11 +3,11 @@
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-use flexarm_analysis::{MetricSettings, PathAxes, tcp_error, tcp_metrics};
+use flexarm_analysis::{ErrorRecord, MetricSettings, PathFrame, engineering_strain, tcp_error, tcp_metrics};
 use flexarm_kinematics::Frame;
 use flexarm_log::{ElasticSample, EnergySample, RecorderSet, Sample};
 use flexarm_stepping::{FlexibleArm, Observation, StepError, Stepper, new_stepper};
-use nalgebra::Vector6;
+use nalgebra::{Vector3, Vector6};
 
 use crate::error::Error;
 use crate::motion::Motion;
@@ -55,6 +55,10 @@ pub fn simulate(
         return Err(Error::Usage(format!("the log rate must be positive, found {} Hz", options.log_rate_hz)));
     }
 
+    if !(options.settling_band_m.is_finite() && options.settling_band_m > 0.0) {
+        return Err(Error::Usage(format!("the settling band must be positive, found {} m", options.settling_band_m)));
+    }
+
     let mut run = Run::new(robot, motion, options, &flexible, arm, stepper);
     let mut files = recorders(outputs)?;
     let head = header(robot, motion, options, &run.arm);
@@ -87,11 +91,11 @@ struct Run<'a> {
     link_frames: Vec<Frame>,
     twin: RigidTwin,
     seen: Observation,
-    path: PathAxes,
+    path: PathFrame,
     sample: Sample,
     times: Vec<f64>,
     errors: Vec<[f64; 6]>,
-    path_errors: Vec<[f64; 6]>,
+    positions: Vec<[f64; 3]>,
     contributions: Vec<f64>,
     strains: Vec<f64>,
     rotations: Vec<f64>,
@@ -119,11 +123,11 @@ impl<'a> Run<'a> {
             link_frames: link_frames(robot, &arm.model),
             twin: RigidTwin::new(&arm),
             seen: Observation::new(&arm),
-            path: PathAxes::default(),
+            path: PathFrame::world(),
             sample: Sample::default(),
             times: Vec::new(),
             errors: Vec::new(),
-            path_errors: Vec::new(),
+            positions: Vec::new(),
             contributions: vec![0.0; n],
             strains: vec![0.0; n],
             rotations: vec![0.0; n],
@@ -162,11 +166,14 @@ impl<'a> Run<'a> {
         let X_rigid = self.twin.data.X_WF(&self.tcp);
         let X_flexible = self.seen.X_WB[self.tcp.body] * self.tcp.X_BF;
         let error = tcp_error(&X_rigid, &X_flexible);
-        self.path.update(&self.twin.velocity, &self.twin.acceleration);
-        let path_error = self.path.resolve(&error);
+        self.path = self.path.next(&self.twin.velocity, &self.twin.acceleration);
+        let [x, y, z, rx, ry, rz] = error;
+        let [along, normal, binormal] = self.path.components(&Vector3::new(x, y, z));
+        let [r_along, r_normal, r_binormal] = self.path.components(&Vector3::new(rx, ry, rz));
+        let path_error = [along, normal, binormal, r_along, r_normal, r_binormal];
         self.times.push(t);
         self.errors.push(error);
-        self.path_errors.push(path_error);
+        self.positions.push(X_rigid.translation.vector.into());
         for (peak, drive) in self.peak_drive.iter_mut().zip(self.seen.drive.iter()) {
             *peak = peak.max(drive.abs());
         }
@@ -178,7 +185,7 @@ impl<'a> Run<'a> {
             let at_tcp = self.twin.J.fixed_columns::<6>(element.coordinate) * e;
             let (spring, _) = &self.flexible.springs[k];
             self.contributions[k] = self.contributions[k].max(at_tcp.fixed_rows::<3>(0).norm());
-            self.strains[k] = self.strains[k].max(engineering_strain(spring, &e));
+            self.strains[k] = self.strains[k].max(length_change(spring, &e));
             self.rotations[k] = self.rotations[k].max(e.fixed_rows::<3>(3).norm());
             sample.elastic[k] = ElasticSample { deflection: e.into(), load: self.seen.load[k].into() };
         }
@@ -215,8 +222,16 @@ impl<'a> Run<'a> {
     /// Figures of what was seen so far.
     fn summary(&self, robot: &Robot, motion: &Motion, options: &RunOptions) -> Summary {
         let moves: Vec<(f64, f64)> = motion.trajectory.moves().iter().map(|m| (m.start, m.end)).collect();
-        let settings = MetricSettings { settling_band_m: options.settling_band_m, ..MetricSettings::default() };
-        let metrics = tcp_metrics(&self.times, &self.errors, &self.path_errors, &moves, &settings);
+        let settings = MetricSettings { settling_band_m: options.settling_band_m };
+        let record = ErrorRecord {
+            times: &self.times,
+            errors: &self.errors,
+            rigid_positions: &self.positions,
+            quasi_static: None,
+            moves: &moves,
+        };
+        // A run that stopped at once has nothing to measure.
+        let metrics = tcp_metrics(&record, &settings).ok();
         let links: Vec<LinkFigures> = (0..self.arm.elements.len())
             .map(|k| LinkFigures {
                 name: self.arm.elements[k].name.clone(),
@@ -235,7 +250,7 @@ impl<'a> Run<'a> {
             links_model: options.links.name(),
             duration_s: self.times.last().copied().unwrap_or(0.0),
             stepper: StepperFigures::new(options, self.stepper.counts()),
-            tcp: options.with_twin.then(|| TcpFigures::from(&metrics)),
+            tcp: metrics.as_ref().filter(|_| options.with_twin).map(TcpFigures::from),
             frequencies_hz: self.arm.modes.frequencies_hz(),
             links,
             drives: self
@@ -289,11 +304,11 @@ impl<'a> Run<'a> {
     }
 }
 
-/// Change of the distance between the interfaces over that distance.
-fn engineering_strain(spring: &flexarm_flexlink::Spring, e: &Vector6<f64>) -> f64 {
-    let p_SB = spring.X_LS.inverse() * spring.X_LB.translation.vector;
-    let phi: nalgebra::Vector3<f64> = e.fixed_rows::<3>(3).into();
-    let moved = nalgebra::Rotation3::from_scaled_axis(phi) * p_SB + e.fixed_rows::<3>(0);
+/// Engineering strain: change of the distance between the interfaces over that distance.
+fn length_change(spring: &flexarm_flexlink::Spring, e: &Vector6<f64>) -> f64 {
+    let p_SB = spring.X_LS.inverse() * nalgebra::Point3::from(spring.X_LB.translation.vector);
+    let phi: Vector3<f64> = e.fixed_rows::<3>(3).into();
+    let moved = nalgebra::Rotation3::from_scaled_axis(phi) * p_SB.coords + e.fixed_rows::<3>(0);
     let p_LB = spring.X_LS.translation.vector + spring.X_LS.rotation * moved;
-    ((p_LB.norm() - spring.length) / spring.length).abs()
+    engineering_strain(p_LB.norm() - spring.length, spring.length).map_or(0.0, f64::abs)
 }

@@ -89,12 +89,12 @@ mod tests {
         let mut cdr = Cdr::default();
         cdr.start().u32(7).string("ab").f64_sequence(&[1.0]);
         let expected: Vec<u8> = [
-            vec![0, 1, 0, 0],                     // encapsulation, not counted
-            vec![7, 0, 0, 0],                     // at 0
-            vec![3, 0, 0, 0, b'a', b'b', 0],      // at 4: length with the zero
-            vec![0],                              // padding to 12
-            vec![1, 0, 0, 0],                     // at 12: count
-            vec![0, 0, 0, 0, 0, 0, 0xf0, 0x3f],   // at 16: 1.0
+            vec![0, 1, 0, 0],                   // encapsulation, not counted
+            vec![7, 0, 0, 0],                   // at 0
+            vec![3, 0, 0, 0, b'a', b'b', 0],    // at 4: length with the zero
+            vec![0],                            // padding to 12
+            vec![1, 0, 0, 0],                   // at 12: count
+            vec![0, 0, 0, 0, 0, 0, 0xf0, 0x3f], // at 16: 1.0
         ]
         .concat();
         assert_eq!(cdr.bytes(), expected);

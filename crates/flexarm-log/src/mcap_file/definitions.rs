@@ -27,15 +27,17 @@ const DEFINITIONS: &[Definition] = &[
     ("geometry_msgs/Pose", "Point position\nQuaternion orientation\n", &[]),
     ("geometry_msgs/Twist", "Vector3 linear\nVector3 angular\n", &[]),
     ("geometry_msgs/Wrench", "Vector3 force\nVector3 torque\n", &[]),
-    (
-        "geometry_msgs/TransformStamped",
-        "std_msgs/Header header\nstring child_frame_id\nTransform transform\n",
-        &[],
-    ),
+    ("geometry_msgs/TransformStamped", "std_msgs/Header header\nstring child_frame_id\nTransform transform\n", &[]),
     (
         "geometry_msgs/PoseStamped",
         "std_msgs/Header header\nPose pose\n",
-        &["std_msgs/Header", "builtin_interfaces/Time", "geometry_msgs/Pose", "geometry_msgs/Point", "geometry_msgs/Quaternion"],
+        &[
+            "std_msgs/Header",
+            "builtin_interfaces/Time",
+            "geometry_msgs/Pose",
+            "geometry_msgs/Point",
+            "geometry_msgs/Quaternion",
+        ],
     ),
     (
         "geometry_msgs/TwistStamped",
@@ -108,6 +110,7 @@ mod tests {
 
     fn used_by_a_topic(name: &str) -> bool {
         name.ends_with("Stamped") && name != "geometry_msgs/TransformStamped"
-            || ["std_msgs/String", "std_msgs/Float64MultiArray", "tf2_msgs/TFMessage", "sensor_msgs/JointState"].contains(&name)
+            || ["std_msgs/String", "std_msgs/Float64MultiArray", "tf2_msgs/TFMessage", "sensor_msgs/JointState"]
+                .contains(&name)
     }
 }

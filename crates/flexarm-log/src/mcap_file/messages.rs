@@ -5,7 +5,7 @@ use nalgebra::UnitQuaternion;
 
 use super::cdr::Cdr;
 
-/// Time of a message since the epoch of the recording's clock [ns]; at most [`Stamp::MAX`].
+/// Time of a message since the epoch of the recording's clock (ns); at most [`Stamp::MAX`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Stamp(pub(crate) u64);
 

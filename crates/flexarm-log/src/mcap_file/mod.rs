@@ -2,7 +2,8 @@
 //!
 //! Profile `ros2`: CDR messages, their definitions embedded, `offered_qos_profiles` on every channel. Chunks of
 //! at most 1 MiB, compressed with zstd, are closed where the data says so; between two chunks the open one is
-//! in the file as a provisional chunk ([`crate::tail_file`]), so that a killed run ends at a whole chunk.
+//! in the file as a provisional chunk with a provisional end ([`crate::tail_file`]), so that what a killed run
+//! leaves is a whole MCAP file; only its index is missing.
 //!
 //! Start at [`McapRecorder`]; topics are in [`channels`], messages in [`messages`] and [`cdr`].
 
@@ -73,7 +74,7 @@ impl McapRecorder {
         Self { path: path.into(), options, epoch_ns: 0, state: State::New }
     }
 
-    /// Sets the time of simulated time zero [ns since 1970], default 0. Files with the present time as epoch
+    /// Sets the time of simulated time zero (ns since 1970), default 0. Files with the present time as epoch
     /// are no longer the same on another day.
     #[must_use]
     pub fn with_epoch_ns(self, epoch_ns: u64) -> Self {
@@ -136,7 +137,7 @@ impl Recorder for McapRecorder {
 
 /// A file between `begin` and `finish`.
 struct Open {
-    /// Keeps the open chunk in memory and writes it whole. Dropped before `file` is: it closes the MCAP.
+    /// Keeps the open chunk in memory and writes it whole, into `file`.
     writer: Writer<SharedTail>,
     file: SharedTail,
     channels: Channels,
@@ -209,7 +210,7 @@ impl Open {
         for file in meshes.iter().chain(&header.attachments) {
             self.attach(start, &file.name, &file.media_type, &file.bytes)?;
         }
-        Ok(self.file.flush()?)
+        Ok(self.flush()?)
     }
 
     fn sample(&mut self, stamp: Stamp, sample: &Sample) -> McapResult<()> {
@@ -272,8 +273,7 @@ impl Open {
 
     /// Adds the message in `cdr` to the open chunk, or to a new one if it would grow too large.
     fn message(&mut self, channel_id: u16, stamp: Stamp) -> McapResult<()> {
-        let header =
-            MessageHeader { channel_id, sequence: self.samples, log_time: stamp.0, publish_time: stamp.0 };
+        let header = MessageHeader { channel_id, sequence: self.samples, log_time: stamp.0, publish_time: stamp.0 };
         let size = MESSAGE_OVERHEAD + self.cdr.bytes().len();
         if !self.chunk.is_empty() && self.chunk.len() + size > CHUNK_BYTES {
             self.close_chunk()?;
@@ -289,12 +289,14 @@ impl Open {
         self.writer.flush()
     }
 
-    /// Brings everything so far into the file: closed chunks for good, the open one provisionally.
+    /// Brings everything so far into the file: closed chunks for good, the open one and an end provisionally.
     fn flush(&mut self) -> std::io::Result<()> {
-        match self.chunk.is_empty() {
-            true => self.file.flush(),
-            false => self.file.set_tail(&chunk_record(&self.chunk, self.chunk_times)),
+        let mut tail = Vec::with_capacity(self.chunk.len() + 128);
+        if !self.chunk.is_empty() {
+            push_chunk_record(&mut tail, &self.chunk, self.chunk_times);
         }
+        push_end(&mut tail);
+        self.file.set_tail(&tail)
     }
 
     fn metadata(&mut self, name: &str, pairs: impl IntoIterator<Item = (String, String)>) -> McapResult<()> {
@@ -327,22 +329,33 @@ impl Drop for Open {
     }
 }
 
-/// A chunk without compression and checksum, made by hand: the provisional end of a file.
-fn chunk_record(messages: &[u8], (start, end): (u64, u64)) -> Vec<u8> {
+/// Adds a chunk without compression and checksum, made by hand: the provisional end of a file.
+fn push_chunk_record(file: &mut Vec<u8>, messages: &[u8], (start, end): (u64, u64)) {
     const OPCODE: u8 = 0x06;
     const FIXED_BYTES: u64 = 8 + 8 + 8 + 4 + 4 + 8;
     let size = messages.len() as u64;
-    let mut record = Vec::with_capacity(messages.len() + 64);
-    record.push(OPCODE);
-    record.extend((FIXED_BYTES + size).to_le_bytes());
-    record.extend(start.to_le_bytes());
-    record.extend(end.to_le_bytes());
-    record.extend(size.to_le_bytes()); // uncompressed
-    record.extend(0_u32.to_le_bytes()); // no checksum
-    record.extend(0_u32.to_le_bytes()); // no compression: an empty name
-    record.extend(size.to_le_bytes());
-    record.extend_from_slice(messages);
-    record
+    file.push(OPCODE);
+    file.extend((FIXED_BYTES + size).to_le_bytes());
+    file.extend(start.to_le_bytes());
+    file.extend(end.to_le_bytes());
+    file.extend(size.to_le_bytes()); // uncompressed
+    file.extend(0_u32.to_le_bytes()); // no checksum
+    file.extend(0_u32.to_le_bytes()); // no compression: an empty name
+    file.extend(size.to_le_bytes());
+    file.extend_from_slice(messages);
+}
+
+/// Adds an end of file without an index: data end, footer, magic. Readers then go through the data.
+fn push_end(file: &mut Vec<u8>) {
+    const DATA_END: u8 = 0x0f;
+    const FOOTER: u8 = 0x02;
+    file.push(DATA_END);
+    file.extend(4_u64.to_le_bytes());
+    file.extend([0; 4]); // no checksum
+    file.push(FOOTER);
+    file.extend(20_u64.to_le_bytes());
+    file.extend([0; 20]); // no summary, no offsets, no checksum
+    file.extend(mcap::MAGIC);
 }
 
 /// Bytes of a message record besides its data.

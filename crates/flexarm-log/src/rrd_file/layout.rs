@@ -4,8 +4,8 @@
 //! its parts by chance and cannot set a plot's legend.
 
 use rerun::external::re_sdk_types::blueprint::archetypes::{
-    ContainerBlueprint, EyeControls3D, PanelBlueprint, PlotLegend, TimeAxis, TimePanelBlueprint, ViewBlueprint, ViewContents,
-    ViewportBlueprint,
+    ContainerBlueprint, EyeControls3D, PanelBlueprint, PlotLegend, TimeAxis, TimePanelBlueprint, ViewBlueprint,
+    ViewContents, ViewportBlueprint,
 };
 use rerun::external::re_sdk_types::blueprint::components::{
     ColumnShare, ContainerKind, Corner2D, LinkAxis, LoopMode, PanelState, PlayState, RowShare, TimelineName,
@@ -31,7 +31,7 @@ pub(crate) enum Part {
     View(View),
 }
 
-/// Where the 3D view is seen from, and what is in its middle [m, world].
+/// Where the 3D view is seen from, and what is in its middle (m, world).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Eye {
     pub(crate) position: [f32; 3],
@@ -72,10 +72,7 @@ impl Part {
 pub(crate) fn entities(root: &Part, timeline: &str, eye: Option<Eye>) -> Entities {
     let mut layout = Layout { entities: Vec::new(), parts: 0, eye };
     let root_id = layout.add(root).id;
-    let viewport = ViewportBlueprint::new()
-        .with_root_container(root_id)
-        .with_auto_layout(false)
-        .with_auto_views(false);
+    let viewport = ViewportBlueprint::new().with_root_container(root_id).with_auto_layout(false).with_auto_views(false);
     layout.log("viewport", viewport);
     layout.log("blueprint_panel", PanelBlueprint::new().with_state(PanelState::Collapsed));
     layout.log("selection_panel", PanelBlueprint::new().with_state(PanelState::Collapsed));

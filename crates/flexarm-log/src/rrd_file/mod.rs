@@ -44,11 +44,11 @@ const GHOST: u32 = 0x7F_B2_FF_60;
 /// | `/<robot>/flexible/<link>`, `/<robot>/rigid/<link>` | pose in the world; below it the link's meshes, those of the rigid twin as a ghost |
 /// | `/<robot>/flexible/tcp`, `/<robot>/rigid/tcp` | pose of the tool centre point |
 /// | `/<robot>/path/flexible`, `/<robot>/path/rigid` | way of the tool centre point |
-/// | `/plots/tcp_error/{x,y,z,norm}`, `/plots/tcp_error_path/{tangential,normal,binormal}` | TCP error **[mm]** |
-/// | `/plots/tcp_error_rotation/{x,y,z}` | its rotation vector **[mrad]** |
-/// | `/plots/joints/position`, `/plots/joints/effort/{flexible,rigid}` | [rad or m], [N m or N] |
-/// | `/plots/elastic/<element>` | deflection **[mm, mrad]** |
-/// | `/plots/energy`, `/plots/solver` | [J]; iterations and residual |
+/// | `/plots/tcp_error/{x,y,z,norm}`, `/plots/tcp_error_path/{tangential,normal,binormal}` | TCP error, in **mm** |
+/// | `/plots/tcp_error_rotation/{x,y,z}` | its rotation vector, in **mrad** |
+/// | `/plots/joints/position`, `/plots/joints/effort/{flexible,rigid}` | in rad (m), in N m (N) |
+/// | `/plots/elastic/<element>` | deflection, in **mm** and **mrad** |
+/// | `/plots/energy`, `/plots/solver` | in J; iterations and residual |
 /// | `/summary`, `/urdf` | set-up with the result, and the robot's description, as text |
 ///
 /// Errors and deflections are in millimetres and milliradians because people read them here; the other formats
@@ -190,7 +190,8 @@ impl Open {
         }
         const AXIS_LENGTH_M: f32 = 0.1;
         self.constant(&path([&header.robot, "flexible", "tcp"]), &TransformAxes3D::new(AXIS_LENGTH_M))?;
-        for skeleton in [self.flexible.skeleton.as_ref(), self.rigid.as_ref().and_then(|rigid| rigid.skeleton.as_ref())] {
+        for skeleton in [self.flexible.skeleton.as_ref(), self.rigid.as_ref().and_then(|rigid| rigid.skeleton.as_ref())]
+        {
             let Some(skeleton) = skeleton else { continue };
             let style = skeleton.style(self.stream.ids())?;
             self.stream.append(&self.recording, &style)?;
@@ -503,9 +504,10 @@ fn content_hash(header: &RunHeader) -> u64 {
     const OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
     const PRIME: u64 = 0x0000_0100_0000_01b3;
     let names = header.joints.iter().chain(&header.elements).chain(header.links.iter().map(|link| &link.name));
-    let groups = header.metadata.iter().flat_map(|(name, pairs)| {
-        std::iter::once(name).chain(pairs.iter().flat_map(|(key, value)| [key, value]))
-    });
+    let groups = header
+        .metadata
+        .iter()
+        .flat_map(|(name, pairs)| std::iter::once(name).chain(pairs.iter().flat_map(|(key, value)| [key, value])));
     let texts = [&header.robot, &header.trajectory, &header.urdf, &header.tcp, &header.description];
     let texts = texts.into_iter().chain(names).chain(groups);
     let bytes = texts.flat_map(|text| text.bytes().chain([0])).chain(header.log_rate_hz.to_le_bytes());

@@ -180,7 +180,8 @@ impl SkeletonTrack {
     }
 
     pub(crate) fn push(&mut self, X_WL: &[Pose]) {
-        let line = |&(child, parent): &(usize, usize)| LineStrip3D::from_iter([point(&X_WL[parent]), point(&X_WL[child])]);
+        let line =
+            |&(child, parent): &(usize, usize)| LineStrip3D::from_iter([point(&X_WL[parent]), point(&X_WL[child])]);
         self.lines.extend(self.pairs.iter().map(line));
     }
 

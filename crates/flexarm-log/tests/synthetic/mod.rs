@@ -2,24 +2,26 @@
 //!
 //! The upper arm gives way like a damped oscillator that the motion's acceleration pushes, so that the files
 //! show what real ones do: an error while the arm speeds up and slows down, and ringing afterwards.
+#![allow(dead_code, reason = "every test and the example use their own part")]
 
 use std::f64::consts::TAU;
+use std::path::PathBuf;
 
 use flexarm_kinematics::Pose;
 use flexarm_log::{Attachment, ElasticSample, EnergySample, LinkInfo, LinkMesh, RunHeader, Sample, TwinSample};
 use nalgebra::{Rotation3, Translation3, Vector3};
 
 /// Samples per second.
-pub const RATE_HZ: f64 = 500.0;
+pub(crate) const RATE_HZ: f64 = 500.0;
 /// Number of samples of the whole run: two seconds with both ends.
-pub const SAMPLES: u64 = 1001;
+pub(crate) const SAMPLES: u64 = 1001;
 
 const BASE_HEIGHT: f64 = 0.4;
 const UPPER_ARM: f64 = 0.8;
 const FOREARM: f64 = 0.6;
 
 /// The run's header, with meshes and metadata.
-pub fn header() -> RunHeader {
+pub(crate) fn header() -> RunHeader {
     let link = |name: &str, parent, fixed| LinkInfo { name: name.into(), parent, fixed };
     let links = vec![
         link("base_link", None, true),
@@ -59,12 +61,12 @@ pub fn header() -> RunHeader {
 }
 
 /// Result figures for `finish`.
-pub fn result() -> Vec<(String, String)> {
-    vec![("tcp.peak_m".into(), "0.0042".into()), ("tcp.settling_s".into(), "0.31".into())]
+pub(crate) fn result() -> Vec<(String, String)> {
+    vec![("tcp.peak_m".into(), "0.00211".into()), ("tcp.end_m".into(), "0.00130".into())]
 }
 
 /// One sample of the motion.
-pub fn sample(step: u64) -> Sample {
+pub(crate) fn sample(step: u64) -> Sample {
     let time_s = step as f64 / RATE_HZ;
     let (s, v, a) = swing(time_s);
     let q = [1.2 * s - 0.6, -0.9 + 0.7 * s, 1.2 - 0.5 * s];
@@ -93,6 +95,13 @@ pub fn sample(step: u64) -> Sample {
         flexible,
         rigid,
     }
+}
+
+/// A path for a test's file; nothing is there.
+pub(crate) fn scratch(name: &str) -> PathBuf {
+    let path = std::env::temp_dir().join(format!("flexarm-log-{}-{name}", std::process::id()));
+    std::fs::remove_file(&path).ok();
+    path
 }
 
 /// Quintic from 0 to 1 within 1.2 s, its velocity and acceleration.

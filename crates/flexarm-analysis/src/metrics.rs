@@ -1,0 +1,170 @@
+//! The figures of a whole record.
+//!
+//! Start at [`tcp_metrics`]. What happens after each move is in `hold`, the spectrum in `spectrum`.
+
+use nalgebra::Vector3;
+
+use crate::hold::{Hold, HoldMetrics};
+use crate::path_frame::{PathFrame, path_frames};
+use crate::record::{ErrorRecord, RecordError};
+use crate::spectrum::{Taper, strongest_line};
+
+/// What a user may choose about the figures.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MetricSettings {
+    /// Half width of the band (radius of the ball) around the final value for settling and overshoot, m.
+    pub settling_band_m: f64,
+}
+
+impl Default for MetricSettings {
+    /// A band of 0.1 mm.
+    fn default() -> Self {
+        Self { settling_band_m: 1e-4 }
+    }
+}
+
+/// Figures of the TCP error `e` (translation, m) and `θ` (rotation vector, rad) over a record from `t_0` to `t_n`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TcpMetrics {
+    /// `max |e|`, m.
+    pub peak_m: f64,
+    /// Time of `peak_m`, s.
+    pub t_peak_s: f64,
+    /// `sqrt(1/(t_n - t_0) ∫ |e|² dt)`, m, by the trapezoidal rule, so uneven steps are weighed rightly.
+    pub rms_m: f64,
+    /// `|e(t_n)|`, m: the error that is left at the end of the record.
+    pub end_m: f64,
+    /// `|e(t_0)|`, m: the sag at rest, if the run was started in equilibrium; 0 if undeformed.
+    pub static_sag_m: f64,
+    /// `max |θ|`, rad.
+    pub peak_rad: f64,
+    /// `sqrt(1/(t_n - t_0) ∫ |θ|² dt)`, rad.
+    pub rms_rad: f64,
+    /// Settling time after the last move, s: [`HoldMetrics::settling_s`] of the last hold. `None` when the error has
+    /// not settled within the record, or when there is no move or no hold after it.
+    pub settling_s: Option<f64>,
+    /// Largest [`HoldMetrics::overshoot_m`] of all holds, m (position overshoot OV); 0 without a hold.
+    pub overshoot_m: f64,
+    /// Frequency of the strongest line in any hold after a move, Hz. Without one: the strongest line of the whole
+    /// record of `e` minus the quasi-static error (minus its mean when that is not known). `None` when nothing
+    /// oscillates.
+    pub dominant_hz: Option<f64>,
+    /// `max |e·t|`, m: ahead of or behind the rigid tool, along its path.
+    pub tangential_peak_m: f64,
+    /// `max |e·n|`, m: in the plane of the path, across it.
+    pub normal_peak_m: f64,
+    /// `max |e·b|`, m: out of the plane of the path.
+    pub binormal_peak_m: f64,
+    /// `max sqrt((e·n)² + (e·b)²)`, m: distance from the path (path accuracy AT).
+    pub lateral_peak_m: f64,
+    /// The hold after each move, where there is one (two samples at least), in order.
+    pub holds: Vec<HoldMetrics>,
+}
+
+/// Condenses a record of the TCP error.
+///
+/// # Errors
+/// [`RecordError`] when the record is empty, its slices differ in length, a value is not finite, times or moves do not
+/// ascend, or the band is not positive.
+pub fn tcp_metrics(record: &ErrorRecord<'_>, settings: &MetricSettings) -> Result<TcpMetrics, RecordError> {
+    let band = settings.settling_band_m;
+    if !(band > 0.0 && band.is_finite()) {
+        return Err(RecordError::BadBand { found: band });
+    }
+    record.check()?;
+
+    let translation = |e: &[f64; 6]| Vector3::new(e[0], e[1], e[2]).norm();
+    let rotation = |e: &[f64; 6]| Vector3::new(e[3], e[4], e[5]).norm();
+    let distances: Vec<f64> = record.errors.iter().map(translation).collect();
+    let angles: Vec<f64> = record.errors.iter().map(rotation).collect();
+    let (t_peak_s, peak_m) = peak(record.times, &distances);
+    let (_, peak_rad) = peak(record.times, &angles);
+
+    let frames = path_frames(record.times, record.rigid_positions);
+    let [tangential_peak_m, normal_peak_m, binormal_peak_m, lateral_peak_m] = path_peaks(record, &frames);
+    let holds = holds(record, &frames, band);
+    let ends_in_hold = |hold: &&HoldMetrics| record.moves.last().is_some_and(|last| hold.start_s >= last.1);
+    Ok(TcpMetrics {
+        peak_m,
+        t_peak_s,
+        rms_m: rms(record.times, &distances),
+        end_m: distances[distances.len() - 1],
+        static_sag_m: distances[0],
+        peak_rad,
+        rms_rad: rms(record.times, &angles),
+        settling_s: holds.last().filter(ends_in_hold).and_then(|hold| hold.settling_s),
+        overshoot_m: holds.iter().map(|hold| hold.overshoot_m).fold(0.0, f64::max),
+        dominant_hz: dominant_hz(record, &holds),
+        tangential_peak_m,
+        normal_peak_m,
+        binormal_peak_m,
+        lateral_peak_m,
+        holds,
+    })
+}
+
+/// Time and size of the largest value, the first of several.
+fn peak(times: &[f64], values: &[f64]) -> (f64, f64) {
+    let first = (times[0], values[0]);
+    times.iter().copied().zip(values.iter().copied()).fold(first, |best, e| if e.1 > best.1 { e } else { best })
+}
+
+/// Root of the time average of the squares.
+fn rms(times: &[f64], values: &[f64]) -> f64 {
+    let last = times.len() - 1;
+    if last == 0 {
+        return values[0];
+    }
+    let area = |i: usize| 0.5 * (values[i].powi(2) + values[i + 1].powi(2)) * (times[i + 1] - times[i]);
+    ((0..last).map(area).sum::<f64>() / (times[last] - times[0])).sqrt()
+}
+
+/// Peaks along the tangential, normal and binormal axis, and across the path.
+fn path_peaks(record: &ErrorRecord<'_>, frames: &[PathFrame]) -> [f64; 4] {
+    let mut peaks: [f64; 4] = [0.0; 4];
+    for (error, frame) in record.errors.iter().zip(frames) {
+        let [t, n, b] = frame.components(&Vector3::new(error[0], error[1], error[2]));
+        for (peak, value) in peaks.iter_mut().zip([t, n, b, n.hypot(b)]) {
+            *peak = peak.max(value.abs());
+        }
+    }
+    peaks
+}
+
+/// The hold after each move that has one.
+fn holds(record: &ErrorRecord<'_>, frames: &[PathFrame], band: f64) -> Vec<HoldMetrics> {
+    let mut holds = Vec::new();
+    for (i, &(start, end)) in record.moves.iter().enumerate() {
+        // Times of moves and samples come from different sums; a billionth of the record is no difference.
+        let slack = 1e-9 * (record.times[record.times.len() - 1] - record.times[0]);
+        let until = record.moves.get(i + 1).map_or(f64::INFINITY, |next| next.0);
+        let first = record.times.partition_point(|&t| t < end - slack);
+        let after = record.times.partition_point(|&t| t <= until + slack);
+        if after < first + 2 {
+            continue;
+        }
+
+        // The axes are kept at rest, so those at the first sample of the hold still show the way of arrival.
+        let before = record.times.partition_point(|&t| t < start);
+        let has_moved = record.rigid_positions[before..=first].iter().any(|p| *p != record.rigid_positions[first]);
+        let hold = Hold {
+            times: &record.times[first..after],
+            errors: record.errors[first..after].iter().map(|e| [e[0], e[1], e[2]]).collect(),
+            final_static: record.quasi_static.map(|values| values[after - 1]),
+            approach: has_moved.then(|| frames[first].tangential),
+        };
+        holds.push(hold.metrics(end, band));
+    }
+    holds
+}
+
+fn dominant_hz(record: &ErrorRecord<'_>, holds: &[HoldMetrics]) -> Option<f64> {
+    let lines = holds.iter().filter_map(|hold| hold.line);
+    if let Some(line) = lines.max_by(|a, b| a.amplitude.total_cmp(&b.amplitude)) {
+        return Some(line.hz);
+    }
+    let trend = |i: usize, c: usize| record.quasi_static.map_or(0.0, |values| values[i][c]);
+    let rest = record.errors.iter().enumerate();
+    let rest: Vec<[f64; 3]> = rest.map(|(i, e)| std::array::from_fn(|c| e[c] - trend(i, c))).collect();
+    strongest_line(record.times, &rest, Taper::Both).map(|line| line.hz)
+}

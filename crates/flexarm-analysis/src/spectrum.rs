@@ -1,0 +1,267 @@
+//! The strongest line in the spectrum of a vibration, between the bins of the transform.
+//!
+//! The signal is tapered, transformed by a radix-2 FFT of twice its length, and the highest peak is refined by
+//! golden-section search on the exact transform. 10 s at 1 kHz take a few milliseconds.
+
+use std::f64::consts::{PI, TAU};
+
+/// More samples than this are not transformed.
+const MOST_SAMPLES: usize = 1 << 14;
+/// Fewer than this have no spectrum worth the name.
+const FEWEST_SAMPLES: usize = 16;
+/// A line must be passed this many times within the record.
+const FEWEST_CYCLES: f64 = 1.5;
+/// Power of a line over the lowest power between DC and it.
+const PROMINENCE: f64 = 4.0;
+
+/// How the signal is faded in and out before the transform.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Taper {
+    /// Full weight at the start, faded out by `cos²`: for a vibration that dies away. A long signal is cut off.
+    FadeOut,
+    /// Faded in and out by `sin²` (Hann): for a signal without a special start. A long signal is averaged in blocks.
+    Both,
+}
+
+/// A line of a spectrum.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SpectralLine {
+    /// Frequency, Hz.
+    pub hz: f64,
+    /// Amplitude of the undamped sinusoid that would give this line, in the unit of the signal, all components
+    /// together (root of the sum of squares). Less than the initial amplitude of a vibration that dies away.
+    pub amplitude: f64,
+}
+
+/// The strongest line of a signal with three components, over all components together.
+///
+/// * `times`: s, strictly increasing; steps may vary, the signal is interpolated to even ones.
+/// * `signal`: one entry per time, any unit; its weighted mean is removed.
+///
+/// Returns `None` when there is no line: fewer than 16 samples, nothing that repeats at least one and a half times
+/// and stands out by 6 dB from the spectrum below it, or an amplitude within the rounding of the signal.
+///
+/// Accuracy, of an undamped sinusoid with `n` cycles in the record: about `0.2 / n²` of the frequency.
+pub fn strongest_line(times: &[f64], signal: &[[f64; 3]], taper: Taper) -> Option<SpectralLine> {
+    if times.len() < FEWEST_SAMPLES || times.len() != signal.len() {
+        return None;
+    }
+    let tapered = Tapered::new(times, signal, taper);
+    let bins = (2 * tapered.samples.len()).next_power_of_two();
+    let power = tapered.power_spectrum(bins);
+    let bin_hz = 1.0 / (bins as f64 * tapered.step);
+
+    // Local maxima that have room for enough cycles, away from the Nyquist frequency.
+    let first = (FEWEST_CYCLES / (tapered.samples.len() as f64 * tapered.step * bin_hz)).ceil() as usize;
+    let is_peak = |k: &usize| power[*k] >= power[k - 1] && power[*k] > power[k + 1];
+    let peak = (first.max(1)..bins / 2 - 1).filter(is_peak).max_by(|&a, &b| power[a].total_cmp(&power[b]))?;
+    let valley = power[1..=peak].iter().copied().fold(f64::INFINITY, f64::min);
+    if power[peak] < PROMINENCE * valley {
+        return None;
+    }
+
+    let (low, high) = ((peak - 1) as f64 * bin_hz, (peak + 1) as f64 * bin_hz);
+    let hz = golden_maximum(|hz| tapered.power_at(hz), low, high);
+    let amplitude = 2.0 * tapered.power_at(hz).sqrt() / tapered.weight;
+    (amplitude > 1e-12 * tapered.scale).then_some(SpectralLine { hz, amplitude })
+}
+
+/// A signal at even steps, without its mean, times the taper.
+struct Tapered {
+    samples: Vec<[f64; 3]>,
+    /// Sampling step, s.
+    step: f64,
+    /// Sum of the taper's weights.
+    weight: f64,
+    /// Largest absolute value before the mean was removed.
+    scale: f64,
+}
+
+impl Tapered {
+    fn new(times: &[f64], signal: &[[f64; 3]], taper: Taper) -> Self {
+        let scale = signal.iter().flatten().fold(0.0, |peak: f64, x| peak.max(x.abs()));
+        let (mut samples, step) = match taper {
+            Taper::FadeOut => {
+                let n = times.len().min(MOST_SAMPLES);
+                evenly(&times[..n], &signal[..n])
+            }
+            Taper::Both => {
+                let (samples, step) = evenly(times, signal);
+                let block = samples.len().div_ceil(MOST_SAMPLES);
+                (samples.chunks_exact(block).map(mean).collect(), step * block as f64)
+            }
+        };
+
+        let n = samples.len() as f64;
+        let shape = |k: usize| match taper {
+            Taper::FadeOut => (0.5 * PI * k as f64 / n).cos().powi(2),
+            Taper::Both => (PI * (k as f64 + 0.5) / n).sin().powi(2),
+        };
+        let weight: f64 = (0..samples.len()).map(shape).sum();
+        for component in 0..3 {
+            let sum: f64 = samples.iter().enumerate().map(|(k, x)| shape(k) * x[component]).sum();
+            samples.iter_mut().for_each(|x| x[component] -= sum / weight);
+        }
+        for (k, x) in samples.iter_mut().enumerate() {
+            *x = x.map(|value| value * shape(k));
+        }
+        Self { samples, step, weight, scale }
+    }
+
+    /// Squared magnitude of the transform at the first half of `bins` frequencies.
+    fn power_spectrum(&self, bins: usize) -> Vec<f64> {
+        let mut power = vec![0.0; bins / 2];
+        for component in 0..3 {
+            let mut data = vec![[0.0; 2]; bins];
+            for (slot, x) in data.iter_mut().zip(&self.samples) {
+                slot[0] = x[component];
+            }
+            fft(&mut data);
+            for (sum, [re, im]) in power.iter_mut().zip(&data) {
+                *sum += re * re + im * im;
+            }
+        }
+        power
+    }
+
+    /// Squared magnitude of the transform at any frequency, by a rotating phasor.
+    fn power_at(&self, hz: f64) -> f64 {
+        let (turn_im, turn_re) = (TAU * hz * self.step).sin_cos();
+        let (mut re, mut im) = (1.0, 0.0);
+        let mut sums = [[0.0; 2]; 3];
+        for x in &self.samples {
+            for (sum, value) in sums.iter_mut().zip(x) {
+                sum[0] += value * re;
+                sum[1] -= value * im;
+            }
+            (re, im) = (re * turn_re - im * turn_im, re * turn_im + im * turn_re);
+        }
+        sums.iter().flatten().map(|part| part * part).sum()
+    }
+}
+
+/// Linear interpolation to as many even steps as there are samples.
+fn evenly(times: &[f64], signal: &[[f64; 3]]) -> (Vec<[f64; 3]>, f64) {
+    let last = times.len() - 1;
+    let step = (times[last] - times[0]) / last as f64;
+    let mut i = 0;
+    let at = |k: usize| {
+        let t = times[0] + k as f64 * step;
+        while i + 2 <= last && times[i + 1] <= t {
+            i += 1;
+        }
+        let part = ((t - times[i]) / (times[i + 1] - times[i])).clamp(0.0, 1.0);
+        std::array::from_fn(|c| signal[i][c] + part * (signal[i + 1][c] - signal[i][c]))
+    };
+    ((0..=last).map(at).collect(), step)
+}
+
+fn mean(block: &[[f64; 3]]) -> [f64; 3] {
+    std::array::from_fn(|c| block.iter().map(|x| x[c]).sum::<f64>() / block.len() as f64)
+}
+
+/// Radix-2 transform in place, decimation in time; the length is a power of two.
+fn fft(data: &mut [[f64; 2]]) {
+    let n = data.len();
+    let twiddles: Vec<[f64; 2]> = (0..n / 2)
+        .map(|k| {
+            let (sin, cos) = (TAU * k as f64 / n as f64).sin_cos();
+            [cos, -sin]
+        })
+        .collect();
+
+    // Bit reversal, then butterflies of growing span.
+    let bits = n.trailing_zeros();
+    for i in 0..n {
+        let j = i.reverse_bits() >> (usize::BITS - bits);
+        if i < j {
+            data.swap(i, j);
+        }
+    }
+    let mut span = 1;
+    while span < n {
+        let stride = n / (2 * span);
+        for start in (0..n).step_by(2 * span) {
+            for k in 0..span {
+                let [w_re, w_im] = twiddles[k * stride];
+                let ([a_re, a_im], [b_re, b_im]) = (data[start + k], data[start + k + span]);
+                let (t_re, t_im) = (b_re * w_re - b_im * w_im, b_re * w_im + b_im * w_re);
+                data[start + k] = [a_re + t_re, a_im + t_im];
+                data[start + k + span] = [a_re - t_re, a_im - t_im];
+            }
+        }
+        span *= 2;
+    }
+}
+
+/// Place of the maximum of a function with one peak in the interval, by golden-section search.
+fn golden_maximum(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
+    const GOLDEN: f64 = 0.618_033_988_749_894_9;
+    let (mut left, mut right) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
+    let (mut f_left, mut f_right) = (f(left), f(right));
+    // 24 steps narrow two bins down to 2e-5 of a bin.
+    for _ in 0..24 {
+        if f_left > f_right {
+            (high, right, f_right) = (right, left, f_left);
+            left = high - GOLDEN * (high - low);
+            f_left = f(left);
+        } else {
+            (low, left, f_left) = (left, right, f_right);
+            right = low + GOLDEN * (high - low);
+            f_right = f(right);
+        }
+    }
+    0.5 * (low + high)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn times(n: u32, rate: f64) -> Vec<f64> {
+        (0..n).map(|k| f64::from(k) / rate).collect()
+    }
+
+    /// Second algorithm: the sum of the definition.
+    #[test]
+    fn fast_transform_equals_the_plain_sum() {
+        let samples: Vec<[f64; 3]> = (0..50).map(|k| [f64::from(k * k % 17), f64::from(k % 5), 0.0]).collect();
+        let tapered = Tapered { samples, step: 0.01, weight: 1.0, scale: 1.0 };
+        for (k, power) in tapered.power_spectrum(128).iter().enumerate() {
+            let plain = tapered.power_at(k as f64 / (128.0 * 0.01));
+            assert!((power - plain).abs() < 1e-9 * (1.0 + plain)); // measured 1e-16 of the largest line
+        }
+    }
+
+    #[test]
+    fn a_sinusoid_between_two_bins_is_found() {
+        let t = times(2000, 1000.0);
+        for hz in [3.3, 12.34, 87.6, 312.1] {
+            let signal: Vec<_> =
+                t.iter().map(|t| [0.3, 4e-4 * (TAU * hz * t).sin(), 3e-4 * (TAU * hz * t).cos()]).collect();
+            for (taper, bound) in [(Taper::Both, 1e-4), (Taper::FadeOut, 0.2 / (2.0 * hz).powi(2))] {
+                let line = strongest_line(&t, &signal, taper).unwrap();
+                assert!((line.hz / hz - 1.0).abs() < bound, "{hz} Hz, {taper:?}: {}", line.hz / hz - 1.0);
+                assert!((line.amplitude / 5e-4 - 1.0).abs() < 0.05); // measured 2.8e-3
+            }
+        }
+    }
+
+    #[test]
+    fn creep_without_a_vibration_has_no_line() {
+        let t = times(3000, 1000.0);
+        for rate in [0.5, 2.0, 10.0, 50.0] {
+            let creep: Vec<_> = t.iter().map(|t| [1e-3 * (-rate * t).exp(), 0.0, 1e-4]).collect();
+            assert_eq!(strongest_line(&t, &creep, Taper::FadeOut), None, "rate {rate} 1/s");
+        }
+        assert_eq!(strongest_line(&t, &vec![[1e-3, 0.0, 0.0]; 3000], Taper::FadeOut), None);
+    }
+
+    #[test]
+    fn a_long_record_is_averaged_and_keeps_its_low_line() {
+        let t = times(200_000, 10_000.0);
+        let signal: Vec<_> = t.iter().map(|t| [(TAU * 14.2 * t).sin(), 0.0, 0.0]).collect();
+        let line = strongest_line(&t, &signal, Taper::Both).unwrap();
+        assert!((line.hz / 14.2 - 1.0).abs() < 1e-5); // measured 1.6e-9
+    }
+}

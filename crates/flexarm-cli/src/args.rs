@@ -1,0 +1,178 @@
+//! The command line: words, defaults and help texts.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+/// How far is a robot's tool from where the rigid model puts it, because its links bend?
+#[derive(Debug, Parser)]
+#[command(name = "flexarm", version, arg_required_else_help = true)]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+    /// Print one JSON object on standard output and nothing else
+    #[arg(long, global = true)]
+    pub(crate) json: bool,
+    /// No progress bar and no messages but errors
+    #[arg(long, short, global = true)]
+    pub(crate) quiet: bool,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    /// Run the flexible robot beside its rigid twin, log both, measure the TCP error
+    ///
+    /// Without arguments: the shipped industrial arm on its pick-and-place cycle.
+    Compare(RunArgs),
+    /// Run one model along a trajectory and log it
+    Run(RunArgs),
+    /// Show what was loaded, and kinematics and dynamics at a pose
+    Inspect(InspectArgs),
+    /// Look for everything that is wrong with a robot and a trajectory
+    Check(CheckArgs),
+    /// Print a shell completion script
+    Completions {
+        /// Shell to complete for
+        shell: clap_complete::Shell,
+    },
+    /// Print the manual page (roff)
+    Man,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct RobotArgs {
+    /// Frame to use as TCP instead of the robot file's
+    #[arg(long, value_name = "FRAME")]
+    pub(crate) tcp: Option<String>,
+    /// Where package://NAME/ leads (may be repeated)
+    #[arg(long = "package", value_name = "NAME=FOLDER")]
+    pub(crate) packages: Vec<String>,
+    /// Estimate missing inertias from the meshes with this density [kg/m^3]
+    #[arg(long, value_name = "KG_PER_M3", conflicts_with = "inertia_from_total_mass")]
+    pub(crate) inertia_from_density: Option<f64>,
+    /// Estimate missing inertias from the meshes, all together of this mass [kg]
+    #[arg(long, value_name = "KG")]
+    pub(crate) inertia_from_total_mass: Option<f64>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct RunArgs {
+    /// robot.toml, a folder with one, a .urdf or .xacro file, or the name of a shipped robot [default: kr210]
+    pub(crate) robot: Option<PathBuf>,
+    /// .csv or .toml trajectory, or the name of a shipped one [default: the robot's own]
+    pub(crate) trajectory: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) load: RobotArgs,
+    /// Time stepper
+    #[arg(long, value_name = "NAME", default_value = "generalized-alpha", value_parser = parse_stepper)]
+    pub(crate) stepper: StepperName,
+    /// Step of the stepper [s]
+    #[arg(long, value_name = "SECONDS", default_value_t = 1e-3)]
+    pub(crate) step: f64,
+    /// Model of the links
+    #[arg(long, value_enum, default_value_t = LinksName::Lumped)]
+    pub(crate) links: LinksName,
+    /// Logged samples per second
+    #[arg(long, value_name = "HZ", default_value_t = 500.0)]
+    pub(crate) log_rate: f64,
+    /// How the run starts
+    #[arg(long, value_enum, default_value_t = StartName::Equilibrium)]
+    pub(crate) from_rest: StartName,
+    /// Spectral radius of generalized-alpha: 1 damps nothing, 0 damps the highest modes at once
+    #[arg(long, value_name = "RHO", default_value_t = 0.9)]
+    pub(crate) rho_inf: f64,
+    /// Constraint form of spook
+    #[arg(long, value_enum, default_value_t = FormName::Local)]
+    pub(crate) spook_form: FormName,
+    /// Preset of spook: exact formulas, or those of the method's source
+    #[arg(long, value_enum, default_value_t = PresetName::Exact)]
+    pub(crate) spook_preset: PresetName,
+    /// Band around the final TCP error for the settling time [m]
+    #[arg(long, value_name = "METRES", default_value_t = 1e-4)]
+    pub(crate) settling_band: f64,
+    /// Output folder [default: a new one in out/]
+    #[arg(short, long, value_name = "FOLDER")]
+    pub(crate) output: Option<PathBuf>,
+    /// Overwrite what is in the output folder
+    #[arg(long)]
+    pub(crate) force: bool,
+    /// Write nothing, only print the figures
+    #[arg(long, conflicts_with_all = ["output", "force"])]
+    pub(crate) no_files: bool,
+    /// Run although the trajectory passes joint limits
+    #[arg(long)]
+    pub(crate) ignore_limits: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct InspectArgs {
+    /// robot.toml, a folder with one, a .urdf or .xacro file, or the name of a shipped robot
+    pub(crate) robot: PathBuf,
+    /// Joint values in coordinate order, or name=value pairs [rad, m]
+    #[arg(long, value_name = "Q1,Q2,...", allow_hyphen_values = true)]
+    pub(crate) at: Option<String>,
+    /// Joint velocities, likewise [rad/s, m/s]
+    #[arg(long, value_name = "V1,V2,...", allow_hyphen_values = true)]
+    pub(crate) velocity: Option<String>,
+    #[command(flatten)]
+    pub(crate) load: RobotArgs,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct CheckArgs {
+    /// robot.toml, a folder with one, a .urdf or .xacro file, or the name of a shipped robot
+    pub(crate) robot: PathBuf,
+    /// Trajectory to check against the robot's limits
+    pub(crate) trajectory: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) load: RobotArgs,
+}
+
+/// Steppers of this version.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum StepperName {
+    GeneralizedAlpha,
+    Spook,
+    Rk4,
+}
+
+fn parse_stepper(text: &str) -> Result<StepperName, String> {
+    match text {
+        "generalized-alpha" | "generalised-alpha" => Ok(StepperName::GeneralizedAlpha),
+        "spook" => Ok(StepperName::Spook),
+        "rk4" => Ok(StepperName::Rk4),
+        _ => Err("this version has generalized-alpha, spook and rk4".into()),
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum LinksName {
+    /// No link bends
+    Rigid,
+    /// Two rigid parts with a coupled 6x6 spring
+    Lumped,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum StartName {
+    /// The springs carry the weight
+    Equilibrium,
+    /// The springs are relaxed: the arm falls into its sag and rings
+    Undeformed,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum FormName {
+    /// Relative motion in the proximal frame
+    Local,
+    /// Relative motion in world axes
+    Global,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum PresetName {
+    /// Physical damping time
+    Exact,
+    /// Damping time of two steps
+    Source,
+}

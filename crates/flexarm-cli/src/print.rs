@@ -1,0 +1,113 @@
+//! Tables for people.
+
+use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
+use flexarm::{Finding, Inspection, Summary};
+
+fn table(header: &[&str]) -> Table {
+    let mut table = Table::new();
+    table.load_preset(presets::UTF8_HORIZONTAL_ONLY).set_content_arrangement(ContentArrangement::Dynamic);
+    if !header.is_empty() {
+        table.set_header(header);
+    }
+    table
+}
+
+/// Eight heights of a block character, scaled to the largest value.
+fn sparkline(values: &[f64]) -> String {
+    const BLOCKS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
+    let top = values.iter().fold(0.0f64, |a, b| a.max(*b));
+    if top <= 0.0 {
+        return String::new();
+    }
+    values.iter().map(|v| BLOCKS[((v / top * 7.0).round() as usize).min(7)]).collect()
+}
+
+/// The figures of a run.
+pub(crate) fn summary(summary: &Summary) -> String {
+    let mut out = format!("{} on {}, {} links\n", summary.robot, summary.trajectory, summary.links_model);
+    let mut t = table(&[]);
+    for (name, value) in flexarm::rows(summary) {
+        t.add_row([name, value]);
+    }
+    out += &t.to_string();
+    out.push('\n');
+    if summary.tcp.is_some() {
+        let curve = sparkline(&summary.error_curve);
+        out += &format!("TCP error over time  {curve}\n");
+    }
+    let f = &summary.files;
+    for (what, path) in [("MCAP", &f.mcap), ("Rerun", &f.rrd), ("CSV", &f.csv), ("report", &f.report)] {
+        if let Some(path) = path {
+            out += &format!("{what:<7} {path}\n");
+        }
+    }
+    if let Some(path) = &f.rrd {
+        out += &format!("look:   rerun {path}\n");
+    }
+    out
+}
+
+fn limit(x: Option<f64>) -> String {
+    x.map_or_else(|| "-".into(), |x| format!("{x:.4}"))
+}
+
+/// What was loaded.
+pub(crate) fn inspection(i: &Inspection) -> String {
+    let mut out = format!("{}, {:.2} kg\n", i.robot, i.mass_kg);
+    let mut t = table(&["joint", "type", "lower", "upper", "velocity", "effort", "at", "gravity torque", "bias"]);
+    for (k, j) in i.joints.iter().enumerate() {
+        t.add_row([
+            j.name.clone(),
+            j.kind.into(),
+            limit(j.lower),
+            limit(j.upper),
+            limit(j.velocity),
+            limit(j.effort),
+            format!("{:.4}", i.q[k]),
+            format!("{:.3}", i.gravity_torque[k]),
+            format!("{:.3}", i.bias[k]),
+        ]);
+    }
+    for k in 2..9 {
+        if let Some(column) = t.column_mut(k) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    out += &format!("{t}\n");
+    let mut t = table(&["link", "mass [kg]", "centre of mass [m]"]);
+    for l in i.links.iter().filter(|l| l.mass_kg > 0.0) {
+        t.add_row([l.name.clone(), format!("{:.3}", l.mass_kg), format!("{:.4?}", l.com_m)]);
+    }
+    out += &format!("{t}\n");
+    for f in &i.flexible_links {
+        out += &format!(
+            "flexible: {} ({}), {:.4} m, parts {:.2} + {:.2} kg\n",
+            f.name, f.method, f.length_m, f.parts_kg[0], f.parts_kg[1]
+        );
+    }
+    out += &format!(
+        "TCP on {}: position {:.6?} m, quaternion wxyz {:.6?}\n",
+        i.tcp.link, i.tcp.position_m, i.tcp.quaternion_wxyz
+    );
+    for w in &i.warnings {
+        out += &format!("warning: {w}\n");
+    }
+    out
+}
+
+/// All findings.
+pub(crate) fn findings(findings: &[Finding]) -> String {
+    if findings.is_empty() {
+        return "nothing found\n".into();
+    }
+    let mut out = String::new();
+    for f in findings {
+        out += &format!("{}[{}] {}: {}\n", f.severity, f.code, f.location, f.message);
+        if !f.help.is_empty() {
+            out += &format!("    help: {}\n", f.help);
+        }
+    }
+    let count = |severity: &str| findings.iter().filter(|f| f.severity == severity).count();
+    out += &format!("{} errors, {} warnings, {} notes\n", count("error"), count("warning"), count("note"));
+    out
+}
