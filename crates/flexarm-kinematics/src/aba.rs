@@ -65,7 +65,7 @@ pub fn forward_dynamics<'d>(
     roles_all_free: &Roles,
     tau: &DVector<f64>,
 ) -> &'d DVector<f64> {
-    data.tau.copy_from(tau);
+    data.tau.as_mut_slice().copy_from_slice(tau.as_slice());
     solve(model, data, state, roles_all_free);
     &data.qddot
 }
@@ -83,11 +83,11 @@ pub fn hybrid_dynamics(
     qddot: &mut DVector<f64>,
     tau: &mut DVector<f64>,
 ) {
-    data.tau.copy_from(tau);
-    data.qddot.copy_from(qddot);
+    data.tau.as_mut_slice().copy_from_slice(tau.as_slice());
+    data.qddot.as_mut_slice().copy_from_slice(qddot.as_slice());
     solve(model, data, state, roles);
-    tau.copy_from(&data.tau);
-    qddot.copy_from(&data.qddot);
+    tau.as_mut_slice().copy_from_slice(data.tau.as_slice());
+    qddot.as_mut_slice().copy_from_slice(data.qddot.as_slice());
 }
 
 fn solve(model: &Model, data: &mut Data, state: &State, roles: &Roles) {

@@ -25,7 +25,7 @@ pub fn mass_matrix_at_poses(model: &Model, data: &mut Data) {
     for (composite, body) in data.composite.iter_mut().zip(&model.bodies) {
         *composite = body.inertia;
     }
-    data.M.fill(0.0);
+    data.M.as_mut_slice().fill(0.0);
     let nv = data.M.nrows();
     for i in (1..n).rev() {
         let body = &model.bodies[i];

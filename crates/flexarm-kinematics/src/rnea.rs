@@ -68,7 +68,7 @@ fn newton_euler(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], qddot: 
         data.V[i] = V;
         data.A[i] = A;
     }
-    data.tau.fill(0.0);
+    data.tau.as_mut_slice().fill(0.0);
     for i in (1..n).rev() {
         let F = data.F[i];
         add_projection(model, &data.elastic[i], i, &F, data.tau.as_mut_slice()); // (4)

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::time::Instant;
 
 use flexarm_analysis::{ErrorRecord, MetricSettings, PathFrame, engineering_strain, tcp_error, tcp_metrics};
-use flexarm_kinematics::Frame;
+use flexarm_kinematics::{Data, Frame, State, forward_kinematics};
 use flexarm_log::{ElasticSample, EnergySample, RecorderSet, Sample};
 use flexarm_stepping::{FlexibleArm, Observation, StepError, Stepper, new_stepper};
 use nalgebra::{Vector3, Vector6};
@@ -250,7 +250,7 @@ impl<'a> Run<'a> {
             links_model: options.links.name(),
             duration_s: self.times.last().copied().unwrap_or(0.0),
             stepper: StepperFigures::new(options, self.stepper.counts()),
-            tcp: metrics.as_ref().filter(|_| options.with_twin).map(TcpFigures::from),
+            tcp: metrics.as_ref().filter(|_| options.with_twin).map(|m| TcpFigures { static_sag_m: self.static_sag(), ..m.into() }),
             frequencies_hz: self.arm.modes.frequencies_hz(),
             links,
             drives: self
@@ -265,6 +265,19 @@ impl<'a> Run<'a> {
             warnings,
             ..Summary::default()
         }
+    }
+
+    /// TCP error with the drives at rest in their first position, also for runs that start undeformed [m].
+    fn static_sag(&self) -> f64 {
+        let model = &self.arm.model;
+        let (mut data, mut state) = (Data::new(model), State::zeros(model));
+        self.arm.prescribed_state(0.0, &mut state, &mut nalgebra::DVector::zeros(model.nv()));
+        forward_kinematics(model, &mut data, &state.q);
+        let rigid = data.X_WF(&self.tcp).translation.vector;
+        let n = model.n_actuated();
+        state.q.rows_mut(n, model.nv() - n).copy_from(&self.arm.modes.equilibrium);
+        forward_kinematics(model, &mut data, &state.q);
+        (data.X_WF(&self.tcp).translation.vector - rigid).norm()
     }
 
     fn validity_warnings(&self, links: &[LinkFigures], warnings: &mut Vec<String>) {

@@ -128,7 +128,7 @@ pub(crate) fn header(robot: &Robot, motion: &Motion, options: &RunOptions, arm: 
     RunHeader {
         robot: robot.name.clone(),
         trajectory: motion.name.clone(),
-        urdf: robot.urdf.text.clone(),
+        urdf: located_urdf(robot),
         joints: model.coordinates()[..model.n_actuated()].iter().map(|c| c.joint.clone()).collect(),
         meshes: meshes(robot, &links),
         links,
@@ -140,6 +140,22 @@ pub(crate) fn header(robot: &Robot, motion: &Motion, options: &RunOptions, arm: 
         has_rigid: options.with_twin,
         log_rate_hz: options.log_rate_hz,
     }
+}
+
+/// The URDF with the meshes that were found as `file://` references: viewers then find them without being told where
+/// the robot's folder is.
+fn located_urdf(robot: &Robot) -> String {
+    let mut text = robot.urdf.text.clone();
+    for visual in &robot.urdf.visuals {
+        if let Geometry::Mesh { uri, path: Some(path), .. } = &visual.geometry
+            && let Ok(path) = path.canonicalize()
+        {
+            let located = format!("file://{}", path.display());
+            text = text.replace(&format!("\"{uri}\""), &format!("\"{located}\""));
+            text = text.replace(&format!("'{uri}'"), &format!("'{located}'"));
+        }
+    }
+    text
 }
 
 fn description(robot: &Robot, motion: &Motion, options: &RunOptions, frequencies: &[String]) -> String {
