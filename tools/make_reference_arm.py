@@ -21,7 +21,7 @@ ALUMINIUM = dict(E=70e9, nu=0.33, rho=2700.0)
 # forearm: steel tube, outer diameter 140 mm, wall 6 mm; shear factor of Cowper (1966) for a *thin* tube
 RO, RI, STEEL_E, STEEL_NU = 0.070, 0.064, 210e9, 0.30
 
-VARIANTS = {   # split, offset, roll of lower arm and forearm; beta of D = beta K, 3 % on the first mode at q = 0
+VARIANTS = {   # split, offset, roll of lower arm and forearm; beta of D = beta K, about 3 % on the first mode at q = 0
     "reference_arm": dict(low=(0.5, [0, 0, 0], 0.0), up=(0.5, [0, 0, 0], 0.0), beta=0.0010536078174585805),
     "reference_arm_coupled": dict(low=(0.4, [0.03, 0.05, 0], math.radians(25.0)), up=(0.6, [0, 0.02, -0.04], 0.0),
                                   beta=0.0010220415109918086),

@@ -269,14 +269,21 @@ class Arm:
         M = np.triu(pin.crba(self.model, self.data, self.full(q_a, e)))
         return M + np.triu(M, 1).T
 
+    def gravity_stiffness(self, q, step=1e-5):
+        """dg/dq of all coordinates, by central differences of the gravity forces; symmetric up to rounding.
+
+        Not pin.computeGeneralizedGravityDerivatives: that leaves out dS/dq of the ZYX joint (Pinocchio 4.1).
+        """
+        gravity = lambda x: pin.computeGeneralizedGravity(self.model, self.data, x).copy()
+        return np.column_stack([(gravity(q + d) - gravity(q - d)) / (2 * step) for d in step * np.eye(self.model.nv)])
+
     def statics(self, q_a):
         """Elastic coordinates at rest under gravity, actuated joints held."""
         e, sub = np.zeros(len(self.elastic)), np.ix_(self.elastic, self.elastic)
         for _ in range(30):
             q = self.full(q_a, e)
             g = pin.computeGeneralizedGravity(self.model, self.data, q)[self.elastic]
-            dg = pin.computeGeneralizedGravityDerivatives(self.model, self.data, q)[sub]
-            de = -np.linalg.solve(self.K + dg, self.K @ e + g)
+            de = -np.linalg.solve(self.K + self.gravity_stiffness(q)[sub], self.K @ e + g)
             e = e + de
             if np.abs(de).max(initial=0) < 1e-16:
                 break
@@ -289,7 +296,7 @@ class Arm:
         if joint_stiffness is not None:
             free, K = free + self.actuated, sl.block_diag(K, np.diag(joint_stiffness))
         sub = np.ix_(free, free)
-        dg = pin.computeGeneralizedGravityDerivatives(self.model, self.data, self.full(q_a, e))[sub]
+        dg = self.gravity_stiffness(self.full(q_a, e))[sub]
         Kt = K + 0.5 * (dg + dg.T)
         return np.sqrt(sl.eigh(Kt, self.mass_matrix(q_a, e)[sub], eigvals_only=True)) / (2 * np.pi)
 

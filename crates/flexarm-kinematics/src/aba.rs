@@ -11,7 +11,7 @@ use nalgebra::{Cholesky, DVector, Matrix3, Vector3};
 use crate::data::{Data, State, add_projection, joint_motion, subspace_times};
 use crate::model::{JointMotion, Model};
 use crate::rnea::nonlinear_effects;
-use crate::spatial::{ArticulatedInertia, Twist, Wrench};
+use crate::spatial::{ArticulatedInertia, Twist, Wrench, mul, mul3, tr_mul, tr_mul3};
 
 /// Which joints are prescribed; the rest are free.
 #[derive(Clone, Debug, PartialEq)]
@@ -131,14 +131,14 @@ fn solve_articulated(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], pr
             }
             JointMotion::Revolute(axis) => {
                 let I = &data.articulated[i];
-                let U = Wrench::new(I.coupling * axis, I.angular * axis);
+                let U = Wrench::new(mul(&I.coupling, &axis), mul(&I.angular, &axis));
                 let d = axis.dot(&U.torque);
                 let u = data.tau[body.coordinate] * body.ratio - axis.dot(&pA.torque);
                 one_dof_inward(data, i, U, d, u, &c, pA)
             }
             JointMotion::Prismatic(axis) => {
                 let I = &data.articulated[i];
-                let U = Wrench::new(I.linear * axis, I.coupling.tr_mul(&axis));
+                let U = Wrench::new(mul(&I.linear, &axis), tr_mul(&I.coupling, &axis));
                 let d = axis.dot(&U.force);
                 let u = data.tau[body.coordinate] * body.ratio - axis.dot(&pA.force);
                 one_dof_inward(data, i, U, d, u, &c, pA)
@@ -188,8 +188,8 @@ fn solve_articulated(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], pr
                 let A_B = solve_inertia(&data.articulated[i], &(data.F[i] - data.pA[i]));
                 let relative = A_B - A;
                 let S = &data.elastic[i];
-                let linear = S.L.tr_mul(&relative.linear);
-                let angular = inverse_3x3(&S.B) * relative.angular;
+                let linear = tr_mul(&S.L, &relative.linear);
+                let angular = mul(&inverse_3x3(&S.B), &relative.angular);
                 data.qddot.as_mut_slice()[k..k + 3].copy_from_slice(linear.as_slice());
                 data.qddot.as_mut_slice()[k + 3..k + 6].copy_from_slice(angular.as_slice());
                 A_B
@@ -224,8 +224,8 @@ fn elastic_wrench(data: &Data, i: usize, k: usize) -> Wrench {
     let S = &data.elastic[i];
     let tau = data.tau.as_slice();
     // L is a rotation: L^-T = L.
-    let force = S.L * Vector3::new(tau[k], tau[k + 1], tau[k + 2]);
-    let torque = inverse_3x3(&S.B).tr_mul(&Vector3::new(tau[k + 3], tau[k + 4], tau[k + 5]));
+    let force = mul(&S.L, &Vector3::new(tau[k], tau[k + 1], tau[k + 2]));
+    let torque = tr_mul(&inverse_3x3(&S.B), &Vector3::new(tau[k + 3], tau[k + 4], tau[k + 5]));
     Wrench::new(force, torque)
 }
 
@@ -242,10 +242,10 @@ fn inverse_3x3(B: &Matrix3<f64>) -> Matrix3<f64> {
 #[inline(always)]
 fn solve_inertia(I: &ArticulatedInertia, F: &Wrench) -> Twist {
     let linear_inverse = inverse_3x3(&I.linear);
-    let G = linear_inverse * I.coupling;
-    let complement = I.angular - I.coupling.tr_mul(&G);
-    let angular = inverse_3x3(&complement) * (F.torque - G.tr_mul(&F.force));
-    Twist::new(linear_inverse * F.force - G * angular, angular)
+    let G = mul3(&linear_inverse, &I.coupling);
+    let complement = I.angular - tr_mul3(&I.coupling, &G);
+    let angular = mul(&inverse_3x3(&complement), &(F.torque - tr_mul(&G, &F.force)));
+    Twist::new(mul(&linear_inverse, &F.force) - mul(&G, &angular), angular)
 }
 
 /// `M_ff q̈_f = τ_f - bias_f - M_fp q̈_p` by Cholesky; then the prescribed forces from RNEA.

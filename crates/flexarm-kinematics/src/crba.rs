@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use crate::data::{Data, joint_position};
 use crate::model::{JointMotion, Model};
-use crate::spatial::{Pose, SpatialInertia, Twist, Wrench};
+use crate::spatial::{Pose, SpatialInertia, Twist, Wrench, cross3, mul3, tr_mul, tr_mul3};
 
 /// Mass matrix `M(q)`, nv×nv, both triangles [kg, kg m, kg m²]. Fills `data.{X_PB, M}`. No allocation.
 pub fn mass_matrix<'d>(model: &Model, data: &'d mut Data, q: &DVector<f64>) -> &'d DMatrix<f64> {
@@ -36,13 +36,13 @@ pub fn mass_matrix_at_poses(model: &Model, data: &mut Data) {
                 let F = composite.mul_twist(&Twist::new(Vector3::zeros(), axis)) * body.ratio;
                 let k = body.coordinate;
                 data.M.as_mut_slice()[k * nv + k] += body.ratio * axis.dot(&F.torque);
-                one_column(model, data, body.parent, k, F.at_parent(&X_PB));
+                one_column(model, data, i, k, F);
             }
             JointMotion::Prismatic(axis) => {
                 let F = composite.mul_twist(&Twist::new(axis, Vector3::zeros())) * body.ratio;
                 let k = body.coordinate;
                 data.M.as_mut_slice()[k * nv + k] += body.ratio * axis.dot(&F.force);
-                one_column(model, data, body.parent, k, F.at_parent(&X_PB));
+                one_column(model, data, i, k, F);
             }
             JointMotion::Elastic(_) => {}
         }
@@ -55,47 +55,52 @@ pub fn mass_matrix_at_poses(model: &Model, data: &mut Data) {
             }
         }
     }
-    // Each pair of different coordinates was written once.
-    let M = data.M.as_mut_slice();
-    for c in 0..nv {
-        for r in 0..c {
-            let sum = M[c * nv + r] + M[r * nv + c];
-            M[c * nv + r] = sum;
-            M[r * nv + c] = sum;
-        }
-    }
 }
 
-/// Rows of all joints from body j inward in the column of one coordinate; `F` at j.
+/// Rows of all joints inward of body j in the column of one coordinate; `F` at j.
 #[inline(always)]
 fn one_column(model: &Model, data: &mut Data, mut j: usize, column: usize, mut F: Wrench) {
     let nv = data.M.nrows();
-    let rows = &mut data.M.as_mut_slice()[column * nv..(column + 1) * nv];
-    while j > 0 {
-        let inward = &model.bodies[j];
-        let k = inward.coordinate;
-        match inward.motion {
-            JointMotion::Revolute(axis) => rows[k] += mirrored(k, column) * inward.ratio * axis.dot(&F.torque),
-            JointMotion::Prismatic(axis) => rows[k] += mirrored(k, column) * inward.ratio * axis.dot(&F.force),
-            JointMotion::Elastic(_) => {
-                let S = &data.elastic[j];
-                let (f, t) = (S.L.tr_mul(&F.force), S.B.tr_mul(&F.torque));
-                let rows = &mut rows[k..k + 6];
-                for r in 0..3 {
-                    rows[r] += f[r];
-                    rows[3 + r] += t[r];
-                }
-            }
+    let M = data.M.as_mut_slice();
+    loop {
+        let parent = model.bodies[j].parent;
+        if parent == 0 {
+            return;
         }
         F = F.at_parent(&data.X_PB[j]);
-        j = inward.parent;
+        j = parent;
+        let inward = &model.bodies[j];
+        let row = inward.coordinate;
+        match inward.motion {
+            JointMotion::Revolute(axis) => add_pair(M, nv, row, column, inward.ratio * axis.dot(&F.torque)),
+            JointMotion::Prismatic(axis) => add_pair(M, nv, row, column, inward.ratio * axis.dot(&F.force)),
+            JointMotion::Elastic(_) => {
+                let S = &data.elastic[j];
+                let (f, t) = (tr_mul(&S.L, &F.force), tr_mul(&S.B, &F.torque));
+                add_six(M, nv, row, column, [f.x, f.y, f.z, t.x, t.y, t.z]);
+            }
+        }
     }
 }
 
-/// A joint that mimics a joint inward of it meets itself twice on the diagonal.
+/// Adds to both triangles; on the diagonal (a joint that mimics one inward of it) that is twice.
 #[inline(always)]
-fn mirrored(row: usize, column: usize) -> f64 {
-    if row == column { 2.0 } else { 1.0 }
+fn add_pair(M: &mut [f64], nv: usize, row: usize, column: usize, value: f64) {
+    M[column * nv + row] += value;
+    M[row * nv + column] += value;
+}
+
+/// Adds six rows from `row` on in one column, and their mirror image.
+#[inline(always)]
+fn add_six(M: &mut [f64], nv: usize, row: usize, column: usize, values: [f64; 6]) {
+    for (entry, value) in M[column * nv + row..][..6].iter_mut().zip(values) {
+        *entry += value;
+    }
+    let mut at = row * nv + column;
+    for value in values {
+        M[at] += value;
+        at += nv;
+    }
 }
 
 /// Wrenches on six columns, as 3×3 blocks: translations (t), then angles (r).
@@ -110,20 +115,14 @@ impl Columns {
     #[inline(always)]
     fn at_parent(&self, X_PB: &Pose) -> Self {
         let (R, p) = (X_PB.rotation.matrix(), &X_PB.translation.vector);
-        let (force_t, force_r) = (R * self.force_t, R * self.force_r);
+        let (force_t, force_r) = (mul3(R, &self.force_t), mul3(R, &self.force_r));
         Self {
-            torque_t: R * self.torque_t + cross(p, &force_t),
-            torque_r: R * self.torque_r + cross(p, &force_r),
+            torque_t: mul3(R, &self.torque_t) + cross3(p, &force_t),
+            torque_r: mul3(R, &self.torque_r) + cross3(p, &force_r),
             force_t,
             force_r,
         }
     }
-}
-
-/// `[p]x A`.
-#[inline(always)]
-fn cross(p: &Vector3<f64>, A: &Matrix3<f64>) -> Matrix3<f64> {
-    Matrix3::from_columns(&[p.cross(&A.column(0)), p.cross(&A.column(1)), p.cross(&A.column(2))])
 }
 
 /// All columns of an elastic joint, from the composite inertia `M_P` of its body about Po in P axes.
@@ -134,28 +133,30 @@ fn elastic_columns(model: &Model, data: &mut Data, i: usize, M_P: &SpatialInerti
     let body = &model.bodies[i];
     let (X_PB, nv) = (&data.X_PB[i], data.M.nrows());
     let (R_PJ, p, h) = (body.X_PJ.rotation.matrix(), &X_PB.translation.vector, &M_P.first_moment);
-    let Omega = X_PB.rotation.matrix() * data.elastic[i].B;
-    let force_r = cross(&(p * M_P.mass - h), &Omega);
+    let Omega = mul3(X_PB.rotation.matrix(), &data.elastic[i].B);
+    let force_r = cross3(&(p * M_P.mass - h), &Omega);
     let mut F = Columns {
         force_t: R_PJ * M_P.mass,
-        torque_t: cross(h, R_PJ),
-        torque_r: cross(h, &cross(p, &Omega)) + M_P.rotational * Omega,
+        torque_t: cross3(h, R_PJ),
+        torque_r: cross3(h, &cross3(p, &Omega)) + mul3(&M_P.rotational, &Omega),
         force_r,
     };
 
-    // Own block: the translations meet the mass alone; only the upper triangle, the rest is mirrored.
+    // Own block: the translations meet the mass alone.
     let k = body.coordinate;
-    let tr = R_PJ.tr_mul(&force_r);
-    let rr = Omega.tr_mul(&(F.torque_r - cross(p, &force_r)));
+    let tr = tr_mul3(R_PJ, &force_r);
+    let rr = tr_mul3(&Omega, &(F.torque_r - cross3(p, &force_r)));
     let M = data.M.as_mut_slice();
     for c in 0..3 {
-        M[(k + c) * nv + k + c] = M_P.mass;
-        let rows = &mut M[(k + 3 + c) * nv + k..][..6];
+        let column = &mut M[(k + c) * nv + k..][..6];
+        column[c] = M_P.mass;
         for r in 0..3 {
-            rows[r] = tr[(r, c)];
+            column[3 + r] = tr[(c, r)];
         }
-        for r in 0..=c {
-            rows[3 + r] = rr[(r, c)];
+        let column = &mut M[(k + 3 + c) * nv + k..][..6];
+        for r in 0..3 {
+            column[r] = tr[(r, c)];
+            column[3 + r] = rr[(r, c)];
         }
     }
 
@@ -166,39 +167,30 @@ fn elastic_columns(model: &Model, data: &mut Data, i: usize, M_P: &SpatialInerti
         match inward.motion {
             JointMotion::Revolute(axis) => {
                 let a = axis * inward.ratio;
-                let (t, r) = (F.torque_t.tr_mul(&a), F.torque_r.tr_mul(&a));
-                for c in 0..3 {
-                    M[(k + c) * nv + row] += t[c];
-                    M[(k + 3 + c) * nv + row] += r[c];
-                }
+                let (t, r) = (tr_mul(&F.torque_t, &a), tr_mul(&F.torque_r, &a));
+                add_six(M, nv, k, row, [t.x, t.y, t.z, r.x, r.y, r.z]);
             }
             JointMotion::Prismatic(axis) => {
                 let a = axis * inward.ratio;
-                let (t, r) = (F.force_t.tr_mul(&a), F.force_r.tr_mul(&a));
-                for c in 0..3 {
-                    M[(k + c) * nv + row] += t[c];
-                    M[(k + 3 + c) * nv + row] += r[c];
-                }
+                let (t, r) = (tr_mul(&F.force_t, &a), tr_mul(&F.force_r, &a));
+                add_six(M, nv, k, row, [t.x, t.y, t.z, r.x, r.y, r.z]);
             }
             JointMotion::Elastic(_) => {
                 let S = &data.elastic[j];
-                let (tt, rt) = (S.L.tr_mul(&F.force_t), S.B.tr_mul(&F.torque_t));
-                let (tr, rr) = (S.L.tr_mul(&F.force_r), S.B.tr_mul(&F.torque_r));
+                let (tt, rt) = (tr_mul3(&S.L, &F.force_t), tr_mul3(&S.B, &F.torque_t));
+                let (tr, rr) = (tr_mul3(&S.L, &F.force_r), tr_mul3(&S.B, &F.torque_r));
                 for c in 0..3 {
-                    let rows = &mut M[(k + c) * nv + row..][..6];
-                    for r in 0..3 {
-                        rows[r] = tt[(r, c)];
-                        rows[3 + r] = rt[(r, c)];
-                    }
-                    let rows = &mut M[(k + 3 + c) * nv + row..][..6];
-                    for r in 0..3 {
-                        rows[r] = tr[(r, c)];
-                        rows[3 + r] = rr[(r, c)];
-                    }
+                    let six = |t: &Matrix3<f64>, r: &Matrix3<f64>| {
+                        [t[(0, c)], t[(1, c)], t[(2, c)], r[(0, c)], r[(1, c)], r[(2, c)]]
+                    };
+                    add_six(M, nv, row, k + c, six(&tt, &rt));
+                    add_six(M, nv, row, k + 3 + c, six(&tr, &rr));
                 }
             }
         }
-        F = F.at_parent(&data.X_PB[j]);
+        if inward.parent > 0 {
+            F = F.at_parent(&data.X_PB[j]);
+        }
         j = inward.parent;
     }
 }

@@ -6,7 +6,7 @@
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use crate::model::{JointMotion, Model};
-use crate::spatial::{ArticulatedInertia, Pose, SpatialInertia, Twist, Wrench};
+use crate::spatial::{ArticulatedInertia, Pose, SpatialInertia, Twist, Wrench, mul, mul3, tr_mul};
 
 /// Positions and velocities of all independent coordinates, in the model's coordinate order.
 #[derive(Clone, Debug, PartialEq)]
@@ -129,7 +129,7 @@ pub(crate) fn joint_motion(model: &Model, data: &mut Data, i: usize, q: &[f64], 
             place_elastic(&mut data.X_PB[i], &body.X_PJ, &kin.R, &Vector3::new(q[0], q[1], q[2]));
             let L = kin.R.transpose();
             data.elastic[i] = ElasticSubspace { L, B: kin.B };
-            let V = Twist::new(L * ddot, kin.B * rates);
+            let V = Twist::new(mul(&L, &ddot), mul(&kin.B, &rates));
             // d(R_PBᵀ)/dt d' = -w × (R_PBᵀ d')
             (V, Twist::new(V.linear.cross(&V.angular), kin.bias))
         }
@@ -156,17 +156,17 @@ pub(crate) fn joint_position(model: &Model, data: &mut Data, i: usize, q: &[f64]
                 body.X_PJ.translation.vector + body.X_PJ.rotation * (axis * (body.ratio * q[k] + body.offset));
         }
         JointMotion::Elastic(angles) => {
-            let kin = angles.kinematics(&Vector3::new(q[k + 3], q[k + 4], q[k + 5]), &Vector3::zeros());
-            place_elastic(&mut data.X_PB[i], &body.X_PJ, &kin.R, &Vector3::new(q[k], q[k + 1], q[k + 2]));
-            data.elastic[i] = ElasticSubspace { L: kin.R.transpose(), B: kin.B };
+            let (R, B) = angles.pose(&Vector3::new(q[k + 3], q[k + 4], q[k + 5]));
+            place_elastic(&mut data.X_PB[i], &body.X_PJ, &R, &Vector3::new(q[k], q[k + 1], q[k + 2]));
+            data.elastic[i] = ElasticSubspace { L: R.transpose(), B };
         }
     }
 }
 
 #[inline(always)]
 fn place_elastic(X_PB: &mut Pose, X_PJ: &Pose, R: &Matrix3<f64>, d: &Vector3<f64>) {
-    *X_PB.rotation.matrix_mut_unchecked() = X_PJ.rotation.matrix() * R;
-    X_PB.translation.vector = X_PJ.translation.vector + X_PJ.rotation * d;
+    *X_PB.rotation.matrix_mut_unchecked() = mul3(X_PJ.rotation.matrix(), R);
+    X_PB.translation.vector = X_PJ.translation.vector + mul(X_PJ.rotation.matrix(), d);
 }
 
 /// `S q̈` in B axes.
@@ -180,8 +180,8 @@ pub(crate) fn subspace_times(model: &Model, data: &Data, i: usize, qddot: &[f64]
         JointMotion::Elastic(_) => {
             let S = &data.elastic[i];
             Twist::new(
-                S.L * Vector3::new(qddot[k], qddot[k + 1], qddot[k + 2]),
-                S.B * Vector3::new(qddot[k + 3], qddot[k + 4], qddot[k + 5]),
+                mul(&S.L, &Vector3::new(qddot[k], qddot[k + 1], qddot[k + 2])),
+                mul(&S.B, &Vector3::new(qddot[k + 3], qddot[k + 4], qddot[k + 5])),
             )
         }
     }
@@ -196,8 +196,8 @@ pub(crate) fn add_projection(model: &Model, data_elastic: &ElasticSubspace, i: u
         JointMotion::Revolute(axis) => tau[k] += body.ratio * axis.dot(&F.torque),
         JointMotion::Prismatic(axis) => tau[k] += body.ratio * axis.dot(&F.force),
         JointMotion::Elastic(_) => {
-            let f = data_elastic.L.tr_mul(&F.force);
-            let t = data_elastic.B.tr_mul(&F.torque);
+            let f = tr_mul(&data_elastic.L, &F.force);
+            let t = tr_mul(&data_elastic.B, &F.torque);
             for c in 0..3 {
                 tau[k + c] += f[c];
                 tau[k + 3 + c] += t[c];

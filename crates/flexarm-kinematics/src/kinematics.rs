@@ -7,7 +7,7 @@ use nalgebra::{Matrix6xX, Vector3};
 
 use crate::data::{Data, State, joint_motion, joint_position};
 use crate::model::{Frame, JointMotion, Model};
-use crate::spatial::{Pose, Twist};
+use crate::spatial::{Pose, Twist, mul, mul3};
 
 /// Poses of all bodies: fills `data.{X_PB, X_WB}`.
 pub fn forward_kinematics(model: &Model, data: &mut Data, q: &nalgebra::DVector<f64>) {
@@ -32,7 +32,11 @@ pub fn forward_kinematics_velocity(model: &Model, data: &mut Data, state: &State
 pub fn world_poses(model: &Model, data: &mut Data) {
     data.X_WB[0] = Pose::identity();
     for i in 1..model.bodies.len() {
-        data.X_WB[i] = data.X_WB[model.bodies[i].parent] * data.X_PB[i];
+        let (X_WP, X_PB) = (data.X_WB[model.bodies[i].parent], data.X_PB[i]);
+        let R_WP = X_WP.rotation.matrix();
+        let X_WB = &mut data.X_WB[i];
+        *X_WB.rotation.matrix_mut_unchecked() = mul3(R_WP, X_PB.rotation.matrix());
+        X_WB.translation.vector = X_WP.translation.vector + mul(R_WP, &X_PB.translation.vector);
     }
 }
 

@@ -40,6 +40,18 @@ impl ElasticAngles {
         }
     }
 
+    /// Rotation and rate map alone.
+    #[inline]
+    pub fn pose(self, angles: &Vector3<f64>) -> (Matrix3<f64>, Matrix3<f64>) {
+        match self {
+            Self::RotationVector => rotation_vector_pose(angles, &exponential_coefficients(angles.norm_squared())),
+            Self::EulerZyx => {
+                let k = euler_zyx_kinematics(angles, &Vector3::zeros());
+                (k.R, k.B)
+            }
+        }
+    }
+
     /// `dB/dt` at `angles` [rad] and `rates` [rad/s], as a matrix.
     pub fn rate_map_derivative(self, angles: &Vector3<f64>, rates: &Vector3<f64>) -> Matrix3<f64> {
         match self {
@@ -105,16 +117,23 @@ fn exponential_coefficients(x: f64) -> (f64, f64, f64, f64, f64) {
     (s, a, b, da, db)
 }
 
+/// `R` and `B` from the coefficients at `|phi|²`.
+#[inline]
+fn rotation_vector_pose(phi: &Vector3<f64>, coefficients: &(f64, f64, f64, f64, f64)) -> (Matrix3<f64>, Matrix3<f64>) {
+    let (s, a, b, ..) = *coefficients;
+    let (x, P) = (phi.norm_squared(), skew(phi));
+    // [phi]x² = phi phiᵀ - x 1
+    let square = Matrix3::from_columns(&[phi * phi.x, phi * phi.y, phi * phi.z]);
+    let R = P * s + square * a + Matrix3::from_diagonal_element(1.0 - x * a);
+    let B = square * b - P * a + Matrix3::from_diagonal_element(1.0 - x * b);
+    (R, B)
+}
+
 #[inline]
 fn rotation_vector_kinematics(phi: &Vector3<f64>, rates: &Vector3<f64>) -> AngleKinematics {
-    let x = phi.norm_squared();
-    let (s, a, b, da, db) = exponential_coefficients(x);
-    let P = skew(phi);
-    // [phi]x² = phi phiᵀ - x 1
-    let P2 = phi * phi.transpose() - Matrix3::from_diagonal_element(x);
-    let I = Matrix3::identity();
-    let R = I + P * s + P2 * a;
-    let B = I - P * a + P2 * b;
+    let coefficients = exponential_coefficients(phi.norm_squared());
+    let (R, B) = rotation_vector_pose(phi, &coefficients);
+    let (_, _, b, da, db) = coefficients;
     // bias = (dB/dt) rates = -a' x' phi×rates + b' x' phi×(phi×rates) + b (rates×(phi×rates)),  x' = 2 phi·rates
     let xdot = 2.0 * phi.dot(rates);
     let c = phi.cross(rates);

@@ -9,6 +9,67 @@
 use nalgebra::{IsometryMatrix3, Matrix3, Matrix6, Vector3, Vector6};
 use std::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 
+/// `A v`, written out on columns: nalgebra's general product of small matrices costs twice as many instructions.
+#[inline(always)]
+pub(crate) fn mul(A: &Matrix3<f64>, v: &Vector3<f64>) -> Vector3<f64> {
+    let [a, b, c] = &A.data.0;
+    let (x, y, z) = (v.x, v.y, v.z);
+    Vector3::new(a[0] * x + b[0] * y + c[0] * z, a[1] * x + b[1] * y + c[1] * z, a[2] * x + b[2] * y + c[2] * z)
+}
+
+/// `Aᵀ v`.
+#[inline(always)]
+pub(crate) fn tr_mul(A: &Matrix3<f64>, v: &Vector3<f64>) -> Vector3<f64> {
+    let [a, b, c] = &A.data.0;
+    let (x, y, z) = (v.x, v.y, v.z);
+    Vector3::new(a[0] * x + a[1] * y + a[2] * z, b[0] * x + b[1] * y + b[2] * z, c[0] * x + c[1] * y + c[2] * z)
+}
+
+/// Matrix of three columns.
+#[inline(always)]
+fn columns(a: Vector3<f64>, b: Vector3<f64>, c: Vector3<f64>) -> Matrix3<f64> {
+    Matrix3::new(a.x, b.x, c.x, a.y, b.y, c.y, a.z, b.z, c.z)
+}
+
+/// Column j as a vector.
+#[inline(always)]
+fn column(A: &Matrix3<f64>, j: usize) -> Vector3<f64> {
+    let c = &A.data.0[j];
+    Vector3::new(c[0], c[1], c[2])
+}
+
+/// `A B`.
+#[inline(always)]
+pub(crate) fn mul3(A: &Matrix3<f64>, B: &Matrix3<f64>) -> Matrix3<f64> {
+    columns(mul(A, &column(B, 0)), mul(A, &column(B, 1)), mul(A, &column(B, 2)))
+}
+
+/// `Aᵀ B`.
+#[inline(always)]
+pub(crate) fn tr_mul3(A: &Matrix3<f64>, B: &Matrix3<f64>) -> Matrix3<f64> {
+    columns(tr_mul(A, &column(B, 0)), tr_mul(A, &column(B, 1)), tr_mul(A, &column(B, 2)))
+}
+
+/// `R A Rᵀ` for a symmetric A.
+#[inline(always)]
+pub(crate) fn turn_symmetric(R: &Matrix3<f64>, A: &Matrix3<f64>) -> Matrix3<f64> {
+    let [t0, t1, t2] = &mul3(R, A).data.0;
+    let [r0, r1, r2] = &R.data.0;
+    let xx = t0[0] * r0[0] + t1[0] * r1[0] + t2[0] * r2[0];
+    let xy = t0[0] * r0[1] + t1[0] * r1[1] + t2[0] * r2[1];
+    let xz = t0[0] * r0[2] + t1[0] * r1[2] + t2[0] * r2[2];
+    let yy = t0[1] * r0[1] + t1[1] * r1[1] + t2[1] * r2[1];
+    let yz = t0[1] * r0[2] + t1[1] * r1[2] + t2[1] * r2[2];
+    let zz = t0[2] * r0[2] + t1[2] * r1[2] + t2[2] * r2[2];
+    Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
+}
+
+/// `[p]x A`.
+#[inline(always)]
+pub(crate) fn cross3(p: &Vector3<f64>, A: &Matrix3<f64>) -> Matrix3<f64> {
+    columns(p.cross(&column(A, 0)), p.cross(&column(A, 1)), p.cross(&column(A, 2)))
+}
+
 /// Pose `X_AB` of frame B in frame A, as rotation matrix and translation [m]. `p_A = X_AB * p_B`.
 pub type Pose = IsometryMatrix3<f64>;
 
@@ -132,15 +193,15 @@ impl Twist {
     pub fn at_child(&self, X_AB: &Pose) -> Twist {
         let R = X_AB.rotation.matrix();
         let p = &X_AB.translation.vector;
-        Twist::new(R.tr_mul(&(self.linear + self.angular.cross(p))), R.tr_mul(&self.angular))
+        Twist::new(tr_mul(R, &(self.linear + self.angular.cross(p))), tr_mul(R, &self.angular))
     }
 
     /// The inverse of [`Twist::at_child`]: from Bo, B axes to Ao, A axes.
     #[inline(always)]
     pub fn at_parent(&self, X_AB: &Pose) -> Twist {
         let R = X_AB.rotation.matrix();
-        let angular = R * self.angular;
-        Twist::new(R * self.linear + X_AB.translation.vector.cross(&angular), angular)
+        let angular = mul(R, &self.angular);
+        Twist::new(mul(R, &self.linear) + X_AB.translation.vector.cross(&angular), angular)
     }
 }
 
@@ -149,8 +210,8 @@ impl Wrench {
     #[inline(always)]
     pub fn at_parent(&self, X_AB: &Pose) -> Wrench {
         let R = X_AB.rotation.matrix();
-        let force = R * self.force;
-        Wrench::new(force, R * self.torque + X_AB.translation.vector.cross(&force))
+        let force = mul(R, &self.force);
+        Wrench::new(force, mul(R, &self.torque) + X_AB.translation.vector.cross(&force))
     }
 
     /// The inverse of [`Wrench::at_parent`]: from Ao, A axes to Bo, B axes.
@@ -158,7 +219,7 @@ impl Wrench {
     pub fn at_child(&self, X_AB: &Pose) -> Wrench {
         let R = X_AB.rotation.matrix();
         let p = &X_AB.translation.vector;
-        Wrench::new(R.tr_mul(&self.force), R.tr_mul(&(self.torque - p.cross(&self.force))))
+        Wrench::new(tr_mul(R, &self.force), tr_mul(R, &(self.torque - p.cross(&self.force))))
     }
 }
 
@@ -218,7 +279,7 @@ impl SpatialInertia {
     #[inline(always)]
     pub fn mul_twist(&self, V: &Twist) -> Wrench {
         let h = &self.first_moment;
-        Wrench::new(V.linear * self.mass - h.cross(&V.angular), h.cross(&V.linear) + self.rotational * V.angular)
+        Wrench::new(V.linear * self.mass - h.cross(&V.angular), h.cross(&V.linear) + mul(&self.rotational, &V.angular))
     }
 
     /// The same body about Ao in A axes, for `X_AB`.
@@ -226,17 +287,12 @@ impl SpatialInertia {
     pub fn at_parent(&self, X_AB: &Pose) -> SpatialInertia {
         let R = X_AB.rotation.matrix();
         let p = &X_AB.translation.vector;
-        let h = R * self.first_moment;
+        let h = mul(R, &self.first_moment);
         // I_A = R I Rᵀ + (2 p·h + m p·p) 1 - (p hᵀ + h pᵀ + m p pᵀ)
-        let hm = h + p * (0.5 * self.mass);
-        let scale = 2.0 * p.dot(&hm);
-        let mut I = R * self.rotational * R.transpose();
-        for i in 0..3 {
-            for j in 0..3 {
-                I[(i, j)] -= p[i] * hm[j] + hm[i] * p[j];
-            }
-            I[(i, i)] += scale;
-        }
+        let k = h + p * (0.5 * self.mass);
+        let (x, y, z) = (2.0 * p.x * k.x, 2.0 * p.y * k.y, 2.0 * p.z * k.z);
+        let (xy, xz, yz) = (p.x * k.y + k.x * p.y, p.x * k.z + k.x * p.z, p.y * k.z + k.y * p.z);
+        let I = turn_symmetric(R, &self.rotational) + Matrix3::new(y + z, -xy, -xz, -xy, x + z, -yz, -xz, -yz, x + y);
         SpatialInertia { mass: self.mass, first_moment: h + p * self.mass, rotational: I }
     }
 
@@ -287,8 +343,8 @@ impl ArticulatedInertia {
     #[inline(always)]
     pub fn mul_twist(&self, V: &Twist) -> Wrench {
         Wrench::new(
-            self.linear * V.linear + self.coupling * V.angular,
-            self.coupling.tr_mul(&V.linear) + self.angular * V.angular,
+            mul(&self.linear, &V.linear) + mul(&self.coupling, &V.angular),
+            tr_mul(&self.coupling, &V.linear) + mul(&self.angular, &V.angular),
         )
     }
 
@@ -296,21 +352,23 @@ impl ArticulatedInertia {
     #[inline(always)]
     pub fn rank_one_update(&mut self, F: &Wrench, s: f64) {
         let (f, t) = (F.force * s, F.torque * s);
-        self.linear -= f * F.force.transpose();
-        self.coupling -= f * F.torque.transpose();
-        self.angular -= t * F.torque.transpose();
+        let outer = |a: &Vector3<f64>, b: &Vector3<f64>| Matrix3::from_columns(&[a * b.x, a * b.y, a * b.z]);
+        self.linear -= outer(&f, &F.force);
+        self.coupling -= outer(&f, &F.torque);
+        self.angular -= outer(&t, &F.torque);
     }
 
     /// The same inertia at Ao in A axes, for `X_AB`.
     #[inline(always)]
     pub fn at_parent(&self, X_AB: &Pose) -> Self {
         let R = X_AB.rotation.matrix();
-        let Rt = R.transpose();
-        let p = skew(&X_AB.translation.vector);
-        let linear = R * self.linear * Rt;
-        let rotated = R * self.coupling * Rt;
-        let coupling = rotated - linear * p;
-        let angular = R * self.angular * Rt + p * coupling - rotated.tr_mul(&p);
+        let p = &X_AB.translation.vector;
+        let linear = turn_symmetric(R, &self.linear);
+        let rotated = mul3(&mul3(R, &self.coupling), &R.transpose());
+        // A [p]x = -([p]x A)ᵀ for symmetric A
+        let coupling = rotated + cross3(p, &linear).transpose();
+        // Bᵀ [p]x = -([p]x B)ᵀ
+        let angular = turn_symmetric(R, &self.angular) + cross3(p, &coupling) + cross3(p, &rotated).transpose();
         Self { linear, coupling, angular }
     }
 
