@@ -66,7 +66,11 @@ fn check(name: &str) {
         let state = State { q: ours(&case["q"]), qdot: ours(&case["qd"]) };
         let qddot = ours(&case["qdd"]);
         close("tau", &column(inverse_dynamics(&model, &mut data, &state, &qddot)), &column(&ours(&case["tau"])));
-        close("bias", &column(nonlinear_effects(&model, &mut data, &state)), &column(&ours(&case["nonlinear_effects"])));
+        close(
+            "bias",
+            &column(nonlinear_effects(&model, &mut data, &state)),
+            &column(&ours(&case["nonlinear_effects"])),
+        );
         close("gravity", &column(gravity_forces(&model, &mut data, &state.q)), &column(&ours(&case["gravity_torque"])));
         let M = columns(&case["mass_matrix"]);
         let M = DMatrix::from_fn(M.ncols(), M.ncols(), |i, j| M[(order[i], j)]);
@@ -77,7 +81,11 @@ fn check(name: &str) {
 
         forward_kinematics_velocity(&model, &mut data, &state);
         let X = data.X_WF(&frame);
-        close("position", &column(&DVector::from_column_slice(X.translation.vector.as_slice())), &column(&vector(&case["frame"]["translation"])));
+        close(
+            "position",
+            &column(&DVector::from_column_slice(X.translation.vector.as_slice())),
+            &column(&vector(&case["frame"]["translation"])),
+        );
         let R = DMatrix::from_fn(3, 3, |i, j| X.rotation.matrix()[(i, j)]);
         close("rotation", &R, &matrix(&case["frame"]["rotation"]));
         let mut J = Matrix6xX::zeros(model.nv());

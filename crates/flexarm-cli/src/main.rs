@@ -12,7 +12,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use args::{CheckArgs, Cli, Command, FormName, InspectArgs, LinksName, PresetName, RobotArgs, RunArgs, StartName, StepperName};
+use args::{
+    CheckArgs, Cli, Command, FormName, InspectArgs, LinksName, PresetName, RobotArgs, RunArgs, StartName, StepperName,
+};
 use clap::{CommandFactory, Parser};
 use flexarm::{
     ConstraintForm, Error, InertiaEstimate, LinkModel, LoadOptions, Motion, Outputs, ReadOptions, Robot, RunOptions,

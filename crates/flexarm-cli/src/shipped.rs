@@ -38,9 +38,7 @@ pub(crate) fn trajectory(given: &Path) -> PathBuf {
 
 /// A folder `out/<stem>-<n>` that is not there yet.
 pub(crate) fn new_output_folder(stem: &str) -> PathBuf {
-    let clean: String = stem.chars().map(|c| if c.is_alphanumeric() || c == '-' || c == '_' { c } else { '_' }).collect();
-    (1..)
-        .map(|n| Path::new("out").join(format!("{clean}-{n:03}")))
-        .find(|p| !p.exists())
-        .expect("some number is free")
+    let clean: String =
+        stem.chars().map(|c| if c.is_alphanumeric() || c == '-' || c == '_' { c } else { '_' }).collect();
+    (1..).map(|n| Path::new("out").join(format!("{clean}-{n:03}"))).find(|p| !p.exists()).expect("some number is free")
 }

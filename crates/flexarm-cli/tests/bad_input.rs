@@ -216,8 +216,8 @@ mod trajectory {
 
     #[test]
     fn toml_cut_off() {
-        // Within a string, within an array, and after the joints: no cut before the first whole move may pass.
-        let end = SWING.find("duration").unwrap();
+        // Within a string, within an array, between lines: no cut before the first whole move may pass.
+        let end = SWING.find(".0]\nduration").unwrap();
         for length in 0..end {
             let answer = compare_motion("m.toml", &SWING[..length], &["m.toml"]);
             assert!(!answer.err.contains("untagged"), "{}", answer.err);
@@ -251,14 +251,22 @@ mod trajectory {
 
     #[test]
     fn limits_are_all_listed() {
-        let words = ["3 joint limits", "upper limit 3.0", "lower limit -3.0", "velocity exceeds", "\"swing\"", "--ignore-limits"];
+        let words = [
+            "3 joint limits",
+            "upper limit 3.0",
+            "lower limit -3.0",
+            "velocity exceeds",
+            "\"swing\"",
+            "--ignore-limits",
+        ];
         compare_motion("wild.csv", WILD, &words);
         let place = Place::new();
         let robot = common::shipped_robot("reference_arm");
         let rows = |q: f64| format!("1,{}\n", [q; 6].map(|q| q.to_string()).join(","));
         let head = "time,joint_1,joint_2,joint_3,joint_4,joint_5,joint_6\n0,0,0,0,0,0,0\n";
         place.write("fast.csv", format!("{head}{}", rows(6.0)));
-        let joints: Vec<String> = (1..=6).map(|k| format!("joint \"joint_{k}\": velocity exceeds its limit 4")).collect();
+        let joints: Vec<String> =
+            (1..=6).map(|k| format!("joint \"joint_{k}\": velocity exceeds its limit 4")).collect();
         let words: Vec<&str> = joints.iter().map(String::as_str).collect();
         place.refused(&["compare", &robot, "fast.csv", "-o", "result"], &words);
     }
@@ -311,7 +319,7 @@ mod robot_description {
         // Bytes that are text, but no XML.
         let letters: String = garbage(500, 5).iter().map(|b| char::from(b' ' + b % 90)).collect();
         place.write("garbled.urdf", letters);
-        compare_robot(&place, "garbled.urdf", &["garbled.urdf:1:", "XML"]);
+        compare_robot(&place, "garbled.urdf", &["garbled.urdf:1:", "expected", "help: "]);
     }
 
     #[test]
@@ -343,7 +351,8 @@ mod robot_description {
     fn cyclic_links() {
         let text = with(URDF, "<parent link=\"base\"/>", "<parent link=\"ball\"/>");
         urdf(&text, "name=\"swing\"", &["cycle", "\"swing\"", "\"weld\""]);
-        let back = "<joint name=\"back\" type=\"fixed\"><parent link=\"ball\"/><child link=\"base\"/></joint>\n</robot>";
+        let back =
+            "<joint name=\"back\" type=\"fixed\"><parent link=\"ball\"/><child link=\"base\"/></joint>\n</robot>";
         let text = with(URDF, "</robot>", back);
         urdf(&text, "name=\"back\"", &["cycle", "\"swing\"", "\"weld\"", "\"back\"", "remove"]);
     }
@@ -356,7 +365,8 @@ mod robot_description {
 
     #[test]
     fn two_parents() {
-        let again = "<joint name=\"again\" type=\"fixed\"><parent link=\"base\"/><child link=\"ball\"/></joint>\n</robot>";
+        let again =
+            "<joint name=\"again\" type=\"fixed\"><parent link=\"base\"/><child link=\"ball\"/></joint>\n</robot>";
         let text = with(URDF, "</robot>", again);
         let first = format!("(line {})", line_of(URDF, "\"weld\""));
         urdf(&text, "again", &["link \"ball\"", "two joints", "\"weld\"", &first, "\"again\"", "remove"]);
@@ -408,8 +418,8 @@ mod robot_description {
     #[test]
     fn several_faults_at_once() {
         let text = with(&with(URDF, "\"1.728\"", "\"-1.728\""), "\"0 0 1\"", "\"0 0 0\"");
-        let words = ["zero vector", "-1.728 kg", "beam.urdf:8:", "beam.urdf:12:"];
-        urdf(&text, "<axis", &words);
+        let mass = format!("beam.urdf:{}:", line_of(&text, "<inertial>"));
+        urdf(&text, "<axis", &["zero vector", &mass, "-1.728 kg"]);
     }
 }
 
@@ -442,7 +452,13 @@ mod robot_toml {
 
     #[test]
     fn misspelt_keys() {
-        let keys = [("gravity", "gravitty"), ("damping", "dampng"), ("modal", "modul"), ("width", "widht"), ("distal", "distl")];
+        let keys = [
+            ("gravity", "gravitty"),
+            ("damping", "dampng"),
+            ("modal", "modul"),
+            ("width", "widht"),
+            ("distal", "distl"),
+        ];
         for (key, wrong) in keys {
             let (key_quoted, wrong_quoted) = (format!("`{key}`"), format!("`{wrong}`"));
             robot_file(&with(ROBOT, key, wrong), wrong, &["unknown field", &wrong_quoted, "expected", &key_quoted]);
@@ -461,8 +477,16 @@ mod robot_toml {
 
     #[test]
     fn unknown_section_material_theory() {
-        robot_file(&with(ROBOT, "\"rectangle\"", "\"rectangel\""), "beam =", &["\"bar\"", "\"rectangel\"", "rectangle", "tube"]);
-        robot_file(&with(ROBOT, "\"aluminium\"", "\"unobtainium\""), "beam =", &["\"unobtainium\"", "aluminium", "steel"]);
+        robot_file(
+            &with(ROBOT, "\"rectangle\"", "\"rectangel\""),
+            "beam =",
+            &["\"bar\"", "\"rectangel\"", "rectangle", "tube"],
+        );
+        robot_file(
+            &with(ROBOT, "\"aluminium\"", "\"unobtainium\""),
+            "beam =",
+            &["\"unobtainium\"", "aluminium", "steel"],
+        );
         let text = with(ROBOT, "y_axis", "theory = \"string\", y_axis");
         robot_file(&text, "beam =", &["\"string\"", "timoshenko", "euler-bernoulli"]);
     }
@@ -472,7 +496,11 @@ mod robot_toml {
         robot_file(&with(ROBOT, "width = 0.02", "width = 0.0"), "beam =", &["\"bar\"", "width (m) is 0", "positive"]);
         robot_file(&with(ROBOT, "width = 0.02", "width = nan"), "beam =", &["width (m) is NaN", "positive finite"]);
         robot_file(&with(ROBOT, "width = 0.02, ", ""), "beam =", &["\"rectangle\"", "needs width"]);
-        robot_file(&with(ROBOT, "width = 0.02", "width = 0.02, wall = 0.001"), "beam =", &["does not take wall", "width", "height"]);
+        robot_file(
+            &with(ROBOT, "width = 0.02", "width = 0.02, wall = 0.001"),
+            "beam =",
+            &["does not take wall", "width", "height"],
+        );
         robot_file(&with(ROBOT, "[0.0, 1.0, 0.0]", "[1.0, 0.0, 0.0]"), "beam =", &["\"bar\"", "axis y"]);
         robot_file(&with(ROBOT, "y_axis", "split = 1.5, y_axis"), "beam =", &["1.5", "above 0 and below 1"]);
     }
@@ -497,7 +525,8 @@ mod robot_toml {
         compare_robot(&place, "robot.toml", &[&["robot.toml:"], &words[..]].concat());
         robot_file(&with(ROBOT, "\"weld\"", "\"wold\""), "wold", &["\"wold\"", "\"bar\"", "\"weld\""]);
         robot_file(&with(ROBOT, "\"ball\"", "\"bell\""), "bell", &["TCP", "\"bell\"", "\"ball\""]);
-        let text = with(ROBOT, "\ngravity", "\npayload = { link = \"hand\", mass = 1.0, com = [0.0, 0.0, 0.0] }\ngravity");
+        let text =
+            with(ROBOT, "\ngravity", "\npayload = { link = \"hand\", mass = 1.0, com = [0.0, 0.0, 0.0] }\ngravity");
         robot_file(&text, "payload", &["payload", "\"hand\"", "\"ball\""]);
     }
 
@@ -527,7 +556,11 @@ mod robot_toml {
     fn models_of_other_versions() {
         robot_file(&with(ROBOT, "damping", "model = \"modal\"\ndamping"), "model =", &["\"modal\"", "\"lumped\""]);
         robot_file(&with(ROBOT, "damping", "segments = 3\ndamping"), "segments", &["segments = 3", "2 rigid parts"]);
-        robot_file(&with(ROBOT, "damping", "angles = \"xyz\"\ndamping"), "angles", &["\"xyz\"", "rotation-vector", "euler-zyx"]);
+        robot_file(
+            &with(ROBOT, "damping", "angles = \"xyz\"\ndamping"),
+            "angles",
+            &["\"xyz\"", "rotation-vector", "euler-zyx"],
+        );
     }
 
     #[test]
@@ -760,7 +793,10 @@ mod values_on_the_command_line {
 
     #[test]
     fn explicit_step_that_is_too_large() {
-        options(&["--stepper", "rk4", "--step", "1e-2"], &["rk4", "unstable", "Hz", "below", "--step", "generalized-alpha"]);
+        options(
+            &["--stepper", "rk4", "--step", "1e-2"],
+            &["rk4", "unstable", "Hz", "below", "--step", "generalized-alpha"],
+        );
     }
 
     #[test]
@@ -837,6 +873,9 @@ mod outputs {
     #[test]
     fn folder_that_cannot_be_made() {
         let place = Place::new();
-        place.refused(&["compare", "robot.toml", "swing.toml", "-o", "beam.urdf"], &["beam.urdf", "folder cannot be made"]);
+        place.refused(
+            &["compare", "robot.toml", "swing.toml", "-o", "beam.urdf"],
+            &["beam.urdf", "folder cannot be made"],
+        );
     }
 }

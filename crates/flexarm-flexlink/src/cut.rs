@@ -79,8 +79,13 @@ mod tests {
     use nalgebra::{Matrix3, vector};
 
     fn bar() -> LinkInertia {
-        let I = 12.0 / 12.0 * 0.64;
-        LinkInertia { mass: 12.0, com: vector![0.4, 0.1, 0.0], inertia_com: Matrix3::from_diagonal(&vector![0.02, I, I]) }
+        // m l²/12 with m = 12 kg, l = 0.8 m
+        let I = 0.64;
+        LinkInertia {
+            mass: 12.0,
+            com: vector![0.4, 0.1, 0.0],
+            inertia_com: Matrix3::from_diagonal(&vector![0.02, I, I]),
+        }
     }
 
     /// Truth: two half bars, I = m l²/12 each; measured 1e-16.

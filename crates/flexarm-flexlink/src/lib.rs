@@ -36,4 +36,4 @@ mod substitute;
 
 pub use cut::{CutError, cut_inertia};
 pub use flexarm_fem::ReducedLink;
-pub use substitute::{FlexibleLink, Parts, Spring, SubstitutionError, Substituted, distal_joint, substitute};
+pub use substitute::{FlexibleLink, Parts, Spring, Substituted, SubstitutionError, distal_joint, substitute};

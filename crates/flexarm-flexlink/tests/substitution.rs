@@ -73,7 +73,11 @@ fn undeformed_robot_is_the_rigid_robot() {
     let mut full = DVector::zeros(7);
     full[0] = 0.7;
     assert_relative_eq!(mass_matrix(&rigid, &mut d1, &q)[0], mass_matrix(&soft, &mut d2, &full)[0], epsilon = 1e-12);
-    assert_relative_eq!(gravity_forces(&rigid, &mut d1, &q)[0], gravity_forces(&soft, &mut d2, &full)[0], epsilon = 1e-12);
+    assert_relative_eq!(
+        gravity_forces(&rigid, &mut d1, &q)[0],
+        gravity_forces(&soft, &mut d2, &full)[0],
+        epsilon = 1e-12
+    );
     forward_kinematics(&rigid, &mut d1, &q);
     forward_kinematics(&soft, &mut d2, &full);
     for name in ["beam", "tip"] {

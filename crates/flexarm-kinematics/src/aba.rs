@@ -35,7 +35,8 @@ impl Roles {
 
     /// Coordinates for which `prescribed(index)` holds; all six of an elastic joint follow its first.
     pub fn new(model: &Model, prescribed: impl Fn(usize) -> bool) -> Self {
-        let mut roles = Self { prescribed_body: vec![false; model.bodies.len()], free_coordinates: vec![], dense: false };
+        let mut roles =
+            Self { prescribed_body: vec![false; model.bodies.len()], free_coordinates: vec![], dense: false };
         for (i, body) in model.bodies.iter().enumerate().skip(1) {
             roles.prescribed_body[i] = prescribed(body.coordinate);
         }
@@ -102,12 +103,12 @@ fn solve(model: &Model, data: &mut Data, state: &State, roles: &Roles) {
 fn solve_articulated(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], prescribed: &[bool]) {
     let n = model.bodies.len();
     data.V[0] = Twist::zeros();
-    for i in 1..n {
+    for (i, &is_prescribed) in prescribed.iter().enumerate().skip(1) {
         let body = &model.bodies[i];
         let (V_PB, bias) = joint_motion(model, data, i, q, qdot);
         let V = data.V[body.parent].at_child(&data.X_PB[i]) + V_PB;
         let mut c = bias + V.cross(&V_PB);
-        if prescribed[i] {
+        if is_prescribed {
             c += subspace_times(model, data, i, data.qddot.as_slice());
         }
         data.V[i] = V;
@@ -155,20 +156,20 @@ fn solve_articulated(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], pr
     }
 
     data.A[0] = Twist::new(-model.gravity, Vector3::zeros());
-    for i in 1..n {
-        if prescribed[i] {
+    for (i, &is_prescribed) in prescribed.iter().enumerate().skip(1) {
+        if is_prescribed {
             data.tau[model.bodies[i].coordinate] = 0.0;
             if let JointMotion::Elastic(_) = model.bodies[i].motion {
                 data.tau.as_mut_slice()[model.bodies[i].coordinate..][..6].fill(0.0);
             }
         }
     }
-    for i in 1..n {
+    for (i, &is_prescribed) in prescribed.iter().enumerate().skip(1) {
         let body = &model.bodies[i];
         let k = body.coordinate;
         let A = data.A[body.parent].at_child(&data.X_PB[i]) + data.bias[i];
         data.A[i] = match body.motion {
-            _ if prescribed[i] => {
+            _ if is_prescribed => {
                 let F = data.articulated[i].mul_twist(&A) + data.pA[i];
                 let S = data.elastic[i];
                 add_projection(model, &S, i, &F, data.tau.as_mut_slice());

@@ -89,13 +89,7 @@ pub fn frame_jacobian(model: &Model, data: &Data, frame: &Frame, J: &mut Matrix6
 ///
 /// # Panics
 /// If `Jdot` does not have nv columns.
-pub fn frame_jacobian_derivative(
-    model: &Model,
-    data: &Data,
-    state: &State,
-    frame: &Frame,
-    Jdot: &mut Matrix6xX<f64>,
-) {
+pub fn frame_jacobian_derivative(model: &Model, data: &Data, state: &State, frame: &Frame, Jdot: &mut Matrix6xX<f64>) {
     assert_eq!(Jdot.ncols(), model.nv(), "the Jacobian needs one column per coordinate");
     Jdot.fill(0.0);
     let p_T = (data.X_WB[frame.body] * frame.X_BF).translation.vector;

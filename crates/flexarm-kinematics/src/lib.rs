@@ -48,9 +48,7 @@ mod spatial;
 pub use aba::{Roles, forward_dynamics, hybrid_dynamics};
 pub use crba::{mass_matrix, mass_matrix_at_poses};
 pub use data::{Data, State};
-pub use energy::{
-    center_of_mass, kinetic_energy, kinetic_energy_of, potential_energy, potential_energy_of,
-};
+pub use energy::{center_of_mass, kinetic_energy, kinetic_energy_of, potential_energy, potential_energy_of};
 pub use inverse_kinematics::{IkError, IkOptions, inverse_kinematics};
 pub use kinematics::{
     forward_kinematics, forward_kinematics_velocity, frame_jacobian, frame_jacobian_derivative, frame_twist,

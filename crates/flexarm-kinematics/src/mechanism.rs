@@ -120,12 +120,8 @@ pub struct Limits {
 
 impl Limits {
     /// No limit at all.
-    pub const NONE: Limits = Limits {
-        lower: f64::NEG_INFINITY,
-        upper: f64::INFINITY,
-        velocity: f64::INFINITY,
-        effort: f64::INFINITY,
-    };
+    pub const NONE: Limits =
+        Limits { lower: f64::NEG_INFINITY, upper: f64::INFINITY, velocity: f64::INFINITY, effort: f64::INFINITY };
 }
 
 /// `q = ratio * q_of(joint) + offset`.

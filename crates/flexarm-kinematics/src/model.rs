@@ -154,7 +154,9 @@ pub enum ModelError {
         links: Vec<String>,
     },
     /// A body that moves without mass.
-    #[error("link {link:?} moves (joint {joint:?}) but has mass {mass} kg with all that is fixed to it: give it a positive mass")]
+    #[error(
+        "link {link:?} moves (joint {joint:?}) but has mass {mass} kg with all that is fixed to it: give it a positive mass"
+    )]
     NoMass {
         /// The link.
         link: String,
@@ -439,8 +441,8 @@ impl Builder<'_> {
 }
 
 fn check_inertia(link: &str, inertia: &crate::mechanism::LinkInertia) -> Result<(), ModelError> {
-    let finite = inertia.mass.is_finite()
-        && inertia.com.iter().chain(inertia.inertia_com.iter()).all(|x| x.is_finite());
+    let finite =
+        inertia.mass.is_finite() && inertia.com.iter().chain(inertia.inertia_com.iter()).all(|x| x.is_finite());
     if !finite {
         return Err(ModelError::NotFinite { what: "inertia", name: link.to_owned() });
     }

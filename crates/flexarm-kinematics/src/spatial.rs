@@ -173,19 +173,13 @@ impl Twist {
     /// Motion cross product `V × U`: the rate of `U` when it is carried along by `V`.
     #[inline(always)]
     pub fn cross(&self, U: &Twist) -> Twist {
-        Twist::new(
-            self.angular.cross(&U.linear) + self.linear.cross(&U.angular),
-            self.angular.cross(&U.angular),
-        )
+        Twist::new(self.angular.cross(&U.linear) + self.linear.cross(&U.angular), self.angular.cross(&U.angular))
     }
 
     /// Force cross product `V ×* F`: the rate of `F` when it is carried along by `V`.
     #[inline(always)]
     pub fn cross_force(&self, F: &Wrench) -> Wrench {
-        Wrench::new(
-            self.angular.cross(&F.force),
-            self.angular.cross(&F.torque) + self.linear.cross(&F.force),
-        )
+        Wrench::new(self.angular.cross(&F.force), self.angular.cross(&F.torque) + self.linear.cross(&F.force))
     }
 
     /// `Ad_BA V_A`: the same motion seen at Bo in B axes, for `X_AB` (B fixed in A's body).
@@ -332,11 +326,7 @@ impl ArticulatedInertia {
     /// The articulated inertia of a single rigid body.
     #[inline(always)]
     pub fn from_rigid(M: &SpatialInertia) -> Self {
-        Self {
-            linear: Matrix3::from_diagonal_element(M.mass),
-            coupling: -skew(&M.first_moment),
-            angular: M.rotational,
-        }
+        Self { linear: Matrix3::from_diagonal_element(M.mass), coupling: -skew(&M.first_moment), angular: M.rotational }
     }
 
     /// `I V`.

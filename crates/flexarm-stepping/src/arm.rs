@@ -180,7 +180,9 @@ impl FlexibleArm {
         self.prescribed_state(0.0, &mut state, &mut qddot);
         state.q.rows_mut(model.n_actuated(), n).copy_from(&self.modes.equilibrium);
         let mut data = Data::new(&model);
-        let M = mass_matrix(&model, &mut data, &state.q).view((model.n_actuated(), model.n_actuated()), (n, n)).clone_owned();
+        let M = mass_matrix(&model, &mut data, &state.q)
+            .view((model.n_actuated(), model.n_actuated()), (n, n))
+            .clone_owned();
         for (j, omega) in self.modes.omega.iter().enumerate() {
             let phi = self.modes.shapes.column(j);
             let (mut zeta, mut total) = (0.0, 0.0);

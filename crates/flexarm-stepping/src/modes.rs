@@ -57,8 +57,7 @@ pub fn modes_at(arm: &FlexibleArm, t: f64) -> Result<Modes, StepError> {
     let mut order: Vec<usize> = (0..n).collect();
     order.sort_by(|&i, &j| eigen.eigenvalues[j].total_cmp(&eigen.eigenvalues[i]));
 
-    let mut modes =
-        Modes { omega: Vec::with_capacity(n), shapes: DMatrix::zeros(n, n), equilibrium, residual: 0.0 };
+    let mut modes = Modes { omega: Vec::with_capacity(n), shapes: DMatrix::zeros(n, n), equilibrium, residual: 0.0 };
     for (column, &k) in order.iter().enumerate() {
         let value = eigen.eigenvalues[k];
         if value.is_nan() || value <= 0.0 {

@@ -6,9 +6,7 @@
 //! The residual is one Newton-Euler pass, the acceleration one hybrid pass; the iteration matrix
 //! `M_ee + c_D D + c_K K` is dense in the elastic coordinates. Not here: integration.
 
-use flexarm_kinematics::{
-    Data, Roles, State, hybrid_dynamics, inverse_dynamics, mass_matrix_at_poses, world_poses,
-};
+use flexarm_kinematics::{Data, Roles, State, hybrid_dynamics, inverse_dynamics, mass_matrix_at_poses, world_poses};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector6};
 
 use crate::arm::FlexibleArm;

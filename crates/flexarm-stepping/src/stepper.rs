@@ -153,7 +153,8 @@ pub fn new_stepper(kind: StepperKind, arm: FlexibleArm, h: f64, start: Start) ->
 fn check_explicit_step(arm: &FlexibleArm, h: f64) -> Result<(), StepError> {
     let Some(&highest) = arm.modes.omega.last() else { return Ok(()) };
     // A strongly damped mode decays at up to beta ω²: the negative real axis ends at -2.785.
-    let rate = arm.tau.iter().filter(|_| arm.proportional).fold(highest, |rate: f64, beta| rate.max(beta * highest * highest));
+    let rate =
+        arm.tau.iter().filter(|_| arm.proportional).fold(highest, |rate: f64, beta| rate.max(beta * highest * highest));
     if h * rate <= STABILITY_LIMIT {
         return Ok(());
     }
@@ -166,7 +167,14 @@ fn check_explicit_step(arm: &FlexibleArm, h: f64) -> Result<(), StepError> {
 }
 
 /// Fills an observation from the reduced arm after [`ReducedArm::evaluate`].
-fn observe_reduced(system: &mut ReducedArm, t: f64, x: &DVector<f64>, v: &DVector<f64>, a: &DVector<f64>, out: &mut Observation) {
+fn observe_reduced(
+    system: &mut ReducedArm,
+    t: f64,
+    x: &DVector<f64>,
+    v: &DVector<f64>,
+    a: &DVector<f64>,
+    out: &mut Observation,
+) {
     system.evaluate(t, x, v, a);
     let (model, n) = (&system.arm.model, system.arm.model.n_actuated());
     out.t = t;

@@ -1,4 +1,5 @@
 //! The integrators on systems with closed-form answers; none of them knows a robot.
+#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(non_snake_case, reason = "monogram notation")]
 
 use std::sync::Arc;
@@ -26,7 +27,13 @@ impl SecondOrderSystem for Oscillators {
             r[i] = self.m[i] * a[i] + self.d[i] * v[i] + self.k[i] * x[i] - self.load * (self.p * t).sin();
         }
     }
-    fn acceleration(&mut self, t: f64, x: &DVector<f64>, v: &DVector<f64>, a: &mut DVector<f64>) -> Result<(), StepError> {
+    fn acceleration(
+        &mut self,
+        t: f64,
+        x: &DVector<f64>,
+        v: &DVector<f64>,
+        a: &mut DVector<f64>,
+    ) -> Result<(), StepError> {
         for i in 0..self.m.len() {
             a[i] = (self.load * (self.p * t).sin() - self.d[i] * v[i] - self.k[i] * x[i]) / self.m[i];
         }
@@ -44,8 +51,14 @@ impl SecondOrderSystem for Oscillators {
 /// Free vibration `x = e^(-ζωt)(cos w t + ζω/w sin w t)` of one damped oscillator started at 1.
 fn free_vibration_error(run: impl Fn(&mut Oscillators) -> f64) -> f64 {
     let (omega, zeta, t) = (20.0f64, 0.03, 1.0);
-    let mut system =
-        Oscillators { m: vec![2.0], d: vec![2.0 * 2.0 * zeta * omega], k: vec![2.0 * omega * omega], load: 0.0, p: 0.0, factor: vec![] };
+    let mut system = Oscillators {
+        m: vec![2.0],
+        d: vec![2.0 * 2.0 * zeta * omega],
+        k: vec![2.0 * omega * omega],
+        load: 0.0,
+        p: 0.0,
+        factor: vec![],
+    };
     let w = omega * (1.0 - zeta * zeta).sqrt();
     let truth = (-zeta * omega * t).exp() * ((w * t).cos() + zeta * omega / w * (w * t).sin());
     (run(&mut system) - truth).abs()
@@ -53,7 +66,8 @@ fn free_vibration_error(run: impl Fn(&mut Oscillators) -> f64) -> f64 {
 
 fn alpha(h: f64, rho: f64) -> impl Fn(&mut Oscillators) -> f64 {
     move |s| {
-        let mut g = GeneralizedAlpha::new(s, 0.0, h, rho, DVector::from_element(1, 1.0), DVector::zeros(1)).expect("starts");
+        let mut g =
+            GeneralizedAlpha::new(s, 0.0, h, rho, DVector::from_element(1, 1.0), DVector::zeros(1)).expect("starts");
         (0..(1.0 / h).round() as usize).for_each(|_| g.step(s).expect("steps"));
         g.x[0]
     }
@@ -91,7 +105,8 @@ fn rk4_is_of_fourth_order() {
 fn spectral_radius_one_keeps_the_energy_and_less_loses_it() {
     let energy_after = |rho: f64| {
         let mut s = Oscillators { m: vec![1.0], d: vec![0.0], k: vec![1e4], load: 0.0, p: 0.0, factor: vec![] };
-        let mut g = GeneralizedAlpha::new(&mut s, 0.0, 0.02, rho, DVector::from_element(1, 1.0), DVector::zeros(1)).expect("starts");
+        let mut g = GeneralizedAlpha::new(&mut s, 0.0, 0.02, rho, DVector::from_element(1, 1.0), DVector::zeros(1))
+            .expect("starts");
         (0..2000).for_each(|_| g.step(&mut s).expect("steps"));
         (0.5 * g.v[0] * g.v[0] + 0.5e4 * g.x[0] * g.x[0]) / 0.5e4
     };
@@ -104,7 +119,8 @@ fn spectral_radius_one_keeps_the_energy_and_less_loses_it() {
 fn stiff_modes_shrink_by_the_spectral_radius_each_step() {
     let rho = 0.6;
     let mut s = Oscillators { m: vec![1.0], d: vec![0.0], k: vec![1e14], load: 0.0, p: 0.0, factor: vec![] };
-    let mut g = GeneralizedAlpha::new(&mut s, 0.0, 1e-3, rho, DVector::from_element(1, 1e-3), DVector::zeros(1)).expect("starts");
+    let mut g = GeneralizedAlpha::new(&mut s, 0.0, 1e-3, rho, DVector::from_element(1, 1e-3), DVector::zeros(1))
+        .expect("starts");
     (0..40).for_each(|_| g.step(&mut s).expect("steps"));
     let before = g.x[0].abs().max(1e-3 * g.v[0].abs());
     (0..20).for_each(|_| g.step(&mut s).expect("steps"));

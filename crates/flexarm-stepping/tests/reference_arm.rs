@@ -1,4 +1,5 @@
 //! The reference arm against a converged solution of another tool (Pinocchio's recursions, scipy's DOP853).
+#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(non_snake_case, reason = "monogram notation")]
 
 use std::sync::Arc;
@@ -33,10 +34,8 @@ fn arm() -> FlexibleArm {
     let reference = reference_arm(true);
     let model = Arc::new(Model::new(&reference.mechanism).expect("valid"));
     let damping = Damping::StiffnessProportional(reference.beta);
-    let springs = vec![
-        ("lower".to_owned(), reference.K_S[0], damping),
-        ("upper".to_owned(), reference.K_S[1], damping),
-    ];
+    let springs =
+        vec![("lower".to_owned(), reference.K_S[0], damping), ("upper".to_owned(), reference.K_S[1], damping)];
     let motion = MotionFn(|t: f64, q: &mut [f64], v: &mut [f64], a: &mut [f64]| {
         let (x, y, z) = reference_motion(t);
         q.copy_from_slice(&x);
@@ -68,7 +67,12 @@ fn tcp_error(kind: StepperKind, h: f64) -> f64 {
         let p = (seen.X_WB[tcp.body] * tcp.X_BF).translation.vector;
         worst = worst.max((p - row.flexible).norm());
     }
-    eprintln!("{:<18} h = {h:.1e}: {:.3e} of the peak deflection {peak:.6} m, {:?}", kind.name(), worst / peak, stepper.counts());
+    eprintln!(
+        "{:<18} h = {h:.1e}: {:.3e} of the peak deflection {peak:.6} m, {:?}",
+        kind.name(),
+        worst / peak,
+        stepper.counts()
+    );
     worst / peak
 }
 

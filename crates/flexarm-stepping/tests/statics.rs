@@ -1,4 +1,5 @@
 //! At rest every stepper is at the static equilibrium, whatever the step.
+#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(non_snake_case, reason = "monogram notation")]
 
 use std::sync::Arc;
@@ -14,10 +15,8 @@ fn arm(beta: f64, loaded: bool) -> FlexibleArm {
     let reference = reference_arm(true);
     let model = Arc::new(Model::new(&reference.mechanism).expect("valid"));
     let damping = Damping::StiffnessProportional(beta);
-    let springs = vec![
-        ("lower".to_owned(), reference.K_S[0], damping),
-        ("upper".to_owned(), reference.K_S[1], damping),
-    ];
+    let springs =
+        vec![("lower".to_owned(), reference.K_S[0], damping), ("upper".to_owned(), reference.K_S[1], damping)];
     let tool = model.frame("link6").expect("there").body;
     let arm = FlexibleArm::new(model, springs, Arc::new(Held(POSE.to_vec()))).expect("valid");
     let load = Wrench::new(Vector3::new(200.0, -300.0, 150.0), Vector3::new(20.0, 10.0, -40.0));
@@ -29,7 +28,13 @@ fn tcp(seen: &Observation, model: &Model) -> Vector3<f64> {
     (seen.X_WB[frame.body] * frame.X_BF).translation.vector
 }
 
-fn deflection(arm: &FlexibleArm, kind: StepperKind, h: f64, start: Start, duration: f64) -> (Vector3<f64>, Vector3<f64>) {
+fn deflection(
+    arm: &FlexibleArm,
+    kind: StepperKind,
+    h: f64,
+    start: Start,
+    duration: f64,
+) -> (Vector3<f64>, Vector3<f64>) {
     let model = arm.model.clone();
     let mut seen = Observation::new(arm);
     let mut stepper = new_stepper(kind, arm.clone(), h, start).expect("starts");
@@ -83,7 +88,9 @@ fn a_ringing_arm_settles_on_the_static_pose() {
     let arm = arm(2e-2, true);
     let sag = static_deflection(&arm);
     let (truth, _) = deflection(&arm, ALPHA, 1e-3, Start::Equilibrium, 0.0);
-    for (kind, h) in [(ALPHA, 1e-3), (ALPHA, 1e-2), (spook(SpookPreset::Exact), 1e-3), (spook(SpookPreset::Exact), 1e-2)] {
+    for (kind, h) in
+        [(ALPHA, 1e-3), (ALPHA, 1e-2), (spook(SpookPreset::Exact), 1e-3), (spook(SpookPreset::Exact), 1e-2)]
+    {
         let (_, end) = deflection(&arm, kind, h, Start::Undeformed, 3.0);
         let error = (end - truth).norm() / sag;
         eprintln!("{} h {h}: settled within {error:.1e} of the sag", kind.name());

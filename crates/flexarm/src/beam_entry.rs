@@ -14,9 +14,7 @@ pub(crate) fn beam_section(beam: &BeamEntry) -> Result<(Section, Material), Stri
         None if given => Material::STEEL,
         None => return Err("material is missing: a name such as \"steel\" or { E = ..., nu = ..., rho = ... }".into()),
     };
-    let need = |value: Option<f64>, key: &str| {
-        value.ok_or_else(|| format!("section {:?} needs {key}", beam.section))
-    };
+    let need = |value: Option<f64>, key: &str| value.ok_or_else(|| format!("section {:?} needs {key}", beam.section));
     let section = match beam.section.as_str() {
         "box" => Section::Box {
             width: need(beam.width, "width")?,

@@ -67,7 +67,12 @@ pub fn check(robot: &Path, trajectory: Option<&Path>, options: &LoadOptions) -> 
     };
     findings.extend(robot.urdf.warnings.iter().map(Finding::from));
     findings.extend(robot.warnings.iter().filter(|w| !w.contains(".urdf")).map(|w| {
-        Finding::warning("flexible-link", robot.path.display().to_string(), w.clone(), "compare the masses of both sources")
+        Finding::warning(
+            "flexible-link",
+            robot.path.display().to_string(),
+            w.clone(),
+            "compare the masses of both sources",
+        )
     }));
     check_flexible(&robot, &mut findings);
     if let Some(path) = trajectory {

@@ -250,7 +250,10 @@ impl<'a> Run<'a> {
             links_model: options.links.name(),
             duration_s: self.times.last().copied().unwrap_or(0.0),
             stepper: StepperFigures::new(options, self.stepper.counts()),
-            tcp: metrics.as_ref().filter(|_| options.with_twin).map(|m| TcpFigures { static_sag_m: self.static_sag(), ..m.into() }),
+            tcp: metrics
+                .as_ref()
+                .filter(|_| options.with_twin)
+                .map(|m| TcpFigures { static_sag_m: self.static_sag(), ..m.into() }),
             frequencies_hz: self.arm.modes.frequencies_hz(),
             links,
             drives: self

@@ -150,7 +150,8 @@ pub fn parse_joint_values(text: &str, joints: &[&str]) -> Result<Vec<f64>, Error
 pub fn inspect(robot: &Robot, at: Option<&str>, velocity: Option<&str>) -> Result<Inspection, Error> {
     let model = robot.rigid_model()?;
     let names: Vec<&str> = model.coordinates().iter().map(|c| c.joint.as_str()).collect();
-    let values = |text: Option<&str>| text.map_or_else(|| Ok(vec![0.0; names.len()]), |t| parse_joint_values(t, &names));
+    let values =
+        |text: Option<&str>| text.map_or_else(|| Ok(vec![0.0; names.len()]), |t| parse_joint_values(t, &names));
     let (q, v) = (values(at)?, values(velocity)?);
     let mut state = State::zeros(&model);
     state.q.copy_from_slice(&q);

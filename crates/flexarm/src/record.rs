@@ -107,7 +107,10 @@ pub(crate) fn header(robot: &Robot, motion: &Motion, options: &RunOptions, arm: 
                 ("log_rate_hz", options.log_rate_hz.to_string()),
             ],
         ),
-        group("flexarm.units", &[("length", "m".into()), ("angle", "rad".into()), ("force", "N".into()), ("time", "s".into())]),
+        group(
+            "flexarm.units",
+            &[("length", "m".into()), ("angle", "rad".into()), ("force", "N".into()), ("time", "s".into())],
+        ),
         group(
             "flexarm.model",
             &[

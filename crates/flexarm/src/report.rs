@@ -71,7 +71,13 @@ pub fn rows(summary: &Summary) -> Vec<(String, String)> {
     let s = &summary.stepper;
     rows.push((
         "stepper".into(),
-        format!("{}, {} ms, {} steps, {:.1} evaluations a step", s.name, 1e3 * s.h_s, s.steps, s.evaluations as f64 / s.steps.max(1) as f64),
+        format!(
+            "{}, {} ms, {} steps, {:.1} evaluations a step",
+            s.name,
+            1e3 * s.h_s,
+            s.steps,
+            s.evaluations as f64 / s.steps.max(1) as f64
+        ),
     ));
     rows.push((
         "run".into(),

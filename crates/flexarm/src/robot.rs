@@ -166,7 +166,9 @@ impl Robot {
         let (link, X_LT) = self.tcp.clone();
         if self.rigid.link(&link).is_none() {
             let known: Vec<_> = self.rigid.links.iter().map(|l| l.name.as_str()).collect();
-            return Err(Error::Usage(format!("TCP frame {link:?} is not a link of the robot; its links are {known:?}")));
+            return Err(Error::Usage(format!(
+                "TCP frame {link:?} is not a link of the robot; its links are {known:?}"
+            )));
         }
         self.rigid.joints.push(Joint::new("__tcp_joint", JointKind::Fixed, link, TCP_FRAME, X_LT));
         self.rigid.links.push(Link { name: TCP_FRAME.into(), inertia: None });
@@ -198,7 +200,8 @@ impl Robot {
         }
         let mass = *payload.mass.get_ref();
         if !(mass.is_finite() && mass > 0.0) {
-            let message = format!("payload mass is {mass} kg, it must be positive; leave the payload out if there is none");
+            let message =
+                format!("payload mass is {mass} kg, it must be positive; leave the payload out if there is none");
             return Err(source.error(payload.mass.span(), message).into());
         }
         let [xx, yy, zz, xy, xz, yz] = payload.inertia;
@@ -219,9 +222,7 @@ impl Robot {
     /// # Errors
     /// [`Error::Model`].
     pub fn rigid_model(&self) -> Result<Arc<Model>, Error> {
-        Model::new(&self.rigid)
-            .map(Arc::new)
-            .map_err(|source| Error::Model { path: self.urdf_path.clone(), source })
+        Model::new(&self.rigid).map(Arc::new).map_err(|source| Error::Model { path: self.urdf_path.clone(), source })
     }
 
     /// The robot with its flexible links in place.
@@ -275,14 +276,19 @@ fn tcp_of(file: &RobotFile, source: &Source, urdf: &UrdfRobot, options: &LoadOpt
         }
         Some(tcp) => Ok((tcp.link.get_ref().clone(), pose(tcp.xyz, tcp.rpy))),
         None => {
-            let link = default_tcp(&urdf.mechanism)
-                .ok_or_else(|| Error::Usage("the robot has no link that could be the TCP: add tcp = { link = ... }".into()))?;
+            let link = default_tcp(&urdf.mechanism).ok_or_else(|| {
+                Error::Usage("the robot has no link that could be the TCP: add tcp = { link = ... }".into())
+            })?;
             Ok((link.to_owned(), Pose::identity()))
         }
     }
 }
 
-fn check_drive(drive: &crate::robot_file::DriveEntry, mechanism: &Mechanism, source: &Source) -> Result<(), RobotFileError> {
+fn check_drive(
+    drive: &crate::robot_file::DriveEntry,
+    mechanism: &Mechanism,
+    source: &Source,
+) -> Result<(), RobotFileError> {
     let joint = drive.joint.get_ref();
     if mechanism.joint(joint).is_none_or(|j| j.kind == JointKind::Fixed) {
         let known: Vec<_> =
@@ -293,7 +299,8 @@ fn check_drive(drive: &crate::robot_file::DriveEntry, mechanism: &Mechanism, sou
     match drive.kind.get_ref().as_str() {
         "prescribed" => Ok(()),
         other => {
-            let message = format!("drive kind {other:?} is not known; this version drives joints as \"prescribed\" only");
+            let message =
+                format!("drive kind {other:?} is not known; this version drives joints as \"prescribed\" only");
             Err(source.error(drive.kind.span(), message))
         }
     }
@@ -387,7 +394,9 @@ fn beam_link(
     let theory = match beam.theory.as_deref() {
         None | Some("timoshenko") => BeamTheory::Timoshenko,
         Some("euler-bernoulli") => BeamTheory::EulerBernoulli,
-        Some(other) => return Err(fail(format!("theory {other:?} is not known; use \"timoshenko\" or \"euler-bernoulli\""))),
+        Some(other) => {
+            return Err(fail(format!("theory {other:?} is not known; use \"timoshenko\" or \"euler-bernoulli\"")));
+        }
     };
     let axis = X_LB.translation.vector;
     let length = axis.norm();

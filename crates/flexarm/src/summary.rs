@@ -182,9 +182,11 @@ impl Summary {
                 ("tcp.dominant_hz".into(), optional(tcp.dominant_hz)),
             ]);
         }
-        rows.extend(self.links.iter().map(|l| {
-            (format!("link.{}.peak_contribution_m", l.name), l.peak_contribution_m.to_string())
-        }));
+        rows.extend(
+            self.links
+                .iter()
+                .map(|l| (format!("link.{}.peak_contribution_m", l.name), l.peak_contribution_m.to_string())),
+        );
         if let Some(f) = self.frequencies_hz.first() {
             rows.push(("first_frequency_hz".into(), f.to_string()));
         }

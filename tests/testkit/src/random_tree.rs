@@ -73,13 +73,7 @@ pub fn random_tree(seed: u64, n_joints: usize) -> Mechanism {
         tree.links.push(Link { name: name.clone(), inertia: Some(draw.inertia()) });
         if draw.signed() > 0.5 {
             let fixed = format!("fixed_{i}");
-            tree.joints.push(Joint::new(
-                format!("weld_{i}"),
-                JointKind::Fixed,
-                name,
-                fixed.clone(),
-                draw.pose(0.3),
-            ));
+            tree.joints.push(Joint::new(format!("weld_{i}"), JointKind::Fixed, name, fixed.clone(), draw.pose(0.3)));
             tree.links.push(Link { name: fixed, inertia: Some(draw.inertia()) });
         }
     }

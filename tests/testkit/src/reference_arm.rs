@@ -81,15 +81,8 @@ pub fn reference_arm(elastic: bool) -> ReferenceArm {
     let A = std::f64::consts::PI * (ro * ro - ri * ri);
     let I = std::f64::consts::PI / 4.0 * (ro.powi(4) - ri.powi(4));
     let k = 2.0 * (1.0 + nu) / (4.0 + 3.0 * nu);
-    let upper = Beam {
-        length: 1.0,
-        EA: E * A,
-        GJ: G * 2.0 * I,
-        EI_2: E * I,
-        EI_3: E * I,
-        kGA_2: k * G * A,
-        kGA_3: k * G * A,
-    };
+    let upper =
+        Beam { length: 1.0, EA: E * A, GJ: G * 2.0 * I, EI_2: E * I, EI_3: E * I, kGA_2: k * G * A, kGA_3: k * G * A };
     let upper_i = I / A;
 
     // Lower: beam axes (1, 2, 3) = link (z, x, y). Upper: beam axes = link axes.
@@ -130,10 +123,20 @@ pub fn reference_arm(elastic: bool) -> ReferenceArm {
         ("1", JointKind::Continuous(z), [0.0; 3], body(140.0, [0.06, 0.0, 0.33], box_inertia(140.0, 0.45, 0.40, 0.50))),
         ("2", JointKind::Continuous(y), [0.175, 0.0, 0.495], half_lower(0.5 * l2)),
         ("2b", spring, [0.0, 0.0, l2], half_lower(0.5 * l2)),
-        ("3", JointKind::Continuous(y), [0.0, 0.0, l2], body(90.0, [0.03, 0.0, 0.15], box_inertia(90.0, 0.50, 0.35, 0.38))),
+        (
+            "3",
+            JointKind::Continuous(y),
+            [0.0, 0.0, l2],
+            body(90.0, [0.03, 0.0, 0.15], box_inertia(90.0, 0.50, 0.35, 0.38)),
+        ),
         ("4", JointKind::Continuous(x), [0.27, 0.0, 0.175], half_upper(0.5 * l4)),
         ("4b", spring, [l4, 0.0, 0.0], half_upper(0.5 * l4)),
-        ("5", JointKind::Continuous(y), [l4, 0.0, 0.0], body(12.0, [0.04, 0.0, 0.0], box_inertia(12.0, 0.16, 0.14, 0.14))),
+        (
+            "5",
+            JointKind::Continuous(y),
+            [l4, 0.0, 0.0],
+            body(12.0, [0.04, 0.0, 0.0], box_inertia(12.0, 0.16, 0.14, 0.14)),
+        ),
         ("6", JointKind::Continuous(x), [0.135, 0.0, 0.0], tool),
     ];
     let mut parent = "base".to_owned();

@@ -270,7 +270,8 @@ impl Table {
     }
 
     pub(crate) fn column(&self, name: &str) -> Vec<f64> {
-        let k = self.names.iter().position(|n| n == name).unwrap_or_else(|| panic!("no column {name}: {:?}", self.names));
+        let k =
+            self.names.iter().position(|n| n == name).unwrap_or_else(|| panic!("no column {name}: {:?}", self.names));
         self.rows.iter().map(|r| r[k]).collect()
     }
 

@@ -215,9 +215,10 @@ impl Stepper for Spook {
                     let turn = Rotation3::from_scaled_axis(axis * self.q[body.coordinate]);
                     (Pose::from_parts(X_WP.translation, X_WP.rotation * turn), Default::default())
                 }
-                JointMotion::Prismatic(axis) => {
-                    (X_WP * Pose::from_parts((axis * self.q[body.coordinate]).into(), Rotation3::identity()), Default::default())
-                }
+                JointMotion::Prismatic(axis) => (
+                    X_WP * Pose::from_parts((axis * self.q[body.coordinate]).into(), Rotation3::identity()),
+                    Default::default(),
+                ),
             };
             // Rigid joints have no deflection to speak of: the local form serves both.
             let form = if matches!(body.motion, JointMotion::Elastic(_)) { form } else { ConstraintForm::Local };
@@ -236,8 +237,8 @@ impl Stepper for Spook {
             let load = &self.loads[i];
             let arm = -(R * body.com);
             let force = model.gravity * body.mass + load.fixed_rows::<3>(0);
-            let torque =
-                load.fixed_rows::<3>(3) + arm.cross(&load.fixed_rows::<3>(0).into_owned()) - body.V.angular.cross(&spin);
+            let torque = load.fixed_rows::<3>(3) + arm.cross(&load.fixed_rows::<3>(0).into_owned())
+                - body.V.angular.cross(&spin);
             let b = &mut self.solver.b[i];
             b.fixed_rows_mut::<3>(0).copy_from(&(body.V.linear * body.mass + force * h));
             b.fixed_rows_mut::<3>(3).copy_from(&(spin + torque * h));
