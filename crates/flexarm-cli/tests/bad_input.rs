@@ -406,6 +406,23 @@ mod robot_description {
     }
 
     #[test]
+    fn missing_inertial() {
+        let text = URDF.replace("inertial>", "inertia_tensor>");
+        urdf(
+            &text,
+            "<link name=\"bar\">",
+            &["link \"bar\"", "\"swing\"", "no <inertial>", "(\"ball\")", "add <inertial>"],
+        );
+    }
+
+    #[test]
+    #[ignore = "wanted: help names options that exist, --inertia-from-density and --inertia-from-total-mass"]
+    fn missing_inertial_with_options_that_exist() {
+        let text = URDF.replace("inertial>", "inertia_tensor>");
+        urdf(&text, "<link name=\"bar\">", &["--inertia-from-density", "--inertia-from-total-mass"]);
+    }
+
+    #[test]
     fn joints() {
         let text = with(URDF, "\"0 0 1\"", "\"0 0 0\"");
         urdf(&text, "<axis", &["\"swing\"", "zero vector", "unit vector"]);

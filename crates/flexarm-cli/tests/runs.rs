@@ -60,7 +60,8 @@ fn agrees_with_table(summary: &Value, table: &Table) {
     let angle = table.length(["error_rx_rad", "error_ry_rad", "error_rz_rad"]);
     near(number(tcp, "peak_m"), max(&error), 1e-12);
     near(number(tcp, "peak_rad"), max(&angle), 1e-12);
-    near(number(tcp, "static_sag_m"), error[0], 1e-12);
+    // The run started in equilibrium.
+    near(number(tcp, "static_sag_m"), error[0], 1e-9);
     near(number(tcp, "end_m"), *error.last().unwrap(), 1e-12);
     near(number(summary, "duration_s"), *times.last().unwrap(), 1e-12);
     let at_peak =
@@ -71,7 +72,7 @@ fn agrees_with_table(summary: &Value, table: &Table) {
         let square = |k: usize| values[k] * values[k];
         let integral: f64 =
             (1..times.len()).map(|k| 0.5 * (square(k) + square(k - 1)) * (times[k] - times[k - 1])).sum();
-        near(number(tcp, key), (integral / times.last().unwrap()).sqrt(), 1e-3);
+        near(number(tcp, key), (integral / times.last().unwrap()).sqrt(), 1e-9);
     }
     // The path frame turns the error, it does not stretch it.
     let along = table.length(["error_tangential_m", "error_normal_m", "error_binormal_m"]);
@@ -131,7 +132,7 @@ mod compare {
 
     #[test]
     fn sag_of_the_beam_is_that_of_the_books() {
-        // Weight of the ball at the tip: m g l³/(3 EI); the bar's own, on two rigid parts, adds 1/(0.1453 mm · 5/6).
+        // Weight of the ball at the tip: m g l³/(3 EI); the bar's own acts on two rigid parts.
         let place = Place::new();
         let bare = "theory = \"euler-bernoulli\", parts = \"uniform\", y_axis";
         place.write("robot.toml", with(ROBOT, "y_axis", bare));
@@ -139,7 +140,7 @@ mod compare {
         let (e, l, g) = (70e9, 0.8f64, 9.81);
         let ei = e * 0.02 * 0.04f64.powi(3) / 12.0;
         let ball = 0.5 * g * l.powi(3) / (3.0 * ei);
-        // The distal half, 0.864 kg at 3l/4, bends the joint at l/2 as a force there and a moment: (5/6) q l⁴/(8 EI).
+        // Of its own weight only the distal half loads the joint in the middle: 5/6 of q l⁴/(8 EI).
         let own = 5.0 / 6.0 * (1.728 / l * g) * l.powi(4) / (8.0 * ei);
         near(number(&summary["tcp"], "static_sag_m"), ball + own, 1e-3);
     }
@@ -222,14 +223,13 @@ mod compare {
         let reference = peak(&["--stepper", "rk4", "--step", "1e-4"]);
         for (options, allowed) in [
             (vec!["--stepper", "generalized-alpha", "--step", "1e-4"], 1e-4),
-            (vec!["--stepper", "generalised-alpha"], 0.01),
-            (vec!["--stepper", "generalized-alpha", "--rho-inf", "0"], 0.03),
-            (vec!["--stepper", "generalized-alpha", "--rho-inf", "1"], 0.01),
-            (vec!["--stepper", "spook", "--step", "1e-4"], 0.01),
-            (vec!["--stepper", "spook", "--step", "2.5e-4", "--spook-form", "global"], 0.03),
+            (vec!["--stepper", "generalised-alpha"], 2e-3),
+            (vec!["--stepper", "generalized-alpha", "--rho-inf", "0"], 5e-3),
+            (vec!["--stepper", "generalized-alpha", "--rho-inf", "1"], 2e-3),
+            (vec!["--stepper", "spook", "--step", "1e-4"], 2e-3),
+            (vec!["--stepper", "spook", "--step", "2.5e-4", "--spook-form", "global"], 5e-3),
         ] {
             let found = peak(&options);
-            eprintln!("{options:?}: {:.2e} {:.2e}", found.0 / reference.0 - 1.0, found.1 / reference.1 - 1.0);
             near(found.0, reference.0, allowed);
             near(found.1, reference.1, allowed);
         }
@@ -244,7 +244,7 @@ mod compare {
         let (rest, fall) = (summary("equilibrium"), summary("undeformed"));
         let sag = number(&rest["tcp"], "static_sag_m");
         near(number(&rest["tcp"], "peak_m"), sag, 1e-6);
-        assert!(number(&fall["tcp"], "static_sag_m") < 1e-9, "an undeformed start has no error");
+        near(number(&fall["tcp"], "static_sag_m"), sag, 1e-9);
         // It falls to nearly twice the sag: 3 per cent damping takes exp(-0.03 pi) = 9 per cent off the overshoot.
         near(number(&fall["tcp"], "peak_m"), sag * (1.0 + (-0.03 * std::f64::consts::PI).exp()), 0.02);
     }
@@ -263,6 +263,17 @@ mod compare {
 
 mod run {
     use super::*;
+
+    #[test]
+    #[ignore = "wanted: the unit in the column's name; today a prismatic joint's position is called _rad"]
+    fn prismatic_joints_are_in_metres() {
+        let place = Place::new();
+        place.write("beam.urdf", with(common::URDF, "\"revolute\"", "\"prismatic\""));
+        place.write("slide.csv", "time,swing,swing.vel\n0,0,0\n1,0.1,0\n");
+        place.json(&["run", "beam.urdf", "slide.csv", "-o", "result"]);
+        let table = Table::parse(&place.text("result/run.csv"));
+        assert!(table.names.contains(&"swing_position_m".to_owned()), "{:?}", table.names);
+    }
 
     #[test]
     fn rigid_links_do_not_bend() {
@@ -507,6 +518,17 @@ mod stopped {
         let options = ["--no-files", "--stepper", "spook", "--step", "0.5"];
         let answer = place.flexarm(&[&["compare", &robot, &motion], &options[..]].concat());
         assert_eq!(answer.code, 1, "{}", answer.out);
+    }
+
+    #[test]
+    #[ignore = "wanted: a run without files does not speak of a log"]
+    fn without_files_there_is_no_log() {
+        let place = Place::new();
+        place.write("spin.csv", spin());
+        let options = ["--ignore-limits", "--step", "1e-4", "--no-files"];
+        let answer = place.flexarm(&[&["compare", "robot.toml", "spin.csv"], &options[..]].concat());
+        assert_eq!(answer.code, 1);
+        assert!(!answer.err.contains("readable"), "{}", answer.err);
     }
 
     #[test]
