@@ -26,7 +26,7 @@ compile() { # name, further flags
     shift
     # Boost must allow for the 25 types of the joint variant and the long argument lists of the visitors.
     "${CXX:-g++}" -std=c++17 -O3 -DNDEBUG -DBOOST_MPL_CFG_NO_PREPROCESSED_HEADERS -DBOOST_MPL_LIMIT_LIST_SIZE=30 \
-        -DBOOST_MPL_LIMIT_VECTOR_SIZE=30 -DBOOST_FUSION_INVOKE_MAX_ARITY=12 -fmax-errors=3 "$@" -isystem "$prefix/include" -isystem "$eigen" \
+        -DBOOST_MPL_LIMIT_VECTOR_SIZE=30 -DBOOST_FUSION_INVOKE_MAX_ARITY=12 -w "$@" -isystem "$prefix/include" -isystem "$eigen" \
         -o "$work/$name" tools/pinocchio_bench.cpp
 }
 compile plain &

@@ -81,6 +81,9 @@ pub(crate) struct RunArgs {
     /// Spectral radius of generalized-alpha: 1 damps nothing, 0 damps the highest modes at once
     #[arg(long, value_name = "RHO", default_value_t = 0.9)]
     pub(crate) rho_inf: f64,
+    /// Plain generalized-alpha, without the correction of its leading frequency error
+    #[arg(long)]
+    pub(crate) no_dispersion_correction: bool,
     /// Constraint form of spook
     #[arg(long, value_enum, default_value_t = FormName::Local)]
     pub(crate) spook_form: FormName,

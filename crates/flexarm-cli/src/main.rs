@@ -17,8 +17,8 @@ use args::{
 };
 use clap::{CommandFactory, Parser};
 use flexarm::{
-    ConstraintForm, Error, InertiaEstimate, LinkModel, LoadOptions, Motion, Outputs, ReadOptions, Robot, RunOptions,
-    SpookPreset, SpookSettings, Start, StepperKind,
+    AlphaSettings, ConstraintForm, Error, InertiaEstimate, LinkModel, LoadOptions, Motion, Outputs, ReadOptions, Robot,
+    RunOptions, SpookPreset, SpookSettings, Start, StepperKind,
 };
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -92,7 +92,10 @@ fn load_options(args: &RobotArgs) -> Result<LoadOptions, Error> {
 
 fn run_options(args: &RunArgs, with_twin: bool) -> RunOptions {
     let stepper = match args.stepper {
-        StepperName::GeneralizedAlpha => StepperKind::GeneralizedAlpha { rho: args.rho_inf },
+        StepperName::GeneralizedAlpha => StepperKind::GeneralizedAlpha(AlphaSettings {
+            rho: args.rho_inf,
+            dispersion_correction: !args.no_dispersion_correction,
+        }),
         StepperName::Spook => StepperKind::Spook(SpookSettings {
             form: if args.spook_form == FormName::Local { ConstraintForm::Local } else { ConstraintForm::Global },
             preset: if args.spook_preset == PresetName::Exact { SpookPreset::Exact } else { SpookPreset::Source },

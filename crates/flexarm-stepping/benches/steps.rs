@@ -29,8 +29,8 @@ fn arm() -> FlexibleArm {
 /// Cost per step, averaged over the whole motion of 4 s.
 fn steps(c: &mut Criterion) {
     let kinds = [
-        (StepperKind::GeneralizedAlpha { rho: 0.9 }, 1e-3),
-        (StepperKind::GeneralizedAlpha { rho: 0.9 }, 4e-3),
+        (StepperKind::GeneralizedAlpha(AlphaSettings::default()), 1e-3),
+        (StepperKind::GeneralizedAlpha(AlphaSettings::default()), 4e-3),
         (StepperKind::Spook(SpookSettings::default()), 1e-3),
         (StepperKind::Rk4, 1e-4),
     ];

@@ -21,7 +21,7 @@
 //! let spring = ("spring".to_owned(), Matrix6::identity() * 1e5, Damping::Modal(0.03));
 //! let arm = FlexibleArm::new(Arc::new(Model::new(&beam)?), vec![spring], Arc::new(Held(vec![])))?;
 //! let mut seen = Observation::new(&arm);
-//! let mut stepper = new_stepper(StepperKind::GeneralizedAlpha { rho: 0.9 }, arm, 1e-3, Start::Equilibrium)?;
+//! let mut stepper = new_stepper(StepperKind::GeneralizedAlpha(AlphaSettings::default()), arm, 1e-3, Start::Equilibrium)?;
 //! stepper.step()?;
 //! stepper.observe(&mut seen);
 //! assert!((seen.q[2] + 10.0 * 9.81 / 1e5).abs() < 1e-6); // sag = m g / k
@@ -44,7 +44,7 @@ mod system;
 
 pub use arm::{Damping, ElasticElement, FlexibleArm};
 pub use error::StepError;
-pub use generalized_alpha::GeneralizedAlpha;
+pub use generalized_alpha::{AlphaSettings, GeneralizedAlpha};
 pub use modes::{Modes, modes_at};
 pub use motion::{Held, MotionFn, PrescribedMotion};
 pub use reduced::ReducedArm;

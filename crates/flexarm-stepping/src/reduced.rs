@@ -24,6 +24,10 @@ pub struct ReducedArm {
     sampled_at: f64,
     factor: Option<Cholesky<f64, Dyn>>,
     matrix: DMatrix<f64>,
+    /// Storage of the mass matrix's factor, `M^-1 K`, and a product.
+    mass_factor: Option<Cholesky<f64, Dyn>>,
+    M_inverse_K: DMatrix<f64>,
+    product: DMatrix<f64>,
 }
 
 impl ReducedArm {
@@ -40,6 +44,9 @@ impl ReducedArm {
             sampled_at: f64::NAN,
             factor: None,
             matrix: DMatrix::zeros(n, n),
+            mass_factor: None,
+            M_inverse_K: DMatrix::zeros(n, n),
+            product: DMatrix::zeros(n, n),
             arm,
         }
     }
@@ -125,31 +132,49 @@ impl SecondOrderSystem for ReducedArm {
         Ok(())
     }
 
-    fn factor_iteration_matrix(&mut self, t: f64, c_D: f64, c_K: f64) -> Result<(), StepError> {
+    fn factor_iteration_matrix(&mut self, t: f64, c_D: f64, c_K: f64, c_h2: f64) -> Result<(), StepError> {
         mass_matrix_at_poses(&self.arm.model, &mut self.data);
         let (n, ne) = (self.arm.model.n_actuated(), self.dimension());
         // The factor's storage is taken back and filled again: no allocation.
-        let mut S = match self.factor.take() {
+        let reuse = |factor: &mut Option<Cholesky<f64, Dyn>>| match factor.take() {
             Some(old) => old.unpack_dirty(),
-            None => std::mem::replace(&mut self.matrix, DMatrix::zeros(0, 0)),
+            None => DMatrix::zeros(ne, ne),
         };
-        S.copy_from(&self.data.M.view((n, n), (ne, ne)));
+        // c_D D + c_K K
+        let C = &mut self.matrix;
+        C.as_mut_slice().fill(0.0);
         for (k, element) in self.arm.elements.iter().enumerate() {
             let weight = if self.arm.proportional { c_K + c_D * self.arm.tau[k] } else { c_K };
-            let mut block = S.fixed_view_mut::<6, 6>(6 * k, 6 * k);
+            let mut block = C.fixed_view_mut::<6, 6>(6 * k, 6 * k);
             block += element.K_S * weight;
         }
         if !self.arm.proportional {
-            S.zip_apply(&self.arm.D, |s, d| *s += c_D * d);
+            C.zip_apply(&self.arm.D, |s, d| *s += c_D * d);
         }
-        self.factor = Cholesky::new(S);
-        match self.factor {
-            Some(_) => Ok(()),
-            None => {
-                self.matrix = DMatrix::zeros(ne, ne);
-                Err(StepError::Singular { matrix: "iteration matrix", t })
+
+        let mut S = reuse(&mut self.factor);
+        S.copy_from(&self.data.M.view((n, n), (ne, ne)));
+        if c_h2 > 0.0 {
+            let mut M = reuse(&mut self.mass_factor);
+            M.copy_from(&S);
+            let factor = Cholesky::new(M).ok_or(StepError::Singular { matrix: "mass matrix", t })?;
+            self.M_inverse_K.as_mut_slice().fill(0.0);
+            for (k, element) in self.arm.elements.iter().enumerate() {
+                self.M_inverse_K.fixed_view_mut::<6, 6>(6 * k, 6 * k).copy_from(&element.K_S);
             }
+            factor.solve_mut(&mut self.M_inverse_K);
+            self.mass_factor = Some(factor);
+            // The product is symmetric for stiffness-proportional and modal damping; Cholesky reads one triangle.
+            self.product.gemm(c_h2, &self.matrix, &self.M_inverse_K, 0.0);
+            S += &self.product;
         }
+        S += &self.matrix;
+        self.factor = Cholesky::new(S);
+        self.factor.as_ref().map(|_| ()).ok_or(StepError::Singular { matrix: "iteration matrix", t })
+    }
+
+    fn inverse_mass_times_stiffness(&mut self, a: &DVector<f64>, out: &mut DVector<f64>) {
+        out.gemv(1.0, &self.M_inverse_K, a, 0.0);
     }
 
     fn solve_iteration(&mut self, r: &mut DVector<f64>) {

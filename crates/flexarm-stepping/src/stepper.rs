@@ -6,7 +6,7 @@ use nalgebra::{DVector, Vector6};
 
 use crate::arm::FlexibleArm;
 use crate::error::StepError;
-use crate::generalized_alpha::GeneralizedAlpha;
+use crate::generalized_alpha::{AlphaSettings, GeneralizedAlpha};
 use crate::reduced::ReducedArm;
 use crate::rk4::{Rk4, STABILITY_LIMIT};
 use crate::spook::{Spook, SpookSettings};
@@ -15,11 +15,8 @@ use crate::statics::static_equilibrium;
 /// Which time stepper.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StepperKind {
-    /// Implicit, reduced coordinates; spectral radius at infinity.
-    GeneralizedAlpha {
-        /// 1 keeps all energy, 0 kills the highest modes at once.
-        rho: f64,
-    },
+    /// Implicit, reduced coordinates.
+    GeneralizedAlpha(AlphaSettings),
     /// Compliant constraints in maximal coordinates.
     Spook(SpookSettings),
     /// Explicit, reduced coordinates.
@@ -30,7 +27,7 @@ impl StepperKind {
     /// The word of the command line.
     pub fn name(&self) -> &'static str {
         match self {
-            Self::GeneralizedAlpha { .. } => "generalized-alpha",
+            Self::GeneralizedAlpha(_) => "generalized-alpha",
             Self::Spook(_) => "spook",
             Self::Rk4 => "rk4",
         }
@@ -131,12 +128,13 @@ pub fn new_stepper(kind: StepperKind, arm: FlexibleArm, h: f64, start: Start) ->
     };
     let v = DVector::zeros(n);
     Ok(match kind {
-        StepperKind::GeneralizedAlpha { rho } => {
+        StepperKind::GeneralizedAlpha(settings) => {
+            let rho = settings.rho;
             if !(0.0..=1.0).contains(&rho) {
                 return Err(StepError::Setup(format!("the spectral radius must lie between 0 and 1, found {rho}")));
             }
             let mut system = ReducedArm::new(arm);
-            let integrator = GeneralizedAlpha::new(&mut system, 0.0, h, rho, e, v)?;
+            let integrator = GeneralizedAlpha::new(&mut system, 0.0, h, settings, e, v)?;
             Box::new(ImplicitStepper { system, integrator })
         }
         StepperKind::Rk4 => {

@@ -30,12 +30,15 @@ pub trait SecondOrderSystem {
         a: &mut DVector<f64>,
     ) -> Result<(), StepError>;
 
-    /// Factors `M + c_D D + c_K K` at the configuration of the last `residual` call.
+    /// Factors `M + (c_D D + c_K K)(1 + c_h2 M^-1 K)` at the configuration of the last `residual` call.
     ///
     /// # Errors
     /// [`StepError::Singular`] if it is not positive definite.
-    fn factor_iteration_matrix(&mut self, t: f64, c_D: f64, c_K: f64) -> Result<(), StepError>;
+    fn factor_iteration_matrix(&mut self, t: f64, c_D: f64, c_K: f64, c_h2: f64) -> Result<(), StepError>;
 
-    /// Replaces `r` by `(M + c_D D + c_K K)^-1 r` of the last factorisation.
+    /// Replaces `r` by the solution with the last factorised matrix.
     fn solve_iteration(&mut self, r: &mut DVector<f64>);
+
+    /// `M^-1 K a` with the mass matrix of the last factorisation with `c_h2 > 0`, written into `out`.
+    fn inverse_mass_times_stiffness(&mut self, a: &DVector<f64>, out: &mut DVector<f64>);
 }

@@ -47,7 +47,7 @@ fn deflection(
     (before, tcp(&seen, &model))
 }
 
-const ALPHA: StepperKind = StepperKind::GeneralizedAlpha { rho: 0.9 };
+const ALPHA: StepperKind = StepperKind::GeneralizedAlpha(AlphaSettings { rho: 0.9, dispersion_correction: true });
 fn spook(preset: SpookPreset) -> StepperKind {
     StepperKind::Spook(SpookSettings { form: ConstraintForm::Local, preset })
 }

@@ -43,5 +43,5 @@ pub use report::{markdown, rows};
 pub use robot::{FlexibleRobot, LoadOptions, Robot, TCP_FRAME};
 pub use summary::{Files, LinkFigures, StepperFigures, Summary, TcpFigures};
 
-pub use flexarm_stepping::{ConstraintForm, SpookPreset, SpookSettings, Start, StepError, StepperKind};
+pub use flexarm_stepping::{AlphaSettings, ConstraintForm, SpookPreset, SpookSettings, Start, StepError, StepperKind};
 pub use flexarm_urdf::{InertiaEstimate, ReadOptions, search_paths_from_environment};

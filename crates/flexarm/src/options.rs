@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use flexarm_stepping::{Start, StepperKind};
+use flexarm_stepping::{AlphaSettings, Start, StepperKind};
 
 /// How links are modelled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -48,7 +48,7 @@ pub struct RunOptions {
 impl Default for RunOptions {
     fn default() -> Self {
         Self {
-            stepper: StepperKind::GeneralizedAlpha { rho: 0.9 },
+            stepper: StepperKind::GeneralizedAlpha(AlphaSettings::default()),
             step_s: 1e-3,
             links: LinkModel::Lumped,
             log_rate_hz: 500.0,

@@ -70,6 +70,9 @@ pub struct StepperFigures {
     /// Spectral radius (generalised-alpha).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rho_inf: Option<f64>,
+    /// Whether the leading frequency error is cancelled (generalised-alpha).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub dispersion_correction: Option<bool>,
     /// local or global (SPOOK).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub form: Option<&'static str>,
@@ -86,9 +89,12 @@ pub struct StepperFigures {
 
 impl StepperFigures {
     pub(crate) fn new(options: &RunOptions, counts: Counts) -> Self {
-        let (mut rho_inf, mut form, mut preset) = (None, None, None);
+        let (mut rho_inf, mut dispersion_correction, mut form, mut preset) = (None, None, None, None);
         match options.stepper {
-            StepperKind::GeneralizedAlpha { rho } => rho_inf = Some(rho),
+            StepperKind::GeneralizedAlpha(s) => {
+                rho_inf = Some(s.rho);
+                dispersion_correction = Some(s.dispersion_correction);
+            }
             StepperKind::Spook(s) => {
                 form = Some(if s.form == ConstraintForm::Local { "local" } else { "global" });
                 preset = Some(if s.preset == SpookPreset::Exact { "exact" } else { "source" });
@@ -97,7 +103,7 @@ impl StepperFigures {
         }
         let Counts { steps, evaluations, factorisations } = counts;
         let (name, h_s) = (options.stepper.name(), options.step_s);
-        Self { name, h_s, rho_inf, form, preset, steps, evaluations, factorisations }
+        Self { name, h_s, rho_inf, dispersion_correction, form, preset, steps, evaluations, factorisations }
     }
 }
 
