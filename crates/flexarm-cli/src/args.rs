@@ -48,10 +48,10 @@ pub(crate) struct RobotArgs {
     #[arg(long = "package", value_name = "NAME=FOLDER")]
     pub(crate) packages: Vec<String>,
     /// Estimate missing inertias from the meshes with this density [kg/m^3]
-    #[arg(long, value_name = "KG_PER_M3", conflicts_with = "inertia_from_total_mass")]
+    #[arg(long, value_name = "KG_PER_M3", conflicts_with = "inertia_from_total_mass", allow_hyphen_values = true)]
     pub(crate) inertia_from_density: Option<f64>,
     /// Estimate missing inertias from the meshes, all together of this mass [kg]
-    #[arg(long, value_name = "KG")]
+    #[arg(long, value_name = "KG", allow_hyphen_values = true)]
     pub(crate) inertia_from_total_mass: Option<f64>,
 }
 
@@ -67,19 +67,19 @@ pub(crate) struct RunArgs {
     #[arg(long, value_name = "NAME", default_value = "generalized-alpha", value_parser = parse_stepper)]
     pub(crate) stepper: StepperName,
     /// Step of the stepper [s]
-    #[arg(long, value_name = "SECONDS", default_value_t = 1e-3)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 1e-3, allow_hyphen_values = true)]
     pub(crate) step: f64,
     /// Model of the links
     #[arg(long, value_enum, default_value_t = LinksName::Lumped)]
     pub(crate) links: LinksName,
     /// Logged samples per second
-    #[arg(long, value_name = "HZ", default_value_t = 500.0)]
+    #[arg(long, value_name = "HZ", default_value_t = 500.0, allow_hyphen_values = true)]
     pub(crate) log_rate: f64,
     /// How the run starts
     #[arg(long, value_enum, default_value_t = StartName::Equilibrium)]
     pub(crate) from_rest: StartName,
     /// Spectral radius of generalized-alpha: 1 damps nothing, 0 damps the highest modes at once
-    #[arg(long, value_name = "RHO", default_value_t = 0.9)]
+    #[arg(long, value_name = "RHO", default_value_t = 0.9, allow_hyphen_values = true)]
     pub(crate) rho_inf: f64,
     /// Plain generalized-alpha, without the correction of its leading frequency error
     #[arg(long)]
@@ -91,7 +91,7 @@ pub(crate) struct RunArgs {
     #[arg(long, value_enum, default_value_t = PresetName::Exact)]
     pub(crate) spook_preset: PresetName,
     /// Band around the final TCP error for the settling time [m]
-    #[arg(long, value_name = "METRES", default_value_t = 1e-4)]
+    #[arg(long, value_name = "METRES", default_value_t = 1e-4, allow_hyphen_values = true)]
     pub(crate) settling_band: f64,
     /// Output folder [default: a new one in out/]
     #[arg(short, long, value_name = "FOLDER")]

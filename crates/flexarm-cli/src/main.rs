@@ -125,7 +125,12 @@ fn simulate(cli: &Cli, args: &RunArgs, with_twin: bool) -> Result<ExitCode, Erro
         }
     };
     let model = robot.rigid_model()?;
-    let motion = Motion::load(&trajectory, &model)?;
+    let motion = Motion::load(&trajectory, &model).map_err(|error| match error {
+        Error::File { path, what } if args.trajectory.is_none() => {
+            Error::File { path, what: format!("{what} (it is the default_trajectory of {})", robot.path.display()) }
+        }
+        other => other,
+    })?;
     let options = run_options(args, with_twin);
     let outputs = (!args.no_files).then(|| {
         let stem = format!("{}-{}", robot.name, motion.name);

@@ -143,7 +143,6 @@ mod trajectory {
     }
 
     #[test]
-    #[ignore = "wanted: the message names the trajectory file"]
     fn joints_that_do_not_match_with_file() {
         compare_motion("other.csv", "time,swong\n0,0\n1,0.5\n", &["other.csv", "missing \"swing\""]);
     }
@@ -287,7 +286,6 @@ mod trajectory {
     }
 
     #[test]
-    #[ignore = "wanted: the message names the trajectory file"]
     fn limits_with_file() {
         compare_motion("wild.csv", WILD, &["wild.csv", "3 joint limits"]);
     }
@@ -416,7 +414,6 @@ mod robot_description {
     }
 
     #[test]
-    #[ignore = "wanted: help names options that exist, --inertia-from-density and --inertia-from-total-mass"]
     fn missing_inertial_with_options_that_exist() {
         let text = URDF.replace("inertial>", "inertia_tensor>");
         urdf(&text, "<link name=\"bar\">", &["--inertia-from-density", "--inertia-from-total-mass"]);
@@ -529,7 +526,6 @@ mod robot_toml {
     }
 
     #[test]
-    #[ignore = "wanted: the message names the missing constant, not the parser's enum"]
     fn material_without_density() {
         robot_file(&with(ROBOT, "\"aluminium\"", "{ E = 70e9, nu = 0.33 }"), "beam =", &["rho"]);
     }
@@ -548,7 +544,6 @@ mod robot_toml {
     }
 
     #[test]
-    #[ignore = "wanted: the place of the unknown link, not of the distal joint below it"]
     fn unknown_link_in_its_line() {
         robot_file(&with(ROBOT, "link = \"bar\"", "link = \"bor\""), "\"bor\"", &["not a link"]);
     }
@@ -609,13 +604,11 @@ mod robot_toml {
     }
 
     #[test]
-    #[ignore = "wanted: exit code 2 and a place in the robot file; today 1 and no static equilibrium"]
     fn gravity_that_is_no_number() {
         robot_file(&with(ROBOT, "-9.81]", "nan]"), "gravity", &["gravity", "NaN"]);
     }
 
     #[test]
-    #[ignore = "wanted: a place in the robot file; today the URDF and an internal name"]
     fn tcp_and_payload_that_are_no_numbers() {
         robot_file(&with(ROBOT, "{ link = \"ball\" }", "{ link = \"ball\", xyz = [0.0, nan, 0.0] }"), "tcp", &["NaN"]);
         let payload = "\npayload = { mass = 1.0, com = [0.0, inf, 0.0] }\ngravity";
@@ -694,7 +687,6 @@ mod reduced_link {
     }
 
     #[test]
-    #[ignore = "wanted: a file of another link is refused or warned about"]
     fn file_of_another_link() {
         let place = Place::new();
         place.write("robot.toml", flex::robot());
@@ -797,13 +789,11 @@ mod values_on_the_command_line {
     }
 
     #[test]
-    #[ignore = "wanted: `--step -1e-3` is read as a negative step, not as an option -1"]
     fn negative_step_after_a_space() {
         options(&["--step", "-1e-3"], &["step must be", "positive", "-0.001"]);
     }
 
     #[test]
-    #[ignore = "wanted: a step longer than the motion is refused; today it gives a result"]
     fn step_longer_than_the_motion() {
         options(&["--step", "10"], &["step", "10"]);
     }
@@ -855,7 +845,6 @@ mod values_on_the_command_line {
     }
 
     #[test]
-    #[ignore = "wanted: the same joint twice is refused; today the last value counts"]
     fn joint_value_twice() {
         Place::new().refused(&["inspect", "robot.toml", "--at", "swing=1,swing=2"], &["\"swing\"", "twice"]);
     }

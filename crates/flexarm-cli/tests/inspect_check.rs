@@ -396,7 +396,6 @@ mod check {
     }
 
     #[test]
-    #[ignore = "wanted: all faults of a robot file; today the first"]
     fn all_faults_of_a_robot_file() {
         let place = Place::new();
         let mut text = with(ROBOT, "\"ball\"", "\"bell\"");
@@ -410,7 +409,6 @@ mod check {
     }
 
     #[test]
-    #[ignore = "wanted: the trajectory is checked although the robot has errors"]
     fn motion_beside_a_faulty_robot() {
         let place = Place::new();
         place.write("beam.urdf", with(URDF, "\"1.728\"", "\"-1.728\""));
@@ -419,7 +417,6 @@ mod check {
     }
 
     #[test]
-    #[ignore = "wanted: a default_trajectory that is not there is found"]
     fn default_trajectory_that_is_missing() {
         let place = Place::new();
         place.write("robot.toml", with(ROBOT, "\ngravity", "\ndefault_trajectory = \"none.toml\"\ngravity"));
@@ -428,7 +425,6 @@ mod check {
     }
 
     #[test]
-    #[ignore = "wanted: `where` has the line, and the message does not repeat it"]
     fn place_in_a_robot_file() {
         let place = Place::new();
         place.write("robot.toml", with(ROBOT, "gravity", "gravitty"));

@@ -250,7 +250,6 @@ mod compare {
     }
 
     #[test]
-    #[ignore = "wanted: the figures do not depend on the log rate, or a warning says that they do"]
     fn peak_at_a_low_log_rate() {
         let place = Place::new();
         let run = |rate: &str| place.json(&["compare", "robot.toml", "swing.toml", "--no-files", "--log-rate", rate]);
@@ -265,7 +264,6 @@ mod run {
     use super::*;
 
     #[test]
-    #[ignore = "wanted: the unit in the column's name; today a prismatic joint's position is called _rad"]
     fn prismatic_joints_are_in_metres() {
         let place = Place::new();
         place.write("beam.urdf", with(common::URDF, "\"revolute\"", "\"prismatic\""));
@@ -511,7 +509,6 @@ mod stopped {
     }
 
     #[test]
-    #[ignore = "wanted: an absurd step ends with 1; today metres of error are a result with code 0"]
     fn by_an_absurd_step_of_spook() {
         let place = Place::new();
         let (robot, motion) = (shipped_robot("kr210"), shipped_trajectory("stress.toml"));
@@ -521,7 +518,6 @@ mod stopped {
     }
 
     #[test]
-    #[ignore = "wanted: a run without files does not speak of a log"]
     fn without_files_there_is_no_log() {
         let place = Place::new();
         place.write("spin.csv", spin());
@@ -532,7 +528,6 @@ mod stopped {
     }
 
     #[test]
-    #[ignore = "wanted: summary.json and report.md of a stopped run say that it stopped"]
     fn report_of_a_stopped_run_says_so() {
         let place = Place::new();
         place.write("spin.csv", spin());

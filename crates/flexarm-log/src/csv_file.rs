@@ -104,8 +104,9 @@ fn columns(header: &RunHeader) -> Vec<String> {
         names.extend(DISPLACEMENT.map(|part| format!("error_{part}")));
         names.extend(["tangential", "normal", "binormal"].map(|axis| format!("error_{axis}_m")));
     }
-    for joint in &header.joints {
-        names.push(format!("{joint}_position_rad"));
+    for (k, joint) in header.joints.iter().enumerate() {
+        let unit = if header.prismatic.get(k).copied().unwrap_or(false) { "m" } else { "rad" };
+        names.push(format!("{joint}_position_{unit}"));
         names.push(format!("{joint}_effort"));
         if header.has_rigid {
             names.push(format!("rigid_{joint}_effort"));

@@ -18,6 +18,8 @@ pub struct RunHeader {
     pub urdf: String,
     /// Names of the actuated joints, in coordinate order.
     pub joints: Vec<String>,
+    /// Which of them slide instead of turning; all turn if empty.
+    pub prismatic: Vec<bool>,
     /// Links of the URDF, parents before children; the first is the base.
     pub links: Vec<LinkInfo>,
     /// Names of the elastic elements (one per flexible link joint).

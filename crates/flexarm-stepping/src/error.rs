@@ -6,7 +6,7 @@
 pub enum StepError {
     /// The state left every plausible range.
     #[error(
-        "the simulation diverged at t = {t:.6} s (step {h:e} s): {what}; try a smaller --step, more damping, or --stepper generalized-alpha"
+        "the simulation diverged at t = {t:.6} s (step {h:e} s): {what}; try a smaller --step; a motion so fast that the links cannot hold it also ends like this"
     )]
     Diverged {
         /// Time [s].

@@ -164,6 +164,11 @@ impl GeneralizedAlpha {
         })
     }
 
+    /// Step [s].
+    pub fn step_size(&self) -> f64 {
+        self.h
+    }
+
     /// Current time [s].
     pub fn time(&self) -> f64 {
         self.t0 + self.steps as f64 * self.h

@@ -60,6 +60,11 @@ impl Rk4 {
         })
     }
 
+    /// Step [s].
+    pub fn step_size(&self) -> f64 {
+        self.h
+    }
+
     /// Current time [s].
     pub fn time(&self) -> f64 {
         self.t0 + self.steps as f64 * self.h

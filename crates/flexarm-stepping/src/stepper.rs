@@ -191,6 +191,21 @@ fn observe_reduced(
     ];
 }
 
+/// Elastic coordinates beyond this are no deflection of a link any more [m, rad].
+pub(crate) const LARGEST_DEFLECTION: f64 = 3.0;
+
+/// Stops a run whose links have come apart.
+fn check_deflection(arm: &FlexibleArm, x: &DVector<f64>, t: f64, h: f64) -> Result<(), StepError> {
+    for (k, element) in arm.elements.iter().enumerate() {
+        let largest = x.as_slice()[6 * k..6 * k + 6].iter().fold(0.0f64, |m, e| m.max(e.abs()));
+        if largest > LARGEST_DEFLECTION {
+            let what = format!("the deflection of link {:?} reached {largest:.1e} m or rad", element.name);
+            return Err(StepError::Diverged { t, h, what });
+        }
+    }
+    Ok(())
+}
+
 struct ImplicitStepper {
     system: ReducedArm,
     integrator: GeneralizedAlpha,
@@ -201,7 +216,8 @@ impl Stepper for ImplicitStepper {
         self.integrator.time()
     }
     fn step(&mut self) -> Result<(), StepError> {
-        self.integrator.step(&mut self.system)
+        self.integrator.step(&mut self.system)?;
+        check_deflection(&self.system.arm, &self.integrator.x, self.integrator.time(), self.integrator.step_size())
     }
     fn observe(&mut self, out: &mut Observation) {
         let g = &self.integrator;
@@ -229,7 +245,7 @@ impl Stepper for ExplicitStepper {
     fn step(&mut self) -> Result<(), StepError> {
         self.integrator.step(&mut self.system)?;
         self.steps += 1;
-        Ok(())
+        check_deflection(&self.system.arm, &self.integrator.x, self.integrator.time(), self.integrator.step_size())
     }
     fn observe(&mut self, out: &mut Observation) {
         let g = &self.integrator;

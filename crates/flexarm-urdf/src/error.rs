@@ -341,18 +341,18 @@ impl Problem {
             }
             Self::MissingInertial { no_estimate, .. } => match no_estimate {
                 None => "add <inertial> with mass and inertia, or have it estimated from the meshes \
-                         (--inertia-from-mesh density|total-mass)"
+                         (--inertia-from-density or --inertia-from-total-mass)"
                     .into(),
                 Some(why) => format!("add <inertial> with mass and inertia; it could not be estimated: {why}"),
             },
             Self::InertiaNotPositiveDefinite { .. } => {
                 "check signs, units (kg m^2) and that the values are about the centre of mass; if the model means it, \
-                 waive the check for this link"
+                 waive the check by waive_inertia = [\"link\"] in robot.toml"
                     .into()
             }
             Self::TriangleInequality { .. } => {
                 "check the order ixx ixy ixz iyy iyz izz and that the values are about the centre of mass; if the \
-                 model means it, waive the check for this link"
+                 model means it, waive the check by waive_inertia = [\"link\"] in robot.toml"
                     .into()
             }
             Self::BadEstimate { .. } => "give a density in kg/m^3 (steel 7850, aluminium 2700) or a mass in kg".into(),

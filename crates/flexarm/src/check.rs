@@ -52,19 +52,23 @@ impl From<&UrdfFinding> for Finding {
 /// Never fails: what cannot be loaded is a finding of severity `error`.
 pub fn check(robot: &Path, trajectory: Option<&Path>, options: &LoadOptions) -> Vec<Finding> {
     let mut findings = Vec::new();
-    let robot = match Robot::load(robot, options) {
+    let path = robot;
+    let robot = match Robot::load(path, options) {
         Ok(robot) => robot,
-        Err(Error::Urdf(error)) => return error.findings().iter().map(Finding::from).collect(),
         Err(error) => {
-            let code = match error {
-                Error::File { .. } => "missing-file",
-                Error::RobotFile(_) => "robot-file",
-                Error::Flex(_) => "reduced-link",
-                _ => "model",
-            };
-            return vec![Finding::error(code, robot.display().to_string(), &error)];
+            load_findings(&error, path, &mut findings);
+            if let Some(trajectory) = trajectory
+                && let Err(error) = flexarm_trajectory::Trajectory::from_path(trajectory, &[])
+            {
+                findings.push(Finding::error("trajectory", trajectory.display().to_string(), &error));
+            }
+            return findings;
         }
     };
+    if let Some(own) = robot.default_trajectory.as_ref().filter(|t| !t.is_file()) {
+        let message = format!("default_trajectory: there is no file {}", own.display());
+        findings.push(Finding::error("missing-file", path.display().to_string(), &message));
+    }
     findings.extend(robot.urdf.warnings.iter().map(Finding::from));
     findings.extend(robot.warnings.iter().filter(|w| !w.contains(".urdf")).map(|w| {
         Finding::warning(
@@ -79,6 +83,21 @@ pub fn check(robot: &Path, trajectory: Option<&Path>, options: &LoadOptions) -> 
         check_trajectory(&robot, path, &mut findings);
     }
     findings
+}
+
+/// What kept a robot from being loaded, one finding per fault.
+fn load_findings(error: &Error, path: &Path, findings: &mut Vec<Finding>) {
+    match error {
+        Error::Several(errors) => errors.iter().for_each(|e| load_findings(e, path, findings)),
+        Error::Urdf(error) => findings.extend(error.findings().iter().map(Finding::from)),
+        Error::RobotFile(e) => {
+            let location = format!("{}:{}", e.path.display(), e.line);
+            findings.push(Finding::error("robot-file", location, &e.message));
+        }
+        Error::File { path, what } => findings.push(Finding::error("missing-file", path.display().to_string(), what)),
+        Error::Flex(error) => findings.push(Finding::error("reduced-link", path.display().to_string(), error)),
+        error => findings.push(Finding::error("model", path.display().to_string(), error)),
+    }
 }
 
 fn check_flexible(robot: &Robot, findings: &mut Vec<Finding>) {

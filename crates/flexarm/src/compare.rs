@@ -42,7 +42,8 @@ pub fn simulate(
     let started = Instant::now();
     let cpu = cpu_time::ProcessTime::now();
     if !motion.violations.is_empty() && !options.ignore_limits {
-        return Err(Error::Limits(motion.violations.iter().map(ToString::to_string).collect()));
+        let violations = motion.violations.iter().map(ToString::to_string).collect();
+        return Err(Error::Limits { path: motion.path.clone(), violations });
     }
     let flexible = match options.links {
         LinkModel::Rigid => robot.rigid_robot()?,
@@ -55,6 +56,7 @@ pub fn simulate(
         return Err(Error::Usage(format!("the log rate must be positive, found {} Hz", options.log_rate_hz)));
     }
 
+    check_sizes(motion, options)?;
     if !(options.settling_band_m.is_finite() && options.settling_band_m > 0.0) {
         return Err(Error::Usage(format!("the settling band must be positive, found {} m", options.settling_band_m)));
     }
@@ -63,21 +65,43 @@ pub fn simulate(
     let mut files = recorders(outputs)?;
     let head = header(robot, motion, options, &run.arm);
     files.set.begin(&head)?;
-    let end = run.go(&mut files.set, progress);
+    let end = run.go(&mut files.set, outputs.is_some(), progress);
 
     let mut summary = run.summary(robot, motion, options);
+    summary.end = end.as_ref().map_or_else(ToString::to_string, |()| "complete".into());
     summary.wall_s = started.elapsed().as_secs_f64();
     summary.cpu_s = cpu.elapsed().as_secs_f64();
     summary.real_time_factor = summary.duration_s / summary.wall_s.max(1e-9);
     summary.cpu_s_per_simulated_s = summary.cpu_s / summary.duration_s.max(1e-9);
     summary.files = files.names.clone();
-    let mut result = summary.labelled();
-    result.push(("end".into(), end.as_ref().map_or_else(ToString::to_string, |()| "complete".into())));
-    files.set.finish(&result)?;
+    files.set.finish(&summary.labelled())?;
     if let Some(outputs) = outputs {
         crate::report::write(outputs, &summary)?;
     }
     end.map(|()| summary)
+}
+
+/// Steps between two looks at the progress callback.
+const POLL_EVERY: u64 = 64;
+/// Most logged samples of a run: they are kept for the figures.
+const MOST_SAMPLES: f64 = 2e6;
+
+/// Step and duration must make a run that can be finished and kept in memory.
+fn check_sizes(motion: &Motion, options: &RunOptions) -> Result<(), Error> {
+    let duration = motion.trajectory.duration();
+    if options.step_s > duration {
+        let message = format!("the step (--step {} s) is longer than the motion ({duration} s)", options.step_s);
+        return Err(Error::Usage(message));
+    }
+    let samples = duration * options.log_rate_hz.min(1.0 / options.step_s);
+    if samples > MOST_SAMPLES {
+        return Err(Error::Usage(format!(
+            "{duration} s at a log rate of {} Hz make {samples:.1e} samples, at most {MOST_SAMPLES:.0e} are kept: \
+             lower --log-rate or cut the trajectory",
+            options.log_rate_hz
+        )));
+    }
+    Ok(())
 }
 
 /// A run under way, with what has been seen of it.
@@ -140,18 +164,18 @@ impl<'a> Run<'a> {
     }
 
     /// Steps to the end, logging on the way.
-    fn go(&mut self, files: &mut RecorderSet, progress: &mut Progress<'_>) -> Result<(), Error> {
+    fn go(&mut self, files: &mut RecorderSet, partial: bool, progress: &mut Progress<'_>) -> Result<(), Error> {
         let total = self.last as f64 * self.options.step_s;
         for step in 0..=self.last {
             if step % self.every == 0 || step == self.last {
                 self.observe(step);
                 files.record(&self.sample)?;
-                if progress(self.stepper.time(), total).is_break() {
-                    return Err(Error::Interrupted { t: self.stepper.time() });
-                }
+            }
+            if step % POLL_EVERY == 0 && progress(self.stepper.time(), total).is_break() {
+                return Err(Error::Interrupted { t: self.stepper.time(), partial });
             }
             if step < self.last {
-                self.stepper.step().map_err(|source| Error::Step { source, partial: true })?;
+                self.stepper.step().map_err(|source| Error::Step { source, partial })?;
             }
         }
         Ok(())
@@ -284,6 +308,19 @@ impl<'a> Run<'a> {
     }
 
     fn validity_warnings(&self, links: &[LinkFigures], warnings: &mut Vec<String>) {
+        if let Some(first) = self.arm.modes.frequencies_hz().first() {
+            let logged = 1.0 / (self.every as f64 * self.options.step_s);
+            if logged < 10.0 * first {
+                warnings.push(format!(
+                    "{logged:.1} logged samples a second are few for a first frequency of {first:.2} Hz: peaks between \
+                     them are missed; raise --log-rate or lower --step"
+                ));
+            }
+            if self.options.step_s * first > 0.05 {
+                let steps = 1.0 / (self.options.step_s * first);
+                warnings.push(format!("{steps:.1} steps per period of the first mode are coarse: lower --step"));
+            }
+        }
         for link in links {
             if link.peak_rotation_rad > ROTATION_LIMIT {
                 warnings.push(format!(

@@ -19,6 +19,9 @@ pub enum Error {
     /// Something in the robot file.
     #[error(transparent)]
     RobotFile(#[from] RobotFileError),
+    /// Several faults of one robot file.
+    #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
+    Several(Vec<Error>),
     /// Something in the URDF.
     #[error(transparent)]
     Urdf(#[from] flexarm_urdf::UrdfError),
@@ -37,8 +40,16 @@ pub enum Error {
     #[error(transparent)]
     Trajectory(#[from] flexarm_trajectory::TrajectoryError),
     /// The trajectory asks for more than the joints can do.
-    #[error("the trajectory passes {} joint limits:\n  {}\nslow it down, change it, or go on anyway with --ignore-limits", .0.len(), .0.join("\n  "))]
-    Limits(Vec<String>),
+    #[error(
+        "{}: the trajectory passes {} joint limits:\n  {}\nslow it down, change it, or go on anyway with --ignore-limits",
+        path.display(), violations.len(), violations.join("\n  ")
+    )]
+    Limits {
+        /// The trajectory.
+        path: PathBuf,
+        /// One line each.
+        violations: Vec<String>,
+    },
     /// A value on the command line or in an option.
     #[error("{0}")]
     Usage(String),
@@ -51,10 +62,12 @@ pub enum Error {
         partial: bool,
     },
     /// The user stopped it.
-    #[error("stopped at t = {t:.3} s; the log up to there is complete and readable")]
+    #[error("stopped at t = {t:.3} s{}", if *partial { "; the log up to there is complete and readable" } else { "" })]
     Interrupted {
         /// Simulated time [s].
         t: f64,
+        /// Whether files were written up to the stop.
+        partial: bool,
     },
     /// A recording could not be written.
     #[error(transparent)]

@@ -119,6 +119,7 @@ pub fn parse_joint_values(text: &str, joints: &[&str]) -> Result<Vec<f64>, Error
         value.ok_or_else(|| Error::Usage(format!("joint value {s:?} is not a finite number (rad or m)")))
     };
     if items.iter().any(|i| i.contains('=')) {
+        let mut given = vec![false; joints.len()];
         for item in items {
             let (name, value) = item
                 .split_once('=')
@@ -126,6 +127,9 @@ pub fn parse_joint_values(text: &str, joints: &[&str]) -> Result<Vec<f64>, Error
             let k = joints.iter().position(|j| *j == name.trim()).ok_or_else(|| {
                 Error::Usage(format!("there is no movable joint {:?}; the joints are {joints:?}", name.trim()))
             })?;
+            if std::mem::replace(&mut given[k], true) {
+                return Err(Error::Usage(format!("joint {:?} is given twice", joints[k])));
+            }
             values[k] = number(value)?;
         }
     } else {
@@ -153,6 +157,13 @@ pub fn inspect(robot: &Robot, at: Option<&str>, velocity: Option<&str>) -> Resul
     let values =
         |text: Option<&str>| text.map_or_else(|| Ok(vec![0.0; names.len()]), |t| parse_joint_values(t, &names));
     let (q, v) = (values(at)?, values(velocity)?);
+    let mut warnings = robot.warnings.clone();
+    for (c, q) in model.coordinates().iter().zip(&q) {
+        if *q < c.limits.lower || *q > c.limits.upper {
+            let (lower, upper) = (c.limits.lower, c.limits.upper);
+            warnings.push(format!("joint {:?} at {q} is outside its limits {lower} to {upper}", c.joint));
+        }
+    }
     let mut state = State::zeros(&model);
     state.q.copy_from_slice(&q);
     state.qdot.copy_from_slice(&v);
@@ -215,6 +226,6 @@ pub fn inspect(robot: &Robot, at: Option<&str>, velocity: Option<&str>) -> Resul
         gravity_torque: gravity.as_slice().to_vec(),
         bias: bias.as_slice().to_vec(),
         mass_kg: robot.rigid.links.iter().filter_map(|l| l.inertia).map(|i| i.mass).sum(),
-        warnings: robot.warnings.clone(),
+        warnings,
     })
 }

@@ -1,6 +1,6 @@
 //! Trajectories for a robot: joints in coordinate order, checked against its limits.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use flexarm_kinematics::Model;
@@ -14,6 +14,8 @@ use crate::error::Error;
 pub struct Motion {
     /// Name for logs.
     pub name: String,
+    /// The file.
+    pub path: PathBuf,
     /// The curves, in coordinate order.
     pub trajectory: Arc<Trajectory>,
     /// Limits that it passes.
@@ -54,10 +56,12 @@ impl Motion {
         let named: Vec<(&str, JointLimits)> = names.iter().copied().zip(limits.iter().copied()).collect();
         let trajectory = Trajectory::from_path(path, &named)?;
         let warnings = trajectory.warnings().iter().map(|w| format!("{}: {w}", path.display())).collect();
-        let trajectory = trajectory.with_joint_order(&names)?;
+        let trajectory = trajectory
+            .with_joint_order(&names)
+            .map_err(|e| Error::File { path: path.to_owned(), what: e.to_string() })?;
         let violations = trajectory.check_limits(&limits);
         let name = path.file_stem().map_or_else(|| "trajectory".into(), |s| s.to_string_lossy().into_owned());
-        Ok(Self { name, trajectory: Arc::new(trajectory), violations, warnings })
+        Ok(Self { name, path: path.to_owned(), trajectory: Arc::new(trajectory), violations, warnings })
     }
 
     /// For steppers.

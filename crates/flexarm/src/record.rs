@@ -108,10 +108,6 @@ pub(crate) fn header(robot: &Robot, motion: &Motion, options: &RunOptions, arm: 
             ],
         ),
         group(
-            "flexarm.units",
-            &[("length", "m".into()), ("angle", "rad".into()), ("force", "N".into()), ("time", "s".into())],
-        ),
-        group(
             "flexarm.model",
             &[
                 ("links", options.links.name().into()),
@@ -133,6 +129,7 @@ pub(crate) fn header(robot: &Robot, motion: &Motion, options: &RunOptions, arm: 
         trajectory: motion.name.clone(),
         urdf: located_urdf(robot),
         joints: model.coordinates()[..model.n_actuated()].iter().map(|c| c.joint.clone()).collect(),
+        prismatic: model.coordinates()[..model.n_actuated()].iter().map(|c| c.kind == "prismatic").collect(),
         meshes: meshes(robot, &links),
         links,
         elements,

@@ -42,6 +42,9 @@ pub fn rows(summary: &Summary) -> Vec<(String, String)> {
     let mm = |x: f64| format!("{:.4} mm", 1e3 * x);
     let mrad = |x: f64| format!("{:.4} mrad", 1e3 * x);
     let mut rows = Vec::new();
+    if summary.end != "complete" {
+        rows.push(("STOPPED EARLY".to_owned(), summary.end.clone()));
+    }
     if let Some(tcp) = &summary.tcp {
         rows.push(("peak TCP error".to_owned(), format!("{} at {:.3} s", mm(tcp.peak_m), tcp.t_peak_s)));
         rows.push(("RMS TCP error".into(), mm(tcp.rms_m)));

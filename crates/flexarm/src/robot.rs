@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use flexarm_fem::{BeamLink, BeamTheory, Material, ReducedLink, Section, read_flex};
-use flexarm_flexlink::{FlexibleLink, Parts, Spring, distal_joint, substitute};
+use flexarm_flexlink::{FlexibleLink, Parts, Spring, SubstitutionError, distal_joint, substitute};
 use flexarm_kinematics::{ElasticAngles, Joint, JointKind, Link, LinkInertia, Mechanism, Model, Pose};
 use flexarm_stepping::{Damping, FlexibleArm, PrescribedMotion, StepError};
 use flexarm_urdf::{ReadOptions, UrdfRobot, default_tcp, read_urdf};
@@ -130,11 +130,13 @@ impl Robot {
         urdf_options.waive.extend(file.waive_inertia.iter().cloned());
         let urdf = read_urdf(&urdf_path, &urdf_options)?;
 
+        let mut faults: Vec<Error> = Vec::new();
         let mut rigid = urdf.mechanism.clone();
-        if let Some(g) = file.gravity {
-            rigid.gravity = g.into();
+        if let Some(gravity) = &file.gravity {
+            rigid.gravity = (*gravity.get_ref()).into();
+            keep(check_finite("gravity", gravity.get_ref(), gravity.span(), &source).map_err(Error::from), &mut faults);
         }
-        let tcp = tcp_of(&file, &source, &urdf, options)?;
+        let tcp = keep(tcp_of(&file, &source, &urdf, options), &mut faults);
         let fallback_name = folder.file_name().map_or_else(|| "robot".into(), |n| n.to_string_lossy().into_owned());
         let mut robot = Self {
             name: file.name.clone().unwrap_or(fallback_name),
@@ -143,19 +145,24 @@ impl Robot {
             rigid,
             urdf,
             flexible: Vec::new(),
-            tcp,
-            default_trajectory: file.default_trajectory.as_ref().map(|t| folder.join(t)),
+            tcp: tcp.unwrap_or_default(),
+            default_trajectory: file.default_trajectory.as_ref().map(|t| folder.join(t.get_ref())),
             warnings: Vec::new(),
         };
         if let Some(payload) = &file.payload {
-            robot.add_payload(payload, &source)?;
+            keep(robot.add_payload(payload, &source), &mut faults);
         }
         for drive in &file.drive {
-            check_drive(drive, &robot.rigid, &source)?;
+            check_drive(drive, &robot.rigid, &source, &mut faults);
         }
         for entry in &file.flexible_link {
-            let flexible = flexible_link(entry, &robot.rigid, &source, folder, &mut robot.warnings)?;
-            robot.flexible.push(flexible);
+            let flexible = flexible_link(entry, &robot.rigid, &source, folder, &mut robot.warnings, &mut faults);
+            robot.flexible.extend(keep(flexible, &mut faults));
+        }
+        match faults.len() {
+            0 => {}
+            1 => return Err(faults.remove(0)),
+            _ => return Err(Error::Several(faults)),
         }
         robot.finish(Some((&file, &source)))?;
         Ok(robot)
@@ -173,8 +180,9 @@ impl Robot {
         self.rigid.joints.push(Joint::new("__tcp_joint", JointKind::Fixed, link, TCP_FRAME, X_LT));
         self.rigid.links.push(Link { name: TCP_FRAME.into(), inertia: None });
         self.warnings.extend(self.urdf.warnings_only().map(|w| format!("{}: {}", w.location, w.message)));
-        let first_flexible = file.and_then(|(f, s)| f.flexible_link.first().map(|e| (s, e.link.span())));
-        match (self.flexible_robot(), first_flexible) {
+        // Faults that only show in the whole are put to the last flexible link: that is where a second entry stands.
+        let last_flexible = file.and_then(|(f, s)| f.flexible_link.last().map(|e| (s, e.link.span())));
+        match (self.flexible_robot(), last_flexible) {
             (Ok(flexible), _) => {
                 for (spring, _) in &flexible.springs {
                     let (own, parts) = spring.masses;
@@ -192,7 +200,10 @@ impl Robot {
         }
     }
 
-    fn add_payload(&mut self, payload: &PayloadEntry, source: &Source) -> Result<(), Error> {
+    fn add_payload(&mut self, entry: &Spanned<PayloadEntry>, source: &Source) -> Result<(), Error> {
+        let payload = entry.get_ref();
+        check_finite("payload com", &payload.com, entry.span(), source)?;
+        check_finite("payload inertia", &payload.inertia, entry.span(), source)?;
         let link = payload.link.as_ref().map_or_else(|| self.tcp.0.clone(), |l| l.get_ref().clone());
         if self.rigid.link(&link).is_none() {
             let span = payload.link.as_ref().map_or(0..0, Spanned::span);
@@ -208,7 +219,7 @@ impl Robot {
         let inertia_com = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
         if inertia_com.symmetric_eigenvalues().min() < -1e-9 * inertia_com.norm() {
             let message = "payload inertia has a negative principal moment; the order is ixx iyy izz ixy ixz iyz";
-            return Err(source.error(payload.mass.span(), message).into());
+            return Err(source.error(entry.span(), message).into());
         }
         let inertia = LinkInertia { mass, com: payload.com.into(), inertia_com };
         self.rigid.links.push(Link { name: PAYLOAD_LINK.into(), inertia: Some(inertia) });
@@ -270,7 +281,11 @@ fn tcp_of(file: &RobotFile, source: &Source, urdf: &UrdfRobot, options: &LoadOpt
     if let Some(link) = &options.tcp {
         return Ok((link.clone(), Pose::identity()));
     }
-    match &file.tcp {
+    if let Some(tcp) = &file.tcp {
+        check_finite("tcp xyz", &tcp.get_ref().xyz, tcp.span(), source)?;
+        check_finite("tcp rpy", &tcp.get_ref().rpy, tcp.span(), source)?;
+    }
+    match file.tcp.as_ref().map(Spanned::get_ref) {
         Some(tcp) if urdf.mechanism.link(tcp.link.get_ref()).is_none() => {
             Err(source.error(tcp.link.span(), unknown_link("TCP", tcp.link.get_ref(), &urdf.mechanism)).into())
         }
@@ -284,25 +299,35 @@ fn tcp_of(file: &RobotFile, source: &Source, urdf: &UrdfRobot, options: &LoadOpt
     }
 }
 
-fn check_drive(
-    drive: &crate::robot_file::DriveEntry,
-    mechanism: &Mechanism,
-    source: &Source,
-) -> Result<(), RobotFileError> {
+fn check_drive(drive: &crate::robot_file::DriveEntry, mechanism: &Mechanism, source: &Source, faults: &mut Vec<Error>) {
     let joint = drive.joint.get_ref();
     if mechanism.joint(joint).is_none_or(|j| j.kind == JointKind::Fixed) {
         let known: Vec<_> =
             mechanism.joints.iter().filter(|j| j.kind != JointKind::Fixed).map(|j| j.name.as_str()).collect();
         let message = format!("drive of joint {joint:?}: the robot has no such movable joint; it has {known:?}");
-        return Err(source.error(drive.joint.span(), message));
+        faults.push(source.error(drive.joint.span(), message).into());
     }
-    match drive.kind.get_ref().as_str() {
-        "prescribed" => Ok(()),
-        other => {
-            let message =
-                format!("drive kind {other:?} is not known; this version drives joints as \"prescribed\" only");
-            Err(source.error(drive.kind.span(), message))
-        }
+    let kind = drive.kind.get_ref();
+    if kind != "prescribed" {
+        let message = format!("drive kind {kind:?} is not known; this version drives joints as \"prescribed\" only");
+        faults.push(source.error(drive.kind.span(), message).into());
+    }
+}
+
+/// The value, or the fault put aside so that the next one is found too.
+fn keep<T>(result: Result<T, Error>, faults: &mut Vec<Error>) -> Option<T> {
+    result.map_err(|e| faults.push(e)).ok()
+}
+
+fn check_finite(
+    what: &str,
+    values: &[f64],
+    span: std::ops::Range<usize>,
+    source: &Source,
+) -> Result<(), RobotFileError> {
+    match values.iter().find(|x| !x.is_finite()) {
+        Some(found) => Err(source.error(span, format!("{what} has the entry {found}, expected finite numbers"))),
+        None => Ok(()),
     }
 }
 
@@ -312,6 +337,7 @@ fn flexible_link(
     source: &Source,
     folder: &Path,
     warnings: &mut Vec<String>,
+    faults: &mut Vec<Error>,
 ) -> Result<(FlexibleLink, Damping), Error> {
     let name = entry.link.get_ref();
     let at = |span: std::ops::Range<usize>, message: String| source.error(span, message);
@@ -335,10 +361,14 @@ fn flexible_link(
             return Err(at(entry.angles.as_ref().map_or(0..0, Spanned::span), message).into());
         }
     };
-    let damping = damping_of(entry.damping.as_ref(), source)?;
+    let damping = damping_of(entry.damping.as_ref(), source);
+    let damping = keep(damping.map_err(Error::from), faults).unwrap_or(Damping::Modal(0.0));
     let distal_name = entry.distal.as_ref().map(|d| d.get_ref().as_str());
-    let distal = distal_joint(mechanism, name, distal_name)
-        .map_err(|e| at(entry.distal.as_ref().map_or(entry.link.span(), Spanned::span), e.to_string()))?;
+    let distal = distal_joint(mechanism, name, distal_name).map_err(|e| {
+        let unknown = matches!(e, SubstitutionError::UnknownLink { .. });
+        let named = entry.distal.as_ref().filter(|_| !unknown);
+        at(named.map_or(entry.link.span(), Spanned::span), e.to_string())
+    })?;
 
     let (reduced, parts) = match (&entry.reduced, &entry.beam) {
         (Some(file), None) => {
@@ -348,6 +378,13 @@ fn flexible_link(
                 return Err(at(file.span(), message).into());
             }
             let reduced = read_flex(&path).map_err(Box::new)?;
+            if reduced.name != *name {
+                warnings.push(format!(
+                    "link {name:?} takes the reduced link of {:?} ({})",
+                    reduced.name,
+                    path.display()
+                ));
+            }
             warnings.extend(reduced.warnings(&Default::default()).into_iter().map(|w| format!("link {name:?}: {w}")));
             (reduced, Parts::Reduced)
         }

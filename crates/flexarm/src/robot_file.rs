@@ -18,13 +18,13 @@ pub struct RobotFile {
     /// URDF or xacro file, relative to the robot file.
     pub urdf: Spanned<PathBuf>,
     /// Tool centre point.
-    pub tcp: Option<TcpEntry>,
+    pub tcp: Option<Spanned<TcpEntry>>,
     /// What the tool carries.
-    pub payload: Option<PayloadEntry>,
+    pub payload: Option<Spanned<PayloadEntry>>,
     /// Acceleration of gravity in base axes [m/s²].
-    pub gravity: Option<[f64; 3]>,
+    pub gravity: Option<Spanned<[f64; 3]>>,
     /// Trajectory for `flexarm compare` without one, relative to the robot file.
-    pub default_trajectory: Option<PathBuf>,
+    pub default_trajectory: Option<Spanned<PathBuf>>,
     /// Where `package://` names lead.
     #[serde(default)]
     pub packages: std::collections::BTreeMap<String, PathBuf>,
@@ -171,13 +171,33 @@ fn half() -> f64 {
 }
 
 /// Name of a preset, or constants.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(untagged)]
+#[derive(Clone, Debug)]
 pub enum MaterialEntry {
     /// steel, aluminium, cast_iron, ductile_iron.
     Named(String),
     /// Elastic constants and density.
     Given(MaterialConstants),
+}
+
+impl<'de> Deserialize<'de> for MaterialEntry {
+    /// By hand, because an untagged enum would not say which constant is missing.
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Either;
+        impl<'de> serde::de::Visitor<'de> for Either {
+            type Value = MaterialEntry;
+            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str("the name of a material or { E = ..., nu = ..., rho = ... }")
+            }
+            fn visit_str<E: serde::de::Error>(self, name: &str) -> Result<MaterialEntry, E> {
+                Ok(MaterialEntry::Named(name.to_owned()))
+            }
+            fn visit_map<A: serde::de::MapAccess<'de>>(self, map: A) -> Result<MaterialEntry, A::Error> {
+                let constants = MaterialConstants::deserialize(serde::de::value::MapAccessDeserializer::new(map))?;
+                Ok(MaterialEntry::Given(constants))
+            }
+        }
+        deserializer.deserialize_any(Either)
+    }
 }
 
 /// Isotropic material.
@@ -193,9 +213,8 @@ pub struct MaterialConstants {
     pub rho: f64,
 }
 
-/// Drive of a joint.
+/// Drive of a joint. Tables of other kinds of drives are read, so that the message can name the kind.
 #[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct DriveEntry {
     /// Joint of the URDF.
     pub joint: Spanned<String>,
@@ -242,7 +261,10 @@ impl Source {
 pub fn parse_robot_file(text: &str, path: &Path) -> Result<(RobotFile, Source), RobotFileError> {
     let source = Source { path: path.to_owned(), text: text.to_owned() };
     let file: RobotFile = toml::from_str(text).map_err(|error| {
-        let message = error.message().trim().replace('\n', " ");
+        let mut message = error.message().trim().replace('\n', " ");
+        if message.contains("missing field `format`") {
+            message += ": add format = 1 as the first line";
+        }
         source.error(error.span().unwrap_or(0..0), message)
     })?;
     if *file.format.get_ref() != 1 {

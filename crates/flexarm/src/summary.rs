@@ -17,6 +17,8 @@ pub struct Summary {
     pub trajectory: String,
     /// rigid or lumped.
     pub links_model: &'static str,
+    /// "complete", or why the run stopped early.
+    pub end: String,
     /// Simulated time [s].
     pub duration_s: f64,
     /// Stepper with its work.
@@ -171,6 +173,7 @@ impl Summary {
         let mut rows = vec![
             ("robot".to_owned(), self.robot.clone()),
             ("trajectory".into(), self.trajectory.clone()),
+            ("end".into(), self.end.clone()),
             ("duration_s".into(), self.duration_s.to_string()),
             ("stepper".into(), format!("{} h = {} s", self.stepper.name, self.stepper.h_s)),
         ];

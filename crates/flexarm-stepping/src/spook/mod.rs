@@ -24,7 +24,7 @@ use nalgebra::{DVector, Matrix3, Matrix6, Rotation3, UnitQuaternion, Vector3, Ve
 
 use crate::arm::FlexibleArm;
 use crate::error::StepError;
-use crate::stepper::{Counts, Observation, Stepper};
+use crate::stepper::{Counts, LARGEST_DEFLECTION, Observation, Stepper};
 use constraint::Rows;
 use solve::TreeSolver;
 
@@ -223,6 +223,11 @@ impl Stepper for Spook {
             // Rigid joints have no deflection to speak of: the local form serves both.
             let form = if matches!(body.motion, JointMotion::Elastic(_)) { form } else { ConstraintForm::Local };
             self.rows[i] = Rows::new(form, angles, &moved, &parent.x, &X_WQ, &child.x);
+            let deflection = self.rows[i].g.amax();
+            if deflection > LARGEST_DEFLECTION || deflection.is_nan() {
+                let what = format!("joint {:?} came apart by {deflection:.1e} m or rad", body.joint);
+                return Err(StepError::Diverged { t, h, what });
+            }
         }
 
         // Body blocks: mass, momentum, impulse of gravity, gyroscopic moment and loads.
