@@ -56,7 +56,8 @@ fn reference_arm_by_file_equals_the_converged_curve() {
     let (mut rigid, mut flexible, mut peak) = (0.0f64, 0.0f64, 0.0f64);
     for (k, row) in rows.iter().enumerate() {
         let distance = |prefix: &str, at: usize| {
-            let d = ["x_m", "y_m", "z_m"].iter().enumerate().map(|(i, n)| table[&format!("{prefix}_{n}")][k] - row[at + i]);
+            let d =
+                ["x_m", "y_m", "z_m"].iter().enumerate().map(|(i, n)| table[&format!("{prefix}_{n}")][k] - row[at + i]);
             d.map(|x| x * x).sum::<f64>().sqrt()
         };
         assert!((table["time"][k] - row[0]).abs() < 1e-12);

@@ -47,10 +47,10 @@ pub(crate) struct RobotArgs {
     /// Where package://NAME/ leads (may be repeated)
     #[arg(long = "package", value_name = "NAME=FOLDER")]
     pub(crate) packages: Vec<String>,
-    /// Estimate missing inertias from the meshes with this density [kg/m^3]
+    /// Estimate missing inertias from the meshes with this density (kg/m^3)
     #[arg(long, value_name = "KG_PER_M3", conflicts_with = "inertia_from_total_mass", allow_hyphen_values = true)]
     pub(crate) inertia_from_density: Option<f64>,
-    /// Estimate missing inertias from the meshes, all together of this mass [kg]
+    /// Estimate missing inertias from the meshes, all together of this mass (kg)
     #[arg(long, value_name = "KG", allow_hyphen_values = true)]
     pub(crate) inertia_from_total_mass: Option<f64>,
 }
@@ -66,7 +66,7 @@ pub(crate) struct RunArgs {
     /// Time stepper
     #[arg(long, value_name = "NAME", default_value = "generalized-alpha", value_parser = parse_stepper)]
     pub(crate) stepper: StepperName,
-    /// Step of the stepper [s]
+    /// Step of the stepper (s)
     #[arg(long, value_name = "SECONDS", default_value_t = 1e-3, allow_hyphen_values = true)]
     pub(crate) step: f64,
     /// Model of the links
@@ -90,7 +90,7 @@ pub(crate) struct RunArgs {
     /// Preset of spook: exact formulas, or those of the method's source
     #[arg(long, value_enum, default_value_t = PresetName::Exact)]
     pub(crate) spook_preset: PresetName,
-    /// Band around the final TCP error for the settling time [m]
+    /// Band around the final TCP error for the settling time (m)
     #[arg(long, value_name = "METRES", default_value_t = 1e-4, allow_hyphen_values = true)]
     pub(crate) settling_band: f64,
     /// Output folder [default: a new one in out/]
@@ -111,10 +111,10 @@ pub(crate) struct RunArgs {
 pub(crate) struct InspectArgs {
     /// robot.toml, a folder with one, a .urdf or .xacro file, or the name of a shipped robot
     pub(crate) robot: PathBuf,
-    /// Joint values in coordinate order, or name=value pairs [rad, m]
+    /// Joint values in coordinate order, or name=value pairs (rad, m)
     #[arg(long, value_name = "Q1,Q2,...", allow_hyphen_values = true)]
     pub(crate) at: Option<String>,
-    /// Joint velocities, likewise [rad/s, m/s]
+    /// Joint velocities, likewise (rad/s, m/s)
     #[arg(long, value_name = "V1,V2,...", allow_hyphen_values = true)]
     pub(crate) velocity: Option<String>,
     #[command(flatten)]

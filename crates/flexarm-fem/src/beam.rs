@@ -110,7 +110,7 @@ impl Beam {
     /// ```text
     /// F = K [u_A; u_B]
     /// ```
-    /// [N/m, N/rad; N·m/m, N·m/rad], exactly symmetric, with the six rigid motions as null space.
+    /// (N/m, N/rad; N·m/m, N·m/rad), exactly symmetric, with the six rigid motions as null space.
     ///
     /// # Source
     /// Przemieniecki (1968), *Theory of Matrix Structural Analysis*, eq. (5.116).
@@ -181,7 +181,7 @@ impl Beam {
     /// ```text
     /// M = ∫ (rho A Nᵀ N + rho I N_thetaᵀ N_theta) dx
     /// ```
-    /// with the static shapes of [`Self::stiffness12`]; [kg, kg·m; kg·m, kg·m²]. Exact for rigid
+    /// with the static shapes of [`Self::stiffness12`]; (kg, kg·m; kg·m, kg·m²). Exact for rigid
     /// motions and Guyan's mass for the rest.
     ///
     /// # Source

@@ -27,7 +27,7 @@ use crate::spatial::{Matrix12, Pose, adjoint, symmetric_part};
 pub struct ElasticSplit {
     /// Split frame in the link frame.
     pub X_LS: Pose,
-    /// Stiffness of the joint at So, in S axes, [N/m, N/rad; N·m/m, N·m/rad].
+    /// Stiffness of the joint at So, in S axes, (N/m, N/rad; N·m/m, N·m/rad).
     pub K_S: Matrix6<f64>,
 }
 
@@ -76,7 +76,7 @@ pub struct ReducedLink {
 impl ReducedLink {
     /// Link from a 12×12 stiffness of its two interfaces, A then B, both in *link axes*.
     ///
-    /// * `K`: `F = K [u_A; u_B]`, [N/m, N/rad; N·m/m, N·m/rad], at Ao and Bo.
+    /// * `K`: `F = K [u_A; u_B]`, (N/m, N/rad; N·m/m, N·m/rad), at Ao and Bo.
     /// * `parts`: proximal and distal rigid part.
     ///
     /// # Errors
@@ -240,7 +240,7 @@ fn elastic_split(frames: &LinkFrames, K_BB: &Matrix6<f64>) -> Result<ElasticSpli
 /// Exact to first order for every wrench at B, wherever S lies. `K_S` couples force and rotation
 /// even where the beam is straight; see [`drop_coupling`] for what ignoring that means.
 ///
-/// * `K_BB`: [N/m, N/rad; N·m/m, N·m/rad], at Bo, with A held.
+/// * `K_BB`: (N/m, N/rad; N·m/m, N·m/rad), at Bo, with A held.
 /// * `X_BS`: pose of S in the frame at Bo in whose axes `K_BB` is given, translation in m.
 ///
 /// Returns `K_S`, same units, at So, in S axes, exactly symmetric.

@@ -33,12 +33,12 @@ pub enum CutError {
          which must stay positive: use parts = \"uniform\" or give the parts in a .flex file"
     )]
     Inertia {
-        /// Smallest principal moment that remains [kg m²].
+        /// Smallest principal moment that remains (kg m²).
         remaining: f64,
     },
 }
 
-/// Proximal and distal part of a link cut at `split` of the line from `p_LA` to `p_LB` (link axes) [m].
+/// Proximal and distal part of a link cut at `split` of the line from `p_LA` to `p_LB` (link axes) (m).
 ///
 /// # Errors
 /// [`CutError`] if no two bodies of this kind make up the link.

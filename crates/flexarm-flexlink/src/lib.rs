@@ -2,7 +2,7 @@
 //!
 //! A link with a [`ReducedLink`] becomes two links, proximal and distal, joined by a six-DoF elastic joint at the
 //! split frame S. Everything that hangs on the link beyond the split follows the distal part. The result is again a
-//! [`Mechanism`]: the tree model and every algorithm on it stay the same. Start at [`substitute`].
+//! [`flexarm_kinematics::Mechanism`]: the tree model and every algorithm on it stay the same. Start at [`substitute`].
 //!
 //! Frames: L link, A proximal and B distal interface, S split. Not here: where the stiffness comes from
 //! (`flexarm-fem`), damping and time (`flexarm-stepping`).

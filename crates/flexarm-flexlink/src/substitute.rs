@@ -49,15 +49,15 @@ pub struct Spring {
     pub joint: String,
     /// Name of the distal part.
     pub distal_link: String,
-    /// `K_S`, at So in S axes [N/m, N/rad; N m/m, N m/rad].
+    /// `K_S`, at So in S axes (N/m, N/rad; N m/m, N m/rad).
     pub K_S: Matrix6<f64>,
-    /// Distance of the interfaces [m].
+    /// Distance of the interfaces (m).
     pub length: f64,
     /// Pose of S in the link.
     pub X_LS: Pose,
     /// Pose of B in the link.
     pub X_LB: Pose,
-    /// Mass of the link in the mechanism and of the two parts together [kg].
+    /// Mass of the link in the mechanism and of the two parts together (kg).
     pub masses: (f64, f64),
 }
 
@@ -115,7 +115,7 @@ pub enum SubstitutionError {
         link: String,
         /// The distal joint.
         joint: String,
-        /// Distance [m].
+        /// Distance (m).
         distance: f64,
     },
     /// A link without mass cannot be cut.

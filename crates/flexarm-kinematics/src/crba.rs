@@ -10,7 +10,7 @@ use crate::data::{Data, joint_position};
 use crate::model::{JointMotion, Model};
 use crate::spatial::{Pose, SpatialInertia, Twist, Wrench, cross3, mul3, tr_mul, tr_mul3};
 
-/// Mass matrix `M(q)`, nv×nv, both triangles [kg, kg m, kg m²]. Fills `data.{X_PB, M}`. No allocation.
+/// Mass matrix `M(q)`, nv×nv, both triangles (kg, kg m, kg m²). Fills `data.{X_PB, M}`. No allocation.
 pub fn mass_matrix<'d>(model: &Model, data: &'d mut Data, q: &DVector<f64>) -> &'d DMatrix<f64> {
     for i in 1..model.bodies.len() {
         joint_position(model, data, i, q.as_slice());

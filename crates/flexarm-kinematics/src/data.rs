@@ -11,9 +11,9 @@ use crate::spatial::{ArticulatedInertia, Pose, SpatialInertia, Twist, Wrench, mu
 /// Positions and velocities of all independent coordinates, in the model's coordinate order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct State {
-    /// Positions [rad or m].
+    /// Positions (rad or m).
     pub q: DVector<f64>,
-    /// Velocities [rad/s or m/s].
+    /// Velocities (rad/s or m/s).
     pub qdot: DVector<f64>,
 }
 

@@ -6,30 +6,30 @@ use crate::data::{Data, State};
 use crate::kinematics::{forward_kinematics, forward_kinematics_velocity};
 use crate::model::Model;
 
-/// Kinetic energy [J]; fills `data.{X_PB, X_WB, V}`.
+/// Kinetic energy (J); fills `data.{X_PB, X_WB, V}`.
 pub fn kinetic_energy(model: &Model, data: &mut Data, state: &State) -> f64 {
     forward_kinematics_velocity(model, data, state);
     kinetic_energy_of(model, data)
 }
 
-/// Kinetic energy [J] for the twists that another algorithm left in `data.V`.
+/// Kinetic energy (J) for the twists that another algorithm left in `data.V`.
 pub fn kinetic_energy_of(model: &Model, data: &Data) -> f64 {
     let bodies = model.bodies.iter().zip(&data.V).skip(1);
     bodies.map(|(body, V)| 0.5 * V.power(&body.inertia.mul_twist(V))).sum()
 }
 
-/// Potential energy of gravity [J], zero at the world origin; fills `data.{X_PB, X_WB}`.
+/// Potential energy of gravity (J), zero at the world origin; fills `data.{X_PB, X_WB}`.
 pub fn potential_energy(model: &Model, data: &mut Data, q: &nalgebra::DVector<f64>) -> f64 {
     forward_kinematics(model, data, q);
     potential_energy_of(model, data)
 }
 
-/// Potential energy of gravity [J] for the poses in `data.X_WB`.
+/// Potential energy of gravity (J) for the poses in `data.X_WB`.
 pub fn potential_energy_of(model: &Model, data: &Data) -> f64 {
     -model.gravity.dot(&first_moment(model, data))
 }
 
-/// Centre of mass of all moving bodies in the world [m], for the poses in `data.X_WB`.
+/// Centre of mass of all moving bodies in the world (m), for the poses in `data.X_WB`.
 pub fn center_of_mass(model: &Model, data: &Data) -> Vector3<f64> {
     first_moment(model, data) / model.moving_mass()
 }

@@ -17,13 +17,13 @@ use crate::spatial::Pose;
 /// Tolerances and bounds of the iteration.
 #[derive(Clone, Copy, Debug)]
 pub struct IkOptions {
-    /// Accepted position error [m].
+    /// Accepted position error (m).
     pub position_tolerance_m: f64,
-    /// Accepted rotation error [rad].
+    /// Accepted rotation error (rad).
     pub rotation_tolerance_rad: f64,
     /// Most iterations before giving up.
     pub max_iterations: usize,
-    /// Length that weighs rotation against translation in the damped step [m].
+    /// Length that weighs rotation against translation in the damped step (m).
     pub characteristic_length_m: f64,
 }
 
@@ -50,9 +50,9 @@ pub struct IkError {
     pub frame: String,
     /// Iterations done.
     pub iterations: usize,
-    /// Remaining distance [m].
+    /// Remaining distance (m).
     pub position_m: f64,
-    /// Remaining angle [rad].
+    /// Remaining angle (rad).
     pub rotation_rad: f64,
     /// Joints that sit at a limit.
     pub at_limit: Vec<String>,

@@ -18,7 +18,7 @@ pub struct Mechanism {
     pub links: Vec<Link>,
     /// All joints, in the order of the source.
     pub joints: Vec<Joint>,
-    /// Acceleration of gravity in world (= base link) axes [m/s²].
+    /// Acceleration of gravity in world (= base link) axes (m/s²).
     pub gravity: Vector3<f64>,
 }
 
@@ -34,11 +34,11 @@ pub struct Link {
 /// Mass properties of a link, in link axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LinkInertia {
-    /// Mass [kg].
+    /// Mass (kg).
     pub mass: f64,
-    /// Centre of mass `p_LoLcm_L` [m].
+    /// Centre of mass `p_LoLcm_L` (m).
     pub com: Vector3<f64>,
-    /// Rotational inertia about the centre of mass [kg m²].
+    /// Rotational inertia about the centre of mass (kg m²).
     pub inertia_com: Matrix3<f64>,
 }
 
@@ -108,13 +108,13 @@ impl JointKind {
 /// Limits of a joint; infinite where there is none.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
-    /// Lowest position [rad or m].
+    /// Lowest position (rad or m).
     pub lower: f64,
-    /// Highest position [rad or m].
+    /// Highest position (rad or m).
     pub upper: f64,
-    /// Highest speed [rad/s or m/s].
+    /// Highest speed (rad/s or m/s).
     pub velocity: f64,
-    /// Highest torque or force [N m or N].
+    /// Highest torque or force (N m or N).
     pub effort: f64,
 }
 
@@ -131,7 +131,7 @@ pub struct Mimic {
     pub joint: String,
     /// Factor.
     pub ratio: f64,
-    /// Offset [rad or m].
+    /// Offset (rad or m).
     pub offset: f64,
 }
 

@@ -27,7 +27,7 @@ pub struct Model {
     n_actuated: usize,
     n_elastic: usize,
     pub(crate) has_mimic: bool,
-    /// Acceleration of gravity in world axes [m/s²].
+    /// Acceleration of gravity in world axes (m/s²).
     pub gravity: Vector3<f64>,
 }
 
@@ -162,7 +162,7 @@ pub enum ModelError {
         link: String,
         /// The joint that moves it.
         joint: String,
-        /// What was found [kg].
+        /// What was found (kg).
         mass: f64,
     },
     /// Mass properties that no body has.
@@ -263,7 +263,7 @@ impl Model {
         (0..self.n_elastic).map(|k| self.coordinates[self.n_actuated + 6 * k].body)
     }
 
-    /// Total mass of all moving bodies [kg].
+    /// Total mass of all moving bodies (kg).
     pub fn moving_mass(&self) -> f64 {
         self.bodies[1..].iter().map(|b| b.inertia.mass).sum()
     }

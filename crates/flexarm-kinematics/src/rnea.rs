@@ -16,7 +16,7 @@ use crate::data::{Data, State, add_projection, joint_motion, subspace_times};
 use crate::model::Model;
 use crate::spatial::Twist;
 
-/// Generalised forces `τ = M(q) q̈ + bias(q, q̇)` [N m or N] for the accelerations `qddot`.
+/// Generalised forces `τ = M(q) q̈ + bias(q, q̇)` (N m or N) for the accelerations `qddot`.
 ///
 /// Elastic coordinates are treated like any other: their entries of τ are what the elastic joint must
 /// supply. External wrenches in `data.F_ext` are subtracted. Fills `data.{X_PB, V, A, F, tau}`; `A` has

@@ -31,7 +31,7 @@ pub struct AngleKinematics {
 }
 
 impl ElasticAngles {
-    /// Rotation, rate map and bias at `angles` [rad] and `rates` [rad/s].
+    /// Rotation, rate map and bias at `angles` (rad) and `rates` (rad/s).
     #[inline]
     pub fn kinematics(self, angles: &Vector3<f64>, rates: &Vector3<f64>) -> AngleKinematics {
         match self {
@@ -52,7 +52,7 @@ impl ElasticAngles {
         }
     }
 
-    /// `dB/dt` at `angles` [rad] and `rates` [rad/s], as a matrix.
+    /// `dB/dt` at `angles` (rad) and `rates` (rad/s), as a matrix.
     pub fn rate_map_derivative(self, angles: &Vector3<f64>, rates: &Vector3<f64>) -> Matrix3<f64> {
         match self {
             Self::RotationVector => {

@@ -70,10 +70,10 @@ pub(crate) fn cross3(p: &Vector3<f64>, A: &Matrix3<f64>) -> Matrix3<f64> {
     columns(p.cross(&column(A, 0)), p.cross(&column(A, 1)), p.cross(&column(A, 2)))
 }
 
-/// Pose `X_AB` of frame B in frame A, as rotation matrix and translation [m]. `p_A = X_AB * p_B`.
+/// Pose `X_AB` of frame B in frame A, as rotation matrix and translation (m). `p_A = X_AB * p_B`.
 pub type Pose = IsometryMatrix3<f64>;
 
-/// Velocity (or acceleration) of a frame: linear part of its origin [m/s], angular part [rad/s].
+/// Velocity (or acceleration) of a frame: linear part of its origin (m/s), angular part (rad/s).
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Twist {
     /// Velocity of the origin.
@@ -82,7 +82,7 @@ pub struct Twist {
     pub angular: Vector3<f64>,
 }
 
-/// Force [N] through a frame's origin and moment [N m] about it.
+/// Force (N) through a frame's origin and moment (N m) about it.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Wrench {
     /// Force.
@@ -164,7 +164,7 @@ pair_algebra!(Twist, linear, angular);
 pair_algebra!(Wrench, force, torque);
 
 impl Twist {
-    /// Power `Fᵀ V` [W]; both at the same point, in the same axes.
+    /// Power `Fᵀ V` (W); both at the same point, in the same axes.
     #[inline(always)]
     pub fn power(&self, F: &Wrench) -> f64 {
         self.linear.dot(&F.force) + self.angular.dot(&F.torque)
@@ -238,11 +238,11 @@ pub fn adjoint(X_AB: &Pose) -> Matrix6<f64> {
 /// Spatial inertia `M_BBo_B` of a rigid body about Bo, in B axes, by its ten parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpatialInertia {
-    /// Mass m [kg].
+    /// Mass m (kg).
     pub mass: f64,
-    /// First moment `m p_BoBcm_B` [kg m].
+    /// First moment `m p_BoBcm_B` (kg m).
     pub first_moment: Vector3<f64>,
-    /// Rotational inertia about Bo (not the centre of mass) [kg m²].
+    /// Rotational inertia about Bo (not the centre of mass) (kg m²).
     pub rotational: Matrix3<f64>,
 }
 
@@ -252,18 +252,18 @@ impl SpatialInertia {
         Self { mass: 0.0, first_moment: Vector3::zeros(), rotational: Matrix3::zeros() }
     }
 
-    /// From mass [kg], centre of mass `p_BoBcm_B` [m] and inertia about the centre of mass, in B axes [kg m²].
+    /// From mass (kg), centre of mass `p_BoBcm_B` (m) and inertia about the centre of mass, in B axes (kg m²).
     pub fn from_com(mass: f64, com: &Vector3<f64>, inertia_com: &Matrix3<f64>) -> Self {
         let c = skew(com);
         Self { mass, first_moment: com * mass, rotational: inertia_com - c * c * mass }
     }
 
-    /// Centre of mass `p_BoBcm_B` [m]; zero for a massless body.
+    /// Centre of mass `p_BoBcm_B` (m); zero for a massless body.
     pub fn com(&self) -> Vector3<f64> {
         if self.mass == 0.0 { Vector3::zeros() } else { self.first_moment / self.mass }
     }
 
-    /// Inertia about the centre of mass, in B axes [kg m²].
+    /// Inertia about the centre of mass, in B axes (kg m²).
     pub fn inertia_com(&self) -> Matrix3<f64> {
         let c = skew(&self.com());
         self.rotational + c * c * self.mass

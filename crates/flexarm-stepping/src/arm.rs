@@ -20,7 +20,7 @@ pub struct ElasticElement {
     pub body: usize,
     /// First of its six coordinates.
     pub coordinate: usize,
-    /// `K_S` [N/m, N/rad; N m/m, N m/rad].
+    /// `K_S` (N/m, N/rad; N m/m, N m/rad).
     pub K_S: Matrix6<f64>,
     /// `K_S^-1`.
     pub C_S: Matrix6<f64>,
@@ -33,7 +33,7 @@ pub struct ElasticElement {
 pub enum Damping {
     /// Damping ratio of the modes, weighted by the share of strain energy that this element has in each mode.
     Modal(f64),
-    /// `D = beta K` [s].
+    /// `D = beta K` (s).
     StiffnessProportional(f64),
 }
 
@@ -46,7 +46,7 @@ pub struct FlexibleArm {
     pub elements: Vec<ElasticElement>,
     /// Damping matrix on the elastic coordinates (6 per element).
     pub D: DMatrix<f64>,
-    /// `beta` per element that comes nearest to `D` (exact when stiffness-proportional), for SPOOK [s].
+    /// `beta` per element that comes nearest to `D` (exact when stiffness-proportional), for SPOOK (s).
     pub tau: Vec<f64>,
     /// Whether `D` is block diagonal with `beta K` in the blocks.
     pub proportional: bool,
@@ -129,7 +129,7 @@ impl FlexibleArm {
         K
     }
 
-    /// Elastic energy [J] at elastic coordinates `e`.
+    /// Elastic energy (J) at elastic coordinates `e`.
     pub fn elastic_energy(&self, e: &[f64]) -> f64 {
         self.elements
             .iter()

@@ -9,9 +9,9 @@ pub enum StepError {
         "the simulation diverged at t = {t:.6} s (step {h:e} s): {what}; try a smaller --step; a motion so fast that the links cannot hold it also ends like this"
     )]
     Diverged {
-        /// Time [s].
+        /// Time (s).
         t: f64,
-        /// Step [s].
+        /// Step (s).
         h: f64,
         /// What left its range, with the value.
         what: String,
@@ -21,9 +21,9 @@ pub enum StepError {
         "the step to t = {t:.6} s (step {h:e} s) did not converge in {iterations} iterations; last relative correction {correction:.1e}: try a smaller --step"
     )]
     NotConverged {
-        /// Time [s].
+        /// Time (s).
         t: f64,
-        /// Step [s].
+        /// Step (s).
         h: f64,
         /// Iterations done.
         iterations: usize,
@@ -35,7 +35,7 @@ pub enum StepError {
     Singular {
         /// Which matrix.
         matrix: &'static str,
-        /// Time [s].
+        /// Time (s).
         t: f64,
     },
     /// No static equilibrium was found.
@@ -43,7 +43,7 @@ pub enum StepError {
         "no static equilibrium at t = {t:.6} s: after {iterations} Newton iterations the forces are out of balance by {residual:.1e} (relative); is the structure too soft for its weight? --from-rest undeformed starts without it"
     )]
     NoEquilibrium {
-        /// Time [s].
+        /// Time (s).
         t: f64,
         /// Iterations done.
         iterations: usize,
@@ -57,11 +57,11 @@ pub enum StepError {
     UnstableStep {
         /// Name of the stepper.
         stepper: &'static str,
-        /// Step [s].
+        /// Step (s).
         h: f64,
-        /// Highest natural frequency [Hz].
+        /// Highest natural frequency (Hz).
         highest_hz: f64,
-        /// Largest stable step [s].
+        /// Largest stable step (s).
         largest_s: f64,
     },
     /// The parts of the arm do not fit together.

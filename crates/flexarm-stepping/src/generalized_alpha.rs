@@ -116,7 +116,7 @@ impl Coefficients {
 }
 
 impl GeneralizedAlpha {
-    /// Starts at `t0` with step `h` [s].
+    /// Starts at `t0` with step `h` (s).
     ///
     /// # Errors
     /// [`StepError::Singular`] if the first acceleration cannot be found.
@@ -164,12 +164,12 @@ impl GeneralizedAlpha {
         })
     }
 
-    /// Step [s].
+    /// Step (s).
     pub fn step_size(&self) -> f64 {
         self.h
     }
 
-    /// Current time [s].
+    /// Current time (s).
     pub fn time(&self) -> f64 {
         self.t0 + self.steps as f64 * self.h
     }

@@ -10,7 +10,7 @@ use crate::statics::{static_equilibrium, tangent_stiffness};
 /// Modes of `K_t φ = ω² M φ`, mass-normalised, ascending.
 #[derive(Clone, Debug, Default)]
 pub struct Modes {
-    /// Angular frequencies [rad/s].
+    /// Angular frequencies (rad/s).
     pub omega: Vec<f64>,
     /// Shapes in the elastic coordinates, one column each; `Φᵀ M Φ = 1`.
     pub shapes: DMatrix<f64>,
@@ -21,7 +21,7 @@ pub struct Modes {
 }
 
 impl Modes {
-    /// Frequencies [Hz], ascending.
+    /// Frequencies (Hz), ascending.
     pub fn frequencies_hz(&self) -> Vec<f64> {
         self.omega.iter().map(|w| w / std::f64::consts::TAU).collect()
     }

@@ -2,7 +2,7 @@
 
 /// Positions, velocities and accelerations of the actuated coordinates as functions of time.
 pub trait PrescribedMotion: Send + Sync {
-    /// Writes the values at `t` [s], in coordinate order: rad or m, per s, per s².
+    /// Writes the values at `t` (s), in coordinate order: rad or m, per s, per s².
     fn sample(&self, t: f64, q: &mut [f64], qdot: &mut [f64], qddot: &mut [f64]);
 }
 

@@ -31,7 +31,7 @@ pub struct Rk4 {
 }
 
 impl Rk4 {
-    /// Starts at `t0` with step `h` [s].
+    /// Starts at `t0` with step `h` (s).
     ///
     /// # Errors
     /// [`StepError::Singular`] if the first acceleration cannot be found.
@@ -60,12 +60,12 @@ impl Rk4 {
         })
     }
 
-    /// Step [s].
+    /// Step (s).
     pub fn step_size(&self) -> f64 {
         self.h
     }
 
-    /// Current time [s].
+    /// Current time (s).
     pub fn time(&self) -> f64 {
         self.t0 + self.steps as f64 * self.h
     }

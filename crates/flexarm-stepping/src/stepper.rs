@@ -47,7 +47,7 @@ pub enum Start {
 /// What a run can see of a stepper at its current time.
 #[derive(Clone, Debug)]
 pub struct Observation {
-    /// Time [s].
+    /// Time (s).
     pub t: f64,
     /// All coordinates, actuated then elastic.
     pub q: DVector<f64>,
@@ -59,7 +59,7 @@ pub struct Observation {
     pub drive: DVector<f64>,
     /// Generalised elastic load per element: what the spring and damper put on the distal part.
     pub load: Vec<Vector6<f64>>,
-    /// Kinetic, gravitational and elastic energy [J].
+    /// Kinetic, gravitational and elastic energy (J).
     pub energy: [f64; 3],
 }
 
@@ -92,7 +92,7 @@ pub struct Counts {
 
 /// A running simulation.
 pub trait Stepper: Send {
-    /// Current time [s].
+    /// Current time (s).
     fn time(&self) -> f64;
 
     /// Advances by one step without allocation; on error the state stays at the last good time.
@@ -191,7 +191,7 @@ fn observe_reduced(
     ];
 }
 
-/// Elastic coordinates beyond this are no deflection of a link any more [m, rad].
+/// Elastic coordinates beyond this are no deflection of a link any more (m, rad).
 pub(crate) const LARGEST_DEFLECTION: f64 = 3.0;
 
 /// Stops a run whose links have come apart.

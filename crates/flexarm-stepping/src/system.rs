@@ -15,7 +15,7 @@ pub trait SecondOrderSystem {
     /// Number of coordinates.
     fn dimension(&self) -> usize;
 
-    /// `r(t, x, v, a)` [N or N m], written into `r`.
+    /// `r(t, x, v, a)` (N or N m), written into `r`.
     fn residual(&mut self, t: f64, x: &DVector<f64>, v: &DVector<f64>, a: &DVector<f64>, r: &mut DVector<f64>);
 
     /// Acceleration for which the residual vanishes, written into `a`.

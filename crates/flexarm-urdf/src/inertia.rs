@@ -96,7 +96,7 @@ fn check_waived_names(robot: &RawRobot, options: &ReadOptions, report: &mut Repo
     }
 }
 
-/// Principal moments in rising order [kg m²]; NaN if the matrix is not finite.
+/// Principal moments in rising order (kg m²); NaN if the matrix is not finite.
 fn principal_moments(inertia: &Matrix3<f64>) -> [f64; 3] {
     // Scaled to one: the squares of huge entries would overflow, and the iteration never end.
     let scale = inertia.amax();

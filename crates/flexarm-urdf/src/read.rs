@@ -58,7 +58,7 @@ impl Default for ReadOptions {
 /// Bodies count as a whole: where one link of several fixed to each other has an `<inertial>`, nothing is added.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum InertiaEstimate {
-    /// The same density everywhere [kg/m³].
+    /// The same density everywhere (kg/m³).
     Density(f64),
     /// The mass of all estimated links together, the base included, in kg; distributed by volume.
     TotalMass(f64),
@@ -88,9 +88,9 @@ pub struct UrdfRobot {
 pub struct JointDynamics {
     /// Name of the joint.
     pub joint: String,
-    /// Viscous damping [N m s/rad or N s/m].
+    /// Viscous damping (N m s/rad or N s/m).
     pub damping: f64,
-    /// Static friction [N m or N].
+    /// Static friction (N m or N).
     pub friction: f64,
 }
 

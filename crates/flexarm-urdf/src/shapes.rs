@@ -13,9 +13,9 @@ use crate::raw::{RawGeometry, RawRobot, RawVisual};
 use crate::report::Report;
 use crate::resolve::Resolver;
 
-/// Geometry larger than this was probably drawn in millimetres [m].
+/// Geometry larger than this was probably drawn in millimetres (m).
 const LARGE: f64 = 30.0;
-/// Geometry smaller than this was probably scaled twice [m].
+/// Geometry smaller than this was probably scaled twice (m).
 const SMALL: f64 = 1e-4;
 
 /// What the checks of inertia need to know of a link's shapes.

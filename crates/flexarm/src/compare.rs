@@ -17,7 +17,7 @@ use crate::robot::{FlexibleRobot, Robot, TCP_FRAME};
 use crate::summary::{LinkFigures, StepperFigures, Summary, TcpFigures};
 use crate::twin::RigidTwin;
 
-/// Largest elastic rotation for which the linear elastic model is taken to hold [rad].
+/// Largest elastic rotation for which the linear elastic model is taken to hold (rad).
 pub(crate) const ROTATION_LIMIT: f64 = 0.05;
 /// Largest engineering strain of a flexible link before a warning.
 const STRAIN_LIMIT: f64 = 1e-3;
@@ -294,7 +294,7 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// TCP error with the drives at rest in their first position, also for runs that start undeformed [m].
+    /// TCP error with the drives at rest in their first position, also for runs that start undeformed (m).
     fn static_sag(&self) -> f64 {
         let model = &self.arm.model;
         let (mut data, mut state) = (Data::new(model), State::zeros(model));

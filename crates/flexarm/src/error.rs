@@ -64,7 +64,7 @@ pub enum Error {
     /// The user stopped it.
     #[error("stopped at t = {t:.3} s{}", if *partial { "; the log up to there is complete and readable" } else { "" })]
     Interrupted {
-        /// Simulated time [s].
+        /// Simulated time (s).
         t: f64,
         /// Whether files were written up to the stop.
         partial: bool,

@@ -36,7 +36,7 @@ pub struct Inspection {
     pub bias: Vec<f64>,
     /// `bias - gravity_torque`.
     pub coriolis: Vec<f64>,
-    /// Total mass [kg], payload and base included.
+    /// Total mass (kg), payload and base included.
     pub mass_kg: f64,
     /// Things worth telling.
     pub warnings: Vec<String>,
@@ -50,9 +50,9 @@ pub struct JointInfo {
     /// revolute, continuous, prismatic.
     #[serde(rename = "type")]
     pub kind: &'static str,
-    /// Lowest position [rad or m].
+    /// Lowest position (rad or m).
     pub lower: Option<f64>,
-    /// Highest position [rad or m].
+    /// Highest position (rad or m).
     pub upper: Option<f64>,
     /// Highest speed.
     pub velocity: Option<f64>,
@@ -65,11 +65,11 @@ pub struct JointInfo {
 pub struct LinkInfo {
     /// Name.
     pub name: String,
-    /// Mass [kg]; 0 for a mere frame.
+    /// Mass (kg); 0 for a mere frame.
     pub mass_kg: f64,
-    /// Centre of mass in link axes [m].
+    /// Centre of mass in link axes (m).
     pub com_m: [f64; 3],
-    /// `ixx iyy izz ixy ixz iyz` about the centre of mass, link axes [kg m²].
+    /// `ixx iyy izz ixy ixz iyz` about the centre of mass, link axes (kg m²).
     pub inertia: [f64; 6],
 }
 
@@ -80,9 +80,9 @@ pub struct FlexibleInfo {
     pub name: String,
     /// Where its stiffness comes from.
     pub method: String,
-    /// Distance of the interfaces [m].
+    /// Distance of the interfaces (m).
     pub length_m: f64,
-    /// Masses of the two parts [kg].
+    /// Masses of the two parts (kg).
     pub parts_kg: [f64; 2],
     /// Stiffness at the split, 6×6, linear first.
     pub stiffness: Vec<Vec<f64>>,
@@ -93,7 +93,7 @@ pub struct FlexibleInfo {
 pub struct TcpInfo {
     /// Link that carries it.
     pub link: String,
-    /// Position [m].
+    /// Position (m).
     pub position_m: [f64; 3],
     /// Attitude, w first.
     pub quaternion_wxyz: [f64; 4],

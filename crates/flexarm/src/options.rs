@@ -29,7 +29,7 @@ impl LinkModel {
 pub struct RunOptions {
     /// Time stepper.
     pub stepper: StepperKind,
-    /// Step [s].
+    /// Step (s).
     pub step_s: f64,
     /// Link model.
     pub links: LinkModel,
@@ -41,7 +41,7 @@ pub struct RunOptions {
     pub ignore_limits: bool,
     /// Log and measure against the rigid twin.
     pub with_twin: bool,
-    /// Band of the settling time [m].
+    /// Band of the settling time (m).
     pub settling_band_m: f64,
 }
 

@@ -21,7 +21,7 @@ pub struct RobotFile {
     pub tcp: Option<Spanned<TcpEntry>>,
     /// What the tool carries.
     pub payload: Option<Spanned<PayloadEntry>>,
-    /// Acceleration of gravity in base axes [m/s²].
+    /// Acceleration of gravity in base axes (m/s²).
     pub gravity: Option<Spanned<[f64; 3]>>,
     /// Trajectory for `flexarm compare` without one, relative to the robot file.
     pub default_trajectory: Option<Spanned<PathBuf>>,
@@ -45,10 +45,10 @@ pub struct RobotFile {
 pub struct TcpEntry {
     /// Link that carries it.
     pub link: Spanned<String>,
-    /// Position [m].
+    /// Position (m).
     #[serde(default)]
     pub xyz: [f64; 3],
-    /// Roll, pitch, yaw [rad].
+    /// Roll, pitch, yaw (rad).
     #[serde(default)]
     pub rpy: [f64; 3],
 }
@@ -59,11 +59,11 @@ pub struct TcpEntry {
 pub struct PayloadEntry {
     /// Link that carries it; that of the TCP if not given.
     pub link: Option<Spanned<String>>,
-    /// Mass [kg].
+    /// Mass (kg).
     pub mass: Spanned<f64>,
-    /// Centre of mass in link axes [m].
+    /// Centre of mass in link axes (m).
     pub com: [f64; 3],
-    /// `ixx iyy izz ixy ixz iyz` about the centre of mass [kg m²].
+    /// `ixx iyy izz ixy ixz iyz` about the centre of mass (kg m²).
     #[serde(default)]
     pub inertia: [f64; 6],
 }
@@ -103,7 +103,7 @@ fn yes() -> bool {
 pub struct DampingEntry {
     /// Ratio to critical, per mode.
     pub modal: Option<f64>,
-    /// `D = beta K` [s].
+    /// `D = beta K` (s).
     pub stiffness_beta: Option<f64>,
 }
 
@@ -113,39 +113,39 @@ pub struct DampingEntry {
 pub struct BeamEntry {
     /// box, rectangle, tube, circle or given.
     pub section: String,
-    /// Along section axis y [m].
+    /// Along section axis y (m).
     pub width: Option<f64>,
-    /// Along section axis z [m].
+    /// Along section axis z (m).
     pub height: Option<f64>,
-    /// Thickness [m].
+    /// Thickness (m).
     pub wall: Option<f64>,
-    /// Of tubes [m].
+    /// Of tubes (m).
     pub outer_diameter: Option<f64>,
-    /// Of circles [m].
+    /// Of circles (m).
     pub diameter: Option<f64>,
-    /// Stretching stiffness [N].
+    /// Stretching stiffness (N).
     #[serde(rename = "EA")]
     pub ea: Option<f64>,
-    /// Bending stiffness about y [N m²].
+    /// Bending stiffness about y (N m²).
     #[serde(rename = "EI_y")]
     pub ei_y: Option<f64>,
-    /// Bending stiffness about z [N m²].
+    /// Bending stiffness about z (N m²).
     #[serde(rename = "EI_z")]
     pub ei_z: Option<f64>,
-    /// Torsional stiffness [N m²].
+    /// Torsional stiffness (N m²).
     #[serde(rename = "GJ")]
     pub gj: Option<f64>,
-    /// Shear stiffness along y [N].
+    /// Shear stiffness along y (N).
     #[serde(rename = "kGA_y")]
     pub kga_y: Option<f64>,
-    /// Shear stiffness along z [N].
+    /// Shear stiffness along z (N).
     #[serde(rename = "kGA_z")]
     pub kga_z: Option<f64>,
-    /// For given sections [kg/m].
+    /// For given sections (kg/m).
     pub mass_per_length: Option<f64>,
-    /// Rotary inertia about y, `rho I_y`, for given sections [kg m].
+    /// Rotary inertia about y, `rho I_y`, for given sections (kg m).
     pub rotary_y: Option<f64>,
-    /// Rotary inertia about z, for given sections [kg m].
+    /// Rotary inertia about z, for given sections (kg m).
     pub rotary_z: Option<f64>,
     /// A name or elastic constants.
     pub material: Option<MaterialEntry>,
@@ -153,10 +153,10 @@ pub struct BeamEntry {
     pub theory: Option<String>,
     /// Direction of the section's y axis in link axes; chosen if not given.
     pub y_axis: Option<[f64; 3]>,
-    /// Turn of the section about the beam [rad].
+    /// Turn of the section about the beam (rad).
     #[serde(default)]
     pub roll: f64,
-    /// From the line A-B to the beam, link axes [m].
+    /// From the line A-B to the beam, link axes (m).
     #[serde(default)]
     pub offset: [f64; 3],
     /// Where the link is split, as a fraction of A-B.
@@ -204,12 +204,12 @@ impl<'de> Deserialize<'de> for MaterialEntry {
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MaterialConstants {
-    /// Young's modulus [Pa].
+    /// Young's modulus (Pa).
     #[serde(rename = "E")]
     pub young: f64,
     /// Poisson's ratio.
     pub nu: f64,
-    /// Density [kg/m³].
+    /// Density (kg/m³).
     pub rho: f64,
 }
 

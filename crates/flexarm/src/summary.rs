@@ -19,26 +19,26 @@ pub struct Summary {
     pub links_model: &'static str,
     /// "complete", or why the run stopped early.
     pub end: String,
-    /// Simulated time [s].
+    /// Simulated time (s).
     pub duration_s: f64,
     /// Stepper with its work.
     pub stepper: StepperFigures,
-    /// Wall-clock time of the run, recordings included [s].
+    /// Wall-clock time of the run, recordings included (s).
     pub wall_s: f64,
     /// Simulated over wall-clock time.
     pub real_time_factor: f64,
-    /// Processor time, all threads [s].
+    /// Processor time, all threads (s).
     pub cpu_s: f64,
     /// Processor time per simulated second.
     pub cpu_s_per_simulated_s: f64,
     /// Flexible against rigid tool centre point; absent for runs without the twin.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tcp: Option<TcpFigures>,
-    /// Natural frequencies at the start pose, drives locked [Hz].
+    /// Natural frequencies at the start pose, drives locked (Hz).
     pub frequencies_hz: Vec<f64>,
     /// Flexible links.
     pub links: Vec<LinkFigures>,
-    /// Largest force per drive [N m or N].
+    /// Largest force per drive (N m or N).
     pub drives: BTreeMap<String, f64>,
     /// Things worth telling.
     pub warnings: Vec<String>,
@@ -67,7 +67,7 @@ pub struct Files {
 pub struct StepperFigures {
     /// Word of the command line.
     pub name: &'static str,
-    /// Step [s].
+    /// Step (s).
     pub h_s: f64,
     /// Spectral radius (generalised-alpha).
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -114,38 +114,38 @@ impl StepperFigures {
 pub struct LinkFigures {
     /// Name of the link.
     pub name: String,
-    /// Largest TCP displacement that its deflection alone causes [m].
+    /// Largest TCP displacement that its deflection alone causes (m).
     pub peak_contribution_m: f64,
     /// Largest change of the distance of its interfaces over that distance.
     pub engineering_strain: f64,
-    /// Largest elastic rotation [rad].
+    /// Largest elastic rotation (rad).
     pub peak_rotation_rad: f64,
 }
 
 /// Flexible against rigid tool centre point.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct TcpFigures {
-    /// Largest distance [m].
+    /// Largest distance (m).
     pub peak_m: f64,
-    /// When [s].
+    /// When (s).
     pub t_peak_s: f64,
-    /// Root mean square of the distance [m].
+    /// Root mean square of the distance (m).
     pub rms_m: f64,
-    /// Distance at the end [m].
+    /// Distance at the end (m).
     pub end_m: f64,
-    /// Distance at rest at the start [m].
+    /// Distance at rest at the start (m).
     pub static_sag_m: f64,
-    /// Largest angle [rad].
+    /// Largest angle (rad).
     pub peak_rad: f64,
-    /// Root mean square of the angle [rad].
+    /// Root mean square of the angle (rad).
     pub rms_rad: f64,
-    /// Time from the end of the last move until the error stays within the band of its final value [s].
+    /// Time from the end of the last move until the error stays within the band of its final value (s).
     pub settling_s: Option<f64>,
-    /// Largest excursion past the final value after a move [m].
+    /// Largest excursion past the final value after a move (m).
     pub overshoot_m: f64,
-    /// Strongest frequency of the error [Hz].
+    /// Strongest frequency of the error (Hz).
     pub dominant_hz: Option<f64>,
-    /// Largest components along, across and out of the path [m].
+    /// Largest components along, across and out of the path (m).
     pub path_peak_m: [f64; 3],
 }
 
@@ -203,7 +203,7 @@ impl Summary {
     }
 }
 
-/// Largest error in each of 60 equal pieces of the run [m].
+/// Largest error in each of 60 equal pieces of the run (m).
 pub(crate) fn thinned(times: &[f64], errors: &[[f64; 6]]) -> Vec<f64> {
     let pieces = 60.min(times.len());
     (0..pieces)

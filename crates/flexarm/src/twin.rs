@@ -11,9 +11,9 @@ pub(crate) struct RigidTwin {
     qddot: DVector<f64>,
     /// Jacobian of the TCP, world axes.
     pub(crate) J: Matrix6xX<f64>,
-    /// Velocity of the TCP [m/s].
+    /// Velocity of the TCP (m/s).
     pub(crate) velocity: Vector3<f64>,
-    /// Acceleration of the TCP [m/s²].
+    /// Acceleration of the TCP (m/s²).
     pub(crate) acceleration: Vector3<f64>,
 }
 

@@ -13,7 +13,7 @@ pub struct ReferenceArm {
     pub mechanism: Mechanism,
     /// Stiffness at the two splits.
     pub K_S: [Matrix6<f64>; 2],
-    /// `D = beta K` [s].
+    /// `D = beta K` (s).
     pub beta: f64,
 }
 

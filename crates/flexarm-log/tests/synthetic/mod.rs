@@ -44,6 +44,7 @@ pub(crate) fn header() -> RunHeader {
         trajectory: "swing".into(),
         urdf: urdf(),
         joints: ["joint_1", "joint_2", "joint_3"].map(str::to_owned).into(),
+        prismatic: Vec::new(),
         links,
         elements: vec!["upper_arm".into()],
         meshes,

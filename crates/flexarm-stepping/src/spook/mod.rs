@@ -28,7 +28,7 @@ use crate::stepper::{Counts, LARGEST_DEFLECTION, Observation, Stepper};
 use constraint::Rows;
 use solve::TreeSolver;
 
-/// Compliance of a rigid joint [m/N, rad/(N m)]: 1e4 N move it by 1e-13 m.
+/// Compliance of a rigid joint (m/N, rad/(N m)): 1e4 N move it by 1e-13 m.
 const RIGID_COMPLIANCE: f64 = 1e-17;
 
 /// Axes in which the relative motion of an elastic joint is measured.

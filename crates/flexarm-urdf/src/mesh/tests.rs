@@ -14,7 +14,7 @@ fn decode(bytes: &[u8], path: &Path) -> Result<Loaded, MeshError> {
     super::decode(bytes, path, UpAxis::Declared)
 }
 
-/// Edges of the box [m] and its centre.
+/// Edges of the box (m) and its centre.
 const SIZE: [f64; 3] = [0.25, 0.5, 0.75];
 const CENTRE: [f64; 3] = [1.0, -2.0, 0.5];
 
