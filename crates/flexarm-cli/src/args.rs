@@ -111,7 +111,7 @@ pub(crate) struct RunArgs {
 pub(crate) struct InspectArgs {
     /// robot.toml, a folder with one, a .urdf or .xacro file, or the name of a shipped robot
     pub(crate) robot: PathBuf,
-    /// Joint values in coordinate order, or name=value pairs (rad, m)
+    /// Joint values in coordinate order, or name=value pairs (rad or m; 30deg for degrees)
     #[arg(long, value_name = "Q1,Q2,...", allow_hyphen_values = true)]
     pub(crate) at: Option<String>,
     /// Joint velocities, likewise (rad/s, m/s)

@@ -107,7 +107,8 @@ fn rows(M: &DMatrix<f64>) -> Vec<Vec<f64>> {
     M.row_iter().map(|r| r.iter().copied().collect()).collect()
 }
 
-/// Reads a joint vector: `v1,v2,...` in coordinate order, or `name=value,...` with the rest zero.
+/// Reads a joint vector: `v1,v2,...` in coordinate order, or `name=value,...` with the rest zero; rad or m, or degrees
+/// with the ending `deg`.
 ///
 /// # Errors
 /// [`Error::Usage`] saying which joints there are.
@@ -115,8 +116,14 @@ pub fn parse_joint_values(text: &str, joints: &[&str]) -> Result<Vec<f64>, Error
     let mut values = vec![0.0; joints.len()];
     let items: Vec<&str> = text.split(',').map(str::trim).filter(|s| !s.is_empty()).collect();
     let number = |s: &str| {
-        let value: Option<f64> = s.trim().parse().ok().filter(|x: &f64| x.is_finite());
-        value.ok_or_else(|| Error::Usage(format!("joint value {s:?} is not a finite number (rad or m)")))
+        let (digits, unit) = match s.trim().strip_suffix("deg") {
+            Some(digits) => (digits.trim(), std::f64::consts::PI / 180.0),
+            None => (s.trim(), 1.0),
+        };
+        let value: Option<f64> = digits.parse().ok().filter(|x: &f64| x.is_finite());
+        value.map(|x| x * unit).ok_or_else(|| {
+            Error::Usage(format!("joint value {s:?} is not a finite number (rad or m, or degrees as in 30deg)"))
+        })
     };
     if items.iter().any(|i| i.contains('=')) {
         let mut given = vec![false; joints.len()];
