@@ -47,9 +47,10 @@ mod record;
 mod spectrum;
 
 pub use contributions::{ContributionPeak, ContributionPeaks, engineering_strain, tcp_displacement};
+pub use flexarm_kinematics::{Pose, rotation_vector};
 pub use hold::HoldMetrics;
 pub use metrics::{MetricSettings, TcpMetrics, tcp_metrics};
 pub use path_frame::{PathFrame, path_frames};
-pub use pose_error::{Pose, rotation_vector, tcp_error};
+pub use pose_error::tcp_error;
 pub use record::{ErrorRecord, RecordError};
 pub use spectrum::{SpectralLine, Taper, strongest_line};

@@ -1,12 +1,6 @@
 //! The difference of two poses as a 6-vector, accurate from a picoradian to half a turn.
 
-use nalgebra::{IsometryMatrix3, Matrix3, Vector3};
-
-/// A pose `X_WT`: rotation matrix and translation in m.
-pub type Pose = IsometryMatrix3<f64>;
-
-/// Below this cosine the axis is taken from the symmetric part of the rotation, above from the skew part.
-const NEAR_HALF_TURN: f64 = -0.9;
+use flexarm_kinematics::{Pose, rotation_vector};
 
 /// TCP error: flexible minus rigid pose, in world axes.
 ///
@@ -25,32 +19,10 @@ pub fn tcp_error(rigid: &Pose, flexible: &Pose) -> [f64; 6] {
     [p.x, p.y, p.z, theta.x, theta.y, theta.z]
 }
 
-/// Rotation vector (unit axis times angle, 0 to pi) of the rotation matrix `R`, rad.
-///
-/// ```text
-/// (R - Rᵀ)/2 = sin θ [a]x,   (R + Rᵀ)/2 = cos θ 1 + (1 - cos θ) a aᵀ
-/// ```
-/// At exactly half a turn both `a` and `-a` are right; one of them is returned.
-pub fn rotation_vector(R: &Matrix3<f64>) -> Vector3<f64> {
-    let skew = 0.5 * Vector3::new(R[(2, 1)] - R[(1, 2)], R[(0, 2)] - R[(2, 0)], R[(1, 0)] - R[(0, 1)]);
-    let (sine, cosine) = (skew.norm(), 0.5 * (R.trace() - 1.0));
-    let angle = sine.atan2(cosine);
-    if cosine > NEAR_HALF_TURN {
-        // θ / sin θ tends to 1; where the sine is lost to underflow, the angle is as well.
-        return if sine > 0.0 { skew * (angle / sine) } else { skew };
-    }
-
-    // The largest column of a aᵀ is a, up to its length; its sign follows from the skew part.
-    let outer = 0.5 * (R + R.transpose()) - Matrix3::identity() * cosine;
-    let largest = outer.diagonal().imax();
-    let axis = outer.column(largest).normalize();
-    if axis.dot(&skew) < 0.0 { -axis * angle } else { axis * angle }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::{Rotation3, Translation3};
+    use nalgebra::{Rotation3, Translation3, Vector3};
     use proptest::prelude::*;
 
     /// Truth: a rotation by 1e-9 rad is the identity plus a skew matrix up to 5e-19.

@@ -9,6 +9,9 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::spatial::skew;
 
+/// Below this cosine the axis is taken from the symmetric part of the rotation, above from the skew part.
+const NEAR_HALF_TURN: f64 = -0.9;
+
 /// Which three numbers describe the rotation of an elastic joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum ElasticAngles {
@@ -78,21 +81,25 @@ impl ElasticAngles {
     }
 }
 
-/// Rotation vector of a rotation matrix, accurate for tiny angles and near half a turn.
+/// Rotation vector (unit axis times angle, 0 to pi) of a rotation matrix, accurate from a picoradian to half a turn.
+///
+/// ```text
+/// (R - Rᵀ)/2 = sin θ [a]x,   (R + Rᵀ)/2 = cos θ 1 + (1 - cos θ) a aᵀ
+/// ```
+/// At exactly half a turn both `a` and `-a` are right; one of them is returned.
 pub fn rotation_vector(R: &Matrix3<f64>) -> Vector3<f64> {
-    // 2 sin(theta) n and 1 + 2 cos(theta)
-    let twice_sine = Vector3::new(R[(2, 1)] - R[(1, 2)], R[(0, 2)] - R[(2, 0)], R[(1, 0)] - R[(0, 1)]);
-    let (sine, cosine) = (0.5 * twice_sine.norm(), 0.5 * (R.trace() - 1.0));
-    let theta = sine.atan2(cosine);
-    if cosine > -0.9 {
-        let ratio = if theta < 1e-4 { 0.5 * (1.0 + theta * theta / 6.0) } else { 0.5 * theta / sine };
-        return twice_sine * ratio;
+    let skew = 0.5 * Vector3::new(R[(2, 1)] - R[(1, 2)], R[(0, 2)] - R[(2, 0)], R[(1, 0)] - R[(0, 1)]);
+    let (sine, cosine) = (skew.norm(), 0.5 * (R.trace() - 1.0));
+    let angle = sine.atan2(cosine);
+    if cosine > NEAR_HALF_TURN {
+        // θ / sin θ tends to 1; where the sine is lost to underflow, the angle is as well.
+        return if sine > 0.0 { skew * (angle / sine) } else { skew };
     }
-    // Near half a turn the skew part vanishes; the symmetric part (R + Rᵀ)/2 - cos 1 = (1 - cos) n nᵀ does not.
-    let S = (R + R.transpose()) * 0.5 - Matrix3::from_diagonal_element(cosine);
-    let k = (0..3).max_by(|&a, &b| S[(a, a)].total_cmp(&S[(b, b)])).unwrap_or(0);
-    let n = S.column(k).normalize();
-    if n.dot(&twice_sine) < 0.0 { n * -theta } else { n * theta }
+    // The largest column of a aᵀ is a, up to its length; its sign follows from the skew part.
+    let outer = 0.5 * (R + R.transpose()) - Matrix3::identity() * cosine;
+    let largest = outer.diagonal().imax();
+    let axis = outer.column(largest).normalize();
+    if axis.dot(&skew) < 0.0 { -axis * angle } else { axis * angle }
 }
 
 /// Coefficients of the exponential map at `x = theta²`, with the derivatives of the last two by x.
