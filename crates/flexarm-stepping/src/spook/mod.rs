@@ -153,7 +153,7 @@ impl Spook {
         for (body, F) in &arm.loads {
             loads[*body] += F.to_vector();
         }
-        Ok(Self {
+        let mut spook = Self {
             solver: TreeSolver::new(model.bodies().iter().map(|b| b.parent).collect()),
             arm,
             h,
@@ -170,7 +170,10 @@ impl Spook {
             scratch: DVector::zeros(na),
             velocities: vec![Vector6::zeros(); n],
             loads,
-        })
+        };
+        // The impulses of the first step, so that the forces are known before it.
+        spook.solve()?;
+        Ok(spook)
     }
 
     fn time_after(&self, steps: u64) -> f64 {
@@ -197,6 +200,55 @@ impl Stepper for Spook {
     }
 
     fn step(&mut self) -> Result<(), StepError> {
+        self.solve()?;
+        self.advance()
+    }
+
+    fn observe(&mut self, out: &mut Observation) {
+        let (h, t) = (self.h, self.time());
+        self.sample(t);
+        let model = self.arm.model.clone();
+        let n = model.n_actuated();
+        out.t = t;
+        out.q.rows_mut(0, n).copy_from(&self.q);
+        out.qdot.rows_mut(0, n).copy_from(&self.qdot);
+        let (mut kinetic, mut potential) = (0.0, 0.0);
+        for (i, state) in self.bodies.iter().enumerate() {
+            out.X_WB[i] = state.X_WB();
+            let w = state.R.inverse() * state.V.angular;
+            kinetic += 0.5 * (state.mass * state.V.linear.norm_squared() + w.dot(&(state.J * w)));
+            potential -= state.mass * model.gravity.dot(&state.x);
+        }
+        for (i, body) in model.bodies().iter().enumerate().skip(1) {
+            // Mean force over the last step (before the first one: over that).
+            let force = self.lambda[i] / h;
+            match body.motion {
+                JointMotion::Revolute(axis) => out.drive[body.coordinate] = axis.dot(&force.fixed_rows::<3>(3)),
+                JointMotion::Prismatic(axis) => out.drive[body.coordinate] = axis.dot(&force.fixed_rows::<3>(0)),
+                JointMotion::Elastic(angles) => {
+                    let (parent, child) = (&self.bodies[body.parent], &self.bodies[i]);
+                    let (X_WP, X_WQ) = (parent.X_WB() * body.X_PJ, child.X_WB());
+                    let rows = Rows::new(ConstraintForm::Local, angles, &X_WP, &parent.x, &X_WQ, &child.x);
+                    let rate = rows.G_parent * parent.V.to_vector() + rows.G_child * child.V.to_vector();
+                    out.q.fixed_rows_mut::<6>(body.coordinate).copy_from(&rows.g);
+                    out.qdot.fixed_rows_mut::<6>(body.coordinate).copy_from(&rate);
+                    let k = (body.coordinate - n) / 6;
+                    let element = &self.arm.elements[k];
+                    out.load[k] = -(element.K_S * (rows.g + rate * self.arm.tau[k]));
+                }
+            }
+        }
+        out.energy = [kinetic, potential, self.arm.elastic_energy(&out.q.as_slice()[n..])];
+    }
+
+    fn counts(&self) -> Counts {
+        Counts { steps: self.steps, evaluations: self.steps, factorisations: self.steps }
+    }
+}
+
+impl Spook {
+    /// Velocities and impulses of the step from the current time; poses stay.
+    fn solve(&mut self) -> Result<(), StepError> {
         let (h, t, t_next) = (self.h, self.time(), self.time_after(self.steps + 1));
         // Rates at the end of the step belong to the new velocities, positions at its start to g.
         self.sample(t_next);
@@ -266,7 +318,12 @@ impl Stepper for Spook {
             .solve(right_hand_side, velocities, lambda)
             .map_err(|_| StepError::Singular { matrix: "constraint matrix", t })?;
 
-        // New poses; the old ones stay until all are known to be sound.
+        Ok(())
+    }
+
+    /// New poses from the velocities; the old ones stay until all are known to be sound.
+    fn advance(&mut self) -> Result<(), StepError> {
+        let (h, t_next) = (self.h, self.time_after(self.steps + 1));
         let mut largest = 0.0f64;
         for ((trial, body), v) in self.trial.iter_mut().zip(&self.bodies).zip(&self.velocities).skip(1) {
             trial.V = Twist::from_vector(v);
@@ -285,49 +342,6 @@ impl Stepper for Spook {
         Ok(())
     }
 
-    fn observe(&mut self, out: &mut Observation) {
-        let (h, t) = (self.h, self.time());
-        self.sample(t);
-        let model = self.arm.model.clone();
-        let n = model.n_actuated();
-        out.t = t;
-        out.q.rows_mut(0, n).copy_from(&self.q);
-        out.qdot.rows_mut(0, n).copy_from(&self.qdot);
-        let (mut kinetic, mut potential) = (0.0, 0.0);
-        for (i, state) in self.bodies.iter().enumerate() {
-            out.X_WB[i] = state.X_WB();
-            let w = state.R.inverse() * state.V.angular;
-            kinetic += 0.5 * (state.mass * state.V.linear.norm_squared() + w.dot(&(state.J * w)));
-            potential -= state.mass * model.gravity.dot(&state.x);
-        }
-        for (i, body) in model.bodies().iter().enumerate().skip(1) {
-            // Before the first step there is no impulse yet; the forces are then those of the springs at rest.
-            let force = self.lambda[i] / h;
-            match body.motion {
-                JointMotion::Revolute(axis) => out.drive[body.coordinate] = axis.dot(&force.fixed_rows::<3>(3)),
-                JointMotion::Prismatic(axis) => out.drive[body.coordinate] = axis.dot(&force.fixed_rows::<3>(0)),
-                JointMotion::Elastic(angles) => {
-                    let (parent, child) = (&self.bodies[body.parent], &self.bodies[i]);
-                    let (X_WP, X_WQ) = (parent.X_WB() * body.X_PJ, child.X_WB());
-                    let rows = Rows::new(ConstraintForm::Local, angles, &X_WP, &parent.x, &X_WQ, &child.x);
-                    let rate = rows.G_parent * parent.V.to_vector() + rows.G_child * child.V.to_vector();
-                    out.q.fixed_rows_mut::<6>(body.coordinate).copy_from(&rows.g);
-                    out.qdot.fixed_rows_mut::<6>(body.coordinate).copy_from(&rate);
-                    let k = (body.coordinate - n) / 6;
-                    let element = &self.arm.elements[k];
-                    out.load[k] = -(element.K_S * (rows.g + rate * self.arm.tau[k]));
-                }
-            }
-        }
-        out.energy = [kinetic, potential, self.arm.elastic_energy(&out.q.as_slice()[n..])];
-    }
-
-    fn counts(&self) -> Counts {
-        Counts { steps: self.steps, evaluations: self.steps, factorisations: self.steps }
-    }
-}
-
-impl Spook {
     /// Prescribed motion at t into `q`, `qdot`.
     fn sample(&mut self, t: f64) {
         let Self { arm, q, qdot, scratch, .. } = self;
