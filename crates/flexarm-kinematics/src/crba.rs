@@ -4,11 +4,11 @@
 //! carried inward, gives one column of M. An elastic joint is six columns at once, as 3×3 blocks in its parent's
 //! axes, where its translations are constant. Source: [Featherstone 2008], Table 6.2.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3};
 
 use crate::data::{Data, joint_position};
 use crate::model::{JointMotion, Model};
-use crate::spatial::{Pose, SpatialInertia, Twist, Wrench, cross3, mul3, tr_mul, tr_mul3};
+use crate::spatial::{SpatialInertia, Wrench, cross3, mul, mul3, tr_mul, tr_mul3};
 
 /// Mass matrix `M(q)`, nv×nv, both triangles (kg, kg m, kg m²). Fills `data.{X_PB, M}`. No allocation.
 pub fn mass_matrix<'d>(model: &Model, data: &'d mut Data, q: &DVector<f64>) -> &'d DMatrix<f64> {
@@ -30,52 +30,50 @@ pub fn mass_matrix_at_poses(model: &Model, data: &mut Data) {
     for i in (1..n).rev() {
         let body = &model.bodies[i];
         let (composite, X_PB) = (data.composite[i], data.X_PB[i]);
-        // Column of each coordinate of joint i, rows of itself and of the joints inward of it.
+        let k = body.coordinate;
         match body.motion {
             JointMotion::Revolute(axis) => {
-                let F = composite.mul_twist(&Twist::new(Vector3::zeros(), axis)) * body.ratio;
-                let k = body.coordinate;
-                data.M.as_mut_slice()[k * nv + k] += body.ratio * axis.dot(&F.torque);
-                one_column(model, data, i, k, F);
+                let a = axis * body.ratio;
+                let F = Wrench::new(a.cross(&composite.first_moment), mul(&composite.rotational, &a));
+                data.M.as_mut_slice()[k * nv + k] += a.dot(&F.torque);
+                data.U[i] = F;
             }
             JointMotion::Prismatic(axis) => {
-                let F = composite.mul_twist(&Twist::new(axis, Vector3::zeros())) * body.ratio;
-                let k = body.coordinate;
-                data.M.as_mut_slice()[k * nv + k] += body.ratio * axis.dot(&F.force);
-                one_column(model, data, i, k, F);
+                let a = axis * body.ratio;
+                let F = Wrench::new(a * composite.mass, composite.first_moment.cross(&a));
+                data.M.as_mut_slice()[k * nv + k] += a.dot(&F.force);
+                data.U[i] = F;
             }
-            JointMotion::Elastic(_) => {}
+            JointMotion::Elastic(_) => elastic_columns(model, data, i, &composite),
         }
-        let is_elastic = matches!(body.motion, JointMotion::Elastic(_));
-        if body.parent > 0 || is_elastic {
-            let M_P = composite.at_parent(&X_PB);
-            data.composite[body.parent] += M_P;
-            if is_elastic {
-                elastic_columns(model, data, i, &M_P);
-            }
+        if body.parent > 0 {
+            data.composite[body.parent] += composite.at_parent(&X_PB);
+            carry_columns(model, data, i);
         }
     }
 }
 
-/// Rows of all joints inward of body j in the column of one coordinate; `F` at j.
+/// Carries the wrenches of all one-DoF joints from body i outward over to its parent and meets the parent's joint:
+/// one level for all of them at once, because they do not wait for each other.
 #[inline(always)]
-fn one_column(model: &Model, data: &mut Data, mut j: usize, column: usize, mut F: Wrench) {
-    let nv = data.M.nrows();
+fn carry_columns(model: &Model, data: &mut Data, i: usize) {
+    let (nv, X_PB) = (data.M.nrows(), data.X_PB[i]);
+    let parent = model.bodies[i].parent;
+    let inward = &model.bodies[parent];
+    let row = inward.coordinate;
     let M = data.M.as_mut_slice();
-    loop {
-        let parent = model.bodies[j].parent;
-        if parent == 0 {
-            return;
+    let outward = i..model.bodies[i].subtree_end;
+    for (F, body) in data.U[outward.clone()].iter_mut().zip(&model.bodies[outward]) {
+        if matches!(body.motion, JointMotion::Elastic(_)) {
+            continue;
         }
-        F = F.at_parent(&data.X_PB[j]);
-        j = parent;
-        let inward = &model.bodies[j];
-        let row = inward.coordinate;
+        *F = F.at_parent(&X_PB);
+        let column = body.coordinate;
         match inward.motion {
             JointMotion::Revolute(axis) => add_pair(M, nv, row, column, inward.ratio * axis.dot(&F.torque)),
             JointMotion::Prismatic(axis) => add_pair(M, nv, row, column, inward.ratio * axis.dot(&F.force)),
             JointMotion::Elastic(_) => {
-                let S = &data.elastic[j];
+                let S = &data.elastic[parent];
                 let (f, t) = (tr_mul(&S.L, &F.force), tr_mul(&S.B, &F.torque));
                 add_six(M, nv, row, column, [f.x, f.y, f.z, t.x, t.y, t.z]);
             }
@@ -103,53 +101,36 @@ fn add_six(M: &mut [f64], nv: usize, row: usize, column: usize, values: [f64; 6]
     }
 }
 
-/// Wrenches on six columns, as 3×3 blocks: translations (t), then angles (r).
-struct Columns {
-    force_t: Matrix3<f64>,
-    torque_t: Matrix3<f64>,
-    force_r: Matrix3<f64>,
-    torque_r: Matrix3<f64>,
-}
-
-impl Columns {
-    #[inline(always)]
-    fn at_parent(&self, X_PB: &Pose) -> Self {
-        let (R, p) = (X_PB.rotation.matrix(), &X_PB.translation.vector);
-        let (force_t, force_r) = (mul3(R, &self.force_t), mul3(R, &self.force_r));
-        Self {
-            torque_t: mul3(R, &self.torque_t) + cross3(p, &force_t),
-            torque_r: mul3(R, &self.torque_r) + cross3(p, &force_r),
-            force_t,
-            force_r,
-        }
-    }
-}
-
-/// All columns of an elastic joint, from the composite inertia `M_P` of its body about Po in P axes.
+/// All columns of an elastic joint of body i, whose composite inertia is `composite` (about Bo, B axes).
 ///
-/// With `Ω = R_PB B`, `p = p_PB`: S at Po in P axes is `[R_PJ, [p]x Ω; 0, Ω]`.
+/// Everything is kept in the axes of the parent P, and the axes of the joints inward are turned there, one rotation
+/// per level instead of four. With `U = R_PJ` and `Ω = R_PB B` the joint moves Bo by `U d'` and turns B by `Ω φ'`; the
+/// composite's first moment `h_B` and inertia `J_B` about Bo answer with
+///
+/// ```text
+/// translations: force m U,          moment about Bo  [h_B]x U
+/// angles:       force -[h_B]x Ω,    moment about Bo  W = J_B Ω
+/// ```
+/// About the origin of a joint inward, `r` before Bo, an axis a meets them as
+/// `Uᵀ (a × (m r + h_B))` and `Wᵀ a - Ωᵀ ((a × r) × h_B)`.
 #[inline(always)]
-fn elastic_columns(model: &Model, data: &mut Data, i: usize, M_P: &SpatialInertia) {
+fn elastic_columns(model: &Model, data: &mut Data, i: usize, composite: &SpatialInertia) {
     let body = &model.bodies[i];
-    let (X_PB, nv) = (&data.X_PB[i], data.M.nrows());
-    let (R_PJ, p, h) = (body.X_PJ.rotation.matrix(), &X_PB.translation.vector, &M_P.first_moment);
-    let Omega = mul3(X_PB.rotation.matrix(), &data.elastic[i].B);
-    let force_r = cross3(&(p * M_P.mass - h), &Omega);
-    let mut F = Columns {
-        force_t: R_PJ * M_P.mass,
-        torque_t: cross3(h, R_PJ),
-        torque_r: cross3(h, &cross3(p, &Omega)) + mul3(&M_P.rotational, &Omega),
-        force_r,
-    };
+    let (X_PB, nv, mass) = (&data.X_PB[i], data.M.nrows(), composite.mass);
+    let (R_PB, U) = (X_PB.rotation.matrix(), body.X_PJ.rotation.matrix());
+    let B = &data.elastic[i].B;
+    let Omega = mul3(R_PB, B);
+    let W = mul3(R_PB, &mul3(&composite.rotational, B));
+    let h_B = mul(R_PB, &composite.first_moment);
+    let force_r = -cross3(&h_B, &Omega);
 
     // Own block: the translations meet the mass alone.
     let k = body.coordinate;
-    let tr = tr_mul3(R_PJ, &force_r);
-    let rr = tr_mul3(&Omega, &(F.torque_r - cross3(p, &force_r)));
+    let (tr, rr) = (tr_mul3(U, &force_r), tr_mul3(&Omega, &W));
     let M = data.M.as_mut_slice();
     for c in 0..3 {
         let column = &mut M[(k + c) * nv + k..][..6];
-        column[c] = M_P.mass;
+        column[c] = mass;
         for r in 0..3 {
             column[3 + r] = tr[(c, r)];
         }
@@ -160,25 +141,30 @@ fn elastic_columns(model: &Model, data: &mut Data, i: usize, M_P: &SpatialInerti
         }
     }
 
+    // From joint to joint inward: A the body there, R_AP its rotation, r from Ao to Bo in P axes.
     let mut j = body.parent;
+    let (mut R_AP, mut r) = (Matrix3::identity(), X_PB.translation.vector);
     while j > 0 {
         let inward = &model.bodies[j];
         let row = inward.coordinate;
         match inward.motion {
             JointMotion::Revolute(axis) => {
-                let a = axis * inward.ratio;
-                let (t, r) = (tr_mul(&F.torque_t, &a), tr_mul(&F.torque_r, &a));
-                add_six(M, nv, k, row, [t.x, t.y, t.z, r.x, r.y, r.z]);
+                let a = tr_mul(&R_AP, &(axis * inward.ratio));
+                let t = tr_mul(U, &a.cross(&(r * mass + h_B)));
+                let q = tr_mul(&W, &a) - tr_mul(&Omega, &a.cross(&r).cross(&h_B));
+                add_six(M, nv, k, row, [t.x, t.y, t.z, q.x, q.y, q.z]);
             }
             JointMotion::Prismatic(axis) => {
-                let a = axis * inward.ratio;
-                let (t, r) = (tr_mul(&F.force_t, &a), tr_mul(&F.force_r, &a));
-                add_six(M, nv, k, row, [t.x, t.y, t.z, r.x, r.y, r.z]);
+                let a = tr_mul(&R_AP, &(axis * inward.ratio));
+                let (t, q) = (tr_mul(U, &a) * mass, tr_mul(&force_r, &a));
+                add_six(M, nv, k, row, [t.x, t.y, t.z, q.x, q.y, q.z]);
             }
             JointMotion::Elastic(_) => {
                 let S = &data.elastic[j];
-                let (tt, rt) = (tr_mul3(&S.L, &F.force_t), tr_mul3(&S.B, &F.torque_t));
-                let (tr, rr) = (tr_mul3(&S.L, &F.force_r), tr_mul3(&S.B, &F.torque_r));
+                let (L, B) = (tr_mul3(&R_AP, &S.L), tr_mul3(&R_AP, &S.B));
+                let (tt, tr) = (tr_mul3(&L, &(U * mass)), tr_mul3(&L, &force_r));
+                let rt = tr_mul3(&B, &cross3(&(r * mass + h_B), U));
+                let rr = tr_mul3(&B, &(W + cross3(&r, &force_r)));
                 for c in 0..3 {
                     let six = |t: &Matrix3<f64>, r: &Matrix3<f64>| {
                         [t[(0, c)], t[(1, c)], t[(2, c)], r[(0, c)], r[(1, c)], r[(2, c)]]
@@ -189,7 +175,9 @@ fn elastic_columns(model: &Model, data: &mut Data, i: usize, M_P: &SpatialInerti
             }
         }
         if inward.parent > 0 {
-            F = F.at_parent(&data.X_PB[j]);
+            let X = &data.X_PB[j];
+            R_AP = mul3(X.rotation.matrix(), &R_AP);
+            r += tr_mul(&R_AP, &X.translation.vector);
         }
         j = inward.parent;
     }

@@ -53,6 +53,8 @@ pub struct Body {
     /// See `ratio`.
     pub offset: f64,
     pub(crate) turn: RevoluteTable,
+    /// One past the last body outward of this one; depth-first order makes a subtree a range.
+    pub(crate) subtree_end: usize,
 }
 
 /// Motion of a joint in the recursions.
@@ -213,6 +215,7 @@ impl Model {
             ratio: 1.0,
             offset: 0.0,
             turn: RevoluteTable::new(&Pose::identity(), &Vector3::z()),
+            subtree_end: 0,
         });
         build.attach(base, 0, Pose::identity())?;
         build.finish()
@@ -380,6 +383,7 @@ impl Builder<'_> {
                 ratio,
                 offset,
                 turn: RevoluteTable::new(&X_BJ, &axis),
+                subtree_end: 0,
             });
             self.attach(child, index, Pose::identity())?;
             let mass = self.bodies[index].inertia.mass;
@@ -424,6 +428,12 @@ impl Builder<'_> {
                     return Err(ModelError::BadMimic { joint, leader });
                 }
             }
+        }
+        for i in (0..self.bodies.len()).rev() {
+            let end = self.bodies[i].subtree_end.max(i + 1);
+            self.bodies[i].subtree_end = end;
+            let parent = self.bodies[i].parent;
+            self.bodies[parent].subtree_end = self.bodies[parent].subtree_end.max(end);
         }
         let frame_by_name = self.frames.iter().enumerate().map(|(i, f)| (f.name.clone(), i)).collect();
         Ok(Model {
