@@ -204,7 +204,7 @@ fn a_moving_link_has_the_mass_of_a_body() {
     let (line, fault) = problem(&with_inertial(""));
     assert_eq!((line, fault.code()), (3, "missing-inertial"));
     assert!(fault.to_string().contains("\"arm\" is moved by joint \"j\""), "{fault}");
-    assert!(fault.help().contains("--inertia-from-mesh"));
+    assert!(fault.help().contains("--inertia-from-density"));
     assert_eq!(
         problem(&with_inertial(&inertial(-1.0, [1.0; 3]))).1,
         Problem::NegativeMass { link: "arm".into(), mass: -1.0 }
