@@ -67,19 +67,27 @@ impl PathFrame {
 /// Path axes at every sample of the rigid tool's positions.
 ///
 /// Velocity and acceleration are those of the parabola through a sample and its two neighbours (exact for constant
-/// acceleration, whatever the steps); the first and last sample use the parabola next to them.
+/// acceleration, whatever the steps); the first and last sample use the parabola next to them. Before the
+/// first motion the axes are those with which it begins.
 ///
 /// * `times`: s, strictly increasing. `positions`: m, in the world, one per time.
 pub fn path_frames(times: &[f64], positions: &[[f64; 3]]) -> Vec<PathFrame> {
     let n = times.len().min(positions.len());
     let mut frames = Vec::with_capacity(n);
     let mut frame = PathFrame::world();
+    let mut started = None;
     for i in 0..n {
         if n >= 3 {
             let [velocity, acceleration] = parabola_rates(times, positions, i.clamp(1, n - 2), times[i]);
             frame = frame.next(&velocity, &acceleration);
+            started = started.or((velocity.norm() > REST_SPEED).then_some(i));
         }
         frames.push(frame);
+    }
+    // At rest before the first motion: the axes with which it begins.
+    if let Some(start) = started.filter(|start| *start > 0) {
+        let first = frames[start];
+        frames[..start].fill(first);
     }
     frames
 }
@@ -120,7 +128,9 @@ mod tests {
         let way = |t: f64| if t < 1.0 { 0.0 } else { 0.1 * (1.0 - (3.0 * (t - 1.0)).cos()) };
         let positions: Vec<[f64; 3]> = times.iter().map(|&t| (direction * way(t)).into()).collect();
         let frames = path_frames(&times, &positions);
-        assert_eq!(frames[50], PathFrame::world());
+        // at rest before the motion: the axes with which it begins
+        assert!((frames[50].tangential - direction).norm() < 1e-12); // measured 2.2e-16
+        assert_eq!(frames[50], frames[99]);
         for frame in &frames[110..] {
             assert!((frame.tangential.dot(&direction).abs() - 1.0).abs() < 1e-12); // measured 3.3e-16
             assert!((frame.normal - frames[110].normal).norm() < 1e-9); // measured 0

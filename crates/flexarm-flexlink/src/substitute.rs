@@ -57,8 +57,12 @@ pub struct Spring {
     pub X_LS: Pose,
     /// Pose of B in the link.
     pub X_LB: Pose,
-    /// Mass of the link in the mechanism and of the two parts together (kg).
-    pub masses: (f64, f64),
+    /// Pose of A in the link.
+    pub X_LA: Pose,
+    /// Mass of the link in the mechanism (kg).
+    pub own_mass: f64,
+    /// Masses of the proximal and the distal part (kg).
+    pub part_masses: [f64; 2],
 }
 
 /// A mechanism with its flexible links in place.
@@ -208,7 +212,7 @@ fn substitute_one(mechanism: &mut Mechanism, flexible: &FlexibleLink) -> Result<
                 .map_err(|source| SubstitutionError::Cut { link: name.clone(), source })?
         }
     };
-    let masses = (own.map_or(0.0, |i| i.mass), parts[0].mass + parts[1].mass);
+    let (own_mass, part_masses) = (own.map_or(0.0, |i| i.mass), [parts[0].mass, parts[1].mass]);
 
     // The proximal part keeps the link's frame and name, the distal part has its frame at S.
     let X_LS = reduced.split.X_LS;
@@ -233,7 +237,8 @@ fn substitute_one(mechanism: &mut Mechanism, flexible: &FlexibleLink) -> Result<
     mechanism.joints.push(Joint::new(&joint, kind, name, &distal_link, X_LS));
 
     let K_S = if flexible.coupling { reduced.split.K_S } else { drop_coupling(&reduced.split.K_S) };
-    Ok(Spring { link: name.clone(), joint, distal_link, K_S, length, X_LS, X_LB: reduced.X_LB, masses })
+    let (X_LA, X_LB) = (reduced.X_LA, reduced.X_LB);
+    Ok(Spring { link: name.clone(), joint, distal_link, K_S, length, X_LS, X_LB, X_LA, own_mass, part_masses })
 }
 
 fn inertia_of(part: &RigidPart) -> LinkInertia {

@@ -28,6 +28,8 @@ pub struct ReducedArm {
     mass_factor: Option<Cholesky<f64, Dyn>>,
     M_inverse_K: DMatrix<f64>,
     product: DMatrix<f64>,
+    shifted: DVector<f64>,
+    c_h2: f64,
 }
 
 impl ReducedArm {
@@ -47,6 +49,8 @@ impl ReducedArm {
             mass_factor: None,
             M_inverse_K: DMatrix::zeros(n, n),
             product: DMatrix::zeros(n, n),
+            shifted: DVector::zeros(n),
+            c_h2: 0.0,
             arm,
         }
     }
@@ -164,10 +168,18 @@ impl SecondOrderSystem for ReducedArm {
             }
             factor.solve_mut(&mut self.M_inverse_K);
             self.mass_factor = Some(factor);
-            // The product is symmetric for stiffness-proportional and modal damping; Cholesky reads one triangle.
-            self.product.gemm(c_h2, &self.matrix, &self.M_inverse_K, 0.0);
-            S += &self.product;
+            // J = M + C Sᵀ with Sᵀ = 1 + c M^-1 K is not symmetric in general; S J = M + c K + S C Sᵀ is, for every
+            // damping, and is factorised in its place.
+            self.product.copy_from(&self.matrix);
+            self.product.gemm(c_h2, &self.matrix, &self.M_inverse_K, 1.0);
+            self.matrix.copy_from(&self.product);
+            self.matrix.gemm_tr(c_h2, &self.M_inverse_K, &self.product, 1.0);
+            for (k, element) in self.arm.elements.iter().enumerate() {
+                let mut block = S.fixed_view_mut::<6, 6>(6 * k, 6 * k);
+                block += element.K_S * c_h2;
+            }
         }
+        self.c_h2 = c_h2;
         S += &self.matrix;
         self.factor = Cholesky::new(S);
         self.factor.as_ref().map(|_| ()).ok_or(StepError::Singular { matrix: "iteration matrix", t })
@@ -178,6 +190,11 @@ impl SecondOrderSystem for ReducedArm {
     }
 
     fn solve_iteration(&mut self, r: &mut DVector<f64>) {
+        if self.c_h2 > 0.0 {
+            // S r
+            self.shifted.gemv_tr(self.c_h2, &self.M_inverse_K, r, 0.0);
+            *r += &self.shifted;
+        }
         if let Some(factor) = &self.factor {
             factor.solve_mut(r);
         }

@@ -138,16 +138,26 @@ impl<'a> Run<'a> {
         stepper: Box<dyn Stepper>,
     ) -> Self {
         let n = arm.elements.len();
+        let tcp = arm.model.frame(TCP_FRAME).expect("added when the robot was loaded").clone();
+        let mut twin = RigidTwin::new(&arm);
+        // Before the first motion the path axes are those of its beginning.
+        let duration = motion.trajectory.duration();
+        let path = (0..=1000)
+            .find_map(|k| {
+                twin.update(&arm, &tcp, duration * f64::from(k) * 1e-3);
+                (twin.velocity.norm() > 1e-6).then(|| PathFrame::world().next(&twin.velocity, &twin.acceleration))
+            })
+            .unwrap_or_else(PathFrame::world);
         let last = (motion.trajectory.duration() / options.step_s - 1e-9).ceil().max(0.0) as u64;
         Self {
             motion,
             options,
             flexible,
-            tcp: arm.model.frame(TCP_FRAME).expect("added when the robot was loaded").clone(),
+            tcp,
             link_frames: link_frames(robot, &arm.model),
-            twin: RigidTwin::new(&arm),
+            twin,
             seen: Observation::new(&arm),
-            path: PathFrame::world(),
+            path,
             sample: Sample::default(),
             times: Vec::new(),
             errors: Vec::new(),
@@ -363,5 +373,6 @@ fn length_change(spring: &flexarm_flexlink::Spring, e: &Vector6<f64>) -> f64 {
     let phi: Vector3<f64> = e.fixed_rows::<3>(3).into();
     let moved = nalgebra::Rotation3::from_scaled_axis(phi) * p_SB.coords + e.fixed_rows::<3>(0);
     let p_LB = spring.X_LS.translation.vector + spring.X_LS.rotation * moved;
-    engineering_strain(p_LB.norm() - spring.length, spring.length).map_or(0.0, f64::abs)
+    let distance = (p_LB - spring.X_LA.translation.vector).norm();
+    engineering_strain(distance - spring.length, spring.length).map_or(0.0, f64::abs)
 }

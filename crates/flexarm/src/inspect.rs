@@ -205,13 +205,12 @@ pub fn inspect(robot: &Robot, at: Option<&str>, velocity: Option<&str>) -> Resul
     let flexible = robot.flexible_robot()?;
     let flexible_links = robot.flexible.iter().filter_map(|(f, _)| {
         let (spring, _) = flexible.springs.iter().find(|(s, _)| s.link == f.link)?;
-        let part = |name: &str| flexible.model.bodies().iter().find(|b| b.name == name).map_or(0.0, |b| b.inertia.mass);
         let K = DMatrix::from_iterator(6, 6, spring.K_S.iter().copied());
         Some(FlexibleInfo {
             name: f.link.clone(),
             method: f.reduced.provenance.method.clone(),
             length_m: spring.length,
-            parts_kg: [part(&spring.link), part(&spring.distal_link)],
+            parts_kg: spring.part_masses,
             stiffness: rows(&K),
         })
     });

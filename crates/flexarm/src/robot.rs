@@ -150,13 +150,16 @@ impl Robot {
             warnings: Vec::new(),
         };
         if let Some(payload) = &file.payload {
-            keep(robot.add_payload(payload, &source), &mut faults);
+            let link = file.tcp.as_ref().map(|t| t.get_ref().link.get_ref().as_str());
+            let link = link.or_else(|| default_tcp(&robot.urdf.mechanism)).unwrap_or_default().to_owned();
+            keep(robot.add_payload(payload, &link, &source), &mut faults);
         }
         for drive in &file.drive {
             check_drive(drive, &robot.rigid, &source, &mut faults);
         }
         for entry in &file.flexible_link {
-            let flexible = flexible_link(entry, &robot.rigid, &source, folder, &mut robot.warnings, &mut faults);
+            let urdf = &robot.urdf.mechanism;
+            let flexible = flexible_link(entry, urdf, &source, folder, &mut robot.warnings, &mut faults);
             robot.flexible.extend(keep(flexible, &mut faults));
         }
         match faults.len() {
@@ -185,7 +188,7 @@ impl Robot {
         match (self.flexible_robot(), last_flexible) {
             (Ok(flexible), _) => {
                 for (spring, _) in &flexible.springs {
-                    let (own, parts) = spring.masses;
+                    let (own, parts) = (spring.own_mass, spring.part_masses.iter().sum::<f64>());
                     if own > 0.0 && (parts / own - 1.0).abs() > 1e-6 {
                         self.warnings.push(format!(
                             "link {:?}: the two parts weigh {parts:.4} kg, the URDF's link {own:.4} kg; the parts count",
@@ -200,11 +203,12 @@ impl Robot {
         }
     }
 
-    fn add_payload(&mut self, entry: &Spanned<PayloadEntry>, source: &Source) -> Result<(), Error> {
+    /// Hangs the payload on its link, else on the file's TCP link, whatever other frame the user looks at.
+    fn add_payload(&mut self, entry: &Spanned<PayloadEntry>, tcp_link: &str, source: &Source) -> Result<(), Error> {
         let payload = entry.get_ref();
         check_finite("payload com", &payload.com, entry.span(), source)?;
         check_finite("payload inertia", &payload.inertia, entry.span(), source)?;
-        let link = payload.link.as_ref().map_or_else(|| self.tcp.0.clone(), |l| l.get_ref().clone());
+        let link = payload.link.as_ref().map_or_else(|| tcp_link.to_owned(), |l| l.get_ref().clone());
         if self.rigid.link(&link).is_none() {
             let span = payload.link.as_ref().map_or(0..0, Spanned::span);
             return Err(source.error(span, unknown_link("payload", &link, &self.rigid)).into());
@@ -221,9 +225,10 @@ impl Robot {
             let message = "payload inertia has a negative principal moment; the order is ixx iyy izz ixy ixz iyz";
             return Err(source.error(entry.span(), message).into());
         }
-        let inertia = LinkInertia { mass, com: payload.com.into(), inertia_com };
+        // Its frame is at its centre of mass: a cut through the link then leaves it on the side where it is.
+        let inertia = LinkInertia { mass, com: Vector3::zeros(), inertia_com };
         self.rigid.links.push(Link { name: PAYLOAD_LINK.into(), inertia: Some(inertia) });
-        let joint = Joint::new("__payload_joint", JointKind::Fixed, link, PAYLOAD_LINK, Pose::identity());
+        let joint = Joint::new("__payload_joint", JointKind::Fixed, link, PAYLOAD_LINK, pose(payload.com, [0.0; 3]));
         self.rigid.joints.push(joint);
         Ok(())
     }
