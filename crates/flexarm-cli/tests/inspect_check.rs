@@ -25,6 +25,36 @@ mod inspect {
         a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
     }
 
+    /// Looking at another frame must not move the load: it once hung on whatever frame `--tcp` named.
+    #[test]
+    fn another_tcp_leaves_the_payload_where_it_is() {
+        let place = Place::new();
+        let payload = "\npayload = { mass = 2.0, com = [0.1, 0.0, 0.0] }\ngravity";
+        place.write("robot.toml", with(&with(ROBOT, "\ngravity", payload), "-9.81]", "-9.81]"));
+        let masses = |more: &[&str]| {
+            let seen = place.json(&[&["inspect", "robot.toml"], more].concat());
+            matrix(&seen["mass_matrix"])[0][0]
+        };
+        assert_eq!(masses(&[]), masses(&["--tcp", "bar"]));
+        assert_eq!(masses(&[]), masses(&["--tcp", "base"]));
+    }
+
+    /// The two parts of a flexible link weigh the link, with nothing of what hangs on them.
+    #[test]
+    fn parts_of_flexible_links_are_the_links_own() {
+        let place = Place::new();
+        for robot in ["one_beam", "three_beams", "kr210", "reference_arm"] {
+            let seen = place.json(&["inspect", &shipped_robot(robot)]);
+            let links = seen["links"].as_array().unwrap();
+            for flexible in seen["flexible_links"].as_array().unwrap() {
+                let link = links.iter().find(|l| l["name"] == flexible["name"]).unwrap();
+                let whole = link["mass_kg"].as_f64().unwrap();
+                let parts: f64 = numbers(&flexible["parts_kg"]).iter().sum();
+                assert!((parts / whole - 1.0).abs() < 1e-9, "{robot}: {parts} {whole}");
+            }
+        }
+    }
+
     #[test]
     fn keys_and_shapes() {
         let place = Place::new();
@@ -67,7 +97,7 @@ mod inspect {
         assert!((seen["mass_kg"].as_f64().unwrap() - 2.228).abs() < 1e-12);
         let flexible = &seen["flexible_links"][0];
         assert_eq!(flexible["name"], "bar");
-        assert!((numbers(&flexible["parts_kg"]).iter().sum::<f64>() - 2.228).abs() < 1e-9, "bar and ball: {flexible}");
+        assert!((numbers(&flexible["parts_kg"]).iter().sum::<f64>() - 1.728).abs() < 1e-9, "the bar alone: {flexible}");
         assert_eq!(seen["tcp"]["link"], "ball");
     }
 

@@ -273,6 +273,23 @@ mod run {
         assert!(table.names.contains(&"swing_position_m".to_owned()), "{:?}", table.names);
     }
 
+    /// A load beyond the cut of a flexible link bends it as much as the same load on the link after it.
+    #[test]
+    fn payload_at_the_far_end_of_a_flexible_link_bends_it() {
+        let place = Place::new();
+        let sag = |payload: &str| {
+            let text = with(common::ROBOT, "\ngravity", &format!("\npayload = {{ {payload} }}\ngravity"));
+            place.write("robot.toml", text);
+            let summary = place.json(&["compare", "robot.toml", "swing.toml", "--no-files"]);
+            number(&summary["tcp"], "static_sag_m")
+        };
+        let on_the_ball = sag("link = \"ball\", mass = 1.0, com = [0.0, 0.0, 0.0]");
+        let on_the_bar = sag("link = \"bar\", mass = 1.0, com = [0.8, 0.0, 0.0]");
+        near(on_the_bar, on_the_ball, 1e-9);
+        let near_the_hinge = sag("link = \"bar\", mass = 1.0, com = [0.1, 0.0, 0.0]");
+        assert!(near_the_hinge < 0.7 * on_the_ball);
+    }
+
     #[test]
     fn rigid_links_do_not_bend() {
         let place = Place::new();
