@@ -12,6 +12,11 @@ fn table(header: &[&str]) -> Table {
     table
 }
 
+/// The table without the blanks that pad its last column.
+fn lines(table: &Table) -> String {
+    table.to_string().lines().map(|l| l.trim_end().to_owned() + "\n").collect()
+}
+
 /// Eight heights of a block character, scaled to the largest value.
 fn sparkline(values: &[f64]) -> String {
     const BLOCKS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
@@ -29,8 +34,7 @@ pub(crate) fn summary(summary: &Summary) -> String {
     for (name, value) in flexarm::rows(summary) {
         t.add_row([name, value]);
     }
-    out += &t.to_string();
-    out.push('\n');
+    out += &lines(&t);
     if summary.tcp.is_some() {
         let curve = sparkline(&summary.error_curve);
         out += &format!("TCP error over time  {curve}\n");
@@ -73,12 +77,12 @@ pub(crate) fn inspection(i: &Inspection) -> String {
             column.set_cell_alignment(CellAlignment::Right);
         }
     }
-    out += &format!("{t}\n");
+    out += &lines(&t);
     let mut t = table(&["link", "mass [kg]", "centre of mass [m]"]);
     for l in i.links.iter().filter(|l| l.mass_kg > 0.0) {
         t.add_row([l.name.clone(), format!("{:.3}", l.mass_kg), format!("{:.4?}", l.com_m)]);
     }
-    out += &format!("{t}\n");
+    out += &lines(&t);
     for f in &i.flexible_links {
         out += &format!(
             "flexible: {} ({}), {:.4} m, parts {:.2} + {:.2} kg\n",
