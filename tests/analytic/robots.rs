@@ -41,7 +41,7 @@ fn run(robot: &str, trajectory: &str, options: &RunOptions) -> (Summary, HashMap
 
 /// The reference arm from its folder meets the converged curve of the other tool (tests/golden/reference_arm_mid.csv).
 ///
-/// Measured: rigid twin 1e-11 m, the digits stored; flexible 3.8e-5 of the peak deflection at 1 ms.
+/// Measured: rigid twin 1e-11 m, the digits stored; flexible 2.6e-5 of the peak deflection at 1 ms.
 #[test]
 fn reference_arm_by_file_equals_the_converged_curve() {
     let options = RunOptions { log_rate_hz: 250.0, ..RunOptions::default() };

@@ -251,9 +251,8 @@ impl GeneralizedAlpha {
         }
 
         for k in 0..self.x.len() {
-            let a_new = ((1.0 - alpha_f) * self.trial[k] + alpha_f * self.acceleration[k] - alpha_m * self.a[k])
+            self.a[k] = ((1.0 - alpha_f) * self.x_tilde_new[k] + alpha_f * self.x_tilde[k] - alpha_m * self.a[k])
                 / (1.0 - alpha_m);
-            self.a[k] = a_new;
         }
         std::mem::swap(&mut self.x, &mut self.x_new);
         std::mem::swap(&mut self.v, &mut self.v_new);

@@ -92,8 +92,8 @@ fn generalized_alpha_is_of_second_order() {
     }
 }
 
-/// The dispersion correction takes most of the second-order error away; measured 4.8e-6, 2.0e-5, 3.5e-5 at 1 ms for
-/// rho = 1, 0.9, 0.8 instead of 3.4e-4 to 3.6e-4. What is left is the damping force's share, 2 zeta of it.
+/// The dispersion correction takes most of the second-order error away; measured 4.8e-6, 4.9e-6, 5.2e-6 at 1 ms for
+/// rho = 1, 0.9, 0.8 instead of 3.4e-4 to 3.6e-4 (a scheme that corrected x but kept the plain a had 2.0e-5 at 0.9). What is left is the damping force's share, 2 zeta of it.
 #[test]
 fn dispersion_correction_cancels_the_leading_error() {
     for rho in [0.8, 0.9, 1.0] {
@@ -102,7 +102,7 @@ fn dispersion_correction_cancels_the_leading_error() {
         let before = free_vibration_error(alpha(1e-3, plain(rho)));
         let order = (errors[0] / errors[1]).log2();
         eprintln!("corrected, rho {rho}: error {:.2e} instead of {before:.2e}, order {order:.2}", errors[0]);
-        assert!(errors[0] < 0.1 * before);
+        assert!(errors[0] < 0.03 * before);
     }
 }
 
