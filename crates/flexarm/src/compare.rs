@@ -3,7 +3,9 @@
 use std::ops::ControlFlow;
 use std::time::Instant;
 
-use flexarm_analysis::{ErrorRecord, MetricSettings, PathFrame, engineering_strain, tcp_error, tcp_metrics};
+use flexarm_analysis::{
+    ContributionPeaks, ErrorRecord, MetricSettings, PathFrame, engineering_strain, tcp_error, tcp_metrics,
+};
 use flexarm_kinematics::{Data, Frame, State, forward_kinematics};
 use flexarm_log::{ElasticSample, EnergySample, RecorderSet, Sample};
 use flexarm_stepping::{FlexibleArm, Observation, StepError, Stepper, new_stepper};
@@ -45,6 +47,7 @@ pub fn simulate(
         let violations = motion.violations.iter().map(ToString::to_string).collect();
         return Err(Error::Limits { path: motion.path.clone(), violations });
     }
+    check_options(motion, options)?;
     let flexible = match options.links {
         LinkModel::Rigid => robot.rigid_robot()?,
         LinkModel::Lumped => robot.flexible_robot()?,
@@ -52,14 +55,6 @@ pub fn simulate(
     let failed = |source: StepError| Error::Step { source, partial: false };
     let arm = flexible.arm(motion.prescribed()).map_err(failed)?;
     let stepper = new_stepper(options.stepper, arm.clone(), options.step_s, options.start).map_err(failed)?;
-    if !(options.log_rate_hz.is_finite() && options.log_rate_hz > 0.0) {
-        return Err(Error::Usage(format!("the log rate must be positive, found {} Hz", options.log_rate_hz)));
-    }
-
-    check_sizes(motion, options)?;
-    if !(options.settling_band_m.is_finite() && options.settling_band_m > 0.0) {
-        return Err(Error::Usage(format!("the settling band must be positive, found {} m", options.settling_band_m)));
-    }
 
     let mut run = Run::new(robot, motion, options, &flexible, arm, stepper);
     let mut files = recorders(outputs)?;
@@ -86,8 +81,14 @@ const POLL_EVERY: u64 = 64;
 /// Most logged samples of a run: they are kept for the figures.
 const MOST_SAMPLES: f64 = 2e6;
 
-/// Step and duration must make a run that can be finished and kept in memory.
-fn check_sizes(motion: &Motion, options: &RunOptions) -> Result<(), Error> {
+/// Numbers must make sense, and step and duration make a run that can be kept in memory.
+fn check_options(motion: &Motion, options: &RunOptions) -> Result<(), Error> {
+    let positive = |what: &str, x: f64, unit: &str| {
+        let message = || Error::Usage(format!("the {what} must be positive, found {x} {unit}"));
+        if x.is_finite() && x > 0.0 { Ok(()) } else { Err(message()) }
+    };
+    positive("log rate", options.log_rate_hz, "Hz")?;
+    positive("settling band", options.settling_band_m, "m")?;
     let duration = motion.trajectory.duration();
     if options.step_s > duration {
         let message = format!("the step (--step {} s) is longer than the motion ({duration} s)", options.step_s);
@@ -120,7 +121,7 @@ struct Run<'a> {
     times: Vec<f64>,
     errors: Vec<[f64; 6]>,
     positions: Vec<[f64; 3]>,
-    contributions: Vec<f64>,
+    contributions: ContributionPeaks,
     strains: Vec<f64>,
     rotations: Vec<f64>,
     peak_drive: Vec<f64>,
@@ -162,7 +163,7 @@ impl<'a> Run<'a> {
             times: Vec::new(),
             errors: Vec::new(),
             positions: Vec::new(),
-            contributions: vec![0.0; n],
+            contributions: ContributionPeaks::new(n),
             strains: vec![0.0; n],
             rotations: vec![0.0; n],
             peak_drive: vec![0.0; arm.model.n_actuated()],
@@ -216,9 +217,9 @@ impl<'a> Run<'a> {
         sample.elastic.resize(self.arm.elements.len(), ElasticSample::default());
         for (k, element) in self.arm.elements.iter().enumerate() {
             let e: Vector6<f64> = self.seen.q.fixed_rows::<6>(element.coordinate).into();
-            let at_tcp = self.twin.J.fixed_columns::<6>(element.coordinate) * e;
+            let map = self.twin.J.fixed_columns::<6>(element.coordinate).into_owned();
             let (spring, _) = &self.flexible.springs[k];
-            self.contributions[k] = self.contributions[k].max(at_tcp.fixed_rows::<3>(0).norm());
+            self.contributions.update(k, t, &map, &e);
             self.strains[k] = self.strains[k].max(length_change(spring, &e));
             self.rotations[k] = self.rotations[k].max(e.fixed_rows::<3>(3).norm());
             sample.elastic[k] = ElasticSample { deflection: e.into(), load: self.seen.load[k].into() };
@@ -269,7 +270,7 @@ impl<'a> Run<'a> {
         let links: Vec<LinkFigures> = (0..self.arm.elements.len())
             .map(|k| LinkFigures {
                 name: self.arm.elements[k].name.clone(),
-                peak_contribution_m: self.contributions[k],
+                peak_contribution_m: self.contributions.peaks()[k].peak_m,
                 engineering_strain: self.strains[k],
                 peak_rotation_rad: self.rotations[k],
             })

@@ -247,7 +247,7 @@ impl Robot {
     /// [`Error::Usage`] if a link cannot be substituted, [`Error::Model`] if the result is no tree.
     pub fn flexible_robot(&self) -> Result<FlexibleRobot, Error> {
         let links: Vec<FlexibleLink> = self.flexible.iter().map(|(f, _)| f.clone()).collect();
-        let substituted = substitute(&self.rigid, &links).map_err(|e| Error::Usage(full_message(&e)))?;
+        let substituted = substitute(&self.rigid, &links).map_err(|e| Error::Usage(e.to_string()))?;
         let model = Model::new(&substituted.mechanism)
             .map_err(|source| Error::Model { path: self.urdf_path.clone(), source })?;
         let mut springs = Vec::new();
@@ -266,11 +266,6 @@ impl Robot {
     pub fn rigid_robot(&self) -> Result<FlexibleRobot, Error> {
         Ok(FlexibleRobot { model: self.rigid_model()?, springs: Vec::new() })
     }
-}
-
-/// Error text with its causes.
-pub(crate) fn full_message(error: &dyn std::error::Error) -> String {
-    error.to_string()
 }
 
 fn unknown_link(what: &str, link: &str, mechanism: &Mechanism) -> String {
