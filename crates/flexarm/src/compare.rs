@@ -87,6 +87,7 @@ fn check_options(motion: &Motion, options: &RunOptions) -> Result<(), Error> {
         let message = || Error::Usage(format!("the {what} must be positive, found {x} {unit}"));
         if x.is_finite() && x > 0.0 { Ok(()) } else { Err(message()) }
     };
+    positive("step", options.step_s, "s")?;
     positive("log rate", options.log_rate_hz, "Hz")?;
     positive("settling band", options.settling_band_m, "m")?;
     let duration = motion.trajectory.duration();
