@@ -41,15 +41,19 @@
 
 pub mod beam;
 pub mod beam_link;
+pub mod element;
 pub mod error;
+pub mod exchange;
 pub mod flex_file;
 pub mod frames;
 pub mod gate;
 pub mod material;
+pub mod mesh;
 pub mod reduced;
 pub mod rigid_part;
 pub mod section;
 pub mod spatial;
+pub mod units;
 
 pub use beam::{Beam, BeamTheory};
 pub use beam_link::BeamLink;
@@ -58,7 +62,9 @@ pub use flex_file::{FlexErrorKind, FlexFileError, parse_flex, read_flex, write_f
 pub use frames::LinkFrames;
 pub use gate::{GateLimits, GateReport};
 pub use material::Material;
+pub use mesh::{ElementBlock, ElementKind, Mesh};
 pub use reduced::{ElasticSplit, Provenance, ReducedLink, drop_coupling, stiffness_at_split};
 pub use rigid_part::RigidPart;
 pub use section::{Bar, Section, SectionProperties};
 pub use spatial::{Matrix12, Pose};
+pub use units::UnitSystem;

@@ -1,0 +1,1 @@
+//! Solid elements: shape functions, quadrature, stiffness and mass of one element.

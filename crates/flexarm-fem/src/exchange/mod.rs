@@ -1,0 +1,1 @@
+//! Reduced matrices from and to other FE programs.

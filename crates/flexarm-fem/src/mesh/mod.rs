@@ -1,0 +1,158 @@
+//! A finite element mesh in SI units: nodes, blocks of elements, regions with materials, named sets.
+//!
+//! Plain data. Readers fill it and convert node order and units on the way; here
+//! positions are in m, in the frame of the mesh, and the nodes of an element are in the order of
+//! CalculiX and Abaqus ([`ElementKind`]).
+//!
+//! Not here: shape functions and matrices of elements ([`crate::element`]), ties, reduction.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Vector3;
+
+use crate::beam::BeamTheory;
+use crate::material::Material;
+use crate::section::Section;
+
+/// Kind of an element. Node order: that of CalculiX and Abaqus, named in the variants.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum ElementKind {
+    /// Four-node tetrahedron, C3D4.
+    Tet4,
+    /// Ten-node tetrahedron, C3D10: corners 1 to 4, then edges 12, 23, 31, 14, 24, 34.
+    Tet10,
+    /// Eight-node brick, C3D8: bottom face 1 to 4 counter-clockwise seen from the top face 5 to 8.
+    Hex8,
+    /// Twenty-node brick, C3D20: corners, edges 12 23 34 41, edges 56 67 78 85, edges 15 26 37 48.
+    Hex20,
+    /// Six-node wedge, C3D6: bottom triangle 1 to 3, top 4 to 6.
+    Wedge6,
+    /// Fifteen-node wedge, C3D15: corners, edges 12 23 31, edges 45 56 64, edges 14 25 36.
+    Wedge15,
+    /// Two-node beam with six DoF per node, B31 or B33: straight, section of the region.
+    Beam2,
+}
+
+impl ElementKind {
+    /// Nodes of one element.
+    pub const fn nodes(self) -> usize {
+        match self {
+            Self::Beam2 => 2,
+            Self::Tet4 => 4,
+            Self::Wedge6 => 6,
+            Self::Hex8 => 8,
+            Self::Tet10 => 10,
+            Self::Wedge15 => 15,
+            Self::Hex20 => 20,
+        }
+    }
+
+    /// The name in messages and files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Tet4 => "TET4",
+            Self::Tet10 => "TET10",
+            Self::Hex8 => "HEX8",
+            Self::Hex20 => "HEX20",
+            Self::Wedge6 => "WEDGE6",
+            Self::Wedge15 => "WEDGE15",
+            Self::Beam2 => "BEAM2",
+        }
+    }
+
+    /// Whether its nodes have rotations.
+    pub const fn is_beam(self) -> bool {
+        matches!(self, Self::Beam2)
+    }
+}
+
+/// Section of the beam elements of a region.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BeamProperties {
+    /// Cross section, m.
+    pub section: Section,
+    /// Direction of the section's y axis, mesh axes; need not be unit or orthogonal to the beam.
+    pub y_axis: Vector3<f64>,
+    /// With or without shear deformation.
+    pub theory: BeamTheory,
+}
+
+/// A named part of the mesh with one material: a physical volume, or an element set with a section.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Region {
+    /// Name in the file.
+    pub name: String,
+    /// Material, if the file has one; SI.
+    pub material: Option<Material>,
+    /// Section of its beam elements, if it has any and the file says so.
+    pub beam: Option<BeamProperties>,
+}
+
+/// Elements of one kind in one region.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ElementBlock {
+    /// Their kind.
+    pub kind: ElementKind,
+    /// Index into [`Mesh::regions`].
+    pub region: usize,
+    /// Numbers in the file, for messages.
+    pub ids: Vec<u64>,
+    /// Node indices, `kind.nodes()` per element.
+    pub connectivity: Vec<u32>,
+}
+
+impl ElementBlock {
+    /// Number of elements.
+    pub fn len(&self) -> usize {
+        self.ids.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.ids.is_empty()
+    }
+
+    /// Node indices of each element in turn.
+    pub fn elements(&self) -> impl ExactSizeIterator<Item = &[u32]> {
+        self.connectivity.chunks_exact(self.kind.nodes())
+    }
+}
+
+/// A mesh, SI, checked by its reader: every index in range, every set sorted and without repetition.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Mesh {
+    /// Positions, m.
+    pub nodes: Vec<Vector3<f64>>,
+    /// Numbers of the nodes in the file, for messages.
+    pub node_ids: Vec<u64>,
+    /// Elements that carry stiffness and mass.
+    pub blocks: Vec<ElementBlock>,
+    /// Regions of the elements.
+    pub regions: Vec<Region>,
+    /// Node indices by name: node sets, physical points and curves, and nodes of physical surfaces.
+    pub node_sets: BTreeMap<String, Vec<u32>>,
+}
+
+impl Mesh {
+    /// Number of elements.
+    pub fn element_count(&self) -> usize {
+        self.blocks.iter().map(ElementBlock::len).sum()
+    }
+
+    /// Which nodes belong to an element.
+    pub fn used_nodes(&self) -> Vec<bool> {
+        let mut used = vec![false; self.nodes.len()];
+        for node in self.blocks.iter().flat_map(|block| &block.connectivity) {
+            used[*node as usize] = true;
+        }
+        used
+    }
+
+    /// Smallest box around the nodes that elements use, `(min, max)`, m; `None` without elements.
+    pub fn bounding_box(&self) -> Option<(Vector3<f64>, Vector3<f64>)> {
+        let used = self.used_nodes();
+        let mut points = self.nodes.iter().zip(&used).filter(|(_, used)| **used).map(|(p, _)| *p);
+        let first = points.next()?;
+        Some(points.fold((first, first), |(low, high), p| (low.inf(&p), high.sup(&p))))
+    }
+}
