@@ -49,9 +49,12 @@ pub mod frames;
 pub mod gate;
 pub mod material;
 pub mod mesh;
+pub mod model;
 pub mod reduced;
+pub mod reduction;
 pub mod rigid_part;
 pub mod section;
+pub mod sparse;
 pub mod spatial;
 pub mod units;
 

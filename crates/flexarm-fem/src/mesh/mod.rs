@@ -4,7 +4,23 @@
 //! positions are in m, in the frame of the mesh, and the nodes of an element are in the order of
 //! CalculiX and Abaqus ([`ElementKind`]).
 //!
+//! Start at [`read_mesh`] for a file, [`select`](select()) for the nodes of an interface, [`skin`] for a
+//! picture, [`connected_parts`] to see whether the mesh is in one piece.
+//!
 //! Not here: shape functions and matrices of elements ([`crate::element`]), ties, reduction.
+
+mod draft;
+mod error;
+mod faces;
+mod gmsh;
+mod ids;
+mod inp;
+mod parts;
+mod read;
+mod select;
+mod selector;
+mod source;
+mod surface;
 
 use std::collections::BTreeMap;
 
@@ -13,6 +29,13 @@ use nalgebra::Vector3;
 use crate::beam::BeamTheory;
 use crate::material::Material;
 use crate::section::Section;
+
+pub use error::{MeshError, MeshErrorKind, Place};
+pub use parts::{Part, connected_parts};
+pub use read::{MeshFile, ReadOptions, parse_mesh, read_mesh};
+pub use select::{SelectError, select};
+pub use selector::{NodeSelector, SelectorSyntaxError};
+pub use surface::{Skin, SkinFace, skin};
 
 /// Kind of an element. Node order: that of CalculiX and Abaqus, named in the variants.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -1,0 +1,237 @@
+//! The map from reference to real element: its Jacobian, how straight it is, where it turns over.
+
+use std::fmt;
+
+use nalgebra::Vector3;
+
+use super::rules::{Table, tables};
+use super::shape::{MAX_NODES, edges, reference_volume};
+use crate::mesh::ElementKind;
+
+/// Offset of a mid-edge node, or gap to a parallelepiped, per edge length that counts as none.
+const STRAIGHT: f64 = 1e-12;
+
+/// A node may have `det J` this far below zero, per the largest at Gauss points: rounding.
+const NODE_SLACK: f64 = 1e-12;
+
+/// Where an element is inverted; both numbers count from 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Place {
+    /// At this Gauss point of the stiffness or mass.
+    GaussPoint(usize),
+    /// At this node of the element.
+    Node(usize),
+}
+
+/// An element whose map turns over or collapses somewhere.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct InvertedElement {
+    /// Kind of the element.
+    pub kind: ElementKind,
+    /// Determinant of the Jacobian there, m³; zero, negative or NaN.
+    pub det: f64,
+    /// Where it was found.
+    pub place: Place,
+}
+
+impl fmt::Display for InvertedElement {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (place, number) = match self.place {
+            Place::GaussPoint(number) => ("Gauss point", number + 1),
+            Place::Node(number) => ("node", number + 1),
+        };
+        let name = self.kind.name();
+        write!(f, "{name} is inverted: det J is {:.3e} m3 at its {place} {number}, it must be positive", self.det)
+    }
+}
+
+impl std::error::Error for InvertedElement {}
+
+/// How evenly an element fills its space: the ratios are 1 for a parallelepiped, and zero or less
+/// where it is inverted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct JacobianRange {
+    /// Smallest `det J` over the Gauss points of the exact stiffness, over `|mean|`.
+    pub min_gauss: f64,
+    /// Gauss point where it is, from 0.
+    pub gauss_point: usize,
+    /// Smallest `det J` over the nodes, over `|mean|`.
+    pub min_node: f64,
+    /// Node of the element where it is, from 0.
+    pub node: usize,
+    /// Mean `det J`, m³: volume over that of the reference element.
+    pub mean: f64,
+}
+
+/// Smallest `det J` over Gauss points and over nodes, scaled by the mean: the quality of a shape.
+///
+/// An element without volume gives zeros.
+///
+/// # Panics
+/// For a beam, and for a wrong number of nodes.
+pub fn jacobian_range(kind: ElementKind, x: &[Vector3<f64>]) -> JacobianRange {
+    let nodes = Nodes::new(kind, x);
+    let all = tables(kind);
+    let volume: f64 = dets(all.mass(nodes.geometry), &nodes).map(|(w, det)| w * det).sum();
+    let mean = volume / reference_volume(kind);
+    let scale = if mean == 0.0 { f64::INFINITY } else { mean.abs() };
+    let smallest = |table: &Table| {
+        let (mut at, mut min) = (0, f64::INFINITY);
+        for (i, (_, det)) in dets(table, &nodes).enumerate() {
+            if !(det >= min) {
+                (at, min) = (i, det);
+            }
+        }
+        (at, min / scale)
+    };
+    let (gauss_point, min_gauss) = smallest(all.stiffness(nodes.geometry));
+    let (node, min_node) = smallest(&all.nodes);
+    JacobianRange { min_gauss, gauss_point, min_node, node, mean }
+}
+
+fn dets(table: &Table, nodes: &Nodes) -> impl Iterator<Item = (f64, f64)> {
+    (0..table.len()).map(move |p| (table.weight[p], Jacobian::new(nodes.n, table.dN(p), &nodes.x).det))
+}
+
+/// What kind of map an element has; decides the quadrature.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Geometry {
+    /// Constant Jacobian.
+    Affine,
+    /// Mid-edge nodes in the middle of straight edges.
+    Straight,
+    /// Largest relative difference between `det J` at a node and its mean over the nodes: `1/det J` in
+    /// the stiffness is as far from a polynomial as this.
+    Curved(f64),
+}
+
+/// Nodes of one element relative to the first (small numbers round less), padded for the vector unit.
+pub(crate) struct Nodes {
+    pub(crate) n: usize,
+    pub(crate) x: [[f64; 4]; MAX_NODES],
+    pub(crate) geometry: Geometry,
+}
+
+impl Nodes {
+    pub(crate) fn new(kind: ElementKind, x: &[Vector3<f64>]) -> Self {
+        let n = kind.nodes();
+        assert!(!kind.is_beam() && x.len() == n, "a {} has {n} nodes, {} were given", kind.name(), x.len());
+        let mut padded = [[0.0; 4]; MAX_NODES];
+        for (padded, x_i) in padded.iter_mut().zip(x) {
+            let d = x_i - x[0];
+            *padded = [d.x, d.y, d.z, 0.0];
+        }
+        let mut nodes = Self { n, x: padded, geometry: classify(kind, x) };
+        if let Geometry::Curved(spread) = &mut nodes.geometry {
+            *spread = spread_at_nodes(kind, &nodes.x);
+        }
+        nodes
+    }
+}
+
+fn spread_at_nodes(kind: ElementKind, x: &[[f64; 4]; MAX_NODES]) -> f64 {
+    let (n, table) = (kind.nodes(), &tables(kind).nodes);
+    let mut dets = [0.0; MAX_NODES];
+    for (p, det) in dets[..n].iter_mut().enumerate() {
+        *det = Jacobian::new(n, table.dN(p), x).det;
+    }
+    let mean = dets[..n].iter().sum::<f64>() / n as f64;
+    dets[..n].iter().fold(0.0, |spread, det| f64::max(spread, (det / mean - 1.0).abs()))
+}
+
+/// The kind of map; the spread of a curved one is left infinite.
+fn classify(kind: ElementKind, x: &[Vector3<f64>]) -> Geometry {
+    let corners = match kind {
+        ElementKind::Tet4 | ElementKind::Tet10 => 4,
+        ElementKind::Wedge6 | ElementKind::Wedge15 => 6,
+        _ => 8,
+    };
+    // Coordinates far from the origin carry their own rounding, eps |x|.
+    let rounding = 4.0 * f64::EPSILON * x[0].amax();
+    for ([a, b], middle) in edges(kind).iter().zip(&x[corners..]) {
+        let edge = (x[*a] - x[*b]).norm();
+        let gap = (middle - (x[*a] + x[*b]) * 0.5).norm();
+        if !(gap <= STRAIGHT * edge + rounding) {
+            return Geometry::Curved(f64::INFINITY);
+        }
+    }
+    // Corners that a parallelepiped or prism on corner 0 would have elsewhere.
+    let gap = |i: usize, from: [usize; 2]| (x[i] - (x[from[0]] + x[from[1]] - x[0])).norm();
+    let gap = match corners {
+        4 => return Geometry::Affine,
+        6 => gap(4, [1, 3]).max(gap(5, [2, 3])),
+        _ => gap(2, [1, 3]).max(gap(5, [1, 4])).max(gap(7, [3, 4])).max((x[6] - (x[2] + x[4] - x[0])).norm()),
+    };
+    let size = (x[1] - x[0]).norm();
+    if gap <= STRAIGHT * size + rounding { Geometry::Affine } else { Geometry::Straight }
+}
+
+/// `J = dx/dxi` at one point.
+pub(crate) struct Jacobian {
+    pub(crate) det: f64,
+    /// `inverse[c][a] = dxi_c/dx_a`, without meaning unless `det > 0`.
+    pub(crate) inverse: [[f64; 3]; 3],
+}
+
+impl Jacobian {
+    /// * `dN`: by r for all nodes, then by s, then by t.
+    #[inline(always)]
+    pub(crate) fn new(n: usize, dN: &[f64], x: &[[f64; 4]; MAX_NODES]) -> Self {
+        let (d_r, d_s, d_t) = (&dN[..n], &dN[n..2 * n], &dN[2 * n..3 * n]);
+        let mut J = [[0.0; 4]; 3]; // J[c] = dx/dxi_c
+        for i in 0..n {
+            for a in 0..4 {
+                J[0][a] += d_r[i] * x[i][a];
+                J[1][a] += d_s[i] * x[i][a];
+                J[2][a] += d_t[i] * x[i][a];
+            }
+        }
+        let cross = |u: &[f64; 4], v: &[f64; 4]| {
+            [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
+        };
+        let adjugate = [cross(&J[1], &J[2]), cross(&J[2], &J[0]), cross(&J[0], &J[1])];
+        let det = J[0][0] * adjugate[0][0] + J[0][1] * adjugate[0][1] + J[0][2] * adjugate[0][2];
+        Self { det, inverse: adjugate.map(|row| row.map(|a| a / det)) }
+    }
+
+    /// As [`Self::new`], refusing an inverted element.
+    #[inline(always)]
+    pub(crate) fn checked(
+        kind: ElementKind,
+        n: usize,
+        table: &Table,
+        point: usize,
+        x: &[[f64; 4]; MAX_NODES],
+    ) -> Result<Self, InvertedElement> {
+        let jacobian = Self::new(n, table.dN(point), x);
+        if jacobian.det > 0.0 {
+            return Ok(jacobian);
+        }
+        Err(InvertedElement { kind, det: jacobian.det, place: Place::GaussPoint(point) })
+    }
+
+    /// `dN_i/dx_a` of all nodes into `gradient[a * stride + i]`.
+    #[inline(always)]
+    pub(crate) fn gradients(&self, n: usize, dN: &[f64], stride: usize, gradient: &mut [f64]) {
+        let (d_r, d_s, d_t) = (&dN[..n], &dN[n..2 * n], &dN[2 * n..3 * n]);
+        let inverse = &self.inverse;
+        for a in 0..3 {
+            let row = &mut gradient[a * stride..a * stride + n];
+            for i in 0..n {
+                row[i] = inverse[0][a] * d_r[i] + inverse[1][a] * d_s[i] + inverse[2][a] * d_t[i];
+            }
+        }
+    }
+}
+
+/// Refuses a negative `det J` at a node: with it there is a surface in the element where the
+/// integrand of the stiffness is infinite, whatever the Gauss points say.
+pub(crate) fn check_nodes(kind: ElementKind, nodes: &Nodes, largest_det: f64) -> Result<(), InvertedElement> {
+    let table = &tables(kind).nodes;
+    for (number, (_, det)) in dets(table, nodes).enumerate() {
+        if !(det >= -NODE_SLACK * largest_det) {
+            return Err(InvertedElement { kind, det, place: Place::Node(number) });
+        }
+    }
+    Ok(())
+}

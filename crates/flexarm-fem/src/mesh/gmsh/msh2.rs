@@ -1,0 +1,69 @@
+//! Sections of MSH 2: counts are text, the rest is text or bytes.
+
+use nalgebra::Vector3;
+
+use super::collector::Collector;
+use super::reader::{Layout, Reader};
+use super::shapes::MOST_NODES;
+use crate::mesh::error::MeshError;
+
+/// `$Nodes`: number and position of each.
+pub(super) fn nodes(reader: &mut Reader, collector: &mut Collector) -> Result<(), MeshError> {
+    let count = text_count(reader, "number of nodes")?;
+    let count = reader.checked(count, "number of nodes", [1, 0, 3])?;
+    for _ in 0..count {
+        let at = reader.pos;
+        let id = reader.id("node number")?;
+        let p = Vector3::new(reader.real("x of a node")?, reader.real("y of a node")?, reader.real("z of a node")?);
+        collector.draft.add_node(id, p, at + usize::from(reader.layout == Layout::Ascii));
+    }
+    Ok(())
+}
+
+/// `$Elements`: as text one per line, as bytes in runs of one type.
+pub(super) fn elements(reader: &mut Reader, collector: &mut Collector) -> Result<(), MeshError> {
+    let count = text_count(reader, "number of elements")?;
+    let ascii = reader.layout == Layout::Ascii;
+    let count = reader.checked(count, "number of elements", [if ascii { 4 } else { 2 }, 0, 0])?;
+    let mut done = 0;
+    let mut nodes = [0_u64; MOST_NODES];
+    while done < count {
+        let at = reader.pos;
+        let first_id = if ascii { reader.id("element number")? } else { 0 };
+        let number = reader.int("element type")?;
+        let shape = collector.shape(reader, at, number)?;
+        let run = if ascii { 1 } else { reader.id("number of elements of one type")? };
+        let tag_count = reader.id("number of tags")?;
+        let tag_count = reader.checked(tag_count, "number of tags", [1, 0, 0])?;
+        let each = usize::from(!ascii) + tag_count.saturating_add(shape.nodes);
+        let run = reader.checked(run, "number of elements of one type", [each, 0, 0])?;
+        for _ in 0..run {
+            let at = if ascii { at + 1 } else { reader.pos };
+            let id = if ascii { first_id } else { reader.id("element number")? };
+            // The first tag is the physical group, 0 for none; then geometry and partitions.
+            let mut group = 0;
+            for k in 0..tag_count {
+                let tag = reader.int("tag")?;
+                group = if k == 0 { tag.abs() } else { group };
+            }
+            for node in &mut nodes[..shape.nodes] {
+                *node = reader.id("node of an element")?;
+            }
+            let groups: &[i64] = if group == 0 { &[] } else { &[group] };
+            collector.element(&reader.src, &shape, id, at, groups, &nodes[..shape.nodes])?;
+        }
+        done += run;
+    }
+    Ok(())
+}
+
+/// A count on a line of its own, text in binary files, too.
+fn text_count(reader: &mut Reader, what: &str) -> Result<u64, MeshError> {
+    let layout = std::mem::replace(&mut reader.layout, Layout::Ascii);
+    let count = reader.size(what);
+    if layout != Layout::Ascii {
+        reader.rest_of_line();
+    }
+    reader.layout = layout;
+    count
+}

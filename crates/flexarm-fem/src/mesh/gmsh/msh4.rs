@@ -1,0 +1,107 @@
+//! Sections of MSH 4.1: the same numbers in the same order as text and as bytes.
+
+use nalgebra::Vector3;
+
+use super::collector::Collector;
+use super::reader::{Layout, Reader};
+use super::shapes::MOST_NODES;
+use crate::mesh::error::{MeshError, MeshErrorKind as Kind};
+
+/// `$Entities`: only the physical groups of each are kept.
+pub(super) fn entities(reader: &mut Reader, collector: &mut Collector) -> Result<(), MeshError> {
+    let mut counts = [0; 4];
+    for count in &mut counts {
+        *count = reader.size("number of entities")?;
+    }
+    for (dim, count) in (0_u8..).zip(counts) {
+        // A point has its position, the others have a box and a list of what bounds them.
+        let reals = if dim == 0 { 3 } else { 6 };
+        let count = reader.checked(count, "number of entities", [1, 1, reals])?;
+        for _ in 0..count {
+            let tag = reader.int("tag of an entity")?;
+            for _ in 0..reals {
+                reader.real("box of an entity")?;
+            }
+            let groups = tags(reader, "number of physical groups")?;
+            if dim > 0 {
+                tags(reader, "number of bounding entities")?;
+            }
+            if !groups.is_empty() {
+                collector.entity(dim, tag, groups);
+            }
+        }
+    }
+    Ok(())
+}
+
+fn tags(reader: &mut Reader, what: &str) -> Result<Vec<i64>, MeshError> {
+    let count = reader.size(what)?;
+    let count = reader.checked(count, what, [1, 0, 0])?;
+    (0..count).map(|_| reader.int("tag").map(i64::abs)).collect()
+}
+
+/// `$Nodes`: per entity the numbers of its nodes, then their positions.
+pub(super) fn nodes(reader: &mut Reader, collector: &mut Collector) -> Result<(), MeshError> {
+    let block_count = header(reader)?;
+    for _ in 0..block_count {
+        let dim = reader.int("dimension of an entity")?;
+        reader.int("tag of an entity")?;
+        let parametric = reader.int("whether nodes have parameters")? != 0;
+        let count = reader.size("number of nodes")?;
+        let count = reader.checked(count, "number of nodes", [0, 1, 3])?;
+        let first = collector.draft.node_ids.len();
+        for _ in 0..count {
+            collector.draft.node_ids.push(reader.size("node number")?);
+        }
+        for _ in 0..count {
+            let at = reader.pos + usize::from(reader.layout == Layout::Ascii);
+            let p = Vector3::new(reader.real("x of a node")?, reader.real("y of a node")?, reader.real("z of a node")?);
+            collector.draft.nodes.push(p);
+            collector.draft.node_offsets.push(at);
+            let parameters = if parametric { dim.clamp(0, 3) } else { 0 };
+            for _ in 0..parameters {
+                reader.real("parameter of a node")?;
+            }
+        }
+        debug_assert_eq!(collector.draft.node_ids.len(), first + count);
+    }
+    Ok(())
+}
+
+/// `$Elements`: per entity and type the number and the nodes of each element.
+pub(super) fn elements(reader: &mut Reader, collector: &mut Collector) -> Result<(), MeshError> {
+    let block_count = header(reader)?;
+    let mut nodes = [0_u64; MOST_NODES];
+    for _ in 0..block_count {
+        let at = reader.pos + usize::from(reader.layout == Layout::Ascii);
+        let dim = reader.int("dimension of an entity")?;
+        let tag = reader.int("tag of an entity")?;
+        let number = reader.int("element type")?;
+        let shape = collector.shape(reader, at, number)?;
+        if dim != i64::from(shape.dim) {
+            let found = format!("a {} in an entity of dimension {dim}", shape.name);
+            return Err(reader.src.error(Kind::Syntax, at, "$Elements", found, format!("dimension {}", shape.dim)));
+        }
+        let count = reader.size("number of elements")?;
+        let count = reader.checked(count, "number of elements", [0, 1 + shape.nodes, 0])?;
+        let groups = collector.groups_of(shape.dim, tag);
+        for _ in 0..count {
+            let at = reader.pos + usize::from(reader.layout == Layout::Ascii);
+            let id = reader.size("element number")?;
+            for node in &mut nodes[..shape.nodes] {
+                *node = reader.size("node of an element")?;
+            }
+            collector.element(&reader.src, &shape, id, at, &groups, &nodes[..shape.nodes])?;
+        }
+    }
+    Ok(())
+}
+
+/// Number of blocks, number of things, smallest and largest number: only the first is needed.
+fn header(reader: &mut Reader) -> Result<usize, MeshError> {
+    let blocks = reader.size("number of entity blocks")?;
+    for what in ["number in all", "smallest number", "largest number"] {
+        reader.size(what)?;
+    }
+    reader.checked(blocks, "number of entity blocks", [3, 1, 0])
+}

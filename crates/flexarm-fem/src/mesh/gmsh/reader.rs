@@ -1,0 +1,166 @@
+//! Numbers of a Gmsh file in turn, as text or as bytes of either order.
+
+use crate::mesh::error::{MeshError, MeshErrorKind as Kind};
+use crate::mesh::source::{Source, parse_f64, parse_u64, shown};
+
+/// How numbers are written.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Layout {
+    /// As words between blanks.
+    Ascii,
+    /// As bytes; `size` is that of Gmsh's `size_t`, 4 or 8.
+    Binary {
+        /// Most significant byte first.
+        big_endian: bool,
+        /// Bytes of a `size_t`.
+        size: usize,
+    },
+}
+
+/// A place in the file that moves on with every number.
+pub(super) struct Reader<'a> {
+    pub(super) src: Source<'a>,
+    pub(super) pos: usize,
+    pub(super) layout: Layout,
+}
+
+impl<'a> Reader<'a> {
+    /// Bytes that are left.
+    pub(super) fn left(&self) -> usize {
+        self.src.bytes.len() - self.pos
+    }
+
+    /// The next word of text.
+    pub(super) fn word(&mut self, what: &str) -> Result<&'a [u8], MeshError> {
+        self.skip_blanks();
+        let rest = &self.src.bytes[self.pos..];
+        let length = rest.iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len());
+        if length == 0 {
+            return Err(self.ended(what));
+        }
+        self.pos += length;
+        Ok(&rest[..length])
+    }
+
+    pub(super) fn skip_blanks(&mut self) {
+        let rest = &self.src.bytes[self.pos..];
+        self.pos += rest.iter().position(|byte| !byte.is_ascii_whitespace()).unwrap_or(rest.len());
+    }
+
+    /// The rest of the line, without its end; moves behind it.
+    pub(super) fn rest_of_line(&mut self) -> &'a [u8] {
+        let rest = &self.src.bytes[self.pos..];
+        let length = rest.iter().position(|byte| *byte == b'\n').unwrap_or(rest.len());
+        self.pos += (length + 1).min(rest.len());
+        rest[..length].trim_ascii()
+    }
+
+    /// A signed integer, C `int`.
+    pub(super) fn int(&mut self, what: &str) -> Result<i64, MeshError> {
+        match self.layout {
+            Layout::Ascii => {
+                let at = self.pos;
+                let word = self.word(what)?;
+                let (digits, sign) = word.strip_prefix(b"-").map_or((word, 1), |digits| (digits, -1));
+                let value = parse_u64(digits).and_then(|value| i64::try_from(value).ok());
+                value.map(|value| sign * value).ok_or_else(|| self.wrong(at, what, word, "an integer"))
+            }
+            Layout::Binary { big_endian, .. } => {
+                let bytes = self.bytes::<4>(what)?;
+                let value = if big_endian { i32::from_be_bytes(bytes) } else { i32::from_le_bytes(bytes) };
+                Ok(i64::from(value))
+            }
+        }
+    }
+
+    /// An unsigned integer, C `size_t`.
+    pub(super) fn size(&mut self, what: &str) -> Result<u64, MeshError> {
+        match self.layout {
+            Layout::Ascii => {
+                let at = self.pos;
+                let word = self.word(what)?;
+                parse_u64(word).ok_or_else(|| self.wrong(at, what, word, "an integer, not negative"))
+            }
+            Layout::Binary { big_endian, size: 4 } => {
+                let bytes = self.bytes::<4>(what)?;
+                let value = if big_endian { u32::from_be_bytes(bytes) } else { u32::from_le_bytes(bytes) };
+                Ok(u64::from(value))
+            }
+            Layout::Binary { big_endian, .. } => {
+                let bytes = self.bytes::<8>(what)?;
+                Ok(if big_endian { u64::from_be_bytes(bytes) } else { u64::from_le_bytes(bytes) })
+            }
+        }
+    }
+
+    /// The number of a node or an element in MSH 2, an `int`.
+    pub(super) fn id(&mut self, what: &str) -> Result<u64, MeshError> {
+        let at = self.pos;
+        let value = self.int(what)?;
+        u64::try_from(value).map_err(|_| self.wrong(at, what, value.to_string().as_bytes(), "no negative number"))
+    }
+
+    /// A real number, C `double`.
+    pub(super) fn real(&mut self, what: &str) -> Result<f64, MeshError> {
+        match self.layout {
+            Layout::Ascii => {
+                let at = self.pos;
+                let word = self.word(what)?;
+                parse_f64(word).ok_or_else(|| self.wrong(at, what, word, "a number"))
+            }
+            Layout::Binary { big_endian, .. } => {
+                let bytes = self.bytes::<8>(what)?;
+                Ok(if big_endian { f64::from_be_bytes(bytes) } else { f64::from_le_bytes(bytes) })
+            }
+        }
+    }
+
+    /// A count of things that take at least so many integers, sizes and reals each.
+    ///
+    /// A count that cannot fit into the rest of the file is refused here, before anything is allocated.
+    pub(super) fn checked(&self, count: u64, what: &str, parts: [usize; 3]) -> Result<usize, MeshError> {
+        let [ints, sizes, reals] = parts;
+        let each = match self.layout {
+            Layout::Ascii => 2 * (ints + sizes + reals),
+            Layout::Binary { size, .. } => 4 * ints + size * sizes + 8 * reals,
+        };
+        let fits = self.left().saturating_add(1) / each.max(1);
+        match usize::try_from(count) {
+            Ok(count) if count <= fits => Ok(count),
+            _ => {
+                let found = format!("a count of {count}");
+                let expected = format!("at most {fits}, for which the file has bytes");
+                Err(self.src.error(Kind::Truncated, self.pos, what, found, expected).help("was the file cut off?"))
+            }
+        }
+    }
+
+    /// The word `$End<section>`.
+    pub(super) fn end_of(&mut self, section: &str) -> Result<(), MeshError> {
+        let expected = format!("$End{section}");
+        self.skip_blanks();
+        let at = self.pos;
+        let word = self.word(&expected)?;
+        if word == expected.as_bytes() {
+            return Ok(());
+        }
+        Err(self.src.error(Kind::Syntax, at, format!("end of ${section}"), shown(word), expected))
+    }
+
+    fn bytes<const N: usize>(&mut self, what: &str) -> Result<[u8; N], MeshError> {
+        let bytes = self.src.bytes[self.pos..].first_chunk::<N>().ok_or_else(|| self.ended(what))?;
+        self.pos += N;
+        Ok(*bytes)
+    }
+
+    fn ended(&self, what: &str) -> MeshError {
+        let at = self.src.bytes.len();
+        self.src.error(Kind::Truncated, at, what, "the end of the file", "more data").help("was the file cut off?")
+    }
+
+    fn wrong(&self, from: usize, what: &str, word: &[u8], expected: &str) -> MeshError {
+        // From the word itself, not from the blanks before it.
+        let blanks = self.src.bytes[from..].iter().take_while(|byte| byte.is_ascii_whitespace()).count();
+        self.src.error(Kind::Syntax, from + blanks, what, shown(word), expected)
+    }
+}

@@ -1,0 +1,106 @@
+//! From the numbers of nodes or elements in a file to their indices.
+
+/// Lookup of unique numbers; memory stays proportional to how many there are.
+pub(super) enum IdIndex {
+    /// `first, first + 1, ...` in order of the file.
+    Run { first: u64, count: u32 },
+    /// A table over all numbers up to the largest; `NONE` where there is none.
+    Table(Vec<u32>),
+    /// Pairs sorted by number, for numbers with large gaps.
+    Sorted(Vec<(u64, u32)>),
+}
+
+const NONE: u32 = u32::MAX;
+
+impl IdIndex {
+    /// Builds the lookup.
+    ///
+    /// # Errors
+    /// The two positions of a number that is there twice.
+    pub(super) fn new(ids: &[u64]) -> Result<Self, (usize, usize)> {
+        let first = ids.first().copied().unwrap_or(0);
+        if ids.iter().zip(0_u64..).all(|(id, k)| first.checked_add(k) == Some(*id)) {
+            return Ok(Self::Run { first, count: ids.len() as u32 });
+        }
+        let largest = ids.iter().max().copied().unwrap_or(0);
+        if largest < 8 * ids.len() as u64 + 1024 {
+            let mut table = vec![NONE; largest as usize + 1];
+            for (k, id) in ids.iter().enumerate() {
+                let slot = &mut table[*id as usize];
+                if *slot != NONE {
+                    return Err((*slot as usize, k));
+                }
+                *slot = k as u32;
+            }
+            return Ok(Self::Table(table));
+        }
+        let mut sorted: Vec<(u64, u32)> = ids.iter().copied().zip(0..).collect();
+        sorted.sort_unstable();
+        match sorted.windows(2).find(|pair| pair[0].0 == pair[1].0) {
+            Some(pair) => Err((pair[0].1 as usize, pair[1].1 as usize)),
+            None => Ok(Self::Sorted(sorted)),
+        }
+    }
+
+    /// Index of a number.
+    pub(super) fn get(&self, id: u64) -> Option<u32> {
+        match self {
+            Self::Run { first, count } => id.checked_sub(*first).filter(|k| *k < u64::from(*count)).map(|k| k as u32),
+            Self::Table(table) => {
+                let slot = table.get(usize::try_from(id).ok()?)?;
+                (*slot != NONE).then_some(*slot)
+            }
+            Self::Sorted(sorted) => {
+                let k = sorted.binary_search_by_key(&id, |(id, _)| *id).ok()?;
+                Some(sorted[k].1)
+            }
+        }
+    }
+
+    /// Appends the indices of those numbers of `first, first + step, ... <= last` that exist.
+    pub(super) fn extend_from_range(&self, first: u64, last: u64, step: u64, out: &mut Vec<u32>) {
+        // Clipped to the numbers there are: the work never depends on the numbers in the file alone.
+        let (low, high) = match self {
+            Self::Run { count: 0, .. } => return,
+            Self::Run { first, count } => (*first, *first + u64::from(*count) - 1),
+            Self::Table(table) => (0, table.len() as u64 - 1),
+            Self::Sorted(sorted) => {
+                let from = sorted.partition_point(|(id, _)| *id < first);
+                let within = sorted[from..].iter().take_while(|(id, _)| *id <= last);
+                out.extend(within.filter(|(id, _)| (id - first) % step == 0).map(|(_, k)| *k));
+                return;
+            }
+        };
+        let skipped = low.saturating_sub(first).div_ceil(step).checked_mul(step);
+        let Some(start) = skipped.and_then(|skipped| first.checked_add(skipped)) else { return };
+        let wanted = (start..=last.min(high)).step_by(usize::try_from(step).unwrap_or(usize::MAX));
+        out.extend(wanted.filter_map(|id| self.get(id)));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_layout_finds_its_numbers_and_no_others() {
+        for ids in [vec![5, 6, 7, 8], vec![8, 5, 7, 6], vec![5, 7_000_000_000, 6, 8]] {
+            let index = IdIndex::new(&ids).unwrap();
+            for (k, id) in ids.iter().enumerate() {
+                assert_eq!(index.get(*id), Some(k as u32), "{ids:?}");
+            }
+            assert_eq!((index.get(4), index.get(9), index.get(u64::MAX)), (None, None, None));
+            let mut found = Vec::new();
+            index.extend_from_range(1, u64::MAX, 2, &mut found);
+            let odd = ids.iter().enumerate().filter(|(_, id)| **id % 2 == 1 && **id < 100);
+            found.sort_unstable();
+            assert_eq!(found, odd.map(|(k, _)| k as u32).collect::<Vec<_>>(), "{ids:?}");
+        }
+    }
+
+    #[test]
+    fn a_number_that_is_there_twice_is_reported_with_both_places() {
+        assert_eq!(IdIndex::new(&[3, 4, 3]).err(), Some((0, 2)));
+        assert_eq!(IdIndex::new(&[3, u64::MAX, 9, u64::MAX]).err(), Some((1, 3)));
+    }
+}

@@ -1,0 +1,157 @@
+//! Lines of a deck: cards `*NAME, KEY=VALUE, FLAG` and their data lines.
+
+use crate::mesh::error::{MeshError, MeshErrorKind as Kind};
+use crate::mesh::source::{Source, parse_f64, parse_u64, shown};
+
+/// The lines that are neither blank nor comments.
+pub(super) struct Lines<'a> {
+    pub(super) src: Source<'a>,
+    pos: usize,
+}
+
+/// A line with its offset.
+pub(super) type Line<'a> = (usize, &'a [u8]);
+
+/// A keyword line.
+pub(super) struct Card {
+    /// In capitals, without blanks: `SOLIDSECTION`.
+    pub(super) name: String,
+    /// Its first words as in the file, for messages.
+    pub(super) title: String,
+    /// Offset of the line.
+    pub(super) at: usize,
+    parameters: Vec<(String, String)>,
+}
+
+impl<'a> Lines<'a> {
+    pub(super) fn new(src: Source<'a>) -> Self {
+        let pos = if src.bytes.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
+        Self { src, pos }
+    }
+
+    /// The next line, and where the one after it begins; does not move.
+    fn peek(&mut self) -> Option<(Line<'a>, usize)> {
+        let bytes = self.src.bytes;
+        while self.pos < bytes.len() {
+            let rest = &bytes[self.pos..];
+            let length = rest.iter().position(|byte| *byte == b'\n').unwrap_or(rest.len());
+            let next = self.pos + (length + 1).min(rest.len());
+            let line = rest[..length].trim_ascii();
+            if !line.is_empty() && !line.starts_with(b"**") {
+                return Some(((self.pos, line), next));
+            }
+            self.pos = next;
+        }
+        None
+    }
+
+    /// The next data line of the current card.
+    pub(super) fn data(&mut self) -> Option<Line<'a>> {
+        let (line, next) = self.peek()?;
+        if line.1.starts_with(b"*") {
+            return None;
+        }
+        self.pos = next;
+        Some(line)
+    }
+
+    /// The next card; data lines before it are passed over.
+    pub(super) fn card(&mut self) -> Option<Card> {
+        loop {
+            let ((at, line), next) = self.peek()?;
+            self.pos = next;
+            if line.starts_with(b"*") {
+                let mut text = line[1..].to_vec();
+                // A comma at the end: the card goes on in the next line.
+                while text.trim_ascii_end().ends_with(b",") {
+                    let Some(((_, more), next)) = self.peek() else { break };
+                    if more.starts_with(b"*") || !more.contains(&b'=') {
+                        break;
+                    }
+                    text.extend_from_slice(more);
+                    self.pos = next;
+                }
+                return Some(Card::new(at, &text));
+            }
+        }
+    }
+}
+
+impl Card {
+    fn new(at: usize, text: &[u8]) -> Self {
+        let text = String::from_utf8_lossy(text);
+        let mut words = split_outside_quotes(&text);
+        let first = words.next().unwrap_or("").trim();
+        let parameters = words.map(|word| {
+            let (key, value) = word.split_once('=').unwrap_or((word, ""));
+            (squeezed(key), unquoted(value).to_owned())
+        });
+        let parameters = parameters.collect();
+        Self { name: squeezed(first), title: format!("*{}", first.to_uppercase()), at, parameters }
+    }
+
+    /// Value of a parameter, empty for a flag.
+    pub(super) fn get(&self, key: &str) -> Option<&str> {
+        self.parameters.iter().find(|(known, _)| known == key).map(|(_, value)| value.as_str())
+    }
+
+    /// Whether a parameter is there.
+    pub(super) fn has(&self, key: &str) -> bool {
+        self.get(key).is_some()
+    }
+
+    /// Value of a parameter that must be there.
+    pub(super) fn need(&self, src: &Source, key: &str) -> Result<&str, MeshError> {
+        self.get(key).filter(|value| !value.is_empty()).ok_or_else(|| {
+            src.error(Kind::Syntax, self.at, self.title.as_str(), format!("no {key}="), format!("{key}=name"))
+        })
+    }
+
+    /// An error at the card.
+    pub(super) fn refuse(&self, src: &Source, found: impl Into<Box<str>>, expected: &str) -> MeshError {
+        src.error(Kind::Unsupported, self.at, self.title.as_str(), found, expected)
+    }
+}
+
+/// Comma-separated fields of a data line, trimmed; a comma at the end adds none.
+pub(super) fn fields(line: &[u8]) -> impl Iterator<Item = &[u8]> {
+    let line = line.trim_ascii_end();
+    line.strip_suffix(b",").unwrap_or(line).split(|byte| *byte == b',').map(<[u8]>::trim_ascii)
+}
+
+/// All fields of a data line as numbers; an empty field is zero.
+pub(super) fn numbers(src: &Source, card: &Card, (at, line): Line) -> Result<Vec<f64>, MeshError> {
+    let number = |field: &[u8]| {
+        let value = if field.is_empty() { Some(0.0) } else { parse_f64(field) };
+        match value {
+            Some(value) if value.is_finite() => Ok(value),
+            Some(_) => Err(src.error(Kind::NotFinite, at, card.title.as_str(), shown(field), "a finite number")),
+            None => Err(src.error(Kind::Syntax, at, card.title.as_str(), shown(field), "a number")),
+        }
+    };
+    fields(line).map(number).collect()
+}
+
+/// A field as the number of a node or an element.
+pub(super) fn id(src: &Source, at: usize, what: &str, field: &[u8]) -> Result<u64, MeshError> {
+    parse_u64(field).ok_or_else(|| src.error(Kind::Syntax, at, what, shown(field), "a number without sign or point"))
+}
+
+/// Capitals, without blanks.
+pub(super) fn squeezed(text: &str) -> String {
+    text.chars().filter(|c| !c.is_whitespace()).flat_map(char::to_uppercase).collect()
+}
+
+/// Without blanks and quotes around it.
+pub(super) fn unquoted(text: &str) -> &str {
+    let text = text.trim();
+    text.strip_prefix('"').and_then(|text| text.strip_suffix('"')).unwrap_or(text)
+}
+
+fn split_outside_quotes(text: &str) -> impl Iterator<Item = &str> {
+    let mut quoted = false;
+    text.split(move |c| {
+        quoted ^= c == '"';
+        c == ',' && !quoted
+    })
+}

@@ -1,0 +1,24 @@
+//! CalculiX and Abaqus decks, `.inp`: nodes, elements, sets, materials and sections.
+//!
+//! Cards are read once, in order, into a [`Deck`]; sets, sections and surfaces are put together at
+//! the end ([`finish`](deck)). Loads, ties and steps are passed over and named in a warning.
+
+mod deck;
+mod finish;
+mod lines;
+mod properties;
+mod sets;
+mod types;
+
+use super::error::MeshError;
+use super::read::{MeshFile, ReadOptions};
+use super::source::Source;
+use deck::Deck;
+
+/// Reads a whole file.
+pub(super) fn parse(src: &Source, options: &ReadOptions) -> Result<MeshFile, MeshError> {
+    let mut deck = Deck::new(*src, options.units);
+    deck.read()?;
+    let (mesh, warnings) = deck.finish(options)?;
+    Ok(MeshFile { mesh, format: "CalculiX/Abaqus deck", warnings })
+}

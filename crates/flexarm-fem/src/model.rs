@@ -1,0 +1,316 @@
+//! The assembled finite element model: degrees of freedom, sparse stiffness and mass of a whole mesh.
+//!
+//! Nodes of solid elements have three DoF, nodes of beams six; nodes without an element have none.
+//! DoF are numbered node by node, `ux uy uz (rx ry rz)`, in mesh axes.
+//!
+//! Start at [`FeModel::assemble`]. Not here: ties, boundaries, reduction ([`crate::reduction`]).
+
+mod mass;
+mod scatter;
+
+use nalgebra::{DMatrix, Vector3};
+
+use crate::beam::Beam;
+use crate::element::{ElementWorkspace, Quadrature};
+use crate::error::FemError;
+use crate::material::Material;
+use crate::mesh::{ElementBlock, Mesh, Region};
+use crate::sparse::SparseSymmetric;
+use crate::spatial::Matrix12;
+
+pub use mass::MassMatrix;
+use scatter::NodeGraph;
+
+/// Why a mesh could not be assembled.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum AssemblyError {
+    /// Elements whose Jacobian is not positive.
+    #[error(
+        "{count} element(s) of {total} are inverted or folded, the Jacobian there is not positive: {list}; \
+         mend the mesh (for curved tetrahedra: straight sides, Mesh.SecondOrderLinear = 1 in Gmsh, or \
+         Mesh.HighOrderOptimize = 2)"
+    )]
+    InvertedElements {
+        /// How many.
+        count: usize,
+        /// Of how many.
+        total: usize,
+        /// The first ones, with kind, number in the file, place and value.
+        list: String,
+    },
+    /// A region without a material.
+    #[error("region {region:?} has no material: give one for it, or one for all")]
+    NoMaterial {
+        /// Its name.
+        region: String,
+    },
+    /// A region with beams but without a section.
+    #[error("region {region:?} has beam elements but no section: the mesh file must have one, or give it")]
+    NoSection {
+        /// Its name.
+        region: String,
+    },
+    /// A material or a beam that cannot be.
+    #[error("region {region:?}: {source}")]
+    Property {
+        /// Its name.
+        region: String,
+        /// What is wrong with it.
+        source: FemError,
+    },
+    /// A mesh without elements.
+    #[error("the mesh has no element that carries stiffness")]
+    Empty,
+}
+
+/// Which DoF belong to which node.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DofMap {
+    /// First DoF of each node; one more entry than there are nodes.
+    first: Vec<u32>,
+}
+
+impl DofMap {
+    /// Three DoF for the nodes of solids, six for those of beams, none for unused ones.
+    pub fn new(mesh: &Mesh) -> Self {
+        let mut count = vec![0_u8; mesh.nodes.len()];
+        for block in &mesh.blocks {
+            let dofs = if block.kind.is_beam() { 6 } else { 3 };
+            for node in &block.connectivity {
+                let here = &mut count[*node as usize];
+                *here = dofs.max(*here);
+            }
+        }
+        let mut first = Vec::with_capacity(count.len() + 1);
+        first.push(0);
+        first.extend(count.iter().scan(0_u32, |sum, c| {
+            *sum += u32::from(*c);
+            Some(*sum)
+        }));
+        Self { first }
+    }
+
+    /// Number of DoF.
+    pub fn size(&self) -> usize {
+        *self.first.last().unwrap_or(&0) as usize
+    }
+
+    /// Number of nodes, used or not.
+    pub fn nodes(&self) -> usize {
+        self.first.len() - 1
+    }
+
+    /// DoF of a node: none, three or six.
+    pub fn of(&self, node: usize) -> std::ops::Range<usize> {
+        self.first[node] as usize..self.first[node + 1] as usize
+    }
+
+    /// Node of a DoF, and its component from 0 (`ux`) to 5 (`rz`).
+    pub fn node_of(&self, dof: usize) -> (usize, usize) {
+        let node = self.first.partition_point(|first| *first as usize <= dof) - 1;
+        (node, dof - self.first[node] as usize)
+    }
+}
+
+/// What the assembly needs besides the mesh.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct AssemblyOptions {
+    /// Quadrature of solid elements.
+    pub quadrature: Quadrature,
+    /// Material of regions that bring none of their own.
+    pub material: Option<Material>,
+}
+
+/// Stiffness and mass of a mesh, SI, mesh axes.
+#[derive(Debug, Clone)]
+pub struct FeModel {
+    /// Which DoF belong to which node.
+    pub dofs: DofMap,
+    /// Positions of all nodes, m.
+    pub nodes: Vec<Vector3<f64>>,
+    /// Stiffness.
+    pub K: SparseSymmetric,
+    /// Consistent mass.
+    pub M: MassMatrix,
+}
+
+/// Material of each region, checked: its own, or the one for all.
+///
+/// # Errors
+/// [`AssemblyError::NoMaterial`] and [`AssemblyError::Property`].
+pub fn materials(mesh: &Mesh, options: &AssemblyOptions) -> Result<Vec<Material>, AssemblyError> {
+    let one = |(index, region): (usize, &Region)| {
+        let used = mesh.blocks.iter().any(|block| block.region == index && !block.is_empty());
+        let material = region.material.or(options.material).or((!used).then_some(Material::STEEL));
+        let material = material.ok_or_else(|| AssemblyError::NoMaterial { region: region.name.clone() })?;
+        let property = |source| AssemblyError::Property { region: region.name.clone(), source };
+        material.check().map_err(property)?;
+        if let Some(found) = material.G.filter(|G| (G * 2.0 * (1.0 + material.nu) / material.E - 1.0).abs() > 1e-3) {
+            return Err(property(FemError::OutOfRange {
+                what: "shear modulus G (Pa) of an isotropic material".into(),
+                found,
+                allowed: format!("E / (2 (1 + nu)) = {:.6e}, or left out", material.E / (2.0 * (1.0 + material.nu))),
+            }));
+        }
+        if material.nu > 0.4999 && mesh.blocks.iter().any(|b| b.region == index && !b.kind.is_beam()) {
+            return Err(property(FemError::OutOfRange {
+                what: "Poisson's ratio nu of solid elements".into(),
+                found: material.nu,
+                allowed: "up to 0.4999: incompressible solids are not covered".into(),
+            }));
+        }
+        Ok(material)
+    };
+    mesh.regions.iter().enumerate().map(one).collect()
+}
+
+impl FeModel {
+    /// Stiffness and mass of `mesh`.
+    ///
+    /// # Errors
+    /// [`AssemblyError`].
+    pub fn assemble(mesh: &Mesh, options: &AssemblyOptions) -> Result<Self, AssemblyError> {
+        let materials = materials(mesh, options)?;
+        let dofs = DofMap::new(mesh);
+        if dofs.size() == 0 {
+            return Err(AssemblyError::Empty);
+        }
+        let graph = NodeGraph::new(mesh, &dofs);
+        let mut K = SparseSymmetric::zeros(graph.dof_pattern(&dofs));
+        let mut M = MassMatrix::zeros(&graph, &dofs);
+        let mut beams = Vec::new();
+        let mut inverted = Inverted::default();
+        let mut workspace = ElementWorkspace::new();
+        for block in &mesh.blocks {
+            if block.kind.is_beam() {
+                add_beams(mesh, block, &materials, &dofs, &graph, &mut K, &mut beams)?;
+                continue;
+            }
+            let mut x = vec![Vector3::zeros(); block.kind.nodes()];
+            for (id, nodes) in block.ids.iter().zip(block.elements()) {
+                for (x, node) in x.iter_mut().zip(nodes) {
+                    *x = mesh.nodes[*node as usize];
+                }
+                let material = &materials[block.region];
+                match workspace.stiffness_and_mass(block.kind, &x, material, options.quadrature) {
+                    Ok(()) => {
+                        graph.add_blocks(&dofs, nodes, 3, workspace.stiffness(), &mut K.values);
+                        M.add_nodal(&graph, nodes, workspace.mass());
+                    }
+                    Err(error) => inverted.add(block, *id, &error),
+                }
+            }
+        }
+        inverted.check(mesh.element_count())?;
+        M.add_general(dofs.size(), &beams);
+        Ok(Self { dofs, nodes: mesh.nodes.clone(), K, M })
+    }
+
+    /// Number of DoF.
+    pub fn size(&self) -> usize {
+        self.dofs.size()
+    }
+
+    /// The six rigid motions about `point`, by columns: three translations, three rotations.
+    pub fn rigid_modes(&self, point: &Vector3<f64>) -> DMatrix<f64> {
+        let mut R = DMatrix::zeros(self.size(), 6);
+        for (node, p) in self.nodes.iter().enumerate() {
+            let dofs = self.dofs.of(node);
+            if dofs.is_empty() {
+                continue;
+            }
+            let turn = -(p - point).cross_matrix();
+            for i in 0..3 {
+                R[(dofs.start + i, i)] = 1.0;
+                for j in 0..3 {
+                    R[(dofs.start + i, 3 + j)] = turn[(i, j)];
+                }
+            }
+            for (j, dof) in dofs.skip(3).enumerate() {
+                R[(dof, 3 + j)] = 1.0;
+            }
+        }
+        R
+    }
+}
+
+/// Inverted elements, counted; the first few described.
+#[derive(Default)]
+struct Inverted {
+    count: usize,
+    list: Vec<String>,
+}
+
+impl Inverted {
+    fn add(&mut self, block: &ElementBlock, id: u64, error: &crate::element::InvertedElement) {
+        self.count += 1;
+        if self.list.len() < 10 {
+            self.list.push(format!("{} {id} ({error})", block.kind.name()));
+        }
+    }
+
+    fn check(self, total: usize) -> Result<(), AssemblyError> {
+        if self.count == 0 {
+            return Ok(());
+        }
+        let more = if self.count > self.list.len() { ", ..." } else { "" };
+        let list = self.list.join(", ") + more;
+        Err(AssemblyError::InvertedElements { count: self.count, total, list })
+    }
+}
+
+/// The 12×12 of a beam element and its mass, in mesh axes: `A = Q A_E Qᵀ`.
+fn add_beams(
+    mesh: &Mesh,
+    block: &ElementBlock,
+    materials: &[Material],
+    dofs: &DofMap,
+    graph: &NodeGraph,
+    K: &mut SparseSymmetric,
+    masses: &mut Vec<(u32, u32, f64)>,
+) -> Result<(), AssemblyError> {
+    let region = &mesh.regions[block.region];
+    let name = || region.name.clone();
+    let properties = region.beam.as_ref().ok_or_else(|| AssemblyError::NoSection { region: name() })?;
+    let property = |source| AssemblyError::Property { region: name(), source };
+    let bar = properties.section.bar(&materials[block.region]).map_err(property)?;
+    for nodes in block.elements() {
+        let (a, b) = (nodes[0] as usize, nodes[1] as usize);
+        let along = mesh.nodes[b] - mesh.nodes[a];
+        let beam = Beam::new(bar, properties.theory, along.norm()).map_err(property)?;
+        let R = beam_axes(&along, &properties.y_axis).map_err(property)?;
+        let mut Q = Matrix12::zeros();
+        for corner in [0, 3, 6, 9] {
+            Q.fixed_view_mut::<3, 3>(corner, corner).copy_from(&R);
+        }
+        let stiffness = Q * beam.stiffness12() * Q.transpose();
+        graph.add_blocks(dofs, nodes, 6, stiffness.as_slice(), &mut K.values);
+        let mass = Q * beam.mass12() * Q.transpose();
+        let place = |k: usize| dofs.of(nodes[k / 6] as usize).start + k % 6;
+        for i in 0..12 {
+            for j in 0..12 {
+                let (row, column) = (place(i), place(j));
+                if row >= column {
+                    masses.push((row as u32, column as u32, mass[(i, j)]));
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Axes of a beam in mesh axes, by columns: x along it, y as near to `y_axis` as that allows.
+pub(crate) fn beam_axes(along: &Vector3<f64>, y_axis: &Vector3<f64>) -> Result<nalgebra::Matrix3<f64>, FemError> {
+    let x = along.normalize();
+    let y = y_axis - x * x.dot(y_axis);
+    if !(y.norm() > 1e-6 * y_axis.norm()) {
+        return Err(FemError::OutOfRange {
+            what: "angle between a beam and the y axis of its section (rad)".into(),
+            found: 0.0,
+            allowed: "above zero: give a direction across the beam".into(),
+        });
+    }
+    let y = y.normalize();
+    Ok(nalgebra::Matrix3::from_columns(&[x, y, x.cross(&y)]))
+}

@@ -1,0 +1,257 @@
+//! Interfaces of a link and how they are tied to the mesh.
+
+use nalgebra::{DMatrix, Matrix3, SymmetricEigen, Vector3};
+use serde::{Deserialize, Serialize};
+
+use crate::model::FeModel;
+use crate::spatial::Pose;
+
+/// How the six DoF of an interface act on the nodes of its surface.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Tie {
+    /// RBE2: every node moves with the interface as one rigid body; stiffens the seat.
+    #[default]
+    Rigid,
+    /// RBE3: the interface follows the mean motion of the nodes, all with the same weight; adds no stiffness.
+    Distributing,
+}
+
+impl Tie {
+    /// The name that files use.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Rigid => "rigid",
+            Self::Distributing => "distributing",
+        }
+    }
+}
+
+/// A joint seat: a frame and the nodes tied to it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Interface {
+    /// Name, such as `A`.
+    pub name: String,
+    /// Its frame in the mesh frame, m. The six DoF are those of its origin, in mesh axes.
+    pub X_LI: Pose,
+    /// Indices of the tied nodes.
+    pub nodes: Vec<u32>,
+    /// How they are tied.
+    pub tie: Tie,
+}
+
+/// Why interfaces could not be tied.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum TieError {
+    /// Fewer than two interfaces.
+    #[error("{found} interface(s) given; a link needs at least two, a proximal one first")]
+    TooFew {
+        /// How many there are.
+        found: usize,
+    },
+    /// An interface without nodes.
+    #[error("interface {interface:?} has no node that belongs to an element")]
+    Empty {
+        /// Its name.
+        interface: String,
+    },
+    /// Nodes that cannot hold all three rotations.
+    #[error(
+        "interface {interface:?}: its {count} node(s) {shape}, so a rotation stays free; \
+         an interface on solid elements needs three nodes that are not on a line"
+    )]
+    Degenerate {
+        /// Its name.
+        interface: String,
+        /// Number of its nodes.
+        count: usize,
+        /// "are one point" or "lie on a line".
+        shape: &'static str,
+    },
+    /// A node in two interfaces.
+    #[error("interfaces {first:?} and {second:?} overlap: {count} node(s) are in both, such as index {node}")]
+    Overlap {
+        /// The one.
+        first: String,
+        /// The other.
+        second: String,
+        /// How many nodes they share.
+        count: usize,
+        /// One of them, index in the mesh.
+        node: u32,
+    },
+    /// Two interfaces of one name.
+    #[error("two interfaces are called {name:?}")]
+    SameName {
+        /// The name.
+        name: String,
+    },
+    /// A rigid interface on every node of the mesh.
+    #[error("all nodes are tied rigidly; nothing is left that could bend")]
+    NothingFree,
+}
+
+/// The boundary of a model: which DoF are free, and how the others follow the interfaces.
+#[derive(Debug, Clone)]
+pub struct Boundary {
+    /// Rows of B: (DoF, boundary column, factor).
+    rigid: Vec<(u32, u32, f64)>,
+    /// Rows of G: for each constrained boundary DoF its column and the (DoF, weight) it is the mean of.
+    means: Vec<(usize, Vec<(u32, f64)>)>,
+    /// DoF that neither follow an interface nor are boundary DoF themselves, ascending.
+    free: Vec<u32>,
+    columns: usize,
+    size: usize,
+}
+
+impl Boundary {
+    /// Ties `interfaces`, proximal first, to a model.
+    ///
+    /// # Errors
+    /// [`TieError`].
+    pub fn tie(model: &FeModel, interfaces: &[Interface]) -> Result<Self, TieError> {
+        check(model, interfaces)?;
+        let (mut rigid, mut means) = (Vec::new(), Vec::new());
+        let mut is_free = vec![true; model.size()];
+        for (index, interface) in interfaces.iter().enumerate() {
+            let origin = interface.X_LI.translation.vector;
+            match interface.tie {
+                Tie::Rigid => {
+                    for node in &interface.nodes {
+                        let dofs = model.dofs.of(*node as usize);
+                        let turn = -(model.nodes[*node as usize] - origin).cross_matrix();
+                        is_free[dofs.clone()].fill(false);
+                        for (i, dof) in dofs.enumerate() {
+                            let dof = dof as u32;
+                            let column = |k: usize| (6 * index + k) as u32;
+                            rigid.push((dof, column(i), 1.0));
+                            if i < 3 {
+                                rigid.extend((0..3).filter(|j| *j != i).map(|j| (dof, column(3 + j), turn[(i, j)])));
+                            }
+                        }
+                    }
+                }
+                Tie::Distributing => means.extend(mean_rows(model, interface, 6 * index)),
+            }
+        }
+        let free: Vec<u32> = (0..model.size() as u32).filter(|dof| is_free[*dof as usize]).collect();
+        if free.is_empty() {
+            return Err(TieError::NothingFree);
+        }
+        Ok(Self { rigid, means, free, columns: 6 * interfaces.len(), size: model.size() })
+    }
+
+    /// Boundary made of DoF of the model themselves: the reference nodes of an imported model.
+    pub fn retained(size: usize, dofs: &[u32]) -> Self {
+        let rigid: Vec<_> = dofs.iter().enumerate().map(|(column, dof)| (*dof, column as u32, 1.0)).collect();
+        let free = (0..size as u32).filter(|dof| !dofs.contains(dof)).collect();
+        Self { rigid, means: Vec::new(), free, columns: dofs.len(), size }
+    }
+
+    /// Boundary coordinates: six per interface.
+    pub fn columns(&self) -> usize {
+        self.columns
+    }
+
+    /// DoF that are solved for, ascending.
+    pub fn free(&self) -> &[u32] {
+        &self.free
+    }
+
+    /// Rows of G.
+    pub(super) fn means(&self) -> &[(usize, Vec<(u32, f64)>)] {
+        &self.means
+    }
+
+    /// Whether any boundary DoF holds the model by itself.
+    pub(super) fn holds(&self) -> bool {
+        !self.rigid.is_empty()
+    }
+
+    /// B: displacement of every DoF that follows an interface rigidly, one column per boundary DoF.
+    pub(super) fn rigid_part(&self) -> DMatrix<f64> {
+        let mut B = DMatrix::zeros(self.size, self.columns);
+        for (dof, column, factor) in &self.rigid {
+            B[(*dof as usize, *column as usize)] = *factor;
+        }
+        B
+    }
+}
+
+fn check(model: &FeModel, interfaces: &[Interface]) -> Result<(), TieError> {
+    if interfaces.len() < 2 {
+        return Err(TieError::TooFew { found: interfaces.len() });
+    }
+    let mut owner = vec![u32::MAX; model.nodes.len()];
+    for (index, interface) in interfaces.iter().enumerate() {
+        if interfaces[..index].iter().any(|other| other.name == interface.name) {
+            return Err(TieError::SameName { name: interface.name.clone() });
+        }
+        if !interface.nodes.iter().any(|node| !model.dofs.of(*node as usize).is_empty()) {
+            return Err(TieError::Empty { interface: interface.name.clone() });
+        }
+        for node in &interface.nodes {
+            let before = owner[*node as usize];
+            if before != u32::MAX {
+                let shared = interface.nodes.iter().filter(|n| owner[**n as usize] == before);
+                let first = interfaces[before as usize].name.clone();
+                let second = interface.name.clone();
+                return Err(TieError::Overlap { first, second, count: shared.count(), node: *node });
+            }
+        }
+        for node in &interface.nodes {
+            owner[*node as usize] = index as u32;
+        }
+        let turns = interface.nodes.iter().any(|node| model.dofs.of(*node as usize).len() == 6);
+        if !(turns && interface.tie == Tie::Rigid) {
+            spread(model, interface)?;
+        }
+    }
+    Ok(())
+}
+
+/// Weighted centre and second moments `Σ (r² 1 - r rᵀ)` of the nodes, checked to hold every rotation.
+fn spread(model: &FeModel, interface: &Interface) -> Result<(Vector3<f64>, Matrix3<f64>), TieError> {
+    let points: Vec<_> = interface.nodes.iter().map(|node| model.nodes[*node as usize]).collect();
+    let count = points.len();
+    let centre = points.iter().sum::<Vector3<f64>>() / count as f64;
+    let moments = points.iter().fold(Matrix3::zeros(), |sum, p| {
+        let r = p - centre;
+        sum + Matrix3::identity() * r.norm_squared() - r * r.transpose()
+    });
+    let degenerate = |shape| TieError::Degenerate { interface: interface.name.clone(), count, shape };
+    let mut principal: Vec<f64> = SymmetricEigen::new(moments).eigenvalues.iter().copied().collect();
+    principal.sort_by(f64::total_cmp);
+    if !(principal[2] > 1e-24 * centre.norm_squared().max(1e-12)) {
+        return Err(degenerate("are one point"));
+    }
+    if !(principal[0] > 1e-9 * principal[2]) {
+        return Err(degenerate("lie on a line"));
+    }
+    Ok((centre, moments))
+}
+
+/// Rows of G of one distributing interface, weights equal:
+/// `u_c = mean u`, `theta = T⁻¹ Σ r x u`, `u_0 = u_c + theta x (p_0 - c)`.
+fn mean_rows(model: &FeModel, interface: &Interface, column: usize) -> Vec<(usize, Vec<(u32, f64)>)> {
+    let Ok((centre, moments)) = spread(model, interface) else { return Vec::new() };
+    let Some(inverse) = moments.try_inverse() else { return Vec::new() };
+    let weight = 1.0 / interface.nodes.len() as f64;
+    // theta x a = -[a]x theta
+    let carry = -(interface.X_LI.translation.vector - centre).cross_matrix();
+    let mut rows = vec![Vec::new(); 6];
+    for node in &interface.nodes {
+        let dofs = model.dofs.of(*node as usize);
+        let turn = inverse * (model.nodes[*node as usize] - centre).cross_matrix();
+        let shift = Matrix3::identity() * weight + carry * turn;
+        for j in 0..3 {
+            let dof = (dofs.start + j) as u32;
+            for i in 0..3 {
+                rows[i].push((dof, shift[(i, j)]));
+                rows[3 + i].push((dof, turn[(i, j)]));
+            }
+        }
+    }
+    rows.into_iter().enumerate().map(|(i, row)| (column + i, row)).collect()
+}

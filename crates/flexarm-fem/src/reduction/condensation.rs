@@ -1,0 +1,435 @@
+//! The factorised model with its boundary: static shapes, and modes under three kinds of support.
+
+use nalgebra::{DMatrix, DVector, Vector3};
+
+use super::boundary::{Boundary, Interface, TieError};
+use super::grounding::statically_determinate;
+use super::superelement::{InterfaceFrame, Superelement};
+use crate::model::FeModel;
+use crate::sparse::{
+    Cholesky, FactorFigures, Modes, ModesError, ModesWanted, NotPositiveDefinite, Ordering, Threads, add_product, gram,
+    smallest_modes,
+};
+
+/// How to solve.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct CondensationOptions {
+    /// Fill-reducing order.
+    pub ordering: Ordering,
+    /// Threads of factorisation and solves.
+    pub threads: Threads,
+}
+
+/// Why a model could not be reduced.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ReductionError {
+    /// The interfaces cannot be tied.
+    #[error(transparent)]
+    Tie(#[from] TieError),
+    /// `K_ii` has no Cholesky factor.
+    #[error(
+        "the stiffness of the free nodes is not positive definite: node index {node} can move without \
+         force ({component}); a part of the mesh is loose, an element is inverted, or a mechanism is left"
+    )]
+    Loose {
+        /// Node index at which it was found.
+        node: usize,
+        /// Component at that node.
+        component: &'static str,
+    },
+    /// The factor does not fit into memory.
+    #[error("the factor of {entries} numbers does not fit into memory; coarsen the mesh")]
+    OutOfMemory {
+        /// Entries of the factor.
+        entries: usize,
+    },
+    /// Nothing holds the model and no six DoF can.
+    #[error("the mesh lies on a line or in a point: nothing holds its rotations")]
+    NoGrounding,
+    /// The modes were not found.
+    #[error(transparent)]
+    Modes(#[from] ModesError),
+}
+
+/// Size of the linear algebra, for reports.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SolverFigures {
+    /// DoF of the whole mesh.
+    pub dofs: usize,
+    /// The factor.
+    pub factor: FactorFigures,
+    /// Smallest pivot of the factor over the diagonal entry it came from.
+    pub smallest_pivot: f64,
+}
+
+/// The part of the solution that distributing ties need.
+#[derive(Debug)]
+struct Saddle {
+    /// G over the solved DoF, by rows.
+    rows: Vec<Vec<(u32, f64)>>,
+    /// `K_ii⁻¹ Gᵀ`.
+    Z: DMatrix<f64>,
+    /// Inverse of the small matrix for the forces λ and, where nothing holds the mesh, its rigid motion.
+    small: nalgebra::LU<f64, nalgebra::Dyn, nalgebra::Dyn>,
+    /// Scale of the compliances in it.
+    scale: f64,
+    /// Rigid motions of the whole mesh, if nothing else holds it.
+    rigid: Option<DMatrix<f64>>,
+}
+
+/// A model, its boundary, the factor of `K_ii` and the static shapes.
+#[derive(Debug)]
+pub struct Condensation<'m> {
+    model: &'m FeModel,
+    boundary: Boundary,
+    /// DoF in the factor: the free ones without those held by grounding.
+    solved: Vec<u32>,
+    factor: Cholesky,
+    saddle: Option<Saddle>,
+    /// Static shapes, one column per boundary DoF, over all DoF.
+    T: DMatrix<f64>,
+    K_g: DMatrix<f64>,
+    M_g: DMatrix<f64>,
+    /// Inverse of `K_g` without its first six rows: the compliance with the first interface held.
+    tip: DMatrix<f64>,
+}
+
+impl<'m> Condensation<'m> {
+    /// Ties, factorises and finds the static shapes.
+    ///
+    /// # Errors
+    /// [`ReductionError`].
+    pub fn new(
+        model: &'m FeModel,
+        interfaces: &[Interface],
+        options: CondensationOptions,
+    ) -> Result<Self, ReductionError> {
+        Self::with_boundary(model, Boundary::tie(model, interfaces)?, options)
+    }
+
+    /// The same with a boundary made elsewhere.
+    ///
+    /// # Errors
+    /// [`ReductionError`].
+    pub fn with_boundary(
+        model: &'m FeModel,
+        boundary: Boundary,
+        options: CondensationOptions,
+    ) -> Result<Self, ReductionError> {
+        let mut solved = boundary.free().to_vec();
+        let rigid = if boundary.holds() {
+            None
+        } else {
+            let R = model.rigid_modes(&Vector3::zeros());
+            let held = statically_determinate(model, &solved, &R).ok_or(ReductionError::NoGrounding)?;
+            for position in held.into_iter().rev() {
+                solved.remove(position);
+            }
+            Some(R)
+        };
+        let K_ii = model.K.submatrix(&solved);
+        let factor = Cholesky::new(&K_ii, options.ordering, options.threads).map_err(|error| match error {
+            NotPositiveDefinite::Pivot { unknown } => {
+                let (node, component) = model.dofs.node_of(solved[unknown] as usize);
+                ReductionError::Loose { node, component: crate::error::COMPONENTS[component] }
+            }
+            NotPositiveDefinite::OutOfMemory { entries } => ReductionError::OutOfMemory { entries },
+        })?;
+        drop(K_ii);
+        let columns = boundary.columns();
+        let empty = DMatrix::zeros(0, 0);
+        let mut this = Self {
+            model,
+            boundary,
+            solved,
+            factor,
+            saddle: None,
+            T: empty.clone(),
+            K_g: empty.clone(),
+            M_g: empty.clone(),
+            tip: empty,
+        };
+        this.saddle = this.saddle_of(rigid);
+        this.T = this.static_shapes(columns);
+        let KT = this.model.K.product(&this.T);
+        this.K_g = symmetric(gram(&this.T, &KT));
+        this.M_g = symmetric(gram(&this.T, &this.model.M.product(&this.T)));
+        this.tip = this.tip_compliance()?;
+        Ok(this)
+    }
+
+    fn saddle_of(&self, rigid: Option<DMatrix<f64>>) -> Option<Saddle> {
+        let means = self.boundary.means();
+        if means.is_empty() {
+            return None;
+        }
+        let m = means.len();
+        let mut position = vec![u32::MAX; self.model.size()];
+        for (k, dof) in self.solved.iter().enumerate() {
+            position[*dof as usize] = k as u32;
+        }
+        let rows: Vec<Vec<(u32, f64)>> = means
+            .iter()
+            .map(|(_, row)| {
+                let inside = |(dof, weight): &(u32, f64)| {
+                    let at = position[*dof as usize];
+                    (at != u32::MAX).then_some((at, *weight))
+                };
+                row.iter().filter_map(inside).collect()
+            })
+            .collect();
+        let mut Z = DMatrix::zeros(self.solved.len(), m);
+        for (k, row) in rows.iter().enumerate() {
+            for (at, weight) in row {
+                Z[(*at as usize, k)] = *weight;
+            }
+        }
+        self.factor.solve_in_place(&mut Z);
+        let S = apply_rows(&rows, &Z);
+        let scale = S.amax();
+        // [S/s, -GR; -(GR)ᵀ, 0] [λ; a/s] = [(G y - g)/s; -Rᵀ f]
+        let extra = if rigid.is_some() { 6 } else { 0 };
+        let mut small = DMatrix::zeros(m + extra, m + extra);
+        small.view_mut((0, 0), (m, m)).copy_from(&(S / scale));
+        if let Some(R) = &rigid {
+            for (k, (_, row)) in means.iter().enumerate() {
+                for j in 0..6 {
+                    let GR: f64 = row.iter().map(|(dof, weight)| weight * R[(*dof as usize, j)]).sum();
+                    small[(k, m + j)] = -GR;
+                    small[(m + j, k)] = -GR;
+                }
+            }
+        }
+        Some(Saddle { rows, Z, small: small.lu(), scale, rigid })
+    }
+
+    /// Solves `K u + Gᵀ λ = F` on the free DoF with `G u = g`; tied DoF are zero. F is replaced by u.
+    fn solve_constrained(&self, F: &mut DMatrix<f64>, g: Option<&DMatrix<f64>>) {
+        let width = F.ncols();
+        let mut y = DMatrix::from_fn(self.solved.len(), width, |k, j| F[(self.solved[k] as usize, j)]);
+        self.factor.solve_in_place(&mut y);
+        let mut motion = None;
+        if let Some(saddle) = &self.saddle {
+            let m = saddle.rows.len();
+            let mut right = DMatrix::zeros(saddle.small.l().nrows(), width);
+            let mut gap = apply_rows(&saddle.rows, &y);
+            if let Some(g) = g {
+                gap -= g;
+            }
+            right.view_mut((0, 0), (m, width)).copy_from(&(gap / saddle.scale));
+            if let Some(R) = &saddle.rigid {
+                right.view_mut((m, 0), (6, width)).copy_from(&-gram(R, F));
+            }
+            if saddle.small.solve_mut(&mut right) {
+                let lambda = right.rows(0, m).into_owned();
+                add_product(&mut y, -1.0, &saddle.Z, &lambda);
+                motion = saddle.rigid.as_ref().map(|R| (R, right.rows(m, 6) * saddle.scale));
+            } else {
+                y.fill(f64::NAN);
+            }
+        }
+        F.fill(0.0);
+        for (k, dof) in self.solved.iter().enumerate() {
+            for j in 0..width {
+                F[(*dof as usize, j)] = y[(k, j)];
+            }
+        }
+        if let Some((R, a)) = motion {
+            add_product(F, 1.0, R, &a);
+        }
+    }
+
+    fn static_shapes(&self, columns: usize) -> DMatrix<f64> {
+        let B = self.boundary.rigid_part();
+        let mut X = -self.model.K.product(&B);
+        let means = self.boundary.means();
+        let g = DMatrix::from_fn(means.len(), columns, |k, j| if means[k].0 == j { 1.0 } else { 0.0 });
+        self.solve_constrained(&mut X, Some(&g));
+        X + B
+    }
+
+    fn tip_compliance(&self) -> Result<DMatrix<f64>, ReductionError> {
+        let n = self.K_g.nrows();
+        if n < 12 {
+            return Ok(DMatrix::zeros(0, 0));
+        }
+        let K = self.K_g.view((6, 6), (n - 6, n - 6)).into_owned();
+        let loose = ReductionError::Loose { node: 0, component: "an interface that holds nothing" };
+        spd_inverse(&K).ok_or(loose)
+    }
+
+    /// The model that was reduced.
+    pub fn model(&self) -> &FeModel {
+        self.model
+    }
+
+    /// Static shapes: displacement of every DoF for a unit of each boundary DoF.
+    pub fn static_shapes_ref(&self) -> &DMatrix<f64> {
+        &self.T
+    }
+
+    /// Guyan stiffness, six rows per interface, mesh axes.
+    pub fn stiffness(&self) -> &DMatrix<f64> {
+        &self.K_g
+    }
+
+    /// Guyan mass, likewise.
+    pub fn mass(&self) -> &DMatrix<f64> {
+        &self.M_g
+    }
+
+    /// Displacements of all DoF under unit wrenches at the interfaces but the first, which is held.
+    pub fn unit_load_shapes(&self) -> DMatrix<f64> {
+        let n = self.K_g.nrows();
+        let T_B = self.T.columns(6, n - 6).into_owned();
+        let mut U = DMatrix::zeros(self.T.nrows(), n - 6);
+        add_product(&mut U, 1.0, &T_B, &self.tip);
+        U
+    }
+
+    /// Displacements of all DoF and of the boundary under nodal forces, the first interface held.
+    pub fn solve_held(&self, F: &mut DMatrix<f64>) {
+        let n = self.K_g.nrows();
+        let T_B = self.T.columns(6, n - 6).into_owned();
+        let f_B = gram(&T_B, F);
+        self.solve_constrained(F, None);
+        add_product(F, 1.0, &T_B, &(&self.tip * f_B));
+    }
+
+    /// Modes with every interface held: those of Craig and Bampton.
+    ///
+    /// # Errors
+    /// [`ModesError`].
+    pub fn fixed_modes(&self, wanted: ModesWanted) -> Result<Modes, ModesError> {
+        let dimension = self.boundary.free().len() - self.boundary.means().len();
+        let mut solve = |F: &mut DMatrix<f64>| self.solve_constrained(F, None);
+        smallest_modes(self.model.size(), dimension, wanted, &mut solve, &mut |X, Y| self.model.M.product_into(X, Y))
+    }
+
+    /// Modes with the first interface held and the others free.
+    ///
+    /// # Errors
+    /// [`ModesError`].
+    pub fn held_modes(&self, wanted: ModesWanted) -> Result<Modes, ModesError> {
+        let dimension = self.boundary.free().len() - self.boundary.means().len() + self.boundary.columns() - 6;
+        let mut solve = |F: &mut DMatrix<f64>| self.solve_held(F);
+        smallest_modes(self.model.size(), dimension, wanted, &mut solve, &mut |X, Y| self.model.M.product_into(X, Y))
+    }
+
+    /// Elastic modes of the free link.
+    ///
+    /// # Errors
+    /// [`ModesError`].
+    pub fn free_modes(&self, wanted: ModesWanted) -> Result<Modes, ModesError> {
+        let dimension = self.boundary.free().len() - self.boundary.means().len() + self.boundary.columns() - 6;
+        // u <- u - R (Rᵀ M R)⁻¹ Rᵀ M u leaves what moves no mass as a whole.
+        let n = self.T.ncols();
+        let R_b = DMatrix::from_fn(n, 6, |i, j| if i < 6 { f64::from(i == j) } else { self.rigid_at(i, j) });
+        let mut R = DMatrix::zeros(self.T.nrows(), 6);
+        add_product(&mut R, 1.0, &self.T, &R_b);
+        let MR = self.model.M.product(&R);
+        let Some(inverse) = gram(&R, &MR).try_inverse() else { return Err(ModesError::NotFinite) };
+        let mut solve = |F: &mut DMatrix<f64>| {
+            add_product(F, -1.0, &MR, &(&inverse * gram(&R, F)));
+            self.solve_held(F);
+            add_product(F, -1.0, &R, &(&inverse * gram(&MR, F)));
+        };
+        smallest_modes(self.model.size(), dimension - 6, wanted, &mut solve, &mut |X, Y| {
+            self.model.M.product_into(X, Y)
+        })
+    }
+
+    /// Row `i` of the boundary under the rigid motion that moves the first interface by `j`, from the stiffness itself.
+    fn rigid_at(&self, i: usize, j: usize) -> f64 {
+        // K_BB u_B + K_BA u_A = 0 for a motion without force.
+        let n = self.K_g.nrows();
+        let K_BA = self.K_g.view((6, j), (n - 6, 1));
+        -(self.tip.row(i - 6) * K_BA)[(0, 0)]
+    }
+
+    /// Residual `‖K φ - ω² M φ + Gᵀ λ‖ / ‖ω² M φ‖` of each mode over the free DoF, as the mesh says it.
+    pub fn mode_residuals(&self, modes: &Modes) -> Vec<f64> {
+        let K = self.model.K.product(&modes.shapes);
+        let M = self.model.M.product(&modes.shapes);
+        let one = |(k, omega2): (usize, &f64)| {
+            let mut r = DVector::from_iterator(
+                self.boundary.free().len(),
+                self.boundary.free().iter().map(|dof| K[(*dof as usize, k)] - omega2 * M[(*dof as usize, k)]),
+            );
+            let size =
+                self.boundary.free().iter().map(|dof| (omega2 * M[(*dof as usize, k)]).powi(2)).sum::<f64>().sqrt();
+            self.remove_tie_forces(&mut r);
+            r.norm() / size
+        };
+        modes.omega2.iter().enumerate().map(one).collect()
+    }
+
+    /// Takes the component along the rows of G out of a residual over the free DoF.
+    fn remove_tie_forces(&self, r: &mut DVector<f64>) {
+        let means = self.boundary.means();
+        if means.is_empty() {
+            return;
+        }
+        let free = self.boundary.free();
+        let mut G = DMatrix::zeros(free.len(), means.len());
+        for (k, (_, row)) in means.iter().enumerate() {
+            for (dof, weight) in row {
+                if let Ok(at) = free.binary_search(dof) {
+                    G[(at, k)] = *weight;
+                }
+            }
+        }
+        if let Some(lambda) = gram(&G, &G).lu().solve(&(G.transpose() * &*r)) {
+            *r -= G * lambda;
+        }
+    }
+
+    /// Guyan reduction where `modes` is empty, Craig-Bampton otherwise.
+    ///
+    /// * `frames`: name, frame and tie of each interface, in the order of the boundary.
+    /// * `modes`: as [`Self::fixed_modes`] gives them.
+    pub fn superelement(&self, frames: Vec<InterfaceFrame>, modes: &Modes) -> Superelement {
+        let (n, m) = (self.K_g.nrows(), modes.len());
+        let mut K = DMatrix::zeros(n + m, n + m);
+        let mut M = DMatrix::identity(n + m, n + m);
+        K.view_mut((0, 0), (n, n)).copy_from(&self.K_g);
+        M.view_mut((0, 0), (n, n)).copy_from(&self.M_g);
+        for (k, omega2) in modes.omega2.iter().enumerate() {
+            K[(n + k, n + k)] = *omega2;
+        }
+        let coupling = gram(&self.T, &self.model.M.product(&modes.shapes));
+        M.view_mut((0, n), (n, m)).copy_from(&coupling);
+        M.view_mut((n, 0), (m, n)).copy_from(&coupling.transpose());
+        Superelement { interfaces: frames, K, M }
+    }
+
+    /// Size of the linear algebra.
+    pub fn figures(&self) -> SolverFigures {
+        SolverFigures {
+            dofs: self.model.size(),
+            factor: self.factor.figures(),
+            smallest_pivot: self.factor.smallest_pivot(),
+        }
+    }
+}
+
+fn apply_rows(rows: &[Vec<(u32, f64)>], X: &DMatrix<f64>) -> DMatrix<f64> {
+    DMatrix::from_fn(rows.len(), X.ncols(), |k, j| rows[k].iter().map(|(at, w)| w * X[(*at as usize, j)]).sum())
+}
+
+fn symmetric(A: DMatrix<f64>) -> DMatrix<f64> {
+    let B = A.transpose();
+    (A + B) * 0.5
+}
+
+/// Inverse of a small SPD matrix whose rows have different units, through its scaled form.
+pub(crate) fn spd_inverse(K: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let scale = K.diagonal().map(|k| 1.0 / k.sqrt());
+    let scaled = DMatrix::from_fn(K.nrows(), K.ncols(), |i, j| K[(i, j)] * scale[i] * scale[j]);
+    if scaled.iter().any(|x| !x.is_finite()) {
+        return None;
+    }
+    let inverse = scaled.cholesky()?.inverse();
+    Some(symmetric(DMatrix::from_fn(K.nrows(), K.ncols(), |i, j| inverse[(i, j)] * scale[i] * scale[j])))
+}

@@ -1,0 +1,81 @@
+//! The reduced model: a small dense stiffness and mass over interfaces and modes.
+
+use nalgebra::{DMatrix, SymmetricEigen};
+
+use super::boundary::Tie;
+use crate::spatial::Pose;
+
+/// One interface of a superelement.
+#[derive(Debug, Clone, PartialEq)]
+pub struct InterfaceFrame {
+    /// Name.
+    pub name: String,
+    /// Frame in the link frame; the six DoF are those of its origin, in link axes.
+    pub X_LI: Pose,
+    /// How it was tied, if known.
+    pub tie: Option<Tie>,
+}
+
+/// Stiffness and mass over the boundary DoF, six per interface, and mass-normalised modes after them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Superelement {
+    /// Interfaces, proximal first.
+    pub interfaces: Vec<InterfaceFrame>,
+    /// Stiffness, link axes, SI; modal block diagonal with ω².
+    pub K: DMatrix<f64>,
+    /// Mass, likewise; identity in the modal block.
+    pub M: DMatrix<f64>,
+}
+
+impl Superelement {
+    /// Boundary DoF.
+    pub fn boundary(&self) -> usize {
+        6 * self.interfaces.len()
+    }
+
+    /// Modal coordinates.
+    pub fn modes(&self) -> usize {
+        self.K.nrows() - self.boundary()
+    }
+
+    /// Frequencies of the fixed-interface modes, Hz.
+    pub fn fixed_frequencies_hz(&self) -> Vec<f64> {
+        (self.boundary()..self.K.nrows()).map(|k| self.K[(k, k)].max(0.0).sqrt() / std::f64::consts::TAU).collect()
+    }
+
+    /// Natural frequencies with some interfaces held, ascending, Hz; those of rigid motions are near zero.
+    ///
+    /// Empty where the mass is not positive definite.
+    pub fn frequencies_hz(&self, held: &[usize]) -> Vec<f64> {
+        let keep: Vec<usize> =
+            (0..self.K.nrows()).filter(|k| *k >= self.boundary() || !held.contains(&(k / 6))).collect();
+        let K = self.K.select_rows(&keep).select_columns(&keep);
+        let M = self.M.select_rows(&keep).select_columns(&keep);
+        generalised_frequencies(&K, &M)
+    }
+
+    /// The same superelement without its modes: Guyan.
+    pub fn guyan(&self) -> Self {
+        let n = self.boundary();
+        let top = |A: &DMatrix<f64>| A.view((0, 0), (n, n)).into_owned();
+        Self { interfaces: self.interfaces.clone(), K: top(&self.K), M: top(&self.M) }
+    }
+}
+
+/// Frequencies of a small dense pencil, Hz, ascending; empty where the mass is not positive definite.
+pub(crate) fn generalised_frequencies(K: &DMatrix<f64>, M: &DMatrix<f64>) -> Vec<f64> {
+    // Rows of different units are scaled by the mass first.
+    let scale = M.diagonal().map(|m| 1.0 / m.sqrt());
+    let scaled = |A: &DMatrix<f64>| DMatrix::from_fn(A.nrows(), A.ncols(), |i, j| A[(i, j)] * scale[i] * scale[j]);
+    let (K, M) = (scaled(K), scaled(M));
+    if K.iter().chain(M.iter()).any(|x| !x.is_finite()) {
+        return Vec::new();
+    }
+    let Some(factor) = M.cholesky() else { return Vec::new() };
+    let Some(inverse) = factor.l().try_inverse() else { return Vec::new() };
+    let A = &inverse * K * inverse.transpose();
+    let eigenvalues = SymmetricEigen::new((&A + A.transpose()) * 0.5).eigenvalues;
+    let mut frequencies: Vec<f64> = eigenvalues.iter().map(|e| e.max(0.0).sqrt() / std::f64::consts::TAU).collect();
+    frequencies.sort_by(f64::total_cmp);
+    frequencies
+}

@@ -1,0 +1,196 @@
+//! Sparse Cholesky factor: ordered, factorised once, used for many right-hand sides.
+
+use std::fmt;
+
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt::factor::{LltError, LltRegularization};
+use faer::perm::Perm;
+use faer::sparse::linalg::cholesky::{
+    CholeskySymbolicParams, LltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
+    factorize_symbolic_cholesky,
+};
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
+use faer::{Conj, Par, Side, Spec};
+use nalgebra::DMatrix;
+
+use super::dense::view_mut;
+use super::ordering::{Ordering, nested_dissection};
+use super::symmetric::SparseSymmetric;
+
+/// How many threads a factorisation or a solve may use.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Threads(pub usize);
+
+impl Default for Threads {
+    fn default() -> Self {
+        Self(1)
+    }
+}
+
+impl Threads {
+    fn par(self) -> Par {
+        if self.0 > 1 { Par::rayon(self.0) } else { Par::Seq }
+    }
+}
+
+/// Size and cost of a factor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FactorFigures {
+    /// Unknowns.
+    pub size: usize,
+    /// Stored entries of the lower triangle of the matrix.
+    pub matrix_entries: usize,
+    /// Stored entries of the factor, with the zeros inside its dense blocks.
+    pub factor_entries: usize,
+    /// The order that was used.
+    pub ordering: Ordering,
+}
+
+/// Why there is no factor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NotPositiveDefinite {
+    /// A pivot was not positive.
+    Pivot {
+        /// Unknown, as numbered in the matrix.
+        unknown: usize,
+    },
+    /// Not enough memory for the factor.
+    OutOfMemory {
+        /// Entries it would have had, if known.
+        entries: usize,
+    },
+}
+
+impl fmt::Display for NotPositiveDefinite {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Pivot { unknown } => write!(f, "the matrix is not positive definite (pivot of unknown {unknown})"),
+            Self::OutOfMemory { entries } => write!(f, "no memory for a factor of {entries} entries"),
+        }
+    }
+}
+
+/// The factor `P K Pᵀ = L Lᵀ` of a sparse symmetric positive definite matrix.
+pub struct Cholesky {
+    symbolic: SymbolicCholesky<u32>,
+    values: Vec<f64>,
+    figures: FactorFigures,
+    threads: Threads,
+}
+
+impl fmt::Debug for Cholesky {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Cholesky").field("figures", &self.figures).finish_non_exhaustive()
+    }
+}
+
+impl Cholesky {
+    /// Factorises `K`.
+    ///
+    /// # Errors
+    /// [`NotPositiveDefinite`], with the unknown at which it was found.
+    pub fn new(K: &SparseSymmetric, ordering: Ordering, threads: Threads) -> Result<Self, NotPositiveDefinite> {
+        let n = K.size();
+        let pattern = K.pattern();
+        let places = SymbolicSparseColMatRef::new_checked(n, n, &pattern.starts, None, &pattern.rows);
+        let (symbolic, ordering) = analyse(K, places, ordering)?;
+
+        let entries = symbolic.len_val();
+        let out_of_memory = NotPositiveDefinite::OutOfMemory { entries };
+        let mut values = Vec::new();
+        values.try_reserve_exact(entries).map_err(|_| out_of_memory)?;
+        values.resize(entries, 0.0);
+        let scratch = symbolic.factorize_numeric_llt_scratch::<f64>(threads.par(), Spec::default());
+        let mut memory = MemBuffer::try_new(scratch).map_err(|_| out_of_memory)?;
+        let factor = symbolic.factorize_numeric_llt(
+            &mut values,
+            SparseColMatRef::new(places, &K.values),
+            Side::Lower,
+            LltRegularization::default(),
+            threads.par(),
+            MemStack::new(&mut memory),
+            Spec::default(),
+        );
+        if let Err(error) = factor {
+            let LltError::NonPositivePivot { index } = error;
+            let order = symbolic.perm().map(|perm| perm.arrays().0);
+            return Err(NotPositiveDefinite::Pivot { unknown: order.map_or(index, |order| order[index] as usize) });
+        }
+        let figures = FactorFigures { size: n, matrix_entries: K.stored(), factor_entries: entries, ordering };
+        Ok(Self { symbolic, values, figures, threads })
+    }
+
+    /// Size and cost.
+    pub fn figures(&self) -> FactorFigures {
+        self.figures
+    }
+
+    /// Smallest pivot `L_jj²` over the largest: near rounding where the matrix is all but singular.
+    pub fn smallest_pivot(&self) -> f64 {
+        let (mut low, mut high) = (f64::INFINITY, 0.0_f64);
+        let mut see = |diagonal: f64| {
+            low = low.min(diagonal * diagonal);
+            high = high.max(diagonal * diagonal);
+        };
+        match self.symbolic.raw() {
+            SymbolicCholeskyRaw::Simplicial(raw) => {
+                raw.col_ptr()[..self.figures.size].iter().for_each(|at| see(self.values[*at as usize]))
+            }
+            SymbolicCholeskyRaw::Supernodal(raw) => {
+                for s in 0..raw.n_supernodes() {
+                    let columns = (raw.supernode_end()[s] - raw.supernode_begin()[s]) as usize;
+                    let values = raw.col_ptr_for_val()[s] as usize..raw.col_ptr_for_val()[s + 1] as usize;
+                    let rows = if columns > 0 { values.len() / columns } else { 0 };
+                    (0..columns).for_each(|k| see(self.values[values.start + k * rows + k]));
+                }
+            }
+        }
+        low / high
+    }
+
+    /// Replaces `B` by `K⁻¹ B`.
+    ///
+    /// # Panics
+    /// If `B` has another number of rows.
+    pub fn solve_in_place(&self, B: &mut DMatrix<f64>) {
+        assert_eq!(B.nrows(), self.figures.size, "right-hand side of another size");
+        if B.is_empty() {
+            return;
+        }
+        let par = self.threads.par();
+        let mut memory = MemBuffer::new(self.symbolic.solve_in_place_scratch::<f64>(B.ncols(), par));
+        LltRef::new(&self.symbolic, &self.values).solve_in_place_with_conj(
+            Conj::No,
+            view_mut(B),
+            par,
+            MemStack::new(&mut memory),
+        );
+    }
+}
+
+fn analyse(
+    K: &SparseSymmetric,
+    places: SymbolicSparseColMatRef<'_, u32>,
+    ordering: Ordering,
+) -> Result<(SymbolicCholesky<u32>, Ordering), NotPositiveDefinite> {
+    let n = K.size();
+    let dissected = match ordering.resolve(n) {
+        Ordering::NestedDissection => nested_dissection(K.pattern()),
+        _ => None,
+    };
+    let parameters = CholeskySymbolicParams::default();
+    let symbolic = match &dissected {
+        Some(order) => {
+            let mut position = vec![0_u32; n];
+            for (k, unknown) in order.iter().enumerate() {
+                position[*unknown as usize] = k as u32;
+            }
+            let perm = Perm::new_checked(order.clone().into_boxed_slice(), position.into_boxed_slice(), n);
+            factorize_symbolic_cholesky(places, Side::Lower, SymmetricOrdering::Custom(perm.as_ref()), parameters)
+        }
+        None => factorize_symbolic_cholesky(places, Side::Lower, SymmetricOrdering::Amd, parameters),
+    };
+    let used = if dissected.is_some() { Ordering::NestedDissection } else { Ordering::MinimumDegree };
+    symbolic.map(|symbolic| (symbolic, used)).map_err(|_| NotPositiveDefinite::OutOfMemory { entries: 0 })
+}

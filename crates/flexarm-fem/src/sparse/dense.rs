@@ -1,0 +1,26 @@
+//! Products of tall matrices, through faer's kernels.
+
+use faer::linalg::matmul::matmul;
+use faer::{Accum, MatMut, MatRef, Par};
+use nalgebra::DMatrix;
+
+pub(super) fn view(A: &DMatrix<f64>) -> MatRef<'_, f64> {
+    MatRef::from_column_major_slice(A.as_slice(), A.nrows(), A.ncols())
+}
+
+pub(super) fn view_mut(A: &mut DMatrix<f64>) -> MatMut<'_, f64> {
+    let (rows, columns) = A.shape();
+    MatMut::from_column_major_slice_mut(A.as_mut_slice(), rows, columns)
+}
+
+/// `Aᵀ B`.
+pub(crate) fn gram(A: &DMatrix<f64>, B: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut result = DMatrix::zeros(A.ncols(), B.ncols());
+    matmul(view_mut(&mut result), Accum::Replace, view(A).transpose(), view(B), 1.0, Par::Seq);
+    result
+}
+
+/// `C += factor A B`.
+pub(crate) fn add_product(C: &mut DMatrix<f64>, factor: f64, A: &DMatrix<f64>, B: &DMatrix<f64>) {
+    matmul(view_mut(C), Accum::Add, view(A), view(B), factor, Par::Seq);
+}
