@@ -41,6 +41,8 @@
 
 pub mod beam;
 pub mod beam_link;
+pub mod chain;
+pub mod cut;
 pub mod element;
 pub mod error;
 pub mod exchange;
@@ -49,6 +51,8 @@ pub mod frames;
 pub mod gate;
 pub mod material;
 pub mod mesh;
+pub mod mesh_gate;
+pub mod mesh_link;
 pub mod model;
 pub mod reduced;
 pub mod reduction;
@@ -56,6 +60,8 @@ pub mod rigid_part;
 pub mod section;
 pub mod sparse;
 pub mod spatial;
+#[cfg(test)]
+pub(crate) mod test_mesh;
 pub mod units;
 
 pub use beam::{Beam, BeamTheory};
@@ -65,8 +71,12 @@ pub use flex_file::{FlexErrorKind, FlexFileError, parse_flex, read_flex, write_f
 pub use frames::LinkFrames;
 pub use gate::{GateLimits, GateReport};
 pub use material::Material;
-pub use mesh::{ElementBlock, ElementKind, Mesh};
-pub use reduced::{ElasticSplit, Provenance, ReducedLink, drop_coupling, stiffness_at_split};
+pub use mesh::{
+    ElementBlock, ElementKind, Mesh, MeshError, MeshFile, NodeSelector, ReadOptions, SelectError, parse_mesh, read_mesh,
+};
+pub use mesh_gate::MeshGate;
+pub use mesh_link::{LinkPlan, MeshReduction, SplitAt, reduce_mesh};
+pub use reduced::{ElasticSplit, LinkDetails, Provenance, ReducedLink, drop_coupling, stiffness_at_split};
 pub use rigid_part::RigidPart;
 pub use section::{Bar, Section, SectionProperties};
 pub use spatial::{Matrix12, Pose};

@@ -260,7 +260,30 @@ impl Inverted {
     }
 }
 
-/// The 12×12 of a beam element and its mass, in mesh axes: `A = Q A_E Qᵀ`.
+/// A beam element between its nodes, and the turn of its axes: `A = Q A_E Qᵀ`.
+fn beam_of(mesh: &Mesh, region: usize, nodes: &[u32], material: &Material) -> Result<(Beam, Matrix12), AssemblyError> {
+    let region = &mesh.regions[region];
+    let name = || region.name.clone();
+    let properties = region.beam.as_ref().ok_or_else(|| AssemblyError::NoSection { region: name() })?;
+    let property = |source| AssemblyError::Property { region: name(), source };
+    let bar = properties.section.bar(material).map_err(property)?;
+    let along = mesh.nodes[nodes[1] as usize] - mesh.nodes[nodes[0] as usize];
+    let beam = Beam::new(bar, properties.theory, along.norm()).map_err(property)?;
+    let R = beam_axes(&along, &properties.y_axis).map_err(property)?;
+    let mut Q = Matrix12::zeros();
+    for corner in [0, 3, 6, 9] {
+        Q.fixed_view_mut::<3, 3>(corner, corner).copy_from(&R);
+    }
+    Ok((beam, Q))
+}
+
+/// Stiffness of one beam element in mesh axes.
+pub(crate) fn beam_stiffness(mesh: &Mesh, region: usize, nodes: &[u32], material: &Material) -> Option<DMatrix<f64>> {
+    let (beam, Q) = beam_of(mesh, region, nodes, material).ok()?;
+    let K = Q * beam.stiffness12() * Q.transpose();
+    Some(DMatrix::from_column_slice(12, 12, K.as_slice()))
+}
+
 fn add_beams(
     mesh: &Mesh,
     block: &ElementBlock,
@@ -270,20 +293,8 @@ fn add_beams(
     K: &mut SparseSymmetric,
     masses: &mut Vec<(u32, u32, f64)>,
 ) -> Result<(), AssemblyError> {
-    let region = &mesh.regions[block.region];
-    let name = || region.name.clone();
-    let properties = region.beam.as_ref().ok_or_else(|| AssemblyError::NoSection { region: name() })?;
-    let property = |source| AssemblyError::Property { region: name(), source };
-    let bar = properties.section.bar(&materials[block.region]).map_err(property)?;
     for nodes in block.elements() {
-        let (a, b) = (nodes[0] as usize, nodes[1] as usize);
-        let along = mesh.nodes[b] - mesh.nodes[a];
-        let beam = Beam::new(bar, properties.theory, along.norm()).map_err(property)?;
-        let R = beam_axes(&along, &properties.y_axis).map_err(property)?;
-        let mut Q = Matrix12::zeros();
-        for corner in [0, 3, 6, 9] {
-            Q.fixed_view_mut::<3, 3>(corner, corner).copy_from(&R);
-        }
+        let (beam, Q) = beam_of(mesh, block.region, nodes, &materials[block.region])?;
         let stiffness = Q * beam.stiffness12() * Q.transpose();
         graph.add_blocks(dofs, nodes, 6, stiffness.as_slice(), &mut K.values);
         let mass = Q * beam.mass12() * Q.transpose();

@@ -12,13 +12,17 @@
 //! Start at [`ReducedLink::from_matrix12`] and [`ReducedLink::from_matrix6`]; beams come from
 //! [`BeamLink`](crate::BeamLink), files from [`read_flex`](crate::read_flex).
 //!
-//! Not here: more than two interfaces, modes, reduction of meshes.
+//! More than two interfaces, modes and chains of parts are in [`LinkDetails`]. Not here: how meshes are
+//! reduced ([`crate::mesh_link`]).
 
 use nalgebra::{Matrix6, Vector3};
 
+use crate::chain::Chain;
 use crate::error::FemError;
 use crate::frames::LinkFrames;
 use crate::gate::{GateLimits, GateReport, check_matrix6, check_matrix12, lever};
+use crate::mesh_gate::MeshGate;
+use crate::reduction::Superelement;
 use crate::rigid_part::RigidPart;
 use crate::spatial::{Matrix12, Pose, adjoint, symmetric_part};
 
@@ -48,6 +52,17 @@ pub struct Provenance {
     pub note: String,
 }
 
+/// What a reduction of a mesh, or a matrix with mass, knows beyond the static 6×6.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct LinkDetails {
+    /// Stiffness and mass over all interfaces and modes, link axes.
+    pub superelement: Option<Superelement>,
+    /// Chains of rigid parts, by their number of parts.
+    pub chains: Vec<Chain>,
+    /// What was checked against the mesh.
+    pub gate: Option<MeshGate>,
+}
+
 /// A link with two interfaces, reduced; what every source delivers. SI units.
 ///
 /// The constructors check; afterwards it is plain data.
@@ -71,6 +86,8 @@ pub struct ReducedLink {
     pub provenance: Provenance,
     /// What the gate measured on the source matrix.
     pub checks: GateReport,
+    /// Superelement, chains and checks of a mesh, where the source has them.
+    pub details: Option<Box<LinkDetails>>,
 }
 
 impl ReducedLink {
@@ -127,7 +144,7 @@ impl ReducedLink {
         let (proximal, distal) = (proximal.symmetrised(), distal.symmetrised());
         let split = elastic_split(&frames, &K_BB)?;
         let LinkFrames { X_LA, X_LB, .. } = frames;
-        Ok(Self { name, X_LA, X_LB, K_BB, split, proximal, distal, provenance, checks })
+        Ok(Self { name, X_LA, X_LB, K_BB, split, proximal, distal, provenance, checks, details: None })
     }
 
     /// The frames of the link.

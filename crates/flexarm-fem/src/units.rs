@@ -108,7 +108,7 @@ mod tests {
             ("m-kg-s", 1.0, 1.0, 1.0),
             ("mm-t-s", 1.0, 1e6, 1e12),
             ("mm-kg-ms", 1e3, 1e9, 1e9),
-            ("in-slinch-s", 4.448_221_615_260_5, 6894.757_293_168_4, 10_686_895.0),
+            ("in-slinch-s", 4.448_221_615_260_5, 6_894.757_293_168_4, 10_686_895.0),
         ] {
             let units: UnitSystem = name.parse().unwrap();
             assert_eq!(units.name(), name);

@@ -100,8 +100,9 @@ pub(crate) enum Geometry {
     Affine,
     /// Mid-edge nodes in the middle of straight edges.
     Straight,
-    /// Largest relative difference between `det J` at a node and its mean over the nodes: `1/det J` in
-    /// the stiffness is as far from a polynomial as this.
+    /// Distortion: the larger of the relative difference between `det J` at a node and its mean over the
+    /// nodes (how far `1/det J` in the stiffness is from a polynomial), and of twice the offset of a
+    /// mid-edge node per edge length (how much the polynomial of high degree weighs beside it).
     Curved(f64),
 }
 
@@ -122,8 +123,8 @@ impl Nodes {
             *padded = [d.x, d.y, d.z, 0.0];
         }
         let mut nodes = Self { n, x: padded, geometry: classify(kind, x) };
-        if let Geometry::Curved(spread) = &mut nodes.geometry {
-            *spread = spread_at_nodes(kind, &nodes.x);
+        if let Geometry::Curved(distortion) = &mut nodes.geometry {
+            *distortion = distortion.max(spread_at_nodes(kind, &nodes.x));
         }
         nodes
     }
@@ -139,7 +140,7 @@ fn spread_at_nodes(kind: ElementKind, x: &[[f64; 4]; MAX_NODES]) -> f64 {
     dets[..n].iter().fold(0.0, |spread, det| f64::max(spread, (det / mean - 1.0).abs()))
 }
 
-/// The kind of map; the spread of a curved one is left infinite.
+/// The kind of map; the distortion of a curved one only from its offsets.
 fn classify(kind: ElementKind, x: &[Vector3<f64>]) -> Geometry {
     let corners = match kind {
         ElementKind::Tet4 | ElementKind::Tet10 => 4,
@@ -148,12 +149,15 @@ fn classify(kind: ElementKind, x: &[Vector3<f64>]) -> Geometry {
     };
     // Coordinates far from the origin carry their own rounding, eps |x|.
     let rounding = 4.0 * f64::EPSILON * x[0].amax();
+    let (mut curved, mut offset) = (false, 0.0_f64);
     for ([a, b], middle) in edges(kind).iter().zip(&x[corners..]) {
         let edge = (x[*a] - x[*b]).norm();
         let gap = (middle - (x[*a] + x[*b]) * 0.5).norm();
-        if !(gap <= STRAIGHT * edge + rounding) {
-            return Geometry::Curved(f64::INFINITY);
-        }
+        curved |= !(gap <= STRAIGHT * edge + rounding);
+        offset = offset.max(gap / edge);
+    }
+    if curved {
+        return Geometry::Curved(2.0 * offset);
     }
     // Corners that a parallelepiped or prism on corner 0 would have elsewhere.
     let gap = |i: usize, from: [usize; 2]| (x[i] - (x[from[0]] + x[from[1]] - x[0])).norm();
@@ -191,7 +195,8 @@ impl Jacobian {
         };
         let adjugate = [cross(&J[1], &J[2]), cross(&J[2], &J[0]), cross(&J[0], &J[1])];
         let det = J[0][0] * adjugate[0][0] + J[0][1] * adjugate[0][1] + J[0][2] * adjugate[0][2];
-        Self { det, inverse: adjugate.map(|row| row.map(|a| a / det)) }
+        let reciprocal = 1.0 / det;
+        Self { det, inverse: adjugate.map(|row| row.map(|a| a * reciprocal)) }
     }
 
     /// As [`Self::new`], refusing an inverted element.

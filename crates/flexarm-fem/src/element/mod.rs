@@ -22,6 +22,9 @@ mod tests;
 
 pub use elasticity::{check_solid_material, stress_strain};
 pub use geometry::{InvertedElement, JacobianRange, Place, jacobian_range};
+#[cfg(test)]
+pub(crate) use quadrature::gauss_jacobi;
+pub(crate) use quadrature::{TetRule, tet_points};
 pub use rules::{Point, Purpose, Quadrature, for_each_point};
 pub use shape::{edges, reference_nodes, reference_volume, shape_functions};
 pub use solid::ElementWorkspace;

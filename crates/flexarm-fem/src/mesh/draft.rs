@@ -175,7 +175,7 @@ fn refuse_twins(src: &Source, drafts: &[DraftBlock], blocks: &[ElementBlock]) ->
     let (kind, help) = if first == second {
         (Kind::Element, "was a volume meshed or written twice?")
     } else {
-        (Kind::Region, "an element in two physical volumes is written twice: leave it in one of them")
+        (Kind::Region, "it is in two regions: leave it in one physical volume or element set")
     };
     let element = format!("elements {} and {}", id.min(twin), id.max(twin));
     Err(src.error(kind, offset.max(again), element, "the same corner nodes", "every element once").help(help))

@@ -67,7 +67,7 @@ impl IdIndex {
             Self::Sorted(sorted) => {
                 let from = sorted.partition_point(|(id, _)| *id < first);
                 let within = sorted[from..].iter().take_while(|(id, _)| *id <= last);
-                out.extend(within.filter(|(id, _)| (id - first) % step == 0).map(|(_, k)| *k));
+                out.extend(within.filter(|(id, _)| (id - first).is_multiple_of(step)).map(|(_, k)| *k));
                 return;
             }
         };

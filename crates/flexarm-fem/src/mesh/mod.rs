@@ -162,6 +162,17 @@ impl Mesh {
         self.blocks.iter().map(ElementBlock::len).sum()
     }
 
+    /// The mesh with its nodes moved from frame M into frame L; sections of beams turn with it.
+    pub fn transformed(mut self, X_LM: &crate::spatial::Pose) -> Self {
+        for p in &mut self.nodes {
+            *p = X_LM.rotation * *p + X_LM.translation.vector;
+        }
+        for beam in self.regions.iter_mut().filter_map(|region| region.beam.as_mut()) {
+            beam.y_axis = X_LM.rotation * beam.y_axis;
+        }
+        self
+    }
+
     /// Which nodes belong to an element.
     pub fn used_nodes(&self) -> Vec<bool> {
         let mut used = vec![false; self.nodes.len()];

@@ -37,7 +37,7 @@ pub struct SkinFace<'a> {
 ///
 /// "Outside" holds for elements of positive volume. Faces that lie on each other without having
 /// the same corners, as between unconnected parts, are both skin. Time grows linearly: about a
-/// second for a million tetrahedra.
+/// second for six million tetrahedra.
 pub fn skin(mesh: &Mesh) -> Skin {
     // Faces are sorted into buckets by their smallest corner; partners meet in a bucket.
     let mut starts = vec![0_usize; mesh.nodes.len() + 1];

@@ -59,6 +59,8 @@ pub struct SolverFigures {
     pub dofs: usize,
     /// The factor.
     pub factor: FactorFigures,
+    /// Right-hand sides solved for the static shapes.
+    pub static_solves: usize,
     /// Smallest pivot of the factor over the diagonal entry it came from.
     pub smallest_pivot: f64,
 }
@@ -91,6 +93,8 @@ pub struct Condensation<'m> {
     T: DMatrix<f64>,
     K_g: DMatrix<f64>,
     M_g: DMatrix<f64>,
+    /// Largest relative asymmetry of `K_g` as computed.
+    asymmetry: f64,
     /// Inverse of `K_g` without its first six rows: the compliance with the first interface held.
     tip: DMatrix<f64>,
 }
@@ -148,12 +152,17 @@ impl<'m> Condensation<'m> {
             T: empty.clone(),
             K_g: empty.clone(),
             M_g: empty.clone(),
+            asymmetry: 0.0,
             tip: empty,
         };
         this.saddle = this.saddle_of(rigid);
         this.T = this.static_shapes(columns);
         let KT = this.model.K.product(&this.T);
-        this.K_g = symmetric(gram(&this.T, &KT));
+        let K_g = gram(&this.T, &KT);
+        let place = |(i, j): (usize, usize)| (K_g[(i, j)] - K_g[(j, i)]).abs() / (K_g[(i, i)] * K_g[(j, j)]).sqrt();
+        let pairs = (0..columns).flat_map(|i| (0..i).map(move |j| (i, j)));
+        this.asymmetry = pairs.map(place).fold(0.0, f64::max);
+        this.K_g = symmetric(K_g);
         this.M_g = symmetric(gram(&this.T, &this.model.M.product(&this.T)));
         this.tip = this.tip_compliance()?;
         Ok(this)
@@ -404,11 +413,47 @@ impl<'m> Condensation<'m> {
         Superelement { interfaces: frames, K, M }
     }
 
+    /// Largest relative asymmetry of the condensed stiffness as computed.
+    pub fn asymmetry(&self) -> f64 {
+        self.asymmetry
+    }
+
+    /// Condition number of `K_ii`: largest over smallest eigenvalue, each by a few power iterations.
+    pub fn condition_estimate(&self) -> f64 {
+        let rows = self.model.size();
+        let inside = |x: &mut DMatrix<f64>| {
+            let mut kept = DMatrix::zeros(rows, 1);
+            self.solved.iter().for_each(|dof| kept[*dof as usize] = x[*dof as usize]);
+            *x = kept;
+        };
+        // Neighbouring nodes against each other excite the stiff end, all together the soft one.
+        let mut stiff = DMatrix::from_fn(rows, 1, |i, _| if (i * 2_654_435_761) & 64 == 0 { 1.0 } else { -1.0 });
+        let mut soft = DMatrix::from_element(rows, 1, 1.0);
+        let (mut largest, mut smallest) = (0.0, 1.0);
+        for _ in 0..20 {
+            inside(&mut stiff);
+            stiff /= stiff.norm();
+            stiff = self.model.K.product(&stiff);
+            largest = stiff.norm();
+        }
+        for _ in 0..5 {
+            let mut y = DMatrix::from_fn(self.solved.len(), 1, |k, _| soft[self.solved[k] as usize]);
+            y /= y.norm();
+            self.factor.solve_in_place(&mut y);
+            smallest = 1.0 / y.norm();
+            for (k, dof) in self.solved.iter().enumerate() {
+                soft[*dof as usize] = y[k];
+            }
+        }
+        largest / smallest
+    }
+
     /// Size of the linear algebra.
     pub fn figures(&self) -> SolverFigures {
         SolverFigures {
             dofs: self.model.size(),
             factor: self.factor.figures(),
+            static_solves: self.boundary.columns() + self.boundary.means().len(),
             smallest_pivot: self.factor.smallest_pivot(),
         }
     }

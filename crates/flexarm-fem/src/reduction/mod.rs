@@ -22,3 +22,6 @@ mod superelement;
 pub use boundary::{Boundary, Interface, Tie, TieError};
 pub use condensation::{Condensation, CondensationOptions, ReductionError, SolverFigures};
 pub use superelement::{InterfaceFrame, Superelement};
+
+pub(crate) use condensation::spd_inverse;
+pub(crate) use superelement::generalised_frequencies;

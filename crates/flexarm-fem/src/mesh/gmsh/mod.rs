@@ -75,10 +75,9 @@ fn next_section<'a>(reader: &mut Reader<'a>) -> Option<(&'a [u8], usize)> {
     while reader.left() > 0 {
         reader.skip_blanks();
         let at = reader.pos;
-        if let Some(name) = reader.rest_of_line().strip_prefix(b"$") {
-            if !name.starts_with(b"End") {
-                return Some((name, at));
-            }
+        let name = reader.rest_of_line().strip_prefix(b"$");
+        if let Some(name) = name.filter(|name| !name.starts_with(b"End")) {
+            return Some((name, at));
         }
     }
     None

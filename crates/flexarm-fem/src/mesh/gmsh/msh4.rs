@@ -7,6 +7,9 @@ use super::reader::{Layout, Reader};
 use super::shapes::MOST_NODES;
 use crate::mesh::error::{MeshError, MeshErrorKind as Kind};
 
+/// Physical groups that one entity may be in.
+const MOST_GROUPS: usize = 64;
+
 /// `$Entities`: only the physical groups of each are kept.
 pub(super) fn entities(reader: &mut Reader, collector: &mut Collector) -> Result<(), MeshError> {
     let mut counts = [0; 4];
@@ -25,6 +28,11 @@ pub(super) fn entities(reader: &mut Reader, collector: &mut Collector) -> Result
             let groups = tags(reader, "number of physical groups")?;
             if dim > 0 {
                 tags(reader, "number of bounding entities")?;
+            }
+            if groups.len() > MOST_GROUPS {
+                let (element, found) = (format!("entity {tag} of dimension {dim}"), format!("{} groups", groups.len()));
+                let expected = format!("at most {MOST_GROUPS} physical groups");
+                return Err(reader.src.error(Kind::TooLarge, reader.pos, element, found, expected));
             }
             if !groups.is_empty() {
                 collector.entity(dim, tag, groups);
@@ -49,7 +57,6 @@ pub(super) fn nodes(reader: &mut Reader, collector: &mut Collector) -> Result<()
         let parametric = reader.int("whether nodes have parameters")? != 0;
         let count = reader.size("number of nodes")?;
         let count = reader.checked(count, "number of nodes", [0, 1, 3])?;
-        let first = collector.draft.node_ids.len();
         for _ in 0..count {
             collector.draft.node_ids.push(reader.size("node number")?);
         }
@@ -63,7 +70,6 @@ pub(super) fn nodes(reader: &mut Reader, collector: &mut Collector) -> Result<()
                 reader.real("parameter of a node")?;
             }
         }
-        debug_assert_eq!(collector.draft.node_ids.len(), first + count);
     }
     Ok(())
 }

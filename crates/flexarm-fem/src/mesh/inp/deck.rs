@@ -1,5 +1,7 @@
 //! The cards of a deck, one after the other.
 
+use std::collections::{BTreeSet, HashMap};
+
 use nalgebra::Vector3;
 
 use super::lines::{Card, Lines, fields, id, numbers, squeezed};
@@ -21,9 +23,13 @@ pub(super) struct Deck<'a> {
     pub(super) elsets: Sets,
     pub(super) surfaces: Vec<Surface>,
     pub(super) materials: Vec<MaterialCard>,
+    /// Index of each material by its name in capitals.
+    pub(super) material_by_name: HashMap<String, usize>,
     pub(super) sections: Vec<SectionCard>,
     /// Cards that were passed over, with their number.
     ignored: Vec<(String, usize)>,
+    /// Element types that were remarked on.
+    remarks: BTreeSet<String>,
     scope: Scope,
     instances: usize,
     assembly_nodes: bool,
@@ -70,8 +76,10 @@ impl<'a> Deck<'a> {
             elsets: Sets::new("element"),
             surfaces: Vec::new(),
             materials: Vec::new(),
+            material_by_name: HashMap::new(),
             sections: Vec::new(),
             ignored: Vec::new(),
+            remarks: BTreeSet::new(),
             scope: Scope::Part,
             instances: 0,
             assembly_nodes: false,
@@ -109,7 +117,7 @@ impl<'a> Deck<'a> {
             "SURFACE" => self.surface(card),
             "MATERIAL" => {
                 let new = MaterialCard::new(&src, card)?;
-                if self.materials.iter().any(|known| squeezed(&known.name) == squeezed(&new.name)) {
+                if self.material_by_name.insert(squeezed(&new.name), self.materials.len()).is_some() {
                     let found = format!("a second material {:?}", new.name);
                     return Err(src.error(Kind::Duplicate, card.at, "*MATERIAL", found, "different names"));
                 }
@@ -130,7 +138,13 @@ impl<'a> Deck<'a> {
                 Ok(())
             }
             "BEAMSECTION" => {
-                self.sections.push(SectionCard::beam(&mut self.lines, card, self.scope, &self.units)?);
+                self.sections.push(SectionCard::beam(
+                    &mut self.lines,
+                    card,
+                    self.scope,
+                    &self.units,
+                    &mut self.draft.warnings,
+                )?);
                 Ok(())
             }
             "INCLUDE" => {
@@ -225,7 +239,7 @@ impl<'a> Deck<'a> {
         };
         if let Some(remark) = remark {
             let warning = format!("{type_name}: {remark}");
-            if !self.draft.warnings.contains(&warning) {
+            if self.remarks.insert(type_name.clone()) {
                 self.draft.warnings.push(warning);
             }
         }

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::deck::{Deck, Surface};
 use super::lines::squeezed;
-use super::sets::{Scope, unknown};
+use super::sets::{Budget, Scope, unknown};
 use super::types::Class;
 use crate::beam::BeamTheory;
 use crate::mesh::error::{MeshError, MeshErrorKind as Kind};
@@ -25,19 +25,20 @@ impl Deck<'_> {
         let src = self.lines.src;
         let nodes = self.draft.index_nodes(&src)?;
         let elements = self.index_elements()?;
-        let elsets = self.elsets.resolve(&src, &elements, Vec::new())?;
-        let sets = self.node_sets(&nodes, &elements, &elsets)?;
+        let mut budget = Budget::new(&src);
+        let elsets = self.elsets.resolve(&src, &elements, Vec::new(), &mut budget)?;
+        let sets = self.node_sets(&nodes, &elements, &elsets, &mut budget)?;
 
         let region_of = self.regions(&elsets)?;
         self.beams_of_options(options, &region_of)?;
-        for k in 0..self.elements.ids.len() {
+        for (k, region) in region_of.iter().enumerate() {
             let kind = match self.class(k) {
                 Class::Solid(kind) => kind,
                 Class::Beam(_) => ElementKind::Beam2,
                 Class::Skin(_) => continue,
             };
             let start = self.elements.starts[k];
-            let block = self.draft.block(kind, region_of[k] as usize);
+            let block = self.draft.block(kind, *region as usize);
             block.ids.push(self.elements.ids[k]);
             block.offsets.push(self.elements.offsets[k]);
             block.nodes.extend_from_slice(&self.elements.nodes[start..start + kind.nodes()]);
@@ -68,7 +69,9 @@ impl Deck<'_> {
         let mut region_of = vec![NONE; self.elements.ids.len()];
         for section in &self.sections {
             let set = self.elsets.find(&src, &section.elset, section.scope, section.at)?;
-            let material = section.find(&src, &self.materials)?.material(&src, &mut self.draft.warnings)?;
+            let material = section
+                .find(&src, &self.materials, &self.material_by_name)?
+                .material(&src, &mut self.draft.warnings)?;
             let region = self.draft.regions.len();
             let mut theory: Option<BeamTheory> = None;
             for element in elsets[set].iter().map(|element| *element as usize) {
@@ -154,17 +157,24 @@ impl Deck<'_> {
     }
 
     /// Node sets, nodes of surfaces, and nodes of the element sets that are skins; names differ.
-    fn node_sets(&self, nodes: &IdIndex, elements: &IdIndex, elsets: &[Vec<u32>]) -> Result<Vec<Named>, MeshError> {
+    fn node_sets(
+        &self,
+        nodes: &IdIndex,
+        elements: &IdIndex,
+        elsets: &[Vec<u32>],
+        budget: &mut Budget,
+    ) -> Result<Vec<Named>, MeshError> {
         let src = self.lines.src;
         let mut own = Vec::with_capacity(self.nsets.list.len());
         for set in &self.nsets.list {
             let mut members = Vec::new();
             for elset in &set.of_elements {
+                budget.spend(&src, set.at, &set.name, elsets[*elset].len())?;
                 self.nodes_of(nodes, &elsets[*elset], &mut members)?;
             }
             own.push(members);
         }
-        let resolved = self.nsets.resolve(&src, nodes, own)?;
+        let resolved = self.nsets.resolve(&src, nodes, own, budget)?;
 
         let mut named = Vec::new();
         let mut taken = BTreeSet::new();
@@ -178,7 +188,7 @@ impl Deck<'_> {
             }
         }
         for surface in &self.surfaces {
-            let members = self.surface_nodes(surface, nodes, elements, elsets, &resolved)?;
+            let members = self.surface_nodes(surface, nodes, elements, elsets, &resolved, budget)?;
             let clash = !taken.insert(squeezed(&surface.name));
             named.push((format!("{}{}", surface.name, if clash { "_surface" } else { "" }), members));
         }
@@ -231,6 +241,7 @@ impl Deck<'_> {
         elements: &IdIndex,
         elsets: &[Vec<u32>],
         nsets: &[Vec<u32>],
+        budget: &mut Budget,
     ) -> Result<Vec<u32>, MeshError> {
         let src = self.lines.src;
         let mut out = Vec::new();
@@ -241,7 +252,11 @@ impl Deck<'_> {
             if surface.of_nodes {
                 match number {
                     Some(id) => out.push(nodes.get(id).ok_or_else(missing)?),
-                    None => out.extend_from_slice(&nsets[self.nsets.find(&src, member, surface.scope, *at)?]),
+                    None => {
+                        let members = &nsets[self.nsets.find(&src, member, surface.scope, *at)?];
+                        budget.spend(&src, *at, &surface.name, members.len())?;
+                        out.extend_from_slice(members);
+                    }
                 }
                 continue;
             }
@@ -253,6 +268,7 @@ impl Deck<'_> {
                 }
                 None => &elsets[self.elsets.find(&src, member, surface.scope, *at)?],
             };
+            budget.spend(&src, *at, &surface.name, 8 * members.len())?;
             for element in members {
                 let found = |text: &str| src.error(Kind::Unsupported, *at, what(), text, "a face S1 to S6 of a solid");
                 let Class::Solid(kind) = self.class(*element as usize) else {

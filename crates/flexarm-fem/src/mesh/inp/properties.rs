@@ -1,5 +1,7 @@
 //! Materials and sections of a deck, converted to SI.
 
+use std::collections::HashMap;
+
 use nalgebra::Vector3;
 
 use super::lines::{Card, Lines, numbers, squeezed};
@@ -102,13 +104,22 @@ impl SectionCard {
     }
 
     /// `*BEAM SECTION`: dimensions, then the first local direction.
-    pub(super) fn beam(lines: &mut Lines, card: &Card, scope: Scope, units: &UnitSystem) -> Result<Self, MeshError> {
+    pub(super) fn beam(
+        lines: &mut Lines,
+        card: &Card,
+        scope: Scope,
+        units: &UnitSystem,
+        warnings: &mut Vec<String>,
+    ) -> Result<Self, MeshError> {
         let src = lines.src;
         let mut section = Self::solid(&src, card, scope)?;
         for key in ["OFFSET1", "OFFSET2"] {
             if card.get(key).is_some_and(|value| value.trim().parse() != Ok(0.0)) {
                 return Err(card.refuse(&src, format!("{key}={}", card.get(key).unwrap_or("")), "no offset"));
             }
+        }
+        if card.has("NODALTHICKNESS") {
+            return Err(card.refuse(&src, "NODAL THICKNESS", "one section for all elements"));
         }
         let shape = card.need(&src, "SECTION")?;
         let dimensions: Vec<f64> = first_line(lines, card)?.iter().map(|x| x * units.length).collect();
@@ -117,6 +128,13 @@ impl SectionCard {
             let expected = "RECT (a, b), CIRC (radius), PIPE (radius, wall) or BOX (a, b, four equal walls)";
             card.refuse(&src, found, expected)
         })?;
+        if matches!((&shape, dimensions.len()), (Section::Circle { .. }, 1)) {
+            let elset = &section.elset;
+            warnings.push(format!(
+                "section {elset:?}: the one number of CIRC is taken as a radius, as in Abaqus; CalculiX takes it as \
+                 a diameter: write two equal diameters to mean that"
+            ));
+        }
         // Poisson's ratio plays no part in what is possible.
         shape.properties(0.3).map_err(|error| impossible(&src, card.at, card.title.clone(), &error))?;
 
@@ -145,9 +163,14 @@ impl SectionCard {
     }
 
     /// The material that the section names.
-    pub(super) fn find<'a>(&self, src: &Source, materials: &'a [MaterialCard]) -> Result<&'a MaterialCard, MeshError> {
-        let name = squeezed(&self.material);
-        materials.iter().find(|known| squeezed(&known.name) == name).ok_or_else(|| {
+    pub(super) fn find<'a>(
+        &self,
+        src: &Source,
+        materials: &'a [MaterialCard],
+        by_name: &HashMap<String, usize>,
+    ) -> Result<&'a MaterialCard, MeshError> {
+        let found = by_name.get(&squeezed(&self.material)).and_then(|k| materials.get(*k));
+        found.ok_or_else(|| {
             let known = format!("one of: {}", listed(materials.iter().map(|known| &known.name)));
             let found = format!("MATERIAL={}", self.material);
             src.error(Kind::Missing, self.at, self.title.as_str(), found, known)
@@ -155,7 +178,7 @@ impl SectionCard {
     }
 }
 
-/// Abaqus' dimensions; two equal numbers for CIRC are CalculiX's two diameters.
+/// Dimensions as in Abaqus; two equal numbers for CIRC are CalculiX's diameters (its beamsections.f).
 fn beam_section(name: &str, dimensions: &[f64]) -> Option<Section> {
     match (name, dimensions) {
         ("RECT", [a, b]) => Some(Section::Rectangle { width: *a, height: *b }),

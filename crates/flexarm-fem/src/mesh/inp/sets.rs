@@ -7,8 +7,32 @@ use crate::mesh::error::{MeshError, MeshErrorKind as Kind, Place};
 use crate::mesh::ids::IdIndex;
 use crate::mesh::source::{Source, listed, parse_u64, shown};
 
-/// Members that all sets of a file together may have, after nesting.
-const MOST_MEMBERS: usize = 1 << 28;
+/// What sets may grow to by nesting and generation: a bound by the size of the file, so that a small
+/// file cannot ask for endless work.
+pub(super) struct Budget {
+    left: usize,
+}
+
+impl Budget {
+    pub(super) fn new(src: &Source) -> Self {
+        // 500 sets of all nodes at 30 bytes per node.
+        Self { left: src.bytes.len().saturating_mul(16).saturating_add(1 << 20) }
+    }
+
+    /// Counts members of a set or surface that stands at an offset.
+    pub(super) fn spend(&mut self, src: &Source, at: usize, name: &str, members: usize) -> Result<(), MeshError> {
+        match self.left.checked_sub(members) {
+            Some(left) => {
+                self.left = left;
+                Ok(())
+            }
+            None => {
+                let expected = "at most 16 members per byte of the file in all sets together";
+                Err(src.error(Kind::TooLarge, at, format!("set {name:?}"), "too many members", expected))
+            }
+        }
+    }
+}
 
 /// Where a name was given: sets of a part and of the assembly may share names.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
@@ -31,7 +55,7 @@ pub(super) struct Set {
     /// As in the file.
     pub(super) name: String,
     pub(super) scope: Scope,
-    at: usize,
+    pub(super) at: usize,
     pub(super) ids: Vec<u64>,
     ranges: Vec<[u64; 3]>,
     /// Sets of the same sort inside.
@@ -71,7 +95,7 @@ impl Sets {
 
     /// Takes one data line of `*NSET` or `*ELSET`.
     ///
-    /// * `take_ids`: whether plain numbers count; names of sets always do.
+    /// * `take_ids`: whether plain numbers count; names and numbers with an instance always do.
     pub(super) fn add_line(
         &mut self,
         src: &Source,
@@ -96,9 +120,16 @@ impl Sets {
         for field in fields(line).filter(|field| !field.is_empty()) {
             // `Part-1-1.17` is node 17 of the only instance.
             let last = field.rsplit(|byte| *byte == b'.').next().unwrap_or(field);
-            if let Some(id) = parse_u64(field).or_else(|| parse_u64(last)) {
-                self.list[set].ids.extend(take_ids.then_some(id));
-                continue;
+            match (parse_u64(field), parse_u64(last)) {
+                (Some(id), _) => {
+                    self.list[set].ids.extend(take_ids.then_some(id));
+                    continue;
+                }
+                (None, Some(id)) => {
+                    self.list[set].ids.push(id);
+                    continue;
+                }
+                (None, None) => {}
             }
             let inner = self.find(src, &String::from_utf8_lossy(field), self.list[set].scope, at)?;
             self.list[set].inner.push(inner);
@@ -114,18 +145,8 @@ impl Sets {
         src: &Source,
         index: &IdIndex,
         own: Vec<Vec<u32>>,
+        budget: &mut Budget,
     ) -> Result<Vec<Vec<u32>>, MeshError> {
-        let mut total = 0;
-        let mut count = |set: &Set, more: usize| {
-            total += more;
-            if total <= MOST_MEMBERS {
-                return Ok(());
-            }
-            let element = format!("{} set {:?}", self.what, set.name);
-            let expected = format!("at most {MOST_MEMBERS} in all sets");
-            Err(src.error(Kind::TooLarge, set.at, element, "too many members", expected))
-        };
-
         // Members of each set itself.
         let mut direct = own;
         direct.resize(self.list.len(), Vec::new());
@@ -140,7 +161,7 @@ impl Sets {
             for [first, last, step] in &set.ranges {
                 let before = members.len();
                 index.extend_from_range(*first, *last, *step, members);
-                count(set, members.len() - before)?;
+                budget.spend(src, set.at, &set.name, members.len() - before)?;
                 tidy(members, before);
             }
             members.sort_unstable();
@@ -154,7 +175,7 @@ impl Sets {
             let mut open = vec![k];
             seen_from[k] = k;
             while let Some(inside) = open.pop() {
-                count(set, direct[inside].len() + 1)?;
+                budget.spend(src, set.at, &set.name, direct[inside].len() + 1)?;
                 if inside != k {
                     all[k].extend_from_slice(&direct[inside]);
                 }

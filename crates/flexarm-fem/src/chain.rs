@@ -1,0 +1,274 @@
+//! A link as n rigid parts in series with n - 1 elastic joints, exact for every end wrench.
+//!
+//! With A held and the end loaded, the link's energy is `½ F_Bᵀ C_BB F_B`. The mesh knows where that
+//! energy sits: element by element it is a sum of 6×6 matrices,
+//!
+//! ```text
+//! C_BB = Σ_e U_eᵀ K_e U_e,       U: displacements under the six unit wrenches at B
+//! E_k  = share of the elements between two planes,   Σ_k E_k = C_BB
+//! C_k  = Ad_{SB} E_k Ad_{SB}ᵀ,   K_k = C_k⁻¹         joint k, at S_k
+//! ```
+//! so the joints add up to the whole link whatever the planes and the mesh are; for a uniform beam
+//! `C_k` is the closed form of its piece. No section is made rigid to get there: segments reduced as
+//! superelements of their own, with tied sections, do not add up (compare `tests/chain.rs`).
+//!
+//! An element cut by a plane gives its energy to both sides by volume. The parts are cut at the
+//! joints, so each joint stands in the middle of the material that it replaces.
+//!
+//! Source: Castigliano's theorem for `C_BB`; the sharing by energy is ours.
+
+use nalgebra::{DMatrix, Matrix3, Matrix6, SMatrix, Vector3, Vector6};
+
+use crate::cut::{CutError, CutPlane, cut, volume_fractions};
+use crate::element::{ElementWorkspace, Quadrature};
+use crate::material::Material;
+use crate::mesh::Mesh;
+use crate::model::FeModel;
+use crate::reduced::ElasticSplit;
+use crate::reduction::generalised_frequencies;
+use crate::rigid_part::RigidPart;
+use crate::spatial::{Pose, adjoint, skew, symmetric_part};
+
+/// A matrix with one column per unit wrench at B.
+type Loads = SMatrix<f64, 6, 6>;
+
+/// n rigid parts, n - 1 elastic joints, from A to B.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Chain {
+    /// Joints, proximal first; poses in the link frame, stiffness in the axes of the joint.
+    pub joints: Vec<ElasticSplit>,
+    /// Parts, proximal first; one more than joints.
+    pub parts: Vec<RigidPart>,
+}
+
+/// Why a chain could not be made.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ChainError {
+    /// Fewer than two parts.
+    #[error("a chain needs at least two parts, not {parts}")]
+    TooFewParts {
+        /// Parts asked for.
+        parts: usize,
+    },
+    /// A slice without enough material to be a joint.
+    #[error(
+        "between {from:.4} and {to:.4} of the way from A to B there is too little material for an \
+         elastic joint (its compliance is singular); ask for fewer parts, {parts} are too many"
+    )]
+    EmptySlice {
+        /// Start of the slice, as a fraction of AB.
+        from: f64,
+        /// Its end.
+        to: f64,
+        /// Parts asked for.
+        parts: usize,
+    },
+    /// The parts could not be cut.
+    #[error(transparent)]
+    Cut(#[from] CutError),
+}
+
+/// Where each unit load at B leaves its energy along the link.
+///
+/// * `U`: displacements of all DoF under the six unit wrenches at B, A held.
+/// * `planes`: n - 1 planes between the n slices, from A to B.
+///
+/// Returns one 6×6 per slice, m/N ... rad/(N·m), at Bo, link axes; their sum is `C_BB`.
+///
+/// # Errors
+/// None: elements were checked when they were assembled.
+pub fn energy_by_slice(
+    mesh: &Mesh,
+    model: &FeModel,
+    materials: &[Material],
+    quadrature: Quadrature,
+    U: &DMatrix<f64>,
+    planes: &[CutPlane],
+) -> Vec<Loads> {
+    let mut slices = vec![Loads::zeros(); planes.len() + 1];
+    let mut workspace = ElementWorkspace::new();
+    for block in &mesh.blocks {
+        let per_node = if block.kind.is_beam() { 6 } else { 3 };
+        for nodes in block.elements() {
+            let x: Vec<_> = nodes.iter().map(|node| mesh.nodes[*node as usize]).collect();
+            let size = per_node * nodes.len();
+            let u = DMatrix::from_fn(size, 6, |i, j| {
+                U[(model.dofs.of(nodes[i / per_node] as usize).start + i % per_node, j)]
+            });
+            let material = &materials[block.region];
+            let K_e = if block.kind.is_beam() {
+                crate::model::beam_stiffness(mesh, block.region, nodes, material)
+            } else {
+                workspace
+                    .stiffness_and_mass(block.kind, &x, material, quadrature)
+                    .ok()
+                    .map(|()| DMatrix::from_column_slice(size, size, workspace.stiffness()))
+            };
+            let Some(K_e) = K_e else { continue };
+            let energy = u.transpose() * K_e * &u;
+            let energy = Loads::from_fn(|i, j| energy[(i, j)]);
+            let shares = volume_fractions(block.kind, &x, planes).unwrap_or_else(|_| vec![1.0; 1]);
+            for (slice, share) in slices.iter_mut().zip(shares) {
+                *slice += energy * share;
+            }
+        }
+    }
+    slices.iter().map(symmetric_part).collect()
+}
+
+/// The centre of compliance: where a symmetric 6×6 compliance at `p_B` couples least, its coupling
+/// block symmetric there. For a straight uniform beam, the middle.
+///
+/// ```text
+/// C_tr(S) = C_tr(B) + [p_BS... ]x C_rr,   skew part of C_tr(S) = 0:   three equations for S
+/// ```
+/// Source: Lončarić (1987), normal forms of stiffness and compliance matrices.
+pub fn centre_of_compliance(C: &Matrix6<f64>, p_B: &Vector3<f64>) -> Option<Vector3<f64>> {
+    let C_tr = C.fixed_view::<3, 3>(0, 3).into_owned();
+    let C_rr = C.fixed_view::<3, 3>(3, 3).into_owned();
+    // u_S = u_B + theta x p_BS = u_B - [p]x theta: C_tr(S) = C_tr - [p]x C_rr; axial vectors of both sides:
+    // vee([p]x C_rr - C_rrᵀ [p]xᵀ ...) = (tr(C_rr) 1 - C_rr) p.
+    let axial = |A: &Matrix3<f64>| Vector3::new(A[(2, 1)] - A[(1, 2)], A[(0, 2)] - A[(2, 0)], A[(1, 0)] - A[(0, 1)]);
+    let matrix = Matrix3::identity() * C_rr.trace() - C_rr;
+    matrix.try_inverse().map(|inverse| p_B + inverse * axial(&C_tr))
+}
+
+/// What a chain is cut from.
+#[derive(Debug, Clone, Copy)]
+pub struct ChainSource<'a> {
+    /// The mesh, link axes.
+    pub mesh: &'a Mesh,
+    /// Its model.
+    pub model: &'a FeModel,
+    /// Material of each region.
+    pub materials: &'a [Material],
+    /// Quadrature of the model.
+    pub quadrature: Quadrature,
+    /// Displacements under the six unit wrenches at B, A held.
+    pub U: &'a DMatrix<f64>,
+    /// Origin of A, link axes, m.
+    pub p_LA: Vector3<f64>,
+    /// Origin of B.
+    pub p_LB: Vector3<f64>,
+}
+
+impl ChainSource<'_> {
+    fn plane(&self, fraction: f64) -> CutPlane {
+        let normal = self.p_LB - self.p_LA;
+        CutPlane { point: self.p_LA + normal * fraction, normal }
+    }
+
+    /// How far along AB a point is, as a fraction.
+    fn fraction(&self, p: &Vector3<f64>) -> f64 {
+        let along = self.p_LB - self.p_LA;
+        (p - self.p_LA).dot(&along) / along.norm_squared()
+    }
+
+    /// The chain of `parts` parts.
+    ///
+    /// # Errors
+    /// [`ChainError`].
+    pub fn chain(&self, parts: usize) -> Result<Chain, ChainError> {
+        if parts < 2 {
+            return Err(ChainError::TooFewParts { parts });
+        }
+        let slices = parts - 1;
+        let bound = |k: usize| k as f64 / slices as f64;
+        let between: Vec<CutPlane> = (1..slices).map(|k| self.plane(bound(k))).collect();
+        let energies = energy_by_slice(self.mesh, self.model, self.materials, self.quadrature, self.U, &between);
+
+        let (mut joints, mut cuts) = (Vec::new(), Vec::new());
+        for (k, E) in energies.iter().enumerate() {
+            let (from, to) = (bound(k), bound(k + 1));
+            let empty = || ChainError::EmptySlice { from, to, parts };
+            // The centre of compliance of the slice, unless a bent link puts it outside.
+            let middle = self.plane((from + to) / 2.0).point;
+            let centre = centre_of_compliance(E, &self.p_LB).filter(|p| {
+                let t = self.fraction(p);
+                t > from && t < to
+            });
+            let p_LS = centre.unwrap_or(middle);
+            let X_LS = Pose::translation(p_LS.x, p_LS.y, p_LS.z);
+            let p = self.p_LB - p_LS;
+            // From Bo to So, same axes.
+            let Ad_SB = adjoint(&Pose::translation(p.x, p.y, p.z));
+            let C_S = symmetric_part(&(Ad_SB * E * Ad_SB.transpose()));
+            let scale = C_S.diagonal().map(|c| 1.0 / c.sqrt());
+            let scaled = C_S.component_mul(&(scale * scale.transpose()));
+            let inverse = scaled.cholesky().filter(|f| f.l().diagonal().min() > 1e-6).ok_or_else(empty)?.inverse();
+            let K_S = symmetric_part(&inverse.component_mul(&(scale * scale.transpose())));
+            joints.push(ElasticSplit { X_LS, K_S });
+            cuts.push(self.plane(self.fraction(&p_LS)));
+        }
+        let densities: Vec<f64> = self.materials.iter().map(|m| m.rho).collect();
+        Ok(Chain { joints, parts: cut(self.mesh, &densities, &cuts)? })
+    }
+}
+
+impl Chain {
+    /// Displacement twist of each part at the link origin per joint coordinate: `xi_i = Σ_{k<i} Ad_{LS_k} d_k`.
+    fn carries(&self) -> Vec<Matrix6<f64>> {
+        self.joints.iter().map(|joint| adjoint(&joint.X_LS)).collect()
+    }
+
+    /// Compliance at B with A held, link axes: `Σ Ad_{BS} C_S Ad_{BS}ᵀ`.
+    pub fn tip_compliance(&self, p_LB: &Vector3<f64>) -> Option<Matrix6<f64>> {
+        let mut C = Matrix6::zeros();
+        for joint in &self.joints {
+            let X_BS = Pose::translation(-p_LB.x, -p_LB.y, -p_LB.z) * joint.X_LS;
+            let Ad_BS = adjoint(&X_BS);
+            let K = DMatrix::from_column_slice(6, 6, joint.K_S.as_slice());
+            let C_S = crate::reduction::spd_inverse(&K)?;
+            C += Ad_BS * Matrix6::from_column_slice(C_S.as_slice()) * Ad_BS.transpose();
+        }
+        Some(C)
+    }
+
+    /// Stiffness and mass over the joint coordinates, A held: `K = blkdiag(K_S)`, `M = Σ J_iᵀ M_i J_i`.
+    pub fn held_matrices(&self) -> (DMatrix<f64>, DMatrix<f64>) {
+        let (n, carries) = (6 * self.joints.len(), self.carries());
+        let (mut K, mut M) = (DMatrix::zeros(n, n), DMatrix::zeros(n, n));
+        for (k, joint) in self.joints.iter().enumerate() {
+            K.view_mut((6 * k, 6 * k), (6, 6)).copy_from(&joint.K_S);
+        }
+        for (a, Ad_a) in carries.iter().enumerate() {
+            for (b, Ad_b) in carries.iter().enumerate() {
+                // Both joints move the parts beyond the farther one.
+                let beyond = self.parts.iter().skip(a.max(b) + 1);
+                let inertia: Matrix6<f64> = beyond.map(RigidPart::spatial_inertia).sum();
+                M.view_mut((6 * a, 6 * b), (6, 6)).copy_from(&(Ad_a.transpose() * inertia * Ad_b));
+            }
+        }
+        (K, M)
+    }
+
+    /// Natural frequencies with A held, Hz, ascending.
+    pub fn held_frequencies_hz(&self) -> Vec<f64> {
+        let (K, M) = self.held_matrices();
+        generalised_frequencies(&K, &M)
+    }
+
+    /// Displacement of B under the link's own weight, A held.
+    ///
+    /// * `gravity`: m/s², link axes.
+    ///
+    /// Returns the displacement at Bo, link axes.
+    pub fn sag(&self, p_LB: &Vector3<f64>, gravity: &Vector3<f64>) -> Option<Vector6<f64>> {
+        let mut u = Vector6::zeros();
+        for (k, joint) in self.joints.iter().enumerate() {
+            let Ad_LS = adjoint(&joint.X_LS);
+            let mut weight = Vector6::zeros();
+            for part in self.parts.iter().skip(k + 1) {
+                let f = gravity * part.mass;
+                let t = skew(&part.com) * f;
+                weight += Vector6::new(f.x, f.y, f.z, t.x, t.y, t.z);
+            }
+            let K = DMatrix::from_column_slice(6, 6, joint.K_S.as_slice());
+            let C_S = Matrix6::from_column_slice(crate::reduction::spd_inverse(&K)?.as_slice());
+            let d = C_S * (Ad_LS.transpose() * weight);
+            u += adjoint(&(Pose::translation(-p_LB.x, -p_LB.y, -p_LB.z) * joint.X_LS)) * d;
+        }
+        Some(u)
+    }
+}

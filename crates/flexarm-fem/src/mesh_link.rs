@@ -1,0 +1,399 @@
+//! From a mesh with named interfaces to a checked flexible link, in one call.
+//!
+//! ```text
+//! mesh --assemble--> K, M --tie, factorise--> K_g, M_g, modes --+--> ReducedLink (K_BB, two parts, chains)
+//!                                                               +--> MeshGate: what was checked, with numbers
+//! ```
+//! Start at [`reduce_mesh`]. Everything is in link axes and SI: a mesh in another frame is moved first
+//! ([`Mesh::transformed`]).
+//!
+//! Not here: files, clocks, pictures.
+
+use nalgebra::{DMatrix, Matrix3, Matrix6, Vector3};
+
+use crate::chain::{Chain, ChainError, ChainSource, centre_of_compliance};
+use crate::cut::{CutError, CutPlane, cut, mass_properties};
+use crate::error::FemError;
+use crate::frames::LinkFrames;
+use crate::gate::GateLimits;
+use crate::mesh::Mesh;
+use crate::mesh_gate::{ElementQuality, MeshGate, ModeCheck};
+use crate::model::{AssemblyError, AssemblyOptions, FeModel, materials};
+use crate::reduced::{LinkDetails, Provenance, ReducedLink};
+use crate::reduction::{
+    Condensation, CondensationOptions, Interface, InterfaceFrame, ReductionError, SolverFigures, Superelement,
+    spd_inverse,
+};
+use crate::rigid_part::RigidPart;
+use crate::sparse::{Modes, ModesError, ModesWanted};
+use crate::spatial::{Matrix12, Pose, symmetric_part};
+
+/// Where the elastic joint of the two-part link sits.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum SplitAt {
+    /// At the centre of compliance of the link, if a cut there has material on both sides; else mid length.
+    #[default]
+    ElasticCentre,
+    /// Midway between A and B.
+    MidLength,
+    /// At a fraction of the way from A to B.
+    Fraction(f64),
+    /// At a point, link axes, m.
+    Point(Vector3<f64>),
+}
+
+/// What to make of a mesh.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LinkPlan {
+    /// Name of the link.
+    pub name: String,
+    /// Interfaces, proximal first, then distal, then any others.
+    pub interfaces: Vec<Interface>,
+    /// Materials and quadrature.
+    pub assembly: AssemblyOptions,
+    /// Order and threads.
+    pub condensation: CondensationOptions,
+    /// Fixed-interface modes to keep; a count of zero is Guyan.
+    pub modes: ModesWanted,
+    /// Place of the elastic joint.
+    pub split: SplitAt,
+    /// Chains to make, by their number of parts.
+    pub chains: Vec<usize>,
+    /// Modes with A held against which the reduced models are judged.
+    pub judged_modes: usize,
+    /// Limits of the gate.
+    pub limits: GateLimits,
+    /// Where the numbers come from.
+    pub provenance: Provenance,
+}
+
+/// What came out.
+#[derive(Debug, Clone)]
+pub struct MeshReduction {
+    /// The link, with its superelement, chains and gate in [`ReducedLink::details`].
+    pub link: ReducedLink,
+    /// Mass properties of the whole mesh, link axes.
+    pub whole: RigidPart,
+    /// Size of the linear algebra.
+    pub solver: SolverFigures,
+    /// Displacements of all DoF under six unit wrenches at B, A held; for pictures.
+    pub unit_loads: DMatrix<f64>,
+    /// Fixed-interface modes over all DoF; for pictures.
+    pub fixed_modes: Modes,
+    /// Modes with A held, over all DoF; for pictures.
+    pub held_modes: Modes,
+    /// Right-hand sides solved in all.
+    pub solves: usize,
+    /// Sentences about what was accepted, but looks like a mistake.
+    pub warnings: Vec<String>,
+}
+
+/// Why a mesh could not become a link.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum MeshLinkError {
+    /// Elements, materials, sections.
+    #[error(transparent)]
+    Assembly(#[from] AssemblyError),
+    /// Ties, factorisation.
+    #[error(transparent)]
+    Reduction(#[from] ReductionError),
+    /// Modes.
+    #[error(transparent)]
+    Modes(#[from] ModesError),
+    /// Parts.
+    #[error(transparent)]
+    Cut(#[from] CutError),
+    /// Chains.
+    #[error(transparent)]
+    Chain(#[from] ChainError),
+    /// The gate refused the result.
+    #[error(transparent)]
+    Gate(#[from] FemError),
+    /// Parts of the mesh that hang on no interface.
+    #[error(
+        "the mesh falls into {parts} parts that share no node: {list}; only one may remain; \
+         was a glue or merge of coincident nodes forgotten (Coherence in Gmsh)?"
+    )]
+    Unconnected {
+        /// How many.
+        parts: usize,
+        /// Their sizes, with one node each.
+        list: String,
+    },
+}
+
+/// Steps of a reduction, for progress displays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ReductionStep {
+    /// Element matrices.
+    Assembly,
+    /// Sparse Cholesky and static shapes.
+    Factorisation,
+    /// Fixed-interface modes.
+    FixedModes,
+    /// Modes with A held, to judge the result.
+    HeldModes,
+    /// Parts, chains and checks.
+    Parts,
+}
+
+impl ReductionStep {
+    /// All steps, in order.
+    pub const ALL: [Self; 5] = [Self::Assembly, Self::Factorisation, Self::FixedModes, Self::HeldModes, Self::Parts];
+
+    /// What it is called.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Assembly => "assembly",
+            Self::Factorisation => "factorisation and static shapes",
+            Self::FixedModes => "fixed-interface modes",
+            Self::HeldModes => "modes of the mesh with A held",
+            Self::Parts => "parts and checks",
+        }
+    }
+}
+
+/// Reduces `mesh`, given in link axes, to a link.
+///
+/// * `step`: called at the start of each step.
+///
+/// # Errors
+/// [`MeshLinkError`].
+pub fn reduce_mesh(
+    mesh: &Mesh,
+    plan: &LinkPlan,
+    step: &mut dyn FnMut(ReductionStep),
+) -> Result<MeshReduction, MeshLinkError> {
+    check_connected(mesh)?;
+    step(ReductionStep::Assembly);
+    let quality = ElementQuality::of(mesh);
+    let materials = materials(mesh, &plan.assembly)?;
+    let model = FeModel::assemble(mesh, &plan.assembly)?;
+
+    step(ReductionStep::Factorisation);
+    let condensation = Condensation::new(&model, &plan.interfaces, plan.condensation)?;
+    let unit_loads = condensation.unit_load_shapes().columns(0, 6).into_owned();
+
+    step(ReductionStep::FixedModes);
+    let fixed_modes = condensation.fixed_modes(plan.modes)?;
+    let frame = |i: &Interface| InterfaceFrame { name: i.name.clone(), X_LI: i.X_LI, tie: Some(i.tie) };
+    let superelement = condensation.superelement(plan.interfaces.iter().map(frame).collect(), &fixed_modes);
+
+    step(ReductionStep::HeldModes);
+    let held_modes = condensation.held_modes(ModesWanted::Count(plan.judged_modes))?;
+
+    step(ReductionStep::Parts);
+    let densities: Vec<f64> = materials.iter().map(|m| m.rho).collect();
+    let whole = mass_properties(mesh, &densities)?;
+    let (X_LA, X_LB) = (plan.interfaces[0].X_LI, plan.interfaces[1].X_LI);
+    let mut warnings = Vec::new();
+    let K12 = stiffness12(&superelement)?;
+    let frames = LinkFrames::new(X_LA, X_LB);
+    let (frames, parts) = split(mesh, &densities, frames, &K12, plan.split, &mut warnings)?;
+    let mut link = ReducedLink::from_matrix12(&plan.name, frames, &K12, parts, plan.provenance.clone(), &plan.limits)?;
+
+    let source = ChainSource {
+        mesh,
+        model: &model,
+        materials: &materials,
+        quadrature: plan.assembly.quadrature,
+        U: &unit_loads,
+        p_LA: X_LA.translation.vector,
+        p_LB: X_LB.translation.vector,
+    };
+    let chains = plan.chains.iter().map(|parts| source.chain(*parts)).collect::<Result<Vec<_>, _>>()?;
+    let gate = gate(&condensation, &superelement, &link, &whole, &fixed_modes, &held_modes, quality);
+    warnings.extend(gate.warnings());
+    warnings.extend(implausible(mesh, &whole, &held_modes));
+    link.details = Some(Box::new(LinkDetails { superelement: Some(superelement), chains, gate: Some(gate) }));
+    warnings.extend(link.warnings(&plan.limits));
+    let solves = fixed_modes.solves + held_modes.solves + condensation.figures().static_solves;
+    let solver = condensation.figures();
+    Ok(MeshReduction { link, whole, solver, unit_loads, fixed_modes, held_modes, solves, warnings })
+}
+
+fn check_connected(mesh: &Mesh) -> Result<(), MeshLinkError> {
+    let parts = crate::mesh::connected_parts(mesh);
+    if parts.len() < 2 {
+        return Ok(());
+    }
+    let one = |part: &crate::mesh::Part| {
+        let id = mesh.node_ids[part.node as usize];
+        format!("{} elements with node {id}", part.elements)
+    };
+    let mut list: Vec<String> = parts.iter().take(6).map(one).collect();
+    if parts.len() > 6 {
+        list.push("...".into());
+    }
+    Err(MeshLinkError::Unconnected { parts: parts.len(), list: list.join(", ") })
+}
+
+/// Stiffness of A and B with every other interface free.
+pub fn stiffness12(element: &Superelement) -> Result<Matrix12, MeshLinkError> {
+    let n = element.boundary();
+    let K = element.K.view((0, 0), (n, n));
+    let mut K12 = K.view((0, 0), (12, 12)).into_owned();
+    if n > 12 {
+        let K_cc = K.view((12, 12), (n - 12, n - 12)).into_owned();
+        let K_cb = K.view((12, 0), (n - 12, 12)).into_owned();
+        let loose = FemError::Missing { what: "stiffness of the third interface", help: "it holds nothing" };
+        let C = spd_inverse(&K_cc).ok_or(loose)?;
+        K12 -= K_cb.transpose() * C * K_cb;
+    }
+    Ok(Matrix12::from_column_slice(K12.as_slice()))
+}
+
+/// Split frame and the two parts. The cut is across AB, through S.
+fn split(
+    mesh: &Mesh,
+    densities: &[f64],
+    frames: LinkFrames,
+    K12: &Matrix12,
+    at: SplitAt,
+    warnings: &mut Vec<String>,
+) -> Result<(LinkFrames, [RigidPart; 2]), MeshLinkError> {
+    let (p_LA, p_LB, along) = (frames.X_LA.translation.vector, frames.X_LB.translation.vector, frames.p_AB());
+    let middle = p_LA + along * 0.5;
+    let parts = |p: Vector3<f64>| -> Result<[RigidPart; 2], CutError> {
+        let mut parts = cut(mesh, densities, &[CutPlane { point: p, normal: along }])?.into_iter();
+        match (parts.next(), parts.next()) {
+            (Some(proximal), Some(distal)) => Ok([proximal, distal]),
+            _ => Err(CutError::NoElements),
+        }
+    };
+    let p_LS = match at {
+        SplitAt::MidLength => middle,
+        SplitAt::Fraction(fraction) => p_LA + along * fraction,
+        SplitAt::Point(point) => point,
+        SplitAt::ElasticCentre => {
+            let K_BB = DMatrix::from_fn(6, 6, |i, j| K12[(6 + i, 6 + j)]);
+            let C = spd_inverse(&K_BB).map(|C| symmetric_part(&Matrix6::from_column_slice(C.as_slice())));
+            let centre = C.and_then(|C| centre_of_compliance(&C, &p_LB));
+            let fraction = |p: &Vector3<f64>| (p - p_LA).dot(&along) / along.norm_squared();
+            match centre.filter(|p| (0.1..=0.9).contains(&fraction(p)) && parts(*p).is_ok()) {
+                Some(centre) => centre,
+                None => {
+                    warnings.push("the elastic centre lies outside the middle of the link; split at mid length".into());
+                    middle
+                }
+            }
+        }
+    };
+    let parts = parts(p_LS)?;
+    Ok((frames.with_split(Pose::translation(p_LS.x, p_LS.y, p_LS.z)), parts))
+}
+
+/// Everything that is checked on a finished reduction.
+fn gate(
+    condensation: &Condensation<'_>,
+    element: &Superelement,
+    link: &ReducedLink,
+    whole: &RigidPart,
+    fixed: &Modes,
+    held: &Modes,
+    quality: ElementQuality,
+) -> MeshGate {
+    let worst = |values: Vec<f64>| values.into_iter().fold(0.0, f64::max);
+    let from_matrix = condensed_body(element);
+    let size = link.p_AB().norm().max(f64::MIN_POSITIVE);
+    let inertia = |part: &RigidPart| part.spatial_inertia().fixed_view::<3, 3>(3, 3).into_owned();
+    let scale = inertia(whole).diagonal().amax();
+
+    let full = held.frequencies_hz();
+    let reduced = element.frequencies_hz(&[0]);
+    let guyan = element.guyan().frequencies_hz(&[0]);
+    let lumped = Chain { joints: vec![link.split.clone()], parts: vec![link.proximal.clone(), link.distal.clone()] };
+    let lumped = lumped.held_frequencies_hz();
+    let rows = full.iter().enumerate().map(|(k, hz)| ModeCheck {
+        mesh_hz: *hz,
+        reduced_hz: reduced.get(k).copied(),
+        guyan_hz: guyan.get(k).copied(),
+        lumped_hz: lumped.get(k).copied(),
+    });
+    let free = element.frequencies_hz(&[]);
+    let first_elastic = free.get(6).copied().unwrap_or(0.0);
+    MeshGate {
+        dofs: condensation.figures().dofs,
+        asymmetry: condensation.asymmetry(),
+        rigid_body_residual: link.checks.rigid_body_residual.unwrap_or(0.0).max(rigid_residual(element)),
+        block_identity: link.checks.block_identity.unwrap_or(0.0),
+        zero_modes: free.iter().take_while(|hz| **hz < 1e-3 * first_elastic).count(),
+        mass_error: (from_matrix.mass / whole.mass - 1.0).abs(),
+        com_error_m: (from_matrix.com - whole.com).norm(),
+        inertia_error: (inertia(&from_matrix) - inertia(whole)).amax() / scale.max(whole.mass * size * size * 1e-6),
+        condition: condensation.condition_estimate(),
+        mode_residual: worst(condensation.mode_residuals(fixed)),
+        fixed_frequencies_hz: fixed.frequencies_hz(),
+        modes: rows.collect(),
+        quality,
+    }
+}
+
+/// Largest relative force under the six rigid motions of all interfaces.
+fn rigid_residual(element: &Superelement) -> f64 {
+    let n = element.boundary();
+    let R = rigid_motions(element);
+    let s = element.K.diagonal().map(|k| k.max(0.0).sqrt());
+    let mut worst = 0.0_f64;
+    for m in 0..6 {
+        let size: f64 = (0..n).map(|k| s[k] * R[(k, m)].abs()).sum();
+        for i in 0..n {
+            let force: f64 = (0..n).map(|k| element.K[(i, k)] * R[(k, m)]).sum();
+            worst = worst.max(force.abs() / (s[i] * size));
+        }
+    }
+    worst
+}
+
+/// Rigid motions of the interfaces about the middle of the first two.
+fn rigid_motions(element: &Superelement) -> DMatrix<f64> {
+    let p = |k: usize| element.interfaces[k].X_LI.translation.vector;
+    rigid_motions_about(element, &((p(0) + p(1)) / 2.0))
+}
+
+fn rigid_motions_about(element: &Superelement, point: &Vector3<f64>) -> DMatrix<f64> {
+    let mut R = DMatrix::zeros(element.boundary(), 6);
+    for (k, interface) in element.interfaces.iter().enumerate() {
+        let turn = -(interface.X_LI.translation.vector - point).cross_matrix();
+        R.view_mut((6 * k, 0), (3, 3)).copy_from(&Matrix3::identity());
+        R.view_mut((6 * k, 3), (3, 3)).copy_from(&turn);
+        R.view_mut((6 * k + 3, 3), (3, 3)).copy_from(&Matrix3::identity());
+    }
+    R
+}
+
+/// Mass, centre of mass and inertia that the reduced mass says: `Rᵀ M R` about the link origin.
+pub fn condensed_body(element: &Superelement) -> RigidPart {
+    let n = element.boundary();
+    let R = rigid_motions_about(element, &Vector3::zeros());
+    let M = R.transpose() * element.M.view((0, 0), (n, n)) * &R;
+    let mass = (M[(0, 0)] + M[(1, 1)] + M[(2, 2)]) / 3.0;
+    // The coupling block is -m[c]x.
+    let com = Vector3::new(M[(1, 5)] - M[(2, 4)], M[(2, 3)] - M[(0, 5)], M[(0, 4)] - M[(1, 3)]) / (-2.0 * mass);
+    let c = com.cross_matrix();
+    let inertia = M.fixed_view::<3, 3>(3, 3) + c * c * mass;
+    RigidPart { mass, com, inertia: (inertia + inertia.transpose()) * 0.5 }
+}
+
+/// Sentences about a link whose size, mass or frequency no robot link has: wrong units, most often.
+fn implausible(mesh: &Mesh, whole: &RigidPart, held: &Modes) -> Vec<String> {
+    let size = mesh.bounding_box().map_or(0.0, |(low, high)| (high - low).amax());
+    let first = held.frequencies_hz().first().copied();
+    let mut warnings = Vec::new();
+    let mut see = |what: &str, value: f64, unit: &str, low: f64, high: f64| {
+        if !(low..=high).contains(&value) {
+            warnings.push(format!(
+                "{what} is {value:.3e} {unit}; links of robots lie between {low:.0e} and {high:.0e}: are the units those declared?"
+            ));
+        }
+    };
+    see("the largest dimension", size, "m", 1e-2, 2e1);
+    see("the mass", whole.mass, "kg", 1e-3, 1e4);
+    let volume_density = whole.mass / size.powi(3).max(f64::MIN_POSITIVE);
+    see("the mass over the cube of the largest dimension", volume_density, "kg/m3", 1e-1, 2.5e4);
+    if let Some(first) = first {
+        see("the first frequency with A held", first, "Hz", 1e0, 5e4);
+    }
+    warnings
+}
