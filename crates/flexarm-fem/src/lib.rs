@@ -66,6 +66,7 @@ pub mod units;
 
 pub use beam::{Beam, BeamTheory};
 pub use beam_link::BeamLink;
+pub use cut::{CutError, CutPlane, cut, mass_properties, volume_fractions};
 pub use error::{Direction, FemError};
 pub use flex_file::{FlexErrorKind, FlexFileError, parse_flex, read_flex, write_flex};
 pub use frames::LinkFrames;

@@ -109,7 +109,7 @@ pub enum MeshLinkError {
     Chain(#[from] ChainError),
     /// The gate refused the result.
     #[error(transparent)]
-    Gate(#[from] FemError),
+    Gate(Box<FemError>),
     /// Parts of the mesh that hang on no interface.
     #[error(
         "the mesh falls into {parts} parts that share no node: {list}; only one may remain; \
@@ -121,6 +121,12 @@ pub enum MeshLinkError {
         /// Their sizes, with one node each.
         list: String,
     },
+}
+
+impl From<FemError> for MeshLinkError {
+    fn from(error: FemError) -> Self {
+        Self::Gate(Box::new(error))
+    }
 }
 
 /// Steps of a reduction, for progress displays.
@@ -370,7 +376,7 @@ pub fn condensed_body(element: &Superelement) -> RigidPart {
     let M = R.transpose() * element.M.view((0, 0), (n, n)) * &R;
     let mass = (M[(0, 0)] + M[(1, 1)] + M[(2, 2)]) / 3.0;
     // The coupling block is -m[c]x.
-    let com = Vector3::new(M[(1, 5)] - M[(2, 4)], M[(2, 3)] - M[(0, 5)], M[(0, 4)] - M[(1, 3)]) / (-2.0 * mass);
+    let com = Vector3::new(M[(1, 5)] - M[(2, 4)], M[(2, 3)] - M[(0, 5)], M[(0, 4)] - M[(1, 3)]) / (2.0 * mass);
     let c = com.cross_matrix();
     let inertia = M.fixed_view::<3, 3>(3, 3) + c * c * mass;
     RigidPart { mass, com, inertia: (inertia + inertia.transpose()) * 0.5 }

@@ -57,7 +57,7 @@ pub enum AssemblyError {
         /// Its name.
         region: String,
         /// What is wrong with it.
-        source: FemError,
+        source: Box<FemError>,
     },
     /// A mesh without elements.
     #[error("the mesh has no element that carries stiffness")]
@@ -144,7 +144,7 @@ pub fn materials(mesh: &Mesh, options: &AssemblyOptions) -> Result<Vec<Material>
         let used = mesh.blocks.iter().any(|block| block.region == index && !block.is_empty());
         let material = region.material.or(options.material).or((!used).then_some(Material::STEEL));
         let material = material.ok_or_else(|| AssemblyError::NoMaterial { region: region.name.clone() })?;
-        let property = |source| AssemblyError::Property { region: region.name.clone(), source };
+        let property = |source| AssemblyError::Property { region: region.name.clone(), source: Box::new(source) };
         material.check().map_err(property)?;
         if let Some(found) = material.G.filter(|G| (G * 2.0 * (1.0 + material.nu) / material.E - 1.0).abs() > 1e-3) {
             return Err(property(FemError::OutOfRange {
@@ -265,7 +265,7 @@ fn beam_of(mesh: &Mesh, region: usize, nodes: &[u32], material: &Material) -> Re
     let region = &mesh.regions[region];
     let name = || region.name.clone();
     let properties = region.beam.as_ref().ok_or_else(|| AssemblyError::NoSection { region: name() })?;
-    let property = |source| AssemblyError::Property { region: name(), source };
+    let property = |source| AssemblyError::Property { region: name(), source: Box::new(source) };
     let bar = properties.section.bar(material).map_err(property)?;
     let along = mesh.nodes[nodes[1] as usize] - mesh.nodes[nodes[0] as usize];
     let beam = Beam::new(bar, properties.theory, along.norm()).map_err(property)?;

@@ -123,7 +123,7 @@ impl Case {
         (reduction.superelement(frames, &fixed), residuals, held, free)
     }
 
-    fn agrees_with_calculix(&self) {
+    fn agrees_with_calculix(&self, bound: f64) {
         let Some(mesh) = self.read() else { return };
         let (mut element, residuals, held, _) = self.reduce(&mesh, Quadrature::Calculix, 10);
         let (K, M) = (
@@ -151,22 +151,87 @@ impl Case {
             self.file,
             &held[..3]
         );
-        assert!(dK < 1e-8 && dM < 1e-8 && cK < 1e-8 && cM < 1e-8);
+        assert!(dK < bound && dM < bound && cK < bound && cM < bound);
         assert!(worst < 1e-6);
     }
 }
 
 #[test]
 fn beam_of_tetrahedra_equals_calculix() {
-    BEAM_TET.agrees_with_calculix();
+    BEAM_TET.agrees_with_calculix(1e-8); // measured 6.0e-10
 }
 
+/// The stored matrix of this case is itself off by 3.2e-8 under rigid motion: printed digits.
 #[test]
-fn beam_of_bricks_equals_calculix() {
-    BEAM_HEX.agrees_with_calculix();
+fn beam_of_bricks_equals_calculix_to_the_digits_of_its_matrix() {
+    BEAM_HEX.agrees_with_calculix(5e-8); // measured 3.3e-8
 }
 
 #[test]
 fn lower_arm_equals_calculix() {
-    ARM.agrees_with_calculix();
+    ARM.agrees_with_calculix(1e-8); // measured 4.6e-10
+}
+
+/// Truth: frequencies of CalculiX (4-point rule) and of NGSolve (exact) on the same mesh, under three
+/// kinds of support; compliances of NGSolve.
+#[test]
+fn frequencies_of_the_beam_are_those_of_two_other_codes() {
+    let Some(path) = reference("A1_beam/beam_truth.json") else { return };
+    let truth: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
+    let numbers = |value: &serde_json::Value| -> Vec<f64> {
+        value.as_array().unwrap().iter().map(|x| x.as_f64().unwrap()).collect()
+    };
+    for (case, level, code, quadrature) in [
+        (&BEAM_TET, "tet10_h50mm", "ccx", Quadrature::Calculix),
+        (&BEAM_TET, "tet10_h50mm", "ngsolve", Quadrature::Exact),
+        (&BEAM_HEX, "hex20_20x4x2", "ccx", Quadrature::Calculix),
+    ] {
+        let mesh = case.read().unwrap();
+        let (element, _, held, free) = case.reduce(&mesh, quadrature, 10);
+        let truth = &truth["levels"][level][code];
+        for (key, found) in
+            [("fixed_fixed_hz", element.fixed_frequencies_hz()), ("fixed_free_hz", held), ("free_free_hz", free)]
+        {
+            let expected = numbers(&truth[key]);
+            let error = found.iter().zip(&expected).map(|(a, b)| (a / b - 1.0).abs()).fold(0.0, f64::max);
+            eprintln!("{level} {code} {key}: {error:.1e}");
+            assert!(error < 1e-6, "{level} {code} {key}: {error:.1e}");
+        }
+        let K_BB = element.K.view((6, 6), (6, 6)).into_owned();
+        let C = K_BB.try_inverse().unwrap();
+        let rows: Vec<Vec<f64>> = truth["C_BB"].as_array().unwrap().iter().map(numbers).collect();
+        let expected = DMatrix::from_fn(6, 6, |i, j| rows[i][j]);
+        let error = difference(&C, &expected);
+        eprintln!("{level} {code} C_BB: {error:.1e}");
+        assert!(error < 1e-7, "{level} {code}: {error:.1e}");
+    }
+}
+
+/// What the choice of quadrature means on a curved casting; exact is the default.
+#[test]
+fn four_points_on_curved_elements_differ_by_a_ten_thousandth_from_exact_quadrature() {
+    let Some(mesh) = ARM.read() else { return };
+    let (four, _, held_four, _) = ARM.reduce(&mesh, Quadrature::Calculix, 4);
+    let (exact, _, held_exact, _) = ARM.reduce(&mesh, Quadrature::Exact, 4);
+    let (dK, dM) = (difference(&four.guyan().K, &exact.guyan().K), difference(&four.guyan().M, &exact.guyan().M));
+    let df = held_four.iter().zip(&held_exact).map(|(a, b)| (a / b - 1.0).abs()).fold(0.0, f64::max);
+    eprintln!("4-point against exact: K {dK:.1e}, M {dM:.1e}, frequencies {df:.1e}");
+    assert!((1e-6..1e-3).contains(&dK) && (1e-6..1e-3).contains(&dM) && df < 1e-3);
+}
+
+/// Published with the case: the choice of tie matters more than the mesh.
+#[test]
+fn distributing_ties_soften_the_beam_by_a_few_per_cent_and_the_arm_by_a_fifth() {
+    for (case, low, high) in [(&BEAM_TET, 1.01, 1.05), (&ARM, 1.10, 1.26)] {
+        let Some(mesh) = case.read() else { return };
+        let model = FeModel::assemble(&mesh, &AssemblyOptions::default()).unwrap();
+        let compliance = |tie| {
+            let interfaces = interfaces(&mesh, case.a, case.b, tie);
+            let reduction = Condensation::new(&model, &interfaces, CondensationOptions::default()).unwrap();
+            reduction.stiffness().view((6, 6), (6, 6)).into_owned().try_inverse().unwrap().diagonal()
+        };
+        let ratio = compliance(Tie::Distributing).component_div(&compliance(Tie::Rigid));
+        eprintln!("{}: {:.4?}", case.file, ratio.as_slice());
+        assert!(ratio.iter().all(|r| (low..high).contains(r)));
+    }
 }

@@ -2,7 +2,6 @@ use nalgebra::{Matrix3, Rotation3, Vector3, vector};
 
 use super::*;
 use crate::beam::{Beam, BeamTheory};
-use crate::element::edges;
 use crate::material::Material;
 use crate::mesh::{BeamProperties, ElementBlock};
 use crate::section::Section;
@@ -37,15 +36,15 @@ fn difference(part: &RigidPart, other: &RigidPart, whole: &RigidPart) -> f64 {
     mass.max((part.com - other.com).amax() / size).max((part.inertia - other.inertia).amax() / whole.inertia.amax())
 }
 
-/// Reference numbers of the test body A1 (closed form of a box, five digits and more in its file).
+/// Reference numbers of the test body A1 (closed form of a box).
 #[test]
 fn the_beam_a1_is_cut_into_two_equal_halves() {
     let plane = CutPlane { point: vector![0.5, 0.0, 0.0], normal: Vector3::x() };
     for kind in SOLIDS {
         let parts = cut(&uneven_beam(kind), &[RHO], &[plane]).unwrap();
         for (part, x) in parts.iter().zip([0.25, 0.75]) {
-            // measured 5e-9 where the plane is curved in reference coordinates, 1e-15 in tetrahedra
-            let tolerance = if matches!(kind, ElementKind::Tet4 | ElementKind::Tet10) { 1e-13 } else { 1e-7 };
+            // measured 5e-8 where the plane is curved in reference coordinates, 1e-15 in tetrahedra
+            let tolerance = if matches!(kind, ElementKind::Tet4 | ElementKind::Tet10) { 1e-13 } else { 1e-6 };
             assert!((part.mass - 19.625).abs() < tolerance * 19.625, "{}", kind.name());
             assert!((part.com - vector![x, 0.0, 0.0]).amax() < tolerance);
             let inertia = Matrix3::from_diagonal(&vector![0.020_442_708_3, 0.412_942_708_3, 0.425_208_333_3]);
@@ -70,15 +69,14 @@ fn a_box_cut_by_an_oblique_plane_is_the_closed_form() {
     let plane = CutPlane { point: vector![x_0, 0.0, 0.0], normal: 3.0 * vector![1.0, -b, -c] };
     for kind in SOLIDS {
         for (mesh, tolerance) in [
-            (cube(kind, [4, 2, 2], false, beam_a1), 1e-13), // measured 5e-15
-            (uneven_beam(kind), 1e-6),
+            (cube(kind, [4, 2, 2], false, beam_a1), 1e-13), // measured 3e-15
+            (uneven_beam(kind), 1e-7),                      // measured 3e-9, 1e-15 in tetrahedra
         ] {
             let whole = mass_properties(&mesh, &[RHO]).unwrap();
             let parts = cut(&mesh, &[RHO], &[plane]).unwrap();
             let error = difference(&parts[0], &exact, &whole);
-            eprintln!("oblique {} {error:.1e}", kind.name());
             assert!(error < tolerance, "{}: {error:.1e}", kind.name());
-            assert!(difference(&parts[0].merged(&parts[1]), &whole, &whole) < 1e-13); // measured 4e-15
+            assert!(difference(&parts[0].merged(&parts[1]), &whole, &whole) < 1e-13); // measured 3e-16
         }
     }
 }
@@ -96,7 +94,8 @@ fn a_plane_across_a_corner_cuts_off_a_tetrahedron() {
     for kind in SOLIDS {
         let mesh = cube(kind, [3, 2, 2], false, |unit| unit.component_mul(&SIZE));
         let parts = cut(&mesh, &[RHO], &[plane]).unwrap();
-        assert!(difference(&parts[0], &exact, &exact) < 1e-12, "{}", kind.name()); // measured 2e-14
+        // measured 7e-13: a small part is the difference of two large ones
+        assert!(difference(&parts[0], &exact, &exact) < 1e-10, "{}", kind.name());
     }
 }
 
@@ -124,11 +123,10 @@ fn a_bent_bar_of_curved_elements_is_cut_as_the_integral_says() {
     for kind in [ElementKind::Tet10, ElementKind::Hex20, ElementKind::Wedge15] {
         let mesh = cube(kind, [4, 2, 2], true, bend);
         let whole = mass_properties(&mesh, &[RHO]).unwrap();
-        assert!((whole.mass - RHO * l * w * h).abs() < 1e-12 * whole.mass); // det J is one; measured 2e-14
+        assert!((whole.mass - RHO * l * w * h).abs() < 1e-12 * whole.mass); // det J is one; measured 2e-15
         let parts = cut(&mesh, &[RHO], &[plane]).unwrap();
         let error = difference(&parts[1], &exact.rigid_part(), &whole);
-        eprintln!("bent {} {error:.1e}", kind.name());
-        assert!(error < 1e-6, "{}: {error:.1e}", kind.name());
+        assert!(error < 1e-6, "{}: {error:.1e}", kind.name()); // measured 6e-8
     }
 }
 
@@ -156,16 +154,15 @@ fn a_pipe_of_curved_elements_weighs_and_halves_as_a_pipe() {
     };
     for kind in [ElementKind::Tet10, ElementKind::Hex20, ElementKind::Wedge15] {
         let errors = [8, 16].map(|n| difference(&mass_properties(&pipe(kind, n), &[RHO]).unwrap(), &exact, &exact));
-        eprintln!("cyl {} {errors:?}", kind.name());
+        // measured 1.5e-3 and 9.5e-5, a factor of 15.8
+        assert!(errors[1] < 2e-4 && errors[0] > 13.0 * errors[1], "{} {errors:?}", kind.name());
 
         let mesh = pipe(kind, 8);
         let whole = mass_properties(&mesh, &[RHO]).unwrap();
         for normal in [Vector3::x(), vector![0.3, 0.8, 0.4], vector![-0.5, 0.2, 1.0]] {
-            let started = std::time::Instant::now();
             let parts = cut(&mesh, &[RHO], &[CutPlane { point: Vector3::zeros(), normal }]).unwrap();
             let error = (parts[0].mass - 0.5 * whole.mass).abs() / whole.mass;
-            eprintln!("half {} {error:.1e} {:?}", kind.name(), started.elapsed());
-            assert!(error < 1e-6, "{}: {error:.1e}", kind.name());
+            assert!(error < 1e-6, "{}: {error:.1e}", kind.name()); // measured 2e-7
         }
     }
 }
@@ -206,7 +203,7 @@ fn shares_of_the_elements_add_up_to_the_parts() {
             volumes.iter_mut().zip(fractions).for_each(|(sum, fraction)| *sum += fraction * volume);
         }
         for (volume, part) in volumes.iter().zip(&parts) {
-            assert!((volume / part.mass - 1.0).abs() < 1e-12, "{}", kind.name()); // measured 7e-15
+            assert!((volume / part.mass - 1.0).abs() < 1e-12, "{}", kind.name()); // measured 4e-15
         }
     }
 }
@@ -235,7 +232,7 @@ fn a_line_of_beam_elements_is_cut_as_one_beam() {
     let one = Beam::new(section.bar(&Material::STEEL).unwrap(), BeamTheory::Timoshenko, 0.6).unwrap();
     for (part, (from, to)) in parts.iter().zip([(0.0, 0.25 / 0.6), (0.25 / 0.6, 1.0)]) {
         let exact = one.piece(from, to).unwrap().transformed(&crate::Pose::from_parts(Vector3::zeros().into(), R));
-        assert!(difference(part, &exact, &exact) < 1e-13); // measured 4e-16
+        assert!(difference(part, &exact, &exact) < 1e-13); // measured 1.4e-15
     }
     let x = &mesh.nodes[1..3];
     assert!((volume_fractions(ElementKind::Beam2, x, &[plane]).unwrap()[0] - 0.25).abs() < 1e-14);
@@ -245,11 +242,9 @@ fn a_line_of_beam_elements_is_cut_as_one_beam() {
     assert!(matches!(cut(&nameless, &[RHO], &[plane]), Err(CutError::NoSection { .. })));
 }
 
-/// Identity: a body weighs the same in any place, and an inverted element is named by its number.
 #[test]
 fn an_inverted_element_is_named() {
     let mut mesh = uneven_beam(ElementKind::Tet10);
-    assert_eq!(edges(ElementKind::Tet10).len(), 6);
     mesh.blocks[0].connectivity.swap(3, 2);
     assert!(matches!(mass_properties(&mesh, &[RHO]), Err(CutError::Inverted { element: 1, .. })));
 }

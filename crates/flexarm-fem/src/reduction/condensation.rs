@@ -274,7 +274,7 @@ impl<'m> Condensation<'m> {
     }
 
     /// Static shapes: displacement of every DoF for a unit of each boundary DoF.
-    pub fn static_shapes_ref(&self) -> &DMatrix<f64> {
+    pub fn shapes(&self) -> &DMatrix<f64> {
         &self.T
     }
 
@@ -301,9 +301,16 @@ impl<'m> Condensation<'m> {
     pub fn solve_held(&self, F: &mut DMatrix<f64>) {
         let n = self.K_g.nrows();
         let T_B = self.T.columns(6, n - 6).into_owned();
-        let f_B = gram(&T_B, F);
+        let u_B = self.tip_under(F);
         self.solve_constrained(F, None);
-        add_product(F, 1.0, &T_B, &(&self.tip * f_B));
+        add_product(F, 1.0, &T_B, &u_B);
+    }
+
+    /// Displacements of the interfaces but the first under nodal forces, the first one held.
+    pub fn tip_under(&self, F: &DMatrix<f64>) -> DMatrix<f64> {
+        let n = self.K_g.nrows();
+        let T_B = self.T.columns(6, n - 6).into_owned();
+        &self.tip * gram(&T_B, F)
     }
 
     /// Modes with every interface held: those of Craig and Bampton.

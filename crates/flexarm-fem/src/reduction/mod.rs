@@ -18,6 +18,8 @@ mod boundary;
 mod condensation;
 mod grounding;
 mod superelement;
+#[cfg(test)]
+mod tests;
 
 pub use boundary::{Boundary, Interface, Tie, TieError};
 pub use condensation::{Condensation, CondensationOptions, ReductionError, SolverFigures};

@@ -141,7 +141,7 @@ impl Cholesky {
                 for s in 0..raw.n_supernodes() {
                     let columns = (raw.supernode_end()[s] - raw.supernode_begin()[s]) as usize;
                     let values = raw.col_ptr_for_val()[s] as usize..raw.col_ptr_for_val()[s + 1] as usize;
-                    let rows = if columns > 0 { values.len() / columns } else { 0 };
+                    let rows = values.len().checked_div(columns).unwrap_or(0);
                     (0..columns).for_each(|k| see(self.values[values.start + k * rows + k]));
                 }
             }
