@@ -22,7 +22,7 @@ use crate::model::{AssemblyError, AssemblyOptions, FeModel, materials};
 use crate::reduced::{LinkDetails, Provenance, ReducedLink};
 use crate::reduction::{
     Condensation, CondensationOptions, Interface, InterfaceFrame, ReductionError, SolverFigures, Superelement,
-    spd_inverse,
+    spd_inverse, stiffness12,
 };
 use crate::rigid_part::RigidPart;
 use crate::sparse::{Modes, ModesError, ModesWanted};
@@ -194,7 +194,8 @@ pub fn reduce_mesh(
     let whole = mass_properties(mesh, &densities)?;
     let (X_LA, X_LB) = (plan.interfaces[0].X_LI, plan.interfaces[1].X_LI);
     let mut warnings = Vec::new();
-    let K12 = stiffness12(&superelement)?;
+    let loose = FemError::Missing { what: "stiffness of the third interface", help: "it holds nothing" };
+    let K12 = stiffness12(&superelement).ok_or(loose)?;
     let frames = LinkFrames::new(X_LA, X_LB);
     let (frames, parts) = split(mesh, &densities, frames, &K12, plan.split, &mut warnings)?;
     let mut link = ReducedLink::from_matrix12(&plan.name, frames, &K12, parts, plan.provenance.clone(), &plan.limits)?;
@@ -233,21 +234,6 @@ fn check_connected(mesh: &Mesh) -> Result<(), MeshLinkError> {
         list.push("...".into());
     }
     Err(MeshLinkError::Unconnected { parts: parts.len(), list: list.join(", ") })
-}
-
-/// Stiffness of A and B with every other interface free.
-pub fn stiffness12(element: &Superelement) -> Result<Matrix12, MeshLinkError> {
-    let n = element.boundary();
-    let K = element.K.view((0, 0), (n, n));
-    let mut K12 = K.view((0, 0), (12, 12)).into_owned();
-    if n > 12 {
-        let K_cc = K.view((12, 12), (n - 12, n - 12)).into_owned();
-        let K_cb = K.view((12, 0), (n - 12, 12)).into_owned();
-        let loose = FemError::Missing { what: "stiffness of the third interface", help: "it holds nothing" };
-        let C = spd_inverse(&K_cc).ok_or(loose)?;
-        K12 -= K_cb.transpose() * C * K_cb;
-    }
-    Ok(Matrix12::from_column_slice(K12.as_slice()))
 }
 
 /// Split frame and the two parts. The cut is across AB, through S.

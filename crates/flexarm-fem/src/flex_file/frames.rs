@@ -15,20 +15,20 @@ pub(super) fn read_frames(root: &Table<'_, '_>, units: &Units) -> Result<LinkFra
     let interface = node.table()?;
     interface.only(&["A", "B"])?;
     let help = "a link has a proximal interface A and a distal one B";
-    let X_LA = read_pose(&required_table(&interface, "A", help)?, units)?;
-    let X_LB = read_pose(&required_table(&interface, "B", help)?, units)?;
+    let X_LA = read_pose(&required_table(&interface, "A", help)?, units, &[])?;
+    let X_LB = read_pose(&required_table(&interface, "B", help)?, units, &[])?;
     let frames = LinkFrames::new(X_LA, X_LB);
     frames.check().map_err(|cause| refused(&node, cause, "frames in reach of each other"))?;
 
     let Some(node) = root.get("split") else { return Ok(frames) };
-    let frames = frames.with_split(read_pose(&node.table()?, units)?);
+    let frames = frames.with_split(read_pose(&node.table()?, units, &[])?);
     frames.check().map_err(|cause| refused(&node, cause, "a frame on or near the link"))?;
     Ok(frames)
 }
 
-/// Pose from `xyz` and either `rpy`, `rotation` or nothing.
-fn read_pose(table: &Table<'_, '_>, units: &Units) -> Result<Pose, FlexFileError> {
-    table.only(&["xyz", "rpy", "rotation"])?;
+/// Pose from `xyz` and either `rpy`, `rotation` or nothing; `others`: keys that may stand beside them.
+pub(super) fn read_pose(table: &Table<'_, '_>, units: &Units, others: &[&str]) -> Result<Pose, FlexFileError> {
+    table.only(&[&["xyz", "rpy", "rotation"], others].concat())?;
     let p = table.require("xyz", "three numbers, link axes")?.vector()? * units.length;
     let rotation = match (table.get("rpy"), table.get("rotation")) {
         (None, None) => Rotation3::identity(),

@@ -1,5 +1,6 @@
 #![doc = include_str!("format.md")]
 
+mod details;
 mod document;
 mod error;
 mod frames;

@@ -5,6 +5,7 @@ use std::path::Path;
 use nalgebra::{Matrix3, Matrix6};
 use toml::de::DeTable;
 
+use super::details::read_details;
 use super::document::{Document, Node, Table};
 use super::error::{FlexErrorKind, FlexFileError};
 use super::frames::read_frames;
@@ -81,6 +82,9 @@ pub fn parse_flex_with(text: &str, origin: &str, limits: &GateLimits) -> Result<
         "stiffness",
         "provenance",
         "checks",
+        "superelement",
+        "chain",
+        "gate",
         "part",
     ])?;
     let name = root.require("link", "give the name of the link")?.text()?;
@@ -90,6 +94,7 @@ pub fn parse_flex_with(text: &str, origin: &str, limits: &GateLimits) -> Result<
     let parts = read_parts(&root, &units)?;
     let mut link = read_stiffness(&root, &units, name, frames, provenance, parts, limits)?;
     read_checks(&root, &mut link)?;
+    read_details(&root, &units, text, &mut link, limits)?;
     Ok(link)
 }
 
@@ -157,7 +162,7 @@ fn read_parts(root: &Table<'_, '_>, units: &Units) -> Result<[RigidPart; 2], Fle
             let expected = "each part once";
             return Err(name.fail(FlexErrorKind::Part, "a second one", expected, "remove one"));
         }
-        found[which] = Some(read_part(&item, &table, PARTS[which], units)?);
+        found[which] = Some(read_inertial(&item, &table, &format!("the {} part", PARTS[which]), units)?);
     }
     let [Some(proximal), Some(distal)] = found else {
         let missing = if found[0].is_none() { PARTS[0] } else { PARTS[1] };
@@ -167,7 +172,7 @@ fn read_parts(root: &Table<'_, '_>, units: &Units) -> Result<[RigidPart; 2], Fle
     Ok([proximal, distal])
 }
 
-fn read_part(
+pub(super) fn read_inertial(
     item: &Node<'_, '_>,
     table: &Table<'_, '_>,
     name: &str,
@@ -180,8 +185,7 @@ fn read_part(
         inertia.numbers::<6>("numbers: ixx, iyy, izz, ixy, ixz, iyz")?.map(|moment| moment * units.inertia());
 
     let part = RigidPart { mass, com: com * units.length, inertia: Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) };
-    part.check(&format!("the {name} part"))
-        .map_err(|cause| refused(item, cause, "mass and inertia of a possible body"))?;
+    part.check(name).map_err(|cause| refused(item, cause, "mass and inertia of a possible body"))?;
     Ok(part)
 }
 

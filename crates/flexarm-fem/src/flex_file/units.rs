@@ -46,6 +46,10 @@ impl Units {
         Matrix6::from_fn(|i, j| K[(i, j)] * (s[i] * s[j] * (self.force / l)))
     }
 
+    pub(super) fn is_si(&self) -> bool {
+        self.length == 1.0 && self.force == 1.0 && self.mass == 1.0
+    }
+
     pub(super) fn inertia(&self) -> f64 {
         self.mass * self.length * self.length
     }

@@ -31,6 +31,7 @@ pub fn write_flex(link: &ReducedLink) -> String {
     text += "]\n";
 
     text += &checks(link);
+    text += &super::details::write_details(link);
     text += &part("proximal", &link.proximal);
     text += &part("distal", &link.distal);
     text
@@ -53,7 +54,11 @@ fn provenance(p: &Provenance) -> String {
 }
 
 fn pose(name: &str, X: &Pose) -> String {
-    let mut text = format!("\n[{name}]\nxyz = {}\n", numbers(X.translation.vector.iter()));
+    format!("\n[{name}]\n{}", pose_lines(X))
+}
+
+pub(super) fn pose_lines(X: &Pose) -> String {
+    let mut text = format!("xyz = {}\n", numbers(X.translation.vector.iter()));
     let R = X.rotation.matrix();
     let (roll, pitch, yaw) = X.rotation.euler_angles();
     if *Rotation3::from_euler_angles(roll, pitch, yaw).matrix() == *R {
@@ -76,14 +81,13 @@ fn checks(link: &ReducedLink) -> String {
 }
 
 fn part(name: &str, part: &RigidPart) -> String {
+    format!("\n[[part]]\nname = \"{name}\"\n{}", inertial(part))
+}
+
+pub(super) fn inertial(part: &RigidPart) -> String {
     let I = &part.inertia;
     let moments = [I[(0, 0)], I[(1, 1)], I[(2, 2)], I[(0, 1)], I[(0, 2)], I[(1, 2)]];
-    format!(
-        "\n[[part]]\nname = \"{name}\"\nmass = {:?}\ncom = {}\ninertia = {}\n",
-        part.mass,
-        numbers(part.com.iter()),
-        numbers(moments.iter()),
-    )
+    format!("mass = {:?}\ncom = {}\ninertia = {}\n", part.mass, numbers(part.com.iter()), numbers(moments.iter()),)
 }
 
 fn rows(R: &Matrix3<f64>) -> String {
@@ -92,13 +96,13 @@ fn rows(R: &Matrix3<f64>) -> String {
 }
 
 /// `{:?}` prints the shortest text that parses back to the same f64, always with a point or exponent.
-fn numbers<'a>(values: impl Iterator<Item = &'a f64>) -> String {
+pub(super) fn numbers<'a>(values: impl Iterator<Item = &'a f64>) -> String {
     let printed: Vec<_> = values.map(|x| format!("{x:?}")).collect();
     format!("[{}]", printed.join(", "))
 }
 
 /// A TOML basic string.
-fn quoted(text: &str) -> String {
+pub(super) fn quoted(text: &str) -> String {
     let mut result = String::from('"');
     for c in text.chars() {
         match c {

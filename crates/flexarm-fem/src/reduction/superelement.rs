@@ -3,7 +3,8 @@
 use nalgebra::{DMatrix, SymmetricEigen};
 
 use super::boundary::Tie;
-use crate::spatial::Pose;
+use super::condensation::spd_inverse;
+use crate::spatial::{Matrix12, Pose};
 
 /// One interface of a superelement.
 #[derive(Debug, Clone, PartialEq)]
@@ -60,6 +61,19 @@ impl Superelement {
         let top = |A: &DMatrix<f64>| A.view((0, 0), (n, n)).into_owned();
         Self { interfaces: self.interfaces.clone(), K: top(&self.K), M: top(&self.M) }
     }
+}
+
+/// Stiffness of the first two interfaces with every other one free; `None` where another holds nothing.
+pub fn stiffness12(element: &Superelement) -> Option<Matrix12> {
+    let n = element.boundary();
+    let K = element.K.view((0, 0), (n, n));
+    let mut K12 = K.view((0, 0), (12, 12)).into_owned();
+    if n > 12 {
+        let K_cc = K.view((12, 12), (n - 12, n - 12)).into_owned();
+        let K_cb = K.view((12, 0), (n - 12, 12)).into_owned();
+        K12 -= K_cb.transpose() * spd_inverse(&K_cc)? * K_cb;
+    }
+    Some(Matrix12::from_column_slice(K12.as_slice()))
 }
 
 /// Frequencies of a small dense pencil, Hz, ascending; empty where the mass is not positive definite.

@@ -468,3 +468,24 @@ fn the_stiffness_of_a_turned_mesh_is_the_turned_stiffness() {
     assert!(error < 1e-9, "{error:.1e}");
     assert!((moved.whole.com - place(straight.whole.com)).norm() < 1e-12);
 }
+
+/// What a reduction knows survives the file to the last bit.
+#[test]
+fn a_link_with_all_its_details_reads_back_the_same() {
+    let (mesh, interfaces) = casting(ElementKind::Hex20, [Tie::Rigid, Tie::Distributing]);
+    let plan = LinkPlan { chains: vec![2, 4], ..plan(interfaces, STEEL, 5) };
+    let link = reduce_mesh(&mesh, &plan, &mut |_| ()).unwrap().link;
+    let text = crate::write_flex(&link);
+    let back = crate::parse_flex(&text, "test.flex").unwrap();
+    assert_eq!(back.details, link.details);
+    assert_eq!(crate::write_flex(&back), text);
+
+    // An edited superelement contradicts the 6x6.
+    let mut edited = link;
+    if let Some(element) = edited.details.as_mut().and_then(|details| details.superelement.as_mut()) {
+        element.K *= 1.01;
+    }
+    let edited = crate::write_flex(&edited);
+    let error = crate::parse_flex(&edited, "test.flex").unwrap_err().to_string();
+    assert!(error.contains("superelement") && error.contains("differs by 1.0e-2"), "{error}");
+}

@@ -1,0 +1,213 @@
+//! The optional tables of a reduced-link file: `[superelement]`, `[[chain]]` and `[gate]`.
+
+use nalgebra::{DMatrix, Matrix6};
+use serde::Deserialize;
+
+use super::document::{Node, Table};
+use super::error::{FlexErrorKind, FlexFileError};
+use super::frames::read_pose;
+use super::read::{read_inertial, refused};
+use super::units::Units;
+use super::write::{numbers, pose_lines, quoted};
+use crate::chain::Chain;
+use crate::error::FemError;
+use crate::gate::{GateLimits, check_matrix6};
+use crate::mesh_gate::MeshGate;
+use crate::reduced::{ElasticSplit, LinkDetails, ReducedLink};
+use crate::reduction::{InterfaceFrame, Superelement, Tie, stiffness12};
+
+/// Relative difference that `K_BB` and the superelement may have.
+const AGREEMENT: f64 = 1e-6;
+
+/// Modes that a file may carry: far more than any use, far less than fills the memory.
+const MOST_ROWS: usize = 6000;
+
+/// The tables as text; empty without details.
+pub(super) fn write_details(link: &ReducedLink) -> String {
+    let Some(details) = &link.details else { return String::new() };
+    let mut text = String::new();
+    if let Some(element) = &details.superelement {
+        text +=
+            "\n[superelement]                # rows: six per interface, then the modes; link axes\ninterfaces = [\n";
+        for interface in &element.interfaces {
+            let tie = interface.tie.map_or(String::new(), |tie| format!(", tie = \"{}\"", tie.name()));
+            let pose = pose_lines(&interface.X_LI).trim_end().replace('\n', ", ");
+            text += &format!("  {{ name = {}{tie}, {pose} }},\n", quoted(&interface.name));
+        }
+        text += "]\n";
+        text += &matrix("stiffness", &element.K);
+        text += &matrix("mass", &element.M);
+    }
+    for chain in &details.chains {
+        text += &format!("\n[[chain]]                     # {} rigid parts in series\n", chain.parts.len());
+        for joint in &chain.joints {
+            text += &format!("\n[[chain.joint]]\n{}", pose_lines(&joint.X_LS));
+            text += &matrix("stiffness", &DMatrix::from_column_slice(6, 6, joint.K_S.as_slice()));
+        }
+        for part in &chain.parts {
+            text += &format!("\n[[chain.part]]\n{}", super::write::inertial(part));
+        }
+    }
+    if let Some(gate) = details.gate.as_ref().and_then(|gate| toml::to_string(gate).ok()) {
+        // Its own tables become tables of [gate].
+        let body = gate.replace("\n[[", "\n[[gate.").replace("\n[quality]", "\n[gate.quality]");
+        text += &format!("\n[gate]                        # what was checked against the mesh\n{body}");
+    }
+    text
+}
+
+fn matrix(key: &str, A: &DMatrix<f64>) -> String {
+    let rows: String = A.row_iter().map(|row| format!("  {},\n", numbers(row.iter()))).collect();
+    format!("{key} = [\n{rows}]\n")
+}
+
+/// Reads the optional tables into `link`.
+pub(super) fn read_details(
+    root: &Table<'_, '_>,
+    units: &Units,
+    text: &str,
+    link: &mut ReducedLink,
+    limits: &GateLimits,
+) -> Result<(), FlexFileError> {
+    let mut details = LinkDetails::default();
+    for (key, found) in [("superelement", root.get("superelement")), ("chain", root.get("chain"))] {
+        if let Some(node) = found.filter(|_| !units.is_si()) {
+            let (found, help) = (units.names.clone(), format!("convert the numbers, or leave [{key}] out"));
+            return Err(node.fail(FlexErrorKind::Unit, found, "m, N, kg: these tables are in SI only", help));
+        }
+    }
+    if let Some(node) = root.get("superelement") {
+        details.superelement = Some(read_superelement(&node, units, link, limits)?);
+    }
+    if let Some(node) = root.get("chain") {
+        for item in node.list()? {
+            details.chains.push(read_chain(&item, units)?);
+        }
+    }
+    if let Some(node) = root.get("gate") {
+        #[derive(Deserialize)]
+        struct OnlyGate {
+            gate: MeshGate,
+        }
+        let parsed: Result<OnlyGate, _> = toml::from_str(text);
+        let gate = parsed.map_err(|error| {
+            let found = error.message().to_owned();
+            node.fail(FlexErrorKind::WrongType, found, "the table that `flexarm reduce` writes", "remove it")
+        })?;
+        details.gate = Some(gate.gate);
+    }
+    if details != LinkDetails::default() {
+        link.details = Some(Box::new(details));
+    }
+    Ok(())
+}
+
+fn read_superelement(
+    node: &Node<'_, '_>,
+    units: &Units,
+    link: &ReducedLink,
+    limits: &GateLimits,
+) -> Result<Superelement, FlexFileError> {
+    let table = node.table()?;
+    table.only(&["interfaces", "stiffness", "mass"])?;
+    let mut interfaces = Vec::new();
+    let list = table.require("interfaces", "the interfaces, proximal first")?;
+    for item in list.list()? {
+        let entry = item.table()?;
+        let name = entry.require("name", "the name of the interface")?.text()?.to_owned();
+        let tie = match entry.get("tie") {
+            None => None,
+            Some(word) => Some(match word.word(&["rigid", "distributing"], "how it is tied")? {
+                "rigid" => Tie::Rigid,
+                _ => Tie::Distributing,
+            }),
+        };
+        interfaces.push(InterfaceFrame { name, X_LI: read_pose(&entry, units, &["name", "tie"])?, tie });
+    }
+    if interfaces.len() < 2 {
+        let found = format!("{} interface(s)", interfaces.len());
+        return Err(list.fail(FlexErrorKind::WrongSize, found, "two or more", "A and B first"));
+    }
+    let K = read_dense(&table, "stiffness", 6 * interfaces.len())?;
+    let M = read_dense(&table, "mass", 6 * interfaces.len())?;
+    if K.nrows() != M.nrows() {
+        let found = format!("{} rows of stiffness, {} of mass", K.nrows(), M.nrows());
+        return Err(node.fail(FlexErrorKind::WrongSize, found, "as many of both", "is the file cut off?"));
+    }
+    for (key, A) in [("stiffness", &K), ("mass", &M)] {
+        let gap = (A - A.transpose()).amax() / A.amax().max(f64::MIN_POSITIVE);
+        if !(gap <= limits.asymmetry) {
+            let found = format!("an asymmetry of {gap:.1e}");
+            return Err(node.fail(FlexErrorKind::Link, found, format!("a symmetric {key}"), ""));
+        }
+    }
+    let element = Superelement { interfaces, K, M };
+    agrees(&element, link).map_err(|found| {
+        node.fail(FlexErrorKind::Link, found, "the same K_BB as in [stiffness]", "was one of them edited?")
+    })?;
+    Ok(element)
+}
+
+/// The superelement must say the same as the 6×6 of its link.
+fn agrees(element: &Superelement, link: &ReducedLink) -> Result<(), String> {
+    for (k, X) in [(0, &link.X_LA), (1, &link.X_LB)] {
+        let gap = (element.interfaces[k].X_LI.translation.vector - X.translation.vector).norm();
+        if !(gap <= 1e-9) {
+            return Err(format!("interface {:?} is {gap:.1e} m from the one of the link", element.interfaces[k].name));
+        }
+    }
+    let K = stiffness12(element).ok_or("a singular stiffness")?;
+    let s = link.K_BB.diagonal().map(f64::sqrt);
+    let gap = Matrix6::from_fn(|i, j| (K[(6 + i, 6 + j)] - link.K_BB[(i, j)]).abs() / (s[i] * s[j])).amax();
+    if gap <= AGREEMENT { Ok(()) } else { Err(format!("a K_BB that differs by {gap:.1e}")) }
+}
+
+/// A square matrix of at least `smallest` rows.
+fn read_dense(table: &Table<'_, '_>, key: &str, smallest: usize) -> Result<DMatrix<f64>, FlexFileError> {
+    let node = table.require(key, "one array per row")?;
+    let rows = node.list()?;
+    let n = rows.len();
+    if n < smallest || n > MOST_ROWS {
+        let expected = format!("{smallest} to {MOST_ROWS} rows: six per interface, then the modes");
+        return Err(node.fail(FlexErrorKind::WrongSize, format!("{n} rows"), expected, "is the file cut off?"));
+    }
+    let mut A = DMatrix::zeros(n, n);
+    for (i, row) in rows.iter().enumerate() {
+        for (j, entry) in row.items(n, "numbers in each row")?.iter().enumerate() {
+            A[(i, j)] = entry.number()?;
+        }
+    }
+    Ok(A)
+}
+
+fn read_chain(node: &Node<'_, '_>, units: &Units) -> Result<Chain, FlexFileError> {
+    let table = node.table()?;
+    table.only(&["joint", "part"])?;
+    let (mut joints, mut parts) = (Vec::new(), Vec::new());
+    for item in table.require("joint", "one [[chain.joint]] between two parts")?.list()? {
+        let joint = item.table()?;
+        let X_LS = read_pose(&joint, units, &["stiffness"])?;
+        let K = read_dense(&joint, "stiffness", 6)?;
+        if K.nrows() != 6 {
+            let found = format!("{} rows", K.nrows());
+            return Err(item.fail(FlexErrorKind::WrongSize, found, "6 rows", "a joint has six components"));
+        }
+        let K = Matrix6::from_column_slice(K.as_slice());
+        let expected = "a symmetric, positive definite stiffness";
+        let (K_S, _) =
+            check_matrix6("K_S", &K, &GateLimits::default()).map_err(|cause| refused(&item, cause, expected))?;
+        joints.push(ElasticSplit { X_LS, K_S });
+    }
+    for item in table.require("part", "one [[chain.part]] per rigid part")?.list()? {
+        let part = item.table()?;
+        part.only(&["mass", "com", "inertia"])?;
+        parts.push(read_inertial(&item, &part, "a part of the chain", units)?);
+    }
+    if parts.len() != joints.len() + 1 {
+        let found = format!("{} parts and {} joints", parts.len(), joints.len());
+        let cause = FemError::Missing { what: "a part or a joint", help: "n parts are joined by n - 1 joints" };
+        let error = node.fail(FlexErrorKind::WrongSize, found, "one part more than joints", "is the file cut off?");
+        return Err(FlexFileError { source: Some(Box::new(cause)), ..error });
+    }
+    Ok(Chain { joints, parts })
+}
