@@ -17,10 +17,10 @@ use nalgebra::{DMatrix, SymmetricEigen};
 use super::dense::{add_product, gram};
 
 /// Residual `‖K⁻¹ M φ - θ φ‖_M / θ` at which a mode counts as found.
-const TOLERANCE: f64 = 1e-11;
+const TOLERANCE: f64 = 1e-10;
 
 /// Columns of one block.
-const BLOCK: usize = 8;
+const BLOCK: usize = 4;
 
 /// Which modes are asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,0 +1,144 @@
+//! Matrices without a header: `node,dof,node,dof,value`, `row column value`, and lists of rows.
+//!
+//! Abaqus `*MATRIX OUTPUT` and newer CalculiX write the first, Abaqus `COORDINATE` and CalculiX
+//! `.sti`/`.mas` the second. Either triangle or both may be there.
+
+use std::collections::{BTreeSet, HashMap};
+
+use super::error::{ExchangeError, ExchangeErrorKind};
+use super::matrix::{DofLabel, LabelledMatrix, Storage, Triplets};
+use super::text::{Text, shown, words};
+
+/// Lines with data: no comments, no empty ones.
+fn data<'a>(text: &Text<'a>) -> impl Iterator<Item = (super::error::Place<'a>, &'a str)> + use<'a> {
+    text.lines().filter(|(_, line)| !line.starts_with("**") && !line.trim().is_empty())
+}
+
+/// Reads `node,dof,node,dof,value` (commas or blanks); rows are sorted by node and component.
+///
+/// Returns a sentence about internal unknowns (negative labels), if there are any.
+pub(super) fn parse_labelled(text: Text<'_>) -> Result<(LabelledMatrix, Option<String>), ExchangeError> {
+    let mut entries = Vec::new();
+    for (place, line) in data(&text) {
+        let mut values = words(line);
+        let mut label = |what| -> Result<DofLabel, ExchangeError> {
+            let node = place.integer(what, place.word(what, &mut values)?)?;
+            let dof = place.word("degree of freedom", &mut values)?;
+            let range = || place.fail(ExchangeErrorKind::Syntax, "degree of freedom", shown(dof), "0 to 255", "");
+            Ok(DofLabel::new(node, dof.parse().map_err(|_| range())?))
+        };
+        let (row, column) = (label("node of the row")?, label("node of the column")?);
+        let value = place.number("entry", place.word("entry", &mut values)?)?;
+        place.end(&mut values)?;
+        entries.push((row, column, value, place));
+    }
+
+    let labels: BTreeSet<DofLabel> = entries.iter().flat_map(|(row, column, ..)| [*row, *column]).collect();
+    // Nodes of the mesh first, internal ones (negative) last.
+    let (internal, mesh): (Vec<DofLabel>, Vec<_>) = labels.into_iter().partition(|label| label.node < Some(0));
+    let warning = internal.last().map(|last| {
+        format!(
+            "{} rows have negative node numbers ({last}, ...): internal unknowns of Abaqus (Lagrange multipliers of \
+             ties, hybrid elements, or modal coordinates of a substructure); they stand last",
+            internal.len()
+        )
+    });
+    let rows: Vec<_> = mesh.into_iter().chain(internal.into_iter().rev()).collect();
+    let index: HashMap<DofLabel, usize> = rows.iter().enumerate().map(|(i, label)| (*label, i)).collect();
+    let mut triplets = Triplets::default();
+    for (row, column, value, place) in entries {
+        triplets.push(index[&row], index[&column], value, &place);
+    }
+    if rows.is_empty() {
+        return Err(text.file().fail(ExchangeErrorKind::Missing, "matrix", "no entries", "at least one", ""));
+    }
+    Ok((triplets.symmetric("the matrix", text.origin, rows, Storage::BySize)?, warning))
+}
+
+/// Reads `row column value`, rows from 1; they have no labels.
+pub(super) fn parse_coordinate(text: Text<'_>, storage: Storage) -> Result<LabelledMatrix, ExchangeError> {
+    let mut triplets = Triplets::default();
+    for (place, line) in data(&text) {
+        let mut values = words(line);
+        let row = place.index("row", place.word("row", &mut values)?)?;
+        let column = place.index("column", place.word("column", &mut values)?)?;
+        let value = place.number("entry", place.word("entry", &mut values)?)?;
+        place.end(&mut values)?;
+        triplets.push(row, column, value, &place);
+    }
+    let rows = triplets.unlabelled(triplets.extent(), &text.file())?;
+    triplets.symmetric("the matrix", text.origin, rows, storage)
+}
+
+/// Reads a CalculiX `.dof`: one `node.dof` per row. It is text: `10.1` and `10.10` differ.
+pub(super) fn parse_dof_list(text: Text<'_>) -> Result<Vec<DofLabel>, ExchangeError> {
+    let mut rows = Vec::new();
+    for (place, line) in data(&text) {
+        let label = line
+            .trim()
+            .split_once('.')
+            .and_then(|(node, dof)| Some(DofLabel::new(node.parse().ok()?, dof.parse().ok()?)));
+        let wrong = || place.fail(ExchangeErrorKind::Syntax, "row", shown(line), "node.dof, such as 948.3", "");
+        rows.push(label.ok_or_else(wrong)?);
+    }
+    Ok(rows)
+}
+
+/// Reads an ANSYS `.mapping`: `equation node label`, with labels such as `UX` and `ROTX`.
+pub(super) fn parse_equation_mapping(text: Text<'_>) -> Result<Vec<DofLabel>, ExchangeError> {
+    const COMPONENTS: [&str; 6] = ["UX", "UY", "UZ", "ROTX", "ROTY", "ROTZ"];
+    let mut rows = Vec::new();
+    for (place, line) in data(&text).skip(1) {
+        let mut values = words(line);
+        let equation = place.index("equation", place.word("equation", &mut values)?)?;
+        if equation != rows.len() {
+            let (found, expected) = (format!("{}", equation + 1), format!("{}", rows.len() + 1));
+            return Err(place.fail(ExchangeErrorKind::Syntax, "equation", found, expected, "equations in order"));
+        }
+        let node = place.integer("node", place.word("node", &mut values)?)?;
+        let name = place.word("DOF", &mut values)?;
+        let dof = COMPONENTS.iter().position(|known| name.eq_ignore_ascii_case(known));
+        let wrong = || {
+            let help = "only displacements and rotations can be taken over";
+            place.fail(ExchangeErrorKind::Unsupported, "DOF", shown(name), COMPONENTS.join(", "), help)
+        };
+        rows.push(DofLabel::new(node, dof.ok_or_else(wrong)? as u8 + 1));
+    }
+    Ok(rows)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn commas_and_blanks_and_either_triangle_read_alike() {
+        for text in [
+            "1,1, 1,1, 4.0\n1,2, 1,1, -1.5\n1,2, 1,2, 3.0\n",
+            "1 1 1 1 4.0\n1 1 1 2 -1.5\n1 2 1 2 3.0\n",
+            "** note\n1,1,1,1,4.\r\n1,1,1,2,-1.5\r\n1,2,1,1,-1.5\r\n1,2,1,2,3\r\n",
+        ] {
+            let (matrix, warning) = parse_labelled(Text::new(text, "t")).unwrap();
+            assert_eq!(matrix.dense().unwrap().as_slice(), [4.0, -1.5, -1.5, 3.0]);
+            assert_eq!(matrix.rows, [DofLabel::new(1, 1), DofLabel::new(1, 2)]);
+            assert_eq!(warning, None);
+        }
+    }
+
+    #[test]
+    fn internal_unknowns_of_abaqus_stand_last_and_are_reported() {
+        let text = "-2,1,-2,1,7\n-1,1,-1,1,6\n5,1,5,1,4\n5,1,-1,1,1\n";
+        let (matrix, warning) = parse_labelled(Text::new(text, "t")).unwrap();
+        let nodes: Vec<_> = matrix.rows.iter().map(|label| label.node.unwrap()).collect();
+        assert_eq!(nodes, [5, -1, -2]);
+        assert!(warning.unwrap().contains("2 rows have negative node numbers"));
+    }
+
+    #[test]
+    fn a_dof_list_is_text_and_not_numbers() {
+        let rows = parse_dof_list(Text::new("10.1\n10.10\n\n", "job.dof")).unwrap();
+        assert_eq!(rows, [DofLabel::new(10, 1), DofLabel::new(10, 10)]);
+        let error = parse_dof_list(Text::new("10.1\n10\n", "job.dof")).unwrap_err();
+        assert!(error.to_string().starts_with("job.dof:2: row: found \"10\""), "{error}");
+    }
+}

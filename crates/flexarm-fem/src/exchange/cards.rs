@@ -1,0 +1,86 @@
+//! Nastran bulk data: physical lines in small, large or free field put together to entries.
+
+use super::error::{ExchangeError, ExchangeErrorKind, Place};
+use super::text::{Text, shown};
+
+/// One entry with all its continuation lines.
+#[derive(Debug)]
+pub(super) struct Card<'a> {
+    /// The first line.
+    pub(super) place: Place<'a>,
+    /// Keyword without `*`, upper case.
+    pub(super) keyword: String,
+    /// Data fields after the keyword: eight per line, four per line in large field.
+    pub(super) fields: Vec<(&'a str, usize)>,
+}
+
+impl<'a> Card<'a> {
+    /// A data field, from 0; empty if it is not there.
+    pub(super) fn field(&self, i: usize) -> &'a str {
+        self.fields.get(i).map_or("", |(text, _)| text)
+    }
+
+    /// The line of a field.
+    pub(super) fn place_of(&self, i: usize) -> Place<'a> {
+        let line = self.fields.get(i).map(|(_, line)| *line).or(self.place.line);
+        Place { line, ..self.place }
+    }
+}
+
+/// The entries with one of these keywords, in the order of the file.
+pub(super) fn cards<'a>(text: Text<'a>, keywords: &[&str]) -> Result<Vec<Card<'a>>, ExchangeError> {
+    let mut cards: Vec<Card<'_>> = Vec::new();
+    let mut skipping = true;
+    for (place, line) in text.lines() {
+        let line = line.split('$').next().unwrap_or("").trim_end();
+        if line.is_empty() {
+            continue;
+        }
+        let (head, fields, beyond) = fields(line);
+        let number = place.line.unwrap_or(0);
+        let fields = fields.into_iter().map(|field| (field, number));
+        let is_continuation = head.is_empty() || head.starts_with(['*', '+']);
+        if !is_continuation {
+            let keyword = head.trim_end_matches('*').trim().to_ascii_uppercase();
+            skipping = !keywords.contains(&keyword.as_str());
+            if !skipping {
+                cards.push(Card { place, keyword, fields: Vec::new() });
+            }
+        }
+        let Some(card) = cards.last_mut().filter(|_| !skipping) else { continue };
+        if let Some(beyond) = beyond {
+            let (found, help) = (shown(beyond), "put the rest on a line of its own that begins with a comma");
+            return Err(place.fail(ExchangeErrorKind::Syntax, "free field", found, "ten fields in a line", help));
+        }
+        card.fields.extend(fields);
+    }
+    Ok(cards)
+}
+
+/// First field and data fields of a line, padded to eight (small) or four (large field), and what is too much.
+fn fields(line: &str) -> (&str, Vec<&str>, Option<&str>) {
+    const SMALL: usize = 8;
+    const LARGE: usize = 4;
+    let (head, mut data, count) = if line.contains(',') {
+        let mut parts = line.split(',').map(str::trim);
+        let head = parts.next().unwrap_or("");
+        let count = if head.contains('*') { LARGE } else { SMALL };
+        (head, parts.collect::<Vec<_>>(), count)
+    } else {
+        let head = columns(line, 0, 8);
+        let count = if head.contains('*') { LARGE } else { SMALL };
+        let width = 64 / count;
+        let data = (0..count).map(|i| columns(line, 8 + i * width, width)).collect();
+        (head, data, count)
+    };
+    // One more is the name of the continuation.
+    let beyond = data.iter().skip(count + 1).find(|field| !field.is_empty()).copied();
+    data.resize(count, "");
+    (head, data, beyond)
+}
+
+/// Columns of a line without blanks around; what is beyond its end, or no ASCII, is empty.
+fn columns(line: &str, first: usize, width: usize) -> &str {
+    let end = (first + width).min(line.len());
+    line.get(first..end).unwrap_or("").trim()
+}

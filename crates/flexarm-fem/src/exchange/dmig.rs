@@ -1,0 +1,272 @@
+//! Nastran DMIG entries, in large, small and free field: bulk data, `.pch` of EXTSEOUT and others.
+//!
+//! One file may hold several matrices (KAAX, MAAX, BAAX, ...). GRID entries give positions. Entries
+//! hold either triangle, mixed; zero columns are absent. Matrices are in the *displacement* frame of
+//! each grid (field CD of GRID), which a warning recalls where it is not the basic one.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+
+use nalgebra::Vector3;
+
+use super::cards::{Card, cards};
+use super::error::{ExchangeError, ExchangeErrorKind, Place};
+use super::matrix::{DofLabel, LabelledMatrix, Storage, Triplets};
+use super::text::{Text, shown};
+
+/// What a file of DMIG entries holds.
+#[derive(Debug, Default)]
+pub(super) struct Dmig {
+    pub(super) matrices: Vec<LabelledMatrix>,
+    pub(super) positions: BTreeMap<i64, Vector3<f64>>,
+    pub(super) warnings: Vec<String>,
+}
+
+struct RawMatrix<'a> {
+    name: String,
+    header: Place<'a>,
+    entries: Vec<(DofLabel, DofLabel, f64, Place<'a>)>,
+}
+
+/// Reads all matrices that can be a stiffness or a mass; others are named in the warnings.
+pub(super) fn parse(text: Text<'_>) -> Result<Dmig, ExchangeError> {
+    let mut result = Dmig::default();
+    let mut matrices: Vec<RawMatrix<'_>> = Vec::new();
+    let mut index: HashMap<String, usize> = HashMap::new();
+    for card in cards(text, &["DMIG", "GRID"])? {
+        match card.keyword.as_str() {
+            "GRID" => parse_grid(&card, &mut result)?,
+            "DMIG" => {
+                let name = card.field(0).to_ascii_uppercase();
+                match index.get(&name) {
+                    None => {
+                        check_header(&card, &name)?;
+                        index.insert(name.clone(), matrices.len());
+                        matrices.push(RawMatrix { name, header: card.place, entries: Vec::new() });
+                    }
+                    Some(i) => parse_column(&card, &mut matrices[*i])?,
+                }
+            }
+            _ => {}
+        }
+    }
+    for raw in matrices {
+        match assemble(raw, text)? {
+            Ok(matrix) => result.matrices.push(matrix),
+            Err(warning) => result.warnings.push(warning),
+        }
+    }
+    Ok(result)
+}
+
+/// `DMIG NAME 0 IFO TIN TOUT POLAR _ NCOL`.
+fn check_header(card: &Card<'_>, name: &str) -> Result<(), ExchangeError> {
+    let place = card.place;
+    let is_header = card.field(1) == "0" && !card.field(2).is_empty();
+    if name.is_empty() || !is_header {
+        let element = format!("DMIG {name}");
+        let expected = "its header first: DMIG, NAME, 0, IFO, TIN";
+        return Err(place.fail(ExchangeErrorKind::Syntax, element, "a column", expected, "is the file cut off?"));
+    }
+    let refuse = |what, field: &str, expected, help| {
+        let element = format!("DMIG {name}, {what}");
+        Err(place.fail(ExchangeErrorKind::Unsupported, element, shown(field), expected, help))
+    };
+    match card.field(2) {
+        "1" | "2" | "6" | "9" => {}
+        form => return refuse("IFO", form, "1 (square), 6 (symmetric), 2 or 9 (rectangular)", ""),
+    }
+    match card.field(3) {
+        "1" | "2" | "" => Ok(()),
+        kind @ ("3" | "4") => refuse("TIN", kind, "1 or 2 (real)", "complex: give structural damping as damping"),
+        kind => refuse("TIN", kind, "1 or 2 (real)", ""),
+    }
+}
+
+/// `DMIG NAME GJ CJ _ (Gi Ci Ai Bi)...`.
+fn parse_column<'a>(card: &Card<'a>, matrix: &mut RawMatrix<'a>) -> Result<(), ExchangeError> {
+    let column = label(&card.place, "column", card.field(1), card.field(2))?;
+    let place_of = |i: usize| card.place_of(i);
+    for first in (4..card.fields.len()).step_by(4) {
+        let [node, dof, value, imaginary] = std::array::from_fn(|i| card.field(first + i));
+        if node.is_empty() && dof.is_empty() && value.is_empty() {
+            continue;
+        }
+        let place = place_of(first);
+        let row = label(&place, "row", node, dof)?;
+        let element = format!("DMIG {}, row {row}, column {column}", matrix.name);
+        if !imaginary.is_empty() && place.number(&element, imaginary)? != 0.0 {
+            let (found, kind) = (shown(imaginary), ExchangeErrorKind::Unsupported);
+            return Err(place.fail(kind, element, found, "no imaginary part", ""));
+        }
+        matrix.entries.push((row, column, place.number(&element, value)?, place));
+    }
+    Ok(())
+}
+
+fn label(place: &Place<'_>, what: &str, node: &str, dof: &str) -> Result<DofLabel, ExchangeError> {
+    let node = place.integer(what, node)?;
+    let component = match dof {
+        "" => Some(0),
+        dof => dof.parse::<u8>().ok().filter(|dof| *dof <= 6),
+    };
+    let wrong = || {
+        let element = format!("component of the {what}");
+        place.fail(ExchangeErrorKind::Syntax, element, shown(dof), "1 to 6, or 0 for a scalar point", "")
+    };
+    component.map(|dof| DofLabel::new(node, dof)).ok_or_else(wrong)
+}
+
+/// `GRID ID CP X1 X2 X3 CD`.
+fn parse_grid(card: &Card<'_>, result: &mut Dmig) -> Result<(), ExchangeError> {
+    let place = card.place;
+    let id = place.integer("GRID number", card.field(0))?;
+    let mut p = Vector3::zeros();
+    for i in 0..3 {
+        let text = card.field(2 + i);
+        p[i] = if text.is_empty() { 0.0 } else { place.number("GRID position", text)? };
+    }
+    let other = |field: &str| !matches!(field, "" | "0");
+    if other(card.field(1)) {
+        let system = card.field(1);
+        result.warnings.push(format!("GRID {id} is given in coordinate system {system}: its position is not used"));
+    } else {
+        result.positions.insert(id, p);
+    }
+    if other(card.field(5)) {
+        result.warnings.push(format!(
+            "the displacements of GRID {id} are in coordinate system {}: give the axes of the interface frame so",
+            card.field(5)
+        ));
+    }
+    Ok(())
+}
+
+/// The symmetric matrix, or a sentence why it can be none.
+fn assemble(raw: RawMatrix<'_>, text: Text<'_>) -> Result<Result<LabelledMatrix, String>, ExchangeError> {
+    let RawMatrix { name, header, entries } = raw;
+    let rows: BTreeSet<DofLabel> = entries.iter().map(|(row, ..)| *row).collect();
+    let columns: BTreeSet<DofLabel> = entries.iter().map(|(_, column, ..)| *column).collect();
+    if entries.is_empty() {
+        return Ok(Err(format!("DMIG {name} (line {}) has no entries", header.line.unwrap_or(0))));
+    }
+    // Columns that are numbers instead of grids: loads and other rectangular matrices.
+    if rows.is_disjoint(&columns) {
+        return Ok(Err(format!("DMIG {name} is rectangular and was left out")));
+    }
+    // Grids first, scalar points (modal coordinates) after them, each in rising order.
+    let mut labels: Vec<DofLabel> = rows.union(&columns).copied().collect();
+    labels.sort_by_key(|label| (label.dof == 0, *label));
+    let index: HashMap<DofLabel, usize> = labels.iter().enumerate().map(|(i, label)| (*label, i)).collect();
+    let mut triplets = Triplets::default();
+    for (row, column, value, place) in &entries {
+        triplets.push(index[row], index[column], *value, place);
+    }
+    triplets.symmetric(&name, text.origin, labels, Storage::BySize).map(Ok)
+}
+
+/// Matrices as DMIG entries in large field: ten significant digits, relative error 5e-10.
+///
+/// * `matrices`: names, such as `KAAX` (cut to eight characters), with their matrices.
+/// * `rows`: node and component of each row; scalar points have component 0. Every row needs a node.
+/// * `positions`: written as GRID entries.
+///
+/// # Panics
+/// If a matrix does not have as many rows and columns as there are `rows`.
+pub fn write_dmig(
+    matrices: &[(&str, &nalgebra::DMatrix<f64>)],
+    rows: &[DofLabel],
+    positions: &BTreeMap<i64, Vector3<f64>>,
+) -> String {
+    let mut text = String::from("$ written by flexarm\n");
+    for (id, p) in positions {
+        text += &format!("GRID*   {id:16}{:16}{}{}\n", "", large(p.x), large(p.y));
+        text += &format!("*       {}\n", large(p.z));
+    }
+    let points: Vec<_> = rows.iter().filter(|label| label.dof == 0).filter_map(|label| label.node).collect();
+    for point in points {
+        text += &format!("SPOINT  {point:8}\n");
+    }
+    for (name, matrix) in matrices {
+        assert_eq!(matrix.shape(), (rows.len(), rows.len()), "a label for every row of {name}");
+        text += &format!("DMIG    {name:8.8}{:8}{:8}{:8}{:8}\n", 0, 6, 2, 0);
+        for (j, column) in rows.iter().enumerate() {
+            let below: Vec<usize> = (j..rows.len()).filter(|&i| matrix[(i, j)] != 0.0).collect();
+            if below.is_empty() {
+                continue;
+            }
+            text += &format!("DMIG*   {name:<16.8}{:16}{:16}\n", column.node.unwrap_or(0), column.dof);
+            for i in below {
+                let row = rows[i];
+                text += &format!("*       {:16}{:16}{}\n", row.node.unwrap_or(0), row.dof, large(matrix[(i, j)]));
+            }
+        }
+    }
+    text
+}
+
+/// A number in 16 columns, nine decimals, with D exponent.
+fn large(value: f64) -> String {
+    super::user_element::fortran(value, 9, 16).replace('E', "D")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LARGE: &str = "\
+$ note
+GRID          11             0.0     0.5    1.-3
+DMIG    KAAX           0       6       2       0
+DMIG*   KAAX                          11               1
+*                     11               1 4.000000000D+00
+*                     12               0-1.500000000D+00
+DMIG*   KAAX                          12               0
+*                     12               0 3.000000000D+00
+";
+    const SMALL: &str = "\
+DMIG    KAAX    0       1       1       0
+DMIG    KAAX    11      1               11      1       4.0
+        12      0       -1.5
+DMIG    KAAX    12      0               12      0       3.0+0
++       11      1       -15.-1
+";
+    const FREE: &str = "\
+DMIG,KAAX,0,6,2
+DMIG,KAAX,11,1,,11,1,4.
+,12,,-1.5,,
+DMIG*,KAAX,12,0,
+*,12,0,3.D0
+";
+
+    #[test]
+    fn large_small_and_free_field_read_alike() {
+        for text in [LARGE.to_owned(), SMALL.to_owned(), FREE.to_owned(), LARGE.replace('\n', "\r\n")] {
+            let dmig = parse(Text::new(&text, "t.pch")).unwrap();
+            let K = &dmig.matrices[0];
+            assert_eq!(K.dense().unwrap().as_slice(), [4.0, -1.5, -1.5, 3.0], "{text}");
+            assert_eq!(K.rows, [DofLabel::new(11, 1), DofLabel::new(12, 0)]);
+        }
+        let dmig = parse(Text::new(LARGE, "t.pch")).unwrap();
+        assert_eq!(dmig.positions[&11], Vector3::new(0.0, 0.5, 1e-3));
+    }
+
+    #[test]
+    fn complex_matrices_are_refused_and_rectangular_ones_left_out() {
+        let complex = LARGE.replace("       2       0\n", "       4       0\n");
+        let error = parse(Text::new(&complex, "t.pch")).unwrap_err();
+        assert!(error.to_string().contains("t.pch:3: DMIG KAAX, TIN: found \"4\""), "{error}");
+        let loads = "DMIG,PAX,0,9,2,0,,,2\nDMIG,PAX,1,0,,11,1,5.\nDMIG,PAX,2,0,,11,2,6.\n";
+        let dmig = parse(Text::new(loads, "t.pch")).unwrap();
+        assert!(dmig.matrices.is_empty() && dmig.warnings[0].contains("PAX is rectangular"));
+    }
+
+    #[test]
+    fn a_column_without_header_and_a_bad_value_are_named_with_line() {
+        let error = parse(Text::new("DMIG*   KAAX                          11               1\n", "t")).unwrap_err();
+        assert!(error.to_string().contains("its header first"), "{error}");
+        let bad = LARGE.replace("-1.500000000D+00", "-1.5O0000000D+00");
+        let error = parse(Text::new(&bad, "t")).unwrap_err();
+        assert_eq!(error.line, Some(6));
+        assert!(error.element.contains("row 12:0, column 11:1"), "{error}");
+    }
+}

@@ -1,0 +1,49 @@
+//! Fortran edit descriptors: `(8I10)`, `(1P,3E25.16)`, `1P5D16.9`, and the fields they cut out.
+
+use super::error::{ExchangeError, ExchangeErrorKind, Place};
+use super::text::shown;
+
+/// Repeated fields of one width.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Format {
+    /// Columns of each field.
+    pub(super) width: usize,
+}
+
+/// Reads the last descriptor of a format.
+pub(super) fn parse_format(text: &str, place: &Place<'_>) -> Result<Format, ExchangeError> {
+    let upper = text.to_ascii_uppercase();
+    let width = upper.rfind(['I', 'E', 'D', 'F', 'G']).and_then(|letter| {
+        let digits: String = upper[letter + 1..].chars().take_while(char::is_ascii_digit).collect();
+        digits.parse().ok().filter(|width| (1..=80).contains(width))
+    });
+    let expected = "a Fortran format such as (3E25.16)";
+    let wrong = || place.fail(ExchangeErrorKind::Syntax, "format", shown(text), expected, "");
+    width.map(|width| Format { width }).ok_or_else(wrong)
+}
+
+impl Format {
+    /// The fields of a line; blank ones at its end are left out.
+    pub(super) fn fields<'l>(&self, line: &'l str) -> impl Iterator<Item = &'l str> + use<'l> {
+        // Columns are bytes: a line with other characters than ASCII has no numbers after them.
+        let line = if line.is_ascii() { line.trim_end() } else { "" };
+        let width = self.width;
+        (0..line.len().div_ceil(width)).map(move |i| line[i * width..line.len().min((i + 1) * width)].trim())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn formats_give_their_width() {
+        for (text, width) in [("(8I10)", 10), ("(3E25.16)", 25), ("1P,3E23.16", 23), ("(1P5D16.9)", 16), ("5e16.9", 16)]
+        {
+            assert_eq!(parse_format(text, &Place::file("t")).unwrap().width, width, "{text}");
+        }
+        assert!(parse_format("(A8)", &Place::file("t")).is_err());
+        let fields: Vec<_> = Format { width: 5 }.fields("-1.0-2.00-3.000  ").collect();
+        assert_eq!(fields, ["-1.0-", "2.00-", "3.000"]);
+    }
+}

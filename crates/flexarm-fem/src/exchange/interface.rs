@@ -1,0 +1,313 @@
+//! Which rows of an imported matrix are which interface: text such as `A=1001,B=1002`.
+//!
+//! ```text
+//! A=1001,B=1002                                  components 1 to 6 of these nodes
+//! A=947:1-3+948:1-3,B=949:1-3+950:1-3            CalculiX: rotations are 1 to 3 of a second node
+//! A=#1-6,B=#7-12                                 rows of the file, from 1
+//! A=1001,B=1002,modal=#13-22                     which other rows are modal coordinates
+//! ```
+//! Every interface needs six rows, in the order ux uy uz rx ry rz.
+
+use std::collections::{BTreeMap, HashMap};
+use std::fmt;
+use std::str::FromStr;
+
+use super::error::{ExchangeError, ExchangeErrorKind, Place};
+use super::matrix::DofLabel;
+
+/// What a map is called in messages.
+const ORIGIN: &str = "map of interfaces";
+/// No map names more rows than this.
+const MOST_ROWS: i64 = 100_000;
+
+/// Some rows of a matrix.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RowPick {
+    /// Components `first` to `last` of a node.
+    Node {
+        /// Number of the node.
+        node: i64,
+        /// First component.
+        first: u8,
+        /// Last component.
+        last: u8,
+    },
+    /// Rows of the file from `first` to `last`, counted from 1.
+    Rows {
+        /// First row.
+        first: usize,
+        /// Last row.
+        last: usize,
+    },
+}
+
+/// An interface and its six rows.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Interface {
+    /// Its name, such as "A".
+    pub name: String,
+    /// Its rows, ux uy uz rx ry rz.
+    pub picks: Vec<RowPick>,
+}
+
+/// All interfaces in the order in which they are wanted.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct InterfaceMap {
+    /// The interfaces.
+    pub interfaces: Vec<Interface>,
+    /// Rows that are modal coordinates; empty: those without a node or with component 0.
+    pub modal: Vec<RowPick>,
+}
+
+fn wrong(element: impl Into<Box<str>>, found: impl Into<Box<str>>, expected: &str, help: &str) -> ExchangeError {
+    Place::file(ORIGIN).fail(ExchangeErrorKind::Interface, element, found, expected, help)
+}
+
+impl Interface {
+    /// Reads the rows of one interface, such as `947:1-3+948:1-3`.
+    ///
+    /// # Errors
+    /// [`ExchangeErrorKind::Interface`].
+    pub fn parse(name: &str, rows: &str) -> Result<Self, ExchangeError> {
+        let picks = rows.split('+').map(|text| parse_pick(name, text)).collect::<Result<_, _>>()?;
+        Ok(Self { name: name.to_owned(), picks })
+    }
+
+    /// The rows as text.
+    pub fn rows_text(&self) -> String {
+        self.picks.iter().map(RowPick::to_string).collect::<Vec<_>>().join("+")
+    }
+}
+
+fn parse_pick(name: &str, text: &str) -> Result<RowPick, ExchangeError> {
+    let text = text.trim();
+    let help = "write A=1001 or A=1001:1-6 or A=#1-6; join several with +";
+    let refuse =
+        || wrong(format!("interface {name}"), format!("{text:?}"), "node, node:first-last or #first-last", help);
+    let range = |text: &str| -> Option<(i64, i64)> {
+        let (first, last) = text.split_once('-').unwrap_or((text, text));
+        let (first, last) = (first.trim().parse().ok()?, last.trim().parse().ok()?);
+        (0 <= first && first <= last && last - first < MOST_ROWS).then_some((first, last))
+    };
+    if let Some(rows) = text.strip_prefix('#') {
+        let (first, last) = range(rows).filter(|(first, _)| *first > 0).ok_or_else(refuse)?;
+        return Ok(RowPick::Rows { first: first as usize, last: last as usize });
+    }
+    let (node, dofs) = text.split_once(':').unwrap_or((text, "1-6"));
+    let node = node.trim().parse().map_err(|_| refuse())?;
+    let (first, last) = range(dofs).filter(|(_, last)| *last <= 6).ok_or_else(refuse)?;
+    Ok(RowPick::Node { node, first: first as u8, last: last as u8 })
+}
+
+impl fmt::Display for RowPick {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Node { node, first: 1, last: 6 } => write!(f, "{node}"),
+            Self::Node { node, first, last } if first == last => write!(f, "{node}:{first}"),
+            Self::Node { node, first, last } => write!(f, "{node}:{first}-{last}"),
+            Self::Rows { first, last } => write!(f, "#{first}-{last}"),
+        }
+    }
+}
+
+impl fmt::Display for InterfaceMap {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut parts: Vec<String> =
+            self.interfaces.iter().map(|interface| format!("{}={}", interface.name, interface.rows_text())).collect();
+        if !self.modal.is_empty() {
+            let modal = Interface { name: String::new(), picks: self.modal.clone() };
+            parts.push(format!("modal={}", modal.rows_text()));
+        }
+        f.write_str(&parts.join(","))
+    }
+}
+
+impl FromStr for InterfaceMap {
+    type Err = ExchangeError;
+
+    fn from_str(text: &str) -> Result<Self, ExchangeError> {
+        let mut map = Self::default();
+        for part in text.split(',') {
+            let Some((name, rows)) = part.split_once('=') else {
+                return Err(wrong("map", format!("{:?}", part.trim()), "name=rows", "such as A=1001,B=1002"));
+            };
+            let interface = Interface::parse(name.trim(), rows)?;
+            if interface.name.is_empty() || map.interfaces.iter().any(|known| known.name == interface.name) {
+                return Err(wrong("map", format!("the name {:?}", interface.name), "a name used once", ""));
+            }
+            if interface.name == "modal" {
+                map.modal.extend(interface.picks);
+            } else {
+                map.interfaces.push(interface);
+            }
+        }
+        Ok(map)
+    }
+}
+
+/// The rows of a map in a matrix, from 0.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct ResolvedMap {
+    pub(super) interfaces: Vec<[usize; 6]>,
+    pub(super) modal: Vec<usize>,
+}
+
+impl InterfaceMap {
+    /// Finds the rows; all rows that are left over must be modal coordinates.
+    pub(super) fn resolve(&self, rows: &[DofLabel], origin: &str) -> Result<ResolvedMap, ExchangeError> {
+        let index: HashMap<DofLabel, usize> = rows.iter().enumerate().map(|(i, label)| (*label, i)).collect();
+        let mut owner: HashMap<usize, &str> = HashMap::new();
+        let mut find = |name, picks: &[RowPick]| -> Result<Vec<usize>, ExchangeError> {
+            let mut found = Vec::new();
+            for pick in picks {
+                found.extend(find_rows(*pick, name, rows.len(), &index, origin)?);
+            }
+            for row in &found {
+                if let Some(other) = owner.insert(*row, name) {
+                    let twice = format!("row {} also in {other}", row + 1);
+                    return Err(wrong(format!("interface {name}"), twice, "every row once", ""));
+                }
+            }
+            Ok(found)
+        };
+        let mut interfaces = Vec::new();
+        for interface in &self.interfaces {
+            let found = find(interface.name.as_str(), &interface.picks)?;
+            let six = found.as_slice().try_into().map_err(|_| {
+                let help = "ux uy uz rx ry rz; CalculiX has the rotations on a second node: A=947:1-3+948:1-3";
+                wrong(format!("interface {}", interface.name), format!("{} rows", found.len()), "six rows", help)
+            })?;
+            interfaces.push(six);
+        }
+        let mut modal = find("modal", &self.modal)?;
+        for (row, label) in rows.iter().enumerate().filter(|(row, _)| !owner.contains_key(row)) {
+            let is_scalar = label.dof == 0 || label.node.is_none_or(|node| node < 0);
+            if !is_scalar || !self.modal.is_empty() {
+                let left = rows.len() - owner.len();
+                let found = format!("row {} ({label}), one of {left} in no interface", row + 1);
+                let help = "a full model must first be reduced to its interfaces; if these rows are modal \
+                            coordinates, add modal=... to the map";
+                let expected = "interfaces and modal coordinates only";
+                return Err(Place::file(origin).fail(ExchangeErrorKind::Interface, "rows", found, expected, help));
+            }
+            modal.push(row);
+        }
+        Ok(ResolvedMap { interfaces, modal })
+    }
+}
+
+fn find_rows(
+    pick: RowPick,
+    name: &str,
+    size: usize,
+    index: &HashMap<DofLabel, usize>,
+    origin: &str,
+) -> Result<Vec<usize>, ExchangeError> {
+    match pick {
+        RowPick::Rows { first, last } if last <= size => Ok((first - 1..last).collect()),
+        RowPick::Rows { .. } => {
+            let found = format!("{pick} in a matrix of {size} rows");
+            Err(wrong(format!("interface {name}"), found, "rows that exist", ""))
+        }
+        RowPick::Node { node, first, last } => (first..=last)
+            .map(|dof| {
+                index.get(&DofLabel::new(node, dof)).copied().ok_or_else(|| {
+                    let found = format!("no row {node}:{dof} in {origin}");
+                    let help = nodes_in(index);
+                    wrong(format!("interface {name}"), found, "rows that exist", &help)
+                })
+            })
+            .collect(),
+    }
+}
+
+fn nodes_in(index: &HashMap<DofLabel, usize>) -> String {
+    let mut nodes: Vec<i64> = index.keys().filter_map(|label| label.node).collect();
+    nodes.sort_unstable();
+    nodes.dedup();
+    match nodes.len() {
+        0 => "the file names no nodes: pick rows, such as A=#1-6,B=#7-12".into(),
+        1..=12 => format!("its nodes are {nodes:?}"),
+        n => format!("it has {n} nodes from {} to {}", nodes[0], nodes[n - 1]),
+    }
+}
+
+/// The map that the rows suggest, if they suggest one; the user must agree to it.
+///
+/// Two nodes of six components, four nodes of three (CalculiX), or at least twelve rows without nodes.
+pub fn propose_map(rows: &[DofLabel]) -> Option<InterfaceMap> {
+    let named = |picks: Vec<Vec<RowPick>>| {
+        let interfaces = ["A", "B"].into_iter().zip(picks).map(|(name, picks)| Interface { name: name.into(), picks });
+        Some(InterfaceMap { interfaces: interfaces.collect(), modal: Vec::new() })
+    };
+    let mut order: Vec<i64> = Vec::new();
+    let mut components: BTreeMap<i64, Vec<u8>> = BTreeMap::new();
+    for label in rows.iter().filter(|label| label.dof > 0) {
+        let node = label.node.filter(|node| *node >= 0)?;
+        let list = components.entry(node).or_default();
+        if list.is_empty() {
+            order.push(node);
+        }
+        list.push(label.dof);
+    }
+    let all = |last: u8| components.values().all(|dofs| dofs.iter().copied().eq(1..=last));
+    let node = |i: usize, last: u8| RowPick::Node { node: order[i], first: 1, last };
+    match order.len() {
+        2 if all(6) => named(vec![vec![node(0, 6)], vec![node(1, 6)]]),
+        4 if all(3) => named(vec![vec![node(0, 3), node(1, 3)], vec![node(2, 3), node(3, 3)]]),
+        0 if rows.len() >= 12 && rows.len() <= super::matrix::LARGEST_DENSE => {
+            named(vec![vec![RowPick::Rows { first: 1, last: 6 }], vec![RowPick::Rows { first: 7, last: 12 }]])
+        }
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rows(nodes: &[i64], last: u8) -> Vec<DofLabel> {
+        nodes.iter().flat_map(|node| (1..=last).map(|dof| DofLabel::new(*node, dof))).collect()
+    }
+
+    #[test]
+    fn a_map_is_read_and_printed_unchanged() {
+        for text in ["A=1001,B=1002", "A=947:1-3+948:1-3,B=949:1-3+950:1-3", "A=#1-6,B=#7-12,modal=#13-22", "A=5:2"] {
+            assert_eq!(text.parse::<InterfaceMap>().unwrap().to_string(), text);
+        }
+        for text in ["", "A", "A=", "A=1:0-9", "A=#0-5", "A=#6-1", "A=x", "A=1,A=2", "A=#1-99999999999999999999"] {
+            let error = text.parse::<InterfaceMap>().unwrap_err();
+            assert_eq!(error.kind, ExchangeErrorKind::Interface, "{text}: {error}");
+        }
+    }
+
+    #[test]
+    fn maps_find_their_rows_in_any_order_and_the_rest_is_modal() {
+        let mut labels = rows(&[7, 3], 6);
+        labels.push(DofLabel::new(2001, 0));
+        let map: InterfaceMap = "A=3,B=7".parse().unwrap();
+        let resolved = map.resolve(&labels, "t").unwrap();
+        assert_eq!(resolved.interfaces, [[6, 7, 8, 9, 10, 11], [0, 1, 2, 3, 4, 5]]);
+        assert_eq!(resolved.modal, [12]);
+    }
+
+    #[test]
+    fn maps_that_do_not_fit_say_what_the_file_has() {
+        let labels = rows(&[947, 948, 949, 950], 3);
+        let fail = |text: &str| text.parse::<InterfaceMap>().unwrap().resolve(&labels, "t").unwrap_err().to_string();
+        assert!(fail("A=947,B=948").contains("its nodes are [947, 948, 949, 950]"));
+        assert!(fail("A=947:1-3,B=949:1-3+950:1-3").contains("3 rows"));
+        assert!(fail("A=#1-6,B=#6-11").contains("also in A"));
+        assert!(fail("A=947:1-3+948:1-3").contains("one of 6 in no interface"));
+        assert!(fail("A=#9-14").contains("12 rows"));
+    }
+
+    #[test]
+    fn proposals_fit_the_rows() {
+        let text = |rows: &[DofLabel]| propose_map(rows).map(|map| map.to_string());
+        assert_eq!(text(&rows(&[1001, 1002], 6)).unwrap(), "A=1001,B=1002");
+        assert_eq!(text(&rows(&[947, 948, 949, 950], 3)).unwrap(), "A=947:1-3+948:1-3,B=949:1-3+950:1-3");
+        assert_eq!(text(&[DofLabel::UNKNOWN; 22]).unwrap(), "A=#1-6,B=#7-12");
+        assert_eq!(text(&rows(&[1, 2, 3], 6)), None);
+    }
+}

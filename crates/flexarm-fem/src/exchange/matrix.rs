@@ -1,0 +1,314 @@
+//! Symmetric matrices with labelled rows, as they stand in a file: no units are converted here.
+
+use std::collections::{BTreeMap, HashMap};
+use std::fmt;
+
+use nalgebra::{DMatrix, Vector3};
+
+use super::error::{ExchangeError, ExchangeErrorKind, Place};
+use super::recognise::MatrixFormat;
+use super::sidecar::Sidecar;
+use crate::spatial::Pose;
+
+/// Up to this many rows a matrix is stored dense (32 MB).
+pub const LARGEST_DENSE: usize = 2000;
+
+/// Mirrored entries may differ by this much of `sqrt(|k_ii k_jj|)`: the last of nine printed decimals.
+pub const LARGEST_ASYMMETRY: f64 = 1e-8;
+
+/// What a row of a matrix belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct DofLabel {
+    /// Number of the node; `None` where the file does not say.
+    pub node: Option<i64>,
+    /// 1 to 3 translations, 4 to 6 rotations; 0 for a scalar (modal) coordinate or if unknown.
+    ///
+    /// CalculiX gives the rotations of a rigid body as 1 to 3 of a second node.
+    pub dof: u8,
+}
+
+impl DofLabel {
+    /// A row about which the file says nothing.
+    pub const UNKNOWN: Self = Self { node: None, dof: 0 };
+
+    /// A component of a node.
+    pub fn new(node: i64, dof: u8) -> Self {
+        Self { node: Some(node), dof }
+    }
+}
+
+impl fmt::Display for DofLabel {
+    /// `1001:3`, or `?:3` where the node is not known.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.node {
+            Some(node) => write!(f, "{node}:{}", self.dof),
+            None => write!(f, "?:{}", self.dof),
+        }
+    }
+}
+
+/// Lower triangle of a symmetric matrix, each place once, sorted by column and then row, from 0.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct SparseSymmetric {
+    /// Number of rows.
+    pub n: usize,
+    /// Row of each entry, at least its column.
+    pub rows: Vec<u32>,
+    /// Column of each entry.
+    pub columns: Vec<u32>,
+    /// The entries; zeros are left out.
+    pub values: Vec<f64>,
+}
+
+impl SparseSymmetric {
+    /// Number of stored entries.
+    pub fn len(&self) -> usize {
+        self.values.len()
+    }
+
+    /// Whether the matrix is zero.
+    pub fn is_empty(&self) -> bool {
+        self.values.is_empty()
+    }
+
+    /// `(row, column, value)` of the lower triangle.
+    pub fn triplets(&self) -> impl Iterator<Item = (usize, usize, f64)> + '_ {
+        let places = self.rows.iter().zip(&self.columns).zip(&self.values);
+        places.map(|((row, column), value)| (*row as usize, *column as usize, *value))
+    }
+}
+
+/// The numbers of a matrix.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Entries {
+    /// Up to [`LARGEST_DENSE`] rows; both triangles, exactly symmetric.
+    Dense(DMatrix<f64>),
+    /// Full models.
+    Sparse(SparseSymmetric),
+}
+
+/// A symmetric matrix with its rows, in the units of the file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LabelledMatrix {
+    /// Its name in the file, or the file itself.
+    pub name: String,
+    /// What each row belongs to.
+    pub rows: Vec<DofLabel>,
+    /// The numbers.
+    pub entries: Entries,
+    /// Largest `|k_ij - k_ji| / sqrt(|k_ii k_jj|)` of the file, which is gone from the entries.
+    pub asymmetry: f64,
+}
+
+impl LabelledMatrix {
+    /// Number of rows.
+    pub fn size(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// The dense matrix, unless it is stored sparse.
+    pub fn dense(&self) -> Option<&DMatrix<f64>> {
+        match &self.entries {
+            Entries::Dense(matrix) => Some(matrix),
+            Entries::Sparse(_) => None,
+        }
+    }
+
+    /// The lower triangle, however it is stored.
+    pub fn to_sparse(&self) -> SparseSymmetric {
+        match &self.entries {
+            Entries::Sparse(sparse) => sparse.clone(),
+            Entries::Dense(matrix) => {
+                let n = matrix.nrows();
+                let mut sparse = SparseSymmetric { n, ..SparseSymmetric::default() };
+                for column in 0..n {
+                    for row in (column..n).filter(|&row| matrix[(row, column)] != 0.0) {
+                        sparse.rows.push(row as u32);
+                        sparse.columns.push(column as u32);
+                        sparse.values.push(matrix[(row, column)]);
+                    }
+                }
+                sparse
+            }
+        }
+    }
+
+    /// Whether the file says which node the rows belong to.
+    pub fn is_labelled(&self) -> bool {
+        self.rows.iter().any(|label| label.node.is_some())
+    }
+}
+
+/// What one or several files say about one structure, in the units of the files.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImportedMatrices {
+    /// Format of the file with the stiffness.
+    pub format: MatrixFormat,
+    /// Where it came from, for messages.
+    pub origin: String,
+    /// The stiffness.
+    pub stiffness: LabelledMatrix,
+    /// The mass, in the same order of rows.
+    pub mass: Option<LabelledMatrix>,
+    /// Positions of nodes, where the format has them.
+    pub positions: BTreeMap<i64, Vector3<f64>>,
+    /// Nodes by the name of their set, where the format has them.
+    pub node_sets: BTreeMap<String, Vec<i64>>,
+    /// Frames of the interfaces in the order of the rows, where the format has them.
+    pub frames: Vec<Pose>,
+    /// Units, interfaces and frames from the sidecar of Matrix Market files.
+    pub sidecar: Option<Sidecar>,
+    /// Sentences about what was accepted, but should be looked at.
+    pub warnings: Vec<String>,
+}
+
+/// Entries as they come from a file, in any order and any triangle.
+#[derive(Debug, Default)]
+pub(super) struct Triplets {
+    entries: Vec<Triplet>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Triplet {
+    row: u32,
+    column: u32,
+    line: u32,
+    value: f64,
+}
+
+/// How to store the result.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Storage {
+    /// Dense up to [`LARGEST_DENSE`] rows.
+    BySize,
+    /// Always sparse: a full model.
+    Sparse,
+}
+
+impl Triplets {
+    /// Adds an entry, rows and columns from 0; `place` is only for messages.
+    pub(super) fn push(&mut self, row: usize, column: usize, value: f64, place: &Place<'_>) {
+        let line = place.line.unwrap_or(0) as u32;
+        self.entries.push(Triplet { row: row as u32, column: column as u32, line, value });
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.entries.len()
+    }
+
+    /// Number of rows that the entries need.
+    pub(super) fn extent(&self) -> usize {
+        self.entries.iter().map(|t| t.row.max(t.column) as usize + 1).max().unwrap_or(0)
+    }
+
+    /// Labels for rows about which the file says nothing; refuses counts that the entries cannot fill.
+    pub(super) fn unlabelled(&self, n: usize, place: &Place<'_>) -> Result<Vec<DofLabel>, ExchangeError> {
+        if n == 0 || (n > LARGEST_DENSE && n > 8 * self.len()) {
+            let found = format!("{n} rows, but {} entries", self.len());
+            let help = "a stiffness has an entry in every row; is this another file?";
+            return Err(place.fail(ExchangeErrorKind::WrongSize, "matrix", found, "entries in every row", help));
+        }
+        Ok(vec![DofLabel::UNKNOWN; n])
+    }
+
+    /// Makes the symmetric matrix: fills missing triangles and refuses contradictions.
+    ///
+    /// All rows and columns must be below `rows.len()`.
+    pub(super) fn symmetric(
+        mut self,
+        name: &str,
+        origin: &str,
+        rows: Vec<DofLabel>,
+        storage: Storage,
+    ) -> Result<LabelledMatrix, ExchangeError> {
+        let n = rows.len();
+        let mut scale = vec![0.0_f64; n];
+        for t in self.entries.iter().filter(|t| t.row == t.column) {
+            scale[t.row as usize] = t.value.abs().sqrt();
+        }
+
+        // Entries of one place stand together, lower triangle before upper.
+        let place = |t: &Triplet| (t.row.min(t.column), t.row.max(t.column));
+        self.entries.sort_by_key(|t| (place(t), t.row < t.column));
+        let mut lower = SparseSymmetric { n, ..SparseSymmetric::default() };
+        let mut asymmetry = 0.0_f64;
+        for group in self.entries.chunk_by(|a, b| place(a) == place(b)) {
+            let (column, row) = place(&group[0]);
+            let size = scale[row as usize] * scale[column as usize];
+            let (value, difference) = common_value(group, size, &rows, name, origin)?;
+            asymmetry = asymmetry.max(difference);
+            if value != 0.0 {
+                lower.rows.push(row);
+                lower.columns.push(column);
+                lower.values.push(value);
+            }
+        }
+
+        let entries = if storage == Storage::Sparse || n > LARGEST_DENSE {
+            Entries::Sparse(lower)
+        } else {
+            let mut dense = DMatrix::zeros(n, n);
+            for (row, column, value) in lower.triplets() {
+                dense[(row, column)] = value;
+                dense[(column, row)] = value;
+            }
+            Entries::Dense(dense)
+        };
+        Ok(LabelledMatrix { name: name.into(), rows, entries, asymmetry })
+    }
+}
+
+/// The one value of an entry that a file may give several times, and the relative asymmetry.
+fn common_value(
+    group: &[Triplet],
+    size: f64,
+    rows: &[DofLabel],
+    name: &str,
+    origin: &str,
+) -> Result<(f64, f64), ExchangeError> {
+    let first = group[0];
+    let Some(last) = group.iter().find(|t| t.value != first.value) else { return Ok((first.value, 0.0)) };
+
+    // Mirrored entries may differ by rounding, entries of the same place not at all.
+    let upper = group.iter().find(|t| (t.row < t.column) != (first.row < first.column));
+    let mirrored =
+        upper.filter(|upper| group.iter().all(|t| t.value == if t.row < t.column { upper.value } else { first.value }));
+    if let Some(upper) = mirrored {
+        let size = size.max(first.value.abs()).max(upper.value.abs());
+        let difference = (first.value - upper.value).abs() / size;
+        if difference <= LARGEST_ASYMMETRY {
+            return Ok((0.5 * (first.value + upper.value), difference));
+        }
+    }
+    let (row, column) = (first.row as usize, first.column as usize);
+    let element = format!("entry ({}, {}) of {name}, rows {} and {}", row + 1, column + 1, rows[row], rows[column]);
+    let line = Some(last.line as usize).filter(|line| *line > 0);
+    let what = if mirrored.is_some() { "mirrored entries" } else { "the entry twice" };
+    Err(Place { origin, line }.fail(
+        ExchangeErrorKind::Unequal,
+        element,
+        format!("{what}: {:e} (line {}) and {:e}", first.value, first.line, last.value),
+        format!("equal values, mirrored ones to {LARGEST_ASYMMETRY:.0e} of sqrt(k_ii k_jj)"),
+        "stiffness and mass are symmetric; do not add up matrices of several parts in one file",
+    ))
+}
+
+/// A matrix in another order of rows; rows that it lacks are zero.
+///
+/// Returns `None` if it has a row that `rows` lacks.
+pub(super) fn reordered(matrix: &LabelledMatrix, rows: &[DofLabel]) -> Option<LabelledMatrix> {
+    if matrix.rows == rows {
+        return Some(matrix.clone());
+    }
+    let places: HashMap<DofLabel, usize> = rows.iter().enumerate().map(|(i, label)| (*label, i)).collect();
+    let target: Option<Vec<usize>> = matrix.rows.iter().map(|label| places.get(label).copied()).collect();
+    let target = target?;
+    let mut moved = Triplets::default();
+    let nowhere = Place::file("");
+    for (row, column, value) in matrix.to_sparse().triplets() {
+        moved.push(target[row], target[column], value, &nowhere);
+    }
+    let storage = if matrix.dense().is_some() { Storage::BySize } else { Storage::Sparse };
+    let moved = moved.symmetric(&matrix.name, "", rows.to_vec(), storage).ok()?;
+    Some(LabelledMatrix { asymmetry: matrix.asymmetry, ..moved })
+}

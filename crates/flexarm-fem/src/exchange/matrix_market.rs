@@ -1,0 +1,200 @@
+//! Matrix Market: `%%MatrixMarket matrix coordinate|array real|integer symmetric|general`.
+//!
+//! Units, frames and the meaning of the rows are not in the file; they come from the [`Sidecar`]
+//! that [`write_matrix_market`] puts beside its files, or from the user.
+//!
+//! [`Sidecar`]: super::Sidecar
+
+use nalgebra::DMatrix;
+
+use super::error::{ExchangeError, ExchangeErrorKind, Place};
+use super::matrix::{LabelledMatrix, Storage, Triplets};
+use super::text::{Text, shown, words};
+
+/// One triangle (by the standard the lower), or all entries.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Symmetry {
+    Symmetric,
+    General,
+}
+
+/// Reads a matrix; rows have no labels.
+pub(super) fn parse(text: Text<'_>) -> Result<LabelledMatrix, ExchangeError> {
+    let mut lines = text.lines();
+    let (place, banner) = lines.next().ok_or_else(|| cut_off(&text.file()))?;
+    let (is_array, symmetry) = parse_banner(&place, banner)?;
+
+    // Size line, then the entries; comments and empty lines anywhere.
+    let mut lines = lines.filter(|(_, line)| !line.starts_with('%') && !line.trim().is_empty());
+    let (place, size) = lines.next().ok_or_else(|| cut_off(&text.file()))?;
+    let mut size = words(size);
+    let rows = place.index("number of rows", place.word("number of rows", &mut size)?)? + 1;
+    let columns = place.index("number of columns", place.word("number of columns", &mut size)?)? + 1;
+    if rows != columns {
+        let found = format!("{rows} rows and {columns} columns");
+        return Err(place.fail(ExchangeErrorKind::Unsupported, "size", found, "a square matrix", ""));
+    }
+    let header = place;
+    let mut triplets = Triplets::default();
+    let promised = if is_array {
+        size_of_array(rows, symmetry)
+    } else {
+        let promised = place.word("number of entries", &mut size)?;
+        usize::try_from(place.integer("number of entries", promised)?).unwrap_or(usize::MAX)
+    };
+    place.end(&mut size)?;
+
+    let (mut row, mut column) = (0, 0);
+    for (place, line) in lines {
+        let mut values = words(line);
+        if triplets.len() == promised {
+            let found = format!("more than {promised} entries");
+            return Err(place.fail(ExchangeErrorKind::WrongSize, "matrix", found, format!("{promised}"), ""));
+        }
+        if is_array {
+            let value = place.number("entry", place.word("entry", &mut values)?)?;
+            triplets.push(row, column, value, &place);
+            row += 1;
+            if row == rows {
+                column += 1;
+                row = if symmetry == Symmetry::Symmetric { column } else { 0 };
+            }
+        } else {
+            let row = place.index("row", place.word("row", &mut values)?)?;
+            let column = place.index("column", place.word("column", &mut values)?)?;
+            if row.max(column) >= rows {
+                let found = format!("row {}, column {}", row + 1, column + 1);
+                return Err(place.fail(ExchangeErrorKind::Syntax, "entry", found, format!("1 to {rows}"), ""));
+            }
+            let value = place.number("entry", place.word("entry", &mut values)?)?;
+            triplets.push(row, column, value, &place);
+        }
+        place.end(&mut values)?;
+    }
+    if triplets.len() < promised {
+        let (found, expected) = (format!("{} entries", triplets.len()), format!("{promised}, as in its header"));
+        let help = "is the file cut off?";
+        return Err(header.fail(ExchangeErrorKind::WrongSize, "matrix", found, expected, help));
+    }
+    let labels = triplets.unlabelled(rows, &header)?;
+    triplets.symmetric("the matrix", text.origin, labels, Storage::BySize)
+}
+
+fn size_of_array(rows: usize, symmetry: Symmetry) -> usize {
+    match symmetry {
+        Symmetry::General => rows.saturating_mul(rows),
+        Symmetry::Symmetric => rows.saturating_mul(rows + 1) / 2,
+    }
+}
+
+fn cut_off(place: &Place<'_>) -> ExchangeError {
+    place.fail(ExchangeErrorKind::Syntax, "header", "the end of the file", "a header and a line with the size", "")
+}
+
+/// Whether it is an array, and its symmetry.
+fn parse_banner(place: &Place<'_>, banner: &str) -> Result<(bool, Symmetry), ExchangeError> {
+    let lower = banner.to_ascii_lowercase();
+    let words: Vec<_> = words(lower.trim_start_matches('\u{feff}')).collect();
+    let [_, "matrix", layout, field, symmetry] = words[..] else {
+        let expected = "%%MatrixMarket matrix coordinate|array real|integer symmetric|general";
+        return Err(place.fail(ExchangeErrorKind::Syntax, "header", shown(banner), expected, ""));
+    };
+    let refuse = |element, found: &str, expected, help| {
+        Err(place.fail(ExchangeErrorKind::Unsupported, element, shown(found), expected, help))
+    };
+    let is_array = match layout {
+        "array" => true,
+        "coordinate" => false,
+        _ => return refuse("layout", layout, "coordinate or array", ""),
+    };
+    match field {
+        "real" | "integer" | "double" => {}
+        "pattern" => return refuse("field", field, "real or integer", "a pattern has no values"),
+        _ => return refuse("field", field, "real or integer", "structural damping is to be given as damping"),
+    }
+    match symmetry {
+        "symmetric" => Ok((is_array, Symmetry::Symmetric)),
+        "general" => Ok((is_array, Symmetry::General)),
+        _ => refuse("symmetry", symmetry, "symmetric or general", "a stiffness is symmetric"),
+    }
+}
+
+/// A symmetric matrix as Matrix Market text, `coordinate real symmetric`, read back to the last bit.
+///
+/// Only the lower triangle is written. `comments` become lines that begin with `%`.
+pub fn write_matrix_market(matrix: &DMatrix<f64>, comments: &[&str]) -> String {
+    let n = matrix.nrows().min(matrix.ncols());
+    let mut text = String::from("%%MatrixMarket matrix coordinate real symmetric\n");
+    for line in comments.iter().flat_map(|comment| comment.lines()) {
+        text += &format!("% {line}\n");
+    }
+    let places = (0..n).flat_map(|column| (column..n).map(move |row| (row, column)));
+    let places: Vec<_> = places.filter(|place| matrix[*place] != 0.0).collect();
+    text += &format!("{n} {n} {}\n", places.len());
+    for (row, column) in places {
+        text += &format!("{} {} {:e}\n", row + 1, column + 1, matrix[(row, column)]);
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse_text(text: &str) -> Result<LabelledMatrix, ExchangeError> {
+        parse(Text::new(text, "test.mtx"))
+    }
+
+    const TRUTH: [f64; 4] = [4.0, -1.5, -1.5, 3.0];
+
+    #[test]
+    fn every_layout_gives_the_same_matrix() {
+        for text in [
+            "%%MatrixMarket matrix coordinate real symmetric\n% note\n2 2 3\n1 1 4\n2 1 -1.5\n2 2 3\n",
+            "%%MatrixMarket matrix coordinate real symmetric\r\n2 2 3\r\n2 2 3\r\n1 2 -1.5D0\r\n1 1 4\r\n",
+            "%%matrixmarket MATRIX coordinate real general\n2 2 4\n1 1 4\n2 1 -1.5\n1 2 -1.5\n2 2 3\n",
+            "%%MatrixMarket matrix array real symmetric\n2 2\n4\n-1.5\n3\n",
+            "%%MatrixMarket matrix array real general\n2 2\n4\n-1.5\n-1.5\n\n3\n",
+        ] {
+            assert_eq!(parse_text(text).unwrap().dense().unwrap().as_slice(), TRUTH, "{text}");
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_a_stiffness_is_refused_with_the_reason() {
+        for (text, kind, words) in [
+            ("%%MatrixMarket matrix coordinate pattern symmetric\n1 1 1\n1 1\n", "Unsupported", "pattern"),
+            ("%%MatrixMarket matrix coordinate real skew-symmetric\n1 1 1\n1 1\n", "Unsupported", "skew"),
+            ("%%MatrixMarket matrix array complex general\n1 1\n1 1\n", "Unsupported", "complex"),
+            ("%%MatrixMarket matrix array real general\n1 2\n1\n1\n", "Unsupported", "square"),
+            ("%%MatrixMarket matrix coordinate real symmetric\n2 2 3\n1 1 4\n2 1 1\n", "WrongSize", "cut off"),
+            ("%%MatrixMarket matrix coordinate real symmetric\n2 2 1\n3 1 4\n", "Syntax", "row 3"),
+            ("%%MatrixMarket matrix coordinate real symmetric\n2 2 1\n1 1 nan\n", "NotFinite", "nan"),
+            ("%%MatrixMarket matrix coordinate real symmetric\n4000000000 4000000000 1\n1 1 1\n", "WrongSize", "rows"),
+        ] {
+            let error = parse_text(text).unwrap_err();
+            assert_eq!(format!("{:?}", error.kind), kind, "{error}");
+            assert!(error.to_string().contains(words) && error.origin.as_ref() == "test.mtx", "{error}");
+        }
+    }
+
+    #[test]
+    fn unequal_doubles_are_refused_with_both_values_and_the_line() {
+        let twice = "%%MatrixMarket matrix coordinate real general\n2 2 5\n1 1 4\n2 1 -1\n1 2 -2\n2 2 3\n1 1 4\n";
+        let error = parse_text(twice).unwrap_err();
+        assert_eq!((error.kind, error.line), (ExchangeErrorKind::Unequal, Some(5)));
+        assert!(error.found.contains("-1e0") && error.found.contains("-2e0"), "{error}");
+        let rounding = twice.replace("-2", "-1.00000000001");
+        assert!(parse_text(&rounding).unwrap().asymmetry > 1e-12);
+        let same_place = twice.replace("1 2 -2", "2 1 -1.00000000001");
+        assert_eq!(parse_text(&same_place).unwrap_err().kind, ExchangeErrorKind::Unequal);
+    }
+
+    #[test]
+    fn a_written_matrix_reads_back_to_the_last_bit() {
+        let x = [1.0 / 3.0, -1e-300, 2.5e20, f64::MIN_POSITIVE, 0.1, 7e7];
+        let matrix = DMatrix::from_row_slice(3, 3, &[x[0], x[1], x[2], x[1], x[3], x[4], x[2], x[4], x[5]]);
+        let text = write_matrix_market(&matrix, &["two\nlines"]);
+        assert_eq!(parse_text(&text).unwrap().dense(), Some(&matrix));
+    }
+}

@@ -1,0 +1,222 @@
+//! Nastran OUTPUT4 as text: dense columns, sparse strings, and sparse strings with BIGMAT.
+//!
+//! Lines of integers say what follows: four and a name begin a matrix, three a column, one or two a
+//! string of a sparse column; lines with a point hold values. The number of words in a column counts
+//! a double once or twice, depending on the writer, so the values are counted instead.
+
+use nalgebra::DMatrix;
+
+use super::error::{ExchangeError, ExchangeErrorKind, Place};
+use super::fortran::{Format, parse_format};
+use super::matrix::{LabelledMatrix, Storage, Triplets};
+use super::text::{Text, shown, words};
+use super::user_element::fortran;
+
+/// The header of a matrix, in text and in binary files.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Header {
+    pub(super) name: String,
+    pub(super) columns: usize,
+    pub(super) rows: usize,
+    /// Strings carry their length and row in two integers instead of one.
+    pub(super) big: bool,
+    pub(super) is_double: bool,
+}
+
+impl Header {
+    /// Checks NCOL, NROW, FORM, TYPE.
+    pub(super) fn new(
+        name: &str,
+        [columns, rows, _form, kind]: [i64; 4],
+        place: &Place<'_>,
+    ) -> Result<Self, ExchangeError> {
+        let element = format!("OP4 matrix {name}");
+        let refuse = |found: String, expected: &str| {
+            place.fail(ExchangeErrorKind::Unsupported, element.as_str(), found, expected, "")
+        };
+        if !matches!(kind, 1 | 2) {
+            return Err(refuse(format!("TYPE {kind}"), "1 or 2 (real)"));
+        }
+        let size = |n: i64| u32::try_from(n.unsigned_abs()).map(|n| n as usize);
+        match (size(columns), size(rows)) {
+            (Ok(columns @ 1..), Ok(rows @ 1..)) => {
+                Ok(Self { name: name.to_ascii_uppercase(), columns, rows, big: false, is_double: kind == 2 })
+            }
+            _ => Err(refuse(format!("{columns} columns, {rows} rows"), "1 to 4294967295")),
+        }
+        .map(|header| Self { big: rows < 0, ..header })
+    }
+
+    /// The symmetric matrix, or nothing for a rectangular one.
+    pub(super) fn finish(self, triplets: Triplets, origin: &str) -> Result<Option<LabelledMatrix>, ExchangeError> {
+        if self.rows != self.columns {
+            return Ok(None);
+        }
+        let rows = triplets.unlabelled(self.rows, &Place::file(origin))?;
+        triplets.symmetric(&self.name, origin, rows, Storage::BySize).map(Some)
+    }
+
+    /// Length of a string in words and its first row (from 1), from its one integer.
+    pub(super) fn string(code: i64) -> (i64, i64) {
+        (code / 65536 - 1, code % 65536)
+    }
+}
+
+/// A matrix being read.
+struct Reading {
+    header: Header,
+    format: Format,
+    triplets: Triplets,
+    column: usize,
+    row: usize,
+    /// Values of the column or string at hand: so many so far, and the words that it promises.
+    count: usize,
+    promised: usize,
+}
+
+/// Reads all square matrices.
+pub(super) fn parse(text: Text<'_>) -> Result<Vec<LabelledMatrix>, ExchangeError> {
+    let mut matrices = Vec::new();
+    let mut reading: Option<Reading> = None;
+    for (place, line) in text.lines().filter(|(_, line)| !line.trim().is_empty()) {
+        if let Some(header) = line.get(..32).filter(|_| is_header(line)) {
+            if let Some(done) = reading.take() {
+                matrices.extend(done.finish(&place, text.origin)?);
+            }
+            reading = Some(begin(&place, header, line)?);
+            continue;
+        }
+        let Some(current) = reading.as_mut() else {
+            let expected = "NCOL, NROW, FORM, TYPE, a name and a format";
+            return Err(place.fail(ExchangeErrorKind::Syntax, "header", shown(line), expected, ""));
+        };
+        if line.contains('.') { current.values(&place, line)? } else { current.integers(&place, line)? }
+    }
+    if let Some(done) = reading {
+        matrices.extend(done.finish(&text.file(), text.origin)?);
+    }
+    Ok(matrices)
+}
+
+/// Four integers and a name that begins with a letter.
+fn is_header(line: &str) -> bool {
+    let (head, name) = (line.get(..32), line.get(32..33));
+    head.is_some_and(|head| !head.contains('.'))
+        && name.is_some_and(|c| c.starts_with(|c: char| c.is_ascii_alphabetic()))
+}
+
+fn begin(place: &Place<'_>, head: &str, line: &str) -> Result<Reading, ExchangeError> {
+    let mut numbers = [0; 4];
+    for (i, number) in numbers.iter_mut().enumerate() {
+        *number = place.integer("header", head.get(8 * i..8 * i + 8).unwrap_or(""))?;
+    }
+    let name = line.get(32..).map(|rest| rest.get(..8).unwrap_or(rest)).unwrap_or("").trim();
+    let format = line.get(40..).filter(|rest| !rest.trim().is_empty()).unwrap_or("5E16.9");
+    Ok(Reading {
+        header: Header::new(name, numbers, place)?,
+        format: parse_format(format, place)?,
+        triplets: Triplets::default(),
+        column: 0,
+        row: 0,
+        count: 0,
+        promised: 0,
+    })
+}
+
+impl Reading {
+    /// A column (three integers) or a string of a sparse column (one or two).
+    fn integers(&mut self, place: &Place<'_>, line: &str) -> Result<(), ExchangeError> {
+        self.check_count(place)?;
+        let numbers = words(line).map(|word| place.integer("column", word)).collect::<Result<Vec<_>, _>>()?;
+        let (row, promised) = match numbers[..] {
+            [column, row, length] => {
+                let last = self.header.columns as i64 + 1;
+                if !(1..=last).contains(&column) {
+                    let found = format!("column {column}");
+                    return Err(place.fail(ExchangeErrorKind::Syntax, "column", found, format!("1 to {last}"), ""));
+                }
+                self.column = column as usize;
+                // The words of a sparse column are counted string by string.
+                (row, if row == 0 { 0 } else { length })
+            }
+            [length, row] => (row, length.saturating_sub(1)),
+            [code] => {
+                let (length, row) = Header::string(code);
+                (row, length)
+            }
+            _ => {
+                let expected = "one, two or three whole numbers";
+                return Err(place.fail(ExchangeErrorKind::Syntax, "line", shown(line), expected, ""));
+            }
+        };
+        let size = |n: i64| usize::try_from(n).ok().filter(|n| *n <= 2 * u32::MAX as usize);
+        let (Some(row), Some(promised)) = (size(row), size(promised)) else {
+            return Err(place.fail(ExchangeErrorKind::Syntax, "row", shown(line), "positive numbers", ""));
+        };
+        (self.row, self.promised, self.count) = (row, promised, 0);
+        Ok(())
+    }
+
+    fn values(&mut self, place: &Place<'_>, line: &str) -> Result<(), ExchangeError> {
+        for field in self.format.fields(line) {
+            let value = place.number("entry", field)?;
+            let row = self.row + self.count;
+            self.count += 1;
+            // The column after the last ends the matrix with one dummy value.
+            if self.column == self.header.columns + 1 {
+                continue;
+            }
+            if self.column == 0 || row == 0 || row > self.header.rows || self.count > self.promised {
+                let element = format!("entry ({row}, {}) of {}", self.column, self.header.name);
+                let expected = format!("{} values, rows 1 to {}", self.promised, self.header.rows);
+                return Err(place.fail(ExchangeErrorKind::WrongSize, element, "one value more", expected, ""));
+            }
+            self.triplets.push(row - 1, self.column - 1, value, place);
+        }
+        Ok(())
+    }
+
+    /// A double counts as one word or as two.
+    fn check_count(&self, place: &Place<'_>) -> Result<(), ExchangeError> {
+        let halves = self.header.is_double && 2 * self.count == self.promised;
+        if self.count == self.promised || halves || self.column == self.header.columns + 1 {
+            return Ok(());
+        }
+        let element = format!("column {} of {}", self.column, self.header.name);
+        let found = format!("{} values", self.count);
+        let expected = format!("{} words", self.promised);
+        Err(place.fail(ExchangeErrorKind::WrongSize, element, found, expected, "is the file cut off?"))
+    }
+
+    fn finish(self, place: &Place<'_>, origin: &str) -> Result<Option<LabelledMatrix>, ExchangeError> {
+        self.check_count(place)?;
+        if self.column != self.header.columns + 1 {
+            let found = format!("the end after column {}", self.column);
+            let expected = format!("column {} as its end mark", self.header.columns + 1);
+            let element = format!("OP4 matrix {}", self.header.name);
+            let help = "is the file cut off?";
+            return Err(place.fail(ExchangeErrorKind::WrongSize, element, found, expected, help));
+        }
+        self.header.finish(self.triplets, origin)
+    }
+}
+
+/// Matrices as OUTPUT4 text, symmetric, double, dense columns: 17 digits, read back to the last bit.
+///
+/// The number of words in a column is that of its values, as pyNastran writes and reads it. Names are
+/// cut to eight characters.
+pub fn write_op4(matrices: &[(&str, &DMatrix<f64>)]) -> String {
+    const PER_LINE: usize = 3;
+    let mut text = String::new();
+    for (name, matrix) in matrices {
+        let n = matrix.nrows();
+        text += &format!("{n:8}{n:8}{:8}{:8}{name:8.8}1P,3E23.16\n", 6, 2);
+        for (j, column) in matrix.column_iter().enumerate() {
+            text += &format!("{:8}{:8}{n:8}\n", j + 1, 1);
+            let values: Vec<String> = column.iter().map(|value| fortran(*value, 16, 23)).collect();
+            text.extend(values.chunks(PER_LINE).map(|line| line.concat() + "\n"));
+        }
+        text += &format!("{:8}{:8}{:8}\n{}\n", n + 1, 1, 1, fortran(1.0, 16, 23));
+    }
+    text
+}

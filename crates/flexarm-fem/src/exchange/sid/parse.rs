@@ -1,0 +1,290 @@
+//! Text to [`Sid`].
+
+use std::iter::Peekable;
+use std::path::Path;
+
+use super::{BODY_BLOCKS, NODE_BLOCKS, Sid, SidMatrix, SidNode};
+use crate::exchange::error::{ExchangeError, ExchangeErrorKind, Place};
+use crate::exchange::text::{Text, shown, unpack, words};
+
+/// More shape coordinates than any body has: sizes above are mistakes.
+const MOST_MODES: usize = 10_000;
+
+/// Reads a `.SID_FEM` file, which may be packed with gzip.
+///
+/// # Errors
+/// [`ExchangeError`] with file, line, element, what was found and what was expected.
+pub fn read_sid(path: impl AsRef<Path>) -> Result<Sid, ExchangeError> {
+    let file = crate::exchange::InputFile::open(path)?;
+    let bytes = unpack(&file.bytes, &file.origin)?;
+    parse_sid(&String::from_utf8_lossy(&bytes), &file.origin)
+}
+
+/// One line: a word, or `key = value`.
+type Line<'a> = (Place<'a>, &'a str, Option<&'a str>);
+
+/// The lines that are left.
+struct Cursor<'a, I: Iterator<Item = Line<'a>>> {
+    lines: Peekable<I>,
+    origin: &'a str,
+}
+
+/// Parses the text of a `.SID_FEM` file; `origin` names it in messages. Never panics.
+///
+/// # Errors
+/// As [`read_sid`].
+pub fn parse_sid(text: &str, origin: &str) -> Result<Sid, ExchangeError> {
+    let text = Text::new(text, origin);
+    let mut lines = text.lines();
+    let (place, first) = lines.next().unwrap_or((text.file(), ""));
+    let (numbers, comment) = first.split_once(':').unwrap_or((first, ""));
+    let mut numbers = words(numbers);
+    let nodes = place.integer("number of nodes", numbers.next().unwrap_or(""))?;
+    let modes = place.integer("number of modes", numbers.next().unwrap_or(""))?;
+
+    let lines = lines.map(|(place, line)| match line.split_once('=') {
+        Some((key, value)) => (place, key.trim(), Some(value.trim())),
+        None => (place, line.trim(), None),
+    });
+    let lines = lines.filter(|(_, key, value)| !key.is_empty() || value.is_some());
+    let mut cursor = Cursor { lines: lines.peekable(), origin };
+    cursor.expect("part")?;
+    cursor.expect("new modal")?;
+    let mut sid = Sid { comment: comment.to_owned(), ..Sid::default() };
+    cursor.refmod(&mut sid)?;
+    cursor.frame(&mut sid)?;
+    cursor.body(&mut sid)?;
+    cursor.expect("end part")?;
+    if nodes != sid.nodes.len() as i64 || modes != sid.nq() as i64 {
+        let found = format!("{} nodes, {} modes", sid.nodes.len(), sid.nq());
+        let expected = format!("{nodes} and {modes}, as in its first line");
+        return Err(place.fail(ExchangeErrorKind::WrongSize, "file", found, expected, ""));
+    }
+    Ok(sid)
+}
+
+impl<'a, I: Iterator<Item = Line<'a>>> Cursor<'a, I> {
+    fn next(&mut self, expected: &str) -> Result<Line<'a>, ExchangeError> {
+        self.lines.next().ok_or_else(|| {
+            let help = "is the file cut off?";
+            Place::file(self.origin).fail(ExchangeErrorKind::Syntax, "file", "its end", expected, help)
+        })
+    }
+
+    fn expect(&mut self, word: &str) -> Result<(), ExchangeError> {
+        let (place, key, _) = self.next(word)?;
+        if same(key, word) { Ok(()) } else { Err(unexpected(&place, key, word)) }
+    }
+
+    /// Takes the next line if it is this word.
+    fn take(&mut self, word: &str) -> bool {
+        self.lines.next_if(|(_, key, value)| value.is_none() && same(key, word)).is_some()
+    }
+
+    /// `refmod`: mass, number of shape coordinates, a text for each.
+    fn refmod(&mut self, sid: &mut Sid) -> Result<(), ExchangeError> {
+        self.expect("refmod")?;
+        let mut promised = 0;
+        while !self.take("end refmod") {
+            let (place, key, value) = self.next("end refmod")?;
+            let value = value.unwrap_or("");
+            match key {
+                "mass" => sid.mass = place.number("mass", value)?,
+                "nelastq" => promised = count(&place, "nelastq", value)?,
+                _ if key.starts_with("ielastq") => sid.modes.push(value.to_owned()),
+                _ => return Err(unexpected(&place, key, "mass, nelastq, ielastq (k) or end refmod")),
+            }
+        }
+        if sid.modes.is_empty() {
+            sid.modes = vec![String::new(); promised];
+        }
+        if sid.modes.len() != promised {
+            let found = format!("{} lines ielastq", sid.modes.len());
+            let kind = ExchangeErrorKind::WrongSize;
+            return Err(Place::file(self.origin).fail(
+                kind,
+                "refmod",
+                found,
+                format!("{promised}, as nelastq says"),
+                "",
+            ));
+        }
+        Ok(())
+    }
+
+    /// `frame`: the nodes.
+    fn frame(&mut self, sid: &mut Sid) -> Result<(), ExchangeError> {
+        self.expect("frame")?;
+        while !self.take("end frame") {
+            let (place, key, value) = self.next("end frame")?;
+            if !same(key, "new node") {
+                return Err(unexpected(&place, key, "new node or end frame"));
+            }
+            let id = place.integer("number of the node", value.unwrap_or(""))?;
+            let node = self.node(place, id, sid.nq())?;
+            sid.nodes.push(node);
+        }
+        Ok(())
+    }
+
+    fn node(&mut self, place: Place<'a>, id: i64, nq: usize) -> Result<SidNode, ExchangeError> {
+        let mut rframe = String::new();
+        let mut found: [Option<SidMatrix>; 5] = Default::default();
+        while !self.take("end node") {
+            let (place, key, value) = self.next("end node")?;
+            if same(key, "rframe") {
+                rframe = value.unwrap_or("").to_owned();
+                continue;
+            }
+            let Some(i) = NODE_BLOCKS.iter().position(|name| same(name, key)) else {
+                return Err(unexpected(&place, key, "rframe, origin, phi, psi, AP, sigma or end node"));
+            };
+            found[i] = Some(self.matrix(place, NODE_BLOCKS[i], nq)?);
+        }
+        let [Some(origin), Some(phi), Some(psi), Some(AP), sigma] = found else {
+            let found = found.iter().zip(NODE_BLOCKS).filter_map(|(block, name)| block.as_ref().and(Some(name)));
+            let found: Vec<_> = found.collect();
+            let kind = ExchangeErrorKind::Missing;
+            return Err(place.fail(kind, format!("node {id}"), found.join(", "), "origin, phi, psi, AP", ""));
+        };
+        Ok(SidNode { id, rframe, origin, phi, psi, AP, sigma })
+    }
+
+    /// The matrices of the body up to `end modal`.
+    fn body(&mut self, sid: &mut Sid) -> Result<(), ExchangeError> {
+        let nq = sid.nq();
+        let mut found: [Option<SidMatrix>; 11] = Default::default();
+        while !self.take("end modal") {
+            let (place, key, _) = self.next("end modal")?;
+            let known = BODY_BLOCKS.iter().position(|name| same(name, key));
+            let matrix = self.matrix(place, known.map_or(key, |i| BODY_BLOCKS[i]), nq)?;
+            match known {
+                Some(i) => found[i] = Some(matrix),
+                None => sid.others.push((key.to_owned(), matrix)),
+            }
+        }
+        let shape = |ncol| SidMatrix { nrow: nq, ncol, nq, ..SidMatrix::default() };
+        let mut missing = Vec::new();
+        let mut take = |i: usize| {
+            found[i].take().unwrap_or_else(|| match BODY_BLOCKS[i] {
+                "ksigma" => shape(1),
+                "De" => shape(nq),
+                name => {
+                    missing.push(name);
+                    SidMatrix::default()
+                }
+            })
+        };
+        [sid.mdCM, sid.J, sid.Ct, sid.Cr, sid.Me, sid.Gr, sid.Ge, sid.Oe, sid.ksigma, sid.Ke, sid.De] =
+            std::array::from_fn(&mut take);
+        if missing.is_empty() {
+            return Ok(());
+        }
+        let found = format!("no {}", missing.join(", "));
+        let kind = ExchangeErrorKind::Missing;
+        Err(Place::file(self.origin).fail(kind, "modal", found, "all matrices of the body", "is the file cut off?"))
+    }
+
+    /// A matrix up to `end <name>`.
+    fn matrix(&mut self, head: Place<'a>, name: &str, nq: usize) -> Result<SidMatrix, ExchangeError> {
+        let mut matrix = SidMatrix::default();
+        let end = format!("end {name}");
+        let mut last = head;
+        while !self.take(&end) {
+            let (place, key, value) = self.next(&end)?;
+            last = place;
+            let value = value.unwrap_or("");
+            let code = |what| count(&place, what, value).map(|code| code.min(255) as u8);
+            match key {
+                "order" => matrix.order = code("order")?,
+                "nrow" => matrix.nrow = count(&place, "nrow", value)?,
+                "ncol" => matrix.ncol = count(&place, "ncol", value)?,
+                "nq" => matrix.nq = count(&place, "nq", value)?,
+                "nqn" => matrix.nqn = count(&place, "nqn", value)?,
+                "structure" => matrix.structure = code("structure")?,
+                _ => entry(&mut matrix, &place, name, key, value)?,
+            }
+        }
+        // Sizes follow from the kind of matrix, so a file cannot ask for more memory than it is worth.
+        let shape = (matrix.nrow, matrix.ncol);
+        let expected: &[(usize, usize)] = match name {
+            "origin" | "mdCM" => &[(3, 1)],
+            "phi" | "psi" => &[(3, nq)],
+            "AP" => &[(3, 3)],
+            "J" => &[(6, 1), (3, 3)],
+            "Ct" | "Cr" => &[(nq, 3)],
+            "Me" | "Ke" | "De" => &[(nq, nq)],
+            "Gr" => &[(3, 3 * nq)],
+            "Ge" => &[(nq, 3 * nq)],
+            "Oe" => &[(nq, 6)],
+            _ => &[],
+        };
+        if matrix.order > 1
+            || matrix.structure > 4
+            || matrix.nq > nq
+            || (!expected.is_empty() && !expected.contains(&shape))
+        {
+            let found = format!(
+                "{} x {}, order {}, structure {}, nq {}",
+                matrix.nrow, matrix.ncol, matrix.order, matrix.structure, matrix.nq
+            );
+            let sizes: Vec<_> = expected.iter().map(|(rows, columns)| format!("{rows} x {columns}")).collect();
+            let expected = format!("{}, order 0 or 1, structure 0 to 4, nq {nq}", sizes.join(" or "));
+            return Err(last.fail(ExchangeErrorKind::WrongSize, name, found, expected, ""));
+        }
+        Ok(matrix)
+    }
+}
+
+/// `m0( i, j) = v` or `m1( i, k, j) = v`.
+fn entry(matrix: &mut SidMatrix, place: &Place<'_>, name: &str, key: &str, value: &str) -> Result<(), ExchangeError> {
+    let expected = format!("m0( i, j), m1( i, k, j) or end {name}");
+    let Some((kind, indices)) = key.strip_suffix(')').and_then(|key| key.split_once('(')) else {
+        return Err(unexpected(place, key, &expected));
+    };
+    let element = format!("{name}, {}", key.split_whitespace().collect::<String>());
+    let indices = words(indices).map(|index| place.index(&element, index)).collect::<Result<Vec<_>, _>>()?;
+    let value = place.number(&element, value)?;
+    let is_inside = |row, column| row < matrix.nrow && column < matrix.ncol;
+    let previous = match (kind.trim(), &indices[..]) {
+        ("m0", &[row, column]) if is_inside(row, column) => matrix.entries0.insert((row, column), value),
+        ("m1", &[row, mode, column]) if is_inside(row, column) && mode < matrix.nq && matrix.order == 1 => {
+            matrix.entries1.insert((row, mode, column), value)
+        }
+        _ => {
+            let size = format!("{} x {}, nq {}, order {}", matrix.nrow, matrix.ncol, matrix.nq, matrix.order);
+            return Err(place.fail(
+                ExchangeErrorKind::Syntax,
+                element,
+                shown(key),
+                format!("{expected} in {size}"),
+                "",
+            ));
+        }
+    };
+    match previous.filter(|previous| *previous != value) {
+        None => Ok(()),
+        Some(previous) => {
+            let found = format!("{previous:e} and {value:e}");
+            Err(place.fail(ExchangeErrorKind::Unequal, element, found, "one value", ""))
+        }
+    }
+}
+
+/// A count that is not beyond reason.
+fn count(place: &Place<'_>, what: &str, text: &str) -> Result<usize, ExchangeError> {
+    let most = 3 * MOST_MODES;
+    match usize::try_from(place.integer(what, text)?) {
+        Ok(count) if count <= most => Ok(count),
+        _ => Err(place.fail(ExchangeErrorKind::Syntax, what, shown(text), format!("0 to {most}"), "")),
+    }
+}
+
+/// Keywords may be spelt in either case and with several blanks.
+fn same(key: &str, word: &str) -> bool {
+    key.split_whitespace().map(str::to_ascii_lowercase).eq(word.split_whitespace().map(str::to_ascii_lowercase))
+}
+
+fn unexpected(place: &Place<'_>, key: &str, expected: &str) -> ExchangeError {
+    place.fail(ExchangeErrorKind::Syntax, "line", shown(key), expected, "")
+}

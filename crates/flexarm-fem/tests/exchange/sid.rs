@@ -1,0 +1,188 @@
+//! Standard Input Data: the identities of the body, the orders that files disagree in, reading and writing.
+
+use flexarm_fem::exchange::{
+    ExchangeErrorKind, GyroLayout, OeOrder, Sid, SidMatrix, SidNode, parse_sid, read_sid, write_sid,
+};
+use nalgebra::{DMatrix, Matrix3, Vector3};
+use proptest::prelude::*;
+
+use crate::common::fixed_cases;
+use crate::shared::{samples, truth};
+
+/// Point masses with three shapes: every integral is a sum that can be written down.
+fn point_masses(gyro: GyroLayout, oe: OeOrder, tensor_as_3x3: bool) -> Sid {
+    let masses =
+        [(1.0, Vector3::new(0.1, 0.2, 0.3)), (2.0, Vector3::new(1.0, -0.4, 0.5)), (0.7, Vector3::new(0.3, 0.9, -0.8))];
+    let nq = 3;
+    let phi = |i: usize| DMatrix::from_fn(3, nq, |axis, k| ((7 * i + 3 * axis + k) as f64).sin());
+    let shape = |i: usize, k: usize| Vector3::from_iterator(phi(i).column(k).iter().copied());
+    let zero = |rows, columns| DMatrix::zeros(rows, columns);
+
+    let (mut J0, mut J1) = (Matrix3::zeros(), vec![Matrix3::zeros(); nq]);
+    let (mut Gr, mut Oe, mut Ct, mut Me) = (zero(3, 3 * nq), zero(nq, 6), zero(nq, 3), zero(nq, nq));
+    for (i, (m, p)) in masses.iter().enumerate() {
+        let skew = |r: &Vector3<f64>| r.cross_matrix();
+        J0 += skew(p).transpose() * skew(p) * *m;
+        for k in 0..nq {
+            let u = shape(i, k);
+            J1[k] += (skew(p).transpose() * skew(&u) + skew(&u).transpose() * skew(p)) * *m;
+            // Gr_k = -2 ∫ p̃ ũ, whose symmetric part is J1_k.
+            let gyro_matrix = skew(p) * skew(&u) * (-2.0 * m);
+            for (row, axis) in (0..9).map(|n| (n / 3, n % 3)) {
+                Gr[(row, gyro.column(nq, axis, k))] += gyro_matrix[(row, axis)];
+                Ct[(k, axis)] += if row == 0 { m * u[axis] } else { 0.0 };
+            }
+            // Centrifugal products: ∫ (x φy + y φx)/..., minus the products of J1.
+            let columns = if oe == OeOrder::XyYzXz { [3, 5, 4] } else { [3, 4, 5] };
+            for ((a, b), column) in [(0, 1), (0, 2), (1, 2)].into_iter().zip(columns) {
+                Oe[(k, column)] += m * (p[a] * u[b] + p[b] * u[a]);
+            }
+            for l in 0..nq {
+                Me[(k, l)] += m * u.dot(&shape(i, l));
+            }
+        }
+    }
+    let six = |J: &Matrix3<f64>| {
+        DMatrix::from_column_slice(6, 1, &[J[(0, 0)], J[(1, 1)], J[(2, 2)], J[(0, 1)], J[(0, 2)], J[(1, 2)]])
+    };
+    let as_file = |J: &Matrix3<f64>| if tensor_as_3x3 { DMatrix::from_fn(3, 3, |i, j| J[(i, j)]) } else { six(J) };
+    let node = SidNode {
+        id: 26,
+        rframe: "body ref".into(),
+        origin: SidMatrix::linear(
+            &DMatrix::from_column_slice(3, 1, masses[0].1.as_slice()),
+            &[zero(3, 1), zero(3, 1), zero(3, 1)],
+        ),
+        phi: SidMatrix::constant(nq, &phi(0)),
+        psi: SidMatrix::constant(nq, &zero(3, nq)),
+        AP: SidMatrix::linear(&DMatrix::identity(3, 3), &[zero(3, 3), zero(3, 3), zero(3, 3)]),
+        sigma: Some(SidMatrix::constant(nq, &zero(6, nq))),
+    };
+    Sid {
+        comment: " point masses = 3".into(),
+        mass: 3.7,
+        modes: vec!["first = bending".into(), "second".into(), String::new()],
+        nodes: vec![node],
+        mdCM: SidMatrix::constant(nq, &zero(3, 1)),
+        J: SidMatrix::linear(&as_file(&J0), &J1.iter().map(as_file).collect::<Vec<_>>()),
+        Ct: SidMatrix::constant(nq, &Ct),
+        Cr: SidMatrix::constant(nq, &zero(nq, 3)),
+        Me: SidMatrix { structure: 2, ..SidMatrix::constant(nq, &Me) },
+        Gr: SidMatrix::constant(nq, &Gr),
+        Ge: SidMatrix::constant(nq, &zero(nq, 3 * nq)),
+        Oe: SidMatrix::constant(nq, &Oe),
+        ksigma: SidMatrix::constant(nq, &zero(nq, 1)),
+        Ke: SidMatrix { structure: 4, nrow: nq, ncol: nq, nq, ..SidMatrix::default() },
+        De: SidMatrix::constant(nq, &zero(nq, nq)),
+        others: vec![("Kgeo".into(), SidMatrix::constant(nq, &Me))],
+    }
+}
+
+#[test]
+fn a_written_body_reads_back_to_the_last_bit() {
+    for tensor in [false, true] {
+        let sid = point_masses(GyroLayout::ComponentMajor, OeOrder::XyYzXz, tensor);
+        let text = write_sid(&sid);
+        assert_eq!(parse_sid(&text, "t").unwrap(), sid, "{text}");
+        assert_eq!(sid.Ke.m0(), DMatrix::identity(3, 3));
+        // CRLF, other indentation and case of the keywords change nothing.
+        let other: String =
+            text.lines().map(|line| format!("\t{}\r\n", line.trim().replace("end modal", "END  Modal"))).collect();
+        assert_eq!(parse_sid(&other, "t").unwrap(), sid);
+    }
+}
+
+#[test]
+fn the_orders_of_a_file_are_found_by_its_own_identities() {
+    for gyro in [GyroLayout::ComponentMajor, GyroLayout::ModeMajor] {
+        for oe in [OeOrder::XyYzXz, OeOrder::XyXzYz] {
+            for tensor in [false, true] {
+                let sid = point_masses(gyro, oe, tensor);
+                let found = sid.conventions("t").unwrap();
+                assert_eq!((found.gyro, found.oe), (gyro, oe));
+                assert!(found.gyro_residual < 1e-14 && found.oe_residual < 1e-14, "{found:?}"); // measured 8e-17, 0
+                let J1 = sid.J1(1);
+                assert!((sid.Oe(oe)[(1, 4)] + J1[(0, 2)]).abs() < 1e-14);
+            }
+        }
+    }
+    let mut wrong = point_masses(GyroLayout::ComponentMajor, OeOrder::XyYzXz, false);
+    wrong.Gr.entries0.insert((0, 0), 100.0);
+    assert_eq!(wrong.conventions("t").unwrap_err().kind, ExchangeErrorKind::Ambiguous);
+}
+
+#[test]
+fn the_sample_body_agrees_with_the_reduced_matrices() {
+    let Some(folder) = samples() else { return };
+    let path = folder.join("formats/beam_synthetic.SID_FEM");
+    let sid = read_sid(&path).unwrap();
+    assert_eq!((sid.nq(), sid.nodes.len(), sid.mass), (10, 2, 39.25));
+    assert_eq!(sid.modes[0], "B static ux");
+    assert_eq!(sid.nodes[1].id, 1002);
+    assert_eq!(sid.nodes[1].origin.m0().as_slice(), [1.0, 0.0, 0.0]);
+
+    let found = sid.conventions("sample").unwrap();
+    assert_eq!((found.gyro, found.oe), (GyroLayout::ComponentMajor, OeOrder::XyYzXz));
+    assert!(found.gyro_residual < 1e-10 && found.oe_residual < 1e-10, "{found:?}"); // measured 8e-13, 0
+
+    // AP1 is the skew matrix of psi: (row, mode, column).
+    let psi = sid.nodes[1].psi.m0();
+    for k in 0..10 {
+        let skew = Vector3::new(psi[(0, k)], psi[(1, k)], psi[(2, k)]).cross_matrix();
+        let AP1 = sid.nodes[1].AP.m1(k);
+        assert!((0..9).all(|n| AP1[(n / 3, n % 3)] == skew[(n / 3, n % 3)]), "{k}");
+    }
+
+    // A held: stiffness and mass of the first six shapes are the blocks of B.
+    let (K, M) = truth(&folder);
+    let error = |a: DMatrix<f64>, b: &DMatrix<f64>| {
+        let b = b.view((6, 6), (6, 6));
+        let places = (0..36).map(|n| (n / 6, n % 6));
+        places.map(|(i, j)| (a[(i, j)] - b[(i, j)]).abs() / (b[(i, i)] * b[(j, j)]).sqrt()).fold(0.0, f64::max)
+    };
+    // The file comes from another assembly of the same mesh, the truth from CalculiX.
+    let (of_K, of_M) = (error(sid.Ke.m0(), &K), error(sid.Me.m0(), &M));
+    assert!(of_K < 1e-8, "{of_K:.1e}"); // measured 6e-10
+    assert!(of_M < 1e-4, "{of_M:.1e}"); // measured 1.7e-5: CalculiX integrates the mass at four points
+
+    assert_eq!(parse_sid(&write_sid(&sid), "again").unwrap(), sid);
+}
+
+#[test]
+fn mistakes_are_named_with_line_and_block() {
+    let text = write_sid(&point_masses(GyroLayout::ComponentMajor, OeOrder::XyYzXz, false));
+    for (from, to, part) in [
+        ("          J\n", "          end Cr\n", "end Cr"),
+        ("nelastq                          =   3", "nelastq                          =   4", "3 lines ielastq"),
+        ("m0( 1, 1)", "m0( 9, 1)", "m0(9,1)"),
+        ("nq                     =   3", "nq                     = 999999999", "0 to 30000"),
+        ("3.7000000000000002D+00", "nan", "a finite number"),
+        ("    1    3    :", "    2    3    :", "as in its first line"),
+    ] {
+        let changed = text.replacen(from, to, 1);
+        assert!(changed != text, "{from}");
+        let error = parse_sid(&changed, "t").unwrap_err();
+        assert!(error.to_string().contains(part), "{part}: {error}");
+    }
+}
+
+proptest! {
+    #![proptest_config(fixed_cases())]
+
+    #[test]
+    fn bodies_that_are_cut_or_changed_do_not_panic(
+        cut in any::<prop::sample::Index>(),
+        changes in prop::collection::vec((any::<prop::sample::Index>(), 32..127_u8), 0..6),
+    ) {
+        let mut bytes = write_sid(&point_masses(GyroLayout::ModeMajor, OeOrder::XyYzXz, false)).into_bytes();
+        for (place, byte) in changes {
+            let i = place.index(bytes.len());
+            bytes[i] = byte;
+        }
+        let text = String::from_utf8_lossy(&bytes);
+        if let Ok(sid) = parse_sid(&text, "t") {
+            let _ = (sid.conventions("t"), sid.Me.m0(), write_sid(&sid));
+        }
+        let _ = parse_sid(&text[..cut.index(text.len())], "t");
+    }
+}
