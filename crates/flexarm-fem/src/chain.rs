@@ -10,7 +10,8 @@
 //! ```
 //! so the joints add up to the whole link whatever the planes and the mesh are; for a uniform beam
 //! `C_k` is the closed form of its piece. No section is made rigid to get there: segments reduced as
-//! superelements of their own, with tied sections, do not add up (compare `tests/chain.rs`).
+//! superelements of their own, with tied sections, do not add up: off by per cents
+//! (`segments_as_superelements_of_their_own_do_not_add_up_to_the_link` in the tests of the reduction).
 //!
 //! An element cut by a plane gives its energy to both sides by volume. The parts are cut at the
 //! joints, so each joint stands in the middle of the material that it replaces.

@@ -50,6 +50,7 @@ pub mod flex_file;
 pub mod frames;
 pub mod gate;
 pub mod material;
+pub mod matrix_link;
 pub mod mesh;
 pub mod mesh_gate;
 pub mod mesh_link;

@@ -19,7 +19,7 @@ use crate::gate::GateLimits;
 use crate::mesh::Mesh;
 use crate::mesh_gate::{ElementQuality, MeshGate, ModeCheck};
 use crate::model::{AssemblyError, AssemblyOptions, FeModel, materials};
-use crate::reduced::{LinkDetails, Provenance, ReducedLink};
+use crate::reduced::{ElasticSplit, LinkDetails, Provenance, ReducedLink};
 use crate::reduction::{
     Condensation, CondensationOptions, Interface, InterfaceFrame, ReductionError, SolverFigures, Superelement,
     spd_inverse, stiffness12,
@@ -59,6 +59,9 @@ pub struct LinkPlan {
     pub split: SplitAt,
     /// Chains to make, by their number of parts.
     pub chains: Vec<usize>,
+    /// Bodies that ride on the link without being in its mesh (motors, gears, cables), link axes; each
+    /// joins the rigid part on whose side of the cut its centre of mass lies.
+    pub attached: Vec<RigidPart>,
     /// Modes with A held against which the reduced models are judged.
     pub judged_modes: usize,
     /// Limits of the gate.
@@ -211,6 +214,8 @@ pub fn reduce_mesh(
     };
     let chains = plan.chains.iter().map(|parts| source.chain(*parts)).collect::<Result<Vec<_>, _>>()?;
     let gate = gate(&condensation, &superelement, &link, &whole, &fixed_modes, &held_modes, quality);
+    let mut chains = chains;
+    attach(&plan.attached, &mut link, &mut chains)?;
     warnings.extend(gate.warnings());
     warnings.extend(implausible(mesh, &whole, &held_modes));
     link.details = Some(Box::new(LinkDetails { superelement: Some(superelement), chains, gate: Some(gate) }));
@@ -245,35 +250,65 @@ fn split(
     at: SplitAt,
     warnings: &mut Vec<String>,
 ) -> Result<(LinkFrames, [RigidPart; 2]), MeshLinkError> {
-    let (p_LA, p_LB, along) = (frames.X_LA.translation.vector, frames.X_LB.translation.vector, frames.p_AB());
-    let middle = p_LA + along * 0.5;
-    let parts = |p: Vector3<f64>| -> Result<[RigidPart; 2], CutError> {
-        let mut parts = cut(mesh, densities, &[CutPlane { point: p, normal: along }])?.into_iter();
+    let normal = frames.p_AB();
+    let parts = |point: Vector3<f64>| -> Result<[RigidPart; 2], CutError> {
+        let mut parts = cut(mesh, densities, &[CutPlane { point, normal }])?.into_iter();
         match (parts.next(), parts.next()) {
             (Some(proximal), Some(distal)) => Ok([proximal, distal]),
             _ => Err(CutError::NoElements),
         }
     };
-    let p_LS = match at {
-        SplitAt::MidLength => middle,
-        SplitAt::Fraction(fraction) => p_LA + along * fraction,
-        SplitAt::Point(point) => point,
+    let (p_LS, said) = split_point(&frames, K12, at, &|p| parts(p).is_ok());
+    warnings.extend(said);
+    Ok((frames.with_split(Pose::translation(p_LS.x, p_LS.y, p_LS.z)), parts(p_LS)?))
+}
+
+/// Merges bodies into the parts on whose side of the joints they lie.
+fn attach(attached: &[RigidPart], link: &mut ReducedLink, chains: &mut [Chain]) -> Result<(), FemError> {
+    let along = link.p_AB();
+    let is_beyond =
+        |body: &RigidPart, joint: &ElasticSplit| (body.com - joint.X_LS.translation.vector).dot(&along) > 0.0;
+    for body in attached {
+        body.check("an attached body")?;
+        let part = if is_beyond(body, &link.split) { &mut link.distal } else { &mut link.proximal };
+        *part = part.merged(body);
+        for chain in chains.iter_mut() {
+            let index = chain.joints.iter().filter(|joint| is_beyond(body, joint)).count();
+            chain.parts[index] = chain.parts[index].merged(body);
+        }
+    }
+    Ok(())
+}
+
+/// The split point, link axes, and a sentence where it is not the one asked for.
+///
+/// * `possible`: whether a cut there leaves two parts.
+pub(crate) fn split_point(
+    frames: &LinkFrames,
+    K12: &Matrix12,
+    at: SplitAt,
+    possible: &dyn Fn(Vector3<f64>) -> bool,
+) -> (Vector3<f64>, Option<String>) {
+    let (p_LA, p_LB, along) = (frames.X_LA.translation.vector, frames.X_LB.translation.vector, frames.p_AB());
+    let middle = p_LA + along * 0.5;
+    match at {
+        SplitAt::MidLength => (middle, None),
+        SplitAt::Fraction(fraction) => (p_LA + along * fraction, None),
+        SplitAt::Point(point) => (point, None),
         SplitAt::ElasticCentre => {
             let K_BB = DMatrix::from_fn(6, 6, |i, j| K12[(6 + i, 6 + j)]);
             let C = spd_inverse(&K_BB).map(|C| symmetric_part(&Matrix6::from_column_slice(C.as_slice())));
             let centre = C.and_then(|C| centre_of_compliance(&C, &p_LB));
             let fraction = |p: &Vector3<f64>| (p - p_LA).dot(&along) / along.norm_squared();
-            match centre.filter(|p| (0.1..=0.9).contains(&fraction(p)) && parts(*p).is_ok()) {
-                Some(centre) => centre,
+            match centre.filter(|p| (0.1..=0.9).contains(&fraction(p)) && possible(*p)) {
+                Some(centre) => (centre, None),
                 None => {
-                    warnings.push("the elastic centre lies outside the middle of the link; split at mid length".into());
-                    middle
+                    let said = "the elastic centre lies outside the middle of the link; split at mid length";
+                    (middle, Some(said.into()))
                 }
             }
         }
-    };
-    let parts = parts(p_LS)?;
-    Ok((frames.with_split(Pose::translation(p_LS.x, p_LS.y, p_LS.z)), parts))
+    }
 }
 
 /// Everything that is checked on a finished reduction.

@@ -207,6 +207,12 @@ impl FeModel {
         Ok(Self { dofs, nodes: mesh.nodes.clone(), K, M })
     }
 
+    /// A model whose matrices come from elsewhere; it has rows, but no nodes.
+    pub fn from_matrices(K: SparseSymmetric, M: SparseSymmetric) -> Self {
+        let dofs = DofMap { first: (0..=K.size() as u32).collect() };
+        Self { nodes: vec![Vector3::zeros(); K.size()], dofs, K, M: MassMatrix::from_general(M) }
+    }
+
     /// Number of DoF.
     pub fn size(&self) -> usize {
         self.dofs.size()

@@ -63,14 +63,16 @@ impl Superelement {
     }
 }
 
-/// Stiffness of the first two interfaces with every other one free; `None` where another holds nothing.
+/// Stiffness of the first two interfaces with every other one, and every mode, free; `None` where
+/// one of those holds nothing.
 pub fn stiffness12(element: &Superelement) -> Option<Matrix12> {
-    let n = element.boundary();
-    let K = element.K.view((0, 0), (n, n));
+    let n = element.K.nrows();
+    let K = &element.K;
     let mut K12 = K.view((0, 0), (12, 12)).into_owned();
-    if n > 12 {
+    let K_cb = K.view((12, 0), (n - 12, 12)).into_owned();
+    // Modes of Craig and Bampton have no stiffness with the interfaces.
+    if K_cb.iter().any(|k| *k != 0.0) {
         let K_cc = K.view((12, 12), (n - 12, n - 12)).into_owned();
-        let K_cb = K.view((12, 0), (n - 12, 12)).into_owned();
         K12 -= K_cb.transpose() * spd_inverse(&K_cc)? * K_cb;
     }
     Some(Matrix12::from_column_slice(K12.as_slice()))

@@ -1,0 +1,240 @@
+//! From matrices of another FE program to a checked flexible link.
+//!
+//! ```text
+//! full K, M (.sti/.mas, HDF5) --Guyan or Craig-Bampton--> superelement --+
+//! reduced K, M (DMIG, .mtx, OP4, ...) -------------------> superelement --+--gate--> ReducedLink
+//! ```
+//! Start at [`link_from_superelement`]; a full model goes through [`reduce_matrices`] first.
+//!
+//! A matrix says nothing about where the mass sits along the link, so the two rigid parts are given, or
+//! are the halves of the uniform bar with the same mass, centre of mass and inertia
+//! ([`halves_of_bar`]), which is said in a warning.
+
+use nalgebra::{DMatrix, Matrix3, Vector3};
+
+use crate::chain::Chain;
+use crate::error::FemError;
+use crate::frames::LinkFrames;
+use crate::gate::GateLimits;
+use crate::mesh_link::{MeshLinkError, SplitAt, condensed_body, split_point};
+use crate::model::FeModel;
+use crate::reduced::{LinkDetails, Provenance, ReducedLink};
+use crate::reduction::{Boundary, Condensation, CondensationOptions, InterfaceFrame, Superelement, stiffness12};
+use crate::rigid_part::RigidPart;
+use crate::sparse::{ModesWanted, SparseSymmetric};
+use crate::spatial::Pose;
+
+/// Where the masses of the two parts come from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum PartMasses {
+    /// Given: proximal and distal, link axes.
+    Given([RigidPart; 2]),
+    /// One body, halved as a uniform bar.
+    Whole(RigidPart),
+    /// The mass matrix, halved as a uniform bar.
+    FromMatrix,
+}
+
+/// What to make of a superelement.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MatrixPlan {
+    /// Name of the link.
+    pub name: String,
+    /// Masses of the parts.
+    pub masses: PartMasses,
+    /// Place of the elastic joint.
+    pub split: SplitAt,
+    /// Limits of the gate.
+    pub limits: GateLimits,
+    /// Where the numbers come from.
+    pub provenance: Provenance,
+}
+
+/// What came out.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MatrixReduction {
+    /// The link, with its superelement if the matrices had a mass.
+    pub link: ReducedLink,
+    /// Mass properties according to the matrices or the plan.
+    pub whole: RigidPart,
+    /// Frequencies with A held and everything else free, Hz; empty without mass.
+    pub held_frequencies_hz: Vec<f64>,
+    /// The same of the two rigid parts with their joint.
+    pub lumped_frequencies_hz: Vec<f64>,
+    /// Sentences about what was accepted, but is worth a look.
+    pub warnings: Vec<String>,
+}
+
+/// Reduces a full model to some of its own DoF: six per interface, in order.
+///
+/// * `K`, `M`: SI, the same rows.
+/// * `boundary`: rows kept, interface by interface, `ux uy uz rx ry rz`.
+/// * `frames`: the interfaces they belong to.
+///
+/// # Errors
+/// [`MeshLinkError::Reduction`], [`MeshLinkError::Modes`].
+pub fn reduce_matrices(
+    K: SparseSymmetric,
+    M: SparseSymmetric,
+    boundary: &[u32],
+    frames: Vec<InterfaceFrame>,
+    modes: ModesWanted,
+    options: CondensationOptions,
+) -> Result<Superelement, MeshLinkError> {
+    let model = FeModel::from_matrices(K, M);
+    let boundary = Boundary::retained(model.size(), boundary);
+    let condensation = Condensation::with_boundary(&model, boundary, options)?;
+    let modes = condensation.fixed_modes(modes)?;
+    Ok(condensation.superelement(frames, &modes))
+}
+
+/// The superelement with its matrices turned from the axes they were given in to link axes.
+///
+/// * `R_LM`: axes of the matrices in link axes.
+pub fn turned(element: Superelement, R_LM: &Matrix3<f64>) -> Superelement {
+    let n = element.K.nrows();
+    let mut Q = DMatrix::identity(n, n);
+    for corner in (0..element.boundary()).step_by(3) {
+        Q.view_mut((corner, corner), (3, 3)).copy_from(R_LM);
+    }
+    let turn = |A: &DMatrix<f64>| &Q * A * Q.transpose();
+    Superelement { K: turn(&element.K), M: turn(&element.M), interfaces: element.interfaces }
+}
+
+/// Makes a link of a superelement in link axes; `has_mass`: whether its mass means anything.
+///
+/// # Errors
+/// [`MeshLinkError::Gate`] for a stiffness that fails the gate, or a mass that is missing or impossible.
+pub fn link_from_superelement(
+    element: Superelement,
+    has_mass: bool,
+    plan: &MatrixPlan,
+) -> Result<MatrixReduction, MeshLinkError> {
+    let loose = FemError::Missing { what: "stiffness of an interface or a mode", help: "it holds nothing" };
+    let K12 = stiffness12(&element).ok_or(loose)?;
+    let frames = LinkFrames::new(element.interfaces[0].X_LI, element.interfaces[1].X_LI);
+    let mut warnings = Vec::new();
+    let (p, said) = split_point(&frames, &K12, plan.split, &|_| true);
+    warnings.extend(said);
+    let frames = frames.with_split(Pose::translation(p.x, p.y, p.z));
+
+    let whole = match &plan.masses {
+        PartMasses::Given([proximal, distal]) => proximal.merged(distal),
+        PartMasses::Whole(whole) => whole.clone(),
+        PartMasses::FromMatrix if has_mass => condensed_body(&element),
+        PartMasses::FromMatrix => {
+            let help = "give the mass matrix, or mass, centre of mass and inertia of the link or of its two parts";
+            return Err(FemError::Missing { what: "mass", help }.into());
+        }
+    };
+    whole.check("the link")?;
+    let parts = match &plan.masses {
+        PartMasses::Given(parts) => parts.clone(),
+        _ => {
+            warnings.push(
+                "the masses of the two parts are the halves of a uniform bar with the mass, centre of mass and \
+                 inertia of the link: a matrix does not say where the mass sits; give the parts if they are known"
+                    .into(),
+            );
+            halves_of_bar(&whole, &frames.p_AB())
+        }
+    };
+    let mut link = ReducedLink::from_matrix12(&plan.name, frames, &K12, parts, plan.provenance.clone(), &plan.limits)?;
+    let held_frequencies_hz = if has_mass { element.frequencies_hz(&[0]) } else { Vec::new() };
+    if has_mass && held_frequencies_hz.is_empty() {
+        warnings.push("the mass matrix is not positive definite: no frequencies, the modal link cannot be used".into());
+    }
+    if has_mass && let PartMasses::Given(_) | PartMasses::Whole(_) = plan.masses {
+        let found = condensed_body(&element).mass;
+        if (found / whole.mass - 1.0).abs() > 0.01 {
+            warnings.push(format!("the mass matrix says {found:.6} kg, the given masses sum to {:.6} kg", whole.mass));
+        }
+    }
+    let lumped = Chain { joints: vec![link.split.clone()], parts: vec![link.proximal.clone(), link.distal.clone()] };
+    let lumped_frequencies_hz = lumped.held_frequencies_hz();
+    if has_mass {
+        link.details = Some(Box::new(LinkDetails { superelement: Some(element), ..LinkDetails::default() }));
+    }
+    warnings.extend(link.warnings(&plan.limits));
+    Ok(MatrixReduction { link, whole, held_frequencies_hz, lumped_frequencies_hz, warnings })
+}
+
+/// A body as two halves along an axis: together they have its mass, centre of mass and inertia.
+///
+/// Each half of a uniform bar of length l has its centre l/4 from the middle, where `l²/12` is the
+/// second moment of the bar along its axis over its mass.
+pub fn halves_of_bar(whole: &RigidPart, along: &Vector3<f64>) -> [RigidPart; 2] {
+    let axis = along.normalize();
+    // Second moment along the axis: half the trace less the moment about it.
+    let spread = (whole.inertia.trace() / 2.0 - axis.dot(&(whole.inertia * axis))).max(0.0) / whole.mass;
+    let offset = axis * (0.75 * spread).sqrt();
+    let c = offset.cross_matrix();
+    // Steiner with the mass of both halves at +-offset.
+    let inertia = (whole.inertia + c * c * whole.mass) * 0.5;
+    let half = |com| RigidPart { mass: whole.mass / 2.0, com, inertia };
+    [half(whole.com - offset), half(whole.com + offset)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::beam::{Beam, BeamTheory};
+    use crate::material::Material;
+    use crate::section::Section;
+
+    /// Truth: the two halves of a uniform beam, in closed form.
+    #[test]
+    fn the_halves_of_a_uniform_bar_are_its_halves() {
+        let bar = Section::Rectangle { width: 0.04, height: 0.06 }.bar(&Material::STEEL).unwrap();
+        let beam = Beam::new(bar, BeamTheory::EulerBernoulli, 0.9).unwrap();
+        let halves = halves_of_bar(&beam.piece(0.0, 1.0).unwrap(), &Vector3::x());
+        for (half, truth) in halves.iter().zip([beam.piece(0.0, 0.5).unwrap(), beam.piece(0.5, 1.0).unwrap()]) {
+            assert!((half.mass / truth.mass - 1.0).abs() < 1e-12);
+            assert!((half.com - truth.com).norm() < 1e-12);
+            assert!((half.inertia - truth.inertia).amax() < 1e-12 * truth.inertia.amax().max(1.0));
+        }
+    }
+
+    /// Truth: the parts together are the whole.
+    #[test]
+    fn two_halves_make_the_body_again() {
+        let whole = RigidPart {
+            mass: 30.0,
+            com: Vector3::new(0.1, -0.2, 0.5),
+            inertia: Matrix3::new(2.0, 0.1, -0.2, 0.1, 2.2, 0.05, -0.2, 0.05, 0.6),
+        };
+        let [a, b] = halves_of_bar(&whole, &Vector3::new(0.1, 0.05, 1.0));
+        let again = a.merged(&b);
+        assert!((again.inertia - whole.inertia).amax() < 1e-13 && (again.com - whole.com).norm() < 1e-14);
+        a.check("a half").unwrap();
+    }
+
+    /// Second algorithm: the beam's own 12x12 and mass, through the route of imported matrices.
+    #[test]
+    fn a_beam_as_matrices_gives_the_beam_as_a_link() {
+        let bar = Section::Rectangle { width: 0.04, height: 0.06 }.bar(&Material::STEEL).unwrap();
+        let beam = Beam::new(bar, BeamTheory::Timoshenko, 0.9).unwrap();
+        let frame =
+            |name: &str, x| InterfaceFrame { name: name.into(), X_LI: Pose::translation(x, 0.0, 0.0), tie: None };
+        let element = Superelement {
+            interfaces: vec![frame("A", 0.0), frame("B", 0.9)],
+            K: DMatrix::from_column_slice(12, 12, beam.stiffness12().as_slice()),
+            M: DMatrix::from_column_slice(12, 12, beam.mass12().as_slice()),
+        };
+        let plan = MatrixPlan {
+            name: "beam".into(),
+            masses: PartMasses::FromMatrix,
+            split: SplitAt::ElasticCentre,
+            limits: GateLimits::default(),
+            provenance: Provenance::default(),
+        };
+        let result = link_from_superelement(element.clone(), true, &plan).unwrap();
+        assert!((result.link.K_BB - beam.tip_stiffness()).amax() < 1e-9 * beam.tip_stiffness().amax());
+        assert!((result.link.split.X_LS.translation.vector - Vector3::new(0.45, 0.0, 0.0)).norm() < 1e-9);
+        let error = result.whole.mass / beam.piece(0.0, 1.0).unwrap().mass - 1.0;
+        assert!(error.abs() < 1e-12, "{error:.1e}");
+
+        let without = link_from_superelement(element, false, &plan).unwrap_err().to_string();
+        assert!(without.contains("mass is missing"), "{without}");
+    }
+}
