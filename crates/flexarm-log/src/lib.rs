@@ -3,9 +3,10 @@
 //! A run hands over one [`RunHeader`], then [`Sample`]s, then its result figures; every [`Recorder`] takes the
 //! same three calls, and [`RecorderSet`] passes them to several files at once. Start at [`CsvRecorder`] for
 //! tables, `McapRecorder` (feature `mcap`) for ROS 2 tools, Foxglove and PlotJuggler, `RrdRecorder` (feature
-//! `rerun`) for the Rerun viewer with meshes and a layout.
+//! `rerun`) for the Rerun viewer with meshes and a layout. Pictures of a mesh reduction are a module of their
+//! own, `mesh_picture` (feature `png`).
 //!
-//! What all three promise:
+//! What all three recorders promise:
 //! * a file is created by [`Recorder::begin`] and replaces an existing one only if told to
 //!   ([`CreateOptions::overwrite`]);
 //! * a killed run loses at most the last moment ([`CreateOptions::flush_every`]), and what is left can be read;
@@ -45,6 +46,8 @@ mod csv_file;
 mod error;
 #[cfg(feature = "mcap")]
 mod mcap_file;
+#[cfg(feature = "png")]
+pub mod mesh_picture;
 mod multi;
 mod record;
 #[cfg(feature = "rerun")]

@@ -1,0 +1,71 @@
+//! An image in memory and its way into a PNG file.
+
+/// Red, green, blue.
+pub type Rgb = [u8; 3];
+
+/// Pixels of a picture, four bytes each, row by row from the top left.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Image {
+    /// Pixels in a row.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Red, green, blue, alpha; `4 * width * height` bytes.
+    pub rgba: Vec<u8>,
+}
+
+impl Image {
+    /// An image of one colour.
+    pub fn new(width: usize, height: usize, color: Rgb) -> Self {
+        let [r, g, b] = color;
+        Self { width, height, rgba: [r, g, b, 255].repeat(width * height) }
+    }
+
+    /// Colour of a pixel; black outside.
+    pub fn pixel(&self, x: usize, y: usize) -> Rgb {
+        let at = 4 * (y * self.width + x);
+        match self.rgba.get(at..at + 3) {
+            Some(&[r, g, b]) if x < self.width => [r, g, b],
+            _ => [0; 3],
+        }
+    }
+
+    /// Lays `color` over a pixel; `alpha` 1 covers it. Outside nothing happens.
+    pub fn blend(&mut self, x: usize, y: usize, color: Rgb, alpha: f32) {
+        if x >= self.width || y >= self.height {
+            return;
+        }
+        let at = 4 * (y * self.width + x);
+        for (old, new) in self.rgba[at..at + 3].iter_mut().zip(color) {
+            let mixed = f32::from(*old) + (f32::from(new) - f32::from(*old)) * alpha;
+            *old = mixed.round().clamp(0.0, 255.0) as u8;
+        }
+    }
+
+    /// Copies `other` with its top left corner at (`left`, `top`); what does not fit is left out.
+    pub fn paste(&mut self, other: &Self, left: usize, top: usize) {
+        let columns = other.width.min(self.width.saturating_sub(left));
+        for y in 0..other.height.min(self.height.saturating_sub(top)) {
+            let from = 4 * y * other.width;
+            let to = 4 * ((top + y) * self.width + left);
+            self.rgba[to..to + 4 * columns].copy_from_slice(&other.rgba[from..from + 4 * columns]);
+        }
+    }
+
+    /// The image as a PNG file, without date or program name: same image, same bytes.
+    ///
+    /// # Errors
+    /// An image without pixels, or of more than a PNG can hold.
+    pub fn to_png(&self) -> Result<Vec<u8>, String> {
+        let size = |n: usize| u32::try_from(n).map_err(|_| format!("{n} pixels are too many for a PNG"));
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, size(self.width)?, size(self.height)?);
+        encoder.set_color(png::ColorType::Rgba);
+        encoder.set_depth(png::BitDepth::Eight);
+        encoder.set_compression(png::Compression::Balanced);
+        let mut writer = encoder.write_header().map_err(|error| error.to_string())?;
+        writer.write_image_data(&self.rgba).map_err(|error| error.to_string())?;
+        writer.finish().map_err(|error| error.to_string())?;
+        Ok(bytes)
+    }
+}

@@ -1,0 +1,106 @@
+//! The words beside the views: what is tied how, where the cut is, what the parts weigh.
+
+use flexarm_fem::reduction::Tie;
+
+use super::MeshPictures;
+use super::color;
+use super::draw::{Align, Style, wrap};
+use super::image::{Image, Rgb};
+use super::numbers;
+use super::sheet::{self, HEAD, HEIGHT, WIDTH};
+use super::surface::Tied;
+use super::view::side_name;
+
+/// Width of the legend, pixels.
+pub(super) const LEGEND: usize = 392;
+
+/// Writes line after line.
+struct Column<'a> {
+    sheet: &'a mut Image,
+    left: f64,
+    y: f64,
+}
+
+impl Column<'_> {
+    fn line(&mut self, text: &str, style: Style) {
+        for line in wrap(text, WIDTH as f64 - self.left - 12.0, style) {
+            // A legend that is too long ends; it never runs off the sheet.
+            if self.y > HEIGHT as f64 - 10.0 {
+                return;
+            }
+            self.sheet.text(&line, [self.left, self.y], Align::Left, style);
+            self.y += style.size * 1.42;
+        }
+    }
+
+    fn heading(&mut self, text: &str, color: Rgb) {
+        self.y += 11.0;
+        if self.y <= HEIGHT as f64 - 10.0 {
+            sheet::swatch(self.sheet, [self.left - 25.0, self.y], color);
+        }
+        self.line(text, Style::new(18.0, color::INK).bold());
+    }
+}
+
+/// Writes the legend down the right side of the sheet.
+pub(super) fn draw(sheet: &mut Image, pictures: &MeshPictures<'_>, tied: &[Tied]) {
+    let (plain, faint, alert) =
+        (Style::new(15.0, color::INK), Style::new(15.0, color::FAINT), Style::new(15.0, color::ALERT).bold());
+    let mut column = Column { sheet, left: (WIDTH - LEGEND) as f64 + 46.0, y: HEAD as f64 + 20.0 };
+    for (number, (interface, tied)) in pictures.interfaces.iter().zip(tied).enumerate() {
+        let role = ["held in the pictures", "loaded in the pictures", "a further interface"][number.min(2)];
+        column.heading(&format!("{}: {role}", interface.name), color::interface(number));
+        let tie = match interface.tie {
+            Tie::Rigid => "rigid tie (RBE2)",
+            Tie::Distributing => "distributing tie (RBE3)",
+        };
+        column.line(&format!("{tie}, {} node(s)", interface.nodes.len()), plain);
+        if tied.faces > 0 {
+            column.line(&format!("{} faces, {}, {}", tied.faces, numbers::area(tied.area), shape(tied)), plain);
+        }
+        let of = if tied.faces > 0 { "faces" } else { "nodes" };
+        let origin = interface.X_LI.translation.vector;
+        column.line(&format!("origin {}", numbers::position(&origin)), faint);
+        column.line(&format!("{} from the centre of the {of}", numbers::offset((tied.centre - origin).norm())), faint);
+        let has_solids = !pictures.surface.features.is_empty() || !pictures.surface.grid.is_empty();
+        if tied.faces == 0 && has_solids {
+            column.line("No face of the skin is tied as a whole, only single nodes.", alert);
+        }
+        if tied.torn > 0 {
+            let count = tied.torn;
+            column.line(&format!("{count} faces are tied by their corners only, mid-side nodes are loose."), alert);
+        }
+    }
+
+    let (reduction, link) = (pictures.reduction, &pictures.reduction.link);
+    let p_LS = link.split.X_LS.translation.vector;
+    let along = link.p_AB();
+    let fraction = along.dot(&(p_LS - link.X_LA.translation.vector)) / along.norm_squared();
+    column.heading("S: cut and elastic joint", color::CUT);
+    column.line(&format!("at {}", numbers::position(&p_LS)), plain);
+    column.line(&format!("{:.0} % of the way from A to B, across AB", 100.0 * fraction), plain);
+
+    let kilograms = |mass: f64| format!("{} kg", numbers::significant(mass, 4));
+    column.heading(&format!("part of A: {}", kilograms(link.proximal.mass)), color::PROXIMAL);
+    column.heading(&format!("part of B: {}", kilograms(link.distal.mass)), color::DISTAL);
+    column.line(&format!("whole mesh {}", kilograms(reduction.whole.mass)), plain);
+    column.y += 9.0;
+    column.line(&format!("A to B {} mm", numbers::significant(along.norm() * 1e3, 4)), faint);
+    let mesh = pictures.mesh;
+    column.line(&format!("{} elements, {} nodes", mesh.element_count(), mesh.nodes.len()), faint);
+    if !reduction.warnings.is_empty() {
+        column.y += 9.0;
+        column.line(&format!("{} warning(s) of the reduction:", reduction.warnings.len()), alert);
+        for warning in &reduction.warnings {
+            column.line(warning, Style::new(13.0, color::ALERT));
+        }
+    }
+}
+
+/// Flat or curved, and where it looks.
+fn shape(tied: &Tied) -> String {
+    if tied.normal.norm() > 0.999 {
+        return format!("flat, facing {}", side_name(&tied.normal));
+    }
+    "curved or several".into()
+}

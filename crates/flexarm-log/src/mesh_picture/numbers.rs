@@ -1,0 +1,94 @@
+//! Numbers as people read them, units included.
+
+use nalgebra::Vector3;
+
+/// A number with `digits` significant digits, without exponent.
+pub(super) fn significant(value: f64, digits: i32) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return format!("{value}");
+    }
+    let decimals = (digits - 1 - value.abs().log10().floor() as i32).clamp(0, 9) as usize;
+    format!("{value:.decimals$}")
+}
+
+/// Unit in which a length reads well, and its size in m.
+fn length_unit(size: f64) -> (&'static str, f64) {
+    match size.abs() {
+        x if x >= 10.0 => ("m", 1.0),
+        x if x >= 1e-4 => ("mm", 1e-3),
+        x if x >= 1e-7 || x == 0.0 => ("µm", 1e-6),
+        _ => ("nm", 1e-9),
+    }
+}
+
+/// A displacement, m, in the unit that suits it.
+pub(super) fn displacement(value: f64) -> String {
+    let (unit, size) = length_unit(value);
+    format!("{} {unit}", significant(value / size, 3))
+}
+
+/// A displacement vector, m, in the unit of its largest component; zero if that is below `noise`.
+pub(super) fn displacements(u: &Vector3<f64>, noise: f64) -> String {
+    if u.amax() <= noise {
+        return "0".into();
+    }
+    let (unit, size) = length_unit(u.amax());
+    format!("{} {unit}", triple(&(u / size), u.amax() / size))
+}
+
+/// A small rotation, rad, in mrad or µrad; zero if it is below `noise`.
+pub(super) fn rotations(theta: &Vector3<f64>, noise: f64) -> String {
+    if theta.amax() <= noise {
+        return "0".into();
+    }
+    let (unit, size) = if theta.amax() >= 1e-4 { ("mrad", 1e-3) } else { ("µrad", 1e-6) };
+    format!("{} {unit}", triple(&(theta / size), theta.amax() / size))
+}
+
+/// Three numbers with as many decimals as the largest deserves.
+fn triple(v: &Vector3<f64>, largest: f64) -> String {
+    let decimals = if largest > 0.0 { (2 - largest.log10().floor() as i32).clamp(0, 6) as usize } else { 0 };
+    let [x, y, z] = [v.x, v.y, v.z].map(|x| {
+        let text = format!("{x:.decimals$}");
+        // What rounds to nothing has no sign.
+        if text.bytes().all(|b| matches!(b, b'-' | b'0' | b'.')) { text.replace('-', "") } else { text }
+    });
+    format!("({x}, {y}, {z})")
+}
+
+/// A position, m, in mm.
+pub(super) fn position(p: &Vector3<f64>) -> String {
+    let [x, y, z] = [p.x, p.y, p.z].map(|x| (x * 1e4).round() / 10.0 + 0.0);
+    format!("({x}, {y}, {z}) mm")
+}
+
+/// A distance, m, to 0.1 mm.
+pub(super) fn offset(value: f64) -> String {
+    format!("{:.1} mm", value * 1e3)
+}
+
+/// An area, m², in cm².
+pub(super) fn area(value: f64) -> String {
+    format!("{} cm²", significant(value * 1e4, 3))
+}
+
+/// The longest of 1, 2, 5, 10, ... that is not longer than `limit`.
+pub(super) fn round_below(limit: f64) -> f64 {
+    let decade = 10_f64.powi(limit.log10().floor() as i32);
+    [5.0, 2.0, 1.0].into_iter().map(|k| k * decade).find(|x| *x <= limit * (1.0 + 1e-12)).unwrap_or(decade)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_read_as_on_a_drawing() {
+        assert_eq!(displacement(0.000359), "0.359 mm");
+        assert_eq!(displacement(-4.2e-5), "-42.0 µm");
+        assert_eq!(displacements(&Vector3::new(1e-5, -2.5e-3, -1e-9), 1e-9), "(0.01, -2.50, 0.00) mm");
+        assert_eq!(rotations(&Vector3::new(0.0, 1e-16, 0.0), 1e-12), "0");
+        assert_eq!(position(&Vector3::new(0.04, -0.11, 1.1)), "(40, -110, 1100) mm");
+        assert_eq!([round_below(0.27), round_below(0.5), round_below(1.9)], [0.2, 0.5, 1.0]);
+    }
+}

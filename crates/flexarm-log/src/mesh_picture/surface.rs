@@ -1,0 +1,158 @@
+//! The drawable surface of a mesh, and which of its faces an interface ties.
+
+use nalgebra::Vector3;
+
+use flexarm_fem::Mesh;
+use flexarm_fem::mesh::skin;
+use flexarm_fem::reduction::Interface;
+
+use super::topology::{feature_edges, triangle_normals};
+
+/// Radius of the rods that stand for beam elements, as a share of the size of the mesh.
+const ROD: f64 = 0.008;
+/// Sides of such a rod.
+const ROD_SIDES: u32 = 8;
+
+/// Skin of the solids, rods for the beams.
+#[derive(Debug)]
+pub(super) struct Surface {
+    /// Undeformed, m.
+    pub(super) positions: Vec<Vector3<f64>>,
+    /// Node of the mesh that each position moves with.
+    pub(super) nodes: Vec<u32>,
+    pub(super) triangles: Vec<[u32; 3]>,
+    /// Face of each triangle of the solids.
+    face_of: Vec<u32>,
+    /// Corner and mid-side nodes of each face, nodes of the mesh.
+    faces: Vec<(Vec<u32>, Vec<u32>)>,
+    /// Edges of the body.
+    pub(super) features: Vec<[u32; 2]>,
+    /// Edges of the faces.
+    pub(super) grid: Vec<[u32; 2]>,
+    /// Diagonal of the box around it, m.
+    pub(super) size: f64,
+}
+
+/// What an interface ties, as far as it is seen.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Tied {
+    /// Per triangle: whether it belongs to a tied face.
+    pub(super) triangles: Vec<bool>,
+    /// Faces of which every node is tied.
+    pub(super) faces: usize,
+    /// Faces of which all corners, but not all mid-side nodes are tied.
+    pub(super) torn: usize,
+    /// m².
+    pub(super) area: f64,
+    /// Mean outward normal: of length one where the faces are flat, shorter where they are curved.
+    pub(super) normal: Vector3<f64>,
+    /// Centre of the faces, m; of the nodes where there is no face.
+    pub(super) centre: Vector3<f64>,
+}
+
+impl Surface {
+    /// `None` for a mesh without elements.
+    pub(super) fn new(mesh: &Mesh) -> Option<Self> {
+        let (low, high) = mesh.bounding_box()?;
+        let skin = skin(mesh);
+        let nodes = skin.nodes();
+        let mut vertex_of = vec![u32::MAX; mesh.nodes.len()];
+        for (vertex, node) in (0..).zip(&nodes) {
+            vertex_of[*node as usize] = vertex;
+        }
+        let vertex = |node: &u32| vertex_of[*node as usize];
+        let triangles: Vec<[u32; 3]> = skin.triangles().iter().map(|t| t.each_ref().map(vertex)).collect();
+
+        let (mut face_of, mut faces, mut grid) = (Vec::with_capacity(triangles.len()), Vec::new(), Vec::new());
+        for (number, face) in (0..).zip(skin.faces()) {
+            let (c, m) = (face.corners, face.midsides);
+            // As many as `Skin::triangles` makes.
+            let count = if m.is_empty() { c.len() - 2 } else { 2 * m.len() - 2 };
+            face_of.extend(std::iter::repeat_n(number, count));
+            faces.push((c.to_vec(), m.to_vec()));
+            for k in 0..c.len() {
+                let (from, to) = (vertex(&c[k]), vertex(&c[(k + 1) % c.len()]));
+                match m.get(k).map(vertex) {
+                    Some(middle) => grid.extend([[from, middle], [middle, to]]),
+                    None => grid.push([from, to]),
+                }
+            }
+        }
+        for edge in &mut grid {
+            edge.sort_unstable();
+        }
+        grid.sort_unstable();
+        grid.dedup();
+
+        let positions: Vec<_> = nodes.iter().map(|node| mesh.nodes[*node as usize]).collect();
+        let features = feature_edges(&positions, &triangles);
+        let size = (high - low).norm();
+        let mut surface = Self { positions, nodes, triangles, face_of, faces, features, grid, size };
+        for block in mesh.blocks.iter().filter(|block| block.kind.is_beam()) {
+            for ends in block.elements() {
+                surface.rod(mesh, ends[0], ends[1]);
+            }
+        }
+        Some(surface)
+    }
+
+    /// A prism around a beam element; its ends move with the nodes.
+    fn rod(&mut self, mesh: &Mesh, from: u32, to: u32) {
+        let [a, b] = [from, to].map(|node| mesh.nodes[node as usize]);
+        let Some(along) = (b - a).try_normalize(0.0) else { return };
+        let y = along.cross(&Vector3::ith(along.iamin(), 1.0)).normalize();
+        let z = along.cross(&y);
+        let first = self.positions.len() as u32;
+        for (node, centre) in [(from, a), (to, b)] {
+            for k in 0..ROD_SIDES {
+                let (sin, cos) = (f64::from(k) / f64::from(ROD_SIDES) * std::f64::consts::TAU).sin_cos();
+                self.positions.push(centre + (y * cos + z * sin) * ROD * self.size);
+                self.nodes.push(node);
+            }
+        }
+        let n = ROD_SIDES;
+        for k in 0..n {
+            let next = (k + 1) % n;
+            let [p, q, r, s] = [k, next, n + next, n + k].map(|v| first + v);
+            self.triangles.extend([[p, q, r], [p, r, s]]);
+        }
+        for k in 2..n {
+            self.triangles.extend([[0, k, k - 1], [n, n + k - 1, n + k]].map(|t| t.map(|v| first + v)));
+        }
+    }
+
+    /// Positions with a field of the mesh added, `scale` times.
+    pub(super) fn deformed(&self, field: &[Vector3<f64>], scale: f64) -> Vec<Vector3<f64>> {
+        self.positions.iter().zip(&self.nodes).map(|(p, node)| p + field[*node as usize] * scale).collect()
+    }
+
+    /// What `interface` ties.
+    pub(super) fn tied(&self, mesh: &Mesh, interface: &Interface) -> Tied {
+        let mut is_tied = vec![false; mesh.nodes.len()];
+        for node in &interface.nodes {
+            is_tied[*node as usize] = true;
+        }
+        let all = |nodes: &[u32]| nodes.iter().all(|node| is_tied[*node as usize]);
+        let faces: Vec<bool> = self.faces.iter().map(|(corners, middles)| all(corners) && all(middles)).collect();
+        let torn = self.faces.iter().filter(|(corners, middles)| all(corners) && !all(middles)).count();
+        let mut triangles: Vec<bool> = self.face_of.iter().map(|face| faces[*face as usize]).collect();
+        triangles.resize(self.triangles.len(), false);
+
+        let (mut area, mut normal, mut centre) = (0.0, Vector3::zeros(), Vector3::zeros());
+        let normals = triangle_normals(&self.positions, &self.triangles);
+        for (number, (n, a)) in normals.iter().enumerate().filter(|(number, _)| triangles[*number]) {
+            area += a;
+            normal += n * *a;
+            centre +=
+                self.triangles[number].iter().map(|v| self.positions[*v as usize]).sum::<Vector3<f64>>() * (a / 3.0);
+        }
+        if area > 0.0 {
+            (normal, centre) = (normal / area, centre / area);
+        } else {
+            let sum: Vector3<f64> = interface.nodes.iter().map(|node| mesh.nodes[*node as usize]).sum();
+            centre = sum / interface.nodes.len().max(1) as f64;
+        }
+        let faces = faces.iter().filter(|tied| **tied).count();
+        Tied { triangles, faces, torn, area, normal, centre }
+    }
+}
