@@ -40,6 +40,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         modes: ModesWanted::Count(10),
         split: SplitAt::ElasticCentre,
         chains: Vec::new(),
+        attached: Vec::new(),
         judged_modes: 6,
         limits: GateLimits::default(),
         provenance: Provenance::default(),

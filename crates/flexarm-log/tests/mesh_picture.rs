@@ -64,6 +64,7 @@ fn reduce(mesh: &Mesh, interfaces: &[Interface]) -> MeshReduction {
         modes: ModesWanted::Count(4),
         split: SplitAt::MidLength,
         chains: Vec::new(),
+        attached: Vec::new(),
         judged_modes: 4,
         limits: GateLimits::default(),
         provenance: Provenance::default(),
