@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use crate::reduce_args::ReduceArgs;
+
 /// How far is a robot's tool from where the rigid model puts it, because its links bend?
 #[derive(Debug, Parser)]
 #[command(name = "flexarm", version, arg_required_else_help = true)]
@@ -30,6 +32,8 @@ pub(crate) enum Command {
     Inspect(InspectArgs),
     /// Look for everything that is wrong with a robot and a trajectory
     Check(CheckArgs),
+    /// Make a flexible link of a finite element mesh, with its checks
+    Reduce(Box<ReduceArgs>),
     /// Print a shell completion script
     Completions {
         /// Shell to complete for

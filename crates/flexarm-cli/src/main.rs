@@ -3,6 +3,8 @@
 
 mod args;
 mod print;
+mod reduce;
+mod reduce_args;
 mod shipped;
 
 use std::io::{IsTerminal, Write};
@@ -58,6 +60,7 @@ fn run(cli: &Cli) -> Result<ExitCode, Error> {
         Command::Run(args) => simulate(cli, args, false),
         Command::Inspect(args) => inspect(cli, args),
         Command::Check(args) => check(cli, args),
+        Command::Reduce(args) => reduce::run(cli, args),
         Command::Completions { shell } => {
             clap_complete::generate(*shell, &mut Cli::command(), "flexarm", &mut std::io::stdout());
             Ok(ExitCode::SUCCESS)

@@ -1,6 +1,7 @@
 //! Tables for people.
 
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
+use flexarm::reduce::{MeshListing, ReduceSummary, ReportTable, SetListing};
 use flexarm::{Finding, Inspection, Summary};
 
 fn table(header: &[&str]) -> Table {
@@ -114,4 +115,80 @@ pub(crate) fn findings(findings: &[Finding]) -> String {
     let count = |severity: &str| findings.iter().filter(|f| f.severity == severity).count();
     out += &format!("{} errors, {} warnings, {} notes\n", count("error"), count("warning"), count("note"));
     out
+}
+
+fn report_table(report: &ReportTable) -> String {
+    let mut t = table(&[]);
+    if report.header.iter().any(|name| !name.is_empty()) {
+        t.set_header(report.header.clone());
+    }
+    for row in &report.rows {
+        t.add_row(row);
+    }
+    format!("\n{}\n{}", report.title, lines(&t))
+}
+
+/// The figures of a reduction.
+pub(crate) fn reduction(summary: &ReduceSummary) -> String {
+    let mut out = format!("link {}\n{}\n", summary.link, flexarm::reduce::headline(summary));
+    for report in flexarm::reduce::tables(summary).iter().filter(|report| !report.page_only) {
+        out += &report_table(report);
+    }
+    let f = &summary.files;
+    let files = [("link", &f.flex), ("job", &f.job), ("figures", &f.summary), ("report", &f.report)];
+    if files.iter().any(|(_, path)| path.is_some()) {
+        out += "\n";
+    }
+    for (what, path) in files {
+        if let Some(path) = path {
+            out += &format!("{what:<8} {path}\n");
+        }
+    }
+    for path in &f.pictures {
+        out += &format!("picture  {path}\n");
+    }
+    if let Some(path) = &f.flex {
+        out += &format!("use:     reduced = \"{path}\" under [[flexible_link]] of a robot.toml\n");
+    }
+    out
+}
+
+/// What is in a mesh.
+pub(crate) fn listing(l: &MeshListing) -> String {
+    let units = l.units.as_deref().unwrap_or("units not declared");
+    let mut out = format!("{} ({}, {units}): {} nodes, {} elements\n", l.mesh, l.format, l.nodes, l.elements);
+    let kinds: Vec<String> = l.element_kinds.iter().map(|(kind, count)| format!("{count} {kind}")).collect();
+    out += &format!("elements: {}\n", kinds.join(", "));
+    out += &format!("from {:?} to {:?} in the unit of the mesh", l.min, l.max);
+    out += &l.size_m.map_or_else(|| "\n".into(), |size| format!("; {size:.4} m at most\n"));
+    let mut t = table(&["region", "elements", "material"]);
+    for region in &l.regions {
+        let material = match &region.material {
+            Some(material) => material.text.clone(),
+            None if region.has_material => "in the file, in its own units".into(),
+            None => "none: --material".into(),
+        };
+        t.add_row([region.name.clone(), region.elements.to_string(), material]);
+    }
+    out += &format!("\nregions\n{}", lines(&t));
+    out += &sets("node sets", &l.sets);
+    if !l.interfaces.is_empty() {
+        out += &sets("interfaces", &l.interfaces);
+    }
+    for warning in &l.warnings {
+        out += &format!("warning: {warning}\n");
+    }
+    out
+}
+
+fn sets(title: &str, sets: &[SetListing]) -> String {
+    if sets.is_empty() {
+        return format!("\n{title}: none; choose nodes by place, such as plane(x,y,z; nx,ny,nz)\n");
+    }
+    let mut t = table(&["name", "nodes", "centroid (as for --at)", "extent"]);
+    for set in sets {
+        let [x, y, z] = set.extent.map(|x| format!("{x:.6}"));
+        t.add_row([set.name.clone(), set.nodes.to_string(), set.at.clone(), format!("{x}, {y}, {z}")]);
+    }
+    format!("\n{title} (unit of the mesh)\n{}", lines(&t))
 }

@@ -95,6 +95,15 @@ pub struct MeshGate {
 }
 
 impl MeshGate {
+    /// Relative force under rigid motion above which [`Self::warnings`] speaks.
+    pub const RIGID_BODY_RESIDUAL: f64 = 1e-7;
+    /// The same for the relative difference of mass and inertia.
+    pub const MASS_ERROR: f64 = 1e-6;
+    /// The same for the residual of a mode.
+    pub const MODE_RESIDUAL: f64 = 1e-6;
+    /// Jacobian at a node, over the mean of its element, below which it speaks.
+    pub const SMALLEST_JACOBIAN: f64 = 0.05;
+
     /// Sentences about what passes, but is worth a look.
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
@@ -104,7 +113,7 @@ impl MeshGate {
             }
         };
         see(
-            !(self.rigid_body_residual < 1e-7),
+            !(self.rigid_body_residual < Self::RIGID_BODY_RESIDUAL),
             format!(
                 "rigid motion of the interfaces meets a relative force of {:.1e}; usual is 1e-11",
                 self.rigid_body_residual
@@ -112,18 +121,18 @@ impl MeshGate {
         );
         see(self.zero_modes != 6, format!("{} zero modes instead of six", self.zero_modes));
         see(
-            !(self.mass_error < 1e-6 && self.inertia_error < 1e-6),
+            !(self.mass_error < Self::MASS_ERROR && self.inertia_error < Self::MASS_ERROR),
             format!(
                 "the reduced mass differs from the mesh: mass by {:.1e}, inertia by {:.1e} (relative)",
                 self.mass_error, self.inertia_error
             ),
         );
         see(
-            !(self.mode_residual < 1e-6),
+            !(self.mode_residual < Self::MODE_RESIDUAL),
             format!("a fixed-interface mode has a residual of {:.1e}", self.mode_residual),
         );
         see(
-            self.quality.smallest_at_nodes < 0.05,
+            self.quality.smallest_at_nodes < Self::SMALLEST_JACOBIAN,
             format!(
                 "element {} is nearly folded: its Jacobian at a node is {:.3} of its mean",
                 self.quality.worst_element, self.quality.smallest_at_nodes

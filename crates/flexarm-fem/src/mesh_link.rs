@@ -85,6 +85,8 @@ pub struct MeshReduction {
     pub fixed_modes: Modes,
     /// Modes with A held, over all DoF; for pictures.
     pub held_modes: Modes,
+    /// The chains of the mesh alone, without bodies that ride on it; those of the link have them.
+    pub bare_chains: Vec<Chain>,
     /// Right-hand sides solved in all.
     pub solves: usize,
     /// Sentences about what was accepted, but looks like a mistake.
@@ -214,6 +216,7 @@ pub fn reduce_mesh(
     };
     let chains = plan.chains.iter().map(|parts| source.chain(*parts)).collect::<Result<Vec<_>, _>>()?;
     let gate = gate(&condensation, &superelement, &link, &whole, &fixed_modes, &held_modes, quality);
+    let bare_chains = chains.clone();
     let mut chains = chains;
     attach(&plan.attached, &mut link, &mut chains)?;
     warnings.extend(gate.warnings());
@@ -222,7 +225,7 @@ pub fn reduce_mesh(
     warnings.extend(link.warnings(&plan.limits));
     let solves = fixed_modes.solves + held_modes.solves + condensation.figures().static_solves;
     let solver = condensation.figures();
-    Ok(MeshReduction { link, whole, solver, unit_loads, fixed_modes, held_modes, solves, warnings })
+    Ok(MeshReduction { link, whole, solver, unit_loads, fixed_modes, held_modes, bare_chains, solves, warnings })
 }
 
 fn check_connected(mesh: &Mesh) -> Result<(), MeshLinkError> {

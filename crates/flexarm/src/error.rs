@@ -2,6 +2,10 @@
 
 use std::path::PathBuf;
 
+use flexarm_fem::mesh_link::MeshLinkError;
+use flexarm_fem::reduction::ReductionError;
+use flexarm_fem::sparse::ModesError;
+
 use crate::robot_file::RobotFileError;
 
 /// Anything that ends a command.
@@ -16,10 +20,10 @@ pub enum Error {
         /// What is wrong and how to mend it.
         what: String,
     },
-    /// Something in the robot file.
+    /// Something in the robot file or in a job file.
     #[error(transparent)]
     RobotFile(#[from] RobotFileError),
-    /// Several faults of one robot file.
+    /// Several faults of one robot file or job.
     #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
     Several(Vec<Error>),
     /// Something in the URDF.
@@ -36,6 +40,37 @@ pub enum Error {
     /// A reduced-link file.
     #[error(transparent)]
     Flex(#[from] Box<flexarm_fem::FlexFileError>),
+    /// A mesh file.
+    #[error(transparent)]
+    Mesh(#[from] Box<flexarm_fem::MeshError>),
+    /// An interface of a link to be reduced.
+    #[error("{place}: interface {interface:?}: {what}")]
+    Interface {
+        /// File, file with line, or flag that it comes from.
+        place: String,
+        /// Its name.
+        interface: String,
+        /// What is wrong and how to mend it.
+        what: String,
+    },
+    /// A mesh that could not be reduced to a link.
+    #[error("{}: {source}{note}", path.display())]
+    Reduction {
+        /// The mesh.
+        path: PathBuf,
+        /// What the file can add: numbers of nodes.
+        note: String,
+        /// Why.
+        source: Box<flexarm_fem::mesh_link::MeshLinkError>,
+    },
+    /// A result could not be written.
+    #[error("{}: cannot be written: {source}", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
     /// Something in the trajectory.
     #[error(transparent)]
     Trajectory(#[from] flexarm_trajectory::TrajectoryError),
@@ -83,7 +118,15 @@ impl Error {
                 flexarm_stepping::StepError::Singular { .. } if !partial => 2,
                 _ => 1,
             },
-            Self::Interrupted { .. } => 1,
+            Self::Interrupted { .. } | Self::Write { .. } => 1,
+            Self::Reduction { source, .. } => match source.as_ref() {
+                MeshLinkError::Reduction(ReductionError::OutOfMemory { .. })
+                | MeshLinkError::Modes(ModesError::NotConverged { .. } | ModesError::NotFinite)
+                | MeshLinkError::Reduction(ReductionError::Modes(
+                    ModesError::NotConverged { .. } | ModesError::NotFinite,
+                )) => 1,
+                _ => 2,
+            },
             Self::Log(flexarm_log::LogError::Exists { .. }) => 2,
             Self::Log(_) => 1,
             _ => 2,

@@ -2,7 +2,7 @@
 //!
 //! Data path: robot file → rigid model → substitution → system → stepper → recorder → metrics. [`Robot::load`] does
 //! the first three, [`Motion::load`] reads the trajectory, [`simulate`] runs both robots and returns a [`Summary`].
-//! [`inspect()`] and [`check()`] look at what was loaded. Both faces (command line, Python) use this crate alone.
+//! [`inspect()`] and [`check()`] look at what was loaded; [`mod@reduce`] makes a flexible link of a mesh. Both faces (command line, Python) use this crate alone.
 //!
 //! ```no_run
 //! use std::ops::ControlFlow;
@@ -27,6 +27,7 @@ mod inspect;
 mod motion;
 mod options;
 mod record;
+pub mod reduce;
 mod report;
 mod robot;
 pub mod robot_file;

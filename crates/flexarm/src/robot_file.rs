@@ -245,6 +245,11 @@ pub struct Source {
 }
 
 impl Source {
+    /// The text of the file at `path`.
+    pub fn new(path: &Path, text: &str) -> Self {
+        Self { path: path.to_owned(), text: text.to_owned() }
+    }
+
     /// An error at a byte range of the text.
     pub fn error(&self, span: std::ops::Range<usize>, message: impl Into<String>) -> RobotFileError {
         let before = self.text.get(..span.start).unwrap_or(&self.text);
@@ -259,7 +264,7 @@ impl Source {
 /// # Errors
 /// [`RobotFileError`] with line and column for anything that is not the format.
 pub fn parse_robot_file(text: &str, path: &Path) -> Result<(RobotFile, Source), RobotFileError> {
-    let source = Source { path: path.to_owned(), text: text.to_owned() };
+    let source = Source::new(path, text);
     let file: RobotFile = toml::from_str(text).map_err(|error| {
         let mut message = error.message().trim().replace('\n', " ");
         if message.contains("missing field `format`") {

@@ -1,0 +1,172 @@
+//! `flexarm reduce`: flags to a job, steps on the terminal.
+
+use std::io::IsTerminal;
+use std::process::ExitCode;
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use flexarm::Error;
+use flexarm::reduce::{
+    At, InterfaceEntry, OrderingChoice, QuadratureChoice, ReduceJob, ReduceOptions, ReduceOutputs, ReduceProgress,
+    UrdfEntry,
+};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use crate::args::Cli;
+use crate::reduce_args::{Named, OrderingName, PlaceWord, QuadratureName, ReduceArgs};
+use crate::{answer, print, shipped, to_json};
+
+pub(crate) fn run(cli: &Cli, args: &ReduceArgs) -> Result<ExitCode, Error> {
+    let mut job = ReduceJob::load(&args.mesh)?;
+    job.put_over(flags(args)?);
+    if args.list {
+        let listing = flexarm::reduce::list_mesh(&job)?;
+        answer(cli, || to_json(&listing), || print::listing(&listing));
+        return Ok(ExitCode::SUCCESS);
+    }
+    let outputs = (!args.no_files).then(|| {
+        let new_folder = || args.flex.is_none().then(|| shipped::new_output_folder(&job.link_name()));
+        ReduceOutputs {
+            folder: args.output.clone().or_else(new_folder),
+            flex: args.flex.clone(),
+            overwrite: args.force,
+        }
+    });
+    let mut options = ReduceOptions::default();
+    options.urdf.search_paths = flexarm::search_paths_from_environment();
+
+    let steps = Steps::new(cli);
+    let result = flexarm::reduce::reduce(&job, &options, outputs.as_ref(), &mut |step| steps.show(step));
+    steps.clear();
+    let summary = result?;
+    if !cli.quiet {
+        for warning in &summary.warnings {
+            eprintln!("warning: {warning}");
+        }
+    }
+    answer(cli, || to_json(&summary), || print::reduction(&summary));
+    Ok(ExitCode::SUCCESS)
+}
+
+/// What the flags say, as a job without a mesh.
+fn flags(args: &ReduceArgs) -> Result<ReduceJob, Error> {
+    let urdf = args.urdf.clone().zip(args.link.clone());
+    let mut job = ReduceJob {
+        link: args.name.clone(),
+        units: args.units,
+        modes: args.modes,
+        modes_up_to_hz: args.modes_up_to,
+        split: args.split,
+        chains: args.chains.clone(),
+        quadrature: args.quadrature.map(|name| match name {
+            QuadratureName::Exact => QuadratureChoice::Exact,
+            QuadratureName::Calculix => QuadratureChoice::Calculix,
+        }),
+        ordering: args.ordering.map(|name| match name {
+            OrderingName::Auto => OrderingChoice::Auto,
+            OrderingName::Amd => OrderingChoice::Amd,
+            OrderingName::Nested => OrderingChoice::Nested,
+        }),
+        threads: args.threads,
+        mesh_frame: args.mesh_frame,
+        urdf: urdf.map(|(file, link)| UrdfEntry { file, link, joint: args.joint.clone(), rest: args.rest }),
+        ..ReduceJob::default()
+    };
+    for Named { name, value } in &args.materials {
+        match name {
+            Some(region) => {
+                job.materials.insert(region.clone(), *value);
+            }
+            None => once(&mut job.material, *value, "--material")?,
+        }
+    }
+    for (Named { name, value }, letter) in args.interfaces.iter().zip('A'..='Z') {
+        let name = name.clone().unwrap_or_else(|| letter.to_string());
+        once(&mut entry(&mut job, &name).select, value.clone(), &format!("--interface {name}=..."))?;
+        entry(&mut job, &name).place = "command line".into();
+    }
+    for Named { name, value } in &args.at {
+        let Some(name) = name else {
+            let text = "--at needs the name of an interface: --at A=x,y,z, --at A=centroid or --at A=joint:NAME";
+            return Err(Error::Usage(text.into()));
+        };
+        let own = entry(&mut job, name);
+        if own.xyz.is_some() || own.at.is_some() || own.joint.is_some() {
+            return Err(Error::Usage(format!("--at {name}=... is given twice")));
+        }
+        match value {
+            PlaceWord::Centroid => own.at = Some(At::Centroid),
+            PlaceWord::Joint(joint) => own.joint = Some(joint.clone()),
+            PlaceWord::Frame(frame) => (own.xyz, own.rpy) = (Some(frame.xyz), Some(frame.rpy)),
+        }
+    }
+    for Named { name, value } in &args.ties {
+        match name {
+            Some(name) => once(&mut entry(&mut job, name).tie, value.0, &format!("--tie {name}=..."))?,
+            None => once(&mut job.tie, value.0, "--tie")?,
+        }
+    }
+    Ok(job)
+}
+
+fn once<T>(own: &mut Option<T>, value: T, flag: &str) -> Result<(), Error> {
+    match own.replace(value) {
+        None => Ok(()),
+        Some(_) => Err(Error::Usage(format!("{flag} is given twice"))),
+    }
+}
+
+/// The interface of that name; a new one if there is none yet.
+fn entry<'a>(job: &'a mut ReduceJob, name: &str) -> &'a mut InterfaceEntry {
+    let found = job.interface.iter().position(|own| own.name.as_deref() == Some(name));
+    let index = found.unwrap_or_else(|| {
+        job.interface.push(InterfaceEntry { name: Some(name.to_owned()), ..InterfaceEntry::default() });
+        job.interface.len() - 1
+    });
+    &mut job.interface[index]
+}
+
+/// The step under way, shown on a terminal once the work takes more than two seconds.
+struct Steps {
+    bar: ProgressBar,
+    /// Ends the wait of the thread that shows the bar.
+    waiting: Option<(Sender<()>, JoinHandle<()>)>,
+}
+
+impl Steps {
+    fn new(cli: &Cli) -> Self {
+        let style = ProgressStyle::with_template("{spinner} {pos}/{len} {msg}, {elapsed}");
+        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden())
+            .with_style(style.unwrap_or_else(|_| ProgressStyle::default_spinner()));
+        let wanted = !cli.quiet && std::io::stderr().is_terminal();
+        let waiting = wanted.then(|| {
+            let (sender, receiver) = channel();
+            let shown = bar.clone();
+            let wait = move || {
+                // A step may last minutes: the bar cannot wait for the next one to show itself.
+                if receiver.recv_timeout(Duration::from_secs(2)) == Err(RecvTimeoutError::Timeout) {
+                    shown.set_draw_target(ProgressDrawTarget::stderr());
+                    shown.enable_steady_tick(Duration::from_millis(200));
+                }
+            };
+            (sender, std::thread::spawn(wait))
+        });
+        Self { bar, waiting }
+    }
+
+    fn show(&self, step: ReduceProgress) {
+        self.bar.set_length(step.of as u64);
+        self.bar.set_position(step.number as u64);
+        self.bar.set_message(step.step);
+    }
+
+    fn clear(self) {
+        if let Some((sender, thread)) = self.waiting {
+            drop(sender);
+            // It only waits and shows; there is nothing to tell if it failed.
+            let _ = thread.join();
+        }
+        self.bar.finish_and_clear();
+    }
+}

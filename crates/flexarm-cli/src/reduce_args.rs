@@ -1,0 +1,196 @@
+//! Words of `flexarm reduce`.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use clap::{Args, ValueEnum};
+use flexarm::reduce::{FrameEntry, MaterialChoice, NodeSelector, SplitChoice, Tie, Units, numbers};
+
+const EXAMPLES: &str = "\
+Examples:
+  What is in a mesh (groups, sizes, materials), to see what to type:
+      flexarm reduce lower_arm.msh --list
+  Two named surfaces, frames at given points (unit of the mesh, link frame):
+      flexarm reduce lower_arm.msh --units mm-t-s --material aluminium \\
+          --interface A=interface_A --at A=0,-75,0 --interface B=interface_B --at B=40,110,1100
+  Surfaces by place; a softer tie at the far end; frames from the robot's URDF:
+      flexarm reduce arm.inp.gz --units m-kg-s --urdf arm.urdf --link link_2 \\
+          --interface 'A=plane(0,0,0; 0,1,0)' --interface 'B=cylinder(0,0,1.1; 0,1,0; 0.06)' --tie B=distributing
+  The same again, with other modes, from the job that the first run wrote:
+      flexarm reduce out/lower_arm-001/reduce.toml --modes-up-to 500 --chains 3,4,8
+  Straight into a robot's folder:
+      flexarm reduce lower_arm.reduce.toml --flex robots/mine/lower_arm.flex
+
+Node selectors (lengths in the unit and the frame of the mesh file):
+  NAME                               a node set or a physical group; quote \"NAME\" if it has & or ( in it
+  plane(x,y,z; nx,ny,nz)             nodes of the surface in a plane
+  cylinder(x,y,z; ax,ay,az; radius)  on the wall of an endless cylinder, such as a bore
+  box(x,y,z; x,y,z)                  in a box; each of the three takes a tolerance as last argument
+  S & T                              nodes that both choose
+
+Ties: rigid (RBE2) stiffens the seat, distributing (RBE3) adds no stiffness; the truth lies between.
+Everything can stand in a job file (TOML, with mesh = \"...\"); flags go before it.";
+
+#[derive(Debug, Args)]
+#[command(after_long_help = EXAMPLES, after_help = "More, with examples: flexarm reduce --help")]
+pub(crate) struct ReduceArgs {
+    /// Mesh (.msh of Gmsh, .inp of CalculiX or Abaqus, also .gz), or a job file (.toml with mesh = "...")
+    #[arg(value_name = "MESH_OR_JOB")]
+    pub(crate) mesh: PathBuf,
+    /// Show what is in the mesh and stop: groups, node sets, regions, materials, sizes
+    #[arg(long, alias = "dry-run")]
+    pub(crate) list: bool,
+    /// Units of the mesh: m-kg-s (N, Pa), mm-t-s (N, MPa), in-slinch-s, ...
+    #[arg(long, value_name = "LENGTH-MASS-TIME")]
+    pub(crate) units: Option<Units>,
+    /// steel, aluminium, cast_iron, ductile_iron or E,nu,rho in SI; of one region with REGION= (may be repeated)
+    #[arg(long = "material", value_name = "[REGION=]MATERIAL", value_parser = Named::<MaterialChoice>::parse)]
+    pub(crate) materials: Vec<Named<MaterialChoice>>,
+    /// Nodes of an interface, the proximal one first (repeat); named A, B, C in turn unless NAME is given
+    #[arg(long = "interface", value_name = "[NAME=]SELECTOR", value_parser = Named::<NodeSelector>::parse)]
+    pub(crate) interfaces: Vec<Named<NodeSelector>>,
+    /// Frame of an interface in the link frame: x,y,z or x,y,z,roll,pitch,yaw (unit of the mesh, rad), centroid, or
+    /// joint:NAME with --urdf (repeat)
+    #[arg(long, value_name = "NAME=PLACE", value_parser = Named::<PlaceWord>::parse)]
+    pub(crate) at: Vec<Named<PlaceWord>>,
+    /// rigid or distributing, for all interfaces or for one with NAME= (may be repeated) [default: rigid]
+    #[arg(long = "tie", value_name = "[NAME=]TIE", value_parser = Named::<TieWord>::parse)]
+    pub(crate) ties: Vec<Named<TieWord>>,
+    /// URDF or xacro whose joints are the interfaces: A at the origin of the link, B at that of the next joint
+    #[arg(long, value_name = "FILE", requires = "link")]
+    pub(crate) urdf: Option<PathBuf>,
+    /// The link in the URDF
+    #[arg(long, value_name = "NAME", requires = "urdf")]
+    pub(crate) link: Option<String>,
+    /// The joint at B, where several follow the link
+    #[arg(long, value_name = "NAME", requires = "urdf")]
+    pub(crate) joint: Option<String>,
+
+    /// With --urdf: what the URDF's link weighs beyond the mesh (motors, gears) rides on the two parts
+    #[arg(long, requires = "urdf")]
+    pub(crate) rest: bool,
+    /// Pose of the mesh frame in the link frame: x,y,z or x,y,z,roll,pitch,yaw (unit of the mesh, rad)
+    #[arg(long, value_name = "POSE", allow_hyphen_values = true, value_parser = parse_frame)]
+    pub(crate) mesh_frame: Option<FrameEntry>,
+    /// Fixed-interface modes to keep (Craig-Bampton); 0 for Guyan [default: 10]
+    #[arg(long, value_name = "N")]
+    pub(crate) modes: Option<usize>,
+    /// Keep all fixed-interface modes up to this frequency (Hz); take twice the highest one of interest
+    #[arg(long, value_name = "HZ", conflicts_with = "modes", allow_hyphen_values = true)]
+    pub(crate) modes_up_to: Option<f64>,
+    /// Where the elastic joint of the two parts sits: elastic-centre, mid, a fraction of the way from A to B, or x,y,z
+    #[arg(long, value_name = "WHERE", allow_hyphen_values = true)]
+    pub(crate) split: Option<SplitChoice>,
+    /// Numbers of parts of longer chains to store in the link, such as 3,4,8
+    #[arg(long, value_name = "N,N,...", value_delimiter = ',')]
+    pub(crate) chains: Option<Vec<usize>>,
+    /// Integration of the elements
+    #[arg(long, value_enum)]
+    pub(crate) quadrature: Option<QuadratureName>,
+    /// Order of elimination
+    #[arg(long, value_enum)]
+    pub(crate) ordering: Option<OrderingName>,
+    /// Threads of the solver; more than one may change the last digits [default: 1]
+    #[arg(long, value_name = "N")]
+    pub(crate) threads: Option<usize>,
+    /// Name of the link [default: that of --link, or of the mesh file]
+    #[arg(long, value_name = "NAME")]
+    pub(crate) name: Option<String>,
+    /// Output folder for link file, job, figures and report [default: a new one in out/, or none with --flex]
+    #[arg(short, long, value_name = "FOLDER")]
+    pub(crate) output: Option<PathBuf>,
+    /// Write the link file (also) here
+    #[arg(long, value_name = "FILE")]
+    pub(crate) flex: Option<PathBuf>,
+    /// Overwrite what is there
+    #[arg(long)]
+    pub(crate) force: bool,
+    /// Write nothing, only print the figures
+    #[arg(long, conflicts_with_all = ["output", "flex", "force"])]
+    pub(crate) no_files: bool,
+}
+
+/// `NAME=VALUE`, or a value for all.
+#[derive(Clone, Debug)]
+pub(crate) struct Named<T> {
+    pub(crate) name: Option<String>,
+    pub(crate) value: T,
+}
+
+impl<T: FromStr<Err: ToString>> Named<T> {
+    fn parse(text: &str) -> Result<Self, String> {
+        // An = inside quotes or brackets belongs to the value.
+        let name = text.split_once('=').filter(|(name, _)| !name.contains(['"', '(']));
+        let (name, value) = match name {
+            Some((name, _)) if name.trim().is_empty() => return Err("there is no name before the =".into()),
+            Some((name, value)) => (Some(name.trim().to_owned()), value),
+            None => (None, text),
+        };
+        let value = value.parse().map_err(|error: T::Err| error.to_string())?;
+        Ok(Self { name, value })
+    }
+}
+
+/// Where an interface is.
+#[derive(Clone, Debug)]
+pub(crate) enum PlaceWord {
+    Centroid,
+    Joint(String),
+    Frame(FrameEntry),
+}
+
+impl FromStr for PlaceWord {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match (text.trim(), text.trim().strip_prefix("joint:")) {
+            ("centroid", _) => Ok(Self::Centroid),
+            (_, Some(joint)) => Ok(Self::Joint(joint.to_owned())),
+            (other, None) => parse_frame(other)
+                .map(Self::Frame)
+                .map_err(|error| format!("{error}; expected x,y,z, x,y,z,roll,pitch,yaw, centroid or joint:NAME")),
+        }
+    }
+}
+
+fn parse_frame(text: &str) -> Result<FrameEntry, String> {
+    match numbers(text)?.as_slice() {
+        [x, y, z] => Ok(FrameEntry { xyz: [*x, *y, *z], rpy: [0.0; 3] }),
+        [x, y, z, roll, pitch, yaw] => Ok(FrameEntry { xyz: [*x, *y, *z], rpy: [*roll, *pitch, *yaw] }),
+        other => Err(format!("{} numbers in {text:?}, 3 or 6 are expected", other.len())),
+    }
+}
+
+/// Ties by their words.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TieWord(pub(crate) Tie);
+
+impl FromStr for TieWord {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text.trim() {
+            "rigid" => Ok(Self(Tie::Rigid)),
+            "distributing" => Ok(Self(Tie::Distributing)),
+            other => Err(format!("{other:?} is not a tie; expected rigid or distributing")),
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum QuadratureName {
+    /// Enough points for stiffness and mass [default]
+    Exact,
+    /// The points of CalculiX, for comparison with it
+    Calculix,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum OrderingName {
+    /// By size [default]
+    Auto,
+    /// Approximate minimum degree
+    Amd,
+    /// Nested dissection (METIS)
+    Nested,
+}

@@ -1,0 +1,194 @@
+//! Files of a reduction: refused before the work if they are there, written all or none.
+
+use std::path::{Component, Path, PathBuf};
+
+use super::job::ReduceJob;
+use crate::error::Error;
+
+/// Where the results go.
+#[derive(Clone, Debug, Default)]
+pub struct ReduceOutputs {
+    /// Folder for link file, job, summary and report; made if it is not there.
+    pub folder: Option<PathBuf>,
+    /// Another place for the link file.
+    pub flex: Option<PathBuf>,
+    /// Overwrite what is there.
+    pub overwrite: bool,
+}
+
+/// The paths of one reduction.
+pub(super) struct Paths {
+    pub(super) folder: Option<Folder>,
+    pub(super) flex: Option<PathBuf>,
+    overwrite: bool,
+}
+
+/// Names in the output folder.
+pub(super) struct Folder {
+    pub(super) path: PathBuf,
+    pub(super) flex: PathBuf,
+    pub(super) job: PathBuf,
+    pub(super) summary: PathBuf,
+    pub(super) report: PathBuf,
+}
+
+impl Paths {
+    /// # Errors
+    /// [`Error::File`] for what is there already.
+    pub(super) fn new(outputs: &ReduceOutputs, link: &str) -> Result<Self, Error> {
+        let keep = |c: char| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' };
+        let file: String = link.chars().map(keep).collect();
+        let folder = outputs.folder.as_ref().map(|path| Folder {
+            flex: path.join(format!("{file}.flex")),
+            job: path.join("reduce.toml"),
+            summary: path.join("summary.json"),
+            report: path.join("report.md"),
+            path: path.clone(),
+        });
+        // Asked for twice, it is still one file.
+        let whole = |path: &Path| std::path::absolute(path).map(|path| normal(&path)).ok();
+        let in_folder = folder.as_ref().and_then(|folder| whole(&folder.flex));
+        let flex = outputs.flex.clone().filter(|path| in_folder.is_none() || whole(path) != in_folder);
+        let paths = Self { folder, flex, overwrite: outputs.overwrite };
+        paths.check()?;
+        Ok(paths)
+    }
+
+    fn all(&self) -> Vec<PathBuf> {
+        let pictures = |f: &Folder| ["interfaces.png", "unit_loads.png", "modes.png"].map(|name| f.path.join(name));
+        let texts = |f: &Folder| [&f.flex, &f.job, &f.summary, &f.report].map(Clone::clone);
+        let in_folder = self.folder.iter().flat_map(|f| texts(f).into_iter().chain(pictures(f)));
+        in_folder.chain(self.flex.clone()).collect()
+    }
+
+    fn check(&self) -> Result<(), Error> {
+        for path in self.all() {
+            let fail = |what: &str| Err(Error::File { path: path.clone(), what: what.into() });
+            if path.is_dir() {
+                return fail("is a folder, a file is to be written there");
+            }
+            if !self.overwrite && path.exists() {
+                return fail(
+                    "exists already and is not overwritten: choose another place with -o or --flex, or give --force",
+                );
+            }
+            if let Some(above) = path.ancestors().skip(1).find(|above| above.exists())
+                && !above.is_dir()
+            {
+                let what = "is a file; the results need a folder".into();
+                return Err(Error::File { path: above.to_owned(), what });
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes all files or none: each first under another name, then all are renamed.
+    pub(super) fn write(&self, files: &[(PathBuf, &[u8])]) -> Result<(), Error> {
+        self.check()?;
+        let mut undo = Undo::default();
+        for (path, bytes) in files {
+            let failed = |source| Error::Write { path: path.clone(), source };
+            if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+                undo.make(folder).map_err(failed)?;
+            }
+            let partial = partial(path);
+            undo.files.push(partial.clone());
+            std::fs::write(&partial, bytes).map_err(failed)?;
+        }
+        for (path, _) in files {
+            std::fs::rename(partial(path), path).map_err(|source| Error::Write { path: path.clone(), source })?;
+        }
+        undo.done = true;
+        Ok(())
+    }
+}
+
+fn partial(path: &Path) -> PathBuf {
+    let mut name = path.file_name().unwrap_or_default().to_owned();
+    name.push(".partial");
+    path.with_file_name(name)
+}
+
+/// Removes on its way out what was made, unless all went well.
+#[derive(Default)]
+struct Undo {
+    files: Vec<PathBuf>,
+    folders: Vec<PathBuf>,
+    done: bool,
+}
+
+impl Undo {
+    fn make(&mut self, folder: &Path) -> std::io::Result<()> {
+        let missing: Vec<PathBuf> =
+            folder.ancestors().take_while(|f| !f.as_os_str().is_empty() && !f.exists()).map(Path::to_owned).collect();
+        std::fs::create_dir_all(folder)?;
+        self.folders.extend(missing.into_iter().rev());
+        Ok(())
+    }
+}
+
+impl Drop for Undo {
+    fn drop(&mut self) {
+        if self.done {
+            return;
+        }
+        // What cannot be removed stays; the error that led here is reported.
+        for file in &self.files {
+            let _ = std::fs::remove_file(file);
+        }
+        for folder in self.folders.iter().rev() {
+            let _ = std::fs::remove_dir(folder);
+        }
+    }
+}
+
+/// The job as a file in `folder`.
+pub(super) fn job_file(job: &ReduceJob, folder: &Path) -> String {
+    let mut job = job.clone();
+    job.mesh = from_folder(folder, &job.mesh);
+    if let Some(urdf) = &mut job.urdf {
+        urdf.file = from_folder(folder, &urdf.file);
+    }
+    let body = toml::to_string(&job).expect("strings, numbers and tables");
+    format!("# The job as it was run, every default written out. Again: flexarm reduce reduce.toml\n{body}")
+}
+
+/// The way to `path` from `folder`: relative where both lie in one tree below the root, else absolute.
+fn from_folder(folder: &Path, path: &Path) -> PathBuf {
+    let whole = |p: &Path| std::path::absolute(p).map(|p| normal(&p));
+    let (Ok(folder), Ok(path)) = (whole(folder), whole(path)) else { return path.to_owned() };
+    let shared = folder.components().zip(path.components()).take_while(|(a, b)| a == b).count();
+    let below_root = folder.components().take(shared).filter(|c| matches!(c, Component::Normal(_))).count();
+    if below_root == 0 {
+        return path;
+    }
+    let up = folder.components().skip(shared).map(|_| Component::ParentDir);
+    up.chain(path.components().skip(shared)).collect()
+}
+
+/// Without `.` and `..`.
+fn normal(path: &Path) -> PathBuf {
+    path.components().fold(PathBuf::new(), |mut sum, component| {
+        match component {
+            Component::ParentDir => {
+                sum.pop();
+            }
+            Component::CurDir => {}
+            other => sum.push(other),
+        }
+        sum
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_path_is_relative_within_one_tree_only() {
+        let way = |folder: &str, path: &str| from_folder(Path::new(folder), Path::new(path));
+        assert_eq!(way("/a/out/x-001", "/a/meshes/x.msh"), Path::new("../../meshes/x.msh"));
+        assert_eq!(way("/a/out", "/b/x.msh"), Path::new("/b/x.msh"));
+        assert_eq!(way("/a/b/../c", "/a/./c/x.msh"), Path::new("x.msh"));
+    }
+}

@@ -1,0 +1,245 @@
+//! From the interfaces of a job to nodes and frames of a mesh, with messages that say what to type.
+
+use flexarm_fem::matrix_link::halves_of_bar;
+use flexarm_fem::mesh::select;
+use flexarm_fem::reduction::{Interface, Tie};
+use flexarm_fem::{Mesh, NodeSelector, RigidPart};
+use flexarm_flexlink::distal_joint;
+use flexarm_kinematics::{Mechanism, Pose};
+use flexarm_urdf::{ReadOptions, read_urdf};
+use nalgebra::{Rotation3, Translation3, Vector3};
+
+use super::job::{FrameEntry, InterfaceEntry, ReduceJob, UrdfEntry};
+use crate::error::Error;
+
+/// An interface of the mesh, with what a person wants to see of it. Link axes, m.
+#[derive(Clone, Debug)]
+pub(super) struct Chosen {
+    pub(super) interface: Interface,
+    pub(super) selector: NodeSelector,
+    pub(super) centroid: Vector3<f64>,
+    pub(super) extent: Vector3<f64>,
+}
+
+/// The mesh with the frame that the user speaks in.
+pub(super) struct Place<'a> {
+    /// In its own frame, m.
+    pub(super) mesh: &'a Mesh,
+    /// Its unit of length, m; 1 while it is not known.
+    pub(super) unit: f64,
+    /// Its frame in the link frame, m.
+    pub(super) X_LM: Pose,
+}
+
+/// Pose of a job in m.
+pub(super) fn pose(frame: &FrameEntry, unit: f64) -> Pose {
+    let [roll, pitch, yaw] = frame.rpy;
+    let position = Vector3::from(frame.xyz) * unit;
+    Pose::from_parts(Translation3::from(position), Rotation3::from_euler_angles(roll, pitch, yaw))
+}
+
+impl Place<'_> {
+    /// Middle and size of some nodes along the link axes, m.
+    pub(super) fn middle_and_extent(&self, nodes: &[u32]) -> (Vector3<f64>, Vector3<f64>) {
+        let points = || nodes.iter().map(|node| self.X_LM * nalgebra::Point3::from(self.mesh.nodes[*node as usize]));
+        let sum: Vector3<f64> = points().map(|p| p.coords).sum();
+        let low = points().fold(Vector3::repeat(f64::INFINITY), |low, p| low.inf(&p.coords));
+        let high = points().fold(Vector3::repeat(f64::NEG_INFINITY), |high, p| high.sup(&p.coords));
+        (sum / nodes.len().max(1) as f64, high - low)
+    }
+
+    /// Three lengths in the unit of the mesh, with as many digits as make sense for its size.
+    pub(super) fn typed(&self, p: &Vector3<f64>) -> String {
+        let size = self.mesh.bounding_box().map_or(1.0, |(low, high)| (high - low).norm()) / self.unit;
+        let digits = (6.0 - size.log10().ceil()).clamp(0.0, 12.0) as usize;
+        let one = |x: f64| {
+            let text = format!("{:.digits$}", x / self.unit);
+            let short = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+            if short == "-0" { "0".to_owned() } else { short.to_owned() }
+        };
+        format!("{},{},{}", one(p.x), one(p.y), one(p.z))
+    }
+
+    /// The sets of the mesh, for messages about one that is wanted.
+    pub(super) fn known_sets(&self) -> String {
+        const MOST: usize = 12;
+        let sets = &self.mesh.node_sets;
+        if sets.is_empty() {
+            return "the mesh has no node sets: choose by place, such as plane(0,0,0; 1,0,0)".into();
+        }
+        let shown: Vec<String> =
+            sets.iter().take(MOST).map(|(name, nodes)| format!("{name:?} ({} nodes)", nodes.len())).collect();
+        let more = sets.len().saturating_sub(MOST);
+        let rest = if more > 0 { format!(" and {more} more (--list shows all)") } else { String::new() };
+        format!("node sets of the mesh: {}{rest}", shown.join(", "))
+    }
+
+    /// Nodes and frames of all interfaces, or all that is wrong with them.
+    pub(super) fn choose(&self, job: &ReduceJob, robot: Option<&RobotLink>) -> Result<Vec<Chosen>, Vec<Error>> {
+        let (mut chosen, mut faults) = (Vec::new(), Vec::new());
+        if job.interface.len() < 2 {
+            let found = job.interface.len();
+            let what = format!(
+                "{found} interface(s) given, a link needs at least two, the proximal one first: \
+                 --interface A=SELECTOR --interface B=SELECTOR, where SELECTOR is a node set or a place such as \
+                 plane(x,y,z; nx,ny,nz); {}",
+                self.known_sets()
+            );
+            faults.push(Error::File { path: job.mesh.clone(), what });
+        }
+        for (index, entry) in job.interface.iter().enumerate() {
+            match self.one(job, index, entry, robot) {
+                Ok(interface) => chosen.push(interface),
+                Err(fault) => faults.push(fault),
+            }
+        }
+        if faults.is_empty() { Ok(chosen) } else { Err(faults) }
+    }
+
+    fn one(
+        &self,
+        job: &ReduceJob,
+        index: usize,
+        entry: &InterfaceEntry,
+        robot: Option<&RobotLink>,
+    ) -> Result<Chosen, Error> {
+        let name = entry.name.clone().unwrap_or_default();
+        let place = if entry.place.is_empty() { job.mesh.display().to_string() } else { entry.place.clone() };
+        let fail = |what: String| Error::Interface { place: place.clone(), interface: name.clone(), what };
+        let Some(selector) = &entry.select else {
+            return Err(fail(format!(
+                "it has no nodes: --interface {name}=SELECTOR or select = \"...\"; {}",
+                self.known_sets()
+            )));
+        };
+        let nodes = select(self.mesh, selector, self.unit).map_err(|source| fail(source.to_string()))?;
+        let (centroid, extent) = self.middle_and_extent(&nodes);
+        let turned = |position: Vector3<f64>| {
+            let frame = FrameEntry { xyz: (position / self.unit).into(), rpy: entry.rpy.unwrap_or_default() };
+            pose(&frame, self.unit)
+        };
+        let X_LI = match (entry.xyz, entry.at, &entry.joint) {
+            (Some(xyz), None, None) => {
+                if xyz.iter().chain(&entry.rpy.unwrap_or_default()).any(|x| !x.is_finite()) {
+                    return Err(fail(format!("its position is {xyz:?}, finite numbers are expected")));
+                }
+                pose(&FrameEntry { xyz, rpy: entry.rpy.unwrap_or_default() }, self.unit)
+            }
+            (None, Some(_), None) => turned(centroid),
+            (None, None, Some(joint)) => {
+                let robot = robot.ok_or_else(|| {
+                    fail(format!("joint {joint:?} needs a robot: --urdf FILE --link NAME, or [urdf] in the job file"))
+                })?;
+                robot.joint(joint).map_err(fail)?
+            }
+            (None, None, None) => match (robot, index) {
+                (Some(_), 0) => Pose::identity(),
+                (Some(robot), 1) => robot.X_LB,
+                _ => return Err(fail(self.no_position(&name, nodes.len(), &centroid))),
+            },
+            _ => return Err(fail("it has more than one position: xyz, at and joint exclude each other".into())),
+        };
+        let tie = entry.tie.or(job.tie).unwrap_or(Tie::Rigid);
+        let interface = Interface { name, X_LI, nodes, tie };
+        Ok(Chosen { interface, selector: selector.clone(), centroid, extent })
+    }
+
+    fn no_position(&self, name: &str, nodes: usize, centroid: &Vector3<f64>) -> String {
+        let xyz = self.typed(centroid);
+        format!(
+            "it has no position: --at {name}={xyz} (that is the centroid of its {nodes} nodes; link frame, in the \
+             unit of the mesh), --at {name}=centroid, or frames from a robot with --urdf FILE --link NAME; in a job \
+             file xyz = [{}], at = \"centroid\" or [urdf]",
+            xyz.replace(',', ", ")
+        )
+    }
+
+    /// Sentences about positions that look like a mistake in the unit or the frame.
+    pub(super) fn doubts(&self, chosen: &[Chosen]) -> Vec<String> {
+        let size = self.mesh.bounding_box().map_or(0.0, |(low, high)| (high - low).norm());
+        let mut doubts = Vec::new();
+        for one in chosen {
+            let distance = (one.interface.X_LI.translation.vector - one.centroid).norm();
+            if distance > 0.5 * size {
+                doubts.push(format!(
+                    "interface {:?} stands {distance:.4} m from the centroid of its nodes, in a mesh of {size:.4} m: \
+                     is its position in the unit of the mesh and in the link frame?",
+                    one.interface.name
+                ));
+            }
+        }
+        if let [a, b, ..] = chosen {
+            let X = [a, b].map(|one| one.interface.X_LI.translation.vector);
+            let (apart, nodes) = ((X[1] - X[0]).norm(), (b.centroid - a.centroid).norm());
+            if apart < 0.05 * nodes {
+                doubts.push(format!(
+                    "interfaces {:?} and {:?} are {apart:.2e} m apart, the centroids of their nodes {nodes:.4} m: \
+                     are the positions in the unit of the mesh?",
+                    a.interface.name, b.interface.name
+                ));
+            }
+        }
+        doubts
+    }
+}
+
+/// A link of a robot with the joints on it.
+pub(super) struct RobotLink {
+    mechanism: Mechanism,
+    link: String,
+    X_LB: Pose,
+}
+
+impl RobotLink {
+    pub(super) fn read(entry: &UrdfEntry, options: &ReadOptions) -> Result<Self, Error> {
+        let mechanism = read_urdf(&entry.file, options)?.mechanism;
+        let X_LB = distal_joint(&mechanism, &entry.link, entry.joint.as_deref()).map(|joint| joint.X_PJ);
+        let X_LB = X_LB.map_err(|e| Error::File { path: entry.file.clone(), what: e.to_string() })?;
+        Ok(Self { mechanism, link: entry.link.clone(), X_LB })
+    }
+
+    /// What the link weighs beyond its mesh, as two halves along the line from A to B, link axes.
+    pub(super) fn rest(&self, mesh: &RigidPart, along: &Vector3<f64>) -> Result<[RigidPart; 2], String> {
+        let inertia = self.mechanism.link(&self.link).and_then(|link| link.inertia.as_ref());
+        let Some(whole) = inertia else {
+            return Err(format!("link {:?} has no inertial, so there is no rest", self.link));
+        };
+        let mass = whole.mass - mesh.mass;
+        if !(mass > 0.0) {
+            return Err(format!(
+                "the mesh weighs {:.4} kg, link {:?} of the URDF {:.4} kg: nothing is left that could ride on it; \
+                 leave `rest` out, or correct the density",
+                mesh.mass, self.link, whole.mass
+            ));
+        }
+        let com = (whole.com * whole.mass - mesh.com * mesh.mass) / mass;
+        // Second moments about the centre of the rest.
+        let about = |part: f64, com_part: Vector3<f64>| {
+            let c = (com_part - com).cross_matrix();
+            -c * c * part
+        };
+        let inertia = whole.inertia_com + about(whole.mass, whole.com) - mesh.inertia - about(mesh.mass, mesh.com);
+        let halves = halves_of_bar(&RigidPart { mass, com, inertia }, along);
+        for half in &halves {
+            half.check("what link and mesh differ by").map_err(|error| {
+                format!(
+                    "{error}: the mesh has more inertia than the URDF's link; leave `rest` out, or correct one of them"
+                )
+            })?;
+        }
+        Ok(halves)
+    }
+
+    /// Frame in the link of a joint at either of its ends.
+    fn joint(&self, name: &str) -> Result<Pose, String> {
+        if let Some(joint) = self.mechanism.child_joints(&self.link).find(|joint| joint.name == name) {
+            return Ok(joint.X_PJ);
+        }
+        if self.mechanism.joints.iter().any(|joint| joint.name == name && joint.child == self.link) {
+            return Ok(Pose::identity());
+        }
+        let on_link = |joint: &&flexarm_kinematics::Joint| joint.parent == self.link || joint.child == self.link;
+        let known: Vec<&str> = self.mechanism.joints.iter().filter(on_link).map(|joint| joint.name.as_str()).collect();
+        Err(format!("link {:?} has no joint {name:?}; its joints are {known:?}", self.link))
+    }
+}

@@ -1,0 +1,380 @@
+//! The job file of a reduction, read into a plain struct; command-line flags are a second such struct on top.
+//!
+//! Unknown keys are refused. Lengths are in the unit of the mesh, positions in the link frame, angles in rad.
+
+use std::collections::BTreeMap;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use flexarm_fem::reduction::Tie;
+use flexarm_fem::{NodeSelector, UnitSystem};
+use serde::de::IgnoredAny;
+use serde::{Deserialize, Serialize};
+use toml::Spanned;
+
+use super::words::{At, MaterialChoice, OrderingChoice, QuadratureChoice, SplitChoice, text};
+use crate::error::Error;
+use crate::robot_file::Source;
+
+/// What to reduce, and how. Whatever is `None` has a default or is asked for when it is needed.
+///
+/// ```toml
+/// mesh = "lower_arm.msh.gz"        # relative to this file
+/// units = "mm-t-s"
+/// material = "aluminium"           # or { E = 70e9, nu = 0.33, rho = 2700 }; left out if the mesh has its own
+/// modes = 10
+/// [[interface]]
+/// name = "A"
+/// select = "interface_A"           # a set, plane(...), cylinder(...), box(...), joined with &
+/// xyz = [0.0, -75.0, 0.0]          # unit of the mesh, link frame; or at = "centroid", or joint = "..." with [urdf]
+/// [[interface]]
+/// name = "B"
+/// select = "cylinder(40,0,1100; 0,1,0; 60)"
+/// at = "centroid"
+/// tie = "distributing"
+/// ```
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct ReduceJob {
+    /// Mesh file; in the file relative to the file, in memory relative to the working folder.
+    pub mesh: PathBuf,
+    /// Name of the link; that of the URDF's link, or of the mesh file, if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub link: Option<String>,
+    /// Units of the mesh, such as `mm-t-s`.
+    #[serde(default, with = "text", skip_serializing_if = "Option::is_none")]
+    pub units: Option<UnitSystem>,
+    /// Material of all regions, also of those for which the mesh has its own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub material: Option<MaterialChoice>,
+    /// Material of single regions by name; goes before `material`.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub materials: BTreeMap<String, MaterialChoice>,
+    /// Fixed-interface modes to keep.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub modes: Option<usize>,
+    /// Or all below this frequency (Hz).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub modes_up_to_hz: Option<f64>,
+    /// Tie of interfaces that do not say otherwise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tie: Option<Tie>,
+    /// Place of the elastic joint.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub split: Option<SplitChoice>,
+    /// Chains to store in the link, by their number of parts.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub chains: Option<Vec<usize>>,
+    /// Quadrature of solid elements.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub quadrature: Option<QuadratureChoice>,
+    /// Order of elimination.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ordering: Option<OrderingChoice>,
+    /// Threads of the solver.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub threads: Option<usize>,
+    /// Pose of the mesh frame in the link frame.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mesh_frame: Option<FrameEntry>,
+    /// A robot that says where the interfaces are.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub urdf: Option<UrdfEntry>,
+    /// Interfaces, proximal first, then distal, then any others.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub interface: Vec<InterfaceEntry>,
+}
+
+/// A pose; length in the unit of the mesh.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct FrameEntry {
+    /// Position.
+    #[serde(default)]
+    pub xyz: [f64; 3],
+    /// Roll, pitch, yaw (rad).
+    #[serde(default)]
+    pub rpy: [f64; 3],
+}
+
+/// An interface: which nodes, and where its frame is.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct InterfaceEntry {
+    /// Name; A, B, C, ... if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+    /// Its nodes. Places are in the frame and the unit of the mesh file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub select: Option<NodeSelector>,
+    /// Position in the link frame, unit of the mesh.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub xyz: Option<[f64; 3]>,
+    /// Roll, pitch, yaw in the link frame (rad).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rpy: Option<[f64; 3]>,
+    /// Or: at the centroid of its nodes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub at: Option<At>,
+    /// Or: at the origin of a joint of the robot.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub joint: Option<String>,
+    /// How its nodes are tied.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tie: Option<Tie>,
+    /// File and line that it comes from, for messages.
+    #[serde(skip)]
+    pub place: String,
+}
+
+/// A robot whose joints are at the interfaces of the link.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct UrdfEntry {
+    /// URDF or xacro file; as `mesh`, relative to the job file.
+    pub file: PathBuf,
+    /// The link.
+    pub link: String,
+    /// The joint at B; the only moving child joint if not given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub joint: Option<String>,
+    /// What the URDF's link weighs beyond the mesh (motors, gears, cables) rides on the two parts, as the
+    /// halves of a uniform bar, so that the rigid robot stays that of the URDF.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub rest: bool,
+}
+
+/// A job file is not longer than this; longer files are meshes.
+const LONGEST_JOB: u64 = 1 << 20;
+
+impl ReduceJob {
+    /// Nothing but a mesh.
+    pub fn for_mesh(mesh: impl Into<PathBuf>) -> Self {
+        Self { mesh: mesh.into(), ..Self::default() }
+    }
+
+    /// A job file, or a job with nothing but this mesh; told apart by content: a job is TOML with `mesh = ...`.
+    ///
+    /// # Errors
+    /// [`Error::File`] if it cannot be read, [`Error::RobotFile`] with line and column for what is not the format.
+    pub fn load(path: &Path) -> Result<Self, Error> {
+        let unreadable = |e: std::io::Error| {
+            let what = match e.kind() {
+                std::io::ErrorKind::NotFound => {
+                    "there is no such file; give a mesh (.msh or .inp, also .gz) or a job file (.toml)".into()
+                }
+                _ => format!("cannot be read: {e}"),
+            };
+            Error::File { path: path.to_owned(), what }
+        };
+        let mut bytes = Vec::new();
+        let file = std::fs::File::open(path).map_err(unreadable)?;
+        file.take(LONGEST_JOB + 1).read_to_end(&mut bytes).map_err(unreadable)?;
+        let is_toml = path.extension().is_some_and(|e| e == "toml");
+        match std::str::from_utf8(&bytes) {
+            Ok(text) if is_toml || is_job(text) => parse_job(text, path),
+            Err(_) if is_toml => {
+                let what = "a job file is text in UTF-8; this is not".into();
+                Err(Error::File { path: path.to_owned(), what })
+            }
+            _ => Ok(Self::for_mesh(path)),
+        }
+    }
+
+    /// Name of the link: the one given, that of the URDF's link, or that of the mesh file.
+    pub fn link_name(&self) -> String {
+        let given = self.link.clone().or_else(|| self.urdf.as_ref().map(|urdf| urdf.link.clone()));
+        given.unwrap_or_else(|| stem(&self.mesh))
+    }
+
+    /// Puts `flags` over this job: what is given there counts. Interfaces are matched by name; a new name is a new
+    /// interface. The mesh stays.
+    pub fn put_over(&mut self, flags: Self) {
+        fn put<T>(own: &mut Option<T>, given: Option<T>) {
+            if given.is_some() {
+                *own = given;
+            }
+        }
+        if flags.modes.is_some() || flags.modes_up_to_hz.is_some() {
+            (self.modes, self.modes_up_to_hz) = (flags.modes, flags.modes_up_to_hz);
+        }
+        if flags.tie.is_some() {
+            // "All of them" on the command line means all of them.
+            self.interface.iter_mut().for_each(|entry| entry.tie = None);
+        }
+        if flags.material.is_some() {
+            self.materials.clear();
+        }
+        put(&mut self.link, flags.link);
+        put(&mut self.units, flags.units);
+        put(&mut self.material, flags.material);
+        self.materials.extend(flags.materials);
+        put(&mut self.tie, flags.tie);
+        put(&mut self.split, flags.split);
+        put(&mut self.chains, flags.chains);
+        put(&mut self.quadrature, flags.quadrature);
+        put(&mut self.ordering, flags.ordering);
+        put(&mut self.threads, flags.threads);
+        put(&mut self.mesh_frame, flags.mesh_frame);
+        put(&mut self.urdf, flags.urdf);
+        self.name_interfaces();
+        for given in flags.interface {
+            let Some(own) = self.interface.iter_mut().find(|own| own.name == given.name) else {
+                self.interface.push(given);
+                continue;
+            };
+            if given.select.is_some() {
+                own.place.clone_from(&given.place);
+            }
+            put(&mut own.select, given.select);
+            if given.xyz.is_some() || given.at.is_some() || given.joint.is_some() {
+                (own.xyz, own.rpy, own.at, own.joint) = (given.xyz, given.rpy, given.at, given.joint);
+            }
+            put(&mut own.tie, given.tie);
+        }
+        self.name_interfaces();
+    }
+
+    /// Gives interfaces without a name the letter of their place.
+    fn name_interfaces(&mut self) {
+        for (entry, letter) in self.interface.iter_mut().zip('A'..='Z') {
+            entry.name.get_or_insert_with(|| letter.to_string());
+        }
+    }
+}
+
+/// Whether text that is no mesh is TOML with a mesh in it; also if it is spoilt further down.
+fn is_job(text: &str) -> bool {
+    let lines = text.lines().map(str::trim_start);
+    let mut keys = lines.filter(|line| !line.is_empty() && !line.starts_with('#'));
+    !text.trim_start().starts_with(['$', '*'])
+        && keys.any(|line| line.strip_prefix("mesh").is_some_and(|rest| rest.trim_start().starts_with('=')))
+}
+
+fn parse_job(text: &str, path: &Path) -> Result<ReduceJob, Error> {
+    let source = Source::new(path, text);
+    let failed = |error: toml::de::Error| {
+        let mut message = error.message().trim().replace('\n', " ");
+        if message.contains("missing field `mesh`") {
+            message += ": add mesh = \"file.msh\"";
+        }
+        Error::from(source.error(error.span().unwrap_or(0..0), message))
+    };
+    let mut job: ReduceJob = toml::from_str(text).map_err(failed)?;
+    let places: Places = toml::from_str(text).map_err(failed)?;
+    for (entry, place) in job.interface.iter_mut().zip(places.interface) {
+        let span = place.select.or(place.name).map_or(0..0, |value| value.span());
+        let at = source.error(span, "");
+        entry.place = format!("{}:{}:{}", path.display(), at.line, at.column);
+    }
+    let folder = path.parent().unwrap_or(Path::new(""));
+    job.mesh = folder.join(&job.mesh);
+    if let Some(urdf) = &mut job.urdf {
+        urdf.file = folder.join(&urdf.file);
+    }
+    Ok(job)
+}
+
+/// Where the interfaces stand in the file.
+#[derive(Deserialize)]
+struct Places {
+    #[serde(default)]
+    interface: Vec<InterfacePlace>,
+}
+
+#[derive(Deserialize)]
+struct InterfacePlace {
+    name: Option<Spanned<IgnoredAny>>,
+    select: Option<Spanned<IgnoredAny>>,
+}
+
+/// Name of a file without folder and endings.
+fn stem(path: &Path) -> String {
+    let name = path.file_name().map_or_else(|| "link".into(), |name| name.to_string_lossy().into_owned());
+    name.split('.').find(|part| !part.is_empty()).unwrap_or("link").to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const JOB: &str = r#"mesh = "arm.msh.gz"
+units = "mm-t-s"
+material = { E = 70e9, nu = 0.33, rho = 2700.0 }
+split = [1, 2.5, 3]
+chains = [3, 4]
+[materials]
+rib = "steel"
+[[interface]]
+select = "interface_A"
+xyz = [0, -75.0, 0]
+[[interface]]
+name = "far"
+select = { plane = { point = [0, 0, 0], normal = [1, 0, 0] } }
+at = "centroid"
+tie = "distributing"
+"#;
+
+    fn parse(text: &str) -> Result<ReduceJob, Error> {
+        parse_job(text, Path::new("jobs/arm.toml"))
+    }
+
+    #[test]
+    fn a_job_is_read_with_paths_and_places_and_written_so_that_it_reads_the_same() {
+        let job = parse(JOB).unwrap();
+        assert_eq!(job.mesh, Path::new("jobs/arm.msh.gz"));
+        assert_eq!(job.link_name(), "arm");
+        assert_eq!(job.split, Some(SplitChoice::Point([1.0, 2.5, 3.0])));
+        assert_eq!(job.interface[0].place, "jobs/arm.toml:9:10");
+        assert_eq!(job.interface[1].tie, Some(Tie::Distributing));
+
+        let written = toml::to_string(&ReduceJob { mesh: "arm.msh.gz".into(), ..job.clone() }).unwrap();
+        let mut again = parse(&written).unwrap();
+        for (again, first) in again.interface.iter_mut().zip(&job.interface) {
+            again.place.clone_from(&first.place);
+        }
+        assert_eq!(again, job);
+    }
+
+    #[test]
+    fn mistakes_are_answered_with_line_and_column() {
+        for (old, new, at, word) in [
+            ("units =", "unit =", ":2:1:", "`unit`"),
+            ("mm-t-s", "mm-N-s", ":2:9:", "mm-t-s"),
+            ("nu = 0.33, ", "", ":3:", "nu"),
+            ("nu = 0.33", "nu = 0.77", ":3:", "Poisson"),
+            ("\"steel\"", "\"steal\"", ":7:7:", "aluminium"),
+            ("\"centroid\"", "\"center\"", ":14:6:", "centroid"),
+            ("\"distributing\"", "\"rbe3\"", ":15:7:", "distributing"),
+            ("\"interface_A\"", "\"plane(0,0,0)\"", ":9:10:", "plane(x,y,z; nx,ny,nz)"),
+            ("[1, 2.5, 3]", "\"middle\"", ":4:9:", "elastic-centre"),
+            ("mesh = \"arm.msh.gz\"", "", ":1:1:", "mesh = "),
+        ] {
+            assert!(JOB.contains(old));
+            let message = parse(&JOB.replacen(old, new, 1)).unwrap_err().to_string();
+            assert!(message.contains(&format!("arm.toml{at}")) && message.contains(word), "{old}: {message}");
+        }
+    }
+
+    #[test]
+    fn flags_go_before_the_file() {
+        let mut job = parse(JOB).unwrap();
+        let entry = |name: &str| InterfaceEntry { name: Some(name.into()), ..InterfaceEntry::default() };
+        let flags = ReduceJob {
+            modes: Some(3),
+            tie: Some(Tie::Rigid),
+            interface: vec![InterfaceEntry { at: Some(At::Centroid), ..entry("A") }, entry("third")],
+            ..ReduceJob::default()
+        };
+        job.put_over(flags);
+        assert_eq!((job.modes, job.interface.len()), (Some(3), 3));
+        assert_eq!((job.interface[0].xyz, job.interface[0].at), (None, Some(At::Centroid)));
+        assert!(job.interface[0].select.is_some() && job.interface[1].tie.is_none());
+    }
+
+    #[test]
+    fn meshes_and_jobs_are_told_apart_by_content() {
+        assert!(is_job(JOB) && is_job("# comment\n\n  mesh=\"x\"\nbroken ="));
+        assert!(!is_job("$MeshFormat\nmesh = 1\n") && !is_job("*HEADING\nmesh = x\n") && !is_job("solid mesh\n"));
+    }
+}

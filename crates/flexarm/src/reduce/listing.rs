@@ -1,0 +1,126 @@
+//! What is in a mesh, to see what can be typed: sets, regions, sizes.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use flexarm_fem::mesh::connected_parts;
+use flexarm_fem::{Mesh, MeshFile};
+use nalgebra::Vector3;
+use serde::Serialize;
+
+use super::interfaces::Place;
+use super::summary::MaterialFigures;
+
+/// Answer of `flexarm reduce --list`. Lengths are in the unit of the mesh file; sets in the link frame, which is the
+/// frame of the mesh unless the job says otherwise.
+#[derive(Clone, Debug, Serialize)]
+pub struct MeshListing {
+    /// The file.
+    pub mesh: String,
+    /// Its format.
+    pub format: &'static str,
+    /// Declared units; null while they are not.
+    pub units: Option<String>,
+    /// Nodes.
+    pub nodes: usize,
+    /// Elements.
+    pub elements: usize,
+    /// Elements of each kind.
+    pub element_kinds: BTreeMap<&'static str, usize>,
+    /// Smallest coordinates of the nodes of elements, frame of the mesh.
+    pub min: [f64; 3],
+    /// Largest coordinates.
+    pub max: [f64; 3],
+    /// Largest dimension in m; null without units.
+    pub size_m: Option<f64>,
+    /// Pieces that share no node; one is right.
+    pub parts: usize,
+    /// Regions of elements.
+    pub regions: Vec<RegionListing>,
+    /// Sets of nodes.
+    pub sets: Vec<SetListing>,
+    /// The interfaces of the job.
+    pub interfaces: Vec<SetListing>,
+    /// Things worth telling.
+    pub warnings: Vec<String>,
+}
+
+/// A region of the mesh.
+#[derive(Clone, Debug, Serialize)]
+pub struct RegionListing {
+    /// Name.
+    pub name: String,
+    /// Elements.
+    pub elements: usize,
+    /// Its own material, SI; null if it has none or the units are not declared.
+    pub material: Option<MaterialFigures>,
+    /// Whether the file has a material for it.
+    pub has_material: bool,
+}
+
+/// A set of nodes of the mesh.
+#[derive(Clone, Debug, Serialize)]
+pub struct SetListing {
+    /// Name.
+    pub name: String,
+    /// Nodes.
+    pub nodes: usize,
+    /// Mean of its nodes.
+    pub centroid: [f64; 3],
+    /// Size along the axes.
+    pub extent: [f64; 3],
+    /// The centroid as it can be typed.
+    pub at: String,
+}
+
+impl MeshListing {
+    pub(super) fn new(path: &Path, file: &MeshFile, units: Option<String>, place: &Place<'_>) -> Self {
+        let mesh: &Mesh = &file.mesh;
+        let mut element_kinds = BTreeMap::new();
+        for block in &mesh.blocks {
+            *element_kinds.entry(block.kind.name()).or_insert(0) += block.len();
+        }
+        let (low, high) = mesh.bounding_box().unwrap_or_default();
+        let region = |(index, region): (usize, &flexarm_fem::mesh::Region)| RegionListing {
+            name: region.name.clone(),
+            elements: mesh.blocks.iter().filter(|b| b.region == index).map(flexarm_fem::ElementBlock::len).sum(),
+            material: region.material.as_ref().filter(|_| units.is_some()).map(MaterialFigures::new),
+            has_material: region.material.is_some(),
+        };
+        let parts = connected_parts(mesh).len();
+        let mut warnings = file.warnings.clone();
+        if parts > 1 {
+            warnings.push(format!("the mesh falls into {parts} parts that share no node; a link must be in one piece"));
+        }
+        let typed = |v: Vector3<f64>| -> [f64; 3] { (v / place.unit).into() };
+        Self {
+            mesh: path.display().to_string(),
+            format: file.format,
+            nodes: mesh.nodes.len(),
+            elements: mesh.element_count(),
+            element_kinds,
+            min: typed(low),
+            max: typed(high),
+            size_m: units.is_some().then(|| (high - low).amax()),
+            parts,
+            regions: mesh.regions.iter().enumerate().map(region).collect(),
+            sets: mesh.node_sets.iter().map(|(name, nodes)| SetListing::new(name, nodes, place)).collect(),
+            interfaces: Vec::new(),
+            units,
+            warnings,
+        }
+    }
+}
+
+impl SetListing {
+    pub(super) fn new(name: &str, nodes: &[u32], place: &Place<'_>) -> Self {
+        let (centroid, extent) = place.middle_and_extent(nodes);
+        Self {
+            name: name.to_owned(),
+            nodes: nodes.len(),
+            centroid: (centroid / place.unit).into(),
+            extent: (extent / place.unit).into(),
+            at: place.typed(&centroid),
+        }
+    }
+}

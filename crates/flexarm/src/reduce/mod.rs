@@ -1,0 +1,253 @@
+//! From a mesh to a flexible link with its files: what `flexarm reduce` does.
+//!
+//! A [`ReduceJob`] comes from a file, from flags, or from both ([`ReduceJob::put_over`]); [`reduce()`] checks it,
+//! reduces the mesh and writes the link file, the complete job, the figures and a report. [`list_mesh`] shows what is
+//! in a mesh, to see what can be typed.
+//!
+//! ```no_run
+//! use flexarm::reduce::{ReduceJob, ReduceOptions, ReduceOutputs, reduce};
+//!
+//! let job = ReduceJob::load("lower_arm.reduce.toml".as_ref())?;
+//! let outputs = ReduceOutputs { folder: Some("out/lower_arm".into()), ..ReduceOutputs::default() };
+//! let summary = reduce(&job, &ReduceOptions::default(), Some(&outputs), &mut |_| {})?;
+//! println!("{:.2} kg, first frequency {:.1} Hz", summary.mass_kg, summary.frequencies_hz[0]);
+//! # Ok::<(), flexarm::Error>(())
+//! ```
+//!
+//! Units: SI, except lengths in a job, which are in the unit of its mesh. Positions of interfaces are in the link
+//! frame; places that choose nodes are in the frame of the mesh, as a mesher shows them.
+//!
+//! Not here: the reduction itself (`flexarm-fem`).
+
+mod files;
+mod interfaces;
+mod job;
+mod listing;
+mod prepare;
+mod report;
+mod stamp;
+mod summary;
+mod words;
+
+use std::time::{Duration, Instant};
+
+use flexarm_fem::mesh::read_mesh;
+use flexarm_fem::mesh_link::ReductionStep;
+use flexarm_fem::{ReadOptions, UnitSystem, reduce_mesh, write_flex};
+use flexarm_kinematics::Pose;
+
+use crate::error::Error;
+use files::Paths;
+use interfaces::Place;
+use prepare::{Prepared, failed, prepare};
+use summary::summary_of;
+
+pub use files::ReduceOutputs;
+pub use flexarm_fem::reduction::Tie;
+pub use flexarm_fem::{NodeSelector, UnitSystem as Units};
+pub use job::{FrameEntry, InterfaceEntry, ReduceJob, UrdfEntry};
+pub use listing::{MeshListing, RegionListing, SetListing};
+pub use report::{ReportTable, headline, markdown, tables};
+pub use summary::{
+    ChainFigures, CheckFigures, InterfaceFigures, MaterialFigures, ModeFigures, PartFigures, PhaseFigures, ReduceFiles,
+    ReduceSummary, RegionFigures, SolverFigures,
+};
+pub use words::{At, MaterialChoice, OrderingChoice, QuadratureChoice, SplitChoice, numbers};
+
+/// Modes that are kept if the job does not say.
+const MODES: usize = 10;
+/// More modes than this are a slip of the pen.
+const MOST_MODES: usize = 1000;
+/// Modes with A held against which the reduced models are judged.
+const JUDGED_MODES: usize = 10;
+
+/// What a job does not say.
+#[derive(Clone, Debug, Default)]
+pub struct ReduceOptions {
+    /// For the reader of the URDF.
+    pub urdf: flexarm_urdf::ReadOptions,
+}
+
+/// A step that begins.
+#[derive(Clone, Copy, Debug)]
+pub struct ReduceProgress {
+    /// What is done in it.
+    pub step: &'static str,
+    /// Its number, from 1.
+    pub number: usize,
+    /// How many there are.
+    pub of: usize,
+}
+
+/// Reduces a mesh to a link and writes the files.
+///
+/// Everything that can be checked is checked before the work starts; nothing is written if it fails.
+///
+/// # Errors
+/// [`Error`]; several faults of a job come together. See [`Error::exit_code`].
+pub fn reduce(
+    job: &ReduceJob,
+    options: &ReduceOptions,
+    outputs: Option<&ReduceOutputs>,
+    progress: &mut dyn FnMut(ReduceProgress),
+) -> Result<ReduceSummary, Error> {
+    let (started, cpu) = (Instant::now(), cpu_time::ProcessTime::now());
+    let of = ReductionStep::ALL.len() + 1;
+    progress(ReduceProgress { step: "reading the mesh", number: 1, of });
+    let job = &with_defaults(job)?;
+    let paths = outputs.map(|outputs| Paths::new(outputs, &job.link_name())).transpose()?;
+    let Prepared { plan, file, units, chosen, materials, warnings } = prepare(job, options)?;
+    let read_s = started.elapsed();
+
+    let mut starts = Vec::new();
+    let reduction = reduce_mesh(&file.mesh, &plan, &mut |step| {
+        starts.push(Instant::now());
+        let number = starts.len() + 1;
+        progress(ReduceProgress { step: step.name(), number, of });
+    });
+    let reduction = reduction.map_err(|source| failed(job, &file, units, source))?;
+    starts.push(Instant::now());
+
+    let mut summary = summary_of(job, &plan, &file, units, &chosen, materials, &reduction);
+    summary.warnings.splice(0..0, warnings);
+    summary.phases = phases(read_s, &starts);
+    summary.wall_s = started.elapsed().as_secs_f64();
+    summary.cpu_s = cpu.elapsed().as_secs_f64();
+    summary.peak_rss_bytes = stamp::peak_rss_bytes();
+    if let Some(paths) = paths {
+        let pictures = if paths.folder.is_some() { pictures(&file.mesh, &plan, &reduction)? } else { Vec::new() };
+        write(job, &paths, &write_flex(&reduction.link), &pictures, &mut summary)?;
+    }
+    Ok(summary)
+}
+
+/// What is in the mesh of a job. Units, materials and positions may be missing.
+///
+/// # Errors
+/// [`Error::Mesh`], and [`Error::Interface`] for interfaces that choose no nodes.
+pub fn list_mesh(job: &ReduceJob) -> Result<MeshListing, Error> {
+    let read = ReadOptions { units: job.units.unwrap_or(UnitSystem::SI), ..ReadOptions::default() };
+    let file = read_mesh(&job.mesh, &read).map_err(Box::new)?;
+    let unit = read.units.length;
+    let X_LM = job.mesh_frame.map_or_else(Pose::identity, |frame| interfaces::pose(&frame, unit));
+    let place = Place { mesh: &file.mesh, unit, X_LM };
+    let mut listing = MeshListing::new(&job.mesh, &file, job.units.map(|units| units.name()), &place);
+    for entry in &job.interface {
+        let Some(selector) = &entry.select else { continue };
+        let interface = entry.name.clone().unwrap_or_default();
+        let nodes = flexarm_fem::mesh::select(&file.mesh, selector, unit).map_err(|source| Error::Interface {
+            place: if entry.place.is_empty() { listing.mesh.clone() } else { entry.place.clone() },
+            interface: interface.clone(),
+            what: source.to_string(),
+        })?;
+        listing.interfaces.push(SetListing::new(&interface, &nodes, &place));
+    }
+    Ok(listing)
+}
+
+/// The job with every default written out.
+fn with_defaults(job: &ReduceJob) -> Result<ReduceJob, Error> {
+    let mut job = job.clone();
+    job.put_over(ReduceJob::default()); // names the interfaces
+    job.link = Some(job.link_name());
+    match (job.modes, job.modes_up_to_hz) {
+        (None, None) => job.modes = Some(MODES),
+        (Some(_), Some(_)) => {
+            return Err(Error::Usage("modes and modes_up_to_hz exclude each other: give one of them".into()));
+        }
+        (Some(modes), None) if modes > MOST_MODES => {
+            return Err(Error::Usage(format!("{modes} modes are asked for; at most {MOST_MODES} can be kept")));
+        }
+        (None, Some(hz)) if !(hz.is_finite() && hz > 0.0) => {
+            return Err(Error::Usage(format!("modes up to {hz} Hz are asked for; a positive frequency is expected")));
+        }
+        _ => {}
+    }
+    let chains = job.chains.get_or_insert_with(Vec::new);
+    chains.sort_unstable();
+    chains.dedup();
+    if let Some(parts) = chains.iter().find(|parts| !(2..=100).contains(*parts)) {
+        return Err(Error::Usage(format!("a chain of {parts} parts is asked for; 2 to 100 are possible")));
+    }
+    job.tie.get_or_insert(Tie::Rigid);
+    job.split.get_or_insert(SplitChoice::ElasticCentre);
+    job.quadrature.get_or_insert(QuadratureChoice::Exact);
+    job.ordering.get_or_insert(OrderingChoice::Auto);
+    let threads = *job.threads.get_or_insert(1);
+    if !(1..=1024).contains(&threads) {
+        return Err(Error::Usage(format!("{threads} threads are asked for; 1 to 1024 are possible")));
+    }
+    Ok(job)
+}
+
+fn phases(read: Duration, starts: &[Instant]) -> PhaseFigures {
+    let step = |k: usize| match starts.get(k..k + 2) {
+        Some([from, to]) => (*to - *from).as_secs_f64(),
+        _ => 0.0,
+    };
+    let [assembly_s, factorisation_s, fixed_modes_s, held_modes_s, parts_s] = [0, 1, 2, 3, 4].map(step);
+    PhaseFigures { read_s: read.as_secs_f64(), assembly_s, factorisation_s, fixed_modes_s, held_modes_s, parts_s }
+}
+
+/// The sheets of pictures, as PNG with their file names; none without the feature `png`.
+#[cfg(feature = "png")]
+fn pictures(
+    mesh: &flexarm_fem::Mesh,
+    plan: &flexarm_fem::LinkPlan,
+    reduction: &flexarm_fem::MeshReduction,
+) -> Result<Vec<(&'static str, Vec<u8>)>, Error> {
+    use flexarm_log::mesh_picture::MeshPictures;
+    fn failed(error: impl std::fmt::Display) -> Error {
+        Error::Usage(format!("the pictures failed: {error}"))
+    }
+    let sheets = MeshPictures::new(mesh, &plan.interfaces, reduction).map_err(failed)?;
+    let mut all = vec![("interfaces.png", sheets.render_interfaces()), ("unit_loads.png", sheets.render_unit_loads())];
+    if !reduction.held_modes.is_empty() {
+        all.push(("modes.png", sheets.render_modes().map_err(failed)?));
+    }
+    all.into_iter().map(|(name, image)| Ok((name, image.to_png().map_err(failed)?))).collect()
+}
+
+#[cfg(not(feature = "png"))]
+#[allow(clippy::unnecessary_wraps, reason = "with the feature `png` it can fail")]
+fn pictures(
+    _: &flexarm_fem::Mesh,
+    _: &flexarm_fem::LinkPlan,
+    _: &flexarm_fem::MeshReduction,
+) -> Result<Vec<(&'static str, Vec<u8>)>, Error> {
+    Ok(Vec::new())
+}
+
+fn write(
+    job: &ReduceJob,
+    paths: &Paths,
+    flex: &str,
+    pictures: &[(&'static str, Vec<u8>)],
+    summary: &mut ReduceSummary,
+) -> Result<(), Error> {
+    let text = |path: &std::path::Path| Some(path.display().to_string());
+    summary.files.flex = paths.flex.as_deref().or(paths.folder.as_ref().map(|f| f.flex.as_path())).and_then(text);
+    let (mut job_text, mut json, mut page) = (String::new(), String::new(), String::new());
+    if let Some(folder) = &paths.folder {
+        summary.files.job = text(&folder.job);
+        summary.files.summary = text(&folder.summary);
+        summary.files.report = text(&folder.report);
+        summary.files.pictures =
+            pictures.iter().map(|(name, _)| folder.path.join(name).display().to_string()).collect();
+        job_text = files::job_file(job, &folder.path);
+        json = serde_json::to_string_pretty(&summary).expect("plain numbers and strings") + "\n";
+        page = markdown(summary);
+    }
+    let mut files: Vec<(std::path::PathBuf, &[u8])> = Vec::new();
+    if let Some(folder) = &paths.folder {
+        files.extend([
+            (folder.flex.clone(), flex.as_bytes()),
+            (folder.job.clone(), job_text.as_bytes()),
+            (folder.summary.clone(), json.as_bytes()),
+            (folder.report.clone(), page.as_bytes()),
+        ]);
+        files.extend(pictures.iter().map(|(name, png)| (folder.path.join(name), png.as_slice())));
+    }
+    files.extend(paths.flex.clone().map(|path| (path, flex.as_bytes())));
+    paths.write(&files)
+}

@@ -1,0 +1,229 @@
+//! From a job to a mesh with materials and a plan, everything checked before the work starts.
+
+use flexarm_fem::element::Quadrature;
+use flexarm_fem::mesh::read_mesh;
+use flexarm_fem::mesh_link::MeshLinkError;
+use flexarm_fem::model::AssemblyOptions;
+use flexarm_fem::reduction::{CondensationOptions, ReductionError, TieError};
+use flexarm_fem::sparse::{ModesWanted, Ordering, Threads};
+use flexarm_fem::{
+    GateLimits, LinkPlan, Material, MeshFile, Provenance, ReadOptions, SplitAt, UnitSystem, mass_properties,
+};
+use flexarm_kinematics::Pose;
+use nalgebra::Vector3;
+
+use super::interfaces::{Chosen, Place, RobotLink, pose};
+use super::job::ReduceJob;
+use super::summary::{MaterialFigures, RegionFigures};
+use super::words::{MATERIAL_FORMS, OrderingChoice, QuadratureChoice, SplitChoice, described};
+use super::{JUDGED_MODES, MODES, MOST_MODES, ReduceOptions, stamp};
+use crate::error::Error;
+
+/// All that a reduction needs.
+pub(super) struct Prepared {
+    pub(super) plan: LinkPlan,
+    /// In link axes, with the materials of the job.
+    pub(super) file: MeshFile,
+    pub(super) units: UnitSystem,
+    pub(super) chosen: Vec<Chosen>,
+    pub(super) materials: Vec<RegionFigures>,
+    pub(super) warnings: Vec<String>,
+}
+
+pub(super) fn prepare(job: &ReduceJob, options: &ReduceOptions) -> Result<Prepared, Error> {
+    // Without units the mesh is still read, to say what could be typed.
+    let units = job.units.unwrap_or(UnitSystem::SI);
+    let mut file = read_mesh(&job.mesh, &ReadOptions { units, ..ReadOptions::default() }).map_err(Box::new)?;
+    let mut warnings = std::mem::take(&mut file.warnings);
+    let robot = job.urdf.as_ref().map(|entry| RobotLink::read(entry, &options.urdf)).transpose()?;
+    let X_LM = job.mesh_frame.map_or_else(Pose::identity, |frame| pose(&frame, units.length));
+
+    let mut faults = Vec::new();
+    if job.units.is_none() {
+        faults.push(no_units(job, &file));
+    }
+    let materials = materials(job, &mut file, &mut faults, &mut warnings);
+    let place = Place { mesh: &file.mesh, unit: units.length, X_LM };
+    let chosen = place.choose(job, robot.as_ref()).unwrap_or_else(|more| {
+        faults.extend(more);
+        Vec::new()
+    });
+    if let [a, b, ..] = chosen.as_slice()
+        && (a.interface.X_LI.translation.vector - b.interface.X_LI.translation.vector).norm() == 0.0
+    {
+        let names = [&a.interface.name, &b.interface.name];
+        let what = format!("interfaces {names:?} are at the same point; a link needs a length");
+        faults.push(Error::File { path: job.mesh.clone(), what });
+    }
+    match faults.len() {
+        0 => {}
+        1 => return Err(faults.remove(0)),
+        _ => return Err(Error::Several(faults)),
+    }
+    warnings.extend(place.doubts(&chosen));
+    let mut plan = plan(job, &file, units, &chosen, &materials);
+    file.mesh = file.mesh.transformed(&X_LM);
+    if let (Some(robot), Some(entry)) = (&robot, job.urdf.as_ref().filter(|entry| entry.rest)) {
+        let fault = |what| Error::File { path: entry.file.clone(), what };
+        let densities: Vec<f64> = file.mesh.regions.iter().map(|r| r.material.map_or(0.0, |m| m.rho)).collect();
+        let mesh = mass_properties(&file.mesh, &densities)
+            .map_err(|error| Error::File { path: job.mesh.clone(), what: error.to_string() })?;
+        let along = plan.interfaces[1].X_LI.translation.vector - plan.interfaces[0].X_LI.translation.vector;
+        plan.attached = robot.rest(&mesh, &along).map_err(fault)?.into();
+    }
+    Ok(Prepared { plan, file, units, chosen, materials, warnings })
+}
+
+fn no_units(job: &ReduceJob, file: &MeshFile) -> Error {
+    let size = file.mesh.bounding_box().map_or(0.0, |(low, high)| (high - low).amax());
+    let what = format!(
+        "the units of the mesh are not declared: --units LENGTH-MASS-TIME or units = \"...\"; the mesh is {size:.6} long in \
+         its own unit, so {size:.4} m with m-kg-s (N, Pa) and {:.4} m with mm-t-s (N, MPa)",
+        1e-3 * size
+    );
+    Error::File { path: job.mesh.clone(), what }
+}
+
+/// Puts the materials of the job into the mesh; says of each region which one counts.
+fn materials(
+    job: &ReduceJob,
+    file: &mut MeshFile,
+    faults: &mut Vec<Error>,
+    warnings: &mut Vec<String>,
+) -> Vec<RegionFigures> {
+    let fault = |what: String| Error::File { path: job.mesh.clone(), what };
+    let mesh = &mut file.mesh;
+    let names: Vec<&str> = mesh.regions.iter().map(|region| region.name.as_str()).collect();
+    for name in job.materials.keys().filter(|name| !names.contains(&name.as_str())) {
+        faults.push(fault(format!("a material is given for region {name:?}; the mesh has the regions {names:?}")));
+    }
+    let used: Vec<bool> = (0..mesh.regions.len())
+        .map(|index| mesh.blocks.iter().any(|block| block.region == index && !block.is_empty()))
+        .collect();
+    let (mut figures, mut missing) = (Vec::new(), Vec::new());
+    for (region, _) in mesh.regions.iter_mut().zip(used).filter(|(_, used)| *used) {
+        let given = job.materials.get(&region.name).or(job.material.as_ref());
+        let (material, from) = match (given, region.material) {
+            (Some(given), own) => {
+                // Only where the units are known can the two be compared.
+                if let Some(own) = own.filter(|own| job.units.is_some() && differ(own, &given.material)) {
+                    warnings.push(format!(
+                        "region {:?}: the material of the job, {given}, replaces that of the mesh, {}",
+                        region.name,
+                        described(&own)
+                    ));
+                }
+                (given.material, "job")
+            }
+            (None, Some(own)) => (own, "mesh"),
+            (None, None) => {
+                missing.push(region.name.as_str());
+                continue;
+            }
+        };
+        region.material = Some(material);
+        figures.push(RegionFigures { region: region.name.clone(), material: MaterialFigures::new(&material), from });
+    }
+    if !missing.is_empty() {
+        faults.push(fault(format!(
+            "no material for {} {missing:?}: --material MATERIAL for all, --material REGION=MATERIAL for one, or \
+             material = ... in the job file, where MATERIAL is {}",
+            if missing.len() == 1 { "region" } else { "regions" },
+            MATERIAL_FORMS
+        )));
+    }
+    figures
+}
+
+fn differ(a: &Material, b: &Material) -> bool {
+    [(a.E, b.E), (a.nu, b.nu), (a.rho, b.rho)].into_iter().any(|(a, b)| (a - b).abs() > 1e-6 * a.abs().max(b.abs()))
+}
+
+fn plan(
+    job: &ReduceJob,
+    file: &MeshFile,
+    units: UnitSystem,
+    chosen: &[Chosen],
+    materials: &[RegionFigures],
+) -> LinkPlan {
+    let modes = match (job.modes, job.modes_up_to_hz) {
+        (_, Some(hz)) => ModesWanted::Below { omega2: (std::f64::consts::TAU * hz).powi(2), at_most: MOST_MODES },
+        (modes, None) => ModesWanted::Count(modes.unwrap_or(MODES)),
+    };
+    let split = match job.split.unwrap_or_default() {
+        SplitChoice::ElasticCentre => SplitAt::ElasticCentre,
+        SplitChoice::Mid => SplitAt::MidLength,
+        SplitChoice::Fraction(fraction) => SplitAt::Fraction(fraction),
+        SplitChoice::Point(point) => SplitAt::Point(Vector3::from(point) * units.length),
+    };
+    let quadrature = match job.quadrature.unwrap_or_default() {
+        QuadratureChoice::Exact => Quadrature::Exact,
+        QuadratureChoice::Calculix => Quadrature::Calculix,
+    };
+    let ordering = match job.ordering.unwrap_or_default() {
+        OrderingChoice::Auto => Ordering::Auto,
+        OrderingChoice::Amd => Ordering::MinimumDegree,
+        OrderingChoice::Nested => Ordering::NestedDissection,
+    };
+    let ties: Vec<&str> = chosen.iter().map(|one| one.interface.tie.name()).collect();
+    let tie = match ties.as_slice() {
+        [first, rest @ ..] if rest.iter().all(|tie| tie == first) => (*first).to_owned(),
+        _ => chosen
+            .iter()
+            .map(|one| format!("{} {}", one.interface.name, one.interface.tie.name()))
+            .collect::<Vec<_>>()
+            .join(", "),
+    };
+    let materials: Vec<String> = materials.iter().map(|m| format!("{}: {}", m.region, m.material.text)).collect();
+    let mesh = job.mesh.file_name().unwrap_or_default().to_string_lossy();
+    let provenance = Provenance {
+        source: format!("{mesh} ({})", file.format),
+        method: match modes {
+            ModesWanted::Count(0) => "guyan".into(),
+            _ => "craig-bampton".into(),
+        },
+        tie,
+        units: units.name(),
+        date: stamp::today(),
+        note: format!(
+            "flexarm {}; {}; {} quadrature",
+            env!("CARGO_PKG_VERSION"),
+            materials.join("; "),
+            quadrature_name(job)
+        ),
+    };
+    LinkPlan {
+        name: job.link_name(),
+        interfaces: chosen.iter().map(|one| one.interface.clone()).collect(),
+        assembly: AssemblyOptions { quadrature, material: None },
+        condensation: CondensationOptions { ordering, threads: Threads(job.threads.unwrap_or(1)) },
+        modes,
+        split,
+        chains: job.chains.clone().unwrap_or_default(),
+        attached: Vec::new(),
+        judged_modes: JUDGED_MODES,
+        limits: GateLimits::default(),
+        provenance,
+    }
+}
+
+pub(super) fn quadrature_name(job: &ReduceJob) -> &'static str {
+    match job.quadrature.unwrap_or_default() {
+        QuadratureChoice::Exact => "exact",
+        QuadratureChoice::Calculix => "calculix",
+    }
+}
+
+/// The error with what the file knows of it: numbers and places of nodes.
+pub(super) fn failed(job: &ReduceJob, file: &MeshFile, units: UnitSystem, source: MeshLinkError) -> Error {
+    let node = match &source {
+        MeshLinkError::Reduction(ReductionError::Tie(TieError::Overlap { node, .. })) => Some(*node as usize),
+        MeshLinkError::Reduction(ReductionError::Loose { node, .. }) => Some(*node),
+        _ => None,
+    };
+    let described = node.and_then(|node| {
+        let (id, p) = (file.mesh.node_ids.get(node)?, file.mesh.nodes.get(node)? / units.length);
+        Some(format!("; in the file this is node {id}, at {:.6}, {:.6}, {:.6} in the unit of the mesh", p.x, p.y, p.z))
+    });
+    Error::Reduction { path: job.mesh.clone(), note: described.unwrap_or_default(), source: Box::new(source) }
+}

@@ -1,0 +1,250 @@
+//! A reduction as tables, for the terminal and for a page of Markdown.
+
+use std::fmt::Write as _;
+
+use flexarm_fem::MeshGate;
+
+use super::summary::{ModeFigures, ReduceSummary};
+
+/// A table of text; the first row is the header.
+#[derive(Clone, Debug)]
+pub struct ReportTable {
+    /// What it is about, with units.
+    pub title: &'static str,
+    /// Names of the columns.
+    pub header: Vec<String>,
+    /// The rows, each as long as the header.
+    pub rows: Vec<Vec<String>>,
+    /// Whether it is for the page only: numbers that a terminal has no room for.
+    pub page_only: bool,
+}
+
+impl ReportTable {
+    fn new(title: &'static str, header: &[&str], rows: Vec<Vec<String>>) -> Self {
+        let header = header.iter().map(|name| (*name).to_owned()).collect();
+        Self { title, header, rows, page_only: false }
+    }
+
+    fn on_page(self) -> Self {
+        Self { page_only: true, ..self }
+    }
+}
+
+/// Six components at an interface.
+const COMPONENTS: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
+
+/// All tables of a reduction, in the order in which a person asks.
+pub fn tables(summary: &ReduceSummary) -> Vec<ReportTable> {
+    let mut tables = vec![interfaces(summary), mass(summary), softness(summary)];
+    tables.push(matrix("stiffness K_BB at B, A held (N/m, N/rad; N m/m, N m/rad)", &summary.stiffness));
+    tables.push(matrix("compliance C_BB at B, A held (m/N, m/(N m); rad/N, rad/(N m))", &summary.compliance));
+    tables.extend([checks(summary), frequencies(summary)]);
+    if !summary.fixed_interface_hz.is_empty() {
+        tables.push(kept(summary));
+    }
+    tables.push(cost(summary));
+    tables
+}
+
+/// The figures as a page of Markdown.
+pub fn markdown(summary: &ReduceSummary) -> String {
+    let mut page = format!("# Link {}\n\n{}\n", summary.link, headline(summary));
+    for table in tables(summary) {
+        let _ = writeln!(page, "\n## {}\n", sentence(table.title));
+        let mut row = |cells: &[String]| {
+            let cells: Vec<String> = cells.iter().map(|cell| cell.replace('|', "\\|")).collect();
+            let _ = writeln!(page, "| {} |", cells.join(" | "));
+        };
+        row(&table.header);
+        row(&vec!["---".to_owned(); table.header.len()]);
+        table.rows.iter().for_each(|cells| row(cells));
+    }
+    if !summary.warnings.is_empty() {
+        page += "\n## Warnings\n\n";
+        for warning in &summary.warnings {
+            let _ = writeln!(page, "- {warning}");
+        }
+    }
+    page
+}
+
+/// What was reduced, in two lines.
+pub fn headline(summary: &ReduceSummary) -> String {
+    let materials: Vec<String> =
+        summary.materials.iter().map(|m| format!("{}: {}", m.region, m.material.text)).collect();
+    format!(
+        "{} ({}, {}): {} nodes, {} elements, {} DoF\n{}; {}, {} quadrature",
+        summary.mesh,
+        summary.format,
+        summary.units,
+        summary.nodes,
+        summary.elements,
+        summary.dofs,
+        materials.join("; "),
+        summary.method,
+        summary.quadrature
+    )
+}
+
+fn sentence(title: &str) -> String {
+    let mut letters = title.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
+/// Three numbers with `digits` after the point, without a minus before zero.
+fn triple(p: &[f64; 3], digits: usize) -> String {
+    let smallest = 0.5 * 10f64.powi(-(digits as i32));
+    p.map(|x| format!("{:.digits$}", if x.abs() < smallest { 0.0 } else { x })).join(", ")
+}
+
+/// Four significant digits.
+fn significant(x: f64) -> String {
+    if x == 0.0 {
+        return "0".into();
+    }
+    let before = x.abs().log10().floor() as i32 + 1;
+    if (-3..=6).contains(&before) { format!("{x:.*}", (4 - before).max(0) as usize) } else { format!("{x:.3e}") }
+}
+
+fn interfaces(summary: &ReduceSummary) -> ReportTable {
+    let rows = summary.interfaces.iter().map(|i| {
+        vec![
+            i.name.clone(),
+            i.selector.clone(),
+            i.nodes.to_string(),
+            i.tie.into(),
+            triple(&i.position_m, 4),
+            triple(&i.centroid_m, 4),
+            triple(&i.extent_m, 4),
+        ]
+    });
+    let header = ["interface", "nodes chosen by", "nodes", "tie", "position", "their centroid", "their extent"];
+    ReportTable::new("interfaces (m, link frame)", &header, rows.collect())
+}
+
+fn mass(summary: &ReduceSummary) -> ReportTable {
+    let row = |name: &str, mass: f64, com: &[f64; 3], I: &[[f64; 3]; 3]| {
+        let moments = [I[0][0], I[1][1], I[2][2], I[0][1], I[0][2], I[1][2]].map(significant);
+        vec![name.to_owned(), format!("{mass:.4}"), triple(com, 4), moments.join(", ")]
+    };
+    let mut rows = vec![row("whole mesh", summary.mass_kg, &summary.com_m, &summary.inertia)];
+    for part in &summary.attached {
+        rows.push(row("rides on it", part.mass_kg, &part.com_m, &part.inertia));
+    }
+    for (name, part) in ["proximal part", "distal part"].iter().zip(&summary.parts) {
+        rows.push(row(name, part.mass_kg, &part.com_m, &part.inertia));
+    }
+    rows.push(vec!["elastic joint".into(), String::new(), triple(&summary.split_m, 4), String::new()]);
+    let header = ["", "mass [kg]", "centre of mass [m]", "ixx, iyy, izz, ixy, ixz, iyz there [kg m2]"];
+    ReportTable::new("mass", &header, rows)
+}
+
+/// What a unit that people know does at B.
+fn softness(summary: &ReduceSummary) -> ReportTable {
+    let C = &summary.compliance;
+    // 1 kN and mm, 1 kN m and mrad.
+    let of = |k: usize| significant(1e6 * C[k][k]);
+    let rows = vec![
+        vec!["1 kN along it moves B by".into(), of(0), of(1), of(2), "mm".into()],
+        vec!["1 kN m about it turns B by".into(), of(3), of(4), of(5), "mrad".into()],
+    ];
+    ReportTable::new("how soft it is, A held (along the same axis)", &["", "x", "y", "z", ""], rows)
+}
+
+fn matrix(title: &'static str, M: &[[f64; 6]; 6]) -> ReportTable {
+    let rows = M
+        .iter()
+        .zip(COMPONENTS)
+        .map(|(row, name)| std::iter::once(name.to_owned()).chain(row.iter().map(|x| format!("{x:.6e}"))).collect());
+    let header: Vec<&str> = std::iter::once("").chain(COMPONENTS).collect();
+    ReportTable::new(title, &header, rows.collect()).on_page()
+}
+
+fn checks(summary: &ReduceSummary) -> ReportTable {
+    let c = &summary.checks;
+    let below = |name: &str, value: f64, limit: f64| {
+        let mark = if value < limit { "ok" } else { "warn" };
+        vec![name.to_owned(), format!("{value:.1e}"), format!("below {limit:.0e}"), mark.to_owned()]
+    };
+    let limits = flexarm_fem::GateLimits::default();
+    let zero = if c.zero_modes == 6 { "ok" } else { "warn" };
+    let shape = if c.jacobian_at_nodes < MeshGate::SMALLEST_JACOBIAN { "warn" } else { "ok" };
+    let rows = vec![
+        below("asymmetry of the stiffness", c.symmetry, limits.asymmetry),
+        below("force under rigid motion", c.rigid_body_residual, MeshGate::RIGID_BODY_RESIDUAL),
+        below("blocks of the stiffness agree", c.block_identity, limits.rigid_body_warning),
+        vec!["motions without stiffness".into(), c.zero_modes.to_string(), "6".into(), zero.into()],
+        below("mass, reduced against mesh", c.mass_error, MeshGate::MASS_ERROR),
+        below("inertia, reduced against mesh", c.inertia_error, MeshGate::MASS_ERROR),
+        below("residual of the kept modes", c.mode_residual, MeshGate::MODE_RESIDUAL),
+        vec![
+            format!("flattest element ({})", c.worst_element),
+            format!("{:.3}", c.jacobian_at_nodes),
+            format!("above {}", MeshGate::SMALLEST_JACOBIAN),
+            shape.into(),
+        ],
+    ];
+    ReportTable::new("checks", &["", "measured", "usual", ""], rows)
+}
+
+fn frequencies(summary: &ReduceSummary) -> ReportTable {
+    let percent = |hz: Option<f64>, error: Option<f64>| match hz.zip(error) {
+        Some((hz, error)) => format!("{hz:.2} ({:+.2} %)", if error.abs() < 5e-5 { 0.0 } else { 100.0 * error }),
+        None => "-".into(),
+    };
+    let mut header = vec!["mode".to_owned(), "mesh".into(), "Craig-Bampton".into(), "Guyan".into(), "two parts".into()];
+    header.extend(summary.chains.iter().map(|chain| format!("{} parts", chain.parts)));
+    let row = |(k, mode): (usize, &ModeFigures)| {
+        let mut cells = vec![
+            (k + 1).to_string(),
+            format!("{:.2}", mode.mesh_hz),
+            percent(mode.reduced_hz, mode.reduced_error),
+            percent(mode.guyan_hz, mode.guyan_error),
+            percent(mode.lumped_hz, mode.lumped_error),
+        ];
+        cells.extend(summary.chains.iter().map(|chain| {
+            let hz = chain.frequencies_hz.get(k).copied();
+            percent(hz, hz.map(|hz| hz / mode.mesh_hz - 1.0))
+        }));
+        cells
+    };
+    let rows = summary.modes.iter().enumerate().map(row).collect();
+    let title = "natural frequencies, A held, B free (Hz; error against the mesh)";
+    ReportTable { title, header, rows, page_only: false }
+}
+
+fn kept(summary: &ReduceSummary) -> ReportTable {
+    let rows = summary.fixed_interface_hz.iter().enumerate();
+    let rows = rows.map(|(k, hz)| vec![(k + 1).to_string(), format!("{hz:.2}")]).collect();
+    ReportTable::new("kept modes, all interfaces held (Hz)", &["mode", "frequency"], rows).on_page()
+}
+
+fn cost(summary: &ReduceSummary) -> ReportTable {
+    let (p, s) = (&summary.phases, &summary.solver);
+    let seconds = |x: f64| format!("{x:.2} s");
+    let memory = summary.peak_rss_bytes.map_or_else(|| "-".into(), |b| format!("{:.0} MB", b as f64 / 1e6));
+    let rows = vec![
+        vec!["wall clock / processor".into(), format!("{} / {}", seconds(summary.wall_s), seconds(summary.cpu_s))],
+        vec![
+            "read, assemble, factorise".into(),
+            format!("{}, {}, {}", seconds(p.read_s), seconds(p.assembly_s), seconds(p.factorisation_s)),
+        ],
+        vec![
+            "kept modes, judging modes, parts".into(),
+            format!("{}, {}, {}", seconds(p.fixed_modes_s), seconds(p.held_modes_s), seconds(p.parts_s)),
+        ],
+        vec!["peak memory".into(), memory],
+        vec![
+            "factor".into(),
+            format!(
+                "{} unknowns, {:.2} million entries, order {}, {} thread(s), {} right-hand sides",
+                s.unknowns,
+                1e-6 * s.factor_entries as f64,
+                s.ordering,
+                s.threads,
+                s.right_hand_sides
+            ),
+        ],
+    ];
+    ReportTable::new("cost", &["", ""], rows)
+}

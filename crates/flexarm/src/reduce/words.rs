@@ -1,0 +1,267 @@
+//! Words and numbers of a reduction job that may be written in more than one way.
+
+use std::fmt;
+use std::str::FromStr;
+
+use flexarm_fem::Material;
+use serde::de::{Error as _, SeqAccess, Visitor, value::SeqAccessDeserializer};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+use crate::robot_file::MaterialEntry;
+
+/// A material by the name of a preset or by its constants.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MaterialChoice {
+    /// The preset, if it is one.
+    pub name: Option<&'static str>,
+    /// Its constants, SI.
+    pub material: Material,
+}
+
+/// The forms of a material, for messages.
+pub(super) const MATERIAL_FORMS: &str =
+    "steel, aluminium, cast_iron, ductile_iron, or E,nu,rho in SI such as 70e9,0.33,2700 (Pa, -, kg/m3)";
+
+impl MaterialChoice {
+    fn named(name: &str) -> Result<Self, String> {
+        let known = Material::PRESETS.into_iter().find(|(known, _)| *known == name);
+        let (name, material) =
+            known.ok_or_else(|| format!("material {name:?} is not known; expected {MATERIAL_FORMS}"))?;
+        Ok(Self { name: Some(name), material })
+    }
+
+    fn given([young, nu, rho]: [f64; 3]) -> Result<Self, String> {
+        let material = Material::isotropic(young, nu, rho);
+        material.check().map_err(|error| error.to_string())?;
+        Ok(Self { name: None, material })
+    }
+}
+
+impl FromStr for MaterialChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if !text.contains(',') {
+            return Self::named(text.trim());
+        }
+        let wrong = || format!("material {text:?} is not known; expected {MATERIAL_FORMS}");
+        Self::given(<[f64; 3]>::try_from(numbers(text)?).map_err(|_| wrong())?)
+    }
+}
+
+impl fmt::Display for MaterialChoice {
+    /// For reports: the name with the constants.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&described(&self.material))
+    }
+}
+
+/// A material in a few words: the preset that it equals, and its constants.
+pub(super) fn described(material: &Material) -> String {
+    let name = Material::PRESETS.iter().find(|(_, preset)| preset == material).map_or("", |(name, _)| *name);
+    let Material { E, nu, rho, .. } = material;
+    let constants = format!("E {} GPa, nu {nu}, rho {rho} kg/m3", (E * 1e-3).round() * 1e-6);
+    if name.is_empty() { constants } else { format!("{name} ({constants})") }
+}
+
+impl Serialize for MaterialChoice {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self.name {
+            Some(name) => serializer.serialize_str(name),
+            None => {
+                #[derive(Serialize)]
+                struct Constants {
+                    #[serde(rename = "E")]
+                    young: f64,
+                    nu: f64,
+                    rho: f64,
+                }
+                let Material { E, nu, rho, .. } = self.material;
+                Constants { young: E, nu, rho }.serialize(serializer)
+            }
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for MaterialChoice {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let choice = match MaterialEntry::deserialize(deserializer)? {
+            MaterialEntry::Named(name) => Self::named(&name),
+            MaterialEntry::Given(m) => Self::given([m.young, m.nu, m.rho]),
+        };
+        choice.map_err(D::Error::custom)
+    }
+}
+
+/// Where the elastic joint of the two-part link sits.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum SplitChoice {
+    /// At the centre of compliance.
+    #[default]
+    ElasticCentre,
+    /// Midway between A and B.
+    Mid,
+    /// At a fraction of the way from A to B.
+    Fraction(f64),
+    /// At a point of the link frame, in the unit of the mesh.
+    Point([f64; 3]),
+}
+
+/// The forms of a split, for messages.
+const SPLIT_FORMS: &str = "elastic-centre, mid, a fraction of the way from A to B (0 to 1), or a point x,y,z";
+
+impl SplitChoice {
+    fn fraction(x: f64) -> Result<Self, String> {
+        let inside = x.is_finite() && (0.0..=1.0).contains(&x);
+        inside.then_some(Self::Fraction(x)).ok_or_else(|| format!("split is {x}; expected {SPLIT_FORMS}"))
+    }
+}
+
+impl FromStr for SplitChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || format!("split {text:?} is not known; expected {SPLIT_FORMS}");
+        match text.trim() {
+            "elastic-centre" | "elastic-center" => Ok(Self::ElasticCentre),
+            "mid" => Ok(Self::Mid),
+            other => match numbers(other).map_err(|_| wrong())?.as_slice() {
+                [x] => Self::fraction(*x),
+                [x, y, z] => Ok(Self::Point([*x, *y, *z])),
+                _ => Err(wrong()),
+            },
+        }
+    }
+}
+
+impl Serialize for SplitChoice {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::ElasticCentre => serializer.serialize_str("elastic-centre"),
+            Self::Mid => serializer.serialize_str("mid"),
+            Self::Fraction(x) => serializer.serialize_f64(*x),
+            Self::Point(p) => p.serialize(serializer),
+        }
+    }
+}
+
+impl<'de> Deserialize<'de> for SplitChoice {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Forms;
+        impl<'de> Visitor<'de> for Forms {
+            type Value = SplitChoice;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("\"elastic-centre\", \"mid\", a fraction such as 0.5, or a point [x, y, z]")
+            }
+
+            fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<SplitChoice, E> {
+                text.parse().map_err(E::custom)
+            }
+
+            fn visit_f64<E: serde::de::Error>(self, x: f64) -> Result<SplitChoice, E> {
+                SplitChoice::fraction(x).map_err(E::custom)
+            }
+
+            fn visit_i64<E: serde::de::Error>(self, x: i64) -> Result<SplitChoice, E> {
+                self.visit_f64(x as f64)
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<SplitChoice, A::Error> {
+                <[f64; 3]>::deserialize(SeqAccessDeserializer::new(seq)).map(SplitChoice::Point)
+            }
+        }
+        deserializer.deserialize_any(Forms)
+    }
+}
+
+/// Rule by which elements are integrated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum QuadratureChoice {
+    /// Enough points for stiffness and mass.
+    #[default]
+    Exact,
+    /// The points of CalculiX, for comparison with it.
+    Calculix,
+}
+
+/// Order in which the unknowns are eliminated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum OrderingChoice {
+    /// By size of the mesh.
+    #[default]
+    Auto,
+    /// Approximate minimum degree.
+    Amd,
+    /// Nested dissection (METIS).
+    Nested,
+}
+
+/// A position that the mesh itself gives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum At {
+    /// The mean of the chosen nodes.
+    Centroid,
+}
+
+/// Finite numbers between commas.
+///
+/// # Errors
+/// The word that is not one.
+pub fn numbers(text: &str) -> Result<Vec<f64>, String> {
+    let number = |word: &str| {
+        let value = word.trim().parse().ok().filter(|x: &f64| x.is_finite());
+        value.ok_or_else(|| format!("{:?} in {text:?} is not a finite number", word.trim()))
+    };
+    text.split(',').map(number).collect()
+}
+
+/// Something with a text form, as an optional string of a file.
+pub(super) mod text {
+    use std::fmt::Display;
+    use std::str::FromStr;
+
+    use serde::{Deserialize, Deserializer, Serializer, de::Error};
+
+    pub(crate) fn serialize<T: Display, S: Serializer>(value: &Option<T>, serializer: S) -> Result<S::Ok, S::Error> {
+        match value {
+            Some(value) => serializer.collect_str(value),
+            None => serializer.serialize_none(),
+        }
+    }
+
+    pub(crate) fn deserialize<'de, T: FromStr<Err: Display>, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<Option<T>, D::Error> {
+        String::deserialize(deserializer)?.parse().map(Some).map_err(D::Error::custom)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_material_is_a_preset_or_three_constants() {
+        assert_eq!("steel".parse::<MaterialChoice>().unwrap().material, Material::STEEL);
+        let given: MaterialChoice = "70e9, 0.33, 2700".parse().unwrap();
+        assert_eq!(given.material, Material::ALUMINIUM);
+        for (text, word) in [("steal", "aluminium"), ("70e9,0.33", "E,nu,rho"), ("70e9,0.7,2700", "Poisson")] {
+            let message = text.parse::<MaterialChoice>().unwrap_err();
+            assert!(message.contains(word), "{message}");
+        }
+    }
+
+    #[test]
+    fn a_split_has_four_forms() {
+        assert_eq!("mid".parse(), Ok(SplitChoice::Mid));
+        assert_eq!("0.4".parse(), Ok(SplitChoice::Fraction(0.4)));
+        assert_eq!("1,2,3".parse(), Ok(SplitChoice::Point([1.0, 2.0, 3.0])));
+        for text in ["middle", "1.5", "1,2", "nan"] {
+            assert!(text.parse::<SplitChoice>().unwrap_err().contains("elastic-centre"), "{text}");
+        }
+    }
+}
