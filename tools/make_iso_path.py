@@ -102,7 +102,7 @@ def joints(arm, samples):
 
 
 if __name__ == "__main__":
-    arm = Arm(ROOT / "robots" / "kr210", elastic=False)
+    arm = Arm(ROOT / "robots" / "kr210" / "beams.toml", elastic=False)
     sample, total = path()
     times = np.arange(int(np.ceil(total * RATE_HZ)) + 1) / RATE_HZ
     rows = joints(arm, [sample(t) for t in times])

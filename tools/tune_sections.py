@@ -13,7 +13,7 @@ import numpy as np
 
 from robot_file import Arm
 
-ROBOT = Path(__file__).parent.parent / "robots" / "kr210"
+ROBOT = Path(__file__).parent.parent / "robots" / "kr210" / "beams.toml"
 JOINT_STIFFNESS = [2.207e6, 3.377e6, 2.776e6, 2.350e6, 2.157e6, 4.671e5]   # N m/rad
 POSES = {"upright": [0, -90, 90, 0, 45, 0], "typical": [0, -60, 60, 0, 60, 0], "reaching": [0, -40, 40, 0, 0, 0]}
 
