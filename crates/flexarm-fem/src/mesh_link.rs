@@ -177,6 +177,10 @@ pub fn reduce_mesh(
     step: &mut dyn FnMut(ReductionStep),
 ) -> Result<MeshReduction, MeshLinkError> {
     check_connected(mesh)?;
+    // Frames in other units are refused before the work, not after it.
+    if let [a, b, ..] = plan.interfaces.as_slice() {
+        LinkFrames::new(a.X_LI, b.X_LI).check()?;
+    }
     step(ReductionStep::Assembly);
     let quality = ElementQuality::of(mesh);
     let materials = materials(mesh, &plan.assembly)?;
