@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use crate::exchange_args::{ExportArgs, ImportArgs};
 use crate::reduce_args::ReduceArgs;
 
 /// How far is a robot's tool from where the rigid model puts it, because its links bend?
@@ -34,6 +35,10 @@ pub(crate) enum Command {
     Check(CheckArgs),
     /// Make a flexible link of a finite element mesh, with its checks
     Reduce(Box<ReduceArgs>),
+    /// Make a flexible link of matrices from another FE program
+    Import(Box<ImportArgs>),
+    /// Write the matrices of a flexible link for another FE program
+    Export(ExportArgs),
     /// Print a shell completion script
     Completions {
         /// Shell to complete for

@@ -2,6 +2,8 @@
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "printing is what this face is for")]
 
 mod args;
+mod exchange;
+mod exchange_args;
 mod print;
 mod reduce;
 mod reduce_args;
@@ -61,6 +63,8 @@ fn run(cli: &Cli) -> Result<ExitCode, Error> {
         Command::Inspect(args) => inspect(cli, args),
         Command::Check(args) => check(cli, args),
         Command::Reduce(args) => reduce::run(cli, args),
+        Command::Import(args) => exchange::import(cli, args),
+        Command::Export(args) => exchange::export(cli, args),
         Command::Completions { shell } => {
             clap_complete::generate(*shell, &mut Cli::command(), "flexarm", &mut std::io::stdout());
             Ok(ExitCode::SUCCESS)

@@ -153,6 +153,53 @@ pub(crate) fn reduction(summary: &ReduceSummary) -> String {
     out
 }
 
+/// The figures of an import.
+pub(crate) fn imported(summary: &flexarm::import::ImportSummary) -> String {
+    let mut out = format!(
+        "link {}\n{}: {}, {}, {} rows; {}\n",
+        summary.link,
+        summary.sources.join(", "),
+        summary.format,
+        summary.units,
+        summary.rows,
+        summary.method
+    );
+    for report in flexarm::import::tables(summary).iter().filter(|report| !report.page_only) {
+        out += &report_table(report);
+    }
+    let f = &summary.files;
+    let files = [("link", &f.flex), ("figures", &f.summary), ("report", &f.report)];
+    if files.iter().any(|(_, path)| path.is_some()) {
+        out += "\n";
+    }
+    for (what, path) in files {
+        if let Some(path) = path {
+            out += &format!("{what:<8} {path}\n");
+        }
+    }
+    if let Some(path) = &f.flex {
+        out += &format!("use:     reduced = \"{path}\" under [[flexible_link]] of a robot.toml\n");
+    }
+    out
+}
+
+/// What was exported.
+pub(crate) fn exported(summary: &flexarm::export::ExportSummary) -> String {
+    let mut out = format!(
+        "link {} as {} in {}: {} rows, {} of them modes\n",
+        summary.link, summary.format, summary.units, summary.rows, summary.modes
+    );
+    let c = &summary.checks;
+    out += &format!("read back: stiffness differs by {:.1e}", c.stiffness_error);
+    out += &c.mass_error.map_or_else(|| ", no mass".into(), |error| format!(", mass by {error:.1e}"));
+    out += " (relative to the diagonal)\n";
+    for file in &summary.files {
+        out += &format!("{file}\n");
+    }
+    out += &format!("map for flexarm import: --map \"{}\"\n", summary.map);
+    out
+}
+
 /// What is in a mesh.
 pub(crate) fn listing(l: &MeshListing) -> String {
     let units = l.units.as_deref().unwrap_or("units not declared");
@@ -191,4 +238,9 @@ fn sets(title: &str, sets: &[SetListing]) -> String {
         t.add_row([set.name.clone(), set.nodes.to_string(), set.at.clone(), format!("{x}, {y}, {z}")]);
     }
     format!("\n{title} (unit of the mesh)\n{}", lines(&t))
+}
+
+/// A warning on standard error.
+pub(crate) fn warning(text: &str) {
+    eprintln!("warning: {text}");
 }

@@ -213,6 +213,16 @@ impl FeModel {
         Self { nodes: vec![Vector3::zeros(); K.size()], dofs, K, M: MassMatrix::from_general(M) }
     }
 
+    /// A model of solids whose matrices come from elsewhere: three DoF per node, node by node.
+    ///
+    /// # Panics
+    /// If the matrices have another number of rows.
+    pub fn from_nodal_matrices(nodes: Vec<Vector3<f64>>, K: SparseSymmetric, M: SparseSymmetric) -> Self {
+        assert_eq!((K.size(), M.size()), (3 * nodes.len(), 3 * nodes.len()), "three rows per node");
+        let dofs = DofMap { first: (0..=nodes.len() as u32).map(|node| 3 * node).collect() };
+        Self { nodes, dofs, K, M: MassMatrix::from_general(M) }
+    }
+
     /// Number of DoF.
     pub fn size(&self) -> usize {
         self.dofs.size()

@@ -107,6 +107,17 @@ pub enum Error {
     /// A recording could not be written.
     #[error(transparent)]
     Log(#[from] flexarm_log::LogError),
+    /// A file of matrices of another FE program.
+    #[error(transparent)]
+    Exchange(#[from] Box<flexarm_fem::exchange::ExchangeError>),
+    /// Matrices that could not become a link.
+    #[error("{}: {source}", path.display())]
+    Import {
+        /// The file of the stiffness.
+        path: PathBuf,
+        /// Why.
+        source: Box<flexarm_fem::mesh_link::MeshLinkError>,
+    },
 }
 
 impl Error {
@@ -119,7 +130,7 @@ impl Error {
                 _ => 1,
             },
             Self::Interrupted { .. } | Self::Write { .. } => 1,
-            Self::Reduction { source, .. } => match source.as_ref() {
+            Self::Reduction { source, .. } | Self::Import { source, .. } => match source.as_ref() {
                 MeshLinkError::Reduction(ReductionError::OutOfMemory { .. })
                 | MeshLinkError::Modes(ModesError::NotConverged { .. } | ModesError::NotFinite)
                 | MeshLinkError::Reduction(ReductionError::Modes(

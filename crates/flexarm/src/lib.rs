@@ -23,14 +23,18 @@ mod beam_entry;
 mod check;
 mod compare;
 mod error;
+pub mod export;
+pub mod import;
 mod inspect;
 mod motion;
 mod options;
 mod record;
 pub mod reduce;
 mod report;
+mod result_files;
 mod robot;
 pub mod robot_file;
+mod stamp;
 mod summary;
 mod twin;
 

@@ -205,7 +205,7 @@ impl RobotLink {
             return Err(format!("link {:?} has no inertial, so there is no rest", self.link));
         };
         let mass = whole.mass - mesh.mass;
-        if !(mass > 0.0) {
+        if mass.is_nan() || mass <= 0.0 {
             return Err(format!(
                 "the mesh weighs {:.4} kg, link {:?} of the URDF {:.4} kg: nothing is left that could ride on it; \
                  leave `rest` out, or correct the density",

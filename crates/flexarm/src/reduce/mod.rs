@@ -25,7 +25,6 @@ mod job;
 mod listing;
 mod prepare;
 mod report;
-mod stamp;
 mod summary;
 mod words;
 
@@ -113,7 +112,7 @@ pub fn reduce(
     summary.phases = phases(read_s, &starts);
     summary.wall_s = started.elapsed().as_secs_f64();
     summary.cpu_s = cpu.elapsed().as_secs_f64();
-    summary.peak_rss_bytes = stamp::peak_rss_bytes();
+    summary.peak_rss_bytes = crate::stamp::peak_rss_bytes();
     if let Some(paths) = paths {
         let pictures = if paths.folder.is_some() { pictures(&file.mesh, &plan, &reduction)? } else { Vec::new() };
         write(job, &paths, &write_flex(&reduction.link), &pictures, &mut summary)?;

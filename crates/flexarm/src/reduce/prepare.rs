@@ -16,8 +16,9 @@ use super::interfaces::{Chosen, Place, RobotLink, pose};
 use super::job::ReduceJob;
 use super::summary::{MaterialFigures, RegionFigures};
 use super::words::{MATERIAL_FORMS, OrderingChoice, QuadratureChoice, SplitChoice, described};
-use super::{JUDGED_MODES, MODES, MOST_MODES, ReduceOptions, stamp};
+use super::{JUDGED_MODES, MODES, MOST_MODES, ReduceOptions};
 use crate::error::Error;
+use crate::stamp;
 
 /// All that a reduction needs.
 pub(super) struct Prepared {

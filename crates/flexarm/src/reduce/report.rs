@@ -20,12 +20,12 @@ pub struct ReportTable {
 }
 
 impl ReportTable {
-    fn new(title: &'static str, header: &[&str], rows: Vec<Vec<String>>) -> Self {
+    pub(crate) fn new(title: &'static str, header: &[&str], rows: Vec<Vec<String>>) -> Self {
         let header = header.iter().map(|name| (*name).to_owned()).collect();
         Self { title, header, rows, page_only: false }
     }
 
-    fn on_page(self) -> Self {
+    pub(crate) fn on_page(self) -> Self {
         Self { page_only: true, ..self }
     }
 }

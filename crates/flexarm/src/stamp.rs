@@ -3,7 +3,7 @@
 use std::time::SystemTime;
 
 /// Largest resident memory of this process, from the kernel.
-pub(super) fn peak_rss_bytes() -> Option<u64> {
+pub(crate) fn peak_rss_bytes() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
     let kilobytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
@@ -11,7 +11,7 @@ pub(super) fn peak_rss_bytes() -> Option<u64> {
 }
 
 /// Today (UTC), ISO 8601; empty if the clock stands before 1970.
-pub(super) fn today() -> String {
+pub(crate) fn today() -> String {
     let days = SystemTime::UNIX_EPOCH.elapsed().map_or(0, |since| since.as_secs() / 86_400);
     if days == 0 { String::new() } else { date(days) }
 }

@@ -1,0 +1,100 @@
+//! `flexarm import` and `flexarm export`: flags to a job.
+
+use std::process::ExitCode;
+
+use flexarm::Error;
+use flexarm::export::{ExportFormat, ExportJob};
+use flexarm::import::{ImportFormat, ImportJob, ImportOutputs, Names, PartMasses, RigidPart, parse_inertia, triple};
+
+use crate::args::Cli;
+use crate::exchange_args::{ExportArgs, ExportFormatName, ImportArgs, ImportFormatName};
+use crate::{answer, print, shipped, to_json};
+
+pub(crate) fn import(cli: &Cli, args: &ImportArgs) -> Result<ExitCode, Error> {
+    let job = import_job(args)?;
+    let outputs = (!args.no_files).then(|| {
+        let new_folder = || args.flex.is_none().then(|| shipped::new_output_folder(&job.link_name()));
+        ImportOutputs {
+            folder: args.output.clone().or_else(new_folder),
+            flex: args.flex.clone(),
+            overwrite: args.force,
+        }
+    });
+    let summary = flexarm::import::import(&job, outputs.as_ref())?;
+    warn(cli, &summary.warnings);
+    answer(cli, || to_json(&summary), || print::imported(&summary));
+    Ok(ExitCode::SUCCESS)
+}
+
+pub(crate) fn export(cli: &Cli, args: &ExportArgs) -> Result<ExitCode, Error> {
+    let stem = args.link.file_stem().unwrap_or_default().to_string_lossy();
+    let job = ExportJob {
+        link: args.link.clone(),
+        format: match args.format {
+            ExportFormatName::MatrixMarket => ExportFormat::MatrixMarket,
+            ExportFormatName::UserElement => ExportFormat::UserElement,
+            ExportFormatName::Dmig => ExportFormat::Dmig,
+            ExportFormatName::Op4 => ExportFormat::Op4,
+            ExportFormatName::Simscape => ExportFormat::Simscape,
+        },
+        units: args.units,
+        nodes: args.nodes.clone(),
+        folder: args.output.clone().unwrap_or_else(|| shipped::new_output_folder(&stem)),
+        overwrite: args.force,
+    };
+    let summary = flexarm::export::export(&job)?;
+    warn(cli, &summary.warnings);
+    answer(cli, || to_json(&summary), || print::exported(&summary));
+    Ok(ExitCode::SUCCESS)
+}
+
+fn warn(cli: &Cli, warnings: &[String]) {
+    if !cli.quiet {
+        for warning in warnings {
+            print::warning(warning);
+        }
+    }
+}
+
+fn import_job(args: &ImportArgs) -> Result<ImportJob, Error> {
+    let usage = |flag: &'static str| move |what: String| Error::Usage(format!("{flag}: {what}"));
+    let masses = match (&args.part_a, &args.part_b, args.mass, &args.com, &args.inertia) {
+        (Some(a), Some(b), ..) => PartMasses::Given([a.clone(), b.clone()]),
+        (_, _, Some(mass), Some(com), Some(inertia)) => PartMasses::Whole(RigidPart {
+            mass,
+            com: triple(com).map_err(usage("--com"))?,
+            inertia: parse_inertia(inertia).map_err(usage("--inertia"))?,
+        }),
+        _ => PartMasses::FromMatrix,
+    };
+    let default = ImportJob::default();
+    Ok(ImportJob {
+        files: args.files.clone(),
+        mass_file: args.mass_file.clone(),
+        format: match args.format {
+            ImportFormatName::Auto => None,
+            ImportFormatName::MatrixMarket => Some(ImportFormat::MatrixMarket),
+            ImportFormatName::UserElement => Some(ImportFormat::UserElement),
+            ImportFormatName::AbaqusText => Some(ImportFormat::AbaqusText),
+            ImportFormatName::Coordinate => Some(ImportFormat::Coordinate),
+            ImportFormatName::Dmig => Some(ImportFormat::Dmig),
+            ImportFormatName::Op4 => Some(ImportFormat::Op4),
+            ImportFormatName::HarwellBoeing => Some(ImportFormat::HarwellBoeing),
+            ImportFormatName::Exudyn => Some(ImportFormat::Exudyn),
+            ImportFormatName::Simscape => Some(ImportFormat::Simscape),
+            ImportFormatName::Sid => Some(ImportFormat::Sid),
+        },
+        names: Names { stiffness: args.k_name.clone(), mass: args.m_name.clone() },
+        units: args.units,
+        map: args.map.clone(),
+        at: args.at.clone(),
+        axes_rpy: match &args.axes_rpy {
+            Some(text) => triple(text).map_err(usage("--axes-rpy"))?,
+            None => default.axes_rpy,
+        },
+        modes: args.modes,
+        masses,
+        split: args.split.unwrap_or(default.split),
+        name: args.name.clone(),
+    })
+}

@@ -1,0 +1,150 @@
+//! Words of `flexarm import` and `flexarm export`.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use flexarm::import::{FrameAt, ImportMap, RigidPart, Split, UnitsOfFile, parse_part, parse_split};
+
+const IMPORT_EXAMPLES: &str = "\
+Examples:
+  Nastran punch file with GRIDs (positions), millimetres:
+      flexarm import arm.pch --units mm-t-s --map A=1001,B=1002
+  CalculiX, full model; the rotations of a rigid body are on its ROT NODE:
+      flexarm import arm.sti --units m-kg-s --map A=947:1-3+948:1-3,B=949:1-3+950:1-3 --at A=0,0,0 --at B=1,0,0
+  Matrix Market with the .toml that flexarm export writes says everything itself:
+      flexarm import arm_K.mtx
+  Exudyn, interfaces by planes (unit of the file), tied rigidly:
+      flexarm import arm.hdf5 --units m-kg-s --map \"A=plane(0,0,0;1,0,0),B=plane(1,0,0;1,0,0)\"
+  Stiffness only, with the mass of the link:
+      flexarm import arm.mtx --units m-kg-s --map A=1001,B=1002 --at A=0,0,0 --at B=1,0,0 \\
+          --mass 18.8 --com 0.5,0,0 --inertia 0.01,1.6,1.6,0,0,0
+
+Maps (proximal interface first; six rows each, ux uy uz rx ry rz):
+  A=1001                  components 1 to 6 of a node
+  A=947:1-3+948:1-3       rotations are components 1 to 3 of a second node (CalculiX)
+  A=#1-6                  rows of the file, from 1
+  modal=#13-22            which other rows are modal coordinates
+  A=set:NAME, A=plane(x,y,z;nx,ny,nz)    nodes of a full model with positions (Exudyn)
+
+Lengths are in the unit of the file, masses and inertias in SI.";
+
+#[derive(Debug, Args)]
+#[command(after_long_help = IMPORT_EXAMPLES, after_help = "More, with examples: flexarm import --help")]
+pub(crate) struct ImportArgs {
+    /// Files of one structure (stiffness, mass, list of rows); companions beside them are found
+    #[arg(required = true, value_name = "FILE")]
+    pub(crate) files: Vec<PathBuf>,
+    /// Format that the files must have; auto: by content
+    #[arg(long, value_enum, default_value_t = ImportFormatName::Auto)]
+    pub(crate) format: ImportFormatName,
+    /// Units of the files: m-kg-s (N, Pa), mm-t-s (N, MPa), in-slinch-s, ...
+    #[arg(long, value_name = "LENGTH-MASS-TIME")]
+    pub(crate) units: Option<UnitsOfFile>,
+    /// Which rows or nodes are which interface, proximal first, such as A=1001,B=1002
+    #[arg(long, value_name = "NAME=ROWS,...")]
+    pub(crate) map: Option<ImportMap>,
+    /// Frame of an interface in the link frame: x,y,z or x,y,z,roll,pitch,yaw (unit of the file, rad; repeat)
+    #[arg(long, value_name = "NAME=PLACE")]
+    pub(crate) at: Vec<FrameAt>,
+    /// File of the mass, if its name does not tell
+    #[arg(long, value_name = "FILE")]
+    pub(crate) mass_file: Option<PathBuf>,
+    /// Name of the stiffness in a file with several matrices
+    #[arg(long, value_name = "NAME")]
+    pub(crate) k_name: Option<String>,
+    /// Name of the mass in a file with several matrices
+    #[arg(long, value_name = "NAME")]
+    pub(crate) m_name: Option<String>,
+    /// Axes of the matrices in link axes: roll,pitch,yaw (rad)
+    #[arg(long, value_name = "R,P,Y", allow_hyphen_values = true)]
+    pub(crate) axes_rpy: Option<String>,
+    /// Fixed-interface modes to keep of a full model; 0 for Guyan [default: 10]
+    #[arg(long, value_name = "N")]
+    pub(crate) modes: Option<usize>,
+    /// Mass of the link (kg), where the matrices have none or another
+    #[arg(long, value_name = "KG", requires_all = ["com", "inertia"], allow_hyphen_values = true)]
+    pub(crate) mass: Option<f64>,
+    /// Its centre of mass in the link frame: x,y,z (m)
+    #[arg(long, value_name = "X,Y,Z", requires = "mass", allow_hyphen_values = true)]
+    pub(crate) com: Option<String>,
+    /// Its inertia about the centre of mass: ixx,iyy,izz,ixy,ixz,iyz (kg m2, link axes)
+    #[arg(long, value_name = "IXX,IYY,...", requires = "mass", allow_hyphen_values = true)]
+    pub(crate) inertia: Option<String>,
+    /// Proximal rigid part: mass;x,y,z;ixx,iyy,izz,ixy,ixz,iyz (kg, m, kg m2, link axes)
+    #[arg(long, value_name = "PART", value_parser = parse_part, requires = "part_b", conflicts_with = "mass")]
+    pub(crate) part_a: Option<RigidPart>,
+    /// Distal rigid part, likewise
+    #[arg(long, value_name = "PART", value_parser = parse_part, requires = "part_a", conflicts_with = "mass")]
+    pub(crate) part_b: Option<RigidPart>,
+    /// Where the elastic joint of the two parts sits: elastic-centre, mid, a fraction of the way from A to B, or x,y,z
+    #[arg(long, value_name = "WHERE", value_parser = parse_split, allow_hyphen_values = true)]
+    pub(crate) split: Option<Split>,
+    /// Name of the link [default: that of the file]
+    #[arg(long, value_name = "NAME")]
+    pub(crate) name: Option<String>,
+    /// Output folder for link file, figures and report [default: a new one in out/, or none with --flex]
+    #[arg(short, long, value_name = "FOLDER")]
+    pub(crate) output: Option<PathBuf>,
+    /// Write the link file (also) here
+    #[arg(long, value_name = "FILE")]
+    pub(crate) flex: Option<PathBuf>,
+    /// Overwrite what is there
+    #[arg(long)]
+    pub(crate) force: bool,
+    /// Write nothing, only print the figures
+    #[arg(long, conflicts_with_all = ["output", "flex", "force"])]
+    pub(crate) no_files: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ExportArgs {
+    /// The link file (.flex)
+    #[arg(value_name = "LINK.flex")]
+    pub(crate) link: PathBuf,
+    /// Format to write
+    #[arg(long, value_enum)]
+    pub(crate) format: ExportFormatName,
+    /// Units to write: m-kg-s (N), mm-t-s (N, MPa), ...
+    #[arg(long, value_name = "LENGTH-MASS-TIME")]
+    pub(crate) units: UnitsOfFile,
+    /// Node numbers of the interfaces in formats that have some, proximal first [default: 1001,1002,...]
+    #[arg(long, value_name = "N,N,...", value_delimiter = ',')]
+    pub(crate) nodes: Vec<i64>,
+    /// Output folder [default: a new one in out/]
+    #[arg(short, long, value_name = "FOLDER")]
+    pub(crate) output: Option<PathBuf>,
+    /// Overwrite what is there
+    #[arg(long)]
+    pub(crate) force: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ImportFormatName {
+    Auto,
+    MatrixMarket,
+    UserElement,
+    /// node,dof,node,dof,value
+    AbaqusText,
+    /// row column value (Abaqus COORDINATE, CalculiX .sti)
+    Coordinate,
+    Dmig,
+    Op4,
+    HarwellBoeing,
+    Exudyn,
+    Simscape,
+    Sid,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum ExportFormatName {
+    /// With a .toml of units and frames
+    MatrixMarket,
+    /// CalculiX, Abaqus
+    UserElement,
+    /// Nastran
+    Dmig,
+    /// Nastran, text
+    Op4,
+    /// Comma-separated values and a script
+    Simscape,
+}

@@ -1,0 +1,251 @@
+//! `flexarm import` and `flexarm export` as a user meets them.
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stderr,
+    reason = "a test stops at the first failure and says what it skips"
+)]
+
+mod common;
+
+use std::path::{Path, PathBuf};
+
+use common::flex;
+use common::{Place, matrix, numbers};
+
+/// Largest difference of two matrices over the geometric mean of the diagonal of the first.
+fn difference(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
+    let mut worst = 0.0_f64;
+    for i in 0..a.len() {
+        for j in 0..a.len() {
+            worst = worst.max((a[i][j] - b[i][j]).abs() / (a[i][i] * a[j][j]).sqrt());
+        }
+    }
+    worst
+}
+
+/// Outside samples, where they are there.
+fn sample(name: &str) -> Option<PathBuf> {
+    let path = Path::new("/work/shared/fe").join(name);
+    if !path.exists() {
+        eprintln!("skipped: {} is not there", path.display());
+        return None;
+    }
+    Some(path)
+}
+
+const MASS: [&str; 6] = ["--mass", "1.728", "--com", "0.4,0,0", "--inertia", "0.0003,0.0924,0.0922,0,0,0"];
+const AT: [&str; 4] = ["--at", "A=0,0,0", "--at", "B=0.8,0,0"];
+
+/// `node,dof,node,dof,value` of the beam of the tests; `order` gives the component that stands in each row.
+fn labelled(order: [usize; 6]) -> String {
+    let k = flex::stiffness_12();
+    let mut text = String::new();
+    for i in 0..12 {
+        for j in 0..=i {
+            let value = k[6 * (i / 6) + order[i % 6]][6 * (j / 6) + order[j % 6]];
+            if value != 0.0 {
+                text += &format!("{},{},{},{},{value:.15e}\n", 1001 + i / 6, i % 6 + 1, 1001 + j / 6, j % 6 + 1);
+            }
+        }
+    }
+    text
+}
+
+/// Truth: the stiffness of the link before it was written.
+#[test]
+fn every_format_brings_the_link_back() {
+    let place = Place::new();
+    place.write("bar.flex", flex::text(&flex::stiffness_12()));
+    for (format, file, map, bound) in [
+        ("matrix-market", "bar_K.mtx", "", 1e-13),
+        ("user-element", "bar.mtx", "A=7,B=9", 1e-12),
+        ("dmig", "bar.pch", "A=7,B=9", 5e-9),
+        ("op4", "bar.op4", "A=#1-6,B=#7-12", 1e-13),
+        ("simscape", "bar_K.csv", "A=#1-6,B=#7-12", 1e-13),
+    ] {
+        for units in ["m-kg-s", "mm-t-s"] {
+            let folder = format!("{format}-{units}");
+            let export =
+                ["export", "bar.flex", "--format", format, "--units", units, "--nodes", "7,9", "-o", folder.as_str()];
+            let said = place.json(&export);
+            assert!(said["checks"]["stiffness_error"].as_f64().unwrap() < bound, "{format}: {said}");
+            assert!(said["warnings"][0].as_str().unwrap().contains("without mass"));
+            place.refused(&export, &["exists already", "--force"]);
+
+            let file = format!("{folder}/{file}");
+            let mut import = vec!["import", file.as_str()];
+            let b = if units == "mm-t-s" { "B=800,0,0" } else { "B=0.8,0,0" };
+            if format != "matrix-market" {
+                import.extend(["--units", units, "--map", map]);
+            }
+            if !["matrix-market", "dmig"].contains(&format) {
+                import.extend(["--at", "A=0,0,0", "--at", b]);
+            }
+            import.extend(MASS);
+            let into = format!("{folder}/back");
+            import.extend(["-o", &into]);
+            let back = place.json(&import);
+            let error = difference(&flex::stiffness_6(), &matrix(&back["stiffness"]));
+            assert!(error < bound, "{format} {units}: {error:.1e}");
+            assert!((numbers(&back["interfaces"][1]["position_m"])[0] - 0.8).abs() < 1e-9);
+            assert!(place.text(&format!("{into}/report.md")).contains("force under rigid motion"));
+        }
+    }
+}
+
+#[test]
+fn what_is_missing_is_asked_for_with_the_text_to_type() {
+    let place = Place::new();
+    place.write("job_STIF1.mtx", labelled([0, 1, 2, 3, 4, 5]));
+    place.refused(
+        &["import", "job_STIF1.mtx"],
+        &["--units mm-t-s", "--map \"A=1001,B=1002\"", "--at A=0,0,0 --at B=0.8"],
+    );
+    let said = ["import", "job_STIF1.mtx", "--units", "m-kg-s", "--map", "A=1001,B=1002"];
+    place.refused(&said, &["--at A=0,0,0 --at B=0.8"]);
+    place.refused(&[&said[..], &AT].concat(), &["mass is missing", "mass, centre of mass and inertia"]);
+    place.refused(&["import", "nowhere.mtx"], &["nowhere.mtx"]);
+    place.refused(&[&said[..], &AT, &MASS, &["--format", "dmig"]].concat(), &["--format"]);
+    let summary = place.json(&[&said[..], &AT, &MASS, &["--no-files"]].concat());
+    assert!(difference(&flex::stiffness_6(), &matrix(&summary["stiffness"])) < 1e-12);
+    assert!(summary["warnings"].to_string().contains("halves of a uniform bar"));
+}
+
+#[test]
+fn rotations_before_translations_fail_the_gate() {
+    let place = Place::new();
+    place.write("job_STIF1.mtx", labelled([3, 4, 5, 0, 1, 2]));
+    let said = ["import", "job_STIF1.mtx", "--units", "m-kg-s", "--map", "A=1001,B=1002"];
+    place.refused(&[&said[..], &AT, &MASS].concat(), &["job_STIF1.mtx"]);
+}
+
+/// Debian's CalculiX 2.20 writes substructures without condensing them.
+#[test]
+fn the_defective_substructures_are_refused_with_the_reason() {
+    for name in [
+        "A1_beam/beam_tet10_h50mm_ccx220_substructure_REAL_UNCONDENSED.mtx",
+        "A2_lower_arm/arm_tet10_h30mm_ccx220_substructure_REAL_UNCONDENSED.mtx",
+    ] {
+        let Some(path) = sample(name) else { return };
+        let place = Place::new();
+        let path = path.to_str().unwrap();
+        let asked = place.flexarm(&["import", path]).err;
+        let map = asked.split("--map \"").nth(1).unwrap().split('"').next().unwrap();
+        let said = ["import", path, "--units", "m-kg-s", "--map", map, "--at", "A=0,0,0", "--at", "B=1,0,0"];
+        place.refused(&[&said[..], &MASS].concat(), &["CalculiX 2.20", "without condensing"]);
+    }
+}
+
+/// Truth: the matrices condensed by another program from the same mesh.
+#[test]
+fn a_full_calculix_model_gives_the_condensed_stiffness() {
+    let Some(full) = sample("A1_beam/beam_tet10_h50mm_ccx220_REAL.sti.gz") else { return };
+    let Some(condensed) = sample("A1_beam/beam_tet10_h50mm_ccx_K12.mtx") else { return };
+    let place = Place::new();
+    let at = ["--units", "m-kg-s", "--at", "A=0,0,0", "--at", "B=1,0,0", "--no-files"];
+    let full = ["import", full.to_str().unwrap(), "--map", "A=947:1-3+948:1-3,B=949:1-3+950:1-3", "--modes", "4"];
+    let found = place.json(&[&full[..], &at].concat());
+    let reduced = ["import", condensed.to_str().unwrap(), "--map", "A=#1-6,B=#7-12"];
+    let truth = place.json(&[&reduced[..], &at, &MASS].concat());
+    let error = difference(&matrix(&truth["stiffness"]), &matrix(&found["stiffness"]));
+    assert!(error < 1e-8, "{error:.1e}");
+    assert_eq!(numbers(&found["fixed_interface_hz"]).len(), 4);
+    assert!(found["checks"]["mass_error"].as_f64().unwrap() < 1e-6, "{found}");
+}
+
+/// Second algorithm: all samples are of one beam.
+#[test]
+fn all_samples_are_the_same_beam() {
+    let place = Place::new();
+    let base = ["--units", "m-kg-s", "--at", "A=0,0,0", "--at", "B=1,0,0", "--no-files"];
+    let mut first: Option<(String, Vec<Vec<f64>>)> = None;
+    for (name, map, bound) in [
+        ("mm_coordinate_symmetric_K12.mtx", "A=#1-6,B=#7-12", 1e-12),
+        ("mm_array_K12.mtx", "A=#1-6,B=#7-12", 1e-8),
+        ("abaqus_user_element_K12_M12.mtx", "A=1001,B=1002", 1e-8),
+        ("abaqus_matrix_input_STIF1.mtx", "A=1001,B=1002", 1e-8),
+        ("abaqus_coordinate_STIF1.mtx", "A=#1-6,B=#7-12", 1e-8),
+        ("ansys_hbmat_K12.matrix", "A=1001,B=1002", 1e-8),
+        ("calculix_layout_condensed_K12.mtx", "", 1e-8),
+        ("simscape_K.csv", "A=#1-6,B=#7-12", 1e-6),
+        ("nastran_dmig_punch.pch", "A=1001,B=1002", 1e-6),
+        ("nastran_op4_text.op4", "A=#1-6,B=#7-12", 1e-6),
+        ("nastran_op4_binary_le.op4", "A=#1-6,B=#7-12", 1e-6),
+    ] {
+        let Some(path) = sample(&format!("formats/{name}")) else { continue };
+        let path = path.to_str().unwrap();
+        let proposed = place.flexarm(&["import", path]).err;
+        let proposed = proposed.split("--map \"").nth(1).and_then(|text| text.split('"').next()).unwrap_or_default();
+        let map = if map.is_empty() { proposed } else { map };
+        let said = ["import", path, "--map", map];
+        let summary = place.json(&[&said[..], &base, &MASS].concat());
+        let found = matrix(&summary["stiffness"]);
+        match &first {
+            None => first = Some((name.into(), found)),
+            Some((other, truth)) => {
+                let error = difference(truth, &found);
+                assert!(error < bound, "{name} against {other}: {error:.1e}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_sid_and_an_exudyn_model_are_beams_too() {
+    let place = Place::new();
+    if let Some(path) = sample("formats/beam_synthetic.SID_FEM") {
+        let path = path.to_str().unwrap();
+        let answer = place.flexarm(&["import", path]);
+        assert_eq!(answer.code, 2);
+        answer.says(&["--units", "--map"]);
+        let map = answer.err.split("--map \"").nth(1).unwrap().split('"').next().unwrap().to_owned();
+        let found = place.json(&["import", path, "--units", "m-kg-s", "--map", &map, "--no-files"]);
+        let Some(truth) = sample("formats/mm_coordinate_symmetric_K12.mtx") else { return };
+        let truth = ["import", truth.to_str().unwrap(), "--units", "m-kg-s", "--map", "A=#1-6,B=#7-12", "--no-files"];
+        let truth = place.json(&[&truth[..], &["--at", "A=0,0,0", "--at", "B=1,0,0"], &MASS].concat());
+        let error = difference(&matrix(&truth["stiffness"]), &matrix(&found["stiffness"]));
+        assert!(error < 1e-6, "SID: {error:.1e}");
+        assert!((found["mass_kg"].as_f64().unwrap() / 39.25 - 1.0).abs() < 1e-6);
+    }
+    if let Some(path) = sample("formats/exudyn_femInterface_beam.hdf5.gz") {
+        let path = path.to_str().unwrap();
+        place.refused(&["import", path, "--units", "m-kg-s"], &["set:NAME", "plane("]);
+        let map = "A=plane(0,0,0;1,0,0),B=plane(1,0,0;1,0,0)";
+        let found = place.json(&["import", path, "--units", "m-kg-s", "--map", map, "--no-files"]);
+        assert!((found["mass_kg"].as_f64().unwrap() / 39.25 - 1.0).abs() < 1e-6);
+        // EA/l of the beam with stiffened ends: 100 x 50 mm, 1 m, 210 GPa.
+        let axial = matrix(&found["stiffness"])[0][0];
+        assert!((axial / 1.05e9 - 1.0).abs() < 0.02, "{axial:e}");
+    }
+}
+
+/// Truth: the link before it was written, with its mass and modes.
+#[test]
+fn mass_and_modes_survive_the_way_out_and_back() {
+    let Some(full) = sample("A1_beam/beam_tet10_h50mm_ccx220_REAL.sti.gz") else { return };
+    let place = Place::new();
+    let map = "A=947:1-3+948:1-3,B=949:1-3+950:1-3";
+    let full = ["import", full.to_str().unwrap(), "--map", map, "--modes", "4", "--name", "arm", "-o", "first"];
+    let first = place.json(&[&full[..], &["--units", "m-kg-s", "--at", "A=0,0,0", "--at", "B=1,0,0"]].concat());
+    for (format, file, map) in [
+        ("matrix-market", "arm_K.mtx", ""),
+        ("user-element", "arm.mtx", "A=1001,B=1002"),
+        ("dmig", "arm.pch", "A=1001,B=1002"),
+        ("op4", "arm.op4", "A=#1-6,B=#7-12"),
+    ] {
+        let said = place.json(&["export", "first/arm.flex", "--format", format, "--units", "mm-t-s", "-o", format]);
+        assert_eq!(said["modes"], 4);
+        assert!(said["checks"]["mass_error"].as_f64().unwrap() < 1e-9, "{said}");
+        let file = format!("{format}/{file}");
+        let mut import = vec!["import", file.as_str(), "--no-files"];
+        if !map.is_empty() {
+            import.extend(["--units", "mm-t-s", "--map", map, "--at", "A=0,0,0", "--at", "B=1000,0,0"]);
+        }
+        let back = place.json(&import);
+        let hz = |value: &serde_json::Value| numbers(&value["frequencies_hz"]);
+        assert_eq!(hz(&back).len(), hz(&first).len());
+        for (a, b) in hz(&back).iter().zip(hz(&first)) {
+            assert!((a / b - 1.0).abs() < 1e-6, "{format}: {a} and {b}");
+        }
+    }
+}

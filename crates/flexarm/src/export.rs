@@ -1,0 +1,379 @@
+//! A flexible link as matrices for other FE programs: what `flexarm export` does.
+//!
+//! Stiffness and mass of the interfaces, with modes where the link has them, are converted to the units asked for,
+//! written, read back through the same path as every import, and compared. A text beside them says the order of the
+//! rows and the units, which most formats do not hold. A link without superelement gives its static stiffness alone.
+//!
+//! Not here: the formats (`flexarm-fem`).
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::time::Instant;
+
+use flexarm_fem::exchange::{
+    DofLabel, Interface, InterfaceMap, MatrixNames, RowPick, Sidecar, SidecarInterface, assemble_interfaces,
+    read_matrices, write_dmig, write_matrix_market, write_op4, write_sidecar, write_simscape, write_user_element,
+};
+use flexarm_fem::reduction::{InterfaceFrame, Superelement};
+use flexarm_fem::{Pose, ReducedLink, UnitSystem, read_flex};
+use nalgebra::{DMatrix, Translation3};
+use serde::Serialize;
+
+use crate::error::Error;
+use crate::{result_files, stamp};
+
+/// Formats that can be written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ExportFormat {
+    /// Matrix Market with a sidecar of units and frames.
+    MatrixMarket,
+    /// `*USER ELEMENT` of CalculiX and Abaqus.
+    UserElement,
+    /// Nastran DMIG.
+    Dmig,
+    /// Nastran OP4, text.
+    Op4,
+    /// Comma-separated values and a script for Simscape.
+    Simscape,
+}
+
+impl ExportFormat {
+    /// Name, as typed.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::MatrixMarket => "matrix-market",
+            Self::UserElement => "user-element",
+            Self::Dmig => "dmig",
+            Self::Op4 => "op4",
+            Self::Simscape => "simscape",
+        }
+    }
+
+    /// Largest difference that printing and reading may make, relative to `sqrt(k_ii k_jj)`.
+    fn digits(self) -> f64 {
+        if self == Self::Dmig { 1e-9 } else { 1e-12 }
+    }
+}
+
+/// What to export.
+#[derive(Clone, Debug)]
+pub struct ExportJob {
+    /// The link file.
+    pub link: PathBuf,
+    /// The format.
+    pub format: ExportFormat,
+    /// Units to write.
+    pub units: UnitSystem,
+    /// Node numbers of the interfaces; empty: 1001, 1002, ...
+    pub nodes: Vec<i64>,
+    /// Where to write; made if it is not there.
+    pub folder: PathBuf,
+    /// Overwrite what is there.
+    pub overwrite: bool,
+}
+
+/// Answer of `flexarm export`; SI units, link axes.
+#[derive(Clone, Debug, Serialize)]
+pub struct ExportSummary {
+    /// Name of the link.
+    pub link: String,
+    /// Format.
+    pub format: &'static str,
+    /// Units of the files.
+    pub units: String,
+    /// Rows of the matrices.
+    pub rows: usize,
+    /// How many of them are modal coordinates.
+    pub modes: usize,
+    /// The map with which `flexarm import` reads the files.
+    pub map: String,
+    /// Mass of the whole link.
+    pub mass_kg: f64,
+    /// Its centre of mass.
+    pub com_m: [f64; 3],
+    /// Its inertia about the centre of mass, 3×3 (kg m²).
+    pub inertia: [[f64; 3]; 3],
+    /// Stiffness at B with A held, 6×6.
+    pub stiffness: [[f64; 6]; 6],
+    /// Natural frequencies of the matrices with A held (Hz); empty without mass.
+    pub frequencies_hz: Vec<f64>,
+    /// What was checked.
+    pub checks: ExportChecks,
+    /// Wall-clock time (s).
+    pub wall_s: f64,
+    /// Largest memory of the process so far; null where the system does not tell.
+    pub peak_rss_bytes: Option<u64>,
+    /// Things worth telling.
+    pub warnings: Vec<String>,
+    /// Written files.
+    pub files: Vec<String>,
+}
+
+/// Differences between the link and the files as read back, and the checks of the link itself.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct ExportChecks {
+    /// Asymmetry of the stiffness of the link's source.
+    pub symmetry: f64,
+    /// Force under rigid motion; null where the source was a 6×6.
+    pub rigid_body_residual: Option<f64>,
+    /// Largest difference of the mass, relative to `sqrt(m_ii m_jj)`; null without mass.
+    pub mass_error: Option<f64>,
+    /// Largest difference of the stiffness, relative to `sqrt(k_ii k_jj)`.
+    pub stiffness_error: f64,
+}
+
+/// Writes a link in another format and reads it back.
+///
+/// # Errors
+/// [`Error`]; see [`Error::exit_code`].
+pub fn export(job: &ExportJob) -> Result<ExportSummary, Error> {
+    let started = Instant::now();
+    let link = read_flex(&job.link).map_err(Box::new)?;
+    let mut warnings = Vec::new();
+    let (element, has_mass) = element_of(&link, &mut warnings);
+    let nodes = nodes(job, element.interfaces.len())?;
+    let content = Content { job, link: &link, element: &element, has_mass, nodes: &nodes };
+    let texts: Vec<(PathBuf, String)> =
+        content.files().into_iter().map(|(name, text)| (job.folder.join(name), text)).collect();
+    let paths: Vec<PathBuf> = texts.iter().map(|(path, _)| path.clone()).collect();
+    result_files::check_free(&paths, job.overwrite)?;
+    result_files::write_all(&texts)?;
+
+    // Back through the door of every import.
+    let readable: Vec<&PathBuf> =
+        paths.iter().filter(|path| path.extension().is_none_or(|ending| ending != "txt" && ending != "m")).collect();
+    let imported = read_matrices(&readable, &MatrixNames::default()).map_err(Box::new)?;
+    let map = content.map();
+    let back = assemble_interfaces(&imported, Some(&map), Some(&job.units)).map_err(Box::new)?;
+    let stiffness_error = difference(&element.K, &back.K);
+    let mass_error = back.M.as_ref().filter(|_| has_mass).map(|M| difference(&element.M, M));
+    for (what, error) in [("stiffness", Some(stiffness_error)), ("mass", mass_error)] {
+        if error.is_some_and(|error| error.is_nan() || error > job.format.digits()) {
+            let error = error.unwrap_or(f64::NAN);
+            warnings.push(format!("the {what} read back differs by {error:.1e} (relative to its diagonal)"));
+        }
+    }
+    let whole = link.rigid();
+    Ok(ExportSummary {
+        link: link.name.clone(),
+        format: job.format.name(),
+        units: job.units.name(),
+        rows: element.K.nrows(),
+        modes: element.modes(),
+        map: map.to_string(),
+        mass_kg: whole.mass,
+        com_m: whole.com.into(),
+        inertia: whole.inertia.transpose().into(),
+        stiffness: link.K_BB.transpose().into(),
+        frequencies_hz: if has_mass { element.frequencies_hz(&[0]).into_iter().take(10).collect() } else { Vec::new() },
+        checks: ExportChecks {
+            symmetry: link.checks.asymmetry,
+            rigid_body_residual: link.checks.rigid_body_residual,
+            mass_error,
+            stiffness_error,
+        },
+        wall_s: started.elapsed().as_secs_f64(),
+        peak_rss_bytes: stamp::peak_rss_bytes(),
+        warnings,
+        files: paths.iter().map(|path| path.display().to_string()).collect(),
+    })
+}
+
+/// The superelement of the link, or its static stiffness without mass.
+fn element_of(link: &ReducedLink, warnings: &mut Vec<String>) -> (Superelement, bool) {
+    if let Some(element) = link.details.as_ref().and_then(|details| details.superelement.clone()) {
+        return (element, true);
+    }
+    warnings.push(
+        "the link has no superelement: its static stiffness is written, without mass and modes; the mass of its two \
+         rigid parts is in the text beside it"
+            .into(),
+    );
+    let frame = |name: &str, X_LI| InterfaceFrame { name: name.into(), X_LI, tie: None };
+    let K = DMatrix::from_column_slice(12, 12, link.matrix12().as_slice());
+    let interfaces = vec![frame("A", link.X_LA), frame("B", link.X_LB)];
+    (Superelement { interfaces, K, M: DMatrix::zeros(12, 12) }, false)
+}
+
+fn nodes(job: &ExportJob, interfaces: usize) -> Result<Vec<i64>, Error> {
+    if job.nodes.is_empty() {
+        return Ok((1001..1001 + interfaces as i64).collect());
+    }
+    let distinct = job.nodes.iter().collect::<std::collections::BTreeSet<_>>().len() == job.nodes.len();
+    if job.nodes.len() != interfaces || !distinct || job.nodes.iter().any(|node| !(1..=99_999_999).contains(node)) {
+        let text = format!(
+            "--nodes has {:?}; {interfaces} different numbers between 1 and 99999999 are needed, one per interface, \
+             proximal first",
+            job.nodes
+        );
+        return Err(Error::Usage(text));
+    }
+    Ok(job.nodes.clone())
+}
+
+/// Largest difference, relative to the diagonal.
+fn difference(A: &DMatrix<f64>, B: &DMatrix<f64>) -> f64 {
+    if A.shape() != B.shape() {
+        return f64::INFINITY;
+    }
+    let scale = A.diagonal().map(|a| a.abs().sqrt());
+    let place = |(i, j): (usize, usize)| (A[(i, j)] - B[(i, j)]).abs() / (scale[i] * scale[j]).max(f64::MIN_POSITIVE);
+    let all = (0..A.nrows()).flat_map(|i| (0..=i).map(move |j| (i, j)));
+    all.map(place).fold(0.0, f64::max)
+}
+
+/// All that goes into the files.
+struct Content<'a> {
+    job: &'a ExportJob,
+    link: &'a ReducedLink,
+    element: &'a Superelement,
+    has_mass: bool,
+    nodes: &'a [i64],
+}
+
+impl Content<'_> {
+    /// Whether rows carry node numbers.
+    fn is_labelled(&self) -> bool {
+        matches!(self.job.format, ExportFormat::UserElement | ExportFormat::Dmig)
+    }
+
+    fn map(&self) -> InterfaceMap {
+        let pick = |k: usize| match self.is_labelled() {
+            true => RowPick::Node { node: self.nodes[k], first: 1, last: 6 },
+            false => RowPick::Rows { first: 6 * k + 1, last: 6 * k + 6 },
+        };
+        let names = self.element.interfaces.iter().enumerate();
+        let interfaces = names.map(|(k, i)| Interface { name: i.name.clone(), picks: vec![pick(k)] }).collect();
+        InterfaceMap { interfaces, modal: Vec::new() }
+    }
+
+    /// Matrices in the units of the files: the way back of `assemble_interfaces`.
+    fn matrices(&self) -> (DMatrix<f64>, Option<DMatrix<f64>>) {
+        let units = &self.job.units;
+        let boundary = self.element.boundary();
+        let d: Vec<f64> = (0..self.element.K.nrows())
+            .map(|i| match i {
+                i if i >= boundary => units.mass.sqrt() * units.length,
+                i if i % 6 < 3 => units.length,
+                _ => 1.0,
+            })
+            .collect();
+        let energy = units.force() * units.length;
+        let inertia = units.mass * units.length * units.length;
+        let convert =
+            |A: &DMatrix<f64>, unit: f64| DMatrix::from_fn(d.len(), d.len(), |i, j| A[(i, j)] * (d[i] * d[j] / unit));
+        (convert(&self.element.K, energy), self.has_mass.then(|| convert(&self.element.M, inertia)))
+    }
+
+    fn frames(&self) -> Vec<Pose> {
+        let scaled =
+            |X: &Pose| Pose::from_parts(Translation3::from(X.translation.vector / self.job.units.length), X.rotation);
+        self.element.interfaces.iter().map(|interface| scaled(&interface.X_LI)).collect()
+    }
+
+    fn rows(&self) -> Vec<DofLabel> {
+        let physical = self.nodes.iter().flat_map(|node| (1..=6).map(|dof| DofLabel::new(*node, dof)));
+        let next = self.nodes.iter().max().copied().unwrap_or(0) + 1000;
+        physical.chain((0..self.element.modes() as i64).map(|k| DofLabel::new(next + k, 0))).collect()
+    }
+
+    /// Names and texts.
+    fn files(&self) -> Vec<(String, String)> {
+        let stem = result_files::file_stem(&self.link.name);
+        let (K, M) = self.matrices();
+        let said = format!("{}: {}; rows {}", self.link.name, self.job.units, self.row_order());
+        let mut files = match self.job.format {
+            ExportFormat::MatrixMarket => {
+                let (k, m) = (format!("{stem}_K.mtx"), format!("{stem}_M.mtx"));
+                let interfaces = self.map().interfaces.into_iter().zip(self.frames());
+                let sidecar = Sidecar {
+                    stiffness: k.clone(),
+                    mass: M.as_ref().map(|_| m.clone()),
+                    units: self.job.units,
+                    interfaces: interfaces.map(|(interface, frame)| SidecarInterface { interface, frame }).collect(),
+                };
+                let mut files = vec![(k, write_matrix_market(&K, &["stiffness", &said]))];
+                files.extend(M.map(|M| (m, write_matrix_market(&M, &["mass", &said]))));
+                files.push((format!("{stem}.toml"), write_sidecar(&sidecar)));
+                files
+            }
+            ExportFormat::UserElement => {
+                vec![(format!("{stem}.mtx"), write_user_element(&K, M.as_ref(), &self.rows()))]
+            }
+            ExportFormat::Dmig => {
+                let positions: BTreeMap<i64, _> =
+                    self.nodes.iter().copied().zip(self.frames().iter().map(|X| X.translation.vector)).collect();
+                let mut list = vec![("KAAX", &K)];
+                list.extend(M.as_ref().map(|M| ("MAAX", M)));
+                vec![(format!("{stem}.pch"), write_dmig(&list, &self.rows(), &positions))]
+            }
+            ExportFormat::Op4 => {
+                let mut list = vec![("KAAX", &K)];
+                list.extend(M.as_ref().map(|M| ("MAAX", M)));
+                vec![(format!("{stem}.op4"), write_op4(&list))]
+            }
+            ExportFormat::Simscape => {
+                let zero = DMatrix::zeros(K.nrows(), K.nrows());
+                let simscape = write_simscape(&stem, &K, M.as_ref().unwrap_or(&zero), &self.frames());
+                let mut files = vec![
+                    (format!("{stem}_K.csv"), simscape.stiffness),
+                    (format!("{stem}_frames.csv"), simscape.frames),
+                    (format!("{stem}_load.m"), simscape.script),
+                ];
+                if self.has_mass {
+                    files.push((format!("{stem}_M.csv"), simscape.mass));
+                }
+                files
+            }
+        };
+        files.push((format!("{stem}_README.txt"), self.readme()));
+        files
+    }
+
+    fn row_order(&self) -> String {
+        let names: Vec<String> = self.element.interfaces.iter().map(|i| i.name.clone()).collect();
+        let modes = match self.element.modes() {
+            0 => String::new(),
+            n => format!(", then {n} mass-normalised fixed-interface modes"),
+        };
+        format!("ux uy uz rx ry rz of interface {}{modes}", names.join(", then "))
+    }
+
+    /// What the format does not say.
+    fn readme(&self) -> String {
+        let units = &self.job.units;
+        let mut text = format!(
+            "Link {}, written by flexarm export as {}\n\nrows: {}\naxes: those of the link at every interface\n\
+             units: {units} (length-mass-time; forces follow: 1 unit = {} N); angles in rad\n\nmap for flexarm import: \
+             --map \"{}\" --units {units}\n\ninterfaces (position in the unit of length, link axes):\n",
+            self.link.name,
+            self.job.format.name(),
+            self.row_order(),
+            units.force(),
+            self.map()
+        );
+        for ((interface, X), node) in self.element.interfaces.iter().zip(self.frames()).zip(self.nodes) {
+            let p = X.translation.vector;
+            let node = if self.is_labelled() { format!(", node {node}") } else { String::new() };
+            text += &format!("  {}{node}: --at {}={},{},{}\n", interface.name, interface.name, p.x, p.y, p.z);
+        }
+        text += "\nrigid parts (kg; m; kg m2: ixx,iyy,izz,ixy,ixz,iyz about the centre of mass, link axes):\n";
+        for (flag, part) in [("--part-a", &self.link.proximal), ("--part-b", &self.link.distal)] {
+            let (c, I) = (part.com, part.inertia);
+            text += &format!(
+                "  {flag} \"{};{},{},{};{},{},{},{},{},{}\"\n",
+                part.mass,
+                c.x,
+                c.y,
+                c.z,
+                I[(0, 0)],
+                I[(1, 1)],
+                I[(2, 2)],
+                I[(0, 1)],
+                I[(0, 2)],
+                I[(1, 2)]
+            );
+        }
+        text
+    }
+}

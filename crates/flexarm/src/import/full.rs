@@ -1,0 +1,216 @@
+//! Full models: rows or nodes of the interfaces are found, everything else is condensed.
+
+use std::collections::HashMap;
+
+use flexarm_fem::UnitSystem;
+use flexarm_fem::exchange::{Entries, ImportedMatrices, InterfaceMap, LabelledMatrix, MatrixFormat, RowPick};
+use flexarm_fem::matrix_link::reduce_matrices;
+use flexarm_fem::model::FeModel;
+use flexarm_fem::reduction::{Condensation, CondensationOptions, Interface, InterfaceFrame, Superelement, Tie};
+use flexarm_fem::sparse::{ModesWanted, SparseSymmetric};
+use nalgebra::{Matrix3, Vector3};
+
+use super::words::{ImportMap, NodeChoice};
+use crate::error::Error;
+
+/// Whether more than the interfaces is in the matrices, so that they must be condensed.
+pub(super) fn is_full(imported: &ImportedMatrices, map: Option<&InterfaceMap>) -> bool {
+    let rows = &imported.stiffness.rows;
+    let physical = rows.iter().filter(|label| label.dof > 0 && label.node.is_some_and(|node| node >= 0)).count();
+    let mapped = map.map_or(0, |map| 6 * map.interfaces.len());
+    let limit = if mapped > 0 { mapped } else { 24 };
+    matches!(imported.stiffness.entries, Entries::Sparse(_)) || physical > limit
+}
+
+/// What to type where the map of a full model is missing.
+pub(super) fn propose(imported: &ImportedMatrices) -> String {
+    if is_solid(imported) && !imported.positions.is_empty() {
+        let sets: Vec<String> =
+            imported.node_sets.iter().map(|(name, nodes)| format!("{name:?} ({} nodes)", nodes.len())).collect();
+        let list = if sets.is_empty() { "none".into() } else { sets.join(", ") };
+        let (low, high) = box_of(imported);
+        return format!(
+            "choose the nodes of each interface, which are tied rigidly: --map A=set:NAME,B=set:NAME with the sets of the \
+             file ({list}), or by planes such as --map \"A=plane({},0,0;1,0,0),B=plane({},0,0;1,0,0)\"; the nodes lie \
+             between {:?} and {:?}",
+            low.x,
+            high.x,
+            <[f64; 3]>::from(low),
+            <[f64; 3]>::from(high)
+        );
+    }
+    let mut nodes: Vec<i64> = imported.stiffness.rows.iter().filter_map(|label| label.node).collect();
+    nodes.sort_unstable();
+    nodes.dedup();
+    match nodes[..] {
+        [.., a, b, c, d] => format!(
+            "give --map with the reference nodes: CalculiX has them after *RIGID BODY, REF NODE= (translations) and ROT \
+             NODE= (rotations); if they are the last nodes of the model: --map A={a}:1-3+{b}:1-3,B={c}:1-3+{d}:1-3; with \
+             six components per node: --map A={c},B={d}"
+        ),
+        _ => {
+            "the rows have no node numbers; give the list of rows too (.dof, .mapping), or --map A=#1-6,B=#7-12".into()
+        }
+    }
+}
+
+fn is_solid(imported: &ImportedMatrices) -> bool {
+    imported.stiffness.rows.iter().enumerate().all(|(i, label)| label.dof as usize == i % 3 + 1)
+}
+
+fn box_of(imported: &ImportedMatrices) -> (Vector3<f64>, Vector3<f64>) {
+    let mut points = imported.positions.values();
+    let first = points.next().copied().unwrap_or_default();
+    points.fold((first, first), |(low, high), p| (low.inf(p), high.sup(p)))
+}
+
+/// Frames of the interfaces as the reduction needs them.
+pub(super) struct Target<'a> {
+    pub(super) units: UnitSystem,
+    pub(super) frames: Vec<InterfaceFrame>,
+    /// Axes of the matrices in link axes.
+    pub(super) R_LM: &'a Matrix3<f64>,
+    pub(super) modes: usize,
+}
+
+/// The model reduced to its interfaces, matrix axes; frames are those of the link.
+///
+/// # Errors
+/// [`Error::File`] for a map that does not fit, [`Error::Import`] from the reduction.
+pub(super) fn reduce(imported: &ImportedMatrices, map: &ImportMap, target: Target<'_>) -> Result<Superelement, Error> {
+    let path = || imported.origin.clone().into();
+    let refuse = |what: String| Error::File { path: path(), what };
+    let Some(mass) = &imported.mass else {
+        let what = "a full model can only be reduced with its mass: give the mass matrix too (.mas, --mass-file)";
+        return Err(refuse(what.into()));
+    };
+    let failed = |source| Error::Import { path: path(), source: Box::new(source) };
+    let modes = ModesWanted::Count(target.modes);
+    let options = CondensationOptions::default();
+    let rows = &imported.stiffness.rows;
+    match map {
+        ImportMap::Rows(map) => {
+            if imported.format == MatrixFormat::ExudynHdf5 {
+                return Err(refuse(format!("has no rotations at its nodes: {}", propose(imported))));
+            }
+            let boundary = boundary_rows(imported, map)?;
+            let mut is_turn: Vec<bool> = rows.iter().map(|label| label.dof > 3).collect();
+            for (k, row) in boundary.iter().enumerate() {
+                is_turn[*row as usize] = k % 6 >= 3;
+            }
+            let K = to_si(&imported.stiffness, target.units, &is_turn, false);
+            let M = to_si(mass, target.units, &is_turn, true);
+            reduce_matrices(K, M, &boundary, target.frames, modes, options).map_err(failed)
+        }
+        ImportMap::Nodes(list) => {
+            if !is_solid(imported) || imported.positions.is_empty() {
+                let what = "sets and planes need three components at every node and positions, which only Exudyn files \
+                            have; pick rows by node: --map A=947:1-3+948:1-3,B=949:1-3+950:1-3";
+                return Err(refuse(what.into()));
+            }
+            let nodes: Vec<i64> = rows.iter().step_by(3).filter_map(|label| label.node).collect();
+            let position = |node: &i64| imported.positions.get(node).map(|p| p * target.units.length);
+            let Some(points) = nodes.iter().map(position).collect::<Option<Vec<_>>>() else {
+                return Err(refuse("not every node has a position".into()));
+            };
+            let index: HashMap<i64, u32> = nodes.iter().enumerate().map(|(i, node)| (*node, i as u32)).collect();
+            let mut interfaces = Vec::new();
+            for ((name, choice), frame) in list.iter().zip(&target.frames) {
+                let chosen =
+                    chosen_nodes(imported, choice).map_err(|what| refuse(format!("interface {name}: {what}")))?;
+                let mut nodes: Vec<u32> = chosen.iter().filter_map(|node| index.get(node).copied()).collect();
+                nodes.sort_unstable();
+                nodes.dedup();
+                // The tie works in the axes of the matrices.
+                let p = target.R_LM.transpose() * frame.X_LI.translation.vector;
+                let X_LI = flexarm_kinematics::Pose::translation(p.x, p.y, p.z);
+                interfaces.push(Interface { name: name.clone(), X_LI, nodes, tie: Tie::Rigid });
+            }
+            let is_turn = vec![false; rows.len()];
+            let K = to_si(&imported.stiffness, target.units, &is_turn, false);
+            let M = to_si(mass, target.units, &is_turn, true);
+            let model = FeModel::from_nodal_matrices(points, K, M);
+            let condensation = Condensation::new(&model, &interfaces, options).map_err(|e| failed(e.into()))?;
+            let modes = condensation.fixed_modes(modes).map_err(|e| failed(e.into()))?;
+            let frames = target.frames.into_iter().map(|f| InterfaceFrame { tie: Some(Tie::Rigid), ..f }).collect();
+            Ok(condensation.superelement(frames, &modes))
+        }
+    }
+}
+
+/// Rows of the interfaces, six each.
+fn boundary_rows(imported: &ImportedMatrices, map: &InterfaceMap) -> Result<Vec<u32>, Error> {
+    let rows = &imported.stiffness.rows;
+    let index: HashMap<(i64, u8), u32> =
+        rows.iter().enumerate().filter_map(|(i, label)| Some(((label.node?, label.dof), i as u32))).collect();
+    let mut boundary: Vec<u32> = Vec::new();
+    for interface in &map.interfaces {
+        let refuse = |what: String| Error::File {
+            path: imported.origin.clone().into(),
+            what: format!("interface {}: {what}; {}", interface.name, propose(imported)),
+        };
+        let before = boundary.len();
+        for pick in &interface.picks {
+            match *pick {
+                RowPick::Rows { first, last } if first >= 1 && last <= rows.len() => {
+                    boundary.extend(first as u32 - 1..last as u32);
+                }
+                RowPick::Rows { .. } => return Err(refuse(format!("no rows {pick} among {}", rows.len()))),
+                RowPick::Node { node, first, last } => {
+                    for dof in first..=last {
+                        let row =
+                            index.get(&(node, dof)).ok_or_else(|| refuse(format!("there is no row {node}:{dof}")))?;
+                        boundary.push(*row);
+                    }
+                }
+            }
+        }
+        if boundary.len() - before != 6 {
+            let found = boundary.len() - before;
+            return Err(refuse(format!("{found} rows are named, six are needed (ux uy uz rx ry rz)")));
+        }
+    }
+    let mut sorted = boundary.clone();
+    sorted.sort_unstable();
+    sorted.dedup();
+    if sorted.len() != boundary.len() {
+        let path = imported.origin.clone().into();
+        return Err(Error::File { path, what: format!("the map {map} names a row twice") });
+    }
+    Ok(boundary)
+}
+
+/// The lower triangle in SI: displacements are lengths, or angles where `is_turn`.
+fn to_si(matrix: &LabelledMatrix, units: UnitSystem, is_turn: &[bool], is_mass: bool) -> SparseSymmetric {
+    let energy = units.force() * units.length;
+    let unit = if is_mass { energy * units.time * units.time } else { energy };
+    let d: Vec<f64> = is_turn.iter().map(|turn| if *turn { 1.0 } else { units.length }).collect();
+    let entries: Vec<(u32, u32, f64)> = matrix
+        .to_sparse()
+        .triplets()
+        .map(|(row, column, value)| (row as u32, column as u32, value * (unit / (d[row] * d[column]))))
+        .collect();
+    SparseSymmetric::from_triplets(matrix.size(), &entries)
+}
+
+/// The nodes that a map entry chooses.
+pub(super) fn chosen_nodes(imported: &ImportedMatrices, choice: &NodeChoice) -> Result<Vec<i64>, String> {
+    match choice {
+        NodeChoice::Set(name) => imported.node_sets.get(name).cloned().ok_or_else(|| {
+            let known: Vec<&String> = imported.node_sets.keys().collect();
+            format!("there is no node set {name:?}; the sets are {known:?}")
+        }),
+        NodeChoice::Plane { point, normal } => {
+            let (low, high) = box_of(imported);
+            let tolerance = 1e-6 * (high - low).norm();
+            let n = normal.normalize();
+            let near = |p: &Vector3<f64>| (p - point).dot(&n).abs() <= tolerance;
+            let nodes: Vec<i64> = imported.positions.iter().filter(|(_, p)| near(p)).map(|(node, _)| *node).collect();
+            if nodes.is_empty() {
+                let (low, high): ([f64; 3], [f64; 3]) = (low.into(), high.into());
+                return Err(format!("no node lies in {choice}; the nodes lie between {low:?} and {high:?}"));
+            }
+            Ok(nodes)
+        }
+    }
+}

@@ -1,0 +1,476 @@
+//! From matrices of another FE program to a flexible link with its files: what `flexarm import` does.
+//!
+//! An [`ImportJob`] says which files, in which units, which rows are the interfaces and where these are. What is not
+//! said and not in the files is asked for, with the text to type. Full models are reduced here; everything then
+//! passes the gate of the link, and its figures are in the [`ImportSummary`].
+//!
+//! ```no_run
+//! use flexarm::import::{ImportJob, ImportOutputs, import};
+//!
+//! let job = ImportJob {
+//!     files: vec!["arm.pch".into()],
+//!     units: Some("mm-t-s".parse().unwrap()),
+//!     map: Some("A=1001,B=1002".parse().unwrap()),
+//!     ..ImportJob::default()
+//! };
+//! let outputs = ImportOutputs { folder: Some("out/arm".into()), ..ImportOutputs::default() };
+//! let summary = import(&job, Some(&outputs))?;
+//! println!("{:.2} kg", summary.mass_kg);
+//! # Ok::<(), flexarm::Error>(())
+//! ```
+//!
+//! Lengths in a job are in the unit of the files, masses in SI. Not here: parsers and reduction (`flexarm-fem`).
+
+pub(crate) mod full;
+mod sid;
+mod summary;
+mod words;
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use flexarm_fem::exchange::{
+    ImportedMatrices, InputFile, InterfaceMap, MatrixFormat, MatrixNames, MatrixRole, RowPick, assemble_interfaces,
+    parse_matrices, propose_map, read_matrices, recognise,
+};
+use flexarm_fem::gate::check_matrix12;
+use flexarm_fem::matrix_link::{MatrixPlan, MatrixReduction, link_from_superelement, turned};
+use flexarm_fem::reduction::{InterfaceFrame, Superelement, stiffness12};
+use flexarm_fem::{FemError, GateLimits, Pose, Provenance, SplitAt, UnitSystem, write_flex};
+use nalgebra::{DMatrix, Rotation3, Translation3, Vector3};
+
+use crate::error::Error;
+use crate::{result_files, stamp};
+use summary::Parts;
+
+pub use flexarm_fem::exchange::MatrixNames as Names;
+pub use flexarm_fem::matrix_link::PartMasses;
+pub use flexarm_fem::{RigidPart, SplitAt as Split, UnitSystem as UnitsOfFile};
+pub use summary::{ImportChecks, ImportFiles, ImportInterface, ImportPart, ImportSummary, markdown, tables};
+pub use words::{FrameAt, ImportFormat, ImportMap, NodeChoice, parse_inertia, parse_part, parse_split, triple};
+
+/// Modes that are kept of a full model if the job does not say.
+const MODES: usize = 10;
+
+/// What to import.
+#[derive(Clone, Debug)]
+pub struct ImportJob {
+    /// Files of one structure; companions beside them are found.
+    pub files: Vec<PathBuf>,
+    /// File of the mass, if its name does not tell.
+    pub mass_file: Option<PathBuf>,
+    /// The format that is expected; `None`: by content.
+    pub format: Option<ImportFormat>,
+    /// Names of the matrices in files that hold several.
+    pub names: MatrixNames,
+    /// Units of the files; `None`: those of the sidecar.
+    pub units: Option<UnitSystem>,
+    /// Rows or nodes of the interfaces, proximal first; `None`: those of the sidecar.
+    pub map: Option<ImportMap>,
+    /// Frames of interfaces; those of the files where it is silent.
+    pub at: Vec<FrameAt>,
+    /// Axes of the matrices in link axes: roll, pitch, yaw (rad).
+    pub axes_rpy: Vector3<f64>,
+    /// Fixed-interface modes to keep of a full model.
+    pub modes: Option<usize>,
+    /// Masses of the parts (SI, link axes).
+    pub masses: PartMasses,
+    /// Place of the elastic joint; a point is in the unit of the files.
+    pub split: SplitAt,
+    /// Name of the link; `None`: that of the file.
+    pub name: Option<String>,
+}
+
+impl Default for ImportJob {
+    fn default() -> Self {
+        Self {
+            files: Vec::new(),
+            mass_file: None,
+            format: None,
+            names: MatrixNames::default(),
+            units: None,
+            map: None,
+            at: Vec::new(),
+            axes_rpy: Vector3::zeros(),
+            modes: None,
+            masses: PartMasses::FromMatrix,
+            split: SplitAt::ElasticCentre,
+            name: None,
+        }
+    }
+}
+
+impl ImportJob {
+    /// Name of the link.
+    pub fn link_name(&self) -> String {
+        let from_file = || {
+            let name = self.files.first().and_then(|path| path.file_name()).unwrap_or_default().to_string_lossy();
+            let name = name.strip_suffix(".gz").unwrap_or(&name);
+            name.rsplit_once('.').map_or(name, |(stem, _)| stem).to_owned()
+        };
+        self.name.clone().unwrap_or_else(from_file)
+    }
+}
+
+/// Where the results go.
+#[derive(Clone, Debug, Default)]
+pub struct ImportOutputs {
+    /// Folder for link file, summary and report; made if it is not there.
+    pub folder: Option<PathBuf>,
+    /// Another place for the link file.
+    pub flex: Option<PathBuf>,
+    /// Overwrite what is there.
+    pub overwrite: bool,
+}
+
+/// Reads matrices, makes a link of them, writes the files.
+///
+/// # Errors
+/// [`Error`]; what is missing is asked for all at once. See [`Error::exit_code`].
+pub fn import(job: &ImportJob, outputs: Option<&ImportOutputs>) -> Result<ImportSummary, Error> {
+    let (started, cpu) = (Instant::now(), cpu_time::ProcessTime::now());
+    let name = job.link_name();
+    let targets = outputs.map(|outputs| Targets::new(outputs, &name));
+    if let Some(targets) = &targets {
+        result_files::check_free(&targets.all(), targets.overwrite)?;
+    }
+    let first = job.files.first().ok_or_else(|| Error::Usage("no file to import is given".into()))?;
+    let head = InputFile::open(first).map_err(Box::new)?;
+    let (reduction, parts) = if recognise(&head.bytes) == Some(MatrixFormat::Sid) {
+        expect_format(job, MatrixFormat::Sid, &head.origin)?;
+        sid::import(job, &head, &name)?
+    } else {
+        drop(head);
+        matrices(job, &name)?
+    };
+
+    let mut summary = ImportSummary::new(&reduction, parts);
+    summary.wall_s = started.elapsed().as_secs_f64();
+    summary.cpu_s = cpu.elapsed().as_secs_f64();
+    summary.peak_rss_bytes = stamp::peak_rss_bytes();
+    if let Some(targets) = targets {
+        targets.write(&write_flex(&reduction.link), &mut summary)?;
+    }
+    Ok(summary)
+}
+
+fn expect_format(job: &ImportJob, found: MatrixFormat, origin: &str) -> Result<(), Error> {
+    match job.format {
+        Some(format) if !format.covers(found) => {
+            let what = format!("is {} by its content, --format says otherwise: leave it out", found.name());
+            Err(Error::File { path: origin.into(), what })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// All formats with a stiffness over physical coordinates.
+fn matrices(job: &ImportJob, name: &str) -> Result<(MatrixReduction, Parts), Error> {
+    let imported = read(job).map_err(Box::new)?;
+    expect_format(job, imported.format, &imported.origin)?;
+    let sidecar = imported.sidecar.as_ref();
+    let mut warnings = imported.warnings.clone();
+    let units = job.units.or(sidecar.map(|sidecar| sidecar.units));
+    if let (Some(given), Some(sidecar)) = (job.units, sidecar)
+        && given != sidecar.units
+    {
+        warnings
+            .push(format!("the sidecar says the units are {}, the command line {given}, which counts", sidecar.units));
+    }
+    let from_sidecar = || sidecar.map(|sidecar| ImportMap::Rows(sidecar.map()));
+    let map = job.map.clone().or_else(from_sidecar).filter(|map| !map.entries().is_empty());
+    let rows_of = |map: &ImportMap| match map {
+        ImportMap::Rows(map) => Some(map.clone()),
+        ImportMap::Nodes(_) => None,
+    };
+    let is_full =
+        matches!(map, Some(ImportMap::Nodes(_))) || full::is_full(&imported, map.as_ref().and_then(rows_of).as_ref());
+
+    let mut faults = Vec::new();
+    if units.is_none() {
+        let what = "the units of the file are not declared: --units LENGTH-MASS-TIME, such as --units m-kg-s (N, Pa) or \
+                    --units mm-t-s (N, MPa); no matrix says them itself";
+        faults.push(file_error(&imported, what));
+    }
+    if map.is_none() {
+        let proposal = if is_full {
+            full::propose(&imported)
+        } else {
+            match propose_map(&imported.stiffness.rows) {
+                Some(map) => format!("if the proximal interface comes first: --map \"{map}\""),
+                None => "give --map, such as A=1001,B=1002 or A=#1-6,B=#7-12".into(),
+            }
+        };
+        faults.push(file_error(&imported, format!("which rows are interface A and which B is not said: {proposal}")));
+    }
+    let R_LM = rotation(&job.axes_rpy);
+    let placed = map.as_ref().map(|map| place(job, &imported, map, &R_LM, &mut warnings)).transpose();
+    let placed = placed.unwrap_or_else(|fault| {
+        faults.push(fault);
+        None
+    });
+    if map.is_none() && imported.positions.is_empty() && imported.frames.is_empty() && job.at.is_empty() {
+        faults.push(file_error(&imported, no_place(&imported, None, &["A".into(), "B".into()])));
+    }
+    let (Some(units), Some(map), Some(placed)) = (units, map, placed) else {
+        return Err(if faults.len() == 1 { faults.remove(0) } else { Error::Several(faults) });
+    };
+    if !faults.is_empty() {
+        return Err(if faults.len() == 1 { faults.remove(0) } else { Error::Several(faults) });
+    }
+
+    let frames: Vec<InterfaceFrame> = placed
+        .iter()
+        .map(|p| {
+            let X_LI = Pose::from_parts(Translation3::from(p.xyz * units.length), p.rotation);
+            InterfaceFrame { name: p.name.clone(), X_LI, tie: None }
+        })
+        .collect();
+    let (element, has_mass, asymmetry) = if is_full {
+        let target =
+            full::Target { units, frames: frames.clone(), R_LM: R_LM.matrix(), modes: job.modes.unwrap_or(MODES) };
+        (full::reduce(&imported, &map, target)?, true, imported.stiffness.asymmetry)
+    } else {
+        if job.modes.is_some() {
+            warnings.push("--modes only counts for full models; these matrices are reduced already".into());
+        }
+        let rows = rows_of(&map);
+        let reduced = assemble_interfaces(&imported, rows.as_ref(), Some(&units)).map_err(Box::new)?;
+        let (has_mass, n) = (reduced.M.is_some(), reduced.K.nrows());
+        let M = reduced.M.unwrap_or_else(|| DMatrix::zeros(n, n));
+        (Superelement { interfaces: frames, K: reduced.K, M }, has_mass, reduced.asymmetry)
+    };
+    let element = turned(element, R_LM.matrix());
+    let modes = element.modes();
+    let method = match (is_full, modes) {
+        (true, 0) => "guyan".into(),
+        (true, _) => format!("craig-bampton, {modes} modes"),
+        (false, 0) => "reduced matrices".into(),
+        (false, _) => format!("reduced matrices with {modes} modes"),
+    };
+    let plan = plan(job, name, units, &imported.origin, &format!("{method}, {}", imported.format.name()));
+    let checked = if has_mass { Some(element.clone()) } else { None };
+    let reduction = link_from_superelement(element, has_mass, &plan).map_err(|source| {
+        let path = imported.origin.clone().into();
+        Error::Import { path, source: Box::new(source) }
+    })?;
+    let interfaces = placed.iter().zip(map.entries()).map(|(p, (_, rows))| summary::ImportInterface {
+        name: p.name.clone(),
+        rows,
+        position_m: (p.xyz * units.length).into(),
+        rpy_rad: p.rotation.euler_angles().into(),
+        from: p.from,
+    });
+    let parts = Parts {
+        files: job.files.iter().chain(&job.mass_file).map(|path| path.display().to_string()).collect(),
+        format: imported.format.name().to_string(),
+        units: units.name(),
+        method,
+        rows: imported.stiffness.size(),
+        interfaces: interfaces.collect(),
+        asymmetry,
+        element: checked,
+        warnings,
+    };
+    Ok((reduction, parts))
+}
+
+fn plan(job: &ImportJob, name: &str, units: UnitSystem, source: &str, method: &str) -> MatrixPlan {
+    MatrixPlan {
+        name: name.to_owned(),
+        masses: job.masses.clone(),
+        split: match job.split {
+            SplitAt::Point(p) => SplitAt::Point(p * units.length),
+            other => other,
+        },
+        limits: GateLimits::default(),
+        provenance: Provenance {
+            source: source.to_owned(),
+            method: method.to_owned(),
+            tie: String::new(),
+            units: units.name(),
+            date: stamp::today(),
+            note: String::new(),
+        },
+    }
+}
+
+fn read(job: &ImportJob) -> Result<ImportedMatrices, flexarm_fem::exchange::ExchangeError> {
+    let Some(mass) = &job.mass_file else {
+        let imported = read_matrices(&job.files, &job.names)?;
+        // A sidecar that was found beside the stiffness names the mass.
+        let named = imported.sidecar.as_ref().filter(|_| imported.mass.is_none()).and_then(|s| s.mass.as_ref());
+        let path = named.zip(job.files.first()).map(|(name, first)| first.with_file_name(name));
+        let Some(path) = path.filter(|path| path.exists()) else { return Ok(imported) };
+        let files: Vec<PathBuf> = job.files.iter().cloned().chain([path]).collect();
+        return read_matrices(&files, &job.names);
+    };
+    let mut files = job.files.iter().map(InputFile::open).collect::<Result<Vec<_>, _>>()?;
+    if let [only] = &mut files[..] {
+        only.role = Some(MatrixRole::Stiffness);
+    }
+    files.push(InputFile::open(mass)?.with_role(MatrixRole::Mass));
+    parse_matrices(&files, &job.names)
+}
+
+fn rotation(rpy: &Vector3<f64>) -> Rotation3<f64> {
+    Rotation3::from_euler_angles(rpy.x, rpy.y, rpy.z)
+}
+
+fn file_error(imported: &ImportedMatrices, what: impl Into<String>) -> Error {
+    Error::File { path: imported.origin.clone().into(), what: what.into() }
+}
+
+/// Frame of an interface, unit of the file.
+struct Placed {
+    name: String,
+    xyz: Vector3<f64>,
+    rotation: Rotation3<f64>,
+    from: &'static str,
+}
+
+/// The frame of each interface: as said, or as the file has it.
+fn place(
+    job: &ImportJob,
+    imported: &ImportedMatrices,
+    map: &ImportMap,
+    R_LM: &Rotation3<f64>,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<Placed>, Error> {
+    let entries = map.entries();
+    let names: Vec<String> = entries.iter().map(|(name, _)| name.clone()).collect();
+    if names.len() < 2 {
+        let what = format!("the map names {names:?}; a link needs two interfaces, the proximal one first");
+        return Err(file_error(imported, what));
+    }
+    for (k, at) in job.at.iter().enumerate() {
+        if !names.contains(&at.name) {
+            return Err(Error::Usage(format!("--at names interface {:?}, the map has {names:?}", at.name)));
+        }
+        if job.at[..k].iter().any(|other| other.name == at.name) {
+            return Err(Error::Usage(format!("--at {}=... is given twice", at.name)));
+        }
+    }
+    let mut placed = Vec::new();
+    for (k, name) in names.iter().enumerate() {
+        let found =
+            in_file(imported, map, k).map_err(|what| file_error(imported, format!("interface {name}: {what}")))?;
+        let found = found.map(|(X, from)| (R_LM * X.translation.vector, R_LM * X.rotation, from));
+        let given = job.at.iter().find(|at| at.name == *name);
+        let one = match (given, found) {
+            (Some(at), found) => {
+                if let Some((p, _, from)) = found
+                    && (p - at.xyz).norm() > 1e-6 * p.norm().max(at.xyz.norm())
+                {
+                    let (p, q): ([f64; 3], [f64; 3]) = (p.into(), at.xyz.into());
+                    warnings.push(format!("interface {name}: {from} is {p:?}, --at says {q:?}, which counts"));
+                }
+                Placed { name: name.clone(), xyz: at.xyz, rotation: rotation(&at.rpy), from: "given" }
+            }
+            (None, Some((xyz, rotation, from))) => Placed { name: name.clone(), xyz, rotation, from },
+            (None, None) => return Err(file_error(imported, no_place(imported, Some(map), &names))),
+        };
+        placed.push(one);
+    }
+    if (placed[0].xyz - placed[1].xyz).norm() == 0.0 {
+        let what = format!("interfaces {:?} and {:?} are at the same point; a link needs a length", names[0], names[1]);
+        return Err(Error::Usage(what));
+    }
+    Ok(placed)
+}
+
+/// Where the file says interface `k` is: matrix axes, unit of the file.
+fn in_file(imported: &ImportedMatrices, map: &ImportMap, k: usize) -> Result<Option<(Pose, &'static str)>, String> {
+    let at = |p: Vector3<f64>| Pose::from_parts(Translation3::from(p), Rotation3::identity());
+    let map = match map {
+        ImportMap::Rows(map) => map,
+        ImportMap::Nodes(list) => {
+            let nodes = full::chosen_nodes(imported, &list[k].1)?;
+            let points: Vec<_> = nodes.iter().filter_map(|node| imported.positions.get(node)).collect();
+            let sum: Vector3<f64> = points.iter().copied().sum();
+            return Ok((!points.is_empty()).then(|| (at(sum / points.len() as f64), "the centroid of its nodes")));
+        }
+    };
+    let interface = &map.interfaces[k];
+    if let Some(side) = imported.sidecar.as_ref().and_then(|s| s.interfaces.iter().find(|i| i.interface == *interface))
+    {
+        return Ok(Some((side.frame, "its place in the sidecar")));
+    }
+    if let Some(RowPick::Node { node, .. }) = interface.picks.first()
+        && let Some(p) = imported.positions.get(node)
+    {
+        return Ok(Some((at(*p), "the position of its node")));
+    }
+    Ok(imported.frames.get(k).map(|X| (*X, "its frame in the file")))
+}
+
+/// The question where the interfaces are, with what the matrix itself implies.
+fn no_place(imported: &ImportedMatrices, map: Option<&ImportMap>, names: &[String]) -> String {
+    let proposed = match map {
+        Some(ImportMap::Rows(map)) => Some(map.clone()),
+        Some(ImportMap::Nodes(_)) => None,
+        None => propose_map(&imported.stiffness.rows),
+    };
+    let implied = proposed.and_then(|map| implied_distance(imported, &map));
+    let (a, b) = (&names[0], &names[1]);
+    let text = match implied {
+        Some(p) => {
+            let [x, y, z] = <[f64; 3]>::from(p).map(|x| if x.abs() < 1e-9 * p.norm() { 0.0 } else { x });
+            format!(
+                "the stiffness itself says that {b} lies at ({x:.6}, {y:.6}, {z:.6}) from {a}; if {a} is the origin of the \
+                 link: --at {a}=0,0,0 --at {b}={x:.6},{y:.6},{z:.6}"
+            )
+        }
+        None => format!("give --at {a}=x,y,z --at {b}=x,y,z"),
+    };
+    format!("where the interfaces are is not in the file (unit of the file, link axes): {text}")
+}
+
+/// From A to B as the blocks of the stiffness imply it, unit of the file.
+fn implied_distance(imported: &ImportedMatrices, map: &InterfaceMap) -> Option<Vector3<f64>> {
+    let reduced = assemble_interfaces(imported, Some(map), Some(&UnitSystem::SI)).ok()?;
+    let M = DMatrix::zeros(reduced.K.nrows(), reduced.K.nrows());
+    let frame = |name: &String| InterfaceFrame { name: name.clone(), X_LI: Pose::identity(), tie: None };
+    let element = Superelement { interfaces: reduced.names.iter().map(frame).collect(), K: reduced.K, M };
+    match check_matrix12(&stiffness12(&element)?, &Vector3::zeros(), &GateLimits::default()) {
+        Err(FemError::MovesUnderRigidMotion { implied_p_AB, .. }) => implied_p_AB,
+        _ => None,
+    }
+}
+
+/// The paths of the results.
+struct Targets {
+    folder: Option<[PathBuf; 3]>,
+    flex: Option<PathBuf>,
+    overwrite: bool,
+}
+
+impl Targets {
+    fn new(outputs: &ImportOutputs, link: &str) -> Self {
+        let stem = result_files::file_stem(link);
+        let in_folder = |f: &PathBuf| [f.join(format!("{stem}.flex")), f.join("summary.json"), f.join("report.md")];
+        let folder = outputs.folder.as_ref().map(in_folder);
+        Self { folder, flex: outputs.flex.clone(), overwrite: outputs.overwrite }
+    }
+
+    fn all(&self) -> Vec<PathBuf> {
+        self.folder.iter().flatten().chain(&self.flex).cloned().collect()
+    }
+
+    fn write(&self, flex: &str, summary: &mut ImportSummary) -> Result<(), Error> {
+        let text = |path: &PathBuf| Some(path.display().to_string());
+        summary.files.flex = self.flex.as_ref().or(self.folder.as_ref().map(|f| &f[0])).and_then(text);
+        let mut contents = Vec::new();
+        if let Some([link, figures, report]) = &self.folder {
+            summary.files.summary = text(figures);
+            summary.files.report = text(report);
+            let json = serde_json::to_string_pretty(&summary).expect("plain numbers and strings") + "\n";
+            contents.push((link.clone(), flex.to_owned()));
+            contents.push((figures.clone(), json));
+            contents.push((report.clone(), markdown(summary)));
+        }
+        contents.extend(self.flex.iter().map(|path| (path.clone(), flex.to_owned())));
+        result_files::check_free(&self.all(), self.overwrite)?;
+        result_files::write_all(&contents)
+    }
+}

@@ -1,0 +1,299 @@
+//! Figures of an import, with the keys of `flexarm reduce` where both have them. SI units, link axes.
+
+use std::fmt::Write as _;
+
+use flexarm_fem::matrix_link::MatrixReduction;
+use flexarm_fem::reduction::Superelement;
+use flexarm_fem::{GateLimits, RigidPart};
+use nalgebra::{DMatrix, Matrix3, Matrix6};
+use serde::Serialize;
+
+use crate::reduce::ReportTable;
+
+/// Answer of `flexarm import`.
+#[derive(Clone, Debug, Serialize)]
+pub struct ImportSummary {
+    /// Name of the link.
+    pub link: String,
+    /// Files that were given.
+    pub sources: Vec<String>,
+    /// Their format.
+    pub format: String,
+    /// Their units.
+    pub units: String,
+    /// "reduced matrices", "craig-bampton, 10 modes", ...
+    pub method: String,
+    /// Rows of the stiffness in the file.
+    pub rows: usize,
+    /// Interfaces, proximal first.
+    pub interfaces: Vec<ImportInterface>,
+    /// Mass of the whole link.
+    pub mass_kg: f64,
+    /// Its centre of mass.
+    pub com_m: [f64; 3],
+    /// Its inertia about the centre of mass, 3×3 (kg m²).
+    pub inertia: [[f64; 3]; 3],
+    /// Stiffness at B with A held, 6×6, linear first (N/m, N/rad; N m/m, N m/rad).
+    pub stiffness: [[f64; 6]; 6],
+    /// Its inverse.
+    pub compliance: [[f64; 6]; 6],
+    /// Where the elastic joint of the two parts sits.
+    pub split_m: [f64; 3],
+    /// The two rigid parts, proximal first.
+    pub parts: Vec<ImportPart>,
+    /// Natural frequencies with A held and B free (Hz); empty without a mass matrix.
+    pub frequencies_hz: Vec<f64>,
+    /// The same of the two rigid parts with their joint (Hz).
+    pub lumped_frequencies_hz: Vec<f64>,
+    /// Frequencies of the fixed-interface modes in the matrices (Hz).
+    pub fixed_interface_hz: Vec<f64>,
+    /// What was checked.
+    pub checks: ImportChecks,
+    /// Wall-clock time without the writing of files (s).
+    pub wall_s: f64,
+    /// Processor time, all threads (s).
+    pub cpu_s: f64,
+    /// Largest memory of the process so far; null where the system does not tell.
+    pub peak_rss_bytes: Option<u64>,
+    /// Things worth telling.
+    pub warnings: Vec<String>,
+    /// Written files.
+    pub files: ImportFiles,
+}
+
+/// An interface.
+#[derive(Clone, Debug, Serialize)]
+pub struct ImportInterface {
+    /// Name.
+    pub name: String,
+    /// Its rows or nodes in the file.
+    pub rows: String,
+    /// Position of its frame.
+    pub position_m: [f64; 3],
+    /// Roll, pitch, yaw of its frame.
+    pub rpy_rad: [f64; 3],
+    /// Where the frame comes from.
+    pub from: &'static str,
+}
+
+/// A rigid part.
+#[derive(Clone, Debug, Serialize)]
+pub struct ImportPart {
+    /// Mass.
+    pub mass_kg: f64,
+    /// Centre of mass.
+    pub com_m: [f64; 3],
+    /// Inertia about the centre of mass, 3×3 (kg m²).
+    pub inertia: [[f64; 3]; 3],
+}
+
+/// What was checked; relative unless the key has a unit.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct ImportChecks {
+    /// Largest asymmetry of the matrices in the file.
+    pub symmetry: f64,
+    /// Force under rigid motion.
+    pub rigid_body_residual: f64,
+    /// Mass along x, y, z and that of the link, largest difference; null without a mass matrix.
+    pub mass_error: Option<f64>,
+    /// Disagreement of the blocks of the stiffness.
+    pub block_identity: f64,
+    /// Smallest eigenvalue of the stiffness, scaled to a unit diagonal.
+    pub min_eigenvalue: f64,
+    /// Its condition number.
+    pub condition: f64,
+}
+
+/// Written files; null where none was written.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct ImportFiles {
+    /// The link file, for `reduced = "..."` of a robot file.
+    pub flex: Option<String>,
+    /// These figures.
+    pub summary: Option<String>,
+    /// These figures for people.
+    pub report: Option<String>,
+}
+
+/// What is known beside the reduction.
+pub(super) struct Parts {
+    pub(super) files: Vec<String>,
+    pub(super) format: String,
+    pub(super) units: String,
+    pub(super) method: String,
+    pub(super) rows: usize,
+    pub(super) interfaces: Vec<ImportInterface>,
+    pub(super) asymmetry: f64,
+    /// With its mass, link axes.
+    pub(super) element: Option<Superelement>,
+    pub(super) warnings: Vec<String>,
+}
+
+/// Difference of masses above which a warning is given.
+const MASS_ERROR: f64 = 1e-6;
+
+impl ImportSummary {
+    pub(super) fn new(reduction: &MatrixReduction, parts: Parts) -> Self {
+        let MatrixReduction { link, whole, held_frequencies_hz, lumped_frequencies_hz, warnings } = reduction;
+        let gate = &link.checks;
+        let masses = parts.element.as_ref().map(masses_along_axes);
+        let mass_error = masses.map(|m| m.iter().map(|m| (m / whole.mass - 1.0).abs()).fold(0.0, f64::max));
+        let mut all = parts.warnings;
+        all.extend(warnings.iter().cloned());
+        if let (Some(error), Some(m)) = (mass_error, masses)
+            && (error.is_nan() || error > MASS_ERROR)
+        {
+            all.push(format!("the mass matrix holds {:.6}, {:.6}, {:.6} kg along x, y, z", m[0], m[1], m[2]));
+        }
+        let list =
+            |part: &RigidPart| ImportPart { mass_kg: part.mass, com_m: part.com.into(), inertia: rows3(&part.inertia) };
+        Self {
+            link: link.name.clone(),
+            sources: parts.files,
+            format: parts.format,
+            units: parts.units,
+            method: parts.method,
+            rows: parts.rows,
+            interfaces: parts.interfaces,
+            mass_kg: whole.mass,
+            com_m: whole.com.into(),
+            inertia: rows3(&whole.inertia),
+            stiffness: rows6(&link.K_BB),
+            compliance: link.tip_compliance().map_or([[f64::NAN; 6]; 6], |C| rows6(&C)),
+            split_m: link.split.X_LS.translation.vector.into(),
+            parts: vec![list(&link.proximal), list(&link.distal)],
+            frequencies_hz: held_frequencies_hz.iter().copied().take(10).collect(),
+            lumped_frequencies_hz: lumped_frequencies_hz.clone(),
+            fixed_interface_hz: parts.element.as_ref().map_or_else(Vec::new, Superelement::fixed_frequencies_hz),
+            checks: ImportChecks {
+                symmetry: gate.asymmetry.max(parts.asymmetry),
+                rigid_body_residual: gate.rigid_body_residual.unwrap_or(0.0),
+                mass_error,
+                block_identity: gate.block_identity.unwrap_or(0.0),
+                min_eigenvalue: gate.min_eigenvalue,
+                condition: gate.condition,
+            },
+            wall_s: 0.0,
+            cpu_s: 0.0,
+            peak_rss_bytes: None,
+            warnings: all,
+            files: ImportFiles::default(),
+        }
+    }
+}
+
+/// Mass under a translation of all interfaces along x, y, z.
+fn masses_along_axes(element: &Superelement) -> [f64; 3] {
+    let n = element.boundary();
+    let M: DMatrix<f64> = element.M.view((0, 0), (n, n)).into_owned();
+    let along = |axis: usize| {
+        let rows = || (axis..n).step_by(6);
+        rows().flat_map(|i| rows().map(move |j| (i, j))).map(|place| M[place]).sum()
+    };
+    [along(0), along(1), along(2)]
+}
+
+/// All tables of an import.
+pub fn tables(summary: &ImportSummary) -> Vec<ReportTable> {
+    let table = |title, header: &[&'static str], rows| ReportTable::new(title, header, rows);
+    let vector = |p: &[f64; 3]| p.map(|x| format!("{:.4}", if x.abs() < 5e-5 { 0.0 } else { x })).join(", ");
+    let interfaces = summary.interfaces.iter();
+    let interfaces = interfaces
+        .map(|i| vec![i.name.clone(), i.rows.clone(), vector(&i.position_m), vector(&i.rpy_rad), i.from.into()])
+        .collect();
+    let body = |name: &str, mass: f64, com: &[f64; 3], I: &[[f64; 3]; 3]| {
+        let moments = [I[0][0], I[1][1], I[2][2], I[0][1], I[0][2], I[1][2]].map(|x| format!("{x:.4e}")).join(", ");
+        vec![name.to_owned(), format!("{mass:.4}"), vector(com), moments]
+    };
+    let mut masses = vec![body("whole", summary.mass_kg, &summary.com_m, &summary.inertia)];
+    for (name, part) in ["proximal part", "distal part"].iter().zip(&summary.parts) {
+        masses.push(body(name, part.mass_kg, &part.com_m, &part.inertia));
+    }
+    masses.push(vec!["elastic joint".into(), String::new(), vector(&summary.split_m), String::new()]);
+    let C = &summary.compliance;
+    let soft = |k: usize| format!("{:.4e}", 1e6 * C[k][k]);
+    let softness = vec![
+        vec!["1 kN along it moves B by".into(), soft(0), soft(1), soft(2), "mm".into()],
+        vec!["1 kN m about it turns B by".into(), soft(3), soft(4), soft(5), "mrad".into()],
+    ];
+    let c = &summary.checks;
+    let limits = GateLimits::default();
+    let below = |name: &str, value: f64, usual: f64| {
+        let mark = if value <= usual { "ok" } else { "warn" };
+        vec![name.to_owned(), format!("{value:.1e}"), format!("below {usual:.0e}"), mark.into()]
+    };
+    let mut checks = vec![
+        // Nine decimals of a DMIG.
+        below("asymmetry of the file", c.symmetry, 1e-8),
+        below("force under rigid motion", c.rigid_body_residual, limits.rigid_body_warning),
+        below("blocks of the stiffness agree", c.block_identity, limits.rigid_body_warning),
+    ];
+    let least = if c.min_eigenvalue > limits.min_eigenvalue { "ok" } else { "warn" };
+    let usual = format!("above {:.0e}", limits.min_eigenvalue);
+    checks.push(vec!["smallest eigenvalue".into(), format!("{:.1e}", c.min_eigenvalue), usual, least.into()]);
+    checks.push(match c.mass_error {
+        Some(error) => below("mass along x, y, z and of the link", error, MASS_ERROR),
+        None => vec!["mass".into(), "-".into(), "no mass matrix".into(), "-".into()],
+    });
+    let count = summary.frequencies_hz.len().max(summary.lumped_frequencies_hz.len());
+    let hz = |list: &[f64], k: usize| list.get(k).map_or_else(|| "-".into(), |x| format!("{x:.2}"));
+    let frequencies = (0..count)
+        .map(|k| vec![(k + 1).to_string(), hz(&summary.frequencies_hz, k), hz(&summary.lumped_frequencies_hz, k)])
+        .collect();
+    let names = ["x", "y", "z", "rx", "ry", "rz"];
+    let matrix = |title, M: &[[f64; 6]; 6]| {
+        let row = |(row, name): (&[f64; 6], &str)| {
+            std::iter::once(name.to_owned()).chain(row.iter().map(|x| format!("{x:.6e}"))).collect()
+        };
+        let header: Vec<&str> = std::iter::once("").chain(names).collect();
+        ReportTable::new(title, &header, M.iter().zip(names).map(row).collect()).on_page()
+    };
+    vec![
+        table(
+            "interfaces (m, rad, link frame)",
+            &["interface", "rows", "position", "roll, pitch, yaw", "from"],
+            interfaces,
+        ),
+        table("mass", &["", "mass [kg]", "centre of mass [m]", "ixx, iyy, izz, ixy, ixz, iyz there [kg m2]"], masses),
+        table("how soft it is, A held (along the same axis)", &["", "x", "y", "z", ""], softness),
+        matrix("stiffness K_BB at B, A held (N/m, N/rad; N m/m, N m/rad)", &summary.stiffness),
+        matrix("compliance C_BB at B, A held (m/N, m/(N m); rad/N, rad/(N m))", &summary.compliance),
+        table("checks", &["", "measured", "usual", ""], checks),
+        table("natural frequencies, A held, B free (Hz)", &["mode", "matrices", "two parts"], frequencies),
+    ]
+}
+
+/// The figures as a page of Markdown.
+pub fn markdown(summary: &ImportSummary) -> String {
+    let mut page = format!(
+        "# Link {}\n\n{}: {}, {}, {} rows; {}\n",
+        summary.link,
+        summary.sources.join(", "),
+        summary.format,
+        summary.units,
+        summary.rows,
+        summary.method
+    );
+    for table in tables(summary) {
+        let _ = writeln!(page, "\n## {}\n\n| {} |", table.title, table.header.join(" | "));
+        let _ = writeln!(page, "| {} |", vec!["---"; table.header.len()].join(" | "));
+        for row in &table.rows {
+            let _ = writeln!(page, "| {} |", row.join(" | "));
+        }
+    }
+    if !summary.warnings.is_empty() {
+        page += "\n## Warnings\n\n";
+        for warning in &summary.warnings {
+            let _ = writeln!(page, "- {warning}");
+        }
+    }
+    page
+}
+
+fn rows3(M: &Matrix3<f64>) -> [[f64; 3]; 3] {
+    M.transpose().into()
+}
+
+fn rows6(M: &Matrix6<f64>) -> [[f64; 6]; 6] {
+    M.transpose().into()
+}

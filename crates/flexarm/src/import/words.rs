@@ -1,0 +1,267 @@
+//! Words of an import: which rows or nodes are an interface, where it is, masses, the place of the joint.
+
+use std::fmt;
+use std::str::FromStr;
+
+use flexarm_fem::exchange::{InterfaceMap, MatrixFormat};
+use flexarm_fem::{RigidPart, SplitAt};
+use nalgebra::{Matrix3, Vector3};
+
+/// Which rows or nodes are which interface.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ImportMap {
+    /// Rows of the matrices: `A=1001,B=1002`, `A=947:1-3+948:1-3,...`, `A=#1-6,B=#7-12`.
+    Rows(InterfaceMap),
+    /// Nodes tied rigidly: `A=set:NAME,B=plane(x,y,z;nx,ny,nz)`; for full models of solids with positions.
+    Nodes(Vec<(String, NodeChoice)>),
+}
+
+/// Nodes of a full model.
+#[derive(Clone, Debug, PartialEq)]
+pub enum NodeChoice {
+    /// A set of the file.
+    Set(String),
+    /// All nodes in a plane; unit and axes of the file.
+    Plane {
+        /// A point of it.
+        point: Vector3<f64>,
+        /// Its normal.
+        normal: Vector3<f64>,
+    },
+}
+
+impl FromStr for ImportMap {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let is_nodes = |value: &str| value.trim().starts_with("set:") || value.trim().starts_with("plane(");
+        let parts = split_outside_brackets(text);
+        let values = || parts.iter().filter_map(|part| part.split_once('=').map(|(_, value)| value));
+        if !values().any(is_nodes) {
+            return text
+                .parse()
+                .map(Self::Rows)
+                .map_err(|error: flexarm_fem::exchange::ExchangeError| error.to_string());
+        }
+        let one = |part: &&str| {
+            let wrong =
+                || format!("{part:?}: expected NAME=set:NAME or NAME=plane(x,y,z;nx,ny,nz) for every interface");
+            let (name, value) = part.split_once('=').ok_or_else(wrong)?;
+            let value = value.trim();
+            let choice =
+                match (value.strip_prefix("set:"), value.strip_prefix("plane(").and_then(|v| v.strip_suffix(')'))) {
+                    (Some(set), _) => NodeChoice::Set(set.into()),
+                    (_, Some(inside)) => {
+                        let (point, normal) = inside.split_once(';').ok_or_else(wrong)?;
+                        let (point, normal) = (triple(point)?, triple(normal)?);
+                        if normal.norm() == 0.0 {
+                            return Err(format!("{part:?}: the normal of the plane has no length"));
+                        }
+                        NodeChoice::Plane { point, normal }
+                    }
+                    _ => return Err(wrong()),
+                };
+            Ok((name.trim().to_owned(), choice))
+        };
+        let list: Vec<(String, NodeChoice)> = parts.iter().map(one).collect::<Result<_, String>>()?;
+        for (k, (name, _)) in list.iter().enumerate() {
+            if list[..k].iter().any(|(other, _)| other == name) {
+                return Err(format!("the name {name:?} is used twice in the map"));
+            }
+        }
+        Ok(Self::Nodes(list))
+    }
+}
+
+impl fmt::Display for NodeChoice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Set(name) => write!(f, "set:{name}"),
+            Self::Plane { point: p, normal: n } => {
+                write!(f, "plane({},{},{};{},{},{})", p.x, p.y, p.z, n.x, n.y, n.z)
+            }
+        }
+    }
+}
+
+impl ImportMap {
+    /// Names of the interfaces, in order, with what was chosen.
+    pub(super) fn entries(&self) -> Vec<(String, String)> {
+        match self {
+            Self::Rows(map) => map.interfaces.iter().map(|i| (i.name.clone(), i.rows_text())).collect(),
+            Self::Nodes(list) => list.iter().map(|(name, choice)| (name.clone(), choice.to_string())).collect(),
+        }
+    }
+}
+
+/// At commas that stand in no bracket.
+fn split_outside_brackets(text: &str) -> Vec<&str> {
+    let (mut parts, mut depth, mut start) = (Vec::new(), 0_i32, 0);
+    for (i, c) in text.char_indices() {
+        match c {
+            '(' => depth += 1,
+            ')' => depth -= 1,
+            ',' if depth == 0 => {
+                parts.push(&text[start..i]);
+                start = i + 1;
+            }
+            _ => {}
+        }
+    }
+    parts.push(&text[start..]);
+    parts
+}
+
+/// Frame of an interface, `NAME=x,y,z` or `NAME=x,y,z,roll,pitch,yaw`; unit of the file, rad, link axes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FrameAt {
+    /// The interface.
+    pub name: String,
+    /// Its position, unit of the file.
+    pub xyz: Vector3<f64>,
+    /// Roll, pitch, yaw (rad).
+    pub rpy: Vector3<f64>,
+}
+
+impl FromStr for FrameAt {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || format!("{text:?}: expected NAME=x,y,z or NAME=x,y,z,roll,pitch,yaw, such as B=0,0,1.1");
+        let (name, values) = text.split_once('=').ok_or_else(wrong)?;
+        match finite_numbers(values)?.as_slice() {
+            [x, y, z] => Ok(Self { name: name.trim().into(), xyz: Vector3::new(*x, *y, *z), rpy: Vector3::zeros() }),
+            [x, y, z, r, p, w] => {
+                Ok(Self { name: name.trim().into(), xyz: Vector3::new(*x, *y, *z), rpy: Vector3::new(*r, *p, *w) })
+            }
+            _ => Err(wrong()),
+        }
+    }
+}
+
+/// The format that the user says the files have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ImportFormat {
+    /// Matrix Market.
+    MatrixMarket,
+    /// `*USER ELEMENT` of CalculiX and Abaqus.
+    UserElement,
+    /// `node,dof,node,dof,value`.
+    AbaqusText,
+    /// `row column value`: Abaqus COORDINATE, CalculiX `.sti`.
+    Coordinate,
+    /// Nastran DMIG.
+    Dmig,
+    /// Nastran OP4, text or binary.
+    Op4,
+    /// Harwell-Boeing.
+    HarwellBoeing,
+    /// Exudyn HDF5.
+    Exudyn,
+    /// Comma-separated, as for Simscape.
+    Simscape,
+    /// SID.
+    Sid,
+}
+
+impl ImportFormat {
+    /// Whether a file that was recognised as `found` is one.
+    pub(super) fn covers(self, found: MatrixFormat) -> bool {
+        match self {
+            Self::MatrixMarket => found == MatrixFormat::MatrixMarket,
+            Self::UserElement => found == MatrixFormat::UserElement,
+            Self::AbaqusText => found == MatrixFormat::LabelledText,
+            Self::Coordinate => found == MatrixFormat::CoordinateText,
+            Self::Dmig => found == MatrixFormat::Dmig,
+            Self::Op4 => matches!(found, MatrixFormat::Op4Text | MatrixFormat::Op4Binary),
+            Self::HarwellBoeing => found == MatrixFormat::HarwellBoeing,
+            Self::Exudyn => found == MatrixFormat::ExudynHdf5,
+            Self::Simscape => found == MatrixFormat::Csv,
+            Self::Sid => found == MatrixFormat::Sid,
+        }
+    }
+}
+
+/// A rigid part, `mass;cx,cy,cz;ixx,iyy,izz,ixy,ixz,iyz`: kg, m, kg m² about its centre of mass, link axes.
+///
+/// # Errors
+/// What is wrong with the text.
+pub fn parse_part(text: &str) -> Result<RigidPart, String> {
+    let wrong = || format!("{text:?}: expected mass;x,y,z;ixx,iyy,izz,ixy,ixz,iyz in kg, m, kg m2");
+    let mut pieces = text.split(';');
+    let (Some(mass), Some(com), Some(inertia), None) = (pieces.next(), pieces.next(), pieces.next(), pieces.next())
+    else {
+        return Err(wrong());
+    };
+    let [mass] = finite_numbers(mass)?[..] else { return Err(wrong()) };
+    Ok(RigidPart { mass, com: triple(com)?, inertia: parse_inertia(inertia)? })
+}
+
+/// Inertia `ixx,iyy,izz,ixy,ixz,iyz` (kg m²).
+///
+/// # Errors
+/// What is wrong with the text.
+pub fn parse_inertia(text: &str) -> Result<Matrix3<f64>, String> {
+    let [xx, yy, zz, xy, xz, yz] = finite_numbers(text)?[..] else {
+        return Err(format!("{text:?}: expected ixx,iyy,izz,ixy,ixz,iyz"));
+    };
+    Ok(Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz))
+}
+
+/// Where the elastic joint sits: `elastic-centre`, `mid`, a fraction, or a point in the unit of the file.
+///
+/// # Errors
+/// What is wrong with the text.
+pub fn parse_split(text: &str) -> Result<SplitAt, String> {
+    let wrong = || {
+        format!("split {text:?}: expected elastic-centre, mid, a fraction of the way from A to B (0 to 1), or x,y,z")
+    };
+    match text.trim() {
+        "elastic-centre" | "elastic-center" => Ok(SplitAt::ElasticCentre),
+        "mid" => Ok(SplitAt::MidLength),
+        other => match finite_numbers(other).map_err(|_| wrong())?[..] {
+            [x] if (0.0..=1.0).contains(&x) => Ok(SplitAt::Fraction(x)),
+            [x, y, z] => Ok(SplitAt::Point(Vector3::new(x, y, z))),
+            _ => Err(wrong()),
+        },
+    }
+}
+
+/// Three finite numbers between commas.
+///
+/// # Errors
+/// What is wrong with the text.
+pub fn triple(text: &str) -> Result<Vector3<f64>, String> {
+    let [x, y, z] = finite_numbers(text)?[..] else { return Err(format!("{text:?}: expected three numbers x,y,z")) };
+    Ok(Vector3::new(x, y, z))
+}
+
+fn finite_numbers(text: &str) -> Result<Vec<f64>, String> {
+    let number = |word: &str| {
+        let value = word.trim().parse().ok().filter(|x: &f64| x.is_finite());
+        value.ok_or_else(|| format!("{:?} in {text:?} is not a finite number", word.trim()))
+    };
+    text.split(',').map(number).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_map_names_rows_or_nodes() {
+        assert!(matches!("A=947:1-3+948:1-3,B=#7-12".parse(), Ok(ImportMap::Rows(_))));
+        let map: ImportMap = "A=plane(0,0,0;1,0,0),B=set:tip".parse().unwrap();
+        assert_eq!(map.entries()[0].1, "plane(0,0,0;1,0,0)");
+        assert_eq!(map.entries()[1], ("B".into(), "set:tip".into()));
+        assert!("A=set:x,B=1002".parse::<ImportMap>().unwrap_err().contains("set:NAME"));
+        assert!("A=set:x,A=set:y".parse::<ImportMap>().unwrap_err().contains("twice"));
+    }
+
+    #[test]
+    fn a_part_is_mass_centre_and_inertia() {
+        let part = parse_part("2;0,0,0.5;1,2,3,0.1,0.2,0.3").unwrap();
+        assert_eq!((part.mass, part.com.z, part.inertia[(0, 1)], part.inertia[(2, 1)]), (2.0, 0.5, 0.1, 0.3));
+        assert!(parse_part("2;0,0;1,2,3,0,0,0").is_err());
+    }
+}

@@ -1,0 +1,94 @@
+//! Files of a result: refused before the work if their places are taken, written all or none.
+
+use std::path::{Path, PathBuf};
+
+use crate::error::Error;
+
+/// Refuses places that are taken.
+///
+/// # Errors
+/// [`Error::File`].
+pub(crate) fn check_free(paths: &[PathBuf], overwrite: bool) -> Result<(), Error> {
+    for path in paths {
+        let fail = |what: &str| Err(Error::File { path: path.clone(), what: what.into() });
+        if path.is_dir() {
+            return fail("is a folder, a file is to be written there");
+        }
+        if !overwrite && path.exists() {
+            return fail("exists already and is not overwritten: choose another place, or give --force");
+        }
+        if let Some(above) = path.ancestors().skip(1).find(|above| above.exists())
+            && !above.is_dir()
+        {
+            let what = "is a file; the results need a folder".into();
+            return Err(Error::File { path: above.to_owned(), what });
+        }
+    }
+    Ok(())
+}
+
+/// Writes all files or none: each first under another name, then all are renamed.
+///
+/// # Errors
+/// [`Error::Write`].
+pub(crate) fn write_all(files: &[(PathBuf, impl AsRef<[u8]>)]) -> Result<(), Error> {
+    let mut undo = Undo::default();
+    for (path, bytes) in files {
+        let failed = |source| Error::Write { path: path.clone(), source };
+        if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+            undo.make(folder).map_err(failed)?;
+        }
+        let partial = partial(path);
+        undo.files.push(partial.clone());
+        std::fs::write(&partial, bytes).map_err(failed)?;
+    }
+    for (path, _) in files {
+        std::fs::rename(partial(path), path).map_err(|source| Error::Write { path: path.clone(), source })?;
+    }
+    undo.done = true;
+    Ok(())
+}
+
+/// A name as it may stand in a file name.
+pub(crate) fn file_stem(name: &str) -> String {
+    name.chars().map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' }).collect()
+}
+
+fn partial(path: &Path) -> PathBuf {
+    let mut name = path.file_name().unwrap_or_default().to_owned();
+    name.push(".partial");
+    path.with_file_name(name)
+}
+
+/// Removes on its way out what was made, unless all went well.
+#[derive(Default)]
+struct Undo {
+    files: Vec<PathBuf>,
+    folders: Vec<PathBuf>,
+    done: bool,
+}
+
+impl Undo {
+    fn make(&mut self, folder: &Path) -> std::io::Result<()> {
+        let missing: Vec<PathBuf> =
+            folder.ancestors().take_while(|f| !f.as_os_str().is_empty() && !f.exists()).map(Path::to_owned).collect();
+        std::fs::create_dir_all(folder)?;
+        self.folders.extend(missing.into_iter().rev());
+        Ok(())
+    }
+}
+
+impl Drop for Undo {
+    fn drop(&mut self) {
+        if self.done {
+            return;
+        }
+        // What cannot be removed stays; the error that led here is reported.
+        for file in &self.files {
+            let _ = std::fs::remove_file(file);
+        }
+        for folder in self.folders.iter().rev() {
+            let _ = std::fs::remove_dir(folder);
+        }
+    }
+}
