@@ -109,7 +109,8 @@ pub fn energy_by_slice(
             let Some(K_e) = K_e else { continue };
             let energy = u.transpose() * K_e * &u;
             let energy = Loads::from_fn(|i, j| energy[(i, j)]);
-            let shares = volume_fractions(block.kind, &x, planes).unwrap_or_else(|_| vec![1.0; 1]);
+            // Inverted elements were refused when the model was assembled.
+            let Ok(shares) = volume_fractions(block.kind, &x, planes) else { continue };
             for (slice, share) in slices.iter_mut().zip(shares) {
                 *slice += energy * share;
             }
@@ -122,7 +123,7 @@ pub fn energy_by_slice(
 /// block symmetric there. For a straight uniform beam, the middle.
 ///
 /// ```text
-/// C_tr(S) = C_tr(B) + [p_BS... ]x C_rr,   skew part of C_tr(S) = 0:   three equations for S
+/// C_tr(S) = C_tr(B) - [p_BS]x C_rr,   skew part of C_tr(S) = 0:   three equations for S
 /// ```
 /// Source: Lončarić (1987), normal forms of stiffness and compliance matrices.
 pub fn centre_of_compliance(C: &Matrix6<f64>, p_B: &Vector3<f64>) -> Option<Vector3<f64>> {

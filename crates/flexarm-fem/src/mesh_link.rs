@@ -22,7 +22,7 @@ use crate::model::{AssemblyError, AssemblyOptions, FeModel, materials};
 use crate::reduced::{ElasticSplit, LinkDetails, Provenance, ReducedLink};
 use crate::reduction::{
     Condensation, CondensationOptions, Interface, InterfaceFrame, ReductionError, SolverFigures, Superelement,
-    spd_inverse, stiffness12,
+    spd_inverse, stiffness12, worst,
 };
 use crate::rigid_part::RigidPart;
 use crate::sparse::{Modes, ModesError, ModesWanted};
@@ -225,7 +225,12 @@ pub fn reduce_mesh(
     attach(&plan.attached, &mut link, &mut chains)?;
     warnings.extend(gate.warnings());
     warnings.extend(implausible(mesh, &whole, &held_modes));
-    link.details = Some(Box::new(LinkDetails { superelement: Some(superelement), chains, gate: Some(gate) }));
+    link.details = Some(Box::new(LinkDetails {
+        superelement: Some(superelement),
+        chains,
+        attached: plan.attached.clone(),
+        gate: Some(gate),
+    }));
     warnings.extend(link.warnings(&plan.limits));
     let solves = fixed_modes.solves + held_modes.solves + condensation.figures().static_solves;
     let solver = condensation.figures();
@@ -328,7 +333,6 @@ fn gate(
     held: &Modes,
     quality: ElementQuality,
 ) -> MeshGate {
-    let worst = |values: Vec<f64>| values.into_iter().fold(0.0, f64::max);
     let from_matrix = condensed_body(element);
     let size = link.p_AB().norm().max(f64::MIN_POSITIVE);
     let inertia = |part: &RigidPart| part.spatial_inertia().fixed_view::<3, 3>(3, 3).into_owned();
@@ -350,14 +354,14 @@ fn gate(
     MeshGate {
         dofs: condensation.figures().dofs,
         asymmetry: condensation.asymmetry(),
-        rigid_body_residual: link.checks.rigid_body_residual.unwrap_or(0.0).max(rigid_residual(element)),
+        rigid_body_residual: worst([link.checks.rigid_body_residual.unwrap_or(0.0), rigid_residual(element)]),
         block_identity: link.checks.block_identity.unwrap_or(0.0),
         zero_modes: free.iter().take_while(|hz| **hz < 1e-3 * first_elastic).count(),
         mass_error: (from_matrix.mass / whole.mass - 1.0).abs(),
         com_error_m: (from_matrix.com - whole.com).norm(),
         inertia_error: (inertia(&from_matrix) - inertia(whole)).amax() / scale.max(whole.mass * size * size * 1e-6),
         condition: condensation.condition_estimate(),
-        mode_residual: worst(condensation.mode_residuals(fixed)),
+        mode_residual: worst(condensation.mode_residuals(fixed).into_iter().chain(condensation.mode_residuals(held))),
         fixed_frequencies_hz: fixed.frequencies_hz(),
         modes: rows.collect(),
         quality,
@@ -369,15 +373,15 @@ fn rigid_residual(element: &Superelement) -> f64 {
     let n = element.boundary();
     let R = rigid_motions(element);
     let s = element.K.diagonal().map(|k| k.max(0.0).sqrt());
-    let mut worst = 0.0_f64;
+    let mut largest = 0.0_f64;
     for m in 0..6 {
         let size: f64 = (0..n).map(|k| s[k] * R[(k, m)].abs()).sum();
         for i in 0..n {
             let force: f64 = (0..n).map(|k| element.K[(i, k)] * R[(k, m)]).sum();
-            worst = worst.max(force.abs() / (s[i] * size));
+            largest = worst([largest, force.abs() / (s[i] * size)]);
         }
     }
-    worst
+    largest
 }
 
 /// Rigid motions of the interfaces about the middle of the first two.

@@ -11,7 +11,7 @@ mod scatter;
 use nalgebra::{DMatrix, Vector3};
 
 use crate::beam::Beam;
-use crate::element::{ElementWorkspace, Quadrature};
+use crate::element::{ElementWorkspace, Quadrature, check_solid_material};
 use crate::error::FemError;
 use crate::material::Material;
 use crate::mesh::{ElementBlock, Mesh, Region};
@@ -146,12 +146,9 @@ pub fn materials(mesh: &Mesh, options: &AssemblyOptions) -> Result<Vec<Material>
         let material = material.ok_or_else(|| AssemblyError::NoMaterial { region: region.name.clone() })?;
         let property = |source| AssemblyError::Property { region: region.name.clone(), source: Box::new(source) };
         material.check().map_err(property)?;
-        if let Some(found) = material.G.filter(|G| (G * 2.0 * (1.0 + material.nu) / material.E - 1.0).abs() > 1e-3) {
-            return Err(property(FemError::OutOfRange {
-                what: "shear modulus G (Pa) of an isotropic material".into(),
-                found,
-                allowed: format!("E / (2 (1 + nu)) = {:.6e}, or left out", material.E / (2.0 * (1.0 + material.nu))),
-            }));
+        let solid = |block: &ElementBlock| block.region == index && !block.kind.is_beam() && !block.is_empty();
+        if mesh.blocks.iter().any(solid) {
+            check_solid_material(&material).map_err(property)?;
         }
         if material.nu > 0.4999 && mesh.blocks.iter().any(|b| b.region == index && !b.kind.is_beam()) {
             return Err(property(FemError::OutOfRange {

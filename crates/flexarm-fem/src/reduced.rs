@@ -59,6 +59,9 @@ pub struct LinkDetails {
     pub superelement: Option<Superelement>,
     /// Chains of rigid parts, by their number of parts.
     pub chains: Vec<Chain>,
+    /// Bodies that ride on the link (motors, gears): already in the two parts and in the chains, but not in the
+    /// superelement, whose mass is that of the mesh.
+    pub attached: Vec<RigidPart>,
     /// What was checked against the mesh.
     pub gate: Option<MeshGate>,
 }

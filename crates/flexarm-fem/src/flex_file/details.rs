@@ -11,10 +11,10 @@ use super::units::Units;
 use super::write::{numbers, pose_lines, quoted};
 use crate::chain::Chain;
 use crate::error::FemError;
-use crate::gate::{GateLimits, check_matrix6};
+use crate::gate::{GateLimits, check_matrix6, check_matrix12};
 use crate::mesh_gate::MeshGate;
 use crate::reduced::{ElasticSplit, LinkDetails, ReducedLink};
-use crate::reduction::{InterfaceFrame, Superelement, Tie, stiffness12};
+use crate::reduction::{InterfaceFrame, Superelement, Tie, stiffness12, worst};
 
 /// Relative difference that `K_BB` and the superelement may have.
 const AGREEMENT: f64 = 1e-6;
@@ -48,6 +48,11 @@ pub(super) fn write_details(link: &ReducedLink) -> String {
             text += &format!("\n[[chain.part]]\n{}", super::write::inertial(part));
         }
     }
+    for body in &details.attached {
+        text +=
+            "\n[[attached]]                  # rides on the link: in the parts and chains, not in the superelement\n";
+        text += &super::write::inertial(body);
+    }
     if let Some(gate) = details.gate.as_ref().and_then(|gate| toml::to_string(gate).ok()) {
         // Its own tables become tables of [gate].
         let body = gate.replace("\n[[", "\n[[gate.").replace("\n[quality]", "\n[gate.quality]");
@@ -70,7 +75,8 @@ pub(super) fn read_details(
     limits: &GateLimits,
 ) -> Result<(), FlexFileError> {
     let mut details = LinkDetails::default();
-    for (key, found) in [("superelement", root.get("superelement")), ("chain", root.get("chain"))] {
+    for key in ["superelement", "chain", "attached"] {
+        let found = root.get(key);
         if let Some(node) = found.filter(|_| !units.is_si()) {
             let (found, help) = (units.names.clone(), format!("convert the numbers, or leave [{key}] out"));
             return Err(node.fail(FlexErrorKind::Unit, found, "m, N, kg: these tables are in SI only", help));
@@ -81,7 +87,14 @@ pub(super) fn read_details(
     }
     if let Some(node) = root.get("chain") {
         for item in node.list()? {
-            details.chains.push(read_chain(&item, units)?);
+            details.chains.push(read_chain(&item, units, link)?);
+        }
+    }
+    if let Some(node) = root.get("attached") {
+        for item in node.list()? {
+            let body = item.table()?;
+            body.only(&["mass", "com", "inertia"])?;
+            details.attached.push(read_inertial(&item, &body, "an attached body", units)?);
         }
     }
     if let Some(node) = root.get("gate") {
@@ -135,7 +148,13 @@ fn read_superelement(
         return Err(node.fail(FlexErrorKind::WrongSize, found, "as many of both", "is the file cut off?"));
     }
     for (key, A) in [("stiffness", &K), ("mass", &M)] {
-        let gap = (A - A.transpose()).amax() / A.amax().max(f64::MIN_POSITIVE);
+        if let Some(found) = A.diagonal().iter().find(|a| !(**a >= 0.0)) {
+            let expected = format!("a {key} without negative diagonal entries");
+            return Err(node.fail(FlexErrorKind::Link, found.to_string(), expected, ""));
+        }
+        let scale = |i: usize, j: usize| (A[(i, i)] * A[(j, j)]).sqrt().max(f64::MIN_POSITIVE);
+        let place = |(i, j): (usize, usize)| (A[(i, j)] - A[(j, i)]).abs() / scale(i, j);
+        let gap = worst((0..A.nrows()).flat_map(|i| (0..i).map(move |j| (i, j))).map(place));
         if !(gap <= limits.asymmetry) {
             let found = format!("an asymmetry of {gap:.1e}");
             return Err(node.fail(FlexErrorKind::Link, found, format!("a symmetric {key}"), ""));
@@ -157,6 +176,7 @@ fn agrees(element: &Superelement, link: &ReducedLink) -> Result<(), String> {
         }
     }
     let K = stiffness12(element).ok_or("a singular stiffness")?;
+    check_matrix12(&K, &link.p_AB(), &GateLimits::default()).map_err(|error| error.to_string())?;
     let s = link.K_BB.diagonal().map(f64::sqrt);
     let gap = Matrix6::from_fn(|i, j| (K[(6 + i, 6 + j)] - link.K_BB[(i, j)]).abs() / (s[i] * s[j])).amax();
     if gap <= AGREEMENT { Ok(()) } else { Err(format!("a K_BB that differs by {gap:.1e}")) }
@@ -180,7 +200,7 @@ fn read_dense(table: &Table<'_, '_>, key: &str, smallest: usize) -> Result<DMatr
     Ok(A)
 }
 
-fn read_chain(node: &Node<'_, '_>, units: &Units) -> Result<Chain, FlexFileError> {
+fn read_chain(node: &Node<'_, '_>, units: &Units, link: &ReducedLink) -> Result<Chain, FlexFileError> {
     let table = node.table()?;
     table.only(&["joint", "part"])?;
     let (mut joints, mut parts) = (Vec::new(), Vec::new());
@@ -209,5 +229,27 @@ fn read_chain(node: &Node<'_, '_>, units: &Units) -> Result<Chain, FlexFileError
         let error = node.fail(FlexErrorKind::WrongSize, found, "one part more than joints", "is the file cut off?");
         return Err(FlexFileError { source: Some(Box::new(cause)), ..error });
     }
-    Ok(Chain { joints, parts })
+    let chain = Chain { joints, parts };
+    let same = "the compliance and the mass of the link";
+    chain_agrees(&chain, link)
+        .map_err(|found| node.fail(FlexErrorKind::Link, found, same, "was one of them edited?"))?;
+    Ok(chain)
+}
+
+/// The joints of a chain add up to the 6×6 of its link, its parts to the mass of the two parts.
+fn chain_agrees(chain: &Chain, link: &ReducedLink) -> Result<(), String> {
+    let p_LB = link.X_LB.translation.vector;
+    let (Some(sum), Ok(C)) = (chain.tip_compliance(&p_LB), link.tip_compliance()) else {
+        return Err("a joint without compliance".into());
+    };
+    let s = C.diagonal().map(f64::sqrt);
+    let gap = Matrix6::from_fn(|i, j| (sum[(i, j)] - C[(i, j)]).abs() / (s[i] * s[j])).amax();
+    if !(gap <= AGREEMENT) {
+        return Err(format!("joints whose compliance differs from that of the link by {gap:.1e}"));
+    }
+    let mass: f64 = chain.parts.iter().map(|part| part.mass).sum();
+    if !((mass / link.mass() - 1.0).abs() <= AGREEMENT) {
+        return Err(format!("parts of {mass} kg in a link of {} kg", link.mass()));
+    }
+    Ok(())
 }

@@ -84,6 +84,7 @@ pub fn parse_flex_with(text: &str, origin: &str, limits: &GateLimits) -> Result<
         "checks",
         "superelement",
         "chain",
+        "attached",
         "gate",
         "part",
     ])?;

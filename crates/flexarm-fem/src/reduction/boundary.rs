@@ -111,6 +111,15 @@ impl Boundary {
     /// # Errors
     /// [`TieError`].
     pub fn tie(model: &FeModel, interfaces: &[Interface]) -> Result<Self, TieError> {
+        // Nodes without an element have no DoF and no say; a node counts once.
+        let used = |interface: &Interface| {
+            let has_dofs = |node: &u32| !model.dofs.of(*node as usize).is_empty();
+            let mut nodes: Vec<u32> = interface.nodes.iter().copied().filter(has_dofs).collect();
+            nodes.sort_unstable();
+            nodes.dedup();
+            Interface { nodes, ..interface.clone() }
+        };
+        let interfaces: &[Interface] = &interfaces.iter().map(used).collect::<Vec<_>>();
         check(model, interfaces)?;
         let (mut rigid, mut means) = (Vec::new(), Vec::new());
         let mut is_free = vec![true; model.size()];
@@ -188,7 +197,7 @@ fn check(model: &FeModel, interfaces: &[Interface]) -> Result<(), TieError> {
         if interfaces[..index].iter().any(|other| other.name == interface.name) {
             return Err(TieError::SameName { name: interface.name.clone() });
         }
-        if !interface.nodes.iter().any(|node| !model.dofs.of(*node as usize).is_empty()) {
+        if interface.nodes.is_empty() {
             return Err(TieError::Empty { interface: interface.name.clone() });
         }
         for node in &interface.nodes {

@@ -11,6 +11,10 @@ use crate::sparse::{
     smallest_modes,
 };
 
+/// A pivot this far below its diagonal entry is rounding: a mechanism that passed by its sign. Links of
+/// a thousand times their thickness stay above 1e-10.
+const SINGULAR: f64 = 1e-12;
+
 /// How to solve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct CondensationOptions {
@@ -44,6 +48,11 @@ pub enum ReductionError {
         /// Entries of the factor.
         entries: usize,
     },
+    /// An interface after the first can move without force.
+    #[error(
+        "an interface after the first one can move without force: is it on the same part of the mesh as the others?"
+    )]
+    FreeInterface,
     /// Nothing holds the model and no six DoF can.
     #[error("the mesh lies on a line or in a point: nothing holds its rotations")]
     NoGrounding,
@@ -141,6 +150,11 @@ impl<'m> Condensation<'m> {
             NotPositiveDefinite::OutOfMemory { entries } => ReductionError::OutOfMemory { entries },
         })?;
         drop(K_ii);
+        let (pivot, unknown) = factor.smallest_pivot();
+        if !(pivot > SINGULAR) {
+            let (node, component) = model.dofs.node_of(solved[unknown] as usize);
+            return Err(ReductionError::Loose { node, component: crate::error::COMPONENTS[component] });
+        }
         let columns = boundary.columns();
         let empty = DMatrix::zeros(0, 0);
         let mut this = Self {
@@ -156,13 +170,20 @@ impl<'m> Condensation<'m> {
             tip: empty,
         };
         this.saddle = this.saddle_of(rigid);
-        this.T = this.static_shapes(columns);
+        let (T, lambda) = this.static_shapes(columns);
+        this.T = T;
         let KT = this.model.K.product(&this.T);
-        let K_g = gram(&this.T, &KT);
-        let place = |(i, j): (usize, usize)| (K_g[(i, j)] - K_g[(j, i)]).abs() / (K_g[(i, i)] * K_g[(j, j)]).sqrt();
+        // The energy is symmetric whatever T is; the forces on the interfaces are so only if T solves the equations.
+        let mut forces = gram(&this.boundary.rigid_part(), &KT);
+        for ((column, _), row) in this.boundary.means().iter().zip(lambda.row_iter()) {
+            let mut force = forces.row_mut(*column);
+            force -= row;
+        }
+        this.K_g = symmetric(gram(&this.T, &KT));
+        let d = this.K_g.diagonal();
+        let place = |(i, j): (usize, usize)| (forces[(i, j)] - forces[(j, i)]).abs() / (d[i] * d[j]).sqrt();
         let pairs = (0..columns).flat_map(|i| (0..i).map(move |j| (i, j)));
-        this.asymmetry = pairs.map(place).fold(0.0, f64::max);
-        this.K_g = symmetric(K_g);
+        this.asymmetry = worst(pairs.map(place));
         this.M_g = symmetric(gram(&this.T, &this.model.M.product(&this.T)));
         this.tip = this.tip_compliance()?;
         Ok(this)
@@ -214,8 +235,11 @@ impl<'m> Condensation<'m> {
     }
 
     /// Solves `K u + Gᵀ λ = F` on the free DoF with `G u = g`; tied DoF are zero. F is replaced by u.
-    fn solve_constrained(&self, F: &mut DMatrix<f64>, g: Option<&DMatrix<f64>>) {
+    ///
+    /// Returns λ, one row per constrained boundary DoF.
+    fn solve_constrained(&self, F: &mut DMatrix<f64>, g: Option<&DMatrix<f64>>) -> DMatrix<f64> {
         let width = F.ncols();
+        let mut forces = DMatrix::zeros(0, width);
         let mut y = DMatrix::from_fn(self.solved.len(), width, |k, j| F[(self.solved[k] as usize, j)]);
         self.factor.solve_in_place(&mut y);
         let mut motion = None;
@@ -233,6 +257,7 @@ impl<'m> Condensation<'m> {
             if saddle.small.solve_mut(&mut right) {
                 let lambda = right.rows(0, m).into_owned();
                 add_product(&mut y, -1.0, &saddle.Z, &lambda);
+                forces = lambda;
                 motion = saddle.rigid.as_ref().map(|R| (R, right.rows(m, 6) * saddle.scale));
             } else {
                 y.fill(f64::NAN);
@@ -247,15 +272,16 @@ impl<'m> Condensation<'m> {
         if let Some((R, a)) = motion {
             add_product(F, 1.0, R, &a);
         }
+        forces
     }
 
-    fn static_shapes(&self, columns: usize) -> DMatrix<f64> {
+    fn static_shapes(&self, columns: usize) -> (DMatrix<f64>, DMatrix<f64>) {
         let B = self.boundary.rigid_part();
         let mut X = -self.model.K.product(&B);
         let means = self.boundary.means();
         let g = DMatrix::from_fn(means.len(), columns, |k, j| if means[k].0 == j { 1.0 } else { 0.0 });
-        self.solve_constrained(&mut X, Some(&g));
-        X + B
+        let lambda = self.solve_constrained(&mut X, Some(&g));
+        (X + B, lambda)
     }
 
     fn tip_compliance(&self) -> Result<DMatrix<f64>, ReductionError> {
@@ -264,8 +290,7 @@ impl<'m> Condensation<'m> {
             return Ok(DMatrix::zeros(0, 0));
         }
         let K = self.K_g.view((6, 6), (n - 6, n - 6)).into_owned();
-        let loose = ReductionError::Loose { node: 0, component: "an interface that holds nothing" };
-        spd_inverse(&K).ok_or(loose)
+        spd_inverse(&K).ok_or(ReductionError::FreeInterface)
     }
 
     /// The model that was reduced.
@@ -319,7 +344,9 @@ impl<'m> Condensation<'m> {
     /// [`ModesError`].
     pub fn fixed_modes(&self, wanted: ModesWanted) -> Result<Modes, ModesError> {
         let dimension = self.boundary.free().len() - self.boundary.means().len();
-        let mut solve = |F: &mut DMatrix<f64>| self.solve_constrained(F, None);
+        let mut solve = |F: &mut DMatrix<f64>| {
+            self.solve_constrained(F, None);
+        };
         smallest_modes(self.model.size(), dimension, wanted, &mut solve, &mut |X, Y| self.model.M.product_into(X, Y))
     }
 
@@ -364,7 +391,8 @@ impl<'m> Condensation<'m> {
         -(self.tip.row(i - 6) * K_BA)[(0, 0)]
     }
 
-    /// Residual `‖K φ - ω² M φ + Gᵀ λ‖ / ‖ω² M φ‖` of each mode over the free DoF, as the mesh says it.
+    /// Residual `‖K φ - ω² M φ + Gᵀ λ‖ / ‖ω² M φ‖` of each mode over the free DoF, as the mesh says it; for modes
+    /// under any support.
     pub fn mode_residuals(&self, modes: &Modes) -> Vec<f64> {
         let K = self.model.K.product(&modes.shapes);
         let M = self.model.M.product(&modes.shapes);
@@ -437,10 +465,11 @@ impl<'m> Condensation<'m> {
         let mut stiff = DMatrix::from_fn(rows, 1, |i, _| if (i * 2_654_435_761) & 64 == 0 { 1.0 } else { -1.0 });
         let mut soft = DMatrix::from_element(rows, 1, 1.0);
         let (mut largest, mut smallest) = (0.0, 1.0);
+        inside(&mut stiff);
         for _ in 0..20 {
-            inside(&mut stiff);
             stiff /= stiff.norm();
             stiff = self.model.K.product(&stiff);
+            inside(&mut stiff);
             largest = stiff.norm();
         }
         for _ in 0..5 {
@@ -461,13 +490,18 @@ impl<'m> Condensation<'m> {
             dofs: self.model.size(),
             factor: self.factor.figures(),
             static_solves: self.boundary.columns() + self.boundary.means().len(),
-            smallest_pivot: self.factor.smallest_pivot(),
+            smallest_pivot: self.factor.smallest_pivot().0,
         }
     }
 }
 
 fn apply_rows(rows: &[Vec<(u32, f64)>], X: &DMatrix<f64>) -> DMatrix<f64> {
     DMatrix::from_fn(rows.len(), X.ncols(), |k, j| rows[k].iter().map(|(at, w)| w * X[(*at as usize, j)]).sum())
+}
+
+/// The largest of some measures; a NaN among them stays.
+pub(crate) fn worst(values: impl IntoIterator<Item = f64>) -> f64 {
+    values.into_iter().fold(0.0, |worst: f64, x| if !(x <= worst) { x } else { worst })
 }
 
 fn symmetric(A: DMatrix<f64>) -> DMatrix<f64> {

@@ -25,5 +25,5 @@ pub use boundary::{Boundary, Interface, Tie, TieError};
 pub use condensation::{Condensation, CondensationOptions, ReductionError, SolverFigures};
 pub use superelement::{InterfaceFrame, Superelement, stiffness12};
 
-pub(crate) use condensation::spd_inverse;
+pub(crate) use condensation::{spd_inverse, worst};
 pub(crate) use superelement::generalised_frequencies;

@@ -66,6 +66,7 @@ impl fmt::Display for NotPositiveDefinite {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Pivot { unknown } => write!(f, "the matrix is not positive definite (pivot of unknown {unknown})"),
+            Self::OutOfMemory { entries: 0 } => write!(f, "the factor is too large to be counted"),
             Self::OutOfMemory { entries } => write!(f, "no memory for a factor of {entries} entries"),
         }
     }
@@ -77,6 +78,7 @@ pub struct Cholesky {
     values: Vec<f64>,
     figures: FactorFigures,
     threads: Threads,
+    smallest_pivot: (f64, usize),
 }
 
 impl fmt::Debug for Cholesky {
@@ -114,11 +116,14 @@ impl Cholesky {
         );
         if let Err(error) = factor {
             let LltError::NonPositivePivot { index } = error;
+            // faer counts from 0 in some of its kernels and from 1 in others.
+            let index = index.min(n - 1);
             let order = symbolic.perm().map(|perm| perm.arrays().0);
             return Err(NotPositiveDefinite::Pivot { unknown: order.map_or(index, |order| order[index] as usize) });
         }
         let figures = FactorFigures { size: n, matrix_entries: K.stored(), factor_entries: entries, ordering };
-        Ok(Self { symbolic, values, figures, threads })
+        let smallest_pivot = smallest_pivot(&symbolic, &values, &K.diagonal());
+        Ok(Self { symbolic, values, figures, threads, smallest_pivot })
     }
 
     /// Size and cost.
@@ -126,27 +131,11 @@ impl Cholesky {
         self.figures
     }
 
-    /// Smallest pivot `L_jj²` over the largest: near rounding where the matrix is all but singular.
-    pub fn smallest_pivot(&self) -> f64 {
-        let (mut low, mut high) = (f64::INFINITY, 0.0_f64);
-        let mut see = |diagonal: f64| {
-            low = low.min(diagonal * diagonal);
-            high = high.max(diagonal * diagonal);
-        };
-        match self.symbolic.raw() {
-            SymbolicCholeskyRaw::Simplicial(raw) => {
-                raw.col_ptr()[..self.figures.size].iter().for_each(|at| see(self.values[*at as usize]))
-            }
-            SymbolicCholeskyRaw::Supernodal(raw) => {
-                for s in 0..raw.n_supernodes() {
-                    let columns = (raw.supernode_end()[s] - raw.supernode_begin()[s]) as usize;
-                    let values = raw.col_ptr_for_val()[s] as usize..raw.col_ptr_for_val()[s + 1] as usize;
-                    let rows = values.len().checked_div(columns).unwrap_or(0);
-                    (0..columns).for_each(|k| see(self.values[values.start + k * rows + k]));
-                }
-            }
-        }
-        low / high
+    /// Smallest pivot `L_jj²` over the diagonal entry of the matrix it came from, and its unknown.
+    ///
+    /// Near rounding (1e-16 to 1e-12) where the matrix is singular but passed by the sign of an error.
+    pub fn smallest_pivot(&self) -> (f64, usize) {
+        self.smallest_pivot
     }
 
     /// Replaces `B` by `K⁻¹ B`.
@@ -167,6 +156,36 @@ impl Cholesky {
             MemStack::new(&mut memory),
         );
     }
+}
+
+/// Over the unknowns: `L_jj² / K_jj`, smallest, with its unknown.
+fn smallest_pivot(symbolic: &SymbolicCholesky<u32>, values: &[f64], diagonal: &[f64]) -> (f64, usize) {
+    let order = symbolic.perm().map(|perm| perm.arrays().0);
+    let mut smallest = (f64::INFINITY, 0);
+    let mut see = |column: usize, L_jj: f64| {
+        let unknown = order.map_or(column, |order| order[column] as usize);
+        let ratio = L_jj * L_jj / diagonal[unknown];
+        // A NaN counts as the smallest of all.
+        if !(ratio >= smallest.0) {
+            smallest = (ratio, unknown);
+        }
+    };
+    match symbolic.raw() {
+        SymbolicCholeskyRaw::Simplicial(raw) => {
+            (0..diagonal.len()).for_each(|j| see(j, values[raw.col_ptr()[j] as usize]));
+        }
+        SymbolicCholeskyRaw::Supernodal(raw) => {
+            for s in 0..raw.n_supernodes() {
+                let columns = raw.supernode_begin()[s] as usize..raw.supernode_end()[s] as usize;
+                let block = raw.col_ptr_for_val()[s] as usize..raw.col_ptr_for_val()[s + 1] as usize;
+                let rows = block.len().checked_div(columns.len()).unwrap_or(0);
+                for (k, column) in columns.enumerate() {
+                    see(column, values[block.start + k * rows + k]);
+                }
+            }
+        }
+    }
+    smallest
 }
 
 fn analyse(

@@ -126,11 +126,22 @@ pub fn smallest_modes(
     }
     let mut basis = Basis::new(rows, BLOCK.min(dimension));
     basis.start(solve, mass)?;
+    if basis.exhausted {
+        // No vector has mass.
+        return Err(ModesError::NotFinite);
+    }
     let limit = dimension.min(8 * count + 120);
+    let mut steps = 0;
     loop {
         basis.advance(solve, mass)?;
-        let ritz = basis.ritz();
+        steps += 1;
         let full = basis.len() >= limit || basis.exhausted;
+        // The small eigenproblem grows with the cube of the basis: not after every step of a large one.
+        let asked = basis.len() >= count.min(BLOCK * 4) && (basis.len() < 150 || steps % 5 == 0);
+        if !(asked || full) {
+            continue;
+        }
+        let ritz = basis.ritz();
         if let Some(found) = ritz.settled(count, wanted, basis.exhausted)? {
             let shapes = basis.shapes(&ritz, found);
             let omega2 = ritz.theta[..found].iter().map(|theta| 1.0 / theta).collect();
@@ -432,6 +443,16 @@ mod tests {
         assert_eq!(modes.len(), 17);
         let refused = modes_of(&K, ModesWanted::Below { omega2: bound, at_most: 5 });
         assert_eq!(refused.unwrap_err(), ModesError::TooMany { at_most: 5 });
+    }
+
+    /// A mass that is zero wherever the body can move: an error, not a panic.
+    #[test]
+    fn a_body_without_mass_has_no_modes() {
+        let (K, _) = chain(20, 1);
+        let factor = Cholesky::new(&K, Ordering::MinimumDegree, Threads(1)).unwrap();
+        let mut solve = |F: &mut DMatrix<f64>| factor.solve_in_place(F);
+        let found = smallest_modes(20, 20, ModesWanted::Count(3), &mut solve, &mut |_, Y| Y.fill(0.0));
+        assert_eq!(found.unwrap_err(), ModesError::NotFinite);
     }
 
     #[test]
