@@ -49,7 +49,14 @@ fn main() -> ExitCode {
 fn answer(cli: &Cli, json: impl FnOnce() -> String, text: impl FnOnce() -> String) {
     let out = if cli.json { json() + "\n" } else { text() };
     let mut stdout = std::io::stdout().lock();
-    let _ = stdout.write_all(out.as_bytes()).and_then(|()| stdout.flush());
+    match stdout.write_all(out.as_bytes()).and_then(|()| stdout.flush()) {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+            // An answer that is lost must not look like one that was given.
+            eprintln!("error: standard output cannot be written: {error}");
+            std::process::exit(1);
+        }
+        _ => {}
+    }
 }
 
 fn to_json(value: &impl serde::Serialize) -> String {

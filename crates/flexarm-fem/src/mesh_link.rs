@@ -115,6 +115,25 @@ pub enum MeshLinkError {
     /// The gate refused the result.
     #[error(transparent)]
     Gate(Box<FemError>),
+    /// Elements of different kinds that meet without fitting.
+    #[error(
+        "{count} pair(s) of elements meet without fitting: {list}; the faces gape or overlap; use one order of \
+         elements, and wedges or one kind where tetrahedra meet bricks"
+    )]
+    Misfit {
+        /// How many.
+        count: usize,
+        /// The first ones.
+        list: String,
+    },
+    /// A split that leaves nothing on one side.
+    #[error("the cut through the elastic joint at ({:.6}, {:.6}, {:.6}) m: {source}; choose another place for the split", p[0], p[1], p[2])]
+    Split {
+        /// The split point, link axes.
+        p: [f64; 3],
+        /// Why.
+        source: CutError,
+    },
     /// Parts of the mesh that hang on no interface.
     #[error(
         "the mesh falls into {parts} parts that share no node: {list}; only one may remain; \
@@ -177,6 +196,7 @@ pub fn reduce_mesh(
     step: &mut dyn FnMut(ReductionStep),
 ) -> Result<MeshReduction, MeshLinkError> {
     check_connected(mesh)?;
+    check_fit(mesh)?;
     // Frames in other units are refused before the work, not after it.
     if let [a, b, ..] = plan.interfaces.as_slice() {
         LinkFrames::new(a.X_LI, b.X_LI).check()?;
@@ -237,6 +257,19 @@ pub fn reduce_mesh(
     Ok(MeshReduction { link, whole, solver, unit_loads, fixed_modes, held_modes, bare_chains, solves, warnings })
 }
 
+fn check_fit(mesh: &Mesh) -> Result<(), MeshLinkError> {
+    let misfits = crate::mesh::misfits(mesh);
+    if misfits.is_empty() {
+        return Ok(());
+    }
+    let one = |m: &crate::mesh::Misfit| format!("{} and {} ({})", m.first, m.second, m.why);
+    let mut list: Vec<String> = misfits.iter().take(5).map(one).collect();
+    if misfits.len() > 5 {
+        list.push("...".into());
+    }
+    Err(MeshLinkError::Misfit { count: misfits.len(), list: list.join(", ") })
+}
+
 fn check_connected(mesh: &Mesh) -> Result<(), MeshLinkError> {
     let parts = crate::mesh::connected_parts(mesh);
     if parts.len() < 2 {
@@ -272,7 +305,8 @@ fn split(
     };
     let (p_LS, said) = split_point(&frames, K12, at, &|p| parts(p).is_ok());
     warnings.extend(said);
-    Ok((frames.with_split(Pose::translation(p_LS.x, p_LS.y, p_LS.z)), parts(p_LS)?))
+    let parts = parts(p_LS).map_err(|source| MeshLinkError::Split { p: p_LS.into(), source })?;
+    Ok((frames.with_split(Pose::translation(p_LS.x, p_LS.y, p_LS.z)), parts))
 }
 
 /// Merges bodies into the parts on whose side of the joints they lie.

@@ -23,6 +23,8 @@ pub(super) struct Dmig {
 
 struct RawMatrix<'a> {
     name: String,
+    /// IFO 2 or 9: rows and columns are different things, even where their numbers are the same.
+    is_rectangular: bool,
     header: Place<'a>,
     entries: Vec<(DofLabel, DofLabel, f64, Place<'a>)>,
 }
@@ -41,7 +43,8 @@ pub(super) fn parse(text: Text<'_>) -> Result<Dmig, ExchangeError> {
                     None => {
                         check_header(&card, &name)?;
                         index.insert(name.clone(), matrices.len());
-                        matrices.push(RawMatrix { name, header: card.place, entries: Vec::new() });
+                        let is_rectangular = matches!(card.field(2), "2" | "9");
+                        matrices.push(RawMatrix { name, is_rectangular, header: card.place, entries: Vec::new() });
                     }
                     Some(i) => parse_column(&card, &mut matrices[*i])?,
                 }
@@ -143,14 +146,14 @@ fn parse_grid(card: &Card<'_>, result: &mut Dmig) -> Result<(), ExchangeError> {
 
 /// The symmetric matrix, or a sentence why it can be none.
 fn assemble(raw: RawMatrix<'_>, text: Text<'_>) -> Result<Result<LabelledMatrix, String>, ExchangeError> {
-    let RawMatrix { name, header, entries } = raw;
+    let RawMatrix { name, is_rectangular, header, entries } = raw;
     let rows: BTreeSet<DofLabel> = entries.iter().map(|(row, ..)| *row).collect();
     let columns: BTreeSet<DofLabel> = entries.iter().map(|(_, column, ..)| *column).collect();
     if entries.is_empty() {
         return Ok(Err(format!("DMIG {name} (line {}) has no entries", header.line.unwrap_or(0))));
     }
     // Columns that are numbers instead of grids: loads and other rectangular matrices.
-    if rows.is_disjoint(&columns) {
+    if is_rectangular || rows.is_disjoint(&columns) {
         return Ok(Err(format!("DMIG {name} is rectangular and was left out")));
     }
     // Grids first, scalar points (modal coordinates) after them, each in rising order.
@@ -258,6 +261,13 @@ DMIG*,KAAX,12,0,
         let loads = "DMIG,PAX,0,9,2,0,,,2\nDMIG,PAX,1,0,,11,1,5.\nDMIG,PAX,2,0,,11,2,6.\n";
         let dmig = parse(Text::new(loads, "t.pch")).unwrap();
         assert!(dmig.matrices.is_empty() && dmig.warnings[0].contains("PAX is rectangular"));
+        // Scalar points 1 and 2 loaded by columns 1 and 2: the same labels, but no symmetric matrix.
+        for form in [2, 9] {
+            let scalar =
+                format!("DMIG,KPAX,0,{form},2,0,,,2\nDMIG,KPAX,1,0,,1,0,5.,\n,2,0,7.\nDMIG,KPAX,2,0,,2,0,6.\n");
+            let dmig = parse(Text::new(&scalar, "t.pch")).unwrap();
+            assert!(dmig.matrices.is_empty() && dmig.warnings[0].contains("KPAX is rectangular"), "{form}: {dmig:?}");
+        }
     }
 
     #[test]

@@ -2,6 +2,7 @@
 //!
 //! The default `.npz` holds pickled Python objects, which no other program reads.
 
+use std::cell::Cell;
 use std::collections::BTreeMap;
 
 use hdf5_pure::File;
@@ -9,6 +10,7 @@ use nalgebra::Vector3;
 
 use super::error::{ExchangeError, ExchangeErrorKind, Place};
 use super::matrix::{DofLabel, LabelledMatrix, Storage, Triplets};
+use super::text::LARGEST_UNPACKED;
 
 /// What a file of Exudyn holds; nodes are counted from 0, as Exudyn does.
 pub(super) struct Exudyn {
@@ -22,6 +24,8 @@ pub(super) struct Exudyn {
 struct Reader<'a> {
     file: File,
     size: usize,
+    /// Bytes that may still be read: several names may stand for the same data.
+    left: Cell<u64>,
     place: Place<'a>,
 }
 
@@ -31,7 +35,8 @@ pub(super) fn parse(bytes: &[u8], origin: &str) -> Result<Exudyn, ExchangeError>
     let syntax = |error: hdf5_pure::Error| {
         place.fail(ExchangeErrorKind::Syntax, "file", error.to_string(), "HDF5", "is the file cut off?")
     };
-    let reader = Reader { file: File::from_bytes(bytes.to_vec()).map_err(syntax)?, size: bytes.len(), place };
+    let file = File::from_bytes(bytes.to_vec()).map_err(syntax)?;
+    let reader = Reader { file, size: bytes.len(), left: Cell::new(LARGEST_UNPACKED), place };
     let points = reader.reals("nodes/Position")?;
     if points.is_empty() || !points.len().is_multiple_of(3) {
         let found = format!("{} numbers", points.len());
@@ -54,13 +59,24 @@ impl Reader<'_> {
         self.place.fail(ExchangeErrorKind::Syntax, what, found, expected, help)
     }
 
-    /// A data set whose size the file can have: packed data grow at most a thousandfold.
+    /// A data set whose size the file can have: packed data grow at most a thousandfold, and all
+    /// that is read stays below [`LARGEST_UNPACKED`].
     fn dataset(&self, name: &str) -> Result<hdf5_pure::Dataset, ExchangeError> {
         let wrong = |error: hdf5_pure::Error| self.fail(name, error.to_string(), "this data set");
         let dataset = self.file.dataset(name).map_err(wrong)?;
-        let count = dataset.shape().map_err(wrong)?.iter().try_fold(1_u64, |product, n| product.checked_mul(*n));
-        if count.is_none_or(|count| count > 1000 * self.size as u64) {
+        let (shape, width) = (dataset.shape().map_err(wrong)?, dataset.element_size().map_err(wrong)?);
+        let count = shape.iter().try_fold(1_u64, |product, n| product.checked_mul(*n));
+        let bytes = |width| count.and_then(|count| count.checked_mul(width));
+        if bytes(width).is_none_or(|bytes| bytes > 1100 * self.size as u64) {
             return Err(self.fail(name, "more numbers than the file can hold", "its own size"));
+        }
+        // Numbers become 8 bytes each, however short they are in the file.
+        match bytes(width.max(8)).and_then(|bytes| self.left.get().checked_sub(bytes)) {
+            Some(left) => self.left.set(left),
+            None => {
+                let expected = format!("at most {LARGEST_UNPACKED} bytes in all data sets");
+                return Err(self.fail(name, format!("{shape:?} numbers"), &expected));
+            }
         }
         Ok(dataset)
     }
@@ -124,5 +140,40 @@ impl Reader<'_> {
             inside.then(|| (name.unwrap_or_else(|| format!("set {i}")), numbers))
         };
         (0..MOST_SETS).map_while(set).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_more_is_read_than_the_limit_in_all_data_sets_together() {
+        let mut builder = hdf5_pure::FileBuilder::new();
+        builder.create_dataset("numbers").with_f64_data(&[1.0; 100]);
+        builder.create_dataset("short").with_i32_data(&[1; 100]);
+        let bytes = builder.finish().unwrap();
+        let reader = |left| Reader {
+            file: File::from_bytes(bytes.clone()).unwrap(),
+            size: bytes.len(),
+            left: Cell::new(left),
+            place: Place::file("t.hdf5"),
+        };
+        let read = reader(1600);
+        assert_eq!((read.reals("numbers").unwrap().len(), read.integers("short").unwrap().len()), (100, 100));
+        let error = read.reals("numbers").unwrap_err();
+        assert!(error.to_string().contains("at most 2147483648 bytes in all data sets"), "{error}");
+        assert!(reader(799).integers("short").is_err());
+    }
+
+    #[test]
+    fn a_size_that_the_file_cannot_hold_is_refused() {
+        let mut builder = hdf5_pure::FileBuilder::new();
+        builder.create_dataset("numbers").with_f64_data(&[1.0; 100]);
+        let bytes = builder.finish().unwrap();
+        let file = File::from_bytes(bytes).unwrap();
+        // 800 bytes of a file of which only the size is changed.
+        let small = Reader { file, size: 0, left: Cell::new(LARGEST_UNPACKED), place: Place::file("t.hdf5") };
+        assert!(small.reals("numbers").unwrap_err().to_string().contains("than the file can hold"));
     }
 }

@@ -104,56 +104,82 @@ struct Found {
 ///
 /// Files that belong to a given one are read too where they are not given: `.mas` and `.dof` of a
 /// `.sti`, the `.mapping` of a Harwell-Boeing file, the sidecar `.toml` of Matrix Market files and
-/// the matrices that a sidecar names.
+/// the matrices that a sidecar names, also if it was found beside the only given file, which it names.
 ///
 /// # Errors
 /// [`ExchangeError`] with file, line, element, what was found and what was expected.
 pub fn read_matrices<P: AsRef<Path>>(paths: &[P], names: &MatrixNames) -> Result<ImportedMatrices, ExchangeError> {
     let mut files = paths.iter().map(InputFile::open).collect::<Result<Vec<_>, _>>()?;
-    let given: HashSet<PathBuf> = paths.iter().map(|path| path.as_ref().to_owned()).collect();
-    for path in companions(&files, &given)? {
-        files.push(InputFile::open(path)?);
-    }
+    companions(&mut files)?;
     parse_matrices(&files, names)
 }
 
-/// Files beside the given ones that belong to them.
-fn companions(files: &[InputFile], given: &HashSet<PathBuf>) -> Result<Vec<PathBuf>, ExchangeError> {
-    let mut wanted = Vec::new();
-    for file in files {
-        let path = Path::new(&file.origin);
-        let folder = path.parent().unwrap_or(Path::new(""));
-        let full = path.file_name().unwrap_or_default().to_string_lossy();
-        let name = full.strip_suffix(".gz").unwrap_or(&full);
-        let (stem, ending) = name.rsplit_once('.').unwrap_or((name, ""));
-        match recognise(&file.bytes) {
-            Some(MatrixFormat::CoordinateText) if ending == "sti" => {
-                for ending in ["mas", "dof"] {
-                    let plain = folder.join(format!("{stem}.{ending}"));
-                    let packed = folder.join(format!("{stem}.{ending}.gz"));
-                    wanted.push(if plain.exists() { plain } else { packed });
-                }
-            }
-            Some(MatrixFormat::HarwellBoeing) => wanted.push(folder.join(format!("{stem}.mapping"))),
-            Some(MatrixFormat::MatrixMarket) => {
-                let shorter = stem.rsplit_once('_').map_or(stem, |(head, _)| head);
-                let sidecars = [stem, shorter].map(|stem| folder.join(format!("{stem}.toml")));
-                let is_ours = |path: &PathBuf| {
-                    std::fs::read(path).is_ok_and(|bytes| recognise(&bytes) == Some(MatrixFormat::Sidecar))
-                };
-                wanted.extend(sidecars.into_iter().find(is_ours));
-            }
-            Some(MatrixFormat::Sidecar) => {
-                let sidecar = sidecar::parse(Text::new(&String::from_utf8_lossy(&file.bytes), &file.origin))?;
-                wanted.extend(
-                    [Some(sidecar.stiffness), sidecar.mass].into_iter().flatten().map(|name| folder.join(name)),
-                );
-            }
-            _ => {}
+/// Adds the files beside the given ones that belong to them.
+fn companions(files: &mut Vec<InputFile>) -> Result<(), ExchangeError> {
+    // The same file may have several paths.
+    let real = |path: &Path| std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let given = files.len();
+    let mut known: Vec<PathBuf> = files.iter().map(|file| real(Path::new(&file.origin))).collect();
+    let mut next = 0;
+    while let Some(file) = files.get(next) {
+        let mut wanted = wanted_by(file)?;
+        wanted.retain(|(path, _)| path.exists());
+        let is_given = |path: &Path| known[..given].contains(&real(path));
+        // A sidecar that was found counts for the matrices only if it is that of the one given: other
+        // files may be there to replace those that it names.
+        if next >= given && !(given == 1 && wanted.iter().any(|(path, _)| is_given(path))) {
+            wanted.clear();
         }
+        for (path, role) in wanted {
+            let place = known.iter().position(|known| *known == real(&path));
+            let place = match place {
+                Some(place) => place,
+                None => {
+                    files.push(InputFile::open(&path)?);
+                    known.push(real(&path));
+                    files.len() - 1
+                }
+            };
+            files[place].role = files[place].role.or(role);
+        }
+        next += 1;
     }
-    let mut known = given.clone();
-    Ok(wanted.into_iter().filter(|path| path.exists() && known.insert(path.clone())).collect())
+    Ok(())
+}
+
+/// Files that a file may have beside it, and what a sidecar says they are.
+fn wanted_by(file: &InputFile) -> Result<Vec<(PathBuf, Option<MatrixRole>)>, ExchangeError> {
+    let path = Path::new(&file.origin);
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let full = path.file_name().unwrap_or_default().to_string_lossy();
+    let name = full.strip_suffix(".gz").unwrap_or(&full);
+    let (stem, ending) = name.rsplit_once('.').unwrap_or((name, ""));
+    let beside = |name: &str| {
+        let plain = folder.join(name);
+        if plain.exists() { plain } else { folder.join(format!("{name}.gz")) }
+    };
+    let mut wanted = Vec::new();
+    match recognise(&file.bytes) {
+        Some(MatrixFormat::CoordinateText) if ending == "sti" => {
+            wanted.extend(["mas", "dof"].map(|ending| (beside(&format!("{stem}.{ending}")), None)));
+        }
+        Some(MatrixFormat::HarwellBoeing) => wanted.push((folder.join(format!("{stem}.mapping")), None)),
+        Some(MatrixFormat::MatrixMarket) => {
+            let shorter = stem.rsplit_once('_').map_or(stem, |(head, _)| head);
+            let sidecars = [stem, shorter].map(|stem| folder.join(format!("{stem}.toml")));
+            let is_ours = |path: &PathBuf| {
+                std::fs::read(path).is_ok_and(|bytes| recognise(&bytes) == Some(MatrixFormat::Sidecar))
+            };
+            wanted.extend(sidecars.into_iter().find(is_ours).map(|path| (path, None)));
+        }
+        Some(MatrixFormat::Sidecar) => {
+            let sidecar = sidecar::parse(Text::new(&String::from_utf8_lossy(&file.bytes), &file.origin))?;
+            wanted.push((beside(&sidecar.stiffness), Some(MatrixRole::Stiffness)));
+            wanted.extend(sidecar.mass.map(|mass| (beside(&mass), Some(MatrixRole::Mass))));
+        }
+        _ => {}
+    }
+    Ok(wanted)
 }
 
 /// Parses files of one structure that are in memory. Never panics.

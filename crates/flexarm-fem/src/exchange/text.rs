@@ -8,7 +8,7 @@ use flate2::read::MultiGzDecoder;
 use super::error::{ExchangeError, ExchangeErrorKind, Place};
 
 /// No file is unpacked to more than this: a full model of 300 000 unknowns has half of it.
-const LARGEST_UNPACKED: u64 = 2 << 30;
+pub(super) const LARGEST_UNPACKED: u64 = 2 << 30;
 
 /// Whether the bytes are packed with gzip.
 pub(super) fn is_gzip(bytes: &[u8]) -> bool {

@@ -12,6 +12,7 @@
 mod draft;
 mod error;
 mod faces;
+mod fit;
 mod gmsh;
 mod ids;
 mod inp;
@@ -31,6 +32,7 @@ use crate::material::Material;
 use crate::section::Section;
 
 pub use error::{MeshError, MeshErrorKind, Place};
+pub use fit::{Misfit, misfits};
 pub use parts::{Part, connected_parts};
 pub use read::{MeshFile, ReadOptions, parse_mesh, read_mesh};
 pub use select::{SelectError, select};

@@ -79,14 +79,14 @@ pub fn skin(mesh: &Mesh) -> Skin {
 
 /// A face by block, element and number.
 #[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
-struct FaceRef {
-    block: u32,
-    element: u32,
+pub(super) struct FaceRef {
+    pub(super) block: u32,
+    pub(super) element: u32,
     face: u8,
 }
 
 /// Calls with every face and its sorted corners; the fourth of a triangle is the largest number.
-fn for_each_face(blocks: &[ElementBlock], mut call: impl FnMut(FaceRef, [u32; 4])) {
+pub(super) fn for_each_face(blocks: &[ElementBlock], mut call: impl FnMut(FaceRef, [u32; 4])) {
     for (b, block) in (0..).zip(blocks) {
         let faces = face_corners(block.kind);
         for (element, nodes) in (0..).zip(block.elements()) {

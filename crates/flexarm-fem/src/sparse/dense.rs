@@ -24,3 +24,12 @@ pub(crate) fn gram(A: &DMatrix<f64>, B: &DMatrix<f64>) -> DMatrix<f64> {
 pub(crate) fn add_product(C: &mut DMatrix<f64>, factor: f64, A: &DMatrix<f64>, B: &DMatrix<f64>) {
     matmul(view_mut(C), Accum::Add, view(A), view(B), factor, Par::Seq);
 }
+
+/// Eigenvalues, ascending, and eigenvectors of a symmetric matrix; `None` if it is not finite.
+pub(super) fn symmetric_eigen(A: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f64>)> {
+    let eigen = view(A).self_adjoint_eigen(faer::Side::Lower).ok()?;
+    let (S, U) = (eigen.S(), eigen.U());
+    let values: Vec<f64> = (0..A.nrows()).map(|k| S[k]).collect();
+    let vectors = DMatrix::from_fn(A.nrows(), A.nrows(), |i, j| U[(i, j)]);
+    values.iter().all(|x| x.is_finite()).then_some((values, vectors))
+}

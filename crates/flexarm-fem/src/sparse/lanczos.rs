@@ -14,7 +14,7 @@
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
-use super::dense::{add_product, gram};
+use super::dense::{add_product, gram, symmetric_eigen};
 
 /// Residual `‖K⁻¹ M φ - θ φ‖_M / θ` at which a mode counts as found.
 const TOLERANCE: f64 = 1e-10;
@@ -131,17 +131,16 @@ pub fn smallest_modes(
         return Err(ModesError::NotFinite);
     }
     let limit = dimension.min(8 * count + 120);
-    let mut steps = 0;
+    let mut next_look = count.min(dimension);
     loop {
         basis.advance(solve, mass)?;
-        steps += 1;
         let full = basis.len() >= limit || basis.exhausted;
-        // The small eigenproblem grows with the cube of the basis: not after every step of a large one.
-        let asked = basis.len() >= count.min(BLOCK * 4) && (basis.len() < 150 || steps % 5 == 0);
-        if !(asked || full) {
+        // The small eigenproblem grows with the cube of the basis: a larger one is looked at less often.
+        if basis.len() < next_look && !full {
             continue;
         }
-        let ritz = basis.ritz();
+        next_look = basis.len() + (basis.len() / 12).max(1);
+        let ritz = basis.ritz().ok_or(ModesError::NotFinite)?;
         if let Some(found) = ritz.settled(count, wanted, basis.exhausted)? {
             let shapes = basis.shapes(&ritz, found);
             let omega2 = ritz.theta[..found].iter().map(|theta| 1.0 / theta).collect();
@@ -352,21 +351,20 @@ impl Basis {
     }
 
     /// Ritz values, largest θ first.
-    fn ritz(&self) -> Ritz {
-        let eigen = SymmetricEigen::new(self.projected.clone());
-        let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
-        order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
+    fn ritz(&self) -> Option<Ritz> {
+        let (eigenvalues, eigenvectors) = symmetric_eigen(&self.projected)?;
+        let order = (0..eigenvalues.len()).rev();
         let size = self.projected.nrows();
         let last = self.blocks.last().map_or(0, DMatrix::ncols);
-        let positive: Vec<usize> = order.into_iter().filter(|k| eigen.eigenvalues[*k] > 0.0).collect();
-        let theta: Vec<f64> = positive.iter().map(|k| eigen.eigenvalues[*k]).collect();
-        let vectors = eigen.eigenvectors.select_columns(&positive);
+        let positive: Vec<usize> = order.filter(|k| eigenvalues[*k] > 0.0).collect();
+        let theta: Vec<f64> = positive.iter().map(|k| eigenvalues[*k]).collect();
+        let vectors = eigenvectors.select_columns(&positive);
         let bottom = vectors.rows(size - last, last);
         let residuals = match self.coupling.nrows() {
             0 => vec![0.0; theta.len()],
             _ => (&self.coupling * bottom).column_iter().zip(&theta).map(|(r, theta)| r.norm() / theta).collect(),
         };
-        Ritz { theta, vectors, residuals }
+        Some(Ritz { theta, vectors, residuals })
     }
 
     fn shapes(&self, ritz: &Ritz, count: usize) -> DMatrix<f64> {

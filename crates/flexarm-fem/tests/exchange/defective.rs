@@ -1,11 +1,13 @@
 //! Files that are well formed and wrong.
 
-use flexarm_fem::UnitSystem;
 use flexarm_fem::exchange::{
     ExchangeErrorKind, InputFile, MatrixNames, MatrixRole, assemble_interfaces, parse_matrices, propose_map,
     write_matrix_market, write_user_element,
 };
+use flexarm_fem::gate::check_matrix12;
+use flexarm_fem::{GateLimits, Matrix12, UnitSystem};
 
+use crate::common::turned_arm;
 use crate::shared::{parse, read, samples, small_structure};
 
 /// CalculiX 2.20 as built by Debian does not condense; the reason must be given, not only a residual.
@@ -28,9 +30,10 @@ fn uncondensed_substructures_of_calculix_are_refused_with_the_reason() {
     }
 }
 
+/// Only what is recognised has the advice about CalculiX; the gate refuses the rest.
 #[test]
-fn a_substructure_on_the_ground_is_refused_and_a_free_one_is_not() {
-    let (mut K, _) = small_structure(0);
+fn matrices_with_other_faults_are_left_to_the_gate_and_uncoupled_ones_are_not() {
+    let (K, _) = small_structure(0);
     let rows: Vec<_> = (0..12).map(|i| flexarm_fem::exchange::DofLabel::new(1 + i / 6, i as u8 % 6 + 1)).collect();
     let assemble = |K: &nalgebra::DMatrix<f64>| {
         let imported = parse(&[("x.mtx", &write_user_element(K, None, &rows))]);
@@ -38,12 +41,44 @@ fn a_substructure_on_the_ground_is_refused_and_a_free_one_is_not() {
         assemble_interfaces(&imported, Some(&map), Some(&UnitSystem::SI))
     };
     assert!(assemble(&K).is_ok());
-    for i in 0..12 {
-        K[(i, i)] *= 1.5;
+    let refused_by_the_gate = |K: nalgebra::DMatrix<f64>| {
+        let assembled = assemble(&K).unwrap_or_else(|error| panic!("{error}"));
+        let link = turned_arm();
+        let p_AB = link.X_LB.translation.vector - link.X_LA.translation.vector;
+        let K12 = Matrix12::from_fn(|i, j| assembled.K[(i, j)]);
+        assert!(check_matrix12(&K12, &p_AB, &GateLimits::default()).is_err());
+    };
+    // On the ground.
+    let mut held = K.clone();
+    (0..12).for_each(|i| held[(i, i)] *= 1.5);
+    refused_by_the_gate(held);
+    // Rotations before translations.
+    let mixed = |i: usize| 6 * (i / 6) + (i + 3) % 6;
+    refused_by_the_gate(nalgebra::DMatrix::from_fn(12, 12, |i, j| K[(mixed(i), mixed(j))]));
+
+    // Not condensed: nothing between the interfaces, exactly or to rounding.
+    for (factor, part) in [(0.0, "exactly zero"), (1e-13, "only rounding")] {
+        let of_block = |i: usize, j: usize| if i / 6 == j / 6 { 1.0 } else { factor };
+        let error = assemble(&nalgebra::DMatrix::from_fn(12, 12, |i, j| K[(i, j)] * of_block(i, j))).unwrap_err();
+        assert_eq!(error.kind, ExchangeErrorKind::Defective);
+        let message = error.to_string();
+        assert!(message.contains(part) && message.contains("without condensing"), "{message}");
     }
-    let error = assemble(&K).unwrap_err();
-    assert_eq!(error.kind, ExchangeErrorKind::Defective);
-    assert!(error.found.contains("when all interfaces move alike"), "{error}");
+}
+
+/// The same in a format that CalculiX does not write has no advice about it, and rounding says nothing there.
+#[test]
+fn uncoupled_interfaces_of_other_formats_are_refused_without_the_advice_about_calculix() {
+    let (K, _) = small_structure(0);
+    let assemble = |factor: f64| {
+        let of_block = |i: usize, j: usize| if i / 6 == j / 6 { 1.0 } else { factor };
+        let K = nalgebra::DMatrix::from_fn(12, 12, |i, j| K[(i, j)] * of_block(i, j));
+        let imported = parse(&[("x_K.mtx", &write_matrix_market(&K, &[]))]);
+        assemble_interfaces(&imported, Some(&"A=#1-6,B=#7-12".parse().unwrap()), Some(&UnitSystem::SI))
+    };
+    let message = assemble(0.0).unwrap_err().to_string();
+    assert!(message.contains("exactly zero") && !message.contains("CalculiX"), "{message}");
+    assert!(assemble(1e-13).is_ok());
 }
 
 /// A full model without labels must not pass as interfaces with hundreds of modes.

@@ -155,7 +155,7 @@ fn mistakes_are_named_with_line_and_block() {
         ("          J\n", "          end Cr\n", "end Cr"),
         ("nelastq                          =   3", "nelastq                          =   4", "3 lines ielastq"),
         ("m0( 1, 1)", "m0( 9, 1)", "m0(9,1)"),
-        ("nq                     =   3", "nq                     = 999999999", "0 to 30000"),
+        ("nq                     =   3", "nq                     = 999999999", "0 to 10000"),
         ("3.7000000000000002D+00", "nan", "a finite number"),
         ("    1    3    :", "    2    3    :", "as in its first line"),
     ] {
@@ -180,9 +180,145 @@ proptest! {
             bytes[i] = byte;
         }
         let text = String::from_utf8_lossy(&bytes);
-        if let Ok(sid) = parse_sid(&text, "t") {
-            let _ = (sid.conventions("t"), sid.Me.m0(), write_sid(&sid));
-        }
-        let _ = parse_sid(&text[..cut.index(text.len())], "t");
+        use_all(&text);
+        use_all(&text[..cut.index(text.len())]);
     }
+
+    #[test]
+    fn bodies_with_other_sizes_and_structures_do_not_panic(
+        changes in prop::collection::vec(
+            (
+                any::<prop::sample::Index>(),
+                prop::sample::select(vec!["order", "nrow", "ncol", "nq", "nqn", "structure", "nelastq", "m0( 6, 1)", "m1( 3, 3, 1)"]),
+                prop::sample::select(vec!["0", "1", "2", "3", "4", "6", "9", "10000", "30000"]),
+                any::<bool>(),
+            ),
+            1..4,
+        ),
+    ) {
+        let text = write_sid(&point_masses(GyroLayout::ModeMajor, OeOrder::XyYzXz, false));
+        let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+        for (place, key, value, is_new) in changes {
+            // In place of a line with this key, or as a new line anywhere.
+            let line = format!("{key} = {value}");
+            let same: Vec<usize> = (0..lines.len()).filter(|&i| lines[i].trim().starts_with(key)).collect();
+            match same.get(place.index(same.len().max(1))) {
+                Some(&i) if !is_new => lines[i] = line,
+                _ => lines.insert(place.index(lines.len()), line),
+            }
+        }
+        use_all(&lines.join("\n"));
+    }
+}
+
+/// Everything that can be asked of a body, if the text is one.
+fn use_all(text: &str) {
+    let Ok(sid) = parse_sid(text, "t") else { return };
+    let of_nodes = sid.nodes.iter().flat_map(|node| {
+        [Some(&node.origin), Some(&node.phi), Some(&node.psi), Some(&node.AP), node.sigma.as_ref()]
+            .into_iter()
+            .flatten()
+    });
+    for matrix in sid.blocks().map(|(_, matrix)| matrix).chain(of_nodes) {
+        let size = matrix.m0().len();
+        // As the parser: 2^20 and 16 per byte.
+        assert!(size <= (1 << 20) + 16 * text.len(), "{size}");
+        (0..=matrix.nq.min(8)).for_each(|mode| assert_eq!(matrix.m1(mode).len(), size));
+    }
+    let _ = (sid.conventions("t"), sid.J0(), write_sid(&sid));
+    for (mode, layout) in (0..sid.nq().min(8)).zip([GyroLayout::ModeMajor, GyroLayout::ComponentMajor].iter().cycle()) {
+        let _ = (sid.J1(mode), sid.Gr(*layout, mode), sid.Ge(*layout, mode));
+    }
+    let _ = sid.Oe(OeOrder::XyXzYz);
+}
+
+/// Text of the sample body with a block changed: from the block's name to its end.
+fn with_block(name: &str, change: impl Fn(&str) -> String) -> String {
+    let text = write_sid(&point_masses(GyroLayout::ModeMajor, OeOrder::XyYzXz, false));
+    let (head, rest) = text.split_once(&format!(" {name}\n")).unwrap();
+    let (block, tail) = rest.split_once(&format!(" end {name}\n")).unwrap();
+    let changed = change(block);
+    assert!(changed != block, "{block}");
+    format!("{head} {name}\n{changed} end {name}\n{tail}")
+}
+
+/// `key = value` in place of the line with this key.
+fn set(block: &str, key: &str, value: usize) -> String {
+    let line =
+        |line: &str| if line.trim().starts_with(key) { format!("{key} = {value}\n") } else { format!("{line}\n") };
+    block.lines().map(line).collect()
+}
+
+#[test]
+fn structures_of_square_matrices_are_refused_elsewhere() {
+    for (name, structures) in [("origin", [1, 2, 4]), ("J", [1, 2, 4]), ("mdCM", [1, 2, 4]), ("Gr", [1, 2, 4])] {
+        for structure in structures {
+            let text = with_block(name, |block| set(block, "structure", structure));
+            let error = parse_sid(&text, "t").unwrap_err();
+            assert_eq!(error.kind, ExchangeErrorKind::WrongSize);
+            assert!(&*error.element == name && error.expected.contains("a square matrix"), "{error}");
+        }
+    }
+    // A unit matrix without entries, and one triangle of a symmetric matrix.
+    let unit = with_block("Me", |block| set(&block[..block.find("m0(").unwrap()], "structure", 4));
+    assert_eq!(parse_sid(&unit, "t").unwrap().Me.m0(), DMatrix::identity(3, 3));
+    let of_lower = |line: &&str| !["m0( 1, 2)", "m0( 1, 3)", "m0( 2, 3)"].iter().any(|upper| line.contains(upper));
+    let lower = with_block("Me", |block| block.lines().filter(of_lower).map(|line| format!("{line}\n")).collect());
+    let whole = point_masses(GyroLayout::ModeMajor, OeOrder::XyYzXz, false);
+    assert_eq!(parse_sid(&lower, "t").unwrap().Me.m0(), whole.Me.m0());
+}
+
+#[test]
+fn sizes_after_the_first_entry_are_refused() {
+    for key in ["order", "nrow", "ncol", "nq", "nqn", "structure"] {
+        let error = parse_sid(&with_block("J", |block| format!("{block}{key} = 1\n")), "t").unwrap_err();
+        assert!(error.expected.contains("before the first entry"), "{key}: {error}");
+    }
+}
+
+/// A matrix that was made by hand may be anything.
+#[test]
+fn entries_outside_of_a_matrix_are_left_out() {
+    let matrix = SidMatrix {
+        order: 1,
+        nrow: 3,
+        ncol: 1,
+        structure: 2,
+        entries0: [((2, 0), 5.0), ((7, 0), 6.0)].into(),
+        entries1: [((1, 0, 0), 2.0), ((0, 0, 9), 3.0)].into(),
+        ..SidMatrix::default()
+    };
+    assert_eq!(matrix.m0().as_slice(), [0.0, 0.0, 5.0]);
+    assert_eq!(matrix.m1(0).as_slice(), [0.0, 2.0, 0.0]);
+}
+
+/// A block of any size, and shape coordinates that are only promised.
+#[test]
+fn matrices_that_are_much_larger_than_the_file_are_refused() {
+    for name in ["Kgeo", "ksigma", "sigma"] {
+        let large = |block: &str| set(&set(block, "nrow", 30_000), "ncol", 30_000);
+        let error = parse_sid(&with_block(name, large), "t").unwrap_err();
+        assert!(error.expected.contains("by the size of the file"), "{name}: {error}");
+    }
+    let zero = |nrow, ncol| SidMatrix { nrow, ncol, ..SidMatrix::default() };
+    let body = |n: usize| Sid {
+        modes: vec![String::new(); n],
+        mdCM: zero(3, 1),
+        J: zero(6, 1),
+        Ct: zero(n, 3),
+        Cr: zero(n, 3),
+        Me: zero(n, n),
+        Gr: zero(3, 3 * n),
+        Ge: zero(n, 3 * n),
+        Oe: zero(n, 6),
+        ksigma: zero(n, 1),
+        Ke: zero(n, n),
+        De: zero(n, n),
+        ..Sid::default()
+    };
+    let of_modes = |n: usize| parse_sid(&write_sid(&body(n)), "t");
+    assert_eq!(of_modes(500).unwrap().Ge.m0().len(), 750_000);
+    let error = of_modes(10_000).unwrap_err();
+    assert!(&*error.element == "Me" && error.expected.contains("by the size of the file"), "{error}");
+    assert!(of_modes(10_001).unwrap_err().expected.contains("0 to 10000"));
 }

@@ -59,6 +59,39 @@ fn a_sidecar_is_found_beside_its_matrices_and_finds_them() {
     assert_eq!(by_sidecar.sidecar.as_ref(), Some(&sidecar));
     assert_eq!(by_sidecar.mass.unwrap().dense(), Some(&M));
     assert_eq!(by_matrix.sidecar, Some(sidecar));
+    assert_eq!(by_matrix.mass.unwrap().dense(), Some(&M));
+}
+
+/// What the sidecar says of a file counts, whatever it is called; other files are not mixed with it.
+#[test]
+fn a_stiffness_finds_its_mass_through_the_sidecar() {
+    let folder = std::env::temp_dir().join(format!("flexarm_exchange_mass_{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let (K, M) = small_structure(0);
+    let sidecar = |stiffness: &str, mass: &str| Sidecar {
+        stiffness: stiffness.into(),
+        mass: Some(mass.into()),
+        units: UnitSystem::SI,
+        interfaces: Vec::new(),
+    };
+    let write = |name: &str, text: String| std::fs::write(folder.join(name), text).unwrap();
+    write("arm.toml", write_sidecar(&sidecar("arm_K.mtx", "inertia.mtx")));
+    write("stiff.toml", write_sidecar(&sidecar("stiff.mtx", "inertia.mtx")));
+    write("arm_K.mtx", write_matrix_market(&K, &[]));
+    write("stiff.mtx", write_matrix_market(&K, &[]));
+    write("arm_Kb.mtx", write_matrix_market(&(&K * 3.0), &[]));
+    write("inertia.mtx", write_matrix_market(&M, &[]));
+    write("heavy_M.mtx", write_matrix_market(&(&M * 2.0), &[]));
+    let read = |names: &[&str]| {
+        let paths: Vec<_> = names.iter().map(|name| folder.join(name)).collect();
+        flexarm_fem::exchange::read_matrices(&paths, &Default::default()).unwrap_or_else(|error| panic!("{error}"))
+    };
+    let found = [&["arm_K.mtx"][..], &["stiff.mtx"], &["arm_K.mtx", "heavy_M.mtx"], &["arm_Kb.mtx"]].map(read);
+    std::fs::remove_dir_all(&folder).unwrap();
+    let masses = found.each_ref().map(|found| found.mass.as_ref().map(|mass| mass.dense().unwrap().clone()));
+    assert_eq!(masses, [Some(M.clone()), Some(M.clone()), Some(&M * 2.0), None]);
+    assert_eq!(found[1].stiffness.dense(), Some(&K));
+    assert_eq!(found[3].stiffness.dense(), Some(&(&K * 3.0)));
 }
 
 /// Fourteen digits: half of the last one is 5e-14 of a number that begins with 1.

@@ -155,10 +155,10 @@ fn with_defaults(job: &ReduceJob) -> Result<ReduceJob, Error> {
             return Err(Error::Usage("modes and modes_up_to_hz exclude each other: give one of them".into()));
         }
         (Some(modes), None) if modes > MOST_MODES => {
-            return Err(Error::Usage(format!("{modes} modes are asked for; at most {MOST_MODES} can be kept")));
+            return Err(Error::Usage(format!("--modes {modes}: at most {MOST_MODES} can be kept")));
         }
         (None, Some(hz)) if !(hz.is_finite() && hz > 0.0) => {
-            return Err(Error::Usage(format!("modes up to {hz} Hz are asked for; a positive frequency is expected")));
+            return Err(Error::Usage(format!("--modes-up-to {hz}: a positive frequency in Hz is expected")));
         }
         _ => {}
     }
@@ -166,7 +166,7 @@ fn with_defaults(job: &ReduceJob) -> Result<ReduceJob, Error> {
     chains.sort_unstable();
     chains.dedup();
     if let Some(parts) = chains.iter().find(|parts| !(2..=100).contains(*parts)) {
-        return Err(Error::Usage(format!("a chain of {parts} parts is asked for; 2 to 100 are possible")));
+        return Err(Error::Usage(format!("--chains {parts}: a chain has 2 to 100 parts")));
     }
     job.tie.get_or_insert(Tie::Rigid);
     job.split.get_or_insert(SplitChoice::ElasticCentre);
@@ -174,7 +174,7 @@ fn with_defaults(job: &ReduceJob) -> Result<ReduceJob, Error> {
     job.ordering.get_or_insert(OrderingChoice::Auto);
     let threads = *job.threads.get_or_insert(1);
     if !(1..=1024).contains(&threads) {
-        return Err(Error::Usage(format!("{threads} threads are asked for; 1 to 1024 are possible")));
+        return Err(Error::Usage(format!("--threads {threads}: 1 to 1024 are possible")));
     }
     Ok(job)
 }

@@ -44,13 +44,21 @@ pub(super) fn prepare(job: &ReduceJob, options: &ReduceOptions) -> Result<Prepar
         faults.push(no_units(job, &file));
     }
     let materials = materials(job, &mut file, &mut faults, &mut warnings);
+    if job.link_name().trim().is_empty() || job.link_name().contains(['/', '\\', '\n']) {
+        let what =
+            format!("{:?} is no name for a link: give one that can be part of a file name (--name)", job.link_name());
+        faults.push(Error::Usage(what));
+    }
+    // Said by the reader about a deck without sections; the job has the material.
+    warnings.retain(|said| !said.contains("hence without a material") || materials.is_empty());
     let place = Place { mesh: &file.mesh, unit: units.length, X_LM };
     let chosen = place.choose(job, robot.as_ref()).unwrap_or_else(|more| {
         faults.extend(more);
         Vec::new()
     });
     if let [a, b, ..] = chosen.as_slice()
-        && (a.interface.X_LI.translation.vector - b.interface.X_LI.translation.vector).norm() == 0.0
+        && let size = file.mesh.bounding_box().map_or(0.0, |(low, high)| (high - low).norm())
+        && (a.interface.X_LI.translation.vector - b.interface.X_LI.translation.vector).norm() <= 1e-6 * size
     {
         let names = [&a.interface.name, &b.interface.name];
         let what = format!("interfaces {names:?} are at the same point; a link needs a length");

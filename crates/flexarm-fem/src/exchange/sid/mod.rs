@@ -158,29 +158,36 @@ impl SidMatrix {
         matrix
     }
 
-    /// The constant part.
+    /// The constant part; entries outside of the size are left out, which [`parse_sid`] refuses.
     pub fn m0(&self) -> DMatrix<f64> {
         if self.structure == 4 && self.entries0.is_empty() {
             return DMatrix::identity(self.nrow, self.ncol);
         }
         let mut dense = DMatrix::zeros(self.nrow, self.ncol);
         for (&(row, column), &value) in &self.entries0 {
-            dense[(row, column)] = value;
+            put(&mut dense, row, column, value);
             // One triangle is enough for a symmetric matrix.
             if self.structure == 2 && !self.entries0.contains_key(&(column, row)) {
-                dense[(column, row)] = value;
+                put(&mut dense, column, row, value);
             }
         }
         dense
     }
 
-    /// The derivative with respect to a shape coordinate, from 0.
+    /// The derivative with respect to a shape coordinate, from 0; zero where there is none.
     pub fn m1(&self, mode: usize) -> DMatrix<f64> {
         let mut dense = DMatrix::zeros(self.nrow, self.ncol);
         for (&(row, _, column), &value) in self.entries1.iter().filter(|((_, k, _), _)| *k == mode) {
-            dense[(row, column)] = value;
+            put(&mut dense, row, column, value);
         }
         dense
+    }
+}
+
+/// Sets an entry, unless it is outside.
+fn put(dense: &mut DMatrix<f64>, row: usize, column: usize, value: f64) {
+    if let Some(entry) = dense.get_mut((row, column)) {
+        *entry = value;
     }
 }
 

@@ -9,6 +9,10 @@ use crate::exchange::text::{Text, shown, unpack, words};
 
 /// More shape coordinates than any body has: sizes above are mistakes.
 const MOST_MODES: usize = 10_000;
+/// `Ge` has three columns per shape coordinate.
+const MOST_ROWS: usize = 3 * MOST_MODES;
+/// Entries that a dense matrix may have, zeros included: so many in any file, so many more per byte.
+const MOST_ENTRIES: (usize, usize) = (1 << 20, 16);
 
 /// Reads a `.SID_FEM` file, which may be packed with gzip.
 ///
@@ -27,6 +31,8 @@ type Line<'a> = (Place<'a>, &'a str, Option<&'a str>);
 struct Cursor<'a, I: Iterator<Item = Line<'a>>> {
     lines: Peekable<I>,
     origin: &'a str,
+    /// Entries that one matrix may have.
+    most_entries: usize,
 }
 
 /// Parses the text of a `.SID_FEM` file; `origin` names it in messages. Never panics.
@@ -47,7 +53,8 @@ pub fn parse_sid(text: &str, origin: &str) -> Result<Sid, ExchangeError> {
         None => (place, line.trim(), None),
     });
     let lines = lines.filter(|(_, key, value)| !key.is_empty() || value.is_some());
-    let mut cursor = Cursor { lines: lines.peekable(), origin };
+    let most_entries = MOST_ENTRIES.0.saturating_add(text.text.len().saturating_mul(MOST_ENTRIES.1));
+    let mut cursor = Cursor { lines: lines.peekable(), origin, most_entries };
     cursor.expect("part")?;
     cursor.expect("new modal")?;
     let mut sid = Sid { comment: comment.to_owned(), ..Sid::default() };
@@ -90,7 +97,7 @@ impl<'a, I: Iterator<Item = Line<'a>>> Cursor<'a, I> {
             let value = value.unwrap_or("");
             match key {
                 "mass" => sid.mass = place.number("mass", value)?,
-                "nelastq" => promised = count(&place, "nelastq", value)?,
+                "nelastq" => promised = count(&place, "nelastq", value, MOST_MODES)?,
                 _ if key.starts_with("ielastq") => sid.modes.push(value.to_owned()),
                 _ => return Err(unexpected(&place, key, "mass, nelastq, ielastq (k) or end refmod")),
             }
@@ -194,18 +201,23 @@ impl<'a, I: Iterator<Item = Line<'a>>> Cursor<'a, I> {
             let (place, key, value) = self.next(&end)?;
             last = place;
             let value = value.unwrap_or("");
-            let code = |what| count(&place, what, value).map(|code| code.min(255) as u8);
+            let is_head = matches!(key, "order" | "nrow" | "ncol" | "nq" | "nqn" | "structure");
+            // Entries are checked against the sizes, which must not change any more.
+            if is_head && !(matrix.entries0.is_empty() && matrix.entries1.is_empty()) {
+                let (element, expected) = (format!("{name}, {key}"), "all sizes before the first entry");
+                return Err(place.fail(ExchangeErrorKind::Syntax, element, shown(value), expected, ""));
+            }
             match key {
-                "order" => matrix.order = code("order")?,
-                "nrow" => matrix.nrow = count(&place, "nrow", value)?,
-                "ncol" => matrix.ncol = count(&place, "ncol", value)?,
-                "nq" => matrix.nq = count(&place, "nq", value)?,
-                "nqn" => matrix.nqn = count(&place, "nqn", value)?,
-                "structure" => matrix.structure = code("structure")?,
+                "order" => matrix.order = count(&place, "order", value, 255)? as u8,
+                "nrow" => matrix.nrow = count(&place, "nrow", value, MOST_ROWS)?,
+                "ncol" => matrix.ncol = count(&place, "ncol", value, MOST_ROWS)?,
+                "nq" => matrix.nq = count(&place, "nq", value, MOST_MODES)?,
+                "nqn" => matrix.nqn = count(&place, "nqn", value, MOST_MODES)?,
+                "structure" => matrix.structure = count(&place, "structure", value, 255)? as u8,
                 _ => entry(&mut matrix, &place, name, key, value)?,
             }
         }
-        // Sizes follow from the kind of matrix, so a file cannot ask for more memory than it is worth.
+        // Most sizes follow from the kind of matrix.
         let shape = (matrix.nrow, matrix.ncol);
         let expected: &[(usize, usize)] = match name {
             "origin" | "mdCM" => &[(3, 1)],
@@ -230,6 +242,16 @@ impl<'a, I: Iterator<Item = Line<'a>>> Cursor<'a, I> {
             );
             let sizes: Vec<_> = expected.iter().map(|(rows, columns)| format!("{rows} x {columns}")).collect();
             let expected = format!("{}, order 0 or 1, structure 0 to 4, nq {nq}", sizes.join(" or "));
+            return Err(last.fail(ExchangeErrorKind::WrongSize, name, found, expected, ""));
+        }
+        let found = format!("{} x {}, structure {}", shape.0, shape.1, matrix.structure);
+        if matches!(matrix.structure, 1 | 2 | 4) && shape.0 != shape.1 {
+            let expected = "a square matrix for structure 1 (diagonal), 2 (symmetric) and 4 (unit matrix)";
+            return Err(last.fail(ExchangeErrorKind::WrongSize, name, found, expected, ""));
+        }
+        // Blocks without a size of their own, and many shape coordinates in a file of a few lines.
+        if shape.0 * shape.1 > self.most_entries {
+            let expected = format!("at most {} entries, by the size of the file", self.most_entries);
             return Err(last.fail(ExchangeErrorKind::WrongSize, name, found, expected, ""));
         }
         Ok(matrix)
@@ -272,8 +294,7 @@ fn entry(matrix: &mut SidMatrix, place: &Place<'_>, name: &str, key: &str, value
 }
 
 /// A count that is not beyond reason.
-fn count(place: &Place<'_>, what: &str, text: &str) -> Result<usize, ExchangeError> {
-    let most = 3 * MOST_MODES;
+fn count(place: &Place<'_>, what: &str, text: &str, most: usize) -> Result<usize, ExchangeError> {
     match usize::try_from(place.integer(what, text)?) {
         Ok(count) if count <= most => Ok(count),
         _ => Err(place.fail(ExchangeErrorKind::Syntax, what, shown(text), format!("0 to {most}"), "")),

@@ -8,7 +8,7 @@ use crate::exchange::user_element::fortran;
 /// Index orders stay as they are in the struct; see [`Sid::conventions`].
 pub fn write_sid(sid: &Sid) -> String {
     let mut text =
-        format!("{:5}{:5}    :{}\n part\n     new modal\n          refmod\n", sid.nodes.len(), sid.nq(), sid.comment);
+        format!("{:5} {:4}    :{}\n part\n     new modal\n          refmod\n", sid.nodes.len(), sid.nq(), sid.comment);
     let mut line = |indent: usize, key: &str, value: &str| {
         text += &format!("{:indent$}{key:width$}= {value}\n", "", width = 48 - indent);
     };

@@ -24,15 +24,34 @@ pub(super) struct Collector {
     regions: HashMap<GroupKey, usize>,
     region_keys: Vec<GroupKey>,
     sets: BTreeMap<GroupKey, GroupNodes>,
+    /// Nodes of all sets together when each was last tidied.
+    kept: usize,
 }
 
 #[derive(Default)]
 struct GroupNodes {
     ids: Vec<u64>,
+    /// How many of them are sorted and unique.
+    tidied: usize,
     /// Where its first element stands.
     at: usize,
     /// Where a line with more than two nodes stands, if there is one.
     bent_line: Option<usize>,
+}
+
+/// A set is tidied when it has twice as many nodes as after the last time, and this many more.
+const FEW: usize = 32;
+
+/// Nodes in all sets: so many in any file, so many more per byte. 160 groups of all nodes at 40 bytes per node.
+const MOST_MEMBERS: (usize, usize) = (1 << 20, 4);
+
+impl GroupNodes {
+    /// Sorts and removes duplicates: neighbouring elements share most of their nodes. Returns how many are new.
+    fn tidy(&mut self) -> usize {
+        self.ids.sort_unstable();
+        self.ids.dedup();
+        self.ids.len() - std::mem::replace(&mut self.tidied, self.ids.len())
+    }
 }
 
 impl Collector {
@@ -46,6 +65,7 @@ impl Collector {
             regions: HashMap::new(),
             region_keys: Vec::new(),
             sets: BTreeMap::new(),
+            kept: 0,
         }
     }
 
@@ -129,6 +149,14 @@ impl Collector {
             if shape.dim == 1 && nodes.len() > 2 {
                 set.bent_line.get_or_insert(at);
             }
+            if set.ids.len() > 2 * set.tidied + FEW {
+                self.kept += set.tidy();
+                if self.kept > MOST_MEMBERS.0 + MOST_MEMBERS.1 * src.bytes.len() {
+                    let element = format!("physical group {:?}", self.name(key));
+                    let expected = format!("at most {} nodes per byte of the file in all groups", MOST_MEMBERS.1);
+                    return Err(src.error(Kind::TooLarge, at, element, "too many nodes", expected));
+                }
+            }
             if self.keep_lines && shape.dim == 1 && nodes.len() == 2 {
                 self.keep(ElementKind::Beam2, key, id, at, nodes.iter().copied());
             }
@@ -197,10 +225,9 @@ impl Collector {
 
     /// Node sets by name; where dimensions share a name, the highest keeps it.
     fn node_sets(&mut self, src: &Source, index: &IdIndex) -> Result<Vec<(String, Vec<u32>)>, MeshError> {
-        // Duplicates go first: neighbouring elements share most of their nodes.
+        // The last duplicates go first: neighbouring elements share most of their nodes.
         for set in self.sets.values_mut() {
-            set.ids.sort_unstable();
-            set.ids.dedup();
+            set.tidy();
         }
         let mut sets: BTreeMap<String, (u8, Vec<u32>)> = BTreeMap::new();
         let taken: BTreeSet<String> = self.sets.keys().map(|key| self.name(*key)).collect();
@@ -228,5 +255,35 @@ impl Collector {
             sets.entry(name.clone()).or_insert((key.0, vec![]));
         }
         Ok(sets.into_iter().map(|(name, (_, nodes))| (name, nodes)).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Puts triangles into 64 groups as a file of 8 bytes per triangle; returns the numbers that are held.
+    fn held(triangles: impl ExactSizeIterator<Item = [u64; 3]>) -> Result<usize, MeshError> {
+        let bytes = vec![b'\n'; 8 * triangles.len()];
+        let src = Source { bytes: &bytes, origin: "t.msh", binary: false };
+        let groups: Vec<i64> = (1..=64).collect();
+        let mut collector = Collector::new(false);
+        for (id, nodes) in (1..).zip(triangles) {
+            collector.element(&src, &shape(2).unwrap(), id, 0, &groups, &nodes)?;
+        }
+        Ok(collector.sets.values().map(|set| set.ids.capacity()).sum())
+    }
+
+    #[test]
+    fn many_groups_of_shared_nodes_do_not_grow_with_the_elements() {
+        let numbers = held((0..20_000_u32).map(u64::from).map(|k| [k % 7, 7, 8 + k % 5])).unwrap();
+        assert!(numbers <= 64 * 128, "{numbers}"); // 24 million bytes / 8 without tidying
+    }
+
+    #[test]
+    fn many_groups_of_many_nodes_are_refused() {
+        let error = held((0..40_000_u32).map(u64::from).map(|k| [3 * k, 3 * k + 1, 3 * k + 2])).unwrap_err();
+        assert_eq!(error.kind, Kind::TooLarge);
+        assert!(error.to_string().contains("at most 4 nodes per byte"), "{error}");
     }
 }

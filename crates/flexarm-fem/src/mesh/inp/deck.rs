@@ -97,6 +97,20 @@ impl<'a> Deck<'a> {
                 self.card(&card)?;
             }
         }
+        /// Cards that join or load parts of the structure itself.
+        const STRUCTURAL: [&str; 9] =
+            ["TIE", "EQUATION", "MPC", "COUPLING", "KINEMATIC", "DISTRIBUTING", "MASS", "ROTARY INERTIA", "SPRING"];
+        let is_structural = |title: &str| STRUCTURAL.iter().any(|known| title.trim_start_matches('*') == *known);
+        let structural: Vec<String> =
+            self.ignored.iter().filter(|(title, _)| is_structural(title)).map(|(title, _)| title.clone()).collect();
+        if !structural.is_empty() {
+            let warning = format!(
+                "the deck changes the structure with cards that are not read: {}; what they join or add is missing in \
+                 the model",
+                structural.join(", ")
+            );
+            self.draft.warnings.push(warning);
+        }
         if !self.ignored.is_empty() {
             let cards = self.ignored.iter().map(|(title, count)| match count {
                 1 => title.clone(),

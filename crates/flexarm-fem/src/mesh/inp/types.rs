@@ -33,8 +33,9 @@ pub(super) fn class(name: &str) -> Option<(Class, Option<&'static str>)> {
         "C3D4" => solid(ElementKind::Tet4, None),
         "C3D10" => solid(ElementKind::Tet10, None),
         "C3D10M" | "C3D10HS" | "C3D10T" => solid(ElementKind::Tet10, Some("read as plain C3D10")),
-        "C3D8" => solid(ElementKind::Hex8, None),
-        "C3D8I" => solid(ElementKind::Hex8, Some("read as plain C3D8, without incompatible modes")),
+        "C3D8" => solid(ElementKind::Hex8, Some("read with incompatible modes unless quadrature = calculix")),
+        // The own rules have incompatible modes, those of CalculiX's C3D8 have none.
+        "C3D8I" => solid(ElementKind::Hex8, None),
         "C3D8R" => solid(ElementKind::Hex8, REDUCED),
         "C3D20" => solid(ElementKind::Hex20, None),
         "C3D20R" => solid(ElementKind::Hex20, REDUCED),
@@ -61,5 +62,18 @@ pub(super) fn advice(name: &str) -> &'static str {
             "shells, membranes, plane elements and masses are not read: mesh the part with solids"
         }
         _ => "remove these elements from the deck, or mesh with a supported type",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_bricks_that_are_not_what_they_say_are_remarked_on() {
+        let remark = |name| class(name).unwrap().1.unwrap_or("");
+        assert_eq!(remark("C3D8I"), "");
+        assert_eq!(remark("C3D8"), "read with incompatible modes unless quadrature = calculix");
+        assert!(remark("C3D8R").starts_with("reduced integration is not used"));
     }
 }
