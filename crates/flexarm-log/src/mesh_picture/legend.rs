@@ -84,6 +84,10 @@ pub(super) fn draw(sheet: &mut Image, pictures: &MeshPictures<'_>, tied: &[Tied]
     column.heading(&format!("part of A: {}", kilograms(link.proximal.mass)), color::PROXIMAL);
     column.heading(&format!("part of B: {}", kilograms(link.distal.mass)), color::DISTAL);
     column.line(&format!("whole mesh {}", kilograms(reduction.whole.mass)), plain);
+    let riding = link.mass() - reduction.whole.mass;
+    if riding > 1e-6 * link.mass() {
+        column.line(&format!("riding on it {}", kilograms(riding)), plain);
+    }
     column.y += 9.0;
     column.line(&format!("A to B {} mm", numbers::significant(along.norm() * 1e3, 4)), faint);
     let mesh = pictures.mesh;
