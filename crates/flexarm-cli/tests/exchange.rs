@@ -7,7 +7,7 @@
 
 mod common;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use common::flex;
 use common::{Place, matrix, numbers};
@@ -25,12 +25,7 @@ fn difference(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
 
 /// Outside samples, where they are there.
 fn sample(name: &str) -> Option<PathBuf> {
-    let path = Path::new("/work/shared/fe").join(name);
-    if !path.exists() {
-        eprintln!("skipped: {} is not there", path.display());
-        return None;
-    }
-    Some(path)
+    common::reference(name)
 }
 
 const MASS: [&str; 6] = ["--mass", "1.728", "--com", "0.4,0,0", "--inertia", "0.0003,0.0924,0.0922,0,0,0"];

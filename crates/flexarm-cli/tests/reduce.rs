@@ -1,13 +1,12 @@
 //! `flexarm reduce`: a small beam mesh to a link file, the keys of its figures, and every sort of bad input.
 //!
-//! The reference cases in `/work/shared/fe` are used where they are there; the tests say so where they are not.
+//! Reference cases are used where they are there; the tests say so where they are not.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 #![allow(clippy::print_stderr, reason = "a test that skips says so")]
 
 mod common;
 
 use std::io::Write as _;
-use std::path::Path;
 
 use common::{Place, line_of, matrix, numbers, with};
 use serde_json::Value;
@@ -501,12 +500,7 @@ mod reference {
     use super::*;
 
     fn case(file: &str) -> Option<String> {
-        let path = format!("/work/shared/fe/{file}");
-        let there = Path::new(&path).exists();
-        if !there {
-            eprintln!("skipped: there is no {path}");
-        }
-        there.then_some(path)
+        common::reference(file).map(|path| path.display().to_string())
     }
 
     /// Truth: CalculiX, stored with the case (A held, both faces tied, its quadrature).

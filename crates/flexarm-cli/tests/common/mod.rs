@@ -301,3 +301,15 @@ pub(crate) fn mcap_records(bytes: &[u8]) -> BTreeMap<u8, usize> {
 
 const FOOTER: u8 = 0x02;
 const DATA_END: u8 = 0x0f;
+
+/// A file of the reference data, which stand beside the project or where FLEXARM_SHARED says; `None` and a word about it elsewhere.
+#[allow(clippy::print_stderr, reason = "a test that skips says so")]
+pub(crate) fn reference(name: &str) -> Option<PathBuf> {
+    let named = std::env::var_os("FLEXARM_SHARED").map(PathBuf::from);
+    let above = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().map(|folder| folder.join("shared"));
+    let found = named.into_iter().chain(above).map(|shared| shared.join("fe").join(name)).find(|path| path.exists());
+    if found.is_none() {
+        eprintln!("skipped: the reference file {name} is not on this machine");
+    }
+    found
+}
