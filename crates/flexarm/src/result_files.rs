@@ -1,4 +1,4 @@
-//! Files of a result: refused before the work if their places are taken, written all or none.
+//! Files of a result: refused before the work if their places are taken, none left half written.
 
 use std::path::{Path, PathBuf};
 
@@ -27,7 +27,8 @@ pub(crate) fn check_free(paths: &[PathBuf], overwrite: bool) -> Result<(), Error
     Ok(())
 }
 
-/// Writes all files or none: each first under another name, then all are renamed.
+/// Writes all files, each first under another name; only when all are there are they renamed, so a full disk leaves
+/// nothing behind. A rename that fails leaves those before it.
 ///
 /// # Errors
 /// [`Error::Write`].

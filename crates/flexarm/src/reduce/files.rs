@@ -1,4 +1,4 @@
-//! Files of a reduction: refused before the work if they are there, written all or none.
+//! Places and names of the files of a reduction.
 
 use std::path::{Component, Path, PathBuf};
 
@@ -65,7 +65,7 @@ impl Paths {
         check_free(&self.all(), self.overwrite)
     }
 
-    /// Writes all files or none.
+    /// Writes all files; see [`write_all`].
     pub(super) fn write(&self, files: &[(PathBuf, &[u8])]) -> Result<(), Error> {
         self.check()?;
         write_all(files)
