@@ -59,6 +59,10 @@ pub fn markdown(summary: &ReduceSummary) -> String {
         row(&vec!["---".to_owned(); table.header.len()]);
         table.rows.iter().for_each(|cells| row(cells));
     }
+    for path in &summary.files.pictures {
+        let name = std::path::Path::new(path).file_name().unwrap_or_default().to_string_lossy();
+        let _ = writeln!(page, "\n![{name}]({name})");
+    }
     if !summary.warnings.is_empty() {
         page += "\n## Warnings\n\n";
         for warning in &summary.warnings {
