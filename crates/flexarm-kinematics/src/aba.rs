@@ -2,21 +2,28 @@
 //!
 //! Every joint is either free (its force is given, its acceleration wanted) or prescribed (the other way
 //! round). A free elastic joint has a square, invertible motion subspace: it passes on exactly its own
-//! wrench and no inertia, so the tree falls apart there and each piece is solved by itself.
+//! wrench and no inertia, so the tree falls apart there and each piece is solved by itself. A modal body gathers what
+//! its interfaces carry into `H` over its frame and its n coordinates and eliminates the latter:
+//!
+//! ```text
+//! [ I_rr  H_rη ] [ A ]   [ p_r ]   [ F ]
+//! [ H_ηr  H_ηη ] [ η̈ ] + [ p_η ] = [ τ ]        I_A = I_rr - H_rη H_ηη^-1 H_ηr,   p_A = p_r + H_rη H_ηη^-1 (τ - p_η)
+//! ```
 //!
 //! Source: [Featherstone 2008], Table 7.1 (articulated bodies) and section 9.2 (hybrid dynamics).
 
-use nalgebra::{Cholesky, DVector, Matrix3, Vector3};
+use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Vector3};
 
-use crate::data::{Data, State, add_projection, joint_motion, subspace_times};
-use crate::model::{JointMotion, Model};
+use crate::data::{Data, State, add_projection, joint_motion, place_modal, subspace_times};
+use crate::model::{Body, JointMotion, Model};
 use crate::rnea::nonlinear_effects;
-use crate::spatial::{ArticulatedInertia, Twist, Wrench, mul, mul3, tr_mul, tr_mul3};
+use crate::spatial::{ArticulatedInertia, SpatialInertia, Twist, Wrench, mul, mul3, tr_mul, tr_mul3};
 
 /// Which joints are prescribed; the rest are free.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Roles {
     prescribed_body: Vec<bool>,
+    prescribed_modal: Vec<bool>,
     free_coordinates: Vec<usize>,
     /// A free coordinate moves several joints: the recursion does not apply, the mass matrix does.
     dense: bool,
@@ -33,18 +40,25 @@ impl Roles {
         Self::new(model, |k| k < model.n_actuated())
     }
 
-    /// Coordinates for which `prescribed(index)` holds; all six of an elastic joint follow its first.
+    /// Coordinates for which `prescribed(index)` holds; those of an elastic group follow its first.
     pub fn new(model: &Model, prescribed: impl Fn(usize) -> bool) -> Self {
-        let mut roles =
-            Self { prescribed_body: vec![false; model.bodies.len()], free_coordinates: vec![], dense: false };
+        let mut roles = Self {
+            prescribed_body: vec![false; model.bodies.len()],
+            prescribed_modal: model.modal.iter().map(|m| prescribed(m.coordinate)).collect(),
+            free_coordinates: vec![],
+            dense: false,
+        };
         for (i, body) in model.bodies.iter().enumerate().skip(1) {
-            roles.prescribed_body[i] = prescribed(body.coordinate);
+            // An interface has no coordinate of its own.
+            let own = !matches!(body.motion, JointMotion::Interface { .. });
+            roles.prescribed_body[i] = own && prescribed(body.coordinate);
         }
-        for (k, coordinate) in model.coordinates().iter().enumerate() {
-            if !roles.prescribed_body[coordinate.body] {
-                roles.free_coordinates.push(k);
-                let movers = model.bodies[1..].iter().filter(|b| b.coordinate == k).count();
-                roles.dense |= movers > 1;
+        let actuated = (0..model.n_actuated()).map(|k| (k, 1));
+        for (first, size) in actuated.chain(model.elastic().iter().map(|g| (g.coordinate, g.size))) {
+            if !prescribed(first) {
+                roles.free_coordinates.extend(first..first + size);
+                let moves = |b: &&Body| b.coordinate == first && !matches!(b.motion, JointMotion::Interface { .. });
+                roles.dense |= model.bodies[1..].iter().filter(moves).count() > 1;
             }
         }
         roles
@@ -95,14 +109,20 @@ fn solve(model: &Model, data: &mut Data, state: &State, roles: &Roles) {
     if roles.dense {
         solve_dense(model, data, state, roles);
     } else {
-        solve_articulated(model, data, state.q.as_slice(), state.qdot.as_slice(), &roles.prescribed_body);
+        solve_articulated(model, data, state.q.as_slice(), state.qdot.as_slice(), roles);
     }
 }
 
 #[inline(always)]
-fn solve_articulated(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], prescribed: &[bool]) {
-    let n = model.bodies.len();
+fn solve_articulated(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], roles: &Roles) {
+    let (n, prescribed) = (model.bodies.len(), &roles.prescribed_body);
     data.V[0] = Twist::zeros();
+    data.pA[0] = Wrench::zeros();
+    data.articulated[0] = ArticulatedInertia::from_rigid(&SpatialInertia::zeros());
+    place_modal(model, data, q);
+    if let Some(m) = model.bodies[0].modal {
+        begin_modal(model, data, 0, m, qdot);
+    }
     for (i, &is_prescribed) in prescribed.iter().enumerate().skip(1) {
         let body = &model.bodies[i];
         let (V_PB, bias) = joint_motion(model, data, i, q, qdot);
@@ -115,10 +135,20 @@ fn solve_articulated(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], pr
         data.bias[i] = c;
         data.pA[i] = V.cross_force(&body.inertia.mul_twist(&V)) - data.F_ext[i];
         data.articulated[i] = ArticulatedInertia::from_rigid(&body.inertia);
+        if let Some(m) = body.modal {
+            begin_modal(model, data, i, m, qdot);
+        }
     }
 
     for i in (1..n).rev() {
         let body = &model.bodies[i];
+        if let Some(m) = body.modal {
+            eliminate_modal(model, data, i, m, roles.prescribed_modal[m]);
+        }
+        if let JointMotion::Interface { modal, interface } = body.motion {
+            gather_interface(model, data, i, modal, interface);
+            continue;
+        }
         let (pA, c) = (data.pA[i], data.bias[i]);
         let (passed_inertia, passed_force) = match body.motion {
             _ if prescribed[i] => {
@@ -133,17 +163,18 @@ fn solve_articulated(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], pr
             JointMotion::Revolute(axis) => {
                 let I = &data.articulated[i];
                 let U = Wrench::new(mul(&I.coupling, &axis), mul(&I.angular, &axis));
-                let d = axis.dot(&U.torque);
+                let d = axis.dot(&U.torque) + body.armature;
                 let u = data.tau[body.coordinate] * body.ratio - axis.dot(&pA.torque);
                 one_dof_inward(data, i, U, d, u, &c, pA)
             }
             JointMotion::Prismatic(axis) => {
                 let I = &data.articulated[i];
                 let U = Wrench::new(mul(&I.linear, &axis), tr_mul(&I.coupling, &axis));
-                let d = axis.dot(&U.force);
+                let d = axis.dot(&U.force) + body.armature;
                 let u = data.tau[body.coordinate] * body.ratio - axis.dot(&pA.force);
                 one_dof_inward(data, i, U, d, u, &c, pA)
             }
+            JointMotion::Interface { .. } => continue,
         };
         if body.parent > 0 {
             let X_PB = data.X_PB[i];
@@ -156,6 +187,10 @@ fn solve_articulated(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], pr
     }
 
     data.A[0] = Twist::new(-model.gravity, Vector3::zeros());
+    if let Some(m) = model.bodies[0].modal {
+        eliminate_modal(model, data, 0, m, roles.prescribed_modal[m]);
+        finish_modal(model, data, 0, m, roles.prescribed_modal[m]);
+    }
     for (i, &is_prescribed) in prescribed.iter().enumerate().skip(1) {
         if is_prescribed {
             data.tau[model.bodies[i].coordinate] = 0.0;
@@ -169,10 +204,12 @@ fn solve_articulated(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], pr
         let k = body.coordinate;
         let A = data.A[body.parent].at_child(&data.X_PB[i]) + data.bias[i];
         data.A[i] = match body.motion {
+            JointMotion::Interface { .. } => A + subspace_times(model, data, i, data.qddot.as_slice()),
             _ if is_prescribed => {
                 let F = data.articulated[i].mul_twist(&A) + data.pA[i];
                 let S = data.elastic[i];
                 add_projection(model, &S, i, &F, data.tau.as_mut_slice());
+                data.tau[k] += body.armature * data.qddot[k];
                 A
             }
             JointMotion::Revolute(axis) => {
@@ -196,6 +233,93 @@ fn solve_articulated(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], pr
                 A_B
             }
         };
+        if let Some(m) = body.modal {
+            finish_modal(model, data, i, m, roles.prescribed_modal[m]);
+        }
+    }
+}
+
+/// Outward: own inertia and velocity terms of the modal body m on body i.
+#[inline(always)]
+fn begin_modal(model: &Model, data: &mut Data, i: usize, m: usize, qdot: &[f64]) {
+    let entry = &model.modal[m];
+    let (modal, shapes) = (&mut data.modal[m], &entry.tables.shapes);
+    data.pA[i] += modal.bias(&entry.tables, &data.V[i], &qdot[entry.coordinate..entry.coordinate + entry.n]);
+    data.articulated[i] += ArticulatedInertia::from_rigid(&modal.inertia);
+    modal.H.copy_from(&shapes.M);
+    for (k, column) in modal.columns.iter_mut().enumerate() {
+        *column = Wrench::new(shapes.C_t[k], modal.C_r[k]);
+    }
+}
+
+/// Inward: what hangs on interface body i, over the frame and the coordinates of its modal body.
+#[inline(always)]
+fn gather_interface(model: &Model, data: &mut Data, i: usize, m: usize, interface: usize) {
+    let (entry, S, X_PB) = (&model.modal[m], data.elastic[i], data.X_PB[i]);
+    let parent = model.bodies[i].parent;
+    let I = data.articulated[i];
+    let p = data.pA[i] + I.mul_twist(&data.bias[i]);
+    let shape = &entry.tables.shapes.interfaces[interface];
+    let modal = &mut data.modal[m];
+    let n = entry.n;
+    for k in 0..n {
+        let F = I.mul_twist(&shape.twist(k, &S.L, &S.B));
+        shape.project(&S.L, &S.B, &F, &mut modal.H.as_mut_slice()[k * n..(k + 1) * n]);
+        modal.columns[k] += F.at_parent(&X_PB);
+    }
+    shape.project(&S.L, &S.B, &p, &mut modal.f);
+    data.articulated[parent] += I.at_parent(&X_PB);
+    data.pA[parent] += p.at_parent(&X_PB);
+}
+
+/// Inward: takes the coordinates of the modal body out of the articulated inertia of body i.
+#[inline(always)]
+fn eliminate_modal(model: &Model, data: &mut Data, i: usize, m: usize, prescribed: bool) {
+    let (entry, modal) = (&model.modal[m], &mut data.modal[m]);
+    let range = entry.coordinate..entry.coordinate + entry.n;
+    if prescribed {
+        for (F, a) in modal.columns.iter().zip(&data.qddot.as_slice()[range]) {
+            data.pA[i] += *F * *a;
+        }
+        return;
+    }
+    let mut H = modal.factor.take().map_or_else(|| DMatrix::zeros(entry.n, entry.n), Cholesky::unpack_dirty);
+    H.copy_from(&modal.H);
+    let factor = Cholesky::new(H).expect("the mass matrix of a modal body with its load is positive definite");
+    for (k, F) in modal.columns.iter().enumerate() {
+        let (f, t) = (&F.force, &F.torque);
+        for (c, value) in [f.x, f.y, f.z, t.x, t.y, t.z].into_iter().enumerate() {
+            modal.solved[(k, c)] = value;
+        }
+        modal.solved[(k, 6)] = data.tau[entry.coordinate + k] - modal.f[k];
+    }
+    factor.solve_mut(&mut modal.solved);
+    let I = &mut data.articulated[i];
+    for (k, F) in modal.columns.iter().enumerate() {
+        let s = |c: usize| modal.solved[(k, c)];
+        let (f, t) = (Vector3::new(s(0), s(1), s(2)), Vector3::new(s(3), s(4), s(5)));
+        I.linear -= F.force * f.transpose();
+        I.coupling -= F.force * t.transpose();
+        I.angular -= F.torque * t.transpose();
+        data.pA[i] += *F * s(6);
+    }
+    modal.factor = Some(factor);
+}
+
+/// Outward: accelerations of the coordinates of the modal body, or the forces they need.
+#[inline(always)]
+fn finish_modal(model: &Model, data: &mut Data, i: usize, m: usize, prescribed: bool) {
+    let (entry, modal, A) = (&model.modal[m], &data.modal[m], data.A[i]);
+    for k in 0..entry.n {
+        if prescribed {
+            let range = entry.coordinate..entry.coordinate + entry.n;
+            let own: f64 = modal.H.row(k).iter().zip(&data.qddot.as_slice()[range]).map(|(h, a)| h * a).sum();
+            data.tau[entry.coordinate + k] = own + A.power(&modal.columns[k]) + modal.f[k];
+        } else {
+            let s = |c: usize| modal.solved[(k, c)];
+            let rest = Wrench::new(Vector3::new(s(0), s(1), s(2)), Vector3::new(s(3), s(4), s(5)));
+            data.qddot[entry.coordinate + k] = s(6) - A.power(&rest);
+        }
     }
 }
 

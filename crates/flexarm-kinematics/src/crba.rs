@@ -2,16 +2,18 @@
 //!
 //! The composite inertia of everything outward of B acts on B's motion subspace; the resulting wrench,
 //! carried inward, gives one column of M. An elastic joint is six columns at once, as 3×3 blocks in its parent's
-//! axes, where its translations are constant. Source: [Featherstone 2008], Table 6.2.
+//! axes, where its translations are constant. The coordinates of a modal body are n columns more: its own `C_t` and `C_r`
+//! and what its interfaces carry. Source: [Featherstone 2008], Table 6.2.
 
 use nalgebra::{DMatrix, DVector, Matrix3};
 
-use crate::data::{Data, joint_position};
+use crate::data::{Data, ElasticSubspace, joint_position, place_modal};
 use crate::model::{JointMotion, Model};
 use crate::spatial::{SpatialInertia, Wrench, cross3, mul, mul3, tr_mul, tr_mul3};
 
 /// Mass matrix `M(q)`, nv×nv, both triangles (kg, kg m, kg m²). Fills `data.{X_PB, M}`. No allocation.
 pub fn mass_matrix<'d>(model: &Model, data: &'d mut Data, q: &DVector<f64>) -> &'d DMatrix<f64> {
+    place_modal(model, data, q.as_slice());
     for i in 1..model.bodies.len() {
         joint_position(model, data, i, q.as_slice());
     }
@@ -27,6 +29,14 @@ pub fn mass_matrix_at_poses(model: &Model, data: &mut Data) {
     }
     data.M.as_mut_slice().fill(0.0);
     let nv = data.M.nrows();
+    for (entry, modal) in model.modal.iter().zip(&mut data.modal) {
+        data.composite[entry.body] += modal.inertia;
+        let (c, shapes) = (entry.coordinate, &entry.tables.shapes);
+        data.M.view_mut((c, c), (entry.n, entry.n)).copy_from(&shapes.M);
+        for (k, column) in modal.columns.iter_mut().enumerate() {
+            *column = Wrench::new(shapes.C_t[k], modal.C_r[k]);
+        }
+    }
     for i in (1..n).rev() {
         let body = &model.bodies[i];
         let (composite, X_PB) = (data.composite[i], data.X_PB[i]);
@@ -35,16 +45,26 @@ pub fn mass_matrix_at_poses(model: &Model, data: &mut Data) {
             JointMotion::Revolute(axis) => {
                 let a = axis * body.ratio;
                 let F = Wrench::new(a.cross(&composite.first_moment), mul(&composite.rotational, &a));
-                data.M.as_mut_slice()[k * nv + k] += a.dot(&F.torque);
+                data.M.as_mut_slice()[k * nv + k] += a.dot(&F.torque) + body.ratio * body.ratio * body.armature;
                 data.U[i] = F;
             }
             JointMotion::Prismatic(axis) => {
                 let a = axis * body.ratio;
                 let F = Wrench::new(a * composite.mass, composite.first_moment.cross(&a));
-                data.M.as_mut_slice()[k * nv + k] += a.dot(&F.force);
+                data.M.as_mut_slice()[k * nv + k] += a.dot(&F.force) + body.ratio * body.ratio * body.armature;
                 data.U[i] = F;
             }
             JointMotion::Elastic(_) => elastic_columns(model, data, i, &composite),
+            JointMotion::Interface { modal, interface } => {
+                interface_columns(model, data, i, modal, interface, &composite)
+            }
+        }
+        if let Some(m) = body.modal {
+            let entry = &model.modal[m];
+            for (k, F) in data.modal[m].columns.iter().enumerate() {
+                let column = entry.coordinate + k;
+                meet(model, &data.elastic, data.M.as_mut_slice(), nv, i, column, F);
+            }
         }
         if body.parent > 0 {
             data.composite[body.parent] += composite.at_parent(&X_PB);
@@ -64,7 +84,7 @@ fn carry_columns(model: &Model, data: &mut Data, i: usize) {
     let M = data.M.as_mut_slice();
     let outward = i..model.bodies[i].subtree_end;
     for (F, body) in data.U[outward.clone()].iter_mut().zip(&model.bodies[outward]) {
-        if matches!(body.motion, JointMotion::Elastic(_)) {
+        if matches!(body.motion, JointMotion::Elastic(_) | JointMotion::Interface { .. }) {
             continue;
         }
         *F = F.at_parent(&X_PB);
@@ -77,7 +97,62 @@ fn carry_columns(model: &Model, data: &mut Data, i: usize) {
                 let (f, t) = (tr_mul(&S.L, &F.force), tr_mul(&S.B, &F.torque));
                 add_six(M, nv, row, column, [f.x, f.y, f.z, t.x, t.y, t.z]);
             }
+            JointMotion::Interface { .. } => meet(model, &data.elastic, M, nv, parent, column, F),
         }
+    }
+    for (entry, modal) in model.modal.iter().zip(&mut data.modal) {
+        if (i..model.bodies[i].subtree_end).contains(&entry.body) {
+            for (k, F) in modal.columns.iter_mut().enumerate() {
+                *F = F.at_parent(&X_PB);
+                meet(model, &data.elastic, M, nv, parent, entry.coordinate + k, F);
+            }
+        }
+    }
+}
+
+/// Adds `Sᵀ F` of the joint that moves body j to one column, and the mirror image; F at Bo in B axes of that body.
+#[inline(always)]
+fn meet(model: &Model, elastic: &[ElasticSubspace], M: &mut [f64], nv: usize, j: usize, column: usize, F: &Wrench) {
+    let body = &model.bodies[j];
+    let row = body.coordinate;
+    match body.motion {
+        JointMotion::Revolute(axis) => add_pair(M, nv, row, column, body.ratio * axis.dot(&F.torque)),
+        JointMotion::Prismatic(axis) => add_pair(M, nv, row, column, body.ratio * axis.dot(&F.force)),
+        JointMotion::Elastic(_) => {
+            let S = &elastic[j];
+            let (f, t) = (tr_mul(&S.L, &F.force), tr_mul(&S.B, &F.torque));
+            add_six(M, nv, row, column, [f.x, f.y, f.z, t.x, t.y, t.z]);
+        }
+        JointMotion::Interface { modal, interface } => {
+            let (S, entry) = (&elastic[j], &model.modal[modal]);
+            let (f, t) = (tr_mul(&S.L, &F.force), tr_mul(&S.B, &F.torque));
+            let columns = entry.tables.shapes.interfaces[interface].Phi.as_slice().chunks_exact(6);
+            for (k, c) in columns.enumerate() {
+                let value = c[0] * f.x + c[1] * f.y + c[2] * f.z + c[3] * t.x + c[4] * t.y + c[5] * t.z;
+                add_pair(M, nv, row + k, column, value);
+            }
+        }
+    }
+}
+
+/// What the composite body behind an interface adds to the coordinates of its modal body.
+#[inline(always)]
+fn interface_columns(
+    model: &Model,
+    data: &mut Data,
+    i: usize,
+    modal: usize,
+    interface: usize,
+    composite: &SpatialInertia,
+) {
+    let (entry, S) = (&model.modal[modal], data.elastic[i]);
+    let (nv, c) = (data.M.nrows(), entry.coordinate);
+    let shape = &entry.tables.shapes.interfaces[interface];
+    let M = data.M.as_mut_slice();
+    for (k, column) in data.modal[modal].columns.iter_mut().enumerate() {
+        let F = composite.mul_twist(&shape.twist(k, &S.L, &S.B));
+        shape.project(&S.L, &S.B, &F, &mut M[(c + k) * nv + c..][..entry.n]);
+        *column += F.at_parent(&data.X_PB[i]);
     }
 }
 
@@ -171,6 +246,17 @@ fn elastic_columns(model: &Model, data: &mut Data, i: usize, composite: &Spatial
                     };
                     add_six(M, nv, row, k + c, six(&tt, &rt));
                     add_six(M, nv, row, k + 3 + c, six(&tr, &rr));
+                }
+            }
+            JointMotion::Interface { modal, interface } => {
+                let (S, entry) = (&data.elastic[j], &model.modal[modal]);
+                let shape = &entry.tables.shapes.interfaces[interface];
+                for m in 0..entry.n {
+                    let column = shape.twist(m, &S.L, &S.B);
+                    let (l, a) = (tr_mul(&R_AP, &column.linear), tr_mul(&R_AP, &column.angular));
+                    let t = tr_mul(U, &(l * mass + a.cross(&(r * mass + h_B))));
+                    let q = tr_mul(&force_r, &l) + tr_mul(&W, &a) - tr_mul(&Omega, &a.cross(&r).cross(&h_B));
+                    add_six(M, nv, k, row + m, [t.x, t.y, t.z, q.x, q.y, q.z]);
                 }
             }
         }

@@ -5,7 +5,9 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
+use crate::modal::ModalData;
 use crate::model::{JointMotion, Model};
+use crate::rotation::ElasticAngles;
 use crate::spatial::{ArticulatedInertia, Pose, SpatialInertia, Twist, Wrench, mul, mul3, tr_mul};
 
 /// Positions and velocities of all independent coordinates, in the model's coordinate order.
@@ -24,7 +26,7 @@ impl State {
     }
 }
 
-/// Motion subspace of an elastic joint in B axes: `V_PB_B = [L d'; B angles']`.
+/// Motion subspace of an elastic joint or an interface in B axes: `V_PB_B = [L d'; B angles']`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ElasticSubspace {
     /// `R_PBᵀ` on the translation rates.
@@ -65,6 +67,10 @@ pub struct Data {
     pub(crate) inverse_d: Vec<f64>,
     pub(crate) u: Vec<f64>,
     pub(crate) scratch: Vec<f64>,
+    /// One per modal body.
+    pub(crate) modal: Vec<ModalData>,
+    /// Kinetic energy of the rotors in the last velocity pass.
+    pub(crate) rotor_energy: f64,
 }
 
 impl Data {
@@ -91,6 +97,8 @@ impl Data {
             inverse_d: vec![0.0; n],
             u: vec![0.0; n],
             scratch: vec![0.0; model.nv()],
+            modal: model.modal.iter().map(|m| ModalData::new(&m.tables)).collect(),
+            rotor_energy: 0.0,
         }
     }
 
@@ -133,6 +141,18 @@ pub(crate) fn joint_motion(model: &Model, data: &mut Data, i: usize, q: &[f64], 
             // d(R_PBᵀ)/dt d' = -w × (R_PBᵀ d')
             (V, Twist::new(V.linear.cross(&V.angular), kin.bias))
         }
+        JointMotion::Interface { modal, interface } => {
+            let modal = &model.modal[modal];
+            let shape = &modal.tables.shapes.interfaces[interface];
+            let (d, phi) = shape.times(&q[k..k + modal.n]);
+            let (ddot, rates) = shape.times(&qdot[k..k + modal.n]);
+            let kin = ElasticAngles::RotationVector.kinematics(&phi, &rates);
+            place_elastic(&mut data.X_PB[i], &body.X_PJ, &kin.R, &d);
+            let L = kin.R.transpose();
+            data.elastic[i] = ElasticSubspace { L, B: kin.B };
+            let V = Twist::new(mul(&L, &ddot), mul(&kin.B, &rates));
+            (V, Twist::new(V.linear.cross(&V.angular), kin.bias))
+        }
     }
 }
 
@@ -160,6 +180,27 @@ pub(crate) fn joint_position(model: &Model, data: &mut Data, i: usize, q: &[f64]
             place_elastic(&mut data.X_PB[i], &body.X_PJ, &R, &Vector3::new(q[k], q[k + 1], q[k + 2]));
             data.elastic[i] = ElasticSubspace { L: R.transpose(), B };
         }
+        JointMotion::Interface { modal, interface } => {
+            let modal = &model.modal[modal];
+            let (d, phi) = modal.tables.shapes.interfaces[interface].times(&q[k..k + modal.n]);
+            let (R, B) = ElasticAngles::RotationVector.pose(&phi);
+            place_elastic(&mut data.X_PB[i], &body.X_PJ, &R, &d);
+            data.elastic[i] = ElasticSubspace { L: R.transpose(), B };
+        }
+    }
+}
+
+/// `Σ ½ a q̇²` of the rotors.
+#[inline(always)]
+pub(crate) fn rotor_energy(model: &Model, qdot: &[f64]) -> f64 {
+    model.rotors.iter().map(|&(k, a)| 0.5 * a * qdot[k] * qdot[k]).sum()
+}
+
+/// Mass integrals of all modal bodies at the coordinates; fills `modal`.
+#[inline(always)]
+pub(crate) fn place_modal(model: &Model, data: &mut Data, q: &[f64]) {
+    for (modal, entry) in data.modal.iter_mut().zip(&model.modal) {
+        modal.place(&entry.tables, &q[entry.coordinate..entry.coordinate + entry.n]);
     }
 }
 
@@ -184,6 +225,11 @@ pub(crate) fn subspace_times(model: &Model, data: &Data, i: usize, qddot: &[f64]
                 mul(&S.B, &Vector3::new(qddot[k + 3], qddot[k + 4], qddot[k + 5])),
             )
         }
+        JointMotion::Interface { modal, interface } => {
+            let (S, modal) = (&data.elastic[i], &model.modal[modal]);
+            let (d, phi) = modal.tables.shapes.interfaces[interface].times(&qddot[k..k + modal.n]);
+            Twist::new(mul(&S.L, &d), mul(&S.B, &phi))
+        }
     }
 }
 
@@ -202,6 +248,11 @@ pub(crate) fn add_projection(model: &Model, data_elastic: &ElasticSubspace, i: u
                 tau[k + c] += f[c];
                 tau[k + 3 + c] += t[c];
             }
+        }
+        JointMotion::Interface { modal, interface } => {
+            let modal = &model.modal[modal];
+            let shape = &modal.tables.shapes.interfaces[interface];
+            shape.project(&data_elastic.L, &data_elastic.B, F, &mut tau[k..k + modal.n]);
         }
     }
 }

@@ -5,6 +5,7 @@ use nalgebra::Vector3;
 use crate::data::{Data, State};
 use crate::kinematics::{forward_kinematics, forward_kinematics_velocity};
 use crate::model::Model;
+use crate::spatial::{Pose, SpatialInertia, Wrench};
 
 /// Kinetic energy (J); fills `data.{X_PB, X_WB, V}`.
 pub fn kinetic_energy(model: &Model, data: &mut Data, state: &State) -> f64 {
@@ -12,10 +13,25 @@ pub fn kinetic_energy(model: &Model, data: &mut Data, state: &State) -> f64 {
     kinetic_energy_of(model, data)
 }
 
-/// Kinetic energy (J) for the twists that another algorithm left in `data.V`.
+/// Kinetic energy (J), rotors included, for the twists that another algorithm left in `data.V`.
 pub fn kinetic_energy_of(model: &Model, data: &Data) -> f64 {
     let bodies = model.bodies.iter().zip(&data.V).skip(1);
-    bodies.map(|(body, V)| 0.5 * V.power(&body.inertia.mul_twist(V))).sum()
+    let rigid: f64 = bodies.map(|(body, V)| 0.5 * V.power(&body.inertia.mul_twist(V))).sum();
+    let modal = model.modal.iter().zip(&data.modal);
+    data.rotor_energy
+        + rigid
+        + modal.map(|(entry, modal)| modal.kinetic_energy(&entry.tables, &data.V[entry.body])).sum::<f64>()
+}
+
+/// Momentum of all moving bodies about the world origin, world axes (kg m/s; kg m²/s), for the poses and twists that
+/// another algorithm left in `data.X_WB` and `data.V`.
+pub fn momentum_of(model: &Model, data: &Data) -> Wrench {
+    let bodies = model.bodies.iter().zip(&data.V).zip(&data.X_WB).skip(1);
+    let rigid = bodies.map(|((body, V), X)| body.inertia.mul_twist(V).at_parent(X));
+    let modal = model.modal.iter().zip(&data.modal);
+    let modal = modal
+        .map(|(entry, modal)| modal.momentum(&entry.tables, &data.V[entry.body]).at_parent(&data.X_WB[entry.body]));
+    rigid.chain(modal).fold(Wrench::zeros(), |sum, p| sum + p)
 }
 
 /// Potential energy of gravity (J), zero at the world origin; fills `data.{X_PB, X_WB}`.
@@ -36,7 +52,9 @@ pub fn center_of_mass(model: &Model, data: &Data) -> Vector3<f64> {
 
 fn first_moment(model: &Model, data: &Data) -> Vector3<f64> {
     let bodies = model.bodies.iter().zip(&data.X_WB).skip(1);
-    bodies
-        .map(|(body, X)| X.rotation * body.inertia.first_moment + X.translation.vector * body.inertia.mass)
-        .fold(Vector3::zeros(), |sum, h| sum + h)
+    let in_world =
+        |inertia: &SpatialInertia, X: &Pose| X.rotation * inertia.first_moment + X.translation.vector * inertia.mass;
+    let rigid = bodies.map(|(body, X)| in_world(&body.inertia, X));
+    let modal = model.modal.iter().zip(&data.modal).map(|(entry, m)| in_world(&m.inertia, &data.X_WB[entry.body]));
+    rigid.chain(modal).fold(Vector3::zeros(), |sum, h| sum + h)
 }

@@ -5,12 +5,14 @@
 
 use nalgebra::{Matrix6xX, Vector3};
 
-use crate::data::{Data, State, joint_motion, joint_position};
+use crate::data::{Data, State, joint_motion, joint_position, place_modal, rotor_energy};
 use crate::model::{Frame, JointMotion, Model};
+use crate::rotation::ElasticAngles;
 use crate::spatial::{Pose, Twist, mul, mul3};
 
 /// Poses of all bodies: fills `data.{X_PB, X_WB}`.
 pub fn forward_kinematics(model: &Model, data: &mut Data, q: &nalgebra::DVector<f64>) {
+    place_modal(model, data, q.as_slice());
     for i in 1..model.bodies.len() {
         joint_position(model, data, i, q.as_slice());
     }
@@ -20,6 +22,11 @@ pub fn forward_kinematics(model: &Model, data: &mut Data, q: &nalgebra::DVector<
 /// Poses and twists of all bodies: fills `data.{X_PB, X_WB, V}`.
 pub fn forward_kinematics_velocity(model: &Model, data: &mut Data, state: &State) {
     data.V[0] = Twist::zeros();
+    data.rotor_energy = rotor_energy(model, state.qdot.as_slice());
+    place_modal(model, data, state.q.as_slice());
+    for (modal, entry) in data.modal.iter_mut().zip(&model.modal) {
+        modal.rates.copy_from_slice(&state.qdot.as_slice()[entry.coordinate..entry.coordinate + entry.n]);
+    }
     for i in 1..model.bodies.len() {
         let (V_PB, bias) = joint_motion(model, data, i, state.q.as_slice(), state.qdot.as_slice());
         data.bias[i] = bias;
@@ -78,6 +85,13 @@ pub fn frame_jacobian(model: &Model, data: &Data, frame: &Frame, J: &mut Matrix6
                     add(body.coordinate + 3 + c, Vector3::zeros(), B.column(c).into());
                 }
             }
+            JointMotion::Interface { modal, interface } => {
+                let (S, modal) = (&data.elastic[i], &model.modal[modal]);
+                for c in 0..modal.n {
+                    let column = modal.tables.shapes.interfaces[interface].twist(c, &S.L, &S.B);
+                    add(body.coordinate + c, R * column.linear, R * column.angular);
+                }
+            }
         }
         i = body.parent;
     }
@@ -132,6 +146,23 @@ pub fn frame_jacobian_derivative(model: &Model, data: &Data, state: &State, fram
                     add(k + c, w_P.cross(&l), Vector3::zeros(), Vector3::zeros());
                     let a: Vector3<f64> = B.column(c).into();
                     add(k + 3 + c, Vector3::zeros(), a, w_B.cross(&a) + Bdot_W.column(c));
+                }
+            }
+            JointMotion::Interface { modal, interface } => {
+                let (S, modal) = (&data.elastic[i], &model.modal[modal]);
+                let shape = &modal.tables.shapes.interfaces[interface];
+                let range = body.coordinate..body.coordinate + modal.n;
+                let (_, phi) = shape.times(&state.q.as_slice()[range.clone()]);
+                let (_, rates) = shape.times(&state.qdot.as_slice()[range]);
+                let Bdot = ElasticAngles::RotationVector.rate_map_derivative(&phi, &rates);
+                let w_P = w_B - R * (S.B * rates);
+                for c in 0..modal.n {
+                    let column = shape.twist(c, &S.L, &S.B);
+                    let (l, a) = (R * column.linear, R * column.angular);
+                    let turned = R * shape.twist(c, &S.L, &Bdot).angular;
+                    // Both parts of the column belong to one coordinate.
+                    let linear = w_P.cross(&l);
+                    add(body.coordinate + c, linear, a, w_B.cross(&a) + turned);
                 }
             }
         }

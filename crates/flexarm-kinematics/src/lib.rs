@@ -40,6 +40,7 @@ mod energy;
 mod inverse_kinematics;
 mod kinematics;
 mod mechanism;
+mod modal;
 mod model;
 mod rnea;
 mod rotation;
@@ -48,14 +49,17 @@ mod spatial;
 pub use aba::{Roles, forward_dynamics, hybrid_dynamics};
 pub use crba::{mass_matrix, mass_matrix_at_poses};
 pub use data::{Data, State};
-pub use energy::{center_of_mass, kinetic_energy, kinetic_energy_of, potential_energy, potential_energy_of};
+pub use energy::{
+    center_of_mass, kinetic_energy, kinetic_energy_of, momentum_of, potential_energy, potential_energy_of,
+};
 pub use inverse_kinematics::{IkError, IkOptions, inverse_kinematics};
 pub use kinematics::{
     forward_kinematics, forward_kinematics_velocity, frame_jacobian, frame_jacobian_derivative, frame_twist,
     world_poses,
 };
 pub use mechanism::{Joint, JointKind, Limits, Link, LinkInertia, Mechanism, Mimic};
-pub use model::{Body, Coordinate, Frame, JointMotion, Model, ModelError};
+pub use modal::{InterfaceShape, ModalBody};
+pub use model::{Body, Coordinate, ElasticGroup, Frame, JointMotion, Model, ModelError};
 pub use rnea::{gravity_forces, inverse_dynamics, nonlinear_effects};
 pub use rotation::{AngleKinematics, ElasticAngles, rotation_vector};
 pub use spatial::{ArticulatedInertia, Pose, SpatialInertia, Twist, Wrench, adjoint, skew};

@@ -4,8 +4,11 @@
 //! [`crate::Model::new`] checks it once and turns it into the immutable tree that the recursions read.
 //! Start at [`Mechanism`]. Not here: any computation.
 
+use std::sync::Arc;
+
 use nalgebra::{Matrix3, Unit, Vector3};
 
+use crate::modal::ModalBody;
 use crate::rotation::ElasticAngles;
 use crate::spatial::{Pose, SpatialInertia};
 
@@ -18,6 +21,8 @@ pub struct Mechanism {
     pub links: Vec<Link>,
     /// All joints, in the order of the source.
     pub joints: Vec<Joint>,
+    /// Links that bend in modes, by name; their mass is in the modal body, beside the link's own inertia.
+    pub modal: Vec<(String, Arc<ModalBody>)>,
     /// Acceleration of gravity in world (= base link) axes (m/s²).
     pub gravity: Vector3<f64>,
 }
@@ -66,6 +71,8 @@ pub struct Joint {
     pub limits: Limits,
     /// Set when this joint follows another one.
     pub mimic: Option<Mimic>,
+    /// Inertia of the rotor seen from the joint, ratio² times its own (kg m² or kg); only on one-DoF joints.
+    pub armature: f64,
 }
 
 /// What a joint lets move. Axes are unit vectors in the joint frame.
@@ -81,14 +88,21 @@ pub enum JointKind {
     Prismatic(Unit<Vector3<f64>>),
     /// Six small elastic coordinates: translation in P axes, then three angles.
     Elastic(ElasticAngles),
+    /// One small elastic rotation (the spring of a gearbox).
+    ElasticRevolute(Unit<Vector3<f64>>),
+    /// One small elastic translation.
+    ElasticPrismatic(Unit<Vector3<f64>>),
+    /// Interface of that number of the parent link, which must have a [`ModalBody`]: moves with its coordinates.
+    Interface(usize),
 }
 
 impl JointKind {
-    /// Number of coordinates.
+    /// Number of coordinates of its own.
     pub fn degrees_of_freedom(&self) -> usize {
         match self {
-            Self::Fixed => 0,
+            Self::Fixed | Self::Interface(_) => 0,
             Self::Revolute(_) | Self::Continuous(_) | Self::Prismatic(_) => 1,
+            Self::ElasticRevolute(_) | Self::ElasticPrismatic(_) => 1,
             Self::Elastic(_) => 6,
         }
     }
@@ -100,7 +114,8 @@ impl JointKind {
             Self::Revolute(_) => "revolute",
             Self::Continuous(_) => "continuous",
             Self::Prismatic(_) => "prismatic",
-            Self::Elastic(_) => "elastic",
+            Self::Elastic(_) | Self::ElasticRevolute(_) | Self::ElasticPrismatic(_) => "elastic",
+            Self::Interface(_) => "interface",
         }
     }
 }
@@ -138,7 +153,13 @@ pub struct Mimic {
 impl Mechanism {
     /// A mechanism without links, under standard gravity along -z.
     pub fn new(name: impl Into<String>) -> Self {
-        Self { name: name.into(), links: Vec::new(), joints: Vec::new(), gravity: Vector3::new(0.0, 0.0, -9.81) }
+        Self {
+            name: name.into(),
+            links: Vec::new(),
+            joints: Vec::new(),
+            modal: Vec::new(),
+            gravity: Vector3::new(0.0, 0.0, -9.81),
+        }
     }
 
     /// The link of that name.
@@ -174,6 +195,7 @@ impl Joint {
             X_PJ,
             limits: Limits::NONE,
             mimic: None,
+            armature: 0.0,
         }
     }
 }

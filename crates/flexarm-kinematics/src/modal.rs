@@ -1,0 +1,318 @@
+//! A body that bends in modes: floating frame of reference with its frame at the proximal interface.
+//!
+//! A point at `s` of the undeformed body stands at `r = s + Σ φ_k(s) η_k`, body axes, with shapes that vanish where the
+//! body hangs on its parent. With a kinetic energy that is exact in η (second order included) the equations of motion
+//! need no more than mass integrals:
+//!
+//! ```text
+//! h   = ∫ r dm            = S + C_t η                                    (1)
+//! Q_k = ∫ φ_k rᵀ dm       = P_kᵀ + Σ_l N_kl η_l                          (2)
+//! J   = ∫ (r·r 1 - r rᵀ)  = J_0 + tr(E) 1 - E,   E = Σ_k η_k (P_k + Q_k) (3)
+//! C_r,k = ∫ r × φ_k dm    = C_r0,k + axial(Σ_l N_kl η_l)                 (4)
+//!
+//! [ F ]   [ m 1    -[h]x   C_t ] [ a ]   [ 2 ω × C_t η̇ + ω × (ω × h)                              ]
+//! [ T ] = [ [h]x    J      C_r ] [ α ] + [ ω × J ω + 2 (tr W 1 - Wᵀ) ω                              ]   (5)
+//! [ f ]   [ C_tᵀ    C_rᵀ   M_e ] [ η̈ ]   [ 2 ω · Σ_l η̇_l g_lk + ωᵀ Q_k ω - tr(Q_k) ω·ω             ]
+//!
+//! W = ∫ r (dr/dt)ᵀ dm = (Σ_k η̇_k Q_k)ᵀ,   g_lk = ∫ φ_l × φ_k dm;   a = v̇ + ω × v in body axes
+//! ```
+//! What turns with the sections (rotary inertia of beams) enters `J_0`, `C_r0` and `M_e` as constants.
+//!
+//! Start at [`ModalBody`]. Sources: [Shabana 2013], chapter 5; [Wallrapp 1994] for the set of integrals.
+//! Not here: stiffness and damping of the modes, where shapes come from.
+
+use nalgebra::{Cholesky, DMatrix, Dyn, Matrix3, Matrix6xX, Vector3};
+
+use crate::spatial::{Pose, SpatialInertia, Twist, Wrench, mul, tr_mul};
+
+/// Shapes at the interfaces and mass integrals over them; n coordinates, link axes, about the link's origin. SI units.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModalBody {
+    /// Mass (kg).
+    pub mass: f64,
+    /// `∫ s dm` (kg m).
+    pub first_moment: Vector3<f64>,
+    /// Inertia about the origin, undeformed (kg m²).
+    pub inertia: Matrix3<f64>,
+    /// `∫ φ_k dm`, one per coordinate.
+    pub C_t: Vec<Vector3<f64>>,
+    /// `∫ s × φ_k dm`, with the rotary inertia of sections.
+    pub C_r: Vec<Vector3<f64>>,
+    /// `P_k[a,b] = ∫ s_a φ_k,b dm`.
+    pub P: Vec<Matrix3<f64>>,
+    /// `N[k n + l][a,b] = ∫ φ_k,a φ_l,b dm`; empty: terms of second order in the deformation are left out.
+    pub N: Vec<Matrix3<f64>>,
+    /// Modal mass, n×n.
+    pub M: DMatrix<f64>,
+    /// Every interface but the proximal one.
+    pub interfaces: Vec<InterfaceShape>,
+}
+
+/// How one interface moves with the coordinates.
+#[derive(Clone, Debug, PartialEq)]
+pub struct InterfaceShape {
+    /// Its frame in the link, undeformed.
+    pub X_LI: Pose,
+    /// Displacement of its origin and rotation vector per coordinate, link axes, 6×n.
+    pub Phi: Matrix6xX<f64>,
+}
+
+impl ModalBody {
+    /// Number of coordinates.
+    pub fn n(&self) -> usize {
+        self.C_t.len()
+    }
+
+    /// Mass properties undeformed, about the link's origin.
+    pub fn undeformed(&self) -> SpatialInertia {
+        SpatialInertia { mass: self.mass, first_moment: self.first_moment, rotational: self.inertia }
+    }
+
+    /// What is wrong with its sizes, if anything.
+    pub(crate) fn fault(&self) -> Option<&'static str> {
+        let n = self.n();
+        let shapes = self.interfaces.iter().all(|i| i.Phi.ncols() == n);
+        let sizes = self.C_r.len() == n && self.P.len() == n && self.M.shape() == (n, n);
+        let second = self.N.is_empty() || self.N.len() == n * n;
+        let finite = self.M.iter().chain(self.interfaces.iter().flat_map(|i| i.Phi.iter())).all(|x| x.is_finite());
+        match (n > 0, shapes && sizes && second, finite && self.mass.is_finite()) {
+            (false, ..) => Some("the number of modal coordinates, which must be positive,"),
+            (_, false, _) => Some("the size of its modal matrices, which do not fit each other,"),
+            (.., false) => Some("an entry of its modal matrices"),
+            _ => None,
+        }
+    }
+}
+
+/// A modal body as the recursions read it.
+#[derive(Clone, Debug)]
+pub(crate) struct ModalTables {
+    pub(crate) shapes: ModalBody,
+    /// (2): column l holds `N_kl` of all k, each column-major.
+    N: DMatrix<f64>,
+    /// Column l holds `g_lk` of all k.
+    g: DMatrix<f64>,
+    /// `P_kᵀ` of all k, column-major.
+    Pt: Vec<f64>,
+    /// `C_r0,k - axial(P_kᵀ)`: what the rotary inertia of sections adds.
+    C_rotary: Vec<Vector3<f64>>,
+}
+
+/// `∫ r × φ` from `Q = ∫ φ rᵀ`.
+#[inline(always)]
+fn axial(Q: &Matrix3<f64>) -> Vector3<f64> {
+    Vector3::new(Q[(2, 1)] - Q[(1, 2)], Q[(0, 2)] - Q[(2, 0)], Q[(1, 0)] - Q[(0, 1)])
+}
+
+impl ModalTables {
+    pub(crate) fn new(shapes: &ModalBody) -> Self {
+        let n = shapes.n();
+        let second = !shapes.N.is_empty();
+        let mut N = DMatrix::zeros(if second { 9 * n } else { 0 }, n);
+        let mut g = DMatrix::zeros(if second { 3 * n } else { 0 }, n);
+        if second {
+            for k in 0..n {
+                for l in 0..n {
+                    let N_kl = &shapes.N[k * n + l];
+                    N.view_mut((9 * k, l), (9, 1)).copy_from_slice(N_kl.as_slice());
+                    // ∫ φ_l × φ_k = axial(∫ φ_k φ_lᵀ)
+                    g.view_mut((3 * k, l), (3, 1)).copy_from(&axial(N_kl));
+                }
+            }
+        }
+        let Pt: Vec<f64> = shapes.P.iter().flat_map(|P| P.transpose().as_slice().to_vec()).collect();
+        let C_rotary = shapes.C_r.iter().zip(&shapes.P).map(|(c, P)| c - axial(&P.transpose())).collect();
+        Self { shapes: shapes.clone(), N, g, Pt, C_rotary }
+    }
+}
+
+/// Configuration, momentum terms and workspaces of one modal body.
+#[derive(Clone, Debug)]
+pub(crate) struct ModalData {
+    /// `η̇` of the last velocity pass.
+    pub(crate) rates: Vec<f64>,
+    /// (1) and (3) with the mass: the body as if it were rigid now.
+    pub(crate) inertia: SpatialInertia,
+    /// (2), column-major.
+    Q: Vec<f64>,
+    g_rate: Vec<f64>,
+    /// (4).
+    pub(crate) C_r: Vec<Vector3<f64>>,
+    /// Generalised forces on the coordinates.
+    pub(crate) f: Vec<f64>,
+    /// Wrench columns of the mass matrix, or `H_rη` of the articulated recursion.
+    pub(crate) columns: Vec<Wrench>,
+    /// `H_ηη` and its factor's storage.
+    pub(crate) H: DMatrix<f64>,
+    pub(crate) factor: Option<Cholesky<f64, Dyn>>,
+    /// `H_ηη^-1 [H_ηr, τ - p]`, n×7.
+    pub(crate) solved: DMatrix<f64>,
+}
+
+#[inline(always)]
+fn column_of(flat: &[f64], k: usize) -> Matrix3<f64> {
+    let q = &flat[9 * k..9 * k + 9];
+    Matrix3::new(q[0], q[3], q[6], q[1], q[4], q[7], q[2], q[5], q[8])
+}
+
+/// `y += A x`, column by column.
+#[inline(always)]
+fn add_product(A: &DMatrix<f64>, x: &[f64], y: &mut [f64]) {
+    let rows = A.nrows();
+    for (column, x) in A.as_slice().chunks_exact(rows).zip(x) {
+        for (y, a) in y.iter_mut().zip(column) {
+            *y += a * x;
+        }
+    }
+}
+
+impl ModalData {
+    pub(crate) fn new(tables: &ModalTables) -> Self {
+        let n = tables.shapes.n();
+        Self {
+            rates: vec![0.0; n],
+            inertia: tables.shapes.undeformed(),
+            Q: tables.Pt.clone(),
+            g_rate: vec![0.0; 3 * n],
+            C_r: tables.shapes.C_r.clone(),
+            f: vec![0.0; n],
+            columns: vec![Wrench::zeros(); n],
+            H: DMatrix::zeros(n, n),
+            factor: Cholesky::new(DMatrix::identity(n, n)),
+            solved: DMatrix::zeros(n, 7),
+        }
+    }
+
+    /// (1) to (4) at coordinates `eta`.
+    #[inline(always)]
+    pub(crate) fn place(&mut self, tables: &ModalTables, eta: &[f64]) {
+        let shapes = &tables.shapes;
+        self.Q.copy_from_slice(&tables.Pt);
+        if !tables.N.is_empty() {
+            add_product(&tables.N, eta, &mut self.Q);
+        }
+        let (mut h, mut E) = (shapes.first_moment, Matrix3::zeros());
+        for (k, &eta_k) in eta.iter().enumerate() {
+            let Q = column_of(&self.Q, k);
+            h += shapes.C_t[k] * eta_k;
+            E += (shapes.P[k] + Q) * eta_k;
+            self.C_r[k] = tables.C_rotary[k] + axial(&Q);
+        }
+        let (xy, xz, yz) =
+            (0.5 * (E[(0, 1)] + E[(1, 0)]), 0.5 * (E[(0, 2)] + E[(2, 0)]), 0.5 * (E[(1, 2)] + E[(2, 1)]));
+        let (x, y, z) = (E[(0, 0)], E[(1, 1)], E[(2, 2)]);
+        let J = shapes.inertia + Matrix3::new(y + z, -xy, -xz, -xy, x + z, -yz, -xz, -yz, x + y);
+        self.inertia = SpatialInertia { mass: shapes.mass, first_moment: h, rotational: J };
+    }
+
+    /// What (5) gives without spatial acceleration and `η̈`: returns `[F; T]`, sets `f`.
+    #[inline(always)]
+    pub(crate) fn bias(&mut self, tables: &ModalTables, V: &Twist, rates: &[f64]) -> Wrench {
+        let (w, v) = (V.angular, V.linear);
+        self.rates.copy_from_slice(rates);
+        let second = !tables.N.is_empty();
+        if second {
+            self.g_rate.fill(0.0);
+            add_product(&tables.g, rates, &mut self.g_rate);
+        }
+        let shapes = &tables.shapes;
+        let (mut Wt, mut c, mut rotary) = (Matrix3::zeros(), Vector3::zeros(), Vector3::zeros());
+        // ω × v is the part of the origin's acceleration that a spatial acceleration leaves out.
+        let wv = w.cross(&v);
+        let ww = w.norm_squared();
+        for (k, &rate) in rates.iter().enumerate() {
+            let Q = column_of(&self.Q, k);
+            Wt += Q * rate;
+            c += shapes.C_t[k] * rate;
+            rotary += tables.C_rotary[k] * rate;
+            let mut f = shapes.C_t[k].dot(&wv) + w.dot(&mul(&Q, &w)) - Q.trace() * ww;
+            if second {
+                f += 2.0 * (w.x * self.g_rate[3 * k] + w.y * self.g_rate[3 * k + 1] + w.z * self.g_rate[3 * k + 2]);
+            }
+            self.f[k] = f;
+        }
+        let SpatialInertia { mass, first_moment: h, rotational: J } = &self.inertia;
+        let force = wv * *mass + w.cross(&(c * 2.0 + w.cross(h)));
+        let torque = h.cross(&wv) + w.cross(&(mul(J, &w) + rotary)) + (w * Wt.trace() - mul(&Wt, &w)) * 2.0;
+        Wrench::new(force, torque)
+    }
+
+    /// Mass terms of (5): adds to `f` and returns the wrench, for spatial acceleration A and `η̈` (none: zero).
+    #[inline(always)]
+    pub(crate) fn inertia_forces(&mut self, tables: &ModalTables, A: &Twist, accelerations: Option<&[f64]>) -> Wrench {
+        let shapes = &tables.shapes;
+        let mut F = self.inertia.mul_twist(A);
+        for (k, f) in self.f.iter_mut().enumerate() {
+            *f += shapes.C_t[k].dot(&A.linear) + self.C_r[k].dot(&A.angular);
+        }
+        if let Some(accelerations) = accelerations {
+            for (k, &a) in accelerations.iter().enumerate() {
+                F.force += shapes.C_t[k] * a;
+                F.torque += self.C_r[k] * a;
+            }
+            add_product(&shapes.M, accelerations, &mut self.f);
+        }
+        F
+    }
+
+    /// Kinetic energy (J) for the twist of the body frame and the rates of the last velocity pass.
+    pub(crate) fn kinetic_energy(&self, tables: &ModalTables, V: &Twist) -> f64 {
+        let mut energy = 0.5 * V.power(&self.inertia.mul_twist(V));
+        for (k, rate) in self.rates.iter().enumerate() {
+            energy += rate * (tables.shapes.C_t[k].dot(&V.linear) + self.C_r[k].dot(&V.angular));
+            let row: f64 = self.rates.iter().enumerate().map(|(l, r)| tables.shapes.M[(k, l)] * r).sum();
+            energy += 0.5 * rate * row;
+        }
+        energy
+    }
+
+    /// Momentum about the body's origin (kg m/s, kg m²/s), likewise.
+    pub(crate) fn momentum(&self, tables: &ModalTables, V: &Twist) -> Wrench {
+        let mut p = self.inertia.mul_twist(V);
+        for (k, rate) in self.rates.iter().enumerate() {
+            p.force += tables.shapes.C_t[k] * *rate;
+            p.torque += self.C_r[k] * *rate;
+        }
+        p
+    }
+}
+
+impl InterfaceShape {
+    /// Displacement and rotation vector at the coordinates (or their rates).
+    #[inline(always)]
+    pub(crate) fn times(&self, eta: &[f64]) -> (Vector3<f64>, Vector3<f64>) {
+        let mut y = [0.0; 6];
+        for (column, x) in self.Phi.as_slice().chunks_exact(6).zip(eta) {
+            for (y, a) in y.iter_mut().zip(column) {
+                *y += a * x;
+            }
+        }
+        (Vector3::new(y[0], y[1], y[2]), Vector3::new(y[3], y[4], y[5]))
+    }
+
+    /// `f += Φᵀ [force; moment]`.
+    #[inline(always)]
+    pub(crate) fn add_transposed(&self, force: &Vector3<f64>, moment: &Vector3<f64>, f: &mut [f64]) {
+        for (column, f) in self.Phi.as_slice().chunks_exact(6).zip(f) {
+            *f += column[0] * force.x
+                + column[1] * force.y
+                + column[2] * force.z
+                + column[3] * moment.x
+                + column[4] * moment.y
+                + column[5] * moment.z;
+        }
+    }
+
+    /// Column k of the motion subspace in the child's axes, for its maps L (translations) and B (rotations).
+    #[inline(always)]
+    pub(crate) fn twist(&self, k: usize, L: &Matrix3<f64>, B: &Matrix3<f64>) -> Twist {
+        let c = &self.Phi.as_slice()[6 * k..6 * k + 6];
+        Twist::new(mul(L, &Vector3::new(c[0], c[1], c[2])), mul(B, &Vector3::new(c[3], c[4], c[5])))
+    }
+
+    /// `Sᵀ F` for all coordinates, F in the child's axes: added to `f`.
+    #[inline(always)]
+    pub(crate) fn project(&self, L: &Matrix3<f64>, B: &Matrix3<f64>, F: &Wrench, f: &mut [f64]) {
+        self.add_transposed(&tr_mul(L, &F.force), &tr_mul(B, &F.torque), f);
+    }
+}
