@@ -1,95 +1,217 @@
-//! The flexible arm that every stepper gets: tree, springs, damping, motion, external loads.
+//! The flexible arm that every stepper gets: tree, springs, damping, drives, motion, external loads.
 //!
 //! Immutable and shared; each stepper makes its own state from it. Start at [`FlexibleArm::new`].
+//!
+//! The free coordinates x of an arm are those of the joints that are driven by torque, then the elastic ones. All
+//! other joints are prescribed.
 
 use std::sync::Arc;
 
-use flexarm_kinematics::{Data, Model, State, Wrench, mass_matrix};
-use nalgebra::{DMatrix, DVector, Matrix6, Vector6};
+use flexarm_kinematics::{Data, JointMotion, Model, SpatialInertia, State, Wrench, mass_matrix};
+use nalgebra::{DMatrix, DVector, Matrix6};
 
+use crate::drive::{Friction, ServoAxis, TorqueCurve};
 use crate::error::StepError;
+use crate::load::Load;
 use crate::modes::{Modes, modes_at};
 use crate::motion::PrescribedMotion;
 
-/// A spring across one elastic joint of the model: generalised force `-(K e + D ė)` on its six coordinates.
+/// Stiffness and damping of one group of elastic coordinates, before it has its place in the model.
+#[derive(Clone, Debug)]
+pub struct Spring {
+    /// Name for logs.
+    pub name: String,
+    /// Stiffness, size×size of the group.
+    pub K: DMatrix<f64>,
+    /// How it is damped.
+    pub damping: Damping,
+    /// Torque over deflection where it is not a straight line; only with one coordinate.
+    pub curve: Option<TorqueCurve>,
+    /// Stiffness by load (geometric stiffening); only on modal bodies.
+    pub geometric: Option<Arc<GeometricStiffness>>,
+}
+
+impl From<(String, Matrix6<f64>, Damping)> for Spring {
+    fn from((name, K, damping): (String, Matrix6<f64>, Damping)) -> Self {
+        let K = DMatrix::from_column_slice(6, 6, K.as_slice());
+        Self { name, K, damping, curve: None, geometric: None }
+    }
+}
+
+/// What loads add to the stiffness of a modal body, n×n per unit.
+///
+/// `K + Σ α_i acceleration_i + Σ ω_i ω_j centrifugal_ij`: the body's own inertia as it is accelerated and turned,
+/// body axes. Loads of what hangs on it are in `interface`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GeometricStiffness {
+    /// Per unit acceleration of the origin, gravity taken off (s²/m).
+    pub acceleration: [DMatrix<f64>; 3],
+    /// Per unit angular acceleration.
+    pub angular: [DMatrix<f64>; 3],
+    /// Per `ω_x², ω_y², ω_z², ω_x ω_y, ω_x ω_z, ω_y ω_z`.
+    pub centrifugal: [DMatrix<f64>; 6],
+    /// Per unit force and moment at each interface, link axes.
+    pub interface: Vec<[DMatrix<f64>; 6]>,
+}
+
+/// A spring in its place: generalised force `-(K e + D ė)` on its coordinates.
 #[derive(Clone, Debug)]
 pub struct ElasticElement {
     /// Name for logs.
     pub name: String,
-    /// Body behind the joint (distal part).
+    /// Body behind the joint (distal part), or the modal body.
     pub body: usize,
-    /// First of its six coordinates.
+    /// First of its coordinates in the model.
     pub coordinate: usize,
-    /// `K_S` (N/m, N/rad; N m/m, N m/rad).
-    pub K_S: Matrix6<f64>,
-    /// `K_S^-1`.
-    pub C_S: Matrix6<f64>,
+    /// Number of its coordinates.
+    pub size: usize,
+    /// Whether these are modal coordinates.
+    pub modal: bool,
+    /// Stiffness, size×size.
+    pub K: DMatrix<f64>,
+    /// `K^-1`.
+    pub C: DMatrix<f64>,
     /// How it is damped.
     pub damping: Damping,
+    /// See [`Spring::curve`].
+    pub curve: Option<TorqueCurve>,
+    /// See [`Spring::geometric`].
+    pub geometric: Option<Arc<GeometricStiffness>>,
+}
+
+impl ElasticElement {
+    /// Stored energy (J) at its coordinates.
+    pub fn energy(&self, e: &[f64]) -> f64 {
+        match &self.curve {
+            Some(curve) => curve.energy(e[0]),
+            None => {
+                let x = DVector::from_column_slice(e);
+                0.5 * x.dot(&(&self.K * &x))
+            }
+        }
+    }
+
+    /// `f += K e`, or the curve.
+    #[inline]
+    pub(crate) fn add_spring_force(&self, e: &[f64], f: &mut [f64]) {
+        match &self.curve {
+            Some(curve) => f[0] += curve.torque(e[0]),
+            None => add_product(&self.K, e, f),
+        }
+    }
+}
+
+/// `y += A x` for a square A.
+#[inline(always)]
+pub(crate) fn add_product(A: &DMatrix<f64>, x: &[f64], y: &mut [f64]) {
+    for (column, x) in A.as_slice().chunks_exact(A.nrows()).zip(x) {
+        for (y, a) in y.iter_mut().zip(column) {
+            *y += a * x;
+        }
+    }
 }
 
 /// Damping of an elastic element.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Damping {
-    /// Damping ratio of the modes, weighted by the share of strain energy that this element has in each mode.
+    /// Damping ratio of the arm's modes, weighted by the share of strain energy that this element has in each mode.
     Modal(f64),
     /// `D = beta K` (s).
     StiffnessProportional(f64),
+    /// `D = a M + b K` with the mass matrix of its own coordinates (1/s, s).
+    Rayleigh(f64, f64),
+    /// A damper per coordinate (N s/m, N m s/rad); the first `size` of them count.
+    Dampers([f64; 6]),
 }
 
-/// Tree, springs, damping and motion.
+/// A change of what a body carries while the arm moves.
+#[derive(Clone, Debug, PartialEq)]
+pub struct InertiaChange {
+    /// When (s).
+    pub t: f64,
+    /// Which body.
+    pub body: usize,
+    /// Its inertia from then on, about Bo, B axes, with all that is fixed to it.
+    pub inertia: SpatialInertia,
+}
+
+/// Tree, springs, damping, drives and motion.
 #[derive(Clone)]
 pub struct FlexibleArm {
-    /// The tree; elastic joints in it are the springs.
+    /// The tree; elastic joints and modal bodies in it are the springs.
     pub model: Arc<Model>,
-    /// Springs, in coordinate order; one per elastic joint.
+    /// Springs, in coordinate order; one per elastic group of the model.
     pub elements: Vec<ElasticElement>,
-    /// Damping matrix on the elastic coordinates (6 per element).
+    /// Damping matrix on the elastic coordinates.
     pub D: DMatrix<f64>,
     /// `beta` per element that comes nearest to `D` (exact when stiffness-proportional), for SPOOK (s).
     pub tau: Vec<f64>,
     /// Whether `D` is block diagonal with `beta K` in the blocks.
     pub proportional: bool,
-    /// Motion of the actuated joints.
+    /// Motion of the actuated joints; what servos follow.
     pub motion: Arc<dyn PrescribedMotion>,
-    /// Constant external wrench per body, at Bo in **world** axes (empty: none).
-    pub loads: Vec<(usize, Wrench)>,
+    /// Actuated coordinates driven by torque, ascending.
+    pub torque_driven: Vec<usize>,
+    /// Friction per actuated coordinate (empty: none).
+    pub friction: Vec<Friction>,
+    /// Controller of the joints that are driven by torque.
+    pub servo: Option<Arc<Servo>>,
+    /// External loads.
+    pub loads: Vec<Load>,
+    /// Changes of inertia, by time.
+    pub inertia_changes: Vec<InertiaChange>,
     /// Natural modes at the start pose, drives locked.
     pub modes: Modes,
 }
 
+/// Sampled joint controllers; see [`ServoAxis`].
+#[derive(Clone, Debug)]
+pub struct Servo {
+    /// Time between two samples (s).
+    pub sample_s: f64,
+    /// One per joint driven by torque, in the order of [`FlexibleArm::torque_driven`].
+    pub axes: Vec<ServoAxis>,
+    /// The rigid robot, for the feed-forward; coordinates are the actuated ones.
+    pub rigid: Arc<Model>,
+}
+
 impl FlexibleArm {
-    /// Puts springs on the elastic joints of a model.
+    /// Puts springs on the elastic groups of a model.
     ///
-    /// `springs` lists name, stiffness and damping in the order of `model.elastic_bodies()`. The modal damping
+    /// `springs` lists name, stiffness and damping in the order of `model.elastic()`. The modal damping
     /// matrix and the modes are those of the static pose at `t = 0`.
     ///
     /// # Errors
-    /// [`StepError::Setup`] if the counts differ, [`StepError::Singular`] if a stiffness is not positive definite,
+    /// [`StepError::Setup`] if counts or sizes differ, [`StepError::Singular`] if a stiffness is not positive definite,
     /// [`StepError::NoEquilibrium`] if the arm cannot carry its weight.
-    pub fn new(
+    pub fn new<S: Into<Spring>>(
         model: Arc<Model>,
-        springs: Vec<(String, Matrix6<f64>, Damping)>,
+        springs: Vec<S>,
         motion: Arc<dyn PrescribedMotion>,
     ) -> Result<Self, StepError> {
-        if springs.len() != model.n_elastic() {
+        let groups = model.elastic();
+        if springs.len() != groups.len() {
             return Err(StepError::Setup(format!(
                 "the model has {} elastic joints but {} springs were given",
-                model.n_elastic(),
+                groups.len(),
                 springs.len()
             )));
         }
-        let bodies: Vec<usize> = model.elastic_bodies().collect();
         let mut elements = Vec::new();
-        for ((name, K_S, damping), body) in springs.into_iter().zip(bodies) {
-            let C_S = K_S.cholesky().map(|c| c.inverse());
-            let Some(C_S) = C_S else {
+        for (spring, group) in springs.into_iter().zip(groups) {
+            let Spring { name, K, damping, curve, geometric } = spring.into();
+            if K.shape() != (group.size, group.size) {
+                let (rows, size) = (K.nrows(), group.size);
+                let text = format!("the stiffness of {name:?} has {rows} rows, its joint has {size} coordinates");
+                return Err(StepError::Setup(text));
+            }
+            let Some(C) = K.clone().cholesky().map(|c| c.inverse()) else {
                 return Err(StepError::Singular { matrix: "stiffness of an elastic joint", t: 0.0 });
             };
-            let coordinate = model.bodies()[body].coordinate;
-            elements.push(ElasticElement { name, body, coordinate, K_S, C_S, damping });
+            let (body, coordinate, size, modal) = (group.body, group.coordinate, group.size, group.modal);
+            elements.push(ElasticElement { name, body, coordinate, size, modal, K, C, damping, curve, geometric });
         }
-        let n = 6 * elements.len();
+        let n = model.n_elastic();
         let mut arm = Self {
             model,
             elements,
@@ -97,7 +219,11 @@ impl FlexibleArm {
             tau: Vec::new(),
             proportional: true,
             motion,
+            torque_driven: Vec::new(),
+            friction: Vec::new(),
+            servo: None,
             loads: Vec::new(),
+            inertia_changes: Vec::new(),
             modes: Modes::default(),
         };
         arm.update_modes_and_damping()?;
@@ -108,37 +234,78 @@ impl FlexibleArm {
     ///
     /// # Errors
     /// As [`FlexibleArm::new`].
-    pub fn with_loads(mut self, loads: Vec<(usize, Wrench)>) -> Result<Self, StepError> {
+    pub fn with_loads(self, loads: Vec<(usize, Wrench)>) -> Result<Self, StepError> {
+        self.with_timed_loads(loads.into_iter().map(|(body, F)| Load::constant(body, F)).collect())
+    }
+
+    /// The same arm with external loads that change with time.
+    ///
+    /// # Errors
+    /// As [`FlexibleArm::new`].
+    pub fn with_timed_loads(mut self, loads: Vec<Load>) -> Result<Self, StepError> {
         self.loads = loads;
         self.update_modes_and_damping()?;
         Ok(self)
     }
 
-    /// Number of elastic coordinates.
-    pub fn n_elastic_coordinates(&self) -> usize {
-        6 * self.elements.len()
+    /// The same arm with some joints driven by torque, under a controller.
+    ///
+    /// # Errors
+    /// [`StepError::Setup`] if the axes are not actuated coordinates, or one without mass behind it has no rotor.
+    pub fn with_servo(mut self, servo: Servo) -> Result<Self, StepError> {
+        let n = self.model.n_actuated();
+        self.torque_driven = servo.axes.iter().map(|a| a.coordinate).collect();
+        let sorted = self.torque_driven.windows(2).all(|w| w[0] < w[1]);
+        if !sorted || self.torque_driven.last().is_some_and(|&k| k >= n) {
+            let text = format!("servo axes {:?} must be ascending coordinates below {n}", self.torque_driven);
+            return Err(StepError::Setup(text));
+        }
+        for &k in &self.torque_driven {
+            let body = self.model.bodies().iter().skip(1).find(|b| b.coordinate == k && !b.elastic);
+            if let Some(body) = body
+                && body.inertia.mass == 0.0
+                && body.armature <= 0.0
+            {
+                let text = format!(
+                    "joint {:?} is driven by torque through a spring: its motor needs an inertia (motor_inertia and ratio)",
+                    body.joint
+                );
+                return Err(StepError::Setup(text));
+            }
+        }
+        self.servo = Some(Arc::new(servo));
+        Ok(self)
     }
 
-    /// Stiffness on the elastic coordinates, block diagonal.
+    /// Number of elastic coordinates.
+    pub fn n_elastic_coordinates(&self) -> usize {
+        self.model.n_elastic()
+    }
+
+    /// Number of free coordinates: joints driven by torque, then elastic ones.
+    pub fn n_free(&self) -> usize {
+        self.torque_driven.len() + self.model.n_elastic()
+    }
+
+    /// Stiffness on the elastic coordinates, block diagonal; of curved springs their slope at rest.
     pub fn stiffness(&self) -> DMatrix<f64> {
         let n = self.n_elastic_coordinates();
         let mut K = DMatrix::zeros(n, n);
-        for (k, element) in self.elements.iter().enumerate() {
-            K.fixed_view_mut::<6, 6>(6 * k, 6 * k).copy_from(&element.K_S);
+        for element in &self.elements {
+            let k = self.offset(element);
+            K.view_mut((k, k), (element.size, element.size)).copy_from(&element.K);
         }
         K
     }
 
+    /// First coordinate of an element within the elastic ones.
+    pub fn offset(&self, element: &ElasticElement) -> usize {
+        element.coordinate - self.model.n_actuated()
+    }
+
     /// Elastic energy (J) at elastic coordinates `e`.
     pub fn elastic_energy(&self, e: &[f64]) -> f64 {
-        self.elements
-            .iter()
-            .enumerate()
-            .map(|(k, element)| {
-                let x = Vector6::from_column_slice(&e[6 * k..6 * k + 6]);
-                0.5 * x.dot(&(element.K_S * x))
-            })
-            .sum()
+        self.elements.iter().map(|element| element.energy(&e[self.offset(element)..][..element.size])).sum()
     }
 
     /// Full state at time `t` with elastic coordinates zero; the accelerations go into `qddot`.
@@ -148,15 +315,35 @@ impl FlexibleArm {
         self.motion.sample(t, &mut q[..n], &mut qdot[..n], &mut qddot.as_mut_slice()[..n]);
     }
 
-    /// Turns the constant loads into body axes for the poses in `data.X_WB`.
-    pub fn apply_loads(&self, data: &mut Data) {
-        for (body, F_W) in &self.loads {
-            let R = data.X_WB[*body].rotation;
-            data.F_ext[*body] = Wrench::new(R.inverse() * F_W.force, R.inverse() * F_W.torque);
+    /// Puts the loads of time `t` on the bodies, for the poses in `data.X_WB`.
+    pub fn apply_loads(&self, data: &mut Data, t: f64) {
+        for load in &self.loads {
+            data.F_ext[load.body] = Wrench::zeros();
+        }
+        for load in &self.loads {
+            data.F_ext[load.body] += load.on_body(t, &data.X_WB[load.body]);
         }
     }
 
-    fn update_modes_and_damping(&mut self) -> Result<(), StepError> {
+    /// Friction torque of an actuated coordinate at a speed.
+    pub(crate) fn friction_torque(&self, coordinate: usize, rate: f64) -> f64 {
+        self.friction.get(coordinate).map_or(0.0, |f| f.torque(rate))
+    }
+
+    /// Whether a one-DoF spring turns (or slides) about that axis, for the rows of SPOOK.
+    pub(crate) fn single_axis(&self, body: usize) -> Option<(bool, nalgebra::Vector3<f64>)> {
+        match self.model.bodies()[body].motion {
+            JointMotion::Revolute(axis) => Some((true, axis)),
+            JointMotion::Prismatic(axis) => Some((false, axis)),
+            _ => None,
+        }
+    }
+
+    /// Modes at `t = 0` and the damping matrix that follows from them; to be called after a change by hand.
+    ///
+    /// # Errors
+    /// As [`FlexibleArm::new`].
+    pub fn update_modes_and_damping(&mut self) -> Result<(), StepError> {
         let n = self.n_elastic_coordinates();
         if n == 0 {
             return Ok(());
@@ -170,11 +357,14 @@ impl FlexibleArm {
             .map(|e| match e.damping {
                 Damping::Modal(zeta) => 2.0 * zeta / first,
                 Damping::StiffnessProportional(beta) => beta,
+                Damping::Rayleigh(a, b) => a / (first * first) + b,
+                // The one factor that gives the same trace.
+                Damping::Dampers(d) => d[..e.size].iter().sum::<f64>() / e.K.trace(),
             })
             .collect();
         self.D.fill(0.0);
 
-        // D = M Φ diag(2 ζ ω) Φᵀ M with ζ of each mode weighted by strain energy, plus beta K blocks.
+        // D = M Φ diag(2 ζ ω) Φᵀ M with ζ of each mode weighted by strain energy, plus blocks.
         let model = self.model.clone();
         let (mut state, mut qddot) = (State::zeros(&model), DVector::zeros(model.nv()));
         self.prescribed_state(0.0, &mut state, &mut qddot);
@@ -186,9 +376,9 @@ impl FlexibleArm {
         for (j, omega) in self.modes.omega.iter().enumerate() {
             let phi = self.modes.shapes.column(j);
             let (mut zeta, mut total) = (0.0, 0.0);
-            for (k, element) in self.elements.iter().enumerate() {
-                let x: Vector6<f64> = phi.fixed_rows::<6>(6 * k).into();
-                let energy = x.dot(&(element.K_S * x));
+            for element in &self.elements {
+                let x = phi.rows(self.offset(element), element.size);
+                let energy = x.dot(&(&element.K * x));
                 total += energy;
                 if let Damping::Modal(z) = element.damping {
                     zeta += z * energy;
@@ -197,10 +387,18 @@ impl FlexibleArm {
             let Mphi = &M * phi;
             self.D.ger(2.0 * zeta / total * omega, &Mphi, &Mphi, 1.0);
         }
-        for (k, element) in self.elements.iter().enumerate() {
-            if let Damping::StiffnessProportional(beta) = element.damping {
-                let mut block = self.D.fixed_view_mut::<6, 6>(6 * k, 6 * k);
-                block += element.K_S * beta;
+        for element in &self.elements {
+            let (k, size) = (element.coordinate - model.n_actuated(), element.size);
+            let mut block = self.D.view_mut((k, k), (size, size));
+            match element.damping {
+                Damping::Modal(_) => {}
+                Damping::StiffnessProportional(beta) => block += &element.K * beta,
+                Damping::Rayleigh(a, b) => block += &element.K * b + M.view((k, k), (size, size)) * a,
+                Damping::Dampers(d) => {
+                    for c in 0..size.min(6) {
+                        block[(c, c)] += d[c];
+                    }
+                }
             }
         }
         Ok(())

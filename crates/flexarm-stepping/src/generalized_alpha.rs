@@ -180,6 +180,18 @@ impl GeneralizedAlpha {
         self.steps
     }
 
+    /// Starts anew from the current state: to be called when a force has jumped.
+    ///
+    /// # Errors
+    /// [`StepError::Singular`] if the acceleration cannot be found.
+    pub fn restart(&mut self, system: &mut impl SecondOrderSystem) -> Result<(), StepError> {
+        system.acceleration(self.time(), &self.x, &self.v, &mut self.acceleration)?;
+        self.a.copy_from(&self.acceleration);
+        self.previous.copy_from(&self.acceleration);
+        self.x_tilde.copy_from(&self.acceleration);
+        Ok(())
+    }
+
     /// Advances by one step. On error the state stays at the last good time. No allocation.
     ///
     /// # Errors

@@ -31,20 +31,25 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
 mod arm;
+mod drive;
 mod error;
 mod generalized_alpha;
+mod load;
 mod modes;
 mod motion;
 mod reduced;
 mod rk4;
+mod servo;
 mod spook;
 mod statics;
 mod stepper;
 mod system;
 
-pub use arm::{Damping, ElasticElement, FlexibleArm};
+pub use arm::{Damping, ElasticElement, FlexibleArm, GeometricStiffness, InertiaChange, Servo, Spring};
+pub use drive::{CurveError, Friction, ServoAxis, TorqueCurve};
 pub use error::StepError;
 pub use generalized_alpha::{AlphaSettings, GeneralizedAlpha};
+pub use load::{Load, LoadAxes};
 pub use modes::{Modes, modes_at};
 pub use motion::{Held, MotionFn, PrescribedMotion};
 pub use reduced::ReducedArm;

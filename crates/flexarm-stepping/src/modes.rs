@@ -5,7 +5,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 
 use crate::arm::FlexibleArm;
 use crate::error::StepError;
-use crate::statics::{static_equilibrium, tangent_stiffness};
+use crate::statics::{static_equilibrium, tangent_stiffness, with_curves};
 
 /// Modes of `K_t φ = ω² M φ`, mass-normalised, ascending.
 #[derive(Clone, Debug, Default)]
@@ -39,7 +39,8 @@ pub fn modes_at(arm: &FlexibleArm, t: f64) -> Result<Modes, StepError> {
     let model = &arm.model;
     let equilibrium = static_equilibrium(arm, t)?;
     let mut data = Data::new(model);
-    let Kt = tangent_stiffness(arm, &mut data, t, &equilibrium, &arm.stiffness());
+    let K = with_curves(arm, &arm.stiffness(), &equilibrium);
+    let Kt = tangent_stiffness(arm, &mut data, t, &equilibrium, &K);
     let (mut state, mut qddot) = (State::zeros(model), DVector::zeros(model.nv()));
     arm.prescribed_state(t, &mut state, &mut qddot);
     let na = model.n_actuated();

@@ -1,17 +1,26 @@
-//! The flexible arm in reduced coordinates: elastic ones free, actuated ones truly prescribed.
+//! The flexible arm in reduced coordinates: elastic ones and torque-driven joints free, the others truly prescribed.
 //!
 //! ```text
-//! M_ee ë + h_e(q, q̇, [q̈_a, 0]) + K e + D ė = 0
+//! M_ff ẍ + h_f(q, q̇, [q̈_p, 0]) + K x + D ẋ + friction(ẋ) = τ
 //! ```
 //! The residual is one Newton-Euler pass, the acceleration one hybrid pass; the iteration matrix
-//! `M_ee + c_D D + c_K K` is dense in the elastic coordinates. Not here: integration.
+//! `M_ff + c_D D + c_K K` is dense in the free coordinates. Torques of a sampled controller stay constant between
+//! its samples ([`ReducedArm::at_time`]). Not here: integration.
 
-use flexarm_kinematics::{Data, Roles, State, hybrid_dynamics, inverse_dynamics, mass_matrix_at_poses, world_poses};
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Vector6};
+use std::sync::Arc;
 
-use crate::arm::FlexibleArm;
+use flexarm_kinematics::{
+    Data, JointMotion, Roles, State, Wrench, hybrid_dynamics, inverse_dynamics, mass_matrix_at_poses, world_poses,
+};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+use crate::arm::{FlexibleArm, GeometricStiffness, add_product};
 use crate::error::StepError;
+use crate::servo::ServoState;
 use crate::system::SecondOrderSystem;
+
+/// Passes after which the stiffness by load of an acceleration has settled.
+const GEOMETRIC_PASSES: usize = 12;
 
 /// A flexible arm as a second-order system; see the module page.
 pub struct ReducedArm {
@@ -21,6 +30,12 @@ pub struct ReducedArm {
     pub(crate) qddot: DVector<f64>,
     tau: DVector<f64>,
     roles: Roles,
+    /// Free coordinates in the model's order.
+    free: Vec<usize>,
+    servo: Option<ServoState>,
+    /// Next change of inertia.
+    changes: usize,
+    geometric: bool,
     sampled_at: f64,
     factor: Option<Cholesky<f64, Dyn>>,
     matrix: DMatrix<f64>,
@@ -29,6 +44,7 @@ pub struct ReducedArm {
     M_inverse_K: DMatrix<f64>,
     product: DMatrix<f64>,
     shifted: DVector<f64>,
+    geometric_force: DVector<f64>,
     c_h2: f64,
 }
 
@@ -36,13 +52,19 @@ impl ReducedArm {
     /// Workspaces for the arm.
     pub fn new(arm: FlexibleArm) -> Self {
         let model = &arm.model;
-        let n = arm.n_elastic_coordinates();
+        let n = arm.n_free();
+        let driven = arm.torque_driven.clone();
+        let roles = Roles::new(model, |k| k < model.n_actuated() && !driven.contains(&k));
         Self {
             data: Data::new(model),
             state: State::zeros(model),
             qddot: DVector::zeros(model.nv()),
             tau: DVector::zeros(model.nv()),
-            roles: Roles::actuated_prescribed(model),
+            free: roles.free_coordinates().to_vec(),
+            roles,
+            servo: arm.servo.clone().map(|servo| ServoState::new(servo, &arm)),
+            changes: 0,
+            geometric: arm.elements.iter().any(|e| e.geometric.is_some()),
             sampled_at: f64::NAN,
             factor: None,
             matrix: DMatrix::zeros(n, n),
@@ -50,6 +72,7 @@ impl ReducedArm {
             M_inverse_K: DMatrix::zeros(n, n),
             product: DMatrix::zeros(n, n),
             shifted: DVector::zeros(n),
+            geometric_force: DVector::zeros(n),
             c_h2: 0.0,
             arm,
         }
@@ -60,60 +83,202 @@ impl ReducedArm {
         &self.arm
     }
 
-    /// Joint motion at t (once per time) and elastic coordinates into the full state.
+    /// Free coordinates and rates at `t = 0`: joints on their reference, springs at `e`, at the reference's speed.
+    pub(crate) fn start(&mut self, e: &DVector<f64>) -> Result<(DVector<f64>, DVector<f64>), StepError> {
+        let (n, driven) = (self.arm.n_free(), self.arm.torque_driven.len());
+        let (mut x, mut v) = (DVector::zeros(n), DVector::zeros(n));
+        self.arm.prescribed_state(0.0, &mut self.state, &mut self.qddot);
+        for (i, &k) in self.arm.torque_driven.iter().enumerate() {
+            x[i] = self.state.q[k];
+            v[i] = self.state.qdot[k];
+        }
+        x.rows_mut(driven, e.len()).copy_from(e);
+        if self.servo.is_some() {
+            // The integrators carry what holds the arm on its motion with the springs as they are.
+            let mut at_rest = DVector::zeros(n);
+            for (i, &k) in self.arm.torque_driven.iter().enumerate() {
+                at_rest[i] = self.qddot[k];
+            }
+            self.evaluate(0.0, &x, &v, &at_rest);
+            let tau = self.data.tau.clone();
+            if let Some(servo) = &mut self.servo {
+                servo.hold(&tau);
+            }
+        }
+        self.at_time(0.0, &x, &v);
+        Ok((x, v))
+    }
+
+    /// What happens at discrete times: samples of the controller, changes of inertia. `true` if accelerations jump.
+    pub(crate) fn at_time(&mut self, t: f64, x: &DVector<f64>, v: &DVector<f64>) -> bool {
+        let mut jumps = false;
+        while let Some(change) = self.arm.inertia_changes.get(self.changes)
+            && change.t <= t + 1e-9
+        {
+            self.arm.model = Arc::new(self.arm.model.with_inertia(change.body, change.inertia));
+            self.changes += 1;
+            jumps = true;
+        }
+        if let Some(servo) = &mut self.servo {
+            jumps |= servo.sample(t, &self.arm, x.as_slice(), v.as_slice());
+        }
+        jumps
+    }
+
+    /// The next time after `t` at which something happens, if any.
+    pub fn next_event(&self, t: f64) -> Option<f64> {
+        let change = self.arm.inertia_changes.get(self.changes).map(|c| c.t).filter(|c| *c > t + 1e-9);
+        let sample = self.servo.as_ref().map(|s| s.next_sample(t));
+        match (change, sample) {
+            (Some(a), Some(b)) => Some(a.min(b)),
+            (a, b) => a.or(b),
+        }
+    }
+
+    /// Joint motion at t (once per time) and free coordinates into the full state.
     fn set(&mut self, t: f64, x: &DVector<f64>, v: &DVector<f64>) {
         if t != self.sampled_at {
             self.arm.prescribed_state(t, &mut self.state, &mut self.qddot);
             self.sampled_at = t;
         }
         let n = self.arm.model.n_actuated();
-        self.state.q.as_mut_slice()[n..].copy_from_slice(x.as_slice());
-        self.state.qdot.as_mut_slice()[n..].copy_from_slice(v.as_slice());
+        let driven = self.arm.torque_driven.len();
+        for (i, &k) in self.arm.torque_driven.iter().enumerate() {
+            self.state.q[k] = x[i];
+            self.state.qdot[k] = v[i];
+        }
+        self.state.q.as_mut_slice()[n..].copy_from_slice(&x.as_slice()[driven..]);
+        self.state.qdot.as_mut_slice()[n..].copy_from_slice(&v.as_slice()[driven..]);
         if !self.arm.loads.is_empty() {
             flexarm_kinematics::forward_kinematics(&self.arm.model, &mut self.data, &self.state.q);
-            self.arm.apply_loads(&mut self.data);
+            self.arm.apply_loads(&mut self.data, t);
         }
     }
 
-    /// `f += K x + D v`.
-    fn add_elastic_forces(&self, x: &DVector<f64>, v: &DVector<f64>, f: &mut DVector<f64>) {
+    fn set_accelerations(&mut self, a: &DVector<f64>) {
+        let (n, driven) = (self.arm.model.n_actuated(), self.arm.torque_driven.len());
+        for (i, &k) in self.arm.torque_driven.iter().enumerate() {
+            self.qddot[k] = a[i];
+        }
+        self.qddot.as_mut_slice()[n..].copy_from_slice(&a.as_slice()[driven..]);
+    }
+
+    /// `f += K x + D v + friction - τ`.
+    fn add_forces(&mut self, x: &DVector<f64>, v: &DVector<f64>, f: &mut DVector<f64>) {
+        let driven = self.arm.torque_driven.len();
+        for (i, &k) in self.arm.torque_driven.iter().enumerate() {
+            f[i] += self.arm.friction_torque(k, v[i]);
+            f[i] -= self.servo.as_ref().map_or(0.0, |s| s.torque[i]);
+        }
+        let (x, v, f) = (&x.as_slice()[driven..], &v.as_slice()[driven..], &mut f.as_mut_slice()[driven..]);
         for (k, element) in self.arm.elements.iter().enumerate() {
-            let mut y: Vector6<f64> = x.fixed_rows::<6>(6 * k).into();
-            if self.arm.proportional {
-                y += v.fixed_rows::<6>(6 * k) * self.arm.tau[k];
+            let first = self.arm.offset(element);
+            let range = first..first + element.size;
+            if self.arm.proportional && element.curve.is_none() {
+                let y = &mut self.shifted.as_mut_slice()[..element.size];
+                for ((y, x), v) in y.iter_mut().zip(&x[range.clone()]).zip(&v[range.clone()]) {
+                    *y = x + self.arm.tau[k] * v;
+                }
+                add_product(&element.K, y, &mut f[range]);
+            } else {
+                element.add_spring_force(&x[range.clone()], &mut f[range.clone()]);
+                if self.arm.proportional {
+                    f[first] += self.arm.tau[k] * element.K[(0, 0)] * v[first];
+                }
             }
-            let force = element.K_S * y;
-            let mut part = f.fixed_rows_mut::<6>(6 * k);
-            part += force;
         }
         if !self.arm.proportional {
-            f.gemv(1.0, &self.arm.D, v, 1.0);
+            add_product(&self.arm.D, v, f);
+        }
+    }
+
+    /// Adds what the loads of the last Newton-Euler pass do to the stiffness of modal bodies.
+    fn add_geometric_forces(&self, x: &DVector<f64>, f: &mut DVector<f64>) {
+        let driven = self.arm.torque_driven.len();
+        for element in &self.arm.elements {
+            let Some(geometric) = &element.geometric else { continue };
+            let range = driven + self.arm.offset(element)..driven + self.arm.offset(element) + element.size;
+            let loads = geometric_loads(&self.arm, &self.data, element.body, geometric);
+            for (matrix, load) in geometric.matrices().zip(loads) {
+                if load != 0.0 {
+                    let (eta, f) = (&x.as_slice()[range.clone()], &mut f.as_mut_slice()[range.clone()]);
+                    for (column, eta) in matrix.as_slice().chunks_exact(matrix.nrows()).zip(eta) {
+                        for (f, g) in f.iter_mut().zip(column) {
+                            *f += load * g * eta;
+                        }
+                    }
+                }
+            }
         }
     }
 
     /// Full motion at `t`: poses, twists and all generalised forces; those of the actuated joints are the
-    /// torques that the drives must supply.
+    /// torques that the drives must supply, friction included.
     pub(crate) fn evaluate(&mut self, t: f64, x: &DVector<f64>, v: &DVector<f64>, a: &DVector<f64>) {
         self.set(t, x, v);
-        let n = self.arm.model.n_actuated();
-        self.qddot.as_mut_slice()[n..].copy_from_slice(a.as_slice());
+        self.set_accelerations(a);
         inverse_dynamics(&self.arm.model, &mut self.data, &self.state, &self.qddot);
+        for k in 0..self.arm.model.n_actuated() {
+            self.data.tau[k] += self.arm.friction_torque(k, self.state.qdot[k]);
+        }
         world_poses(&self.arm.model, &mut self.data);
     }
+
+    /// Torques that the controller holds now, in the order of [`FlexibleArm::torque_driven`]; empty without one.
+    pub(crate) fn held_torques(&self) -> &[f64] {
+        self.servo.as_ref().map_or(&[], |s| &s.torque)
+    }
+}
+
+impl GeometricStiffness {
+    fn matrices(&self) -> impl Iterator<Item = &DMatrix<f64>> {
+        self.acceleration.iter().chain(&self.angular).chain(&self.centrifugal).chain(self.interface.iter().flatten())
+    }
+}
+
+/// Loads in the order of [`GeometricStiffness::matrices`], from the last Newton-Euler pass.
+fn geometric_loads<'a>(
+    arm: &'a FlexibleArm,
+    data: &'a Data,
+    body: usize,
+    geometric: &'a GeometricStiffness,
+) -> impl Iterator<Item = f64> + 'a {
+    let (V, A) = (data.V[body], data.A[body]);
+    let (w, a) = (V.angular, A.linear + V.angular.cross(&V.linear));
+    let own = [
+        a.x, a.y, a.z, A.angular.x, A.angular.y, A.angular.z, w.x * w.x, w.y * w.y, w.z * w.z, w.x * w.y, w.x * w.z,
+        w.y * w.z,
+    ];
+    let wrenches = (0..geometric.interface.len()).flat_map(move |number| {
+        // What hangs on the interface pulls with the opposite of what it needs, in the axes of the link.
+        let carried = arm.model.bodies().iter().enumerate().find(|(_, b)| {
+            b.parent == body && matches!(b.motion, JointMotion::Interface { interface, .. } if interface == number)
+        });
+        let F = carried.map_or(Wrench::zeros(), |(i, _)| {
+            let R = data.X_PB[i].rotation;
+            Wrench::new(-(R * data.F[i].force), -(R * data.F[i].torque))
+        });
+        [F.force.x, F.force.y, F.force.z, F.torque.x, F.torque.y, F.torque.z]
+    });
+    own.into_iter().chain(wrenches)
 }
 
 impl SecondOrderSystem for ReducedArm {
     fn dimension(&self) -> usize {
-        self.arm.n_elastic_coordinates()
+        self.arm.n_free()
     }
 
     fn residual(&mut self, t: f64, x: &DVector<f64>, v: &DVector<f64>, a: &DVector<f64>, r: &mut DVector<f64>) {
         self.set(t, x, v);
-        let n = self.arm.model.n_actuated();
-        self.qddot.as_mut_slice()[n..].copy_from_slice(a.as_slice());
-        let tau = inverse_dynamics(&self.arm.model, &mut self.data, &self.state, &self.qddot);
-        r.as_mut_slice().copy_from_slice(&tau.as_slice()[n..]);
-        self.add_elastic_forces(x, v, r);
+        self.set_accelerations(a);
+        inverse_dynamics(&self.arm.model, &mut self.data, &self.state, &self.qddot);
+        for (r, &k) in r.iter_mut().zip(&self.free) {
+            *r = self.data.tau[k];
+        }
+        self.add_forces(x, v, r);
+        if self.geometric {
+            self.add_geometric_forces(x, r);
+        }
     }
 
     fn acceleration(
@@ -124,47 +289,79 @@ impl SecondOrderSystem for ReducedArm {
         a: &mut DVector<f64>,
     ) -> Result<(), StepError> {
         self.set(t, x, v);
-        a.fill(0.0);
-        self.add_elastic_forces(x, v, a);
-        let n = self.arm.model.n_actuated();
-        for (tau, f) in self.tau.as_mut_slice()[n..].iter_mut().zip(a.iter()) {
-            *tau = -f;
+        let mut forces = std::mem::replace(&mut self.geometric_force, DVector::zeros(0));
+        for pass in 0..GEOMETRIC_PASSES {
+            forces.fill(0.0);
+            if pass > 0 {
+                self.add_geometric_forces(x, &mut forces);
+            }
+            self.add_forces(x, v, &mut forces);
+            for (&k, f) in self.free.iter().zip(forces.iter()) {
+                self.tau[k] = -f;
+            }
+            let Self { arm, data, state, roles, qddot, tau, .. } = self;
+            hybrid_dynamics(&arm.model, data, state, roles, qddot, tau);
+            let mut change = 0.0f64;
+            for (a, &k) in a.iter_mut().zip(&self.free) {
+                change = change.max((qddot[k] - *a).abs());
+                *a = qddot[k];
+            }
+            if !self.geometric || (pass > 0 && change <= 1e-13 * a.amax()) {
+                break;
+            }
+            // The loads belong to the accelerations just found.
+            inverse_dynamics(&self.arm.model, &mut self.data, &self.state, &self.qddot);
         }
-        let Self { arm, data, state, roles, qddot, tau, .. } = self;
-        hybrid_dynamics(&arm.model, data, state, roles, qddot, tau);
-        a.as_mut_slice().copy_from_slice(&qddot.as_slice()[n..]);
+        self.geometric_force = forces;
         Ok(())
     }
 
     fn factor_iteration_matrix(&mut self, t: f64, c_D: f64, c_K: f64, c_h2: f64) -> Result<(), StepError> {
         mass_matrix_at_poses(&self.arm.model, &mut self.data);
-        let (n, ne) = (self.arm.model.n_actuated(), self.dimension());
+        let n = self.dimension();
+        let driven = self.arm.torque_driven.len();
         // The factor's storage is taken back and filled again: no allocation.
         let reuse = |factor: &mut Option<Cholesky<f64, Dyn>>| match factor.take() {
             Some(old) => old.unpack_dirty(),
-            None => DMatrix::zeros(ne, ne),
+            None => DMatrix::zeros(n, n),
         };
         // c_D D + c_K K
         let C = &mut self.matrix;
         C.as_mut_slice().fill(0.0);
+        for (i, &k) in self.arm.torque_driven.iter().enumerate() {
+            // A falling friction would take away from what must stay positive.
+            C[(i, i)] = c_D * self.arm.friction.get(k).map_or(0.0, |f| f.slope(self.state.qdot[k]).max(0.0));
+        }
         for (k, element) in self.arm.elements.iter().enumerate() {
-            let weight = if self.arm.proportional { c_K + c_D * self.arm.tau[k] } else { c_K };
-            let mut block = C.fixed_view_mut::<6, 6>(6 * k, 6 * k);
-            block += element.K_S * weight;
+            let (first, size) = (driven + self.arm.offset(element), element.size);
+            let damping = if self.arm.proportional { c_D * self.arm.tau[k] } else { 0.0 };
+            if let Some(curve) = &element.curve {
+                let slope = curve.slope(self.state.q[element.coordinate]);
+                C[(first, first)] += c_K * slope + damping * element.K[(0, 0)];
+            } else {
+                let mut block = C.view_mut((first, first), (size, size));
+                block.zip_apply(&element.K, |c, k| *c += (c_K + damping) * k);
+            }
         }
         if !self.arm.proportional {
-            C.zip_apply(&self.arm.D, |s, d| *s += c_D * d);
+            let ne = n - driven;
+            C.view_mut((driven, driven), (ne, ne)).zip_apply(&self.arm.D, |s, d| *s += c_D * d);
         }
 
         let mut S = reuse(&mut self.factor);
-        S.copy_from(&self.data.M.view((n, n), (ne, ne)));
+        for (column, &l) in self.free.iter().enumerate() {
+            for (row, &k) in self.free.iter().enumerate() {
+                S[(row, column)] = self.data.M[(k, l)];
+            }
+        }
         if c_h2 > 0.0 {
             let mut M = reuse(&mut self.mass_factor);
             M.copy_from(&S);
             let factor = Cholesky::new(M).ok_or(StepError::Singular { matrix: "mass matrix", t })?;
             self.M_inverse_K.as_mut_slice().fill(0.0);
-            for (k, element) in self.arm.elements.iter().enumerate() {
-                self.M_inverse_K.fixed_view_mut::<6, 6>(6 * k, 6 * k).copy_from(&element.K_S);
+            for element in &self.arm.elements {
+                let (first, size) = (driven + self.arm.offset(element), element.size);
+                self.M_inverse_K.view_mut((first, first), (size, size)).copy_from(&element.K);
             }
             factor.solve_mut(&mut self.M_inverse_K);
             self.mass_factor = Some(factor);
@@ -174,9 +371,9 @@ impl SecondOrderSystem for ReducedArm {
             self.product.gemm(c_h2, &self.matrix, &self.M_inverse_K, 1.0);
             self.matrix.copy_from(&self.product);
             self.matrix.gemm_tr(c_h2, &self.M_inverse_K, &self.product, 1.0);
-            for (k, element) in self.arm.elements.iter().enumerate() {
-                let mut block = S.fixed_view_mut::<6, 6>(6 * k, 6 * k);
-                block += element.K_S * c_h2;
+            for element in &self.arm.elements {
+                let (first, size) = (driven + self.arm.offset(element), element.size);
+                S.view_mut((first, first), (size, size)).zip_apply(&element.K, |s, k| *s += c_h2 * k);
             }
         }
         self.c_h2 = c_h2;

@@ -70,6 +70,15 @@ impl Rk4 {
         self.t0 + self.steps as f64 * self.h
     }
 
+    /// Takes the acceleration anew: to be called when a force has jumped.
+    ///
+    /// # Errors
+    /// [`StepError::Singular`] if it cannot be found.
+    pub fn restart(&mut self, system: &mut impl SecondOrderSystem) -> Result<(), StepError> {
+        let t = self.time();
+        system.acceleration(t, &self.x, &self.v, &mut self.acceleration)
+    }
+
     /// Advances by one step. On error the state stays at the last good time. No allocation.
     ///
     /// # Errors

@@ -9,7 +9,7 @@ use crate::error::StepError;
 /// Accepted unbalanced force over the largest spring or gravity force.
 const TOLERANCE: f64 = 1e-13;
 
-/// Elastic coordinates (6 per element) at which springs carry gravity and the constant loads at time `t`.
+/// Elastic coordinates at which springs carry gravity and the loads of time `t`.
 ///
 /// Inertia forces are left out: the drives are held where the motion is at `t`.
 ///
@@ -35,7 +35,7 @@ pub fn static_equilibrium(arm: &FlexibleArm, t: f64) -> Result<DVector<f64>, Ste
         if !residual.is_finite() {
             break;
         }
-        let Kt = tangent_stiffness(arm, &mut data, t, &e, &K);
+        let Kt = tangent_stiffness(arm, &mut data, t, &e, &with_curves(arm, &K, &e));
         let Some(factor) = Kt.cholesky() else {
             return Err(StepError::Singular { matrix: "static stiffness (with the effect of weight)", t });
         };
@@ -57,9 +57,9 @@ fn unbalanced(arm: &FlexibleArm, data: &mut Data, t: f64, e: &DVector<f64>) -> (
 
 fn spring_forces(arm: &FlexibleArm, e: &DVector<f64>) -> DVector<f64> {
     let mut f = DVector::zeros(e.len());
-    for (k, element) in arm.elements.iter().enumerate() {
-        let force = element.K_S * e.fixed_rows::<6>(6 * k);
-        f.fixed_rows_mut::<6>(6 * k).copy_from(&force);
+    for element in &arm.elements {
+        let range = arm.offset(element)..arm.offset(element) + element.size;
+        element.add_spring_force(&e.as_slice()[range.clone()], &mut f.as_mut_slice()[range]);
     }
     f
 }
@@ -71,9 +71,22 @@ fn gravity_part(arm: &FlexibleArm, data: &mut Data, t: f64, e: &DVector<f64>) ->
     state.q.rows_mut(model.n_actuated(), e.len()).copy_from(e);
     if !arm.loads.is_empty() {
         forward_kinematics(model, data, &state.q);
-        arm.apply_loads(data);
+        arm.apply_loads(data, t);
     }
     gravity_forces(model, data, &state.q).rows(model.n_actuated(), e.len()).clone_owned()
+}
+
+/// The stiffness with curved springs at their slope; where play leaves none, the steepest slope finds the way out.
+pub(crate) fn with_curves(arm: &FlexibleArm, K: &DMatrix<f64>, e: &DVector<f64>) -> DMatrix<f64> {
+    let mut tangent = K.clone();
+    for element in &arm.elements {
+        if let Some(curve) = &element.curve {
+            let k = arm.offset(element);
+            let slope = curve.slope(e[k]);
+            tangent[(k, k)] = if slope > 0.0 { slope } else { curve.stiffest() };
+        }
+    }
+    tangent
 }
 
 /// `K + dg/de` by central differences of the gravity forces, symmetrised.

@@ -57,10 +57,13 @@ pub struct Observation {
     pub X_WB: Vec<Pose>,
     /// Forces that the drives must supply, per actuated coordinate.
     pub drive: DVector<f64>,
-    /// Generalised elastic load per element: what the spring and damper put on the distal part.
+    /// Generalised elastic load per element: what the spring and damper put on the distal part; of modal bodies the
+    /// forces of the first six coordinates, of single springs the first component.
     pub load: Vec<Vector6<f64>>,
     /// Kinetic, gravitational and elastic energy (J).
     pub energy: [f64; 3],
+    /// Power of the drives, of the external loads, and what dampers and friction take away (W).
+    pub power: [f64; 3],
 }
 
 impl Observation {
@@ -75,6 +78,7 @@ impl Observation {
             drive: DVector::zeros(model.n_actuated()),
             load: vec![Vector6::zeros(); arm.elements.len()],
             energy: [0.0; 3],
+            power: [0.0; 3],
         }
     }
 }
@@ -121,12 +125,11 @@ pub fn new_stepper(kind: StepperKind, arm: FlexibleArm, h: f64, start: Start) ->
     if !(h.is_finite() && h > 0.0) {
         return Err(StepError::Setup(format!("the step must be a positive time in seconds, found {h}")));
     }
-    let n = arm.n_elastic_coordinates();
     let e = match start {
         Start::Equilibrium => static_equilibrium(&arm, 0.0)?,
-        Start::Undeformed => DVector::zeros(n),
+        Start::Undeformed => DVector::zeros(arm.n_elastic_coordinates()),
     };
-    let v = DVector::zeros(n);
+    check_events(&arm, h)?;
     Ok(match kind {
         StepperKind::GeneralizedAlpha(settings) => {
             let rho = settings.rho;
@@ -134,17 +137,39 @@ pub fn new_stepper(kind: StepperKind, arm: FlexibleArm, h: f64, start: Start) ->
                 return Err(StepError::Setup(format!("the spectral radius must lie between 0 and 1, found {rho}")));
             }
             let mut system = ReducedArm::new(arm);
-            let integrator = GeneralizedAlpha::new(&mut system, 0.0, h, settings, e, v)?;
+            let (x, v) = system.start(&e)?;
+            let integrator = GeneralizedAlpha::new(&mut system, 0.0, h, settings, x, v)?;
             Box::new(ImplicitStepper { system, integrator })
         }
         StepperKind::Rk4 => {
             check_explicit_step(&arm, h)?;
             let mut system = ReducedArm::new(arm);
-            let integrator = Rk4::new(&mut system, 0.0, h, e, v)?;
+            let (x, v) = system.start(&e)?;
+            let integrator = Rk4::new(&mut system, 0.0, h, x, v)?;
             Box::new(ExplicitStepper { system, integrator, steps: 0 })
         }
         StepperKind::Spook(settings) => Box::new(Spook::new(arm, h, settings, &e)?),
     })
+}
+
+/// With a fixed step, samples and changes must fall on steps.
+fn check_events(arm: &FlexibleArm, h: f64) -> Result<(), StepError> {
+    let on_grid = |t: f64| ((t / h).round() - t / h).abs() < 1e-6 * (1.0 + t / h);
+    if let Some(servo) = &arm.servo
+        && (!(servo.sample_s > 0.0) || !on_grid(servo.sample_s) || servo.sample_s < 0.5 * h)
+    {
+        let text = format!(
+            "the servo samples every {} s, which is no whole number of steps of {h} s: change --step or sample_s",
+            servo.sample_s
+        );
+        return Err(StepError::Setup(text));
+    }
+    if let Some(change) = arm.inertia_changes.iter().find(|c| !on_grid(c.t)) {
+        let t = change.t;
+        let text = format!("the payload changes at {t} s, which is no whole number of steps of {h} s: change --step");
+        return Err(StepError::Setup(text));
+    }
+    Ok(())
 }
 
 /// Every mode must lie inside the stability region: on the imaginary axis up to 2.78, 2.61 where damping turns it
@@ -178,19 +203,47 @@ fn observe_reduced(
 ) {
     system.evaluate(t, x, v, a);
     let (model, n) = (&system.arm.model, system.arm.model.n_actuated());
+    let driven = &system.arm.torque_driven;
+    let (e, rates) = (&x.as_slice()[driven.len()..], &v.as_slice()[driven.len()..]);
     out.t = t;
     out.q.copy_from(&system.state.q);
     out.qdot.copy_from(&system.state.qdot);
     out.X_WB.copy_from_slice(&system.data.X_WB);
     out.drive.copy_from(&system.data.tau.rows(0, n));
-    for (k, element) in system.arm.elements.iter().enumerate() {
-        // What the joint supplies is what inverse dynamics asks for.
-        out.load[k] = system.data.tau.fixed_rows::<6>(element.coordinate).into();
+    for (&k, torque) in driven.iter().zip(system.held_torques()) {
+        out.drive[k] = *torque;
     }
+    let mut damping = 0.0;
+    for (k, element) in system.arm.elements.iter().enumerate() {
+        let first = system.arm.offset(element);
+        let mut force = [0.0; 6];
+        for c in 0..element.size {
+            let row: f64 = rates.iter().enumerate().map(|(j, rate)| system.arm.D[(first + c, j)] * rate).sum();
+            damping += row * rates[first + c];
+            if c < 6 {
+                let own = &e[first..first + element.size];
+                let spring: f64 = match &element.curve {
+                    Some(curve) => curve.torque(own[0]),
+                    None => own.iter().enumerate().map(|(j, e)| element.K[(c, j)] * e).sum(),
+                };
+                force[c] = -(spring + row);
+            }
+        }
+        out.load[k] = Vector6::from(force);
+    }
+    for k in 0..n {
+        let rate = system.state.qdot[k];
+        damping += system.arm.friction_torque(k, rate) * rate;
+    }
+    let loads = system.arm.loads.iter().map(|load| {
+        let F = load.on_body(t, &system.data.X_WB[load.body]);
+        system.data.V[load.body].power(&F)
+    });
+    out.power = [out.drive.dot(&out.qdot.rows(0, n)), loads.sum(), damping];
     out.energy = [
         kinetic_energy_of(model, &system.data),
         potential_energy_of(model, &system.data),
-        system.arm.elastic_energy(x.as_slice()),
+        system.arm.elastic_energy(e),
     ];
 }
 
@@ -199,8 +252,9 @@ pub(crate) const LARGEST_DEFLECTION: f64 = 3.0;
 
 /// Stops a run whose links have come apart.
 fn check_deflection(arm: &FlexibleArm, x: &DVector<f64>, t: f64, h: f64) -> Result<(), StepError> {
-    for (k, element) in arm.elements.iter().enumerate() {
-        let largest = x.as_slice()[6 * k..6 * k + 6].iter().fold(0.0f64, |m, e| m.max(e.abs()));
+    for element in arm.elements.iter().filter(|e| !e.modal || e.size >= 6) {
+        let first = arm.torque_driven.len() + arm.offset(element);
+        let largest = x.as_slice()[first..first + element.size.min(6)].iter().fold(0.0f64, |m, e| m.max(e.abs()));
         if largest > LARGEST_DEFLECTION {
             let what = format!("the deflection of link {:?} reached {largest:.1e} m or rad", element.name);
             return Err(StepError::Diverged { t, h, what });
@@ -220,7 +274,12 @@ impl Stepper for ImplicitStepper {
     }
     fn step(&mut self) -> Result<(), StepError> {
         self.integrator.step(&mut self.system)?;
-        check_deflection(&self.system.arm, &self.integrator.x, self.integrator.time(), self.integrator.step_size())
+        let g = &mut self.integrator;
+        check_deflection(&self.system.arm, &g.x, g.time(), g.step_size())?;
+        if self.system.at_time(g.time(), &g.x, &g.v) {
+            g.restart(&mut self.system)?;
+        }
+        Ok(())
     }
     fn observe(&mut self, out: &mut Observation) {
         let g = &self.integrator;
@@ -248,7 +307,12 @@ impl Stepper for ExplicitStepper {
     fn step(&mut self) -> Result<(), StepError> {
         self.integrator.step(&mut self.system)?;
         self.steps += 1;
-        check_deflection(&self.system.arm, &self.integrator.x, self.integrator.time(), self.integrator.step_size())
+        let g = &mut self.integrator;
+        check_deflection(&self.system.arm, &g.x, g.time(), g.step_size())?;
+        if self.system.at_time(g.time(), &g.x, &g.v) {
+            g.restart(&mut self.system)?;
+        }
+        Ok(())
     }
     fn observe(&mut self, out: &mut Observation) {
         let g = &self.integrator;

@@ -19,7 +19,7 @@
 mod constraint;
 mod solve;
 
-use flexarm_kinematics::{Data, JointMotion, Pose, State, Twist, forward_kinematics_velocity};
+use flexarm_kinematics::{Data, ElasticAngles, JointMotion, Pose, State, Twist, Wrench, forward_kinematics_velocity};
 use nalgebra::{DVector, Matrix3, Matrix6, Rotation3, UnitQuaternion, Vector3, Vector6};
 
 use crate::arm::FlexibleArm;
@@ -120,6 +120,22 @@ impl Spook {
     /// [`StepError::Setup`] for mimic joints, which have no place in maximal coordinates here.
     pub fn new(arm: FlexibleArm, h: f64, settings: SpookSettings, e: &DVector<f64>) -> Result<Self, StepError> {
         let model = arm.model.clone();
+        let refuse = |what: &str| {
+            let text = format!("spook works in maximal coordinates and does not know {what}: use generalized-alpha");
+            Err(StepError::Setup(text))
+        };
+        if model.has_modal() {
+            return refuse("links that bend in modes (--links lumped would do)");
+        }
+        if !arm.torque_driven.is_empty() {
+            return refuse("joints driven by torque");
+        }
+        if !arm.inertia_changes.is_empty() {
+            return refuse("payloads that change");
+        }
+        if arm.elements.iter().any(|e| e.curve.is_some()) {
+            return refuse("springs with play or curves");
+        }
         if model.has_mimic() {
             let text = "spook works in maximal coordinates and does not know mimic joints: use generalized-alpha";
             return Err(StepError::Setup(text.to_owned()));
@@ -149,10 +165,7 @@ impl Spook {
             compliance.push(joint_compliance(&arm, i, h, settings.preset));
         }
         let n = bodies.len();
-        let mut loads = vec![Vector6::zeros(); n];
-        for (body, F) in &arm.loads {
-            loads[*body] += F.to_vector();
-        }
+        let loads = vec![Vector6::zeros(); n];
         let mut spook = Self {
             solver: TreeSolver::new(model.bodies().iter().map(|b| b.parent).collect()),
             arm,
@@ -184,7 +197,19 @@ impl Spook {
 fn joint_compliance(arm: &FlexibleArm, body: usize, h: f64, preset: SpookPreset) -> JointCompliance {
     let element = arm.elements.iter().position(|e| e.body == body);
     let (C, tau) = match element {
-        Some(k) => (arm.elements[k].C_S, arm.tau[k]),
+        Some(k) if arm.elements[k].size == 6 => {
+            (Matrix6::from_column_slice(arm.elements[k].C.as_slice()), arm.tau[k])
+        }
+        // One compliant row among rigid ones.
+        Some(k) => {
+            let mut C = Matrix6::identity() * RIGID_COMPLIANCE;
+            if let Some((turns, axis)) = arm.single_axis(body) {
+                let first = if turns { 3 } else { 0 };
+                let mut block = C.fixed_view_mut::<3, 3>(first, first);
+                block += axis * axis.transpose() * arm.elements[k].C[(0, 0)];
+            }
+            (C, arm.tau[k])
+        }
         None => (Matrix6::identity() * RIGID_COMPLIANCE, 2.0 * h),
     };
     let upsilon = match preset {
@@ -223,21 +248,59 @@ impl Stepper for Spook {
             // Mean force over the last step (before the first one: over that).
             let force = self.lambda[i] / h;
             match body.motion {
+                JointMotion::Revolute(axis) | JointMotion::Prismatic(axis) if body.elastic => {
+                    let first = if matches!(body.motion, JointMotion::Revolute(_)) { 3 } else { 0 };
+                    let rows = &self.rows_now(i, Default::default());
+                    let (parent, child) = (&self.bodies[body.parent], &self.bodies[i]);
+                    let rate = rows.G_parent * parent.V.to_vector() + rows.G_child * child.V.to_vector();
+                    let (e, rate) = (axis.dot(&rows.g.fixed_rows::<3>(first)), axis.dot(&rate.fixed_rows::<3>(first)));
+                    out.q[body.coordinate] = e;
+                    out.qdot[body.coordinate] = rate;
+                    if let Some(k) = self.arm.elements.iter().position(|element| element.body == i) {
+                        out.load[k] = Vector6::zeros();
+                        out.load[k][0] = -self.arm.elements[k].K[(0, 0)] * (e + rate * self.arm.tau[k]);
+                    }
+                }
                 JointMotion::Revolute(axis) => out.drive[body.coordinate] = axis.dot(&force.fixed_rows::<3>(3)),
                 JointMotion::Prismatic(axis) => out.drive[body.coordinate] = axis.dot(&force.fixed_rows::<3>(0)),
+                JointMotion::Interface { .. } => {}
                 JointMotion::Elastic(angles) => {
                     let (parent, child) = (&self.bodies[body.parent], &self.bodies[i]);
-                    let (X_WP, X_WQ) = (parent.X_WB() * body.X_PJ, child.X_WB());
-                    let rows = Rows::new(ConstraintForm::Local, angles, &X_WP, &parent.x, &X_WQ, &child.x);
+                    let rows = self.rows_now(i, angles);
                     let rate = rows.G_parent * parent.V.to_vector() + rows.G_child * child.V.to_vector();
                     out.q.fixed_rows_mut::<6>(body.coordinate).copy_from(&rows.g);
                     out.qdot.fixed_rows_mut::<6>(body.coordinate).copy_from(&rate);
-                    let k = (body.coordinate - n) / 6;
-                    let element = &self.arm.elements[k];
-                    out.load[k] = -(element.K_S * (rows.g + rate * self.arm.tau[k]));
+                    if let Some(k) = self.arm.elements.iter().position(|element| element.body == i) {
+                        let K = Matrix6::from_column_slice(self.arm.elements[k].K.as_slice());
+                        out.load[k] = -(K * (rows.g + rate * self.arm.tau[k]));
+                    }
                 }
             }
         }
+        for (k, rate) in self.qdot.iter().enumerate() {
+            out.drive[k] += self.arm.friction_torque(k, *rate);
+        }
+        for body in model.bodies().iter().skip(1).filter(|b| b.armature != 0.0) {
+            let k = body.coordinate;
+            out.drive[k] += body.armature * (self.qdot_next[k] - self.qdot[k]) / h;
+        }
+        let (mut damping, mut loads) = (0.0, 0.0);
+        for (k, element) in self.arm.elements.iter().enumerate() {
+            let rate = out.qdot.rows(element.coordinate, element.size);
+            damping += self.arm.tau[k] * rate.dot(&(&element.K * rate));
+        }
+        for (k, rate) in self.qdot.iter().enumerate() {
+            damping += self.arm.friction_torque(k, *rate) * rate;
+        }
+        for load in &self.arm.loads {
+            let body = &self.bodies[load.body];
+            let X = body.X_WB();
+            let F = load.on_body(t, &X);
+            let v = body.V.linear - body.V.angular.cross(&(X.rotation * body.com));
+            loads += v.dot(&(X.rotation * F.force)) + body.V.angular.dot(&(X.rotation * F.torque));
+        }
+        let drives = out.drive.dot(&out.qdot.rows(0, n));
+        out.power = [drives, loads, damping];
         out.energy = [kinetic, potential, self.arm.elastic_energy(&out.q.as_slice()[n..])];
     }
 
@@ -247,6 +310,14 @@ impl Stepper for Spook {
 }
 
 impl Spook {
+    /// Rows of the joint of body i for the present poses, in the local form.
+    fn rows_now(&self, i: usize, angles: ElasticAngles) -> Rows {
+        let body = &self.arm.model.bodies()[i];
+        let (parent, child) = (&self.bodies[body.parent], &self.bodies[i]);
+        let (X_WP, X_WQ) = (parent.X_WB() * body.X_PJ, child.X_WB());
+        Rows::new(ConstraintForm::Local, angles, &X_WP, &parent.x, &X_WQ, &child.x)
+    }
+
     /// Velocities and impulses of the step from the current time; poses stay.
     fn solve(&mut self) -> Result<(), StepError> {
         let (h, t, t_next) = (self.h, self.time(), self.time_after(self.steps + 1));
@@ -263,6 +334,9 @@ impl Spook {
             let (X_WP, X_WQ) = (parent.X_WB() * body.X_PJ, child.X_WB());
             let (moved, angles) = match body.motion {
                 JointMotion::Elastic(angles) => (X_WP, angles),
+                // A single spring is measured from its relaxed place.
+                _ if body.elastic => (X_WP, Default::default()),
+                JointMotion::Interface { .. } => (X_WP, Default::default()),
                 JointMotion::Revolute(axis) => {
                     let turn = Rotation3::from_scaled_axis(axis * self.q[body.coordinate]);
                     (Pose::from_parts(X_WP.translation, X_WP.rotation * turn), Default::default())
@@ -280,6 +354,14 @@ impl Spook {
                 let what = format!("joint {:?} came apart by {deflection:.1e} m or rad", body.joint);
                 return Err(StepError::Diverged { t, h, what });
             }
+        }
+
+        self.loads.iter_mut().for_each(|load| *load = Vector6::zeros());
+        for load in &self.arm.loads {
+            // At Bo in world axes.
+            let X_WB = self.bodies[load.body].X_WB();
+            let F = load.on_body(t, &X_WB);
+            self.loads[load.body] += Wrench::new(X_WB.rotation * F.force, X_WB.rotation * F.torque).to_vector();
         }
 
         // Body blocks: mass, momentum, impulse of gravity, gyroscopic moment and loads.
@@ -310,7 +392,10 @@ impl Spook {
                 sigma = turn(X_WP.matrix(), &c.C);
             }
             let rate = row.G_parent * bodies[body.parent].V.to_vector() + row.G_child * bodies[i].V.to_vector();
-            let (g_t, g_t_next) = explicit_rates(body.motion, |v| v[body.coordinate], qdot, qdot_next);
+            let (g_t, g_t_next) = match body.elastic {
+                true => (Vector6::zeros(), Vector6::zeros()),
+                false => explicit_rates(body.motion, |v| v[body.coordinate], qdot, qdot_next),
+            };
             let s = row.g * (-4.0 / h * c.upsilon) + (rate + g_t) * c.upsilon - g_t_next;
             (&row.G_parent, &row.G_child, sigma * c.sigma_factor, s)
         };
@@ -371,7 +456,7 @@ fn explicit_rates(
     let direction = match motion {
         JointMotion::Revolute(axis) => Vector6::new(0.0, 0.0, 0.0, -axis.x, -axis.y, -axis.z),
         JointMotion::Prismatic(axis) => Vector6::new(-axis.x, -axis.y, -axis.z, 0.0, 0.0, 0.0),
-        JointMotion::Elastic(_) => return (Vector6::zeros(), Vector6::zeros()),
+        _ => return (Vector6::zeros(), Vector6::zeros()),
     };
     (direction * rate_of(qdot), direction * rate_of(qdot_next))
 }

@@ -1,0 +1,185 @@
+//! What sits in a drive: curved springs, friction, and the axis of a sampled controller.
+//!
+//! Start at [`ServoAxis`], [`Friction`] and [`TorqueCurve`]. All quantities are on the joint's side of the gear.
+//! Not here: rotors (they are in the tree), gearbox springs that are straight (they are elements of the arm).
+
+/// Torque of a spring over its deflection, by straight pieces, odd or not; the end pieces go on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TorqueCurve {
+    /// Deflections (rad or m), ascending.
+    x: Vec<f64>,
+    /// Torques (N m or N), never falling.
+    y: Vec<f64>,
+}
+
+/// Why points make no curve.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{0}")]
+pub struct CurveError(String);
+
+impl TorqueCurve {
+    /// From points (deflection, torque).
+    ///
+    /// # Errors
+    /// [`CurveError`] for fewer than two points, deflections that do not rise, torques that fall, or no zero torque.
+    pub fn new(points: &[[f64; 2]]) -> Result<Self, CurveError> {
+        let fail = |text: String| Err(CurveError(text));
+        if points.len() < 2 {
+            return fail(format!("a torque curve needs at least two points, found {}", points.len()));
+        }
+        if let Some(bad) = points.iter().flatten().find(|x| !x.is_finite()) {
+            return fail(format!("a torque curve has the entry {bad}"));
+        }
+        for pair in points.windows(2) {
+            if pair[1][0] <= pair[0][0] || pair[1][1] < pair[0][1] {
+                return fail(format!(
+                    "a torque curve must rise: after ({}, {}) comes ({}, {})",
+                    pair[0][0], pair[0][1], pair[1][0], pair[1][1]
+                ));
+            }
+        }
+        let ends = |slope: f64| slope > 0.0;
+        let n = points.len();
+        let slope = |a: [f64; 2], b: [f64; 2]| (b[1] - a[1]) / (b[0] - a[0]);
+        if !ends(slope(points[0], points[1])) || !ends(slope(points[n - 2], points[n - 1])) {
+            return fail("a torque curve must rise at both ends: nothing else holds the joint".into());
+        }
+        Ok(Self { x: points.iter().map(|p| p[0]).collect(), y: points.iter().map(|p| p[1]).collect() })
+    }
+
+    /// A straight spring with play: no torque within `± half` (rad), then `stiffness`.
+    pub fn backlash(stiffness: f64, half: f64) -> Self {
+        let reach = half + 1.0;
+        Self { x: vec![-reach, -half, half, reach], y: vec![-stiffness, 0.0, 0.0, stiffness] }
+    }
+
+    fn piece(&self, e: f64) -> usize {
+        let inner = &self.x[1..self.x.len() - 1];
+        inner.iter().take_while(|x| e >= **x).count()
+    }
+
+    /// Torque at a deflection.
+    pub fn torque(&self, e: f64) -> f64 {
+        let k = self.piece(e);
+        self.y[k] + self.slope(e) * (e - self.x[k])
+    }
+
+    /// Its slope.
+    pub fn slope(&self, e: f64) -> f64 {
+        let k = self.piece(e);
+        (self.y[k + 1] - self.y[k]) / (self.x[k + 1] - self.x[k])
+    }
+
+    /// Steepest slope: the stiffness that linear figures use.
+    pub fn stiffest(&self) -> f64 {
+        (0..self.x.len() - 1).map(|k| (self.y[k + 1] - self.y[k]) / (self.x[k + 1] - self.x[k])).fold(0.0, f64::max)
+    }
+
+    /// Work from zero deflection to `e` (J).
+    pub fn energy(&self, e: f64) -> f64 {
+        let (low, high, sign) = if e < 0.0 { (e, 0.0, -1.0) } else { (0.0, e, 1.0) };
+        let mut places: Vec<f64> = self.x.iter().copied().filter(|x| *x > low && *x < high).collect();
+        places.insert(0, low);
+        places.push(high);
+        let area: f64 =
+            places.windows(2).map(|w| 0.5 * (w[1] - w[0]) * (self.torque(w[0]) + self.torque(w[1]))).sum();
+        sign * area
+    }
+}
+
+/// Friction of a drive: viscous, Coulomb made smooth near standstill, and the Stribeck rise.
+///
+/// ```text
+/// τ = viscous q̇ + (coulomb + stribeck exp(-(q̇/v_s)²)) tanh(q̇/v_0)
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Friction {
+    /// (N m s/rad).
+    pub viscous: f64,
+    /// (N m).
+    pub coulomb: f64,
+    /// What static friction has beyond Coulomb's (N m).
+    pub stribeck: f64,
+    /// Speed at which that has fallen to 1/e (rad/s).
+    pub stribeck_velocity: f64,
+    /// Speed `v_0` over which the sign changes (rad/s): below it the joint creeps instead of sticking.
+    pub regularisation: f64,
+}
+
+impl Friction {
+    /// No friction.
+    pub const NONE: Friction =
+        Friction { viscous: 0.0, coulomb: 0.0, stribeck: 0.0, stribeck_velocity: 1.0, regularisation: 1.0 };
+
+    /// Torque against the motion (N m) at a speed (rad/s).
+    pub fn torque(&self, rate: f64) -> f64 {
+        let rise = self.stribeck * (-(rate / self.stribeck_velocity).powi(2)).exp();
+        self.viscous * rate + (self.coulomb + rise) * (rate / self.regularisation).tanh()
+    }
+
+    /// Its derivative by the speed.
+    pub fn slope(&self, rate: f64) -> f64 {
+        let (s, t) = (rate / self.stribeck_velocity, (rate / self.regularisation).tanh());
+        let rise = self.stribeck * (-s * s).exp();
+        self.viscous + (self.coulomb + rise) * (1.0 - t * t) / self.regularisation
+            - rise * 2.0 * s / self.stribeck_velocity * t
+    }
+}
+
+/// One axis of the controller: position loop around a speed loop, sampled, with feed-forward and a torque limit.
+///
+/// ```text
+/// v_c = q̇_ref + position_gain (q_ref - q)
+/// τ   = velocity_gain (v_c - q̇) + integral_gain ∫ (v_c - q̇) dt + τ_ff        |τ| ≤ limit, held until the next sample
+/// ```
+/// q is the motor's angle seen from the joint. τ_ff is the rigid robot's torque on the reference motion, rotor and
+/// friction included. The integral stops while the torque is at its limit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ServoAxis {
+    /// Coordinate of the joint.
+    pub coordinate: usize,
+    /// (1/s).
+    pub position_gain: f64,
+    /// (N m s/rad).
+    pub velocity_gain: f64,
+    /// (N m/rad).
+    pub integral_gain: f64,
+    /// Whether τ_ff is added.
+    pub feed_forward: bool,
+    /// Largest torque (N m); infinite: none.
+    pub limit: f64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Truth: areas of triangles and trapezia.
+    #[test]
+    fn a_spring_with_play_stores_energy_only_beyond_it() {
+        let curve = TorqueCurve::backlash(1000.0, 0.01);
+        assert_eq!((curve.torque(0.005), curve.slope(0.0), curve.energy(-0.01)), (0.0, 0.0, 0.0));
+        assert!((curve.torque(-0.03) + 20.0).abs() < 1e-12);
+        assert!((curve.energy(0.03) - 0.5 * 1000.0 * 0.02 * 0.02).abs() < 1e-12);
+        assert!((curve.energy(-0.03) - curve.energy(0.03)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn curves_that_fall_or_let_go_are_refused() {
+        assert!(TorqueCurve::new(&[[0.0, 0.0]]).is_err());
+        assert!(TorqueCurve::new(&[[-1.0, -1.0], [0.0, 0.0], [1.0, -0.5]]).is_err());
+        assert!(TorqueCurve::new(&[[-1.0, -1.0], [0.0, 0.0], [1.0, 0.0]]).is_err());
+        let soft = TorqueCurve::new(&[[-0.01, -100.0], [-0.001, -2.0], [0.001, 2.0], [0.01, 100.0]]).unwrap();
+        assert!((soft.torque(0.0005) - 1.0).abs() < 1e-12 && (soft.stiffest() - 98.0 / 0.009).abs() < 1e-9);
+    }
+
+    /// The slope is the derivative, by central differences; measured 1e-9.
+    #[test]
+    fn friction_slope_is_the_derivative_of_its_torque() {
+        let f = Friction { viscous: 3.0, coulomb: 20.0, stribeck: 8.0, stribeck_velocity: 0.2, regularisation: 0.05 };
+        for rate in [-0.3, -0.02, 0.0, 0.01, 0.5] {
+            let numeric = (f.torque(rate + 1e-6) - f.torque(rate - 1e-6)) / 2e-6;
+            assert!((numeric - f.slope(rate)).abs() < 1e-6 * (1.0 + f.slope(rate).abs()), "{rate}");
+        }
+    }
+}

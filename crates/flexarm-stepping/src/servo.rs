@@ -1,0 +1,98 @@
+//! The sampled controller of the joints that are driven by torque: what it remembers between samples.
+
+use std::sync::Arc;
+
+use flexarm_kinematics::{Data, State, inverse_dynamics};
+use nalgebra::DVector;
+
+use crate::arm::{FlexibleArm, Servo};
+use crate::drive::{Friction, ServoAxis};
+
+/// Slack when two times are compared (s).
+const SAME_TIME: f64 = 1e-9;
+
+/// State of a [`Servo`] in a run.
+pub(crate) struct ServoState {
+    servo: Arc<Servo>,
+    friction: Vec<Friction>,
+    /// Torque held until the next sample, one per axis.
+    pub(crate) torque: Vec<f64>,
+    /// Integral part of the torque.
+    integral: Vec<f64>,
+    next: u64,
+    data: Data,
+    reference: State,
+    qddot: DVector<f64>,
+}
+
+impl ServoState {
+    pub(crate) fn new(servo: Arc<Servo>, arm: &FlexibleArm) -> Self {
+        let n = servo.axes.len();
+        Self {
+            friction: arm.friction.clone(),
+            torque: vec![0.0; n],
+            integral: vec![0.0; n],
+            next: 0,
+            data: Data::new(&servo.rigid),
+            reference: State::zeros(&servo.rigid),
+            qddot: DVector::zeros(servo.rigid.nv()),
+            servo,
+        }
+    }
+
+    /// Reference motion and the rigid robot's torques at t.
+    fn update_reference(&mut self, t: f64, arm: &FlexibleArm) {
+        let n = self.qddot.len();
+        let (q, qdot) = (self.reference.q.as_mut_slice(), self.reference.qdot.as_mut_slice());
+        arm.motion.sample(t, &mut q[..n], &mut qdot[..n], self.qddot.as_mut_slice());
+        inverse_dynamics(&self.servo.rigid, &mut self.data, &self.reference, &self.qddot);
+    }
+
+    fn feed_forward(&self, axis: usize) -> f64 {
+        let k = self.servo.axes[axis].coordinate;
+        let friction = self.friction.get(k).map_or(0.0, |f| f.torque(self.reference.qdot[k]));
+        if self.servo.axes[axis].feed_forward { self.data.tau[k] + friction } else { 0.0 }
+    }
+
+    /// Fills the integrators so that the first sample gives the torques `needed`, if it finds the joints on their reference.
+    pub(crate) fn hold(&mut self, needed: &DVector<f64>) {
+        for axis in 0..self.servo.axes.len() {
+            let ServoAxis { coordinate, integral_gain, .. } = self.servo.axes[axis];
+            self.torque[axis] = needed[coordinate];
+            // Without an integrator nothing remembers the load: the joint sags into its gains.
+            self.integral[axis] = if integral_gain > 0.0 { f64::NAN } else { 0.0 };
+        }
+    }
+
+    /// Takes a sample if one is due at t; `true` if it was.
+    pub(crate) fn sample(&mut self, t: f64, arm: &FlexibleArm, x: &[f64], v: &[f64]) -> bool {
+        if t + SAME_TIME < self.next as f64 * self.servo.sample_s {
+            return false;
+        }
+        self.next = (t / self.servo.sample_s + SAME_TIME).floor() as u64 + 1;
+        self.update_reference(t, arm);
+        for axis in 0..self.servo.axes.len() {
+            let a = self.servo.axes[axis];
+            let k = a.coordinate;
+            let wanted = self.reference.qdot[k] + a.position_gain * (self.reference.q[k] - x[axis]);
+            let error = wanted - v[axis];
+            let ahead = self.feed_forward(axis);
+            if self.integral[axis].is_nan() {
+                self.integral[axis] = self.torque[axis] - ahead - a.velocity_gain * error;
+            }
+            let unlimited = a.velocity_gain * error + self.integral[axis] + ahead;
+            self.torque[axis] = unlimited.clamp(-a.limit, a.limit);
+            // At the limit the integral only runs back.
+            if unlimited == self.torque[axis] || (unlimited > 0.0) != (error > 0.0) {
+                self.integral[axis] += a.integral_gain * self.servo.sample_s * error;
+            }
+        }
+        true
+    }
+
+    /// Time of the first sample after t.
+    pub(crate) fn next_sample(&self, t: f64) -> f64 {
+        let s = self.servo.sample_s;
+        ((t + SAME_TIME) / s).floor() * s + s
+    }
+}
