@@ -40,6 +40,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test stops at the first failure"))]
 
 pub mod beam;
+mod beam_chain;
 pub mod beam_link;
 pub mod chain;
 pub mod cut;

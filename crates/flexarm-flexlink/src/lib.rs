@@ -1,8 +1,9 @@
 //! Substitution of rigid links by flexible ones on the tree.
 //!
-//! A link with a [`ReducedLink`] becomes two links, proximal and distal, joined by a six-DoF elastic joint at the
-//! split frame S. Everything that hangs on the link beyond the split follows the distal part. The result is again a
-//! [`flexarm_kinematics::Mechanism`]: the tree model and every algorithm on it stay the same. Start at [`substitute`].
+//! A link with a [`ReducedLink`] becomes two or more links, proximal to distal, joined by six-DoF elastic joints, or one
+//! that bends in modes ([`LinkForm`]). Everything that hangs on the link beyond the split follows the distal part. A
+//! joint with an elastic gearbox becomes two, the motor's and the spring's ([`insert_gearboxes`]). The result is again
+//! a [`flexarm_kinematics::Mechanism`]: the tree model and every algorithm on it stay the same. Start at [`substitute`].
 //!
 //! Frames: L link, A proximal and B distal interface, S split. Not here: where the stiffness comes from
 //! (`flexarm-fem`), damping and time (`flexarm-stepping`).
@@ -32,8 +33,14 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
 mod cut;
+mod gearbox;
+mod modal;
 mod substitute;
 
-pub use cut::{CutError, cut_inertia};
+pub use cut::{CutError, cut_chain, cut_inertia};
 pub use flexarm_fem::ReducedLink;
-pub use substitute::{FlexibleLink, Parts, Spring, Substituted, SubstitutionError, distal_joint, substitute};
+pub use gearbox::{Gearbox, GearSpring, GearStiffness, GearboxError, insert_gearboxes};
+pub use modal::modal_body;
+pub use substitute::{
+    FlexibleLink, FlexibleSpan, LinkForm, Parts, Spring, Substituted, SubstitutionError, distal_joint, substitute,
+};

@@ -1,10 +1,14 @@
-//! One link into two with an elastic joint between.
+//! One link into two or more rigid parts with elastic joints between, or into one that bends in modes.
 
-use flexarm_fem::{ReducedLink, RigidPart, drop_coupling};
+use std::sync::Arc;
+
+use flexarm_fem::chain::Chain;
+use flexarm_fem::{ElasticSplit, ModalLink, ReducedLink, RigidPart, drop_coupling};
 use flexarm_kinematics::{ElasticAngles, Joint, JointKind, Link, LinkInertia, Mechanism, Pose};
-use nalgebra::Matrix6;
+use nalgebra::{Matrix6, Vector3};
 
-use crate::cut::{CutError, cut_inertia};
+use crate::cut::{CutError, cut_chain, cut_inertia};
+use crate::modal::substitute_modal;
 
 /// A link that bends.
 #[derive(Clone, Debug)]
@@ -17,6 +21,8 @@ pub struct FlexibleLink {
     pub reduced: ReducedLink,
     /// Whose mass properties the parts take.
     pub parts: Parts,
+    /// Rigid parts or modes.
+    pub form: LinkForm,
     /// Coordinates of the elastic rotation.
     pub angles: ElasticAngles,
     /// `false` drops the coupling terms of `K_S`: only to show what that costs.
@@ -27,7 +33,29 @@ impl FlexibleLink {
     /// With the reduced link's own parts, rotation vector and full coupling.
     pub fn new(link: impl Into<String>, reduced: ReducedLink) -> Self {
         let (angles, parts) = (ElasticAngles::default(), Parts::Reduced);
-        Self { link: link.into(), distal: None, reduced, parts, angles, coupling: true }
+        Self { link: link.into(), distal: None, reduced, parts, form: LinkForm::TwoParts, angles, coupling: true }
+    }
+}
+
+/// What a flexible link becomes.
+#[derive(Clone, Debug, Default)]
+pub enum LinkForm {
+    /// Two rigid parts with one elastic joint, those of the reduced link.
+    #[default]
+    TwoParts,
+    /// n rigid parts with n - 1 elastic joints.
+    Chain(Chain),
+    /// One body that bends in modes.
+    Modal(Arc<ModalLink>),
+}
+
+impl LinkForm {
+    /// A word for people.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::TwoParts | Self::Chain(_) => "lumped",
+            Self::Modal(_) => "modal",
+        }
     }
 }
 
@@ -51,18 +79,27 @@ pub struct Spring {
     pub distal_link: String,
     /// `K_S`, at So in S axes (N/m, N/rad; N m/m, N m/rad).
     pub K_S: Matrix6<f64>,
-    /// Distance of the interfaces (m).
-    pub length: f64,
     /// Pose of S in the link.
     pub X_LS: Pose,
-    /// Pose of B in the link.
-    pub X_LB: Pose,
+}
+
+/// A flexible link in its place: where to look for its ends.
+#[derive(Clone, Debug)]
+pub struct FlexibleSpan {
+    /// Name of the link; its frame still is at its proximal end.
+    pub link: String,
+    /// Name of the link that carries interface B now.
+    pub distal_link: String,
     /// Pose of A in the link.
     pub X_LA: Pose,
-    /// Mass of the link in the mechanism (kg).
+    /// Pose of B in the distal link.
+    pub X_DB: Pose,
+    /// Distance of the interfaces (m).
+    pub length: f64,
+    /// Mass of the link in the mechanism before (kg).
     pub own_mass: f64,
-    /// Masses of the proximal and the distal part (kg).
-    pub part_masses: [f64; 2],
+    /// Masses of the parts, proximal first; of a link that bends in modes one (kg).
+    pub part_masses: Vec<f64>,
 }
 
 /// A mechanism with its flexible links in place.
@@ -70,8 +107,10 @@ pub struct Spring {
 pub struct Substituted {
     /// The tree with elastic joints.
     pub mechanism: Mechanism,
-    /// One per flexible link, in the order given.
+    /// Elastic joints of lumped links, in the order given, proximal first.
     pub springs: Vec<Spring>,
+    /// One per flexible link, in the order given.
+    pub spans: Vec<FlexibleSpan>,
 }
 
 /// Why a link cannot be made flexible.
@@ -128,6 +167,14 @@ pub enum SubstitutionError {
         /// The link.
         link: String,
     },
+    /// Modes and another frame.
+    #[error("link {link:?} cannot bend in modes: {what}")]
+    Modal {
+        /// The link.
+        link: String,
+        /// Why.
+        what: String,
+    },
     /// The parts cannot be made.
     #[error("link {link:?} cannot be cut in two: {source}")]
     Cut {
@@ -172,75 +219,151 @@ pub fn distal_joint<'m>(
     }
 }
 
-/// Replaces each named link by two rigid parts and an elastic joint `<link>__elastic`.
+/// Replaces each named link by rigid parts with elastic joints `<link>__elastic`, or by a body that bends in modes.
 ///
-/// Joints of the link beyond the plane through S across A-B, and always the distal joint, move to the distal part
-/// `<link>__distal`, whose frame is S. At zero elastic coordinates every frame is where it was.
+/// Joints of the link beyond the plane through S across A-B (half way from A to B of a link that bends in modes), and
+/// always the distal joint, move to the distal part `<link>__distal`; a joint at another interface of a modal link
+/// moves to that. At zero elastic coordinates every frame is where it was.
 ///
 /// # Errors
 /// [`SubstitutionError`], naming the link.
 pub fn substitute(mechanism: &Mechanism, links: &[FlexibleLink]) -> Result<Substituted, SubstitutionError> {
-    let mut result = Substituted { mechanism: mechanism.clone(), springs: Vec::new() };
+    let mut result = Substituted { mechanism: mechanism.clone(), springs: Vec::new(), spans: Vec::new() };
     for (i, flexible) in links.iter().enumerate() {
         if links[..i].iter().any(|other| other.link == flexible.link) {
             return Err(SubstitutionError::Twice { link: flexible.link.clone() });
         }
-        let spring = substitute_one(&mut result.mechanism, flexible)?;
-        result.springs.push(spring);
+        let site = Site::new(&result.mechanism, flexible)?;
+        let span = match &flexible.form {
+            LinkForm::Modal(modal) => substitute_modal(&mut result.mechanism, flexible, &site, modal)?,
+            LinkForm::TwoParts | LinkForm::Chain(_) => {
+                let (joints, parts) = lumped_parts(flexible, &site)?;
+                let (span, springs) = insert_chain(&mut result.mechanism, flexible, &site, &joints, &parts);
+                result.springs.extend(springs);
+                span
+            }
+        };
+        result.spans.push(span);
     }
     Ok(result)
 }
 
-fn substitute_one(mechanism: &mut Mechanism, flexible: &FlexibleLink) -> Result<Spring, SubstitutionError> {
-    let name = &flexible.link;
-    let reduced = &flexible.reduced;
-    let distal = distal_joint(mechanism, name, flexible.distal.as_deref())?;
-    let (p_LA, p_LB) = (reduced.X_LA.translation.vector, reduced.X_LB.translation.vector);
-    let length = (p_LB - p_LA).norm();
-    let distance = (distal.X_PJ.translation.vector - p_LB).norm();
-    if distance > INTERFACE_TOLERANCE * length {
-        return Err(SubstitutionError::InterfaceElsewhere { link: name.clone(), joint: distal.name.clone(), distance });
-    }
-    let distal = distal.name.clone();
-
-    let own = mechanism.link(name).and_then(|l| l.inertia);
-    let parts = match flexible.parts {
-        Parts::Reduced => [reduced.proximal.clone(), reduced.distal.clone()],
-        Parts::FromLink(split) => {
-            let own = own.ok_or_else(|| SubstitutionError::NoInertia { link: name.clone() })?;
-            cut_inertia(&own, &p_LA, &p_LB, split)
-                .map_err(|source| SubstitutionError::Cut { link: name.clone(), source })?
-        }
-    };
-    let (own_mass, part_masses) = (own.map_or(0.0, |i| i.mass), [parts[0].mass, parts[1].mass]);
-
-    // The proximal part keeps the link's frame and name, the distal part has its frame at S.
-    let X_LS = reduced.split.X_LS;
-    let distal_link = format!("{name}__distal");
-    let joint = format!("{name}__elastic");
-    for link in &mut mechanism.links {
-        if link.name == *name {
-            link.inertia = Some(inertia_of(&parts[0]));
-        }
-    }
-    let far = parts[1].transformed(&X_LS.inverse());
-    mechanism.links.push(Link { name: distal_link.clone(), inertia: Some(inertia_of(&far)) });
-    let direction = (p_LB - p_LA) / length;
-    for child in mechanism.joints.iter_mut().filter(|j| j.parent == *name) {
-        let beyond = (child.X_PJ.translation.vector - X_LS.translation.vector).dot(&direction) > 0.0;
-        if child.name == distal || beyond {
-            child.parent.clone_from(&distal_link);
-            child.X_PJ = X_LS.inverse() * child.X_PJ;
-        }
-    }
-    let kind = JointKind::Elastic(flexible.angles);
-    mechanism.joints.push(Joint::new(&joint, kind, name, &distal_link, X_LS));
-
-    let K_S = if flexible.coupling { reduced.split.K_S } else { drop_coupling(&reduced.split.K_S) };
-    let (X_LA, X_LB) = (reduced.X_LA, reduced.X_LB);
-    Ok(Spring { link: name.clone(), joint, distal_link, K_S, length, X_LS, X_LB, X_LA, own_mass, part_masses })
+/// A link that is to bend, in the mechanism.
+pub(crate) struct Site {
+    pub(crate) distal_joint: String,
+    pub(crate) p_LA: Vector3<f64>,
+    pub(crate) p_LB: Vector3<f64>,
+    pub(crate) length: f64,
+    pub(crate) own: Option<LinkInertia>,
 }
 
-fn inertia_of(part: &RigidPart) -> LinkInertia {
+impl Site {
+    fn new(mechanism: &Mechanism, flexible: &FlexibleLink) -> Result<Self, SubstitutionError> {
+        let name = &flexible.link;
+        let distal = distal_joint(mechanism, name, flexible.distal.as_deref())?;
+        let (p_LA, p_LB) = (flexible.reduced.X_LA.translation.vector, flexible.reduced.X_LB.translation.vector);
+        let length = (p_LB - p_LA).norm();
+        let distance = (distal.X_PJ.translation.vector - p_LB).norm();
+        if distance > INTERFACE_TOLERANCE * length {
+            let (link, joint) = (name.clone(), distal.name.clone());
+            return Err(SubstitutionError::InterfaceElsewhere { link, joint, distance });
+        }
+        let own = mechanism.link(name).and_then(|l| l.inertia);
+        Ok(Self { distal_joint: distal.name.clone(), p_LA, p_LB, length, own })
+    }
+}
+
+/// Elastic joints and parts of a lumped link, proximal first.
+fn lumped_parts(
+    flexible: &FlexibleLink,
+    site: &Site,
+) -> Result<(Vec<ElasticSplit>, Vec<RigidPart>), SubstitutionError> {
+    let (name, reduced) = (&flexible.link, &flexible.reduced);
+    let cut = |source| SubstitutionError::Cut { link: name.clone(), source };
+    let own = || site.own.ok_or_else(|| SubstitutionError::NoInertia { link: name.clone() });
+    Ok(match (&flexible.form, flexible.parts) {
+        (LinkForm::Chain(chain), Parts::Reduced) => (chain.joints.clone(), chain.parts.clone()),
+        (LinkForm::Chain(chain), Parts::FromLink(_)) => {
+            let parts = cut_chain(&own()?, &site.p_LA, &site.p_LB, &chain.parts).map_err(cut)?;
+            (chain.joints.clone(), parts)
+        }
+        (_, Parts::Reduced) => {
+            (vec![reduced.split.clone()], vec![reduced.proximal.clone(), reduced.distal.clone()])
+        }
+        (_, Parts::FromLink(split)) => {
+            let parts = cut_inertia(&own()?, &site.p_LA, &site.p_LB, split).map_err(cut)?;
+            (vec![reduced.split.clone()], parts.to_vec())
+        }
+    })
+}
+
+fn insert_chain(
+    mechanism: &mut Mechanism,
+    flexible: &FlexibleLink,
+    site: &Site,
+    joints: &[ElasticSplit],
+    parts: &[RigidPart],
+) -> (FlexibleSpan, Vec<Spring>) {
+    let name = &flexible.link;
+    // The proximal part keeps the link's frame and name, the others have their frames at the joints before them.
+    for link in mechanism.links.iter_mut().filter(|l| l.name == *name) {
+        link.inertia = Some(inertia_of(&parts[0]));
+    }
+    let last = joints.len() - 1;
+    let part_name = |k: usize| {
+        if k == last { format!("{name}__distal") } else { format!("{name}__part_{}", k + 2) }
+    };
+    let X_LD = joints[last].X_LS;
+    move_children(mechanism, name, &part_name(last), &X_LD, |child, p| {
+        child == site.distal_joint || (p - X_LD.translation.vector).dot(&(site.p_LB - site.p_LA)) > 0.0
+    });
+    let mut springs = Vec::new();
+    let (mut parent, mut X_LP) = (name.clone(), Pose::identity());
+    for (k, joint) in joints.iter().enumerate() {
+        let distal_link = part_name(k);
+        let joint_name = if last == 0 { format!("{name}__elastic") } else { format!("{name}__elastic_{}", k + 1) };
+        let part = parts[k + 1].transformed(&joint.X_LS.inverse());
+        mechanism.links.push(Link { name: distal_link.clone(), inertia: Some(inertia_of(&part)) });
+        let kind = JointKind::Elastic(flexible.angles);
+        mechanism.joints.push(Joint::new(&joint_name, kind, &parent, &distal_link, X_LP.inverse() * joint.X_LS));
+        let K_S = if flexible.coupling { joint.K_S } else { drop_coupling(&joint.K_S) };
+        springs.push(Spring {
+            link: name.clone(),
+            joint: joint_name,
+            distal_link: distal_link.clone(),
+            K_S,
+            X_LS: joint.X_LS,
+        });
+        (parent, X_LP) = (distal_link, joint.X_LS);
+    }
+    let span = FlexibleSpan {
+        link: name.clone(),
+        distal_link: parent,
+        X_LA: flexible.reduced.X_LA,
+        X_DB: X_LD.inverse() * flexible.reduced.X_LB,
+        length: site.length,
+        own_mass: site.own.map_or(0.0, |i| i.mass),
+        part_masses: parts.iter().map(|p| p.mass).collect(),
+    };
+    (span, springs)
+}
+
+/// Hangs the children of a link for which `moves(name, place)` holds on another one, whose pose in the link is `X_LD`.
+pub(crate) fn move_children(
+    mechanism: &mut Mechanism,
+    link: &str,
+    to: &str,
+    X_LD: &Pose,
+    moves: impl Fn(&str, &Vector3<f64>) -> bool,
+) {
+    for child in mechanism.joints.iter_mut().filter(|j| j.parent == *link) {
+        if moves(&child.name, &child.X_PJ.translation.vector) {
+            child.parent = to.to_owned();
+            child.X_PJ = X_LD.inverse() * child.X_PJ;
+        }
+    }
+}
+
+pub(crate) fn inertia_of(part: &RigidPart) -> LinkInertia {
     LinkInertia { mass: part.mass, com: part.com, inertia_com: part.inertia }
 }

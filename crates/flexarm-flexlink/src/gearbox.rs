@@ -1,0 +1,138 @@
+//! Elastic gearboxes: a joint becomes the motor's joint and a spring between motor and link.
+//!
+//! ```text
+//! parent --joint (prescribed or torque)--> <joint>__motor --spring--> child
+//! ```
+//! The link between has no mass; the rotor is an armature of the motor's joint, `ratio² J`. With one stiffness the spring
+//! turns about the joint's axis; with three the bearings tilt too (extended flexible joint), as three springs about x, y,
+//! z of the joint frame; with six, or a full 6x6, it gives way in all directions. At zero deflection nothing has moved.
+
+use flexarm_kinematics::{ElasticAngles, Joint, JointKind, Link, Mechanism, Pose};
+use nalgebra::{DMatrix, Matrix6, Unit, Vector3};
+
+/// Stiffness of a gearbox on the joint's side.
+#[derive(Clone, Debug, PartialEq)]
+pub enum GearStiffness {
+    /// About (or along) the joint's axis (N m/rad or N/m).
+    Axis(f64),
+    /// About x, y and z of the joint frame (N m/rad).
+    Tilting([f64; 3]),
+    /// Translations (N/m) and rotations (N m/rad) in the joint frame, coupled.
+    Full(Matrix6<f64>),
+}
+
+/// A joint with an elastic gearbox.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Gearbox {
+    /// Name of the joint.
+    pub joint: String,
+    /// Its spring.
+    pub stiffness: GearStiffness,
+}
+
+/// A spring that a gearbox brought in, with its stiffness.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GearSpring {
+    /// Name for people: the joint, with the axis where there are three.
+    pub name: String,
+    /// Name of the gearbox's joint.
+    pub gearbox: String,
+    /// Name of the elastic joint.
+    pub joint: String,
+    /// Number of the spring within its gearbox.
+    pub component: usize,
+    /// Stiffness on its coordinates.
+    pub K: DMatrix<f64>,
+}
+
+/// Why a gearbox does not fit.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum GearboxError {
+    /// No such joint, or none that moves.
+    #[error("gearbox of joint {joint:?}: the robot has no such movable joint")]
+    NoJoint {
+        /// The joint.
+        joint: String,
+    },
+    /// A mimic joint follows another one exactly.
+    #[error("gearbox of joint {joint:?}: the joint mimics another one, which leaves no room for a spring")]
+    Mimic {
+        /// The joint.
+        joint: String,
+    },
+    /// A stiffness that holds nothing.
+    #[error("gearbox of joint {joint:?}: its stiffness must be positive (definite), found {found:e} as its smallest value")]
+    NotPositive {
+        /// The joint.
+        joint: String,
+        /// Smallest eigenvalue or entry.
+        found: f64,
+    },
+    /// A tilting gearbox on a slide.
+    #[error("gearbox of joint {joint:?}: three stiffnesses are about the axes of a turning joint; this one slides")]
+    Slides {
+        /// The joint.
+        joint: String,
+    },
+}
+
+/// Puts a spring behind each of the joints.
+///
+/// # Errors
+/// [`GearboxError`], naming the joint.
+pub fn insert_gearboxes(mechanism: &mut Mechanism, gearboxes: &[Gearbox]) -> Result<Vec<GearSpring>, GearboxError> {
+    let mut springs = Vec::new();
+    for gearbox in gearboxes {
+        let name = &gearbox.joint;
+        let missing = || GearboxError::NoJoint { joint: name.clone() };
+        let joint = mechanism.joints.iter_mut().find(|j| j.name == *name).ok_or_else(missing)?;
+        if joint.mimic.is_some() {
+            return Err(GearboxError::Mimic { joint: name.clone() });
+        }
+        let elastic = match joint.kind {
+            JointKind::Revolute(axis) | JointKind::Continuous(axis) => JointKind::ElasticRevolute(axis),
+            JointKind::Prismatic(axis) => JointKind::ElasticPrismatic(axis),
+            _ => return Err(missing()),
+        };
+        let motor = format!("{name}__motor");
+        let child = std::mem::replace(&mut joint.child, motor.clone());
+        mechanism.links.push(Link { name: motor.clone(), inertia: None });
+
+        let slides = matches!(elastic, JointKind::ElasticPrismatic(_));
+        let single = |k: f64| DMatrix::from_element(1, 1, k);
+        let parts: Vec<(&str, JointKind, DMatrix<f64>)> = match &gearbox.stiffness {
+            GearStiffness::Axis(k) => vec![("", elastic, single(*k))],
+            GearStiffness::Tilting(_) if slides => return Err(GearboxError::Slides { joint: name.clone() }),
+            GearStiffness::Tilting(k) => {
+                let turn = |axis: Unit<Vector3<f64>>| JointKind::ElasticRevolute(axis);
+                vec![
+                    (".x", turn(Vector3::x_axis()), single(k[0])),
+                    (".y", turn(Vector3::y_axis()), single(k[1])),
+                    (".z", turn(Vector3::z_axis()), single(k[2])),
+                ]
+            }
+            GearStiffness::Full(K) => {
+                let kind = JointKind::Elastic(ElasticAngles::RotationVector);
+                vec![("", kind, DMatrix::from_column_slice(6, 6, K.as_slice()))]
+            }
+        };
+        let (last, mut parent) = (parts.len() - 1, motor);
+        for (component, (suffix, kind, K)) in parts.into_iter().enumerate() {
+            let smallest = K.symmetric_eigenvalues().min();
+            if !(smallest > 0.0) || !smallest.is_finite() {
+                return Err(GearboxError::NotPositive { joint: name.clone(), found: smallest });
+            }
+            let spring = format!("{name}__spring{suffix}");
+            let to = if component == last { child.clone() } else { format!("{name}__gear{suffix}") };
+            if component < last {
+                mechanism.links.push(Link { name: to.clone(), inertia: None });
+            }
+            mechanism.joints.push(Joint::new(&spring, kind, &parent, &to, Pose::identity()));
+            let gearbox = name.clone();
+            springs.push(GearSpring { name: format!("{name}{suffix}"), gearbox, joint: spring, component, K });
+            parent = to;
+        }
+    }
+    Ok(springs)
+}

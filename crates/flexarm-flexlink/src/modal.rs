@@ -1,0 +1,116 @@
+//! A link that bends in modes, on the tree: one body with its interfaces.
+
+use std::sync::Arc;
+
+use flexarm_fem::ModalLink;
+use flexarm_kinematics::{
+    InterfaceShape, Joint, JointKind, Link, LinkInertia, Mechanism, ModalBody, Pose, SpatialInertia,
+};
+
+use crate::substitute::{FlexibleLink, FlexibleSpan, Parts, Site, SubstitutionError, inertia_of, move_children};
+
+/// How near a joint must be to an interface to hang on it, as a fraction of the link's length.
+const AT_INTERFACE: f64 = 1e-6;
+
+/// The mass integrals and shapes as the tree takes them.
+pub fn modal_body(link: &ModalLink) -> ModalBody {
+    ModalBody {
+        mass: link.mass,
+        first_moment: link.first_moment,
+        inertia: link.inertia,
+        C_t: link.C_t.column_iter().map(|c| c.into_owned()).collect(),
+        C_r: link.C_r.column_iter().map(|c| c.into_owned()).collect(),
+        P: link.P.clone(),
+        // Terms of second order that nobody knew are left out.
+        N: if link.N.iter().all(|N| N.amax() == 0.0) { Vec::new() } else { link.N.clone() },
+        M: link.M.clone(),
+        interfaces: link.interfaces.iter().map(|i| InterfaceShape { X_LI: i.X_LI, Phi: i.Phi.clone() }).collect(),
+    }
+}
+
+/// Puts a modal body in the place of a link.
+///
+/// Bodies that ride on the link stay rigidly on the interface on whose side of the cut they are. With
+/// [`Parts::FromLink`] the mass integrals of the undeformed body are made those of the mechanism's link.
+pub(crate) fn substitute_modal(
+    mechanism: &mut Mechanism,
+    flexible: &FlexibleLink,
+    site: &Site,
+    modal: &Arc<ModalLink>,
+) -> Result<FlexibleSpan, SubstitutionError> {
+    let (name, reduced) = (&flexible.link, &flexible.reduced);
+    let fail = |what: String| SubstitutionError::Modal { link: name.clone(), what };
+    let Some(far) = modal.interfaces.first() else { return Err(fail("it has one interface only".into())) };
+    let distance = (far.X_LI.translation.vector - site.p_LB).norm();
+    if distance > AT_INTERFACE * site.length {
+        return Err(fail(format!("its interface {:?} lies {distance:.3e} m from B of the reduced link", far.name)));
+    }
+    let mut body = modal_body(modal);
+
+    // What rides on the link: at A in the link itself, at B on the distal link.
+    let middle = reduced.split.X_LS.translation.vector;
+    let line = site.p_LB - site.p_LA;
+    let (mut near, mut beyond): (Option<SpatialInertia>, Option<SpatialInertia>) = (None, None);
+    if let (Some(details), Parts::Reduced) = (&reduced.details, flexible.parts) {
+        for part in &details.attached {
+            let place = if (part.com - middle).dot(&line) > 0.0 { &mut beyond } else { &mut near };
+            let add = inertia_of(part).spatial();
+            match place {
+                Some(sum) => *sum += add,
+                None => *place = Some(add),
+            }
+        }
+    }
+    if let Parts::FromLink(_) = flexible.parts {
+        let own = site.own.ok_or_else(|| SubstitutionError::NoInertia { link: name.clone() })?.spatial();
+        if (own.mass / body.mass - 1.0).abs() > 1e-9 {
+            return Err(fail(format!("it weighs {} kg, the link {} kg", body.mass, own.mass)));
+        }
+        (body.first_moment, body.inertia) = (own.first_moment, own.rotational);
+    }
+
+    let rigid = |inertia: SpatialInertia| LinkInertia {
+        mass: inertia.mass,
+        com: inertia.com(),
+        inertia_com: inertia.inertia_com(),
+    };
+    for link in mechanism.links.iter_mut().filter(|l| l.name == *name) {
+        link.inertia = near.map(rigid);
+    }
+    let mut part_masses = vec![body.mass];
+    part_masses.extend(near.iter().chain(&beyond).map(|i| i.mass));
+    let distal_link = format!("{name}__distal");
+    for (k, interface) in modal.interfaces.iter().enumerate() {
+        // Interfaces keep the link's axes.
+        let X_LI = Pose::from(interface.X_LI.translation);
+        let to = if k == 0 { distal_link.clone() } else { format!("{name}__{}", interface.name) };
+        let here = |p: &nalgebra::Vector3<f64>| (p - X_LI.translation.vector).norm() <= AT_INTERFACE * site.length;
+        let elsewhere = |p: &nalgebra::Vector3<f64>| {
+            let other = |i: &flexarm_fem::ModalInterface| (p - i.X_LI.translation.vector).norm() <= AT_INTERFACE * site.length;
+            modal.interfaces.iter().skip(1).any(other)
+        };
+        move_children(mechanism, name, &to, &X_LI, |child, p| match k {
+            0 => {
+                let beyond = (p - site.p_LA).dot(&line) > 0.5 * line.norm_squared();
+                child == site.distal_joint || (!elsewhere(p) && beyond)
+            }
+            _ => here(p),
+        });
+        let at_B = beyond.filter(|_| k == 0).map(|i| {
+            let part = rigid(i);
+            LinkInertia { com: part.com - X_LI.translation.vector, ..part }
+        });
+        mechanism.links.push(Link { name: to.clone(), inertia: at_B });
+        mechanism.joints.push(Joint::new(format!("{to}__interface"), JointKind::Interface(k), name, &to, X_LI));
+    }
+    mechanism.modal.push((name.clone(), Arc::new(body)));
+    Ok(FlexibleSpan {
+        link: name.clone(),
+        distal_link,
+        X_LA: reduced.X_LA,
+        X_DB: Pose::from(far.X_LI.translation).inverse() * reduced.X_LB,
+        length: site.length,
+        own_mass: site.own.map_or(0.0, |i| i.mass),
+        part_masses,
+    })
+}
