@@ -8,7 +8,7 @@
 //!
 //! Not here: distributed loads, buckling, offsets from beam to joint ([`crate::BeamLink`]).
 
-use nalgebra::{Matrix3, Matrix4, Matrix6, Vector3, Vector4};
+use nalgebra::{Matrix3, Matrix4, Matrix6, SMatrix, Vector3, Vector4};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{FemError, positive};
@@ -209,6 +209,37 @@ impl Beam {
         M
     }
 
+    /// Section properties.
+    pub(crate) fn bar(&self) -> &Bar {
+        &self.bar
+    }
+
+    /// How the section at `xi = x/l` follows the twelve displacements of the ends.
+    pub(crate) fn section_at(&self, xi: f64) -> SectionShapes {
+        let l = self.length;
+        let mut s = SectionShapes::default();
+        for (row, target, slope) in [(0, &mut s.u, &mut s.du), (3, &mut s.theta, &mut s.dtheta)] {
+            // Stretch and twist are linear.
+            (target[(0, row)], target[(0, row + 6)]) = (1.0 - xi, xi);
+            (slope[(0, row)], slope[(0, row + 6)]) = (-1.0 / l, 1.0 / l);
+        }
+        for plane in self.planes() {
+            let (N, N_theta) = plane.shapes(xi, l);
+            let (dN, dN_theta) = plane.slopes(xi, l);
+            let signs = [1.0, plane.sign, 1.0, plane.sign];
+            // Deflection along y turns the section about z, and the other way round.
+            let (along, about) = (plane.rows[0], plane.rows[1] - 3);
+            for i in 0..4 {
+                let column = plane.rows[i];
+                s.u[(along, column)] = signs[i] * N[i];
+                s.du[(along, column)] = signs[i] * dN[i];
+                s.theta[(about, column)] = plane.sign * signs[i] * N_theta[i];
+                s.dtheta[(about, column)] = plane.sign * signs[i] * dN_theta[i];
+            }
+        }
+        s
+    }
+
     /// Mass, centre of mass and inertia of the piece between the fractions `from` and `to`.
     ///
     /// Uniform bar with the rotary inertia of its section; beam axes, from the end A.
@@ -269,10 +300,45 @@ impl Plane {
         );
         (N / (1.0 + phi), N_theta / (1.0 + phi))
     }
+
+    /// Derivatives of [`Self::shapes`] by x, 1/m.
+    fn slopes(&self, xi: f64, l: f64) -> (Vector4<f64>, Vector4<f64>) {
+        let phi = self.phi;
+        let x2 = xi * xi;
+        let dN = Vector4::new(
+            (6.0 * x2 - 6.0 * xi - phi) / l,
+            3.0 * x2 - (4.0 + phi) * xi + 1.0 + 0.5 * phi,
+            -(6.0 * x2 - 6.0 * xi - phi) / l,
+            3.0 * x2 - (2.0 - phi) * xi - 0.5 * phi,
+        );
+        let dN_theta = Vector4::new(
+            6.0 * (2.0 * xi - 1.0) / (l * l),
+            (6.0 * xi - 4.0 - phi) / l,
+            -6.0 * (2.0 * xi - 1.0) / (l * l),
+            (6.0 * xi - 2.0 + phi) / l,
+        );
+        (dN / (1.0 + phi), dN_theta / (1.0 + phi))
+    }
+}
+
+/// Three rows over the twelve displacements of the ends of a beam.
+pub(crate) type Matrix3x12 = SMatrix<f64, 3, 12>;
+
+/// Motion of one section, beam axes, per displacement of the ends.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct SectionShapes {
+    /// Displacement of the centre line.
+    pub(crate) u: Matrix3x12,
+    /// Its derivative along the beam, 1/m.
+    pub(crate) du: Matrix3x12,
+    /// Rotation of the section.
+    pub(crate) theta: Matrix3x12,
+    /// Its derivative along the beam, 1/m.
+    pub(crate) dtheta: Matrix3x12,
 }
 
 /// Four Gauss points on [0, 1] with their weights: exact to degree 7, the mass needs 6.
-fn gauss4() -> [(f64, f64); 4] {
+pub(crate) fn gauss4() -> [(f64, f64); 4] {
     let root = (6.0_f64 / 5.0).sqrt();
     let inner = (3.0 / 7.0 - 2.0 / 7.0 * root).sqrt();
     let outer = (3.0 / 7.0 + 2.0 / 7.0 * root).sqrt();

@@ -55,6 +55,7 @@ pub mod matrix_link;
 pub mod mesh;
 pub mod mesh_gate;
 pub mod mesh_link;
+pub mod modal;
 pub mod model;
 pub mod reduced;
 pub mod reduction;
@@ -79,6 +80,7 @@ pub use mesh::{
 };
 pub use mesh_gate::MeshGate;
 pub use mesh_link::{LinkPlan, MeshReduction, SplitAt, reduce_mesh};
+pub use modal::{GeometricStiffness, ModalInterface, ModalLink, ModalOptions};
 pub use reduced::{ElasticSplit, LinkDetails, Provenance, ReducedLink, drop_coupling, stiffness_at_split};
 pub use rigid_part::RigidPart;
 pub use section::{Bar, Section, SectionProperties};

@@ -18,6 +18,7 @@ use crate::frames::LinkFrames;
 use crate::gate::GateLimits;
 use crate::mesh::Mesh;
 use crate::mesh_gate::{ElementQuality, MeshGate, ModeCheck};
+use crate::modal::ModalSource;
 use crate::model::{AssemblyError, AssemblyOptions, FeModel, materials};
 use crate::reduced::{ElasticSplit, LinkDetails, Provenance, ReducedLink};
 use crate::reduction::{
@@ -62,6 +63,8 @@ pub struct LinkPlan {
     /// Bodies that ride on the link without being in its mesh (motors, gears, cables), link axes; each
     /// joins the rigid part on whose side of the cut its centre of mass lies.
     pub attached: Vec<RigidPart>,
+    /// Whether the modal link gets its stiffness by initial stress; 12 more solves and a pass over all elements.
+    pub geometric: bool,
     /// Modes with A held against which the reduced models are judged.
     pub judged_modes: usize,
     /// Limits of the gate.
@@ -73,7 +76,7 @@ pub struct LinkPlan {
 /// What came out.
 #[derive(Debug, Clone)]
 pub struct MeshReduction {
-    /// The link, with its superelement, chains and gate in [`ReducedLink::details`].
+    /// The link, with its superelement, modal link, chains and gate in [`ReducedLink::details`].
     pub link: ReducedLink,
     /// Mass properties of the whole mesh, link axes.
     pub whole: RigidPart,
@@ -245,14 +248,26 @@ pub fn reduce_mesh(
     attach(&plan.attached, &mut link, &mut chains)?;
     warnings.extend(gate.warnings());
     warnings.extend(implausible(mesh, &whole, &held_modes));
+    let modal = ModalSource {
+        mesh,
+        materials: &materials,
+        quadrature: plan.assembly.quadrature,
+        condensation: &condensation,
+        interfaces: &plan.interfaces,
+        fixed_modes: &fixed_modes,
+        superelement: &superelement,
+    };
+    let modal = modal.modal_link(&plan.name, plan.geometric);
     link.details = Some(Box::new(LinkDetails {
         superelement: Some(superelement),
         chains,
         attached: plan.attached.clone(),
+        modal: Some(modal),
         gate: Some(gate),
     }));
     warnings.extend(link.warnings(&plan.limits));
-    let solves = fixed_modes.solves + held_modes.solves + condensation.figures().static_solves;
+    let stress_solves = if plan.geometric { 12 } else { 0 };
+    let solves = fixed_modes.solves + held_modes.solves + condensation.figures().static_solves + stress_solves;
     let solver = condensation.figures();
     Ok(MeshReduction { link, whole, solver, unit_loads, fixed_modes, held_modes, bare_chains, solves, warnings })
 }
@@ -424,7 +439,7 @@ fn rigid_motions(element: &Superelement) -> DMatrix<f64> {
     rigid_motions_about(element, &((p(0) + p(1)) / 2.0))
 }
 
-fn rigid_motions_about(element: &Superelement, point: &Vector3<f64>) -> DMatrix<f64> {
+pub(crate) fn rigid_motions_about(element: &Superelement, point: &Vector3<f64>) -> DMatrix<f64> {
     let mut R = DMatrix::zeros(element.boundary(), 6);
     for (k, interface) in element.interfaces.iter().enumerate() {
         let turn = -(interface.X_LI.translation.vector - point).cross_matrix();

@@ -274,7 +274,12 @@ impl Inverted {
 }
 
 /// A beam element between its nodes, and the turn of its axes: `A = Q A_E Qᵀ`.
-fn beam_of(mesh: &Mesh, region: usize, nodes: &[u32], material: &Material) -> Result<(Beam, Matrix12), AssemblyError> {
+pub(crate) fn beam_of(
+    mesh: &Mesh,
+    region: usize,
+    nodes: &[u32],
+    material: &Material,
+) -> Result<(Beam, Matrix12), AssemblyError> {
     let region = &mesh.regions[region];
     let name = || region.name.clone();
     let properties = region.beam.as_ref().ok_or_else(|| AssemblyError::NoSection { region: name() })?;

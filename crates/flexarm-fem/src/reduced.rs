@@ -22,6 +22,7 @@ use crate::error::FemError;
 use crate::frames::LinkFrames;
 use crate::gate::{GateLimits, GateReport, check_matrix6, check_matrix12, lever};
 use crate::mesh_gate::MeshGate;
+use crate::modal::ModalLink;
 use crate::reduction::Superelement;
 use crate::rigid_part::RigidPart;
 use crate::spatial::{Matrix12, Pose, adjoint, symmetric_part};
@@ -62,6 +63,8 @@ pub struct LinkDetails {
     /// Bodies that ride on the link (motors, gears): already in the two parts and in the chains, but not in the
     /// superelement, whose mass is that of the mesh.
     pub attached: Vec<RigidPart>,
+    /// Shapes and mass integrals of the mesh in the frame at A, without the bodies that ride on it.
+    pub modal: Option<ModalLink>,
     /// What was checked against the mesh.
     pub gate: Option<MeshGate>,
 }

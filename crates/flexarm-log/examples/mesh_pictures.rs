@@ -41,6 +41,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         split: SplitAt::ElasticCentre,
         chains: Vec::new(),
         attached: Vec::new(),
+        geometric: false,
         judged_modes: 6,
         limits: GateLimits::default(),
         provenance: Provenance::default(),

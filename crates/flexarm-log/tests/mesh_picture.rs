@@ -65,6 +65,7 @@ fn reduce(mesh: &Mesh, interfaces: &[Interface]) -> MeshReduction {
         split: SplitAt::MidLength,
         chains: Vec::new(),
         attached: Vec::new(),
+        geometric: false,
         judged_modes: 4,
         limits: GateLimits::default(),
         provenance: Provenance::default(),

@@ -1,4 +1,4 @@
-//! The optional tables of a reduced-link file: `[superelement]`, `[[chain]]` and `[gate]`.
+//! The optional tables of a reduced-link file: `[superelement]`, `[[chain]]`, `[modal]` and `[gate]`.
 
 use nalgebra::{DMatrix, Matrix6};
 use serde::Deserialize;
@@ -53,6 +53,9 @@ pub(super) fn write_details(link: &ReducedLink) -> String {
             "\n[[attached]]                  # rides on the link: in the parts and chains, not in the superelement\n";
         text += &super::write::inertial(body);
     }
+    if let Some(modal) = &details.modal {
+        text += &super::modal::write_modal(modal);
+    }
     if let Some(gate) = details.gate.as_ref().and_then(|gate| toml::to_string(gate).ok()) {
         // Its own tables become tables of [gate].
         let body = gate.replace("\n[[", "\n[[gate.").replace("\n[quality]", "\n[gate.quality]");
@@ -75,7 +78,7 @@ pub(super) fn read_details(
     limits: &GateLimits,
 ) -> Result<(), FlexFileError> {
     let mut details = LinkDetails::default();
-    for key in ["superelement", "chain", "attached"] {
+    for key in ["superelement", "chain", "attached", "modal"] {
         let found = root.get(key);
         if let Some(node) = found.filter(|_| !units.is_si()) {
             let (found, help) = (units.names.clone(), format!("convert the numbers, or leave [{key}] out"));
@@ -96,6 +99,9 @@ pub(super) fn read_details(
             body.only(&["mass", "com", "inertia"])?;
             details.attached.push(read_inertial(&item, &body, "an attached body", units)?);
         }
+    }
+    if let Some(node) = root.get("modal") {
+        details.modal = Some(super::modal::read_modal(&node, units, link, AGREEMENT)?);
     }
     if let Some(node) = root.get("gate") {
         #[derive(Deserialize)]

@@ -4,6 +4,7 @@ mod details;
 mod document;
 mod error;
 mod frames;
+mod modal;
 mod read;
 mod units;
 mod write;

@@ -85,6 +85,7 @@ pub fn parse_flex_with(text: &str, origin: &str, limits: &GateLimits) -> Result<
         "superelement",
         "chain",
         "attached",
+        "modal",
         "gate",
         "part",
     ])?;

@@ -69,6 +69,17 @@ impl MassMatrix {
             Some(general) => general.product_into(X, Y),
             None => Y.fill(0.0),
         }
+        self.add_nodal_product(X, Y);
+    }
+
+    /// The part of `M X` that belongs to solids: on node i `Σ_j m_ij x_j`, component by component.
+    pub(crate) fn solid_product(&self, X: &DMatrix<f64>) -> DMatrix<f64> {
+        let mut Y = DMatrix::zeros(X.nrows(), X.ncols());
+        self.add_nodal_product(X, &mut Y);
+        Y
+    }
+
+    fn add_nodal_product(&self, X: &DMatrix<f64>, Y: &mut DMatrix<f64>) {
         let Some((nodal, first)) = &self.nodal else { return };
         let pattern = nodal.pattern();
         for (x, y) in X.as_slice().chunks_exact(self.size).zip(Y.as_mut_slice().chunks_exact_mut(self.size)) {

@@ -60,6 +60,7 @@ fn plan(interfaces: Vec<Interface>, material: Material, modes: usize) -> LinkPla
         split: SplitAt::ElasticCentre,
         chains: Vec::new(),
         attached: Vec::new(),
+        geometric: false,
         judged_modes: 6,
         limits: crate::GateLimits::default(),
         provenance: Provenance::default(),

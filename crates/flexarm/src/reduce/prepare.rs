@@ -210,6 +210,7 @@ fn plan(
         split,
         chains: job.chains.clone().unwrap_or_default(),
         attached: Vec::new(),
+        geometric: false,
         judged_modes: JUDGED_MODES,
         limits: GateLimits::default(),
         provenance,

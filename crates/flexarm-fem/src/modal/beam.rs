@@ -1,0 +1,122 @@
+//! The modal link of a uniform beam, by beam elements between its two ends.
+
+use super::{ModalLink, ModalOptions, ModalSource};
+use crate::beam_link::BeamLink;
+use crate::element::Quadrature;
+use crate::error::{FemError, positive};
+use crate::material::Material;
+use crate::mesh::{BeamProperties, ElementBlock, ElementKind, Mesh, Region};
+use crate::model::{AssemblyOptions, FeModel};
+use crate::reduction::{Condensation, CondensationOptions, Interface, InterfaceFrame, Tie};
+use crate::section::{Bar, Section};
+use crate::sparse::ModesWanted;
+
+impl BeamLink {
+    /// The modal link of this beam: static shapes of the distal interface and `modes` fixed-interface modes.
+    ///
+    /// The rigid arms from the beam to the joints weigh nothing. Elements: 24, or two per mode where that is more.
+    ///
+    /// ```
+    /// use flexarm_fem::{BeamLink, Material, Section};
+    ///
+    /// let section = Section::Circle { diameter: 0.02 };
+    /// let rod = BeamLink::new("rod", section, Material::STEEL, 1.0).modal(8)?;
+    /// assert_eq!(rod.coordinates(), 14);
+    /// // Cantilever: 1.8751² sqrt(EI/(μ l⁴)) / 2π.
+    /// assert!((rod.held_frequencies_hz()[0] - 14.47).abs() < 0.01);
+    /// # Ok::<(), flexarm_fem::FemError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Self::modal_with`].
+    pub fn modal(&self, modes: usize) -> Result<ModalLink, FemError> {
+        let options = ModalOptions::default();
+        self.modal_with(&ModalOptions { modes, elements: options.elements.max(2 * modes), ..options })
+    }
+
+    /// The modal link of this beam, with choices.
+    ///
+    /// # Errors
+    /// [`FemError::OutOfRange`] for impossible dimensions, materials and masses, too few elements and too many modes,
+    /// [`FemError::Missing`] for a section without shear stiffness in Timoshenko's theory.
+    pub fn modal_with(&self, options: &ModalOptions) -> Result<ModalLink, FemError> {
+        let reduced = self.reduce()?;
+        let m = options.elements;
+        let range = |what: &str, found: usize, allowed: String| {
+            FemError::OutOfRange { what: what.into(), found: found as f64, allowed }
+        };
+        if !(2..=10_000).contains(&m) {
+            return Err(range("number of beam elements", m, "2 to 10000".into()));
+        }
+        if options.modes > 6 * (m - 1) {
+            let allowed = format!("up to {}, six per inner node of the elements", 6 * (m - 1));
+            return Err(range("number of fixed-interface modes", options.modes, allowed));
+        }
+
+        let mesh = self.elements(m)?;
+        let assembly = AssemblyOptions::default();
+        let refused = |what: &str| FemError::OutOfRange {
+            what: format!("{what} of the beam elements"),
+            found: f64::NAN,
+            allowed: "numbers that can be solved: is the section possible at this length?".into(),
+        };
+        let model = FeModel::assemble(&mesh, &assembly).map_err(|_| refused("assembly"))?;
+        let interface =
+            |name: &str, X_LI, node| Interface { name: name.into(), X_LI, nodes: vec![node], tie: Tie::Rigid };
+        let interfaces = [interface("A", self.X_LA, 0), interface("B", self.X_LB, m as u32)];
+        let condensation = Condensation::new(&model, &interfaces, CondensationOptions::default())
+            .map_err(|_| refused("condensation"))?;
+        let fixed_modes =
+            condensation.fixed_modes(ModesWanted::Count(options.modes)).map_err(|_| refused("fixed-interface modes"))?;
+        let frame = |i: &Interface| InterfaceFrame { name: i.name.clone(), X_LI: i.X_LI, tie: Some(i.tie) };
+        let mut superelement = condensation.superelement(interfaces.iter().map(frame).collect(), &fixed_modes);
+        // The same stiffness in closed form has the last digits that condensing loses.
+        let K12 = reduced.matrix12();
+        superelement.K.view_mut((0, 0), (12, 12)).copy_from(&K12);
+
+        let source = ModalSource {
+            mesh: &mesh,
+            materials: &[Material::STEEL],
+            quadrature: Quadrature::Exact,
+            condensation: &condensation,
+            interfaces: &interfaces,
+            fixed_modes: &fixed_modes,
+            superelement: &superelement,
+        };
+        Ok(source.modal_link(&self.name, options.geometric))
+    }
+
+    /// The beam as `m` elements of equal length, link axes.
+    fn elements(&self, m: usize) -> Result<Mesh, FemError> {
+        let bar = self.section.bar(&self.material)?;
+        let factor = match self.mass {
+            Some(mass) => positive("mass of the link (kg)", mass)? / (bar.mass_per_length * self.length),
+            None => 1.0,
+        };
+        let bar = Bar {
+            mass_per_length: bar.mass_per_length * factor,
+            rotary_y: bar.rotary_y * factor,
+            rotary_z: bar.rotary_z * factor,
+            ..bar
+        };
+        let axis = |k: usize| self.X_LE.rotation.matrix().column(k).into_owned();
+        let start = self.X_LE.translation.vector;
+        Ok(Mesh {
+            node_ids: (1..=m as u64 + 1).collect(),
+            nodes: (0..=m).map(|k| start + axis(0) * (self.length * k as f64 / m as f64)).collect(),
+            blocks: vec![ElementBlock {
+                kind: ElementKind::Beam2,
+                region: 0,
+                ids: (1..=m as u64).collect(),
+                connectivity: (0..m as u32).flat_map(|k| [k, k + 1]).collect(),
+            }],
+            // The section brings its own stiffness and mass: the material is not used.
+            regions: vec![Region {
+                name: self.name.clone(),
+                material: Some(Material::STEEL),
+                beam: Some(BeamProperties { section: Section::Given(bar), y_axis: axis(1), theory: self.theory }),
+            }],
+            ..Mesh::default()
+        })
+    }
+}

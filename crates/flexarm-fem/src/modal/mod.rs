@@ -1,0 +1,229 @@
+//! The modal link: shapes and mass integrals of a link that deforms in a floating frame.
+//!
+//! The floating frame is the link frame L, tangent at interface A: A does not deform. A point at s moves to
+//!
+//! ```text
+//! s + u,   u(s) = Σ φ_k(s) η_k
+//! ```
+//! Coordinates of a reduced link: six per interface but A (displacement and rotation of that interface, link axes, with
+//! the static shapes that belong to them), then the amplitudes of its fixed-interface modes. Everything that the equations of motion need
+//! are integrals over the undeformed body, and none of them depends on η:
+//!
+//! ```text
+//! C_t,k = ∫ φ_k dm    C_r,k = ∫ s × φ_k dm    P_k = ∫ s φ_kᵀ dm    N_kl = ∫ φ_k φ_lᵀ dm    M_kl = ∫ φ_k·φ_l dm
+//! C_r,k = axial(P_k),   M_kl = tr N_kl,   N_lk = N_klᵀ           axial(A)_x = A_yz - A_zy, ...
+//! ```
+//! These three identities hold for solids and for beams, whose sections stay plane: there
+//! `φ = u + θ × r` at the place r in the section, so the rotary inertia is in all of them.
+//!
+//! | from | with |
+//! | --- | --- |
+//! | a mesh | [`ModalSource`], in [`LinkDetails::modal`](crate::LinkDetails) after [`reduce_mesh`](crate::reduce_mesh) |
+//! | a uniform beam | [`BeamLink::modal`](crate::BeamLink::modal) |
+//! | a condensed stiffness and mass | [`ModalLink::from_superelement`]: first order only |
+//! | Standard Input Data | [`ModalLink::from_sid`], and back: [`ModalLink::to_sid`] |
+//!
+//! Source: Shabana (2013), chapter 5; Wallrapp (1994); Schwertassek & Wallrapp (1999).
+//!
+//! Not here: equations of motion, joints, time.
+
+mod beam;
+mod geometric;
+mod sid;
+mod source;
+mod superelement;
+#[cfg(test)]
+mod tests;
+mod transform;
+
+use nalgebra::{DMatrix, Matrix3, Matrix3xX, Matrix6xX, Vector3};
+
+use crate::error::FemError;
+use crate::reduction::{generalised_frequencies, spd_inverse};
+use crate::rigid_part::RigidPart;
+use crate::spatial::Pose;
+
+pub use source::ModalSource;
+
+/// An interface of a modal link and how it follows the coordinates.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModalInterface {
+    /// Name.
+    pub name: String,
+    /// Frame in the link frame, undeformed.
+    pub X_LI: Pose,
+    /// Displacement of Io, then rotation of I, link axes, per coordinate; (m; rad).
+    pub Phi: Matrix6xX<f64>,
+}
+
+/// Stiffness by initial stress, per unit of the load that makes the stress.
+///
+/// ```text
+/// K_eff = K + Σ load_i G_i
+/// ```
+/// The stress is the static one of the link with A held under that load alone. Loads are dead: forces keep their
+/// direction in link axes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GeometricStiffness {
+    /// Per m/s² of the acceleration of Lo minus gravity, along x, y, z of the link: load `-a dm`.
+    pub acceleration: [DMatrix<f64>; 3],
+    /// Per rad/s² of angular acceleration about x, y, z: load `-α × s dm`.
+    pub angular: [DMatrix<f64>; 3],
+    /// Per rad²/s² of `ω_i ω_j` in the order xx yy zz xy xz yz: load `-ω × (ω × s) dm`. `ω_x ω_y` counts once.
+    pub centrifugal: [DMatrix<f64>; 6],
+    /// Per unit wrench on each interface, forces (1/N) before torques (1/(N·m)), at Io, link axes.
+    pub interface: Vec<[DMatrix<f64>; 6]>,
+}
+
+/// Shapes and inertia invariants of a link in its floating frame: link axes, tangent at interface A. SI units.
+///
+/// The builders check; afterwards it is plain data. All integrals are over the undeformed link.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModalLink {
+    /// Name of the link.
+    pub name: String,
+    /// Every interface but A; the distal one, B, first.
+    pub interfaces: Vec<ModalInterface>,
+    /// Mass, kg.
+    pub mass: f64,
+    /// `∫ s dm` from Lo, link axes, kg·m.
+    pub first_moment: Vector3<f64>,
+    /// Inertia about Lo (not about the centre of mass), link axes, kg·m².
+    pub inertia: Matrix3<f64>,
+    /// `∫ φ_k dm`, one column per coordinate.
+    pub C_t: Matrix3xX<f64>,
+    /// `∫ s × φ_k dm` about Lo, one column per coordinate.
+    pub C_r: Matrix3xX<f64>,
+    /// `P_k[a,b] = ∫ s_a φ_k,b dm`.
+    pub P: Vec<Matrix3<f64>>,
+    /// `N[k n + l][a,b] = ∫ φ_k,a φ_l,b dm`, so that `N_lk = N_klᵀ`.
+    pub N: Vec<Matrix3<f64>>,
+    /// Mass over the coordinates, exactly symmetric.
+    pub M: DMatrix<f64>,
+    /// Stiffness over the coordinates, exactly symmetric.
+    pub K: DMatrix<f64>,
+    /// Stiffness by initial stress, if it was asked for.
+    pub geometric: Option<GeometricStiffness>,
+    /// What each coordinate is, in words.
+    pub labels: Vec<String>,
+    /// Interface A, which does not deform.
+    pub X_LA: Pose,
+}
+
+/// What to make of a uniform beam.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ModalOptions {
+    /// Fixed-interface modes.
+    pub modes: usize,
+    /// Beam elements in between.
+    pub elements: usize,
+    /// Whether to find the stiffness by initial stress.
+    pub geometric: bool,
+}
+
+impl Default for ModalOptions {
+    fn default() -> Self {
+        Self { modes: 6, elements: 24, geometric: false }
+    }
+}
+
+impl ModalLink {
+    /// Number of coordinates.
+    pub fn coordinates(&self) -> usize {
+        self.K.nrows()
+    }
+
+    /// Rigid body of the undeformed link: mass, centre of mass, inertia about it.
+    pub fn rigid(&self) -> RigidPart {
+        let com = self.first_moment / self.mass;
+        let c = com.cross_matrix();
+        RigidPart { mass: self.mass, com, inertia: self.inertia + c * c * self.mass }
+    }
+
+    /// Whether the integrals of second order are known; a condensed mass does not tell them.
+    pub fn has_second_order(&self) -> bool {
+        self.coordinates() == 0 || self.N.iter().any(|N| N.amax() > 0.0)
+    }
+
+    /// Mass over the motion of the link frame (linear, angular, link axes, at Lo), then the coordinates; undeformed.
+    ///
+    /// ```text
+    /// [ m 1     -[mc]x   C_t ]
+    /// [ [mc]x    J       C_r ]
+    /// [ C_tᵀ     C_rᵀ    M   ]
+    /// ```
+    pub fn mass_matrix(&self) -> DMatrix<f64> {
+        let n = self.coordinates();
+        let mut M = DMatrix::zeros(6 + n, 6 + n);
+        let mc = self.first_moment.cross_matrix();
+        M.view_mut((0, 0), (3, 3)).copy_from(&(Matrix3::identity() * self.mass));
+        M.view_mut((0, 3), (3, 3)).copy_from(&-mc);
+        M.view_mut((3, 0), (3, 3)).copy_from(&mc);
+        M.view_mut((3, 3), (3, 3)).copy_from(&self.inertia);
+        M.view_mut((0, 6), (3, n)).copy_from(&self.C_t);
+        M.view_mut((3, 6), (3, n)).copy_from(&self.C_r);
+        M.view_mut((6, 0), (n, 3)).copy_from(&self.C_t.transpose());
+        M.view_mut((6, 3), (n, 3)).copy_from(&self.C_r.transpose());
+        M.view_mut((6, 6), (n, n)).copy_from(&self.M);
+        M
+    }
+
+    /// Natural frequencies with A held, Hz, ascending.
+    pub fn held_frequencies_hz(&self) -> Vec<f64> {
+        transform::eigenpairs(&self.K, &self.M).map_or_else(Vec::new, |pairs| {
+            pairs.omega.iter().map(|omega| omega / std::f64::consts::TAU).collect()
+        })
+    }
+
+    /// Natural frequencies of the free link, Hz, ascending; the first six belong to rigid motions and are near zero.
+    pub fn free_frequencies_hz(&self) -> Vec<f64> {
+        let n = self.coordinates();
+        let mut K = DMatrix::zeros(6 + n, 6 + n);
+        K.view_mut((6, 6), (n, n)).copy_from(&self.K);
+        generalised_frequencies(&K, &self.mass_matrix())
+    }
+
+    /// Compliance of an interface with A held, at Io, link axes.
+    ///
+    /// # Errors
+    /// [`FemError::OutOfRange`] for an interface that there is not, [`FemError::Missing`] for a singular stiffness.
+    pub fn compliance(&self, interface: usize) -> Result<nalgebra::Matrix6<f64>, FemError> {
+        let Some(at) = self.interfaces.get(interface) else {
+            return Err(FemError::OutOfRange {
+                what: "number of the interface, from 0".into(),
+                found: interface as f64,
+                allowed: format!("below {}", self.interfaces.len()),
+            });
+        };
+        let loose = FemError::Missing { what: "stiffness of a coordinate", help: "it holds nothing" };
+        let C = spd_inverse(&self.K).ok_or(loose)?;
+        let Phi = DMatrix::from_column_slice(6, self.coordinates(), at.Phi.as_slice());
+        let C = &Phi * C * Phi.transpose();
+        Ok(crate::spatial::symmetric_part(&nalgebra::Matrix6::from_column_slice(C.as_slice())))
+    }
+
+    /// Whether the coordinates are those of Craig and Bampton: six per interface, then modes that move none of them.
+    pub fn is_craig_bampton(&self) -> bool {
+        let unit = |(i, interface): (usize, &ModalInterface)| {
+            let expected = |r: usize, c: usize| if c == 6 * i + r { 1.0 } else { 0.0 };
+            interface.Phi == Matrix6xX::from_fn(self.coordinates(), expected)
+        };
+        self.interfaces.iter().enumerate().all(unit)
+    }
+}
+
+/// The axial vector of the skew part, doubled: `∫ s × φ dm` of `∫ s φᵀ dm`.
+pub(crate) fn axial(A: &Matrix3<f64>) -> Vector3<f64> {
+    Vector3::new(A[(1, 2)] - A[(2, 1)], A[(2, 0)] - A[(0, 2)], A[(0, 1)] - A[(1, 0)])
+}
+
+/// Inertia about the origin of second moments `∫ s sᵀ dm`.
+pub(crate) fn inertia_of(S: &Matrix3<f64>) -> Matrix3<f64> {
+    let J = Matrix3::identity() * S.trace() - S;
+    (J + J.transpose()) * 0.5
+}
+
+/// `(A + Aᵀ)/2`.
+pub(crate) fn symmetric(A: &DMatrix<f64>) -> DMatrix<f64> {
+    (A + A.transpose()) * 0.5
+}

@@ -1,0 +1,211 @@
+//! Other coordinates for the same shapes: orthogonalised, or fewer.
+
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Matrix6xX};
+
+use super::{GeometricStiffness, ModalInterface, ModalLink};
+use crate::error::FemError;
+
+/// Modes with `ΦᵀKΦ = diag(ω²)`, `ΦᵀMΦ = 1`.
+pub(super) struct Eigenpairs {
+    /// rad/s, ascending.
+    pub(super) omega: Vec<f64>,
+    pub(super) Phi: DMatrix<f64>,
+}
+
+/// Rotations of pairs of columns until they are orthogonal to rounding; half as many always sufficed.
+const MOST_SWEEPS: usize = 60;
+
+/// All modes of a dense symmetric positive definite pencil; `None` where it is not.
+///
+/// One-sided Jacobi: columns that are orthonormal in K are turned in pairs until they are orthogonal in M too. Low
+/// frequencies keep their digits beside high ones, which eigenvalues of a matrix of ω² would not.
+///
+/// Source: Demmel & Veselić (1992), *SIAM J. Matrix Anal. Appl.* 13.
+pub(super) fn eigenpairs(K: &DMatrix<f64>, M: &DMatrix<f64>) -> Option<Eigenpairs> {
+    let n = K.nrows();
+    // W: columns orthonormal in K; H = Gᵀ W with M = G Gᵀ: their momenta.
+    let mut W = lower_factor(K)?.transpose().solve_upper_triangular(&DMatrix::identity(n, n))?;
+    let G = lower_factor(M)?;
+    let mut H = G.transpose() * &W;
+    if H.iter().any(|x| !x.is_finite()) {
+        return None;
+    }
+    for _ in 0..MOST_SWEEPS {
+        let mut worst = 0.0_f64;
+        for i in 0..n {
+            for j in i + 1..n {
+                let (a, b) = (H.column(i).norm_squared(), H.column(j).norm_squared());
+                let c = H.column(i).dot(&H.column(j));
+                let size = (a * b).sqrt();
+                if !(c.abs() > 1e-16 * size) {
+                    continue;
+                }
+                worst = worst.max(c.abs() / size);
+                let zeta = (b - a) / (2.0 * c);
+                let t = zeta.signum() / (zeta.abs() + zeta.hypot(1.0));
+                let cos = 1.0 / t.hypot(1.0);
+                turn(&mut H, i, j, cos, cos * t);
+                turn(&mut W, i, j, cos, cos * t);
+            }
+        }
+        if worst < 1e-15 {
+            break;
+        }
+    }
+    let sizes: Vec<f64> = H.column_iter().map(|h| h.norm()).collect();
+    if sizes.iter().any(|size| !(*size > 0.0)) {
+        return None;
+    }
+    let mut order: Vec<usize> = (0..n).collect();
+    order.sort_by(|i, j| sizes[*j].total_cmp(&sizes[*i]));
+    let omega = order.iter().map(|k| 1.0 / sizes[*k]).collect();
+    let mut Phi = DMatrix::zeros(n, n);
+    for (new, old) in order.into_iter().enumerate() {
+        Phi.set_column(new, &(W.column(old) / sizes[old]));
+    }
+    Some(Eigenpairs { omega, Phi })
+}
+
+/// Cholesky factor of a matrix whose rows have different units.
+fn lower_factor(A: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let scale = A.diagonal().map(f64::sqrt);
+    if scale.iter().any(|s| !(*s > 0.0 && s.is_finite())) {
+        return None;
+    }
+    let scaled = DMatrix::from_fn(A.nrows(), A.ncols(), |i, j| A[(i, j)] / (scale[i] * scale[j]));
+    let mut L = scaled.cholesky()?.unpack();
+    for (mut row, s) in L.row_iter_mut().zip(scale.iter()) {
+        row *= *s;
+    }
+    Some(L)
+}
+
+fn turn(A: &mut DMatrix<f64>, i: usize, j: usize, cos: f64, sin: f64) {
+    for row in 0..A.nrows() {
+        let (x, y) = (A[(row, i)], A[(row, j)]);
+        A[(row, i)] = cos * x - sin * y;
+        A[(row, j)] = sin * x + cos * y;
+    }
+}
+
+impl ModalLink {
+    /// The same link in its modes with A held: `K = diag(ω²)`, `M = 1`, ascending.
+    ///
+    /// Stiffness and mass decouple, and the highest modes, which belong to no motion of the link, can be left out;
+    /// with some left out, interfaces yield less under static loads.
+    ///
+    /// * `keep`: number of modes; all if not given.
+    ///
+    /// # Errors
+    /// [`FemError::Missing`] where stiffness or mass are not positive definite, [`FemError::OutOfRange`] for more
+    /// modes than coordinates.
+    ///
+    /// # Source
+    /// Craig & Chang (1977): the orthogonalised set of Craig and Bampton's shapes.
+    pub fn orthogonalised(&self, keep: Option<usize>) -> Result<Self, FemError> {
+        let n = self.coordinates();
+        let kept = keep.unwrap_or(n);
+        if kept > n {
+            let what = "number of modes to keep".to_owned();
+            return Err(FemError::OutOfRange { what, found: kept as f64, allowed: format!("up to {n}") });
+        }
+        let help = "they must be positive definite with A held";
+        let pairs = eigenpairs(&self.K, &self.M)
+            .ok_or(FemError::Missing { what: "a usable stiffness and mass of the modal link", help })?;
+        let V = pairs.Phi.columns(0, kept).into_owned();
+        let omega2 = DVector::from_iterator(kept, pairs.omega[..kept].iter().map(|omega| omega * omega));
+        let hz = pairs.omega[..kept].iter().map(|omega| omega / std::f64::consts::TAU);
+        Ok(Self {
+            M: DMatrix::identity(kept, kept),
+            K: DMatrix::from_diagonal(&omega2),
+            labels: hz.enumerate().map(|(k, hz)| format!("mode {} with A held: {hz:.3} Hz", k + 1)).collect(),
+            ..self.in_coordinates(&V)
+        })
+    }
+
+    /// The link with its first `modes` fixed-interface modes only.
+    ///
+    /// # Errors
+    /// [`FemError::Missing`] for other coordinates than those of Craig and Bampton, [`FemError::OutOfRange`] for more
+    /// modes than there are.
+    pub fn truncated(&self, modes: usize) -> Result<Self, FemError> {
+        if !self.is_craig_bampton() {
+            let help = "the coordinates are not those of Craig and Bampton; orthogonalised links take `keep`";
+            return Err(FemError::Missing { what: "the fixed-interface modes", help });
+        }
+        let statics = 6 * self.interfaces.len();
+        let (n, kept) = (self.coordinates(), statics + modes);
+        if kept > n {
+            let what = "number of fixed-interface modes".to_owned();
+            let allowed = format!("up to {}", n - statics);
+            return Err(FemError::OutOfRange { what, found: modes as f64, allowed });
+        }
+        let top = |A: &DMatrix<f64>| A.view((0, 0), (kept, kept)).into_owned();
+        let pairs = (0..kept).flat_map(|k| (0..kept).map(move |l| k * n + l));
+        Ok(Self {
+            interfaces: self
+                .interfaces
+                .iter()
+                .map(|i| ModalInterface { Phi: i.Phi.columns(0, kept).into_owned(), ..i.clone() })
+                .collect(),
+            C_t: self.C_t.columns(0, kept).into_owned(),
+            C_r: self.C_r.columns(0, kept).into_owned(),
+            P: self.P[..kept].to_vec(),
+            N: pairs.map(|at| self.N[at]).collect(),
+            M: top(&self.M),
+            K: top(&self.K),
+            geometric: self.geometric.as_ref().map(|G| G.mapped(&top)),
+            labels: self.labels[..kept].to_vec(),
+            name: self.name.clone(),
+            ..*self
+        })
+    }
+
+    /// `η = V η'`; stiffness and mass too, by their quadratic forms.
+    fn in_coordinates(&self, V: &DMatrix<f64>) -> Self {
+        let (n, m) = V.shape();
+        let form = |A: &DMatrix<f64>| super::symmetric(&(V.transpose() * A * V));
+        // N_ij' = Σ V_ki V_lj N_kl, entry by entry of the 3×3.
+        let mut N = vec![Matrix3::zeros(); m * m];
+        for (a, b) in (0..9).map(|e| (e / 3, e % 3)) {
+            let entries = DMatrix::from_fn(n, n, |k, l| self.N[k * n + l][(a, b)]);
+            let turned = V.transpose() * entries * V;
+            for (i, j) in (0..m).flat_map(|i| (i..m).map(move |j| (i, j))) {
+                N[i * m + j][(a, b)] = turned[(i, j)];
+            }
+        }
+        for i in 0..m {
+            N[i * m + i] = (N[i * m + i] + N[i * m + i].transpose()) * 0.5;
+            for j in 0..i {
+                N[i * m + j] = N[j * m + i].transpose();
+            }
+        }
+        let sum = |j: usize| (0..n).fold(Matrix3::zeros(), |sum, k| sum + self.P[k] * V[(k, j)]);
+        let interface = |i: &ModalInterface| ModalInterface { Phi: Matrix6xX::from(&i.Phi * V), ..i.clone() };
+        Self {
+            name: self.name.clone(),
+            interfaces: self.interfaces.iter().map(interface).collect(),
+            C_t: Matrix3xX::from(&self.C_t * V),
+            C_r: Matrix3xX::from(&self.C_r * V),
+            P: (0..m).map(sum).collect(),
+            N,
+            M: form(&self.M),
+            K: form(&self.K),
+            geometric: self.geometric.as_ref().map(|G| G.mapped(&form)),
+            labels: vec![String::new(); m],
+            ..*self
+        }
+    }
+}
+
+impl GeometricStiffness {
+    /// All matrices through `f`.
+    pub(crate) fn mapped(&self, f: &dyn Fn(&DMatrix<f64>) -> DMatrix<f64>) -> Self {
+        Self {
+            acceleration: self.acceleration.each_ref().map(f),
+            angular: self.angular.each_ref().map(f),
+            centrifugal: self.centrifugal.each_ref().map(f),
+            interface: self.interface.iter().map(|G| G.each_ref().map(f)).collect(),
+        }
+    }
+}
