@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use flexarm::{DriveModel, LinkModel, Modelling};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use crate::exchange_args::{ExportArgs, ImportArgs};
@@ -64,6 +65,44 @@ pub(crate) struct RobotArgs {
     pub(crate) inertia_from_total_mass: Option<f64>,
 }
 
+/// How links and drives are modelled.
+#[derive(Debug, Args)]
+pub(crate) struct ModellingArgs {
+    /// Model of the links [default: as the robot file says]
+    #[arg(long, value_enum)]
+    pub(crate) links: Option<LinksName>,
+    /// Model of the drives [default: as the robot file says]
+    #[arg(long, value_enum)]
+    pub(crate) drives: Option<DrivesName>,
+    /// Rigid parts of every lumped link, instead of the robot file's
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(2..))]
+    pub(crate) segments: Option<u16>,
+    /// Fixed-interface modes of every modal link, instead of the robot file's
+    #[arg(long, value_name = "N")]
+    pub(crate) modes: Option<u16>,
+}
+
+impl ModellingArgs {
+    pub(crate) fn modelling(&self) -> Modelling {
+        Modelling {
+            links: match self.links {
+                None => LinkModel::AsFiled,
+                Some(LinksName::Rigid) => LinkModel::Rigid,
+                Some(LinksName::Lumped) => LinkModel::Lumped,
+                Some(LinksName::Modal) => LinkModel::Modal,
+            },
+            drives: match self.drives {
+                None => DriveModel::AsFiled,
+                Some(DrivesName::Rigid) => DriveModel::Rigid,
+                Some(DrivesName::Elastic) => DriveModel::Elastic,
+                Some(DrivesName::Servo) => DriveModel::Servo,
+            },
+            segments: self.segments.map(usize::from),
+            modes: self.modes.map(usize::from),
+        }
+    }
+}
+
 #[derive(Debug, Args)]
 pub(crate) struct RunArgs {
     /// robot.toml, a folder with one, a .urdf or .xacro file, or the name of a shipped robot [default: kr210]
@@ -78,9 +117,11 @@ pub(crate) struct RunArgs {
     /// Step of the stepper (s)
     #[arg(long, value_name = "SECONDS", default_value_t = 1e-3, allow_hyphen_values = true)]
     pub(crate) step: f64,
-    /// Model of the links
-    #[arg(long, value_enum, default_value_t = LinksName::Lumped)]
-    pub(crate) links: LinksName,
+    #[command(flatten)]
+    pub(crate) modelling: ModellingArgs,
+    /// File with loads and changes of payload during the run (.toml)
+    #[arg(long, value_name = "FILE")]
+    pub(crate) loads: Option<PathBuf>,
     /// Logged samples per second
     #[arg(long, value_name = "HZ", default_value_t = 500.0, allow_hyphen_values = true)]
     pub(crate) log_rate: f64,
@@ -161,8 +202,20 @@ fn parse_stepper(text: &str) -> Result<StepperName, String> {
 pub(crate) enum LinksName {
     /// No link bends
     Rigid,
-    /// Two rigid parts with a coupled 6x6 spring
+    /// Rigid parts with coupled 6x6 springs
     Lumped,
+    /// Bodies that bend in modes (floating frame, Craig-Bampton)
+    Modal,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum DrivesName {
+    /// Every joint exactly along the trajectory, no springs
+    Rigid,
+    /// Gearboxes give way, motors exactly along the trajectory
+    Elastic,
+    /// Motors by torque under servos
+    Servo,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

@@ -17,11 +17,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use args::{
-    CheckArgs, Cli, Command, FormName, InspectArgs, LinksName, PresetName, RobotArgs, RunArgs, StartName, StepperName,
+    CheckArgs, Cli, Command, FormName, InspectArgs, PresetName, RobotArgs, RunArgs, StartName, StepperName,
 };
 use clap::{CommandFactory, Parser};
 use flexarm::{
-    AlphaSettings, ConstraintForm, Error, InertiaEstimate, LinkModel, LoadOptions, Motion, Outputs, ReadOptions, Robot,
+    AlphaSettings, ConstraintForm, Error, InertiaEstimate, LoadOptions, Motion, Outputs, ReadOptions, Robot,
     RunOptions, SpookPreset, SpookSettings, Start, StepperKind,
 };
 use indicatif::{ProgressBar, ProgressStyle};
@@ -119,7 +119,8 @@ fn run_options(args: &RunArgs, with_twin: bool) -> RunOptions {
     RunOptions {
         stepper,
         step_s: args.step,
-        links: if args.links == LinksName::Rigid { LinkModel::Rigid } else { LinkModel::Lumped },
+        modelling: args.modelling.modelling(),
+        loads: args.loads.clone(),
         log_rate_hz: args.log_rate,
         start: if args.from_rest == StartName::Equilibrium { Start::Equilibrium } else { Start::Undeformed },
         ignore_limits: args.ignore_limits,

@@ -86,8 +86,11 @@ pub(crate) fn inspection(i: &Inspection) -> String {
     out += &lines(&t);
     for f in &i.flexible_links {
         out += &format!(
-            "flexible: {} ({}), {:.4} m, parts {:.2} + {:.2} kg\n",
-            f.name, f.method, f.length_m, f.parts_kg[0], f.parts_kg[1]
+            "flexible: {} ({}), {:.4} m, parts {} kg\n",
+            f.name,
+            f.method,
+            f.length_m,
+            f.parts_kg.iter().map(|m| format!("{m:.2}")).collect::<Vec<_>>().join(" + ")
         );
     }
     out += &format!(

@@ -192,24 +192,9 @@ impl ReducedArm {
         }
     }
 
-    /// Adds what the loads of the last Newton-Euler pass do to the stiffness of modal bodies.
     fn add_geometric_forces(&self, x: &DVector<f64>, f: &mut DVector<f64>) {
         let driven = self.arm.torque_driven.len();
-        for element in &self.arm.elements {
-            let Some(geometric) = &element.geometric else { continue };
-            let range = driven + self.arm.offset(element)..driven + self.arm.offset(element) + element.size;
-            let loads = geometric_loads(&self.arm, &self.data, element.body, geometric);
-            for (matrix, load) in geometric.matrices().zip(loads) {
-                if load != 0.0 {
-                    let (eta, f) = (&x.as_slice()[range.clone()], &mut f.as_mut_slice()[range.clone()]);
-                    for (column, eta) in matrix.as_slice().chunks_exact(matrix.nrows()).zip(eta) {
-                        for (f, g) in f.iter_mut().zip(column) {
-                            *f += load * g * eta;
-                        }
-                    }
-                }
-            }
-        }
+        add_geometric_forces(&self.arm, &self.data, &x.as_slice()[driven..], &mut f.as_mut_slice()[driven..]);
     }
 
     /// Full motion at `t`: poses, twists and all generalised forces; those of the actuated joints are the
@@ -233,6 +218,25 @@ impl ReducedArm {
 impl GeometricStiffness {
     fn matrices(&self) -> impl Iterator<Item = &DMatrix<f64>> {
         self.acceleration.iter().chain(&self.angular).chain(&self.centrifugal).chain(self.interface.iter().flatten())
+    }
+}
+
+/// Adds what the loads of the last Newton-Euler pass in `data` do to the stiffness of modal bodies; `e` and `f` are over
+/// the elastic coordinates.
+pub(crate) fn add_geometric_forces(arm: &FlexibleArm, data: &Data, e: &[f64], f: &mut [f64]) {
+    for element in &arm.elements {
+        let Some(geometric) = &element.geometric else { continue };
+        let range = arm.offset(element)..arm.offset(element) + element.size;
+        for (matrix, load) in geometric.matrices().zip(geometric_loads(arm, data, element.body, geometric)) {
+            if load == 0.0 {
+                continue;
+            }
+            for (column, eta) in matrix.as_slice().chunks_exact(matrix.nrows()).zip(&e[range.clone()]) {
+                for (f, g) in f[range.clone()].iter_mut().zip(column) {
+                    *f += load * g * eta;
+                }
+            }
+        }
     }
 }
 

@@ -5,6 +5,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::arm::FlexibleArm;
 use crate::error::StepError;
+use crate::reduced::add_geometric_forces;
 
 /// Accepted unbalanced force over the largest spring or gravity force.
 const TOLERANCE: f64 = 1e-13;
@@ -73,7 +74,9 @@ fn gravity_part(arm: &FlexibleArm, data: &mut Data, t: f64, e: &DVector<f64>) ->
         forward_kinematics(model, data, &state.q);
         arm.apply_loads(data, t);
     }
-    gravity_forces(model, data, &state.q).rows(model.n_actuated(), e.len()).clone_owned()
+    let mut g = gravity_forces(model, data, &state.q).rows(model.n_actuated(), e.len()).clone_owned();
+    add_geometric_forces(arm, data, e.as_slice(), g.as_mut_slice());
+    g
 }
 
 /// The stiffness with curved springs at their slope; where play leaves none, the steepest slope finds the way out.

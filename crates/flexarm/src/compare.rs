@@ -1,22 +1,25 @@
 //! The main job: rigid and flexible run along one motion, logged while it goes on, measured at the end.
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 use std::time::Instant;
 
 use flexarm_analysis::{
     ContributionPeaks, ErrorRecord, MetricSettings, PathFrame, engineering_strain, tcp_error, tcp_metrics,
 };
-use flexarm_kinematics::{Data, Frame, State, forward_kinematics};
+use flexarm_kinematics::{Data, Frame, JointMotion, Pose, State, forward_kinematics, rotation_vector};
 use flexarm_log::{ElasticSample, EnergySample, RecorderSet, Sample};
 use flexarm_stepping::{FlexibleArm, Observation, StepError, Stepper, new_stepper};
-use nalgebra::{Vector3, Vector6};
+use nalgebra::{Matrix6, Vector3, Vector6};
 
 use crate::error::Error;
 use crate::motion::Motion;
-use crate::options::{LinkModel, Outputs, RunOptions};
+use crate::disturbance::Disturbances;
+use crate::flexible::{FlexibleRobot, Owner};
+use crate::options::{Outputs, RunOptions};
 use crate::record::{header, link_frames, recorders};
-use crate::robot::{FlexibleRobot, Robot, TCP_FRAME};
-use crate::summary::{LinkFigures, StepperFigures, Summary, TcpFigures};
+use crate::robot::{Robot, TCP_FRAME};
+use crate::summary::{DriveFigures, EnergyFigures, LinkFigures, StepperFigures, Summary, TcpFigures};
 use crate::twin::RigidTwin;
 
 /// Largest elastic rotation for which the linear elastic model is taken to hold (rad).
@@ -48,17 +51,19 @@ pub fn simulate(
         return Err(Error::Limits { path: motion.path.clone(), violations });
     }
     check_options(motion, options)?;
-    let flexible = match options.links {
-        LinkModel::Rigid => robot.rigid_robot()?,
-        LinkModel::Lumped => robot.flexible_robot()?,
-    };
+    let flexible = robot.modelled(&options.modelling)?;
     let failed = |source: StepError| Error::Step { source, partial: false };
-    let arm = flexible.arm(motion.prescribed()).map_err(failed)?;
+    let mut arm = flexible.arm(motion.prescribed()).map_err(failed)?;
+    if let Some(path) = &options.loads {
+        let disturbances = Disturbances::load(path, robot, &arm.model, motion.trajectory.duration())?;
+        arm.inertia_changes = disturbances.changes;
+        arm = arm.with_timed_loads(disturbances.loads).map_err(failed)?;
+    }
     let stepper = new_stepper(options.stepper, arm.clone(), options.step_s, options.start).map_err(failed)?;
 
     let mut run = Run::new(robot, motion, options, &flexible, arm, stepper);
     let mut files = recorders(outputs)?;
-    let head = header(robot, motion, options, &run.arm);
+    let head = header(robot, motion, options, &run.arm, flexible.links_model());
     files.set.begin(&head)?;
     let end = run.go(&mut files.set, outputs.is_some(), progress);
 
@@ -123,8 +128,16 @@ struct Run<'a> {
     errors: Vec<[f64; 6]>,
     positions: Vec<[f64; 3]>,
     contributions: ContributionPeaks,
+    /// Largest engineering strain and rotation of the far end, per flexible link.
     strains: Vec<f64>,
     rotations: Vec<f64>,
+    /// Largest deflection per elastic drive.
+    give: Vec<f64>,
+    /// Ends of the flexible links: frames of the link and of its far part.
+    ends: Vec<(Frame, Frame)>,
+    /// Link-side angle of a joint: actuated coordinate, elastic coordinate, weight.
+    angles: Vec<(usize, usize, f64)>,
+    energy: EnergyBook,
     peak_drive: Vec<f64>,
     every: u64,
     last: u64,
@@ -139,7 +152,9 @@ impl<'a> Run<'a> {
         arm: FlexibleArm,
         stepper: Box<dyn Stepper>,
     ) -> Self {
-        let n = arm.elements.len();
+        let (n_links, n_drives) = (flexible.spans.len(), robot.drives.len());
+        let frame = |name: &str| arm.model.frame(name).expect("a link of the substitution").clone();
+        let ends = flexible.spans.iter().map(|s| (frame(&s.link), frame(&s.distal_link))).collect();
         let tcp = arm.model.frame(TCP_FRAME).expect("added when the robot was loaded").clone();
         let mut twin = RigidTwin::new(&arm);
         // Before the first motion the path axes are those of its beginning.
@@ -164,9 +179,13 @@ impl<'a> Run<'a> {
             times: Vec::new(),
             errors: Vec::new(),
             positions: Vec::new(),
-            contributions: ContributionPeaks::new(n),
-            strains: vec![0.0; n],
-            rotations: vec![0.0; n],
+            contributions: ContributionPeaks::new(n_links + n_drives),
+            strains: vec![0.0; n_links],
+            rotations: vec![0.0; n_links],
+            give: vec![0.0; n_drives],
+            ends,
+            angles: link_side_angles(robot, flexible),
+            energy: EnergyBook::default(),
             peak_drive: vec![0.0; arm.model.n_actuated()],
             every: ((1.0 / (options.log_rate_hz * options.step_s)).round() as u64).max(1),
             last,
@@ -198,6 +217,13 @@ impl<'a> Run<'a> {
         let n = self.arm.model.n_actuated();
         self.stepper.observe(&mut self.seen);
         let t = self.seen.t;
+        // The twin carries what the arm carries.
+        while let Some(change) = self.arm.inertia_changes.first()
+            && change.t <= t + 1e-9
+        {
+            let change = self.arm.inertia_changes.remove(0);
+            self.arm.model = Arc::new(self.arm.model.with_inertia(change.body, change.inertia));
+        }
         self.twin.update(&self.arm, &self.tcp, t);
         let X_rigid = self.twin.data.X_WF(&self.tcp);
         let X_flexible = self.seen.X_WB[self.tcp.body] * self.tcp.X_BF;
@@ -214,17 +240,8 @@ impl<'a> Run<'a> {
             *peak = peak.max(drive.abs());
         }
 
+        self.look_at_elements(t);
         let sample = &mut self.sample;
-        sample.elastic.resize(self.arm.elements.len(), ElasticSample::default());
-        for (k, element) in self.arm.elements.iter().enumerate() {
-            let e: Vector6<f64> = self.seen.q.fixed_rows::<6>(element.coordinate).into();
-            let map = self.twin.J.fixed_columns::<6>(element.coordinate).into_owned();
-            let (spring, _) = &self.flexible.springs[k];
-            self.contributions.update(k, t, &map, &e);
-            self.strains[k] = self.strains[k].max(length_change(spring, &e));
-            self.rotations[k] = self.rotations[k].max(e.fixed_rows::<3>(3).norm());
-            sample.elastic[k] = ElasticSample { deflection: e.into(), load: self.seen.load[k].into() };
-        }
         sample.time_s = t;
         sample.step = step;
         sample.error_world = error;
@@ -239,6 +256,10 @@ impl<'a> Run<'a> {
         flexible.q.extend_from_slice(&self.seen.q.as_slice()[..n]);
         flexible.qdot.clear();
         flexible.qdot.extend_from_slice(&self.seen.qdot.as_slice()[..n]);
+        for &(k, e, weight) in &self.angles {
+            flexible.q[k] += weight * self.seen.q[e];
+            flexible.qdot[k] += weight * self.seen.qdot[e];
+        }
         flexible.effort.clear();
         flexible.effort.extend_from_slice(self.seen.drive.as_slice());
         flexible.X_WL.clear();
@@ -246,13 +267,59 @@ impl<'a> Run<'a> {
         flexible.X_WT = X_flexible;
 
         let rigid = &mut sample.rigid;
-        rigid.q.clone_from(&flexible.q);
-        rigid.qdot.clone_from(&flexible.qdot);
+        rigid.q.clear();
+        rigid.q.extend_from_slice(&self.twin.state.q.as_slice()[..n]);
+        rigid.qdot.clear();
+        rigid.qdot.extend_from_slice(&self.twin.state.qdot.as_slice()[..n]);
         rigid.effort.clear();
         rigid.effort.extend_from_slice(&self.twin.data.tau.as_slice()[..n]);
         rigid.X_WL.clear();
         rigid.X_WL.extend(self.link_frames.iter().map(|f| self.twin.data.X_WF(f)));
         rigid.X_WT = X_rigid;
+    }
+
+    /// Deflections and loads of the elements, what they do to the tool, how far the links are strained.
+    fn look_at_elements(&mut self, t: f64) {
+        let columns = self.flexible.spans.len();
+        let mut moved = vec![Vector6::zeros(); columns + self.give.len()];
+        self.sample.elastic.resize(self.arm.elements.len(), ElasticSample::default());
+        for (k, element) in self.arm.elements.iter().enumerate() {
+            let range = (element.coordinate, element.size);
+            let e = self.seen.q.rows(range.0, range.1);
+            let displacement: Vector6<f64> = self.twin.J.columns(range.0, range.1) * e;
+            match self.flexible.owners[k] {
+                Owner::Link(link) => moved[link] += displacement,
+                Owner::Drive(drive) => {
+                    moved[columns + drive] += displacement;
+                    let rotation = if element.size == 6 { e.rows(3, 3).norm() } else { e.norm() };
+                    self.give[drive] = self.give[drive].max(rotation);
+                }
+            }
+            let body = &self.arm.model.bodies()[element.body];
+            let (mut deflection, mut load) = ([0.0; 6], self.seen.load[k].into());
+            match (element.size, body.motion) {
+                (1, JointMotion::Revolute(axis)) => place(&mut deflection, &mut load, 3, &axis, e[0]),
+                (1, JointMotion::Prismatic(axis)) => place(&mut deflection, &mut load, 0, &axis, e[0]),
+                (n, _) => (0..n.min(6)).for_each(|c| deflection[c] = e[c]),
+            }
+            self.sample.elastic[k] = ElasticSample { deflection, load };
+        }
+        for (k, displacement) in moved.iter().enumerate() {
+            self.contributions.update(k, t, &Matrix6::identity(), displacement);
+        }
+        for (k, (span, (near, far))) in self.flexible.spans.iter().zip(&self.ends).enumerate() {
+            let pose = |frame: &Frame, X: &Pose| self.seen.X_WB[frame.body] * frame.X_BF * *X;
+            let (X_WA, X_WB) = (pose(near, &span.X_LA), pose(far, &span.X_DB));
+            let distance = (X_WB.translation.vector - X_WA.translation.vector).norm();
+            let strain = engineering_strain(distance - span.length, span.length).map_or(0.0, f64::abs);
+            // Both ends have the attitude that they have undeformed, up to the bending.
+            let undeformed = |frame: &Frame, X: &Pose| self.twin.data.X_WB[frame.body] * frame.X_BF * *X;
+            let (U_WA, U_WB) = (undeformed(near, &span.X_LA), undeformed(far, &span.X_DB));
+            let turn = (U_WA.rotation.inverse() * U_WB.rotation).inverse() * (X_WA.rotation.inverse() * X_WB.rotation);
+            self.strains[k] = self.strains[k].max(strain);
+            self.rotations[k] = self.rotations[k].max(rotation_vector(turn.matrix()).norm());
+        }
+        self.energy.add(t, self.seen.energy, self.seen.power);
     }
 
     /// Figures of what was seen so far.
@@ -268,12 +335,21 @@ impl<'a> Run<'a> {
         };
         // A run that stopped at once has nothing to measure.
         let metrics = tcp_metrics(&record, &settings).ok();
-        let links: Vec<LinkFigures> = (0..self.arm.elements.len())
-            .map(|k| LinkFigures {
-                name: self.arm.elements[k].name.clone(),
-                peak_contribution_m: self.contributions.peaks()[k].peak_m,
+        let peaks = self.contributions.peaks();
+        let links: Vec<LinkFigures> = (self.flexible.spans.iter().enumerate())
+            .map(|(k, span)| LinkFigures {
+                name: span.link.clone(),
+                peak_contribution_m: peaks[k].peak_m,
                 engineering_strain: self.strains[k],
                 peak_rotation_rad: self.rotations[k],
+            })
+            .collect();
+        let elastic_drives: Vec<DriveFigures> = (robot.drives.iter().enumerate())
+            .filter(|(k, _)| self.flexible.owners.contains(&Owner::Drive(*k)))
+            .map(|(k, drive)| DriveFigures {
+                joint: drive.joint.clone(),
+                peak_contribution_m: peaks[links.len() + k].peak_m,
+                peak_deflection_rad: self.give[k],
             })
             .collect();
         let mut warnings = robot.warnings.clone();
@@ -283,7 +359,7 @@ impl<'a> Run<'a> {
         Summary {
             robot: robot.name.clone(),
             trajectory: motion.name.clone(),
-            links_model: options.links.name(),
+            links_model: self.flexible.links_model(),
             duration_s: self.times.last().copied().unwrap_or(0.0),
             stepper: StepperFigures::new(options, self.stepper.counts()),
             tcp: metrics
@@ -292,6 +368,8 @@ impl<'a> Run<'a> {
                 .map(|m| TcpFigures { static_sag_m: self.static_sag(), ..m.into() }),
             frequencies_hz: self.arm.modes.frequencies_hz(),
             links,
+            elastic_drives,
+            energy: self.energy.figures(),
             drives: self
                 .arm
                 .model
@@ -369,12 +447,75 @@ impl<'a> Run<'a> {
     }
 }
 
-/// Engineering strain: change of the distance between the interfaces over that distance.
-fn length_change(spring: &flexarm_flexlink::Spring, e: &Vector6<f64>) -> f64 {
-    let p_SB = spring.X_LS.inverse() * nalgebra::Point3::from(spring.X_LB.translation.vector);
-    let phi: Vector3<f64> = e.fixed_rows::<3>(3).into();
-    let moved = nalgebra::Rotation3::from_scaled_axis(phi) * p_SB.coords + e.fixed_rows::<3>(0);
-    let p_LB = spring.X_LS.translation.vector + spring.X_LS.rotation * moved;
-    let distance = (p_LB - spring.X_LA.translation.vector).norm();
-    engineering_strain(distance - spring.length, spring.length).map_or(0.0, f64::abs)
+/// Puts one deflection and its load along the axis of its joint.
+fn place(deflection: &mut [f64; 6], load: &mut [f64; 6], first: usize, axis: &Vector3<f64>, e: f64) {
+    let torque = load[0];
+    *load = [0.0; 6];
+    for c in 0..3 {
+        deflection[first + c] = e * axis[c];
+        load[first + c] = torque * axis[c];
+    }
+}
+
+/// What the springs of gearboxes add to the motor's angle at the link.
+fn link_side_angles(robot: &Robot, flexible: &FlexibleRobot) -> Vec<(usize, usize, f64)> {
+    let mut angles = Vec::new();
+    for (group, owner) in flexible.model.elastic().iter().zip(&flexible.owners) {
+        let Owner::Drive(drive) = owner else { continue };
+        let joint = &robot.drives[*drive].joint;
+        let actuated = &flexible.model.coordinates()[..flexible.model.n_actuated()];
+        let Some(k) = actuated.iter().position(|c| c.joint == *joint) else { continue };
+        let motor = &flexible.model.bodies()[actuated[k].body];
+        let (JointMotion::Revolute(axis) | JointMotion::Prismatic(axis)) = motor.motion else { continue };
+        let slides = matches!(motor.motion, JointMotion::Prismatic(_));
+        match flexible.model.bodies()[group.body].motion {
+            JointMotion::Revolute(own) | JointMotion::Prismatic(own) => {
+                angles.push((k, group.coordinate, axis.dot(&own)));
+            }
+            _ => {
+                let first = group.coordinate + if slides { 0 } else { 3 };
+                angles.extend((0..3).map(|c| (k, first + c, axis[c])));
+            }
+        }
+    }
+    angles
+}
+
+/// Work that goes in and out between samples, by the trapezoidal rule.
+#[derive(Default)]
+struct EnergyBook {
+    first: Option<f64>,
+    last: f64,
+    before: Option<(f64, [f64; 3])>,
+    /// Drives, loads, dissipation (J).
+    work: [f64; 3],
+    /// Largest gap between what is stored and what was supplied, and largest change of what is stored (J).
+    gap: f64,
+    swing: f64,
+}
+
+impl EnergyBook {
+    fn add(&mut self, t: f64, energy: [f64; 3], power: [f64; 3]) {
+        if let Some((t_before, p)) = self.before {
+            for c in 0..3 {
+                self.work[c] += 0.5 * (t - t_before) * (p[c] + power[c]);
+            }
+        }
+        self.before = Some((t, power));
+        self.last = energy.iter().sum();
+        let first = *self.first.get_or_insert(self.last);
+        let supplied = self.work[0] + self.work[1] - self.work[2];
+        self.gap = self.gap.max((self.last - first - supplied).abs());
+        self.swing = self.swing.max((self.last - first).abs()).max(self.work[0].abs());
+    }
+
+    fn figures(&self) -> EnergyFigures {
+        EnergyFigures {
+            drives_j: self.work[0],
+            loads_j: self.work[1],
+            dissipated_j: self.work[2],
+            stored_j: self.last - self.first.unwrap_or(self.last),
+            imbalance: if self.swing > 0.0 { self.gap / self.swing } else { 0.0 },
+        }
+    }
 }

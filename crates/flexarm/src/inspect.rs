@@ -83,7 +83,7 @@ pub struct FlexibleInfo {
     /// Distance of the interfaces (m).
     pub length_m: f64,
     /// Masses of the two parts (kg).
-    pub parts_kg: [f64; 2],
+    pub parts_kg: Vec<f64>,
     /// Stiffness at the split, 6×6, linear first.
     pub stiffness: Vec<Vec<f64>>,
 }
@@ -203,16 +203,15 @@ pub fn inspect(robot: &Robot, at: Option<&str>, velocity: Option<&str>) -> Resul
         LinkInfo { name: l.name.clone(), mass_kg, com_m, inertia }
     });
     let flexible = robot.flexible_robot()?;
-    let flexible_links = robot.flexible.iter().filter_map(|(f, _)| {
-        let (spring, _) = flexible.springs.iter().find(|(s, _)| s.link == f.link)?;
-        let K = DMatrix::from_iterator(6, 6, spring.K_S.iter().copied());
-        Some(FlexibleInfo {
-            name: f.link.clone(),
-            method: f.reduced.provenance.method.clone(),
-            length_m: spring.length,
-            parts_kg: spring.part_masses,
-            stiffness: rows(&K),
-        })
+    let flexible_links = flexible.spans.iter().zip(&robot.flexible).map(|(span, link)| {
+        let K = link.flexible.reduced.split.K_S;
+        FlexibleInfo {
+            name: span.link.clone(),
+            method: link.flexible.reduced.provenance.method.clone(),
+            length_m: span.length,
+            parts_kg: span.part_masses.clone(),
+            stiffness: rows(&DMatrix::from_iterator(6, 6, K.iter().copied())),
+        }
     });
     Ok(Inspection {
         robot: robot.name.clone(),

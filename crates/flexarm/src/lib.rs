@@ -22,10 +22,14 @@
 mod beam_entry;
 mod check;
 mod compare;
+mod disturbance;
+mod drive_entry;
 mod error;
 pub mod export;
+mod flexible;
 pub mod import;
 mod inspect;
+mod link_entry;
 mod motion;
 mod options;
 mod record;
@@ -40,12 +44,15 @@ mod twin;
 
 pub use check::{Finding, check};
 pub use compare::{Progress, simulate};
+pub use disturbance::Disturbances;
+pub use drive_entry::{Drive, DriveKind};
 pub use error::Error;
 pub use inspect::{FlexibleInfo, Inspection, JointInfo, LinkInfo, TcpInfo, inspect, parse_joint_values};
 pub use motion::Motion;
-pub use options::{LinkModel, Outputs, RunOptions};
+pub use flexible::{FlexibleRobot, LinkChoices, Owner, RobotLink};
+pub use options::{DriveModel, LinkModel, Modelling, Outputs, RunOptions};
 pub use report::{markdown, rows};
-pub use robot::{FlexibleRobot, LoadOptions, Robot, TCP_FRAME};
+pub use robot::{LoadOptions, Robot, TCP_FRAME};
 pub use summary::{Files, LinkFigures, StepperFigures, Summary, TcpFigures};
 
 pub use flexarm_stepping::{AlphaSettings, ConstraintForm, SpookPreset, SpookSettings, Start, StepError, StepperKind};

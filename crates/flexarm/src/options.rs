@@ -7,21 +7,42 @@ use flexarm_stepping::{AlphaSettings, Start, StepperKind};
 /// How links are modelled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum LinkModel {
+    /// As the robot file says.
+    #[default]
+    AsFiled,
     /// All rigid.
     Rigid,
-    /// Flexible links as two rigid parts with a 6×6 spring.
-    #[default]
+    /// Flexible links as rigid parts with 6×6 springs.
     Lumped,
+    /// Flexible links as bodies that bend in modes.
+    Modal,
 }
 
-impl LinkModel {
-    /// The word of the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Rigid => "rigid",
-            Self::Lumped => "lumped",
-        }
-    }
+/// How drives are modelled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum DriveModel {
+    /// As the robot file says.
+    #[default]
+    AsFiled,
+    /// All joints exactly along the trajectory, no springs.
+    Rigid,
+    /// Gearboxes give way, motors exactly along the trajectory.
+    Elastic,
+    /// All joints by torque under servos, gearboxes give way.
+    Servo,
+}
+
+/// How links and drives are modelled, where that differs from the robot file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Modelling {
+    /// Links.
+    pub links: LinkModel,
+    /// Drives.
+    pub drives: DriveModel,
+    /// Number of rigid parts of lumped links, instead of the file's.
+    pub segments: Option<usize>,
+    /// Number of fixed-interface modes of modal links, instead of the file's.
+    pub modes: Option<usize>,
 }
 
 /// Choices of a run.
@@ -31,8 +52,10 @@ pub struct RunOptions {
     pub stepper: StepperKind,
     /// Step (s).
     pub step_s: f64,
-    /// Link model.
-    pub links: LinkModel,
+    /// Link and drive models.
+    pub modelling: Modelling,
+    /// File with loads and changes of payload.
+    pub loads: Option<PathBuf>,
     /// Logged samples per second; the nearest whole number of steps is used.
     pub log_rate_hz: f64,
     /// Start in equilibrium or undeformed.
@@ -50,7 +73,8 @@ impl Default for RunOptions {
         Self {
             stepper: StepperKind::GeneralizedAlpha(AlphaSettings::default()),
             step_s: 1e-3,
-            links: LinkModel::Lumped,
+            modelling: Modelling::default(),
+            loads: None,
             log_rate_hz: 500.0,
             start: Start::Equilibrium,
             ignore_limits: false,

@@ -68,7 +68,7 @@ fn ordered_links(robot: &Robot) -> Vec<LinkInfo> {
             name: j.child.clone(),
             parent: Some(next),
             // A fixed joint at the far end of a flexible link moves against the link's frame.
-            fixed: j.kind == JointKind::Fixed && robot.flexible.iter().all(|(f, _)| f.link != name),
+            fixed: j.kind == JointKind::Fixed && robot.flexible.iter().all(|f| f.flexible.link != name),
         }));
         next += 1;
     }
@@ -82,7 +82,13 @@ pub(crate) fn link_frames(robot: &Robot, model: &Model) -> Vec<Frame> {
 }
 
 /// Everything about a run that does not change.
-pub(crate) fn header(robot: &Robot, motion: &Motion, options: &RunOptions, arm: &FlexibleArm) -> RunHeader {
+pub(crate) fn header(
+    robot: &Robot,
+    motion: &Motion,
+    options: &RunOptions,
+    arm: &FlexibleArm,
+    links_model: &str,
+) -> RunHeader {
     let model = &arm.model;
     let links = ordered_links(robot);
     let group = |name: &str, rows: &[(&str, String)]| {
@@ -91,7 +97,7 @@ pub(crate) fn header(robot: &Robot, motion: &Motion, options: &RunOptions, arm: 
     let stepper = crate::summary::StepperFigures::new(options, Default::default());
     let elements: Vec<String> = arm.elements.iter().map(|e| e.name.clone()).collect();
     let methods: Vec<String> =
-        robot.flexible.iter().map(|(f, _)| format!("{}: {}", f.link, f.reduced.provenance.method)).collect();
+        robot.flexible.iter().map(|f| format!("{}: {}", f.flexible.link, f.flexible.reduced.provenance.method)).collect();
     let frequencies: Vec<String> = arm.modes.frequencies_hz().iter().map(|f| format!("{f:.4}")).collect();
     let metadata = vec![
         group(
@@ -110,7 +116,7 @@ pub(crate) fn header(robot: &Robot, motion: &Motion, options: &RunOptions, arm: 
         group(
             "flexarm.model",
             &[
-                ("links", options.links.name().into()),
+                ("links", links_model.into()),
                 ("elements", elements.join(", ")),
                 ("reduction", methods.join("; ")),
                 ("frequencies_hz", frequencies.join(", ")),
@@ -136,7 +142,7 @@ pub(crate) fn header(robot: &Robot, motion: &Motion, options: &RunOptions, arm: 
         tcp: robot.tcp.0.clone(),
         metadata,
         attachments,
-        description: description(robot, motion, options, &frequencies),
+        description: description(robot, motion, options, links_model, &frequencies),
         has_rigid: options.with_twin,
         log_rate_hz: options.log_rate_hz,
     }
@@ -158,7 +164,13 @@ fn located_urdf(robot: &Robot) -> String {
     text
 }
 
-fn description(robot: &Robot, motion: &Motion, options: &RunOptions, frequencies: &[String]) -> String {
+fn description(
+    robot: &Robot,
+    motion: &Motion,
+    options: &RunOptions,
+    links_model: &str,
+    frequencies: &[String],
+) -> String {
     let mut text = format!(
         "# {} on {}\n\nFlexible arm (solid) against its rigid twin (ghost), TCP `{}`.\n\n| | |\n|---|---|\n\
          | duration | {:.3} s |\n| stepper | {}, step {} s |\n| links | {} |\n",
@@ -168,9 +180,9 @@ fn description(robot: &Robot, motion: &Motion, options: &RunOptions, frequencies
         motion.trajectory.duration(),
         options.stepper.name(),
         options.step_s,
-        options.links.name(),
+        links_model,
     );
-    for (f, _) in &robot.flexible {
+    for f in robot.flexible.iter().map(|f| &f.flexible) {
         text += &format!("| flexible link | {}: {} |\n", f.link, f.reduced.provenance.method);
     }
     if !frequencies.is_empty() {

@@ -3,24 +3,21 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use flexarm_fem::{BeamLink, BeamTheory, Material, ReducedLink, Section, read_flex};
-use flexarm_flexlink::{FlexibleLink, Parts, Spring, SubstitutionError, distal_joint, substitute};
-use flexarm_kinematics::{ElasticAngles, Joint, JointKind, Link, LinkInertia, Mechanism, Model, Pose};
-use flexarm_stepping::{Damping, FlexibleArm, PrescribedMotion, StepError};
+use flexarm_kinematics::{Joint, JointKind, Link, LinkInertia, Mechanism, Model, Pose};
 use flexarm_urdf::{ReadOptions, UrdfRobot, default_tcp, read_urdf};
 use nalgebra::{Matrix3, Rotation3, Translation3, Vector3};
 use toml::Spanned;
 
-use crate::beam_entry::beam_section;
+use crate::drive_entry::{Drive, drives};
 use crate::error::Error;
-use crate::robot_file::{
-    BeamEntry, DampingEntry, FlexibleLinkEntry, PayloadEntry, RobotFile, RobotFileError, Source, parse_robot_file,
-};
+use crate::flexible::RobotLink;
+use crate::link_entry::flexible_link;
+use crate::robot_file::{PayloadEntry, RobotFile, RobotFileError, Source, parse_robot_file};
 
 /// Name of the frame that is added for the tool centre point.
 pub const TCP_FRAME: &str = "__tcp";
 /// Name of the link that is added for the payload.
-const PAYLOAD_LINK: &str = "__payload";
+pub(crate) const PAYLOAD_LINK: &str = "__payload";
 
 /// Choices at loading.
 #[derive(Clone, Debug, Default)]
@@ -44,34 +41,16 @@ pub struct Robot {
     pub urdf_path: PathBuf,
     /// URDF with TCP frame, payload and gravity: the rigid robot.
     pub rigid: Mechanism,
-    /// Flexible links with their damping.
-    pub flexible: Vec<(FlexibleLink, Damping)>,
+    /// Flexible links.
+    pub flexible: Vec<RobotLink>,
+    /// Drives that the file tells about; all other joints are prescribed.
+    pub drives: Vec<Drive>,
     /// Link that carries the TCP and pose of the TCP in it.
     pub tcp: (String, Pose),
     /// Trajectory for runs without one.
     pub default_trajectory: Option<PathBuf>,
     /// Things worth telling.
     pub warnings: Vec<String>,
-}
-
-/// A robot whose links bend, with its springs in coordinate order.
-#[derive(Clone, Debug)]
-pub struct FlexibleRobot {
-    /// The tree.
-    pub model: Arc<Model>,
-    /// Springs in coordinate order, with damping.
-    pub springs: Vec<(Spring, Damping)>,
-}
-
-impl FlexibleRobot {
-    /// The arm that steppers take, driven along a motion.
-    ///
-    /// # Errors
-    /// As [`FlexibleArm::new`].
-    pub fn arm(&self, motion: Arc<dyn PrescribedMotion>) -> Result<FlexibleArm, StepError> {
-        let springs = self.springs.iter().map(|(s, d)| (s.link.clone(), s.K_S, *d)).collect();
-        FlexibleArm::new(self.model.clone(), springs, motion)
-    }
 }
 
 impl Robot {
@@ -107,6 +86,7 @@ impl Robot {
             rigid: urdf.mechanism.clone(),
             urdf,
             flexible: Vec::new(),
+            drives: Vec::new(),
             tcp: (link, Pose::identity()),
             default_trajectory: None,
             warnings: Vec::new(),
@@ -145,6 +125,7 @@ impl Robot {
             rigid,
             urdf,
             flexible: Vec::new(),
+            drives: Vec::new(),
             tcp: tcp.unwrap_or_default(),
             default_trajectory: file.default_trajectory.as_ref().map(|t| folder.join(t.get_ref())),
             warnings: Vec::new(),
@@ -154,8 +135,11 @@ impl Robot {
             let link = link.or_else(|| default_tcp(&robot.urdf.mechanism)).unwrap_or_default().to_owned();
             keep(robot.add_payload(payload, &link, &source), &mut faults);
         }
-        for drive in &file.drive {
-            check_drive(drive, &robot.rigid, &source, &mut faults);
+        robot.drives = drives(&file.drive, &robot.rigid, &source, &mut robot.warnings, &mut faults);
+        for drive in &robot.drives {
+            for joint in robot.rigid.joints.iter_mut().filter(|j| j.name == drive.joint) {
+                joint.armature = drive.armature;
+            }
         }
         for entry in &file.flexible_link {
             let urdf = &robot.urdf.mechanism;
@@ -187,12 +171,12 @@ impl Robot {
         let last_flexible = file.and_then(|(f, s)| f.flexible_link.last().map(|e| (s, e.link.span())));
         match (self.flexible_robot(), last_flexible) {
             (Ok(flexible), _) => {
-                for (spring, _) in &flexible.springs {
-                    let (own, parts) = (spring.own_mass, spring.part_masses.iter().sum::<f64>());
+                for span in &flexible.spans {
+                    let (own, parts) = (span.own_mass, span.part_masses.iter().sum::<f64>());
                     if own > 0.0 && (parts / own - 1.0).abs() > 1e-6 {
                         self.warnings.push(format!(
                             "link {:?}: the two parts weigh {parts:.4} kg, the URDF's link {own:.4} kg; the parts count",
-                            spring.link
+                            span.link
                         ));
                     }
                 }
@@ -240,32 +224,6 @@ impl Robot {
     pub fn rigid_model(&self) -> Result<Arc<Model>, Error> {
         Model::new(&self.rigid).map(Arc::new).map_err(|source| Error::Model { path: self.urdf_path.clone(), source })
     }
-
-    /// The robot with its flexible links in place.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] if a link cannot be substituted, [`Error::Model`] if the result is no tree.
-    pub fn flexible_robot(&self) -> Result<FlexibleRobot, Error> {
-        let links: Vec<FlexibleLink> = self.flexible.iter().map(|(f, _)| f.clone()).collect();
-        let substituted = substitute(&self.rigid, &links).map_err(|e| Error::Usage(e.to_string()))?;
-        let model = Model::new(&substituted.mechanism)
-            .map_err(|source| Error::Model { path: self.urdf_path.clone(), source })?;
-        let mut springs = Vec::new();
-        for body in model.elastic_bodies() {
-            let joint = &model.bodies()[body].joint;
-            let found = substituted.springs.iter().zip(&self.flexible).find(|(s, _)| s.joint == *joint);
-            springs.extend(found.map(|(s, (_, damping))| (s.clone(), *damping)));
-        }
-        Ok(FlexibleRobot { model: Arc::new(model), springs })
-    }
-
-    /// The robot with all links rigid, as an arm without springs.
-    ///
-    /// # Errors
-    /// [`Error::Model`].
-    pub fn rigid_robot(&self) -> Result<FlexibleRobot, Error> {
-        Ok(FlexibleRobot { model: self.rigid_model()?, springs: Vec::new() })
-    }
 }
 
 fn unknown_link(what: &str, link: &str, mechanism: &Mechanism) -> String {
@@ -299,27 +257,12 @@ fn tcp_of(file: &RobotFile, source: &Source, urdf: &UrdfRobot, options: &LoadOpt
     }
 }
 
-fn check_drive(drive: &crate::robot_file::DriveEntry, mechanism: &Mechanism, source: &Source, faults: &mut Vec<Error>) {
-    let joint = drive.joint.get_ref();
-    if mechanism.joint(joint).is_none_or(|j| j.kind == JointKind::Fixed) {
-        let known: Vec<_> =
-            mechanism.joints.iter().filter(|j| j.kind != JointKind::Fixed).map(|j| j.name.as_str()).collect();
-        let message = format!("drive of joint {joint:?}: the robot has no such movable joint; it has {known:?}");
-        faults.push(source.error(drive.joint.span(), message).into());
-    }
-    let kind = drive.kind.get_ref();
-    if kind != "prescribed" {
-        let message = format!("drive kind {kind:?} is not known; this version drives joints as \"prescribed\" only");
-        faults.push(source.error(drive.kind.span(), message).into());
-    }
-}
-
 /// The value, or the fault put aside so that the next one is found too.
-fn keep<T>(result: Result<T, Error>, faults: &mut Vec<Error>) -> Option<T> {
+pub(crate) fn keep<T>(result: Result<T, Error>, faults: &mut Vec<Error>) -> Option<T> {
     result.map_err(|e| faults.push(e)).ok()
 }
 
-fn check_finite(
+pub(crate) fn check_finite(
     what: &str,
     values: &[f64],
     span: std::ops::Range<usize>,
@@ -329,135 +272,4 @@ fn check_finite(
         Some(found) => Err(source.error(span, format!("{what} has the entry {found}, expected finite numbers"))),
         None => Ok(()),
     }
-}
-
-fn flexible_link(
-    entry: &FlexibleLinkEntry,
-    mechanism: &Mechanism,
-    source: &Source,
-    folder: &Path,
-    warnings: &mut Vec<String>,
-    faults: &mut Vec<Error>,
-) -> Result<(FlexibleLink, Damping), Error> {
-    let name = entry.link.get_ref();
-    let at = |span: std::ops::Range<usize>, message: String| source.error(span, message);
-    if let Some(model) = &entry.model
-        && model.get_ref() != "lumped"
-    {
-        let message = format!("model {:?} is not known; this version has \"lumped\"", model.get_ref());
-        return Err(at(model.span(), message).into());
-    }
-    if let Some(segments) = &entry.segments
-        && *segments.get_ref() != 2
-    {
-        let message = format!("segments = {}: this version cuts a link into 2 rigid parts", segments.get_ref());
-        return Err(at(segments.span(), message).into());
-    }
-    let angles = match entry.angles.as_ref().map(|a| a.get_ref().as_str()) {
-        None | Some("rotation-vector") => ElasticAngles::RotationVector,
-        Some("euler-zyx") => ElasticAngles::EulerZyx,
-        Some(other) => {
-            let message = format!("angles {other:?} are not known; use \"rotation-vector\" or \"euler-zyx\"");
-            return Err(at(entry.angles.as_ref().map_or(0..0, Spanned::span), message).into());
-        }
-    };
-    let damping = damping_of(entry.damping.as_ref(), source);
-    let damping = keep(damping.map_err(Error::from), faults).unwrap_or(Damping::Modal(0.0));
-    let distal_name = entry.distal.as_ref().map(|d| d.get_ref().as_str());
-    let distal = distal_joint(mechanism, name, distal_name).map_err(|e| {
-        let unknown = matches!(e, SubstitutionError::UnknownLink { .. });
-        let named = entry.distal.as_ref().filter(|_| !unknown);
-        at(named.map_or(entry.link.span(), Spanned::span), e.to_string())
-    })?;
-
-    let (reduced, parts) = match (&entry.reduced, &entry.beam) {
-        (Some(file), None) => {
-            let path = folder.join(file.get_ref());
-            if !path.is_file() {
-                let message = format!("reduced = {:?}: there is no file {}", file.get_ref(), path.display());
-                return Err(at(file.span(), message).into());
-            }
-            let reduced = read_flex(&path).map_err(Box::new)?;
-            if reduced.name != *name {
-                warnings.push(format!(
-                    "link {name:?} takes the reduced link of {:?} ({})",
-                    reduced.name,
-                    path.display()
-                ));
-            }
-            warnings.extend(reduced.warnings(&Default::default()).into_iter().map(|w| format!("link {name:?}: {w}")));
-            (reduced, Parts::Reduced)
-        }
-        (None, Some(beam)) => beam_link(name, beam, distal.X_PJ, mechanism, source)?,
-        _ => {
-            let message = format!("flexible link {name:?} needs either reduced = \"file.flex\" or beam = {{ ... }}");
-            return Err(at(entry.link.span(), message).into());
-        }
-    };
-    let distal = Some(distal.name.clone());
-    Ok((FlexibleLink { link: name.clone(), distal, reduced, parts, angles, coupling: entry.coupling }, damping))
-}
-
-fn damping_of(entry: Option<&Spanned<DampingEntry>>, source: &Source) -> Result<Damping, RobotFileError> {
-    let Some(entry) = entry else { return Ok(Damping::Modal(0.03)) };
-    let (value, damping) = match entry.get_ref() {
-        DampingEntry { modal: Some(zeta), stiffness_beta: None } => (*zeta, Damping::Modal(*zeta)),
-        DampingEntry { modal: None, stiffness_beta: Some(beta) } => (*beta, Damping::StiffnessProportional(*beta)),
-        _ => {
-            let message = "damping takes exactly one of modal = ratio or stiffness_beta = seconds";
-            return Err(source.error(entry.span(), message));
-        }
-    };
-    if !(value.is_finite() && value >= 0.0) {
-        return Err(source.error(entry.span(), format!("damping is {value}, it must be zero or positive")));
-    }
-    if matches!(damping, Damping::Modal(zeta) if zeta >= 1.0) {
-        let message = format!("modal damping is {value}, a ratio below 1 is expected (3 per cent is 0.03)");
-        return Err(source.error(entry.span(), message));
-    }
-    Ok(damping)
-}
-
-fn beam_link(
-    name: &str,
-    entry: &Spanned<BeamEntry>,
-    X_LB: Pose,
-    mechanism: &Mechanism,
-    source: &Source,
-) -> Result<(ReducedLink, Parts), Error> {
-    let beam = entry.get_ref();
-    let fail = |message: String| Error::from(source.error(entry.span(), format!("link {name:?}: {message}")));
-    let (section, material): (Section, Material) = beam_section(beam).map_err(fail)?;
-    let theory = match beam.theory.as_deref() {
-        None | Some("timoshenko") => BeamTheory::Timoshenko,
-        Some("euler-bernoulli") => BeamTheory::EulerBernoulli,
-        Some(other) => {
-            return Err(fail(format!("theory {other:?} is not known; use \"timoshenko\" or \"euler-bernoulli\"")));
-        }
-    };
-    let axis = X_LB.translation.vector;
-    let length = axis.norm();
-    if length < 1e-6 {
-        return Err(fail("its distal joint lies at the link's origin: a beam needs a length".into()));
-    }
-    // Any direction across the beam will do if none is asked for: the axis that it is farthest from.
-    let y_axis = beam.y_axis.map(Vector3::from).unwrap_or_else(|| {
-        let k = axis.abs().imin();
-        Vector3::from_fn(|i, _| if i == k { 1.0 } else { 0.0 })
-    });
-    let parts = match beam.parts.as_deref() {
-        None | Some("from-link") => Parts::FromLink(beam.split),
-        Some("uniform") => Parts::Reduced,
-        Some(other) => return Err(fail(format!("parts {other:?} are not known; use \"from-link\" or \"uniform\""))),
-    };
-    let mut link = BeamLink::new(name, section, material, length)
-        .along(axis, y_axis, beam.roll, beam.offset.into())
-        .map_err(|e| fail(e.to_string()))?;
-    link.X_LB = X_LB;
-    link.theory = theory;
-    link.split_fraction = beam.split;
-    // The link's own mass spread along the beam; the section's where the URDF gives none.
-    link.mass = mechanism.link(name).and_then(|l| l.inertia).map(|i| i.mass);
-    let reduced = link.reduce().map_err(|e| fail(e.to_string()))?;
-    Ok((reduced, parts))
 }

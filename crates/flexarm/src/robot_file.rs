@@ -7,6 +7,8 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use toml::Spanned;
 
+use crate::drive_entry::DriveEntry;
+
 /// The file as written.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -80,10 +82,17 @@ pub struct FlexibleLinkEntry {
     pub reduced: Option<Spanned<PathBuf>>,
     /// Or a beam.
     pub beam: Option<Spanned<BeamEntry>>,
-    /// `lumped`.
+    /// `lumped` or `modal`.
     pub model: Option<Spanned<String>>,
-    /// Number of rigid parts: 2.
+    /// Number of rigid parts of a lumped link; 2 if not given.
     pub segments: Option<Spanned<i64>>,
+    /// Number of fixed-interface modes of a modal link, beside those of its interfaces; all that the .flex file has, 6 of a beam.
+    pub modes: Option<Spanned<i64>>,
+    /// Modal: use the link's own modes with A held instead of interface displacements, only as many as given.
+    pub eigenmodes: Option<Spanned<i64>>,
+    /// Modal: let loads change the stiffness.
+    #[serde(default)]
+    pub geometric_stiffening: bool,
     /// Damping; 3 % modal if not given.
     pub damping: Option<Spanned<DampingEntry>>,
     /// `rotation-vector` or `euler-zyx`.
@@ -105,6 +114,8 @@ pub struct DampingEntry {
     pub modal: Option<f64>,
     /// `D = beta K` (s).
     pub stiffness_beta: Option<f64>,
+    /// `D = a M + b K` (1/s, s).
+    pub rayleigh: Option<[f64; 2]>,
 }
 
 /// A closed-form beam from the link's frame to the distal joint.
@@ -211,15 +222,6 @@ pub struct MaterialConstants {
     pub nu: f64,
     /// Density (kg/m³).
     pub rho: f64,
-}
-
-/// Drive of a joint. Tables of other kinds of drives are read, so that the message can name the kind.
-#[derive(Clone, Debug, Deserialize)]
-pub struct DriveEntry {
-    /// Joint of the URDF.
-    pub joint: Spanned<String>,
-    /// prescribed.
-    pub kind: Spanned<String>,
 }
 
 /// What is wrong in a robot file, and where.

@@ -15,7 +15,7 @@ pub struct Summary {
     pub robot: String,
     /// Name of the trajectory.
     pub trajectory: String,
-    /// rigid or lumped.
+    /// rigid, lumped, modal or mixed.
     pub links_model: &'static str,
     /// "complete", or why the run stopped early.
     pub end: String,
@@ -38,6 +38,10 @@ pub struct Summary {
     pub frequencies_hz: Vec<f64>,
     /// Flexible links.
     pub links: Vec<LinkFigures>,
+    /// Drives that give way.
+    pub elastic_drives: Vec<DriveFigures>,
+    /// Where the energy went.
+    pub energy: EnergyFigures,
     /// Largest force per drive (N m or N).
     pub drives: BTreeMap<String, f64>,
     /// Things worth telling.
@@ -120,6 +124,32 @@ pub struct LinkFigures {
     pub engineering_strain: f64,
     /// Largest elastic rotation (rad).
     pub peak_rotation_rad: f64,
+}
+
+/// An elastic drive's share.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct DriveFigures {
+    /// Name of the joint.
+    pub joint: String,
+    /// Largest TCP displacement that its deflection alone causes (m).
+    pub peak_contribution_m: f64,
+    /// Largest deflection between motor and link (rad or m).
+    pub peak_deflection_rad: f64,
+}
+
+/// Energy over the run, from the logged samples (trapezoidal rule: a low log rate shows as imbalance).
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct EnergyFigures {
+    /// Work of the drives (J).
+    pub drives_j: f64,
+    /// Work of the external loads (J).
+    pub loads_j: f64,
+    /// Taken away by dampers and friction (J).
+    pub dissipated_j: f64,
+    /// Gain of kinetic, gravitational and elastic energy (J).
+    pub stored_j: f64,
+    /// Largest gap in the balance over the largest energy in it.
+    pub imbalance: f64,
 }
 
 /// Flexible against rigid tool centre point.

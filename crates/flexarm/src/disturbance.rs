@@ -1,0 +1,364 @@
+//! What acts on an arm from outside during a run: loads as functions of time, and payloads that are picked and dropped.
+//!
+//! A file of its own (`--loads FILE.toml`), because loads belong to a run and not to a robot. Start at
+//! [`Disturbances::load`].
+
+use std::f64::consts::{PI, TAU};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use exmex::{Express, FlatEx};
+use flexarm_kinematics::{Frame, LinkInertia, Model, Pose, SpatialInertia, Wrench};
+use flexarm_stepping::{InertiaChange, Load, LoadAxes};
+use nalgebra::{Matrix3, Vector3};
+use serde::Deserialize;
+use toml::Spanned;
+
+use crate::error::Error;
+use crate::robot::{PAYLOAD_LINK, Robot, TCP_FRAME};
+use crate::robot_file::{RobotFileError, Source};
+
+/// The file as written.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LoadsFile {
+    format: Spanned<i64>,
+    #[serde(default)]
+    load: Vec<Spanned<LoadEntry>>,
+    #[serde(default)]
+    payload: Vec<Spanned<PayloadChange>>,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LoadEntry {
+    /// tcp, or a link.
+    #[serde(default = "tcp")]
+    frame: String,
+    /// world or frame.
+    #[serde(default = "world")]
+    axes: String,
+    /// step, impulse, sine, sweep, milling, table or expression.
+    kind: String,
+    /// When it begins (s).
+    #[serde(default)]
+    start: f64,
+    /// When it ends (s); the end of the run if not given.
+    end: Option<f64>,
+    /// Size of the force (N).
+    #[serde(default)]
+    force: [f64; 3],
+    /// Size of the moment (N m).
+    #[serde(default)]
+    torque: [f64; 3],
+    /// sine (Hz).
+    frequency: Option<f64>,
+    /// sine (rad).
+    #[serde(default)]
+    phase: f64,
+    /// sweep: first frequency (Hz).
+    from: Option<f64>,
+    /// sweep: last frequency (Hz).
+    to: Option<f64>,
+    /// impulse: length of the half sine (s); force is then the impulse (N s).
+    duration: Option<f64>,
+    /// milling: cutting edges.
+    teeth: Option<u32>,
+    /// milling: turns per minute.
+    spindle_rpm: Option<f64>,
+    /// milling: harmonics of the tooth frequency beside the mean; 3 if not given.
+    harmonics: Option<u32>,
+    /// table: CSV with time, fx, fy, fz and optionally tx, ty, tz (s, N, N m).
+    file: Option<PathBuf>,
+    /// expression: in t (s), for fx, fy, fz, tx, ty, tz.
+    fx: Option<String>,
+    fy: Option<String>,
+    fz: Option<String>,
+    tx: Option<String>,
+    ty: Option<String>,
+    tz: Option<String>,
+}
+
+fn tcp() -> String {
+    "tcp".into()
+}
+
+fn world() -> String {
+    "world".into()
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PayloadChange {
+    /// When (s).
+    at: f64,
+    /// Mass from then on, in the place of what was carried before (kg); 0 drops it.
+    mass: f64,
+    /// Link that carries it; that of the robot's payload, else of the TCP.
+    link: Option<String>,
+    /// Centre of mass in link axes (m).
+    #[serde(default)]
+    com: [f64; 3],
+    /// `ixx iyy izz ixy ixz iyz` about the centre of mass (kg m²).
+    #[serde(default)]
+    inertia: [f64; 6],
+}
+
+/// Loads and changes, for a model.
+#[derive(Clone, Debug, Default)]
+pub struct Disturbances {
+    /// Loads.
+    pub loads: Vec<Load>,
+    /// Changes of what bodies carry, by time.
+    pub changes: Vec<InertiaChange>,
+}
+
+type WrenchFn = Arc<dyn Fn(f64) -> Wrench + Send + Sync>;
+
+impl Disturbances {
+    /// Reads a file of loads for a model of the robot; `duration` is the end of the run (s).
+    ///
+    /// # Errors
+    /// [`Error`] with file, place, what was found and what was expected.
+    pub fn load(path: &Path, robot: &Robot, model: &Model, duration: f64) -> Result<Self, Error> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|e| Error::File { path: path.to_owned(), what: format!("cannot be read: {e}") })?;
+        let source = Source::new(path, &text);
+        let file: LoadsFile = toml::from_str(&text).map_err(|error| {
+            let message = error.message().trim().replace('\n', " ");
+            source.error(error.span().unwrap_or(0..0), message)
+        })?;
+        if *file.format.get_ref() != 1 {
+            let message = format!("format is {}, this program reads format 1", file.format.get_ref());
+            return Err(source.error(file.format.span(), message).into());
+        }
+        let folder = path.parent().unwrap_or(Path::new("."));
+        let mut disturbances = Self::default();
+        for entry in &file.load {
+            disturbances.loads.push(load(entry, model, folder, duration, &source)?);
+        }
+        let mut changes: Vec<&Spanned<PayloadChange>> = file.payload.iter().collect();
+        changes.sort_by(|a, b| a.get_ref().at.total_cmp(&b.get_ref().at));
+        for entry in changes {
+            let earlier = disturbances.changes.clone();
+            disturbances.changes.push(change(entry, robot, model, &earlier, &source)?);
+        }
+        Ok(disturbances)
+    }
+}
+
+fn frame_of<'m>(name: &str, model: &'m Model) -> Option<&'m Frame> {
+    model.frame(if name == "tcp" { TCP_FRAME } else { name })
+}
+
+fn load(
+    entry: &Spanned<LoadEntry>,
+    model: &Model,
+    folder: &Path,
+    duration: f64,
+    source: &Source,
+) -> Result<Load, Error> {
+    let e = entry.get_ref();
+    let fail = |message: String| source.error(entry.span(), message);
+    let frame = frame_of(&e.frame, model).filter(|f| f.body > 0).ok_or_else(|| {
+        let known: Vec<&str> = model.frames().iter().filter(|f| f.body > 0).map(|f| f.name.as_str()).collect();
+        fail(format!("load on frame {:?}: expected \"tcp\" or a link that moves, of {known:?}", e.frame))
+    })?;
+    let axes = match e.axes.as_str() {
+        "world" => LoadAxes::World,
+        "frame" => LoadAxes::Frame,
+        other => return Err(fail(format!("axes {other:?} are not known; use \"world\" or \"frame\"")).into()),
+    };
+    let numbers = [e.start, e.phase].into_iter().chain(e.end).chain(e.force).chain(e.torque);
+    if let Some(bad) = numbers.into_iter().find(|x| !x.is_finite()) {
+        return Err(fail(format!("a load has the entry {bad}, expected finite numbers")).into());
+    }
+    let end = e.end.unwrap_or(duration.max(e.start));
+    if end < e.start {
+        return Err(fail(format!("a load ends at {end} s before it starts at {} s", e.start)).into());
+    }
+    let needs = |value: Option<f64>, what: &str| match value {
+        Some(x) if x.is_finite() && x > 0.0 => Ok(x),
+        Some(x) => Err(fail(format!("{what} = {x}: expected a positive number"))),
+        None => Err(fail(format!("kind = {:?} needs {what} = ...", e.kind))),
+    };
+    let size = Wrench::new(e.force.into(), e.torque.into());
+    let start = e.start;
+    let scaled = move |s: Box<dyn Fn(f64) -> f64 + Send + Sync>| -> WrenchFn {
+        Arc::new(move |t| if t >= start && t <= end { size * s(t - start) } else { Wrench::zeros() })
+    };
+    let wrench: WrenchFn = match e.kind.as_str() {
+        "step" => scaled(Box::new(|_| 1.0)),
+        "impulse" => {
+            let d = needs(e.duration, "duration")?;
+            // Half a sine of area 1.
+            scaled(Box::new(move |t| if t < d { 0.5 * PI / d * (PI * t / d).sin() } else { 0.0 }))
+        }
+        "sine" => {
+            let (f, phase) = (needs(e.frequency, "frequency")?, e.phase);
+            scaled(Box::new(move |t| (TAU * f * t + phase).sin()))
+        }
+        "sweep" => {
+            let (from, to) = (needs(e.from, "from")?, needs(e.to, "to")?);
+            let rate = (to - from) / (end - start).max(1e-9);
+            scaled(Box::new(move |t| (TAU * (from * t + 0.5 * rate * t * t)).sin()))
+        }
+        "milling" => {
+            let teeth = f64::from(e.teeth.ok_or_else(|| fail("kind = \"milling\" needs teeth = ...".into()))?);
+            let tooth = teeth * needs(e.spindle_rpm, "spindle_rpm")? / 60.0;
+            let harmonics = e.harmonics.unwrap_or(3);
+            // Mean 1, harmonics that halve: the shape of an intermittent cut.
+            scaled(Box::new(move |t| {
+                1.0 + (1..=harmonics).map(|k| 0.5f64.powi(k as i32 - 1) * (TAU * f64::from(k) * tooth * t).sin()).sum::<f64>()
+            }))
+        }
+        "table" => table(&folder.join(e.file.as_ref().ok_or_else(|| fail("kind = \"table\" needs file = ...".into()))?))?,
+        "expression" => expression(e, &fail, (start, end))?,
+        other => {
+            let text = "use step, impulse, sine, sweep, milling, table or expression";
+            return Err(fail(format!("load kind {other:?} is not known; {text}")).into());
+        }
+    };
+    Ok(Load { body: frame.body, X_BF: frame.X_BF, axes, wrench })
+}
+
+/// Linear between the rows of a CSV, zero outside.
+fn table(path: &Path) -> Result<WrenchFn, Error> {
+    let fail = |what: String| Error::File { path: path.to_owned(), what };
+    let text = std::fs::read_to_string(path).map_err(|e| fail(format!("cannot be read: {e}")))?;
+    let mut lines = text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty() && !l.starts_with('#'));
+    let header: Vec<String> =
+        lines.next().map(|(_, l)| l.split(',').map(|w| w.trim().to_owned()).collect()).unwrap_or_default();
+    const NAMES: [&str; 7] = ["time", "fx", "fy", "fz", "tx", "ty", "tz"];
+    if header.first().is_none_or(|h| h != "time") || header.iter().any(|h| !NAMES.contains(&h.as_str())) {
+        return Err(fail(format!("the header is {header:?}, expected time and some of fx, fy, fz, tx, ty, tz")));
+    }
+    let mut rows: Vec<(f64, [f64; 6])> = Vec::new();
+    for (number, line) in lines {
+        let values: Vec<f64> = line.split(',').map_while(|w| w.trim().parse().ok()).collect();
+        if values.len() != header.len() || values.iter().any(|x| !x.is_finite()) {
+            return Err(fail(format!("line {}: expected {} finite numbers, found {line:?}", number + 1, header.len())));
+        }
+        let mut row = [0.0; 6];
+        for (name, value) in header.iter().zip(&values).skip(1) {
+            if let Some(k) = NAMES.iter().position(|n| n == name) {
+                row[k - 1] = *value;
+            }
+        }
+        if rows.last().is_some_and(|(t, _)| *t >= values[0]) {
+            return Err(fail(format!("line {}: time {} does not rise", number + 1, values[0])));
+        }
+        rows.push((values[0], row));
+    }
+    if rows.len() < 2 {
+        return Err(fail("a table of loads needs at least two rows".into()));
+    }
+    Ok(Arc::new(move |t| {
+        let k = rows.partition_point(|(x, _)| *x <= t);
+        let between = |k: usize| {
+            let ((t0, a), (t1, b)) = (&rows[k - 1], &rows[k]);
+            let s = (t - t0) / (t1 - t0);
+            let at = |c: usize| a[c] + s * (b[c] - a[c]);
+            Wrench::new(Vector3::new(at(0), at(1), at(2)), Vector3::new(at(3), at(4), at(5)))
+        };
+        match k {
+            0 => Wrench::zeros(),
+            k if k < rows.len() => between(k),
+            k if t == rows[k - 1].0 => between(k - 1),
+            _ => Wrench::zeros(),
+        }
+    }))
+}
+
+fn expression(
+    e: &LoadEntry,
+    fail: &impl Fn(String) -> RobotFileError,
+    (start, end): (f64, f64),
+) -> Result<WrenchFn, Error> {
+    let texts = [&e.fx, &e.fy, &e.fz, &e.tx, &e.ty, &e.tz];
+    if texts.iter().all(|t| t.is_none()) {
+        return Err(fail("kind = \"expression\" needs some of fx, fy, fz, tx, ty, tz as a function of t".into()).into());
+    }
+    let mut parts: Vec<Option<(FlatEx<f64>, bool)>> = Vec::new();
+    for text in texts {
+        parts.push(match text {
+            None => None,
+            Some(text) => {
+                let parsed: FlatEx<f64> =
+                    exmex::parse(text).map_err(|error| fail(format!("expression {text:?}: {error}")))?;
+                let unknown: Vec<&String> = parsed.var_names().iter().filter(|v| *v != "t").collect();
+                if !unknown.is_empty() {
+                    let text = format!("expression {text:?} has the variables {unknown:?}; only t (s) is known");
+                    return Err(fail(text).into());
+                }
+                let timed = !parsed.var_names().is_empty();
+                let probe = parsed.eval(if timed { &[0.5][..] } else { &[] });
+                if !probe.is_ok_and(|x: f64| x.is_finite()) {
+                    return Err(fail(format!("expression {text:?} is no finite number at t = 0.5 s")).into());
+                }
+                Some((parsed, timed))
+            }
+        });
+    }
+    Ok(Arc::new(move |t| {
+        if t < start || t > end {
+            return Wrench::zeros();
+        }
+        let at = |k: usize| match &parts[k] {
+            Some((parsed, timed)) => parsed.eval(if *timed { std::slice::from_ref(&t) } else { &[] }).unwrap_or(f64::NAN),
+            None => 0.0,
+        };
+        Wrench::new(Vector3::new(at(0), at(1), at(2)), Vector3::new(at(3), at(4), at(5)))
+    }))
+}
+
+fn change(
+    entry: &Spanned<PayloadChange>,
+    robot: &Robot,
+    model: &Model,
+    earlier: &[InertiaChange],
+    source: &Source,
+) -> Result<InertiaChange, RobotFileError> {
+    let e = entry.get_ref();
+    let span: Range<usize> = entry.span();
+    let fail = |message: String| source.error(span.clone(), message);
+    let mut numbers = [e.at, e.mass].into_iter().chain(e.com).chain(e.inertia);
+    if numbers.any(|x| !x.is_finite()) || e.mass < 0.0 || e.at < 0.0 {
+        return Err(fail("a payload needs a time and a mass of at least 0, and finite numbers".into()));
+    }
+    let own = model.frame(PAYLOAD_LINK);
+    let carrier = robot.rigid.joints.iter().find(|j| j.child == PAYLOAD_LINK).map(|j| j.parent.clone());
+    let link = e.link.clone().or(carrier).unwrap_or_else(|| robot.tcp.0.clone());
+    let frame = model.frame(&link).filter(|f| f.body > 0);
+    let frame = frame.ok_or_else(|| fail(format!("payload link {link:?} is not a link that moves")))?;
+    let [xx, yy, zz, xy, xz, yz] = e.inertia;
+    let inertia_com = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+    if inertia_com.symmetric_eigenvalues().min() < -1e-9 * inertia_com.norm() {
+        return Err(fail("payload inertia has a negative principal moment; the order is ixx iyy izz ixy ixz iyz".into()));
+    }
+    // The body as it is without what it carries at the start.
+    let mut inertia = model.bodies()[frame.body].inertia;
+    let at_start = robot.rigid.link(PAYLOAD_LINK).and_then(|l| l.inertia);
+    if let (Some(payload), Some(own)) = (at_start, own) {
+        if own.body != frame.body {
+            return Err(fail(format!("the robot's own payload does not ride on link {link:?}: give that link")));
+        }
+        let carried = payload.spatial().at_parent(&own.X_BF);
+        inertia = SpatialInertia {
+            mass: inertia.mass - carried.mass,
+            first_moment: inertia.first_moment - carried.first_moment,
+            rotational: inertia.rotational - carried.rotational,
+        };
+    }
+    if let Some(other) = earlier.iter().find(|c| c.body != frame.body) {
+        let name = &model.bodies()[other.body].name;
+        return Err(fail(format!("payloads on two bodies ({name:?} and {link:?}): one changes in a run")));
+    }
+    let added = LinkInertia { mass: e.mass, com: e.com.into(), inertia_com };
+    if e.mass > 0.0 {
+        let X_BF: Pose = frame.X_BF;
+        inertia += added.spatial().at_parent(&X_BF);
+    }
+    Ok(InertiaChange { t: e.at, body: frame.body, inertia })
+}

@@ -1,0 +1,335 @@
+//! Drives of a robot file: gearbox springs, rotors, friction and servos, from the text to checked numbers.
+
+use std::ops::Range;
+
+use flexarm_flexlink::{GearStiffness, Gearbox};
+use flexarm_kinematics::{JointKind, Mechanism};
+use flexarm_stepping::{Damping, Friction, TorqueCurve};
+use nalgebra::Matrix6;
+use serde::Deserialize;
+use toml::Spanned;
+
+use crate::error::Error;
+use crate::robot_file::{RobotFileError, Source};
+
+/// Drive of a joint. Quantities are on the joint's side of the gear unless they say otherwise.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DriveEntry {
+    /// Joint of the URDF.
+    pub joint: Spanned<String>,
+    /// prescribed, gearbox or torque.
+    pub kind: Spanned<String>,
+    /// Turns of the motor per turn of the joint; 1 if not given. Its sign does not matter here.
+    pub ratio: Option<Spanned<f64>>,
+    /// Inertia of the rotor, on the motor's side (kg m²).
+    pub motor_inertia: Option<Spanned<f64>>,
+    /// Spring between motor and link.
+    pub gearbox: Option<Spanned<GearboxEntry>>,
+    /// Friction between motor and base of the joint.
+    pub friction: Option<Spanned<FrictionEntry>>,
+    /// Largest torque; the URDF's effort limit if not given (N m).
+    pub torque_limit: Option<Spanned<f64>>,
+    /// Controller of kind = torque.
+    pub servo: Option<Spanned<ServoEntry>>,
+}
+
+/// A number, a list of them or a matrix.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(untagged, expecting = "expected a number, a list of 3 or 6 numbers, or a 6x6 matrix")]
+pub enum Numbers {
+    /// One.
+    One(f64),
+    /// Several.
+    Many(Vec<f64>),
+    /// Rows.
+    Matrix(Vec<Vec<f64>>),
+}
+
+/// Spring and damper of a gearbox.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GearboxEntry {
+    /// About the axis (N m/rad); or about x, y, z of the joint frame; or for its three translations and rotations; or 6x6.
+    pub stiffness: Option<Numbers>,
+    /// Likewise, without the 6x6 (N m s/rad); 3 % modal if not given.
+    pub damping: Option<Numbers>,
+    /// Play to each side (rad).
+    pub backlash: Option<f64>,
+    /// Instead of a stiffness: points (deflection, torque).
+    pub curve: Option<Vec<[f64; 2]>>,
+}
+
+/// Friction of a drive.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FrictionEntry {
+    /// (N m s/rad).
+    #[serde(default)]
+    pub viscous: f64,
+    /// (N m).
+    #[serde(default)]
+    pub coulomb: f64,
+    /// Beyond Coulomb's at standstill (N m).
+    #[serde(default)]
+    pub stribeck: f64,
+    /// (rad/s).
+    #[serde(default = "stribeck_velocity")]
+    pub stribeck_velocity: f64,
+    /// Speed over which the sign changes (rad/s).
+    #[serde(default = "regularisation")]
+    pub regularisation: f64,
+}
+
+fn stribeck_velocity() -> f64 {
+    0.1
+}
+
+fn regularisation() -> f64 {
+    0.01
+}
+
+/// Sampled controller of a joint.
+#[derive(Clone, Copy, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ServoEntry {
+    /// Position loop (1/s); 20 if not given.
+    pub position_gain: Option<f64>,
+    /// Speed loop (N m s/rad); inertia times 100/s if not given.
+    pub velocity_gain: Option<f64>,
+    /// Speed loop's integral (N m/rad); 20/s times the velocity gain if not given.
+    pub integral_gain: Option<f64>,
+    /// Time between samples (s); 1 ms if not given, the same for all axes.
+    pub sample_s: Option<f64>,
+    /// Add the rigid robot's torques on the reference motion.
+    pub feed_forward: Option<bool>,
+}
+
+/// How a joint is driven.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DriveKind {
+    /// Exactly along the trajectory.
+    Prescribed,
+    /// The motor exactly along the trajectory, a spring to the link.
+    Gearbox,
+    /// The motor by torque, under a servo; a spring to the link if there is one.
+    Torque,
+}
+
+/// A drive, checked.
+#[derive(Clone, Debug)]
+pub struct Drive {
+    /// Joint.
+    pub joint: String,
+    /// How it is driven.
+    pub kind: DriveKind,
+    /// Inertia of the rotor seen from the joint (kg m²).
+    pub armature: f64,
+    /// Spring of the gearbox.
+    pub gearbox: Option<(Gearbox, GearDamping)>,
+    /// Friction.
+    pub friction: Friction,
+    /// Largest torque (N m).
+    pub torque_limit: f64,
+    /// Servo as written.
+    pub servo: ServoEntry,
+}
+
+/// Damping and curve of a gearbox's springs.
+#[derive(Clone, Debug)]
+pub struct GearDamping {
+    /// Damping per coordinate; none: 3 % modal.
+    pub dampers: Option<Vec<f64>>,
+    /// Torque curve of the axis.
+    pub curve: Option<TorqueCurve>,
+}
+
+impl GearDamping {
+    /// Damping of the gearbox's spring of that number with so many coordinates.
+    pub fn of(&self, component: usize, size: usize) -> Damping {
+        match &self.dampers {
+            None => Damping::Modal(0.03),
+            Some(d) if size == 1 => Damping::Dampers([d[component], 0.0, 0.0, 0.0, 0.0, 0.0]),
+            Some(d) => Damping::Dampers(std::array::from_fn(|c| d[c])),
+        }
+    }
+}
+
+/// Checks all drives; faults are put aside so that all are found.
+pub(crate) fn drives(
+    entries: &[DriveEntry],
+    mechanism: &Mechanism,
+    source: &Source,
+    warnings: &mut Vec<String>,
+    faults: &mut Vec<Error>,
+) -> Vec<Drive> {
+    let mut drives: Vec<Drive> = Vec::new();
+    let mut sample: Option<f64> = None;
+    for entry in entries {
+        match drive(entry, mechanism, source, warnings) {
+            Err(error) => faults.push(error.into()),
+            Ok(drive) if drives.iter().any(|d| d.joint == drive.joint) => {
+                let message = format!("joint {:?} has two [[drive]] entries: keep one", drive.joint);
+                faults.push(source.error(entry.joint.span(), message).into());
+            }
+            Ok(drive) => {
+                if let (DriveKind::Torque, Some(s)) = (drive.kind, drive.servo.sample_s)
+                    && let Some(other) = sample.replace(s)
+                    && other != s
+                {
+                    let message = format!("sample_s = {s}, another drive has {other}: all servos sample together");
+                    faults.push(source.error(entry.joint.span(), message).into());
+                }
+                drives.push(drive);
+            }
+        }
+    }
+    drives
+}
+
+fn drive(
+    entry: &DriveEntry,
+    mechanism: &Mechanism,
+    source: &Source,
+    warnings: &mut Vec<String>,
+) -> Result<Drive, RobotFileError> {
+    let name = entry.joint.get_ref();
+    let fail = |span: Range<usize>, message: String| source.error(span, format!("drive of joint {name:?}: {message}"));
+    let movable = |j: &&flexarm_kinematics::Joint| j.kind != JointKind::Fixed;
+    let Some(joint) = mechanism.joints.iter().find(|j| j.name == *name && j.kind != JointKind::Fixed) else {
+        let known: Vec<_> = mechanism.joints.iter().filter(movable).map(|j| j.name.as_str()).collect();
+        return Err(fail(entry.joint.span(), format!("the robot has no such movable joint; it has {known:?}")));
+    };
+    let kind = match entry.kind.get_ref().as_str() {
+        "prescribed" => DriveKind::Prescribed,
+        "gearbox" => DriveKind::Gearbox,
+        "torque" => DriveKind::Torque,
+        other => {
+            let text = format!("kind {other:?} is not known; use \"prescribed\", \"gearbox\" or \"torque\"");
+            return Err(fail(entry.kind.span(), text));
+        }
+    };
+    let number = |value: &Option<Spanned<f64>>, what: &str, default: f64, lowest: f64| match value {
+        None => Ok(default),
+        Some(v) if v.get_ref().is_finite() && *v.get_ref() >= lowest => Ok(*v.get_ref()),
+        Some(v) => Err(fail(v.span(), format!("{what} is {}, expected a number of at least {lowest}", v.get_ref()))),
+    };
+    let ratio = number(&entry.ratio, "ratio", 1.0, f64::MIN)?;
+    if ratio == 0.0 {
+        let span = entry.ratio.as_ref().map_or(0..0, Spanned::span);
+        return Err(fail(span, "ratio is 0, expected the motor's turns per turn of the joint".into()));
+    }
+    let armature = ratio * ratio * number(&entry.motor_inertia, "motor_inertia", 0.0, 0.0)?;
+    let gearbox = match &entry.gearbox {
+        Some(gearbox) => Some(gear(name, gearbox, &fail)?),
+        None => None,
+    };
+    match (kind, &gearbox) {
+        (DriveKind::Gearbox, None) => {
+            let text = "kind = \"gearbox\" needs gearbox = { stiffness = ..., damping = ... }";
+            return Err(fail(entry.kind.span(), text.into()));
+        }
+        (DriveKind::Prescribed, Some(_)) => warnings.push(format!(
+            "drive of joint {name:?}: its gearbox is not used because kind = \"prescribed\" drives the link itself; \
+             kind = \"gearbox\" would put the spring in"
+        )),
+        (DriveKind::Torque, Some(_)) if armature == 0.0 => {
+            let text = "a motor that drives through a spring needs an inertia: give motor_inertia and ratio";
+            return Err(fail(entry.kind.span(), text.into()));
+        }
+        _ => {}
+    }
+    let friction = match &entry.friction {
+        None => Friction::NONE,
+        Some(f) => {
+            let FrictionEntry { viscous, coulomb, stribeck, stribeck_velocity, regularisation } = *f.get_ref();
+            let values = [viscous, coulomb, stribeck];
+            let speeds = [stribeck_velocity, regularisation];
+            if values.iter().any(|x| !(x.is_finite() && *x >= 0.0)) || speeds.iter().any(|x| !(x.is_finite() && *x > 0.0)) {
+                let text = "friction takes viscous, coulomb and stribeck of at least 0, and speeds above 0";
+                return Err(fail(f.span(), text.into()));
+            }
+            Friction { viscous, coulomb, stribeck, stribeck_velocity, regularisation }
+        }
+    };
+    let servo = match &entry.servo {
+        None => ServoEntry::default(),
+        Some(s) => {
+            let gains = [s.get_ref().position_gain, s.get_ref().velocity_gain, s.get_ref().integral_gain];
+            if gains.iter().flatten().any(|g| !(g.is_finite() && *g >= 0.0)) {
+                return Err(fail(s.span(), "servo gains must be 0 or above".into()));
+            }
+            if s.get_ref().sample_s.is_some_and(|t| !(t.is_finite() && t > 0.0)) {
+                return Err(fail(s.span(), "sample_s must be a positive time in seconds".into()));
+            }
+            if kind != DriveKind::Torque {
+                warnings.push(format!("drive of joint {name:?}: its servo is not used, only kind = \"torque\" has one"));
+            }
+            *s.get_ref()
+        }
+    };
+    let torque_limit = number(&entry.torque_limit, "torque_limit", joint.limits.effort, 0.0)?;
+    Ok(Drive { joint: name.clone(), kind, armature, gearbox, friction, torque_limit, servo })
+}
+
+fn gear(
+    joint: &str,
+    entry: &Spanned<GearboxEntry>,
+    fail: &impl Fn(Range<usize>, String) -> RobotFileError,
+) -> Result<(Gearbox, GearDamping), RobotFileError> {
+    let gear = entry.get_ref();
+    let at = |message: String| fail(entry.span(), message);
+    let curve = match (&gear.curve, gear.backlash, &gear.stiffness) {
+        (Some(points), None, None) => Some(TorqueCurve::new(points).map_err(|e| at(e.to_string()))?),
+        (None, Some(play), Some(Numbers::One(k))) if play.is_finite() && play >= 0.0 && *k > 0.0 => {
+            (play > 0.0).then(|| TorqueCurve::backlash(*k, play))
+        }
+        (None, Some(play), _) => {
+            return Err(at(format!("backlash = {play}: it must be 0 or above, with one positive stiffness about the axis")));
+        }
+        (Some(_), ..) => return Err(at("curve takes the place of stiffness and backlash: give one of them".into())),
+        (None, None, None) => return Err(at("gearbox needs stiffness = N m/rad, or curve = [[rad, N m], ...]".into())),
+        (None, None, Some(_)) => None,
+    };
+    let (stiffness, size) = match (&gear.stiffness, &curve) {
+        (Some(Numbers::One(k)), _) => (GearStiffness::Axis(*k), 1),
+        (None, Some(curve)) => (GearStiffness::Axis(curve.stiffest()), 1),
+        (Some(Numbers::Many(k)), _) if k.len() == 3 => (GearStiffness::Tilting([k[0], k[1], k[2]]), 3),
+        (Some(Numbers::Many(k)), _) if k.len() == 6 => {
+            (GearStiffness::Full(Matrix6::from_diagonal(&nalgebra::Vector6::from_column_slice(k))), 6)
+        }
+        (Some(Numbers::Matrix(rows)), _) if rows.len() == 6 && rows.iter().all(|r| r.len() == 6) => {
+            let K = Matrix6::from_fn(|i, j| rows[i][j]);
+            let asymmetry = (K - K.transpose()).amax() / K.amax();
+            if asymmetry > 1e-9 {
+                return Err(at(format!("the 6x6 stiffness is not symmetric: relative asymmetry {asymmetry:.1e}")));
+            }
+            (GearStiffness::Full((K + K.transpose()) * 0.5), 6)
+        }
+        _ => return Err(at("stiffness takes one number, 3, 6 or a 6x6 matrix".into())),
+    };
+    let finite = match &stiffness {
+        GearStiffness::Axis(k) => k.is_finite() && *k > 0.0,
+        GearStiffness::Tilting(k) => k.iter().all(|k| k.is_finite() && *k > 0.0),
+        GearStiffness::Full(K) => K.iter().all(|k| k.is_finite()) && K.symmetric_eigenvalues().min() > 0.0,
+    };
+    if !finite {
+        return Err(at("the stiffness must be finite and positive (definite)".into()));
+    }
+    let dampers = match &gear.damping {
+        None => None,
+        Some(Numbers::One(d)) if size == 1 => Some(vec![*d]),
+        Some(Numbers::Many(d)) if d.len() == size => Some(d.clone()),
+        Some(_) => {
+            let text = match size {
+                1 => "one number".to_owned(),
+                n => format!("{n} numbers"),
+            };
+            return Err(at(format!("with this stiffness, damping takes {text}")));
+        }
+    };
+    if dampers.iter().flatten().any(|d| !(d.is_finite() && *d >= 0.0)) {
+        return Err(at("damping must be 0 or above".into()));
+    }
+    Ok((Gearbox { joint: joint.to_owned(), stiffness }, GearDamping { dampers, curve }))
+}

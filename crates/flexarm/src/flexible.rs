@@ -1,0 +1,320 @@
+//! A robot with its flexible links and elastic drives in place: which model each of them gets, and the arm that results.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use flexarm_fem::{BeamLink, ModalLink, ModalOptions};
+use flexarm_flexlink::{FlexibleLink, FlexibleSpan, Gearbox, LinkForm, insert_gearboxes, substitute};
+use flexarm_kinematics::{Data, Model, mass_matrix};
+use flexarm_stepping::{
+    Damping, FlexibleArm, Friction, GeometricStiffness, PrescribedMotion, Servo, ServoAxis, Spring, StepError,
+};
+use nalgebra::{DMatrix, DVector};
+
+use crate::drive_entry::{Drive, DriveKind, GearDamping, ServoEntry};
+use crate::error::Error;
+use crate::options::{DriveModel, LinkModel, Modelling};
+use crate::robot::Robot;
+
+/// Default gain of the position loop (1/s), bandwidth of the speed loop (1/s), integral over speed gain (1/s), sample (s).
+const SERVO: [f64; 4] = [20.0, 100.0, 20.0, 1e-3];
+/// Fixed-interface modes of a beam link that does not say how many.
+const BEAM_MODES: usize = 6;
+
+/// A flexible link with what its models can be made from.
+#[derive(Clone, Debug)]
+pub struct RobotLink {
+    /// The link with its reduced model.
+    pub flexible: FlexibleLink,
+    /// Its damping.
+    pub damping: Damping,
+    /// The beam that it is, if it is one.
+    pub beam: Option<BeamLink>,
+    /// What the robot file asks for.
+    pub choices: LinkChoices,
+}
+
+/// What a robot file asks of a flexible link.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LinkChoices {
+    /// Lumped or modal.
+    pub model: LinkModel,
+    /// Rigid parts of a lumped link.
+    pub segments: usize,
+    /// Fixed-interface modes of a modal link.
+    pub modes: Option<usize>,
+    /// Own modes of a modal link instead.
+    pub eigenmodes: Option<usize>,
+    /// Whether loads change the stiffness.
+    pub geometric: bool,
+}
+
+impl RobotLink {
+    /// The model of the link; rigid links have none.
+    ///
+    /// # Errors
+    /// A sentence about what the link's source does not have.
+    pub fn form(&self, modelling: &Modelling) -> Result<LinkForm, String> {
+        let model = if modelling.links == LinkModel::AsFiled { self.choices.model } else { modelling.links };
+        match model {
+            LinkModel::Modal => self.modal(modelling).map(|modal| LinkForm::Modal(Arc::new(modal))),
+            _ => self.lumped(modelling.segments.unwrap_or(self.choices.segments)),
+        }
+    }
+
+    fn lumped(&self, segments: usize) -> Result<LinkForm, String> {
+        if segments == 2 {
+            return Ok(LinkForm::TwoParts);
+        }
+        let name = &self.flexible.link;
+        if let Some(beam) = &self.beam {
+            return beam.chain(segments).map(LinkForm::Chain).map_err(|e| format!("link {name:?}: {e}"));
+        }
+        let chains = self.flexible.reduced.details.as_ref().map_or(&[][..], |d| &d.chains[..]);
+        chains.iter().find(|c| c.parts.len() == segments).cloned().map(LinkForm::Chain).ok_or_else(|| {
+            let there: Vec<usize> = chains.iter().map(|c| c.parts.len()).collect();
+            format!(
+                "link {name:?}: its .flex file has no chain of {segments} parts (it has 2 and {there:?}): make it with \
+                 flexarm reduce --chains {segments}, or choose another number of segments"
+            )
+        })
+    }
+
+    fn modal(&self, modelling: &Modelling) -> Result<ModalLink, String> {
+        let name = &self.flexible.link;
+        let fail = |e: flexarm_fem::FemError| format!("link {name:?} cannot bend in modes: {e}");
+        let wanted = modelling.modes.or(self.choices.modes);
+        let full = match (&self.beam, &self.flexible.reduced.details) {
+            (Some(beam), _) => {
+                let modes = wanted.unwrap_or(BEAM_MODES);
+                let options = ModalOptions { modes, geometric: self.choices.geometric, ..ModalOptions::default() };
+                beam.modal_with(&ModalOptions { elements: options.elements.max(4 * modes), ..options }).map_err(fail)?
+            }
+            (None, Some(details)) => {
+                let stored = details.modal.clone().map(Ok);
+                let condensed = || {
+                    let element = details.superelement.as_ref()?;
+                    Some(ModalLink::from_superelement(name, element).map_err(fail))
+                };
+                let Some(link) = stored.or_else(condensed) else {
+                    return Err(format!("link {name:?} cannot bend in modes: its .flex file has no mass matrix"));
+                };
+                let link = link?;
+                let all = link.coordinates() - 6 * link.interfaces.len().min(link.coordinates() / 6);
+                match wanted {
+                    Some(n) if n < all => link.truncated(n).map_err(fail)?,
+                    Some(n) if n > all => {
+                        return Err(format!("link {name:?}: {n} modes are asked for, its .flex file has {all}"));
+                    }
+                    _ => link,
+                }
+            }
+            (None, None) => {
+                return Err(format!(
+                    "link {name:?} cannot bend in modes: its .flex file has no mass matrix over interfaces and modes; \
+                     reduce the mesh again with this version, or use model = \"lumped\""
+                ));
+            }
+        };
+        if self.choices.geometric && full.geometric.is_none() {
+            return Err(format!(
+                "link {name:?}: geometric_stiffening needs a beam, or a .flex file made with flexarm reduce --geometric"
+            ));
+        }
+        match self.choices.eigenmodes {
+            Some(keep) => full.orthogonalised(Some(keep)).map_err(fail),
+            None => Ok(full),
+        }
+    }
+}
+
+/// A robot whose links bend, with its springs in coordinate order.
+#[derive(Clone, Debug)]
+pub struct FlexibleRobot {
+    /// The tree.
+    pub model: Arc<Model>,
+    /// Springs in coordinate order.
+    pub springs: Vec<Spring>,
+    /// Owner of each spring.
+    pub owners: Vec<Owner>,
+    /// Flexible links.
+    pub spans: Vec<FlexibleSpan>,
+    /// The same robot with rigid links and without gearboxes.
+    pub rigid: Arc<Model>,
+    /// Friction per actuated coordinate.
+    friction: Vec<Friction>,
+    /// Joints driven by torque: coordinate, servo, limit.
+    torque: Vec<(usize, ServoEntry, f64)>,
+}
+
+/// What a spring belongs to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Owner {
+    /// Flexible link of that number, in [`FlexibleRobot::spans`].
+    Link(usize),
+    /// Drive of that number, in [`Robot::drives`].
+    Drive(usize),
+}
+
+impl FlexibleRobot {
+    /// The arm that steppers take, driven along a motion.
+    ///
+    /// # Errors
+    /// As [`FlexibleArm::new`] and [`FlexibleArm::with_servo`].
+    pub fn arm(&self, motion: Arc<dyn PrescribedMotion>) -> Result<FlexibleArm, StepError> {
+        let mut arm = FlexibleArm::new(self.model.clone(), self.springs.clone(), motion)?;
+        if self.friction.iter().any(|f| *f != Friction::NONE) {
+            arm.friction.clone_from(&self.friction);
+        }
+        if self.torque.is_empty() {
+            return Ok(arm);
+        }
+        // Default gains fit the inertia that each motor sees at the start.
+        let n = self.rigid.nv();
+        let (mut q, mut v, mut a) = (DVector::zeros(n), DVector::zeros(n), DVector::zeros(n));
+        arm.motion.sample(0.0, q.as_mut_slice(), v.as_mut_slice(), a.as_mut_slice());
+        let M = mass_matrix(&self.rigid, &mut Data::new(&self.rigid), &q).clone();
+        let [position, bandwidth, integral, sample] = SERVO;
+        let axes = self.torque.iter().map(|&(coordinate, servo, limit)| {
+            let velocity_gain = servo.velocity_gain.unwrap_or(bandwidth * M[(coordinate, coordinate)]);
+            ServoAxis {
+                coordinate,
+                position_gain: servo.position_gain.unwrap_or(position),
+                velocity_gain,
+                integral_gain: servo.integral_gain.unwrap_or(integral * velocity_gain),
+                feed_forward: servo.feed_forward.unwrap_or(true),
+                limit,
+            }
+        });
+        let sample_s = self.torque.iter().find_map(|(_, servo, _)| servo.sample_s).unwrap_or(sample);
+        arm.with_servo(Servo { sample_s, axes: axes.collect(), rigid: self.rigid.clone() })
+    }
+
+    /// Whether some joint is driven by torque.
+    pub fn has_servo(&self) -> bool {
+        !self.torque.is_empty()
+    }
+
+    /// A word for the models of the links.
+    pub fn links_model(&self) -> &'static str {
+        let modal = self.model.elastic().iter().filter(|g| g.modal).count();
+        match (self.spans.len(), modal) {
+            (0, _) => "rigid",
+            (_, 0) => "lumped",
+            (n, m) if n == m => "modal",
+            _ => "mixed",
+        }
+    }
+}
+
+impl Robot {
+    /// The robot with its flexible links and drives as the file says.
+    ///
+    /// # Errors
+    /// As [`Robot::modelled`].
+    pub fn flexible_robot(&self) -> Result<FlexibleRobot, Error> {
+        self.modelled(&Modelling::default())
+    }
+
+    /// The robot with all links rigid and all joints prescribed, as an arm without springs.
+    ///
+    /// # Errors
+    /// [`Error::Model`].
+    pub fn rigid_robot(&self) -> Result<FlexibleRobot, Error> {
+        self.modelled(&Modelling { links: LinkModel::Rigid, drives: DriveModel::Rigid, ..Modelling::default() })
+    }
+
+    /// The robot with its links and drives modelled as asked for.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if a link or drive has no such model, [`Error::Model`] if the result is no tree.
+    pub fn modelled(&self, modelling: &Modelling) -> Result<FlexibleRobot, Error> {
+        let usage = |text: String| Error::Usage(text);
+        let mut links: Vec<FlexibleLink> = Vec::new();
+        if modelling.links != LinkModel::Rigid {
+            for link in &self.flexible {
+                let form = link.form(modelling).map_err(usage)?;
+                links.push(FlexibleLink { form, ..link.flexible.clone() });
+            }
+        }
+        let mut substituted = substitute(&self.rigid, &links).map_err(|e| usage(e.to_string()))?;
+
+        let kind = |drive: &Drive| match modelling.drives {
+            DriveModel::AsFiled => drive.kind,
+            DriveModel::Rigid => DriveKind::Prescribed,
+            DriveModel::Elastic if drive.gearbox.is_some() => DriveKind::Gearbox,
+            DriveModel::Elastic => DriveKind::Prescribed,
+            DriveModel::Servo => DriveKind::Torque,
+        };
+        let soft = |drive: &Drive| kind(drive) != DriveKind::Prescribed && drive.gearbox.is_some();
+        let with_spring: Vec<(usize, &Drive)> = self.drives.iter().enumerate().filter(|(_, d)| soft(d)).collect();
+        let gearboxes: Vec<Gearbox> =
+            with_spring.iter().filter_map(|(_, d)| d.gearbox.as_ref().map(|g| g.0.clone())).collect();
+        let gears = insert_gearboxes(&mut substituted.mechanism, &gearboxes).map_err(|e| usage(e.to_string()))?;
+        let model = Model::new(&substituted.mechanism)
+            .map_err(|source| Error::Model { path: self.urdf_path.clone(), source })?;
+
+        // Each group of elastic coordinates belongs to a joint of a lumped link, to a modal link or to a gearbox.
+        let span_of = |link: &str| substituted.spans.iter().position(|s| s.link == link);
+        let mut found: HashMap<&str, (Spring, Owner)> = HashMap::new();
+        for spring in &substituted.springs {
+            let Some(k) = span_of(&spring.link) else { continue };
+            let chained = substituted.springs.iter().filter(|s| s.link == spring.link).count() > 1;
+            let number = substituted.springs.iter().filter(|s| s.link == spring.link);
+            let number = 1 + number.take_while(|s| s.joint != spring.joint).count();
+            let name = if chained { format!("{}.{number}", spring.link) } else { spring.link.clone() };
+            let spring_of = Spring::from((name, spring.K_S, self.flexible[k].damping));
+            found.insert(&spring.joint, (spring_of, Owner::Link(k)));
+        }
+        for link in &links {
+            if let (LinkForm::Modal(modal), Some(k)) = (&link.form, span_of(&link.link)) {
+                let geometric = if self.flexible[k].choices.geometric { modal.geometric.as_ref() } else { None };
+                let (name, K, damping) = (link.link.clone(), modal.K.clone(), self.flexible[k].damping);
+                let geometric = geometric.map(|g| Arc::new(stiffening(g)));
+                found.insert(&link.link, (Spring { name, K, damping, curve: None, geometric }, Owner::Link(k)));
+            }
+        }
+        for gear in &gears {
+            let Some((number, drive)) = with_spring.iter().find(|(_, d)| d.joint == gear.gearbox) else { continue };
+            let Some((_, GearDamping { curve, .. })) = &drive.gearbox else { continue };
+            let damping = drive.gearbox.as_ref().map(|g| g.1.of(gear.component, gear.K.nrows()));
+            let damping = damping.unwrap_or(Damping::Modal(0.0));
+            let (name, K): (String, DMatrix<f64>) = (gear.name.clone(), gear.K.clone());
+            let spring = Spring { name, K, damping, curve: curve.clone(), geometric: None };
+            found.insert(&gear.joint, (spring, Owner::Drive(*number)));
+        }
+        let (mut springs, mut owners) = (Vec::new(), Vec::new());
+        for group in model.elastic() {
+            let (spring, owner) = found
+                .remove(group.name.as_str())
+                .ok_or_else(|| usage(format!("elastic joint {:?} has no stiffness", group.name)))?;
+            springs.push(spring);
+            owners.push(owner);
+        }
+
+        let actuated = &model.coordinates()[..model.n_actuated()];
+        let drive_of = |joint: &str| self.drives.iter().find(|d| d.joint == joint);
+        let friction = actuated.iter().map(|c| drive_of(&c.joint).map_or(Friction::NONE, |d| d.friction)).collect();
+        let mut torque = Vec::new();
+        for (k, coordinate) in actuated.iter().enumerate() {
+            match drive_of(&coordinate.joint) {
+                Some(d) if kind(d) == DriveKind::Torque => torque.push((k, d.servo, d.torque_limit)),
+                None if modelling.drives == DriveModel::Servo => {
+                    torque.push((k, ServoEntry::default(), coordinate.limits.effort));
+                }
+                _ => {}
+            }
+        }
+        let (spans, rigid) = (substituted.spans, self.rigid_model()?);
+        Ok(FlexibleRobot { model: Arc::new(model), springs, owners, spans, rigid, friction, torque })
+    }
+}
+
+fn stiffening(g: &flexarm_fem::GeometricStiffness) -> GeometricStiffness {
+    GeometricStiffness {
+        acceleration: g.acceleration.clone(),
+        angular: g.angular.clone(),
+        centrifugal: g.centrifugal.clone(),
+        interface: g.interface.clone(),
+    }
+}

@@ -1,0 +1,166 @@
+//! Flexible links of a robot file: from the text to reduced links with their choices.
+
+use std::path::Path;
+
+use flexarm_fem::{BeamLink, BeamTheory, Material, ReducedLink, Section, read_flex};
+use flexarm_flexlink::{FlexibleLink, LinkForm, Parts, SubstitutionError, distal_joint};
+use flexarm_kinematics::{ElasticAngles, Mechanism, Pose};
+use flexarm_stepping::Damping;
+use nalgebra::Vector3;
+use toml::Spanned;
+
+use crate::beam_entry::beam_section;
+use crate::error::Error;
+use crate::flexible::{LinkChoices, RobotLink};
+use crate::options::{LinkModel, Modelling};
+use crate::robot::keep;
+use crate::robot_file::{BeamEntry, DampingEntry, FlexibleLinkEntry, RobotFileError, Source};
+
+pub(crate) fn flexible_link(
+    entry: &FlexibleLinkEntry,
+    mechanism: &Mechanism,
+    source: &Source,
+    folder: &Path,
+    warnings: &mut Vec<String>,
+    faults: &mut Vec<Error>,
+) -> Result<RobotLink, Error> {
+    let name = entry.link.get_ref();
+    let at = |span: std::ops::Range<usize>, message: String| source.error(span, message);
+    let model = match entry.model.as_ref().map(|m| m.get_ref().as_str()) {
+        None | Some("lumped") => LinkModel::Lumped,
+        Some("modal") => LinkModel::Modal,
+        Some(other) => {
+            let message = format!("model {other:?} is not known; use \"lumped\" or \"modal\"");
+            return Err(at(entry.model.as_ref().map_or(0..0, Spanned::span), message).into());
+        }
+    };
+    let count = |value: &Option<Spanned<i64>>, what: &str, lowest: i64| match value {
+        None => Ok(None),
+        Some(n) if (lowest..=10_000).contains(n.get_ref()) => Ok(Some(*n.get_ref() as usize)),
+        Some(n) => Err(at(n.span(), format!("{what} = {}: expected a whole number of at least {lowest}", n.get_ref()))),
+    };
+    let segments = count(&entry.segments, "segments", 2)?.unwrap_or(2);
+    let (modes, eigenmodes) = (count(&entry.modes, "modes", 0)?, count(&entry.eigenmodes, "eigenmodes", 1)?);
+    let angles = match entry.angles.as_ref().map(|a| a.get_ref().as_str()) {
+        None | Some("rotation-vector") => ElasticAngles::RotationVector,
+        Some("euler-zyx") => ElasticAngles::EulerZyx,
+        Some(other) => {
+            let message = format!("angles {other:?} are not known; use \"rotation-vector\" or \"euler-zyx\"");
+            return Err(at(entry.angles.as_ref().map_or(0..0, Spanned::span), message).into());
+        }
+    };
+    let damping = damping_of(entry.damping.as_ref(), source);
+    let damping = keep(damping.map_err(Error::from), faults).unwrap_or(Damping::Modal(0.0));
+    let distal_name = entry.distal.as_ref().map(|d| d.get_ref().as_str());
+    let distal = distal_joint(mechanism, name, distal_name).map_err(|e| {
+        let unknown = matches!(e, SubstitutionError::UnknownLink { .. });
+        let named = entry.distal.as_ref().filter(|_| !unknown);
+        at(named.map_or(entry.link.span(), Spanned::span), e.to_string())
+    })?;
+
+    let (reduced, parts, beam) = match (&entry.reduced, &entry.beam) {
+        (Some(file), None) => {
+            let path = folder.join(file.get_ref());
+            if !path.is_file() {
+                let message = format!("reduced = {:?}: there is no file {}", file.get_ref(), path.display());
+                return Err(at(file.span(), message).into());
+            }
+            let reduced = read_flex(&path).map_err(Box::new)?;
+            if reduced.name != *name {
+                warnings.push(format!(
+                    "link {name:?} takes the reduced link of {:?} ({})",
+                    reduced.name,
+                    path.display()
+                ));
+            }
+            warnings.extend(reduced.warnings(&Default::default()).into_iter().map(|w| format!("link {name:?}: {w}")));
+            (reduced, Parts::Reduced, None)
+        }
+        (None, Some(beam)) => beam_link(name, beam, distal.X_PJ, mechanism, source)?,
+        _ => {
+            let message = format!("flexible link {name:?} needs either reduced = \"file.flex\" or beam = {{ ... }}");
+            return Err(at(entry.link.span(), message).into());
+        }
+    };
+    let distal = Some(distal.name.clone());
+    let (form, coupling) = (LinkForm::TwoParts, entry.coupling);
+    let flexible = FlexibleLink { link: name.clone(), distal, reduced, parts, form, angles, coupling };
+    let choices = LinkChoices { model, segments, modes, eigenmodes, geometric: entry.geometric_stiffening };
+    let link = RobotLink { flexible, damping, beam, choices };
+    // What the file asks for must be there; overrides are looked at when they are used.
+    link.form(&Modelling::default()).map_err(|message| {
+        let key = entry.segments.as_ref().or(entry.modes.as_ref()).or(entry.eigenmodes.as_ref()).map(Spanned::span);
+        at(key.or(entry.model.as_ref().map(Spanned::span)).unwrap_or(entry.link.span()), message)
+    })?;
+    Ok(link)
+}
+
+fn damping_of(entry: Option<&Spanned<DampingEntry>>, source: &Source) -> Result<Damping, RobotFileError> {
+    let Some(entry) = entry else { return Ok(Damping::Modal(0.03)) };
+    let (value, damping) = match entry.get_ref() {
+        DampingEntry { modal: Some(zeta), stiffness_beta: None, rayleigh: None } => (*zeta, Damping::Modal(*zeta)),
+        DampingEntry { modal: None, stiffness_beta: Some(beta), rayleigh: None } => {
+            (*beta, Damping::StiffnessProportional(*beta))
+        }
+        DampingEntry { modal: None, stiffness_beta: None, rayleigh: Some([a, b]) } => {
+            (a.min(*b) + 0.0 * (a + b), Damping::Rayleigh(*a, *b))
+        }
+        _ => {
+            let message =
+                "damping takes exactly one of modal = ratio, stiffness_beta = seconds or rayleigh = [1/s, s]";
+            return Err(source.error(entry.span(), message));
+        }
+    };
+    if !(value.is_finite() && value >= 0.0) {
+        return Err(source.error(entry.span(), format!("damping is {value}, it must be zero or positive")));
+    }
+    if matches!(damping, Damping::Modal(zeta) if zeta >= 1.0) {
+        let message = format!("modal damping is {value}, a ratio below 1 is expected (3 per cent is 0.03)");
+        return Err(source.error(entry.span(), message));
+    }
+    Ok(damping)
+}
+
+fn beam_link(
+    name: &str,
+    entry: &Spanned<BeamEntry>,
+    X_LB: Pose,
+    mechanism: &Mechanism,
+    source: &Source,
+) -> Result<(ReducedLink, Parts, Option<BeamLink>), Error> {
+    let beam = entry.get_ref();
+    let fail = |message: String| Error::from(source.error(entry.span(), format!("link {name:?}: {message}")));
+    let (section, material): (Section, Material) = beam_section(beam).map_err(fail)?;
+    let theory = match beam.theory.as_deref() {
+        None | Some("timoshenko") => BeamTheory::Timoshenko,
+        Some("euler-bernoulli") => BeamTheory::EulerBernoulli,
+        Some(other) => {
+            return Err(fail(format!("theory {other:?} is not known; use \"timoshenko\" or \"euler-bernoulli\"")));
+        }
+    };
+    let axis = X_LB.translation.vector;
+    let length = axis.norm();
+    if length < 1e-6 {
+        return Err(fail("its distal joint lies at the link's origin: a beam needs a length".into()));
+    }
+    // Any direction across the beam will do if none is asked for: the axis that it is farthest from.
+    let y_axis = beam.y_axis.map(Vector3::from).unwrap_or_else(|| {
+        let k = axis.abs().imin();
+        Vector3::from_fn(|i, _| if i == k { 1.0 } else { 0.0 })
+    });
+    let parts = match beam.parts.as_deref() {
+        None | Some("from-link") => Parts::FromLink(beam.split),
+        Some("uniform") => Parts::Reduced,
+        Some(other) => return Err(fail(format!("parts {other:?} are not known; use \"from-link\" or \"uniform\""))),
+    };
+    let mut link = BeamLink::new(name, section, material, length)
+        .along(axis, y_axis, beam.roll, beam.offset.into())
+        .map_err(|e| fail(e.to_string()))?;
+    link.X_LB = X_LB;
+    link.theory = theory;
+    link.split_fraction = beam.split;
+    // The link's own mass spread along the beam; the section's where the URDF gives none.
+    link.mass = mechanism.link(name).and_then(|l| l.inertia).map(|i| i.mass);
+    let reduced = link.reduce().map_err(|e| fail(e.to_string()))?;
+    Ok((reduced, parts, Some(link)))
+}
