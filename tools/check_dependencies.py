@@ -23,7 +23,7 @@ PAGE = "ARCHITECTURE.md"
 LINES = ["faces", "facade", "edges", "results", "motion", "links", "base"]       # top to bottom
 INNER = ["results", "motion", "links", "base"]
 OWNERS = {  # outside crate: crates or lines that may name it
-    "rerun": ["flexarm-log"], "mcap": ["flexarm-log"], "png": ["flexarm-log"], "faer": ["flexarm-fem"], "metis-sys": ["flexarm-fem"], "urdf-rs": ["flexarm-urdf"],
+    "rerun": ["flexarm-log"], "mcap": ["flexarm-log"], "png": ["flexarm-log"], "faer": ["flexarm-fem"], "diffsol": ["flexarm-stepping"], "metis-sys": ["flexarm-fem"], "urdf-rs": ["flexarm-urdf"],
     "clap": ["faces"], "clap_complete": ["faces"], "clap_mangen": ["faces"], "indicatif": ["faces"],
 }
 PRINTS = re.compile(r"\b(?:e?print(?:ln)?|dbg)!\s*[(\[{]|\bstd::io::(?:stdout|stderr)\b")
@@ -154,7 +154,7 @@ def self_test():
              "base": ["flexarm-fem", "flexarm-kinematics"], "tests": ["flexarm-testkit", "flexarm-tests"]}
     good = {
         "flexarm-cli": ["flexarm", "clap"], "flexarm": ["flexarm-log", "flexarm-stepping"], "flexarm-log": ["rerun", "mcap"],
-        "flexarm-stepping": ["flexarm-kinematics", "dev:flexarm-testkit"], "flexarm-fem": ["faer"],
+        "flexarm-stepping": ["flexarm-kinematics", "diffsol", "dev:flexarm-testkit"], "flexarm-fem": ["faer"],
         "flexarm-kinematics": ["dev:flexarm-testkit"], "flexarm-testkit": ["flexarm-kinematics"], "flexarm-tests": ["dev:flexarm"],
     }
 
@@ -176,6 +176,7 @@ def self_test():
         ("mcap below", found({"flexarm-stepping": ["mcap"]}), "dependency on mcap: only flexarm-log may name it"),
         ("rerun in a face", found({"flexarm-cli": ["flexarm", "rerun"]}), "dependency on rerun: only flexarm-log"),
         ("faer elsewhere", found({"flexarm-stepping": ["dev:faer"]}), "dev-dependency on faer: only flexarm-fem"),
+        ("diffsol elsewhere", found({"flexarm": ["diffsol"]}), "only flexarm-stepping may name it"),
         ("clap in the facade", found({"flexarm": ["clap"]}), "only faces may name it"),
         ("urdf-rs below", found({"flexarm-kinematics": ["urdf-rs"]}), "only flexarm-urdf may name it"),
         ("a crate the page forgot", found({"flexarm-new": []}), "flexarm-new is missing from the table of lines"),

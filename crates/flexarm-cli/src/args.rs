@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use flexarm::{DriveModel, LinkModel, Modelling};
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use flexarm::{DriveModel, LinkModel, Modelling};
 
 use crate::exchange_args::{ExportArgs, ImportArgs};
 use crate::reduce_args::ReduceArgs;
@@ -140,6 +140,12 @@ pub(crate) struct RunArgs {
     /// Preset of spook: exact formulas, or those of the method's source
     #[arg(long, value_enum, default_value_t = PresetName::Exact)]
     pub(crate) spook_preset: PresetName,
+    /// Relative tolerance of reference, which chooses its steps by error control; --step is then the distance of the points
+    #[arg(long, value_name = "RTOL", default_value_t = 1e-9, allow_hyphen_values = true)]
+    pub(crate) rtol: f64,
+    /// Method of reference
+    #[arg(long, value_enum, default_value_t = MethodName::Bdf)]
+    pub(crate) reference_method: MethodName,
     /// Band around the final TCP error for the settling time (m)
     #[arg(long, value_name = "METRES", default_value_t = 1e-4, allow_hyphen_values = true)]
     pub(crate) settling_band: f64,
@@ -187,6 +193,7 @@ pub(crate) enum StepperName {
     GeneralizedAlpha,
     Spook,
     Rk4,
+    Reference,
 }
 
 fn parse_stepper(text: &str) -> Result<StepperName, String> {
@@ -194,7 +201,8 @@ fn parse_stepper(text: &str) -> Result<StepperName, String> {
         "generalized-alpha" | "generalised-alpha" => Ok(StepperName::GeneralizedAlpha),
         "spook" => Ok(StepperName::Spook),
         "rk4" => Ok(StepperName::Rk4),
-        _ => Err("this version has generalized-alpha, spook and rk4".into()),
+        "reference" => Ok(StepperName::Reference),
+        _ => Err("this version has generalized-alpha, spook, rk4 and reference".into()),
     }
 }
 
@@ -240,4 +248,14 @@ pub(crate) enum PresetName {
     Exact,
     /// Damping time of two steps
     Source,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum MethodName {
+    /// Implicit, order 1 to 5: well damped high modes
+    Bdf,
+    /// Implicit, order 3: lightly damped modes in the kHz, loose tolerances
+    Esdirk34,
+    /// Explicit, order 5: no stiff modes
+    Tsit45,
 }

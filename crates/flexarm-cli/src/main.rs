@@ -17,12 +17,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use args::{
-    CheckArgs, Cli, Command, FormName, InspectArgs, PresetName, RobotArgs, RunArgs, StartName, StepperName,
+    CheckArgs, Cli, Command, FormName, InspectArgs, MethodName, PresetName, RobotArgs, RunArgs, StartName, StepperName,
 };
 use clap::{CommandFactory, Parser};
 use flexarm::{
-    AlphaSettings, ConstraintForm, Error, InertiaEstimate, LoadOptions, Motion, Outputs, ReadOptions, Robot,
-    RunOptions, SpookPreset, SpookSettings, Start, StepperKind,
+    AlphaSettings, ConstraintForm, Error, InertiaEstimate, LoadOptions, Motion, Outputs, ReadOptions, ReferenceMethod,
+    ReferenceSettings, Robot, RunOptions, SpookPreset, SpookSettings, Start, StepperKind,
 };
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -115,6 +115,14 @@ fn run_options(args: &RunArgs, with_twin: bool) -> RunOptions {
             preset: if args.spook_preset == PresetName::Exact { SpookPreset::Exact } else { SpookPreset::Source },
         }),
         StepperName::Rk4 => StepperKind::Rk4,
+        StepperName::Reference => StepperKind::Reference(ReferenceSettings {
+            method: match args.reference_method {
+                MethodName::Bdf => ReferenceMethod::Bdf,
+                MethodName::Esdirk34 => ReferenceMethod::Esdirk34,
+                MethodName::Tsit45 => ReferenceMethod::Tsit45,
+            },
+            ..ReferenceSettings::new(args.rtol)
+        }),
     };
     RunOptions {
         stepper,

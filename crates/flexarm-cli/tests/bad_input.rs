@@ -771,7 +771,8 @@ mod values_on_the_command_line {
 
     #[test]
     fn words() {
-        options(&["--stepper", "euler"], &["'euler'", "--stepper", "generalized-alpha", "spook", "rk4"]);
+        options(&["--stepper", "euler"], &["'euler'", "--stepper", "generalized-alpha", "spook", "rk4", "reference"]);
+        options(&["--reference-method", "euler"], &["'euler'", "--reference-method", "bdf", "esdirk34", "tsit45"]);
         options(&["--links", "stiff"], &["'stiff'", "--links", "rigid", "lumped"]);
         options(&["--from-rest", "flying"], &["'flying'", "--from-rest", "equilibrium", "undeformed"]);
         options(&["--tcp", "nowhere"], &["\"nowhere\"", "\"base\", \"bar\", \"ball\""]);
@@ -804,6 +805,14 @@ mod values_on_the_command_line {
             &["--stepper", "rk4", "--step", "1e-2"],
             &["rk4", "unstable", "Hz", "below", "--step", "generalized-alpha"],
         );
+    }
+
+    #[test]
+    fn tolerances() {
+        for (value, found) in [("0", "0e0"), ("nan", "NaN"), ("1", "1e0"), ("1e-16", "1e-16")] {
+            let words = ["relative tolerance", "between 1e-13 and 1e-2", &format!("found {found}")];
+            options(&["--stepper", "reference", "--rtol", value], &words);
+        }
     }
 
     #[test]

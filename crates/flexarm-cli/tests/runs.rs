@@ -493,7 +493,7 @@ mod stopped {
 
     #[test]
     fn by_divergence() {
-        for stepper in ["generalized-alpha", "spook", "rk4"] {
+        for stepper in ["generalized-alpha", "spook", "rk4", "reference"] {
             let place = Place::new();
             place.write("spin.csv", spin());
             let options = ["--ignore-limits", "--stepper", stepper, "--step", "1e-4", "--log-rate", "1000", "--json"];

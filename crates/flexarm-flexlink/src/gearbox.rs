@@ -62,7 +62,9 @@ pub enum GearboxError {
         joint: String,
     },
     /// A stiffness that holds nothing.
-    #[error("gearbox of joint {joint:?}: its stiffness must be positive (definite), found {found:e} as its smallest value")]
+    #[error(
+        "gearbox of joint {joint:?}: its stiffness must be positive (definite), found {found:e} as its smallest value"
+    )]
     NotPositive {
         /// The joint.
         joint: String,

@@ -39,7 +39,7 @@ mod substitute;
 
 pub use cut::{CutError, cut_chain, cut_inertia};
 pub use flexarm_fem::ReducedLink;
-pub use gearbox::{Gearbox, GearSpring, GearStiffness, GearboxError, insert_gearboxes};
+pub use gearbox::{GearSpring, GearStiffness, Gearbox, GearboxError, insert_gearboxes};
 pub use modal::modal_body;
 pub use substitute::{
     FlexibleLink, FlexibleSpan, LinkForm, Parts, Spring, Substituted, SubstitutionError, distal_joint, substitute,

@@ -86,7 +86,8 @@ pub(crate) fn substitute_modal(
         let to = if k == 0 { distal_link.clone() } else { format!("{name}__{}", interface.name) };
         let here = |p: &nalgebra::Vector3<f64>| (p - X_LI.translation.vector).norm() <= AT_INTERFACE * site.length;
         let elsewhere = |p: &nalgebra::Vector3<f64>| {
-            let other = |i: &flexarm_fem::ModalInterface| (p - i.X_LI.translation.vector).norm() <= AT_INTERFACE * site.length;
+            let other =
+                |i: &flexarm_fem::ModalInterface| (p - i.X_LI.translation.vector).norm() <= AT_INTERFACE * site.length;
             modal.interfaces.iter().skip(1).any(other)
         };
         move_children(mechanism, name, &to, &X_LI, |child, p| match k {

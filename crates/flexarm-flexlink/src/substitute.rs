@@ -287,9 +287,7 @@ fn lumped_parts(
             let parts = cut_chain(&own()?, &site.p_LA, &site.p_LB, &chain.parts).map_err(cut)?;
             (chain.joints.clone(), parts)
         }
-        (_, Parts::Reduced) => {
-            (vec![reduced.split.clone()], vec![reduced.proximal.clone(), reduced.distal.clone()])
-        }
+        (_, Parts::Reduced) => (vec![reduced.split.clone()], vec![reduced.proximal.clone(), reduced.distal.clone()]),
         (_, Parts::FromLink(split)) => {
             let parts = cut_inertia(&own()?, &site.p_LA, &site.p_LB, split).map_err(cut)?;
             (vec![reduced.split.clone()], parts.to_vec())

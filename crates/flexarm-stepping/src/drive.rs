@@ -81,8 +81,7 @@ impl TorqueCurve {
         let mut places: Vec<f64> = self.x.iter().copied().filter(|x| *x > low && *x < high).collect();
         places.insert(0, low);
         places.push(high);
-        let area: f64 =
-            places.windows(2).map(|w| 0.5 * (w[1] - w[0]) * (self.torque(w[0]) + self.torque(w[1]))).sum();
+        let area: f64 = places.windows(2).map(|w| 0.5 * (w[1] - w[0]) * (self.torque(w[0]) + self.torque(w[1]))).sum();
         sign * area
     }
 }

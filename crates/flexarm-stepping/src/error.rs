@@ -50,6 +50,18 @@ pub enum StepError {
         /// Unbalanced force over applied force.
         residual: f64,
     },
+    /// The solver with error control found no step that keeps the tolerance.
+    #[error(
+        "the reference stepper gave up at t = {t:.6} s (step {h:e} s): {what}; try a larger --rtol or another --reference-method"
+    )]
+    SolverGaveUp {
+        /// Time (s).
+        t: f64,
+        /// Step of the solver (s).
+        h: f64,
+        /// What the solver says.
+        what: String,
+    },
     /// An explicit stepper cannot work with this step.
     #[error(
         "{stepper} with step {h:e} s is unstable here: the highest frequency is {highest_hz:.1} Hz, which needs a step below {largest_s:.2e} s; use --step or --stepper generalized-alpha"

@@ -1,4 +1,5 @@
-//! Time steppers for flexible arms: generalised-alpha, SPOOK, explicit RK4; static equilibrium and modes.
+//! Time steppers for flexible arms: generalised-alpha, SPOOK, explicit RK4, a reference with error control; static
+//! equilibrium and modes.
 //!
 //! A [`FlexibleArm`] (tree, springs, damping, motion) goes into [`new_stepper`]; the [`Stepper`] that comes out is
 //! advanced and observed. The integrators for reduced coordinates know only [`SecondOrderSystem`]; SPOOK works on the
@@ -38,6 +39,7 @@ mod load;
 mod modes;
 mod motion;
 mod reduced;
+mod reference;
 mod rk4;
 mod servo;
 mod spook;
@@ -53,6 +55,7 @@ pub use load::{Load, LoadAxes};
 pub use modes::{Modes, modes_at};
 pub use motion::{Held, MotionFn, PrescribedMotion};
 pub use reduced::ReducedArm;
+pub use reference::{Reference, ReferenceMethod, ReferenceSettings};
 pub use rk4::{Rk4, STABILITY_LIMIT};
 pub use spook::{ConstraintForm, Spook, SpookPreset, SpookSettings};
 pub use statics::static_equilibrium;

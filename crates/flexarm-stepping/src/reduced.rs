@@ -250,7 +250,17 @@ fn geometric_loads<'a>(
     let (V, A) = (data.V[body], data.A[body]);
     let (w, a) = (V.angular, A.linear + V.angular.cross(&V.linear));
     let own = [
-        a.x, a.y, a.z, A.angular.x, A.angular.y, A.angular.z, w.x * w.x, w.y * w.y, w.z * w.z, w.x * w.y, w.x * w.z,
+        a.x,
+        a.y,
+        a.z,
+        A.angular.x,
+        A.angular.y,
+        A.angular.z,
+        w.x * w.x,
+        w.y * w.y,
+        w.z * w.z,
+        w.x * w.y,
+        w.x * w.z,
         w.y * w.z,
     ];
     let wrenches = (0..geometric.interface.len()).flat_map(move |number| {

@@ -8,6 +8,7 @@ use crate::arm::FlexibleArm;
 use crate::error::StepError;
 use crate::generalized_alpha::{AlphaSettings, GeneralizedAlpha};
 use crate::reduced::ReducedArm;
+use crate::reference::{Reference, ReferenceSettings};
 use crate::rk4::{Rk4, STABILITY_LIMIT};
 use crate::spook::{Spook, SpookSettings};
 use crate::statics::static_equilibrium;
@@ -21,6 +22,8 @@ pub enum StepperKind {
     Spook(SpookSettings),
     /// Explicit, reduced coordinates.
     Rk4,
+    /// Steps of its own choice under error control, reduced coordinates.
+    Reference(ReferenceSettings),
 }
 
 impl StepperKind {
@@ -30,6 +33,7 @@ impl StepperKind {
             Self::GeneralizedAlpha(_) => "generalized-alpha",
             Self::Spook(_) => "spook",
             Self::Rk4 => "rk4",
+            Self::Reference(_) => "reference",
         }
     }
 }
@@ -86,7 +90,7 @@ impl Observation {
 /// Work done by a stepper.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// Steps taken.
+    /// Steps taken; those of the solver where it chooses them.
     pub steps: u64,
     /// Newton iterations or evaluations of the equations of motion.
     pub evaluations: u64,
@@ -99,7 +103,8 @@ pub trait Stepper: Send {
     /// Current time (s).
     fn time(&self) -> f64;
 
-    /// Advances by one step without allocation; on error the state stays at the last good time.
+    /// Advances by one step; on error the state stays at the last good time. No stepper allocates here but
+    /// [`StepperKind::Reference`], whose solver is another library's.
     ///
     /// # Errors
     /// [`StepError`] with time, step and cause.
@@ -147,6 +152,12 @@ pub fn new_stepper(kind: StepperKind, arm: FlexibleArm, h: f64, start: Start) ->
             let (x, v) = system.start(&e)?;
             let integrator = Rk4::new(&mut system, 0.0, h, x, v)?;
             Box::new(ExplicitStepper { system, integrator, steps: 0 })
+        }
+        StepperKind::Reference(settings) => {
+            let mut system = ReducedArm::new(arm);
+            let (x, v) = system.start(&e)?;
+            let integrator = Reference::new(&mut system, 0.0, h, settings, x, v)?;
+            Box::new(ReferenceStepper { system, integrator })
         }
         StepperKind::Spook(settings) => Box::new(Spook::new(arm, h, settings, &e)?),
     })
@@ -320,5 +331,37 @@ impl Stepper for ExplicitStepper {
     }
     fn counts(&self) -> Counts {
         Counts { steps: self.steps, evaluations: 4 * self.steps, factorisations: 0 }
+    }
+}
+
+struct ReferenceStepper {
+    system: ReducedArm,
+    integrator: Reference,
+}
+
+impl Stepper for ReferenceStepper {
+    fn time(&self) -> f64 {
+        self.integrator.time()
+    }
+    fn step(&mut self) -> Result<(), StepError> {
+        let g = &mut self.integrator;
+        // The solver must not look past a sample of the servo or a change of payload.
+        if let Some(t) = self.system.next_event(g.time()) {
+            g.restart_at(t);
+        }
+        g.step(&mut self.system)?;
+        check_deflection(&self.system.arm, &g.x, g.time(), g.step_size())?;
+        if self.system.at_time(g.time(), &g.x, &g.v) {
+            g.restart(&mut self.system)?;
+        }
+        Ok(())
+    }
+    fn observe(&mut self, out: &mut Observation) {
+        let g = &self.integrator;
+        observe_reduced(&mut self.system, g.time(), &g.x, &g.v, &g.acceleration, out);
+    }
+    fn counts(&self) -> Counts {
+        let g = &self.integrator;
+        Counts { steps: g.solver_steps, evaluations: g.evaluations, factorisations: g.factorisations }
     }
 }

@@ -12,10 +12,10 @@ use flexarm_log::{ElasticSample, EnergySample, RecorderSet, Sample};
 use flexarm_stepping::{FlexibleArm, Observation, StepError, Stepper, new_stepper};
 use nalgebra::{Matrix6, Vector3, Vector6};
 
-use crate::error::Error;
-use crate::motion::Motion;
 use crate::disturbance::Disturbances;
+use crate::error::Error;
 use crate::flexible::{FlexibleRobot, Owner};
+use crate::motion::Motion;
 use crate::options::{Outputs, RunOptions};
 use crate::record::{header, link_frames, recorders};
 use crate::robot::{Robot, TCP_FRAME};

@@ -210,10 +210,14 @@ fn load(
             let harmonics = e.harmonics.unwrap_or(3);
             // Mean 1, harmonics that halve: the shape of an intermittent cut.
             scaled(Box::new(move |t| {
-                1.0 + (1..=harmonics).map(|k| 0.5f64.powi(k as i32 - 1) * (TAU * f64::from(k) * tooth * t).sin()).sum::<f64>()
+                1.0 + (1..=harmonics)
+                    .map(|k| 0.5f64.powi(k as i32 - 1) * (TAU * f64::from(k) * tooth * t).sin())
+                    .sum::<f64>()
             }))
         }
-        "table" => table(&folder.join(e.file.as_ref().ok_or_else(|| fail("kind = \"table\" needs file = ...".into()))?))?,
+        "table" => {
+            table(&folder.join(e.file.as_ref().ok_or_else(|| fail("kind = \"table\" needs file = ...".into()))?))?
+        }
         "expression" => expression(e, &fail, (start, end))?,
         other => {
             let text = "use step, impulse, sine, sweep, milling, table or expression";
@@ -306,7 +310,9 @@ fn expression(
             return Wrench::zeros();
         }
         let at = |k: usize| match &parts[k] {
-            Some((parsed, timed)) => parsed.eval(if *timed { std::slice::from_ref(&t) } else { &[] }).unwrap_or(f64::NAN),
+            Some((parsed, timed)) => {
+                parsed.eval(if *timed { std::slice::from_ref(&t) } else { &[] }).unwrap_or(f64::NAN)
+            }
             None => 0.0,
         };
         Wrench::new(Vector3::new(at(0), at(1), at(2)), Vector3::new(at(3), at(4), at(5)))
@@ -335,7 +341,9 @@ fn change(
     let [xx, yy, zz, xy, xz, yz] = e.inertia;
     let inertia_com = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
     if inertia_com.symmetric_eigenvalues().min() < -1e-9 * inertia_com.norm() {
-        return Err(fail("payload inertia has a negative principal moment; the order is ixx iyy izz ixy ixz iyz".into()));
+        return Err(fail(
+            "payload inertia has a negative principal moment; the order is ixx iyy izz ixy ixz iyz".into(),
+        ));
     }
     // The body as it is without what it carries at the start.
     let mut inertia = model.bodies()[frame.body].inertia;

@@ -245,7 +245,9 @@ fn drive(
             let FrictionEntry { viscous, coulomb, stribeck, stribeck_velocity, regularisation } = *f.get_ref();
             let values = [viscous, coulomb, stribeck];
             let speeds = [stribeck_velocity, regularisation];
-            if values.iter().any(|x| !(x.is_finite() && *x >= 0.0)) || speeds.iter().any(|x| !(x.is_finite() && *x > 0.0)) {
+            if values.iter().any(|x| !(x.is_finite() && *x >= 0.0))
+                || speeds.iter().any(|x| !(x.is_finite() && *x > 0.0))
+            {
                 let text = "friction takes viscous, coulomb and stribeck of at least 0, and speeds above 0";
                 return Err(fail(f.span(), text.into()));
             }
@@ -263,7 +265,8 @@ fn drive(
                 return Err(fail(s.span(), "sample_s must be a positive time in seconds".into()));
             }
             if kind != DriveKind::Torque {
-                warnings.push(format!("drive of joint {name:?}: its servo is not used, only kind = \"torque\" has one"));
+                warnings
+                    .push(format!("drive of joint {name:?}: its servo is not used, only kind = \"torque\" has one"));
             }
             *s.get_ref()
         }
@@ -285,7 +288,9 @@ fn gear(
             (play > 0.0).then(|| TorqueCurve::backlash(*k, play))
         }
         (None, Some(play), _) => {
-            return Err(at(format!("backlash = {play}: it must be 0 or above, with one positive stiffness about the axis")));
+            return Err(at(format!(
+                "backlash = {play}: it must be 0 or above, with one positive stiffness about the axis"
+            )));
         }
         (Some(_), ..) => return Err(at("curve takes the place of stiffness and backlash: give one of them".into())),
         (None, None, None) => return Err(at("gearbox needs stiffness = N m/rad, or curve = [[rad, N m], ...]".into())),

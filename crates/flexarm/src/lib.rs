@@ -47,13 +47,16 @@ pub use compare::{Progress, simulate};
 pub use disturbance::Disturbances;
 pub use drive_entry::{Drive, DriveKind};
 pub use error::Error;
+pub use flexible::{FlexibleRobot, LinkChoices, Owner, RobotLink};
 pub use inspect::{FlexibleInfo, Inspection, JointInfo, LinkInfo, TcpInfo, inspect, parse_joint_values};
 pub use motion::Motion;
-pub use flexible::{FlexibleRobot, LinkChoices, Owner, RobotLink};
 pub use options::{DriveModel, LinkModel, Modelling, Outputs, RunOptions};
 pub use report::{markdown, rows};
 pub use robot::{LoadOptions, Robot, TCP_FRAME};
 pub use summary::{Files, LinkFigures, StepperFigures, Summary, TcpFigures};
 
-pub use flexarm_stepping::{AlphaSettings, ConstraintForm, SpookPreset, SpookSettings, Start, StepError, StepperKind};
+pub use flexarm_stepping::{
+    AlphaSettings, ConstraintForm, ReferenceMethod, ReferenceSettings, SpookPreset, SpookSettings, Start, StepError,
+    StepperKind,
+};
 pub use flexarm_urdf::{InertiaEstimate, ReadOptions, search_paths_from_environment};

@@ -106,8 +106,7 @@ fn damping_of(entry: Option<&Spanned<DampingEntry>>, source: &Source) -> Result<
             (a.min(*b) + 0.0 * (a + b), Damping::Rayleigh(*a, *b))
         }
         _ => {
-            let message =
-                "damping takes exactly one of modal = ratio, stiffness_beta = seconds or rayleigh = [1/s, s]";
+            let message = "damping takes exactly one of modal = ratio, stiffness_beta = seconds or rayleigh = [1/s, s]";
             return Err(source.error(entry.span(), message));
         }
     };

@@ -96,8 +96,11 @@ pub(crate) fn header(
     };
     let stepper = crate::summary::StepperFigures::new(options, Default::default());
     let elements: Vec<String> = arm.elements.iter().map(|e| e.name.clone()).collect();
-    let methods: Vec<String> =
-        robot.flexible.iter().map(|f| format!("{}: {}", f.flexible.link, f.flexible.reduced.provenance.method)).collect();
+    let methods: Vec<String> = robot
+        .flexible
+        .iter()
+        .map(|f| format!("{}: {}", f.flexible.link, f.flexible.reduced.provenance.method))
+        .collect();
     let frequencies: Vec<String> = arm.modes.frequencies_hz().iter().map(|f| format!("{f:.4}")).collect();
     let metadata = vec![
         group(

@@ -85,6 +85,12 @@ pub struct StepperFigures {
     /// exact or source (SPOOK).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub preset: Option<&'static str>,
+    /// Relative tolerance (reference).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rtol: Option<f64>,
+    /// bdf, esdirk34 or tsit45 (reference).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub method: Option<&'static str>,
     /// Steps taken.
     pub steps: u64,
     /// Evaluations of the equations of motion.
@@ -95,21 +101,25 @@ pub struct StepperFigures {
 
 impl StepperFigures {
     pub(crate) fn new(options: &RunOptions, counts: Counts) -> Self {
-        let (mut rho_inf, mut dispersion_correction, mut form, mut preset) = (None, None, None, None);
-        match options.stepper {
-            StepperKind::GeneralizedAlpha(s) => {
-                rho_inf = Some(s.rho);
-                dispersion_correction = Some(s.dispersion_correction);
-            }
-            StepperKind::Spook(s) => {
-                form = Some(if s.form == ConstraintForm::Local { "local" } else { "global" });
-                preset = Some(if s.preset == SpookPreset::Exact { "exact" } else { "source" });
-            }
-            StepperKind::Rk4 => {}
-        }
         let Counts { steps, evaluations, factorisations } = counts;
         let (name, h_s) = (options.stepper.name(), options.step_s);
-        Self { name, h_s, rho_inf, dispersion_correction, form, preset, steps, evaluations, factorisations }
+        let mut figures = Self { name, h_s, steps, evaluations, factorisations, ..Self::default() };
+        match options.stepper {
+            StepperKind::GeneralizedAlpha(s) => {
+                figures.rho_inf = Some(s.rho);
+                figures.dispersion_correction = Some(s.dispersion_correction);
+            }
+            StepperKind::Spook(s) => {
+                figures.form = Some(if s.form == ConstraintForm::Local { "local" } else { "global" });
+                figures.preset = Some(if s.preset == SpookPreset::Exact { "exact" } else { "source" });
+            }
+            StepperKind::Rk4 => {}
+            StepperKind::Reference(s) => {
+                figures.rtol = Some(s.rtol);
+                figures.method = Some(s.method.name());
+            }
+        }
+        figures
     }
 }
 

@@ -19,7 +19,9 @@ const MOST_COORDINATES: usize = 6000;
 /// The table as text.
 pub(super) fn write_modal(modal: &ModalLink) -> String {
     let n = modal.coordinates();
-    let mut text = String::from("\n[modal]                       # shapes with A held: six per interface, then modes; link axes\n");
+    let mut text = String::from(
+        "\n[modal]                       # shapes with A held: six per interface, then modes; link axes\n",
+    );
     text += "coordinates = [\n";
     for label in &modal.labels {
         text += &format!("  {},\n", quoted(label));

@@ -42,8 +42,10 @@ impl BeamLink {
     pub fn modal_with(&self, options: &ModalOptions) -> Result<ModalLink, FemError> {
         let reduced = self.reduce()?;
         let m = options.elements;
-        let range = |what: &str, found: usize, allowed: String| {
-            FemError::OutOfRange { what: what.into(), found: found as f64, allowed }
+        let range = |what: &str, found: usize, allowed: String| FemError::OutOfRange {
+            what: what.into(),
+            found: found as f64,
+            allowed,
         };
         if !(2..=10_000).contains(&m) {
             return Err(range("number of beam elements", m, "2 to 10000".into()));
@@ -66,8 +68,9 @@ impl BeamLink {
         let interfaces = [interface("A", self.X_LA, 0), interface("B", self.X_LB, m as u32)];
         let condensation = Condensation::new(&model, &interfaces, CondensationOptions::default())
             .map_err(|_| refused("condensation"))?;
-        let fixed_modes =
-            condensation.fixed_modes(ModesWanted::Count(options.modes)).map_err(|_| refused("fixed-interface modes"))?;
+        let fixed_modes = condensation
+            .fixed_modes(ModesWanted::Count(options.modes))
+            .map_err(|_| refused("fixed-interface modes"))?;
         let frame = |i: &Interface| InterfaceFrame { name: i.name.clone(), X_LI: i.X_LI, tie: Some(i.tie) };
         let mut superelement = condensation.superelement(interfaces.iter().map(frame).collect(), &fixed_modes);
         // The same stiffness in closed form has the last digits that condensing loses.

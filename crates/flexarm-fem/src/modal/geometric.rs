@@ -172,9 +172,9 @@ fn add_solids(source: &ModalSource<'_>, U: &DMatrix<f64>, shapes: &DMatrix<f64>,
             let dof = |i: usize| model.dofs.of(nodes[i] as usize).start;
             // Gradients of all displacements at a point: [c, b] = du_c/dx_b.
             let gradient = |A: &DMatrix<f64>, column: usize, dN: &[Vector3<f64>]| {
-                dN.iter().enumerate().fold(Matrix3::zeros(), |sum, (i, d)| {
-                    sum + A.fixed_view::<3, 1>(dof(i), column) * d.transpose()
-                })
+                dN.iter()
+                    .enumerate()
+                    .fold(Matrix3::zeros(), |sum, (i, d)| sum + A.fixed_view::<3, 1>(dof(i), column) * d.transpose())
             };
             // Nine rows per point: gradients times weight and stress on one side, gradients on the other.
             let (mut right, mut stresses) = (Vec::new(), Vec::new());

@@ -170,9 +170,8 @@ impl ModalLink {
 
     /// Natural frequencies with A held, Hz, ascending.
     pub fn held_frequencies_hz(&self) -> Vec<f64> {
-        transform::eigenpairs(&self.K, &self.M).map_or_else(Vec::new, |pairs| {
-            pairs.omega.iter().map(|omega| omega / std::f64::consts::TAU).collect()
-        })
+        transform::eigenpairs(&self.K, &self.M)
+            .map_or_else(Vec::new, |pairs| pairs.omega.iter().map(|omega| omega / std::f64::consts::TAU).collect())
     }
 
     /// Natural frequencies of the free link, Hz, ascending; the first six belong to rigid motions and are near zero.

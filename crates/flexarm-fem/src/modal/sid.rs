@@ -102,7 +102,11 @@ impl ModalLink {
             nodes,
             mdCM: SidMatrix::linear(&column(&self.first_moment), &first),
             J: SidMatrix::linear(&six(&self.inertia), &turning),
-            Ct: if G.is_some() { SidMatrix::linear(&dense(&self.C_t), &Ct1) } else { SidMatrix::constant(n, &dense(&self.C_t)) },
+            Ct: if G.is_some() {
+                SidMatrix::linear(&dense(&self.C_t), &Ct1)
+            } else {
+                SidMatrix::constant(n, &dense(&self.C_t))
+            },
             Cr: SidMatrix::linear(&dense(&self.C_r), &Cr1),
             Me: square(&self.M),
             Gr: SidMatrix::constant(n, &Gr),
@@ -231,13 +235,18 @@ fn check_sizes(origin: &str, sid: &Sid) -> Result<(), ExchangeError> {
     ];
     let of_nodes = sid.nodes.iter().flat_map(|node| {
         let (vector, shapes): (&[_], &[_]) = (&[(3, 1)], &[(3, 0)]);
-        [("origin", &node.origin, vector), ("phi", &node.phi, shapes), ("psi", &node.psi, shapes), ("AP", &node.AP, &[(3, 3)])]
+        [
+            ("origin", &node.origin, vector),
+            ("phi", &node.phi, shapes),
+            ("psi", &node.psi, shapes),
+            ("AP", &node.AP, &[(3, 3)]),
+        ]
     });
     for (name, matrix, sizes) in body.into_iter().chain(of_nodes) {
         // Shapes have a column per mode.
-        let fits = sizes.iter().any(|(rows, columns)| {
-            (matrix.nrow, matrix.ncol) == (*rows, if *columns == 0 { n } else { *columns })
-        });
+        let fits = sizes
+            .iter()
+            .any(|(rows, columns)| (matrix.nrow, matrix.ncol) == (*rows, if *columns == 0 { n } else { *columns }));
         if !fits || n == 0 {
             let found = format!("{} x {} with {n} modes", matrix.nrow, matrix.ncol);
             return Err(fail(origin, ExchangeErrorKind::WrongSize, name, found, "the size of the standard", ""));
@@ -295,7 +304,8 @@ fn geometric(sid: &Sid, A: usize) -> Option<GeometricStiffness> {
     let n = sid.nq();
     let nodes: Vec<&SidNode> = sid.nodes.iter().enumerate().filter(|(at, _)| *at != A).map(|(_, node)| node).collect();
     let own = || -> Option<GeometricStiffness> {
-        let interface = (0..nodes.len()).map(|i| by_loads(sid, "K0F", 6 * i, 6 * nodes.len())).collect::<Option<_>>()?;
+        let interface =
+            (0..nodes.len()).map(|i| by_loads(sid, "K0F", 6 * i, 6 * nodes.len())).collect::<Option<_>>()?;
         Some(GeometricStiffness {
             acceleration: by_loads(sid, "K0t", 0, 3)?,
             angular: by_loads(sid, "K0r", 0, 3)?,

@@ -129,7 +129,10 @@ impl ModalSource<'_> {
             M: block(&self.superelement.M),
             K: block(&self.superelement.K),
             geometric: geometric.then(|| geometric::geometric_stiffness(self, &beams, &shapes)),
-            labels: labels(&self.superelement.interfaces[1..].iter().map(|i| &*i.name).collect::<Vec<_>>(), self.superelement),
+            labels: labels(
+                &self.superelement.interfaces[1..].iter().map(|i| &*i.name).collect::<Vec<_>>(),
+                self.superelement,
+            ),
             X_LA: self.interfaces[0].X_LI,
         }
     }

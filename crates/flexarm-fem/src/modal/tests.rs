@@ -34,7 +34,8 @@ fn bar(
     let mesh = cube(kind, divisions, true, shape);
     let plain = cube(kind, divisions, true, |u| u).nodes;
     let side = |x: f64| (0..plain.len() as u32).filter(|k| (plain[*k as usize].x - x).abs() < 1e-9).collect();
-    let one = |i: usize, name: &str| Interface { name: name.into(), X_LI: at(p[i]), nodes: side(i as f64), tie: tie[i] };
+    let one =
+        |i: usize, name: &str| Interface { name: name.into(), X_LI: at(p[i]), nodes: side(i as f64), tie: tie[i] };
     let interfaces = vec![one(0, "A"), one(1, "B")];
     (mesh, interfaces)
 }
@@ -211,7 +212,8 @@ fn check_identities(what: &str, link: &ModalLink, model: &FeModel, shapes: &DMat
     };
     let rigid = worst(6 * (6 + n), |at| gap(at % 6, at / 6));
     let size = |k: usize| link.M[(k, k)].sqrt();
-    let trace = worst(n * n, |at| (link.N[at].trace() - link.M[(at / n, at % n)]).abs() / (size(at / n) * size(at % n)));
+    let trace =
+        worst(n * n, |at| (link.N[at].trace() - link.M[(at / n, at % n)]).abs() / (size(at / n) * size(at % n)));
     assert!((0..n * n).all(|at| link.N[at] == link.N[at % n * n + at / n].transpose()), "{what}");
     assert!((0..n).all(|k| axial(&link.P[k]) == link.C_r.column(k)), "{what}");
     eprintln!("{what}: rigid {rigid:.1e} trace {trace:.1e}");
@@ -239,7 +241,9 @@ fn frame(theory: BeamTheory) -> (Mesh, Vec<Interface>) {
     let corner = Vector3::new(0.5, 0.1, -0.2);
     let end = Vector3::new(0.6, 0.7, 0.1);
     let nodes: Vec<_> = (0..=8)
-        .map(|k| if k <= 4 { corner * (f64::from(k) / 4.0) } else { corner + (end - corner) * (f64::from(k - 4) / 4.0) })
+        .map(
+            |k| if k <= 4 { corner * (f64::from(k) / 4.0) } else { corner + (end - corner) * (f64::from(k - 4) / 4.0) },
+        )
         .collect();
     let section = Section::Rectangle { width: 0.08, height: 0.12 };
     let mesh = Mesh {

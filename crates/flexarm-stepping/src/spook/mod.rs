@@ -197,9 +197,7 @@ impl Spook {
 fn joint_compliance(arm: &FlexibleArm, body: usize, h: f64, preset: SpookPreset) -> JointCompliance {
     let element = arm.elements.iter().position(|e| e.body == body);
     let (C, tau) = match element {
-        Some(k) if arm.elements[k].size == 6 => {
-            (Matrix6::from_column_slice(arm.elements[k].C.as_slice()), arm.tau[k])
-        }
+        Some(k) if arm.elements[k].size == 6 => (Matrix6::from_column_slice(arm.elements[k].C.as_slice()), arm.tau[k]),
         // One compliant row among rigid ones.
         Some(k) => {
             let mut C = Matrix6::identity() * RIGID_COMPLIANCE;

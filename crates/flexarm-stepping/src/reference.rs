@@ -1,0 +1,495 @@
+//! Integration with error control, by the solvers of `diffsol`: what the steppers of fixed step are measured against.
+//!
+//! The second-order system is seen as `y = [x; v]`, `ẏ = [v; a(t, x, v)]`. The solver chooses order and step so that its
+//! estimate of the local error stays below the tolerance, and takes its own steps past the points `t0 + k h`; there its
+//! continuous output is read ([`Reference::step`]), which is as good there as the steps are at their ends. The error of a
+//! whole run is larger than the tolerance: over 4 s of the reference arm 100 to 200 times (BDF, 1e-6 to 1e-9).
+//!
+//! **Which method.** The highest modes decide (measured in `tests/reference_arm.rs`, `tests/reference_stepper.rs`).
+//! BDF of variable order, the default, is nine times cheaper than the explicit pair where they are well damped, and costs
+//! about as much where they are not: its orders 3 to 5 are unstable near the imaginary axis, so that the error control holds
+//! the step near `1/ω` of a lightly damped mode, however little it moves. Only the A-stable ESDIRK steps over those; it is of
+//! third order, so it pays where modes are in the kHz or the tolerance is loose.
+//!
+//! **Restarts.** A jump of the load inside a step costs rejected steps: [`Reference::restart_at`] makes the solver end a
+//! step there and start anew. [`Reference::restart`] is for a system that was changed from outside.
+//!
+//! **Who owns what.** A solver of `diffsol` borrows its problem and the problem holds the equations, so none of them can be
+//! kept beside a system that the caller lends for one call. Each call that needs more of the solution builds problem and
+//! solver around the system, lets the solver run and takes its state back. That state holds the history (for BDF the
+//! differences and the order), so nothing of the method is lost; the Jacobian is, so an implicit solver takes 50 steps at a
+//! time, as many as it would keep its Jacobian anyway, and the points that it passes wait in a queue.
+//!
+//! Sources: BDF of variable order [Shampine & Reichelt 1997], ESDIRK3(4) [Jørgensen, Kristensen & Thomsen 2018],
+//! explicit 5(4) pair [Tsitouras 2011].
+
+use std::cell::RefCell;
+use std::collections::VecDeque;
+
+use diffsol::{
+    BdfState, DiffsolError, NalgebraLU, NalgebraMat, NalgebraVec, OdeBuilder, OdeEquations, OdeSolverMethod,
+    OdeSolverState, OdeSolverStopReason, RkState, Tableau, VectorCommon,
+};
+use nalgebra::DVector;
+
+use crate::error::StepError;
+use crate::system::SecondOrderSystem;
+
+/// Positions below this count as small: absolute over relative tolerance (m, rad).
+const SMALL: f64 = 1e-3;
+/// The same for velocities, over that for positions (1/s): what a mode of 16 Hz has.
+const RATE: f64 = 100.0;
+/// Steps that an implicit solver takes before it is taken apart; its own interval between two Jacobians.
+const RUN: u64 = 50;
+/// Longest step of the solver (s): at rest it would grow until it passes over a motion that starts later.
+const LONGEST: f64 = 0.02;
+/// Restarts closer to each other than this part of h are one,
+const TOGETHER: f64 = 1e-9;
+/// and those closer than this part of the time, where the solver sees no difference (2e-14 of it).
+const ROUNDING: f64 = 1e-13;
+/// Increment of the differences for the Jacobian, over what counts as small.
+const INCREMENT: f64 = 1e-4;
+
+/// Method of the solver; see the module page.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum ReferenceMethod {
+    /// Implicit multistep formulas of orders 1 to 5.
+    #[default]
+    Bdf,
+    /// Implicit Runge-Kutta of third order, A-stable: for lightly damped modes in the kHz.
+    Esdirk34,
+    /// Explicit Runge-Kutta of fifth order: for a second opinion.
+    Tsit45,
+}
+
+impl ReferenceMethod {
+    /// The word of the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Bdf => "bdf",
+            Self::Esdirk34 => "esdirk34",
+            Self::Tsit45 => "tsit45",
+        }
+    }
+}
+
+/// Tolerances on the local error of a coordinate y: `atol + rtol |y|` in the root mean square over all coordinates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ReferenceSettings {
+    /// Relative tolerance.
+    pub rtol: f64,
+    /// Absolute tolerance of positions (m, rad); of velocities 100/s times as much.
+    pub atol: f64,
+    /// Method of the solver.
+    pub method: ReferenceMethod,
+}
+
+impl ReferenceSettings {
+    /// The default method; coordinates below 1 mm or 1 mrad count as small.
+    pub fn new(rtol: f64) -> Self {
+        Self { rtol, atol: SMALL * rtol, method: ReferenceMethod::default() }
+    }
+
+    fn check(&self) -> Result<(), StepError> {
+        let Self { rtol, atol, .. } = *self;
+        // Below this the estimate of the local error is rounding.
+        if !(1e-13..=1e-2).contains(&rtol) {
+            return Err(StepError::Setup(format!(
+                "the relative tolerance must lie between 1e-13 and 1e-2, found {rtol:e}"
+            )));
+        }
+        if !(atol.is_finite() && atol > 0.0) {
+            return Err(StepError::Setup(format!("the absolute tolerance must be positive, found {atol:e}")));
+        }
+        Ok(())
+    }
+}
+
+impl Default for ReferenceSettings {
+    fn default() -> Self {
+        Self::new(1e-9)
+    }
+}
+
+type V = NalgebraVec<f64>;
+type Lu = NalgebraLU<f64>;
+
+/// What the next run of the solver continues.
+enum Kept {
+    /// Time and `[x; v]`, without history.
+    Start(f64, Vec<f64>),
+    Bdf(BdfState<V>),
+    RungeKutta(RkState<V>),
+}
+
+impl Kept {
+    /// How far the solver has come (s).
+    fn time(&self) -> f64 {
+        match self {
+            Self::Start(t, _) => *t,
+            Self::Bdf(state) => state.as_ref().t,
+            Self::RungeKutta(state) => state.as_ref().t,
+        }
+    }
+}
+
+/// The integrator with its state; see the module page.
+pub struct Reference {
+    settings: ReferenceSettings,
+    h: f64,
+    t0: f64,
+    done: u64,
+    /// Positions at the current time.
+    pub x: DVector<f64>,
+    /// Velocities.
+    pub v: DVector<f64>,
+    /// Accelerations at the current time.
+    pub acceleration: DVector<f64>,
+    kept: Kept,
+    /// `[x; v]` at the points after the current time that the solver has passed.
+    ahead: VecDeque<Vec<f64>>,
+    /// Times of restarts, in order.
+    restarts: Vec<f64>,
+    /// Steps of the solver so far; it may be ahead of the current time.
+    pub solver_steps: u64,
+    /// Evaluations of the equations of motion so far, those for Jacobians included.
+    pub evaluations: u64,
+    /// Factorisations so far.
+    pub factorisations: u64,
+}
+
+impl Reference {
+    /// Starts at `t0`; [`Reference::step`] goes from one multiple of `h` (s) to the next.
+    ///
+    /// # Errors
+    /// [`StepError::Setup`] for tolerances that make no sense, [`StepError::Singular`] if the first acceleration cannot be
+    /// found.
+    ///
+    /// # Panics
+    /// If `h` is not positive.
+    pub fn new(
+        system: &mut impl SecondOrderSystem,
+        t0: f64,
+        h: f64,
+        settings: ReferenceSettings,
+        x: DVector<f64>,
+        v: DVector<f64>,
+    ) -> Result<Self, StepError> {
+        assert!(h > 0.0, "the step is positive");
+        settings.check()?;
+        let mut acceleration = DVector::zeros(system.dimension());
+        system.acceleration(t0, &x, &v, &mut acceleration)?;
+        let kept = Kept::Start(t0, together(&x, &v));
+        Ok(Self {
+            settings,
+            h,
+            t0,
+            done: 0,
+            x,
+            v,
+            acceleration,
+            kept,
+            ahead: VecDeque::new(),
+            restarts: Vec::new(),
+            solver_steps: 0,
+            evaluations: 1,
+            factorisations: 0,
+        })
+    }
+
+    /// Distance of the points (s); the solver's own steps are its affair.
+    pub fn step_size(&self) -> f64 {
+        self.h
+    }
+
+    /// Current time (s).
+    pub fn time(&self) -> f64 {
+        self.t0 + self.done as f64 * self.h
+    }
+
+    /// First point that is neither reached nor waiting.
+    fn next_point(&self) -> f64 {
+        self.t0 + (self.done + 1 + self.ahead.len() as u64) as f64 * self.h
+    }
+
+    /// Makes the solver end a step at `t` (s) and start anew, because the load jumps there: before `t` the system is only
+    /// asked for times before it, afterwards only for times after it. A time that has passed starts anew at once.
+    ///
+    /// # Panics
+    /// If `t` is not finite.
+    pub fn restart_at(&mut self, t: f64) {
+        assert!(t.is_finite(), "a restart has a time");
+        let near = self.near(t);
+        let t = if (t - self.time()).abs() <= near { self.time() } else { t };
+        if t <= self.kept.time() + near {
+            self.start_again();
+        }
+        if !self.restarts.iter().any(|other| (other - t).abs() <= near) {
+            self.restarts.insert(self.restarts.partition_point(|other| *other < t), t);
+        }
+    }
+
+    /// Starts anew at the current time with the system as it is now: position and velocity are kept, the acceleration is
+    /// evaluated again, the step is chosen again.
+    ///
+    /// # Errors
+    /// [`StepError::Singular`] if the acceleration cannot be found.
+    pub fn restart(&mut self, system: &mut impl SecondOrderSystem) -> Result<(), StepError> {
+        self.start_again();
+        self.evaluations += 1;
+        system.acceleration(self.time(), &self.x, &self.v, &mut self.acceleration)
+    }
+
+    /// Drops what the solver knows beyond the current time.
+    fn start_again(&mut self) {
+        self.ahead.clear();
+        self.kept = Kept::Start(self.time(), together(&self.x, &self.v));
+    }
+
+    /// Times closer than this to t are the same (s).
+    fn near(&self, t: f64) -> f64 {
+        TOGETHER * self.h + ROUNDING * t.abs()
+    }
+
+    /// Advances to the next multiple of h. On error the state stays at the last good time. Allocates.
+    ///
+    /// # Errors
+    /// [`StepError::SolverGaveUp`], [`StepError::Diverged`] or [`StepError::Singular`].
+    pub fn step(&mut self, system: &mut impl SecondOrderSystem) -> Result<(), StepError> {
+        let n = self.x.len();
+        while self.ahead.is_empty() && n > 0 {
+            if let Err(error) = self.advance(system) {
+                // Points that were passed before the failure are good; the solver tries again from the last one.
+                let Some(last) = self.ahead.back().cloned() else {
+                    self.start_again();
+                    return Err(error);
+                };
+                self.kept = Kept::Start(self.next_point() - self.h, last);
+            }
+        }
+        let t = self.t0 + (self.done + 1) as f64 * self.h;
+        let y = self.ahead.pop_front().unwrap_or_default();
+        let (x, v) = (DVector::from_column_slice(&y[..n]), DVector::from_column_slice(&y[n..]));
+        let mut acceleration = DVector::zeros(n);
+        self.evaluations += 1;
+        system.acceleration(t, &x, &v, &mut acceleration)?;
+        (self.x, self.v, self.acceleration) = (x, v, acceleration);
+        self.done += 1;
+        Ok(())
+    }
+
+    /// Lends the system to a solver that continues from what was kept.
+    fn advance(&mut self, system: &mut impl SecondOrderSystem) -> Result<(), StepError> {
+        let start = self.kept.time();
+        let kept = std::mem::replace(&mut self.kept, Kept::Start(start, Vec::new()));
+        // The system is asked for times between two restarts, without these.
+        let passed = self.restarts.partition_point(|t| *t <= start);
+        let from = if passed > 0 { self.restarts[passed - 1].next_up() } else { f64::NEG_INFINITY };
+        let stop = self.restarts.get(passed).copied().unwrap_or(f64::INFINITY);
+        let equations = RefCell::new(FirstOrder::new(system, from, stop.next_down(), &self.settings));
+        let result = self.solve(kept, stop, &equations);
+        let FirstOrder { evaluations, error, .. } = equations.into_inner();
+        self.evaluations += evaluations;
+        // What stopped the system explains what stopped the solver.
+        self.kept = error.map_or(result, Err)?;
+        Ok(())
+    }
+
+    /// Builds problem and solver around the equations and lets it run.
+    fn solve<S: SecondOrderSystem>(
+        &mut self,
+        kept: Kept,
+        stop: f64,
+        equations: &RefCell<FirstOrder<'_, S>>,
+    ) -> Result<Kept, StepError> {
+        let n = self.x.len();
+        let (start, h) = (kept.time(), self.h);
+        let fault = |error: DiffsolError| gave_up(start, h, &error);
+        let (y0, bdf, runge_kutta) = match kept {
+            Kept::Start(_, y) => (y, None, None),
+            // The problem asks for a start, the state has its own.
+            Kept::Bdf(state) => (vec![0.0; 2 * n], Some(state), None),
+            Kept::RungeKutta(state) => (vec![0.0; 2 * n], None, Some(state)),
+        };
+        let ReferenceSettings { rtol, atol, method } = self.settings;
+        let problem = OdeBuilder::<NalgebraMat<f64>>::new()
+            .t0(start)
+            .rtol(rtol)
+            .atol((0..2 * n).map(|k| if k < n { atol } else { RATE * atol }))
+            .rhs_implicit(
+                |y: &[f64], _: &[f64], t: f64, dy: &mut [f64]| equations.borrow_mut().derivative(t, y, dy),
+                |y: &[f64], _: &[f64], t: f64, w: &[f64], Jw: &mut [f64]| {
+                    equations.borrow_mut().times_jacobian(t, y, w, Jw);
+                },
+            )
+            .init(|_: &[f64], _: f64, y: &mut [f64]| y.copy_from_slice(&y0), 2 * n)
+            .build()
+            .map_err(fault)?;
+        match method {
+            ReferenceMethod::Bdf => {
+                let state = bdf.map_or_else(|| problem.bdf_state::<Lu>(), Ok);
+                let solver = state.and_then(|state| problem.bdf_solver::<Lu>(state)).map_err(fault)?;
+                self.run(solver, stop, RUN, Kept::Bdf)
+            }
+            ReferenceMethod::Esdirk34 => {
+                let state = runge_kutta.map_or_else(|| problem.rk_state(&Tableau::esdirk34()), Ok);
+                let solver = state.and_then(|state| problem.esdirk34_solver::<Lu>(state)).map_err(fault)?;
+                self.run(solver, stop, RUN, Kept::RungeKutta)
+            }
+            ReferenceMethod::Tsit45 => {
+                let state = runge_kutta.map_or_else(|| problem.rk_state(&Tableau::tsit45()), Ok);
+                let solver = state.and_then(|state| problem.tsit45_solver(state)).map_err(fault)?;
+                self.run(solver, stop, 1, Kept::RungeKutta)
+            }
+        }
+    }
+
+    /// Steps until a point was passed and `least` steps were made, or to the restart at `stop`; queues the points.
+    fn run<'p, E, S>(
+        &mut self,
+        mut solver: S,
+        stop: f64,
+        least: u64,
+        keep: fn(S::State) -> Kept,
+    ) -> Result<Kept, StepError>
+    where
+        E: OdeEquations<T = f64, V = V> + 'p,
+        S: OdeSolverMethod<'p, E>,
+    {
+        let mut steps = 0;
+        let result = loop {
+            if steps >= least && !self.ahead.is_empty() {
+                break Ok(None);
+            }
+            match self.solver_step(&mut solver, stop) {
+                Ok(None) => steps += 1,
+                end => break end,
+            }
+        };
+        let work = solver.get_statistics();
+        self.solver_steps += work.number_of_steps as u64;
+        self.factorisations += work.number_of_linear_solver_setups as u64;
+        Ok(result?.unwrap_or_else(|| keep(solver.into_state())))
+    }
+
+    /// One step of the solver; queues the points in it. At the restart it returns where the next run starts.
+    fn solver_step<'p, E, S>(&mut self, solver: &mut S, stop: f64) -> Result<Option<Kept>, StepError>
+    where
+        E: OdeEquations<T = f64, V = V> + 'p,
+        S: OdeSolverMethod<'p, E>,
+    {
+        let (t, h) = (solver.state().t, solver.state().h);
+        let fault = |error: DiffsolError| gave_up(t, h, &error);
+        // The solver knows no longest step, but a time not to pass.
+        let mut target = if h > LONGEST { t + LONGEST } else { f64::INFINITY };
+        if target > stop - self.near(stop) {
+            target = stop;
+        }
+        if target.is_finite() {
+            solver.set_stop_time(target).map_err(fault)?;
+        }
+        let reason = solver.step().map_err(fault)?;
+        // A longest step that was rejected leaves its end behind as a time not to pass: that is no restart.
+        let restart = reason == OdeSolverStopReason::TstopReached && target == stop && stop.is_finite();
+
+        let state = solver.state();
+        let t = if restart { stop } else { state.t };
+        let x = &state.y.inner().as_slice()[..self.x.len()];
+        let largest = x.iter().fold(0.0f64, |m, x| if x.is_finite() { m.max(x.abs()) } else { f64::INFINITY });
+        if largest > 1e6 {
+            let what = format!("a coordinate reached {largest:.1e}");
+            return Err(StepError::Diverged { t, h, what });
+        }
+        let mut y = state.y.clone();
+        while self.next_point() <= t {
+            solver.interpolate_inplace(self.next_point().min(solver.state().t), &mut y).map_err(fault)?;
+            self.ahead.push_back(y.inner().as_slice().to_vec());
+        }
+        Ok(restart.then(|| Kept::Start(stop, solver.state().y.inner().as_slice().to_vec())))
+    }
+}
+
+/// The system of first order `y = [x; v]`, with what an evaluation needs.
+struct FirstOrder<'s, S> {
+    system: &'s mut S,
+    /// Times are moved into this range.
+    from: f64,
+    to: f64,
+    x: DVector<f64>,
+    v: DVector<f64>,
+    a: DVector<f64>,
+    /// Where the Jacobian is wanted, and the acceleration there.
+    base: Option<(f64, Vec<f64>, DVector<f64>)>,
+    /// Increments of positions and velocities for it.
+    increments: [f64; 2],
+    evaluations: u64,
+    error: Option<StepError>,
+}
+
+impl<'s, S: SecondOrderSystem> FirstOrder<'s, S> {
+    fn new(system: &'s mut S, from: f64, to: f64, settings: &ReferenceSettings) -> Self {
+        let zeros = DVector::zeros(system.dimension());
+        let increment = INCREMENT * settings.atol / settings.rtol;
+        Self {
+            system,
+            from,
+            to,
+            x: zeros.clone(),
+            v: zeros.clone(),
+            a: zeros,
+            base: None,
+            increments: [increment, RATE * increment],
+            evaluations: 0,
+            error: None,
+        }
+    }
+
+    /// `ẏ = [v; a]`.
+    fn derivative(&mut self, t: f64, y: &[f64], dy: &mut [f64]) {
+        self.evaluate(t, y.iter().copied());
+        let n = self.x.len();
+        dy[..n].copy_from_slice(&y[n..]);
+        dy[n..].copy_from_slice(self.a.as_slice());
+    }
+
+    /// The acceleration at t and y into `a`; a failure becomes NaN, which makes the solver give up.
+    fn evaluate(&mut self, t: f64, y: impl Iterator<Item = f64>) {
+        self.x.iter_mut().chain(self.v.iter_mut()).zip(y).for_each(|(to, from)| *to = from);
+        self.evaluations += 1;
+        let t = t.clamp(self.from, self.to);
+        if let Err(error) = self.system.acceleration(t, &self.x, &self.v, &mut self.a) {
+            self.error.get_or_insert(error);
+            self.a.fill(f64::NAN);
+        }
+    }
+
+    /// `J w` by a forward difference. The solver asks for one column after the other at the same y, and uses the matrix for
+    /// Newton's method only.
+    fn times_jacobian(&mut self, t: f64, y: &[f64], w: &[f64], Jw: &mut [f64]) {
+        let n = self.x.len();
+        let base = match self.base.take() {
+            Some(base) if base.0 == t && base.1 == y => base,
+            _ => {
+                self.evaluate(t, y.iter().copied());
+                (t, y.to_vec(), self.a.clone())
+            }
+        };
+        let size = |w: &[f64], increment: f64| w.iter().fold(0.0f64, |m, w| m.max(w.abs())) / increment;
+        let size = size(&w[..n], self.increments[0]).max(size(&w[n..], self.increments[1]));
+        let d = if size > 0.0 { 1.0 / size } else { 1.0 };
+        self.evaluate(t, y.iter().zip(w).map(|(y, w)| y + d * w));
+        Jw[..n].copy_from_slice(&w[n..]);
+        for k in 0..n {
+            Jw[n + k] = (self.a[k] - base.2[k]) / d;
+        }
+        self.base = Some(base);
+    }
+}
+
+fn together(x: &DVector<f64>, v: &DVector<f64>) -> Vec<f64> {
+    x.iter().chain(v.iter()).copied().collect()
+}
+
+fn gave_up(t: f64, h: f64, error: &DiffsolError) -> StepError {
+    StepError::SolverGaveUp { t, h, what: error.to_string() }
+}
