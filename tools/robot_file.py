@@ -197,7 +197,7 @@ class Arm:
         def visit(link, parent, X):
             body = self.links[link]
             if load and load.get("link", tcp["link"]) == link:
-                xx, yy, zz, xy, xz, yz = load["inertia"]
+                xx, yy, zz, xy, xz, yz = load.get("inertia", [0.0] * 6)
                 I = pin.Inertia(load["mass"], np.array(load["com"], float), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
                 self.model.appendBodyToJoint(parent, I, X)
             if link in flexible:

@@ -115,6 +115,9 @@ pub(super) fn read_modal(
     }
     let [xx, yy, zz, xy, xz, yz] =
         table.require("inertia", "about the link origin")?.numbers::<6>("numbers: xx, yy, zz, xy, xz, yz")?;
+    // The matrices first: so much stands in the file, so N may have its room.
+    let K = read_triangle(&table.require("K", "lower triangle")?, n)?;
+    let M = read_triangle(&table.require("M", "lower triangle")?, n)?;
     let N = match table.get("N") {
         None => vec![Matrix3::zeros(); n * n],
         Some(node) => read_pairs(&node, n)?,
@@ -129,8 +132,8 @@ pub(super) fn read_modal(
         C_r: read_three(&table, "C_r", n)?,
         P: read_nines(&table.require("P", "one row of nine per coordinate")?, n)?,
         N,
-        M: read_triangle(&table.require("M", "lower triangle")?, n)?,
-        K: read_triangle(&table.require("K", "lower triangle")?, n)?,
+        M,
+        K,
         geometric: match table.get("geometric") {
             None => None,
             Some(node) => Some(read_geometric(&node, n, count)?),

@@ -10,7 +10,8 @@
 //! between its ends (exact forces at the ends, so only the bow of N and M within an element is lost):
 //!
 //! ```text
-//! N (v'v' + w'w' + r² θx'θx') - M_y v'θx' - M_z w'θx' + V_y w'θx - V_z v'θx + T/2 (θy'θz - θz'θy)    r² = polar/mass
+//! N (v'v' + w'w' + r² θx'θx') - M_y v'θx' - M_z w'θx' + V_y w'θx - V_z v'θx + T/2 (θy'θz - θz'θy)
+//! r² = polar/mass
 //! ```
 //! Terms in the axial strain u' are left out: they are as small as the strain of the load. Bending moments are then
 //! pairs of axial forces that keep their direction; at both ends of each element they are made to turn half with the section

@@ -6,8 +6,8 @@
 //! s + u,   u(s) = Σ φ_k(s) η_k
 //! ```
 //! Coordinates of a reduced link: six per interface but A (displacement and rotation of that interface, link axes, with
-//! the static shapes that belong to them), then the amplitudes of its fixed-interface modes. Everything that the equations of motion need
-//! are integrals over the undeformed body, and none of them depends on η:
+//! the static shapes that belong to them), then the amplitudes of its fixed-interface modes. All that the equations of
+//! motion need are integrals over the undeformed body, and none of them depends on η:
 //!
 //! ```text
 //! C_t,k = ∫ φ_k dm    C_r,k = ∫ s × φ_k dm    P_k = ∫ s φ_kᵀ dm    N_kl = ∫ φ_k φ_lᵀ dm    M_kl = ∫ φ_k·φ_l dm
@@ -21,9 +21,9 @@
 //! | a mesh | [`ModalSource`], in [`LinkDetails::modal`](crate::LinkDetails) after [`reduce_mesh`](crate::reduce_mesh) |
 //! | a uniform beam | [`BeamLink::modal`](crate::BeamLink::modal) |
 //! | a condensed stiffness and mass | [`ModalLink::from_superelement`]: first order only |
-//! | Standard Input Data | [`ModalLink::from_sid`], and back: [`ModalLink::to_sid`] |
+//! | Standard Input Data | [`ModalLink::from_sid`], [`ModalLink::from_sid_held_at`], and back: [`ModalLink::to_sid`] |
 //!
-//! Source: Shabana (2013), chapter 5; Wallrapp (1994); Schwertassek & Wallrapp (1999).
+//! Source: Shabana (2013), chapter 5; Wallrapp (1994).
 //!
 //! Not here: equations of motion, joints, time.
 

@@ -1,7 +1,7 @@
 //! A modal link from and to Standard Input Data.
 //!
 //! ```text
-//! mdCM = ∫ s dm + Σ C_t,k η_k          J = inertia + Σ J1_k η_k        J1 = 2 tr(Ps) 1 - 2 Ps,  Ps: symmetric part of P
+//! mdCM = ∫ s dm + Σ C_t,k η_k          J = inertia + Σ J1_k η_k      J1 = 2 tr(Ps) 1 - 2 Ps,  Ps: symmetric part of P
 //! Ct0 = C_tᵀ                           Cr0 = C_rᵀ,  Cr1_kl = ∫ φ_l × φ_k dm                     from N_lk
 //! Gr_k = -2 ∫ [s]x [φ_k]x dm = 2 (tr(P_k) 1 - P_kᵀ)                    Ge_kl = 2 ∫ φ_l × φ_k dm
 //! Oe0 = ∫ φ_kᵀ [ω]x² s dm,  Oe1 = ∫ φ_kᵀ [ω]x² φ_l dm                  by products ω_i ω_j
@@ -129,8 +129,8 @@ impl ModalLink {
 
     /// The modal link that Standard Input Data describe.
     ///
-    /// A is the first node that no coordinate moves; every other node becomes an interface, in the order of the file.
-    /// The names of the link and of the nodes are those that [`Self::to_sid`] wrote, else `name` and the numbers of the
+    /// A is the first node that no coordinate moves (else see [`Self::from_sid_held_at`]); every other node becomes an
+    /// interface, in the order of the file. The names of the link and of the nodes are those that [`Self::to_sid`] wrote, else `name` and the numbers of the
     /// nodes. Damping (`De`) is not taken over. In a file without the block `K0omega` centrifugal stiffening stays in
     /// `Oe`, so in N.
     ///
@@ -144,13 +144,35 @@ impl ModalLink {
     /// [`ExchangeErrorKind::WrongSize`] for blocks of other sizes than the modes say.
     pub fn from_sid(name: &str, sid: &Sid) -> Result<Self, ExchangeError> {
         check_sizes(name, sid)?;
+        Self::of_node(name, sid, held_node(name, sid)?)
+    }
+
+    /// As [`Self::from_sid`], with a given node as A, whatever frame the data have.
+    ///
+    /// Where the coordinates move that node, its motion is taken out of all shapes as that of a rigid body; stiffness by
+    /// initial stress belongs to the frame of the data and is then left out.
+    ///
+    /// # Errors
+    /// As [`Self::from_sid`]; [`ExchangeErrorKind::Missing`] if there is no such node.
+    pub fn from_sid_held_at(name: &str, sid: &Sid, node: i64) -> Result<Self, ExchangeError> {
+        check_sizes(name, sid)?;
+        let ids: Vec<i64> = sid.nodes.iter().map(|node| node.id).collect();
+        let Some(A) = ids.iter().position(|id| *id == node) else {
+            let (found, expected) = (format!("the nodes {ids:?}"), format!("node {node}"));
+            return Err(fail(name, ExchangeErrorKind::Missing, "frame", found, &expected, ""));
+        };
+        Self::of_node(name, sid, A)
+    }
+
+    /// * `A`: index of the node that is held.
+    fn of_node(name: &str, sid: &Sid, A: usize) -> Result<Self, ExchangeError> {
         let conventions = sid.conventions(name)?;
         if sid.ksigma.m0().iter().any(|x| *x != 0.0) {
             let help = "a modal link is free of stress where its coordinates are zero";
             return Err(fail(name, ExchangeErrorKind::Unsupported, "ksigma", "initial stress", "zeros", help));
         }
         let n = sid.nq();
-        let (names, A) = (node_names(sid), held_node(name, sid)?);
+        let names = node_names(sid);
         let interfaces = sid.nodes.iter().zip(&names).enumerate().filter(|(at, _)| *at != A);
         let interfaces = interfaces
             .map(|(_, (node, node_name))| {
@@ -174,14 +196,8 @@ impl ModalLink {
             .collect();
         let geometric = geometric(sid, A);
         let N = second_order(sid, conventions.gyro, conventions.oe);
-        let (M, K) = (symmetric(&sid.Me.m0()), symmetric(&sid.Ke.m0()));
-        if !(sid.mass > 0.0) || super::transform::eigenpairs(&K, &M).is_none() {
-            let expected = "a positive mass, Me and Ke positive definite";
-            let help = "are rigid motions among the modes?";
-            return Err(fail(name, ExchangeErrorKind::Defective, "Me, Ke", "others", expected, help));
-        }
         let J = sid.J0();
-        Ok(Self {
+        let link = Self {
             name: link_name(sid).unwrap_or_else(|| name.to_owned()),
             interfaces,
             mass: sid.mass,
@@ -191,12 +207,19 @@ impl ModalLink {
             C_r,
             P,
             N,
-            M,
-            K,
+            M: symmetric(&sid.Me.m0()),
+            K: symmetric(&sid.Ke.m0()),
             geometric,
             labels: sid.modes.clone(),
             X_LA: frame(name, &sid.nodes[A])?,
-        })
+        };
+        let link = if is_still(&sid.nodes[A]) { link } else { link.without_rigid_motion(&motion_of(&sid.nodes[A], n)) };
+        if !(link.mass > 0.0) || super::transform::eigenpairs(&link.K, &link.M).is_none() {
+            let expected = "a positive mass, Me and Ke positive definite with A held";
+            let help = "are rigid motions among the modes?";
+            return Err(fail(name, ExchangeErrorKind::Defective, "Me, Ke", "others", expected, help));
+        }
+        Ok(link)
     }
 }
 
@@ -219,10 +242,13 @@ fn fail(
     }
 }
 
+/// A block with its name and the sizes that it may have.
+type Block<'a> = (&'a str, &'a SidMatrix, &'a [(usize, usize)]);
+
 /// Data made by hand may have any size; those of a file were checked.
 fn check_sizes(origin: &str, sid: &Sid) -> Result<(), ExchangeError> {
     let n = sid.nq();
-    let body: [(&str, &SidMatrix, &[(usize, usize)]); 9] = [
+    let body: [Block<'_>; 9] = [
         ("mdCM", &sid.mdCM, &[(3, 1)]),
         ("J", &sid.J, &[(6, 1), (3, 3)]),
         ("Ct", &sid.Ct, &[(n, 3)]),
@@ -382,12 +408,30 @@ fn second_order(sid: &Sid, gyro: GyroLayout, oe: OeOrder) -> Vec<Matrix3<f64>> {
     N
 }
 
+fn is_still(node: &SidNode) -> bool {
+    let still = |shapes: &SidMatrix| shapes.m0().iter().all(|x| *x == 0.0);
+    still(&node.phi) && still(&node.psi)
+}
+
+/// The rigid motions of the whole link that move it as the coordinates move a node: at Lo, then rotation.
+fn motion_of(node: &SidNode, n: usize) -> Matrix6xX<f64> {
+    let (phi, psi) = (node.phi.m0(), node.psi.m0());
+    let p = Vector3::from_iterator(node.origin.m0().iter().copied());
+    let column = |A: &DMatrix<f64>, k: usize| Vector3::from_iterator(A.column(k).iter().copied());
+    let mut motion = Matrix6xX::zeros(n);
+    for k in 0..n {
+        let theta = column(&psi, k);
+        motion.fixed_view_mut::<3, 1>(0, k).copy_from(&(column(&phi, k) - theta.cross(&p)));
+        motion.fixed_view_mut::<3, 1>(3, k).copy_from(&theta);
+    }
+    motion
+}
+
 /// The first node that no coordinate moves.
 fn held_node(origin: &str, sid: &Sid) -> Result<usize, ExchangeError> {
-    let still = |shapes: &SidMatrix| shapes.m0().iter().all(|x| *x == 0.0);
-    sid.nodes.iter().position(|node| still(&node.phi) && still(&node.psi)).ok_or_else(|| {
+    sid.nodes.iter().position(is_still).ok_or_else(|| {
         let expected = "a node without displacement: interface A, at which the frame is tangent";
-        let help = "choose the proximal interface as the reference frame when the file is made";
+        let help = "say which node is A, or make the file with the proximal interface as its frame";
         fail(origin, ExchangeErrorKind::Missing, "frame", "nodes that all move", expected, help)
     })
 }

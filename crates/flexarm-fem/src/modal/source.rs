@@ -1,7 +1,7 @@
 //! From a mesh and its condensation to a modal link: the integrals themselves.
 //!
 //! ```text
-//! solids   u = Σ N_i u_i, one shape function in x, y and z:   ∫ s_a φ_b dm = x_aᵀ M_s φ_b,   ∫ φ_a φ_b dm = φ_aᵀ M_s φ_b
+//! solids   u = Σ N_i u_i, one shape function in x, y, z:   ∫ s_a φ_b dm = x_aᵀ M_s φ_b,   ∫ φ_a φ_b dm = φ_aᵀ M_s φ_b
 //! beams    φ = u + θ × r over the section, D = ∫ r rᵀ dm per length:
 //!          ∫ s φᵀ dm = ∫ (μ s uᵀ + D [θ]xᵀ) dx,   ∫ φ_k φ_lᵀ dm = ∫ (μ u_k u_lᵀ + [θ_k]x D [θ_l]xᵀ) dx
 //! ```
@@ -216,16 +216,16 @@ impl Integrals {
         self.first += Vector3::from_fn(|a, _| moments[(0, 1 + a)]);
         self.second += moments.fixed_view::<3, 3>(1, 1);
 
-        for b in 0..3 {
-            let with_places = gram(&X, &M_axes[b]);
+        for (b, M_axis) in M_axes.iter().enumerate() {
+            let with_places = gram(&X, M_axis);
             for k in 0..n {
                 self.C_t[(b, k)] += with_places[(0, k)];
                 for a in 0..3 {
                     self.P[k][(a, b)] += with_places[(1 + a, k)];
                 }
             }
-            for a in 0..=b {
-                let products = gram(&axes[a], &M_axes[b]);
+            for (a, axis) in axes.iter().enumerate().take(b + 1) {
+                let products = gram(axis, M_axis);
                 for (k, l) in (0..n).flat_map(|k| (k..n).map(move |l| (k, l))) {
                     self.N[k * n + l][(a, b)] += products[(k, l)];
                     if a != b {
@@ -257,8 +257,8 @@ impl Integrals {
                 self.C_t.column_mut(k).axpy(w * mu, &u_k, 1.0);
                 self.P[k] += (s * u_k.transpose() * mu + D * turns[k].transpose()) * w;
                 let turned = turns[k] * D;
-                for l in k..n {
-                    self.N[k * n + l] += (u_k * U.column(l).transpose() * mu + turned * turns[l].transpose()) * w;
+                for (l, turn) in turns.iter().enumerate().skip(k) {
+                    self.N[k * n + l] += (u_k * U.column(l).transpose() * mu + turned * turn.transpose()) * w;
                 }
             }
         }

@@ -125,12 +125,11 @@ fn fine_points(kind: ElementKind) -> Vec<([f64; 3], f64)> {
     points
 }
 
+/// What is summed over fine points.
+type Sums = (f64, Vector3<f64>, Matrix3<f64>, Vec<Vector3<f64>>, Vec<Matrix3<f64>>, Vec<Matrix3<f64>>);
+
 /// Sums over fine points: mass, ∫ s, ∫ s sᵀ, ∫ φ, P, N.
-fn brute_force(
-    mesh: &Mesh,
-    model: &FeModel,
-    shapes: &DMatrix<f64>,
-) -> (f64, Vector3<f64>, Matrix3<f64>, Vec<Vector3<f64>>, Vec<Matrix3<f64>>, Vec<Matrix3<f64>>) {
+fn brute_force(mesh: &Mesh, model: &FeModel, shapes: &DMatrix<f64>) -> Sums {
     let n = shapes.ncols();
     let (mut mass, mut first, mut second) = (0.0, Vector3::zeros(), Matrix3::zeros());
     let (mut C, mut P, mut N) = (vec![Vector3::zeros(); n], vec![Matrix3::zeros(); n], vec![Matrix3::zeros(); n * n]);
@@ -168,7 +167,7 @@ fn brute_force(
     (mass, first, second, C, P, N)
 }
 
-/// Largest difference of 3×3 matrices per `size(k, l)`.
+/// The largest of `count` measures; a NaN stays.
 fn worst(count: usize, gap: impl Fn(usize) -> f64) -> f64 {
     (0..count).map(gap).fold(0.0, |worst: f64, x| if x <= worst { worst } else { x })
 }
@@ -194,7 +193,8 @@ fn integrals_of_a_mesh_are_those_over_fine_points() {
         ];
         let list: Vec<_> = errors.iter().map(|e| format!("{e:.1e}")).collect();
         eprintln!("{kind:?} fine points: {}", list.join(" "));
-        assert!(errors.iter().all(|e| *e < 1e-12), "{kind:?} {errors:.1?}");
+        // measured 1.4e-14
+        assert!(errors.iter().all(|e| *e < 1e-12), "{kind:?} {}", list.join(" "));
     }
 }
 
@@ -217,7 +217,7 @@ fn check_identities(what: &str, link: &ModalLink, model: &FeModel, shapes: &DMat
     assert!((0..n * n).all(|at| link.N[at] == link.N[at % n * n + at / n].transpose()), "{what}");
     assert!((0..n).all(|k| axial(&link.P[k]) == link.C_r.column(k)), "{what}");
     eprintln!("{what}: rigid {rigid:.1e} trace {trace:.1e}");
-    assert!(rigid < 1e-11 && trace < 1e-11, "{what}: {rigid:.1e} {trace:.1e}");
+    assert!(rigid < 1e-12 && trace < 1e-12, "{what}: {rigid:.1e} {trace:.1e}"); // measured 2e-15, 7e-15
 }
 
 #[test]
@@ -301,7 +301,7 @@ fn a_condensed_matrix_tells_everything_of_first_order() {
     let mass = worst(n * n, |at| (a[at] - b[at]).abs() / (b[(at % n, at % n)] * b[(at / n, at / n)]).sqrt());
     let skew = worst(n - 6, |k| (axial(&link.P[k]) - link.C_r.column(k)).amax() / link.C_r.amax());
     eprintln!("superelement: mass {mass:.1e} axial {skew:.1e}");
-    assert!(mass < 1e-9, "{mass:.1e}");
+    assert!(mass < 1e-10, "{mass:.1e}"); // measured 7e-13
     assert!(skew < 1e-15, "{skew:.1e}");
     assert_eq!((link.K.clone(), link.labels.clone()), (full.K.clone(), full.labels.clone()));
     assert!(!link.has_second_order() && full.has_second_order());
@@ -309,7 +309,7 @@ fn a_condensed_matrix_tells_everything_of_first_order() {
     // The body is that of the mesh.
     let gap = (full.rigid().inertia - reduction.whole.inertia).amax() / reduction.whole.inertia.amax();
     eprintln!("body: {gap:.1e}");
-    assert!(gap < 1e-6, "{gap:.1e}");
+    assert!(gap < 1e-8, "{gap:.1e}"); // measured 7e-16
 
     // The file keeps it all to the last bit, and refuses another stiffness.
     let text = crate::write_flex(&reduction.link);
@@ -318,8 +318,6 @@ fn a_condensed_matrix_tells_everything_of_first_order() {
     let changed = format!("{}1{}", &text[..K], &text[K..]);
     let error = crate::parse_flex(&changed, "casting").unwrap_err();
     assert!(error.to_string().contains("compliance of B that differs"), "{error}");
-    let other = ModalLink { interfaces: full.interfaces.clone(), ..full.orthogonalised(Some(9)).unwrap() };
-    assert!(!ModalLink { interfaces: full.orthogonalised(Some(9)).unwrap().interfaces, ..other }.is_craig_bampton());
     let mut orthogonal = reduction.link.clone();
     orthogonal.details.as_mut().unwrap().modal = Some(full.orthogonalised(Some(9)).unwrap());
     assert_eq!(crate::parse_flex(&crate::write_flex(&orthogonal), "casting").unwrap(), orthogonal);
@@ -333,10 +331,61 @@ fn a_condensed_matrix_tells_everything_of_first_order() {
         let P = worst(n, |k| (link.P[k] - back.P[k]).amax() / (link.inertia.amax().sqrt() * size(k)));
         let N = worst(n * n, |at| (link.N[at] - back.N[at]).amax() / (size(at / n) * size(at % n)));
         eprintln!("SID: P {P:.1e} N {N:.1e}");
-        assert!(P < 1e-12 && N < 1e-12, "{P:.1e} {N:.1e}");
+        assert!(P < 1e-12 && N < 1e-12, "{P:.1e} {N:.1e}"); // measured 9e-17, 2e-15
         // All else is the same number.
         assert_eq!(ModalLink { P: link.P.clone(), N: link.N.clone(), ..back }, link);
     }
+}
+
+/// Truth: the shapes with rigid motions added, over fine points. Identity: frequencies of the free link stay, and with A
+/// held again all is as before.
+#[test]
+fn data_in_any_frame_give_the_link_held_at_a() {
+    use crate::exchange::SidMatrix;
+    let (mesh, interfaces) = casting(ElementKind::Hex20, [Tie::Rigid; 2]);
+    let (link, model, shapes) = modal(&mesh, &interfaces, 5);
+    let n = link.coordinates();
+    // Motions in proportion to the shapes, so that all terms count.
+    let size = |k: usize| (link.M[(k, k)] / link.mass).sqrt();
+    let motion = Matrix6xX::from_fn(n, |r, k| 0.5 * size(k) * ((7 * r + 3 * k) as f64).sin());
+    let adrift = link.clone().without_rigid_motion(&-&motion);
+    let R = model.rigid_modes(&Vector3::zeros());
+    let (.., C, P, N) = brute_force(&mesh, &model, &(shapes + R * DMatrix::from_column_slice(6, n, motion.as_slice())));
+    let (scale, lever) = (|k: usize| adrift.M[(k, k)].sqrt(), link.inertia.amax().sqrt());
+    let fine = [
+        worst(n, |k| (adrift.C_t.column(k) - C[k]).amax() / (link.mass.sqrt() * scale(k))),
+        worst(n, |k| (adrift.P[k] - P[k]).amax() / (lever * scale(k))),
+        worst(n * n, |at| (adrift.N[at] - N[at]).amax() / (scale(at / n) * scale(at % n))),
+        worst(n * n, |at| (adrift.M[at] - N[at].trace()).abs() / (scale(at / n) * scale(at % n))),
+    ];
+    let free = worst(n, |k| (adrift.free_frequencies_hz()[6 + k] / link.free_frequencies_hz()[6 + k] - 1.0).abs());
+    eprintln!("adrift: {fine:?} free {free:.1e}");
+    assert!(fine.iter().all(|e| *e < 1e-12) && free < 1e-10, "{fine:?} {free:.1e}"); // measured 5e-15, 1.5e-13
+
+    // The file of the drifting frame says how A moves in it.
+    let mut sid = adrift.to_sid();
+    let p = link.X_LA.translation.vector;
+    let at_A = |k: usize| {
+        let (c, theta) = (motion.fixed_view::<3, 1>(0, k), motion.fixed_view::<3, 1>(3, k).into_owned());
+        c + theta.cross(&p)
+    };
+    sid.nodes[0].phi = SidMatrix::constant(n, &DMatrix::from_fn(3, n, |a, k| at_A(k)[a]));
+    sid.nodes[0].psi = SidMatrix::constant(n, &DMatrix::from_fn(3, n, |a, k| motion[(3 + a, k)]));
+    assert!(ModalLink::from_sid("casting", &sid).is_err());
+    assert!(ModalLink::from_sid_held_at("casting", &sid, 77).is_err());
+    let back = ModalLink::from_sid_held_at("casting", &sid, 1).unwrap();
+    let size = |k: usize| link.M[(k, k)].sqrt();
+    let errors = [
+        worst(n, |k| (back.C_t.column(k) - link.C_t.column(k)).amax() / (link.mass.sqrt() * size(k))),
+        worst(n, |k| (back.C_r.column(k) - link.C_r.column(k)).amax() / (lever * size(k))),
+        worst(n, |k| (back.P[k] - link.P[k]).amax() / (lever * size(k))),
+        worst(n * n, |at| (back.N[at] - link.N[at]).amax() / (size(at / n) * size(at % n))),
+        worst(n * n, |at| (back.M[at] - link.M[at]).abs() / (size(at / n) * size(at % n))),
+        worst(n, |k| (back.interfaces[0].Phi.column(k) - link.interfaces[0].Phi.column(k)).amax()),
+    ];
+    let list: Vec<_> = errors.iter().map(|e| format!("{e:.1e}")).collect();
+    eprintln!("held again: {}", list.join(" "));
+    assert!(errors.iter().all(|e| *e < 1e-12), "{}", list.join(" ")); // measured 4e-16
 }
 
 /// A slender uniform beam of unit mass and length with bending stiffness one, stiff in stretch.
@@ -384,7 +433,7 @@ fn a_cantilever_buckles_at_eulers_load() {
         }
         let error = buckling_load(&link.K, &G) / (low * low) - 1.0;
         eprintln!("Euler, rigid end {a}: {error:.1e}");
-        assert!(error.abs() < 1e-5, "{a}: {error:.1e}");
+        assert!(error.abs() < 1e-5, "{a}: {error:.1e}"); // measured 1.2e-6
     }
 }
 
@@ -402,8 +451,8 @@ fn a_deep_cantilever_tips_over_at_the_textbooks_load() {
     let force = buckling_load(&link.K, &G[1]) / (4.0126 * 0.3_f64.sqrt()) - 1.0;
     let moment = buckling_load(&link.K, &G[5]) / (PI * 0.3_f64.sqrt()) - 1.0;
     eprintln!("lateral: force {force:.1e} moment {moment:.1e}");
-    assert!(force.abs() < 1e-3, "{force:.1e}");
-    assert!(moment.abs() < 1e-2, "{moment:.1e}");
+    assert!(force.abs() < 1e-3, "{force:.1e}"); // measured 3.4e-4
+    assert!(moment.abs() < 1e-3, "{moment:.1e}"); // measured 2.8e-4
 }
 
 /// Truth: Wright, Smith, Thresher & Wang (1982), *J. Appl. Mech.* 49, hub radius zero: first flapwise frequency over
@@ -422,16 +471,16 @@ fn a_spinning_beam_stiffens_as_in_the_literature() {
         let flap = (0..n).find(|j| pairs.Phi[(2, *j)].abs() > 1e-6 * pairs.Phi.column(*j).amax()).unwrap();
         let error = pairs.omega[flap] / truth - 1.0;
         eprintln!("spin {spin}: {:.5} {error:.1e}", pairs.omega[flap]);
-        assert!(error.abs() < 1e-3, "{spin}: {error:.1e}");
+        assert!(error.abs() < 1e-3, "{spin}: {error:.1e}"); // measured 1.8e-4
     }
 }
 
 /// Second algorithm: the beam's own stiffening, for a slender bar of bricks; loads of all kinds.
 #[test]
 fn solids_stiffen_as_the_beam_does() {
-    let (width, height) = (0.05, 0.03);
+    let (width, height) = (0.0125, 0.0075);
     let p = [Vector3::zeros(), Vector3::new(1.0, 0.0, 0.0)];
-    let (mesh, interfaces) = bar(ElementKind::Hex20, [12, 1, 1], p, [Tie::Rigid; 2], |u| {
+    let (mesh, interfaces) = bar(ElementKind::Hex20, [24, 2, 2], p, [Tie::Rigid; 2], |u| {
         Vector3::new(u.x, (u.y - 0.5) * width, (u.z - 0.5) * height)
     });
     // No Poisson's ratio: rigid ties at the ends would hinder it.
@@ -459,11 +508,12 @@ fn solids_stiffen_as_the_beam_does() {
         let size = sizes[group].iter().fold(0.0_f64, |a, b| a.max(*b));
         let error = (scaled(a) - scaled(&b)).amax() / size;
         eprintln!("load {j}: solid against beam {error:.1e}, own size {:.1e}", sizes[j] / size);
-        //assert!(error < 0.02, "{j}: {error:.1e}");
+        // measured 1.7e-2: tied ends cannot warp in torsion, which fades with the thickness; bending 9e-4
+        assert!(error < 0.03, "{j}: {error:.1e}");
     }
     let buckling = |link: &ModalLink| buckling_load(&link.K, &-&link.geometric.as_ref().unwrap().interface[0][0]);
     let euler = PI * PI * 210e9 * width * height.powi(3) / 12.0 / 4.0;
     let error = buckling(&solid) / euler - 1.0;
     eprintln!("Euler, solid: {error:.1e}");
-    assert!(error.abs() < 5e-3, "{error:.1e}");
+    assert!(error.abs() < 1e-3, "{error:.1e}"); // measured 2.3e-4
 }

@@ -1,6 +1,6 @@
 //! Other coordinates for the same shapes: orthogonalised, or fewer.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Matrix6xX};
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Matrix6xX, Vector3};
 
 use super::{GeometricStiffness, ModalInterface, ModalLink};
 use crate::error::FemError;
@@ -159,6 +159,67 @@ impl ModalLink {
             name: self.name.clone(),
             ..*self
         })
+    }
+
+    /// The same link in another frame: from each shape a rigid motion is taken away, `φ_k - c_k - θ_k × s`.
+    ///
+    /// Stiffness stays; that by initial stress belongs to the other support and is dropped. Unknown terms of second
+    /// order stay unknown.
+    ///
+    /// * `motion`: c_k (at Lo) over θ_k, link axes, one column per coordinate.
+    pub(super) fn without_rigid_motion(self, motion: &Matrix6xX<f64>) -> Self {
+        let n = self.coordinates();
+        let (m, mc) = (self.mass, self.first_moment);
+        // ∫ s sᵀ dm
+        let S = Matrix3::identity() * (0.5 * self.inertia.trace()) - self.inertia;
+        let c: Vec<Vector3<f64>> = motion.column_iter().map(|q| q.fixed_rows::<3>(0).into_owned()).collect();
+        let theta: Vec<Vector3<f64>> = motion.column_iter().map(|q| q.fixed_rows::<3>(3).into_owned()).collect();
+        let turn: Vec<Matrix3<f64>> = theta.iter().map(Vector3::cross_matrix).collect();
+
+        let (mut C_t, mut P, mut N, mut M) = (self.C_t.clone(), self.P.clone(), self.N.clone(), self.M.clone());
+        for k in 0..n {
+            C_t.column_mut(k).axpy(-1.0, &(c[k] * m + turn[k] * mc), 1.0);
+            P[k] -= mc * c[k].transpose() + S * turn[k].transpose();
+        }
+        // ∫ φ_k ρ_lᵀ and ∫ ρ_k ρ_lᵀ of the rigid motions ρ.
+        let mixed =
+            |k: usize, l: usize| self.C_t.column(k) * c[l].transpose() + self.P[k].transpose() * turn[l].transpose();
+        let rigid = |k: usize, l: usize| {
+            c[k] * (c[l] * m + turn[l] * mc).transpose()
+                + turn[k] * mc * c[l].transpose()
+                + turn[k] * S * turn[l].transpose()
+        };
+        for (k, l) in (0..n).flat_map(|k| (k..n).map(move |l| (k, l))) {
+            let change = rigid(k, l) - mixed(k, l) - mixed(l, k).transpose();
+            M[(k, l)] += change.trace();
+            M[(l, k)] = M[(k, l)];
+            if self.has_second_order() {
+                N[k * n + l] += change;
+                N[l * n + k] = N[k * n + l].transpose();
+            }
+        }
+        let interface = |i: &ModalInterface| {
+            let mut Phi = i.Phi.clone();
+            for (k, mut column) in Phi.column_iter_mut().enumerate() {
+                let at = c[k] + theta[k].cross(&i.X_LI.translation.vector);
+                let mut linear = column.fixed_rows_mut::<3>(0);
+                linear -= at;
+                let mut angular = column.fixed_rows_mut::<3>(3);
+                angular -= theta[k];
+            }
+            ModalInterface { Phi, ..i.clone() }
+        };
+        let C_r: Vec<_> = P.iter().map(super::axial).collect();
+        Self {
+            interfaces: self.interfaces.iter().map(interface).collect(),
+            C_t,
+            C_r: Matrix3xX::from_columns(&C_r),
+            P,
+            N,
+            M,
+            geometric: None,
+            ..self
+        }
     }
 
     /// `η = V η'`; stiffness and mass too, by their quadratic forms.
