@@ -28,28 +28,39 @@
 //! # Ok::<(), flexarm_analysis::RecordError>(())
 //! ```
 //!
+//! Linear structures are a part of their own: [`damped_modes`] with what each mode does ([`compliance_parts`],
+//! [`strain_energy_shares`]), and the response to harmonic excitation ([`LinearSystem::response`], [`response_peaks`]).
+//!
 //! Names of ISO 9283:1998 are used where they fit. A simulation is deterministic and has one cycle, so these are
 //! "ISO 9283-style" figures, not a test after the standard: path accuracy AT ([`TcpMetrics::lateral_peak_m`]),
 //! position overshoot OV ([`TcpMetrics::overshoot_m`]), position stabilisation time ([`TcpMetrics::settling_s`], which
 //! counts from the end of the commanded move and not, as the standard does, from the first entry into the band).
 //!
 //! Frames: W world, T tool. Order: linear first, angular second. SI units.
-//! Not here: simulation, robots, files. Everything is a pure function of slices.
+//! Not here: simulation, robots, files. Everything is a pure function of slices and matrices.
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test"))]
 #![allow(non_snake_case, reason = "monogram notation: R_WT, X_WT, p_WT")]
 
 mod contributions;
+mod damped_modes;
 mod hold;
+mod linear_system;
 mod metrics;
+mod participation;
 mod path_frame;
 mod pose_error;
 mod record;
 mod spectrum;
 
 pub use contributions::{ContributionPeak, ContributionPeaks, engineering_strain, tcp_displacement};
+pub use damped_modes::{DampedMode, damped_modes};
 pub use flexarm_kinematics::{Pose, rotation_vector};
 pub use hold::HoldMetrics;
+pub use linear_system::{
+    LinearError, LinearSystem, Quantity, ResponsePeak, Spacing, frequency_grid, response_peaks, with_resonances,
+};
 pub use metrics::{MetricSettings, TcpMetrics, tcp_metrics};
+pub use participation::{compliance_parts, effective_mass, mode_outputs, strain_energy_shares};
 pub use path_frame::{PathFrame, path_frames};
 pub use pose_error::tcp_error;
 pub use record::{ErrorRecord, RecordError};

@@ -14,6 +14,9 @@ const FEWEST_CYCLES: f64 = 1.5;
 /// Power of a line over the lowest power between DC and it.
 const PROMINENCE: f64 = 4.0;
 
+/// Steps of the search for the peak: they narrow two bins down to 2e-5 of a bin.
+const REFINEMENTS: usize = 24;
+
 /// How the signal is faded in and out before the transform.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Taper {
@@ -61,7 +64,7 @@ pub fn strongest_line(times: &[f64], signal: &[[f64; 3]], taper: Taper) -> Optio
     }
 
     let (low, high) = ((peak - 1) as f64 * bin_hz, (peak + 1) as f64 * bin_hz);
-    let hz = golden_maximum(|hz| tapered.power_at(hz), low, high);
+    let hz = golden_maximum(|hz| tapered.power_at(hz), low, high, REFINEMENTS);
     let amplitude = 2.0 * tapered.power_at(hz).sqrt() / tapered.weight;
     (amplitude > 1e-12 * tapered.scale).then_some(SpectralLine { hz, amplitude })
 }
@@ -194,13 +197,13 @@ fn fft(data: &mut [[f64; 2]]) {
     }
 }
 
-/// Place of the maximum of a function with one peak in the interval, by golden-section search.
-fn golden_maximum(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
+/// Place of the maximum of a function with one peak in the interval, by golden-section search in so many steps, each of
+/// which leaves 0.618 of the interval.
+pub(crate) fn golden_maximum(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64, steps: usize) -> f64 {
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
     let (mut left, mut right) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
     let (mut f_left, mut f_right) = (f(left), f(right));
-    // 24 steps narrow two bins down to 2e-5 of a bin.
-    for _ in 0..24 {
+    for _ in 0..steps {
         if f_left > f_right {
             (high, right, f_right) = (right, left, f_left);
             left = high - GOLDEN * (high - low);

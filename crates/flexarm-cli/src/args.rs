@@ -6,6 +6,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use flexarm::{DriveModel, LinkModel, Modelling};
 
 use crate::exchange_args::{ExportArgs, ImportArgs};
+use crate::posed_args::{ModesArgs, ResponseArgs, StaticsArgs};
 use crate::reduce_args::ReduceArgs;
 
 /// How far is a robot's tool from where the rigid model puts it, because its links bend?
@@ -34,6 +35,12 @@ pub(crate) enum Command {
     Inspect(InspectArgs),
     /// Look for everything that is wrong with a robot and a trajectory
     Check(CheckArgs),
+    /// Equilibrium under weight and load at a pose, and the compliance of the TCP
+    Statics(StaticsArgs),
+    /// Natural frequencies, damping and shapes at a pose, drives locked
+    Modes(ModesArgs),
+    /// Frequency response of the TCP to forces on it and to motions of joints
+    Response(ResponseArgs),
     /// Make a flexible link of a finite element mesh, with its checks
     Reduce(Box<ReduceArgs>),
     /// Make a flexible link of matrices from another FE program

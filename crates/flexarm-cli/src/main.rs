@@ -4,6 +4,8 @@
 mod args;
 mod exchange;
 mod exchange_args;
+mod posed;
+mod posed_args;
 mod print;
 mod reduce;
 mod reduce_args;
@@ -69,6 +71,9 @@ fn run(cli: &Cli) -> Result<ExitCode, Error> {
         Command::Run(args) => simulate(cli, args, false),
         Command::Inspect(args) => inspect(cli, args),
         Command::Check(args) => check(cli, args),
+        Command::Statics(args) => posed::statics(cli, args),
+        Command::Modes(args) => posed::modes(cli, args),
+        Command::Response(args) => posed::response(cli, args),
         Command::Reduce(args) => reduce::run(cli, args),
         Command::Import(args) => exchange::import(cli, args),
         Command::Export(args) => exchange::export(cli, args),

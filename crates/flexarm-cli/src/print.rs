@@ -4,7 +4,7 @@ use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 use flexarm::reduce::{MeshListing, ReduceSummary, ReportTable, SetListing};
 use flexarm::{Finding, Inspection, Summary};
 
-fn table(header: &[&str]) -> Table {
+pub(crate) fn table(header: &[&str]) -> Table {
     let mut table = Table::new();
     table.load_style(presets::NOTHING).set_content_arrangement(ContentArrangement::Dynamic);
     if !header.is_empty() {
@@ -14,7 +14,7 @@ fn table(header: &[&str]) -> Table {
 }
 
 /// The table without the blanks that pad its last column.
-fn lines(table: &Table) -> String {
+pub(crate) fn lines(table: &Table) -> String {
     table.to_string().lines().map(|l| l.trim_end().to_owned() + "\n").collect()
 }
 

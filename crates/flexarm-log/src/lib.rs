@@ -4,7 +4,7 @@
 //! same three calls, and [`RecorderSet`] passes them to several files at once. Start at [`CsvRecorder`] for
 //! tables, `McapRecorder` (feature `mcap`) for ROS 2 tools, Foxglove and PlotJuggler, `RrdRecorder` (feature
 //! `rerun`) for the Rerun viewer with meshes and a layout. Pictures of a mesh reduction are a module of their
-//! own, `mesh_picture` (feature `png`).
+//! own, `mesh_picture` (feature `png`); curves as an SVG picture are drawn by [`line_plot`].
 //!
 //! What all three recorders promise:
 //! * a file is created by [`Recorder::begin`] and replaces an existing one only if told to
@@ -49,6 +49,7 @@ mod mcap_file;
 #[cfg(feature = "png")]
 pub mod mesh_picture;
 mod multi;
+mod plot;
 mod record;
 #[cfg(feature = "rerun")]
 mod rrd_file;
@@ -62,6 +63,7 @@ pub use error::LogError;
 #[cfg(feature = "mcap")]
 pub use mcap_file::McapRecorder;
 pub use multi::RecorderSet;
+pub use plot::{Panel, PlotCurve, PlotError, line_plot};
 pub use record::*;
 #[cfg(feature = "rerun")]
 pub use rrd_file::RrdRecorder;

@@ -35,6 +35,7 @@ mod arm;
 mod drive;
 mod error;
 mod generalized_alpha;
+mod linear;
 mod load;
 mod modes;
 mod motion;
@@ -51,6 +52,7 @@ pub use arm::{Damping, ElasticElement, FlexibleArm, GeometricStiffness, InertiaC
 pub use drive::{CurveError, Friction, ServoAxis, TorqueCurve};
 pub use error::StepError;
 pub use generalized_alpha::{AlphaSettings, GeneralizedAlpha};
+pub use linear::{Linear, linearise};
 pub use load::{Load, LoadAxes};
 pub use modes::{Modes, modes_at};
 pub use motion::{Held, MotionFn, PrescribedMotion};

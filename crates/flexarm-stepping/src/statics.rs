@@ -56,7 +56,7 @@ fn unbalanced(arm: &FlexibleArm, data: &mut Data, t: f64, e: &DVector<f64>) -> (
     (spring + g, scale)
 }
 
-fn spring_forces(arm: &FlexibleArm, e: &DVector<f64>) -> DVector<f64> {
+pub(crate) fn spring_forces(arm: &FlexibleArm, e: &DVector<f64>) -> DVector<f64> {
     let mut f = DVector::zeros(e.len());
     for element in &arm.elements {
         let range = arm.offset(element)..arm.offset(element) + element.size;

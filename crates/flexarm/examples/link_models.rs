@@ -51,7 +51,8 @@ fn main() {
     let trajectory = arguments.next().map_or_else(|| robot.default_trajectory.clone().unwrap(), PathBuf::from);
     let motion = Motion::load(&trajectory, &robot.rigid_model().unwrap()).unwrap();
     let duration = motion.trajectory.duration();
-    let arm = |robot: &Robot, modelling: &Modelling| robot.modelled(modelling).unwrap().arm(motion.prescribed()).unwrap();
+    let arm =
+        |robot: &Robot, modelling: &Modelling| robot.modelled(modelling).unwrap().arm(motion.prescribed()).unwrap();
 
     let rigid = arm(&robot, &Modelling { links: LinkModel::Rigid, ..Modelling::default() });
     let (reference_path, _) = run(&rigid, StepperKind::Rk4, duration);
@@ -63,7 +64,9 @@ fn main() {
     let (truth, _) = run(&arm(&robot, &modal(if beams { 20 } else { 12 })), reference(), duration);
     let peak = truth.iter().zip(&reference_path).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
     println!("{}: peak deflection {:.6} mm over {duration} s; step {STEP} s", robot.name, 1e3 * peak);
-    println!("| links | coordinates | sag [mm] | peak error [% of peak] | f1 ... f10 [Hz] | us per simulated ms | times lumped |");
+    println!(
+        "| links | coordinates | sag [mm] | peak error [% of peak] | f1 ... f10 [Hz] | us per simulated ms | times lumped |"
+    );
     println!("| --- | --- | --- | --- | --- | --- | --- |");
 
     let alpha = StepperKind::GeneralizedAlpha(AlphaSettings::default());

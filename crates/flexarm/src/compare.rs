@@ -25,7 +25,7 @@ use crate::twin::RigidTwin;
 /// Largest elastic rotation for which the linear elastic model is taken to hold (rad).
 pub(crate) const ROTATION_LIMIT: f64 = 0.05;
 /// Largest engineering strain of a flexible link before a warning.
-const STRAIN_LIMIT: f64 = 1e-3;
+pub(crate) const STRAIN_LIMIT: f64 = 1e-3;
 
 /// Called with simulated and total time; breaking off stops the run with readable files.
 pub type Progress<'a> = dyn FnMut(f64, f64) -> ControlFlow<()> + 'a;

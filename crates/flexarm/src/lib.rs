@@ -2,7 +2,7 @@
 //!
 //! Data path: robot file → rigid model → substitution → system → stepper → recorder → metrics. [`Robot::load`] does
 //! the first three, [`Motion::load`] reads the trajectory, [`simulate`] runs both robots and returns a [`Summary`].
-//! [`inspect()`] and [`check()`] look at what was loaded; [`mod@reduce`] makes a flexible link of a mesh. Both faces (command line, Python) use this crate alone.
+//! [`inspect()`] and [`check()`] look at what was loaded; [`statics()`], [`modes()`] and [`response()`] hold it at a pose; [`mod@reduce`] makes a flexible link of a mesh. Both faces (command line, Python) use this crate alone.
 //!
 //! ```no_run
 //! use std::ops::ControlFlow;
@@ -30,15 +30,20 @@ mod flexible;
 pub mod import;
 mod inspect;
 mod link_entry;
+mod mode_recording;
+mod modes;
 mod motion;
 mod options;
+mod posed;
 mod record;
 pub mod reduce;
 mod report;
+mod response;
 mod result_files;
 mod robot;
 pub mod robot_file;
 mod stamp;
+mod statics;
 mod summary;
 mod twin;
 
@@ -49,12 +54,17 @@ pub use drive_entry::{Drive, DriveKind};
 pub use error::Error;
 pub use flexible::{FlexibleRobot, LinkChoices, Owner, RobotLink};
 pub use inspect::{FlexibleInfo, Inspection, JointInfo, LinkInfo, TcpInfo, inspect, parse_joint_values};
+pub use mode_recording::{ModeMovie, record_modes};
+pub use modes::{ModeFigures, ModeTable, modes};
 pub use motion::Motion;
 pub use options::{DriveModel, LinkModel, Modelling, Outputs, RunOptions};
 pub use report::{markdown, rows};
+pub use response::{PeakFigures, Response, ResponseCurve, ResponseFiles, ResponseOutputs, ResponseRequest, response};
 pub use robot::{LoadOptions, Robot, TCP_FRAME};
+pub use statics::{ElementStatics, Statics, parse_wrench, statics};
 pub use summary::{Files, LinkFigures, StepperFigures, Summary, TcpFigures};
 
+pub use flexarm_analysis::{Quantity, Spacing};
 pub use flexarm_stepping::{
     AlphaSettings, ConstraintForm, ReferenceMethod, ReferenceSettings, SpookPreset, SpookSettings, Start, StepError,
     StepperKind,

@@ -89,8 +89,6 @@ pub(crate) fn header(
     arm: &FlexibleArm,
     links_model: &str,
 ) -> RunHeader {
-    let model = &arm.model;
-    let links = ordered_links(robot);
     let group = |name: &str, rows: &[(&str, String)]| {
         (name.to_owned(), rows.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect::<Vec<_>>())
     };
@@ -126,6 +124,20 @@ pub(crate) fn header(
             ],
         ),
     ];
+    RunHeader {
+        trajectory: motion.name.clone(),
+        metadata,
+        description: description(robot, motion, options, links_model, &frequencies),
+        has_rigid: options.with_twin,
+        log_rate_hz: options.log_rate_hz,
+        ..robot_header(robot, arm)
+    }
+}
+
+/// The part of a header that the robot alone decides.
+pub(crate) fn robot_header(robot: &Robot, arm: &FlexibleArm) -> RunHeader {
+    let model = &arm.model;
+    let links = ordered_links(robot);
     let read = |name: &str, media_type: &str, path: &std::path::Path| {
         std::fs::read(path).ok().map(|bytes| Attachment { name: name.into(), media_type: media_type.into(), bytes })
     };
@@ -135,19 +147,15 @@ pub(crate) fn header(
     }
     RunHeader {
         robot: robot.name.clone(),
-        trajectory: motion.name.clone(),
         urdf: located_urdf(robot),
         joints: model.coordinates()[..model.n_actuated()].iter().map(|c| c.joint.clone()).collect(),
         prismatic: model.coordinates()[..model.n_actuated()].iter().map(|c| c.kind == "prismatic").collect(),
         meshes: meshes(robot, &links),
         links,
-        elements,
+        elements: arm.elements.iter().map(|e| e.name.clone()).collect(),
         tcp: robot.tcp.0.clone(),
-        metadata,
         attachments,
-        description: description(robot, motion, options, links_model, &frequencies),
-        has_rigid: options.with_twin,
-        log_rate_hz: options.log_rate_hz,
+        ..RunHeader::default()
     }
 }
 

@@ -1,0 +1,248 @@
+//! A linear structure with inputs and outputs, and its answer to harmonic excitation.
+//!
+//! ```text
+//! M q̈ + D q̇ + K q = B_0 u + B_1 u̇ + B_2 ü        y = C q + F u
+//! H(ω) = C (K + iωD - ω²M)^-1 (B_0 + iωB_1 - ω²B_2) + F
+//! ```
+//! A force has `B_0` alone. A prescribed motion has `B_2` (inertia) and, with weight, `B_0`, and the rigid part `F`.
+//! Start at [`LinearSystem::response`]; [`response_peaks`] finds resonances, [`frequency_grid`] places frequencies.
+
+use std::fmt;
+
+use nalgebra::{Complex, DMatrix};
+
+use crate::spectrum::golden_maximum;
+
+/// Matrices of a linear structure; see the module page. n coordinates, m inputs, p outputs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LinearSystem {
+    /// Mass, n×n.
+    pub M: DMatrix<f64>,
+    /// Damping, n×n.
+    pub D: DMatrix<f64>,
+    /// Stiffness, n×n.
+    pub K: DMatrix<f64>,
+    /// Force per input, n×m.
+    pub B_0: DMatrix<f64>,
+    /// Force per rate of input, n×m.
+    pub B_1: DMatrix<f64>,
+    /// Force per second rate of input, n×m.
+    pub B_2: DMatrix<f64>,
+    /// Output per coordinate, p×n.
+    pub C: DMatrix<f64>,
+    /// Output per input directly, p×m.
+    pub F: DMatrix<f64>,
+}
+
+/// What the response is in: the output itself or a rate of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Quantity {
+    /// The output y.
+    #[default]
+    Displacement,
+    /// `ẏ`: the factor `iω`.
+    Velocity,
+    /// `ÿ`: the factor `-ω²`.
+    Acceleration,
+}
+
+impl Quantity {
+    /// Factor on the response at `omega` (rad/s).
+    pub fn factor(self, omega: f64) -> Complex<f64> {
+        match self {
+            Self::Displacement => Complex::new(1.0, 0.0),
+            Self::Velocity => Complex::new(0.0, omega),
+            Self::Acceleration => Complex::new(-omega * omega, 0.0),
+        }
+    }
+}
+
+impl LinearSystem {
+    /// Whether all matrices fit each other.
+    ///
+    /// # Errors
+    /// [`LinearError::Size`], [`LinearError::NotFinite`] for the first that does not.
+    pub fn check(&self) -> Result<(), LinearError> {
+        let (n, m, p) = (self.M.nrows(), self.F.ncols(), self.F.nrows());
+        let shapes = [
+            ("mass matrix", &self.M, (n, n)),
+            ("damping matrix", &self.D, (n, n)),
+            ("stiffness matrix", &self.K, (n, n)),
+            ("input matrix B_0", &self.B_0, (n, m)),
+            ("input matrix B_1", &self.B_1, (n, m)),
+            ("input matrix B_2", &self.B_2, (n, m)),
+            ("output matrix C", &self.C, (p, n)),
+            ("direct matrix F", &self.F, (p, m)),
+        ];
+        for (what, matrix, expected) in shapes {
+            if matrix.shape() != expected {
+                return Err(LinearError::Size { what, found: matrix.shape(), expected });
+            }
+            if matrix.iter().any(|x| !x.is_finite()) {
+                return Err(LinearError::NotFinite { what });
+            }
+        }
+        Ok(())
+    }
+
+    /// `H(ω)`, p×m, at `omega` (rad/s): complex amplitude of each output per unit amplitude of each input.
+    ///
+    /// At `omega = 0` it is the static answer, `C K^-1 B_0 + F`.
+    ///
+    /// # Errors
+    /// [`LinearError::Resonance`] where the dynamic stiffness is singular (no damping, or a rigid motion at 0), and as
+    /// [`LinearSystem::check`].
+    pub fn response(&self, omega: f64) -> Result<DMatrix<Complex<f64>>, LinearError> {
+        self.check()?;
+        let n = self.M.nrows();
+        let direct = self.F.map(|x| Complex::new(x, 0.0));
+        if n == 0 {
+            return Ok(direct);
+        }
+        let square = omega * omega;
+        let combined = |zero: &DMatrix<f64>, one: &DMatrix<f64>, two: &DMatrix<f64>| {
+            DMatrix::from_fn(zero.nrows(), zero.ncols(), |i, j| {
+                Complex::new(zero[(i, j)] - square * two[(i, j)], omega * one[(i, j)])
+            })
+        };
+        let excitation = combined(&self.B_0, &self.B_1, &self.B_2);
+        let amplitude = combined(&self.K, &self.D, &self.M).lu().solve(&excitation);
+        let amplitude = amplitude.filter(|x| x.iter().all(|x| x.re.is_finite() && x.im.is_finite()));
+        let amplitude = amplitude.ok_or(LinearError::Resonance { omega })?;
+        Ok(self.C.map(|x| Complex::new(x, 0.0)) * amplitude + direct)
+    }
+}
+
+/// Spacing of the frequencies of a response.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Spacing {
+    /// Equal ratios.
+    #[default]
+    Logarithmic,
+    /// Equal steps.
+    Linear,
+}
+
+/// Frequencies from one to the other, both included, ascending; at least two.
+///
+/// With [`Spacing::Logarithmic`] `from` must be positive.
+pub fn frequency_grid(from: f64, to: f64, points: usize, spacing: Spacing) -> Vec<f64> {
+    let last = points.max(2) - 1;
+    let at = |k: usize| {
+        let part = k as f64 / last as f64;
+        match spacing {
+            Spacing::Logarithmic => from * (to / from).powf(part),
+            Spacing::Linear => from + (to - from) * part,
+        }
+    };
+    // The ends are as given, not as rounded.
+    (0..=last)
+        .map(|k| {
+            if k == 0 {
+                from
+            } else if k == last {
+                to
+            } else {
+                at(k)
+            }
+        })
+        .collect()
+}
+
+/// A grid with frequencies put in around each resonance, so that no peak falls between two points.
+///
+/// * `grid`: ascending. `modes`: frequency (in the unit of the grid) and damping ratio of each mode; what lies outside
+///   the grid is left out.
+pub fn with_resonances(grid: &[f64], modes: &[(f64, f64)]) -> Vec<f64> {
+    let (Some(&from), Some(&to)) = (grid.first(), grid.last()) else { return Vec::new() };
+    let mut all = grid.to_vec();
+    for &(frequency, ratio) in modes {
+        // Half-power width is 2 ζ f; without damping the peak has none, and a nearby point will do.
+        let width = ratio.abs().clamp(1e-6, 0.5);
+        let steps = [-4.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 4.0];
+        all.extend(steps.map(|k: f64| frequency * (1.0 + k * width)).into_iter().filter(|f| *f > from && *f < to));
+    }
+    all.sort_by(f64::total_cmp);
+    all.dedup();
+    all
+}
+
+/// A maximum of a response over frequency.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ResponsePeak {
+    /// Where, in the unit of the grid.
+    pub frequency: f64,
+    /// How high.
+    pub magnitude: f64,
+}
+
+/// Local maxima of `magnitude` over a grid of frequencies, each refined between its neighbours by golden-section
+/// search; the highest first. The ends of the grid are not peaks.
+///
+/// * `grid`: ascending, fine enough that a peak has a point of its own ([`with_resonances`]). `values`: magnitudes
+///   there.
+pub fn response_peaks(grid: &[f64], values: &[f64], magnitude: impl Fn(f64) -> f64) -> Vec<ResponsePeak> {
+    let mut peaks: Vec<ResponsePeak> = (1..grid.len().saturating_sub(1))
+        .filter(|&k| values[k] >= values[k - 1] && values[k] > values[k + 1])
+        .map(|k| {
+            // 45 steps narrow the neighbourhood to 4e-10 of it, which is all that a maximum lets one see.
+            let refined = golden_maximum(&magnitude, grid[k - 1], grid[k + 1], 45);
+            let top = magnitude(refined);
+            if top >= values[k] { (refined, top) } else { (grid[k], values[k]) }
+        })
+        .map(|(frequency, magnitude)| ResponsePeak { frequency, magnitude })
+        .collect();
+    peaks.sort_by(|a, b| b.magnitude.total_cmp(&a.magnitude));
+    peaks
+}
+
+/// Why a linear structure has no answer.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum LinearError {
+    /// A matrix of the wrong size.
+    Size {
+        /// Which.
+        what: &'static str,
+        /// Its rows and columns.
+        found: (usize, usize),
+        /// What fits the others.
+        expected: (usize, usize),
+    },
+    /// A NaN or infinite entry.
+    NotFinite {
+        /// In which matrix.
+        what: &'static str,
+    },
+    /// A matrix that must be positive definite is not.
+    NotPositiveDefinite {
+        /// Which.
+        what: &'static str,
+    },
+    /// The iteration for the eigenvalues did not end.
+    NotConverged,
+    /// The dynamic stiffness is singular.
+    Resonance {
+        /// Where, rad/s.
+        omega: f64,
+    },
+}
+
+impl fmt::Display for LinearError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Size { what, found, expected } => {
+                write!(f, "the {what} has {} x {} entries, expected {} x {}", found.0, found.1, expected.0, expected.1)
+            }
+            Self::NotFinite { what } => write!(f, "the {what} has a NaN or infinite entry"),
+            Self::NotPositiveDefinite { what } => write!(f, "the {what} is not positive definite"),
+            Self::NotConverged => write!(f, "the eigenvalues of the damped structure were not found"),
+            Self::Resonance { omega } => {
+                let hz = omega / std::f64::consts::TAU;
+                write!(f, "the structure has an undamped resonance at {hz} Hz, where its response is infinite")
+            }
+        }
+    }
+}
+
+impl std::error::Error for LinearError {}

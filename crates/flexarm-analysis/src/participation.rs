@@ -1,0 +1,59 @@
+//! What a mode does: at the tool, and in which element its energy sits.
+
+use nalgebra::{Complex, DMatrix, DVector};
+
+use crate::damped_modes::DampedMode;
+
+/// Motion of the outputs in a mode, `C φ`, for a shape of unit modal mass.
+///
+/// * `C`: p×n, output per coordinate (for the tool its Jacobian, rows linear first).
+pub fn mode_outputs(mode: &DampedMode, C: &DMatrix<f64>) -> DVector<Complex<f64>> {
+    C.map(|x| Complex::new(x, 0.0)) * &mode.shape
+}
+
+/// Effective mass of a mode at an output: the single mass there that would store the same kinetic energy at the same
+/// speed, `1 / |c φ|²` (kg, or kg m² for an angle). Infinite at a node of the mode.
+pub fn effective_mass(output: Complex<f64>) -> f64 {
+    1.0 / output.norm_sqr()
+}
+
+/// Part of the static compliance `c K^-1 cᵀ` of each output that a mode carries; over all modes the parts add up to the
+/// compliance, whatever the damping.
+///
+/// ```text
+/// c K^-1 cᵀ = Σ 2 Re (c φ)² / (-λ a)        a = φᵀ (2 λ M + D) φ        (half of that for a real λ)
+/// ```
+/// Without damping this is `(c φ)² / ω²`. `None` for a rigid motion, which has no compliance.
+///
+/// * `C`: p×n, output per coordinate. Returns p numbers (m/N, rad/(N m)).
+pub fn compliance_parts(
+    mode: &DampedMode,
+    M: &DMatrix<f64>,
+    D: &DMatrix<f64>,
+    C: &DMatrix<f64>,
+) -> Option<DVector<f64>> {
+    let lambda = mode.eigenvalue;
+    if lambda.norm() == 0.0 {
+        return None;
+    }
+    let weighted = DMatrix::from_fn(M.nrows(), M.ncols(), |i, j| 2.0 * lambda * M[(i, j)] + D[(i, j)]);
+    let a = mode.shape.dot(&(weighted * &mode.shape));
+    let pair = if lambda.im > 0.0 { 2.0 } else { 1.0 };
+    Some(mode_outputs(mode, C).map(|output| pair * (output * output / (-lambda * a)).re))
+}
+
+/// Share of each element in the strain energy of a shape, `φᴴ K_k φ` over the sum; zeros where there is none.
+///
+/// * `blocks`: first coordinate and stiffness of each element.
+pub fn strain_energy_shares(shape: &DVector<Complex<f64>>, blocks: &[(usize, DMatrix<f64>)]) -> Vec<f64> {
+    let energies: Vec<f64> = blocks
+        .iter()
+        .map(|(first, K)| {
+            let part = shape.rows(*first, K.nrows());
+            let (re, im) = (part.map(|x| x.re), part.map(|x| x.im));
+            re.dot(&(K * &re)) + im.dot(&(K * &im))
+        })
+        .collect();
+    let total: f64 = energies.iter().sum();
+    energies.iter().map(|e| if total > 0.0 { e / total } else { 0.0 }).collect()
+}

@@ -1,0 +1,210 @@
+//! `flexarm statics`, `flexarm modes` and `flexarm response`: flags to a request, tables for people.
+
+use std::process::ExitCode;
+
+use comfy_table::CellAlignment;
+use flexarm::{
+    Error, ModeMovie, ModeTable, Outputs, Quantity, Response, ResponseOutputs, ResponseRequest, Robot, Spacing, Statics,
+};
+
+use crate::args::Cli;
+use crate::posed_args::{ModesArgs, PoseArgs, QuantityName, ResponseArgs, SpacingName, StaticsArgs};
+use crate::print::{lines, table, warning};
+use crate::{answer, load_options, shipped, to_json};
+
+/// Directions at the TCP.
+const AXES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
+/// Columns that a terminal has room for: peaks of a response.
+const SHOWN_PEAKS: usize = 3;
+
+fn load(pose: &PoseArgs) -> Result<Robot, Error> {
+    Robot::load(&shipped::robot(Some(&pose.robot)), &load_options(&pose.load)?)
+}
+
+fn warn(cli: &Cli, warnings: &[String]) {
+    if !cli.quiet {
+        warnings.iter().for_each(|text| warning(text));
+    }
+}
+
+pub(crate) fn statics(cli: &Cli, args: &StaticsArgs) -> Result<ExitCode, Error> {
+    let wrench = args.wrench.as_deref().map_or(Ok([0.0; 6]), flexarm::parse_wrench)?;
+    let found =
+        flexarm::statics(&load(&args.pose)?, &args.pose.modelling.modelling(), args.pose.at.as_deref(), wrench)?;
+    warn(cli, &found.warnings);
+    answer(cli, || to_json(&found), || statics_text(&found));
+    Ok(ExitCode::SUCCESS)
+}
+
+pub(crate) fn modes(cli: &Cli, args: &ModesArgs) -> Result<ExitCode, Error> {
+    if args.count == 0 {
+        return Err(Error::Usage("--count must be at least 1".into()));
+    }
+    let (robot, at) = (load(&args.pose)?, args.pose.at.as_deref());
+    let modelling = args.pose.modelling.modelling();
+    let found = match &args.output {
+        Some(folder) => {
+            let outputs = Outputs { overwrite: args.force, ..Outputs::everything(folder) };
+            let movie = ModeMovie { seconds: args.seconds, tool_motion_m: args.tool_motion };
+            flexarm::record_modes(&robot, &modelling, at, args.count, &movie, &outputs)?
+        }
+        None => flexarm::modes(&robot, &modelling, at, args.count)?,
+    };
+    warn(cli, &found.warnings);
+    answer(cli, || to_json(&found), || modes_text(&found));
+    Ok(ExitCode::SUCCESS)
+}
+
+pub(crate) fn response(cli: &Cli, args: &ResponseArgs) -> Result<ExitCode, Error> {
+    let robot = load(&args.pose)?;
+    let trimmed = |words: &[String]| words.iter().map(|w| w.trim().to_owned()).collect();
+    let request = ResponseRequest {
+        inputs: trimmed(&args.input),
+        outputs: trimmed(&args.output),
+        quantity: match args.quantity {
+            QuantityName::Displacement => Quantity::Displacement,
+            QuantityName::Velocity => Quantity::Velocity,
+            QuantityName::Acceleration => Quantity::Acceleration,
+        },
+        from_hz: args.from,
+        to_hz: args.to,
+        points: args.points,
+        spacing: if args.spacing == SpacingName::Log { Spacing::Logarithmic } else { Spacing::Linear },
+    };
+    let outputs = (!args.no_files).then(|| {
+        let new_folder = || shipped::new_output_folder(&format!("{}-response", robot.name));
+        ResponseOutputs { folder: args.folder.clone().unwrap_or_else(new_folder), overwrite: args.force }
+    });
+    let found = flexarm::response(
+        &robot,
+        &args.pose.modelling.modelling(),
+        args.pose.at.as_deref(),
+        &request,
+        outputs.as_ref(),
+    )?;
+    warn(cli, &found.warnings);
+    answer(cli, || to_json(&found), || response_text(&found));
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Numbers to the right from a column on.
+fn right(table: &mut comfy_table::Table, from: usize) {
+    for k in from..table.column_count() {
+        if let Some(column) = table.column_mut(k) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+}
+
+fn pose_text(joints: &[String], at: &[f64]) -> String {
+    let values: Vec<String> = joints.iter().zip(at).map(|(joint, q)| format!("{joint} {q:.4}")).collect();
+    values.join(", ")
+}
+
+fn triple(values: &[f64], scale: f64) -> Vec<String> {
+    values.iter().map(|x| format!("{:.4}", scale * x)).collect()
+}
+
+fn statics_text(s: &Statics) -> String {
+    let mut out = format!("{} at {}\nTCP on {}, world axes\n", s.robot, pose_text(&s.joints, &s.at), s.tcp);
+    let mut t = table(&["", "x [mm]", "y [mm]", "z [mm]", "rx [mrad]", "ry [mrad]", "rz [mrad]"]);
+    let row = |name: &str, d: &[f64; 3], r: &[f64; 3]| [vec![name.to_owned()], triple(d, 1e3), triple(r, 1e3)].concat();
+    t.add_row(row("sag by weight", &s.sag_m, &s.sag_rad));
+    if s.wrench != [0.0; 6] {
+        t.add_row(row("with the wrench", &s.tcp_displacement_m, &s.tcp_rotation_rad));
+    }
+    for e in &s.elements {
+        t.add_row(row(&format!("  by {}", e.name), &e.tcp_displacement_m, &e.tcp_rotation_rad));
+    }
+    right(&mut t, 1);
+    out += &lines(&t);
+    out += "\ncompliance [um/N, urad/N; um/(N m), urad/(N m)]\n";
+    let mut t = table(&["", "fx", "fy", "fz", "tx", "ty", "tz"]);
+    for (axis, values) in AXES.iter().zip(&s.compliance) {
+        t.add_row([vec![(*axis).to_owned()], triple(values, 1e6)].concat());
+    }
+    right(&mut t, 1);
+    out += &lines(&t);
+    let holding: Vec<String> =
+        s.joints.iter().zip(&s.holding_torque).map(|(joint, torque)| format!("{joint} {torque:.2}")).collect();
+    out + &format!("\nholding torques [N m or N]: {}\n", holding.join(", "))
+}
+
+fn modes_text(m: &ModeTable) -> String {
+    let mut out = format!("{} at {}, drives locked\n", m.robot, pose_text(&m.joints, &m.at));
+    if m.modes.is_empty() {
+        return out + "no modes: nothing is flexible\n";
+    }
+    let head = ["mode", "Hz", "damping [%]", "moves the TCP in", "mass there [kg]"].map(str::to_owned);
+    let shares = m.elements.iter().map(|name| format!("{name} [%]"));
+    let compliance = AXES[..3].iter().map(|axis| format!("of C_{axis} [%]"));
+    let head: Vec<String> = head.into_iter().chain(shares).chain(compliance).collect();
+    let mut t = table(&head.iter().map(String::as_str).collect::<Vec<_>>());
+    let percent = |x: f64| format!("{:.1}", 100.0 * x);
+    for (k, mode) in m.modes.iter().enumerate() {
+        let mut row = vec![
+            (k + 1).to_string(),
+            format!("{:.3}", mode.frequency_hz),
+            format!("{:.3}", 100.0 * mode.damping_ratio),
+            direction(&mode.tcp),
+            // Of the whole translation.
+            mass(mode.tcp[..3].iter().map(|x| x * x).sum()),
+        ];
+        row.extend(mode.strain_energy.iter().map(|x| percent(*x)));
+        row.extend(mode.compliance_share[..3].iter().map(|x| x.map_or_else(|| "-".into(), percent)));
+        t.add_row(row);
+    }
+    right(&mut t, 1);
+    out += &lines(&t);
+    let f = &m.files;
+    for (what, path) in [("MCAP", &f.mcap), ("Rerun", &f.rrd), ("CSV", &f.csv)] {
+        if let Some(path) = path {
+            out += &format!("{what:<7} {path}\n");
+        }
+    }
+    if m.total > m.modes.len() {
+        out += &format!("{} more modes: --count\n", m.total - m.modes.len());
+    }
+    out
+}
+
+/// The one mass that moves like the mode, for the square of the motion at unit modal mass.
+fn mass(square: f64) -> String {
+    if square > 1e-12 { format!("{:.2}", 1.0 / square) } else { "-".into() }
+}
+
+/// Components of a translation that count, the largest as 1.
+fn direction(tcp: &[f64; 6]) -> String {
+    let largest = tcp[..3].iter().fold(0.0f64, |top, x| top.max(x.abs()));
+    if largest < 1e-9 {
+        return "rotation".into();
+    }
+    let part = |(axis, x): (&&str, &f64)| {
+        let share = x / largest;
+        (share.abs() > 0.05).then(|| format!("{share:+.2} {axis}"))
+    };
+    AXES[..3].iter().zip(&tcp[..3]).filter_map(part).collect::<Vec<_>>().join(" ")
+}
+
+fn response_text(r: &Response) -> String {
+    let mut out = format!("{} at {}, other drives locked\n", r.robot, pose_text(&r.joints, &r.at));
+    let head = ["from", "to", "unit", "at rest"].into_iter().map(str::to_owned);
+    let head: Vec<String> = head.chain((1..=SHOWN_PEAKS).map(|k| format!("peak {k}"))).collect();
+    let mut t = table(&head.iter().map(String::as_str).collect::<Vec<_>>());
+    for c in &r.curves {
+        let at_rest = c.at_rest.map_or_else(|| "-".into(), |x| format!("{x:.4e}"));
+        let mut row = vec![c.input.clone(), c.output.clone(), c.unit.clone(), at_rest];
+        row.extend(
+            c.peaks.iter().take(SHOWN_PEAKS).map(|p| format!("{:.4e} at {:.2} Hz", p.magnitude, p.frequency_hz)),
+        );
+        t.add_row(row);
+    }
+    right(&mut t, 3);
+    out += &lines(&t);
+    for (what, path) in [("CSV", &r.files.csv), ("plot", &r.files.plot), ("figures", &r.files.json)] {
+        if let Some(path) = path {
+            out += &format!("{what:<7} {path}\n");
+        }
+    }
+    out
+}

@@ -1,0 +1,118 @@
+//! Words of `flexarm statics`, `flexarm modes` and `flexarm response`.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+use crate::args::{ModellingArgs, RobotArgs};
+
+const RESPONSE_EXAMPLES: &str = "\
+Examples:
+  Dynamic compliance of the tool in all directions, table and plot in a new folder of out/:
+      flexarm response kr210 --at 0,-60deg,60deg,0,0,0
+  How the tool shakes when joint 2 does, up to 100 Hz, as acceleration:
+      flexarm response kr210 --input joint_2 --output x,z --quantity acceleration --from 1 --to 100
+  Rotations under moments, figures only:
+      flexarm response kr210 --input torque-x,torque-y,torque-z --output rx,ry,rz --no-files
+
+Inputs: force-x, force-y, force-z, torque-x, torque-y, torque-z on the TCP (world axes), or names of joints.
+Outputs: x, y, z, rx, ry, rz of the TCP (world axes).";
+
+/// A robot at a pose.
+#[derive(Debug, Args)]
+pub(crate) struct PoseArgs {
+    /// robot.toml, a folder with one, a .urdf or .xacro file, or the name of a shipped robot
+    pub(crate) robot: PathBuf,
+    /// Joint values in coordinate order, or name=value pairs (rad or m; 30deg for degrees) [default: all zero]
+    #[arg(long, value_name = "Q1,Q2,...", allow_hyphen_values = true)]
+    pub(crate) at: Option<String>,
+    #[command(flatten)]
+    pub(crate) modelling: ModellingArgs,
+    #[command(flatten)]
+    pub(crate) load: RobotArgs,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct StaticsArgs {
+    #[command(flatten)]
+    pub(crate) pose: PoseArgs,
+    /// Force and moment on the TCP besides weight, world axes (N, N m)
+    #[arg(long, value_name = "FX,FY,FZ[,TX,TY,TZ]", allow_hyphen_values = true)]
+    pub(crate) wrench: Option<String>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ModesArgs {
+    #[command(flatten)]
+    pub(crate) pose: PoseArgs,
+    /// How many modes, from the lowest
+    #[arg(long, value_name = "N", default_value_t = 10)]
+    pub(crate) count: usize,
+    /// Write a recording to this folder, in which each mode swings after another
+    #[arg(short, long, value_name = "FOLDER")]
+    pub(crate) output: Option<PathBuf>,
+    /// Overwrite what is in the output folder
+    #[arg(long, requires = "output")]
+    pub(crate) force: bool,
+    /// How long each mode swings in the recording (s)
+    #[arg(long, value_name = "SECONDS", default_value_t = 3.0, requires = "output", allow_hyphen_values = true)]
+    pub(crate) seconds: f64,
+    /// How far the TCP moves in the recording (m) [default: a twentieth of the arm's reach]
+    #[arg(long, value_name = "METRES", requires = "output", allow_hyphen_values = true)]
+    pub(crate) tool_motion: Option<f64>,
+}
+
+#[derive(Debug, Args)]
+#[command(after_long_help = RESPONSE_EXAMPLES, after_help = "More, with examples: flexarm response --help")]
+pub(crate) struct ResponseArgs {
+    #[command(flatten)]
+    pub(crate) pose: PoseArgs,
+    /// What shakes the arm: force-x ... torque-z on the TCP, or joints
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',', default_value = "force-x,force-y,force-z")]
+    pub(crate) input: Vec<String>,
+    /// What answers: x, y, z, rx, ry, rz of the TCP
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',', default_value = "x,y,z")]
+    pub(crate) output: Vec<String>,
+    /// Of the outputs
+    #[arg(long, value_enum, default_value_t = QuantityName::Displacement)]
+    pub(crate) quantity: QuantityName,
+    /// Lowest frequency (Hz) [default: a tenth of the first mode's]
+    #[arg(long, value_name = "HZ", allow_hyphen_values = true)]
+    pub(crate) from: Option<f64>,
+    /// Highest frequency (Hz) [default: twice the sixth mode's]
+    #[arg(long, value_name = "HZ", allow_hyphen_values = true)]
+    pub(crate) to: Option<f64>,
+    /// How many frequencies; more are put in around resonances
+    #[arg(long, value_name = "N", default_value_t = 500)]
+    pub(crate) points: usize,
+    /// Of the frequencies
+    #[arg(long, value_enum, default_value_t = SpacingName::Log)]
+    pub(crate) spacing: SpacingName,
+    /// Output folder [default: a new one in out/]
+    #[arg(short = 'o', long = "output-folder", value_name = "FOLDER")]
+    pub(crate) folder: Option<PathBuf>,
+    /// Overwrite what is in the output folder
+    #[arg(long)]
+    pub(crate) force: bool,
+    /// Write nothing, only print the figures
+    #[arg(long, conflicts_with_all = ["folder", "force"])]
+    pub(crate) no_files: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum QuantityName {
+    /// m, rad
+    Displacement,
+    /// m/s, rad/s
+    Velocity,
+    /// m/s², rad/s²
+    Acceleration,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum SpacingName {
+    /// Equal ratios
+    Log,
+    /// Equal steps
+    Linear,
+}

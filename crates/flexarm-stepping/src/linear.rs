@@ -1,0 +1,283 @@
+//! The arm as a linear structure about a static pose: what statics, modes and frequency response are made of.
+//!
+//! ```text
+//! M ẍ + D ẋ + K x = Jᵀ F - M_a q̈_a - D_a q̇_a - K_a q_a        V_T = J ẋ + J_a q̇_a
+//! ```
+//! for small motions x of the free coordinates and commands q_a of the joints about the equilibrium under weight and a
+//! constant wrench at a tool frame T. A prescribed joint is where its command is; one that is driven by torque is free, and
+//! its servo is a spring and a damper towards the command, with its feed-forward, without its sampling, its limit and its
+//! integral (which at rest holds the motor where it is commanded). Start at [`linearise`]. Everything that knows how the coordinates are laid out is
+//! in the few functions of this file. Not here: eigenvalues and frequency response (`flexarm-analysis`).
+
+use std::ops::Range;
+
+use flexarm_kinematics::{
+    Data, Frame, Pose, State, Wrench, forward_kinematics, frame_jacobian, gravity_forces, mass_matrix,
+};
+use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX};
+
+use crate::arm::{FlexibleArm, Servo};
+use crate::error::StepError;
+use crate::reduced::add_geometric_forces;
+use crate::statics::{spring_forces, static_equilibrium, with_curves};
+
+/// Accepted unbalanced force over the largest force, as in [`static_equilibrium`].
+const TOLERANCE: f64 = 1e-13;
+/// Step of the central differences of static forces (m, rad).
+const DIFFERENCE: f64 = 1e-6;
+/// Most Newton iterations.
+const MOST_ITERATIONS: usize = 30;
+
+/// Linear structure about a static pose; n free coordinates (joints driven by torque, then elastic ones), m joints.
+/// World axes, at the tool point, linear first.
+#[derive(Clone, Debug)]
+pub struct Linear {
+    /// Free coordinates at the equilibrium.
+    pub equilibrium: DVector<f64>,
+    /// All coordinates there.
+    pub q: DVector<f64>,
+    /// Mass matrix of the free coordinates, n×n.
+    pub M: DMatrix<f64>,
+    /// Damping matrix, n×n.
+    pub D: DMatrix<f64>,
+    /// Tangent stiffness: springs, change of weight and of the wrench, n×n. Symmetric unless there is a constant moment,
+    /// which is not conservative.
+    pub K: DMatrix<f64>,
+    /// How many of the free coordinates are joints driven by torque; they come first.
+    pub driven: usize,
+    /// The part of `K` that is springs alone, n×n, block diagonal.
+    pub springs: DMatrix<f64>,
+    /// Name and free coordinates of each elastic element.
+    pub elements: Vec<(String, Range<usize>)>,
+    /// Forces on the free coordinates per acceleration of the commands, n×m.
+    pub M_a: DMatrix<f64>,
+    /// Per their rates, n×m; zero for prescribed joints.
+    pub D_a: DMatrix<f64>,
+    /// Per the commands themselves, n×m.
+    pub K_a: DMatrix<f64>,
+    /// Twist of the tool per rate of the free coordinates, 6×n.
+    pub J: Matrix6xX<f64>,
+    /// Twist of the tool per rate of the commands, the structure not yielding, 6×m; zero for joints driven by torque.
+    pub J_a: Matrix6xX<f64>,
+    /// Tool in the world at the equilibrium.
+    pub X_WT: Pose,
+    /// Forces with which the drives hold the pose, m.
+    pub holding: DVector<f64>,
+    /// Unbalanced force over the largest force at the equilibrium.
+    pub residual: f64,
+    /// Newton iterations beyond those under weight alone.
+    pub iterations: usize,
+}
+
+impl Linear {
+    /// Cartesian compliance of the tool, `J K^-1 Jᵀ` (m/N, rad/N; m/(N m), rad/(N m)), motors held.
+    ///
+    /// # Errors
+    /// [`StepError::Singular`] where a motion has no stiffness.
+    pub fn compliance(&self) -> Result<Matrix6<f64>, StepError> {
+        let n = self.K.nrows() - self.driven;
+        if n == 0 {
+            return Ok(Matrix6::zeros());
+        }
+        let J = self.J.columns(self.driven, n);
+        let K = self.K.view((self.driven, self.driven), (n, n)).into_owned();
+        let yielding = K
+            .lu()
+            .solve(&J.transpose())
+            .ok_or(StepError::Singular { matrix: "static stiffness (with the effect of weight)", t: 0.0 })?;
+        let C = J * yielding;
+        Ok(Matrix6::from_fn(|i, j| C[(i, j)]))
+    }
+}
+
+/// The arm about its equilibrium at time `t` of the motion, prescribed joints locked there.
+///
+/// * `tool`: a frame of the arm's model; `F_T_W`: constant wrench on it, at its origin, in world axes, which stays the
+///   same and follows the point when the arm yields. The arm's own loads act as well.
+///
+/// # Errors
+/// [`StepError::NoEquilibrium`], [`StepError::Singular`].
+pub fn linearise(arm: &FlexibleArm, tool: &Frame, F_T_W: &Wrench, t: f64) -> Result<Linear, StepError> {
+    let model = &arm.model;
+    let (m, nv, ne) = (model.n_actuated(), model.nv(), model.n_elastic());
+    let driven = arm.torque_driven.len();
+    // Places of the free coordinates among all.
+    let free: Vec<usize> = arm.torque_driven.iter().copied().chain(m..nv).collect();
+    let n = free.len();
+    let mut data = Data::new(model);
+    let statics = Statics { arm, tool, F_T_W: *F_T_W, t };
+
+    // K e + p(e) = 0 with the motors held, from the equilibrium under weight.
+    let (at_rest, mut e) = (arm.stiffness(), static_equilibrium(arm, t)?);
+    let (mut residual, mut iterations) = (f64::INFINITY, 0);
+    let (q, p) = loop {
+        let q = all_coordinates(arm, t, &e);
+        let p = statics.forces(&mut data, &q);
+        let spring = spring_forces(arm, &e);
+        let elastic_p = p.rows(m, ne);
+        let scale = elastic_p.amax().max(spring.amax()).max(f64::MIN_POSITIVE);
+        let r = &spring + elastic_p;
+        let previous = residual;
+        residual = if ne == 0 { 0.0 } else { r.amax() / scale };
+        if residual <= TOLERANCE || (iterations > 2 && residual < 1e-9 && residual >= 0.5 * previous) {
+            break (q, p);
+        }
+        if !residual.is_finite() || iterations == MOST_ITERATIONS {
+            return Err(StepError::NoEquilibrium { t, iterations, residual });
+        }
+        let tangent = with_curves(arm, &at_rest, &e) + statics.slopes(&mut data, &q).view((m, m), (ne, ne));
+        let singular = StepError::Singular { matrix: "static stiffness (with the effect of weight and load)", t };
+        let step = tangent.lu().solve(&r).ok_or(singular)?;
+        // Far from small deflections the full step may overshoot: no coordinate moves by more than 0.5.
+        e -= &step * (0.5 / step.amax()).min(1.0);
+        iterations += 1;
+    };
+
+    let slopes = statics.slopes(&mut data, &q);
+    let select = |A: &DMatrix<f64>| A.select_rows(&free).select_columns(&free);
+    let mut change = select(&slopes);
+    let moments = arm.loads.iter().any(|load| (load.wrench)(t).torque.norm() > 0.0);
+    if F_T_W.torque.norm() == 0.0 && !moments {
+        change = (&change + change.transpose()) * 0.5;
+    }
+    let mut springs = DMatrix::zeros(n, n);
+    springs.view_mut((driven, driven), (ne, ne)).copy_from(&with_curves(arm, &at_rest, &e));
+    let mut D = DMatrix::zeros(n, n);
+    D.view_mut((driven, driven), (ne, ne)).copy_from(&arm.D);
+    // Beyond a buckling load there is an equilibrium too, but the arm does not stay there.
+    let mut K = &springs + change;
+    let elastic = K.view((driven, driven), (ne, ne)).into_owned();
+    if ne > 0 && ((&elastic + elastic.transpose()) * 0.5).cholesky().is_none() {
+        return Err(StepError::Singular { matrix: "static stiffness (with the effect of weight and load)", t });
+    }
+    let M = mass_matrix(model, &mut data, &q).clone();
+    forward_kinematics(model, &mut data, &q);
+    let mut J = Matrix6xX::zeros(nv);
+    frame_jacobian(model, &data, tool, &mut J);
+    let (mut M_a, mut K_a) = (M.columns(0, m).select_rows(&free), slopes.columns(0, m).select_rows(&free));
+    let (mut D_a, mut J_a) = (DMatrix::zeros(n, m), J.columns(0, m).into_owned());
+    for &k in &arm.torque_driven {
+        M_a.column_mut(k).fill(0.0);
+        K_a.column_mut(k).fill(0.0);
+        J_a.column_mut(k).fill(0.0);
+    }
+    if let Some(servo) = &arm.servo {
+        let pose = q.rows(0, m).into_owned();
+        let ahead = FeedForward::new(servo, &pose);
+        for (i, axis) in servo.axes.iter().enumerate() {
+            let (position, rate) = (axis.velocity_gain * axis.position_gain, axis.velocity_gain);
+            K[(i, i)] += position;
+            D[(i, i)] += rate + arm.friction.get(axis.coordinate).map_or(0.0, |f| f.viscous);
+            K_a[(i, axis.coordinate)] -= position;
+            D_a[(i, axis.coordinate)] -= rate;
+            if axis.feed_forward {
+                for k in 0..m {
+                    M_a[(i, k)] -= ahead.M[(axis.coordinate, k)];
+                    K_a[(i, k)] -= ahead.K[(axis.coordinate, k)];
+                }
+            }
+        }
+    }
+    let mut equilibrium = DVector::zeros(n);
+    for (x, &k) in equilibrium.iter_mut().zip(&free) {
+        *x = q[k];
+    }
+    Ok(Linear {
+        M: select(&M),
+        D,
+        K,
+        driven,
+        springs,
+        elements: arm
+            .elements
+            .iter()
+            .map(|e| (e.name.clone(), driven + arm.offset(e)..driven + arm.offset(e) + e.size))
+            .collect(),
+        M_a,
+        D_a,
+        K_a,
+        J: Matrix6xX::from_fn(n, |i, j| J[(i, free[j])]),
+        J_a,
+        X_WT: data.X_WF(tool),
+        holding: p.rows(0, m).into_owned(),
+        equilibrium,
+        q,
+        residual,
+        iterations,
+    })
+}
+
+/// What the feed-forward of a servo adds per acceleration and per displacement of the commands.
+struct FeedForward {
+    M: DMatrix<f64>,
+    K: DMatrix<f64>,
+}
+
+impl FeedForward {
+    fn new(servo: &Servo, pose: &DVector<f64>) -> Self {
+        let model = &servo.rigid;
+        let mut data = Data::new(model);
+        let M = mass_matrix(model, &mut data, pose).clone();
+        let mut K = DMatrix::zeros(pose.len(), pose.len());
+        let mut moved = pose.clone();
+        for k in 0..pose.len() {
+            moved[k] = pose[k] + DIFFERENCE;
+            let up = gravity_forces(model, &mut data, &moved).clone();
+            moved[k] = pose[k] - DIFFERENCE;
+            let down = gravity_forces(model, &mut data, &moved).clone();
+            moved[k] = pose[k];
+            K.set_column(k, &((up - down) / (2.0 * DIFFERENCE)));
+        }
+        Self { M, K }
+    }
+}
+
+/// Joints on their reference at `t` with elastic coordinates.
+fn all_coordinates(arm: &FlexibleArm, t: f64, e: &DVector<f64>) -> DVector<f64> {
+    let model = &arm.model;
+    let (mut state, mut qddot) = (State::zeros(model), DVector::zeros(model.nv()));
+    arm.prescribed_state(t, &mut state, &mut qddot);
+    state.q.rows_mut(model.n_actuated(), e.len()).copy_from(e);
+    state.q
+}
+
+/// Weight and loads.
+struct Statics<'a> {
+    arm: &'a FlexibleArm,
+    tool: &'a Frame,
+    /// Force and moment on the tool.
+    F_T_W: Wrench,
+    t: f64,
+}
+
+impl Statics<'_> {
+    /// What holds the arm still at `q` without its springs: weight, loads, stiffness by load; all coordinates.
+    fn forces(&self, data: &mut Data, q: &DVector<f64>) -> DVector<f64> {
+        let (model, m) = (&self.arm.model, self.arm.model.n_actuated());
+        forward_kinematics(model, data, q);
+        data.clear_external_wrenches();
+        self.arm.apply_loads(data, self.t);
+        let R = data.X_WF(self.tool).rotation.inverse();
+        let F_T = Wrench::new(R * self.F_T_W.force, R * self.F_T_W.torque);
+        data.F_ext[self.tool.body] += F_T.at_parent(&self.tool.X_BF);
+        let mut p = gravity_forces(model, data, q).clone();
+        let e = &q.as_slice()[m..];
+        add_geometric_forces(self.arm, data, e, &mut p.as_mut_slice()[m..]);
+        p
+    }
+
+    /// Their derivatives by all coordinates, central differences.
+    fn slopes(&self, data: &mut Data, q: &DVector<f64>) -> DMatrix<f64> {
+        let mut P = DMatrix::zeros(q.len(), q.len());
+        let mut moved = q.clone();
+        for k in 0..q.len() {
+            moved[k] = q[k] + DIFFERENCE;
+            let up = self.forces(data, &moved);
+            moved[k] = q[k] - DIFFERENCE;
+            let down = self.forces(data, &moved);
+            moved[k] = q[k];
+            P.set_column(k, &((up - down) / (2.0 * DIFFERENCE)));
+        }
+        P
+    }
+}

@@ -1,0 +1,193 @@
+//! Modes as a recording: each swings for a few seconds after another, slowly and large enough to see.
+
+use flexarm_analysis::{DampedMode, tcp_error};
+use flexarm_kinematics::forward_kinematics;
+use flexarm_log::{ElasticSample, Sample, TwinSample};
+use flexarm_stepping::Linear;
+use nalgebra::{DVector, Vector6};
+
+use crate::error::Error;
+use crate::modes::{ModeTable, modes_of, table};
+use crate::options::Modelling;
+use crate::options::Outputs;
+use crate::posed::Posed;
+use crate::record::{link_frames, recorders, robot_header};
+use crate::robot::Robot;
+
+/// Swings per second on the screen, whatever the frequency of the mode.
+const SHOWN_HZ: f64 = 1.0;
+/// Samples per second.
+const RATE_HZ: f64 = 50.0;
+/// Part of the reach by which the tool moves unless told otherwise.
+const PART_OF_REACH: f64 = 0.05;
+/// No elastic coordinate is shown larger than this (m, rad).
+const LARGEST: f64 = 0.5;
+
+/// How modes are shown.
+#[derive(Clone, Debug)]
+pub struct ModeMovie {
+    /// How long each mode swings (s); rounded up to whole swings.
+    pub seconds: f64,
+    /// How far the tool moves in a mode (m); a twentieth of the arm's reach without it.
+    pub tool_motion_m: Option<f64>,
+}
+
+impl Default for ModeMovie {
+    fn default() -> Self {
+        Self { seconds: 3.0, tool_motion_m: None }
+    }
+}
+
+/// As [`crate::modes()`], and writes a recording in which the modes swing one after another about the static pose, beside
+/// the rigid robot at rest.
+///
+/// # Errors
+/// As [`crate::modes()`]; [`Error::Usage`] for a robot without modes, [`Error::File`] and [`Error::Log`] for files.
+pub fn record_modes(
+    robot: &Robot,
+    modelling: &Modelling,
+    at: Option<&str>,
+    count: usize,
+    movie: &ModeMovie,
+    outputs: &Outputs,
+) -> Result<ModeTable, Error> {
+    let positive = |what: &str, x: f64, unit: &str| {
+        let message = || Error::Usage(format!("{what} must be positive and below 1000, found {x} {unit}"));
+        if x > 0.0 && x < 1000.0 { Ok(()) } else { Err(message()) }
+    };
+    positive("--seconds", movie.seconds, "s")?;
+    movie.tool_motion_m.map_or(Ok(()), |x| positive("--tool-motion", x, "m"))?;
+    let posed = Posed::new(robot, modelling, at)?;
+    let linear = posed.linear(&Vector6::zeros())?;
+    let all = modes_of(&linear)?;
+    if all.is_empty() {
+        return Err(Error::Usage("the robot has no flexible link, so there are no modes to record".into()));
+    }
+    let shown = &all[..count.min(all.len())];
+    let motion = movie.tool_motion_m.unwrap_or_else(|| PART_OF_REACH * reach(&posed));
+
+    let mut files = recorders(Some(outputs))?;
+    files.names.report = None;
+    let mut header = robot_header(robot, &posed.arm);
+    header.trajectory = "modes".into();
+    header.has_rigid = true;
+    header.log_rate_hz = RATE_HZ;
+    let swings = (movie.seconds * SHOWN_HZ).ceil();
+    let rows: Vec<(String, String)> = shown
+        .iter()
+        .enumerate()
+        .map(|(k, mode)| {
+            let start = k as f64 * swings / SHOWN_HZ;
+            (
+                format!("from {start} s"),
+                format!(
+                    "mode {}: {:.4} Hz, magnified {:.3e}",
+                    k + 1,
+                    mode.frequency_hz(),
+                    magnification(mode, &linear, motion)
+                ),
+            )
+        })
+        .collect();
+    header.description = format!(
+        "# Modes of {}\n\nEach mode swings once a second, whatever its frequency; the ghost is the rigid robot.\n\n| | |\n|---|---|\n",
+        robot.name
+    );
+    for (when, what) in &rows {
+        header.description += &format!("| {when} | {what} |\n");
+    }
+    header.metadata = vec![("flexarm.modes".into(), rows)];
+    files.set.begin(&header)?;
+    let per_mode = (swings / SHOWN_HZ * RATE_HZ).round() as u64;
+    let mut stage = Stage::new(robot, &posed, &linear);
+    for (k, mode) in shown.iter().enumerate() {
+        let size = magnification(mode, &linear, motion);
+        let last = if k + 1 == shown.len() { per_mode } else { per_mode - 1 };
+        for frame in 0..=last {
+            let step = k as u64 * per_mode + frame;
+            let (sine, cosine) = (std::f64::consts::TAU * SHOWN_HZ * frame as f64 / RATE_HZ).sin_cos();
+            let shape = mode.shape.map(|x| size * (x.re * sine + x.im * cosine));
+            files.set.record(stage.sample(step, &(&linear.equilibrium + shape)))?;
+        }
+    }
+    files.set.finish(&[("modes".into(), shown.len().to_string())])?;
+    let names = files.names.clone();
+    let mut figures = table(robot, posed, &linear, &all, count)?;
+    figures.files = names;
+    Ok(figures)
+}
+
+/// Largest distance of the tool from a joint.
+fn reach(posed: &Posed) -> f64 {
+    let (mut data, state) = posed.undeformed();
+    forward_kinematics(&posed.arm.model, &mut data, &state.q);
+    let tool = data.X_WF(&posed.tool).translation.vector;
+    data.X_WB.iter().skip(1).map(|X| (X.translation.vector - tool).norm()).fold(0.0, f64::max)
+}
+
+/// Factor on the shape of unit modal mass with which the tool moves so far, or the largest that can be looked at.
+fn magnification(mode: &DampedMode, linear: &Linear, motion_m: f64) -> f64 {
+    let tool = flexarm_analysis::mode_outputs(mode, &crate::modes::tool_map(linear));
+    let tool = tool.rows(0, 3).iter().map(|x| x.norm_sqr()).sum::<f64>().sqrt();
+    let largest = mode.shape.iter().map(|x| x.norm()).fold(0.0, f64::max);
+    (motion_m / tool).min(LARGEST / largest)
+}
+
+/// The robot with any elastic coordinates, as samples.
+struct Stage<'a> {
+    posed: &'a Posed,
+    linear: &'a Linear,
+    data: flexarm_kinematics::Data,
+    q: DVector<f64>,
+    frames: Vec<flexarm_kinematics::Frame>,
+    sample: Sample,
+}
+
+impl<'a> Stage<'a> {
+    fn new(robot: &Robot, posed: &'a Posed, linear: &'a Linear) -> Self {
+        let (mut data, state) = posed.undeformed();
+        let model = &posed.arm.model;
+        forward_kinematics(model, &mut data, &state.q);
+        let frames = link_frames(robot, model);
+        let zero = vec![0.0; posed.at.len()];
+        let rigid = TwinSample {
+            q: posed.at.clone(),
+            qdot: zero.clone(),
+            effort: zero,
+            X_WL: frames.iter().map(|f| data.X_WF(f)).collect(),
+            X_WT: data.X_WF(&posed.tool),
+        };
+        let elastic = vec![ElasticSample::default(); linear.elements.len()];
+        let sample = Sample { flexible: rigid.clone(), rigid, elastic, ..Sample::default() };
+        Self { posed, linear, data, q: state.q, frames, sample }
+    }
+
+    fn sample(&mut self, step: u64, x: &DVector<f64>) -> &Sample {
+        let driven = &self.posed.arm.torque_driven;
+        for (value, &k) in x.iter().zip(driven) {
+            self.q[k] = *value;
+        }
+        let (first, ne) = (self.q.len() + driven.len() - x.len(), x.len() - driven.len());
+        self.q.rows_mut(first, ne).copy_from(&x.rows(driven.len(), ne));
+        forward_kinematics(&self.posed.arm.model, &mut self.data, &self.q);
+        let sample = &mut self.sample;
+        sample.time_s = step as f64 / RATE_HZ;
+        sample.step = step;
+        sample.flexible.X_WL.clear();
+        sample.flexible.X_WL.extend(self.frames.iter().map(|f| self.data.X_WF(f)));
+        sample.flexible.X_WT = self.data.X_WF(&self.posed.tool);
+        sample.error_world = tcp_error(&sample.rigid.X_WT, &sample.flexible.X_WT);
+        for (elastic, (_, range)) in sample.elastic.iter_mut().zip(&self.linear.elements) {
+            let n = range.len();
+            let deflection = x.rows(range.start, n);
+            let load = self.linear.springs.view((range.start, range.start), (n, n)) * deflection;
+            for (to, value) in elastic.deflection.iter_mut().zip(&deflection) {
+                *to = *value;
+            }
+            for (to, value) in elastic.load.iter_mut().zip(&load) {
+                *to = *value;
+            }
+        }
+        sample
+    }
+}

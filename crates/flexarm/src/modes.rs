@@ -1,0 +1,164 @@
+//! Natural modes at a pose, drives locked: frequencies, damping, what the tool does in them and which link bends.
+
+use flexarm_analysis::{
+    DampedMode, LinearError, compliance_parts, damped_modes, effective_mass, mode_outputs, strain_energy_shares,
+};
+use flexarm_stepping::Linear;
+use nalgebra::{DMatrix, Vector6};
+use serde::Serialize;
+
+use crate::error::Error;
+use crate::options::Modelling;
+use crate::posed::{Posed, step_error};
+use crate::robot::Robot;
+use crate::summary::Files;
+
+/// Answer of `flexarm modes`. SI units; world axes, at the TCP; six-vectors linear first.
+#[derive(Clone, Debug, Serialize)]
+pub struct ModeTable {
+    /// Name of the robot.
+    pub robot: String,
+    /// Joints that are locked, in coordinate order.
+    pub joints: Vec<String>,
+    /// Where they are locked (rad or m).
+    pub at: Vec<f64>,
+    /// Link that carries the TCP.
+    pub tcp: String,
+    /// Natural frequencies `|λ| / 2π` (Hz), ascending.
+    pub frequencies_hz: Vec<f64>,
+    /// Damping ratios `-Re λ / |λ|`.
+    pub damping_ratio: Vec<f64>,
+    /// Elastic elements, in the order of `strain_energy`.
+    pub elements: Vec<String>,
+    /// One entry per mode.
+    pub modes: Vec<ModeFigures>,
+    /// How many modes there are; `modes` may be fewer.
+    pub total: usize,
+    /// Parts of the static compliance that the modes above carry, per direction of the TCP; null where it does not
+    /// yield.
+    pub compliance_covered: [Option<f64>; 6],
+    /// Written files.
+    pub files: Files,
+    /// Things worth telling.
+    pub warnings: Vec<String>,
+}
+
+/// One mode.
+#[derive(Clone, Debug, Serialize)]
+pub struct ModeFigures {
+    /// Natural frequency (Hz).
+    pub frequency_hz: f64,
+    /// Frequency of the decaying oscillation (Hz).
+    pub damped_frequency_hz: f64,
+    /// Damping ratio.
+    pub damping_ratio: f64,
+    /// Motion of the TCP in the mode scaled to unit modal mass (1/sqrt(kg), rad/sqrt(kg m²) ...), real part.
+    pub tcp: [f64; 6],
+    /// Imaginary part; zero where the damping is proportional.
+    pub tcp_imaginary: [f64; 6],
+    /// Mass (kg) at the TCP, moment of inertia (kg m²) for rotations, that moves like the mode; null at a node.
+    pub effective_mass: [Option<f64>; 6],
+    /// Part of the static compliance of the TCP in each direction that this mode carries; null where it does not yield.
+    pub compliance_share: [Option<f64>; 6],
+    /// Share of each element in the strain energy.
+    pub strain_energy: Vec<f64>,
+    /// How well the mode fits its equation (relative).
+    pub residual: f64,
+}
+
+/// An effective mass above this is that of a node (kg, kg m²).
+const NODE: f64 = 1e12;
+
+impl ModeFigures {
+    fn new(mode: &DampedMode, linear: &Linear, compliance: &Vector6<f64>) -> Self {
+        let C = tool_map(linear);
+        let output = mode_outputs(mode, &C);
+        let parts = compliance_parts(mode, &linear.M, &linear.D, &C);
+        let six = |f: &dyn Fn(usize) -> f64| std::array::from_fn(f);
+        Self {
+            frequency_hz: mode.frequency_hz(),
+            damped_frequency_hz: mode.damped_frequency_hz(),
+            damping_ratio: mode.damping_ratio(),
+            tcp: six(&|i| output[i].re),
+            tcp_imaginary: six(&|i| output[i].im),
+            effective_mass: std::array::from_fn(|i| Some(effective_mass(output[i])).filter(|m| *m < NODE)),
+            compliance_share: std::array::from_fn(|i| share(parts.as_ref()?[i], compliance[i])),
+            strain_energy: strain_energy_shares(&mode.shape, &blocks(linear)),
+            residual: mode.residual,
+        }
+    }
+}
+
+/// Twist of the tool per rate of the free coordinates.
+pub(crate) fn tool_map(linear: &Linear) -> DMatrix<f64> {
+    DMatrix::from_fn(6, linear.J.ncols(), |i, j| linear.J[(i, j)])
+}
+
+fn blocks(linear: &Linear) -> Vec<(usize, DMatrix<f64>)> {
+    let block = |first: usize, n: usize| linear.springs.view((first, first), (n, n)).into_owned();
+    linear.elements.iter().map(|(_, range)| (range.start, block(range.start, range.len()))).collect()
+}
+
+fn share(part: f64, whole: f64) -> Option<f64> {
+    (whole > 0.0).then(|| part / whole)
+}
+
+/// All damped modes of a linear structure.
+pub(crate) fn modes_of(linear: &Linear) -> Result<Vec<DampedMode>, Error> {
+    let K = (&linear.K + linear.K.transpose()) * 0.5;
+    damped_modes(&linear.M, &linear.D, &K).map_err(linear_error)
+}
+
+pub(crate) fn linear_error(error: LinearError) -> Error {
+    Error::Usage(format!("the linear model at this pose: {error}"))
+}
+
+/// The lowest `count` modes of the flexible robot at a pose, under its weight, drives locked.
+///
+/// `at` as for [`crate::parse_joint_values`].
+///
+/// # Errors
+/// [`Error::Usage`] for joint values that do not fit, [`Error::Step`] where there is no equilibrium.
+pub fn modes(robot: &Robot, modelling: &Modelling, at: Option<&str>, count: usize) -> Result<ModeTable, Error> {
+    let posed = Posed::new(robot, modelling, at)?;
+    let linear = posed.linear(&Vector6::zeros())?;
+    let all = modes_of(&linear)?;
+    table(robot, posed, &linear, &all, count)
+}
+
+/// Figures of the modes.
+pub(crate) fn table(
+    robot: &Robot,
+    posed: Posed,
+    linear: &Linear,
+    all: &[DampedMode],
+    count: usize,
+) -> Result<ModeTable, Error> {
+    let compliance = linear.compliance().map_err(step_error)?.diagonal();
+    let mut warnings = posed.warnings;
+    let worst = all.iter().map(|mode| mode.residual).fold(0.0, f64::max);
+    if worst > 1e-6 {
+        warnings.push(format!("a mode leaves its equation open by {worst:.1e} (relative): take the figures with care"));
+    }
+    if all.iter().any(|mode| mode.eigenvalue.re > 1e-9 * mode.eigenvalue.norm()) {
+        warnings.push("a mode grows by itself: the arm is not stable at this pose".into());
+    }
+    let modes: Vec<ModeFigures> =
+        all.iter().take(count).map(|mode| ModeFigures::new(mode, linear, &compliance)).collect();
+    let covered =
+        |i: usize| modes.iter().map(|mode| mode.compliance_share[i]).sum::<Option<f64>>().filter(|_| !modes.is_empty());
+    Ok(ModeTable {
+        robot: robot.name.clone(),
+        tcp: robot.tcp.0.clone(),
+        frequencies_hz: modes.iter().map(|mode| mode.frequency_hz).collect(),
+        damping_ratio: modes.iter().map(|mode| mode.damping_ratio).collect(),
+        elements: linear.elements.iter().map(|(name, _)| name.clone()).collect(),
+        total: all.len(),
+        compliance_covered: std::array::from_fn(covered),
+        modes,
+        files: Files::default(),
+        warnings,
+        joints: posed.joints,
+        at: posed.at,
+    })
+}

@@ -1,0 +1,107 @@
+//! A robot held at a pose: what statics, modes and frequency response begin with.
+
+use std::sync::Arc;
+
+use flexarm_kinematics::{Data, Frame, Pose, State, Wrench, forward_kinematics};
+use flexarm_stepping::{FlexibleArm, Held, Linear, StepError, linearise};
+use nalgebra::{DVector, Vector6};
+
+use crate::error::Error;
+use crate::flexible::FlexibleRobot;
+use crate::inspect::parse_joint_values;
+use crate::options::Modelling;
+use crate::robot::{Robot, TCP_FRAME};
+
+/// Flexible arm with its drives locked at a pose.
+pub(crate) struct Posed {
+    pub(crate) flexible: FlexibleRobot,
+    pub(crate) arm: FlexibleArm,
+    pub(crate) tool: Frame,
+    /// Actuated joints, in coordinate order.
+    pub(crate) joints: Vec<String>,
+    /// Which of them slide.
+    pub(crate) prismatic: Vec<bool>,
+    /// Where they are.
+    pub(crate) at: Vec<f64>,
+    pub(crate) warnings: Vec<String>,
+}
+
+/// A step error of a command that takes no step.
+fn failed(source: StepError) -> Error {
+    Error::Step { source, partial: false }
+}
+
+impl Posed {
+    /// `at` as for [`parse_joint_values`]; all joints at zero without it.
+    pub(crate) fn new(robot: &Robot, modelling: &Modelling, at: Option<&str>) -> Result<Self, Error> {
+        let flexible = robot.modelled(modelling)?;
+        let model = flexible.model.clone();
+        let actuated = &model.coordinates()[..model.n_actuated()];
+        let joints: Vec<String> = actuated.iter().map(|c| c.joint.clone()).collect();
+        let names: Vec<&str> = joints.iter().map(String::as_str).collect();
+        let at = at.map_or_else(|| Ok(vec![0.0; names.len()]), |text| parse_joint_values(text, &names))?;
+        let mut warnings = robot.warnings.clone();
+        for (c, q) in actuated.iter().zip(&at) {
+            let (lower, upper) = (c.limits.lower, c.limits.upper);
+            if *q < lower || *q > upper {
+                warnings.push(format!("joint {:?} at {q} is outside its limits {lower} to {upper}", c.joint));
+            }
+        }
+        if flexible.springs.is_empty() {
+            warnings.push(
+                "the robot has no flexible link and no elastic drive: it does not yield and does not vibrate".into(),
+            );
+        }
+        let prismatic = actuated.iter().map(|c| c.kind == "prismatic").collect();
+        let arm = flexible.arm(Arc::new(Held(at.clone()))).map_err(failed)?;
+        let tool = arm.model.frame(TCP_FRAME).expect("added when the robot was loaded").clone();
+        Ok(Self { flexible, arm, tool, joints, prismatic, at, warnings })
+    }
+
+    /// The linear structure about the equilibrium under weight and a wrench at the TCP (world axes).
+    pub(crate) fn linear(&self, wrench: &Vector6<f64>) -> Result<Linear, Error> {
+        let F = Wrench::new(wrench.fixed_rows::<3>(0).into(), wrench.fixed_rows::<3>(3).into());
+        linearise(&self.arm, &self.tool, &F, 0.0).map_err(failed)
+    }
+
+    /// The tool with every elastic coordinate at zero.
+    pub(crate) fn rigid_tool(&self) -> Pose {
+        let (mut data, state) = self.undeformed();
+        forward_kinematics(&self.arm.model, &mut data, &state.q);
+        data.X_WF(&self.tool)
+    }
+
+    /// Engineering strain of each flexible link with all coordinates at `q`.
+    pub(crate) fn strains(&self, q: &DVector<f64>) -> Vec<f64> {
+        let model = &self.arm.model;
+        let mut data = Data::new(model);
+        forward_kinematics(model, &mut data, q);
+        let place = |link: &str, X: &Pose| {
+            let frame = model.frame(link).expect("a link of the substitution");
+            (data.X_WF(frame) * *X).translation.vector
+        };
+        let strain = |span: &flexarm_flexlink::FlexibleSpan| {
+            let distance = (place(&span.distal_link, &span.X_DB) - place(&span.link, &span.X_LA)).norm();
+            (distance - span.length).abs() / span.length
+        };
+        self.flexible.spans.iter().map(strain).collect()
+    }
+
+    /// Angle of an element's deflection (rad); 0 where its coordinates are not three translations and three angles.
+    pub(crate) fn flexible_rotation(deflection: &DVector<f64>) -> f64 {
+        if deflection.len() == 6 { deflection.rows(3, 3).norm() } else { 0.0 }
+    }
+
+    /// Joints at the pose, elastic coordinates zero.
+    pub(crate) fn undeformed(&self) -> (Data, State) {
+        let model = &self.arm.model;
+        let mut state = State::zeros(model);
+        self.arm.prescribed_state(0.0, &mut state, &mut DVector::zeros(model.nv()));
+        (Data::new(model), state)
+    }
+}
+
+/// [`StepError`] of what a linear structure offers.
+pub(crate) fn step_error(source: StepError) -> Error {
+    failed(source)
+}

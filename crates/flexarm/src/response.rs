@@ -1,0 +1,401 @@
+//! Frequency response at a pose, drives locked or shaken: what the TCP does per newton on it or per radian of a joint.
+
+use std::path::PathBuf;
+
+use flexarm_analysis::{LinearSystem, Quantity, Spacing, frequency_grid, response_peaks, with_resonances};
+use flexarm_log::{Panel, PlotCurve, PlotError, line_plot};
+use flexarm_stepping::Linear;
+use nalgebra::{Complex, DMatrix, Vector6};
+use serde::Serialize;
+
+use crate::error::Error;
+use crate::modes::{linear_error, modes_of, tool_map};
+use crate::options::Modelling;
+use crate::posed::Posed;
+use crate::result_files::{check_free, write_all};
+use crate::robot::Robot;
+
+/// Files of a response in its output folder: table, plot, figures.
+const RESPONSE_FILES: [&str; 3] = ["response.csv", "response.svg", "response.json"];
+/// Fewest and most points of a response.
+const POINTS: std::ops::RangeInclusive<usize> = 2..=100_000;
+/// Highest frequency that makes sense (Hz).
+const HIGHEST_HZ: f64 = 1e6;
+/// Below this damping ratio a resonance is as good as undamped.
+const UNDAMPED: f64 = 1e-6;
+const AXES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
+const WRENCH: [&str; 6] = ["force-x", "force-y", "force-z", "torque-x", "torque-y", "torque-z"];
+
+/// What is asked of [`response`].
+#[derive(Clone, Debug)]
+pub struct ResponseRequest {
+    /// `force-x` ... `torque-z` (on the TCP, world axes), or names of joints.
+    pub inputs: Vec<String>,
+    /// `x`, `y`, `z`, `rx`, `ry`, `rz` of the TCP, world axes.
+    pub outputs: Vec<String>,
+    /// Displacement, velocity or acceleration of the outputs.
+    pub quantity: Quantity,
+    /// Lowest frequency (Hz); a tenth of the first mode without it.
+    pub from_hz: Option<f64>,
+    /// Highest frequency (Hz); twice the sixth mode without it.
+    pub to_hz: Option<f64>,
+    /// How many frequencies; more are put in around the resonances.
+    pub points: usize,
+    /// How they are spaced.
+    pub spacing: Spacing,
+}
+
+impl Default for ResponseRequest {
+    fn default() -> Self {
+        let words = |words: &[&str]| words.iter().map(|w| (*w).to_owned()).collect();
+        Self {
+            inputs: words(&WRENCH[..3]),
+            outputs: words(&AXES[..3]),
+            quantity: Quantity::Displacement,
+            from_hz: None,
+            to_hz: None,
+            points: 500,
+            spacing: Spacing::Logarithmic,
+        }
+    }
+}
+
+/// Answer of `flexarm response`. SI units.
+#[derive(Clone, Debug, Serialize)]
+pub struct Response {
+    /// Name of the robot.
+    pub robot: String,
+    /// Joints, in coordinate order.
+    pub joints: Vec<String>,
+    /// Where they are held, or about where they move (rad or m).
+    pub at: Vec<f64>,
+    /// Link that carries the TCP.
+    pub tcp: String,
+    /// displacement, velocity or acceleration.
+    pub quantity: &'static str,
+    /// Natural frequencies of the modes (Hz), all.
+    pub frequencies_hz: Vec<f64>,
+    /// Their damping ratios.
+    pub damping_ratio: Vec<f64>,
+    /// Frequencies of the curves (Hz).
+    pub frequency_hz: Vec<f64>,
+    /// Whether they are spaced by equal ratios.
+    pub logarithmic: bool,
+    /// One per input and output.
+    pub curves: Vec<ResponseCurve>,
+    /// Written files.
+    pub files: ResponseFiles,
+    /// Things worth telling.
+    pub warnings: Vec<String>,
+}
+
+/// Response of one output to one input.
+#[derive(Clone, Debug, Serialize)]
+pub struct ResponseCurve {
+    /// Word of the input.
+    pub input: String,
+    /// Word of the output.
+    pub output: String,
+    /// Unit of the magnitude.
+    pub unit: String,
+    /// Response at rest, with its sign; null where it is infinite.
+    pub at_rest: Option<f64>,
+    /// Resonances within the frequencies, the highest first.
+    pub peaks: Vec<PeakFigures>,
+    /// Amplitude of the output per amplitude of the input, one per frequency.
+    pub magnitude: Vec<f64>,
+    /// How far the output is ahead of the input (rad), one per frequency; steps of more than half a turn are taken out.
+    pub phase_rad: Vec<f64>,
+}
+
+/// A resonance.
+#[derive(Clone, Debug, Serialize)]
+pub struct PeakFigures {
+    /// Where (Hz).
+    pub frequency_hz: f64,
+    /// How high.
+    pub magnitude: f64,
+    /// Phase there (rad).
+    pub phase_rad: f64,
+}
+
+/// Written files; null where none was written.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct ResponseFiles {
+    /// Table.
+    pub csv: Option<String>,
+    /// Magnitude and phase as a picture.
+    pub plot: Option<String>,
+    /// This answer.
+    pub json: Option<String>,
+}
+
+/// Where a response goes.
+#[derive(Clone, Debug)]
+pub struct ResponseOutputs {
+    /// Folder; made if it is not there.
+    pub folder: PathBuf,
+    /// Overwrite what is there.
+    pub overwrite: bool,
+}
+
+/// A column of the input or output side: its word, its unit, and the letter for names of columns.
+struct Channel {
+    word: String,
+    unit: &'static str,
+    index: usize,
+    joint: bool,
+}
+
+/// Frequency response of the flexible robot at a pose, about its equilibrium under weight, other drives locked.
+///
+/// `at` as for [`crate::parse_joint_values`].
+///
+/// # Errors
+/// [`Error::Usage`] for words and numbers that make no sense, [`Error::Step`] where there is no equilibrium,
+/// [`Error::File`] and [`Error::Write`] for files.
+pub fn response(
+    robot: &Robot,
+    modelling: &Modelling,
+    at: Option<&str>,
+    request: &ResponseRequest,
+    outputs: Option<&ResponseOutputs>,
+) -> Result<Response, Error> {
+    let posed = Posed::new(robot, modelling, at)?;
+    let inputs = input_channels(&request.inputs, &posed)?;
+    let channels = output_channels(&request.outputs)?;
+    if !POINTS.contains(&request.points) {
+        let (few, most) = (POINTS.start(), POINTS.end());
+        return Err(Error::Usage(format!("--points must lie between {few} and {most}, found {}", request.points)));
+    }
+    let paths: Vec<PathBuf> = outputs.iter().flat_map(|o| RESPONSE_FILES.map(|name| o.folder.join(name))).collect();
+    check_free(&paths, outputs.is_some_and(|o| o.overwrite))?;
+
+    let linear = posed.linear(&Vector6::zeros())?;
+    let modes = modes_of(&linear)?;
+    let frequencies_hz: Vec<f64> = modes.iter().map(flexarm_analysis::DampedMode::frequency_hz).collect();
+    let damping_ratio: Vec<f64> = modes.iter().map(flexarm_analysis::DampedMode::damping_ratio).collect();
+    let (from, to) = range(request, &frequencies_hz)?;
+    let system = system(&linear, &inputs, &channels);
+
+    // One solution per frequency serves all curves; an undamped resonance has none and is left out.
+    let resonances: Vec<(f64, f64)> = frequencies_hz.iter().copied().zip(damping_ratio.iter().copied()).collect();
+    let grid = with_resonances(&frequency_grid(from, to, request.points, request.spacing), &resonances);
+    let answer = |hz: f64| {
+        let omega = std::f64::consts::TAU * hz;
+        system.response(omega).ok().map(|H| H * request.quantity.factor(omega))
+    };
+    let (frequency_hz, answers): (Vec<f64>, Vec<DMatrix<Complex<f64>>>) =
+        grid.into_iter().filter_map(|hz| Some((hz, answer(hz)?))).unzip();
+    system.check().map_err(linear_error)?;
+
+    let mut curves = Vec::new();
+    for (j, input) in inputs.iter().enumerate() {
+        for (i, output) in channels.iter().enumerate() {
+            let at = |hz: f64| answer(hz).map_or(Complex::new(0.0, 0.0), |H| H[(i, j)]);
+            let magnitude: Vec<f64> = answers.iter().map(|H| H[(i, j)].norm()).collect();
+            let peaks = response_peaks(&frequency_hz, &magnitude, |hz| at(hz).norm())
+                .into_iter()
+                .map(|p| PeakFigures {
+                    frequency_hz: p.frequency,
+                    magnitude: p.magnitude,
+                    phase_rad: at(p.frequency).arg(),
+                })
+                .collect();
+            curves.push(ResponseCurve {
+                input: input.word.clone(),
+                output: output.word.clone(),
+                unit: unit(output, input, request.quantity),
+                at_rest: answer(0.0).map(|H| H[(i, j)].re),
+                peaks,
+                magnitude,
+                phase_rad: unwrapped(answers.iter().map(|H| H[(i, j)].arg())),
+            });
+        }
+    }
+    let mut warnings = posed.warnings.clone();
+    let within = |k: &usize| damping_ratio[*k] < UNDAMPED && (from..=to).contains(&frequencies_hz[*k]);
+    if let Some(k) = (0..modes.len()).find(within) {
+        let hz = frequencies_hz[k];
+        warnings.push(format!("the mode at {hz:.3} Hz has no damping: the height of its peak means nothing"));
+    }
+    let mut response = Response {
+        robot: robot.name.clone(),
+        tcp: robot.tcp.0.clone(),
+        quantity: quantity_name(request.quantity),
+        frequencies_hz,
+        damping_ratio,
+        frequency_hz,
+        logarithmic: request.spacing == Spacing::Logarithmic,
+        curves,
+        files: ResponseFiles::default(),
+        warnings,
+        joints: posed.joints,
+        at: posed.at,
+    };
+    if outputs.is_some() {
+        save(&mut response, paths)?;
+    }
+    Ok(response)
+}
+
+/// Lowest and highest frequency, asked for or after the modes.
+fn range(request: &ResponseRequest, modes_hz: &[f64]) -> Result<(f64, f64), Error> {
+    let first = modes_hz.iter().find(|f| **f > 0.0);
+    let from = request.from_hz.unwrap_or_else(|| first.map_or(1.0, |f| 0.1 * f));
+    let sixth = modes_hz.get(5).or(modes_hz.last());
+    let to = request.to_hz.unwrap_or_else(|| sixth.map_or(200.0, |f| 2.0 * f).max(10.0 * from).min(HIGHEST_HZ));
+    let lowest = if request.spacing == Spacing::Logarithmic { f64::MIN_POSITIVE } else { 0.0 };
+    if !(from.is_finite() && from >= lowest) {
+        let zero = if lowest > 0.0 { "positive (0 needs --spacing linear)" } else { "positive or zero" };
+        return Err(Error::Usage(format!("--from must be {zero}, found {from} Hz")));
+    }
+    if !(to.is_finite() && to > from && to <= HIGHEST_HZ) {
+        return Err(Error::Usage(format!("--to must lie above --from ({from} Hz) and below 1e6 Hz, found {to} Hz")));
+    }
+    Ok((from, to))
+}
+
+fn input_channels(words: &[String], posed: &Posed) -> Result<Vec<Channel>, Error> {
+    let channel = |word: &String| {
+        if let Some(index) = WRENCH.iter().position(|w| w == word) {
+            let unit = if index < 3 { "N" } else { "Nm" };
+            return Ok(Channel { word: word.clone(), unit, index, joint: false });
+        }
+        let Some(index) = posed.joints.iter().position(|j| j == word) else {
+            return Err(Error::Usage(format!(
+                "input {word:?} is not known; inputs are {WRENCH:?} and the joints {:?}",
+                posed.joints
+            )));
+        };
+        let unit = if posed.prismatic[index] { "m" } else { "rad" };
+        Ok(Channel { word: word.clone(), unit, index, joint: true })
+    };
+    once(words.iter().map(channel).collect::<Result<_, _>>()?, "input")
+}
+
+fn output_channels(words: &[String]) -> Result<Vec<Channel>, Error> {
+    let channel = |word: &String| {
+        let index = AXES.iter().position(|w| w == word);
+        let index = index.ok_or_else(|| {
+            Error::Usage(format!("output {word:?} is not known; outputs are {AXES:?} (the folder is -o)"))
+        })?;
+        Ok(Channel { word: word.clone(), unit: if index < 3 { "m" } else { "rad" }, index, joint: false })
+    };
+    once(words.iter().map(channel).collect::<Result<_, Error>>()?, "output")
+}
+
+fn once(channels: Vec<Channel>, side: &str) -> Result<Vec<Channel>, Error> {
+    if channels.is_empty() {
+        return Err(Error::Usage(format!("no {side} is given")));
+    }
+    for (k, channel) in channels.iter().enumerate() {
+        if channels[..k].iter().any(|c| c.word == channel.word) {
+            return Err(Error::Usage(format!("{side} {:?} is given twice", channel.word)));
+        }
+    }
+    Ok(channels)
+}
+
+/// A wrench acts by `Jᵀ`; a joint by the inertia and weight that it moves, and moves the tool directly.
+fn system(linear: &Linear, inputs: &[Channel], outputs: &[Channel]) -> LinearSystem {
+    let n = linear.M.nrows();
+    let J = tool_map(linear);
+    let columns =
+        |f: &dyn Fn(usize, &Channel) -> f64| DMatrix::from_fn(n, inputs.len(), |row, column| f(row, &inputs[column]));
+    LinearSystem {
+        M: linear.M.clone(),
+        D: linear.D.clone(),
+        K: linear.K.clone(),
+        B_0: columns(&|row, c| if c.joint { -linear.K_a[(row, c.index)] } else { J[(c.index, row)] }),
+        B_1: columns(&|row, c| if c.joint { -linear.D_a[(row, c.index)] } else { 0.0 }),
+        B_2: columns(&|row, c| if c.joint { -linear.M_a[(row, c.index)] } else { 0.0 }),
+        C: DMatrix::from_fn(outputs.len(), n, |row, column| J[(outputs[row].index, column)]),
+        F: DMatrix::from_fn(outputs.len(), inputs.len(), |row, column| {
+            let c = &inputs[column];
+            if c.joint { linear.J_a[(outputs[row].index, c.index)] } else { 0.0 }
+        }),
+    }
+}
+
+fn quantity_name(quantity: Quantity) -> &'static str {
+    match quantity {
+        Quantity::Displacement => "displacement",
+        Quantity::Velocity => "velocity",
+        Quantity::Acceleration => "acceleration",
+    }
+}
+
+fn unit(output: &Channel, input: &Channel, quantity: Quantity) -> String {
+    let rate = match quantity {
+        Quantity::Displacement => "",
+        Quantity::Velocity => "/s",
+        Quantity::Acceleration => "/s2",
+    };
+    format!("{}{rate}/{}", output.unit, input.unit)
+}
+
+/// Angles without steps of more than half a turn.
+fn unwrapped(angles: impl Iterator<Item = f64>) -> Vec<f64> {
+    use std::f64::consts::TAU;
+    let mut last = None;
+    angles
+        .map(|angle| {
+            let near = last.map_or(angle, |last: f64| angle + TAU * ((last - angle) / TAU).round());
+            last = Some(near);
+            near
+        })
+        .collect()
+}
+
+/// The response as a table: frequency, then magnitude and phase of each curve, units in the names.
+fn csv(response: &Response) -> String {
+    let mut text = "frequency_hz".to_owned();
+    for c in &response.curves {
+        let unit = c.unit.replace('/', "_per_");
+        text += &format!(",{}_to_{}_{unit},{}_to_{}_phase_rad", c.input, c.output, c.input, c.output);
+    }
+    text.push('\n');
+    for (k, hz) in response.frequency_hz.iter().enumerate() {
+        text += &hz.to_string();
+        for c in &response.curves {
+            text += &format!(",{:e},{}", c.magnitude[k], c.phase_rad[k]);
+        }
+        text.push('\n');
+    }
+    text
+}
+
+/// Magnitude over frequency, a panel per unit, and phase of all curves below.
+fn plot(response: &Response) -> Result<String, PlotError> {
+    let curve = |c: &ResponseCurve, y: Vec<f64>| PlotCurve {
+        name: format!("{} to {}", c.input, c.output),
+        x: response.frequency_hz.clone(),
+        y,
+    };
+    let mut panels: Vec<Panel> = Vec::new();
+    for c in response.curves.iter().filter(|c| c.magnitude.iter().any(|m| *m > 0.0)) {
+        let label = format!("magnitude [{}]", c.unit);
+        let magnitude = curve(c, c.magnitude.clone());
+        match panels.iter_mut().find(|panel| panel.label == label) {
+            Some(panel) => panel.curves.push(magnitude),
+            None => panels.push(Panel { label, logarithmic: true, legend: true, curves: vec![magnitude] }),
+        }
+    }
+    let degrees = |c: &ResponseCurve| curve(c, c.phase_rad.iter().map(|x| x.to_degrees()).collect());
+    let phase = response.curves.iter().map(degrees).collect();
+    panels.push(Panel { label: "phase [deg]".into(), logarithmic: false, legend: false, curves: phase });
+    let title = format!("{}: {} of the TCP ({})", response.robot, response.quantity, response.tcp);
+    line_plot(&title, "frequency [Hz]", response.logarithmic, &panels)
+}
+
+fn save(response: &mut Response, paths: Vec<PathBuf>) -> Result<(), Error> {
+    let text = |k: usize| Some(paths[k].display().to_string());
+    // A robot that does not yield has no curve to draw.
+    let picture = plot(response).map_err(|error| response.warnings.push(error.to_string())).ok();
+    response.files = ResponseFiles { csv: text(0), plot: picture.as_ref().and(text(1)), json: text(2) };
+    let json = serde_json::to_string_pretty(response).expect("plain numbers and strings") + "\n";
+    let contents = [Some(csv(response)), picture, Some(json)];
+    let files = paths.into_iter().zip(contents).filter_map(|(path, content)| Some((path, content?)));
+    write_all(&files.collect::<Vec<_>>())
+}

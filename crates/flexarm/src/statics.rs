@@ -1,0 +1,164 @@
+//! Statics at a pose: where weight and a wrench at the tool take it, and how it yields to more.
+
+use flexarm_analysis::tcp_error;
+use flexarm_kinematics::{forward_kinematics, frame_jacobian};
+use nalgebra::{DVector, Matrix6xX, Vector6};
+use serde::Serialize;
+
+use crate::compare::{ROTATION_LIMIT, STRAIN_LIMIT};
+use crate::error::Error;
+use crate::options::Modelling;
+use crate::posed::{Posed, step_error};
+use crate::reduce::numbers;
+use crate::robot::Robot;
+
+/// Answer of `flexarm statics`. SI units; world axes, at the TCP; six-vectors linear first.
+#[derive(Clone, Debug, Serialize)]
+pub struct Statics {
+    /// Name of the robot.
+    pub robot: String,
+    /// Joints that are held, in coordinate order.
+    pub joints: Vec<String>,
+    /// Where they are held (rad or m).
+    pub at: Vec<f64>,
+    /// Link that carries the TCP.
+    pub tcp: String,
+    /// Force (N) and moment (N m) on the TCP, besides weight.
+    pub wrench: [f64; 6],
+    /// TCP of the rigid robot (m).
+    pub tcp_position_m: [f64; 3],
+    /// From the rigid TCP to the flexible one, under weight and wrench (m).
+    pub tcp_displacement_m: [f64; 3],
+    /// The same as a rotation vector (rad).
+    pub tcp_rotation_rad: [f64; 3],
+    /// The part of weight alone (m).
+    pub sag_m: [f64; 3],
+    /// The same as a rotation vector (rad).
+    pub sag_rad: [f64; 3],
+    /// Displacement of the TCP per wrench at the equilibrium, drives locked, 6×6 (m/N, rad/N; m/(N m), rad/(N m)).
+    pub compliance: Vec<Vec<f64>>,
+    /// Forces with which the drives hold the pose (N m or N).
+    pub holding_torque: Vec<f64>,
+    /// Flexible elements.
+    pub elements: Vec<ElementStatics>,
+    /// Unbalanced force over the largest force.
+    pub residual: f64,
+    /// Things worth telling.
+    pub warnings: Vec<String>,
+}
+
+/// An elastic element at the equilibrium.
+#[derive(Clone, Debug, Serialize)]
+pub struct ElementStatics {
+    /// Name of the link.
+    pub name: String,
+    /// Elastic coordinates (m, rad), in the axes of the proximal part.
+    pub deflection: Vec<f64>,
+    /// What its spring carries (N, N m).
+    pub load: Vec<f64>,
+    /// Displacement of the TCP that it causes by itself, to first order (m).
+    pub tcp_displacement_m: [f64; 3],
+    /// Rotation of the TCP that it causes by itself (rad).
+    pub tcp_rotation_rad: [f64; 3],
+    /// Energy in it (J).
+    pub energy_j: f64,
+}
+
+/// Reads a wrench: `fx,fy,fz` or `fx,fy,fz,tx,ty,tz` (N, N m).
+///
+/// # Errors
+/// [`Error::Usage`].
+pub fn parse_wrench(text: &str) -> Result<[f64; 6], Error> {
+    let values = numbers(text).map_err(|what| Error::Usage(format!("--wrench: {what} (N, N m)")))?;
+    match values.as_slice() {
+        [fx, fy, fz] => Ok([*fx, *fy, *fz, 0.0, 0.0, 0.0]),
+        [fx, fy, fz, tx, ty, tz] => Ok([*fx, *fy, *fz, *tx, *ty, *tz]),
+        other => Err(Error::Usage(format!(
+            "--wrench has {} numbers; expected fx,fy,fz or fx,fy,fz,tx,ty,tz in world axes",
+            other.len()
+        ))),
+    }
+}
+
+/// Equilibrium of the flexible robot at a pose under its weight and a wrench at the TCP, drives locked.
+///
+/// `at` as for [`crate::parse_joint_values`]; `wrench` in world axes, constant while the arm yields.
+///
+/// # Errors
+/// [`Error::Usage`] for joint values that do not fit, [`Error::Step`] where there is no equilibrium.
+pub fn statics(robot: &Robot, modelling: &Modelling, at: Option<&str>, wrench: [f64; 6]) -> Result<Statics, Error> {
+    let posed = Posed::new(robot, modelling, at)?;
+    let X_rigid = posed.rigid_tool();
+    let weight = posed.linear(&Vector6::zeros())?;
+    let loaded = if wrench == [0.0; 6] { weight.clone() } else { posed.linear(&wrench.into())? };
+    let displacement = tcp_error(&X_rigid, &loaded.X_WT);
+    let sag = tcp_error(&X_rigid, &weight.X_WT);
+    let C = loaded.compliance().map_err(step_error)?;
+
+    // To first order each element's share is its deflection by the Jacobian of the rigid pose.
+    let model = &posed.arm.model;
+    let (mut data, state) = posed.undeformed();
+    forward_kinematics(model, &mut data, &state.q);
+    let mut J = Matrix6xX::zeros(model.nv());
+    frame_jacobian(model, &data, &posed.tool, &mut J);
+    let ne = model.n_elastic();
+    let J = J.columns(model.nv() - ne, ne);
+    let mut warnings = posed.warnings.clone();
+    let mut elements = Vec::new();
+    for (name, range) in &loaded.elements {
+        let (first, n) = (range.start, range.len());
+        let deflection: DVector<f64> = loaded.equilibrium.rows(first, n).into_owned();
+        let load = loaded.springs.view((first, first), (n, n)) * &deflection;
+        let moved = J.columns(first - loaded.driven, n) * &deflection;
+        let rotation = Posed::flexible_rotation(&deflection);
+        if rotation > ROTATION_LIMIT {
+            warnings.push(format!(
+                "link {name:?} bends by {rotation:.3} rad, beyond the {ROTATION_LIMIT} rad for which the linear elastic model is good"
+            ));
+        }
+        elements.push(ElementStatics {
+            name: name.clone(),
+            energy_j: 0.5 * load.dot(&deflection),
+            tcp_displacement_m: [moved[0], moved[1], moved[2]],
+            tcp_rotation_rad: [moved[3], moved[4], moved[5]],
+            load: load.as_slice().to_vec(),
+            deflection: deflection.as_slice().to_vec(),
+        });
+    }
+    for (span, strain) in posed.flexible.spans.iter().zip(posed.strains(&loaded.q)) {
+        if strain > STRAIN_LIMIT {
+            let name = &span.link;
+            warnings.push(format!(
+                "link {name:?} changes its length by {strain:.2e} of it, beyond {STRAIN_LIMIT:.0e}: check stiffness and loads"
+            ));
+        }
+    }
+    for ((joint, c), torque) in posed.joints.iter().zip(model.coordinates()).zip(&loaded.holding) {
+        if torque.abs() > c.limits.effort {
+            warnings.push(format!(
+                "joint {joint:?} needs {:.0} N m (or N) to hold the pose, its limit is {:.0}",
+                torque.abs(),
+                c.limits.effort
+            ));
+        }
+    }
+    let [x, y, z, rx, ry, rz] = displacement;
+    let [sx, sy, sz, srx, sry, srz] = sag;
+    Ok(Statics {
+        robot: robot.name.clone(),
+        tcp: robot.tcp.0.clone(),
+        wrench,
+        tcp_position_m: X_rigid.translation.vector.into(),
+        tcp_displacement_m: [x, y, z],
+        tcp_rotation_rad: [rx, ry, rz],
+        sag_m: [sx, sy, sz],
+        sag_rad: [srx, sry, srz],
+        compliance: C.row_iter().map(|row| row.iter().copied().collect()).collect(),
+        holding_torque: loaded.holding.as_slice().to_vec(),
+        elements,
+        residual: loaded.residual,
+        warnings,
+        joints: posed.joints,
+        at: posed.at,
+    })
+}
