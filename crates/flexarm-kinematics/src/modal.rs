@@ -149,17 +149,22 @@ pub(crate) struct ModalData {
     pub(crate) solved: DMatrix<f64>,
 }
 
-#[inline(always)]
-fn column_of(flat: &[f64], k: usize) -> Matrix3<f64> {
-    let q = &flat[9 * k..9 * k + 9];
-    Matrix3::new(q[0], q[3], q[6], q[1], q[4], q[7], q[2], q[5], q[8])
-}
-
-/// `y += A x`, column by column.
+/// `y += A x`, four columns at a time: y then goes through the registers once for all four.
 #[inline(always)]
 fn add_product(A: &DMatrix<f64>, x: &[f64], y: &mut [f64]) {
     let rows = A.nrows();
-    for (column, x) in A.as_slice().chunks_exact(rows).zip(x) {
+    let (a, y) = (A.as_slice(), &mut y[..rows]);
+    let mut fours = a.chunks_exact(4 * rows);
+    let mut x = x.chunks_exact(4);
+    for (a, x) in fours.by_ref().zip(x.by_ref()) {
+        let (a0, rest) = a.split_at(rows);
+        let (a1, rest) = rest.split_at(rows);
+        let (a2, a3) = rest.split_at(rows);
+        for ((((y, a0), a1), a2), a3) in y.iter_mut().zip(a0).zip(a1).zip(a2).zip(a3) {
+            *y += (a0 * x[0] + a1 * x[1]) + (a2 * x[2] + a3 * x[3]);
+        }
+    }
+    for (column, x) in fours.remainder().chunks_exact(rows).zip(x.remainder()) {
         for (y, a) in y.iter_mut().zip(column) {
             *y += a * x;
         }
@@ -191,16 +196,18 @@ impl ModalData {
         if !tables.N.is_empty() {
             add_product(&tables.N, eta, &mut self.Q);
         }
-        let (mut h, mut E) = (shapes.first_moment, Matrix3::zeros());
-        for (k, &eta_k) in eta.iter().enumerate() {
-            let Q = column_of(&self.Q, k);
+        // Only the symmetric part of E counts, and P and Pᵀ have the same.
+        let (mut h, mut E) = (shapes.first_moment, [0.0; 9]);
+        let matrices = self.Q.chunks_exact(9).zip(tables.Pt.chunks_exact(9));
+        for ((k, &eta_k), (Q, Pt)) in eta.iter().enumerate().zip(matrices) {
             h += shapes.C_t[k] * eta_k;
-            E += (shapes.P[k] + Q) * eta_k;
-            self.C_r[k] = tables.C_rotary[k] + axial(&Q);
+            for ((e, p), q) in E.iter_mut().zip(Pt).zip(Q) {
+                *e += (p + q) * eta_k;
+            }
+            self.C_r[k] = tables.C_rotary[k] + Vector3::new(Q[5] - Q[7], Q[6] - Q[2], Q[1] - Q[3]);
         }
-        let (xy, xz, yz) =
-            (0.5 * (E[(0, 1)] + E[(1, 0)]), 0.5 * (E[(0, 2)] + E[(2, 0)]), 0.5 * (E[(1, 2)] + E[(2, 1)]));
-        let (x, y, z) = (E[(0, 0)], E[(1, 1)], E[(2, 2)]);
+        let (xy, xz, yz) = (0.5 * (E[3] + E[1]), 0.5 * (E[6] + E[2]), 0.5 * (E[7] + E[5]));
+        let (x, y, z) = (E[0], E[4], E[8]);
         let J = shapes.inertia + Matrix3::new(y + z, -xy, -xz, -xy, x + z, -yz, -xz, -yz, x + y);
         self.inertia = SpatialInertia { mass: shapes.mass, first_moment: h, rotational: J };
     }
@@ -216,21 +223,27 @@ impl ModalData {
             add_product(&tables.g, rates, &mut self.g_rate);
         }
         let shapes = &tables.shapes;
-        let (mut Wt, mut c, mut rotary) = (Matrix3::zeros(), Vector3::zeros(), Vector3::zeros());
+        let (mut Wt, mut c, mut rotary) = ([0.0; 9], Vector3::zeros(), Vector3::zeros());
         // ω × v is the part of the origin's acceleration that a spatial acceleration leaves out.
         let wv = w.cross(&v);
-        let ww = w.norm_squared();
-        for (k, &rate) in rates.iter().enumerate() {
-            let Q = column_of(&self.Q, k);
-            Wt += Q * rate;
+        // ωᵀ Q ω - tr(Q) ω·ω is a sum over the entries of Q, with these weights.
+        let (xx, yy, zz) = (w.x * w.x, w.y * w.y, w.z * w.z);
+        let (xy, xz, yz) = (w.x * w.y, w.x * w.z, w.y * w.z);
+        let weights = [-(yy + zz), xy, xz, xy, -(xx + zz), yz, xz, yz, -(xx + yy)];
+        for ((k, &rate), Q) in rates.iter().enumerate().zip(self.Q.chunks_exact(9)) {
+            let mut f = shapes.C_t[k].dot(&wv);
+            for ((W, q), weight) in Wt.iter_mut().zip(Q).zip(&weights) {
+                *W += q * rate;
+                f += q * weight;
+            }
             c += shapes.C_t[k] * rate;
             rotary += tables.C_rotary[k] * rate;
-            let mut f = shapes.C_t[k].dot(&wv) + w.dot(&mul(&Q, &w)) - Q.trace() * ww;
             if second {
                 f += 2.0 * (w.x * self.g_rate[3 * k] + w.y * self.g_rate[3 * k + 1] + w.z * self.g_rate[3 * k + 2]);
             }
             self.f[k] = f;
         }
+        let Wt = Matrix3::from_column_slice(&Wt);
         let SpatialInertia { mass, first_moment: h, rotational: J } = &self.inertia;
         let force = wv * *mass + w.cross(&(c * 2.0 + w.cross(h)));
         let torque = h.cross(&wv) + w.cross(&(mul(J, &w) + rotary)) + (w * Wt.trace() - mul(&Wt, &w)) * 2.0;

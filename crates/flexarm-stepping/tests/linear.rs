@@ -150,7 +150,7 @@ fn matrices_are_those_of_the_modes_and_of_inverse_dynamics() {
 fn a_rigid_arm_does_not_yield() {
     let reference = reference_arm(false);
     let model = Arc::new(Model::new(&reference.mechanism).expect("valid"));
-    let arm = FlexibleArm::new(model.clone(), vec![], Arc::new(Held(POSE.to_vec()))).expect("valid");
+    let arm = FlexibleArm::new(model.clone(), Vec::<Spring>::new(), Arc::new(Held(POSE.to_vec()))).expect("valid");
     let tool = model.frame("tcp").expect("there").clone();
     let here = at(&arm, &tool, &Vector6::new(100.0, 0.0, 0.0, 0.0, 0.0, 0.0));
     assert_eq!(here.compliance().expect("no motion at all"), Matrix6::zeros());
