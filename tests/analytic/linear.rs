@@ -7,7 +7,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use flexarm::{LoadOptions, Motion, ResponseRequest, Robot, RunOptions, modes, response, simulate, statics};
+use flexarm::{LoadOptions, Modelling, Motion, ResponseRequest, Robot, RunOptions, modes, response, simulate, statics};
 use flexarm_analysis::{Taper, strongest_line};
 use flexarm_kinematics::{Data, Frame, Model, State, Wrench, forward_kinematics, mass_matrix};
 use flexarm_stepping::*;
@@ -30,7 +30,7 @@ fn joined(values: &[f64]) -> String {
 /// The reference arm by file with another damping.
 fn arm(damping: Damping, motion: Arc<dyn PrescribedMotion>) -> (FlexibleArm, Frame) {
     let mut robot = load("reference_arm").flexible_robot().expect("a tree");
-    robot.springs.iter_mut().for_each(|(_, own)| *own = damping);
+    robot.springs.iter_mut().for_each(|spring| spring.damping = damping);
     let tool = robot.model.frame("__tcp").expect("there").clone();
     (robot.arm(motion).expect("carries its weight"), tool)
 }
@@ -67,7 +67,7 @@ fn modes_of_the_industrial_arm_are_those_that_compare_reports() {
     let options = RunOptions { log_rate_hz: 100.0, step_s: 0.01, ..RunOptions::default() };
     let summary = simulate(&robot, &motion, &options, None, &mut |_, _| ControlFlow::Continue(()));
     let reported = summary.expect("runs").frequencies_hz;
-    let found = modes(&robot, Some(&joined(&q)), 100).expect("an equilibrium");
+    let found = modes(&robot, &Modelling::default(), Some(&joined(&q)), 100).expect("an equilibrium");
     assert_eq!((found.total, found.frequencies_hz.len()), (12, reported.len()));
     let mut worst = 0.0f64;
     for (mode, truth) in found.modes.iter().zip(&reported) {
@@ -89,7 +89,7 @@ fn modes_of_the_industrial_arm_are_those_that_compare_reports() {
 fn response_at_rest_is_the_compliance() {
     let robot = load("kr210");
     let at = "0.2,-1.1,1.2,0.3,0.4,0.5";
-    let C = statics(&robot, Some(at), [0.0; 6]).expect("an equilibrium").compliance;
+    let C = statics(&robot, &Modelling::default(), Some(at), [0.0; 6]).expect("an equilibrium").compliance;
     let words = |words: [&str; 6]| words.map(str::to_owned).to_vec();
     let request = ResponseRequest {
         inputs: words(["force-x", "force-y", "force-z", "torque-x", "torque-y", "torque-z"]),
@@ -97,7 +97,7 @@ fn response_at_rest_is_the_compliance() {
         points: 2,
         ..ResponseRequest::default()
     };
-    let found = response(&robot, Some(at), &request, None).expect("a response");
+    let found = response(&robot, &Modelling::default(), Some(at), &request, None).expect("a response");
     let mut worst = 0.0f64;
     for (k, curve) in found.curves.iter().enumerate() {
         let (i, j) = (k % 6, k / 6);
@@ -223,7 +223,7 @@ fn a_force_at_a_resonance_shakes_the_tool_as_high_as_the_peak() {
         to_hz: Some(60.0),
         ..ResponseRequest::default()
     };
-    let found = response(&robot, Some(&joined(&POSE)), &request, None).expect("a response");
+    let found = response(&robot, &Modelling::default(), Some(&joined(&POSE)), &request, None).expect("a response");
     let own = robot.flexible_robot().expect("a tree");
     let arm = own.arm(held()).expect("carries its weight");
     let tool = arm.model.frame("__tcp").expect("there").clone();
@@ -270,7 +270,7 @@ fn a_joint_at_a_resonance_shakes_the_tool_as_high_as_the_peak() {
         to_hz: Some(60.0),
         ..ResponseRequest::default()
     };
-    let found = response(&robot, Some(&joined(&POSE)), &request, None).expect("a response");
+    let found = response(&robot, &Modelling::default(), Some(&joined(&POSE)), &request, None).expect("a response");
     for (curve, axis) in found.curves.iter().zip([0, 2]) {
         let peak = &curve.peaks[0];
         let omega = TAU * peak.frequency_hz;

@@ -82,9 +82,9 @@ fn reference_arm_by_file_equals_the_converged_curve() {
 fn one_beam_sags_as_its_two_part_model_must() {
     let (summary, _) = run("one_beam", "beam_hold.toml", &RunOptions::default());
     let robot = load("one_beam");
-    let (spring, _) = &robot.flexible_robot().expect("a tree").springs[0];
+    let span = &robot.flexible_robot().expect("a tree").spans[0];
     let mass = |name: &str| robot.urdf.mechanism.link(name).and_then(|l| l.inertia).map_or(0.0, |i| i.mass);
-    let (l, g) = (spring.length, 9.81);
+    let (l, g) = (span.length, 9.81);
     // bending about the horizontal section axis: height 40 mm upright
     let b_h = [0.02f64, 0.04f64];
     let sags = [b_h[0] * b_h[1].powi(3), b_h[1] * b_h[0].powi(3)].map(|bh3| {

@@ -26,6 +26,8 @@ pub struct ModeTable {
     pub tcp: String,
     /// Natural frequencies `|λ| / 2π` (Hz), ascending.
     pub frequencies_hz: Vec<f64>,
+    /// Frequencies without the dampers (Hz), ascending, as many.
+    pub undamped_frequencies_hz: Vec<f64>,
     /// Damping ratios `-Re λ / |λ|`.
     pub damping_ratio: Vec<f64>,
     /// Elastic elements, in the order of `strain_energy`.
@@ -147,7 +149,11 @@ pub(crate) fn table(
         all.iter().take(count).map(|mode| ModeFigures::new(mode, linear, &compliance)).collect();
     let covered =
         |i: usize| modes.iter().map(|mode| mode.compliance_share[i]).sum::<Option<f64>>().filter(|_| !modes.is_empty());
+    // Dampers that are not in proportion also move the frequencies.
+    let undamped = damped_modes(&linear.M, &(&linear.D * 0.0), &((&linear.K + linear.K.transpose()) * 0.5));
+    let undamped = undamped.map_err(linear_error)?;
     Ok(ModeTable {
+        undamped_frequencies_hz: undamped.iter().take(count).map(DampedMode::frequency_hz).collect(),
         robot: robot.name.clone(),
         tcp: robot.tcp.0.clone(),
         frequencies_hz: modes.iter().map(|mode| mode.frequency_hz).collect(),
