@@ -36,6 +36,7 @@ pub(crate) fn export(cli: &Cli, args: &ExportArgs) -> Result<ExitCode, Error> {
             ExportFormatName::Dmig => ExportFormat::Dmig,
             ExportFormatName::Op4 => ExportFormat::Op4,
             ExportFormatName::Simscape => ExportFormat::Simscape,
+            ExportFormatName::Sid => ExportFormat::Sid,
         },
         units: args.units,
         nodes: args.nodes.clone(),

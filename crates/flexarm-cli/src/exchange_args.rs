@@ -15,6 +15,8 @@ Examples:
       flexarm import arm_K.mtx
   Exudyn, interfaces by planes (unit of the file), tied rigidly:
       flexarm import arm.hdf5 --units m-kg-s --map \"A=plane(0,0,0;1,0,0),B=plane(1,0,0;1,0,0)\"
+  Modal body (SID), for modal links of a robot file:
+      flexarm import arm.SID_FEM --units m-kg-s --map A=1,B=2
   Stiffness only, with the mass of the link:
       flexarm import arm.mtx --units m-kg-s --map A=1001,B=1002 --at A=0,0,0 --at B=1,0,0 \\
           --mass 18.8 --com 0.5,0,0 --inertia 0.01,1.6,1.6,0,0,0
@@ -24,6 +26,7 @@ Maps (proximal interface first; six rows each, ux uy uz rx ry rz):
   A=947:1-3+948:1-3       rotations are components 1 to 3 of a second node (CalculiX)
   A=#1-6                  rows of the file, from 1
   modal=#13-22            which other rows are modal coordinates
+  A=1,B=2,C=3             nodes of a SID, which become the interfaces of the modal link
   A=set:NAME, A=plane(x,y,z;nx,ny,nz)    nodes of a full model with positions (Exudyn)
 
 Lengths are in the unit of the file, masses and inertias in SI.";
@@ -107,7 +110,7 @@ pub(crate) struct ExportArgs {
     /// Units to write: m-kg-s (N), mm-t-s (N, MPa), ...
     #[arg(long, value_name = "LENGTH-MASS-TIME")]
     pub(crate) units: UnitsOfFile,
-    /// Node numbers of the interfaces in formats that have some, proximal first [default: 1001,1002,...]
+    /// Node numbers of the interfaces in formats that have some, proximal first [default: 1001,1002,...; 1,2,... for sid]
     #[arg(long, value_name = "N,N,...", value_delimiter = ',')]
     pub(crate) nodes: Vec<i64>,
     /// Output folder [default: a new one in out/]
@@ -147,4 +150,6 @@ pub(crate) enum ExportFormatName {
     Op4,
     /// Comma-separated values and a script
     Simscape,
+    /// Standard Input Data: modes and mass integrals of the modal link
+    Sid,
 }

@@ -86,12 +86,19 @@ pub(crate) fn inspection(i: &Inspection) -> String {
     out += &lines(&t);
     for f in &i.flexible_links {
         out += &format!(
-            "flexible: {} ({}), {:.4} m, parts {} kg\n",
+            "flexible: {} ({}), {:.4} m, parts {} kg; {}, {} coordinates\n",
             f.name,
             f.method,
             f.length_m,
-            f.parts_kg.iter().map(|m| format!("{m:.2}")).collect::<Vec<_>>().join(" + ")
+            f.parts_kg.iter().map(|m| format!("{m:.2}")).collect::<Vec<_>>().join(" + "),
+            f.model,
+            f.coordinates
         );
+        if let Some(hz) = &f.modal_frequencies_hz {
+            let first: Vec<String> = hz.iter().take(6).map(|hz| format!("{hz:.1}")).collect();
+            let more = if hz.len() > 6 { hz.last().map(|hz| format!(", ... {hz:.0}")) } else { None };
+            out += &format!("  near joint held: {}{} Hz\n", first.join(", "), more.unwrap_or_default());
+        }
     }
     out += &format!(
         "TCP on {}: position {:.6?} m, quaternion wxyz {:.6?}\n",
@@ -195,6 +202,7 @@ pub(crate) fn exported(summary: &flexarm::export::ExportSummary) -> String {
     let c = &summary.checks;
     out += &format!("read back: stiffness differs by {:.1e}", c.stiffness_error);
     out += &c.mass_error.map_or_else(|| ", no mass".into(), |error| format!(", mass by {error:.1e}"));
+    out += &c.integrals_error.map_or_else(String::new, |error| format!(", mass integrals by {error:.1e}"));
     out += " (relative to the diagonal)\n";
     for file in &summary.files {
         out += &format!("{file}\n");

@@ -59,6 +59,7 @@ fn flags(args: &ReduceArgs) -> Result<ReduceJob, Error> {
         modes_up_to_hz: args.modes_up_to,
         split: args.split,
         chains: args.chains.clone(),
+        geometric: args.geometric.then_some(true),
         quadrature: args.quadrature.map(|name| match name {
             QuadratureName::Exact => QuadratureChoice::Exact,
             QuadratureName::Calculix => QuadratureChoice::Calculix,

@@ -18,6 +18,8 @@ Examples:
           --interface 'A=plane(0,0,0; 0,1,0)' --interface 'B=cylinder(0,0,1.1; 0,1,0; 0.06)' --tie B=distributing
   The same again, with other modes, from the job that the first run wrote:
       flexarm reduce out/lower_arm-001/reduce.toml --modes-up-to 500 --chains 3,4,8
+  With the stiffness by load, for modal links with geometric_stiffening = true:
+      flexarm reduce lower_arm.reduce.toml --geometric
   Straight into a robot's folder:
       flexarm reduce lower_arm.reduce.toml --flex robots/mine/lower_arm.flex
 
@@ -84,6 +86,9 @@ pub(crate) struct ReduceArgs {
     /// Numbers of parts of longer chains to store in the link, such as 3,4,8
     #[arg(long, value_name = "N,N,...", value_delimiter = ',')]
     pub(crate) chains: Option<Vec<usize>>,
+    /// Store the stiffness by load of the modal link (12 more solves), for geometric_stiffening = true of a robot file
+    #[arg(long)]
+    pub(crate) geometric: bool,
     /// Integration of the elements
     #[arg(long, value_enum)]
     pub(crate) quadrature: Option<QuadratureName>,

@@ -565,9 +565,7 @@ mod robot_toml {
     }
 
     #[test]
-    fn models_of_other_versions() {
-        robot_file(&with(ROBOT, "damping", "model = \"modal\"\ndamping"), "model =", &["\"modal\"", "\"lumped\""]);
-        robot_file(&with(ROBOT, "damping", "segments = 3\ndamping"), "segments", &["segments = 3", "2 rigid parts"]);
+    fn angles() {
         robot_file(
             &with(ROBOT, "damping", "angles = \"xyz\"\ndamping"),
             "angles",

@@ -214,6 +214,130 @@ fn a_sid_and_an_exudyn_model_are_beams_too() {
     }
 }
 
+/// Numbers of a SID, block by block, in the order of the file.
+fn numbers_of_sid(text: &str) -> Vec<(String, Vec<f64>)> {
+    let mut blocks: Vec<(String, Vec<f64>)> = vec![("head".into(), Vec::new())];
+    for line in text.lines().map(str::trim) {
+        match line.split_once('=') {
+            None => blocks.push((line.to_owned(), Vec::new())),
+            Some((key, value)) if key.starts_with(['m', 'M']) => {
+                let value = value.trim().replace(['D', 'd'], "e");
+                blocks.last_mut().unwrap().1.push(value.parse().unwrap_or_else(|e| panic!("{e}: {line}")));
+            }
+            Some(_) => {}
+        }
+    }
+    blocks
+}
+
+/// Truth: the modal link of a mesh as it was written; each block of numbers against its largest.
+#[test]
+fn a_modal_link_survives_sid_and_the_way_back() {
+    let place = Place::new();
+    let link = common::shipped_robot("lower_arm/lower_arm.flex");
+    for (units, mesh_units) in [("m-kg-s", 1.0), ("mm-t-s", 1e3)] {
+        let folder = format!("out-{units}");
+        let said =
+            place.json(&["export", &link, "--format", "sid", "--units", units, "--nodes", "11,12", "-o", &folder]);
+        assert_eq!((&said["rows"], &said["modes"], &said["map"]), (&16.into(), &10.into(), &"A=11,B=12".into()));
+        for key in ["stiffness_error", "mass_error", "integrals_error"] {
+            assert!(said["checks"][key].as_f64().unwrap() < 1e-12, "{key}: {said}");
+        }
+        let file = format!("{folder}/lower_arm.SID_FEM");
+        let readme = place.text(&format!("{folder}/lower_arm_README.txt"));
+        assert!(
+            readme.contains("--map \"A=11,B=12\"") && readme.contains("B ux") && readme.contains("--part-a"),
+            "{readme}"
+        );
+        let into = format!("back-{units}");
+        let import = ["import", &file, "--units", units, "--map", "A=11,B=12", "--name", "lower_arm", "-o", &into];
+        let back = place.json(&import);
+        let modal = &back["modal"];
+        assert_eq!((&modal["coordinates"], &modal["second_order"]), (&16.into(), &true.into()), "{modal}");
+        let hz = numbers(&modal["frequencies_hz"]);
+        assert!((hz[0] / 66.66771323663794 - 1.0).abs() < 1e-12, "{hz:?}");
+        assert_eq!(numbers(&back["frequencies_hz"])[..], hz[..10]);
+        assert!((back["mass_kg"].as_f64().unwrap() / 22.021087981385556 - 1.0).abs() < 1e-12);
+        assert!((numbers(&back["interfaces"][1]["position_m"])[2] - 1.1).abs() < 1e-12);
+        assert!(back["warnings"].as_array().unwrap().iter().all(|w| !w.as_str().unwrap().contains("SID")), "{back}");
+
+        // Written once more, it has the same numbers.
+        let flex = format!("{into}/lower_arm.flex");
+        let again = format!("again-{units}");
+        place.json(&["export", &flex, "--format", "sid", "--units", units, "--nodes", "11,12", "-o", &again]);
+        let [a, b] = [file, format!("{again}/lower_arm.SID_FEM")].map(|name| numbers_of_sid(&place.text(&name)));
+        let names: Vec<&String> = a.iter().map(|(name, _)| name).collect();
+        assert!(names.iter().any(|name| *name == "Oe") && names.iter().any(|name| *name == "phi"), "{names:?}");
+        for ((name, a), (other, b)) in a.iter().zip(&b) {
+            assert_eq!((name, a.len()), (other, b.len()));
+            let size = a.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+            let gap = a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            // measured 2e-16, Oe 2e-15
+            assert!(gap <= 1e-12 * size, "{name}, {mesh_units}: {gap:.1e} of {size:.1e}");
+        }
+    }
+    // In other axes it is the same link: same frequencies, B where it then is, and the robot refuses it only for that.
+    let turned = ["import", "out-m-kg-s/lower_arm.SID_FEM", "--units", "m-kg-s", "--map", "A=11,B=12", "-o", "turned"];
+    let turned = place.json(&[&turned[..], &["--axes-rpy", "0,0,1.5707963267948966"]].concat());
+    assert!((numbers(&turned["modal"]["frequencies_hz"])[0] / 66.66771323663794 - 1.0).abs() < 1e-12);
+    assert!((numbers(&turned["interfaces"][1]["position_m"])[0] + 0.15).abs() < 1e-12);
+    place.json(&["export", "turned/lower_arm.flex", "--format", "sid", "--units", "m-kg-s", "-o", "turned/sid"]);
+}
+
+#[test]
+fn a_sid_needs_modes_and_nodes() {
+    let place = Place::new();
+    place.write("bar.flex", flex::text(&flex::stiffness_12()));
+    let words = ["bar.flex", "no [modal] section", "flexarm reduce"];
+    place.refused(&["export", "bar.flex", "--format", "sid", "--units", "m-kg-s", "-o", "out"], &words);
+    let link = common::shipped_robot("lower_arm/lower_arm.flex");
+    let export = ["export", &link, "--format", "sid", "--units", "m-kg-s", "-o", "out"];
+    place.refused(&[&export[..], &["--nodes", "1"]].concat(), &["--nodes", "2 different numbers"]);
+    place.json(&export);
+    place.refused(&export, &["exists already", "--force"]);
+    let import = ["import", "out/lower_arm.SID_FEM", "--units", "m-kg-s", "--no-files", "--map"];
+    for (map, words) in [
+        ("A=1,B=3", &["no node 3", "[1, 2]"][..]),
+        ("A=1,B=1", &["node 1 twice"]),
+        ("A=1", &["two nodes or more"]),
+        ("A=#1-6,B=#7-12", &["A=1,B=2"]),
+    ] {
+        place.refused(&[&import[..], &[map]].concat(), words);
+    }
+    // Bodies that ride on the link are no part of it.
+    let said = place.json(&[
+        "export",
+        &common::shipped_robot("kr210/fe/link_2.flex"),
+        "--format",
+        "sid",
+        "--units",
+        "m-kg-s",
+        "-o",
+        "two",
+    ]);
+    assert!(said["warnings"][0].as_str().unwrap().contains("ride on the link"), "{said}");
+}
+
+/// Truth: a cantilever of the sample's figures with its own weight; see `shared/fe` for its origin.
+#[test]
+fn a_sample_sid_runs_as_a_modal_link() {
+    let Some(path) = sample("formats/beam_synthetic.SID_FEM") else { return };
+    let place = Place::new();
+    let import = ["import", path.to_str().unwrap(), "--units", "m-kg-s", "--map", "A=1001,B=1002", "--name", "bar"];
+    let said = place.json(&[&import[..], &["--flex", "bar.flex"]].concat());
+    assert_eq!(said["modal"]["coordinates"], 10);
+    let urdf = common::URDF.replace("0.8 0 0", "1 0 0").replace("1.728", "39.25");
+    place.write("beam.urdf", urdf);
+    let robot = flex::robot();
+    place.write("robot.toml", common::with(&robot, "damping", "model = \"modal\"\ndamping"));
+    let modal = place.json(&["compare", "robot.toml", "swing.toml", "--no-files"]);
+    assert_eq!(modal["links_model"], "modal");
+    // 210 GPa, 100 mm x 50 mm lying flat; measured -1.1e-2: its tied ends are stiff.
+    let sag = modal["tcp"]["static_sag_m"].as_f64().unwrap();
+    let truth = 9.81 / (210e9 * 0.1 * 0.05f64.powi(3) / 12.0) * (39.25 / 8.0 + 0.5 / 3.0);
+    assert!((sag / truth - 1.0).abs() < 0.02, "{sag:.4e} instead of {truth:.4e}");
+}
+
 /// Truth: the link before it was written, with its mass and modes.
 #[test]
 fn mass_and_modes_survive_the_way_out_and_back() {
@@ -222,6 +346,10 @@ fn mass_and_modes_survive_the_way_out_and_back() {
     let map = "A=947:1-3+948:1-3,B=949:1-3+950:1-3";
     let full = ["import", full.to_str().unwrap(), "--map", map, "--modes", "4", "--name", "arm", "-o", "first"];
     let first = place.json(&[&full[..], &["--units", "m-kg-s", "--at", "A=0,0,0", "--at", "B=1,0,0"]].concat());
+    let unknown = |said: &serde_json::Value| {
+        said["warnings"].as_array().unwrap().iter().any(|w| w.as_str().unwrap().contains("second-order terms"))
+    };
+    assert!(unknown(&first) && first["modal"]["second_order"] == false, "{}", first["warnings"]);
     for (format, file, map) in [
         ("matrix-market", "arm_K.mtx", ""),
         ("user-element", "arm.mtx", "A=1001,B=1002"),

@@ -291,6 +291,27 @@ mod inspect {
     }
 
     #[test]
+    fn models_of_flexible_links() {
+        let place = Place::new();
+        let lumped = &place.json(&["inspect", "robot.toml"])["flexible_links"][0];
+        assert_eq!((&lumped["model"], &lumped["coordinates"]), (&"lumped".into(), &6.into()));
+        assert!(lumped.get("modal_frequencies_hz").is_none(), "{lumped}");
+        place.write("robot.toml", with(ROBOT, "damping", "segments = 4\ndamping"));
+        assert_eq!(place.json(&["inspect", "robot.toml"])["flexible_links"][0]["coordinates"], 18);
+        place.write("robot.toml", with(ROBOT, "damping", "model = \"modal\"\nmodes = 3\ndamping"));
+        let modal = &place.json(&["inspect", "robot.toml"])["flexible_links"][0];
+        assert_eq!((&modal["model"], &modal["coordinates"]), (&"modal".into(), &9.into()));
+        let hz = numbers(&modal["modal_frequencies_hz"]);
+        // Clamped beam: 1.8751² sqrt(EI/(mu l⁴))/2π with shear and rotary inertia, which a slender beam hardly feels.
+        let truth = 3.516 / 0.64 * (70e9 * 0.02f64.powi(2) / 12.0 / 2700.0).sqrt() / std::f64::consts::TAU;
+        assert!(hz.len() == 9 && (hz[0] / truth - 1.0).abs() < 3e-3, "{hz:?} {truth}");
+        let answer = place.flexarm(&["inspect", "robot.toml"]);
+        for word in ["modal, 9 coordinates", "near joint held: 25."] {
+            assert!(answer.out.contains(word), "{word}: {}", answer.out);
+        }
+    }
+
+    #[test]
     fn table_for_people() {
         let answer = Place::new().flexarm(&["inspect", "robot.toml", "--at", "-0.5"]);
         assert_eq!((answer.code, answer.err.as_str()), (0, ""));
@@ -420,6 +441,43 @@ mod check {
     }
 
     #[test]
+    fn doubts_about_modal_links() {
+        let place = Place::new();
+        // Matrices tell no terms of second order, and no stiffness by load.
+        let [k, m] = super::condensed_beam();
+        place.write("arm_K.csv", k);
+        place.write("arm_M.csv", m);
+        let at = ["--map", "A=#1-6,B=#7-12", "--at", "A=0,0,0", "--at", "B=0.8,0,0", "--flex", "bar.flex"];
+        let import = ["import", "arm_K.csv", "arm_M.csv", "--units", "m-kg-s", "--name", "bar"];
+        let said = place.json(&[&import[..], &at].concat());
+        assert_eq!((&said["modal"]["coordinates"], &said["modal"]["second_order"]), (&6.into(), &false.into()));
+        let robot = common::flex::robot();
+        place.write("robot.toml", with(&robot, "damping", "model = \"modal\"\ndamping"));
+        let found = findings(&place, &["robot.toml"], 0);
+        assert_eq!(codes(&found, "warning"), ["second-order-unknown"], "{found:?}");
+        let run = place.json(&["run", "robot.toml", "swing.toml", "--no-files"]);
+        assert!(run["warnings"][0].as_str().unwrap().contains("second-order terms"), "{run}");
+        assert!(place.json(&["inspect", "robot.toml"])["warnings"][0].is_string());
+
+        place.write("robot.toml", with(&robot, "damping", "geometric_stiffening = true\ndamping"));
+        let found = findings(&place, &["robot.toml"], 0);
+        assert_eq!(codes(&found, "warning"), ["geometric-stiffening"], "{found:?}");
+        assert!(found.iter().any(|f| f["help"].as_str().unwrap().contains("reduce --geometric")));
+        let both = "model = \"modal\"\ngeometric_stiffening = true\ndamping";
+        place.write("robot.toml", with(&robot, "damping", both));
+        let found = findings(&place, &["robot.toml"], 2);
+        assert!(found[0]["message"].as_str().unwrap().contains("reduce --geometric"), "{found:?}");
+        assert_eq!(found[0]["where"], "robot.toml:11", "{found:?}");
+
+        // A beam can have it, but only as a modal link.
+        place.write("robot.toml", with(ROBOT, "damping", "geometric_stiffening = true\ndamping"));
+        let found = findings(&place, &["robot.toml"], 0);
+        assert_eq!(codes(&found, "warning"), ["geometric-stiffening"], "{found:?}");
+        place.write("robot.toml", with(ROBOT, "damping", both));
+        assert_eq!(codes(&findings(&place, &["robot.toml"], 0), "warning"), [""; 0]);
+    }
+
+    #[test]
     fn rigid_robot_is_noted() {
         let found = findings(&Place::new(), &["beam.urdf"], 0);
         assert_eq!(codes(&found, "note"), ["no-flexible-link"]);
@@ -462,4 +520,37 @@ mod check {
         assert_eq!(found[0]["where"], "robot.toml:5", "{found:?}");
         assert!(!found[0]["message"].as_str().unwrap().contains("robot.toml"), "{found:?}");
     }
+}
+
+/// Stiffness and mass of the beam as CSV, six rows per end: the mass is the consistent one of Euler and Bernoulli.
+fn condensed_beam() -> [String; 2] {
+    let (l, mass, w, h) = (0.8, 1.728, 0.02f64, 0.04f64);
+    let mut m = vec![vec![0.0; 12]; 12];
+    let mut put = |i: usize, j: usize, value: f64| {
+        m[i][j] = value;
+        m[j][i] = value;
+    };
+    let polar = mass * (w * w + h * h) / 12.0;
+    for (at, size) in [(0, mass), (3, polar)] {
+        put(at, at, size / 3.0);
+        put(at + 6, at + 6, size / 3.0);
+        put(at, at + 6, size / 6.0);
+    }
+    for (y, r, sign) in [(1, 5, 1.0), (2, 4, -1.0)] {
+        let unit = mass / 420.0;
+        put(y, y, 156.0 * unit);
+        put(y + 6, y + 6, 156.0 * unit);
+        put(y, y + 6, 54.0 * unit);
+        put(r, r, 4.0 * l * l * unit);
+        put(r + 6, r + 6, 4.0 * l * l * unit);
+        put(r, r + 6, -3.0 * l * l * unit);
+        put(y, r, sign * 22.0 * l * unit);
+        put(y, r + 6, -sign * 13.0 * l * unit);
+        put(y + 6, r, sign * 13.0 * l * unit);
+        put(y + 6, r + 6, -sign * 22.0 * l * unit);
+    }
+    let text = |a: &[Vec<f64>]| -> String {
+        a.iter().map(|row| row.iter().map(|x| format!("{x:e}")).collect::<Vec<_>>().join(",") + "\n").collect()
+    };
+    [text(&common::flex::stiffness_12()), text(&m)]
 }

@@ -130,6 +130,47 @@ fn close(found: f64, expected: f64, tolerance: f64, what: &str) {
 mod a_run {
     use super::*;
 
+    /// Truth: the same job again; and the mesh, for which the modal link stands.
+    #[test]
+    fn stores_a_modal_link_and_its_stiffness_by_load_if_asked() {
+        let place = place();
+        let plain = place.json(&[&SOUND[..], &["-o", "plain"]].concat());
+        let asked = place.json(&[&SOUND[..], &["--geometric", "-o", "asked"]].concat());
+        for (figures, folder, geometric) in [(&plain, "plain", false), (&asked, "asked", true)] {
+            let modal = &figures["modal"];
+            assert_eq!((&modal["coordinates"], &modal["second_order"]), (&16.into(), &true.into()), "{modal}");
+            assert_eq!(modal["geometric"], geometric);
+            close(modal["mass_kg"].as_f64().unwrap(), figures["mass_kg"].as_f64().unwrap(), 1e-12, "mass");
+            for (found, mesh) in
+                numbers(&modal["frequencies_hz"]).iter().zip(numbers(&figures["frequencies_hz"])).take(4)
+            {
+                close(*found, mesh, 2e-3, "frequency");
+            }
+            let flex = place.text(&format!("{folder}/beam.flex"));
+            assert!(flex.contains("\n[modal]"));
+            assert_eq!(flex.contains("\n[modal.geometric]"), geometric);
+            assert!(place.text(&format!("{folder}/reduce.toml")).contains(&format!("geometric = {geometric}")));
+            let word = if geometric { "| stored |" } else { "| not stored |" };
+            assert!(place.text(&format!("{folder}/report.md")).contains(word));
+        }
+        assert_eq!(asked["stiffness"], plain["stiffness"]);
+        // The job that was written gives the same link; so does its key alone.
+        place.json(&["reduce", "asked/reduce.toml", "-o", "again"]);
+        assert_eq!(place.text("again/beam.flex"), place.text("asked/beam.flex"));
+        place.write("job.toml", with(JOB, "modes = 4", "modes = 4\ngeometric = true"));
+        assert_eq!(place.json(&["reduce", "job.toml", "--no-files"])["modal"]["geometric"], true);
+        place.write("job.toml", with(JOB, "modes = 4", "modes = 4\ngeometric = \"yes\""));
+        place.refused(&["reduce", "job.toml"], &["job.toml:5:13:", "boolean"]);
+
+        // Standard Input Data keep it.
+        place.json(&["export", "asked/beam.flex", "--format", "sid", "--units", "mm-t-s", "-o", "sid"]);
+        let import = ["import", "sid/beam.SID_FEM", "--units", "mm-t-s", "--map", "A=1,B=2", "-o", "back"];
+        let back = place.json(&import);
+        assert_eq!(back["modal"]["geometric"], true, "{}", back["warnings"]);
+        let said = place.json(&["export", "back/beam.flex", "--format", "sid", "--units", "m-kg-s", "-o", "far"]);
+        assert!(said["checks"]["integrals_error"].as_f64().unwrap() < 1e-12, "{said}");
+    }
+
     /// Truth: closed forms of a clamped beam; bounds leave room for the tied ends of a coarse mesh.
     #[test]
     fn of_a_beam_gives_the_beam_its_files_and_all_keys() {

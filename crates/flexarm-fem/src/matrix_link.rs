@@ -162,17 +162,25 @@ pub fn link_from_superelement(
 /// A body as two halves along an axis: together they have its mass, centre of mass and inertia.
 ///
 /// Each half of a uniform bar of length l has its centre l/4 from the middle, where `l²/12` is the
-/// second moment of the bar along its axis over its mass.
+/// second moment of the bar along its axis over its mass. A bowed body has no such halves; those of its ellipsoid of
+/// inertia, cut across the axis, have their centres along `S a` (S: second moments, a: axis), and always exist.
 pub fn halves_of_bar(whole: &RigidPart, along: &Vector3<f64>) -> [RigidPart; 2] {
     let axis = along.normalize();
     // Second moment along the axis: half the trace less the moment about it.
     let spread = (whole.inertia.trace() / 2.0 - axis.dot(&(whole.inertia * axis))).max(0.0) / whole.mass;
-    let offset = axis * (0.75 * spread).sqrt();
-    let c = offset.cross_matrix();
-    // Steiner with the mass of both halves at +-offset.
-    let inertia = (whole.inertia + c * c * whole.mass) * 0.5;
-    let half = |com| RigidPart { mass: whole.mass / 2.0, com, inertia };
-    [half(whole.com - offset), half(whole.com + offset)]
+    let at = |offset: Vector3<f64>| {
+        let c = offset.cross_matrix();
+        // Steiner with the mass of both halves at +-offset.
+        let inertia = (whole.inertia + c * c * whole.mass) * 0.5;
+        let half = |com| RigidPart { mass: whole.mass / 2.0, com, inertia };
+        [half(whole.com - offset), half(whole.com + offset)]
+    };
+    let halves = at(axis * (0.75 * spread).sqrt());
+    if halves[0].check("a half").is_ok() || spread == 0.0 {
+        return halves;
+    }
+    let S = Matrix3::identity() * (0.5 * whole.inertia.trace()) - whole.inertia;
+    at(S * axis * (0.75 / spread).sqrt() / whole.mass)
 }
 
 #[cfg(test)]
@@ -207,6 +215,23 @@ mod tests {
         let again = a.merged(&b);
         assert!((again.inertia - whole.inertia).amax() < 1e-13 && (again.com - whole.com).norm() < 1e-14);
         a.check("a half").unwrap();
+    }
+
+    /// Truth: points on a bow, on whose chord halves of a straight bar would need mass that is not there.
+    #[test]
+    fn a_bowed_body_has_halves_too() {
+        let points: Vec<Vector3<f64>> =
+            (0..50).map(|k| k as f64 / 49.0).map(|x| Vector3::new(x, 0.3 * x * x, 0.01 * (41.0 * x).sin())).collect();
+        let com = points.iter().sum::<Vector3<f64>>() / 50.0;
+        let S: Matrix3<f64> = points.iter().map(|p| (p - com) * (p - com).transpose() / 5.0).sum();
+        let whole = RigidPart { mass: 10.0, com, inertia: Matrix3::identity() * S.trace() - S };
+        whole.check("the bow").unwrap();
+        let [a, b] = halves_of_bar(&whole, &Vector3::x());
+        a.check("a half").unwrap();
+        let again = a.merged(&b);
+        assert!((again.inertia - whole.inertia).amax() < 1e-13 && (again.com - whole.com).norm() < 1e-14);
+        let truth = points[25..].iter().sum::<Vector3<f64>>() / 25.0;
+        assert!((b.com - truth).norm() < 0.03, "{} instead of {truth}", b.com); // the bow is no ellipsoid
     }
 
     /// Second algorithm: the beam's own 12x12 and mass, through the route of imported matrices.

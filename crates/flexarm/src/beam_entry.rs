@@ -34,9 +34,9 @@ pub(crate) fn beam_section(beam: &BeamEntry) -> Result<(Section, Material), Stri
             GJ: need(beam.gj, "GJ")?,
             kGA_y: beam.kga_y,
             kGA_z: beam.kga_z,
-            mass_per_length: beam.mass_per_length.unwrap_or(1.0),
-            rotary_y: beam.rotary_y.unwrap_or(0.0),
-            rotary_z: beam.rotary_z.unwrap_or(0.0),
+            mass_per_length: need(beam.mass_per_length, "mass_per_length")?,
+            rotary_y: need(beam.rotary_y, "rotary_y")?,
+            rotary_z: need(beam.rotary_z, "rotary_z")?,
         }),
         other => return Err(format!("section {other:?} is not known; use box, rectangle, tube, circle or given")),
     };

@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use crate::error::Error;
 use crate::motion::Motion;
+use crate::options::LinkModel;
 use crate::robot::{LoadOptions, Robot};
 use flexarm_urdf::{Finding as UrdfFinding, Severity};
 
@@ -111,7 +112,28 @@ fn check_flexible(robot: &Robot, findings: &mut Vec<Finding>) {
         });
         return;
     }
+    for link in robot.flexible.iter().filter(|link| link.choices.geometric) {
+        let name = &link.flexible.link;
+        let (message, help) = match (link.choices.model, link.has_geometric()) {
+            (_, false) => (
+                format!(
+                    "link {name:?}: geometric_stiffening is asked for, but its .flex file has no stiffness by load"
+                ),
+                "make it with flexarm reduce --geometric",
+            ),
+            (LinkModel::Modal, true) => continue,
+            (_, true) => (
+                format!("link {name:?}: geometric_stiffening only counts for model = \"modal\""),
+                "add model = \"modal\", or run with --links modal",
+            ),
+        };
+        findings.push(Finding::warning("geometric-stiffening", robot.path.display().to_string(), message, help));
+    }
     let arm = robot.flexible_robot().and_then(|f| {
+        findings.extend(f.doubts.iter().map(|doubt| {
+            let help = "reduce the mesh itself (flexarm reduce) to have them";
+            Finding::warning("second-order-unknown", robot.path.display().to_string(), doubt.clone(), help)
+        }));
         let n = f.model.n_actuated();
         let held = std::sync::Arc::new(flexarm_stepping::Held(vec![0.0; n]));
         f.arm(held).map_err(|source| Error::Step { source, partial: false })

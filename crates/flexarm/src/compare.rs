@@ -353,6 +353,7 @@ impl<'a> Run<'a> {
             })
             .collect();
         let mut warnings = robot.warnings.clone();
+        warnings.extend(self.flexible.doubts.iter().cloned());
         warnings.extend(motion.warnings.iter().cloned());
         warnings.extend(motion.violations.iter().map(|v| format!("joint limit: {v}")));
         self.validity_warnings(&links, &mut warnings);

@@ -34,18 +34,16 @@ struct LoadsFile {
 #[serde(deny_unknown_fields)]
 struct LoadEntry {
     /// tcp, or a link.
-    #[serde(default = "tcp")]
-    frame: String,
+    frame: Option<Spanned<String>>,
     /// world or frame.
-    #[serde(default = "world")]
-    axes: String,
+    axes: Option<Spanned<String>>,
     /// step, impulse, sine, sweep, milling, table or expression.
-    kind: String,
+    kind: Spanned<String>,
     /// When it begins (s).
     #[serde(default)]
     start: f64,
     /// When it ends (s); the end of the run if not given.
-    end: Option<f64>,
+    end: Option<Spanned<f64>>,
     /// Size of the force (N).
     #[serde(default)]
     force: [f64; 3],
@@ -53,39 +51,31 @@ struct LoadEntry {
     #[serde(default)]
     torque: [f64; 3],
     /// sine (Hz).
-    frequency: Option<f64>,
+    frequency: Option<Spanned<f64>>,
     /// sine (rad).
     #[serde(default)]
     phase: f64,
     /// sweep: first frequency (Hz).
-    from: Option<f64>,
+    from: Option<Spanned<f64>>,
     /// sweep: last frequency (Hz).
-    to: Option<f64>,
+    to: Option<Spanned<f64>>,
     /// impulse: length of the half sine (s); force is then the impulse (N s).
-    duration: Option<f64>,
+    duration: Option<Spanned<f64>>,
     /// milling: cutting edges.
     teeth: Option<u32>,
     /// milling: turns per minute.
-    spindle_rpm: Option<f64>,
+    spindle_rpm: Option<Spanned<f64>>,
     /// milling: harmonics of the tooth frequency beside the mean; 3 if not given.
     harmonics: Option<u32>,
     /// table: CSV with time, fx, fy, fz and optionally tx, ty, tz (s, N, N m).
-    file: Option<PathBuf>,
+    file: Option<Spanned<PathBuf>>,
     /// expression: in t (s), for fx, fy, fz, tx, ty, tz.
-    fx: Option<String>,
-    fy: Option<String>,
-    fz: Option<String>,
-    tx: Option<String>,
-    ty: Option<String>,
-    tz: Option<String>,
-}
-
-fn tcp() -> String {
-    "tcp".into()
-}
-
-fn world() -> String {
-    "world".into()
+    fx: Option<Spanned<String>>,
+    fy: Option<Spanned<String>>,
+    fz: Option<Spanned<String>>,
+    tx: Option<Spanned<String>>,
+    ty: Option<Spanned<String>>,
+    tz: Option<Spanned<String>>,
 }
 
 #[derive(Clone, Debug, Deserialize)]
@@ -96,13 +86,12 @@ struct PayloadChange {
     /// Mass from then on, in the place of what was carried before (kg); 0 drops it.
     mass: f64,
     /// Link that carries it; that of the robot's payload, else of the TCP.
-    link: Option<String>,
+    link: Option<Spanned<String>>,
     /// Centre of mass in link axes (m).
     #[serde(default)]
     com: [f64; 3],
     /// `ixx iyy izz ixy ixz iyz` about the centre of mass (kg m²).
-    #[serde(default)]
-    inertia: [f64; 6],
+    inertia: Option<Spanned<[f64; 6]>>,
 }
 
 /// Loads and changes, for a model.
@@ -161,52 +150,66 @@ fn load(
 ) -> Result<Load, Error> {
     let e = entry.get_ref();
     let fail = |message: String| source.error(entry.span(), message);
-    let frame = frame_of(&e.frame, model).filter(|f| f.body > 0).ok_or_else(|| {
-        let known: Vec<&str> = model.frames().iter().filter(|f| f.body > 0).map(|f| f.name.as_str()).collect();
-        fail(format!("load on frame {:?}: expected \"tcp\" or a link that moves, of {known:?}", e.frame))
+    let name = e.frame.as_ref().map_or("tcp", |frame| frame.get_ref());
+    let frame = frame_of(name, model).filter(|f| f.body > 0).ok_or_else(|| {
+        let known: Vec<&str> = model
+            .frames()
+            .iter()
+            .filter(|f| f.body > 0 && !f.name.starts_with("__"))
+            .map(|f| f.name.as_str())
+            .collect();
+        let message = format!("load on frame {name:?}: expected \"tcp\" or a link that moves, of {known:?}");
+        source.error(span_or(e.frame.as_ref(), entry), message)
     })?;
-    let axes = match e.axes.as_str() {
-        "world" => LoadAxes::World,
-        "frame" => LoadAxes::Frame,
-        other => return Err(fail(format!("axes {other:?} are not known; use \"world\" or \"frame\"")).into()),
+    let axes = match e.axes.as_ref().map(|axes| axes.get_ref().as_str()) {
+        None | Some("world") => LoadAxes::World,
+        Some("frame") => LoadAxes::Frame,
+        Some(other) => {
+            let message = format!("axes {other:?} are not known; use \"world\" or \"frame\"");
+            return Err(source.error(span_or(e.axes.as_ref(), entry), message).into());
+        }
     };
-    let numbers = [e.start, e.phase].into_iter().chain(e.end).chain(e.force).chain(e.torque);
+    let last = e.end.as_ref().map(|end| *end.get_ref());
+    let numbers = [e.start, e.phase].into_iter().chain(last).chain(e.force).chain(e.torque);
     if let Some(bad) = numbers.into_iter().find(|x| !x.is_finite()) {
         return Err(fail(format!("a load has the entry {bad}, expected finite numbers")).into());
     }
-    let end = e.end.unwrap_or(duration.max(e.start));
+    let end = last.unwrap_or(duration.max(e.start));
     if end < e.start {
-        return Err(fail(format!("a load ends at {end} s before it starts at {} s", e.start)).into());
+        let message = format!("a load ends at {end} s before it starts at {} s", e.start);
+        return Err(source.error(span_or(e.end.as_ref(), entry), message).into());
     }
-    let needs = |value: Option<f64>, what: &str| match value {
-        Some(x) if x.is_finite() && x > 0.0 => Ok(x),
-        Some(x) => Err(fail(format!("{what} = {x}: expected a positive number"))),
-        None => Err(fail(format!("kind = {:?} needs {what} = ...", e.kind))),
+    let kind = e.kind.get_ref().as_str();
+    let lacks = |what: &str| source.error(e.kind.span(), format!("kind = {kind:?} needs {what} = ..."));
+    let needs = |value: &Option<Spanned<f64>>, what: &str| match value {
+        Some(x) if x.get_ref().is_finite() && *x.get_ref() > 0.0 => Ok(*x.get_ref()),
+        Some(x) => Err(source.error(x.span(), format!("{what} = {}: expected a positive number", x.get_ref()))),
+        None => Err(lacks(what)),
     };
     let size = Wrench::new(e.force.into(), e.torque.into());
     let start = e.start;
     let scaled = move |s: Box<dyn Fn(f64) -> f64 + Send + Sync>| -> WrenchFn {
         Arc::new(move |t| if t >= start && t <= end { size * s(t - start) } else { Wrench::zeros() })
     };
-    let wrench: WrenchFn = match e.kind.as_str() {
+    let wrench: WrenchFn = match kind {
         "step" => scaled(Box::new(|_| 1.0)),
         "impulse" => {
-            let d = needs(e.duration, "duration")?;
+            let d = needs(&e.duration, "duration")?;
             // Half a sine of area 1.
             scaled(Box::new(move |t| if t < d { 0.5 * PI / d * (PI * t / d).sin() } else { 0.0 }))
         }
         "sine" => {
-            let (f, phase) = (needs(e.frequency, "frequency")?, e.phase);
+            let (f, phase) = (needs(&e.frequency, "frequency")?, e.phase);
             scaled(Box::new(move |t| (TAU * f * t + phase).sin()))
         }
         "sweep" => {
-            let (from, to) = (needs(e.from, "from")?, needs(e.to, "to")?);
+            let (from, to) = (needs(&e.from, "from")?, needs(&e.to, "to")?);
             let rate = (to - from) / (end - start).max(1e-9);
             scaled(Box::new(move |t| (TAU * (from * t + 0.5 * rate * t * t)).sin()))
         }
         "milling" => {
-            let teeth = f64::from(e.teeth.ok_or_else(|| fail("kind = \"milling\" needs teeth = ...".into()))?);
-            let tooth = teeth * needs(e.spindle_rpm, "spindle_rpm")? / 60.0;
+            let teeth = f64::from(e.teeth.ok_or_else(|| lacks("teeth"))?);
+            let tooth = teeth * needs(&e.spindle_rpm, "spindle_rpm")? / 60.0;
             let harmonics = e.harmonics.unwrap_or(3);
             // Mean 1, harmonics that halve: the shape of an intermittent cut.
             scaled(Box::new(move |t| {
@@ -216,15 +219,26 @@ fn load(
             }))
         }
         "table" => {
-            table(&folder.join(e.file.as_ref().ok_or_else(|| fail("kind = \"table\" needs file = ...".into()))?))?
+            let file = e.file.as_ref().ok_or_else(|| lacks("file"))?;
+            let path = folder.join(file.get_ref());
+            if !path.is_file() {
+                let message = format!("file = {:?}: there is no file {}", file.get_ref(), path.display());
+                return Err(source.error(file.span(), message).into());
+            }
+            table(&path)?
         }
-        "expression" => expression(e, &fail, (start, end))?,
+        "expression" => expression(e, source, (start, end))?,
         other => {
             let text = "use step, impulse, sine, sweep, milling, table or expression";
-            return Err(fail(format!("load kind {other:?} is not known; {text}")).into());
+            return Err(source.error(e.kind.span(), format!("load kind {other:?} is not known; {text}")).into());
         }
     };
     Ok(Load { body: frame.body, X_BF: frame.X_BF, axes, wrench })
+}
+
+/// Where a value stands, else its entry.
+fn span_or<T, E>(value: Option<&Spanned<T>>, entry: &Spanned<E>) -> Range<usize> {
+    value.map_or(entry.span(), Spanned::span)
 }
 
 /// Linear between the rows of a CSV, zero outside.
@@ -275,20 +289,19 @@ fn table(path: &Path) -> Result<WrenchFn, Error> {
     }))
 }
 
-fn expression(
-    e: &LoadEntry,
-    fail: &impl Fn(String) -> RobotFileError,
-    (start, end): (f64, f64),
-) -> Result<WrenchFn, Error> {
+fn expression(e: &LoadEntry, source: &Source, (start, end): (f64, f64)) -> Result<WrenchFn, Error> {
     let texts = [&e.fx, &e.fy, &e.fz, &e.tx, &e.ty, &e.tz];
     if texts.iter().all(|t| t.is_none()) {
-        return Err(fail("kind = \"expression\" needs some of fx, fy, fz, tx, ty, tz as a function of t".into()).into());
+        let message = "kind = \"expression\" needs some of fx, fy, fz, tx, ty, tz as a function of t";
+        return Err(source.error(e.kind.span(), message).into());
     }
     let mut parts: Vec<Option<(FlatEx<f64>, bool)>> = Vec::new();
     for text in texts {
         parts.push(match text {
             None => None,
-            Some(text) => {
+            Some(entry) => {
+                let text = entry.get_ref();
+                let fail = |message: String| source.error(entry.span(), message);
                 let parsed: FlatEx<f64> =
                     exmex::parse(text).map_err(|error| fail(format!("expression {text:?}: {error}")))?;
                 let unknown: Vec<&String> = parsed.var_names().iter().filter(|v| *v != "t").collect();
@@ -329,21 +342,30 @@ fn change(
     let e = entry.get_ref();
     let span: Range<usize> = entry.span();
     let fail = |message: String| source.error(span.clone(), message);
-    let mut numbers = [e.at, e.mass].into_iter().chain(e.com).chain(e.inertia);
+    let inertia_given = e.inertia.as_ref().map_or([0.0; 6], |inertia| *inertia.get_ref());
+    let mut numbers = [e.at, e.mass].into_iter().chain(e.com).chain(inertia_given);
     if numbers.any(|x| !x.is_finite()) || e.mass < 0.0 || e.at < 0.0 {
         return Err(fail("a payload needs a time and a mass of at least 0, and finite numbers".into()));
     }
     let own = model.frame(PAYLOAD_LINK);
     let carrier = robot.rigid.joints.iter().find(|j| j.child == PAYLOAD_LINK).map(|j| j.parent.clone());
-    let link = e.link.clone().or(carrier).unwrap_or_else(|| robot.tcp.0.clone());
-    let frame = model.frame(&link).filter(|f| f.body > 0);
-    let frame = frame.ok_or_else(|| fail(format!("payload link {link:?} is not a link that moves")))?;
-    let [xx, yy, zz, xy, xz, yz] = e.inertia;
+    let named = e.link.as_ref().map(|link| link.get_ref().clone());
+    let link = named.or(carrier).unwrap_or_else(|| robot.tcp.0.clone());
+    let frame = model.frame(&link).filter(|f| f.body > 0).ok_or_else(|| {
+        let known: Vec<&str> = model
+            .frames()
+            .iter()
+            .filter(|f| f.body > 0 && !f.name.starts_with("__"))
+            .map(|f| f.name.as_str())
+            .collect();
+        let message = format!("payload link {link:?}: expected a link that moves, of {known:?}");
+        source.error(span_or(e.link.as_ref(), entry), message)
+    })?;
+    let [xx, yy, zz, xy, xz, yz] = inertia_given;
     let inertia_com = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
     if inertia_com.symmetric_eigenvalues().min() < -1e-9 * inertia_com.norm() {
-        return Err(fail(
-            "payload inertia has a negative principal moment; the order is ixx iyy izz ixy ixz iyz".into(),
-        ));
+        let message = "payload inertia has a negative principal moment; the order is ixx iyy izz ixy ixz iyz";
+        return Err(source.error(span_or(e.inertia.as_ref(), entry), message));
     }
     // The body as it is without what it carries at the start.
     let mut inertia = model.bodies()[frame.body].inertia;

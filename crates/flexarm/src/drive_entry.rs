@@ -167,7 +167,11 @@ pub(crate) fn drives(
     let mut sample: Option<f64> = None;
     for entry in entries {
         match drive(entry, mechanism, source, warnings) {
-            Err(error) => faults.push(error.into()),
+            Err(error) => {
+                // An unknown joint must not hide an unknown kind.
+                faults.extend(kind_of(entry, source).err().filter(|other| *other != error).map(Error::from));
+                faults.push(error.into());
+            }
             Ok(drive) if drives.iter().any(|d| d.joint == drive.joint) => {
                 let message = format!("joint {:?} has two [[drive]] entries: keep one", drive.joint);
                 faults.push(source.error(entry.joint.span(), message).into());
@@ -187,6 +191,21 @@ pub(crate) fn drives(
     drives
 }
 
+fn kind_of(entry: &DriveEntry, source: &Source) -> Result<DriveKind, RobotFileError> {
+    match entry.kind.get_ref().as_str() {
+        "prescribed" => Ok(DriveKind::Prescribed),
+        "gearbox" => Ok(DriveKind::Gearbox),
+        "torque" => Ok(DriveKind::Torque),
+        other => {
+            let text = format!(
+                "drive of joint {:?}: kind {other:?} is not known; use \"prescribed\", \"gearbox\" or \"torque\"",
+                entry.joint.get_ref()
+            );
+            Err(source.error(entry.kind.span(), text))
+        }
+    }
+}
+
 fn drive(
     entry: &DriveEntry,
     mechanism: &Mechanism,
@@ -200,15 +219,7 @@ fn drive(
         let known: Vec<_> = mechanism.joints.iter().filter(movable).map(|j| j.name.as_str()).collect();
         return Err(fail(entry.joint.span(), format!("the robot has no such movable joint; it has {known:?}")));
     };
-    let kind = match entry.kind.get_ref().as_str() {
-        "prescribed" => DriveKind::Prescribed,
-        "gearbox" => DriveKind::Gearbox,
-        "torque" => DriveKind::Torque,
-        other => {
-            let text = format!("kind {other:?} is not known; use \"prescribed\", \"gearbox\" or \"torque\"");
-            return Err(fail(entry.kind.span(), text));
-        }
-    };
+    let kind = kind_of(entry, source)?;
     let number = |value: &Option<Spanned<f64>>, what: &str, default: f64, lowest: f64| match value {
         None => Ok(default),
         Some(v) if v.get_ref().is_finite() && *v.get_ref() >= lowest => Ok(*v.get_ref()),

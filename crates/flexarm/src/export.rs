@@ -3,8 +3,11 @@
 //! Stiffness and mass of the interfaces, with modes where the link has them, are converted to the units asked for,
 //! written, read back through the same path as every import, and compared. A text beside them says the order of the
 //! rows and the units, which most formats do not hold. A link without superelement gives its static stiffness alone.
+//! SID holds the modal link instead.
 //!
 //! Not here: the formats (`flexarm-fem`).
+
+mod sid;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -35,6 +38,8 @@ pub enum ExportFormat {
     Op4,
     /// Comma-separated values and a script for Simscape.
     Simscape,
+    /// Standard Input Data: the modal link.
+    Sid,
 }
 
 impl ExportFormat {
@@ -46,6 +51,7 @@ impl ExportFormat {
             Self::Dmig => "dmig",
             Self::Op4 => "op4",
             Self::Simscape => "simscape",
+            Self::Sid => "sid",
         }
     }
 
@@ -120,6 +126,8 @@ pub struct ExportChecks {
     pub mass_error: Option<f64>,
     /// Largest difference of the stiffness, relative to `sqrt(k_ii k_jj)`.
     pub stiffness_error: f64,
+    /// Largest difference of the mass integrals of a modal link; null in other formats.
+    pub integrals_error: Option<f64>,
 }
 
 /// Writes a link in another format and reads it back.
@@ -129,6 +137,9 @@ pub struct ExportChecks {
 pub fn export(job: &ExportJob) -> Result<ExportSummary, Error> {
     let started = Instant::now();
     let link = read_flex(&job.link).map_err(Box::new)?;
+    if job.format == ExportFormat::Sid {
+        return sid::export(job, &link, started);
+    }
     let mut warnings = Vec::new();
     let (element, has_mass) = element_of(&link, &mut warnings);
     let nodes = nodes(job, element.interfaces.len())?;
@@ -171,6 +182,7 @@ pub fn export(job: &ExportJob) -> Result<ExportSummary, Error> {
             rigid_body_residual: link.checks.rigid_body_residual,
             mass_error,
             stiffness_error,
+            integrals_error: None,
         },
         wall_s: started.elapsed().as_secs_f64(),
         peak_rss_bytes: stamp::peak_rss_bytes(),
@@ -312,6 +324,8 @@ impl Content<'_> {
                 list.extend(M.as_ref().map(|M| ("MAAX", M)));
                 vec![(format!("{stem}.op4"), write_op4(&list))]
             }
+            // Written from the modal link.
+            ExportFormat::Sid => Vec::new(),
             ExportFormat::Simscape => {
                 let zero = DMatrix::zeros(K.nrows(), K.nrows());
                 let simscape = write_simscape(&stem, &K, M.as_ref().unwrap_or(&zero), &self.frames());
@@ -357,23 +371,30 @@ impl Content<'_> {
             let node = if self.is_labelled() { format!(", node {node}") } else { String::new() };
             text += &format!("  {}{node}: --at {}={},{},{}\n", interface.name, interface.name, p.x, p.y, p.z);
         }
-        text += "\nrigid parts (kg; m; kg m2: ixx,iyy,izz,ixy,ixz,iyz about the centre of mass, link axes):\n";
-        for (flag, part) in [("--part-a", &self.link.proximal), ("--part-b", &self.link.distal)] {
-            let (c, I) = (part.com, part.inertia);
-            text += &format!(
-                "  {flag} \"{};{},{},{};{},{},{},{},{},{}\"\n",
-                part.mass,
-                c.x,
-                c.y,
-                c.z,
-                I[(0, 0)],
-                I[(1, 1)],
-                I[(2, 2)],
-                I[(0, 1)],
-                I[(0, 2)],
-                I[(1, 2)]
-            );
-        }
+        text += &part_lines(self.link);
         text
     }
+}
+
+/// The rigid parts, with the flags of `flexarm import`.
+fn part_lines(link: &ReducedLink) -> String {
+    let mut text =
+        String::from("\nrigid parts (kg; m; kg m2: ixx,iyy,izz,ixy,ixz,iyz about the centre of mass, link axes):\n");
+    for (flag, part) in [("--part-a", &link.proximal), ("--part-b", &link.distal)] {
+        let (c, I) = (part.com, part.inertia);
+        text += &format!(
+            "  {flag} \"{};{},{},{};{},{},{},{},{},{}\"\n",
+            part.mass,
+            c.x,
+            c.y,
+            c.z,
+            I[(0, 0)],
+            I[(1, 1)],
+            I[(2, 2)],
+            I[(0, 1)],
+            I[(0, 2)],
+            I[(1, 2)]
+        );
+    }
+    text
 }

@@ -13,6 +13,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::drive_entry::{Drive, DriveKind, GearDamping, ServoEntry};
 use crate::error::Error;
+use crate::import::SECOND_ORDER_UNKNOWN;
 use crate::options::{DriveModel, LinkModel, Modelling};
 use crate::robot::Robot;
 
@@ -49,16 +50,39 @@ pub struct LinkChoices {
     pub geometric: bool,
 }
 
+/// The key by which something was asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Asked {
+    Model,
+    Segments,
+    Modes,
+    Eigenmodes,
+    Geometric,
+}
+
 impl RobotLink {
+    /// Whether its source can have its stiffness changed by loads as a modal link.
+    pub fn has_geometric(&self) -> bool {
+        let stored = self.flexible.reduced.details.as_ref().and_then(|details| details.modal.as_ref());
+        self.beam.is_some() || stored.is_some_and(|modal| modal.geometric.is_some())
+    }
+
     /// The model of the link; rigid links have none.
     ///
     /// # Errors
     /// A sentence about what the link's source does not have.
     pub fn form(&self, modelling: &Modelling) -> Result<LinkForm, String> {
+        self.form_or_key(modelling).map_err(|(_, message)| message)
+    }
+
+    /// As [`Self::form`], with the key of the robot file that asks for what is not there.
+    pub(crate) fn form_or_key(&self, modelling: &Modelling) -> Result<LinkForm, (Asked, String)> {
         let model = if modelling.links == LinkModel::AsFiled { self.choices.model } else { modelling.links };
         match model {
             LinkModel::Modal => self.modal(modelling).map(|modal| LinkForm::Modal(Arc::new(modal))),
-            _ => self.lumped(modelling.segments.unwrap_or(self.choices.segments)),
+            _ => self
+                .lumped(modelling.segments.unwrap_or(self.choices.segments))
+                .map_err(|message| (Asked::Segments, message)),
         }
     }
 
@@ -72,57 +96,61 @@ impl RobotLink {
         }
         let chains = self.flexible.reduced.details.as_ref().map_or(&[][..], |d| &d.chains[..]);
         chains.iter().find(|c| c.parts.len() == segments).cloned().map(LinkForm::Chain).ok_or_else(|| {
-            let there: Vec<usize> = chains.iter().map(|c| c.parts.len()).collect();
+            let there: Vec<String> = chains.iter().map(|c| c.parts.len().to_string()).collect();
+            let there =
+                if there.is_empty() { "only two parts".into() } else { format!("2, {} parts", there.join(", ")) };
             format!(
-                "link {name:?}: its .flex file has no chain of {segments} parts (it has 2 and {there:?}): make it with \
-                 flexarm reduce --chains {segments}, or choose another number of segments"
+                "link {name:?}: its .flex file has no chain of {segments} parts (it has {there}): make it with flexarm \
+                 reduce --chains {segments}, or choose another number of segments"
             )
         })
     }
 
-    fn modal(&self, modelling: &Modelling) -> Result<ModalLink, String> {
+    fn modal(&self, modelling: &Modelling) -> Result<ModalLink, (Asked, String)> {
         let name = &self.flexible.link;
-        let fail = |e: flexarm_fem::FemError| format!("link {name:?} cannot bend in modes: {e}");
+        let fail =
+            |asked: Asked| move |e: flexarm_fem::FemError| (asked, format!("link {name:?} cannot bend in modes: {e}"));
         let wanted = modelling.modes.or(self.choices.modes);
-        let full = match (&self.beam, &self.flexible.reduced.details) {
-            (Some(beam), _) => {
+        let full = match &self.beam {
+            Some(beam) => {
                 let modes = wanted.unwrap_or(BEAM_MODES);
                 let options = ModalOptions { modes, geometric: self.choices.geometric, ..ModalOptions::default() };
-                beam.modal_with(&ModalOptions { elements: options.elements.max(4 * modes), ..options }).map_err(fail)?
+                beam.modal_with(&ModalOptions { elements: options.elements.max(4 * modes), ..options })
+                    .map_err(fail(Asked::Modes))?
             }
-            (None, Some(details)) => {
-                let stored = details.modal.clone().map(Ok);
+            None => {
+                let details = self.flexible.reduced.details.as_ref();
+                let stored = details.and_then(|details| details.modal.clone()).map(Ok);
                 let condensed = || {
-                    let element = details.superelement.as_ref()?;
-                    Some(ModalLink::from_superelement(name, element).map_err(fail))
+                    let element = details?.superelement.as_ref()?;
+                    Some(ModalLink::from_superelement(name, element).map_err(fail(Asked::Model)))
                 };
-                let Some(link) = stored.or_else(condensed) else {
-                    return Err(format!("link {name:?} cannot bend in modes: its .flex file has no mass matrix"));
-                };
-                let link = link?;
-                let all = link.coordinates() - 6 * link.interfaces.len().min(link.coordinates() / 6);
+                let link = stored.or_else(condensed).ok_or_else(|| {
+                    let message = format!(
+                        "link {name:?} cannot bend in modes: its .flex file has no mass over interfaces and modes; reduce \
+                         the mesh again with this version, or use model = \"lumped\""
+                    );
+                    (Asked::Model, message)
+                })??;
+                let all = link.coordinates().saturating_sub(6 * link.interfaces.len());
                 match wanted {
-                    Some(n) if n < all => link.truncated(n).map_err(fail)?,
+                    Some(n) if n < all => link.truncated(n).map_err(fail(Asked::Modes))?,
                     Some(n) if n > all => {
-                        return Err(format!("link {name:?}: {n} modes are asked for, its .flex file has {all}"));
+                        let message = format!("link {name:?}: {n} modes are asked for, its .flex file has {all}");
+                        return Err((Asked::Modes, message));
                     }
                     _ => link,
                 }
             }
-            (None, None) => {
-                return Err(format!(
-                    "link {name:?} cannot bend in modes: its .flex file has no mass matrix over interfaces and modes; \
-                     reduce the mesh again with this version, or use model = \"lumped\""
-                ));
-            }
         };
         if self.choices.geometric && full.geometric.is_none() {
-            return Err(format!(
+            let message = format!(
                 "link {name:?}: geometric_stiffening needs a beam, or a .flex file made with flexarm reduce --geometric"
-            ));
+            );
+            return Err((Asked::Geometric, message));
         }
         match self.choices.eigenmodes {
-            Some(keep) => full.orthogonalised(Some(keep)).map_err(fail),
+            Some(keep) => full.orthogonalised(Some(keep)).map_err(fail(Asked::Eigenmodes)),
             None => Ok(full),
         }
     }
@@ -145,6 +173,8 @@ pub struct FlexibleRobot {
     friction: Vec<Friction>,
     /// Joints driven by torque: coordinate, servo, limit.
     torque: Vec<(usize, ServoEntry, f64)>,
+    /// Doubts about the models of the links.
+    pub doubts: Vec<String>,
 }
 
 /// What a spring belongs to.
@@ -230,10 +260,13 @@ impl Robot {
     /// [`Error::Usage`] if a link or drive has no such model, [`Error::Model`] if the result is no tree.
     pub fn modelled(&self, modelling: &Modelling) -> Result<FlexibleRobot, Error> {
         let usage = |text: String| Error::Usage(text);
-        let mut links: Vec<FlexibleLink> = Vec::new();
+        let (mut links, mut doubts): (Vec<FlexibleLink>, Vec<String>) = (Vec::new(), Vec::new());
         if modelling.links != LinkModel::Rigid {
             for link in &self.flexible {
                 let form = link.form(modelling).map_err(usage)?;
+                if matches!(&form, LinkForm::Modal(modal) if !modal.has_second_order()) {
+                    doubts.push(format!("link {:?}: {SECOND_ORDER_UNKNOWN}", link.flexible.link));
+                }
                 links.push(FlexibleLink { form, ..link.flexible.clone() });
             }
         }
@@ -306,7 +339,7 @@ impl Robot {
             }
         }
         let (spans, rigid) = (substituted.spans, self.rigid_model()?);
-        Ok(FlexibleRobot { model: Arc::new(model), springs, owners, spans, rigid, friction, torque })
+        Ok(FlexibleRobot { model: Arc::new(model), springs, owners, spans, rigid, friction, torque, doubts })
     }
 }
 

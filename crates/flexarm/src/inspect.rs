@@ -1,5 +1,6 @@
 //! What was loaded, and its kinematics and dynamics at one pose.
 
+use flexarm_flexlink::LinkForm;
 use flexarm_kinematics::{
     Data, State, forward_kinematics_velocity, frame_jacobian, gravity_forces, mass_matrix, nonlinear_effects,
 };
@@ -7,6 +8,7 @@ use nalgebra::{DMatrix, Matrix6xX, UnitQuaternion};
 use serde::Serialize;
 
 use crate::error::Error;
+use crate::options::Modelling;
 use crate::robot::{Robot, TCP_FRAME};
 
 /// Answer of `flexarm inspect`. SI units; the Jacobian's rows are linear first, world axes, at the TCP.
@@ -86,6 +88,13 @@ pub struct FlexibleInfo {
     pub parts_kg: Vec<f64>,
     /// Stiffness at the split, 6×6, linear first.
     pub stiffness: Vec<Vec<f64>>,
+    /// lumped or modal.
+    pub model: &'static str,
+    /// How many elastic coordinates it has.
+    pub coordinates: usize,
+    /// Of a modal link: natural frequencies with A held, all of them (Hz).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub modal_frequencies_hz: Option<Vec<f64>>,
 }
 
 /// Pose of the tool centre point in the world.
@@ -203,9 +212,20 @@ pub fn inspect(robot: &Robot, at: Option<&str>, velocity: Option<&str>) -> Resul
         LinkInfo { name: l.name.clone(), mass_kg, com_m, inertia }
     });
     let flexible = robot.flexible_robot()?;
-    let flexible_links = flexible.spans.iter().zip(&robot.flexible).map(|(span, link)| {
+    warnings.extend(flexible.doubts.iter().cloned());
+    let forms = robot.flexible.iter().map(|link| link.form(&Modelling::default()).map_err(Error::Usage));
+    let forms = forms.collect::<Result<Vec<_>, _>>()?;
+    let flexible_links = flexible.spans.iter().zip(&robot.flexible).zip(&forms).map(|((span, link), form)| {
         let K = link.flexible.reduced.split.K_S;
+        let (model, coordinates, modal_frequencies_hz) = match form {
+            LinkForm::TwoParts => ("lumped", 6, None),
+            LinkForm::Chain(chain) => ("lumped", 6 * chain.joints.len(), None),
+            LinkForm::Modal(modal) => ("modal", modal.coordinates(), Some(modal.held_frequencies_hz())),
+        };
         FlexibleInfo {
+            model,
+            coordinates,
+            modal_frequencies_hz,
             name: span.link.clone(),
             method: link.flexible.reduced.provenance.method.clone(),
             length_m: span.length,

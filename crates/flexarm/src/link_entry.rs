@@ -11,7 +11,7 @@ use toml::Spanned;
 
 use crate::beam_entry::beam_section;
 use crate::error::Error;
-use crate::flexible::{LinkChoices, RobotLink};
+use crate::flexible::{Asked, LinkChoices, RobotLink};
 use crate::options::{LinkModel, Modelling};
 use crate::robot::keep;
 use crate::robot_file::{BeamEntry, DampingEntry, FlexibleLinkEntry, RobotFileError, Source};
@@ -85,11 +85,18 @@ pub(crate) fn flexible_link(
     let distal = Some(distal.name.clone());
     let (form, coupling) = (LinkForm::TwoParts, entry.coupling);
     let flexible = FlexibleLink { link: name.clone(), distal, reduced, parts, form, angles, coupling };
-    let choices = LinkChoices { model, segments, modes, eigenmodes, geometric: entry.geometric_stiffening };
+    let geometric = entry.geometric_stiffening.as_ref().is_some_and(|asked| *asked.get_ref());
+    let choices = LinkChoices { model, segments, modes, eigenmodes, geometric };
     let link = RobotLink { flexible, damping, beam, choices };
     // What the file asks for must be there; overrides are looked at when they are used.
-    link.form(&Modelling::default()).map_err(|message| {
-        let key = entry.segments.as_ref().or(entry.modes.as_ref()).or(entry.eigenmodes.as_ref()).map(Spanned::span);
+    link.form_or_key(&Modelling::default()).map_err(|(asked, message)| {
+        let key = match asked {
+            Asked::Model => None,
+            Asked::Segments => entry.segments.as_ref().map(Spanned::span),
+            Asked::Modes => entry.modes.as_ref().map(Spanned::span),
+            Asked::Eigenmodes => entry.eigenmodes.as_ref().map(Spanned::span),
+            Asked::Geometric => entry.geometric_stiffening.as_ref().map(Spanned::span),
+        };
         at(key.or(entry.model.as_ref().map(Spanned::span)).unwrap_or(entry.link.span()), message)
     })?;
     Ok(link)

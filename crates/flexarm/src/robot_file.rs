@@ -90,9 +90,8 @@ pub struct FlexibleLinkEntry {
     pub modes: Option<Spanned<i64>>,
     /// Modal: use the link's own modes with A held instead of interface displacements, only as many as given.
     pub eigenmodes: Option<Spanned<i64>>,
-    /// Modal: let loads change the stiffness.
-    #[serde(default)]
-    pub geometric_stiffening: bool,
+    /// Modal: let loads change the stiffness; false if not given.
+    pub geometric_stiffening: Option<Spanned<bool>>,
     /// Damping; 3 % modal if not given.
     pub damping: Option<Spanned<DampingEntry>>,
     /// `rotation-vector` or `euler-zyx`.

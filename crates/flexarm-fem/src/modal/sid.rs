@@ -21,7 +21,7 @@ use crate::spatial::Pose;
 /// Start of the comment in which the names of the link and its nodes are kept.
 const COMMENT: &str = "modal link";
 /// Products of ω: xx yy zz xy xz yz.
-const PRODUCTS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
+pub(super) const PRODUCTS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
 /// Where they stand in the columns of `Oe` as it is written: xx yy zz xy yz xz.
 const OE_COLUMNS: [usize; 6] = [0, 1, 2, 3, 5, 4];
 /// Largest `|RᵀR - 1|` of a node frame: files have few digits.

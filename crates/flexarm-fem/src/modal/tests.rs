@@ -334,6 +334,27 @@ fn a_condensed_matrix_tells_everything_of_first_order() {
         assert!(P < 1e-12 && N < 1e-12, "{P:.1e} {N:.1e}"); // measured 9e-17, 2e-15
         // All else is the same number.
         assert_eq!(ModalLink { P: link.P.clone(), N: link.N.clone(), ..back }, link);
+
+        // In other units it is the same body.
+        let (mm, si) = (crate::UnitSystem { length: 1e-3, mass: 1e3, time: 1e-3 }, crate::UnitSystem::SI);
+        let far = link.to_sid().in_units(&si, &mm);
+        assert!((far.mass / link.mass - 1e-3).abs() < 1e-15);
+        // One t mm²/ms² is 1e3 J.
+        assert!((far.Ke.m0()[(0, 0)] * 1e3 / link.K[(0, 0)] - 1.0).abs() < 1e-15);
+        let text = crate::exchange::write_sid(&far);
+        let near = crate::exchange::parse_sid(&text, "t").unwrap().in_units(&mm, &si);
+        let again = ModalLink::from_sid("other", &near).unwrap();
+        let close = |a: &DMatrix<f64>, b: &DMatrix<f64>| (a - b).amax() <= 1e-15 * b.amax();
+        assert!(close(&again.K, &link.K) && close(&again.M, &link.M), "units");
+        let N = worst(n * n, |at| (link.N[at] - again.N[at]).amax() / (size(at / n) * size(at % n)));
+        assert!(N < 1e-12, "{N:.1e}");
+        assert_eq!(again.geometric.is_some(), link.geometric.is_some());
+        if let (Some(a), Some(b)) = (&again.geometric, &link.geometric) {
+            let pairs = (a.acceleration.iter().zip(&b.acceleration)).chain(a.angular.iter().zip(&b.angular));
+            let pairs = pairs.chain(a.centrifugal.iter().zip(&b.centrifugal));
+            let mut pairs = pairs.chain(a.interface[0].iter().zip(&b.interface[0]));
+            assert!(pairs.all(|(a, b)| close(a, b)), "stiffening in other units");
+        }
     }
 }
 
@@ -386,6 +407,44 @@ fn data_in_any_frame_give_the_link_held_at_a() {
     let list: Vec<_> = errors.iter().map(|e| format!("{e:.1e}")).collect();
     eprintln!("held again: {}", list.join(" "));
     assert!(errors.iter().all(|e| *e < 1e-12), "{}", list.join(" ")); // measured 4e-16
+}
+
+/// Truth: the same mesh, tied and reduced in the other axes. With stiffness by initial stress, of which every load is a component.
+#[test]
+fn a_link_in_other_axes_is_that_of_the_turned_mesh() {
+    let (mesh, interfaces) = casting(ElementKind::Hex20, [Tie::Rigid; 2]);
+    let X = Pose::from_parts(Vector3::zeros().into(), Rotation3::from_euler_angles(0.4, -0.7, 1.1));
+    let moved: Vec<Interface> = interfaces.iter().map(|i| Interface { X_LI: X * i.X_LI, ..i.clone() }).collect();
+    let (link, ..) = modal_of(&mesh, &interfaces, Material::STEEL, 0, true);
+    let (truth, ..) = modal_of(&mesh.transformed(&X), &moved, Material::STEEL, 0, true);
+    // Its coordinates are components along the other axes.
+    let mut V = DMatrix::zeros(6, 6);
+    for at in [0, 3] {
+        V.view_mut((at, at), (3, 3)).copy_from(&X.rotation.matrix().transpose());
+    }
+    let found = ModalLink { labels: truth.labels.clone(), ..link.turned(&X.rotation).in_coordinates(&V) };
+    let gap = |a: &DMatrix<f64>, b: &DMatrix<f64>, s: &dyn Fn(usize) -> f64| {
+        worst(a.len(), |at| (a[at] - b[at]).abs() / (s(at % a.nrows()) * s(at / a.nrows())))
+    };
+    let (size, stiff) = (|k: usize| truth.M[(k, k)].sqrt(), |k: usize| truth.K[(k, k)].sqrt());
+    let errors = [
+        gap(&found.K, &truth.K, &stiff),
+        gap(&found.M, &truth.M, &size),
+        worst(6, |k| (found.C_r.column(k) - truth.C_r.column(k)).amax() / size(k)),
+        worst(6, |k| (found.P[k] - truth.P[k]).amax() / size(k)),
+        worst(36, |at| (found.N[at] - truth.N[at]).amax() / (size(at / 6) * size(at % 6))),
+        (found.inertia - truth.inertia).amax() / truth.inertia.amax(),
+        (found.first_moment - truth.first_moment).amax() / truth.first_moment.amax(),
+        (found.interfaces[0].Phi.clone() - &truth.interfaces[0].Phi).amax(),
+        (found.interfaces[0].X_LI.translation.vector - truth.interfaces[0].X_LI.translation.vector).amax(),
+        (found.X_LA.rotation.matrix() - truth.X_LA.rotation.matrix()).amax(),
+    ];
+    let (a, b) = (found.geometric.unwrap(), truth.geometric.unwrap());
+    let pairs = (a.acceleration.iter().zip(&b.acceleration)).chain(a.angular.iter().zip(&b.angular));
+    let pairs = pairs.chain(a.centrifugal.iter().zip(&b.centrifugal)).chain(a.interface[0].iter().zip(&b.interface[0]));
+    let stress = pairs.map(|(a, b)| (a - b).amax() / b.amax()).fold(0.0, f64::max);
+    eprintln!("turned: {errors:?} stress {stress:.1e}");
+    assert!(errors.iter().all(|e| *e < 1e-9) && stress < 1e-7, "{errors:?} {stress:.1e}");
 }
 
 /// A slender uniform beam of unit mass and length with bending stiffness one, stiff in stretch.

@@ -1,9 +1,11 @@
 //! Other coordinates for the same shapes: orthogonalised, or fewer.
 
-use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Matrix6xX, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Matrix6xX, Rotation3, Translation3, Vector3};
 
+use super::sid::PRODUCTS;
 use super::{GeometricStiffness, ModalInterface, ModalLink};
 use crate::error::FemError;
+use crate::spatial::Pose;
 
 /// Modes with `ΦᵀKΦ = diag(ω²)`, `ΦᵀMΦ = 1`.
 pub(super) struct Eigenpairs {
@@ -222,8 +224,40 @@ impl ModalLink {
         }
     }
 
+    /// The same link in other axes through Lo; its coordinates stay.
+    ///
+    /// * `R`: the present axes in the new ones.
+    pub fn turned(&self, R: &Rotation3<f64>) -> Self {
+        let r = R.matrix();
+        let both = |A: &Matrix3<f64>| r * A * r.transpose();
+        let pose = |X: &Pose| Pose::from_parts(Translation3::from(r * X.translation.vector), R * X.rotation);
+        let interface = |i: &ModalInterface| {
+            let mut Phi = i.Phi.clone();
+            for mut column in Phi.column_iter_mut() {
+                for at in [0, 3] {
+                    let turned = r * column.fixed_rows::<3>(at);
+                    column.fixed_rows_mut::<3>(at).copy_from(&turned);
+                }
+            }
+            ModalInterface { name: i.name.clone(), X_LI: pose(&i.X_LI), Phi }
+        };
+        let inertia = both(&self.inertia);
+        Self {
+            interfaces: self.interfaces.iter().map(interface).collect(),
+            first_moment: r * self.first_moment,
+            inertia: (inertia + inertia.transpose()) * 0.5,
+            C_t: r * &self.C_t,
+            C_r: r * &self.C_r,
+            P: self.P.iter().map(both).collect(),
+            N: self.N.iter().map(both).collect(),
+            geometric: self.geometric.as_ref().map(|G| G.turned(r)),
+            X_LA: pose(&self.X_LA),
+            ..self.clone()
+        }
+    }
+
     /// `η = V η'`; stiffness and mass too, by their quadratic forms.
-    fn in_coordinates(&self, V: &DMatrix<f64>) -> Self {
+    pub(super) fn in_coordinates(&self, V: &DMatrix<f64>) -> Self {
         let (n, m) = V.shape();
         let form = |A: &DMatrix<f64>| super::symmetric(&(V.transpose() * A * V));
         // N_ij' = Σ V_ki V_lj N_kl, entry by entry of the 3×3.
@@ -260,6 +294,34 @@ impl ModalLink {
 }
 
 impl GeometricStiffness {
+    /// Per unit load along new axes; `R`: the present axes in the new ones.
+    fn turned(&self, R: &Matrix3<f64>) -> Self {
+        // A load a along new axes has the components Rᵀ a along the present ones.
+        let three = |G: &[DMatrix<f64>]| -> [DMatrix<f64>; 3] {
+            std::array::from_fn(|i| &G[0] * R[(i, 0)] + &G[1] * R[(i, 1)] + &G[2] * R[(i, 2)])
+        };
+        let six = |G: &[DMatrix<f64>; 6]| -> [DMatrix<f64>; 6] {
+            let [x, y, z] = three(&G[..3]);
+            let [rx, ry, rz] = three(&G[3..]);
+            [x, y, z, rx, ry, rz]
+        };
+        let centrifugal = PRODUCTS.map(|(i, j)| {
+            let mut sum = self.centrifugal[0].map(|_| 0.0);
+            for ((a, b), G) in PRODUCTS.into_iter().zip(&self.centrifugal) {
+                // ω_a ω_b in products of the new components; each mixed one counts once.
+                let once = R[(i, a)] * R[(j, b)];
+                sum += G * if i == j { once } else { once + R[(j, a)] * R[(i, b)] };
+            }
+            sum
+        });
+        Self {
+            acceleration: three(&self.acceleration),
+            angular: three(&self.angular),
+            centrifugal,
+            interface: self.interface.iter().map(six).collect(),
+        }
+    }
+
     /// All matrices through `f`.
     pub(crate) fn mapped(&self, f: &dyn Fn(&DMatrix<f64>) -> DMatrix<f64>) -> Self {
         Self {

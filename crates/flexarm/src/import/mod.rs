@@ -49,6 +49,10 @@ pub use flexarm_fem::{RigidPart, SplitAt as Split, UnitSystem as UnitsOfFile};
 pub use summary::{ImportChecks, ImportFiles, ImportInterface, ImportPart, ImportSummary, markdown, tables};
 pub use words::{FrameAt, ImportFormat, ImportMap, NodeChoice, parse_inertia, parse_part, parse_split, triple};
 
+/// Said where a modal link lacks terms.
+pub(crate) const SECOND_ORDER_UNKNOWN: &str = "second-order terms of the modal link are unknown: a condensed mass does not \
+     tell where inside the link it is; what turning does to the bending is left out";
+
 /// Modes that are kept of a full model if the job does not say.
 const MODES: usize = 10;
 

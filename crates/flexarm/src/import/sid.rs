@@ -1,20 +1,21 @@
-//! A modal body (SID) as a link: the compliance of B with A held, from modes at both nodes.
+//! A modal body (SID) as a link: its modal link in the frame at A, and the compliance of B with A held, from the modes at
+//! both nodes.
 //!
 //! ```text
 //! P = Φ_B - Ad_BA Φ_A          elastic displacement of B with A held, per mode (rows: phi, then psi)
 //! C_BB = P Ke⁻¹ Pᵀ             the rigid motions of the reference frame are free, so this holds for any frame
 //! ```
-//! Not here: the mass of the modes; the link has two rigid parts with the mass, centre and inertia of the body.
+//! The two rigid parts have the mass, centre and inertia of the body. Inside, all is in SI.
 
 use flexarm_fem::exchange::{InputFile, InterfaceMap, RowPick, Sid, parse_sid};
 use flexarm_fem::matrix_link::{MatrixReduction, PartMasses, link_from_superelement};
 use flexarm_fem::reduction::{InterfaceFrame, Superelement};
-use flexarm_fem::{Pose, RigidPart, UnitSystem};
+use flexarm_fem::{GeometricStiffness, LinkDetails, ModalInterface, ModalLink, Pose, RigidPart, UnitSystem};
 use nalgebra::{DMatrix, Matrix6, Rotation3, Translation3, Vector3};
 
 use super::summary::{ImportInterface, Parts};
 use super::words::ImportMap;
-use super::{ImportJob, plan, rotation};
+use super::{ImportJob, SECOND_ORDER_UNKNOWN, plan, rotation};
 use crate::error::Error;
 
 pub(super) fn import(job: &ImportJob, file: &InputFile, name: &str) -> Result<(MatrixReduction, Parts), Error> {
@@ -26,7 +27,7 @@ pub(super) fn import(job: &ImportJob, file: &InputFile, name: &str) -> Result<(M
         faults.push(refuse("the units of the file are not declared: --units m-kg-s is usual for SID".into()));
     }
     let nodes = match &job.map {
-        Some(map) => two_nodes(map, &ids),
+        Some(map) => named_nodes(map, &ids),
         None => {
             let (first, last) = (ids.first().copied().unwrap_or(1), ids.last().copied().unwrap_or(2));
             Err(format!("which nodes are A and B is not said; its nodes are {ids:?}: --map \"A={first},B={last}\""))
@@ -40,56 +41,118 @@ pub(super) fn import(job: &ImportJob, file: &InputFile, name: &str) -> Result<(M
         let what = format!("--at {}=...: the positions are in the SID file; leave --at out", at.name);
         return Err(Error::Usage(what));
     }
+    let mut warnings = Vec::new();
+    if job.modes.is_some() {
+        warnings.push("--modes only counts for full models; the modes of a SID are all kept".into());
+    }
 
+    let sid = sid.in_units(&units, &UnitSystem::SI);
     let R_LM = rotation(&job.axes_rpy);
-    let p = |k: usize| -> Vector3<f64> {
-        let origin = sid.nodes[nodes[k].1].origin.m0();
-        R_LM * Vector3::from_iterator(origin.iter().copied().take(3)) * units.length
+    let modal = modal_link(&sid, name, &nodes, &R_LM, &mut warnings);
+    let place = |k: usize| -> Pose {
+        let p = Vector3::from_iterator(sid.nodes[nodes[k].1].origin.m0().iter().copied().take(3));
+        let plain = Pose::from_parts(Translation3::from(R_LM * p), Rotation3::identity());
+        modal.as_ref().map_or(plain, |modal| if k == 0 { modal.X_LA } else { modal.interfaces[k - 1].X_LI })
     };
-    let frame = |k: usize| InterfaceFrame {
-        name: nodes[k].0.clone(),
-        X_LI: Pose::from_parts(Translation3::from(p(k)), Rotation3::identity()),
-        tie: None,
-    };
-    let C = compliance(&sid, nodes[0].1, nodes[1].1, units, &R_LM, &(p(1) - p(0))).map_err(refuse)?;
+    let places: Vec<Pose> = (0..nodes.len()).map(place).collect();
+    let p = |k: usize| places[k].translation.vector;
+    let frame = |k: usize| InterfaceFrame { name: nodes[k].0.clone(), X_LI: places[k], tie: None };
+    let C = compliance(&sid, nodes[0].1, nodes[1].1, &R_LM, &(p(1) - p(0))).map_err(refuse)?;
     let K_BB = C.try_inverse().ok_or_else(|| refuse("the compliance of B cannot be inverted".into()))?;
     let K_BB = (K_BB + K_BB.transpose()) * 0.5;
     let K = free_stiffness(&K_BB, &(p(1) - p(0)));
     let element = Superelement { interfaces: vec![frame(0), frame(1)], K, M: DMatrix::zeros(12, 12) };
-    let mut plan = plan(job, name, units, &file.origin, &format!("static part of {} modes, SID", sid.nq()));
+    let method = match &modal {
+        Some(_) => format!("modal link of {} modes", sid.nq()),
+        None => format!("static part of {} modes", sid.nq()),
+    };
+    let mut plan = plan(job, name, units, &file.origin, &format!("{method}, SID"));
     if plan.masses == PartMasses::FromMatrix {
-        plan.masses = PartMasses::Whole(body(&sid, units, &R_LM));
+        plan.masses = PartMasses::Whole(body(&sid, &R_LM));
     }
     let failed = |source| Error::Import { path: file.origin.clone().into(), source: Box::new(source) };
-    let reduction = link_from_superelement(element, false, &plan).map_err(failed)?;
-    let interfaces = (0..2).map(|k| ImportInterface {
+    let mut reduction = link_from_superelement(element, false, &plan).map_err(failed)?;
+    if let Some(modal) = modal {
+        if (modal.mass / reduction.whole.mass - 1.0).abs() > 0.01 {
+            warnings.push(format!(
+                "the modal link weighs {:.6} kg, as the SID says; the given masses of the parts sum to {:.6} kg",
+                modal.mass, reduction.whole.mass
+            ));
+        }
+        reduction.held_frequencies_hz = modal.held_frequencies_hz();
+        reduction.link.details = Some(Box::new(LinkDetails { modal: Some(modal), ..LinkDetails::default() }));
+    }
+    let interfaces = (0..nodes.len()).map(|k| ImportInterface {
         name: nodes[k].0.clone(),
         rows: format!("node {}", ids[nodes[k].1]),
         position_m: p(k).into(),
-        rpy_rad: [0.0; 3],
-        from: "the position of its node",
+        rpy_rad: places[k].rotation.euler_angles().into(),
+        from: "the frame of its node",
     });
     let parts = Parts {
         files: vec![file.origin.clone()],
         format: "SID".into(),
         units: units.name(),
-        method: format!("static part of {} modes", sid.nq()),
+        method,
         rows: sid.nq(),
         interfaces: interfaces.collect(),
         asymmetry: 0.0,
         element: None,
-        warnings: vec![
-            "of a SID only the stiffness between A and B and the rigid mass are used, not the mass of its modes".into(),
-        ],
+        warnings,
     };
     Ok((reduction, parts))
 }
 
-/// Names and indices of the two nodes.
-fn two_nodes(map: &ImportMap, ids: &[i64]) -> Result<[(String, usize); 2], String> {
-    let wrong = || format!("a SID needs a map of two nodes such as A=1,B=2; its nodes are {ids:?}");
+/// The modal link, with the mapped nodes as its interfaces; `None` and a warning where the data do not give one.
+fn modal_link(
+    sid: &Sid,
+    name: &str,
+    nodes: &[(String, usize)],
+    R_LM: &Rotation3<f64>,
+    warnings: &mut Vec<String>,
+) -> Option<ModalLink> {
+    let A = nodes[0].1;
+    let link = match ModalLink::from_sid_held_at(name, sid, sid.nodes[A].id) {
+        Ok(link) => link,
+        Err(error) => {
+            let used = "only the stiffness between A and B and the rigid mass are used";
+            warnings.push(format!("the SID gives no modal link, {used}: {error}"));
+            return None;
+        }
+    };
+    // Stiffness by load belongs to the frame of the data, which is lost with another node held.
+    let is_stressed = sid.Ct.order == 1 || sid.others.iter().any(|(block, _)| block.eq_ignore_ascii_case("K0t"));
+    if link.geometric.is_none() && is_stressed {
+        warnings.push(format!(
+            "node {} moves in the frame of the SID, in which its stiffness by load is: that is left out",
+            sid.nodes[A].id
+        ));
+    }
+    if !link.has_second_order() {
+        warnings.push(SECOND_ORDER_UNKNOWN.into());
+    }
+    if sid.De.m0().iter().any(|d| *d != 0.0) {
+        warnings.push("the damping of the SID (De) is not taken over: give damping in the robot file".into());
+    }
+    // One interface per node but A, in the order of the file.
+    let at: Vec<usize> = nodes[1..].iter().map(|(_, node)| if *node > A { node - 1 } else { *node }).collect();
+    let interface = |(k, (name, _)): (&usize, &(String, usize))| {
+        let own = link.interfaces.get(*k)?;
+        Some(ModalInterface { name: name.clone(), ..own.clone() })
+    };
+    let interfaces = at.iter().zip(&nodes[1..]).map(interface).collect::<Option<Vec<_>>>()?;
+    let geometric = link.geometric.clone().map(|G| GeometricStiffness {
+        interface: at.iter().filter_map(|k| G.interface.get(*k).cloned()).collect(),
+        ..G
+    });
+    let link = ModalLink { name: name.to_owned(), interfaces, geometric, ..link };
+    Some(if *R_LM == Rotation3::identity() { link } else { link.turned(R_LM) })
+}
+
+/// Names and indices of the nodes, proximal and distal first.
+fn named_nodes(map: &ImportMap, ids: &[i64]) -> Result<Vec<(String, usize)>, String> {
+    let wrong = || format!("a SID needs a map of two nodes or more such as A=1,B=2; its nodes are {ids:?}");
     let ImportMap::Rows(InterfaceMap { interfaces, modal }) = map else { return Err(wrong()) };
-    let [a, b] = &interfaces[..] else { return Err(wrong()) };
     let index = |picks: &[RowPick]| match picks {
         [RowPick::Node { node, first: 1, last: 6 }] => {
             let found = ids.iter().position(|id| id == node);
@@ -97,18 +160,25 @@ fn two_nodes(map: &ImportMap, ids: &[i64]) -> Result<[(String, usize); 2], Strin
         }
         _ => Err(wrong()),
     };
-    if !modal.is_empty() {
+    if !modal.is_empty() || interfaces.len() < 2 {
         return Err(wrong());
     }
-    Ok([(a.name.clone(), index(&a.picks)?), (b.name.clone(), index(&b.picks)?)])
+    let nodes = interfaces
+        .iter()
+        .map(|one| Ok((one.name.clone(), index(&one.picks)?)))
+        .collect::<Result<Vec<(String, usize)>, String>>()?;
+    let twice = nodes.iter().enumerate().find(|(k, (_, node))| nodes[..*k].iter().any(|(_, other)| other == node));
+    match twice {
+        Some((_, (_, node))) => Err(format!("the map names node {} twice", ids[*node])),
+        None => Ok(nodes),
+    }
 }
 
-/// `C_BB`, SI, link axes.
+/// `C_BB`, link axes.
 fn compliance(
     sid: &Sid,
     a: usize,
     b: usize,
-    units: UnitSystem,
     R_LM: &Rotation3<f64>,
     p_AB: &Vector3<f64>,
 ) -> Result<Matrix6<f64>, String> {
@@ -125,7 +195,7 @@ fn compliance(
             return Err(format!("node {} has no phi and psi of 3 x {nq}", sid.nodes[k].id));
         }
         let mut Phi = DMatrix::zeros(6, nq);
-        Phi.view_mut((0, 0), (3, nq)).copy_from(&(R_LM.matrix() * phi * units.length));
+        Phi.view_mut((0, 0), (3, nq)).copy_from(&(R_LM.matrix() * phi));
         Phi.view_mut((3, 0), (3, nq)).copy_from(&(R_LM.matrix() * psi));
         Ok(Phi)
     };
@@ -133,7 +203,7 @@ fn compliance(
     let mut Ad_BA = DMatrix::identity(6, 6);
     Ad_BA.view_mut((0, 3), (3, 3)).copy_from(&-p_AB.cross_matrix());
     let P = Phi_B - Ad_BA * Phi_A;
-    let Ke = sid.Ke.m0() * (units.force() * units.length);
+    let Ke = sid.Ke.m0();
     let scale = Ke.diagonal().map(|k| 1.0 / k.sqrt());
     let scaled = DMatrix::from_fn(nq, nq, |i, j| Ke[(i, j)] * scale[i] * scale[j]);
     let factor = scaled.cholesky().ok_or("Ke is not positive definite")?;
@@ -166,15 +236,11 @@ fn free_stiffness(K_BB: &Matrix6<f64>, p_AB: &Vector3<f64>) -> DMatrix<f64> {
 }
 
 /// Mass, centre and inertia of the undeformed body, SI, link axes.
-fn body(sid: &Sid, units: UnitSystem, R_LM: &Rotation3<f64>) -> RigidPart {
+fn body(sid: &Sid, R_LM: &Rotation3<f64>) -> RigidPart {
     let moment = sid.mdCM.m0();
     let com = Vector3::from_iterator(moment.iter().copied().take(3)) / sid.mass;
     let c = com.cross_matrix();
     let about_com = sid.J0() + c * c * sid.mass;
     let R = R_LM.matrix();
-    RigidPart {
-        mass: sid.mass * units.mass,
-        com: R_LM * com * units.length,
-        inertia: R * about_com * R.transpose() * (units.mass * units.length * units.length),
-    }
+    RigidPart { mass: sid.mass, com: R_LM * com, inertia: R * about_com * R.transpose() }
 }

@@ -4,11 +4,12 @@ use std::fmt::Write as _;
 
 use flexarm_fem::matrix_link::MatrixReduction;
 use flexarm_fem::reduction::Superelement;
-use flexarm_fem::{GateLimits, RigidPart};
+use flexarm_fem::{GateLimits, ModalLink, RigidPart};
 use nalgebra::{DMatrix, Matrix3, Matrix6};
 use serde::Serialize;
 
-use crate::reduce::ReportTable;
+use super::SECOND_ORDER_UNKNOWN;
+use crate::reduce::{ModalFigures, ReportTable, modal_table};
 
 /// Answer of `flexarm import`.
 #[derive(Clone, Debug, Serialize)]
@@ -41,12 +42,14 @@ pub struct ImportSummary {
     pub split_m: [f64; 3],
     /// The two rigid parts, proximal first.
     pub parts: Vec<ImportPart>,
-    /// Natural frequencies with A held and B free (Hz); empty without a mass matrix.
+    /// Natural frequencies with A held and B free (Hz); empty without mass of matrices or modes.
     pub frequencies_hz: Vec<f64>,
     /// The same of the two rigid parts with their joint (Hz).
     pub lumped_frequencies_hz: Vec<f64>,
     /// Frequencies of the fixed-interface modes in the matrices (Hz).
     pub fixed_interface_hz: Vec<f64>,
+    /// The modal link that the file holds or gives; null where it cannot be one.
+    pub modal: Option<ModalFigures>,
     /// What was checked.
     pub checks: ImportChecks,
     /// Wall-clock time without the writing of files (s).
@@ -145,6 +148,16 @@ impl ImportSummary {
         {
             all.push(format!("the mass matrix holds {:.6}, {:.6}, {:.6} kg along x, y, z", m[0], m[1], m[2]));
         }
+        let details = link.details.as_deref();
+        let stored = details.and_then(|details| details.modal.as_ref()).map(ModalFigures::from);
+        let modal = stored.or_else(|| {
+            let element = details.and_then(|details| details.superelement.as_ref())?;
+            let link = ModalLink::from_superelement(&link.name, element).ok()?;
+            if !link.has_second_order() {
+                all.push(SECOND_ORDER_UNKNOWN.into());
+            }
+            Some(ModalFigures::from(&link))
+        });
         let list =
             |part: &RigidPart| ImportPart { mass_kg: part.mass, com_m: part.com.into(), inertia: rows3(&part.inertia) };
         Self {
@@ -165,6 +178,7 @@ impl ImportSummary {
             frequencies_hz: held_frequencies_hz.iter().copied().take(10).collect(),
             lumped_frequencies_hz: lumped_frequencies_hz.clone(),
             fixed_interface_hz: parts.element.as_ref().map_or_else(Vec::new, Superelement::fixed_frequencies_hz),
+            modal,
             checks: ImportChecks {
                 symmetry: gate.asymmetry.max(parts.asymmetry),
                 rigid_body_residual: gate.rigid_body_residual.unwrap_or(0.0),
@@ -248,7 +262,7 @@ pub fn tables(summary: &ImportSummary) -> Vec<ReportTable> {
         let header: Vec<&str> = std::iter::once("").chain(names).collect();
         ReportTable::new(title, &header, M.iter().zip(names).map(row).collect()).on_page()
     };
-    vec![
+    let mut tables = vec![
         table(
             "interfaces (m, rad, link frame)",
             &["interface", "rows", "position", "roll, pitch, yaw", "from"],
@@ -260,7 +274,9 @@ pub fn tables(summary: &ImportSummary) -> Vec<ReportTable> {
         matrix("compliance C_BB at B, A held (m/N, m/(N m); rad/N, rad/(N m))", &summary.compliance),
         table("checks", &["", "measured", "usual", ""], checks),
         table("natural frequencies, A held, B free (Hz)", &["mode", "matrices", "two parts"], frequencies),
-    ]
+    ];
+    tables.extend(summary.modal.as_ref().map(modal_table));
+    tables
 }
 
 /// The figures as a page of Markdown.

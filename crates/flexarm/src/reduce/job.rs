@@ -65,6 +65,9 @@ pub struct ReduceJob {
     /// Chains to store in the link, by their number of parts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub chains: Option<Vec<usize>>,
+    /// Whether the modal link gets its stiffness by load: `geometric_stiffening = true` of a robot file needs it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub geometric: Option<bool>,
     /// Quadrature of solid elements.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quadrature: Option<QuadratureChoice>,
@@ -212,6 +215,7 @@ impl ReduceJob {
         put(&mut self.tie, flags.tie);
         put(&mut self.split, flags.split);
         put(&mut self.chains, flags.chains);
+        put(&mut self.geometric, flags.geometric);
         put(&mut self.quadrature, flags.quadrature);
         put(&mut self.ordering, flags.ordering);
         put(&mut self.threads, flags.threads);
@@ -303,6 +307,7 @@ units = "mm-t-s"
 material = { E = 70e9, nu = 0.33, rho = 2700.0 }
 split = [1, 2.5, 3]
 chains = [3, 4]
+geometric = true
 [materials]
 rib = "steel"
 [[interface]]
@@ -323,9 +328,9 @@ tie = "distributing"
     fn a_job_is_read_with_paths_and_places_and_written_so_that_it_reads_the_same() {
         let job = parse(JOB).unwrap();
         assert_eq!(job.mesh, Path::new("jobs/arm.msh.gz"));
-        assert_eq!(job.link_name(), "arm");
+        assert_eq!((job.link_name().as_str(), job.geometric), ("arm", Some(true)));
         assert_eq!(job.split, Some(SplitChoice::Point([1.0, 2.5, 3.0])));
-        assert_eq!(job.interface[0].place, "jobs/arm.toml:9:10");
+        assert_eq!(job.interface[0].place, "jobs/arm.toml:10:10");
         assert_eq!(job.interface[1].tie, Some(Tie::Distributing));
 
         let written = toml::to_string(&ReduceJob { mesh: "arm.msh.gz".into(), ..job.clone() }).unwrap();
@@ -341,12 +346,13 @@ tie = "distributing"
         for (old, new, at, word) in [
             ("units =", "unit =", ":2:1:", "`unit`"),
             ("mm-t-s", "mm-N-s", ":2:9:", "mm-t-s"),
+            ("= true", "= 1", ":6:13:", "boolean"),
             ("nu = 0.33, ", "", ":3:", "nu"),
             ("nu = 0.33", "nu = 0.77", ":3:", "Poisson"),
-            ("\"steel\"", "\"steal\"", ":7:7:", "aluminium"),
-            ("\"centroid\"", "\"center\"", ":14:6:", "centroid"),
-            ("\"distributing\"", "\"rbe3\"", ":15:7:", "distributing"),
-            ("\"interface_A\"", "\"plane(0,0,0)\"", ":9:10:", "plane(x,y,z; nx,ny,nz)"),
+            ("\"steel\"", "\"steal\"", ":8:7:", "aluminium"),
+            ("\"centroid\"", "\"center\"", ":15:6:", "centroid"),
+            ("\"distributing\"", "\"rbe3\"", ":16:7:", "distributing"),
+            ("\"interface_A\"", "\"plane(0,0,0)\"", ":10:10:", "plane(x,y,z; nx,ny,nz)"),
             ("[1, 2.5, 3]", "\"middle\"", ":4:9:", "elastic-centre"),
             ("mesh = \"arm.msh.gz\"", "", ":1:1:", "mesh = "),
         ] {

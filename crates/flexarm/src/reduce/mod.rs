@@ -46,10 +46,10 @@ pub use flexarm_fem::reduction::Tie;
 pub use flexarm_fem::{NodeSelector, UnitSystem as Units};
 pub use job::{FrameEntry, InterfaceEntry, ReduceJob, UrdfEntry};
 pub use listing::{MeshListing, RegionListing, SetListing};
-pub use report::{ReportTable, headline, markdown, tables};
+pub use report::{ReportTable, headline, markdown, modal_table, tables};
 pub use summary::{
-    ChainFigures, CheckFigures, InterfaceFigures, MaterialFigures, ModeFigures, PartFigures, PhaseFigures, ReduceFiles,
-    ReduceSummary, RegionFigures, SolverFigures,
+    ChainFigures, CheckFigures, InterfaceFigures, MaterialFigures, ModalFigures, ModeFigures, PartFigures,
+    PhaseFigures, ReduceFiles, ReduceSummary, RegionFigures, SolverFigures,
 };
 pub use words::{At, MaterialChoice, OrderingChoice, QuadratureChoice, SplitChoice, numbers};
 
@@ -168,6 +168,7 @@ fn with_defaults(job: &ReduceJob) -> Result<ReduceJob, Error> {
     if let Some(parts) = chains.iter().find(|parts| !(2..=100).contains(*parts)) {
         return Err(Error::Usage(format!("--chains {parts}: a chain has 2 to 100 parts")));
     }
+    job.geometric.get_or_insert(false);
     job.tie.get_or_insert(Tie::Rigid);
     job.split.get_or_insert(SplitChoice::ElasticCentre);
     job.quadrature.get_or_insert(QuadratureChoice::Exact);

@@ -195,10 +195,11 @@ fn plan(
         units: units.name(),
         date: stamp::today(),
         note: format!(
-            "flexarm {}; {}; {} quadrature",
+            "flexarm {}; {}; {} quadrature{}",
             env!("CARGO_PKG_VERSION"),
             materials.join("; "),
-            quadrature_name(job)
+            quadrature_name(job),
+            if job.geometric == Some(true) { "; stiffness by load" } else { "" }
         ),
     };
     LinkPlan {
@@ -210,7 +211,7 @@ fn plan(
         split,
         chains: job.chains.clone().unwrap_or_default(),
         attached: Vec::new(),
-        geometric: false,
+        geometric: job.geometric.unwrap_or(false),
         judged_modes: JUDGED_MODES,
         limits: GateLimits::default(),
         provenance,

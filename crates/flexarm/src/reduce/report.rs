@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use flexarm_fem::MeshGate;
 
-use super::summary::{ModeFigures, ReduceSummary};
+use super::summary::{ModalFigures, ModeFigures, ReduceSummary};
 
 /// A table of text; the first row is the header.
 #[derive(Clone, Debug)]
@@ -42,8 +42,25 @@ pub fn tables(summary: &ReduceSummary) -> Vec<ReportTable> {
     if !summary.fixed_interface_hz.is_empty() {
         tables.push(kept(summary));
     }
+    tables.extend(summary.modal.as_ref().map(modal_table));
     tables.push(cost(summary));
     tables
+}
+
+/// What a modal link holds.
+pub fn modal_table(modal: &ModalFigures) -> ReportTable {
+    let (low, high) = (modal.frequencies_hz.first(), modal.frequencies_hz.last());
+    let hz = |x: Option<&f64>| x.map_or_else(|| "-".into(), |x| format!("{x:.1}"));
+    let of = match modal.interfaces.as_slice() {
+        [one] => format!("interface {one}"),
+        several => format!("interfaces {}", several.join(", ")),
+    };
+    let rows = vec![
+        vec!["coordinates".into(), format!("{}, {of}, {} Hz to {} Hz", modal.coordinates, hz(low), hz(high))],
+        vec!["integrals of second order".into(), if modal.second_order { "known" } else { "unknown" }.into()],
+        vec!["stiffness by load".into(), if modal.geometric { "stored" } else { "not stored" }.into()],
+    ];
+    ReportTable::new("modal link, A held", &["", ""], rows)
 }
 
 /// The figures as a page of Markdown.

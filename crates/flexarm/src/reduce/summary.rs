@@ -3,7 +3,7 @@
 use flexarm_fem::chain::Chain;
 use flexarm_fem::mesh_gate::ModeCheck;
 use flexarm_fem::sparse::Ordering;
-use flexarm_fem::{LinkPlan, Material, MeshFile, MeshReduction, RigidPart, UnitSystem};
+use flexarm_fem::{LinkPlan, Material, MeshFile, MeshReduction, ModalLink, RigidPart, UnitSystem};
 use nalgebra::{Matrix3, Matrix6};
 use serde::Serialize;
 
@@ -60,6 +60,8 @@ pub struct ReduceSummary {
     pub frequencies_hz: Vec<f64>,
     /// Frequencies of the mesh with all interfaces held: the modes that were kept (Hz).
     pub fixed_interface_hz: Vec<f64>,
+    /// The modal link in the link file.
+    pub modal: Option<ModalFigures>,
     /// Modes with A held, of the mesh and of the reduced models.
     pub modes: Vec<ModeFigures>,
     /// What was checked.
@@ -215,6 +217,36 @@ impl From<&ModeCheck> for ModeFigures {
     }
 }
 
+/// A modal link: `model = "modal"` of a robot file.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ModalFigures {
+    /// Shape coordinates: six per interface but A, then modes.
+    pub coordinates: usize,
+    /// Interfaces but A, distal first.
+    pub interfaces: Vec<String>,
+    /// Mass, without bodies that ride on the link.
+    pub mass_kg: f64,
+    /// Whether the integrals of second order are known.
+    pub second_order: bool,
+    /// Whether stiffness by load is there (`geometric_stiffening = true` of a robot file).
+    pub geometric: bool,
+    /// Natural frequencies with A held, all of them (Hz).
+    pub frequencies_hz: Vec<f64>,
+}
+
+impl From<&ModalLink> for ModalFigures {
+    fn from(link: &ModalLink) -> Self {
+        Self {
+            coordinates: link.coordinates(),
+            interfaces: link.interfaces.iter().map(|interface| interface.name.clone()).collect(),
+            mass_kg: link.mass,
+            second_order: link.has_second_order(),
+            geometric: link.geometric.is_some(),
+            frequencies_hz: link.held_frequencies_hz(),
+        }
+    }
+}
+
 /// What was checked.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct CheckFigures {
@@ -354,6 +386,7 @@ pub(super) fn summary_of(
         chains: reduction.bare_chains.iter().map(|chain| ChainFigures::new(chain, JUDGED_MODES)).collect(),
         frequencies_hz: reduction.held_modes.frequencies_hz(),
         fixed_interface_hz: reduction.fixed_modes.frequencies_hz(),
+        modal: details.and_then(|details| details.modal.as_ref()).map(ModalFigures::from),
         modes,
         checks,
         solver: SolverFigures {

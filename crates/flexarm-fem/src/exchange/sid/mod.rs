@@ -14,10 +14,11 @@
 //! The first shows in the size. The others follow from identities that every body fulfils,
 //! `(Gr_j + Gr_jᵀ)/2 = J1_j`, and the products in `Oe` are those of `-J1_j`; see [`Sid::conventions`].
 //!
-//! Units: those of the file. Nothing is converted here.
+//! Units: those of the file; [`Sid::in_units`] gives others.
 
 mod conventions;
 mod parse;
+mod units;
 mod write;
 
 use std::collections::BTreeMap;

@@ -1,0 +1,147 @@
+//! Export as Standard Input Data: the modal link, which has the mass that the other formats condense.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use flexarm_fem::exchange::{parse_sid, write_sid};
+use flexarm_fem::{ModalLink, ReducedLink, UnitSystem};
+use nalgebra::{DMatrix, Matrix3};
+
+use super::{ExportChecks, ExportFormat, ExportJob, ExportSummary, difference, nodes, part_lines};
+use crate::error::Error;
+use crate::{result_files, stamp};
+
+pub(super) fn export(job: &ExportJob, link: &ReducedLink, started: Instant) -> Result<ExportSummary, Error> {
+    let details = link.details.as_deref();
+    let Some(modal) = details.and_then(|details| details.modal.as_ref()) else {
+        let what = "has no [modal] section, and SID is nothing else: reduce the mesh again with this version (flexarm reduce), \
+                    or export its matrices in another format";
+        return Err(Error::File { path: job.link.clone(), what: what.into() });
+    };
+    let mut warnings = Vec::new();
+    let riding: f64 = details.map_or(0.0, |details| details.attached.iter().map(|body| body.mass).sum());
+    if riding > 0.0 {
+        warnings.push(format!(
+            "bodies of {riding:.4} kg that ride on the link are not in the SID, which is the link alone"
+        ));
+    }
+    if !modal.has_second_order() {
+        warnings.push(crate::import::SECOND_ORDER_UNKNOWN.into());
+    }
+
+    let count = modal.interfaces.len() + 1;
+    let ids = if job.nodes.is_empty() { (1..=count as i64).collect() } else { nodes(job, count)? };
+    let mut sid = modal.to_sid();
+    for (node, id) in sid.nodes.iter_mut().zip(&ids) {
+        node.id = *id;
+    }
+    let text = write_sid(&sid.in_units(&UnitSystem::SI, &job.units));
+    let names = modal.interfaces.iter().map(|interface| interface.name.as_str());
+    let names: Vec<&str> = std::iter::once("A").chain(names).collect();
+    let pairs: Vec<String> = names.iter().zip(&ids).map(|(name, id)| format!("{name}={id}")).collect();
+    let map = pairs.join(",");
+
+    let stem = result_files::file_stem(&link.name);
+    let texts: [(PathBuf, String); 2] = [
+        (job.folder.join(format!("{stem}.SID_FEM")), text),
+        (job.folder.join(format!("{stem}_README.txt")), readme(job, link, modal, &map)),
+    ];
+    let paths: Vec<PathBuf> = texts.iter().map(|(path, _)| path.clone()).collect();
+    result_files::check_free(&paths, job.overwrite)?;
+    result_files::write_all(&texts)?;
+
+    // Back from the disk, as every import reads it.
+    let written = std::fs::read_to_string(&paths[0])
+        .map_err(|e| Error::File { path: paths[0].clone(), what: format!("cannot be read back: {e}") })?;
+    let origin = paths[0].display().to_string();
+    let back = parse_sid(&written, &origin).map_err(Box::new)?.in_units(&job.units, &UnitSystem::SI);
+    let back = ModalLink::from_sid_held_at(&link.name, &back, ids[0]).map_err(Box::new)?;
+    let (stiffness_error, mass_error) = (difference(&modal.K, &back.K), difference(&modal.M, &back.M));
+    let integrals_error = integrals(modal, &back);
+    for (what, error) in [("stiffness", stiffness_error), ("mass", mass_error), ("integrals", integrals_error)] {
+        if error.is_nan() || error > ExportFormat::Sid.digits() {
+            warnings.push(format!("the {what} read back differs by {error:.1e} (relative to its diagonal)"));
+        }
+    }
+    let whole = modal.rigid();
+    Ok(ExportSummary {
+        link: link.name.clone(),
+        format: ExportFormat::Sid.name(),
+        units: job.units.name(),
+        rows: modal.coordinates(),
+        modes: modal.coordinates().saturating_sub(6 * modal.interfaces.len()),
+        map,
+        mass_kg: whole.mass,
+        com_m: whole.com.into(),
+        inertia: whole.inertia.transpose().into(),
+        stiffness: link.K_BB.transpose().into(),
+        frequencies_hz: modal.held_frequencies_hz().into_iter().take(10).collect(),
+        checks: ExportChecks {
+            symmetry: link.checks.asymmetry,
+            rigid_body_residual: link.checks.rigid_body_residual,
+            mass_error: Some(mass_error),
+            stiffness_error,
+            integrals_error: Some(integrals_error),
+        },
+        wall_s: started.elapsed().as_secs_f64(),
+        peak_rss_bytes: stamp::peak_rss_bytes(),
+        warnings,
+        files: paths.iter().map(|path| path.display().to_string()).collect(),
+    })
+}
+
+/// Largest difference of the mass integrals, relative to the sizes that mass, inertia and modal mass give them.
+fn integrals(a: &ModalLink, b: &ModalLink) -> f64 {
+    let n = a.coordinates();
+    if b.coordinates() != n {
+        return f64::INFINITY;
+    }
+    let size: Vec<f64> = a.M.diagonal().iter().map(|m| m.sqrt()).collect();
+    let (mass, lever) = (a.mass.sqrt(), a.inertia.amax().sqrt());
+    let apart = |a: &Matrix3<f64>, b: &Matrix3<f64>| (a - b).amax();
+    let mut worst = [
+        (a.mass / b.mass - 1.0).abs(),
+        (a.first_moment - b.first_moment).amax() / (mass * lever),
+        apart(&a.inertia, &b.inertia) / (lever * lever),
+    ]
+    .into_iter()
+    .fold(0.0, f64::max);
+    for k in 0..n {
+        let linear = (a.C_t.column(k) - b.C_t.column(k)).amax() / (mass * size[k]);
+        let angular = (a.C_r.column(k) - b.C_r.column(k)).amax() / (lever * size[k]);
+        worst = worst.max(linear).max(angular).max(apart(&a.P[k], &b.P[k]) / (lever * size[k]));
+        for l in 0..n {
+            worst = worst.max(apart(&a.N[k * n + l], &b.N[k * n + l]) / (size[k] * size[l]));
+        }
+    }
+    let lost = a.geometric.is_some() != b.geometric.is_some();
+    if let (Some(a), Some(b)) = (&a.geometric, &b.geometric) {
+        let of = |G: &flexarm_fem::GeometricStiffness| -> Vec<DMatrix<f64>> {
+            let all = G.acceleration.iter().chain(&G.angular).chain(&G.centrifugal).chain(G.interface.iter().flatten());
+            all.cloned().collect()
+        };
+        for (a, b) in of(a).iter().zip(&of(b)) {
+            worst = worst.max((a - b).amax() / a.amax().max(f64::MIN_POSITIVE));
+        }
+    }
+    if lost { f64::INFINITY } else { worst }
+}
+
+/// What the format does not say.
+fn readme(job: &ExportJob, link: &ReducedLink, modal: &ModalLink, map: &str) -> String {
+    let units = &job.units;
+    let mut text = format!(
+        "Link {}, written by flexarm export as {}\n\nbody reference frame: the link frame, tangent at interface A, whose node does \
+         not move\naxes: those of the link\nunits: {units} (length-mass-time; forces follow: 1 unit = {} N); angles in rad\n\
+         Gr, Ge: column (axis-1) nq + mode; Oe: xx yy zz xy yz xz; De is empty\n\nmap for flexarm import: --map \"{map}\" --units \
+         {units}\n\nshape coordinates:\n",
+        link.name,
+        job.format.name(),
+        units.force(),
+    );
+    for (k, label) in modal.labels.iter().enumerate() {
+        text += &format!("  {} {label}\n", k + 1);
+    }
+    text += &part_lines(link);
+    text
+}
