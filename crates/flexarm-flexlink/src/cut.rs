@@ -158,7 +158,8 @@ mod tests {
     /// The same for chains, and for two parts the same as the closed form; measured 6e-16.
     #[test]
     fn parts_of_a_chain_together_are_exactly_the_link() {
-        let link = bar();
+        // Wider than the bar, whose inertia does not reach over the whole line.
+        let link = LinkInertia { inertia_com: Matrix3::from_diagonal(&vector![0.02, 0.9, 0.9]), ..bar() };
         let (p_LA, p_LB) = (vector![-0.05, 0.0, 0.0], vector![0.8, 0.0, 0.0]);
         for n in [2, 3, 7] {
             let ends: Vec<f64> = (0..=n).map(|k| -0.05 + 0.85 * k as f64 / n as f64).collect();

@@ -71,6 +71,16 @@ pub enum GearboxError {
         /// Smallest eigenvalue or entry.
         found: f64,
     },
+    /// A matrix that no spring has.
+    #[error(
+        "gearbox of joint {joint:?}: its 6x6 stiffness must be symmetric, found a relative asymmetry of {found:.1e}"
+    )]
+    NotSymmetric {
+        /// The joint.
+        joint: String,
+        /// Largest difference to the transpose over the largest entry.
+        found: f64,
+    },
     /// A tilting gearbox on a slide.
     #[error("gearbox of joint {joint:?}: three stiffnesses are about the axes of a turning joint; this one slides")]
     Slides {
@@ -79,10 +89,37 @@ pub enum GearboxError {
     },
 }
 
+/// Largest relative asymmetry of a full stiffness.
+const ASYMMETRY: f64 = 1e-9;
+
+fn check_stiffness(joint: &str, stiffness: &GearStiffness) -> Result<(), GearboxError> {
+    let smallest = match stiffness {
+        GearStiffness::Axis(k) => *k,
+        GearStiffness::Tilting(k) => match k.iter().find(|k| !k.is_finite()) {
+            Some(hole) => *hole,
+            None => k.iter().copied().fold(f64::INFINITY, f64::min),
+        },
+        GearStiffness::Full(K) => match K.iter().find(|k| !k.is_finite()) {
+            Some(hole) => *hole,
+            None => {
+                let found = (K - K.transpose()).amax() / K.amax();
+                if found > ASYMMETRY {
+                    return Err(GearboxError::NotSymmetric { joint: joint.to_owned(), found });
+                }
+                K.symmetric_eigenvalues().min()
+            }
+        },
+    };
+    if smallest <= 0.0 || !smallest.is_finite() {
+        return Err(GearboxError::NotPositive { joint: joint.to_owned(), found: smallest });
+    }
+    Ok(())
+}
+
 /// Puts a spring behind each of the joints.
 ///
 /// # Errors
-/// [`GearboxError`], naming the joint.
+/// [`GearboxError`], naming the joint; nothing of that gearbox is in the mechanism then.
 pub fn insert_gearboxes(mechanism: &mut Mechanism, gearboxes: &[Gearbox]) -> Result<Vec<GearSpring>, GearboxError> {
     let mut springs = Vec::new();
     for gearbox in gearboxes {
@@ -97,15 +134,18 @@ pub fn insert_gearboxes(mechanism: &mut Mechanism, gearboxes: &[Gearbox]) -> Res
             JointKind::Prismatic(axis) => JointKind::ElasticPrismatic(axis),
             _ => return Err(missing()),
         };
+        let slides = matches!(elastic, JointKind::ElasticPrismatic(_));
+        if slides && matches!(gearbox.stiffness, GearStiffness::Tilting(_)) {
+            return Err(GearboxError::Slides { joint: name.clone() });
+        }
+        check_stiffness(name, &gearbox.stiffness)?;
         let motor = format!("{name}__motor");
         let child = std::mem::replace(&mut joint.child, motor.clone());
         mechanism.links.push(Link { name: motor.clone(), inertia: None });
 
-        let slides = matches!(elastic, JointKind::ElasticPrismatic(_));
         let single = |k: f64| DMatrix::from_element(1, 1, k);
         let parts: Vec<(&str, JointKind, DMatrix<f64>)> = match &gearbox.stiffness {
             GearStiffness::Axis(k) => vec![("", elastic, single(*k))],
-            GearStiffness::Tilting(_) if slides => return Err(GearboxError::Slides { joint: name.clone() }),
             GearStiffness::Tilting(k) => {
                 let turn = |axis: Unit<Vector3<f64>>| JointKind::ElasticRevolute(axis);
                 vec![
@@ -121,10 +161,6 @@ pub fn insert_gearboxes(mechanism: &mut Mechanism, gearboxes: &[Gearbox]) -> Res
         };
         let (last, mut parent) = (parts.len() - 1, motor);
         for (component, (suffix, kind, K)) in parts.into_iter().enumerate() {
-            let smallest = K.symmetric_eigenvalues().min();
-            if !(smallest > 0.0) || !smallest.is_finite() {
-                return Err(GearboxError::NotPositive { joint: name.clone(), found: smallest });
-            }
             let spring = format!("{name}__spring{suffix}");
             let to = if component == last { child.clone() } else { format!("{name}__gear{suffix}") };
             if component < last {

@@ -251,7 +251,8 @@ impl FlexibleArm {
     /// The same arm with some joints driven by torque, under a controller.
     ///
     /// # Errors
-    /// [`StepError::Setup`] if the axes are not actuated coordinates, or one without mass behind it has no rotor.
+    /// [`StepError::Setup`] if the axes are not actuated coordinates, the rigid robot has not just these, or an axis without
+    /// mass behind it has no rotor.
     pub fn with_servo(mut self, servo: Servo) -> Result<Self, StepError> {
         let n = self.model.n_actuated();
         self.torque_driven = servo.axes.iter().map(|a| a.coordinate).collect();
@@ -260,10 +261,17 @@ impl FlexibleArm {
             let text = format!("servo axes {:?} must be ascending coordinates below {n}", self.torque_driven);
             return Err(StepError::Setup(text));
         }
+        if servo.rigid.nv() != n {
+            let text = format!("the servo's rigid robot has {} coordinates, the arm has {n} drives", servo.rigid.nv());
+            return Err(StepError::Setup(text));
+        }
         for &k in &self.torque_driven {
-            let body = self.model.bodies().iter().skip(1).find(|b| b.coordinate == k && !b.elastic);
-            if let Some(body) = body
+            let mut bodies = self.model.bodies().iter().enumerate().skip(1);
+            let body = bodies.find(|(_, b)| b.coordinate == k && !b.elastic);
+            let bends = |i: usize| self.model.elastic().iter().any(|g| g.modal && g.body == i);
+            if let Some((i, body)) = body
                 && body.inertia.mass == 0.0
+                && !bends(i)
                 && body.armature <= 0.0
             {
                 let text = format!(

@@ -60,7 +60,8 @@ impl TorqueCurve {
 
     /// Torque at a deflection.
     pub fn torque(&self, e: f64) -> f64 {
-        let k = self.piece(e);
+        // From the inner end of the first piece, which may be long: no digits are lost beside a play.
+        let k = self.piece(e).max(1);
         self.y[k] + self.slope(e) * (e - self.x[k])
     }
 
@@ -68,6 +69,20 @@ impl TorqueCurve {
     pub fn slope(&self, e: f64) -> f64 {
         let k = self.piece(e);
         (self.y[k + 1] - self.y[k]) / (self.x[k + 1] - self.x[k])
+    }
+
+    /// Distance from a deflection without slope to where the torque rises again in that direction.
+    pub(crate) fn way_out(&self, e: f64, direction: f64) -> Option<f64> {
+        let rises = |k: usize| self.y[k + 1] > self.y[k];
+        let here = self.piece(e);
+        if rises(here) {
+            return None;
+        }
+        if direction > 0.0 {
+            (here + 1..self.x.len() - 1).find(|k| rises(*k)).map(|k| self.x[k] - e)
+        } else {
+            (0..here).rev().find(|k| rises(*k)).map(|k| e - self.x[k + 1])
+        }
     }
 
     /// Steepest slope: the stiffness that linear figures use.

@@ -409,7 +409,10 @@ impl SecondOrderSystem for ReducedArm {
             // J = M + C Sᵀ with Sᵀ = 1 + c M^-1 K is not symmetric in general; S J = M + c K + S C Sᵀ is, for every
             // damping, and is factorised in its place.
             self.product.copy_from(&self.matrix);
-            self.product.gemm(c_h2, &self.matrix, &self.M_inverse_K, 1.0);
+            // Column by column: the product of whole matrices allocates.
+            for (mut column, x) in self.product.column_iter_mut().zip(self.M_inverse_K.column_iter()) {
+                column.gemv(c_h2, &self.matrix, &x, 1.0);
+            }
             self.matrix.copy_from(&self.product);
             self.matrix.gemm_tr(c_h2, &self.M_inverse_K, &self.product, 1.0);
             for element in &self.arm.elements {

@@ -220,7 +220,9 @@ impl Reference {
     pub fn restart_at(&mut self, t: f64) {
         assert!(t.is_finite(), "a restart has a time");
         let near = self.near(t);
-        let t = if (t - self.time()).abs() <= near { self.time() } else { t };
+        // A point is met exactly: a restart that is a rounding beyond it would be met again.
+        let point = self.t0 + ((t - self.t0) / self.h).round() * self.h;
+        let t = if (t - point).abs() <= near { point } else { t };
         if t <= self.kept.time() + near {
             self.start_again();
         }

@@ -36,11 +36,16 @@ pub fn static_equilibrium(arm: &FlexibleArm, t: f64) -> Result<DVector<f64>, Ste
         if !residual.is_finite() {
             break;
         }
-        let Kt = tangent_stiffness(arm, &mut data, t, &e, &with_curves(arm, &K, &e));
-        let Some(factor) = Kt.cholesky() else {
+        let steep = with_curves(arm, &K, &e);
+        let mut tangent = |K: &DMatrix<f64>| tangent_stiffness(arm, &mut data, t, &e, K).cholesky();
+        let Some(factor) = tangent(&leave_play(arm, &e, &g, &steep)).or_else(|| tangent(&steep)) else {
             return Err(StepError::Singular { matrix: "static stiffness (with the effect of weight)", t });
         };
         let step = factor.solve(&g);
+        // Behind a play a small load may be less than the rounding of the deflection makes.
+        if step.amax() <= 2.0 * f64::EPSILON * e.amax() {
+            return Ok(e);
+        }
         // Far from small deflections the full step may overshoot: no coordinate moves by more than 0.5.
         let shorten = (0.5 / step.amax()).min(1.0);
         e -= step * shorten;
@@ -90,6 +95,21 @@ pub(crate) fn with_curves(arm: &FlexibleArm, K: &DMatrix<f64>, e: &DVector<f64>)
         }
     }
     tangent
+}
+
+/// Stiffness with which Newton's step out of a play ends just beyond its edge, however small the force.
+fn leave_play(arm: &FlexibleArm, e: &DVector<f64>, g: &DVector<f64>, K: &DMatrix<f64>) -> DMatrix<f64> {
+    let mut K = K.clone();
+    for element in &arm.elements {
+        let k = arm.offset(element);
+        if let Some(curve) = &element.curve
+            && g[k] != 0.0
+            && let Some(way) = curve.way_out(e[k], -g[k])
+        {
+            K[(k, k)] = K[(k, k)].min(g[k].abs() / (1.001 * way));
+        }
+    }
+    K
 }
 
 /// `K + dg/de` by central differences of the gravity forces, symmetrised.

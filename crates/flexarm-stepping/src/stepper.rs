@@ -1,8 +1,8 @@
 //! One face for all steppers: step, observe, count. A fourth stepper implements [`Stepper`] in a file of its own and
 //! gets a line in [`StepperKind`] and [`new_stepper`]; nothing else changes.
 
-use flexarm_kinematics::{Pose, kinetic_energy_of, potential_energy_of};
-use nalgebra::{DVector, Vector6};
+use flexarm_kinematics::{Data, Pose, State, kinetic_energy_of, mass_matrix, potential_energy_of};
+use nalgebra::{DMatrix, DVector, Vector6};
 
 use crate::arm::FlexibleArm;
 use crate::error::StepError;
@@ -167,7 +167,7 @@ pub fn new_stepper(kind: StepperKind, arm: FlexibleArm, h: f64, start: Start) ->
 fn check_events(arm: &FlexibleArm, h: f64) -> Result<(), StepError> {
     let on_grid = |t: f64| ((t / h).round() - t / h).abs() < 1e-6 * (1.0 + t / h);
     if let Some(servo) = &arm.servo
-        && (!(servo.sample_s > 0.0) || !on_grid(servo.sample_s) || servo.sample_s < 0.5 * h)
+        && (!on_grid(servo.sample_s) || servo.sample_s < 0.5 * h)
     {
         let text = format!(
             "the servo samples every {} s, which is no whole number of steps of {h} s: change --step or sample_s",
@@ -192,15 +192,50 @@ fn check_explicit_step(arm: &FlexibleArm, h: f64) -> Result<(), StepError> {
         let decay = phi.dot(&(&arm.D * phi)); // 2 ζ ω
         rate = rate.max(omega * STABILITY_LIMIT / 2.61).max(decay);
     }
+    let mut highest = arm.modes.omega.last().copied().unwrap_or(0.0);
+    if !arm.torque_driven.is_empty() {
+        // Motors that are free swing against their springs.
+        let (omega, decay) = free_rates(arm)?;
+        rate = rate.max(omega * STABILITY_LIMIT / 2.61).max(decay);
+        highest = highest.max(omega);
+    }
     if h * rate <= STABILITY_LIMIT {
         return Ok(());
     }
     Err(StepError::UnstableStep {
         stepper: "rk4",
         h,
-        highest_hz: arm.modes.omega.last().map_or(0.0, |w| w / std::f64::consts::TAU),
+        highest_hz: highest / std::f64::consts::TAU,
         largest_s: STABILITY_LIMIT / rate,
     })
+}
+
+/// Highest angular frequency and decay (1/s) with the joints driven by torque free, friction near standstill left out.
+fn free_rates(arm: &FlexibleArm) -> Result<(f64, f64), StepError> {
+    let (model, na) = (&arm.model, arm.model.n_actuated());
+    let (mut state, mut qddot) = (State::zeros(model), DVector::zeros(model.nv()));
+    arm.prescribed_state(0.0, &mut state, &mut qddot);
+    state.q.rows_mut(na, arm.modes.equilibrium.len()).copy_from(&arm.modes.equilibrium);
+    let mut data = Data::new(model);
+    let M = mass_matrix(model, &mut data, &state.q);
+    let free: Vec<usize> = arm.torque_driven.iter().copied().chain(na..model.nv()).collect();
+    let (n, driven) = (free.len(), arm.torque_driven.len());
+    let M = DMatrix::from_fn(n, n, |i, j| M[(free[i], free[j])]);
+    let (mut K, mut D) = (DMatrix::zeros(n, n), DMatrix::zeros(n, n));
+    K.view_mut((driven, driven), (n - driven, n - driven)).copy_from(&arm.stiffness());
+    D.view_mut((driven, driven), (n - driven, n - driven)).copy_from(&arm.D);
+    for (i, k) in arm.torque_driven.iter().enumerate() {
+        D[(i, i)] = arm.friction.get(*k).map_or(0.0, |f| f.viscous);
+    }
+    let singular = StepError::Singular { matrix: "mass matrix", t: 0.0 };
+    let L = M.cholesky().ok_or(singular.clone())?.l();
+    let largest = |A: &DMatrix<f64>| {
+        let half = L.solve_lower_triangular(A)?;
+        let whole = L.solve_lower_triangular(&half.transpose())?;
+        Some((&whole + whole.transpose()).symmetric_eigenvalues().max() * 0.5)
+    };
+    let (stiff, damped) = (largest(&K).ok_or(singular.clone())?, largest(&D).ok_or(singular)?);
+    Ok((stiff.max(0.0).sqrt(), damped.max(0.0)))
 }
 
 /// Fills an observation from the reduced arm after [`ReducedArm::evaluate`].

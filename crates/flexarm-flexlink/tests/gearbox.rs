@@ -1,0 +1,211 @@
+//! Elastic gearboxes on the tree: what they keep, how they give way, what is refused.
+#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
+#![allow(non_snake_case, reason = "monogram notation")]
+
+use flexarm_flexlink::*;
+use flexarm_kinematics::*;
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Matrix6xX, Rotation3, UnitVector3, Vector3, vector};
+
+const TIP: [f64; 3] = [0.6, 0.1, -0.2];
+
+/// Turn, slide, turn about oblique axes; heavy links, rotors, a tip frame on the last link.
+fn robot() -> Mechanism {
+    let mut robot = Mechanism::new("robot");
+    robot.gravity = vector![1.5, -2.0, -9.0];
+    let I = |mass: f64, com: Vector3<f64>| LinkInertia { mass, com, inertia_com: Matrix3::identity() * 0.1 * mass };
+    for (name, inertia) in [
+        ("base", None),
+        ("column", Some(I(20.0, vector![0.1, 0.0, 0.3]))),
+        ("carriage", Some(I(8.0, vector![0.1, 0.2, 0.0]))),
+        ("arm", Some(I(5.0, vector![0.3, 0.0, 0.1]))),
+        ("tip", None),
+    ] {
+        robot.links.push(Link { name: name.into(), inertia });
+    }
+    let oblique = UnitVector3::new_normalize(vector![0.3, 0.9, -0.2]);
+    let at = |x: f64, y: f64, z: f64, r: f64| {
+        Pose::from_parts(nalgebra::Translation3::new(x, y, z), Rotation3::from_euler_angles(r, 0.5 * r, -r))
+    };
+    for (name, kind, parent, child, X) in [
+        ("slew", JointKind::Continuous(Vector3::z_axis()), "base", "column", at(0.0, 0.1, 0.2, 0.3)),
+        ("slide", JointKind::Prismatic(Vector3::y_axis()), "column", "carriage", at(0.1, 0.0, 0.6, -0.2)),
+        ("elbow", JointKind::Revolute(oblique), "carriage", "arm", at(0.3, 0.0, 0.0, 0.6)),
+        ("flange", JointKind::Fixed, "arm", "tip", Pose::translation(TIP[0], TIP[1], TIP[2])),
+    ] {
+        robot.joints.push(Joint::new(name, kind, parent, child, X));
+    }
+    for (joint, armature) in robot.joints.iter_mut().zip([2.0, 30.0, 0.5]) {
+        joint.armature = armature;
+    }
+    robot
+}
+
+fn gearbox(joint: &str, stiffness: GearStiffness) -> Gearbox {
+    Gearbox { joint: joint.into(), stiffness }
+}
+
+/// A symmetric positive definite 6x6 with every coupling.
+fn full() -> Matrix6<f64> {
+    let A = Matrix6::from_fn(|i, j| if i == j { 2.0 } else { 0.3 / (1.0 + (i + 2 * j) as f64) });
+    (A * A.transpose()) * 1e5
+}
+
+/// Truth: the rigid robot, rotors included. Measured: no difference in mass matrix and torques.
+#[test]
+fn undeflected_gearboxes_change_nothing() {
+    let rigid = robot();
+    let mut soft = robot();
+    let gearboxes = [
+        gearbox("slew", GearStiffness::Tilting([4e5, 3e5, 1e5])),
+        gearbox("slide", GearStiffness::Axis(1e6)),
+        gearbox("elbow", GearStiffness::Full(full())),
+    ];
+    let springs = insert_gearboxes(&mut soft, &gearboxes).expect("fits");
+    let names: Vec<&str> = springs.iter().map(|s| s.name.as_str()).collect();
+    assert_eq!(names, ["slew.x", "slew.y", "slew.z", "slide", "elbow"]);
+    let (rigid, soft) = (Model::new(&rigid).expect("a tree"), Model::new(&soft).expect("a tree"));
+    assert_eq!((rigid.nv(), soft.n_actuated(), soft.nv()), (3, 3, 3 + 3 + 1 + 6));
+    assert_eq!(rigid.moving_mass(), soft.moving_mass());
+    let pad = |x: [f64; 3]| DVector::from_fn(soft.nv(), |k, _| if k < 3 { x[k] } else { 0.0 });
+    let (q, v, a) = ([0.7, 0.3, -0.4], [1.1, -2.0, 0.6], [3.0, 1.0, -2.0]);
+    let (mut d1, mut d2) = (Data::new(&rigid), Data::new(&soft));
+    let (mut s1, mut s2) = (State::zeros(&rigid), State::zeros(&soft));
+    (s1.q, s1.qdot) = (DVector::from_row_slice(&q), DVector::from_row_slice(&v));
+    (s2.q, s2.qdot) = (pad(q), pad(v));
+    let M = mass_matrix(&rigid, &mut d1, &s1.q).clone();
+    let M_soft = mass_matrix(&soft, &mut d2, &s2.q).view((0, 0), (3, 3)).clone_owned();
+    let error = (&M - M_soft).amax() / M.amax();
+    eprintln!("mass matrix {error:.1e}");
+    assert!(error < 1e-12, "{error:e}");
+    let tau = inverse_dynamics(&rigid, &mut d1, &s1, &DVector::from_row_slice(&a)).clone();
+    let tau_soft = inverse_dynamics(&soft, &mut d2, &s2, &pad(a)).rows(0, 3).clone_owned();
+    let error = (&tau - tau_soft).amax() / tau.amax();
+    eprintln!("torques {error:.1e}");
+    assert!(error < 1e-12, "{error:e}");
+    world_poses(&rigid, &mut d1);
+    world_poses(&soft, &mut d2);
+    for frame in rigid.frames() {
+        let twin = soft.frame(&frame.name).expect("there");
+        assert!((d1.X_WF(frame).to_homogeneous() - d2.X_WF(twin).to_homogeneous()).amax() < 1e-14, "{}", frame.name);
+    }
+}
+
+/// The rotor sits before the spring: the mass matrix has it on the motor's row only. Truth: the armature itself.
+#[test]
+fn rotor_stays_on_the_motor_side_of_the_spring() {
+    let model = |armature: f64| {
+        let mut soft = robot();
+        soft.joints[0].armature = armature;
+        insert_gearboxes(&mut soft, &[gearbox("slew", GearStiffness::Axis(1e5))]).expect("fits");
+        let model = Model::new(&soft).expect("a tree");
+        mass_matrix(&model, &mut Data::new(&model), &DVector::from_element(4, 0.2)).clone()
+    };
+    let rotor = model(7.0) - model(0.0);
+    let mut truth = DMatrix::zeros(4, 4);
+    truth[(0, 0)] = 7.0;
+    assert!((rotor - truth).amax() < 1e-12);
+}
+
+/// Compliance of the tip at `q`, by the springs behind one gearbox.
+fn tip_compliance(mechanism: &Mechanism, springs: &[GearSpring], q: [f64; 3]) -> (Matrix6<f64>, Pose, Pose) {
+    let model = Model::new(mechanism).expect("a tree");
+    let (mut data, mut full) = (Data::new(&model), DVector::zeros(model.nv()));
+    full.rows_mut(0, 3).copy_from_slice(&q);
+    forward_kinematics(&model, &mut data, &full);
+    let mut J = Matrix6xX::zeros(model.nv());
+    let tip = model.frame("tip").expect("there");
+    frame_jacobian(&model, &data, tip, &mut J);
+    let mut C = Matrix6::zeros();
+    let mut column = 3;
+    for spring in springs {
+        let n = spring.K.nrows();
+        let J_e = DMatrix::from_column_slice(6, n, J.columns(column, n).as_slice());
+        let part = &J_e * spring.K.clone().try_inverse().expect("stiff") * J_e.transpose();
+        C += Matrix6::from_column_slice(part.as_slice());
+        column += n;
+    }
+    let motor = model.frame(&format!("{}__motor", springs[0].gearbox)).expect("there");
+    (C, data.X_WF(tip), data.X_WF(motor))
+}
+
+/// Truth: `Σ u uᵀ/k` with `u = [axis × lever; axis]` for each spring, `A K⁻¹ Aᵀ` for the full one, axes of the turned
+/// joint frame; measured 3e-16 relative.
+#[test]
+fn tip_gives_way_by_lever_and_axis() {
+    let q = [0.7, 0.3, -0.4];
+    let k = [4e5, 3e5, 1e5];
+    for (joint, stiffness) in [
+        ("elbow", GearStiffness::Axis(k[2])),
+        ("slide", GearStiffness::Axis(2e6)),
+        ("elbow", GearStiffness::Tilting(k)),
+        ("elbow", GearStiffness::Full(full())),
+        ("slide", GearStiffness::Full(full())),
+    ] {
+        let mut soft = robot();
+        let springs = insert_gearboxes(&mut soft, &[gearbox(joint, stiffness.clone())]).expect("fits");
+        let (C, X_WT, X_WJ) = tip_compliance(&soft, &springs, q);
+        let lever = X_WT.translation.vector - X_WJ.translation.vector;
+        let turn = |axis: Vector3<f64>| {
+            let (axis, mut u) = (X_WJ.rotation * axis, nalgebra::Vector6::zeros());
+            u.fixed_rows_mut::<3>(0).copy_from(&axis.cross(&lever));
+            u.fixed_rows_mut::<3>(3).copy_from(&axis);
+            u
+        };
+        let shift = |axis: Vector3<f64>| {
+            let (axis, mut u) = (X_WJ.rotation * axis, nalgebra::Vector6::zeros());
+            u.fixed_rows_mut::<3>(0).copy_from(&axis);
+            u
+        };
+        let e = |a: usize| Vector3::ith(a, 1.0);
+        let kind = robot().joint(joint).expect("there").kind;
+        let truth = match (&stiffness, kind) {
+            (GearStiffness::Axis(k), JointKind::Revolute(axis)) => turn(*axis) * turn(*axis).transpose() / *k,
+            (GearStiffness::Axis(k), JointKind::Prismatic(axis)) => shift(*axis) * shift(*axis).transpose() / *k,
+            (GearStiffness::Tilting(k), _) => (0..3).map(|a| turn(e(a)) * turn(e(a)).transpose() / k[a]).sum(),
+            (GearStiffness::Full(K), _) => {
+                let A =
+                    Matrix6::from_columns(&[shift(e(0)), shift(e(1)), shift(e(2)), turn(e(0)), turn(e(1)), turn(e(2))]);
+                A * K.try_inverse().expect("stiff") * A.transpose()
+            }
+            _ => unreachable!("no such case"),
+        };
+        let error = (C - truth).amax() / truth.amax();
+        eprintln!("{joint} {stiffness:?}: {error:.1e}");
+        assert!(error < 1e-12, "{joint} {stiffness:?}: {error:e}");
+    }
+}
+
+/// Every wrong gearbox is refused by name, and the mechanism stays as it was.
+#[test]
+fn gearboxes_that_hold_nothing_or_sit_nowhere_are_refused() {
+    let refuse = |joint: &str, stiffness: GearStiffness| {
+        let mut mechanism = robot();
+        mechanism.joints[2].mimic = Some(Mimic { joint: "slew".into(), ratio: 2.0, offset: 0.0 });
+        let before = mechanism.clone();
+        let error = insert_gearboxes(&mut mechanism, &[gearbox(joint, stiffness)]).expect_err("refused");
+        assert!(error.to_string().contains(joint), "{error}");
+        assert_eq!(mechanism, before, "{error}");
+        error
+    };
+    for k in [-1.0, 0.0, f64::NAN, f64::INFINITY] {
+        assert!(matches!(refuse("slew", GearStiffness::Axis(k)), GearboxError::NotPositive { .. }), "{k}");
+        assert!(
+            matches!(refuse("slew", GearStiffness::Tilting([1e5, k, 1e5])), GearboxError::NotPositive { .. }),
+            "{k}"
+        );
+    }
+    let mut indefinite = full();
+    indefinite[(0, 3)] = 1e7;
+    indefinite[(3, 0)] = 1e7;
+    assert!(matches!(refuse("slew", GearStiffness::Full(indefinite)), GearboxError::NotPositive { .. }));
+    let mut lopsided = full();
+    lopsided[(0, 3)] += 1e4;
+    assert!(refuse("slew", GearStiffness::Full(lopsided)).to_string().contains("symmetric"));
+    let mut hole = full();
+    hole[(2, 2)] = f64::NAN;
+    refuse("slew", GearStiffness::Full(hole));
+    assert!(matches!(refuse("wrist", GearStiffness::Axis(1e5)), GearboxError::NoJoint { .. }));
+    assert!(matches!(refuse("flange", GearStiffness::Axis(1e5)), GearboxError::NoJoint { .. }));
+    assert!(matches!(refuse("elbow", GearStiffness::Axis(1e5)), GearboxError::Mimic { .. }));
+    assert!(matches!(refuse("slide", GearStiffness::Tilting([1e5; 3])), GearboxError::Slides { .. }));
+}
