@@ -27,6 +27,9 @@ pub(crate) const ROTATION_LIMIT: f64 = 0.05;
 /// Largest engineering strain of a flexible link before a warning.
 pub(crate) const STRAIN_LIMIT: f64 = 1e-3;
 
+/// Largest gap in the energy balance before a warning.
+const IMBALANCE_LIMIT: f64 = 0.02;
+
 /// Called with simulated and total time; breaking off stops the run with readable files.
 pub type Progress<'a> = dyn FnMut(f64, f64) -> ControlFlow<()> + 'a;
 
@@ -218,11 +221,13 @@ impl<'a> Run<'a> {
         self.stepper.observe(&mut self.seen);
         let t = self.seen.t;
         // The twin carries what the arm carries.
+        let mut changed = false;
         while let Some(change) = self.arm.inertia_changes.first()
             && change.t <= t + 1e-9
         {
             let change = self.arm.inertia_changes.remove(0);
             self.arm.model = Arc::new(self.arm.model.with_inertia(change.body, change.inertia));
+            changed = true;
         }
         self.twin.update(&self.arm, &self.tcp, t);
         let X_rigid = self.twin.data.X_WF(&self.tcp);
@@ -240,7 +245,7 @@ impl<'a> Run<'a> {
             *peak = peak.max(drive.abs());
         }
 
-        self.look_at_elements(t);
+        self.look_at_elements(t, changed);
         let sample = &mut self.sample;
         sample.time_s = t;
         sample.step = step;
@@ -279,7 +284,7 @@ impl<'a> Run<'a> {
     }
 
     /// Deflections and loads of the elements, what they do to the tool, how far the links are strained.
-    fn look_at_elements(&mut self, t: f64) {
+    fn look_at_elements(&mut self, t: f64, payload_changed: bool) {
         let columns = self.flexible.spans.len();
         let mut moved = vec![Vector6::zeros(); columns + self.give.len()];
         self.sample.elastic.resize(self.arm.elements.len(), ElasticSample::default());
@@ -319,7 +324,7 @@ impl<'a> Run<'a> {
             self.strains[k] = self.strains[k].max(strain);
             self.rotations[k] = self.rotations[k].max(rotation_vector(turn.matrix()).norm());
         }
-        self.energy.add(t, self.seen.energy, self.seen.power);
+        self.energy.add(t, self.seen.energy, self.seen.power, payload_changed);
     }
 
     /// Figures of what was seen so far.
@@ -426,6 +431,24 @@ impl<'a> Run<'a> {
                 ));
             }
         }
+        let imbalance = self.energy.figures().imbalance;
+        if imbalance > IMBALANCE_LIMIT {
+            warnings.push(format!(
+                "the energy balance is open by {:.1} % of the energy in it: the samples are too far apart (--log-rate), the \
+                 step too coarse (--step), or the stepper damps by itself",
+                100.0 * imbalance
+            ));
+        }
+        if let Some(servo) = &self.arm.servo {
+            for axis in &servo.axes {
+                let name = &self.arm.model.coordinates()[axis.coordinate].joint;
+                if self.peak_drive[axis.coordinate] >= axis.limit {
+                    let limit = axis.limit;
+                    warnings
+                        .push(format!("the servo of joint {name:?} reached its torque limit of {limit:.0} N m (or N)"));
+                }
+            }
+        }
         for (c, peak) in self.arm.model.coordinates().iter().zip(&self.peak_drive) {
             if *peak > c.limits.effort {
                 warnings.push(format!(
@@ -490,22 +513,32 @@ struct EnergyBook {
     before: Option<(f64, [f64; 3])>,
     /// Drives, loads, dissipation (J).
     work: [f64; 3],
+    /// What payloads brought and took away (J).
+    payload: f64,
     /// Largest gap between what is stored and what was supplied, and largest change of what is stored (J).
     gap: f64,
     swing: f64,
 }
 
 impl EnergyBook {
-    fn add(&mut self, t: f64, energy: [f64; 3], power: [f64; 3]) {
+    /// With a payload picked or dropped since the last sample, what the balance lacks came or went with it.
+    fn add(&mut self, t: f64, energy: [f64; 3], power: [f64; 3], payload_changed: bool) {
+        let before = self.last;
+        let mut supplied = 0.0;
         if let Some((t_before, p)) = self.before {
             for c in 0..3 {
-                self.work[c] += 0.5 * (t - t_before) * (p[c] + power[c]);
+                let work = 0.5 * (t - t_before) * (p[c] + power[c]);
+                self.work[c] += work;
+                supplied += if c < 2 { work } else { -work };
             }
         }
-        self.before = Some((t, power));
         self.last = energy.iter().sum();
+        if payload_changed && self.before.is_some() {
+            self.payload += self.last - before - supplied;
+        }
+        self.before = Some((t, power));
         let first = *self.first.get_or_insert(self.last);
-        let supplied = self.work[0] + self.work[1] - self.work[2];
+        let supplied = self.work[0] + self.work[1] - self.work[2] + self.payload;
         self.gap = self.gap.max((self.last - first - supplied).abs());
         self.swing = self.swing.max((self.last - first).abs()).max(self.work[0].abs());
     }
@@ -515,6 +548,7 @@ impl EnergyBook {
             drives_j: self.work[0],
             loads_j: self.work[1],
             dissipated_j: self.work[2],
+            payload_j: self.payload,
             stored_j: self.last - self.first.unwrap_or(self.last),
             imbalance: if self.swing > 0.0 { self.gap / self.swing } else { 0.0 },
         }

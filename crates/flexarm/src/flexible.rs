@@ -19,6 +19,9 @@ use crate::robot::Robot;
 
 /// Default gain of the position loop (1/s), bandwidth of the speed loop (1/s), integral over speed gain (1/s), sample (s).
 const SERVO: [f64; 4] = [20.0, 100.0, 20.0, 1e-3];
+/// Most of the quick inertia over the sampling time that a default velocity gain takes: 2 is where a sampled speed loop
+/// becomes unstable.
+const QUICK_GAIN: f64 = 0.4;
 /// Fixed-interface modes of a beam link that does not say how many.
 const BEAM_MODES: usize = 6;
 
@@ -205,19 +208,37 @@ impl FlexibleRobot {
         arm.motion.sample(0.0, q.as_mut_slice(), v.as_mut_slice(), a.as_mut_slice());
         let M = mass_matrix(&self.rigid, &mut Data::new(&self.rigid), &q).clone();
         let [position, bandwidth, integral, sample] = SERVO;
-        let axes = self.torque.iter().map(|&(coordinate, servo, limit)| {
-            let velocity_gain = servo.velocity_gain.unwrap_or(bandwidth * M[(coordinate, coordinate)]);
+        let sample_s = self.torque.iter().find_map(|(_, servo, _)| servo.sample_s).unwrap_or(sample);
+        let quick = self.quick_inertia(&q);
+        let axes = self.torque.iter().zip(&quick).map(|(&(coordinate, servo, limit), quick)| {
+            // Between samples a motor feels only what follows it at once: the springs give way first.
+            let most = QUICK_GAIN * quick / sample_s;
+            let inertia = M[(coordinate, coordinate)];
+            let velocity_gain = servo.velocity_gain.unwrap_or((bandwidth * inertia).min(most));
+            // The outer loops must be slower than the speed loop within them.
+            let slower = 0.25 * velocity_gain / inertia;
+            let inner = |gain: f64| if servo.velocity_gain.is_none() { gain.min(slower) } else { gain };
             ServoAxis {
                 coordinate,
-                position_gain: servo.position_gain.unwrap_or(position),
+                position_gain: servo.position_gain.unwrap_or(inner(position)),
                 velocity_gain,
-                integral_gain: servo.integral_gain.unwrap_or(integral * velocity_gain),
+                integral_gain: servo.integral_gain.unwrap_or(inner(integral) * velocity_gain),
                 feed_forward: servo.feed_forward.unwrap_or(true),
                 limit,
             }
         });
-        let sample_s = self.torque.iter().find_map(|(_, servo, _)| servo.sample_s).unwrap_or(sample);
         arm.with_servo(Servo { sample_s, axes: axes.collect(), rigid: self.rigid.clone() })
+    }
+
+    /// Inertia that each torque-driven joint feels at once, all other free coordinates yielding: `1 / (M_ff^-1)_ii`.
+    fn quick_inertia(&self, actuated: &DVector<f64>) -> Vec<f64> {
+        let (model, n) = (&self.model, self.model.n_actuated());
+        let mut q = DVector::zeros(model.nv());
+        q.rows_mut(0, n).copy_from(actuated);
+        let M = mass_matrix(model, &mut Data::new(model), &q).clone();
+        let free: Vec<usize> = self.torque.iter().map(|t| t.0).chain(n..model.nv()).collect();
+        let inverse = M.select_rows(&free).select_columns(&free).cholesky().map(|c| c.inverse());
+        (0..self.torque.len()).map(|i| inverse.as_ref().map_or(0.0, |inverse| 1.0 / inverse[(i, i)])).collect()
     }
 
     /// Whether some joint is driven by torque.

@@ -67,6 +67,26 @@ pub fn rows(summary: &Summary) -> Vec<(String, String)> {
         );
         rows.push((format!("link {}", link.name), text));
     }
+    for drive in &summary.elastic_drives {
+        let text = format!(
+            "{} of TCP motion, gives way by {}",
+            mm(drive.peak_contribution_m),
+            mrad(drive.peak_deflection_rad)
+        );
+        rows.push((format!("drive {}", drive.joint), text));
+    }
+    let e = &summary.energy;
+    if e.drives_j != 0.0 || e.loads_j != 0.0 {
+        let mut loads = if e.loads_j == 0.0 { String::new() } else { format!(", by loads {:.3} J", e.loads_j) };
+        if e.payload_j != 0.0 {
+            loads += &format!(", with payloads {:.3} J", e.payload_j);
+        }
+        let text = format!(
+            "by drives {:.3} J{loads}, dissipated {:.3} J, stored {:.3} J; balance open by {:.1e}",
+            e.drives_j, e.dissipated_j, e.stored_j, e.imbalance
+        );
+        rows.push(("energy".into(), text));
+    }
     if !summary.frequencies_hz.is_empty() {
         let first: Vec<String> = summary.frequencies_hz.iter().take(4).map(|f| format!("{f:.2}")).collect();
         rows.push(("first frequencies".into(), format!("{} Hz", first.join(", "))));

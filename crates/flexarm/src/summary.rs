@@ -156,6 +156,8 @@ pub struct EnergyFigures {
     pub loads_j: f64,
     /// Taken away by dampers and friction (J).
     pub dissipated_j: f64,
+    /// Came with payloads that were picked, went with those that were dropped (J).
+    pub payload_j: f64,
     /// Gain of kinetic, gravitational and elastic energy (J).
     pub stored_j: f64,
     /// Largest gap in the balance over the largest energy in it.
