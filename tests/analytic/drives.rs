@@ -1,4 +1,5 @@
 //! Robots with published joint stiffness: elastic gearboxes by file, against other tools and closed forms.
+#![allow(non_snake_case, reason = "C: compliance")]
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 
 use std::path::{Path, PathBuf};

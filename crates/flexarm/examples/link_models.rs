@@ -57,11 +57,12 @@ fn main() {
     let rigid = arm(&robot, &Modelling { links: LinkModel::Rigid, ..Modelling::default() });
     let (reference_path, _) = run(&rigid, StepperKind::Rk4, duration);
     let modal = |modes| Modelling { links: LinkModel::Modal, modes: Some(modes), ..Modelling::default() };
+    let modal_all = Modelling { links: LinkModel::Modal, ..Modelling::default() };
     let lumped = |n| Modelling { links: LinkModel::Lumped, segments: Some(n), ..Modelling::default() };
     let stiffened = |robot: &mut Robot, on: bool| robot.flexible.iter_mut().for_each(|l| l.choices.geometric = on);
     let beams = robot.flexible.iter().all(|l| l.beam.is_some());
     stiffened(&mut robot, beams);
-    let (truth, _) = run(&arm(&robot, &modal(if beams { 20 } else { 12 })), reference(), duration);
+    let (truth, _) = run(&arm(&robot, &if beams { modal(20) } else { modal_all }), reference(), duration);
     let peak = truth.iter().zip(&reference_path).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
     println!("{}: peak deflection {:.6} mm over {duration} s; step {STEP} s", robot.name, 1e3 * peak);
     println!(
