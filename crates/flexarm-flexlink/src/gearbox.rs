@@ -12,6 +12,7 @@ use nalgebra::{DMatrix, Matrix6, Unit, Vector3};
 
 /// Stiffness of a gearbox on the joint's side.
 #[derive(Clone, Debug, PartialEq)]
+#[allow(clippy::large_enum_variant, reason = "a handful per robot, made once")]
 pub enum GearStiffness {
     /// About (or along) the joint's axis (N m/rad or N/m).
     Axis(f64),

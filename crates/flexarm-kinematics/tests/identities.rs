@@ -24,7 +24,7 @@ struct Case {
 }
 
 fn case(seed: u64, n_joints: usize) -> Case {
-    let tree = if seed % 2 == 0 { random_tree(seed, n_joints) } else { random_flexible_tree(seed, n_joints) };
+    let tree = if seed.is_multiple_of(2) { random_tree(seed, n_joints) } else { random_flexible_tree(seed, n_joints) };
     let model = Model::new(&tree).expect("random trees are valid");
     let mut draw = Draw(seed ^ 0xABCD);
     let state = random_state(&model, &mut draw);
