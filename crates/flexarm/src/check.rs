@@ -4,6 +4,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
+use crate::drive_entry::DriveKind;
 use crate::error::Error;
 use crate::motion::Motion;
 use crate::options::LinkModel;
@@ -102,13 +103,14 @@ fn load_findings(error: &Error, path: &Path, findings: &mut Vec<Finding>) {
 }
 
 fn check_flexible(robot: &Robot, findings: &mut Vec<Finding>) {
-    if robot.flexible.is_empty() {
+    let gives_way = robot.drives.iter().any(|d| d.kind != DriveKind::Prescribed);
+    if robot.flexible.is_empty() && !gives_way {
         findings.push(Finding {
             severity: "note",
             code: "no-flexible-link".into(),
             location: robot.path.display().to_string(),
-            message: "no link is flexible: compare will find no deflection".into(),
-            help: "add [[flexible_link]] entries to a robot.toml".into(),
+            message: "no link is flexible and no drive gives way: compare will find no deflection".into(),
+            help: "add [[flexible_link]] or [[drive]] entries to a robot.toml".into(),
         });
         return;
     }
