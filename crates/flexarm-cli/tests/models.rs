@@ -268,6 +268,37 @@ mod bad_robot_files {
     }
 }
 
+mod contradictions {
+    use super::*;
+
+    /// What no link takes up is refused and not passed over.
+    #[test]
+    fn segments_and_modes_need_links_of_their_kind() {
+        let place = Place::new();
+        place.write("robot.toml", slender());
+        let refused = |extra: &[&str], words: &[&str]| place.refused(&[&RUN[..], extra].concat(), words);
+        refused(&["--links", "rigid", "--segments", "3"], &["3 segments", "no link", "--links lumped"]);
+        refused(&["--links", "modal", "--segments", "3"], &["3 segments", "no link", "--links lumped"]);
+        refused(&["--modes", "3"], &["3 modes", "no link", "--links modal"]);
+        refused(&["--links", "lumped", "--modes", "3"], &["3 modes", "no link", "--links modal"]);
+    }
+
+    /// Truth: behind the play a straight spring carries what the drive holds; energy is that of the straight part.
+    #[test]
+    fn statics_tell_the_load_behind_a_play() {
+        let place = Place::new();
+        let gear = "kind = \"gearbox\"\ngearbox = { stiffness = 1e4, damping = 5.0, backlash = 1e-3 }";
+        place.write("robot.toml", driven(gear));
+        let run = ["statics", "robot.toml", "--links", "rigid", "--wrench", "0,10,0"];
+        let found = place.json(&run);
+        let element = &found["elements"][0];
+        let (load, holding) = (numbers(&element["load"])[0], numbers(&found["holding_torque"])[0]);
+        near(load, -holding, 1e-9, "load");
+        near(element["energy_j"].as_f64().unwrap(), 0.5 * load * load / 1e4, 1e-9, "energy");
+        near(numbers(&element["deflection"])[0].abs(), 1e-3 + load.abs() / 1e4, 1e-9, "deflection");
+    }
+}
+
 mod bad_loads_files {
     use super::*;
 
@@ -299,11 +330,44 @@ mod bad_loads_files {
         refused(&load("kind = \"sweep\"\nfrom = 1.0"), "kind", &["\"sweep\" needs to"]);
         refused(&load("kind = \"milling\"\nspindle_rpm = 6000.0"), "kind", &["\"milling\" needs teeth"]);
         refused(&load("kind = \"milling\"\nteeth = 4"), "kind", &["\"milling\" needs spindle_rpm"]);
+        refused(&load("kind = \"milling\"\nteeth = 0\nspindle_rpm = 6000.0"), at, &["teeth = 0", "cutting edges"]);
+        refused(&load("kind = \"step\"\nfrequency = 3.0"), at, &["\"step\" takes no frequency", "sine"]);
+        refused(&load("kind = \"expression\"\nfx = \"1\"\nforce = [1.0, 0.0, 0.0]"), at, &["takes no force"]);
         refused(&load("kind = \"table\""), "kind", &["\"table\" needs file"]);
         refused(&load("kind = \"expression\""), "kind", &["needs some of fx"]);
         refused(&load("kind = \"expression\"\nfx = \"2*(t\""), "fx", &["2*(t"]);
         refused(&load("kind = \"expression\"\nfx = \"2*x\""), "fx", &["\"x\"", "only t"]);
         refused(&load("kind = \"expression\"\nfx = \"1/0\""), "fx", &["no finite number"]);
+        refused(&load("kind = \"expression\"\nfx = \"ln(t)\""), "fx", &["no finite number at t = 0 s"]);
+    }
+
+    /// Loads that come to nothing, or that the steps do not see, are told of.
+    #[test]
+    fn doubts() {
+        let place = Place::new();
+        let warned = |text: &str, words: &[&str]| {
+            place.write("loads.toml", format!("format = 1\n{text}\n"));
+            let summary = place.json(&[&RUN[..], &["--loads", "loads.toml"]].concat());
+            let warnings = summary["warnings"].to_string();
+            assert!(words.iter().all(|w| warnings.contains(w)), "{text}: {warnings}");
+        };
+        warned("[[load]]\nkind = \"step\"\nstart = 99.0\nforce = [1.0, 0.0, 0.0]", &["99 s", "does nothing"]);
+        warned("[[payload]]\nat = 99.0\nmass = 1.0", &["99 s", "stays as it is"]);
+        let pulse = "[[load]]\nkind = \"impulse\"\nstart = 0.1\nduration = 0.001\nforce = [1.0, 0.0, 0.0]";
+        warned(pulse, &["1.0 steps", "lower --step"]);
+        let sine = "[[load]]\nkind = \"sine\"\nfrequency = 500.0\nforce = [1.0, 0.0, 0.0]";
+        warned(sine, &["500.0 Hz", "2.0 steps per period"]);
+        // An expression is looked at where it acts.
+        warned("[[load]]\nkind = \"expression\"\nstart = 0.6\nfx = \"sqrt(t-0.6)\"", &[]);
+    }
+
+    /// Truth: what is stored is what was supplied, the energy that leaves with a payload included.
+    #[test]
+    fn a_payload_that_is_dropped_takes_its_energy_along() {
+        let place = Place::new();
+        place.write("loads.toml", "format = 1\n[[payload]]\nat = 0.5\nmass = 2.0\n[[payload]]\nat = 1.0\nmass = 0.0\n");
+        let summary = place.json(&[&RUN[..], &["--loads", "loads.toml", "--log-rate", "1000"]].concat());
+        assert!(summary["energy"]["imbalance"].as_f64().unwrap() < 1e-2, "{}", summary["energy"]);
     }
 
     #[test]

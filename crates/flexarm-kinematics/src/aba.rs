@@ -49,8 +49,8 @@ impl Roles {
             dense: false,
         };
         for (i, body) in model.bodies.iter().enumerate().skip(1) {
-            // An interface has no coordinate of its own.
-            let own = !matches!(body.motion, JointMotion::Interface { .. });
+            // Interfaces and welds have no coordinate of their own.
+            let own = !matches!(body.motion, JointMotion::Interface { .. } | JointMotion::Welded);
             roles.prescribed_body[i] = own && prescribed(body.coordinate);
         }
         let actuated = (0..model.n_actuated()).map(|k| (k, 1));
@@ -151,7 +151,7 @@ fn solve_articulated(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], ro
         }
         let (pA, c) = (data.pA[i], data.bias[i]);
         let (passed_inertia, passed_force) = match body.motion {
-            _ if prescribed[i] => {
+            _ if prescribed[i] || body.motion == JointMotion::Welded => {
                 let I = data.articulated[i];
                 (Some(I), pA + I.mul_twist(&c))
             }
@@ -174,7 +174,7 @@ fn solve_articulated(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], ro
                 let u = data.tau[body.coordinate] * body.ratio - axis.dot(&pA.force);
                 one_dof_inward(data, i, U, d, u, &c, pA)
             }
-            JointMotion::Interface { .. } => continue,
+            JointMotion::Interface { .. } | JointMotion::Welded => continue,
         };
         if body.parent > 0 {
             let X_PB = data.X_PB[i];
@@ -205,11 +205,12 @@ fn solve_articulated(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], ro
         let A = data.A[body.parent].at_child(&data.X_PB[i]) + data.bias[i];
         data.A[i] = match body.motion {
             JointMotion::Interface { .. } => A + subspace_times(model, data, i, data.qddot.as_slice()),
+            JointMotion::Welded => A,
             _ if is_prescribed => {
                 let F = data.articulated[i].mul_twist(&A) + data.pA[i];
                 let S = data.elastic[i];
                 add_projection(model, &S, i, &F, data.tau.as_mut_slice());
-                data.tau[k] += body.armature * data.qddot[k];
+                data.tau[k] += body.ratio * body.ratio * body.armature * data.qddot[k];
                 A
             }
             JointMotion::Revolute(axis) => {

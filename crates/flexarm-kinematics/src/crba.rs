@@ -54,6 +54,7 @@ pub fn mass_matrix_at_poses(model: &Model, data: &mut Data) {
                 data.M.as_mut_slice()[k * nv + k] += a.dot(&F.force) + body.ratio * body.ratio * body.armature;
                 data.U[i] = F;
             }
+            JointMotion::Welded => {}
             JointMotion::Elastic(_) => elastic_columns(model, data, i, &composite),
             JointMotion::Interface { modal, interface } => {
                 interface_columns(model, data, i, modal, interface, &composite)
@@ -84,7 +85,7 @@ fn carry_columns(model: &Model, data: &mut Data, i: usize) {
     let M = data.M.as_mut_slice();
     let outward = i..model.bodies[i].subtree_end;
     for (F, body) in data.U[outward.clone()].iter_mut().zip(&model.bodies[outward]) {
-        if matches!(body.motion, JointMotion::Elastic(_) | JointMotion::Interface { .. }) {
+        if !matches!(body.motion, JointMotion::Revolute(_) | JointMotion::Prismatic(_)) {
             continue;
         }
         *F = F.at_parent(&X_PB);
@@ -97,6 +98,7 @@ fn carry_columns(model: &Model, data: &mut Data, i: usize) {
                 let (f, t) = (tr_mul(&S.L, &F.force), tr_mul(&S.B, &F.torque));
                 add_six(M, nv, row, column, [f.x, f.y, f.z, t.x, t.y, t.z]);
             }
+            JointMotion::Welded => {}
             JointMotion::Interface { .. } => meet(model, &data.elastic, M, nv, parent, column, F),
         }
     }
@@ -118,6 +120,7 @@ fn meet(model: &Model, elastic: &[ElasticSubspace], M: &mut [f64], nv: usize, j:
     match body.motion {
         JointMotion::Revolute(axis) => add_pair(M, nv, row, column, body.ratio * axis.dot(&F.torque)),
         JointMotion::Prismatic(axis) => add_pair(M, nv, row, column, body.ratio * axis.dot(&F.force)),
+        JointMotion::Welded => {}
         JointMotion::Elastic(_) => {
             let S = &elastic[j];
             let (f, t) = (tr_mul(&S.L, &F.force), tr_mul(&S.B, &F.torque));
@@ -234,6 +237,7 @@ fn elastic_columns(model: &Model, data: &mut Data, i: usize, composite: &Spatial
                 let (t, q) = (tr_mul(U, &a) * mass, tr_mul(&force_r, &a));
                 add_six(M, nv, k, row, [t.x, t.y, t.z, q.x, q.y, q.z]);
             }
+            JointMotion::Welded => {}
             JointMotion::Elastic(_) => {
                 let S = &data.elastic[j];
                 let (L, B) = (tr_mul3(&R_AP, &S.L), tr_mul3(&R_AP, &S.B));

@@ -129,6 +129,10 @@ pub(crate) fn joint_motion(model: &Model, data: &mut Data, i: usize, q: &[f64], 
             joint_position(model, data, i, q);
             (Twist::new(axis * (body.ratio * qdot[k]), Vector3::zeros()), Twist::zeros())
         }
+        JointMotion::Welded => {
+            data.X_PB[i] = body.X_PJ;
+            (Twist::zeros(), Twist::zeros())
+        }
         JointMotion::Elastic(angles) => {
             let (q, qdot) = (&q[k..k + 6], &qdot[k..k + 6]);
             let ddot = Vector3::new(qdot[0], qdot[1], qdot[2]);
@@ -175,6 +179,7 @@ pub(crate) fn joint_position(model: &Model, data: &mut Data, i: usize, q: &[f64]
             X.translation.vector =
                 body.X_PJ.translation.vector + body.X_PJ.rotation * (axis * (body.ratio * q[k] + body.offset));
         }
+        JointMotion::Welded => data.X_PB[i] = body.X_PJ,
         JointMotion::Elastic(angles) => {
             let (R, B) = angles.pose(&Vector3::new(q[k + 3], q[k + 4], q[k + 5]));
             place_elastic(&mut data.X_PB[i], &body.X_PJ, &R, &Vector3::new(q[k], q[k + 1], q[k + 2]));
@@ -218,6 +223,7 @@ pub(crate) fn subspace_times(model: &Model, data: &Data, i: usize, qddot: &[f64]
     match body.motion {
         JointMotion::Revolute(axis) => Twist::new(Vector3::zeros(), axis * (body.ratio * qddot[k])),
         JointMotion::Prismatic(axis) => Twist::new(axis * (body.ratio * qddot[k]), Vector3::zeros()),
+        JointMotion::Welded => Twist::zeros(),
         JointMotion::Elastic(_) => {
             let S = &data.elastic[i];
             Twist::new(
@@ -241,6 +247,7 @@ pub(crate) fn add_projection(model: &Model, data_elastic: &ElasticSubspace, i: u
     match body.motion {
         JointMotion::Revolute(axis) => tau[k] += body.ratio * axis.dot(&F.torque),
         JointMotion::Prismatic(axis) => tau[k] += body.ratio * axis.dot(&F.force),
+        JointMotion::Welded => {}
         JointMotion::Elastic(_) => {
             let f = tr_mul(&data_elastic.L, &F.force);
             let t = tr_mul(&data_elastic.B, &F.torque);

@@ -77,6 +77,7 @@ pub fn frame_jacobian(model: &Model, data: &Data, frame: &Frame, J: &mut Matrix6
         match body.motion {
             JointMotion::Revolute(axis) => add(body.coordinate, Vector3::zeros(), R * axis * body.ratio),
             JointMotion::Prismatic(axis) => add(body.coordinate, R * axis * body.ratio, Vector3::zeros()),
+            JointMotion::Welded => {}
             JointMotion::Elastic(_) => {
                 let S = &data.elastic[i];
                 let (L, B) = (R * S.L, R * S.B);
@@ -131,6 +132,7 @@ pub fn frame_jacobian_derivative(model: &Model, data: &Data, state: &State, fram
                 let l = R * axis * body.ratio;
                 add(body.coordinate, w_B.cross(&l), Vector3::zeros(), Vector3::zeros());
             }
+            JointMotion::Welded => {}
             JointMotion::Elastic(angles) => {
                 let k = body.coordinate;
                 let S = &data.elastic[i];

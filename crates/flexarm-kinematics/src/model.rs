@@ -76,6 +76,8 @@ pub enum JointMotion {
     Prismatic(Vector3<f64>),
     /// Translation in P axes, then angles.
     Elastic(ElasticAngles),
+    /// None: a modal link on a fixed joint is a body of its own, without a coordinate.
+    Welded,
     /// An interface of the parent's modal body; coordinates are those of that body.
     Interface {
         /// Number of the modal body in the model.
@@ -423,7 +425,8 @@ impl Builder<'_> {
                 return Err(ModelError::BadModal { link: link.name.clone(), what });
             }
             if self.bodies[body].modal.is_some() || X_BL != Pose::identity() {
-                return Err(ModelError::BadModal { link: link.name.clone(), what: "its place on a fixed joint" });
+                let what = "its place on a fixed joint (it must hang on a joint that moves; a lumped link need not)";
+                return Err(ModelError::BadModal { link: link.name.clone(), what });
             }
             self.bodies[body].modal = Some(self.modal.len());
             let tables = ModalTables::new(shapes);
@@ -437,6 +440,8 @@ impl Builder<'_> {
             let child = child.expect("checked by check_tree");
             let X_BJ = X_BL * joint.X_PJ;
             let motion = match joint.kind {
+                // A link that bends in modes needs a body whose frame is its own.
+                JointKind::Fixed if mechanism.modal.iter().any(|(name, _)| *name == joint.child) => JointMotion::Welded,
                 JointKind::Fixed => {
                     self.attach(child, body, X_BJ)?;
                     continue;
@@ -516,7 +521,8 @@ impl Builder<'_> {
         for elastic_pass in [false, true] {
             for i in 0..self.bodies.len() {
                 let body = &self.bodies[i];
-                let own = body.elastic == elastic_pass && !matches!(body.motion, JointMotion::Interface { .. });
+                let none = matches!(body.motion, JointMotion::Interface { .. } | JointMotion::Welded);
+                let own = body.elastic == elastic_pass && !none;
                 let joint = self.mechanism.joint(&body.joint).filter(|_| own && !follows(i, &self.followers));
                 if let Some(joint) = joint {
                     let (coordinate, size) = (coordinates.len(), joint.kind.degrees_of_freedom());

@@ -91,6 +91,13 @@ impl ElasticElement {
         }
     }
 
+    /// What the spring pulls with at its coordinates (N, N m): `K e`, or the curve.
+    pub fn spring_force(&self, e: &[f64]) -> DVector<f64> {
+        let mut f = DVector::zeros(e.len());
+        self.add_spring_force(e, f.as_mut_slice());
+        f
+    }
+
     /// `f += K e`, or the curve.
     #[inline]
     pub(crate) fn add_spring_force(&self, e: &[f64], f: &mut [f64]) {

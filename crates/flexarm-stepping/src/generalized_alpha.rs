@@ -239,11 +239,13 @@ impl GeneralizedAlpha {
                 self.x_tilde_new[k] -= d_tilde;
                 self.x_new[k] -= c_K * d_tilde;
                 self.v_new[k] -= c_D * d_tilde;
-                correction = correction.max(d.abs());
+                // `max` passes over NaN.
+                correction = if d.is_finite() { correction.max(d.abs()) } else { f64::INFINITY };
                 size = size.max(self.trial[k].abs());
                 place = place.max(self.x_new[k].abs());
             }
             if !correction.is_finite() || place > 1e6 {
+                let place = if correction.is_finite() { place } else { f64::INFINITY };
                 let what = format!("a coordinate reached {place:.1e}");
                 return Err(StepError::Diverged { t, h, what });
             }

@@ -27,6 +27,10 @@ pub struct Load {
     pub axes: LoadAxes,
     /// Force (N) and moment (N m) at time t.
     pub wrench: Arc<dyn Fn(f64) -> Wrench + Send + Sync>,
+    /// Times at which it begins, ends, jumps or bends (s); the reference stepper steps over none of them.
+    pub jumps: Vec<f64>,
+    /// Shortest period in it (s), infinite without one: the steps of the reference stepper stay well below.
+    pub period: f64,
 }
 
 impl fmt::Debug for Load {
@@ -38,7 +42,14 @@ impl fmt::Debug for Load {
 impl Load {
     /// A constant wrench at the body's origin, world axes.
     pub fn constant(body: usize, F_W: Wrench) -> Self {
-        Self { body, X_BF: Pose::identity(), axes: LoadAxes::World, wrench: Arc::new(move |_| F_W) }
+        Self {
+            body,
+            X_BF: Pose::identity(),
+            axes: LoadAxes::World,
+            wrench: Arc::new(move |_| F_W),
+            jumps: Vec::new(),
+            period: f64::INFINITY,
+        }
     }
 
     /// At Bo in body axes.

@@ -150,6 +150,8 @@ pub struct Reference {
     ahead: VecDeque<Vec<f64>>,
     /// Times of restarts, in order.
     restarts: Vec<f64>,
+    /// Longest step of the solver (s).
+    longest: f64,
     /// Steps of the solver so far; it may be ahead of the current time.
     pub solver_steps: u64,
     /// Evaluations of the equations of motion so far, those for Jacobians included.
@@ -191,6 +193,7 @@ impl Reference {
             kept,
             ahead: VecDeque::new(),
             restarts: Vec::new(),
+            longest: LONGEST,
             solver_steps: 0,
             evaluations: 1,
             factorisations: 0,
@@ -229,6 +232,11 @@ impl Reference {
         if !self.restarts.iter().any(|other| (other - t).abs() <= near) {
             self.restarts.insert(self.restarts.partition_point(|other| *other < t), t);
         }
+    }
+
+    /// Keeps the solver's steps below `longest` (s).
+    pub fn limit_steps(&mut self, longest: f64) {
+        self.longest = self.longest.min(longest);
     }
 
     /// Starts anew at the current time with the system as it is now: position and velocity are kept, the acceleration is
@@ -383,7 +391,7 @@ impl Reference {
         let (t, h) = (solver.state().t, solver.state().h);
         let fault = |error: DiffsolError| gave_up(t, h, &error);
         // The solver knows no longest step, but a time not to pass.
-        let mut target = if h > LONGEST { t + LONGEST } else { f64::INFINITY };
+        let mut target = if h > self.longest { t + self.longest } else { f64::INFINITY };
         if target > stop - self.near(stop) {
             target = stop;
         }

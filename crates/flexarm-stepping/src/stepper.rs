@@ -156,7 +156,14 @@ pub fn new_stepper(kind: StepperKind, arm: FlexibleArm, h: f64, start: Start) ->
         StepperKind::Reference(settings) => {
             let mut system = ReducedArm::new(arm);
             let (x, v) = system.start(&e)?;
-            let integrator = Reference::new(&mut system, 0.0, h, settings, x, v)?;
+            let mut integrator = Reference::new(&mut system, 0.0, h, settings, x, v)?;
+            // Else a solver that takes long steps may not see a short load at all.
+            for t in system.arm.loads.iter().flat_map(|load| &load.jumps).filter(|t| **t > 0.0) {
+                integrator.restart_at(*t);
+            }
+            // No whole part of a period, or a sine would look like nothing at all.
+            let period = system.arm.loads.iter().map(|load| load.period).fold(f64::INFINITY, f64::min);
+            integrator.limit_steps(0.137 * period);
             Box::new(ReferenceStepper { system, integrator })
         }
         StepperKind::Spook(settings) => Box::new(Spook::new(arm, h, settings, &e)?),

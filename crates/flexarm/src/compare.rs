@@ -7,12 +7,14 @@ use std::time::Instant;
 use flexarm_analysis::{
     ContributionPeaks, ErrorRecord, MetricSettings, PathFrame, engineering_strain, tcp_error, tcp_metrics,
 };
-use flexarm_kinematics::{Data, Frame, JointMotion, Pose, State, forward_kinematics, rotation_vector};
+use flexarm_kinematics::{
+    Data, Frame, JointMotion, Pose, State, forward_kinematics, kinetic_energy, potential_energy, rotation_vector,
+};
 use flexarm_log::{ElasticSample, EnergySample, RecorderSet, Sample};
-use flexarm_stepping::{FlexibleArm, Observation, StepError, Stepper, new_stepper};
+use flexarm_stepping::{FlexibleArm, Load, Observation, StepError, Stepper, StepperKind, new_stepper};
 use nalgebra::{Matrix6, Vector3, Vector6};
 
-use crate::disturbance::Disturbances;
+use crate::disturbance::{Disturbances, EXPRESSION_PERIOD};
 use crate::error::Error;
 use crate::flexible::{FlexibleRobot, Owner};
 use crate::motion::Motion;
@@ -57,8 +59,13 @@ pub fn simulate(
     let flexible = robot.modelled(&options.modelling)?;
     let failed = |source: StepError| Error::Step { source, partial: false };
     let mut arm = flexible.arm(motion.prescribed()).map_err(failed)?;
+    let mut load_warnings = Vec::new();
     if let Some(path) = &options.loads {
         let disturbances = Disturbances::load(path, robot, &arm.model, motion.trajectory.duration())?;
+        load_warnings = disturbances.warnings;
+        if !matches!(options.stepper, StepperKind::Reference(_)) {
+            load_warnings.extend(short_loads(&disturbances.loads, options.step_s));
+        }
         arm.inertia_changes = disturbances.changes;
         arm = arm.with_timed_loads(disturbances.loads).map_err(failed)?;
     }
@@ -71,6 +78,7 @@ pub fn simulate(
     let end = run.go(&mut files.set, outputs.is_some(), progress);
 
     let mut summary = run.summary(robot, motion, options);
+    summary.warnings.extend(load_warnings);
     summary.end = end.as_ref().map_or_else(ToString::to_string, |()| "complete".into());
     summary.wall_s = started.elapsed().as_secs_f64();
     summary.cpu_s = cpu.elapsed().as_secs_f64();
@@ -114,6 +122,30 @@ fn check_options(motion: &Motion, options: &RunOptions) -> Result<(), Error> {
     Ok(())
 }
 
+/// Steps that a load, or a period of it, must last to be met well.
+const STEPS_PER_LOAD: f64 = 8.0;
+
+/// Loads that last so few steps that they do not act as the file says.
+fn short_loads(loads: &[Load], h: f64) -> Vec<String> {
+    let brief = |load: &Load| {
+        let (first, last) = load.jumps.iter().fold((f64::INFINITY, 0.0f64), |(a, b), t| (a.min(*t), b.max(*t)));
+        let steps = (last - first) / h;
+        (last > first && steps < STEPS_PER_LOAD).then(|| {
+            format!(
+                "a load from {first} s to {last} s lasts {steps:.1} steps: its impulse is not met well; lower --step"
+            )
+        })
+    };
+    let fast = |load: &Load| {
+        let steps = load.period / h;
+        (load.period != EXPRESSION_PERIOD && steps < STEPS_PER_LOAD).then(|| {
+            let hz = 1.0 / load.period;
+            format!("a load of {hz:.1} Hz has {steps:.1} steps per period: it does not act as written; lower --step")
+        })
+    };
+    loads.iter().filter_map(|load| brief(load).or_else(|| fast(load))).collect()
+}
+
 /// A run under way, with what has been seen of it.
 struct Run<'a> {
     motion: &'a Motion,
@@ -142,6 +174,8 @@ struct Run<'a> {
     angles: Vec<(usize, usize, f64)>,
     energy: EnergyBook,
     peak_drive: Vec<f64>,
+    /// Samples in which a servo was at its limit, per actuated coordinate.
+    at_limit: Vec<usize>,
     every: u64,
     last: u64,
 }
@@ -190,6 +224,7 @@ impl<'a> Run<'a> {
             angles: link_side_angles(robot, flexible),
             energy: EnergyBook::default(),
             peak_drive: vec![0.0; arm.model.n_actuated()],
+            at_limit: vec![0; arm.model.n_actuated()],
             every: ((1.0 / (options.log_rate_hz * options.step_s)).round() as u64).max(1),
             last,
             arm,
@@ -221,13 +256,17 @@ impl<'a> Run<'a> {
         self.stepper.observe(&mut self.seen);
         let t = self.seen.t;
         // The twin carries what the arm carries.
-        let mut changed = false;
+        let due = self.arm.inertia_changes.first().is_some_and(|change| change.t <= t + 1e-9);
+        let before = if due { self.energy_with_payload() } else { 0.0 };
         while let Some(change) = self.arm.inertia_changes.first()
             && change.t <= t + 1e-9
         {
             let change = self.arm.inertia_changes.remove(0);
             self.arm.model = Arc::new(self.arm.model.with_inertia(change.body, change.inertia));
-            changed = true;
+        }
+        if due {
+            // At the start the arm carries it already.
+            self.energy.exchanged += if step > 0 { self.energy_with_payload() - before } else { 0.0 };
         }
         self.twin.update(&self.arm, &self.tcp, t);
         let X_rigid = self.twin.data.X_WF(&self.tcp);
@@ -244,8 +283,11 @@ impl<'a> Run<'a> {
         for (peak, drive) in self.peak_drive.iter_mut().zip(self.seen.drive.iter()) {
             *peak = peak.max(drive.abs());
         }
+        for axis in self.arm.servo.iter().flat_map(|servo| &servo.axes) {
+            self.at_limit[axis.coordinate] += usize::from(self.seen.drive[axis.coordinate].abs() >= axis.limit);
+        }
 
-        self.look_at_elements(t, changed);
+        self.look_at_elements(t);
         let sample = &mut self.sample;
         sample.time_s = t;
         sample.step = step;
@@ -283,8 +325,16 @@ impl<'a> Run<'a> {
         rigid.X_WT = X_rigid;
     }
 
+    /// Kinetic and gravitational energy (J) of the last state seen, with what the arm carries now.
+    fn energy_with_payload(&self) -> f64 {
+        let mut data = Data::new(&self.arm.model);
+        let state = State { q: self.seen.q.clone(), qdot: self.seen.qdot.clone() };
+        let kinetic = kinetic_energy(&self.arm.model, &mut data, &state);
+        kinetic + potential_energy(&self.arm.model, &mut data, &state.q)
+    }
+
     /// Deflections and loads of the elements, what they do to the tool, how far the links are strained.
-    fn look_at_elements(&mut self, t: f64, payload_changed: bool) {
+    fn look_at_elements(&mut self, t: f64) {
         let columns = self.flexible.spans.len();
         let mut moved = vec![Vector6::zeros(); columns + self.give.len()];
         self.sample.elastic.resize(self.arm.elements.len(), ElasticSample::default());
@@ -324,7 +374,7 @@ impl<'a> Run<'a> {
             self.strains[k] = self.strains[k].max(strain);
             self.rotations[k] = self.rotations[k].max(rotation_vector(turn.matrix()).norm());
         }
-        self.energy.add(t, self.seen.energy, self.seen.power, payload_changed);
+        self.energy.add(t, self.seen.energy, self.seen.power);
     }
 
     /// Figures of what was seen so far.
@@ -439,16 +489,6 @@ impl<'a> Run<'a> {
                 100.0 * imbalance
             ));
         }
-        if let Some(servo) = &self.arm.servo {
-            for axis in &servo.axes {
-                let name = &self.arm.model.coordinates()[axis.coordinate].joint;
-                if self.peak_drive[axis.coordinate] >= axis.limit {
-                    let limit = axis.limit;
-                    warnings
-                        .push(format!("the servo of joint {name:?} reached its torque limit of {limit:.0} N m (or N)"));
-                }
-            }
-        }
         for (c, peak) in self.arm.model.coordinates().iter().zip(&self.peak_drive) {
             if *peak > c.limits.effort {
                 warnings.push(format!(
@@ -457,7 +497,15 @@ impl<'a> Run<'a> {
                 ));
             }
         }
-        if matches!(self.options.stepper, flexarm_stepping::StepperKind::Spook(_)) && !self.arm.proportional {
+        for (c, count) in self.arm.model.coordinates().iter().zip(&self.at_limit).filter(|(_, count)| **count > 0) {
+            let share = 100.0 * *count as f64 / self.times.len() as f64;
+            warnings.push(format!(
+                "the servo of joint {:?} is at its torque limit in {share:.1} % of the samples: it cannot follow, or its loop \
+                 is unstable (gains too high for the inertia and sampling; is motor_inertia given?)",
+                c.joint
+            ));
+        }
+        if matches!(self.options.stepper, StepperKind::Spook(_)) && !self.arm.proportional {
             let betas: Vec<String> = self.arm.tau.iter().map(|b| format!("{b:.2e}")).collect();
             warnings.push(format!(
                 "spook damps each spring in proportion to its stiffness: modal damping became D = beta K with beta = {} s, \
@@ -513,32 +561,24 @@ struct EnergyBook {
     before: Option<(f64, [f64; 3])>,
     /// Drives, loads, dissipation (J).
     work: [f64; 3],
-    /// What payloads brought and took away (J).
-    payload: f64,
     /// Largest gap between what is stored and what was supplied, and largest change of what is stored (J).
     gap: f64,
     swing: f64,
+    /// Energy that came or went with a payload (J).
+    exchanged: f64,
 }
 
 impl EnergyBook {
-    /// With a payload picked or dropped since the last sample, what the balance lacks came or went with it.
-    fn add(&mut self, t: f64, energy: [f64; 3], power: [f64; 3], payload_changed: bool) {
-        let before = self.last;
-        let mut supplied = 0.0;
+    fn add(&mut self, t: f64, energy: [f64; 3], power: [f64; 3]) {
         if let Some((t_before, p)) = self.before {
             for c in 0..3 {
-                let work = 0.5 * (t - t_before) * (p[c] + power[c]);
-                self.work[c] += work;
-                supplied += if c < 2 { work } else { -work };
+                self.work[c] += 0.5 * (t - t_before) * (p[c] + power[c]);
             }
         }
         self.last = energy.iter().sum();
-        if payload_changed && self.before.is_some() {
-            self.payload += self.last - before - supplied;
-        }
         self.before = Some((t, power));
         let first = *self.first.get_or_insert(self.last);
-        let supplied = self.work[0] + self.work[1] - self.work[2] + self.payload;
+        let supplied = self.work[0] + self.work[1] - self.work[2] + self.exchanged;
         self.gap = self.gap.max((self.last - first - supplied).abs());
         self.swing = self.swing.max((self.last - first).abs()).max(self.work[0].abs());
     }
@@ -548,7 +588,7 @@ impl EnergyBook {
             drives_j: self.work[0],
             loads_j: self.work[1],
             dissipated_j: self.work[2],
-            payload_j: self.payload,
+            payload_j: self.exchanged,
             stored_j: self.last - self.first.unwrap_or(self.last),
             imbalance: if self.swing > 0.0 { self.gap / self.swing } else { 0.0 },
         }

@@ -101,6 +101,8 @@ pub struct Disturbances {
     pub loads: Vec<Load>,
     /// Changes of what bodies carry, by time.
     pub changes: Vec<InertiaChange>,
+    /// Entries that do nothing.
+    pub warnings: Vec<String>,
 }
 
 type WrenchFn = Arc<dyn Fn(f64) -> Wrench + Send + Sync>;
@@ -126,12 +128,22 @@ impl Disturbances {
         let mut disturbances = Self::default();
         for entry in &file.load {
             disturbances.loads.push(load(entry, model, folder, duration, &source)?);
+            let start = entry.get_ref().start;
+            if start >= duration {
+                let text = format!("a load starts at {start} s, the run ends at {duration} s: it does nothing");
+                disturbances.warnings.push(text);
+            }
         }
         let mut changes: Vec<&Spanned<PayloadChange>> = file.payload.iter().collect();
         changes.sort_by(|a, b| a.get_ref().at.total_cmp(&b.get_ref().at));
         for entry in changes {
             let earlier = disturbances.changes.clone();
             disturbances.changes.push(change(entry, robot, model, &earlier, &source)?);
+            let at = entry.get_ref().at;
+            if at > duration {
+                let text = format!("the payload changes at {at} s, the run ends at {duration} s: it stays as it is");
+                disturbances.warnings.push(text);
+            }
         }
         Ok(disturbances)
     }
@@ -180,6 +192,9 @@ fn load(
         return Err(source.error(span_or(e.end.as_ref(), entry), message).into());
     }
     let kind = e.kind.get_ref().as_str();
+    if let Some((key, kinds)) = stray_key(e, kind) {
+        return Err(fail(format!("kind = {kind:?} takes no {key}, only {kinds} does")).into());
+    }
     let lacks = |what: &str| source.error(e.kind.span(), format!("kind = {kind:?} needs {what} = ..."));
     let needs = |value: &Option<Spanned<f64>>, what: &str| match value {
         Some(x) if x.get_ref().is_finite() && *x.get_ref() > 0.0 => Ok(*x.get_ref()),
@@ -191,26 +206,38 @@ fn load(
     let scaled = move |s: Box<dyn Fn(f64) -> f64 + Send + Sync>| -> WrenchFn {
         Arc::new(move |t| if t >= start && t <= end { size * s(t - start) } else { Wrench::zeros() })
     };
+    let (mut rows, mut period) = (Vec::new(), f64::INFINITY);
     let wrench: WrenchFn = match kind {
         "step" => scaled(Box::new(|_| 1.0)),
         "impulse" => {
             let d = needs(&e.duration, "duration")?;
+            // It is zero at both its ends: a solver must also see its middle.
+            rows = [0.137, 0.5, 0.863, 1.0].iter().map(|s| start + s * d).collect();
             // Half a sine of area 1.
             scaled(Box::new(move |t| if t < d { 0.5 * PI / d * (PI * t / d).sin() } else { 0.0 }))
         }
         "sine" => {
             let (f, phase) = (needs(&e.frequency, "frequency")?, e.phase);
+            period = 1.0 / f;
             scaled(Box::new(move |t| (TAU * f * t + phase).sin()))
         }
         "sweep" => {
             let (from, to) = (needs(&e.from, "from")?, needs(&e.to, "to")?);
+            period = 1.0 / from.max(to);
             let rate = (to - from) / (end - start).max(1e-9);
             scaled(Box::new(move |t| (TAU * (from * t + 0.5 * rate * t * t)).sin()))
         }
         "milling" => {
             let teeth = f64::from(e.teeth.ok_or_else(|| lacks("teeth"))?);
+            if teeth == 0.0 {
+                return Err(fail("teeth = 0: expected the number of cutting edges".into()).into());
+            }
             let tooth = teeth * needs(&e.spindle_rpm, "spindle_rpm")? / 60.0;
             let harmonics = e.harmonics.unwrap_or(3);
+            if harmonics > MOST_HARMONICS {
+                return Err(fail(format!("harmonics = {harmonics}: expected at most {MOST_HARMONICS}")).into());
+            }
+            period = 1.0 / (tooth * f64::from(harmonics.max(1)));
             // Mean 1, harmonics that halve: the shape of an intermittent cut.
             scaled(Box::new(move |t| {
                 1.0 + (1..=harmonics)
@@ -225,24 +252,64 @@ fn load(
                 let message = format!("file = {:?}: there is no file {}", file.get_ref(), path.display());
                 return Err(source.error(file.span(), message).into());
             }
-            table(&path)?
+            let (inner, times) = table(&path)?;
+            rows = times;
+            Arc::new(move |t| if t >= start && t <= end { inner(t) } else { Wrench::zeros() })
         }
-        "expression" => expression(e, source, (start, end))?,
+        "expression" => {
+            period = EXPRESSION_PERIOD;
+            expression(e, source, (start, end))?
+        }
         other => {
             let text = "use step, impulse, sine, sweep, milling, table or expression";
             return Err(source.error(e.kind.span(), format!("load kind {other:?} is not known; {text}")).into());
         }
     };
-    Ok(Load { body: frame.body, X_BF: frame.X_BF, axes, wrench })
+    let jumps = [start].into_iter().chain(last).chain(rows).filter(|t| *t <= duration).collect();
+    Ok(Load { body: frame.body, X_BF: frame.X_BF, axes, wrench, jumps, period })
 }
+
+/// A key that the kind of load would not use, and the kinds that would.
+fn stray_key(e: &LoadEntry, kind: &str) -> Option<(&'static str, &'static str)> {
+    let sized = "step, impulse, sine, sweep and milling";
+    let keys = [
+        ("force", e.force != [0.0; 3], sized),
+        ("torque", e.torque != [0.0; 3], sized),
+        ("frequency", e.frequency.is_some(), "sine"),
+        ("phase", e.phase != 0.0, "sine"),
+        ("from", e.from.is_some(), "sweep"),
+        ("to", e.to.is_some(), "sweep"),
+        ("duration", e.duration.is_some(), "impulse"),
+        ("teeth", e.teeth.is_some(), "milling"),
+        ("spindle_rpm", e.spindle_rpm.is_some(), "milling"),
+        ("harmonics", e.harmonics.is_some(), "milling"),
+        ("file", e.file.is_some(), "table"),
+        ("fx", e.fx.is_some(), "expression"),
+        ("fy", e.fy.is_some(), "expression"),
+        ("fz", e.fz.is_some(), "expression"),
+        ("tx", e.tx.is_some(), "expression"),
+        ("ty", e.ty.is_some(), "expression"),
+        ("tz", e.tz.is_some(), "expression"),
+    ];
+    let known = ["step", "impulse", "sine", "sweep", "milling", "table", "expression"].contains(&kind);
+    let stray = |(_, given, kinds): &&(&str, bool, &str)| known && *given && !kinds.contains(kind);
+    keys.iter().find(stray).map(|(key, _, kinds)| (*key, *kinds))
+}
+
+/// Nobody knows what is in an expression: the reference stepper looks at it as at a vibration of this period (s).
+pub(crate) const EXPRESSION_PERIOD: f64 = 5e-3;
+/// Most harmonics of a milling force; beyond, each is nothing against the first.
+const MOST_HARMONICS: u32 = 50;
+/// Most rows of a table whose times the reference stepper meets one by one.
+const MOST_ROWS: usize = 1000;
 
 /// Where a value stands, else its entry.
 fn span_or<T, E>(value: Option<&Spanned<T>>, entry: &Spanned<E>) -> Range<usize> {
     value.map_or(entry.span(), Spanned::span)
 }
 
-/// Linear between the rows of a CSV, zero outside.
-fn table(path: &Path) -> Result<WrenchFn, Error> {
+/// Linear between the rows of a CSV, zero outside; with the times at which it bends.
+fn table(path: &Path) -> Result<(WrenchFn, Vec<f64>), Error> {
     let fail = |what: String| Error::File { path: path.to_owned(), what };
     let text = std::fs::read_to_string(path).map_err(|e| fail(format!("cannot be read: {e}")))?;
     let mut lines = text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty() && !l.starts_with('#'));
@@ -272,7 +339,9 @@ fn table(path: &Path) -> Result<WrenchFn, Error> {
     if rows.len() < 2 {
         return Err(fail("a table of loads needs at least two rows".into()));
     }
-    Ok(Arc::new(move |t| {
+    let bends = if rows.len() <= MOST_ROWS { &rows[..] } else { &[rows[0], rows[rows.len() - 1]][..] };
+    let bends = bends.iter().map(|(t, _)| *t).collect();
+    let wrench = Arc::new(move |t| {
         let k = rows.partition_point(|(x, _)| *x <= t);
         let between = |k: usize| {
             let ((t0, a), (t1, b)) = (&rows[k - 1], &rows[k]);
@@ -286,7 +355,8 @@ fn table(path: &Path) -> Result<WrenchFn, Error> {
             k if t == rows[k - 1].0 => between(k - 1),
             _ => Wrench::zeros(),
         }
-    }))
+    });
+    Ok((wrench, bends))
 }
 
 fn expression(e: &LoadEntry, source: &Source, (start, end): (f64, f64)) -> Result<WrenchFn, Error> {
@@ -310,9 +380,12 @@ fn expression(e: &LoadEntry, source: &Source, (start, end): (f64, f64)) -> Resul
                     return Err(fail(text).into());
                 }
                 let timed = !parsed.var_names().is_empty();
-                let probe = parsed.eval(if timed { &[0.5][..] } else { &[] });
-                if !probe.is_ok_and(|x: f64| x.is_finite()) {
-                    return Err(fail(format!("expression {text:?} is no finite number at t = 0.5 s")).into());
+                // At times at which it acts.
+                for t in [start.max(0.0), 0.5 * (start.max(0.0) + end), end] {
+                    let probe = parsed.eval(if timed { std::slice::from_ref(&t) } else { &[] });
+                    if !probe.is_ok_and(|x: f64| x.is_finite()) {
+                        return Err(fail(format!("expression {text:?} is no finite number at t = {t} s")).into());
+                    }
                 }
                 Some((parsed, timed))
             }

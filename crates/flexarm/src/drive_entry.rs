@@ -220,6 +220,10 @@ fn drive(
         return Err(fail(entry.joint.span(), format!("the robot has no such movable joint; it has {known:?}")));
     };
     let kind = kind_of(entry, source)?;
+    if joint.mimic.is_some() && (kind == DriveKind::Torque || entry.friction.is_some()) {
+        let text = "the joint mimics another one: servo and friction belong to that one's drive";
+        return Err(fail(entry.joint.span(), text.into()));
+    }
     let number = |value: &Option<Spanned<f64>>, what: &str, default: f64, lowest: f64| match value {
         None => Ok(default),
         Some(v) if v.get_ref().is_finite() && *v.get_ref() >= lowest => Ok(*v.get_ref()),

@@ -291,6 +291,18 @@ impl Robot {
                 links.push(FlexibleLink { form, ..link.flexible.clone() });
             }
         }
+        // An option that nothing takes up is a mistake, not a wish.
+        let modal = links.iter().filter(|link| matches!(link.form, LinkForm::Modal(_))).count();
+        if let (Some(n), true) = (modelling.segments, modal == links.len()) {
+            return Err(usage(format!(
+                "{n} segments are asked for, but no link of the robot is lumped: add --links lumped"
+            )));
+        }
+        if let (Some(n), 0) = (modelling.modes, modal) {
+            return Err(usage(format!(
+                "{n} modes are asked for, but no link of the robot is modal: add --links modal"
+            )));
+        }
         let mut substituted = substitute(&self.rigid, &links).map_err(|e| usage(e.to_string()))?;
 
         let kind = |drive: &Drive| match modelling.drives {

@@ -105,10 +105,11 @@ pub fn statics(robot: &Robot, modelling: &Modelling, at: Option<&str>, wrench: [
     let J = J.columns(model.nv() - ne, ne);
     let mut warnings = posed.warnings.clone();
     let mut elements = Vec::new();
-    for (name, range) in &loaded.elements {
+    for ((name, range), element) in loaded.elements.iter().zip(&posed.arm.elements) {
         let (first, n) = (range.start, range.len());
         let deflection: DVector<f64> = loaded.equilibrium.rows(first, n).into_owned();
-        let load = loaded.springs.view((first, first), (n, n)) * &deflection;
+        // Of a curved spring the tangent alone would not do.
+        let load = element.spring_force(deflection.as_slice());
         let moved = J.columns(first - loaded.driven, n) * &deflection;
         let rotation = Posed::flexible_rotation(&deflection);
         if rotation > ROTATION_LIMIT {
@@ -118,7 +119,7 @@ pub fn statics(robot: &Robot, modelling: &Modelling, at: Option<&str>, wrench: [
         }
         elements.push(ElementStatics {
             name: name.clone(),
-            energy_j: 0.5 * load.dot(&deflection),
+            energy_j: element.energy(deflection.as_slice()),
             tcp_displacement_m: [moved[0], moved[1], moved[2]],
             tcp_rotation_rad: [moved[3], moved[4], moved[5]],
             load: load.as_slice().to_vec(),

@@ -22,6 +22,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 JointMotion::Revolute(axis) => ("revolute", axis),
                 JointMotion::Prismatic(axis) => ("prismatic", axis),
                 JointMotion::Elastic(_) => ("elastic", nalgebra::Vector3::zeros()),
+                JointMotion::Welded => ("fixed", nalgebra::Vector3::zeros()),
                 JointMotion::Interface { .. } => ("interface", nalgebra::Vector3::zeros()),
             };
             let (R, I) = (body.X_PJ.rotation.matrix(), body.inertia.inertia_com());

@@ -151,8 +151,7 @@ pub fn random_flexible_tree(seed: u64, n_joints: usize) -> Mechanism {
             _ => {}
         }
     }
-    let candidates: Vec<String> =
-        tree.links.iter().map(|l| l.name.clone()).filter(|n| !n.starts_with("fixed")).collect();
+    let candidates: Vec<String> = tree.links.iter().map(|l| l.name.clone()).collect();
     for link in candidates {
         if draw.signed() < 0.3 {
             continue;

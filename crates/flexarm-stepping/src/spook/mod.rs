@@ -261,7 +261,7 @@ impl Stepper for Spook {
                 }
                 JointMotion::Revolute(axis) => out.drive[body.coordinate] = axis.dot(&force.fixed_rows::<3>(3)),
                 JointMotion::Prismatic(axis) => out.drive[body.coordinate] = axis.dot(&force.fixed_rows::<3>(0)),
-                JointMotion::Interface { .. } => {}
+                JointMotion::Interface { .. } | JointMotion::Welded => {}
                 JointMotion::Elastic(angles) => {
                     let (parent, child) = (&self.bodies[body.parent], &self.bodies[i]);
                     let rows = self.rows_now(i, angles);
@@ -334,7 +334,7 @@ impl Spook {
                 JointMotion::Elastic(angles) => (X_WP, angles),
                 // A single spring is measured from its relaxed place.
                 _ if body.elastic => (X_WP, Default::default()),
-                JointMotion::Interface { .. } => (X_WP, Default::default()),
+                JointMotion::Interface { .. } | JointMotion::Welded => (X_WP, Default::default()),
                 JointMotion::Revolute(axis) => {
                     let turn = Rotation3::from_scaled_axis(axis * self.q[body.coordinate]);
                     (Pose::from_parts(X_WP.translation, X_WP.rotation * turn), Default::default())
