@@ -425,7 +425,7 @@ impl Builder<'_> {
                 return Err(ModelError::BadModal { link: link.name.clone(), what });
             }
             if self.bodies[body].modal.is_some() || X_BL != Pose::identity() {
-                let what = "its place on a fixed joint (it must hang on a joint that moves; a lumped link need not)";
+                let what = "its place in a body that bends in modes already";
                 return Err(ModelError::BadModal { link: link.name.clone(), what });
             }
             self.bodies[body].modal = Some(self.modal.len());
