@@ -131,7 +131,9 @@ fn statics_text(s: &Statics) -> String {
 }
 
 fn modes_text(m: &ModeTable) -> String {
-    let mut out = format!("{} at {}, drives locked\n", m.robot, pose_text(&m.joints, &m.at));
+    let drives =
+        if m.driven.is_empty() { "drives locked".to_owned() } else { format!("under servos: {}", m.driven.join(", ")) };
+    let mut out = format!("{} at {}, {drives}\n", m.robot, pose_text(&m.joints, &m.at));
     if m.modes.is_empty() {
         return out + "no modes: nothing is flexible\n";
     }
@@ -144,8 +146,13 @@ fn modes_text(m: &ModeTable) -> String {
     for (k, mode) in m.modes.iter().enumerate() {
         let mut row = vec![
             (k + 1).to_string(),
-            format!("{:.3}", mode.frequency_hz),
-            format!("{:.3}", 100.0 * mode.damping_ratio),
+            // A decay without oscillation has a rate, no frequency.
+            if mode.damping_ratio < 1.0 {
+                format!("{:.3}", mode.frequency_hz)
+            } else {
+                format!("({:.3})", mode.frequency_hz)
+            },
+            if mode.damping_ratio < 1.0 { format!("{:.3}", 100.0 * mode.damping_ratio) } else { "decays".into() },
             direction(&mode.tcp),
             // Of the whole translation.
             mass(mode.tcp[..3].iter().map(|x| x * x).sum()),

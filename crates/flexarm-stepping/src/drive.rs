@@ -21,7 +21,7 @@ impl TorqueCurve {
     /// From points (deflection, torque).
     ///
     /// # Errors
-    /// [`CurveError`] for fewer than two points, deflections that do not rise, torques that fall, or no zero torque.
+    /// [`CurveError`] for fewer than two points, deflections that do not rise, torques that fall, or ends that are flat.
     pub fn new(points: &[[f64; 2]]) -> Result<Self, CurveError> {
         let fail = |text: String| Err(CurveError(text));
         if points.len() < 2 {

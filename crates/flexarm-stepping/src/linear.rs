@@ -90,6 +90,21 @@ impl Linear {
     }
 }
 
+impl Linear {
+    /// As [`Linear::compliance`], with motors under servos yielding like springs; none where one of them is held by nothing.
+    pub fn yielding_compliance(&self) -> Option<Matrix6<f64>> {
+        let K = (&self.K + self.K.transpose()) * 0.5;
+        let scale = K.diagonal().amax();
+        let yielding = self.K.clone().lu().solve(&self.J.transpose())?;
+        let smallest = K.symmetric_eigenvalues().amin();
+        if smallest <= 1e-12 * scale {
+            return None;
+        }
+        let C = &self.J * yielding;
+        Some(Matrix6::from_fn(|i, j| C[(i, j)]))
+    }
+}
+
 /// The arm about its equilibrium at time `t` of the motion, prescribed joints locked there.
 ///
 /// * `tool`: a frame of the arm's model; `F_T_W`: constant wrench on it, at its origin, in world axes, which stays the

@@ -94,6 +94,8 @@ pub fn simulate(
 
 /// Steps between two looks at the progress callback.
 const POLL_EVERY: u64 = 64;
+/// Most steps of a run: some hours.
+const MOST_STEPS: f64 = 1e9;
 /// Most logged samples of a run: they are kept for the figures.
 const MOST_SAMPLES: f64 = 2e6;
 
@@ -110,6 +112,14 @@ fn check_options(motion: &Motion, options: &RunOptions) -> Result<(), Error> {
     if options.step_s > duration {
         let message = format!("the step (--step {} s) is longer than the motion ({duration} s)", options.step_s);
         return Err(Error::Usage(message));
+    }
+    if duration / options.step_s > MOST_STEPS {
+        return Err(Error::Usage(format!(
+            "{duration} s in steps of {:e} s make {:.1e} steps, at most {MOST_STEPS:.0e} are taken: raise --step or cut the \
+             trajectory",
+            options.step_s,
+            duration / options.step_s
+        )));
     }
     let samples = duration * options.log_rate_hz.min(1.0 / options.step_s);
     if samples > MOST_SAMPLES {

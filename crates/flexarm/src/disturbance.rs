@@ -434,6 +434,13 @@ fn change(
         let message = format!("payload link {link:?}: expected a link that moves, of {known:?}");
         source.error(span_or(e.link.as_ref(), entry), message)
     })?;
+    if robot.flexible.iter().any(|f| f.flexible.link == link) && model.frame(&format!("{link}__distal")).is_some() {
+        let beyond = robot.urdf.mechanism.child_joints(&link).map(|j| j.child.as_str()).collect::<Vec<_>>();
+        let message = format!(
+            "payload link {link:?} bends, so that it is not clear how the payload rides on it: name a link beyond it, of {beyond:?}"
+        );
+        return Err(source.error(span_or(e.link.as_ref(), entry), message));
+    }
     let [xx, yy, zz, xy, xz, yz] = inertia_given;
     let inertia_com = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
     if inertia_com.symmetric_eigenvalues().min() < -1e-9 * inertia_com.norm() {

@@ -1,4 +1,4 @@
-//! Natural modes at a pose, drives locked: frequencies, damping, what the tool does in them and which link bends.
+//! Natural modes at a pose, drives locked or under their servos: frequencies, damping, what the tool does in them and which link bends.
 
 use flexarm_analysis::{
     DampedMode, LinearError, compliance_parts, damped_modes, effective_mass, mode_outputs, strain_energy_shares,
@@ -22,6 +22,8 @@ pub struct ModeTable {
     pub joints: Vec<String>,
     /// Where they are locked (rad or m).
     pub at: Vec<f64>,
+    /// Joints that are not locked but under a servo, which counts as spring and damper here.
+    pub driven: Vec<String>,
     /// Link that carries the TCP.
     pub tcp: String,
     /// Natural frequencies `|λ| / 2π` (Hz), ascending.
@@ -136,7 +138,11 @@ pub(crate) fn table(
     all: &[DampedMode],
     count: usize,
 ) -> Result<ModeTable, Error> {
-    let compliance = linear.compliance().map_err(step_error)?.diagonal();
+    // Modes under servos share the compliance of springs and servos; where a motor is held by nothing there is none.
+    let compliance = match linear.driven {
+        0 => linear.compliance().map_err(step_error)?.diagonal(),
+        _ => linear.yielding_compliance().map_or_else(Vector6::zeros, |C| C.diagonal()),
+    };
     let mut warnings = posed.warnings;
     let worst = all.iter().map(|mode| mode.residual).fold(0.0, f64::max);
     if worst > 1e-6 {
@@ -164,6 +170,7 @@ pub(crate) fn table(
         modes,
         files: Files::default(),
         warnings,
+        driven: posed.arm.torque_driven.iter().map(|&k| posed.joints[k].clone()).collect(),
         joints: posed.joints,
         at: posed.at,
     })

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use flexarm_kinematics::{Data, Frame, Pose, State, Wrench, forward_kinematics};
+use flexarm_kinematics::{Data, Frame, Pose, State, Wrench, forward_kinematics, rotation_vector};
 use flexarm_stepping::{FlexibleArm, Held, Linear, StepError, linearise};
 use nalgebra::{DVector, Vector6};
 
@@ -47,6 +47,7 @@ impl Posed {
                 warnings.push(format!("joint {:?} at {q} is outside its limits {lower} to {upper}", c.joint));
             }
         }
+        warnings.extend(flexible.doubts.iter().cloned());
         if flexible.springs.is_empty() {
             warnings.push(
                 "the robot has no flexible link and no elastic drive: it does not yield and does not vibrate".into(),
@@ -71,25 +72,24 @@ impl Posed {
         data.X_WF(&self.tool)
     }
 
-    /// Engineering strain of each flexible link with all coordinates at `q`.
-    pub(crate) fn strains(&self, q: &DVector<f64>) -> Vec<f64> {
+    /// Engineering strain of each flexible link, and how far its far end has turned (rad), with all coordinates at `q`.
+    pub(crate) fn strains(&self, q: &DVector<f64>) -> Vec<(f64, f64)> {
         let model = &self.arm.model;
-        let mut data = Data::new(model);
-        forward_kinematics(model, &mut data, q);
-        let place = |link: &str, X: &Pose| {
-            let frame = model.frame(link).expect("a link of the substitution");
-            (data.X_WF(frame) * *X).translation.vector
+        let (mut data, straight) = self.undeformed();
+        let mut ends = |q: &DVector<f64>| -> Vec<Pose> {
+            forward_kinematics(model, &mut data, q);
+            let pose = |link: &str, X: &Pose| data.X_WF(model.frame(link).expect("a link of the substitution")) * *X;
+            let spans = self.flexible.spans.iter();
+            spans.map(|s| pose(&s.link, &s.X_LA).inverse() * pose(&s.distal_link, &s.X_DB)).collect()
         };
-        let strain = |span: &flexarm_flexlink::FlexibleSpan| {
-            let distance = (place(&span.distal_link, &span.X_DB) - place(&span.link, &span.X_LA)).norm();
-            (distance - span.length).abs() / span.length
-        };
-        self.flexible.spans.iter().map(strain).collect()
-    }
-
-    /// Angle of an element's deflection (rad); 0 where its coordinates are not three translations and three angles.
-    pub(crate) fn flexible_rotation(deflection: &DVector<f64>) -> f64 {
-        if deflection.len() == 6 { deflection.rows(3, 3).norm() } else { 0.0 }
+        let (bent, straight) = (ends(q), ends(&straight.q));
+        let pairs = self.flexible.spans.iter().zip(bent.iter().zip(&straight));
+        pairs
+            .map(|(span, (bent, straight))| {
+                let strain = (bent.translation.vector.norm() - span.length).abs() / span.length;
+                (strain, rotation_vector((straight.rotation.inverse() * bent.rotation).matrix()).norm())
+            })
+            .collect()
     }
 
     /// Joints at the pose, elastic coordinates zero.

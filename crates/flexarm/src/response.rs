@@ -21,6 +21,8 @@ const RESPONSE_FILES: [&str; 3] = ["response.csv", "response.svg", "response.jso
 const POINTS: std::ops::RangeInclusive<usize> = 2..=100_000;
 /// Highest frequency that makes sense (Hz).
 const HIGHEST_HZ: f64 = 1e6;
+/// A curve below this part of the largest of its unit is rounding.
+const NOTHING: f64 = 1e-12;
 /// Below this damping ratio a resonance is as good as undamped.
 const UNDAMPED: f64 = 1e-6;
 const AXES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
@@ -189,12 +191,22 @@ pub fn response(
         grid.into_iter().filter_map(|hz| Some((hz, answer(hz)?))).unzip();
     system.check().map_err(linear_error)?;
 
+    // A curve that is nothing beside the others of its unit has no peaks but rounding.
+    let size = |i: usize, j: usize| answers.iter().map(|H| H[(i, j)].norm()).fold(0.0, f64::max);
+    let largest = |unit: &str, other: &dyn Fn(usize, usize) -> String| {
+        let all = (0..channels.len()).flat_map(|i| (0..inputs.len()).map(move |j| (i, j)));
+        all.filter(|&(i, j)| other(i, j) == unit).map(|(i, j)| size(i, j)).fold(0.0, f64::max)
+    };
+    let unit_of = |i: usize, j: usize| unit(&channels[i], &inputs[j], request.quantity);
     let mut curves = Vec::new();
     for (j, input) in inputs.iter().enumerate() {
         for (i, output) in channels.iter().enumerate() {
             let at = |hz: f64| answer(hz).map_or(Complex::new(0.0, 0.0), |H| H[(i, j)]);
             let magnitude: Vec<f64> = answers.iter().map(|H| H[(i, j)].norm()).collect();
-            let peaks = response_peaks(&frequency_hz, &magnitude, |hz| at(hz).norm())
+            let nothing = size(i, j) < NOTHING * largest(&unit_of(i, j), &unit_of);
+            let peaks =
+                if nothing { Vec::new() } else { response_peaks(&frequency_hz, &magnitude, |hz| at(hz).norm()) };
+            let peaks = peaks
                 .into_iter()
                 .map(|p| PeakFigures {
                     frequency_hz: p.frequency,

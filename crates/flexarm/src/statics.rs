@@ -111,12 +111,6 @@ pub fn statics(robot: &Robot, modelling: &Modelling, at: Option<&str>, wrench: [
         // Of a curved spring the tangent alone would not do.
         let load = element.spring_force(deflection.as_slice());
         let moved = J.columns(first - loaded.driven, n) * &deflection;
-        let rotation = Posed::flexible_rotation(&deflection);
-        if rotation > ROTATION_LIMIT {
-            warnings.push(format!(
-                "link {name:?} bends by {rotation:.3} rad, beyond the {ROTATION_LIMIT} rad for which the linear elastic model is good"
-            ));
-        }
         elements.push(ElementStatics {
             name: name.clone(),
             energy_j: element.energy(deflection.as_slice()),
@@ -126,7 +120,13 @@ pub fn statics(robot: &Robot, modelling: &Modelling, at: Option<&str>, wrench: [
             deflection: deflection.as_slice().to_vec(),
         });
     }
-    for (span, strain) in posed.flexible.spans.iter().zip(posed.strains(&loaded.q)) {
+    for (span, (strain, rotation)) in posed.flexible.spans.iter().zip(posed.strains(&loaded.q)) {
+        if rotation > ROTATION_LIMIT {
+            let name = &span.link;
+            warnings.push(format!(
+                "link {name:?} bends by {rotation:.3} rad, beyond the {ROTATION_LIMIT} rad for which the linear elastic model is good"
+            ));
+        }
         if strain > STRAIN_LIMIT {
             let name = &span.link;
             warnings.push(format!(
