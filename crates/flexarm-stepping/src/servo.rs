@@ -6,7 +6,7 @@ use flexarm_kinematics::{Data, State, inverse_dynamics};
 use nalgebra::DVector;
 
 use crate::arm::{FlexibleArm, Servo};
-use crate::drive::{Friction, ServoAxis};
+use crate::drive::Friction;
 
 /// Slack when two times are compared (s).
 const SAME_TIME: f64 = 1e-9;
@@ -19,6 +19,8 @@ pub(crate) struct ServoState {
     pub(crate) torque: Vec<f64>,
     /// Integral part of the torque.
     integral: Vec<f64>,
+    /// The first sample sets the integrals so that the torques stay what they are.
+    fresh: bool,
     next: u64,
     data: Data,
     reference: State,
@@ -32,6 +34,7 @@ impl ServoState {
             friction: arm.friction.clone(),
             torque: vec![0.0; n],
             integral: vec![0.0; n],
+            fresh: false,
             next: 0,
             data: Data::new(&servo.rigid),
             reference: State::zeros(&servo.rigid),
@@ -56,12 +59,10 @@ impl ServoState {
 
     /// Fills the integrators so that the first sample gives the torques `needed`, if it finds the joints on their reference.
     pub(crate) fn hold(&mut self, needed: &DVector<f64>) {
-        for axis in 0..self.servo.axes.len() {
-            let ServoAxis { coordinate, integral_gain, .. } = self.servo.axes[axis];
-            self.torque[axis] = needed[coordinate];
-            // Without an integrator nothing remembers the load: the joint sags into its gains.
-            self.integral[axis] = if integral_gain > 0.0 { f64::NAN } else { 0.0 };
+        for (torque, axis) in self.torque.iter_mut().zip(&self.servo.axes) {
+            *torque = needed[axis.coordinate];
         }
+        self.fresh = true;
     }
 
     /// Takes a sample if one is due at t; `true` if it was.
@@ -77,7 +78,8 @@ impl ServoState {
             let wanted = self.reference.qdot[k] + a.position_gain * (self.reference.q[k] - x[axis]);
             let error = wanted - v[axis];
             let ahead = self.feed_forward(axis);
-            if self.integral[axis].is_nan() {
+            // Without an integrator nothing remembers the load: the joint sags into its gains.
+            if self.fresh && a.integral_gain > 0.0 {
                 self.integral[axis] = self.torque[axis] - ahead - a.velocity_gain * error;
             }
             let unlimited = a.velocity_gain * error + self.integral[axis] + ahead;
@@ -87,6 +89,7 @@ impl ServoState {
                 self.integral[axis] += a.integral_gain * self.servo.sample_s * error;
             }
         }
+        self.fresh = false;
         true
     }
 

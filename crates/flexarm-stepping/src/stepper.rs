@@ -316,6 +316,12 @@ fn check_deflection(arm: &FlexibleArm, x: &DVector<f64>, t: f64, h: f64) -> Resu
     Ok(())
 }
 
+/// After a step: has the arm come apart, and does a force jump here, so that the integrator must start anew?
+fn jumps(system: &mut ReducedArm, x: &DVector<f64>, v: &DVector<f64>, t: f64, h: f64) -> Result<bool, StepError> {
+    check_deflection(&system.arm, x, t, h)?;
+    Ok(system.at_time(t, x, v))
+}
+
 struct ImplicitStepper {
     system: ReducedArm,
     integrator: GeneralizedAlpha,
@@ -328,8 +334,7 @@ impl Stepper for ImplicitStepper {
     fn step(&mut self) -> Result<(), StepError> {
         self.integrator.step(&mut self.system)?;
         let g = &mut self.integrator;
-        check_deflection(&self.system.arm, &g.x, g.time(), g.step_size())?;
-        if self.system.at_time(g.time(), &g.x, &g.v) {
+        if jumps(&mut self.system, &g.x, &g.v, g.time(), g.step_size())? {
             g.restart(&mut self.system)?;
         }
         Ok(())
@@ -361,8 +366,7 @@ impl Stepper for ExplicitStepper {
         self.integrator.step(&mut self.system)?;
         self.steps += 1;
         let g = &mut self.integrator;
-        check_deflection(&self.system.arm, &g.x, g.time(), g.step_size())?;
-        if self.system.at_time(g.time(), &g.x, &g.v) {
+        if jumps(&mut self.system, &g.x, &g.v, g.time(), g.step_size())? {
             g.restart(&mut self.system)?;
         }
         Ok(())
@@ -392,8 +396,7 @@ impl Stepper for ReferenceStepper {
             g.restart_at(t);
         }
         g.step(&mut self.system)?;
-        check_deflection(&self.system.arm, &g.x, g.time(), g.step_size())?;
-        if self.system.at_time(g.time(), &g.x, &g.v) {
+        if jumps(&mut self.system, &g.x, &g.v, g.time(), g.step_size())? {
             g.restart(&mut self.system)?;
         }
         Ok(())
