@@ -149,6 +149,12 @@ impl Disturbances {
     }
 }
 
+/// Names of the links that move, for messages.
+fn moving_links(model: &Model) -> Vec<&str> {
+    let named = model.frames().iter().filter(|f| f.body > 0 && !f.name.starts_with("__"));
+    named.map(|f| f.name.as_str()).collect()
+}
+
 fn frame_of<'m>(name: &str, model: &'m Model) -> Option<&'m Frame> {
     model.frame(if name == "tcp" { TCP_FRAME } else { name })
 }
@@ -164,12 +170,7 @@ fn load(
     let fail = |message: String| source.error(entry.span(), message);
     let name = e.frame.as_ref().map_or("tcp", |frame| frame.get_ref());
     let frame = frame_of(name, model).filter(|f| f.body > 0).ok_or_else(|| {
-        let known: Vec<&str> = model
-            .frames()
-            .iter()
-            .filter(|f| f.body > 0 && !f.name.starts_with("__"))
-            .map(|f| f.name.as_str())
-            .collect();
+        let known = moving_links(model);
         let message = format!("load on frame {name:?}: expected \"tcp\" or a link that moves, of {known:?}");
         source.error(span_or(e.frame.as_ref(), entry), message)
     })?;
@@ -425,12 +426,7 @@ fn change(
     let named = e.link.as_ref().map(|link| link.get_ref().clone());
     let link = named.or(carrier).unwrap_or_else(|| robot.tcp.0.clone());
     let frame = model.frame(&link).filter(|f| f.body > 0).ok_or_else(|| {
-        let known: Vec<&str> = model
-            .frames()
-            .iter()
-            .filter(|f| f.body > 0 && !f.name.starts_with("__"))
-            .map(|f| f.name.as_str())
-            .collect();
+        let known = moving_links(model);
         let message = format!("payload link {link:?}: expected a link that moves, of {known:?}");
         source.error(span_or(e.link.as_ref(), entry), message)
     })?;

@@ -24,6 +24,7 @@ mod check;
 mod compare;
 mod disturbance;
 mod drive_entry;
+mod energy_book;
 mod error;
 pub mod export;
 mod flexible;
