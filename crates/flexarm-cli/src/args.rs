@@ -156,6 +156,9 @@ pub(crate) struct RunArgs {
     /// Band around the final TCP error for the settling time (m)
     #[arg(long, value_name = "METRES", default_value_t = 1e-4, allow_hyphen_values = true)]
     pub(crate) settling_band: f64,
+    /// Factor by which recordings and pictures show deflections [default: so that they are seen]
+    #[arg(long, value_name = "FACTOR", allow_hyphen_values = true)]
+    pub(crate) magnify: Option<f64>,
     /// Output folder [default: a new one in out/]
     #[arg(short, long, value_name = "FOLDER")]
     pub(crate) output: Option<PathBuf>,

@@ -139,6 +139,7 @@ fn run_options(args: &RunArgs, with_twin: bool) -> RunOptions {
         ignore_limits: args.ignore_limits,
         with_twin,
         settling_band_m: args.settling_band,
+        magnification: args.magnify,
     }
 }
 

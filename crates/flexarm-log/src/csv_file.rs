@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 
 use crate::create::FlushClock;
 use crate::shape::Shape;
-use crate::{CreateOptions, LogError, Recorder, RunHeader, Sample};
+use crate::{CreateOptions, LogError, Recorder, RunHeader, RunResult, Sample};
 
 const DISPLACEMENT: [&str; 6] = ["x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad"];
 const WRENCH: [&str; 6] = ["fx_n", "fy_n", "fz_n", "tx_nm", "ty_nm", "tz_nm"];
@@ -80,7 +80,7 @@ impl Recorder for CsvRecorder {
         Ok(())
     }
 
-    fn finish(&mut self, _result: &[(String, String)]) -> Result<(), LogError> {
+    fn finish(&mut self, _result: &RunResult) -> Result<(), LogError> {
         let State::Open(open) = &mut self.state else { return Err(LogError::not_open(&self.path, "finish")) };
         open.writer.flush().map_err(LogError::io(&self.path, "write the last samples"))?;
         self.state = State::Finished;

@@ -26,7 +26,8 @@
 //!     let flexible = TwinSample { q: vec![2.0 * time_s], qdot: vec![2.0], effort: vec![0.5], ..Default::default() };
 //!     recorder.record(&Sample { time_s, step, flexible, ..Sample::default() })?;
 //! }
-//! recorder.finish(&[("tcp.peak_m".into(), "0.0".into())])?;
+//! let figures = vec![("tcp.peak_m".into(), "0.0".into())];
+//! recorder.finish(&RunResult { figures, ..RunResult::default() })?;
 //!
 //! let text = std::fs::read_to_string(&path)?;
 //! assert!(text.starts_with("time,flexible_x_m,flexible_y_m,flexible_z_m,joint_1_position_rad,joint_1_effort,"));
@@ -41,9 +42,11 @@
 #![allow(non_snake_case, reason = "monogram notation: X_WL, pose of L in W")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
+mod bend;
 mod create;
 mod csv_file;
 mod error;
+mod magnify;
 #[cfg(feature = "mcap")]
 mod mcap_file;
 #[cfg(feature = "png")]
@@ -56,10 +59,13 @@ mod rrd_file;
 mod shape;
 #[cfg(any(feature = "mcap", feature = "rerun"))]
 mod tail_file;
+mod trace;
 
+pub use bend::{BendLine, BentMesh};
 pub use create::CreateOptions;
 pub use csv_file::CsvRecorder;
 pub use error::LogError;
+pub use magnify::{Magnifier, stations_in_link};
 #[cfg(feature = "mcap")]
 pub use mcap_file::McapRecorder;
 pub use multi::RecorderSet;
@@ -67,3 +73,4 @@ pub use plot::{Panel, PlotCurve, PlotError, line_plot};
 pub use record::*;
 #[cfg(feature = "rerun")]
 pub use rrd_file::RrdRecorder;
+pub use trace::{RunSource, Trace, TraceRow};

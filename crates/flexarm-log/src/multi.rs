@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::{LogError, Recorder, RunHeader, Sample};
+use crate::{LogError, Recorder, RunHeader, RunResult, Sample};
 
 /// Recorders that get the same header, samples and result.
 ///
@@ -50,11 +50,11 @@ impl RecorderSet {
         self.all(|recorder| recorder.record(sample))
     }
 
-    /// Adds the result figures to all files and closes them.
+    /// Adds the result to all files and closes them.
     ///
     /// # Errors
     /// The first error of a recorder.
-    pub fn finish(&mut self, result: &[(String, String)]) -> Result<(), LogError> {
+    pub fn finish(&mut self, result: &RunResult) -> Result<(), LogError> {
         self.all(|recorder| recorder.finish(result))
     }
 

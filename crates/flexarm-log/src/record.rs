@@ -38,6 +38,27 @@ pub struct RunHeader {
     pub has_rigid: bool,
     /// Samples per second.
     pub log_rate_hz: f64,
+    /// Links that bend.
+    pub bends: Vec<BendInfo>,
+    /// Flexible links and drives that move the tool, in the order of [`Sample::contributions`].
+    pub contributors: Vec<String>,
+    /// Factor by which pictures show deflections; 0 for recordings without a magnified arm.
+    pub magnification: f64,
+    /// Deviation from the rigid twin that gets the last colour of the scale (m).
+    pub color_scale_m: f64,
+}
+
+/// How a link bends: stations along the line from its near interface to its far one.
+///
+/// In a sample [`TwinSample::X_WS`] says where the stations are; between them the link is drawn as a beam.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BendInfo {
+    /// Index into [`RunHeader::links`].
+    pub link: usize,
+    /// Poses of the undeformed stations in the link, near interface first.
+    pub X_LS: Vec<Pose>,
+    /// Links that hang on a station: index into [`RunHeader::links`], number of the station.
+    pub carries: Vec<(usize, usize)>,
 }
 
 /// A link and the link that carries it.
@@ -94,6 +115,9 @@ pub struct TwinSample {
     pub X_WL: Vec<Pose>,
     /// Pose of the tool centre point in the world.
     pub X_WT: Pose,
+    /// Poses of the stations of all [`RunHeader::bends`] in the world, one link after the other; empty for the rigid twin,
+    /// whose stations are where [`BendInfo::X_LS`] says.
+    pub X_WS: Vec<Pose>,
 }
 
 /// One elastic element at one instant.
@@ -133,10 +157,76 @@ pub struct Sample {
     pub error_path: [f64; 6],
     /// Elastic elements, in header order.
     pub elastic: Vec<ElasticSample>,
+    /// TCP displacement that each contributor's deflection alone causes (m, world axes), in header order.
+    pub contributions: Vec<[f64; 3]>,
     /// Energies.
     pub energy: EnergySample,
     /// Iterations of the last step (0 for explicit steppers) and residual norm.
     pub solver: [f64; 2],
+}
+
+/// What kind of thing happened at an instant of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum EventKind {
+    /// A move begins.
+    MoveStart,
+    /// A move ends; the joints rest.
+    MoveEnd,
+    /// The TCP error is largest.
+    Peak,
+    /// The TCP error stays within the settling band from here on.
+    Settled,
+    /// A limit is passed.
+    Limit,
+    /// A load or payload changes.
+    Load,
+    /// The run was given up.
+    Stopped,
+}
+
+impl EventKind {
+    /// A word for files.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::MoveStart => "move start",
+            Self::MoveEnd => "move end",
+            Self::Peak => "peak",
+            Self::Settled => "settled",
+            Self::Limit => "limit",
+            Self::Load => "load",
+            Self::Stopped => "stopped",
+        }
+    }
+
+    /// The kind that a word of [`EventKind::word`] names.
+    #[must_use]
+    pub fn from_word(word: &str) -> Option<Self> {
+        let all = [Self::MoveStart, Self::MoveEnd, Self::Peak, Self::Settled, Self::Limit, Self::Load, Self::Stopped];
+        all.into_iter().find(|kind| kind.word() == word)
+    }
+}
+
+/// Something that happened at an instant.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Event {
+    /// When (s).
+    pub time_s: f64,
+    /// What kind of thing.
+    pub kind: EventKind,
+    /// In words, with numbers and units.
+    pub text: String,
+}
+
+/// What is known only at the end of a run.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RunResult {
+    /// Label and value pairs.
+    pub figures: Vec<(String, String)>,
+    /// What happened, in order of time.
+    pub events: Vec<Event>,
+    /// Files about the result to put into the recording, such as its summary.
+    pub attachments: Vec<Attachment>,
 }
 
 /// Writes a run while it goes on: `begin` once, `record` any number of times, `finish` once.
@@ -164,11 +254,11 @@ pub trait Recorder {
     /// (full disk).
     fn record(&mut self, sample: &Sample) -> Result<(), crate::LogError>;
 
-    /// Adds the result figures and closes the file so that every reader accepts it.
+    /// Adds the result and closes the file so that every reader accepts it.
     ///
     /// # Errors
     /// [`crate::LogError`] on a write error.
-    fn finish(&mut self, result: &[(String, String)]) -> Result<(), crate::LogError>;
+    fn finish(&mut self, result: &RunResult) -> Result<(), crate::LogError>;
 
     /// Where it writes.
     fn path(&self) -> &std::path::Path;

@@ -10,6 +10,8 @@ pub(crate) struct Shape {
     joints: usize,
     links: usize,
     elements: usize,
+    stations: usize,
+    contributors: usize,
     pub(crate) has_rigid: bool,
 }
 
@@ -19,6 +21,8 @@ impl Shape {
             joints: header.joints.len(),
             links: header.links.len(),
             elements: header.elements.len(),
+            stations: header.bends.iter().map(|bend| bend.X_LS.len()).sum(),
+            contributors: header.contributors.len(),
             has_rigid: header.has_rigid,
         }
     }
@@ -34,8 +38,12 @@ impl Shape {
             ]
         };
         let rigid = self.has_rigid.then(|| twin(&sample.rigid));
-        let elastic = [("elastic", sample.elastic.len(), self.elements)];
-        let lists = twin(&sample.flexible).into_iter().chain(rigid.into_iter().flatten()).chain(elastic);
+        let own = [
+            ("elastic", sample.elastic.len(), self.elements),
+            ("X_WS", sample.flexible.X_WS.len(), self.stations),
+            ("contributions", sample.contributions.len(), self.contributors),
+        ];
+        let lists = twin(&sample.flexible).into_iter().chain(rigid.into_iter().flatten()).chain(own);
 
         for (what, found, expected) in lists {
             if found != expected {

@@ -7,7 +7,7 @@ mod synthetic;
 use std::collections::HashMap;
 use std::path::Path;
 
-use flexarm_log::{CreateOptions, CsvRecorder, LogError, Recorder, RunHeader};
+use flexarm_log::{CreateOptions, CsvRecorder, LogError, Recorder, RunHeader, RunResult};
 
 fn write(path: &Path, header: &RunHeader, samples: u64) {
     let mut recorder = CsvRecorder::create(path, CreateOptions::default());
@@ -89,7 +89,7 @@ fn calls_in_the_wrong_order_are_errors() {
     assert!(matches!(recorder.record(&synthetic::sample(0)), Err(LogError::Order { call: "record", .. })));
     recorder.begin(&synthetic::header()).unwrap();
     assert!(matches!(recorder.begin(&synthetic::header()), Err(LogError::Order { call: "begin", .. })));
-    recorder.finish(&[]).unwrap();
-    assert!(matches!(recorder.finish(&[]), Err(LogError::Order { call: "finish", .. })));
+    recorder.finish(&RunResult::default()).unwrap();
+    assert!(matches!(recorder.finish(&RunResult::default()), Err(LogError::Order { call: "finish", .. })));
     std::fs::remove_file(path).unwrap();
 }

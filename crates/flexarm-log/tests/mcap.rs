@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Duration;
 
-use flexarm_log::{CreateOptions, LinkInfo, LogError, McapRecorder, Recorder, RunHeader};
+use flexarm_log::{CreateOptions, LinkInfo, LogError, McapRecorder, Recorder, RunHeader, RunResult};
 use mcap::read::Options;
 use mcap::{MessageStream, Summary};
 
@@ -351,7 +351,7 @@ fn the_epoch_moves_all_stamps_and_times_out_of_range_are_refused() {
         let sample = flexarm_log::Sample { time_s, ..synthetic::sample(4) };
         assert!(matches!(recorder.record(&sample), Err(LogError::Time { .. })), "{time_s}");
     }
-    recorder.finish(&[]).unwrap();
+    recorder.finish(&RunResult::default()).unwrap();
     let file = std::fs::read(&path).unwrap();
     let (log_time, data) = &messages(&file, "/joint_states")[0];
     assert_eq!((*log_time, CdrReader::new(data).header().0), (epoch + 6_000_000, epoch + 6_000_000));

@@ -6,7 +6,7 @@ mod synthetic;
 
 use std::error::Error;
 
-use flexarm_log::{CreateOptions, CsvRecorder, LogError, RecorderSet};
+use flexarm_log::{CreateOptions, CsvRecorder, LogError, RecorderSet, RunResult};
 
 fn pair(first: &std::path::Path, second: &std::path::Path, options: CreateOptions) -> RecorderSet {
     let mut set = RecorderSet::new();
@@ -30,7 +30,7 @@ fn an_existing_file_stops_the_run_before_any_file_is_made() {
     let mut set = pair(&new, &old, CreateOptions::default().with_overwrite(true));
     set.begin(&synthetic::header()).unwrap();
     set.record(&synthetic::sample(0)).unwrap();
-    set.finish(&[]).unwrap();
+    set.finish(&RunResult::default()).unwrap();
     assert_eq!(std::fs::read(&new).unwrap(), std::fs::read(&old).unwrap());
     assert_eq!(set.paths().collect::<Vec<_>>(), [&new, &old]);
     [new, old].iter().for_each(|path| std::fs::remove_file(path).unwrap());
@@ -50,7 +50,7 @@ fn one_failing_recorder_does_not_cost_the_others_their_data() {
     let mut set = pair(&bad, &good, CreateOptions::default());
     assert!(set.begin(&synthetic::header()).is_err());
     assert!(set.record(&synthetic::sample(0)).is_err());
-    assert!(set.finish(&[]).is_err());
+    assert!(set.finish(&RunResult::default()).is_err());
     assert_eq!(std::fs::read_to_string(&good).unwrap().lines().count(), 2);
     std::fs::remove_file(good).unwrap();
 }

@@ -5,24 +5,28 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use flexarm_analysis::{
-    ContributionPeaks, ErrorRecord, MetricSettings, PathFrame, engineering_strain, tcp_error, tcp_metrics,
+    ContributionPeaks, ErrorRecord, MetricSettings, PathFrame, TcpMetrics, engineering_strain, tcp_error, tcp_metrics,
 };
 use flexarm_kinematics::{
     Data, Frame, JointMotion, Pose, State, forward_kinematics, kinetic_energy, potential_energy, rotation_vector,
 };
-use flexarm_log::{ElasticSample, EnergySample, RecorderSet, Sample};
+use flexarm_log::{
+    Attachment, BendInfo, ElasticSample, EnergySample, Event, EventKind, RecorderSet, RunResult, Sample, Trace,
+};
 use flexarm_stepping::{FlexibleArm, Load, Observation, StepError, Stepper, StepperKind, new_stepper};
 use nalgebra::{Matrix6, Vector3, Vector6};
 
+use crate::bends::stations;
 use crate::disturbance::{Disturbances, EXPRESSION_PERIOD};
 use crate::energy_book::EnergyBook;
 use crate::error::Error;
 use crate::flexible::{FlexibleRobot, Owner};
+use crate::magnification::Expected;
 use crate::motion::Motion;
 use crate::options::{Outputs, RunOptions};
-use crate::record::{header, link_frames, recorders};
+use crate::record::{header, link_frames, ordered_links, recorders};
 use crate::robot::{Robot, TCP_FRAME};
-use crate::summary::{DriveFigures, LinkFigures, StepperFigures, Summary, TcpFigures};
+use crate::summary::{DriveFigures, Files, LinkFigures, StepperFigures, Summary, TcpFigures};
 use crate::twin::RigidTwin;
 
 /// Largest elastic rotation for which the linear elastic model is taken to hold (rad).
@@ -50,6 +54,20 @@ pub fn simulate(
     outputs: Option<&Outputs>,
     progress: &mut Progress<'_>,
 ) -> Result<Summary, Error> {
+    simulate_traced(robot, motion, options, outputs, progress).map(|(summary, _)| summary)
+}
+
+/// As [`simulate`], and returns the curves of the run.
+///
+/// # Errors
+/// As [`simulate`].
+pub fn simulate_traced(
+    robot: &Robot,
+    motion: &Motion,
+    options: &RunOptions,
+    outputs: Option<&Outputs>,
+    progress: &mut Progress<'_>,
+) -> Result<(Summary, Trace), Error> {
     let started = Instant::now();
     let cpu = cpu_time::ProcessTime::now();
     if !motion.violations.is_empty() && !options.ignore_limits {
@@ -72,13 +90,22 @@ pub fn simulate(
     }
     let stepper = new_stepper(options.stepper, arm.clone(), options.step_s, options.start).map_err(failed)?;
 
+    let expected = Expected::of(&arm, &tool_frame(&arm), motion.trajectory.duration(), options.start);
     let mut run = Run::new(robot, motion, options, &flexible, arm, stepper);
     let mut files = recorders(outputs)?;
-    let head = header(robot, motion, options, &run.arm, flexible.links_model());
+    let mut head = header(robot, motion, options, &run.arm, flexible.links_model());
+    head.bends.clone_from(&run.bends);
+    head.contributors = run.contributors.iter().map(|(_, name)| name.clone()).collect();
+    head.color_scale_m = expected.color_scale_m();
+    head.magnification = options.magnification.unwrap_or_else(|| expected.magnification());
     files.set.begin(&head)?;
+    run.trace = Trace::new(head);
     let end = run.go(&mut files.set, outputs.is_some(), progress);
 
-    let mut summary = run.summary(robot, motion, options);
+    let (mut summary, mut events) = run.summary(robot, motion, options);
+    if let Err(error) = &end {
+        events.push(Event { time_s: run.seen.t, kind: EventKind::Stopped, text: error.to_string() });
+    }
     summary.warnings.extend(load_warnings);
     summary.end = end.as_ref().map_or_else(ToString::to_string, |()| "complete".into());
     summary.wall_s = started.elapsed().as_secs_f64();
@@ -86,11 +113,33 @@ pub fn simulate(
     summary.real_time_factor = summary.duration_s / summary.wall_s.max(1e-9);
     summary.cpu_s_per_simulated_s = summary.cpu_s / summary.duration_s.max(1e-9);
     summary.files = files.names.clone();
-    files.set.finish(&summary.labelled())?;
+    run.trace.finish(result(&summary, events));
+    files.set.finish(&run.trace.result)?;
     if let Some(outputs) = outputs {
         crate::report::write(outputs, &summary)?;
     }
-    end.map(|()| summary)
+    end.map(|()| (summary, run.trace))
+}
+
+/// What recordings are told at the end. Timings stay out of it: recordings of the same run are the same bytes.
+fn result(summary: &Summary, events: Vec<Event>) -> RunResult {
+    let timeless =
+        Summary { wall_s: 0.0, cpu_s: 0.0, real_time_factor: 0.0, cpu_s_per_simulated_s: 0.0, ..summary.clone() };
+    let timeless = Summary { files: Files::default(), ..timeless };
+    let json = serde_json::to_string_pretty(&timeless).expect("plain numbers and strings") + "\n";
+    RunResult {
+        figures: summary.labelled(),
+        events,
+        attachments: vec![Attachment {
+            name: "summary.json".into(),
+            media_type: "application/json".into(),
+            bytes: json.into_bytes(),
+        }],
+    }
+}
+
+fn tool_frame(arm: &FlexibleArm) -> Frame {
+    arm.model.frame(TCP_FRAME).expect("added when the robot was loaded").clone()
 }
 
 /// Steps between two looks at the progress callback.
@@ -109,6 +158,7 @@ fn check_options(motion: &Motion, options: &RunOptions) -> Result<(), Error> {
     positive("step", options.step_s, "s")?;
     positive("log rate", options.log_rate_hz, "Hz")?;
     positive("settling band", options.settling_band_m, "m")?;
+    positive("magnification", options.magnification.unwrap_or(1.0), "")?;
     let duration = motion.trajectory.duration();
     if options.step_s > duration {
         let message = format!("the step (--step {} s) is longer than the motion ({duration} s)", options.step_s);
@@ -166,6 +216,14 @@ struct Run<'a> {
     stepper: Box<dyn Stepper>,
     tcp: Frame,
     link_frames: Vec<Frame>,
+    bends: Vec<BendInfo>,
+    stations: Vec<Frame>,
+    /// Flexible links and elastic drives: place among all displacements, name.
+    contributors: Vec<(usize, String)>,
+    trace: Trace,
+    /// When the force of a drive first passed its limit.
+    overloaded: Vec<Option<f64>>,
+    payload_times: Vec<f64>,
     twin: RigidTwin,
     seen: Observation,
     path: PathFrame,
@@ -203,7 +261,11 @@ impl<'a> Run<'a> {
         let (n_links, n_drives) = (flexible.spans.len(), robot.drives.len());
         let frame = |name: &str| arm.model.frame(name).expect("a link of the substitution").clone();
         let ends = flexible.spans.iter().map(|s| (frame(&s.link), frame(&s.distal_link))).collect();
-        let tcp = arm.model.frame(TCP_FRAME).expect("added when the robot was loaded").clone();
+        let tcp = tool_frame(&arm);
+        let (bends, stations) = stations(&flexible.bends, &arm.model, &ordered_links(robot));
+        let drives = robot.drives.iter().enumerate().filter(|(k, _)| flexible.owners.contains(&Owner::Drive(*k)));
+        let contributors = flexible.spans.iter().enumerate().map(|(k, span)| (k, span.link.clone()));
+        let contributors = contributors.chain(drives.map(|(k, drive)| (n_links + k, drive.joint.clone()))).collect();
         let mut twin = RigidTwin::new(&arm);
         // Before the first motion the path axes are those of its beginning.
         let duration = motion.trajectory.duration();
@@ -220,6 +282,12 @@ impl<'a> Run<'a> {
             flexible,
             tcp,
             link_frames: link_frames(robot, &arm.model),
+            bends,
+            stations,
+            contributors,
+            trace: Trace::default(),
+            overloaded: vec![None; arm.model.n_actuated()],
+            payload_times: arm.inertia_changes.iter().map(|change| change.t).collect(),
             twin,
             seen: Observation::new(&arm),
             path,
@@ -250,6 +318,7 @@ impl<'a> Run<'a> {
             if step % self.every == 0 || step == self.last {
                 self.observe(step);
                 files.record(&self.sample)?;
+                self.trace.push(&self.sample);
             }
             if step % POLL_EVERY == 0 && progress(self.stepper.time(), total).is_break() {
                 return Err(Error::Interrupted { t: self.stepper.time(), partial });
@@ -291,8 +360,11 @@ impl<'a> Run<'a> {
         self.times.push(t);
         self.errors.push(error);
         self.positions.push(X_rigid.translation.vector.into());
-        for (peak, drive) in self.peak_drive.iter_mut().zip(self.seen.drive.iter()) {
-            *peak = peak.max(drive.abs());
+        for (k, drive) in self.seen.drive.iter().enumerate() {
+            self.peak_drive[k] = self.peak_drive[k].max(drive.abs());
+            if drive.abs() > self.arm.model.coordinates()[k].limits.effort {
+                self.overloaded[k].get_or_insert(t);
+            }
         }
         for axis in self.arm.servo.iter().flat_map(|servo| &servo.axes) {
             self.at_limit[axis.coordinate] += usize::from(self.seen.drive[axis.coordinate].abs() >= axis.limit);
@@ -323,6 +395,8 @@ impl<'a> Run<'a> {
         flexible.X_WL.clear();
         flexible.X_WL.extend(self.link_frames.iter().map(|f| self.seen.X_WB[f.body] * f.X_BF));
         flexible.X_WT = X_flexible;
+        flexible.X_WS.clear();
+        flexible.X_WS.extend(self.stations.iter().map(|f| self.seen.X_WB[f.body] * f.X_BF));
 
         let rigid = &mut sample.rigid;
         rigid.q.clear();
@@ -370,6 +444,9 @@ impl<'a> Run<'a> {
             }
             self.sample.elastic[k] = ElasticSample { deflection, load };
         }
+        let contributions = self.contributors.iter().map(|(k, _)| [0, 1, 2].map(|c| moved[*k][c]));
+        self.sample.contributions.clear();
+        self.sample.contributions.extend(contributions);
         for (k, displacement) in moved.iter().enumerate() {
             self.contributions.update(k, t, &Matrix6::identity(), displacement);
         }
@@ -389,7 +466,7 @@ impl<'a> Run<'a> {
     }
 
     /// Figures of what was seen so far.
-    fn summary(&self, robot: &Robot, motion: &Motion, options: &RunOptions) -> Summary {
+    fn summary(&self, robot: &Robot, motion: &Motion, options: &RunOptions) -> (Summary, Vec<Event>) {
         let moves: Vec<(f64, f64)> = motion.trajectory.moves().iter().map(|m| (m.start, m.end)).collect();
         let settings = MetricSettings { settling_band_m: options.settling_band_m };
         let record = ErrorRecord {
@@ -423,7 +500,8 @@ impl<'a> Run<'a> {
         warnings.extend(motion.warnings.iter().cloned());
         warnings.extend(motion.violations.iter().map(|v| format!("joint limit: {v}")));
         self.validity_warnings(&links, &mut warnings);
-        Summary {
+        let events = self.events(metrics.as_ref().filter(|_| options.with_twin));
+        let summary = Summary {
             robot: robot.name.clone(),
             trajectory: motion.name.clone(),
             links_model: self.flexible.links_model(),
@@ -448,7 +526,53 @@ impl<'a> Run<'a> {
             error_curve: crate::summary::thinned(&self.times, &self.errors),
             warnings,
             ..Summary::default()
+        };
+        (summary, events)
+    }
+
+    /// What happened when, in order of time, as far as the run came.
+    fn events(&self, metrics: Option<&TcpMetrics>) -> Vec<Event> {
+        let mut events = Vec::new();
+        let mut add = |time_s: f64, kind: EventKind, text: String| events.push(Event { time_s, kind, text });
+        for (k, m) in self.motion.trajectory.moves().iter().enumerate() {
+            add(m.start, EventKind::MoveStart, format!("move {} begins", k + 1));
+            add(m.end, EventKind::MoveEnd, format!("move {} ends", k + 1));
         }
+        if let Some(metrics) = metrics {
+            add(metrics.t_peak_s, EventKind::Peak, format!("largest TCP error: {:.3} mm", 1e3 * metrics.peak_m));
+            for hold in &metrics.holds {
+                if let Some(settling) = hold.settling_s {
+                    let band = 1e3 * self.options.settling_band_m;
+                    let text = format!("settled to within {band} mm, {settling:.3} s after the move");
+                    add(hold.start_s + settling, EventKind::Settled, text);
+                }
+            }
+        }
+        for v in &self.motion.violations {
+            add(v.since_s, EventKind::Limit, v.to_string());
+        }
+        for (c, since) in self.arm.model.coordinates().iter().zip(&self.overloaded) {
+            if let Some(since) = since {
+                let text =
+                    format!("joint {:?} needs more than its limit of {:.0} N m (or N)", c.joint, c.limits.effort);
+                add(*since, EventKind::Limit, text);
+            }
+        }
+        let mut jumps: Vec<f64> = self.arm.loads.iter().flat_map(|load| load.jumps.iter().copied()).collect();
+        jumps.sort_by(f64::total_cmp);
+        jumps.dedup();
+        // A table or a milling load has a corner at every row; a list of those tells nobody anything.
+        const MOST_JUMPS: usize = 20;
+        for t in jumps.iter().take(if jumps.len() <= MOST_JUMPS { MOST_JUMPS } else { 1 }) {
+            add(*t, EventKind::Load, "an external load changes".into());
+        }
+        for t in &self.payload_times {
+            add(*t, EventKind::Load, "the payload changes".into());
+        }
+        let reached = self.times.last().copied().unwrap_or(0.0);
+        events.retain(|event| event.time_s <= reached + 1e-9);
+        events.sort_by(|a, b| a.time_s.total_cmp(&b.time_s).then(a.kind.cmp(&b.kind)));
+        events
     }
 
     /// TCP error with the drives at rest in their first position, also for runs that start undeformed (m).

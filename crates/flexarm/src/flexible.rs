@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
+use crate::bends::Bend;
 use flexarm_fem::{BeamLink, ModalLink, ModalOptions};
 use flexarm_flexlink::{FlexibleLink, FlexibleSpan, Gearbox, LinkForm, insert_gearboxes, substitute};
 use flexarm_kinematics::{Data, Model, mass_matrix};
@@ -170,6 +171,8 @@ pub struct FlexibleRobot {
     pub owners: Vec<Owner>,
     /// Flexible links.
     pub spans: Vec<FlexibleSpan>,
+    /// How they are drawn bent, in the order of the spans.
+    pub bends: Vec<Bend>,
     /// The same robot with rigid links and without gearboxes.
     pub rigid: Arc<Model>,
     /// Friction per actuated coordinate.
@@ -305,6 +308,8 @@ impl Robot {
         }
         let mut substituted = substitute(&self.rigid, &links).map_err(|e| usage(e.to_string()))?;
 
+        let bends = crate::bends::bends(&substituted);
+
         let kind = |drive: &Drive| match modelling.drives {
             DriveModel::AsFiled => drive.kind,
             DriveModel::Rigid => DriveKind::Prescribed,
@@ -372,7 +377,7 @@ impl Robot {
             }
         }
         let (spans, rigid) = (substituted.spans, self.rigid_model()?);
-        Ok(FlexibleRobot { model: Arc::new(model), springs, owners, spans, rigid, friction, torque, doubts })
+        Ok(FlexibleRobot { model: Arc::new(model), springs, owners, spans, bends, rigid, friction, torque, doubts })
     }
 }
 

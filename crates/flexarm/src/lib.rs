@@ -20,6 +20,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
 mod beam_entry;
+mod bends;
 mod check;
 mod compare;
 mod disturbance;
@@ -31,6 +32,7 @@ mod flexible;
 pub mod import;
 mod inspect;
 mod link_entry;
+mod magnification;
 mod mode_recording;
 mod modes;
 mod motion;
@@ -48,8 +50,9 @@ mod statics;
 mod summary;
 mod twin;
 
+pub use bends::Bend;
 pub use check::{Finding, check};
-pub use compare::{Progress, simulate};
+pub use compare::{Progress, simulate, simulate_traced};
 pub use disturbance::Disturbances;
 pub use drive_entry::{Drive, DriveKind};
 pub use error::Error;

@@ -1,11 +1,12 @@
 //! Modes as a recording: each swings for a few seconds after another, slowly and large enough to see.
 
 use flexarm_analysis::{DampedMode, tcp_error};
-use flexarm_kinematics::forward_kinematics;
-use flexarm_log::{ElasticSample, Sample, TwinSample};
+use flexarm_kinematics::{Frame, forward_kinematics};
+use flexarm_log::{ElasticSample, RunResult, Sample, TwinSample};
 use flexarm_stepping::Linear;
 use nalgebra::{DVector, Vector6};
 
+use crate::bends::stations;
 use crate::error::Error;
 use crate::modes::{ModeTable, modes_of, table};
 use crate::options::Modelling;
@@ -71,6 +72,9 @@ pub fn record_modes(
     let mut header = robot_header(robot, &posed.arm);
     header.trajectory = "modes".into();
     header.has_rigid = true;
+    let flexible = robot.modelled(modelling)?;
+    let (bends, stations) = stations(&flexible.bends, &posed.arm.model, &header.links);
+    header.bends = bends;
     header.log_rate_hz = RATE_HZ;
     let swings = (movie.seconds * SHOWN_HZ).ceil();
     let rows: Vec<(String, String)> = shown
@@ -99,7 +103,7 @@ pub fn record_modes(
     header.metadata = vec![("flexarm.modes".into(), rows)];
     files.set.begin(&header)?;
     let per_mode = (swings / SHOWN_HZ * RATE_HZ).round() as u64;
-    let mut stage = Stage::new(robot, &posed, &linear);
+    let mut stage = Stage::new(robot, &posed, &linear, stations);
     for (k, mode) in shown.iter().enumerate() {
         let size = magnification(mode, &linear, motion);
         let last = if k + 1 == shown.len() { per_mode } else { per_mode - 1 };
@@ -110,7 +114,8 @@ pub fn record_modes(
             files.set.record(stage.sample(step, &(&linear.equilibrium + shape)))?;
         }
     }
-    files.set.finish(&[("modes".into(), shown.len().to_string())])?;
+    let figures = vec![("modes".into(), shown.len().to_string())];
+    files.set.finish(&RunResult { figures, ..RunResult::default() })?;
     let names = files.names.clone();
     let mut figures = table(robot, posed, &linear, &all, count)?;
     figures.files = names;
@@ -139,12 +144,13 @@ struct Stage<'a> {
     linear: &'a Linear,
     data: flexarm_kinematics::Data,
     q: DVector<f64>,
-    frames: Vec<flexarm_kinematics::Frame>,
+    frames: Vec<Frame>,
+    stations: Vec<Frame>,
     sample: Sample,
 }
 
 impl<'a> Stage<'a> {
-    fn new(robot: &Robot, posed: &'a Posed, linear: &'a Linear) -> Self {
+    fn new(robot: &Robot, posed: &'a Posed, linear: &'a Linear, stations: Vec<Frame>) -> Self {
         let (mut data, state) = posed.undeformed();
         let model = &posed.arm.model;
         forward_kinematics(model, &mut data, &state.q);
@@ -156,10 +162,11 @@ impl<'a> Stage<'a> {
             effort: zero,
             X_WL: frames.iter().map(|f| data.X_WF(f)).collect(),
             X_WT: data.X_WF(&posed.tool),
+            X_WS: Vec::new(),
         };
         let elastic = vec![ElasticSample::default(); linear.elements.len()];
         let sample = Sample { flexible: rigid.clone(), rigid, elastic, ..Sample::default() };
-        Self { posed, linear, data, q: state.q, frames, sample }
+        Self { posed, linear, data, q: state.q, frames, stations, sample }
     }
 
     fn sample(&mut self, step: u64, x: &DVector<f64>) -> &Sample {
@@ -175,6 +182,8 @@ impl<'a> Stage<'a> {
         sample.step = step;
         sample.flexible.X_WL.clear();
         sample.flexible.X_WL.extend(self.frames.iter().map(|f| self.data.X_WF(f)));
+        sample.flexible.X_WS.clear();
+        sample.flexible.X_WS.extend(self.stations.iter().map(|f| self.data.X_WF(f)));
         sample.flexible.X_WT = self.data.X_WF(&self.posed.tool);
         sample.error_world = tcp_error(&sample.rigid.X_WT, &sample.flexible.X_WT);
         for (elastic, (_, range)) in sample.elastic.iter_mut().zip(&self.linear.elements) {

@@ -66,6 +66,8 @@ pub struct RunOptions {
     pub with_twin: bool,
     /// Band of the settling time (m).
     pub settling_band_m: f64,
+    /// Factor by which recordings and pictures show deflections; chosen for the run without it.
+    pub magnification: Option<f64>,
 }
 
 impl Default for RunOptions {
@@ -80,6 +82,7 @@ impl Default for RunOptions {
             ignore_limits: false,
             with_twin: true,
             settling_band_m: 1e-4,
+            magnification: None,
         }
     }
 }

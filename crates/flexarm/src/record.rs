@@ -56,7 +56,7 @@ pub(crate) fn recorders(outputs: Option<&Outputs>) -> Result<Recordings, Error> 
 }
 
 /// Links of the URDF, parents before children.
-fn ordered_links(robot: &Robot) -> Vec<LinkInfo> {
+pub(crate) fn ordered_links(robot: &Robot) -> Vec<LinkInfo> {
     let mechanism = &robot.urdf.mechanism;
     let base = mechanism.links.iter().find(|l| mechanism.joints.iter().all(|j| j.child != l.name));
     let mut links: Vec<LinkInfo> =

@@ -26,7 +26,7 @@ use self::messages::{Stamp, Transform};
 use crate::create::FlushClock;
 use crate::shape::Shape;
 use crate::tail_file::SharedTail;
-use crate::{CreateOptions, LogError, Recorder, RunHeader, Sample, TwinSample};
+use crate::{CreateOptions, LogError, Recorder, RunHeader, RunResult, Sample, TwinSample};
 
 /// Uncompressed size at which a chunk is closed.
 const CHUNK_BYTES: usize = 1 << 20;
@@ -123,7 +123,7 @@ impl Recorder for McapRecorder {
         Ok(())
     }
 
-    fn finish(&mut self, result: &[(String, String)]) -> Result<(), LogError> {
+    fn finish(&mut self, result: &RunResult) -> Result<(), LogError> {
         let State::Open(open) = &mut self.state else { return Err(LogError::not_open(&self.path, "finish")) };
         open.finish(result).map_err(mcap_error(&self.path, "write the result and the index"))?;
         self.state = State::Finished;
@@ -314,8 +314,8 @@ impl Open {
         })
     }
 
-    fn finish(&mut self, result: &[(String, String)]) -> McapResult<()> {
-        self.metadata("flexarm.result", result.iter().cloned())?;
+    fn finish(&mut self, result: &RunResult) -> McapResult<()> {
+        self.metadata("flexarm.result", result.figures.iter().cloned())?;
         self.writer.finish()?;
         Ok(self.file.flush()?)
     }

@@ -24,7 +24,7 @@ use self::stream::{Ids, RrdStream, StreamError};
 use self::tracks::{PathTrack, PoseTrack, SIM_TIME, ScalarTrack, SkeletonTrack, Times};
 use crate::create::FlushClock;
 use crate::shape::Shape;
-use crate::{CreateOptions, LinkMesh, LogError, Recorder, RunHeader, Sample, TwinSample};
+use crate::{CreateOptions, LinkMesh, LogError, Recorder, RunHeader, RunResult, Sample, TwinSample};
 
 /// Rows of a chunk: enough for compression, few enough for quick reading.
 const CHUNK_ROWS: usize = 512;
@@ -101,7 +101,7 @@ impl Recorder for RrdRecorder {
         open.sample(time_ns as i64, sample).map_err(stream_error(&self.path, "write a sample"))
     }
 
-    fn finish(&mut self, result: &[(String, String)]) -> Result<(), LogError> {
+    fn finish(&mut self, result: &RunResult) -> Result<(), LogError> {
         let State::Open(open) = &mut self.state else { return Err(LogError::not_open(&self.path, "finish")) };
         open.finish(result).map_err(stream_error(&self.path, "write the result and the index"))?;
         self.state = State::Finished;
@@ -300,15 +300,15 @@ impl Open {
         chunks.iter().try_for_each(|chunk| self.stream.append(&self.recording, chunk))
     }
 
-    fn finish(&mut self, result: &[(String, String)]) -> Result<(), StreamError> {
+    fn finish(&mut self, result: &RunResult) -> Result<(), StreamError> {
         self.closed = true;
         self.layout(None)?;
         self.commit_rows()?;
         let mut ids = *self.stream.ids();
         let paths = self.paths(&mut ids)?;
         self.append_all(ids, &paths)?;
-        if !result.is_empty() {
-            self.summary(result)?;
+        if !result.figures.is_empty() {
+            self.summary(&result.figures)?;
         }
         self.stream.finish()
     }
@@ -318,7 +318,7 @@ impl Drop for Open {
     /// A run that was given up still gets its last rows and its index; errors have nowhere to go.
     fn drop(&mut self) {
         if !self.closed {
-            let _ = self.finish(&[]);
+            let _ = self.finish(&RunResult::default());
         }
     }
 }

@@ -8,7 +8,10 @@ use std::f64::consts::TAU;
 use std::path::PathBuf;
 
 use flexarm_kinematics::Pose;
-use flexarm_log::{Attachment, ElasticSample, EnergySample, LinkInfo, LinkMesh, RunHeader, Sample, TwinSample};
+use flexarm_log::{
+    Attachment, BendInfo, ElasticSample, EnergySample, Event, EventKind, LinkInfo, LinkMesh, RunHeader, RunResult,
+    Sample, TwinSample,
+};
 use nalgebra::{Rotation3, Translation3, Vector3};
 
 /// Samples per second.
@@ -58,12 +61,33 @@ pub(crate) fn header() -> RunHeader {
         description: "# synthetic, swing\n\nThree links, the upper arm bends. *Made-up numbers.*".into(),
         has_rigid: true,
         log_rate_hz: RATE_HZ,
+        bends: vec![BendInfo {
+            link: 2,
+            X_LS: vec![Pose::identity(), Pose::from(Translation3::new(UPPER_ARM, 0.0, 0.0))],
+            carries: vec![(3, 1)],
+        }],
+        contributors: vec!["upper_arm".into()],
+        magnification: 50.0,
+        color_scale_m: 2.5e-3,
     }
 }
 
 /// Result figures for `finish`.
-pub(crate) fn result() -> Vec<(String, String)> {
-    vec![("tcp.peak_m".into(), "0.00211".into()), ("tcp.end_m".into(), "0.00130".into())]
+pub(crate) fn result() -> RunResult {
+    let event = |time_s, kind, text: &str| Event { time_s, kind, text: text.into() };
+    RunResult {
+        figures: vec![("tcp.peak_m".into(), "0.00211".into()), ("tcp.end_m".into(), "0.00130".into())],
+        events: vec![
+            event(0.0, EventKind::MoveStart, "move 1 begins"),
+            event(1.2, EventKind::MoveEnd, "move 1 ends"),
+            event(1.25, EventKind::Peak, "largest TCP error: 2.110 mm"),
+        ],
+        attachments: vec![Attachment {
+            name: "summary.json".into(),
+            media_type: "application/json".into(),
+            bytes: b"{\"end\": \"complete\"}".into(),
+        }],
+    }
 }
 
 /// One sample of the motion.
@@ -91,6 +115,7 @@ pub(crate) fn sample(step: u64) -> Sample {
         error_world: error(difference),
         error_path: error(rigid.X_WT.rotation.inverse() * difference),
         elastic: vec![ElasticSample { deflection, load: deflection.map(|part| 4.0e5 * part) }],
+        contributions: vec![difference.into()],
         energy: EnergySample { kinetic: 40.0 * v * v, potential: 120.0 + 30.0 * s, elastic: 1e5 * about_y.powi(2) },
         solver: [2.0, 1e-11 * (1.0 + v)],
         flexible,
@@ -126,9 +151,10 @@ fn twin(q: [f64; 3], qdot: [f64; 3], deflection: [f64; 6]) -> TwinSample {
     let X_WU = X_WC * move_by(0.0, 0.0, BASE_HEIGHT) * turn(Vector3::y() * q[1]);
     let bend = move_by(x, y, z) * turn(Vector3::new(rx, ry, rz));
     let X_WF = X_WU * move_by(UPPER_ARM, 0.0, 0.0) * bend * turn(Vector3::y() * q[2]);
+    let X_WS = vec![X_WU, X_WU * move_by(UPPER_ARM, 0.0, 0.0) * bend];
     let X_WT = X_WF * move_by(FOREARM, 0.0, 0.0);
     let effort = vec![8.0 * qdot[0], 90.0 * q[1].cos(), 25.0 * (q[1] + q[2]).cos()];
-    TwinSample { q: q.into(), qdot: qdot.into(), effort, X_WL: vec![X_WB, X_WC, X_WU, X_WF, X_WT], X_WT }
+    TwinSample { q: q.into(), qdot: qdot.into(), effort, X_WL: vec![X_WB, X_WC, X_WU, X_WF, X_WT], X_WT, X_WS }
 }
 
 fn box_mesh(link: usize, center: [f64; 3], size: [f64; 3], color: [f32; 4]) -> LinkMesh {

@@ -1,0 +1,250 @@
+//! A link drawn bent: its surface between stations that a run says the places of.
+//!
+//! Between two stations the link is a beam: cubic Hermite deflection across the line, linear stretch and twist along it,
+//! sections that stay plane and turn with the line's slope (Euler-Bernoulli). For loads at the ends that is the
+//! deflection line itself; at the stations it is exact for every model. Before the first station the surface is
+//! rigid with it, beyond the last one with that.
+
+use flexarm_kinematics::{Pose, rotation_vector};
+use nalgebra::{Rotation3, Vector3};
+
+use crate::{BendInfo, LinkMesh};
+
+/// Slabs into which a surface is cut along the link, so that it can bend.
+const SLABS: f64 = 16.0;
+/// A surface has at most this many times its triangles after cutting, to keep wild meshes in bounds.
+const GROWTH: usize = 12;
+
+/// Where undeformed stations are and how a vertex lies between them.
+#[derive(Clone, Debug)]
+pub struct BendLine {
+    stations: Vec<Vector3<f64>>,
+    /// Along the link, unit.
+    axis: Vector3<f64>,
+    /// Place of each station along `axis` (m).
+    along: Vec<f64>,
+}
+
+impl BendLine {
+    /// The line through the stations; `None` if there are fewer than two or they do not follow each other.
+    #[must_use]
+    pub fn new(bend: &BendInfo) -> Option<Self> {
+        let stations: Vec<Vector3<f64>> = bend.X_LS.iter().map(|X| X.translation.vector).collect();
+        let (first, last) = (stations.first()?, stations.last()?);
+        let axis = (last - first).try_normalize(1e-9)?;
+        let along: Vec<f64> = stations.iter().map(|p| axis.dot(&(p - first))).collect();
+        along.windows(2).all(|pair| pair[1] > pair[0]).then_some(Self { stations, axis, along })
+    }
+
+    /// Place of a point of the link along its line (m), 0 at the first station.
+    #[must_use]
+    pub fn place(&self, point: &Vector3<f64>) -> f64 {
+        self.axis.dot(&(point - self.stations[0]))
+    }
+
+    /// Length of the line (m).
+    #[must_use]
+    pub fn length(&self) -> f64 {
+        self.along[self.along.len() - 1]
+    }
+
+    /// Where a point of the undeformed link is (link axes), the stations being moved to `moved` (in the link, turned from the
+    /// link's axes).
+    #[must_use]
+    pub fn deformed(&self, point: &Vector3<f64>, moved: &[Pose]) -> Vector3<f64> {
+        let s = self.place(point);
+        let last = self.stations.len() - 1;
+        let rigid = |k: usize| moved[k] * nalgebra::Point3::from(point - self.stations[k]);
+        if s <= 0.0 {
+            return rigid(0).coords;
+        }
+        if s >= self.along[last] {
+            return rigid(last).coords;
+        }
+        let k = self.along.partition_point(|place| *place <= s).clamp(1, last) - 1;
+        let ends = [k, k + 1].map(|k| {
+            let angle = rotation_vector(moved[k].rotation.matrix());
+            (moved[k].translation.vector - self.stations[k], angle)
+        });
+        let [(u0, theta0), (u1, theta1)] = ends;
+        let line = self.stations[k + 1] - self.stations[k];
+        let length = line.norm();
+        let direction = line / length;
+        let x = (s - self.along[k]) / (self.along[k + 1] - self.along[k]);
+        // Slopes of the deflection across the line, per unit of x.
+        let (slope0, slope1) = (theta0.cross(&line), theta1.cross(&line));
+        let across = |v: Vector3<f64>| v - direction * direction.dot(&v);
+        let (v0, v1) = (across(u0), across(u1));
+        let (x2, x3) = (x * x, x * x * x);
+        let deflection = v0 * (1.0 - 3.0 * x2 + 2.0 * x3)
+            + v1 * (3.0 * x2 - 2.0 * x3)
+            + slope0 * (x - 2.0 * x2 + x3)
+            + slope1 * (x3 - x2);
+        let slope = v0 * (6.0 * x2 - 6.0 * x)
+            + v1 * (6.0 * x - 6.0 * x2)
+            + slope0 * (1.0 - 4.0 * x + 3.0 * x2)
+            + slope1 * (3.0 * x2 - 2.0 * x);
+        let mixed = |a: &Vector3<f64>, b: &Vector3<f64>| direction.dot(a) * (1.0 - x) + direction.dot(b) * x;
+        let stretch = direction * mixed(&u0, &u1);
+        let twist = direction * mixed(&theta0, &theta1);
+        let angle = direction.cross(&(slope / length)) + twist;
+        let middle = self.stations[k] + line * x;
+        let turn = Rotation3::from_scaled_axis(angle);
+        middle + stretch + deflection + turn * (point - middle)
+    }
+}
+
+/// A surface that bends, cut finely enough along the link to be seen bent.
+#[derive(Clone, Debug)]
+pub struct BentMesh {
+    /// The undeformed surface, cut.
+    pub mesh: LinkMesh,
+    line: BendLine,
+}
+
+impl BentMesh {
+    /// Cuts `mesh` for bending; `None` if the stations make no line.
+    #[must_use]
+    pub fn new(mesh: &LinkMesh, bend: &BendInfo) -> Option<Self> {
+        let line = BendLine::new(bend)?;
+        let mut mesh = mesh.clone();
+        cut_along(&mut mesh, &line);
+        Some(Self { mesh, line })
+    }
+
+    /// Corners in link axes (m), the stations being moved to `moved` (poses in the link).
+    pub fn positions<'a>(&'a self, moved: &'a [Pose]) -> impl Iterator<Item = [f32; 3]> + 'a {
+        let point = |p: &[f32; 3]| Vector3::from(p.map(f64::from));
+        self.mesh.positions.iter().map(move |p| self.line.deformed(&point(p), moved).map(|x| x as f32).into())
+    }
+}
+
+/// Halves edges until none spans more than a slab of the bending part of the link.
+fn cut_along(mesh: &mut LinkMesh, line: &BendLine) {
+    use std::collections::HashMap;
+    let (slab, most) = (line.length() / SLABS, mesh.triangles.len().max(64) * GROWTH);
+    let with_normals = mesh.normals.len() == mesh.positions.len();
+    let place = |p: &[f32; 3]| line.place(&Vector3::from(p.map(f64::from))).clamp(0.0, line.length());
+    let mut middles: HashMap<(u32, u32), u32> = HashMap::new();
+    let mut open = std::mem::take(&mut mesh.triangles);
+    while let Some(triangle) = open.pop() {
+        let spans = [0, 1, 2].map(|k| {
+            let (a, b) = (triangle[k], triangle[(k + 1) % 3]);
+            (place(&mesh.positions[a as usize]) - place(&mesh.positions[b as usize])).abs()
+        });
+        let longest = (0..3).max_by(|a, b| spans[*a].total_cmp(&spans[*b])).unwrap_or(0);
+        if spans[longest] <= slab || mesh.triangles.len() + open.len() >= most {
+            mesh.triangles.push(triangle);
+            continue;
+        }
+        let [a, b, c] = [0, 1, 2].map(|k| triangle[(longest + k) % 3]);
+        let middle = *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
+            let mean = |x: [f32; 3], y: [f32; 3]| [0, 1, 2].map(|k| 0.5 * (x[k] + y[k]));
+            mesh.positions.push(mean(mesh.positions[a as usize], mesh.positions[b as usize]));
+            if with_normals {
+                let sum = Vector3::from(mean(mesh.normals[a as usize], mesh.normals[b as usize]));
+                mesh.normals.push(sum.try_normalize(1e-6).unwrap_or(Vector3::z()).into());
+            }
+            (mesh.positions.len() - 1) as u32
+        });
+        open.push([a, middle, c]);
+        open.push([middle, b, c]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+
+    fn bend(places: &[[f64; 3]]) -> BendInfo {
+        let X_LS = places.iter().map(|p| Pose::from(Translation3::from(Vector3::from(*p)))).collect();
+        BendInfo { link: 0, X_LS, carries: Vec::new() }
+    }
+
+    fn pose(u: [f64; 3], angle: [f64; 3]) -> Pose {
+        let turn = Rotation3::from_scaled_axis(Vector3::from(angle));
+        Pose::from_parts(Translation3::from(Vector3::from(u)), turn)
+    }
+
+    /// Truth: v(x) = F (3 L x^2 - x^3) / (6 E I) for a force at the end of a clamped beam.
+    #[test]
+    fn a_cantilever_with_a_force_at_its_end_is_drawn_as_its_deflection_line() {
+        let L = 1.5;
+        let line = BendLine::new(&bend(&[[0.2, 0.0, 0.0], [0.2 + L, 0.0, 0.0]])).unwrap();
+        let v_end = 1e-4; // small, so that the truth is the linear one
+        let slope_end = 1.5 * v_end / L;
+        let moved = [pose([0.2, 0.0, 0.0], [0.0; 3]), pose([0.2 + L, v_end, 0.0], [0.0, 0.0, slope_end])];
+        for k in 0..=10 {
+            let x = 0.1 * f64::from(k);
+            let truth = v_end * (3.0 * x * x - x * x * x) / 2.0;
+            let p = line.deformed(&Vector3::new(0.2 + L * x, 0.0, 0.0), &moved);
+            assert!((p.y - truth).abs() < 1e-15, "at {x}: {} beside {truth}", p.y);
+        }
+    }
+
+    /// Truth: what is beyond the far interface turns and moves with it as a rigid body, exactly.
+    #[test]
+    fn the_surface_beyond_the_far_interface_is_rigid_with_it() {
+        let line = BendLine::new(&bend(&[[0.0; 3], [0.5, 0.0, 0.1], [1.0, 0.0, 0.2]])).unwrap();
+        let far = pose([1.01, 0.03, 0.25], [0.1, -0.2, 0.3]);
+        let moved = [pose([0.0; 3], [0.0; 3]), pose([0.5, 0.01, 0.12], [0.05, -0.1, 0.1]), far];
+        for p in [[1.0, 0.0, 0.2], [1.2, 0.1, 0.3], [1.1, -0.4, 0.9]].map(Vector3::from) {
+            let truth = far * nalgebra::Point3::from(p - Vector3::new(1.0, 0.0, 0.2));
+            assert!((line.deformed(&p, &moved) - truth.coords).norm() < 1e-12);
+        }
+    }
+
+    /// Truth: a rigid motion of all stations moves every point rigidly, also between the stations, for small angles.
+    #[test]
+    fn a_rigid_motion_of_the_stations_bends_nothing() {
+        let places = [[0.0, 0.0, 0.0], [0.4, 0.0, 0.0], [1.0, 0.0, 0.0]];
+        let line = BendLine::new(&bend(&places)).unwrap();
+        let angle = Vector3::new(2e-4, -1e-4, 3e-4);
+        let X = Isometry3::from_parts(Translation3::new(0.01, 0.02, -0.03), UnitQuaternion::new(angle));
+        let moved = places.map(|p| {
+            let at = X * nalgebra::Point3::from(Vector3::from(p));
+            pose(at.coords.into(), angle.into())
+        });
+        for p in [[0.1, 0.2, 0.0], [0.5, -0.1, 0.2], [0.9, 0.0, -0.1]].map(Vector3::from) {
+            let truth = X * nalgebra::Point3::from(p);
+            let error = (line.deformed(&p, &moved) - truth.coords).norm();
+            assert!(error < 1e-7, "{error:e}"); // second order in the angle
+        }
+    }
+
+    #[test]
+    fn a_box_is_cut_without_cracks_until_it_can_bend() {
+        // Two triangles, one metre long: every inner edge belongs to two triangles after cutting.
+        let mesh = LinkMesh {
+            link: 0,
+            name: "plate".into(),
+            positions: vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 0.1, 0.0], [0.0, 0.1, 0.0]],
+            normals: vec![[0.0, 0.0, 1.0]; 4],
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+            color: [1.0; 4],
+            file: None,
+        };
+        let bent = BentMesh::new(&mesh, &bend(&[[0.0; 3], [1.0, 0.0, 0.0]])).unwrap();
+        let area = |mesh: &LinkMesh| -> f32 {
+            let p = |k: u32| Vector3::from(mesh.positions[k as usize]);
+            mesh.triangles.iter().map(|[a, b, c]| 0.5 * (p(*b) - p(*a)).cross(&(p(*c) - p(*a))).norm()).sum()
+        };
+        assert!((area(&bent.mesh) - 0.1).abs() < 1e-6, "the area is kept");
+        assert_eq!(bent.mesh.normals.len(), bent.mesh.positions.len());
+        let mut edges = std::collections::HashMap::new();
+        for t in &bent.mesh.triangles {
+            for k in 0..3 {
+                let (a, b) = (t[k], t[(k + 1) % 3]);
+                *edges.entry((a.min(b), a.max(b))).or_insert(0) += 1;
+                let [p, q] = [a, b].map(|k| bent.mesh.positions[k as usize][0]);
+                assert!((p - q).abs() <= 1.0 / SLABS as f32 + 1e-6, "an edge spans {}", (p - q).abs());
+            }
+        }
+        let rim = |(a, b): &(u32, u32)| {
+            let [p, q] = [*a, *b].map(|k| bent.mesh.positions[k as usize]);
+            (0..2).any(|c| p[c] == q[c] && [0.0, [1.0, 0.1][c]].contains(&p[c]))
+        };
+        assert!(edges.iter().all(|(edge, count)| *count == if rim(edge) { 1 } else { 2 }));
+    }
+}

@@ -1,0 +1,116 @@
+//! How much larger than life a recording shows deflections, decided before the run.
+
+use flexarm_kinematics::{Frame, frame_jacobian};
+use flexarm_stepping::{FlexibleArm, LoadAxes, Start};
+use nalgebra::{Matrix6xX, Vector6};
+
+use crate::twin::RigidTwin;
+
+/// Instants at which the deflection is estimated.
+const INSTANTS: u32 = 200;
+/// Part of the arm's reach by which the tool's largest deflection is shown.
+const SHOWN: f64 = 0.1;
+/// Most that springs turn on the screen (rad).
+const LARGEST_TURN: f64 = 0.3;
+/// A load that strikes at once, or a start from undeformed springs, deflects twice as far as the same load at rest.
+const SUDDEN: f64 = 2.0;
+
+/// Deflections that a run will have, roughly.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Expected {
+    /// Of the tool (m).
+    pub(crate) tool_m: f64,
+    /// Of the spring that turns most (rad).
+    pub(crate) turn_rad: f64,
+    /// Distance of the tool from the base joint (m).
+    pub(crate) reach_m: f64,
+}
+
+impl Expected {
+    /// Springs under weight and rigid motion, without their own dynamics: `e = -K^-1 tau_e` with the loads that hold the
+    /// elastic coordinates of the rigid twin at zero.
+    pub(crate) fn of(arm: &FlexibleArm, tcp: &Frame, duration: f64, start: Start) -> Self {
+        let mut twin = RigidTwin::new(arm);
+        let mut J = Matrix6xX::zeros(arm.model.nv());
+        let mut expected = Self::default();
+        for k in 0..=INSTANTS {
+            twin.update(arm, tcp, duration * f64::from(k) / f64::from(INSTANTS));
+            // Loads relieve what holds the elastic coordinates.
+            let t = duration * f64::from(k) / f64::from(INSTANTS);
+            for load in &arm.loads {
+                let frame = Frame { name: String::new(), body: load.body, X_BF: load.X_BF };
+                frame_jacobian(&arm.model, &twin.data, &frame, &mut J);
+                let (F, R) = ((load.wrench)(t), twin.data.X_WF(&frame).rotation);
+                let turn = |v| if load.axes == LoadAxes::Frame { R * v } else { v };
+                let (force, torque) = (turn(F.force), turn(F.torque));
+                let F = Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z);
+                twin.data.tau -= J.tr_mul(&F);
+            }
+            let mut moved = Vector6::zeros();
+            for element in &arm.elements {
+                let (first, n) = (element.coordinate, element.size);
+                let e = -(&element.C * twin.data.tau.rows(first, n));
+                moved += twin.J.columns(first, n) * &e;
+                let turn = match (element.modal, n) {
+                    (false, 6) => e.rows(3, 3).norm(),
+                    (false, _) => e.norm(),
+                    (true, _) => 0.0,
+                };
+                expected.turn_rad = expected.turn_rad.max(turn);
+            }
+            expected.tool_m = expected.tool_m.max(moved.fixed_rows::<3>(0).norm());
+            let tool = twin.data.X_WF(tcp).translation.vector;
+            let far = twin.data.X_WB.iter().skip(1).map(|X| (X.translation.vector - tool).norm());
+            expected.reach_m = far.fold(expected.reach_m, f64::max);
+        }
+        if start == Start::Undeformed || !arm.loads.is_empty() {
+            expected.tool_m *= SUDDEN;
+            expected.turn_rad *= SUDDEN;
+        }
+        expected
+    }
+
+    /// Factor on deflections with which they are seen: a round number, or 0 if nothing bends.
+    pub(crate) fn magnification(&self) -> f64 {
+        if !(self.tool_m > 0.0 && self.tool_m.is_finite()) {
+            return 0.0;
+        }
+        let wanted = (SHOWN * self.reach_m / self.tool_m).min(LARGEST_TURN / self.turn_rad.max(1e-12));
+        round_down(wanted).max(1.0)
+    }
+
+    /// Deviation for the last colour of the scale (m).
+    pub(crate) fn color_scale_m(&self) -> f64 {
+        round_up(self.tool_m)
+    }
+}
+
+/// The next of 1, 2, 5 times a power of ten that is not larger.
+fn round_down(x: f64) -> f64 {
+    let decade = 10f64.powf(x.log10().floor());
+    [5.0, 2.0, 1.0].into_iter().map(|k| k * decade).find(|y| *y <= x * (1.0 + 1e-9)).unwrap_or(decade)
+}
+
+/// The next of 1, 2, 5 times a power of ten that is not smaller; 0 of 0.
+pub(crate) fn round_up(x: f64) -> f64 {
+    if !(x > 0.0 && x.is_finite()) {
+        return 0.0;
+    }
+    let decade = 10f64.powf(x.log10().floor());
+    [1.0, 2.0, 5.0, 10.0].into_iter().map(|k| k * decade).find(|y| *y >= x * (1.0 - 1e-9)).unwrap_or(10.0 * decade)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn factors_are_round_and_show_the_tool_where_it_can_be_seen() {
+        let expected = |tool_m, turn_rad| Expected { tool_m, turn_rad, reach_m: 2.7 };
+        assert_eq!(expected(1.4e-3, 1e-4).magnification(), 100.0); // 193 would show a tenth of the reach
+        assert_eq!(expected(1.4e-3, 1e-2).magnification(), 20.0); // 30 would turn a spring by 0.3 rad
+        assert_eq!(expected(1.0, 0.1).magnification(), 1.0);
+        assert_eq!(expected(0.0, 0.0).magnification(), 0.0);
+        assert_eq!([1.4e-3, 2e-3, 0.6].map(round_up).map(|x| (x * 1e6).round()), [2e3, 2e3, 1e6]);
+    }
+}
