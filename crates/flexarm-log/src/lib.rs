@@ -57,11 +57,12 @@ mod record;
 #[cfg(feature = "rerun")]
 mod rrd_file;
 mod shape;
+mod surface;
 #[cfg(any(feature = "mcap", feature = "rerun"))]
 mod tail_file;
 mod trace;
 
-pub use bend::{BendLine, BentMesh};
+pub use bend::{BendLine, BentMesh, BentPieces};
 pub use create::CreateOptions;
 pub use csv_file::CsvRecorder;
 pub use error::LogError;

@@ -3,7 +3,7 @@
 use flexarm_kinematics::{Frame, JointKind, Model};
 use flexarm_log::{Attachment, CreateOptions, CsvRecorder, LinkInfo, LinkMesh, RecorderSet, RunHeader};
 use flexarm_stepping::FlexibleArm;
-use flexarm_urdf::{Geometry, TriangleMesh};
+use flexarm_urdf::Geometry;
 
 use crate::error::Error;
 use crate::motion::Motion;
@@ -214,30 +214,17 @@ fn meshes(robot: &Robot, links: &[LinkInfo]) -> Vec<LinkMesh> {
         };
         let color = visual.color.or(mesh.color).unwrap_or([0.75, 0.75, 0.78, 1.0]);
         let moved = mesh.transformed(&visual.X_LV);
-        let normals = moved.normals.clone().unwrap_or_else(|| flat_normals(&moved));
-        meshes.push(LinkMesh {
+        let own_normals = moved.normals.is_some();
+        let mesh = LinkMesh {
             link,
             name: visual.name.clone().unwrap_or_else(|| format!("visual_{i}")),
             positions: moved.positions,
-            normals,
+            normals: moved.normals.unwrap_or_default(),
             triangles: moved.triangles,
             color,
             file,
-        });
+        };
+        meshes.push(if own_normals { mesh } else { mesh.with_creases() });
     }
     meshes
-}
-
-/// Area-weighted mean of the adjoining triangles' normals.
-fn flat_normals(mesh: &TriangleMesh) -> Vec<[f32; 3]> {
-    use nalgebra::Vector3;
-    let mut sums = vec![Vector3::<f32>::zeros(); mesh.positions.len()];
-    for triangle in &mesh.triangles {
-        let [a, b, c] = triangle.map(|i| Vector3::from(mesh.positions[i as usize]));
-        let n = (b - a).cross(&(c - a));
-        for &i in triangle {
-            sums[i as usize] += n;
-        }
-    }
-    sums.into_iter().map(|n| n.try_normalize(0.0).unwrap_or(Vector3::z()).into()).collect()
 }
