@@ -11,7 +11,7 @@ use nalgebra::{Point3, Rotation3, Translation3, Vector3};
 use crate::{BendInfo, LinkMesh};
 
 /// Slabs into which a surface is cut along the link, so that it can bend.
-const SLABS: f64 = 16.0;
+const SLABS: f64 = 12.0;
 /// A surface has at most this many times its triangles after cutting, to keep wild meshes in bounds.
 const GROWTH: usize = 12;
 
@@ -40,6 +40,15 @@ impl BendLine {
     #[must_use]
     pub fn place(&self, point: &Vector3<f64>) -> f64 {
         self.axis.dot(&(point - self.stations[0]))
+    }
+
+    /// The undeformed point at `s` metres along the line (link axes).
+    #[must_use]
+    pub fn point(&self, s: f64) -> Point3<f64> {
+        let last = self.stations.len() - 1;
+        let k = self.along.partition_point(|place| *place <= s).clamp(1, last) - 1;
+        let x = (s - self.along[k]) / (self.along[k + 1] - self.along[k]);
+        Point3::from(self.stations[k] + (self.stations[k + 1] - self.stations[k]) * x)
     }
 
     /// Length of the line (m).

@@ -73,5 +73,5 @@ pub use multi::RecorderSet;
 pub use plot::{Panel, PlotCurve, PlotError, line_plot};
 pub use record::*;
 #[cfg(feature = "rerun")]
-pub use rrd_file::RrdRecorder;
+pub use rrd_file::{RrdRecorder, RrdStudy, StudySeat};
 pub use trace::{RunSource, Trace, TraceRow};

@@ -46,6 +46,8 @@ pub struct RunHeader {
     pub magnification: f64,
     /// Deviation from the rigid twin that gets the last colour of the scale (m).
     pub color_scale_m: f64,
+    /// Box in the world that holds all link frames at all times: lowest and highest corner (m). What to point a camera at.
+    pub volume: Option<[[f64; 3]; 2]>,
 }
 
 /// How a link bends: stations along the line from its near interface to its far one.
@@ -221,8 +223,10 @@ pub struct Event {
 /// What is known only at the end of a run.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RunResult {
-    /// Label and value pairs.
+    /// Label and value pairs for programs.
     pub figures: Vec<(String, String)>,
+    /// The same for people: name, and value with its unit.
+    pub readable: Vec<(String, String)>,
     /// What happened, in order of time.
     pub events: Vec<Event>,
     /// Files about the result to put into the recording, such as its summary.

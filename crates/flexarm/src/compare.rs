@@ -97,6 +97,7 @@ pub fn simulate_traced(
     head.bends.clone_from(&run.bends);
     head.contributors = run.contributors.iter().map(|(_, name)| name.clone()).collect();
     head.color_scale_m = expected.color_scale_m();
+    head.volume = expected.volume;
     head.magnification = options.magnification.unwrap_or_else(|| expected.magnification());
     files.set.begin(&head)?;
     run.trace = Trace::new(head);
@@ -129,6 +130,7 @@ fn result(summary: &Summary, events: Vec<Event>) -> RunResult {
     let json = serde_json::to_string_pretty(&timeless).expect("plain numbers and strings") + "\n";
     RunResult {
         figures: summary.labelled(),
+        readable: crate::report::rows(&timeless),
         events,
         attachments: vec![Attachment {
             name: "summary.json".into(),

@@ -9,7 +9,7 @@ use crate::twin::RigidTwin;
 /// Instants at which the deflection is estimated.
 const INSTANTS: u32 = 200;
 /// Part of the arm's reach by which the tool's largest deflection is shown.
-const SHOWN: f64 = 0.1;
+const SHOWN: f64 = 0.12;
 /// Most that springs turn on the screen (rad).
 const LARGEST_TURN: f64 = 0.3;
 /// A load that strikes at once, or a start from undeformed springs, deflects twice as far as the same load at rest.
@@ -24,6 +24,8 @@ pub(crate) struct Expected {
     pub(crate) turn_rad: f64,
     /// Distance of the tool from the base joint (m).
     pub(crate) reach_m: f64,
+    /// Lowest and highest corner of the box around all bodies and the tool at all times (m, world).
+    pub(crate) volume: Option<[[f64; 3]; 2]>,
 }
 
 impl Expected {
@@ -62,6 +64,12 @@ impl Expected {
             let tool = twin.data.X_WF(tcp).translation.vector;
             let far = twin.data.X_WB.iter().skip(1).map(|X| (X.translation.vector - tool).norm());
             expected.reach_m = far.fold(expected.reach_m, f64::max);
+            for p in twin.data.X_WB.iter().map(|X| X.translation.vector).chain([tool]) {
+                let [low, high] = expected.volume.get_or_insert([p.into(), p.into()]);
+                for c in 0..3 {
+                    (low[c], high[c]) = (low[c].min(p[c]), high[c].max(p[c]));
+                }
+            }
         }
         if start == Start::Undeformed || !arm.loads.is_empty() {
             expected.tool_m *= SUDDEN;
@@ -106,8 +114,8 @@ mod tests {
 
     #[test]
     fn factors_are_round_and_show_the_tool_where_it_can_be_seen() {
-        let expected = |tool_m, turn_rad| Expected { tool_m, turn_rad, reach_m: 2.7 };
-        assert_eq!(expected(1.4e-3, 1e-4).magnification(), 100.0); // 193 would show a tenth of the reach
+        let expected = |tool_m, turn_rad| Expected { tool_m, turn_rad, reach_m: 2.7, volume: None };
+        assert_eq!(expected(1.4e-3, 1e-4).magnification(), 200.0); // 231 would show 0.12 of the reach
         assert_eq!(expected(1.4e-3, 1e-2).magnification(), 20.0); // 30 would turn a spring by 0.3 rad
         assert_eq!(expected(1.0, 0.1).magnification(), 1.0);
         assert_eq!(expected(0.0, 0.0).magnification(), 0.0);

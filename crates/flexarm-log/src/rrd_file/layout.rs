@@ -4,17 +4,21 @@
 //! its parts by chance and cannot set a plot's legend.
 
 use rerun::external::re_sdk_types::blueprint::archetypes::{
-    ContainerBlueprint, EyeControls3D, PanelBlueprint, PlotLegend, TimeAxis, TimePanelBlueprint, ViewBlueprint,
-    ViewContents, ViewportBlueprint,
+    Background, ContainerBlueprint, EyeControls3D, PanelBlueprint, PlotLegend, TimeAxis, TimePanelBlueprint,
+    ViewBlueprint, ViewContents, ViewportBlueprint,
 };
 use rerun::external::re_sdk_types::blueprint::components::{
-    ColumnShare, ContainerKind, Corner2D, LinkAxis, LoopMode, PanelState, PlayState, RowShare, TimelineName,
+    BackgroundKind, ColumnShare, ContainerKind, Corner2D, LinkAxis, LoopMode, PanelState, PlayState, RowShare,
+    TimelineName,
 };
 use rerun::{AsComponents, EntityPath};
+
+use super::eye::Eye;
 
 const VIEW_3D: &str = "3D";
 const VIEW_PLOT: &str = "TimeSeries";
 const VIEW_TEXT: &str = "TextDocument";
+const VIEW_LOG: &str = "TextLog";
 
 /// Entities of the blueprint with their contents.
 pub(crate) type Entities = Vec<(EntityPath, Box<dyn AsComponents>)>;
@@ -31,13 +35,6 @@ pub(crate) enum Part {
     View(View),
 }
 
-/// Where the 3D view is seen from, and what is in its middle (m, world).
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Eye {
-    pub(crate) position: [f32; 3],
-    pub(crate) target: [f32; 3],
-}
-
 /// Something to look at.
 pub(crate) struct View {
     pub(crate) class: &'static str,
@@ -47,9 +44,14 @@ pub(crate) struct View {
 }
 
 impl Part {
-    /// The 3D view of all entities below `origin`.
-    pub(crate) fn space(title: &str, origin: EntityPath) -> Self {
-        Self::view(VIEW_3D, title, origin)
+    /// The 3D view of the entities that `contents` selects.
+    pub(crate) fn scene(title: &str, origin: EntityPath, contents: Vec<String>) -> Self {
+        Self::View(View { class: VIEW_3D, title: title.to_owned(), origin, contents })
+    }
+
+    /// A list of messages.
+    pub(crate) fn log(title: &str, origin: EntityPath) -> Self {
+        Self::view(VIEW_LOG, title, origin)
     }
 
     /// A plot of all scalars below `origin`.
@@ -139,6 +141,11 @@ impl Layout {
         if let (VIEW_3D, Some(Eye { position, target })) = (view.class, self.eye) {
             let eye = EyeControls3D::new().with_position(position).with_look_target(target);
             self.log(&format!("{}/EyeControls3D", placed.path), eye);
+        }
+        if view.class == VIEW_3D {
+            // A plain dark ground on which grey, yellow and red stand out alike.
+            let background = Background::new(BackgroundKind::SolidColor).with_color([26, 28, 33]);
+            self.log(&format!("{}/Background", placed.path), background);
         }
         let blueprint = ViewBlueprint::new(view.class)
             .with_display_name(view.title.as_str())

@@ -54,6 +54,11 @@ impl Ids {
         Ok(Chunk::builder_with_id(id, path.clone()).with_archetype(row, when.clone(), what).build()?)
     }
 
+    /// A chunk that holds at all times.
+    pub(crate) fn constant(&mut self, path: &EntityPath, what: &dyn AsComponents) -> Result<Chunk> {
+        self.single(path, &TimePoint::default(), what)
+    }
+
     /// A chunk with a row for each time.
     pub(crate) fn columns(
         &mut self,

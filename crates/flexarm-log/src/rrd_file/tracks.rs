@@ -1,16 +1,25 @@
-//! Rows of samples that wait to be written as columns.
+//! Rows that wait to be written as columns: one track for each entity that changes with time.
 
 use flexarm_kinematics::Pose;
 use nalgebra::UnitQuaternion;
+use rerun::components::{ImageBuffer, ImageFormat};
 use rerun::log::{Chunk, TimeColumn};
-use rerun::{Color, EntityPath, LineStrip3D, LineStrips3D, Quaternion, Scalars, SeriesLines, TimePoint, Transform3D};
+use rerun::{
+    Arrows3D, Color, EntityPath, LineStrip3D, LineStrips3D, Mesh3D, Quaternion, Scalars, SeriesLines, TimePoint,
+    Transform3D,
+};
 
 use super::stream::{Ids, StreamError};
 
 /// Name of the timeline of simulated time.
 pub(crate) const SIM_TIME: &str = "sim_time";
 
-/// Times of the waiting rows.
+type Chunks = Result<Option<Chunk>, StreamError>;
+
+/// An instant: simulated time (ns), step.
+pub(crate) type Instant = (i64, i64);
+
+/// Times of waiting rows.
 #[derive(Debug, Default)]
 pub(crate) struct Times {
     nanoseconds: Vec<i64>,
@@ -18,7 +27,7 @@ pub(crate) struct Times {
 }
 
 impl Times {
-    pub(crate) fn push(&mut self, nanoseconds: i64, step: i64) {
+    pub(crate) fn push(&mut self, (nanoseconds, step): Instant) {
         self.nanoseconds.push(nanoseconds);
         self.steps.push(step);
     }
@@ -40,39 +49,246 @@ impl Times {
     }
 }
 
-/// A moving frame.
+/// A track with times of its own: rows only where something changes.
+pub(crate) trait Track {
+    /// The rows that wait, if any.
+    fn chunk(&self, ids: &mut Ids) -> Chunks;
+
+    /// Forgets them; they have been written.
+    fn clear(&mut self);
+}
+
+/// A moving frame. Instants at which it has not moved are left out.
 #[derive(Debug)]
 pub(crate) struct PoseTrack {
     path: EntityPath,
+    times: Times,
     translations: Vec<[f32; 3]>,
     quaternions: Vec<Quaternion>,
+    last: Option<([f32; 3], [f32; 4])>,
 }
 
 impl PoseTrack {
     pub(crate) fn new(path: EntityPath) -> Self {
-        Self { path, translations: Vec::new(), quaternions: Vec::new() }
+        let times = Times::default();
+        Self { path, times, translations: Vec::new(), quaternions: Vec::new(), last: None }
     }
 
-    pub(crate) fn push(&mut self, X_W: &Pose) {
+    pub(crate) fn push(&mut self, when: Instant, X_W: &Pose) {
         let rotation = UnitQuaternion::from_rotation_matrix(&X_W.rotation);
-        self.translations.push(point(X_W));
-        self.quaternions.push(Quaternion::from_xyzw(rotation.coords.map(|value| value as f32).into()));
-    }
-
-    pub(crate) fn clear(&mut self) {
-        self.translations.clear();
-        self.quaternions.clear();
-    }
-
-    pub(crate) fn chunk(&self, ids: &mut Ids, times: &[TimeColumn]) -> Result<Chunk, StreamError> {
-        let transform = Transform3D::update_fields()
-            .with_many_translation(self.translations.iter().copied())
-            .with_many_quaternion(self.quaternions.iter().copied());
-        ids.columns(&self.path, times, transform.columns_of_unit_batches()?)
+        let row = (point(X_W), rotation.coords.map(|value| value as f32).into());
+        if self.last.as_ref() != Some(&row) {
+            self.times.push(when);
+            self.translations.push(row.0);
+            self.quaternions.push(Quaternion::from_xyzw(row.1));
+            self.last = Some(row);
+        }
     }
 }
 
-/// Curves of one plot, drawn from one entity.
+impl Track for PoseTrack {
+    fn chunk(&self, ids: &mut Ids) -> Chunks {
+        if self.times.rows() == 0 {
+            return Ok(None);
+        }
+        let transform = Transform3D::update_fields()
+            .with_many_translation(self.translations.iter().copied())
+            .with_many_quaternion(self.quaternions.iter().copied());
+        ids.columns(&self.path, &self.times.columns(), transform.columns_of_unit_batches()?).map(Some)
+    }
+
+    fn clear(&mut self) {
+        self.times.clear();
+        self.translations.clear();
+        self.quaternions.clear();
+    }
+}
+
+/// The colours of a surface, as a strip from its near end to its far end; rows only where they change.
+#[derive(Debug)]
+pub(crate) struct TintTrack {
+    path: EntityPath,
+    times: Times,
+    strips: Vec<Vec<u8>>,
+    last: Vec<u8>,
+}
+
+impl TintTrack {
+    pub(crate) fn new(path: EntityPath) -> Self {
+        Self { path, times: Times::default(), strips: Vec::new(), last: Vec::new() }
+    }
+
+    pub(crate) fn push(&mut self, when: Instant, colors: impl IntoIterator<Item = [u8; 3]>) {
+        let strip: Vec<u8> = colors.into_iter().flatten().collect();
+        if self.last != strip {
+            self.times.push(when);
+            self.strips.push(strip.clone());
+            self.last = strip;
+        }
+    }
+
+    /// What says that a strip is `width` pixels of a picture.
+    pub(crate) fn format(width: usize) -> ImageFormat {
+        ImageFormat::rgb8([width as u32, 1])
+    }
+}
+
+impl Track for TintTrack {
+    fn chunk(&self, ids: &mut Ids) -> Chunks {
+        if self.times.rows() == 0 {
+            return Ok(None);
+        }
+        let strips = self.strips.iter().map(|strip| ImageBuffer(strip.clone().into()));
+        let mesh = Mesh3D::update_fields().with_many_albedo_texture_buffer(strips);
+        ids.columns(&self.path, &self.times.columns(), mesh.columns_of_unit_batches()?).map(Some)
+    }
+
+    fn clear(&mut self) {
+        self.times.clear();
+        self.strips.clear();
+    }
+}
+
+/// The corners of a surface that changes its shape.
+#[derive(Debug)]
+pub(crate) struct ShapeTrack {
+    path: EntityPath,
+    times: Times,
+    corners: usize,
+    positions: Vec<[f32; 3]>,
+}
+
+impl ShapeTrack {
+    pub(crate) fn new(path: EntityPath, corners: usize) -> Self {
+        Self { path, times: Times::default(), corners, positions: Vec::new() }
+    }
+
+    pub(crate) fn push(&mut self, when: Instant, positions: impl Iterator<Item = [f32; 3]>) {
+        self.times.push(when);
+        self.positions.extend(positions);
+    }
+}
+
+impl Track for ShapeTrack {
+    fn chunk(&self, ids: &mut Ids) -> Chunks {
+        let rows = self.times.rows();
+        if rows == 0 {
+            return Ok(None);
+        }
+        let lengths = std::iter::repeat_n(self.corners, rows);
+        let mesh = Mesh3D::update_fields().with_vertex_positions(self.positions.iter().copied());
+        ids.columns(&self.path, &self.times.columns(), mesh.columns(lengths)?).map(Some)
+    }
+
+    fn clear(&mut self) {
+        self.times.clear();
+        self.positions.clear();
+    }
+}
+
+/// An arrow with a text at it.
+#[derive(Debug)]
+pub(crate) struct ArrowTrack {
+    path: EntityPath,
+    times: Times,
+    arrows: Vec<([f32; 3], [f32; 3])>,
+    labels: Vec<String>,
+}
+
+impl ArrowTrack {
+    pub(crate) fn new(path: EntityPath) -> Self {
+        Self { path, times: Times::default(), arrows: Vec::new(), labels: Vec::new() }
+    }
+
+    pub(crate) fn push(&mut self, when: Instant, from: &Pose, to: &Pose, label: String) {
+        let (from, to) = (point(from), point(to));
+        let arrow = (from, [0, 1, 2].map(|c| to[c] - from[c]));
+        self.times.push(when);
+        self.arrows.push(arrow);
+        self.labels.push(label);
+    }
+
+    /// Colour and width.
+    pub(crate) fn style(&self, ids: &mut Ids, color: Color) -> Result<Chunk, StreamError> {
+        let style = Arrows3D::update_fields()
+            .with_colors([color])
+            .with_radii([rerun::Radius::new_ui_points(3.0)])
+            .with_show_labels(true);
+        ids.single(&self.path, &TimePoint::default(), &style)
+    }
+}
+
+impl Track for ArrowTrack {
+    fn chunk(&self, ids: &mut Ids) -> Chunks {
+        if self.times.rows() == 0 {
+            return Ok(None);
+        }
+        let arrows = Arrows3D::update_fields()
+            .with_origins(self.arrows.iter().map(|(origin, _)| *origin))
+            .with_vectors(self.arrows.iter().map(|(_, vector)| *vector))
+            .with_labels(self.labels.iter().map(String::as_str));
+        ids.columns(&self.path, &self.times.columns(), arrows.columns_of_unit_batches()?).map(Some)
+    }
+
+    fn clear(&mut self) {
+        self.times.clear();
+        self.arrows.clear();
+        self.labels.clear();
+    }
+}
+
+/// Lines from each link to its parent, for robots without meshes.
+#[derive(Debug)]
+pub(crate) struct SkeletonTrack {
+    path: EntityPath,
+    times: Times,
+    color: Color,
+    /// Child and parent of each line.
+    pairs: Vec<(usize, usize)>,
+    lines: Vec<LineStrip3D>,
+}
+
+impl SkeletonTrack {
+    /// Line width in points of the screen.
+    const RADIUS: f32 = 3.0;
+
+    pub(crate) fn new(path: EntityPath, color: Color, pairs: Vec<(usize, usize)>) -> Self {
+        Self { path, times: Times::default(), color, pairs, lines: Vec::new() }
+    }
+
+    pub(crate) fn push(&mut self, when: Instant, X_WL: &[Pose]) {
+        let line =
+            |&(child, parent): &(usize, usize)| LineStrip3D::from_iter([point(&X_WL[parent]), point(&X_WL[child])]);
+        self.times.push(when);
+        self.lines.extend(self.pairs.iter().map(line));
+    }
+
+    /// Colour and width of the lines.
+    pub(crate) fn style(&self, ids: &mut Ids) -> Result<Chunk, StreamError> {
+        let style = LineStrips3D::update_fields()
+            .with_colors([self.color])
+            .with_radii([rerun::Radius::new_ui_points(Self::RADIUS)]);
+        ids.single(&self.path, &TimePoint::default(), &style)
+    }
+}
+
+impl Track for SkeletonTrack {
+    fn chunk(&self, ids: &mut Ids) -> Chunks {
+        if self.times.rows() == 0 || self.pairs.is_empty() {
+            return Ok(None);
+        }
+        let lengths = std::iter::repeat_n(self.pairs.len(), self.times.rows());
+        let lines = LineStrips3D::update_fields().with_strips(self.lines.iter().cloned());
+        ids.columns(&self.path, &self.times.columns(), lines.columns(lengths)?).map(Some)
+    }
+
+    fn clear(&mut self) {
+        self.times.clear();
+        self.lines.clear();
+    }
+}
+
+/// Curves of one plot, drawn from one entity; all curves share the times of the samples.
 #[derive(Debug)]
 pub(crate) struct ScalarTrack {
     path: EntityPath,
@@ -92,13 +308,18 @@ impl ScalarTrack {
     }
 
     /// Adds a row: one value per name.
-    pub(crate) fn push(&mut self, values: &[f64]) {
-        debug_assert_eq!(values.len(), self.names.len(), "{}: a value per curve", self.path);
-        self.values.extend_from_slice(values);
+    pub(crate) fn push(&mut self, values: impl IntoIterator<Item = f64>) {
+        self.values.extend(values);
+        debug_assert!(self.values.len().is_multiple_of(self.names.len().max(1)), "{}: a value per curve", self.path);
     }
 
     pub(crate) fn clear(&mut self) {
         self.values.clear();
+    }
+
+    /// Whether there are rows that have not been written.
+    pub(crate) fn waiting(&self) -> bool {
+        !self.values.is_empty()
     }
 
     /// Names and colours of the curves.
@@ -117,12 +338,11 @@ impl ScalarTrack {
     }
 }
 
-/// The way of a point through the whole run, drawn as one line.
+/// The way of a point through the whole run, drawn as one line, or in pieces whose colour is a value.
 #[derive(Debug)]
 pub(crate) struct PathTrack {
     path: EntityPath,
-    color: Color,
-    points: Vec<[f32; 3]>,
+    points: Vec<([f32; 3], f64)>,
     /// Only every so many samples become a point.
     stride: u64,
     seen: u64,
@@ -130,17 +350,19 @@ pub(crate) struct PathTrack {
 
 impl PathTrack {
     /// Points at which the line is thinned out to half of them: finer than a screen shows.
-    const LIMIT: usize = 20_000;
+    const LIMIT: usize = 6_000;
+    /// Pieces with a colour of their own.
+    const PIECES: usize = 300;
     /// Line width in points of the screen, whatever the distance.
     const RADIUS: f32 = 1.5;
 
-    pub(crate) fn new(path: EntityPath, color: Color) -> Self {
-        Self { path, color, points: Vec::new(), stride: 1, seen: 0 }
+    pub(crate) fn new(path: EntityPath) -> Self {
+        Self { path, points: Vec::new(), stride: 1, seen: 0 }
     }
 
-    pub(crate) fn push(&mut self, X_W: &Pose) {
+    pub(crate) fn push(&mut self, X_W: &Pose, value: f64) {
         if self.seen.is_multiple_of(self.stride) {
-            self.points.push(point(X_W));
+            self.points.push((point(X_W), value));
         }
         self.seen += 1;
         if self.points.len() >= Self::LIMIT {
@@ -153,57 +375,39 @@ impl PathTrack {
         }
     }
 
-    pub(crate) fn chunk(&self, ids: &mut Ids) -> Result<Chunk, StreamError> {
-        let line = LineStrips3D::new([LineStrip3D::from_iter(self.points.iter().copied())])
-            .with_colors([self.color])
-            .with_radii([rerun::Radius::new_ui_points(Self::RADIUS)]);
-        ids.single(&self.path, &TimePoint::default(), &line)
+    /// The whole line in one colour.
+    pub(crate) fn line(&self, ids: &mut Ids, color: Color) -> Result<Chunk, StreamError> {
+        let line = LineStrip3D::from_iter(self.points.iter().map(|(point, _)| *point));
+        self.strips(ids, [line], [color])
+    }
+
+    /// The line in pieces, each in the colour of its largest value.
+    pub(crate) fn colored(&self, ids: &mut Ids, color: impl Fn(f64) -> Color) -> Result<Chunk, StreamError> {
+        let size = self.points.len().div_ceil(Self::PIECES).max(1);
+        // A piece ends where the next begins.
+        let piece = |k: usize| &self.points[k * size..((k + 1) * size + 1).min(self.points.len())];
+        let pieces = (0..self.points.len().div_ceil(size)).map(piece);
+        let (lines, colors): (Vec<_>, Vec<_>) = pieces
+            .map(|piece| {
+                let largest = piece.iter().fold(0.0, |largest: f64, (_, value)| largest.max(*value));
+                (LineStrip3D::from_iter(piece.iter().map(|(point, _)| *point)), color(largest))
+            })
+            .unzip();
+        self.strips(ids, lines, colors)
+    }
+
+    fn strips(
+        &self,
+        ids: &mut Ids,
+        lines: impl IntoIterator<Item = LineStrip3D>,
+        colors: impl IntoIterator<Item = Color>,
+    ) -> Result<Chunk, StreamError> {
+        let strips =
+            LineStrips3D::new(lines).with_colors(colors).with_radii([rerun::Radius::new_ui_points(Self::RADIUS)]);
+        ids.single(&self.path, &TimePoint::default(), &strips)
     }
 }
 
-/// Lines from each link to its parent, for robots without meshes.
-#[derive(Debug)]
-pub(crate) struct SkeletonTrack {
-    path: EntityPath,
-    color: Color,
-    /// Child and parent of each line.
-    pairs: Vec<(usize, usize)>,
-    lines: Vec<LineStrip3D>,
-}
-
-impl SkeletonTrack {
-    /// Line width in points of the screen.
-    const RADIUS: f32 = 3.0;
-
-    pub(crate) fn new(path: EntityPath, color: Color, pairs: Vec<(usize, usize)>) -> Self {
-        Self { path, color, pairs, lines: Vec::new() }
-    }
-
-    pub(crate) fn push(&mut self, X_WL: &[Pose]) {
-        let line =
-            |&(child, parent): &(usize, usize)| LineStrip3D::from_iter([point(&X_WL[parent]), point(&X_WL[child])]);
-        self.lines.extend(self.pairs.iter().map(line));
-    }
-
-    pub(crate) fn clear(&mut self) {
-        self.lines.clear();
-    }
-
-    /// Colour and width of the lines.
-    pub(crate) fn style(&self, ids: &mut Ids) -> Result<Chunk, StreamError> {
-        let style = LineStrips3D::update_fields()
-            .with_colors([self.color])
-            .with_radii([rerun::Radius::new_ui_points(Self::RADIUS)]);
-        ids.single(&self.path, &TimePoint::default(), &style)
-    }
-
-    pub(crate) fn chunk(&self, ids: &mut Ids, times: &[TimeColumn]) -> Result<Chunk, StreamError> {
-        let lengths = std::iter::repeat_n(self.pairs.len(), self.lines.len() / self.pairs.len().max(1));
-        let lines = LineStrips3D::update_fields().with_strips(self.lines.iter().cloned());
-        ids.columns(&self.path, times, lines.columns(lengths)?)
-    }
-}
-
-fn point(X_W: &Pose) -> [f32; 3] {
+pub(crate) fn point(X_W: &Pose) -> [f32; 3] {
     X_W.translation.vector.map(|value| value as f32).into()
 }

@@ -69,6 +69,7 @@ pub(crate) fn header() -> RunHeader {
         contributors: vec!["upper_arm".into()],
         magnification: 50.0,
         color_scale_m: 2.5e-3,
+        volume: Some([[-1.4, -1.4, 0.0], [1.4, 1.4, 1.6]]),
     }
 }
 
@@ -77,6 +78,7 @@ pub(crate) fn result() -> RunResult {
     let event = |time_s, kind, text: &str| Event { time_s, kind, text: text.into() };
     RunResult {
         figures: vec![("tcp.peak_m".into(), "0.00211".into()), ("tcp.end_m".into(), "0.00130".into())],
+        readable: vec![("peak TCP error".into(), "2.110 mm".into())],
         events: vec![
             event(0.0, EventKind::MoveStart, "move 1 begins"),
             event(1.2, EventKind::MoveEnd, "move 1 ends"),

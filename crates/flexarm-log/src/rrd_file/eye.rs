@@ -1,0 +1,56 @@
+//! Where a recording is looked at from.
+
+use nalgebra::{Rotation3, Vector3};
+
+use crate::{RunHeader, Sample};
+
+/// Where the 3D view is seen from, and what is in its middle (m, world).
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Eye {
+    pub(crate) position: [f32; 3],
+    pub(crate) target: [f32; 3],
+}
+
+/// From where the line of sight is turned against the direction in which the arm reaches (rad): aside of the plane in which
+/// it stands at first, so that bending in that plane is seen.
+const TURN_RAD: f64 = -1.15;
+/// Rise of the line of sight.
+const RISE: f64 = 0.36;
+/// Distance of the eye in radii of the ball around everything: the viewer's field of view is 55 degrees high, and the view
+/// about as wide as it is high.
+const DISTANCE: f64 = 1.6;
+/// Bodies reach beyond their frames.
+const MARGIN: f64 = 1.08;
+
+/// A place to see all of a run from.
+pub(crate) fn eye(header: &RunHeader, first: Option<&Sample>) -> Option<Eye> {
+    let (base, tool) = match first {
+        Some(sample) => {
+            let base = sample.flexible.X_WL.first().map_or_else(Vector3::zeros, |X| X.translation.vector);
+            (base, sample.flexible.X_WT.translation.vector)
+        }
+        None => (Vector3::zeros(), Vector3::x()),
+    };
+    let around_first = || {
+        let points = first.into_iter().flat_map(|sample| sample.flexible.X_WL.iter().chain([&sample.flexible.X_WT]));
+        let mut corners: Option<[[f64; 3]; 2]> = None;
+        for p in points.map(|X| X.translation.vector) {
+            let [low, high] = corners.get_or_insert([p.into(), p.into()]);
+            for c in 0..3 {
+                (low[c], high[c]) = (low[c].min(p[c]), high[c].max(p[c]));
+            }
+        }
+        corners
+    };
+    let [low, high] = header.volume.or_else(around_first)?.map(Vector3::from);
+    let (middle, radius) = (0.5 * (low + high), 0.5 * (high - low).norm() * MARGIN);
+    if !(radius.is_finite() && radius > 0.0) {
+        return None;
+    }
+    let to_tool = tool - base;
+    let ahead = Vector3::new(to_tool.x, to_tool.y, 0.0).try_normalize(0.05 * radius).unwrap_or_else(Vector3::x);
+    let aside = Rotation3::from_axis_angle(&Vector3::z_axis(), TURN_RAD) * ahead;
+    let position = middle + radius * DISTANCE * (aside + RISE * Vector3::z()).normalize();
+    let point = |p: Vector3<f64>| p.map(|part| part as f32).into();
+    Some(Eye { position: point(position), target: point(middle) })
+}

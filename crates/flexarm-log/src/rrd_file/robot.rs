@@ -1,0 +1,300 @@
+//! One of the robots of a recording: rigid twin, flexible arm, or the flexible arm with its deflections magnified.
+
+use flexarm_kinematics::{Pose, rotation_vector};
+use nalgebra::{Point3, Vector3};
+use rerun::components::MeshFaceRendering;
+use rerun::log::Chunk;
+use rerun::{AlbedoFactor, Color, EntityPath, Mesh3D, Rgba32, TransformAxes3D};
+
+use super::colors::{ColorScale, GHOST};
+use super::path;
+use super::stream::{Ids, StreamError};
+use super::tracks::{Instant, PoseTrack, ShapeTrack, SkeletonTrack, TintTrack, Track};
+use crate::{BendLine, BentMesh, BentPieces, LinkMesh, RunHeader, Sample, TwinSample, stations_in_link};
+
+/// How a robot is painted.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Paint {
+    /// In the colours of its meshes.
+    Own,
+    /// Transparent.
+    Ghost,
+    /// Every place in the colour of its distance from the rigid twin.
+    Deviation(ColorScale),
+    /// All in one colour.
+    Plain(Color),
+}
+
+/// A robot's place in the recording and how it looks.
+#[derive(Clone, Debug)]
+pub(crate) struct Look {
+    /// Entity below which its links are.
+    pub(crate) root: EntityPath,
+    pub(crate) paint: Paint,
+    /// Whether links bend; otherwise their surfaces stay as they are.
+    pub(crate) bends: bool,
+    /// A bent surface is written again when a corner has moved by more than this (m).
+    pub(crate) tolerance_m: f64,
+    /// Corners of bent surfaces are rounded to this (m), for the compression; 0 keeps them.
+    pub(crate) quantum_m: f32,
+}
+
+/// Frames and surfaces of a robot.
+pub(crate) struct RobotTracks {
+    look: Look,
+    links: Vec<(usize, PoseTrack)>,
+    tcp: PoseTrack,
+    bent: Vec<BentTracks>,
+    tints: Vec<(usize, Point3<f64>, TintTrack)>,
+    /// Only for a robot without meshes, which would not be seen.
+    skeleton: Option<SkeletonTrack>,
+}
+
+/// A surface between the ends of a flexible link.
+struct BentTracks {
+    /// Link, first of its stations in [`TwinSample::X_WS`], number of stations.
+    link: usize,
+    stations: (usize, usize),
+    middle: BentMesh,
+    shape: ShapeTrack,
+    far: PoseTrack,
+    /// Colours of the part between, and of what is beyond.
+    tint: Option<(TintTrack, TintTrack)>,
+    /// Stations that were written last.
+    written: Option<Vec<Pose>>,
+}
+
+/// Places along a bent link at which its colour is computed.
+const TINTS: usize = 32;
+
+impl RobotTracks {
+    /// The tracks of a robot, and what never changes about it.
+    pub(crate) fn new(header: &RunHeader, look: Look, ids: &mut Ids) -> Result<(Self, Vec<Chunk>), StreamError> {
+        let at = |what: &str| look.root.join(&path([what]));
+        let pairs = header.links.iter().enumerate();
+        let pairs = pairs.filter_map(|(child, link)| Some((child, link.parent?))).collect();
+        let line_color = match look.paint {
+            Paint::Ghost => Color::from_u32(super::colors::BLUE),
+            Paint::Plain(color) => color,
+            Paint::Own | Paint::Deviation(_) => Color::from_u32(super::colors::ORANGE),
+        };
+        // Frames without a surface are told once, by the robot at true scale.
+        let shown = |(k, _): &(usize, &crate::LinkInfo)| {
+            matches!(look.paint, Paint::Own) || header.meshes.iter().any(|mesh| mesh.link == *k)
+        };
+        let pose_track = |(k, link): (usize, &crate::LinkInfo)| (k, PoseTrack::new(at(&link.name)));
+        let mut robot = Self {
+            links: header.links.iter().enumerate().filter(shown).map(pose_track).collect(),
+            tcp: PoseTrack::new(at("tcp")),
+            bent: Vec::new(),
+            tints: Vec::new(),
+            skeleton: header.meshes.is_empty().then(|| SkeletonTrack::new(at("skeleton"), line_color, pairs)),
+            look,
+        };
+        let mut fixed = Vec::new();
+        for mesh in &header.meshes {
+            robot.surface(header, mesh, ids, &mut fixed)?;
+        }
+        if let Some(skeleton) = &robot.skeleton {
+            fixed.push(skeleton.style(ids)?);
+        }
+        const AXIS_LENGTH_M: f32 = 0.15;
+        if !matches!(robot.look.paint, Paint::Ghost) {
+            fixed.push(ids.constant(&robot.look.root.join(&path(["tcp"])), &TransformAxes3D::new(AXIS_LENGTH_M))?);
+        }
+        Ok((robot, fixed))
+    }
+
+    fn surface(
+        &mut self,
+        header: &RunHeader,
+        mesh: &LinkMesh,
+        ids: &mut Ids,
+        fixed: &mut Vec<Chunk>,
+    ) -> Result<(), StreamError> {
+        let entity = self.look.root.join(&path([&header.links[mesh.link].name, &mesh.name]));
+        let mut first = 0;
+        for bend in &header.bends {
+            let stations = (first, bend.X_LS.len());
+            first += bend.X_LS.len();
+            if bend.link != mesh.link || !self.look.bends {
+                continue;
+            }
+            let Some(BentPieces { near, middle, far }) = BentPieces::new(mesh, bend) else { continue };
+            if middle.mesh.triangles.is_empty() {
+                continue;
+            }
+            let (middle_at, far_at) = (entity.join(&path(["bending"])), entity.join(&path(["far"])));
+            if !near.triangles.is_empty() {
+                fixed.push(ids.constant(&entity, &self.painted(&near))?);
+                self.tint(mesh.link, &near, entity);
+            }
+            // The corners of the part that bends come with time.
+            let shape = ShapeTrack::new(middle_at.clone(), middle.mesh.positions.len());
+            let line = middle.line();
+            let place = |p: &[f32; 3]| line.place(&Vector3::from(p.map(f64::from))) / line.length();
+            let along = middle.mesh.positions.iter().map(|p| place(p) as f32);
+            fixed.push(ids.constant(&middle_at, &self.strip(&middle.mesh, TINTS, along))?);
+            let far_surface = far_at.join(&path(["surface"]));
+            if !far.triangles.is_empty() {
+                fixed.push(ids.constant(&far_surface, &self.painted(&far))?);
+            }
+            let tinted = matches!(self.look.paint, Paint::Deviation(_));
+            let tint = tinted.then(|| (TintTrack::new(middle_at), TintTrack::new(far_surface)));
+            self.bent.push(BentTracks {
+                link: mesh.link,
+                stations,
+                middle,
+                shape,
+                far: PoseTrack::new(far_at),
+                tint,
+                written: None,
+            });
+            return Ok(());
+        }
+        fixed.push(ids.constant(&entity, &self.painted(mesh))?);
+        self.tint(mesh.link, mesh, entity);
+        Ok(())
+    }
+
+    /// Lets the colour of a rigid surface change with time, if it is to tell the deviation.
+    fn tint(&mut self, link: usize, mesh: &LinkMesh, entity: EntityPath) {
+        if let Paint::Deviation(_) = self.look.paint {
+            let sum: Vector3<f64> = mesh.positions.iter().map(|p| Vector3::from(p.map(f64::from))).sum();
+            let middle = Point3::from(sum / mesh.positions.len().max(1) as f64);
+            self.tints.push((link, middle, TintTrack::new(entity)));
+        }
+    }
+
+    fn painted(&self, mesh: &LinkMesh) -> Mesh3D {
+        let surface = plain(mesh);
+        let own = || {
+            let [red, green, blue, alpha] = mesh.color.map(|part| (part.clamp(0.0, 1.0) * 255.0).round() as u8);
+            Rgba32::from_unmultiplied_rgba(red, green, blue, alpha)
+        };
+        match self.look.paint {
+            // Its back faces only: they are hidden wherever the flexible robot is in the same place.
+            Paint::Ghost => surface
+                .with_albedo_factor(AlbedoFactor(Rgba32::from_u32(GHOST)))
+                .with_face_rendering(MeshFaceRendering::Back),
+            Paint::Plain(color) => surface.with_albedo_factor(AlbedoFactor(color.0)),
+            Paint::Own => surface.with_albedo_factor(AlbedoFactor(own())),
+            Paint::Deviation(_) => self.strip(mesh, 1, mesh.positions.iter().map(|_| 0.5)),
+        }
+    }
+
+    /// A surface that takes its colours from a strip which comes with time; `along` says from where on it, 0 to 1.
+    fn strip(&self, mesh: &LinkMesh, width: usize, along: impl Iterator<Item = f32>) -> Mesh3D {
+        if !matches!(self.look.paint, Paint::Deviation(_)) {
+            return self.painted(mesh);
+        }
+        let surface = plain(mesh).with_vertex_texcoords(along.map(|x| [x.clamp(0.0, 1.0), 0.5]));
+        surface.with_albedo_texture_format(TintTrack::format(width))
+    }
+
+    /// Adds an instant. `twin` is what is drawn; `sample` says how far places really are from the rigid twin.
+    pub(crate) fn push(&mut self, when: Instant, twin: &TwinSample, sample: &Sample) {
+        for (link, track) in &mut self.links {
+            track.push(when, &twin.X_WL[*link]);
+        }
+        self.tcp.push(when, &twin.X_WT);
+        if let Some(skeleton) = &mut self.skeleton {
+            skeleton.push(when, &twin.X_WL);
+        }
+        if let Paint::Deviation(scale) = self.look.paint {
+            for (link, middle, track) in &mut self.tints {
+                let [flexible, rigid] = [&sample.flexible, &sample.rigid].map(|twin| twin.X_WL[*link] * *middle);
+                track.push(when, [scale.rgb((flexible - rigid).norm())]);
+            }
+        }
+        for bent in &mut self.bent {
+            bent.push(when, twin, sample, &self.look);
+        }
+    }
+
+    fn tracks(&self) -> impl Iterator<Item = &dyn Track> {
+        let bent = self.bent.iter().flat_map(|bent| {
+            let tints = bent.tint.iter().flat_map(|(middle, far)| [middle as &dyn Track, far]);
+            [&bent.shape as &dyn Track, &bent.far].into_iter().chain(tints)
+        });
+        let links = self.links.iter().map(|(_, track)| track).chain([&self.tcp]).map(|track| track as &dyn Track);
+        let tints = self.tints.iter().map(|(_, _, track)| track as &dyn Track);
+        links.chain(bent).chain(tints).chain(self.skeleton.as_ref().map(|track| track as &dyn Track))
+    }
+
+    /// Chunks of the rows that wait.
+    pub(crate) fn rows(&self, ids: &mut Ids, chunks: &mut Vec<Chunk>) -> Result<(), StreamError> {
+        for track in self.tracks() {
+            chunks.extend(track.chunk(ids)?);
+        }
+        Ok(())
+    }
+
+    pub(crate) fn clear(&mut self) {
+        self.links.iter_mut().map(|(_, track)| track).chain([&mut self.tcp]).for_each(Track::clear);
+        self.tints.iter_mut().for_each(|(_, _, track)| track.clear());
+        for bent in &mut self.bent {
+            bent.shape.clear();
+            bent.far.clear();
+            bent.tint.iter_mut().for_each(|(middle, far)| {
+                middle.clear();
+                far.clear();
+            });
+        }
+        self.skeleton.iter_mut().for_each(Track::clear);
+    }
+}
+
+fn plain(mesh: &LinkMesh) -> Mesh3D {
+    let surface = Mesh3D::new(mesh.positions.iter().copied()).with_triangle_indices(mesh.triangles.iter().copied());
+    match mesh.normals.len() == mesh.positions.len() {
+        true => surface.with_vertex_normals(mesh.normals.iter().copied()),
+        false => surface,
+    }
+}
+
+impl BentTracks {
+    fn push(&mut self, when: Instant, twin: &TwinSample, sample: &Sample, look: &Look) {
+        let (first, count) = self.stations;
+        let shown = stations_in_link(twin, self.link, first, count);
+        let line = self.middle.line();
+        self.far.push(when, &line.section(line.length(), &shown));
+        if let (Paint::Deviation(scale), Some((middle, far))) = (look.paint, &mut self.tint) {
+            let real = stations_in_link(&sample.flexible, self.link, first, count);
+            let tints = tints(line, &real, sample, self.link, scale);
+            far.push(when, tints.last().copied());
+            middle.push(when, tints);
+        }
+        let still = |written: &Vec<Pose>| !moved(written, &shown, line.length(), look.tolerance_m);
+        if self.written.as_ref().is_some_and(still) {
+            return;
+        }
+        let rounded = |p: [f32; 3]| match look.quantum_m {
+            quantum if quantum > 0.0 => p.map(|x| (x / quantum).round() * quantum),
+            _ => p,
+        };
+        self.shape.push(when, self.middle.positions(&shown).map(rounded));
+        self.written = Some(shown);
+    }
+}
+
+/// Whether a corner may have moved by more than a tolerance (m).
+fn moved(before: &[Pose], now: &[Pose], length: f64, tolerance_m: f64) -> bool {
+    before.iter().zip(now).any(|(a, b)| {
+        let turn = rotation_vector((a.rotation.inverse() * b.rotation).matrix()).norm();
+        // Corners lie a fraction of the length beside the line.
+        (a.translation.vector - b.translation.vector).norm() + 0.2 * length * turn > tolerance_m
+    })
+}
+
+/// Colours along a bent link: how far its line is from where the rigid twin has it.
+fn tints(line: &BendLine, real: &[Pose], sample: &Sample, link: usize, scale: ColorScale) -> Vec<[u8; 3]> {
+    let (X_flexible, X_rigid) = (&sample.flexible.X_WL[link], &sample.rigid.X_WL[link]);
+    let at = |k: usize| {
+        let s = line.length() * (k as f64 + 0.5) / TINTS as f64;
+        let point = line.point(s);
+        let deviation = X_flexible * (line.section(s, real) * point) - X_rigid * point;
+        scale.rgb(deviation.norm())
+    };
+    (0..TINTS).map(at).collect()
+}

@@ -1,0 +1,293 @@
+//! One run in a recording: its robots, ways of the tool, curves and events.
+
+use rerun::log::Chunk;
+use rerun::{Color, EntityPath, Points3D, Scalars, SeriesPoints, TextLog, TimePoint, Timeline};
+
+use super::colors::{BLUE, ColorScale, LIGHT, ORANGE, RUNS};
+use super::curves::{Curves, size};
+use super::path;
+use super::robot::{Look, Paint, RobotTracks};
+use super::stream::{Ids, StreamError};
+use super::tracks::{ArrowTrack, Instant, PathTrack, SIM_TIME, Times, Track, point};
+use crate::{EventKind, Magnifier, RunHeader, RunResult, Sample, TwinSample};
+
+/// Shortest time between two poses (ns): every sample of a run logged at up to 200 Hz, fewer of faster ones. Curves have all.
+const POSE_EVERY_NS: i64 = 5_000_000;
+
+/// What a run is in its recording.
+#[derive(Clone, Debug)]
+pub(crate) enum Seat {
+    /// The only one.
+    Alone,
+    /// One of a study's, counted from 0, with its label.
+    InStudy(usize, String),
+}
+
+impl Seat {
+    /// Entity below which the robots of the run are.
+    pub(crate) fn root(&self, header: &RunHeader) -> EntityPath {
+        match self {
+            Self::Alone => path([&header.robot]),
+            Self::InStudy(_, label) => path([label]),
+        }
+    }
+
+    pub(crate) fn color(&self) -> Option<Color> {
+        match self {
+            Self::Alone => None,
+            Self::InStudy(k, _) => Some(Color::from_u32(RUNS[k % RUNS.len()])),
+        }
+    }
+}
+
+/// A robot with the way of its tool.
+struct Drawn {
+    robot: Option<RobotTracks>,
+    way: PathTrack,
+    way_color: Option<Color>,
+}
+
+/// Everything of a run that changes with time.
+pub(crate) struct RunTracks {
+    root: EntityPath,
+    /// Of every sample, and of those in which the robots are drawn.
+    times: Times,
+    pose_times: Times,
+    flexible: Drawn,
+    rigid: Option<Drawn>,
+    magnified: Option<Drawn>,
+    magnifier: Magnifier,
+    enlarged: TwinSample,
+    arrow: Option<ArrowTrack>,
+    scale: ColorScale,
+    /// Of every run that is alone or the first of its study.
+    curves: Option<Curves>,
+    study_curves: Option<Curves>,
+    last_pose_ns: Option<i64>,
+    /// Largest error so far (m), its instant, and where the tool is drawn then.
+    peak: Option<(f64, Instant, [f32; 3])>,
+}
+
+impl RunTracks {
+    /// The tracks of a run, and what never changes about it.
+    pub(crate) fn new(header: &RunHeader, seat: &Seat, ids: &mut Ids) -> Result<(Self, Vec<Chunk>), StreamError> {
+        let root = seat.root(header);
+        let at = |what: &str| root.join(&path([what]));
+        let way = |who: &str| PathTrack::new(root.join(&path(["path", who])));
+        let scale = ColorScale { full_m: header.color_scale_m };
+        let alone = matches!(seat, Seat::Alone);
+        let first = matches!(seat, Seat::Alone | Seat::InStudy(0, _));
+        // Sizes on the screen, as lengths in the scene.
+        let extent = header.volume.map_or(3.0, |[low, high]| size(&[0, 1, 2].map(|c| high[c] - low[c])));
+        const PIXELS: f64 = 800.0;
+        const LIFE_SIZE_TOLERANCE_M: f64 = 1e-4;
+        const MAGNIFIED_QUANTUM_M: f32 = 1.0 / 4096.0;
+
+        let mut fixed = Vec::new();
+        let mut robot = |name: &str, paint: Paint, bends: bool, tolerance_m: f64, quantum_m: f32, ids: &mut Ids| {
+            let look = Look { root: at(name), paint, bends, tolerance_m, quantum_m };
+            let (robot, own) = RobotTracks::new(header, look, ids)?;
+            fixed.extend(own);
+            Ok::<_, StreamError>(Some(robot))
+        };
+        let with_magnified = header.has_rigid && header.magnification > 0.0;
+        let flexible = Drawn {
+            robot: match alone || !with_magnified {
+                true => robot("flexible", Paint::Own, true, LIFE_SIZE_TOLERANCE_M, 0.0, ids)?,
+                false => None,
+            },
+            way: way("flexible"),
+            way_color: None,
+        };
+        let rigid = match header.has_rigid {
+            false => None,
+            true => Some(Drawn {
+                robot: match first {
+                    true => robot("rigid", Paint::Ghost, false, 0.0, 0.0, ids)?,
+                    false => None,
+                },
+                way: way("rigid"),
+                way_color: Some(Color::from_u32(BLUE)),
+            }),
+        };
+        let magnified = match with_magnified {
+            false => None,
+            true => {
+                let paint = seat.color().map_or(Paint::Deviation(scale), Paint::Plain);
+                let robot = robot("magnified", paint, true, extent / PIXELS, MAGNIFIED_QUANTUM_M, ids)?;
+                Some(Drawn { robot, way: way("magnified"), way_color: seat.color() })
+            }
+        };
+        let arrow = with_magnified.then(|| ArrowTrack::new(root.join(&path(["magnified", "error"]))));
+        if let Some(arrow) = &arrow {
+            fixed.push(arrow.style(ids, seat.color().unwrap_or(Color::from_u32(LIGHT)))?);
+        }
+        let plots = path(["plots"]);
+        let curves = first.then(|| Curves::new(header, &plots));
+        let study_curves = match seat {
+            Seat::InStudy(_, label) if header.has_rigid => {
+                Some(Curves::of_study(label, &plots, seat.color().unwrap_or(Color::from_u32(ORANGE))))
+            }
+            _ => None,
+        };
+        for curves in curves.iter().chain(&study_curves) {
+            fixed.extend(curves.styles(ids)?);
+        }
+        let run = Self {
+            root,
+            times: Times::default(),
+            pose_times: Times::default(),
+            flexible,
+            rigid,
+            magnified,
+            magnifier: Magnifier::new(header),
+            enlarged: TwinSample::default(),
+            arrow,
+            scale,
+            curves,
+            study_curves,
+            last_pose_ns: None,
+            peak: None,
+        };
+        Ok((run, fixed))
+    }
+
+    /// Adds an instant.
+    pub(crate) fn push(&mut self, when: Instant, sample: &Sample) {
+        self.times.push(when);
+        if let Some(curves) = &mut self.curves {
+            curves.push_error(sample);
+        }
+        if let Some(curves) = &mut self.study_curves {
+            curves.push_study(sample);
+        }
+        let error = size(&sample.error_world[..3]);
+        let new_peak = self.rigid.is_some() && self.peak.is_none_or(|(largest, ..)| error > largest);
+        let due = self.last_pose_ns.is_none_or(|last| when.0 - last >= POSE_EVERY_NS);
+        if self.magnified.is_some() && (due || new_peak) {
+            self.magnifier.magnify(sample, &mut self.enlarged);
+        }
+        if new_peak {
+            let shown = if self.magnified.is_some() { &self.enlarged } else { &sample.flexible };
+            self.peak = Some((error, when, point(&shown.X_WT)));
+        }
+        if due {
+            self.last_pose_ns = Some(when.0);
+            self.pose(when, sample, error);
+        }
+    }
+
+    fn pose(&mut self, when: Instant, sample: &Sample, error: f64) {
+        self.pose_times.push(when);
+        if let Some(curves) = &mut self.curves {
+            curves.push_causes(sample);
+        }
+        let put = |drawn: &mut Drawn, twin: &TwinSample| {
+            if let Some(robot) = &mut drawn.robot {
+                robot.push(when, twin, sample);
+            }
+            drawn.way.push(&twin.X_WT, error);
+        };
+        put(&mut self.flexible, &sample.flexible);
+        if let Some(rigid) = &mut self.rigid {
+            put(rigid, &sample.rigid);
+        }
+        if let Some(magnified) = &mut self.magnified {
+            put(magnified, &self.enlarged);
+        }
+        if let Some(arrow) = &mut self.arrow {
+            let label = format!("{:.2} mm", 1e3 * error);
+            arrow.push(when, &sample.rigid.X_WT, &self.enlarged.X_WT, label);
+        }
+    }
+
+    /// Rows that wait, as of the number of samples.
+    pub(crate) fn waiting(&self) -> usize {
+        self.times.rows()
+    }
+
+    /// Chunks of the rows that wait.
+    pub(crate) fn rows(&self, ids: &mut Ids) -> Result<Vec<Chunk>, StreamError> {
+        let mut chunks = Vec::new();
+        if self.times.rows() == 0 {
+            return Ok(chunks);
+        }
+        let drawn = std::iter::once(&self.flexible).chain(&self.rigid).chain(&self.magnified);
+        for robot in drawn.filter_map(|drawn| drawn.robot.as_ref()) {
+            robot.rows(ids, &mut chunks)?;
+        }
+        if let Some(arrow) = &self.arrow {
+            chunks.extend(arrow.chunk(ids)?);
+        }
+        let (times, pose_times) = (self.times.columns(), self.pose_times.columns());
+        for curves in self.curves.iter().chain(&self.study_curves) {
+            curves.rows(ids, &times, &pose_times, &mut chunks)?;
+        }
+        Ok(chunks)
+    }
+
+    /// Forgets the rows that wait; they have been written.
+    pub(crate) fn clear(&mut self) {
+        self.times.clear();
+        self.pose_times.clear();
+        for drawn in std::iter::once(&mut self.flexible).chain(&mut self.rigid).chain(&mut self.magnified) {
+            drawn.robot.iter_mut().for_each(RobotTracks::clear);
+        }
+        self.arrow.iter_mut().for_each(Track::clear);
+        self.curves.iter_mut().chain(&mut self.study_curves).for_each(Curves::clear);
+    }
+
+    /// The ways of the tool so far.
+    pub(crate) fn ways(&self, ids: &mut Ids) -> Result<Vec<Chunk>, StreamError> {
+        let mut chunks = Vec::new();
+        for drawn in std::iter::once(&self.flexible).chain(&self.rigid).chain(&self.magnified) {
+            chunks.push(match drawn.way_color {
+                Some(color) => drawn.way.line(ids, color)?,
+                None => drawn.way.colored(ids, |error| self.scale.color(error))?,
+            });
+        }
+        Ok(chunks)
+    }
+
+    /// The largest error as a mark on the way and in the plot, and what happened when.
+    pub(crate) fn marks(&self, ids: &mut Ids, result: &RunResult) -> Result<Vec<Chunk>, StreamError> {
+        let mut chunks = Vec::new();
+        if let Some((error, when, place)) = &self.peak {
+            let label = format!("peak {:.3} mm at {:.3} s", 1e3 * error, when.0 as f64 * 1e-9);
+            let mark = Points3D::new([*place])
+                .with_radii([rerun::Radius::new_ui_points(5.0)])
+                .with_colors([Color::from_rgb(255, 255, 255)])
+                .with_labels([label.as_str()])
+                .with_show_labels(false);
+            chunks.push(ids.constant(&self.root.join(&path(["path", "peak"])), &mark)?);
+            if self.curves.is_some() {
+                let at = path(["plots", "tcp_error", "peak"]);
+                let style = SeriesPoints::new()
+                    .with_names([label.as_str()])
+                    .with_colors([Color::from_rgb(255, 255, 255)])
+                    .with_marker_sizes([5.0_f32]);
+                chunks.push(ids.constant(&at, &style)?);
+                chunks.push(ids.single(&at, &instant(*when), &Scalars::single(1e3 * error))?);
+            }
+        }
+        if self.curves.is_some() {
+            for event in &result.events {
+                let level = match event.kind {
+                    EventKind::Stopped => "ERROR",
+                    EventKind::Limit => "WARN",
+                    EventKind::Peak | EventKind::Settled => "INFO",
+                    EventKind::MoveStart | EventKind::MoveEnd | EventKind::Load => "DEBUG",
+                };
+                let text = TextLog::new(event.text.as_str()).with_level(level);
+                let time_ns = (event.time_s * 1e9).round() as i64;
+                let when = TimePoint::default().with(Timeline::new_duration(SIM_TIME), time_ns);
+                chunks.push(ids.single(&path(["events"]), &when, &text)?);
+            }
+        }
+        Ok(chunks)
+    }
+}
+
+fn instant((nanoseconds, step): Instant) -> TimePoint {
+    TimePoint::default().with(Timeline::new_duration(SIM_TIME), nanoseconds).with(Timeline::new_sequence("step"), step)
+}

@@ -1,0 +1,121 @@
+//! Several runs in one recording, one over the other.
+
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use rerun::TextDocument;
+
+use super::run::Seat;
+use super::{RunWriter, Store, content_hash, path, stream_error};
+use crate::{CreateOptions, LogError, Recorder, RunHeader, RunResult, Sample};
+
+/// A recording of several runs: each has its arm in a colour of its own (deflections magnified), the way of its tool and its
+/// error; the first one all curves and the rigid twin too.
+///
+/// The runs are recorded one after another, each through its [`StudySeat`]; time starts at zero for all of them.
+pub struct RrdStudy {
+    path: PathBuf,
+    options: CreateOptions,
+    labels: Vec<String>,
+    store: Arc<Mutex<Option<Store>>>,
+}
+
+impl RrdStudy {
+    /// A study that will write `path`, with a label for each run; the file is created when the first run begins.
+    pub fn create(path: impl Into<PathBuf>, options: CreateOptions, labels: Vec<String>) -> Self {
+        Self { path: path.into(), options, labels, store: Arc::default() }
+    }
+
+    /// The recorder of the run with this number.
+    ///
+    /// # Panics
+    /// If there is no label of that number.
+    #[must_use]
+    pub fn seat(&self, number: usize) -> StudySeat {
+        StudySeat {
+            path: self.path.clone(),
+            options: self.options,
+            seat: Seat::InStudy(number, self.labels[number].clone()),
+            labels: self.labels.clone(),
+            store: self.store.clone(),
+            run: None,
+        }
+    }
+
+    /// Ends the file, with a text (Markdown) that compares the runs.
+    ///
+    /// # Errors
+    /// [`LogError`] on a write error, or if no run was recorded.
+    pub fn finish(self, text: &str) -> Result<(), LogError> {
+        let mut store = lock(&self.store);
+        let Some(store) = store.as_mut() else { return Err(LogError::not_open(&self.path, "finish")) };
+        let mut close = || {
+            store.constant(&path(["summary"]), &TextDocument::from_markdown(text))?;
+            store.stream.finish()
+        };
+        close().map_err(stream_error(&self.path, "write the result and the index"))
+    }
+}
+
+/// Records one run of a study.
+pub struct StudySeat {
+    path: PathBuf,
+    options: CreateOptions,
+    seat: Seat,
+    labels: Vec<String>,
+    store: Arc<Mutex<Option<Store>>>,
+    run: Option<RunWriter>,
+}
+
+impl Recorder for StudySeat {
+    fn check(&self) -> Result<(), LogError> {
+        match lock(&self.store).is_some() {
+            true => Ok(()), // ours
+            false => self.options.check(&self.path),
+        }
+    }
+
+    fn begin(&mut self, header: &RunHeader) -> Result<(), LogError> {
+        if self.run.is_some() {
+            return Err(LogError::begun_twice(&self.path));
+        }
+        let mut shared = lock(&self.store);
+        let error = stream_error(&self.path, "write the description of the run");
+        if shared.is_none() {
+            let file = self.options.create(&self.path)?;
+            let open = Store::new(file, content_hash(header), self.options.flush_clock())
+                .and_then(|mut store| store.describe(header, &self.seat).map(|()| store));
+            *shared = Some(open.map_err(stream_error(&self.path, "write the description of the study"))?);
+        }
+        let Some(store) = shared.as_mut() else { return Err(LogError::not_open(&self.path, "begin")) };
+        let run = RunWriter::begin(store, header, self.seat.clone(), self.labels.clone()).map_err(error)?;
+        self.run = Some(run);
+        Ok(())
+    }
+
+    fn record(&mut self, sample: &Sample) -> Result<(), LogError> {
+        let mut shared = lock(&self.store);
+        match (shared.as_mut(), self.run.as_mut()) {
+            (Some(store), Some(run)) => run.record(store, &self.path, sample),
+            _ => Err(LogError::not_open(&self.path, "record")),
+        }
+    }
+
+    fn finish(&mut self, result: &RunResult) -> Result<(), LogError> {
+        let mut shared = lock(&self.store);
+        match (shared.as_mut(), self.run.take()) {
+            (Some(store), Some(mut run)) => {
+                run.finish(store, result).map_err(stream_error(&self.path, "write the end of a run"))
+            }
+            _ => Err(LogError::not_open(&self.path, "finish")),
+        }
+    }
+
+    fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+fn lock(store: &Mutex<Option<Store>>) -> MutexGuard<'_, Option<Store>> {
+    store.lock().unwrap_or_else(PoisonError::into_inner)
+}
