@@ -9,7 +9,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Duration;
 
-use flexarm_log::{CreateOptions, Recorder, RrdRecorder, RunHeader};
+use flexarm_kinematics::Pose;
+use flexarm_log::{CreateOptions, Recorder, RrdRecorder, RrdStudy, RunHeader};
 use rerun::external::re_log_encoding::DecoderApp;
 use rerun::log::{Chunk, LogMsg};
 
@@ -47,72 +48,192 @@ fn rows(file: &[u8]) -> BTreeMap<String, usize> {
     for chunk in chunks(file).iter().filter(|chunk| !chunk.is_static()) {
         let mut timelines: Vec<_> = chunk.timelines().keys().map(|name| name.to_string()).collect();
         timelines.sort();
-        assert_eq!(timelines, ["sim_time", "step"], "no clock in {}", chunk.entity_path());
+        let expected =
+            if chunk.entity_path().to_string() == "/events" { &["sim_time"][..] } else { &["sim_time", "step"] };
+        assert_eq!(timelines, expected, "no clock in {}", chunk.entity_path());
         *rows.entry(chunk.entity_path().to_string()).or_insert(0) += chunk.num_rows();
     }
     rows
 }
 
+/// Poses are drawn at most every 5 ms: with 500 samples a second in every third.
+const DRAWN: usize = 334;
+
 #[test]
-fn every_entity_has_a_row_for_every_sample() {
+fn the_error_has_a_row_for_every_sample_and_the_robots_for_every_picture() {
     let file = run("rows.rrd", &synthetic::header(), synthetic::SAMPLES, NEVER);
     let rows = rows(&file);
-    let links = ["base_link", "column", "upper_arm", "forearm", "tool0", "tcp"];
-    let robots = ["flexible", "rigid"].iter().flat_map(|twin| links.map(|link| format!("/synthetic/{twin}/{link}")));
-    let plots = [
-        "tcp_error/x",
-        "tcp_error/y",
-        "tcp_error/z",
-        "tcp_error/norm",
-        "tcp_error_path/tangential",
-        "tcp_error_path/normal",
-        "tcp_error_path/binormal",
+    let error = ["tcp_error/x", "tcp_error/y", "tcp_error/z", "tcp_error/norm"];
+    let path_error = ["tcp_error_path/tangential", "tcp_error_path/normal", "tcp_error_path/binormal"];
+    for plot in error.iter().chain(&path_error) {
+        assert_eq!(rows[&format!("/plots/{plot}")], synthetic::SAMPLES as usize, "{plot}");
+    }
+    let causes = [
         "tcp_error_rotation/x",
         "tcp_error_rotation/y",
         "tcp_error_rotation/z",
+        "contributions",
         "joints/position",
+        "joints/velocity",
         "joints/effort/flexible",
         "joints/effort/rigid",
         "elastic/upper_arm",
+        "elastic_load/upper_arm",
         "energy",
         "solver",
     ];
-    let expected = robots.chain(plots.map(|plot| format!("/plots/{plot}")));
-    let expected: BTreeMap<_, _> = expected.map(|entity| (entity, synthetic::SAMPLES as usize)).collect();
-    assert_eq!(rows, expected);
+    for plot in causes {
+        assert_eq!(rows[&format!("/plots/{plot}")], DRAWN, "{plot}");
+    }
+    // What never moves has one row; what comes to rest has none afterwards; a killing of the ringing takes long.
+    for twin in ["flexible", "rigid", "magnified"] {
+        let of = |link: &str| rows[&format!("/synthetic/{twin}/{link}")];
+        assert_eq!(of("base_link"), 1);
+        assert!((180..=DRAWN).contains(&of("forearm")), "{}", of("forearm"));
+    }
+    assert_eq!(rows["/synthetic/magnified/tcp"], DRAWN);
+    assert_eq!(rows["/synthetic/magnified/error"], DRAWN);
+    assert_eq!((rows["/events"], rows["/plots/tcp_error/peak"]), (3, 1));
 
     let fixed: Vec<_> = chunks(&file).iter().filter(|c| c.is_static()).map(|c| c.entity_path().to_string()).collect();
-    for entity in
-        ["/synthetic/flexible/forearm/box", "/synthetic/rigid/forearm/box", "/synthetic/path/flexible", "/urdf"]
-    {
+    for entity in [
+        "/synthetic/flexible/forearm/box",
+        "/synthetic/rigid/forearm/box",
+        "/synthetic/magnified/upper_arm/box/bending",
+        "/synthetic/path/flexible",
+        "/synthetic/path/magnified",
+        "/synthetic/path/peak",
+        "/urdf",
+    ] {
         assert!(fixed.iter().any(|path| path == entity), "{entity} in {fixed:?}");
     }
     // At the start, and once more with the result.
     assert_eq!(fixed.iter().filter(|path| *path == "/summary").count(), 2);
 }
 
+/// Values of a column with a fixed number of numbers in a row, with the times of the rows (ns).
+fn column(file: &[u8], entity: &str, component: &'static str, width: usize) -> Vec<(i64, Vec<f32>)> {
+    let mut found = Vec::new();
+    for chunk in chunks(file).iter().filter(|c| !c.is_static() && c.entity_path().to_string() == entity) {
+        let times =
+            chunk.timelines().iter().find(|(name, _)| name.as_str() == "sim_time").unwrap().1.times_raw().to_vec();
+        let id = rerun::external::re_types_core::ComponentIdentifier::from(component);
+        let rows: Vec<Vec<f32>> = match width {
+            3 => chunk.iter_slices::<[f32; 3]>(id).map(|row| row.iter().flatten().copied().collect()).collect(),
+            _ => chunk.iter_slices::<[f32; 4]>(id).map(|row| row.iter().flatten().copied().collect()).collect(),
+        };
+        if rows.is_empty() {
+            continue; // other components of the entity have times of their own
+        }
+        assert_eq!(times.len(), rows.len());
+        found.extend(times.into_iter().zip(rows));
+    }
+    found.sort_by_key(|(time, _)| *time);
+    found
+}
+
+/// Poses of an entity (times in ns), as the viewer applies them.
+fn poses(file: &[u8], entity: &str) -> Vec<(i64, Pose)> {
+    let places = column(file, entity, "Transform3D:translation", 3);
+    let turns = column(file, entity, "Transform3D:quaternion", 4);
+    let pose = |((time, p), (_, q)): ((i64, Vec<f32>), (i64, Vec<f32>))| {
+        let turn = nalgebra::Quaternion::new(q[3], q[0], q[1], q[2]).cast::<f64>();
+        let turn = nalgebra::UnitQuaternion::from_quaternion(turn).to_rotation_matrix();
+        let place = nalgebra::Vector3::new(p[0], p[1], p[2]).cast::<f64>();
+        (time, Pose::from_parts(place.into(), turn))
+    };
+    places.into_iter().zip(turns).map(pose).collect()
+}
+
+/// Pose of an entity at a time: that of the last row at or before it.
+fn latest(rows: &[(i64, Pose)], time_ns: i64) -> Pose {
+    rows.iter().rev().find(|(time, _)| *time <= time_ns).unwrap().1
+}
+
+/// Truth: the place of the tool centre point that the sample (and so every other recording) says. Seen through the
+/// surfaces: the forearm's mesh ends in it, the upper arm's bent mesh ends where the forearm begins.
+#[test]
+fn the_moving_surfaces_agree_with_the_tool_centre_point_to_a_micrometre() {
+    let file = run("surfaces.rrd", &synthetic::header(), synthetic::SAMPLES, NEVER);
+    let mut worst: [f64; 3] = [0.0; 3];
+    for twin in ["flexible", "rigid"] {
+        let at = |entity: &str| poses(&file, &format!("/synthetic/{twin}/{entity}"));
+        let (forearm, tcp, upper_arm) = (at("forearm"), at("tcp"), at("upper_arm"));
+        let far = if twin == "flexible" { at("upper_arm/box/far") } else { Vec::new() };
+        for step in (0..synthetic::SAMPLES).step_by(3) {
+            let sample = synthetic::sample(step);
+            let time_ns = (sample.time_s * 1e9).round() as i64;
+            let truth = if twin == "flexible" { &sample.flexible } else { &sample.rigid };
+            let T = truth.X_WT.translation.vector;
+            // The end of the forearm's box in its own axes.
+            let tip = latest(&forearm, time_ns) * nalgebra::Point3::new(0.6, 0.0, 0.0);
+            worst[0] = worst[0].max((tip.coords - T).norm());
+            worst[1] = worst[1].max((latest(&tcp, time_ns).translation.vector - T).norm());
+            if twin == "flexible" {
+                // What is rigid with the far interface of the bent link, at that interface.
+                let end = latest(&upper_arm, time_ns) * latest(&far, time_ns) * nalgebra::Point3::new(0.8, 0.0, 0.0);
+                worst[2] = worst[2].max((end.coords - truth.X_WL[3].translation.vector).norm());
+            }
+        }
+    }
+    println!("worst distance of forearm tip, tcp, bent end: {worst:?} m");
+    assert!(worst.iter().all(|error| *error < 1e-6), "{worst:?}");
+}
+
+/// Truth: the line through the stations of the sample at the same time. The bent surface ends in the far interface.
+#[test]
+fn the_bent_surface_ends_where_the_far_interface_is() {
+    let file = run("bent.rrd", &synthetic::header(), synthetic::SAMPLES, NEVER);
+    for (twin, bound) in [("flexible", 1e-6), ("magnified", 0.5 * 3f64.sqrt() / 4096.0 + 1e-6)] {
+        let entity = format!("/synthetic/{twin}/upper_arm/box/bending");
+        let shapes = column(&file, &entity, "Mesh3D:vertex_positions", 3);
+        assert!(shapes.len() > 3, "{} shapes", shapes.len());
+        let undeformed: Vec<f32> = chunks(&file)
+            .iter()
+            .find(|c| c.is_static() && c.entity_path().to_string() == entity)
+            .map(|chunk| {
+                let id = rerun::external::re_types_core::ComponentIdentifier::from("Mesh3D:vertex_positions");
+                chunk.iter_slices::<[f32; 3]>(id).flatten().flatten().copied().collect()
+            })
+            .unwrap();
+        let magnifier = flexarm_log::Magnifier::new(&synthetic::header());
+        let mut worst: f64 = 0.0;
+        for (time_ns, shape) in &shapes {
+            let sample = synthetic::sample((*time_ns as f64 * 1e-9 * synthetic::RATE_HZ).round() as u64);
+            let robot = if twin == "flexible" { sample.flexible } else { magnifier.magnified(&sample) };
+            let X_LS = robot.X_WL[2].inv_mul(&robot.X_WS[1]);
+            for (was, is) in undeformed.chunks(3).zip(shape.chunks(3)).filter(|(was, _)| was[0] == 0.8) {
+                let on_station = nalgebra::Point3::new(0.0, f64::from(was[1]), f64::from(was[2]));
+                let is = nalgebra::Point3::new(is[0], is[1], is[2]).cast::<f64>();
+                worst = worst.max((X_LS * on_station - is).norm());
+            }
+        }
+        assert!(worst > 0.0 && worst < bound, "{twin}: {worst:e}");
+    }
+}
+
 /// Truth: the samples; millimetres where the names say so.
 #[test]
 fn curves_hold_the_samples() {
-    let file = run("curves.rrd", &synthetic::header(), 20, NEVER);
+    let file = run("curves.rrd", &synthetic::header(), 21, NEVER);
     let values = |entity: &str| -> Vec<f64> {
         let chunks = chunks(&file);
         let chunk = chunks.iter().find(|c| !c.is_static() && c.entity_path().to_string() == entity).unwrap();
         let scalars = rerun::Scalars::descriptor_scalars().component;
         chunk.iter_slices::<f64>(scalars).flatten().copied().collect()
     };
-    let samples: Vec<_> = (0..20).map(synthetic::sample).collect();
+    let samples: Vec<_> = (0..21).map(synthetic::sample).collect();
     assert_eq!(values("/plots/tcp_error/z"), samples.iter().map(|s| 1e3 * s.error_world[2]).collect::<Vec<_>>());
-    let deflections: Vec<_> = samples.iter().flat_map(|s| s.elastic[0].deflection).map(|d| 1e3 * d).collect();
+    let drawn = || samples.iter().step_by(3);
+    let deflections: Vec<_> = drawn().flat_map(|s| s.elastic[0].deflection).map(|d| 1e3 * d).collect();
     assert_eq!(values("/plots/elastic/upper_arm"), deflections);
-    let positions: Vec<_> = samples.iter().flat_map(|s| s.flexible.q.clone()).collect();
-    assert_eq!(values("/plots/joints/position"), positions);
+    assert_eq!(values("/plots/joints/position"), drawn().flat_map(|s| s.flexible.q.clone()).collect::<Vec<_>>());
 }
 
 /// The provisional end, written after every sample or never, leaves no trace in the finished file.
 #[test]
 fn a_file_does_not_depend_on_when_it_was_flushed() {
-    let samples = 700; // a full chunk and a started one
+    let samples = 1200; // a full chunk and a started one
     let unflushed = run("never.rrd", &synthetic::header(), samples, NEVER);
     assert!(unflushed == run("again.rrd", &synthetic::header(), samples, NEVER));
     assert!(unflushed == run("always.rrd", &synthetic::header(), samples, Duration::ZERO));
@@ -138,13 +259,15 @@ fn a_killed_run_keeps_every_sample() {
         recorder.record(&synthetic::sample(step)).unwrap();
         if step % 97 == 0 {
             let file = std::fs::read(&path).unwrap();
-            assert!(rows(&file).values().all(|rows| *rows as u64 == step + 1), "{:?}", rows(&file));
+            let rows = rows(&file);
+            assert_eq!(rows["/plots/tcp_error/norm"] as u64, step + 1);
+            assert_eq!(rows["/synthetic/magnified/tcp"] as u64, step / 3 + 1);
             assert!(chunks(&file).iter().any(|chunk| chunk.entity_path().to_string() == "/synthetic/path/rigid"));
         }
     }
     drop(recorder);
     let file = std::fs::read(&path).unwrap();
-    assert!(rows(&file).values().all(|rows| *rows == 600), "dropped without finish");
+    assert_eq!(rows(&file)["/plots/tcp_error/norm"], 600, "dropped without finish");
     std::fs::remove_file(path).unwrap();
 }
 
@@ -153,8 +276,9 @@ fn a_robot_without_meshes_is_drawn_as_lines_and_one_without_a_twin_alone() {
     let header = RunHeader { meshes: Vec::new(), has_rigid: false, ..synthetic::header() };
     let file = run("lines.rrd", &header, 10, NEVER);
     let rows = rows(&file);
-    assert_eq!(rows["/synthetic/flexible/skeleton"], 10);
-    assert!(!rows.keys().any(|entity| entity.contains("rigid") || entity.contains("tcp_error")));
+    assert_eq!(rows["/synthetic/flexible/skeleton"], 4);
+    let twin = ["rigid", "tcp_error", "magnified"];
+    assert!(!rows.keys().any(|entity| twin.iter().any(|word| entity.contains(word))), "{:?}", rows.keys());
 }
 
 /// Names with characters that mean something in an entity path stay one part of it.
@@ -167,4 +291,32 @@ fn any_name_is_one_part_of_a_path() {
     };
     let file = run("names.rrd", &header, 2, NEVER);
     assert!(rows(&file).contains_key(r"/my\/robot\ 1/flexible/column"), "{:?}", rows(&file).keys());
+}
+
+#[test]
+fn a_study_holds_all_its_runs_in_one_readable_file() {
+    let path = synthetic::scratch("study.rrd");
+    let write = || {
+        let options = CreateOptions { overwrite: true, flush_every: NEVER };
+        let study = RrdStudy::create(&path, options, vec!["one".into(), "two/2".into()]);
+        for number in 0..2 {
+            let mut seat = study.seat(number);
+            seat.check().unwrap();
+            seat.begin(&synthetic::header()).unwrap();
+            (0..100).for_each(|step| seat.record(&synthetic::sample(step)).unwrap());
+            seat.finish(&synthetic::result()).unwrap();
+        }
+        study.finish("# Two runs").unwrap();
+        std::fs::read(&path).unwrap()
+    };
+    let file = write();
+    assert!(file == write(), "the same runs give the same bytes");
+    std::fs::remove_file(&path).unwrap();
+    let rows = rows(&file);
+    assert_eq!((rows["/plots/study/error/one"], rows[r"/plots/study/error/two\/2"]), (100, 100));
+    assert_eq!((rows["/one/magnified/tcp"], rows[r"/two\/2/magnified/tcp"]), (34, 34));
+    assert_eq!(rows["/plots/tcp_error/norm"], 100, "curves of the first run only");
+    assert!(rows.contains_key("/one/rigid/tcp") && !rows.contains_key(r"/two\/2/rigid/tcp"));
+    let mut decoder = DecoderApp::decode_lazy(file.as_slice());
+    assert!(decoder.by_ref().all(|message| message.is_ok()));
 }

@@ -9,7 +9,7 @@ use crate::twin::RigidTwin;
 /// Instants at which the deflection is estimated.
 const INSTANTS: u32 = 200;
 /// Part of the arm's reach by which the tool's largest deflection is shown.
-const SHOWN: f64 = 0.12;
+const SHOWN: f64 = 0.15;
 /// Most that springs turn on the screen (rad).
 const LARGEST_TURN: f64 = 0.3;
 /// A load that strikes at once, or a start from undeformed springs, deflects twice as far as the same load at rest.
@@ -115,7 +115,7 @@ mod tests {
     #[test]
     fn factors_are_round_and_show_the_tool_where_it_can_be_seen() {
         let expected = |tool_m, turn_rad| Expected { tool_m, turn_rad, reach_m: 2.7, volume: None };
-        assert_eq!(expected(1.4e-3, 1e-4).magnification(), 200.0); // 231 would show 0.12 of the reach
+        assert_eq!(expected(1.4e-3, 1e-4).magnification(), 200.0); // 289 would show 0.15 of the reach
         assert_eq!(expected(1.4e-3, 1e-2).magnification(), 20.0); // 30 would turn a spring by 0.3 rad
         assert_eq!(expected(1.0, 0.1).magnification(), 1.0);
         assert_eq!(expected(0.0, 0.0).magnification(), 0.0);

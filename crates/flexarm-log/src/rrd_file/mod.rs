@@ -206,6 +206,7 @@ pub(crate) struct RunWriter {
     tracks: RunTracks,
     /// Whether the layout is still to be written: with the first sample, which shows where the robot is.
     layout_due: bool,
+    tools_due: bool,
 }
 
 impl RunWriter {
@@ -217,7 +218,7 @@ impl RunWriter {
         let layout_due = matches!(seat, Seat::Alone | Seat::InStudy(0, _));
         // Surfaces and files are in the recording now.
         let header = RunHeader { meshes: Vec::new(), attachments: Vec::new(), urdf: String::new(), ..header.clone() };
-        Ok(Self { shape: Shape::of(&header), header, seat, labels, tracks, layout_due })
+        Ok(Self { shape: Shape::of(&header), header, seat, labels, tracks, layout_due, tools_due: true })
     }
 
     fn record(&mut self, store: &mut Store, file: &Path, sample: &Sample) -> Result<(), LogError> {
@@ -232,6 +233,11 @@ impl RunWriter {
 
     fn sample(&mut self, store: &mut Store, time_ns: i64, sample: &Sample) -> Result<(), StreamError> {
         self.layout(store, Some(sample))?;
+        if std::mem::take(&mut self.tools_due) {
+            let mut ids = *store.stream.ids();
+            let tools = self.tracks.tools(&self.header, sample, &mut ids)?;
+            store.append_all(ids, &tools)?;
+        }
         self.tracks.push((time_ns, i64::try_from(sample.step).unwrap_or(i64::MAX)), sample);
         if self.tracks.waiting() >= CHUNK_ROWS {
             self.commit(store)?;

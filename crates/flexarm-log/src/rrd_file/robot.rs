@@ -4,12 +4,12 @@ use flexarm_kinematics::{Pose, rotation_vector};
 use nalgebra::{Point3, Vector3};
 use rerun::components::MeshFaceRendering;
 use rerun::log::Chunk;
-use rerun::{AlbedoFactor, Color, EntityPath, Mesh3D, Rgba32, TransformAxes3D};
+use rerun::{AlbedoFactor, Color, EntityPath, LineStrips3D, Mesh3D, Rgba32, TransformAxes3D};
 
 use super::colors::{ColorScale, GHOST};
 use super::path;
 use super::stream::{Ids, StreamError};
-use super::tracks::{Instant, PoseTrack, ShapeTrack, SkeletonTrack, TintTrack, Track};
+use super::tracks::{Instant, PoseTrack, ShapeTrack, SkeletonTrack, TintTrack, Track, point};
 use crate::{BendLine, BentMesh, BentPieces, LinkMesh, RunHeader, Sample, TwinSample, stations_in_link};
 
 /// How a robot is painted.
@@ -190,6 +190,23 @@ impl RobotTracks {
         }
         let surface = plain(mesh).with_vertex_texcoords(along.map(|x| [x.clamp(0.0, 1.0), 0.5]));
         surface.with_albedo_texture_format(TintTrack::format(width))
+    }
+
+    /// The tool as a line from the frame that carries it to the tool centre point: most robot files have no mesh for it.
+    pub(crate) fn tool(&self, X_TL: &Pose, ids: &mut Ids) -> Result<Option<Chunk>, StreamError> {
+        const SHORTEST_M: f64 = 0.01;
+        if X_TL.translation.vector.norm() < SHORTEST_M {
+            return Ok(None);
+        }
+        let color = match self.look.paint {
+            Paint::Ghost => Color(Rgba32::from_u32(GHOST)),
+            Paint::Plain(color) => color,
+            Paint::Own | Paint::Deviation(_) => Color::from_u32(super::colors::LIGHT),
+        };
+        let line = LineStrips3D::new([[point(X_TL), [0.0; 3]]])
+            .with_colors([color])
+            .with_radii([rerun::Radius::new_ui_points(2.5)]);
+        ids.constant(&self.look.root.join(&path(["tcp", "tool"])), &line).map(Some)
     }
 
     /// Adds an instant. `twin` is what is drawn; `sample` says how far places really are from the rigid twin.

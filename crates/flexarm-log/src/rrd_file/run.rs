@@ -152,6 +152,15 @@ impl RunTracks {
         Ok((run, fixed))
     }
 
+    /// What is known of the robots with the first sample.
+    pub(crate) fn tools(&self, header: &RunHeader, first: &Sample, ids: &mut Ids) -> Result<Vec<Chunk>, StreamError> {
+        let Some(link) = header.links.iter().position(|link| link.name == header.tcp) else { return Ok(Vec::new()) };
+        let X_TL = first.flexible.X_WT.inv_mul(&first.flexible.X_WL[link]);
+        let drawn = std::iter::once(&self.flexible).chain(&self.rigid).chain(&self.magnified);
+        let lines = drawn.filter_map(|drawn| drawn.robot.as_ref()).map(|robot| robot.tool(&X_TL, ids));
+        lines.filter_map(Result::transpose).collect()
+    }
+
     /// Adds an instant.
     pub(crate) fn push(&mut self, when: Instant, sample: &Sample) {
         self.times.push(when);
