@@ -28,9 +28,9 @@ pub(crate) enum Command {
     /// Run the flexible robot beside its rigid twin, log both, measure the TCP error
     ///
     /// Without arguments: the shipped industrial arm on its pick-and-place cycle.
-    Compare(RunArgs),
+    Compare(Box<RunArgs>),
     /// Run one model along a trajectory and log it
-    Run(RunArgs),
+    Run(Box<RunArgs>),
     /// Show what was loaded, and kinematics and dynamics at a pose
     Inspect(InspectArgs),
     /// Look for everything that is wrong with a robot and a trajectory
@@ -56,7 +56,7 @@ pub(crate) enum Command {
     Man,
 }
 
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub(crate) struct RobotArgs {
     /// Frame to use as TCP instead of the robot file's
     #[arg(long, value_name = "FRAME")]
@@ -73,7 +73,7 @@ pub(crate) struct RobotArgs {
 }
 
 /// How links and drives are modelled.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub(crate) struct ModellingArgs {
     /// Model of the links [default: as the robot file says]
     #[arg(long, value_enum)]
@@ -110,7 +110,7 @@ impl ModellingArgs {
     }
 }
 
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub(crate) struct RunArgs {
     /// robot.toml, a folder with one, a .urdf or .xacro file, or the name of a shipped robot [default: kr210]
     pub(crate) robot: Option<PathBuf>,
@@ -156,6 +156,10 @@ pub(crate) struct RunArgs {
     /// Band around the final TCP error for the settling time (m)
     #[arg(long, value_name = "METRES", default_value_t = 1e-4, allow_hyphen_values = true)]
     pub(crate) settling_band: f64,
+    /// One more run beside this one, with some options changed: links=modal, or stepper=spook,step=5e-4,name=spook, or
+    /// robot=..., trajectory=... (may be repeated; compare only)
+    #[arg(long, value_name = "KEY=VALUE,...")]
+    pub(crate) with: Vec<String>,
     /// Factor by which recordings and pictures show deflections [default: so that they are seen]
     #[arg(long, value_name = "FACTOR", allow_hyphen_values = true)]
     pub(crate) magnify: Option<f64>,

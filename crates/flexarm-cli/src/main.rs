@@ -10,6 +10,7 @@ mod print;
 mod reduce;
 mod reduce_args;
 mod shipped;
+mod study;
 
 use std::io::{IsTerminal, Write};
 use std::ops::ControlFlow;
@@ -24,7 +25,7 @@ use args::{
 use clap::{CommandFactory, Parser};
 use flexarm::{
     AlphaSettings, ConstraintForm, Error, InertiaEstimate, LoadOptions, Motion, Outputs, ReadOptions, ReferenceMethod,
-    ReferenceSettings, Robot, RunOptions, SpookPreset, SpookSettings, Start, StepperKind,
+    ReferenceSettings, Robot, RunOptions, SpookPreset, SpookSettings, Start, StepperKind, Variant,
 };
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -143,7 +144,8 @@ fn run_options(args: &RunArgs, with_twin: bool) -> RunOptions {
     }
 }
 
-fn simulate(cli: &Cli, args: &RunArgs, with_twin: bool) -> Result<ExitCode, Error> {
+/// Robot, motion and choices of a run.
+fn variant(label: String, args: &RunArgs, with_twin: bool) -> Result<Variant, Error> {
     let robot = Robot::load(&shipped::robot(args.robot.as_deref()), &load_options(&args.load)?)?;
     let trajectory = match (&args.trajectory, &robot.default_trajectory) {
         (Some(given), _) => shipped::trajectory(given),
@@ -160,7 +162,25 @@ fn simulate(cli: &Cli, args: &RunArgs, with_twin: bool) -> Result<ExitCode, Erro
         }
         other => other,
     })?;
-    let options = run_options(args, with_twin);
+    Ok(Variant { label, robot, motion, options: run_options(args, with_twin) })
+}
+
+fn simulate(cli: &Cli, args: &RunArgs, with_twin: bool) -> Result<ExitCode, Error> {
+    let line: Vec<std::ffi::OsString> = std::env::args_os().collect();
+    if !with_twin && !args.with.is_empty() {
+        return Err(Error::Usage("--with belongs to compare: run has one run only".into()));
+    }
+    let parts = study::parts(args, &line)?;
+    let variants = parts.iter().map(|part| {
+        variant(part.label.clone(), &part.args, with_twin).map_err(|error| match parts.len() {
+            1 => error,
+            _ => Error::InStudy { label: part.label.clone(), source: Box::new(error) },
+        })
+    });
+    let variants = variants.collect::<Result<Vec<Variant>, Error>>()?;
+    let Some(Variant { robot, motion, options, .. }) = variants.first() else {
+        return Err(Error::Usage("there is nothing to run".into()));
+    };
     let outputs = (!args.no_files).then(|| {
         let stem = format!("{}-{}", robot.name, motion.name);
         let folder = args.output.clone().unwrap_or_else(|| shipped::new_output_folder(&stem));
@@ -176,12 +196,20 @@ fn simulate(cli: &Cli, args: &RunArgs, with_twin: bool) -> Result<ExitCode, Erro
         bar.show(t, total);
         if stop.load(Ordering::SeqCst) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let result = flexarm::simulate(&robot, &motion, &options, outputs.as_ref(), &mut progress);
+    let result = match variants.len() {
+        1 => flexarm::simulate(robot, motion, options, outputs.as_ref(), &mut progress),
+        _ => flexarm::compare_study(&variants, outputs.as_ref(), &mut progress).map(|(summary, _)| summary),
+    };
     bar.clear();
     let summary = result?;
     if !cli.quiet {
         for warning in &summary.warnings {
             eprintln!("warning: {warning}");
+        }
+        for other in &summary.with {
+            for warning in other.warnings.iter().filter(|warning| !summary.warnings.contains(warning)) {
+                eprintln!("warning: {}: {warning}", other.label.as_deref().unwrap_or_default());
+            }
         }
     }
     answer(cli, || to_json(&summary), || print::summary(&summary));

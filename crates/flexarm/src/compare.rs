@@ -11,7 +11,8 @@ use flexarm_kinematics::{
     Data, Frame, JointMotion, Pose, State, forward_kinematics, kinetic_energy, potential_energy, rotation_vector,
 };
 use flexarm_log::{
-    Attachment, BendInfo, ElasticSample, EnergySample, Event, EventKind, RecorderSet, RunResult, Sample, Trace,
+    Attachment, BendInfo, ElasticSample, EnergySample, Event, EventKind, Recorder, RecorderSet, RunResult, Sample,
+    Trace,
 };
 use flexarm_stepping::{FlexibleArm, Load, Observation, StepError, Stepper, StepperKind, new_stepper};
 use nalgebra::{Matrix6, Vector3, Vector6};
@@ -68,6 +69,18 @@ pub fn simulate_traced(
     outputs: Option<&Outputs>,
     progress: &mut Progress<'_>,
 ) -> Result<(Summary, Trace), Error> {
+    run_traced(robot, motion, options, outputs, Vec::new(), progress)
+}
+
+/// As [`simulate_traced`], into more recorders than those of the outputs.
+pub(crate) fn run_traced(
+    robot: &Robot,
+    motion: &Motion,
+    options: &RunOptions,
+    outputs: Option<&Outputs>,
+    extra: Vec<Box<dyn Recorder>>,
+    progress: &mut Progress<'_>,
+) -> Result<(Summary, Trace), Error> {
     let started = Instant::now();
     let cpu = cpu_time::ProcessTime::now();
     if !motion.violations.is_empty() && !options.ignore_limits {
@@ -93,6 +106,7 @@ pub fn simulate_traced(
     let expected = Expected::of(&arm, &tool_frame(&arm), motion.trajectory.duration(), options.start);
     let mut run = Run::new(robot, motion, options, &flexible, arm, stepper);
     let mut files = recorders(outputs)?;
+    files.set.extend(extra);
     let mut head = header(robot, motion, options, &run.arm, flexible.links_model());
     head.bends.clone_from(&run.bends);
     head.contributors = run.contributors.iter().map(|(_, name)| name.clone()).collect();

@@ -20,6 +20,14 @@ pub enum Error {
         /// What is wrong and how to mend it.
         what: String,
     },
+    /// A run of a study.
+    #[error("run {label:?} of the study: {source}")]
+    InStudy {
+        /// Its label.
+        label: String,
+        /// Why.
+        source: Box<Error>,
+    },
     /// Something in the robot file or in a job file.
     #[error(transparent)]
     RobotFile(#[from] RobotFileError),
@@ -129,6 +137,7 @@ impl Error {
                 flexarm_stepping::StepError::Singular { .. } if !partial => 2,
                 _ => 1,
             },
+            Self::InStudy { source, .. } => source.exit_code(),
             Self::Interrupted { .. } | Self::Write { .. } => 1,
             Self::Reduction { source, .. } | Self::Import { source, .. } => match source.as_ref() {
                 MeshLinkError::Reduction(ReductionError::OutOfMemory { .. })

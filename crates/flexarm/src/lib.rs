@@ -47,6 +47,7 @@ mod robot;
 pub mod robot_file;
 mod stamp;
 mod statics;
+mod study;
 mod summary;
 mod twin;
 
@@ -66,7 +67,8 @@ pub use report::{markdown, rows};
 pub use response::{PeakFigures, Response, ResponseCurve, ResponseFiles, ResponseOutputs, ResponseRequest, response};
 pub use robot::{LoadOptions, Robot, TCP_FRAME};
 pub use statics::{ElementStatics, Statics, parse_wrench, statics};
-pub use summary::{Files, LinkFigures, StepperFigures, Summary, TcpFigures};
+pub use study::{STUDY_NOTE, Variant, compare_study, study_rows};
+pub use summary::{DifferenceFigures, Files, LinkFigures, StepperFigures, Summary, TcpFigures};
 
 pub use flexarm_analysis::{Quantity, Spacing};
 pub use flexarm_stepping::{

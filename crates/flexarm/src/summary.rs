@@ -48,6 +48,15 @@ pub struct Summary {
     pub warnings: Vec<String>,
     /// Written files.
     pub files: Files,
+    /// What the run is called in a study.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub label: Option<String>,
+    /// How far its tool is from that of the first run of a study.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub difference: Option<DifferenceFigures>,
+    /// The other runs of a study.
+    #[serde(skip_serializing_if = "Vec::is_empty", default)]
+    pub with: Vec<Summary>,
     /// Size of the TCP error over time, thinned for the terminal.
     #[serde(skip)]
     pub error_curve: Vec<f64>,
@@ -64,6 +73,9 @@ pub struct Files {
     pub csv: Option<String>,
     /// Report.
     pub report: Option<String>,
+    /// Rerun recording of all runs of a study.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub study: Option<String>,
 }
 
 /// Stepper and its work.
@@ -162,6 +174,19 @@ pub struct EnergyFigures {
     pub stored_j: f64,
     /// Largest gap in the balance over the largest energy in it.
     pub imbalance: f64,
+}
+
+/// One run's flexible tool centre point against another's.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct DifferenceFigures {
+    /// Largest distance (m).
+    pub peak_m: f64,
+    /// When (s).
+    pub t_peak_s: f64,
+    /// Root mean square of the distance (m).
+    pub rms_m: f64,
+    /// Largest distance over the first run's largest TCP error.
+    pub of_peak_error: Option<f64>,
 }
 
 /// Flexible against rigid tool centre point.

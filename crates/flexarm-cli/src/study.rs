@@ -1,0 +1,110 @@
+//! `--with`: more runs beside the one that was asked for, each with some options changed.
+
+use std::borrow::Cow;
+use std::ffi::OsString;
+
+use clap::{CommandFactory, FromArgMatches};
+use flexarm::Error;
+
+use crate::args::{Cli, Command, RunArgs};
+
+/// A run of a study: label, and the arguments that it would have on a command line of its own.
+pub(crate) struct Part<'a> {
+    pub(crate) label: String,
+    pub(crate) args: Cow<'a, RunArgs>,
+}
+
+/// Options that belong to the study as a whole.
+const SHARED: [&str; 9] = ["with", "output", "force", "no-files", "magnify", "json", "quiet", "figures", "parquet"];
+
+/// The runs of a study, the one that was asked for first. `line` is the command line as given.
+pub(crate) fn parts<'a>(main: &'a RunArgs, line: &[OsString]) -> Result<Vec<Part<'a>>, Error> {
+    let line = without_with(line);
+    let mut varied: Vec<String> = Vec::new();
+    let mut others = Vec::new();
+    for text in &main.with {
+        let usage = |what: String| Error::Usage(format!("--with {text:?}: {what}"));
+        let (mut label, mut words) = (None, Vec::new());
+        for pair in text.split(',').map(str::trim) {
+            let (key, value) = pair.split_once('=').unwrap_or((pair, ""));
+            let (key, value) = (key.trim(), value.trim());
+            if key.is_empty() {
+                let example = "for instance links=modal or stepper=spook,step=5e-4,name=spook";
+                return Err(usage(format!(
+                    "expected key=value pairs with commas between them, {example}; found {pair:?}"
+                )));
+            }
+            if SHARED.contains(&key) {
+                return Err(usage(format!("{key} holds for the whole study and cannot differ between its runs")));
+            }
+            if key == "name" {
+                label = Some(value.to_owned());
+                continue;
+            }
+            words.push((key.to_owned(), value.to_owned(), pair.contains('=')));
+            if !varied.iter().any(|known| known == key) {
+                varied.push(key.to_owned());
+            }
+        }
+        let label = label.unwrap_or_else(|| text.replace(", ", ","));
+        others.push(Part { label, args: Cow::Owned(changed(&line, &words).map_err(usage)?) });
+    }
+    let label = varied.iter().map(|key| format!("{key}={}", given(&line, key))).collect::<Vec<_>>().join(",");
+    let label = if label.is_empty() { "as given".to_owned() } else { label };
+    let mut parts = vec![Part { label, args: Cow::Borrowed(main) }];
+    parts.extend(others);
+    Ok(parts)
+}
+
+/// The command line without its `--with` options.
+fn without_with(line: &[OsString]) -> Vec<OsString> {
+    let mut kept = Vec::new();
+    let mut words = line.iter();
+    while let Some(word) = words.next() {
+        match word.to_str() {
+            Some("--with") => {
+                words.next();
+            }
+            Some(word) if word.starts_with("--with=") => {}
+            _ => kept.push(word.clone()),
+        }
+    }
+    kept
+}
+
+/// The arguments of the line with some of them replaced.
+fn changed(line: &[OsString], words: &[(String, String, bool)]) -> Result<RunArgs, String> {
+    let mut line = line.to_vec();
+    let (mut robot, mut trajectory) = (None, None);
+    for (key, value, has_value) in words {
+        match key.as_str() {
+            "robot" => robot = Some(value.into()),
+            "trajectory" => trajectory = Some(value.into()),
+            _ if *has_value => line.push(format!("--{key}={value}").into()),
+            _ => line.push(format!("--{key}").into()),
+        }
+    }
+    let command = Cli::command().args_override_self(true).mut_subcommand("compare", |c| c.args_override_self(true));
+    let matches = command.try_get_matches_from(line).map_err(|error| {
+        // The first lines say what is wrong; usage and hints are those of the whole program.
+        let text = error.to_string();
+        text.lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned()
+    })?;
+    let Cli { command: Command::Compare(mut args), .. } = Cli::from_arg_matches(&matches).map_err(|e| e.to_string())?
+    else {
+        return Err("only compare has several runs".into());
+    };
+    args.robot = robot.or(args.robot);
+    args.trajectory = trajectory.or(args.trajectory);
+    Ok(*args)
+}
+
+/// What the line gives for an option, as a word for a label.
+fn given(line: &[OsString], key: &str) -> String {
+    let Ok(matches) = Cli::command().try_get_matches_from(line) else { return "as given".into() };
+    let Some((_, matches)) = matches.subcommand() else { return "as given".into() };
+    let id = key.replace('-', "_");
+    let values = matches.try_get_raw(&id).ok().flatten();
+    let words: Vec<String> = values.into_iter().flatten().map(|word| word.to_string_lossy().into_owned()).collect();
+    if words.is_empty() { "as filed".into() } else { words.join("/") }
+}

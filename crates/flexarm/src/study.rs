@@ -1,0 +1,235 @@
+//! Several runs compared: robots, link models, steppers or trajectories side by side, in one recording and one report.
+
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+
+use flexarm_log::{Recorder, Trace};
+
+use crate::compare::{Progress, run_traced};
+use crate::error::Error;
+use crate::motion::Motion;
+use crate::options::{Outputs, RunOptions};
+use crate::robot::Robot;
+use crate::summary::{DifferenceFigures, Summary};
+
+/// One run of a study.
+#[derive(Debug)]
+pub struct Variant {
+    /// What it is called in tables, plots and folders.
+    pub label: String,
+    /// Its robot.
+    pub robot: Robot,
+    /// Its motion.
+    pub motion: Motion,
+    /// Its choices.
+    pub options: RunOptions,
+}
+
+/// Runs all variants, the first being the one the others are compared with.
+///
+/// The first run's files are those of [`crate::simulate`]; each of the others has a folder of its own below. All together
+/// are in `study.rrd` and in the report. The answer is the first run's summary with the others in
+/// [`Summary::with`].
+///
+/// # Errors
+/// As [`crate::simulate`], with the label of the run that failed; [`Error::Usage`] for labels that are not distinct.
+pub fn compare_study(
+    variants: &[Variant],
+    outputs: Option<&Outputs>,
+    progress: &mut Progress<'_>,
+) -> Result<(Summary, Vec<(String, Trace)>), Error> {
+    let Some(main) = variants.first() else {
+        return Err(Error::Usage("a study needs at least one run".into()));
+    };
+    let folders = folders(variants)?;
+    let mut options = main.options.clone();
+    let total: f64 = variants.iter().map(|v| v.motion.trajectory.duration()).sum();
+    let mut before = 0.0;
+
+    let recording = StudyRecording::new(variants, outputs)?;
+    let mut summaries = Vec::new();
+    let mut traces: Vec<(String, Trace)> = Vec::new();
+    for (number, variant) in variants.iter().enumerate() {
+        let own = outputs.map(|outputs| match number {
+            0 => outputs.clone(),
+            _ => Outputs { folder: outputs.folder.join(&folders[number]), rrd: false, ..outputs.clone() },
+        });
+        if number > 0 {
+            options = RunOptions { magnification: options.magnification, ..variant.options.clone() };
+        }
+        let extra = recording.seat(number).into_iter().collect();
+        let mut shown = |t: f64, _: f64| progress(before + t, total);
+        let run = run_traced(&variant.robot, &variant.motion, &options, own.as_ref(), extra, &mut shown);
+        let (mut summary, trace) = run.map_err(|error| match variants.len() {
+            1 => error,
+            _ => Error::InStudy { label: variant.label.clone(), source: Box::new(error) },
+        })?;
+        before += variant.motion.trajectory.duration();
+        // All arms are magnified alike, or they could not be compared by eye.
+        options.magnification = Some(trace.header.magnification).filter(|factor| *factor > 0.0);
+        summary.label = Some(variant.label.clone());
+        summary.difference = traces.first().and_then(|(_, first)| difference(first, &trace));
+        summaries.push(summary);
+        traces.push((variant.label.clone(), trace));
+    }
+    let with = summaries.split_off(1);
+    let mut summary = Summary { with, ..summaries.remove(0) };
+    if let Some(path) = recording.finish(&summary)? {
+        summary.files.study = Some(path.display().to_string());
+    }
+    if let Some(outputs) = outputs {
+        crate::report::write(outputs, &summary)?;
+    }
+    Ok((summary, traces))
+}
+
+/// Names of the runs' folders: the labels, with letters that every file system takes.
+fn folders(variants: &[Variant]) -> Result<Vec<String>, Error> {
+    let mut taken = BTreeSet::new();
+    let mut names = Vec::new();
+    for variant in variants {
+        let plain = |c: char| if c.is_ascii_alphanumeric() || "-_.=".contains(c) { c } else { '_' };
+        let name: String = variant.label.chars().map(plain).collect();
+        if name.is_empty() || name.starts_with('.') || !taken.insert(name.to_lowercase()) {
+            return Err(Error::Usage(format!(
+                "the label {:?} names two runs of the study, or none: give each --with a name=... of its own",
+                variant.label
+            )));
+        }
+        names.push(name);
+    }
+    Ok(names)
+}
+
+/// How far the tool of a run is from that of the first, at the first's times; `None` for motions of other lengths.
+fn difference(first: &Trace, other: &Trace) -> Option<DifferenceFigures> {
+    let (end, other_end) = (first.rows.last()?.time_s, other.rows.last()?.time_s);
+    if (end - other_end).abs() > 1e-6 * end.max(1.0) {
+        return None;
+    }
+    let (mut peak_m, mut t_peak_s, mut sum, mut k) = (0.0f64, 0.0, 0.0, 0);
+    for row in &first.rows {
+        while k + 2 < other.rows.len() && other.rows[k + 1].time_s < row.time_s {
+            k += 1;
+        }
+        let (a, b) = (&other.rows[k], &other.rows[(k + 1).min(other.rows.len() - 1)]);
+        let span = b.time_s - a.time_s;
+        let x = if span > 0.0 { ((row.time_s - a.time_s) / span).clamp(0.0, 1.0) } else { 0.0 };
+        let gap = |c: usize| a.flexible_m[c] + (b.flexible_m[c] - a.flexible_m[c]) * x - row.flexible_m[c];
+        let square: f64 = (0..3).map(|c| gap(c) * gap(c)).sum();
+        sum += square;
+        if square.sqrt() > peak_m {
+            (peak_m, t_peak_s) = (square.sqrt(), row.time_s);
+        }
+    }
+    let largest = first.rows.iter().map(|row| row.error_m()).fold(0.0, f64::max);
+    Some(DifferenceFigures {
+        peak_m,
+        t_peak_s,
+        rms_m: (sum / first.rows.len() as f64).sqrt(),
+        of_peak_error: (largest > 0.0).then(|| peak_m / largest),
+    })
+}
+
+/// The runs of a study side by side: a header, then a row for each run. Empty for a run that is alone.
+pub fn study_rows(summary: &Summary) -> Vec<Vec<String>> {
+    if summary.with.is_empty() {
+        return Vec::new();
+    }
+    let header = [
+        "run",
+        "peak [mm]",
+        "at [s]",
+        "RMS [mm]",
+        "sag [mm]",
+        "end [mm]",
+        "settling [s]",
+        "f1 [Hz]",
+        "apart [mm]",
+        "of peak [%]",
+        "CPU [ms/s]",
+    ];
+    let mut rows = vec![header.map(str::to_owned).to_vec()];
+    for run in std::iter::once(summary).chain(&summary.with) {
+        let tcp = run.tcp.as_ref();
+        let mm = |x: Option<f64>| x.map_or_else(|| "-".to_owned(), |x| format!("{:.4}", 1e3 * x));
+        let plain = |x: Option<f64>, digits: usize| x.map_or_else(|| "-".to_owned(), |x| format!("{x:.digits$}"));
+        let apart = run.difference.as_ref();
+        rows.push(vec![
+            run.label.clone().unwrap_or_default(),
+            mm(tcp.map(|t| t.peak_m)),
+            plain(tcp.map(|t| t.t_peak_s), 3),
+            mm(tcp.map(|t| t.rms_m)),
+            mm(tcp.map(|t| t.static_sag_m)),
+            mm(tcp.map(|t| t.end_m)),
+            plain(tcp.and_then(|t| t.settling_s), 3),
+            plain(run.frequencies_hz.first().copied(), 2),
+            mm(apart.map(|d| d.peak_m)),
+            plain(apart.and_then(|d| d.of_peak_error).map(|x| 100.0 * x), 3),
+            format!("{:.1}", 1e3 * run.cpu_s_per_simulated_s),
+        ]);
+    }
+    rows
+}
+
+/// What the columns of [`study_rows`] mean that do not say it themselves.
+pub const STUDY_NOTE: &str = "apart: largest distance of the flexible TCP from that of the first run at the same time, and that over the \
+     first run's largest TCP error";
+
+fn study_markdown(summary: &Summary) -> String {
+    let mut page = format!("# Study of {}\n\n", summary.robot);
+    for (k, row) in study_rows(summary).iter().enumerate() {
+        // Times of this machine stay out of recordings.
+        let cells: Vec<String> = row[..row.len() - 1].iter().map(|cell| cell.replace('|', "\\|")).collect();
+        page += &format!("| {} |\n", cells.join(" | "));
+        if k == 0 {
+            page += &format!("|{}\n", " --- |".repeat(cells.len()));
+        }
+    }
+    page + "\n" + STUDY_NOTE + ".\n"
+}
+
+/// The recording of all runs, if this build and the outputs have one.
+struct StudyRecording {
+    #[cfg(feature = "rerun")]
+    study: Option<(PathBuf, flexarm_log::RrdStudy)>,
+}
+
+#[cfg(feature = "rerun")]
+impl StudyRecording {
+    fn new(variants: &[Variant], outputs: Option<&Outputs>) -> Result<Self, Error> {
+        let Some(outputs) = outputs.filter(|outputs| outputs.rrd && variants.len() > 1) else {
+            return Ok(Self { study: None });
+        };
+        let path = outputs.folder.join("study.rrd");
+        let options = flexarm_log::CreateOptions::default().with_overwrite(outputs.overwrite);
+        let labels = variants.iter().map(|v| v.label.clone()).collect();
+        let study = flexarm_log::RrdStudy::create(&path, options, labels);
+        Ok(Self { study: Some((path, study)) })
+    }
+
+    fn seat(&self, number: usize) -> Option<Box<dyn Recorder>> {
+        self.study.as_ref().map(|(_, study)| Box::new(study.seat(number)) as Box<dyn Recorder>)
+    }
+
+    fn finish(self, summary: &Summary) -> Result<Option<PathBuf>, Error> {
+        let Some((path, study)) = self.study else { return Ok(None) };
+        study.finish(&study_markdown(summary))?;
+        Ok(Some(path))
+    }
+}
+
+#[cfg(not(feature = "rerun"))]
+impl StudyRecording {
+    fn new(_: &[Variant], _: Option<&Outputs>) -> Result<Self, Error> {
+        Ok(Self {})
+    }
+
+    fn seat(&self, _: usize) -> Option<Box<dyn Recorder>> {
+        None
+    }
+
+    fn finish(self, _: &Summary) -> Result<Option<PathBuf>, Error> {
+        Ok(None)
+    }
+}
