@@ -49,8 +49,10 @@ pub(crate) fn parts<'a>(main: &'a RunArgs, line: &[OsString]) -> Result<Vec<Part
         let label = label.unwrap_or_else(|| text.replace(", ", ","));
         others.push(Part { label, args: Cow::Owned(changed(&line, &words).map_err(usage)?) });
     }
-    let label = varied.iter().map(|key| format!("{key}={}", given(&line, key))).collect::<Vec<_>>().join(",");
-    let label = if label.is_empty() { "as given".to_owned() } else { label };
+    let label = match &varied[..] {
+        [key] => format!("{key}={}", given(&line, key)),
+        _ => "as given".to_owned(),
+    };
     let mut parts = vec![Part { label, args: Cow::Borrowed(main) }];
     parts.extend(others);
     Ok(parts)

@@ -83,24 +83,8 @@ pub(crate) fn run_traced(
 ) -> Result<(Summary, Trace), Error> {
     let started = Instant::now();
     let cpu = cpu_time::ProcessTime::now();
-    if !motion.violations.is_empty() && !options.ignore_limits {
-        let violations = motion.violations.iter().map(ToString::to_string).collect();
-        return Err(Error::Limits { path: motion.path.clone(), violations });
-    }
-    check_options(motion, options)?;
-    let flexible = robot.modelled(&options.modelling)?;
+    let Checked { flexible, arm, load_warnings } = checked(robot, motion, options)?;
     let failed = |source: StepError| Error::Step { source, partial: false };
-    let mut arm = flexible.arm(motion.prescribed()).map_err(failed)?;
-    let mut load_warnings = Vec::new();
-    if let Some(path) = &options.loads {
-        let disturbances = Disturbances::load(path, robot, &arm.model, motion.trajectory.duration())?;
-        load_warnings = disturbances.warnings;
-        if !matches!(options.stepper, StepperKind::Reference(_)) {
-            load_warnings.extend(short_loads(&disturbances.loads, options.step_s));
-        }
-        arm.inertia_changes = disturbances.changes;
-        arm = arm.with_timed_loads(disturbances.loads).map_err(failed)?;
-    }
     let stepper = new_stepper(options.stepper, arm.clone(), options.step_s, options.start).map_err(failed)?;
 
     let expected = Expected::of(&arm, &tool_frame(&arm), motion.trajectory.duration(), options.start);
@@ -134,6 +118,36 @@ pub(crate) fn run_traced(
         crate::report::write(outputs, &summary)?;
     }
     end.map(|()| (summary, run.trace))
+}
+
+/// A run whose input makes sense.
+pub(crate) struct Checked {
+    flexible: FlexibleRobot,
+    arm: FlexibleArm,
+    load_warnings: Vec<String>,
+}
+
+/// Everything about the input of a run that can be told before the first step.
+pub(crate) fn checked(robot: &Robot, motion: &Motion, options: &RunOptions) -> Result<Checked, Error> {
+    if !motion.violations.is_empty() && !options.ignore_limits {
+        let violations = motion.violations.iter().map(ToString::to_string).collect();
+        return Err(Error::Limits { path: motion.path.clone(), violations });
+    }
+    check_options(motion, options)?;
+    let failed = |source: StepError| Error::Step { source, partial: false };
+    let flexible = robot.modelled(&options.modelling)?;
+    let mut arm = flexible.arm(motion.prescribed()).map_err(failed)?;
+    let mut load_warnings = Vec::new();
+    if let Some(path) = &options.loads {
+        let disturbances = Disturbances::load(path, robot, &arm.model, motion.trajectory.duration())?;
+        load_warnings = disturbances.warnings;
+        if !matches!(options.stepper, StepperKind::Reference(_)) {
+            load_warnings.extend(short_loads(&disturbances.loads, options.step_s));
+        }
+        arm.inertia_changes = disturbances.changes;
+        arm = arm.with_timed_loads(disturbances.loads).map_err(failed)?;
+    }
+    Ok(Checked { flexible, arm, load_warnings })
 }
 
 /// What recordings are told at the end. Timings stay out of it: recordings of the same run are the same bytes.

@@ -20,16 +20,23 @@ pub(crate) struct Recordings {
 /// Names of the files in an output folder.
 pub(crate) const RECORDING_FILES: [&str; 5] = ["run.mcap", "run.rrd", "run.csv", "report.md", "summary.json"];
 
+/// An error if the folder has files of an earlier run that may not be replaced.
+pub(crate) fn refuse_to_overwrite(outputs: &Outputs) -> Result<(), Error> {
+    let mut files = RECORDING_FILES.iter().map(|file| outputs.folder.join(file));
+    match files.find(|path| path.exists()).filter(|_| !outputs.overwrite) {
+        None => Ok(()),
+        Some(there) => {
+            let what = "exists already and is not overwritten: choose another folder with -o or give --force";
+            Err(Error::File { path: there, what: what.into() })
+        }
+    }
+}
+
 /// Recorders for the outputs; refuses to overwrite before anything is made.
 pub(crate) fn recorders(outputs: Option<&Outputs>) -> Result<Recordings, Error> {
     let mut recordings = Recordings { set: RecorderSet::new(), names: Files::default() };
     let Some(outputs) = outputs else { return Ok(recordings) };
-    if !outputs.overwrite
-        && let Some(there) = RECORDING_FILES.iter().map(|f| outputs.folder.join(f)).find(|p| p.exists())
-    {
-        let what = "exists already and is not overwritten: choose another folder with -o or give --force";
-        return Err(Error::File { path: there, what: what.into() });
-    }
+    refuse_to_overwrite(outputs)?;
     std::fs::create_dir_all(&outputs.folder).map_err(|e| Error::File {
         path: outputs.folder.clone(),
         what: format!("the output folder cannot be made: {e}"),

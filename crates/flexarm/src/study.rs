@@ -5,10 +5,11 @@ use std::path::PathBuf;
 
 use flexarm_log::{Recorder, Trace};
 
-use crate::compare::{Progress, run_traced};
+use crate::compare::{Progress, checked, run_traced};
 use crate::error::Error;
 use crate::motion::Motion;
 use crate::options::{Outputs, RunOptions};
+use crate::record::refuse_to_overwrite;
 use crate::robot::Robot;
 use crate::summary::{DifferenceFigures, Summary};
 
@@ -46,24 +47,33 @@ pub fn compare_study(
     let total: f64 = variants.iter().map(|v| v.motion.trajectory.duration()).sum();
     let mut before = 0.0;
 
+    let own_outputs = |number: usize| {
+        outputs.map(|outputs| match number {
+            0 => outputs.clone(),
+            _ => Outputs { folder: outputs.folder.join(&folders[number]), rrd: false, ..outputs.clone() },
+        })
+    };
+    let named = |number: usize| {
+        let label: &String = &variants[number].label;
+        move |error: Error| Error::InStudy { label: label.clone(), source: Box::new(error) }
+    };
+    // Minutes of running are not spent before something that could be told at once.
+    for (number, variant) in variants.iter().enumerate() {
+        checked(&variant.robot, &variant.motion, &variant.options).map_err(named(number))?;
+        own_outputs(number).as_ref().map_or(Ok(()), refuse_to_overwrite)?;
+    }
     let recording = StudyRecording::new(variants, outputs)?;
     let mut summaries = Vec::new();
     let mut traces: Vec<(String, Trace)> = Vec::new();
     for (number, variant) in variants.iter().enumerate() {
-        let own = outputs.map(|outputs| match number {
-            0 => outputs.clone(),
-            _ => Outputs { folder: outputs.folder.join(&folders[number]), rrd: false, ..outputs.clone() },
-        });
+        let own = own_outputs(number);
         if number > 0 {
             options = RunOptions { magnification: options.magnification, ..variant.options.clone() };
         }
         let extra = recording.seat(number).into_iter().collect();
         let mut shown = |t: f64, _: f64| progress(before + t, total);
         let run = run_traced(&variant.robot, &variant.motion, &options, own.as_ref(), extra, &mut shown);
-        let (mut summary, trace) = run.map_err(|error| match variants.len() {
-            1 => error,
-            _ => Error::InStudy { label: variant.label.clone(), source: Box::new(error) },
-        })?;
+        let (mut summary, trace) = run.map_err(named(number))?;
         before += variant.motion.trajectory.duration();
         // All arms are magnified alike, or they could not be compared by eye.
         options.magnification = Some(trace.header.magnification).filter(|factor| *factor > 0.0);

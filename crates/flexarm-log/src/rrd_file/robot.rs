@@ -21,7 +21,7 @@ pub(crate) enum Paint {
     Ghost,
     /// Every place in the colour of its distance from the rigid twin.
     Deviation(ColorScale),
-    /// All in one colour.
+    /// All in one colour, seen through if it says so.
     Plain(Color),
 }
 

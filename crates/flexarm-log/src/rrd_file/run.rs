@@ -113,7 +113,15 @@ impl RunTracks {
         let magnified = match with_magnified {
             false => None,
             true => {
-                let paint = seat.color().map_or(Paint::Deviation(scale), Paint::Plain);
+                // The first run of a study is solid, the others are seen through.
+                let paint = match (seat, seat.color()) {
+                    (Seat::InStudy(0, _), Some(color)) => Paint::Plain(color),
+                    (Seat::InStudy(..), Some(color)) => {
+                        let [red, green, blue, _] = color.0.to_array();
+                        Paint::Plain(Color::from_unmultiplied_rgba(red, green, blue, 0x90))
+                    }
+                    _ => Paint::Deviation(scale),
+                };
                 let robot = robot("magnified", paint, true, extent / PIXELS, MAGNIFIED_QUANTUM_M, ids)?;
                 Some(Drawn { robot, way: way("magnified"), way_color: seat.color() })
             }
@@ -205,7 +213,7 @@ impl RunTracks {
             put(magnified, &self.enlarged);
         }
         if let Some(arrow) = &mut self.arrow {
-            let label = format!("{:.2} mm", 1e3 * error);
+            let label = if self.curves.is_some() { format!("{:.2} mm", 1e3 * error) } else { String::new() };
             arrow.push(when, &sample.rigid.X_WT, &self.enlarged.X_WT, label);
         }
     }

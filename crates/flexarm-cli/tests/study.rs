@@ -1,0 +1,89 @@
+//! Several runs beside each other: `compare --with`.
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
+mod common;
+
+use common::{Place, Table};
+use serde_json::Value;
+
+const COMPARE: [&str; 5] = ["compare", "robot.toml", "swing.toml", "-o", "result"];
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("no number: {value}"))
+}
+
+/// Truth: the same command without `--with`, with the option in its place.
+#[test]
+fn every_run_of_a_study_is_the_run_that_stands_alone() {
+    let place = Place::new();
+    let study = place.json(&[&COMPARE[..], &["--with", "links=modal", "--with", "step=2e-3,name=coarse"]].concat());
+    let labels: Vec<&str> = study["with"].as_array().unwrap().iter().map(|run| run["label"].as_str().unwrap()).collect();
+    assert_eq!((study["label"].as_str(), labels), (Some("as given"), vec!["links=modal", "coarse"]));
+
+    let alone = [
+        place.json(&["compare", "robot.toml", "swing.toml", "--no-files"]),
+        place.json(&["compare", "robot.toml", "swing.toml", "--no-files", "--links", "modal"]),
+        place.json(&["compare", "robot.toml", "swing.toml", "--no-files", "--step", "2e-3"]),
+    ];
+    for (run, alone) in std::iter::once(&study).chain(study["with"].as_array().unwrap()).zip(&alone) {
+        assert_eq!(run["tcp"], alone["tcp"]);
+        assert_eq!(run["frequencies_hz"], alone["frequencies_hz"]);
+    }
+}
+
+/// Truth: the columns of the two tables.
+#[test]
+fn the_difference_of_two_runs_is_that_of_their_tables() {
+    let place = Place::new();
+    let study = place.json(&[&COMPARE[..], &["--with", "links=modal,name=modal"]].concat());
+    let [first, other] = ["result/run.csv", "result/modal/run.csv"].map(|file| Table::parse(&place.text(file)));
+    let columns = ["flexible_x_m", "flexible_y_m", "flexible_z_m"].map(|name| (first.column(name), other.column(name)));
+    let apart = (0..columns[0].0.len()).map(|k| {
+        let square: f64 = columns.iter().map(|(a, b)| (a[k] - b[k]).powi(2)).sum();
+        square.sqrt()
+    });
+    let truth = apart.fold(0.0, f64::max);
+    let difference = &study["with"][0]["difference"];
+    assert!(truth > 1e-7, "the models differ");
+    assert!((number(&difference["peak_m"]) - truth).abs() < 1e-12, "{difference} beside {truth:e}");
+    let share = truth / number(&study["tcp"]["peak_m"]);
+    assert!((number(&difference["of_peak_error"]) - share).abs() < 1e-9);
+}
+
+#[test]
+fn a_study_names_its_files_and_overwrites_nothing() {
+    let place = Place::new();
+    let with = ["--with", "links=modal,name=modal"];
+    let study = place.json(&[&COMPARE[..], &with[..]].concat());
+    for file in ["result/run.csv", "result/modal/run.csv", "result/summary.json"] {
+        assert!(place.path(file).is_file(), "{file}");
+    }
+    assert_eq!(study["files"]["study"].is_string(), cfg!(feature = "rerun"));
+    if cfg!(feature = "rerun") {
+        assert!(place.path("result/study.rrd").is_file());
+    }
+    place.refused(&[&COMPARE[..], &with[..]].concat(), &["exists already", "--force"]);
+    place.json(&[&COMPARE[..], &with[..], &["--force"]].concat());
+    // Other runs' folders are looked at before the first run starts.
+    std::fs::remove_dir_all(place.path("result")).unwrap();
+    place.write("result/modal/run.csv", "mine");
+    place.refused(&[&COMPARE[..], &with[..]].concat(), &["modal", "run.csv", "exists already"]);
+}
+
+#[test]
+fn bad_runs_of_a_study_are_named_before_anything_runs() {
+    let place = Place::new();
+    let refused = |with: &str, words: &[&str]| {
+        place.refused(&[&COMPARE[..], &["--with", with]].concat(), words);
+    };
+    refused("links", &["links"]);
+    refused("lincs=modal", &["lincs=modal", "--lincs"]);
+    refused("links=soft", &["links=soft", "soft"]);
+    refused("output=there", &["output", "whole study"]);
+    refused(" , ", &["key=value"]);
+    refused("robot=nowhere.toml", &["nowhere.toml", "robot=nowhere.toml"]);
+    refused("trajectory=nowhere.csv,name=lost", &["nowhere.csv", "lost"]);
+    refused("step=-1", &["step=-1", "positive"]);
+    refused("links=modal,name=links=as filed", &["links=as filed", "name="]);
+    place.refused(&["run", "robot.toml", "swing.toml", "-o", "result", "--with", "links=modal"], &["--with", "compare"]);
+}
