@@ -1,0 +1,146 @@
+#!/usr/bin/env python3
+"""Makes the pictures of docs/images that show recordings and reports as their viewers draw them.
+
+    pip install rerun-sdk==0.36.3 playwright pillow     (in a virtual environment; a Chromium on PATH for the reports)
+    tools/screenshots.py [--flexarm target/release/flexarm] [--only recording,mcap,...] [--out docs/images]
+
+Each picture is a command of flexarm and the file of it that is looked at. Nothing needs a display: the Rerun viewer runs
+headless (it needs a Vulkan driver; in software: Debian's mesa-vulkan-drivers and libvulkan1). What is missing is said and
+skipped; the exit status is 1 only if a picture that could be made was not.
+"""
+
+import argparse
+import os
+import pathlib
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+# Picture: arguments of flexarm, file in its output folder, seconds that the viewer plays before the shot.
+RERUN = {
+    "recording": (["compare"], "run.rrd", 6.5),
+    "mcap": (["compare"], "run.mcap", 6.5),
+    "study": (
+        ["compare", "--with", "links=modal,name=modal links", "--with", "robot=robots/kr210/beams.toml,name=tubes"],
+        "study.rrd",
+        6.5,
+    ),
+}
+REPORTS = {
+    "report": ["compare"],
+    "report_study": RERUN["study"][0],
+}
+
+
+def free_port():
+    with socket.socket() as s:
+        s.bind(("127.0.0.1", 0))
+        return s.getsockname()[1]
+
+
+def viewer_picture(file, out, seconds):
+    """What the Rerun viewer shows `seconds` after it was opened."""
+    from rerun.experimental import ViewerClient
+
+    port = free_port()
+    viewer = shutil.which("rerun", path=f"{pathlib.Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
+    command = [viewer, "--headless", "--bind", "127.0.0.1", "--port", str(port), "--window-size", "1600x1000", str(file)]
+    # A process group of its own: the wrapper of the Python package does not pass signals on.
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True)
+    try:
+        client, deadline = None, time.monotonic() + 60
+        while client is None:
+            try:
+                client = ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy")
+            except Exception:
+                if time.monotonic() > deadline or process.poll() is not None:
+                    raise
+                time.sleep(0.3)
+        time.sleep(seconds)
+        client.save_screenshot(str(out))
+    finally:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+
+
+def smaller(picture):
+    """256 colours are enough for a screen and a quarter of the size."""
+    try:
+        from PIL import Image
+    except ImportError:
+        return
+    image = Image.open(picture).convert("RGB")
+    image.quantize(256, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE).save(picture, optimize=True)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--flexarm", default=str(ROOT / "target/release/flexarm"))
+    parser.add_argument("--only", default="", help="names, with commas between them")
+    parser.add_argument("--out", type=pathlib.Path, default=ROOT / "docs/images")
+    arguments = parser.parse_args()
+    only = set(filter(None, arguments.only.split(",")))
+    unknown = only - set(RERUN) - set(REPORTS)
+    if unknown:
+        parser.error(f"no picture is called {', '.join(sorted(unknown))}; there are {', '.join([*RERUN, *REPORTS])}")
+    if not pathlib.Path(arguments.flexarm).is_file():
+        parser.error(f"{arguments.flexarm} is not there: cargo build --release, or --flexarm")
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    wanted = lambda name: not only or name in only
+    failed = False
+
+    with tempfile.TemporaryDirectory() as scratch:
+        runs = {}
+
+        def run(command):
+            key = tuple(command)
+            if key not in runs:
+                folder = pathlib.Path(scratch) / str(len(runs))
+                subprocess.run(
+                    [arguments.flexarm, *command, "-o", str(folder), "--quiet"], check=True, cwd=ROOT, stdout=subprocess.DEVNULL
+                )
+                runs[key] = folder
+            return runs[key]
+
+        try:
+            import rerun.experimental  # noqa: F401
+
+            with_rerun = True
+        except ImportError:
+            with_rerun = False
+            print("skipped: recordings (pip install rerun-sdk==0.36.3)")
+        for name, (command, file, seconds) in RERUN.items():
+            if not (wanted(name) and with_rerun):
+                continue
+            out = arguments.out / f"{name}.png"
+            try:
+                viewer_picture(run(command) / file, out, seconds)
+                smaller(out)
+                print(f"{out}: {out.stat().st_size} bytes")
+            except Exception as error:
+                print(f"{name}: no picture: {error}", file=sys.stderr)
+                failed = True
+        for name, command in REPORTS.items():
+            if not wanted(name):
+                continue
+            folder = pathlib.Path(scratch) / f"pictures_{name}"
+            check = [sys.executable, str(ROOT / "tools/check_report.py"), str(run(command) / "report.html"), "--out", str(folder)]
+            done = subprocess.run(check, capture_output=True, text=True)
+            print(done.stdout.strip().splitlines()[-1] if done.stdout.strip() else done.stderr.strip())
+            if done.returncode != 0:
+                failed = True
+            elif (folder / "top.png").is_file():
+                out = arguments.out / f"{name}.png"
+                shutil.copyfile(folder / "top.png", out)
+                smaller(out)
+                print(f"{out}: {out.stat().st_size} bytes")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
