@@ -8,6 +8,7 @@ use flexarm::{DriveModel, LinkModel, Modelling};
 use crate::exchange_args::{ExportArgs, ImportArgs};
 use crate::posed_args::{ModesArgs, ResponseArgs, StaticsArgs};
 use crate::reduce_args::ReduceArgs;
+use crate::view::ViewArgs;
 
 /// How far is a robot's tool from where the rigid model puts it, because its links bend?
 #[derive(Debug, Parser)]
@@ -47,6 +48,8 @@ pub(crate) enum Command {
     Import(Box<ImportArgs>),
     /// Write the matrices of a flexible link for another FE program
     Export(ExportArgs),
+    /// Open a recording in the Rerun viewer
+    View(ViewArgs),
     /// Print a shell completion script
     Completions {
         /// Shell to complete for

@@ -11,6 +11,7 @@ mod reduce;
 mod reduce_args;
 mod shipped;
 mod study;
+mod view;
 
 use std::io::{IsTerminal, Write};
 use std::ops::ControlFlow;
@@ -78,6 +79,7 @@ fn run(cli: &Cli) -> Result<ExitCode, Error> {
         Command::Reduce(args) => reduce::run(cli, args),
         Command::Import(args) => exchange::import(cli, args),
         Command::Export(args) => exchange::export(cli, args),
+        Command::View(args) => view::run(cli, args),
         Command::Completions { shell } => {
             clap_complete::generate(*shell, &mut Cli::command(), "flexarm", &mut std::io::stdout());
             Ok(ExitCode::SUCCESS)

@@ -17,7 +17,8 @@ fn number(value: &Value) -> f64 {
 fn every_run_of_a_study_is_the_run_that_stands_alone() {
     let place = Place::new();
     let study = place.json(&[&COMPARE[..], &["--with", "links=modal", "--with", "step=2e-3,name=coarse"]].concat());
-    let labels: Vec<&str> = study["with"].as_array().unwrap().iter().map(|run| run["label"].as_str().unwrap()).collect();
+    let labels: Vec<&str> =
+        study["with"].as_array().unwrap().iter().map(|run| run["label"].as_str().unwrap()).collect();
     assert_eq!((study["label"].as_str(), labels), (Some("as given"), vec!["links=modal", "coarse"]));
 
     let alone = [
@@ -85,5 +86,6 @@ fn bad_runs_of_a_study_are_named_before_anything_runs() {
     refused("trajectory=nowhere.csv,name=lost", &["nowhere.csv", "lost"]);
     refused("step=-1", &["step=-1", "positive"]);
     refused("links=modal,name=links=as filed", &["links=as filed", "name="]);
-    place.refused(&["run", "robot.toml", "swing.toml", "-o", "result", "--with", "links=modal"], &["--with", "compare"]);
+    place
+        .refused(&["run", "robot.toml", "swing.toml", "-o", "result", "--with", "links=modal"], &["--with", "compare"]);
 }

@@ -15,7 +15,7 @@ pub enum LogError {
     },
 
     /// The operating system refused: missing folder, no permission, full disk.
-    #[error("{}: cannot {action}", path.display())]
+    #[error("{}: cannot {action}{}", path.display(), remedy(source))]
     Io {
         /// The file concerned.
         path: PathBuf,
@@ -73,6 +73,17 @@ pub enum LogError {
         /// Why it cannot be made now.
         problem: &'static str,
     },
+}
+
+/// What to do when a file may not grow any more; nothing for other troubles, which name themselves.
+fn remedy(source: &io::Error) -> &'static str {
+    use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
+    match source.kind() {
+        StorageFull => ": the disk is full; free space or choose another folder with -o",
+        QuotaExceeded => ": the disk quota is used up; free space or choose another folder with -o",
+        FileTooLarge => ": the file may not grow further (ulimit -f); raise the limit or lower --log-rate",
+        _ => "",
+    }
 }
 
 impl LogError {

@@ -4,12 +4,18 @@
 //! kills it, wants the last second in the file now. [`TailFile`] serves both: committed bytes are final, and
 //! [`TailFile::set_tail`] puts a provisional end behind them, which the next committed bytes overwrite. The
 //! finished file is the committed bytes alone.
+//!
+//! A write that fails (full disk) takes nothing away: the file is put back to what it was, old tail included, and can be
+//! read up to there.
 
 use std::fs::File;
 use std::io::{self, Seek, SeekFrom, Write};
 
 /// Committed bytes held back until they are worth a system call.
 const PENDING_LIMIT: usize = 4 << 20;
+/// The same where the recorder decides when to write: what a full disk may cost.
+#[cfg(feature = "mcap")]
+const SHARED_PENDING_LIMIT: usize = 1 << 20;
 
 /// See the module.
 #[derive(Debug)]
@@ -20,13 +26,13 @@ pub(crate) struct TailFile {
     /// Committed bytes in the file.
     written: u64,
     /// Provisional bytes in the file, behind the committed ones.
-    tail: u64,
+    tail: Vec<u8>,
 }
 
 impl TailFile {
     /// Around a new, empty file.
     pub(crate) fn new(file: File) -> Self {
-        Self { file, pending: Vec::new(), written: 0, tail: 0 }
+        Self { file, pending: Vec::new(), written: 0, tail: Vec::new() }
     }
 
     /// Number of committed bytes.
@@ -35,17 +41,30 @@ impl TailFile {
     }
 
     /// Writes out what is committed, then `tail` behind it, in place of any earlier tail.
+    ///
+    /// # Errors
+    /// Those of the operating system; the file then is what it was before, as far as that can be had.
     pub(crate) fn set_tail(&mut self, tail: &[u8]) -> io::Result<()> {
-        let old_end = self.written + self.tail;
+        let old_end = self.written + self.tail.len() as u64;
+        if let Err(error) = self.replace_tail(tail, old_end) {
+            // In place, where the space is taken already. Should even that fail, the first error is the one to tell.
+            let _ = self.file.seek(SeekFrom::Start(self.written)).and_then(|_| self.file.write_all(&self.tail));
+            let _ = self.file.set_len(old_end);
+            return Err(error);
+        }
+        self.written += self.pending.len() as u64;
+        self.pending.clear();
+        self.tail.clear();
+        self.tail.extend_from_slice(tail);
+        Ok(())
+    }
+
+    fn replace_tail(&mut self, tail: &[u8], old_end: u64) -> io::Result<()> {
         self.file.seek(SeekFrom::Start(self.written))?;
         self.file.write_all(&self.pending)?;
         self.file.write_all(tail)?;
-        self.written += self.pending.len() as u64;
-        self.pending.clear();
-        self.tail = tail.len() as u64;
-
         // Rest of an earlier, longer tail. Cut last: a reader in between meets rubbish behind good data, no gap.
-        let end = self.written + self.tail;
+        let end = self.written + (self.pending.len() + tail.len()) as u64;
         if end < old_end {
             self.file.set_len(end)?;
         }
@@ -83,6 +102,27 @@ impl SharedTail {
         self.lock().set_tail(tail)
     }
 
+    /// Committed bytes that are not in the file yet.
+    pub(crate) fn pending(&self) -> usize {
+        self.lock().pending.len()
+    }
+
+    /// Number of committed bytes.
+    pub(crate) fn position(&self) -> u64 {
+        self.lock().position()
+    }
+
+    /// Shows the committed bytes that are not in the file yet, with the place at which they will be.
+    pub(crate) fn look(&self, look: impl FnOnce(u64, &[u8])) {
+        let file = self.lock();
+        look(file.written, &file.pending);
+    }
+
+    /// Whether enough is held back to be worth a system call.
+    pub(crate) fn is_full(&self) -> bool {
+        self.pending() > SHARED_PENDING_LIMIT
+    }
+
     pub(crate) fn flush(&self) -> io::Result<()> {
         self.lock().flush()
     }
@@ -94,8 +134,10 @@ impl SharedTail {
 
 #[cfg(feature = "mcap")]
 impl Write for SharedTail {
+    /// Only holds the bytes back, so a format writer never meets an error in the middle of a record.
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.lock().write(bytes)
+        self.lock().pending.extend_from_slice(bytes);
+        Ok(bytes.len())
     }
 
     /// Nothing: when bytes go to the disk is the recorder's decision, not the format writer's.
@@ -137,6 +179,24 @@ mod tests {
         assert_eq!((read().as_str(), file.position()), ("one two end", 8));
         file.flush().unwrap();
         assert_eq!(read(), "one two ");
+        std::fs::remove_file(&path).unwrap();
+    }
+
+    /// Truth: a file opened for reading refuses every write; its content is that of before, tail included.
+    #[test]
+    fn a_write_that_fails_leaves_the_file_as_it_was() {
+        let path = std::env::temp_dir().join(format!("flexarm-tail-fails-{}", std::process::id()));
+        let mut file = TailFile::new(File::create(&path).unwrap());
+        file.write_all(b"one ").unwrap();
+        file.set_tail(b"end").unwrap();
+        file.file = File::open(&path).unwrap();
+        file.write_all(b"two ").unwrap();
+        assert!(file.set_tail(b"another end").is_err());
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "one end");
+        // Once there is room again, nothing has been lost.
+        file.file = std::fs::OpenOptions::new().write(true).open(&path).unwrap();
+        file.set_tail(b"last end").unwrap();
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "one two last end");
         std::fs::remove_file(&path).unwrap();
     }
 }

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Duration;
 
-use flexarm_log::{CreateOptions, LinkInfo, LogError, McapRecorder, Recorder, RunHeader, RunResult};
+use flexarm_log::{CreateOptions, LinkInfo, LogError, Magnifier, McapRecorder, Recorder, RunHeader, RunResult};
 use mcap::read::Options;
 use mcap::{MessageStream, Summary};
 
@@ -107,7 +107,8 @@ fn every_topic_is_there_with_schema_quality_of_service_and_all_samples() {
             assert_eq!((schema.encoding.as_str(), channel.message_encoding.as_str()), ("ros2msg", "cdr"));
             assert!(!schema.data.is_empty());
             let profile = &channel.metadata["offered_qos_profiles"];
-            let latched = ["/robot_description", "/tf_static"].contains(&channel.topic.as_str());
+            let latched =
+                ["/robot_description", "/tf_static", "/markers", "/markers/path"].contains(&channel.topic.as_str());
             assert_eq!(profile.contains("durability: transient_local"), latched, "{}", channel.topic);
             (channel.topic.clone(), (schema.name.clone(), counts[&channel.id]))
         })
@@ -116,12 +117,18 @@ fn every_topic_is_there_with_schema_quality_of_service_and_all_samples() {
     let n = synthetic::SAMPLES;
     let expected = [
         ("/diagnostics/solver", "std_msgs/msg/Float64MultiArray", n),
+        ("/elastic/joint_states", "sensor_msgs/msg/JointState", n),
         ("/elastic/upper_arm", "geometry_msgs/msg/WrenchStamped", n),
         ("/elastic/upper_arm/deflection", "std_msgs/msg/Float64MultiArray", n),
         ("/energy", "std_msgs/msg/Float64MultiArray", n),
+        ("/events", "rcl_interfaces/msg/Log", 3),
         ("/joint_states", "sensor_msgs/msg/JointState", n),
+        ("/markers", "visualization_msgs/msg/MarkerArray", 1),
+        ("/markers/error", "visualization_msgs/msg/MarkerArray", 41), // 20 Hz, both ends
+        ("/markers/path", "visualization_msgs/msg/MarkerArray", 2),   // at 1 s and 2 s; one point makes no line
         ("/rigid/joint_states", "sensor_msgs/msg/JointState", n),
         ("/robot_description", "std_msgs/msg/String", 1),
+        ("/tcp/contributions", "std_msgs/msg/Float64MultiArray", n),
         ("/tcp/error", "geometry_msgs/msg/TwistStamped", n),
         ("/tcp/error_path", "geometry_msgs/msg/TwistStamped", n),
         ("/tcp/error_path_plot", "std_msgs/msg/Float64MultiArray", n),
@@ -174,6 +181,23 @@ fn messages_hold_the_samples() {
     assert!((values[3].powi(2) - values[..3].iter().map(|v| v * v).sum::<f64>()).abs() < 1e-18);
     cdr.end();
 
+    let data = message("/tcp/contributions");
+    let mut cdr = CdrReader::new(&data);
+    assert_eq!((cdr.u32(), cdr.string()), (1, "upper_arm x [m],upper_arm y [m],upper_arm z [m]".to_owned()));
+    assert_eq!((cdr.u32(), cdr.u32(), cdr.u32()), (3, 3, 0), "size, stride, offset");
+    assert_eq!(cdr.sequence(), sample.contributions.as_flattened());
+    cdr.end();
+
+    let data = message("/elastic/joint_states");
+    let mut cdr = CdrReader::new(&data);
+    assert_eq!(cdr.header().0, 200_000_000);
+    let names: Vec<String> = (0..cdr.u32()).map(|_| cdr.string()).collect();
+    assert_eq!(names, ["x", "y", "z", "rx", "ry", "rz"].map(|part| format!("upper_arm/{part}")));
+    assert_eq!(cdr.sequence(), sample.elastic[0].deflection);
+    assert!(cdr.sequence().is_empty(), "velocities are not known");
+    assert_eq!(cdr.sequence(), sample.elastic[0].load);
+    cdr.end();
+
     let data = message("/elastic/upper_arm");
     let mut cdr = CdrReader::new(&data);
     assert_eq!(cdr.header().1, "upper_arm");
@@ -181,39 +205,221 @@ fn messages_hold_the_samples() {
     cdr.end();
 }
 
-/// Truth: the links' world poses. Identity: the chain of transforms from `world` to a link is its pose.
-#[test]
-fn the_frames_of_both_robots_chain_up_to_their_links_poses() {
-    let header = synthetic::header();
-    let file = run("frames.mcap", &header, 60, NEVER);
-    let mut tree: BTreeMap<String, (String, Vec<f64>)> = BTreeMap::new();
-    for data in [messages(&file, "/tf_static")[0].1.clone(), messages(&file, "/tf")[50].1.clone()] {
-        let mut cdr = CdrReader::new(&data);
+/// Frames of a file up to a message of `/tf`: child, its parent, translation and quaternion.
+type Frames = BTreeMap<String, (String, [f64; 7])>;
+
+fn frames(file: &[u8], last: usize) -> Frames {
+    let moving = messages(file, "/tf");
+    let mut tree = Frames::new();
+    for (_, data) in messages(file, "/tf_static").iter().chain(&moving[..=last]) {
+        let mut cdr = CdrReader::new(data);
         for _ in 0..cdr.u32() {
-            let (_, parent) = cdr.header();
-            let child = cdr.string();
-            assert!(tree.insert(child, (parent, cdr.f64s(7))).is_none(), "a frame has one parent");
+            let ((_, parent), child) = (cdr.header(), cdr.string());
+            let old = tree.insert(child, (parent.clone(), cdr.f64s(7).try_into().unwrap()));
+            assert!(old.is_none_or(|(before, _)| before == parent), "a frame has one parent");
         }
         cdr.end();
     }
-    assert_eq!(tree.len(), 2 * header.links.len());
+    tree
+}
+
+/// Pose of a frame in the world: the chain of transforms up to it.
+fn in_world(tree: &Frames, frame: &str) -> nalgebra::Isometry3<f64> {
+    let mut X = nalgebra::Isometry3::identity();
+    let mut frame = frame;
+    while frame != "world" {
+        let (parent, [x, y, z, qx, qy, qz, qw]) = tree.get(frame).unwrap_or_else(|| panic!("no frame {frame}"));
+        let rotation = nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(*qw, *qx, *qy, *qz));
+        X = nalgebra::Isometry3::from_parts([*x, *y, *z].into(), rotation) * X;
+        frame = parent;
+    }
+    X
+}
+
+/// Truth: the poses of links and stations, those of the magnified arm from [`Magnifier`]. Identity: the chain of
+/// transforms from `world` to a frame is its pose.
+#[test]
+fn the_frames_of_all_robots_chain_up_to_their_poses() {
+    let header = synthetic::header();
+    let file = run("frames.mcap", &header, 60, NEVER);
+    // The first sample of a sixtieth of a second: 50 / 500 s = 6 / 60 s.
+    let tree = frames(&file, 50);
+    assert_eq!(tree.len(), 3 * (header.links.len() + 1) + 2 + 10, "three trees with tools, two stations, ten slabs");
 
     let sample = synthetic::sample(50);
-    for (prefix, twin) in [("", &sample.flexible), ("rigid/", &sample.rigid)] {
+    let magnified = Magnifier::new(&header).magnified(&sample);
+    let robots = [("", &sample.flexible, 1e-13), ("rigid/", &sample.rigid, 1e-13), ("magnified/", &magnified, 1e-6)];
+    for (prefix, twin, allowed) in robots {
         for (link, X_WL) in header.links.iter().zip(&twin.X_WL) {
-            let mut frame = format!("{prefix}{}", link.name);
-            let mut X = nalgebra::Isometry3::identity();
-            while frame != "world" {
-                let (parent, [x, y, z, qx, qy, qz, qw]) =
-                    tree.get(&frame).map(|(parent, v)| (parent, <[f64; 7]>::try_from(v.as_slice()).unwrap())).unwrap();
-                let rotation = nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(qw, qx, qy, qz));
-                X = nalgebra::Isometry3::from_parts([x, y, z].into(), rotation) * X;
-                frame.clone_from(parent);
-            }
+            let X = in_world(&tree, &format!("{prefix}{}", link.name));
             let error = (X.to_homogeneous() - X_WL.to_homogeneous()).norm();
-            assert!(error < 1e-13, "{prefix}{}: {error:e}", link.name); // measured 8.5e-16
+            assert!(error < allowed, "{prefix}{}: {error:e}", link.name); // measured 8.5e-16, magnified 1.1e-7
         }
     }
+    for (frame, twin) in [("tool0/tcp", &sample.flexible), ("rigid/tool0/tcp", &sample.rigid)] {
+        let error = (in_world(&tree, frame).to_homogeneous() - twin.X_WT.to_homogeneous()).norm();
+        assert!(error < 1e-13, "{frame}: {error:e}");
+    }
+    for (k, X_WS) in sample.flexible.X_WS.iter().enumerate() {
+        let X = in_world(&tree, &format!("upper_arm/station_{k}"));
+        assert!((X.to_homogeneous() - X_WS.to_homogeneous()).norm() < 1e-13, "station {k}");
+    }
+    // Beyond the far end of the bent link its surface moves with the last station.
+    let X = in_world(&tree, "magnified/upper_arm/bend_9") * header.bends[0].X_LS[1].translation;
+    let error = (X.to_homogeneous() - magnified.X_WS[1].to_homogeneous()).norm();
+    assert!(error < 1e-6, "{error:e}");
+}
+
+/// Truth: the rate of pictures, 60 a second, beside 500 samples a second.
+#[test]
+fn the_magnified_arm_is_sent_less_often_than_the_robots() {
+    let file = run("rates.mcap", &synthetic::header(), 501, NEVER);
+    let with = |frame: &str| {
+        let has = |data: &[u8]| data.windows(frame.len()).any(|part| part == frame.as_bytes());
+        messages(&file, "/tf").iter().filter(|(_, data)| has(data)).count()
+    };
+    assert_eq!((with("rigid/forearm"), with("magnified/forearm"), with("magnified/upper_arm/bend_3")), (501, 61, 61));
+}
+
+/// A marker as far as tests look at it: frame, namespace, number, kind, colour, points.
+type Drawn = (String, String, u32, u32, Vec<f32>, Vec<[f64; 3]>);
+
+fn markers(data: &[u8]) -> Vec<Drawn> {
+    let mut cdr = CdrReader::new(data);
+    let markers = (0..cdr.u32())
+        .map(|_| {
+            let (_, frame) = cdr.header();
+            let (namespace, id, kind, action) = (cdr.string(), cdr.u32(), cdr.u32(), cdr.u32());
+            assert_eq!(action, 0, "add");
+            cdr.f64s(3 + 4 + 3); // place, attitude, scale
+            let color = (0..4).map(|_| f32::from_le_bytes(cdr.take())).collect();
+            assert_eq!((cdr.u32(), cdr.u32(), cdr.take::<1>()), (0, 0, [1]), "for ever, locked to its frame");
+            let points = (0..cdr.u32()).map(|_| cdr.f64s(3).try_into().unwrap()).collect();
+            assert_eq!((cdr.u32(), cdr.string()), (0, String::new()), "colours, texture");
+            assert_eq!((cdr.header(), cdr.string(), cdr.u32()), ((0, String::new()), String::new(), 0), "image");
+            assert_eq!(cdr.u32(), 0, "places on the texture");
+            cdr.string();
+            let mesh = (cdr.string(), cdr.string(), cdr.u32(), cdr.take::<1>());
+            assert_eq!(mesh, (String::new(), String::new(), 0, [0]), "no mesh file");
+            (frame, namespace, id, kind, color, points)
+        })
+        .collect();
+    cdr.end();
+    markers
+}
+
+/// Truth: the meshes of the header; the links that deviate are drawn three times, the others twice.
+#[test]
+fn surfaces_are_in_the_file_in_the_frames_of_all_robots() {
+    let header = synthetic::header();
+    let file = run("surfaces.mcap", &header, 60, NEVER);
+    let drawn = markers(&messages(&file, "/markers")[0].1);
+    let tree = frames(&file, 50);
+    for (frame, namespace, _, kind, ..) in &drawn {
+        assert_eq!(*kind, 11, "triangles");
+        in_world(&tree, frame);
+        assert!(["flexible", "rigid", "magnified"].contains(&namespace.as_str()), "{namespace}");
+    }
+    let names: std::collections::BTreeSet<_> = drawn.iter().map(|marker| (&marker.1, marker.2)).collect();
+    assert_eq!(names.len(), drawn.len(), "namespace and number name a marker");
+
+    let of = |namespace: &str| drawn.iter().filter(move |marker| marker.1 == namespace).collect::<Vec<_>>();
+    assert_eq!((of("flexible").len(), of("rigid").len()), (5, 5));
+    for (mesh, marker) in header.meshes.iter().zip(of("flexible")) {
+        assert_eq!((&marker.0, &marker.4[..]), (&header.links[mesh.link].name, &mesh.color[..]));
+        let corners = mesh.triangles.iter().flatten().map(|k| mesh.positions[*k as usize].map(f64::from));
+        assert!(corners.eq(marker.5.iter().copied()));
+    }
+    assert!(of("rigid").iter().all(|marker| marker.4[3] < 0.5), "a ghost");
+    let magnified: Vec<&str> = of("magnified").iter().map(|marker| marker.0.as_str()).collect();
+    assert!(magnified.contains(&"magnified/forearm") && magnified.contains(&"magnified/tool0"), "{magnified:?}");
+    assert!(magnified.contains(&"magnified/upper_arm/bend_4"), "{magnified:?}");
+    assert!(!magnified.contains(&"magnified/upper_arm"), "the link that bends is drawn in slabs: {magnified:?}");
+    assert!(!magnified.contains(&"magnified/column"), "what does not deviate is not drawn again: {magnified:?}");
+}
+
+/// Truth: rigid tool and error of the sample, the magnification of the header.
+#[test]
+fn the_error_arrow_is_the_error_magnified_and_paths_follow_the_tools() {
+    let header = synthetic::header();
+    let file = run("arrows.mcap", &header, 1001, NEVER);
+    let (_, data) = &messages(&file, "/markers/error")[20];
+    let arrow = &markers(data)[0];
+    let sample = synthetic::sample(500);
+    assert_eq!((arrow.1.as_str(), arrow.3), ("error", 0));
+    for c in 0..3 {
+        let from = sample.rigid.X_WT.translation.vector[c];
+        assert!((arrow.5[0][c] - from).abs() < 1e-7);
+        assert!((arrow.5[1][c] - from - header.magnification * sample.error_world[c]).abs() < 2e-7);
+    }
+    let paths = markers(&messages(&file, "/markers/path")[1].1);
+    let names: Vec<&str> = paths.iter().map(|marker| marker.1.as_str()).collect();
+    assert_eq!(names, ["path/flexible", "path/rigid", "path/magnified"]);
+    let last = synthetic::sample(1000);
+    for (path, twin) in paths.iter().zip([&last.flexible, &last.rigid]) {
+        assert!((2..=1000).contains(&path.5.len()));
+        let end = path.5[path.5.len() - 1];
+        assert!((0..3).all(|c| (end[c] - twin.X_WT.translation.vector[c]).abs() < 1e-7));
+    }
+}
+
+/// Times and topics of all messages in order of time, as readers with an index see them.
+fn by_index(file: &[u8]) -> Vec<(u64, String)> {
+    let summary = Summary::read(file).unwrap().unwrap();
+    let mut reader = mcap::sans_io::IndexedReader::new(&summary).unwrap();
+    let mut seen = Vec::new();
+    while let Some(event) = reader.next_event() {
+        match event.unwrap() {
+            mcap::sans_io::IndexedReadEvent::ReadChunkRequest { offset, length } => {
+                let chunk = &file[offset as usize..offset as usize + length];
+                reader.insert_chunk_record_data(offset, chunk).unwrap();
+            }
+            mcap::sans_io::IndexedReadEvent::Message { header, .. } => {
+                seen.push((header.log_time, summary.channels[&header.channel_id].topic.clone()));
+            }
+        }
+    }
+    seen
+}
+
+/// Truth: the events of the result. They are written last; readers that go by time find them among the samples.
+#[test]
+fn events_stand_at_their_own_times() {
+    let file = run("events.mcap", &synthetic::header(), 1001, NEVER);
+    let events = messages(&file, "/events");
+    for (event, (log_time, data)) in synthetic::result().events.iter().zip(&events) {
+        let mut cdr = CdrReader::new(data);
+        let stamp = u64::from(cdr.u32()) * 1_000_000_000 + u64::from(cdr.u32());
+        assert_eq!((stamp, *log_time), ((event.time_s * 1e9) as u64, stamp));
+        assert_eq!(cdr.take::<1>(), [20], "information");
+        assert_eq!((cdr.string().as_str(), cdr.string()), (event.kind.word(), event.text.clone()));
+        assert_eq!((cdr.string(), cdr.string(), cdr.u32()), (String::new(), String::new(), 0));
+        cdr.end();
+    }
+    assert_eq!(events.len(), 3);
+
+    let (times, topics): (Vec<u64>, Vec<String>) = by_index(&file).into_iter().unzip();
+    assert!(times.is_sorted());
+    let peak = times.iter().zip(&topics).position(|(_, topic)| topic == "/events").unwrap();
+    assert_eq!(times[peak], 0, "the first event is at the start");
+    assert_eq!(topics.iter().filter(|topic| *topic == "/events").count(), 3);
+    assert_ne!(topics.last().unwrap(), "/events", "the last event is before the last sample");
+}
+
+/// A run that is not to be magnified shows the deflections that it has: of modes, say, which are large enough to be seen.
+#[test]
+fn without_a_magnification_the_flexible_robot_itself_is_drawn_bent() {
+    let header = RunHeader { magnification: 0.0, ..synthetic::header() };
+    let file = run("modes.mcap", &header, 60, NEVER);
+    let summary = Summary::read(&file).unwrap().unwrap();
+    assert!(!summary.channels.values().any(|channel| channel.topic == "/markers/error"));
+    let tree = frames(&file, 50);
+    assert!(!tree.keys().any(|frame| frame.starts_with("magnified")));
+    let drawn = markers(&messages(&file, "/markers")[0].1);
+    let flexible: Vec<&str> =
+        drawn.iter().filter(|marker| marker.1 == "flexible").map(|marker| marker.0.as_str()).collect();
+    assert!(flexible.contains(&"upper_arm/bend_4") && !flexible.contains(&"upper_arm"), "{flexible:?}");
+    assert!(flexible.iter().all(|frame| in_world(&tree, frame).translation.vector.norm() < 10.0));
 }
 
 /// A base link with the name of the root must not become its own parent.
@@ -238,6 +444,8 @@ fn a_run_without_a_twin_has_no_topics_of_one() {
     let summary = Summary::read(&file).unwrap().unwrap();
     let topics: Vec<_> = summary.channels.values().map(|channel| channel.topic.as_str()).collect();
     assert!(!topics.iter().any(|topic| topic.contains("rigid") || topic.contains("error")), "{topics:?}");
+    let drawn = markers(&messages(&file, "/markers")[0].1);
+    assert!(drawn.iter().all(|marker| marker.1 == "flexible"));
     assert!(topics.contains(&"/elastic/a_b"), "{topics:?}");
 }
 
@@ -254,7 +462,8 @@ fn attachments_and_metadata_come_along() {
     let attachments = summary.attachment_indexes.iter().map(|index| mcap::read::attachment(&file, index).unwrap());
     let attachments: BTreeMap<_, _> =
         attachments.map(|file| (file.name, (file.media_type, file.data.to_vec()))).collect();
-    assert_eq!(attachments.len(), 3);
+    assert_eq!(attachments.len(), 4);
+    assert_eq!(attachments["summary.json"].1, synthetic::result().attachments[0].bytes);
     assert_eq!(attachments["robot.urdf"], ("application/xml".to_owned(), header.urdf.clone().into_bytes()));
     assert_eq!(attachments["run.json"].1, header.attachments[0].bytes);
     let mesh_name = format!("meshes/{}", mesh.file_name().unwrap().to_string_lossy());
@@ -288,7 +497,7 @@ fn chunks_keep_their_size_and_checksums() {
         assert!(chunk.uncompressed_size <= 1 << 20, "{}", chunk.uncompressed_size);
     }
     let checked = MessageStream::new_with_options(&file, Options::ValidateChunkCrcs.into()).unwrap();
-    assert_eq!(checked.map(Result::unwrap).count() as u64, 13 * synthetic::SAMPLES + 2);
+    assert_eq!(checked.map(Result::unwrap).count() as u64, 15 * synthetic::SAMPLES + 3 + 3 + 41 + 2);
 }
 
 /// Number of samples in the undamaged part of a file.
@@ -302,15 +511,41 @@ fn samples_left(file: &[u8]) -> usize {
 fn a_killed_run_keeps_every_sample() {
     let path = synthetic::scratch("killed.mcap");
     let mut recorder = begin(&path, &synthetic::header(), Duration::ZERO);
+    let mut left = Vec::new();
     for step in 0..600_u64 {
         recorder.record(&synthetic::sample(step)).unwrap();
         if step % 37 == 0 {
             let file = std::fs::read(&path).unwrap();
+            left.clone_from(&file);
             assert_eq!(samples_left(&file) as u64, step + 1);
-            // Not only the messages: the file is whole, but for its index.
-            assert!(MessageStream::new(&file).unwrap().all(|message| message.is_ok()));
+            // Not only the messages: the file is whole, with an index of what is in it.
+            let all: Vec<_> = MessageStream::new(&file).unwrap().map(Result::unwrap).collect();
+            assert_eq!(by_index(&file).len(), all.len());
+            let summary = Summary::read(&file).unwrap().unwrap();
+            let stats = summary.stats.as_ref().unwrap();
+            assert_eq!(stats.message_count, all.len() as u64);
+            let times = all.iter().map(|message| message.log_time);
+            assert_eq!((stats.message_start_time, stats.message_end_time), (0, times.max().unwrap()));
+            assert_eq!(stats.chunk_count as usize, summary.chunk_indexes.len());
+            for (id, count) in &stats.channel_message_counts {
+                assert_eq!(all.iter().filter(|message| message.channel.id == *id).count() as u64, *count);
+            }
+            for chunk in &summary.chunk_indexes {
+                let listed = summary.read_message_indexes(&file, chunk).unwrap();
+                assert!(listed.keys().all(|channel| chunk.message_index_offsets.contains_key(&channel.id)));
+            }
+            let attached = summary.attachment_indexes.iter().map(|index| mcap::read::attachment(&file, index).unwrap());
+            assert!(attached.map(|file| file.name).eq(["robot.urdf", "run.json"]));
+            let named = summary.metadata_indexes.iter().map(|index| mcap::read::metadata(&file, index).unwrap());
+            assert!(named.map(|record| record.name).any(|name| name == "flexarm.run"));
         }
     }
+    recorder.finish(&synthetic::result()).unwrap();
+    // The index of the format's library names the same topics in the same way.
+    let (left, closed) = (Summary::read(&left).unwrap().unwrap(), std::fs::read(&path).unwrap());
+    let closed = Summary::read(&closed).unwrap().unwrap();
+    assert_eq!((&left.schemas, left.channels.len()), (&closed.schemas, closed.channels.len()));
+    assert!(left.channels.iter().all(|(id, channel)| closed.channels[id] == *channel));
     std::fs::remove_file(path).unwrap();
 }
 
@@ -319,7 +554,8 @@ fn a_file_cut_between_two_chunks_reads_up_to_there() {
     let file = run("cut.mcap", &synthetic::header(), synthetic::SAMPLES, NEVER);
     let summary = Summary::read(&file).unwrap().unwrap();
     let mut before = 0;
-    for chunk in &summary.chunk_indexes[1..] {
+    // The first chunk holds what is sent once, the last one the events.
+    for chunk in &summary.chunk_indexes[1..summary.chunk_indexes.len() - 1] {
         let end = (chunk.chunk_start_offset + chunk.chunk_length) as usize;
         let left = samples_left(&file[..end]);
         assert!(left > before, "{left} samples up to byte {end}");
@@ -336,7 +572,7 @@ fn a_dropped_recorder_closes_its_file() {
     drop(recorder);
     let file = std::fs::read(&path).unwrap();
     let summary = Summary::read(&file).unwrap().unwrap();
-    assert_eq!(summary.stats.unwrap().message_count, 10 * 13 + 2);
+    assert_eq!(summary.stats.unwrap().message_count, 10 * 15 + 3 + 1); // latched ones, the error
     std::fs::remove_file(path).unwrap();
 }
 

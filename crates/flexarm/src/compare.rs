@@ -113,11 +113,10 @@ pub(crate) fn run_traced(
     summary.cpu_s_per_simulated_s = summary.cpu_s / summary.duration_s.max(1e-9);
     summary.files = files.names.clone();
     run.trace.finish(result(&summary, events));
-    files.set.finish(&run.trace.result)?;
-    if let Some(outputs) = outputs {
-        crate::report::write(outputs, &summary)?;
-    }
-    end.map(|()| (summary, run.trace))
+    let closed = files.set.finish(&run.trace.result).map_err(Error::from);
+    let reported = closed.and_then(|()| outputs.map_or(Ok(()), |outputs| crate::report::write(outputs, &summary)));
+    // What stopped the run is the news: after a full disk, closing fails again.
+    end.and(reported).map(|()| (summary, run.trace))
 }
 
 /// A run whose input makes sense.

@@ -25,11 +25,21 @@ impl Cdr {
         &self.bytes
     }
 
+    /// `bool`, `byte` and `uint8`.
+    pub(crate) fn u8(&mut self, value: u8) -> &mut Self {
+        self.bytes.push(value);
+        self
+    }
+
     pub(crate) fn i32(&mut self, value: i32) -> &mut Self {
         self.aligned(value.to_le_bytes())
     }
 
     pub(crate) fn u32(&mut self, value: u32) -> &mut Self {
+        self.aligned(value.to_le_bytes())
+    }
+
+    pub(crate) fn f32(&mut self, value: f32) -> &mut Self {
         self.aligned(value.to_le_bytes())
     }
 

@@ -1,11 +1,12 @@
 //! Topics of a recording: names, message types, qualities of service.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::io::{Seek, Write};
 
-use mcap::{McapResult, Writer};
+use mcap::McapResult;
 
 use super::definitions::schema_text;
+use super::frames::is_magnified;
+use super::output::Output;
 use crate::RunHeader;
 
 /// Channel numbers of all topics. Those of a rigid twin exist only if there is one.
@@ -19,8 +20,24 @@ pub(crate) struct Channels {
     pub(crate) tcp_flexible: u16,
     pub(crate) rigid: Option<RigidChannels>,
     pub(crate) elastic: Vec<ElasticChannels>,
+    /// Only if there are elastic elements.
+    pub(crate) elastic_joint_states: Option<u16>,
+    /// Only if there are contributors.
+    pub(crate) contributions: Option<u16>,
     pub(crate) solver: u16,
     pub(crate) energy: u16,
+    pub(crate) events: u16,
+    pub(crate) markers: MarkerChannels,
+}
+
+/// Topics of what is drawn.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct MarkerChannels {
+    /// Only if there are meshes.
+    pub(crate) surfaces: Option<u16>,
+    pub(crate) paths: u16,
+    /// Only if there is a magnified arm.
+    pub(crate) error: Option<u16>,
 }
 
 /// Topics of the rigid twin and of the comparison with it.
@@ -43,18 +60,20 @@ pub(crate) struct ElasticChannels {
 
 impl Channels {
     /// Adds all topics of a run to the file.
-    pub(crate) fn add<W: Write + Seek>(writer: &mut Writer<W>, header: &RunHeader) -> McapResult<Self> {
-        let mut add = |topic: &str, kind: &str, note: &str| add_channel(writer, topic, kind, note);
+    pub(crate) fn add(output: &mut Output, header: &RunHeader) -> McapResult<Self> {
+        let mut add = |topic: &str, kind: &str, note: &str| add_channel(output, topic, kind, note);
         const ARRAY: &str = "std_msgs/Float64MultiArray";
         const JOINTS: &str = "sensor_msgs/JointState";
         const POSE: &str = "geometry_msgs/PoseStamped";
         const TWIST: &str = "geometry_msgs/TwistStamped";
+        const MARKERS: &str = "visualization_msgs/MarkerArray";
 
         let robot_description = match header.urdf.is_empty() {
             true => None,
             false => Some(add("/robot_description", "std_msgs/String", "URDF as read")?),
         };
-        let tf = add("/tf", "tf2_msgs/TFMessage", "flexible robot; rigid twin with the prefix rigid/")?;
+        let trees = "flexible robot with stations along its bent links; rigid twin below rigid/; magnified arm below magnified/";
+        let tf = add("/tf", "tf2_msgs/TFMessage", trees)?;
         let tf_static = add("/tf_static", "tf2_msgs/TFMessage", "base and fixed links, once")?;
         let joint_states = add("/joint_states", JOINTS, "flexible robot; effort is what the drives must supply")?;
         let tcp_flexible = add("/tcp/flexible", POSE, "tool centre point of the flexible robot")?;
@@ -86,23 +105,64 @@ impl Channels {
                 deflection: add(&format!("/elastic/{name}/deflection"), ARRAY, &deflection)?,
             });
         }
-        let solver = add("/diagnostics/solver", ARRAY, "stepper")?;
-        let energy = add("/energy", ARRAY, "energies of the flexible robot [J]")?;
+        let mut add_if = |wanted: bool, topic: &str, kind: &str, note: &str| match wanted {
+            true => add(topic, kind, note).map(Some),
+            false => Ok(None),
+        };
+        let some = |channel: Option<u16>| channel.expect("was wanted");
+        let elastic_joint_states = add_if(
+            !header.elements.is_empty(),
+            "/elastic/joint_states",
+            JOINTS,
+            "all elastic elements by name: position = deflection [m, rad], effort = load on the distal part [N, N m], axes of \
+             the proximal face",
+        )?;
+        let contributions = add_if(
+            !header.contributors.is_empty(),
+            "/tcp/contributions",
+            ARRAY,
+            "displacement of the TCP that each flexible link or drive causes alone, world axes [m]",
+        )?;
+        let solver = some(add_if(true, "/diagnostics/solver", ARRAY, "stepper")?);
+        let energy = some(add_if(true, "/energy", ARRAY, "energies of the flexible robot [J]")?);
+        let what = "what happened when; name = kind; written at the end of the run, with the times of the events";
+        let events = some(add_if(true, "/events", "rcl_interfaces/Log", what)?);
+        let what = "surfaces of the links in their frames: flexible as in the URDF, rigid twin as a ghost, magnified arm in blue";
+        let surfaces = add_if(!header.meshes.is_empty(), "/markers", MARKERS, what)?;
+        let what = "paths of the tool so far, each second";
+        let paths = some(add_if(true, "/markers/path", MARKERS, what)?);
+        let factor = header.magnification;
+        let what = format!("TCP error from the rigid tool on, drawn {factor} times");
+        let error = add_if(is_magnified(header), "/markers/error", MARKERS, &what)?;
+        let markers = MarkerChannels { surfaces, paths, error };
 
-        Ok(Self { robot_description, tf, tf_static, joint_states, tcp_flexible, rigid, elastic, solver, energy })
+        Ok(Self {
+            robot_description,
+            tf,
+            tf_static,
+            joint_states,
+            tcp_flexible,
+            rigid,
+            elastic,
+            elastic_joint_states,
+            contributions,
+            solver,
+            energy,
+            events,
+            markers,
+        })
     }
 }
 
-fn add_channel<W: Write + Seek>(writer: &mut Writer<W>, topic: &str, kind: &str, note: &str) -> McapResult<u16> {
+fn add_channel(output: &mut Output, topic: &str, kind: &str, note: &str) -> McapResult<u16> {
     // ROS 2 names a type package/msg/Type in the file and package/Type inside definitions.
     let name = kind.replacen('/', "/msg/", 1);
-    let schema = writer.add_schema(&name, "ros2msg", schema_text(kind).as_bytes())?;
-    let latched = ["/robot_description", "/tf_static"].contains(&topic);
+    let latched = ["/robot_description", "/tf_static", "/markers", "/markers/path"].contains(&topic);
     let metadata = BTreeMap::from([
         ("offered_qos_profiles".to_owned(), qos_profile(latched)),
         ("description".to_owned(), note.to_owned()),
     ]);
-    writer.add_channel(schema, topic, "cdr", &metadata)
+    output.add_channel(topic, &name, &schema_text(kind), &metadata)
 }
 
 /// Quality of service as `ros2 bag` writes it. Latched topics reach subscribers that come late.
@@ -118,7 +178,8 @@ fn qos_profile(latched: bool) -> String {
 
 /// Names turned into valid and distinct parts of a ROS topic: letters, digits and `_`, no digit first.
 fn topic_names(names: &[String]) -> Vec<String> {
-    let mut taken = BTreeSet::new();
+    // `/elastic/joint_states` is taken.
+    let mut taken = BTreeSet::from(["joint_states".to_owned()]);
     let mut distinct = |base: String| {
         let numbered = (2..).map(|n| format!("{base}_{n}"));
         let mut candidates = std::iter::once(base.clone()).chain(numbered);

@@ -1,7 +1,8 @@
 //! Texts of the ROS 2 message definitions that a recording uses.
 //!
-//! The field lists follow the packages `std_msgs`, `geometry_msgs`, `sensor_msgs`, `tf2_msgs` and
-//! `builtin_interfaces` of ROS 2; readers decode messages by them.
+//! The field lists follow the packages `std_msgs`, `geometry_msgs`, `sensor_msgs`, `tf2_msgs`, `visualization_msgs` (as
+//! since Humble, with texture and embedded mesh), `rcl_interfaces` and `builtin_interfaces` of ROS 2; readers decode
+//! messages by them.
 
 /// Line between a message and the definitions it depends on.
 const SEPARATOR: &str = "================================================================================";
@@ -66,6 +67,47 @@ const DEFINITIONS: &[Definition] = &[
         "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort\n",
         &["std_msgs/Header", "builtin_interfaces/Time"],
     ),
+    ("builtin_interfaces/Duration", "int32 sec\nuint32 nanosec\n", &[]),
+    ("std_msgs/ColorRGBA", "float32 r\nfloat32 g\nfloat32 b\nfloat32 a\n", &[]),
+    ("sensor_msgs/CompressedImage", "std_msgs/Header header\nstring format\nuint8[] data\n", &[]),
+    ("visualization_msgs/UVCoordinate", "float32 u\nfloat32 v\n", &[]),
+    ("visualization_msgs/MeshFile", "string filename\nuint8[] data\n", &[]),
+    (
+        "visualization_msgs/Marker",
+        "int32 ARROW=0\nint32 CUBE=1\nint32 SPHERE=2\nint32 CYLINDER=3\nint32 LINE_STRIP=4\nint32 LINE_LIST=5\n\
+         int32 CUBE_LIST=6\nint32 SPHERE_LIST=7\nint32 POINTS=8\nint32 TEXT_VIEW_FACING=9\nint32 MESH_RESOURCE=10\n\
+         int32 TRIANGLE_LIST=11\nint32 ADD=0\nint32 MODIFY=0\nint32 DELETE=2\nint32 DELETEALL=3\n\
+         std_msgs/Header header\nstring ns\nint32 id\nint32 type\nint32 action\ngeometry_msgs/Pose pose\n\
+         geometry_msgs/Vector3 scale\nstd_msgs/ColorRGBA color\nbuiltin_interfaces/Duration lifetime\nbool frame_locked\n\
+         geometry_msgs/Point[] points\nstd_msgs/ColorRGBA[] colors\nstring texture_resource\n\
+         sensor_msgs/CompressedImage texture\nUVCoordinate[] uv_coordinates\nstring text\nstring mesh_resource\n\
+         MeshFile mesh_file\nbool mesh_use_embedded_materials\n",
+        &[],
+    ),
+    (
+        "visualization_msgs/MarkerArray",
+        "Marker[] markers\n",
+        &[
+            "visualization_msgs/Marker",
+            "std_msgs/Header",
+            "builtin_interfaces/Time",
+            "geometry_msgs/Pose",
+            "geometry_msgs/Point",
+            "geometry_msgs/Quaternion",
+            "geometry_msgs/Vector3",
+            "std_msgs/ColorRGBA",
+            "builtin_interfaces/Duration",
+            "sensor_msgs/CompressedImage",
+            "visualization_msgs/UVCoordinate",
+            "visualization_msgs/MeshFile",
+        ],
+    ),
+    (
+        "rcl_interfaces/Log",
+        "byte DEBUG=10\nbyte INFO=20\nbyte WARN=30\nbyte ERROR=40\nbyte FATAL=50\n\
+         builtin_interfaces/Time stamp\nuint8 level\nstring name\nstring msg\nstring file\nstring function\nuint32 line\n",
+        &["builtin_interfaces/Time"],
+    ),
 ];
 
 /// Full text of a message type (`package/Type`) with everything it depends on, in ros2msg form.
@@ -88,7 +130,7 @@ fn find(name: &str) -> (&'static str, &'static [&'static str]) {
 mod tests {
     use super::*;
 
-    const PRIMITIVES: [&str; 4] = ["string", "float64", "int32", "uint32"];
+    const PRIMITIVES: [&str; 8] = ["string", "float64", "float32", "int32", "uint32", "uint8", "byte", "bool"];
 
     /// Checks that a reader finds each type named by a field in the schema's own text.
     #[test]
@@ -110,7 +152,14 @@ mod tests {
 
     fn used_by_a_topic(name: &str) -> bool {
         name.ends_with("Stamped") && name != "geometry_msgs/TransformStamped"
-            || ["std_msgs/String", "std_msgs/Float64MultiArray", "tf2_msgs/TFMessage", "sensor_msgs/JointState"]
-                .contains(&name)
+            || [
+                "std_msgs/String",
+                "std_msgs/Float64MultiArray",
+                "tf2_msgs/TFMessage",
+                "sensor_msgs/JointState",
+                "visualization_msgs/MarkerArray",
+                "rcl_interfaces/Log",
+            ]
+            .contains(&name)
     }
 }

@@ -2,59 +2,73 @@
 //!
 //! Profile `ros2`: CDR messages, their definitions embedded, `offered_qos_profiles` on every channel. Chunks of
 //! at most 1 MiB, compressed with zstd, are closed where the data says so; between two chunks the open one is
-//! in the file as a provisional chunk with a provisional end ([`crate::tail_file`]), so that what a killed run
-//! leaves is a whole MCAP file; only its index is missing.
+//! in the file as a provisional chunk with a provisional index ([`provisional`], [`crate::tail_file`]), so that what a
+//! killed run leaves is a whole MCAP file.
 //!
-//! Start at [`McapRecorder`]; topics are in [`channels`], messages in [`messages`] and [`cdr`].
+//! Start at [`McapRecorder`]; topics are in [`channels`], messages in [`messages`] and [`cdr`], coordinate frames in
+//! [`frames`], what viewers draw in [`markers`], chunks in [`output`].
 
+mod beat;
+mod bent;
 mod cdr;
 mod channels;
 mod definitions;
+mod frames;
+mod markers;
+mod mesh_files;
 mod messages;
+mod output;
+mod provisional;
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
-use flexarm_kinematics::Pose;
-use mcap::records::{MessageHeader, Metadata};
-use mcap::{McapError, McapResult, WriteOptions, Writer};
+use mcap::{McapError, McapResult};
 
 use self::cdr::Cdr;
 use self::channels::Channels;
-use self::messages::{Stamp, Transform};
+use self::frames::{Frames, Moving, WORLD};
+use self::markers::{MovingMarkers, SurfaceFrames};
+use self::mesh_files::mesh_files;
+use self::messages::{Level, Stamp};
+use self::output::Output;
 use crate::create::FlushClock;
 use crate::shape::Shape;
 use crate::tail_file::SharedTail;
-use crate::{CreateOptions, LogError, Recorder, RunHeader, RunResult, Sample, TwinSample};
-
-/// Uncompressed size at which a chunk is closed.
-const CHUNK_BYTES: usize = 1 << 20;
-
-/// Root of both trees of frames.
-const WORLD: &str = "world";
+use crate::{CreateOptions, EventKind, LogError, Recorder, RunHeader, RunResult, Sample, TwinSample};
 
 /// Writes a run as an MCAP file.
 ///
 /// | topic | message | |
 /// | --- | --- | --- |
 /// | `/robot_description` | `std_msgs/String` | the URDF, once, latched |
-/// | `/tf`, `/tf_static` | `tf2_msgs/TFMessage` | two trees under `world`: links, and `rigid/` links |
+/// | `/tf`, `/tf_static` | `tf2_msgs/TFMessage` | three trees under `world`: links, `rigid/` links and `magnified/` links; stations of a bent link as its children `<link>/station_<k>`, the tool centre point as `<link>/tcp` |
 /// | `/joint_states`, `/rigid/joint_states` | `sensor_msgs/JointState` | effort: what the drives must supply |
 /// | `/tcp/flexible`, `/tcp/rigid` | `geometry_msgs/PoseStamped` | in `world` |
 /// | `/tcp/error`, `/tcp/error_path` | `geometry_msgs/TwistStamped` | an error: translation and rotation vector; world axes, path axes |
 /// | `/tcp/error_plot`, `/tcp/error_path_plot` | `std_msgs/Float64MultiArray` | its translation, which viewers plot unasked |
+/// | `/tcp/contributions` | `std_msgs/Float64MultiArray` | what each of [`RunHeader::contributors`] does to the tool: x, y, z of each, world axes |
+/// | `/elastic/joint_states` | `sensor_msgs/JointState` | all elements as joints `<element>/x` to `<element>/rz`, so that curves have names: deflection, load |
 /// | `/elastic/<element>` | `geometry_msgs/WrenchStamped` | load |
 /// | `/elastic/<element>/deflection` | `std_msgs/Float64MultiArray` | deflection |
 /// | `/diagnostics/solver`, `/energy` | `std_msgs/Float64MultiArray` | |
+/// | `/events` | `rcl_interfaces/Log` | what happened, at its own time: name is the kind |
+/// | `/markers` | `visualization_msgs/MarkerArray` | surfaces, once, latched; namespaces `flexible`, `rigid`, `magnified` |
+/// | `/markers/path` | `visualization_msgs/MarkerArray` | paths of the tool so far, each second; namespaces `path/flexible`, `path/rigid`, `path/magnified` |
+/// | `/markers/error` | `visualization_msgs/MarkerArray` | the TCP error, magnified, 20 times a second |
+///
+/// Topics with `rigid` and `error` need a rigid twin, the magnified arm also [`RunHeader::magnification`]. It is sent at
+/// most 60 times per second of simulated time, with the precision of `f32`. A link of [`RunHeader::bends`] is drawn bent in
+/// slabs with the frames `magnified/<link>/bend_<k>`; in a recording that is not magnified, such as one of modes, the
+/// flexible robot itself is drawn so.
 ///
 /// The names of an array's entries are in the label of its one dimension, separated by commas. SI units.
 ///
 /// `header.stamp`, log time and publish time of a message are epoch + simulated time; the epoch is 0 unless
 /// [`McapRecorder::with_epoch_ns`] says otherwise, and viewers then show a time since the start.
 ///
-/// The file also holds `robot.urdf`, the mesh files and `RunHeader::attachments` as attachments, and the groups
-/// of `RunHeader::metadata`, `flexarm.recording`, `flexarm.units` and, at the end, `flexarm.result` as metadata.
+/// The file also holds `robot.urdf`, the mesh files, `RunHeader::attachments` and, at the end, `RunResult::attachments` as
+/// attachments, and the groups of `RunHeader::metadata`, `flexarm.recording`, `flexarm.units` and, at the end,
+/// `flexarm.result` as metadata.
 pub struct McapRecorder {
     path: PathBuf,
     options: CreateOptions,
@@ -105,9 +119,9 @@ impl Recorder for McapRecorder {
         let meshes = mesh_files(header)?;
         let file = SharedTail::new(self.options.create(&self.path)?);
         let error = mcap_error(&self.path, "write the description of the run");
-        let mut open = Open::new(file, header, self.options.flush_clock()).map_err(error)?;
+        let mut open = Open::new(file, header, start, self.options.flush_clock()).map_err(error)?;
         let error = mcap_error(&self.path, "write the description of the run");
-        open.describe(header, start, &meshes).map_err(error)?;
+        open.describe(header, &meshes).map_err(error)?;
         self.state = State::Open(Box::new(open));
         Ok(())
     }
@@ -117,15 +131,16 @@ impl Recorder for McapRecorder {
         let State::Open(open) = &mut self.state else { return Err(LogError::not_open(&self.path, "record")) };
         open.shape.check(&self.path, sample)?;
         open.sample(stamp, sample).map_err(mcap_error(&self.path, "write a sample"))?;
-        if open.flush.due() {
-            open.flush().map_err(LogError::io(&self.path, "write samples"))?;
+        if open.flush.due() || open.output.is_full() {
+            open.output.flush().map_err(LogError::io(&self.path, "write samples"))?;
         }
         Ok(())
     }
 
     fn finish(&mut self, result: &RunResult) -> Result<(), LogError> {
+        let times = result.events.iter().map(|event| self.stamp(event.time_s)).collect::<Result<Vec<_>, _>>()?;
         let State::Open(open) = &mut self.state else { return Err(LogError::not_open(&self.path, "finish")) };
-        open.finish(result).map_err(mcap_error(&self.path, "write the result and the index"))?;
+        open.finish(result, &times).map_err(mcap_error(&self.path, "write the result and the index"))?;
         self.state = State::Finished;
         Ok(())
     }
@@ -137,56 +152,67 @@ impl Recorder for McapRecorder {
 
 /// A file between `begin` and `finish`.
 struct Open {
-    /// Keeps the open chunk in memory and writes it whole, into `file`.
-    writer: Writer<SharedTail>,
-    file: SharedTail,
+    output: Output,
     channels: Channels,
     shape: Shape,
     frames: Frames,
+    markers: MovingMarkers,
     joints: Vec<String>,
     elements: Vec<String>,
+    /// `<element>/x` and so on.
+    deflections: Vec<String>,
+    /// Label of the contributions.
+    contributions: String,
     flush: FlushClock,
-    /// Message records of the open chunk, as they are in it.
-    chunk: Vec<u8>,
-    /// First and last time in the open chunk.
-    chunk_times: (u64, u64),
+    start: Stamp,
+    last: Stamp,
     samples: u32,
-    cdr: Cdr,
+    /// Messages so far of topics that do not get one from each sample.
+    paths: u32,
+    errors: u32,
+    /// Time of the last message with paths.
+    paths_at: Option<Stamp>,
 }
 
 impl Open {
-    fn new(file: SharedTail, header: &RunHeader, flush: FlushClock) -> McapResult<Self> {
-        let options = WriteOptions::new()
-            .profile("ros2")
-            .library(concat!("flexarm ", env!("CARGO_PKG_VERSION")))
-            .chunk_size(None) // closed by `message`, which knows what is in it
-            .disable_seeking(true)
-            .compression_threads(0); // same bytes on every machine
-        let mut writer = options.create(file.clone())?;
-        let channels = Channels::add(&mut writer, header)?;
+    fn new(file: SharedTail, header: &RunHeader, start: Stamp, flush: FlushClock) -> McapResult<Self> {
+        let mut output = Output::new(file)?;
+        let channels = Channels::add(&mut output, header)?;
+        let parts = |names: &[String], parts: &[&str], joint: &str| -> Vec<String> {
+            names.iter().flat_map(|name| parts.iter().map(move |part| format!("{name}{joint}{part}"))).collect()
+        };
         Ok(Self {
-            writer,
-            file,
+            output,
             channels,
             shape: Shape::of(header),
             frames: Frames::of(header),
+            markers: MovingMarkers::new(header),
             joints: header.joints.clone(),
             elements: header.elements.clone(),
+            deflections: parts(&header.elements, &["x", "y", "z", "rx", "ry", "rz"], "/"),
+            contributions: parts(&header.contributors, &["x [m]", "y [m]", "z [m]"], " ").join(","),
             flush,
-            chunk: Vec::new(),
-            chunk_times: (u64::MAX, 0),
+            start,
+            last: start,
             samples: 0,
-            cdr: Cdr::default(),
+            paths: 0,
+            errors: 0,
+            paths_at: None,
         })
     }
 
     /// Everything that is known before the first sample.
-    fn describe(&mut self, header: &RunHeader, start: Stamp, meshes: &[crate::Attachment]) -> McapResult<()> {
+    fn describe(&mut self, header: &RunHeader, meshes: &[crate::Attachment]) -> McapResult<()> {
+        let (start, output) = (self.start, &mut self.output);
         if let Some(channel) = self.channels.robot_description {
-            messages::string(&mut self.cdr, &header.urdf);
-            self.message(channel, start)?;
+            output.send(channel, 0, start, |cdr| messages::string(cdr, &header.urdf))?;
         }
-        self.close_chunk()?;
+        if let Some(channel) = self.channels.markers.surfaces {
+            let frames = SurfaceFrames::of(header);
+            let surfaces = markers::surfaces(header, &frames);
+            output.send(channel, 0, start, |cdr| messages::markers(cdr, start, &surfaces))?;
+        }
+        output.close_chunk()?;
 
         let recording = [
             ("robot", header.robot.clone()),
@@ -198,271 +224,157 @@ impl Open {
             ("epoch_ns", start.0.to_string()),
         ];
         let units = [("length", "m"), ("angle", "rad"), ("time", "s"), ("mass", "kg"), ("force", "N")];
-        self.metadata("flexarm.recording", recording.map(|(key, value)| (key.to_owned(), value)))?;
-        self.metadata("flexarm.units", units.map(|(key, value)| (key.to_owned(), value.to_owned())))?;
+        output.metadata("flexarm.recording", recording.map(|(key, value)| (key.to_owned(), value)))?;
+        output.metadata("flexarm.units", units.map(|(key, value)| (key.to_owned(), value.to_owned())))?;
         for (name, pairs) in &header.metadata {
-            self.metadata(name, pairs.iter().cloned())?;
+            output.metadata(name, pairs.iter().cloned())?;
         }
 
-        if !header.urdf.is_empty() {
-            self.attach(start, "robot.urdf", "application/xml", header.urdf.as_bytes())?;
+        let urdf = (!header.urdf.is_empty()).then(|| crate::Attachment {
+            name: "robot.urdf".into(),
+            media_type: "application/xml".into(),
+            bytes: header.urdf.clone().into_bytes(),
+        });
+        for file in urdf.iter().chain(meshes).chain(&header.attachments) {
+            output.attach(start, file)?;
         }
-        for file in meshes.iter().chain(&header.attachments) {
-            self.attach(start, &file.name, &file.media_type, &file.bytes)?;
-        }
-        Ok(self.flush()?)
+        Ok(output.flush()?)
     }
 
     fn sample(&mut self, stamp: Stamp, sample: &Sample) -> McapResult<()> {
+        let since_start = stamp.0 - self.start.0;
         let rigid = self.channels.rigid.map(|channels| (channels, &sample.rigid));
 
         // Frames. What does not move is known only with the first sample.
-        if self.samples == 0 {
-            self.frames.write(&mut self.cdr, stamp, sample, Moving::No);
-            self.message(self.channels.tf_static, stamp)?;
+        self.frames.advance(since_start, sample);
+        for (channel, moving) in [(self.channels.tf_static, Moving::No), (self.channels.tf, Moving::Yes)] {
+            if moving == Moving::Yes || self.samples == 0 {
+                let write = |cdr: &mut Cdr| self.frames.write(cdr, stamp, sample, moving);
+                self.output.send(channel, self.samples, stamp, write)?;
+            }
         }
-        self.frames.write(&mut self.cdr, stamp, sample, Moving::Yes);
-        self.message(self.channels.tf, stamp)?;
 
         // Joints and tool centre point of either robot.
-        messages::joint_state(&mut self.cdr, stamp, &self.joints, &sample.flexible);
-        self.message(self.channels.joint_states, stamp)?;
-        messages::pose_stamped(&mut self.cdr, stamp, WORLD, &sample.flexible.X_WT);
-        self.message(self.channels.tcp_flexible, stamp)?;
+        self.joint_states(self.channels.joint_states, stamp, &sample.flexible)?;
+        let tool = &sample.flexible.X_WT;
+        self.send(self.channels.tcp_flexible, stamp, |cdr| messages::pose_stamped(cdr, stamp, WORLD, tool))?;
         if let Some((channels, rigid)) = rigid {
-            messages::joint_state(&mut self.cdr, stamp, &self.joints, rigid);
-            self.message(channels.joint_states, stamp)?;
-            messages::pose_stamped(&mut self.cdr, stamp, WORLD, &rigid.X_WT);
-            self.message(channels.tcp, stamp)?;
+            self.joint_states(channels.joint_states, stamp, rigid)?;
+            self.send(channels.tcp, stamp, |cdr| messages::pose_stamped(cdr, stamp, WORLD, &rigid.X_WT))?;
             self.error(stamp, channels.error, channels.error_plot, "x [m],y [m],z [m]", &sample.error_world)?;
             let axes = "tangential [m],normal [m],binormal [m]";
             self.error(stamp, channels.error_path, channels.error_path_plot, axes, &sample.error_path)?;
         }
-
-        // Elastic elements.
-        for (index, element) in sample.elastic.iter().enumerate() {
-            let channels = self.channels.elastic[index];
-            messages::six_vector_stamped(&mut self.cdr, stamp, &self.elements[index], &element.load);
-            self.message(channels.load, stamp)?;
-            let labels = "x [m],y [m],z [m],rx [rad],ry [rad],rz [rad]";
-            messages::labelled_array(&mut self.cdr, labels, &element.deflection);
-            self.message(channels.deflection, stamp)?;
+        if let Some(channel) = self.channels.contributions {
+            let shares = sample.contributions.as_flattened();
+            let write = |cdr: &mut Cdr| messages::labelled_array(cdr, &self.contributions, shares);
+            self.output.send(channel, self.samples, stamp, write)?;
         }
+
+        self.elastic(stamp, sample)?;
 
         // The run itself.
         let energy = &sample.energy;
         let energies = [energy.kinetic, energy.potential, energy.elastic];
-        messages::labelled_array(&mut self.cdr, "kinetic [J],potential [J],elastic [J]", &energies);
-        self.message(self.channels.energy, stamp)?;
-        messages::labelled_array(&mut self.cdr, "iterations,residual", &sample.solver);
-        self.message(self.channels.solver, stamp)?;
+        let labels = "kinetic [J],potential [J],elastic [J]";
+        self.send(self.channels.energy, stamp, |cdr| messages::labelled_array(cdr, labels, &energies))?;
+        let labels = "iterations,residual";
+        self.send(self.channels.solver, stamp, |cdr| messages::labelled_array(cdr, labels, &sample.solver))?;
+
+        // Pictures.
+        let (paths, error) = self.markers.advance(since_start, sample, self.frames.magnified());
+        self.last = stamp;
+        if paths {
+            self.paths()?;
+        }
+        if let Some(channel) = self.channels.markers.error.filter(|_| error) {
+            let arrow = self.markers.error(sample);
+            self.output.send(channel, self.errors, stamp, |cdr| messages::markers(cdr, stamp, &arrow))?;
+            self.errors = self.errors.wrapping_add(1);
+        }
 
         self.samples = self.samples.wrapping_add(1);
         Ok(())
     }
 
+    /// A message of a topic that has one of each sample.
+    fn send(&mut self, channel: u16, stamp: Stamp, write: impl FnOnce(&mut Cdr)) -> McapResult<()> {
+        self.output.send(channel, self.samples, stamp, write)
+    }
+
+    fn joint_states(&mut self, channel: u16, stamp: Stamp, twin: &TwinSample) -> McapResult<()> {
+        let values = [&twin.q, &twin.qdot, &twin.effort].map(Vec::as_slice);
+        self.output.send(channel, self.samples, stamp, |cdr| messages::joint_state(cdr, stamp, &self.joints, values))
+    }
+
+    /// Deflections and loads: one topic pair per element, and all by name for tools that plot joints.
+    fn elastic(&mut self, stamp: Stamp, sample: &Sample) -> McapResult<()> {
+        let labels = "x [m],y [m],z [m],rx [rad],ry [rad],rz [rad]";
+        for (index, element) in sample.elastic.iter().enumerate() {
+            let (channels, name) = (self.channels.elastic[index], &self.elements[index]);
+            let load = |cdr: &mut Cdr| messages::six_vector_stamped(cdr, stamp, name, &element.load);
+            self.output.send(channels.load, self.samples, stamp, load)?;
+            let deflection = |cdr: &mut Cdr| messages::labelled_array(cdr, labels, &element.deflection);
+            self.output.send(channels.deflection, self.samples, stamp, deflection)?;
+        }
+        if let Some(channel) = self.channels.elastic_joint_states {
+            let deflections: Vec<f64> = sample.elastic.iter().flat_map(|element| element.deflection).collect();
+            let loads: Vec<f64> = sample.elastic.iter().flat_map(|element| element.load).collect();
+            let values = [deflections.as_slice(), &[], loads.as_slice()];
+            let write = |cdr: &mut Cdr| messages::joint_state(cdr, stamp, &self.deflections, values);
+            self.output.send(channel, self.samples, stamp, write)?;
+        }
+        Ok(())
+    }
+
     /// An error as a six-vector, and its translation with the norm as plain numbers.
     fn error(&mut self, stamp: Stamp, vector: u16, plot: u16, axes: &str, error: &[f64; 6]) -> McapResult<()> {
-        messages::six_vector_stamped(&mut self.cdr, stamp, WORLD, error);
-        self.message(vector, stamp)?;
+        self.send(vector, stamp, |cdr| messages::six_vector_stamped(cdr, stamp, WORLD, error))?;
         let [x, y, z, ..] = *error;
         let norm = (x * x + y * y + z * z).sqrt();
-        messages::labelled_array(&mut self.cdr, &format!("{axes},norm [m]"), &[x, y, z, norm]);
-        self.message(plot, stamp)
+        let labels = format!("{axes},norm [m]");
+        self.send(plot, stamp, |cdr| messages::labelled_array(cdr, &labels, &[x, y, z, norm]))
     }
 
-    /// Adds the message in `cdr` to the open chunk, or to a new one if it would grow too large.
-    fn message(&mut self, channel_id: u16, stamp: Stamp) -> McapResult<()> {
-        let header = MessageHeader { channel_id, sequence: self.samples, log_time: stamp.0, publish_time: stamp.0 };
-        let size = MESSAGE_OVERHEAD + self.cdr.bytes().len();
-        if !self.chunk.is_empty() && self.chunk.len() + size > CHUNK_BYTES {
-            self.close_chunk()?;
+    /// The paths up to the last sample, unless they are in the file already.
+    fn paths(&mut self) -> McapResult<()> {
+        let stamp = self.last;
+        let paths = self.markers.paths();
+        if self.paths_at == Some(stamp) || paths.is_empty() {
+            return Ok(());
         }
-        push_message_record(&mut self.chunk, &header, self.cdr.bytes());
-        self.chunk_times = (self.chunk_times.0.min(stamp.0), self.chunk_times.1.max(stamp.0));
-        self.writer.write_to_known_channel(&header, self.cdr.bytes())
+        let channel = self.channels.markers.paths;
+        self.output.send(channel, self.paths, stamp, |cdr| messages::markers(cdr, stamp, &paths))?;
+        self.paths = self.paths.wrapping_add(1);
+        self.paths_at = Some(stamp);
+        Ok(())
     }
 
-    fn close_chunk(&mut self) -> McapResult<()> {
-        self.chunk.clear();
-        self.chunk_times = (u64::MAX, 0);
-        self.writer.flush()
-    }
-
-    /// Brings everything so far into the file: closed chunks for good, the open one and an end provisionally.
-    fn flush(&mut self) -> std::io::Result<()> {
-        let mut tail = Vec::with_capacity(self.chunk.len() + 128);
-        if !self.chunk.is_empty() {
-            push_chunk_record(&mut tail, &self.chunk, self.chunk_times);
+    fn finish(&mut self, result: &RunResult, event_times: &[Stamp]) -> McapResult<()> {
+        self.paths()?;
+        // In a chunk of their own: their times span the run, those of the chunk before need not.
+        self.output.close_chunk()?;
+        for ((event, stamp), sequence) in result.events.iter().zip(event_times).zip(0..) {
+            let level = match event.kind {
+                EventKind::Stopped => Level::Error,
+                EventKind::Limit => Level::Warn,
+                _ => Level::Info,
+            };
+            let write = |cdr: &mut Cdr| messages::log(cdr, *stamp, level, event.kind.word(), &event.text);
+            self.output.send(self.channels.events, sequence, *stamp, write)?;
         }
-        push_end(&mut tail);
-        self.file.set_tail(&tail)
-    }
-
-    fn metadata(&mut self, name: &str, pairs: impl IntoIterator<Item = (String, String)>) -> McapResult<()> {
-        let metadata = BTreeMap::from_iter(pairs);
-        self.writer.write_metadata(&Metadata { name: name.to_owned(), metadata })
-    }
-
-    fn attach(&mut self, start: Stamp, name: &str, media_type: &str, bytes: &[u8]) -> McapResult<()> {
-        self.writer.attach(&mcap::Attachment {
-            log_time: start.0,
-            create_time: 0, // unknown, and a run's file must not depend on the day
-            name: name.to_owned(),
-            media_type: media_type.to_owned(),
-            data: bytes.into(),
-        })
-    }
-
-    fn finish(&mut self, result: &RunResult) -> McapResult<()> {
-        self.metadata("flexarm.result", result.figures.iter().cloned())?;
-        self.writer.finish()?;
-        Ok(self.file.flush()?)
+        self.output.metadata("flexarm.result", result.figures.iter().cloned())?;
+        for file in &result.attachments {
+            self.output.attach(self.last, file)?;
+        }
+        self.output.finish()
     }
 }
 
 impl Drop for Open {
     /// A run that was given up still gets its index; errors have nowhere to go.
     fn drop(&mut self) {
-        let _ = self.writer.finish();
-        let _ = self.file.flush();
-    }
-}
-
-/// Adds a chunk without compression and checksum, made by hand: the provisional end of a file.
-fn push_chunk_record(file: &mut Vec<u8>, messages: &[u8], (start, end): (u64, u64)) {
-    const OPCODE: u8 = 0x06;
-    const FIXED_BYTES: u64 = 8 + 8 + 8 + 4 + 4 + 8;
-    let size = messages.len() as u64;
-    file.push(OPCODE);
-    file.extend((FIXED_BYTES + size).to_le_bytes());
-    file.extend(start.to_le_bytes());
-    file.extend(end.to_le_bytes());
-    file.extend(size.to_le_bytes()); // uncompressed
-    file.extend(0_u32.to_le_bytes()); // no checksum
-    file.extend(0_u32.to_le_bytes()); // no compression: an empty name
-    file.extend(size.to_le_bytes());
-    file.extend_from_slice(messages);
-}
-
-/// Adds an end of file without an index: data end, footer, magic. Readers then go through the data.
-fn push_end(file: &mut Vec<u8>) {
-    const DATA_END: u8 = 0x0f;
-    const FOOTER: u8 = 0x02;
-    file.push(DATA_END);
-    file.extend(4_u64.to_le_bytes());
-    file.extend([0; 4]); // no checksum
-    file.push(FOOTER);
-    file.extend(20_u64.to_le_bytes());
-    file.extend([0; 20]); // no summary, no offsets, no checksum
-    file.extend(mcap::MAGIC);
-}
-
-/// Bytes of a message record besides its data.
-const MESSAGE_OVERHEAD: usize = 1 + 8 + (2 + 4 + 8 + 8);
-
-/// Adds a message as it is inside a chunk.
-fn push_message_record(chunk: &mut Vec<u8>, header: &MessageHeader, data: &[u8]) {
-    const OPCODE: u8 = 0x05;
-    const HEADER_BYTES: u64 = 2 + 4 + 8 + 8;
-    chunk.push(OPCODE);
-    chunk.extend((HEADER_BYTES + data.len() as u64).to_le_bytes());
-    chunk.extend(header.channel_id.to_le_bytes());
-    chunk.extend(header.sequence.to_le_bytes());
-    chunk.extend(header.log_time.to_le_bytes());
-    chunk.extend(header.publish_time.to_le_bytes());
-    chunk.extend_from_slice(data);
-}
-
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Moving {
-    Yes,
-    No,
-}
-
-/// Names of the frames of both trees.
-struct Frames {
-    links: Vec<LinkFrame>,
-    has_rigid: bool,
-}
-
-struct LinkFrame {
-    parent: Option<usize>,
-    moving: Moving,
-    flexible: String,
-    rigid: String,
-}
-
-impl Frames {
-    fn of(header: &RunHeader) -> Self {
-        let frame = |link: &crate::LinkInfo| LinkFrame {
-            parent: link.parent,
-            moving: if link.fixed || link.parent.is_none() { Moving::No } else { Moving::Yes },
-            flexible: link.name.clone(),
-            rigid: format!("rigid/{}", link.name),
-        };
-        Self { links: header.links.iter().map(frame).collect(), has_rigid: header.has_rigid }
-    }
-
-    /// Writes the transforms of the links that move, or of those that do not.
-    fn write(&self, cdr: &mut Cdr, stamp: Stamp, sample: &Sample, moving: Moving) {
-        let mut transforms = Vec::with_capacity(2 * self.links.len());
-        self.tree(&mut transforms, &sample.flexible, moving, |link| link.flexible.as_str());
-        if self.has_rigid {
-            self.tree(&mut transforms, &sample.rigid, moving, |link| link.rigid.as_str());
-        }
-        messages::transforms(cdr, stamp, &transforms);
-    }
-
-    fn tree<'a>(
-        &'a self,
-        transforms: &mut Vec<Transform<'a>>,
-        twin: &TwinSample,
-        moving: Moving,
-        name: impl Fn(&'a LinkFrame) -> &'a str,
-    ) {
-        for (index, link) in self.links.iter().enumerate() {
-            let (parent, X_WP) = match link.parent {
-                Some(parent) => (name(&self.links[parent]), twin.X_WL[parent]),
-                None => (WORLD, Pose::identity()),
-            };
-            let child = name(link);
-            // A base link that is called `world` is the root itself.
-            if link.moving == moving && child != parent {
-                transforms.push(Transform { parent, child, X_PC: X_WP.inv_mul(&twin.X_WL[index]) });
-            }
-        }
-    }
-}
-
-/// The files that the meshes came from, each once, as attachments `meshes/<file name>`.
-fn mesh_files(header: &RunHeader) -> Result<Vec<crate::Attachment>, LogError> {
-    let (mut seen, mut names, mut files) = (BTreeSet::new(), BTreeSet::new(), Vec::new());
-    for path in header.meshes.iter().filter_map(|mesh| mesh.file.as_deref()) {
-        if !seen.insert(path) {
-            continue;
-        }
-        let bytes = std::fs::read(path).map_err(LogError::io(path, "read the mesh to attach it"))?;
-        let file_name = path.file_name().map(|name| name.to_string_lossy()).unwrap_or_default();
-        let mut name = format!("meshes/{file_name}");
-        if !names.insert(name.clone()) {
-            name = format!("meshes/{}/{file_name}", seen.len()); // another folder's file of that name
-            names.insert(name.clone());
-        }
-        files.push(crate::Attachment { name, media_type: media_type(path).to_owned(), bytes });
-    }
-    Ok(files)
-}
-
-fn media_type(path: &Path) -> &'static str {
-    let extension = path.extension().and_then(OsStr::to_str).unwrap_or_default().to_ascii_lowercase();
-    match extension.as_str() {
-        "stl" => "model/stl",
-        "obj" => "model/obj",
-        "dae" => "model/vnd.collada+xml",
-        "glb" => "model/gltf-binary",
-        "gltf" => "model/gltf+json",
-        _ => "application/octet-stream",
+        let _ = self.output.finish();
     }
 }
 

@@ -1,0 +1,221 @@
+//! `flexarm view`: finds the Rerun viewer and opens a recording in it.
+
+use std::fmt::Write as _;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitCode, Stdio};
+use std::time::{Duration, Instant};
+
+use clap::Args;
+use flexarm::Error;
+
+use crate::args::Cli;
+use crate::{answer, to_json};
+
+/// Version of the viewer that this program writes `.rrd` files for.
+const WRITTEN_FOR: &str = "0.36";
+/// The newest viewer of that version.
+const WANTED: &str = "0.36.3";
+/// How long a viewer is watched: one that cannot start says so at once.
+const WATCHED: Duration = Duration::from_secs(1);
+
+#[derive(Debug, Args)]
+pub(crate) struct ViewArgs {
+    /// .rrd or .mcap recording, .html report, or the folder of a run
+    pub(crate) file: PathBuf,
+    /// Return only when the viewer is closed
+    #[arg(long)]
+    pub(crate) wait: bool,
+}
+
+pub(crate) fn run(cli: &Cli, args: &ViewArgs) -> Result<ExitCode, Error> {
+    let file = recording(&args.file)?;
+    match ending(&file).as_str() {
+        "html" | "htm" => Ok(browse(cli, &file)),
+        kind => {
+            let Some(viewer) = Viewer::find() else {
+                return Ok(failed(&format!(
+                    "there is no Rerun viewer: neither `rerun` nor `python3 -m rerun` runs here.\nGet it with one of\n    \
+                     pip install rerun-sdk=={WANTED}\n    cargo install rerun-cli --version {WANTED} --locked\nor open the .mcap \
+                     recording with Foxglove (https://foxglove.dev) or PlotJuggler"
+                )));
+            };
+            if kind == "rrd" && !viewer.version.starts_with(&format!("{WRITTEN_FOR}.")) && !cli.quiet {
+                eprintln!(
+                    "warning: .rrd files are written for Rerun {WRITTEN_FOR}, the viewer here is {}: if it cannot show the file, \
+                     `pip install rerun-sdk=={WANTED}` or view the .mcap recording",
+                    viewer.version
+                );
+            }
+            Ok(show(cli, &file, &viewer, args.wait))
+        }
+    }
+}
+
+/// The file to show: the one given, or that of a run's folder.
+fn recording(given: &Path) -> Result<PathBuf, Error> {
+    let fault = |what: &str| Err(Error::File { path: given.to_owned(), what: what.to_owned() });
+    if given.is_dir() {
+        let found = ["run.rrd", "run.mcap"].map(|name| given.join(name)).into_iter().find(|path| path.is_file());
+        return match found {
+            Some(path) => Ok(path),
+            None => fault("the folder has no run.rrd and no run.mcap; `flexarm compare -o FOLDER` writes them"),
+        };
+    }
+    if !given.is_file() {
+        return fault("there is no such file; give a .rrd, .mcap or .html file or the folder of a run");
+    }
+    match ending(given).as_str() {
+        "rrd" | "mcap" | "html" | "htm" => Ok(given.to_owned()),
+        _ => fault("cannot be viewed: give a .rrd or .mcap recording, a .html report or the folder of a run"),
+    }
+}
+
+fn ending(path: &Path) -> String {
+    path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase()).unwrap_or_default()
+}
+
+/// A viewer that answered when asked for its version.
+struct Viewer {
+    /// Program and first arguments.
+    words: &'static [&'static str],
+    version: String,
+}
+
+impl Viewer {
+    /// The one on the path, else the one of python3.
+    fn find() -> Option<Self> {
+        let ways: [&[&str]; 2] = [&["rerun"], &["python3", "-m", "rerun"]];
+        ways.into_iter().find_map(|words| {
+            let output = command(words).arg("--version").stdin(Stdio::null()).stderr(Stdio::null()).output().ok()?;
+            let text = String::from_utf8_lossy(&output.stdout).into_owned();
+            // Other programs of that name would not answer so.
+            let version = text.contains("rerun").then(|| text.split_whitespace().find(|word| is_version(word)))??;
+            output.status.success().then(|| Self { words, version: version.to_owned() })
+        })
+    }
+
+    fn name(&self) -> String {
+        self.words.join(" ")
+    }
+}
+
+fn command(words: &[&str]) -> Command {
+    let mut command = Command::new(words[0]);
+    command.args(&words[1..]);
+    command
+}
+
+/// Digits, point, digits, point, something.
+fn is_version(word: &str) -> bool {
+    let mut parts = word.split('.');
+    let mut number = || parts.next().is_some_and(|part| !part.is_empty() && part.bytes().all(|b| b.is_ascii_digit()));
+    number() && number() && parts.next().is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit()))
+}
+
+/// Starts the viewer, and stays with it for a moment or to its end.
+fn show(cli: &Cli, file: &Path, viewer: &Viewer, wait: bool) -> ExitCode {
+    // What a viewer says when it cannot start. A pipe would break under it when this program ends.
+    let log = std::env::temp_dir().join(format!("flexarm-view-{}.log", std::process::id()));
+    let mut command = command(viewer.words);
+    command.arg(file).stdin(Stdio::null()).stdout(Stdio::null());
+    if !wait {
+        command.stderr(File::create(&log).map_or_else(|_| Stdio::null(), Stdio::from)).env("NO_COLOR", "1");
+        detach(&mut command);
+    }
+    let mut child = match command.spawn() {
+        Ok(child) => child,
+        Err(error) => return failed(&format!("`{}` cannot be started: {error}", viewer.name())),
+    };
+    let ended = watch(&mut child);
+    let said = std::fs::read_to_string(&log).unwrap_or_default();
+    let _ = std::fs::remove_file(&log); // still open in the viewer, gone with it
+    if let Some(Err(status)) = ended {
+        return failed(&format!("`{} {}` ended with {status}{}", viewer.name(), file.display(), last_lines(&said)));
+    }
+    let json = || {
+        to_json(&serde_json::json!({
+            "file": file.display().to_string(), "viewer": viewer.name(), "version": viewer.version, "pid": child.id(),
+        }))
+    };
+    let how = match ended {
+        Some(_) => "handed to the viewer that is open already, by".to_owned(),
+        None => format!("open in process {} of", child.id()),
+    };
+    answer(cli, json, || format!("{}: {how} `{}` {}\n", file.display(), viewer.name(), viewer.version));
+    if wait && ended.is_none() {
+        return match child.wait() {
+            Ok(status) if status.success() => ExitCode::SUCCESS,
+            Ok(status) => failed(&format!("`{} {}` ended with {status}", viewer.name(), file.display())),
+            Err(error) => failed(&format!("lost sight of `{}`: {error}", viewer.name())),
+        };
+    }
+    ExitCode::SUCCESS
+}
+
+/// The keys that stop a program in the terminal shall not close a viewer that was left open.
+fn detach(command: &mut Command) {
+    #[cfg(unix)]
+    std::os::unix::process::CommandExt::process_group(command, 0);
+    #[cfg(not(unix))]
+    let _ = command;
+}
+
+/// How the viewer ended, if it did so at once.
+fn watch(child: &mut Child) -> Option<Result<(), std::process::ExitStatus>> {
+    let begin = Instant::now();
+    while begin.elapsed() < WATCHED {
+        if let Ok(Some(status)) = child.try_wait() {
+            return Some(if status.success() { Ok(()) } else { Err(status) });
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    None
+}
+
+fn last_lines(text: &str) -> String {
+    let lines: Vec<&str> = text.lines().filter(|line| !line.trim().is_empty()).collect();
+    lines[lines.len().saturating_sub(5)..].iter().fold(String::new(), |mut all, line| {
+        let _ = write!(all, "\n    {line}");
+        all
+    })
+}
+
+/// A report is for a browser; without a way to start one, it says which file to open.
+fn browse(cli: &Cli, file: &Path) -> ExitCode {
+    let path = file.canonicalize().unwrap_or_else(|_| file.to_owned());
+    let mut opener = Command::new("xdg-open");
+    opener.arg(&path).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
+    detach(&mut opener);
+    let started = opener.spawn().ok().filter(|_| cfg!(target_os = "linux"));
+    let pid = started.as_ref().map(Child::id);
+    let opened = started.is_some_and(|mut child| !matches!(watch(&mut child), Some(Err(_))));
+    let json = || {
+        let viewer = opened.then_some("xdg-open");
+        to_json(&serde_json::json!({
+            "file": file.display().to_string(), "viewer": viewer, "version": null, "pid": pid.filter(|_| opened),
+        }))
+    };
+    answer(cli, json, || match opened {
+        true => format!("{}: opened with xdg-open\n", file.display()),
+        false => format!("{}: a report for a browser; open file://{}\n", file.display(), path.display()),
+    });
+    ExitCode::SUCCESS
+}
+
+fn failed(message: &str) -> ExitCode {
+    eprintln!("error: {message}");
+    ExitCode::from(1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn versions_are_told_from_other_words() {
+        let text = "rerun-cli 0.36.3 [rustc 1.95.0 (abc), LLVM 21.1] x86_64 release-0.36.3 49bb15f";
+        assert_eq!(text.split_whitespace().find(|word| is_version(word)), Some("0.36.3"));
+        assert!(is_version("0.37.0-alpha.1") && !is_version("release-0.36.3") && !is_version("1.95"));
+    }
+}

@@ -1,0 +1,103 @@
+//! What is left of a run that is killed, or that fills the disk: files that read up to there, and one clear message.
+#![cfg(all(unix, feature = "mcap"))]
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
+mod common;
+
+use std::process::Stdio;
+use std::time::{Duration, Instant};
+
+use common::{Answer, Place, Table, mcap_records, with};
+
+/// A run that takes long, and has much to write: half a minute of rest in small steps.
+const LONG: [&str; 9] = ["compare", "robot.toml", "long.toml", "-o", "result", "--step", "1e-5", "--log-rate", "1000"];
+
+fn place() -> Place {
+    let place = Place::new();
+    place.write("long.toml", with(common::SWING, "hold = 0.5", "hold = 59.5"));
+    place
+}
+
+/// Last time in any chunk of a file that must be whole from magic to magic (s); `None` without chunks.
+///
+/// A chunk record begins with the first and last time of its messages.
+fn last_time(file: &[u8]) -> Option<f64> {
+    const CHUNK: u8 = 0x06;
+    mcap_records(file);
+    let (mut rest, mut last) = (&file[8..file.len() - 8], None);
+    while !rest.is_empty() {
+        let length = u64::from_le_bytes(rest[1..9].try_into().unwrap()) as usize;
+        if rest[0] == CHUNK {
+            let end = u64::from_le_bytes(rest[17..25].try_into().unwrap());
+            last = last.max(Some(end));
+        }
+        rest = &rest[9 + length..];
+    }
+    last.map(|nanoseconds| nanoseconds as f64 * 1e-9)
+}
+
+/// Truth: the promise of the recorder, at most a second of wall time is lost. What was in the file a second before the
+/// kill cannot be all that is left, because the run went on in that second.
+#[test]
+fn a_killed_run_leaves_a_whole_recording_up_to_the_last_second() {
+    let place = place();
+    let mut run = place.command(&LONG).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let read = || std::fs::read(place.path("result/run.mcap")).ok().filter(|file| file.len() > 16);
+    let begin = Instant::now();
+    // Until the run is under way.
+    while read().and_then(|file| last_time(&file)).is_none_or(|t| t < 0.5) {
+        assert!(run.try_wait().unwrap().is_none(), "the run was over too soon");
+        assert!(begin.elapsed() < Duration::from_secs(60), "the run does not get going");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    let before = last_time(&read().unwrap()).unwrap();
+    std::thread::sleep(Duration::from_secs(1));
+    assert!(run.try_wait().unwrap().is_none(), "the run was over too soon");
+    run.kill().unwrap(); // SIGKILL
+    run.wait().unwrap();
+    let after = last_time(&place.read("result/run.mcap")).unwrap();
+    assert!(after > before, "nothing was written in the last second: {after} s after {before} s");
+    // The table may end in the middle of a line, all others are whole.
+    let text = place.text("result/run.csv");
+    let table = Table::parse(&text[..=text.rfind('\n').unwrap()]);
+    assert!(*table.column("time").last().unwrap() > before);
+}
+
+/// The program under a limit of the size of files (in the shell's blocks of 512 or 1024 bytes), writing past which is an
+/// error as on a full disk.
+fn limited(place: &Place, blocks: u32, arguments: &[&str]) -> Answer {
+    let program = env!("CARGO_BIN_EXE_flexarm");
+    let script = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$0\" \"$@\"");
+    let mut command = std::process::Command::new("sh");
+    command.args(["-c", &script, program]).args(arguments).current_dir(place.path(".")).stdin(Stdio::null());
+    Answer::of(command.output().unwrap())
+}
+
+#[test]
+fn a_recording_that_may_not_grow_ends_the_run_with_its_name_and_reads_up_to_there() {
+    let place = place();
+    let arguments = ["compare", "robot.toml", "long.toml", "-o", "result", "--log-rate", "1000"];
+    let answer = limited(&place, 4000, &arguments);
+    assert_eq!((answer.code, answer.out.as_str()), (1, ""));
+    answer.says(&["result/run.", "may not grow further", "File too large"]);
+    assert_eq!(answer.err.matches("error:").count(), 1, "{}", answer.err);
+    // Closing the files fails as well; what counts is what came first.
+    assert!(!answer.err.contains("index") && !answer.err.contains("last samples"), "{}", answer.err);
+    let last = last_time(&place.read("result/run.mcap")).unwrap();
+    assert!((0.1..59.0).contains(&last), "{last} s are left");
+}
+
+/// The first file that is written to fails at once: the device is always full.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_full_disk_is_named_with_what_to_do() {
+    for file in ["run.mcap", "run.csv"] {
+        let place = Place::new();
+        std::fs::create_dir(place.path("result")).unwrap();
+        std::os::unix::fs::symlink("/dev/full", place.path(&format!("result/{file}"))).unwrap();
+        let answer = place.flexarm(&["compare", "robot.toml", "swing.toml", "-o", "result", "--force"]);
+        assert_eq!((answer.code, answer.out.as_str()), (1, ""), "{file}");
+        answer.says(&[&format!("result/{file}"), "the disk is full; free space or choose another folder with -o"]);
+        assert_eq!(answer.err.matches("error:").count(), 1, "{}", answer.err);
+    }
+}

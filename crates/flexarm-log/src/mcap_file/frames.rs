@@ -1,0 +1,188 @@
+//! Coordinate frames of a recording: the trees of both robots and of the magnified arm, and what moves in them.
+
+use flexarm_kinematics::Pose;
+
+use super::beat::Beat;
+use super::bent::BentLink;
+use super::cdr::Cdr;
+use super::messages::{self, Stamp, Transform};
+use crate::{LinkInfo, Magnifier, RunHeader, Sample, TwinSample};
+
+/// Root of all trees.
+pub(crate) const WORLD: &str = "world";
+/// Most pictures of the magnified arm per second of simulated time.
+const PICTURES_HZ: u32 = 60;
+
+/// The robots of a recording.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Tree {
+    Flexible,
+    Rigid,
+    /// Made for the eye: rates and precision are those of pictures.
+    Magnified,
+}
+
+impl Tree {
+    /// Name as a namespace of markers.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Flexible => "flexible",
+            Self::Rigid => "rigid",
+            Self::Magnified => "magnified",
+        }
+    }
+
+    /// Name of a link's frame in this tree.
+    pub(crate) fn frame(self, link: &str) -> String {
+        match self {
+            Self::Flexible => link.to_owned(),
+            Self::Rigid | Self::Magnified => format!("{}/{link}", self.name()),
+        }
+    }
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Moving {
+    Yes,
+    No,
+}
+
+/// Names of the frames of all trees, and the magnified arm of the last picture.
+pub(crate) struct Frames {
+    links: Vec<LinkFrame>,
+    has_rigid: bool,
+    /// Link of the tool centre point, and names of its frame as in [`Tree`].
+    tcp: Option<(usize, [String; 3])>,
+    /// Link and name of each station.
+    stations: Vec<(usize, String)>,
+    /// Only if there is something to magnify.
+    magnifier: Option<Magnifier>,
+    magnified: TwinSample,
+    /// Links in slabs, with the names of these.
+    bent: Vec<(BentLink, Vec<String>)>,
+    pictures: Beat,
+    /// Whether this sample is one for a picture.
+    due: bool,
+}
+
+struct LinkFrame {
+    parent: Option<usize>,
+    moving: Moving,
+    /// As in [`Tree`].
+    names: [String; 3],
+}
+
+impl Frames {
+    pub(crate) fn of(header: &RunHeader) -> Self {
+        let all = [Tree::Flexible, Tree::Rigid, Tree::Magnified];
+        let frame = |link: &LinkInfo| LinkFrame {
+            parent: link.parent,
+            moving: if link.fixed || link.parent.is_none() { Moving::No } else { Moving::Yes },
+            names: all.map(|tree| tree.frame(&link.name)),
+        };
+        let tcp = header.links.iter().position(|link| link.name == header.tcp);
+        let station = |link: usize, k: usize| (link, format!("{}/station_{k}", header.links[link].name));
+        let stations = header.bends.iter().flat_map(|bend| (0..bend.X_LS.len()).map(|k| station(bend.link, k)));
+        let tree = bending_tree(header);
+        let bent = tree.into_iter().flat_map(|tree| {
+            BentLink::all(header).into_iter().map(move |bent| {
+                let link = tree.frame(&header.links[bent.link].name);
+                let names = (0..bent.count()).map(|k| slab_frame(&link, k)).collect();
+                (bent, names)
+            })
+        });
+        Self {
+            links: header.links.iter().map(frame).collect(),
+            has_rigid: header.has_rigid,
+            tcp: tcp.map(|link| (link, all.map(|tree| format!("{}/tcp", tree.frame(&header.tcp))))),
+            stations: stations.collect(),
+            magnifier: is_magnified(header).then(|| Magnifier::new(header)),
+            magnified: TwinSample::default(),
+            bent: bent.collect(),
+            pictures: Beat::new(PICTURES_HZ),
+            due: false,
+        }
+    }
+
+    /// Goes on to a sample; makes the magnified arm if it is time for a picture.
+    pub(crate) fn advance(&mut self, since_start_ns: u64, sample: &Sample) {
+        self.due = self.pictures.due(since_start_ns);
+        if let Some(magnifier) = self.magnifier.as_ref().filter(|_| self.due) {
+            magnifier.magnify(sample, &mut self.magnified);
+        }
+    }
+
+    /// The magnified arm, if this sample shows it.
+    pub(crate) fn magnified(&self) -> Option<&TwinSample> {
+        (self.due && self.magnifier.is_some()).then_some(&self.magnified)
+    }
+
+    /// Writes the transforms of the frames that move, or of those that do not.
+    pub(crate) fn write(&self, cdr: &mut Cdr, stamp: Stamp, sample: &Sample, moving: Moving) {
+        let mut transforms = Vec::with_capacity(3 * self.links.len());
+        self.tree(&mut transforms, &sample.flexible, moving, Tree::Flexible);
+        if self.has_rigid {
+            self.tree(&mut transforms, &sample.rigid, moving, Tree::Rigid);
+        }
+        if let Some(magnified) = self.magnified() {
+            self.tree(&mut transforms, magnified, moving, Tree::Magnified);
+        }
+        if moving == Moving::Yes {
+            for ((link, child), X_WS) in self.stations.iter().zip(&sample.flexible.X_WS) {
+                let X_PC = sample.flexible.X_WL[*link].inv_mul(X_WS);
+                transforms.push(Transform { parent: &self.links[*link].names[0], child, X_PC, coarse: false });
+            }
+            let (tree, twin) = match &self.magnifier {
+                Some(_) => (Tree::Magnified, &self.magnified),
+                None => (Tree::Flexible, &sample.flexible),
+            };
+            for (bent, names) in self.bent.iter().filter(|_| self.due) {
+                let parent = &self.links[bent.link].names[tree as usize];
+                let slabs = bent.poses(twin).zip(names);
+                transforms.extend(slabs.map(|(X_PC, child)| Transform { parent, child, X_PC, coarse: true }));
+            }
+        }
+        messages::transforms(cdr, stamp, &transforms);
+    }
+
+    fn tree<'a>(&'a self, transforms: &mut Vec<Transform<'a>>, twin: &TwinSample, moving: Moving, tree: Tree) {
+        let name = |link: &'a LinkFrame| link.names[tree as usize].as_str();
+        for (index, link) in self.links.iter().enumerate() {
+            let (parent, X_WP) = match link.parent {
+                Some(parent) => (name(&self.links[parent]), twin.X_WL[parent]),
+                None => (WORLD, Pose::identity()),
+            };
+            let child = name(link);
+            // A base link that is called `world` is the root itself.
+            if link.moving == moving && child != parent {
+                let coarse = tree == Tree::Magnified;
+                transforms.push(Transform { parent, child, X_PC: X_WP.inv_mul(&twin.X_WL[index]), coarse });
+            }
+        }
+        // The tool is rigid with its link.
+        if let (Some((link, names)), Moving::No) = (&self.tcp, moving) {
+            let (parent, child) = (name(&self.links[*link]), names[tree as usize].as_str());
+            transforms.push(Transform { parent, child, X_PC: twin.X_WL[*link].inv_mul(&twin.X_WT), coarse: false });
+        }
+    }
+}
+
+/// Whether a recording has a magnified arm: that needs the twin and a factor.
+pub(crate) fn is_magnified(header: &RunHeader) -> bool {
+    header.has_rigid && header.magnification > 0.0
+}
+
+/// The robot whose links are drawn bent: the magnified one. Deflections of a recording that is not to be magnified, such
+/// as one of modes, can be seen as they are; those of a single robot cannot.
+pub(crate) fn bending_tree(header: &RunHeader) -> Option<Tree> {
+    match (is_magnified(header), header.has_rigid) {
+        (true, _) => Some(Tree::Magnified),
+        (false, true) => Some(Tree::Flexible),
+        (false, false) => None,
+    }
+}
+
+/// Frame of a slab of a link that is drawn bent.
+pub(crate) fn slab_frame(link_frame: &str, slab: usize) -> String {
+    format!("{link_frame}/bend_{slab}")
+}

@@ -1,0 +1,319 @@
+//! What viewers draw without any file: the links' surfaces, the paths of the tool, and its error, magnified.
+//!
+//! A viewer that jumps in time shows the last message of each topic, so what is sent at another pace has a topic of its
+//! own: surfaces once, paths each second, the error often.
+
+use std::borrow::Cow;
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::beat::Beat;
+use super::bent::BentLink;
+use super::frames::{Tree, WORLD, bending_tree, is_magnified, slab_frame};
+use super::messages::{Marker, MarkerKind};
+use crate::{LinkMesh, RunHeader, Sample, TwinSample};
+
+/// Triangles of one robot beyond which meshes are thinned.
+const MOST_TRIANGLES: usize = 100_000;
+/// Points of a path beyond which it is thinned.
+const MOST_POINTS: usize = 1000;
+/// Pictures of the error per second of simulated time.
+const ERROR_HZ: u32 = 20;
+
+const GHOST: [f32; 4] = [0.85, 0.88, 0.92, 0.3];
+const MAGNIFIED: [f32; 4] = [0.25, 0.55, 0.95, 0.6];
+const RIGID_PATH: [f32; 4] = [0.75, 0.78, 0.82, 1.0];
+const FLEXIBLE_PATH: [f32; 4] = [0.95, 0.55, 0.1, 1.0];
+const ERROR: [f32; 4] = [0.9, 0.15, 0.15, 1.0];
+
+/// Surfaces of all robots, in the frames of their links.
+pub(crate) fn surfaces<'a>(header: &RunHeader, frames: &'a SurfaceFrames) -> Vec<Marker<'a>> {
+    let total: usize = header.meshes.iter().map(|mesh| mesh.triangles.len()).sum();
+    let share = |mesh: &LinkMesh| (mesh.triangles.len() as f64 / total as f64 * MOST_TRIANGLES as f64) as usize;
+    let meshes: Vec<Cow<'_, LinkMesh>> = header.meshes.iter().map(|mesh| thinned(mesh, share(mesh).max(16))).collect();
+    let deviates = deviating(header);
+    let mut markers = Vec::new();
+    for (tree, frames) in &frames.trees {
+        let mut id = 0;
+        let mut add = |frame: &'a str, color, points: Vec<[f32; 3]>| {
+            if !points.is_empty() {
+                let (kind, scale) = (MarkerKind::TriangleList, [1.0; 3]);
+                markers.push(Marker { points, id, ..marker(frame, tree.name(), kind, scale, color) });
+                id += 1;
+            }
+        };
+        for mesh in meshes.iter().filter(|mesh| *tree != Tree::Magnified || deviates[mesh.link]) {
+            let color = match tree {
+                Tree::Flexible => mesh.color,
+                Tree::Rigid => GHOST,
+                Tree::Magnified => MAGNIFIED,
+            };
+            let own = &frames[mesh.link];
+            match &own.bent {
+                Some((bent, names)) => {
+                    let slabs = names.iter().zip(bent.slabs(mesh));
+                    slabs.for_each(|(name, points)| add(name, color, points));
+                }
+                None => add(&own.name, color, corners(mesh)),
+            }
+        }
+    }
+    markers
+}
+
+/// Which links can be elsewhere than those of the rigid twin: magnified, the others would only lie on themselves.
+fn deviating(header: &RunHeader) -> Vec<bool> {
+    let bends = |name: &String| header.bends.iter().any(|bend| header.links[bend.link].name == *name);
+    let drives_give_way = !header.contributors.iter().all(bends);
+    let mut deviates: Vec<bool> = Vec::with_capacity(header.links.len());
+    for (index, link) in header.links.iter().enumerate() {
+        let own = header.bends.iter().any(|bend| bend.link == index);
+        deviates.push(own || link.parent.is_some_and(|parent| deviates[parent] || drives_give_way));
+    }
+    deviates
+}
+
+/// Names of the frames that surfaces are drawn in.
+pub(crate) struct SurfaceFrames {
+    trees: Vec<(Tree, Vec<LinkFrames>)>,
+}
+
+struct LinkFrames {
+    name: String,
+    /// The link in slabs with their frames, if it is drawn bent in this tree.
+    bent: Option<(BentLink, Vec<String>)>,
+}
+
+impl SurfaceFrames {
+    pub(crate) fn of(header: &RunHeader) -> Self {
+        let mut trees = vec![Tree::Flexible];
+        trees.extend(header.has_rigid.then_some(Tree::Rigid));
+        trees.extend(is_magnified(header).then_some(Tree::Magnified));
+        let links = |tree: Tree| {
+            let names = header.links.iter().map(|link| tree.frame(&link.name));
+            let mut frames: Vec<LinkFrames> = names.map(|name| LinkFrames { name, bent: None }).collect();
+            if bending_tree(header) == Some(tree) {
+                for bent in BentLink::all(header) {
+                    let frame = &mut frames[bent.link];
+                    let slabs = (0..bent.count()).map(|k| slab_frame(&frame.name, k)).collect();
+                    frame.bent = Some((bent, slabs));
+                }
+            }
+            frames
+        };
+        Self { trees: trees.into_iter().map(|tree| (tree, links(tree))).collect() }
+    }
+}
+
+fn marker<'a>(frame: &'a str, namespace: &'a str, kind: MarkerKind, scale: [f64; 3], color: [f32; 4]) -> Marker<'a> {
+    Marker { frame, namespace, id: 0, kind, place: [0.0; 3], scale, color, points: Vec::new(), text: String::new() }
+}
+
+fn corners(mesh: &LinkMesh) -> Vec<[f32; 3]> {
+    mesh.triangles.iter().flatten().map(|k| mesh.positions[*k as usize]).collect()
+}
+
+/// The mesh with at most about so many triangles: corners that are close together become one.
+fn thinned(mesh: &LinkMesh, most: usize) -> Cow<'_, LinkMesh> {
+    if mesh.triangles.len() <= most {
+        return Cow::Borrowed(mesh);
+    }
+    let (low, high) = mesh.positions.iter().fold(([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]), |(low, high), p| {
+        ([0, 1, 2].map(|c| low[c].min(p[c])), [0, 1, 2].map(|c| high[c].max(p[c])))
+    });
+    let size = [0, 1, 2].map(|c| high[c] - low[c]).into_iter().fold(0.0, f32::max);
+    let mut triangles = mesh.triangles.clone();
+    let mut cells = 512.0;
+    while triangles.len() > most && cells > 2.0 {
+        let mut firsts: BTreeMap<[i32; 3], u32> = BTreeMap::new();
+        let keys = mesh.positions.iter().map(|p| [0, 1, 2].map(|c| ((p[c] - low[c]) / size * cells) as i32));
+        let merged: Vec<u32> = keys.zip(0..).map(|(key, k)| *firsts.entry(key).or_insert(k)).collect();
+        let mut seen = BTreeSet::new();
+        triangles = mesh.triangles.iter().map(|corners| corners.map(|k| merged[k as usize])).collect();
+        triangles.retain(|[a, b, c]| {
+            let mut sorted = [*a, *b, *c];
+            sorted.sort_unstable();
+            a != b && b != c && c != a && seen.insert(sorted)
+        });
+        cells /= 1.25;
+    }
+    Cow::Owned(LinkMesh { triangles, ..mesh.clone() })
+}
+
+/// Line that the tool has drawn so far.
+#[derive(Debug)]
+struct Path {
+    points: Vec<[f32; 3]>,
+    stride: u64,
+    seen: u64,
+    last: [f32; 3],
+}
+
+impl Path {
+    fn new() -> Self {
+        Self { points: Vec::new(), stride: 1, seen: 0, last: [0.0; 3] }
+    }
+
+    fn push(&mut self, twin: &TwinSample) {
+        self.last = twin.X_WT.translation.vector.map(|x| x as f32).into();
+        if self.seen.is_multiple_of(self.stride) {
+            self.points.push(self.last);
+        }
+        self.seen += 1;
+        // One place is for the last point.
+        if self.points.len() >= MOST_POINTS {
+            let mut keep = false;
+            self.points.retain(|_| {
+                keep = !keep;
+                keep
+            });
+            self.stride *= 2;
+        }
+    }
+
+    fn points(&self) -> Vec<[f32; 3]> {
+        let mut points = self.points.clone();
+        if points.last() != Some(&self.last) {
+            points.push(self.last);
+        }
+        points
+    }
+}
+
+/// Markers that change while the run goes on.
+pub(crate) struct MovingMarkers {
+    has_rigid: bool,
+    /// Factor of the magnified error, if there is one.
+    factor: Option<f64>,
+    flexible: Path,
+    rigid: Path,
+    magnified: Path,
+    /// Distance from the base to the tool in the first sample (m): lines are so wide that they are seen on any robot.
+    reach: f64,
+    seconds: Beat,
+    errors: Beat,
+}
+
+impl MovingMarkers {
+    pub(crate) fn new(header: &RunHeader) -> Self {
+        Self {
+            has_rigid: header.has_rigid,
+            factor: is_magnified(header).then_some(header.magnification),
+            flexible: Path::new(),
+            rigid: Path::new(),
+            magnified: Path::new(),
+            reach: 0.0,
+            seconds: Beat::new(1),
+            errors: Beat::new(ERROR_HZ),
+        }
+    }
+
+    /// Takes a sample; returns whether paths and error are to be sent now.
+    pub(crate) fn advance(
+        &mut self,
+        since_start_ns: u64,
+        sample: &Sample,
+        magnified: Option<&TwinSample>,
+    ) -> (bool, bool) {
+        if self.flexible.seen == 0 {
+            let base = sample.flexible.X_WL.first().map_or_else(Default::default, |X| X.translation.vector);
+            self.reach = (sample.flexible.X_WT.translation.vector - base).norm();
+        }
+        self.flexible.push(&sample.flexible);
+        if self.has_rigid {
+            self.rigid.push(&sample.rigid);
+        }
+        if let Some(magnified) = magnified {
+            self.magnified.push(magnified);
+        }
+        (self.seconds.due(since_start_ns), self.errors.due(since_start_ns) && self.factor.is_some())
+    }
+
+    /// The paths so far.
+    pub(crate) fn paths(&self) -> Vec<Marker<'static>> {
+        let width = 0.002 * self.reach;
+        let line = |namespace, color, path: &Path| {
+            let marker = marker(WORLD, namespace, MarkerKind::LineStrip, [width, 0.0, 0.0], color);
+            Marker { points: path.points(), ..marker }
+        };
+        let mut lines = vec![line("path/flexible", FLEXIBLE_PATH, &self.flexible)];
+        if self.has_rigid {
+            lines.push(line("path/rigid", RIGID_PATH, &self.rigid));
+        }
+        if self.factor.is_some() {
+            lines.push(line("path/magnified", MAGNIFIED, &self.magnified));
+        }
+        // A line needs two points.
+        lines.retain(|line| line.points.len() > 1);
+        lines
+    }
+
+    /// The error as an arrow from the rigid tool, so many times longer, and in words.
+    pub(crate) fn error(&self, sample: &Sample) -> Vec<Marker<'static>> {
+        let factor = self.factor.unwrap_or(1.0);
+        let from = sample.rigid.X_WT.translation.vector;
+        let error = nalgebra::Vector3::from_column_slice(&sample.error_world[..3]);
+        let to = from + error * factor;
+        let arrow_size = [0.004, 0.01, 0.015].map(|part| part * self.reach);
+        let arrow = marker(WORLD, "error", MarkerKind::Arrow, arrow_size, ERROR);
+        let height = 0.025 * self.reach;
+        let text = marker(WORLD, "error/text", MarkerKind::Text, [0.0, 0.0, height], ERROR);
+        vec![
+            Marker { points: [from, to].map(|p| p.map(|x| x as f32).into()).to_vec(), ..arrow },
+            Marker {
+                place: [to.x, to.y, to.z + 2.0 * height].map(|x| f64::from(x as f32)),
+                text: format!("{:.3} mm, drawn {factor} times", 1e3 * error.norm()),
+                ..text
+            },
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A square in many triangles.
+    fn sheet(n: u32) -> LinkMesh {
+        let at = |k: u32| k as f32 / n as f32;
+        let positions = (0..=n).flat_map(|i| (0..=n).map(move |j| [at(i), at(j), 0.0])).collect();
+        let cell = |i: u32, j: u32| {
+            let [a, b, c, d] = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)].map(|(i, j)| i * (n + 1) + j);
+            [[a, b, c], [a, c, d]]
+        };
+        let triangles = (0..n).flat_map(|i| (0..n).flat_map(move |j| cell(i, j))).collect();
+        LinkMesh {
+            link: 0,
+            name: "sheet".into(),
+            positions,
+            normals: Vec::new(),
+            triangles,
+            color: [1.0; 4],
+            file: None,
+        }
+    }
+
+    #[test]
+    fn large_meshes_become_coarse_and_keep_their_extent_and_small_ones_stay() {
+        let mesh = sheet(100);
+        assert!(matches!(thinned(&mesh, 20_000), Cow::Borrowed(_)));
+        let coarse = thinned(&mesh, 2_000);
+        assert!((1_000..=2_000).contains(&coarse.triangles.len()), "{}", coarse.triangles.len());
+        for c in 0..2 {
+            let used = || coarse.triangles.iter().flatten().map(|k| coarse.positions[*k as usize][c]);
+            assert!(used().fold(1.0, f32::min) == 0.0 && used().fold(0.0, f32::max) > 0.95);
+        }
+    }
+
+    #[test]
+    fn a_path_keeps_its_first_and_last_point_however_long_it_is() {
+        let mut path = Path::new();
+        for k in 0..12_345_u32 {
+            let X_WT = flexarm_kinematics::Pose::translation(f64::from(k), 0.0, 0.0);
+            path.push(&TwinSample { X_WT, ..TwinSample::default() });
+            let points = path.points();
+            assert!(points.len() <= MOST_POINTS);
+            assert_eq!((points[0][0], points[points.len() - 1][0]), (0.0, k as f32));
+        }
+        assert!(path.points().len() > MOST_POINTS / 2);
+    }
+}
