@@ -117,6 +117,9 @@ pub struct BentMesh {
     places: Vec<(u32, f32)>,
 }
 
+/// Corners of a surface between the interfaces at most: they are written again and again.
+const CORNERS: usize = 3000;
+
 /// Sections whose motion is computed; corners between two of them take the mean of their motions.
 const SECTIONS: usize = 48;
 
@@ -179,7 +182,8 @@ impl BentPieces {
         let before = |t: &[u32; 3]| t.iter().all(|k| place(k) <= 0.0);
         let beyond = |t: &[u32; 3]| t.iter().all(|k| place(k) >= line.length());
         let (near, far) = (mesh.part(before), mesh.part(beyond));
-        let middle = BentMesh::of(mesh.part(|t| !before(t) && !beyond(t)), line.clone());
+        let middle = mesh.part(|t| !before(t) && !beyond(t)).simplified(CORNERS);
+        let middle = BentMesh::of(middle, line.clone());
         Some(Self { near, middle, far })
     }
 }

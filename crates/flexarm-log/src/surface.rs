@@ -47,6 +47,54 @@ impl LinkMesh {
         self
     }
 
+    /// About the same surface with at most so many corners: corners that share a cell of a grid become one, the grid being as
+    /// fine as that allows.
+    #[must_use]
+    pub(crate) fn simplified(self, corners: usize) -> Self {
+        if self.positions.len() <= corners {
+            return self;
+        }
+        let extent = |c: usize| {
+            let places = || self.positions.iter().map(|p| p[c]);
+            places().fold(f32::MIN, f32::max) - places().fold(f32::MAX, f32::min)
+        };
+        let largest = (0..3).map(extent).fold(0.0, f32::max);
+        // Finer and finer while it fits; at last a handful of cells always does.
+        let cells = [256.0, 192.0, 144.0, 108.0, 80.0, 60.0, 45.0, 34.0, 25.0, 19.0, 14.0, 10.0, 7.0, 5.0, 3.0, 2.0];
+        let coarser = cells.iter().map(|cells| self.clustered(largest / cells));
+        coarser.clone().find(|mesh| mesh.positions.len() <= corners).or_else(|| coarser.last()).unwrap_or(self)
+    }
+
+    fn clustered(&self, cell: f32) -> Self {
+        let with_normals = self.normals.len() == self.positions.len();
+        // One place per cell, whatever the normals, so that edges stay closed.
+        let mut places: HashMap<[i32; 3], [f32; 3]> = HashMap::new();
+        let mut corners: HashMap<([i32; 3], [i8; 3]), u32> = HashMap::new();
+        let mut to = Self { positions: Vec::new(), normals: Vec::new(), triangles: Vec::new(), ..self.clone() };
+        let index: Vec<u32> = (0..self.positions.len())
+            .map(|k| {
+                let position = self.positions[k];
+                let at = position.map(|x| (x / cell).round() as i32);
+                let place = *places.entry(at).or_insert(position);
+                let normal = if with_normals { self.normals[k] } else { [0.0; 3] };
+                *corners.entry((at, normal.map(|x| (2.0 * x).round() as i8))).or_insert_with(|| {
+                    to.positions.push(place);
+                    if with_normals {
+                        to.normals.push(normal);
+                    }
+                    (to.positions.len() - 1) as u32
+                })
+            })
+            .collect();
+        let kept = self.triangles.iter().map(|t| t.map(|k| index[k as usize]));
+        let flat = |t: &[u32; 3]| {
+            let [a, b, c] = t.map(|k| to.positions[k as usize]);
+            a == b || b == c || c == a
+        };
+        to.triangles = kept.filter(|t| !flat(t)).collect();
+        to
+    }
+
     /// The part of the surface whose triangles are wanted, without corners that no triangle uses.
     pub(crate) fn part(&self, wanted: impl Fn(&[u32; 3]) -> bool) -> Self {
         let with_normals = self.normals.len() == self.positions.len();
@@ -93,6 +141,27 @@ mod tests {
         assert_eq!(mesh.triangles.len(), 3);
         assert!(mesh.normals[..4].iter().all(|n| *n == [0.0, 0.0, 1.0]));
         assert!(mesh.normals[4..].iter().all(|n| *n == [1.0, 0.0, 0.0]));
+    }
+
+    #[test]
+    fn a_simplified_surface_has_few_corners_and_the_same_extent() {
+        // A wavy sheet of 2 * 60 * 60 triangles.
+        let at = |i: usize, j: usize| [i as f32 / 60.0, j as f32 / 60.0, 0.05 * (i as f32 * 0.3).sin()];
+        let mut corners = Vec::new();
+        for (i, j) in (0..60).flat_map(|i| (0..60).map(move |j| (i, j))) {
+            corners.extend([at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+        }
+        let mesh = soup(&corners).with_creases();
+        assert_eq!(mesh.positions.len(), 61 * 61);
+        let simple = mesh.clone().simplified(1000);
+        assert!((300..=1000).contains(&simple.positions.len()), "{}", simple.positions.len());
+        assert_eq!(simple.normals.len(), simple.positions.len());
+        let area = |mesh: &LinkMesh| -> f32 {
+            let p = |k: u32| Vector3::from(mesh.positions[k as usize]);
+            mesh.triangles.iter().map(|[a, b, c]| 0.5 * (p(*b) - p(*a)).cross(&(p(*c) - p(*a))).norm()).sum()
+        };
+        assert!((area(&simple) / area(&mesh) - 1.0).abs() < 0.1, "{} beside {}", area(&simple), area(&mesh));
+        assert_eq!(mesh.clone().simplified(61 * 61), mesh, "nothing is done where nothing is needed");
     }
 
     #[test]

@@ -184,7 +184,7 @@ fn the_moving_surfaces_agree_with_the_tool_centre_point_to_a_micrometre() {
 #[test]
 fn the_bent_surface_ends_where_the_far_interface_is() {
     let file = run("bent.rrd", &synthetic::header(), synthetic::SAMPLES, NEVER);
-    for (twin, bound) in [("flexible", 1e-6), ("magnified", 0.5 * 3f64.sqrt() / 4096.0 + 1e-6)] {
+    for (twin, bound) in [("flexible", 1e-6), ("magnified", 0.5 * 3f64.sqrt() / 512.0 + 1e-6)] {
         let entity = format!("/synthetic/{twin}/upper_arm/box/bending");
         let shapes = column(&file, &entity, "Mesh3D:vertex_positions", 3);
         assert!(shapes.len() > 3, "{} shapes", shapes.len());

@@ -18,7 +18,7 @@ use crate::robot::Robot;
 /// Swings per second on the screen, whatever the frequency of the mode.
 const SHOWN_HZ: f64 = 1.0;
 /// Samples per second.
-const RATE_HZ: f64 = 50.0;
+const RATE_HZ: f64 = 30.0;
 /// Part of the reach by which the tool moves unless told otherwise.
 const PART_OF_REACH: f64 = 0.05;
 /// No elastic coordinate is shown larger than this (m, rad).
@@ -75,6 +75,7 @@ pub fn record_modes(
     let flexible = robot.modelled(modelling)?;
     let (bends, stations) = stations(&flexible.bends, &posed.arm.model, &header.links);
     header.bends = bends;
+    header.color_scale_m = crate::magnification::round_up(motion);
     header.log_rate_hz = RATE_HZ;
     let swings = (movie.seconds * SHOWN_HZ).ceil();
     let rows: Vec<(String, String)> = shown

@@ -81,7 +81,9 @@ impl RunTracks {
         let extent = header.volume.map_or(3.0, |[low, high]| size(&[0, 1, 2].map(|c| high[c] - low[c])));
         const PIXELS: f64 = 800.0;
         const LIFE_SIZE_TOLERANCE_M: f64 = 1e-4;
-        const MAGNIFIED_QUANTUM_M: f32 = 1.0 / 4096.0;
+        let pixel_m = extent / PIXELS;
+        // A power of two, so that rounded numbers are short.
+        let quantum_m = (0.5 * pixel_m).log2().floor().exp2() as f32;
 
         let mut fixed = Vec::new();
         let mut robot = |name: &str, paint: Paint, bends: bool, tolerance_m: f64, quantum_m: f32, ids: &mut Ids| {
@@ -93,6 +95,10 @@ impl RunTracks {
         let with_magnified = header.has_rigid && header.magnification > 0.0;
         let flexible = Drawn {
             robot: match alone || !with_magnified {
+                // Deflections that are drawn as they are and coloured are large ones: modes.
+                true if header.has_rigid && !with_magnified && header.color_scale_m > 0.0 => {
+                    robot("flexible", Paint::Deviation(scale), true, pixel_m, quantum_m, ids)?
+                }
                 true => robot("flexible", Paint::Own, true, LIFE_SIZE_TOLERANCE_M, 0.0, ids)?,
                 false => None,
             },
@@ -122,7 +128,7 @@ impl RunTracks {
                     }
                     _ => Paint::Deviation(scale),
                 };
-                let robot = robot("magnified", paint, true, extent / PIXELS, MAGNIFIED_QUANTUM_M, ids)?;
+                let robot = robot("magnified", paint, true, pixel_m, quantum_m, ids)?;
                 Some(Drawn { robot, way: way("magnified"), way_color: seat.color() })
             }
         };

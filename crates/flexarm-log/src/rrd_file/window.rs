@@ -21,6 +21,8 @@ pub(crate) fn window(header: &RunHeader, seat: &Seat, labels: &[String]) -> Part
         Some(plot("Joint velocities", &["joints", "velocity"])),
         Some(plot("Solver", &["solver"])),
     ];
+    // A recording of modes has neither a path nor events.
+    let moves = !header.contributors.is_empty() || header.magnification > 0.0 || header.elements.is_empty();
     let mut right = Vec::new();
     match seat {
         Seat::InStudy(..) => {
@@ -29,7 +31,9 @@ pub(crate) fn window(header: &RunHeader, seat: &Seat, labels: &[String]) -> Part
         }
         Seat::Alone if header.has_rigid => {
             right.push((3.0, plot("TCP error [mm], world axes", &["tcp_error"])));
-            right.push((3.0, plot("TCP error [mm], along and across the path", &["tcp_error_path"])));
+            if moves {
+                right.push((3.0, plot("TCP error [mm], along and across the path", &["tcp_error_path"])));
+            }
         }
         Seat::Alone => {}
     }
@@ -56,10 +60,13 @@ fn robots(header: &RunHeader, seat: &Seat, labels: &[String]) -> Part {
     };
     let life_size =
         |title: &str| Part::scene(title, root.clone(), without(&["magnified", "path/magnified", "path/peak"]));
-    if !(header.has_rigid && factor > 0.0) {
-        return life_size("Robot");
-    }
     let scale = 1e3 * header.color_scale_m;
+    if !(header.has_rigid && factor > 0.0) {
+        return life_size(&match header.has_rigid && scale > 0.0 {
+            true => format!("Robot (colour: off the rigid robot, grey 0 to red {scale} mm)"),
+            false => "Robot".to_owned(),
+        });
+    }
     let title = format!("Deflections x {factor} (colour: off the rigid robot, grey 0 to red {scale} mm)");
     let magnified = Part::scene(&title, root.clone(), without(&["flexible", "path/flexible"]));
     Part::Tabs(vec![magnified, life_size("True scale")])
