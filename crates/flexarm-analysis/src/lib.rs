@@ -32,7 +32,7 @@
 //! [`strain_energy_shares`]), and the response to harmonic excitation ([`LinearSystem::response`], [`response_peaks`]).
 //!
 //! Names of ISO 9283:1998 are used where they fit. A simulation is deterministic and has one cycle, so these are
-//! "ISO 9283-style" figures, not a test after the standard: path accuracy AT ([`TcpMetrics::lateral_peak_m`]),
+//! "ISO 9283-style" figures, not a test after the standard: path accuracy AT ([`TcpMetrics::path_accuracy_m`]),
 //! position overshoot OV ([`TcpMetrics::overshoot_m`]), position stabilisation time ([`TcpMetrics::settling_s`], which
 //! counts from the end of the commanded move and not, as the standard does, from the first entry into the band).
 //!
@@ -64,4 +64,4 @@ pub use participation::{compliance_parts, effective_mass, mode_outputs, strain_e
 pub use path_frame::{PathFrame, path_frames};
 pub use pose_error::tcp_error;
 pub use record::{ErrorRecord, RecordError};
-pub use spectrum::{SpectralLine, Taper, strongest_line};
+pub use spectrum::{AmplitudeSpectrum, SpectralLine, Taper, amplitude_spectrum, strongest_line};

@@ -55,8 +55,12 @@ pub struct TcpMetrics {
     pub normal_peak_m: f64,
     /// `max |e·b|`, m: out of the plane of the path.
     pub binormal_peak_m: f64,
-    /// `max sqrt((e·n)² + (e·b)²)`, m: distance from the path (path accuracy AT).
+    /// `max sqrt((e·n)² + (e·b)²)`, m: distance from the path.
     pub lateral_peak_m: f64,
+    /// The same while the robot moves, m (path accuracy AT); 0 without a move.
+    pub path_accuracy_m: f64,
+    /// Root mean square of that distance over the moves' samples, m; 0 without a move.
+    pub path_rms_m: f64,
     /// The hold after each move, where there is one (two samples at least), in order.
     pub holds: Vec<HoldMetrics>,
 }
@@ -82,6 +86,7 @@ pub fn tcp_metrics(record: &ErrorRecord<'_>, settings: &MetricSettings) -> Resul
 
     let frames = path_frames(record.times, record.rigid_positions);
     let [tangential_peak_m, normal_peak_m, binormal_peak_m, lateral_peak_m] = path_peaks(record, &frames);
+    let [path_accuracy_m, path_rms_m] = path_accuracy(record, &frames);
     let holds = holds(record, &frames, band);
     let ends_in_hold = |hold: &&HoldMetrics| record.moves.last().is_some_and(|last| hold.start_s >= last.1);
     Ok(TcpMetrics {
@@ -99,6 +104,8 @@ pub fn tcp_metrics(record: &ErrorRecord<'_>, settings: &MetricSettings) -> Resul
         normal_peak_m,
         binormal_peak_m,
         lateral_peak_m,
+        path_accuracy_m,
+        path_rms_m,
         holds,
     })
 }
@@ -129,6 +136,22 @@ fn path_peaks(record: &ErrorRecord<'_>, frames: &[PathFrame]) -> [f64; 4] {
         }
     }
     peaks
+}
+
+/// Largest and root-mean-square distance from the path in the samples of the moves.
+fn path_accuracy(record: &ErrorRecord<'_>, frames: &[PathFrame]) -> [f64; 2] {
+    let (mut largest, mut squares, mut count) = (0.0_f64, 0.0, 0_usize);
+    for (k, t) in record.times.iter().enumerate() {
+        if !record.moves.iter().any(|(start, end)| (*start..=*end).contains(t)) {
+            continue;
+        }
+        let error = record.errors[k];
+        let [_, n, b] = frames[k].components(&Vector3::new(error[0], error[1], error[2]));
+        largest = largest.max(n.hypot(b));
+        squares += n * n + b * b;
+        count += 1;
+    }
+    [largest, (squares / count.max(1) as f64).sqrt()]
 }
 
 /// The hold after each move that has one.

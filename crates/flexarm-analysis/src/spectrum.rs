@@ -69,6 +69,37 @@ pub fn strongest_line(times: &[f64], signal: &[[f64; 3]], taper: Taper) -> Optio
     (amplitude > 1e-12 * tapered.scale).then_some(SpectralLine { hz, amplitude })
 }
 
+/// Amplitudes over frequency.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct AmplitudeSpectrum {
+    /// Frequencies, Hz, evenly spaced from 0.
+    pub hz: Vec<f64>,
+    /// Amplitude of the sinusoid that would give this value, per component, in the unit of the signal.
+    pub amplitude: Vec<[f64; 3]>,
+}
+
+/// The spectrum of a signal with three components, faded in and out by `sin²` (Hann), without its mean.
+///
+/// * `times`: s, strictly increasing; steps may vary, the signal is interpolated to even ones.
+///
+/// A steady sinusoid of amplitude `a` gives a line of height `a` (1 % less between two frequencies), a vibration that
+/// dies away a lower one; over a time `T` lines are `4/T` wide at their foot. Returns `None` for fewer than 16 samples.
+pub fn amplitude_spectrum(times: &[f64], signal: &[[f64; 3]]) -> Option<AmplitudeSpectrum> {
+    if times.len() < FEWEST_SAMPLES || times.len() != signal.len() {
+        return None;
+    }
+    let tapered = Tapered::new(times, signal, Taper::Both);
+    let bins = (4 * tapered.samples.len()).next_power_of_two();
+    let mut amplitude = vec![[0.0; 3]; bins / 2];
+    for component in 0..3 {
+        for (slot, [re, im]) in amplitude.iter_mut().zip(tapered.transform(component, bins)) {
+            slot[component] = 2.0 * re.hypot(im) / tapered.weight;
+        }
+    }
+    let bin_hz = 1.0 / (bins as f64 * tapered.step);
+    Some(AmplitudeSpectrum { hz: (0..bins / 2).map(|k| k as f64 * bin_hz).collect(), amplitude })
+}
+
 /// A signal at even steps, without its mean, times the taper.
 struct Tapered {
     samples: Vec<[f64; 3]>,
@@ -115,16 +146,21 @@ impl Tapered {
     fn power_spectrum(&self, bins: usize) -> Vec<f64> {
         let mut power = vec![0.0; bins / 2];
         for component in 0..3 {
-            let mut data = vec![[0.0; 2]; bins];
-            for (slot, x) in data.iter_mut().zip(&self.samples) {
-                slot[0] = x[component];
-            }
-            fft(&mut data);
-            for (sum, [re, im]) in power.iter_mut().zip(&data) {
+            for (sum, [re, im]) in power.iter_mut().zip(&self.transform(component, bins)) {
                 *sum += re * re + im * im;
             }
         }
         power
+    }
+
+    /// Transform of one component, filled up with zeros to `bins` samples.
+    fn transform(&self, component: usize, bins: usize) -> Vec<[f64; 2]> {
+        let mut data = vec![[0.0; 2]; bins];
+        for (slot, x) in data.iter_mut().zip(&self.samples) {
+            slot[0] = x[component];
+        }
+        fft(&mut data);
+        data
     }
 
     /// Squared magnitude of the transform at any frequency, by a rotating phasor.
@@ -248,6 +284,26 @@ mod tests {
                 assert!((line.amplitude / 5e-4 - 1.0).abs() < 0.05); // measured 2.8e-3
             }
         }
+    }
+
+    /// Truth: the amplitudes that the signal was made with.
+    #[test]
+    fn a_spectrum_has_lines_as_high_as_the_sinusoids_in_the_signal() {
+        let t = times(4000, 1000.0);
+        let signal: Vec<_> =
+            t.iter().map(|t| [7.0 + 3e-3 * (TAU * 20.0 * t).sin(), 0.0, 1e-3 * (TAU * 55.0 * t).cos()]).collect();
+        let spectrum = amplitude_spectrum(&t, &signal).unwrap();
+        let step = spectrum.hz[1];
+        let largest = |component: usize, hz: f64| {
+            let near = spectrum.hz.iter().zip(&spectrum.amplitude).filter(|(f, _)| (*f - hz).abs() < 2.0 * step);
+            near.map(|(_, a)| a[component]).fold(0.0, f64::max)
+        };
+        for (component, hz, truth) in [(0, 20.0, 3e-3), (2, 55.0, 1e-3)] {
+            let error = largest(component, hz) / truth - 1.0;
+            assert!(error.abs() < 0.012, "{hz} Hz: {error:e}");
+        }
+        assert!(largest(0, 55.0) < 1e-9 && spectrum.amplitude.iter().all(|a| a[1] == 0.0));
+        assert_eq!(amplitude_spectrum(&t[..15], &signal[..15]), None);
     }
 
     #[test]

@@ -237,3 +237,21 @@ proptest! {
         prop_assert!(m.dominant_hz.is_none_or(|hz| hz > 0.0 && hz.is_finite()));
     }
 }
+
+/// Truth: the record is made with 0.3 mm beside the path in motion and 0.9 mm at rest, and any lag along the path.
+#[test]
+fn path_accuracy_is_the_distance_from_the_path_in_motion() {
+    let times = even(1000.0);
+    let rigid: Vec<[f64; 3]> = times.iter().map(|t| [0.4 * t.min(2.0), 0.0, 0.8]).collect();
+    let beside = |t: f64| if t <= 2.0 { 3e-4 } else { 9e-4 };
+    let errors: Vec<[f64; 6]> =
+        times.iter().map(|t| [5e-3, 0.6 * beside(*t), -0.8 * beside(*t), 0.0, 0.0, 0.0]).collect();
+    let moves = [(0.0, 2.0)];
+    let record =
+        ErrorRecord { times: &times, errors: &errors, rigid_positions: &rigid, quasi_static: None, moves: &moves };
+    let metrics = tcp_metrics(&record, &MetricSettings::default()).unwrap();
+    assert!((metrics.path_accuracy_m - 3e-4).abs() < 1e-15 && (metrics.path_rms_m - 3e-4).abs() < 1e-15);
+    assert!((metrics.lateral_peak_m - 9e-4).abs() < 1e-15);
+    let still = tcp_metrics(&ErrorRecord { moves: &[], ..record }, &MetricSettings::default()).unwrap();
+    assert_eq!((still.path_accuracy_m, still.path_rms_m), (0.0, 0.0));
+}

@@ -172,8 +172,11 @@ pub(crate) struct RunArgs {
     /// Overwrite what is in the output folder
     #[arg(long)]
     pub(crate) force: bool,
+    /// Write a folder "figures" for papers too: plots as SVG with their data as CSV, pictures of the arm as PNG
+    #[arg(long)]
+    pub(crate) figures: bool,
     /// Write nothing, only print the figures
-    #[arg(long, conflicts_with_all = ["output", "force"])]
+    #[arg(long, conflicts_with_all = ["output", "force", "figures"])]
     pub(crate) no_files: bool,
     /// Run although the trajectory passes joint limits
     #[arg(long)]

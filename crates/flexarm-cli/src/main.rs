@@ -11,6 +11,7 @@ mod reduce;
 mod reduce_args;
 mod shipped;
 mod study;
+mod summary_table;
 mod view;
 
 use std::io::{IsTerminal, Write};
@@ -52,7 +53,8 @@ fn main() -> ExitCode {
 /// Text for people or JSON for programs; a closed pipe is not an error.
 fn answer(cli: &Cli, json: impl FnOnce() -> String, text: impl FnOnce() -> String) {
     let out = if cli.json { json() + "\n" } else { text() };
-    let mut stdout = std::io::stdout().lock();
+    // Colours go to terminals alone, and not there if NO_COLOR is set.
+    let mut stdout = anstream::stdout().lock();
     match stdout.write_all(out.as_bytes()).and_then(|()| stdout.flush()) {
         Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
             // An answer that is lost must not look like one that was given.
@@ -186,7 +188,7 @@ fn simulate(cli: &Cli, args: &RunArgs, with_twin: bool) -> Result<ExitCode, Erro
     let outputs = (!args.no_files).then(|| {
         let stem = format!("{}-{}", robot.name, motion.name);
         let folder = args.output.clone().unwrap_or_else(|| shipped::new_output_folder(&stem));
-        Outputs { overwrite: args.force, ..Outputs::everything(folder) }
+        Outputs { overwrite: args.force, figures: args.figures, ..Outputs::everything(folder) }
     });
 
     let stop = Arc::new(AtomicBool::new(false));
@@ -206,15 +208,15 @@ fn simulate(cli: &Cli, args: &RunArgs, with_twin: bool) -> Result<ExitCode, Erro
     let summary = result?;
     if !cli.quiet {
         for warning in &summary.warnings {
-            eprintln!("warning: {warning}");
+            print::warning(warning);
         }
         for other in &summary.with {
             for warning in other.warnings.iter().filter(|warning| !summary.warnings.contains(warning)) {
-                eprintln!("warning: {}: {warning}", other.label.as_deref().unwrap_or_default());
+                print::warning(&format!("{}: {warning}", other.label.as_deref().unwrap_or_default()));
             }
         }
     }
-    answer(cli, || to_json(&summary), || print::summary(&summary));
+    answer(cli, || to_json(&summary), || summary_table::summary(&summary, summary_table::terminal_width()));
     Ok(ExitCode::SUCCESS)
 }
 

@@ -2,7 +2,7 @@
 
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 use flexarm::reduce::{MeshListing, ReduceSummary, ReportTable, SetListing};
-use flexarm::{Finding, Inspection, Summary};
+use flexarm::{Finding, Inspection};
 
 pub(crate) fn table(header: &[&str]) -> Table {
     let mut table = Table::new();
@@ -16,40 +16,6 @@ pub(crate) fn table(header: &[&str]) -> Table {
 /// The table without the blanks that pad its last column.
 pub(crate) fn lines(table: &Table) -> String {
     table.to_string().lines().map(|l| l.trim_end().to_owned() + "\n").collect()
-}
-
-/// Eight heights of a block character, scaled to the largest value.
-fn sparkline(values: &[f64]) -> String {
-    const BLOCKS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
-    let top = values.iter().fold(0.0f64, |a, b| a.max(*b));
-    if top <= 0.0 {
-        return String::new();
-    }
-    values.iter().map(|v| BLOCKS[((v / top * 7.0).round() as usize).min(7)]).collect()
-}
-
-/// The figures of a run.
-pub(crate) fn summary(summary: &Summary) -> String {
-    let mut out = format!("{} on {}, {} links\n", summary.robot, summary.trajectory, summary.links_model);
-    let mut t = table(&[]);
-    for (name, value) in flexarm::rows(summary) {
-        t.add_row([name, value]);
-    }
-    out += &lines(&t);
-    if summary.tcp.is_some() {
-        let curve = sparkline(&summary.error_curve);
-        out += &format!("TCP error over time  {curve}\n");
-    }
-    let f = &summary.files;
-    for (what, path) in [("MCAP", &f.mcap), ("Rerun", &f.rrd), ("CSV", &f.csv), ("report", &f.report)] {
-        if let Some(path) = path {
-            out += &format!("{what:<7} {path}\n");
-        }
-    }
-    if let Some(path) = &f.rrd {
-        out += &format!("look:   rerun {path}\n");
-    }
-    out
 }
 
 fn limit(x: Option<f64>) -> String {
@@ -253,5 +219,6 @@ fn sets(title: &str, sets: &[SetListing]) -> String {
 
 /// A warning on standard error.
 pub(crate) fn warning(text: &str) {
-    eprintln!("warning: {text}");
+    let yellow = anstyle::AnsiColor::Yellow.on_default().bold();
+    anstream::eprintln!("{yellow}warning:{yellow:#} {text}");
 }

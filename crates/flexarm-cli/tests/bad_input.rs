@@ -862,7 +862,7 @@ mod outputs {
 
     #[test]
     fn existing_results_are_not_overwritten() {
-        for file in ["run.csv", "run.mcap", "run.rrd", "report.md", "summary.json"] {
+        for file in ["run.csv", "run.mcap", "run.rrd", "report.html", "report.md", "summary.json", "figures"] {
             let place = Place::new();
             place.write(&format!("result/{file}"), "old");
             let there = format!("result/{file}");

@@ -185,6 +185,24 @@ mod compare {
             assert!(place.read("result/run.rrd").starts_with(b"RRF2"));
         }
         assert!(place.text("result/report.md").contains("peak TCP error"));
+        assert_eq!(summary["files"]["report"], "result/report.html");
+        assert_eq!(summary["files"]["report_md"], "result/report.md");
+        assert_eq!(summary["files"]["figures"], Value::Null, "only with --figures");
+        assert!(place.text("result/report.html").contains("beam on swing"));
+    }
+
+    #[test]
+    fn figures_for_papers_when_asked_for() {
+        let place = Place::new();
+        let summary = place.json(&[&RUN[..], &["--figures"]].concat());
+        assert_eq!(summary["files"]["figures"], "result/figures");
+        assert!(place.text("result/figures/tcp_error.svg").starts_with("<svg"));
+        assert!(place.text("result/figures/tcp_error.csv").starts_with("time_s,size_mm"));
+        assert_eq!(place.path("result/figures/arm_side.png").is_file(), cfg!(feature = "png"));
+        // Not over those of another run, and not where nothing is to be written.
+        assert_eq!(place.flexarm(&[&RUN[..], &["--figures"]].concat()).code, 2);
+        let answer = place.flexarm(&["compare", "robot.toml", "swing.toml", "--no-files", "--figures"]);
+        assert_eq!(answer.code, 2);
     }
 
     #[test]
@@ -352,6 +370,7 @@ mod printing {
         let table = place.flexarm(&[&wild[..], &["-q"]].concat());
         assert_eq!((table.code, table.err.as_str()), (0, ""));
         assert!(table.out.contains("peak TCP error"));
+        assert!(!table.out.contains('\u{1b}') && !table.err.contains('\u{1b}'), "no colours in a pipe");
         assert!(!table.out.contains('\u{1b}'), "no colours away from a terminal");
     }
 
@@ -424,7 +443,7 @@ mod folders {
     #[test]
     fn force_replaces_all() {
         let place = Place::new();
-        for file in ["run.csv", "run.mcap", "run.rrd", "report.md", "summary.json"] {
+        for file in ["run.csv", "run.mcap", "run.rrd", "report.html", "report.md", "summary.json"] {
             place.write(&format!("result/{file}"), "old and long ".repeat(100_000));
         }
         place.write("result/notes.txt", "mine");

@@ -4,7 +4,7 @@
 //! same three calls, and [`RecorderSet`] passes them to several files at once. Start at [`CsvRecorder`] for
 //! tables, `McapRecorder` (feature `mcap`) for ROS 2 tools, Foxglove and PlotJuggler, `RrdRecorder` (feature
 //! `rerun`) for the Rerun viewer with meshes and a layout. Pictures of a mesh reduction are a module of their
-//! own, `mesh_picture` (feature `png`); curves as an SVG picture are drawn by [`line_plot`].
+//! own, `mesh_picture` (feature `png`), `arm_png` draws the arm at one instant; curves as an SVG picture are drawn by [`line_plot`].
 //!
 //! What all three recorders promise:
 //! * a file is created by [`Recorder::begin`] and replaces an existing one only if told to
@@ -42,6 +42,8 @@
 #![allow(non_snake_case, reason = "monogram notation: X_WL, pose of L in W")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
+#[cfg(feature = "png")]
+mod arm_picture;
 mod bend;
 mod create;
 mod csv_file;
@@ -62,6 +64,8 @@ mod surface;
 mod tail_file;
 mod trace;
 
+#[cfg(feature = "png")]
+pub use arm_picture::{ArmPictureError, ArmSide, arm_png};
 pub use bend::{BendLine, BentMesh, BentPieces};
 pub use create::CreateOptions;
 pub use csv_file::CsvRecorder;
@@ -70,7 +74,7 @@ pub use magnify::{Magnifier, stations_in_link};
 #[cfg(feature = "mcap")]
 pub use mcap_file::McapRecorder;
 pub use multi::RecorderSet;
-pub use plot::{Panel, PlotCurve, PlotError, line_plot};
+pub use plot::{CurveLook, Panel, PlotCurve, PlotError, line_plot, paper_plot};
 pub use record::*;
 #[cfg(feature = "rerun")]
 pub use rrd_file::{RrdRecorder, RrdStudy, StudySeat};

@@ -1,28 +1,54 @@
 //! Curves over a common axis as a picture (SVG): panels one above the other with a legend.
 //!
 //! The one module that names `plotters`, with its SVG backend alone: no fonts, no files, no clock. Start at
-//! [`line_plot`].
+//! [`line_plot`] for the screen, [`paper_plot`] for a column of a paper.
 
 use std::ops::Range;
 
+use plotters::coord::Shift;
 use plotters::coord::ranged1d::{AsRangedCoord, ValueFormatter};
 use plotters::prelude::*;
 
-/// Width of a picture and height of a panel (points).
-const PANEL: (u32, u32) = (960, 340);
 /// Decades that a logarithmic panel shows at most below its highest value.
 const MOST_DECADES: f64 = 1e8;
+/// Colours of curves: Okabe and Ito's, without yellow, which colour-blind people tell apart.
+const COLORS: [RGBColor; 8] = [
+    RGBColor(0, 114, 178),
+    RGBColor(213, 94, 0),
+    RGBColor(0, 158, 115),
+    RGBColor(181, 80, 143),
+    RGBColor(230, 159, 0),
+    RGBColor(86, 180, 233),
+    RGBColor(122, 90, 46),
+    RGBColor(124, 135, 148),
+];
+/// Behind stretches that are to be seen as one, such as moves.
+const BAND: RGBColor = RGBColor(234, 241, 247);
 
 /// Why there is no picture.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("no plot: {0}")]
 pub struct PlotError(String);
 
+/// How a curve is drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum CurveLook {
+    /// In a colour of its own.
+    #[default]
+    Plain,
+    /// Black and a little wider: the size of others.
+    Total,
+    /// In a colour of its own, dashed: what others are compared with.
+    Dashed,
+}
+
 /// A curve.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct PlotCurve {
     /// For the legend.
     pub name: String,
+    /// How it is drawn.
+    pub look: CurveLook,
     /// Ascending.
     pub x: Vec<f64>,
     /// One per x.
@@ -42,29 +68,103 @@ pub struct Panel {
     pub curves: Vec<PlotCurve>,
 }
 
+/// Sizes in units of the picture.
+#[derive(Clone, Copy, Debug)]
+struct Style {
+    panel: (u32, u32),
+    margin: u32,
+    x_area: u32,
+    y_area: u32,
+    caption: u32,
+    font: u32,
+    legend_font: u32,
+    stroke: u32,
+    /// Width of the picture on paper (mm); without it units are pixels.
+    width_mm: Option<f64>,
+    /// Curves are named above the panels, where they hide nothing.
+    legend_above: bool,
+    x_labels: usize,
+}
+
+const SCREEN: Style = Style {
+    panel: (960, 340),
+    margin: 12,
+    x_area: 36,
+    y_area: 72,
+    caption: 18,
+    font: 13,
+    legend_font: 12,
+    stroke: 2,
+    width_mm: None,
+    legend_above: false,
+    x_labels: 11,
+};
+
+/// A column of a paper, 88 mm, in twelfths of a millimetre: text of 8 points, lines of 0.3 mm.
+const COLUMN: Style = Style {
+    panel: (1056, 560),
+    margin: 14,
+    x_area: 84,
+    y_area: 132,
+    caption: 36,
+    font: 33,
+    legend_font: 31,
+    stroke: 4,
+    width_mm: Some(88.0),
+    legend_above: true,
+    x_labels: 8,
+};
+
 /// Draws panels over a common horizontal axis, logarithmic if asked for and possible; the text of an SVG file.
 ///
 /// # Errors
 /// [`PlotError`] if nothing finite is to be drawn.
 pub fn line_plot(title: &str, x_label: &str, logarithmic_x: bool, panels: &[Panel]) -> Result<String, PlotError> {
+    plot(title, x_label, logarithmic_x, panels, &[], &SCREEN)
+}
+
+/// As [`line_plot`], in the size of a column of a two-column paper (88 mm, text of 8 points), without a title: that is
+/// the caption's work. Curves are named above the panels; `bands` are stretches of the horizontal axis to be tinted.
+///
+/// # Errors
+/// As [`line_plot`].
+pub fn paper_plot(x_label: &str, panels: &[Panel], bands: &[(f64, f64)]) -> Result<String, PlotError> {
+    plot("", x_label, false, panels, bands, &COLUMN)
+}
+
+fn plot(
+    title: &str,
+    x_label: &str,
+    logarithmic_x: bool,
+    panels: &[Panel],
+    bands: &[(f64, f64)],
+    style: &Style,
+) -> Result<String, PlotError> {
     let mut text = String::new();
-    let mut names: Vec<&str> = Vec::new();
+    let mut curves: Vec<&PlotCurve> = Vec::new();
     for curve in panels.iter().flat_map(|panel| &panel.curves) {
-        if !names.contains(&curve.name.as_str()) {
-            names.push(&curve.name);
+        if !curves.iter().any(|known| known.name == curve.name) {
+            curves.push(curve);
         }
     }
-    let height = PANEL.1 * panels.len().max(1) as u32;
+    let legend =
+        if style.legend_above && panels.iter().any(|p| p.legend) { legend_rows(&curves, style) } else { Vec::new() };
+    let row = style.legend_font * 3 / 2;
+    let above = if legend.is_empty() { 0 } else { row * legend.len() as u32 + style.margin };
+    let (width, height) = (style.panel.0, style.panel.1 * panels.len().max(1) as u32 + above);
     {
-        let area = SVGBackend::with_string(&mut text, (PANEL.0, height)).into_drawing_area();
+        let area = SVGBackend::with_string(&mut text, (width, height)).into_drawing_area();
         area.fill(&WHITE).map_err(fault)?;
+        let (strip, area) = area.split_vertically(above);
+        draw_legend(&strip, &legend, &curves, style)?;
         for (k, (panel, part)) in panels.iter().zip(area.split_evenly((panels.len(), 1))).enumerate() {
             let title = if k == 0 { title } else { "" };
             let x_label = if k + 1 == panels.len() { x_label } else { "" };
             let points = points(panel);
-            let (x, y) = ranges(&points, panel.logarithmic)
+            let ranges = ranges(&points, panel.logarithmic)
                 .ok_or_else(|| PlotError(format!("{:?} has nothing finite to draw", panel.label)))?;
-            let frame = Frame { title, x_label, panel, points: &points, names: &names };
+            let (x, y) = ranges.clone();
+            let frame = Frame { title, x_label, panel, points: &points, all: &curves, bands, ranges, style };
             match (logarithmic_x && x.start > 0.0, panel.logarithmic) {
                 (true, true) => frame.draw(&part, x.log_scale(), y.log_scale()),
                 (true, false) => frame.draw(&part, x.log_scale(), y),
@@ -73,6 +173,12 @@ pub fn line_plot(title: &str, x_label: &str, logarithmic_x: bool, panels: &[Pane
             }?;
         }
         area.present().map_err(fault)?;
+    }
+    if let Some(mm) = style.width_mm {
+        let high = mm * f64::from(height) / f64::from(width);
+        let (old, new) =
+            (format!("width=\"{width}\" height=\"{height}\""), format!("width=\"{mm}mm\" height=\"{high:.2}mm\""));
+        text = text.replacen(&old, &new, 1);
     }
     Ok(text)
 }
@@ -107,59 +213,132 @@ fn ranges(points: &[Vec<(f64, f64)>], logarithmic: bool) -> Option<(Range<f64>, 
     Some((x_low..if x_high > x_low { x_high } else { x_low + 1.0 }, y))
 }
 
+/// Colour and width of a curve; those of one name look the same in all panels.
+fn look_of(curve: &PlotCurve, all: &[&PlotCurve], style: &Style) -> ShapeStyle {
+    if curve.look == CurveLook::Total {
+        return BLACK.stroke_width(style.stroke + style.stroke / 3);
+    }
+    let colored = all.iter().filter(|known| known.look != CurveLook::Total);
+    let place = colored.clone().position(|known| known.name == curve.name).unwrap_or(0);
+    COLORS[place % COLORS.len()].stroke_width(style.stroke)
+}
+
+/// Places of names above the panels: curve and distance from the left, row by row.
+fn legend_rows(curves: &[&PlotCurve], style: &Style) -> Vec<Vec<(usize, u32)>> {
+    let mut rows = vec![Vec::new()];
+    let first = style.y_area + style.margin;
+    let mut x = first;
+    for (k, curve) in curves.iter().enumerate() {
+        // Without fonts the width of a name is a guess: a little over half its height per letter.
+        let width = swatch(style) + curve.name.chars().count() as u32 * style.legend_font * 6 / 10 + style.legend_font;
+        if x > first && x + width > style.panel.0 {
+            rows.push(Vec::new());
+            x = first;
+        }
+        if let Some(row) = rows.last_mut() {
+            row.push((k, x));
+        }
+        x += width;
+    }
+    rows
+}
+
+/// Length of the line beside a name in the legend, its gap included.
+fn swatch(style: &Style) -> u32 {
+    2 * style.legend_font
+}
+
+fn draw_legend(
+    strip: &DrawingArea<SVGBackend<'_>, Shift>,
+    rows: &[Vec<(usize, u32)>],
+    curves: &[&PlotCurve],
+    style: &Style,
+) -> Result<(), PlotError> {
+    let font = style.legend_font as i32;
+    for (row, places) in rows.iter().enumerate() {
+        let y = style.margin as i32 + row as i32 * font * 3 / 2;
+        for (k, x) in places {
+            let (curve, x, look) = (curves[*k], *x as i32, look_of(curves[*k], curves, style));
+            let (from, middle, to) = (x, y + font / 2, x + font * 3 / 2);
+            let cut = (to - from) / 3;
+            let lines = match curve.look {
+                CurveLook::Dashed => vec![(from, from + cut), (to - cut, to)],
+                _ => vec![(from, to)],
+            };
+            for (a, b) in lines {
+                strip.draw(&PathElement::new([(a, middle), (b, middle)], look)).map_err(fault)?;
+            }
+            let place = (x + swatch(style) as i32 - font / 6, y);
+            strip.draw(&Text::new(curve.name.clone(), place, ("sans-serif", font))).map_err(fault)?;
+        }
+    }
+    Ok(())
+}
+
 struct Frame<'a> {
     title: &'a str,
     x_label: &'a str,
     panel: &'a Panel,
     points: &'a [Vec<(f64, f64)>],
-    /// Of all curves, in the order of their colours.
-    names: &'a [&'a str],
+    /// Of all panels, in the order of their colours.
+    all: &'a [&'a PlotCurve],
+    bands: &'a [(f64, f64)],
+    ranges: (Range<f64>, Range<f64>),
+    style: &'a Style,
 }
 
 impl Frame<'_> {
-    fn draw<X, Y>(
-        &self,
-        area: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>,
-        x: X,
-        y: Y,
-    ) -> Result<(), PlotError>
+    fn draw<X, Y>(&self, area: &DrawingArea<SVGBackend<'_>, Shift>, x: X, y: Y) -> Result<(), PlotError>
     where
         X: AsRangedCoord<Value = f64>,
         Y: AsRangedCoord<Value = f64>,
         X::CoordDescType: ValueFormatter<f64> + Ranged<ValueType = f64>,
         Y::CoordDescType: ValueFormatter<f64> + Ranged<ValueType = f64>,
     {
+        let style = self.style;
         let mut chart = ChartBuilder::on(area);
-        chart.margin(12).x_label_area_size(36).y_label_area_size(72);
+        chart
+            .margin(style.margin)
+            .margin_right(2 * style.margin)
+            .x_label_area_size(style.x_area)
+            .y_label_area_size(style.y_area);
         if !self.title.is_empty() {
-            chart.caption(self.title, ("sans-serif", 18));
+            chart.caption(self.title, ("sans-serif", style.caption));
         }
         let mut chart = chart.build_cartesian_2d(x, y).map_err(fault)?;
+        let (across, up) = &self.ranges;
+        let bands = self.bands.iter().filter(|(from, to)| *to > across.start && *from < across.end);
+        let corners = |(from, to): &(f64, f64)| [(from.max(across.start), up.start), (to.min(across.end), up.end)];
+        chart.draw_series(bands.map(|band| Rectangle::new(corners(band), BAND.filled()))).map_err(fault)?;
         chart
             .configure_mesh()
             .x_desc(self.x_label)
             .y_desc(&self.panel.label)
-            .label_style(("sans-serif", 13))
+            .label_style(("sans-serif", style.font))
             .light_line_style(RGBColor(240, 240, 240))
+            .x_labels(style.x_labels)
             .y_max_light_lines(4)
             .x_label_formatter(&|x| plain(*x))
             .y_label_formatter(&|y| plain(*y))
             .draw()
             .map_err(fault)?;
-        for (k, (curve, points)) in self.panel.curves.iter().zip(self.points).enumerate() {
-            let color = Palette99::pick(self.names.iter().position(|n| *n == curve.name).unwrap_or(k)).to_rgba();
-            chart
-                .draw_series(LineSeries::new(points.iter().copied(), color.stroke_width(2)))
-                .map_err(fault)?
-                .label(&curve.name)
-                .legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], color.stroke_width(2)));
+        for (curve, points) in self.panel.curves.iter().zip(self.points) {
+            let look = look_of(curve, self.all, style);
+            let drawn = if curve.look == CurveLook::Dashed {
+                let (dash, gap) = (6 * style.stroke, 4 * style.stroke);
+                let dashes = DashedLineSeries::new(points.iter().copied(), dash, gap, look);
+                chart.draw_series(dashes).map_err(fault)?
+            } else {
+                chart.draw_series(LineSeries::new(points.iter().copied(), look)).map_err(fault)?
+            };
+            drawn.label(&curve.name).legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], look));
         }
-        if self.panel.legend && !self.panel.curves.is_empty() {
+        if self.panel.legend && !style.legend_above && !self.panel.curves.is_empty() {
             chart
                 .configure_series_labels()
                 .position(SeriesLabelPosition::UpperRight)
                 .background_style(WHITE.mix(0.8))
-                .label_font(("sans-serif", 12))
+                .label_font(("sans-serif", style.legend_font))
                 .draw()
                 .map_err(fault)?;
         }
@@ -169,8 +348,9 @@ impl Frame<'_> {
 
 /// Short form of a number on an axis.
 fn plain(x: f64) -> String {
-    if x != 0.0 && !(1e-2..1e4).contains(&x.abs()) {
-        format!("{x:.0e}")
+    if x != 0.0 && !(1e-2..1e5).contains(&x.abs()) {
+        // Rounding residues of the axis are zeros.
+        if x.abs() < 1e-12 { "0".into() } else { format!("{x:.0e}") }
     } else {
         format!("{}", (x * 1e4).round() / 1e4)
     }
@@ -181,7 +361,12 @@ mod tests {
     use super::*;
 
     fn curve(name: &str, y: &[f64]) -> PlotCurve {
-        PlotCurve { name: name.into(), x: (1..=y.len()).map(|k| k as f64).collect(), y: y.to_vec() }
+        PlotCurve {
+            name: name.into(),
+            x: (1..=y.len()).map(|k| k as f64).collect(),
+            y: y.to_vec(),
+            ..PlotCurve::default()
+        }
     }
 
     #[test]
@@ -207,5 +392,20 @@ mod tests {
         let panel = Panel { label: "size".into(), logarithmic: true, legend: true, curves };
         let error = line_plot("", "", false, &[panel]).unwrap_err();
         assert!(error.to_string().contains("nothing finite"), "{error}");
+    }
+
+    /// Truth: the width of a column, and a picture's units per millimetre.
+    #[test]
+    fn a_figure_for_a_paper_has_the_width_of_a_column_and_names_above_its_panel() {
+        let mut curves: Vec<PlotCurve> =
+            ["size", "x", "a rather long name", "y", "z"].map(|n| curve(n, &[1.0, 2.0, 1.5])).into();
+        (curves[0].look, curves[1].look) = (CurveLook::Total, CurveLook::Dashed);
+        let panel = Panel { label: "error (mm)".into(), logarithmic: false, legend: true, curves };
+        let text = paper_plot("time (s)", &[panel], &[(0.5, 1.5), (7.0, 8.0)]).unwrap();
+        assert!(text.contains("width=\"88mm\"") && text.contains("viewBox=\"0 0 1056 "), "{}", &text[..200]);
+        for word in ["size", "a rather long name", "error (mm)", "time (s)"] {
+            assert!(text.contains(word), "{word}");
+        }
+        assert_eq!(text.matches("#EAF1F7").count(), 1, "one band is within the axis");
     }
 }

@@ -114,7 +114,8 @@ pub(crate) fn run_traced(
     summary.files = files.names.clone();
     run.trace.finish(result(&summary, events));
     let closed = files.set.finish(&run.trace.result).map_err(Error::from);
-    let reported = closed.and_then(|()| outputs.map_or(Ok(()), |outputs| crate::report::write(outputs, &summary)));
+    let reported =
+        closed.and_then(|()| outputs.map_or(Ok(()), |outputs| crate::report::write(outputs, &summary, &run.trace)));
     // What stopped the run is the news: after a full disk, closing fails again.
     end.and(reported).map(|()| (summary, run.trace))
 }
@@ -157,7 +158,7 @@ fn result(summary: &Summary, events: Vec<Event>) -> RunResult {
     let json = serde_json::to_string_pretty(&timeless).expect("plain numbers and strings") + "\n";
     RunResult {
         figures: summary.labelled(),
-        readable: crate::report::rows(&timeless),
+        readable: crate::report::timeless_rows(&timeless),
         events,
         attachments: vec![Attachment {
             name: "summary.json".into(),
@@ -533,7 +534,7 @@ impl<'a> Run<'a> {
         let summary = Summary {
             robot: robot.name.clone(),
             trajectory: motion.name.clone(),
-            links_model: self.flexible.links_model(),
+            links_model: self.flexible.links_model().into(),
             duration_s: self.times.last().copied().unwrap_or(0.0),
             stepper: StepperFigures::new(options, self.stepper.counts()),
             tcp: metrics
@@ -552,6 +553,7 @@ impl<'a> Run<'a> {
                 .zip(&self.peak_drive)
                 .map(|(c, peak)| (c.joint.clone(), *peak))
                 .collect(),
+            moves_s: moves.iter().map(|&(start, end)| [start, end]).collect(),
             error_curve: crate::summary::thinned(&self.times, &self.errors),
             warnings,
             ..Summary::default()

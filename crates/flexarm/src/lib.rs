@@ -63,12 +63,14 @@ pub use mode_recording::{ModeMovie, record_modes};
 pub use modes::{ModeFigures, ModeTable, modes};
 pub use motion::Motion;
 pub use options::{DriveModel, LinkModel, Modelling, Outputs, RunOptions};
-pub use report::{markdown, rows};
+pub use report::{Figure, FigureGroup, ReportRun, Weight, figure_groups, html, markdown, rows};
 pub use response::{PeakFigures, Response, ResponseCurve, ResponseFiles, ResponseOutputs, ResponseRequest, response};
 pub use robot::{LoadOptions, Robot, TCP_FRAME};
 pub use statics::{ElementStatics, Statics, parse_wrench, statics};
 pub use study::{STUDY_NOTE, Variant, compare_study, study_rows};
-pub use summary::{DifferenceFigures, Files, LinkFigures, StepperFigures, Summary, TcpFigures};
+pub use summary::{
+    CURVE_PIECES, DifferenceFigures, Files, HoldFigures, LinkFigures, StepperFigures, Summary, TcpFigures,
+};
 
 pub use flexarm_analysis::{Quantity, Spacing};
 pub use flexarm_stepping::{

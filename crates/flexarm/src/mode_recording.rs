@@ -68,7 +68,7 @@ pub fn record_modes(
     let motion = movie.tool_motion_m.unwrap_or_else(|| PART_OF_REACH * reach(&posed));
 
     let mut files = recorders(Some(outputs))?;
-    files.names.report = None;
+    (files.names.report, files.names.report_md) = (None, None);
     let mut header = robot_header(robot, &posed.arm);
     header.trajectory = "modes".into();
     header.has_rigid = true;

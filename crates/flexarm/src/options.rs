@@ -100,10 +100,12 @@ pub struct Outputs {
     pub rrd: bool,
     /// Write CSV.
     pub csv: bool,
+    /// Write a folder `figures` with plots and pictures for papers.
+    pub figures: bool,
 }
 
 impl Outputs {
-    /// Everything that this build can write, into a folder.
+    /// Every recording that this build can write, into a folder; no figures for papers.
     pub fn everything(folder: impl Into<PathBuf>) -> Self {
         Self {
             folder: folder.into(),
@@ -111,6 +113,7 @@ impl Outputs {
             mcap: cfg!(feature = "mcap"),
             rrd: cfg!(feature = "rerun"),
             csv: true,
+            figures: false,
         }
     }
 }

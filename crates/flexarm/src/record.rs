@@ -18,7 +18,11 @@ pub(crate) struct Recordings {
 }
 
 /// Names of the files in an output folder.
-pub(crate) const RECORDING_FILES: [&str; 5] = ["run.mcap", "run.rrd", "run.csv", "report.md", "summary.json"];
+pub(crate) const RECORDING_FILES: [&str; 7] =
+    ["run.mcap", "run.rrd", "run.csv", "report.html", "report.md", "summary.json", FIGURES_FOLDER];
+
+/// Folder with figures for papers, in the output folder.
+pub(crate) const FIGURES_FOLDER: &str = "figures";
 
 /// An error if the folder has files of an earlier run that may not be replaced.
 pub(crate) fn refuse_to_overwrite(outputs: &Outputs) -> Result<(), Error> {
@@ -58,7 +62,11 @@ pub(crate) fn recorders(outputs: Option<&Outputs>) -> Result<Recordings, Error> 
         recordings.set.push(Box::new(CsvRecorder::create(path("run.csv"), options)));
         recordings.names.csv = text("run.csv");
     }
-    recordings.names.report = text("report.md");
+    recordings.names.report = text("report.html");
+    recordings.names.report_md = text("report.md");
+    if outputs.figures {
+        recordings.names.figures = text(FIGURES_FOLDER);
+    }
     Ok(recordings)
 }
 
@@ -107,6 +115,12 @@ pub(crate) fn header(
         .map(|f| format!("{}: {}", f.flexible.link, f.flexible.reduced.provenance.method))
         .collect();
     let frequencies: Vec<String> = arm.modes.frequencies_hz().iter().map(|f| format!("{f:.4}")).collect();
+    let mut inputs = vec![
+        ("robot_file", robot.path.display().to_string()),
+        ("urdf_file", robot.urdf_path.display().to_string()),
+        ("trajectory_file", motion.path.display().to_string()),
+    ];
+    inputs.extend(options.loads.as_ref().map(|path| ("loads_file", path.display().to_string())));
     let metadata = vec![
         group(
             "flexarm.run",
@@ -114,7 +128,7 @@ pub(crate) fn header(
                 ("version", env!("CARGO_PKG_VERSION").into()),
                 ("robot", robot.name.clone()),
                 ("trajectory", motion.name.clone()),
-                ("stepper", stepper.name.into()),
+                ("stepper", stepper.name.clone()),
                 ("step_s", options.step_s.to_string()),
                 ("rho_inf", stepper.rho_inf.map_or_else(String::new, |r| r.to_string())),
                 ("start", format!("{:?}", options.start).to_lowercase()),
@@ -130,6 +144,7 @@ pub(crate) fn header(
                 ("frequencies_hz", frequencies.join(", ")),
             ],
         ),
+        group("flexarm.inputs", &inputs),
     ];
     RunHeader {
         trajectory: motion.name.clone(),

@@ -384,6 +384,7 @@ fn plot(response: &Response) -> Result<String, PlotError> {
         name: format!("{} to {}", c.input, c.output),
         x: response.frequency_hz.clone(),
         y,
+        ..PlotCurve::default()
     };
     let mut panels: Vec<Panel> = Vec::new();
     for c in response.curves.iter().filter(|c| c.magnitude.iter().any(|m| *m > 0.0)) {

@@ -88,7 +88,7 @@ pub fn compare_study(
         summary.files.study = Some(path.display().to_string());
     }
     if let Some(outputs) = outputs {
-        crate::report::write(outputs, &summary)?;
+        crate::report::write_study(outputs, &summary, &traces)?;
     }
     Ok((summary, traces))
 }
@@ -186,8 +186,14 @@ pub fn study_rows(summary: &Summary) -> Vec<Vec<String>> {
 pub const STUDY_NOTE: &str = "apart: largest distance of the flexible TCP from that of the first run at the same time, and that over the \
      first run's largest TCP error";
 
+#[cfg(feature = "rerun")]
 fn study_markdown(summary: &Summary) -> String {
-    let mut page = format!("# Study of {}\n\n", summary.robot);
+    format!("# Study of {}\n\n", summary.robot) + &table(summary)
+}
+
+/// The runs side by side as a Markdown table.
+pub(crate) fn table(summary: &Summary) -> String {
+    let mut page = String::new();
     for (k, row) in study_rows(summary).iter().enumerate() {
         // Times of this machine stay out of recordings.
         let cells: Vec<String> = row[..row.len() - 1].iter().map(|cell| cell.replace('|', "\\|")).collect();

@@ -2,21 +2,24 @@
 
 use std::collections::BTreeMap;
 
-use flexarm_analysis::TcpMetrics;
+use flexarm_analysis::{HoldMetrics, TcpMetrics};
 use flexarm_stepping::{ConstraintForm, Counts, SpookPreset, StepperKind};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::options::RunOptions;
 
 /// Answer of `flexarm compare` and `flexarm run`. SI units.
-#[derive(Clone, Debug, Default, Serialize)]
+///
+/// `summary.json` is read back by `serde_json`; keys that a file of an older version lacks are their defaults.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Summary {
     /// Name of the robot.
     pub robot: String,
     /// Name of the trajectory.
     pub trajectory: String,
     /// rigid, lumped, modal or mixed.
-    pub links_model: &'static str,
+    pub links_model: String,
     /// "complete", or why the run stopped early.
     pub end: String,
     /// Simulated time (s).
@@ -57,13 +60,16 @@ pub struct Summary {
     /// The other runs of a study.
     #[serde(skip_serializing_if = "Vec::is_empty", default)]
     pub with: Vec<Summary>,
-    /// Size of the TCP error over time, thinned for the terminal.
+    /// Beginning and end of each move (s).
+    pub moves_s: Vec<[f64; 2]>,
+    /// Largest size of the TCP error in each of [`CURVE_PIECES`] equal pieces of the run (m), for the terminal.
     #[serde(skip)]
     pub error_curve: Vec<f64>,
 }
 
 /// Written files; null where none was written.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct Files {
     /// MCAP recording.
     pub mcap: Option<String>,
@@ -71,18 +77,23 @@ pub struct Files {
     pub rrd: Option<String>,
     /// Table.
     pub csv: Option<String>,
-    /// Report.
+    /// Report: a page for the browser, with plots and pictures.
     pub report: Option<String>,
     /// Rerun recording of all runs of a study.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub study: Option<String>,
+    /// The figures of the report as Markdown.
+    pub report_md: Option<String>,
+    /// Folder with figures for papers.
+    pub figures: Option<String>,
 }
 
 /// Stepper and its work.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct StepperFigures {
     /// Word of the command line.
-    pub name: &'static str,
+    pub name: String,
     /// Step (s).
     pub h_s: f64,
     /// Spectral radius (generalised-alpha).
@@ -93,16 +104,16 @@ pub struct StepperFigures {
     pub dispersion_correction: Option<bool>,
     /// local or global (SPOOK).
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub form: Option<&'static str>,
+    pub form: Option<String>,
     /// exact or source (SPOOK).
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub preset: Option<&'static str>,
+    pub preset: Option<String>,
     /// Relative tolerance (reference).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rtol: Option<f64>,
     /// bdf, esdirk34 or tsit45 (reference).
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub method: Option<&'static str>,
+    pub method: Option<String>,
     /// Steps taken.
     pub steps: u64,
     /// Evaluations of the equations of motion.
@@ -114,7 +125,7 @@ pub struct StepperFigures {
 impl StepperFigures {
     pub(crate) fn new(options: &RunOptions, counts: Counts) -> Self {
         let Counts { steps, evaluations, factorisations } = counts;
-        let (name, h_s) = (options.stepper.name(), options.step_s);
+        let (name, h_s) = (options.stepper.name().to_owned(), options.step_s);
         let mut figures = Self { name, h_s, steps, evaluations, factorisations, ..Self::default() };
         match options.stepper {
             StepperKind::GeneralizedAlpha(s) => {
@@ -122,13 +133,13 @@ impl StepperFigures {
                 figures.dispersion_correction = Some(s.dispersion_correction);
             }
             StepperKind::Spook(s) => {
-                figures.form = Some(if s.form == ConstraintForm::Local { "local" } else { "global" });
-                figures.preset = Some(if s.preset == SpookPreset::Exact { "exact" } else { "source" });
+                figures.form = Some(if s.form == ConstraintForm::Local { "local" } else { "global" }.into());
+                figures.preset = Some(if s.preset == SpookPreset::Exact { "exact" } else { "source" }.into());
             }
             StepperKind::Rk4 => {}
             StepperKind::Reference(s) => {
                 figures.rtol = Some(s.rtol);
-                figures.method = Some(s.method.name());
+                figures.method = Some(s.method.name().into());
             }
         }
         figures
@@ -136,7 +147,8 @@ impl StepperFigures {
 }
 
 /// A flexible link's share.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct LinkFigures {
     /// Name of the link.
     pub name: String,
@@ -149,7 +161,8 @@ pub struct LinkFigures {
 }
 
 /// An elastic drive's share.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct DriveFigures {
     /// Name of the joint.
     pub joint: String,
@@ -160,7 +173,8 @@ pub struct DriveFigures {
 }
 
 /// Energy over the run, from the logged samples (trapezoidal rule: a low log rate shows as imbalance).
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct EnergyFigures {
     /// Work of the drives (J).
     pub drives_j: f64,
@@ -177,7 +191,8 @@ pub struct EnergyFigures {
 }
 
 /// One run's flexible tool centre point against another's.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct DifferenceFigures {
     /// Largest distance (m).
     pub peak_m: f64,
@@ -190,7 +205,8 @@ pub struct DifferenceFigures {
 }
 
 /// Flexible against rigid tool centre point.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
 pub struct TcpFigures {
     /// Largest distance (m).
     pub peak_m: f64,
@@ -214,6 +230,43 @@ pub struct TcpFigures {
     pub dominant_hz: Option<f64>,
     /// Largest components along, across and out of the path (m).
     pub path_peak_m: [f64; 3],
+    /// Largest distance from the path while the robot moves (m): across and out of the path together.
+    pub path_accuracy_m: f64,
+    /// Root mean square of that distance over the moves (m).
+    pub path_rms_m: f64,
+    /// What happened at each stop.
+    pub holds: Vec<HoldFigures>,
+}
+
+/// A stop: from the end of a move to the beginning of the next one or the end of the run.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct HoldFigures {
+    /// Beginning (s).
+    pub start_s: f64,
+    /// End (s).
+    pub end_s: f64,
+    /// Distance at which the tool comes to rest (m).
+    pub final_m: f64,
+    /// Time from the beginning of the stop until the error stays within the band of its final value (s).
+    pub settling_s: Option<f64>,
+    /// Largest excursion past the final value (m).
+    pub overshoot_m: f64,
+    /// Strongest frequency (Hz).
+    pub ringing_hz: Option<f64>,
+}
+
+impl From<&HoldMetrics> for HoldFigures {
+    fn from(m: &HoldMetrics) -> Self {
+        Self {
+            start_s: m.start_s,
+            end_s: m.end_s,
+            final_m: m.final_error_m.iter().map(|x| x * x).sum::<f64>().sqrt(),
+            settling_s: m.settling_s,
+            overshoot_m: m.overshoot_m,
+            ringing_hz: m.line.map(|line| line.hz),
+        }
+    }
 }
 
 impl From<&TcpMetrics> for TcpFigures {
@@ -230,6 +283,9 @@ impl From<&TcpMetrics> for TcpFigures {
             overshoot_m: m.overshoot_m,
             dominant_hz: m.dominant_hz,
             path_peak_m: [m.tangential_peak_m, m.normal_peak_m, m.binormal_peak_m],
+            path_accuracy_m: m.path_accuracy_m,
+            path_rms_m: m.path_rms_m,
+            holds: m.holds.iter().map(HoldFigures::from).collect(),
         }
     }
 }
@@ -270,9 +326,12 @@ impl Summary {
     }
 }
 
-/// Largest error in each of 60 equal pieces of the run (m).
+/// Pieces of [`Summary::error_curve`], fewer for a run of fewer samples.
+pub const CURVE_PIECES: usize = 240;
+
+/// Largest error in each of [`CURVE_PIECES`] equal pieces of the run (m).
 pub(crate) fn thinned(times: &[f64], errors: &[[f64; 6]]) -> Vec<f64> {
-    let pieces = 60.min(times.len());
+    let pieces = CURVE_PIECES.min(times.len());
     (0..pieces)
         .map(|k| {
             let range = k * errors.len() / pieces..((k + 1) * errors.len() / pieces).max(k * errors.len() / pieces + 1);

@@ -52,7 +52,7 @@ pub(super) fn cover_line(
 
 /// Where text stands against its anchor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Align {
+pub(crate) enum Align {
     Left,
     Middle,
     Right,
@@ -60,25 +60,25 @@ pub(super) enum Align {
 
 /// Size and colour of text.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Style {
+pub(crate) struct Style {
     /// Pixels from one line of text to the next, about.
-    pub(super) size: f64,
-    pub(super) color: Rgb,
-    pub(super) bold: bool,
+    pub(crate) size: f64,
+    pub(crate) color: Rgb,
+    pub(crate) bold: bool,
     /// A rim of this colour, for text on pictures.
-    pub(super) halo: Option<Rgb>,
+    pub(crate) halo: Option<Rgb>,
 }
 
 impl Style {
-    pub(super) fn new(size: f64, color: Rgb) -> Self {
+    pub(crate) fn new(size: f64, color: Rgb) -> Self {
         Self { size, color, bold: false, halo: None }
     }
 
-    pub(super) fn bold(self) -> Self {
+    pub(crate) fn bold(self) -> Self {
         Self { bold: true, ..self }
     }
 
-    pub(super) fn halo(self, color: Rgb) -> Self {
+    pub(crate) fn halo(self, color: Rgb) -> Self {
         Self { halo: Some(color), ..self }
     }
 
@@ -88,7 +88,7 @@ impl Style {
 }
 
 /// Width of a line of text, pixels.
-pub(super) fn text_width(text: &str, style: Style) -> f64 {
+pub(crate) fn text_width(text: &str, style: Style) -> f64 {
     let units: f64 = text.chars().map(font::advance).sum();
     (units - font::GAP).max(0.0) * style.unit() * NARROW
 }
@@ -110,14 +110,14 @@ pub(super) fn wrap(text: &str, width: f64, style: Style) -> Vec<String> {
 
 impl Image {
     /// A straight line with round ends.
-    pub(super) fn line(&mut self, from: [f64; 2], to: [f64; 2], width: f64, color: Rgb, alpha: f64) {
+    pub(crate) fn line(&mut self, from: [f64; 2], to: [f64; 2], width: f64, color: Rgb, alpha: f64) {
         cover_line([self.width, self.height], from, to, width, |x, y, _, share| {
             self.blend(x, y, color, (alpha * share) as f32);
         });
     }
 
     /// A filled box.
-    pub(super) fn fill(&mut self, left: f64, top: f64, width: f64, height: f64, color: Rgb) {
+    pub(crate) fn fill(&mut self, left: f64, top: f64, width: f64, height: f64, color: Rgb) {
         for y in top.max(0.0) as usize..((top + height).max(0.0) as usize).min(self.height) {
             for x in left.max(0.0) as usize..((left + width).max(0.0) as usize).min(self.width) {
                 self.blend(x, y, color, 1.0);
@@ -126,7 +126,7 @@ impl Image {
     }
 
     /// One line of text; (`x`, `y`) is on its base line.
-    pub(super) fn text(&mut self, text: &str, [x, y]: [f64; 2], align: Align, style: Style) {
+    pub(crate) fn text(&mut self, text: &str, [x, y]: [f64; 2], align: Align, style: Style) {
         let start = match align {
             Align::Left => x,
             Align::Middle => x - text_width(text, style) / 2.0,
@@ -157,7 +157,7 @@ impl Image {
     }
 
     /// An arrow on the picture: a line with a head of two strokes.
-    pub(super) fn arrow(&mut self, from: [f64; 2], to: [f64; 2], width: f64, color: Rgb) {
+    pub(crate) fn arrow(&mut self, from: [f64; 2], to: [f64; 2], width: f64, color: Rgb) {
         self.line(from, to, width, color, 1.0);
         let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
         let length = dx.hypot(dy);

@@ -15,7 +15,7 @@
 
 pub mod color;
 mod deflection_sheet;
-mod draw;
+pub(crate) mod draw;
 mod font;
 mod image;
 mod interface_sheet;

@@ -15,6 +15,8 @@ use super::view::View;
 const FINE: usize = 2;
 /// A step in depth that gets an outline, as a share of the size of the scene.
 const OUTLINE: f64 = 0.02;
+/// How much ink an outline has.
+const OUTLINE_INK: f64 = 0.65;
 /// What lies on the surface is lifted towards the viewer by this share of the size of the scene.
 const LIFT: f64 = 0.004;
 
@@ -92,13 +94,28 @@ pub struct Scene<'a> {
 
 /// Draws a scene.
 pub fn render(scene: &Scene<'_>, view: &View, width: usize, height: usize) -> Image {
-    let mut canvas = Canvas::new(scene, view, width, height);
+    render_over(scene, view, &Image::new(width, height, color::PAPER))
+}
+
+/// Draws a scene over what is on an image already.
+pub fn render_over(scene: &Scene<'_>, view: &View, under: &Image) -> Image {
+    let mut canvas = Canvas::new(scene, view, under);
     canvas.triangles(scene);
     canvas.outline();
     for mark in scene.marks {
         canvas.mark(mark);
     }
     canvas.image()
+}
+
+/// Where the outline of the triangles runs: how much of each pixel it covers, row by row.
+pub fn outline_of(scene: &Scene<'_>, view: &View, width: usize, height: usize) -> Vec<f32> {
+    let mut canvas = Canvas::new(scene, view, &Image::new(width, height, color::PAPER));
+    canvas.triangles(scene);
+    canvas.colors.fill(color::PAPER);
+    canvas.outline();
+    let full = 255.0 - f32::from(color::mix(color::PAPER, color::INK, OUTLINE_INK)[0]);
+    canvas.image().rgba.chunks_exact(4).map(|pixel| (255.0 - f32::from(pixel[0])) / full).collect()
 }
 
 /// Colours and depths of all samples.
@@ -114,8 +131,8 @@ struct Canvas {
 }
 
 impl Canvas {
-    fn new(scene: &Scene<'_>, view: &View, width: usize, height: usize) -> Self {
-        let (width, height) = (FINE * width, FINE * height);
+    fn new(scene: &Scene<'_>, view: &View, under: &Image) -> Self {
+        let (width, height) = (FINE * under.width, FINE * under.height);
         let fine = FINE as f64;
         let view = View { scale: view.scale * fine, origin: view.origin.map(|x| x * fine), ..*view };
         let used = scene.triangles.as_flattened().iter().map(|v| scene.positions[*v as usize]);
@@ -124,7 +141,8 @@ impl Canvas {
         });
         let size = limits.map_or(0.0, |(low, high)| (high - low).norm()) * view.scale;
         let samples = width * height;
-        let (colors, depths) = (vec![color::PAPER; samples], vec![f32::NEG_INFINITY; samples]);
+        let below = |at: usize| under.pixel(at % width / FINE, at / width / FINE);
+        let (colors, depths) = ((0..samples).map(below).collect(), vec![f32::NEG_INFINITY; samples]);
         Self { view, width, height, colors, depths, size }
     }
 
@@ -206,7 +224,7 @@ impl Canvas {
                     .iter()
                     .sum();
                 if count > 0 {
-                    self.colors[at] = color::mix(self.colors[at], color::INK, 0.65);
+                    self.colors[at] = color::mix(self.colors[at], color::INK, OUTLINE_INK);
                 }
             }
         }

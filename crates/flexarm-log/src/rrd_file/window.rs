@@ -38,8 +38,11 @@ pub(crate) fn window(header: &RunHeader, seat: &Seat, labels: &[String]) -> Part
         Seat::Alone => {}
     }
     right.push((3.0, Part::Tabs(causes.into_iter().flatten().collect())));
-    let text =
-        Part::Row(vec![(3.0, Part::text("Summary", path(["summary"]))), (2.0, Part::log("Events", path(["events"])))]);
+    let summary = Part::text("Summary", path(["summary"]));
+    let text = match moves {
+        true => Part::Row(vec![(3.0, summary), (2.0, Part::log("Events", path(["events"])))]),
+        false => summary,
+    };
     let left = Part::Column(vec![(7.0, robots(header, seat, labels)), (2.6, text)]);
     Part::Row(vec![(3.0, left), (2.0, Part::Column(right))])
 }

@@ -1,0 +1,296 @@
+//! The figures of a run on a terminal: a table in groups and a small plot of the error over time.
+//!
+//! Text is styled with ANSI codes; where it does not go to a terminal they are taken out again (`main::answer`).
+
+use anstyle::{AnsiColor, Style};
+use comfy_table::{CellAlignment, Table};
+use flexarm::{Figure, STUDY_NOTE, Summary, Weight, figure_groups, study_rows};
+
+use crate::print;
+
+/// Columns where the terminal does not say how many it has.
+const USUAL_WIDTH: usize = 80;
+/// Fewer columns are treated as so many: nothing fits into less.
+const LEAST_WIDTH: usize = 40;
+/// Most columns of the plot; wider ones are no clearer.
+const WIDEST_PLOT: usize = 100;
+/// Rows of text of the plot.
+const PLOT_ROWS: usize = 4;
+/// Dots of a braille character, across and up.
+const DOTS: (usize, usize) = (2, 4);
+
+const HEADING: Style = Style::new().bold();
+const FAINT: Style = Style::new().dimmed();
+const HEADLINE: Style = AnsiColor::Cyan.on_default().bold();
+const ALERT: Style = AnsiColor::Red.on_default().bold();
+
+/// Columns of the terminal that standard output goes to.
+pub(crate) fn terminal_width() -> usize {
+    // Some pretend to have none.
+    Table::new().width().filter(|width| *width > 0).map_or(USUAL_WIDTH, usize::from)
+}
+
+/// The figures of a run in so many columns.
+pub(crate) fn summary(summary: &Summary, width: usize) -> String {
+    let width = width.max(LEAST_WIDTH);
+    let (robot, trajectory, links) = (&summary.robot, &summary.trajectory, &summary.links_model);
+    let mut out = format!("{HEADING}{robot} on {trajectory}{HEADING:#}, {links} links\n");
+    let groups = figure_groups(summary);
+    let all = || groups.iter().flat_map(|group| &group.rows);
+    let widest = |of: fn(&Figure) -> &str| all().map(|row| columns(of(row))).max().unwrap_or(0);
+    let (names, values, units) = (widest(|row| &row.name), widest(|row| &row.value), widest(|row| row.unit));
+    for group in &groups {
+        out += &format!("\n{HEADING}{}{HEADING:#}\n", group.title);
+        for row in &group.rows {
+            let style = match row.weight {
+                Weight::Plain => Style::new(),
+                Weight::Headline => HEADLINE,
+                Weight::Alert => ALERT,
+            };
+            // Pads by columns, not by bytes.
+            let name = format!("  {}{}", row.name, " ".repeat(names - columns(&row.name)));
+            let value = format!("{}{}", " ".repeat(values - columns(&row.value)), row.value);
+            let unit = format!("{}{}", row.unit, " ".repeat(units - columns(row.unit)));
+            let before = columns(&name) + 2 + columns(&value) + 1 + columns(&unit) + 2;
+            let room = width.saturating_sub(before);
+            // Where notes would be a narrow strip they get lines of their own.
+            let (indent, room) = if room < 20 { (4, width - 4) } else { (before, room) };
+            let mut notes = wrapped(&row.note, room).into_iter();
+            let first = if indent == before { notes.next().unwrap_or_default() } else { String::new() };
+            let text = format!("{name}  {value} {unit}");
+            out += &match first.is_empty() {
+                true => format!("{style}{}{style:#}\n", text.trim_end()),
+                false => format!("{style}{text}{style:#}  {first}\n"),
+            };
+            for note in notes {
+                out += &format!("{}{note}\n", " ".repeat(indent));
+            }
+        }
+    }
+    if summary.tcp.is_some() {
+        out += &plot(summary, width.min(WIDEST_PLOT));
+    }
+    out += &study(summary);
+    let f = &summary.files;
+    let files = [
+        ("report", &f.report),
+        ("study", &f.study),
+        ("Rerun", &f.rrd),
+        ("MCAP", &f.mcap),
+        ("CSV", &f.csv),
+        ("figures", &f.figures),
+    ];
+    let mut files = files.into_iter().filter_map(|(what, path)| path.as_ref().map(|path| (what, path))).peekable();
+    if files.peek().is_some() {
+        out += &format!("\n{HEADING}files{HEADING:#}\n");
+    }
+    for (what, path) in files {
+        out += &format!("  {what:<7}  {path}\n");
+    }
+    if let Some(path) = f.study.as_ref().or(f.rrd.as_ref()) {
+        out += &format!("  look:    flexarm view {path}\n");
+    }
+    out
+}
+
+/// The runs of a study side by side.
+fn study(summary: &Summary) -> String {
+    let rows = study_rows(summary);
+    let Some((header, rows)) = rows.split_first() else { return String::new() };
+    let mut table = print::table(&header.iter().map(String::as_str).collect::<Vec<_>>());
+    for row in rows {
+        table.add_row(row);
+    }
+    for column in 1..header.len() {
+        if let Some(column) = table.column_mut(column) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    format!("\n{HEADING}runs{HEADING:#}\n{}{FAINT}{STUDY_NOTE}{FAINT:#}\n", print::lines(&table))
+}
+
+/// Width of a text on the terminal; names of robots are letters, each of one column.
+fn columns(text: &str) -> usize {
+    text.chars().count()
+}
+
+/// Lines of at most `width` columns, broken at blanks.
+fn wrapped(text: &str, width: usize) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in text.split_whitespace() {
+        match lines.last_mut() {
+            Some(line) if columns(line) + 1 + columns(word) <= width => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
+}
+
+/// Size of the TCP error over time in braille dots, with the largest value, the span of time and the moves.
+fn plot(summary: &Summary, width: usize) -> String {
+    let curve = &summary.error_curve;
+    let top = curve.iter().copied().filter(|e| e.is_finite()).fold(0.0, f64::max);
+    if top <= 0.0 || curve.len() < 2 {
+        return String::new();
+    }
+    let label = format!("{:.3}", 1e3 * top);
+    let margin = columns(&label) + 2;
+    let cells = width - margin - 3;
+    let dots = DOTS.0 * cells;
+    let height = DOTS.1 * PLOT_ROWS;
+    // Largest value of each column of dots, and its place from below.
+    let value = |x: usize| {
+        let range = x * curve.len() / dots..((x + 1) * curve.len()).div_ceil(dots).min(curve.len());
+        curve[range].iter().copied().filter(|e| e.is_finite()).fold(0.0, f64::max)
+    };
+    let place = |x: usize| ((value(x) / top * (height - 1) as f64).round() as usize).min(height - 1);
+    let mut grid = vec![vec![0_u8; cells]; PLOT_ROWS];
+    let mut last = place(0);
+    for x in 0..dots {
+        let now = place(x);
+        for y in last.min(now)..=last.max(now) {
+            let (row, bit) = (PLOT_ROWS - 1 - y / DOTS.1, dot(x % DOTS.0, y % DOTS.1));
+            grid[row][x / DOTS.0] |= bit;
+        }
+        last = now;
+    }
+    let mut out = format!("\n{HEADING}TCP error over time{HEADING:#}, mm\n");
+    for (row, line) in grid.iter().enumerate() {
+        let (label, tick) = if row == 0 { (label.as_str(), '┤') } else { ("", '│') };
+        let line: String = line.iter().map(|bits| char::from_u32(0x2800 + u32::from(*bits)).unwrap_or(' ')).collect();
+        let room = margin - 2;
+        out += &format!("  {label:>room$} {tick}{HEADLINE}{line}{HEADLINE:#}\n");
+    }
+    // The axis is thick where the robot moves.
+    let span = summary.duration_s.max(1e-12);
+    let moving = |cell: usize| {
+        let t = span * (cell as f64 + 0.5) / cells as f64;
+        summary.moves_s.iter().any(|[start, end]| (*start..=*end).contains(&t))
+    };
+    let axis: String = (0..cells).map(|cell| if moving(cell) { '━' } else { '─' }).collect();
+    let left = margin - 2;
+    out += &format!("  {:>left$} └{axis}\n", 0);
+    let end = format!("{span:.2} s");
+    let key = if summary.moves_s.is_empty() { "" } else { "━ moves" };
+    let room = cells.saturating_sub(1 + columns(&end));
+    out += &format!("{}0{FAINT}{key:^room$}{FAINT:#}{end}\n", " ".repeat(margin + 2));
+    out
+}
+
+/// Bit of a dot in a braille character, counted from the left and from below.
+fn dot(x: usize, y: usize) -> u8 {
+    const BITS: [[u8; 4]; 2] = [[0x40, 0x04, 0x02, 0x01], [0x80, 0x20, 0x10, 0x08]];
+    BITS[x][y]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flexarm::{Files, LinkFigures, StepperFigures, TcpFigures};
+
+    fn example() -> Summary {
+        let tcp = TcpFigures {
+            peak_m: 1.4159e-3,
+            t_peak_s: 0.6,
+            rms_m: 1.1e-3,
+            path_peak_m: [1e-3, 2e-4, 3e-4],
+            settling_s: Some(0.25),
+            dominant_hz: Some(15.72),
+            ..TcpFigures::default()
+        };
+        Summary {
+            robot: "arm".into(),
+            trajectory: "swing".into(),
+            links_model: "lumped".into(),
+            end: "complete".into(),
+            duration_s: 2.0,
+            stepper: StepperFigures { name: "rk4".into(), h_s: 1e-3, steps: 2000, ..StepperFigures::default() },
+            tcp: Some(tcp),
+            links: vec![LinkFigures {
+                name: "bar".into(),
+                peak_contribution_m: 1.2e-3,
+                engineering_strain: 4.5e-5,
+                peak_rotation_rad: 7e-4,
+            }],
+            moves_s: vec![[0.0, 1.0]],
+            error_curve: (0..200).map(|k| 1.4159e-3 * (0.05 * f64::from(k)).sin().abs()).collect(),
+            files: Files { report: Some("out/report.html".into()), ..Files::default() },
+            ..Summary::default()
+        }
+    }
+
+    /// What a pipe gets.
+    fn plain(summary: &Summary, width: usize) -> String {
+        anstream::adapter::strip_str(&super::summary(summary, width)).to_string()
+    }
+
+    #[test]
+    fn the_plain_table_is_aligned_and_has_a_plot() {
+        let expected = "\
+arm on swing, lumped links
+
+TCP
+  peak TCP error           1.4159 mm    at 0.600 s
+  RMS TCP error            1.1000 mm
+  peak along the path      1.0000 mm
+  peak normal to the path  0.2000 mm    out of its plane 0.3000 mm
+  path accuracy            0.0000 mm    largest distance from the path in motion
+  static sag at the start  0.0000 mm
+  error at the end         0.0000 mm
+  peak rotation            0.0000 mrad  RMS 0.0000 mrad
+  overshoot after a move   0.0000 mm
+  settling time             0.250 s     after the last move
+  dominant frequency        15.72 Hz
+
+links and drives
+  link bar                 1.2000 mm    of TCP motion; strain 4.5e-5, bends by
+                                        0.7000 mrad
+
+run
+  steps                      2000       rk4, 1 ms, 0.0 evaluations each
+  simulated                  2.00 s
+  in                         0.00 s     0 times real time
+  processor                   0.0 ms    per simulated second
+
+TCP error over time, mm
+  1.416 ┤⠀⠀⠀⠀⠀⠀⣀⡤⠖⠋⠉⠉⠉⠓⠲⢤⣀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⣀⡤⠖⠚⠉⠉⠉⠓⠲⢤⣀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⣀⡤⠖⠋⠉⠉⠉⠙⠲⢤⣀⠀⠀⠀⠀⠀⠀⠀⠀⠀
+        │⠀⠀⠀⢀⣰⠚⠁⠀⠀⠀⠀⠀⠀⠀⠀⠀⠈⠳⣄⡀⠀⠀⠀⠀⠀⢀⡴⠚⠁⠀⠀⠀⠀⠀⠀⠀⠀⠀⠈⠳⣄⡀⠀⠀⠀⠀⠀⢀⡤⠞⠁⠀⠀⠀⠀⠀⠀⠀⠀⠀⠈⠳⣄⡀⠀⠀⠀⠀⠀⢀
+        │⠀⢀⡴⠋⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠓⣆⡀⠀⢀⡴⠋⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠓⣆⠀⠀⢀⡴⠋⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠳⢤⠀⠀⢀⡴⠋
+        │⠤⠏⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠳⠴⠋⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠈⠹⠴⠚⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠀⠈⠹⣴⠋⠀⠀
+      0 └━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━━───────────────────────────────────
+         0                            ━ moves                            2.00 s
+
+files
+  report   out/report.html
+";
+        assert_eq!(plain(&example(), 80), expected);
+    }
+
+    #[test]
+    fn no_line_is_wider_than_the_terminal() {
+        for width in [40, 60, 79, 80, 120] {
+            let text = plain(&example(), width);
+            let widest = text.lines().map(columns).max().unwrap_or(0);
+            assert!(widest <= width, "{widest} of {width} columns:\n{text}");
+            assert!(text.lines().all(|line| line == line.trim_end()), "blanks at the end of a line:\n{text}");
+        }
+    }
+
+    #[test]
+    fn the_peak_is_bold_and_a_stop_is_red() {
+        let stopped = Summary { end: "diverged at t = 1 s".into(), ..example() };
+        let text = super::summary(&stopped, 80);
+        assert!(text.contains(&format!("{ALERT}  STOPPED EARLY")), "{text}");
+        assert!(text.contains(&format!("{HEADLINE}  peak TCP error")), "{text}");
+    }
+
+    #[test]
+    fn nothing_to_plot_is_no_plot() {
+        for error_curve in [vec![], vec![0.0; 50], vec![f64::NAN; 50]] {
+            assert!(!plain(&Summary { error_curve, ..example() }, 80).contains("over time"));
+        }
+    }
+}

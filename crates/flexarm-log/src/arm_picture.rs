@@ -1,0 +1,401 @@
+//! Pictures of the arm at one instant: bent more than it is, coloured by how far it is from its rigid twin.
+//!
+//! The rigid twin is light grey with an outline, the flexible arm is magnified by [`RunHeader::magnification`]; colours
+//! show the true deviation, from 0 to [`RunHeader::color_scale_m`]. An arrow leads from the rigid tool centre point to
+//! the magnified one. Links without surfaces are drawn as rods. Start at [`arm_png`].
+
+use flexarm_kinematics::Pose;
+use nalgebra::{Point3, Vector3};
+
+use crate::mesh_picture::draw::{Align, Style, text_width};
+use crate::mesh_picture::scene::{Paint, Scene, outline_of, render, render_over};
+use crate::mesh_picture::{Image, Rgb, View, color};
+use crate::{BendInfo, BentMesh, LinkMesh, Magnifier, RunHeader, Sample, TwinSample, stations_in_link};
+
+/// Width of a picture at which lines and text have their nominal size (pixels).
+const NOMINAL_WIDTH: f64 = 900.0;
+/// Colours of the rigid twin, and how much of them is left.
+const GHOST: Rgb = [196, 202, 212];
+/// How far the ghost fades into the paper.
+const GHOST_FADE: f64 = 0.35;
+/// Outline of the rigid twin where the flexible arm covers it.
+const GHOST_LINE: Rgb = [70, 78, 92];
+/// The arrow at the tool: vermilion, on no place of the scale.
+const ARROW: Rgb = [213, 60, 0];
+/// Radius of rods that stand for links, as a share of the size of the arm.
+const ROD: f64 = 0.012;
+/// Where on the scale of [`color::magnitude`] zero lies: shade is not seen on its darkest colours.
+const LOWEST: f64 = 0.16;
+/// Sides of a rod.
+const ROD_SIDES: u32 = 10;
+
+/// Why there is no picture of an arm.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ArmPictureError {
+    /// Nothing to compare with.
+    #[error("no picture of the arm: the run has no rigid twin")]
+    NoTwin,
+    /// The sample does not belong to the header, or none was taken.
+    #[error("no picture of the arm: the sample has {found} links, the header {expected}")]
+    Links {
+        /// Links of the sample.
+        found: usize,
+        /// Links of the header.
+        expected: usize,
+    },
+    /// A diverged run.
+    #[error("no picture of the arm: its places are not finite")]
+    NotFinite,
+    /// Neither surfaces nor distances between joints.
+    #[error("no picture of the arm: it has no extent")]
+    Nothing,
+    /// The image does not fit into its file format.
+    #[error("no picture of the arm: cannot make a PNG: {0}")]
+    Encode(String),
+}
+
+/// From where the arm is seen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ArmSide {
+    /// Across the vertical plane through base and tool.
+    Side,
+    /// From the front, the side and above.
+    Oblique,
+}
+
+/// The arm as a PNG picture: rigid twin and magnified flexible arm.
+///
+/// * `size`: width and height, pixels.
+///
+/// The same input gives the same bytes.
+///
+/// # Errors
+/// [`ArmPictureError`].
+pub fn arm_png(
+    header: &RunHeader,
+    sample: &Sample,
+    side: ArmSide,
+    [width, height]: [usize; 2],
+) -> Result<Vec<u8>, ArmPictureError> {
+    if !header.has_rigid {
+        return Err(ArmPictureError::NoTwin);
+    }
+    let expected = header.links.len();
+    for twin in [&sample.flexible, &sample.rigid] {
+        let found = twin.X_WL.len();
+        if found != expected || expected == 0 {
+            return Err(ArmPictureError::Links { found, expected });
+        }
+        let poses = twin.X_WL.iter().chain(&twin.X_WS).chain([&twin.X_WT]);
+        if !poses.into_iter().all(|X| X.to_homogeneous().iter().all(|x| x.is_finite())) {
+            return Err(ArmPictureError::NotFinite);
+        }
+    }
+    let bodies = bodies(header, sample);
+    let magnifier = Magnifier::new(header);
+    let magnified = magnifier.magnified(sample);
+    let rigid = Skin::rigid(&bodies, &sample.rigid);
+    let real = Skin::bent(&bodies, header, &sample.flexible);
+    let shown = Skin::bent(&bodies, header, &magnified);
+    if rigid.triangles.is_empty() {
+        return Err(ArmPictureError::Nothing);
+    }
+    let finite = |skin: &Skin| skin.positions.iter().all(|p| p.iter().all(|x| x.is_finite()));
+    if ![&rigid, &real, &shown].into_iter().all(finite) {
+        return Err(ArmPictureError::NotFinite);
+    }
+    let deviation: Vec<f64> = real.positions.iter().zip(&rigid.positions).map(|(a, b)| (a - b).norm()).collect();
+
+    let unit = width as f64 / NOMINAL_WIDTH;
+    let (toward, right) = directions(side, &sample.rigid);
+    let [tool, moved] = [&sample.rigid.X_WT, &magnified.X_WT].map(|X| X.translation.vector);
+    let points = rigid.positions.iter().chain(&shown.positions).copied().chain([tool, moved]);
+    let (margin, foot) = (26.0 * unit, 78.0 * unit);
+    let frame = [margin, margin, width as f64 - 2.0 * margin, height as f64 - margin - foot];
+    let view = View::fit(toward, right, points, frame);
+
+    let plain = |count: usize| (vec![[GHOST; 2]; count], vec![false; count]);
+    let (colors, bright) = plain(rigid.triangles.len());
+    let side_of = vec![-1.0; rigid.positions.len()];
+    let paint = Paint::Faces { colors: &colors, bright: &bright, side: &side_of };
+    let ghost = Scene { positions: &rigid.positions, triangles: &rigid.triangles, paint, marks: &[] };
+    let mut under = render(&ghost, &view, width, height);
+    for y in 0..height {
+        for x in 0..width {
+            under.blend(x, y, color::PAPER, GHOST_FADE as f32);
+        }
+    }
+    let peak = if header.color_scale_m > 0.0 { header.color_scale_m } else { 1.0 };
+    let values: Vec<f64> = deviation.iter().map(|d| on_scale((d / peak).min(1.0))).collect();
+    let paint = Paint::Magnitude { values: &values, peak: 1.0 };
+    let flexible = Scene { positions: &shown.positions, triangles: &shown.triangles, paint, marks: &[] };
+    let mut image = render_over(&flexible, &view, &under);
+    for (at, share) in outline_of(&ghost, &view, width, height).into_iter().enumerate() {
+        image.blend(at % width, at / width, GHOST_LINE, 0.8 * share);
+    }
+    arrow(&mut image, &view, unit, &tool, &moved);
+    legend(&mut image, &view, unit, header, magnifier.factor());
+    image.to_png().map_err(ArmPictureError::Encode)
+}
+
+/// Place on the scale of colours of a share of the largest deviation.
+fn on_scale(share: f64) -> f64 {
+    LOWEST + (1.0 - LOWEST) * share
+}
+
+/// A surface that goes with a link, bent with it if the link bends.
+struct Body {
+    link: usize,
+    bent: Option<(BentMesh, usize, usize)>,
+    mesh: LinkMesh,
+}
+
+/// Surfaces of the arm, cut where they bend; rods if there are none.
+fn bodies(header: &RunHeader, sample: &Sample) -> Vec<Body> {
+    let mut meshes = header.meshes.clone();
+    let size = reach(&sample.rigid);
+    if meshes.is_empty() {
+        for (child, info) in header.links.iter().enumerate() {
+            let Some(parent) = info.parent else { continue };
+            let X_PC = sample.rigid.X_WL[parent].inv_mul(&sample.rigid.X_WL[child]);
+            meshes.extend(rod(parent, &Vector3::zeros(), &X_PC.translation.vector, ROD * size));
+        }
+    }
+    if let Some(link) = header.links.iter().position(|link| link.name == header.tcp) {
+        let X_LT = sample.rigid.X_WL[link].inv_mul(&sample.rigid.X_WT);
+        meshes.extend(rod(link, &Vector3::zeros(), &X_LT.translation.vector, 0.5 * ROD * size));
+    }
+    let mut firsts = Vec::new();
+    let mut first = 0;
+    for bend in &header.bends {
+        firsts.push(first);
+        first += bend.X_LS.len();
+    }
+    let of = |mesh: LinkMesh| {
+        let found = header.bends.iter().zip(&firsts).find(|(bend, _)| bend.link == mesh.link);
+        let bent = found
+            .and_then(|(bend, first): (&BendInfo, _)| Some((BentMesh::new(&mesh, bend)?, *first, bend.X_LS.len())));
+        Body { link: mesh.link, bent, mesh }
+    };
+    meshes.into_iter().map(of).collect()
+}
+
+/// Largest distance of a link from the base (m).
+fn reach(twin: &TwinSample) -> f64 {
+    let base = twin.X_WL[0].translation.vector;
+    let places = twin.X_WL.iter().chain([&twin.X_WT]);
+    places.map(|X| (X.translation.vector - base).norm()).fold(0.0, f64::max)
+}
+
+/// A prism between two points of a link; none if they coincide.
+fn rod(link: usize, from: &Vector3<f64>, to: &Vector3<f64>, radius: f64) -> Option<LinkMesh> {
+    let along = (to - from).try_normalize(1e-6)?;
+    let y = along.cross(&Vector3::ith(along.iamin(), 1.0)).normalize();
+    let z = along.cross(&y);
+    let mut positions = Vec::new();
+    for end in [from, to] {
+        for k in 0..ROD_SIDES {
+            let (sin, cos) = (f64::from(k) / f64::from(ROD_SIDES) * std::f64::consts::TAU).sin_cos();
+            let p: Vector3<f64> = end + (y * cos + z * sin) * radius;
+            positions.push([p.x as f32, p.y as f32, p.z as f32]);
+        }
+    }
+    let n = ROD_SIDES;
+    let sides = (0..n).flat_map(|k| {
+        let next = (k + 1) % n;
+        [[k, next, n + next], [k, n + next, n + k]]
+    });
+    let caps = (2..n).flat_map(|k| [[0, k, k - 1], [n, n + k - 1, n + k]]);
+    let triangles = sides.chain(caps).collect();
+    Some(LinkMesh { link, name: "rod".into(), positions, normals: Vec::new(), triangles, color: [0.7; 4], file: None })
+}
+
+/// Everything as triangles in the world.
+#[derive(Default)]
+struct Skin {
+    positions: Vec<Vector3<f64>>,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl Skin {
+    fn rigid(bodies: &[Body], twin: &TwinSample) -> Self {
+        let mut skin = Self::default();
+        for body in bodies {
+            let mesh = body.bent.as_ref().map_or(&body.mesh, |(bent, ..)| &bent.mesh);
+            skin.add(&twin.X_WL[body.link], mesh.positions.iter().copied(), &mesh.triangles);
+        }
+        skin
+    }
+
+    fn bent(bodies: &[Body], header: &RunHeader, twin: &TwinSample) -> Self {
+        let mut skin = Self::default();
+        let stations: usize = header.bends.iter().map(|bend| bend.X_LS.len()).sum();
+        for body in bodies {
+            let X_WL = &twin.X_WL[body.link];
+            match &body.bent {
+                Some((bent, first, count)) if twin.X_WS.len() == stations => {
+                    let moved = stations_in_link(twin, body.link, *first, *count);
+                    skin.add(X_WL, bent.positions(&moved), &bent.mesh.triangles);
+                }
+                Some((bent, ..)) => skin.add(X_WL, bent.mesh.positions.iter().copied(), &bent.mesh.triangles),
+                None => skin.add(X_WL, body.mesh.positions.iter().copied(), &body.mesh.triangles),
+            }
+        }
+        skin
+    }
+
+    fn add(&mut self, X_WL: &Pose, positions: impl Iterator<Item = [f32; 3]>, triangles: &[[u32; 3]]) {
+        let first = self.positions.len() as u32;
+        self.positions.extend(positions.map(|p| (X_WL * Point3::from(Vector3::from(p.map(f64::from)))).coords));
+        self.triangles.extend(triangles.iter().map(|t| t.map(|v| first + v)));
+    }
+}
+
+/// Towards the viewer and to the right. The plane of the arm is the vertical one through base and tool.
+fn directions(side: ArmSide, rigid: &TwinSample) -> (Vector3<f64>, Vector3<f64>) {
+    let reach = rigid.X_WT.translation.vector - rigid.X_WL[0].translation.vector;
+    let out = Vector3::new(reach.x, reach.y, 0.0).try_normalize(1e-3).unwrap_or(Vector3::x());
+    // With the arm reaching to the right, this is the side that faces the viewer.
+    let across = out.cross(&Vector3::z());
+    match side {
+        ArmSide::Side => (across + Vector3::z() * 0.12, out),
+        ArmSide::Oblique => (out * 0.75 + across * 0.65 + Vector3::z() * 0.6, out * 0.65 - across * 0.75),
+    }
+}
+
+/// The way of the tool.
+fn arrow(image: &mut Image, view: &View, unit: f64, from: &Vector3<f64>, to: &Vector3<f64>) {
+    let [a, b] = [view.project(from), view.project(to)].map(|[x, y, _]| [x, y]);
+    if (b[0] - a[0]).hypot(b[1] - a[1]) > 2.0 * unit {
+        image.line(a, b, 5.4 * unit, color::PAPER, 1.0);
+        image.arrow(a, b, 3.6 * unit, ARROW);
+    }
+    image.line(a, a, 8.0 * unit, color::PAPER, 1.0);
+    image.line(a, a, 5.5 * unit, color::INK, 1.0);
+}
+
+/// Axes, colour scale and what is shown, along the foot of the picture.
+fn legend(image: &mut Image, view: &View, unit: f64, header: &RunHeader, factor: f64) {
+    let (width, height) = (image.width as f64, image.height as f64);
+    let text = |size: f64| Style::new(size * unit, color::INK);
+    let origin = [44.0 * unit, height - 40.0 * unit];
+    let mut order = [0, 1, 2];
+    order.sort_by(|a, b| view.toward[*a].total_cmp(&view.toward[*b]));
+    for k in order {
+        let direction = [view.right[k], -view.up[k]];
+        // An axis that points at the viewer has no length to see.
+        if direction[0].hypot(direction[1]) < 0.15 {
+            continue;
+        }
+        let place = |length: f64| [0, 1].map(|i| origin[i] + length * unit * direction[i]);
+        image.arrow(origin, place(26.0), 1.8 * unit, color::AXES[k]);
+        let [x, y] = place(36.0);
+        let style = Style::new(14.0 * unit, color::AXES[k]).bold();
+        image.text(["x", "y", "z"][k], [x, y + 5.0 * unit], Align::Middle, style);
+    }
+
+    let (bar, left, top) = (240.0 * unit, width - 286.0 * unit, height - 42.0 * unit);
+    let thick = 11.0 * unit;
+    for x in 0..bar as usize {
+        image.fill(left + x as f64, top, 1.0, thick, color::magnitude(on_scale(x as f64 / (bar - 1.0))));
+    }
+    let scale = 1e3 * if header.color_scale_m > 0.0 { header.color_scale_m } else { 1.0 };
+    for place in [0.0, 0.5, 1.0] {
+        let x = left + place * (bar - 1.0);
+        image.line([x, top + thick], [x, top + thick + 4.0 * unit], unit, color::INK, 1.0);
+        image.text(&short(place * scale), [x, top + thick + 18.0 * unit], Align::Middle, text(15.0).bold());
+    }
+    image.text("deviation from the rigid arm, mm", [left, top - 7.0 * unit], Align::Left, text(13.0));
+
+    let (x, y) = (104.0 * unit, height - 24.0 * unit);
+    let bold = text(14.0).bold();
+    let first = format!("deflections magnified {} times", short(factor));
+    image.text(&first, [x, y - 20.0 * unit], Align::Left, bold);
+    let swatch = 12.0 * unit;
+    image.fill(x, y - swatch + unit, swatch, swatch, color::mix(GHOST, color::PAPER, GHOST_FADE));
+    image.text("rigid arm", [x + 1.5 * swatch, y], Align::Left, text(13.0));
+    let next = x + 1.5 * swatch + text_width("rigid arm", text(13.0)) + 1.6 * swatch;
+    image.arrow([next, y - 4.0 * unit], [next + 24.0 * unit, y - 4.0 * unit], 3.0 * unit, ARROW);
+    image.text("way of the tool", [next + 32.0 * unit, y], Align::Left, text(13.0));
+}
+
+/// A number without needless digits.
+fn short(x: f64) -> String {
+    let digits = if x == 0.0 { 0 } else { (2.0 - x.abs().log10().floor()).clamp(0.0, 9.0) as usize };
+    let text = format!("{x:.digits$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::LinkInfo;
+    use nalgebra::Translation3;
+
+    /// An arm without surfaces: base, upright link, arm that reaches out along x; its tool sags by 2 mm.
+    fn arm() -> (RunHeader, Sample) {
+        let link = |name: &str, parent| LinkInfo { name: name.into(), parent, fixed: false };
+        let header = RunHeader {
+            links: vec![link("base", None), link("arm", Some(0)), link("tool", Some(1))],
+            tcp: "tool".into(),
+            has_rigid: true,
+            magnification: 100.0,
+            color_scale_m: 2e-3,
+            ..RunHeader::default()
+        };
+        let places = |sag: f64| -> Vec<Pose> {
+            [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.2, 0.0, 1.0 - sag]]
+                .map(|p| Pose::from(Translation3::from(Vector3::from(p))))
+                .into()
+        };
+        let twin = |sag: f64| TwinSample { X_WL: places(sag), X_WT: places(sag)[2], ..TwinSample::default() };
+        let sample = Sample { flexible: twin(2e-3), rigid: twin(0.0), ..Sample::default() };
+        (header, sample)
+    }
+
+    fn decoded(png: &[u8]) -> Vec<Rgb> {
+        let mut reader = png::Decoder::new(std::io::Cursor::new(png)).read_info().unwrap();
+        let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+        reader.next_frame(&mut bytes).unwrap();
+        bytes.chunks_exact(4).map(|p| [p[0], p[1], p[2]]).collect()
+    }
+
+    #[test]
+    fn an_arm_without_surfaces_is_drawn_as_rods_with_the_way_of_its_tool() {
+        let (header, sample) = arm();
+        let size = [450, 350];
+        for side in [ArmSide::Side, ArmSide::Oblique] {
+            let png = arm_png(&header, &sample, side, size).unwrap();
+            assert_eq!(png, arm_png(&header, &sample, side, size).unwrap(), "the same bytes");
+            let pixels = decoded(&png);
+            let count = |near: Rgb, within: i32| {
+                let close = |p: &&Rgb| (0..3).all(|k| (i32::from(p[k]) - i32::from(near[k])).abs() <= within);
+                pixels[..size[0] * (size[1] - 50)].iter().filter(close).count()
+            };
+            assert!(count(ARROW, 12) > 8, "{side:?}: {} pixels of the arrow", count(ARROW, 12));
+            // The base does not move, so it has the first colour of the scale; the rigid arm is light grey.
+            assert!(count(color::magnitude(on_scale(0.0)), 40) > 200, "{side:?}");
+            let grey = |p: &&Rgb| p.iter().all(|c| (150..240).contains(c)) && p[0].abs_diff(p[2]) < 24;
+            assert!(pixels.iter().filter(grey).count() > 400, "{side:?}: the ghost");
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_drawn_is_an_error() {
+        let size = [90, 70];
+        let draw = |header: &RunHeader, sample: &Sample| arm_png(header, sample, ArmSide::Side, size).unwrap_err();
+        let (header, sample) = arm();
+        assert_eq!(draw(&RunHeader { has_rigid: false, ..header.clone() }, &sample), ArmPictureError::NoTwin);
+        assert_eq!(draw(&header, &Sample::default()), ArmPictureError::Links { found: 0, expected: 3 });
+        let mut diverged = sample.clone();
+        diverged.flexible.X_WL[2] = Pose::from(Translation3::new(f64::NAN, 0.0, 0.0));
+        assert_eq!(draw(&header, &diverged), ArmPictureError::NotFinite);
+        let mut point = sample;
+        for twin in [&mut point.flexible, &mut point.rigid] {
+            twin.X_WL.fill(Pose::identity());
+            twin.X_WT = Pose::identity();
+        }
+        assert_eq!(draw(&header, &point), ArmPictureError::Nothing);
+    }
+}

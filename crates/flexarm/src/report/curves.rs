@@ -1,0 +1,523 @@
+//! The data of the plots: curves of a run, in readable units, thinned so that peaks stay.
+
+use flexarm_analysis::amplitude_spectrum;
+use flexarm_log::{ElasticSample, Trace, TraceRow};
+
+use crate::summary::Summary;
+
+/// Most points of a curve that is seen at once.
+const MOST_POINTS: usize = 3000;
+/// Most numbers of a plot with many curves.
+const MOST_NUMBERS: usize = 24_000;
+/// Most points of curves behind a selector.
+const MOST_DETAIL: usize = 1000;
+/// Amplitudes below this share of the largest one end the shown part of a spectrum.
+const QUIET: f64 = 1e-3;
+
+/// Most stops of which a spectrum is shown.
+const MOST_STOPS: usize = 8;
+
+/// A plot: curves over a common axis, or several such sets to choose from.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Plot {
+    /// For links and file names.
+    pub(super) id: &'static str,
+    pub(super) section: &'static str,
+    pub(super) title: &'static str,
+    /// What is to be known to read it.
+    pub(super) note: String,
+    pub(super) x_label: &'static str,
+    pub(super) x_unit: &'static str,
+    pub(super) y_label: &'static str,
+    pub(super) y_unit: &'static str,
+    /// Time plots share cursor and zoom.
+    pub(super) over_time: bool,
+    pub(super) logarithmic: bool,
+    /// Across the whole page.
+    pub(super) wide: bool,
+    /// Lines across the plot with their names.
+    pub(super) marks: Vec<(f64, String)>,
+    pub(super) views: Vec<PlotView>,
+}
+
+/// One choice of curves.
+#[derive(Clone, Debug, Default)]
+pub(super) struct PlotView {
+    pub(super) name: String,
+    /// Unit of its curves, if it is not that of the plot.
+    pub(super) y_unit: &'static str,
+    /// One per run: curves with an axis of their own.
+    pub(super) tables: Vec<Table>,
+}
+
+/// Curves with common places.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Table {
+    pub(super) x: Vec<f64>,
+    pub(super) curves: Vec<Curve>,
+}
+
+#[derive(Clone, Debug, Default)]
+pub(super) struct Curve {
+    pub(super) name: String,
+    pub(super) kind: Kind,
+    pub(super) y: Vec<f64>,
+}
+
+/// How a curve is drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Kind {
+    #[default]
+    Plain,
+    /// The size of others.
+    Total,
+    /// What others are compared with.
+    Dashed,
+}
+
+impl Table {
+    fn new(x: Vec<f64>, curves: Vec<Curve>, most: usize) -> Self {
+        let most = most.min(MOST_NUMBERS / (curves.len() + 1)).max(200);
+        let keep = thinned(&curves.iter().map(|c| c.y.as_slice()).collect::<Vec<_>>(), x.len(), most);
+        let pick = |values: &[f64]| keep.iter().map(|k| values[*k]).collect();
+        let curves = curves.iter().map(|c| Curve { y: pick(&c.y), ..c.clone() }).collect();
+        Self { x: pick(&x), curves }
+    }
+}
+
+/// Indices, ascending, of at most about `most` points of curves with a common axis: first and last, and of each of
+/// equal pieces the smallest and the largest value of every curve.
+pub(super) fn thinned(curves: &[&[f64]], length: usize, most: usize) -> Vec<usize> {
+    if length <= most || curves.is_empty() {
+        return (0..length).collect();
+    }
+    let pieces = (most / (2 * curves.len())).max(1);
+    let mut keep = vec![0];
+    for piece in 0..pieces {
+        let range = piece * length / pieces..(piece + 1) * length / pieces;
+        for curve in curves {
+            let finite = || range.clone().filter(|k| curve[*k].is_finite());
+            keep.extend(finite().min_by(|a, b| curve[*a].total_cmp(&curve[*b])));
+            keep.extend(finite().max_by(|a, b| curve[*a].total_cmp(&curve[*b])));
+        }
+    }
+    keep.push(length - 1);
+    keep.sort_unstable();
+    keep.dedup();
+    keep
+}
+
+/// A curve from every row of a run.
+fn curve(trace: &Trace, name: impl Into<String>, kind: Kind, of: impl Fn(&TraceRow) -> f64) -> Curve {
+    Curve { name: name.into(), kind, y: trace.rows.iter().map(of).collect() }
+}
+
+fn norm(v: &[f64]) -> f64 {
+    v.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+fn times(trace: &Trace) -> Vec<f64> {
+    trace.rows.iter().map(|row| row.time_s).collect()
+}
+
+/// Length of the rigid tool's path up to each row (m).
+fn path_lengths(trace: &Trace) -> Vec<f64> {
+    let mut length = 0.0;
+    let mut last = trace.rows.first().map_or([0.0; 3], |row| row.rigid_m);
+    let step = |row: &TraceRow| {
+        let way: [f64; 3] = std::array::from_fn(|k| row.rigid_m[k] - last[k]);
+        last = row.rigid_m;
+        length += norm(&way);
+        length
+    };
+    trace.rows.iter().map(step).collect()
+}
+
+/// All plots of a run. Empty lists (a robot without elements, a run without a twin) give no plot.
+pub(super) fn plots(summary: &Summary, trace: &Trace) -> Vec<Plot> {
+    let mut plots = Vec::new();
+    if trace.rows.is_empty() {
+        return plots;
+    }
+    if trace.header.has_rigid {
+        plots.extend([error(trace), path_over_time(trace), path_over_length(trace)]);
+        plots.extend(spectrum(summary, trace));
+        plots.push(rotation(trace));
+        plots.extend(contributions(trace));
+    }
+    plots.extend(elements(summary, trace));
+    plots.push(torques(trace));
+    plots.extend(joints(trace));
+    plots.push(energy(trace));
+    plots
+}
+
+fn over_time(id: &'static str, section: &'static str, title: &'static str) -> Plot {
+    Plot { id, section, title, x_label: "time", x_unit: "s", over_time: true, ..Plot::default() }
+}
+
+fn one_view(table: Table) -> Vec<PlotView> {
+    vec![PlotView { tables: vec![table], ..PlotView::default() }]
+}
+
+const TOOL: &str = "Tool";
+const PARTS: &str = "Links and elastic elements";
+const DRIVES: &str = "Joints and energy";
+
+fn error(trace: &Trace) -> Plot {
+    let mut curves = vec![curve(trace, "size", Kind::Total, |row| 1e3 * row.error_m())];
+    curves.extend(
+        ["x", "y", "z"]
+            .iter()
+            .enumerate()
+            .map(|(k, name)| curve(trace, *name, Kind::Plain, move |row| 1e3 * row.error_world[k])),
+    );
+    Plot {
+        y_label: "TCP error",
+        y_unit: "mm",
+        wide: true,
+        note: "Flexible minus rigid tool centre point, world axes.".into(),
+        views: one_view(Table::new(times(trace), curves, MOST_POINTS)),
+        ..over_time("tcp_error", TOOL, "TCP error over time")
+    }
+}
+
+fn rotation(trace: &Trace) -> Plot {
+    let mut curves = vec![curve(trace, "size", Kind::Total, |row| 1e3 * norm(&row.error_world[3..]))];
+    curves.extend(
+        ["x", "y", "z"]
+            .iter()
+            .enumerate()
+            .map(|(k, name)| curve(trace, *name, Kind::Plain, move |row| 1e3 * row.error_world[3 + k])),
+    );
+    Plot {
+        y_label: "rotation error",
+        y_unit: "mrad",
+        note: "Rotation vector from the rigid to the flexible tool, world axes.".into(),
+        views: one_view(Table::new(times(trace), curves, MOST_POINTS)),
+        ..over_time("tcp_rotation", TOOL, "Rotation of the tool over time")
+    }
+}
+
+fn path_curves(trace: &Trace) -> Vec<Curve> {
+    let lateral = |row: &TraceRow| 1e3 * row.error_path[1].hypot(row.error_path[2]);
+    let mut curves = vec![curve(trace, "distance from the path", Kind::Total, lateral)];
+    let names = ["along", "normal", "binormal"];
+    curves.extend(
+        names.iter().enumerate().map(|(k, name)| curve(trace, *name, Kind::Plain, move |row| 1e3 * row.error_path[k])),
+    );
+    curves
+}
+
+fn path_over_time(trace: &Trace) -> Plot {
+    Plot {
+        y_label: "deviation",
+        y_unit: "mm",
+        note: "Axes of the rigid tool's path: along it, towards its centre of curvature, out of its plane.".into(),
+        views: one_view(Table::new(times(trace), path_curves(trace), MOST_POINTS)),
+        ..over_time("path_time", TOOL, "Deviation in path axes over time")
+    }
+}
+
+fn path_over_length(trace: &Trace) -> Plot {
+    Plot {
+        id: "path_length",
+        section: TOOL,
+        title: "Deviation in path axes along the path",
+        note: "Upright strokes are stops: the tool rings while its place on the path stays.".into(),
+        x_label: "path of the rigid tool",
+        x_unit: "m",
+        y_label: "deviation",
+        y_unit: "mm",
+        views: one_view(Table::new(path_lengths(trace), path_curves(trace), MOST_POINTS)),
+        ..Plot::default()
+    }
+}
+
+/// Amplitudes over frequency of a stretch of the run: all axes together, then each.
+fn amplitudes(rows: &[TraceRow]) -> Option<(Vec<f64>, Vec<Curve>)> {
+    let times: Vec<f64> = rows.iter().map(|row| row.time_s).collect();
+    let signal: Vec<[f64; 3]> = rows.iter().map(|row| std::array::from_fn(|k| 1e3 * row.error_world[k])).collect();
+    if signal.iter().flatten().any(|x| !x.is_finite()) {
+        return None;
+    }
+    let spectrum = amplitude_spectrum(&times, &signal)?;
+    let total: Vec<f64> = spectrum.amplitude.iter().map(|a| norm(a)).collect();
+    let largest = total.iter().copied().fold(0.0, f64::max);
+    if largest <= 0.0 {
+        return None;
+    }
+    // Zero has no place on a logarithmic axis, and nobody looks six decades below the peak.
+    let seen = |a: f64| a.max(1e-6 * largest);
+    let mut curves =
+        vec![Curve { name: "all axes".into(), kind: Kind::Total, y: total.into_iter().map(seen).collect() }];
+    curves.extend(["x", "y", "z"].iter().enumerate().map(|(k, name)| Curve {
+        name: (*name).into(),
+        kind: Kind::Plain,
+        y: spectrum.amplitude.iter().map(|a| seen(a[k])).collect(),
+    }));
+    Some((spectrum.hz, curves))
+}
+
+fn spectrum(summary: &Summary, trace: &Trace) -> Option<Plot> {
+    let (hz, curves) = amplitudes(&trace.rows)?;
+    // Up to where it is quiet, with the first natural frequencies in any case.
+    let total = &curves[0].y;
+    let largest = total.iter().copied().fold(0.0, f64::max);
+    let loud = total.iter().rposition(|a| *a > QUIET * largest).map_or(0.0, |k| hz[k]);
+    let natural = summary.frequencies_hz.get(2).or(summary.frequencies_hz.last()).copied().unwrap_or(0.0);
+    let end = (1.1 * loud).max(1.2 * natural).min(*hz.last()?);
+    let shown = |hz: &[f64], curves: Vec<Curve>| {
+        let range = 1..hz.partition_point(|f| *f <= end).max(2).min(hz.len());
+        let curves = curves.into_iter().map(|c| Curve { y: c.y[range.clone()].to_vec(), ..c });
+        Table::new(hz[range.clone()].to_vec(), curves.collect(), MOST_POINTS)
+    };
+    let mut views =
+        vec![PlotView { name: "whole run".into(), tables: vec![shown(&hz, curves)], ..PlotView::default() }];
+    // Without the motion in it the ringing stands alone.
+    let holds = summary.tcp.iter().flat_map(|tcp| &tcp.holds).take(MOST_STOPS).enumerate();
+    let stops = holds.filter_map(|(k, hold)| {
+        let place = |t: f64| trace.rows.partition_point(|row| row.time_s < t - 1e-9);
+        let (hz, mut curves) = amplitudes(&trace.rows[place(hold.start_s)..place(hold.end_s)])?;
+        curves.truncate(1);
+        (curves[0].name, curves[0].kind) = (format!("stop {}", k + 1), Kind::Plain);
+        Some(shown(&hz, curves))
+    });
+    let stops: Vec<Table> = stops.collect();
+    if !stops.is_empty() {
+        views.push(PlotView { name: "stops".into(), tables: stops, ..PlotView::default() });
+    }
+    let marks = summary.frequencies_hz.iter().enumerate().filter(|(_, hz)| **hz <= end);
+    Some(Plot {
+        id: "spectrum",
+        section: TOOL,
+        title: "Spectrum of the TCP error",
+        note: "Amplitudes (Hann window). Dashed: natural frequencies at the start pose, drives locked.".into(),
+        x_label: "frequency",
+        x_unit: "Hz",
+        y_label: "amplitude",
+        y_unit: "mm",
+        logarithmic: true,
+        marks: marks.map(|(k, hz)| (*hz, format!("f{} = {hz:.2} Hz", k + 1))).collect(),
+        views,
+        ..Plot::default()
+    })
+}
+
+fn contributions(trace: &Trace) -> Option<Plot> {
+    let names = &trace.header.contributors;
+    if names.is_empty() {
+        return None;
+    }
+    let view = |name: &str, of: fn(&[f64; 3]) -> f64| {
+        let curves = names.iter().enumerate().map(|(k, name)| {
+            curve(trace, name.clone(), Kind::Plain, |row| row.contributions.get(k).map_or(f64::NAN, |c| 1e3 * of(c)))
+        });
+        let table = Table::new(times(trace), curves.collect(), MOST_POINTS);
+        PlotView { name: name.into(), tables: vec![table], ..PlotView::default() }
+    };
+    Some(Plot {
+        y_label: "TCP displacement",
+        y_unit: "mm",
+        wide: true,
+        note: "TCP displacement that the deflection of one link or drive alone causes (first order).".into(),
+        views: vec![view("size", |c| norm(c)), view("x", |c| c[0]), view("y", |c| c[1]), view("z", |c| c[2])],
+        ..over_time("contributions", PARTS, "Who moves the tool")
+    })
+}
+
+/// Loads and deflections: sizes of all elements, and the components of each.
+fn elements(summary: &Summary, trace: &Trace) -> Vec<Plot> {
+    let names = &trace.header.elements;
+    if names.is_empty() {
+        return Vec::new();
+    }
+    let make = |plot: Plot, scale: f64, of: fn(&ElasticSample) -> &[f64]| {
+        let value = |row: &TraceRow, k: usize, f: &dyn Fn(&[f64]) -> f64| {
+            row.elastic.get(k).map_or(f64::NAN, |element| scale * f(of(element)))
+        };
+        let sizes = names
+            .iter()
+            .enumerate()
+            .map(|(k, name)| curve(trace, name.clone(), Kind::Plain, |row| value(row, k, &|v| norm(v))));
+        let table = Table::new(times(trace), sizes.collect(), MOST_POINTS);
+        let mut views = vec![PlotView { name: "all, size".into(), tables: vec![table], ..PlotView::default() }];
+        for (k, name) in names.iter().enumerate() {
+            let axes = ["x", "y", "z"]
+                .iter()
+                .enumerate()
+                .map(|(c, axis)| curve(trace, *axis, Kind::Plain, |row| value(row, k, &|v| v[c])));
+            let table = Table::new(times(trace), axes.collect(), MOST_DETAIL);
+            views.push(PlotView { name: name.clone(), tables: vec![table], ..PlotView::default() });
+        }
+        Plot { views, ..plot }
+    };
+    let note = match summary.links_model.as_str() {
+        "modal" | "mixed" => {
+            "Of modal links: the first six coordinates, which are the motion of the far interface unless the link has \
+             modes of its own."
+        }
+        _ => "",
+    };
+    let plot = |id, title, y_label, y_unit| Plot { y_label, y_unit, note: note.into(), ..over_time(id, PARTS, title) };
+    vec![
+        make(plot("element_force", "Elastic forces", "force", "N"), 1.0, |e| &e.load[..3]),
+        make(plot("element_moment", "Elastic moments", "moment", "N m"), 1.0, |e| &e.load[3..]),
+        make(plot("element_shift", "Elastic displacements", "displacement", "mm"), 1e3, |e| &e.deflection[..3]),
+        make(plot("element_turn", "Elastic rotations", "rotation", "mrad"), 1e3, |e| &e.deflection[3..]),
+    ]
+}
+
+fn slides(trace: &Trace, joint: usize) -> bool {
+    trace.header.prismatic.get(joint).copied().unwrap_or(false)
+}
+
+fn torques(trace: &Trace) -> Plot {
+    let names = &trace.header.joints;
+    let value = |row: &[f64], k: usize| row.get(k).copied().unwrap_or(f64::NAN);
+    let all = names
+        .iter()
+        .enumerate()
+        .map(|(k, name)| curve(trace, name.clone(), Kind::Plain, move |row| value(&row.effort, k)));
+    let table = Table::new(times(trace), all.collect(), MOST_POINTS);
+    let mut views = vec![PlotView { name: "all, flexible".into(), tables: vec![table], ..PlotView::default() }];
+    for (k, name) in names.iter().enumerate() {
+        let mut curves = vec![curve(trace, "flexible", Kind::Plain, |row| value(&row.effort, k))];
+        if trace.header.has_rigid {
+            curves.push(curve(trace, "rigid", Kind::Dashed, |row| value(&row.rigid_effort, k)));
+        }
+        let y_unit = if slides(trace, k) { "N" } else { "N m" };
+        let table = Table::new(times(trace), curves, MOST_DETAIL);
+        views.push(PlotView { name: name.clone(), y_unit, tables: vec![table] });
+    }
+    let all_slide = !names.is_empty() && (0..names.len()).all(|k| slides(trace, k));
+    let none_slides = (0..names.len()).all(|k| !slides(trace, k));
+    let y_unit = if all_slide {
+        "N"
+    } else if none_slides {
+        "N m"
+    } else {
+        "N m or N"
+    };
+    let note = "What the drives supply; choose a joint to see it beside the rigid twin.".to_owned();
+    let y_label = if none_slides { "torque" } else { "drive force" };
+    Plot { y_label, y_unit, note, views, ..over_time("torques", DRIVES, "Joint torques") }
+}
+
+fn joints(trace: &Trace) -> Vec<Plot> {
+    let make = |sliding: bool| {
+        let names = trace.header.joints.iter().enumerate().filter(|(k, _)| slides(trace, *k) == sliding);
+        let scale = if sliding { 1e3 } else { 1f64.to_degrees() };
+        let curves: Vec<Curve> = names
+            .map(|(k, name)| {
+                curve(trace, name.clone(), Kind::Plain, |row| row.q.get(k).map_or(f64::NAN, |q| scale * q))
+            })
+            .collect();
+        let (id, title) =
+            if sliding { ("slides", "Positions of sliding joints") } else { ("joints", "Joint positions") };
+        (!curves.is_empty()).then(|| Plot {
+            y_label: "position",
+            y_unit: if sliding { "mm" } else { "°" },
+            note: "Of the flexible robot, at the link.".into(),
+            views: one_view(Table::new(times(trace), curves, MOST_POINTS)),
+            ..over_time(id, DRIVES, title)
+        })
+    };
+    [make(false), make(true)].into_iter().flatten().collect()
+}
+
+fn energy(trace: &Trace) -> Plot {
+    let start = trace.rows.first().map_or(0.0, |row| row.energy.potential);
+    let curves = vec![
+        curve(trace, "kinetic", Kind::Plain, |row| row.energy.kinetic),
+        curve(trace, "gravity", Kind::Plain, |row| row.energy.potential - start),
+        curve(trace, "elastic", Kind::Plain, |row| row.energy.elastic),
+    ];
+    Plot {
+        y_label: "energy",
+        y_unit: "J",
+        note: "Of the flexible robot; gravity from its value at the start.".into(),
+        views: one_view(Table::new(times(trace), curves, MOST_POINTS)),
+        ..over_time("energy", DRIVES, "Energy")
+    }
+}
+
+/// The plots in which runs are laid over each other: one curve per run.
+pub(super) fn overlays(runs: &[(&str, &Summary, &Trace)]) -> Vec<Plot> {
+    let only = |mut plot: Plot, wanted: &str, label: &str| {
+        let mut table = plot.views.swap_remove(0).tables.swap_remove(0);
+        table.curves.retain(|curve| curve.name == wanted);
+        for curve in &mut table.curves {
+            curve.name = label.to_owned();
+            curve.kind = Kind::Plain;
+        }
+        table
+    };
+    let with_twin: Vec<_> =
+        runs.iter().filter(|(_, _, trace)| trace.header.has_rigid && !trace.rows.is_empty()).collect();
+    if with_twin.is_empty() {
+        return Vec::new();
+    }
+    let overlaid = |plot: Plot, wanted: &str, each: &dyn Fn(&Summary, &Trace) -> Option<Plot>| {
+        let tables = with_twin
+            .iter()
+            .filter_map(|(label, summary, trace)| each(summary, trace).map(|plot| only(plot, wanted, label)));
+        let views = vec![PlotView { tables: tables.collect(), ..PlotView::default() }];
+        Plot { views, section: "", wide: true, marks: Vec::new(), note: String::new(), ..plot }
+    };
+    let (_, summary, trace) = with_twin[0];
+    let size = Plot { id: "all_error", title: "Size of the TCP error", ..error(trace) };
+    let lateral = Plot { id: "all_path", title: "Distance from the path", ..path_over_length(trace) };
+    let mut plots = vec![
+        overlaid(size, "size", &|_, trace| Some(error(trace))),
+        overlaid(lateral, "distance from the path", &|_, trace| Some(path_over_length(trace))),
+    ];
+    if let Some(plot) = spectrum(summary, trace) {
+        let plot = Plot { id: "all_spectrum", ..plot };
+        plots.push(overlaid(plot, "all axes", &spectrum));
+    }
+    plots
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        /// Truth: the extremes of the curves themselves.
+        #[test]
+        fn thinning_keeps_the_ends_and_the_extremes_of_every_curve(
+            (length, most) in (1_usize..20_000, 50_usize..3000),
+            spikes in prop::collection::vec((0.0..1.0, -50.0..50.0), 1..6),
+        ) {
+            let wave = |c: usize, k: usize| (0.01 * k as f64 + c as f64).sin();
+            let mut curves: Vec<Vec<f64>> =
+                (0..spikes.len()).map(|c| (0..length).map(|k| wave(c, k)).collect()).collect();
+            for (curve, (place, height)) in curves.iter_mut().zip(&spikes) {
+                curve[(place * length as f64) as usize] = *height;
+            }
+            let slices: Vec<&[f64]> = curves.iter().map(Vec::as_slice).collect();
+            let keep = thinned(&slices, length, most);
+            prop_assert!(keep.windows(2).all(|pair| pair[0] < pair[1]), "ascending");
+            prop_assert_eq!((keep[0], keep[keep.len() - 1]), (0, length - 1));
+            prop_assert!(keep.len() <= most + 2, "{} of at most {}", keep.len(), most);
+            for curve in &slices {
+                let extremes = |values: &mut dyn Iterator<Item = f64>| {
+                    values.fold((f64::MAX, f64::MIN), |(low, high), y| (low.min(y), high.max(y)))
+                };
+                let all = extremes(&mut curve.iter().copied());
+                prop_assert_eq!(extremes(&mut keep.iter().map(|k| curve[*k])), all);
+            }
+        }
+    }
+
+    #[test]
+    fn numbers_that_are_none_do_not_hide_the_others() {
+        let mut curve = vec![0.0; 1000];
+        (curve[10], curve[500], curve[700]) = (f64::NAN, 3.0, f64::INFINITY);
+        assert!(thinned(&[&curve], 1000, 100).contains(&500));
+        assert_eq!(thinned(&[], 3, 100), [0, 1, 2]);
+    }
+}

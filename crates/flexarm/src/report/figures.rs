@@ -1,0 +1,104 @@
+//! A folder of figures for papers: every plot of the page as SVG in the width of a column, with its data as CSV, and
+//! pictures of the arm at print size.
+
+use std::path::{Path, PathBuf};
+
+use flexarm_log::{CurveLook, EventKind, Panel, PlotCurve, Trace, paper_plot};
+
+use super::curves::{Kind, Plot, PlotView, plots};
+use super::picture::pictures;
+use crate::error::Error;
+use crate::result_files::{file_stem, write_all};
+use crate::summary::Summary;
+
+/// Width of the pictures of the arm (pixels): 300 a inch across both columns of a paper.
+const PICTURE_WIDTH: usize = 1800;
+
+/// Writes the folder. Plots without a finite value, and pictures that cannot be drawn, are left out.
+///
+/// # Errors
+/// [`Error::Write`].
+pub(super) fn write(folder: &Path, summary: &Summary, trace: &Trace) -> Result<(), Error> {
+    let mut files: Vec<(PathBuf, Vec<u8>)> = Vec::new();
+    let bands = moves(trace);
+    for plot in plots(summary, trace) {
+        for (k, view) in plot.views.iter().enumerate() {
+            let stem = if k == 0 { plot.id.to_owned() } else { file_stem(&format!("{}_{}", plot.id, view.name)) };
+            let stem = stem.replace(' ', "_");
+            if let Ok(svg) = svg(&plot, view, if plot.over_time { &bands } else { &[] }) {
+                files.push((folder.join(format!("{stem}.svg")), svg.into_bytes()));
+                files.push((folder.join(format!("{stem}.csv")), csv(&plot, view).into_bytes()));
+            }
+        }
+    }
+    for picture in pictures(trace, PICTURE_WIDTH) {
+        if let Ok(png) = picture.png {
+            files.push((folder.join(format!("{}.png", picture.name)), png));
+        }
+    }
+    write_all(&files)
+}
+
+/// Beginnings and ends of the moves (s).
+fn moves(trace: &Trace) -> Vec<(f64, f64)> {
+    let mut moves = Vec::new();
+    for event in trace.events() {
+        match (event.kind, moves.last_mut()) {
+            (EventKind::MoveStart, _) => moves.push((event.time_s, f64::INFINITY)),
+            (EventKind::MoveEnd, Some(last)) => last.1 = event.time_s,
+            _ => {}
+        }
+    }
+    moves
+}
+
+fn unit_of<'a>(plot: &'a Plot, view: &'a PlotView) -> &'a str {
+    if view.y_unit.is_empty() { plot.y_unit } else { view.y_unit }
+}
+
+fn svg(plot: &Plot, view: &PlotView, bands: &[(f64, f64)]) -> Result<String, flexarm_log::PlotError> {
+    let curves = view.tables.iter().flat_map(|table| {
+        table.curves.iter().map(|curve| PlotCurve {
+            name: curve.name.clone(),
+            look: match curve.kind {
+                Kind::Plain => CurveLook::Plain,
+                Kind::Total => CurveLook::Total,
+                Kind::Dashed => CurveLook::Dashed,
+            },
+            x: table.x.clone(),
+            y: curve.y.clone(),
+        })
+    });
+    let label = format!("{} ({})", plot.y_label, unit_of(plot, view));
+    let panel = Panel { label, logarithmic: plot.logarithmic, legend: true, curves: curves.collect() };
+    paper_plot(&format!("{} ({})", plot.x_label, plot.x_unit), &[panel], bands)
+}
+
+/// The data of a plot: a column per curve, units in the names; sets of curves with axes of their own beside each other.
+fn csv(plot: &Plot, view: &PlotView) -> String {
+    let plain = |unit: &str| unit.replace('°', "deg").replace(' ', "_");
+    let name = |text: &str, unit: &str| {
+        let name = format!("{}_{}", text.replace(' ', "_"), plain(unit));
+        if name.contains([',', '"', '\n']) { format!("\"{}\"", name.replace('"', "\"\"")) } else { name }
+    };
+    let several = view.tables.len() > 1;
+    let (mut heads, mut columns): (Vec<String>, Vec<&[f64]>) = (Vec::new(), Vec::new());
+    for table in &view.tables {
+        let first = table.curves.first().map_or("", |curve| curve.name.as_str());
+        let x = if several { format!("{first} {}", plot.x_label) } else { plot.x_label.to_owned() };
+        heads.push(name(&x, plot.x_unit));
+        columns.push(&table.x);
+        for curve in &table.curves {
+            heads.push(name(&curve.name, unit_of(plot, view)));
+            columns.push(&curve.y);
+        }
+    }
+    let mut text = heads.join(",") + "\n";
+    for row in 0..columns.iter().map(|column| column.len()).max().unwrap_or(0) {
+        let cells = columns
+            .iter()
+            .map(|column| column.get(row).filter(|x| x.is_finite()).map_or_else(String::new, f64::to_string));
+        text += &(cells.collect::<Vec<_>>().join(",") + "\n");
+    }
+    text
+}

@@ -1,0 +1,585 @@
+//! The report as one page that loads nothing: style, behaviour, data and pictures are written into it.
+//!
+//! The same runs give the same bytes, but for the paragraph with the id `timings`. Start at [`html`].
+//! Not here: what is plotted (`curves`), how the arm is drawn (`picture`), how plots behave (`assets/report.js`).
+
+use std::fmt::Write as _;
+
+use base64::Engine as _;
+use flexarm_log::Trace;
+
+use super::curves::{Kind, Plot, overlays, plots};
+use super::picture::pictures;
+use crate::summary::Summary;
+
+const STYLE: &str = include_str!("../../assets/report.css");
+const BEHAVIOUR: &str = include_str!("../../assets/report.js");
+const UPLOT: &str = include_str!("../../assets/uplot/uPlot.iife.min.js");
+const UPLOT_STYLE: &str = include_str!("../../assets/uplot/uPlot.min.css");
+const UPLOT_LICENSE: &str = include_str!("../../assets/uplot/LICENSE");
+const UPLOT_VERSION: &str = "1.6.32";
+
+/// Width of the pictures of the arm (pixels): sharp at the width at which the page shows them.
+const PICTURE_WIDTH: usize = 1080;
+
+/// A run in a report.
+#[derive(Clone, Copy, Debug)]
+pub struct ReportRun<'a> {
+    /// Name of the run, where there are several.
+    pub label: &'a str,
+    /// Its figures.
+    pub summary: &'a Summary,
+    /// Its curves.
+    pub trace: &'a Trace,
+}
+
+/// The report of one run, or of several beside each other: the first is the main one.
+#[must_use]
+pub fn html(runs: &[ReportRun<'_>]) -> String {
+    let Some(main) = runs.first() else {
+        return "<!DOCTYPE html>\n<title>flexarm report</title>\n<p>No runs.\n".to_owned();
+    };
+    let title = match runs {
+        [run] => format!("{} on {}", run.summary.robot, run.summary.trajectory),
+        _ => format!("{} runs: {}", runs.len(), runs.iter().map(|run| run.label).collect::<Vec<_>>().join(", ")),
+    };
+    // The banner of the minified file names an address; licence and origin stand in a comment of this page.
+    let uplot = UPLOT.split_once("*/").map_or(UPLOT, |(_, code)| code);
+    let mut page = String::new();
+    let _ = write!(
+        page,
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <meta name=\"generator\" content=\"flexarm {}\">\n<title>{}</title>\n\
+         <style>\n{UPLOT_STYLE}\n{STYLE}</style>\n</head>\n<body>\n",
+        env!("CARGO_PKG_VERSION"),
+        escaped(&title)
+    );
+    page += &heading(&title, runs);
+    page += "<main>\n";
+    for run in runs {
+        page += &troubles(run, runs.len() > 1);
+    }
+    if let [run] = runs {
+        page += &tiles(run.summary);
+    } else {
+        page += &comparison(runs);
+    }
+    page += &arm_pictures(runs);
+    page += "<section id=\"plots\"><noscript><p>The plots need JavaScript.</p></noscript></section>\n";
+    page += &iso_table(runs);
+    let of = if runs.len() > 1 { format!(" of {}", escaped(main.label)) } else { String::new() };
+    page += &stops_table(main.summary, &of);
+    page += &parts_tables(main.summary, &of);
+    for run in runs {
+        page += &inputs(run, runs.len() > 1);
+    }
+    page += &timings(runs);
+    page += "</main>\n";
+    let _ = write!(
+        page,
+        "<script type=\"application/json\" id=\"data\">{}</script>\n\
+         <script>\n/* uPlot {UPLOT_VERSION}\n\n{}\n*/\n{}</script>\n<script>\n{BEHAVIOUR}</script>\n</body>\n</html>\n",
+        data(runs),
+        UPLOT_LICENSE.trim(),
+        uplot.trim_start()
+    );
+    page
+}
+
+/// Text as it may stand in an element or between the quotes of an attribute.
+fn escaped(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => out += "&amp;",
+            '<' => out += "&lt;",
+            '>' => out += "&gt;",
+            '"' => out += "&quot;",
+            '\'' => out += "&#39;",
+            c => out.push(c),
+        }
+    }
+    out
+}
+
+fn heading(title: &str, runs: &[ReportRun<'_>]) -> String {
+    let s = runs[0].summary;
+    let mut facts = Vec::new();
+    if runs.len() == 1 {
+        if runs[0].trace.header.has_rigid {
+            facts.push("flexible arm against its rigid twin".to_owned());
+        }
+        facts.push(format!("{} links", s.links_model));
+        facts.push(format!("{} s", number(s.duration_s, 4)));
+        facts.push(format!("{}, step {} ms", s.stepper.name, number(1e3 * s.stepper.h_s, 4)));
+    }
+    facts.push(format!("flexarm {}", env!("CARGO_PKG_VERSION")));
+    let facts: Vec<String> = facts.iter().map(|fact| format!("<span>{}</span>", escaped(fact))).collect();
+    format!(
+        "<header>\n<h1>{}</h1>\n<p class=\"facts\">{}</p>\n<nav><a href=\"#summary\">Figures</a><a href=\"#arm\">Arm</a>\
+         <a href=\"#plots\">Plots</a><a href=\"#tables\">Tables</a><a href=\"#inputs\">Inputs</a></nav>\n</header>\n",
+        escaped(title),
+        facts.join("")
+    )
+}
+
+/// Why a run stopped, and its warnings.
+fn troubles(run: &ReportRun<'_>, named: bool) -> String {
+    let s = run.summary;
+    let who = if named { format!("{}: ", escaped(run.label)) } else { String::new() };
+    let mut out = String::new();
+    if s.end != "complete" {
+        let _ = writeln!(out, "<p class=\"stopped\"><strong>{who}Stopped early.</strong> {}</p>", escaped(&s.end));
+    }
+    if !s.warnings.is_empty() {
+        let plural = if s.warnings.len() == 1 { "warning" } else { "warnings" };
+        let items: String = s.warnings.iter().map(|w| format!("<li>{}</li>", escaped(w))).collect();
+        let count = s.warnings.len();
+        let _ = writeln!(
+            out,
+            "<details class=\"warnings\" open><summary>{who}{count} {plural}</summary><ul>{items}</ul></details>"
+        );
+    }
+    out
+}
+
+/// A number with so many significant digits, without needless zeros.
+fn number(x: f64, digits: usize) -> String {
+    if !x.is_finite() {
+        return "–".into();
+    }
+    let x: f64 = format!("{x:.*e}", digits - 1).parse().unwrap_or(x);
+    // Nothing is gained by -0.
+    let x = if x == 0.0 { 0.0 } else { x };
+    let (plain, scientific) = (format!("{x}"), format!("{x:e}"));
+    if x == 0.0 || (1e-3..1e7).contains(&x.abs()) { plain } else { scientific }
+}
+
+/// A number that keeps its digits, so that a row of tiles looks even.
+fn fixed(x: f64) -> String {
+    let digits = match x.abs() {
+        a if a >= 100.0 => 1,
+        a if a >= 10.0 => 2,
+        a if a >= 0.0995 || a == 0.0 => 3,
+        _ => 4,
+    };
+    format!("{x:.digits$}")
+}
+
+fn tiles(s: &Summary) -> String {
+    let mut out = "<section id=\"summary\" class=\"tiles\">\n".to_owned();
+    let mut tile = |name: &str, value: String, unit: &str, note: String| {
+        let class = if out.contains("<div") { "tile" } else { "tile main" };
+        let _ = writeln!(
+            out,
+            "<div class=\"{class}\"><h2>{name}</h2><p class=\"value\">{value}<small>{unit}</small></p><p>{}</p></div>",
+            escaped(&note)
+        );
+    };
+    if let Some(tcp) = &s.tcp {
+        let mm = |x: f64| fixed(1e3 * x);
+        tile("Peak TCP error", mm(tcp.peak_m), "mm", format!("at {:.3} s", tcp.t_peak_s));
+        tile("RMS TCP error", mm(tcp.rms_m), "mm", "over the whole run".into());
+        tile("Static sag", mm(tcp.static_sag_m), "mm", "at rest at the start".into());
+        match tcp.settling_s {
+            Some(settling) => tile("Settling time", fixed(settling), "s", "after the last move".into()),
+            None => tile("Settling time", "–".into(), "", "not within the recording".into()),
+        }
+        tile("Error at the end", mm(tcp.end_m), "mm", format!("at {:.3} s", s.duration_s));
+        match tcp.dominant_hz {
+            Some(hz) => tile("Dominant frequency", fixed(hz), "Hz", "strongest line of the ringing".into()),
+            None => tile("Dominant frequency", "–".into(), "", "nothing oscillates".into()),
+        }
+    } else {
+        tile("Simulated time", fixed(s.duration_s), "s", s.stepper.name.clone());
+        if let Some(hz) = s.frequencies_hz.first() {
+            tile("First natural frequency", fixed(*hz), "Hz", "at the start pose, drives locked".into());
+        }
+        if let Some((joint, peak)) = s.drives.iter().max_by(|a, b| a.1.total_cmp(b.1)) {
+            tile("Largest force of a drive", fixed(*peak), "N m", format!("{joint} (N if it slides)"));
+        }
+        tile(
+            "Energy by the drives",
+            fixed(s.energy.drives_j),
+            "J",
+            format!("balance open by {:.1e}", s.energy.imbalance),
+        );
+    }
+    out + "</section>\n"
+}
+
+/// A figure of the comparison: name, unit, and its value of a run.
+type Compared = (&'static str, &'static str, fn(&Summary) -> Option<f64>);
+
+const COMPARED: [Compared; 12] = [
+    ("peak TCP error", "mm", |s| s.tcp.as_ref().map(|t| 1e3 * t.peak_m)),
+    ("time of the peak", "s", |s| s.tcp.as_ref().map(|t| t.t_peak_s)),
+    ("RMS TCP error", "mm", |s| s.tcp.as_ref().map(|t| 1e3 * t.rms_m)),
+    ("path accuracy", "mm", |s| s.tcp.as_ref().map(|t| 1e3 * t.path_accuracy_m)),
+    ("static sag", "mm", |s| s.tcp.as_ref().map(|t| 1e3 * t.static_sag_m)),
+    ("error at the end", "mm", |s| s.tcp.as_ref().map(|t| 1e3 * t.end_m)),
+    ("overshoot", "mm", |s| s.tcp.as_ref().map(|t| 1e3 * t.overshoot_m)),
+    ("settling time", "s", |s| s.tcp.as_ref().and_then(|t| t.settling_s)),
+    ("peak rotation", "mrad", |s| s.tcp.as_ref().map(|t| 1e3 * t.peak_rad)),
+    ("dominant frequency", "Hz", |s| s.tcp.as_ref().and_then(|t| t.dominant_hz)),
+    ("first natural frequency", "Hz", |s| s.frequencies_hz.first().copied()),
+    ("energy by the drives", "J", |s| Some(s.energy.drives_j)),
+];
+
+fn comparison(runs: &[ReportRun<'_>]) -> String {
+    let mut out =
+        "<section id=\"summary\" class=\"block\"><h2>Figures side by side</h2><div class=\"scroll\"><table><thead><tr>\
+                   <th>figure</th><th>unit</th>"
+            .to_owned();
+    for (k, run) in runs.iter().enumerate() {
+        let _ = write!(out, "<th class=\"number\"><i class=\"key c{}\"></i>{}</th>", k % 8, escaped(run.label));
+    }
+    out += "</tr></thead><tbody>";
+    let row = |name: &str, unit: &str, cells: Vec<String>| {
+        let cells: String = cells.iter().map(|cell| format!("<td class=\"number\">{}</td>", escaped(cell))).collect();
+        format!("<tr><th>{name}</th><td>{unit}</td>{cells}</tr>")
+    };
+    for (name, unit, value) in COMPARED {
+        let values: Vec<Option<f64>> = runs.iter().map(|run| value(run.summary)).collect();
+        let base = values[0];
+        let cell = |(k, v): (usize, &Option<f64>)| match (v, base) {
+            (None, _) => "–".to_owned(),
+            (Some(v), Some(base)) if k > 0 && base != 0.0 => {
+                let change = format!("{:+.1}", 100.0 * (v / base - 1.0));
+                format!("{} ({} %)", number(*v, 5), if change == "-0.0" { "+0.0" } else { &change })
+            }
+            (Some(v), _) => number(*v, 5),
+        };
+        if values.iter().any(Option::is_some) {
+            out += &row(name, unit, values.iter().enumerate().map(cell).collect());
+        }
+    }
+    out += &row("robot", "", runs.iter().map(|run| run.summary.robot.clone()).collect());
+    out += &row("trajectory", "", runs.iter().map(|run| run.summary.trajectory.clone()).collect());
+    out += &row("links", "", runs.iter().map(|run| run.summary.links_model.clone()).collect());
+    let method = |s: &Summary| format!("{}, {} ms", s.stepper.name, number(1e3 * s.stepper.h_s, 4));
+    out += &row("stepper", "", runs.iter().map(|run| method(run.summary)).collect());
+    out + "</tbody></table></div><p class=\"note\">In brackets: against the first run.</p></section>\n"
+}
+
+fn arm_pictures(runs: &[ReportRun<'_>]) -> String {
+    let mut out = "<section id=\"arm\" class=\"block\"><h2>The arm at its largest error</h2>\n".to_owned();
+    let with_twin: Vec<_> = runs.iter().filter(|run| run.trace.header.has_rigid).collect();
+    if with_twin.is_empty() {
+        return String::new();
+    }
+    for run in &with_twin {
+        out += "<div class=\"pictures\">\n";
+        let header = &run.trace.header;
+        let who = if runs.len() > 1 { format!("{}: ", run.label) } else { String::new() };
+        let factor = if header.magnification > 0.0 { header.magnification } else { 1.0 };
+        for picture in pictures(run.trace, PICTURE_WIDTH) {
+            let caption = format!(
+                "{who}{}, at {:.3} s. Deflections magnified {} times, coloured by the true deviation from the rigid arm (grey).",
+                picture.title,
+                run.trace.peak.time_s,
+                number(factor, 3),
+            );
+            match picture.png {
+                Ok(png) => {
+                    let data = base64::engine::general_purpose::STANDARD.encode(png);
+                    let caption = escaped(&caption);
+                    let _ = writeln!(
+                        out,
+                        "<figure><img alt=\"{caption}\" src=\"data:image/png;base64,{data}\"><figcaption>{caption}</figcaption></figure>"
+                    );
+                }
+                Err(why) => {
+                    let _ = writeln!(out, "<p class=\"note\">{}</p>", escaped(&why));
+                }
+            }
+        }
+        out += "</div>\n";
+    }
+    out + "</section>\n"
+}
+
+/// A row of the ISO table: name, meaning, unit, value.
+type Iso = (&'static str, &'static str, &'static str, fn(&Summary) -> Option<f64>);
+
+const ISO: [Iso; 7] = [
+    (
+        "Path accuracy (AT)",
+        "largest distance of the flexible tool from the rigid tool across the path, while moving",
+        "mm",
+        |s| s.tcp.as_ref().map(|t| 1e3 * t.path_accuracy_m),
+    ),
+    ("RMS distance from the path", "of the same, over the samples of the moves", "mm", |s| {
+        s.tcp.as_ref().map(|t| 1e3 * t.path_rms_m)
+    }),
+    ("Lag along the path", "largest deviation along the path, whole run", "mm", |s| {
+        s.tcp.as_ref().map(|t| 1e3 * t.path_peak_m[0])
+    }),
+    (
+        "Position overshoot (OV)",
+        "largest excursion past the place of rest, in the direction of approach, over all stops",
+        "mm",
+        |s| s.tcp.as_ref().map(|t| 1e3 * t.overshoot_m),
+    ),
+    (
+        "Position stabilisation time",
+        "from the end of the last commanded move until the tool stays within the band",
+        "s",
+        |s| s.tcp.as_ref().and_then(|t| t.settling_s),
+    ),
+    ("Pose accuracy (AP)", "largest distance from the rigid tool at rest, over all stops", "mm", |s| {
+        let rests = s.tcp.as_ref()?.holds.iter().map(|hold| 1e3 * hold.final_m);
+        rests.reduce(f64::max)
+    }),
+    ("Static sag", "distance from the rigid tool at rest at the start", "mm", |s| {
+        s.tcp.as_ref().map(|t| 1e3 * t.static_sag_m)
+    }),
+];
+
+fn iso_table(runs: &[ReportRun<'_>]) -> String {
+    if runs.iter().all(|run| run.summary.tcp.is_none()) {
+        return "<h2 id=\"tables\">Tables</h2>\n".to_owned();
+    }
+    let mut out = "<section id=\"tables\" class=\"block\"><h2>ISO 9283-style figures</h2>\n\
+                   <p class=\"note\">ISO 9283-style, not a conformity test: one deterministic cycle against the rigid twin as the command, \
+                   not thirty measured cycles.</p>\n<div class=\"scroll\"><table><thead><tr><th>figure</th><th>meaning</th>"
+        .to_owned();
+    for run in runs {
+        let name = if runs.len() > 1 { escaped(run.label) } else { "value".into() };
+        let _ = write!(out, "<th class=\"number\">{name}</th>");
+    }
+    out += "<th>unit</th></tr></thead><tbody>";
+    for (name, meaning, unit, value) in ISO {
+        let _ = write!(out, "<tr><th>{name}</th><td class=\"text\">{meaning}</td>");
+        for run in runs {
+            let value = value(run.summary).map_or_else(|| "–".into(), |v| number(v, 5));
+            let _ = write!(out, "<td class=\"number\">{value}</td>");
+        }
+        let _ = write!(out, "<td>{unit}</td></tr>");
+    }
+    out + "</tbody></table></div></section>\n"
+}
+
+/// A table with a heading (as HTML); cells that are numbers are set to the right.
+fn table(title: &str, head: &[&str], rows: &[Vec<String>]) -> String {
+    if rows.is_empty() {
+        return String::new();
+    }
+    let is_number = |column: usize| {
+        column > 0 && rows.iter().all(|row| row[column].starts_with(|c: char| "-–0123456789".contains(c)))
+    };
+    let class = |column: usize| if is_number(column) { " class=\"number\"" } else { "" };
+    let heads: String =
+        head.iter().enumerate().map(|(k, name)| format!("<th{}>{}</th>", class(k), escaped(name))).collect();
+    let mut out = format!(
+        "<section class=\"block\"><h2>{title}</h2><div class=\"scroll\"><table><thead><tr>{heads}</tr></thead><tbody>"
+    );
+    for row in rows {
+        let cells: String = (row.iter().enumerate().skip(1))
+            .map(|(k, cell)| format!("<td{}>{}</td>", class(k), escaped(cell)))
+            .collect();
+        let _ = write!(out, "<tr><th>{}</th>{cells}</tr>", escaped(&row[0]));
+    }
+    out + "</tbody></table></div></section>\n"
+}
+
+fn stops_table(s: &Summary, of: &str) -> String {
+    let Some(tcp) = &s.tcp else { return String::new() };
+    let optional = |x: Option<f64>| x.map_or_else(|| "–".into(), |x| number(x, 4));
+    let rows: Vec<Vec<String>> = (tcp.holds.iter().enumerate())
+        .map(|(k, hold)| {
+            vec![
+                (k + 1).to_string(),
+                number(hold.start_s, 5),
+                number(hold.end_s, 5),
+                number(1e3 * hold.final_m, 4),
+                optional(hold.settling_s),
+                number(1e3 * hold.overshoot_m, 4),
+                optional(hold.ringing_hz),
+            ]
+        })
+        .collect();
+    let head =
+        ["stop", "from (s)", "to (s)", "error at rest (mm)", "settled after (s)", "overshoot (mm)", "rings at (Hz)"];
+    table(&format!("Stops{of}"), &head, &rows)
+}
+
+fn parts_tables(s: &Summary, of: &str) -> String {
+    let row = |kind: &str, name: &str, share: f64, turn: f64, strain: Option<f64>| {
+        let strain = strain.map_or_else(|| "–".into(), |x| number(x, 3));
+        vec![name.to_owned(), kind.to_owned(), number(1e3 * share, 4), number(1e3 * turn, 4), strain]
+    };
+    let links = s
+        .links
+        .iter()
+        .map(|l| row("link", &l.name, l.peak_contribution_m, l.peak_rotation_rad, Some(l.engineering_strain)));
+    let drives =
+        s.elastic_drives.iter().map(|d| row("drive", &d.joint, d.peak_contribution_m, d.peak_deflection_rad, None));
+    let rows: Vec<_> = links.chain(drives).collect();
+    let head =
+        ["name", "kind", "largest share of TCP error (mm)", "largest rotation (mrad)", "change of length (relative)"];
+    let mut out = table(&format!("Flexible links and drives{of}"), &head, &rows);
+
+    let forces: Vec<_> = s.drives.iter().map(|(joint, peak)| vec![joint.clone(), number(*peak, 5)]).collect();
+    let frequencies: Vec<_> = (s.frequencies_hz.iter().take(12).enumerate())
+        .map(|(k, hz)| vec![format!("f{}", k + 1), number(*hz, 5)])
+        .collect();
+    let e = &s.energy;
+    let energies = [
+        ("work of the drives", e.drives_j, "J"),
+        ("work of external loads", e.loads_j, "J"),
+        ("came with payloads", e.payload_j, "J"),
+        ("dissipated", e.dissipated_j, "J"),
+        ("stored", e.stored_j, "J"),
+        ("balance open by", 100.0 * e.imbalance, "%"),
+    ];
+    let energies: Vec<_> =
+        energies.iter().map(|(name, x, unit)| vec![(*name).to_owned(), number(*x, 4), (*unit).to_owned()]).collect();
+    out += "<div class=\"columns\">\n";
+    out += &table(&format!("Largest forces of the drives{of}"), &["joint", "N m, or N if it slides"], &forces);
+    out += &table(&format!("Natural frequencies at the start{of}"), &["mode", "Hz"], &frequencies);
+    out += &table(&format!("Energy over the run{of}"), &["what", "value", "unit"], &energies);
+    out + "</div>\n"
+}
+
+fn inputs(run: &ReportRun<'_>, named: bool) -> String {
+    let (s, header) = (run.summary, &run.trace.header);
+    let who = if named { format!(" of {}", escaped(run.label)) } else { String::new() };
+    let id = if named { "" } else { " id=\"inputs\"" };
+    let mut out = format!("<section{id} class=\"block\"><h2>Inputs and versions{who}</h2>\n<div class=\"groups\">\n");
+    let mut group = |title: &str, rows: &[(String, String)]| {
+        let rows: String = (rows.iter().filter(|(_, value)| !value.is_empty()))
+            .map(|(key, value)| format!("<dt>{}</dt><dd>{}</dd>", escaped(key), escaped(value)))
+            .collect();
+        if !rows.is_empty() {
+            let _ = writeln!(out, "<div><h3>{}</h3><dl>{rows}</dl></div>", escaped(title));
+        }
+    };
+    for (title, rows) in &header.metadata {
+        group(title, rows);
+    }
+    let text = |x: Option<f64>| x.map_or_else(String::new, |x| number(x, 6));
+    let word = |x: &Option<String>| x.clone().unwrap_or_default();
+    let step = &s.stepper;
+    let rows = [
+        ("name", step.name.clone()),
+        ("step_s", number(step.h_s, 6)),
+        ("rho_inf", text(step.rho_inf)),
+        ("dispersion_correction", step.dispersion_correction.map_or_else(String::new, |on| on.to_string())),
+        ("form", word(&step.form)),
+        ("preset", word(&step.preset)),
+        ("rtol", text(step.rtol)),
+        ("method", word(&step.method)),
+        ("steps", step.steps.to_string()),
+        ("evaluations", step.evaluations.to_string()),
+        ("factorisations", step.factorisations.to_string()),
+    ];
+    group("stepper", &rows.map(|(key, value)| (key.to_owned(), value)));
+    // File names alone: the same run in another folder is the same page.
+    let f = &s.files;
+    let names: Vec<String> = [&f.report, &f.report_md, &f.mcap, &f.rrd, &f.csv, &f.figures]
+        .into_iter()
+        .flatten()
+        .filter_map(|path| std::path::Path::new(path).file_name().map(|name| name.to_string_lossy().into_owned()))
+        .collect();
+    group("files beside this page", &[("files".to_owned(), names.join(", "))]);
+    out + "</div></section>\n"
+}
+
+/// What depends on the machine and the day, in one place.
+fn timings(runs: &[ReportRun<'_>]) -> String {
+    let text = |run: &ReportRun<'_>| {
+        let s = run.summary;
+        let who = if runs.len() > 1 { format!("{}: ", run.label) } else { String::new() };
+        escaped(&format!(
+            "{who}{:.2} s simulated in {:.2} s ({:.0} times real time), {:.1} ms processor time per simulated second.",
+            s.duration_s,
+            s.wall_s,
+            s.real_time_factor,
+            1e3 * s.cpu_s_per_simulated_s
+        ))
+    };
+    let lines: Vec<String> = runs.iter().map(text).collect();
+    format!("<p id=\"timings\" class=\"note\">{}</p>\n", lines.join("<br>"))
+}
+
+/// What the plots are made of, as JSON that may stand in a script element.
+fn data(runs: &[ReportRun<'_>]) -> String {
+    let list = |items: Vec<String>| format!("[{}]", items.join(","));
+    let run = |run: &ReportRun<'_>| {
+        let events = run.trace.result.events.iter().map(|event| {
+            let (kind, text) = (json_text(event.kind.word()), json_text(&event.text));
+            format!("{{\"t\":{},\"kind\":{kind},\"text\":{text}}}", short(event.time_s, 7))
+        });
+        let plots = plots(run.summary, run.trace).iter().map(json_plot).collect();
+        format!(
+            "{{\"label\":{},\"events\":{},\"plots\":{}}}",
+            json_text(run.label),
+            list(events.collect()),
+            list(plots)
+        )
+    };
+    let several: Vec<_> = runs.iter().map(|run| (run.label, run.summary, run.trace)).collect();
+    let overlays = if runs.len() > 1 { overlays(&several) } else { Vec::new() };
+    let overlays = list(overlays.iter().map(json_plot).collect());
+    let json = format!("{{\"runs\":{},\"overlays\":{overlays}}}", list(runs.iter().map(run).collect()));
+    // No text in it can end the script element or begin a comment.
+    json.replace('<', "\\u003c")
+}
+
+fn json_text(text: &str) -> String {
+    serde_json::to_string(text).expect("text is JSON")
+}
+
+/// The shorter form of a number with so many significant digits; null if it is none.
+fn short(x: f64, digits: usize) -> String {
+    if !x.is_finite() {
+        return "null".into();
+    }
+    let rounded: f64 = format!("{x:.*e}", digits - 1).parse().unwrap_or(x);
+    let rounded = if rounded == 0.0 { 0.0 } else { rounded };
+    let (plain, scientific) = (format!("{rounded}"), format!("{rounded:e}"));
+    if scientific.len() < plain.len() { scientific } else { plain }
+}
+
+fn json_plot(plot: &Plot) -> String {
+    let numbers = |values: &[f64], digits| values.iter().map(|x| short(*x, digits)).collect::<Vec<_>>().join(",");
+    let views = plot.views.iter().map(|view| {
+        let tables = view.tables.iter().map(|table| {
+            let curves = table.curves.iter().map(|curve| {
+                let kind = match curve.kind {
+                    Kind::Plain => "",
+                    Kind::Total => "total",
+                    Kind::Dashed => "dashed",
+                };
+                let name = json_text(&curve.name);
+                format!("{{\"name\":{name},\"kind\":\"{kind}\",\"y\":[{}]}}", numbers(&curve.y, 5))
+            });
+            let curves = curves.collect::<Vec<_>>().join(",");
+            format!("{{\"x\":[{}],\"curves\":[{curves}]}}", numbers(&table.x, 7))
+        });
+        let (name, unit) = (json_text(&view.name), json_text(view.y_unit));
+        format!("{{\"name\":{name},\"unit\":{unit},\"tables\":[{}]}}", tables.collect::<Vec<_>>().join(","))
+    });
+    let marks = plot.marks.iter().map(|(x, text)| format!("{{\"x\":{},\"text\":{}}}", short(*x, 6), json_text(text)));
+    let texts = [
+        ("id", plot.id),
+        ("section", plot.section),
+        ("title", plot.title),
+        ("note", &plot.note),
+        ("xLabel", plot.x_label),
+        ("xUnit", plot.x_unit),
+        ("yLabel", plot.y_label),
+        ("yUnit", plot.y_unit),
+    ];
+    let texts: String = texts.iter().map(|(key, text)| format!("\"{key}\":{},", json_text(text))).collect();
+    format!(
+        "{{{texts}\"time\":{},\"log\":{},\"wide\":{},\"marks\":[{}],\"views\":[{}]}}",
+        plot.over_time,
+        plot.logarithmic,
+        plot.wide,
+        marks.collect::<Vec<_>>().join(","),
+        views.collect::<Vec<_>>().join(",")
+    )
+}

@@ -1,0 +1,216 @@
+//! The report of a run: a page for the browser, its figures as Markdown and JSON, figures for papers.
+//!
+//! Start at [`html`]; what a person wants to see in numbers is in [`figure_groups`], which page, Markdown and the
+//! terminal share. `curves` makes the data of the plots, `picture` has the arm drawn, `figures` writes the folder for papers.
+
+mod curves;
+mod figures;
+mod html;
+mod picture;
+
+use std::fmt::Write as _;
+
+use flexarm_log::Trace;
+
+use crate::error::Error;
+use crate::options::Outputs;
+use crate::record::FIGURES_FOLDER;
+use crate::result_files::write_all;
+use crate::summary::Summary;
+
+pub use html::{ReportRun, html};
+
+/// Writes report, figures and `summary.json` into the output folder.
+pub(crate) fn write(outputs: &Outputs, summary: &Summary, trace: &Trace) -> Result<(), Error> {
+    let label = format!("{} on {}", summary.robot, summary.trajectory);
+    write_page(outputs, summary, &html(&[ReportRun { label: &label, summary, trace }]))?;
+    match outputs.figures {
+        true => figures::write(&outputs.folder.join(FIGURES_FOLDER), summary, trace),
+        false => Ok(()),
+    }
+}
+
+/// Writes report and `summary.json` of several runs into the output folder; the summary has all but the first within.
+pub(crate) fn write_study(outputs: &Outputs, summary: &Summary, traces: &[(String, Trace)]) -> Result<(), Error> {
+    let summaries = std::iter::once(summary).chain(&summary.with);
+    let runs: Vec<ReportRun<'_>> =
+        summaries.zip(traces).map(|(summary, (label, trace))| ReportRun { label, summary, trace }).collect();
+    write_page(outputs, summary, &html(&runs))
+}
+
+fn write_page(outputs: &Outputs, summary: &Summary, page: &str) -> Result<(), Error> {
+    let json = serde_json::to_string_pretty(summary).expect("plain numbers and strings") + "\n";
+    let files = [("report.md", markdown(summary)), ("report.html", page.to_owned()), ("summary.json", json)];
+    write_all(&files.map(|(name, text)| (outputs.folder.join(name), text)))
+}
+
+/// The figures for people without what depends on the machine and its load.
+pub(crate) fn timeless_rows(summary: &Summary) -> Vec<(String, String)> {
+    let of_run: Vec<String> = run_figures(summary).into_iter().map(|figure| figure.name).collect();
+    rows(summary).into_iter().filter(|(name, _)| !of_run.contains(name)).collect()
+}
+
+/// The summary as a page of Markdown.
+pub fn markdown(summary: &Summary) -> String {
+    let mut page = format!("# {} on {}\n\n", summary.robot, summary.trajectory);
+    page += "| figure | value |\n| --- | --- |\n";
+    for (name, value) in rows(summary) {
+        let _ = writeln!(page, "| {name} | {value} |");
+    }
+    if !summary.with.is_empty() {
+        page += "\n## Runs of the study\n\n";
+        page += &crate::study::table(summary);
+    }
+    if !summary.warnings.is_empty() {
+        page += "\n## Warnings\n\n";
+        for warning in &summary.warnings {
+            let _ = writeln!(page, "- {warning}");
+        }
+    }
+    page
+}
+
+/// The figures that a person wants to see, with readable units, in one column.
+pub fn rows(summary: &Summary) -> Vec<(String, String)> {
+    let text = |row: Figure| {
+        let parts = [row.value.as_str(), row.unit].into_iter().filter(|part| !part.is_empty());
+        let value = parts.collect::<Vec<_>>().join(" ");
+        let text = match (value.is_empty(), row.note.is_empty()) {
+            (false, false) => format!("{value}, {}", row.note),
+            (false, true) => value,
+            (true, _) => row.note,
+        };
+        (row.name, text)
+    };
+    figure_groups(summary).into_iter().flat_map(|group| group.rows).map(text).collect()
+}
+
+/// Figures that belong together.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FigureGroup {
+    /// Heading.
+    pub title: &'static str,
+    /// In the order to be shown.
+    pub rows: Vec<Figure>,
+}
+
+/// A figure in readable units.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Figure {
+    /// What it is.
+    pub name: String,
+    /// The number; empty if there is none.
+    pub value: String,
+    /// Its unit.
+    pub unit: &'static str,
+    /// What else is to be said.
+    pub note: String,
+    /// How much it matters.
+    pub weight: Weight,
+}
+
+/// How much a figure matters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Weight {
+    /// One of many.
+    Plain,
+    /// The answer.
+    Headline,
+    /// Something is wrong.
+    Alert,
+}
+
+impl Figure {
+    fn new(name: impl Into<String>, value: impl Into<String>, unit: &'static str, note: impl Into<String>) -> Self {
+        Self { name: name.into(), value: value.into(), unit, note: note.into(), weight: Weight::Plain }
+    }
+}
+
+/// The figures of a run in groups: what the tool does, what links and drives contribute, how the run went.
+pub fn figure_groups(summary: &Summary) -> Vec<FigureGroup> {
+    let groups = [
+        FigureGroup { title: "TCP", rows: tool_figures(summary) },
+        FigureGroup { title: "links and drives", rows: part_figures(summary) },
+        FigureGroup { title: "run", rows: run_figures(summary) },
+    ];
+    groups.into_iter().filter(|group| !group.rows.is_empty()).collect()
+}
+
+fn mm(x: f64) -> String {
+    format!("{:.4}", 1e3 * x)
+}
+
+fn tool_figures(summary: &Summary) -> Vec<Figure> {
+    let mut rows = Vec::new();
+    if summary.end != "complete" {
+        let stopped = Figure::new("STOPPED EARLY", "", "", summary.end.clone());
+        rows.push(Figure { weight: Weight::Alert, ..stopped });
+    }
+    let Some(tcp) = &summary.tcp else { return rows };
+    let peak = Figure::new("peak TCP error", mm(tcp.peak_m), "mm", format!("at {:.3} s", tcp.t_peak_s));
+    rows.push(Figure { weight: Weight::Headline, ..peak });
+    rows.push(Figure::new("RMS TCP error", mm(tcp.rms_m), "mm", ""));
+    let [along, normal, binormal] = tcp.path_peak_m;
+    rows.push(Figure::new("peak along the path", mm(along), "mm", ""));
+    let across = format!("out of its plane {} mm", mm(binormal));
+    rows.push(Figure::new("peak normal to the path", mm(normal), "mm", across));
+    rows.push(Figure::new("path accuracy", mm(tcp.path_accuracy_m), "mm", "largest distance from the path in motion"));
+    rows.push(Figure::new("static sag at the start", mm(tcp.static_sag_m), "mm", ""));
+    rows.push(Figure::new("error at the end", mm(tcp.end_m), "mm", ""));
+    let rms = format!("RMS {} mrad", mm(tcp.rms_rad));
+    rows.push(Figure::new("peak rotation", mm(tcp.peak_rad), "mrad", rms));
+    rows.push(Figure::new("overshoot after a move", mm(tcp.overshoot_m), "mm", ""));
+    rows.push(match tcp.settling_s {
+        Some(s) => Figure::new("settling time", format!("{s:.3}"), "s", "after the last move"),
+        None => Figure::new("settling time", "", "", "not within the recording"),
+    });
+    if let Some(hz) = tcp.dominant_hz {
+        rows.push(Figure::new("dominant frequency", format!("{hz:.2}"), "Hz", ""));
+    }
+    rows
+}
+
+fn part_figures(summary: &Summary) -> Vec<Figure> {
+    let mut rows = Vec::new();
+    for link in &summary.links {
+        let (strain, turn) = (link.engineering_strain, mm(link.peak_rotation_rad));
+        let note = format!("of TCP motion; strain {strain:.1e}, bends by {turn} mrad");
+        rows.push(Figure::new(format!("link {}", link.name), mm(link.peak_contribution_m), "mm", note));
+    }
+    for drive in &summary.elastic_drives {
+        let note = format!("of TCP motion; gives way by {} mrad", mm(drive.peak_deflection_rad));
+        rows.push(Figure::new(format!("drive {}", drive.joint), mm(drive.peak_contribution_m), "mm", note));
+    }
+    if let Some(first) = summary.frequencies_hz.first() {
+        let others: Vec<String> = summary.frequencies_hz.iter().skip(1).take(3).map(|f| format!("{f:.2}")).collect();
+        let note = if others.is_empty() { String::new() } else { format!("then {} Hz", others.join(", ")) };
+        rows.push(Figure::new("first frequency", format!("{first:.2}"), "Hz", note));
+    }
+    let e = &summary.energy;
+    if e.drives_j != 0.0 || e.loads_j != 0.0 {
+        let mut note = String::new();
+        if e.loads_j != 0.0 {
+            let _ = write!(note, "by loads {:.3} J, ", e.loads_j);
+        }
+        if e.payload_j != 0.0 {
+            let _ = write!(note, "with payloads {:.3} J, ", e.payload_j);
+        }
+        let (dissipated, stored) = (e.dissipated_j, e.stored_j);
+        let _ = write!(note, "dissipated {dissipated:.3} J, stored {stored:.3} J; open by {:.1e}", e.imbalance);
+        rows.push(Figure::new("energy by the drives", format!("{:.3}", e.drives_j), "J", note));
+    }
+    rows
+}
+
+fn run_figures(summary: &Summary) -> Vec<Figure> {
+    let s = &summary.stepper;
+    let evaluations = s.evaluations as f64 / s.steps.max(1) as f64;
+    let work = format!("{}, {} ms, {evaluations:.1} evaluations each", s.name, 1e3 * s.h_s);
+    let (wall, factor) = (summary.wall_s, summary.real_time_factor);
+    vec![
+        Figure::new("steps", s.steps.to_string(), "", work),
+        Figure::new("simulated", format!("{:.2}", summary.duration_s), "s", ""),
+        Figure::new("in", format!("{wall:.2}"), "s", format!("{factor:.0} times real time")),
+        Figure::new("processor", format!("{:.1}", 1e3 * summary.cpu_s_per_simulated_s), "ms", "per simulated second"),
+    ]
+}

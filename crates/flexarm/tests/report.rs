@@ -1,0 +1,248 @@
+//! The report page of real runs: it loads nothing, says what the runs said, and is the same for the same run.
+#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
+
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+use flexarm::{
+    LinkModel, LoadOptions, Modelling, Motion, Outputs, ReportRun, Robot, RunOptions, Summary, html, markdown,
+    simulate_traced,
+};
+use flexarm_log::Trace;
+
+type Run = (Summary, Trace);
+
+fn run(robot: &str, trajectory: &str, options: &RunOptions, outputs: Option<&Outputs>) -> Run {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let robot = Robot::load(&root.join("robots").join(robot), &LoadOptions::default()).unwrap();
+    let model = robot.rigid_model().unwrap();
+    let motion = Motion::load(&root.join("trajectories").join(trajectory), &model).unwrap();
+    simulate_traced(&robot, &motion, options, outputs, &mut |_, _| ControlFlow::Continue(())).unwrap()
+}
+
+/// The shipped arm on its cycle, run once for all tests.
+fn arm() -> &'static Run {
+    static RUN: OnceLock<Run> = OnceLock::new();
+    RUN.get_or_init(|| run("kr210", "pick_and_place.toml", &RunOptions::default(), None))
+}
+
+fn page_of((summary, trace): &Run) -> String {
+    html(&[ReportRun { label: "run", summary, trace }])
+}
+
+/// The page without the paragraph of timings.
+fn timeless(page: &str) -> String {
+    let (before, rest) = page.split_once("<p id=\"timings\"").unwrap();
+    before.to_owned() + rest.split_once("</p>").unwrap().1
+}
+
+fn data_of(page: &str) -> serde_json::Value {
+    let (_, rest) = page.split_once("<script type=\"application/json\" id=\"data\">").unwrap();
+    serde_json::from_str(rest.split_once("</script>").unwrap().0).unwrap()
+}
+
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        Self(std::env::temp_dir().join(format!("flexarm-report-{}-{name}", std::process::id())))
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+#[test]
+fn the_page_refers_to_nothing_outside() {
+    let page = page_of(arm());
+    for scheme in ["http:", "https:", "file:", "ftp:", "//cdn", "@import", "url(", "import("] {
+        assert!(!page.contains(scheme), "{scheme} at {:?}", page.find(scheme).map(|at| &page[at - 40..at + 40]));
+    }
+    for attribute in [" src=", " href=", " srcset=", " action="] {
+        for (at, _) in page.match_indices(attribute) {
+            let value = page[at + attribute.len()..].trim_start_matches('"');
+            assert!(value.starts_with("data:") || value.starts_with('#'), "{}", &page[at..at + 60]);
+        }
+    }
+    for tag in ["<link", "<iframe", "<object", "<embed", "<base"] {
+        assert!(!page.contains(tag), "{tag}");
+    }
+}
+
+#[test]
+fn the_page_of_the_shipped_arm_is_small_and_complete() {
+    let (summary, trace) = arm();
+    let page = page_of(arm());
+    assert!(page.len() < 3_000_000, "{} bytes", page.len());
+    assert!(page.contains("ISO 9283-style, not a conformity test"));
+    assert!(page.contains(&format!("{:.3}", 1e3 * summary.tcp.as_ref().unwrap().peak_m)), "the peak is a tile");
+    if cfg!(feature = "png") {
+        assert_eq!(page.matches("src=\"data:image/png;base64,").count(), 2);
+    } else {
+        assert!(page.contains("without the feature png"));
+    }
+    let data = data_of(&page);
+    let plots = data["runs"][0]["plots"].as_array().unwrap();
+    let ids: Vec<&str> = plots.iter().map(|plot| plot["id"].as_str().unwrap()).collect();
+    for id in ["tcp_error", "path_time", "path_length", "spectrum", "contributions", "element_force", "torques"] {
+        assert!(ids.contains(&id), "{id} of {ids:?}");
+    }
+    // Truth: the largest error of the run, to the five digits of the page.
+    let size = &plots[0]["views"][0]["tables"][0]["curves"][0];
+    let largest = size["y"].as_array().unwrap().iter().map(|y| y.as_f64().unwrap()).fold(0.0, f64::max);
+    assert!((largest / (1e3 * summary.tcp.as_ref().unwrap().peak_m) - 1.0).abs() < 1e-4);
+    let events = data["runs"][0]["events"].as_array().unwrap();
+    assert_eq!(events.len(), trace.result.events.len());
+    for plot in plots {
+        for table in plot["views"].as_array().unwrap().iter().flat_map(|v| v["tables"].as_array().unwrap()) {
+            let x = table["x"].as_array().unwrap();
+            assert!(x.len() <= 3100, "{} points in {}", x.len(), plot["id"]);
+            assert!(x.windows(2).all(|pair| pair[0].as_f64() <= pair[1].as_f64()), "{} ascends", plot["id"]);
+            assert!(table["curves"].as_array().unwrap().iter().all(|c| c["y"].as_array().unwrap().len() == x.len()));
+        }
+    }
+}
+
+#[test]
+fn the_same_run_gives_the_same_page_but_for_its_timings() {
+    let options = RunOptions::default();
+    let pages = [(); 2].map(|()| page_of(&run("one_beam", "beam_swing.toml", &options, None)));
+    assert!(timeless(&pages[0]) == timeless(&pages[1]));
+    // Other timings alone change that paragraph alone.
+    let (summary, trace) = arm();
+    let slower =
+        Summary { wall_s: 12.345, cpu_s: 3.0, real_time_factor: 0.5, cpu_s_per_simulated_s: 2.0, ..summary.clone() };
+    let [page, slow] = [summary, &slower].map(|s| html(&[ReportRun { label: "run", summary: s, trace }]));
+    assert!(page != slow && timeless(&page) == timeless(&slow));
+}
+
+#[test]
+fn names_cannot_break_the_page() {
+    const EVIL: &str = "</script><script>alert(1)</script><b a='x' b=\"y\">&amp; <!-- \\ \u{2028}";
+    let harmless = run("one_beam", "beam_swing.toml", &RunOptions::default(), None);
+    let (mut summary, mut trace) = harmless.clone();
+    summary.robot = EVIL.into();
+    summary.warnings.push(EVIL.into());
+    summary.end = EVIL.into();
+    summary.links[0].name = EVIL.into();
+    trace.header.contributors[0] = EVIL.into();
+    trace.header.metadata.push((EVIL.into(), vec![(EVIL.into(), EVIL.into())]));
+    trace.result.events[0].text = EVIL.into();
+    for count in [1, 2] {
+        let page = html(&vec![ReportRun { label: EVIL, summary: &summary, trace: &trace }; count]);
+        let plain = html(&vec![ReportRun { label: "x", summary: &harmless.0, trace: &harmless.1 }; count]);
+        for piece in ["</script>", "<script>", "<!--", "<b "] {
+            assert_eq!(page.matches(piece).count(), plain.matches(piece).count(), "{piece}");
+        }
+        let data = data_of(&page);
+        assert_eq!(data["runs"][0]["events"][0]["text"], EVIL, "what is said is said");
+        assert_eq!(data["runs"][0]["label"], EVIL);
+    }
+}
+
+#[test]
+fn a_run_without_a_twin_leaves_out_what_needs_one() {
+    let options = RunOptions { with_twin: false, ..RunOptions::default() };
+    let run = run("one_beam", "beam_swing.toml", &options, None);
+    let page = page_of(&run);
+    for absent in ["ISO 9283", "Peak TCP error", "data:image/png", "\"tcp_error\"", "\"contributions\""] {
+        assert!(!page.contains(absent), "{absent}");
+    }
+    for present in ["\"torques\"", "\"element_moment\"", "\"energy\"", "First natural frequency"] {
+        assert!(page.contains(present), "{present}");
+    }
+}
+
+#[test]
+fn several_runs_lie_over_each_other() {
+    let modelling = Modelling { links: LinkModel::Rigid, ..Modelling::default() };
+    let rigid = run("kr210", "pick_and_place.toml", &RunOptions { modelling, ..RunOptions::default() }, None);
+    let fine = run("kr210", "pick_and_place.toml", &RunOptions { step_s: 2e-3, ..RunOptions::default() }, None);
+    let runs = [("as it is", arm()), ("coarse <step>", &fine), ("rigid", &rigid)];
+    let runs = runs.map(|(label, (summary, trace))| ReportRun { label, summary, trace });
+    let page = html(&runs);
+    let data = data_of(&page);
+    assert_eq!(data["runs"].as_array().unwrap().len(), 3);
+    let overlays = data["overlays"].as_array().unwrap();
+    let ids: Vec<&str> = overlays.iter().map(|plot| plot["id"].as_str().unwrap()).collect();
+    assert_eq!(ids, ["all_error", "all_path", "all_spectrum"]);
+    for plot in &overlays[..2] {
+        let tables = plot["views"][0]["tables"].as_array().unwrap();
+        let labels: Vec<&str> = tables.iter().map(|t| t["curves"][0]["name"].as_str().unwrap()).collect();
+        assert_eq!(labels, ["as it is", "coarse <step>", "rigid"]);
+    }
+    assert!(page.contains("Figures side by side") && page.contains("coarse &lt;step&gt;"));
+    if cfg!(feature = "png") {
+        assert_eq!(page.matches("src=\"data:image/png;base64,").count(), 6, "two pictures of each run");
+    }
+}
+
+#[test]
+fn no_runs_and_runs_without_a_sample_still_make_a_page() {
+    assert!(html(&[]).contains("<title>"));
+    let page = html(&[ReportRun { label: "", summary: &Summary::default(), trace: &Trace::default() }]);
+    assert!(page.contains("</html>"));
+}
+
+#[test]
+fn the_summary_can_be_read_back() {
+    let (summary, _) = arm();
+    let json = serde_json::to_string(summary).unwrap();
+    let read: Summary = serde_json::from_str(&json).unwrap();
+    assert_eq!(Summary { error_curve: summary.error_curve.clone(), ..read.clone() }, *summary);
+    assert_eq!(serde_json::to_string(&read).unwrap(), json);
+    // A file of an older version lacks keys.
+    let mut old: serde_json::Value = serde_json::from_str(&json).unwrap();
+    for key in ["moves_s", "files", "tcp"] {
+        old.as_object_mut().unwrap().remove(key);
+    }
+    let read: Summary = serde_json::from_value(old).unwrap();
+    assert_eq!((read.tcp, read.robot), (None, summary.robot.clone()));
+}
+
+#[test]
+fn the_files_of_a_run_are_written_and_not_overwritten() {
+    let folder = Folder::new("files");
+    let outputs = Outputs { csv: false, mcap: false, rrd: false, figures: true, ..Outputs::everything(&folder.0) };
+    let (summary, _) = run("one_beam", "beam_swing.toml", &RunOptions::default(), Some(&outputs));
+    let text = |name: &str| std::fs::read_to_string(folder.0.join(name)).unwrap();
+    assert!(summary.files.report.as_ref().unwrap().ends_with("report.html"));
+    assert!(summary.files.report_md.as_ref().unwrap().ends_with("report.md"));
+    assert_eq!(text("report.md"), markdown(&summary));
+    assert!(text("report.html").contains("one_beam on beam_swing"));
+    let read: Summary = serde_json::from_str(&text("summary.json")).unwrap();
+    assert_eq!(read.files, summary.files);
+
+    let figures = folder.0.join("figures");
+    assert_eq!(summary.files.figures, Some(figures.display().to_string()));
+    let names: Vec<String> =
+        std::fs::read_dir(&figures).unwrap().map(|f| f.unwrap().file_name().into_string().unwrap()).collect();
+    assert_eq!(names.contains(&"arm_side.png".to_owned()), cfg!(feature = "png"));
+    let svgs = names.iter().filter(|name| name.ends_with(".svg"));
+    for svg in svgs.clone() {
+        assert!(text(&format!("figures/{svg}")).contains("width=\"88mm\""), "{svg}");
+        let csv = text(&format!("figures/{}", svg.replace(".svg", ".csv")));
+        assert!(csv.lines().count() > 10 && csv.lines().next().unwrap().contains('_'), "{svg}: {csv}");
+    }
+    assert!(svgs.count() >= 10);
+    assert!(text("figures/tcp_error.csv").starts_with("time_s,size_mm,x_mm,y_mm,z_mm\n"));
+
+    // Any one of them in the way stops the next run before it writes.
+    for name in ["report.html", "report.md", "summary.json", "figures"] {
+        let other = Folder::new(name);
+        std::fs::create_dir_all(&other.0).unwrap();
+        std::fs::write(other.0.join(name), "mine").unwrap();
+        let outputs = Outputs { folder: other.0.clone(), ..outputs.clone() };
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+        let robot = Robot::load(&root.join("robots/one_beam"), &LoadOptions::default()).unwrap();
+        let motion = Motion::load(&root.join("trajectories/beam_swing.toml"), &robot.rigid_model().unwrap()).unwrap();
+        let go = &mut |_, _| ControlFlow::Continue(());
+        let error = simulate_traced(&robot, &motion, &RunOptions::default(), Some(&outputs), go).unwrap_err();
+        assert!(error.to_string().contains(name), "{error}");
+        assert_eq!(std::fs::read_to_string(other.0.join(name)).unwrap(), "mine");
+    }
+}
