@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use flexarm::{DriveModel, LinkModel, Modelling};
 
+use crate::convert::ConvertArgs;
 use crate::exchange_args::{ExportArgs, ImportArgs};
 use crate::posed_args::{ModesArgs, ResponseArgs, StaticsArgs};
 use crate::reduce_args::ReduceArgs;
@@ -42,6 +43,8 @@ pub(crate) enum Command {
     Modes(ModesArgs),
     /// Frequency response of the TCP to forces on it and to motions of joints
     Response(ResponseArgs),
+    /// Write a recording as MCAP, Rerun, CSV or Parquet, from any of them
+    Convert(ConvertArgs),
     /// Make a flexible link of a finite element mesh, with its checks
     Reduce(Box<ReduceArgs>),
     /// Make a flexible link of matrices from another FE program
@@ -175,6 +178,9 @@ pub(crate) struct RunArgs {
     /// Write a folder "figures" for papers too: plots as SVG with their data as CSV, pictures of the arm as PNG
     #[arg(long)]
     pub(crate) figures: bool,
+    /// Write the table as Parquet too (run.parquet); not readable before the run ends
+    #[arg(long, conflicts_with = "no_files")]
+    pub(crate) parquet: bool,
     /// Write nothing, only print the figures
     #[arg(long, conflicts_with_all = ["output", "force", "figures"])]
     pub(crate) no_files: bool,

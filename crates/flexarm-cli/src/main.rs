@@ -2,6 +2,7 @@
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "printing is what this face is for")]
 
 mod args;
+mod convert;
 mod exchange;
 mod exchange_args;
 mod posed;
@@ -78,6 +79,7 @@ fn run(cli: &Cli) -> Result<ExitCode, Error> {
         Command::Statics(args) => posed::statics(cli, args),
         Command::Modes(args) => posed::modes(cli, args),
         Command::Response(args) => posed::response(cli, args),
+        Command::Convert(args) => convert::run(cli, args),
         Command::Reduce(args) => reduce::run(cli, args),
         Command::Import(args) => exchange::import(cli, args),
         Command::Export(args) => exchange::export(cli, args),
@@ -188,7 +190,8 @@ fn simulate(cli: &Cli, args: &RunArgs, with_twin: bool) -> Result<ExitCode, Erro
     let outputs = (!args.no_files).then(|| {
         let stem = format!("{}-{}", robot.name, motion.name);
         let folder = args.output.clone().unwrap_or_else(|| shipped::new_output_folder(&stem));
-        Outputs { overwrite: args.force, figures: args.figures, ..Outputs::everything(folder) }
+        let outputs = Outputs::everything(folder);
+        Outputs { overwrite: args.force, figures: args.figures, parquet: args.parquet, ..outputs }
     });
 
     let stop = Arc::new(AtomicBool::new(false));

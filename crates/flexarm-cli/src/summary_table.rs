@@ -78,6 +78,7 @@ pub(crate) fn summary(summary: &Summary, width: usize) -> String {
         ("Rerun", &f.rrd),
         ("MCAP", &f.mcap),
         ("CSV", &f.csv),
+        ("Parquet", &f.parquet),
         ("figures", &f.figures),
     ];
     let mut files = files.into_iter().filter_map(|(what, path)| path.as_ref().map(|path| (what, path))).peekable();

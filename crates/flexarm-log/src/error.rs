@@ -63,6 +63,19 @@ pub enum LogError {
         limit_s: f64,
     },
 
+    /// A file that is to be read is no recording, or not one that can be read.
+    #[error("{}: found {found}; expected {expected}{}", path.display(), if mend.is_empty() { String::new() } else { format!(": {mend}") })]
+    NotARecording {
+        /// The file.
+        path: PathBuf,
+        /// What is there.
+        found: String,
+        /// What should be there.
+        expected: String,
+        /// What to do.
+        mend: String,
+    },
+
     /// The calls came in the wrong order: `begin`, any number of `record`, `finish`.
     #[error("{}: {call} was called {problem}", path.display())]
     Order {

@@ -1,15 +1,19 @@
-//! Recorders: a run of the simulator into CSV, MCAP and Rerun files.
+//! Recorders: a run of the simulator into CSV, Parquet, MCAP and Rerun files, and back.
 //!
 //! A run hands over one [`RunHeader`], then [`Sample`]s, then its result figures; every [`Recorder`] takes the
 //! same three calls, and [`RecorderSet`] passes them to several files at once. Start at [`CsvRecorder`] for
-//! tables, `McapRecorder` (feature `mcap`) for ROS 2 tools, Foxglove and PlotJuggler, `RrdRecorder` (feature
+//! tables (`ParquetRecorder`, feature `parquet`, for the same table as Parquet), `McapRecorder` (feature `mcap`) for ROS 2 tools, Foxglove and PlotJuggler, `RrdRecorder` (feature
 //! `rerun`) for the Rerun viewer with meshes and a layout. Pictures of a mesh reduction are a module of their
 //! own, `mesh_picture` (feature `png`), `arm_png` draws the arm at one instant; curves as an SVG picture are drawn by [`line_plot`].
 //!
-//! What all three recorders promise:
+//! The way back is [`open_recording`]: a [`RunSource`] gives header, samples and result of a file, for reports and for
+//! other formats. What a format cannot hold is listed by [`RecordingFormat::lost_on_the_way_to`].
+//!
+//! What all recorders promise:
 //! * a file is created by [`Recorder::begin`] and replaces an existing one only if told to
 //!   ([`CreateOptions::overwrite`]);
 //! * a killed run loses at most the last moment ([`CreateOptions::flush_every`]), and what is left can be read;
+//!   Parquet is the exception, it comes into being under another name and is there whole or not at all;
 //! * the same samples give the same bytes, on any day and at any speed: nothing in a file depends on the clock.
 //!
 //! Not here: what the numbers mean (`flexarm-analysis`), running the simulation (`flexarm`).
@@ -54,12 +58,18 @@ mod mcap_file;
 #[cfg(feature = "png")]
 pub mod mesh_picture;
 mod multi;
+#[cfg(feature = "parquet")]
+mod parquet_file;
 mod plot;
+mod read;
 mod record;
 #[cfg(feature = "rerun")]
 mod rrd_file;
+#[cfg(any(feature = "mcap", feature = "parquet", feature = "rerun"))]
+mod run_json;
 mod shape;
 mod surface;
+mod table;
 #[cfg(any(feature = "mcap", feature = "rerun"))]
 mod tail_file;
 mod trace;
@@ -74,7 +84,10 @@ pub use magnify::{Magnifier, stations_in_link};
 #[cfg(feature = "mcap")]
 pub use mcap_file::McapRecorder;
 pub use multi::RecorderSet;
+#[cfg(feature = "parquet")]
+pub use parquet_file::ParquetRecorder;
 pub use plot::{CurveLook, Panel, PlotCurve, PlotError, line_plot, paper_plot};
+pub use read::{RecordingFormat, open_recording};
 pub use record::*;
 #[cfg(feature = "rerun")]
 pub use rrd_file::{RrdRecorder, RrdStudy, StudySeat};

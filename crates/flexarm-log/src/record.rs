@@ -38,6 +38,8 @@ pub struct RunHeader {
     pub has_rigid: bool,
     /// Samples per second.
     pub log_rate_hz: f64,
+    /// Step of the stepper (s): times of samples are whole multiples of it; 0 if it is not known.
+    pub step_s: f64,
     /// Links that bend.
     pub bends: Vec<BendInfo>,
     /// Flexible links and drives that move the tool, in the order of [`Sample::contributions`].

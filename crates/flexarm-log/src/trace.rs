@@ -129,6 +129,16 @@ pub trait RunSource {
     /// What stays the same.
     fn header(&self) -> &RunHeader;
 
+    /// What the source cannot know of a run, as sentences.
+    fn missing(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// What a reader should be told, such as a broken end; complete after [`RunSource::replay`].
+    fn warnings(&self) -> Vec<String> {
+        Vec::new()
+    }
+
     /// Calls `take` with every instant, in order of time; returns what is known at the end.
     ///
     /// # Errors

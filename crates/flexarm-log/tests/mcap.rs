@@ -462,10 +462,10 @@ fn attachments_and_metadata_come_along() {
     let attachments = summary.attachment_indexes.iter().map(|index| mcap::read::attachment(&file, index).unwrap());
     let attachments: BTreeMap<_, _> =
         attachments.map(|file| (file.name, (file.media_type, file.data.to_vec()))).collect();
-    assert_eq!(attachments.len(), 4);
+    assert_eq!(attachments.len(), 7, "with run.json, meshes.bin.zst and result.json");
     assert_eq!(attachments["summary.json"].1, synthetic::result().attachments[0].bytes);
     assert_eq!(attachments["robot.urdf"], ("application/xml".to_owned(), header.urdf.clone().into_bytes()));
-    assert_eq!(attachments["run.json"].1, header.attachments[0].bytes);
+    assert_eq!(attachments["notes.json"].1, header.attachments[0].bytes);
     let mesh_name = format!("meshes/{}", mesh.file_name().unwrap().to_string_lossy());
     assert_eq!(attachments[&mesh_name], ("model/stl".to_owned(), b"solid gripper".to_vec()));
 
@@ -535,7 +535,7 @@ fn a_killed_run_keeps_every_sample() {
                 assert!(listed.keys().all(|channel| chunk.message_index_offsets.contains_key(&channel.id)));
             }
             let attached = summary.attachment_indexes.iter().map(|index| mcap::read::attachment(&file, index).unwrap());
-            assert!(attached.map(|file| file.name).eq(["robot.urdf", "run.json"]));
+            assert!(attached.map(|file| file.name).eq(["robot.urdf", "notes.json", "run.json", "meshes.bin.zst"]));
             let named = summary.metadata_indexes.iter().map(|index| mcap::read::metadata(&file, index).unwrap());
             assert!(named.map(|record| record.name).any(|name| name == "flexarm.run"));
         }

@@ -147,7 +147,7 @@ impl Error {
                 )) => 1,
                 _ => 2,
             },
-            Self::Log(flexarm_log::LogError::Exists { .. }) => 2,
+            Self::Log(flexarm_log::LogError::Exists { .. } | flexarm_log::LogError::NotARecording { .. }) => 2,
             Self::Log(_) => 1,
             _ => 2,
         }

@@ -23,6 +23,7 @@ mod beam_entry;
 mod bends;
 mod check;
 mod compare;
+mod convert;
 mod disturbance;
 mod drive_entry;
 mod energy_book;
@@ -54,6 +55,7 @@ mod twin;
 pub use bends::Bend;
 pub use check::{Finding, check};
 pub use compare::{Progress, simulate, simulate_traced};
+pub use convert::{ConvertOptions, ConvertSummary, convert, parse_recording_format, read_run};
 pub use disturbance::Disturbances;
 pub use drive_entry::{Drive, DriveKind};
 pub use error::Error;
@@ -73,6 +75,7 @@ pub use summary::{
 };
 
 pub use flexarm_analysis::{Quantity, Spacing};
+pub use flexarm_log::{RecordingFormat, Trace};
 pub use flexarm_stepping::{
     AlphaSettings, ConstraintForm, ReferenceMethod, ReferenceSettings, SpookPreset, SpookSettings, Start, StepError,
     StepperKind,

@@ -102,10 +102,13 @@ pub struct Outputs {
     pub csv: bool,
     /// Write a folder `figures` with plots and pictures for papers.
     pub figures: bool,
+    /// Write Parquet (needs the feature `parquet`).
+    pub parquet: bool,
 }
 
 impl Outputs {
-    /// Every recording that this build can write, into a folder; no figures for papers.
+    /// Every recording that this build can write, into a folder; no figures for papers, and no Parquet, which holds what the
+    /// CSV does.
     pub fn everything(folder: impl Into<PathBuf>) -> Self {
         Self {
             folder: folder.into(),
@@ -114,6 +117,7 @@ impl Outputs {
             rrd: cfg!(feature = "rerun"),
             csv: true,
             figures: false,
+            parquet: false,
         }
     }
 }

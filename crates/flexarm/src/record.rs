@@ -18,8 +18,8 @@ pub(crate) struct Recordings {
 }
 
 /// Names of the files in an output folder.
-pub(crate) const RECORDING_FILES: [&str; 7] =
-    ["run.mcap", "run.rrd", "run.csv", "report.html", "report.md", "summary.json", FIGURES_FOLDER];
+pub(crate) const RECORDING_FILES: [&str; 8] =
+    ["run.mcap", "run.rrd", "run.csv", "run.parquet", "report.html", "report.md", "summary.json", FIGURES_FOLDER];
 
 /// Folder with figures for papers, in the output folder.
 pub(crate) const FIGURES_FOLDER: &str = "figures";
@@ -61,6 +61,15 @@ pub(crate) fn recorders(outputs: Option<&Outputs>) -> Result<Recordings, Error> 
     if outputs.csv {
         recordings.set.push(Box::new(CsvRecorder::create(path("run.csv"), options)));
         recordings.names.csv = text("run.csv");
+    }
+    if outputs.parquet {
+        #[cfg(not(feature = "parquet"))]
+        return Err(Error::Usage("this program was built without Parquet: leave --parquet out".into()));
+        #[cfg(feature = "parquet")]
+        {
+            recordings.set.push(Box::new(flexarm_log::ParquetRecorder::create(path("run.parquet"), options)));
+            recordings.names.parquet = text("run.parquet");
+        }
     }
     recordings.names.report = text("report.html");
     recordings.names.report_md = text("report.md");
@@ -152,6 +161,7 @@ pub(crate) fn header(
         description: description(robot, motion, options, links_model, &frequencies),
         has_rigid: options.with_twin,
         log_rate_hz: options.log_rate_hz,
+        step_s: options.step_s,
         ..robot_header(robot, arm)
     }
 }

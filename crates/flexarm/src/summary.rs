@@ -77,6 +77,8 @@ pub struct Files {
     pub rrd: Option<String>,
     /// Table.
     pub csv: Option<String>,
+    /// The same table as Parquet.
+    pub parquet: Option<String>,
     /// Report: a page for the browser, with plots and pictures.
     pub report: Option<String>,
     /// Rerun recording of all runs of a study.

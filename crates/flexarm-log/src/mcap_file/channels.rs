@@ -177,7 +177,7 @@ fn qos_profile(latched: bool) -> String {
 }
 
 /// Names turned into valid and distinct parts of a ROS topic: letters, digits and `_`, no digit first.
-fn topic_names(names: &[String]) -> Vec<String> {
+pub(crate) fn topic_names(names: &[String]) -> Vec<String> {
     // `/elastic/joint_states` is taken.
     let mut taken = BTreeSet::from(["joint_states".to_owned()]);
     let mut distinct = |base: String| {

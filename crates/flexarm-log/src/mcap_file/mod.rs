@@ -11,7 +11,7 @@
 mod beat;
 mod bent;
 mod cdr;
-mod channels;
+pub(crate) mod channels;
 mod definitions;
 mod frames;
 mod markers;
@@ -66,8 +66,8 @@ use crate::{CreateOptions, EventKind, LogError, Recorder, RunHeader, RunResult, 
 /// `header.stamp`, log time and publish time of a message are epoch + simulated time; the epoch is 0 unless
 /// [`McapRecorder::with_epoch_ns`] says otherwise, and viewers then show a time since the start.
 ///
-/// The file also holds `robot.urdf`, the mesh files, `RunHeader::attachments` and, at the end, `RunResult::attachments` as
-/// attachments, and the groups of `RunHeader::metadata`, `flexarm.recording`, `flexarm.units` and, at the end,
+/// The file also holds `robot.urdf`, the mesh files, `RunHeader::attachments`, for readers of flexarm `run.json` and
+/// `meshes.bin.zst` (header and surfaces) and, at the end, `result.json` and `RunResult::attachments` as attachments, and the groups of `RunHeader::metadata`, `flexarm.recording`, `flexarm.units` and, at the end,
 /// `flexarm.result` as metadata.
 pub struct McapRecorder {
     path: PathBuf,
@@ -235,7 +235,7 @@ impl Open {
             media_type: "application/xml".into(),
             bytes: header.urdf.clone().into_bytes(),
         });
-        for file in urdf.iter().chain(meshes).chain(&header.attachments) {
+        for file in urdf.iter().chain(meshes).chain(&header.attachments).chain(&crate::run_json::files(header)?) {
             output.attach(start, file)?;
         }
         Ok(output.flush()?)
@@ -364,7 +364,7 @@ impl Open {
             self.output.send(self.channels.events, sequence, *stamp, write)?;
         }
         self.output.metadata("flexarm.result", result.figures.iter().cloned())?;
-        for file in &result.attachments {
+        for file in [crate::run_json::result_file(result)].iter().chain(&result.attachments) {
             self.output.attach(self.last, file)?;
         }
         self.output.finish()

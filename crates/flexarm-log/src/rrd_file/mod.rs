@@ -13,7 +13,7 @@ mod robot;
 mod run;
 mod stream;
 mod study;
-mod tracks;
+pub(crate) mod tracks;
 mod window;
 
 use std::fs::File;
@@ -31,6 +31,11 @@ use crate::shape::Shape;
 use crate::{CreateOptions, LogError, Recorder, RunHeader, RunResult, Sample};
 
 pub use self::study::{RrdStudy, StudySeat};
+
+/// Where the header is for readers of flexarm, as JSON.
+pub(crate) const RUN_ENTITY: [&str; 2] = ["recording", "run.json"];
+/// Where the result is.
+pub(crate) const RESULT_ENTITY: [&str; 2] = ["recording", "result.json"];
 
 /// Samples of a chunk: enough for compression, few enough for quick reading.
 const CHUNK_ROWS: usize = 1024;
@@ -52,6 +57,7 @@ const CHUNK_ROWS: usize = 1024;
 /// | `/plots/elastic/<element>`, `/plots/elastic_load/<element>` | deflection, in **mm** and **mrad**; load, in N and N m |
 /// | `/plots/energy`, `/plots/solver` | in J; iterations and residual |
 /// | `/events` | moves, largest error, settling, limits |
+/// | `/recording/run.json`, `/recording/result.json` | header and result for readers of flexarm |
 /// | `/summary`, `/urdf` | result and set-up, and the robot's description, as text |
 ///
 /// Errors and deflections are in millimetres and milliradians because people read them here; the other formats
@@ -134,6 +140,8 @@ impl Open {
             let text = summary(&self.run.header.description, result);
             self.store.constant(&path(["summary"]), &TextDocument::from_markdown(text))?;
         }
+        let result = crate::run_json::write_result(result);
+        self.store.constant(&path(RESULT_ENTITY), &TextDocument::new(result))?;
         self.store.stream.finish()
     }
 }
@@ -302,7 +310,7 @@ fn summary(description: &str, result: &RunResult) -> String {
 }
 
 /// An entity path of parts that may hold any character.
-fn path<S: AsRef<str>>(parts: impl IntoIterator<Item = S>) -> EntityPath {
+pub(crate) fn path<S: AsRef<str>>(parts: impl IntoIterator<Item = S>) -> EntityPath {
     EntityPath::from_iter(parts.into_iter().map(|part| part.as_ref().into()))
 }
 

@@ -16,6 +16,8 @@ use nalgebra::{Rotation3, Translation3, Vector3};
 
 /// Samples per second.
 pub(crate) const RATE_HZ: f64 = 500.0;
+/// Step of the made-up stepper (s).
+pub(crate) const STEP_S: f64 = 1e-4;
 /// Number of samples of the whole run: two seconds with both ends.
 pub(crate) const SAMPLES: u64 = 1001;
 
@@ -54,13 +56,14 @@ pub(crate) fn header() -> RunHeader {
         tcp: "tool0".into(),
         metadata: vec![("flexarm.run".into(), vec![("stepper".into(), "none".into()), ("seed".into(), "0".into())])],
         attachments: vec![Attachment {
-            name: "run.json".into(),
+            name: "notes.json".into(),
             media_type: "application/json".into(),
             bytes: b"{\"robot\": \"synthetic\"}".into(),
         }],
         description: "# synthetic, swing\n\nThree links, the upper arm bends. *Made-up numbers.*".into(),
         has_rigid: true,
         log_rate_hz: RATE_HZ,
+        step_s: STEP_S,
         bends: vec![BendInfo {
             link: 2,
             X_LS: vec![Pose::identity(), Pose::from(Translation3::new(UPPER_ARM, 0.0, 0.0))],
@@ -94,7 +97,7 @@ pub(crate) fn result() -> RunResult {
 
 /// One sample of the motion.
 pub(crate) fn sample(step: u64) -> Sample {
-    let time_s = step as f64 / RATE_HZ;
+    let time_s = (20 * step) as f64 * STEP_S;
     let (s, v, a) = swing(time_s);
     let q = [1.2 * s - 0.6, -0.9 + 0.7 * s, 1.2 - 0.5 * s];
     let qdot = [1.2 * v, 0.7 * v, -0.5 * v];

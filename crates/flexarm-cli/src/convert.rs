@@ -1,0 +1,63 @@
+//! `flexarm convert`: words and table.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+use flexarm::{ConvertOptions, ConvertSummary, Error, RecordingFormat, parse_recording_format};
+
+use crate::args::Cli;
+
+const EXAMPLES: &str = "\
+Examples:
+  A table for pandas or a spreadsheet, from a recording for viewers:
+      flexarm convert out/run.mcap run.parquet
+      flexarm convert out/run.mcap run.csv
+  The Rerun view of a run that was recorded as MCAP only:
+      flexarm convert out/run.mcap run.rrd
+  What a killed run left, as a whole file:
+      flexarm convert out/run.mcap whole.mcap";
+
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct ConvertArgs {
+    /// Recording to read: .mcap, .rrd, .csv or .parquet
+    #[arg(value_name = "IN")]
+    pub(crate) input: PathBuf,
+    /// Recording to write; its ending says the format
+    #[arg(value_name = "OUT")]
+    pub(crate) output: PathBuf,
+    /// Format of IN, whatever its name ends with: mcap, rrd, csv, parquet
+    #[arg(long, value_name = "FORMAT", value_parser = parse_recording_format)]
+    pub(crate) from: Option<RecordingFormat>,
+    /// Format of OUT, whatever its name ends with
+    #[arg(long, value_name = "FORMAT", value_parser = parse_recording_format)]
+    pub(crate) to: Option<RecordingFormat>,
+    /// Overwrite OUT
+    #[arg(long)]
+    pub(crate) force: bool,
+}
+
+pub(crate) fn run(cli: &Cli, args: &ConvertArgs) -> Result<ExitCode, Error> {
+    let options = ConvertOptions { from: args.from, to: args.to, overwrite: args.force };
+    let summary = flexarm::convert(&args.input, &args.output, &options)?;
+    if !cli.quiet {
+        for warning in &summary.warnings {
+            eprintln!("warning: {warning}");
+        }
+    }
+    crate::answer(cli, || crate::to_json(&summary), || text(&summary));
+    Ok(ExitCode::SUCCESS)
+}
+
+fn text(summary: &ConvertSummary) -> String {
+    let mut out = format!("{} -> {}\n", summary.input, summary.output);
+    let mut table = crate::print::table(&[]);
+    table.add_row(["samples", &summary.samples.to_string()]);
+    table.add_row(["duration", &format!("{:.3} s", summary.duration_s)]);
+    out += &crate::print::lines(&table);
+    for sentence in &summary.lost {
+        out += &format!("lost: {sentence}\n");
+    }
+    out
+}

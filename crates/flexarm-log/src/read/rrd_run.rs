@@ -1,0 +1,287 @@
+//! A Rerun recording of a run. It is made to be looked at: curves are in millimetres and have every sample, poses are in
+//! single precision and fewer. All of it is read into memory, since a viewer may have written the chunks in any order.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+
+use flexarm_kinematics::Pose;
+use nalgebra::{Quaternion, Translation3, UnitQuaternion};
+use rerun::external::re_log_encoding::DecoderApp;
+use rerun::log::{Chunk, LogMsg};
+use rerun::{EntityPath, Scalars, SeriesLines, TextDocument, Timeline, Transform3D};
+
+use super::{broken_end, exact_time, not_a_recording};
+use crate::rrd_file::tracks::SIM_TIME;
+use crate::rrd_file::{RESULT_ENTITY, RUN_ENTITY, path as entity};
+use crate::{ElasticSample, EnergySample, LogError, RunHeader, RunResult, RunSource, Sample, TwinSample, run_json};
+
+/// Poses further apart than this stand still in between (ns): moving ones come every few milliseconds.
+const STANDSTILL_NS: i64 = 20_000_000;
+const MILLI: f64 = 1e-3;
+
+/// See the module.
+pub(super) struct RrdRun {
+    path: PathBuf,
+    header: RunHeader,
+    result: RunResult,
+    /// Why the file ends before its end.
+    broken: Option<String>,
+    finished: bool,
+    data: Data,
+    missing: Vec<String>,
+    warnings: Vec<String>,
+}
+
+/// What changes with time, by entity and time (ns).
+#[derive(Default)]
+struct Data {
+    scalars: BTreeMap<EntityPath, BTreeMap<i64, Vec<f64>>>,
+    poses: BTreeMap<EntityPath, BTreeMap<i64, Pose>>,
+    /// Instants at which anything moved.
+    pictures: BTreeSet<i64>,
+    names: BTreeMap<EntityPath, Vec<String>>,
+    texts: BTreeMap<EntityPath, String>,
+}
+
+impl RrdRun {
+    pub(super) fn open(path: &Path) -> Result<Self, LogError> {
+        let file = File::open(path).map_err(LogError::io(path, "open the recording"))?;
+        let (mut data, mut broken, mut application) = (Data::default(), None, None);
+        for message in DecoderApp::decode_lazy(BufReader::new(file)) {
+            match message {
+                Ok(LogMsg::SetStoreInfo(store)) if store.info.store_id.is_recording() => {
+                    application = Some(store.info.store_id.application_id().to_string());
+                }
+                Ok(LogMsg::ArrowMsg(store, message)) if store.is_recording() => match Chunk::from_arrow_msg(&message) {
+                    Ok(chunk) => data.take(&chunk),
+                    Err(error) => broken = Some(format!("damaged: {error}")),
+                },
+                Ok(_) => {}
+                Err(error) => {
+                    broken = Some(format!("damaged: {error}"));
+                    break;
+                }
+            }
+        }
+        let is_ours = application.as_deref() == Some("flexarm");
+        if !is_ours || data.scalars.is_empty() && data.text(RUN_ENTITY).is_none() {
+            let found = match (application, &broken) {
+                (Some(name), _) if !is_ours => format!("a Rerun recording of {name:?}"),
+                (_, Some(cause)) => format!("a Rerun recording without a run ({cause})"),
+                _ => "a Rerun recording without a run".into(),
+            };
+            return Err(not_a_recording(path, found, "one that flexarm wrote, with curves below /plots"));
+        }
+        let mut missing = vec!["the file has no stations of bent links: they are straight".to_owned()];
+        let header = match data.text(RUN_ENTITY).map(|text| run_json::read(text.as_bytes())) {
+            Some(Ok((header, _))) => header,
+            Some(Err(what)) => return Err(not_a_recording(path, what, "the description of a run")),
+            None => {
+                missing.push("the file does not describe its run: links are not known".into());
+                data.header()
+            }
+        };
+        if !header.contributors.is_empty() {
+            missing.push("the file has only sizes of the shares of the tool error, not their directions".into());
+        }
+        missing.push("surfaces of links and attached files are not read back".into());
+        let header = RunHeader {
+            urdf: data.text(["urdf", ""]).unwrap_or_default().to_owned(),
+            bends: Vec::new(),
+            contributors: Vec::new(),
+            magnification: 0.0,
+            ..header
+        };
+        let finished = data.text(RESULT_ENTITY).is_some();
+        let result = data.text(RESULT_ENTITY).map(run_json::read_result).unwrap_or_default();
+        let path = path.to_owned();
+        Ok(Self { path, header, result, broken, finished, data, missing, warnings: Vec::new() })
+    }
+}
+
+impl RunSource for RrdRun {
+    fn header(&self) -> &RunHeader {
+        &self.header
+    }
+
+    fn missing(&self) -> Vec<String> {
+        self.missing.clone()
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        self.warnings.clone()
+    }
+
+    fn replay(&mut self, take: &mut dyn FnMut(&Sample) -> Result<(), LogError>) -> Result<RunResult, LogError> {
+        let twins = [Tracks::of(&self.header, "flexible"), Tracks::of(&self.header, "rigid")];
+        let (mut count, mut last_s) = (0, 0.0);
+        for time_ns in self.data.times(self.finished) {
+            let sample = self.sample(time_ns, &twins);
+            take(&sample)?;
+            (count, last_s) = (count + 1, sample.time_s);
+        }
+        self.warnings.clear();
+        if let Some(cause) = &self.broken {
+            self.warnings.push(broken_end(&self.path, cause, count, last_s));
+        } else if !self.finished {
+            let path = self.path.display();
+            self.warnings
+                .push(format!("{path}: the run was not finished; {count} samples, up to t = {last_s} s, were read"));
+        }
+        Ok(self.result.clone())
+    }
+}
+
+impl RrdRun {
+    fn sample(&self, time_ns: i64, twins: &[Tracks; 2]) -> Sample {
+        let (header, data) = (&self.header, &self.data);
+        let joints = header.joints.len();
+        let row = |parts: &[&str], width: usize| -> Vec<f64> {
+            let row = data.scalars.get(&entity(parts)).and_then(|rows| rows.get(&time_ns));
+            row.filter(|row| row.len() == width).cloned().unwrap_or_else(|| vec![f64::NAN; width])
+        };
+        let one = |group: &str, key: &str| MILLI * row(&["plots", group, key], 1)[0];
+        let six = |parts: [f64; 3], angles: [f64; 3]| [parts[0], parts[1], parts[2], angles[0], angles[1], angles[2]];
+        let twin = |tracks: &Tracks, who: &str| TwinSample {
+            q: row(&["plots", "joints", "position"], joints),
+            qdot: row(&["plots", "joints", "velocity"], joints),
+            effort: row(&["plots", "joints", "effort", who], joints),
+            X_WL: tracks.links.iter().map(|link| data.pose(link, time_ns).unwrap_or_default()).collect(),
+            X_WT: data.tool(&tracks.tool, time_ns),
+            X_WS: Vec::new(),
+        };
+        let (time_s, step) = exact_time(u64::try_from(time_ns).unwrap_or(0), header.step_s);
+        let mut sample = Sample { time_s, step, flexible: twin(&twins[0], "flexible"), ..Sample::default() };
+        if header.has_rigid {
+            sample.rigid = twin(&twins[1], "rigid");
+            sample.rigid.q.fill(f64::NAN); // the curves are those of the flexible robot
+            sample.rigid.qdot.fill(f64::NAN);
+            let rotation = ["x", "y", "z"].map(|axis| one("tcp_error_rotation", axis));
+            sample.error_world = six(["x", "y", "z"].map(|axis| one("tcp_error", axis)), rotation);
+            let along = ["tangential", "normal", "binormal"].map(|axis| one("tcp_error_path", axis));
+            sample.error_path = six(along, [f64::NAN; 3]);
+        }
+        let element = |name: &String| {
+            let (deflection, load) = (row(&["plots", "elastic", name], 6), row(&["plots", "elastic_load", name], 6));
+            ElasticSample {
+                deflection: std::array::from_fn(|k| MILLI * deflection[k]),
+                load: std::array::from_fn(|k| load[k]),
+            }
+        };
+        sample.elastic = header.elements.iter().map(element).collect();
+        let energy = row(&["plots", "energy"], 3);
+        sample.energy = EnergySample { kinetic: energy[0], potential: energy[1], elastic: energy[2] };
+        let solver = row(&["plots", "solver"], 2);
+        sample.solver = [solver[0], solver[1]];
+        sample
+    }
+}
+
+/// Entities of one of the two robots.
+struct Tracks {
+    links: Vec<EntityPath>,
+    tool: EntityPath,
+}
+
+impl Tracks {
+    fn of(header: &RunHeader, who: &str) -> Self {
+        let at = |what: &str| entity([header.robot.as_str(), who, what]);
+        Self { links: header.links.iter().map(|link| at(&link.name)).collect(), tool: at("tcp") }
+    }
+}
+
+impl Data {
+    fn take(&mut self, chunk: &Chunk) {
+        let at = chunk.entity_path();
+        if chunk.is_static() {
+            let mut texts = chunk.iter_slices::<String>(TextDocument::descriptor_text().component);
+            if let Some(text) = texts.next().and_then(|texts| texts.first().cloned()) {
+                self.texts.insert(at.clone(), text.as_str().to_owned());
+            }
+            let mut names = chunk.iter_slices::<String>(SeriesLines::descriptor_names().component);
+            if let Some(names) = names.next() {
+                self.names.insert(at.clone(), names.iter().map(|name| name.as_str().to_owned()).collect());
+            }
+            return;
+        }
+        let timeline = *Timeline::new_duration(SIM_TIME).name();
+        let scalars = Scalars::descriptor_scalars().component;
+        let times = || chunk.iter_component_indices(timeline, scalars).map(|(time, _)| time.as_i64());
+        for (time, values) in times().zip(chunk.iter_slices::<f64>(scalars)) {
+            self.scalars.entry(at.clone()).or_default().insert(time, values.to_vec());
+        }
+        let translation = Transform3D::descriptor_translation().component;
+        let translations = chunk.iter_slices::<[f32; 3]>(translation);
+        let rotations = chunk.iter_slices::<[f32; 4]>(Transform3D::descriptor_quaternion().component);
+        let times = chunk.iter_component_indices(timeline, translation).map(|(time, _)| time.as_i64());
+        for ((time, places), turns) in times.zip(translations).zip(rotations) {
+            let (Some(&[x, y, z]), Some(&[qx, qy, qz, qw])) = (places.first(), turns.first()) else { continue };
+            let [x, y, z, qx, qy, qz, qw] = [x, y, z, qx, qy, qz, qw].map(f64::from);
+            let rotation = UnitQuaternion::from_quaternion(Quaternion::new(qw, qx, qy, qz));
+            let X = Pose::from_parts(Translation3::new(x, y, z), rotation.to_rotation_matrix());
+            self.poses.entry(at.clone()).or_default().insert(time, X);
+            self.pictures.insert(time);
+        }
+    }
+
+    fn text(&self, parts: [&str; 2]) -> Option<&str> {
+        let parts = parts.into_iter().filter(|part| !part.is_empty());
+        self.texts.get(&entity(parts)).map(String::as_str)
+    }
+
+    /// Times of the samples: those of the fullest curve. Curves are written one after the other, so at the end of a file
+    /// that breaks off some go further than others; only what all have counts.
+    fn times(&self, finished: bool) -> Vec<i64> {
+        // Names of curves are written at the start, before any rows.
+        if !finished && self.names.keys().any(|curve| !self.scalars.contains_key(curve)) {
+            return Vec::new();
+        }
+        let fullest = self.scalars.values().max_by_key(|rows| rows.len());
+        let first = fullest.and_then(|rows| rows.keys().next());
+        let curves = self.scalars.values().filter(|rows| rows.keys().next() == first);
+        let shortest = curves.filter_map(|rows| rows.keys().next_back()).min().copied();
+        let end = shortest.filter(|_| !finished).unwrap_or(i64::MAX);
+        fullest.map(|rows| rows.range(..=end).map(|(time, _)| *time).collect()).unwrap_or_default()
+    }
+
+    /// The last pose at or before a time, or the first one.
+    fn pose(&self, at: &EntityPath, time_ns: i64) -> Option<Pose> {
+        let rows = self.poses.get(at)?;
+        rows.range(..=time_ns).next_back().or_else(|| rows.iter().next()).map(|(_, X)| *X)
+    }
+
+    /// Pose of a tool: its place is a result, so between two pictures it is not known.
+    fn tool(&self, at: &EntityPath, time_ns: i64) -> Pose {
+        let mut X = self.pose(at, time_ns).unwrap_or_default();
+        let before = self.pictures.range(..=time_ns).next_back();
+        let after = self.pictures.range(time_ns..).next();
+        let known = match (before, after) {
+            (Some(before), Some(after)) => before == after || after - before > STANDSTILL_NS,
+            (Some(before), None) => time_ns - before > STANDSTILL_NS,
+            _ => false,
+        };
+        if !known || !self.poses.contains_key(at) {
+            X.translation.vector.fill(f64::NAN);
+        }
+        X
+    }
+
+    /// Header of a recording that does not describe itself, from the names of its entities.
+    fn header(&self) -> RunHeader {
+        let part = |at: &EntityPath, k: usize| at.iter().nth(k).map(|part| part.unescaped_str().to_owned());
+        let names = |parts: [&str; 3]| self.names.get(&entity(parts)).cloned().unwrap_or_default();
+        let is_element =
+            |at: &&EntityPath| part(at, 0).as_deref() == Some("plots") && part(at, 1).as_deref() == Some("elastic");
+        let mut robots = self.poses.keys().filter(|at| part(at, 1).as_deref() == Some("flexible"));
+        RunHeader {
+            robot: robots.next().and_then(|at| part(at, 0)).unwrap_or_else(|| "robot".into()),
+            trajectory: "unknown".into(),
+            joints: names(["plots", "joints", "position"]),
+            elements: self.scalars.keys().filter(is_element).filter_map(|at| part(at, 2)).collect(),
+            has_rigid: self.scalars.contains_key(&entity(["plots", "tcp_error", "x"])),
+            ..RunHeader::default()
+        }
+    }
+}

@@ -1,0 +1,305 @@
+//! A run's header as JSON, and its triangles as one compressed block: what the topics of a recording have no place for.
+//!
+//! `run.json` is a stable format of its own: keys are added, not renamed. It holds everything of a [`RunHeader`] but the
+//! URDF, which recordings carry as it is, and the corners of meshes, which are in `meshes.bin.zst`.
+
+use flexarm_kinematics::Pose;
+use nalgebra::{Matrix3, Rotation3, Translation3};
+use serde::{Deserialize, Serialize};
+
+use crate::{Attachment, BendInfo, Event, EventKind, LinkInfo, RunHeader, RunResult};
+
+/// Name of the header in a recording.
+pub(crate) const RUN_JSON: &str = "run.json";
+/// Name of the result in a recording.
+pub(crate) const RESULT_JSON: &str = "result.json";
+/// Media type of both.
+pub(crate) const JSON: &str = "application/json";
+
+/// Version of the format; a reader refuses higher ones.
+const FORMAT: u32 = 1;
+
+#[derive(Debug, Serialize, Deserialize)]
+pub(crate) struct RunJson {
+    /// Always first, for whoever looks into the file.
+    pub(crate) format: u32,
+    robot: String,
+    trajectory: String,
+    tcp: String,
+    joints: Vec<String>,
+    prismatic: Vec<bool>,
+    links: Vec<Link>,
+    elements: Vec<String>,
+    contributors: Vec<String>,
+    bends: Vec<Bend>,
+    has_rigid: bool,
+    log_rate_hz: f64,
+    step_s: f64,
+    magnification: f64,
+    color_scale_m: f64,
+    volume: Option<[[f64; 3]; 2]>,
+    description: String,
+    /// Groups of key-value pairs, in their order.
+    metadata: Vec<(String, Vec<(String, String)>)>,
+    /// Names of the attached files that are not the recorder's own.
+    pub(crate) attachments: Vec<String>,
+    /// Meshes in the order of `meshes.bin.zst`.
+    pub(crate) meshes: Vec<MeshEntry>,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+struct Link {
+    name: String,
+    parent: Option<usize>,
+    fixed: bool,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+struct Bend {
+    link: usize,
+    /// Three lengths (m), then the nine entries of the rotation matrix, row by row.
+    stations: Vec<[f64; 12]>,
+    carries: Vec<(usize, usize)>,
+}
+
+/// A mesh without its numbers.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct MeshEntry {
+    pub(crate) link: usize,
+    pub(crate) name: String,
+    pub(crate) color: [f32; 4],
+    pub(crate) corners: usize,
+    pub(crate) triangles: usize,
+}
+
+/// The header as JSON text. `meshes` says whether its meshes are listed, that is stored beside it.
+pub(crate) fn write(header: &RunHeader, meshes: bool) -> String {
+    let entry = |mesh: &crate::LinkMesh| MeshEntry {
+        link: mesh.link,
+        name: mesh.name.clone(),
+        color: mesh.color,
+        corners: mesh.positions.len(),
+        triangles: mesh.triangles.len(),
+    };
+    let link = |link: &LinkInfo| Link { name: link.name.clone(), parent: link.parent, fixed: link.fixed };
+    let bend = |bend: &BendInfo| Bend {
+        link: bend.link,
+        stations: bend.X_LS.iter().map(numbers).collect(),
+        carries: bend.carries.clone(),
+    };
+    let run = RunJson {
+        format: FORMAT,
+        robot: header.robot.clone(),
+        trajectory: header.trajectory.clone(),
+        tcp: header.tcp.clone(),
+        joints: header.joints.clone(),
+        prismatic: header.prismatic.clone(),
+        links: header.links.iter().map(link).collect(),
+        elements: header.elements.clone(),
+        contributors: header.contributors.clone(),
+        bends: header.bends.iter().map(bend).collect(),
+        has_rigid: header.has_rigid,
+        log_rate_hz: header.log_rate_hz,
+        step_s: header.step_s,
+        magnification: header.magnification,
+        color_scale_m: header.color_scale_m,
+        volume: header.volume,
+        description: header.description.clone(),
+        metadata: header.metadata.clone(),
+        attachments: header.attachments.iter().map(|file| file.name.clone()).collect(),
+        meshes: if meshes { header.meshes.iter().map(entry).collect() } else { Vec::new() },
+    };
+    serde_json::to_string(&run).expect("names, texts and numbers are JSON")
+}
+
+/// What an MCAP file needs besides its topics to be read back: the header, and the meshes if there are any.
+#[cfg(feature = "mcap")]
+pub(crate) fn files(header: &RunHeader) -> std::io::Result<Vec<crate::Attachment>> {
+    let file = |name: &str, media_type: &str, bytes| crate::Attachment {
+        name: name.into(),
+        media_type: media_type.into(),
+        bytes,
+    };
+    let mut files = vec![file(RUN_JSON, JSON, write(header, true).into_bytes())];
+    if !header.meshes.is_empty() {
+        files.push(file(meshes::FILE, meshes::MEDIA_TYPE, meshes::write(&header.meshes)?));
+    }
+    Ok(files)
+}
+
+/// The header without URDF, attached files and meshes, which the caller adds.
+///
+/// # Errors
+/// In words, what is wrong with the text.
+pub(crate) fn read(text: &[u8]) -> Result<(RunHeader, RunJson), String> {
+    let mut run: RunJson =
+        serde_json::from_slice(text).map_err(|error| format!("{RUN_JSON} cannot be read: {error}"))?;
+    if run.format > FORMAT {
+        return Err(format!("{RUN_JSON} has format {}, this program reads up to {FORMAT}", run.format));
+    }
+    let links = run.links.len();
+    let parents_first = run.links.iter().enumerate().all(|(k, link)| link.parent.is_none_or(|parent| parent < k));
+    let in_range = run.meshes.iter().all(|mesh| mesh.link < links)
+        && run.bends.iter().all(|bend| {
+            bend.link < links && bend.carries.iter().all(|&(link, k)| link < links && k < bend.stations.len())
+        });
+    if !parents_first || !in_range {
+        return Err(format!("{RUN_JSON} names links that it does not have"));
+    }
+    let bend = |bend: Bend| BendInfo {
+        link: bend.link,
+        X_LS: bend.stations.iter().map(pose).collect(),
+        carries: bend.carries,
+    };
+    let header = RunHeader {
+        robot: std::mem::take(&mut run.robot),
+        trajectory: std::mem::take(&mut run.trajectory),
+        tcp: std::mem::take(&mut run.tcp),
+        joints: std::mem::take(&mut run.joints),
+        prismatic: std::mem::take(&mut run.prismatic),
+        links: run
+            .links
+            .drain(..)
+            .map(|link| LinkInfo { name: link.name, parent: link.parent, fixed: link.fixed })
+            .collect(),
+        elements: std::mem::take(&mut run.elements),
+        contributors: std::mem::take(&mut run.contributors),
+        bends: run.bends.drain(..).map(bend).collect(),
+        has_rigid: run.has_rigid,
+        log_rate_hz: run.log_rate_hz,
+        step_s: run.step_s,
+        magnification: run.magnification,
+        color_scale_m: run.color_scale_m,
+        volume: run.volume,
+        description: std::mem::take(&mut run.description),
+        metadata: std::mem::take(&mut run.metadata),
+        ..RunHeader::default()
+    };
+    Ok((header, run))
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+struct ResultJson {
+    format: u32,
+    /// Label and value, in their order.
+    figures: Vec<(String, String)>,
+    /// The same for people.
+    readable: Vec<(String, String)>,
+    /// Time (s), kind, words.
+    events: Vec<(f64, String, String)>,
+    /// Name, media type and text of the attached files that are text.
+    files: Vec<(String, String, String)>,
+}
+
+/// What an MCAP file needs at its end to give back the result as it was; attached files are in it by themselves.
+#[cfg(feature = "mcap")]
+pub(crate) fn result_file(result: &RunResult) -> Attachment {
+    let text = write_result(&RunResult { attachments: Vec::new(), ..result.clone() });
+    Attachment { name: RESULT_JSON.into(), media_type: JSON.into(), bytes: text.into_bytes() }
+}
+
+/// What is known at the end, as JSON text. Attached files that are not text are left out.
+pub(crate) fn write_result(result: &RunResult) -> String {
+    let event = |event: &Event| (event.time_s, event.kind.word().to_owned(), event.text.clone());
+    let file = |file: &Attachment| {
+        let text = String::from_utf8(file.bytes.clone()).ok()?;
+        Some((file.name.clone(), file.media_type.clone(), text))
+    };
+    let result = ResultJson {
+        format: FORMAT,
+        figures: result.figures.clone(),
+        readable: result.readable.clone(),
+        events: result.events.iter().map(event).collect(),
+        files: result.attachments.iter().filter_map(file).collect(),
+    };
+    serde_json::to_string(&result).expect("names, texts and numbers are JSON")
+}
+
+/// The result from such a text; what is not there is empty, kinds of events that are not known are left out.
+pub(crate) fn read_result(text: &str) -> RunResult {
+    let Ok(result) = serde_json::from_str::<ResultJson>(text) else { return RunResult::default() };
+    let event =
+        |(time_s, kind, text): (f64, String, String)| Some(Event { time_s, kind: EventKind::from_word(&kind)?, text });
+    let file =
+        |(name, media_type, text): (String, String, String)| Attachment { name, media_type, bytes: text.into_bytes() };
+    RunResult {
+        figures: result.figures,
+        readable: result.readable,
+        events: result.events.into_iter().filter_map(event).collect(),
+        attachments: result.files.into_iter().map(file).collect(),
+    }
+}
+
+fn numbers(X: &Pose) -> [f64; 12] {
+    let rotation = X.rotation.matrix();
+    std::array::from_fn(|k| match k {
+        0..3 => X.translation.vector[k],
+        _ => rotation[((k - 3) / 3, (k - 3) % 3)],
+    })
+}
+
+fn pose(numbers: &[f64; 12]) -> Pose {
+    let rotation = Rotation3::from_matrix_unchecked(Matrix3::from_row_slice(&numbers[3..]));
+    Pose::from_parts(Translation3::new(numbers[0], numbers[1], numbers[2]), rotation)
+}
+
+#[cfg(feature = "mcap")]
+pub(crate) mod meshes {
+    //! Triangles of all meshes, one mesh after the other: corners, normals (three `f32` each), triangles (three `u32`
+    //! each), little endian, compressed with zstd.
+
+    use super::MeshEntry;
+    use crate::LinkMesh;
+
+    /// Name of the block in a recording.
+    pub(crate) const FILE: &str = "meshes.bin.zst";
+    /// Its media type.
+    pub(crate) const MEDIA_TYPE: &str = "application/zstd";
+
+    const LEVEL: i32 = 9;
+
+    pub(crate) fn write(meshes: &[LinkMesh]) -> std::io::Result<Vec<u8>> {
+        let mut bytes = Vec::new();
+        for mesh in meshes {
+            // A mesh without normals for all corners gets zeros: sizes in the file follow from the counts alone.
+            let normals = (0..mesh.positions.len()).map(|k| mesh.normals.get(k).copied().unwrap_or_default());
+            let floats = mesh.positions.iter().copied().chain(normals).flatten();
+            floats.for_each(|value| bytes.extend(value.to_le_bytes()));
+            mesh.triangles.iter().flatten().for_each(|corner| bytes.extend(corner.to_le_bytes()));
+        }
+        zstd::bulk::compress(&bytes, LEVEL)
+    }
+
+    /// The meshes that `entries` describe.
+    ///
+    /// # Errors
+    /// In words, what is wrong with the block.
+    pub(crate) fn read(block: &[u8], entries: &[MeshEntry]) -> Result<Vec<LinkMesh>, String> {
+        let size = |entry: &MeshEntry| entry.corners.checked_mul(24)?.checked_add(entry.triangles.checked_mul(12)?);
+        let total = entries.iter().try_fold(0_usize, |sum, entry| sum.checked_add(size(entry)?));
+        // A compressed block is at most some thousand times smaller than its contents.
+        let total =
+            total.filter(|total| *total / 100_000 <= block.len()).ok_or("its counts of corners are too large")?;
+        let bytes = zstd::bulk::decompress(block, total).map_err(|error| error.to_string())?;
+        if bytes.len() != total {
+            return Err(format!("it has {} bytes, the list of meshes asks for {total}", bytes.len()));
+        }
+        let mut words = bytes.chunks_exact(4).map(|word| [word[0], word[1], word[2], word[3]]);
+        let mut word = || words.next().unwrap_or_default();
+        let mut meshes = Vec::new();
+        for entry in entries {
+            let mut triples = |count: usize| (0..count).map(|_| [word(), word(), word()]).collect::<Vec<_>>();
+            let float = |triple: [[u8; 4]; 3]| triple.map(f32::from_le_bytes);
+            let positions = triples(entry.corners).into_iter().map(float).collect();
+            let normals = triples(entry.corners).into_iter().map(float).collect();
+            let triangles: Vec<[u32; 3]> =
+                triples(entry.triangles).into_iter().map(|triple| triple.map(u32::from_le_bytes)).collect();
+            if triangles.iter().flatten().any(|corner| *corner as usize >= entry.corners) {
+                return Err(format!("a triangle of mesh {:?} has a corner that is not there", entry.name));
+            }
+            let (link, name, color) = (entry.link, entry.name.clone(), entry.color);
+            meshes.push(LinkMesh { link, name, positions, normals, triangles, color, file: None });
+        }
+        Ok(meshes)
+    }
+}

@@ -1,0 +1,222 @@
+//! The table of a run: which numbers of a sample are its columns. CSV and Parquet files share it, both ways.
+
+use flexarm_kinematics::Pose;
+use nalgebra::{Translation3, Vector3};
+
+use crate::{ElasticSample, RunHeader, Sample, TwinSample};
+
+const DISPLACEMENT: [&str; 6] = ["x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad"];
+const WRENCH: [&str; 6] = ["fx_n", "fy_n", "fz_n", "tx_nm", "ty_nm", "tz_nm"];
+const POSITION: [&str; 3] = ["x_m", "y_m", "z_m"];
+
+/// Names of all columns, in the order of [`fill_row`].
+pub(crate) fn columns(header: &RunHeader) -> Vec<String> {
+    let position = |who: &str| POSITION.map(|axis| format!("{who}_{axis}"));
+    let mut names = vec!["time".to_owned()];
+    if header.has_rigid {
+        names.extend(position("rigid"));
+    }
+    names.extend(position("flexible"));
+    if header.has_rigid {
+        names.extend(DISPLACEMENT.map(|part| format!("error_{part}")));
+        names.extend(["tangential", "normal", "binormal"].map(|axis| format!("error_{axis}_m")));
+    }
+    for (k, joint) in header.joints.iter().enumerate() {
+        let unit = if header.prismatic.get(k).copied().unwrap_or(false) { "m" } else { "rad" };
+        names.push(format!("{joint}_position_{unit}"));
+        names.push(format!("{joint}_effort"));
+        if header.has_rigid {
+            names.push(format!("rigid_{joint}_effort"));
+        }
+    }
+    for element in &header.elements {
+        names.extend(DISPLACEMENT.iter().chain(&WRENCH).map(|part| format!("{element}_{part}")));
+    }
+    names.extend(["kinetic", "potential", "elastic"].map(|kind| format!("{kind}_energy_j")));
+    names
+}
+
+/// Puts the numbers of a sample into `row`, in the order of [`columns`].
+pub(crate) fn fill_row(sample: &Sample, has_rigid: bool, row: &mut Vec<f64>) {
+    row.clear();
+    row.push(sample.time_s);
+    if has_rigid {
+        row.extend(sample.rigid.X_WT.translation.vector.iter());
+    }
+    row.extend(sample.flexible.X_WT.translation.vector.iter());
+    if has_rigid {
+        row.extend(sample.error_world);
+        row.extend(&sample.error_path[..3]);
+    }
+    for (joint, q) in sample.flexible.q.iter().enumerate() {
+        row.push(*q);
+        row.push(sample.flexible.effort[joint]);
+        if has_rigid {
+            row.push(sample.rigid.effort[joint]);
+        }
+    }
+    for element in &sample.elastic {
+        row.extend(element.deflection);
+        row.extend(element.load);
+    }
+    row.extend([sample.energy.kinetic, sample.energy.potential, sample.energy.elastic]);
+}
+
+/// What a table made of a run with this header leaves out, as sentences.
+pub(crate) fn left_out(header: &RunHeader) -> Vec<String> {
+    let mut left = vec!["the table has no velocities of joints and no orientations of the tool".to_owned()];
+    if !header.links.is_empty() {
+        left.push("the table has no poses of links: no picture of the arm can be made of it".into());
+    }
+    if !header.contributors.is_empty() {
+        left.push("the table has no shares of the tool error".into());
+    }
+    left
+}
+
+/// What a table cannot tell a recording with pictures, as sentences.
+pub(crate) fn unknown(header: &RunHeader) -> Vec<String> {
+    let mut unknown = vec![
+        "the table has no velocities of joints and no work of the solver: not a number (NaN) in the new file"
+            .to_owned(),
+        "the table has no poses of links: there is no picture of the arm, and the tool does not turn".into(),
+    ];
+    if header.has_rigid {
+        unknown
+            .push("the table has no joint positions of the rigid twin and no error angles along the path: NaN".into());
+    }
+    unknown
+}
+
+/// What a table is read with: which of its columns is which number of a sample.
+#[derive(Clone, Debug)]
+pub(crate) struct TableLayout {
+    /// Header as far as column names say it; no links.
+    pub(crate) header: RunHeader,
+    /// Index in the file of each column of [`columns`].
+    pub(crate) places: Vec<usize>,
+}
+
+impl TableLayout {
+    /// Finds the columns of a run among `names`; their order does not matter, others are passed over.
+    ///
+    /// # Errors
+    /// What was found and what was expected.
+    pub(crate) fn of_names(names: &[String]) -> Result<Self, (String, String)> {
+        let has = |name: &str| names.iter().any(|n| n == name);
+        let mut header = RunHeader { has_rigid: has("error_tangential_m"), ..RunHeader::default() };
+        for name in names {
+            for (end, prismatic) in [("_position_rad", false), ("_position_m", true)] {
+                if let Some(joint) = name.strip_suffix(end) {
+                    header.joints.push(joint.to_owned());
+                    header.prismatic.push(prismatic);
+                }
+            }
+            header.elements.extend(name.strip_suffix("_fx_n").map(str::to_owned));
+        }
+        Self::of_header(header, names)
+    }
+
+    /// Finds the columns that a run with this header has.
+    ///
+    /// # Errors
+    /// What was found and what was expected.
+    pub(crate) fn of_header(mut header: RunHeader, names: &[String]) -> Result<Self, (String, String)> {
+        // What the columns do not hold must not be asked of samples.
+        (header.links, header.meshes) = (Vec::new(), Vec::new());
+        (header.bends, header.contributors) = (Vec::new(), Vec::new());
+        (header.magnification, header.urdf) = (0.0, String::new());
+        let wanted = columns(&header);
+        let place = |name: &String| names.iter().position(|n| n == name);
+        let missing: Vec<&str> = wanted.iter().filter(|name| place(name).is_none()).map(String::as_str).collect();
+        if !missing.is_empty() {
+            let found = match names.iter().all(|name| name.trim().is_empty()) {
+                true => "a table without column names".to_owned(),
+                false => format!("a table with the columns {}", shortened(names)),
+            };
+            let expected = format!(
+                "the columns of a recording: time, flexible_x_m, flexible_y_m, flexible_z_m, kinetic_energy_j, \
+                 potential_energy_j, elastic_energy_j, and for each joint <joint>_position_rad and <joint>_effort; \
+                 missing here: {}",
+                shortened(&missing)
+            );
+            return Err((found, expected));
+        }
+        if let Some(twice) = wanted.iter().find(|name| names.iter().filter(|n| n == name).count() > 1) {
+            return Err((format!("two columns of the name {twice}"), "each column once".into()));
+        }
+        let places = wanted.iter().filter_map(place).collect();
+        Ok(Self { header, places })
+    }
+
+    /// A sample from the numbers of a row in the order of [`columns`]. What a table does not hold is NaN; orientations of
+    /// the tool are those of the world.
+    pub(crate) fn sample(&self, row: &[f64], sample: &mut Sample) {
+        let mut next = row.iter().copied();
+        let mut number = || next.next().unwrap_or(f64::NAN);
+        let joints = self.header.joints.len();
+        let unknown = vec![f64::NAN; joints];
+        let twin = || TwinSample {
+            q: unknown.clone(),
+            qdot: unknown.clone(),
+            effort: unknown.clone(),
+            ..TwinSample::default()
+        };
+        let place = |number: &mut dyn FnMut() -> f64| -> Pose {
+            let vector: Vector3<f64> = Vector3::from_fn(|_, _| number());
+            Translation3::from(vector).into()
+        };
+
+        *sample = Sample {
+            time_s: number(),
+            flexible: twin(),
+            error_world: [f64::NAN; 6],
+            error_path: [f64::NAN; 6],
+            solver: [f64::NAN; 2],
+            ..Sample::default()
+        };
+        if self.header.has_rigid {
+            sample.rigid = twin();
+            sample.rigid.X_WT = place(&mut number);
+        }
+        sample.flexible.X_WT = place(&mut number);
+        if self.header.has_rigid {
+            sample.error_world = std::array::from_fn(|_| number());
+            sample.error_path[..3].fill_with(&mut number);
+        }
+        for joint in 0..joints {
+            sample.flexible.q[joint] = number();
+            sample.flexible.effort[joint] = number();
+            if self.header.has_rigid {
+                sample.rigid.effort[joint] = number();
+            }
+        }
+        let element = |_| ElasticSample {
+            deflection: std::array::from_fn(|_| number()),
+            load: std::array::from_fn(|_| number()),
+        };
+        sample.elastic = (0..self.header.elements.len()).map(element).collect();
+        [sample.energy.kinetic, sample.energy.potential, sample.energy.elastic] = std::array::from_fn(|_| number());
+        if self.header.step_s > 0.0 && sample.time_s.is_finite() {
+            sample.step = (sample.time_s / self.header.step_s).round() as u64;
+        }
+    }
+}
+
+/// Samples per second from two times that follow each other, without the rounding of their difference.
+pub(crate) fn rate_hz(first_s: f64, second_s: f64) -> f64 {
+    let rate = 1.0 / (second_s - first_s);
+    let digits = format!("{rate:.8e}").parse().unwrap_or(rate);
+    if rate.is_finite() && rate > 0.0 { digits } else { 0.0 }
+}
+
+/// The first few of many names.
+fn shortened<T: AsRef<str>>(names: &[T]) -> String {
+    const SHOWN: usize = 8;
+    let mut text: Vec<String> =
+        names.iter().take(SHOWN).map(|name| name.as_ref().chars().take(40).collect::<String>()).collect();
+    if names.len() > SHOWN {
+        text.push(format!("... ({} in all)", names.len()));
+    }
+    text.join(", ")
+}

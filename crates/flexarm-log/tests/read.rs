@@ -1,0 +1,605 @@
+//! Recordings read back, and written again in other formats. Truth: the samples of `synthetic`.
+#![allow(non_snake_case, reason = "monogram notation: X_WT, pose of T in W")]
+#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
+
+mod synthetic;
+
+use std::path::{Path, PathBuf};
+
+use flexarm_kinematics::Pose;
+use flexarm_log::{
+    CreateOptions, CsvRecorder, LogError, Recorder, RecordingFormat, RunHeader, RunResult, RunSource, Sample,
+    open_recording,
+};
+
+/// Samples of most tests: more than one chunk of MCAP.
+const SAMPLES: u64 = 400;
+
+fn recorder(path: &Path, format: RecordingFormat) -> Box<dyn Recorder> {
+    let options = CreateOptions::default().with_overwrite(true);
+    match format {
+        RecordingFormat::Csv => Box::new(CsvRecorder::create(path, options)),
+        #[cfg(feature = "mcap")]
+        RecordingFormat::Mcap => Box::new(flexarm_log::McapRecorder::create(path, options)),
+        #[cfg(feature = "parquet")]
+        RecordingFormat::Parquet => Box::new(flexarm_log::ParquetRecorder::create(path, options)),
+        #[cfg(feature = "rerun")]
+        RecordingFormat::Rrd => Box::new(flexarm_log::RrdRecorder::create(path, options)),
+        #[allow(unreachable_patterns, reason = "which formats are left depends on the features")]
+        _ => unreachable!("only formats of this build are asked for"),
+    }
+}
+
+/// Formats of this build whose numbers come back to the last bit.
+fn exact_formats() -> Vec<RecordingFormat> {
+    let exact = [RecordingFormat::Mcap, RecordingFormat::Csv, RecordingFormat::Parquet];
+    exact.into_iter().filter(|format| format.is_built_in()).collect()
+}
+
+fn scratch(name: &str, format: RecordingFormat) -> PathBuf {
+    synthetic::scratch(&format!("{name}.{}", format.extension()))
+}
+
+/// A recording of the made-up run, with or without the rigid twin.
+fn written(name: &str, format: RecordingFormat, header: &RunHeader, samples: u64) -> PathBuf {
+    let path = scratch(name, format);
+    let mut recorder = recorder(&path, format);
+    recorder.begin(header).unwrap();
+    (0..samples).for_each(|step| recorder.record(&synthetic::sample(step)).unwrap());
+    recorder.finish(&synthetic::result()).unwrap();
+    path
+}
+
+/// Header, samples, result and warnings of a recording.
+fn read(path: &Path, format: RecordingFormat) -> Result<(RunHeader, Vec<Sample>, RunResult, Vec<String>), LogError> {
+    let mut source: Box<dyn RunSource> = open_recording(path, format)?;
+    let mut samples = Vec::new();
+    let result = source.replay(&mut |sample| {
+        samples.push(sample.clone());
+        Ok(())
+    })?;
+    Ok((source.header().clone(), samples, result, source.warnings()))
+}
+
+/// The same run in another format.
+fn converted(from: &Path, format: RecordingFormat, name: &str, to: RecordingFormat) -> PathBuf {
+    let path = scratch(name, to);
+    let mut source = open_recording(from, format).unwrap();
+    let mut recorder = recorder(&path, to);
+    recorder.begin(source.header()).unwrap();
+    let result = source.replay(&mut |sample| recorder.record(sample)).unwrap();
+    recorder.finish(&result).unwrap();
+    path
+}
+
+fn remove(paths: &[&PathBuf]) {
+    paths.iter().for_each(|path| std::fs::remove_file(path).unwrap());
+}
+
+fn bits(values: &[f64]) -> Vec<u64> {
+    values.iter().map(|value| value.to_bits()).collect()
+}
+
+fn distance(a: &Pose, b: &Pose) -> f64 {
+    (a.to_homogeneous() - b.to_homogeneous()).norm()
+}
+
+fn assert_same_but_time(found: &[u8], expected: &[u8]) {
+    let lines = |bytes: &[u8]| -> Vec<String> { str::from_utf8(bytes).unwrap().lines().map(str::to_owned).collect() };
+    assert_eq!(lines(found).len(), lines(expected).len());
+    for (found, expected) in lines(found).iter().zip(&lines(expected)).skip(1) {
+        let ((t, found), (truth, expected)) = (found.split_once(',').unwrap(), expected.split_once(',').unwrap());
+        assert_eq!(found, expected);
+        let (t, truth): (f64, f64) = (t.parse().unwrap(), truth.parse().unwrap());
+        assert!((t - truth).abs() < 1e-15, "{t:?} and {truth:?}"); // measured 1.1e-16
+    }
+}
+
+/// The bytes of a table are the check: shortest numbers that read back, so equal tables are equal numbers.
+#[test]
+fn a_table_is_the_same_bytes_whatever_formats_it_went_through() {
+    for (twin, has_rigid) in [("twin", true), ("alone", false)] {
+        let header = RunHeader { has_rigid, ..synthetic::header() };
+        let direct = written(&format!("direct-{twin}"), RecordingFormat::Csv, &header, SAMPLES);
+        let expected = std::fs::read(&direct).unwrap();
+        for from in exact_formats() {
+            let first = written(&format!("first-{twin}-{}", from.extension()), from, &header, SAMPLES);
+            for to in exact_formats() {
+                let name = format!("{twin}-{}-{}", from.extension(), to.extension());
+                let second = converted(&first, from, &name, to);
+                let table = converted(&second, to, &format!("{name}-table"), RecordingFormat::Csv);
+                let found = std::fs::read(&table).unwrap();
+                match (from, to) {
+                    // MCAP has whole nanoseconds, and CSV does not say of which step its times are multiples.
+                    (RecordingFormat::Csv, RecordingFormat::Mcap) => assert_same_but_time(&found, &expected),
+                    _ => assert!(found == expected, "{from} to {to}, {twin}"),
+                }
+                remove(&[&second, &table]);
+            }
+            remove(&[&first]);
+        }
+        remove(&[&direct]);
+    }
+}
+
+#[cfg(feature = "mcap")]
+#[test]
+fn an_mcap_file_gives_back_every_number_to_the_last_bit_and_poses_to_rounding() {
+    let path = written("whole", RecordingFormat::Mcap, &synthetic::header(), SAMPLES);
+    let (_, samples, _, warnings) = read(&path, RecordingFormat::Mcap).unwrap();
+    assert_eq!(samples.len() as u64, SAMPLES);
+    assert!(warnings.is_empty(), "{warnings:?}");
+    let mut worst = 0.0_f64;
+    for (step, found) in (0..).zip(&samples) {
+        let truth = synthetic::sample(step);
+        assert_eq!((found.time_s.to_bits(), found.step), (truth.time_s.to_bits(), truth.step));
+        for (found, truth) in [(&found.flexible, &truth.flexible), (&found.rigid, &truth.rigid)] {
+            assert_eq!(bits(&found.q), bits(&truth.q));
+            assert_eq!(bits(&found.qdot), bits(&truth.qdot));
+            assert_eq!(bits(&found.effort), bits(&truth.effort));
+            assert_eq!(bits(found.X_WT.translation.vector.as_slice()), bits(truth.X_WT.translation.vector.as_slice()));
+            assert_eq!(found.X_WL.len(), truth.X_WL.len());
+            let poses = found.X_WL.iter().zip(&truth.X_WL).chain([(&found.X_WT, &truth.X_WT)]);
+            worst = poses.map(|(found, truth)| distance(found, truth)).fold(worst, f64::max);
+        }
+        {
+            assert_eq!(found.flexible.X_WS.len(), truth.flexible.X_WS.len());
+            let stations = found.flexible.X_WS.iter().zip(&truth.flexible.X_WS);
+            worst = stations.map(|(found, truth)| distance(found, truth)).fold(worst, f64::max);
+        }
+        {
+            assert_eq!(found.contributions, truth.contributions);
+        }
+        assert_eq!(bits(&found.error_world), bits(&truth.error_world));
+        assert_eq!(bits(&found.error_path), bits(&truth.error_path));
+        assert_eq!(found.elastic, truth.elastic);
+        assert_eq!(found.energy, truth.energy);
+        assert_eq!(bits(&found.solver), bits(&truth.solver));
+    }
+    assert!(worst < 1e-13, "{worst:e}"); // measured 1.3e-15
+    remove(&[&path]);
+}
+
+/// What a header has no topic for is in the attachments; meshes come back as the triangles that were drawn.
+#[cfg(feature = "mcap")]
+#[test]
+fn an_mcap_file_gives_back_its_header_with_the_meshes() {
+    let mesh_file = synthetic::scratch("attached.stl");
+    std::fs::write(&mesh_file, "solid").unwrap();
+    let mut truth = synthetic::header();
+    truth.prismatic = vec![false, true, false];
+    truth.meshes[2].file = Some(mesh_file.clone());
+    let path = written("header", RecordingFormat::Mcap, &truth, 3);
+    remove(&[&mesh_file]); // the recording must not need it any more
+
+    let (header, _, result, _) = read(&path, RecordingFormat::Mcap).unwrap();
+    truth.meshes[2].file = None;
+    assert_eq!(header.meshes, truth.meshes);
+    let mut names: Vec<&str> = header.attachments.iter().map(|file| file.name.as_str()).collect();
+    assert!(names.remove(0).starts_with("meshes/"), "files of meshes stay attached: {names:?}");
+    assert_eq!(header.attachments[1..], truth.attachments);
+    let plain = |header: &RunHeader| {
+        let empty = RunHeader { meshes: Vec::new(), attachments: Vec::new(), ..header.clone() };
+        format!("{empty:?}")
+    };
+    assert_eq!(plain(&header), plain(&truth));
+    let truth = synthetic::result();
+    assert_eq!((result.figures, result.readable, result.events), (truth.figures, truth.readable, truth.events));
+
+    // A second generation has the same header: nothing is lost bit by bit.
+    let again = converted(&path, RecordingFormat::Mcap, "header-again", RecordingFormat::Mcap);
+    let (second, ..) = read(&again, RecordingFormat::Mcap).unwrap();
+    assert_eq!(format!("{second:?}"), format!("{header:?}"));
+    remove(&[&path, &again]);
+}
+
+#[cfg(feature = "parquet")]
+#[test]
+fn a_parquet_file_gives_back_names_result_and_events() {
+    let truth = synthetic::header();
+    let path = written("names", RecordingFormat::Parquet, &truth, 20_000); // two row groups
+    let (header, samples, result, _) = read(&path, RecordingFormat::Parquet).unwrap();
+    assert_eq!((header.robot, header.trajectory, header.tcp), (truth.robot, truth.trajectory, truth.tcp));
+    assert_eq!((header.joints, header.elements), (truth.joints, truth.elements));
+    assert_eq!((header.metadata, header.attachments), (truth.metadata, truth.attachments));
+    assert_eq!(header.log_rate_hz, synthetic::RATE_HZ);
+    assert_eq!(result, synthetic::result());
+    assert_eq!(samples.len(), 20_000);
+    assert_eq!(samples[19_999].step, synthetic::sample(19_999).step);
+    assert!(samples[0].flexible.qdot.iter().all(|v| v.is_nan()), "what is not in a table is not made up");
+    remove(&[&path]);
+}
+
+#[test]
+fn a_table_is_read_by_the_names_of_its_columns() {
+    let path = written("names-of", RecordingFormat::Csv, &synthetic::header(), 10);
+    let (header, samples, ..) = read(&path, RecordingFormat::Csv).unwrap();
+    assert_eq!((header.joints, header.elements), (synthetic::header().joints, synthetic::header().elements));
+    assert_eq!(header.log_rate_hz, synthetic::RATE_HZ);
+    assert!(header.has_rigid && header.links.is_empty());
+
+    // The same columns in another order, with one that is not ours.
+    let text = std::fs::read_to_string(&path).unwrap();
+    let shuffled: String = text
+        .lines()
+        .enumerate()
+        .map(|(k, line)| {
+            let mut fields: Vec<&str> = line.split(',').collect();
+            fields.rotate_left(9);
+            format!("{},{}\n", fields.join(","), if k == 0 { "note" } else { "text" })
+        })
+        .collect();
+    std::fs::write(&path, shuffled).unwrap();
+    let (_, reordered, ..) = read(&path, RecordingFormat::Csv).unwrap();
+    for (a, b) in samples.iter().zip(&reordered) {
+        assert_eq!(a.error_world, b.error_world);
+        assert_eq!(a.elastic, b.elastic);
+        assert_eq!(bits(&a.rigid.effort), bits(&b.rigid.effort));
+    }
+    remove(&[&path]);
+}
+
+/// What is read from a file cut anywhere: the error, or the samples in front of the cut, each as it was recorded.
+fn cut_at(file: &[u8], bytes: usize, path: &Path, format: RecordingFormat) -> Result<usize, LogError> {
+    std::fs::write(path, &file[..bytes]).unwrap();
+    let (_, samples, _, warnings) = read(path, format)?;
+    for (step, found) in (0..).zip(&samples) {
+        let truth = synthetic::sample(step);
+        assert_eq!(found.time_s.to_bits(), truth.time_s.to_bits());
+        assert_eq!(bits(&found.error_world), bits(&truth.error_world), "cut at {bytes}, sample {step}");
+        assert_eq!(found.energy, truth.energy);
+    }
+    if bytes + 8 >= file.len() && format == RecordingFormat::Mcap {
+        return Ok(samples.len()); // all is there but the closing mark
+    }
+    assert!(!warnings.is_empty(), "a file cut at {bytes} of {} bytes gives no warning", file.len());
+    assert!(warnings[0].starts_with(&path.display().to_string()), "{warnings:?}");
+    Ok(samples.len())
+}
+
+/// Cut positions: all of the first, then further and further apart, and all near the end.
+fn cuts(length: usize) -> impl Iterator<Item = usize> {
+    let step = length / 300 + 1;
+    (0..length.min(300)).chain((300..length).step_by(step)).chain(length.saturating_sub(120)..length)
+}
+
+#[cfg(feature = "mcap")]
+#[test]
+fn a_cut_mcap_file_gives_the_samples_before_the_cut_or_a_clear_error() {
+    let path = written("cut", RecordingFormat::Mcap, &synthetic::header(), SAMPLES);
+    let file = std::fs::read(&path).unwrap();
+    let mut most = 0;
+    for bytes in cuts(file.len()) {
+        match cut_at(&file, bytes, &path, RecordingFormat::Mcap) {
+            Ok(samples) => {
+                assert!(samples >= most, "{samples} samples of {bytes} bytes, {most} of fewer");
+                most = samples;
+            }
+            Err(LogError::NotARecording { found, .. }) => {
+                assert!(most == 0, "{found}");
+                let plain = found.contains("breaks off") || found.contains("empty") || found == "something else";
+                assert!(plain || found.starts_with("text"), "{found}");
+            }
+            Err(error) => panic!("cut at {bytes}: {error}"),
+        }
+    }
+    assert_eq!(most as u64, SAMPLES, "the index at the end is not needed");
+    remove(&[&path]);
+}
+
+/// What a kill leaves: the provisional end, at any moment.
+#[cfg(feature = "mcap")]
+#[test]
+fn what_a_killed_run_left_is_read_up_to_its_last_sample() {
+    let path = scratch("killed", RecordingFormat::Mcap);
+    let copy = scratch("killed-copy", RecordingFormat::Mcap);
+    let options = CreateOptions { overwrite: true, flush_every: std::time::Duration::ZERO };
+    let mut recorder = flexarm_log::McapRecorder::create(&path, options);
+    recorder.begin(&synthetic::header()).unwrap();
+    for step in 0..300_u64 {
+        recorder.record(&synthetic::sample(step)).unwrap();
+        if step % 43 == 0 {
+            std::fs::copy(&path, &copy).unwrap();
+            let (_, samples, _, warnings) = read(&copy, RecordingFormat::Mcap).unwrap();
+            assert_eq!(samples.len() as u64, step + 1);
+            let seconds = format!("{} s", synthetic::sample(step).time_s);
+            assert!(warnings[0].contains("not finished") && warnings[0].contains(&seconds), "{warnings:?}");
+        }
+    }
+    drop(recorder);
+    remove(&[&path, &copy]);
+}
+
+/// Flipped bits meet a checksum, a size or a name; they must never bring the program down or change a number unseen.
+#[cfg(feature = "mcap")]
+#[test]
+fn a_damaged_mcap_file_gives_no_wrong_number() {
+    let path = written("flipped", RecordingFormat::Mcap, &synthetic::header(), SAMPLES);
+    let file = std::fs::read(&path).unwrap();
+    for at in (0..file.len()).step_by(file.len() / 400 + 1) {
+        let mut damaged = file.clone();
+        damaged[at] ^= 0x41;
+        std::fs::write(&path, &damaged).unwrap();
+        let Ok((header, samples, ..)) = read(&path, RecordingFormat::Mcap) else { continue };
+        if header.step_s != synthetic::STEP_S || header.elements.len() != 1 {
+            continue; // run.json has no checksum of its own that readers must heed
+        }
+        for (step, found) in (0..).zip(&samples) {
+            assert_eq!(
+                bits(&found.error_world),
+                bits(&synthetic::sample(step).error_world),
+                "byte {at}, sample {step}"
+            );
+        }
+    }
+    remove(&[&path]);
+}
+
+#[test]
+fn a_cut_csv_file_gives_its_whole_lines() {
+    let path = written("cut", RecordingFormat::Csv, &synthetic::header(), 40);
+    let file = std::fs::read(&path).unwrap();
+    let head = file.iter().position(|byte| *byte == b'\n').unwrap() + 1;
+    let mut lines = 0;
+    for bytes in (head..file.len()).step_by(7) {
+        if file[bytes - 1] == b'\n' {
+            continue; // a whole table
+        }
+        let samples = cut_at(&file, bytes, &path, RecordingFormat::Csv).unwrap();
+        assert_eq!(samples, file[head..bytes].iter().filter(|byte| **byte == b'\n').count());
+        lines = samples;
+    }
+    assert_eq!(lines, 39);
+    // Within the names of the columns nothing can be known.
+    for bytes in (1..head - 1).step_by(5) {
+        std::fs::write(&path, &file[..bytes]).unwrap();
+        let error = read(&path, RecordingFormat::Csv).map(|_| ()).unwrap_err();
+        assert!(matches!(error, LogError::NotARecording { .. }), "{error}");
+    }
+    remove(&[&path]);
+}
+
+#[cfg(feature = "parquet")]
+#[test]
+fn a_cut_parquet_file_is_an_error_and_never_a_panic() {
+    let path = written("cut", RecordingFormat::Parquet, &synthetic::header(), 50);
+    let file = std::fs::read(&path).unwrap();
+    for bytes in cuts(file.len()) {
+        std::fs::write(&path, &file[..bytes]).unwrap();
+        let error = read(&path, RecordingFormat::Parquet).map(|_| ()).unwrap_err();
+        assert!(matches!(error, LogError::NotARecording { .. }), "{bytes}: {error}");
+    }
+    remove(&[&path]);
+}
+
+/// A Parquet file is there whole or not at all; one that was there before stays until then.
+#[cfg(feature = "parquet")]
+#[test]
+fn a_parquet_file_has_its_name_only_when_it_is_finished() {
+    let path = scratch("finished", RecordingFormat::Parquet);
+    let begun = |options| {
+        let mut recorder = flexarm_log::ParquetRecorder::create(&path, options);
+        recorder.begin(&synthetic::header()).map(|()| recorder)
+    };
+    let folder = || {
+        let stem = path.file_name().unwrap().to_string_lossy().into_owned();
+        let files = std::fs::read_dir(path.parent().unwrap()).unwrap().map(|entry| entry.unwrap().file_name());
+        files.filter(|name| name.to_string_lossy().starts_with(&stem)).count()
+    };
+    let mut killed = begun(CreateOptions::default()).unwrap();
+    killed.record(&synthetic::sample(0)).unwrap();
+    assert!(!path.exists());
+    drop(killed);
+    assert_eq!(folder(), 0, "nothing is left of a run that was given up");
+
+    let mut first = begun(CreateOptions::default()).unwrap();
+    first.record(&synthetic::sample(0)).unwrap();
+    first.finish(&RunResult::default()).unwrap();
+    assert_eq!(folder(), 1);
+    assert!(matches!(begun(CreateOptions::default()), Err(LogError::Exists { .. })));
+    let before = std::fs::read(&path).unwrap();
+    drop(begun(CreateOptions::default().with_overwrite(true)).unwrap());
+    assert!(std::fs::read(&path).unwrap() == before);
+    remove(&[&path]);
+}
+
+/// The same run gives the same bytes on any day.
+#[cfg(feature = "parquet")]
+#[test]
+fn a_parquet_file_does_not_depend_on_the_clock() {
+    let [a, b] = ["once", "twice"].map(|name| written(name, RecordingFormat::Parquet, &synthetic::header(), 100));
+    assert!(std::fs::read(&a).unwrap() == std::fs::read(&b).unwrap());
+    remove(&[&a, &b]);
+}
+
+#[test]
+fn what_is_no_recording_is_refused_with_what_it_is() {
+    let path = synthetic::scratch("strange");
+    let mut cases: Vec<(&[u8], RecordingFormat, &str)> = vec![
+        (b"", RecordingFormat::Csv, "an empty file"),
+        (b"time,x\n0,1\n", RecordingFormat::Csv, "a table with the columns time, x"),
+        (b"1,2\n3,4\n", RecordingFormat::Csv, "a table with the columns 1, 2"),
+        (b"\0\x01\x02\x03", RecordingFormat::Csv, "something else"),
+        (b"PAR1....PAR1", RecordingFormat::Csv, "a file in the format Parquet"),
+    ];
+    if RecordingFormat::Mcap.is_built_in() {
+        cases.push((b"hello\nyou\n", RecordingFormat::Mcap, "text, beginning \"hello\""));
+        cases.push((b"\x89MCAP", RecordingFormat::Mcap, "breaks off"));
+        cases.push((b"", RecordingFormat::Mcap, "an empty file"));
+    }
+    if RecordingFormat::Parquet.is_built_in() {
+        cases.push((b"PAR1....PAR1", RecordingFormat::Parquet, "a damaged file"));
+        cases.push((b"\x89MCAP0\r\n", RecordingFormat::Parquet, "a file in the format MCAP"));
+    }
+    for (bytes, format, words) in cases {
+        std::fs::write(&path, bytes).unwrap();
+        let error = open_recording(&path, format).map(|_| ()).unwrap_err();
+        let text = error.to_string();
+        assert!(matches!(error, LogError::NotARecording { .. }), "{text}");
+        assert!(text.starts_with(&path.display().to_string()) && text.contains("expected"), "{text}");
+        assert!(text.contains(words), "{text}");
+    }
+    remove(&[&path]);
+
+    let folder = std::env::temp_dir();
+    let error = open_recording(&folder, RecordingFormat::Csv).map(|_| ()).unwrap_err().to_string();
+    assert!(error.contains("a folder") && error.contains("run.csv"), "{error}");
+}
+
+#[cfg(feature = "mcap")]
+#[test]
+fn an_mcap_file_of_another_program_is_refused_with_its_topics() {
+    let path = scratch("foreign", RecordingFormat::Mcap);
+    let mut writer =
+        mcap::WriteOptions::new().library("rosbag2").create(std::fs::File::create(&path).unwrap()).unwrap();
+    let channel = writer.add_channel(0, "/camera/image", "cdr", &std::collections::BTreeMap::new()).unwrap();
+    let header = mcap::records::MessageHeader { channel_id: channel, sequence: 0, log_time: 1, publish_time: 1 };
+    writer.write_to_known_channel(&header, &[1, 2, 3]).unwrap();
+    writer.finish().unwrap();
+    drop(writer);
+    let error = open_recording(&path, RecordingFormat::Mcap).map(|_| ()).unwrap_err().to_string();
+    assert!(error.contains("rosbag2") && error.contains("/camera/image"), "{error}");
+    remove(&[&path]);
+}
+
+/// Another program's Parquet: refused with its columns, unless it has the columns of a recording.
+#[cfg(feature = "parquet")]
+#[test]
+fn a_parquet_file_of_another_program_is_read_by_its_columns_or_refused() {
+    use parquet::data_type::DoubleType;
+    let path = scratch("foreign", RecordingFormat::Parquet);
+    let write = |names: &[&str], kind: &str| {
+        let fields: Vec<String> = names.iter().map(|name| format!("REQUIRED {kind} {name};")).collect();
+        let schema = format!("message schema {{ {} }}", fields.join(" "));
+        let schema = parquet::schema::parser::parse_message_type(&schema).unwrap();
+        let file = std::fs::File::create(&path).unwrap();
+        let mut writer =
+            parquet::file::writer::SerializedFileWriter::new(file, schema.into(), Default::default()).unwrap();
+        if kind == "DOUBLE" {
+            let mut group = writer.next_row_group().unwrap();
+            let mut value = 0.0;
+            while let Some(mut column) = group.next_column().unwrap() {
+                column.typed::<DoubleType>().write_batch(&[value, value + 0.5], None, None).unwrap();
+                column.close().unwrap();
+                value += 1.0;
+            }
+            group.close().unwrap();
+        }
+        writer.close().unwrap();
+    };
+    let error = || open_recording(&path, RecordingFormat::Parquet).map(|_| ()).unwrap_err().to_string();
+    write(&["city", "price"], "DOUBLE");
+    assert!(error().contains("city, price") && error().contains("flexible_x_m"), "{}", error());
+
+    let energies = ["kinetic_energy_j", "potential_energy_j", "elastic_energy_j"];
+    let names: Vec<&str> =
+        ["time", "flexible_x_m", "flexible_y_m", "flexible_z_m"].into_iter().chain(energies).collect();
+    write(&names, "FLOAT");
+    assert!(error().contains("column time of type FLOAT"), "{}", error());
+    write(&names, "DOUBLE");
+    let (header, samples, ..) = read(&path, RecordingFormat::Parquet).unwrap();
+    assert_eq!((samples.len(), header.log_rate_hz, samples[1].energy.elastic), (2, 2.0, 6.5));
+    remove(&[&path]);
+}
+
+/// Curves come back to rounding (they are stored in mm), poses in single precision, both at their own rates.
+#[cfg(feature = "rerun")]
+#[test]
+fn a_rerun_file_gives_back_its_curves_and_poses() {
+    let truth = synthetic::header();
+    let path = written("curves", RecordingFormat::Rrd, &truth, SAMPLES);
+    let (header, samples, result, warnings) = read(&path, RecordingFormat::Rrd).unwrap();
+    assert_eq!((&header.robot, &header.trajectory), (&truth.robot, &truth.trajectory));
+    assert_eq!((&header.joints, &header.elements, &header.links), (&truth.joints, &truth.elements, &truth.links));
+    assert_eq!(result, synthetic::result());
+    assert!(warnings.is_empty(), "{warnings:?}");
+    assert_eq!(samples.len() as u64, SAMPLES);
+    let near = |found: &[f64], truth: &[f64]| {
+        // measured 1.1e-16 of the number
+        found.iter().zip(truth).for_each(|(a, b)| assert!((a - b).abs() <= 4e-16 * b.abs(), "{a:e} and {b:e}"));
+    };
+    let mut places = 0;
+    for (step, found) in (0..).zip(&samples) {
+        let truth = synthetic::sample(step);
+        assert_eq!((found.time_s.to_bits(), found.step), (truth.time_s.to_bits(), truth.step));
+        assert_eq!(bits(&found.flexible.q), bits(&truth.flexible.q));
+        assert_eq!(bits(&found.flexible.effort), bits(&truth.flexible.effort));
+        assert_eq!(bits(&found.rigid.effort), bits(&truth.rigid.effort));
+        near(&found.error_world, &truth.error_world);
+        near(&found.error_path[..3], &truth.error_path[..3]);
+        near(&found.elastic[0].deflection, &truth.elastic[0].deflection);
+        assert_eq!(found.energy, truth.energy);
+        assert_eq!(bits(&found.solver), bits(&truth.solver));
+        if !found.flexible.X_WT.translation.x.is_nan() {
+            places += 1;
+            let error = (found.flexible.X_WT.translation.vector - truth.flexible.X_WT.translation.vector).norm();
+            assert!(error < 1e-6, "{error:e}"); // measured 7e-8
+        }
+    }
+    assert!(places * 4 > samples.len(), "{places} places of the tool");
+
+    // On to a table and to MCAP.
+    for format in [RecordingFormat::Csv, RecordingFormat::Mcap].into_iter().filter(|format| format.is_built_in()) {
+        let next = converted(&path, RecordingFormat::Rrd, "from-rrd", format);
+        let (_, again, ..) = read(&next, format).unwrap();
+        assert_eq!(again.len(), samples.len());
+        assert!(again.iter().zip(&samples).all(|(a, b)| bits(&a.error_world) == bits(&b.error_world)));
+        remove(&[&next]);
+    }
+    remove(&[&path]);
+}
+
+/// The picture that a recording gives does not depend on the way that the run took to it.
+#[cfg(all(feature = "rerun", feature = "mcap"))]
+#[test]
+fn a_rerun_file_made_of_an_mcap_file_shows_the_same() {
+    use rerun::external::re_log_encoding::DecoderApp;
+    use rerun::log::{Chunk, LogMsg};
+
+    let direct = written("direct", RecordingFormat::Rrd, &synthetic::header(), 60);
+    let mcap = written("way", RecordingFormat::Mcap, &synthetic::header(), 60);
+    let over = converted(&mcap, RecordingFormat::Mcap, "over-mcap", RecordingFormat::Rrd);
+    let entities = |path: &Path| -> std::collections::BTreeMap<String, usize> {
+        let file = std::fs::read(path).unwrap();
+        let mut rows = std::collections::BTreeMap::new();
+        for message in DecoderApp::decode_lazy(file.as_slice()) {
+            if let LogMsg::ArrowMsg(store, message) = message.unwrap()
+                && store.is_recording()
+            {
+                let chunk = Chunk::from_arrow_msg(&message).unwrap();
+                *rows.entry(chunk.entity_path().to_string()).or_insert(0) += chunk.num_rows();
+            }
+        }
+        rows
+    };
+    let (a, b) = (entities(&direct), entities(&over));
+    let names = |rows: &std::collections::BTreeMap<String, usize>| rows.keys().cloned().collect::<Vec<_>>();
+    assert_eq!(names(&a), names(&b));
+    assert!(a.contains_key("/synthetic/flexible/forearm/box"), "meshes: {a:?}");
+    remove(&[&direct, &mcap, &over]);
+}
+
+/// A file cut anywhere gives what is in front of the cut, or says that it is none; never a panic.
+#[cfg(feature = "rerun")]
+#[test]
+fn a_cut_rerun_file_gives_the_samples_before_the_cut_or_a_clear_error() {
+    let path = written("cut", RecordingFormat::Rrd, &synthetic::header(), 200);
+    let file = std::fs::read(&path).unwrap();
+    let mut most = 0;
+    for bytes in (0..file.len()).step_by(file.len() / 60 + 1) {
+        std::fs::write(&path, &file[..bytes]).unwrap();
+        match read(&path, RecordingFormat::Rrd) {
+            Ok((_, samples, _, warnings)) => {
+                // Behind the result there is only an index.
+                assert!(!warnings.is_empty() || samples.len() == 200, "cut at {bytes} of {}", file.len());
+                assert!(samples.len() >= most);
+                let last = samples.last().map(|sample| sample.energy.elastic.is_finite());
+                assert_ne!(last, Some(false), "cut at {bytes}: curves of different lengths");
+                most = samples.len();
+            }
+            Err(error) => assert!(matches!(error, LogError::NotARecording { .. }), "{error}"),
+        }
+    }
+    assert_eq!(most, 200);
+    remove(&[&path]);
+}

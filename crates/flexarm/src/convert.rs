@@ -1,0 +1,217 @@
+//! Recordings from one format to another, and back into memory.
+
+use std::path::{Path, PathBuf};
+
+use flexarm_log::{
+    CreateOptions, CsvRecorder, LogError, Recorder, RecordingFormat, RunSource, Sample, Trace, open_recording,
+};
+use serde::Serialize;
+
+use crate::error::Error;
+
+/// Choices of a conversion.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ConvertOptions {
+    /// Format of the input, whatever its name ends with.
+    pub from: Option<RecordingFormat>,
+    /// Format of the output, whatever its name ends with.
+    pub to: Option<RecordingFormat>,
+    /// Overwrite the output.
+    pub overwrite: bool,
+}
+
+/// What was converted.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct ConvertSummary {
+    /// The recording that was read.
+    pub input: String,
+    /// The one that was written.
+    pub output: String,
+    /// Ending of the input's format: mcap, rrd, csv or parquet.
+    pub from: &'static str,
+    /// The same of the output.
+    pub to: &'static str,
+    /// Instants.
+    pub samples: u64,
+    /// Time from the first to the last (s).
+    pub duration_s: f64,
+    /// What did not come along: sentences.
+    pub lost: Vec<String>,
+    /// Things worth telling, such as a broken end: sentences.
+    pub warnings: Vec<String>,
+}
+
+/// Writes the run of a recording as a recording of another format.
+///
+/// The output comes into being under another name and is renamed at the end: whatever goes wrong, it is there whole or not
+/// at all, and what was there before stays until then.
+///
+/// # Errors
+/// [`Error::Usage`] if a format is not known or input and output are one file; [`Error::File`] if the input is not there or
+/// the output is and may not be overwritten; [`Error::Log`] for what the files say.
+pub fn convert(input: &Path, output: &Path, options: &ConvertOptions) -> Result<ConvertSummary, Error> {
+    let from = format(input, options.from, "--from")?;
+    let to = format(output, options.to, "--to")?;
+    let mut source = open(input, from)?;
+    if same_file(input, output) {
+        let text = format!("{} is input and output: give the output another name", input.display());
+        return Err(Error::Usage(text));
+    }
+    crate::result_files::check_free(&[output.to_owned()], options.overwrite)?;
+
+    let mut partial = Partial::of(output);
+    let mut recorder = recorder(&partial.path, to)?;
+    // Messages name the file that was asked for.
+    let provisional = partial.path.clone();
+    let named = |error: LogError| match error {
+        LogError::Io { path, action, source } if path == provisional => {
+            LogError::Io { path: output.to_owned(), action, source }
+        }
+        LogError::Format { path, action, cause } if path == provisional => {
+            LogError::Format { path: output.to_owned(), action, cause }
+        }
+        other => other,
+    };
+    recorder.begin(source.header()).map_err(named)?;
+    let (mut samples, mut span) = (0, None);
+    let result = source.replay(&mut |sample: &Sample| -> Result<(), LogError> {
+        samples += 1;
+        let (first, _) = span.unwrap_or((sample.time_s, 0.0));
+        span = Some((first, sample.time_s));
+        recorder.record(sample).map_err(named)
+    })?;
+    let Some((first, last)) = span else {
+        let what = source.warnings().pop().unwrap_or_else(|| "a recording without a single sample".into());
+        return Err(LogError::NotARecording {
+            path: input.to_owned(),
+            found: "no sample".into(),
+            expected: "at least one".into(),
+            mend: what,
+        }
+        .into());
+    };
+    recorder.finish(&result).map_err(named)?;
+    drop(recorder);
+    partial.rename(output)?;
+
+    let mut lost = from.lost_on_the_way_to(to, source.header());
+    lost.extend(source.missing());
+    Ok(ConvertSummary {
+        input: input.display().to_string(),
+        output: output.display().to_string(),
+        from: from.extension(),
+        to: to.extension(),
+        samples,
+        duration_s: last - first,
+        lost,
+        warnings: source.warnings(),
+    })
+}
+
+/// Reads a recording into memory: its summary, if it holds one (MCAP, Parquet), and its curves.
+///
+/// What the format does not hold is NaN or empty ([`flexarm_log::RunSource::missing`]); a broken end is no error here.
+///
+/// # Errors
+/// As [`convert()`].
+pub fn read_run(path: &Path) -> Result<(Option<serde_json::Value>, Trace), Error> {
+    let mut source = open(path, format(path, None, "--from")?)?;
+    let mut trace = Trace::new(source.header().clone());
+    let result = source.replay(&mut |sample: &Sample| {
+        trace.push(sample);
+        Ok(())
+    })?;
+    let summary = result.attachments.iter().find(|file| file.name == "summary.json");
+    let summary = summary.and_then(|file| serde_json::from_slice(&file.bytes).ok());
+    trace.finish(result);
+    Ok((summary, trace))
+}
+
+/// The formats of recordings by the words that `--from` and `--to` take.
+///
+/// # Errors
+/// Which words there are.
+pub fn parse_recording_format(word: &str) -> Result<RecordingFormat, String> {
+    let known = |format: &RecordingFormat| format.extension() == word.to_ascii_lowercase();
+    RecordingFormat::ALL.into_iter().find(known).ok_or_else(|| format!("expected one of {}", words()))
+}
+
+fn words() -> String {
+    RecordingFormat::ALL.map(RecordingFormat::extension).join(", ")
+}
+
+fn format(path: &Path, given: Option<RecordingFormat>, flag: &str) -> Result<RecordingFormat, Error> {
+    if path.is_dir() {
+        let what = "is a folder, a recording is a file: give one in it, such as run.mcap".into();
+        return Err(Error::File { path: path.to_owned(), what });
+    }
+    let format = given.or_else(|| RecordingFormat::from_path(path)).ok_or_else(|| {
+        let ending = path.extension().map_or("no ending".into(), |e| format!("the ending .{}", e.to_string_lossy()));
+        Error::Usage(format!(
+            "{}: the name has {ending}, expected one of {}: rename the file or give its format with {flag}",
+            path.display(),
+            RecordingFormat::ALL.map(|format| format!(".{}", format.extension())).join(", ")
+        ))
+    })?;
+    if !format.is_built_in() {
+        let text = format!("{}: this program was built without {format}; use a build with it", path.display());
+        return Err(Error::Usage(text));
+    }
+    Ok(format)
+}
+
+fn open(path: &Path, format: RecordingFormat) -> Result<Box<dyn RunSource>, Error> {
+    if !path.exists() {
+        let what = "there is no such file: give a recording that flexarm compare or run wrote".into();
+        return Err(Error::File { path: path.to_owned(), what });
+    }
+    Ok(open_recording(path, format)?)
+}
+
+fn same_file(a: &Path, b: &Path) -> bool {
+    a.canonicalize().ok().zip(b.canonicalize().ok()).is_some_and(|(a, b)| a == b)
+}
+
+/// A recorder that may overwrite: its file is a provisional one.
+fn recorder(path: &Path, format: RecordingFormat) -> Result<Box<dyn Recorder>, Error> {
+    let options = CreateOptions::default().with_overwrite(true);
+    match format {
+        RecordingFormat::Csv => Ok(Box::new(CsvRecorder::create(path, options))),
+        #[cfg(feature = "mcap")]
+        RecordingFormat::Mcap => Ok(Box::new(flexarm_log::McapRecorder::create(path, options))),
+        #[cfg(feature = "rerun")]
+        RecordingFormat::Rrd => Ok(Box::new(flexarm_log::RrdRecorder::create(path, options))),
+        #[cfg(feature = "parquet")]
+        RecordingFormat::Parquet => Ok(Box::new(flexarm_log::ParquetRecorder::create(path, options))),
+        #[allow(unreachable_patterns, reason = "which formats are left depends on the features")]
+        _ => Err(Error::Usage(format!("this program was built without {format}; use a build with it"))),
+    }
+}
+
+/// A file under a provisional name, which goes away unless it is renamed.
+struct Partial {
+    path: PathBuf,
+    done: bool,
+}
+
+impl Partial {
+    fn of(output: &Path) -> Self {
+        let mut name = output.file_name().unwrap_or_default().to_owned();
+        name.push(".new");
+        Self { path: output.with_file_name(name), done: false }
+    }
+
+    fn rename(&mut self, output: &Path) -> Result<(), Error> {
+        std::fs::rename(&self.path, output).map_err(|source| Error::Write { path: output.to_owned(), source })?;
+        self.done = true;
+        Ok(())
+    }
+}
+
+impl Drop for Partial {
+    fn drop(&mut self) {
+        if !self.done {
+            let _ = std::fs::remove_file(&self.path); // what cannot be removed stays; the error that led here is told
+        }
+    }
+}
