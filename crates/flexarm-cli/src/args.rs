@@ -9,6 +9,7 @@ use crate::convert::ConvertArgs;
 use crate::exchange_args::{ExportArgs, ImportArgs};
 use crate::posed_args::{ModesArgs, ResponseArgs, StaticsArgs};
 use crate::reduce_args::ReduceArgs;
+use crate::report::ReportArgs;
 use crate::view::ViewArgs;
 
 /// How far is a robot's tool from where the rigid model puts it, because its links bend?
@@ -43,6 +44,8 @@ pub(crate) enum Command {
     Modes(ModesArgs),
     /// Frequency response of the TCP to forces on it and to motions of joints
     Response(ResponseArgs),
+    /// Make the HTML report of recorded runs
+    Report(ReportArgs),
     /// Write a recording as MCAP, Rerun, CSV or Parquet, from any of them
     Convert(ConvertArgs),
     /// Make a flexible link of a finite element mesh, with its checks

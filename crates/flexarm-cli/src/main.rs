@@ -10,6 +10,7 @@ mod posed_args;
 mod print;
 mod reduce;
 mod reduce_args;
+mod report;
 mod shipped;
 mod study;
 mod summary_table;
@@ -79,6 +80,7 @@ fn run(cli: &Cli) -> Result<ExitCode, Error> {
         Command::Statics(args) => posed::statics(cli, args),
         Command::Modes(args) => posed::modes(cli, args),
         Command::Response(args) => posed::response(cli, args),
+        Command::Report(args) => report::run(cli, args),
         Command::Convert(args) => convert::run(cli, args),
         Command::Reduce(args) => reduce::run(cli, args),
         Command::Import(args) => exchange::import(cli, args),

@@ -12,7 +12,8 @@ use crate::{CreateOptions, LogError, Recorder, RunHeader, RunResult, Sample};
 ///
 /// Columns: `time`; TCP positions `rigid_x_m` ..., `flexible_x_m` ...; TCP error, flexible minus rigid, in world
 /// axes `error_x_m` ... `error_rz_rad` (rotation vector) and along the path `error_tangential_m`,
-/// `error_normal_m`, `error_binormal_m`; for every joint `<joint>_position_rad`, `<joint>_effort` and
+/// `error_normal_m`, `error_binormal_m`; for every flexible link and elastic drive the TCP displacement that it alone causes,
+/// `<name>_contribution_x_m` ...; for every joint `<joint>_position_rad`, `<joint>_effort` and
 /// `rigid_<joint>_effort`; for every elastic element its deflection and load, `<element>_x_m` ...
 /// `<element>_tz_nm`; `kinetic_energy_j`, `potential_energy_j`, `elastic_energy_j`. A run without a rigid twin
 /// has no `rigid_` and no `error_` columns.

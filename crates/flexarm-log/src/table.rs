@@ -21,6 +21,9 @@ pub(crate) fn columns(header: &RunHeader) -> Vec<String> {
         names.extend(DISPLACEMENT.map(|part| format!("error_{part}")));
         names.extend(["tangential", "normal", "binormal"].map(|axis| format!("error_{axis}_m")));
     }
+    for contributor in &header.contributors {
+        names.extend(POSITION.map(|axis| format!("{contributor}_contribution_{axis}")));
+    }
     for (k, joint) in header.joints.iter().enumerate() {
         let unit = if header.prismatic.get(k).copied().unwrap_or(false) { "m" } else { "rad" };
         names.push(format!("{joint}_position_{unit}"));
@@ -48,6 +51,7 @@ pub(crate) fn fill_row(sample: &Sample, has_rigid: bool, row: &mut Vec<f64>) {
         row.extend(sample.error_world);
         row.extend(&sample.error_path[..3]);
     }
+    row.extend(sample.contributions.iter().flatten());
     for (joint, q) in sample.flexible.q.iter().enumerate() {
         row.push(*q);
         row.push(sample.flexible.effort[joint]);
@@ -67,9 +71,6 @@ pub(crate) fn left_out(header: &RunHeader) -> Vec<String> {
     let mut left = vec!["the table has no velocities of joints and no orientations of the tool".to_owned()];
     if !header.links.is_empty() {
         left.push("the table has no poses of links: no picture of the arm can be made of it".into());
-    }
-    if !header.contributors.is_empty() {
-        left.push("the table has no shares of the tool error".into());
     }
     left
 }
@@ -113,6 +114,7 @@ impl TableLayout {
                 }
             }
             header.elements.extend(name.strip_suffix("_fx_n").map(str::to_owned));
+            header.contributors.extend(name.strip_suffix("_contribution_x_m").map(str::to_owned));
         }
         Self::of_header(header, names)
     }
@@ -124,7 +126,7 @@ impl TableLayout {
     pub(crate) fn of_header(mut header: RunHeader, names: &[String]) -> Result<Self, (String, String)> {
         // What the columns do not hold must not be asked of samples.
         (header.links, header.meshes) = (Vec::new(), Vec::new());
-        (header.bends, header.contributors) = (Vec::new(), Vec::new());
+        header.bends = Vec::new();
         (header.magnification, header.urdf) = (0.0, String::new());
         let wanted = columns(&header);
         let place = |name: &String| names.iter().position(|n| n == name);
@@ -184,6 +186,8 @@ impl TableLayout {
             sample.error_world = std::array::from_fn(|_| number());
             sample.error_path[..3].fill_with(&mut number);
         }
+        let contribution = |_: &String| std::array::from_fn(|_| number());
+        sample.contributions = self.header.contributors.iter().map(contribution).collect();
         for joint in 0..joints {
             sample.flexible.q[joint] = number();
             sample.flexible.effort[joint] = number();

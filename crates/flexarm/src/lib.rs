@@ -65,7 +65,9 @@ pub use mode_recording::{ModeMovie, record_modes};
 pub use modes::{ModeFigures, ModeTable, modes};
 pub use motion::Motion;
 pub use options::{DriveModel, LinkModel, Modelling, Outputs, RunOptions};
-pub use report::{Figure, FigureGroup, ReportRun, Weight, figure_groups, html, markdown, rows};
+pub use report::{
+    Figure, FigureGroup, ReportFiles, ReportOptions, ReportRun, Weight, figure_groups, html, markdown, report, rows,
+};
 pub use response::{PeakFigures, Response, ResponseCurve, ResponseFiles, ResponseOutputs, ResponseRequest, response};
 pub use robot::{LoadOptions, Robot, TCP_FRAME};
 pub use statics::{ElementStatics, Statics, parse_wrench, statics};

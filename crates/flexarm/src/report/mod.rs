@@ -3,6 +3,7 @@
 //! Start at [`html`]; what a person wants to see in numbers is in [`figure_groups`], which page, Markdown and the
 //! terminal share. `curves` makes the data of the plots, `picture` has the arm drawn, `figures` writes the folder for papers.
 
+mod again;
 mod curves;
 mod figures;
 mod html;
@@ -18,6 +19,7 @@ use crate::record::FIGURES_FOLDER;
 use crate::result_files::write_all;
 use crate::summary::Summary;
 
+pub use again::{ReportFiles, ReportOptions, report};
 pub use html::{ReportRun, html};
 
 /// Writes report, figures and `summary.json` into the output folder.

@@ -1,0 +1,51 @@
+//! `flexarm report`: words and answer.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+use flexarm::{Error, ReportFiles, ReportOptions};
+
+use crate::args::Cli;
+
+const EXAMPLES: &str = "\
+Examples:
+  The page of a run again, from its recording, with figures for a paper:
+      flexarm report out/run.mcap -o again/report.html --figures
+  Two runs in one page:
+      flexarm report out/before out/after -o compared.html";
+
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct ReportArgs {
+    /// Recordings (.mcap holds most; .parquet, .csv, .rrd) or folders of runs; several are compared in one page
+    #[arg(required = true, value_name = "RECORDING")]
+    pub(crate) recordings: Vec<PathBuf>,
+    /// The page to write [default: report.html beside the first recording]
+    #[arg(short, long, value_name = "FILE")]
+    pub(crate) output: Option<PathBuf>,
+    /// Write a folder "figures" for papers beside the page too
+    #[arg(long)]
+    pub(crate) figures: bool,
+    /// Overwrite what is there
+    #[arg(long)]
+    pub(crate) force: bool,
+}
+
+pub(crate) fn run(cli: &Cli, args: &ReportArgs) -> Result<ExitCode, Error> {
+    let options = ReportOptions { output: args.output.clone(), figures: args.figures, overwrite: args.force };
+    let files = flexarm::report(&args.recordings, &options)?;
+    if !cli.quiet {
+        files.warnings.iter().for_each(|warning| crate::print::warning(warning));
+    }
+    crate::answer(cli, || crate::to_json(&files), || text(&files));
+    Ok(ExitCode::SUCCESS)
+}
+
+fn text(files: &ReportFiles) -> String {
+    let mut out = format!("report   {}\n", files.report);
+    if let Some(folder) = &files.figures {
+        out += &format!("figures  {folder}\n");
+    }
+    out
+}
