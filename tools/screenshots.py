@@ -129,7 +129,7 @@ def main():
             if not wanted(name):
                 continue
             folder = pathlib.Path(scratch) / f"pictures_{name}"
-            check = [sys.executable, str(ROOT / "tools/check_report.py"), str(run(command) / "report.html"), "--out", str(folder)]
+            check = [sys.executable, str(ROOT / "tools/check_report.py"), str(run(command) / "report.html"), "--pictures", str(folder)]
             done = subprocess.run(check, capture_output=True, text=True)
             print(done.stdout.strip().splitlines()[-1] if done.stdout.strip() else done.stderr.strip())
             if done.returncode != 0:

@@ -61,6 +61,18 @@ fn a_killed_run_leaves_a_whole_recording_up_to_the_last_second() {
     let text = place.text("result/run.csv");
     let table = Table::parse(&text[..=text.rfind('\n').unwrap()]);
     assert!(*table.column("time").last().unwrap() > before);
+    // Read back by the program itself, all recordings go as far.
+    for recording in ["run.mcap", "run.rrd"].into_iter().filter(|name| place.path(&format!("result/{name}")).is_file())
+    {
+        let summary = place.json(&["convert", &format!("result/{recording}"), &format!("{recording}.csv")]);
+        let reached = Table::parse(&place.text(&format!("{recording}.csv"))).column("time").last().copied().unwrap();
+        assert!(reached > before, "{recording}: {reached} s, {before} s a second before the kill");
+        assert!(summary["warnings"].as_array().unwrap().len() == 1, "{summary}");
+    }
+    // And a report can be made of what is left.
+    let report = place.json(&["report", "result/run.mcap", "-o", "left.html"]);
+    assert!(report["warnings"][0].as_str().unwrap().contains("no result"), "{report}");
+    assert!(place.text("left.html").contains("TCP error"));
 }
 
 /// The program under a limit of the size of files (in the shell's blocks of 512 or 1024 bytes), writing past which is an
@@ -85,6 +97,11 @@ fn a_recording_that_may_not_grow_ends_the_run_with_its_name_and_reads_up_to_ther
     assert!(!answer.err.contains("index") && !answer.err.contains("last samples"), "{}", answer.err);
     let last = last_time(&place.read("result/run.mcap")).unwrap();
     assert!((0.1..59.0).contains(&last), "{last} s are left");
+    if cfg!(feature = "rerun") {
+        place.json(&["convert", "result/run.rrd", "left.csv"]);
+        let reached = *Table::parse(&place.text("left.csv")).column("time").last().unwrap();
+        assert!((0.1..59.0).contains(&reached), "{reached} s are left in the .rrd");
+    }
 }
 
 /// The first file that is written to fails at once: the device is always full.

@@ -91,7 +91,7 @@ fn assert_same_but_time(found: &[u8], expected: &[u8]) {
         let ((t, found), (truth, expected)) = (found.split_once(',').unwrap(), expected.split_once(',').unwrap());
         assert_eq!(found, expected);
         let (t, truth): (f64, f64) = (t.parse().unwrap(), truth.parse().unwrap());
-        assert!((t - truth).abs() < 1e-15, "{t:?} and {truth:?}"); // measured 1.1e-16
+        assert!((t - truth).abs() < 1e-15, "{t:?} and {truth:?}");
     }
 }
 
@@ -156,7 +156,7 @@ fn an_mcap_file_gives_back_every_number_to_the_last_bit_and_poses_to_rounding() 
         assert_eq!(found.energy, truth.energy);
         assert_eq!(bits(&found.solver), bits(&truth.solver));
     }
-    assert!(worst < 1e-13, "{worst:e}"); // measured 1.3e-15
+    assert!(worst < 1e-13, "{worst:e}");
     remove(&[&path]);
 }
 
@@ -514,29 +514,35 @@ fn a_rerun_file_gives_back_its_curves_and_poses() {
     assert_eq!(result, synthetic::result());
     assert!(warnings.is_empty(), "{warnings:?}");
     assert_eq!(samples.len() as u64, SAMPLES);
-    let near = |found: &[f64], truth: &[f64]| {
-        // measured 1.1e-16 of the number
-        found.iter().zip(truth).for_each(|(a, b)| assert!((a - b).abs() <= 4e-16 * b.abs(), "{a:e} and {b:e}"));
+    let near = |found: &[f64], truth: &[f64], bound: f64| {
+        found.iter().zip(truth).for_each(|(a, b)| assert!((a - b).abs() <= bound, "{a:e} and {b:e}"));
     };
-    let mut places = 0;
+    let (mut drawn, mut worst, mut worst_between) = (0, 0.0f64, 0.0f64);
     for (step, found) in (0..).zip(&samples) {
         let truth = synthetic::sample(step);
         assert_eq!((found.time_s.to_bits(), found.step), (truth.time_s.to_bits(), truth.step));
-        assert_eq!(bits(&found.flexible.q), bits(&truth.flexible.q));
-        assert_eq!(bits(&found.flexible.effort), bits(&truth.flexible.effort));
-        assert_eq!(bits(&found.rigid.effort), bits(&truth.rigid.effort));
-        near(&found.error_world, &truth.error_world);
-        near(&found.error_path[..3], &truth.error_path[..3]);
-        near(&found.elastic[0].deflection, &truth.elastic[0].deflection);
-        assert_eq!(found.energy, truth.energy);
-        assert_eq!(bits(&found.solver), bits(&truth.solver));
-        if !found.flexible.X_WT.translation.x.is_nan() {
-            places += 1;
-            let error = (found.flexible.X_WT.translation.vector - truth.flexible.X_WT.translation.vector).norm();
-            assert!(error < 1e-6, "{error:e}"); // measured 7e-8
+        // Stored in millimetres: rounding of a number of 1e-3.
+        near(&found.error_world[..3], &truth.error_world[..3], 1e-18);
+        near(&found.error_path[..3], &truth.error_path[..3], 1e-18);
+        let apart = (found.flexible.X_WT.translation.vector - truth.flexible.X_WT.translation.vector).norm();
+        if step % 3 == 0 {
+            drawn += 1;
+            assert_eq!(bits(&found.flexible.q), bits(&truth.flexible.q));
+            assert_eq!(bits(&found.flexible.effort), bits(&truth.flexible.effort));
+            assert_eq!(bits(&found.rigid.effort), bits(&truth.rigid.effort));
+            near(&found.elastic[0].deflection, &truth.elastic[0].deflection, 1e-18);
+            assert_eq!(found.energy, truth.energy);
+            assert_eq!(bits(&found.solver), bits(&truth.solver));
+            worst = worst.max(apart);
+        } else {
+            // Linear over 6 ms: a h^2 / 8 with the motion's largest acceleration of 7 rad/s2.
+            near(&found.flexible.q, &truth.flexible.q, 5e-5);
+            worst_between = worst_between.max(apart);
         }
     }
-    assert!(places * 4 > samples.len(), "{places} places of the tool");
+    println!("tool: {worst:e} m in pictures, {worst_between:e} m between them");
+    assert!(drawn * 3 >= samples.len(), "{drawn} pictures");
+    assert!(worst < 1e-6 && worst_between < 1e-4, "{worst:e}, {worst_between:e}");
 
     // On to a table and to MCAP.
     for format in [RecordingFormat::Csv, RecordingFormat::Mcap].into_iter().filter(|format| format.is_built_in()) {

@@ -2,10 +2,10 @@
 //!
 //! | format | what comes back |
 //! | --- | --- |
-//! | MCAP | everything; numbers exactly, poses of links to 1e-15 (they are stored as quaternions from link to link) |
+//! | MCAP | everything; numbers exactly, poses of links to 1e-13 (they are stored as quaternions from link to link) |
 //! | Parquet | the numbers of its columns exactly; names, set-up, result and events; no poses of links, no velocities |
 //! | CSV | the numbers of its columns exactly (times to 1 ns once they went through MCAP); no poses, velocities, result, nor names of robot and trajectory |
-//! | .rrd | curves to 1e-15 (they are stored in mm), poses as `f32` at the rate of the pictures |
+//! | .rrd | the error to rounding (it is stored in mm); other curves and poses, these as `f32`, at the rate of the pictures, interpolated between them |
 //!
 //! A file that a killed run left, or a copy that broke off, is read up to its break; [`RunSource::warnings`] says so.
 //! What a format does not hold is not made up: numbers are NaN, lists empty, and [`RunSource::missing`] lists it.

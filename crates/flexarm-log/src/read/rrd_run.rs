@@ -1,5 +1,5 @@
-//! A Rerun recording of a run. It is made to be looked at: curves are in millimetres and have every sample, poses are in
-//! single precision and fewer. All of it is read into memory, since a viewer may have written the chunks in any order.
+//! A Rerun recording of a run. It is made to be looked at: the error is in millimetres and has every sample, other curves and
+//! poses (in single precision) are fewer and interpolated. All of it is read into memory, since a viewer may have written the chunks in any order.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
@@ -7,7 +7,7 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use flexarm_kinematics::Pose;
-use nalgebra::{Quaternion, Translation3, UnitQuaternion};
+use nalgebra::{Quaternion, Translation3, UnitQuaternion, Vector3};
 use rerun::external::re_log_encoding::DecoderApp;
 use rerun::log::{Chunk, LogMsg};
 use rerun::{EntityPath, Scalars, SeriesLines, TextDocument, Timeline, Transform3D};
@@ -17,8 +17,6 @@ use crate::rrd_file::tracks::SIM_TIME;
 use crate::rrd_file::{RESULT_ENTITY, RUN_ENTITY, path as entity};
 use crate::{ElasticSample, EnergySample, LogError, RunHeader, RunResult, RunSource, Sample, TwinSample, run_json};
 
-/// Poses further apart than this stand still in between (ns): moving ones come every few milliseconds.
-const STANDSTILL_NS: i64 = 20_000_000;
 const MILLI: f64 = 1e-3;
 
 /// See the module.
@@ -86,6 +84,9 @@ impl RrdRun {
         if !header.contributors.is_empty() {
             missing.push("the file has only sizes of the shares of the tool error, not their directions".into());
         }
+        missing.push(
+            "between pictures (200 a second) all but the error is interpolated; poses are in single precision".into(),
+        );
         missing.push("surfaces of links and attached files are not read back".into());
         let header = RunHeader {
             urdf: data.text(["urdf", ""]).unwrap_or_default().to_owned(),
@@ -139,8 +140,8 @@ impl RrdRun {
         let (header, data) = (&self.header, &self.data);
         let joints = header.joints.len();
         let row = |parts: &[&str], width: usize| -> Vec<f64> {
-            let row = data.scalars.get(&entity(parts)).and_then(|rows| rows.get(&time_ns));
-            row.filter(|row| row.len() == width).cloned().unwrap_or_else(|| vec![f64::NAN; width])
+            let row = data.scalars.get(&entity(parts)).and_then(|rows| between(rows, time_ns, mixed));
+            row.filter(|row| row.len() == width).unwrap_or_else(|| vec![f64::NAN; width])
         };
         let one = |group: &str, key: &str| MILLI * row(&["plots", group, key], 1)[0];
         let six = |parts: [f64; 3], angles: [f64; 3]| [parts[0], parts[1], parts[2], angles[0], angles[1], angles[2]];
@@ -156,12 +157,18 @@ impl RrdRun {
         let mut sample = Sample { time_s, step, flexible: twin(&twins[0], "flexible"), ..Sample::default() };
         if header.has_rigid {
             sample.rigid = twin(&twins[1], "rigid");
+            sample.rigid.X_WT = data.tool(&twins[1].tool, time_ns);
             sample.rigid.q.fill(f64::NAN); // the curves are those of the flexible robot
             sample.rigid.qdot.fill(f64::NAN);
             let rotation = ["x", "y", "z"].map(|axis| one("tcp_error_rotation", axis));
             sample.error_world = six(["x", "y", "z"].map(|axis| one("tcp_error", axis)), rotation);
             let along = ["tangential", "normal", "binormal"].map(|axis| one("tcp_error_path", axis));
             sample.error_path = six(along, [f64::NAN; 3]);
+            // Between two pictures the error is known better than the pose.
+            if !data.drawn(&twins[0].tool, time_ns) {
+                let [x, y, z, ..] = sample.error_world;
+                sample.flexible.X_WT.translation.vector = sample.rigid.X_WT.translation.vector + Vector3::new(x, y, z);
+            }
         }
         let element = |name: &String| {
             let (deflection, load) = (row(&["plots", "elastic", name], 6), row(&["plots", "elastic_load", name], 6));
@@ -252,20 +259,26 @@ impl Data {
         rows.range(..=time_ns).next_back().or_else(|| rows.iter().next()).map(|(_, X)| *X)
     }
 
-    /// Pose of a tool: its place is a result, so between two pictures it is not known.
+    /// Whether there is a pose for just this time.
+    fn drawn(&self, at: &EntityPath, time_ns: i64) -> bool {
+        self.poses.get(at).is_some_and(|rows| rows.contains_key(&time_ns))
+    }
+
+    /// Pose of a tool, between two pictures on the straight way from one to the other; without any its place is NaN.
     fn tool(&self, at: &EntityPath, time_ns: i64) -> Pose {
-        let mut X = self.pose(at, time_ns).unwrap_or_default();
-        let before = self.pictures.range(..=time_ns).next_back();
-        let after = self.pictures.range(time_ns..).next();
-        let known = match (before, after) {
-            (Some(before), Some(after)) => before == after || after - before > STANDSTILL_NS,
-            (Some(before), None) => time_ns - before > STANDSTILL_NS,
-            _ => false,
+        let Some(rows) = self.poses.get(at) else { return Translation3::from(Vector3::repeat(f64::NAN)).into() };
+        // A row is left out where nothing moves: the way begins at the last picture before the next row.
+        let (before, after) = (rows.range(..=time_ns).next_back(), rows.range(time_ns..).next());
+        let (Some((_, start)), Some((end_ns, end))) = (before, after) else {
+            return before.or(after).map(|(_, X)| *X).unwrap_or_default();
         };
-        if !known || !self.poses.contains_key(at) {
-            X.translation.vector.fill(f64::NAN);
+        let start_ns = self.pictures.range(..*end_ns).next_back().copied().unwrap_or(*end_ns);
+        if time_ns <= start_ns || *end_ns == start_ns {
+            return if time_ns == *end_ns { *end } else { *start };
         }
-        X
+        let share = (time_ns - start_ns) as f64 / (end_ns - start_ns) as f64;
+        let place = start.translation.vector.lerp(&end.translation.vector, share);
+        Pose::from_parts(place.into(), start.rotation.slerp(&end.rotation, share))
     }
 
     /// Header of a recording that does not describe itself, from the names of its entities.
@@ -284,4 +297,19 @@ impl Data {
             ..RunHeader::default()
         }
     }
+}
+
+/// The row at a time, or what lies between the two around it; before the first and beyond the last one that.
+fn between<T: Clone>(rows: &BTreeMap<i64, T>, time_ns: i64, mix: impl Fn(&T, &T, f64) -> T) -> Option<T> {
+    let (before, after) = (rows.range(..=time_ns).next_back(), rows.range(time_ns..).next());
+    match (before, after) {
+        (Some((start, a)), Some((end, b))) if start < end => {
+            Some(mix(a, b, (time_ns - start) as f64 / (end - start) as f64))
+        }
+        _ => before.or(after).map(|(_, row)| row.clone()),
+    }
+}
+
+fn mixed(a: &Vec<f64>, b: &Vec<f64>, share: f64) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a + (b - a) * share).collect()
 }
