@@ -88,11 +88,12 @@ impl RecordingFormat {
         };
         if self == Self::Rrd && !to.is_table() {
             lost.push(
-                "Rerun files hold no velocities of joints: NaN; poses of links are those of the last picture".into(),
+                "Rerun files hold no joint values of the rigid twin: NaN; poses of links are those of the last picture"
+                    .into(),
             );
         }
         if to == Self::Rrd && !self.is_table() {
-            lost.push("Rerun files hold poses in single precision and no velocities of joints".into());
+            lost.push("Rerun files hold poses in single precision, at most 200 a second".into());
         }
         if self == Self::Csv && to != Self::Csv {
             lost.push("CSV says neither robot nor trajectory, and has no set-up, result figures and events".into());

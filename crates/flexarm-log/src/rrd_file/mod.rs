@@ -184,6 +184,9 @@ impl Store {
         self.constant(&EntityPath::root(), &ViewCoordinates::RIGHT_HAND_Z_UP())?;
         let text = summary(&header.description, &RunResult::default());
         self.constant(&path(["summary"]), &TextDocument::from_markdown(text))?;
+        if let Seat::Alone = seat {
+            self.constant(&path(RUN_ENTITY), &TextDocument::new(crate::run_json::write(header, false)))?;
+        }
         if !header.urdf.is_empty() {
             self.constant(
                 &path(["urdf"]),
