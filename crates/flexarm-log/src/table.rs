@@ -1,5 +1,7 @@
 //! The table of a run: which numbers of a sample are its columns. CSV and Parquet files share it, both ways.
 
+use std::collections::BTreeSet;
+
 use flexarm_kinematics::Pose;
 use nalgebra::{Translation3, Vector3};
 
@@ -36,7 +38,14 @@ pub(crate) fn columns(header: &RunHeader) -> Vec<String> {
         names.extend(DISPLACEMENT.iter().chain(&WRENCH).map(|part| format!("{element}_{part}")));
     }
     names.extend(["kinetic", "potential", "elastic"].map(|kind| format!("{kind}_energy_j")));
-    names
+    // A link may be called `flexible`: later columns give way.
+    let mut taken = BTreeSet::new();
+    let distinct = |name: String| {
+        let numbered = (2..).map(|n| format!("{name}_{n}"));
+        let free = std::iter::once(name.clone()).chain(numbered).find(|name| taken.insert(name.clone()));
+        free.unwrap_or(name)
+    };
+    names.into_iter().map(distinct).collect()
 }
 
 /// Puts the numbers of a sample into `row`, in the order of [`columns`].

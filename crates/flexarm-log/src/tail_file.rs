@@ -12,7 +12,7 @@ use std::fs::File;
 use std::io::{self, Seek, SeekFrom, Write};
 
 /// Committed bytes held back until they are worth a system call.
-const PENDING_LIMIT: usize = 4 << 20;
+const PENDING_LIMIT: usize = 256 << 10;
 /// The same where the recorder decides when to write: what a full disk may cost.
 #[cfg(feature = "mcap")]
 const SHARED_PENDING_LIMIT: usize = 1 << 20;

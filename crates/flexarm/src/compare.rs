@@ -69,16 +69,25 @@ pub fn simulate_traced(
     outputs: Option<&Outputs>,
     progress: &mut Progress<'_>,
 ) -> Result<(Summary, Trace), Error> {
-    run_traced(robot, motion, options, outputs, Vec::new(), progress)
+    run_traced(robot, motion, options, outputs, Together::default(), progress)
 }
 
-/// As [`simulate_traced`], into more recorders than those of the outputs.
+/// What a run shares with others that it is seen with.
+#[derive(Default)]
+pub(crate) struct Together {
+    /// Recorders beside those of its own outputs.
+    pub(crate) recorders: Vec<Box<dyn Recorder>>,
+    /// Deflections of all of them, for a scale in common.
+    pub(crate) expected: Option<Expected>,
+}
+
+/// As [`simulate_traced`], as one of several runs.
 pub(crate) fn run_traced(
     robot: &Robot,
     motion: &Motion,
     options: &RunOptions,
     outputs: Option<&Outputs>,
-    extra: Vec<Box<dyn Recorder>>,
+    together: Together,
     progress: &mut Progress<'_>,
 ) -> Result<(Summary, Trace), Error> {
     let started = Instant::now();
@@ -87,10 +96,11 @@ pub(crate) fn run_traced(
     let failed = |source: StepError| Error::Step { source, partial: false };
     let stepper = new_stepper(options.stepper, arm.clone(), options.step_s, options.start).map_err(failed)?;
 
-    let expected = Expected::of(&arm, &tool_frame(&arm), motion.trajectory.duration(), options.start);
+    let own = || Expected::of(&arm, &tool_frame(&arm), motion.trajectory.duration(), options.start);
+    let expected = together.expected.unwrap_or_else(own);
     let mut run = Run::new(robot, motion, options, &flexible, arm, stepper);
     let mut files = recorders(outputs)?;
-    files.set.extend(extra);
+    files.set.extend(together.recorders);
     let mut head = header(robot, motion, options, &run.arm, flexible.links_model());
     head.bends.clone_from(&run.bends);
     head.contributors = run.contributors.iter().map(|(_, name)| name.clone()).collect();
@@ -125,6 +135,13 @@ pub(crate) struct Checked {
     flexible: FlexibleRobot,
     arm: FlexibleArm,
     load_warnings: Vec<String>,
+}
+
+impl Checked {
+    /// Deflections that the run will have, roughly.
+    pub(crate) fn expected(&self, motion: &Motion, options: &RunOptions) -> Expected {
+        Expected::of(&self.arm, &tool_frame(&self.arm), motion.trajectory.duration(), options.start)
+    }
 }
 
 /// Everything about the input of a run that can be told before the first step.

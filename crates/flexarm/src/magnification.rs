@@ -8,6 +8,8 @@ use crate::twin::RigidTwin;
 
 /// Instants at which the deflection is estimated.
 const INSTANTS: u32 = 200;
+/// Values of a load of which its mean is made.
+const PIECES: u32 = 64;
 /// Part of the arm's reach by which the tool's largest deflection is shown.
 const SHOWN: f64 = 0.15;
 /// Most that springs turn on the screen (rad).
@@ -35,17 +37,25 @@ impl Expected {
         let mut twin = RigidTwin::new(arm);
         let mut J = Matrix6xX::zeros(arm.model.nv());
         let mut expected = Self::default();
-        for k in 0..=INSTANTS {
-            twin.update(arm, tcp, duration * f64::from(k) / f64::from(INSTANTS));
+        // What acts for a short time only acts on the arm as its mean over half a period of the first mode.
+        let window = 0.5 / arm.modes.frequencies_hz().first().copied().unwrap_or(f64::INFINITY).max(1e-3);
+        let jumps = arm.loads.iter().flat_map(|load| &load.jumps).map(|t| t + 0.5 * window).take(INSTANTS as usize);
+        let evenly = (0..=INSTANTS).map(|k| duration * f64::from(k) / f64::from(INSTANTS));
+        for t in evenly.chain(jumps.filter(|t| *t < duration)) {
+            twin.update(arm, tcp, t);
             // Loads relieve what holds the elastic coordinates.
-            let t = duration * f64::from(k) / f64::from(INSTANTS);
             for load in &arm.loads {
                 let frame = Frame { name: String::new(), body: load.body, X_BF: load.X_BF };
                 frame_jacobian(&arm.model, &twin.data, &frame, &mut J);
-                let (F, R) = ((load.wrench)(t), twin.data.X_WF(&frame).rotation);
+                let R = twin.data.X_WF(&frame).rotation;
                 let turn = |v| if load.axes == LoadAxes::Frame { R * v } else { v };
-                let (force, torque) = (turn(F.force), turn(F.torque));
-                let F = Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z);
+                let mut F = Vector6::zeros();
+                for k in 0..PIECES {
+                    let share = (f64::from(k) + 0.5) / f64::from(PIECES) - 0.5;
+                    let now = (load.wrench)((t + share * window).max(0.0));
+                    let (force, torque) = (turn(now.force), turn(now.torque));
+                    F += Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z) / f64::from(PIECES);
+                }
                 twin.data.tau -= J.tr_mul(&F);
             }
             let mut moved = Vector6::zeros();
@@ -76,6 +86,21 @@ impl Expected {
             expected.turn_rad *= SUDDEN;
         }
         expected
+    }
+
+    /// What two runs that are seen together have at most.
+    pub(crate) fn or(self, other: Self) -> Self {
+        let largest = |a: [f64; 3], b: [f64; 3], pick: fn(f64, f64) -> f64| [0, 1, 2].map(|c| pick(a[c], b[c]));
+        let volume = match (self.volume, other.volume) {
+            (Some([a, b]), Some([c, d])) => Some([largest(a, c, f64::min), largest(b, d, f64::max)]),
+            (own, others) => own.or(others),
+        };
+        Self {
+            tool_m: self.tool_m.max(other.tool_m),
+            turn_rad: self.turn_rad.max(other.turn_rad),
+            reach_m: self.reach_m.max(other.reach_m),
+            volume,
+        }
     }
 
     /// Factor on deflections with which they are seen: a round number, or 0 if nothing bends.

@@ -76,6 +76,7 @@ pub fn record_modes(
     let (bends, stations) = stations(&flexible.bends, &posed.arm.model, &header.links);
     header.bends = bends;
     header.color_scale_m = crate::magnification::round_up(motion);
+    header.volume = Some(volume(&posed, motion));
     header.log_rate_hz = RATE_HZ;
     let swings = (movie.seconds * SHOWN_HZ).ceil();
     let rows: Vec<(String, String)> = shown
@@ -121,6 +122,18 @@ pub fn record_modes(
     let mut figures = table(robot, posed, &linear, &all, count)?;
     figures.files = names;
     Ok(figures)
+}
+
+/// Box around all bodies and the tool, with room for the tool's motion (m).
+fn volume(posed: &Posed, motion_m: f64) -> [[f64; 3]; 2] {
+    let (mut data, state) = posed.undeformed();
+    forward_kinematics(&posed.arm.model, &mut data, &state.q);
+    let places = data.X_WB.iter().map(|X| X.translation.vector).chain([data.X_WF(&posed.tool).translation.vector]);
+    places.fold([[f64::MAX; 3], [f64::MIN; 3]], |[low, high], p| {
+        let corner = |c: usize| (low[c].min(p[c] - motion_m), high[c].max(p[c] + motion_m));
+        let [x, y, z] = [0, 1, 2].map(corner);
+        [[x.0, y.0, z.0], [x.1, y.1, z.1]]
+    })
 }
 
 /// Largest distance of the tool from a joint.

@@ -256,7 +256,13 @@ fn meshes(robot: &Robot, links: &[LinkInfo]) -> Vec<LinkMesh> {
             color,
             file,
         };
-        meshes.push(if own_normals { mesh } else { mesh.with_creases() });
+        let mut mesh = if own_normals { mesh } else { mesh.with_creases() };
+        // Two visuals of a link may have one name.
+        let named = |name: &str| meshes.iter().any(|other: &LinkMesh| other.link == link && other.name == name);
+        if named(&mesh.name) {
+            mesh.name = (2..).map(|n| format!("{}_{n}", mesh.name)).find(|name| !named(name)).unwrap_or_default();
+        }
+        meshes.push(mesh);
     }
     meshes
 }

@@ -5,8 +5,9 @@ use std::path::PathBuf;
 
 use flexarm_log::{Recorder, Trace};
 
-use crate::compare::{Progress, checked, run_traced};
+use crate::compare::{Progress, Together, checked, run_traced};
 use crate::error::Error;
+use crate::magnification::Expected;
 use crate::motion::Motion;
 use crate::options::{Outputs, RunOptions};
 use crate::record::refuse_to_overwrite;
@@ -58,8 +59,10 @@ pub fn compare_study(
         move |error: Error| Error::InStudy { label: label.clone(), source: Box::new(error) }
     };
     // Minutes of running are not spent before something that could be told at once.
+    let mut expected = Expected::default();
     for (number, variant) in variants.iter().enumerate() {
-        checked(&variant.robot, &variant.motion, &variant.options).map_err(named(number))?;
+        let run = checked(&variant.robot, &variant.motion, &variant.options).map_err(named(number))?;
+        expected = expected.or(run.expected(&variant.motion, &variant.options));
         own_outputs(number).as_ref().map_or(Ok(()), refuse_to_overwrite)?;
     }
     let recording = StudyRecording::new(variants, outputs)?;
@@ -68,15 +71,15 @@ pub fn compare_study(
     for (number, variant) in variants.iter().enumerate() {
         let own = own_outputs(number);
         if number > 0 {
-            options = RunOptions { magnification: options.magnification, ..variant.options.clone() };
+            options = RunOptions { magnification: main.options.magnification, ..variant.options.clone() };
         }
-        let extra = recording.seat(number).into_iter().collect();
+        // All arms are magnified and coloured alike, or they could not be compared by eye.
+        let recorders = recording.seat(number).into_iter().collect();
+        let together = Together { recorders, expected: Some(expected) };
         let mut shown = |t: f64, _: f64| progress(before + t, total);
-        let run = run_traced(&variant.robot, &variant.motion, &options, own.as_ref(), extra, &mut shown);
+        let run = run_traced(&variant.robot, &variant.motion, &options, own.as_ref(), together, &mut shown);
         let (mut summary, trace) = run.map_err(named(number))?;
         before += variant.motion.trajectory.duration();
-        // All arms are magnified alike, or they could not be compared by eye.
-        options.magnification = Some(trace.header.magnification).filter(|factor| *factor > 0.0);
         summary.label = Some(variant.label.clone());
         summary.difference = traces.first().and_then(|(_, first)| difference(first, &trace));
         summaries.push(summary);

@@ -14,7 +14,7 @@ use rerun::{EntityPath, Scalars, SeriesLines, TextDocument, Timeline, Transform3
 
 use super::{broken_end, exact_time, not_a_recording};
 use crate::rrd_file::tracks::SIM_TIME;
-use crate::rrd_file::{RESULT_ENTITY, RUN_ENTITY, path as entity};
+use crate::rrd_file::{RESULT_ENTITY, RUN_ENTITY, link_part, path as entity};
 use crate::{ElasticSample, EnergySample, LogError, RunHeader, RunResult, RunSource, Sample, TwinSample, run_json};
 
 const MILLI: f64 = 1e-3;
@@ -72,6 +72,14 @@ impl RrdRun {
             };
             return Err(not_a_recording(path, found, "one that flexarm wrote, with curves below /plots"));
         }
+        let of_study = |at: &&EntityPath| at.to_string().starts_with("/plots/study/");
+        if data.scalars.keys().find(of_study).is_some() {
+            return Err(not_a_recording(
+                path,
+                "a study of several runs",
+                "one run: run.mcap beside it, or in a folder below",
+            ));
+        }
         let mut missing = vec!["the file has no stations of bent links: they are straight".to_owned()];
         let header = match data.text(RUN_ENTITY).map(|text| run_json::read(text.as_bytes())) {
             Some(Ok((header, _))) => header,
@@ -83,6 +91,9 @@ impl RrdRun {
         };
         if !header.contributors.is_empty() {
             missing.push("the file has only sizes of the shares of the tool error, not their directions".into());
+        }
+        if !header.has_rigid {
+            missing.push("the file has at most 200 samples a second".into());
         }
         missing.push(
             "between pictures (200 a second) all but the error is interpolated; poses are in single precision".into(),
@@ -195,7 +206,7 @@ struct Tracks {
 impl Tracks {
     fn of(header: &RunHeader, who: &str) -> Self {
         let at = |what: &str| entity([header.robot.as_str(), who, what]);
-        Self { links: header.links.iter().map(|link| at(&link.name)).collect(), tool: at("tcp") }
+        Self { links: header.links.iter().map(|link| at(&link_part(&link.name))).collect(), tool: at("tcp") }
     }
 }
 

@@ -23,6 +23,7 @@ use rerun::external::re_log_types::StoreKind;
 use rerun::log::Chunk;
 use rerun::{EntityPath, StoreId, TextDocument, TimePoint, Timeline, ViewCoordinates};
 
+use self::layout::Part;
 use self::run::{RunTracks, Seat};
 use self::stream::{Ids, RrdStream, StreamError};
 use self::tracks::SIM_TIME;
@@ -98,9 +99,9 @@ impl Recorder for RrdRecorder {
         let file = self.options.create(&self.path)?;
         let clock = self.options.flush_clock();
         let open = || -> Result<Open, StreamError> {
-            let mut store = Store::new(file, content_hash(header), clock)?;
+            let mut store = Store::new(file, content_hash(header, &[]), clock)?;
             store.describe(header, &Seat::Alone)?;
-            let run = RunWriter::begin(&mut store, header, Seat::Alone, Vec::new())?;
+            let run = RunWriter::begin(&mut store, header, Seat::Alone, &[])?;
             Ok(Open { store, run, closed: false })
         };
         self.state =
@@ -210,26 +211,24 @@ impl Store {
 /// The rows of one run on their way into a recording.
 pub(crate) struct RunWriter {
     header: RunHeader,
-    seat: Seat,
-    /// Labels of all runs of a study.
-    labels: Vec<String>,
     shape: Shape,
     tracks: RunTracks,
-    /// Whether the layout is still to be written: with the first sample, which shows where the robot is.
-    layout_due: bool,
+    /// The layout, until it is written: with the first sample, which shows where the robot is.
+    layout: Option<Part>,
     tools_due: bool,
 }
 
 impl RunWriter {
-    fn begin(store: &mut Store, header: &RunHeader, seat: Seat, labels: Vec<String>) -> Result<Self, StreamError> {
+    fn begin(store: &mut Store, header: &RunHeader, seat: Seat, labels: &[String]) -> Result<Self, StreamError> {
         let mut ids = *store.stream.ids();
         let (tracks, fixed) = RunTracks::new(header, &seat, &mut ids)?;
         store.append_all(ids, &fixed)?;
         store.stream.set_tail(&store.recording, &[])?;
-        let layout_due = matches!(seat, Seat::Alone | Seat::InStudy(0, _));
+        let has_layout = matches!(seat, Seat::Alone | Seat::InStudy(0, _));
+        let layout = has_layout.then(|| window::window(header, &seat, labels));
         // Surfaces and files are in the recording now.
         let header = RunHeader { meshes: Vec::new(), attachments: Vec::new(), urdf: String::new(), ..header.clone() };
-        Ok(Self { shape: Shape::of(&header), header, seat, labels, tracks, layout_due, tools_due: true })
+        Ok(Self { shape: Shape::of(&header), header, tracks, layout, tools_due: true })
     }
 
     fn record(&mut self, store: &mut Store, file: &Path, sample: &Sample) -> Result<(), LogError> {
@@ -273,11 +272,8 @@ impl RunWriter {
 
     /// Writes the layout if that has not happened yet, with the robot of this sample in the picture.
     fn layout(&mut self, store: &mut Store, first: Option<&Sample>) -> Result<(), StreamError> {
-        if !std::mem::take(&mut self.layout_due) {
-            return Ok(());
-        }
+        let Some(window) = self.layout.take() else { return Ok(()) };
         let eye = eye::eye(&self.header, first);
-        let window = window::window(&self.header, &self.seat, &self.labels);
         let when = TimePoint::default().with(Timeline::new_sequence("blueprint"), 0);
         let blueprint = store.blueprint.clone();
         store.stream.open_store(&blueprint)?;
@@ -291,6 +287,7 @@ impl RunWriter {
     /// Writes what waits, the ways and the marks.
     fn finish(&mut self, store: &mut Store, result: &RunResult) -> Result<(), StreamError> {
         self.layout(store, None)?;
+        self.tracks.close();
         self.commit(store)?;
         let mut ids = *store.stream.ids();
         let mut chunks = self.tracks.ways(&mut ids)?;
@@ -317,8 +314,17 @@ pub(crate) fn path<S: AsRef<str>>(parts: impl IntoIterator<Item = S>) -> EntityP
     EntityPath::from_iter(parts.into_iter().map(|part| part.as_ref().into()))
 }
 
-/// FNV-1a of the texts and names of a header: the same set-up gives the same recording.
-fn content_hash(header: &RunHeader) -> u64 {
+/// Entity name of a link. Names that a robot's own entities have are for those.
+pub(crate) fn link_part(name: &str) -> String {
+    match name {
+        "tcp" | "skeleton" | "error" => format!("link_{name}"),
+        _ => name.to_owned(),
+    }
+}
+
+/// FNV-1a of all that a header says, files included, and of the labels of a study: the same set-up gives the same recording,
+/// and a viewer that has two of different set-ups keeps them apart.
+fn content_hash(header: &RunHeader, labels: &[String]) -> u64 {
     const OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
     const PRIME: u64 = 0x0000_0100_0000_01b3;
     let names = header.joints.iter().chain(&header.elements).chain(header.links.iter().map(|link| &link.name));
@@ -327,9 +333,12 @@ fn content_hash(header: &RunHeader) -> u64 {
         .iter()
         .flat_map(|(name, pairs)| std::iter::once(name).chain(pairs.iter().flat_map(|(key, value)| [key, value])));
     let texts = [&header.robot, &header.trajectory, &header.urdf, &header.tcp, &header.description];
-    let texts = texts.into_iter().chain(names).chain(groups);
-    let numbers = [header.log_rate_hz, header.magnification].map(f64::to_le_bytes).concat();
-    let bytes = texts.flat_map(|text| text.bytes().chain([0])).chain(numbers);
+    let texts = texts.into_iter().chain(names).chain(groups).chain(labels);
+    let numbers = [header.log_rate_hz, header.magnification, header.color_scale_m, header.step_s, labels.len() as f64];
+    let corners = header.volume.into_iter().flatten().flatten();
+    let numbers = numbers.into_iter().chain(corners).flat_map(f64::to_le_bytes);
+    let files = header.attachments.iter().flat_map(|file| file.bytes.iter().copied());
+    let bytes = texts.flat_map(|text| text.bytes().chain([0])).chain(numbers).chain(files);
     bytes.fold(OFFSET, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(PRIME))
 }
 

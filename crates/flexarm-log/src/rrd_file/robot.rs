@@ -7,9 +7,9 @@ use rerun::log::Chunk;
 use rerun::{AlbedoFactor, Color, EntityPath, LineStrips3D, Mesh3D, Rgba32, TransformAxes3D};
 
 use super::colors::{ColorScale, GHOST};
-use super::path;
 use super::stream::{Ids, StreamError};
 use super::tracks::{Instant, PoseTrack, ShapeTrack, SkeletonTrack, TintTrack, Track, point};
+use super::{link_part, path};
 use crate::{BendLine, BentMesh, BentPieces, LinkMesh, RunHeader, Sample, TwinSample, stations_in_link};
 
 /// How a robot is painted.
@@ -35,6 +35,8 @@ pub(crate) struct Look {
     pub(crate) bends: bool,
     /// A bent surface is written again when a corner has moved by more than this (m).
     pub(crate) tolerance_m: f64,
+    /// Shortest time between two writings of a bent surface (ns).
+    pub(crate) every_ns: i64,
     /// Corners of bent surfaces are rounded to this (m), for the compression; 0 keeps them.
     pub(crate) quantum_m: f32,
 }
@@ -62,6 +64,8 @@ struct BentTracks {
     tint: Option<(TintTrack, TintTrack)>,
     /// Stations that were written last.
     written: Option<Vec<Pose>>,
+    /// When (ns).
+    last: Option<i64>,
 }
 
 /// Places along a bent link at which its colour is computed.
@@ -82,7 +86,7 @@ impl RobotTracks {
         let shown = |(k, _): &(usize, &crate::LinkInfo)| {
             matches!(look.paint, Paint::Own) || header.meshes.iter().any(|mesh| mesh.link == *k)
         };
-        let pose_track = |(k, link): (usize, &crate::LinkInfo)| (k, PoseTrack::new(at(&link.name)));
+        let pose_track = |(k, link): (usize, &crate::LinkInfo)| (k, PoseTrack::new(at(&link_part(&link.name))));
         let mut robot = Self {
             links: header.links.iter().enumerate().filter(shown).map(pose_track).collect(),
             tcp: PoseTrack::new(at("tcp")),
@@ -112,7 +116,7 @@ impl RobotTracks {
         ids: &mut Ids,
         fixed: &mut Vec<Chunk>,
     ) -> Result<(), StreamError> {
-        let entity = self.look.root.join(&path([&header.links[mesh.link].name, &mesh.name]));
+        let entity = self.look.root.join(&path([&link_part(&header.links[mesh.link].name), &mesh.name]));
         let mut first = 0;
         for bend in &header.bends {
             let stations = (first, bend.X_LS.len());
@@ -149,6 +153,7 @@ impl RobotTracks {
                 far: PoseTrack::new(far_at),
                 tint,
                 written: None,
+                last: None,
             });
             return Ok(());
         }
@@ -283,9 +288,10 @@ impl BentTracks {
             middle.push(when, tints);
         }
         let still = |written: &Vec<Pose>| !moved(written, &shown, line.length(), look.tolerance_m);
-        if self.written.as_ref().is_some_and(still) {
+        if self.written.as_ref().is_some_and(still) || self.last.is_some_and(|last| when.0 - last < look.every_ns) {
             return;
         }
+        self.last = Some(when.0);
         let rounded = |p: [f32; 3]| match look.quantum_m {
             quantum if quantum > 0.0 => p.map(|x| (x / quantum).round() * quantum),
             _ => p,

@@ -64,6 +64,9 @@ pub(crate) struct RunTracks {
     curves: Option<Curves>,
     study_curves: Option<Curves>,
     last_pose_ns: Option<i64>,
+    /// The last sample and its instant, if it has not been drawn.
+    undrawn: Option<Instant>,
+    last: Sample,
     /// Largest error so far (m), its instant, and where the tool is drawn then.
     peak: Option<(f64, Instant, [f32; 3])>,
 }
@@ -80,14 +83,17 @@ impl RunTracks {
         // Sizes on the screen, as lengths in the scene.
         let extent = header.volume.map_or(3.0, |[low, high]| size(&[0, 1, 2].map(|c| high[c] - low[c])));
         const PIXELS: f64 = 800.0;
-        const LIFE_SIZE_TOLERANCE_M: f64 = 1e-4;
         let pixel_m = extent / PIXELS;
+        // Of arms that bend by centimetres in proportion.
+        let true_tolerance_m = (0.02 * header.color_scale_m).clamp(1e-4, pixel_m);
         // A power of two, so that rounded numbers are short.
         let quantum_m = (0.5 * pixel_m).log2().floor().exp2() as f32;
 
         let mut fixed = Vec::new();
         let mut robot = |name: &str, paint: Paint, bends: bool, tolerance_m: f64, quantum_m: f32, ids: &mut Ids| {
-            let look = Look { root: at(name), paint, bends, tolerance_m, quantum_m };
+            // At true scale bending is hardly seen; a surface for every picture would be wasted.
+            let every_ns = if quantum_m > 0.0 { 0 } else { 20_000_000 };
+            let look = Look { root: at(name), paint, bends, tolerance_m, every_ns, quantum_m };
             let (robot, own) = RobotTracks::new(header, look, ids)?;
             fixed.extend(own);
             Ok::<_, StreamError>(Some(robot))
@@ -99,7 +105,7 @@ impl RunTracks {
                 true if header.has_rigid && !with_magnified && header.color_scale_m > 0.0 => {
                     robot("flexible", Paint::Deviation(scale), true, pixel_m, quantum_m, ids)?
                 }
-                true => robot("flexible", Paint::Own, true, LIFE_SIZE_TOLERANCE_M, 0.0, ids)?,
+                true => robot("flexible", Paint::Own, true, true_tolerance_m, 0.0, ids)?,
                 false => None,
             },
             way: way("flexible"),
@@ -161,6 +167,8 @@ impl RunTracks {
             curves,
             study_curves,
             last_pose_ns: None,
+            undrawn: None,
+            last: Sample::default(),
             peak: None,
         };
         Ok((run, fixed))
@@ -197,6 +205,21 @@ impl RunTracks {
         if due {
             self.last_pose_ns = Some(when.0);
             self.pose(when, sample, error);
+        }
+        self.undrawn = (!due).then_some(when);
+        if !due {
+            self.last.clone_from(sample);
+        }
+    }
+
+    /// Draws the last sample, if that has not happened.
+    pub(crate) fn close(&mut self) {
+        if let Some(when) = self.undrawn.take() {
+            let last = std::mem::take(&mut self.last);
+            if self.magnified.is_some() {
+                self.magnifier.magnify(&last, &mut self.enlarged);
+            }
+            self.pose(when, &last, size(&last.error_world[..3]));
         }
     }
 

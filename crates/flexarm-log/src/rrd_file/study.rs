@@ -47,13 +47,21 @@ impl RrdStudy {
     /// # Errors
     /// [`LogError`] on a write error, or if no run was recorded.
     pub fn finish(self, text: &str) -> Result<(), LogError> {
-        let mut store = lock(&self.store);
-        let Some(store) = store.as_mut() else { return Err(LogError::not_open(&self.path, "finish")) };
+        let Some(mut store) = lock(&self.store).take() else { return Err(LogError::not_open(&self.path, "finish")) };
         let mut close = || {
             store.constant(&path(["summary"]), &TextDocument::from_markdown(text))?;
             store.stream.finish()
         };
         close().map_err(stream_error(&self.path, "write the result and the index"))
+    }
+}
+
+impl Drop for RrdStudy {
+    /// A study that was given up still gets its index; errors have nowhere to go.
+    fn drop(&mut self) {
+        if let Some(mut store) = lock(&self.store).take() {
+            let _ = store.stream.finish();
+        }
     }
 }
 
@@ -83,12 +91,12 @@ impl Recorder for StudySeat {
         let error = stream_error(&self.path, "write the description of the run");
         if shared.is_none() {
             let file = self.options.create(&self.path)?;
-            let open = Store::new(file, content_hash(header), self.options.flush_clock())
+            let open = Store::new(file, content_hash(header, &self.labels), self.options.flush_clock())
                 .and_then(|mut store| store.describe(header, &self.seat).map(|()| store));
             *shared = Some(open.map_err(stream_error(&self.path, "write the description of the study"))?);
         }
         let Some(store) = shared.as_mut() else { return Err(LogError::not_open(&self.path, "begin")) };
-        let run = RunWriter::begin(store, header, self.seat.clone(), self.labels.clone()).map_err(error)?;
+        let run = RunWriter::begin(store, header, self.seat.clone(), &self.labels).map_err(error)?;
         self.run = Some(run);
         Ok(())
     }
@@ -105,7 +113,9 @@ impl Recorder for StudySeat {
         let mut shared = lock(&self.store);
         match (shared.as_mut(), self.run.take()) {
             (Some(store), Some(mut run)) => {
-                run.finish(store, result).map_err(stream_error(&self.path, "write the end of a run"))
+                // Into the file at once: the next run may take long, or fail.
+                let written = run.finish(store, result).and_then(|()| store.stream.set_tail(&store.recording, &[]));
+                written.map_err(stream_error(&self.path, "write the end of a run"))
             }
             _ => Err(LogError::not_open(&self.path, "finish")),
         }
@@ -113,6 +123,15 @@ impl Recorder for StudySeat {
 
     fn path(&self) -> &Path {
         &self.path
+    }
+}
+
+impl Drop for StudySeat {
+    /// A run that was given up still gets its last rows; errors have nowhere to go.
+    fn drop(&mut self) {
+        if let (Some(store), Some(mut run)) = (lock(&self.store).as_mut(), self.run.take()) {
+            let _ = run.finish(store, &RunResult::default());
+        }
     }
 }
 

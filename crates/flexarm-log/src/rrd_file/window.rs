@@ -70,7 +70,10 @@ fn robots(header: &RunHeader, seat: &Seat, labels: &[String]) -> Part {
             false => "Robot".to_owned(),
         });
     }
-    let title = format!("Deflections x {factor} (colour: off the rigid robot, grey 0 to red {scale} mm)");
+    let title = match header.meshes.is_empty() {
+        true => format!("Deflections x {factor}"),
+        false => format!("Deflections x {factor} (colour: off the rigid robot, grey 0 to red {scale} mm)"),
+    };
     let magnified = Part::scene(&title, root.clone(), without(&["flexible", "path/flexible"]));
     Part::Tabs(vec![magnified, life_size("True scale")])
 }
