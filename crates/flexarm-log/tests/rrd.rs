@@ -56,8 +56,8 @@ fn rows(file: &[u8]) -> BTreeMap<String, usize> {
     rows
 }
 
-/// Poses are drawn at most every 5 ms: with 500 samples a second in every third.
-const DRAWN: usize = 334;
+/// Poses are drawn at most every 5 ms: with 500 samples a second in every third, and in the last one.
+const DRAWN: usize = 335;
 
 #[test]
 fn the_error_has_a_row_for_every_sample_and_the_robots_for_every_picture() {
@@ -224,7 +224,7 @@ fn curves_hold_the_samples() {
     };
     let samples: Vec<_> = (0..21).map(synthetic::sample).collect();
     assert_eq!(values("/plots/tcp_error/z"), samples.iter().map(|s| 1e3 * s.error_world[2]).collect::<Vec<_>>());
-    let drawn = || samples.iter().step_by(3);
+    let drawn = || samples.iter().step_by(3).chain(samples.last());
     let deflections: Vec<_> = drawn().flat_map(|s| s.elastic[0].deflection).map(|d| 1e3 * d).collect();
     assert_eq!(values("/plots/elastic/upper_arm"), deflections);
     assert_eq!(values("/plots/joints/position"), drawn().flat_map(|s| s.flexible.q.clone()).collect::<Vec<_>>());
@@ -319,4 +319,68 @@ fn a_study_holds_all_its_runs_in_one_readable_file() {
     assert!(rows.contains_key("/one/rigid/tcp") && !rows.contains_key(r"/two\/2/rigid/tcp"));
     let mut decoder = DecoderApp::decode_lazy(file.as_slice());
     assert!(decoder.by_ref().all(|message| message.is_ok()));
+}
+
+/// Identity of the recording in a file.
+fn identity(file: &[u8]) -> String {
+    let mut messages = DecoderApp::decode_lazy(file).map(|message| message.unwrap());
+    messages
+        .find_map(|message| match message {
+            LogMsg::SetStoreInfo(store) => Some(store.info.store_id.recording_id().as_str().to_owned()),
+            _ => None,
+        })
+        .unwrap()
+}
+
+/// A viewer puts recordings of one identity together: two set-ups, or a run and a study of it, must not share one.
+#[test]
+fn recordings_of_different_set_ups_have_different_identities() {
+    let header = synthetic::header();
+    let mut other = header.clone();
+    other.attachments[0].bytes = b"damping = 0.005".to_vec();
+    let identities = [&header, &header, &other].map(|header| identity(&run("identity.rrd", header, 2, NEVER)));
+    assert_eq!(identities[0], identities[1]);
+    assert_ne!(identities[0], identities[2]);
+    let path = synthetic::scratch("identity-study.rrd");
+    let options = CreateOptions { overwrite: true, flush_every: NEVER };
+    let study = RrdStudy::create(&path, options, vec!["one".into()]);
+    let mut seat = study.seat(0);
+    seat.begin(&header).unwrap();
+    seat.finish(&synthetic::result()).unwrap();
+    study.finish("").unwrap();
+    assert_ne!(identity(&std::fs::read(&path).unwrap()), identities[0]);
+    std::fs::remove_file(path).unwrap();
+}
+
+#[test]
+fn a_study_that_is_given_up_keeps_the_runs_it_has() {
+    let path = synthetic::scratch("given-up.rrd");
+    let options = CreateOptions { overwrite: true, flush_every: NEVER };
+    let study = RrdStudy::create(&path, options, vec!["one".into(), "two".into()]);
+    let mut first = study.seat(0);
+    first.begin(&synthetic::header()).unwrap();
+    (0..100).for_each(|step| first.record(&synthetic::sample(step)).unwrap());
+    first.finish(&synthetic::result()).unwrap();
+    // Killed here, the first run would be in the file.
+    assert_eq!(rows(&std::fs::read(&path).unwrap())["/plots/study/error/one"], 100);
+    let mut second = study.seat(1);
+    second.begin(&synthetic::header()).unwrap();
+    (0..10).for_each(|step| second.record(&synthetic::sample(step)).unwrap());
+    drop((second, study));
+    let file = std::fs::read(&path).unwrap();
+    assert_eq!(rows(&file)["/plots/study/error/two"], 10);
+    let mut decoder = DecoderApp::decode_lazy(file.as_slice());
+    assert!(decoder.by_ref().all(|message| message.is_ok()));
+    assert_eq!(decoder.rrd_manifests().unwrap().len(), 2, "with its index");
+    std::fs::remove_file(path).unwrap();
+}
+
+/// REP-199 calls the frame of the tool `tcp`: the link keeps its pose, the tool centre point its own.
+#[test]
+fn a_link_called_tcp_and_the_tool_centre_point_are_two_entities() {
+    let mut header = synthetic::header();
+    header.links[4].name = "tcp".into();
+    let file = run("tcp.rrd", &header, 30, NEVER);
+    let rows = rows(&file);
+    assert_eq!((rows["/synthetic/flexible/tcp"], rows["/synthetic/flexible/link_tcp"]), (11, 11));
 }

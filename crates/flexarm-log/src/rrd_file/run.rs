@@ -92,7 +92,7 @@ impl RunTracks {
         let mut fixed = Vec::new();
         let mut robot = |name: &str, paint: Paint, bends: bool, tolerance_m: f64, quantum_m: f32, ids: &mut Ids| {
             // At true scale bending is hardly seen; a surface for every picture would be wasted.
-            let every_ns = if quantum_m > 0.0 { 0 } else { 20_000_000 };
+            let every_ns = if quantum_m > 0.0 { 10_000_000 } else { 100_000_000 };
             let look = Look { root: at(name), paint, bends, tolerance_m, every_ns, quantum_m };
             let (robot, own) = RobotTracks::new(header, look, ids)?;
             fixed.extend(own);
