@@ -61,8 +61,8 @@ impl LinkMesh {
         let largest = (0..3).map(extent).fold(0.0, f32::max);
         // Finer and finer while it fits; at last a handful of cells always does.
         let cells = [256.0, 192.0, 144.0, 108.0, 80.0, 60.0, 45.0, 34.0, 25.0, 19.0, 14.0, 10.0, 7.0, 5.0, 3.0, 2.0];
-        let coarser = cells.iter().map(|cells| self.clustered(largest / cells));
-        coarser.clone().find(|mesh| mesh.positions.len() <= corners).or_else(|| coarser.last()).unwrap_or(self)
+        let mut coarser = cells.iter().map(|cells| self.clustered(largest / cells));
+        coarser.clone().find(|mesh| mesh.positions.len() <= corners).or_else(|| coarser.next_back()).unwrap_or(self)
     }
 
     fn clustered(&self, cell: f32) -> Self {

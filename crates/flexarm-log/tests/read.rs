@@ -540,7 +540,6 @@ fn a_rerun_file_gives_back_its_curves_and_poses() {
             worst_between = worst_between.max(apart);
         }
     }
-    println!("tool: {worst:e} m in pictures, {worst_between:e} m between them");
     assert!(drawn * 3 >= samples.len(), "{drawn} pictures");
     assert!(worst < 1e-6 && worst_between < 1e-4, "{worst:e}, {worst_between:e}");
 

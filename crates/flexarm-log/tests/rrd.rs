@@ -176,7 +176,7 @@ fn the_moving_surfaces_agree_with_the_tool_centre_point_to_a_micrometre() {
             }
         }
     }
-    println!("worst distance of forearm tip, tcp, bent end: {worst:?} m");
+    // Measured 6.6e-8, 6.6e-8 and 4.5e-8 m: single precision.
     assert!(worst.iter().all(|error| *error < 1e-6), "{worst:?}");
 }
 

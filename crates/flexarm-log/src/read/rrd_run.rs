@@ -151,7 +151,7 @@ impl RrdRun {
         let (header, data) = (&self.header, &self.data);
         let joints = header.joints.len();
         let row = |parts: &[&str], width: usize| -> Vec<f64> {
-            let row = data.scalars.get(&entity(parts)).and_then(|rows| between(rows, time_ns, mixed));
+            let row = data.scalars.get(&entity(parts)).and_then(|rows| between(rows, time_ns));
             row.filter(|row| row.len() == width).unwrap_or_else(|| vec![f64::NAN; width])
         };
         let one = |group: &str, key: &str| MILLI * row(&["plots", group, key], 1)[0];
@@ -311,16 +311,13 @@ impl Data {
 }
 
 /// The row at a time, or what lies between the two around it; before the first and beyond the last one that.
-fn between<T: Clone>(rows: &BTreeMap<i64, T>, time_ns: i64, mix: impl Fn(&T, &T, f64) -> T) -> Option<T> {
+fn between(rows: &BTreeMap<i64, Vec<f64>>, time_ns: i64) -> Option<Vec<f64>> {
     let (before, after) = (rows.range(..=time_ns).next_back(), rows.range(time_ns..).next());
     match (before, after) {
         (Some((start, a)), Some((end, b))) if start < end => {
-            Some(mix(a, b, (time_ns - start) as f64 / (end - start) as f64))
+            let share = (time_ns - start) as f64 / (end - start) as f64;
+            Some(a.iter().zip(b).map(|(a, b)| a + (b - a) * share).collect())
         }
         _ => before.or(after).map(|(_, row)| row.clone()),
     }
-}
-
-fn mixed(a: &Vec<f64>, b: &Vec<f64>, share: f64) -> Vec<f64> {
-    a.iter().zip(b).map(|(a, b)| a + (b - a) * share).collect()
 }
