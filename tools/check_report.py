@@ -3,7 +3,8 @@
 
     python3 tools/check_report.py out/run/report.html [more.html ...] [--pictures FOLDER] [--require]
 
-Checks: nothing is loaded but the file itself, nothing is said on the console, every plot has ink, dragging zooms,
+Checks: nothing is loaded but the file itself, nothing is said on the console, every view of every plot
+shows curves (and would not without values), links lead somewhere, dragging zooms,
 other time plots follow, a double click resets, the cursor is shared, the page prints.
 Needs playwright (pip install playwright) and a Chromium on the PATH or in CHROMIUM; without them it says "skipped" and
 exits with 0, with 1 under --require. Exit code 1 if a check fails.
@@ -14,17 +15,39 @@ import os
 import re
 import shutil
 import sys
+import tempfile
 from pathlib import Path
 
 BROWSERS = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"]
 WIDTHS = [1000, 1280, 1600]
-# Share of a plot's pixels that differ from its corner.
-INK = """canvas => {
-  const data = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
+# Pixels within the axes in the colour of a curve; grid, axes and texts have others, and marks are left out.
+INK = """async id => {
+  const drawn = () => new Promise(done => setTimeout(done, 0));
+  window.flexarmBare(true);
+  await drawn();
+  const { chart } = window.flexarmPlots().find(p => p.id === id);
+  const canvas = chart.ctx.canvas, { left, top, width, height } = chart.bbox;
+  const number = color => {
+    const one = Object.assign(document.createElement("canvas"), { width: 1, height: 1 }).getContext("2d");
+    one.fillStyle = color;
+    one.fillRect(0, 0, 1, 1);
+    return [...one.getImageData(0, 0, 1, 1).data];
+  };
+  const colors = chart.series.slice(1).map((s, k) => number(s.stroke(chart, k + 1)));
+  const data = canvas.getContext("2d").getImageData(left, top, width, height).data;
   let count = 0;
-  for (let k = 3; k < data.length; k += 4) if (data[k] !== 0) count++;
-  return count / (canvas.width * canvas.height);
+  for (let k = 0; k < data.length; k += 4) {
+    if (data[k + 3] < 100) continue;
+    if (colors.some(c => Math.abs(c[0] - data[k]) + Math.abs(c[1] - data[k + 1]) + Math.abs(c[2] - data[k + 2]) < 24)) count++;
+  }
+  window.flexarmBare(false);
+  await drawn();
+  return count;
 }"""
+# A curve that is seen has at least so many pixels.
+FEWEST = 40
+DEAD = """() => [...document.querySelectorAll("a[href^='#']")].map(a => a.getAttribute("href"))
+  .filter(href => href.length < 2 || !document.getElementById(href.slice(1)))"""
 RANGES = """() => window.flexarmPlots().map(p => [p.id, p.time, p.chart.scales.x.min, p.chart.scales.x.max])"""
 
 
@@ -102,15 +125,43 @@ def check_cursor(page, checks):
     checks.that(together, f"the cursor is at the same time in {len(values)} of {len(over_time)} time plots")
 
 
+def ink_of_views(page):
+    """Pixels of curves in every choice of every plot."""
+    ink = {}
+    for name in ranges(page):
+        select = page.locator(f"#plot-{name} select")
+        names = select.locator("option").all_text_contents() if select.count() else [""]
+        for value, view in enumerate(names):
+            if select.count():
+                select.select_option(str(value))
+                page.wait_for_timeout(30)
+            ink[f"{name} {view}".strip()] = page.evaluate(INK, name)
+        if select.count():
+            select.select_option("0")
+    page.wait_for_timeout(100)
+    return ink
+
+
 def check_views(page, checks):
-    selects = page.locator("#plots .plot select")
-    for k in range(selects.count()):
-        select = selects.nth(k)
-        for value in range(select.locator("option").count()):
-            select.select_option(str(value))
-        select.select_option("0")
-    charts = page.evaluate("() => window.flexarmPlots().every(p => p.chart.root.isConnected)")
-    checks.that(charts, f"all choices of {selects.count()} plots can be drawn")
+    ink = ink_of_views(page)
+    empty = [name for name, count in ink.items() if count < FEWEST]
+    fewest = min(ink.values(), default=0)
+    checks.that(ink and not empty, f"curves are seen in {len(ink)} views, at least {fewest} pixels {', '.join(empty)}")
+
+
+def check_empty(context, path, checks):
+    """The same page without a single value must not pass: this check can fail."""
+    def nothing(found):
+        return '"y":[' + ",".join(["null"] * (found.group().count(",") + 1)) + "]"
+
+    text = re.sub(r'"y":\[[^\]]*\]', nothing, path.read_text("utf-8"))
+    with tempfile.TemporaryDirectory() as folder:
+        empty = Path(folder) / "empty.html"
+        empty.write_text(text, "utf-8")
+        page, *_ = open_page(context, empty, checks)
+        ink = ink_of_views(page)
+        page.close()
+    checks.that(all(count < FEWEST for count in ink.values()), f"without values no curve is seen, {max(ink.values())} pixels at most")
 
 
 def check(browser, path, folder, checks):
@@ -122,13 +173,14 @@ def check(browser, path, folder, checks):
     ids = list(ranges(page))
     wanted = {"torques", "energy"}
     checks.that(wanted <= set(ids) and len(ids) >= 3, f"{len(ids)} plots: {', '.join(ids)}")
-    ink = {name: page.locator(f"#plot-{name} canvas").evaluate(INK) for name in ids}
-    checks.that(all(share > 0.005 for share in ink.values()), f"every plot has ink, at least {min(ink.values()):.1%}")
+    dead = page.evaluate(DEAD)
+    checks.that(not dead, f"all links lead somewhere {' '.join(dead)}")
     pictures = page.evaluate("() => [...document.images].map(i => [i.complete && i.naturalWidth, i.clientWidth])")
     checks.that(all(natural >= shown > 0 for natural, shown in pictures), f"{len(pictures)} pictures, sharp: {pictures}")
     check_zoom(page, checks)
     check_cursor(page, checks)
     check_views(page, checks)
+    check_empty(context, path, checks)
     wide = page.evaluate("() => document.documentElement.scrollWidth - window.innerWidth")
     checks.that(wide <= 0, "nothing is wider than the window")
     checks.that(not said, f"nothing is said on the console {said or ''}")

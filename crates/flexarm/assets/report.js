@@ -6,6 +6,7 @@
   const PRINT_WIDTH = 680;
   let drawn = [];
   let printing = false;
+  let bare = false;
 
   const make = (tag, name, text) => {
     const node = document.createElement(tag);
@@ -84,6 +85,7 @@
           ctx.restore();
         }],
         draw: [(u) => {
+          if (bare) return;
           const { ctx, bbox } = u;
           const ratio = uPlot.pxRatio;
           ctx.save();
@@ -126,10 +128,15 @@
         setScale: [(u, key) => {
           if (key !== "x" || !plot.time) return;
           const { min, max } = u.scales.x;
+          const whole = (x) => ({ min: x[0], max: x[x.length - 1] });
+          const own = whole(u.data[0]);
           for (const other of drawn) {
+            if (!other.chart || other.chart === u || !other.plot.time) continue;
+            // Runs differ in length: who shows everything of one shows everything of all.
+            const wanted = min === own.min && max === own.max ? whole(other.chart.data[0]) : { min, max };
             const scale = other.chart.scales.x;
-            if (other.chart === u || !other.plot.time || (scale.min === min && scale.max === max)) continue;
-            other.chart.setScale("x", { min, max });
+            if (scale.min === wanted.min && scale.max === wanted.max) continue;
+            other.chart.setScale("x", wanted);
           }
         }],
       },
@@ -279,6 +286,7 @@
   window.addEventListener("beforeprint", () => { printing = true; redraw(); });
   window.addEventListener("afterprint", () => { printing = false; redraw(); });
   build(0);
-  // For checks of this page.
+  // For checks of this page: the plots, and whether they are drawn without marks.
+  window.flexarmBare = (on) => { bare = on; for (const entry of drawn) entry.chart.redraw(false); };
   window.flexarmPlots = () => drawn.map((entry) => ({ id: entry.plot.id, time: entry.plot.time, chart: entry.chart }));
 })();

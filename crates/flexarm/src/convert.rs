@@ -108,14 +108,16 @@ pub fn convert(input: &Path, output: &Path, options: &ConvertOptions) -> Result<
     })
 }
 
-/// Reads a recording into memory: its summary, if it holds one (MCAP, Parquet), and its curves.
+/// Reads a recording into memory: its summary, if it holds one (MCAP, Parquet), its curves, and sentences about what is
+/// missing.
 ///
-/// What the format does not hold is NaN or empty ([`flexarm_log::RunSource::missing`]); a broken end is no error here.
+/// What the format does not hold is NaN or empty ([`flexarm_log::RunSource::missing`]); a broken end is no error here, but
+/// one of the sentences.
 ///
 /// # Errors
 /// As [`convert()`].
-pub fn read_run(path: &Path) -> Result<(Option<serde_json::Value>, Trace), Error> {
-    let mut source = open(path, format(path, None, "--from")?)?;
+pub fn read_run(path: &Path) -> Result<(Option<serde_json::Value>, Trace, Vec<String>), Error> {
+    let mut source = open(path, format(path, None, "")?)?;
     let mut trace = Trace::new(source.header().clone());
     let result = source.replay(&mut |sample: &Sample| {
         trace.push(sample);
@@ -124,7 +126,8 @@ pub fn read_run(path: &Path) -> Result<(Option<serde_json::Value>, Trace), Error
     let summary = result.attachments.iter().find(|file| file.name == "summary.json");
     let summary = summary.and_then(|file| serde_json::from_slice(&file.bytes).ok());
     trace.finish(result);
-    Ok((summary, trace))
+    let told = [source.missing(), source.warnings()].concat();
+    Ok((summary, trace, told))
 }
 
 /// The formats of recordings by the words that `--from` and `--to` take.
@@ -147,8 +150,9 @@ fn format(path: &Path, given: Option<RecordingFormat>, flag: &str) -> Result<Rec
     }
     let format = given.or_else(|| RecordingFormat::from_path(path)).ok_or_else(|| {
         let ending = path.extension().map_or("no ending".into(), |e| format!("the ending .{}", e.to_string_lossy()));
+        let or = if flag.is_empty() { String::new() } else { format!(" or give its format with {flag}") };
         Error::Usage(format!(
-            "{}: the name has {ending}, expected one of {}: rename the file or give its format with {flag}",
+            "{}: the name has {ending}, expected one of {}: rename the file{or}",
             path.display(),
             RecordingFormat::ALL.map(|format| format!(".{}", format.extension())).join(", ")
         ))
@@ -168,7 +172,7 @@ fn open(path: &Path, format: RecordingFormat) -> Result<Box<dyn RunSource>, Erro
     Ok(open_recording(path, format)?)
 }
 
-fn same_file(a: &Path, b: &Path) -> bool {
+pub(crate) fn same_file(a: &Path, b: &Path) -> bool {
     a.canonicalize().ok().zip(b.canonicalize().ok()).is_some_and(|(a, b)| a == b)
 }
 

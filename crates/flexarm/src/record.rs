@@ -1,5 +1,7 @@
 //! What recordings of a run say once: header, meshes, files.
 
+use std::path::{Component, Path, PathBuf};
+
 use flexarm_kinematics::{Frame, JointKind, Model};
 use flexarm_log::{Attachment, CreateOptions, CsvRecorder, LinkInfo, LinkMesh, RecorderSet, RunHeader};
 use flexarm_stepping::FlexibleArm;
@@ -7,7 +9,7 @@ use flexarm_urdf::Geometry;
 
 use crate::error::Error;
 use crate::motion::Motion;
-use crate::options::{Outputs, RunOptions};
+use crate::options::{DriveModel, LinkModel, Outputs, RunOptions};
 use crate::robot::Robot;
 use crate::summary::Files;
 
@@ -105,6 +107,23 @@ pub(crate) fn link_frames(robot: &Robot, model: &Model) -> Vec<Frame> {
     links.iter().map(|l| model.frame(&l.name).expect("all links are frames").clone()).collect()
 }
 
+/// A model that was not chosen for the run.
+const AS_FILED: &str = "as the robot file says";
+
+/// A path for people: without `folder/..` in it. The file system is not asked, so that the answer is the same anywhere.
+fn straight(path: &Path) -> String {
+    let mut parts: Vec<Component<'_>> = Vec::new();
+    for part in path.components() {
+        match (part, parts.last()) {
+            (Component::ParentDir, Some(Component::Normal(_))) => {
+                parts.pop();
+            }
+            _ => parts.push(part),
+        }
+    }
+    parts.iter().collect::<PathBuf>().display().to_string()
+}
+
 /// Everything about a run that does not change.
 pub(crate) fn header(
     robot: &Robot,
@@ -125,11 +144,23 @@ pub(crate) fn header(
         .collect();
     let frequencies: Vec<String> = arm.modes.frequencies_hz().iter().map(|f| format!("{f:.4}")).collect();
     let mut inputs = vec![
-        ("robot_file", robot.path.display().to_string()),
-        ("urdf_file", robot.urdf_path.display().to_string()),
-        ("trajectory_file", motion.path.display().to_string()),
+        ("robot_file", straight(&robot.path)),
+        ("urdf_file", straight(&robot.urdf_path)),
+        ("trajectory_file", straight(&motion.path)),
     ];
-    inputs.extend(options.loads.as_ref().map(|path| ("loads_file", path.display().to_string())));
+    inputs.extend(options.loads.as_ref().map(|path| ("loads_file", straight(path))));
+    let drives = match options.modelling.drives {
+        DriveModel::AsFiled => AS_FILED,
+        DriveModel::Rigid => "rigid",
+        DriveModel::Elastic => "elastic",
+        DriveModel::Servo => "servo",
+    };
+    let links_choice = match options.modelling.links {
+        LinkModel::AsFiled => AS_FILED,
+        LinkModel::Rigid => "rigid",
+        LinkModel::Lumped => "lumped",
+        LinkModel::Modal => "modal",
+    };
     let metadata = vec![
         group(
             "flexarm.run",
@@ -142,12 +173,15 @@ pub(crate) fn header(
                 ("rho_inf", stepper.rho_inf.map_or_else(String::new, |r| r.to_string())),
                 ("start", format!("{:?}", options.start).to_lowercase()),
                 ("log_rate_hz", options.log_rate_hz.to_string()),
+                ("settling_band_m", options.settling_band_m.to_string()),
             ],
         ),
         group(
             "flexarm.model",
             &[
                 ("links", links_model.into()),
+                ("links_choice", links_choice.into()),
+                ("drives", drives.into()),
                 ("elements", elements.join(", ")),
                 ("reduction", methods.join("; ")),
                 ("frequencies_hz", frequencies.join(", ")),
@@ -265,4 +299,21 @@ fn meshes(robot: &Robot, links: &[LinkInfo]) -> Vec<LinkMesh> {
         meshes.push(mesh);
     }
     meshes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paths_are_shown_without_ways_back() {
+        for (path, shown) in [
+            ("/x/crates/cli/../../robots/arm", "/x/robots/arm"),
+            ("../robots/arm", "../robots/arm"),
+            ("../../a/../b", "../../b"),
+            ("a/./b.toml", "a/b.toml"),
+        ] {
+            assert_eq!(straight(Path::new(path)), shown);
+        }
+    }
 }

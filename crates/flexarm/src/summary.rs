@@ -65,6 +65,10 @@ pub struct Summary {
     /// Largest size of the TCP error in each of [`CURVE_PIECES`] equal pieces of the run (m), for the terminal.
     #[serde(skip)]
     pub error_curve: Vec<f64>,
+    /// Computed from curves alone: nothing is known of energies, forces, frequencies, the stepper's work and the end of the
+    /// run, and of moves only what [`Summary::moves_s`] says.
+    #[serde(skip)]
+    pub computed: bool,
 }
 
 /// Written files; null where none was written.
@@ -293,6 +297,11 @@ impl From<&TcpMetrics> for TcpFigures {
 }
 
 impl Summary {
+    /// Whether figures about moves and stops mean something.
+    pub(crate) fn knows_moves(&self) -> bool {
+        !self.computed || !self.moves_s.is_empty()
+    }
+
     /// Label and value pairs for recordings.
     pub fn labelled(&self) -> Vec<(String, String)> {
         let mut rows = vec![

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use flexarm::{
-    LinkModel, LoadOptions, Modelling, Motion, Outputs, ReportRun, Robot, RunOptions, Summary, html, markdown,
-    simulate_traced,
+    DifferenceFigures, LinkModel, LoadOptions, Modelling, Motion, Outputs, ReportRun, Robot, RunOptions, Summary, html,
+    markdown, simulate_traced,
 };
 use flexarm_log::Trace;
 
@@ -77,6 +77,7 @@ fn the_page_refers_to_nothing_outside() {
 fn the_page_of_the_shipped_arm_is_small_and_complete() {
     let (summary, trace) = arm();
     let page = page_of(arm());
+    links_lead_somewhere(&page);
     assert!(page.len() < 3_000_000, "{} bytes", page.len());
     assert!(page.contains("ISO 9283-style, not a conformity test"));
     assert!(page.contains(&format!("{:.3}", 1e3 * summary.tcp.as_ref().unwrap().peak_m)), "the peak is a tile");
@@ -149,6 +150,7 @@ fn a_run_without_a_twin_leaves_out_what_needs_one() {
     let options = RunOptions { with_twin: false, ..RunOptions::default() };
     let run = run("one_beam", "beam_swing.toml", &options, None);
     let page = page_of(&run);
+    links_lead_somewhere(&page);
     for absent in ["ISO 9283", "Peak TCP error", "data:image/png", "\"tcp_error\"", "\"contributions\""] {
         assert!(!page.contains(absent), "{absent}");
     }
@@ -177,8 +179,80 @@ fn several_runs_lie_over_each_other() {
     }
     assert!(page.contains("Figures side by side") && page.contains("coarse &lt;step&gt;"));
     if cfg!(feature = "png") {
-        assert_eq!(page.matches("src=\"data:image/png;base64,").count(), 6, "two pictures of each run");
+        assert_eq!(page.matches("src=\"data:image/png;base64,").count(), 4, "two pictures of each run that bends");
     }
+    assert!(page.contains("rigid: nothing gives way"));
+    // Per cent stand with lengths, angles and frequencies alone.
+    let row =
+        |name: &str| page.split_once(&format!("<th>{name}</th>")).unwrap().1.split_once("</tr>").unwrap().0.to_owned();
+    assert!(row("peak TCP error").contains(" %)"));
+    for name in ["time of the peak", "settling time", "energy by the drives"] {
+        assert!(!row(name).contains(" %)"), "{name}");
+    }
+    links_lead_somewhere(&page);
+
+    // The rigid run has no spectrum; the others' are shown though it is the first.
+    let runs =
+        [("rigid", &rigid), ("as it is", arm())].map(|(label, (summary, trace))| ReportRun { label, summary, trace });
+    let data = data_of(&html(&runs));
+    let last = data["overlays"].as_array().unwrap().last().unwrap().clone();
+    assert_eq!(last["id"], "all_spectrum");
+    assert_eq!(last["views"][0]["tables"][0]["curves"][0]["name"], "as it is");
+}
+
+fn links_lead_somewhere(page: &str) {
+    let targets: Vec<&str> = page.split("href=\"#").skip(1).map(|rest| rest.split_once('"').unwrap().0).collect();
+    assert!(targets.contains(&"plots") && targets.contains(&"inputs"), "{targets:?}");
+    for target in targets {
+        assert_eq!(page.matches(&format!("id=\"{target}\"")).count(), 1, "{target}");
+    }
+}
+
+/// Truth: [`DifferenceFigures`] of the summary.
+#[test]
+fn a_study_says_how_far_its_runs_are_apart() {
+    let (summary, trace) = arm();
+    let apart = DifferenceFigures { peak_m: 1.2345e-3, of_peak_error: Some(0.4321), ..DifferenceFigures::default() };
+    let other = Summary { difference: Some(apart), ..summary.clone() };
+    let page = html(&[("a", summary), ("b", &other)].map(|(label, summary)| ReportRun { label, summary, trace }));
+    assert!(page.contains("<td class=\"number\">1.2345</td>") && page.contains("<td class=\"number\">43.21</td>"));
+}
+
+#[test]
+fn an_arm_on_its_twin_has_no_scale_and_no_peak() {
+    let modelling = Modelling { links: LinkModel::Rigid, ..Modelling::default() };
+    let rigid = run("one_beam", "beam_swing.toml", &RunOptions { modelling, ..RunOptions::default() }, None);
+    let page = page_of(&rigid);
+    assert!(!page.contains("magnified") && !page.contains("data:image/png") && page.contains("nothing gives way"));
+    let data = data_of(&page);
+    let events = data["runs"][0]["events"].as_array().unwrap();
+    assert!(events.iter().all(|event| event["kind"] != "peak"), "{events:?}");
+}
+
+/// Truth: a scale that ends below the error.
+#[cfg(feature = "png")]
+#[test]
+fn an_error_beyond_the_scale_of_the_picture_is_said_to_be() {
+    let (summary, mut trace) = arm().clone();
+    assert!(!page_of(arm()).contains("beyond the scale"));
+    trace.header.color_scale_m = 0.1 * summary.tcp.as_ref().unwrap().peak_m;
+    assert_eq!(page_of(&(summary, trace)).matches("beyond the scale").count(), 4, "two captions, two descriptions");
+}
+
+#[test]
+fn the_band_of_settling_and_the_models_are_named() {
+    let page = page_of(&run(
+        "one_beam",
+        "beam_swing.toml",
+        &RunOptions { settling_band_m: 2.5e-4, ..RunOptions::default() },
+        None,
+    ));
+    assert!(page.contains("tool stays within 0.25 mm of its place of rest"));
+    assert!(page.contains("<dt>settling_band_m</dt><dd>0.00025</dd>"));
+    assert!(page.contains("<dt>drives</dt><dd>as the robot file says</dd>"));
+    let (_, inputs) = page.split_once("id=\"inputs\"").unwrap();
+    let (inputs, _) = inputs.split_once("<script").unwrap();
+    assert!(!inputs.contains("/../"), "paths are straight");
 }
 
 #[test]

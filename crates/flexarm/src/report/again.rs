@@ -3,14 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use flexarm_analysis::{ErrorRecord, MetricSettings, tcp_metrics};
-use flexarm_log::{EventKind, Trace};
+use flexarm_log::{EventKind, RunHeader, Trace};
 use serde::Serialize;
 
 use super::{ReportRun, figures, html};
-use crate::convert::read_run;
+use crate::convert::{read_run, same_file};
 use crate::error::Error;
 use crate::result_files::{check_free, write_all};
-use crate::summary::Summary;
+use crate::summary::{StepperFigures, Summary, TcpFigures};
 
 /// Choices of a report.
 #[derive(Clone, Debug, Default)]
@@ -39,32 +39,56 @@ pub struct ReportFiles {
 /// Recordings in the folder of a run, the one that holds most first.
 const IN_FOLDER: [&str; 4] = ["run.mcap", "run.parquet", "run.csv", "run.rrd"];
 
-/// Makes the report of one recording, or one page in which several are compared.
+/// The trajectory of a recording that names none, for readers of tables.
+const UNKNOWN: &str = "unknown";
+
+/// A recording to be read.
+struct Input {
+    path: PathBuf,
+    /// Its figures, if they are known from elsewhere: those of the recording lack what a study adds.
+    of_study: Option<Summary>,
+}
+
+/// Makes the report of one recording, or one page in which several are compared. The folder of a study gives the page
+/// of the study.
 ///
 /// Figures are those that the recording holds. If it holds none (a table, a killed run), those of the tool are computed from
-/// its curves.
+/// its curves, and what curves cannot tell is left out.
 ///
 /// # Errors
-/// As [`read_run`]; [`Error::File`] for a folder without a recording and for places that are taken.
+/// As [`read_run`]; [`Error::File`] for a folder without a recording and for places that are taken; [`Error::Usage`] if
+/// the page would replace a recording that it is made of.
 pub fn report(recordings: &[PathBuf], options: &ReportOptions) -> Result<ReportFiles, Error> {
-    let inputs = recordings.iter().map(|path| recording(path)).collect::<Result<Vec<PathBuf>, Error>>()?;
+    let mut warnings = Vec::new();
+    let mut inputs = Vec::new();
+    for path in recordings {
+        inputs.push(Input { path: recording(path)?, of_study: None });
+        let study = path.is_dir().then(|| study(path)).flatten();
+        match study {
+            Some(study) if recordings.len() == 1 => inputs = runs_of(path, study, inputs, &mut warnings),
+            Some(study) => warnings.push(format!(
+                "{}: holds a study, of which only the first run is shown; give the folders of its other {} too",
+                path.display(),
+                study.with.len()
+            )),
+            None => {}
+        }
+    }
     let Some(first) = inputs.first() else {
         return Err(Error::Usage("give at least one recording, or the folder of a run".into()));
     };
-    let beside = |name: &str| first.with_file_name(name);
-    let page = options.output.clone().unwrap_or_else(|| beside("report.html"));
+    let page = options.output.clone().unwrap_or_else(|| first.path.with_file_name("report.html"));
     let folder = page.with_file_name(crate::record::FIGURES_FOLDER);
-    check_free(std::slice::from_ref(&page), options.overwrite)?;
-    if options.figures && folder.exists() && !options.overwrite {
-        let what = "exists already and is not overwritten: choose another place with -o or give --force";
-        return Err(Error::File { path: folder, what: what.into() });
-    }
+    check_places(&inputs, &page, &folder, options)?;
 
-    let mut warnings = Vec::new();
     let mut runs: Vec<(String, Summary, Trace)> = Vec::new();
-    for path in &inputs {
-        let (json, trace) = read_run(path)?;
-        let stored = json.and_then(|json| serde_json::from_value::<Summary>(json).ok());
+    for Input { path, of_study } in &inputs {
+        let (json, trace, told) = read_run(path)?;
+        let name = format!("{}: ", path.display());
+        // Some sentences name the file already.
+        let named = |sentence: String| if sentence.starts_with(&name) { sentence } else { name.clone() + &sentence };
+        warnings.extend(told.into_iter().map(named));
+        let stored = of_study.clone().or_else(|| json.and_then(|json| serde_json::from_value::<Summary>(json).ok()));
         let summary = stored.unwrap_or_else(|| {
             warnings.push(format!(
                 "{}: the recording holds no result (a table, or a run that was stopped): the figures of the tool are computed \
@@ -73,8 +97,9 @@ pub fn report(recordings: &[PathBuf], options: &ReportOptions) -> Result<ReportF
             ));
             computed(&trace)
         });
-        let label = match inputs.len() {
-            1 => format!("{} on {}", summary.robot, summary.trajectory),
+        let label = match (inputs.len(), &summary.label) {
+            (1, _) => super::title(&summary),
+            (_, Some(label)) if of_study.is_some() => label.clone(),
             _ => path.display().to_string(),
         };
         runs.push((label, summary, trace));
@@ -86,25 +111,100 @@ pub fn report(recordings: &[PathBuf], options: &ReportOptions) -> Result<ReportF
         figures::write(&folder, summary, trace)?;
     }
     Ok(ReportFiles {
-        inputs: inputs.iter().map(|path| path.display().to_string()).collect(),
+        inputs: inputs.iter().map(|input| input.path.display().to_string()).collect(),
         report: page.display().to_string(),
         figures: options.figures.then(|| folder.display().to_string()),
         warnings,
     })
 }
 
+/// Refuses places that are taken, before anything is read at length or written.
+fn check_places(inputs: &[Input], page: &Path, folder: &Path, options: &ReportOptions) -> Result<(), Error> {
+    if let Some(input) = inputs.iter().find(|input| same_file(&input.path, page)) {
+        let path = input.path.display();
+        let text = format!("{path} is a recording and the page to be written: give the page another name with -o");
+        return Err(Error::Usage(text));
+    }
+    check_free(&[page.to_owned()], options.overwrite)?;
+    let fail = |what: &str| Err(Error::File { path: folder.to_owned(), what: what.into() });
+    if !options.figures || !folder.exists() {
+        Ok(())
+    } else if !folder.is_dir() {
+        fail("is a file, a folder with figures is to be written there: choose another place with -o")
+    } else if !options.overwrite {
+        fail("exists already and is not overwritten: choose another place with -o or give --force")
+    } else {
+        Ok(())
+    }
+}
+
 fn recording(path: &Path) -> Result<PathBuf, Error> {
+    let fail = |what: String| Err(Error::File { path: path.to_owned(), what });
+    if !path.exists() {
+        return fail("there is no such file or folder: give a recording, or the folder of a run".into());
+    }
     if !path.is_dir() {
         return Ok(path.to_owned());
     }
-    IN_FOLDER.iter().map(|name| path.join(name)).find(|path| path.is_file()).ok_or_else(|| Error::File {
-        path: path.to_owned(),
-        what: format!("the folder has no recording: expected one of {}", IN_FOLDER.join(", ")),
-    })
+    match in_folder(path) {
+        Some(path) => Ok(path),
+        None => fail(format!("the folder has no recording: expected one of {}", IN_FOLDER.join(", "))),
+    }
+}
+
+fn in_folder(folder: &Path) -> Option<PathBuf> {
+    // What this program cannot read is no reason to fail while there is something that it can.
+    let there = || IN_FOLDER.iter().map(|name| folder.join(name)).filter(|path| path.is_file());
+    let readable = |path: &PathBuf| {
+        flexarm_log::RecordingFormat::from_path(path).is_some_and(flexarm_log::RecordingFormat::is_built_in)
+    };
+    there().find(readable).or_else(|| there().next())
+}
+
+/// The summary of a folder, if it is one of several runs.
+fn study(folder: &Path) -> Option<Summary> {
+    let bytes = std::fs::read(folder.join("summary.json")).ok()?;
+    let summary: Summary = serde_json::from_slice(&bytes).ok()?;
+    (!summary.with.is_empty()).then_some(summary)
+}
+
+/// The first run of a study with the others; runs without a recording are told and left out.
+fn runs_of(folder: &Path, mut study: Summary, first: Vec<Input>, warnings: &mut Vec<String>) -> Vec<Input> {
+    let others = std::mem::take(&mut study.with);
+    let mut runs: Vec<Input> =
+        first.into_iter().map(|input| Input { of_study: Some(study.clone()), ..input }).collect();
+    for other in others {
+        let label = other.label.clone().unwrap_or_default();
+        let own = folder.join(folder_name(&label));
+        match in_folder(&own).filter(|_| !label.is_empty()) {
+            Some(path) => runs.push(Input { path, of_study: Some(other) }),
+            None => warnings
+                .push(format!("{}: no recording of the run {label:?} of the study, which is left out", own.display())),
+        }
+    }
+    runs
+}
+
+/// Name of the folder of a study's run, as the study makes it of the label.
+fn folder_name(label: &str) -> String {
+    label.chars().map(|c| if c.is_ascii_alphanumeric() || "-_.=".contains(c) { c } else { '_' }).collect()
+}
+
+/// A value of the metadata.
+pub(super) fn told<'a>(header: &'a RunHeader, group: &str, key: &str) -> Option<&'a str> {
+    let (_, rows) = header.metadata.iter().find(|(name, _)| name == group)?;
+    let (_, value) = rows.iter().find(|(name, _)| name == key)?;
+    Some(value.as_str()).filter(|value| !value.is_empty())
+}
+
+/// Half width of the band in which the tool counts as settled (m).
+pub(super) fn settling_band_m(header: &RunHeader) -> Option<f64> {
+    told(header, "flexarm.run", "settling_band_m")?.parse().ok()
 }
 
 /// The figures that curves alone give.
 fn computed(trace: &Trace) -> Summary {
+    let header = &trace.header;
     let rows: Vec<_> = trace.rows.iter().filter(|row| row.error_world.iter().all(|x| x.is_finite())).collect();
     let times: Vec<f64> = rows.iter().map(|row| row.time_s).collect();
     let errors: Vec<[f64; 6]> = rows.iter().map(|row| row.error_world).collect();
@@ -118,17 +218,34 @@ fn computed(trace: &Trace) -> Summary {
         quasi_static: None,
         moves: &moves,
     };
-    let metrics = tcp_metrics(&record, &MetricSettings::default()).ok();
+    let usual = MetricSettings::default();
+    let settings = MetricSettings { settling_band_m: settling_band_m(header).unwrap_or(usual.settling_band_m) };
+    let metrics = tcp_metrics(&record, &settings).ok();
+    let mut tcp = metrics.as_ref().filter(|_| header.has_rigid).map(TcpFigures::from);
+    if let Some(tcp) = tcp.as_mut().filter(|_| moves.is_empty()) {
+        // Where the ringing cannot be told from the motion it has no frequency.
+        (tcp.dominant_hz, tcp.settling_s) = (None, None);
+    }
     let named = |name: &str, otherwise: &str| if name.is_empty() { otherwise.to_owned() } else { name.to_owned() };
+    let run = |key: &str| told(header, "flexarm.run", key);
+    let flexible = if header.elements.is_empty() { "" } else { "flexible" };
+    let robot = run("robot").unwrap_or(&header.robot);
+    let trajectory = run("trajectory").unwrap_or(&header.trajectory);
     Summary {
-        robot: named(&trace.header.robot, "robot"),
-        trajectory: named(&trace.header.trajectory, "motion"),
-        links_model: if trace.header.elements.is_empty() { "rigid" } else { "flexible" }.into(),
-        end: "not known: the recording holds no result".into(),
+        robot: named(robot, "recorded run"),
+        trajectory: if trajectory == UNKNOWN { String::new() } else { trajectory.to_owned() },
+        links_model: told(header, "flexarm.model", "links").unwrap_or(flexible).to_owned(),
+        stepper: StepperFigures {
+            name: run("stepper").unwrap_or_default().to_owned(),
+            h_s: run("step_s").and_then(|h| h.parse().ok()).unwrap_or(header.step_s),
+            rho_inf: run("rho_inf").and_then(|rho| rho.parse().ok()),
+            ..StepperFigures::default()
+        },
         duration_s: trace.rows.last().map_or(0.0, |row| row.time_s),
-        tcp: metrics.as_ref().filter(|_| trace.header.has_rigid).map(Into::into),
+        tcp,
         error_curve: crate::summary::thinned(&times, &errors),
         moves_s: moves.iter().map(|&(start, end)| [start, end]).collect(),
+        computed: true,
         ..Summary::default()
     }
 }

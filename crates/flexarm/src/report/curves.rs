@@ -14,6 +14,8 @@ const MOST_DETAIL: usize = 1000;
 /// Amplitudes below this share of the largest one end the shown part of a spectrum.
 const QUIET: f64 = 1e-3;
 
+const WHOLE_RUN: &str = "whole run";
+
 /// Most stops of which a spectrum is shown.
 const MOST_STOPS: usize = 8;
 
@@ -272,8 +274,7 @@ fn spectrum(summary: &Summary, trace: &Trace) -> Option<Plot> {
         let curves = curves.into_iter().map(|c| Curve { y: c.y[range.clone()].to_vec(), ..c });
         Table::new(hz[range.clone()].to_vec(), curves.collect(), MOST_POINTS)
     };
-    let mut views =
-        vec![PlotView { name: "whole run".into(), tables: vec![shown(&hz, curves)], ..PlotView::default() }];
+    let mut views = vec![PlotView { name: WHOLE_RUN.into(), tables: vec![shown(&hz, curves)], ..PlotView::default() }];
     // Without the motion in it the ringing stands alone.
     let holds = summary.tcp.iter().flat_map(|tcp| &tcp.holds).take(MOST_STOPS).enumerate();
     let stops = holds.filter_map(|(k, hold)| {
@@ -285,14 +286,14 @@ fn spectrum(summary: &Summary, trace: &Trace) -> Option<Plot> {
     });
     let stops: Vec<Table> = stops.collect();
     if !stops.is_empty() {
-        views.push(PlotView { name: "stops".into(), tables: stops, ..PlotView::default() });
+        views.insert(0, PlotView { name: "stops".into(), tables: stops, ..PlotView::default() });
     }
     let marks = summary.frequencies_hz.iter().enumerate().filter(|(_, hz)| **hz <= end);
     Some(Plot {
         id: "spectrum",
         section: TOOL,
         title: "Spectrum of the TCP error",
-        note: "Amplitudes (Hann window). Dashed: natural frequencies at the start pose, drives locked.".into(),
+        note: "Amplitudes (Hann window). Dashed: natural frequencies at the start pose, motors held.".into(),
         x_label: "frequency",
         x_unit: "Hz",
         y_label: "amplitude",
@@ -360,12 +361,19 @@ fn elements(summary: &Summary, trace: &Trace) -> Vec<Plot> {
         _ => "",
     };
     let plot = |id, title, y_label, y_unit| Plot { y_label, y_unit, note: note.into(), ..over_time(id, PARTS, title) };
-    vec![
+    let plots = vec![
         make(plot("element_force", "Elastic forces", "force", "N"), 1.0, |e| &e.load[..3]),
         make(plot("element_moment", "Elastic moments", "moment", "N m"), 1.0, |e| &e.load[3..]),
         make(plot("element_shift", "Elastic displacements", "displacement", "mm"), 1e3, |e| &e.deflection[..3]),
         make(plot("element_turn", "Elastic rotations", "rotation", "mrad"), 1e3, |e| &e.deflection[3..]),
-    ]
+    ];
+    plots.into_iter().filter(|plot| !is_zero(plot)).collect()
+}
+
+/// Whether all curves of a plot are zero everywhere: springs of one kind alone leave the plots of the others so.
+fn is_zero(plot: &Plot) -> bool {
+    let tables = plot.views.iter().flat_map(|view| &view.tables);
+    tables.flat_map(|table| &table.curves).flat_map(|curve| &curve.y).all(|y| *y == 0.0)
 }
 
 fn slides(trace: &Trace, joint: usize) -> bool {
@@ -444,14 +452,15 @@ fn energy(trace: &Trace) -> Plot {
 
 /// The plots in which runs are laid over each other: one curve per run.
 pub(super) fn overlays(runs: &[(&str, &Summary, &Trace)]) -> Vec<Plot> {
-    let only = |mut plot: Plot, wanted: &str, label: &str| {
-        let mut table = plot.views.swap_remove(0).tables.swap_remove(0);
+    let only = |plot: Plot, wanted: &str, label: &str| {
+        let mut tables = plot.views.into_iter().flat_map(|view| view.tables);
+        let mut table = tables.find(|table| table.curves.iter().any(|curve| curve.name == wanted))?;
         table.curves.retain(|curve| curve.name == wanted);
         for curve in &mut table.curves {
             curve.name = label.to_owned();
             curve.kind = Kind::Plain;
         }
-        table
+        Some(table)
     };
     let with_twin: Vec<_> =
         runs.iter().filter(|(_, _, trace)| trace.header.has_rigid && !trace.rows.is_empty()).collect();
@@ -461,18 +470,23 @@ pub(super) fn overlays(runs: &[(&str, &Summary, &Trace)]) -> Vec<Plot> {
     let overlaid = |plot: Plot, wanted: &str, each: &dyn Fn(&Summary, &Trace) -> Option<Plot>| {
         let tables = with_twin
             .iter()
-            .filter_map(|(label, summary, trace)| each(summary, trace).map(|plot| only(plot, wanted, label)));
+            .filter_map(|(label, summary, trace)| each(summary, trace).and_then(|plot| only(plot, wanted, label)));
         let views = vec![PlotView { tables: tables.collect(), ..PlotView::default() }];
-        Plot { views, section: "", wide: true, marks: Vec::new(), note: String::new(), ..plot }
+        let note = match plot.over_time {
+            true => "Moves and marks are those of the first run.",
+            false => "",
+        };
+        Plot { views, section: "", wide: true, marks: Vec::new(), note: note.into(), ..plot }
     };
-    let (_, summary, trace) = with_twin[0];
+    let (_, _, trace) = with_twin[0];
     let size = Plot { id: "all_error", title: "Size of the TCP error", ..error(trace) };
     let lateral = Plot { id: "all_path", title: "Distance from the path", ..path_over_length(trace) };
     let mut plots = vec![
         overlaid(size, "size", &|_, trace| Some(error(trace))),
         overlaid(lateral, "distance from the path", &|_, trace| Some(path_over_length(trace))),
     ];
-    if let Some(plot) = spectrum(summary, trace) {
+    // A rigid run has none.
+    if let Some(plot) = with_twin.iter().find_map(|(_, summary, trace)| spectrum(summary, trace)) {
         let plot = Plot { id: "all_spectrum", ..plot };
         plots.push(overlaid(plot, "all axes", &spectrum));
     }
@@ -511,6 +525,19 @@ mod tests {
                 prop_assert_eq!(extremes(&mut keep.iter().map(|k| curve[*k])), all);
             }
         }
+    }
+
+    #[test]
+    fn springs_that_only_turn_have_no_plots_of_forces() {
+        let mut trace = Trace::default();
+        trace.header.elements = vec!["spring".into()];
+        let mut element = ElasticSample::default();
+        (element.load[5], element.deflection[5]) = (3.0, 1e-3);
+        for time_s in [0.0, 0.1] {
+            trace.rows.push(TraceRow { time_s, elastic: vec![element], ..TraceRow::default() });
+        }
+        let ids: Vec<&str> = elements(&Summary::default(), &trace).iter().map(|plot| plot.id).collect();
+        assert_eq!(ids, ["element_moment", "element_turn"]);
     }
 
     #[test]

@@ -6,11 +6,12 @@
 use std::fmt::Write as _;
 
 use base64::Engine as _;
-use flexarm_log::Trace;
+use flexarm_log::{EventKind, RunHeader, Trace};
 
+use super::again::settling_band_m;
 use super::curves::{Kind, Plot, overlays, plots};
 use super::picture::pictures;
-use crate::summary::Summary;
+use crate::summary::{Summary, TcpFigures};
 
 const STYLE: &str = include_str!("../../assets/report.css");
 const BEHAVIOUR: &str = include_str!("../../assets/report.js");
@@ -18,6 +19,9 @@ const UPLOT: &str = include_str!("../../assets/uplot/uPlot.iife.min.js");
 const UPLOT_STYLE: &str = include_str!("../../assets/uplot/uPlot.min.css");
 const UPLOT_LICENSE: &str = include_str!("../../assets/uplot/LICENSE");
 const UPLOT_VERSION: &str = "1.6.32";
+
+/// Errors below this are rounding (m).
+const NOTHING_M: f64 = 1e-12;
 
 /// Width of the pictures of the arm (pixels): sharp at the width at which the page shows them.
 const PICTURE_WIDTH: usize = 1080;
@@ -40,7 +44,7 @@ pub fn html(runs: &[ReportRun<'_>]) -> String {
         return "<!DOCTYPE html>\n<title>flexarm report</title>\n<p>No runs.\n".to_owned();
     };
     let title = match runs {
-        [run] => format!("{} on {}", run.summary.robot, run.summary.trajectory),
+        [run] => super::title(run.summary),
         _ => format!("{} runs: {}", runs.len(), runs.iter().map(|run| run.label).collect::<Vec<_>>().join(", ")),
     };
     // The banner of the minified file names an address; licence and origin stand in a comment of this page.
@@ -55,27 +59,9 @@ pub fn html(runs: &[ReportRun<'_>]) -> String {
         env!("CARGO_PKG_VERSION"),
         escaped(&title)
     );
-    page += &heading(&title, runs);
-    page += "<main>\n";
-    for run in runs {
-        page += &troubles(run, runs.len() > 1);
-    }
-    if let [run] = runs {
-        page += &tiles(run.summary);
-    } else {
-        page += &comparison(runs);
-    }
-    page += &arm_pictures(runs);
-    page += "<section id=\"plots\"><noscript><p>The plots need JavaScript.</p></noscript></section>\n";
-    page += &iso_table(runs);
-    let of = if runs.len() > 1 { format!(" of {}", escaped(main.label)) } else { String::new() };
-    page += &stops_table(main.summary, &of);
-    page += &parts_tables(main.summary, &of);
-    for run in runs {
-        page += &inputs(run, runs.len() > 1);
-    }
-    page += &timings(runs);
-    page += "</main>\n";
+    let body = body(main, runs);
+    page += &heading(&title, runs, &body);
+    let _ = write!(page, "<main>\n{body}</main>\n");
     let _ = write!(
         page,
         "<script type=\"application/json\" id=\"data\">{}</script>\n\
@@ -85,6 +71,26 @@ pub fn html(runs: &[ReportRun<'_>]) -> String {
         uplot.trim_start()
     );
     page
+}
+
+fn body(main: &ReportRun<'_>, runs: &[ReportRun<'_>]) -> String {
+    let mut body: String = runs.iter().map(|run| troubles(run, runs.len() > 1)).collect();
+    if let [run] = runs {
+        body += &tiles(run);
+    } else {
+        body += &comparison(runs);
+    }
+    body += &arm_pictures(runs);
+    body += "<section id=\"plots\"><noscript><p>The plots need JavaScript.</p></noscript></section>\n";
+    body += &iso_table(runs);
+    let of = if runs.len() > 1 { format!(" of {}", escaped(main.label)) } else { String::new() };
+    body += &stops_table(main.summary, &of);
+    body += &parts_tables(main.summary, &of);
+    let inputs: String = runs.iter().map(|run| inputs(run, runs.len() > 1)).collect();
+    if !inputs.is_empty() {
+        let _ = write!(body, "<div id=\"inputs\">\n{inputs}</div>\n");
+    }
+    body + &timings(runs)
 }
 
 /// Text as it may stand in an element or between the quotes of an attribute.
@@ -103,25 +109,41 @@ fn escaped(text: &str) -> String {
     out
 }
 
-fn heading(title: &str, runs: &[ReportRun<'_>]) -> String {
+/// Parts of the page that can be gone to: name of the link, place.
+const PLACES: [(&str, &str); 5] =
+    [("Figures", "summary"), ("Arm", "arm"), ("Plots", "plots"), ("Tables", "tables"), ("Inputs", "inputs")];
+
+fn heading(title: &str, runs: &[ReportRun<'_>], body: &str) -> String {
     let s = runs[0].summary;
     let mut facts = Vec::new();
     if runs.len() == 1 {
         if runs[0].trace.header.has_rigid {
             facts.push("flexible arm against its rigid twin".to_owned());
         }
-        facts.push(format!("{} links", s.links_model));
+        if !s.links_model.is_empty() {
+            facts.push(format!("{} links", s.links_model));
+        }
         facts.push(format!("{} s", number(s.duration_s, 4)));
-        facts.push(format!("{}, step {} ms", s.stepper.name, number(1e3 * s.stepper.h_s, 4)));
+        facts.extend(method(s, "step "));
     }
     facts.push(format!("flexarm {}", env!("CARGO_PKG_VERSION")));
     let facts: Vec<String> = facts.iter().map(|fact| format!("<span>{}</span>", escaped(fact))).collect();
+    // Names of runs are escaped: none can look like a place.
+    let there = PLACES.iter().filter(|(_, id)| body.contains(&format!("id=\"{id}\"")));
+    let links: String = there.map(|(name, id)| format!("<a href=\"#{id}\">{name}</a>")).collect();
     format!(
-        "<header>\n<h1>{}</h1>\n<p class=\"facts\">{}</p>\n<nav><a href=\"#summary\">Figures</a><a href=\"#arm\">Arm</a>\
-         <a href=\"#plots\">Plots</a><a href=\"#tables\">Tables</a><a href=\"#inputs\">Inputs</a></nav>\n</header>\n",
+        "<header>\n<h1>{}</h1>\n<p class=\"facts\">{}</p>\n<nav>{links}</nav>\n</header>\n",
         escaped(title),
         facts.join("")
     )
+}
+
+/// Stepper and step, as far as they are known.
+fn method(s: &Summary, before: &str) -> Option<String> {
+    let step = (s.stepper.h_s > 0.0).then(|| format!("{before}{} ms", number(1e3 * s.stepper.h_s, 4)));
+    let name = Some(s.stepper.name.clone()).filter(|name| !name.is_empty());
+    let known: Vec<String> = name.into_iter().chain(step).collect();
+    (!known.is_empty()).then(|| known.join(", "))
 }
 
 /// Why a run stopped, and its warnings.
@@ -129,7 +151,11 @@ fn troubles(run: &ReportRun<'_>, named: bool) -> String {
     let s = run.summary;
     let who = if named { format!("{}: ", escaped(run.label)) } else { String::new() };
     let mut out = String::new();
-    if s.end != "complete" {
+    if s.computed {
+        let why =
+            "The recording holds no result: the figures of the tool are computed from its curves, others are missing.";
+        let _ = writeln!(out, "<p class=\"block note\"><strong>{who}End not known.</strong> {why}</p>");
+    } else if s.end != "complete" {
         let _ = writeln!(out, "<p class=\"stopped\"><strong>{who}Stopped early.</strong> {}</p>", escaped(&s.end));
     }
     if !s.warnings.is_empty() {
@@ -167,7 +193,19 @@ fn fixed(x: f64) -> String {
     format!("{x:.digits$}")
 }
 
-fn tiles(s: &Summary) -> String {
+/// A band in words, such as "within 0.1 mm".
+fn within(header: &RunHeader) -> Option<String> {
+    settling_band_m(header).map(|band| format!("within {} mm", number(1e3 * band, 3)))
+}
+
+/// Whether the tool never leaves its rigid twin.
+fn lies_on_twin(run: &ReportRun<'_>) -> bool {
+    run.summary.tcp.as_ref().is_some_and(|tcp| tcp.peak_m < NOTHING_M)
+}
+
+fn tiles(run: &ReportRun<'_>) -> String {
+    let s = run.summary;
+    let band = within(&run.trace.header).map_or_else(String::new, |band| format!(", {band}"));
     let mut out = "<section id=\"summary\" class=\"tiles\">\n".to_owned();
     let mut tile = |name: &str, value: String, unit: &str, note: String| {
         let class = if out.contains("<div") { "tile" } else { "tile main" };
@@ -179,32 +217,34 @@ fn tiles(s: &Summary) -> String {
     };
     if let Some(tcp) = &s.tcp {
         let mm = |x: f64| fixed(1e3 * x);
-        tile("Peak TCP error", mm(tcp.peak_m), "mm", format!("at {:.3} s", tcp.t_peak_s));
+        let when = if lies_on_twin(run) { "nothing gives way".into() } else { format!("at {:.3} s", tcp.t_peak_s) };
+        tile("Peak TCP error", mm(tcp.peak_m), "mm", when);
         tile("RMS TCP error", mm(tcp.rms_m), "mm", "over the whole run".into());
         tile("Static sag", mm(tcp.static_sag_m), "mm", "at rest at the start".into());
-        match tcp.settling_s {
-            Some(settling) => tile("Settling time", fixed(settling), "s", "after the last move".into()),
-            None => tile("Settling time", "–".into(), "", "not within the recording".into()),
+        if s.knows_moves() {
+            match tcp.settling_s {
+                Some(settling) => tile("Settling time", fixed(settling), "s", format!("after the last move{band}")),
+                None => tile("Settling time", "–".into(), "", format!("not within the recording{band}")),
+            }
         }
         tile("Error at the end", mm(tcp.end_m), "mm", format!("at {:.3} s", s.duration_s));
         match tcp.dominant_hz {
+            _ if !s.knows_moves() => {}
             Some(hz) => tile("Dominant frequency", fixed(hz), "Hz", "strongest line of the ringing".into()),
             None => tile("Dominant frequency", "–".into(), "", "nothing oscillates".into()),
         }
     } else {
         tile("Simulated time", fixed(s.duration_s), "s", s.stepper.name.clone());
         if let Some(hz) = s.frequencies_hz.first() {
-            tile("First natural frequency", fixed(*hz), "Hz", "at the start pose, drives locked".into());
+            tile("First natural frequency", fixed(*hz), "Hz", "at the start pose, motors held".into());
         }
         if let Some((joint, peak)) = s.drives.iter().max_by(|a, b| a.1.total_cmp(b.1)) {
             tile("Largest force of a drive", fixed(*peak), "N m", format!("{joint} (N if it slides)"));
         }
-        tile(
-            "Energy by the drives",
-            fixed(s.energy.drives_j),
-            "J",
-            format!("balance open by {:.1e}", s.energy.imbalance),
-        );
+        if !s.computed {
+            let open = format!("balance open by {:.1e}", s.energy.imbalance);
+            tile("Energy by the drives", fixed(s.energy.drives_j), "J", open);
+        }
     }
     out + "</section>\n"
 }
@@ -212,20 +252,33 @@ fn tiles(s: &Summary) -> String {
 /// A figure of the comparison: name, unit, and its value of a run.
 type Compared = (&'static str, &'static str, fn(&Summary) -> Option<f64>);
 
-const COMPARED: [Compared; 12] = [
+/// The figures of the tool that mean nothing unless the moves are known.
+fn moving(s: &Summary) -> Option<&TcpFigures> {
+    s.tcp.as_ref().filter(|_| s.knows_moves())
+}
+
+/// Units of figures of which a change in per cent says something; a time or an energy has no natural zero.
+const RELATIVE: [&str; 3] = ["mm", "mrad", "Hz"];
+
+const COMPARED: [Compared; 14] = [
     ("peak TCP error", "mm", |s| s.tcp.as_ref().map(|t| 1e3 * t.peak_m)),
     ("time of the peak", "s", |s| s.tcp.as_ref().map(|t| t.t_peak_s)),
     ("RMS TCP error", "mm", |s| s.tcp.as_ref().map(|t| 1e3 * t.rms_m)),
-    ("path accuracy", "mm", |s| s.tcp.as_ref().map(|t| 1e3 * t.path_accuracy_m)),
+    (APART, "mm", |s| s.difference.as_ref().map(|d| 1e3 * d.peak_m)),
+    ("apart, of the first run's peak", "%", |s| s.difference.as_ref()?.of_peak_error.map(|x| 100.0 * x)),
+    ("path accuracy", "mm", |s| moving(s).map(|t| 1e3 * t.path_accuracy_m)),
     ("static sag", "mm", |s| s.tcp.as_ref().map(|t| 1e3 * t.static_sag_m)),
     ("error at the end", "mm", |s| s.tcp.as_ref().map(|t| 1e3 * t.end_m)),
-    ("overshoot", "mm", |s| s.tcp.as_ref().map(|t| 1e3 * t.overshoot_m)),
-    ("settling time", "s", |s| s.tcp.as_ref().and_then(|t| t.settling_s)),
+    ("overshoot", "mm", |s| moving(s).map(|t| 1e3 * t.overshoot_m)),
+    ("settling time", "s", |s| moving(s).and_then(|t| t.settling_s)),
     ("peak rotation", "mrad", |s| s.tcp.as_ref().map(|t| 1e3 * t.peak_rad)),
-    ("dominant frequency", "Hz", |s| s.tcp.as_ref().and_then(|t| t.dominant_hz)),
+    ("dominant frequency", "Hz", |s| moving(s).and_then(|t| t.dominant_hz)),
     ("first natural frequency", "Hz", |s| s.frequencies_hz.first().copied()),
-    ("energy by the drives", "J", |s| Some(s.energy.drives_j)),
+    ("energy by the drives", "J", |s| (!s.computed).then_some(s.energy.drives_j)),
 ];
+
+/// The name of a figure that is a difference already.
+const APART: &str = "apart from the first run";
 
 fn comparison(runs: &[ReportRun<'_>]) -> String {
     let mut out =
@@ -243,9 +296,10 @@ fn comparison(runs: &[ReportRun<'_>]) -> String {
     for (name, unit, value) in COMPARED {
         let values: Vec<Option<f64>> = runs.iter().map(|run| value(run.summary)).collect();
         let base = values[0];
+        let relative = RELATIVE.contains(&unit) && name != APART;
         let cell = |(k, v): (usize, &Option<f64>)| match (v, base) {
             (None, _) => "–".to_owned(),
-            (Some(v), Some(base)) if k > 0 && base != 0.0 => {
+            (Some(v), Some(base)) if k > 0 && relative && base.abs() > 1e3 * NOTHING_M => {
                 let change = format!("{:+.1}", 100.0 * (v / base - 1.0));
                 format!("{} ({} %)", number(*v, 5), if change == "-0.0" { "+0.0" } else { &change })
             }
@@ -255,12 +309,17 @@ fn comparison(runs: &[ReportRun<'_>]) -> String {
             out += &row(name, unit, values.iter().enumerate().map(cell).collect());
         }
     }
+    let or_none = |text: &str| if text.is_empty() { "–".to_owned() } else { text.to_owned() };
     out += &row("robot", "", runs.iter().map(|run| run.summary.robot.clone()).collect());
-    out += &row("trajectory", "", runs.iter().map(|run| run.summary.trajectory.clone()).collect());
-    out += &row("links", "", runs.iter().map(|run| run.summary.links_model.clone()).collect());
-    let method = |s: &Summary| format!("{}, {} ms", s.stepper.name, number(1e3 * s.stepper.h_s, 4));
-    out += &row("stepper", "", runs.iter().map(|run| method(run.summary)).collect());
-    out + "</tbody></table></div><p class=\"note\">In brackets: against the first run.</p></section>\n"
+    out += &row("trajectory", "", runs.iter().map(|run| or_none(&run.summary.trajectory)).collect());
+    out += &row("links", "", runs.iter().map(|run| or_none(&run.summary.links_model)).collect());
+    out += &row("stepper", "", runs.iter().map(|run| or_none(&method(run.summary, "").unwrap_or_default())).collect());
+    let apart = match runs.iter().any(|run| run.summary.difference.is_some()) {
+        true => " Apart: largest distance of the flexible TCP from that of the first run at the same time.",
+        false => "",
+    };
+    out += "</tbody></table></div><p class=\"note\">In brackets: against the first run.";
+    out + apart + "</p></section>\n"
 }
 
 fn arm_pictures(runs: &[ReportRun<'_>]) -> String {
@@ -270,16 +329,37 @@ fn arm_pictures(runs: &[ReportRun<'_>]) -> String {
         return String::new();
     }
     for run in &with_twin {
-        out += "<div class=\"pictures\">\n";
         let header = &run.trace.header;
         let who = if runs.len() > 1 { format!("{}: ", run.label) } else { String::new() };
+        let none = if run.trace.peak.flexible.X_WL.is_empty() {
+            Some("the recording has no poses of links, so there is no picture of the arm")
+        } else if lies_on_twin(run) {
+            Some("nothing gives way: the arm lies on its rigid twin, so there is no picture of it")
+        } else {
+            None
+        };
+        if let Some(why) = none {
+            let _ = writeln!(out, "<p class=\"note\">{}{why}</p>", escaped(&who));
+            continue;
+        }
+        out += "<div class=\"pictures\">\n";
+        let error_m = run.trace.peak.error_world[..3].iter().map(|x| x * x).sum::<f64>().sqrt();
+        let beyond = if header.color_scale_m > 0.0 && error_m > 1.001 * header.color_scale_m {
+            format!(" The tool is {} mm off, beyond the scale.", number(1e3 * error_m, 3))
+        } else {
+            String::new()
+        };
         let factor = if header.magnification > 0.0 { header.magnification } else { 1.0 };
         for picture in pictures(run.trace, PICTURE_WIDTH) {
             let caption = format!(
-                "{who}{}, at {:.3} s. Deflections magnified {} times, coloured by the true deviation from the rigid arm (grey).",
+                "{who}{}, at {:.3} s. {}oloured by the true deviation from the rigid arm (grey).{beyond}",
                 picture.title,
                 run.trace.peak.time_s,
-                number(factor, 3),
+                if factor == 1.0 {
+                    "C".into()
+                } else {
+                    format!("Deflections magnified {} times, c", number(factor, 3))
+                },
             );
             match picture.png {
                 Ok(png) => {
@@ -308,10 +388,10 @@ const ISO: [Iso; 7] = [
         "Path accuracy (AT)",
         "largest distance of the flexible tool from the rigid tool across the path, while moving",
         "mm",
-        |s| s.tcp.as_ref().map(|t| 1e3 * t.path_accuracy_m),
+        |s| moving(s).map(|t| 1e3 * t.path_accuracy_m),
     ),
     ("RMS distance from the path", "of the same, over the samples of the moves", "mm", |s| {
-        s.tcp.as_ref().map(|t| 1e3 * t.path_rms_m)
+        moving(s).map(|t| 1e3 * t.path_rms_m)
     }),
     ("Lag along the path", "largest deviation along the path, whole run", "mm", |s| {
         s.tcp.as_ref().map(|t| 1e3 * t.path_peak_m[0])
@@ -320,16 +400,16 @@ const ISO: [Iso; 7] = [
         "Position overshoot (OV)",
         "largest excursion past the place of rest, in the direction of approach, over all stops",
         "mm",
-        |s| s.tcp.as_ref().map(|t| 1e3 * t.overshoot_m),
+        |s| moving(s).map(|t| 1e3 * t.overshoot_m),
     ),
     (
         "Position stabilisation time",
-        "from the end of the last commanded move until the tool stays within the band",
+        "from the end of the last commanded move until the tool stays BAND of its place of rest",
         "s",
-        |s| s.tcp.as_ref().and_then(|t| t.settling_s),
+        |s| moving(s).and_then(|t| t.settling_s),
     ),
     ("Pose accuracy (AP)", "largest distance from the rigid tool at rest, over all stops", "mm", |s| {
-        let rests = s.tcp.as_ref()?.holds.iter().map(|hold| 1e3 * hold.final_m);
+        let rests = moving(s)?.holds.iter().map(|hold| 1e3 * hold.final_m);
         rests.reduce(f64::max)
     }),
     ("Static sag", "distance from the rigid tool at rest at the start", "mm", |s| {
@@ -350,7 +430,17 @@ fn iso_table(runs: &[ReportRun<'_>]) -> String {
         let _ = write!(out, "<th class=\"number\">{name}</th>");
     }
     out += "<th>unit</th></tr></thead><tbody>";
+    let mut bands = runs.iter().map(|run| within(&run.trace.header));
+    let first = bands.next().flatten();
+    let band = first.filter(|first| bands.all(|band| band.as_ref() == Some(first)));
+    let band = band.unwrap_or_else(|| "within the settling band".into());
     for (name, meaning, unit, value) in ISO {
+        // What is not known is no row; what there is not, such as the end of a ringing, is.
+        let known = |run: &ReportRun<'_>| run.summary.knows_moves() || value(run.summary).is_some();
+        if !runs.iter().any(known) {
+            continue;
+        }
+        let meaning = meaning.replace("BAND", &band);
         let _ = write!(out, "<tr><th>{name}</th><td class=\"text\">{meaning}</td>");
         for run in runs {
             let value = value(run.summary).map_or_else(|| "–".into(), |v| number(v, 5));
@@ -434,6 +524,7 @@ fn parts_tables(s: &Summary, of: &str) -> String {
         ("stored", e.stored_j, "J"),
         ("balance open by", 100.0 * e.imbalance, "%"),
     ];
+    let energies = if s.computed { &[][..] } else { &energies };
     let energies: Vec<_> =
         energies.iter().map(|(name, x, unit)| vec![(*name).to_owned(), number(*x, 4), (*unit).to_owned()]).collect();
     out += "<div class=\"columns\">\n";
@@ -446,8 +537,7 @@ fn parts_tables(s: &Summary, of: &str) -> String {
 fn inputs(run: &ReportRun<'_>, named: bool) -> String {
     let (s, header) = (run.summary, &run.trace.header);
     let who = if named { format!(" of {}", escaped(run.label)) } else { String::new() };
-    let id = if named { "" } else { " id=\"inputs\"" };
-    let mut out = format!("<section{id} class=\"block\"><h2>Inputs and versions{who}</h2>\n<div class=\"groups\">\n");
+    let mut out = String::new();
     let mut group = |title: &str, rows: &[(String, String)]| {
         let rows: String = (rows.iter().filter(|(_, value)| !value.is_empty()))
             .map(|(key, value)| format!("<dt>{}</dt><dd>{}</dd>", escaped(key), escaped(value)))
@@ -461,19 +551,20 @@ fn inputs(run: &ReportRun<'_>, named: bool) -> String {
     }
     let text = |x: Option<f64>| x.map_or_else(String::new, |x| number(x, 6));
     let word = |x: &Option<String>| x.clone().unwrap_or_default();
+    let count = |n: u64| if s.computed { String::new() } else { n.to_string() };
     let step = &s.stepper;
     let rows = [
         ("name", step.name.clone()),
-        ("step_s", number(step.h_s, 6)),
+        ("step_s", if step.h_s > 0.0 { number(step.h_s, 6) } else { String::new() }),
         ("rho_inf", text(step.rho_inf)),
         ("dispersion_correction", step.dispersion_correction.map_or_else(String::new, |on| on.to_string())),
         ("form", word(&step.form)),
         ("preset", word(&step.preset)),
         ("rtol", text(step.rtol)),
         ("method", word(&step.method)),
-        ("steps", step.steps.to_string()),
-        ("evaluations", step.evaluations.to_string()),
-        ("factorisations", step.factorisations.to_string()),
+        ("steps", count(step.steps)),
+        ("evaluations", count(step.evaluations)),
+        ("factorisations", count(step.factorisations)),
     ];
     group("stepper", &rows.map(|(key, value)| (key.to_owned(), value)));
     // File names alone: the same run in another folder is the same page.
@@ -484,7 +575,12 @@ fn inputs(run: &ReportRun<'_>, named: bool) -> String {
         .filter_map(|path| std::path::Path::new(path).file_name().map(|name| name.to_string_lossy().into_owned()))
         .collect();
     group("files beside this page", &[("files".to_owned(), names.join(", "))]);
-    out + "</div></section>\n"
+    if out.is_empty() {
+        return out;
+    }
+    format!(
+        "<section class=\"block\"><h2>Inputs and versions{who}</h2>\n<div class=\"groups\">\n{out}</div></section>\n"
+    )
 }
 
 /// What depends on the machine and the day, in one place.
@@ -500,7 +596,11 @@ fn timings(runs: &[ReportRun<'_>]) -> String {
             1e3 * s.cpu_s_per_simulated_s
         ))
     };
-    let lines: Vec<String> = runs.iter().map(text).collect();
+    // Recordings hold no times of the machine.
+    let lines: Vec<String> = runs.iter().filter(|run| run.summary.wall_s > 0.0).map(text).collect();
+    if lines.is_empty() {
+        return String::new();
+    }
     format!("<p id=\"timings\" class=\"note\">{}</p>\n", lines.join("<br>"))
 }
 
@@ -508,7 +608,9 @@ fn timings(runs: &[ReportRun<'_>]) -> String {
 fn data(runs: &[ReportRun<'_>]) -> String {
     let list = |items: Vec<String>| format!("[{}]", items.join(","));
     let run = |run: &ReportRun<'_>| {
-        let events = run.trace.result.events.iter().map(|event| {
+        let still = lies_on_twin(run);
+        let events = run.trace.result.events.iter().filter(|event| !(still && event.kind == EventKind::Peak));
+        let events = events.map(|event| {
             let (kind, text) = (json_text(event.kind.word()), json_text(&event.text));
             format!("{{\"t\":{},\"kind\":{kind},\"text\":{text}}}", short(event.time_s, 7))
         });

@@ -22,9 +22,17 @@ use crate::summary::Summary;
 pub use again::{ReportFiles, ReportOptions, report};
 pub use html::{ReportRun, html};
 
+/// What a run is called where it is alone.
+fn title(summary: &Summary) -> String {
+    match summary.trajectory.as_str() {
+        "" => summary.robot.clone(),
+        trajectory => format!("{} on {trajectory}", summary.robot),
+    }
+}
+
 /// Writes report, figures and `summary.json` into the output folder.
 pub(crate) fn write(outputs: &Outputs, summary: &Summary, trace: &Trace) -> Result<(), Error> {
-    let label = format!("{} on {}", summary.robot, summary.trajectory);
+    let label = title(summary);
     write_page(outputs, summary, &html(&[ReportRun { label: &label, summary, trace }]))?;
     match outputs.figures {
         true => figures::write(&outputs.folder.join(FIGURES_FOLDER), summary, trace),
