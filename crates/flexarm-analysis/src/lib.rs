@@ -59,7 +59,7 @@ pub use hold::HoldMetrics;
 pub use linear_system::{
     LinearError, LinearSystem, Quantity, ResponsePeak, Spacing, frequency_grid, response_peaks, with_resonances,
 };
-pub use metrics::{MetricSettings, TcpMetrics, tcp_metrics};
+pub use metrics::{MetricSettings, TcpMetrics, tcp_metrics, tcp_metrics_on_path};
 pub use participation::{compliance_parts, effective_mass, mode_outputs, strain_energy_shares};
 pub use path_frame::{PathFrame, path_frames};
 pub use pose_error::tcp_error;

@@ -71,11 +71,33 @@ pub struct TcpMetrics {
 /// [`RecordError`] when the record is empty, its slices differ in length, a value is not finite, times or moves do not
 /// ascend, or the band is not positive.
 pub fn tcp_metrics(record: &ErrorRecord<'_>, settings: &MetricSettings) -> Result<TcpMetrics, RecordError> {
+    tcp_metrics_on_path(record, None, settings)
+}
+
+/// As [`tcp_metrics`], with the parts of the errors along the path axes (tangential, normal, binormal; m) where they are
+/// known better than from positions, one per sample.
+///
+/// # Errors
+/// As [`tcp_metrics`], of the field `path_errors` too.
+pub fn tcp_metrics_on_path(
+    record: &ErrorRecord<'_>,
+    path_errors: Option<&[[f64; 3]]>,
+    settings: &MetricSettings,
+) -> Result<TcpMetrics, RecordError> {
     let band = settings.settling_band_m;
     if !(band > 0.0 && band.is_finite()) {
         return Err(RecordError::BadBand { found: band });
     }
     record.check()?;
+    if let Some(path_errors) = path_errors {
+        let (found, expected) = (path_errors.len(), record.times.len());
+        if found != expected {
+            return Err(RecordError::Length { what: "path_errors", found, expected });
+        }
+        if let Some(index) = path_errors.iter().position(|row| row.iter().any(|value| !value.is_finite())) {
+            return Err(RecordError::NotFinite { what: "path_errors", index });
+        }
+    }
 
     let translation = |e: &[f64; 6]| Vector3::new(e[0], e[1], e[2]).norm();
     let rotation = |e: &[f64; 6]| Vector3::new(e[3], e[4], e[5]).norm();
@@ -85,8 +107,13 @@ pub fn tcp_metrics(record: &ErrorRecord<'_>, settings: &MetricSettings) -> Resul
     let (_, peak_rad) = peak(record.times, &angles);
 
     let frames = path_frames(record.times, record.rigid_positions);
-    let [tangential_peak_m, normal_peak_m, binormal_peak_m, lateral_peak_m] = path_peaks(record, &frames);
-    let [path_accuracy_m, path_rms_m] = path_accuracy(record, &frames);
+    let from_positions = || {
+        let pairs = record.errors.iter().zip(&frames);
+        pairs.map(|(e, frame)| frame.components(&Vector3::new(e[0], e[1], e[2]))).collect()
+    };
+    let path_errors: Vec<[f64; 3]> = path_errors.map_or_else(from_positions, <[_]>::to_vec);
+    let [tangential_peak_m, normal_peak_m, binormal_peak_m, lateral_peak_m] = path_peaks(&path_errors);
+    let [path_accuracy_m, path_rms_m] = path_accuracy(record, &path_errors);
     let holds = holds(record, &frames, band);
     let ends_in_hold = |hold: &&HoldMetrics| record.moves.last().is_some_and(|last| hold.start_s >= last.1);
     Ok(TcpMetrics {
@@ -127,10 +154,9 @@ fn rms(times: &[f64], values: &[f64]) -> f64 {
 }
 
 /// Peaks along the tangential, normal and binormal axis, and across the path.
-fn path_peaks(record: &ErrorRecord<'_>, frames: &[PathFrame]) -> [f64; 4] {
+fn path_peaks(path_errors: &[[f64; 3]]) -> [f64; 4] {
     let mut peaks: [f64; 4] = [0.0; 4];
-    for (error, frame) in record.errors.iter().zip(frames) {
-        let [t, n, b] = frame.components(&Vector3::new(error[0], error[1], error[2]));
+    for &[t, n, b] in path_errors {
         for (peak, value) in peaks.iter_mut().zip([t, n, b, n.hypot(b)]) {
             *peak = peak.max(value.abs());
         }
@@ -139,15 +165,13 @@ fn path_peaks(record: &ErrorRecord<'_>, frames: &[PathFrame]) -> [f64; 4] {
 }
 
 /// Largest and root-mean-square distance from the path in the samples of the moves.
-fn path_accuracy(record: &ErrorRecord<'_>, frames: &[PathFrame]) -> [f64; 2] {
+fn path_accuracy(record: &ErrorRecord<'_>, path_errors: &[[f64; 3]]) -> [f64; 2] {
     let (mut largest, mut squares, mut count) = (0.0_f64, 0.0, 0_usize);
-    for (k, t) in record.times.iter().enumerate() {
+    for (t, [_, n, b]) in record.times.iter().zip(path_errors) {
         if !record.moves.iter().any(|(start, end)| (*start..=*end).contains(t)) {
             continue;
         }
-        let error = record.errors[k];
-        let [_, n, b] = frames[k].components(&Vector3::new(error[0], error[1], error[2]));
-        largest = largest.max(n.hypot(b));
+        largest = largest.max(n.hypot(*b));
         squares += n * n + b * b;
         count += 1;
     }

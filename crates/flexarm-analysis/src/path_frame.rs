@@ -1,7 +1,8 @@
 //! Path axes: along the path of the rigid tool, towards its centre of curvature, and across both.
 //!
 //! Where the path does not define them (at rest, on a straight line), axes are kept from the sample before, so that
-//! they vary smoothly and an error has one sign on a straight line. Before any motion they are the world axes.
+//! they vary smoothly and an error has one sign on a straight line. Up to the first bend they are those with which it
+//! begins: a motion from rest is slow at first, and its curvature does not show.
 
 use nalgebra::Vector3;
 
@@ -31,6 +32,23 @@ impl PathFrame {
         Self { tangential: Vector3::x(), normal: Vector3::y(), binormal: Vector3::z() }
     }
 
+    /// The axes before the first sample, from the velocities (m/s) and accelerations (m/s²) of a whole motion in order:
+    /// tangential along its beginning, normal towards the inside of its first bend. Without a bend the normal is any; without
+    /// motion these are the world axes.
+    pub fn before(rates: impl IntoIterator<Item = [Vector3<f64>; 2]>) -> Self {
+        let mut first: Option<[Vector3<f64>; 2]> = None;
+        for [velocity, acceleration] in rates {
+            if velocity.norm() <= REST_SPEED {
+                continue;
+            }
+            let [v, a] = *first.get_or_insert([velocity, acceleration]);
+            if lateral(&velocity, &acceleration).is_some() {
+                return Self::world().next(&velocity, &acceleration).next(&v, &a);
+            }
+        }
+        first.map_or_else(Self::world, |[v, a]| Self::world().next(&v, &a))
+    }
+
     /// The axes of the next sample, from the velocity (m/s) and acceleration (m/s²) of the rigid tool in the world.
     ///
     /// * At rest (slower than 1e-5 m/s): these axes again.
@@ -45,15 +63,10 @@ impl PathFrame {
         }
         let tangential = velocity / speed;
         let across = |v: &Vector3<f64>| v - tangential * tangential.dot(v);
-        let lateral = across(acceleration);
-        let noise =
-            STRAIGHT_ACCELERATION.max(STRAIGHT_FRACTION * acceleration.norm()).max(STRAIGHT_CURVATURE * speed * speed);
-        let sideways = if lateral.norm() > noise {
-            lateral
-        } else {
+        let sideways = lateral(velocity, acceleration).unwrap_or_else(|| {
             let kept = across(&self.normal);
             if kept.norm() > 0.1 { kept } else { across(&self.binormal) }
-        };
+        });
         let normal = sideways.normalize();
         Self { tangential, normal, binormal: tangential.cross(&normal) }
     }
@@ -64,32 +77,35 @@ impl PathFrame {
     }
 }
 
+/// Acceleration across the velocity, unless it is so small that the path is straight.
+fn lateral(velocity: &Vector3<f64>, acceleration: &Vector3<f64>) -> Option<Vector3<f64>> {
+    let speed = velocity.norm();
+    let tangential = velocity / speed;
+    let lateral = acceleration - tangential * tangential.dot(acceleration);
+    let noise =
+        STRAIGHT_ACCELERATION.max(STRAIGHT_FRACTION * acceleration.norm()).max(STRAIGHT_CURVATURE * speed * speed);
+    (lateral.norm() > noise).then_some(lateral)
+}
+
 /// Path axes at every sample of the rigid tool's positions.
 ///
 /// Velocity and acceleration are those of the parabola through a sample and its two neighbours (exact for constant
-/// acceleration, whatever the steps); the first and last sample use the parabola next to them. Before the
-/// first motion the axes are those with which it begins.
+/// acceleration, whatever the steps); the first and last sample use the parabola next to them. The axes begin as
+/// [`PathFrame::before`] says.
 ///
 /// * `times`: s, strictly increasing. `positions`: m, in the world, one per time.
 pub fn path_frames(times: &[f64], positions: &[[f64; 3]]) -> Vec<PathFrame> {
     let n = times.len().min(positions.len());
-    let mut frames = Vec::with_capacity(n);
-    let mut frame = PathFrame::world();
-    let mut started = None;
-    for i in 0..n {
-        if n >= 3 {
-            let [velocity, acceleration] = parabola_rates(times, positions, i.clamp(1, n - 2), times[i]);
-            frame = frame.next(&velocity, &acceleration);
-            started = started.or((velocity.norm() > REST_SPEED).then_some(i));
-        }
-        frames.push(frame);
+    if n < 3 {
+        return vec![PathFrame::world(); n];
     }
-    // At rest before the first motion: the axes with which it begins.
-    if let Some(start) = started.filter(|start| *start > 0) {
-        let first = frames[start];
-        frames[..start].fill(first);
-    }
-    frames
+    let rates = |i: usize| parabola_rates(times, positions, i.clamp(1, n - 2), times[i]);
+    let mut frame = PathFrame::before((0..n).map(rates));
+    let next = |[velocity, acceleration]: [Vector3<f64>; 2]| {
+        frame = frame.next(&velocity, &acceleration);
+        frame
+    };
+    (0..n).map(rates).map(next).collect()
 }
 
 /// Velocity at `t` and acceleration of the parabola through samples `i - 1`, `i` and `i + 1`.
@@ -136,6 +152,24 @@ mod tests {
             assert!((frame.normal - frames[110].normal).norm() < 1e-9); // measured 0
             let handed = frame.tangential.cross(&frame.normal) - frame.binormal;
             assert!(handed.norm() < 1e-14);
+        }
+    }
+
+    /// Truth: a circle lies in its plane from its first sample on, however slowly it begins.
+    #[test]
+    fn a_circle_from_rest_has_its_own_plane_from_the_start() {
+        let tilt = nalgebra::Rotation3::from_euler_angles(0.4, -0.7, 0.2);
+        for seconds in [2.0, 60.0] {
+            let times: Vec<f64> = (0..2000).map(|k| seconds * f64::from(k) / 1999.0).collect();
+            let angle = |t: f64| {
+                let u = t / seconds;
+                2.0 * u.powi(3) * (10.0 - 15.0 * u + 6.0 * u * u)
+            };
+            let place = |t: f64| tilt * Vector3::new(0.4 * angle(t).cos(), 0.4 * angle(t).sin(), 0.0);
+            let positions: Vec<[f64; 3]> = times.iter().map(|&t| place(t).into()).collect();
+            for frame in path_frames(&times, &positions) {
+                assert!((frame.binormal - tilt * Vector3::z()).norm() < 1e-3); // rounding of small accelerations
+            }
         }
     }
 

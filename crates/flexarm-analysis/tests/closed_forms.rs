@@ -3,7 +3,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use flexarm_analysis::{ErrorRecord, MetricSettings, RecordError, TcpMetrics, tcp_metrics};
+use flexarm_analysis::{ErrorRecord, MetricSettings, RecordError, TcpMetrics, tcp_metrics, tcp_metrics_on_path};
 use proptest::prelude::*;
 
 /// A move from 0 to 1 s along x by 0.3 m, then a hold of 4 s with a damped oscillation around a static error.
@@ -254,4 +254,49 @@ fn path_accuracy_is_the_distance_from_the_path_in_motion() {
     assert!((metrics.lateral_peak_m - 9e-4).abs() < 1e-15);
     let still = tcp_metrics(&ErrorRecord { moves: &[], ..record }, &MetricSettings::default()).unwrap();
     assert_eq!((still.path_accuracy_m, still.path_rms_m), (0.0, 0.0));
+}
+
+/// A circle in the horizontal plane, from rest to rest, with a sag that stays the same.
+fn circle_with_sag(seconds: f64) -> (Vec<f64>, Vec<[f64; 6]>, Vec<[f64; 3]>) {
+    let times: Vec<f64> = (0..=1000).map(|k| seconds * f64::from(k) / 1000.0).collect();
+    let place = |t: &f64| {
+        let u = t / seconds;
+        let angle = 1.5 * u.powi(3) * (10.0 - 15.0 * u + 6.0 * u * u);
+        [0.8 * angle.cos(), 0.8 * angle.sin(), 0.3]
+    };
+    let (errors, rigid) = (vec![[0.0, 0.0, -2e-4, 0.0, 0.0, 0.0]; times.len()], times.iter().map(place).collect());
+    (times, errors, rigid)
+}
+
+/// Truth: the sag is along the axis of the circle, at its slow beginning too.
+#[test]
+fn a_sag_out_of_the_plane_of_a_circle_is_not_normal_to_it() {
+    for seconds in [1.0, 60.0] {
+        let (times, errors, rigid) = circle_with_sag(seconds);
+        let record =
+            ErrorRecord { times: &times, errors: &errors, rigid_positions: &rigid, quasi_static: None, moves: &[] };
+        let metrics = tcp_metrics(&record, &MetricSettings::default()).unwrap();
+        assert!(metrics.normal_peak_m < 1e-12 && metrics.tangential_peak_m < 1e-12, "{metrics:?}");
+        assert!((metrics.binormal_peak_m - 2e-4).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn given_parts_along_the_path_take_the_place_of_computed_ones() {
+    let (times, errors, rigid) = circle_with_sag(1.0);
+    let moves = [(0.0, 1.0)];
+    let record =
+        ErrorRecord { times: &times, errors: &errors, rigid_positions: &rigid, quasi_static: None, moves: &moves };
+    let mut parts = vec![[1e-4, 0.0, 0.0]; times.len()];
+    parts[500] = [-2e-4, 3e-4, -4e-4];
+    let settings = MetricSettings::default();
+    let metrics = tcp_metrics_on_path(&record, Some(&parts), &settings).unwrap();
+    let peaks = [metrics.tangential_peak_m, metrics.normal_peak_m, metrics.binormal_peak_m];
+    assert_eq!(peaks, [2e-4, 3e-4, 4e-4]);
+    assert!((metrics.path_accuracy_m - 5e-4).abs() < 1e-15 && (metrics.lateral_peak_m - 5e-4).abs() < 1e-15);
+    let fault = tcp_metrics_on_path(&record, Some(&parts[1..]), &settings).unwrap_err();
+    assert_eq!(fault, RecordError::Length { what: "path_errors", found: 1000, expected: 1001 });
+    parts[3][1] = f64::NAN;
+    let fault = tcp_metrics_on_path(&record, Some(&parts), &settings).unwrap_err();
+    assert_eq!(fault, RecordError::NotFinite { what: "path_errors", index: 3 });
 }

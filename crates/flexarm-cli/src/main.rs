@@ -196,14 +196,11 @@ fn simulate(cli: &Cli, args: &RunArgs, with_twin: bool) -> Result<ExitCode, Erro
         Outputs { overwrite: args.force, figures: args.figures, parquet: args.parquet, ..outputs }
     });
 
-    let stop = Arc::new(AtomicBool::new(false));
-    let flag = stop.clone();
-    // A second handler cannot be set in one process; the first one then serves.
-    let _ = ctrlc::set_handler(move || flag.store(true, Ordering::SeqCst));
+    let mut stop = stop_on_ctrl_c();
     let mut bar = Bar::new(cli);
     let mut progress = |t: f64, total: f64| {
         bar.show(t, total);
-        if stop.load(Ordering::SeqCst) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        stop()
     };
     let result = match variants.len() {
         1 => flexarm::simulate(robot, motion, options, outputs.as_ref(), &mut progress),
@@ -223,6 +220,15 @@ fn simulate(cli: &Cli, args: &RunArgs, with_twin: bool) -> Result<ExitCode, Erro
     }
     answer(cli, || to_json(&summary), || summary_table::summary(&summary, summary_table::terminal_width()));
     Ok(ExitCode::SUCCESS)
+}
+
+/// Says whether Ctrl-C was pressed since this was called.
+fn stop_on_ctrl_c() -> impl FnMut() -> ControlFlow<()> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let flag = stop.clone();
+    // A second handler cannot be set in one process; the first one then serves.
+    let _ = ctrlc::set_handler(move || flag.store(true, Ordering::SeqCst));
+    move || if stop.load(Ordering::SeqCst) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
 }
 
 fn inspect(cli: &Cli, args: &InspectArgs) -> Result<ExitCode, Error> {

@@ -37,6 +37,9 @@ pub(crate) fn parts<'a>(main: &'a RunArgs, line: &[OsString]) -> Result<Vec<Part
             if SHARED.contains(&key) {
                 return Err(usage(format!("{key} holds for the whole study and cannot differ between its runs")));
             }
+            if ["help", "version"].contains(&key) {
+                return Err(usage(format!("{key} is no option of a run")));
+            }
             if key == "name" {
                 label = Some(value.to_owned());
                 continue;
@@ -64,6 +67,11 @@ fn without_with(line: &[OsString]) -> Vec<OsString> {
     let mut words = line.iter();
     while let Some(word) = words.next() {
         match word.to_str() {
+            // What follows are names of files.
+            Some("--") => {
+                kept.push(word.clone());
+                kept.extend(words.by_ref().cloned());
+            }
             Some("--with") => {
                 words.next();
             }
@@ -76,7 +84,9 @@ fn without_with(line: &[OsString]) -> Vec<OsString> {
 
 /// The arguments of the line with some of them replaced.
 fn changed(line: &[OsString], words: &[(String, String, bool)]) -> Result<RunArgs, String> {
-    let mut line = line.to_vec();
+    // After a `--` there are no options.
+    let (options, names) = line.split_at(line.iter().position(|word| word == "--").unwrap_or(line.len()));
+    let mut line = options.to_vec();
     let (mut robot, mut trajectory) = (None, None);
     for (key, value, has_value) in words {
         match key.as_str() {
@@ -86,6 +96,7 @@ fn changed(line: &[OsString], words: &[(String, String, bool)]) -> Result<RunArg
             _ => line.push(format!("--{key}").into()),
         }
     }
+    line.extend_from_slice(names);
     let command = Cli::command().args_override_self(true).mut_subcommand("compare", |c| c.args_override_self(true));
     let matches = command.try_get_matches_from(line).map_err(|error| {
         // The first lines say what is wrong; usage and hints are those of the whole program.

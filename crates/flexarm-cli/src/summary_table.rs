@@ -3,10 +3,8 @@
 //! Text is styled with ANSI codes; where it does not go to a terminal they are taken out again (`main::answer`).
 
 use anstyle::{AnsiColor, Style};
-use comfy_table::{CellAlignment, Table};
+use comfy_table::Table;
 use flexarm::{Figure, STUDY_NOTE, Summary, Weight, figure_groups, study_rows};
-
-use crate::print;
 
 /// Columns where the terminal does not say how many it has.
 const USUAL_WIDTH: usize = 80;
@@ -70,7 +68,7 @@ pub(crate) fn summary(summary: &Summary, width: usize) -> String {
     if summary.tcp.is_some() {
         out += &plot(summary, width.min(WIDEST_PLOT));
     }
-    out += &study(summary);
+    out += &study(summary, width);
     let f = &summary.files;
     let files = [
         ("report", &f.report),
@@ -95,19 +93,83 @@ pub(crate) fn summary(summary: &Summary, width: usize) -> String {
 }
 
 /// The runs of a study side by side.
-fn study(summary: &Summary) -> String {
+fn study(summary: &Summary, width: usize) -> String {
     let rows = study_rows(summary);
-    let Some((header, rows)) = rows.split_first() else { return String::new() };
-    let mut table = print::table(&header.iter().map(String::as_str).collect::<Vec<_>>());
+    if rows.is_empty() {
+        return String::new();
+    }
+    let mut out = format!("\n{HEADING}runs{HEADING:#}\n");
+    let table = aligned(&rows);
+    out += &if fits(&table, width) { table } else { turned(&rows, width) };
+    for line in wrapped(STUDY_NOTE, width) {
+        out += &format!("{FAINT}{line}{FAINT:#}\n");
+    }
+    out
+}
+
+fn fits(table: &str, width: usize) -> bool {
+    table.lines().all(|line| columns(line) <= width)
+}
+
+/// Cells as they are, names to the left and numbers to the right.
+fn aligned(rows: &[Vec<String>]) -> String {
+    let count = rows.iter().map(Vec::len).max().unwrap_or(0);
+    let widest = |k: usize| rows.iter().filter_map(|row| row.get(k)).map(|cell| columns(cell)).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..count).map(widest).collect();
+    let mut out = String::new();
     for row in rows {
-        table.add_row(row);
-    }
-    for column in 1..header.len() {
-        if let Some(column) = table.column_mut(column) {
-            column.set_cell_alignment(CellAlignment::Right);
+        let mut line = String::new();
+        for (k, (cell, width)) in row.iter().zip(&widths).enumerate() {
+            let blanks = " ".repeat(width - columns(cell));
+            line += &if k == 0 { format!("  {cell}{blanks}") } else { format!("  {blanks}{cell}") };
         }
+        out += line.trim_end();
+        out.push('\n');
     }
-    format!("\n{HEADING}runs{HEADING:#}\n{}{FAINT}{STUDY_NOTE}{FAINT:#}\n", print::lines(&table))
+    out
+}
+
+/// A row for every figure and a column for every run, in as many tables as they need. Names too long for a column are
+/// listed below and numbered.
+fn turned(rows: &[Vec<String>], width: usize) -> String {
+    let names: Vec<&str> = rows[1..].iter().map(|row| row[0].as_str()).collect();
+    let part = |runs: &[usize], numbered: bool| {
+        let head = |run: &usize| if numbered { format!("({})", run + 1) } else { names[*run].to_owned() };
+        let row = |figure: usize| {
+            let first = std::iter::once(rows[0][figure].clone());
+            let others = runs.iter().map(|run| if figure == 0 { head(run) } else { rows[run + 1][figure].clone() });
+            first.chain(others).collect()
+        };
+        aligned(&(0..rows[0].len()).map(row).collect::<Vec<Vec<String>>>())
+    };
+    let all: Vec<usize> = (0..names.len()).collect();
+    let whole = part(&all, false);
+    if fits(&whole, width) {
+        return whole;
+    }
+    let mut out = String::new();
+    let mut rest = &all[..];
+    while !rest.is_empty() {
+        let most = (1..=rest.len()).rev().find(|count| fits(&part(&rest[..*count], true), width)).unwrap_or(1);
+        let (now, later) = rest.split_at(most);
+        out += &part(now, true);
+        out.push('\n');
+        rest = later;
+    }
+    for (k, name) in names.iter().enumerate() {
+        let number = format!("  ({})  ", k + 1);
+        let room = width - columns(&number);
+        out += &format!("{number}{}\n", shortened(name, room));
+    }
+    out
+}
+
+/// The text in at most so many columns.
+fn shortened(text: &str, room: usize) -> String {
+    if columns(text) <= room {
+        return text.to_owned();
+    }
+    text.chars().take(room.saturating_sub(1)).chain(['…']).collect()
 }
 
 /// Width of a text on the terminal; names of robots are letters, each of one column.
@@ -190,7 +252,7 @@ fn dot(x: usize, y: usize) -> u8 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use flexarm::{Files, LinkFigures, StepperFigures, TcpFigures};
+    use flexarm::{DifferenceFigures, Files, LinkFigures, StepperFigures, TcpFigures};
 
     fn example() -> Summary {
         let tcp = TcpFigures {
@@ -270,14 +332,55 @@ files
         assert_eq!(plain(&example(), 80), expected);
     }
 
+    /// A study of so many runs.
+    fn study_of(runs: usize) -> Summary {
+        let run = |label: String| {
+            let difference =
+                DifferenceFigures { peak_m: 2.3456e-3, of_peak_error: Some(123.456), ..Default::default() };
+            Summary { label: Some(label), difference: Some(difference), frequencies_hz: vec![15.72], ..example() }
+        };
+        let labels =
+            (1..runs).map(|k| format!("links=modal,modes={k},stepper=generalized-alpha,step=5e-4,rho-inf=0.8"));
+        Summary { with: labels.map(run).collect(), label: Some("as given".into()), ..example() }
+    }
+
     #[test]
     fn no_line_is_wider_than_the_terminal() {
-        for width in [40, 60, 79, 80, 120] {
-            let text = plain(&example(), width);
-            let widest = text.lines().map(columns).max().unwrap_or(0);
-            assert!(widest <= width, "{widest} of {width} columns:\n{text}");
-            assert!(text.lines().all(|line| line == line.trim_end()), "blanks at the end of a line:\n{text}");
+        for summary in [example(), study_of(2), study_of(3), study_of(9)] {
+            for width in [40, 60, 79, 80, 120] {
+                let text = plain(&summary, width);
+                let widest = text.lines().map(columns).max().unwrap_or(0);
+                assert!(widest <= width, "{widest} of {width} columns:\n{text}");
+                assert!(text.lines().all(|line| line == line.trim_end()), "blanks at the end of a line:\n{text}");
+            }
         }
+    }
+
+    #[test]
+    fn numbers_of_a_study_stay_whole() {
+        for runs in [2, 3, 9] {
+            for width in [40, 60, 79, 80, 120, 200] {
+                let text = plain(&study_of(runs), width);
+                let count = |number: &str| text.split_whitespace().filter(|word| *word == number).count();
+                assert_eq!(count("2.3456"), runs - 1, "{width} columns:\n{text}");
+                assert_eq!(count("12345.600"), runs - 1, "{width} columns:\n{text}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_study_too_wide_for_the_terminal_has_a_row_for_each_figure() {
+        let mut summary = study_of(2);
+        summary.with[0].label = Some("links=modal".into());
+        let text = plain(&summary, 60);
+        let expected = "\
+runs
+  run           as given  links=modal
+  peak [mm]       1.4159       1.4159
+  at [s]           0.600        0.600
+  RMS [mm]        1.1000       1.1000
+";
+        assert!(text.contains(expected), "{text}");
     }
 
     #[test]

@@ -56,11 +56,13 @@ pub(crate) fn run(cli: &Cli, args: &ViewArgs) -> Result<ExitCode, Error> {
 fn recording(given: &Path) -> Result<PathBuf, Error> {
     let fault = |what: &str| Err(Error::File { path: given.to_owned(), what: what.to_owned() });
     if given.is_dir() {
-        let found =
-            ["study.rrd", "run.rrd", "run.mcap"].map(|name| given.join(name)).into_iter().find(|path| path.is_file());
+        let names = ["study.rrd", "run.rrd", "run.mcap", "report.html"];
+        let found = names.map(|name| given.join(name)).into_iter().find(|path| path.is_file());
         return match found {
             Some(path) => Ok(path),
-            None => fault("the folder has no run.rrd and no run.mcap; `flexarm compare -o FOLDER` writes them"),
+            None => {
+                fault("the folder has no run.rrd, run.mcap or report.html; `flexarm compare -o FOLDER` writes them")
+            }
         };
     }
     if !given.is_file() {

@@ -55,6 +55,24 @@ fn a_table_is_the_same_bytes_through_every_format() {
     }
 }
 
+#[test]
+fn names_beside_the_output_belong_to_others() {
+    let place = recorded();
+    let table = place.read("result/run.csv");
+    place.write("x.csv.new", &table);
+    place.json(&["convert", "x.csv.new", "x.csv", "--from", "csv"]);
+    assert!(place.read("x.csv.new") == table && place.read("x.csv") == table);
+    place.write("y.csv.new", "mine");
+    convert(&place, "x.csv", "y.csv");
+    assert_eq!(place.text("y.csv.new"), "mine");
+    // Nothing stays behind, whether it went well or not.
+    place.write("broken.csv", "time\n");
+    assert_ne!(place.flexarm(&["convert", "broken.csv", "z.csv"]).code, 0);
+    let hidden = |path: &std::path::PathBuf| path.to_string_lossy().starts_with('.');
+    assert_eq!(place.snapshot().keys().filter(|path| hidden(path)).count(), 0);
+    assert!(!place.path("z.csv").exists());
+}
+
 #[cfg(feature = "parquet")]
 #[test]
 fn parquet_is_written_by_a_run_that_is_asked_for_it() {

@@ -85,7 +85,48 @@ fn bad_runs_of_a_study_are_named_before_anything_runs() {
     refused("robot=nowhere.toml", &["nowhere.toml", "robot=nowhere.toml"]);
     refused("trajectory=nowhere.csv,name=lost", &["nowhere.csv", "lost"]);
     refused("step=-1", &["step=-1", "positive"]);
+    refused("help", &["help", "no option"]);
+    refused("version", &["version", "no option"]);
+    for name in ["run.csv", "Summary.json", "figures", "study.rrd"] {
+        refused(&format!("links=modal,name={name}"), &[name, "name="]);
+    }
+    refused(&format!("links=modal,name={}", "long".repeat(26)), &["104 letters", "100", "name="]);
+    refused("stepper=rk4,step=1e-2", &["unstable", "stepper=rk4"]);
     refused("links=modal,name=links=as filed", &["links=as filed", "name="]);
     place
         .refused(&["run", "robot.toml", "swing.toml", "-o", "result", "--with", "links=modal"], &["--with", "compare"]);
+}
+
+/// Truth: the same options before the names of the files.
+#[test]
+fn options_of_other_runs_stand_before_two_dashes() {
+    let place = Place::new();
+    let with = ["compare", "--json", "--no-files", "--with", "links=modal"];
+    let plain = place.flexarm(&[&with[..], &["robot.toml", "swing.toml"]].concat()).json();
+    let dashes = place.flexarm(&[&with[..], &["--", "robot.toml", "swing.toml"]].concat()).json();
+    assert_eq!((&plain["with"][0]["tcp"], &plain["label"]), (&dashes["with"][0]["tcp"], &dashes["label"]));
+    assert_eq!(dashes["with"][0]["label"], "links=modal");
+}
+
+#[test]
+fn force_leaves_no_recording_of_an_earlier_run_beside_the_new_ones() {
+    let place = Place::new();
+    place.json(&COMPARE);
+    for file in ["result/study.rrd", "result/run.parquet", "result/notes.txt", "result/figures/mine.svg"] {
+        place.write(file, "old");
+    }
+    place.json(&[&COMPARE[..], &["--force"]].concat());
+    for gone in ["result/study.rrd", "result/run.parquet"] {
+        assert!(!place.path(gone).exists(), "{gone}");
+    }
+    for kept in ["result/notes.txt", "result/figures/mine.svg"] {
+        assert_eq!(place.text(kept), "old");
+    }
+    for new in ["result/run.csv", "result/report.html", "result/summary.json"] {
+        assert!(place.read(new) != b"old");
+    }
+    // A study's recording alone is not overwritten either.
+    let other = Place::new();
+    other.write("result/study.rrd", "old");
+    other.refused(&COMPARE, &["study.rrd", "exists already"]);
 }

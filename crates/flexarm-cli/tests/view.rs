@@ -136,6 +136,9 @@ fn a_report_goes_to_the_browser_or_is_named() {
     assert_eq!(answer.code, 0);
     assert!(answer.out.contains("browser") && answer.out.contains("file:///"), "{}", answer.out);
     assert!(view(&place, &["report.html", "--json"]).json()["viewer"].is_null());
+    // A folder with nothing else shows its report.
+    place.write("pages/report.html", "content");
+    assert_eq!(view(&place, &["pages", "--json"]).json()["file"], "pages/report.html");
 
     let opener = "#!/bin/sh\necho \"$*\" > \"$NOTE\"\n";
     if cfg!(target_os = "linux") {

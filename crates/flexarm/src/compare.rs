@@ -5,7 +5,8 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use flexarm_analysis::{
-    ContributionPeaks, ErrorRecord, MetricSettings, PathFrame, TcpMetrics, engineering_strain, tcp_error, tcp_metrics,
+    ContributionPeaks, ErrorRecord, MetricSettings, PathFrame, TcpMetrics, engineering_strain, tcp_error,
+    tcp_metrics_on_path,
 };
 use flexarm_kinematics::{
     Data, Frame, JointMotion, Pose, State, forward_kinematics, kinetic_energy, potential_energy, rotation_vector,
@@ -34,6 +35,9 @@ use crate::twin::RigidTwin;
 pub(crate) const ROTATION_LIMIT: f64 = 0.05;
 /// Largest engineering strain of a flexible link before a warning.
 pub(crate) const STRAIN_LIMIT: f64 = 1e-3;
+
+/// What servos leave of the way to go, among the contributors to the TCP error.
+const FOLLOWING_ERROR: &str = "following error";
 
 /// Largest gap in the energy balance before a warning.
 const IMBALANCE_LIMIT: f64 = 0.02;
@@ -92,14 +96,12 @@ pub(crate) fn run_traced(
 ) -> Result<(Summary, Trace), Error> {
     let started = Instant::now();
     let cpu = cpu_time::ProcessTime::now();
-    let Checked { flexible, arm, load_warnings } = checked(robot, motion, options)?;
-    let failed = |source: StepError| Error::Step { source, partial: false };
-    let stepper = new_stepper(options.stepper, arm.clone(), options.step_s, options.start).map_err(failed)?;
+    let Checked { flexible, arm, stepper, load_warnings } = checked(robot, motion, options)?;
 
     let own = || Expected::of(&arm, &tool_frame(&arm), motion.trajectory.duration(), options.start);
     let expected = together.expected.unwrap_or_else(own);
     let mut run = Run::new(robot, motion, options, &flexible, arm, stepper);
-    let mut files = recorders(outputs)?;
+    let mut files = recorders(outputs, !together.recorders.is_empty())?;
     files.set.extend(together.recorders);
     let mut head = header(robot, motion, options, &run.arm, flexible.links_model());
     head.bends.clone_from(&run.bends);
@@ -134,6 +136,7 @@ pub(crate) fn run_traced(
 pub(crate) struct Checked {
     flexible: FlexibleRobot,
     arm: FlexibleArm,
+    stepper: Box<dyn Stepper>,
     load_warnings: Vec<String>,
 }
 
@@ -164,7 +167,8 @@ pub(crate) fn checked(robot: &Robot, motion: &Motion, options: &RunOptions) -> R
         arm.inertia_changes = disturbances.changes;
         arm = arm.with_timed_loads(disturbances.loads).map_err(failed)?;
     }
-    Ok(Checked { flexible, arm, load_warnings })
+    let stepper = new_stepper(options.stepper, arm.clone(), options.step_s, options.start).map_err(failed)?;
+    Ok(Checked { flexible, arm, stepper, load_warnings })
 }
 
 /// What recordings are told at the end. Timings stay out of it: recordings of the same run are the same bytes.
@@ -265,7 +269,7 @@ struct Run<'a> {
     link_frames: Vec<Frame>,
     bends: Vec<BendInfo>,
     stations: Vec<Frame>,
-    /// Flexible links and elastic drives: place among all displacements, name.
+    /// Flexible links, elastic drives and what servos leave: place among all displacements, name.
     contributors: Vec<(usize, String)>,
     trace: Trace,
     /// When the force of a drive first passed its limit.
@@ -277,6 +281,8 @@ struct Run<'a> {
     sample: Sample,
     times: Vec<f64>,
     errors: Vec<[f64; 6]>,
+    /// Translation along the path axes.
+    path_errors: Vec<[f64; 3]>,
     positions: Vec<[f64; 3]>,
     contributions: ContributionPeaks,
     /// Largest engineering strain and rotation of the far end, per flexible link.
@@ -312,16 +318,17 @@ impl<'a> Run<'a> {
         let (bends, stations) = stations(&flexible.bends, &arm.model, &ordered_links(robot));
         let drives = robot.drives.iter().enumerate().filter(|(k, _)| flexible.owners.contains(&Owner::Drive(*k)));
         let contributors = flexible.spans.iter().enumerate().map(|(k, span)| (k, span.link.clone()));
-        let contributors = contributors.chain(drives.map(|(k, drive)| (n_links + k, drive.joint.clone()))).collect();
+        let contributors = contributors.chain(drives.map(|(k, drive)| (n_links + k, drive.joint.clone())));
+        let follows = !arm.torque_driven.is_empty();
+        let following = follows.then(|| (n_links + n_drives, FOLLOWING_ERROR.to_owned()));
+        let contributors = contributors.chain(following).collect();
         let mut twin = RigidTwin::new(&arm);
         // Before the first motion the path axes are those of its beginning.
         let duration = motion.trajectory.duration();
-        let path = (0..=1000)
-            .find_map(|k| {
-                twin.update(&arm, &tcp, duration * f64::from(k) * 1e-3);
-                (twin.velocity.norm() > 1e-6).then(|| PathFrame::world().next(&twin.velocity, &twin.acceleration))
-            })
-            .unwrap_or_else(PathFrame::world);
+        let path = PathFrame::before((0..=1000).map(|k| {
+            twin.update(&arm, &tcp, duration * f64::from(k) * 1e-3);
+            [twin.velocity, twin.acceleration]
+        }));
         let last = (motion.trajectory.duration() / options.step_s - 1e-9).ceil().max(0.0) as u64;
         Self {
             motion,
@@ -341,8 +348,9 @@ impl<'a> Run<'a> {
             sample: Sample::default(),
             times: Vec::new(),
             errors: Vec::new(),
+            path_errors: Vec::new(),
             positions: Vec::new(),
-            contributions: ContributionPeaks::new(n_links + n_drives),
+            contributions: ContributionPeaks::new(n_links + n_drives + 1),
             strains: vec![0.0; n_links],
             rotations: vec![0.0; n_links],
             give: vec![0.0; n_drives],
@@ -406,6 +414,7 @@ impl<'a> Run<'a> {
         let path_error = [along, normal, binormal, r_along, r_normal, r_binormal];
         self.times.push(t);
         self.errors.push(error);
+        self.path_errors.push([along, normal, binormal]);
         self.positions.push(X_rigid.translation.vector.into());
         for (k, drive) in self.seen.drive.iter().enumerate() {
             self.peak_drive[k] = self.peak_drive[k].max(drive.abs());
@@ -468,7 +477,7 @@ impl<'a> Run<'a> {
     /// Deflections and loads of the elements, what they do to the tool, how far the links are strained.
     fn look_at_elements(&mut self, t: f64) {
         let columns = self.flexible.spans.len();
-        let mut moved = vec![Vector6::zeros(); columns + self.give.len()];
+        let mut moved = vec![Vector6::zeros(); columns + self.give.len() + 1];
         self.sample.elastic.resize(self.arm.elements.len(), ElasticSample::default());
         for (k, element) in self.arm.elements.iter().enumerate() {
             let range = (element.coordinate, element.size);
@@ -490,6 +499,11 @@ impl<'a> Run<'a> {
                 (n, _) => (0..n.min(6)).for_each(|c| deflection[c] = e[c]),
             }
             self.sample.elastic[k] = ElasticSample { deflection, load };
+        }
+        // Motors under servos are not where the trajectory wants them.
+        let following = &mut moved[columns + self.give.len()];
+        for &k in &self.arm.torque_driven {
+            *following += self.twin.J.column(k) * (self.seen.q[k] - self.twin.state.q[k]);
         }
         let contributions = self.contributors.iter().map(|(k, _)| [0, 1, 2].map(|c| moved[*k][c]));
         self.sample.contributions.clear();
@@ -524,7 +538,7 @@ impl<'a> Run<'a> {
             moves: &moves,
         };
         // A run that stopped at once has nothing to measure.
-        let metrics = tcp_metrics(&record, &settings).ok();
+        let metrics = tcp_metrics_on_path(&record, Some(&self.path_errors), &settings).ok();
         let peaks = self.contributions.peaks();
         let links: Vec<LinkFigures> = (self.flexible.spans.iter().enumerate())
             .map(|(k, span)| LinkFigures {

@@ -1,5 +1,8 @@
 //! Recordings from one format to another, and back into memory.
 
+use std::ffi::OsString;
+use std::io::ErrorKind;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use flexarm_log::{
@@ -8,6 +11,11 @@ use flexarm_log::{
 use serde::Serialize;
 
 use crate::error::Error;
+
+/// Samples between two looks at the callback.
+const POLL_EVERY: u64 = 1000;
+/// Provisional names that are tried.
+const MOST_NAMES: u32 = 1000;
 
 /// Choices of a conversion.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -50,6 +58,19 @@ pub struct ConvertSummary {
 /// [`Error::Usage`] if a format is not known or input and output are one file; [`Error::File`] if the input is not there or
 /// the output is and may not be overwritten; [`Error::Log`] for what the files say.
 pub fn convert(input: &Path, output: &Path, options: &ConvertOptions) -> Result<ConvertSummary, Error> {
+    convert_until(input, output, options, &mut |_| ControlFlow::Continue(()))
+}
+
+/// As [`convert()`], until the callback breaks off; it is told the time that the conversion has come to (s).
+///
+/// # Errors
+/// As [`convert()`]; [`Error::Interrupted`] when broken off, and there is no output then.
+pub fn convert_until(
+    input: &Path,
+    output: &Path,
+    options: &ConvertOptions,
+    progress: &mut dyn FnMut(f64) -> ControlFlow<()>,
+) -> Result<ConvertSummary, Error> {
     let from = format(input, options.from, "--from")?;
     let to = format(output, options.to, "--to")?;
     let mut source = open(input, from)?;
@@ -59,7 +80,7 @@ pub fn convert(input: &Path, output: &Path, options: &ConvertOptions) -> Result<
     }
     crate::result_files::check_free(&[output.to_owned()], options.overwrite)?;
 
-    let mut partial = Partial::of(output);
+    let mut partial = Partial::of(output)?;
     let mut recorder = recorder(&partial.path, to)?;
     // Messages name the file that was asked for.
     let provisional = partial.path.clone();
@@ -73,13 +94,22 @@ pub fn convert(input: &Path, output: &Path, options: &ConvertOptions) -> Result<
         other => other,
     };
     recorder.begin(source.header()).map_err(named)?;
-    let (mut samples, mut span) = (0, None);
+    let (mut samples, mut span, mut stopped) = (0, None, None);
     let result = source.replay(&mut |sample: &Sample| -> Result<(), LogError> {
+        if samples % POLL_EVERY == 0 && progress(sample.time_s).is_break() {
+            stopped = Some(sample.time_s);
+            let source = ErrorKind::Interrupted.into();
+            return Err(LogError::Io { path: output.to_owned(), action: "write", source });
+        }
         samples += 1;
         let (first, _) = span.unwrap_or((sample.time_s, 0.0));
         span = Some((first, sample.time_s));
         recorder.record(sample).map_err(named)
-    })?;
+    });
+    if let Some(t) = stopped {
+        return Err(Error::Interrupted { t, partial: false });
+    }
+    let result = result?;
     let Some((first, last)) = span else {
         let what = source.warnings().pop().unwrap_or_else(|| "a recording without a single sample".into());
         return Err(LogError::NotARecording {
@@ -176,9 +206,9 @@ pub(crate) fn same_file(a: &Path, b: &Path) -> bool {
     a.canonicalize().ok().zip(b.canonicalize().ok()).is_some_and(|(a, b)| a == b)
 }
 
-/// A recorder that may overwrite: its file is a provisional one.
+/// A recorder that overwrites nothing: its file is a new one under a provisional name.
 fn recorder(path: &Path, format: RecordingFormat) -> Result<Box<dyn Recorder>, Error> {
-    let options = CreateOptions::default().with_overwrite(true);
+    let options = CreateOptions::default();
     match format {
         RecordingFormat::Csv => Ok(Box::new(CsvRecorder::create(path, options))),
         #[cfg(feature = "mcap")]
@@ -192,30 +222,36 @@ fn recorder(path: &Path, format: RecordingFormat) -> Result<Box<dyn Recorder>, E
     }
 }
 
-/// A file under a provisional name, which goes away unless it is renamed.
+/// A file in a folder of its own beside the output, so that its name is nobody else's. The folder goes away in the end.
 struct Partial {
+    folder: PathBuf,
     path: PathBuf,
-    done: bool,
 }
 
 impl Partial {
-    fn of(output: &Path) -> Self {
-        let mut name = output.file_name().unwrap_or_default().to_owned();
-        name.push(".new");
-        Self { path: output.with_file_name(name), done: false }
+    fn of(output: &Path) -> Result<Self, Error> {
+        let name = output.file_name().unwrap_or_default();
+        let mut number = 0_u32;
+        loop {
+            let mut own = OsString::from(".");
+            own.push(name);
+            own.push(format!(".{}-{number}.new", std::process::id()));
+            let folder = output.with_file_name(own);
+            match std::fs::create_dir(&folder) {
+                Ok(()) => return Ok(Self { path: folder.join(name), folder }),
+                Err(error) if error.kind() == ErrorKind::AlreadyExists && number < MOST_NAMES => number += 1,
+                Err(source) => return Err(Error::Write { path: output.to_owned(), source }),
+            }
+        }
     }
 
     fn rename(&mut self, output: &Path) -> Result<(), Error> {
-        std::fs::rename(&self.path, output).map_err(|source| Error::Write { path: output.to_owned(), source })?;
-        self.done = true;
-        Ok(())
+        std::fs::rename(&self.path, output).map_err(|source| Error::Write { path: output.to_owned(), source })
     }
 }
 
 impl Drop for Partial {
     fn drop(&mut self) {
-        if !self.done {
-            let _ = std::fs::remove_file(&self.path); // what cannot be removed stays; the error that led here is told
-        }
+        let _ = std::fs::remove_dir_all(&self.folder); // what cannot be removed stays; the error that led here is told
     }
 }

@@ -55,7 +55,7 @@ mod twin;
 pub use bends::Bend;
 pub use check::{Finding, check};
 pub use compare::{Progress, simulate, simulate_traced};
-pub use convert::{ConvertOptions, ConvertSummary, convert, parse_recording_format, read_run};
+pub use convert::{ConvertOptions, ConvertSummary, convert, convert_until, parse_recording_format, read_run};
 pub use disturbance::Disturbances;
 pub use drive_entry::{Drive, DriveKind};
 pub use error::Error;

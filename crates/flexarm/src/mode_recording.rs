@@ -67,7 +67,7 @@ pub fn record_modes(
     let shown = &all[..count.min(all.len())];
     let motion = movie.tool_motion_m.unwrap_or_else(|| PART_OF_REACH * reach(&posed));
 
-    let mut files = recorders(Some(outputs))?;
+    let mut files = recorders(Some(outputs), false)?;
     (files.names.report, files.names.report_md) = (None, None);
     let mut header = robot_header(robot, &posed.arm);
     header.trajectory = "modes".into();

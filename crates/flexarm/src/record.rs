@@ -20,15 +20,33 @@ pub(crate) struct Recordings {
 }
 
 /// Names of the files in an output folder.
-pub(crate) const RECORDING_FILES: [&str; 8] =
-    ["run.mcap", "run.rrd", "run.csv", "run.parquet", "report.html", "report.md", "summary.json", FIGURES_FOLDER];
+pub(crate) const RECORDING_FILES: [&str; 9] = [
+    "run.mcap",
+    "run.rrd",
+    "run.csv",
+    "run.parquet",
+    "report.html",
+    "report.md",
+    "summary.json",
+    STUDY_FILE,
+    FIGURES_FOLDER,
+];
+
+/// Recording of all runs of a study.
+pub(crate) const STUDY_FILE: &str = "study.rrd";
 
 /// Folder with figures for papers, in the output folder.
 pub(crate) const FIGURES_FOLDER: &str = "figures";
 
 /// An error if the folder has files of an earlier run that may not be replaced.
 pub(crate) fn refuse_to_overwrite(outputs: &Outputs) -> Result<(), Error> {
-    let mut files = RECORDING_FILES.iter().map(|file| outputs.folder.join(file));
+    refuse_others(outputs, &[])
+}
+
+/// The same, whatever is there under the names in `ours`.
+fn refuse_others(outputs: &Outputs, ours: &[&str]) -> Result<(), Error> {
+    let files = RECORDING_FILES.iter().filter(|file| !ours.contains(file));
+    let mut files = files.map(|file| outputs.folder.join(file));
     match files.find(|path| path.exists()).filter(|_| !outputs.overwrite) {
         None => Ok(()),
         Some(there) => {
@@ -38,11 +56,37 @@ pub(crate) fn refuse_to_overwrite(outputs: &Outputs) -> Result<(), Error> {
     }
 }
 
-/// Recorders for the outputs; refuses to overwrite before anything is made.
-pub(crate) fn recorders(outputs: Option<&Outputs>) -> Result<Recordings, Error> {
+/// Removes what an earlier run left that this one does not write: beside the new files it would be taken for its own.
+fn remove_leftovers(outputs: &Outputs, ours: &[&str]) -> Result<(), Error> {
+    for file in RECORDING_FILES.iter().filter(|file| !ours.contains(file)) {
+        let path = outputs.folder.join(file);
+        // Neither folders nor links were written by a run.
+        if path.symlink_metadata().is_ok_and(|there| there.is_file()) {
+            std::fs::remove_file(&path)
+                .map_err(|e| Error::File { what: format!("is of an earlier run and cannot be removed: {e}"), path })?;
+        }
+    }
+    Ok(())
+}
+
+/// Recorders for the outputs; refuses to overwrite before anything is made. `in_study`: the recording of the study is being
+/// written too.
+pub(crate) fn recorders(outputs: Option<&Outputs>, in_study: bool) -> Result<Recordings, Error> {
     let mut recordings = Recordings { set: RecorderSet::new(), names: Files::default() };
     let Some(outputs) = outputs else { return Ok(recordings) };
-    refuse_to_overwrite(outputs)?;
+    let mut ours = vec!["report.html", "report.md", "summary.json"];
+    let written = [
+        (outputs.mcap && cfg!(feature = "mcap"), "run.mcap"),
+        (outputs.rrd && cfg!(feature = "rerun"), "run.rrd"),
+        (outputs.csv, "run.csv"),
+        (outputs.parquet, "run.parquet"),
+        (in_study, STUDY_FILE),
+    ];
+    ours.extend(written.into_iter().filter_map(|(is_written, file)| is_written.then_some(file)));
+    refuse_others(outputs, if in_study { &[STUDY_FILE] } else { &[] })?;
+    if outputs.overwrite {
+        remove_leftovers(outputs, &ours)?;
+    }
     std::fs::create_dir_all(&outputs.folder).map_err(|e| Error::File {
         path: outputs.folder.clone(),
         what: format!("the output folder cannot be made: {e}"),

@@ -3,14 +3,14 @@
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
-use flexarm_log::{Recorder, Trace};
+use flexarm_log::{Recorder, Trace, TraceRow};
 
 use crate::compare::{Progress, Together, checked, run_traced};
 use crate::error::Error;
 use crate::magnification::Expected;
 use crate::motion::Motion;
 use crate::options::{Outputs, RunOptions};
-use crate::record::refuse_to_overwrite;
+use crate::record::{RECORDING_FILES, refuse_to_overwrite};
 use crate::robot::Robot;
 use crate::summary::{DifferenceFigures, Summary};
 
@@ -96,6 +96,9 @@ pub fn compare_study(
     Ok((summary, traces))
 }
 
+/// Most letters of a run's folder.
+const LONGEST_NAME: usize = 100;
+
 /// Names of the runs' folders: the labels, with letters that every file system takes.
 fn folders(variants: &[Variant]) -> Result<Vec<String>, Error> {
     let mut taken = BTreeSet::new();
@@ -109,28 +112,47 @@ fn folders(variants: &[Variant]) -> Result<Vec<String>, Error> {
                 variant.label
             )));
         }
+        if RECORDING_FILES.contains(&name.to_lowercase().as_str()) {
+            let text = "is the name of a file of the study: give its --with another name=...";
+            return Err(Error::Usage(format!("the label {:?} {text}", variant.label)));
+        }
+        if name.len() > LONGEST_NAME {
+            return Err(Error::Usage(format!(
+                "the label {:?} has {} letters, at most {LONGEST_NAME} make a folder: give its --with a short name=...",
+                variant.label,
+                name.len()
+            )));
+        }
         names.push(name);
     }
     Ok(names)
 }
 
 /// How far the tool of a run is from that of the first, at the first's times; `None` for motions of other lengths.
-fn difference(first: &Trace, other: &Trace) -> Option<DifferenceFigures> {
+///
+/// On one motion the places of the rigid tools are the same, so the errors are compared: they are small, and so is what is
+/// lost between the samples. Otherwise the places are.
+pub(crate) fn difference(first: &Trace, other: &Trace) -> Option<DifferenceFigures> {
     let (end, other_end) = (first.rows.last()?.time_s, other.rows.last()?.time_s);
-    if (end - other_end).abs() > 1e-6 * end.max(1.0) {
+    // The last step may pass the end of the motion.
+    let slack = first.header.step_s.max(other.header.step_s).max(1e-6 * end.max(1.0));
+    if (end - other_end).abs() > slack {
         return None;
     }
-    let (mut peak_m, mut t_peak_s, mut sum, mut k) = (0.0f64, 0.0, 0.0, 0);
-    for row in &first.rows {
+    let error = |row: &TraceRow| -> [f64; 3] { std::array::from_fn(|c| row.error_world[c]) };
+    let place = |row: &TraceRow| row.flexible_m;
+    let of_row: &dyn Fn(&TraceRow) -> [f64; 3] = if on_one_motion(first, other) { &error } else { &place };
+    let values: Vec<[f64; 3]> = other.rows.iter().map(of_row).collect();
+    let (mut peak_m, mut t_peak_s, mut sum, mut count, mut k) = (0.0f64, 0.0, 0.0, 0, 0);
+    for row in first.rows.iter().filter(|row| row.time_s <= other_end + SAME_TIME) {
         while k + 2 < other.rows.len() && other.rows[k + 1].time_s < row.time_s {
             k += 1;
         }
-        let (a, b) = (&other.rows[k], &other.rows[(k + 1).min(other.rows.len() - 1)]);
-        let span = b.time_s - a.time_s;
-        let x = if span > 0.0 { ((row.time_s - a.time_s) / span).clamp(0.0, 1.0) } else { 0.0 };
-        let gap = |c: usize| a.flexible_m[c] + (b.flexible_m[c] - a.flexible_m[c]) * x - row.flexible_m[c];
-        let square: f64 = (0..3).map(|c| gap(c) * gap(c)).sum();
+        let value = between(&other.rows, &values, k, row.time_s);
+        let own = of_row(row);
+        let square: f64 = (0..3).map(|c| (value[c] - own[c]).powi(2)).sum();
         sum += square;
+        count += 1;
         if square.sqrt() > peak_m {
             (peak_m, t_peak_s) = (square.sqrt(), row.time_s);
         }
@@ -139,8 +161,57 @@ fn difference(first: &Trace, other: &Trace) -> Option<DifferenceFigures> {
     Some(DifferenceFigures {
         peak_m,
         t_peak_s,
-        rms_m: (sum / first.rows.len() as f64).sqrt(),
+        rms_m: (sum / f64::from(count.max(1))).sqrt(),
         of_peak_error: (largest > 0.0).then(|| peak_m / largest),
+    })
+}
+
+/// Whether the rigid tools are at the same places at the times that both runs have.
+fn on_one_motion(first: &Trace, other: &Trace) -> bool {
+    if !(first.header.has_rigid && other.header.has_rigid) {
+        return false;
+    }
+    let (mut k, mut common) = (0, 0);
+    for row in &first.rows {
+        while k < other.rows.len() && other.rows[k].time_s < row.time_s - SAME_TIME {
+            k += 1;
+        }
+        let Some(there) = other.rows.get(k).filter(|there| (there.time_s - row.time_s).abs() <= SAME_TIME) else {
+            continue;
+        };
+        if (0..3).any(|c| (there.rigid_m[c] - row.rigid_m[c]).abs() > SAME_PLACE) {
+            return false;
+        }
+        common += 1;
+    }
+    // The start alone is common to many motions.
+    common > 1 || first.header.trajectory == other.header.trajectory
+}
+
+/// Times nearer than this are one (s).
+const SAME_TIME: f64 = 1e-10;
+/// Places nearer than this are one (m): those of rigid tools that differ by rounding, and by the time of a sample.
+const SAME_PLACE: f64 = 1e-9;
+
+/// Values at `t` between the samples k and k + 1: a cubic with the slopes of the chords across their neighbours.
+fn between(rows: &[TraceRow], values: &[[f64; 3]], k: usize, t: f64) -> [f64; 3] {
+    let last = rows.len() - 1;
+    let next = (k + 1).min(last);
+    let span = rows[next].time_s - rows[k].time_s;
+    if span <= 0.0 {
+        return values[k];
+    }
+    let x = ((t - rows[k].time_s) / span).clamp(0.0, 1.0);
+    let slope = |i: usize, c: usize| {
+        let (a, b) = (i.saturating_sub(1), (i + 1).min(last));
+        (values[b][c] - values[a][c]) / (rows[b].time_s - rows[a].time_s)
+    };
+    std::array::from_fn(|c| {
+        let (p, q) = (values[k][c], values[next][c]);
+        let (m, n) = (span * slope(k, c), span * slope(next, c));
+        // Written so that the samples themselves are met exactly.
+        let bend = (m - (q - p)) * (1.0 - x) - (n - (q - p)) * x;
+        p + x * (q - p) + x * (1.0 - x) * bend
     })
 }
 
@@ -220,7 +291,7 @@ impl StudyRecording {
         let Some(outputs) = outputs.filter(|outputs| outputs.rrd && variants.len() > 1) else {
             return Ok(Self { study: None });
         };
-        let path = outputs.folder.join("study.rrd");
+        let path = outputs.folder.join(crate::record::STUDY_FILE);
         let options = flexarm_log::CreateOptions::default().with_overwrite(outputs.overwrite);
         let labels = variants.iter().map(|v| v.label.clone()).collect();
         let study = flexarm_log::RrdStudy::create(&path, options, labels);

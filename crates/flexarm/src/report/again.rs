@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use flexarm_analysis::{ErrorRecord, MetricSettings, tcp_metrics};
+use flexarm_analysis::{ErrorRecord, MetricSettings, tcp_metrics_on_path};
 use flexarm_log::{EventKind, RunHeader, Trace};
 use serde::Serialize;
 
@@ -89,7 +89,7 @@ pub fn report(recordings: &[PathBuf], options: &ReportOptions) -> Result<ReportF
         let named = |sentence: String| if sentence.starts_with(&name) { sentence } else { name.clone() + &sentence };
         warnings.extend(told.into_iter().map(named));
         let stored = of_study.clone().or_else(|| json.and_then(|json| serde_json::from_value::<Summary>(json).ok()));
-        let summary = stored.unwrap_or_else(|| {
+        let mut summary = stored.unwrap_or_else(|| {
             warnings.push(format!(
                 "{}: the recording holds no result (a table, or a run that was stopped): the figures of the tool are computed \
                  from its curves, others are missing",
@@ -97,6 +97,9 @@ pub fn report(recordings: &[PathBuf], options: &ReportOptions) -> Result<ReportF
             ));
             computed(&trace)
         });
+        if summary.difference.is_none() {
+            summary.difference = runs.first().and_then(|(_, _, first)| crate::study::difference(first, &trace));
+        }
         let label = match (inputs.len(), &summary.label) {
             (1, _) => super::title(&summary),
             (_, Some(label)) if of_study.is_some() => label.clone(),
@@ -220,7 +223,8 @@ fn computed(trace: &Trace) -> Summary {
     };
     let usual = MetricSettings::default();
     let settings = MetricSettings { settling_band_m: settling_band_m(header).unwrap_or(usual.settling_band_m) };
-    let metrics = tcp_metrics(&record, &settings).ok();
+    let along: Vec<[f64; 3]> = rows.iter().map(|row| [0, 1, 2].map(|c| row.error_path[c])).collect();
+    let metrics = tcp_metrics_on_path(&record, Some(&along), &settings).ok();
     let mut tcp = metrics.as_ref().filter(|_| header.has_rigid).map(TcpFigures::from);
     if let Some(tcp) = tcp.as_mut().filter(|_| moves.is_empty()) {
         // Where the ringing cannot be told from the motion it has no frequency.
