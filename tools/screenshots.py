@@ -63,6 +63,14 @@ def viewer_picture(file, out, seconds):
                 time.sleep(0.3)
         time.sleep(seconds)
         client.save_screenshot(str(out))
+        # The viewer writes when it has drawn.
+        size, deadline = -1, time.monotonic() + 30
+        while time.monotonic() < deadline:
+            time.sleep(0.5)
+            now = out.stat().st_size if out.exists() else 0
+            if now > 0 and now == size:
+                break
+            size = now
     finally:
         os.killpg(process.pid, signal.SIGKILL)
         process.wait()
