@@ -15,17 +15,17 @@ use flexarm_log::{
     Attachment, BendInfo, ElasticSample, EnergySample, Event, EventKind, Recorder, RecorderSet, RunResult, Sample,
     Trace,
 };
-use flexarm_stepping::{FlexibleArm, Load, Observation, StepError, Stepper, StepperKind, new_stepper};
+use flexarm_stepping::{FlexibleArm, Observation, Stepper, StepperKind};
 use nalgebra::{Matrix6, Vector3, Vector6};
 
 use crate::bends::stations;
-use crate::disturbance::{Disturbances, EXPRESSION_PERIOD};
 use crate::energy_book::EnergyBook;
 use crate::error::Error;
 use crate::flexible::{FlexibleRobot, Owner};
 use crate::magnification::Expected;
 use crate::motion::Motion;
 use crate::options::{Outputs, RunOptions};
+use crate::prepare::{Checked, checked};
 use crate::record::{header, link_frames, ordered_links, recorders};
 use crate::robot::{Robot, TCP_FRAME};
 use crate::summary::{DriveFigures, Files, LinkFigures, StepperFigures, Summary, TcpFigures};
@@ -41,6 +41,9 @@ const FOLLOWING_ERROR: &str = "following error";
 
 /// Largest gap in the energy balance before a warning.
 const IMBALANCE_LIMIT: f64 = 0.02;
+
+/// Steps between two looks at the progress callback.
+const POLL_EVERY: u64 = 64;
 
 /// Called with simulated and total time; breaking off stops the run with readable files.
 pub type Progress<'a> = dyn FnMut(f64, f64) -> ControlFlow<()> + 'a;
@@ -132,45 +135,6 @@ pub(crate) fn run_traced(
     end.and(reported).map(|()| (summary, run.trace))
 }
 
-/// A run whose input makes sense.
-pub(crate) struct Checked {
-    flexible: FlexibleRobot,
-    arm: FlexibleArm,
-    stepper: Box<dyn Stepper>,
-    load_warnings: Vec<String>,
-}
-
-impl Checked {
-    /// Deflections that the run will have, roughly.
-    pub(crate) fn expected(&self, motion: &Motion, options: &RunOptions) -> Expected {
-        Expected::of(&self.arm, &tool_frame(&self.arm), motion.trajectory.duration(), options.start)
-    }
-}
-
-/// Everything about the input of a run that can be told before the first step.
-pub(crate) fn checked(robot: &Robot, motion: &Motion, options: &RunOptions) -> Result<Checked, Error> {
-    if !motion.violations.is_empty() && !options.ignore_limits {
-        let violations = motion.violations.iter().map(ToString::to_string).collect();
-        return Err(Error::Limits { path: motion.path.clone(), violations });
-    }
-    check_options(motion, options)?;
-    let failed = |source: StepError| Error::Step { source, partial: false };
-    let flexible = robot.modelled(&options.modelling)?;
-    let mut arm = flexible.arm(motion.prescribed()).map_err(failed)?;
-    let mut load_warnings = Vec::new();
-    if let Some(path) = &options.loads {
-        let disturbances = Disturbances::load(path, robot, &arm.model, motion.trajectory.duration())?;
-        load_warnings = disturbances.warnings;
-        if !matches!(options.stepper, StepperKind::Reference(_)) {
-            load_warnings.extend(short_loads(&disturbances.loads, options.step_s));
-        }
-        arm.inertia_changes = disturbances.changes;
-        arm = arm.with_timed_loads(disturbances.loads).map_err(failed)?;
-    }
-    let stepper = new_stepper(options.stepper, arm.clone(), options.step_s, options.start).map_err(failed)?;
-    Ok(Checked { flexible, arm, stepper, load_warnings })
-}
-
 /// What recordings are told at the end. Timings stay out of it: recordings of the same run are the same bytes.
 fn result(summary: &Summary, events: Vec<Event>) -> RunResult {
     let timeless =
@@ -189,73 +153,8 @@ fn result(summary: &Summary, events: Vec<Event>) -> RunResult {
     }
 }
 
-fn tool_frame(arm: &FlexibleArm) -> Frame {
+pub(crate) fn tool_frame(arm: &FlexibleArm) -> Frame {
     arm.model.frame(TCP_FRAME).expect("added when the robot was loaded").clone()
-}
-
-/// Steps between two looks at the progress callback.
-const POLL_EVERY: u64 = 64;
-/// Most steps of a run: some hours.
-const MOST_STEPS: f64 = 1e9;
-/// Most logged samples of a run: they are kept for the figures.
-const MOST_SAMPLES: f64 = 2e6;
-
-/// Numbers must make sense, and step and duration make a run that can be kept in memory.
-fn check_options(motion: &Motion, options: &RunOptions) -> Result<(), Error> {
-    let positive = |what: &str, x: f64, unit: &str| {
-        let message = || Error::Usage(format!("the {what} must be positive, found {x} {unit}"));
-        if x.is_finite() && x > 0.0 { Ok(()) } else { Err(message()) }
-    };
-    positive("step", options.step_s, "s")?;
-    positive("log rate", options.log_rate_hz, "Hz")?;
-    positive("settling band", options.settling_band_m, "m")?;
-    positive("magnification", options.magnification.unwrap_or(1.0), "")?;
-    let duration = motion.trajectory.duration();
-    if options.step_s > duration {
-        let message = format!("the step (--step {} s) is longer than the motion ({duration} s)", options.step_s);
-        return Err(Error::Usage(message));
-    }
-    if duration / options.step_s > MOST_STEPS {
-        return Err(Error::Usage(format!(
-            "{duration} s in steps of {:e} s make {:.1e} steps, at most {MOST_STEPS:.0e} are taken: raise --step or cut the \
-             trajectory",
-            options.step_s,
-            duration / options.step_s
-        )));
-    }
-    let samples = duration * options.log_rate_hz.min(1.0 / options.step_s);
-    if samples > MOST_SAMPLES {
-        return Err(Error::Usage(format!(
-            "{duration} s at a log rate of {} Hz make {samples:.1e} samples, at most {MOST_SAMPLES:.0e} are kept: \
-             lower --log-rate or cut the trajectory",
-            options.log_rate_hz
-        )));
-    }
-    Ok(())
-}
-
-/// Steps that a load, or a period of it, must last to be met well.
-const STEPS_PER_LOAD: f64 = 8.0;
-
-/// Loads that last so few steps that they do not act as the file says.
-fn short_loads(loads: &[Load], h: f64) -> Vec<String> {
-    let brief = |load: &Load| {
-        let (first, last) = load.jumps.iter().fold((f64::INFINITY, 0.0f64), |(a, b), t| (a.min(*t), b.max(*t)));
-        let steps = (last - first) / h;
-        (last > first && steps < STEPS_PER_LOAD).then(|| {
-            format!(
-                "a load from {first} s to {last} s lasts {steps:.1} steps: its impulse is not met well; lower --step"
-            )
-        })
-    };
-    let fast = |load: &Load| {
-        let steps = load.period / h;
-        (load.period != EXPRESSION_PERIOD && steps < STEPS_PER_LOAD).then(|| {
-            let hz = 1.0 / load.period;
-            format!("a load of {hz:.1} Hz has {steps:.1} steps per period: it does not act as written; lower --step")
-        })
-    };
-    loads.iter().filter_map(|load| brief(load).or_else(|| fast(load))).collect()
 }
 
 /// A run under way, with what has been seen of it.

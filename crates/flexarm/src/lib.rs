@@ -39,6 +39,7 @@ mod modes;
 mod motion;
 mod options;
 mod posed;
+mod prepare;
 mod record;
 pub mod reduce;
 mod report;

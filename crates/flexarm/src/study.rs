@@ -5,11 +5,12 @@ use std::path::PathBuf;
 
 use flexarm_log::{Recorder, Trace, TraceRow};
 
-use crate::compare::{Progress, Together, checked, run_traced};
+use crate::compare::{Progress, Together, run_traced};
 use crate::error::Error;
 use crate::magnification::Expected;
 use crate::motion::Motion;
 use crate::options::{Outputs, RunOptions};
+use crate::prepare::checked;
 use crate::record::{RECORDING_FILES, refuse_to_overwrite};
 use crate::robot::Robot;
 use crate::summary::{DifferenceFigures, Summary};
