@@ -101,7 +101,8 @@ fn changed(line: &[OsString], words: &[(String, String, bool)]) -> Result<RunArg
     let matches = command.try_get_matches_from(line).map_err(|error| {
         // The first lines say what is wrong; usage and hints are those of the whole program.
         let text = error.to_string();
-        text.lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned()
+        let first = text.lines().next().unwrap_or_default().trim_start_matches("error: ");
+        format!("{first}; a key is robot, trajectory, name or an option of compare (flexarm compare --help)")
     })?;
     let Cli { command: Command::Compare(mut args), .. } = Cli::from_arg_matches(&matches).map_err(|e| e.to_string())?
     else {

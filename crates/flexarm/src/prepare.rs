@@ -64,7 +64,7 @@ fn check_options(motion: &Motion, options: &RunOptions) -> Result<(), Error> {
     positive("step", options.step_s, "s")?;
     positive("log rate", options.log_rate_hz, "Hz")?;
     positive("settling band", options.settling_band_m, "m")?;
-    positive("magnification", options.magnification.unwrap_or(1.0), "")?;
+    positive("factor of deflections (--magnify)", options.magnification.unwrap_or(1.0), "times")?;
     let duration = motion.trajectory.duration();
     if options.step_s > duration {
         let message = format!("the step (--step {} s) is longer than the motion ({duration} s)", options.step_s);
