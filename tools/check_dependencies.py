@@ -20,7 +20,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = "ARCHITECTURE.md"
-LINES = ["faces", "facade", "edges", "results", "motion", "links", "base"]       # top to bottom
+LINES = ["faces", "proof", "facade", "edges", "results", "motion", "links", "base"]       # top to bottom
 INNER = ["results", "motion", "links", "base"]
 OWNERS = {  # outside crate: crates or lines that may name it
     "rerun": ["flexarm-log"], "mcap": ["flexarm-log"], "parquet": ["flexarm-log"], "zstd": ["flexarm-log"], "png": ["flexarm-log"], "plotters": ["flexarm-log"], "faer": ["flexarm-fem"], "diffsol": ["flexarm-stepping"], "metis-sys": ["flexarm-fem"], "urdf-rs": ["flexarm-urdf"],

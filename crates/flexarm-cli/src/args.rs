@@ -10,6 +10,7 @@ use crate::exchange_args::{ExportArgs, ImportArgs};
 use crate::posed_args::{ModesArgs, ResponseArgs, StaticsArgs};
 use crate::reduce_args::ReduceArgs;
 use crate::report::ReportArgs;
+use crate::verify::VerifyArgs;
 use crate::view::ViewArgs;
 
 /// How far is a robot's tool from where the rigid model puts it, because its links bend?
@@ -54,6 +55,8 @@ pub(crate) enum Command {
     Import(Box<ImportArgs>),
     /// Write the matrices of a flexible link for another FE program
     Export(ExportArgs),
+    /// Run the case studies against their truths and write the page of the results
+    Verify(VerifyArgs),
     /// Open a recording in the Rerun viewer
     View(ViewArgs),
     /// Print a shell completion script

@@ -14,6 +14,7 @@ mod report;
 mod shipped;
 mod study;
 mod summary_table;
+mod verify;
 mod view;
 
 use std::io::{IsTerminal, Write};
@@ -85,6 +86,7 @@ fn run(cli: &Cli) -> Result<ExitCode, Error> {
         Command::Reduce(args) => reduce::run(cli, args),
         Command::Import(args) => exchange::import(cli, args),
         Command::Export(args) => exchange::export(cli, args),
+        Command::Verify(args) => verify::run(cli, args),
         Command::View(args) => view::run(cli, args),
         Command::Completions { shell } => {
             clap_complete::generate(*shell, &mut Cli::command(), "flexarm", &mut std::io::stdout());

@@ -42,3 +42,9 @@ pub(crate) fn new_output_folder(stem: &str) -> PathBuf {
         stem.chars().map(|c| if c.is_alphanumeric() || c == '-' || c == '_' { c } else { '_' }).collect();
     (1..).map(|n| Path::new("out").join(format!("{clean}-{n:03}"))).find(|p| !p.exists()).expect("some number is free")
 }
+
+/// The folder with `robots` and `tests`: the first root that has both, else where the program was built.
+pub(crate) fn checkout() -> PathBuf {
+    let has_both = |root: &PathBuf| root.join("robots").is_dir() && root.join("tests/verification").is_dir();
+    roots().into_iter().find(has_both).unwrap_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../.."))
+}

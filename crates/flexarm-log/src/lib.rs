@@ -86,7 +86,7 @@ pub use mcap_file::McapRecorder;
 pub use multi::RecorderSet;
 #[cfg(feature = "parquet")]
 pub use parquet_file::ParquetRecorder;
-pub use plot::{CurveLook, Panel, PlotCurve, PlotError, line_plot, paper_plot};
+pub use plot::{CurveLook, Panel, PlotCurve, PlotError, line_plot, page_plot, paper_plot};
 pub use read::{RecordingFormat, open_recording};
 pub use record::*;
 #[cfg(feature = "rerun")]

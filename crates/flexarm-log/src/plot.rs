@@ -40,6 +40,10 @@ pub enum CurveLook {
     Total,
     /// In a colour of its own, dashed: what others are compared with.
     Dashed,
+    /// In a colour of its own, a dot at each point: what was measured or computed there and nowhere else.
+    Dots,
+    /// As [`CurveLook::Plain`] with a dot at each point.
+    Marked,
 }
 
 /// A curve.
@@ -100,6 +104,21 @@ const SCREEN: Style = Style {
     x_labels: 11,
 };
 
+/// A picture between paragraphs, 960 pixels of the browser in halves.
+const PAGE: Style = Style {
+    panel: (1920, 660),
+    margin: 24,
+    x_area: 88,
+    y_area: 168,
+    caption: 36,
+    font: 30,
+    legend_font: 30,
+    stroke: 4,
+    width_mm: Some(254.0),
+    legend_above: true,
+    x_labels: 11,
+};
+
 /// A column of a paper, 88 mm, in twelfths of a millimetre: text of 8 points, lines of 0.3 mm.
 const COLUMN: Style = Style {
     panel: (1056, 560),
@@ -130,6 +149,14 @@ pub fn line_plot(title: &str, x_label: &str, logarithmic_x: bool, panels: &[Pane
 /// As [`line_plot`].
 pub fn paper_plot(x_label: &str, panels: &[Panel], bands: &[(f64, f64)]) -> Result<String, PlotError> {
     plot("", x_label, false, panels, bands, &COLUMN)
+}
+
+/// Panels below each other for a page of text, 960 pixels wide, curves named above them, as SVG.
+///
+/// # Errors
+/// As [`line_plot`].
+pub fn page_plot(x_label: &str, logarithmic_x: bool, panels: &[Panel]) -> Result<String, PlotError> {
+    plot("", x_label, logarithmic_x, panels, &[], &PAGE)
 }
 
 fn plot(
@@ -243,6 +270,10 @@ fn legend_rows(curves: &[&PlotCurve], style: &Style) -> Vec<Vec<(usize, u32)>> {
     rows
 }
 
+fn dot_radius(style: &Style) -> u32 {
+    2 * style.stroke
+}
+
 /// Length of the line beside a name in the legend, its gap included.
 fn swatch(style: &Style) -> u32 {
     2 * style.legend_font
@@ -262,6 +293,11 @@ fn draw_legend(
             let (from, middle, to) = (x, y + font / 2, x + font * 3 / 2);
             let cut = (to - from) / 3;
             let lines = match curve.look {
+                CurveLook::Dots => {
+                    let dot = Circle::new(((from + to) / 2, middle), dot_radius(style), look.filled());
+                    strip.draw(&dot).map_err(fault)?;
+                    vec![]
+                }
                 CurveLook::Dashed => vec![(from, from + cut), (to - cut, to)],
                 _ => vec![(from, to)],
             };
@@ -324,7 +360,10 @@ impl Frame<'_> {
             .map_err(fault)?;
         for (curve, points) in self.panel.curves.iter().zip(self.points) {
             let look = look_of(curve, self.all, style);
-            let drawn = if curve.look == CurveLook::Dashed {
+            let drawn = if curve.look == CurveLook::Dots {
+                let dots = points.iter().map(|point| Circle::new(*point, dot_radius(style), look.filled()));
+                chart.draw_series(dots).map_err(fault)?
+            } else if curve.look == CurveLook::Dashed {
                 let (dash, gap) = (6 * style.stroke, 4 * style.stroke);
                 let dashes = DashedLineSeries::new(points.iter().copied(), dash, gap, look);
                 chart.draw_series(dashes).map_err(fault)?
@@ -332,6 +371,10 @@ impl Frame<'_> {
                 chart.draw_series(LineSeries::new(points.iter().copied(), look)).map_err(fault)?
             };
             drawn.label(&curve.name).legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], look));
+            if curve.look == CurveLook::Marked {
+                let dots = points.iter().map(|point| Circle::new(*point, dot_radius(style), look.filled()));
+                chart.draw_series(dots).map_err(fault)?;
+            }
         }
         if self.panel.legend && !style.legend_above && !self.panel.curves.is_empty() {
             chart

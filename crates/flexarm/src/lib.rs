@@ -44,7 +44,7 @@ mod record;
 pub mod reduce;
 mod report;
 mod response;
-mod result_files;
+pub mod result_files;
 mod robot;
 pub mod robot_file;
 mod stamp;

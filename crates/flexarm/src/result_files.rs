@@ -8,7 +8,7 @@ use crate::error::Error;
 ///
 /// # Errors
 /// [`Error::File`].
-pub(crate) fn check_free(paths: &[PathBuf], overwrite: bool) -> Result<(), Error> {
+pub fn check_free(paths: &[PathBuf], overwrite: bool) -> Result<(), Error> {
     for path in paths {
         let fail = |what: &str| Err(Error::File { path: path.clone(), what: what.into() });
         if path.is_dir() {
@@ -32,7 +32,7 @@ pub(crate) fn check_free(paths: &[PathBuf], overwrite: bool) -> Result<(), Error
 ///
 /// # Errors
 /// [`Error::Write`].
-pub(crate) fn write_all(files: &[(PathBuf, impl AsRef<[u8]>)]) -> Result<(), Error> {
+pub fn write_all(files: &[(PathBuf, impl AsRef<[u8]>)]) -> Result<(), Error> {
     let mut undo = Undo::default();
     for (path, bytes) in files {
         let failed = |source| Error::Write { path: path.clone(), source };

@@ -1,0 +1,125 @@
+//! `flexarm verify`: the case studies, their page, and whether a stored page still holds.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Instant;
+
+use clap::Args;
+use flexarm::Error;
+use flexarm_verify::bench::Bench;
+use flexarm_verify::check::differences;
+use flexarm_verify::{Verification, VerificationFiles, case_names, verify};
+use serde_json::json;
+
+use crate::{Cli, answer, shipped, stop_on_ctrl_c};
+
+#[derive(Debug, Args)]
+pub(crate) struct VerifyArgs {
+    /// Cases to run: one-beam, three-beams, lower-arm, manipulator, programs [default: all]
+    pub(crate) cases: Vec<String>,
+    /// Leave out what takes long
+    #[arg(long)]
+    pub(crate) quick: bool,
+    /// Folder with robots, trajectories and tests/verification [default: the checkout that the program was built from]
+    #[arg(long, value_name = "DIR")]
+    pub(crate) data: Option<PathBuf>,
+    /// Folder for verification.md, its pictures and verification.json [default: a new one in out]
+    #[arg(long, short, value_name = "DIR")]
+    pub(crate) output: Option<PathBuf>,
+    /// Overwrite what is there
+    #[arg(long)]
+    pub(crate) force: bool,
+    /// Write no files
+    #[arg(long, conflicts_with_all = ["output", "force"])]
+    pub(crate) no_files: bool,
+    /// Compare with a stored page instead of writing one; exit code 1 if it differs
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["output", "force", "quick", "cases"])]
+    pub(crate) check: Option<PathBuf>,
+}
+
+pub(crate) fn run(cli: &Cli, args: &VerifyArgs) -> Result<ExitCode, Error> {
+    let stored = args.check.as_ref().map(|path| {
+        let what = |e| Error::File { path: path.clone(), what: format!("the stored page cannot be read: {e}") };
+        std::fs::read_to_string(path).map_err(what)
+    });
+    let stored = stored.transpose()?;
+    let files = (!args.no_files && stored.is_none()).then(|| {
+        let folder = args.output.clone().unwrap_or_else(|| shipped::new_output_folder("verification"));
+        VerificationFiles::new(folder, args.force)
+    });
+    let files = files.transpose()?;
+    let bench = Bench { root: args.data.clone().unwrap_or_else(shipped::checkout), quick: args.quick };
+
+    let started = Instant::now();
+    let mut stop = stop_on_ctrl_c();
+    let verification = verify(&bench, &args.cases, &mut |name, k, n| {
+        if !cli.quiet {
+            eprintln!("case {} of {n}: {name}", k + 1);
+        }
+        stop()
+    })?;
+    let wall_s = started.elapsed().as_secs_f64();
+    if let Some(files) = &files {
+        files.write(&verification)?;
+    }
+    let changed = stored.map(|stored| differences(&stored, &verification.page())).unwrap_or_default();
+    let page = files.as_ref().map(|files| files.page().display().to_string());
+    let json = || {
+        let claims: Vec<_> = verification
+            .cases
+            .iter()
+            .flat_map(|c| c.claims().map(|claim| json!({"case": c.name, "claim": claim})))
+            .collect();
+        json!({
+            "passed": verification.passed, "claims": claims, "cases": verification.cases, "differences": changed,
+            "wall_s": wall_s, "file": page,
+        })
+        .to_string()
+    };
+    answer(cli, json, || {
+        text(&verification, &changed.iter().map(line).collect::<Vec<_>>(), args, page.as_deref(), wall_s)
+    });
+    Ok(if verification.passed && changed.is_empty() { ExitCode::SUCCESS } else { ExitCode::from(1) })
+}
+
+fn line(difference: &flexarm_verify::check::Difference) -> String {
+    format!("  line {}\n    stored {}\n    found  {}\n", difference.line, difference.stored, difference.found)
+}
+
+/// Claims, then where the rest is.
+fn text(verification: &Verification, changed: &[String], args: &VerifyArgs, page: Option<&str>, wall_s: f64) -> String {
+    let mut text = String::new();
+    for case in &verification.cases {
+        text += &format!("{}\n", case.title);
+        for claim in case.claims() {
+            let mark = if claim.holds { "ok  " } else { "FAIL" };
+            text +=
+                &format!("  {mark} {} {}  {} (against: {})\n", claim.found(), claim.limit(), claim.text, claim.truth);
+        }
+    }
+    let all: usize = verification.cases.iter().map(|case| case.claims().count()).sum();
+    let broken = verification.cases.iter().flat_map(|case| case.claims()).filter(|claim| !claim.holds).count();
+    text += &format!("{} of {all} claims hold, {wall_s:.1} s\n", all - broken);
+    if let Some(stored) = &args.check {
+        text += &match changed.len() {
+            0 => format!("{} is what this command prints\n", stored.display()),
+            n => format!(
+                "{} differs in {n} line(s); flexarm verify -o {} --force writes it again\n{}",
+                stored.display(),
+                stored
+                    .parent()
+                    .map(|p| p.display().to_string())
+                    .filter(|p| !p.is_empty())
+                    .unwrap_or_else(|| ".".into()),
+                changed.concat()
+            ),
+        };
+    }
+    if let Some(page) = page {
+        text += &format!("page: {page}\n");
+    }
+    if args.cases.is_empty() && !args.quick {
+        return text;
+    }
+    text + &format!("(cases: {})\n", case_names().join(", "))
+}

@@ -1,0 +1,291 @@
+//! What the cases share: shipped files, arms held at a pose, loads, and a stepper that runs until it rests.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use flexarm::{
+    ConstraintForm, Error, LinkModel, LoadOptions, Modelling, Motion, Robot, SpookPreset, SpookSettings, Start,
+    StepError, StepperKind, TCP_FRAME,
+};
+use flexarm_analysis::tcp_error;
+use flexarm_kinematics::{Data, Frame, Pose, State, Wrench, forward_kinematics};
+use flexarm_stepping::{
+    AlphaSettings, Damping, FlexibleArm, Held, Load, LoadAxes, Observation, new_stepper, static_equilibrium,
+};
+use nalgebra::{DVector, Matrix6, Vector3, Vector6};
+use serde_json::Value;
+
+use crate::page::Case;
+
+/// The folder with `robots`, `trajectories` and `tests`, and how much is asked for.
+#[derive(Clone, Debug)]
+pub struct Bench {
+    /// That folder.
+    pub root: PathBuf,
+    /// Leave out what takes long.
+    pub quick: bool,
+}
+
+impl Bench {
+    /// A shipped robot, by its path from the root.
+    pub fn robot(&self, file: &str) -> Result<Robot, Error> {
+        Robot::load(&self.root.join(file), &LoadOptions::default())
+    }
+
+    /// A shipped motion.
+    pub fn motion(&self, robot: &Robot, file: &str) -> Result<Motion, Error> {
+        Motion::load(&self.root.join(file), &*robot.rigid_model()?)
+    }
+
+    /// Stored results of another program: `tests/verification/<name>`.
+    pub fn stored(&self, name: &str) -> Result<Stored, Error> {
+        Stored::read(&self.root.join("tests/verification").join(name))
+    }
+}
+
+/// Results of another program, with where they come from.
+#[derive(Clone, Debug)]
+pub struct Stored {
+    path: PathBuf,
+    value: Value,
+}
+
+impl Stored {
+    fn read(path: &Path) -> Result<Self, Error> {
+        let fail = |what: String| Error::File { path: path.to_owned(), what };
+        let text = std::fs::read_to_string(path)
+            .map_err(|e| fail(format!("stored results cannot be read: {e}; they are in a checkout of the project")))?;
+        let value = serde_json::from_str(&text).map_err(|e| fail(format!("is no JSON: {e}")))?;
+        Ok(Self { path: path.to_owned(), value })
+    }
+
+    /// A sentence about program, script and day.
+    pub fn provenance(&self) -> String {
+        let word = |key: &str| self.value[key].as_str().unwrap_or("?").to_owned();
+        format!("{} ({}, {})", word("program"), word("script"), word("date"))
+    }
+
+    /// What is at a path of keys and places, `a/0/b`.
+    pub fn at(&self, pointer: &str) -> Result<&Value, Error> {
+        self.value.pointer(&format!("/{pointer}")).ok_or_else(|| self.fault(pointer, "is missing"))
+    }
+
+    /// A number.
+    pub fn number(&self, pointer: &str) -> Result<f64, Error> {
+        self.at(pointer)?.as_f64().ok_or_else(|| self.fault(pointer, "is no number"))
+    }
+
+    /// A list of numbers.
+    pub fn numbers(&self, pointer: &str) -> Result<Vec<f64>, Error> {
+        let list = self.at(pointer)?.as_array().ok_or_else(|| self.fault(pointer, "is no list"))?;
+        let numbers = list.iter().map(Value::as_f64).collect::<Option<Vec<f64>>>();
+        numbers.ok_or_else(|| self.fault(pointer, "has something that is no number"))
+    }
+
+    /// A six-vector.
+    pub fn vector6(&self, pointer: &str) -> Result<Vector6<f64>, Error> {
+        let numbers = self.numbers(pointer)?;
+        if numbers.len() == 6 {
+            Ok(Vector6::from_column_slice(&numbers))
+        } else {
+            Err(self.fault(pointer, "is no list of six"))
+        }
+    }
+
+    /// A 6x6 matrix, stored by rows.
+    pub fn matrix6(&self, pointer: &str) -> Result<Matrix6<f64>, Error> {
+        let mut matrix = Matrix6::zeros();
+        for row in 0..6 {
+            matrix.set_row(row, &self.vector6(&format!("{pointer}/{row}"))?.transpose());
+        }
+        Ok(matrix)
+    }
+
+    fn fault(&self, pointer: &str, what: &str) -> Error {
+        let what = format!("{pointer:?} {what}; the script named in it writes the file again");
+        Error::File { path: self.path.clone(), what }
+    }
+}
+
+/// Generalised-alpha as runs use it.
+pub const ALPHA: StepperKind = StepperKind::GeneralizedAlpha(AlphaSettings { rho: 0.9, dispersion_correction: true });
+
+/// Compliant constraints in their exact form.
+pub const fn spook(form: ConstraintForm) -> StepperKind {
+    StepperKind::Spook(SpookSettings { form, preset: SpookPreset::Exact })
+}
+
+/// The three ways in which a lumped link is stepped.
+pub const LUMPED: [(&str, StepperKind); 3] = [
+    ("compliant constraints, local", spook(ConstraintForm::Local)),
+    ("compliant constraints, global", spook(ConstraintForm::Global)),
+    ("spring-damper", ALPHA),
+];
+
+/// Links in rigid parts.
+pub fn parts(n: usize) -> Modelling {
+    Modelling { links: LinkModel::Lumped, segments: Some(n), ..Modelling::default() }
+}
+
+/// Links that bend in modes.
+pub fn modal(modes: usize) -> Modelling {
+    Modelling { links: LinkModel::Modal, modes: Some(modes), ..Modelling::default() }
+}
+
+/// A robot without weight.
+pub fn weightless(mut robot: Robot) -> Robot {
+    robot.rigid.gravity = Vector3::zeros();
+    robot
+}
+
+/// A robot whose first mode is critically damped: for coming to rest.
+pub fn damped(mut robot: Robot) -> Robot {
+    for link in &mut robot.flexible {
+        link.damping = Damping::Modal(1.0);
+    }
+    robot
+}
+
+/// An arm with its joints held at zero, and the frame at which it is loaded and watched.
+pub struct Rig {
+    /// The arm.
+    pub arm: FlexibleArm,
+    /// The frame.
+    pub frame: Frame,
+    /// The frame in the undeformed arm.
+    pub X_WF: Pose,
+}
+
+impl Rig {
+    /// At a frame of the robot, its tool without one.
+    pub fn new(robot: &Robot, modelling: &Modelling, frame: Option<&str>) -> Result<Self, Error> {
+        let flexible = robot.modelled(modelling)?;
+        let joints = vec![0.0; flexible.model.n_actuated()];
+        let arm = flexible.arm(Arc::new(Held(joints))).map_err(step_error)?;
+        let name = frame.unwrap_or(TCP_FRAME);
+        let known = || Error::Usage(format!("there is no frame {name:?}"));
+        let frame = arm.model.frame(name).ok_or_else(known)?.clone();
+        let X_WF = place(&arm, &frame, &DVector::zeros(arm.model.n_elastic()));
+        Ok(Self { arm, frame, X_WF })
+    }
+
+    /// The same arm watched at a point of a body that is at `p_W` when undeformed, world axes.
+    pub fn at_point(&self, body: usize, p_W: Vector3<f64>) -> Self {
+        let e = DVector::zeros(self.arm.model.n_elastic());
+        let body_only = Frame { body, X_BF: Pose::identity(), ..self.frame.clone() };
+        let X_WB = place(&self.arm, &body_only, &e);
+        let X_WF = Pose::from(nalgebra::Translation3::from(p_W));
+        let frame = Frame { X_BF: X_WB.inverse() * X_WF, ..body_only };
+        Self { arm: self.arm.clone(), frame, X_WF }
+    }
+
+    /// The arm under a wrench at the frame, world axes.
+    pub fn loaded(&self, wrench: &Vector6<f64>) -> Result<FlexibleArm, Error> {
+        let F = Wrench::new(wrench.fixed_rows::<3>(0).into(), wrench.fixed_rows::<3>(3).into());
+        let load = Load {
+            body: self.frame.body,
+            X_BF: self.frame.X_BF,
+            axes: LoadAxes::World,
+            wrench: Arc::new(move |_| F),
+            jumps: Vec::new(),
+            period: f64::INFINITY,
+        };
+        self.arm.clone().with_timed_loads(vec![load]).map_err(step_error)
+    }
+
+    /// Displacement and rotation of the frame in the equilibrium under a wrench at it, by Newton's method.
+    pub fn statics(&self, wrench: &Vector6<f64>) -> Result<Vector6<f64>, Error> {
+        self.statics_at(wrench, self)
+    }
+
+    /// The same at the frame of another rig of the same arm.
+    pub fn statics_at(&self, wrench: &Vector6<f64>, seen: &Self) -> Result<Vector6<f64>, Error> {
+        let arm = self.loaded(wrench)?;
+        let e = static_equilibrium(&arm, 0.0).map_err(step_error)?;
+        Ok(Vector6::from(tcp_error(&seen.X_WF, &place(&arm, &seen.frame, &e))))
+    }
+
+    /// The same by a stepper, from the undeformed arm until it rests.
+    pub fn settled(&self, wrench: &Vector6<f64>, kind: StepperKind, h: f64) -> Result<Vector6<f64>, Error> {
+        const AT_MOST: usize = 100_000;
+        const BETWEEN: usize = 50;
+        let arm = self.loaded(wrench)?;
+        let mut stepper = new_stepper(kind, arm.clone(), h, Start::Undeformed).map_err(step_error)?;
+        let mut seen = Observation::new(&arm);
+        let (mut before, mut calm) = (Vector6::repeat(f64::INFINITY), 0);
+        for step in 1..=AT_MOST {
+            stepper.step().map_err(step_error)?;
+            if step % BETWEEN != 0 {
+                continue;
+            }
+            stepper.observe(&mut seen);
+            let X = seen.X_WB[self.frame.body] * self.frame.X_BF;
+            let now = Vector6::from(tcp_error(&self.X_WF, &X));
+            // It rests when what still changes is rounding of the pose.
+            calm = if (now - before).amax() < 1e-15 + 1e-12 * now.amax() { calm + 1 } else { 0 };
+            before = now;
+            if calm == 3 {
+                break;
+            }
+        }
+        Ok(before)
+    }
+
+    /// Compliance at the frame from pairs of opposite loads, so that effects of second order cancel.
+    ///
+    /// `loads`: size of each load; `response`: displacement under a wrench.
+    pub fn compliance(
+        &self,
+        loads: &Vector6<f64>,
+        mut response: impl FnMut(&Self, &Vector6<f64>) -> Result<Vector6<f64>, Error>,
+    ) -> Result<Matrix6<f64>, Error> {
+        let mut C = Matrix6::zeros();
+        for j in 0..6 {
+            let mut wrench = Vector6::zeros();
+            wrench[j] = loads[j];
+            let difference = response(self, &wrench)? - response(self, &-wrench)?;
+            C.set_column(j, &(difference / (2.0 * loads[j])));
+        }
+        Ok(C)
+    }
+}
+
+/// Pose of a frame at elastic coordinates, joints as prescribed at the start.
+pub fn place(arm: &FlexibleArm, frame: &Frame, e: &DVector<f64>) -> Pose {
+    let model = &arm.model;
+    let (mut data, mut state) = (Data::new(model), State::zeros(model));
+    arm.prescribed_state(0.0, &mut state, &mut DVector::zeros(model.nv()));
+    state.q.rows_mut(model.n_actuated(), e.len()).copy_from(e);
+    forward_kinematics(model, &mut data, &state.q);
+    data.X_WF(frame)
+}
+
+/// Loads that move a point with compliance `C` by about 10 µm or 10 µrad each: far above rounding, far below where
+/// geometry counts.
+pub fn small_loads(C: &Matrix6<f64>) -> Vector6<f64> {
+    Vector6::from_fn(|j, _| 1e-5 / C[(j, j)])
+}
+
+/// Largest difference of the response to load `j`, relative to `sqrt(C_ii C_jj)`.
+pub fn column_error(C: &Matrix6<f64>, truth: &Matrix6<f64>, j: usize) -> f64 {
+    let scale = |i: usize| (truth[(i, i)] * truth[(j, j)]).sqrt();
+    (0..6).map(|i| (C[(i, j)] - truth[(i, j)]).abs() / scale(i)).fold(0.0, f64::max)
+}
+
+/// The same over all loads.
+pub fn compliance_error(C: &Matrix6<f64>, truth: &Matrix6<f64>) -> f64 {
+    (0..6).map(|j| column_error(C, truth, j)).fold(0.0, f64::max)
+}
+
+/// Names of the six loads.
+pub const LOADS: [&str; 6] = ["F_x", "F_y", "F_z", "M_x", "M_y", "M_z"];
+
+/// A case of which nothing but its text is known.
+pub fn case(name: &str, title: &str) -> Case {
+    Case::new(name, title)
+}
+
+/// A step error of a verification.
+pub fn step_error(source: StepError) -> Error {
+    Error::Step { source, partial: false }
+}

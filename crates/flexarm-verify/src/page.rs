@@ -1,0 +1,356 @@
+//! What a verification says: cases with text, tables, figures and claims; as Markdown and as JSON.
+//!
+//! Numbers keep their value until they are printed. Relative errors below [`FLOOR`] are printed as that: what lies below is
+//! rounding and differs between machines.
+
+use flexarm_log::{Panel, PlotError};
+use serde::Serialize;
+
+/// Relative errors below this are printed as "< 1e-9".
+pub const FLOOR: f64 = 1e-9;
+
+/// One case study.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Case {
+    /// Word of the command line.
+    pub name: String,
+    /// Heading.
+    pub title: String,
+    /// What it shows, in order.
+    pub blocks: Vec<Block>,
+}
+
+/// A piece of a case.
+#[derive(Clone, Debug, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Block {
+    /// A heading within the case.
+    Heading(String),
+    /// A paragraph, Markdown.
+    Text(String),
+    /// Numbers.
+    Table(Table),
+    /// Curves.
+    Figure(Figure),
+    /// A measured number and its bound.
+    Claim(Claim),
+}
+
+/// A table with what it is measured against.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Table {
+    /// What it shows, with truth and units where the heads do not say them.
+    pub caption: String,
+    /// Heads of the columns.
+    pub columns: Vec<String>,
+    /// Cells, one vector per row.
+    pub rows: Vec<Vec<Cell>>,
+}
+
+/// A cell of a table.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum Cell {
+    /// A word.
+    Text(String),
+    /// A number and how it is printed.
+    Number {
+        /// In the unit of the column; relative errors as fractions.
+        value: f64,
+        /// Look.
+        #[serde(skip)]
+        look: Look,
+    },
+}
+
+/// How a number is printed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Look {
+    /// With so many decimals.
+    Decimals(usize),
+    /// With so many significant digits.
+    Digits(usize),
+    /// Relative error without sign.
+    Error,
+    /// Relative difference with sign.
+    Signed,
+}
+
+/// Curves over a common axis.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Figure {
+    /// Stem of its file.
+    pub name: String,
+    /// What it shows.
+    pub caption: String,
+    /// Label of the horizontal axis.
+    pub x_label: String,
+    /// Logarithmic horizontal axis.
+    pub logarithmic_x: bool,
+    /// Curves.
+    #[serde(skip)]
+    pub panels: Vec<Panel>,
+}
+
+/// A measured number that must keep a bound.
+#[derive(Clone, Debug, Serialize)]
+pub struct Claim {
+    /// A sentence.
+    pub text: String,
+    /// What it is measured against.
+    pub truth: String,
+    /// The number.
+    pub measured: f64,
+    /// The bound.
+    pub bound: Bound,
+    /// Whether it holds.
+    pub holds: bool,
+}
+
+/// A bound.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Bound {
+    /// Not above.
+    AtMost(f64),
+    /// Not below: an effect that must show.
+    AtLeast(f64),
+}
+
+impl Bound {
+    fn holds(self, x: f64) -> bool {
+        match self {
+            Self::AtMost(bound) => x <= bound,
+            Self::AtLeast(bound) => x >= bound,
+        }
+    }
+
+    fn text(self) -> String {
+        match self {
+            Self::AtMost(bound) => format!("≤ {}", bare_error(bound)),
+            Self::AtLeast(bound) => format!("≥ {}", bare_error(bound)),
+        }
+    }
+}
+
+impl Claim {
+    /// The number as printed.
+    pub fn found(&self) -> String {
+        if self.measured.is_finite() { bare_error(self.measured) } else { "-".into() }
+    }
+
+    /// The bound as printed.
+    pub fn limit(&self) -> String {
+        self.bound.text()
+    }
+}
+
+impl Case {
+    /// A case without content.
+    pub fn new(name: &str, title: &str) -> Self {
+        Self { name: name.into(), title: title.into(), blocks: Vec::new() }
+    }
+
+    /// Adds a heading.
+    pub fn heading(&mut self, text: &str) {
+        self.blocks.push(Block::Heading(text.into()));
+    }
+
+    /// Adds a paragraph.
+    pub fn text(&mut self, text: impl Into<String>) {
+        self.blocks.push(Block::Text(text.into()));
+    }
+
+    /// Adds a table.
+    pub fn table(&mut self, table: Table) {
+        self.blocks.push(Block::Table(table));
+    }
+
+    /// Adds a figure.
+    pub fn figure(&mut self, figure: Figure) {
+        self.blocks.push(Block::Figure(figure));
+    }
+
+    /// Adds a claim; a number that is not finite does not hold.
+    pub fn claim(&mut self, text: impl Into<String>, truth: impl Into<String>, measured: f64, bound: Bound) {
+        let holds = bound.holds(measured);
+        self.blocks.push(Block::Claim(Claim { text: text.into(), truth: truth.into(), measured, bound, holds }));
+    }
+
+    /// Its claims, in order.
+    pub fn claims(&self) -> impl Iterator<Item = &Claim> {
+        self.blocks.iter().filter_map(|block| match block {
+            Block::Claim(claim) => Some(claim),
+            _ => None,
+        })
+    }
+
+    /// Its figures, in order.
+    pub fn figures(&self) -> impl Iterator<Item = &Figure> {
+        self.blocks.iter().filter_map(|block| match block {
+            Block::Figure(figure) => Some(figure),
+            _ => None,
+        })
+    }
+}
+
+impl Table {
+    /// A table with these heads.
+    pub fn new(caption: impl Into<String>, columns: &[&str]) -> Self {
+        Self { caption: caption.into(), columns: columns.iter().map(|&c| c.into()).collect(), rows: Vec::new() }
+    }
+}
+
+impl Figure {
+    /// The picture.
+    ///
+    /// # Errors
+    /// Where there is nothing to draw.
+    pub fn svg(&self) -> Result<String, PlotError> {
+        flexarm_log::page_plot(&self.x_label, self.logarithmic_x, &self.panels)
+    }
+}
+
+/// A word as a cell.
+pub fn word(text: impl Into<String>) -> Cell {
+    Cell::Text(text.into())
+}
+
+/// A number with so many decimals.
+pub fn fixed(value: f64, decimals: usize) -> Cell {
+    Cell::Number { value, look: Look::Decimals(decimals) }
+}
+
+/// A number with so many significant digits.
+pub fn digits(value: f64, digits: usize) -> Cell {
+    Cell::Number { value, look: Look::Digits(digits) }
+}
+
+/// A relative error.
+pub fn error(value: f64) -> Cell {
+    Cell::Number { value: value.abs(), look: Look::Error }
+}
+
+/// A relative difference with its sign.
+pub fn signed(value: f64) -> Cell {
+    Cell::Number { value, look: Look::Signed }
+}
+
+impl Cell {
+    /// As printed.
+    pub fn print(&self) -> String {
+        match self {
+            Self::Text(text) => text.clone(),
+            Self::Number { value, .. } if !value.is_finite() => "-".into(),
+            Self::Number { value, look: Look::Decimals(n) } => {
+                let text = format!("{value:.n$}");
+                // A zero has no sign.
+                let is_zero = text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.');
+                if is_zero { text.trim_start_matches('-').into() } else { text }
+            }
+            Self::Number { value, look: Look::Digits(n) } => significant(*value, *n),
+            Self::Number { value, look: Look::Error } => bare_error(*value),
+            Self::Number { value, look: Look::Signed } => {
+                let size = bare_error(value.abs());
+                let sign = if *value < 0.0 { "-" } else { "+" };
+                if value.abs() < FLOOR { size } else { format!("{sign}{size}") }
+            }
+        }
+    }
+}
+
+/// Per cent where a person thinks in them, else powers of ten.
+pub(crate) fn bare_error(x: f64) -> String {
+    match x {
+        _ if x < FLOOR => "< 1e-9".into(),
+        _ if x < 1e-3 => format!("{x:.1e}"),
+        _ => format!("{} %", significant(100.0 * x, 2)),
+    }
+}
+
+/// `n` significant digits without an exponent between 1e-4 and 1e6.
+fn significant(x: f64, n: usize) -> String {
+    if x == 0.0 {
+        return "0".into();
+    }
+    let scientific = format!("{:.*e}", n - 1, x);
+    let exponent: i32 = scientific.split('e').nth(1).and_then(|e| e.parse().ok()).unwrap_or(0);
+    if !(-4..6).contains(&exponent) {
+        return scientific;
+    }
+    format!("{:.*}", (n as i32 - 1 - exponent).max(0) as usize, x)
+}
+
+/// Markdown of a case; pictures are looked for in `folder`.
+pub fn markdown(case: &Case, folder: &str) -> String {
+    let mut text = format!("## {}\n", case.title);
+    for block in &case.blocks {
+        match block {
+            Block::Heading(heading) => text += &format!("\n### {heading}\n"),
+            Block::Text(paragraph) => text += &format!("\n{paragraph}\n"),
+            Block::Table(table) => text += &format!("\n{}", table_text(table)),
+            Block::Figure(figure) => {
+                let Figure { name, caption, .. } = figure;
+                text += &format!("\n![{caption}]({folder}/{name}.svg)\n\n*{caption}*\n");
+            }
+            // They stand together at the top of the page.
+            Block::Claim(_) => {}
+        }
+    }
+    text
+}
+
+pub(crate) fn table_text(table: &Table) -> String {
+    let row = |cells: Vec<String>| format!("| {} |\n", cells.join(" | "));
+    let heads = row(table.columns.clone()) + &row(vec!["---".into(); table.columns.len()]);
+    let rows: String = table.rows.iter().map(|cells| row(cells.iter().map(Cell::print).collect())).collect();
+    format!("{}\n\n{heads}{rows}", table.caption)
+}
+
+/// All claims of all cases as one table.
+pub fn claims_table(cases: &[Case]) -> Table {
+    let mut table = Table::new("", &["case", "claim", "truth", "measured", "bound", ""]);
+    for case in cases {
+        for claim in case.claims() {
+            let holds = if claim.holds { "holds" } else { "**does not hold**" };
+            let cells = [&case.name, &claim.text, &claim.truth, &claim.found(), &claim.limit(), holds];
+            table.rows.push(cells.into_iter().map(|text| word(text.to_owned())).collect());
+        }
+    }
+    table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_printed_as_a_person_reads_them() {
+        let cases = [
+            (error(3.21e-12), "< 1e-9"),
+            (error(-4.56e-7), "4.6e-7"),
+            (error(0.00655), "0.66 %"),
+            (error(0.166), "17 %"),
+            (error(1.5), "150 %"),
+            (signed(-0.041), "-4.1 %"),
+            (signed(2e-10), "< 1e-9"),
+            (fixed(-0.00001, 3), "0.000"),
+            (digits(17.42284, 6), "17.4228"),
+            (digits(2.675693401e-7, 4), "2.676e-7"),
+            (digits(0.0, 4), "0"),
+            (fixed(f64::NAN, 2), "-"),
+        ];
+        for (cell, text) in cases {
+            assert_eq!(cell.print(), text);
+        }
+    }
+
+    #[test]
+    fn what_is_no_number_holds_no_bound() {
+        let mut case = Case::new("a", "A");
+        case.claim("x", "y", f64::NAN, Bound::AtMost(1.0));
+        case.claim("x", "y", f64::NAN, Bound::AtLeast(1.0));
+        case.claim("x", "y", 0.5, Bound::AtMost(1.0));
+        assert_eq!(case.claims().map(|c| c.holds).collect::<Vec<_>>(), [false, false, true]);
+    }
+}
