@@ -19,7 +19,7 @@ from scipy.optimize import brentq
 from robot_file import Arm, origin
 
 ROOT = Path(__file__).parent.parent
-FILES = {"pick_and_place.toml": "kr210", "point_to_point.toml": "kr210", "stress.toml": "kr210", "iso9283_path.csv": "kr210",
+FILES = {"pick_and_place.toml": "kr210", "point_to_point.toml": "kr210", "large_moves.toml": "kr210", "stress.toml": "kr210", "iso9283_path.csv": "kr210",
          "reference_arm.toml": "reference_arm", "beam_hold.toml": "one_beam", "beam_swing.toml": "three_beams",
          "manutec_r3.toml": "manutec_r3", "identified_arms.toml": ("kr210_identified", "kr500_identified"), "three_mass.toml": "abb_three_mass"}
 PAYLOAD_HALF_SIZE = np.array([0.25, 0.25, 0.20])                     # m; the box behind the inertia of the payload

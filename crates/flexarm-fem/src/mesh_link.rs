@@ -60,8 +60,8 @@ pub struct LinkPlan {
     pub split: SplitAt,
     /// Chains to make, by their number of parts.
     pub chains: Vec<usize>,
-    /// Bodies that ride on the link without being in its mesh (motors, gears, cables), link axes; each
-    /// joins the rigid part on whose side of the cut its centre of mass lies.
+    /// Bodies that ride on the link without being in its mesh (motors, gears, cables), link axes; each stays
+    /// rigidly on the interface on whose side of the split its centre of mass lies, so in a chain it joins the first or last part.
     pub attached: Vec<RigidPart>,
     /// Whether the modal link gets its stiffness by initial stress; 12 more solves and a pass over all elements.
     pub geometric: bool,
@@ -324,18 +324,20 @@ fn split(
     Ok((frames.with_split(Pose::translation(p_LS.x, p_LS.y, p_LS.z)), parts))
 }
 
-/// Merges bodies into the parts on whose side of the joints they lie.
+/// Merges bodies into the part of that interface on whose side of the split they lie: the two-part link, chains and modal links
+/// then carry them alike.
 fn attach(attached: &[RigidPart], link: &mut ReducedLink, chains: &mut [Chain]) -> Result<(), FemError> {
-    let along = link.p_AB();
-    let is_beyond =
-        |body: &RigidPart, joint: &ElasticSplit| (body.com - joint.X_LS.translation.vector).dot(&along) > 0.0;
+    let (along, p_LS) = (link.p_AB(), link.split.X_LS.translation.vector);
     for body in attached {
         body.check("an attached body")?;
-        let part = if is_beyond(body, &link.split) { &mut link.distal } else { &mut link.proximal };
+        let is_beyond = (body.com - p_LS).dot(&along) > 0.0;
+        let part = if is_beyond { &mut link.distal } else { &mut link.proximal };
         *part = part.merged(body);
         for chain in chains.iter_mut() {
-            let index = chain.joints.iter().filter(|joint| is_beyond(body, joint)).count();
-            chain.parts[index] = chain.parts[index].merged(body);
+            let end = if is_beyond { chain.parts.last_mut() } else { chain.parts.first_mut() };
+            if let Some(end) = end {
+                *end = end.merged(body);
+            }
         }
     }
     Ok(())

@@ -196,8 +196,7 @@ fn check_explicit_step(arm: &FlexibleArm, h: f64) -> Result<(), StepError> {
     let mut rate = 0.0f64;
     for (j, omega) in arm.modes.omega.iter().enumerate() {
         let phi = arm.modes.shapes.column(j);
-        let decay = phi.dot(&(&arm.D * phi)); // 2 ζ ω
-        rate = rate.max(omega * STABILITY_LIMIT / 2.61).max(decay);
+        rate = rate.max(omega * STABILITY_LIMIT / 2.61).max(fastest_decay(phi.dot(&(&arm.D * phi)), *omega));
     }
     let mut highest = arm.modes.omega.last().copied().unwrap_or(0.0);
     if !arm.torque_driven.is_empty() {
@@ -215,6 +214,12 @@ fn check_explicit_step(arm: &FlexibleArm, h: f64) -> Result<(), StepError> {
         highest_hz: highest / std::f64::consts::TAU,
         largest_s: STABILITY_LIMIT / rate,
     })
+}
+
+/// Decay (1/s) of a mode with damping `2 ζ ω`; an oscillating one is bounded by its frequency alone.
+fn fastest_decay(damping: f64, omega: f64) -> f64 {
+    let squared = damping * damping - 4.0 * omega * omega;
+    if squared > 0.0 { 0.5 * (damping + squared.sqrt()) } else { 0.0 }
 }
 
 /// Highest angular frequency and decay (1/s) with the joints driven by torque free, friction near standstill left out.

@@ -12,6 +12,7 @@
 pub mod bench;
 pub mod check;
 mod files;
+mod manipulator;
 mod one_beam;
 pub mod page;
 pub mod textbook;
@@ -29,7 +30,7 @@ pub use files::{PAGE, VerificationFiles};
 type Entry = (&'static str, fn(&Bench) -> Result<Case, Error>);
 
 /// The cases, in the order of the page.
-const CASES: [Entry; 1] = [("one-beam", one_beam::case)];
+const CASES: [Entry; 2] = [("one-beam", one_beam::case), ("manipulator", manipulator::case)];
 
 /// Names of the cases.
 pub fn case_names() -> Vec<&'static str> {

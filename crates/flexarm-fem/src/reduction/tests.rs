@@ -513,7 +513,7 @@ fn a_link_with_all_its_details_reads_back_the_same() {
 
 /// Motors and gears ride on the parts; the static model and the mesh's own checks do not see them.
 #[test]
-fn an_attached_body_joins_the_part_on_whose_side_it_lies() {
+fn an_attached_body_stays_on_the_interface_on_whose_side_it_lies() {
     let (mesh, interfaces) = casting(ElementKind::Tet10, [Tie::Rigid; 2]);
     let bare_plan = LinkPlan { chains: vec![4], ..plan(interfaces, STEEL, 0) };
     let bare = reduce_mesh(&mesh, &bare_plan, &mut |_| ()).unwrap();
@@ -522,15 +522,16 @@ fn an_attached_body_joins_the_part_on_whose_side_it_lies() {
         com: Vector3::new(x, 0.0, 0.1),
         inertia: nalgebra::Matrix3::identity() * 0.05,
     };
-    let with = LinkPlan { attached: vec![motor(0.1), motor(0.9)], ..bare_plan };
+    let with = LinkPlan { attached: vec![motor(0.3), motor(0.7)], ..bare_plan };
     let with = reduce_mesh(&mesh, &with, &mut |_| ()).unwrap();
     assert!((with.link.proximal.mass - bare.link.proximal.mass - 12.0).abs() < 1e-12);
-    let expected = bare.link.distal.merged(&motor(0.9));
+    let expected = bare.link.distal.merged(&motor(0.7));
     assert!((with.link.distal.inertia - expected.inertia).amax() < 1e-12);
     let masses = |result: &MeshReduction| -> Vec<f64> {
         result.link.details.as_ref().unwrap().chains[0].parts.iter().map(|p| p.mass).collect()
     };
     let gained: Vec<f64> = masses(&with).iter().zip(masses(&bare)).map(|(a, b)| a - b).collect();
+    // Not where its centre lies: that part would bend away under it, which the modal link and the two parts do not know.
     assert!((gained[0] - 12.0).abs() < 1e-12 && gained[1].abs() < 1e-12 && (gained[3] - 12.0).abs() < 1e-12);
     assert_eq!(with.link.K_BB, bare.link.K_BB);
 }

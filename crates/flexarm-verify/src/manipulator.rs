@@ -1,0 +1,296 @@
+//! The whole manipulator in motion: link models and steppers against modal links, links against drives.
+
+use std::ops::ControlFlow;
+
+use flexarm::{
+    ConstraintForm, DriveModel, Error, LinkModel, Modelling, Motion, ReferenceSettings, Robot, RunOptions, SpookPreset,
+    SpookSettings, StepperKind, Summary, Trace, simulate_traced,
+};
+use flexarm_log::{CurveLook, Panel, PlotCurve};
+use flexarm_stepping::Damping;
+use nalgebra::Vector3;
+
+use crate::bench::{ALPHA, Bench, modal, parts, spook};
+use crate::page::{Bound, Case, Figure, Table, digits, error, fixed, signed, word};
+
+const LINKS: &str = "robots/kr210/robot.toml";
+const DRIVES: &str = "robots/kr210/drives.toml";
+/// Modes in the castings' files.
+const ALL_MODES: usize = 10;
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// A run that was made, seen every 2 ms.
+struct Run {
+    summary: Summary,
+    trace: Trace,
+}
+
+impl Run {
+    fn new(
+        robot: &Robot,
+        motion: &Motion,
+        modelling: Modelling,
+        stepper: StepperKind,
+        step_s: f64,
+    ) -> Result<Self, Error> {
+        let options = RunOptions { stepper, step_s, modelling, log_rate_hz: 500.0, ..RunOptions::default() };
+        let (summary, trace) = simulate_traced(robot, motion, &options, None, &mut |_, _| ControlFlow::Continue(()))?;
+        Ok(Self { summary, trace })
+    }
+
+    fn tool(&self) -> impl Iterator<Item = Vector3<f64>> {
+        self.trace.rows.iter().map(|row| Vector3::from(row.flexible_m))
+    }
+
+    /// Flexible minus rigid tool.
+    fn deflection(&self) -> impl Iterator<Item = Vector3<f64>> {
+        self.trace.rows.iter().map(|row| Vector3::from(row.flexible_m) - Vector3::from(row.rigid_m))
+    }
+
+    /// Largest deflection, of all and of x, y, z.
+    fn peaks(&self) -> [f64; 4] {
+        peaks(self.deflection())
+    }
+
+    /// Largest distance of the tools of two runs, of all and of x, y, z.
+    fn apart(&self, other: &Self) -> [f64; 4] {
+        peaks(self.tool().zip(other.tool()).map(|(a, b)| a - b))
+    }
+}
+
+/// Largest length, then largest component along x, y, z.
+fn peaks(vectors: impl Iterator<Item = Vector3<f64>>) -> [f64; 4] {
+    vectors.fold([0.0; 4], |m, v| [m[0].max(v.norm()), m[1].max(v.x.abs()), m[2].max(v.y.abs()), m[3].max(v.z.abs())])
+}
+
+/// The case.
+pub(crate) fn case(bench: &Bench) -> Result<Case, Error> {
+    let mut case = Case::new("manipulator", "4. A whole manipulator");
+    case.text(
+        "`robots/kr210`: a six-axis arm of the KR 210 class with 150 kg; link arm and forearm are castings, reduced from meshes of 10-node tetrahedra. \
+         Joints follow the motion exactly. Deflection is the flexible tool minus the rigid one, world axes. Truth is the same robot with modal links \
+         (all ten fixed-interface modes) by the stepper with error control, tolerance 1e-8.",
+    );
+    let robot = bench.robot(LINKS)?;
+    let moves: &[&str] =
+        if bench.quick { &["point_to_point"] } else { &["pick_and_place", "point_to_point", "large_moves"] };
+    for name in moves {
+        methods(&mut case, bench, &robot, name)?;
+    }
+    which_flexibility(&mut case, bench, moves)?;
+    elastic_drives(&mut case, bench, moves[moves.len() - 1])?;
+    Ok(case)
+}
+
+const SOURCE: StepperKind =
+    StepperKind::Spook(SpookSettings { form: ConstraintForm::Local, preset: SpookPreset::Source });
+
+/// One motion, every model and stepper.
+fn methods(case: &mut Case, bench: &Bench, robot: &Robot, name: &str) -> Result<(), Error> {
+    let motion = bench.motion(robot, &format!("trajectories/{name}.toml"))?;
+    case.heading(&format!("`trajectories/{name}.toml`, links alone"));
+    let reference = StepperKind::Reference(ReferenceSettings::new(1e-8));
+    let truth = Run::new(robot, &motion, modal(ALL_MODES), reference, 2e-3)?;
+    let [peak, ..] = truth.peaks();
+    let (local, global) = (spook(ConstraintForm::Local), spook(ConstraintForm::Global));
+    // SPOOK damps each spring in proportion to its stiffness; with such damping in both, only the steppers differ.
+    let mut proportional = robot.clone();
+    let first = truth.summary.frequencies_hz[0];
+    for link in &mut proportional.flexible {
+        link.damping = Damping::StiffnessProportional(2.0 * 0.03 / (std::f64::consts::TAU * first));
+    }
+    let runs: Vec<(&str, &str, &Robot, Modelling, StepperKind, f64)> = vec![
+        ("2 parts", "spring-damper, 1 ms", robot, parts(2), ALPHA, 1e-3),
+        ("3 parts", "spring-damper, 1 ms", robot, parts(3), ALPHA, 1e-3),
+        ("4 parts", "spring-damper, 1 ms", robot, parts(4), ALPHA, 1e-3),
+        ("8 parts", "spring-damper, 1 ms", robot, parts(8), ALPHA, 1e-3),
+        ("2 parts", "compliant constraints, local, 1 ms", robot, parts(2), local, 1e-3),
+        ("2 parts", "compliant constraints, local, 0.1 ms", robot, parts(2), local, 1e-4),
+        ("2 parts", "compliant constraints, global, 0.1 ms", robot, parts(2), global, 1e-4),
+        ("4 parts", "compliant constraints, local, 0.1 ms", robot, parts(4), local, 1e-4),
+        ("2 parts", "compliant constraints, preset `source`, 1 ms", robot, parts(2), SOURCE, 1e-3),
+        ("modal, 0 modes", "spring-damper, 1 ms", robot, modal(0), ALPHA, 1e-3),
+        ("modal, 10 modes", "spring-damper, 1 ms", robot, modal(ALL_MODES), ALPHA, 1e-3),
+    ];
+    let mut table = Table::new(
+        format!(
+            "Largest deflection along x, y, z and in all [mm], sag at the start [mm], first frequency there [Hz]; then the largest distance of the tool from that of the \
+             truth along x, y, z and in all, in per cent of the truth's peak of {:.4} mm. {} s, tool seen every 2 ms.",
+            1e3 * peak,
+            truth.summary.duration_s
+        ),
+        &["links", "stepper", "x", "y", "z", "peak", "sag", "f_1", "Δx", "Δy", "Δz", "Δ"],
+    );
+    let row = |links: &str, stepper: &str, run: &Run, against: Option<&Run>| {
+        let [all, x, y, z] = run.peaks();
+        let sag = run.summary.tcp.as_ref().map_or(f64::NAN, |tcp| tcp.static_sag_m);
+        let mut cells = vec![word(links), word(stepper)];
+        cells.extend([x, y, z, all, sag].map(|u| fixed(1e3 * u, 4)));
+        cells.push(digits(run.summary.frequencies_hz.first().copied().unwrap_or(f64::NAN), 5));
+        match against {
+            Some(truth) => {
+                let [all, x, y, z] = run.apart(truth);
+                cells.extend([x, y, z, all].map(|u| error(u / peak)));
+            }
+            None => cells.extend(["", "", "", ""].map(word)),
+        }
+        cells
+    };
+    let rigid = Run::new(robot, &motion, Modelling { links: LinkModel::Rigid, ..Modelling::default() }, ALPHA, 2e-3)?;
+    table.rows.push(row("rigid", "-", &rigid, Some(&truth)));
+    let mut kept = Vec::new();
+    for (links, stepper, robot, modelling, kind, h) in &runs {
+        let run = Run::new(robot, &motion, *modelling, *kind, *h)?;
+        table.rows.push(row(links, stepper, &run, Some(&truth)));
+        kept.push((format!("{links}, {stepper}"), run.apart(&truth)[0] / peak, run));
+    }
+    table.rows.push(row("modal, 10 modes", "error control (truth)", &truth, None));
+    case.table(table);
+    let claim = |case: &mut Case, k: usize, bound: f64| {
+        let (what, apart, _) = &kept[k];
+        let text = format!("tool on {name}, {what}: largest distance over the peak deflection");
+        case.claim(text, "modal links, error control", *apart, Bound::AtMost(bound));
+    };
+    // Spring-damper and compliant constraints with two parts; the chain that closes what is left; the stepper alone.
+    claim(case, 0, 0.01);
+    claim(case, 5, 0.01);
+    claim(case, 3, 0.002);
+    claim(case, 10, 0.002);
+
+    // Where the rest of compliant constraints comes from: same model, same damping, stepper with error control.
+    let exact = Run::new(&proportional, &motion, parts(2), reference, 2e-3)?;
+    let mut split = Table::new(
+        format!(
+            "Compliant constraints (local) taken apart, same two parts: distance of the tool from the stepper with error control, over the peak, with damping \
+             proportional to stiffness in both (3 % of {first:.2} Hz). What is left is the stepper's own error."
+        ),
+        &["step", "distance", "spring-damper, same step"],
+    );
+    let steps: &[f64] = if bench.quick { &[1e-3] } else { &[2e-3, 1e-3, 5e-4, 1e-4] };
+    for &h in steps {
+        let mut cells = vec![word(format!("{} ms", 1e3 * h))];
+        for kind in [local, ALPHA] {
+            cells.push(error(Run::new(&proportional, &motion, parts(2), kind, h)?.apart(&exact)[0] / peak));
+        }
+        split.rows.push(cells);
+    }
+    case.table(split);
+
+    let mut panels = Vec::new();
+    let shown = [0, 5];
+    for (axis, letter) in AXES.iter().enumerate() {
+        let curve = |name: &str, look, run: &Run| PlotCurve {
+            name: name.into(),
+            look,
+            x: run.trace.rows.iter().map(|row| row.time_s).collect(),
+            y: run.deflection().map(|d| 1e3 * d[axis]).collect(),
+        };
+        let mut curves = vec![curve("modal", CurveLook::Total, &truth)];
+        curves.extend(shown.map(|k| curve(&kept[k].0, CurveLook::Dashed, &kept[k].2)));
+        panels.push(Panel { label: format!("deflection {letter} [mm]"), logarithmic: false, legend: true, curves });
+    }
+    let distances = [0, 3, 5].map(|k| PlotCurve {
+        name: kept[k].0.clone(),
+        look: if shown.contains(&k) { CurveLook::Dashed } else { CurveLook::Plain },
+        x: truth.trace.rows.iter().map(|row| row.time_s).collect(),
+        y: kept[k].2.tool().zip(truth.tool()).map(|(a, b)| 100.0 * (a - b).norm() / peak).collect(),
+    });
+    panels.push(Panel { label: "Δ [% of peak]".into(), logarithmic: false, legend: true, curves: distances.into() });
+    case.figure(Figure {
+        name: format!("manipulator-{}", name.replace('_', "-")),
+        caption: format!("{name}: deflection of the tool, and distance from modal links"),
+        x_label: "time [s]".into(),
+        logarithmic_x: false,
+        panels,
+    });
+    Ok(())
+}
+
+/// Links, drives, both.
+fn which_flexibility(case: &mut Case, bench: &Bench, moves: &[&str]) -> Result<(), Error> {
+    case.heading("Which flexibility matters");
+    case.text(
+        "`robots/kr210/drives.toml` has gearboxes that yield, besides: stiffness and damping identified on another KR 210 whose links were taken as rigid (so what bends \
+         in them is in the gearboxes' numbers too, and \"both\" is an upper bound). Motors follow the motion exactly; spring-damper, two parts, 1 ms.",
+    );
+    let robot = bench.robot(DRIVES)?;
+    let mut table = Table::new(
+        "Largest deflection along x, y, z, in all and its RMS [mm]; sag at the start [mm]; first frequencies there [Hz].",
+        &["motion", "flexible", "x", "y", "z", "peak", "RMS", "sag", "f_1", "f_2", "f_3", "f_4"],
+    );
+    let both = Modelling::default();
+    let kinds = [
+        ("links", Modelling { drives: DriveModel::Rigid, ..both }),
+        ("drives", Modelling { links: LinkModel::Rigid, ..both }),
+        ("both", both),
+    ];
+    let mut additive = 0.0f64;
+    for name in moves {
+        let motion = bench.motion(&robot, &format!("trajectories/{name}.toml"))?;
+        let runs: Vec<Run> =
+            kinds.iter().map(|(_, m)| Run::new(&robot, &motion, *m, ALPHA, 1e-3)).collect::<Result<_, Error>>()?;
+        for ((what, _), run) in kinds.iter().zip(&runs) {
+            let [all, x, y, z] = run.peaks();
+            let tcp = run.summary.tcp.as_ref();
+            let (rms, sag) = tcp.map_or((f64::NAN, f64::NAN), |tcp| (tcp.rms_m, tcp.static_sag_m));
+            let mut cells = vec![word(*name), word(*what)];
+            cells.extend([x, y, z, all, rms, sag].map(|u| fixed(1e3 * u, 3)));
+            cells.extend(run.summary.frequencies_hz.iter().take(4).map(|f| digits(*f, 4)));
+            table.rows.push(cells);
+        }
+        // At rest compliances in series add.
+        let sags: Vec<Vector3<f64>> = runs.iter().filter_map(|run| run.deflection().next()).collect();
+        if let [links, drives, both] = sags[..] {
+            additive = additive.max((links + drives - both).norm() / both.norm());
+        }
+    }
+    case.table(table);
+    case.claim(
+        "sag of links and drives together: sum of the two alone",
+        "series springs, to first order",
+        additive,
+        Bound::AtMost(0.01),
+    );
+    case.text(
+        "Drives of this class give more than the castings do, and both together lower the first frequency further. The motion decides the ratio: the sums of peaks are \
+         larger than the peak of both where the two do not peak at one time.",
+    );
+    Ok(())
+}
+
+/// The methods again with drives that yield.
+fn elastic_drives(case: &mut Case, bench: &Bench, name: &str) -> Result<(), Error> {
+    case.heading(&format!("`trajectories/{name}.toml`, links and drives"));
+    let robot = bench.robot(DRIVES)?;
+    let motion = bench.motion(&robot, &format!("trajectories/{name}.toml"))?;
+    let truth =
+        Run::new(&robot, &motion, modal(ALL_MODES), StepperKind::Reference(ReferenceSettings::new(1e-8)), 2e-3)?;
+    let [peak, ..] = truth.peaks();
+    let mut table = Table::new(
+        format!(
+            "Largest distance of the tool from modal links with the same drives, over their peak of {:.3} mm.",
+            1e3 * peak
+        ),
+        &["links", "stepper", "Δx", "Δy", "Δz", "Δ", "peak"],
+    );
+    let rows = [
+        ("2 parts", "spring-damper, 1 ms", parts(2), ALPHA, 1e-3),
+        ("8 parts", "spring-damper, 1 ms", parts(8), ALPHA, 1e-3),
+        ("2 parts", "compliant constraints, local, 0.1 ms", parts(2), spook(ConstraintForm::Local), 1e-4),
+        ("2 parts", "compliant constraints, global, 0.1 ms", parts(2), spook(ConstraintForm::Global), 1e-4),
+    ];
+    for (links, stepper, modelling, kind, h) in rows {
+        let run = Run::new(&robot, &motion, modelling, kind, h)?;
+        let [all, x, y, z] = run.apart(&truth);
+        let mut cells = vec![word(links), word(stepper)];
+        cells.extend([x, y, z, all].map(|u| error(u / peak)));
+        cells.push(signed(run.peaks()[0] / peak - 1.0));
+        table.rows.push(cells);
+        if !stepper.contains("global") {
+            let text = format!("tool on {name} with elastic drives, {links}, {stepper}");
+            case.claim(text, "modal links, error control", all / peak, Bound::AtMost(0.01));
+        }
+    }
+    case.table(table);
+    Ok(())
+}
