@@ -20,7 +20,7 @@ use crate::mesh::Mesh;
 use crate::mesh_gate::{ElementQuality, MeshGate, ModeCheck};
 use crate::modal::ModalSource;
 use crate::model::{AssemblyError, AssemblyOptions, FeModel, materials};
-use crate::reduced::{ElasticSplit, LinkDetails, Provenance, ReducedLink};
+use crate::reduced::{LinkDetails, Provenance, ReducedLink};
 use crate::reduction::{
     Condensation, CondensationOptions, Interface, InterfaceFrame, ReductionError, SolverFigures, Superelement,
     spd_inverse, stiffness12, worst,

@@ -11,10 +11,12 @@
 
 pub mod bench;
 pub mod check;
+mod fe;
 mod files;
 mod manipulator;
 mod one_beam;
 pub mod page;
+mod programs;
 pub mod textbook;
 
 use std::ops::ControlFlow;
@@ -30,7 +32,8 @@ pub use files::{PAGE, VerificationFiles};
 type Entry = (&'static str, fn(&Bench) -> Result<Case, Error>);
 
 /// The cases, in the order of the page.
-const CASES: [Entry; 2] = [("one-beam", one_beam::case), ("manipulator", manipulator::case)];
+const CASES: [Entry; 3] =
+    [("one-beam", one_beam::case), ("manipulator", manipulator::case), ("programs", programs::case)];
 
 /// Names of the cases.
 pub fn case_names() -> Vec<&'static str> {

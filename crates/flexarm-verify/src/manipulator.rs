@@ -77,6 +77,14 @@ pub(crate) fn case(bench: &Bench) -> Result<Case, Error> {
     for name in moves {
         methods(&mut case, bench, &robot, name)?;
     }
+    case.text(
+        "**What is left, and why.** *Two parts* miss the modal links by 0.5 to 0.7 % of the peak, most of it at rest too: they carry the weight of each casting in two lumps (cases 1 and 3). \
+         *Chains* close two thirds of it and then stop: what stays, 0.1 to 0.2 %, is the sag of the forearm under its own weight. It does not shrink with the number of parts nor with \
+         the stiffness, so it is no term of second order. A chain's joints share the strain energy slice by slice, which is exact at the end; between, energy up to a section is the work of its force on its mean \
+         motion only while sections stay plane, and those of a drum with three openings do not. *Modal links* need no inner modes here: the first fixed-interface mode of a casting lies above \
+         400 Hz, the arm rings at 12 to 33 Hz. *Compliant constraints* have two causes more: damping in proportion to stiffness where the others damp each mode by 3 % (the difference of the rows at 0.1 ms), \
+         and their first order in the step. The preset `source` ties damping to the step and is that far away.",
+    );
     which_flexibility(&mut case, bench, moves)?;
     elastic_drives(&mut case, bench, moves[moves.len() - 1])?;
     Ok(case)
@@ -154,8 +162,8 @@ fn methods(case: &mut Case, bench: &Bench, robot: &Robot, name: &str) -> Result<
     // Spring-damper and compliant constraints with two parts; the chain that closes what is left; the stepper alone.
     claim(case, 0, 0.01);
     claim(case, 5, 0.01);
-    claim(case, 3, 0.002);
-    claim(case, 10, 0.002);
+    claim(case, 3, 0.004);
+    claim(case, 10, 2e-4);
 
     // Where the rest of compliant constraints comes from: same model, same damping, stepper with error control.
     let exact = Run::new(&proportional, &motion, parts(2), reference, 2e-3)?;
@@ -288,7 +296,7 @@ fn elastic_drives(case: &mut Case, bench: &Bench, name: &str) -> Result<(), Erro
         table.rows.push(cells);
         if !stepper.contains("global") {
             let text = format!("tool on {name} with elastic drives, {links}, {stepper}");
-            case.claim(text, "modal links, error control", all / peak, Bound::AtMost(0.01));
+            case.claim(text, "modal links, error control", all / peak, Bound::AtMost(0.004));
         }
     }
     case.table(table);

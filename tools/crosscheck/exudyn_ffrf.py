@@ -1,8 +1,8 @@
 """Modal links against Exudyn: the reference arm with both flexible links as floating-frame bodies, same meshes, same motion.
 
     cargo build --release -p flexarm-cli --no-default-features --features mcap
-    python tools/crosscheck_exudyn_ffrf.py                       # pip install exudyn ngsolve numpy scipy pin
-    python tools/crosscheck_exudyn_ffrf.py --curved --size-mm 25 --program target/release/flexarm --keep out/exudyn
+    python tools/crosscheck/exudyn_ffrf.py                       # pip install exudyn ngsolve numpy scipy pin
+    python tools/crosscheck/exudyn_ffrf.py --curved --size-mm 25 --program target/release/flexarm --keep out/exudyn
 
 Each link is meshed once as the hollow section it stands for (netgen, ten-node tetrahedra) at the density that gives its mass.
 flexarm gets the mesh as a file: `reduce`, then `model = "modal"`. Exudyn gets it through NGSolve, which assembles its own K and
@@ -47,10 +47,11 @@ from exudyn.solver import ComputeODE2Eigenvalues
 from exudyn.utilities import CreateSymbolicUserFunction, RigidBodyInertia
 from netgen import csg, meshing
 
+sys.path.insert(0, str(Path(__file__).parent.parent))
 from golden_reference_arm import Motion
 from robot_file import read_urdf, skew
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parent.parent.parent
 ROBOT = ROOT / "robots" / "reference_arm"
 MOTION = ROOT / "trajectories" / "reference_arm.toml"
 BETA = 0.0010536078174585805            # damping D = beta K of robots/reference_arm, s
