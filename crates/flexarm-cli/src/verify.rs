@@ -32,8 +32,8 @@ pub(crate) struct VerifyArgs {
     /// Write no files
     #[arg(long, conflicts_with_all = ["output", "force"])]
     pub(crate) no_files: bool,
-    /// Compare with a stored page instead of writing one; exit code 1 if it differs
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["output", "force", "quick", "cases"])]
+    /// Compare with a stored page of the same cases instead of writing one; exit code 1 if it differs
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["output", "force"])]
     pub(crate) check: Option<PathBuf>,
 }
 
@@ -93,8 +93,8 @@ fn text(verification: &Verification, changed: &[String], args: &VerifyArgs, page
         text += &format!("{}\n", case.title);
         for claim in case.claims() {
             let mark = if claim.holds { "ok  " } else { "FAIL" };
-            text +=
-                &format!("  {mark} {} {}  {} (against: {})\n", claim.found(), claim.limit(), claim.text, claim.truth);
+            let (found, limit) = (claim.found(), claim.limit());
+            text += &format!("  {mark} {found:>8} {limit:<9}  {} [{}]\n", claim.text, claim.truth);
         }
     }
     let all: usize = verification.cases.iter().map(|case| case.claims().count()).sum();

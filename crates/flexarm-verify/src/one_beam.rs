@@ -49,7 +49,8 @@ pub(crate) fn case(bench: &Bench) -> Result<Case, Error> {
     let mut case = Case::new("one-beam", "1. One beam");
     case.text(
         "`robots/one_beam`: a bar of aluminium, 0.8 m long, 20 mm wide and 40 mm high, clamped at A, a ball of 0.5 kg at its end B. \
-         Euler and Bernoulli's theory unless said otherwise, so closed forms are exact truths. x points along the bar, z upwards.",
+         Euler and Bernoulli's theory unless said otherwise, so closed forms are exact truths. x points along the bar, z upwards. \
+         By hand: `flexarm statics one_beam --wrench 0,0,10`, `flexarm modes one_beam --segments 5`.",
     );
     let robot = bench.robot(ROBOT)?;
     end_loads(&mut case, &robot)?;

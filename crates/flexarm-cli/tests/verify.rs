@@ -1,0 +1,54 @@
+//! `flexarm verify`: files, refusals, the check of a stored page, exit codes.
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
+mod common;
+
+use common::Place;
+
+const CASE: [&str; 3] = ["verify", "one-beam", "--quick"];
+
+#[test]
+fn a_case_is_written_once_and_then_checked() {
+    let place = Place::new();
+    let found = place.json(&[&CASE[..], &["-o", "page"]].concat());
+    assert_eq!(found["passed"], true);
+    assert!(found["wall_s"].as_f64().unwrap() > 0.0);
+    let claims = found["claims"].as_array().unwrap();
+    assert!(claims.len() > 20 && claims.iter().all(|c| c["case"] == "one-beam" && c["claim"]["holds"] == true));
+    assert_eq!(found["file"], "page/verification.md");
+    // The page names its pictures and they are there.
+    let page = place.text("page/verification.md");
+    assert!(page.contains("## 1. One beam") && page.contains("| --- |"), "{page}");
+    let pictures: Vec<&str> =
+        page.split("](verification/").skip(1).map(|rest| rest.split(')').next().unwrap()).collect();
+    assert!(pictures.len() >= 4);
+    for picture in pictures {
+        assert!(place.text(&format!("page/verification/{picture}")).starts_with("<svg"), "{picture}");
+    }
+    let numbers: serde_json::Value = serde_json::from_slice(&place.read("page/verification.json")).unwrap();
+    assert_eq!(numbers["cases"][0]["name"], "one-beam");
+
+    place.refused(&[&CASE[..], &["-o", "page"]].concat(), &["verification.md", "--force"]);
+
+    // The same page is what the command prints; another number is not, and says where.
+    let check = [&CASE[..], &["--check", "page/verification.md"]].concat();
+    let same = place.flexarm(&check);
+    assert_eq!((same.code, same.out.contains("is what this command prints")), (0, true), "{}", same.out);
+    let line = page.lines().position(|line| line.contains("| F_y | 91.4286 |")).unwrap() + 1;
+    place.write("page/verification.md", page.replacen("| F_y | 91.4286 |", "| F_y | 95.4286 |", 1));
+    let other = place.flexarm(&check);
+    assert_eq!(other.code, 1, "{}", other.out);
+    assert!(other.out.contains(&format!("line {line}\n")) && other.out.contains("95.4286"), "{}", other.out);
+}
+
+#[test]
+fn what_cannot_be_run_is_refused_with_what_can() {
+    let place = Place::new();
+    place.refused(&["verify", "two-beams"], &["two-beams", "one-beam", "manipulator"]);
+    place.refused(
+        &["verify", "one-beam", "--data", "nowhere", "--no-files", "-q"],
+        &["nowhere/robots/one_beam/robot.toml"],
+    );
+    place.refused(&["verify", "one-beam", "--check", "no.md"], &["no.md", "cannot be read"]);
+    place.refused(&["verify", "--no-files", "-o", "x"], &["--no-files"]);
+}
