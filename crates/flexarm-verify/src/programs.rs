@@ -178,8 +178,13 @@ fn stored_runs(case: &mut Case, stored: &Stored) -> Result<(), Error> {
         table.rows.push(cells);
 
         let (cpu, apart) = (number(&row["cpu_s_per_s"]), number(&row["error_peak_rel"]));
-        let drawn =
-            step.is_some() && cpu.is_finite() && apart > 0.0 && program != "Pinocchio" && !method.contains("rotation");
+        let is_model = row["note"].as_str().is_some_and(|note| note.starts_with("another model"));
+        let drawn = step.is_some()
+            && cpu.is_finite()
+            && apart > 0.0
+            && program != "Pinocchio"
+            && !is_model
+            && method != "discrete";
         if drawn {
             let stem = method.split(", rtol").next().unwrap_or(method);
             let name = format!("{program}: {stem}");
@@ -193,7 +198,6 @@ fn stored_runs(case: &mut Case, stored: &Stored) -> Result<(), Error> {
         }
         // Curves brought to no step, or the finest of a method of high order: they must be one.
         let converged = extrapolated || method == "RK4" && step.is_some_and(|h| h < 2e-4);
-        let is_model = row["note"].as_str().is_some_and(|note| note.starts_with("another model"));
         if converged && !is_model && program != "flexarm" {
             let text = format!("stored converged curve of {program} ({method})");
             case.claim(text, "Pinocchio, DOP853", apart, Bound::AtMost(1e-6));
@@ -210,7 +214,10 @@ fn stored_runs(case: &mut Case, stored: &Stored) -> Result<(), Error> {
     );
     case.figure(Figure {
         name: "programs-cost".into(),
-        caption: format!("{}: error over cost, one run on one machine", name(first)),
+        caption: format!(
+            "{}: error over cost, one run on one machine (without other models and MuJoCo's `discrete`)",
+            name(first)
+        ),
         x_label: "CPU [ms per simulated second]".into(),
         logarithmic_x: true,
         panels: vec![Panel { label: "error / peak".into(), logarithmic: true, legend: true, curves }],
