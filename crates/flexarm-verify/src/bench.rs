@@ -289,3 +289,20 @@ pub fn case(name: &str, title: &str) -> Case {
 pub fn step_error(source: StepError) -> Error {
     Error::Step { source, partial: false }
 }
+
+/// Displacement and rotation of a frame per acceleration of gravity (m/s², world axes), times `g`: from a hundredth of it up and
+/// down, so that what is left is linear.
+pub fn weight_response(
+    robot: &Robot,
+    modelling: &Modelling,
+    frame: Option<&str>,
+    g: &Vector3<f64>,
+) -> Result<Vector6<f64>, Error> {
+    const PART: f64 = 1e-2;
+    let under = |factor: f64| -> Result<Vector6<f64>, Error> {
+        let mut robot = robot.clone();
+        robot.rigid.gravity = factor * g;
+        Rig::new(&robot, modelling, frame)?.statics(&Vector6::zeros())
+    };
+    Ok((under(PART)? - under(-PART)?) / (2.0 * PART))
+}

@@ -11,13 +11,15 @@
 
 pub mod bench;
 pub mod check;
-mod fe;
 mod files;
+mod lower_arm;
 mod manipulator;
+mod meshed;
 mod one_beam;
 pub mod page;
 mod programs;
 pub mod textbook;
+mod three_beams;
 
 use std::ops::ControlFlow;
 
@@ -32,8 +34,13 @@ pub use files::{PAGE, VerificationFiles};
 type Entry = (&'static str, fn(&Bench) -> Result<Case, Error>);
 
 /// The cases, in the order of the page.
-const CASES: [Entry; 3] =
-    [("one-beam", one_beam::case), ("manipulator", manipulator::case), ("programs", programs::case)];
+const CASES: [Entry; 5] = [
+    ("one-beam", one_beam::case),
+    ("three-beams", three_beams::case),
+    ("lower-arm", lower_arm::case),
+    ("manipulator", manipulator::case),
+    ("programs", programs::case),
+];
 
 /// Names of the cases.
 pub fn case_names() -> Vec<&'static str> {

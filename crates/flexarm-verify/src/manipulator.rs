@@ -6,13 +6,15 @@ use flexarm::{
     ConstraintForm, DriveModel, Error, LinkModel, Modelling, Motion, ReferenceSettings, Robot, RunOptions, SpookPreset,
     SpookSettings, StepperKind, Summary, Trace, simulate_traced,
 };
+use flexarm_fem::element::Quadrature;
+use flexarm_fem::reduction::Tie;
 use flexarm_fem::{Material, UnitSystem};
 use flexarm_log::{CurveLook, Panel, PlotCurve};
 use flexarm_stepping::Damping;
 use nalgebra::{Matrix6, Vector3, Vector6};
 
 use crate::bench::{ALPHA, Bench, modal, parts, spook};
-use crate::fe::Fe;
+use crate::meshed::Meshed;
 use crate::page::{Bound, Case, Figure, Table, digits, error, fixed, signed, word};
 
 const LINKS: &str = "robots/kr210/robot.toml";
@@ -225,12 +227,13 @@ fn methods(case: &mut Case, bench: &Bench, robot: &Robot, name: &str) -> Result<
 fn where_chains_stop(case: &mut Case, bench: &Bench, robot: &Robot) -> Result<(), Error> {
     const PARTS: usize = 8;
     let ductile_iron = Material { E: 169e9, nu: 0.275, rho: 7100.0, G: None };
-    let fe = Fe::load(&bench.root.join("robots/kr210/fe/link_3.msh.gz"), UnitSystem::SI, ductile_iron)?;
+    let fe =
+        Meshed::read_with(bench, "robots/kr210/fe/link_3.msh.gz", UnitSystem::SI, ductile_iron, Quadrature::Exact)?;
     let Some(link) = robot.flexible.iter().map(|l| &l.flexible.reduced).find(|r| r.name == "link_3") else {
         return Ok(());
     };
     let (A, B) = (link.X_LA.translation.vector, link.X_LB.translation.vector);
-    let condensation = fe.condense(&[fe.rigid("interface_A", A.into())?, fe.rigid("interface_B", B.into())?])?;
+    let condensation = fe.condense(&[fe.interface("A", A, Tie::Rigid)?, fe.interface("B", B, Tie::Rigid)?])?;
     let U = condensation.unit_load_shapes();
     let weights = fe.model.M.product(&fe.model.rigid_modes(&Vector3::zeros()).columns(0, 3).into_owned());
     let line = (B - A).normalize();

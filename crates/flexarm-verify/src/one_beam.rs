@@ -1,8 +1,9 @@
 //! One clamped beam: everything that has an answer on paper.
 
 use flexarm::{ConstraintForm, Error, Robot, SpookPreset, SpookSettings, Start, StepperKind};
+use flexarm_fem::UnitSystem;
+use flexarm_fem::reduction::Tie;
 use flexarm_fem::sparse::ModesWanted;
-use flexarm_fem::{Material, UnitSystem};
 use flexarm_kinematics::LinkInertia;
 use flexarm_log::{CurveLook, Panel, PlotCurve};
 use flexarm_stepping::{Damping, Observation, ReferenceSettings, new_stepper};
@@ -12,7 +13,7 @@ use crate::bench::{
     ALPHA, Bench, LOADS, LUMPED, Rig, Stored, column_error, compliance_error, damped, modal, parts, small_loads, spook,
     step_error, weightless,
 };
-use crate::fe::Fe;
+use crate::meshed::Meshed;
 use crate::page::{Bound, Case, Figure, Table, digits, error, fixed, signed, word};
 use crate::textbook::{Stiffness, rectangle_torsion};
 
@@ -442,9 +443,12 @@ fn mesh(case: &mut Case, bench: &Bench, meshed: &Robot) -> Result<(), Error> {
          whose link is reduced from it.",
         stored.provenance()
     ));
-    let fe = Fe::load(&bench.root.join(MESH), UnitSystem::SI, Material::ALUMINIUM)?;
+    let fe = Meshed::read(bench, MESH, UnitSystem::SI)?;
     let stations = [0.2, 0.4, 0.6];
-    let mut interfaces = vec![fe.rigid("interface_A", [0.0; 3])?, fe.rigid("interface_B", [0.8, 0.0, 0.0])?];
+    let mut interfaces = vec![
+        fe.interface("A", Vector3::zeros(), Tie::Rigid)?,
+        fe.interface("B", Vector3::new(0.8, 0.0, 0.0), Tie::Rigid)?,
+    ];
     interfaces.extend(stations.map(|x| fe.section(x)));
     let condensation = fe.condense(&interfaces)?;
     let K = condensation.stiffness();
