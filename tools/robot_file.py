@@ -88,6 +88,14 @@ def read_urdf(path):
 
 
 # ---------------------------------------------------------------------------------------------- beam
+def box_shear_factor(along, across, nu):
+    """Cowper 1966, thin-walled box of one wall thickness; lengths of the midline along and across the force."""
+    m = n = across / along
+    return (10 * (1 + nu) * (1 + 3 * m)**2
+            / (12 + 72 * m + 150 * m**2 + 90 * m**3 + nu * (11 + 66 * m + 135 * m**2 + 90 * m**3)
+               + 10 * n**2 * ((3 + nu) * m + 3 * m**2)))
+
+
 def section_stiffness(beam):
     """EA, EI_y, EI_z, GJ, kGA_y, kGA_z and the squared section radii i_y2, i_z2 (rotary inertia over mass)."""
     kind = beam["section"]
@@ -104,7 +112,7 @@ def section_stiffness(beam):
         wi, hi = w - 2 * t, h - 2 * t
         A, I_y, I_z = w * h - wi * hi, (w * h**3 - wi * hi**3) / 12, (h * w**3 - hi * wi**3) / 12
         J = 4 * ((w - t) * (h - t))**2 * t / (2 * (w - t) + 2 * (h - t))          # Bredt
-        k_y, k_z = 2 * t * w / A, 2 * t * h / A
+        k_y, k_z = box_shear_factor(w - t, h - t, nu), box_shear_factor(h - t, w - t, nu)
     elif kind == "rectangle":
         w, h = beam["width"], beam["height"]
         A, I_y, I_z = w * h, w * h**3 / 12, h * w**3 / 12
