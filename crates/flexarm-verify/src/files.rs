@@ -90,7 +90,7 @@ impl Verification {
 
     /// Everything with all digits.
     pub fn json(&self) -> String {
-        serde_json::to_string_pretty(self).expect("plain numbers and strings")
+        serde_json::to_string(self).expect("plain numbers and strings")
     }
 
     /// Name and SVG of each picture.

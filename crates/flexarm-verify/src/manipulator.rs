@@ -21,6 +21,8 @@ const LINKS: &str = "robots/kr210/robot.toml";
 const DRIVES: &str = "robots/kr210/drives.toml";
 /// Modes in the castings' files.
 const ALL_MODES: usize = 10;
+/// Every so many samples are drawn: 4 ms, a seventh of the period of the fourth mode.
+const DRAWN: usize = 2;
 const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// A run that was made, seen every 2 ms.
@@ -196,8 +198,8 @@ fn methods(case: &mut Case, bench: &Bench, robot: &Robot, name: &str) -> Result<
         let curve = |name: &str, look, run: &Run| PlotCurve {
             name: name.into(),
             look,
-            x: run.trace.rows.iter().map(|row| row.time_s).collect(),
-            y: run.deflection().map(|d| 1e3 * d[axis]).collect(),
+            x: run.trace.rows.iter().step_by(DRAWN).map(|row| row.time_s).collect(),
+            y: run.deflection().step_by(DRAWN).map(|d| 1e3 * d[axis]).collect(),
         };
         let mut curves = vec![curve("modal", CurveLook::Total, &truth)];
         curves.extend(shown.map(|k| curve(&kept[k].0, CurveLook::Dashed, &kept[k].2)));
@@ -205,9 +207,9 @@ fn methods(case: &mut Case, bench: &Bench, robot: &Robot, name: &str) -> Result<
     }
     let distances = [0, 3, 5].map(|k| PlotCurve {
         name: kept[k].0.clone(),
-        look: if shown.contains(&k) { CurveLook::Dashed } else { CurveLook::Plain },
-        x: truth.trace.rows.iter().map(|row| row.time_s).collect(),
-        y: kept[k].2.tool().zip(truth.tool()).map(|(a, b)| 100.0 * (a - b).norm() / peak).collect(),
+        look: CurveLook::Plain,
+        x: truth.trace.rows.iter().step_by(DRAWN).map(|row| row.time_s).collect(),
+        y: kept[k].2.tool().zip(truth.tool()).step_by(DRAWN).map(|(a, b)| 100.0 * (a - b).norm() / peak).collect(),
     });
     panels.push(Panel { label: "Δ [% of peak]".into(), logarithmic: false, legend: true, curves: distances.into() });
     case.figure(Figure {
