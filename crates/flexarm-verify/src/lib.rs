@@ -1,7 +1,7 @@
 //! The case studies: each method against each truth, from shipped files, as tables, figures and claims with bounds.
 //!
 //! [`verify`] runs them, [`Verification::page`] makes the page `docs/verification.md`. A case is a module with one function
-//! that takes a [`Bench`] and returns a [`page::Case`]; a new one gets a line in [`CASES`]. What other programs computed is
+//! that takes a [`Bench`] and returns a [`page::Case`]; a new one gets a line in `CASES`. What other programs computed is
 //! stored in `tests/verification`, with the script that writes it.
 //!
 //! Not here: methods. Everything is done through the public faces of the other crates, and closed forms are written down

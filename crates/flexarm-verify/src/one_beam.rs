@@ -120,7 +120,7 @@ fn at(rig: &Rig, bodies: &[(usize, f64)], x: f64) -> Rig {
 
 /// Loads at stations along the bar, deflection and slope along it.
 fn stations(case: &mut Case, robot: &Robot) -> Result<(), Error> {
-    case.heading("Deflection along the beam, loads at stations");
+    case.heading("Deflection and rotation along the beam, loads at stations");
     case.text(
         "Rigid parts bend at their joints only, and there they shift as well as turn. At the end, and for loads at the end, that is exact; between, a link of \
          n parts is n straight pieces. Modal links are watched at their interfaces alone, so they are not in this table; the mesh below has its stations as interfaces.",
@@ -133,18 +133,17 @@ fn stations(case: &mut Case, robot: &Robot) -> Result<(), Error> {
     // The size does not matter as long as the bar hardly bends.
     let (force, moment) = (0.1, 0.1);
     let heads: Vec<String> = counts.iter().map(|n| format!("{n} parts")).collect();
-    let with = |caption: &str, what: &str| {
-        let mut table = Table::new(caption, &["load at a/l", "", what]);
+    let with = |caption: &str| {
+        let mut table = Table::new(caption, &["load at a/l", "", "", "closed form [µm, µrad]"]);
         table.columns.extend(heads.iter().cloned());
         table
     };
     let mut there = with(
-        "Force F_z of 100 mN or moment -M_y of 100 mN m at x = a: deflection of the loaded station in closed form, and the error there.",
-        "w(a) [µm]",
+        "Force F_z of 100 mN or moment -M_y of 100 mN m at x = a: deflection w and slope w' of the loaded station in closed form, and the error there.",
     );
-    let mut end = with("The same loads, deflection of the end.", "w(l) [µm]");
+    let mut end = with("The same loads, deflection and slope of the end.");
     let mut worst_end = 0.0f64;
-    for fraction in [0.25, 0.5, 0.75, 1.0] {
+    for fraction in [0.3, 0.5, 0.75, 1.0] {
         let a = fraction * bar.l;
         for (name, wrench) in [
             ("F_z", Vector6::new(0.0, 0.0, force, 0.0, 0.0, 0.0)),
@@ -153,22 +152,24 @@ fn stations(case: &mut Case, robot: &Robot) -> Result<(), Error> {
             let closed = |x: f64| {
                 if name == "F_z" { bar.under_force(force, a, x) } else { bar.under_moment(moment, a, x) }
             };
-            let ([w_a, _], [w_l, slope_l]) = (closed(a), closed(bar.l));
-            let mut at_load = vec![fixed(fraction, 2), word(name), digits(1e6 * w_a, 5)];
-            let mut at_end = vec![fixed(fraction, 2), word(name), digits(1e6 * w_l, 5)];
-            for (_, rig) in &rigs {
-                let bodies = bodies(rig);
-                let loaded = at(rig, &bodies, a);
-                at_load.push(signed(loaded.statics_at(&wrench, &loaded)?[2] / w_a - 1.0));
-                let u = loaded.statics_at(&wrench, &at(rig, &bodies, bar.l))?;
-                let errors = [u[2] / w_l - 1.0, -u[4] / slope_l - 1.0];
-                at_end.push(signed(errors[0]));
-                if fraction == 1.0 {
-                    worst_end = errors.iter().fold(worst_end, |m, e| m.max(e.abs()));
+            for (table, x, place) in [(&mut there, a, "a"), (&mut end, bar.l, "l")] {
+                // Deflection along z, and slope: a rotation about -y.
+                let mut rows = [0, 1].map(|k| {
+                    let what = if k == 0 { format!("w({place})") } else { format!("w'({place})") };
+                    vec![fixed(fraction, 2), word(name), word(what), digits(1e6 * closed(x)[k], 5)]
+                });
+                for (_, rig) in &rigs {
+                    let bodies = bodies(rig);
+                    let u = at(rig, &bodies, a).statics_at(&wrench, &at(rig, &bodies, x))?;
+                    for (row, (found, truth)) in rows.iter_mut().zip([u[2], -u[4]].into_iter().zip(closed(x))) {
+                        row.push(signed(found / truth - 1.0));
+                        if place == "l" && fraction == 1.0 {
+                            worst_end = worst_end.max((found / truth - 1.0).abs());
+                        }
+                    }
                 }
+                table.rows.extend(rows);
             }
-            there.rows.push(at_load);
-            end.rows.push(at_end);
         }
     }
     case.table(there);
@@ -187,22 +188,30 @@ fn stations(case: &mut Case, robot: &Robot) -> Result<(), Error> {
 
     let places: Vec<f64> = (0..=400).map(|k| bar.l * f64::from(k) / 400.0).collect();
     let mut panels = Vec::new();
-    for (label, a) in [("w, force at l [µm]", bar.l), ("w, force at l/2 [µm]", 0.5 * bar.l)] {
+    for (label, a, k) in [
+        ("w, force at l [µm]", bar.l, 0),
+        ("w', force at l [µrad]", bar.l, 1),
+        ("w, force at l/2 [µm]", 0.5 * bar.l, 0),
+        ("w', force at l/2 [µrad]", 0.5 * bar.l, 1),
+    ] {
         let wrench = Vector6::new(0.0, 0.0, force, 0.0, 0.0, 0.0);
         let curve = |name: &str, look, y: Vec<f64>| PlotCurve { name: name.into(), look, x: places.clone(), y };
-        let closed = places.iter().map(|x| 1e6 * bar.under_force(force, a, *x)[0]).collect();
+        let closed = places.iter().map(|x| 1e6 * bar.under_force(force, a, *x)[k]).collect();
         let mut curves = vec![curve("closed form", CurveLook::Total, closed)];
         for (n, rig) in rigs.iter().filter(|(n, _)| [2, 3, 5].contains(n)) {
             let bodies = bodies(rig);
             let loaded = at(rig, &bodies, a);
-            let w = places.iter().map(|x| Ok(1e6 * loaded.statics_at(&wrench, &at(rig, &bodies, *x))?[2]));
+            let w = places.iter().map(|x| {
+                let u = loaded.statics_at(&wrench, &at(rig, &bodies, *x))?;
+                Ok(1e6 * if k == 0 { u[2] } else { -u[4] })
+            });
             curves.push(curve(&format!("{n} parts"), CurveLook::Plain, w.collect::<Result<_, Error>>()?));
         }
         panels.push(Panel { label: label.into(), logarithmic: false, legend: true, curves });
     }
     case.figure(Figure {
         name: "one-beam-along".into(),
-        caption: "Deflection along the bar under 100 mN upwards at the end and at mid length".into(),
+        caption: "Deflection and slope along the bar under 100 mN upwards at the end and at mid length".into(),
         x_label: "x [m]".into(),
         logarithmic_x: false,
         panels,
