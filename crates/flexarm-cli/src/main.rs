@@ -263,6 +263,10 @@ impl Bar {
     }
 
     fn show(&mut self, t: f64, total: f64) {
+        self.show_as(t, total, || format!("{t:.2} of {total:.2} s simulated"));
+    }
+
+    fn show_as(&mut self, t: f64, total: f64, message: impl FnOnce() -> String) {
         if !self.wanted {
             return;
         }
@@ -272,7 +276,7 @@ impl Bar {
             self.bar = Some(bar);
         }
         if let Some(bar) = &self.bar {
-            bar.set_message(format!("{t:.2} of {total:.2} s simulated"));
+            bar.set_message(message());
             bar.set_position((1000.0 * t / total.max(1e-9)) as u64);
         }
     }

@@ -11,7 +11,7 @@ use flexarm_verify::check::differences;
 use flexarm_verify::{Verification, VerificationFiles, case_names, verify};
 use serde_json::json;
 
-use crate::{Cli, answer, shipped, stop_on_ctrl_c};
+use crate::{Bar, Cli, answer, shipped, stop_on_ctrl_c};
 
 #[derive(Debug, Args)]
 pub(crate) struct VerifyArgs {
@@ -51,13 +51,19 @@ pub(crate) fn run(cli: &Cli, args: &VerifyArgs) -> Result<ExitCode, Error> {
     let bench = Bench { root: args.data.clone().unwrap_or_else(shipped::checkout), quick: args.quick };
 
     let started = Instant::now();
-    let mut stop = stop_on_ctrl_c();
-    let verification = verify(&bench, &args.cases, &mut |name, k, n| {
-        if !cli.quiet {
-            eprintln!("case {} of {n}: {name}", k + 1);
-        }
+    let (mut stop, mut bar) = (stop_on_ctrl_c(), Bar::new(cli));
+    let result = verify(&bench, &args.cases, &mut |share, name| {
+        bar.show_as(share, 1.0, || format!("case {name}"));
         stop()
-    })?;
+    });
+    bar.clear();
+    let verification = match result {
+        Err(Error::Interrupted { .. }) => {
+            eprintln!("error: stopped; nothing was written");
+            return Ok(ExitCode::from(1));
+        }
+        other => other?,
+    };
     let wall_s = started.elapsed().as_secs_f64();
     if let Some(files) = &files {
         files.write(&verification)?;

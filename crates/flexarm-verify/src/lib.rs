@@ -30,21 +30,21 @@ use page::Case;
 
 pub use files::{PAGE, VerificationFiles};
 
-/// A case study: name, what it is, how it is run.
-type Entry = (&'static str, fn(&Bench) -> Result<Case, Error>);
+/// A case study: name, how long it takes beside the others, how it is run.
+type Entry = (&'static str, f64, fn(&Bench, &mut Pace<'_>) -> Result<Case, Error>);
 
 /// The cases, in the order of the page.
 const CASES: [Entry; 5] = [
-    ("one-beam", one_beam::case),
-    ("three-beams", three_beams::case),
-    ("lower-arm", lower_arm::case),
-    ("manipulator", manipulator::case),
-    ("programs", programs::case),
+    ("one-beam", 1.0, one_beam::case),
+    ("three-beams", 5.0, three_beams::case),
+    ("lower-arm", 5.0, lower_arm::case),
+    ("manipulator", 45.0, manipulator::case),
+    ("programs", 3.0, programs::case),
 ];
 
 /// Names of the cases.
 pub fn case_names() -> Vec<&'static str> {
-    CASES.iter().map(|(name, _)| *name).collect()
+    CASES.iter().map(|(name, ..)| *name).collect()
 }
 
 /// What came out.
@@ -56,30 +56,48 @@ pub struct Verification {
     pub passed: bool,
 }
 
+/// Called with the share that is done, 0 to 1, and the name of the case under way; breaking off ends the run.
+pub type Progress<'a> = dyn FnMut(f64, &str) -> ControlFlow<()> + 'a;
+
+/// How far a case is.
+pub(crate) struct Pace<'a> {
+    name: &'static str,
+    /// Share of all that was done before it, and its own.
+    begin: f64,
+    own: f64,
+    progress: &'a mut Progress<'a>,
+}
+
+impl Pace<'_> {
+    /// Tells that so much of the case is done, 0 to 1.
+    pub(crate) fn at(&mut self, share: f64) -> Result<(), Error> {
+        match (self.progress)(self.begin + self.own * share, self.name) {
+            ControlFlow::Continue(()) => Ok(()),
+            ControlFlow::Break(()) => Err(Error::Interrupted { t: 0.0, partial: false }),
+        }
+    }
+}
+
 /// Runs cases, all if none is named.
 ///
-/// * `progress`: called before each case with its name, number and the number of cases; breaking off ends the run.
-///
 /// # Errors
-/// [`Error::Usage`] for an unknown name, [`Error::File`] where files of the checkout are missing, and what the steps of a case
-/// may end with.
-pub fn verify(
-    bench: &Bench,
-    names: &[String],
-    progress: &mut dyn FnMut(&str, usize, usize) -> ControlFlow<()>,
-) -> Result<Verification, Error> {
+/// [`Error::Usage`] for an unknown name, [`Error::File`] where files of the checkout are missing, [`Error::Interrupted`], and what
+/// the steps of a case may end with.
+pub fn verify(bench: &Bench, names: &[String], progress: &mut Progress<'_>) -> Result<Verification, Error> {
     if let Some(unknown) = names.iter().find(|name| !case_names().contains(&name.as_str())) {
         let known = case_names().join(", ");
         return Err(Error::Usage(format!("there is no case {unknown:?}; the cases are {known}")));
     }
     let wanted: Vec<&Entry> =
-        CASES.iter().filter(|(name, _)| names.is_empty() || names.iter().any(|n| n == name)).collect();
-    let mut cases = Vec::new();
-    for (k, (name, run)) in wanted.iter().enumerate() {
-        if progress(name, k, wanted.len()).is_break() {
-            return Err(Error::Interrupted { t: 0.0, partial: false });
-        }
-        cases.push(run(bench)?);
+        CASES.iter().filter(|(name, ..)| names.is_empty() || names.iter().any(|n| n == name)).collect();
+    let all: f64 = wanted.iter().map(|(_, weight, _)| weight).sum();
+    let (mut cases, mut done) = (Vec::new(), 0.0);
+    for (name, weight, run) in wanted {
+        let mut tell = |share: f64, name: &str| progress(share, name);
+        let mut pace = Pace { name, begin: done / all, own: weight / all, progress: &mut tell };
+        pace.at(0.0)?;
+        cases.push(run(bench, &mut pace)?);
+        done += weight;
     }
     let passed = cases.iter().flat_map(Case::claims).all(|claim| claim.holds);
     Ok(Verification { cases, passed })

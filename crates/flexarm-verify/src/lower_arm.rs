@@ -7,6 +7,7 @@ use flexarm_fem::{ElasticSplit, UnitSystem};
 use flexarm_log::{CurveLook, Panel, PlotCurve};
 use nalgebra::{Matrix6, Vector3, Vector6};
 
+use crate::Pace;
 use crate::bench::{
     Bench, LOADS, LUMPED, Rig, Stored, column_error, compliance_error, damped, modal, parts, small_loads,
     weight_response, weightless,
@@ -59,7 +60,7 @@ impl Truth {
 }
 
 /// The case.
-pub(crate) fn case(bench: &Bench) -> Result<Case, Error> {
+pub(crate) fn case(bench: &Bench, _pace: &mut Pace<'_>) -> Result<Case, Error> {
     let mut case = Case::new("lower-arm", "3. Lower arm");
     let mut robot = bench.robot(ROBOT)?;
     // The truths are those of the casting alone.

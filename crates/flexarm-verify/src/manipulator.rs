@@ -13,6 +13,7 @@ use flexarm_log::{CurveLook, Panel, PlotCurve};
 use flexarm_stepping::Damping;
 use nalgebra::{Matrix6, Vector3, Vector6};
 
+use crate::Pace;
 use crate::bench::{ALPHA, Bench, modal, parts, spook};
 use crate::meshed::Meshed;
 use crate::page::{Bound, Case, Figure, Table, digits, error, fixed, signed, word};
@@ -31,19 +32,44 @@ struct Run {
     trace: Trace,
 }
 
-impl Run {
-    fn new(
+/// Makes runs and tells how far it is.
+struct Runs<'a, 'p> {
+    pace: &'a mut Pace<'p>,
+    done: f64,
+    all: f64,
+}
+
+impl Runs<'_, '_> {
+    fn make(
+        &mut self,
         robot: &Robot,
         motion: &Motion,
         modelling: Modelling,
         stepper: StepperKind,
         step_s: f64,
-    ) -> Result<Self, Error> {
+    ) -> Result<Run, Error> {
         let options = RunOptions { stepper, step_s, modelling, log_rate_hz: 500.0, ..RunOptions::default() };
-        let (summary, trace) = simulate_traced(robot, motion, &options, None, &mut |_, _| ControlFlow::Continue(()))?;
-        Ok(Self { summary, trace })
+        let weight = weight(stepper, step_s);
+        let mut progress = |t: f64, total: f64| match self.pace.at((self.done + weight * t / total) / self.all) {
+            Ok(()) => ControlFlow::Continue(()),
+            Err(_) => ControlFlow::Break(()),
+        };
+        let (summary, trace) = simulate_traced(robot, motion, &options, None, &mut progress)?;
+        self.done += weight;
+        Ok(Run { summary, trace })
     }
+}
 
+/// What a run costs, roughly, in runs by generalised-alpha.
+fn weight(stepper: StepperKind, step_s: f64) -> f64 {
+    match stepper {
+        StepperKind::Reference(_) => 20.0,
+        StepperKind::Spook(_) => 2e-3 / step_s,
+        _ => 1e-3 / step_s,
+    }
+}
+
+impl Run {
     fn tool(&self) -> impl Iterator<Item = Vector3<f64>> {
         self.trace.rows.iter().map(|row| Vector3::from(row.flexible_m))
     }
@@ -70,7 +96,7 @@ fn peaks(vectors: impl Iterator<Item = Vector3<f64>>) -> [f64; 4] {
 }
 
 /// The case.
-pub(crate) fn case(bench: &Bench) -> Result<Case, Error> {
+pub(crate) fn case(bench: &Bench, pace: &mut Pace<'_>) -> Result<Case, Error> {
     let mut case = Case::new("manipulator", "4. A whole manipulator");
     case.text(
         "`robots/kr210`: a six-axis arm of the KR 210 class with 150 kg; link arm and forearm are castings, reduced from meshes of 10-node tetrahedra. \
@@ -81,8 +107,10 @@ pub(crate) fn case(bench: &Bench) -> Result<Case, Error> {
     let robot = bench.robot(LINKS)?;
     let moves: &[&str] =
         if bench.quick { &["point_to_point"] } else { &["pick_and_place", "point_to_point", "large_moves"] };
+    // One motion of all methods weighs about 150 runs by generalised-alpha, the rest 80.
+    let mut runs = Runs { pace, done: 0.0, all: 150.0 * moves.len() as f64 + 80.0 };
     for name in moves {
-        methods(&mut case, bench, &robot, name)?;
+        methods(&mut case, bench, &mut runs, &robot, name)?;
     }
     case.heading("What is left, and why");
     case.text(
@@ -93,8 +121,8 @@ pub(crate) fn case(bench: &Bench) -> Result<Case, Error> {
     if !bench.quick {
         where_chains_stop(&mut case, bench, &robot)?;
     }
-    which_flexibility(&mut case, bench, moves)?;
-    elastic_drives(&mut case, bench, moves[moves.len() - 1])?;
+    which_flexibility(&mut case, bench, &mut runs, moves)?;
+    elastic_drives(&mut case, bench, &mut runs, moves[moves.len() - 1])?;
     Ok(case)
 }
 
@@ -102,11 +130,11 @@ const SOURCE: StepperKind =
     StepperKind::Spook(SpookSettings { form: ConstraintForm::Local, preset: SpookPreset::Source });
 
 /// One motion, every model and stepper.
-fn methods(case: &mut Case, bench: &Bench, robot: &Robot, name: &str) -> Result<(), Error> {
+fn methods(case: &mut Case, bench: &Bench, runs: &mut Runs<'_, '_>, robot: &Robot, name: &str) -> Result<(), Error> {
     let motion = bench.motion(robot, &format!("trajectories/{name}.toml"))?;
     case.heading(&format!("`trajectories/{name}.toml`, links alone"));
     let reference = StepperKind::Reference(ReferenceSettings::new(1e-8));
-    let truth = Run::new(robot, &motion, modal(ALL_MODES), reference, 2e-3)?;
+    let truth = runs.make(robot, &motion, modal(ALL_MODES), reference, 2e-3)?;
     let [peak, ..] = truth.peaks();
     let (local, global) = (spook(ConstraintForm::Local), spook(ConstraintForm::Global));
     // SPOOK damps each spring in proportion to its stiffness; with such damping in both, only the steppers differ.
@@ -115,7 +143,7 @@ fn methods(case: &mut Case, bench: &Bench, robot: &Robot, name: &str) -> Result<
     for link in &mut proportional.flexible {
         link.damping = Damping::StiffnessProportional(2.0 * 0.03 / (std::f64::consts::TAU * first));
     }
-    let runs: Vec<(&str, &str, &Robot, Modelling, StepperKind, f64)> = vec![
+    let list: Vec<(&str, &str, &Robot, Modelling, StepperKind, f64)> = vec![
         ("2 parts", "spring-damper, 1 ms", robot, parts(2), ALPHA, 1e-3),
         ("3 parts", "spring-damper, 1 ms", robot, parts(3), ALPHA, 1e-3),
         ("4 parts", "spring-damper, 1 ms", robot, parts(4), ALPHA, 1e-3),
@@ -152,11 +180,12 @@ fn methods(case: &mut Case, bench: &Bench, robot: &Robot, name: &str) -> Result<
         }
         cells
     };
-    let rigid = Run::new(robot, &motion, Modelling { links: LinkModel::Rigid, ..Modelling::default() }, ALPHA, 2e-3)?;
+    let rigid =
+        runs.make(robot, &motion, Modelling { links: LinkModel::Rigid, ..Modelling::default() }, ALPHA, 2e-3)?;
     table.rows.push(row("rigid", "-", &rigid, Some(&truth)));
     let mut kept = Vec::new();
-    for (links, stepper, robot, modelling, kind, h) in &runs {
-        let run = Run::new(robot, &motion, *modelling, *kind, *h)?;
+    for (links, stepper, robot, modelling, kind, h) in &list {
+        let run = runs.make(robot, &motion, *modelling, *kind, *h)?;
         table.rows.push(row(links, stepper, &run, Some(&truth)));
         kept.push((format!("{links}, {stepper}"), run.apart(&truth)[0] / peak, run));
     }
@@ -174,7 +203,7 @@ fn methods(case: &mut Case, bench: &Bench, robot: &Robot, name: &str) -> Result<
     claim(case, 10, 2e-4);
 
     // Where the rest of compliant constraints comes from: same model, same damping, stepper with error control.
-    let exact = Run::new(&proportional, &motion, parts(2), reference, 2e-3)?;
+    let exact = runs.make(&proportional, &motion, parts(2), reference, 2e-3)?;
     let mut split = Table::new(
         format!(
             "Compliant constraints (local) taken apart, same two parts: distance of the tool from the stepper with error control, over the peak, with damping \
@@ -186,7 +215,7 @@ fn methods(case: &mut Case, bench: &Bench, robot: &Robot, name: &str) -> Result<
     for &h in steps {
         let mut cells = vec![word(format!("{} ms", 1e3 * h))];
         for kind in [local, ALPHA] {
-            cells.push(error(Run::new(&proportional, &motion, parts(2), kind, h)?.apart(&exact)[0] / peak));
+            cells.push(error(runs.make(&proportional, &motion, parts(2), kind, h)?.apart(&exact)[0] / peak));
         }
         split.rows.push(cells);
     }
@@ -298,7 +327,7 @@ fn where_chains_stop(case: &mut Case, bench: &Bench, robot: &Robot) -> Result<()
 }
 
 /// Links, drives, both.
-fn which_flexibility(case: &mut Case, bench: &Bench, moves: &[&str]) -> Result<(), Error> {
+fn which_flexibility(case: &mut Case, bench: &Bench, runs: &mut Runs<'_, '_>, moves: &[&str]) -> Result<(), Error> {
     case.heading("Which flexibility matters");
     case.text(
         "`robots/kr210/drives.toml` has gearboxes that yield, besides: stiffness and damping identified on another KR 210 whose links were taken as rigid (so what bends \
@@ -318,9 +347,9 @@ fn which_flexibility(case: &mut Case, bench: &Bench, moves: &[&str]) -> Result<(
     let mut additive = 0.0f64;
     for name in moves {
         let motion = bench.motion(&robot, &format!("trajectories/{name}.toml"))?;
-        let runs: Vec<Run> =
-            kinds.iter().map(|(_, m)| Run::new(&robot, &motion, *m, ALPHA, 1e-3)).collect::<Result<_, Error>>()?;
-        for ((what, _), run) in kinds.iter().zip(&runs) {
+        let made: Vec<Run> =
+            kinds.iter().map(|(_, m)| runs.make(&robot, &motion, *m, ALPHA, 1e-3)).collect::<Result<_, Error>>()?;
+        for ((what, _), run) in kinds.iter().zip(&made) {
             let [all, x, y, z] = run.peaks();
             let tcp = run.summary.tcp.as_ref();
             let (rms, sag) = tcp.map_or((f64::NAN, f64::NAN), |tcp| (tcp.rms_m, tcp.static_sag_m));
@@ -330,7 +359,7 @@ fn which_flexibility(case: &mut Case, bench: &Bench, moves: &[&str]) -> Result<(
             table.rows.push(cells);
         }
         // At rest compliances in series add.
-        let sags: Vec<Vector3<f64>> = runs.iter().filter_map(|run| run.deflection().next()).collect();
+        let sags: Vec<Vector3<f64>> = made.iter().filter_map(|run| run.deflection().next()).collect();
         if let [links, drives, both] = sags[..] {
             additive = additive.max((links + drives - both).norm() / both.norm());
         }
@@ -350,12 +379,12 @@ fn which_flexibility(case: &mut Case, bench: &Bench, moves: &[&str]) -> Result<(
 }
 
 /// The methods again with drives that yield.
-fn elastic_drives(case: &mut Case, bench: &Bench, name: &str) -> Result<(), Error> {
+fn elastic_drives(case: &mut Case, bench: &Bench, runs: &mut Runs<'_, '_>, name: &str) -> Result<(), Error> {
     case.heading(&format!("`trajectories/{name}.toml`, links and drives"));
     let robot = bench.robot(DRIVES)?;
     let motion = bench.motion(&robot, &format!("trajectories/{name}.toml"))?;
     let truth =
-        Run::new(&robot, &motion, modal(ALL_MODES), StepperKind::Reference(ReferenceSettings::new(1e-8)), 2e-3)?;
+        runs.make(&robot, &motion, modal(ALL_MODES), StepperKind::Reference(ReferenceSettings::new(1e-8)), 2e-3)?;
     let [peak, ..] = truth.peaks();
     let mut table = Table::new(
         format!(
@@ -371,7 +400,7 @@ fn elastic_drives(case: &mut Case, bench: &Bench, name: &str) -> Result<(), Erro
         ("2 parts", "compliant constraints, global, 0.1 ms", parts(2), spook(ConstraintForm::Global), 1e-4),
     ];
     for (links, stepper, modelling, kind, h) in rows {
-        let run = Run::new(&robot, &motion, modelling, kind, h)?;
+        let run = runs.make(&robot, &motion, modelling, kind, h)?;
         let [all, x, y, z] = run.apart(&truth);
         let mut cells = vec![word(links), word(stepper)];
         cells.extend([x, y, z, all].map(|u| error(u / peak)));

@@ -9,6 +9,7 @@ use flexarm_log::{CurveLook, Panel, PlotCurve};
 use flexarm_stepping::{Damping, Observation, ReferenceSettings, new_stepper};
 use nalgebra::{Matrix6, Vector3, Vector6};
 
+use crate::Pace;
 use crate::bench::{
     ALPHA, Bench, LOADS, LUMPED, Rig, Stored, column_error, compliance_error, damped, modal, parts, small_loads, spook,
     step_error, weightless,
@@ -46,7 +47,7 @@ fn bar_with_shear() -> Stiffness {
 }
 
 /// The case.
-pub(crate) fn case(bench: &Bench) -> Result<Case, Error> {
+pub(crate) fn case(bench: &Bench, _pace: &mut Pace<'_>) -> Result<Case, Error> {
     let mut case = Case::new("one-beam", "1. One beam");
     case.text(
         "`robots/one_beam`: a bar of aluminium, 0.8 m long, 20 mm wide and 40 mm high, clamped at A, a ball of 0.5 kg at its end B. \

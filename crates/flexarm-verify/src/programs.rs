@@ -10,6 +10,7 @@ use flexarm_stepping::Damping;
 use nalgebra::Vector3;
 use serde_json::Value;
 
+use crate::Pace;
 use crate::bench::{ALPHA, Bench, Stored, spook};
 use crate::page::{Bound, Case, Cell, Figure, Table, digits, error, word};
 
@@ -18,7 +19,7 @@ const STORED: &str = "other_programs.json";
 const CURVE: &str = "tests/verification/kr210_pick_and_place_pinocchio.csv";
 
 /// The case.
-pub(crate) fn case(bench: &Bench) -> Result<Case, Error> {
+pub(crate) fn case(bench: &Bench, _pace: &mut Pace<'_>) -> Result<Case, Error> {
     let mut case = Case::new("programs", "5. Other programs");
     let stored = bench.stored(STORED)?;
     let beta = stored.number("model/damping_beta_s")?;

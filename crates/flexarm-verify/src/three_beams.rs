@@ -8,6 +8,7 @@ use flexarm_log::{CurveLook, Panel, PlotCurve};
 use flexarm_stepping::{Damping, Observation, ReferenceSettings, new_stepper};
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
+use crate::Pace;
 use crate::bench::{
     ALPHA, Bench, LOADS, LUMPED, Rig, column_error, compliance_error, damped, modal, parts, place, small_loads,
     step_error, weight_response, weightless,
@@ -87,7 +88,7 @@ fn tip_compliance() -> Matrix6<f64> {
 }
 
 /// The case.
-pub(crate) fn case(bench: &Bench) -> Result<Case, Error> {
+pub(crate) fn case(bench: &Bench, _pace: &mut Pace<'_>) -> Result<Case, Error> {
     let mut case = Case::new("three-beams", "2. Three beams");
     case.text(
         "`robots/three_beams`: three aluminium beams joined at right angles, a tube of 0.8 m upwards, a box of 0.6 m forwards (x), a rectangle of 0.4 m sideways (y), \
