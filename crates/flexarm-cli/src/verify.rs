@@ -7,8 +7,7 @@ use std::time::Instant;
 use clap::Args;
 use flexarm::Error;
 use flexarm_verify::bench::Bench;
-use flexarm_verify::check::differences;
-use flexarm_verify::{Verification, VerificationFiles, case_names, verify};
+use flexarm_verify::{Verification, VerificationFiles, case_names, differences_from, verify};
 use serde_json::json;
 
 use crate::{Bar, Cli, answer, shipped, stop_on_ctrl_c};
@@ -36,6 +35,9 @@ pub(crate) struct VerifyArgs {
     #[arg(long, value_name = "FILE", conflicts_with_all = ["output", "force"])]
     pub(crate) check: Option<PathBuf>,
 }
+
+/// Differences that are shown.
+const SHOWN: usize = 20;
 
 pub(crate) fn run(cli: &Cli, args: &VerifyArgs) -> Result<ExitCode, Error> {
     let stored = args.check.as_ref().map(|path| {
@@ -68,7 +70,10 @@ pub(crate) fn run(cli: &Cli, args: &VerifyArgs) -> Result<ExitCode, Error> {
     if let Some(files) = &files {
         files.write(&verification)?;
     }
-    let changed = stored.map(|stored| differences(&stored, &verification.page())).unwrap_or_default();
+    let changed = match (&stored, &args.check) {
+        (Some(stored), Some(path)) => differences_from(stored, path, &verification)?,
+        _ => Vec::new(),
+    };
     let page = files.as_ref().map(|files| files.page().display().to_string());
     let json = || {
         let claims: Vec<_> = verification
@@ -89,7 +94,11 @@ pub(crate) fn run(cli: &Cli, args: &VerifyArgs) -> Result<ExitCode, Error> {
 }
 
 fn line(difference: &flexarm_verify::check::Difference) -> String {
-    format!("  line {}\n    stored {}\n    found  {}\n", difference.line, difference.stored, difference.found)
+    let flexarm_verify::check::Difference { line, stored, found } = difference;
+    match line {
+        0 => format!("  picture {found}: stored is {stored}\n"),
+        _ => format!("  line {line}\n    stored {stored}\n    found  {found}\n"),
+    }
 }
 
 /// Claims, then where the rest is.
@@ -110,14 +119,15 @@ fn text(verification: &Verification, changed: &[String], args: &VerifyArgs, page
         text += &match changed.len() {
             0 => format!("{} is what this command prints\n", stored.display()),
             n => format!(
-                "{} differs in {n} line(s); flexarm verify -o {} --force writes it again\n{}",
+                "{} differs in {n} place(s); flexarm verify -o {} --force writes it again\n{}",
                 stored.display(),
                 stored
                     .parent()
                     .map(|p| p.display().to_string())
                     .filter(|p| !p.is_empty())
                     .unwrap_or_else(|| ".".into()),
-                changed.concat()
+                changed.iter().take(SHOWN).cloned().collect::<String>()
+                    + &if n > SHOWN { format!("  and {} more\n", n - SHOWN) } else { String::new() }
             ),
         };
     }

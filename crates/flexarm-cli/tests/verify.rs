@@ -18,7 +18,11 @@ fn a_case_is_written_once_and_then_checked() {
     assert_eq!(found["file"], "page/verification.md");
     // The page names its pictures and they are there.
     let page = place.text("page/verification.md");
-    assert!(page.contains("## 1. One beam") && page.contains("| --- |"), "{page}");
+    assert!(
+        page.contains("## 1. One beam")
+            && page.contains("| --- |")
+            && page.contains("part of the page: one-beam, quick")
+    );
     let pictures: Vec<&str> =
         page.split("](verification/").skip(1).map(|rest| rest.split(')').next().unwrap()).collect();
     assert!(pictures.len() >= 4);
@@ -39,6 +43,27 @@ fn a_case_is_written_once_and_then_checked() {
     let other = place.flexarm(&check);
     assert_eq!(other.code, 1, "{}", other.out);
     assert!(other.out.contains(&format!("line {line}\n")) && other.out.contains("95.4286"), "{}", other.out);
+
+    // A picture that is gone is news too.
+    place.write("page/verification.md", &page);
+    std::fs::remove_file(place.path("page/verification/one-beam-steps.svg")).unwrap();
+    let gone = place.flexarm(&check);
+    assert_eq!((gone.code, gone.out.contains("one-beam-steps.svg")), (1, true), "{}", gone.out);
+}
+
+/// Ctrl-C within a long case: at once, and nothing is left.
+#[cfg(unix)]
+#[test]
+fn a_stopped_verification_leaves_nothing() {
+    let place = Place::new();
+    let before = place.snapshot();
+    let mut command = place.command(&["verify", "manipulator", "-o", "page"]);
+    let mut child = command.stdout(std::process::Stdio::null()).stderr(std::process::Stdio::null()).spawn().unwrap();
+    std::thread::sleep(std::time::Duration::from_millis(1500));
+    let pid = child.id().to_string();
+    assert!(std::process::Command::new("/bin/kill").args(["-INT", &pid]).status().unwrap().success());
+    assert_eq!(child.wait().unwrap().code(), Some(1));
+    assert!(place.snapshot() == before);
 }
 
 #[test]

@@ -179,6 +179,25 @@ impl Rig {
         Self { arm: self.arm.clone(), frame, X_WF }
     }
 
+    /// Frequencies (Hz) of the modes in which the frame moves along y and along z, world axes, ascending; those that turn it or move
+    /// it along x are left out.
+    pub fn bending_hz(&self) -> [Vec<f64>; 2] {
+        let modes = &self.arm.modes;
+        let mut found = [Vec::new(), Vec::new()];
+        for (shape, hz) in modes.shapes.column_iter().zip(modes.frequencies_hz()) {
+            let step = shape * (1e-6 / shape.amax());
+            let at = |e: DVector<f64>| place(&self.arm, &self.frame, &e);
+            let moved = tcp_error(&at(&modes.equilibrium - &step), &at(&modes.equilibrium + &step));
+            let [x, y, z] = [moved[0].abs(), moved[1].abs(), moved[2].abs()];
+            let turned = moved[3..].iter().copied().worst();
+            // A millimetre is no lever here.
+            if y.max(z) > x && y.max(z) > 1e-3 * turned {
+                found[usize::from(z > y)].push(hz);
+            }
+        }
+        found
+    }
+
     /// The arm under a wrench at the frame, world axes.
     pub fn loaded(&self, wrench: &Vector6<f64>) -> Result<FlexibleArm, Error> {
         let F = Wrench::new(wrench.fixed_rows::<3>(0).into(), wrench.fixed_rows::<3>(3).into());
@@ -225,10 +244,11 @@ impl Rig {
             calm = if (now - before).amax() < 1e-15 + 1e-12 * now.amax() { calm + 1 } else { 0 };
             before = now;
             if calm == 3 {
-                break;
+                return Ok(before);
             }
         }
-        Ok(before)
+        let what = format!("the arm does not come to rest within {AT_MOST} steps of {h} s ({})", kind.name());
+        Err(Error::Usage(what))
     }
 
     /// Compliance at the frame from pairs of opposite loads, so that effects of second order cancel.
@@ -269,13 +289,28 @@ pub fn small_loads(C: &Matrix6<f64>) -> Vector6<f64> {
 /// Largest difference of the response to load `j`, relative to `sqrt(C_ii C_jj)`.
 pub fn column_error(C: &Matrix6<f64>, truth: &Matrix6<f64>, j: usize) -> f64 {
     let scale = |i: usize| (truth[(i, i)] * truth[(j, j)]).sqrt();
-    (0..6).map(|i| (C[(i, j)] - truth[(i, j)]).abs() / scale(i)).fold(0.0, f64::max)
+    (0..6).map(|i| (C[(i, j)] - truth[(i, j)]).abs() / scale(i)).worst()
 }
 
 /// The same over all loads.
 pub fn compliance_error(C: &Matrix6<f64>, truth: &Matrix6<f64>) -> f64 {
-    (0..6).map(|j| column_error(C, truth, j)).fold(0.0, f64::max)
+    (0..6).map(|j| column_error(C, truth, j)).worst()
 }
+
+/// The larger of two errors; what is no number is the worst of all, where `f64::max` would drop it.
+pub fn larger(a: f64, b: f64) -> f64 {
+    if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
+}
+
+/// The largest size of errors.
+pub trait Worst: Iterator<Item = f64> + Sized {
+    /// Not a number if one of them is none, or if there are none at all: nothing was compared.
+    fn worst(self) -> f64 {
+        self.map(f64::abs).reduce(larger).unwrap_or(f64::NAN)
+    }
+}
+
+impl<I: Iterator<Item = f64>> Worst for I {}
 
 /// Names of the six loads.
 pub const LOADS: [&str; 6] = ["F_x", "F_y", "F_z", "M_x", "M_y", "M_z"];
@@ -305,4 +340,22 @@ pub fn weight_response(
         Rig::new(&robot, modelling, frame)?.statics(&Vector6::zeros())
     };
     Ok((under(PART)? - under(-PART)?) / (2.0 * PART))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A number that is none must not be dropped, as `f64::max` does, nor may an empty comparison pass.
+    #[test]
+    fn the_worst_error_is_what_is_no_number() {
+        assert_eq!([1.0, -3.0, 2.0].into_iter().worst(), 3.0);
+        assert!([1.0, f64::NAN, 2.0].into_iter().worst().is_nan());
+        assert!(std::iter::empty().worst().is_nan());
+        assert!(larger(f64::NAN, 1.0).is_nan() && larger(1.0, f64::NAN).is_nan());
+        let mut C = Matrix6::identity();
+        assert_eq!(compliance_error(&C, &Matrix6::identity()), 0.0);
+        C[(2, 3)] = f64::NAN;
+        assert!(compliance_error(&C, &Matrix6::identity()).is_nan());
+    }
 }

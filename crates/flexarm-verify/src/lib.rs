@@ -28,7 +28,7 @@ use flexarm::Error;
 use bench::Bench;
 use page::Case;
 
-pub use files::{PAGE, VerificationFiles};
+pub use files::{PAGE, VerificationFiles, differences_from};
 
 /// A case study: name, how long it takes beside the others, how it is run.
 type Entry = (&'static str, f64, fn(&Bench, &mut Pace<'_>) -> Result<Case, Error>);
@@ -54,6 +54,8 @@ pub struct Verification {
     pub cases: Vec<Case>,
     /// Whether every claim holds.
     pub passed: bool,
+    /// Whether what takes long was left out.
+    pub quick: bool,
 }
 
 /// Called with the share that is done, 0 to 1, and the name of the case under way; breaking off ends the run.
@@ -99,6 +101,10 @@ pub fn verify(bench: &Bench, names: &[String], progress: &mut Progress<'_>) -> R
         cases.push(run(bench, &mut pace)?);
         done += weight;
     }
+    // The last chance to stop before anything is written.
+    if progress(1.0, "").is_break() {
+        return Err(Error::Interrupted { t: 0.0, partial: false });
+    }
     let passed = cases.iter().flat_map(Case::claims).all(|claim| claim.holds);
-    Ok(Verification { cases, passed })
+    Ok(Verification { cases, passed, quick: bench.quick })
 }

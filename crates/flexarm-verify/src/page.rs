@@ -304,7 +304,8 @@ pub(crate) fn table_text(table: &Table) -> String {
     let row = |cells: Vec<String>| format!("| {} |\n", cells.join(" | "));
     let heads = row(table.columns.clone()) + &row(vec!["---".into(); table.columns.len()]);
     let rows: String = table.rows.iter().map(|cells| row(cells.iter().map(Cell::print).collect())).collect();
-    format!("{}\n\n{heads}{rows}", table.caption)
+    let caption = if table.caption.is_empty() { String::new() } else { format!("{}\n", table.caption) };
+    format!("{caption}\n{heads}{rows}")
 }
 
 /// All claims of all cases as one table.

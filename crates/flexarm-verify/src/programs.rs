@@ -11,7 +11,7 @@ use nalgebra::Vector3;
 use serde_json::Value;
 
 use crate::Pace;
-use crate::bench::{ALPHA, Bench, Stored, spook};
+use crate::bench::{ALPHA, Bench, Stored, Worst, larger, spook};
 use crate::page::{Bound, Case, Cell, Figure, Table, digits, error, word};
 
 const ROBOT: &str = "robots/kr210/robot.toml";
@@ -31,7 +31,7 @@ pub(crate) fn case(bench: &Bench, _pace: &mut Pace<'_>) -> Result<Case, Error> {
     case.text(format!(
         "The arm of case 4, two rigid parts per link with the full 6x6 between them, in four programs, each with its own recursions and integrators: flexarm, {}. Stored by \
          `tools/crosscheck/other_programs.py` on {} ({}), which reads robot, link and trajectory files by itself. So that all have the same model, damping is proportional to \
-         stiffness ({beta} s, 3 % of the first mode) and the elastic joints have Euler angles; truth is Pinocchio's recursions with DOP853 at a tolerance of 1e-12.",
+         stiffness ({beta} s, 3 % of the first mode) and the elastic joints have Euler angles; truth is Pinocchio's recursions with DOP853 at a tolerance of 1e-12. All programs get the parts and the 6x6 of the same `.flex` files: this case is about motion, cases 1 to 3 are about reduction. Again: `python tools/crosscheck/other_programs.py`.",
         versions.join(", "),
         stored.at("date")?.as_str().unwrap_or("?"),
         stored.at("machine")?.as_str().unwrap_or("?"),
@@ -91,7 +91,7 @@ fn today(case: &mut Case, bench: &Bench, beta: f64) -> Result<(), Error> {
             return Err(Error::File { path: bench.root.join(CURVE), what });
         }
         let apart: Vec<Vector3<f64>> = tools.iter().zip(&truth.flexible).map(|(a, b)| a - b).collect();
-        let most = |f: &dyn Fn(&Vector3<f64>) -> f64| apart.iter().map(f).fold(0.0, f64::max) / truth.peak;
+        let most = |f: &dyn Fn(&Vector3<f64>) -> f64| apart.iter().map(f).worst() / truth.peak;
         let mut cells = vec![word(*name), word(format!("{} ms", 1e3 * step_s))];
         cells.extend((0..3).map(|i| error(most(&|d| d[i].abs()))));
         let all = most(&|d| d.norm());
@@ -119,10 +119,11 @@ impl Curve {
         let (mut flexible, mut peak) = (Vec::new(), 0.0f64);
         for row in rows {
             let values: Option<Vec<f64>> = row.split(',').map(|word| word.trim().parse().ok()).collect();
-            let values =
-                values.filter(|v| v.len() == 7).ok_or_else(|| fail(format!("row {row:?}: expected seven numbers")))?;
+            let values = values
+                .filter(|v| v.len() == 7 && v.iter().all(|x| x.is_finite()))
+                .ok_or_else(|| fail(format!("row {row:?}: expected seven finite numbers")))?;
             let (rigid, tool) = (Vector3::from_column_slice(&values[1..4]), Vector3::from_column_slice(&values[4..7]));
-            peak = peak.max((tool - rigid).norm());
+            peak = larger(peak, (tool - rigid).norm());
             flexible.push(tool);
         }
         Ok(Self { flexible, peak })

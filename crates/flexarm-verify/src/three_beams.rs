@@ -10,8 +10,8 @@ use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
 use crate::Pace;
 use crate::bench::{
-    ALPHA, Bench, LOADS, LUMPED, Rig, column_error, compliance_error, damped, modal, parts, place, small_loads,
-    step_error, weight_response, weightless,
+    ALPHA, Bench, LOADS, LUMPED, Rig, Worst, column_error, compliance_error, damped, larger, modal, parts, place,
+    small_loads, step_error, weight_response, weightless,
 };
 use crate::meshed::{self, Meshed};
 use crate::page::{Bound, Case, Figure, Table, bare_error, digits, error, fixed, signed, word};
@@ -93,7 +93,7 @@ pub(crate) fn case(bench: &Bench, _pace: &mut Pace<'_>) -> Result<Case, Error> {
     case.text(
         "`robots/three_beams`: three aluminium beams joined at right angles, a tube of 0.8 m upwards, a box of 0.6 m forwards (x), a rectangle of 0.4 m sideways (y), \
          a ball of 1 kg at the tip (0.6, 0.4, 0.8) m; the joint at the base is held at 0. Every load at the tip bends and twists some of them, and no entry of a beam \
-         reaches the tip without a turn and a lever. World axes, z upwards; Timoshenko's theory.",
+         reaches the tip without a turn and a lever. World axes, z upwards; Timoshenko's theory. By hand: `flexarm statics three_beams --wrench 0,0,10`, `flexarm compare three_beams`.",
     );
     let robot = bench.robot(ROBOT)?;
     let meshed = bench.robot(MESH)?;
@@ -264,13 +264,13 @@ fn meshes(case: &mut Case, bench: &Bench, robot: &Robot) -> Result<(), Error> {
         row.extend(errors.iter().map(|e| signed(*e)));
         table.rows.push(row);
         if name.starts_with("modal") {
-            modal_sag = shift.iter().fold(modal_sag, |m, e| m.max(*e));
+            modal_sag = larger(modal_sag, shift.iter().copied().worst());
         } else {
             sags.push(shift[0]);
-            firsts.push(errors[..4].iter().fold(0.0f64, |m, e| m.max(e.abs())));
+            firsts.push(errors[..4].iter().copied().worst());
         }
         if name.ends_with("10 modes") {
-            ten = errors.iter().fold(0.0, |m, e| m.max(e.abs()));
+            ten = errors.iter().copied().worst();
         }
         if name.ends_with("10 modes") {
             shares = [ball_shares(&rig, hz.len()), inner_shares(&rig, hz.len())];
@@ -384,7 +384,7 @@ fn sections(case: &mut Case, bench: &Bench, robot: &Robot) -> Result<(), Error> 
                 tube_torsion = errors[3].abs();
             }
             let known = meshed::inverse(&reduced.K_BB).map_or(f64::NAN, |known| compliance_error(&known, &C));
-            filed = filed.max(known);
+            filed = larger(filed, known);
             let slices = condensed.slices(&mesh, SLICES);
             let short: Matrix6<f64> = slices[SLICES / 2 - 1..=SLICES / 2].iter().sum();
             let c = turned(&at_lever(&short, &(-0.5 * p_B)), &R).diagonal();
@@ -401,7 +401,7 @@ fn sections(case: &mut Case, bench: &Bench, robot: &Robot) -> Result<(), Error> 
                 shear(c[2], c[4], kGA[1]),
                 mesh.mass() / (mu * l) - 1.0,
             ];
-            middle = found[..3].iter().fold(middle, |m, e| m.max(e.abs()));
+            middle = larger(middle, found[..3].iter().copied().worst());
             let mut row = vec![word(member.name)];
             row.extend(found.iter().map(|e| signed(*e)));
             middles.rows.push(row);
@@ -464,7 +464,7 @@ fn path(rig: &Rig, kind: StepperKind, h: f64, every: f64, duration: f64) -> Resu
 
 /// Largest distance of two paths.
 fn apart(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max)
+    a.iter().zip(b).map(|(a, b)| (a - b).norm()).worst()
 }
 
 /// The arm as a sum of modes: angular frequency, damping ratio and part in the sag of each of the lowest ones, and the rest of the sag.
@@ -542,7 +542,7 @@ fn ring_down(case: &mut Case, robot: &Robot, quick: bool) -> Result<(), Error> {
     let truths =
         models.iter().map(|(_, rig)| path(rig, precise, every, every, duration)).collect::<Result<Vec<_>, Error>>()?;
     let truth = &truths[0];
-    let peak = truth.iter().map(|u| u.norm()).fold(0.0, f64::max);
+    let peak = truth.iter().map(|u| u.norm()).worst();
     let spook = |k: usize| LUMPED[k].1;
     let mut runs = vec![
         (2, "compliant constraints, local", spook(0), 1e-3),
@@ -586,7 +586,7 @@ fn ring_down(case: &mut Case, robot: &Robot, quick: bool) -> Result<(), Error> {
     let mut compliant = Vec::new();
     for (model, name, kind, h) in runs {
         let found = path(&models[model].1, kind, h, every, duration)?;
-        let axis = |i: usize| found.iter().zip(truth).map(|(a, b)| (a[i] - b[i]).abs()).fold(0.0, f64::max) / peak;
+        let axis = |i: usize| found.iter().zip(truth).map(|(a, b)| a[i] - b[i]).worst() / peak;
         let stepper = apart(&found, &truths[model]) / peak;
         let of_model = apart(&truths[model], truth) / peak;
         let mut row = vec![word(models[model].0), word(name), digits(1e3 * h, 1), error(apart(&found, truth) / peak)];
@@ -675,7 +675,7 @@ fn causes(
         if *name == "2 parts" {
             // What the sums do not explain of the difference of the motions.
             let left = (0..both.len()).map(|k| ((truth[k] - truths[0][k]) - (both[k] - linear[k])).norm());
-            let left = left.fold(0.0, f64::max) / peak;
+            let left = left.worst() / peak;
             case.claim(
                 "three beams, ring-down, two parts: what frequencies and shares of six modes do not explain",
                 "stepped motions",
@@ -691,7 +691,7 @@ fn causes(
     let slow = two.stepped(every).path(&two, every, duration);
     let both = two.stepped(every).path_ahead(&two, every, duration, 0.5 * every);
     let left = (0..local.len()).map(|k| ((local[k] - truths[2][k]) - (both[k] - alone[k])).norm());
-    let left = left.fold(0.0, f64::max) / peak;
+    let left = left.worst() / peak;
     case.text(format!(
         "*Model.* Two parts put a third of a per cent on the first two frequencies; the phase that this adds is most of the difference, which is largest after a third of a second, when damping begins to win. The rest is the sag, which two \
          parts miss by a little. Stiffness by load (weight turns with what bends) is in chains of parts by themselves and an option of modal links: without it their frequencies are 1e-4 higher. \
