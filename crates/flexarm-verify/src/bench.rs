@@ -10,7 +10,8 @@ use flexarm::{
 use flexarm_analysis::tcp_error;
 use flexarm_kinematics::{Data, Frame, Pose, State, Wrench, forward_kinematics};
 use flexarm_stepping::{
-    AlphaSettings, Damping, FlexibleArm, Held, Load, LoadAxes, Observation, new_stepper, static_equilibrium,
+    AlphaSettings, Damping, FlexibleArm, Held, Load, LoadAxes, Observation, PrescribedMotion, new_stepper,
+    static_equilibrium,
 };
 use nalgebra::{DVector, Matrix6, Vector3, Vector6};
 use serde_json::Value;
@@ -268,6 +269,35 @@ impl Rig {
         }
         Ok(C)
     }
+}
+
+/// Places of the tool at the end of each step of generalised-alpha, world axes.
+///
+/// `stiffening`: whether loads change the stiffness of modal links. Damping is proportional to stiffness, 0.5 ms, in every model.
+pub fn tool_path(
+    robot: &Robot,
+    modelling: &Modelling,
+    stiffening: bool,
+    motion: Arc<dyn PrescribedMotion>,
+    start: Start,
+    (h, steps): (f64, usize),
+) -> Result<Vec<Vector3<f64>>, Error> {
+    let mut robot = robot.clone();
+    for link in &mut robot.flexible {
+        link.choices.geometric = stiffening;
+        link.damping = Damping::StiffnessProportional(5e-4);
+    }
+    let arm = robot.modelled(modelling)?.arm(motion).map_err(step_error)?;
+    let frame = arm.model.frame(TCP_FRAME).ok_or_else(|| Error::Usage("the robot has no tool".into()))?.clone();
+    let mut stepper = new_stepper(ALPHA, arm.clone(), h, start).map_err(step_error)?;
+    let mut seen = Observation::new(&arm);
+    let mut path = Vec::new();
+    for _ in 0..steps {
+        stepper.step().map_err(step_error)?;
+        stepper.observe(&mut seen);
+        path.push((seen.X_WB[frame.body] * frame.X_BF).translation.vector);
+    }
+    Ok(path)
 }
 
 /// Pose of a frame at elastic coordinates, joints as prescribed at the start.
