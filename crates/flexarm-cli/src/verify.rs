@@ -19,7 +19,7 @@ pub(crate) struct VerifyArgs {
     /// Leave out what takes long
     #[arg(long)]
     pub(crate) quick: bool,
-    /// Folder with robots, trajectories and tests/verification [default: the checkout that the program was built from]
+    /// Folder with robots, trajectories and tests/verification [default: here, else where the program was built]
     #[arg(long, value_name = "DIR")]
     pub(crate) data: Option<PathBuf>,
     /// Folder for verification.md, its pictures and verification.json [default: a new one in out]

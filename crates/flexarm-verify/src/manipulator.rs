@@ -120,7 +120,7 @@ pub(crate) fn case(bench: &Bench, pace: &mut Pace<'_>) -> Result<Case, Error> {
     case.heading("What is left, and why");
     case.text(
         "*Two parts* miss the modal links by 0.5 to 0.7 % of the peak, half of it or more at rest too: they carry the weight of each casting in two lumps (cases 1 and 3). *Chains* close two thirds of it and then \
-         stop; the table below says why. *Modal links* need no inner modes here: with both ends held a casting rings above 400 Hz, the arm at 12 to 33 Hz. *Compliant constraints* have two causes more: \
+         stop; the table below says why. *Modal links* need no inner modes here: with both ends held a casting rings above 490 Hz, the arm at 12 to 33 Hz. *Compliant constraints* have two causes more: \
          damping in proportion to stiffness where the others damp each mode by 3 % (the rows at 0.1 ms), and their first order in the step. The preset `source` ties damping to the step.",
     );
     if !bench.quick {
@@ -378,7 +378,7 @@ fn which_flexibility(case: &mut Case, bench: &Bench, runs: &mut Runs<'_, '_>, mo
         Bound::AtMost(0.01),
     );
     case.text(
-        "Drives of this class give two to four times what the castings do. At rest the two add up. In motion peaks need not: both together ring lower and longer (point_to_point, large_moves: the peak of both is the larger), or do not peak at one time \
+        "Drives of this class give three to four times what the castings do. At rest the two add up. In motion peaks need not: both together ring lower and longer (point_to_point, large_moves: the peak of both is the larger), or do not peak at one time \
          (pick_and_place).",
     );
     Ok(())
