@@ -252,6 +252,25 @@ impl Rig {
         Err(Error::Usage(what))
     }
 
+    /// Way of the frame from its undeformed place, let go there, seen at the start and every so often.
+    ///
+    /// * `h`: step (s), of which `every` (s) is a multiple.
+    pub fn path(&self, kind: StepperKind, h: f64, every: f64, duration: f64) -> Result<Vec<Vector3<f64>>, Error> {
+        let mut stepper = new_stepper(kind, self.arm.clone(), h, Start::Undeformed).map_err(step_error)?;
+        let mut seen = Observation::new(&self.arm);
+        let (stride, steps) = ((every / h).round() as usize, (duration / h).round() as usize);
+        let mut path = vec![Vector3::zeros()];
+        for step in 1..=steps {
+            stepper.step().map_err(step_error)?;
+            if step % stride == 0 {
+                stepper.observe(&mut seen);
+                let X = seen.X_WB[self.frame.body] * self.frame.X_BF;
+                path.push(X.translation.vector - self.X_WF.translation.vector);
+            }
+        }
+        Ok(path)
+    }
+
     /// Compliance at the frame from pairs of opposite loads, so that effects of second order cancel.
     ///
     /// `loads`: size of each load; `response`: displacement under a wrench.

@@ -79,6 +79,16 @@ impl Run {
         self.trace.rows.iter().map(|row| Vector3::from(row.flexible_m) - Vector3::from(row.rigid_m))
     }
 
+    /// Deflection along an axis over time (mm).
+    fn curve(&self, name: &str, look: CurveLook, axis: usize) -> PlotCurve {
+        PlotCurve {
+            name: name.into(),
+            look,
+            x: self.trace.rows.iter().step_by(DRAWN).map(|row| row.time_s).collect(),
+            y: self.deflection().step_by(DRAWN).map(|d| 1e3 * d[axis]).collect(),
+        }
+    }
+
     /// Largest deflection, of all and of x, y, z.
     fn peaks(&self) -> [f64; 4] {
         peaks(self.deflection())
@@ -230,14 +240,8 @@ fn methods(case: &mut Case, bench: &Bench, runs: &mut Runs<'_, '_>, robot: &Robo
     let mut panels = Vec::new();
     let shown = [0, 5];
     for (axis, letter) in AXES.iter().enumerate() {
-        let curve = |name: &str, look, run: &Run| PlotCurve {
-            name: name.into(),
-            look,
-            x: run.trace.rows.iter().step_by(DRAWN).map(|row| row.time_s).collect(),
-            y: run.deflection().step_by(DRAWN).map(|d| 1e3 * d[axis]).collect(),
-        };
-        let mut curves = vec![curve("modal", CurveLook::Total, &truth)];
-        curves.extend(shown.map(|k| curve(&kept[k].0, CurveLook::Dashed, &kept[k].2)));
+        let mut curves = vec![truth.curve("modal", CurveLook::Total, axis)];
+        curves.extend(shown.map(|k| kept[k].2.curve(&kept[k].0, CurveLook::Dashed, axis)));
         panels.push(Panel { label: format!("deflection {letter} [mm]"), logarithmic: false, legend: true, curves });
     }
     let distances = [0, 3, 5].map(|k| PlotCurve {
@@ -437,17 +441,11 @@ fn elastic_drives(case: &mut Case, bench: &Bench, runs: &mut Runs<'_, '_>, name:
     case.table(table);
     let mut panels = Vec::new();
     for (axis, letter) in AXES.iter().enumerate() {
-        let curve = |name: &str, look, run: &Run| PlotCurve {
-            name: name.into(),
-            look,
-            x: run.trace.rows.iter().step_by(DRAWN).map(|row| row.time_s).collect(),
-            y: run.deflection().step_by(DRAWN).map(|d| 1e3 * d[axis]).collect(),
-        };
         let curves = vec![
-            curve("links and drives, modal", CurveLook::Total, &truth),
-            curve("links and drives, 2 parts, spring-damper", CurveLook::Dashed, &kept[3]),
-            curve("drives alone", CurveLook::Plain, &kept[2]),
-            curve("links alone", CurveLook::Plain, &kept[1]),
+            truth.curve("links and drives, modal", CurveLook::Total, axis),
+            kept[3].curve("links and drives, 2 parts, spring-damper", CurveLook::Dashed, axis),
+            kept[2].curve("drives alone", CurveLook::Plain, axis),
+            kept[1].curve("links alone", CurveLook::Plain, axis),
         ];
         panels.push(Panel { label: format!("deflection {letter} [mm]"), logarithmic: false, legend: true, curves });
     }

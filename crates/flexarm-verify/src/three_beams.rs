@@ -7,13 +7,13 @@ use flexarm_fem::element::Quadrature;
 use flexarm_fem::reduction::Tie;
 use flexarm_fem::{Material, UnitSystem};
 use flexarm_log::{CurveLook, Panel, PlotCurve};
-use flexarm_stepping::{Damping, MotionFn, Observation, ReferenceSettings, new_stepper};
+use flexarm_stepping::{Damping, MotionFn, ReferenceSettings};
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
 use crate::Pace;
 use crate::bench::{
     ALPHA, Bench, LOADS, LUMPED, Rig, Worst, column_error, compliance_error, damped, larger, modal, parts, place,
-    small_loads, step_error, tool_path, weight_response, weightless,
+    small_loads, tool_path, weight_response, weightless,
 };
 use crate::meshed::{self, Meshed};
 use crate::page::{Bound, Case, Figure, Table, bare_error, digits, error, fixed, signed, word};
@@ -448,23 +448,6 @@ fn shear_area(along: f64, across: f64, wall: f64) -> f64 {
     20.0 * wall * (along + across) * (1.0 + NU) * (1.0 + 3.0 * m).powi(2) / (still + NU * poisson)
 }
 
-/// Path of the tip from its undeformed place.
-fn path(rig: &Rig, kind: StepperKind, h: f64, every: f64, duration: f64) -> Result<Vec<Vector3<f64>>, Error> {
-    let mut stepper = new_stepper(kind, rig.arm.clone(), h, Start::Undeformed).map_err(step_error)?;
-    let mut seen = Observation::new(&rig.arm);
-    let (stride, steps) = ((every / h).round() as usize, (duration / h).round() as usize);
-    let mut path = vec![Vector3::zeros()];
-    for step in 1..=steps {
-        stepper.step().map_err(step_error)?;
-        if step % stride == 0 {
-            stepper.observe(&mut seen);
-            let X = seen.X_WB[rig.frame.body] * rig.frame.X_BF;
-            path.push(X.translation.vector - rig.X_WF.translation.vector);
-        }
-    }
-    Ok(path)
-}
-
 /// Largest distance of two paths.
 fn apart(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).norm()).worst()
@@ -543,7 +526,7 @@ fn ring_down(case: &mut Case, robot: &Robot, quick: bool) -> Result<(), Error> {
     ];
     let precise = StepperKind::Reference(ReferenceSettings::new(1e-9));
     let truths =
-        models.iter().map(|(_, rig)| path(rig, precise, every, every, duration)).collect::<Result<Vec<_>, Error>>()?;
+        models.iter().map(|(_, rig)| rig.path(precise, every, every, duration)).collect::<Result<Vec<_>, Error>>()?;
     let truth = &truths[0];
     let peak = truth.iter().map(|u| u.norm()).worst();
     let spook = |k: usize| LUMPED[k].1;
@@ -588,7 +571,7 @@ fn ring_down(case: &mut Case, robot: &Robot, quick: bool) -> Result<(), Error> {
     }
     let mut compliant = Vec::new();
     for (model, name, kind, h) in runs {
-        let found = path(&models[model].1, kind, h, every, duration)?;
+        let found = models[model].1.path(kind, h, every, duration)?;
         let axis = |i: usize| found.iter().zip(truth).map(|(a, b)| a[i] - b[i]).worst() / peak;
         let stepper = apart(&found, &truths[model]) / peak;
         let of_model = apart(&truths[model], truth) / peak;
