@@ -59,7 +59,7 @@ fn a_stopped_verification_leaves_nothing() {
     let before = place.snapshot();
     let mut command = place.command(&["verify", "manipulator", "-o", "page"]);
     let mut child = command.stdout(std::process::Stdio::null()).stderr(std::process::Stdio::null()).spawn().unwrap();
-    std::thread::sleep(std::time::Duration::from_millis(1500));
+    std::thread::sleep(std::time::Duration::from_secs(4));
     let pid = child.id().to_string();
     assert!(std::process::Command::new("/bin/kill").args(["-INT", &pid]).status().unwrap().success());
     assert_eq!(child.wait().unwrap().code(), Some(1));
