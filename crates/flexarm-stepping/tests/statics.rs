@@ -145,3 +145,34 @@ fn drives_carry_the_weight_from_the_first_sample_on() {
         }
     }
 }
+
+/// Truth: the fastest decay of an overdamped mode, `(d + sqrt(d² - 4 omega²))/2` with `d = 2 ζ omega`, against the real limit of RK4,
+/// 2.78. The damping itself, d, would refuse steps up to twice too small.
+#[test]
+fn rk4_takes_steps_up_to_the_decay_of_an_overdamped_mode() {
+    let undamped = arm(0.0, false);
+    let omega = undamped.modes.omega.iter().copied().fold(0.0, f64::max);
+    let beta = 2.2 / omega;
+    let damped = arm(beta, false);
+    let fastest = damped.modes.omega.iter().map(|w| {
+        let d = beta * w * w;
+        0.5 * (d + (d * d - 4.0 * w * w).max(0.0).sqrt())
+    });
+    let limit = 2.78 / fastest.fold(0.0, f64::max);
+    assert!(limit > 1.2 * 2.78 / (beta * omega * omega), "the two rules must differ for this test to say anything");
+    let mut stepper = new_stepper(StepperKind::Rk4, damped.clone(), 0.95 * limit, Start::Undeformed).expect("stable");
+    let mut seen = Observation::new(&damped);
+    for _ in 0..20_000 {
+        stepper.step().expect("steps");
+    }
+    stepper.observe(&mut seen);
+    let still = static_deflection(&damped);
+    assert!(seen.qdot.amax() < 1e3 * still && seen.q.amax().is_finite(), "{}", seen.qdot.amax());
+    let refused = new_stepper(StepperKind::Rk4, damped, 1.05 * limit, Start::Undeformed).err();
+    match refused {
+        Some(StepError::UnstableStep { largest_s, .. }) => {
+            assert!((largest_s / limit - 1.0).abs() < 1e-3, "{largest_s} {limit}")
+        }
+        other => panic!("{other:?}"),
+    }
+}

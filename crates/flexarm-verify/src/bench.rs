@@ -16,8 +16,6 @@ use flexarm_stepping::{
 use nalgebra::{DVector, Matrix6, Vector3, Vector6};
 use serde_json::Value;
 
-use crate::page::Case;
-
 /// The folder with `robots`, `trajectories` and `tests`, and how much is asked for.
 #[derive(Clone, Debug)]
 pub struct Bench {
@@ -30,7 +28,13 @@ pub struct Bench {
 impl Bench {
     /// A shipped robot, by its path from the root.
     pub fn robot(&self, file: &str) -> Result<Robot, Error> {
-        Robot::load(&self.root.join(file), &LoadOptions::default())
+        let path = self.root.join(file);
+        if !path.is_file() {
+            let what = "there is no such file; the case studies need robots, trajectories and tests/verification of a checkout of the \
+                        project: give its folder (--data)";
+            return Err(Error::File { path, what: what.into() });
+        }
+        Robot::load(&path, &LoadOptions::default())
     }
 
     /// A shipped motion.
@@ -363,11 +367,6 @@ impl<I: Iterator<Item = f64>> Worst for I {}
 
 /// Names of the six loads.
 pub const LOADS: [&str; 6] = ["F_x", "F_y", "F_z", "M_x", "M_y", "M_z"];
-
-/// A case of which nothing but its text is known.
-pub fn case(name: &str, title: &str) -> Case {
-    Case::new(name, title)
-}
 
 /// A step error of a verification.
 pub fn step_error(source: StepError) -> Error {
