@@ -2,17 +2,22 @@
 
 use std::path::Path;
 
+use flexarm_kinematics::Coordinate;
+use flexarm_trajectory::{FileError, PlanError, Problem, TrajectoryError};
+use flexarm_urdf::{Finding as UrdfFinding, Severity};
+use nalgebra::Vector6;
 use serde::Serialize;
 
+use crate::caveat::Caveat;
 use crate::drive_entry::DriveKind;
 use crate::error::Error;
 use crate::motion::Motion;
-use crate::options::LinkModel;
+use crate::options::{LinkModel, Modelling};
+use crate::posed::Posed;
 use crate::robot::{LoadOptions, Robot};
-use flexarm_urdf::{Finding as UrdfFinding, Severity};
 
 /// One thing found.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Finding {
     /// error, warning or note.
     pub severity: &'static str,
@@ -25,15 +30,38 @@ pub struct Finding {
     pub message: String,
     /// How to mend it.
     pub help: String,
+    /// Value that was found, if it is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub value: Option<f64>,
+    /// What it was compared with.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub yardstick: Option<f64>,
+    /// Unit of both.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub unit: String,
+    /// The slip that would explain it.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub likely: String,
 }
 
 impl Finding {
     fn error(code: &str, location: String, error: &dyn std::fmt::Display) -> Self {
-        Self { severity: "error", code: code.into(), location, message: error.to_string(), help: String::new() }
+        Self { severity: "error", code: code.into(), location, message: error.to_string(), ..Self::default() }
+    }
+
+    fn note(code: &str, location: String, message: String) -> Self {
+        Self { severity: "note", code: code.into(), location, message, ..Self::default() }
+    }
+
+    /// A caveat about something in a file.
+    fn caveat(file: &Path, caveat: Caveat) -> Self {
+        let severity = caveat.severity.word();
+        let Caveat { code, message, value, yardstick, unit, likely, help, .. } = caveat;
+        Self { severity, code, location: file.display().to_string(), message, help, value, yardstick, unit, likely }
     }
 
     fn warning(code: &str, location: String, message: String, help: &str) -> Self {
-        Self { severity: "warning", code: code.into(), location, message, help: help.into() }
+        Self { severity: "warning", code: code.into(), location, message, help: help.into(), ..Self::default() }
     }
 }
 
@@ -45,13 +73,14 @@ impl From<&UrdfFinding> for Finding {
             Severity::Note => "note",
         };
         let (code, location) = (f.code.to_owned(), f.location.clone());
-        Self { severity, code, location, message: f.message.clone(), help: f.help.clone() }
+        Self { severity, code, location, message: f.message.clone(), help: f.help.clone(), ..Self::default() }
     }
 }
 
 /// All findings about a robot, and about a trajectory on it.
 ///
-/// Never fails: what cannot be loaded is a finding of severity `error`.
+/// Never fails: what cannot be loaded is a finding of severity `error`. The robot is held where the trajectory begins,
+/// else its default trajectory, else in the middle of its joint ranges.
 pub fn check(robot: &Path, trajectory: Option<&Path>, options: &LoadOptions) -> Vec<Finding> {
     let mut findings = Vec::new();
     let path = robot;
@@ -59,32 +88,35 @@ pub fn check(robot: &Path, trajectory: Option<&Path>, options: &LoadOptions) -> 
         Ok(robot) => robot,
         Err(error) => {
             load_findings(&error, path, &mut findings);
-            if let Some(trajectory) = trajectory
-                && let Err(error) = flexarm_trajectory::Trajectory::from_path(trajectory, &[])
-            {
-                findings.push(Finding::error("trajectory", trajectory.display().to_string(), &error));
-            }
+            findings.extend(trajectory.and_then(motion_without_robot));
             return findings;
         }
     };
-    if let Some(own) = robot.default_trajectory.as_ref().filter(|t| !t.is_file()) {
-        let message = format!("default_trajectory: there is no file {}", own.display());
-        findings.push(Finding::error("missing-file", path.display().to_string(), &message));
-    }
     findings.extend(robot.urdf.warnings.iter().map(Finding::from));
-    findings.extend(robot.warnings.iter().filter(|w| !w.contains(".urdf")).map(|w| {
-        Finding::warning(
-            "flexible-link",
-            robot.path.display().to_string(),
-            w.clone(),
-            "compare the masses of both sources",
-        )
-    }));
-    check_flexible(&robot, &mut findings);
-    if let Some(path) = trajectory {
-        check_trajectory(&robot, path, &mut findings);
-    }
+    let file = robot.path.clone();
+    let own = robot.caveats().into_iter().filter(|caveat| !caveat.location.contains(".urdf:"));
+    findings.extend(own.map(|caveat| Finding::caveat(&file, caveat)));
+    let motion = match (trajectory, robot.default_trajectory.as_deref()) {
+        (None, Some(own)) if !own.is_file() => {
+            let message = format!("default_trajectory: there is no file {}", own.display());
+            findings.push(Finding::error("missing-file", path.display().to_string(), &message));
+            None
+        }
+        (Some(path), _) => check_motion(&robot, path, &mut findings),
+        // Its own faults are told when it is asked for.
+        (None, Some(own)) => robot.rigid_model().and_then(|model| Motion::load(own, &model)).ok(),
+        (None, None) => None,
+    };
+    check_flexible(&robot, motion.as_ref(), &mut findings);
     findings
+}
+
+/// What is wrong with a motion whose robot cannot be loaded; limits that the robot would give are not missed.
+fn motion_without_robot(path: &Path) -> Option<Finding> {
+    let error = flexarm_trajectory::Trajectory::from_path(path, &[]).err()?;
+    let missed = |file: &FileError| matches!(file.problem, Problem::Plan(PlanError::MissingLimit { .. }));
+    let follows = matches!(&error, TrajectoryError::File(file) if missed(file));
+    (!follows).then(|| Finding::error("trajectory", path.display().to_string(), &error))
 }
 
 /// What kept a robot from being loaded, one finding per fault.
@@ -102,18 +134,37 @@ fn load_findings(error: &Error, path: &Path, findings: &mut Vec<Finding>) {
     }
 }
 
-fn check_flexible(robot: &Robot, findings: &mut Vec<Finding>) {
+fn check_flexible(robot: &Robot, motion: Option<&Motion>, findings: &mut Vec<Finding>) {
+    let file = robot.path.display().to_string();
     let gives_way = robot.drives.iter().any(|d| d.kind != DriveKind::Prescribed);
     if robot.flexible.is_empty() && !gives_way {
-        findings.push(Finding {
-            severity: "note",
-            code: "no-flexible-link".into(),
-            location: robot.path.display().to_string(),
-            message: "no link is flexible and no drive gives way: compare will find no deflection".into(),
-            help: "add [[flexible_link]] or [[drive]] entries to a robot.toml".into(),
-        });
-        return;
+        let message = "no link is flexible and no drive gives way: compare will find no deflection";
+        let help = "add [[flexible_link]] or [[drive]] entries to a robot.toml".into();
+        findings.push(Finding { help, ..Finding::note("no-flexible-link", file.clone(), message.into()) });
     }
+    check_geometric(robot, findings);
+    let held = Pose::of(robot, motion);
+    let posed = held.as_ref().map_err(|e| e.to_string()).and_then(|pose| {
+        let posed = Posed::held(robot, &Modelling::default(), pose.at.clone()).map_err(|e| e.to_string())?;
+        let linear = posed.linear(&Vector6::zeros()).map_err(|e| e.to_string())?;
+        Ok((posed, linear, &pose.words))
+    });
+    match posed {
+        Err(error) => findings.push(Finding::error("no-equilibrium", file, &error)),
+        Ok((posed, linear, words)) => {
+            let hz = posed.arm.modes.frequencies_hz();
+            if !hz.is_empty() {
+                let message = format!("first frequencies {words} {:.2?} Hz", &hz[..hz.len().min(4)]);
+                findings.push(Finding::note("modes", file, message));
+            }
+            let told = posed.flexible.caveats().into_iter().chain(posed.validity(&linear));
+            findings.extend(told.map(|caveat| Finding::caveat(&robot.path, caveat)));
+        }
+    }
+}
+
+/// Links that are asked to stiffen by load and cannot.
+fn check_geometric(robot: &Robot, findings: &mut Vec<Finding>) {
     for link in robot.flexible.iter().filter(|link| link.choices.geometric) {
         let name = &link.flexible.link;
         let (message, help) = match (link.choices.model, link.has_geometric()) {
@@ -131,51 +182,46 @@ fn check_flexible(robot: &Robot, findings: &mut Vec<Finding>) {
         };
         findings.push(Finding::warning("geometric-stiffening", robot.path.display().to_string(), message, help));
     }
-    let arm = robot.flexible_robot().and_then(|f| {
-        findings.extend(f.doubts.iter().map(|doubt| {
-            let help = "reduce the mesh itself (flexarm reduce) to have them";
-            Finding::warning("second-order-unknown", robot.path.display().to_string(), doubt.clone(), help)
-        }));
-        let n = f.model.n_actuated();
-        let held = std::sync::Arc::new(flexarm_stepping::Held(vec![0.0; n]));
-        f.arm(held).map_err(|source| Error::Step { source, partial: false })
-    });
-    match arm {
-        Err(error) => findings.push(Finding::error("no-equilibrium", robot.path.display().to_string(), &error)),
-        Ok(arm) => {
-            let hz = arm.modes.frequencies_hz();
-            let sag = arm.modes.equilibrium.iter().skip(3).step_by(6).fold(0.0f64, |m, x| m.max(x.abs()));
-            findings.push(Finding {
-                severity: "note",
-                code: "modes".into(),
-                location: robot.path.display().to_string(),
-                message: format!("first frequencies at zero joint values {:.2?} Hz", &hz[..hz.len().min(4)]),
-                help: String::new(),
-            });
-            if sag > crate::compare::ROTATION_LIMIT {
-                let message = format!("a link bends by {sag:.3} rad under its own weight");
-                let help = "the model is linear elastic: check stiffness and units";
-                findings.push(Finding::warning("large-deformation", robot.path.display().to_string(), message, help));
-            }
-        }
+}
+
+/// Where a robot is held to look at it.
+struct Pose {
+    at: Vec<f64>,
+    words: String,
+}
+
+impl Pose {
+    /// Where the motion begins, else in the middle of the joint ranges.
+    fn of(robot: &Robot, motion: Option<&Motion>) -> Result<Self, Error> {
+        let model = robot.rigid_model()?;
+        let middle = |c: &Coordinate| match (c.limits.lower, c.limits.upper) {
+            (lower, upper) if lower.is_finite() && upper.is_finite() => 0.5 * (lower + upper),
+            (lower, upper) => 0.0f64.max(lower).min(upper),
+        };
+        let mut at: Vec<f64> = model.coordinates().iter().map(middle).collect();
+        let Some(motion) = motion else {
+            return Ok(Self { at, words: "in the middle of the joint ranges".into() });
+        };
+        let n = at.len();
+        motion.trajectory.sample(0.0, &mut at, &mut vec![0.0; n], &mut vec![0.0; n]);
+        Ok(Self { at, words: format!("at the start of {}", motion.name) })
     }
 }
 
-fn check_trajectory(robot: &Robot, path: &Path, findings: &mut Vec<Finding>) {
-    let motion = robot.rigid_model().and_then(|model| Motion::load(path, &model));
-    match motion {
-        Err(error) => findings.push(Finding::error("trajectory", path.display().to_string(), &error)),
+/// The motion, if it can be used, with its findings.
+fn check_motion(robot: &Robot, path: &Path, findings: &mut Vec<Finding>) -> Option<Motion> {
+    let file = || path.display().to_string();
+    match robot.rigid_model().and_then(|model| Motion::load(path, &model)) {
+        Err(error) => {
+            findings.push(Finding::error("trajectory", file(), &error));
+            None
+        }
         Ok(motion) => {
-            findings.extend(motion.violations.iter().map(|v| Finding {
-                severity: "error",
-                code: "joint-limit".into(),
-                location: path.display().to_string(),
-                message: v.to_string(),
-                help: "slow the motion down or keep away from the limit".into(),
-            }));
-            findings.extend(
-                motion.warnings.into_iter().map(|w| Finding::warning("trajectory", path.display().to_string(), w, "")),
-            );
+            let help = "slow the motion down or keep away from the limit";
+            let passed = |v| Finding { help: help.into(), ..Finding::error("joint-limit", file(), v) };
+            findings.extend(motion.violations.iter().map(|v| passed(v)));
+            findings.extend(motion.caveats().into_iter().map(|caveat| Finding::caveat(path, caveat)));
+            Some(motion)
         }
     }
 }

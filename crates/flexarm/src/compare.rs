@@ -16,9 +16,11 @@ use flexarm_log::{
     Trace,
 };
 use flexarm_stepping::{FlexibleArm, Observation, Stepper, StepperKind};
+use flexarm_trajectory::LimitViolation;
 use nalgebra::{Matrix6, Vector3, Vector6};
 
 use crate::bends::stations;
+use crate::caveat::{self, Caveat, kinds, validity};
 use crate::energy_book::EnergyBook;
 use crate::error::Error;
 use crate::flexible::{FlexibleRobot, Owner};
@@ -31,16 +33,8 @@ use crate::robot::{Robot, TCP_FRAME};
 use crate::summary::{DriveFigures, Files, LinkFigures, StepperFigures, Summary, TcpFigures};
 use crate::twin::RigidTwin;
 
-/// Largest elastic rotation for which the linear elastic model is taken to hold (rad).
-pub(crate) const ROTATION_LIMIT: f64 = 0.05;
-/// Largest engineering strain of a flexible link before a warning.
-pub(crate) const STRAIN_LIMIT: f64 = 1e-3;
-
 /// What servos leave of the way to go, among the contributors to the TCP error.
 const FOLLOWING_ERROR: &str = "following error";
-
-/// Largest gap in the energy balance before a warning.
-const IMBALANCE_LIMIT: f64 = 0.02;
 
 /// Steps between two looks at the progress callback.
 const POLL_EVERY: u64 = 64;
@@ -99,7 +93,7 @@ pub(crate) fn run_traced(
 ) -> Result<(Summary, Trace), Error> {
     let started = Instant::now();
     let cpu = cpu_time::ProcessTime::now();
-    let Checked { flexible, arm, stepper, load_warnings } = checked(robot, motion, options)?;
+    let Checked { flexible, arm, stepper, load_caveats } = checked(robot, motion, options)?;
 
     let own = || Expected::of(&arm, &tool_frame(&arm), motion.trajectory.duration(), options.start);
     let expected = together.expected.unwrap_or_else(own);
@@ -120,7 +114,9 @@ pub(crate) fn run_traced(
     if let Err(error) = &end {
         events.push(Event { time_s: run.seen.t, kind: EventKind::Stopped, text: error.to_string() });
     }
-    summary.warnings.extend(load_warnings);
+    summary.caveats.extend(load_caveats);
+    summary.caveats = caveat::once_each(std::mem::take(&mut summary.caveats));
+    summary.warnings = caveat::warnings(&summary.caveats);
     summary.end = end.as_ref().map_or_else(ToString::to_string, |()| "complete".into());
     summary.wall_s = started.elapsed().as_secs_f64();
     summary.cpu_s = cpu.elapsed().as_secs_f64();
@@ -455,11 +451,12 @@ impl<'a> Run<'a> {
                 peak_deflection_rad: self.give[k],
             })
             .collect();
-        let mut warnings = robot.warnings.clone();
-        warnings.extend(self.flexible.doubts.iter().cloned());
-        warnings.extend(motion.warnings.iter().cloned());
-        warnings.extend(motion.violations.iter().map(|v| format!("joint limit: {v}")));
-        self.validity_warnings(&links, &mut warnings);
+        let mut caveats = robot.caveats();
+        caveats.extend(self.flexible.caveats());
+        caveats.extend(motion.caveats());
+        let passed = |v: &LimitViolation| Caveat::said("joint-limit", &v.joint, format!("joint limit: {v}"), "");
+        caveats.extend(motion.violations.iter().map(passed));
+        caveats.extend(self.caveats(&links));
         let events = self.events(metrics.as_ref().filter(|_| options.with_twin));
         let summary = Summary {
             robot: robot.name.clone(),
@@ -485,7 +482,7 @@ impl<'a> Run<'a> {
                 .collect(),
             moves_s: moves.iter().map(|&(start, end)| [start, end]).collect(),
             error_curve: crate::summary::thinned(&self.times, &self.errors),
-            warnings,
+            caveats,
             ..Summary::default()
         };
         (summary, events)
@@ -549,69 +546,37 @@ impl<'a> Run<'a> {
         (data.X_WF(&self.tcp).translation.vector - rigid).norm()
     }
 
-    fn validity_warnings(&self, links: &[LinkFigures], warnings: &mut Vec<String>) {
+    /// Whether the models held in what was seen so far.
+    fn caveats(&self, links: &[LinkFigures]) -> Vec<Caveat> {
+        let coordinates = self.arm.model.coordinates();
+        let mut caveats = Vec::new();
         if let Some(first) = self.arm.modes.frequencies_hz().first() {
-            let logged = 1.0 / (self.every as f64 * self.options.step_s);
-            if logged < 10.0 * first {
-                warnings.push(format!(
-                    "{logged:.1} logged samples a second are few for a first frequency of {first:.2} Hz: peaks between \
-                     them are missed; raise --log-rate or lower --step"
-                ));
-            }
-            if self.options.step_s * first > 0.05 {
-                let steps = 1.0 / (self.options.step_s * first);
-                warnings.push(format!("{steps:.1} steps per period of the first mode are coarse: lower --step"));
-            }
+            let logged_hz = 1.0 / (self.every as f64 * self.options.step_s);
+            caveats.extend(validity::sampling(*first, self.options.step_s, logged_hz));
         }
         for link in links {
-            if link.peak_rotation_rad > ROTATION_LIMIT {
-                warnings.push(format!(
-                    "link {:?} bends by {:.3} rad, beyond the {ROTATION_LIMIT} rad for which the linear elastic model is good",
-                    link.name, link.peak_rotation_rad
-                ));
-            }
-            if link.engineering_strain > STRAIN_LIMIT {
-                warnings.push(format!(
-                    "link {:?} changes its length by {:.2e} of it, beyond {STRAIN_LIMIT:.0e}: check stiffness and loads",
-                    link.name, link.engineering_strain
-                ));
-            }
+            caveats.extend(validity::link(&link.name, link.peak_rotation_rad, link.engineering_strain));
         }
-        let imbalance = self.energy.figures().imbalance;
-        if imbalance > IMBALANCE_LIMIT {
-            warnings.push(format!(
-                "the energy balance is open by {:.1} % of the energy in it: the samples are too far apart (--log-rate), the \
-                 step too coarse (--step), or the stepper damps by itself",
-                100.0 * imbalance
-            ));
-        }
-        for (c, peak) in self.arm.model.coordinates().iter().zip(&self.peak_drive) {
-            if *peak > c.limits.effort {
-                warnings.push(format!(
-                    "joint {:?} needs {peak:.0} N m (or N), its limit is {:.0}: the real drive would not follow",
-                    c.joint, c.limits.effort
-                ));
-            }
-        }
-        for (c, count) in self.arm.model.coordinates().iter().zip(&self.at_limit).filter(|(_, count)| **count > 0) {
+        caveats.extend(validity::energy(self.energy.figures().imbalance));
+        caveats.extend(validity::efforts(&kinds::EFFORT, coordinates, &self.peak_drive));
+        for (c, count) in coordinates.iter().zip(&self.at_limit).filter(|(_, count)| **count > 0) {
             let share = 100.0 * *count as f64 / self.times.len() as f64;
-            warnings.push(format!(
-                "the servo of joint {:?} is at its torque limit in {share:.1} % of the samples: it cannot follow, or its loop \
-                 is unstable (gains too high for the inertia and sampling; is motor_inertia given?)",
-                c.joint
-            ));
+            caveats.push(kinds::SERVO_LIMIT.found(format!("joint {:?}", c.joint), share, 0.0));
         }
         if matches!(self.options.stepper, StepperKind::Spook(_)) && !self.arm.proportional {
             let betas: Vec<String> = self.arm.tau.iter().map(|b| format!("{b:.2e}")).collect();
-            warnings.push(format!(
+            let message = format!(
                 "spook damps each spring in proportion to its stiffness: modal damping became D = beta K with beta = {} s, \
                  exact for the first mode",
                 betas.join(", ")
-            ));
+            );
+            caveats.push(Caveat::said("spook-damping", "run", message, ""));
         }
         if self.motion.trajectory.initial_speed() > 1e-6 {
-            warnings.push("the motion starts at speed: the first ringing is an artefact of the sudden start".into());
+            let message = "the motion starts at speed: the first ringing is an artefact of the sudden start";
+            caveats.push(Caveat::said("starts-moving", "run", message, ""));
         }
+        caveats
     }
 }
 

@@ -15,6 +15,7 @@ use nalgebra::{Matrix3, Vector3};
 use serde::Deserialize;
 use toml::Spanned;
 
+use crate::caveat::Caveat;
 use crate::error::Error;
 use crate::robot::{PAYLOAD_LINK, Robot, TCP_FRAME};
 use crate::robot_file::{RobotFileError, Source};
@@ -102,7 +103,7 @@ pub struct Disturbances {
     /// Changes of what bodies carry, by time.
     pub changes: Vec<InertiaChange>,
     /// Entries that do nothing.
-    pub warnings: Vec<String>,
+    pub caveats: Vec<Caveat>,
 }
 
 type WrenchFn = Arc<dyn Fn(f64) -> Wrench + Send + Sync>;
@@ -131,7 +132,7 @@ impl Disturbances {
             let start = entry.get_ref().start;
             if start >= duration {
                 let text = format!("a load starts at {start} s, the run ends at {duration} s: it does nothing");
-                disturbances.warnings.push(text);
+                disturbances.caveats.push(Caveat::said("no-effect", "loads", text, "move it into the run"));
             }
         }
         let mut changes: Vec<&Spanned<PayloadChange>> = file.payload.iter().collect();
@@ -142,7 +143,7 @@ impl Disturbances {
             let at = entry.get_ref().at;
             if at > duration {
                 let text = format!("the payload changes at {at} s, the run ends at {duration} s: it stays as it is");
-                disturbances.warnings.push(text);
+                disturbances.caveats.push(Caveat::said("no-effect", "loads", text, "move it into the run"));
             }
         }
         Ok(disturbances)

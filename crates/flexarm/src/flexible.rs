@@ -12,6 +12,7 @@ use flexarm_stepping::{
 };
 use nalgebra::{DMatrix, DVector};
 
+use crate::caveat::Caveat;
 use crate::drive_entry::{Drive, DriveKind, GearDamping, ServoEntry};
 use crate::error::Error;
 use crate::import::SECOND_ORDER_UNKNOWN;
@@ -242,6 +243,12 @@ impl FlexibleRobot {
         let free: Vec<usize> = self.torque.iter().map(|t| t.0).chain(n..model.nv()).collect();
         let inverse = M.select_rows(&free).select_columns(&free).cholesky().map(|c| c.inverse());
         (0..self.torque.len()).map(|i| inverse.as_ref().map_or(0.0, |inverse| 1.0 / inverse[(i, i)])).collect()
+    }
+
+    /// Doubts about the models of the links, as caveats.
+    pub fn caveats(&self) -> Vec<Caveat> {
+        let help = "reduce the mesh itself (flexarm reduce) to have them";
+        self.doubts.iter().map(|text| Caveat::said("second-order-unknown", "links", text, help)).collect()
     }
 
     /// Whether some joint is driven by torque.

@@ -21,6 +21,7 @@
 
 mod beam_entry;
 mod bends;
+pub mod caveat;
 mod check;
 mod compare;
 mod convert;
@@ -54,6 +55,7 @@ mod summary;
 mod twin;
 
 pub use bends::Bend;
+pub use caveat::Caveat;
 pub use check::{Finding, check};
 pub use compare::{Progress, simulate, simulate_traced};
 pub use convert::{ConvertOptions, ConvertSummary, convert, convert_until, parse_recording_format, read_run};

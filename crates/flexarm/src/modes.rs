@@ -7,6 +7,7 @@ use flexarm_stepping::Linear;
 use nalgebra::{DMatrix, Vector6};
 use serde::Serialize;
 
+use crate::caveat::{self, Caveat};
 use crate::error::Error;
 use crate::options::Modelling;
 use crate::posed::{Posed, step_error};
@@ -43,8 +44,10 @@ pub struct ModeTable {
     pub compliance_covered: [Option<f64>; 6],
     /// Written files.
     pub files: Files,
-    /// Things worth telling.
+    /// What the caveats warn of, as sentences.
     pub warnings: Vec<String>,
+    /// What is probably wrong with the input, or limits the worth of the result.
+    pub caveats: Vec<Caveat>,
 }
 
 /// One mode.
@@ -143,13 +146,15 @@ pub(crate) fn table(
         0 => linear.compliance().map_err(step_error)?.diagonal(),
         _ => linear.yielding_compliance().map_or_else(Vector6::zeros, |C| C.diagonal()),
     };
-    let mut warnings = posed.warnings;
+    let mut caveats = posed.caveats;
     let worst = all.iter().map(|mode| mode.residual).fold(0.0, f64::max);
     if worst > 1e-6 {
-        warnings.push(format!("a mode leaves its equation open by {worst:.1e} (relative): take the figures with care"));
+        let message = format!("a mode leaves its equation open by {worst:.1e} (relative): take the figures with care");
+        caveats.push(Caveat::said("inexact-mode", "modes", message, ""));
     }
     if all.iter().any(|mode| mode.eigenvalue.re > 1e-9 * mode.eigenvalue.norm()) {
-        warnings.push("a mode grows by itself: the arm is not stable at this pose".into());
+        let message = "a mode grows by itself: the arm is not stable at this pose";
+        caveats.push(Caveat::said("unstable", "modes", message, "check the gains of the servos"));
     }
     let modes: Vec<ModeFigures> =
         all.iter().take(count).map(|mode| ModeFigures::new(mode, linear, &compliance)).collect();
@@ -169,7 +174,8 @@ pub(crate) fn table(
         compliance_covered: std::array::from_fn(covered),
         modes,
         files: Files::default(),
-        warnings,
+        warnings: caveat::warnings(&caveats),
+        caveats,
         driven: posed.arm.torque_driven.iter().map(|&k| posed.joints[k].clone()).collect(),
         joints: posed.joints,
         at: posed.at,

@@ -7,6 +7,7 @@ use flexarm_kinematics::Model;
 use flexarm_stepping::PrescribedMotion;
 use flexarm_trajectory::{JointLimits, LimitViolation, Trajectory};
 
+use crate::caveat::Caveat;
 use crate::error::Error;
 
 /// A trajectory whose joints are the model's actuated coordinates.
@@ -62,6 +63,12 @@ impl Motion {
         let violations = trajectory.check_limits(&limits);
         let name = path.file_stem().map_or_else(|| "trajectory".into(), |s| s.to_string_lossy().into_owned());
         Ok(Self { name, path: path.to_owned(), trajectory: Arc::new(trajectory), violations, warnings })
+    }
+
+    /// What is worth knowing about it.
+    pub fn caveats(&self) -> Vec<Caveat> {
+        let file = self.path.display().to_string();
+        self.warnings.iter().map(|text| Caveat::said("trajectory", &file, text, "")).collect()
     }
 
     /// For steppers.

@@ -6,6 +6,7 @@ use flexarm_kinematics::{Data, Frame, Pose, State, Wrench, forward_kinematics, r
 use flexarm_stepping::{FlexibleArm, Held, Linear, StepError, linearise};
 use nalgebra::{DVector, Vector6};
 
+use crate::caveat::{Caveat, kinds, validity};
 use crate::error::Error;
 use crate::flexible::FlexibleRobot;
 use crate::inspect::parse_joint_values;
@@ -23,7 +24,7 @@ pub(crate) struct Posed {
     pub(crate) prismatic: Vec<bool>,
     /// Where they are.
     pub(crate) at: Vec<f64>,
-    pub(crate) warnings: Vec<String>,
+    pub(crate) caveats: Vec<Caveat>,
 }
 
 /// A step error of a command that takes no step.
@@ -34,29 +35,34 @@ fn failed(source: StepError) -> Error {
 impl Posed {
     /// `at` as for [`parse_joint_values`]; all joints at zero without it.
     pub(crate) fn new(robot: &Robot, modelling: &Modelling, at: Option<&str>) -> Result<Self, Error> {
+        let model = robot.rigid_model()?;
+        let names: Vec<&str> = model.coordinates().iter().map(|c| c.joint.as_str()).collect();
+        let at = at.map_or_else(|| Ok(vec![0.0; names.len()]), |text| parse_joint_values(text, &names))?;
+        Self::held(robot, modelling, at)
+    }
+
+    /// `at` in coordinate order (rad or m).
+    pub(crate) fn held(robot: &Robot, modelling: &Modelling, at: Vec<f64>) -> Result<Self, Error> {
         let flexible = robot.modelled(modelling)?;
         let model = flexible.model.clone();
         let actuated = &model.coordinates()[..model.n_actuated()];
         let joints: Vec<String> = actuated.iter().map(|c| c.joint.clone()).collect();
-        let names: Vec<&str> = joints.iter().map(String::as_str).collect();
-        let at = at.map_or_else(|| Ok(vec![0.0; names.len()]), |text| parse_joint_values(text, &names))?;
-        let mut warnings = robot.warnings.clone();
-        for (c, q) in actuated.iter().zip(&at) {
-            let (lower, upper) = (c.limits.lower, c.limits.upper);
-            if *q < lower || *q > upper {
-                warnings.push(format!("joint {:?} at {q} is outside its limits {lower} to {upper}", c.joint));
-            }
-        }
-        warnings.extend(flexible.doubts.iter().cloned());
+        let mut caveats = robot.caveats();
+        caveats.extend(validity::outside_limits(actuated, &at));
+        caveats.extend(flexible.caveats());
         if flexible.springs.is_empty() {
-            warnings.push(
-                "the robot has no flexible link and no elastic drive: it does not yield and does not vibrate".into(),
-            );
+            let message = "the robot has no flexible link and no elastic drive: it does not yield and does not vibrate";
+            caveats.push(Caveat::said(
+                "nothing-yields",
+                "robot",
+                message,
+                "add [[flexible_link]] or [[drive]] entries",
+            ));
         }
         let prismatic = actuated.iter().map(|c| c.kind == "prismatic").collect();
         let arm = flexible.arm(Arc::new(Held(at.clone()))).map_err(failed)?;
         let tool = arm.model.frame(TCP_FRAME).expect("added when the robot was loaded").clone();
-        Ok(Self { flexible, arm, tool, joints, prismatic, at, warnings })
+        Ok(Self { flexible, arm, tool, joints, prismatic, at, caveats })
     }
 
     /// The linear structure about the equilibrium under weight and a wrench at the TCP (world axes).
@@ -90,6 +96,14 @@ impl Posed {
                 (strain, rotation_vector((straight.rotation.inverse() * bent.rotation).matrix()).norm())
             })
             .collect()
+    }
+
+    /// Whether the models hold at an equilibrium: deflections of links, forces of drives.
+    pub(crate) fn validity(&self, linear: &Linear) -> Vec<Caveat> {
+        let links = self.flexible.spans.iter().zip(self.strains(&linear.q));
+        let links = links.flat_map(|(span, (strain, rotation))| validity::link(&span.link, rotation, strain));
+        let holding = linear.holding.as_slice();
+        links.chain(validity::efforts(&kinds::HOLDING, self.arm.model.coordinates(), holding)).collect()
     }
 
     /// Joints at the pose, elastic coordinates zero.

@@ -2,6 +2,7 @@
 
 use flexarm_stepping::{FlexibleArm, Load, StepError, Stepper, StepperKind, new_stepper};
 
+use crate::caveat::Caveat;
 use crate::compare::tool_frame;
 use crate::disturbance::{Disturbances, EXPRESSION_PERIOD};
 use crate::error::Error;
@@ -16,7 +17,7 @@ pub(crate) struct Checked {
     pub(crate) flexible: FlexibleRobot,
     pub(crate) arm: FlexibleArm,
     pub(crate) stepper: Box<dyn Stepper>,
-    pub(crate) load_warnings: Vec<String>,
+    pub(crate) load_caveats: Vec<Caveat>,
 }
 
 impl Checked {
@@ -36,18 +37,18 @@ pub(crate) fn checked(robot: &Robot, motion: &Motion, options: &RunOptions) -> R
     let failed = |source: StepError| Error::Step { source, partial: false };
     let flexible = robot.modelled(&options.modelling)?;
     let mut arm = flexible.arm(motion.prescribed()).map_err(failed)?;
-    let mut load_warnings = Vec::new();
+    let mut load_caveats = Vec::new();
     if let Some(path) = &options.loads {
         let disturbances = Disturbances::load(path, robot, &arm.model, motion.trajectory.duration())?;
-        load_warnings = disturbances.warnings;
+        load_caveats = disturbances.caveats;
         if !matches!(options.stepper, StepperKind::Reference(_)) {
-            load_warnings.extend(short_loads(&disturbances.loads, options.step_s));
+            load_caveats.extend(short_loads(&disturbances.loads, options.step_s));
         }
         arm.inertia_changes = disturbances.changes;
         arm = arm.with_timed_loads(disturbances.loads).map_err(failed)?;
     }
     let stepper = new_stepper(options.stepper, arm.clone(), options.step_s, options.start).map_err(failed)?;
-    Ok(Checked { flexible, arm, stepper, load_warnings })
+    Ok(Checked { flexible, arm, stepper, load_caveats })
 }
 
 /// Most steps of a run: some hours.
@@ -93,7 +94,7 @@ fn check_options(motion: &Motion, options: &RunOptions) -> Result<(), Error> {
 const STEPS_PER_LOAD: f64 = 8.0;
 
 /// Loads that last so few steps that they do not act as the file says.
-fn short_loads(loads: &[Load], h: f64) -> Vec<String> {
+fn short_loads(loads: &[Load], h: f64) -> Vec<Caveat> {
     let brief = |load: &Load| {
         let (first, last) = load.jumps.iter().fold((f64::INFINITY, 0.0f64), |(a, b), t| (a.min(*t), b.max(*t)));
         let steps = (last - first) / h;
@@ -110,5 +111,6 @@ fn short_loads(loads: &[Load], h: f64) -> Vec<String> {
             format!("a load of {hz:.1} Hz has {steps:.1} steps per period: it does not act as written; lower --step")
         })
     };
-    loads.iter().filter_map(|load| brief(load).or_else(|| fast(load))).collect()
+    let told = |text: String| Caveat::said("short-load", "loads", text, "lower the step");
+    loads.iter().filter_map(|load| brief(load).or_else(|| fast(load)).map(told)).collect()
 }

@@ -8,6 +8,7 @@ use flexarm_stepping::Linear;
 use nalgebra::{Complex, DMatrix, Vector6};
 use serde::Serialize;
 
+use crate::caveat::{self, Caveat, kinds};
 use crate::error::Error;
 use crate::modes::{linear_error, modes_of, tool_map};
 use crate::options::Modelling;
@@ -87,8 +88,10 @@ pub struct Response {
     pub curves: Vec<ResponseCurve>,
     /// Written files.
     pub files: ResponseFiles,
-    /// Things worth telling.
+    /// What the caveats warn of, as sentences.
     pub warnings: Vec<String>,
+    /// What is probably wrong with the input, or limits the worth of the result.
+    pub caveats: Vec<Caveat>,
 }
 
 /// Response of one output to one input.
@@ -225,11 +228,11 @@ pub fn response(
             });
         }
     }
-    let mut warnings = posed.warnings.clone();
+    let mut caveats = posed.caveats.clone();
     let within = |k: &usize| damping_ratio[*k] < UNDAMPED && (from..=to).contains(&frequencies_hz[*k]);
     if let Some(k) = (0..modes.len()).find(within) {
         let hz = frequencies_hz[k];
-        warnings.push(format!("the mode at {hz:.3} Hz has no damping: the height of its peak means nothing"));
+        caveats.push(kinds::UNDAMPED.found(format!("the mode at {hz:.3} Hz"), damping_ratio[k], UNDAMPED));
     }
     let mut response = Response {
         robot: robot.name.clone(),
@@ -241,7 +244,8 @@ pub fn response(
         logarithmic: request.spacing == Spacing::Logarithmic,
         curves,
         files: ResponseFiles::default(),
-        warnings,
+        warnings: caveat::warnings(&caveats),
+        caveats,
         joints: posed.joints,
         at: posed.at,
     };

@@ -8,6 +8,7 @@ use flexarm_urdf::{ReadOptions, UrdfRobot, default_tcp, read_urdf};
 use nalgebra::{Matrix3, Rotation3, Translation3, Vector3};
 use toml::Spanned;
 
+use crate::caveat::Caveat;
 use crate::drive_entry::{Drive, drives};
 use crate::error::Error;
 use crate::flexible::RobotLink;
@@ -166,7 +167,7 @@ impl Robot {
         }
         self.rigid.joints.push(Joint::new("__tcp_joint", JointKind::Fixed, link, TCP_FRAME, X_LT));
         self.rigid.links.push(Link { name: TCP_FRAME.into(), inertia: None });
-        self.warnings.extend(self.urdf.warnings_only().map(|w| format!("{}: {}", w.location, w.message)));
+        self.warnings.extend(self.urdf.warnings_only().map(told));
         // Faults that only show in the whole are put to the last flexible link: that is where a second entry stands.
         let last_flexible = file.and_then(|(f, s)| f.flexible_link.last().map(|e| (s, e.link.span())));
         match (self.flexible_robot(), last_flexible) {
@@ -217,6 +218,15 @@ impl Robot {
         Ok(())
     }
 
+    /// What is worth knowing about it before anything is computed.
+    pub fn caveats(&self) -> Vec<Caveat> {
+        let file = self.path.display().to_string();
+        let of_urdf = |text: &&String| self.urdf.warnings_only().any(|w| **text == told(w));
+        let own = self.warnings.iter().filter(|text| !of_urdf(text));
+        let own = own.map(|text| Caveat::said("flexible-link", &file, text, "compare both sources"));
+        own.chain(self.urdf.warnings_only().map(|w| Caveat::said(w.code, &w.location, told(w), &w.help))).collect()
+    }
+
     /// The rigid robot's tree.
     ///
     /// # Errors
@@ -224,6 +234,11 @@ impl Robot {
     pub fn rigid_model(&self) -> Result<Arc<Model>, Error> {
         Model::new(&self.rigid).map(Arc::new).map_err(|source| Error::Model { path: self.urdf_path.clone(), source })
     }
+}
+
+/// A finding with its place, as a sentence.
+fn told(finding: &flexarm_urdf::Finding) -> String {
+    format!("{}: {}", finding.location, finding.message)
 }
 
 fn unknown_link(what: &str, link: &str, mechanism: &Mechanism) -> String {

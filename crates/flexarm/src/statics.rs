@@ -5,7 +5,7 @@ use flexarm_kinematics::{forward_kinematics, frame_jacobian};
 use nalgebra::{DVector, Matrix6xX, Vector6};
 use serde::Serialize;
 
-use crate::compare::{ROTATION_LIMIT, STRAIN_LIMIT};
+use crate::caveat::{self, Caveat};
 use crate::error::Error;
 use crate::options::Modelling;
 use crate::posed::{Posed, step_error};
@@ -43,8 +43,10 @@ pub struct Statics {
     pub elements: Vec<ElementStatics>,
     /// Unbalanced force over the largest force.
     pub residual: f64,
-    /// Things worth telling.
+    /// What the caveats warn of, as sentences.
     pub warnings: Vec<String>,
+    /// What is probably wrong with the input, or limits the worth of the result.
+    pub caveats: Vec<Caveat>,
 }
 
 /// An elastic element at the equilibrium.
@@ -103,7 +105,7 @@ pub fn statics(robot: &Robot, modelling: &Modelling, at: Option<&str>, wrench: [
     frame_jacobian(model, &data, &posed.tool, &mut J);
     let ne = model.n_elastic();
     let J = J.columns(model.nv() - ne, ne);
-    let mut warnings = posed.warnings.clone();
+    let mut caveats = posed.caveats.clone();
     let mut elements = Vec::new();
     for ((name, range), element) in loaded.elements.iter().zip(&posed.arm.elements) {
         let (first, n) = (range.start, range.len());
@@ -120,29 +122,7 @@ pub fn statics(robot: &Robot, modelling: &Modelling, at: Option<&str>, wrench: [
             deflection: deflection.as_slice().to_vec(),
         });
     }
-    for (span, (strain, rotation)) in posed.flexible.spans.iter().zip(posed.strains(&loaded.q)) {
-        if rotation > ROTATION_LIMIT {
-            let name = &span.link;
-            warnings.push(format!(
-                "link {name:?} bends by {rotation:.3} rad, beyond the {ROTATION_LIMIT} rad for which the linear elastic model is good"
-            ));
-        }
-        if strain > STRAIN_LIMIT {
-            let name = &span.link;
-            warnings.push(format!(
-                "link {name:?} changes its length by {strain:.2e} of it, beyond {STRAIN_LIMIT:.0e}: check stiffness and loads"
-            ));
-        }
-    }
-    for ((joint, c), torque) in posed.joints.iter().zip(model.coordinates()).zip(&loaded.holding) {
-        if torque.abs() > c.limits.effort {
-            warnings.push(format!(
-                "joint {joint:?} needs {:.0} N m (or N) to hold the pose, its limit is {:.0}",
-                torque.abs(),
-                c.limits.effort
-            ));
-        }
-    }
+    caveats.extend(posed.validity(&loaded));
     let [x, y, z, rx, ry, rz] = displacement;
     let [sx, sy, sz, srx, sry, srz] = sag;
     Ok(Statics {
@@ -158,7 +138,8 @@ pub fn statics(robot: &Robot, modelling: &Modelling, at: Option<&str>, wrench: [
         holding_torque: loaded.holding.as_slice().to_vec(),
         elements,
         residual: loaded.residual,
-        warnings,
+        warnings: caveat::warnings(&caveats),
+        caveats,
         joints: posed.joints,
         at: posed.at,
     })

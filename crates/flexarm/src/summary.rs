@@ -6,6 +6,7 @@ use flexarm_analysis::{HoldMetrics, TcpMetrics};
 use flexarm_stepping::{ConstraintForm, Counts, SpookPreset, StepperKind};
 use serde::{Deserialize, Serialize};
 
+use crate::caveat::Caveat;
 use crate::options::RunOptions;
 
 /// Answer of `flexarm compare` and `flexarm run`. SI units.
@@ -47,8 +48,10 @@ pub struct Summary {
     pub energy: EnergyFigures,
     /// Largest force per drive (N m or N).
     pub drives: BTreeMap<String, f64>,
-    /// Things worth telling.
+    /// What [`Summary::caveats`] warn of, as sentences.
     pub warnings: Vec<String>,
+    /// What is probably wrong with the input, or limits the worth of the result.
+    pub caveats: Vec<Caveat>,
     /// Written files.
     pub files: Files,
     /// What the run is called in a study.
