@@ -138,6 +138,9 @@ pub(crate) struct RunArgs {
     pub(crate) step: f64,
     #[command(flatten)]
     pub(crate) modelling: ModellingArgs,
+    /// Round corners of the trajectory, where a velocity jumps, by blends that last this long (s)
+    #[arg(long, value_name = "SECONDS", allow_hyphen_values = true)]
+    pub(crate) round_corners: Option<f64>,
     /// File with loads and changes of payload during the run (.toml)
     #[arg(long, value_name = "FILE")]
     pub(crate) loads: Option<PathBuf>,

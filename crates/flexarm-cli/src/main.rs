@@ -172,6 +172,10 @@ fn variant(label: String, args: &RunArgs, with_twin: bool) -> Result<Variant, Er
         }
         other => other,
     })?;
+    let motion = match args.round_corners {
+        Some(seconds) => motion.with_rounded_corners(seconds, &model)?,
+        None => motion,
+    };
     Ok(Variant { label, robot, motion, options: run_options(args, with_twin) })
 }
 

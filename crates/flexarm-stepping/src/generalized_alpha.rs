@@ -26,6 +26,11 @@
 //! (a mode ω meets the scheme as `ω² (1 + c (hω)²)`, still positive). At rest ẍ = 0 and nothing changes. What is left out
 //! of (5) is the second derivative of the load, slow against the modes, and that of the damping force, 2ζ of the rest.
 //! The price: where rho is far below 1, the scheme damps modes of `hω` near 1 about twice as much as without.
+//!
+//! **Events.** The scheme remembers accelerations a and x̃, which a jump makes wrong: after [`GeneralizedAlpha::restart`]
+//! they are taken anew from the equations of motion, after [`GeneralizedAlpha::renew`] the matrix as well. A step may end
+//! anywhere before the next multiple of h ([`GeneralizedAlpha::advance_to`]). A step whose iteration fails is tried again
+//! with a matrix of its start, then in halves, down to `h/64`; after that the multiples of h go on.
 
 use nalgebra::DVector;
 
@@ -34,6 +39,8 @@ use crate::system::SecondOrderSystem;
 
 /// Most Newton iterations in a step before it counts as failed.
 const MAX_ITERATIONS: usize = 25;
+/// A step that fails is halved so many times before the run is given up.
+const MOST_HALVINGS: u32 = 6;
 /// A step that needed more iterations than this renews the matrix for the next one.
 const RENEW_ABOVE: usize = 4;
 /// Accepted correction over the size of the acceleration.
@@ -60,7 +67,9 @@ impl Default for AlphaSettings {
 #[derive(Clone, Debug)]
 pub struct GeneralizedAlpha {
     coefficients: Coefficients,
-    /// `c h²` of (5); 0 without the correction.
+    /// c of (5); 0 without the correction.
+    dispersion: f64,
+    /// `c h²`.
     c_h2: f64,
     /// x̃ at the current time and at the new one.
     x_tilde: DVector<f64>,
@@ -68,7 +77,12 @@ pub struct GeneralizedAlpha {
     stiff: DVector<f64>,
     h: f64,
     t0: f64,
+    t: f64,
     steps: u64,
+    /// Step to which `c_h2`, matrix and memory belong (s).
+    dt: f64,
+    /// Whether a and x̃ are to be taken anew.
+    fresh: bool,
     /// Positions at the current time.
     pub x: DVector<f64>,
     /// Velocities.
@@ -139,15 +153,21 @@ impl GeneralizedAlpha {
         let mut acceleration = DVector::zeros(n);
         system.acceleration(t0, &x, &v, &mut acceleration)?;
         let zeros = DVector::zeros(n);
+        let coefficients = Coefficients::new(rho);
+        let dispersion = if dispersion_correction { coefficients.dispersion() } else { 0.0 };
         Ok(Self {
-            coefficients: Coefficients::new(rho),
-            c_h2: if dispersion_correction { Coefficients::new(rho).dispersion() * h * h } else { 0.0 },
+            coefficients,
+            dispersion,
+            c_h2: dispersion * h * h,
             x_tilde: acceleration.clone(),
             x_tilde_new: zeros.clone(),
             stiff: zeros.clone(),
             h,
             t0,
+            t: t0,
             steps: 0,
+            dt: h,
+            fresh: true,
             x_new: x.clone(),
             v_new: v.clone(),
             x,
@@ -172,7 +192,12 @@ impl GeneralizedAlpha {
 
     /// Current time (s).
     pub fn time(&self) -> f64 {
-        self.t0 + self.steps as f64 * self.h
+        self.t
+    }
+
+    /// Next multiple of the step (s).
+    pub fn next_time(&self) -> f64 {
+        self.t0 + (self.steps + 1) as f64 * self.h
     }
 
     /// Steps taken.
@@ -180,35 +205,83 @@ impl GeneralizedAlpha {
         self.steps
     }
 
-    /// Starts anew from the current state: to be called when a force has jumped.
+    /// Starts anew from the current state: to be called when a force or a velocity has jumped.
     ///
     /// # Errors
     /// [`StepError::Singular`] if the acceleration cannot be found.
     pub fn restart(&mut self, system: &mut impl SecondOrderSystem) -> Result<(), StepError> {
-        system.acceleration(self.time(), &self.x, &self.v, &mut self.acceleration)?;
-        self.a.copy_from(&self.acceleration);
-        self.previous.copy_from(&self.acceleration);
-        self.x_tilde.copy_from(&self.acceleration);
+        system.acceleration(self.t, &self.x, &self.v, &mut self.acceleration)?;
+        self.fresh = true;
         Ok(())
     }
 
-    /// Advances by one step. On error the state stays at the last good time. No allocation.
+    /// As [`GeneralizedAlpha::restart`], when masses, stiffness or damping have changed: the matrix too is out of date.
+    ///
+    /// # Errors
+    /// As [`GeneralizedAlpha::restart`].
+    pub fn renew(&mut self, system: &mut impl SecondOrderSystem) -> Result<(), StepError> {
+        self.factored = false;
+        self.restart(system)
+    }
+
+    /// Advances to the next multiple of the step. On error the state stays at the last good time. No allocation.
     ///
     /// # Errors
     /// [`StepError::NotConverged`], [`StepError::Diverged`] or [`StepError::Singular`].
     pub fn step(&mut self, system: &mut impl SecondOrderSystem) -> Result<(), StepError> {
+        self.advance_to(system, self.next_time())
+    }
+
+    /// Advances to t, which lies after the current time and not beyond the next multiple of the step.
+    ///
+    /// # Errors
+    /// As [`GeneralizedAlpha::step`].
+    pub fn advance_to(&mut self, system: &mut impl SecondOrderSystem, t: f64) -> Result<(), StepError> {
+        let whole = t == self.next_time();
+        // Whole steps are all the same, so that their matrix lasts.
+        let from_grid = self.t == self.t0 + self.steps as f64 * self.h;
+        let dt = if whole && from_grid { self.h } else { t - self.t };
+        self.last_iterations = 0;
+        self.cross(system, t, dt, MOST_HALVINGS)?;
+        self.steps += u64::from(whole);
+        Ok(())
+    }
+
+    /// From the current time to t: in one step, else in two halves.
+    fn cross(&mut self, system: &mut impl SecondOrderSystem, t: f64, dt: f64, halvings: u32) -> Result<(), StepError> {
+        if dt != self.dt {
+            (self.dt, self.c_h2) = (dt, self.dispersion * dt * dt);
+            (self.factored, self.fresh) = (false, true);
+        }
+        let kept = self.factored;
+        let mut result = self.attempt(system, t);
+        if result.is_err() && kept {
+            (self.factored, self.fresh) = (false, true);
+            result = self.attempt(system, t);
+        }
+        let Err(error) = result else { return Ok(()) };
+        (self.factored, self.fresh) = (false, true);
+        if halvings == 0 {
+            return Err(error);
+        }
+        self.cross(system, t - 0.5 * dt, 0.5 * dt, halvings - 1)?;
+        self.cross(system, t, 0.5 * dt, halvings - 1)
+    }
+
+    /// One step of length `dt` to t; on error nothing but the matrix has changed.
+    fn attempt(&mut self, system: &mut impl SecondOrderSystem, t: f64) -> Result<(), StepError> {
         let Coefficients { alpha_m, alpha_f, beta, gamma } = self.coefficients;
-        let h = self.h;
-        let t = self.t0 + (self.steps + 1) as f64 * h;
+        let h = self.dt;
         let ratio = (1.0 - alpha_f) / (1.0 - alpha_m);
         let (c_D, c_K) = (h * gamma * ratio, h * h * beta * ratio);
 
-        // The matrix belongs to the configuration of the last residual.
         if !self.factored {
-            if self.steps == 0 {
-                system.residual(self.t0, &self.x, &self.v, &self.acceleration, &mut self.r);
-            }
+            // The matrix belongs to the configuration of the last residual.
+            system.residual(self.t, &self.x, &self.v, &self.acceleration, &mut self.r);
             self.factor(system, t, c_D, c_K)?;
+        }
+        if self.fresh {
+            self.remember();
         }
         // Predict ẍ⁺ by extrapolation.
         for k in 0..self.x.len() {
@@ -273,9 +346,9 @@ impl GeneralizedAlpha {
         std::mem::swap(&mut self.x_tilde, &mut self.x_tilde_new);
         std::mem::swap(&mut self.previous, &mut self.acceleration);
         std::mem::swap(&mut self.acceleration, &mut self.trial);
-        self.steps += 1;
+        self.t = t;
         self.iterations += iterations as u64;
-        self.last_iterations = iterations;
+        self.last_iterations += iterations;
         self.factored = iterations <= RENEW_ABOVE;
         Ok(())
     }
@@ -287,10 +360,19 @@ impl GeneralizedAlpha {
         Ok(())
     }
 
+    /// a and x̃ of the current acceleration alone. With the correction in x̃, a jump would set modes of `hω >> 1` ringing
+    /// from one step to the next.
+    fn remember(&mut self) {
+        self.a.copy_from(&self.acceleration);
+        self.previous.copy_from(&self.acceleration);
+        self.x_tilde.copy_from(&self.acceleration);
+        self.fresh = false;
+    }
+
     /// x̃⁺, a⁺, x⁺, v⁺ of the trial ẍ⁺ by (5), (4), (2), (3).
     fn place(&mut self, system: &mut impl SecondOrderSystem) {
         let Coefficients { alpha_m, alpha_f, beta, gamma } = self.coefficients;
-        let (h, ratio) = (self.h, (1.0 - alpha_f) / (1.0 - alpha_m));
+        let (h, ratio) = (self.dt, (1.0 - alpha_f) / (1.0 - alpha_m));
         self.x_tilde_new.as_mut_slice().copy_from_slice(self.trial.as_slice());
         if self.c_h2 > 0.0 {
             system.inverse_mass_times_stiffness(&self.trial, &mut self.stiff);

@@ -34,6 +34,7 @@
 mod arm;
 mod drive;
 mod error;
+mod events;
 mod generalized_alpha;
 mod linear;
 mod load;

@@ -4,6 +4,11 @@
 pub trait PrescribedMotion: Send + Sync {
     /// Writes the values at `t` (s), in coordinate order: rad or m, per s, per s².
     fn sample(&self, t: f64, q: &mut [f64], qdot: &mut [f64], qddot: &mut [f64]);
+
+    /// Times at which a velocity jumps (s): just before and after them the samples differ. One at 0 starts from rest.
+    fn velocity_jumps(&self) -> Vec<f64> {
+        Vec::new()
+    }
 }
 
 /// All joints held at fixed positions.
@@ -18,7 +23,7 @@ impl PrescribedMotion for Held {
     }
 }
 
-/// A motion given as a function of time.
+/// A motion given as a function of time; its velocities do not jump.
 pub struct MotionFn<F>(pub F);
 
 impl<F: Fn(f64, &mut [f64], &mut [f64], &mut [f64]) + Send + Sync> PrescribedMotion for MotionFn<F> {

@@ -5,9 +5,7 @@
 //! ```
 //! The residual is one Newton-Euler pass, the acceleration one hybrid pass; the iteration matrix
 //! `M_ff + c_D D + c_K K` is dense in the free coordinates. Torques of a sampled controller stay constant between
-//! its samples ([`ReducedArm::at_time`]). Not here: integration.
-
-use std::sync::Arc;
+//! its samples. What happens at discrete times is in `events`. Not here: integration.
 
 use flexarm_kinematics::{
     Data, JointMotion, Roles, State, Wrench, hybrid_dynamics, inverse_dynamics, mass_matrix_at_poses, world_poses,
@@ -16,6 +14,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::arm::{FlexibleArm, GeometricStiffness, add_product};
 use crate::error::StepError;
+use crate::events::{ArmDamping, Breaks, damping_after_changes};
 use crate::servo::ServoState;
 use crate::system::SecondOrderSystem;
 
@@ -28,25 +27,30 @@ pub struct ReducedArm {
     pub(crate) data: Data,
     pub(crate) state: State,
     pub(crate) qddot: DVector<f64>,
-    tau: DVector<f64>,
+    pub(crate) tau: DVector<f64>,
     roles: Roles,
     /// Free coordinates in the model's order.
-    free: Vec<usize>,
-    servo: Option<ServoState>,
+    pub(crate) free: Vec<usize>,
+    pub(crate) servo: Option<ServoState>,
     /// Next change of inertia.
-    changes: usize,
+    pub(crate) changes: usize,
+    /// Damping after each of them.
+    pub(crate) dampings: Vec<ArmDamping>,
+    pub(crate) breaks: Breaks,
+    /// Work of the drives where prescribed velocities jumped (J).
+    pub(crate) struck: f64,
     geometric: bool,
-    sampled_at: f64,
+    pub(crate) sampled_at: f64,
     factor: Option<Cholesky<f64, Dyn>>,
     /// Inverse of the iteration matrix: it is used dozens of times before it is renewed, and a product costs a third of
     /// two triangular solutions.
     inverse: DMatrix<f64>,
     matrix: DMatrix<f64>,
     /// Storage of the mass matrix's factor, `M^-1 K`, and a product.
-    mass_factor: Option<Cholesky<f64, Dyn>>,
+    pub(crate) mass_factor: Option<Cholesky<f64, Dyn>>,
     M_inverse_K: DMatrix<f64>,
     product: DMatrix<f64>,
-    shifted: DVector<f64>,
+    pub(crate) shifted: DVector<f64>,
     geometric_force: DVector<f64>,
 }
 
@@ -66,6 +70,9 @@ impl ReducedArm {
             roles,
             servo: arm.servo.clone().map(|servo| ServoState::new(servo, &arm)),
             changes: 0,
+            dampings: damping_after_changes(&arm),
+            breaks: Breaks::of(&arm),
+            struck: 0.0,
             geometric: arm.elements.iter().any(|e| e.geometric.is_some()),
             sampled_at: f64::NAN,
             factor: None,
@@ -85,7 +92,8 @@ impl ReducedArm {
         &self.arm
     }
 
-    /// Free coordinates and rates at `t = 0`: joints on their reference, springs at `e`, at the reference's speed.
+    /// Free coordinates and rates at `t = 0`: joints on their reference, springs at `e`, at the reference's speed. A motion
+    /// whose velocities jump at 0 starts from rest.
     pub(crate) fn start(&mut self, e: &DVector<f64>) -> Result<(DVector<f64>, DVector<f64>), StepError> {
         let (n, driven) = (self.arm.n_free(), self.arm.torque_driven.len());
         let (mut x, mut v) = (DVector::zeros(n), DVector::zeros(n));
@@ -107,38 +115,13 @@ impl ReducedArm {
                 servo.hold(&tau);
             }
         }
-        self.at_time(0.0, &x, &v);
+        self.at_time(0.0, &x, &mut v)?;
         Ok((x, v))
     }
 
-    /// What happens at discrete times: samples of the controller, changes of inertia. `true` if accelerations jump.
-    pub(crate) fn at_time(&mut self, t: f64, x: &DVector<f64>, v: &DVector<f64>) -> bool {
-        let mut jumps = false;
-        while let Some(change) = self.arm.inertia_changes.get(self.changes)
-            && change.t <= t + 1e-9
-        {
-            self.arm.model = Arc::new(self.arm.model.with_inertia(change.body, change.inertia));
-            self.changes += 1;
-            jumps = true;
-        }
-        if let Some(servo) = &mut self.servo {
-            jumps |= servo.sample(t, &self.arm, x.as_slice(), v.as_slice());
-        }
-        jumps
-    }
-
-    /// The next time after `t` at which something happens, if any.
-    pub fn next_event(&self, t: f64) -> Option<f64> {
-        let change = self.arm.inertia_changes.get(self.changes).map(|c| c.t).filter(|c| *c > t + 1e-9);
-        let sample = self.servo.as_ref().map(|s| s.next_sample(t));
-        match (change, sample) {
-            (Some(a), Some(b)) => Some(a.min(b)),
-            (a, b) => a.or(b),
-        }
-    }
-
     /// Joint motion at t (once per time) and free coordinates into the full state.
-    fn set(&mut self, t: f64, x: &DVector<f64>, v: &DVector<f64>) {
+    pub(crate) fn set(&mut self, t: f64, x: &DVector<f64>, v: &DVector<f64>) {
+        let t = self.breaks.side(t);
         if t != self.sampled_at {
             self.arm.prescribed_state(t, &mut self.state, &mut self.qddot);
             self.sampled_at = t;

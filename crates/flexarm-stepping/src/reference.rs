@@ -138,6 +138,7 @@ pub struct Reference {
     settings: ReferenceSettings,
     h: f64,
     t0: f64,
+    t: f64,
     done: u64,
     /// Positions at the current time.
     pub x: DVector<f64>,
@@ -186,6 +187,7 @@ impl Reference {
             settings,
             h,
             t0,
+            t: t0,
             done: 0,
             x,
             v,
@@ -207,7 +209,12 @@ impl Reference {
 
     /// Current time (s).
     pub fn time(&self) -> f64 {
-        self.t0 + self.done as f64 * self.h
+        self.t
+    }
+
+    /// Next multiple of `h` (s).
+    pub fn next_time(&self) -> f64 {
+        self.t0 + (self.done + 1) as f64 * self.h
     }
 
     /// First point that is neither reached nor waiting.
@@ -226,12 +233,13 @@ impl Reference {
         // A point is met exactly: a restart that is a rounding beyond it would be met again.
         let point = self.t0 + ((t - self.t0) / self.h).round() * self.h;
         let t = if (t - point).abs() <= near { point } else { t };
+        if self.restarts.iter().any(|other| (other - t).abs() <= near) {
+            return;
+        }
         if t <= self.kept.time() + near {
             self.start_again();
         }
-        if !self.restarts.iter().any(|other| (other - t).abs() <= near) {
-            self.restarts.insert(self.restarts.partition_point(|other| *other < t), t);
-        }
+        self.restarts.insert(self.restarts.partition_point(|other| *other < t), t);
     }
 
     /// Keeps the solver's steps below `longest` (s).
@@ -266,8 +274,7 @@ impl Reference {
     /// # Errors
     /// [`StepError::SolverGaveUp`], [`StepError::Diverged`] or [`StepError::Singular`].
     pub fn step(&mut self, system: &mut impl SecondOrderSystem) -> Result<(), StepError> {
-        let n = self.x.len();
-        while self.ahead.is_empty() && n > 0 {
+        while self.ahead.is_empty() && !self.x.is_empty() {
             if let Err(error) = self.advance(system) {
                 // Points that were passed before the failure are good; the solver tries again from the last one.
                 let Some(last) = self.ahead.back().cloned() else {
@@ -277,14 +284,41 @@ impl Reference {
                 self.kept = Kept::Start(self.next_point() - self.h, last);
             }
         }
-        let t = self.t0 + (self.done + 1) as f64 * self.h;
         let y = self.ahead.pop_front().unwrap_or_default();
+        self.arrive(system, self.next_time(), &y)?;
+        self.done += 1;
+        Ok(())
+    }
+
+    /// Advances to a restart that lies before the next multiple of h ([`Reference::restart_at`]); what is left of the step
+    /// starts anew there.
+    ///
+    /// # Errors
+    /// As [`Reference::step`].
+    pub fn step_to_restart(&mut self, system: &mut impl SecondOrderSystem, t: f64) -> Result<(), StepError> {
+        while self.kept.time() < t - self.near(t) && !self.x.is_empty() {
+            if let Err(error) = self.advance(system) {
+                self.start_again();
+                return Err(error);
+            }
+        }
+        let y = match &self.kept {
+            Kept::Start(_, y) => y.clone(),
+            _ => together(&self.x, &self.v),
+        };
+        self.arrive(system, t, &y)?;
+        self.start_again();
+        Ok(())
+    }
+
+    /// Takes over position and velocity at t.
+    fn arrive(&mut self, system: &mut impl SecondOrderSystem, t: f64, y: &[f64]) -> Result<(), StepError> {
+        let n = self.x.len();
         let (x, v) = (DVector::from_column_slice(&y[..n]), DVector::from_column_slice(&y[n..]));
         let mut acceleration = DVector::zeros(n);
         self.evaluations += 1;
         system.acceleration(t, &x, &v, &mut acceleration)?;
-        (self.x, self.v, self.acceleration) = (x, v, acceleration);
-        self.done += 1;
+        (self.x, self.v, self.acceleration, self.t) = (x, v, acceleration, t);
         Ok(())
     }
 

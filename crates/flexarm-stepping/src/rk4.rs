@@ -16,6 +16,7 @@ pub const STABILITY_LIMIT: f64 = 2.78;
 pub struct Rk4 {
     h: f64,
     t0: f64,
+    t: f64,
     steps: u64,
     /// Positions at the current time.
     pub x: DVector<f64>,
@@ -48,6 +49,7 @@ impl Rk4 {
         Ok(Self {
             h,
             t0,
+            t: t0,
             steps: 0,
             x,
             v,
@@ -67,7 +69,17 @@ impl Rk4 {
 
     /// Current time (s).
     pub fn time(&self) -> f64 {
-        self.t0 + self.steps as f64 * self.h
+        self.t
+    }
+
+    /// Steps taken.
+    pub fn steps(&self) -> u64 {
+        self.steps
+    }
+
+    /// Next multiple of the step (s).
+    pub fn next_time(&self) -> f64 {
+        self.t0 + (self.steps + 1) as f64 * self.h
     }
 
     /// Takes the acceleration anew: to be called when a force has jumped.
@@ -75,16 +87,23 @@ impl Rk4 {
     /// # Errors
     /// [`StepError::Singular`] if it cannot be found.
     pub fn restart(&mut self, system: &mut impl SecondOrderSystem) -> Result<(), StepError> {
-        let t = self.time();
-        system.acceleration(t, &self.x, &self.v, &mut self.acceleration)
+        system.acceleration(self.t, &self.x, &self.v, &mut self.acceleration)
     }
 
-    /// Advances by one step. On error the state stays at the last good time. No allocation.
+    /// Advances to the next multiple of the step. On error the state stays at the last good time. No allocation.
     ///
     /// # Errors
     /// [`StepError::Diverged`] or [`StepError::Singular`].
     pub fn step(&mut self, system: &mut impl SecondOrderSystem) -> Result<(), StepError> {
-        let (h, t) = (self.h, self.time());
+        self.advance_to(system, self.next_time())
+    }
+
+    /// Advances to `t_new`, which lies after the current time and not beyond the next multiple of the step.
+    ///
+    /// # Errors
+    /// As [`Rk4::step`].
+    pub fn advance_to(&mut self, system: &mut impl SecondOrderSystem, t_new: f64) -> Result<(), StepError> {
+        let (t, h) = (self.t, t_new - self.t);
         // Stage 1 is the acceleration kept from the end of the last step.
         self.dx.copy_from(&self.v);
         self.dv.copy_from(&self.acceleration);
@@ -108,7 +127,6 @@ impl Rk4 {
                 largest = f64::INFINITY;
             }
         }
-        let t_new = self.t0 + (self.steps + 1) as f64 * h;
         if largest > 1e6 {
             let what = format!("a coordinate reached {largest:.1e}");
             return Err(StepError::Diverged { t: t_new, h, what });
@@ -117,7 +135,8 @@ impl Rk4 {
         std::mem::swap(&mut self.x, &mut self.x_stage);
         std::mem::swap(&mut self.v, &mut self.v_stage);
         std::mem::swap(&mut self.acceleration, &mut self.a_stage);
-        self.steps += 1;
+        self.steps += u64::from(t_new == self.next_time());
+        self.t = t_new;
         Ok(())
     }
 }

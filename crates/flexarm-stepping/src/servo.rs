@@ -7,9 +7,7 @@ use nalgebra::DVector;
 
 use crate::arm::{FlexibleArm, Servo};
 use crate::drive::Friction;
-
-/// Slack when two times are compared (s).
-const SAME_TIME: f64 = 1e-9;
+use crate::events::SAME_TIME;
 
 /// State of a [`Servo`] in a run.
 pub(crate) struct ServoState {

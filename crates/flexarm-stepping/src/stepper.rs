@@ -1,11 +1,14 @@
 //! One face for all steppers: step, observe, count. A fourth stepper implements [`Stepper`] in a file of its own and
 //! gets a line in [`StepperKind`] and [`new_stepper`]; nothing else changes.
 
+use std::sync::Arc;
+
 use flexarm_kinematics::{Data, Pose, State, kinetic_energy_of, mass_matrix, potential_energy_of};
 use nalgebra::{DMatrix, DVector, Vector6};
 
 use crate::arm::FlexibleArm;
 use crate::error::StepError;
+use crate::events::{Change, SAME_TIME};
 use crate::generalized_alpha::{AlphaSettings, GeneralizedAlpha};
 use crate::reduced::ReducedArm;
 use crate::reference::{Reference, ReferenceSettings};
@@ -68,6 +71,8 @@ pub struct Observation {
     pub energy: [f64; 3],
     /// Power of the drives, of the external loads, and what dampers and friction take away (W).
     pub power: [f64; 3],
+    /// Work of the drives so far where velocities of the motion jumped (J); not in their power, which has no impulses.
+    pub impulse_work: f64,
 }
 
 impl Observation {
@@ -83,6 +88,7 @@ impl Observation {
             load: vec![Vector6::zeros(); arm.elements.len()],
             energy: [0.0; 3],
             power: [0.0; 3],
+            impulse_work: 0.0,
         }
     }
 }
@@ -134,7 +140,6 @@ pub fn new_stepper(kind: StepperKind, arm: FlexibleArm, h: f64, start: Start) ->
         Start::Equilibrium => static_equilibrium(&arm, 0.0)?,
         Start::Undeformed => DVector::zeros(arm.n_elastic_coordinates()),
     };
-    check_events(&arm, h)?;
     Ok(match kind {
         StepperKind::GeneralizedAlpha(settings) => {
             let rho = settings.rho;
@@ -144,14 +149,22 @@ pub fn new_stepper(kind: StepperKind, arm: FlexibleArm, h: f64, start: Start) ->
             let mut system = ReducedArm::new(arm);
             let (x, v) = system.start(&e)?;
             let integrator = GeneralizedAlpha::new(&mut system, 0.0, h, settings, x, v)?;
-            Box::new(ImplicitStepper { system, integrator })
+            Box::new(ReducedStepper { system, integrator })
         }
         StepperKind::Rk4 => {
             check_explicit_step(&arm, h)?;
+            let mut changed = arm.clone();
+            for change in &arm.inertia_changes {
+                changed.model = Arc::new(changed.model.with_inertia(change.body, change.inertia));
+                // An arm that cannot stand with this payload may be able to move with it.
+                if changed.update_modes_and_damping().is_ok() {
+                    check_explicit_step(&changed, h)?;
+                }
+            }
             let mut system = ReducedArm::new(arm);
             let (x, v) = system.start(&e)?;
             let integrator = Rk4::new(&mut system, 0.0, h, x, v)?;
-            Box::new(ExplicitStepper { system, integrator, steps: 0 })
+            Box::new(ReducedStepper { system, integrator })
         }
         StepperKind::Reference(settings) => {
             let mut system = ReducedArm::new(arm);
@@ -164,30 +177,10 @@ pub fn new_stepper(kind: StepperKind, arm: FlexibleArm, h: f64, start: Start) ->
             // No whole part of a period, or a sine would look like nothing at all.
             let period = system.arm.loads.iter().map(|load| load.period).fold(f64::INFINITY, f64::min);
             integrator.limit_steps(0.137 * period);
-            Box::new(ReferenceStepper { system, integrator })
+            Box::new(ReducedStepper { system, integrator })
         }
         StepperKind::Spook(settings) => Box::new(Spook::new(arm, h, settings, &e)?),
     })
-}
-
-/// With a fixed step, samples and changes must fall on steps.
-fn check_events(arm: &FlexibleArm, h: f64) -> Result<(), StepError> {
-    let on_grid = |t: f64| ((t / h).round() - t / h).abs() < 1e-6 * (1.0 + t / h);
-    if let Some(servo) = &arm.servo
-        && (!on_grid(servo.sample_s) || servo.sample_s < 0.5 * h)
-    {
-        let text = format!(
-            "the servo samples every {} s, which is no whole number of steps of {h} s: change --step or sample_s",
-            servo.sample_s
-        );
-        return Err(StepError::Setup(text));
-    }
-    if let Some(change) = arm.inertia_changes.iter().find(|c| !on_grid(c.t)) {
-        let t = change.t;
-        let text = format!("the payload changes at {t} s, which is no whole number of steps of {h} s: change --step");
-        return Err(StepError::Setup(text));
-    }
-    Ok(())
 }
 
 /// Every mode must lie inside the stability region: on the imaginary axis up to 2.78, 2.61 where damping turns it
@@ -294,10 +287,11 @@ fn observe_reduced(
         damping += system.arm.friction_torque(k, rate) * rate;
     }
     let loads = system.arm.loads.iter().map(|load| {
-        let F = load.on_body(t, &system.data.X_WB[load.body]);
+        let F = load.on_body(system.breaks.side(t), &system.data.X_WB[load.body]);
         system.data.V[load.body].power(&F)
     });
     out.power = [out.drive.dot(&out.qdot.rows(0, n)), loads.sum(), damping];
+    out.impulse_work = system.struck;
     out.energy = [
         kinetic_energy_of(model, &system.data),
         potential_energy_of(model, &system.data),
@@ -321,97 +315,152 @@ fn check_deflection(arm: &FlexibleArm, x: &DVector<f64>, t: f64, h: f64) -> Resu
     Ok(())
 }
 
-/// After a step: has the arm come apart, and does a force jump here, so that the integrator must start anew?
-fn jumps(system: &mut ReducedArm, x: &DVector<f64>, v: &DVector<f64>, t: f64, h: f64) -> Result<bool, StepError> {
-    check_deflection(&system.arm, x, t, h)?;
-    Ok(system.at_time(t, x, v))
+/// What the steppers of reduced coordinates need of their integrators.
+trait Integrator: Send {
+    fn time(&self) -> f64;
+    /// Next multiple of the step.
+    fn next_time(&self) -> f64;
+    fn step_size(&self) -> f64;
+    /// Advances to an event or to [`Integrator::next_time`]; beyond `event` nothing is known yet.
+    fn advance_to(&mut self, system: &mut ReducedArm, t: f64, event: Option<f64>) -> Result<(), StepError>;
+    /// Takes up what an event has changed at the current time.
+    fn take_up(&mut self, system: &mut ReducedArm, change: Change) -> Result<(), StepError>;
+    fn state(&mut self) -> (&DVector<f64>, &mut DVector<f64>);
+    fn all(&self) -> [&DVector<f64>; 3];
+    fn counts(&self) -> Counts;
+    fn last_iteration(&self) -> (usize, f64) {
+        (0, 0.0)
+    }
 }
 
-struct ImplicitStepper {
-    system: ReducedArm,
-    integrator: GeneralizedAlpha,
-}
-
-impl Stepper for ImplicitStepper {
+impl Integrator for GeneralizedAlpha {
     fn time(&self) -> f64 {
-        self.integrator.time()
+        self.time()
     }
-    fn step(&mut self) -> Result<(), StepError> {
-        self.integrator.step(&mut self.system)?;
-        let g = &mut self.integrator;
-        if jumps(&mut self.system, &g.x, &g.v, g.time(), g.step_size())? {
-            g.restart(&mut self.system)?;
+    fn next_time(&self) -> f64 {
+        self.next_time()
+    }
+    fn step_size(&self) -> f64 {
+        self.step_size()
+    }
+    fn advance_to(&mut self, system: &mut ReducedArm, t: f64, _event: Option<f64>) -> Result<(), StepError> {
+        self.advance_to(system, t)
+    }
+    fn take_up(&mut self, system: &mut ReducedArm, change: Change) -> Result<(), StepError> {
+        match change {
+            Change::Nothing => Ok(()),
+            Change::Motion => self.restart(system),
+            Change::Matrices => self.renew(system),
         }
-        Ok(())
     }
-    fn observe(&mut self, out: &mut Observation) {
-        let g = &self.integrator;
-        observe_reduced(&mut self.system, g.time(), &g.x, &g.v, &g.acceleration, out);
+    fn state(&mut self) -> (&DVector<f64>, &mut DVector<f64>) {
+        (&self.x, &mut self.v)
+    }
+    fn all(&self) -> [&DVector<f64>; 3] {
+        [&self.x, &self.v, &self.acceleration]
     }
     fn counts(&self) -> Counts {
-        let g = &self.integrator;
-        Counts { steps: g.steps(), evaluations: g.iterations, factorisations: g.factorisations }
+        Counts { steps: self.steps(), evaluations: self.iterations, factorisations: self.factorisations }
     }
     fn last_iteration(&self) -> (usize, f64) {
-        (self.integrator.last_iterations, self.integrator.last_correction)
+        (self.last_iterations, self.last_correction)
     }
 }
 
-struct ExplicitStepper {
-    system: ReducedArm,
-    integrator: Rk4,
-    steps: u64,
+impl Integrator for Rk4 {
+    fn time(&self) -> f64 {
+        self.time()
+    }
+    fn next_time(&self) -> f64 {
+        self.next_time()
+    }
+    fn step_size(&self) -> f64 {
+        self.step_size()
+    }
+    fn advance_to(&mut self, system: &mut ReducedArm, t: f64, _event: Option<f64>) -> Result<(), StepError> {
+        self.advance_to(system, t)
+    }
+    fn take_up(&mut self, system: &mut ReducedArm, change: Change) -> Result<(), StepError> {
+        if change == Change::Nothing { Ok(()) } else { self.restart(system) }
+    }
+    fn state(&mut self) -> (&DVector<f64>, &mut DVector<f64>) {
+        (&self.x, &mut self.v)
+    }
+    fn all(&self) -> [&DVector<f64>; 3] {
+        [&self.x, &self.v, &self.acceleration]
+    }
+    fn counts(&self) -> Counts {
+        Counts { steps: self.steps(), evaluations: 4 * self.steps(), factorisations: 0 }
+    }
 }
 
-impl Stepper for ExplicitStepper {
+impl Integrator for Reference {
+    fn time(&self) -> f64 {
+        self.time()
+    }
+    fn next_time(&self) -> f64 {
+        self.next_time()
+    }
+    fn step_size(&self) -> f64 {
+        self.step_size()
+    }
+    fn advance_to(&mut self, system: &mut ReducedArm, t: f64, event: Option<f64>) -> Result<(), StepError> {
+        // The solver must not look past an event.
+        if let Some(event) = event {
+            self.restart_at(event);
+        }
+        if t == self.next_time() { self.step(system) } else { self.step_to_restart(system, t) }
+    }
+    fn take_up(&mut self, system: &mut ReducedArm, change: Change) -> Result<(), StepError> {
+        if change == Change::Nothing { Ok(()) } else { self.restart(system) }
+    }
+    fn state(&mut self) -> (&DVector<f64>, &mut DVector<f64>) {
+        (&self.x, &mut self.v)
+    }
+    fn all(&self) -> [&DVector<f64>; 3] {
+        [&self.x, &self.v, &self.acceleration]
+    }
+    fn counts(&self) -> Counts {
+        Counts { steps: self.solver_steps, evaluations: self.evaluations, factorisations: self.factorisations }
+    }
+}
+
+/// A stepper of reduced coordinates; its steps end at events too.
+struct ReducedStepper<I> {
+    system: ReducedArm,
+    integrator: I,
+}
+
+impl<I: Integrator> Stepper for ReducedStepper<I> {
     fn time(&self) -> f64 {
         self.integrator.time()
     }
     fn step(&mut self) -> Result<(), StepError> {
-        self.integrator.step(&mut self.system)?;
-        self.steps += 1;
-        let g = &mut self.integrator;
-        if jumps(&mut self.system, &g.x, &g.v, g.time(), g.step_size())? {
-            g.restart(&mut self.system)?;
+        let Self { system, integrator } = self;
+        let end = integrator.next_time();
+        loop {
+            let event = system.next_event(integrator.time());
+            let event = event.map(|t| if (t - end).abs() <= SAME_TIME { end } else { t });
+            let stop = event.filter(|t| *t < end).unwrap_or(end);
+            integrator.advance_to(system, stop, event)?;
+            let h = integrator.step_size();
+            let (x, v) = integrator.state();
+            check_deflection(&system.arm, x, stop, h)?;
+            let change = system.at_time(stop, x, v)?;
+            integrator.take_up(system, change)?;
+            if stop == end {
+                return Ok(());
+            }
         }
-        Ok(())
     }
     fn observe(&mut self, out: &mut Observation) {
-        let g = &self.integrator;
-        observe_reduced(&mut self.system, g.time(), &g.x, &g.v, &g.acceleration, out);
+        let [x, v, a] = self.integrator.all();
+        observe_reduced(&mut self.system, self.integrator.time(), x, v, a, out);
     }
     fn counts(&self) -> Counts {
-        Counts { steps: self.steps, evaluations: 4 * self.steps, factorisations: 0 }
+        self.integrator.counts()
     }
-}
-
-struct ReferenceStepper {
-    system: ReducedArm,
-    integrator: Reference,
-}
-
-impl Stepper for ReferenceStepper {
-    fn time(&self) -> f64 {
-        self.integrator.time()
-    }
-    fn step(&mut self) -> Result<(), StepError> {
-        let g = &mut self.integrator;
-        // The solver must not look past a sample of the servo or a change of payload.
-        if let Some(t) = self.system.next_event(g.time()) {
-            g.restart_at(t);
-        }
-        g.step(&mut self.system)?;
-        if jumps(&mut self.system, &g.x, &g.v, g.time(), g.step_size())? {
-            g.restart(&mut self.system)?;
-        }
-        Ok(())
-    }
-    fn observe(&mut self, out: &mut Observation) {
-        let g = &self.integrator;
-        observe_reduced(&mut self.system, g.time(), &g.x, &g.v, &g.acceleration, out);
-    }
-    fn counts(&self) -> Counts {
-        let g = &self.integrator;
-        Counts { steps: g.solver_steps, evaluations: g.evaluations, factorisations: g.factorisations }
+    fn last_iteration(&self) -> (usize, f64) {
+        self.integrator.last_iteration()
     }
 }

@@ -71,6 +71,12 @@ pub enum TrajectoryError {
         /// What was given.
         factor: f64,
     },
+    /// A time for blends at corners that is not positive and finite.
+    #[error("corners cannot be rounded within {seconds} s; give a positive time, such as 0.02 s")]
+    BadRounding {
+        /// What was given, s.
+        seconds: f64,
+    },
     /// A sampling rate that is not positive and finite, or that would give more than 100 million rows.
     #[error(
         "sampling rate {rate_hz} Hz is not possible for {duration_s} s of motion; give a positive rate that makes at most 100 million rows"

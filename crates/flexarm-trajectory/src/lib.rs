@@ -47,6 +47,7 @@
 //! Not here: robots, links and inverse kinematics; a trajectory knows its joints by name only.
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test"))]
 
+mod corner;
 pub mod csv_file;
 mod csv_write;
 mod error;
@@ -57,6 +58,7 @@ mod peak;
 mod plan;
 mod polynomial;
 mod problem;
+mod rounding;
 mod shape;
 mod spline;
 mod trajectory;
@@ -72,5 +74,5 @@ pub use peak::{Extreme, JointPeak};
 pub use plan::{MotionLimits, Plan, PlannedMove, Profile};
 pub use problem::{PlanError, Problem, SampleError};
 pub use spline::{JointSamples, Samples};
-pub use trajectory::{Move, Trajectory};
+pub use trajectory::{Move, Trajectory, VelocityJump};
 pub use warning::Warning;

@@ -15,7 +15,13 @@
 //! zero velocity (clamped) and the last quintic takes the acceleration to zero. An end without a hold is natural
 //! (zero acceleration), unless the spline is slower there than 2 % of its top speed: then it is taken to be at rest
 //! as well. Otherwise the velocity jumps at that end, which [`crate::Trajectory::warnings`] tells.
+//!
+//! Nor does a spline know of corners: through positions that were sampled from a velocity that jumps, it would ring, and
+//! no stepper would see the impulse. Corners are found (`corner`), at a sample or between two, and the joint's curve is
+//! cut there: either side has its own spline with an end of constant acceleration, and the velocity jumps between them.
+//! Velocities and accelerations that are given beside a corner are not used, for they may be of either side or of neither.
 
+use crate::corner::{Corner, corners};
 use crate::error::TrajectoryError;
 use crate::polynomial::Piece;
 use crate::problem::SampleError;
@@ -56,12 +62,7 @@ impl Samples {
     pub fn interpolate(&self) -> Result<Trajectory, TrajectoryError> {
         self.check()?;
         let knots: Vec<f64> = self.times.iter().map(|t| t - self.times[0]).collect();
-        let curve = |joint: &JointSamples| {
-            let rates = rates(&knots, joint);
-            let state = |i: usize| [joint.position[i], rates[i][0], rates[i][1]];
-            let pieces = (1..knots.len()).map(|i| Piece::hermite(knots[i] - knots[i - 1], state(i - 1), state(i)));
-            Curve { pieces: pieces.collect(), knots: knots.clone() }
-        };
+        let curve = |joint: &JointSamples| joint.curve(&knots);
         let curves = self.joints.iter().map(curve).collect();
         let names = self.joints.iter().map(|joint| joint.name.clone()).collect();
         Trajectory::from_curves(names, curves, knots[knots.len() - 1], Vec::new())
@@ -115,15 +116,64 @@ impl JointSamples {
     }
 }
 
-/// Velocity and acceleration of one joint at every knot.
-fn rates(t: &[f64], joint: &JointSamples) -> Vec<[f64; 2]> {
-    match (&joint.velocity, &joint.acceleration) {
-        (Some(v), Some(a)) => v.iter().zip(a).map(|(&v, &a)| [v, a]).collect(),
-        (Some(v), None) => {
-            let a = accelerations_from_velocities(t, &joint.position, v);
-            v.iter().zip(a).map(|(&v, a)| [v, a]).collect()
+/// Velocity and acceleration just before and just after a knot; they differ at corners.
+#[derive(Clone, Copy, Default)]
+struct Rates {
+    before: [f64; 2],
+    after: [f64; 2],
+}
+
+impl JointSamples {
+    /// The curve through the samples, with a knot more for each corner between two of them.
+    fn curve(&self, times: &[f64]) -> Curve {
+        let found = corners(times, &self.position);
+        let (mut knots, mut position, mut is_corner) = (Vec::new(), Vec::new(), Vec::new());
+        let mut next = found.iter().peekable();
+        for (i, (&t, &q)) in times.iter().zip(&self.position).enumerate() {
+            let corner = next.next_if(|corner| corner.sample == i);
+            knots.push(t);
+            position.push(q);
+            is_corner.push(corner.is_some_and(|corner| corner.fraction == 0.0));
+            if let Some(Corner { fraction, position: q, .. }) = corner.filter(|corner| corner.fraction > 0.0) {
+                knots.push(t + fraction * (times[i + 1] - t));
+                position.push(*q);
+                is_corner.push(true);
+            }
         }
-        _ => rates_from_positions(t, &joint.position),
+        let rates = self.rates(times, &knots, &position, &is_corner);
+        let piece = |i: usize| {
+            let (a, b) = (rates[i - 1].after, rates[i].before);
+            Piece::hermite(knots[i] - knots[i - 1], [position[i - 1], a[0], a[1]], [position[i], b[0], b[1]])
+        };
+        let pieces = (1..knots.len()).map(piece).collect();
+        Curve { pieces, knots }
+    }
+
+    /// Velocity and acceleration at every knot.
+    fn rates(&self, times: &[f64], knots: &[f64], position: &[f64], is_corner: &[bool]) -> Vec<Rates> {
+        let given = match (&self.velocity, &self.acceleration) {
+            (Some(v), Some(a)) => v.iter().zip(a).map(|(&v, &a)| [v, a]).collect(),
+            (Some(v), None) => {
+                let a = accelerations_from_velocities(times, &self.position, v);
+                v.iter().zip(a).map(|(&v, a)| [v, a]).collect()
+            }
+            _ => Vec::new(),
+        };
+        if !given.is_empty() && !is_corner.contains(&true) {
+            return given.into_iter().map(|rate| Rates { before: rate, after: rate }).collect();
+        }
+        let mut rates = rates_from_positions(knots, position, is_corner);
+        // What is given counts away from corners. Knots between the samples are corners, so the rest are the samples.
+        let mut samples = given.into_iter();
+        for i in 0..knots.len() {
+            let is_sample = times.binary_search_by(|t| t.total_cmp(&knots[i])).is_ok();
+            let given = if is_sample { samples.next() } else { None };
+            let beside = (i.saturating_sub(1)..=(i + 1).min(knots.len() - 1)).any(|k| is_corner[k]);
+            if let Some(rate) = given.filter(|_| !beside) {
+                rates[i] = Rates { before: rate, after: rate };
+            }
+        }
+        rates
     }
 }
 
@@ -150,13 +200,13 @@ fn accelerations_from_velocities(t: &[f64], q: &[f64], v: &[f64]) -> Vec<f64> {
     (0..=last).map(acceleration).collect()
 }
 
-/// Velocities and accelerations at the knots from cubic splines between the holds.
-fn rates_from_positions(t: &[f64], q: &[f64]) -> Vec<[f64; 2]> {
+/// Velocities and accelerations at the knots from cubic splines between holds and corners.
+fn rates_from_positions(t: &[f64], q: &[f64], is_corner: &[bool]) -> Vec<Rates> {
     let last = q.len() - 1;
     let repeats = |i: usize| q[i] == q[i + 1];
     let is_hold = |i: usize| repeats(i) && (i == 0 || i + 1 == last || repeats(i - 1) || repeats(i + 1));
 
-    let mut rates = vec![[0.0; 2]; q.len()];
+    let mut rates = vec![Rates::default(); q.len()];
     let mut first = 0;
     while first < last {
         if is_hold(first) {
@@ -164,42 +214,75 @@ fn rates_from_positions(t: &[f64], q: &[f64]) -> Vec<[f64; 2]> {
             continue;
         }
         let mut end = first + 1;
-        while end < last && !is_hold(end) {
+        while end < last && !is_hold(end) && !is_corner[end] {
             end += 1;
         }
-        // Within the record a run ends at a hold; at the ends of the record it need not.
-        let (mut clamp_start, mut clamp_end) = (first > 0, end < last);
+        // Within the record a run ends at a hold or a corner; at the ends of the record it need not.
+        let kind = |k: usize, inside: bool| match (is_corner[k], inside) {
+            (true, _) => End::Free,
+            (false, true) => End::Clamped,
+            (false, false) => End::Natural,
+        };
+        let (mut start_kind, mut end_kind) = (kind(first, first > 0), kind(end, end < last));
         let (t, q) = (&t[first..=end], &q[first..=end]);
-        let free = cubic_spline(t, q, clamp_start, clamp_end);
+        let free = cubic_spline(t, q, start_kind, end_kind);
         let top = free.iter().fold(0.0, |top: f64, rate| top.max(rate[0].abs()));
-        clamp_start |= free[0][0].abs() <= REST_FRACTION * top;
-        clamp_end |= free[free.len() - 1][0].abs() <= REST_FRACTION * top;
+        let rests = |kind: End, rate: [f64; 2]| match kind {
+            End::Natural if rate[0].abs() <= REST_FRACTION * top => End::Clamped,
+            kind => kind,
+        };
+        start_kind = rests(start_kind, free[0]);
+        end_kind = rests(end_kind, free[free.len() - 1]);
 
-        let mut run = cubic_spline(t, q, clamp_start, clamp_end);
+        let mut run = cubic_spline(t, q, start_kind, end_kind);
         let n = run.len();
-        if clamp_start {
+        if start_kind == End::Clamped {
             run[0] = [0.0; 2];
         }
-        if clamp_end {
+        if end_kind == End::Clamped {
             run[n - 1] = [0.0; 2];
         }
-        rates[first..=end].copy_from_slice(&run);
+        for (k, rate) in run.iter().enumerate() {
+            if k > 0 {
+                rates[first + k].before = *rate;
+            }
+            if k + 1 < n {
+                rates[first + k].after = *rate;
+            }
+        }
         first = end;
     }
+    // Beyond the ends of the record nothing is known.
+    rates[0].before = rates[0].after;
+    rates[last].after = rates[last].before;
     rates
 }
 
-/// Velocity and acceleration at the knots of the cubic spline; an end is clamped (zero velocity) or natural.
+/// How a spline ends.
+#[derive(Clone, Copy, PartialEq)]
+enum End {
+    /// Without velocity.
+    Clamped,
+    /// Without acceleration.
+    Natural,
+    /// With the acceleration of the next knot.
+    Free,
+}
+
+/// Velocity and acceleration at the knots of the cubic spline.
 ///
 /// Unknown are the accelerations `M`; the rows are the usual ones,
 /// `h[i-1] M[i-1] + 2 (h[i-1] + h[i]) M[i] + h[i] M[i+1] = 6 (slope[i] - slope[i-1])`.
-fn cubic_spline(t: &[f64], q: &[f64], clamp_start: bool, clamp_end: bool) -> Vec<[f64; 2]> {
+fn cubic_spline(t: &[f64], q: &[f64], start: End, end: End) -> Vec<[f64; 2]> {
     let last = q.len() - 1;
     let h: Vec<f64> = t.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let slope: Vec<f64> = (0..last).map(|i| (q[i + 1] - q[i]) / h[i]).collect();
     let row = |i: usize| match i {
-        0 if clamp_start => [0.0, 2.0 * h[0], h[0], 6.0 * slope[0]],
-        i if i == last && clamp_end => [h[i - 1], 2.0 * h[i - 1], 0.0, -6.0 * slope[i - 1]],
+        0 if start == End::Clamped => [0.0, 2.0 * h[0], h[0], 6.0 * slope[0]],
+        i if i == last && end == End::Clamped => [h[i - 1], 2.0 * h[i - 1], 0.0, -6.0 * slope[i - 1]],
+        // Two knots alone have one slope and no acceleration.
+        0 if start == End::Free && last > 1 => [0.0, 1.0, -1.0, 0.0],
+        i if i == last && end == End::Free && last > 1 => [-1.0, 1.0, 0.0, 0.0],
         i if i == 0 || i == last => [0.0, 1.0, 0.0, 0.0],
         i => [h[i - 1], 2.0 * (h[i - 1] + h[i]), h[i], 6.0 * (slope[i] - slope[i - 1])],
     };

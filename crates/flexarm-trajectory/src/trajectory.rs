@@ -4,7 +4,7 @@
 
 use crate::error::TrajectoryError;
 use crate::polynomial::Piece;
-use crate::warning::Warning;
+use crate::warning::{QUIET_SPEED, Warning};
 
 /// A joint that moves less than this within a piece, in rad or m, is at rest there.
 const REST: f64 = 1e-9;
@@ -13,7 +13,8 @@ const REST: f64 = 1e-9;
 ///
 /// Position, velocity and acceleration are continuous everywhere, with three exceptions, each of which shows in
 /// [`Trajectory::warnings`]: an unrounded trapezoid jumps in acceleration; sampled data may start or end in
-/// motion, which makes the velocity jump there; data with velocities or accelerations of its own may do the same.
+/// motion or have corners, where the velocity jumps ([`Trajectory::velocity_jumps`]); data with velocities or
+/// accelerations of its own may do the same.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trajectory {
     joints: Vec<String>,
@@ -28,6 +29,17 @@ pub struct Trajectory {
 pub(crate) struct Curve {
     pub(crate) knots: Vec<f64>,
     pub(crate) pieces: Vec<Piece>,
+}
+
+/// A corner: a velocity that is one thing just before a time and another just after it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct VelocityJump {
+    /// Joint name.
+    pub joint: String,
+    /// Time, s.
+    pub time_s: f64,
+    /// Velocity after less velocity before, rad/s or m/s.
+    pub jump: f64,
 }
 
 /// A stretch of time in which at least one joint moves; between two of them nothing does.
@@ -161,7 +173,19 @@ impl Trajectory {
         Self::from_curves(self.joints.clone(), curves, self.duration * factor, notes)
     }
 
-    /// Times at which the acceleration or the jerk of some joint jumps, ascending: knots that a step of an
+    /// Where velocities jump, by time: corners of sampled data, and both ends where the motion does not start or end at
+    /// rest (before and after it the joints are held).
+    pub fn velocity_jumps(&self) -> Vec<VelocityJump> {
+        let of_curve = |(joint, curve): (&String, &Curve)| -> Vec<VelocityJump> {
+            let jumps = curve.jumps().filter(|jump| jump.exceeds(1, QUIET_SPEED));
+            jumps.map(|j| VelocityJump { joint: joint.clone(), time_s: j.time_s, jump: j.size[1] }).collect()
+        };
+        let mut jumps: Vec<VelocityJump> = self.joints.iter().zip(&self.curves).flat_map(of_curve).collect();
+        jumps.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+        jumps
+    }
+
+    /// Times at which the velocity, the acceleration or the jerk of some joint jumps, ascending: knots that a step of an
     /// integrator should end at. Includes 0 and the end when the motion does not start or end smoothly.
     pub fn kinks(&self) -> Vec<f64> {
         let mut times: Vec<f64> = self.curves.iter().flat_map(Curve::kinks).collect();
@@ -206,6 +230,10 @@ impl Trajectory {
             warnings.extend(Warning::of_curve(joint, curve));
         }
         warnings
+    }
+
+    pub(crate) fn notes(&self) -> &[Warning] {
+        &self.notes
     }
 
     pub(crate) fn curves(&self) -> &[Curve] {
@@ -257,10 +285,10 @@ impl Curve {
         })
     }
 
-    /// Knots at which acceleration or jerk jumps by more than rounding and a millionth of its peak.
+    /// Knots at which velocity, acceleration or jerk jumps by more than rounding and a millionth of its peak.
     fn kinks(&self) -> Vec<f64> {
-        let (acceleration, jerk) = (self.largest(2), self.largest(3));
-        let kinks = self.jumps().filter(|jump| jump.exceeds(2, 1e-6 * acceleration) || jump.exceeds(3, 1e-6 * jerk));
+        let levels = [0.0, QUIET_SPEED, 1e-6 * self.largest(2), 1e-6 * self.largest(3)];
+        let kinks = self.jumps().filter(|jump| (1..4).any(|order| jump.exceeds(order, levels[order])));
         kinks.map(|jump| jump.time_s).collect()
     }
 

@@ -5,7 +5,7 @@ use std::fmt;
 use crate::trajectory::Curve;
 
 /// Speeds below this, in rad/s or m/s, are not worth a warning.
-const QUIET_SPEED: f64 = 1e-6;
+pub(crate) const QUIET_SPEED: f64 = 1e-6;
 /// Jumps below this part of the peak acceleration are rounding.
 const QUIET_JUMP: f64 = 1e-6;
 
@@ -26,6 +26,17 @@ pub enum Warning {
         joint: String,
         /// Velocity at the end, rad/s or m/s.
         speed: f64,
+    },
+    /// The velocity jumps within the motion.
+    VelocityJumps {
+        /// Joint name.
+        joint: String,
+        /// Time of the largest jump, s.
+        time_s: f64,
+        /// Its size, rad/s or m/s.
+        jump: f64,
+        /// How many corners there are.
+        count: usize,
     },
     /// The acceleration jumps within the motion, or at an end at which the velocity is continuous.
     AccelerationJumps {
@@ -73,6 +84,13 @@ impl fmt::Display for Warning {
                 "joint {joint:?} ends with a velocity of {speed:.3e} and is stopped at once: \
                  put a row with the same positions after the last one, or give its velocity as 0"
             ),
+            Self::VelocityJumps { joint, time_s, jump, count } => write!(
+                f,
+                "the velocity of joint {joint:?} jumps at {count} {times}, most at t = {time_s:.4} s by {jump:.4} rad/s \
+                 (or m/s): no drive can do that, and the arm is struck with just this impulse; round the corners (--round-corners), or \
+                 give samples of a motion without them",
+                times = if *count == 1 { "time" } else { "times" }
+            ),
             Self::AccelerationJumps { joint, time_s, jump, count } => write!(
                 f,
                 "the acceleration of joint {joint:?} jumps at {count} times, most at t = {time_s:.4} s by {jump:.3e}, \
@@ -107,6 +125,15 @@ impl Warning {
         }
         if end.abs() > QUIET_SPEED {
             warnings.push(Self::EndsMoving { joint: joint.to_owned(), speed: end });
+        }
+
+        let last = curve.knots[curve.knots.len() - 1];
+        let inside = |time_s: f64| time_s > curve.knots[0] && time_s < last;
+        let corners: Vec<_> =
+            curve.jumps().filter(|jump| inside(jump.time_s) && jump.exceeds(1, QUIET_SPEED)).collect();
+        if let Some(most) = corners.iter().max_by(|a, b| a.size[1].abs().total_cmp(&b.size[1].abs())) {
+            let (joint, count) = (joint.to_owned(), corners.len());
+            warnings.push(Self::VelocityJumps { joint, time_s: most.time_s, jump: most.size[1], count });
         }
 
         // Where the velocity jumps already, the acceleration says nothing new.

@@ -263,3 +263,85 @@ proptest! {
         }
     }
 }
+
+// --- Corners -----------------------------------------------------------------------------------------------------------
+
+/// Rest, 2 rad/s, -2 rad/s, rest, with `columns` of `.vel`: a triangle whose corners lie `shift` beside 0.5, 1.0 and 1.5 s.
+fn triangle_file(rate_hz: f64, shift: f64, velocities: bool) -> String {
+    let mut text = if velocities { "time,q,q.vel\n".to_owned() } else { "time,q\n".to_owned() };
+    for k in 0..=(2.0 * rate_hz) as u32 {
+        let t = f64::from(k) / rate_hz;
+        let s = t - shift;
+        let q = 2.0 * ((s - 0.5).max(0.0) - 2.0 * (s - 1.0).max(0.0) + (s - 1.5).max(0.0));
+        let v = 2.0 * (f64::from(s > 0.5) - 2.0 * f64::from(s > 1.0) + f64::from(s > 1.5));
+        writeln!(text, "{t},{q}{}", if velocities { format!(",{v}") } else { String::new() }).unwrap();
+    }
+    text
+}
+
+/// Truth: the triangle. Corners at the rows and between them, with and without given velocities; nothing rings beside them.
+#[test]
+fn corners_of_sampled_positions_are_jumps_of_the_velocity() {
+    for (rate, shift) in [(1000.0, 0.0), (500.0, 0.0), (1000.0, 3.7e-4), (500.0, 6e-4), (100.0, 2.5e-3)] {
+        for velocities in [false, true] {
+            let trajectory = parse(&triangle_file(rate, shift, velocities));
+            let jumps = trajectory.velocity_jumps();
+            assert_eq!(jumps.len(), 3, "{rate} {shift} {velocities}: {jumps:?}");
+            for (jump, (t, dv)) in jumps.iter().zip([(0.5, 2.0), (1.0, -4.0), (1.5, 2.0)]) {
+                // measured 2e-13 s, 4e-10
+                assert!((jump.time_s - t - shift).abs() < 1e-9 && (jump.jump - dv).abs() < 1e-7, "{jump:?}");
+            }
+            for k in 0..2000 {
+                let t = 1e-3 * f64::from(k) + 5e-4;
+                let s = t - shift;
+                let truth = 2.0 * ((s - 0.5).max(0.0) - 2.0 * (s - 1.0).max(0.0) + (s - 1.5).max(0.0));
+                assert!((at(&trajectory, t)[0] - truth).abs() < 1e-9, "{rate} {shift} {t}");
+                assert!(at(&trajectory, t)[2].abs() < 1e-3, "{rate} {shift} {t} {}", at(&trajectory, t)[2]);
+            }
+            let warnings = trajectory.warnings();
+            assert!(matches!(warnings[..], [Warning::VelocityJumps { count: 3, .. }]), "{warnings:?}");
+            assert!(warnings[0].to_string().contains("\"q\" jumps at 3 times, most at t = 1.00"), "{}", warnings[0]);
+        }
+    }
+}
+
+/// Truth: `cos` before and after a kick of 1 rad/s, curved on both sides, between two rows; third order in the distance of rows.
+#[test]
+fn a_corner_between_curved_pieces_is_found() {
+    for rate in [1000.0, 200.0] {
+        let mut text = "time,q\n".to_owned();
+        let corner = 1.0 + 0.3 / rate;
+        let truth = |t: f64| (3.0 * t).cos() + (t - corner).max(0.0);
+        (0..=(2.0 * rate) as u32).for_each(|k| {
+            let t = f64::from(k) / rate;
+            writeln!(text, "{t},{}", truth(t)).unwrap();
+        });
+        let trajectory = parse(&text);
+        let inside: Vec<_> =
+            trajectory.velocity_jumps().into_iter().filter(|j| j.time_s > 0.1 && j.time_s < 1.9).collect();
+        assert_eq!(inside.len(), 1, "{inside:?}");
+        // measured 9e-4 of a row, 1e-3 at 200 Hz
+        assert!((inside[0].time_s - corner).abs() < 0.05 / rate && (inside[0].jump - 1.0).abs() < 2e-2, "{inside:?}");
+    }
+}
+
+/// Truth: away from the blends the curve, within them at most an eighth of the jump times their length beside it.
+#[test]
+fn rounded_corners_jump_no_more_and_stay_near() {
+    let corners = parse(&triangle_file(1000.0, 3.7e-4, false));
+    let rounded = corners.with_rounded_corners(0.02).unwrap();
+    assert_eq!(rounded.velocity_jumps(), []);
+    assert_eq!(rounded.warnings(), []);
+    assert_eq!(rounded.duration(), corners.duration());
+    for k in 0..20_000 {
+        let t = 1e-4 * f64::from(k);
+        let beside = (at(&rounded, t)[0] - at(&corners, t)[0]).abs();
+        let near = [0.5, 1.0, 1.5].iter().any(|c| (t - c - 3.7e-4).abs() < 0.01);
+        // measured 7.5e-3 at the middle of the blend of 4 rad/s
+        assert!(beside <= if near { 4.0 * 0.02 / 8.0 } else { 1e-12 }, "{t} {beside}");
+    }
+    // Blends that have no room share what there is.
+    let long = corners.with_rounded_corners(10.0).unwrap();
+    assert_eq!(long.velocity_jumps(), []);
+    assert!(corners.with_rounded_corners(0.0).is_err() && corners.with_rounded_corners(f64::NAN).is_err());
+}

@@ -418,7 +418,7 @@ impl<'a> Run<'a> {
             self.strains[k] = self.strains[k].max(strain);
             self.rotations[k] = self.rotations[k].max(rotation_vector(turn.matrix()).norm());
         }
-        self.energy.add(t, self.seen.energy, self.seen.power);
+        self.energy.add(t, self.seen.energy, self.seen.power, self.seen.impulse_work);
     }
 
     /// Figures of what was seen so far.

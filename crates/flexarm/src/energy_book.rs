@@ -13,17 +13,21 @@ pub(crate) struct EnergyBook {
     /// Largest gap between what is stored and what was supplied, and largest change of what is stored (J).
     gap: f64,
     swing: f64,
+    struck: f64,
     /// Energy that came or went with a payload (J).
     pub(crate) exchanged: f64,
 }
 
 impl EnergyBook {
-    pub(crate) fn add(&mut self, t: f64, energy: [f64; 3], power: [f64; 3]) {
+    /// `impulse_work`: work of the drives so far that is in no power, where velocities jumped (J).
+    pub(crate) fn add(&mut self, t: f64, energy: [f64; 3], power: [f64; 3], impulse_work: f64) {
         if let Some((t_before, p)) = self.before {
             for c in 0..3 {
                 self.work[c] += 0.5 * (t - t_before) * (p[c] + power[c]);
             }
         }
+        self.work[0] += impulse_work - self.struck;
+        self.struck = impulse_work;
         self.last = energy.iter().sum();
         self.before = Some((t, power));
         let first = *self.first.get_or_insert(self.last);

@@ -134,7 +134,8 @@ impl Error {
         match self {
             Self::Step { source, partial } => match source {
                 flexarm_stepping::StepError::Setup(_) | flexarm_stepping::StepError::UnstableStep { .. } => 2,
-                flexarm_stepping::StepError::Singular { .. } if !partial => 2,
+                // At the start it is the input, later the run.
+                flexarm_stepping::StepError::Singular { t, .. } if !partial && *t == 0.0 => 2,
                 _ => 1,
             },
             Self::InStudy { source, .. } => source.exit_code(),

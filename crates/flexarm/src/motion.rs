@@ -31,6 +31,23 @@ impl PrescribedMotion for Along {
     fn sample(&self, t: f64, q: &mut [f64], qdot: &mut [f64], qddot: &mut [f64]) {
         self.0.sample(t, q, qdot, qddot);
     }
+
+    fn velocity_jumps(&self) -> Vec<f64> {
+        let mut times: Vec<f64> = self.0.velocity_jumps().iter().map(|jump| jump.time_s).collect();
+        times.dedup();
+        times
+    }
+}
+
+fn limits(model: &Model) -> Vec<JointLimits> {
+    let actuated = &model.coordinates()[..model.n_actuated()];
+    let limits = actuated.iter().map(|c| JointLimits {
+        lower: c.limits.lower,
+        upper: c.limits.upper,
+        velocity: c.limits.velocity,
+        acceleration: None,
+    });
+    limits.collect()
 }
 
 impl Motion {
@@ -44,25 +61,32 @@ impl Motion {
             return Err(Error::File { path: path.to_owned(), what });
         }
         let actuated = &model.coordinates()[..model.n_actuated()];
-        let limits: Vec<JointLimits> = actuated
-            .iter()
-            .map(|c| JointLimits {
-                lower: c.limits.lower,
-                upper: c.limits.upper,
-                velocity: c.limits.velocity,
-                acceleration: None,
-            })
-            .collect();
+        let limits = limits(model);
         let names: Vec<&str> = actuated.iter().map(|c| c.joint.as_str()).collect();
         let named: Vec<(&str, JointLimits)> = names.iter().copied().zip(limits.iter().copied()).collect();
         let trajectory = Trajectory::from_path(path, &named)?;
-        let warnings = trajectory.warnings().iter().map(|w| format!("{}: {w}", path.display())).collect();
+        let warnings = warnings(&trajectory, path);
         let trajectory = trajectory
             .with_joint_order(&names)
             .map_err(|e| Error::File { path: path.to_owned(), what: e.to_string() })?;
         let violations = trajectory.check_limits(&limits);
         let name = path.file_stem().map_or_else(|| "trajectory".into(), |s| s.to_string_lossy().into_owned());
         Ok(Self { name, path: path.to_owned(), trajectory: Arc::new(trajectory), violations, warnings })
+    }
+
+    /// The same motion with each corner, where a velocity jumps, replaced by a blend that lasts `seconds`.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] unless `seconds` is positive, [`Error::Trajectory`] if numbers become too extreme.
+    pub fn with_rounded_corners(self, seconds: f64, model: &Model) -> Result<Self, Error> {
+        if !(seconds > 0.0 && seconds.is_finite()) {
+            let message = format!("corners are rounded within a positive time, found {seconds} s: try 0.02");
+            return Err(Error::Usage(message));
+        }
+        let trajectory = self.trajectory.with_rounded_corners(seconds)?;
+        let warnings = warnings(&trajectory, &self.path);
+        let violations = trajectory.check_limits(&limits(model));
+        Ok(Self { trajectory: Arc::new(trajectory), violations, warnings, ..self })
     }
 
     /// What is worth knowing about it.
@@ -75,4 +99,8 @@ impl Motion {
     pub fn prescribed(&self) -> Arc<dyn PrescribedMotion> {
         Arc::new(Along(self.trajectory.clone()))
     }
+}
+
+fn warnings(trajectory: &Trajectory, path: &Path) -> Vec<String> {
+    trajectory.warnings().iter().map(|w| format!("{}: {w}", path.display())).collect()
 }

@@ -13,17 +13,22 @@
 //! λ is an impulse; at rest `λ/h = -K g` whatever h and τ. `g_t` is the explicit time rate of a prescribed joint.
 //! The matrix is block tridiagonal (a tree of 6×6 blocks) and eliminated from the leaves to the base, O(bodies).
 //!
+//! A step ends where a load or a prescribed velocity jumps; the next one has a length of its own, and with it Σ and Υ.
+//!
 //! Frames: P, Q proximal and distal face of a joint, P = Q when undeformed. [`constraint`] has the rows,
 //! [`solve`] the elimination. Source: [Lacoursière 2007]; theory page, section 4.
 
 mod constraint;
 mod solve;
 
-use flexarm_kinematics::{Data, ElasticAngles, JointMotion, Pose, State, Twist, Wrench, forward_kinematics_velocity};
+use flexarm_kinematics::{
+    Data, ElasticAngles, JointMotion, Model, Pose, State, Twist, Wrench, forward_kinematics_velocity,
+};
 use nalgebra::{DVector, Matrix3, Matrix6, Rotation3, UnitQuaternion, Vector3, Vector6};
 
 use crate::arm::FlexibleArm;
 use crate::error::StepError;
+use crate::events::{Breaks, SAME_TIME};
 use crate::stepper::{Counts, LARGEST_DEFLECTION, Observation, Stepper};
 use constraint::Rows;
 use solve::TreeSolver;
@@ -97,6 +102,10 @@ pub struct Spook {
     arm: FlexibleArm,
     h: f64,
     steps: u64,
+    t: f64,
+    /// Step to which `compliance` belongs, and that of the impulses in `lambda` (s).
+    dt: f64,
+    breaks: Breaks,
     settings: SpookSettings,
     /// Index 0 is the world and never moves.
     bodies: Vec<BodyState>,
@@ -106,8 +115,10 @@ pub struct Spook {
     solver: TreeSolver,
     q: DVector<f64>,
     qdot: DVector<f64>,
-    qdot_next: DVector<f64>,
-    scratch: DVector<f64>,
+    qddot: DVector<f64>,
+    /// Prescribed velocities that the bodies have, and those at the end of the step.
+    rates: DVector<f64>,
+    rates_next: DVector<f64>,
     velocities: Vec<Vector6<f64>>,
     trial: Vec<BodyState>,
     loads: Vec<Vector6<f64>>,
@@ -117,7 +128,8 @@ impl Spook {
     /// Starts at `t = 0` at rest with elastic coordinates `e`.
     ///
     /// # Errors
-    /// [`StepError::Setup`] for mimic joints, which have no place in maximal coordinates here.
+    /// [`StepError::Setup`] for what has no place in maximal coordinates here: mimic joints, modal links, torques, payloads
+    /// that change, curved springs, links without mass or moments of inertia at an end of the arm.
     pub fn new(arm: FlexibleArm, h: f64, settings: SpookSettings, e: &DVector<f64>) -> Result<Self, StepError> {
         let model = arm.model.clone();
         let refuse = |what: &str| {
@@ -140,10 +152,17 @@ impl Spook {
             let text = "spook works in maximal coordinates and does not know mimic joints: use generalized-alpha";
             return Err(StepError::Setup(text.to_owned()));
         }
+        check_ends(&model)?;
         let (mut state, mut qddot) = (State::zeros(&model), DVector::zeros(model.nv()));
         arm.prescribed_state(0.0, &mut state, &mut qddot);
         let na = model.n_actuated();
         state.q.rows_mut(na, e.len()).copy_from(e);
+        let mut breaks = Breaks::of(&arm);
+        breaks.pass(0.0);
+        if arm.motion.velocity_jumps().iter().any(|t| t.abs() <= SAME_TIME) {
+            state.qdot.fill(0.0);
+        }
+        let rates = state.qdot.rows(0, na).clone_owned();
         let mut data = Data::new(&model);
         forward_kinematics_velocity(&model, &mut data, &state);
 
@@ -171,6 +190,9 @@ impl Spook {
             arm,
             h,
             steps: 0,
+            t: 0.0,
+            dt: h,
+            breaks,
             settings,
             trial: bodies.clone(),
             bodies,
@@ -179,19 +201,39 @@ impl Spook {
             lambda: vec![Vector6::zeros(); n],
             q: DVector::zeros(na),
             qdot: DVector::zeros(na),
-            qdot_next: DVector::zeros(na),
-            scratch: DVector::zeros(na),
+            qddot: DVector::zeros(na),
+            rates_next: rates.clone(),
+            rates,
             velocities: vec![Vector6::zeros(); n],
             loads,
         };
         // The impulses of the first step, so that the forces are known before it.
-        spook.solve()?;
+        spook.solve(h)?;
         Ok(spook)
     }
+}
 
-    fn time_after(&self, steps: u64) -> f64 {
-        steps as f64 * self.h
+/// Least moment of inertia over the largest with which a body can be turned about all its axes.
+const LEAST_MOMENT: f64 = 1e-9;
+
+/// A body at an end of the arm has six degrees of freedom and nothing behind it: its own mass and moments must hold them.
+/// Elsewhere the bodies that it carries do.
+fn check_ends(model: &Model) -> Result<(), StepError> {
+    let carries = |i: usize| model.bodies().iter().any(|body| body.parent == i);
+    for (_, body) in model.bodies().iter().enumerate().skip(1).filter(|(i, _)| !carries(*i)) {
+        let mass = body.inertia.mass;
+        let moments = if mass > 0.0 { body.inertia.inertia_com().symmetric_eigenvalues() } else { Vector3::zeros() };
+        let (least, most) = (moments.min(), moments.max());
+        if mass <= 0.0 || least <= LEAST_MOMENT * most {
+            return Err(StepError::Setup(format!(
+                "spook works in maximal coordinates and needs a mass and three moments of inertia of link {:?}, at the end of \
+                 the arm: it has {mass} kg and principal moments of {least:.3e} to {most:.3e} kg m²; give it (or its payload) \
+                 an inertia, or use generalized-alpha",
+                body.name
+            )));
+        }
     }
+    Ok(())
 }
 
 fn joint_compliance(arm: &FlexibleArm, body: usize, h: f64, preset: SpookPreset) -> JointCompliance {
@@ -219,16 +261,25 @@ fn joint_compliance(arm: &FlexibleArm, body: usize, h: f64, preset: SpookPreset)
 
 impl Stepper for Spook {
     fn time(&self) -> f64 {
-        self.time_after(self.steps)
+        self.t
     }
 
     fn step(&mut self) -> Result<(), StepError> {
-        self.solve()?;
-        self.advance()
+        let (start, end) = (self.steps as f64 * self.h, (self.steps + 1) as f64 * self.h);
+        loop {
+            let stop = self.breaks.next().filter(|t| *t < end - SAME_TIME).unwrap_or(end);
+            let dt = if self.t == start && stop == end { self.h } else { stop - self.t };
+            self.advance(stop, dt)?;
+            self.breaks.pass(stop);
+            if stop == end {
+                self.steps += 1;
+                return Ok(());
+            }
+        }
     }
 
     fn observe(&mut self, out: &mut Observation) {
-        let (h, t) = (self.h, self.time());
+        let (h, t) = (self.dt, self.t);
         self.sample(t);
         let model = self.arm.model.clone();
         let n = model.n_actuated();
@@ -280,7 +331,8 @@ impl Stepper for Spook {
         }
         for body in model.bodies().iter().skip(1).filter(|b| b.armature != 0.0) {
             let k = body.coordinate;
-            out.drive[k] += body.armature * (self.qdot_next[k] - self.qdot[k]) / h;
+            out.drive[k] += body.armature * self.qddot[k];
+            kinetic += 0.5 * body.armature * self.qdot[k].powi(2);
         }
         let (mut damping, mut loads) = (0.0, 0.0);
         for (k, element) in self.arm.elements.iter().enumerate() {
@@ -293,7 +345,7 @@ impl Stepper for Spook {
         for load in &self.arm.loads {
             let body = &self.bodies[load.body];
             let X = body.X_WB();
-            let F = load.on_body(t, &X);
+            let F = load.on_body(self.breaks.side(t), &X);
             let v = body.V.linear - body.V.angular.cross(&(X.rotation * body.com));
             loads += v.dot(&(X.rotation * F.force)) + body.V.angular.dot(&(X.rotation * F.torque));
         }
@@ -317,11 +369,11 @@ impl Spook {
     }
 
     /// Velocities and impulses of the step from the current time; poses stay.
-    fn solve(&mut self) -> Result<(), StepError> {
-        let (h, t, t_next) = (self.h, self.time(), self.time_after(self.steps + 1));
+    fn solve(&mut self, t_next: f64) -> Result<(), StepError> {
+        let (h, t) = (self.dt, self.t);
         // Rates at the end of the step belong to the new velocities, positions at its start to g.
         self.sample(t_next);
-        self.qdot_next.copy_from(&self.qdot);
+        self.rates_next.copy_from(&self.qdot);
         self.sample(t);
         let model = &self.arm.model;
         let form = self.settings.form;
@@ -358,7 +410,7 @@ impl Spook {
         for load in &self.arm.loads {
             // At Bo in world axes.
             let X_WB = self.bodies[load.body].X_WB();
-            let F = load.on_body(t, &X_WB);
+            let F = load.on_body(self.breaks.side(t), &X_WB);
             self.loads[load.body] += Wrench::new(X_WB.rotation * F.force, X_WB.rotation * F.torque).to_vector();
         }
 
@@ -381,7 +433,7 @@ impl Spook {
             b.fixed_rows_mut::<3>(3).copy_from(&(spin + torque * h));
         }
 
-        let Self { rows, compliance, bodies, solver, velocities, lambda, q: _, qdot, qdot_next, .. } = self;
+        let Self { rows, compliance, bodies, solver, velocities, lambda, rates, rates_next, .. } = self;
         let right_hand_side = |i: usize| {
             let (row, c, body) = (&rows[i], &compliance[i], &model.bodies()[i]);
             let mut sigma = c.C;
@@ -392,21 +444,25 @@ impl Spook {
             let rate = row.G_parent * bodies[body.parent].V.to_vector() + row.G_child * bodies[i].V.to_vector();
             let (g_t, g_t_next) = match body.elastic {
                 true => (Vector6::zeros(), Vector6::zeros()),
-                false => explicit_rates(body.motion, |v| v[body.coordinate], qdot, qdot_next),
+                false => explicit_rates(body.motion, |v| v[body.coordinate], rates, rates_next),
             };
             let s = row.g * (-4.0 / h * c.upsilon) + (rate + g_t) * c.upsilon - g_t_next;
             (&row.G_parent, &row.G_child, sigma * c.sigma_factor, s)
         };
         solver
             .solve(right_hand_side, velocities, lambda)
-            .map_err(|_| StepError::Singular { matrix: "constraint matrix", t })?;
-
-        Ok(())
+            .map_err(|_| StepError::Singular { matrix: "constraint matrix", t })
     }
 
-    /// New poses from the velocities; the old ones stay until all are known to be sound.
-    fn advance(&mut self) -> Result<(), StepError> {
-        let (h, t_next) = (self.h, self.time_after(self.steps + 1));
+    /// A step of length `h` to `t_next`. The old poses stay until all new ones are known to be sound.
+    fn advance(&mut self, t_next: f64, h: f64) -> Result<(), StepError> {
+        if h != self.dt {
+            self.dt = h;
+            for (i, compliance) in self.compliance.iter_mut().enumerate() {
+                *compliance = joint_compliance(&self.arm, i, h, self.settings.preset);
+            }
+        }
+        self.solve(t_next)?;
         let mut largest = 0.0f64;
         for ((trial, body), v) in self.trial.iter_mut().zip(&self.bodies).zip(&self.velocities).skip(1) {
             trial.V = Twist::from_vector(v);
@@ -421,14 +477,15 @@ impl Spook {
             return Err(StepError::Diverged { t: t_next, h, what });
         }
         std::mem::swap(&mut self.bodies, &mut self.trial);
-        self.steps += 1;
+        std::mem::swap(&mut self.rates, &mut self.rates_next);
+        self.t = t_next;
         Ok(())
     }
 
-    /// Prescribed motion at t into `q`, `qdot`.
+    /// Prescribed motion at t into `q`, `qdot`, `qddot`.
     fn sample(&mut self, t: f64) {
-        let Self { arm, q, qdot, scratch, .. } = self;
-        arm.motion.sample(t, q.as_mut_slice(), qdot.as_mut_slice(), scratch.as_mut_slice());
+        let Self { arm, breaks, q, qdot, qddot, .. } = self;
+        arm.motion.sample(breaks.side(t), q.as_mut_slice(), qdot.as_mut_slice(), qddot.as_mut_slice());
     }
 }
 

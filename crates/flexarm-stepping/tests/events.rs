@@ -1,0 +1,304 @@
+//! What happens at discrete times: payloads, loads that start between steps, velocities that jump, steps that fail.
+#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
+#![allow(non_snake_case, reason = "monogram notation")]
+#![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
+
+use std::sync::Arc;
+
+use flexarm_kinematics::*;
+use flexarm_stepping::*;
+use nalgebra::{DVector, Matrix3, Matrix6, Vector3};
+
+const ALPHA: StepperKind = StepperKind::GeneralizedAlpha(AlphaSettings { rho: 0.9, dispersion_correction: true });
+const PLAIN: StepperKind = StepperKind::GeneralizedAlpha(AlphaSettings { rho: 0.6, dispersion_correction: false });
+const SPOOK: StepperKind =
+    StepperKind::Spook(SpookSettings { form: ConstraintForm::Local, preset: SpookPreset::Exact });
+
+fn reference() -> StepperKind {
+    StepperKind::Reference(ReferenceSettings::new(1e-9))
+}
+
+const K: f64 = 4e4;
+const MASS: f64 = 10.0;
+
+/// Joint velocity that is zero, then something else, at one or several times.
+#[derive(Clone)]
+struct Corners {
+    /// (time, velocity from then on).
+    corners: Vec<(f64, f64)>,
+}
+
+impl PrescribedMotion for Corners {
+    fn sample(&self, t: f64, q: &mut [f64], qdot: &mut [f64], qddot: &mut [f64]) {
+        (q[0], qdot[0], qddot[0]) = (0.0, 0.0, 0.0);
+        for (k, &(from, v)) in self.corners.iter().enumerate() {
+            let to = self.corners.get(k + 1).map_or(t, |next| next.0.min(t));
+            if t >= from {
+                (q[0], qdot[0]) = (q[0] + v * (to - from), v);
+            }
+        }
+    }
+
+    fn velocity_jumps(&self) -> Vec<f64> {
+        self.corners.iter().map(|c| c.0).collect()
+    }
+}
+
+/// A slide along x that carries a body on a 6x6 spring, in no gravity unless given.
+fn slide(motion: Arc<dyn PrescribedMotion>, gravity: f64, damping: Damping) -> FlexibleArm {
+    let mut slide = Mechanism::new("slide");
+    slide.gravity = -Vector3::z() * gravity;
+    let carriage = LinkInertia { mass: 2.0, com: Vector3::zeros(), inertia_com: Matrix3::identity() * 0.1 };
+    let body = LinkInertia { mass: MASS, com: Vector3::zeros(), inertia_com: Matrix3::identity() * 0.5 };
+    slide.links.push(Link { name: "base".into(), inertia: None });
+    slide.links.push(Link { name: "carriage".into(), inertia: Some(carriage) });
+    slide.links.push(Link { name: "body".into(), inertia: Some(body) });
+    slide.joints.push(Joint::new(
+        "slide",
+        JointKind::Prismatic(Vector3::x_axis()),
+        "base",
+        "carriage",
+        Pose::identity(),
+    ));
+    let elastic = JointKind::Elastic(ElasticAngles::RotationVector);
+    slide.joints.push(Joint::new("spring", elastic, "carriage", "body", Pose::identity()));
+    let spring = ("spring".to_owned(), Matrix6::identity() * K, damping);
+    FlexibleArm::new(Arc::new(Model::new(&slide).unwrap()), vec![spring], motion).unwrap()
+}
+
+fn held() -> Arc<dyn PrescribedMotion> {
+    Arc::new(Held(vec![0.0]))
+}
+
+/// Largest distance of an elastic coordinate from `truth(t)` at the steps.
+fn error(arm: &FlexibleArm, kind: StepperKind, h: f64, duration: f64, k: usize, truth: impl Fn(f64) -> f64) -> f64 {
+    let mut stepper = new_stepper(kind, arm.clone(), h, Start::Equilibrium).unwrap();
+    let mut seen = Observation::new(arm);
+    let mut worst = 0.0f64;
+    for _ in 0..(duration / h).round() as usize {
+        stepper.step().unwrap();
+        stepper.observe(&mut seen);
+        worst = worst.max((seen.q[1 + k] - truth(seen.t)).abs());
+    }
+    worst
+}
+
+fn pick_up(t: f64, mass: f64, damping: Damping) -> FlexibleArm {
+    let mut arm = slide(held(), 9.81, damping);
+    let body = arm.model.frame("body").unwrap().body;
+    let inertia = LinkInertia { mass, com: Vector3::zeros(), inertia_com: Matrix3::identity() * 0.05 * mass };
+    arm.inertia_changes = vec![InertiaChange { t, body, inertia: inertia.spatial() }];
+    arm
+}
+
+/// Truth: the closed form of a mass that is hung on a spring at rest. The time of the event is on the steps and between
+/// them. With the matrix of the empty arm the iteration of the next step diverged.
+///
+/// Measured, of the sag: generalised-alpha 2.5e-5, RK4 3.7e-8, reference 8.4e-8.
+#[test]
+fn an_arm_that_picks_up_fifty_times_its_mass_swings_about_the_new_sag() {
+    let (heavy, g) = (50.0 * MASS, 9.81);
+    for at in [0.1, 0.10037] {
+        let arm = pick_up(at, heavy, Damping::StiffnessProportional(0.0));
+        let omega = (K / heavy).sqrt();
+        let (before, after) = (-MASS * g / K, -heavy * g / K);
+        let truth = |t: f64| if t < at { before } else { after + (before - after) * (omega * (t - at)).cos() };
+        for (kind, bound) in [(ALPHA, 2e-4), (PLAIN, 2e-3), (StepperKind::Rk4, 1e-6), (reference(), 1e-6)] {
+            let error = error(&arm, kind, 1e-3, 2.0, 2, truth) / after.abs();
+            eprintln!("{:<18} at {at}: {error:.1e}", kind.name());
+            assert!(error < bound, "{} at {at}: {error}", kind.name());
+        }
+    }
+}
+
+/// Truth: a ratio of modal damping is one of the modes that the arm has: 3 % after the pick-up as before.
+#[test]
+fn modal_damping_keeps_its_ratio_with_another_payload() {
+    let (heavy, g, zeta, at) = (50.0 * MASS, 9.81, 0.03_f64, 0.1);
+    let arm = pick_up(at, heavy, Damping::Modal(zeta));
+    let omega = (K / heavy).sqrt();
+    let damped = omega * (1.0 - zeta * zeta).sqrt();
+    let (before, after) = (-MASS * g / K, -heavy * g / K);
+    let truth = |t: f64| {
+        let s = (t - at).max(0.0);
+        let swing = (damped * s).cos() + zeta * omega / damped * (damped * s).sin();
+        after + (before - after) * (-zeta * omega * s).exp() * swing
+    };
+    for kind in [ALPHA, StepperKind::Rk4, reference()] {
+        let error = error(&arm, kind, 1e-3, 4.0, 2, truth) / after.abs();
+        eprintln!("{:<18} {error:.1e}", kind.name());
+        assert!(error < 2e-4, "{} {error}", kind.name()); // measured 2e-5; with the damping of the empty arm 0.2
+    }
+}
+
+/// Truth: an oscillator under a force that begins and ends between steps.
+///
+/// Second order in the step, 16 where the step is a quarter; before, both ends were known to a step only: first order.
+#[test]
+fn a_load_that_begins_and_ends_between_steps_acts_as_long_as_it_lasts() {
+    let (from, to, F) = (0.01034, 0.05271, 300.0);
+    let wrench = Arc::new(move |t: f64| {
+        let force = if (from..=to).contains(&t) { F } else { 0.0 };
+        Wrench::new(Vector3::x() * force, Vector3::zeros())
+    });
+    let mut arm = slide(held(), 0.0, Damping::StiffnessProportional(0.0));
+    let body = arm.model.frame("body").unwrap().body;
+    arm = arm
+        .with_timed_loads(vec![Load { wrench, jumps: vec![from, to], ..Load::constant(body, Wrench::zeros()) }])
+        .unwrap();
+    let omega = (K / MASS).sqrt();
+    let ramp = |t: f64, s: f64| if t > s { F / K * (1.0 - (omega * (t - s)).cos()) } else { 0.0 };
+    let truth = |t: f64| ramp(t, from) - ramp(t, to);
+    for (kind, bound) in [(ALPHA, 5e-4), (PLAIN, 2e-2), (StepperKind::Rk4, 1e-5), (reference(), 1e-5), (SPOOK, 0.1)] {
+        let errors = [1e-3, 2.5e-4].map(|h| error(&arm, kind, h, 0.2, 0, truth) / (F / K));
+        eprintln!("{:<18} {errors:?}", kind.name());
+        assert!(errors[0] < bound, "{} {errors:?}", kind.name());
+        if kind == PLAIN {
+            assert!(errors[0] / errors[1] > 12.0, "{errors:?}");
+        }
+    }
+}
+
+/// Truth: the base of an oscillator at rest starts with Δv at once; e = -Δv/ω sin ω(t - t_c) for each corner, added up.
+///
+/// Corners on the steps, between them, two in one step, and at the start.
+#[test]
+fn the_base_velocity_jumps_and_the_spring_takes_the_impulse() {
+    let corners = vec![(0.0, 0.3), (0.02, -0.5), (0.06037, 1.0), (0.0611, 0.2), (0.1, 0.0)];
+    let motion = Corners { corners: corners.clone() };
+    let arm = slide(Arc::new(motion), 0.0, Damping::StiffnessProportional(0.0));
+    let omega = (K / MASS).sqrt();
+    let truth = |t: f64| {
+        let mut before = 0.0;
+        let struck = corners.iter().map(|&(at, v)| {
+            let jump = v - before;
+            before = v;
+            if t > at { -jump / omega * (omega * (t - at)).sin() } else { 0.0 }
+        });
+        struck.sum::<f64>()
+    };
+    let size = 1.0 / omega;
+    for (kind, h, bound) in [
+        (ALPHA, 1e-3, 1e-3),
+        (ALPHA, 2e-3, 1e-2),
+        (PLAIN, 5e-4, 1e-2),
+        (StepperKind::Rk4, 1e-3, 1e-5),
+        (StepperKind::Rk4, 2e-3, 1e-4),
+        (reference(), 1e-3, 1e-6),
+        (SPOOK, 1e-4, 1e-2),
+    ] {
+        let error = error(&arm, kind, h, 0.2, 0, truth) / size;
+        eprintln!("{:<18} {h:.0e}: {error:.1e}", kind.name());
+        assert!(error < bound, "{} {h}: {error}", kind.name());
+    }
+}
+
+/// Truth: work of the drive in a blow is what the kinetic energy gains, `m Δv (v + Δv/2)` of the carriage alone, because
+/// the body on the spring keeps its velocity.
+#[test]
+fn the_work_of_a_blow_is_the_energy_that_it_brings() {
+    let motion = Corners { corners: vec![(0.0105, 0.5), (0.0305, -0.25)] };
+    let arm = slide(Arc::new(motion), 0.0, Damping::StiffnessProportional(0.0));
+    for kind in [ALPHA, StepperKind::Rk4, reference()] {
+        let mut stepper = new_stepper(kind, arm.clone(), 1e-3, Start::Equilibrium).unwrap();
+        let mut seen = Observation::new(&arm);
+        (0..40).for_each(|_| stepper.step().unwrap());
+        stepper.observe(&mut seen);
+        let truth = 2.0 * (0.5 * 0.5f64.powi(2) + -0.75 * (0.5 - 0.375));
+        assert!((seen.impulse_work - truth).abs() < 1e-12, "{} {}", kind.name(), seen.impulse_work); // measured 1e-16
+    }
+}
+
+/// A force that begins in the middle of a long run, a payload and a corner at one time, and a step that is longer than the
+/// time between them: every stepper comes to the same end as the one with error control.
+#[test]
+fn events_at_one_time_and_events_within_one_step_are_all_met() {
+    let motion = Corners { corners: vec![(0.05, 0.4), (0.0503, -0.2), (0.06, 0.0)] };
+    let mut arm = slide(Arc::new(motion), 9.81, Damping::StiffnessProportional(1e-4));
+    let body = arm.model.frame("body").unwrap().body;
+    let change = |t: f64, mass: f64| {
+        let inertia = LinkInertia { mass, com: Vector3::x() * 0.1, inertia_com: Matrix3::identity() };
+        InertiaChange { t, body, inertia: inertia.spatial() }
+    };
+    arm.inertia_changes = vec![change(0.05, 80.0), change(0.0508, 5.0), change(0.06, 30.0)];
+    let wrench = Arc::new(|t: f64| Wrench::new(Vector3::x() * if t >= 0.0505 { 500.0 } else { 0.0 }, Vector3::zeros()));
+    arm = arm
+        .with_timed_loads(vec![Load { wrench, jumps: vec![0.0505], ..Load::constant(body, Wrench::zeros()) }])
+        .unwrap();
+    let end = |kind: StepperKind, h: f64| {
+        let mut stepper = new_stepper(kind, arm.clone(), h, Start::Equilibrium).unwrap();
+        let mut seen = Observation::new(&arm);
+        (0..(0.2 / h).round() as usize).for_each(|_| stepper.step().unwrap());
+        stepper.observe(&mut seen);
+        seen.q.rows(1, 6).clone_owned()
+    };
+    let truth = end(reference(), 2e-3);
+    for (kind, h, bound) in
+        [(reference(), 5e-4, 1e-6), (StepperKind::Rk4, 5e-4, 1e-5), (ALPHA, 1e-3, 5e-3), (ALPHA, 2e-3, 2e-2)]
+    {
+        let error = (end(kind, h) - &truth).amax() / truth.amax();
+        eprintln!("{:<18} {h:.0e}: {error:.1e}", kind.name());
+        assert!(error < bound, "{} {h}: {error}", kind.name());
+    }
+}
+
+/// A mass between two walls: the force `x / (1 - x²)` has no values beyond them.
+struct Walls {
+    matrix: f64,
+    x: f64,
+}
+
+impl SecondOrderSystem for Walls {
+    fn dimension(&self) -> usize {
+        1
+    }
+    fn residual(&mut self, t: f64, x: &DVector<f64>, v: &DVector<f64>, a: &DVector<f64>, r: &mut DVector<f64>) {
+        let mut free = DVector::zeros(1);
+        self.acceleration(t, x, v, &mut free).unwrap();
+        self.x = x[0];
+        r[0] = a[0] - free[0];
+    }
+    fn acceleration(
+        &mut self,
+        _: f64,
+        x: &DVector<f64>,
+        _: &DVector<f64>,
+        a: &mut DVector<f64>,
+    ) -> Result<(), StepError> {
+        a[0] = if x[0].abs() < 1.0 { -x[0] / (1.0 - x[0] * x[0]) } else { f64::NAN };
+        Ok(())
+    }
+    fn factor_iteration_matrix(&mut self, _: f64, _: f64, c_K: f64, _: f64) -> Result<(), StepError> {
+        let s = self.x * self.x;
+        self.matrix = 1.0 + c_K * (1.0 + s) / (1.0 - s).powi(2);
+        Ok(())
+    }
+    fn solve_iteration(&mut self, r: &mut DVector<f64>) {
+        r[0] /= self.matrix;
+    }
+    fn inverse_mass_times_stiffness(&mut self, _: &DVector<f64>, out: &mut DVector<f64>) {
+        out[0] = 0.0;
+    }
+}
+
+/// A step that ends beyond a wall has no solution that Newton finds; shorter ones have, and after the bounce the steps are
+/// whole again. Truth: energy, `v²/2 - ln(1 - x²)/2`, and the time, which stays on the steps.
+#[test]
+fn a_step_that_fails_is_taken_in_shorter_ones() {
+    let settings = AlphaSettings { rho: 1.0, dispersion_correction: false };
+    let (x, v) = (DVector::zeros(1), DVector::from_element(1, 2.0));
+    let mut walls = Walls { matrix: 1.0, x: 0.0 };
+    let mut g = GeneralizedAlpha::new(&mut walls, 0.0, 0.05, settings, x, v).unwrap();
+    let (mut bounces, mut worst) = (0, 0.0f64);
+    for k in 1..=2000 {
+        let before = g.v[0];
+        g.step(&mut walls).unwrap();
+        assert!((g.time() - 0.05 * f64::from(k)).abs() < 1e-9 && g.steps() == k as u64);
+        bounces += u32::from(before * g.v[0] < 0.0);
+        if g.x[0].abs() < 0.5 {
+            worst = worst.max((0.5 * g.v[0].powi(2) - 0.5 * (1.0 - g.x[0].powi(2)).ln() - 2.0).abs() / 2.0);
+        }
+    }
+    eprintln!("{bounces} bounces in 100 s, energy within {worst:.1e}");
+    assert!(bounces > 50 && worst < 0.2, "{bounces} {worst}");
+}

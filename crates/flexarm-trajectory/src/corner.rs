@@ -1,0 +1,128 @@
+//! Corners of sampled positions: where the velocity jumps from one sample to the next, as distinct from curvature.
+//!
+//! Between samples the position has the slopes s; over a sample they change by `d_i = s_i - s_(i-1)`. Smooth data share
+//! their changes among neighbours, noise and rounding change sign from sample to sample. A corner stands alone: at a
+//! sample it is in one d, between two samples in two of the same sign, whose shares tell where it lies.
+//!
+//! Start at [`corners`]. Not here: what a spline does with them, and velocities that a file gives.
+
+/// A corner stands out so many times over the changes of slope around it.
+const STANDS_OUT: f64 = 10.0;
+/// Changes of slope that are looked at on either side, and how many there must be.
+const AROUND: usize = 4;
+const LEAST_AROUND: usize = 2;
+/// Smaller jumps are left to the spline, as parts of the top speed.
+const SMALLEST: f64 = 1e-4;
+/// A corner nearer to a sample than this part of the interval is at the sample.
+const AT_SAMPLE: f64 = 0.01;
+
+/// A corner after sample `sample`, or at it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Corner {
+    pub(crate) sample: usize,
+    /// Part of the interval to the next sample, 0 to 1; 0 is at the sample.
+    pub(crate) fraction: f64,
+    /// Position there.
+    pub(crate) position: f64,
+}
+
+/// The corners of positions q at times t, in order.
+pub(crate) fn corners(t: &[f64], q: &[f64]) -> Vec<Corner> {
+    let last = q.len() - 1;
+    let slope: Vec<f64> = (0..last).map(|i| (q[i + 1] - q[i]) / (t[i + 1] - t[i])).collect();
+    let top = slope.iter().fold(0.0, |top: f64, s| top.max(s.abs()));
+    // Positions are known to a few units in the last place.
+    let size = q.iter().fold(0.0, |size: f64, q| size.max(q.abs()));
+    let rounding = |i: usize| 1e-14 * size / (t[i + 1] - t[i]).min(t[i] - t[i - 1]);
+    // Accelerations at the inner samples.
+    let span = |i: usize| 0.5 * (t[i + 1] - t[i - 1]);
+    let change = |i: usize| slope[i] - slope[i - 1];
+    // What is ordinary around the samples `i..=j`, as an acceleration; unknown where too few samples are near.
+    let around = |i: usize, j: usize| {
+        let (left, right) = (i.saturating_sub(AROUND).max(1)..i, j + 1..last.min(j + 1 + AROUND));
+        let enough = left.len() >= LEAST_AROUND && right.len() >= LEAST_AROUND;
+        let mean = |range: std::ops::Range<usize>| {
+            let n = range.len() as f64;
+            range.map(|k| change(k) / span(k)).sum::<f64>() / n
+        };
+        let most = left.clone().chain(right.clone()).map(|k| change(k).abs() / span(k)).fold(0.0, f64::max);
+        enough.then(|| (most, mean(left), mean(right)))
+    };
+    let stands_out = |jump: f64, i: usize, most: f64| {
+        jump.abs() > STANDS_OUT * (most * span(i) + rounding(i)) && jump.abs() > SMALLEST * top
+    };
+
+    let mut corners = Vec::new();
+    let mut i = 1;
+    while i < last {
+        let between = (i + 1 < last).then(|| around(i, i + 1)).flatten().and_then(|(most, left, right)| {
+            let h = t[i + 1] - t[i];
+            // The curvature beside the corner is not part of it.
+            let shares = [change(i) - left * span(i), change(i + 1) - right * span(i + 1)];
+            let jump = shares[0] + shares[1];
+            let fraction = shares[1] / jump;
+            let lies_between = (AT_SAMPLE..=1.0 - AT_SAMPLE).contains(&fraction);
+            let tau = fraction * h;
+            let position = q[i] + (slope[i - 1] + 0.5 * left * (t[i] - t[i - 1])) * tau + 0.5 * left * tau * tau;
+            (lies_between && stands_out(jump, i, most)).then_some(Corner { sample: i, fraction, position })
+        });
+        let at = || {
+            let (most, ..) = around(i, i)?;
+            stands_out(change(i), i, most).then_some(Corner { sample: i, fraction: 0.0, position: q[i] })
+        };
+        match between.or_else(at) {
+            Some(corner) => {
+                corners.push(corner);
+                i += 2;
+            }
+            None => i += 1,
+        }
+    }
+    corners
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn found(n: usize, h: f64, f: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
+        let t: Vec<f64> = (0..=n).map(|k| h * k as f64).collect();
+        let q: Vec<f64> = t.iter().map(|t| f(*t)).collect();
+        corners(&t, &q).iter().map(|c| (h * (c.sample as f64 + c.fraction), c.position)).collect()
+    }
+
+    /// Truth: two parabolas that meet in a corner, at a sample and anywhere between two.
+    #[test]
+    fn a_corner_is_found_where_it_is() {
+        for corner in [0.5, 0.5002, 0.5007, 0.50049] {
+            let f = |t: f64| {
+                let s = t - corner;
+                if s < 0.0 { 2.0 * s + 3.0 * s * s } else { -s - 2.0 * s * s }
+            };
+            let found = found(1000, 1e-3, f);
+            assert_eq!(found.len(), 1, "{corner}: {found:?}");
+            // measured 1.3e-7 s, 2.5e-7
+            assert!((found[0].0 - corner).abs() < 2e-6 && found[0].1.abs() < 2e-6, "{corner}: {found:?}");
+        }
+    }
+
+    /// Accelerations that jump, fast curvature, coarse data, rounding to five digits, noise: no corner in any of them.
+    #[test]
+    fn smooth_and_rough_data_have_no_corners() {
+        let trapezoid = |t: f64| if t < 0.3 { 5.0 * t * t } else { 0.45 + 3.0 * (t - 0.3) };
+        let mut noise = 12345u64;
+        let mut random = || {
+            noise = noise.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (noise >> 33) as f64 / 2f64.powi(31) - 0.5
+        };
+        let rough: Vec<f64> = (0..20_000).map(|_| 1e-4 * random()).collect();
+        assert_eq!(found(1000, 1e-3, trapezoid), []);
+        assert_eq!(found(1000, 1e-3, |t| (200.0 * t).sin()), []);
+        assert_eq!(found(20, 0.05, |t| (20.0 * t).sin()), []);
+        assert_eq!(found(1000, 1e-3, |t| (1e5 * (2.0 * t).sin()).round() * 1e-5), []);
+        assert_eq!(found(1000, 1e-3, |t| (1e5 * 0.123 * t).round() * 1e-5), []);
+        assert_eq!(found(19_999, 1e-3, |t| t + rough[(t * 1e3).round() as usize]), []);
+        assert_eq!(found(8, 1.0, |t| [0.0, 0.0, 1.0, 2.0, 2.0, 2.0, 1.0, 0.0, 0.0][t as usize]), []);
+        assert_eq!(found(500, 2e-3, |_| 1.7), []);
+    }
+}

@@ -1,0 +1,75 @@
+//! Rounding of corners: a velocity that jumps becomes one that changes within a given time.
+//!
+//! Around each corner a stretch of the curve gives way to one quintic with position, velocity and acceleration of the curve
+//! at both ends. Not here: finding corners (`corner`), ends of the record at speed.
+
+use crate::error::TrajectoryError;
+use crate::polynomial::Piece;
+use crate::trajectory::{Curve, Trajectory};
+use crate::warning::QUIET_SPEED;
+
+impl Trajectory {
+    /// The same motion with every corner inside it replaced by a quintic blend that lasts `seconds`, less where two
+    /// corners, or a corner and an end, are nearer than that. A joint leaves its curve by up to `|Δv| seconds / 8` and a
+    /// little more; a motion that starts or ends at speed still does.
+    ///
+    /// # Errors
+    /// [`TrajectoryError::BadRounding`] unless `seconds` is positive and finite; [`TrajectoryError::OutOfRange`] when it is
+    /// so short that numbers are too extreme for f64.
+    pub fn with_rounded_corners(&self, seconds: f64) -> Result<Self, TrajectoryError> {
+        if !(seconds > 0.0 && seconds.is_finite()) {
+            return Err(TrajectoryError::BadRounding { seconds });
+        }
+        let curves = self.curves().iter().map(|curve| curve.rounded(seconds)).collect();
+        Self::from_curves(self.joints().to_vec(), curves, self.duration(), self.notes().to_vec())
+    }
+}
+
+impl Curve {
+    fn rounded(&self, seconds: f64) -> Self {
+        let (begin, end) = (self.knots[0], self.knots[self.knots.len() - 1]);
+        let jumps = self.jumps().filter(|jump| jump.exceeds(1, QUIET_SPEED)).map(|jump| jump.time_s);
+        let corners: Vec<f64> = jumps.filter(|t| *t > begin && *t < end).collect();
+        let mut rounded = Self { knots: vec![begin], pieces: Vec::new() };
+        for (k, &t) in corners.iter().enumerate() {
+            let left = if k == 0 { t - begin } else { 0.5 * (t - corners[k - 1]) };
+            let right = corners.get(k + 1).map_or(end - t, |next| 0.5 * (next - t));
+            let half = (0.5 * seconds).min(left).min(right);
+            let (from, to) = (t - half, t + half);
+            rounded.append_part(self, from);
+            let state = |at: [f64; 4]| [at[0], at[1], at[2]];
+            rounded.pieces.push(Piece::hermite(to - from, state(self.at(from)), state(self.at(to))));
+            rounded.knots.push(to);
+        }
+        rounded.append_part(self, end);
+        rounded
+    }
+
+    /// Goes on along `other` from the last knot until `until`.
+    fn append_part(&mut self, other: &Self, until: f64) {
+        for (piece, knots) in other.pieces.iter().zip(other.knots.windows(2)) {
+            let (from, to) = (self.knots[self.knots.len() - 1].max(knots[0]), until.min(knots[1]));
+            // What is left after rounding of the times is no piece.
+            if to - from > 1e-9 * piece.width {
+                self.pieces.push(piece.part(from - knots[0], to - knots[0]));
+                self.knots.push(to);
+            }
+        }
+        let last = self.knots.len() - 1;
+        self.knots[last] = until;
+    }
+}
+
+impl Piece {
+    /// The stretch between two of its times.
+    fn part(&self, from: f64, to: f64) -> Self {
+        let mut c = self.c;
+        // Taylor's shift, by Horner's scheme repeated.
+        for first in 0..5 {
+            for k in (first..5).rev() {
+                c[k] += from * c[k + 1];
+            }
+        }
+        Self { width: to - from, c }
+    }
+}
