@@ -26,7 +26,7 @@ RERUN = {
     "recording": (["compare"], "run.rrd", 6.5),
     "mcap": (["compare"], "run.mcap", 6.5),
     "study": (
-        ["compare", "--with", "links=modal,name=modal links", "--with", "robot=robots/kr210/beams.toml,name=tubes"],
+        ["compare", "robots/kr210/links.toml", "--with", "links=modal,name=modal links", "--with", "robot=robots/kr210/beams.toml,name=tubes"],
         "study.rrd",
         6.5,
     ),

@@ -59,7 +59,7 @@ fn fitted(samples: &[(f64, f64)], omega: f64) -> (f64, f64) {
 /// Truth: `compare`, which finds the modes at the start of its motion by the undamped problem.
 #[test]
 fn modes_of_the_industrial_arm_are_those_that_compare_reports() {
-    let robot = load("kr210");
+    let robot = load("kr210/links.toml");
     let path = root().join("trajectories/pick_and_place.toml");
     let motion = Motion::load(&path, &robot.rigid_model().expect("a tree")).expect("a sound trajectory");
     let (mut q, mut v, mut a) = ([0.0; 6], [0.0; 6], [0.0; 6]);
@@ -87,7 +87,7 @@ fn modes_of_the_industrial_arm_are_those_that_compare_reports() {
 /// Truth: `C = J K^-1 Jᵀ` of statics is the response at 0 Hz, all 36 entries, and the sag is what the steppers start from.
 #[test]
 fn response_at_rest_is_the_compliance() {
-    let robot = load("kr210");
+    let robot = load("kr210/links.toml");
     let at = "0.2,-1.1,1.2,0.3,0.4,0.5";
     let C = statics(&robot, &Modelling::default(), Some(at), [0.0; 6]).expect("an equilibrium").compliance;
     let words = |words: [&str; 6]| words.map(str::to_owned).to_vec();

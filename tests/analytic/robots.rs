@@ -108,7 +108,7 @@ fn kr210_has_the_published_mass_and_a_plausible_first_frequency() {
     let inspection = flexarm::inspect(&load("kr210"), None, None).expect("inspects");
     let urdf: f64 = inspection.links.iter().map(|l| l.mass_kg).sum();
     assert!((urdf - 1077.424).abs() < 0.01, "{urdf}");
-    let (summary, table) = run("kr210", "point_to_point.toml", &RunOptions::default());
+    let (summary, table) = run("kr210/links.toml", "point_to_point.toml", &RunOptions::default());
     let f1 = summary.frequencies_hz[0];
     assert!((10.0..25.0).contains(&f1), "{f1}");
     // Both parts of a cut link are exactly the link: the rigid twin needs the torques of the URDF's robot.

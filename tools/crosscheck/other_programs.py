@@ -4,7 +4,7 @@
     python tools/crosscheck/other_programs.py            # pip install pin exudyn mujoco numpy scipy; seven minutes
     python tools/crosscheck/other_programs.py --write    # also replaces the two files in tests/verification/
 
-Robot: robots/kr210, two links of two rigid parts each with one elastic joint between them, full 6x6. Two things are changed, for every
+Robot: robots/kr210/links.toml, two links of two rigid parts each with one elastic joint between them, full 6x6. Two things are changed, for every
 program, flexarm too, since not every program has them: the damping is D = beta K (the first mode at the start of
 pick_and_place gets 3 %), and the angles of the elastic joints are Z-Y-X Euler angles. Everybody starts from an equilibrium of its own.
 
@@ -60,7 +60,7 @@ from scipy.integrate import solve_ivp
 from arm_chain import Chain, Motion
 
 ROOT = Path(__file__).parent.parent.parent
-ROBOT = ROOT / "robots" / "kr210" / "robot.toml"
+ROBOT = ROOT / "robots" / "kr210" / "links.toml"
 STORED = ROOT / "tests" / "verification" / "other_programs.json"
 CURVE = ROOT / "tests" / "verification" / "kr210_pick_and_place_pinocchio.csv"
 DATE = "2026-11-21"
@@ -613,7 +613,7 @@ def compare(name, chain, hybrid, beta, soft, vector):
 
 def write_curve(rows, beta, f1):
     head = f"""\
-# robots/kr210 on trajectories/pick_and_place.toml: converged motion of the TCP, joints exactly along the motion, start in equilibrium.
+# robots/kr210/links.toml on trajectories/pick_and_place.toml: converged motion of the TCP, joints exactly along the motion, start in equilibrium.
 # Unlike robot.toml: damping = {{ stiffness_beta = {beta!r} }} (s; 3 % of the first mode at the start, {f1:.6f} Hz) and angles = "euler-zyx", both links.
 # Pinocchio {pin.__version__} (RNEA, CRBA) with scipy's DOP853 at rtol 1e-12. Regenerate: tools/crosscheck/other_programs.py --write. Units m, s; world axes.
 time,rigid_x,rigid_y,rigid_z,flexible_x,flexible_y,flexible_z
@@ -646,7 +646,7 @@ if __name__ == "__main__":
     cpu = next((l.split(":")[1].strip() for l in open("/proc/cpuinfo") if l.startswith("model name")), platform.processor())
     about = subprocess.run([args.program, "--version"], capture_output=True, text=True).stdout.split()
     stored = {
-        "what": "TCP of robots/kr210 in four programs. Error: largest distance to the truth, over the peak deflection of the truth (peak_m, all axes alike);"
+        "what": "TCP of robots/kr210/links.toml in four programs. Error: largest distance to the truth, over the peak deflection of the truth (peak_m, all axes alike);"
                 " RMS over rms_m. CPU: process time per simulated second, one thread, smallest of three runs.",
         "script": "tools/crosscheck/other_programs.py", "date": DATE, "machine": f"{cpu}, {os.cpu_count()} cores",
         "versions": {"flexarm": about[-1], "exudyn": version("exudyn"), "mujoco": mujoco.__version__, "pinocchio": pin.__version__,

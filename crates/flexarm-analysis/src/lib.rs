@@ -28,13 +28,16 @@
 //! # Ok::<(), flexarm_analysis::RecordError>(())
 //! ```
 //!
+//! [`error_parts`] says how much of the error is sag and how much comes from the motion.
+//!
 //! Linear structures are a part of their own: [`damped_modes`] with what each mode does ([`compliance_parts`],
 //! [`strain_energy_shares`]), and the response to harmonic excitation ([`LinearSystem::response`], [`response_peaks`]).
 //!
 //! Names of ISO 9283:1998 are used where they fit. A simulation is deterministic and has one cycle, so these are
 //! "ISO 9283-style" figures, not a test after the standard: path accuracy AT ([`TcpMetrics::path_accuracy_m`]),
 //! position overshoot OV ([`TcpMetrics::overshoot_m`]), position stabilisation time ([`TcpMetrics::settling_s`], which
-//! counts from the end of the commanded move and not, as the standard does, from the first entry into the band).
+//! is that of the worst stop and counts from the end of the commanded move and not, as the standard does, from the first
+//! entry into the band).
 //!
 //! Frames: W world, T tool. Order: linear first, angular second. SI units.
 //! Not here: simulation, robots, files. Everything is a pure function of slices and matrices.
@@ -43,6 +46,7 @@
 
 mod contributions;
 mod damped_modes;
+mod error_parts;
 mod hold;
 mod linear_system;
 mod metrics;
@@ -54,6 +58,7 @@ mod spectrum;
 
 pub use contributions::{ContributionPeak, ContributionPeaks, engineering_strain, tcp_displacement};
 pub use damped_modes::{DampedMode, damped_modes};
+pub use error_parts::{ErrorParts, error_parts};
 pub use flexarm_kinematics::{Pose, rotation_vector};
 pub use hold::HoldMetrics;
 pub use linear_system::{

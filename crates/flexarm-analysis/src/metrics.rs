@@ -40,8 +40,8 @@ pub struct TcpMetrics {
     pub peak_rad: f64,
     /// `sqrt(1/(t_n - t_0) ∫ |θ|² dt)`, rad.
     pub rms_rad: f64,
-    /// Settling time after the last move, s: [`HoldMetrics::settling_s`] of the last hold. `None` when the error has
-    /// not settled within the record, or when there is no move or no hold after it.
+    /// Settling time, s: the longest [`HoldMetrics::settling_s`] of all holds. `None` when the error has not settled before
+    /// the end of some hold, or when there is no hold after a move.
     pub settling_s: Option<f64>,
     /// Largest [`HoldMetrics::overshoot_m`] of all holds, m (position overshoot OV); 0 without a hold.
     pub overshoot_m: f64,
@@ -115,7 +115,8 @@ pub fn tcp_metrics_on_path(
     let [tangential_peak_m, normal_peak_m, binormal_peak_m, lateral_peak_m] = path_peaks(&path_errors);
     let [path_accuracy_m, path_rms_m] = path_accuracy(record, &path_errors);
     let holds = holds(record, &frames, band);
-    let ends_in_hold = |hold: &&HoldMetrics| record.moves.last().is_some_and(|last| hold.start_s >= last.1);
+    // One stop that does not settle is enough: the worst counts.
+    let settling = holds.iter().map(|hold| hold.settling_s).reduce(|a, b| Some(a?.max(b?)));
     Ok(TcpMetrics {
         peak_m,
         t_peak_s,
@@ -124,7 +125,7 @@ pub fn tcp_metrics_on_path(
         static_sag_m: distances[0],
         peak_rad,
         rms_rad: rms(record.times, &angles),
-        settling_s: holds.last().filter(ends_in_hold).and_then(|hold| hold.settling_s),
+        settling_s: settling.flatten(),
         overshoot_m: holds.iter().map(|hold| hold.overshoot_m).fold(0.0, f64::max),
         dominant_hz: dominant_hz(record, &holds),
         tangential_peak_m,

@@ -32,7 +32,11 @@ pub(crate) fn terminal_width() -> usize {
 pub(crate) fn summary(summary: &Summary, width: usize) -> String {
     let width = width.max(LEAST_WIDTH);
     let (robot, trajectory, links) = (&summary.robot, &summary.trajectory, &summary.links_model);
-    let mut out = format!("{HEADING}{robot} on {trajectory}{HEADING:#}, {links} links\n");
+    let mut out = String::new();
+    for line in wrapped(&summary.headline, width) {
+        out += &format!("{HEADLINE}{line}{HEADLINE:#}\n");
+    }
+    out += &format!("{HEADING}{robot} on {trajectory}{HEADING:#}, {links} links\n");
     let groups = figure_groups(summary);
     let all = || groups.iter().flat_map(|group| &group.rows);
     let widest = |of: fn(&Figure) -> &str| all().map(|row| columns(of(row))).max().unwrap_or(0);
@@ -101,6 +105,10 @@ fn study(summary: &Summary, width: usize) -> String {
     let mut out = format!("\n{HEADING}runs{HEADING:#}\n");
     let table = aligned(&rows);
     out += &if fits(&table, width) { table } else { turned(&rows, width) };
+    for run in std::iter::once(summary).chain(&summary.with).filter(|run| !run.headline.is_empty()) {
+        let text = format!("{}: {}", run.label.as_deref().unwrap_or_default(), run.headline);
+        out += &wrapped(&text, width).iter().map(|line| format!("{line}\n")).collect::<String>();
+    }
     for line in wrapped(STUDY_NOTE, width) {
         out += &format!("{FAINT}{line}{FAINT:#}\n");
     }
@@ -299,7 +307,7 @@ TCP
   peak TCP error           1.4159 mm    at 0.600 s
   RMS TCP error            1.1000 mm
   peak along the path      1.0000 mm
-  peak normal to the path  0.2000 mm    out of its plane 0.3000 mm
+  peak normal to the path  0.2000 mm    binormal 0.3000 mm
   path accuracy            0.0000 mm    largest distance from the path in motion
   static sag at the start  0.0000 mm
   error at the end         0.0000 mm
@@ -330,6 +338,14 @@ files
   report   out/report.html
 ";
         assert_eq!(plain(&example(), 80), expected);
+    }
+
+    /// How far the tool is off and what bends is read before anything else.
+    #[test]
+    fn the_first_line_says_what_bends() {
+        let headline = "6.01 mm = 5.02 static + 0.99 in motion (up to 2.85); links 1.41, gearboxes 4.61 (joint_2 most)";
+        let text = plain(&Summary { headline: headline.into(), ..example() }, 120);
+        assert!(text.starts_with(&format!("{headline}\narm on swing")), "{text}");
     }
 
     /// A study of so many runs.

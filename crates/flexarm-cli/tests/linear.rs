@@ -15,7 +15,7 @@ mod statics {
     #[test]
     fn keys_and_shapes() {
         let place = Place::new();
-        for (robot, joints, flexible) in [("kr210", 6, 2), ("reference_arm", 6, 2), ("three_beams", 1, 3)] {
+        for (robot, joints, flexible) in [("kr210/links.toml", 6, 2), ("reference_arm", 6, 2), ("three_beams", 1, 3)] {
             let seen = place.json(&["statics", &shipped_robot(robot), "--wrench", "1,2,3,4,5,6"]);
             for key in ["tcp_displacement_m", "tcp_rotation_rad", "sag_m", "sag_rad", "tcp_position_m"] {
                 assert_eq!(numbers(&seen[key]).len(), 3, "{robot} {key}");
@@ -60,8 +60,14 @@ mod statics {
     #[test]
     fn elements_add_up_to_the_displacement() {
         let place = Place::new();
-        let seen =
-            place.json(&["statics", &shipped_robot("kr210"), "--at", "0.1,-1,1,0,0.4,0", "--wrench", "0,0,-500"]);
+        let seen = place.json(&[
+            "statics",
+            &shipped_robot("kr210/links.toml"),
+            "--at",
+            "0.1,-1,1,0,0.4,0",
+            "--wrench",
+            "0,0,-500",
+        ]);
         let total = numbers(&seen["tcp_displacement_m"]);
         let mut sum = [0.0; 3];
         for element in seen["elements"].as_array().unwrap() {
@@ -124,7 +130,7 @@ mod modes {
     #[test]
     fn keys_and_shapes() {
         let place = Place::new();
-        let seen = place.json(&["modes", &shipped_robot("kr210"), "--count", "4"]);
+        let seen = place.json(&["modes", &shipped_robot("kr210/links.toml"), "--count", "4"]);
         let (frequencies, ratios) = (numbers(&seen["frequencies_hz"]), numbers(&seen["damping_ratio"]));
         assert_eq!((frequencies.len(), ratios.len()), (4, 4));
         assert!(frequencies.windows(2).all(|w| 0.0 < w[0] && w[0] <= w[1]));

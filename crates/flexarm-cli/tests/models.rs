@@ -74,7 +74,7 @@ mod links {
     #[test]
     fn shipped_castings_bend_in_modes() {
         let place = Place::new();
-        let (robot, motion) = (shipped_robot("kr210"), shipped_trajectory("point_to_point.toml"));
+        let (robot, motion) = (shipped_robot("kr210/links.toml"), shipped_trajectory("point_to_point.toml"));
         let run = |links: &str| place.json(&["compare", &robot, &motion, "--links", links, "--no-files"]);
         let [modal, lumped] = ["modal", "lumped"].map(run);
         assert_eq!(modal["links_model"], "modal");

@@ -475,9 +475,38 @@ mod folders {
             (summary["robot"].as_str(), summary["trajectory"].as_str()),
             (Some("kr210"), Some("pick_and_place"))
         );
-        assert!(place.path("out/kr210-pick_and_place-001/report.md").is_file());
+        let report = place.text("out/kr210-pick_and_place-001/report.md");
+        let headline = summary["headline"].as_str().unwrap();
+        assert!(headline.contains("static") && headline.contains("gearboxes"), "{headline}");
+        assert_eq!(report.lines().nth(2), Some(headline));
+        assert!(place.text("out/kr210-pick_and_place-001/report.html").contains(headline));
         let stiffness = matrix(&place.json(&["inspect", "kr210"])["flexible_links"][0]["stiffness"]);
         assert_eq!((stiffness.len(), stiffness[0].len()), (6, 6));
+    }
+}
+
+mod first_line {
+    use super::*;
+
+    #[test]
+    fn says_that_nothing_bends_before_any_figure() {
+        let place = Place::new();
+        let answer = place.flexarm(&["compare", "beam.urdf", "swing.toml", "--no-files"]);
+        assert_eq!(answer.code, 0, "{}", answer.err);
+        assert!(answer.out.starts_with("nothing bends"), "{}", answer.out);
+        let how = answer.out.find("[[flexible_link]]").unwrap();
+        assert!(how < answer.out.find("0.0000 mm").unwrap(), "{}", answer.out);
+        let summary = place.json(&["compare", "beam.urdf", "swing.toml", "--no-files"]);
+        assert!(summary["headline"].as_str().unwrap().starts_with("nothing bends"));
+        assert_eq!(summary["bends"], serde_json::json!({ "links": [], "gearboxes": [] }));
+    }
+
+    #[test]
+    fn says_what_bends_and_by_how_much() {
+        let place = Place::new();
+        let answer = place.flexarm(&["compare", "robot.toml", "swing.toml", "--no-files"]);
+        let first = answer.out.lines().next().unwrap();
+        assert!(first.contains("static") && first.contains("in motion") && first.contains("links"), "{first}");
     }
 }
 

@@ -34,12 +34,14 @@
 
 mod cut;
 mod gearbox;
+mod interfaces;
 mod modal;
 mod substitute;
 
 pub use cut::{CutError, cut_chain, cut_inertia};
 pub use flexarm_fem::ReducedLink;
 pub use gearbox::{GearSpring, GearStiffness, Gearbox, GearboxError, insert_gearboxes};
+pub use interfaces::{BranchJoint, branch_joints};
 pub use modal::modal_body;
 pub use substitute::{
     FlexibleLink, FlexibleSpan, LinkForm, Parts, Spring, Substituted, SubstitutionError, distal_joint, substitute,

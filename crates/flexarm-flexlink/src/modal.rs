@@ -7,9 +7,10 @@ use flexarm_kinematics::{
     InterfaceShape, Joint, JointKind, Link, LinkInertia, Mechanism, ModalBody, Pose, SpatialInertia,
 };
 
+use crate::interfaces::nearest;
 use crate::substitute::{FlexibleLink, FlexibleSpan, Parts, Site, SubstitutionError, inertia_of, move_children};
 
-/// How near a joint must be to an interface to hang on it, as a fraction of the link's length.
+/// How near the far interface must be to the far end of the reduced link, as a fraction of its length.
 const AT_INTERFACE: f64 = 1e-6;
 
 /// The mass integrals and shapes as the tree takes them.
@@ -80,22 +81,15 @@ pub(crate) fn substitute_modal(
     let mut part_masses = vec![body.mass];
     part_masses.extend(near.iter().chain(&beyond).map(|i| i.mass));
     let distal_link = format!("{name}__distal");
+    let far_ends = modal.interfaces.iter().map(|interface| interface.X_LI.translation.vector);
+    let places: Vec<_> = std::iter::once(site.p_LA).chain(far_ends).collect();
     for (k, interface) in modal.interfaces.iter().enumerate() {
         // Interfaces keep the link's axes.
         let X_LI = Pose::from(interface.X_LI.translation);
         let to = if k == 0 { distal_link.clone() } else { format!("{name}__{}", interface.name) };
-        let here = |p: &nalgebra::Vector3<f64>| (p - X_LI.translation.vector).norm() <= AT_INTERFACE * site.length;
-        let elsewhere = |p: &nalgebra::Vector3<f64>| {
-            let other =
-                |i: &flexarm_fem::ModalInterface| (p - i.X_LI.translation.vector).norm() <= AT_INTERFACE * site.length;
-            modal.interfaces.iter().skip(1).any(other)
-        };
-        move_children(mechanism, name, &to, &X_LI, |child, p| match k {
-            0 => {
-                let beyond = (p - site.p_LA).dot(&line) > 0.5 * line.norm_squared();
-                child == site.distal_joint || (!elsewhere(p) && beyond)
-            }
-            _ => here(p),
+        move_children(mechanism, name, &to, &X_LI, |child, p| match child == site.distal_joint {
+            true => k == 0,
+            false => nearest(p, places.iter()) == Some(k + 1),
         });
         let at_B = beyond.filter(|_| k == 0).map(|i| {
             let part = rigid(i);

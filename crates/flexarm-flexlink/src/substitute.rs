@@ -8,6 +8,7 @@ use flexarm_kinematics::{ElasticAngles, Joint, JointKind, Link, LinkInertia, Mec
 use nalgebra::{Matrix6, Vector3};
 
 use crate::cut::{CutError, cut_chain, cut_inertia};
+use crate::interfaces::{BranchJoint, branch_joints};
 use crate::modal::substitute_modal;
 
 /// A link that bends.
@@ -175,6 +176,19 @@ pub enum SubstitutionError {
         /// Why.
         what: String,
     },
+    /// A load where springs between rigid parts know nothing.
+    #[error(
+        "joint {joint:?} hangs on interface {interface:?} of link {link:?}, which is neither its near nor its far end: rigid parts with \
+         springs carry load at the two ends alone, let the link bend in modes"
+    )]
+    Branched {
+        /// The link.
+        link: String,
+        /// The joint.
+        joint: String,
+        /// The interface.
+        interface: String,
+    },
     /// The parts cannot be made.
     #[error("link {link:?} cannot be cut in two: {source}")]
     Cut {
@@ -221,9 +235,9 @@ pub fn distal_joint<'m>(
 
 /// Replaces each named link by rigid parts with elastic joints `<link>__elastic`, or by a body that bends in modes.
 ///
-/// Joints of the link beyond the plane through S across A-B (half way from A to B of a link that bends in modes), and
-/// always the distal joint, move to the distal part `<link>__distal`; a joint at another interface of a modal link
-/// moves to that. At zero elastic coordinates every frame is where it was.
+/// Joints of a lumped link beyond the plane through S across A-B, and always the distal joint, move to the distal part
+/// `<link>__distal`. Joints of a link that bends in modes move to the nearest of its interfaces. At zero elastic
+/// coordinates every frame is where it was.
 ///
 /// # Errors
 /// [`SubstitutionError`], naming the link.
@@ -237,6 +251,9 @@ pub fn substitute(mechanism: &Mechanism, links: &[FlexibleLink]) -> Result<Subst
         let span = match &flexible.form {
             LinkForm::Modal(modal) => substitute_modal(&mut result.mechanism, flexible, &site, modal)?,
             LinkForm::TwoParts | LinkForm::Chain(_) => {
+                if let Some(BranchJoint { joint, interface }) = branch_joints(mechanism, flexible).into_iter().next() {
+                    return Err(SubstitutionError::Branched { link: flexible.link.clone(), joint, interface });
+                }
                 let (joints, parts) = lumped_parts(flexible, &site)?;
                 let (span, springs) = insert_chain(&mut result.mechanism, flexible, &site, &joints, &parts);
                 result.springs.extend(springs);

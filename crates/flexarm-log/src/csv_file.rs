@@ -70,7 +70,7 @@ impl Recorder for CsvRecorder {
     fn record(&mut self, sample: &Sample) -> Result<(), LogError> {
         let State::Open(open) = &mut self.state else { return Err(LogError::not_open(&self.path, "record")) };
         open.shape.check(&self.path, sample)?;
-        table::fill_row(sample, open.shape.has_rigid, &mut open.row);
+        table::fill_row(sample, &open.shape, &mut open.row);
         // Rust's debug form of a float is the shortest that reads back, with an exponent where that is shorter.
         let fields = open.row.iter().map(|value| format!("{value:?}"));
         open.writer.write_record(fields).map_err(csv_error(&self.path, "write a sample"))?;

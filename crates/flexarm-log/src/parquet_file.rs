@@ -162,7 +162,7 @@ impl Open {
     }
 
     fn sample(&mut self, sample: &Sample) -> Result<(), ParquetError> {
-        table::fill_row(sample, self.shape.has_rigid, &mut self.row);
+        table::fill_row(sample, &self.shape, &mut self.row);
         for (column, value) in self.columns.iter_mut().zip(&self.row) {
             column.push(*value);
         }

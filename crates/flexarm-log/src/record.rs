@@ -36,6 +36,8 @@ pub struct RunHeader {
     pub description: String,
     /// Whether samples carry a rigid twin.
     pub has_rigid: bool,
+    /// Whether samples carry [`Sample::static_m`], which without a twin nobody can say.
+    pub has_static: bool,
     /// Samples per second.
     pub log_rate_hz: f64,
     /// Step of the stepper (s): times of samples are whole multiples of it; 0 if it is not known.
@@ -159,6 +161,9 @@ pub struct Sample {
     pub error_world: [f64; 6],
     /// The same in path axes: tangential, normal, binormal.
     pub error_path: [f64; 6],
+    /// Static part of the error: the TCP error if the arm stood still where it is, under weight and the loads of the instant
+    /// (m, world axes); meaningless unless [`RunHeader::has_static`].
+    pub static_m: [f64; 3],
     /// Elastic elements, in header order.
     pub elastic: Vec<ElasticSample>,
     /// TCP displacement that each contributor's deflection alone causes (m, world axes), in header order.

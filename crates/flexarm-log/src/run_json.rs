@@ -33,6 +33,9 @@ pub(crate) struct RunJson {
     contributors: Vec<String>,
     bends: Vec<Bend>,
     has_rigid: bool,
+    /// Missing in files of older versions.
+    #[serde(default)]
+    has_static: bool,
     log_rate_hz: f64,
     step_s: f64,
     magnification: f64,
@@ -99,6 +102,7 @@ pub(crate) fn write(header: &RunHeader, meshes: bool) -> String {
         contributors: header.contributors.clone(),
         bends: header.bends.iter().map(bend).collect(),
         has_rigid: header.has_rigid,
+        has_static: header.has_static,
         log_rate_hz: header.log_rate_hz,
         step_s: header.step_s,
         magnification: header.magnification,
@@ -166,6 +170,7 @@ pub(crate) fn read(text: &[u8]) -> Result<(RunHeader, RunJson), String> {
         contributors: std::mem::take(&mut run.contributors),
         bends: run.bends.drain(..).map(bend).collect(),
         has_rigid: run.has_rigid,
+        has_static: run.has_static,
         log_rate_hz: run.log_rate_hz,
         step_s: run.step_s,
         magnification: run.magnification,

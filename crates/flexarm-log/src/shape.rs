@@ -13,6 +13,7 @@ pub(crate) struct Shape {
     stations: usize,
     contributors: usize,
     pub(crate) has_rigid: bool,
+    pub(crate) has_static: bool,
 }
 
 impl Shape {
@@ -24,6 +25,7 @@ impl Shape {
             stations: header.bends.iter().map(|bend| bend.X_LS.len()).sum(),
             contributors: header.contributors.len(),
             has_rigid: header.has_rigid,
+            has_static: header.has_rigid && header.has_static,
         }
     }
 

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use flexarm_kinematics::Pose;
 use nalgebra::{Translation3, Vector3};
 
+use crate::shape::Shape;
 use crate::{ElasticSample, RunHeader, Sample, TwinSample};
 
 const DISPLACEMENT: [&str; 6] = ["x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad"];
@@ -22,6 +23,9 @@ pub(crate) fn columns(header: &RunHeader) -> Vec<String> {
     if header.has_rigid {
         names.extend(DISPLACEMENT.map(|part| format!("error_{part}")));
         names.extend(["tangential", "normal", "binormal"].map(|axis| format!("error_{axis}_m")));
+    }
+    if header.has_rigid && header.has_static {
+        names.extend(position("static_error"));
     }
     for contributor in &header.contributors {
         names.extend(POSITION.map(|axis| format!("{contributor}_contribution_{axis}")));
@@ -49,7 +53,8 @@ pub(crate) fn columns(header: &RunHeader) -> Vec<String> {
 }
 
 /// Puts the numbers of a sample into `row`, in the order of [`columns`].
-pub(crate) fn fill_row(sample: &Sample, has_rigid: bool, row: &mut Vec<f64>) {
+pub(crate) fn fill_row(sample: &Sample, shape: &Shape, row: &mut Vec<f64>) {
+    let has_rigid = shape.has_rigid;
     row.clear();
     row.push(sample.time_s);
     if has_rigid {
@@ -59,6 +64,9 @@ pub(crate) fn fill_row(sample: &Sample, has_rigid: bool, row: &mut Vec<f64>) {
     if has_rigid {
         row.extend(sample.error_world);
         row.extend(&sample.error_path[..3]);
+    }
+    if shape.has_static {
+        row.extend(sample.static_m);
     }
     row.extend(sample.contributions.iter().flatten());
     for (joint, q) in sample.flexible.q.iter().enumerate() {
@@ -114,7 +122,8 @@ impl TableLayout {
     /// What was found and what was expected.
     pub(crate) fn of_names(names: &[String]) -> Result<Self, (String, String)> {
         let has = |name: &str| names.iter().any(|n| n == name);
-        let mut header = RunHeader { has_rigid: has("error_tangential_m"), ..RunHeader::default() };
+        let (has_rigid, has_static) = (has("error_tangential_m"), has("static_error_x_m"));
+        let mut header = RunHeader { has_rigid, has_static, ..RunHeader::default() };
         for name in names {
             for (end, prismatic) in [("_position_rad", false), ("_position_m", true)] {
                 if let Some(joint) = name.strip_suffix(end) {
@@ -183,6 +192,7 @@ impl TableLayout {
             flexible: twin(),
             error_world: [f64::NAN; 6],
             error_path: [f64::NAN; 6],
+            static_m: [f64::NAN; 3],
             solver: [f64::NAN; 2],
             ..Sample::default()
         };
@@ -194,6 +204,9 @@ impl TableLayout {
         if self.header.has_rigid {
             sample.error_world = std::array::from_fn(|_| number());
             sample.error_path[..3].fill_with(&mut number);
+        }
+        if self.header.has_rigid && self.header.has_static {
+            sample.static_m = std::array::from_fn(|_| number());
         }
         let contribution = |_: &String| std::array::from_fn(|_| number());
         sample.contributions = self.header.contributors.iter().map(contribution).collect();

@@ -30,6 +30,8 @@ pub struct TraceRow {
     pub error_world: [f64; 6],
     /// See [`Sample::error_path`].
     pub error_path: [f64; 6],
+    /// See [`Sample::static_m`].
+    pub static_m: [f64; 3],
     /// Place of the rigid TCP (m).
     pub rigid_m: [f64; 3],
     /// Place of the flexible TCP (m).
@@ -111,6 +113,7 @@ impl From<&Sample> for TraceRow {
             time_s: sample.time_s,
             error_world: sample.error_world,
             error_path: sample.error_path,
+            static_m: sample.static_m,
             rigid_m: sample.rigid.X_WT.translation.vector.into(),
             flexible_m: sample.flexible.X_WT.translation.vector.into(),
             contributions: sample.contributions.clone(),

@@ -36,7 +36,7 @@ fn numbers_read_back_exactly_under_their_names() {
     let path = synthetic::scratch("round-trip.csv");
     write(&path, &synthetic::header(), 200);
     let columns = columns(&path);
-    assert_eq!(columns.len(), 1 + 3 + 3 + 6 + 3 + 3 + 3 * 3 + 12 + 3);
+    assert_eq!(columns.len(), 1 + 3 + 3 + 6 + 3 + 3 + 3 + 3 * 3 + 12 + 3);
     for step in 0..200_u64 {
         let (row, sample) = (step as usize, synthetic::sample(step));
         let expected = [
@@ -46,6 +46,7 @@ fn numbers_read_back_exactly_under_their_names() {
             ("error_x_m", sample.error_world[0]),
             ("error_rz_rad", sample.error_world[5]),
             ("error_binormal_m", sample.error_path[2]),
+            ("static_error_z_m", sample.static_m[2]),
             ("upper_arm_contribution_y_m", sample.contributions[0][1]),
             ("joint_2_position_rad", sample.flexible.q[1]),
             ("joint_3_effort", sample.flexible.effort[2]),

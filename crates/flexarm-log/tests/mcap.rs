@@ -135,6 +135,7 @@ fn every_topic_is_there_with_schema_quality_of_service_and_all_samples() {
         ("/tcp/error_plot", "std_msgs/msg/Float64MultiArray", n),
         ("/tcp/flexible", "geometry_msgs/msg/PoseStamped", n),
         ("/tcp/rigid", "geometry_msgs/msg/PoseStamped", n),
+        ("/tcp/static_error", "std_msgs/msg/Float64MultiArray", n),
         ("/tf", "tf2_msgs/msg/TFMessage", n),
         ("/tf_static", "tf2_msgs/msg/TFMessage", 1),
     ];
@@ -497,7 +498,7 @@ fn chunks_keep_their_size_and_checksums() {
         assert!(chunk.uncompressed_size <= 1 << 20, "{}", chunk.uncompressed_size);
     }
     let checked = MessageStream::new_with_options(&file, Options::ValidateChunkCrcs.into()).unwrap();
-    assert_eq!(checked.map(Result::unwrap).count() as u64, 15 * synthetic::SAMPLES + 3 + 3 + 41 + 2);
+    assert_eq!(checked.map(Result::unwrap).count() as u64, 16 * synthetic::SAMPLES + 3 + 3 + 41 + 2);
 }
 
 /// Number of samples in the undamaged part of a file.
@@ -572,7 +573,7 @@ fn a_dropped_recorder_closes_its_file() {
     drop(recorder);
     let file = std::fs::read(&path).unwrap();
     let summary = Summary::read(&file).unwrap().unwrap();
-    assert_eq!(summary.stats.unwrap().message_count, 10 * 15 + 3 + 1); // latched ones, the error
+    assert_eq!(summary.stats.unwrap().message_count, 10 * 16 + 3 + 1); // latched ones, the error
     std::fs::remove_file(path).unwrap();
 }
 

@@ -18,8 +18,8 @@ use crate::bench::{ALPHA, Bench, larger, modal, parts, spook};
 use crate::meshed::Meshed;
 use crate::page::{Bound, Case, Figure, Table, digits, error, fixed, signed, word};
 
-const LINKS: &str = "robots/kr210/robot.toml";
-const DRIVES: &str = "robots/kr210/drives.toml";
+const LINKS: &str = "robots/kr210/links.toml";
+const DRIVES: &str = "robots/kr210/robot.toml";
 /// Modes in the castings' files.
 const ALL_MODES: usize = 10;
 /// Every so many samples are drawn: 4 ms, a seventh of the period of the fourth mode.
@@ -114,9 +114,9 @@ fn peaks(vectors: impl Iterator<Item = Vector3<f64>>) -> [f64; 4] {
 pub(crate) fn case(bench: &Bench, pace: &mut Pace<'_>) -> Result<Case, Error> {
     let mut case = Case::new("manipulator", "4. A whole manipulator");
     case.text(
-        "`robots/kr210`: a six-axis arm of the KR 210 class with 150 kg; link arm and forearm are castings, reduced from meshes of 10-node tetrahedra. \
+        "`robots/kr210/links.toml`: a six-axis arm of the KR 210 class with 150 kg; link arm and forearm are castings, reduced from meshes of 10-node tetrahedra. \
          Joints follow the motion exactly. Deflection is the flexible tool minus the rigid one, world axes. Truth is the same robot with modal links \
-         (all ten fixed-interface modes) by the stepper with error control, tolerance 1e-8. By hand: `flexarm compare kr210 large_moves --links modal --stepper reference --rtol 1e-8`, \
+         (all ten fixed-interface modes) by the stepper with error control, tolerance 1e-8. By hand: `flexarm compare robots/kr210/links.toml large_moves --links modal --stepper reference --rtol 1e-8`, \
          `--with links=lumped,segments=4` beside it; `--stepper spook --step 1e-4`.",
     );
     let robot = bench.robot(LINKS)?;
@@ -340,7 +340,7 @@ fn where_chains_stop(case: &mut Case, bench: &Bench, robot: &Robot) -> Result<()
 fn which_flexibility(case: &mut Case, bench: &Bench, runs: &mut Runs<'_, '_>, moves: &[&str]) -> Result<(), Error> {
     case.heading("Which flexibility matters");
     case.text(
-        "`robots/kr210/drives.toml` has gearboxes that yield, besides: stiffness and damping identified on another KR 210 whose links were taken as rigid (so what bends \
+        "`robots/kr210/robot.toml` has gearboxes that yield, besides: stiffness and damping identified on another KR 210 whose links were taken as rigid (so what bends \
          in them is in the gearboxes' numbers too, and \"both\" is an upper bound). Motors follow the motion exactly; spring-damper, two parts, 1 ms.",
     );
     let robot = bench.robot(DRIVES)?;

@@ -14,7 +14,7 @@ use crate::Pace;
 use crate::bench::{ALPHA, Bench, Stored, Worst, larger, spook};
 use crate::page::{Bound, Case, Cell, Figure, Table, digits, error, word};
 
-const ROBOT: &str = "robots/kr210/robot.toml";
+const ROBOT: &str = "robots/kr210/links.toml";
 const STORED: &str = "other_programs.json";
 const CURVE: &str = "tests/verification/kr210_pick_and_place_pinocchio.csv";
 

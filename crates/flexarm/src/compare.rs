@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use flexarm_analysis::{
-    ContributionPeaks, ErrorRecord, MetricSettings, PathFrame, TcpMetrics, engineering_strain, tcp_error,
+    ContributionPeaks, ErrorRecord, MetricSettings, PathFrame, TcpMetrics, engineering_strain, error_parts, tcp_error,
     tcp_metrics_on_path,
 };
 use flexarm_kinematics::{
@@ -24,12 +24,14 @@ use crate::caveat::{self, Caveat, kinds, validity};
 use crate::energy_book::EnergyBook;
 use crate::error::Error;
 use crate::flexible::{FlexibleRobot, Owner};
+use crate::headline::{self, Bending, ShareFigures};
 use crate::magnification::Expected;
 use crate::motion::Motion;
 use crate::options::{Outputs, RunOptions};
 use crate::prepare::{Checked, checked};
 use crate::record::{header, link_frames, ordered_links, recorders};
 use crate::robot::{Robot, TCP_FRAME};
+use crate::static_part::StaticPart;
 use crate::summary::{DriveFigures, Files, LinkFigures, StepperFigures, Summary, TcpFigures};
 use crate::twin::RigidTwin;
 
@@ -102,7 +104,8 @@ pub(crate) fn run_traced(
     files.set.extend(together.recorders);
     let mut head = header(robot, motion, options, &run.arm, flexible.links_model());
     head.bends.clone_from(&run.bends);
-    head.contributors = run.contributors.iter().map(|(_, name)| name.clone()).collect();
+    head.contributors = run.contributors.iter().map(|c| c.name.clone()).collect();
+    head.has_static = options.with_twin;
     head.color_scale_m = expected.color_scale_m();
     head.volume = expected.volume;
     head.magnification = options.magnification.unwrap_or_else(|| expected.magnification());
@@ -153,6 +156,14 @@ pub(crate) fn tool_frame(arm: &FlexibleArm) -> Frame {
     arm.model.frame(TCP_FRAME).expect("added when the robot was loaded").clone()
 }
 
+/// Who moves the tool.
+struct Contributor {
+    /// Place among all displacements: links, then drives, then what servos leave.
+    place: usize,
+    name: String,
+    kind: &'static str,
+}
+
 /// A run under way, with what has been seen of it.
 struct Run<'a> {
     motion: &'a Motion,
@@ -164,8 +175,11 @@ struct Run<'a> {
     link_frames: Vec<Frame>,
     bends: Vec<BendInfo>,
     stations: Vec<Frame>,
-    /// Flexible links, elastic drives and what servos leave: place among all displacements, name.
-    contributors: Vec<(usize, String)>,
+    /// Flexible links, elastic drives and what servos leave.
+    contributors: Vec<Contributor>,
+    static_part: StaticPart,
+    /// Static part of the error per sample (m).
+    statics: Vec<[f64; 3]>,
     trace: Trace,
     /// When the force of a drive first passed its limit.
     overloaded: Vec<Option<f64>>,
@@ -212,11 +226,12 @@ impl<'a> Run<'a> {
         let tcp = tool_frame(&arm);
         let (bends, stations) = stations(&flexible.bends, &arm.model, &ordered_links(robot));
         let drives = robot.drives.iter().enumerate().filter(|(k, _)| flexible.owners.contains(&Owner::Drive(*k)));
-        let contributors = flexible.spans.iter().enumerate().map(|(k, span)| (k, span.link.clone()));
-        let contributors = contributors.chain(drives.map(|(k, drive)| (n_links + k, drive.joint.clone())));
+        let links = flexible.spans.iter().enumerate().map(|(k, span)| (k, span.link.clone(), headline::LINK));
+        let drives = drives.map(|(k, drive)| (n_links + k, drive.joint.clone(), headline::GEARBOX));
         let follows = !arm.torque_driven.is_empty();
-        let following = follows.then(|| (n_links + n_drives, FOLLOWING_ERROR.to_owned()));
-        let contributors = contributors.chain(following).collect();
+        let following = follows.then(|| (n_links + n_drives, FOLLOWING_ERROR.to_owned(), headline::SERVO));
+        let contributors = links.chain(drives).chain(following);
+        let contributors = contributors.map(|(place, name, kind)| Contributor { place, name, kind });
         let mut twin = RigidTwin::new(&arm);
         // Before the first motion the path axes are those of its beginning.
         let duration = motion.trajectory.duration();
@@ -225,6 +240,9 @@ impl<'a> Run<'a> {
             [twin.velocity, twin.acceleration]
         }));
         let last = (motion.trajectory.duration() / options.step_s - 1e-9).ceil().max(0.0) as u64;
+        let every = ((1.0 / (options.log_rate_hz * options.step_s)).round() as u64).max(1);
+        let moves = motion.trajectory.moves().iter().map(|m| (m.start, m.end)).collect();
+        let static_part = StaticPart::new(&arm, &tcp, moves, duration, every as f64 * options.step_s);
         Self {
             motion,
             options,
@@ -233,7 +251,9 @@ impl<'a> Run<'a> {
             link_frames: link_frames(robot, &arm.model),
             bends,
             stations,
-            contributors,
+            contributors: contributors.collect(),
+            static_part,
+            statics: Vec::new(),
             trace: Trace::default(),
             overloaded: vec![None; arm.model.n_actuated()],
             payload_times: arm.inertia_changes.iter().map(|change| change.t).collect(),
@@ -254,7 +274,7 @@ impl<'a> Run<'a> {
             energy: EnergyBook::default(),
             peak_drive: vec![0.0; arm.model.n_actuated()],
             at_limit: vec![0; arm.model.n_actuated()],
-            every: ((1.0 / (options.log_rate_hz * options.step_s)).round() as u64).max(1),
+            every,
             last,
             arm,
             stepper,
@@ -302,7 +322,7 @@ impl<'a> Run<'a> {
         let X_rigid = self.twin.data.X_WF(&self.tcp);
         let X_flexible = self.seen.X_WB[self.tcp.body] * self.tcp.X_BF;
         let error = tcp_error(&X_rigid, &X_flexible);
-        self.path = self.path.next(&self.twin.velocity, &self.twin.acceleration);
+        self.path = self.path.next(&self.twin.velocity);
         let [x, y, z, rx, ry, rz] = error;
         let [along, normal, binormal] = self.path.components(&Vector3::new(x, y, z));
         let [r_along, r_normal, r_binormal] = self.path.components(&Vector3::new(rx, ry, rz));
@@ -321,6 +341,9 @@ impl<'a> Run<'a> {
             self.at_limit[axis.coordinate] += usize::from(self.seen.drive[axis.coordinate].abs() >= axis.limit);
         }
 
+        let known = self.options.with_twin.then(|| self.static_part.at(t)).flatten();
+        self.sample.static_m = known.unwrap_or([f64::NAN; 3]);
+        self.statics.push(self.sample.static_m);
         self.look_at_elements(t);
         let sample = &mut self.sample;
         sample.time_s = t;
@@ -400,7 +423,7 @@ impl<'a> Run<'a> {
         for &k in &self.arm.torque_driven {
             *following += self.twin.J.column(k) * (self.seen.q[k] - self.twin.state.q[k]);
         }
-        let contributions = self.contributors.iter().map(|(k, _)| [0, 1, 2].map(|c| moved[*k][c]));
+        let contributions = self.contributors.iter().map(|who| [0, 1, 2].map(|c| moved[who.place][c]));
         self.sample.contributions.clear();
         self.sample.contributions.extend(contributions);
         for (k, displacement) in moved.iter().enumerate() {
@@ -429,7 +452,7 @@ impl<'a> Run<'a> {
             times: &self.times,
             errors: &self.errors,
             rigid_positions: &self.positions,
-            quasi_static: None,
+            quasi_static: self.resting_places(),
             moves: &moves,
         };
         // A run that stopped at once has nothing to measure.
@@ -458,16 +481,19 @@ impl<'a> Run<'a> {
         caveats.extend(motion.violations.iter().map(passed));
         caveats.extend(self.caveats(&links));
         let events = self.events(metrics.as_ref().filter(|_| options.with_twin));
-        let summary = Summary {
+        let bends = Bending {
+            links: links.iter().map(|link| link.name.clone()).collect(),
+            gearboxes: elastic_drives.iter().map(|drive| drive.joint.clone()).collect(),
+        };
+        let by_choice = !robot.flexible.is_empty() || robot.drives.iter().any(|drive| drive.gearbox.is_some());
+        let mut summary = Summary {
+            bends,
             robot: robot.name.clone(),
             trajectory: motion.name.clone(),
             links_model: self.flexible.links_model().into(),
             duration_s: self.times.last().copied().unwrap_or(0.0),
             stepper: StepperFigures::new(options, self.stepper.counts()),
-            tcp: metrics
-                .as_ref()
-                .filter(|_| options.with_twin)
-                .map(|m| TcpFigures { static_sag_m: self.static_sag(), ..m.into() }),
+            tcp: metrics.as_ref().filter(|_| options.with_twin).map(|m| self.tool_figures(m)),
             frequencies_hz: self.arm.modes.frequencies_hz(),
             links,
             elastic_drives,
@@ -485,7 +511,40 @@ impl<'a> Run<'a> {
             caveats,
             ..Summary::default()
         };
+        summary.headline = headline::headline(&summary, by_choice);
         (summary, events)
+    }
+
+    /// Where the tool comes to rest at each stop: the static part, unless servos bring the joints elsewhere or a load moves it.
+    fn resting_places(&self) -> Option<&[[f64; 3]]> {
+        let known = self.statics.iter().flatten().all(|x| x.is_finite());
+        let steady = self.arm.torque_driven.is_empty() && self.arm.loads.is_empty();
+        (known && steady).then_some(&self.statics)
+    }
+
+    fn tool_figures(&self, metrics: &TcpMetrics) -> TcpFigures {
+        let figures = TcpFigures {
+            static_sag_m: self.static_sag(),
+            shares_at_peak: self.shares_at_peak(),
+            ..TcpFigures::from(metrics).with_band(self.options.settling_band_m)
+        };
+        match error_parts(&self.times, &self.errors, &self.statics) {
+            Ok(parts) => figures.with_parts(&parts),
+            Err(_) => figures,
+        }
+    }
+
+    /// What each contributor has in the largest error, along its direction.
+    fn shares_at_peak(&self) -> Vec<ShareFigures> {
+        let peak = &self.trace.peak;
+        let error = Vector3::from_row_slice(&peak.error_world[..3]);
+        let along = error.try_normalize(0.0).unwrap_or_default();
+        let shares = self.contributors.iter().zip(&peak.contributions).map(|(who, moved)| ShareFigures {
+            name: who.name.clone(),
+            kind: who.kind.into(),
+            along_m: along.dot(&Vector3::from(*moved)),
+        });
+        shares.collect()
     }
 
     /// What happened when, in order of time, as far as the run came.

@@ -5,7 +5,9 @@ use std::sync::Arc;
 
 use crate::bends::Bend;
 use flexarm_fem::{BeamLink, ModalLink, ModalOptions};
-use flexarm_flexlink::{FlexibleLink, FlexibleSpan, Gearbox, LinkForm, insert_gearboxes, substitute};
+use flexarm_flexlink::{
+    BranchJoint, FlexibleLink, FlexibleSpan, Gearbox, LinkForm, branch_joints, insert_gearboxes, substitute,
+};
 use flexarm_kinematics::{Data, Model, mass_matrix};
 use flexarm_stepping::{
     Damping, FlexibleArm, Friction, GeometricStiffness, PrescribedMotion, Servo, ServoAxis, Spring, StepError,
@@ -182,6 +184,8 @@ pub struct FlexibleRobot {
     torque: Vec<(usize, ServoEntry, f64)>,
     /// Doubts about the models of the links.
     pub doubts: Vec<String>,
+    /// Links that bend in modes though rigid parts are asked for, and why: sentences.
+    pub modal_instead: Vec<String>,
 }
 
 /// What a spring belongs to.
@@ -248,7 +252,10 @@ impl FlexibleRobot {
     /// Doubts about the models of the links, as caveats.
     pub fn caveats(&self) -> Vec<Caveat> {
         let help = "reduce the mesh itself (flexarm reduce) to have them";
-        self.doubts.iter().map(|text| Caveat::said("second-order-unknown", "links", text, help)).collect()
+        let doubts = self.doubts.iter().map(|text| Caveat::said("second-order-unknown", "links", text, help));
+        let help = "write model = \"modal\" into the robot file";
+        let instead = self.modal_instead.iter().map(|text| Caveat::said("third-interface", "links", text, help));
+        doubts.chain(instead).collect()
     }
 
     /// Whether some joint is driven by torque.
@@ -292,9 +299,11 @@ impl Robot {
     pub fn modelled(&self, modelling: &Modelling) -> Result<FlexibleRobot, Error> {
         let usage = |text: String| Error::Usage(text);
         let (mut links, mut doubts): (Vec<FlexibleLink>, Vec<String>) = (Vec::new(), Vec::new());
+        let mut modal_instead = Vec::new();
         if modelling.links != LinkModel::Rigid {
             for link in &self.flexible {
-                let form = link.form(modelling).map_err(usage)?;
+                let (form, instead) = self.form_of(link, modelling)?;
+                modal_instead.extend(instead);
                 if matches!(&form, LinkForm::Modal(modal) if !modal.has_second_order()) {
                     doubts.push(format!("link {:?}: {SECOND_ORDER_UNKNOWN}", link.flexible.link));
                 }
@@ -305,7 +314,8 @@ impl Robot {
         let modal = links.iter().filter(|link| matches!(link.form, LinkForm::Modal(_))).count();
         if let (Some(n), true) = (modelling.segments, modal == links.len()) {
             return Err(usage(format!(
-                "{n} segments are asked for, but no link of the robot is lumped: add --links lumped"
+                "{n} segments are asked for, but no link of the robot is lumped: {}",
+                if modal_instead.is_empty() { "add --links lumped".to_owned() } else { modal_instead.join("; ") }
             )));
         }
         if let (Some(n), 0) = (modelling.modes, modal) {
@@ -384,7 +394,35 @@ impl Robot {
             }
         }
         let (spans, rigid) = (substituted.spans, self.rigid_model()?);
-        Ok(FlexibleRobot { model: Arc::new(model), springs, owners, spans, bends, rigid, friction, torque, doubts })
+        Ok(FlexibleRobot {
+            model: Arc::new(model),
+            springs,
+            owners,
+            spans,
+            bends,
+            rigid,
+            friction,
+            torque,
+            doubts,
+            modal_instead,
+        })
+    }
+
+    /// The model of a link on this robot, and a sentence if it is another one than asked for: a link with load on a third
+    /// interface bends in modes, because rigid parts with springs know two.
+    pub(crate) fn form_of(&self, link: &RobotLink, modelling: &Modelling) -> Result<(LinkForm, Option<String>), Error> {
+        let form = link.form(modelling).map_err(Error::Usage)?;
+        let branches =
+            if matches!(form, LinkForm::Modal(_)) { Vec::new() } else { branch_joints(&self.rigid, &link.flexible) };
+        let Some(BranchJoint { joint, interface }) = branches.first() else { return Ok((form, None)) };
+        let name = &link.flexible.link;
+        let why = format!(
+            "joint {joint:?} hangs on its interface {interface:?}, and rigid parts with springs know its two ends alone"
+        );
+        let modelling = Modelling { links: LinkModel::Modal, ..*modelling };
+        let modal =
+            link.form(&modelling).map_err(|message| Error::Usage(format!("link {name:?}: {why}; {message}")))?;
+        Ok((modal, Some(format!("link {name:?} bends in modes (model = \"modal\"): {why}"))))
     }
 }
 

@@ -212,8 +212,8 @@ pub fn inspect(robot: &Robot, at: Option<&str>, velocity: Option<&str>) -> Resul
         LinkInfo { name: l.name.clone(), mass_kg, com_m, inertia }
     });
     let flexible = robot.flexible_robot()?;
-    warnings.extend(flexible.doubts.iter().cloned());
-    let forms = robot.flexible.iter().map(|link| link.form(&Modelling::default()).map_err(Error::Usage));
+    warnings.extend(flexible.doubts.iter().chain(&flexible.modal_instead).cloned());
+    let forms = robot.flexible.iter().map(|link| robot.form_of(link, &Modelling::default()).map(|(form, _)| form));
     let forms = forms.collect::<Result<Vec<_>, _>>()?;
     let flexible_links = flexible.spans.iter().zip(&robot.flexible).zip(&forms).map(|((span, link), form)| {
         let K = link.flexible.reduced.split.K_S;

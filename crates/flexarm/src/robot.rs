@@ -118,7 +118,11 @@ impl Robot {
             keep(check_finite("gravity", gravity.get_ref(), gravity.span(), &source).map_err(Error::from), &mut faults);
         }
         let tcp = keep(tcp_of(&file, &source, &urdf, options), &mut faults);
-        let fallback_name = folder.file_name().map_or_else(|| "robot".into(), |n| n.to_string_lossy().into_owned());
+        // `robot.toml`, `.` and links to folders have no name to be read off the path.
+        let real_folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+        let real_folder = real_folder.canonicalize().unwrap_or_else(|_| real_folder.to_owned());
+        let fallback_name =
+            real_folder.file_name().map_or_else(|| "robot".into(), |n| n.to_string_lossy().into_owned());
         let mut robot = Self {
             name: file.name.clone().unwrap_or(fallback_name),
             path: path.to_owned(),

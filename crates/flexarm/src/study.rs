@@ -13,7 +13,7 @@ use crate::options::{Outputs, RunOptions};
 use crate::prepare::checked;
 use crate::record::{RECORDING_FILES, refuse_to_overwrite};
 use crate::robot::Robot;
-use crate::summary::{DifferenceFigures, Summary};
+use crate::summary::{DifferenceFigures, Summary, TcpFigures};
 
 /// One run of a study.
 #[derive(Debug)]
@@ -225,6 +225,8 @@ pub fn study_rows(summary: &Summary) -> Vec<Vec<String>> {
         "run",
         "peak [mm]",
         "at [s]",
+        "static [mm]",
+        "in motion [mm]",
         "RMS [mm]",
         "sag [mm]",
         "end [mm]",
@@ -244,10 +246,15 @@ pub fn study_rows(summary: &Summary) -> Vec<Vec<String>> {
             run.label.clone().unwrap_or_default(),
             mm(tcp.map(|t| t.peak_m)),
             plain(tcp.map(|t| t.t_peak_s), 3),
+            mm(tcp.and_then(|t| t.static_at_peak_m)),
+            mm(tcp.and_then(|t| t.dynamic_peak_m)),
             mm(tcp.map(|t| t.rms_m)),
             mm(tcp.map(|t| t.static_sag_m)),
             mm(tcp.map(|t| t.end_m)),
-            plain(tcp.and_then(|t| t.settling_s), 3),
+            tcp.map(TcpFigures::settling_state).map_or_else(
+                || "-".to_owned(),
+                |settling| settling.time_s().map_or_else(|| settling.short().to_owned(), |s| format!("{s:.3}")),
+            ),
             plain(run.frequencies_hz.first().copied(), 2),
             mm(apart.map(|d| d.peak_m)),
             plain(apart.and_then(|d| d.of_peak_error).map(|x| 100.0 * x), 3),
@@ -258,7 +265,8 @@ pub fn study_rows(summary: &Summary) -> Vec<Vec<String>> {
 }
 
 /// What the columns of [`study_rows`] mean that do not say it themselves.
-pub const STUDY_NOTE: &str = "apart: largest distance of the flexible TCP from that of the first run at the same time, and that over the \
+pub const STUDY_NOTE: &str = "static: part of the peak that the arm has standing still there; in motion: largest part that its motion adds; \
+     settling: at the stop that takes longest; apart: largest distance of the flexible TCP from that of the first run at the same time, and that over the \
      first run's largest TCP error";
 
 #[cfg(feature = "rerun")]
@@ -277,7 +285,11 @@ pub(crate) fn table(summary: &Summary) -> String {
             page += &format!("|{}\n", " --- |".repeat(cells.len()));
         }
     }
-    page + "\n" + STUDY_NOTE + ".\n"
+    page += &format!("\n{STUDY_NOTE}.\n");
+    for run in std::iter::once(summary).chain(&summary.with).filter(|run| !run.headline.is_empty()) {
+        page += &format!("\n* {}: {}", run.label.as_deref().unwrap_or_default(), run.headline);
+    }
+    page + "\n"
 }
 
 /// The recording of all runs, if this build and the outputs have one.

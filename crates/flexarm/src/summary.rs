@@ -2,12 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use flexarm_analysis::{HoldMetrics, TcpMetrics};
+use flexarm_analysis::{ErrorParts, HoldMetrics, TcpMetrics};
 use flexarm_stepping::{ConstraintForm, Counts, SpookPreset, StepperKind};
 use serde::{Deserialize, Serialize};
 
 use crate::caveat::Caveat;
+use crate::headline::{Bending, ShareFigures};
 use crate::options::RunOptions;
+use crate::settling::within;
 
 /// Answer of `flexarm compare` and `flexarm run`. SI units.
 ///
@@ -15,12 +17,16 @@ use crate::options::RunOptions;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Summary {
+    /// How far the tool is off and what bends, in one sentence; empty where that is not known.
+    pub headline: String,
     /// Name of the robot.
     pub robot: String,
     /// Name of the trajectory.
     pub trajectory: String,
     /// rigid, lumped, modal or mixed.
     pub links_model: String,
+    /// What bends; nothing if the robot is rigid.
+    pub bends: Bending,
     /// "complete", or why the run stopped early.
     pub end: String,
     /// Simulated time (s).
@@ -227,12 +233,32 @@ pub struct TcpFigures {
     pub end_m: f64,
     /// Distance at rest at the start (m).
     pub static_sag_m: f64,
+    /// Part of `peak_m` that the arm would have standing still there, under weight and the loads of the instant, along the
+    /// direction of the error (m); null where the arm has no equilibrium on its way.
+    pub static_at_peak_m: Option<f64>,
+    /// The rest of `peak_m`, from inertia and ringing (m); negative where the motion relieves the arm.
+    pub dynamic_at_peak_m: Option<f64>,
+    /// Largest static part (m).
+    pub static_peak_m: Option<f64>,
+    /// Largest dynamic part: error less static part (m).
+    pub dynamic_peak_m: Option<f64>,
+    /// When (s).
+    pub t_dynamic_peak_s: Option<f64>,
+    /// Root mean square of the dynamic part (m).
+    pub dynamic_rms_m: Option<f64>,
+    /// Who makes the largest error: along its direction, in the order of the recordings.
+    pub shares_at_peak: Vec<ShareFigures>,
     /// Largest angle (rad).
     pub peak_rad: f64,
     /// Root mean square of the angle (rad).
     pub rms_rad: f64,
-    /// Time from the end of the last move until the error stays within the band of its final value (s).
+    /// Time from the end of a move until the error stays within the band of its final value (s), at the stop that takes
+    /// longest; null if the tool does not settle at some stop.
     pub settling_s: Option<f64>,
+    /// The same in words: after which time, or at which stops the tool has not settled.
+    pub settling: String,
+    /// Half width of the band (m).
+    pub settling_band_m: Option<f64>,
     /// Largest excursion past the final value after a move (m).
     pub overshoot_m: f64,
     /// Strongest frequency of the error (Hz).
@@ -295,6 +321,29 @@ impl From<&TcpMetrics> for TcpFigures {
             path_accuracy_m: m.path_accuracy_m,
             path_rms_m: m.path_rms_m,
             holds: m.holds.iter().map(HoldFigures::from).collect(),
+            ..Self::default()
+        }
+    }
+}
+
+impl TcpFigures {
+    /// With the words for settling into a band (m).
+    pub(crate) fn with_band(mut self, band_m: f64) -> Self {
+        self.settling = self.settling_state().words(&within(band_m));
+        self.settling_band_m = Some(band_m);
+        self
+    }
+
+    /// With static and dynamic part.
+    pub(crate) fn with_parts(self, parts: &ErrorParts) -> Self {
+        Self {
+            static_at_peak_m: Some(parts.static_at_peak_m),
+            dynamic_at_peak_m: Some(parts.dynamic_at_peak_m),
+            static_peak_m: Some(parts.static_peak_m),
+            dynamic_peak_m: Some(parts.dynamic_peak_m),
+            t_dynamic_peak_s: Some(parts.t_dynamic_peak_s),
+            dynamic_rms_m: Some(parts.dynamic_rms_m),
+            ..self
         }
     }
 }
@@ -313,6 +362,7 @@ impl Summary {
             ("end".into(), self.end.clone()),
             ("duration_s".into(), self.duration_s.to_string()),
             ("stepper".into(), format!("{} h = {} s", self.stepper.name, self.stepper.h_s)),
+            ("headline".into(), self.headline.clone()),
         ];
         if let Some(tcp) = &self.tcp {
             let optional = |x: Option<f64>| x.map_or_else(|| "none".to_owned(), |x| x.to_string());
@@ -321,9 +371,13 @@ impl Summary {
                 ("tcp.rms_m".into(), tcp.rms_m.to_string()),
                 ("tcp.end_m".into(), tcp.end_m.to_string()),
                 ("tcp.static_sag_m".into(), tcp.static_sag_m.to_string()),
+                ("tcp.static_at_peak_m".into(), optional(tcp.static_at_peak_m)),
+                ("tcp.dynamic_at_peak_m".into(), optional(tcp.dynamic_at_peak_m)),
+                ("tcp.dynamic_peak_m".into(), optional(tcp.dynamic_peak_m)),
                 ("tcp.peak_rad".into(), tcp.peak_rad.to_string()),
                 ("tcp.rms_rad".into(), tcp.rms_rad.to_string()),
                 ("tcp.settling_s".into(), optional(tcp.settling_s)),
+                ("tcp.settling".into(), tcp.settling.clone()),
                 ("tcp.overshoot_m".into(), tcp.overshoot_m.to_string()),
                 ("tcp.dominant_hz".into(), optional(tcp.dominant_hz)),
             ]);

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use flexarm::{
-    DifferenceFigures, LinkModel, LoadOptions, Modelling, Motion, Outputs, ReportRun, Robot, RunOptions, Summary, html,
-    markdown, simulate_traced,
+    DifferenceFigures, DriveModel, LinkModel, LoadOptions, Modelling, Motion, Outputs, ReportRun, Robot, RunOptions,
+    Summary, html, markdown, simulate_traced,
 };
 use flexarm_log::Trace;
 
@@ -161,7 +161,7 @@ fn a_run_without_a_twin_leaves_out_what_needs_one() {
 
 #[test]
 fn several_runs_lie_over_each_other() {
-    let modelling = Modelling { links: LinkModel::Rigid, ..Modelling::default() };
+    let modelling = Modelling { links: LinkModel::Rigid, drives: DriveModel::Rigid, ..Modelling::default() };
     let rigid = run("kr210", "pick_and_place.toml", &RunOptions { modelling, ..RunOptions::default() }, None);
     let fine = run("kr210", "pick_and_place.toml", &RunOptions { step_s: 2e-3, ..RunOptions::default() }, None);
     let runs = [("as it is", arm()), ("coarse <step>", &fine), ("rigid", &rigid)];
@@ -220,7 +220,7 @@ fn a_study_says_how_far_its_runs_are_apart() {
 
 #[test]
 fn an_arm_on_its_twin_has_no_scale_and_no_peak() {
-    let modelling = Modelling { links: LinkModel::Rigid, ..Modelling::default() };
+    let modelling = Modelling { links: LinkModel::Rigid, drives: DriveModel::Rigid, ..Modelling::default() };
     let rigid = run("one_beam", "beam_swing.toml", &RunOptions { modelling, ..RunOptions::default() }, None);
     let page = page_of(&rigid);
     assert!(!page.contains("magnified") && !page.contains("data:image/png") && page.contains("nothing gives way"));

@@ -23,6 +23,7 @@ pub(crate) struct Channels {
     /// Only if there are elastic elements.
     pub(crate) elastic_joint_states: Option<u16>,
     /// Only if there are contributors.
+    pub(crate) static_error: Option<u16>,
     pub(crate) contributions: Option<u16>,
     pub(crate) solver: u16,
     pub(crate) energy: u16,
@@ -117,6 +118,8 @@ impl Channels {
             "all elastic elements by name: position = deflection [m, rad], effort = load on the distal part [N, N m], axes of \
              the proximal face",
         )?;
+        let what = "static part of /tcp/error: the TCP error if the arm stood still where it is, world axes [m]";
+        let static_error = add_if(header.has_rigid && header.has_static, "/tcp/static_error", ARRAY, what)?;
         let contributions = add_if(
             !header.contributors.is_empty(),
             "/tcp/contributions",
@@ -145,6 +148,7 @@ impl Channels {
             rigid,
             elastic,
             elastic_joint_states,
+            static_error,
             contributions,
             solver,
             energy,

@@ -46,6 +46,7 @@ use crate::{CreateOptions, EventKind, LogError, Recorder, RunHeader, RunResult, 
 /// | `/tcp/flexible`, `/tcp/rigid` | `geometry_msgs/PoseStamped` | in `world` |
 /// | `/tcp/error`, `/tcp/error_path` | `geometry_msgs/TwistStamped` | an error: translation and rotation vector; world axes, path axes |
 /// | `/tcp/error_plot`, `/tcp/error_path_plot` | `std_msgs/Float64MultiArray` | its translation, which viewers plot unasked |
+/// | `/tcp/static_error` | `std_msgs/Float64MultiArray` | what of the error the arm would have standing still: x, y, z, world axes |
 /// | `/tcp/contributions` | `std_msgs/Float64MultiArray` | what each of [`RunHeader::contributors`] does to the tool: x, y, z of each, world axes |
 /// | `/elastic/joint_states` | `sensor_msgs/JointState` | all elements as joints `<element>/x` to `<element>/rz`, so that curves have names: deflection, load |
 /// | `/elastic/<element>` | `geometry_msgs/WrenchStamped` | load |
@@ -264,6 +265,10 @@ impl Open {
             self.error(stamp, channels.error, channels.error_plot, "x [m],y [m],z [m]", &sample.error_world)?;
             let axes = "tangential [m],normal [m],binormal [m]";
             self.error(stamp, channels.error_path, channels.error_path_plot, axes, &sample.error_path)?;
+        }
+        if let Some(channel) = self.channels.static_error {
+            let write = |cdr: &mut Cdr| messages::labelled_array(cdr, "x [m],y [m],z [m]", &sample.static_m);
+            self.output.send(channel, self.samples, stamp, write)?;
         }
         if let Some(channel) = self.channels.contributions {
             let shares = sample.contributions.as_flattened();

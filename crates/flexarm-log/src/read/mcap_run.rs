@@ -49,6 +49,7 @@ enum Topic {
     PathError,
     Load(usize),
     Deflection(usize),
+    StaticError,
     Contributions,
     Energy,
     Solver,
@@ -89,6 +90,10 @@ impl McapRun {
         if !header.contributors.is_empty() && !topics.is_empty() && !topics.contains(&Topic::Contributions) {
             header.contributors.clear();
             missing.push("the file has no shares of the tool error (/tcp/contributions)".into());
+        }
+        if header.has_static && !topics.is_empty() && !topics.contains(&Topic::StaticError) {
+            header.has_static = false;
+            missing.push("the file has no static part of the tool error (/tcp/static_error)".into());
         }
         if !header.bends.is_empty() && !topics.is_empty() && !assembly.frames.stations_seen {
             header.bends.clear();
@@ -322,6 +327,7 @@ impl Found {
             elements: list("elements"),
             log_rate_hz: text("log_rate_hz").parse().unwrap_or(0.0),
             has_rigid: self.topics.values().any(|topic| topic == "/tcp/rigid"),
+            has_static: self.topics.values().any(|topic| topic == "/tcp/static_error"),
             urdf: String::from_utf8_lossy(self.urdf.as_deref().unwrap_or_default()).into_owned(),
             metadata: groups.map(|(name, pairs)| (name.clone(), pairs.clone().into_iter().collect())).collect(),
             ..RunHeader::default()
@@ -359,6 +365,7 @@ impl Assembly {
             ("/tcp/rigid", Topic::RigidTool),
             ("/tcp/error", Topic::Error),
             ("/tcp/error_path", Topic::PathError),
+            ("/tcp/static_error", Topic::StaticError),
             ("/tcp/contributions", Topic::Contributions),
             ("/energy", Topic::Energy),
             ("/diagnostics/solver", Topic::Solver),
@@ -456,6 +463,7 @@ impl Assembly {
                 sample.elastic[k].load = cdr.f64s()?;
             }
             Topic::Deflection(k) => sample.elastic[k].deflection = cdr.labelled_array()?.1.try_into().ok()?,
+            Topic::StaticError => sample.static_m = cdr.labelled_array()?.1.try_into().ok()?,
             Topic::Contributions => {
                 let (_, values) = cdr.labelled_array()?;
                 sample.contributions = values.chunks_exact(3).map(|part| [part[0], part[1], part[2]]).collect();

@@ -92,6 +92,9 @@ impl RrdRun {
         if !header.contributors.is_empty() {
             missing.push("the file has only sizes of the shares of the tool error, not their directions".into());
         }
+        if header.has_static {
+            missing.push("the file has no static part of the tool error".into());
+        }
         if !header.has_rigid {
             missing.push("the file has at most 200 samples a second".into());
         }
@@ -103,6 +106,7 @@ impl RrdRun {
             urdf: data.text(["urdf", ""]).unwrap_or_default().to_owned(),
             bends: Vec::new(),
             contributors: Vec::new(),
+            has_static: false,
             magnification: 0.0,
             ..header
         };

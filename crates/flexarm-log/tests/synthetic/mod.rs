@@ -62,6 +62,7 @@ pub(crate) fn header() -> RunHeader {
         }],
         description: "# synthetic, swing\n\nThree links, the upper arm bends. *Made-up numbers.*".into(),
         has_rigid: true,
+        has_static: true,
         log_rate_hz: RATE_HZ,
         step_s: STEP_S,
         bends: vec![BendInfo {
@@ -119,6 +120,7 @@ pub(crate) fn sample(step: u64) -> Sample {
         step: 20 * step,
         error_world: error(difference),
         error_path: error(rigid.X_WT.rotation.inverse() * difference),
+        static_m: [2.0e-4 * s, -1.0e-4, -1.1e-3],
         elastic: vec![ElasticSample { deflection, load: deflection.map(|part| 4.0e5 * part) }],
         contributions: vec![difference.into()],
         energy: EnergySample { kinetic: 40.0 * v * v, potential: 120.0 + 30.0 * s, elastic: 1e5 * about_y.powi(2) },

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use flexarm_analysis::{ErrorRecord, MetricSettings, tcp_metrics_on_path};
+use flexarm_analysis::{ErrorRecord, MetricSettings, error_parts, tcp_metrics_on_path};
 use flexarm_log::{EventKind, RunHeader, Trace};
 use serde::Serialize;
 
@@ -225,7 +225,13 @@ fn computed(trace: &Trace) -> Summary {
     let settings = MetricSettings { settling_band_m: settling_band_m(header).unwrap_or(usual.settling_band_m) };
     let along: Vec<[f64; 3]> = rows.iter().map(|row| [0, 1, 2].map(|c| row.error_path[c])).collect();
     let metrics = tcp_metrics_on_path(&record, Some(&along), &settings).ok();
-    let mut tcp = metrics.as_ref().filter(|_| header.has_rigid).map(TcpFigures::from);
+    let band_m = settings.settling_band_m;
+    let tool = |m| TcpFigures::from(m).with_band(band_m);
+    let mut tcp = metrics.as_ref().filter(|_| header.has_rigid).map(tool);
+    let statics: Vec<[f64; 3]> = rows.iter().map(|row| row.static_m).collect();
+    if let (true, Ok(parts)) = (header.has_static, error_parts(&times, &errors, &statics)) {
+        tcp = tcp.map(|tcp| tcp.with_parts(&parts));
+    }
     if let Some(tcp) = tcp.as_mut().filter(|_| moves.is_empty()) {
         // Where the ringing cannot be told from the motion it has no frequency.
         (tcp.dominant_hz, tcp.settling_s) = (None, None);

@@ -174,14 +174,33 @@ fn error(trace: &Trace) -> Plot {
             .enumerate()
             .map(|(k, name)| curve(trace, *name, Kind::Plain, move |row| 1e3 * row.error_world[k])),
     );
+    let mut views = one_view(Table::new(times(trace), curves, MOST_POINTS));
+    let mut note = "Flexible minus rigid tool centre point, world axes.".to_owned();
+    if trace.header.has_static {
+        views[0].name = "error".into();
+        views.push(static_and_dynamic(trace));
+        note += " Static: the error if the arm stood still where it is; in motion: the rest.";
+    }
     Plot {
         y_label: "TCP error",
         y_unit: "mm",
         wide: true,
-        note: "Flexible minus rigid tool centre point, world axes.".into(),
-        views: one_view(Table::new(times(trace), curves, MOST_POINTS)),
+        note,
+        views,
         ..over_time("tcp_error", TOOL, "TCP error over time")
     }
+}
+
+/// Sizes of the error and of its two parts.
+fn static_and_dynamic(trace: &Trace) -> PlotView {
+    let moving = |row: &TraceRow| -> [f64; 3] { std::array::from_fn(|c| row.error_world[c] - row.static_m[c]) };
+    let curves = vec![
+        curve(trace, "size", Kind::Total, |row| 1e3 * row.error_m()),
+        curve(trace, "static", Kind::Plain, |row| 1e3 * norm(&row.static_m)),
+        curve(trace, "in motion", Kind::Plain, |row| 1e3 * norm(&moving(row))),
+    ];
+    let table = Table::new(times(trace), curves, MOST_POINTS);
+    PlotView { name: "static and in motion".into(), tables: vec![table], ..PlotView::default() }
 }
 
 fn rotation(trace: &Trace) -> Plot {
@@ -215,7 +234,7 @@ fn path_over_time(trace: &Trace) -> Plot {
     Plot {
         y_label: "deviation",
         y_unit: "mm",
-        note: "Axes of the rigid tool's path: along it, towards its centre of curvature, out of its plane.".into(),
+        note: "Axes of the rigid tool's path: along it, and two across that turn no more than the path makes them (the normal begins on the inside of the first bend).".into(),
         views: one_view(Table::new(times(trace), path_curves(trace), MOST_POINTS)),
         ..over_time("path_time", TOOL, "Deviation in path axes over time")
     }

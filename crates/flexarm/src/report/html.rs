@@ -132,10 +132,20 @@ fn heading(title: &str, runs: &[ReportRun<'_>], body: &str) -> String {
     let there = PLACES.iter().filter(|(_, id)| body.contains(&format!("id=\"{id}\"")));
     let links: String = there.map(|(name, id)| format!("<a href=\"#{id}\">{name}</a>")).collect();
     format!(
-        "<header>\n<h1>{}</h1>\n<p class=\"facts\">{}</p>\n<nav>{links}</nav>\n</header>\n",
+        "<header>\n<h1>{}</h1>\n{}<p class=\"facts\">{}</p>\n<nav>{links}</nav>\n</header>\n",
         escaped(title),
+        headlines(runs),
         facts.join("")
     )
+}
+
+/// What bends and how far, a line for each run.
+fn headlines(runs: &[ReportRun<'_>]) -> String {
+    let line = |run: &ReportRun<'_>| {
+        let who = if runs.len() > 1 { format!("{}: ", run.label) } else { String::new() };
+        format!("<p class=\"headline\">{}</p>\n", escaped(&(who + &run.summary.headline)))
+    };
+    runs.iter().filter(|run| !run.summary.headline.is_empty()).map(line).collect()
 }
 
 /// Stepper and step, as far as they are known.
@@ -195,7 +205,7 @@ fn fixed(x: f64) -> String {
 
 /// A band in words, such as "within 0.1 mm".
 fn within(header: &RunHeader) -> Option<String> {
-    settling_band_m(header).map(|band| format!("within {} mm", number(1e3 * band, 3)))
+    settling_band_m(header).map(crate::settling::within)
 }
 
 /// Whether the tool never leaves its rigid twin.
@@ -205,7 +215,7 @@ fn lies_on_twin(run: &ReportRun<'_>) -> bool {
 
 fn tiles(run: &ReportRun<'_>) -> String {
     let s = run.summary;
-    let band = within(&run.trace.header).map_or_else(String::new, |band| format!(", {band}"));
+    let band = within(&run.trace.header).unwrap_or_default();
     let mut out = "<section id=\"summary\" class=\"tiles\">\n".to_owned();
     let mut tile = |name: &str, value: String, unit: &str, note: String| {
         let class = if out.contains("<div") { "tile" } else { "tile main" };
@@ -220,12 +230,18 @@ fn tiles(run: &ReportRun<'_>) -> String {
         let when = if lies_on_twin(run) { "nothing gives way".into() } else { format!("at {:.3} s", tcp.t_peak_s) };
         tile("Peak TCP error", mm(tcp.peak_m), "mm", when);
         tile("RMS TCP error", mm(tcp.rms_m), "mm", "over the whole run".into());
+        if let (Some(at_rest), Some(moving), Some(most)) =
+            (tcp.static_at_peak_m, tcp.dynamic_at_peak_m, tcp.dynamic_peak_m)
+        {
+            tile("Static part", mm(at_rest), "mm", "of the peak: standing still there".into());
+            tile("Part in motion", mm(moving), "mm", format!("of the peak; up to {} mm", mm(most)));
+        }
         tile("Static sag", mm(tcp.static_sag_m), "mm", "at rest at the start".into());
         if s.knows_moves() {
-            match tcp.settling_s {
-                Some(settling) => tile("Settling time", fixed(settling), "s", format!("after the last move{band}")),
-                None => tile("Settling time", "–".into(), "", format!("not within the recording{band}")),
-            }
+            let settling = tcp.settling_state();
+            let value = settling.time_s().map_or_else(|| settling.short().to_owned(), fixed);
+            let unit = if settling.time_s().is_some() { "s" } else { "" };
+            tile("Settling time", value, unit, settling.note(&band));
         }
         tile("Error at the end", mm(tcp.end_m), "mm", format!("at {:.3} s", s.duration_s));
         match tcp.dominant_hz {
@@ -260,8 +276,11 @@ fn moving(s: &Summary) -> Option<&TcpFigures> {
 /// Units of figures of which a change in per cent says something; a time or an energy has no natural zero.
 const RELATIVE: [&str; 3] = ["mm", "mrad", "Hz"];
 
-const COMPARED: [Compared; 14] = [
+const COMPARED: [Compared; 17] = [
     ("peak TCP error", "mm", |s| s.tcp.as_ref().map(|t| 1e3 * t.peak_m)),
+    ("static part of the peak", "mm", |s| Some(1e3 * s.tcp.as_ref()?.static_at_peak_m?)),
+    ("part of the peak in motion", "mm", |s| Some(1e3 * s.tcp.as_ref()?.dynamic_at_peak_m?)),
+    ("largest part in motion", "mm", |s| Some(1e3 * s.tcp.as_ref()?.dynamic_peak_m?)),
     ("time of the peak", "s", |s| s.tcp.as_ref().map(|t| t.t_peak_s)),
     ("RMS TCP error", "mm", |s| s.tcp.as_ref().map(|t| 1e3 * t.rms_m)),
     (APART, "mm", |s| s.difference.as_ref().map(|d| 1e3 * d.peak_m)),
@@ -270,12 +289,23 @@ const COMPARED: [Compared; 14] = [
     ("static sag", "mm", |s| s.tcp.as_ref().map(|t| 1e3 * t.static_sag_m)),
     ("error at the end", "mm", |s| s.tcp.as_ref().map(|t| 1e3 * t.end_m)),
     ("overshoot", "mm", |s| moving(s).map(|t| 1e3 * t.overshoot_m)),
-    ("settling time", "s", |s| moving(s).and_then(|t| t.settling_s)),
+    (SETTLING, "s", |s| moving(s).and_then(|t| t.settling_state().time_s())),
     ("peak rotation", "mrad", |s| s.tcp.as_ref().map(|t| 1e3 * t.peak_rad)),
     ("dominant frequency", "Hz", |s| moving(s).and_then(|t| t.dominant_hz)),
     ("first natural frequency", "Hz", |s| s.frequencies_hz.first().copied()),
     ("energy by the drives", "J", |s| (!s.computed).then_some(s.energy.drives_j)),
 ];
+
+/// The figure that is a word where there is no number.
+const SETTLING: &str = "settling time";
+
+/// What stands in the place of a figure that a run does not have.
+fn without_number(s: &Summary, figure: &str) -> String {
+    match moving(s).filter(|_| [SETTLING, STABILISATION].contains(&figure)) {
+        Some(tcp) => tcp.settling_state().short().to_owned(),
+        None => "–".to_owned(),
+    }
+}
 
 /// The name of a figure that is a difference already.
 const APART: &str = "apart from the first run";
@@ -298,14 +328,15 @@ fn comparison(runs: &[ReportRun<'_>]) -> String {
         let base = values[0];
         let relative = RELATIVE.contains(&unit) && name != APART;
         let cell = |(k, v): (usize, &Option<f64>)| match (v, base) {
-            (None, _) => "–".to_owned(),
+            (None, _) => without_number(runs[k].summary, name),
             (Some(v), Some(base)) if k > 0 && relative && base.abs() > 1e3 * NOTHING_M => {
                 let change = format!("{:+.1}", 100.0 * (v / base - 1.0));
                 format!("{} ({} %)", number(*v, 5), if change == "-0.0" { "+0.0" } else { &change })
             }
             (Some(v), _) => number(*v, 5),
         };
-        if values.iter().any(Option::is_some) {
+        let words = name == SETTLING && runs.iter().any(|run| moving(run.summary).is_some());
+        if words || values.iter().any(Option::is_some) {
             out += &row(name, unit, values.iter().enumerate().map(cell).collect());
         }
     }
@@ -383,6 +414,9 @@ fn arm_pictures(runs: &[ReportRun<'_>]) -> String {
 /// A row of the ISO table: name, meaning, unit, value.
 type Iso = (&'static str, &'static str, &'static str, fn(&Summary) -> Option<f64>);
 
+/// The name of the settling time in the standard.
+const STABILISATION: &str = "Position stabilisation time";
+
 const ISO: [Iso; 7] = [
     (
         "Path accuracy (AT)",
@@ -403,10 +437,10 @@ const ISO: [Iso; 7] = [
         |s| moving(s).map(|t| 1e3 * t.overshoot_m),
     ),
     (
-        "Position stabilisation time",
-        "from the end of the last commanded move until the tool stays BAND of its place of rest",
+        STABILISATION,
+        "from the end of a commanded move until the tool stays BAND of its place of rest, at the stop that takes longest",
         "s",
-        |s| moving(s).and_then(|t| t.settling_s),
+        |s| moving(s).and_then(|t| t.settling_state().time_s()),
     ),
     ("Pose accuracy (AP)", "largest distance from the rigid tool at rest, over all stops", "mm", |s| {
         let rests = moving(s)?.holds.iter().map(|hold| 1e3 * hold.final_m);
@@ -443,7 +477,7 @@ fn iso_table(runs: &[ReportRun<'_>]) -> String {
         let meaning = meaning.replace("BAND", &band);
         let _ = write!(out, "<tr><th>{name}</th><td class=\"text\">{meaning}</td>");
         for run in runs {
-            let value = value(run.summary).map_or_else(|| "–".into(), |v| number(v, 5));
+            let value = value(run.summary).map_or_else(|| without_number(run.summary, name), |v| number(v, 5));
             let _ = write!(out, "<td class=\"number\">{value}</td>");
         }
         let _ = write!(out, "<td>{unit}</td></tr>");
@@ -484,7 +518,7 @@ fn stops_table(s: &Summary, of: &str) -> String {
                 number(hold.start_s, 5),
                 number(hold.end_s, 5),
                 number(1e3 * hold.final_m, 4),
-                optional(hold.settling_s),
+                hold.settling_s.map_or_else(|| "not settled".into(), |x| number(x, 4)),
                 number(1e3 * hold.overshoot_m, 4),
                 optional(hold.ringing_hz),
             ]

@@ -17,6 +17,7 @@ use crate::error::Error;
 use crate::options::Outputs;
 use crate::record::FIGURES_FOLDER;
 use crate::result_files::write_all;
+use crate::settling::within;
 use crate::summary::Summary;
 
 pub use again::{ReportFiles, ReportOptions, report};
@@ -63,6 +64,9 @@ pub(crate) fn timeless_rows(summary: &Summary) -> Vec<(String, String)> {
 /// The summary as a page of Markdown.
 pub fn markdown(summary: &Summary) -> String {
     let mut page = format!("# {} on {}\n\n", summary.robot, summary.trajectory);
+    if !summary.headline.is_empty() {
+        let _ = writeln!(page, "{}\n", summary.headline);
+    }
     page += "| figure | value |\n| --- | --- |\n";
     for (name, value) in rows(summary) {
         let _ = writeln!(page, "| {name} | {value} |");
@@ -159,10 +163,17 @@ fn tool_figures(summary: &Summary) -> Vec<Figure> {
     let Some(tcp) = &summary.tcp else { return rows };
     let peak = Figure::new("peak TCP error", mm(tcp.peak_m), "mm", format!("at {:.3} s", tcp.t_peak_s));
     rows.push(Figure { weight: Weight::Headline, ..peak });
+    if let (Some(at_rest), Some(moving), Some(most), Some(t)) =
+        (tcp.static_at_peak_m, tcp.dynamic_at_peak_m, tcp.dynamic_peak_m, tcp.t_dynamic_peak_s)
+    {
+        rows.push(Figure::new("static part of the peak", mm(at_rest), "mm", "what it would be standing still there"));
+        let note = format!("up to {} mm at {t:.3} s", mm(most));
+        rows.push(Figure::new("part of the peak in motion", mm(moving), "mm", note));
+    }
     rows.push(Figure::new("RMS TCP error", mm(tcp.rms_m), "mm", ""));
     let [along, normal, binormal] = tcp.path_peak_m;
     rows.push(Figure::new("peak along the path", mm(along), "mm", ""));
-    let across = format!("out of its plane {} mm", mm(binormal));
+    let across = format!("binormal {} mm", mm(binormal));
     rows.push(Figure::new("peak normal to the path", mm(normal), "mm", across));
     rows.push(Figure::new("path accuracy", mm(tcp.path_accuracy_m), "mm", "largest distance from the path in motion"));
     rows.push(Figure::new("static sag at the start", mm(tcp.static_sag_m), "mm", ""));
@@ -170,9 +181,11 @@ fn tool_figures(summary: &Summary) -> Vec<Figure> {
     let rms = format!("RMS {} mrad", mm(tcp.rms_rad));
     rows.push(Figure::new("peak rotation", mm(tcp.peak_rad), "mrad", rms));
     rows.push(Figure::new("overshoot after a move", mm(tcp.overshoot_m), "mm", ""));
-    rows.push(match tcp.settling_s {
-        Some(s) => Figure::new("settling time", format!("{s:.3}"), "s", "after the last move"),
-        None => Figure::new("settling time", "", "", "not within the recording"),
+    let settling = tcp.settling_state();
+    let note = settling.note(&tcp.settling_band_m.map_or_else(String::new, within));
+    rows.push(match settling.time_s() {
+        Some(s) => Figure::new("settling time", format!("{s:.3}"), "s", note),
+        None => Figure::new("settling time", "", "", note),
     });
     if let Some(hz) = tcp.dominant_hz {
         rows.push(Figure::new("dominant frequency", format!("{hz:.2}"), "Hz", ""));

@@ -1,0 +1,114 @@
+//! Static equilibria along a motion: each is sought from the one before, with the stiffness that was factored there.
+
+use std::sync::Arc;
+
+use flexarm_kinematics::{Data, State, forward_kinematics, gravity_forces};
+use nalgebra::{Cholesky, DVector, Dyn};
+
+use crate::arm::FlexibleArm;
+use crate::error::StepError;
+use crate::reduced::add_geometric_forces;
+use crate::statics::{static_equilibrium, tangent_stiffness, with_curves};
+
+/// A correction below this part of the deflection ends the search: the next one would be ten times smaller at least.
+const SMALL: f64 = 1e-7;
+/// Deflections below this are none (m, rad).
+const NOTHING: f64 = 1e-15;
+/// Corrections with one factor; a factor of the right place needs three or four.
+const MOST_CORRECTIONS: usize = 8;
+
+/// The elastic coordinates of an arm that stands still wherever its motion is, for times in ascending order.
+///
+/// The same equilibria as [`static_equilibrium`], at the price of a few evaluations of weight each: the tangent stiffness
+/// changes little along a motion, so that one factor serves many instants.
+pub struct StaticPath {
+    arm: FlexibleArm,
+    data: Data,
+    state: State,
+    qddot: DVector<f64>,
+    e: DVector<f64>,
+    unbalanced: DVector<f64>,
+    factor: Option<Cholesky<f64, Dyn>>,
+}
+
+impl StaticPath {
+    /// For an arm with its loads and its changes of inertia.
+    pub fn new(arm: FlexibleArm) -> Self {
+        let (nv, n) = (arm.model.nv(), arm.n_elastic_coordinates());
+        let (data, state) = (Data::new(&arm.model), State::zeros(&arm.model));
+        let e = if arm.modes.equilibrium.len() == n { arm.modes.equilibrium.clone() } else { DVector::zeros(n) };
+        Self { data, state, qddot: DVector::zeros(nv), unbalanced: DVector::zeros(n), e, factor: None, arm }
+    }
+
+    /// All coordinates at time `t` (s), not before the last one asked for: drives where the motion is, springs in balance
+    /// with weight and loads. What the arm carries is what it carries from `t` on.
+    ///
+    /// # Errors
+    /// As [`static_equilibrium`].
+    pub fn at(&mut self, t: f64) -> Result<&DVector<f64>, StepError> {
+        while self.arm.inertia_changes.first().is_some_and(|change| change.t <= t) {
+            let change = self.arm.inertia_changes.remove(0);
+            self.arm.model = Arc::new(self.arm.model.with_inertia(change.body, change.inertia));
+        }
+        if self.e.is_empty() || self.correct(t) {
+            self.place(t);
+            return Ok(&self.state.q);
+        }
+        self.e = static_equilibrium(&self.arm, t)?;
+        let K = with_curves(&self.arm, &self.arm.stiffness(), &self.e);
+        self.factor = tangent_stiffness(&self.arm, &mut self.data, t, &self.e, &K).cholesky();
+        self.place(t);
+        Ok(&self.state.q)
+    }
+
+    /// The arm that stands still, with what it carries now.
+    pub fn arm(&self) -> &FlexibleArm {
+        &self.arm
+    }
+
+    fn place(&mut self, t: f64) {
+        self.arm.prescribed_state(t, &mut self.state, &mut self.qddot);
+        self.state.q.rows_mut(self.arm.model.n_actuated(), self.e.len()).copy_from(&self.e);
+    }
+
+    /// Newton with the factor at hand; false if it does not lead to the equilibrium.
+    fn correct(&mut self, t: f64) -> bool {
+        let Some(factor) = self.factor.take() else { return false };
+        let (mut found, mut last) = (false, f64::INFINITY);
+        for _ in 0..MOST_CORRECTIONS {
+            self.balance(t);
+            factor.solve_mut(&mut self.unbalanced);
+            let size = self.unbalanced.amax();
+            // A factor of another place makes small steps too; it must make them quickly smaller.
+            if !size.is_finite() || size > 0.1 * last {
+                break;
+            }
+            self.e -= &self.unbalanced;
+            last = size;
+            if size <= (SMALL * self.e.amax()).max(NOTHING) {
+                found = true;
+                break;
+            }
+        }
+        if found {
+            self.factor = Some(factor);
+        }
+        found
+    }
+
+    /// Forces of springs, weight and loads at the elastic coordinates.
+    fn balance(&mut self, t: f64) {
+        self.place(t);
+        let Self { arm, data, state, e, unbalanced, .. } = self;
+        if !arm.loads.is_empty() {
+            forward_kinematics(&arm.model, data, &state.q);
+            arm.apply_loads(data, t);
+        }
+        unbalanced.copy_from(&gravity_forces(&arm.model, data, &state.q).rows(arm.model.n_actuated(), e.len()));
+        add_geometric_forces(arm, data, e.as_slice(), unbalanced.as_mut_slice());
+        for element in &arm.elements {
+            let range = arm.offset(element)..arm.offset(element) + element.size;
+            element.add_spring_force(&e.as_slice()[range.clone()], &mut unbalanced.as_mut_slice()[range]);
+        }
+    }
+}

@@ -1,0 +1,128 @@
+//! When the tool has settled, in words: the stop that takes longest counts, and one that does not settle is the news.
+
+use crate::summary::TcpFigures;
+
+/// What became of the ringing at the stops of a run.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Settling {
+    /// There is no stop after a move.
+    NoStop,
+    /// It dies away at every stop.
+    Settled {
+        /// After the longest of these times (s).
+        after_s: f64,
+        /// At that stop, counted from 1; not known for runs of which the stops are not.
+        stop: Option<usize>,
+        /// Number of stops.
+        of: usize,
+    },
+    /// At some stops the tool still is outside the band at the end.
+    NotSettled {
+        /// These stops, counted from 1, and how long each lasts (s).
+        stops: Vec<(usize, f64)>,
+        /// Number of stops.
+        of: usize,
+    },
+}
+
+impl TcpFigures {
+    /// What became of the ringing at the stops.
+    pub fn settling_state(&self) -> Settling {
+        let of = self.holds.len();
+        let Some(worst) = self.holds.iter().map(|hold| hold.settling_s.unwrap_or(0.0)).reduce(f64::max) else {
+            return self.settling_s.map_or(Settling::NoStop, |after_s| Settling::Settled { after_s, stop: None, of });
+        };
+        let unsettled = self.holds.iter().enumerate().filter(|(_, hold)| hold.settling_s.is_none());
+        let stops: Vec<(usize, f64)> = unsettled.map(|(k, hold)| (k + 1, hold.end_s - hold.start_s)).collect();
+        if !stops.is_empty() {
+            return Settling::NotSettled { stops, of };
+        }
+        let stop = self.holds.iter().position(|hold| hold.settling_s == Some(worst)).map(|k| k + 1);
+        Settling::Settled { after_s: worst, stop, of }
+    }
+}
+
+impl Settling {
+    /// The time, if there is one (s).
+    pub fn time_s(&self) -> Option<f64> {
+        if let Self::Settled { after_s, .. } = self { Some(*after_s) } else { None }
+    }
+
+    /// Two words for a cell of a table without a number.
+    pub fn short(&self) -> &'static str {
+        match self {
+            Self::NoStop => "no stop",
+            Self::Settled { .. } => "settled",
+            Self::NotSettled { .. } => "not settled",
+        }
+    }
+
+    /// What is to be said beside the time, or in its place; `band` such as "within 0.1 mm" or empty.
+    pub fn note(&self, band: &str) -> String {
+        let band = if band.is_empty() { String::new() } else { format!(", {band}") };
+        match self {
+            Self::NoStop => "there is no stop after a move".into(),
+            Self::Settled { stop: None, .. } => format!("after the last move{band}"),
+            Self::Settled { of: 1, .. } => format!("after the move{band}"),
+            Self::Settled { stop: Some(stop), of, .. } => format!("at stop {stop}, the longest of {of}{band}"),
+            Self::NotSettled { stops, of } => {
+                let each: Vec<String> =
+                    stops.iter().map(|(stop, lasts)| format!("stop {stop}, which lasts {lasts:.3} s")).collect();
+                let of = if *of == stops.len() { String::new() } else { format!(" ({} of {of} stops)", stops.len()) };
+                format!("not settled at {}{of}{band}", each.join(", "))
+            }
+        }
+    }
+
+    /// The whole answer in words.
+    pub(crate) fn words(&self, band: &str) -> String {
+        match self.time_s() {
+            Some(s) => format!("settled after {s:.3} s, {}", self.note(band)),
+            None => self.note(band),
+        }
+    }
+}
+
+/// A band in words, such as "within 0.1 mm".
+pub(crate) fn within(band_m: f64) -> String {
+    let mm: f64 = format!("{:.2e}", 1e3 * band_m).parse().unwrap_or(1e3 * band_m);
+    format!("within {mm} mm")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::summary::HoldFigures;
+
+    fn with_stops(settling: &[Option<f64>]) -> TcpFigures {
+        let hold = |(k, settling_s): (usize, &Option<f64>)| HoldFigures {
+            start_s: k as f64,
+            end_s: k as f64 + 0.5,
+            settling_s: *settling_s,
+            ..HoldFigures::default()
+        };
+        TcpFigures { holds: settling.iter().enumerate().map(hold).collect(), ..TcpFigures::default() }
+    }
+
+    #[test]
+    fn the_stop_that_takes_longest_counts() {
+        let settling = with_stops(&[Some(0.1), Some(0.3), Some(0.0)]).settling_state();
+        assert_eq!(settling, Settling::Settled { after_s: 0.3, stop: Some(2), of: 3 });
+        assert_eq!(settling.note("within 0.1 mm"), "at stop 2, the longest of 3, within 0.1 mm");
+    }
+
+    #[test]
+    fn a_stop_that_never_settles_is_not_hidden_by_one_that_does() {
+        let settling = with_stops(&[None, None, Some(0.0)]).settling_state();
+        assert_eq!((settling.time_s(), settling.short()), (None, "not settled"));
+        let words =
+            "not settled at stop 1, which lasts 0.500 s, stop 2, which lasts 0.500 s (2 of 3 stops), within 0.1 mm";
+        assert_eq!(settling.note("within 0.1 mm"), words);
+    }
+
+    #[test]
+    fn without_a_stop_nothing_is_said_to_settle() {
+        assert_eq!(with_stops(&[]).settling_state(), Settling::NoStop);
+        assert_eq!(with_stops(&[Some(0.0)]).settling_state().note(""), "after the move");
+    }
+}

@@ -1,0 +1,138 @@
+//! The static part of the TCP error: how far the tool would be off if the arm stood still wherever its motion is.
+//!
+//! Drives at their commanded places, springs in balance with weight and with the loads of the instant, no inertia force. The
+//! curve is smooth between the instants at which something jumps: it is computed on a grid and interpolated by cubics.
+
+use flexarm_kinematics::{Data, Frame, State, forward_kinematics};
+use flexarm_stepping::{FlexibleArm, StaticPath};
+use nalgebra::{DVector, Vector3};
+
+/// Time between two equilibria along a motion (s): a cubic through four of them is good to a thousandth of a millimetre.
+const GRID_S: f64 = 0.02;
+/// Equilibria per shortest period of a load.
+const PER_PERIOD: f64 = 16.0;
+/// Intervals of the grid that are computed at once.
+const MOST_INTERVALS: usize = 64;
+
+/// Follows the static part for times in ascending order.
+pub(crate) struct StaticPart {
+    path: StaticPath,
+    tcp: Frame,
+    /// Times between which the curve is smooth, ascending.
+    breaks: Vec<f64>,
+    /// Moves: between them, and without loads, the curve stands still.
+    moves: Vec<(f64, f64)>,
+    /// Of the logged samples (s): a finer grid tells nothing.
+    sample_s: f64,
+    grid_s: f64,
+    block: Block,
+    data: Data,
+    state: State,
+    qddot: DVector<f64>,
+    failed: bool,
+}
+
+/// A stretch of the grid.
+#[derive(Default)]
+struct Block {
+    start: f64,
+    end: f64,
+    /// At evenly spaced times from start to end; a single one stands for all times.
+    values: Vec<Vector3<f64>>,
+}
+
+impl StaticPart {
+    pub(crate) fn new(arm: &FlexibleArm, tcp: &Frame, moves: Vec<(f64, f64)>, duration: f64, sample_s: f64) -> Self {
+        let jumps = arm.loads.iter().flat_map(|load| load.jumps.iter().copied());
+        let changes = arm.inertia_changes.iter().map(|change| change.t);
+        let ends = moves.iter().flat_map(|&(start, end)| [start, end]);
+        let mut breaks: Vec<f64> = jumps.chain(changes).chain(ends).chain([duration]).filter(|t| *t > 0.0).collect();
+        breaks.sort_by(f64::total_cmp);
+        breaks.dedup();
+        let period = arm.loads.iter().map(|load| load.period).fold(f64::INFINITY, f64::min);
+        Self {
+            path: StaticPath::new(arm.clone()),
+            tcp: tcp.clone(),
+            breaks,
+            moves,
+            sample_s,
+            grid_s: GRID_S.min(period / PER_PERIOD).max(sample_s),
+            block: Block::default(),
+            data: Data::new(&arm.model),
+            state: State::zeros(&arm.model),
+            qddot: DVector::zeros(arm.model.nv()),
+            failed: false,
+        }
+    }
+
+    /// Displacement of the tool at `t` (m, world axes), not before the last time asked for; `None` where the arm has no
+    /// equilibrium.
+    pub(crate) fn at(&mut self, t: f64) -> Option<[f64; 3]> {
+        while !self.failed && (self.block.values.is_empty() || t >= self.block.end) {
+            let start = self.block.end;
+            let next = self.breaks.partition_point(|at| *at <= start);
+            let end = self.breaks.get(next).copied().unwrap_or(f64::INFINITY);
+            match self.next_block(start, end) {
+                Some(block) => self.block = block,
+                None => self.failed = true,
+            }
+        }
+        (!self.failed).then(|| self.block.at(t).into())
+    }
+
+    /// The grid from `start` on, at most to `end`.
+    fn next_block(&mut self, start: f64, end: f64) -> Option<Block> {
+        let moving = self.moves.iter().any(|&(from, to)| from < end && start < to);
+        if end.is_infinite() || !(moving || self.is_loaded()) {
+            return Some(Block { start, end, values: vec![self.displacement(start)?] });
+        }
+        let intervals = ((end - start) / self.grid_s).ceil().max(1.0);
+        let (intervals, end) = match intervals > MOST_INTERVALS as f64 {
+            true => (MOST_INTERVALS, start + MOST_INTERVALS as f64 * self.grid_s),
+            // A cubic needs three; between samples there is nothing to be told.
+            false => ((intervals as usize).max(if end - start > 3.0 * self.sample_s { 3 } else { 1 }), end),
+        };
+        let node = |k: usize| match k == intervals {
+            // What happens at the end belongs to what follows.
+            true => end - 1e-12 * end.max(1.0),
+            false => start + (end - start) * k as f64 / intervals as f64,
+        };
+        let values = (0..=intervals).map(|k| self.displacement(node(k))).collect::<Option<_>>()?;
+        Some(Block { start, end, values })
+    }
+
+    fn is_loaded(&self) -> bool {
+        !self.path.arm().loads.is_empty()
+    }
+
+    /// Tool of the arm at rest minus that of the rigid twin.
+    fn displacement(&mut self, t: f64) -> Option<Vector3<f64>> {
+        let q = self.path.at(t).ok()?.clone();
+        let model = &self.path.arm().model;
+        forward_kinematics(model, &mut self.data, &q);
+        let yielding = self.data.X_WF(&self.tcp).translation.vector;
+        self.path.arm().prescribed_state(t, &mut self.state, &mut self.qddot);
+        forward_kinematics(model, &mut self.data, &self.state.q);
+        Some(yielding - self.data.X_WF(&self.tcp).translation.vector)
+    }
+}
+
+impl Block {
+    /// The polynomial through the four values around `t`, or as many as there are.
+    fn at(&self, t: f64) -> Vector3<f64> {
+        let intervals = self.values.len() - 1;
+        if intervals == 0 {
+            return self.values[0];
+        }
+        let x = (t - self.start) / (self.end - self.start) * intervals as f64;
+        let nodes = self.values.len().min(4);
+        let first = (x.floor().max(1.0) as usize - 1).min(self.values.len() - nodes);
+        let mut sum = Vector3::zeros();
+        for i in first..first + nodes {
+            let others = (first..first + nodes).filter(|j| *j != i);
+            let weight: f64 = others.map(|j| (x - j as f64) / (i as f64 - j as f64)).product();
+            sum += self.values[i] * weight;
+        }
+        sum
+    }
+}
