@@ -20,10 +20,10 @@ pub(crate) struct Cli {
     #[command(subcommand)]
     pub(crate) command: Command,
     /// Print one JSON object on standard output and nothing else
-    #[arg(long, global = true)]
+    #[arg(long, global = true, help_heading = "Terminal")]
     pub(crate) json: bool,
     /// No progress bar and no messages but errors
-    #[arg(long, short, global = true)]
+    #[arg(long, short, global = true, help_heading = "Terminal")]
     pub(crate) quiet: bool,
 }
 
@@ -59,6 +59,12 @@ pub(crate) enum Command {
     Verify(VerifyArgs),
     /// Open a recording in the Rerun viewer
     View(ViewArgs),
+    /// Print the page of a file format: keys, units, defaults, examples
+    Format {
+        /// Which file
+        #[arg(value_enum)]
+        page: PageName,
+    },
     /// Print a shell completion script
     Completions {
         /// Shell to complete for
@@ -69,23 +75,31 @@ pub(crate) enum Command {
 }
 
 #[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Robot")]
 pub(crate) struct RobotArgs {
     /// Frame to use as TCP instead of the robot file's
     #[arg(long, value_name = "FRAME")]
     pub(crate) tcp: Option<String>,
     /// Where package://NAME/ leads (may be repeated)
-    #[arg(long = "package", value_name = "NAME=FOLDER")]
+    #[arg(long = "package", hide_short_help = true, value_name = "NAME=FOLDER")]
     pub(crate) packages: Vec<String>,
     /// Estimate missing inertias from the meshes with this density (kg/m^3)
-    #[arg(long, value_name = "KG_PER_M3", conflicts_with = "inertia_from_total_mass", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        hide_short_help = true,
+        value_name = "KG_PER_M3",
+        conflicts_with = "inertia_from_total_mass",
+        allow_hyphen_values = true
+    )]
     pub(crate) inertia_from_density: Option<f64>,
     /// Estimate missing inertias from the meshes, all together of this mass (kg)
-    #[arg(long, value_name = "KG", allow_hyphen_values = true)]
+    #[arg(long, hide_short_help = true, value_name = "KG", allow_hyphen_values = true)]
     pub(crate) inertia_from_total_mass: Option<f64>,
 }
 
 /// How links and drives are modelled.
 #[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Models")]
 pub(crate) struct ModellingArgs {
     /// Model of the links [default: as the robot file says]
     #[arg(long, value_enum)]
@@ -94,11 +108,11 @@ pub(crate) struct ModellingArgs {
     #[arg(long, value_enum)]
     pub(crate) drives: Option<DrivesName>,
     /// Rigid parts of every lumped link, instead of the robot file's
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(2..))]
-    pub(crate) segments: Option<u16>,
+    #[arg(long, value_name = "N", hide_short_help = true, value_parser = clap::value_parser!(u32).range(2..))]
+    pub(crate) segments: Option<u32>,
     /// Fixed-interface modes of every modal link, instead of the robot file's
-    #[arg(long, value_name = "N")]
-    pub(crate) modes: Option<u16>,
+    #[arg(long, value_name = "N", hide_short_help = true)]
+    pub(crate) modes: Option<u32>,
 }
 
 impl ModellingArgs {
@@ -116,85 +130,114 @@ impl ModellingArgs {
                 Some(DrivesName::Elastic) => DriveModel::Elastic,
                 Some(DrivesName::Servo) => DriveModel::Servo,
             },
-            segments: self.segments.map(usize::from),
-            modes: self.modes.map(usize::from),
+            segments: self.segments.map(|n| n as usize),
+            modes: self.modes.map(|n| n as usize),
         }
     }
 }
 
 #[derive(Clone, Debug, Args)]
+#[command(after_help = "All options, by groups: --help")]
 pub(crate) struct RunArgs {
     /// robot.toml, a folder with one, a .urdf or .xacro file, or the name of a shipped robot [default: kr210]
     pub(crate) robot: Option<PathBuf>,
     /// .csv or .toml trajectory, or the name of a shipped one [default: the robot's own]
     pub(crate) trajectory: Option<PathBuf>,
-    #[command(flatten)]
-    pub(crate) load: RobotArgs,
     /// Time stepper
-    #[arg(long, value_name = "NAME", default_value = "generalized-alpha", value_parser = parse_stepper)]
+    #[arg(long, help_heading = "Stepper", value_name = "NAME", value_enum, default_value_t = StepperName::GeneralizedAlpha)]
     pub(crate) stepper: StepperName,
     /// Step of the stepper (s)
-    #[arg(long, value_name = "SECONDS", default_value_t = 1e-3, allow_hyphen_values = true)]
+    #[arg(long, help_heading = "Stepper", value_name = "SECONDS", default_value_t = 1e-3, allow_hyphen_values = true)]
     pub(crate) step: f64,
     #[command(flatten)]
     pub(crate) modelling: ModellingArgs,
+    #[command(flatten)]
+    pub(crate) load: RobotArgs,
     /// Round corners of the trajectory, where a velocity jumps, by blends that last this long (s)
-    #[arg(long, value_name = "SECONDS", allow_hyphen_values = true)]
+    #[arg(long, help_heading = "Models", hide_short_help = true, value_name = "SECONDS", allow_hyphen_values = true)]
     pub(crate) round_corners: Option<f64>,
-    /// File with loads and changes of payload during the run (.toml)
-    #[arg(long, value_name = "FILE")]
+    /// File with loads and changes of payload during the run (.toml; flexarm format loads)
+    #[arg(long, help_heading = "Models", value_name = "FILE")]
     pub(crate) loads: Option<PathBuf>,
     /// Logged samples per second
-    #[arg(long, value_name = "HZ", default_value_t = 500.0, allow_hyphen_values = true)]
+    #[arg(
+        long,
+        help_heading = "Results",
+        hide_short_help = true,
+        value_name = "HZ",
+        default_value_t = 500.0,
+        allow_hyphen_values = true
+    )]
     pub(crate) log_rate: f64,
     /// How the run starts
-    #[arg(long, value_enum, default_value_t = StartName::Equilibrium)]
+    #[arg(long, help_heading = "Models", hide_short_help = true, value_enum, default_value_t = StartName::Equilibrium)]
     pub(crate) from_rest: StartName,
     /// Spectral radius of generalized-alpha: 1 damps nothing, 0 damps the highest modes at once
-    #[arg(long, value_name = "RHO", default_value_t = 0.9, allow_hyphen_values = true)]
+    #[arg(
+        long,
+        help_heading = "Stepper",
+        hide_short_help = true,
+        value_name = "RHO",
+        default_value_t = 0.9,
+        allow_hyphen_values = true
+    )]
     pub(crate) rho_inf: f64,
     /// Plain generalized-alpha, without the correction of its leading frequency error
-    #[arg(long)]
+    #[arg(long, help_heading = "Stepper", hide_short_help = true)]
     pub(crate) no_dispersion_correction: bool,
     /// Constraint form of spook
-    #[arg(long, value_enum, default_value_t = FormName::Local)]
+    #[arg(long, help_heading = "Stepper", hide_short_help = true, value_enum, default_value_t = FormName::Local)]
     pub(crate) spook_form: FormName,
     /// Preset of spook: exact formulas, or those of the method's source
-    #[arg(long, value_enum, default_value_t = PresetName::Exact)]
+    #[arg(long, help_heading = "Stepper", hide_short_help = true, value_enum, default_value_t = PresetName::Exact)]
     pub(crate) spook_preset: PresetName,
     /// Relative tolerance of reference, which chooses its steps by error control; --step is then the distance of the points
-    #[arg(long, value_name = "RTOL", default_value_t = 1e-9, allow_hyphen_values = true)]
+    #[arg(
+        long,
+        help_heading = "Stepper",
+        hide_short_help = true,
+        value_name = "RTOL",
+        default_value_t = 1e-9,
+        allow_hyphen_values = true
+    )]
     pub(crate) rtol: f64,
     /// Method of reference
-    #[arg(long, value_enum, default_value_t = MethodName::Bdf)]
+    #[arg(long, help_heading = "Stepper", hide_short_help = true, value_enum, default_value_t = MethodName::Bdf)]
     pub(crate) reference_method: MethodName,
     /// Band around the final TCP error for the settling time (m)
-    #[arg(long, value_name = "METRES", default_value_t = 1e-4, allow_hyphen_values = true)]
+    #[arg(
+        long,
+        help_heading = "Results",
+        hide_short_help = true,
+        value_name = "METRES",
+        default_value_t = 1e-4,
+        allow_hyphen_values = true
+    )]
     pub(crate) settling_band: f64,
     /// One more run beside this one, with some options changed: links=modal, or stepper=spook,step=5e-4,name=spook, or
     /// robot=..., trajectory=... (may be repeated; compare only)
-    #[arg(long, value_name = "KEY=VALUE,...")]
+    #[arg(long, help_heading = "Results", value_name = "KEY=VALUE,...")]
     pub(crate) with: Vec<String>,
     /// Factor by which recordings and pictures show deflections [default: so that they are seen]
-    #[arg(long, value_name = "FACTOR", allow_hyphen_values = true)]
+    #[arg(long, help_heading = "Results", hide_short_help = true, value_name = "FACTOR", allow_hyphen_values = true)]
     pub(crate) magnify: Option<f64>,
     /// Output folder [default: a new one in out/]
-    #[arg(short, long, value_name = "FOLDER")]
+    #[arg(short, long, help_heading = "Files", value_name = "FOLDER")]
     pub(crate) output: Option<PathBuf>,
     /// Overwrite what is in the output folder
-    #[arg(long)]
+    #[arg(long, help_heading = "Files")]
     pub(crate) force: bool,
     /// Write a folder "figures" for papers too: plots as SVG with their data as CSV, pictures of the arm as PNG
-    #[arg(long)]
+    #[arg(long, help_heading = "Files", hide_short_help = true)]
     pub(crate) figures: bool,
     /// Write the table as Parquet too (run.parquet); not readable before the run ends
-    #[arg(long, conflicts_with = "no_files")]
+    #[arg(long, help_heading = "Files", hide_short_help = true, conflicts_with = "no_files")]
     pub(crate) parquet: bool,
     /// Write nothing, only print the figures
-    #[arg(long, conflicts_with_all = ["output", "force", "figures"])]
+    #[arg(long, help_heading = "Files", conflicts_with_all = ["output", "force", "figures"])]
     pub(crate) no_files: bool,
     /// Run although the trajectory passes joint limits
-    #[arg(long)]
+    #[arg(long, help_heading = "Models", hide_short_help = true)]
     pub(crate) ignore_limits: bool,
 }
 
@@ -222,22 +265,43 @@ pub(crate) struct CheckArgs {
     pub(crate) load: RobotArgs,
 }
 
-/// Steppers of this version.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum StepperName {
+    /// Implicit, second order, damps what is too fast for the step; for all models
+    #[value(alias = "generalised-alpha")]
     GeneralizedAlpha,
+    /// Bodies with compliant constraints, first order; lumped links without motors
     Spook,
+    /// Explicit, fourth order; small steps only
     Rk4,
+    /// Error control instead of a fixed step, for converged results
     Reference,
 }
 
-fn parse_stepper(text: &str) -> Result<StepperName, String> {
-    match text {
-        "generalized-alpha" | "generalised-alpha" => Ok(StepperName::GeneralizedAlpha),
-        "spook" => Ok(StepperName::Spook),
-        "rk4" => Ok(StepperName::Rk4),
-        "reference" => Ok(StepperName::Reference),
-        _ => Err("this version has generalized-alpha, spook, rk4 and reference".into()),
+/// Pages of file formats.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum PageName {
+    /// robot.toml: tool, payload, links that bend, drives
+    Robot,
+    /// Motions: waypoints (.toml) and samples (.csv)
+    Motion,
+    /// What acts on the arm during a run (.toml)
+    Loads,
+    /// Recordings: MCAP, Rerun, CSV, Parquet
+    Recordings,
+    /// Reduced links (.flex)
+    Flex,
+}
+
+impl PageName {
+    pub(crate) fn text(self) -> &'static str {
+        match self {
+            Self::Robot => include_str!("../../../docs/robot-file.md"),
+            Self::Motion => include_str!("../../../docs/motions.md"),
+            Self::Loads => include_str!("../../../docs/loads.md"),
+            Self::Recordings => include_str!("../../../docs/recordings.md"),
+            Self::Flex => include_str!("../../flexarm-fem/src/flex_file/format.md"),
+        }
     }
 }
 

@@ -38,64 +38,76 @@ pub(crate) struct ImportArgs {
     #[arg(required = true, value_name = "FILE")]
     pub(crate) files: Vec<PathBuf>,
     /// Format that the files must have; auto: by content
-    #[arg(long, value_enum, default_value_t = ImportFormatName::Auto)]
+    #[arg(long, value_enum, default_value_t = ImportFormatName::Auto, help_heading = "Matrices")]
     pub(crate) format: ImportFormatName,
     /// Units of the files: m-kg-s (N, Pa), mm-t-s (N, MPa), in-slinch-s, ...
-    #[arg(long, value_name = "LENGTH-MASS-TIME")]
+    #[arg(long, value_name = "LENGTH-MASS-TIME", help_heading = "Matrices")]
     pub(crate) units: Option<UnitsOfFile>,
     /// Which rows or nodes are which interface, proximal first, such as A=1001,B=1002
-    #[arg(long, value_name = "NAME=ROWS,...")]
+    #[arg(long, value_name = "NAME=ROWS,...", help_heading = "Interfaces")]
     pub(crate) map: Option<ImportMap>,
     /// Frame of an interface in the link frame: x,y,z or x,y,z,roll,pitch,yaw (unit of the file, rad; repeat)
-    #[arg(long, value_name = "NAME=PLACE")]
+    #[arg(long, value_name = "NAME=PLACE", help_heading = "Interfaces")]
     pub(crate) at: Vec<FrameAt>,
     /// File of the mass, if its name does not tell
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Matrices", hide_short_help = true)]
     pub(crate) mass_file: Option<PathBuf>,
     /// Name of the stiffness in a file with several matrices
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = "Matrices", hide_short_help = true)]
     pub(crate) k_name: Option<String>,
     /// Name of the mass in a file with several matrices
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = "Matrices", hide_short_help = true)]
     pub(crate) m_name: Option<String>,
     /// Axes of the matrices in link axes: roll,pitch,yaw (rad)
-    #[arg(long, value_name = "R,P,Y", allow_hyphen_values = true)]
+    #[arg(long, value_name = "R,P,Y", allow_hyphen_values = true, help_heading = "Matrices", hide_short_help = true)]
     pub(crate) axes_rpy: Option<String>,
     /// Fixed-interface modes to keep of a full model; 0 for Guyan [default: 10]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", help_heading = "Matrices")]
     pub(crate) modes: Option<usize>,
     /// Mass of the link (kg), where the matrices have none or another
-    #[arg(long, value_name = "KG", requires_all = ["com", "inertia"], allow_hyphen_values = true)]
+    #[arg(long, value_name = "KG", requires_all = ["com", "inertia"], allow_hyphen_values = true, help_heading = "Mass of the link")]
     pub(crate) mass: Option<f64>,
     /// Its centre of mass in the link frame: x,y,z (m)
-    #[arg(long, value_name = "X,Y,Z", requires = "mass", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        requires = "mass",
+        allow_hyphen_values = true,
+        help_heading = "Mass of the link"
+    )]
     pub(crate) com: Option<String>,
     /// Its inertia about the centre of mass: ixx,iyy,izz,ixy,ixz,iyz (kg m2, link axes)
-    #[arg(long, value_name = "IXX,IYY,...", requires = "mass", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "IXX,IYY,...",
+        requires = "mass",
+        allow_hyphen_values = true,
+        help_heading = "Mass of the link"
+    )]
     pub(crate) inertia: Option<String>,
     /// Proximal rigid part: mass;x,y,z;ixx,iyy,izz,ixy,ixz,iyz (kg, m, kg m2, link axes)
-    #[arg(long, value_name = "PART", value_parser = parse_part, requires = "part_b", conflicts_with = "mass")]
+    #[arg(long, value_name = "PART", value_parser = parse_part, requires = "part_b", conflicts_with = "mass", help_heading = "Mass of the link", hide_short_help = true)]
     pub(crate) part_a: Option<RigidPart>,
     /// Distal rigid part, likewise
-    #[arg(long, value_name = "PART", value_parser = parse_part, requires = "part_a", conflicts_with = "mass")]
+    #[arg(long, value_name = "PART", value_parser = parse_part, requires = "part_a", conflicts_with = "mass", help_heading = "Mass of the link", hide_short_help = true)]
     pub(crate) part_b: Option<RigidPart>,
     /// Where the elastic joint of the two parts sits: elastic-centre, mid, a fraction of the way from A to B, or x,y,z
-    #[arg(long, value_name = "WHERE", value_parser = parse_split, allow_hyphen_values = true)]
+    #[arg(long, value_name = "WHERE", value_parser = parse_split, allow_hyphen_values = true, help_heading = "Mass of the link", hide_short_help = true)]
     pub(crate) split: Option<Split>,
     /// Name of the link [default: that of the file]
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = "Files")]
     pub(crate) name: Option<String>,
     /// Output folder for link file, figures and report [default: a new one in out/, or none with --flex]
-    #[arg(short, long, value_name = "FOLDER")]
+    #[arg(short, long, value_name = "FOLDER", help_heading = "Files")]
     pub(crate) output: Option<PathBuf>,
     /// Write the link file (also) here
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Files")]
     pub(crate) flex: Option<PathBuf>,
     /// Overwrite what is there
-    #[arg(long)]
+    #[arg(long, help_heading = "Files")]
     pub(crate) force: bool,
     /// Write nothing, only print the figures
-    #[arg(long, conflicts_with_all = ["output", "flex", "force"])]
+    #[arg(long, conflicts_with_all = ["output", "flex", "force"], help_heading = "Files")]
     pub(crate) no_files: bool,
 }
 
@@ -105,19 +117,19 @@ pub(crate) struct ExportArgs {
     #[arg(value_name = "LINK.flex")]
     pub(crate) link: PathBuf,
     /// Format to write
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = "Matrices")]
     pub(crate) format: ExportFormatName,
     /// Units to write: m-kg-s (N), mm-t-s (N, MPa), ...
-    #[arg(long, value_name = "LENGTH-MASS-TIME")]
+    #[arg(long, value_name = "LENGTH-MASS-TIME", help_heading = "Matrices")]
     pub(crate) units: UnitsOfFile,
     /// Node numbers of the interfaces in formats that have some, proximal first [default: 1001,1002,...; 1,2,... for sid]
-    #[arg(long, value_name = "N,N,...", value_delimiter = ',')]
+    #[arg(long, value_name = "N,N,...", value_delimiter = ',', help_heading = "Interfaces")]
     pub(crate) nodes: Vec<i64>,
     /// Output folder [default: a new one in out/]
-    #[arg(short, long, value_name = "FOLDER")]
+    #[arg(short, long, value_name = "FOLDER", help_heading = "Files")]
     pub(crate) output: Option<PathBuf>,
     /// Overwrite what is there
-    #[arg(long)]
+    #[arg(long, help_heading = "Files")]
     pub(crate) force: bool,
 }
 

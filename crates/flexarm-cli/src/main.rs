@@ -48,8 +48,24 @@ fn main() -> ExitCode {
                 }
                 source = cause.source();
             }
+            if let Some(page) = page_of(&error) {
+                eprintln!("  help: `flexarm format {page}` prints the keys with their units, and examples");
+            }
             ExitCode::from(error.exit_code())
         }
+    }
+}
+
+/// The page of the format of a file that is not as it should be.
+fn page_of(error: &Error) -> Option<&'static str> {
+    match error {
+        Error::InStudy { source, .. } => page_of(source),
+        Error::Trajectory(flexarm::TrajectoryError::File(_)) => Some("motion"),
+        Error::RobotFile(fault) if fault.message.contains("unknown field") => {
+            let loads = fault.message.contains("`payload`, ") || fault.message.contains("spindle_rpm");
+            Some(if loads && !fault.message.contains("`urdf`") { "loads" } else { "robot" })
+        }
+        _ => None,
     }
 }
 
@@ -88,6 +104,10 @@ fn run(cli: &Cli) -> Result<ExitCode, Error> {
         Command::Export(args) => exchange::export(cli, args),
         Command::Verify(args) => verify::run(cli, args),
         Command::View(args) => view::run(cli, args),
+        Command::Format { page } => {
+            answer(cli, || to_json(&serde_json::json!({ "page": page.text() })), || page.text().to_owned());
+            Ok(ExitCode::SUCCESS)
+        }
         Command::Completions { shell } => {
             clap_complete::generate(*shell, &mut Cli::command(), "flexarm", &mut std::io::stdout());
             Ok(ExitCode::SUCCESS)
@@ -228,13 +248,20 @@ fn simulate(cli: &Cli, args: &RunArgs, with_twin: bool) -> Result<ExitCode, Erro
     Ok(ExitCode::SUCCESS)
 }
 
-/// Says whether Ctrl-C was pressed since this was called.
+/// Says whether Ctrl-C was pressed since it was first asked.
+///
+/// Before that nothing is open that must be closed: a signal then ends the program at once, however long the preparation takes.
 fn stop_on_ctrl_c() -> impl FnMut() -> ControlFlow<()> {
     let stop = Arc::new(AtomicBool::new(false));
-    let flag = stop.clone();
-    // A second handler cannot be set in one process; the first one then serves.
-    let _ = ctrlc::set_handler(move || flag.store(true, Ordering::SeqCst));
-    move || if stop.load(Ordering::SeqCst) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    let mut armed = false;
+    move || {
+        if !std::mem::replace(&mut armed, true) {
+            let flag = stop.clone();
+            // A second handler cannot be set in one process; the first one then serves.
+            let _ = ctrlc::set_handler(move || flag.store(true, Ordering::SeqCst));
+        }
+        if stop.load(Ordering::SeqCst) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
 }
 
 fn inspect(cli: &Cli, args: &InspectArgs) -> Result<ExitCode, Error> {

@@ -68,34 +68,40 @@ pub(crate) struct ResponseArgs {
     #[command(flatten)]
     pub(crate) pose: PoseArgs,
     /// What shakes the arm: force-x ... torque-z on the TCP, or joints
-    #[arg(long, value_name = "NAME,...", value_delimiter = ',', default_value = "force-x,force-y,force-z")]
+    #[arg(
+        long,
+        help_heading = "Response",
+        value_name = "NAME,...",
+        value_delimiter = ',',
+        default_value = "force-x,force-y,force-z"
+    )]
     pub(crate) input: Vec<String>,
     /// What answers: x, y, z, rx, ry, rz of the TCP
-    #[arg(long, value_name = "NAME,...", value_delimiter = ',', default_value = "x,y,z")]
+    #[arg(long, help_heading = "Response", value_name = "NAME,...", value_delimiter = ',', default_value = "x,y,z")]
     pub(crate) output: Vec<String>,
     /// Of the outputs
-    #[arg(long, value_enum, default_value_t = QuantityName::Displacement)]
+    #[arg(long, help_heading = "Response", hide_short_help = true, value_enum, default_value_t = QuantityName::Displacement)]
     pub(crate) quantity: QuantityName,
     /// Lowest frequency (Hz) [default: a tenth of the first mode's]
-    #[arg(long, value_name = "HZ", allow_hyphen_values = true)]
+    #[arg(long, help_heading = "Response", value_name = "HZ", allow_hyphen_values = true)]
     pub(crate) from: Option<f64>,
     /// Highest frequency (Hz) [default: twice the sixth mode's]
-    #[arg(long, value_name = "HZ", allow_hyphen_values = true)]
+    #[arg(long, help_heading = "Response", value_name = "HZ", allow_hyphen_values = true)]
     pub(crate) to: Option<f64>,
     /// How many frequencies; more are put in around resonances
-    #[arg(long, value_name = "N", default_value_t = 500)]
+    #[arg(long, help_heading = "Response", hide_short_help = true, value_name = "N", default_value_t = 500)]
     pub(crate) points: usize,
     /// Of the frequencies
-    #[arg(long, value_enum, default_value_t = SpacingName::Log)]
+    #[arg(long, help_heading = "Response", hide_short_help = true, value_enum, default_value_t = SpacingName::Log)]
     pub(crate) spacing: SpacingName,
     /// Output folder [default: a new one in out/]
-    #[arg(short = 'o', long = "output-folder", value_name = "FOLDER")]
+    #[arg(short = 'o', long = "output-folder", help_heading = "Files", value_name = "FOLDER")]
     pub(crate) folder: Option<PathBuf>,
     /// Overwrite what is in the output folder
-    #[arg(long)]
+    #[arg(long, help_heading = "Files")]
     pub(crate) force: bool,
     /// Write nothing, only print the figures
-    #[arg(long, conflicts_with_all = ["folder", "force"])]
+    #[arg(long, help_heading = "Files", conflicts_with_all = ["folder", "force"])]
     pub(crate) no_files: bool,
 }
 

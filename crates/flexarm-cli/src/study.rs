@@ -14,11 +14,21 @@ pub(crate) struct Part<'a> {
     pub(crate) args: Cow<'a, RunArgs>,
 }
 
+/// Most runs beside the first one.
+const MOST_OTHERS: usize = 50;
+
 /// Options that belong to the study as a whole.
 const SHARED: [&str; 9] = ["with", "output", "force", "no-files", "magnify", "json", "quiet", "figures", "parquet"];
 
 /// The runs of a study, the one that was asked for first. `line` is the command line as given.
 pub(crate) fn parts<'a>(main: &'a RunArgs, line: &[OsString]) -> Result<Vec<Part<'a>>, Error> {
+    if main.with.len() > MOST_OTHERS {
+        let found = main.with.len();
+        return Err(Error::Usage(format!(
+            "--with is given {found} times: at most {MOST_OTHERS}, for their curves are drawn over each other; more need runs of their own, \
+             with --no-files --json for instance"
+        )));
+    }
     let line = without_with(line);
     let mut varied: Vec<String> = Vec::new();
     let mut others = Vec::new();

@@ -50,6 +50,7 @@ pub mod exchange;
 pub mod flex_file;
 pub mod frames;
 pub mod gate;
+mod input;
 pub mod material;
 pub mod matrix_link;
 pub mod mesh;

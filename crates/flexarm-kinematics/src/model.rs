@@ -11,7 +11,7 @@ use std::collections::HashMap;
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::mechanism::{JointKind, Limits, Mechanism};
+use crate::mechanism::{Joint, JointKind, Limits, Mechanism};
 use crate::modal::ModalTables;
 use crate::rotation::ElasticAngles;
 use crate::spatial::{Pose, SpatialInertia, skew};
@@ -153,6 +153,9 @@ pub struct Coordinate {
     pub kind: &'static str,
 }
 
+/// Most independent coordinates of a model.
+pub const MOST_COORDINATES: usize = 600;
+
 /// Why a mechanism is not a usable tree.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -236,6 +239,15 @@ pub enum ModelError {
         /// Of which link or joint.
         name: String,
     },
+    /// More coordinates than can be computed with.
+    #[error(
+        "the model has {found} coordinates (joints, springs and modes together), at most {MOST_COORDINATES} are taken: memory grows with \
+         their square and the time of a step with their cube"
+    )]
+    TooManyCoordinates {
+        /// How many it has.
+        found: usize,
+    },
     /// A mimic joint without a leader.
     #[error("joint {joint:?} mimics {leader:?}, which is not a movable, independent joint")]
     BadMimic {
@@ -253,8 +265,15 @@ impl Model {
     /// [`ModelError`], with the names of the links or joints that are wrong.
     pub fn new(mechanism: &Mechanism) -> Result<Self, ModelError> {
         let base = check_tree(mechanism)?;
-        let mut build =
-            Builder { mechanism, bodies: Vec::new(), frames: Vec::new(), followers: Vec::new(), modal: Vec::new() };
+        let mut build = Builder {
+            mechanism,
+            links: mechanism.links.iter().enumerate().map(|(i, link)| (link.name.as_str(), i)).collect(),
+            children: children_of_links(mechanism),
+            bodies: Vec::new(),
+            frames: Vec::new(),
+            followers: Vec::new(),
+            modal: Vec::new(),
+        };
         let world = &mechanism.links[base];
         build.bodies.push(Body {
             name: world.name.clone(),
@@ -272,7 +291,7 @@ impl Model {
             turn: RevoluteTable::new(&Pose::identity(), &Vector3::z()),
             subtree_end: 0,
         });
-        build.attach(base, 0, Pose::identity())?;
+        build.grow(base)?;
         build.finish()
     }
 
@@ -377,11 +396,12 @@ fn check_tree(mechanism: &Mechanism) -> Result<usize, ModelError> {
     // Whatever cannot be reached from a link without parent lies on a loop.
     let roots: Vec<usize> =
         (0..mechanism.links.len()).filter(|&i| parent_of[mechanism.links[i].name.as_str()].is_none()).collect();
+    let children = children_of_links(mechanism);
     let mut reached: HashMap<&str, ()> = HashMap::new();
     let mut open: Vec<&str> = roots.iter().map(|&i| mechanism.links[i].name.as_str()).collect();
     while let Some(link) = open.pop() {
         reached.insert(link, ());
-        open.extend(mechanism.child_joints(link).map(|j| j.child.as_str()));
+        open.extend(children.get(link).into_iter().flatten().map(|j| j.child.as_str()));
     }
     let looped: Vec<String> =
         mechanism.links.iter().filter(|l| !reached.contains_key(l.name.as_str())).map(|l| l.name.clone()).collect();
@@ -395,6 +415,15 @@ fn check_tree(mechanism: &Mechanism) -> Result<usize, ModelError> {
     Ok(roots[0])
 }
 
+/// The joints that start at each link, in source order.
+fn children_of_links(mechanism: &Mechanism) -> HashMap<&str, Vec<&Joint>> {
+    let mut children: HashMap<&str, Vec<&Joint>> = HashMap::new();
+    for joint in &mechanism.joints {
+        children.entry(&joint.parent).or_default().push(joint);
+    }
+    children
+}
+
 struct Follower {
     body: usize,
     joint: String,
@@ -403,24 +432,42 @@ struct Follower {
 
 struct Builder<'a> {
     mechanism: &'a Mechanism,
+    links: HashMap<&'a str, usize>,
+    children: HashMap<&'a str, Vec<&'a Joint>>,
     bodies: Vec<Body>,
     frames: Vec<Frame>,
     followers: Vec<Follower>,
     modal: Vec<Modal>,
 }
 
-impl Builder<'_> {
-    /// Lumps a link into a body and goes on to its children, depth first.
-    fn attach(&mut self, link: usize, body: usize, X_BL: Pose) -> Result<(), ModelError> {
-        let mechanism = self.mechanism;
-        let link = &mechanism.links[link];
+impl<'a> Builder<'a> {
+    /// Bodies and frames of the whole tree, depth first. Chains may be long: this does not recurse.
+    fn grow(&mut self, base: usize) -> Result<(), ModelError> {
+        self.lump(base, 0, Pose::identity())?;
+        // Joints to go on with, the next one last: parent link, its body, its pose in that body.
+        let mut pending: Vec<(&'a Joint, usize, usize, Pose)> = Vec::new();
+        let (mut link, mut body, mut X_BL) = (base, 0, Pose::identity());
+        loop {
+            let name = self.mechanism.links[link].name.as_str();
+            let children = self.children.get(name).into_iter().flatten().rev();
+            pending.extend(children.map(|joint| (*joint, link, body, X_BL)));
+            let Some((joint, parent, on, X_BP)) = pending.pop() else { break };
+            link = self.links[joint.child.as_str()];
+            (body, X_BL) = self.cross(joint, parent, on, &X_BP)?;
+            self.lump(link, body, X_BL)?;
+        }
+        (1..self.bodies.len()).try_for_each(|body| self.check_mass(body))
+    }
+
+    /// Adds a link to the body that carries it.
+    fn lump(&mut self, link: usize, body: usize, X_BL: Pose) -> Result<(), ModelError> {
+        let link = &self.mechanism.links[link];
         if let Some(inertia) = &link.inertia {
             check_inertia(&link.name, inertia)?;
             self.bodies[body].inertia += inertia.spatial().at_parent(&X_BL);
         }
         self.frames.push(Frame { name: link.name.clone(), body, X_BF: X_BL });
-        let modal = mechanism.modal.iter().find(|(name, _)| *name == link.name);
-        if let Some((_, shapes)) = modal {
+        if let Some((_, shapes)) = self.mechanism.modal.iter().find(|(name, _)| *name == link.name) {
             if let Some(what) = shapes.fault() {
                 return Err(ModelError::BadModal { link: link.name.clone(), what });
             }
@@ -432,77 +479,79 @@ impl Builder<'_> {
             let tables = ModalTables::new(shapes);
             self.modal.push(Modal { body, coordinate: usize::MAX, n: shapes.n(), tables });
         }
-        for joint in mechanism.child_joints(&link.name) {
-            if !joint.X_PJ.translation.vector.iter().chain(joint.X_PJ.rotation.matrix().iter()).all(|x| x.is_finite()) {
-                return Err(ModelError::NotFinite { what: "origin", name: joint.name.clone() });
+        Ok(())
+    }
+
+    /// The body behind a joint, which is a new one unless the joint is fixed, and the pose of the child link in it.
+    fn cross(&mut self, joint: &Joint, parent: usize, body: usize, X_BL: &Pose) -> Result<(usize, Pose), ModelError> {
+        if !joint.X_PJ.translation.vector.iter().chain(joint.X_PJ.rotation.matrix().iter()).all(|x| x.is_finite()) {
+            return Err(ModelError::NotFinite { what: "origin", name: joint.name.clone() });
+        }
+        let mechanism = self.mechanism;
+        let link = &mechanism.links[parent];
+        let X_BJ = X_BL * joint.X_PJ;
+        let motion = match joint.kind {
+            // A link that bends in modes needs a body whose frame is its own.
+            JointKind::Fixed if mechanism.modal.iter().any(|(name, _)| *name == joint.child) => JointMotion::Welded,
+            JointKind::Fixed => return Ok((body, X_BJ)),
+            JointKind::Revolute(axis) | JointKind::Continuous(axis) | JointKind::ElasticRevolute(axis) => {
+                JointMotion::Revolute(axis.into_inner())
             }
-            let child = mechanism.links.iter().position(|l| l.name == joint.child);
-            let child = child.expect("checked by check_tree");
-            let X_BJ = X_BL * joint.X_PJ;
-            let motion = match joint.kind {
-                // A link that bends in modes needs a body whose frame is its own.
-                JointKind::Fixed if mechanism.modal.iter().any(|(name, _)| *name == joint.child) => JointMotion::Welded,
-                JointKind::Fixed => {
-                    self.attach(child, body, X_BJ)?;
-                    continue;
+            JointKind::Prismatic(axis) | JointKind::ElasticPrismatic(axis) => JointMotion::Prismatic(axis.into_inner()),
+            JointKind::Elastic(angles) => JointMotion::Elastic(angles),
+            JointKind::Interface(interface) => match self.bodies[body].modal {
+                Some(modal) if modal_has(&self.modal[modal], interface) && self.frames_are_at(body, &link.name) => {
+                    JointMotion::Interface { modal, interface }
                 }
-                JointKind::Revolute(axis) | JointKind::Continuous(axis) | JointKind::ElasticRevolute(axis) => {
-                    JointMotion::Revolute(axis.into_inner())
+                _ => {
+                    let what = "an interface joint on it that its modal body does not have";
+                    return Err(ModelError::BadModal { link: link.name.clone(), what });
                 }
-                JointKind::Prismatic(axis) | JointKind::ElasticPrismatic(axis) => {
-                    JointMotion::Prismatic(axis.into_inner())
-                }
-                JointKind::Elastic(angles) => JointMotion::Elastic(angles),
-                JointKind::Interface(interface) => match self.bodies[body].modal {
-                    Some(modal) if modal_has(&self.modal[modal], interface) && self.frames_are_at(body, &link.name) => {
-                        JointMotion::Interface { modal, interface }
-                    }
-                    _ => {
-                        let what = "an interface joint on it that its modal body does not have";
-                        return Err(ModelError::BadModal { link: link.name.clone(), what });
-                    }
-                },
-            };
-            let elastic = matches!(
-                joint.kind,
-                JointKind::Elastic(_) | JointKind::ElasticRevolute(_) | JointKind::ElasticPrismatic(_)
-            );
-            let axis = match motion {
-                JointMotion::Revolute(axis) => axis,
-                _ => Vector3::z(),
-            };
-            let (ratio, offset) = joint.mimic.as_ref().map_or((1.0, 0.0), |m| (m.ratio, m.offset));
-            let index = self.bodies.len();
-            if let Some(mimic) = &joint.mimic {
-                let (joint, leader) = (joint.name.clone(), mimic.joint.clone());
-                self.followers.push(Follower { body: index, joint, leader });
-            }
-            self.bodies.push(Body {
-                name: joint.child.clone(),
-                joint: joint.name.clone(),
-                parent: body,
-                X_PJ: X_BJ,
-                inertia: SpatialInertia::zeros(),
-                motion,
-                coordinate: usize::MAX,
-                ratio,
-                offset,
-                armature: joint.armature,
-                elastic,
-                modal: None,
-                turn: RevoluteTable::new(&X_BJ, &axis),
-                subtree_end: 0,
-            });
-            self.attach(child, index, Pose::identity())?;
-            let body = &self.bodies[index];
-            let mass = body.inertia.mass + body.modal.map_or(0.0, |m| self.modal[m].tables.shapes.mass);
-            // Interfaces and what stands between a motor and its spring need no mass of their own.
-            let springs = |b: &Body| b.parent == index && b.elastic && b.X_PJ == Pose::identity();
-            let carrier =
-                matches!(motion, JointMotion::Interface { .. }) || self.bodies[index + 1..].iter().any(springs);
-            if mass.is_nan() || mass < 0.0 || (mass == 0.0 && !carrier) {
-                return Err(ModelError::NoMass { link: joint.child.clone(), joint: joint.name.clone(), mass });
-            }
+            },
+        };
+        let elastic = matches!(
+            joint.kind,
+            JointKind::Elastic(_) | JointKind::ElasticRevolute(_) | JointKind::ElasticPrismatic(_)
+        );
+        let axis = match motion {
+            JointMotion::Revolute(axis) => axis,
+            _ => Vector3::z(),
+        };
+        let (ratio, offset) = joint.mimic.as_ref().map_or((1.0, 0.0), |m| (m.ratio, m.offset));
+        let index = self.bodies.len();
+        if let Some(mimic) = &joint.mimic {
+            let (joint, leader) = (joint.name.clone(), mimic.joint.clone());
+            self.followers.push(Follower { body: index, joint, leader });
+        }
+        self.bodies.push(Body {
+            name: joint.child.clone(),
+            joint: joint.name.clone(),
+            parent: body,
+            X_PJ: X_BJ,
+            inertia: SpatialInertia::zeros(),
+            motion,
+            coordinate: usize::MAX,
+            ratio,
+            offset,
+            armature: joint.armature,
+            elastic,
+            modal: None,
+            turn: RevoluteTable::new(&X_BJ, &axis),
+            subtree_end: 0,
+        });
+        Ok((index, Pose::identity()))
+    }
+
+    /// A body that moves needs a mass, with all that is fixed to it.
+    fn check_mass(&self, index: usize) -> Result<(), ModelError> {
+        let body = &self.bodies[index];
+        let mass = body.inertia.mass + body.modal.map_or(0.0, |m| self.modal[m].tables.shapes.mass);
+        // Interfaces and what stands between a motor and its spring need no mass of their own.
+        let springs = |b: &Body| b.parent == index && b.elastic && b.X_PJ == Pose::identity();
+        let carrier =
+            || matches!(body.motion, JointMotion::Interface { .. }) || self.bodies[index + 1..].iter().any(springs);
+        if mass.is_nan() || mass < 0.0 || (mass == 0.0 && !carrier()) {
+            return Err(ModelError::NoMass { link: body.name.clone(), joint: body.joint.clone(), mass });
         }
         Ok(())
     }
@@ -518,12 +567,13 @@ impl Builder<'_> {
         let mut coordinates: Vec<Coordinate> = Vec::new();
         let mut elastic: Vec<ElasticGroup> = Vec::new();
         let mut n_actuated = 0;
+        let joints: HashMap<&str, &Joint> = self.children.values().flatten().map(|j| (j.name.as_str(), *j)).collect();
         for elastic_pass in [false, true] {
             for i in 0..self.bodies.len() {
                 let body = &self.bodies[i];
                 let none = matches!(body.motion, JointMotion::Interface { .. } | JointMotion::Welded);
                 let own = body.elastic == elastic_pass && !none;
-                let joint = self.mechanism.joint(&body.joint).filter(|_| own && !follows(i, &self.followers));
+                let joint = joints.get(body.joint.as_str()).filter(|_| own && !follows(i, &self.followers));
                 if let Some(joint) = joint {
                     let (coordinate, size) = (coordinates.len(), joint.kind.degrees_of_freedom());
                     self.bodies[i].coordinate = coordinate;
@@ -557,6 +607,9 @@ impl Builder<'_> {
                     elastic.push(ElasticGroup { name, body: i, coordinate, size, modal: true });
                 }
             }
+        }
+        if coordinates.len() > MOST_COORDINATES {
+            return Err(ModelError::TooManyCoordinates { found: coordinates.len() });
         }
         for body in &mut self.bodies {
             if let JointMotion::Interface { modal, .. } = body.motion {

@@ -27,6 +27,9 @@ use crate::warning::Warning;
 /// A joint of a file without a unit that reaches this is likely to be in degrees: two turns.
 const SUSPICIOUS_ANGLE: f64 = 4.0 * std::f64::consts::PI;
 
+/// Most numbers of a file.
+const MOST_NUMBERS: usize = 30_000_000;
+
 impl Trajectory {
     /// Reads sampled joint values; the page of the module [`crate::csv_file`] describes the format.
     ///
@@ -86,6 +89,9 @@ fn parse(text: &str) -> Result<Trajectory, Located> {
         }
         match &header {
             None => header = Some(Header::new(line, record.iter().map(str::to_owned).collect())?),
+            Some(header) if rows.len() >= MOST_NUMBERS / header.columns.len() => {
+                return Err(located(line, None, Problem::TooManyNumbers { most: MOST_NUMBERS }));
+            }
             Some(header) => rows.push((line, numbers(&record, line, &header.columns)?)),
         }
     }

@@ -1,11 +1,16 @@
 //! From a path to a trajectory: reads the file and chooses the reader by the ending of its name.
 
+use std::fs::File;
+use std::io::{Error, ErrorKind, Read};
 use std::path::Path;
 
 use crate::error::{FileError, TrajectoryError};
 use crate::limits::JointLimits;
 use crate::problem::Problem;
 use crate::trajectory::Trajectory;
+
+/// A file larger than this is refused (bytes): an hour of six joints at 1 kHz has a third of it.
+const LARGEST: u64 = 1 << 30;
 
 impl Trajectory {
     /// Reads a trajectory file: `.csv` holds samples ([`Trajectory::parse_csv`]), `.toml` waypoints
@@ -24,13 +29,27 @@ impl Trajectory {
         }
 
         let origin = path.display().to_string();
-        let bytes = std::fs::read(path).map_err(|source| TrajectoryError::Read { path: path.to_owned(), source })?;
+        let bytes = read(path).map_err(|source| TrajectoryError::Read { path: path.to_owned(), source })?;
         let text = text_of(bytes, &origin)?;
         match extension.as_str() {
             "csv" => Self::parse_csv(&text, &origin),
             _ => Self::parse_toml(&text, &origin, limits),
         }
     }
+}
+
+/// The bytes of a file; no device, which might never end, and no pipe, which might never begin.
+fn read(path: &Path) -> std::io::Result<Vec<u8>> {
+    if !std::fs::metadata(path)?.is_file() {
+        return Err(Error::other("this is not a file"));
+    }
+    let mut bytes = Vec::new();
+    File::open(path)?.take(LARGEST + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > LARGEST {
+        let what = format!("more than {LARGEST} bytes, which is more than is read; leave out rows or digits");
+        return Err(Error::new(ErrorKind::FileTooLarge, what));
+    }
+    Ok(bytes)
 }
 
 fn text_of(bytes: Vec<u8>, origin: &str) -> Result<String, Box<FileError>> {

@@ -56,6 +56,14 @@ pub enum Problem {
         /// Fields of the header.
         expected: usize,
     },
+    /// More numbers than are kept in memory.
+    #[error(
+        "more than {most} numbers, which is more than is read (an hour of six joints at 1 kHz has 25 million); leave out rows: splines pass between them"
+    )]
+    TooManyNumbers {
+        /// How many are read.
+        most: usize,
+    },
     /// A field that is not a number.
     #[error("{column}: {found:?} is not a number; expected one such as 0.25 or -1e-3")]
     NotANumber {

@@ -60,7 +60,7 @@ impl Trajectory {
         };
         let file: FileToml = toml::from_str(text).map_err(|error| {
             let message = error.message().split_whitespace().collect::<Vec<_>>().join(" ");
-            let message = format!("{message}; the page of the waypoint format lists the keys and their types");
+            let message = format!("{message}; docs/motions.md has all keys, with types and units");
             fail(error.span().map(|span| span.start), Problem::Toml { message })
         })?;
 

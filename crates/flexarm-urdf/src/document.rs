@@ -22,6 +22,9 @@ use crate::report::Report;
 use crate::spelling::closest;
 use crate::xml::Lines;
 
+/// Most links and joints of a robot: checks compare each with each.
+const MOST_ELEMENTS: usize = 4000;
+
 const JOINT_TYPES: [&str; 7] = ["fixed", "revolute", "continuous", "prismatic", "floating", "planar", "spherical"];
 /// Children of `<robot>`, `<link>` and `<joint>` that are URDF or a well-known extension.
 const ROBOT_CHILDREN: [&str; 12] = [
@@ -66,6 +69,11 @@ pub(crate) fn read_document(root: Node<'_, '_>, lines: &Lines<'_>, report: &mut 
         let file = &reader.report.file;
         let command = format!("xacro {} > expanded.urdf", file.display());
         reader.report.error(&place, Problem::UnexpandedXacro { found, command });
+        return None;
+    }
+    let found = elements(root).filter(|n| matches!(n.tag_name().name(), "link" | "joint")).count();
+    if found > MOST_ELEMENTS {
+        reader.report.error(&place, Problem::TooManyElements { found, most: MOST_ELEMENTS });
         return None;
     }
     reader.quaternions = version(root) >= (1, 1);

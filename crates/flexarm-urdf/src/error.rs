@@ -171,6 +171,9 @@ pub enum Problem {
     /// A robot without any link.
     #[error("the robot {robot:?} has no <link>")]
     NoLink { robot: String },
+    /// More links or joints than any robot has.
+    #[error("the robot has {found} links and joints, at most {most} are read")]
+    TooManyElements { found: usize, most: usize },
     /// A child element that URDF demands.
     #[error("{owner} has no <{element}>")]
     MissingElement { owner: String, element: &'static str },
@@ -261,6 +264,7 @@ impl Problem {
             Self::NotUrdf { .. } => "not-urdf",
             Self::UnexpandedXacro { .. } => "unexpanded-xacro",
             Self::NoLink { .. } => "no-link",
+            Self::TooManyElements { .. } => "too-many-elements",
             Self::MissingElement { .. } => "missing-element",
             Self::MissingAttribute { .. } => "missing-attribute",
             Self::NotANumber { .. } => "not-a-number",
@@ -301,6 +305,9 @@ impl Problem {
             },
             Self::UnexpandedXacro { command, .. } => format!("run `{command}` and use its output"),
             Self::NoLink { .. } => "is the file complete? A robot needs at least one <link>".into(),
+            Self::TooManyElements { .. } => {
+                "is this one robot? Arms have some dozens of links: leave out what does not move with it".into()
+            }
             Self::MissingElement { element, .. } => format!("add <{element} .../>"),
             Self::MissingAttribute { attribute, .. } => format!("add {attribute}=\"...\""),
             Self::NotANumber { .. } => "write plain decimal numbers such as 0.1 or -1.5e-3, separated by spaces".into(),

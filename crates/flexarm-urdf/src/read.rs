@@ -151,6 +151,9 @@ fn all_findings((result, report): (Result<UrdfRobot, UrdfError>, Report)) -> Vec
     findings
 }
 
+/// A description larger than this is refused (bytes): those of real robots have up to one megabyte.
+const LARGEST: u64 = 64 << 20;
+
 /// Elements nested deeper are left to the readers that can stand it.
 const MAX_DEPTH: usize = 64;
 
@@ -164,6 +167,14 @@ fn load_text(path: &Path, options: &ReadOptions) -> Result<(String, PathBuf), Ur
     let meta = std::fs::metadata(path).map_err(io_error)?;
     if meta.is_dir() {
         return Err(io_error(std::io::Error::other("this is a folder; name the URDF file in it")));
+    }
+    // Not a device or a pipe, which might never end.
+    if !meta.is_file() {
+        return Err(io_error(std::io::Error::other("this is not a file")));
+    }
+    if meta.len() > LARGEST {
+        let what = format!("{} bytes, more than the {LARGEST} that are read", meta.len());
+        return Err(io_error(std::io::Error::new(std::io::ErrorKind::FileTooLarge, what)));
     }
     let (bytes, shown) = if xacro::is_xacro(path) {
         let expanded = xacro::expand(path, &options.xacro_program, &options.xacro_arguments)?;

@@ -1,10 +1,21 @@
 //! The name that was probably meant.
 
+/// Longest name for which another one is looked for (characters).
+const LONGEST_WORD: usize = 200;
+
 /// The candidate closest to `name`, if it is close enough to be a slip of the pen.
 pub(crate) fn closest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<String> {
-    let allowed = (name.chars().count() / 3).clamp(1, 4);
+    let length = name.chars().count();
+    // What is this long was not typed.
+    if length > LONGEST_WORD {
+        return None;
+    }
+    let allowed = (length / 3).clamp(1, 4);
     let mut best: Option<(usize, &str)> = None;
     for candidate in candidates {
+        if candidate.chars().count().abs_diff(length) > allowed {
+            continue;
+        }
         let distance = edit_distance(&name.to_lowercase(), &candidate.to_lowercase());
         if distance <= allowed && best.is_none_or(|(d, _)| distance < d) {
             best = Some((distance, candidate));

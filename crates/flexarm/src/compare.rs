@@ -38,8 +38,10 @@ use crate::twin::RigidTwin;
 /// What servos leave of the way to go, among the contributors to the TCP error.
 const FOLLOWING_ERROR: &str = "following error";
 
-/// Steps between two looks at the progress callback.
-const POLL_EVERY: u64 = 64;
+/// Coordinates times steps between two looks at the progress callback: a stop must not wait for many large steps.
+const POLL_EVERY: usize = 2000;
+/// Most steps between two looks.
+const RAREST_POLL: usize = 64;
 
 /// Called with simulated and total time; breaking off stops the run with readable files.
 pub type Progress<'a> = dyn FnMut(f64, f64) -> ControlFlow<()> + 'a;
@@ -97,6 +99,10 @@ pub(crate) fn run_traced(
     let cpu = cpu_time::ProcessTime::now();
     let Checked { flexible, arm, stepper, load_caveats } = checked(robot, motion, options)?;
 
+    // Before the first file is made, so that a stop during the preparation leaves none.
+    if progress(0.0, motion.trajectory.duration()).is_break() {
+        return Err(Error::Interrupted { t: 0.0, partial: false });
+    }
     let own = || Expected::of(&arm, &tool_frame(&arm), motion.trajectory.duration(), options.start);
     let expected = together.expected.unwrap_or_else(own);
     let mut run = Run::new(robot, motion, options, &flexible, arm, stepper);
@@ -284,13 +290,14 @@ impl<'a> Run<'a> {
     /// Steps to the end, logging on the way.
     fn go(&mut self, files: &mut RecorderSet, partial: bool, progress: &mut Progress<'_>) -> Result<(), Error> {
         let total = self.last as f64 * self.options.step_s;
+        let poll_every = (POLL_EVERY / self.arm.model.nv().max(1)).clamp(1, RAREST_POLL) as u64;
         for step in 0..=self.last {
             if step % self.every == 0 || step == self.last {
                 self.observe(step);
                 files.record(&self.sample)?;
                 self.trace.push(&self.sample);
             }
-            if step % POLL_EVERY == 0 && progress(self.stepper.time(), total).is_break() {
+            if step % poll_every == 0 && progress(self.stepper.time(), total).is_break() {
                 return Err(Error::Interrupted { t: self.stepper.time(), partial });
             }
             if step < self.last {

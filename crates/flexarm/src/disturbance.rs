@@ -17,6 +17,7 @@ use toml::Spanned;
 
 use crate::caveat::Caveat;
 use crate::error::Error;
+use crate::input::read_text;
 use crate::robot::{PAYLOAD_LINK, Robot, TCP_FRAME};
 use crate::robot_file::{RobotFileError, Source};
 
@@ -114,8 +115,7 @@ impl Disturbances {
     /// # Errors
     /// [`Error`] with file, place, what was found and what was expected.
     pub fn load(path: &Path, robot: &Robot, model: &Model, duration: f64) -> Result<Self, Error> {
-        let text = std::fs::read_to_string(path)
-            .map_err(|e| Error::File { path: path.to_owned(), what: format!("cannot be read: {e}") })?;
+        let text = read_text(path)?;
         let source = Source::new(path, &text);
         let file: LoadsFile = toml::from_str(&text).map_err(|error| {
             let message = error.message().trim().replace('\n', " ");
@@ -300,6 +300,8 @@ fn stray_key(e: &LoadEntry, kind: &str) -> Option<(&'static str, &'static str)> 
 
 /// Nobody knows what is in an expression: the reference stepper looks at it as at a vibration of this period (s).
 pub(crate) const EXPRESSION_PERIOD: f64 = 5e-3;
+/// Longest expression (characters).
+const LONGEST_EXPRESSION: usize = 2000;
 /// Most harmonics of a milling force; beyond, each is nothing against the first.
 const MOST_HARMONICS: u32 = 50;
 /// Most rows of a table whose times the reference stepper meets one by one.
@@ -313,13 +315,16 @@ fn span_or<T, E>(value: Option<&Spanned<T>>, entry: &Spanned<E>) -> Range<usize>
 /// Linear between the rows of a CSV, zero outside; with the times at which it bends.
 fn table(path: &Path) -> Result<(WrenchFn, Vec<f64>), Error> {
     let fail = |what: String| Error::File { path: path.to_owned(), what };
-    let text = std::fs::read_to_string(path).map_err(|e| fail(format!("cannot be read: {e}")))?;
+    let text = read_text(path)?;
     let mut lines = text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty() && !l.starts_with('#'));
     let header: Vec<String> =
         lines.next().map(|(_, l)| l.split(',').map(|w| w.trim().to_owned()).collect()).unwrap_or_default();
     const NAMES: [&str; 7] = ["time", "fx", "fy", "fz", "tx", "ty", "tz"];
     if header.first().is_none_or(|h| h != "time") || header.iter().any(|h| !NAMES.contains(&h.as_str())) {
         return Err(fail(format!("the header is {header:?}, expected time and some of fx, fy, fz, tx, ty, tz")));
+    }
+    if let Some(twice) = (1..header.len()).find(|&k| header[..k].contains(&header[k])) {
+        return Err(fail(format!("the header names {:?} twice: remove or rename one of the columns", header[twice])));
     }
     let mut rows: Vec<(f64, [f64; 6])> = Vec::new();
     for (number, line) in lines {
@@ -374,6 +379,14 @@ fn expression(e: &LoadEntry, source: &Source, (start, end): (f64, f64)) -> Resul
             Some(entry) => {
                 let text = entry.get_ref();
                 let fail = |message: String| source.error(entry.span(), message);
+                if text.len() > LONGEST_EXPRESSION {
+                    let length = text.len();
+                    let message = format!(
+                        "the expression has {length} characters, at most {LONGEST_EXPRESSION} are read, for it is computed in \
+                         every step: use kind = \"table\" for curves without a short formula"
+                    );
+                    return Err(fail(message).into());
+                }
                 let parsed: FlatEx<f64> =
                     exmex::parse(text).map_err(|error| fail(format!("expression {text:?}: {error}")))?;
                 let unknown: Vec<&String> = parsed.var_names().iter().filter(|v| *v != "t").collect();

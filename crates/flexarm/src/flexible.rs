@@ -8,7 +8,7 @@ use flexarm_fem::{BeamLink, ModalLink, ModalOptions};
 use flexarm_flexlink::{
     BranchJoint, FlexibleLink, FlexibleSpan, Gearbox, LinkForm, branch_joints, insert_gearboxes, substitute,
 };
-use flexarm_kinematics::{Data, Model, mass_matrix};
+use flexarm_kinematics::{Data, MOST_COORDINATES, Model, mass_matrix};
 use flexarm_stepping::{
     Damping, FlexibleArm, Friction, GeometricStiffness, PrescribedMotion, Servo, ServoAxis, Spring, StepError,
 };
@@ -26,6 +26,8 @@ const SERVO: [f64; 4] = [20.0, 100.0, 20.0, 1e-3];
 /// Most of the quick inertia over the sampling time that a default velocity gain takes: 2 is where a sampled speed loop
 /// becomes unstable.
 const QUICK_GAIN: f64 = 0.4;
+/// Most fixed-interface modes of a link.
+const MOST_MODES: usize = 200;
 /// Fixed-interface modes of a beam link that does not say how many.
 const BEAM_MODES: usize = 6;
 
@@ -98,6 +100,14 @@ impl RobotLink {
             return Ok(LinkForm::TwoParts);
         }
         let name = &self.flexible.link;
+        let coordinates = 6 * segments.saturating_sub(1);
+        if coordinates > MOST_COORDINATES {
+            return Err(format!(
+                "link {name:?}: {segments} segments have {coordinates} elastic coordinates, a robot can have {MOST_COORDINATES} in all, for the \
+                 time of a step grows with their cube: ask for at most {} in one link, or for modes, which say more with fewer",
+                MOST_COORDINATES / 6 + 1
+            ));
+        }
         if let Some(beam) = &self.beam {
             return beam.chain(segments).map(LinkForm::Chain).map_err(|e| format!("link {name:?}: {e}"));
         }
@@ -118,6 +128,13 @@ impl RobotLink {
         let fail =
             |asked: Asked| move |e: flexarm_fem::FemError| (asked, format!("link {name:?} cannot bend in modes: {e}"));
         let wanted = modelling.modes.or(self.choices.modes);
+        if let Some(modes) = wanted.filter(|modes| *modes > MOST_MODES) {
+            let message = format!(
+                "link {name:?}: {modes} modes are asked for, at most {MOST_MODES} are taken: the work of a step grows with the cube of their \
+                 number, and those beyond the first dozen are far above what a drive or a tool excites"
+            );
+            return Err((Asked::Modes, message));
+        }
         let full = match &self.beam {
             Some(beam) => {
                 let modes = wanted.unwrap_or(BEAM_MODES);

@@ -33,6 +33,7 @@ pub mod export;
 mod flexible;
 mod headline;
 pub mod import;
+mod input;
 mod inspect;
 mod link_entry;
 mod magnification;
@@ -90,4 +91,5 @@ pub use flexarm_stepping::{
     AlphaSettings, ConstraintForm, ReferenceMethod, ReferenceSettings, SpookPreset, SpookSettings, Start, StepError,
     StepperKind,
 };
+pub use flexarm_trajectory::TrajectoryError;
 pub use flexarm_urdf::{InertiaEstimate, ReadOptions, search_paths_from_environment};

@@ -53,6 +53,8 @@ pub(crate) fn checked(robot: &Robot, motion: &Motion, options: &RunOptions) -> R
 
 /// Most steps of a run: some hours.
 const MOST_STEPS: f64 = 1e9;
+/// Factors by which deflections can be shown.
+const MAGNIFICATIONS: std::ops::RangeInclusive<f64> = 1e-3..=1e6;
 /// Most logged samples of a run: they are kept for the figures.
 const MOST_SAMPLES: f64 = 2e6;
 
@@ -66,6 +68,13 @@ fn check_options(motion: &Motion, options: &RunOptions) -> Result<(), Error> {
     positive("log rate", options.log_rate_hz, "Hz")?;
     positive("settling band", options.settling_band_m, "m")?;
     positive("factor of deflections (--magnify)", options.magnification.unwrap_or(1.0), "times")?;
+    if let Some(factor) = options.magnification.filter(|factor| !MAGNIFICATIONS.contains(factor)) {
+        let (least, most) = (MAGNIFICATIONS.start(), MAGNIFICATIONS.end());
+        let message = format!(
+            "the factor of deflections (--magnify) is {factor:e}: expected one from {least} to {most}, 1 shows them as they are"
+        );
+        return Err(Error::Usage(message));
+    }
     let duration = motion.trajectory.duration();
     if options.step_s > duration {
         let message = format!("the step (--step {} s) is longer than the motion ({duration} s)", options.step_s);

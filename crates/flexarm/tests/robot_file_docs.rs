@@ -1,10 +1,10 @@
-//! `docs/robot-file.md` and `docs/robot.schema.json`: every example loads, every key is there.
+//! The pages of the robot, motion and loads files in `docs/` and their schemas: every example loads, every key is there.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use flexarm::{Disturbances, DriveKind, LinkModel, LoadOptions, Robot};
+use flexarm::{Disturbances, DriveKind, LinkModel, LoadOptions, Motion, Robot};
 
 fn project(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(path)
@@ -46,28 +46,10 @@ impl Drop for Place {
 }
 
 #[test]
-fn every_example_loads() {
-    let (page, place) = (read("docs/robot-file.md"), Place::new("examples"));
-    std::fs::write(place.0.join("force.csv"), &blocks(&page, "csv")[0]).unwrap();
-    let (mut modal, mut torque, mut loads) = (0, 0, 0);
+fn every_example_of_a_robot_file_loads() {
+    let (page, place) = (read("docs/robot-file.md"), Place::new("robots"));
+    let (mut modal, mut torque) = (0, 0);
     for block in blocks(&page, "toml") {
-        if block.contains("[[load]]") {
-            let robot = place.robot("format = 1\nurdf = \"kr210.urdf\"\ntcp = { link = \"tool0\" }\n");
-            let path = place.0.join("loads.toml");
-            std::fs::write(&path, &block).unwrap();
-            let model = robot.rigid_model().unwrap();
-            let read = Disturbances::load(&path, &robot, &model, 3.0).unwrap_or_else(|e| panic!("{e}"));
-            assert_eq!(read.loads.len(), block.matches("[[load]]").count());
-            assert_eq!(read.changes.len(), block.matches("[[payload]]").count());
-            for t in [0.0, 0.3, 1.0005, 2.9] {
-                for load in &read.loads {
-                    let wrench = (load.wrench)(t);
-                    assert!(wrench.force.iter().chain(wrench.torque.iter()).all(|x| x.is_finite()), "at {t} s");
-                }
-            }
-            loads += 1;
-            continue;
-        }
         let head = if block.starts_with("format") { "" } else { "format = 1\nurdf = \"kr210.urdf\"\n" };
         let robot = place.robot(&format!("{head}{block}"));
         assert_eq!(robot.flexible.len(), block.matches("[[flexible_link]]").count());
@@ -76,7 +58,74 @@ fn every_example_loads() {
         modal += robot.flexible.iter().filter(|link| link.choices.model == LinkModel::Modal).count();
         torque += robot.drives.iter().filter(|drive| drive.kind == DriveKind::Torque).count();
     }
-    assert!(modal >= 2 && torque >= 1 && loads >= 1, "{modal} {torque} {loads}");
+    assert!(modal >= 2 && torque >= 1, "{modal} {torque}");
+}
+
+#[test]
+fn every_example_of_a_loads_file_loads() {
+    let (page, place) = (read("docs/loads.md"), Place::new("loads"));
+    std::fs::write(place.0.join("force.csv"), &blocks(&page, "csv")[0]).unwrap();
+    let robot = place.robot("format = 1\nurdf = \"kr210.urdf\"\ntcp = { link = \"tool0\" }\n");
+    let model = robot.rigid_model().unwrap();
+    let examples = blocks(&page, "toml");
+    assert!(!examples.is_empty());
+    for block in examples {
+        let path = place.0.join("loads.toml");
+        std::fs::write(&path, &block).unwrap();
+        let read = Disturbances::load(&path, &robot, &model, 3.0).unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(read.loads.len(), block.matches("[[load]]").count());
+        assert_eq!(read.changes.len(), block.matches("[[payload]]").count());
+        for t in [0.0, 0.3, 1.0005, 2.9] {
+            for load in &read.loads {
+                let wrench = (load.wrench)(t);
+                assert!(wrench.force.iter().chain(wrench.torque.iter()).all(|x| x.is_finite()), "at {t} s");
+            }
+        }
+    }
+}
+
+/// A robot on a rail, for the examples of motions: speed limits as in a URDF.
+const RAIL: &str = r#"<robot name="rail">
+  <link name="base"/>
+  <joint name="rail" type="prismatic"><parent link="base"/><child link="cart"/><axis xyz="1 0 0"/>
+    <limit lower="-1" upper="1" effort="1" velocity="2"/></joint>
+  <link name="cart"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="joint_1" type="revolute"><parent link="cart"/><child link="arm"/><axis xyz="0 0 1"/>
+    <limit lower="-3" upper="3" effort="1" velocity="4"/></joint>
+  <link name="arm"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="joint_2" type="revolute"><parent link="arm"/><child link="hand"/><axis xyz="0 1 0"/>
+    <limit lower="-3" upper="3" effort="1" velocity="20"/></joint>
+  <link name="hand"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+</robot>"#;
+
+/// Truth: the goals, durations and units that stand in the examples.
+#[test]
+fn every_example_of_a_motion_file_loads_and_goes_where_it_says() {
+    let (page, place) = (read("docs/motions.md"), Place::new("motions"));
+    std::fs::write(place.0.join("rail.urdf"), RAIL).unwrap();
+    let robot = Robot::load(&place.0.join("rail.urdf"), &LoadOptions::default()).unwrap();
+    let model = robot.rigid_model().unwrap();
+    for language in ["toml", "csv"] {
+        let examples = blocks(&page, language);
+        assert!(!examples.is_empty(), "{language}");
+        for block in examples {
+            let path = place.0.join(format!("motion.{language}"));
+            std::fs::write(&path, &block).unwrap();
+            let motion = Motion::load(&path, &model).unwrap_or_else(|e| panic!("{e}"));
+            assert!(motion.violations.is_empty(), "{:?}", motion.violations);
+            let (mut q, mut v, mut a) = ([0.0; 3], [0.0; 3], [0.0; 3]);
+            let t = if language == "toml" { 1.6 } else { 0.04 };
+            motion.trajectory.sample(t, &mut q, &mut v, &mut a);
+            let degrees = f64::to_radians(1.0);
+            let goal = if language == "toml" {
+                [0.2, 60.0 * degrees, 30.0 * degrees]
+            } else {
+                [0.003, 0.3 * degrees, -0.5 * degrees]
+            };
+            // measured 6e-17
+            assert!(q.iter().zip(goal).all(|(q, goal)| (q - goal).abs() < 1e-14), "{q:?}");
+        }
+    }
 }
 
 /// Keys of every struct that is read from a file.
@@ -85,7 +134,7 @@ fn keys(sources: &[&str]) -> BTreeMap<String, BTreeSet<String>> {
     for source in sources {
         let (mut reads, mut inside, mut renamed) = (false, None::<String>, None::<String>);
         for line in read(source).lines().map(str::trim) {
-            let line = line.strip_prefix("pub ").unwrap_or(line);
+            let line = line.strip_prefix("pub ").or_else(|| line.strip_prefix("pub(crate) ")).unwrap_or(line);
             if line.starts_with("#[derive(") {
                 reads = line.contains("Deserialize");
             } else if let Some(name) = line.strip_prefix("struct ").filter(|_| reads) {
@@ -107,29 +156,47 @@ fn keys(sources: &[&str]) -> BTreeMap<String, BTreeSet<String>> {
 
 const ROBOT: [&str; 2] = ["crates/flexarm/src/robot_file.rs", "crates/flexarm/src/drive_entry.rs"];
 
+const LOADS: [&str; 1] = ["crates/flexarm/src/disturbance.rs"];
+const MOTION: [&str; 1] = ["crates/flexarm-trajectory/src/waypoints_toml.rs"];
+
 #[test]
-fn every_key_is_on_the_page() {
-    let page = read("docs/robot-file.md");
-    let all = keys(&[ROBOT[0], ROBOT[1], "crates/flexarm/src/disturbance.rs"]);
+fn every_key_is_on_its_page() {
+    let all = keys(&ROBOT);
     assert!(all["FlexibleLinkEntry"].contains("eigenmodes") && all["BeamEntry"].contains("kGA_y"), "{all:?}");
-    assert!(all["LoadEntry"].contains("spindle_rpm") && all["DriveEntry"].contains("motor_inertia"), "{all:?}");
-    for (of, names) in &all {
-        for name in names {
-            let shown = [format!("`{name}`"), format!("{name} ="), format!("{{ {name}"), format!(", {name}")];
-            assert!(shown.iter().any(|text| page.contains(text)), "{name} of {of} is not in docs/robot-file.md");
+    assert!(all["DriveEntry"].contains("motor_inertia"), "{all:?}");
+    assert!(keys(&LOADS)["LoadEntry"].contains("spindle_rpm"));
+    assert!(keys(&MOTION)["MoveToml"].contains("via") && keys(&MOTION)["FileToml"].contains("move"));
+    for (path, sources) in [("docs/robot-file.md", &ROBOT[..]), ("docs/loads.md", &LOADS), ("docs/motions.md", &MOTION)]
+    {
+        let page = read(path);
+        for (of, names) in &keys(sources) {
+            for name in names {
+                let shown = [format!("`{name}`"), format!("{name} ="), format!("{{ {name}"), format!(", {name}")];
+                assert!(shown.iter().any(|text| page.contains(text)), "{name} of {of} is not in {path}");
+            }
         }
     }
 }
 
-#[test]
-fn the_schema_has_the_same_keys() {
-    let schema: serde_json::Value = serde_json::from_str(&read("docs/robot.schema.json")).unwrap();
+/// Definitions of a schema by name, with the struct that each describes; the first is the whole file.
+fn same_keys(schema: &str, sources: &[&str], file: &str, definitions: &[(&str, &str)]) {
+    let schema: serde_json::Value = serde_json::from_str(&read(schema)).unwrap();
     let properties = |node: &serde_json::Value| -> BTreeSet<String> {
         node["properties"].as_object().unwrap().keys().cloned().collect()
     };
-    let all = keys(&ROBOT);
-    assert_eq!(properties(&schema), all["RobotFile"]);
-    for (definition, entry) in [
+    let all = keys(sources);
+    assert_eq!(properties(&schema), all[file]);
+    assert_eq!(schema["additionalProperties"], false);
+    for (definition, entry) in definitions {
+        let node = &schema["$defs"][definition];
+        assert_eq!(properties(node), all[*entry], "{definition}");
+        assert_eq!(node["additionalProperties"], false, "{definition}");
+    }
+}
+
+#[test]
+fn the_schemas_have_the_same_keys() {
+    let robot = [
         ("tcp", "TcpEntry"),
         ("payload", "PayloadEntry"),
         ("flexible_link", "FlexibleLinkEntry"),
@@ -140,9 +207,8 @@ fn the_schema_has_the_same_keys() {
         ("gearbox", "GearboxEntry"),
         ("friction", "FrictionEntry"),
         ("servo", "ServoEntry"),
-    ] {
-        let node = &schema["$defs"][definition];
-        assert_eq!(properties(node), all[entry], "{definition}");
-        assert_eq!(node["additionalProperties"], false, "{definition}");
-    }
+    ];
+    same_keys("docs/robot.schema.json", &ROBOT, "RobotFile", &robot);
+    same_keys("docs/loads.schema.json", &LOADS, "LoadsFile", &[("load", "LoadEntry"), ("payload", "PayloadChange")]);
+    same_keys("docs/motion.schema.json", &MOTION, "FileToml", &[("move", "MoveToml"), ("limits", "LimitsToml")]);
 }

@@ -9,10 +9,11 @@ use super::error::{ExchangeError, ExchangeErrorKind, Place};
 use super::matrix::{DofLabel, ImportedMatrices, LabelledMatrix, Storage, reordered};
 use super::recognise::{MatrixFormat, recognise};
 use super::sidecar::Sidecar;
-use super::text::{Text, unpack};
+use super::text::{LARGEST_UNPACKED, Text, unpack};
 use super::{
     abaqus_text, dmig, exudyn, harwell_boeing, matrix_market, op4_binary, op4_text, sidecar, simscape, user_element,
 };
+use crate::input::read_file;
 use crate::spatial::Pose;
 
 /// What a matrix is.
@@ -69,7 +70,7 @@ impl InputFile {
         let refuse = |error: std::io::Error| {
             Place::file(&origin).fail(ExchangeErrorKind::Unreadable, "file", error.to_string(), "a readable file", "")
         };
-        let bytes = std::fs::read(path.as_ref()).map_err(refuse)?;
+        let bytes = read_file(path.as_ref(), LARGEST_UNPACKED).map_err(refuse)?;
         Ok(Self { origin, bytes, role: None })
     }
 
@@ -168,7 +169,7 @@ fn wanted_by(file: &InputFile) -> Result<Vec<(PathBuf, Option<MatrixRole>)>, Exc
             let shorter = stem.rsplit_once('_').map_or(stem, |(head, _)| head);
             let sidecars = [stem, shorter].map(|stem| folder.join(format!("{stem}.toml")));
             let is_ours = |path: &PathBuf| {
-                std::fs::read(path).is_ok_and(|bytes| recognise(&bytes) == Some(MatrixFormat::Sidecar))
+                read_file(path, LARGEST_UNPACKED).is_ok_and(|bytes| recognise(&bytes) == Some(MatrixFormat::Sidecar))
             };
             wanted.extend(sidecars.into_iter().find(is_ours).map(|path| (path, None)));
         }

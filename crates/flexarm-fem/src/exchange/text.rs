@@ -6,30 +6,20 @@ use std::io::Read;
 use flate2::read::MultiGzDecoder;
 
 use super::error::{ExchangeError, ExchangeErrorKind, Place};
+use crate::input::{is_gzip, unpacked};
 
 /// No file is unpacked to more than this: a full model of 300 000 unknowns has half of it.
 pub(super) const LARGEST_UNPACKED: u64 = 2 << 30;
-
-/// Whether the bytes are packed with gzip.
-pub(super) fn is_gzip(bytes: &[u8]) -> bool {
-    bytes.starts_with(&[0x1f, 0x8b])
-}
 
 /// The bytes, unpacked if they are packed with gzip.
 pub(super) fn unpack<'b>(bytes: &'b [u8], origin: &str) -> Result<Cow<'b, [u8]>, ExchangeError> {
     if !is_gzip(bytes) {
         return Ok(Cow::Borrowed(bytes));
     }
-    let refuse = |found: String, expected: &str| {
-        let help = "is the file cut off? unpack it with gunzip to see";
-        Err(Place::file(origin).fail(ExchangeErrorKind::Unreadable, "gzip data", found, expected, help))
-    };
-    let mut unpacked = Vec::new();
-    match MultiGzDecoder::new(bytes).take(LARGEST_UNPACKED + 1).read_to_end(&mut unpacked) {
-        Err(error) => refuse(error.to_string(), "a whole gzip file"),
-        Ok(size) if size as u64 > LARGEST_UNPACKED => refuse(format!("more than {LARGEST_UNPACKED} bytes"), "less"),
-        Ok(_) => Ok(Cow::Owned(unpacked)),
-    }
+    let unpacked = unpacked(bytes, LARGEST_UNPACKED);
+    unpacked
+        .map(Cow::Owned)
+        .map_err(|e| Place::file(origin).fail(ExchangeErrorKind::Unreadable, "gzip data", e.found, e.expected, e.help))
 }
 
 /// The first bytes, unpacked; what cannot be unpacked ends the result without an error.

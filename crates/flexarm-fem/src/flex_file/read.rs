@@ -14,11 +14,14 @@ use super::{FORMAT, ORDER, VERSION};
 use crate::error::FemError;
 use crate::frames::LinkFrames;
 use crate::gate::GateLimits;
+use crate::input::read_file;
 use crate::reduced::{Provenance, ReducedLink};
 use crate::rigid_part::RigidPart;
 use crate::spatial::{Matrix12, turn6, twice};
 
 const PARTS: [&str; 2] = ["proximal", "distal"];
+/// A file larger than this is refused (bytes): a link with 100 modes and stiffness by load has 10 MB.
+const LARGEST: u64 = 256 << 20;
 
 /// Reads a reduced-link file.
 ///
@@ -27,7 +30,7 @@ const PARTS: [&str; 2] = ["proximal", "distal"];
 pub fn read_flex(path: impl AsRef<Path>) -> Result<ReducedLink, FlexFileError> {
     let path = path.as_ref();
     let origin = path.display().to_string();
-    match std::fs::read(path) {
+    match read_file(path, LARGEST) {
         Ok(bytes) => parse_flex_bytes(&bytes, &origin),
         Err(error) => Err(unreadable(&Document { text: "", origin: &origin }, 0, error.to_string())),
     }

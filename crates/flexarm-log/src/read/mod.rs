@@ -150,6 +150,10 @@ fn check_kind(path: &Path, expected: RecordingFormat) -> Result<(), LogError> {
         let inside = path.join(format!("run.{}", expected.extension()));
         return refuse("a folder", format!("give a file in it, such as {}", inside.display()));
     }
+    // A device might never end, a pipe never begin.
+    if path.exists() && !path.is_file() {
+        return refuse("what is not a file", "write it to a file first".into());
+    }
     let mut start = Vec::new();
     let file = std::fs::File::open(path).map_err(LogError::io(path, "open the recording"))?;
     file.take(64).read_to_end(&mut start).map_err(LogError::io(path, "read the recording"))?;

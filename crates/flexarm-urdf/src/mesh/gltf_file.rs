@@ -13,7 +13,7 @@ use gltf::json::{Index, Node, Root};
 use nalgebra::{Matrix3, Matrix4, Quaternion, UnitQuaternion, Vector3, Vector4};
 
 use super::collada::Transform;
-use super::{MAX_TRIANGLES, MeshError, TriangleMesh, dominant_color, stl};
+use super::{LARGEST, MAX_TRIANGLES, MeshError, TriangleMesh, dominant_color, stl};
 
 /// Nodes below nodes; deeper is taken for a cycle.
 const MAX_DEPTH: usize = 64;
@@ -91,6 +91,10 @@ fn read_buffers(root: &Root, mut blob: Option<Vec<u8>>, path: &Path) -> Result<V
                     let file = path.with_file_name(uri);
                     if !file.is_file() {
                         return Err(missing(format!("its buffer {uri:?} is not beside it")));
+                    }
+                    let large = std::fs::metadata(&file).is_ok_and(|meta| meta.len() > LARGEST);
+                    if large {
+                        return Err(missing(format!("its buffer {uri:?} has more than {LARGEST} bytes")));
                     }
                     std::fs::read(&file).map_err(|source| MeshError::Io { path: file, source })?
                 }

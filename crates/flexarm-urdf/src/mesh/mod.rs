@@ -34,6 +34,9 @@ pub use mass::MassProperties;
 /// A file that places its meshes so often that it has more than this is taken for a trap.
 const MAX_TRIANGLES: usize = 50_000_000;
 
+/// A file larger than this is refused (bytes): 20 million triangles of a binary STL.
+const LARGEST: u64 = 1 << 30;
+
 /// Triangles with shared vertices; counter-clockwise seen from outside.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TriangleMesh {
@@ -134,8 +137,13 @@ pub(crate) struct Loaded {
 pub(crate) fn load_with_remarks(path: &Path, up_axis: UpAxis) -> Result<Loaded, MeshError> {
     let io_error = |source| MeshError::Io { path: path.to_owned(), source };
     // Not a device or a pipe, which might never end.
-    if !std::fs::metadata(path).map_err(io_error)?.is_file() {
+    let meta = std::fs::metadata(path).map_err(io_error)?;
+    if !meta.is_file() {
         return Err(io_error(std::io::Error::other("this is not a file")));
+    }
+    if meta.len() > LARGEST {
+        let what = format!("{} bytes, more than the {LARGEST} that are read", meta.len());
+        return Err(io_error(std::io::Error::new(std::io::ErrorKind::FileTooLarge, what)));
     }
     decode(&std::fs::read(path).map_err(io_error)?, path, up_axis)
 }

@@ -171,6 +171,10 @@ impl ReduceJob {
             Error::File { path: path.to_owned(), what }
         };
         let mut bytes = Vec::new();
+        // A device might never end, a pipe never begin.
+        if !std::fs::metadata(path).map_err(unreadable)?.is_file() {
+            return Err(unreadable(std::io::Error::other("this is not a file")));
+        }
         let file = std::fs::File::open(path).map_err(unreadable)?;
         file.take(LONGEST_JOB + 1).read_to_end(&mut bytes).map_err(unreadable)?;
         let is_toml = path.extension().is_some_and(|e| e == "toml");
