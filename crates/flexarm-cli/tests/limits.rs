@@ -187,6 +187,16 @@ fn a_motion_of_100_000_waypoints_is_read_in_seconds() {
     assert!(answer.code == 0 && begin.elapsed() < Duration::from_secs(60), "{:?}: {}", begin.elapsed(), answer.err);
 }
 
+/// JSON writes what is no number as null: an answer that overflows is refused instead.
+#[test]
+fn answers_that_overflow_are_refused() {
+    let place = Place::new();
+    refused_at_once(&place, &["inspect", "robot.toml", "--velocity", "1e300", "--json"], &["finite", "joint value"]);
+    place.write("robot.toml", with(ROBOT, "-9.81", "-1e308"));
+    let answer = place.flexarm(&["statics", "robot.toml", "--json"]);
+    assert!(answer.code != 0 && answer.out.is_empty() && !answer.err.is_empty(), "{answer:?}");
+}
+
 #[test]
 fn names_of_a_megabyte_are_no_danger() {
     let place = Place::new();

@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use crate::error::Error;
 use crate::options::Modelling;
+use crate::posed::all_finite;
 use crate::robot::{Robot, TCP_FRAME};
 
 /// Answer of `flexarm inspect`. SI units; the Jacobian's rows are linear first, world axes, at the TCP.
@@ -194,6 +195,8 @@ pub fn inspect(robot: &Robot, at: Option<&str>, velocity: Option<&str>) -> Resul
     frame_jacobian(&model, &data, tcp, &mut J);
     let X = data.X_WF(tcp);
     let attitude = UnitQuaternion::from_rotation_matrix(&X.rotation);
+    all_finite("the place of the TCP and its Jacobian", X.translation.vector.iter().chain(&J))?;
+    all_finite("the mass matrix and the torques", M.iter().chain(&gravity).chain(&bias))?;
 
     let joints = model.coordinates().iter().map(|c| JointInfo {
         name: c.joint.clone(),

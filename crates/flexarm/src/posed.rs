@@ -119,3 +119,16 @@ impl Posed {
 pub(crate) fn step_error(source: StepError) -> Error {
     failed(source)
 }
+
+/// Figures of an answer, which must be numbers.
+///
+/// # Errors
+/// [`Error::Usage`]: masses, lengths or joint values of 1e200 overflow on the way.
+pub(crate) fn all_finite<'a>(what: &str, values: impl IntoIterator<Item = &'a f64>) -> Result<(), Error> {
+    match values.into_iter().all(|x| x.is_finite()) {
+        true => Ok(()),
+        false => Err(Error::Usage(format!(
+            "{what} are no finite numbers: a mass, a length, a stiffness, a force or a joint value is far too large or too small"
+        ))),
+    }
+}

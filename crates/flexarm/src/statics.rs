@@ -8,7 +8,7 @@ use serde::Serialize;
 use crate::caveat::{self, Caveat};
 use crate::error::Error;
 use crate::options::Modelling;
-use crate::posed::{Posed, step_error};
+use crate::posed::{Posed, all_finite, step_error};
 use crate::reduce::numbers;
 use crate::robot::Robot;
 
@@ -96,6 +96,10 @@ pub fn statics(robot: &Robot, modelling: &Modelling, at: Option<&str>, wrench: [
     let displacement = tcp_error(&X_rigid, &loaded.X_WT);
     let sag = tcp_error(&X_rigid, &weight.X_WT);
     let C = loaded.compliance().map_err(step_error)?;
+
+    all_finite("the displacements", displacement.iter().chain(&sag))?;
+    all_finite("the compliances", &C)?;
+    all_finite("the holding torques", &loaded.holding)?;
 
     // To first order each element's share is its deflection by the Jacobian of the rigid pose.
     let model = &posed.arm.model;
