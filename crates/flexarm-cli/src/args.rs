@@ -83,6 +83,9 @@ pub(crate) struct RobotArgs {
     /// Where package://NAME/ leads (may be repeated)
     #[arg(long = "package", hide_short_help = true, value_name = "NAME=FOLDER")]
     pub(crate) packages: Vec<String>,
+    /// Argument of a xacro file, before those of the robot file (may be repeated)
+    #[arg(long = "arg", value_name = "NAME=VALUE")]
+    pub(crate) arguments: Vec<String>,
     /// Estimate missing inertias from the meshes with this density (kg/m^3)
     #[arg(
         long,

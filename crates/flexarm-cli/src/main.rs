@@ -128,6 +128,15 @@ fn load_options(args: &RobotArgs) -> Result<LoadOptions, Error> {
             .ok_or_else(|| Error::Usage(format!("--package {package:?}: expected NAME=FOLDER")))?;
         urdf.packages.push((name.to_owned(), folder.into()));
     }
+    for argument in &args.arguments {
+        // NAME:=VALUE is how ROS writes it
+        let (name, value) = argument
+            .split_once(":=")
+            .or_else(|| argument.split_once('='))
+            .filter(|(name, _)| !name.trim().is_empty())
+            .ok_or_else(|| Error::Usage(format!("--arg {argument:?}: expected NAME=VALUE")))?;
+        urdf.arguments.push((name.trim().to_owned(), value.to_owned()));
+    }
     let positive = |x: f64, what: &str| {
         if x.is_finite() && x > 0.0 { Ok(x) } else { Err(Error::Usage(format!("{what} must be positive, found {x}"))) }
     };

@@ -65,12 +65,6 @@ pub(crate) fn read_document(root: Node<'_, '_>, lines: &Lines<'_>, report: &mut 
         reader.report.error(&place, Problem::NotUrdf { root: root.tag_name().name().to_owned() });
         return None;
     }
-    if let Some((place, found)) = unexpanded_xacro(root, lines) {
-        let file = &reader.report.file;
-        let command = format!("xacro {} > expanded.urdf", file.display());
-        reader.report.error(&place, Problem::UnexpandedXacro { found, command });
-        return None;
-    }
     let found = elements(root).filter(|n| matches!(n.tag_name().name(), "link" | "joint")).count();
     if found > MOST_ELEMENTS {
         reader.report.error(&place, Problem::TooManyElements { found, most: MOST_ELEMENTS });
@@ -88,18 +82,6 @@ fn version(root: Node<'_, '_>) -> (u32, u32) {
         .unwrap_or((1, 0))
 }
 
-/// The first element or attribute that only the xacro program understands.
-fn unexpanded_xacro(root: Node<'_, '_>, lines: &Lines<'_>) -> Option<(Place, String)> {
-    root.descendants().filter(Node::is_element).find_map(|node| {
-        let name = node.tag_name();
-        if name.namespace().is_some_and(|ns| ns.contains("xacro")) {
-            return Some((lines.of(node), format!("<xacro:{}>", name.name())));
-        }
-        let attribute = node.attributes().find(|a| a.value().contains("${") || a.value().contains("$("))?;
-        Some((lines.of(node), format!("{}={:?}", attribute.name(), attribute.value())))
-    })
-}
-
 struct Reader<'a, 't> {
     lines: &'a Lines<'t>,
     report: &'a mut Report,
@@ -113,6 +95,7 @@ impl Reader<'_, '_> {
             name: root.attribute("name").unwrap_or("").to_owned(),
             place: place.clone(),
             open_limits: version(root) >= (1, 2),
+            idle_macros: Vec::new(),
             links: Vec::new(),
             joints: Vec::new(),
             transmissions: Vec::new(),

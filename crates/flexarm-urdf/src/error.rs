@@ -18,9 +18,9 @@ pub enum UrdfError {
         #[source]
         source: std::io::Error,
     },
-    /// The xacro program is missing or refused the file.
-    #[error(transparent)]
-    Xacro(#[from] XacroError),
+    /// A xacro file that does not make a description.
+    #[error("{0}")]
+    Xacro(#[source] Box<XacroError>),
     /// The file was read and something is wrong in it. All faults are listed, in the order of the file.
     #[error("{}", listed(issues))]
     Invalid {
@@ -52,9 +52,9 @@ impl UrdfError {
             Self::Xacro(error) => vec![Finding {
                 severity: Severity::Error,
                 code: "xacro",
-                location: error.path().display().to_string(),
-                message: error.to_string(),
-                help: String::new(),
+                location: format!("{}:{}", error.place.file.display(), error.place.line),
+                message: error.whole_message(),
+                help: error.help.clone(),
             }],
         }
     }
@@ -64,63 +64,35 @@ fn listed(issues: &[Issue]) -> String {
     issues.iter().map(Issue::to_string).collect::<Vec<_>>().join("\n")
 }
 
-/// Why a `.xacro` file could not be expanded.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum XacroError {
-    /// There is no such program.
-    #[error(
-        "{}: this is a xacro file and the program {} is not installed; where ROS is, run\n  \
-         xacro {file} > {urdf}\nand use {urdf}",
-        path.display(), program.display(), file = file_name(path), urdf = expanded_name(path)
-    )]
-    NotInstalled {
-        /// The xacro file.
-        path: PathBuf,
-        /// What was looked for.
-        program: PathBuf,
-    },
-    /// The program exists and cannot be started.
-    #[error("{}: {} cannot be started", path.display(), program.display())]
-    NotStarted {
-        /// The xacro file.
-        path: PathBuf,
-        /// What was started.
-        program: PathBuf,
-        /// What the system said.
-        #[source]
-        source: std::io::Error,
-    },
-    /// The program ended with an error.
-    #[error("{}: xacro failed ({status}) and said:\n{}", path.display(), stderr.trim_end())]
-    Failed {
-        /// The xacro file.
-        path: PathBuf,
-        /// How it ended.
-        status: String,
-        /// What it wrote to its standard error.
-        stderr: String,
-    },
+/// Why a xacro file could not be expanded: the first thing that went wrong.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct XacroError {
+    /// The element.
+    pub place: Place,
+    /// What is wrong.
+    pub message: String,
+    /// How to mend it; may be empty.
+    pub help: String,
+    /// Macro calls and files that led there, the innermost first.
+    pub trail: Vec<String>,
 }
 
 impl XacroError {
-    fn path(&self) -> &PathBuf {
-        match self {
-            Self::NotInstalled { path, .. } | Self::NotStarted { path, .. } | Self::Failed { path, .. } => path,
-        }
+    /// What is wrong, and how it came there.
+    fn whole_message(&self) -> String {
+        let steps = self.trail.iter().map(|step| format!("\n  {step}"));
+        self.message.clone() + &steps.collect::<String>()
     }
 }
 
-fn file_name(path: &std::path::Path) -> String {
-    path.display().to_string()
+impl fmt::Display for XacroError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.place, self.whole_message())?;
+        if self.help.is_empty() { Ok(()) } else { write!(f, "\n  help: {}", self.help) }
+    }
 }
 
-/// `robot.urdf.xacro` and `robot.xacro` both become `robot.urdf`.
-pub(crate) fn expanded_name(path: &std::path::Path) -> String {
-    let bare = path.with_extension("");
-    let bare = if bare.extension().is_some_and(|e| e == "urdf") { bare } else { bare.with_extension("urdf") };
-    bare.display().to_string()
-}
+impl std::error::Error for XacroError {}
 
 /// One fault and its place.
 #[derive(Clone, Debug, PartialEq)]
@@ -165,15 +137,12 @@ pub enum Problem {
     /// Well-formed XML with another root element.
     #[error("the root element is <{root}>, expected <robot>")]
     NotUrdf { root: String },
-    /// A xacro file under the name of a URDF.
-    #[error("{found} is xacro, which was not expanded")]
-    UnexpandedXacro { found: String, command: String },
-    /// A robot without any link.
-    #[error("the robot {robot:?} has no <link>")]
-    NoLink { robot: String },
     /// More links or joints than any robot has.
     #[error("the robot has {found} links and joints, at most {most} are read")]
     TooManyElements { found: usize, most: usize },
+    /// A robot without any link.
+    #[error("the robot {robot:?} has no <link>{}", macros_text(idle_macros))]
+    NoLink { robot: String, idle_macros: Vec<String> },
     /// A child element that URDF demands.
     #[error("{owner} has no <{element}>")]
     MissingElement { owner: String, element: &'static str },
@@ -262,7 +231,6 @@ impl Problem {
             Self::NotUtf8 { .. } => "not-utf8",
             Self::Malformed { .. } => "malformed-xml",
             Self::NotUrdf { .. } => "not-urdf",
-            Self::UnexpandedXacro { .. } => "unexpanded-xacro",
             Self::NoLink { .. } => "no-link",
             Self::TooManyElements { .. } => "too-many-elements",
             Self::MissingElement { .. } => "missing-element",
@@ -303,7 +271,11 @@ impl Problem {
                 "COLLADA" => "this is a mesh; give the URDF that refers to it".into(),
                 _ => "give a URDF file".into(),
             },
-            Self::UnexpandedXacro { command, .. } => format!("run `{command}` and use its output"),
+            Self::NoLink { idle_macros, .. } if !idle_macros.is_empty() => {
+                let calls = idle_macros.iter().take(3).map(|name| format!("<xacro:{name} .../>"));
+                let calls = calls.collect::<Vec<_>>().join(", ");
+                format!("give the file that calls them, or one that includes this one and calls {calls}")
+            }
             Self::NoLink { .. } => "is the file complete? A robot needs at least one <link>".into(),
             Self::TooManyElements { .. } => {
                 "is this one robot? Arms have some dozens of links: leave out what does not move with it".into()
@@ -369,6 +341,10 @@ impl Problem {
 
 fn quoted(names: &[String]) -> String {
     names.iter().map(|n| format!("{n:?}")).collect::<Vec<_>>().join(", ")
+}
+
+fn macros_text(idle: &[String]) -> &'static str {
+    if idle.is_empty() { "" } else { ": the file defines macros and calls none" }
 }
 
 fn lumped_text(lumped: &[String]) -> String {

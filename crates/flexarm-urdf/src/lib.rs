@@ -3,7 +3,7 @@
 //! Start at [`read_urdf`], which gives a [`Mechanism`](flexarm_kinematics::Mechanism) with the shapes of its links,
 //! or at [`check_urdf`], which lists everything that is wrong or doubtful. Every error names file, line, what was found
 //! and how to mend it, and all of them come at once. Nothing is printed and, but for
-//! [`search_paths_from_environment`], no environment is read (a xacro program is found by the system).
+//! [`search_paths_from_environment`] and the `$(env NAME)` of a xacro file, no environment is read.
 //!
 //! ```
 //! use flexarm_urdf::{ReadOptions, check_urdf_text, default_tcp, parse_urdf};
@@ -69,8 +69,8 @@ pub use finding::{Finding, Place, Severity};
 pub use geometry::{Geometry, Visual};
 pub use mesh::{MassProperties, MeshError, TriangleMesh, UpAxis, load_mesh, load_mesh_with};
 pub use read::{
-    InertiaEstimate, JointDynamics, ReadOptions, Transmission, UrdfRobot, check_urdf, check_urdf_text, parse_urdf,
-    read_urdf,
+    InertiaEstimate, JointDynamics, ReadOptions, Transmission, UrdfRobot, check_urdf, check_urdf_text, expand_xacro,
+    parse_urdf, read_urdf,
 };
 pub use resolve::search_paths_from_environment;
 pub use tcp::{default_tcp, tcp_candidates};

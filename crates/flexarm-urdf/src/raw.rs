@@ -13,6 +13,8 @@ pub(crate) struct RawRobot {
     pub(crate) place: Place,
     /// Limits that are not written are infinite (URDF 1.2 and later), not zero.
     pub(crate) open_limits: bool,
+    /// Macros of a file that calls none of them.
+    pub(crate) idle_macros: Vec<String>,
     pub(crate) links: Vec<RawLink>,
     pub(crate) joints: Vec<RawJoint>,
     pub(crate) transmissions: Vec<RawTransmission>,

@@ -32,10 +32,8 @@ pub struct ReadOptions {
     pub inspect_meshes: bool,
     /// What to do with the up axis of COLLADA meshes.
     pub up_axis: UpAxis,
-    /// The program that expands `.xacro` files; a bare name is looked for by the system.
-    pub xacro_program: PathBuf,
-    /// Arguments for it, such as `"prefix:=left_"`.
-    pub xacro_arguments: Vec<String>,
+    /// Values of `$(arg name)` in xacro files, by name.
+    pub arguments: Vec<(String, String)>,
 }
 
 impl Default for ReadOptions {
@@ -47,8 +45,7 @@ impl Default for ReadOptions {
             waive: Vec::new(),
             inspect_meshes: true,
             up_axis: UpAxis::Declared,
-            xacro_program: PathBuf::from("xacro"),
-            xacro_arguments: Vec::new(),
+            arguments: Vec::new(),
         }
     }
 }
@@ -69,7 +66,7 @@ pub enum InertiaEstimate {
 pub struct UrdfRobot {
     /// Links, joints and masses. Every link of the file is there, frames without mass too.
     pub mechanism: Mechanism,
-    /// The URDF, expanded if it was xacro.
+    /// The URDF, expanded if it was xacro: without comments then.
     pub text: String,
     /// What the links look like, in the order of the file.
     pub visuals: Vec<Visual>,
@@ -105,38 +102,46 @@ pub struct Transmission {
     pub reduction: Option<f64>,
 }
 
-/// Reads a `.urdf` file, or a `.xacro` file where the xacro program is installed.
+/// Reads a `.urdf` or `.xacro` file; a URDF with xacro in it counts as xacro.
 ///
 /// # Errors
-/// [`UrdfError`]: unreadable, not expanded, or all faults in it with their lines.
+/// [`UrdfError`]: unreadable, xacro that does not make a description, or all faults in it with their lines.
 pub fn read_urdf(path: impl AsRef<Path>, options: &ReadOptions) -> Result<UrdfRobot, UrdfError> {
     let path = path.as_ref();
-    let (text, shown) = load_text(path, options)?;
-    parse(&text, &shown, folder_of(path), options).0
+    parse(&load_text(path)?, path, options).0
 }
 
-/// Reads URDF text; `origin_path` serves messages, and its folder relative mesh paths.
+/// Reads URDF or xacro text; `origin_path` serves messages, and its folder relative paths.
 ///
 /// # Errors
-/// [`UrdfError::Invalid`] with all faults and their lines.
+/// As [`read_urdf`], but for reading the text itself.
 pub fn parse_urdf(text: &str, origin_path: impl AsRef<Path>, options: &ReadOptions) -> Result<UrdfRobot, UrdfError> {
-    let path = origin_path.as_ref();
-    parse(text, path, folder_of(path), options).0
+    parse(text, origin_path.as_ref(), options).0
+}
+
+/// The URDF that a xacro file stands for, as text; comments are left out.
+///
+/// # Errors
+/// [`UrdfError`] if it cannot be read or does not make a document. Whether that is a robot is not looked at.
+pub fn expand_xacro(path: impl AsRef<Path>, options: &ReadOptions) -> Result<String, UrdfError> {
+    let path = path.as_ref();
+    let text = load_text(path)?;
+    let expanded = xacro::expand(&text, path, &resolver(path, options), &options.arguments)?;
+    Ok(expanded.text)
 }
 
 /// Everything that can be said about a file: errors, warnings and notes, in the order of the file.
 pub fn check_urdf(path: impl AsRef<Path>, options: &ReadOptions) -> Vec<Finding> {
     let path = path.as_ref();
-    match load_text(path, options) {
-        Ok((text, shown)) => all_findings(parse(&text, &shown, folder_of(path), options)),
+    match load_text(path) {
+        Ok(text) => all_findings(parse(&text, path, options)),
         Err(error) => error.findings(),
     }
 }
 
 /// As [`check_urdf`], for text.
 pub fn check_urdf_text(text: &str, origin_path: impl AsRef<Path>, options: &ReadOptions) -> Vec<Finding> {
-    let path = origin_path.as_ref();
-    all_findings(parse(text, path, folder_of(path), options))
+    all_findings(parse(text, origin_path.as_ref(), options))
 }
 
 fn all_findings((result, report): (Result<UrdfRobot, UrdfError>, Report)) -> Vec<Finding> {
@@ -157,12 +162,12 @@ const LARGEST: u64 = 64 << 20;
 /// Elements nested deeper are left to the readers that can stand it.
 const MAX_DEPTH: usize = 64;
 
-fn folder_of(path: &Path) -> PathBuf {
-    path.parent().map(Path::to_owned).unwrap_or_default()
+fn resolver<'a>(path: &Path, options: &'a ReadOptions) -> Resolver<'a> {
+    let folder = path.parent().map(Path::to_owned).unwrap_or_default();
+    Resolver { folder, packages: &options.packages, search_paths: &options.search_paths }
 }
 
-/// The text and the name under which its lines are cited.
-fn load_text(path: &Path, options: &ReadOptions) -> Result<(String, PathBuf), UrdfError> {
+fn load_text(path: &Path) -> Result<String, UrdfError> {
     let io_error = |source| UrdfError::Io { path: path.to_owned(), source };
     let meta = std::fs::metadata(path).map_err(io_error)?;
     if meta.is_dir() {
@@ -176,48 +181,76 @@ fn load_text(path: &Path, options: &ReadOptions) -> Result<(String, PathBuf), Ur
         let what = format!("{} bytes, more than the {LARGEST} that are read", meta.len());
         return Err(io_error(std::io::Error::new(std::io::ErrorKind::FileTooLarge, what)));
     }
-    let (bytes, shown) = if xacro::is_xacro(path) {
-        let expanded = xacro::expand(path, &options.xacro_program, &options.xacro_arguments)?;
-        (expanded, PathBuf::from(format!("{} (expanded)", path.display())))
-    } else {
-        (std::fs::read(path).map_err(io_error)?, path.to_owned())
-    };
-    let text = xml::decode(bytes, &shown).map_err(|issue| UrdfError::Invalid { issues: vec![*issue] })?;
-    Ok((text, shown))
+    let bytes = std::fs::read(path).map_err(io_error)?;
+    xml::decode(bytes, path).map_err(|issue| UrdfError::Invalid { issues: vec![*issue] })
 }
 
-fn parse(text: &str, shown: &Path, folder: PathBuf, options: &ReadOptions) -> (Result<UrdfRobot, UrdfError>, Report) {
-    let mut report = Report::new(shown.to_owned());
+fn parse(text: &str, path: &Path, options: &ReadOptions) -> (Result<UrdfRobot, UrdfError>, Report) {
+    let mut report = Report::default();
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let lines = xml::Lines::new(shown, text);
+    let resolver = resolver(path, options);
+    if !(xacro::is_xacro(path) || xacro::has_xacro(text)) {
+        if let Some((name, _)) = options.arguments.first() {
+            let message = format!("the argument {name:?} has no effect: the file is no xacro");
+            report.warning(&xml::Lines::new(path, text).place(0), "unused-argument", message, "remove it");
+        }
+        let result = parse_expanded(text, xml::Lines::new(path, text), &[], &resolver, options, &mut report);
+        return (result, report);
+    }
+    let expanded = match xacro::expand(text, path, &resolver, &options.arguments) {
+        Ok(expanded) => expanded,
+        Err(error) => return (Err(error), report),
+    };
+    report.take(expanded.remarks);
+    let lines = xml::Lines::new(path, &expanded.text).with_origins(&expanded.origins);
+    let result = parse_expanded(&expanded.text, lines, &expanded.idle_macros, &resolver, options, &mut report);
+    (result, report)
+}
+
+fn parse_expanded(
+    text: &str,
+    lines: xml::Lines<'_>,
+    idle_macros: &[String],
+    resolver: &Resolver<'_>,
+    options: &ReadOptions,
+    report: &mut Report,
+) -> Result<UrdfRobot, UrdfError> {
     let mut deep = false;
     let raw = match xml::parse(text, &lines) {
         Ok(document) => {
             deep = document.descendants().any(|n| n.ancestors().nth(MAX_DEPTH).is_some());
-            read_document(document.root_element(), &lines, &mut report)
+            read_document(document.root_element(), &lines, report)
         }
         Err(issue) => {
             report.issues.push(*issue);
             None
         }
     };
-    let robot = raw.map(|raw| assemble(&raw, text, folder, options, &mut report));
-    let result = match robot {
+    let robot = raw.map(|mut raw| {
+        raw.idle_macros = idle_macros.to_vec();
+        assemble(&raw, text, resolver, options, report)
+    });
+    match robot {
         Some(mut robot) if report.issues.is_empty() => {
             // it recurses, and would overflow the stack
             if !deep {
-                ask_second_reader(text, &robot.mechanism, &lines.place(0), &mut report);
+                ask_second_reader(text, &robot.mechanism, &lines.place(0), report);
             }
             robot.warnings = report.remarks();
             Ok(robot)
         }
         _ => Err(UrdfError::Invalid { issues: report.sorted_issues() }),
-    };
-    (result, report)
+    }
 }
 
 /// All checks, each as far as the ones before it allow, and the robot, which counts only without errors.
-fn assemble(raw: &RawRobot, text: &str, folder: PathBuf, options: &ReadOptions, report: &mut Report) -> UrdfRobot {
+fn assemble(
+    raw: &RawRobot,
+    text: &str,
+    resolver: &Resolver<'_>,
+    options: &ReadOptions,
+    report: &mut Report,
+) -> UrdfRobot {
     let faults = report.issues.len();
     tree::check_names(raw, report);
     tree::check_tree(raw, report);
@@ -226,8 +259,7 @@ fn assemble(raw: &RawRobot, text: &str, folder: PathBuf, options: &ReadOptions, 
     let mut mechanism = Mechanism::new(&raw.name);
     mechanism.joints = joints::convert_joints(raw, report);
 
-    let resolver = Resolver { folder, packages: &options.packages, search_paths: &options.search_paths };
-    let visuals = shapes::find_visuals(raw, &resolver, options.up_axis, report);
+    let visuals = shapes::find_visuals(raw, resolver, options.up_axis, report);
     let shapes = if options.inspect_meshes || options.inertia_from_mesh.is_some() {
         shapes::inspect(raw, &visuals, report)
     } else {

@@ -1,14 +1,11 @@
 //! Collects what the checks find, so that all faults come out at once.
 
-use std::path::PathBuf;
-
 use crate::error::{Issue, Problem};
 use crate::finding::{Finding, Place, Severity};
 
 /// Faults, warnings and notes about one file.
+#[derive(Default)]
 pub(crate) struct Report {
-    /// The file as the user named it.
-    pub(crate) file: PathBuf,
     /// Errors.
     pub(crate) issues: Vec<Issue>,
     /// Warnings and notes, with the line for sorting.
@@ -16,10 +13,6 @@ pub(crate) struct Report {
 }
 
 impl Report {
-    pub(crate) fn new(file: PathBuf) -> Self {
-        Self { file, issues: Vec::new(), remarks: Vec::new() }
-    }
-
     pub(crate) fn error(&mut self, place: &Place, problem: Problem) {
         self.issues.push(Issue { place: place.clone(), problem });
     }
@@ -35,6 +28,12 @@ impl Report {
     fn remark(&mut self, severity: Severity, place: &Place, code: &'static str, message: String, help: String) {
         let location = format!("{}:{}", place.file.display(), place.line);
         self.remarks.push((place.line, Finding { severity, code, location, message, help }));
+    }
+
+    /// Takes over what was found before.
+    pub(crate) fn take(&mut self, findings: Vec<Finding>) {
+        let line = |f: &Finding| f.location.rsplit(':').next().and_then(|l| l.parse().ok()).unwrap_or(0);
+        self.remarks.extend(findings.into_iter().map(|finding| (line(&finding), finding)));
     }
 
     /// Warnings and notes in the order of the file.

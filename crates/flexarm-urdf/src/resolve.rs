@@ -73,6 +73,19 @@ impl Resolver<'_> {
         })
     }
 
+    /// The folder of a package, as an absolute path; `near` is the folder of the file that asks for it.
+    pub(crate) fn find_package(&self, package: &str, near: Option<&Path>) -> Result<PathBuf, NotFound> {
+        let mut found = self.package_folders(package).into_iter().next();
+        for start in near.into_iter().chain([self.folder.as_path()]) {
+            found = found.or_else(|| neighbour(start, package));
+        }
+        let found = found.map(|folder| std::path::absolute(&folder).unwrap_or(folder));
+        found.ok_or_else(|| NotFound {
+            reason: format!("the package {package:?} was not found"),
+            help: format!("say where it is with --package {package}=FOLDER, or by packages in the robot file"),
+        })
+    }
+
     /// All folders that may be the package, best first.
     fn package_folders(&self, package: &str) -> Vec<PathBuf> {
         if package.is_empty() || package == "." || package == ".." {
@@ -107,6 +120,16 @@ impl Resolver<'_> {
         folders.retain(|folder| folder.is_dir());
         folders
     }
+}
+
+/// A package beside the one that holds `start`, whose folder has another name.
+fn neighbour(start: &Path, package: &str) -> Option<PathBuf> {
+    let start = std::path::absolute(start).ok()?;
+    let own = start.ancestors().find(|folder| folder.join("package.xml").is_file())?;
+    let beside = std::fs::read_dir(own.parent()?).ok()?.flatten().take(1000);
+    let mut folders: Vec<PathBuf> = beside.map(|entry| entry.path()).filter(|path| path.is_dir()).collect();
+    folders.sort();
+    folders.into_iter().find(|folder| is_package(folder, package))
 }
 
 /// True if the folder bears the package's name or its `package.xml` does.

@@ -15,7 +15,8 @@ use crate::spelling::closest;
 /// Reports links and joints of one name; only the first counts in what follows.
 pub(crate) fn check_names(robot: &RawRobot, report: &mut Report) {
     if robot.links.is_empty() && report.issues.is_empty() {
-        report.error(&robot.place, Problem::NoLink { robot: robot.name.clone() });
+        report
+            .error(&robot.place, Problem::NoLink { robot: robot.name.clone(), idle_macros: robot.idle_macros.clone() });
     }
     let mut first: HashMap<&str, u32> = HashMap::new();
     for link in &robot.links {

@@ -14,17 +14,27 @@ pub(crate) struct Lines<'t> {
     file: PathBuf,
     text: &'t str,
     starts: Vec<usize>,
+    /// Where each line was written, if the text is made from other files.
+    origins: &'t [Place],
 }
 
 impl<'t> Lines<'t> {
     pub(crate) fn new(file: &Path, text: &'t str) -> Self {
         let starts = std::iter::once(0).chain(text.match_indices('\n').map(|(at, _)| at + 1)).collect();
-        Self { file: file.to_owned(), text, starts }
+        Self { file: file.to_owned(), text, starts, origins: &[] }
+    }
+
+    /// The same for a text whose lines come from somewhere else.
+    pub(crate) fn with_origins(self, origins: &'t [Place]) -> Self {
+        Self { origins, ..self }
     }
 
     /// The place of a byte offset.
     pub(crate) fn place(&self, offset: usize) -> Place {
         let row = self.starts.partition_point(|&start| start <= offset) - 1;
+        if let Some(origin) = self.origins.get(row) {
+            return origin.clone();
+        }
         let before = self.text.get(self.starts[row]..offset).unwrap_or("");
         Place { file: self.file.clone(), line: row as u32 + 1, column: before.chars().count() as u32 + 1 }
     }

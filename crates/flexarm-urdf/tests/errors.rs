@@ -4,9 +4,7 @@
 mod common;
 
 use common::{TestFolder, hinge, link, problem, problems, problems_with, robot, with_joint};
-use flexarm_urdf::{
-    Problem, ReadOptions, Severity, UrdfError, XacroError, check_urdf, check_urdf_text, parse_urdf, read_urdf,
-};
+use flexarm_urdf::{Problem, ReadOptions, Severity, UrdfError, check_urdf, check_urdf_text, parse_urdf, read_urdf};
 
 #[track_caller]
 fn assert_code(text: &str, line: u32, code: &str) {
@@ -44,8 +42,7 @@ fn other_files_are_recognised() {
     assert_code("<sdf/>", 1, "not-urdf");
     assert!(problem("<mujoco/>").1.help().contains("MJCF"));
     let macros = "<robot xmlns:xacro='http://www.ros.org/wiki/xacro'>\n<xacro:macro name='m'/></robot>";
-    assert_code(macros, 2, "unexpanded-xacro");
-    assert_code("<robot name='r'>\n<link name='${prefix}a'/></robot>", 2, "unexpanded-xacro");
+    assert_code(macros, 1, "no-link");
     let folder = TestFolder::new();
     let path = folder.write("a.urdf", b"<robot name='\xff'/>");
     let error = read_urdf(&path, &ReadOptions::default()).unwrap_err();
@@ -290,41 +287,4 @@ fn all_faults_come_at_once_in_the_order_of_the_file() {
     assert_eq!(error.to_string().matches("arm.urdf:").count(), 6);
     assert_eq!(error.to_string().matches("help: ").count(), 6);
     assert_eq!(error.findings()[0].location, "arm.urdf:3");
-}
-
-#[test]
-fn a_missing_xacro_program_gives_the_command_to_run() {
-    let folder = TestFolder::new();
-    let path = folder.write("robot.urdf.xacro", "<robot/>");
-    let options = ReadOptions { xacro_program: "no-such-xacro".into(), ..ReadOptions::default() };
-    let error = read_urdf(&path, &options).unwrap_err();
-    assert!(matches!(error, UrdfError::Xacro(XacroError::NotInstalled { .. })));
-    let text = error.to_string();
-    let expected = format!("xacro {} > {}", path.display(), folder.0.join("robot.urdf").display());
-    assert!(text.contains(&expected), "{text}");
-    assert_eq!(check_urdf(&path, &options)[0].code, "xacro");
-}
-
-#[cfg(unix)]
-#[test]
-fn xacro_is_run_and_its_complaint_passed_on() {
-    use std::os::unix::fs::PermissionsExt;
-    let folder = TestFolder::new();
-    let program = |name: &str, script: &str| {
-        let path = folder.write(name, format!("#!/bin/sh\n{script}\n"));
-        std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o755)).unwrap();
-        ReadOptions { xacro_program: path, xacro_arguments: vec!["side:=left".into()], ..ReadOptions::default() }
-    };
-    let path = folder.write("robot.xacro", "<robot/>");
-    let works = program("works", "echo \"<robot name='$2'><link name='a'/></robot>\"");
-    assert_eq!(read_urdf(&path, &works).unwrap().mechanism.name, "side:=left");
-    let fails = program("fails", "echo 'undefined macro: arm' >&2; exit 2");
-    let error = read_urdf(&path, &fails).unwrap_err();
-    assert!(error.to_string().contains("undefined macro: arm"), "{error}");
-    let broken = program("broken", "echo '<robot'");
-    let error = read_urdf(&path, &broken).unwrap_err();
-    assert!(error.to_string().contains("robot.xacro (expanded):1:"), "{error}");
-    let unstartable = ReadOptions { xacro_program: folder.0.clone(), ..ReadOptions::default() };
-    let error = read_urdf(&path, &unstartable).unwrap_err();
-    assert!(matches!(error, UrdfError::Xacro(XacroError::NotStarted { .. })));
 }

@@ -109,6 +109,13 @@ impl Robot {
         let mut urdf_options = options.urdf.clone();
         urdf_options.packages.extend(file.packages.iter().map(|(name, to)| (name.clone(), folder.join(to))));
         urdf_options.waive.extend(file.waive_inertia.iter().cloned());
+        for (name, value) in &file.args {
+            let given = urdf_options.arguments.iter().any(|(given, _)| given == name);
+            let value = argument_text(name, value, &source)?;
+            if !given {
+                urdf_options.arguments.push((name.clone(), value));
+            }
+        }
         let urdf = read_urdf(&urdf_path, &urdf_options)?;
 
         let mut faults: Vec<Error> = Vec::new();
@@ -243,6 +250,20 @@ impl Robot {
 /// A finding with its place, as a sentence.
 fn told(finding: &flexarm_urdf::Finding) -> String {
     format!("{}: {}", finding.location, finding.message)
+}
+
+/// The text of an argument for a xacro file.
+fn argument_text(name: &str, value: &Spanned<toml::Value>, source: &Source) -> Result<String, RobotFileError> {
+    match value.get_ref() {
+        toml::Value::String(text) => Ok(text.clone()),
+        toml::Value::Integer(number) => Ok(number.to_string()),
+        toml::Value::Float(number) => Ok(format!("{number:?}")),
+        toml::Value::Boolean(truth) => Ok(truth.to_string()),
+        other => {
+            let message = format!("args: {name} is a {}, expected a text, a number, true or false", other.type_str());
+            Err(source.error(value.span(), message))
+        }
+    }
 }
 
 fn unknown_link(what: &str, link: &str, mechanism: &Mechanism) -> String {

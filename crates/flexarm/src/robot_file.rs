@@ -30,6 +30,9 @@ pub struct RobotFile {
     /// Where `package://` names lead.
     #[serde(default)]
     pub packages: std::collections::BTreeMap<String, PathBuf>,
+    /// Values of the arguments of a xacro file: text, numbers or true and false.
+    #[serde(default)]
+    pub args: std::collections::BTreeMap<String, Spanned<toml::Value>>,
     /// Links whose inertia may be one that no body has (published data sometimes do).
     #[serde(default)]
     pub waive_inertia: Vec<String>,

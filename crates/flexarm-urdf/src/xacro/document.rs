@@ -1,0 +1,197 @@
+//! XML as a tree that can be copied, with the place of every element, from text and back to text.
+
+use std::fmt;
+use std::path::Path;
+use std::rc::Rc;
+
+use roxmltree::{Document, NodeType};
+
+use crate::error::Issue;
+use crate::finding::Place;
+use crate::xml;
+
+/// Elements nested deeper are refused.
+const MOST_NESTED: usize = 200;
+
+/// Place of an element; copies share the name of the file.
+#[derive(Clone, Debug)]
+pub(crate) struct At {
+    pub(crate) file: Rc<Path>,
+    pub(crate) line: u32,
+    pub(crate) column: u32,
+}
+
+impl At {
+    /// The beginning of a file.
+    pub(crate) fn start(file: &Rc<Path>) -> Self {
+        Self { file: file.clone(), line: 1, column: 1 }
+    }
+
+    pub(crate) fn place(&self) -> Place {
+        Place { file: self.file.to_path_buf(), line: self.line, column: self.column }
+    }
+}
+
+impl fmt::Display for At {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}", self.file.display(), self.line)
+    }
+}
+
+/// An element with its attributes in the order of the file. Names have their prefixes, as in the file.
+#[derive(Clone, Debug)]
+pub(crate) struct Element {
+    pub(crate) name: String,
+    pub(crate) attributes: Vec<(String, String)>,
+    pub(crate) children: Vec<Node>,
+    pub(crate) at: At,
+}
+
+/// Comments are left out: nothing follows from them.
+#[derive(Clone, Debug)]
+pub(crate) enum Node {
+    Element(Rc<Element>),
+    Text(String),
+    /// In which nothing is evaluated.
+    Literal(String),
+}
+
+impl Element {
+    pub(crate) fn attribute(&self, name: &str) -> Option<&str> {
+        self.attributes.iter().find(|(n, _)| n == name).map(|(_, v)| v.as_str())
+    }
+
+    pub(crate) fn set_attribute(&mut self, name: &str, value: String) {
+        match self.attributes.iter_mut().find(|(n, _)| n == name) {
+            Some(slot) => slot.1 = value,
+            None => self.attributes.push((name.to_owned(), value)),
+        }
+    }
+
+    pub(crate) fn elements(&self) -> impl Iterator<Item = &Rc<Element>> {
+        self.children.iter().filter_map(|node| if let Node::Element(element) = node { Some(element) } else { None })
+    }
+}
+
+/// The root element of a text.
+pub(crate) fn parse(text: &str, file: &Rc<Path>) -> Result<Element, Box<Issue>> {
+    let lines = xml::Lines::new(file, text);
+    let document = xml::parse(text, &lines)?;
+    let deepest = document.descendants().find(|n| n.ancestors().nth(MOST_NESTED).is_some());
+    if let Some(node) = deepest {
+        let problem = crate::Problem::Malformed {
+            found: format!("elements nested {MOST_NESTED} deep"),
+            expected: "fewer".to_owned(),
+        };
+        return Err(Box::new(Issue { place: lines.of(node), problem }));
+    }
+    Ok(element(&document, document.root_element(), &lines, file))
+}
+
+fn element(document: &Document<'_>, node: roxmltree::Node<'_, '_>, lines: &xml::Lines<'_>, file: &Rc<Path>) -> Element {
+    let text = document.input_text();
+    let range = node.range();
+    // the name with its prefix stands behind the bracket
+    let tag = text.get(range.start + 1..range.end).unwrap_or_default();
+    let end = tag.find(|c: char| c.is_whitespace() || c == '>' || c == '/').unwrap_or(tag.len());
+    let place = lines.of(node);
+    let outer = node.parent_element();
+    let declared = node.namespaces().filter_map(|ns| {
+        let known = outer.is_some_and(|o| o.namespaces().any(|n| n.name() == ns.name() && n.uri() == ns.uri()));
+        let name = ns.name().map_or_else(|| "xmlns".to_owned(), |prefix| format!("xmlns:{prefix}"));
+        (!known && ns.name() != Some("xml")).then(|| (name, ns.uri().to_owned()))
+    });
+    let plain = node.attributes().map(|a| {
+        let name = text.get(a.range_qname()).unwrap_or(a.name());
+        (name.to_owned(), a.value().to_owned())
+    });
+    let attributes = declared.chain(plain).collect();
+    let children = node.children().filter_map(|child| match child.node_type() {
+        NodeType::Element => Some(Node::Element(Rc::new(element(document, child, lines, file)))),
+        NodeType::Text => {
+            let words = child.text().unwrap_or_default().to_owned();
+            let literal = text.get(child.range()).is_some_and(|source| source.starts_with("<![CDATA["));
+            Some(if literal { Node::Literal(words) } else { Node::Text(words) })
+        }
+        _ => None,
+    });
+    Element {
+        name: tag[..end].to_owned(),
+        attributes,
+        children: children.collect(),
+        at: At { file: file.clone(), line: place.line, column: place.column },
+    }
+}
+
+/// A document as text, and for each of its lines where it comes from.
+pub(crate) struct Written {
+    pub(crate) text: String,
+    pub(crate) origins: Vec<At>,
+}
+
+/// Writes an element with one line per tag. `namespaces` are declared at the root.
+pub(crate) fn write(root: &Element, namespaces: &[(String, String)]) -> Written {
+    let first = root.at.clone();
+    let mut out = Written { text: "<?xml version=\"1.0\"?>\n".to_owned(), origins: vec![first] };
+    write_element(root, namespaces, 0, &mut out);
+    out
+}
+
+impl Written {
+    fn line(&mut self, depth: usize, text: &str, at: &At) {
+        self.text.extend(std::iter::repeat_n("  ", depth));
+        self.text.push_str(text);
+        self.text.push('\n');
+        let lines = text.matches('\n').count() + 1;
+        self.origins.extend(std::iter::repeat_n(at.clone(), lines));
+    }
+}
+
+fn write_element(element: &Element, namespaces: &[(String, String)], depth: usize, out: &mut Written) {
+    let mut tag = format!("<{}", element.name);
+    for (name, value) in element.attributes.iter().chain(namespaces) {
+        tag.push_str(&format!(" {name}=\"{}\"", escaped(value, true)));
+    }
+    let words = |node: &Node| match node {
+        Node::Text(words) | Node::Literal(words) if !words.trim().is_empty() => Some(escaped(words, false)),
+        _ => None,
+    };
+    let has_content = element.children.iter().any(|node| matches!(node, Node::Element(_)) || words(node).is_some());
+    if !has_content {
+        out.line(depth, &format!("{tag}/>"), &element.at);
+        return;
+    }
+    let texts: Vec<String> = element.children.iter().filter_map(words).collect();
+    if element.elements().next().is_none() {
+        out.line(depth, &format!("{tag}>{}</{}>", texts.concat(), element.name), &element.at);
+        return;
+    }
+    out.line(depth, &format!("{tag}>"), &element.at);
+    for node in &element.children {
+        match (node, words(node)) {
+            (Node::Element(child), _) => write_element(child, &[], depth + 1, out),
+            (_, Some(words)) => out.line(depth + 1, words.trim(), &element.at),
+            (_, None) => {}
+        }
+    }
+    out.line(depth, &format!("</{}>", element.name), &element.at);
+}
+
+fn escaped(text: &str, in_attribute: bool) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '"' => out.push_str("&quot;"),
+            '\n' | '\t' if in_attribute => out.push_str(&format!("&#{};", u32::from(c))),
+            '\r' => out.push_str("&#13;"),
+            // what XML has no way to write
+            c if c < ' ' && c != '\n' && c != '\t' => out.push(' '),
+            '\u{fffe}' | '\u{ffff}' => out.push(' '),
+            c => out.push(c),
+        }
+    }
+    out
+}

@@ -1,0 +1,268 @@
+//! A tree to its value.
+
+use std::rc::Rc;
+
+use super::super::scope::Table;
+use super::arithmetic::{binary, compare, unary};
+use super::functions::named_value;
+use super::methods::{index, slice};
+use super::parse::{Clause, Expr};
+use super::value::{Value, lookup};
+use super::{Interpreter, Scope, Trouble};
+use crate::spelling::closest;
+
+impl Interpreter<'_> {
+    pub(super) fn evaluate(&mut self, tree: &Expr, scope: &Scope) -> Result<Value, Trouble> {
+        self.charge(16)?;
+        self.deeper()?;
+        let value = self.evaluate_here(tree, scope)?;
+        self.depth -= 1;
+        Ok(value)
+    }
+
+    fn evaluate_here(&mut self, tree: &Expr, scope: &Scope) -> Result<Value, Trouble> {
+        Ok(match tree {
+            Expr::Const(constant) => constant.value(),
+            Expr::Name(name) => return self.name(name, scope),
+            Expr::List(items) => Value::list(self.all(items, scope)?),
+            Expr::Tuple(items) => Value::Tuple(Rc::new(self.all(items, scope)?)),
+            Expr::Dict(items) => {
+                let mut pairs = Vec::new();
+                for (key, value) in items {
+                    pairs.push((self.evaluate(key, scope)?, self.evaluate(value, scope)?));
+                }
+                Value::Dict(Rc::new(unique(pairs)))
+            }
+            Expr::Unary(sign, operand) => return unary(sign, &self.evaluate(operand, scope)?),
+            Expr::Binary(sign, left, right) => {
+                let (left, right) = (self.evaluate(left, scope)?, self.evaluate(right, scope)?);
+                self.charge_whole(&left)?;
+                self.charge_whole(&right)?;
+                let value = binary(sign, &left, &right, &mut |size| self.charge(size))?;
+                self.charge(value.size())?;
+                value
+            }
+            Expr::Compare(first, rest) => {
+                let mut left = self.evaluate(first, scope)?;
+                for (sign, right) in rest {
+                    let right = self.evaluate(right, scope)?;
+                    self.charge_whole(&left)?;
+                    self.charge_whole(&right)?;
+                    if !compare(sign, &left, &right)? {
+                        return Ok(Value::Bool(false));
+                    }
+                    left = right;
+                }
+                Value::Bool(true)
+            }
+            Expr::And(terms) => return self.until(terms, scope, false),
+            Expr::Or(terms) => return self.until(terms, scope, true),
+            Expr::If { condition, then, otherwise } => {
+                let branch = if self.evaluate(condition, scope)?.is_true() { then } else { otherwise };
+                return self.evaluate(branch, scope);
+            }
+            Expr::Call { function, arguments, named } => return self.call_tree(function, arguments, named, scope),
+            Expr::Attribute(owner, name) => {
+                let owner = self.evaluate(owner, scope)?;
+                return self.attribute(&owner, name);
+            }
+            Expr::Index(owner, key) => {
+                let (owner, key) = (self.evaluate(owner, scope)?, self.evaluate(key, scope)?);
+                self.charge(owner.size())?;
+                self.charge_whole(&key)?;
+                return index(&owner, &key);
+            }
+            Expr::Slice(owner, parts) => {
+                let owner = self.evaluate(owner, scope)?;
+                let mut bounds = [None, None, None];
+                for (bound, part) in bounds.iter_mut().zip(parts) {
+                    let value = part.as_ref().map(|part| self.evaluate(part, scope)).transpose()?;
+                    *bound = match value {
+                        None | Some(Value::None) => None,
+                        Some(value) => Some(value.as_int().ok_or_else(|| Trouble::new("a slice needs whole numbers"))?),
+                    };
+                }
+                self.charge(owner.size())?;
+                return slice(&owner, bounds);
+            }
+            Expr::Comprehension { item, clauses } => {
+                let mut items = Vec::new();
+                self.comprehend(item, clauses, scope, &mut items)?;
+                Value::list(items)
+            }
+        })
+    }
+
+    /// Counts a value with all that is in it, before it is printed or compared: lists may share their elements, and be
+    /// much larger than what they take.
+    pub(crate) fn charge_whole(&mut self, value: &Value) -> Result<(), Trouble> {
+        self.charge(value.size())?;
+        match value {
+            Value::List(items) | Value::Tuple(items) => items.iter().try_for_each(|item| self.charge_whole(item)),
+            Value::Dict(items) => items.iter().try_for_each(|(key, value)| {
+                self.charge_whole(key)?;
+                self.charge_whole(value)
+            }),
+            _ => Ok(()),
+        }
+    }
+
+    /// A value as text.
+    pub(crate) fn shown(&mut self, value: &Value) -> Result<String, Trouble> {
+        self.charge_whole(value)?;
+        Ok(value.shown())
+    }
+
+    fn all(&mut self, trees: &[Expr], scope: &Scope) -> Result<Vec<Value>, Trouble> {
+        trees.iter().map(|tree| self.evaluate(tree, scope)).collect()
+    }
+
+    /// The first value that is as true as `wanted`, else the last one: `and`, `or`.
+    fn until(&mut self, terms: &[Expr], scope: &Scope, wanted: bool) -> Result<Value, Trouble> {
+        let mut value = Value::Bool(!wanted);
+        for term in terms {
+            value = self.evaluate(term, scope)?;
+            if value.is_true() == wanted {
+                break;
+            }
+        }
+        Ok(value)
+    }
+
+    /// A property, else what the language brings.
+    fn name(&mut self, name: &str, scope: &Scope) -> Result<Value, Trouble> {
+        if let Some(value) = self.property(scope, name)? {
+            return Ok(value);
+        }
+        named_value(name).ok_or_else(|| {
+            let known = scope.names();
+            let trouble = Trouble::new(format!("the name {name:?} is not defined"));
+            match closest(name, known.iter().map(String::as_str)) {
+                Some(meant) => trouble.help(format!("did you mean {meant:?}?")),
+                None => trouble.help("define it with <xacro:property> before it is used, or put quotes around a text"),
+            }
+        })
+    }
+
+    fn attribute(&mut self, owner: &Value, name: &str) -> Result<Value, Trouble> {
+        match owner {
+            Value::Dict(items) => {
+                self.charge(owner.size())?;
+                lookup(items, &Value::text(name)).cloned().ok_or_else(|| missing_key(items, name))
+            }
+            Value::Namespace(table) => self
+                .property(table, name)?
+                .ok_or_else(|| Trouble::new(format!("the namespace has no property {name:?}"))),
+            Value::Module(module) => named_value(name)
+                .ok_or_else(|| Trouble::new(format!("there is no {module}.{name}")).help("is it misspelt?")),
+            other => Err(Trouble::new(format!("a {} has no attribute {name:?}", other.kind()))),
+        }
+    }
+
+    fn call_tree(
+        &mut self,
+        function: &Expr,
+        arguments: &[Expr],
+        named: &[(String, Expr)],
+        scope: &Scope,
+    ) -> Result<Value, Trouble> {
+        // a method, unless the owner is a module or a namespace
+        let method = match function {
+            Expr::Attribute(owner, name) => match self.evaluate(owner, scope)? {
+                Value::Module(_) | Value::Namespace(_) => None,
+                owner => Some((owner, name)),
+            },
+            _ => None,
+        };
+        let callee = if method.is_none() { Some(self.evaluate(function, scope)?) } else { None };
+        let arguments = self.all(arguments, scope)?;
+        let mut by_name = Vec::new();
+        for (name, tree) in named {
+            by_name.push((name.clone(), self.evaluate(tree, scope)?));
+        }
+        for argument in arguments.iter().chain(by_name.iter().map(|(_, value)| value)) {
+            self.charge_whole(argument)?;
+        }
+        let value = match (callee, method) {
+            (Some(Value::Function(name)), _) => self.call(name, &arguments, by_name, scope)?,
+            (Some(other), _) => return Err(Trouble::new(format!("a {} cannot be called", other.kind()))),
+            (None, Some((owner, name))) => {
+                self.charge_whole(&owner)?;
+                super::methods::call(&owner, name, &arguments, &by_name)?
+            }
+            (None, None) => Value::None,
+        };
+        self.charge(value.size())?;
+        Ok(value)
+    }
+
+    fn comprehend(
+        &mut self,
+        item: &Expr,
+        clauses: &[Clause],
+        scope: &Scope,
+        found: &mut Vec<Value>,
+    ) -> Result<(), Trouble> {
+        let Some((clause, inner)) = clauses.split_first() else {
+            let value = self.evaluate(item, scope)?;
+            self.charge(32 + value.size())?;
+            found.push(value);
+            return Ok(());
+        };
+        let items = self.evaluate(&clause.items, scope)?;
+        for value in elements(&items)? {
+            let local = Table::child(scope);
+            match &clause.targets[..] {
+                [name] => local.define(name, value),
+                names => {
+                    let values = elements(&value)?;
+                    if values.len() != names.len() {
+                        let message = format!("{} names for {} values", names.len(), values.len());
+                        return Err(Trouble::new(message));
+                    }
+                    names.iter().zip(values).for_each(|(name, value)| local.define(name, value));
+                }
+            }
+            self.charge(200)?;
+            let mut kept = true;
+            for condition in &clause.conditions {
+                kept = kept && self.evaluate(condition, &local)?.is_true();
+            }
+            if kept {
+                self.comprehend(item, inner, &local, found)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+fn missing_key(items: &[(Value, Value)], name: &str) -> Trouble {
+    let keys: Vec<String> = items.iter().map(|(k, _)| k.shown()).collect();
+    let trouble = Trouble::new(format!("the dictionary has no key {name:?}"));
+    match closest(name, keys.iter().map(String::as_str)) {
+        Some(meant) => trouble.help(format!("did you mean {meant:?}?")),
+        None => trouble.help(format!("its keys are {}", super::shortened(&keys.join(", ")))),
+    }
+}
+
+/// What a loop over the value sees.
+pub(super) fn elements(value: &Value) -> Result<Vec<Value>, Trouble> {
+    Ok(match value {
+        Value::List(items) | Value::Tuple(items) => items.to_vec(),
+        Value::Dict(items) => items.iter().map(|(k, _)| k.clone()).collect(),
+        Value::Str(text) => text.chars().map(|c| Value::text(c.to_string())).collect(),
+        other => return Err(Trouble::new(format!("a {} has no elements", other.kind()))),
+    })
+}
+
+/// The last value of each key, at the place of the first one.
+pub(crate) fn unique(pairs: Vec<(Value, Value)>) -> Vec<(Value, Value)> {
+    let mut kept: Vec<(Value, Value)> = Vec::with_capacity(pairs.len());
+    for (key, value) in pairs {
+        match kept.iter_mut().find(|(k, _)| k.equals(&key)) {
+            Some(slot) => slot.1 = value,
+            None => kept.push((key, value)),
+        }
+    }
+    kept
+}

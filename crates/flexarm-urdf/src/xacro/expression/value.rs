@@ -1,0 +1,262 @@
+//! Values of expressions, printed, compared and tested as Python does.
+
+use std::cmp::Ordering;
+use std::rc::Rc;
+
+use super::super::document::Element;
+use super::super::scope::Table;
+
+/// What a property or an expression may be.
+#[derive(Clone)]
+pub(crate) enum Value {
+    None,
+    Bool(bool),
+    /// Python's whole numbers have no bound; these end at 1.7e38, and passing that is an error.
+    Int(i128),
+    Float(f64),
+    Str(Rc<str>),
+    List(Rc<Vec<Value>>),
+    Tuple(Rc<Vec<Value>>),
+    /// In the order of insertion.
+    Dict(Rc<Vec<(Value, Value)>>),
+    /// XML kept for `<xacro:insert_block>`.
+    Block(Rc<Element>),
+    /// A function by its name without module.
+    Function(&'static str),
+    /// `math`, `python` or `xacro`.
+    Module(&'static str),
+    /// What `<xacro:include ns="...">` makes.
+    Namespace(Rc<Table>),
+}
+
+impl Value {
+    pub(crate) fn text(text: impl AsRef<str>) -> Self {
+        Self::Str(Rc::from(text.as_ref()))
+    }
+
+    pub(crate) fn list(items: Vec<Value>) -> Self {
+        Self::List(Rc::new(items))
+    }
+
+    /// Python's word for the type.
+    pub(crate) fn kind(&self) -> &'static str {
+        match self {
+            Self::None => "None",
+            Self::Bool(_) => "bool",
+            Self::Int(_) => "int",
+            Self::Float(_) => "float",
+            Self::Str(_) => "str",
+            Self::List(_) => "list",
+            Self::Tuple(_) => "tuple",
+            Self::Dict(_) => "dict",
+            Self::Block(_) => "block of XML",
+            Self::Function(_) => "function",
+            Self::Module(_) => "module",
+            Self::Namespace(_) => "namespace",
+        }
+    }
+
+    pub(crate) fn is_true(&self) -> bool {
+        match self {
+            Self::None => false,
+            Self::Bool(b) => *b,
+            Self::Int(i) => *i != 0,
+            Self::Float(x) => *x != 0.0,
+            Self::Str(s) => !s.is_empty(),
+            Self::List(items) | Self::Tuple(items) => !items.is_empty(),
+            Self::Dict(items) => !items.is_empty(),
+            Self::Block(_) | Self::Function(_) | Self::Module(_) | Self::Namespace(_) => true,
+        }
+    }
+
+    /// A whole number; a Boolean counts as one.
+    pub(crate) fn as_int(&self) -> Option<i128> {
+        match self {
+            Self::Bool(b) => Some(i128::from(*b)),
+            Self::Int(i) => Some(*i),
+            _ => None,
+        }
+    }
+
+    pub(crate) fn as_float(&self) -> Option<f64> {
+        match self {
+            Self::Float(x) => Some(*x),
+            other => other.as_int().map(|i| i as f64),
+        }
+    }
+
+    /// As `str()` gives it, and as it is written into the document.
+    pub(crate) fn shown(&self) -> String {
+        match self {
+            Self::Str(s) => s.to_string(),
+            other => other.repr(),
+        }
+    }
+
+    /// As `repr()` gives it: strings in quotes.
+    pub(crate) fn repr(&self) -> String {
+        let joined = |items: &[Value]| items.iter().map(Self::repr).collect::<Vec<_>>().join(", ");
+        match self {
+            Self::None => "None".into(),
+            Self::Bool(b) => if *b { "True" } else { "False" }.into(),
+            Self::Int(i) => i.to_string(),
+            Self::Float(x) => float_repr(*x),
+            Self::Str(s) => quoted(s),
+            Self::List(items) => format!("[{}]", joined(items)),
+            Self::Tuple(items) if items.len() == 1 => format!("({},)", items[0].repr()),
+            Self::Tuple(items) => format!("({})", joined(items)),
+            Self::Dict(items) => {
+                let pairs: Vec<_> = items.iter().map(|(k, v)| format!("{}: {}", k.repr(), v.repr())).collect();
+                format!("{{{}}}", pairs.join(", "))
+            }
+            Self::Block(_) | Self::Function(_) | Self::Module(_) | Self::Namespace(_) => format!("<{}>", self.kind()),
+        }
+    }
+
+    /// Python's `==`.
+    pub(crate) fn equals(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Str(a), Self::Str(b)) => a == b,
+            (Self::List(a), Self::List(b)) | (Self::Tuple(a), Self::Tuple(b)) => {
+                a.len() == b.len() && a.iter().zip(b.iter()).all(|(a, b)| a.equals(b))
+            }
+            (Self::Dict(a), Self::Dict(b)) => {
+                a.len() == b.len() && a.iter().all(|(k, v)| lookup(b, k).is_some_and(|w| v.equals(w)))
+            }
+            (Self::None, Self::None) => true,
+            (Self::Function(a), Self::Function(b)) | (Self::Module(a), Self::Module(b)) => a == b,
+            _ => self.order(other) == Some(Ordering::Equal),
+        }
+    }
+
+    /// Python's `<`, for what has an order.
+    pub(crate) fn order(&self, other: &Self) -> Option<Ordering> {
+        match (self, other) {
+            (Self::Str(a), Self::Str(b)) => Some(a.cmp(b)),
+            (Self::List(a), Self::List(b)) | (Self::Tuple(a), Self::Tuple(b)) => {
+                let unequal = a.iter().zip(b.iter()).find(|(a, b)| !a.equals(b));
+                unequal.map_or_else(|| Some(a.len().cmp(&b.len())), |(a, b)| a.order(b))
+            }
+            _ => match (self.as_int(), other.as_int()) {
+                (Some(a), Some(b)) => Some(a.cmp(&b)),
+                _ => self.as_float()?.partial_cmp(&other.as_float()?),
+            },
+        }
+    }
+
+    /// A rough number of bytes, for the account of work.
+    pub(crate) fn size(&self) -> usize {
+        match self {
+            Self::Str(s) => s.len(),
+            Self::List(items) | Self::Tuple(items) => 16 + 32 * items.len(),
+            Self::Dict(items) => 16 + 64 * items.len(),
+            _ => 16,
+        }
+    }
+}
+
+/// The value of a key.
+pub(crate) fn lookup<'a>(items: &'a [(Value, Value)], key: &Value) -> Option<&'a Value> {
+    items.iter().find(|(k, _)| k.equals(key)).map(|(_, v)| v)
+}
+
+/// The shortest digits that give the number back, laid out as Python's `repr` does.
+pub(crate) fn float_repr(x: f64) -> String {
+    if x.is_nan() {
+        return "nan".into();
+    }
+    if x.is_infinite() {
+        return if x > 0.0 { "inf" } else { "-inf" }.into();
+    }
+    let scientific = format!("{x:e}");
+    let (mantissa, exponent) = scientific.split_once('e').unwrap_or((&scientific, "0"));
+    let exponent: i32 = exponent.parse().unwrap_or(0);
+    if (-4..16).contains(&exponent) {
+        let plain = format!("{x}");
+        return if plain.contains('.') { plain } else { format!("{plain}.0") };
+    }
+    let sign = if exponent < 0 { '-' } else { '+' };
+    format!("{mantissa}e{sign}{:02}", exponent.abs())
+}
+
+fn quoted(text: &str) -> String {
+    let quote = if text.contains('\'') && !text.contains('"') { '"' } else { '\'' };
+    let mut out = String::from(quote);
+    for c in text.chars() {
+        match c {
+            '\\' => out.push_str("\\\\"),
+            '\n' => out.push_str("\\n"),
+            '\t' => out.push_str("\\t"),
+            '\r' => out.push_str("\\r"),
+            c if c == quote => out.extend(['\\', c]),
+            c => out.push(c),
+        }
+    }
+    out.push(quote);
+    out
+}
+
+/// What Python's `int()` takes from text.
+pub(crate) fn int_of(text: &str) -> Option<i128> {
+    let digits = text.trim();
+    let bare = digits.strip_prefix(['+', '-']).unwrap_or(digits);
+    let single = !bare.starts_with('_') && !bare.ends_with('_') && !bare.contains("__");
+    let plain = !bare.is_empty() && bare.bytes().all(|b| b.is_ascii_digit() || b == b'_') && single;
+    plain.then(|| digits.replace('_', "").parse().ok()).flatten()
+}
+
+/// What Python's `float()` takes from text.
+pub(crate) fn float_of(text: &str) -> Option<f64> {
+    let text = text.trim();
+    let bare = text.strip_prefix(['+', '-']).unwrap_or(text).to_ascii_lowercase();
+    let word = matches!(bare.as_str(), "inf" | "infinity" | "nan");
+    let digits = bare.bytes().all(|b| b.is_ascii_digit() || matches!(b, b'.' | b'e' | b'+' | b'-'));
+    if word || (digits && bare.starts_with(|c: char| c.is_ascii_digit() || c == '.')) {
+        return text.parse().ok();
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Truth: Python's repr, from `python3 -c "print(repr(...))"`.
+    #[test]
+    fn numbers_are_printed_as_python_prints_them() {
+        let pairs = [
+            (0.1 + 0.2, "0.30000000000000004"),
+            (1.0, "1.0"),
+            (-0.0, "-0.0"),
+            (1e16, "1e+16"),
+            (123456789012345680.0, "1.2345678901234568e+17"),
+            (1e15, "1000000000000000.0"),
+            (0.0001, "0.0001"),
+            (0.00001, "1e-05"),
+            (1.5e-7, "1.5e-07"),
+            (1e-300, "1e-300"),
+            (1.0 / 3.0, "0.3333333333333333"),
+            (f64::NAN, "nan"),
+            (f64::NEG_INFINITY, "-inf"),
+        ];
+        for (x, expected) in pairs {
+            assert_eq!(float_repr(x), expected);
+        }
+        let nested =
+            Value::list(vec![Value::text("it's"), Value::Float(2.0), Value::Tuple(Rc::new(vec![Value::None]))]);
+        assert_eq!(nested.repr(), "[\"it's\", 2.0, (None,)]");
+    }
+
+    #[test]
+    fn text_is_a_number_where_python_takes_it_for_one() {
+        assert_eq!(int_of(" +12 "), Some(12));
+        assert_eq!(int_of("1_000"), Some(1000));
+        assert_eq!(int_of("1.0"), None);
+        assert_eq!(int_of("-"), None);
+        assert_eq!(float_of("1e-3"), Some(1e-3));
+        assert_eq!(float_of(".5"), Some(0.5));
+        assert_eq!(float_of("1.5.2"), None);
+        assert_eq!(float_of("e5"), None);
+        assert!(float_of("-inf").is_some_and(|x| x == f64::NEG_INFINITY));
+    }
+}

@@ -1,0 +1,318 @@
+//! Macros: their parameters, and what a call does.
+
+use std::cell::RefCell;
+use std::collections::{HashMap, HashSet};
+use std::rc::Rc;
+
+use super::document::{At, Element};
+use super::expression::Trouble;
+use super::expression::value::Value;
+use super::scope::{Scope, Table};
+use super::{Content, Interpreter, Outcome};
+use crate::spelling::closest;
+
+/// Calls within calls; ROS's program ends at about 200.
+const MOST_CALLS: usize = 300;
+
+/// A macro as it was defined.
+pub(crate) struct Macro {
+    name: String,
+    parameters: Vec<Parameter>,
+    body: Rc<Element>,
+}
+
+/// A parameter with its default.
+#[derive(Clone, Debug, PartialEq)]
+struct Parameter {
+    /// With `*` or `**` if a block is meant.
+    name: String,
+    /// `^`: taken from the caller's property of that name.
+    forwarded: bool,
+    default: Option<String>,
+}
+
+/// Macros by name, and those of namespaces; what is not here is looked for where the call stands.
+#[derive(Default)]
+pub(crate) struct Macros {
+    macros: RefCell<HashMap<String, Rc<Macro>>>,
+    namespaces: RefCell<HashMap<String, Rc<Macros>>>,
+    outer: Option<Rc<Macros>>,
+}
+
+impl Macros {
+    pub(crate) fn new() -> Rc<Self> {
+        Rc::new(Self::default())
+    }
+
+    fn within(outer: &Rc<Self>) -> Rc<Self> {
+        Rc::new(Self { outer: Some(outer.clone()), ..Self::default() })
+    }
+
+    pub(crate) fn add_namespace(&self, name: &str, macros: Rc<Self>) {
+        self.namespaces.borrow_mut().insert(name.to_owned(), macros);
+    }
+
+    fn find(&self, name: &str) -> Option<Rc<Macro>> {
+        let own = self.macros.borrow().get(name).cloned();
+        own.or_else(|| self.outer.as_ref().and_then(|outer| outer.find(name)))
+    }
+
+    fn namespace(&self, name: &str) -> Option<Rc<Self>> {
+        let own = self.namespaces.borrow().get(name).cloned();
+        own.or_else(|| self.outer.as_ref().and_then(|outer| outer.namespace(name)))
+    }
+
+    /// All names that can be called.
+    fn names(&self) -> Vec<String> {
+        let mut names: Vec<String> = self.macros.borrow().keys().cloned().collect();
+        for (space, macros) in self.namespaces.borrow().iter() {
+            names.extend(macros.names().iter().map(|name| format!("{space}.{name}")));
+        }
+        names.extend(self.outer.iter().flat_map(|outer| outer.names()));
+        names.sort();
+        names.dedup();
+        names
+    }
+}
+
+impl Interpreter<'_> {
+    /// `<xacro:macro name="..." params="...">`
+    pub(super) fn define_macro(&mut self, element: &Rc<Element>, macros: &Rc<Macros>) -> Outcome<()> {
+        let name = self.required(element, "name")?;
+        let name = name.strip_prefix("xacro:").unwrap_or(name);
+        let at = &element.at;
+        if name == "call" || name.contains('.') {
+            let trouble = Trouble::new(format!("a macro cannot have the name {name:?}"));
+            return Err(self.fault(at, trouble.help("dots are for namespaces, \"call\" is an element of xacro")));
+        }
+        let parameters = parameters(element.attribute("params").unwrap_or_default());
+        self.expect_attributes(element, &["name", "params"]);
+        self.defined_macros.insert(name.to_owned());
+        let defined = Macro { name: name.to_owned(), parameters, body: element.clone() };
+        macros.macros.borrow_mut().insert(name.to_owned(), Rc::new(defined));
+        Ok(())
+    }
+
+    /// `<xacro:NAME ...>` and `<xacro:call macro="NAME" ...>`
+    pub(super) fn call_macro(&mut self, element: &Element, macros: &Rc<Macros>, scope: &Scope) -> Outcome<Content> {
+        let at = &element.at;
+        let (name, skipped) = if element.name == "xacro:call" {
+            (self.attribute_text(element, "macro", scope)?, Some("macro"))
+        } else {
+            (element.name["xacro:".len()..].to_owned(), None)
+        };
+        let (inner_macros, inner_scope, called) = self.resolve(&name, macros, scope, at)?;
+        if self.calls.len() >= MOST_CALLS {
+            let trouble = Trouble::new(format!("macros call each other more than {MOST_CALLS} deep"));
+            return Err(self.fault(at, trouble.help("does a macro call itself without an end?")));
+        }
+        self.called_macros.insert(called.name.clone());
+        self.calls.push((called.name.clone(), at.clone()));
+
+        let local = Table::child(&inner_scope);
+        let mut open: Vec<&Parameter> = called.parameters.iter().collect();
+        for (name, value) in element.attributes.iter().filter(|(n, _)| Some(n.as_str()) != skipped) {
+            if name.starts_with("xmlns") {
+                continue;
+            }
+            let Some(k) = open.iter().position(|p| p.name == *name) else {
+                return Err(self.fault(at, unknown_parameter(&called, name)));
+            };
+            open.remove(k);
+            let value = self.text(value, scope).map_err(|e| self.fault(at, e.within(format!("{name}=..."))))?;
+            local.set(name, value, false, at);
+        }
+        self.take_blocks(element, &called, &mut open, macros, scope, &local)?;
+        self.take_defaults(&called, open, scope, &local, at)?;
+
+        let content = self.children(&called.body.children, &Macros::within(&inner_macros), &local)?;
+        self.calls.pop();
+        Ok(content)
+    }
+
+    /// The elements inside a call, evaluated where the call stands, to the parameters with a star.
+    fn take_blocks(
+        &mut self,
+        element: &Element,
+        called: &Macro,
+        open: &mut Vec<&Parameter>,
+        macros: &Rc<Macros>,
+        scope: &Scope,
+        local: &Scope,
+    ) -> Outcome<()> {
+        let at = &element.at;
+        let content = self.children(&element.children, macros, scope)?;
+        let holder = Element { children: content.nodes, ..element.clone() };
+        let mut blocks = holder.elements();
+        let wanted: Vec<&Parameter> = open.iter().copied().filter(|p| p.name.starts_with('*')).collect();
+        open.retain(|p| !p.name.starts_with('*'));
+        for parameter in wanted {
+            let Some(block) = blocks.next() else {
+                let name = parameter.name.trim_start_matches('*');
+                let trouble = Trouble::new(format!("the macro {:?} needs a block for {name:?}", called.name));
+                return Err(self.fault(at, trouble.help("put an element inside of the call")));
+            };
+            local.define(&parameter.name, Value::Block(block.clone()));
+        }
+        match blocks.next() {
+            Some(block) => {
+                let trouble = Trouble::new(format!("the macro {:?} takes no block <{}>", called.name, block.name));
+                Err(self.fault(at, trouble.help("remove it, or add a parameter *name to the macro")))
+            }
+            None => Ok(()),
+        }
+    }
+
+    fn take_defaults(
+        &mut self,
+        called: &Macro,
+        open: Vec<&Parameter>,
+        scope: &Scope,
+        local: &Scope,
+        at: &At,
+    ) -> Outcome<()> {
+        let mut missing = Vec::new();
+        for parameter in open {
+            let name = &parameter.name;
+            let forwarded = match parameter.forwarded {
+                true => self.property(scope, name).map_err(|e| self.fault(at, e))?,
+                false => None,
+            };
+            let value = match (forwarded, &parameter.default) {
+                (Some(value), _) => value,
+                (None, Some(default)) => self.text(default, scope).map_err(|e| {
+                    self.fault(at, e.within(format!("in the default of parameter {name:?} of macro {:?}", called.name)))
+                })?,
+                (None, None) => {
+                    missing.push(format!("{name:?}"));
+                    continue;
+                }
+            };
+            local.set(name, value, false, at);
+        }
+        if missing.is_empty() {
+            return Ok(());
+        }
+        let trouble = Trouble::new(format!("the macro {:?} is called without {}", called.name, missing.join(", ")));
+        Err(self.fault(at, trouble.help("give it as an attribute of the call")))
+    }
+
+    /// A macro with the tables that its call looks into.
+    fn resolve(
+        &mut self,
+        full: &str,
+        macros: &Rc<Macros>,
+        scope: &Scope,
+        at: &At,
+    ) -> Outcome<(Rc<Macros>, Scope, Rc<Macro>)> {
+        if let Some(found) = macros.find(full) {
+            return Ok((macros.clone(), scope.clone(), found));
+        }
+        let mut names: Vec<&str> = full.split('.').collect();
+        let name = names.pop().unwrap_or_default();
+        let (mut macros_there, mut scope_there) = (Some(macros.clone()), scope.clone());
+        for space in names {
+            macros_there = macros_there.and_then(|m| m.namespace(space));
+            match self.property(&scope_there, space).map_err(|e| self.fault(at, e))? {
+                Some(Value::Namespace(table)) => scope_there = table,
+                _ => macros_there = None,
+            }
+        }
+        let found = macros_there.clone().and_then(|m| m.find(name));
+        let (Some(macros_there), Some(found)) = (macros_there, found) else {
+            let trouble = Trouble::new(format!("there is no macro {full:?}"));
+            let known = macros.names();
+            return Err(self.fault(
+                at,
+                match closest(full, known.iter().map(String::as_str)) {
+                    Some(meant) => trouble.help(format!("did you mean <xacro:{meant}>?")),
+                    None => trouble.help("define it, or include the file that does, before it is called"),
+                },
+            ));
+        };
+        Ok((macros_there, scope_there, found))
+    }
+}
+
+fn unknown_parameter(called: &Macro, name: &str) -> Trouble {
+    let known: Vec<&str> = called.parameters.iter().map(|p| p.name.as_str()).collect();
+    let trouble = Trouble::new(format!("the macro {:?} has no parameter {name:?}", called.name));
+    match closest(name, known.iter().copied()) {
+        Some(meant) => trouble.help(format!("did you mean {meant:?}?")),
+        None => trouble.help(format!("its parameters are {}", known.join(", "))),
+    }
+}
+
+/// `a b:=1 c:='x y' d:=${e} f:=^ g:=^|2 *block **blocks`
+fn parameters(text: &str) -> Vec<Parameter> {
+    let mut found: Vec<Parameter> = Vec::new();
+    let mut rest = text.trim_start();
+    while !rest.is_empty() {
+        let end = rest.find(|c: char| c.is_whitespace() || c == ':' || c == '=').unwrap_or(rest.len());
+        let behind = rest[end..].trim_start();
+        let value = behind.strip_prefix(":=").or_else(|| behind.strip_prefix('='));
+        let with_default = value.filter(|_| end > 0).and_then(|value| {
+            let value = value.trim_start();
+            let (forwarded, value) = match value.strip_prefix("^|").or_else(|| value.strip_prefix('^')) {
+                Some(value) => (true, value),
+                None => (false, value),
+            };
+            let length = default_length(value)?;
+            let default = Some(value[..length].to_owned()).filter(|d| !d.is_empty());
+            Some((Parameter { name: rest[..end].to_owned(), forwarded, default }, &value[length..]))
+        });
+        let (parameter, after) = with_default.unwrap_or_else(|| {
+            let end = rest.find(char::is_whitespace).unwrap_or(rest.len());
+            (Parameter { name: rest[..end].to_owned(), forwarded: false, default: None }, &rest[end..])
+        });
+        found.push(parameter);
+        rest = after.trim_start();
+    }
+    // a parameter that is named twice counts once
+    let mut seen = HashSet::new();
+    found.retain(|p| seen.insert(p.name.clone()));
+    found
+}
+
+/// Length of the default at the start of a text: it ends where white space or nothing follows.
+fn default_length(text: &str) -> Option<usize> {
+    let ends_at = |at: usize| text[at..].chars().next().is_none_or(char::is_whitespace);
+    for (open, close) in [("${", '}'), ("$(", ')')] {
+        if text.starts_with(open) {
+            let mut closings = text.match_indices(close).map(|(at, _)| at + 1);
+            if let Some(end) = closings.find(|end| ends_at(*end)) {
+                return Some(end);
+            }
+        }
+    }
+    let mut at = 0;
+    while let Some(c) = text[at..].chars().next().filter(|c| !c.is_whitespace()) {
+        at += match c {
+            '\'' | '"' => text[at + 1..].find(c)? + 2,
+            c => c.len_utf8(),
+        };
+    }
+    Some(at)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parameters_have_defaults_forwarding_and_blocks() {
+        let of = |text: &str| -> Vec<(String, bool, Option<String>)> {
+            parameters(text).into_iter().map(|p| (p.name, p.forwarded, p.default)).collect()
+        };
+        let plain = |name: &str| (name.to_owned(), false, None);
+        let with = |name: &str, forwarded, default: &str| (name.to_owned(), forwarded, Some(default.to_owned()));
+        assert_eq!(of("a  *b **c "), [plain("a"), plain("*b"), plain("**c")]);
+        assert_eq!(
+            of("a:=1 b := 'x y' c=2"),
+            [with("a", false, "1"), with("b", false, "'x y'"), with("c", false, "2")]
+        );
+        assert_eq!(of("a:=${b + 1} c:=$(arg d)"), [with("a", false, "${b + 1}"), with("c", false, "$(arg d)")]);
+        assert_eq!(of("a:=^ b:=^|3"), [("a".to_owned(), true, None), with("b", true, "3")]);
+        assert_eq!(of("a:=${x}${y} b"), [with("a", false, "${x}${y}"), plain("b")]);
+    }
+}

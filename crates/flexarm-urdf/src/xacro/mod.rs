@@ -1,0 +1,258 @@
+//! Xacro, the macro language of robot descriptions, read as ROS's program reads it (version 2, in order of the file).
+//!
+//! Start at [`expand`]: a file in, one element tree as text out, with the place of every line of it. The way in between:
+//! [`document`] is XML as a tree, [`process`] what the elements of xacro do, [`macros`] and [`scope`] what they define,
+//! [`text`] cuts attributes into pieces, [`expression`] and [`substitution`] give the pieces their values, [`yaml`] reads
+//! `xacro.load_yaml`.
+//!
+//! A file is read from anywhere, so nothing here may run away: calls are counted, depth and work are bounded, and no
+//! clock is needed. The result is the same on every machine but for what the file itself asks of the environment.
+//!
+//! Not here: comments and processing instructions, which are left out; what a URDF means.
+//!
+//! # Source
+//! <https://github.com/ros/xacro>, version 2.1.1; where it leaves a choice, what it does.
+
+mod document;
+mod expression;
+mod macros;
+mod process;
+mod scope;
+mod substitution;
+mod text;
+mod yaml;
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::path::{Path, PathBuf};
+use std::rc::Rc;
+
+use document::{At, Node};
+use expression::Trouble;
+use expression::value::{Value, int_of};
+
+use crate::error::XacroError;
+use crate::finding::{Finding, Place, Severity};
+use crate::resolve::Resolver;
+use crate::spelling::closest;
+use crate::{Issue, UrdfError, xml};
+
+/// Work that one document may cost, about the bytes that it looks at and makes.
+const MOST_WORK: usize = 100_000_000;
+/// What an element costs, about its memory.
+const ELEMENT: usize = 200;
+/// Levels of elements, macros, files and expressions within each other.
+const MOST_DEPTH: usize = 5_000;
+/// Files included in each other.
+const MOST_FILES: usize = 50;
+/// Largest file, in bytes.
+const MOST_BYTES: u64 = 32 << 20;
+/// Stack of the thread that expands: the depth needs about 40 MB of it in a debug build.
+const STACK: usize = 256 << 20;
+
+/// A document without any xacro in it.
+pub(crate) struct Expanded {
+    pub(crate) text: String,
+    /// Where each line of the text comes from.
+    pub(crate) origins: Vec<Place>,
+    /// What the file says by `xacro.warning` and the like, and doubts about the arguments.
+    pub(crate) remarks: Vec<Finding>,
+    /// Macros that are defined and not called, if there is nothing else.
+    pub(crate) idle_macros: Vec<String>,
+}
+
+/// True for the ending of xacro files.
+pub(crate) fn is_xacro(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("xacro"))
+}
+
+/// True if the text has something that only xacro understands.
+pub(crate) fn has_xacro(text: &str) -> bool {
+    text.contains("<xacro:") || text.contains("${") || text.contains("$(")
+}
+
+/// The document that a xacro file stands for.
+///
+/// * `text`: what the file at `path` holds.
+/// * `arguments`: values of `$(arg name)`.
+///
+/// # Errors
+/// [`UrdfError::Xacro`] with the place in the file, and the calls that led there.
+pub(crate) fn expand(
+    text: &str,
+    path: &Path,
+    resolver: &Resolver<'_>,
+    arguments: &[(String, String)],
+) -> Result<Expanded, UrdfError> {
+    // Depth is bounded, but may need more stack than the caller has left.
+    std::thread::scope(|threads| {
+        let work = || Interpreter::new(path, resolver, arguments).document(text, path);
+        let thread = std::thread::Builder::new().stack_size(STACK).spawn_scoped(threads, work);
+        let thread = thread.map_err(|source| UrdfError::Io { path: path.to_owned(), source })?;
+        thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+    })
+}
+
+type Outcome<T> = Result<T, Box<XacroError>>;
+
+/// What an element becomes: nodes in its place, and attributes for the element around it.
+#[derive(Default)]
+struct Content {
+    nodes: Vec<Node>,
+    attributes: Vec<(String, String)>,
+}
+
+/// Everything that is known while a document is expanded.
+pub(crate) struct Interpreter<'a> {
+    resolver: &'a Resolver<'a>,
+    /// Files that are being read, the innermost last.
+    files: Vec<Rc<Path>>,
+    /// Macros that are being called, with the places of the calls.
+    calls: Vec<(String, At)>,
+    arguments: BTreeMap<String, String>,
+    used_arguments: BTreeSet<String>,
+    declared_arguments: BTreeSet<String>,
+    defined_macros: BTreeSet<String>,
+    called_macros: BTreeSet<String>,
+    /// Packages found so far.
+    packages: HashMap<String, PathBuf>,
+    /// Prefixes declared anywhere.
+    namespaces: Vec<(String, String)>,
+    remarks: Vec<Finding>,
+    at: At,
+    work: usize,
+    depth: usize,
+}
+
+impl<'a> Interpreter<'a> {
+    fn new(path: &Path, resolver: &'a Resolver<'a>, arguments: &[(String, String)]) -> Self {
+        let file: Rc<Path> = path.into();
+        Self {
+            resolver,
+            at: At::start(&file),
+            files: vec![file],
+            calls: Vec::new(),
+            arguments: arguments.iter().cloned().collect(),
+            used_arguments: BTreeSet::new(),
+            declared_arguments: BTreeSet::new(),
+            defined_macros: BTreeSet::new(),
+            called_macros: BTreeSet::new(),
+            packages: HashMap::new(),
+            namespaces: Vec::new(),
+            remarks: Vec::new(),
+            work: 0,
+            depth: 0,
+        }
+    }
+
+    fn document(mut self, text: &str, path: &Path) -> Result<Expanded, UrdfError> {
+        let given: Vec<String> = self.arguments.keys().cloned().collect();
+        let file = self.files[0].clone();
+        let invalid = |issue: Box<Issue>| UrdfError::Invalid { issues: vec![*issue] };
+        let root = document::parse(text, &file).map_err(invalid)?;
+        let scope = scope::Table::root();
+        let root = self.element(&root, &macros::Macros::new(), &scope).map_err(UrdfError::Xacro)?;
+        self.doubt_arguments(&given, path);
+        let has_links = root.elements().any(|e| e.name == "link");
+        let idle = self.defined_macros.difference(&self.called_macros).cloned();
+        let idle_macros = if has_links { Vec::new() } else { idle.collect() };
+        let written = document::write(&root, &self.namespaces);
+        let origins = written.origins.iter().map(At::place).collect();
+        Ok(Expanded { text: written.text, origins, remarks: self.remarks, idle_macros })
+    }
+
+    /// An argument that nothing asks for is probably misspelt.
+    fn doubt_arguments(&mut self, given: &[String], path: &Path) {
+        for name in given {
+            if self.used_arguments.contains(name) || self.declared_arguments.contains(name) {
+                continue;
+            }
+            let known: Vec<&str> = self.declared_arguments.iter().map(String::as_str).collect();
+            let help = match (closest(name, known.iter().copied()), known.is_empty()) {
+                (Some(meant), _) => format!("did you mean {meant:?}?"),
+                (None, true) => "the file has no arguments".to_owned(),
+                (None, false) => format!("its arguments are {}", known.join(", ")),
+            };
+            self.remarks.push(Finding {
+                severity: Severity::Warning,
+                code: "unused-argument",
+                location: format!("{}:1", path.display()),
+                message: format!("the argument {name:?} is given and nothing in the file asks for it"),
+                help,
+            });
+        }
+    }
+
+    /// Counts work, and stops what would never end or not fit.
+    fn charge(&mut self, work: usize) -> Result<(), Trouble> {
+        self.work = self.work.saturating_add(work);
+        if self.work <= MOST_WORK {
+            return Ok(());
+        }
+        Err(Trouble::new("the file makes too much: more than 100 million letters were looked at or written")
+            .help("does a macro call itself without an end, or a list grow with every call?"))
+    }
+
+    /// One level deeper; the caller takes it back.
+    fn deeper(&mut self) -> Result<(), Trouble> {
+        self.depth += 1;
+        if self.depth <= MOST_DEPTH {
+            return Ok(());
+        }
+        Err(Trouble::new("macros, files and properties use each other too deeply")
+            .help("does one of them use itself without an end?"))
+    }
+
+    /// The text of a file that the document asks for.
+    fn read(&mut self, path: &Path) -> Result<String, Trouble> {
+        let failed = |what: String| {
+            Trouble::new(format!("{} cannot be read: {what}", path.display())).help("correct the path, or the package")
+        };
+        let meta = std::fs::metadata(path).map_err(|e| failed(e.to_string()))?;
+        if !meta.is_file() {
+            return Err(failed("it is no file".into()));
+        }
+        if meta.len() > MOST_BYTES {
+            return Err(failed(format!("it has {} MB, at most {} are read", meta.len() >> 20, MOST_BYTES >> 20)));
+        }
+        self.charge(meta.len() as usize)?;
+        let bytes = std::fs::read(path).map_err(|e| failed(e.to_string()))?;
+        xml::decode(bytes, path).map_err(|issue| Trouble::new(issue.to_string()))
+    }
+
+    /// A fault at a place, with the calls and files that led there.
+    fn fault(&self, at: &At, trouble: Trouble) -> Box<XacroError> {
+        let calls = self.calls.iter().rev().map(|(name, at)| format!("in the macro {name:?}, called at {at}"));
+        let outer = self.files[..self.files.len().saturating_sub(1)].iter().rev();
+        let files = outer.map(|file| format!("included from {}", file.display()));
+        let trail = shortened_trail(calls.chain(files).collect());
+        Box::new(XacroError { place: at.place(), message: trouble.message, help: trouble.help, trail })
+    }
+
+    fn remark(&mut self, severity: Severity, code: &'static str, message: String, help: &str) {
+        if self.remarks.len() < 100 {
+            let location = self.at.to_string();
+            self.remarks.push(Finding { severity, code, location, message, help: help.to_owned() });
+        }
+    }
+}
+
+/// The ends of a long way; the middle repeats itself.
+fn shortened_trail(mut trail: Vec<String>) -> Vec<String> {
+    if trail.len() > 12 {
+        let left_out = format!("... {} more ...", trail.len() - 10);
+        trail.splice(6..trail.len() - 4, [left_out]);
+    }
+    trail
+}
+
+/// What counts as true or false in a condition; `None` if it is neither.
+fn boolean(value: &Value) -> Option<bool> {
+    match value {
+        Value::Str(text) => match &**text {
+            "true" | "True" => Some(true),
+            "false" | "False" => Some(false),
+            text => int_of(text).map(|i| i != 0),
+        },
+        value => Some(value.is_true()),
+    }
+}

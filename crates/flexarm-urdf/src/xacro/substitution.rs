@@ -1,0 +1,104 @@
+//! Substitutions `$(arg name)`, `$(find package)`, `$(env NAME)`, `$(optenv NAME default)`, `$(eval expression)`,
+//! `$(dirname)` and `$(cwd)`. Their results are text.
+
+use std::path::{Path, PathBuf};
+
+use super::Interpreter;
+use super::expression::value::{Value, float_of, int_of};
+use super::expression::{Trouble, shortened};
+use super::scope::Table;
+use crate::spelling::closest;
+
+const COMMANDS: [&str; 7] = ["arg", "find", "env", "optenv", "eval", "dirname", "cwd"];
+
+impl Interpreter<'_> {
+    /// The text for what stands between `$(` and `)`.
+    pub(crate) fn substitution(&mut self, inner: &str) -> Result<String, Trouble> {
+        if let Some(expression) = inner.strip_prefix("eval ") {
+            return self.eval(expression);
+        }
+        let words: Vec<&str> = inner.split_whitespace().collect();
+        let text = match &words[..] {
+            ["arg", name] => self.argument(name)?,
+            ["find", package] => self.package(package)?.display().to_string(),
+            ["env", name] => std::env::var(name).map_err(|_| {
+                let message = format!("the environment variable {name} is not set");
+                Trouble::new(message).help("set it, or write $(optenv NAME default) in the file")
+            })?,
+            ["optenv", name, default @ ..] => std::env::var(name).unwrap_or_else(|_| default.join(" ")),
+            ["dirname"] => shown(self.here().parent()),
+            ["cwd"] => shown(std::env::current_dir().ok().as_deref()),
+            [command, ..] if !COMMANDS.contains(command) => {
+                let trouble = Trouble::new(format!("$({}) is not known", shortened(inner)));
+                return Err(match closest(command, COMMANDS) {
+                    Some(meant) => trouble.help(format!("did you mean $({meant} ...)?")),
+                    None => trouble.help(format!("known are {}", COMMANDS.join(", "))),
+                });
+            }
+            _ => return Err(Trouble::new(format!("$({}) needs one name", shortened(inner)))),
+        };
+        self.charge(text.len())?;
+        Ok(text)
+    }
+
+    /// The value of an argument of the document.
+    pub(crate) fn argument(&mut self, name: &str) -> Result<String, Trouble> {
+        self.used_arguments.insert(name.to_owned());
+        self.arguments.get(name).cloned().ok_or_else(|| {
+            let help = format!("give it with --arg {name}=VALUE, or by args = {{ {name} = ... }} in the robot file");
+            Trouble::new(format!("the argument {name:?} has no value")).help(help)
+        })
+    }
+
+    /// Folder of a package.
+    fn package(&mut self, name: &str) -> Result<PathBuf, Trouble> {
+        if let Some(folder) = self.packages.get(name) {
+            return Ok(folder.clone());
+        }
+        let found = self.resolver.find_package(name, self.files.last().and_then(|f| f.parent()));
+        let folder = found.map_err(|missing| Trouble::new(missing.reason).help(missing.help))?;
+        self.packages.insert(name.to_owned(), folder.clone());
+        Ok(folder)
+    }
+
+    /// `$(eval ...)`: arguments are names, as numbers where they look like numbers.
+    fn eval(&mut self, expression: &str) -> Result<String, Trouble> {
+        let scope = Table::root();
+        for (name, value) in &self.arguments {
+            scope.define(name, typed(value));
+        }
+        for (name, value) in [("true", true), ("false", false)] {
+            scope.define(name, Value::Bool(value));
+        }
+        self.used_arguments.extend(self.arguments.keys().cloned());
+        let value = self.expression(expression, &scope)?;
+        self.shown(&value)
+    }
+
+    /// The file that is being read, as an absolute path.
+    fn here(&self) -> PathBuf {
+        let file: &Path = self.files.last().map_or(Path::new("."), |file| file);
+        std::path::absolute(file).unwrap_or_else(|_| file.to_owned())
+    }
+
+    /// A path that may be relative to the file that is being read.
+    pub(crate) fn beside(&self, path: &str) -> PathBuf {
+        match self.files.last().and_then(|file| file.parent()) {
+            Some(folder) => folder.join(path),
+            None => PathBuf::from(path),
+        }
+    }
+}
+
+fn shown(path: Option<&Path>) -> String {
+    path.map(|p| p.display().to_string()).unwrap_or_default()
+}
+
+fn typed(text: &str) -> Value {
+    let number = if text.contains('.') { float_of(text).map(Value::Float) } else { int_of(text).map(Value::Int) };
+    number.unwrap_or_else(|| match text.to_lowercase().as_str() {
+        "true" => Value::Bool(true),
+        "false" => Value::Bool(false),
+        _ => Value::text(text),
+    })
+}

@@ -1,0 +1,113 @@
+//! Text with `${expressions}` and `$(substitutions)` in it.
+
+use super::Interpreter;
+use super::expression::value::Value;
+use super::expression::{Trouble, shortened};
+use super::scope::Scope;
+
+/// A stretch of text.
+#[derive(Debug, PartialEq)]
+enum Piece<'t> {
+    Plain(&'t str),
+    /// Between `${` and `}`.
+    Expression(&'t str),
+    /// Between `$(` and `)`.
+    Substitution(&'t str),
+}
+
+/// Cuts a text: an expression ends at the first `}`, a substitution at the first `)`; `$${` stands for `${`.
+fn pieces(text: &str) -> Result<Vec<Piece<'_>>, Trouble> {
+    let mut found = Vec::new();
+    let mut rest = text;
+    while !rest.is_empty() {
+        let dollars = rest.len() - rest.trim_start_matches('$').len();
+        let opens = rest[dollars..].starts_with(['{', '(']);
+        let end = if dollars > 1 && opens {
+            found.push(Piece::Plain(&rest[1..=dollars]));
+            dollars + 1
+        } else if dollars == 1 && opens {
+            let (open, close) = if rest.starts_with("${") { ('{', '}') } else { ('(', ')') };
+            let end = rest.find(close).ok_or_else(|| {
+                let message = format!("{:?} has no closing {close:?}", shortened(rest));
+                Trouble::new(message).help(format!("close it, or write $${open} for ${open} itself"))
+            })?;
+            let inner = &rest[2..end];
+            found.push(if open == '{' { Piece::Expression(inner) } else { Piece::Substitution(inner) });
+            end + 1
+        } else {
+            // dollars before anything else are text, as far as the next one
+            let end = rest[dollars..].find('$').map_or(rest.len(), |at| at + dollars);
+            found.push(Piece::Plain(&rest[..end]));
+            end
+        };
+        rest = &rest[end..];
+    }
+    Ok(found)
+}
+
+impl Interpreter<'_> {
+    /// The value of a text: that of its only piece, or all of them put together.
+    pub(crate) fn text(&mut self, text: &str, scope: &Scope) -> Result<Value, Trouble> {
+        self.charge(text.len())?;
+        if !text.contains('$') {
+            return Ok(Value::text(text));
+        }
+        let pieces = pieces(text)?;
+        if let [piece] = &pieces[..] {
+            return self.piece(piece, scope);
+        }
+        let mut joined = String::new();
+        for piece in &pieces {
+            let shown = match self.piece(piece, scope)? {
+                Value::Block(_) => return Err(Trouble::new("a block of XML cannot stand in a text")),
+                value => self.shown(&value)?,
+            };
+            self.charge(shown.len())?;
+            joined.push_str(&shown);
+        }
+        Ok(Value::text(joined))
+    }
+
+    fn piece(&mut self, piece: &Piece<'_>, scope: &Scope) -> Result<Value, Trouble> {
+        match piece {
+            Piece::Plain(text) => Ok(Value::text(text)),
+            // what stands inside may have pieces of its own
+            Piece::Expression(inner) => {
+                let inner = self.inner(inner, scope)?;
+                self.expression(&inner, scope)
+            }
+            Piece::Substitution(inner) => {
+                let inner = self.inner(inner, scope)?;
+                self.substitution(&inner).map(Value::text)
+            }
+        }
+    }
+
+    /// The value of a text, as text again.
+    pub(crate) fn shown_text(&mut self, text: &str, scope: &Scope) -> Result<String, Trouble> {
+        let value = self.text(text, scope)?;
+        self.shown(&value)
+    }
+
+    fn inner(&mut self, text: &str, scope: &Scope) -> Result<String, Trouble> {
+        self.deeper()?;
+        let shown = self.shown_text(text, scope)?;
+        self.depth -= 1;
+        Ok(shown)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_text_is_cut_at_dollars_with_brackets() {
+        use Piece::{Expression, Plain, Substitution};
+        let cut = |text| pieces(text).unwrap();
+        assert_eq!(cut("a${b}c$(d e)"), [Plain("a"), Expression("b"), Plain("c"), Substitution("d e")]);
+        assert_eq!(cut("$${x} 5$"), [Plain("${"), Plain("x} 5"), Plain("$")]);
+        assert_eq!(cut("$$$(x)"), [Plain("$$("), Plain("x)")]);
+        assert!(pieces("${open").unwrap_err().message.contains("no closing"));
+    }
+}

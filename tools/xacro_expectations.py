@@ -1,0 +1,34 @@
+#!/usr/bin/env python3
+"""What ROS's xacro makes of the files in crates/flexarm-urdf/tests/data/xacro, written beside them as NAME.expected.xml.
+
+Needs xacro from PyPI (2.1.1 was used, with PyYAML 6.0.3): python3 tools/xacro_expectations.py
+The package test_parts, which one file asks for, is that folder itself; its path is written as PACKAGE.
+"""
+import sys
+import types
+from pathlib import Path
+
+FOLDER = Path(__file__).resolve().parent.parent / "crates/flexarm-urdf/tests/data/xacro"
+
+packages = types.ModuleType("ament_index_python.packages")
+packages.get_package_share_directory = lambda name: {"test_parts": str(FOLDER)}[name]
+sys.modules["ament_index_python"] = types.ModuleType("ament_index_python")
+sys.modules["ament_index_python.packages"] = packages
+
+import xacro  # noqa: E402, it looks for the module above
+
+
+def without_comments(node):
+    for child in list(node.childNodes):
+        if child.nodeType == child.COMMENT_NODE:
+            node.removeChild(child)
+        else:
+            without_comments(child)
+
+
+for path in sorted(FOLDER.glob("*.xacro")):
+    document = xacro.process_file(str(path))
+    without_comments(document)
+    text = document.toprettyxml(indent="  ").replace(str(FOLDER), "PACKAGE")
+    path.with_suffix(".expected.xml").write_text(text)
+    print(f"{path.name}: {text.count(chr(10))} lines")
