@@ -191,10 +191,21 @@ fn a_motion_of_100_000_waypoints_is_read_in_seconds() {
 #[test]
 fn answers_that_overflow_are_refused() {
     let place = Place::new();
-    refused_at_once(&place, &["inspect", "robot.toml", "--velocity", "1e300", "--json"], &["finite", "joint value"]);
+    let heavy = with(&with(URDF, "mass value=\"1.728\"", "mass value=\"1e308\""), "xyz=\"0.4 0 0\"", "xyz=\"4e3 0 0\"");
+    place.write("heavy.urdf", heavy);
+    refused_at_once(&place, &["inspect", "heavy.urdf", "--json"], &["mass matrix", "no finite numbers"]);
     place.write("robot.toml", with(ROBOT, "-9.81", "-1e308"));
     let answer = place.flexarm(&["statics", "robot.toml", "--json"]);
     assert!(answer.code != 0 && answer.out.is_empty() && !answer.err.is_empty(), "{answer:?}");
+}
+
+/// Each sample of a servo is an event of the run: 1e15 of them per second would never end.
+#[test]
+fn a_servo_that_samples_without_end_is_refused() {
+    let place = Place::new();
+    let drive = "[[drive]]\njoint = \"swing\"\nkind = \"torque\"\nservo = { sample_s = 1e-15 }\n";
+    place.write("robot.toml", format!("{ROBOT}\n{drive}"));
+    refused_at_once(&place, &RUN, &["robot.toml:", "sample_s", "positive time", "0.000001"]);
 }
 
 #[test]

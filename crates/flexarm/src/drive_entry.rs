@@ -12,6 +12,9 @@ use toml::Spanned;
 use crate::error::Error;
 use crate::robot_file::{RobotFileError, Source};
 
+/// Shortest time between two samples of a servo (s): each is an event of the run.
+const SHORTEST_SAMPLE: f64 = 1e-6;
+
 /// Drive of a joint. Quantities are on the joint's side of the gear unless they say otherwise.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -276,8 +279,10 @@ fn drive(
             if gains.iter().flatten().any(|g| !(g.is_finite() && *g >= 0.0)) {
                 return Err(fail(s.span(), "servo gains must be 0 or above".into()));
             }
-            if s.get_ref().sample_s.is_some_and(|t| !(t.is_finite() && t > 0.0)) {
-                return Err(fail(s.span(), "sample_s must be a positive time in seconds".into()));
+            if let Some(t) = s.get_ref().sample_s.filter(|t| !(t.is_finite() && *t >= SHORTEST_SAMPLE)) {
+                let text =
+                    format!("sample_s must be a positive time in seconds, {SHORTEST_SAMPLE} at least, found {t}");
+                return Err(fail(s.span(), text));
             }
             if kind != DriveKind::Torque {
                 warnings

@@ -14,7 +14,12 @@ const LARGEST: u64 = 256 << 20;
 /// [`Error::File`].
 pub(crate) fn read_text(path: &Path) -> Result<String, Error> {
     let fail = |what: String| Error::File { path: path.to_owned(), what };
-    let unreadable = |error: std::io::Error| fail(format!("cannot be read: {error}"));
+    let unreadable = |error: std::io::Error| match error.kind() {
+        std::io::ErrorKind::InvalidData => {
+            fail("cannot be read: it is not text in UTF-8; save it as that, or is it another file?".into())
+        }
+        _ => fail(format!("cannot be read: {error}")),
+    };
     // A device might never end, a pipe never begin.
     if !std::fs::metadata(path).map_err(unreadable)?.is_file() {
         return Err(fail("cannot be read: this is not a file".into()));

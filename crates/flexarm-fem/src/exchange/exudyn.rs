@@ -11,6 +11,7 @@ use nalgebra::Vector3;
 use super::error::{ExchangeError, ExchangeErrorKind, Place};
 use super::matrix::{DofLabel, LabelledMatrix, Storage, Triplets};
 use super::text::LARGEST_UNPACKED;
+use crate::input::allowed_unpacked;
 
 /// What a file of Exudyn holds; nodes are counted from 0, as Exudyn does.
 pub(super) struct Exudyn {
@@ -36,7 +37,8 @@ pub(super) fn parse(bytes: &[u8], origin: &str) -> Result<Exudyn, ExchangeError>
         place.fail(ExchangeErrorKind::Syntax, "file", error.to_string(), "HDF5", "is the file cut off?")
     };
     let file = File::from_bytes(bytes.to_vec()).map_err(syntax)?;
-    let reader = Reader { file, size: bytes.len(), left: Cell::new(LARGEST_UNPACKED), place };
+    let reader =
+        Reader { file, size: bytes.len(), left: Cell::new(allowed_unpacked(bytes.len(), LARGEST_UNPACKED)), place };
     let points = reader.reals("nodes/Position")?;
     if points.is_empty() || !points.len().is_multiple_of(3) {
         let found = format!("{} numbers", points.len());
@@ -74,7 +76,7 @@ impl Reader<'_> {
         match bytes(width.max(8)).and_then(|bytes| self.left.get().checked_sub(bytes)) {
             Some(left) => self.left.set(left),
             None => {
-                let expected = format!("at most {LARGEST_UNPACKED} bytes in all data sets");
+                let expected = "no more bytes in all data sets together than a file of this size may hold".to_owned();
                 return Err(self.fail(name, format!("{shape:?} numbers"), &expected));
             }
         }
@@ -162,7 +164,7 @@ mod tests {
         let read = reader(1600);
         assert_eq!((read.reals("numbers").unwrap().len(), read.integers("short").unwrap().len()), (100, 100));
         let error = read.reals("numbers").unwrap_err();
-        assert!(error.to_string().contains("at most 2147483648 bytes in all data sets"), "{error}");
+        assert!(error.to_string().contains("than a file of this size may hold"), "{error}");
         assert!(reader(799).integers("short").is_err());
     }
 
