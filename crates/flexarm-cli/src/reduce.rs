@@ -60,6 +60,7 @@ fn flags(args: &ReduceArgs) -> Result<ReduceJob, Error> {
         split: args.split,
         chains: args.chains.clone(),
         geometric: args.geometric.then_some(true),
+        merge: args.merge,
         quadrature: args.quadrature.map(|name| match name {
             QuadratureName::Exact => QuadratureChoice::Exact,
             QuadratureName::Calculix => QuadratureChoice::Calculix,

@@ -96,6 +96,9 @@ pub(crate) struct ReduceArgs {
     /// Store the stiffness by load of the modal link (12 more solves), for geometric_stiffening = true of a robot file
     #[arg(long, help_heading = "Reduction", hide_short_help = true)]
     pub(crate) geometric: bool,
+    /// Make one node of nodes nearer to each other than this (unit of the mesh), to close seams and cracks
+    #[arg(long, value_name = "DISTANCE", allow_hyphen_values = true)]
+    pub(crate) merge: Option<f64>,
     /// Integration of the elements
     #[arg(long, value_enum, help_heading = "Reduction", hide_short_help = true)]
     pub(crate) quadrature: Option<QuadratureName>,

@@ -58,12 +58,14 @@ pub mod mesh_gate;
 pub mod mesh_link;
 pub mod modal;
 pub mod model;
+pub mod order_check;
 pub mod reduced;
 pub mod reduction;
 pub mod rigid_part;
 pub mod section;
 pub mod sparse;
 pub mod spatial;
+mod spelling;
 #[cfg(test)]
 pub(crate) mod test_mesh;
 pub mod units;

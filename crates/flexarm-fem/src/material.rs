@@ -2,9 +2,13 @@
 //!
 //! The presets are textbook values for a first answer; a certificate or a test of the part is better.
 
+use std::ops::RangeInclusive;
+
 use serde::{Deserialize, Serialize};
 
 use crate::error::{FemError, positive};
+use crate::spelling;
+use crate::units::UnitSystem;
 
 /// Isotropic linear elastic material.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -43,22 +47,64 @@ impl Material {
         ("ductile_iron", Self::DUCTILE_IRON),
     ];
 
+    /// Other names of the presets, in the form of [`Self::preset`]: lower case, words joined by `_`.
+    const OTHER_NAMES: [(&'static str, &'static str); 19] = [
+        ("structural_steel", "steel"),
+        ("carbon_steel", "steel"),
+        ("mild_steel", "steel"),
+        ("aluminum", "aluminium"),
+        ("aluminium_alloy", "aluminium"),
+        ("aluminum_alloy", "aluminium"),
+        ("alu", "aluminium"),
+        ("al", "aluminium"),
+        ("castiron", "cast_iron"),
+        ("grey_iron", "cast_iron"),
+        ("gray_iron", "cast_iron"),
+        ("grey_cast_iron", "cast_iron"),
+        ("gray_cast_iron", "cast_iron"),
+        ("en_gjl_250", "cast_iron"),
+        ("ductile_cast_iron", "ductile_iron"),
+        ("nodular_iron", "ductile_iron"),
+        ("nodular_cast_iron", "ductile_iron"),
+        ("spheroidal_cast_iron", "ductile_iron"),
+        ("en_gjs_400", "ductile_iron"),
+    ];
+
     /// Material with the shear modulus that isotropy asks for.
     pub const fn isotropic(E: f64, nu: f64, rho: f64) -> Self {
         Self { E, nu, rho, G: None }
     }
 
-    /// A preset by its name.
+    /// A preset by one of its names (`aluminium`, `Aluminum`, `cast iron`, ...), with the name that files use.
+    pub fn preset(name: &str) -> Option<(&'static str, Self)> {
+        let plain = plain(name);
+        let other = Self::OTHER_NAMES.iter().find(|(other, _)| *other == plain).map(|(_, name)| *name);
+        let name = other.unwrap_or(&plain);
+        Self::PRESETS.into_iter().find(|(known, _)| *known == name)
+    }
+
+    /// The preset whose name is most like a word that is none.
+    pub fn suggestion(name: &str) -> Option<&'static str> {
+        let others = Self::OTHER_NAMES.iter().map(|(other, _)| *other);
+        let found = spelling::nearest(&plain(name), Self::PRESETS.iter().map(|(known, _)| *known).chain(others))?;
+        Self::preset(found).map(|(known, _)| known)
+    }
+
+    /// [`Self::preset`], or an error that says which there are.
     ///
     /// # Errors
-    /// [`FemError::UnknownName`], with all the names there are.
+    /// [`FemError::UnknownName`], with all the names there are and the one that is meant most likely.
     pub fn named(name: &str) -> Result<Self, FemError> {
-        Self::PRESETS.iter().find(|(known, _)| *known == name).map(|(_, material)| *material).ok_or_else(|| {
-            FemError::UnknownName {
-                what: "material",
-                found: name.to_owned(),
-                known: Self::PRESETS.map(|(known, _)| known).join(", "),
-            }
+        Self::preset(name).map(|(_, material)| material).ok_or_else(|| FemError::UnknownName {
+            what: "material",
+            found: name.to_owned(),
+            known: {
+                let known = Self::PRESETS.map(|(known, _)| known).join(", ");
+                match Self::suggestion(name) {
+                    Some(meant) => format!("{known}; is {meant:?} meant?"),
+                    None => known,
+                }
+            },
         })
     }
 
@@ -84,6 +130,86 @@ impl Material {
         positive("shear modulus G (Pa)", self.shear_modulus())?;
         Ok(())
     }
+
+    /// Sentences about constants that pass [`Self::check`], but that no material of a robot has: a wrong unit, most often.
+    ///
+    /// * `units`: those in which they were written, so that the message shows what stands in the file.
+    pub fn doubts(&self, units: &UnitSystem) -> Vec<String> {
+        let mut doubts = Vec::new();
+        let written = |value: f64, unit: f64| match *units == UnitSystem::SI {
+            true => String::new(),
+            false => format!(" ({:.4e} in units {units})", value / unit),
+        };
+        if !MODULI.contains(&self.E) {
+            doubts.push(format!(
+                "Young's modulus E is {:.3e} Pa{}; solids have {:.0e} to {:.1e} Pa{}",
+                self.E,
+                written(self.E, units.stress()),
+                MODULI.start(),
+                MODULI.end(),
+                likely(self.E, &MODULI, &MODULUS_SLIPS)
+            ));
+        }
+        if !DENSITIES.contains(&self.rho) {
+            doubts.push(format!(
+                "the density is {:.3e} kg/m3{}; solids have {} to {} kg/m3{}",
+                self.rho,
+                written(self.rho, units.density()),
+                DENSITIES.start(),
+                DENSITIES.end(),
+                likely(self.rho, &DENSITIES, &DENSITY_SLIPS)
+            ));
+        }
+        if !RATIOS.contains(&self.nu) {
+            doubts.push(format!(
+                "Poisson's ratio nu is {}; metals have 0.25 to 0.35, other solids {} to {}{}",
+                self.nu,
+                RATIOS.start(),
+                RATIOS.end(),
+                if self.nu < 0.0 { ": is the sign right?" } else { ": is rubber meant?" }
+            ));
+        }
+        doubts
+    }
+}
+
+/// Young's moduli from soft plastics to diamond, Pa.
+const MODULI: RangeInclusive<f64> = 1e8..=1.2e12;
+/// Densities from rigid foam to osmium, kg/m³.
+const DENSITIES: RangeInclusive<f64> = 20.0..=23_000.0;
+/// Poisson's ratios from cork to stiff rubber.
+const RATIOS: RangeInclusive<f64> = 0.0..=0.49;
+
+/// By how much a modulus is too large after a slip, and the slip.
+const MODULUS_SLIPS: [(f64, &str); 5] = [
+    (1e6, "given in Pa where the file is in MPa (mm, N)?"),
+    (1e-6, "given in MPa where Pa is expected?"),
+    (1e-9, "given in GPa where Pa is expected?"),
+    (1e3, "given in MPa where the file is in GPa?"),
+    (1e-3, "a factor of 1000 too small?"),
+];
+/// The same of a density.
+const DENSITY_SLIPS: [(f64, &str); 5] = [
+    (1e12, "given in kg/m3 where the file is in t/mm3?"),
+    (1e-12, "given in t/mm3 where kg/m3 is expected?"),
+    (1e-9, "given in kg/mm3 where kg/m3 is expected?"),
+    (1e9, "given in kg/m3 where the file is in kg/mm3?"),
+    (1e-3, "given in g/cm3 where kg/m3 is expected?"),
+];
+
+/// The slip that explains a value, if one does.
+fn likely(value: f64, sound: &RangeInclusive<f64>, slips: &[(f64, &str)]) -> String {
+    // Metals are meant most often, so the slip that leads nearest to the middle of the range counts.
+    let middle = (sound.start() * sound.end()).sqrt();
+    let explains = slips.iter().filter(|(factor, _)| sound.contains(&(value / factor)));
+    let off = |factor: f64| (value / factor / middle).ln().abs();
+    let best = explains.min_by(|a, b| off(a.0).total_cmp(&off(b.0)));
+    best.map_or_else(|| ": is the unit right?".into(), |(_, words)| format!(": {words}"))
+}
+
+/// A name in lower case with `_` between words.
+fn plain(name: &str) -> String {
+    name.trim().to_lowercase().replace([' ', '-'], "_")
 }
 
 #[cfg(test)]
@@ -102,6 +228,68 @@ mod tests {
     fn an_unknown_material_is_answered_with_the_known_ones() {
         let message = Material::named("steal").unwrap_err().to_string();
         assert!(message.contains("\"steal\"") && message.contains("aluminium"), "{message}");
+    }
+
+    #[test]
+    fn common_spellings_of_a_material_are_the_material() {
+        for (word, name) in [
+            ("aluminum", "aluminium"),
+            ("Aluminium", "aluminium"),
+            ("STEEL", "steel"),
+            ("cast iron", "cast_iron"),
+            ("grey cast-iron", "cast_iron"),
+            ("nodular iron", "ductile_iron"),
+        ] {
+            assert_eq!(Material::preset(word).unwrap().0, name, "{word}");
+        }
+        for (word, name) in [("alumnium", "aluminium"), ("steal", "steel"), ("duktile_iron", "ductile_iron")] {
+            assert_eq!(Material::suggestion(word), Some(name));
+        }
+        assert_eq!(Material::suggestion("unobtainium"), None);
+    }
+
+    /// Truth: the same steel, written with one slip of the unit each.
+    #[test]
+    fn a_slip_of_the_unit_is_told_with_the_value_in_the_file_and_the_slip() {
+        let mm: UnitSystem = "mm-t-s".parse().unwrap();
+        let doubt = |material: Material, units: &UnitSystem| material.doubts(units).join("; ");
+        let pa_in_mpa = doubt(Material::isotropic(2.1e11 * mm.stress(), 0.3, 7850.0), &mm);
+        assert!(pa_in_mpa.contains("2.1000e11 in units mm-t-s") && pa_in_mpa.contains("Pa where"), "{pa_in_mpa}");
+        let kg_in_t = doubt(Material::isotropic(2.1e11, 0.3, 7850.0 * mm.density()), &mm);
+        assert!(kg_in_t.contains("7.8500e3 in units mm-t-s") && kg_in_t.contains("t/mm3"), "{kg_in_t}");
+        for (E, nu, rho, word) in [
+            (2.1e5, 0.3, 7850.0, "given in MPa"),
+            (210.0, 0.3, 7850.0, "given in GPa"),
+            (2.1e11, 0.3, 7.85, "g/cm3"),
+            (2.1e11, 0.3, 7.85e-9, "t/mm3"),
+            (2.1e11, 0.3, 7.85e-6, "kg/mm3"),
+            (2.1e11, 0.5, 7850.0, "rubber"),
+            (2.1e11, -0.9, 7850.0, "sign"),
+        ] {
+            let said = doubt(Material::isotropic(E, nu, rho), &UnitSystem::SI);
+            assert!(said.contains(word), "{E} {nu} {rho}: {said}");
+        }
+    }
+
+    /// Metals, plastics, composites and ceramics of data sheets: no false alarm.
+    #[test]
+    fn materials_of_data_sheets_raise_no_doubt() {
+        for (E, nu, rho) in [
+            (210e9, 0.3, 7850.0),
+            (193e9, 0.29, 8000.0),
+            (45e9, 0.35, 1800.0),
+            (113e9, 0.34, 4430.0),
+            (70e9, 0.33, 2700.0),
+            (135e9, 0.3, 1600.0),
+            (12e9, 0.35, 1400.0),
+            (2.3e9, 0.39, 1050.0),
+            (400e9, 0.28, 19_300.0),
+            (600e9, 0.22, 15_600.0),
+            (370e9, 0.22, 3900.0),
+            (0.6e9, 0.45, 950.0),
+        ] {
+            assert_eq!(Material::isotropic(E, nu, rho).doubts(&UnitSystem::SI), Vec::<String>::new());
+        }
     }
 
     #[test]

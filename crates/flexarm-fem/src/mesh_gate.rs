@@ -1,9 +1,11 @@
 //! What is checked on every reduction of a mesh, with numbers; written into the link file and the report.
 
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::element::jacobian_range;
-use crate::mesh::Mesh;
+use crate::element::{edges, jacobian_range};
+use crate::mesh::{ElementKind, Mesh};
+use crate::order_check::OrderCheck;
 
 /// One mode with A held and B free, as the mesh and the reduced models have it, Hz.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -36,12 +38,32 @@ pub struct ElementQuality {
     pub smallest_at_nodes: f64,
     /// Number in the file of the element with the smallest one at a node.
     pub worst_element: u64,
+    /// Smallest volume of an element over that of the best shape of its kind with edges of the same length; 1 is best.
+    #[serde(default = "one")]
+    pub smallest_fullness: f64,
+    /// Number in the file of that element.
+    #[serde(default)]
+    pub flattest_element: u64,
+    /// Elements below [`MeshGate::SMALLEST_FULLNESS`].
+    #[serde(default)]
+    pub flat_elements: usize,
+    /// Largest distance of a mid-side node from the middle of its edge, over the length of the edge.
+    #[serde(default)]
+    pub largest_offset: f64,
+    /// Number in the file of the element with it.
+    #[serde(default)]
+    pub bent_element: u64,
+}
+
+fn one() -> f64 {
+    1.0
 }
 
 impl ElementQuality {
     /// Looks at every solid element of a mesh.
     pub fn of(mesh: &Mesh) -> Self {
-        let mut quality = Self { smallest_at_points: 1.0, smallest_at_nodes: 1.0, ..Self::default() };
+        let mut quality =
+            Self { smallest_at_points: 1.0, smallest_at_nodes: 1.0, smallest_fullness: 1.0, ..Self::default() };
         let mut x = Vec::new();
         for block in mesh.blocks.iter() {
             quality.elements += block.len();
@@ -53,15 +75,63 @@ impl ElementQuality {
                 x.extend(nodes.iter().map(|node| mesh.nodes[*node as usize]));
                 let range = jacobian_range(block.kind, &x);
                 quality.smallest_at_points = quality.smallest_at_points.min(range.min_gauss);
+                // TOML has no larger integers.
+                let id = (*id).min(i64::MAX as u64);
                 if range.min_node < quality.smallest_at_nodes {
-                    quality.smallest_at_nodes = range.min_node;
-                    // TOML has no larger integers.
-                    quality.worst_element = (*id).min(i64::MAX as u64);
+                    (quality.smallest_at_nodes, quality.worst_element) = (range.min_node, id);
+                }
+                let fullness = fullness(block.kind, &x, range.mean);
+                quality.flat_elements += usize::from(fullness < MeshGate::SMALLEST_FULLNESS);
+                if fullness < quality.smallest_fullness {
+                    (quality.smallest_fullness, quality.flattest_element) = (fullness, id);
+                }
+                let offset = largest_offset(block.kind, &x);
+                if offset > quality.largest_offset {
+                    (quality.largest_offset, quality.bent_element) = (offset, id);
                 }
             }
         }
         quality
     }
+}
+
+/// Volume over that of the regular shape whose edges have the same mean square along each direction of the element.
+///
+/// Tetrahedra are compared with the regular one (a sliver has edges and no volume); bricks and wedges, which may well be
+/// flat, with the right-angled one of their own three edge lengths.
+///
+/// * `det`: mean of the determinant of the Jacobian, m³.
+fn fullness(kind: ElementKind, x: &[Vector3<f64>], det: f64) -> f64 {
+    let length2 = |a: usize, b: usize| (x[a] - x[b]).norm_squared();
+    let mean = |pairs: &[[usize; 2]]| pairs.iter().map(|[a, b]| length2(*a, *b)).sum::<f64>() / pairs.len() as f64;
+    // det J of the best shape: 6 V of the regular tetrahedron; edge products of brick (8 det = V) and wedge (2 V, t from -1 to 1).
+    let best = match kind {
+        ElementKind::Tet4 | ElementKind::Tet10 => mean(&edges(kind)[..6]).powf(1.5) / 2f64.sqrt(),
+        ElementKind::Wedge6 | ElementKind::Wedge15 => {
+            mean(&edges(kind)[..6]) * (0.75f64).sqrt() * mean(&edges(kind)[6..9]).sqrt() / 2.0
+        }
+        ElementKind::Hex8 | ElementKind::Hex20 => {
+            let e = edges(kind);
+            let along = [[e[0], e[2], e[4], e[6]], [e[1], e[3], e[5], e[7]], [e[8], e[9], e[10], e[11]]];
+            along.iter().map(|pairs| mean(pairs).sqrt()).product::<f64>() / 8.0
+        }
+        ElementKind::Beam2 => return 1.0,
+    };
+    if best > 0.0 { det / best } else { 0.0 }
+}
+
+/// Largest distance of a mid-side node from the middle of its edge, over the length of the edge.
+fn largest_offset(kind: ElementKind, x: &[Vector3<f64>]) -> f64 {
+    let corners = match kind {
+        ElementKind::Tet10 => 4,
+        ElementKind::Wedge15 => 6,
+        ElementKind::Hex20 => 8,
+        _ => return 0.0,
+    };
+    let one = |([a, b], middle): (&[usize; 2], &Vector3<f64>)| {
+        (middle - (x[*a] + x[*b]) * 0.5).norm() / (x[*a] - x[*b]).norm()
+    };
+    edges(kind).iter().zip(&x[corners..]).map(one).fold(0.0, f64::max)
 }
 
 /// The checks of a reduction.
@@ -94,6 +164,9 @@ pub struct MeshGate {
     pub modes: Vec<ModeCheck>,
     /// Shape of the elements.
     pub quality: ElementQuality,
+    /// How much too stiff elements of first order make the link; none where there are none, or too many to tell.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub order: Option<OrderCheck>,
 }
 
 impl MeshGate {
@@ -105,6 +178,10 @@ impl MeshGate {
     pub const MODE_RESIDUAL: f64 = 1e-6;
     /// Jacobian at a node, over the mean of its element, below which it speaks.
     pub const SMALLEST_JACOBIAN: f64 = 0.05;
+    /// Volume of an element over that of the best shape below which it speaks.
+    pub const SMALLEST_FULLNESS: f64 = 0.01;
+    /// Offset of a mid-side node over the length of its edge above which it speaks: an arc of 140 degrees.
+    pub const LARGEST_OFFSET: f64 = 0.35;
 
     /// Sentences about what passes, but is worth a look.
     pub fn warnings(&self) -> Vec<String> {
@@ -140,6 +217,87 @@ impl MeshGate {
                 self.quality.worst_element, self.quality.smallest_at_nodes
             ),
         );
+        see(
+            self.quality.smallest_fullness < Self::SMALLEST_FULLNESS,
+            format!(
+                "{} element(s) are nearly without volume, the flattest is {}: its volume is {:.1e} of that of the best shape \
+                 with such edges, usual is above {}; such slivers are far too stiff: mesh anew, or optimise the mesh",
+                self.quality.flat_elements,
+                self.quality.flattest_element,
+                self.quality.smallest_fullness,
+                Self::SMALLEST_FULLNESS
+            ),
+        );
+        see(
+            self.quality.largest_offset > Self::LARGEST_OFFSET,
+            format!(
+                "a mid-side node of element {} stands {:.2} of the length of its edge from the middle of it, usual is below \
+                 {}: is it in the wrong place, or the mesh too coarse for the curve?",
+                self.quality.bent_element,
+                self.quality.largest_offset,
+                Self::LARGEST_OFFSET
+            ),
+        );
+        warnings.extend(self.order.as_ref().and_then(OrderCheck::caveat));
         warnings
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::promoted;
+    use crate::test_mesh::{Noise, SOLIDS, cube, positions};
+
+    fn quality(mesh: &Mesh) -> ElementQuality {
+        ElementQuality::of(mesh)
+    }
+
+    /// Truth: right-angled bricks and wedges over an equilateral triangle are full, Kuhn's tetrahedra are 0.61.
+    #[test]
+    fn the_best_shape_of_a_kind_is_full_also_where_it_is_flat() {
+        for (kind, fullness) in [(ElementKind::Hex8, 1.0), (ElementKind::Hex20, 1.0), (ElementKind::Wedge6, 0.866)] {
+            let flat = cube(kind, [2, 2, 2], false, |u| Vector3::new(u.x, u.y, 1e-3 * u.z));
+            let found = quality(&flat).smallest_fullness;
+            assert!((found / fullness - 1.0).abs() < 1e-3, "{kind:?}: {found}");
+        }
+        let regular = [
+            Vector3::new(0.0, 0.0, 0.0),
+            Vector3::new(1.0, 0.0, 0.0),
+            Vector3::new(0.5, 0.75f64.sqrt(), 0.0),
+            Vector3::new(0.5, 0.75f64.sqrt() / 3.0, (2.0f64 / 3.0).sqrt()),
+        ];
+        let det = jacobian_range(ElementKind::Tet4, &regular).mean;
+        assert!((fullness(ElementKind::Tet4, &regular, det) - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_sliver_is_named_and_distorted_elements_are_not() {
+        let mut noise = Noise(3);
+        for kind in SOLIDS {
+            let mesh = cube(kind, [3, 3, 3], false, |u| u + noise.vector() * 0.04);
+            let found = quality(&mesh);
+            assert!(found.flat_elements == 0 && found.smallest_fullness > 0.2, "{kind:?}: {found:?}");
+        }
+        // The last corner of one tetrahedron nearly in the plane of the others.
+        let mut mesh = cube(ElementKind::Tet4, [1, 1, 1], false, |u| u);
+        let element = mesh.blocks[0].elements().next().unwrap().to_vec();
+        let x = positions(&mesh, &element);
+        mesh.blocks[0] =
+            crate::mesh::ElementBlock { ids: vec![7], connectivity: element.clone(), ..mesh.blocks[0].clone() };
+        let normal = (x[1] - x[0]).cross(&(x[2] - x[0])).normalize();
+        mesh.nodes[element[3] as usize] -= normal * ((x[3] - x[0]).dot(&normal) * (1.0 - 1e-3));
+        let found = quality(&mesh);
+        assert_eq!((found.flat_elements, found.flattest_element), (1, 7), "{found:?}");
+    }
+
+    #[test]
+    fn a_mid_side_node_far_off_is_named() {
+        let mut mesh = promoted(&cube(ElementKind::Tet4, [1, 1, 1], false, |u| u)).mesh;
+        assert!(quality(&mesh).largest_offset < 1e-15);
+        let middle = mesh.blocks[0].connectivity[10 + 6] as usize;
+        mesh.nodes[middle] += Vector3::new(0.0, 0.0, 0.5);
+        let found = quality(&mesh);
+        assert!(found.largest_offset > MeshGate::LARGEST_OFFSET && found.bent_element > 0, "{found:?}");
     }
 }

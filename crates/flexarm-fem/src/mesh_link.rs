@@ -13,13 +13,14 @@ use nalgebra::{DMatrix, Matrix3, Matrix6, Vector3};
 
 use crate::chain::{Chain, ChainError, ChainSource, centre_of_compliance};
 use crate::cut::{CutError, CutPlane, cut, mass_properties};
-use crate::error::FemError;
+use crate::error::{Direction, FemError};
 use crate::frames::LinkFrames;
 use crate::gate::GateLimits;
-use crate::mesh::Mesh;
+use crate::mesh::{Bodies, Mesh, bodies, coincident};
 use crate::mesh_gate::{ElementQuality, MeshGate, ModeCheck};
 use crate::modal::ModalSource;
 use crate::model::{AssemblyError, AssemblyOptions, FeModel, materials};
+use crate::order_check::check_order;
 use crate::reduced::{LinkDetails, Provenance, ReducedLink};
 use crate::reduction::{
     Condensation, CondensationOptions, Interface, InterfaceFrame, ReductionError, SolverFigures, Superelement,
@@ -118,6 +119,26 @@ pub enum MeshLinkError {
     /// The gate refused the result.
     #[error(transparent)]
     Gate(Box<FemError>),
+    /// An interface that the mesh does not hold.
+    #[error("interface {interface:?} can move without force while {first:?} is held ({direction}): {cause}")]
+    FreeInterface {
+        /// Its name.
+        interface: String,
+        /// The proximal interface.
+        first: String,
+        /// How it moves, link axes.
+        direction: Direction,
+        /// Why, as far as the mesh tells.
+        cause: String,
+    },
+    /// Bodies of the mesh that turn against each other.
+    #[error("{source}; {cause}")]
+    Hinge {
+        /// What was found.
+        source: ReductionError,
+        /// Where the bodies touch.
+        cause: String,
+    },
     /// Elements of different kinds that meet without fitting.
     #[error(
         "{count} pair(s) of elements meet without fitting: {list}; the faces gape or overlap; use one order of \
@@ -139,14 +160,20 @@ pub enum MeshLinkError {
     },
     /// Parts of the mesh that hang on no interface.
     #[error(
-        "the mesh falls into {parts} parts that share no node: {list}; only one may remain; \
-         was a glue or merge of coincident nodes forgotten (Coherence in Gmsh)?"
+        "the mesh falls into {parts} parts that share no node: {list}; only one may remain; {}",
+        if *coincident > 0 {
+            format!("{coincident} pair(s) of nodes lie in one place: merge them (Coherence in Gmsh, or merge in the reduction)")
+        } else {
+            "no two of their nodes lie in one place: is a part there that does not belong to the link?".to_owned()
+        }
     )]
     Unconnected {
         /// How many.
         parts: usize,
         /// Their sizes, with one node each.
         list: String,
+        /// Pairs of nodes in one place.
+        coincident: usize,
     },
 }
 
@@ -200,6 +227,7 @@ pub fn reduce_mesh(
 ) -> Result<MeshReduction, MeshLinkError> {
     check_connected(mesh)?;
     check_fit(mesh)?;
+    let bodies = bodies(mesh);
     // Frames in other units are refused before the work, not after it.
     if let [a, b, ..] = plan.interfaces.as_slice() {
         LinkFrames::new(a.X_LI, b.X_LI).check()?;
@@ -210,7 +238,8 @@ pub fn reduce_mesh(
     let model = FeModel::assemble(mesh, &plan.assembly)?;
 
     step(ReductionStep::Factorisation);
-    let condensation = Condensation::new(&model, &plan.interfaces, plan.condensation)?;
+    let condensation = Condensation::new(&model, &plan.interfaces, plan.condensation)
+        .map_err(|error| with_cause(error, plan, &bodies))?;
     let unit_loads = condensation.unit_load_shapes().columns(0, 6).into_owned();
 
     step(ReductionStep::FixedModes);
@@ -225,7 +254,7 @@ pub fn reduce_mesh(
     let densities: Vec<f64> = materials.iter().map(|m| m.rho).collect();
     let whole = mass_properties(mesh, &densities)?;
     let (X_LA, X_LB) = (plan.interfaces[0].X_LI, plan.interfaces[1].X_LI);
-    let mut warnings = Vec::new();
+    let mut warnings = suspicious(mesh, &bodies);
     let loose = FemError::Missing { what: "stiffness of the third interface", help: "it holds nothing" };
     let K12 = stiffness12(&superelement).ok_or(loose)?;
     let frames = LinkFrames::new(X_LA, X_LB);
@@ -242,7 +271,8 @@ pub fn reduce_mesh(
         p_LB: X_LB.translation.vector,
     };
     let chains = plan.chains.iter().map(|parts| source.chain(*parts)).collect::<Result<Vec<_>, _>>()?;
-    let gate = gate(&condensation, &superelement, &link, &whole, &fixed_modes, &held_modes, quality);
+    let mut gate = gate(&condensation, &superelement, &link, &whole, &fixed_modes, &held_modes, quality);
+    gate.order = check_order(mesh, &plan.assembly, &plan.interfaces, &condensation, &unit_loads)?;
     let bare_chains = chains.clone();
     let mut chains = chains;
     attach(&plan.attached, &mut link, &mut chains)?;
@@ -272,6 +302,73 @@ pub fn reduce_mesh(
     Ok(MeshReduction { link, whole, solver, unit_loads, fixed_modes, held_modes, bare_chains, solves, warnings })
 }
 
+/// How to mend a hinge.
+const JOIN: &str = "connect bodies by whole faces (fragment or Coherence in Gmsh, a tie or merge elsewhere)";
+
+/// A mechanism, with the interface by name and the hinge that lets it move.
+fn with_cause(error: ReductionError, plan: &LinkPlan, bodies: &Bodies) -> MeshLinkError {
+    let hinges = |with: Option<[usize; 2]>| -> Vec<String> {
+        let between = |bodies: [usize; 2]| with.is_none_or(|with| bodies == with);
+        bodies.hinges.iter().filter(|hinge| between(hinge.bodies)).take(4).map(ToString::to_string).collect()
+    };
+    match error {
+        ReductionError::FreeInterface { interface, direction } if interface < plan.interfaces.len() => {
+            let [first, free] = [0, interface].map(|k| body_of(&plan.interfaces[k], bodies));
+            let direct = hinges(Some([first.min(free), first.max(free)]));
+            let list = if direct.is_empty() { hinges(None) } else { direct };
+            let cause = match list.is_empty() {
+                true => {
+                    "its nodes are connected to nothing that resists; are they on the part that is meant?".to_owned()
+                }
+                false => format!("{}; this is a hinge, which carries no moment: {JOIN}", list.join("; ")),
+            };
+            let name = |k: usize| plan.interfaces[k].name.clone();
+            MeshLinkError::FreeInterface { interface: name(interface), first: name(0), direction, cause }
+        }
+        ReductionError::Loose { .. } if !bodies.hinges.is_empty() => {
+            MeshLinkError::Hinge { source: error, cause: format!("{}: {JOIN}", hinges(None).join("; ")) }
+        }
+        other => other.into(),
+    }
+}
+
+/// The body on which most nodes of an interface are.
+fn body_of(interface: &Interface, bodies: &Bodies) -> usize {
+    let mut count = vec![0_usize; bodies.elements.len()];
+    for node in &interface.nodes {
+        if let Some(count) = count.get_mut(bodies.of_node[*node as usize]) {
+            *count += 1;
+        }
+    }
+    (0..count.len()).rev().max_by_key(|body| count[*body]).unwrap_or(0)
+}
+
+/// Sentences about a mesh that is connected, but not as it looks: cracks, hinges.
+fn suspicious(mesh: &Mesh, bodies: &Bodies) -> Vec<String> {
+    let mut warnings: Vec<String> = bodies
+        .hinges
+        .iter()
+        .take(3)
+        .map(|hinge| format!("{hinge}: they turn against each other there; {JOIN} if they are one part"))
+        .collect();
+    let found = coincident(mesh, mesh.coincidence());
+    if let Some([first, _]) = found.pairs.first() {
+        let p = mesh.nodes[*first as usize];
+        let faces = if found.faces > 0 { format!(", {} faces lie on each other", found.faces) } else { String::new() };
+        warnings.push(format!(
+            "{} pair(s) of nodes lie in one place without being one node{faces} (first: node {} at {:.6}, {:.6}, {:.6} m): a \
+             crack, through which no force goes; merge coincident nodes (Coherence in Gmsh, or merge in the reduction) if \
+             the body is whole",
+            found.pairs.len(),
+            mesh.node_ids[*first as usize],
+            p.x,
+            p.y,
+            p.z
+        ));
+    }
+    warnings
+}
+
 fn check_fit(mesh: &Mesh) -> Result<(), MeshLinkError> {
     let misfits = crate::mesh::misfits(mesh);
     if misfits.is_empty() {
@@ -298,7 +395,8 @@ fn check_connected(mesh: &Mesh) -> Result<(), MeshLinkError> {
     if parts.len() > 6 {
         list.push("...".into());
     }
-    Err(MeshLinkError::Unconnected { parts: parts.len(), list: list.join(", ") })
+    let coincident = coincident(mesh, mesh.coincidence()).pairs.len();
+    Err(MeshLinkError::Unconnected { parts: parts.len(), list: list.join(", "), coincident })
 }
 
 /// Split frame and the two parts. The cut is across AB, through S.
@@ -416,6 +514,7 @@ fn gate(
         fixed_frequencies_hz: fixed.frequencies_hz(),
         modes: rows.collect(),
         quality,
+        order: None,
     }
 }
 
@@ -470,19 +569,26 @@ fn implausible(mesh: &Mesh, whole: &RigidPart, held: &Modes) -> Vec<String> {
     let size = mesh.bounding_box().map_or(0.0, |(low, high)| (high - low).amax());
     let first = held.frequencies_hz().first().copied();
     let mut warnings = Vec::new();
-    let mut see = |what: &str, value: f64, unit: &str, low: f64, high: f64| {
+    let mut see = |what: &str, value: f64, unit: &str, low: f64, high: f64, slip: &str| {
         if !(low..=high).contains(&value) {
             warnings.push(format!(
-                "{what} is {value:.3e} {unit}; links of robots lie between {low:.0e} and {high:.0e}: are the units those declared?"
+                "{what} is {value:.3e} {unit}; links of robots lie between {low:.0e} and {high:.0e}: are the units those declared?{slip}"
             ));
         }
     };
-    see("the largest dimension", size, "m", 1e-2, 2e1);
-    see("the mass", whole.mass, "kg", 1e-3, 1e4);
+    let of_length = if (1e-2..=2e1).contains(&(size * 1e-3)) {
+        " With mm for m it would be a thousandth."
+    } else if (1e-2..=2e1).contains(&(size * 1e3)) {
+        " With m for mm it would be a thousand times as large."
+    } else {
+        ""
+    };
+    see("the largest dimension", size, "m", 1e-2, 2e1, of_length);
+    see("the mass", whole.mass, "kg", 1e-3, 1e4, "");
     let volume_density = whole.mass / size.powi(3).max(f64::MIN_POSITIVE);
-    see("the mass over the cube of the largest dimension", volume_density, "kg/m3", 1e-1, 2.5e4);
+    see("the mass over the cube of the largest dimension", volume_density, "kg/m3", 1e-1, 2.5e4, "");
     if let Some(first) = first {
-        see("the first frequency with A held", first, "Hz", 1e0, 5e4);
+        see("the first frequency with A held", first, "Hz", 1e0, 5e4, "");
     }
     warnings
 }

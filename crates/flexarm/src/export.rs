@@ -14,8 +14,8 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use flexarm_fem::exchange::{
-    DofLabel, Interface, InterfaceMap, MatrixNames, RowPick, Sidecar, SidecarInterface, assemble_interfaces,
-    read_matrices, write_dmig, write_matrix_market, write_op4, write_sidecar, write_simscape, write_user_element,
+    DofLabel, InputFile, Interface, InterfaceMap, MatrixNames, RowPick, Sidecar, SidecarInterface, assemble_interfaces,
+    parse_matrices, write_dmig, write_matrix_market, write_op4, write_sidecar, write_simscape, write_user_element,
 };
 use flexarm_fem::reduction::{InterfaceFrame, Superelement};
 use flexarm_fem::{Pose, ReducedLink, UnitSystem, read_flex};
@@ -148,12 +148,13 @@ pub fn export(job: &ExportJob) -> Result<ExportSummary, Error> {
         content.files().into_iter().map(|(name, text)| (job.folder.join(name), text)).collect();
     let paths: Vec<PathBuf> = texts.iter().map(|(path, _)| path.clone()).collect();
     result_files::check_free(&paths, job.overwrite)?;
-    result_files::write_all(&texts)?;
 
-    // Back through the door of every import.
-    let readable: Vec<&PathBuf> =
-        paths.iter().filter(|path| path.extension().is_none_or(|ending| ending != "txt" && ending != "m")).collect();
-    let imported = read_matrices(&readable, &MatrixNames::default()).map_err(Box::new)?;
+    // Back through the door of every import, before anything is written: what cannot be read leaves no file.
+    let is_readable = |path: &PathBuf| path.extension().is_none_or(|ending| ending != "txt" && ending != "m");
+    let readable = texts.iter().filter(|(path, _)| is_readable(path));
+    let readable: Vec<InputFile> =
+        readable.map(|(path, text)| InputFile::new(path.display().to_string(), text.as_bytes())).collect();
+    let imported = parse_matrices(&readable, &MatrixNames::default()).map_err(Box::new)?;
     let map = content.map();
     let back = assemble_interfaces(&imported, Some(&map), Some(&job.units)).map_err(Box::new)?;
     let stiffness_error = difference(&element.K, &back.K);
@@ -164,6 +165,7 @@ pub fn export(job: &ExportJob) -> Result<ExportSummary, Error> {
             warnings.push(format!("the {what} read back differs by {error:.1e} (relative to its diagonal)"));
         }
     }
+    result_files::write_all(&texts)?;
     let whole = link.rigid();
     Ok(ExportSummary {
         link: link.name.clone(),

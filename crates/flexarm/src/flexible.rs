@@ -6,13 +6,14 @@ use std::sync::Arc;
 use crate::bends::Bend;
 use flexarm_fem::{BeamLink, ModalLink, ModalOptions};
 use flexarm_flexlink::{
-    BranchJoint, FlexibleLink, FlexibleSpan, Gearbox, LinkForm, branch_joints, insert_gearboxes, substitute,
+    BranchJoint, FlexibleLink, FlexibleSpan, Gearbox, LinkForm, Parts, SubstitutionError, branch_joints, insert_gearboxes,
+    substitute,
 };
 use flexarm_kinematics::{Data, MOST_COORDINATES, Model, mass_matrix};
 use flexarm_stepping::{
     Damping, FlexibleArm, Friction, GeometricStiffness, PrescribedMotion, Servo, ServoAxis, Spring, StepError,
 };
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::caveat::Caveat;
 use crate::drive_entry::{Drive, DriveKind, GearDamping, ServoEntry};
@@ -57,6 +58,9 @@ pub struct LinkChoices {
     pub eigenmodes: Option<usize>,
     /// Whether loads change the stiffness.
     pub geometric: bool,
+    /// Whether the file says whose mass the parts take; if not, they take that of the uniform beam where the link's own
+    /// cannot be cut.
+    pub parts_asked: bool,
 }
 
 /// The key by which something was asked for.
@@ -324,7 +328,9 @@ impl Robot {
                 if matches!(&form, LinkForm::Modal(modal) if !modal.has_second_order()) {
                     doubts.push(format!("link {:?}: {SECOND_ORDER_UNKNOWN}", link.flexible.link));
                 }
-                links.push(FlexibleLink { form, ..link.flexible.clone() });
+                let mut flexible = FlexibleLink { form, ..link.flexible.clone() };
+                doubts.extend(self.uncut(link, &mut flexible));
+                links.push(flexible);
             }
         }
         // An option that nothing takes up is a mistake, not a wish.
@@ -440,6 +446,27 @@ impl Robot {
         let modal =
             link.form(&modelling).map_err(|message| Error::Usage(format!("link {name:?}: {why}; {message}")))?;
         Ok((modal, Some(format!("link {name:?} bends in modes (model = \"modal\"): {why}"))))
+    }
+
+    /// Gives a beam that does not say whose mass it takes that of the uniform beam, if the link's own cannot be cut; says so.
+    fn uncut(&self, link: &RobotLink, flexible: &mut FlexibleLink) -> Option<String> {
+        if link.choices.parts_asked {
+            return None;
+        }
+        let Err(SubstitutionError::Cut { link: name, source }) =
+            substitute(&self.rigid, std::slice::from_ref(flexible))
+        else {
+            return None;
+        };
+        flexible.parts = Parts::Reduced;
+        let middle = flexible.reduced.rigid().com;
+        let own =
+            self.rigid.link(&name).and_then(|link| link.inertia).map_or_else(Vector3::zeros, |inertia| inertia.com);
+        Some(format!(
+            "link {name:?}: the URDF's inertia cannot be spread along the beam ({source}); its parts have the URDF's mass as a \
+             uniform beam instead, whose centre of mass is {:.4} m from the URDF's; parts = \"uniform\" says that this is meant",
+            (middle - own).norm()
+        ))
     }
 }
 

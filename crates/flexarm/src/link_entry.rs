@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use flexarm_fem::{BeamLink, BeamTheory, Material, ReducedLink, Section, read_flex};
+use flexarm_fem::{BeamLink, BeamTheory, Material, ReducedLink, Section, UnitSystem, read_flex};
 use flexarm_flexlink::{FlexibleLink, LinkForm, Parts, SubstitutionError, distal_joint};
 use flexarm_kinematics::{ElasticAngles, Mechanism, Pose};
 use flexarm_stepping::Damping;
@@ -74,9 +74,13 @@ pub(crate) fn flexible_link(
                 ));
             }
             warnings.extend(reduced.warnings(&Default::default()).into_iter().map(|w| format!("link {name:?}: {w}")));
+            let order = reduced.details.as_ref().and_then(|details| details.gate.as_ref()?.order);
+            let stiff =
+                order.and_then(|order| order.caveat()).map(|caveat| format!("link {name:?}: its mesh: {caveat}"));
+            warnings.extend(stiff);
             (reduced, Parts::Reduced, None)
         }
-        (None, Some(beam)) => beam_link(name, beam, distal.X_PJ, mechanism, source)?,
+        (None, Some(beam)) => beam_link(name, beam, distal.X_PJ, mechanism, source, warnings)?,
         _ => {
             let message = format!("flexible link {name:?} needs either reduced = \"file.flex\" or beam = {{ ... }}");
             return Err(at(entry.link.span(), message).into());
@@ -86,7 +90,8 @@ pub(crate) fn flexible_link(
     let (form, coupling) = (LinkForm::TwoParts, entry.coupling);
     let flexible = FlexibleLink { link: name.clone(), distal, reduced, parts, form, angles, coupling };
     let geometric = entry.geometric_stiffening.as_ref().is_some_and(|asked| *asked.get_ref());
-    let choices = LinkChoices { model, segments, modes, eigenmodes, geometric };
+    let parts_asked = entry.beam.as_ref().is_none_or(|beam| beam.get_ref().parts.is_some());
+    let choices = LinkChoices { model, segments, modes, eigenmodes, geometric, parts_asked };
     let link = RobotLink { flexible, damping, beam, choices };
     // What the file asks for must be there; overrides are looked at when they are used.
     link.form_or_key(&Modelling::default()).map_err(|(asked, message)| {
@@ -133,10 +138,15 @@ fn beam_link(
     X_LB: Pose,
     mechanism: &Mechanism,
     source: &Source,
+    warnings: &mut Vec<String>,
 ) -> Result<(ReducedLink, Parts, Option<BeamLink>), Error> {
     let beam = entry.get_ref();
     let fail = |message: String| Error::from(source.error(entry.span(), format!("link {name:?}: {message}")));
     let (section, material): (Section, Material) = beam_section(beam).map_err(fail)?;
+    if beam.material.is_some() {
+        let doubts = material.doubts(&UnitSystem::SI).into_iter();
+        warnings.extend(doubts.map(|doubt| format!("link {name:?}: {doubt}")));
+    }
     let theory = match beam.theory.as_deref() {
         None | Some("timoshenko") => BeamTheory::Timoshenko,
         Some("euler-bernoulli") => BeamTheory::EulerBernoulli,

@@ -27,8 +27,8 @@ pub fn check_free(paths: &[PathBuf], overwrite: bool) -> Result<(), Error> {
     Ok(())
 }
 
-/// Writes all files, each first under another name; only when all are there are they renamed, so a full disk leaves
-/// nothing behind. A rename that fails leaves those before it.
+/// Writes all files, each first under another name; only when all are there are they renamed, so neither a full disk nor a
+/// rename that fails leaves new files behind. Files that were overwritten before it stay as they are now.
 ///
 /// # Errors
 /// [`Error::Write`].
@@ -44,7 +44,11 @@ pub fn write_all(files: &[(PathBuf, impl AsRef<[u8]>)]) -> Result<(), Error> {
         std::fs::write(&partial, bytes).map_err(failed)?;
     }
     for (path, _) in files {
+        let is_new = !path.exists();
         std::fs::rename(partial(path), path).map_err(|source| Error::Write { path: path.clone(), source })?;
+        if is_new {
+            undo.files.push(path.clone());
+        }
     }
     undo.done = true;
     Ok(())

@@ -33,6 +33,8 @@ pub enum Quadrature {
     /// mass. The mass of tetrahedra, HEX20 and wedges is under-integrated: right in sum, not in detail.
     /// WEDGE6 has one motion without stiffness beside the rigid ones.
     Calculix,
+    /// The same, but HEX8 with incompatible modes: C3D8I.
+    CalculixModes,
 }
 
 /// What the quadrature points are for.
@@ -235,14 +237,14 @@ impl Tables {
     pub(crate) fn stiffness_for(&self, rule: Quadrature, geometry: Geometry) -> &Table {
         match rule {
             Quadrature::Exact => self.stiffness(geometry),
-            Quadrature::Calculix => &self.calculix,
+            Quadrature::Calculix | Quadrature::CalculixModes => &self.calculix,
         }
     }
 
     pub(crate) fn mass_for(&self, rule: Quadrature, geometry: Geometry) -> &Table {
         match rule {
             Quadrature::Exact => self.mass(geometry),
-            Quadrature::Calculix => &self.calculix,
+            Quadrature::Calculix | Quadrature::CalculixModes => &self.calculix,
         }
     }
 }

@@ -44,7 +44,7 @@ impl ElementWorkspace {
     /// ```text
     /// K_ij = ∫ λ a bᵀ + μ (b aᵀ + (a·b) 1) dV,   a = ∇N_i, b = ∇N_j      M_ij = ∫ ρ N_i N_j dV
     /// ```
-    /// HEX8 with [`Quadrature::Exact`] has nine incompatible modes `1 - r²`, `1 - s²`, `1 - t²` in each
+    /// HEX8 with [`Quadrature::Exact`] or [`Quadrature::CalculixModes`] has nine incompatible modes `1 - r²`, `1 - s²`, `1 - t²` in each
     /// direction, condensed statically: it bends without locking. Their gradients use the Jacobian of the
     /// centre, `(det J_0 / det J) J_0⁻ᵀ`, so that they do no work in constant stress and the patch test
     /// holds for any shape. They carry no mass.
@@ -74,7 +74,7 @@ impl ElementWorkspace {
             (ElementKind::Tet4, _) => self.compute::<4, 12>(kind, &nodes, material, rule),
             (ElementKind::Tet10, _) => self.compute::<10, 30>(kind, &nodes, material, rule),
             (ElementKind::Hex8, Quadrature::Calculix) => self.compute::<8, 24>(kind, &nodes, material, rule),
-            (ElementKind::Hex8, Quadrature::Exact) => {
+            (ElementKind::Hex8, Quadrature::Exact | Quadrature::CalculixModes) => {
                 self.compute::<8, 33>(kind, &nodes, material, rule)?;
                 condense(&mut self.stiffness, 33, 24);
                 Ok(())

@@ -232,12 +232,16 @@ fn nodes_in(index: &HashMap<DofLabel, usize>) -> String {
     }
 }
 
+/// Nodes or sixes of rows beyond which no map is proposed: a full model, or modes.
+const MOST_PROPOSED: usize = 4;
+
 /// The map that the rows suggest, if they suggest one; the user must agree to it.
 ///
-/// Two nodes of six components, four nodes of three (CalculiX), or at least twelve rows without nodes.
+/// Nodes of six components, pairs of nodes of three (CalculiX), or sixes of rows without nodes; of other numbers of rows
+/// without nodes the first twelve.
 pub fn propose_map(rows: &[DofLabel]) -> Option<InterfaceMap> {
     let named = |picks: Vec<Vec<RowPick>>| {
-        let interfaces = ["A", "B"].into_iter().zip(picks).map(|(name, picks)| Interface { name: name.into(), picks });
+        let interfaces = ('A'..='Z').zip(picks).map(|(name, picks)| Interface { name: name.into(), picks });
         Some(InterfaceMap { interfaces: interfaces.collect(), modal: Vec::new() })
     };
     let mut order: Vec<i64> = Vec::new();
@@ -253,10 +257,14 @@ pub fn propose_map(rows: &[DofLabel]) -> Option<InterfaceMap> {
     let all = |last: u8| components.values().all(|dofs| dofs.iter().copied().eq(1..=last));
     let node = |i: usize, last: u8| RowPick::Node { node: order[i], first: 1, last };
     match order.len() {
-        2 if all(6) => named(vec![vec![node(0, 6)], vec![node(1, 6)]]),
-        4 if all(3) => named(vec![vec![node(0, 3), node(1, 3)], vec![node(2, 3), node(3, 3)]]),
+        n @ 2..=MOST_PROPOSED if all(6) => named((0..n).map(|k| vec![node(k, 6)]).collect()),
+        n @ 4..=MOST_PROPOSED if all(3) && n % 2 == 0 => {
+            named((0..n / 2).map(|k| vec![node(2 * k, 3), node(2 * k + 1, 3)]).collect())
+        }
         0 if rows.len() >= 12 && rows.len() <= super::matrix::LARGEST_DENSE => {
-            named(vec![vec![RowPick::Rows { first: 1, last: 6 }], vec![RowPick::Rows { first: 7, last: 12 }]])
+            let n = rows.len() / 6;
+            let n = if rows.len() % 6 == 0 && n <= MOST_PROPOSED { n } else { 2 };
+            named((0..n).map(|k| vec![RowPick::Rows { first: 6 * k + 1, last: 6 * k + 6 }]).collect())
         }
         _ => None,
     }

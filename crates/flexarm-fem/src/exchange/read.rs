@@ -106,13 +106,83 @@ struct Found {
 /// Files that belong to a given one are read too where they are not given: `.mas` and `.dof` of a
 /// `.sti`, the `.mapping` of a Harwell-Boeing file, the sidecar `.toml` of Matrix Market files and
 /// the matrices that a sidecar names, also if it was found beside the only given file, which it names.
+/// Beside a single file that is named as a stiffness (`arm_K.mtx`, `STIF1`, `stiffness`) or as a mass, the other
+/// matrix of the same name is found, and said in a warning.
 ///
 /// # Errors
 /// [`ExchangeError`] with file, line, element, what was found and what was expected.
 pub fn read_matrices<P: AsRef<Path>>(paths: &[P], names: &MatrixNames) -> Result<ImportedMatrices, ExchangeError> {
     let mut files = paths.iter().map(InputFile::open).collect::<Result<Vec<_>, _>>()?;
     companions(&mut files)?;
-    parse_matrices(&files, names)
+    let other = other_matrix(&files)?;
+    files.extend(other.clone());
+    let mut imported = parse_matrices(&files, names)?;
+    if let Some(InputFile { origin, role: Some(role), .. }) = &other {
+        imported
+            .warnings
+            .push(format!("{origin}, found beside the file that was given, is taken as its {}", role.name()));
+    }
+    Ok(imported)
+}
+
+/// The mass that belongs to a single stiffness, or the other way round, by its name.
+fn other_matrix(files: &[InputFile]) -> Result<Option<InputFile>, ExchangeError> {
+    let is_matrix = |format| {
+        matches!(
+            format,
+            MatrixFormat::MatrixMarket
+                | MatrixFormat::LabelledText
+                | MatrixFormat::CoordinateText
+                | MatrixFormat::HarwellBoeing
+                | MatrixFormat::Csv
+        )
+    };
+    let format = |file: &InputFile| recognise(&file.bytes).filter(|format| is_matrix(*format));
+    let mut matrices = files.iter().filter(|file| format(file).is_some());
+    let (Some(only), None) = (matrices.next(), matrices.next()) else { return Ok(None) };
+    let Some(role) = only.role.or_else(|| role_by_name(&only.origin)) else { return Ok(None) };
+    let path = Path::new(&only.origin);
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    for other in other_names(&name, role) {
+        let place = path.with_file_name(&other);
+        if !place.is_file() {
+            continue;
+        }
+        let file = InputFile::open(&place)?;
+        if format(&file) == format(only) {
+            let role = if role == MatrixRole::Stiffness { MatrixRole::Mass } else { MatrixRole::Stiffness };
+            return Ok(Some(file.with_role(role)));
+        }
+    }
+    Ok(None)
+}
+
+/// Names that the other matrix may have: the last word that means the one is changed to the other.
+fn other_names(name: &str, role: MatrixRole) -> Vec<String> {
+    const WORDS: [(&str, &str); 9] = [
+        ("stiffness", "mass"),
+        ("Stiffness", "Mass"),
+        ("STIFFNESS", "MASS"),
+        ("stiff", "mass"),
+        ("STIFF", "MASS"),
+        ("stif", "mass"),
+        ("STIF", "MASS"),
+        ("k", "m"),
+        ("K", "M"),
+    ];
+    let mut names = Vec::new();
+    for (stiffness, mass) in WORDS {
+        let (from, to) = if role == MatrixRole::Stiffness { (stiffness, mass) } else { (mass, stiffness) };
+        // A whole word: no letters beside it.
+        let is_word = |at: usize| {
+            let letter = |c: Option<char>| c.is_some_and(char::is_alphabetic);
+            !letter(name[..at].chars().next_back()) && !letter(name[at + from.len()..].chars().next())
+        };
+        if let Some((at, _)) = name.rmatch_indices(from).find(|(at, _)| is_word(*at)) {
+            names.push(format!("{}{to}{}", &name[..at], &name[at + from.len()..]));
+        }
+    }
+    names
 }
 
 /// Adds the files beside the given ones that belong to them.
@@ -404,5 +474,26 @@ fn aligned(
     match (reordered(K, &rows), reordered(M, &rows)) {
         (Some(K), Some(M)) => Ok((K, M)),
         _ => Err(refuse()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_mass_beside_a_stiffness_has_the_usual_names() {
+        for (stiffness, mass) in [
+            ("fork_K.mtx", "fork_M.mtx"),
+            ("K.mtx", "M.mtx"),
+            ("arm-k.csv", "arm-m.csv"),
+            ("job_STIF1.mtx", "job_MASS1.mtx"),
+            ("kuka_stiffness.mtx.gz", "kuka_mass.mtx.gz"),
+            ("beam_K12.mtx", "beam_M12.mtx"),
+        ] {
+            assert!(other_names(stiffness, MatrixRole::Stiffness).contains(&mass.to_owned()), "{stiffness}");
+            assert!(other_names(mass, MatrixRole::Mass).contains(&stiffness.to_owned()), "{mass}");
+        }
+        assert!(other_names("kuka.mtx", MatrixRole::Stiffness).is_empty());
     }
 }

@@ -59,6 +59,7 @@ pub(super) fn write_details(link: &ReducedLink) -> String {
     if let Some(gate) = details.gate.as_ref().and_then(|gate| toml::to_string(gate).ok()) {
         // Its own tables become tables of [gate].
         let body = gate.replace("\n[[", "\n[[gate.").replace("\n[quality]", "\n[gate.quality]");
+        let body = body.replace("\n[order]", "\n[gate.order]");
         text += &format!("\n[gate]                        # what was checked against the mesh\n{body}");
     }
     text

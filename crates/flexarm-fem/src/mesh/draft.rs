@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 use super::error::{MeshError, MeshErrorKind as Kind, Place};
 use super::faces::corner_count;
 use super::ids::IdIndex;
+use super::orientation::turn_reversed;
 use super::source::{Source, listed};
 use super::{ElementBlock, ElementKind, Mesh, Region};
 use crate::units::UnitSystem;
@@ -114,7 +115,8 @@ impl Draft {
             node_sets.insert(name, nodes);
         }
         let nodes = self.nodes.into_iter().map(|p| p * units.length).collect();
-        let mesh = Mesh { nodes, node_ids: self.node_ids, blocks, regions: self.regions, node_sets };
+        let mut mesh = Mesh { nodes, node_ids: self.node_ids, blocks, regions: self.regions, node_sets };
+        warnings.extend(turn_reversed(&mut mesh));
         let used = mesh.used_nodes();
         if used.contains(&false) {
             let unused = used.iter().zip(&mesh.node_ids).filter(|(used, _)| !**used).map(|(_, id)| id);

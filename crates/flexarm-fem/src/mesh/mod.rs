@@ -9,15 +9,20 @@
 //!
 //! Not here: shape functions and matrices of elements ([`crate::element`]), ties, reduction.
 
+mod coincident;
 mod draft;
 mod error;
 mod faces;
 mod fit;
 mod gmsh;
+mod hinges;
 mod ids;
 mod inp;
+mod orientation;
 mod parts;
+mod promote;
 mod read;
+mod seat;
 mod select;
 mod selector;
 mod source;
@@ -31,10 +36,14 @@ use crate::beam::BeamTheory;
 use crate::material::Material;
 use crate::section::Section;
 
+pub use coincident::{COINCIDENT, Coincident, coincident};
 pub use error::{MeshError, MeshErrorKind, Place};
 pub use fit::{Misfit, misfits};
+pub use hinges::{Bodies, Hinge, bodies};
 pub use parts::{Part, connected_parts};
+pub use promote::{Promoted, added_nodes, promoted, second_order};
 pub use read::{MeshFile, ReadOptions, parse_mesh, read_mesh};
+pub use seat::{Seat, Surface};
 pub use select::{SelectError, select};
 pub use selector::{NodeSelector, SelectorSyntaxError};
 pub use surface::{Skin, SkinFace, skin};

@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 use super::selector::NodeSelector;
 use super::surface::skin;
 use super::{ElementKind, Mesh};
+use crate::spelling::distance;
 
 /// Tolerance of places where none is given, as a part of the diagonal of the mesh.
 const TOLERANCE: f64 = 1e-6;
@@ -255,19 +256,4 @@ fn size(selector: &NodeSelector, what: &'static str, value: f64) -> Result<f64, 
         return Ok(value);
     }
     Err(geometry(selector, what, value.to_string(), "zero or a positive finite number"))
-}
-
-/// Number of letters to insert, delete or change (Levenshtein).
-fn distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, x) in a.chars().enumerate() {
-        let mut diagonal = std::mem::replace(&mut row[0], i + 1);
-        for (j, y) in b.iter().enumerate() {
-            let change = diagonal + usize::from(x != *y);
-            diagonal = row[j + 1];
-            row[j + 1] = change.min(row[j] + 1).min(diagonal + 1);
-        }
-    }
-    row[b.len()]
 }

@@ -1,10 +1,11 @@
 //! The factorised model with its boundary: static shapes, and modes under three kinds of support.
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, DVector, SymmetricEigen, Vector3};
 
 use super::boundary::{Boundary, Interface, TieError};
 use super::grounding::statically_determinate;
 use super::superelement::{InterfaceFrame, Superelement};
+use crate::error::Direction;
 use crate::model::FeModel;
 use crate::sparse::{
     Cholesky, FactorFigures, Modes, ModesError, ModesWanted, NotPositiveDefinite, Ordering, Threads, add_product, gram,
@@ -14,6 +15,10 @@ use crate::sparse::{
 /// A pivot this far below its diagonal entry is rounding: a mechanism that passed by its sign. Links of
 /// a thousand times their thickness stay above 1e-10.
 const SINGULAR: f64 = 1e-12;
+
+/// Smallest eigenvalue of the stiffness of the interfaces, scaled to a unit diagonal, below which one of them moves freely:
+/// that of the gate.
+const FREE: f64 = 1e-10;
 
 /// How to solve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -50,9 +55,15 @@ pub enum ReductionError {
     },
     /// An interface after the first can move without force.
     #[error(
-        "an interface after the first one can move without force: is it on the same part of the mesh as the others?"
+        "interface number {} can move without force while the first one is held ({direction}): do the two stand on the same \
+         part of the model, and is that part connected in more than a point or a line?", interface + 1
     )]
-    FreeInterface,
+    FreeInterface {
+        /// Its number, from 0.
+        interface: usize,
+        /// How it moves; components in the axes of the model.
+        direction: Direction,
+    },
     /// Nothing holds the model and no six DoF can.
     #[error("the mesh lies on a line or in a point: nothing holds its rotations")]
     NoGrounding,
@@ -290,7 +301,10 @@ impl<'m> Condensation<'m> {
             return Ok(DMatrix::zeros(0, 0));
         }
         let K = self.K_g.view((6, 6), (n - 6, n - 6)).into_owned();
-        spd_inverse(&K).ok_or(ReductionError::FreeInterface)
+        match free_direction(&K) {
+            Some((interface, direction)) => Err(ReductionError::FreeInterface { interface: interface + 1, direction }),
+            None => spd_inverse(&K).ok_or_else(|| ReductionError::Modes(ModesError::NotFinite)),
+        }
     }
 
     /// The model that was reduced.
@@ -502,6 +516,30 @@ fn apply_rows(rows: &[Vec<(u32, f64)>], X: &DMatrix<f64>) -> DMatrix<f64> {
 /// The largest of some measures; a NaN among them stays.
 pub(crate) fn worst(values: impl IntoIterator<Item = f64>) -> f64 {
     values.into_iter().fold(0.0, |worst: f64, x| if !(x <= worst) { x } else { worst })
+}
+
+/// The interface that moves most, and how, where a stiffness of six rows per interface resists some motion with nothing.
+fn free_direction(K: &DMatrix<f64>) -> Option<(usize, Direction)> {
+    let scale = K.diagonal().map(|k| if k > 0.0 { 1.0 / k.sqrt() } else { 0.0 });
+    let scaled = DMatrix::from_fn(K.nrows(), K.ncols(), |i, j| K[(i, j)] * scale[i] * scale[j]);
+    if scaled.iter().any(|x| !x.is_finite()) {
+        return None;
+    }
+    // A row without any stiffness is a free motion by itself.
+    let motion = match (0..K.nrows()).find(|i| scale[*i] == 0.0) {
+        Some(row) => DVector::from_fn(K.nrows(), |i, _| f64::from(i == row)),
+        None => {
+            let eigen = SymmetricEigen::new(scaled);
+            let (at, smallest) = eigen.eigenvalues.argmin();
+            if smallest > FREE {
+                return None;
+            }
+            eigen.eigenvectors.column(at).component_mul(&scale)
+        }
+    };
+    let size = |k: usize| motion.rows(6 * k, 6).norm();
+    let most = (0..K.nrows() / 6).max_by(|a, b| size(*a).total_cmp(&size(*b)))?;
+    Some((most, Direction::new(motion.rows(6 * most, 6).iter().copied())))
 }
 
 fn symmetric(A: DMatrix<f64>) -> DMatrix<f64> {

@@ -96,7 +96,7 @@ pub(super) fn draw(sheet: &mut Image, pictures: &MeshPictures<'_>, tied: &[Tied]
         column.y += 9.0;
         column.line(&format!("{} warning(s) of the reduction:", reduction.warnings.len()), alert);
         for warning in &reduction.warnings {
-            column.line(warning, Style::new(13.0, color::ALERT));
+            column.line(&warning.message, Style::new(13.0, color::ALERT));
         }
     }
 }

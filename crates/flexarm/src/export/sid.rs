@@ -48,13 +48,10 @@ pub(super) fn export(job: &ExportJob, link: &ReducedLink, started: Instant) -> R
     ];
     let paths: Vec<PathBuf> = texts.iter().map(|(path, _)| path.clone()).collect();
     result_files::check_free(&paths, job.overwrite)?;
-    result_files::write_all(&texts)?;
 
-    // Back from the disk, as every import reads it.
-    let written = std::fs::read_to_string(&paths[0])
-        .map_err(|e| Error::File { path: paths[0].clone(), what: format!("cannot be read back: {e}") })?;
+    // Back as every import reads it, before anything is written: what cannot be read leaves no file.
     let origin = paths[0].display().to_string();
-    let back = parse_sid(&written, &origin).map_err(Box::new)?.in_units(&job.units, &UnitSystem::SI);
+    let back = parse_sid(&texts[0].1, &origin).map_err(Box::new)?.in_units(&job.units, &UnitSystem::SI);
     let back = ModalLink::from_sid_held_at(&link.name, &back, ids[0]).map_err(Box::new)?;
     let (stiffness_error, mass_error) = (difference(&modal.K, &back.K), difference(&modal.M, &back.M));
     let integrals_error = integrals(modal, &back);
@@ -63,6 +60,7 @@ pub(super) fn export(job: &ExportJob, link: &ReducedLink, started: Instant) -> R
             warnings.push(format!("the {what} read back differs by {error:.1e} (relative to its diagonal)"));
         }
     }
+    result_files::write_all(&texts)?;
     let whole = modal.rigid();
     Ok(ExportSummary {
         link: link.name.clone(),

@@ -201,7 +201,17 @@ fn matrices(job: &ImportJob, name: &str) -> Result<(MatrixReduction, Parts), Err
             full::propose(&imported)
         } else {
             match propose_map(&imported.stiffness.rows) {
-                Some(map) => format!("if the proximal interface comes first: --map \"{map}\""),
+                Some(map) => {
+                    let unnumbered = imported.stiffness.rows.iter().all(|label| label.node.is_none());
+                    let rows = imported.stiffness.rows.len();
+                    let modal = match unnumbered && rows > 12 && map.interfaces.len() > 2 {
+                        true => format!(
+                            ", or, where modes follow two interfaces, --map \"A=#1-6,B=#7-12,modal=#13-{rows}\""
+                        ),
+                        false => String::new(),
+                    };
+                    format!("if the proximal interface comes first: --map \"{map}\"{modal}")
+                }
                 None => "give --map, such as A=1001,B=1002 or A=#1-6,B=#7-12".into(),
             }
         };
@@ -214,7 +224,12 @@ fn matrices(job: &ImportJob, name: &str) -> Result<(MatrixReduction, Parts), Err
         None
     });
     if map.is_none() && imported.positions.is_empty() && imported.frames.is_empty() && job.at.is_empty() {
-        faults.push(file_error(&imported, no_place(&imported, None, &["A".into(), "B".into()])));
+        let names = propose_map(&imported.stiffness.rows).filter(|_| !is_full);
+        let names = names.map_or_else(
+            || vec!["A".into(), "B".into()],
+            |map| map.interfaces.iter().map(|interface| interface.name.clone()).collect(),
+        );
+        faults.push(file_error(&imported, no_place(&imported, None, &names)));
     }
     let (Some(units), Some(map), Some(placed)) = (units, map, placed) else {
         return Err(if faults.len() == 1 { faults.remove(0) } else { Error::Several(faults) });
@@ -415,17 +430,33 @@ fn no_place(imported: &ImportedMatrices, map: Option<&ImportMap>, names: &[Strin
         Some(ImportMap::Nodes(_)) => None,
         None => propose_map(&imported.stiffness.rows),
     };
-    let implied = proposed.and_then(|map| implied_distance(imported, &map));
-    let (a, b) = (&names[0], &names[1]);
+    // From the first interface to each other one, which takes the second place for it.
+    let implied = proposed.and_then(|map| {
+        let to = |k: usize| {
+            let mut map = map.clone();
+            map.interfaces.swap(1, k);
+            implied_distance(imported, &map)
+        };
+        (1..names.len().min(map.interfaces.len())).map(to).collect::<Option<Vec<_>>>()
+    });
+    let a = &names[0];
     let text = match implied {
-        Some(p) => {
-            let [x, y, z] = <[f64; 3]>::from(p).map(|x| if x.abs() < 1e-9 * p.norm() { 0.0 } else { x });
+        Some(places) if places.len() + 1 == names.len() => {
+            let place = |(name, p): (&String, &Vector3<f64>)| {
+                let [x, y, z] = <[f64; 3]>::from(*p).map(|x| if x.abs() < 1e-9 * p.norm() { 0.0 } else { x });
+                (format!("{name} at ({x:.6}, {y:.6}, {z:.6})"), format!(" --at {name}={x:.6},{y:.6},{z:.6}"))
+            };
+            let (where_they_are, flags): (Vec<String>, Vec<String>) = names[1..].iter().zip(&places).map(place).unzip();
             format!(
-                "the stiffness itself says that {b} lies at ({x:.6}, {y:.6}, {z:.6}) from {a}; if {a} is the origin of the \
-                 link: --at {a}=0,0,0 --at {b}={x:.6},{y:.6},{z:.6}"
+                "the stiffness itself says, from {a}: {}; if {a} is the origin of the link: --at {a}=0,0,0{}",
+                where_they_are.join(", "),
+                flags.concat()
             )
         }
-        None => format!("give --at {a}=x,y,z --at {b}=x,y,z"),
+        _ => {
+            let flags: Vec<String> = names.iter().map(|name| format!("--at {name}=x,y,z")).collect();
+            format!("give {}", flags.join(" "))
+        }
     };
     format!("where the interfaces are is not in the file (unit of the file, link axes): {text}")
 }

@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, Matrix3, Matrix6};
 use serde::Serialize;
 
 use super::SECOND_ORDER_UNKNOWN;
-use crate::reduce::{ModalFigures, ReportTable, modal_table};
+use crate::reduce::{ModalFigures, ReportTable, coarse, modal_table};
 
 /// Answer of `flexarm import`.
 #[derive(Clone, Debug, Serialize)]
@@ -148,6 +148,8 @@ impl ImportSummary {
         {
             all.push(format!("the mass matrix holds {:.6}, {:.6}, {:.6} kg along x, y, z", m[0], m[1], m[2]));
         }
+        let first = held_frequencies_hz.first().zip(lumped_frequencies_hz.first());
+        all.extend(coarse("the matrices", first.map(|(hz, lumped)| lumped / hz - 1.0), None));
         let details = link.details.as_deref();
         let stored = details.and_then(|details| details.modal.as_ref()).map(ModalFigures::from);
         let modal = stored.or_else(|| {

@@ -1,10 +1,10 @@
 //! From the interfaces of a job to nodes and frames of a mesh, with messages that say what to type.
 
 use flexarm_fem::matrix_link::halves_of_bar;
-use flexarm_fem::mesh::select;
+use flexarm_fem::mesh::{Seat, Surface, select};
 use flexarm_fem::reduction::{Interface, Tie};
 use flexarm_fem::{Mesh, NodeSelector, RigidPart};
-use flexarm_flexlink::distal_joint;
+use flexarm_flexlink::{SubstitutionError, distal_joint};
 use flexarm_kinematics::{Mechanism, Pose};
 use flexarm_urdf::{ReadOptions, read_urdf};
 use nalgebra::{Rotation3, Translation3, Vector3};
@@ -19,6 +19,48 @@ pub(super) struct Chosen {
     pub(super) selector: NodeSelector,
     pub(super) centroid: Vector3<f64>,
     pub(super) extent: Vector3<f64>,
+    /// How the nodes that the job chose lie on the surface.
+    pub(super) seat: Seat,
+    /// How many these were, before mid-side nodes were added.
+    pub(super) chosen_nodes: usize,
+}
+
+impl Chosen {
+    /// Sentences about nodes that are no seat: corners without the nodes between them, edges, nodes inside.
+    fn seat_doubts(&self) -> Vec<String> {
+        let (name, seat, chosen) = (&self.interface.name, &self.seat, self.chosen_nodes);
+        let mut doubts = Vec::new();
+        if !seat.missing.is_empty() {
+            doubts.push(format!(
+                "interface {name:?}: its {chosen} nodes hold the corners of {} faces, but {} of the {} mid-side nodes of these \
+                 faces are missing; they were added, because faces tied at their corners alone make the link too soft; write \
+                 sets with all nodes of their faces",
+                seat.faces,
+                seat.missing.len(),
+                seat.middles
+            ));
+        }
+        if seat.faces == 0 && seat.on_beams == 0 {
+            doubts.push(format!(
+                "interface {name:?}: no face of the surface has all its corners among its {chosen} node(s), so it is an edge or \
+                 single nodes, and what is tied there depends on the mesh; choose the nodes of a surface"
+            ));
+        } else if 2 * seat.stray > chosen {
+            doubts.push(format!(
+                "interface {name:?}: {} of its {chosen} nodes are on none of the {} faces that it holds; is its tolerance too \
+                 small, or the place not that of the surface?",
+                seat.stray, seat.faces
+            ));
+        }
+        if seat.inside > 0 {
+            doubts.push(format!(
+                "interface {name:?}: {} of its {chosen} nodes lie inside the body, where no joint sits, and what is between \
+                 them cannot bend; choose nodes of the surface",
+                seat.inside
+            ));
+        }
+        doubts
+    }
 }
 
 /// The mesh with the frame that the user speaks in.
@@ -87,8 +129,9 @@ impl Place<'_> {
             );
             faults.push(Error::File { path: job.mesh.clone(), what });
         }
+        let surface = Surface::new(self.mesh);
         for (index, entry) in job.interface.iter().enumerate() {
-            match self.one(job, index, entry, robot) {
+            match self.one(job, index, entry, robot, &surface) {
                 Ok(interface) => chosen.push(interface),
                 Err(fault) => faults.push(fault),
             }
@@ -102,6 +145,7 @@ impl Place<'_> {
         index: usize,
         entry: &InterfaceEntry,
         robot: Option<&RobotLink>,
+        surface: &Surface,
     ) -> Result<Chosen, Error> {
         let name = entry.name.clone().unwrap_or_default();
         let place = if entry.place.is_empty() { job.mesh.display().to_string() } else { entry.place.clone() };
@@ -112,7 +156,11 @@ impl Place<'_> {
                 self.known_sets()
             )));
         };
-        let nodes = select(self.mesh, selector, self.unit).map_err(|source| fail(source.to_string()))?;
+        let mut nodes = select(self.mesh, selector, self.unit).map_err(|source| fail(source.to_string()))?;
+        let (seat, chosen_nodes) = (surface.seat(&nodes), nodes.len());
+        // A face is tied whole: corners without the nodes between them hold it at points only.
+        nodes.extend(&seat.missing);
+        nodes.sort_unstable();
         let (centroid, extent) = self.middle_and_extent(&nodes);
         let turned = |position: Vector3<f64>| {
             let frame = FrameEntry { xyz: (position / self.unit).into(), rpy: entry.rpy.unwrap_or_default() };
@@ -135,13 +183,19 @@ impl Place<'_> {
             (None, None, None) => match (robot, index) {
                 (Some(_), 0) => Pose::identity(),
                 (Some(robot), 1) => robot.X_LB,
-                _ => return Err(fail(self.no_position(&name, nodes.len(), &centroid))),
+                (Some(robot), _) => {
+                    let joints = robot.joints();
+                    let hint = joints.iter().map(|joint| format!("--at {name}=joint:{joint}")).collect::<Vec<_>>();
+                    let hint = format!("; at a joint of the link: {}", hint.join(" or "));
+                    return Err(fail(self.no_position(&name, nodes.len(), &centroid) + &hint));
+                }
+                (None, _) => return Err(fail(self.no_position(&name, nodes.len(), &centroid))),
             },
             _ => return Err(fail("it has more than one position: xyz, at and joint exclude each other".into())),
         };
         let tie = entry.tie.or(job.tie).unwrap_or(Tie::Rigid);
         let interface = Interface { name, X_LI, nodes, tie };
-        Ok(Chosen { interface, selector: selector.clone(), centroid, extent })
+        Ok(Chosen { interface, selector: selector.clone(), centroid, extent, seat, chosen_nodes })
     }
 
     fn no_position(&self, name: &str, nodes: usize, centroid: &Vector3<f64>) -> String {
@@ -157,7 +211,7 @@ impl Place<'_> {
     /// Sentences about positions that look like a mistake in the unit or the frame.
     pub(super) fn doubts(&self, chosen: &[Chosen]) -> Vec<String> {
         let size = self.mesh.bounding_box().map_or(0.0, |(low, high)| (high - low).norm());
-        let mut doubts = Vec::new();
+        let mut doubts: Vec<String> = chosen.iter().flat_map(Chosen::seat_doubts).collect();
         for one in chosen {
             let distance = (one.interface.X_LI.translation.vector - one.centroid).norm();
             if distance > 0.5 * size {
@@ -194,7 +248,18 @@ impl RobotLink {
     pub(super) fn read(entry: &UrdfEntry, options: &ReadOptions) -> Result<Self, Error> {
         let mechanism = read_urdf(&entry.file, options)?.mechanism;
         let X_LB = distal_joint(&mechanism, &entry.link, entry.joint.as_deref()).map(|joint| joint.X_PJ);
-        let X_LB = X_LB.map_err(|e| Error::File { path: entry.file.clone(), what: e.to_string() })?;
+        let X_LB = X_LB.map_err(|e| {
+            let what = match &e {
+                SubstitutionError::DistalUnclear { link, children } => format!(
+                    "link {link:?} has {} joints that lead on ({children:?}): name the one at B with --joint NAME, or joint = \
+                     \"NAME\" in [urdf]; the others may be further interfaces, such as --interface C=SELECTOR --at C=joint:{}",
+                    children.len(),
+                    children.last().map_or("NAME", String::as_str)
+                ),
+                other => other.to_string(),
+            };
+            Error::File { path: entry.file.clone(), what }
+        })?;
         Ok(Self { mechanism, link: entry.link.clone(), X_LB })
     }
 
@@ -228,6 +293,11 @@ impl RobotLink {
             })?;
         }
         Ok(halves)
+    }
+
+    /// Names of the joints that lead on from the link.
+    fn joints(&self) -> Vec<&str> {
+        self.mechanism.child_joints(&self.link).map(|joint| joint.name.as_str()).collect()
     }
 
     /// Frame in the link of a joint at either of its ends.

@@ -68,6 +68,9 @@ pub struct ReduceJob {
     /// Whether the modal link gets its stiffness by load: `geometric_stiffening = true` of a robot file needs it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub geometric: Option<bool>,
+    /// Nodes nearer to each other than this become one, unit of the mesh; closes seams and cracks.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub merge: Option<f64>,
     /// Quadrature of solid elements.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quadrature: Option<QuadratureChoice>,
@@ -220,6 +223,7 @@ impl ReduceJob {
         put(&mut self.split, flags.split);
         put(&mut self.chains, flags.chains);
         put(&mut self.geometric, flags.geometric);
+        put(&mut self.merge, flags.merge);
         put(&mut self.quadrature, flags.quadrature);
         put(&mut self.ordering, flags.ordering);
         put(&mut self.threads, flags.threads);

@@ -47,6 +47,7 @@ pub use flexarm_fem::{NodeSelector, UnitSystem as Units};
 pub use job::{FrameEntry, InterfaceEntry, ReduceJob, UrdfEntry};
 pub use listing::{MeshListing, RegionListing, SetListing};
 pub use report::{ReportTable, headline, markdown, modal_table, tables};
+pub(crate) use summary::coarse;
 pub use summary::{
     ChainFigures, CheckFigures, InterfaceFigures, MaterialFigures, ModalFigures, ModeFigures, PartFigures,
     PhaseFigures, ReduceFiles, ReduceSummary, RegionFigures, SolverFigures,

@@ -36,6 +36,9 @@ pub(super) fn prepare(job: &ReduceJob, options: &ReduceOptions) -> Result<Prepar
     let units = job.units.unwrap_or(UnitSystem::SI);
     let mut file = read_mesh(&job.mesh, &ReadOptions { units, ..ReadOptions::default() }).map_err(Box::new)?;
     let mut warnings = std::mem::take(&mut file.warnings);
+    if let Some(distance) = job.merge {
+        merge(&mut file, distance, units, &mut warnings)?;
+    }
     let robot = job.urdf.as_ref().map(|entry| RobotLink::read(entry, &options.urdf)).transpose()?;
     let X_LM = job.mesh_frame.map_or_else(Pose::identity, |frame| pose(&frame, units.length));
 
@@ -70,7 +73,9 @@ pub(super) fn prepare(job: &ReduceJob, options: &ReduceOptions) -> Result<Prepar
         _ => return Err(Error::Several(faults)),
     }
     warnings.extend(place.doubts(&chosen));
+    warnings.extend(material_doubts(&file, units, &materials));
     let mut plan = plan(job, &file, units, &chosen, &materials);
+    plan.assembly.quadrature = quadrature(job, &file)?;
     file.mesh = file.mesh.transformed(&X_LM);
     if let (Some(robot), Some(entry)) = (&robot, job.urdf.as_ref().filter(|entry| entry.rest)) {
         let fault = |what| Error::File { path: entry.file.clone(), what };
@@ -81,6 +86,38 @@ pub(super) fn prepare(job: &ReduceJob, options: &ReduceOptions) -> Result<Prepar
         plan.attached = robot.rest(&mesh, &along).map_err(fault)?.into();
     }
     Ok(Prepared { plan, file, units, chosen, materials, warnings })
+}
+
+/// Joins nodes that lie in one place.
+fn merge(file: &mut MeshFile, distance: f64, units: UnitSystem, warnings: &mut Vec<String>) -> Result<(), Error> {
+    if !(distance.is_finite() && distance >= 0.0) {
+        return Err(Error::Usage(format!("merge = {distance}: a distance of zero or more, in the unit of the mesh")));
+    }
+    let merged = file.mesh.merge_coincident(distance * units.length);
+    let before = file.mesh.nodes.len();
+    warnings.push(match merged {
+        0 => format!("merge: no two of the {before} nodes are nearer than {distance} (unit of the mesh)"),
+        _ => format!("merge: {merged} of {before} nodes were in the place of another one and are now that node"),
+    });
+    Ok(())
+}
+
+/// Sentences about the materials in use, with the numbers as they were written.
+fn material_doubts(file: &MeshFile, units: UnitSystem, figures: &[RegionFigures]) -> Vec<String> {
+    let mut doubts: Vec<(String, Vec<&str>)> = Vec::new();
+    for figure in figures {
+        let region = file.mesh.regions.iter().find(|region| region.name == figure.region);
+        let Some(material) = region.and_then(|region| region.material) else { continue };
+        // Materials of a job are in SI, whatever the mesh is in.
+        let written = if figure.from == "mesh" { units } else { UnitSystem::SI };
+        for doubt in material.doubts(&written) {
+            match doubts.iter_mut().find(|(known, _)| *known == doubt) {
+                Some((_, regions)) => regions.push(&figure.region),
+                None => doubts.push((doubt, vec![&figure.region])),
+            }
+        }
+    }
+    doubts.into_iter().map(|(doubt, regions)| format!("material of {}: {doubt}", regions.join(", "))).collect()
 }
 
 fn no_units(job: &ReduceJob, file: &MeshFile) -> Error {
@@ -165,10 +202,6 @@ fn plan(
         SplitChoice::Fraction(fraction) => SplitAt::Fraction(fraction),
         SplitChoice::Point(point) => SplitAt::Point(Vector3::from(point) * units.length),
     };
-    let quadrature = match job.quadrature.unwrap_or_default() {
-        QuadratureChoice::Exact => Quadrature::Exact,
-        QuadratureChoice::Calculix => Quadrature::Calculix,
-    };
     let ordering = match job.ordering.unwrap_or_default() {
         OrderingChoice::Auto => Ordering::Auto,
         OrderingChoice::Amd => Ordering::MinimumDegree,
@@ -205,7 +238,7 @@ fn plan(
     LinkPlan {
         name: job.link_name(),
         interfaces: chosen.iter().map(|one| one.interface.clone()).collect(),
-        assembly: AssemblyOptions { quadrature, material: None },
+        assembly: AssemblyOptions::default(),
         condensation: CondensationOptions { ordering, threads: Threads(job.threads.unwrap_or(1)) },
         modes,
         split,
@@ -215,6 +248,21 @@ fn plan(
         judged_modes: JUDGED_MODES,
         limits: GateLimits::default(),
         provenance,
+    }
+}
+
+/// The rules of a job, with incompatible modes under those of CalculiX where the deck has C3D8I.
+fn quadrature(job: &ReduceJob, file: &MeshFile) -> Result<Quadrature, Error> {
+    let has = |name: &str| file.element_types.contains(name);
+    match job.quadrature.unwrap_or_default() {
+        QuadratureChoice::Exact => Ok(Quadrature::Exact),
+        QuadratureChoice::Calculix if has("C3D8I") && (has("C3D8") || has("C3D8R")) => {
+            let what = "the deck has C3D8I beside C3D8 or C3D8R; the rules of CalculiX can be had for bricks of one of them: give \
+                        all bricks one type, or leave quadrature out, with which all have incompatible modes";
+            Err(Error::File { path: job.mesh.clone(), what: what.into() })
+        }
+        QuadratureChoice::Calculix if has("C3D8I") => Ok(Quadrature::CalculixModes),
+        QuadratureChoice::Calculix => Ok(Quadrature::Calculix),
     }
 }
 
@@ -229,7 +277,8 @@ pub(super) fn quadrature_name(job: &ReduceJob) -> &'static str {
 pub(super) fn failed(job: &ReduceJob, file: &MeshFile, units: UnitSystem, source: MeshLinkError) -> Error {
     let node = match &source {
         MeshLinkError::Reduction(ReductionError::Tie(TieError::Overlap { node, .. })) => Some(*node as usize),
-        MeshLinkError::Reduction(ReductionError::Loose { node, .. }) => Some(*node),
+        MeshLinkError::Reduction(ReductionError::Loose { node, .. })
+        | MeshLinkError::Hinge { source: ReductionError::Loose { node, .. }, .. } => Some(*node),
         _ => None,
     };
     let described = node.and_then(|node| {

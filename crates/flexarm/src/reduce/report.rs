@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use flexarm_fem::MeshGate;
+use flexarm_fem::order_check::OrderCheck;
 
 use super::summary::{ModalFigures, ModeFigures, ReduceSummary};
 
@@ -190,7 +191,7 @@ fn checks(summary: &ReduceSummary) -> ReportTable {
     let limits = flexarm_fem::GateLimits::default();
     let zero = if c.zero_modes == 6 { "ok" } else { "warn" };
     let shape = if c.jacobian_at_nodes < MeshGate::SMALLEST_JACOBIAN { "warn" } else { "ok" };
-    let rows = vec![
+    let mut rows = vec![
         below("asymmetry of the stiffness", c.symmetry, limits.asymmetry),
         below("force under rigid motion", c.rigid_body_residual, MeshGate::RIGID_BODY_RESIDUAL),
         below("blocks of the stiffness agree", c.block_identity, limits.rigid_body_warning),
@@ -205,6 +206,11 @@ fn checks(summary: &ReduceSummary) -> ReportTable {
             shape.into(),
         ],
     ];
+    if let Some(ratio) = c.order_ratio {
+        let mark = if ratio < OrderCheck::LARGEST_RATIO { "ok" } else { "warn" };
+        let usual = format!("below {}", OrderCheck::LARGEST_RATIO);
+        rows.push(vec!["softer with quadratic elements".into(), format!("{ratio:.2} times"), usual, mark.into()]);
+    }
     ReportTable::new("checks", &["", "measured", "usual", ""], rows)
 }
 

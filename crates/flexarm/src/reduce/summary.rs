@@ -276,6 +276,15 @@ pub struct CheckFigures {
     pub jacobian_at_nodes: f64,
     /// Number in the file of the element with the latter.
     pub worst_element: u64,
+    /// Smallest volume of an element over that of the best shape with edges of the same length.
+    pub smallest_fullness: f64,
+    /// Largest distance of a mid-side node from the middle of its edge, over the length of the edge.
+    pub largest_offset: f64,
+    /// Compliance with elements of second order over that of the mesh, the largest of any load at B; null for elements of
+    /// second order.
+    pub order_ratio: Option<f64>,
+    /// The same along x y z rx ry rz.
+    pub order_ratios: Option<[f64; 6]>,
 }
 
 /// The linear algebra.
@@ -353,9 +362,15 @@ pub(super) fn summary_of(
         jacobian_at_points: gate.quality.smallest_at_points,
         jacobian_at_nodes: gate.quality.smallest_at_nodes,
         worst_element: gate.quality.worst_element,
+        smallest_fullness: gate.quality.smallest_fullness,
+        largest_offset: gate.quality.largest_offset,
+        order_ratio: gate.order.map(|order| order.largest_ratio),
+        order_ratios: gate.order.map(|order| order.compliance_ratio),
     });
     let modes: Vec<_> = gate.map_or_else(Vec::new, |gate| gate.modes.iter().map(ModeFigures::from).collect());
-    let warnings = reduction.warnings.iter().cloned().chain(coarse(&modes)).collect();
+    let coarse =
+        modes.first().map_or_else(Vec::new, |first| coarse("the mesh", first.lumped_error, first.reduced_error));
+    let warnings = reduction.warnings.iter().cloned().chain(coarse).collect();
     let kept = reduction.fixed_modes.len();
     let factor = reduction.solver.factor;
     ReduceSummary {
@@ -410,19 +425,21 @@ pub(super) fn summary_of(
 const COARSE_PARTS: f64 = 0.05;
 const COARSE_MODES: f64 = 0.005;
 
-/// Sentences about reduced models that miss the first frequency of the mesh.
-fn coarse(modes: &[ModeFigures]) -> Vec<String> {
-    let Some(first) = modes.first() else { return Vec::new() };
+/// Sentences about reduced models that miss the first frequency.
+///
+/// * `source`: whose frequency it is: that of the mesh, or of the matrices.
+/// * `parts`, `modes`: relative errors of the two rigid parts and of the kept modes.
+pub(crate) fn coarse(source: &str, parts: Option<f64>, modes: Option<f64>) -> Vec<String> {
     let off = |error: Option<f64>, bound: f64| error.filter(|error| error.abs() > bound).map(|error| 100.0 * error);
-    let parts = off(first.lumped_error, COARSE_PARTS).map(|percent| {
+    let parts = off(parts, COARSE_PARTS).map(|percent| {
         format!(
-            "two rigid parts miss the first frequency of the mesh by {percent:+.1} %: so will a simulation with them"
+            "two rigid parts miss the first frequency of {source} by {percent:+.1} %: so will a simulation with them"
         )
     });
-    let reduced = off(first.reduced_error, COARSE_MODES).map(|percent| {
+    let modes = off(modes, COARSE_MODES).map(|percent| {
         format!("the kept modes miss the first frequency by {percent:+.2} %: keep more of them (--modes)")
     });
-    parts.into_iter().chain(reduced).collect()
+    parts.into_iter().chain(modes).collect()
 }
 
 fn rows3(M: &Matrix3<f64>) -> [[f64; 3]; 3] {

@@ -24,9 +24,10 @@ pub(super) const MATERIAL_FORMS: &str =
 
 impl MaterialChoice {
     fn named(name: &str) -> Result<Self, String> {
-        let known = Material::PRESETS.into_iter().find(|(known, _)| *known == name);
-        let (name, material) =
-            known.ok_or_else(|| format!("material {name:?} is not known; expected {MATERIAL_FORMS}"))?;
+        let (name, material) = Material::preset(name).ok_or_else(|| {
+            let meant = Material::suggestion(name).map_or(String::new(), |meant| format!("; is {meant:?} meant?"));
+            format!("material {name:?} is not known; expected {MATERIAL_FORMS}{meant}")
+        })?;
         Ok(Self { name: Some(name), material })
     }
 
@@ -247,6 +248,8 @@ mod tests {
     #[test]
     fn a_material_is_a_preset_or_three_constants() {
         assert_eq!("steel".parse::<MaterialChoice>().unwrap().material, Material::STEEL);
+        let aluminum: MaterialChoice = "aluminum".parse().unwrap();
+        assert_eq!((aluminum.name, aluminum.material), (Some("aluminium"), Material::ALUMINIUM));
         let given: MaterialChoice = "70e9, 0.33, 2700".parse().unwrap();
         assert_eq!(given.material, Material::ALUMINIUM);
         for (text, word) in [("steal", "aluminium"), ("70e9,0.33", "E,nu,rho"), ("70e9,0.7,2700", "Poisson")] {

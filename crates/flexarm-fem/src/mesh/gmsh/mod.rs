@@ -62,7 +62,7 @@ pub(super) fn parse(src: &Source, options: &ReadOptions) -> Result<MeshFile, Mes
         (_, false) => "Gmsh MSH 2 text",
         (_, true) => "Gmsh MSH 2 binary",
     };
-    Ok(MeshFile { mesh, format, warnings })
+    Ok(MeshFile { mesh, format, warnings, element_types: Default::default() })
 }
 
 #[derive(Clone, Copy)]

@@ -243,6 +243,11 @@ impl<'a> Deck<'a> {
         Ok(())
     }
 
+    /// Types of all elements, in capitals.
+    pub(super) fn element_types(&self) -> BTreeSet<String> {
+        self.elements.groups.iter().map(|group| group.type_name.clone()).collect()
+    }
+
     /// `*ELEMENT`: number and nodes, over as many lines as they take.
     fn element_card(&mut self, card: &Card) -> Result<(), MeshError> {
         let src = self.lines.src;

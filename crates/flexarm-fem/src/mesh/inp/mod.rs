@@ -19,6 +19,7 @@ use deck::Deck;
 pub(super) fn parse(src: &Source, options: &ReadOptions) -> Result<MeshFile, MeshError> {
     let mut deck = Deck::new(*src, options.units);
     deck.read()?;
+    let element_types = deck.element_types();
     let (mesh, warnings) = deck.finish(options)?;
-    Ok(MeshFile { mesh, format: "CalculiX/Abaqus deck", warnings })
+    Ok(MeshFile { mesh, format: "CalculiX/Abaqus deck", warnings, element_types })
 }

@@ -33,8 +33,8 @@ pub(super) fn class(name: &str) -> Option<(Class, Option<&'static str>)> {
         "C3D4" => solid(ElementKind::Tet4, None),
         "C3D10" => solid(ElementKind::Tet10, None),
         "C3D10M" | "C3D10HS" | "C3D10T" => solid(ElementKind::Tet10, Some("read as plain C3D10")),
+        // The own rules have incompatible modes always, those of CalculiX with C3D8I alone.
         "C3D8" => solid(ElementKind::Hex8, Some("read with incompatible modes unless quadrature = calculix")),
-        // The own rules have incompatible modes, those of CalculiX's C3D8 have none.
         "C3D8I" => solid(ElementKind::Hex8, None),
         "C3D8R" => solid(ElementKind::Hex8, REDUCED),
         "C3D20" => solid(ElementKind::Hex20, None),

@@ -1,0 +1,146 @@
+//! The nodes of an interface against the faces of the surface: what is missing, inside, or on no face.
+
+use std::collections::{BTreeSet, HashMap};
+
+use super::Mesh;
+use super::surface::{Skin, skin};
+
+/// How a set of nodes lies on the surface of a mesh.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Seat {
+    /// Faces of the surface with all their corners in the set.
+    pub faces: usize,
+    /// Patches that these faces make, each connected through its nodes.
+    pub patches: usize,
+    /// Mid-side nodes of these faces, in the set or not.
+    pub middles: usize,
+    /// Those of them that are not in the set, ascending.
+    pub missing: Vec<u32>,
+    /// Nodes of the set on the surface, but on none of these faces.
+    pub stray: usize,
+    /// Nodes of the set inside the body.
+    pub inside: usize,
+    /// Nodes of the set on beams.
+    pub on_beams: usize,
+}
+
+/// The surface of a mesh, made once for all its interfaces.
+#[derive(Debug)]
+pub struct Surface {
+    skin: Skin,
+    is_outside: Vec<bool>,
+    is_beam: Vec<bool>,
+}
+
+impl Surface {
+    /// Finds it.
+    pub fn new(mesh: &Mesh) -> Self {
+        let skin = skin(mesh);
+        let mark = |nodes: &[u32]| {
+            let mut marked = vec![false; mesh.nodes.len()];
+            nodes.iter().for_each(|node| marked[*node as usize] = true);
+            marked
+        };
+        let beams = mesh.blocks.iter().filter(|block| block.kind.is_beam());
+        let beams: Vec<u32> = beams.flat_map(|block| block.connectivity.iter().copied()).collect();
+        Self { is_outside: mark(&skin.nodes()), is_beam: mark(&beams), skin }
+    }
+
+    /// Looks at the nodes of an interface, sorted.
+    pub fn seat(&self, nodes: &[u32]) -> Seat {
+        let is_in = |node: &u32| nodes.binary_search(node).is_ok();
+        let mut seat = Seat::default();
+        let (mut middles, mut on_faces): (BTreeSet<u32>, BTreeSet<u32>) = Default::default();
+        let mut patches = Patches::default();
+        for face in self.skin.faces().filter(|face| face.corners.iter().all(is_in)) {
+            seat.faces += 1;
+            middles.extend(face.midsides);
+            on_faces.extend(face.corners);
+            patches.join(face.corners);
+        }
+        seat.patches = patches.count();
+        seat.middles = middles.len();
+        seat.missing = middles.iter().copied().filter(|node| !is_in(node)).collect();
+        for node in nodes {
+            if self.is_beam[*node as usize] {
+                seat.on_beams += 1;
+            } else if !self.is_outside[*node as usize] {
+                seat.inside += 1;
+            } else if !on_faces.contains(node) && !middles.contains(node) {
+                seat.stray += 1;
+            }
+        }
+        seat
+    }
+}
+
+/// Groups of nodes that faces join.
+#[derive(Default)]
+struct Patches {
+    parent: HashMap<u32, u32>,
+}
+
+impl Patches {
+    fn root(&mut self, mut node: u32) -> u32 {
+        self.parent.entry(node).or_insert(node);
+        while self.parent[&node] != node {
+            let above = self.parent[&self.parent[&node]];
+            self.parent.insert(node, above);
+            node = above;
+        }
+        node
+    }
+
+    fn join(&mut self, nodes: &[u32]) {
+        let first = self.root(nodes[0]);
+        for node in &nodes[1..] {
+            let other = self.root(*node);
+            self.parent.insert(other, first);
+        }
+    }
+
+    fn count(&self) -> usize {
+        self.parent.iter().filter(|(node, above)| node == above).count()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::ElementKind;
+    use crate::test_mesh::cube;
+
+    fn nodes_at(mesh: &Mesh, keep: impl Fn(&nalgebra::Vector3<f64>) -> bool) -> Vec<u32> {
+        (0..mesh.nodes.len() as u32).filter(|node| keep(&mesh.nodes[*node as usize])).collect()
+    }
+
+    #[test]
+    fn corner_nodes_of_quadratic_faces_alone_lack_the_middles_of_all_their_edges() {
+        for kind in [ElementKind::Tet10, ElementKind::Hex20, ElementKind::Wedge15] {
+            let mesh = cube(kind, [2, 2, 2], false, |u| u);
+            let face = nodes_at(&mesh, |p| p.x == 0.0);
+            let corners: BTreeSet<u32> =
+                mesh.blocks[0].elements().flat_map(|e| e[..super::super::faces::corner_count(kind)].to_vec()).collect();
+            let only: Vec<u32> = face.iter().copied().filter(|node| corners.contains(node)).collect();
+            let surface = Surface::new(&mesh);
+            assert!(surface.seat(&face).missing.is_empty(), "{kind:?}");
+            let seat = surface.seat(&only);
+            let mut whole = [only.clone(), seat.missing.clone()].concat();
+            whole.sort_unstable();
+            assert_eq!(whole, face, "{kind:?}");
+            assert_eq!((seat.missing.len(), seat.patches, seat.stray, seat.inside), (seat.middles, 1, 0, 0));
+        }
+    }
+
+    #[test]
+    fn an_edge_is_no_seat_two_ends_are_two_patches_and_inner_nodes_are_counted() {
+        let mesh = cube(ElementKind::Hex8, [4, 2, 2], false, |u| u);
+        let surface = Surface::new(&mesh);
+        let edge = surface.seat(&nodes_at(&mesh, |p| p.x == 0.0 && p.y == 0.0));
+        assert_eq!((edge.faces, edge.stray), (0, 3));
+        let ends = surface.seat(&nodes_at(&mesh, |p| p.x == 0.0 || p.x == 1.0));
+        assert_eq!((ends.faces, ends.patches), (8, 2));
+        let inner = surface.seat(&nodes_at(&mesh, |p| p.x == 0.5));
+        assert_eq!((inner.inside, inner.faces), (1, 0));
+    }
+}
