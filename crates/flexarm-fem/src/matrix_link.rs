@@ -13,6 +13,7 @@
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use crate::chain::Chain;
+use crate::doubt::Doubt;
 use crate::error::FemError;
 use crate::frames::LinkFrames;
 use crate::gate::GateLimits;
@@ -61,8 +62,8 @@ pub struct MatrixReduction {
     pub held_frequencies_hz: Vec<f64>,
     /// The same of the two rigid parts with their joint.
     pub lumped_frequencies_hz: Vec<f64>,
-    /// Sentences about what was accepted, but is worth a look.
-    pub warnings: Vec<String>,
+    /// What was accepted, but is worth a look.
+    pub doubts: Vec<Doubt>,
 }
 
 /// Reduces a full model to some of its own DoF: six per interface, in order.
@@ -113,9 +114,9 @@ pub fn link_from_superelement(
     let loose = FemError::Missing { what: "stiffness of an interface or a mode", help: "it holds nothing" };
     let K12 = stiffness12(&element).ok_or(loose)?;
     let frames = LinkFrames::new(element.interfaces[0].X_LI, element.interfaces[1].X_LI);
-    let mut warnings = Vec::new();
+    let mut doubts = Vec::new();
     let (p, said) = split_point(&frames, &K12, plan.split, &|_| true);
-    warnings.extend(said);
+    doubts.extend(said.map(|said| Doubt::said("split", said)));
     let frames = frames.with_split(Pose::translation(p.x, p.y, p.z));
 
     let whole = match &plan.masses {
@@ -131,23 +132,25 @@ pub fn link_from_superelement(
     let parts = match &plan.masses {
         PartMasses::Given(parts) => parts.clone(),
         _ => {
-            warnings.push(
+            doubts.push(Doubt::said(
+                "halves",
                 "the masses of the two parts are the halves of a uniform bar with the mass, centre of mass and \
-                 inertia of the link: a matrix does not say where the mass sits; give the parts if they are known"
-                    .into(),
-            );
+                 inertia of the link: a matrix does not say where the mass sits; give the parts if they are known",
+            ));
             halves_of_bar(&whole, &frames.p_AB())
         }
     };
     let mut link = ReducedLink::from_matrix12(&plan.name, frames, &K12, parts, plan.provenance.clone(), &plan.limits)?;
     let held_frequencies_hz = if has_mass { element.frequencies_hz(&[0]) } else { Vec::new() };
     if has_mass && held_frequencies_hz.is_empty() {
-        warnings.push("the mass matrix is not positive definite: no frequencies, the modal link cannot be used".into());
+        let said = "the mass matrix is not positive definite: no frequencies, the modal link cannot be used";
+        doubts.push(Doubt::said("mass", said));
     }
     if has_mass && let PartMasses::Given(_) | PartMasses::Whole(_) = plan.masses {
         let found = condensed_body(&element).mass;
         if (found / whole.mass - 1.0).abs() > 0.01 {
-            warnings.push(format!("the mass matrix says {found:.6} kg, the given masses sum to {:.6} kg", whole.mass));
+            let said = format!("the mass matrix says {found:.6} kg, the given masses sum to {:.6} kg", whole.mass);
+            doubts.push(Doubt::found("mass", found, whole.mass, said));
         }
     }
     let lumped = Chain { joints: vec![link.split.clone()], parts: vec![link.proximal.clone(), link.distal.clone()] };
@@ -155,8 +158,8 @@ pub fn link_from_superelement(
     if has_mass {
         link.details = Some(Box::new(LinkDetails { superelement: Some(element), ..LinkDetails::default() }));
     }
-    warnings.extend(link.warnings(&plan.limits));
-    Ok(MatrixReduction { link, whole, held_frequencies_hz, lumped_frequencies_hz, warnings })
+    doubts.extend(link.warnings(&plan.limits).into_iter().map(|said| Doubt::said("gate", said)));
+    Ok(MatrixReduction { link, whole, held_frequencies_hz, lumped_frequencies_hz, doubts })
 }
 
 /// A body as two halves along an axis: together they have its mass, centre of mass and inertia.

@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
+use crate::doubt::Doubt;
 use crate::element::{edges, jacobian_range};
 use crate::mesh::{ElementKind, Mesh};
 use crate::order_check::OrderCheck;
@@ -170,7 +171,7 @@ pub struct MeshGate {
 }
 
 impl MeshGate {
-    /// Relative force under rigid motion above which [`Self::warnings`] speaks.
+    /// Relative force under rigid motion above which [`Self::doubts`] speaks.
     pub const RIGID_BODY_RESIDUAL: f64 = 1e-7;
     /// The same for the relative difference of mass and inertia.
     pub const MASS_ERROR: f64 = 1e-6;
@@ -183,63 +184,62 @@ impl MeshGate {
     /// Offset of a mid-side node over the length of its edge above which it speaks: an arc of 140 degrees.
     pub const LARGEST_OFFSET: f64 = 0.35;
 
-    /// Sentences about what passes, but is worth a look.
-    pub fn warnings(&self) -> Vec<String> {
-        let mut warnings = Vec::new();
-        let mut see = |bad: bool, sentence: String| {
+    /// What passes, but is worth a look.
+    pub fn doubts(&self) -> Vec<Doubt> {
+        let mut doubts = Vec::new();
+        let mut see = |code: &'static str, value: f64, usual: f64, bad: bool, sentence: String| {
             if bad {
-                warnings.push(sentence);
+                doubts.push(Doubt::found(code, value, usual, sentence));
             }
         };
-        see(
-            !(self.rigid_body_residual < Self::RIGID_BODY_RESIDUAL),
-            format!(
-                "rigid motion of the interfaces meets a relative force of {:.1e}; usual is 1e-11",
-                self.rigid_body_residual
-            ),
-        );
-        see(self.zero_modes != 6, format!("{} zero modes instead of six", self.zero_modes));
-        see(
-            !(self.mass_error < Self::MASS_ERROR && self.inertia_error < Self::MASS_ERROR),
-            format!(
-                "the reduced mass differs from the mesh: mass by {:.1e}, inertia by {:.1e} (relative)",
-                self.mass_error, self.inertia_error
-            ),
-        );
-        see(
-            !(self.mode_residual < Self::MODE_RESIDUAL),
-            format!("a mode has a residual of {:.1e}", self.mode_residual),
-        );
-        see(
-            self.quality.smallest_at_nodes < Self::SMALLEST_JACOBIAN,
-            format!(
-                "element {} is nearly folded: its Jacobian at a node is {:.3} of its mean",
-                self.quality.worst_element, self.quality.smallest_at_nodes
-            ),
-        );
-        see(
-            self.quality.smallest_fullness < Self::SMALLEST_FULLNESS,
-            format!(
-                "{} element(s) are nearly without volume, the flattest is {}: its volume is {:.1e} of that of the best shape \
-                 with such edges, usual is above {}; such slivers are far too stiff: mesh anew, or optimise the mesh",
-                self.quality.flat_elements,
-                self.quality.flattest_element,
-                self.quality.smallest_fullness,
-                Self::SMALLEST_FULLNESS
-            ),
-        );
-        see(
-            self.quality.largest_offset > Self::LARGEST_OFFSET,
-            format!(
-                "a mid-side node of element {} stands {:.2} of the length of its edge from the middle of it, usual is below \
-                 {}: is it in the wrong place, or the mesh too coarse for the curve?",
-                self.quality.bent_element,
-                self.quality.largest_offset,
-                Self::LARGEST_OFFSET
-            ),
-        );
-        warnings.extend(self.order.as_ref().and_then(OrderCheck::caveat));
-        warnings
+        let (residual, usual) = (self.rigid_body_residual, Self::RIGID_BODY_RESIDUAL);
+        let said = format!("rigid motion of the interfaces meets a relative force of {residual:.1e}; usual is 1e-11");
+        see("rigid-motion", residual, usual, !(residual < usual), said);
+        let said = format!("{} zero modes instead of six", self.zero_modes);
+        see("zero-modes", self.zero_modes as f64, 6.0, self.zero_modes != 6, said);
+        let (mass, inertia, usual) = (self.mass_error, self.inertia_error, Self::MASS_ERROR);
+        let said =
+            format!("the reduced mass differs from the mesh: mass by {mass:.1e}, inertia by {inertia:.1e} (relative)");
+        see("mass", mass.max(inertia), usual, !(mass < usual && inertia < usual), said);
+        let (residual, usual) = (self.mode_residual, Self::MODE_RESIDUAL);
+        see("mode-residual", residual, usual, !(residual < usual), format!("a mode has a residual of {residual:.1e}"));
+        doubts.extend(self.quality.doubts());
+        doubts.extend(self.order.as_ref().and_then(OrderCheck::doubt));
+        doubts
+    }
+}
+
+impl ElementQuality {
+    /// What is said of elements that are folded, flat or bent.
+    fn doubts(&self) -> Vec<Doubt> {
+        let mut doubts = Vec::new();
+        let (value, usual) = (self.smallest_at_nodes, MeshGate::SMALLEST_JACOBIAN);
+        if value < usual {
+            let said = format!(
+                "element {} is nearly folded: its Jacobian at a node is {value:.3} of its mean, usual is above {usual}",
+                self.worst_element
+            );
+            doubts.push(Doubt::found("folded-element", value, usual, said));
+        }
+        let (value, usual) = (self.smallest_fullness, MeshGate::SMALLEST_FULLNESS);
+        if value < usual {
+            let said = format!(
+                "{} element(s) are nearly without volume, the flattest is {}: its volume is {value:.1e} of that of the best \
+                 shape with such edges, usual is above {usual}; such slivers are far too stiff: mesh anew, or optimise the mesh",
+                self.flat_elements, self.flattest_element
+            );
+            doubts.push(Doubt::found("sliver", value, usual, said));
+        }
+        let (value, usual) = (self.largest_offset, MeshGate::LARGEST_OFFSET);
+        if value > usual {
+            let said = format!(
+                "a mid-side node of element {} stands {value:.2} of the length of its edge from the middle of it, usual is \
+                 below {usual}: is it in the wrong place, or the mesh too coarse for the curve?",
+                self.bent_element
+            );
+            doubts.push(Doubt::found("mid-side-node", value, usual, said));
+        }
+        doubts
     }
 }
 

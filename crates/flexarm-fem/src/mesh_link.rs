@@ -13,6 +13,7 @@ use nalgebra::{DMatrix, Matrix3, Matrix6, Vector3};
 
 use crate::chain::{Chain, ChainError, ChainSource, centre_of_compliance};
 use crate::cut::{CutError, CutPlane, cut, mass_properties};
+use crate::doubt::Doubt;
 use crate::error::{Direction, FemError};
 use crate::frames::LinkFrames;
 use crate::gate::GateLimits;
@@ -93,8 +94,8 @@ pub struct MeshReduction {
     pub bare_chains: Vec<Chain>,
     /// Right-hand sides solved in all.
     pub solves: usize,
-    /// Sentences about what was accepted, but looks like a mistake.
-    pub warnings: Vec<String>,
+    /// What was accepted, but looks like a mistake.
+    pub doubts: Vec<Doubt>,
 }
 
 /// Why a mesh could not become a link.
@@ -254,11 +255,11 @@ pub fn reduce_mesh(
     let densities: Vec<f64> = materials.iter().map(|m| m.rho).collect();
     let whole = mass_properties(mesh, &densities)?;
     let (X_LA, X_LB) = (plan.interfaces[0].X_LI, plan.interfaces[1].X_LI);
-    let mut warnings = suspicious(mesh, &bodies);
+    let mut doubts = suspicious(mesh, &bodies);
     let loose = FemError::Missing { what: "stiffness of the third interface", help: "it holds nothing" };
     let K12 = stiffness12(&superelement).ok_or(loose)?;
     let frames = LinkFrames::new(X_LA, X_LB);
-    let (frames, parts) = split(mesh, &densities, frames, &K12, plan.split, &mut warnings)?;
+    let (frames, parts) = split(mesh, &densities, frames, &K12, plan.split, &mut doubts)?;
     let mut link = ReducedLink::from_matrix12(&plan.name, frames, &K12, parts, plan.provenance.clone(), &plan.limits)?;
 
     let source = ChainSource {
@@ -276,8 +277,8 @@ pub fn reduce_mesh(
     let bare_chains = chains.clone();
     let mut chains = chains;
     attach(&plan.attached, &mut link, &mut chains)?;
-    warnings.extend(gate.warnings());
-    warnings.extend(implausible(mesh, &whole, &held_modes));
+    doubts.extend(gate.doubts());
+    doubts.extend(implausible(mesh, &whole, &held_modes));
     let modal = ModalSource {
         mesh,
         materials: &materials,
@@ -295,11 +296,11 @@ pub fn reduce_mesh(
         modal: Some(modal),
         gate: Some(gate),
     }));
-    warnings.extend(link.warnings(&plan.limits));
+    doubts.extend(link.warnings(&plan.limits).into_iter().map(|said| Doubt::said("gate", said)));
     let stress_solves = if plan.geometric { 12 } else { 0 };
     let solves = fixed_modes.solves + held_modes.solves + condensation.figures().static_solves + stress_solves;
     let solver = condensation.figures();
-    Ok(MeshReduction { link, whole, solver, unit_loads, fixed_modes, held_modes, bare_chains, solves, warnings })
+    Ok(MeshReduction { link, whole, solver, unit_loads, fixed_modes, held_modes, bare_chains, solves, doubts })
 }
 
 /// How to mend a hinge.
@@ -343,19 +344,20 @@ fn body_of(interface: &Interface, bodies: &Bodies) -> usize {
     (0..count.len()).rev().max_by_key(|body| count[*body]).unwrap_or(0)
 }
 
-/// Sentences about a mesh that is connected, but not as it looks: cracks, hinges.
-fn suspicious(mesh: &Mesh, bodies: &Bodies) -> Vec<String> {
-    let mut warnings: Vec<String> = bodies
+/// What is said of a mesh that is connected, but not as it looks: cracks, hinges.
+fn suspicious(mesh: &Mesh, bodies: &Bodies) -> Vec<Doubt> {
+    let mut doubts: Vec<Doubt> = bodies
         .hinges
         .iter()
         .take(3)
         .map(|hinge| format!("{hinge}: they turn against each other there; {JOIN} if they are one part"))
+        .map(|said| Doubt::said("hinge", said))
         .collect();
     let found = coincident(mesh, mesh.coincidence());
     if let Some([first, _]) = found.pairs.first() {
         let p = mesh.nodes[*first as usize];
         let faces = if found.faces > 0 { format!(", {} faces lie on each other", found.faces) } else { String::new() };
-        warnings.push(format!(
+        let said = format!(
             "{} pair(s) of nodes lie in one place without being one node{faces} (first: node {} at {:.6}, {:.6}, {:.6} m): a \
              crack, through which no force goes; merge coincident nodes (Coherence in Gmsh, or merge in the reduction) if \
              the body is whole",
@@ -364,9 +366,10 @@ fn suspicious(mesh: &Mesh, bodies: &Bodies) -> Vec<String> {
             p.x,
             p.y,
             p.z
-        ));
+        );
+        doubts.push(Doubt::found("coincident-nodes", found.pairs.len() as f64, 0.0, said));
     }
-    warnings
+    doubts
 }
 
 fn check_fit(mesh: &Mesh) -> Result<(), MeshLinkError> {
@@ -406,7 +409,7 @@ fn split(
     frames: LinkFrames,
     K12: &Matrix12,
     at: SplitAt,
-    warnings: &mut Vec<String>,
+    doubts: &mut Vec<Doubt>,
 ) -> Result<(LinkFrames, [RigidPart; 2]), MeshLinkError> {
     let normal = frames.p_AB();
     let parts = |point: Vector3<f64>| -> Result<[RigidPart; 2], CutError> {
@@ -417,7 +420,7 @@ fn split(
         }
     };
     let (p_LS, said) = split_point(&frames, K12, at, &|p| parts(p).is_ok());
-    warnings.extend(said);
+    doubts.extend(said.map(|said| Doubt::said("split", said)));
     let parts = parts(p_LS).map_err(|source| MeshLinkError::Split { p: p_LS.into(), source })?;
     Ok((frames.with_split(Pose::translation(p_LS.x, p_LS.y, p_LS.z)), parts))
 }
@@ -564,16 +567,17 @@ pub fn condensed_body(element: &Superelement) -> RigidPart {
     RigidPart { mass, com, inertia: (inertia + inertia.transpose()) * 0.5 }
 }
 
-/// Sentences about a link whose size, mass or frequency no robot link has: wrong units, most often.
-fn implausible(mesh: &Mesh, whole: &RigidPart, held: &Modes) -> Vec<String> {
+/// What is said of a link whose size, mass or frequency no robot link has: wrong units, most often.
+fn implausible(mesh: &Mesh, whole: &RigidPart, held: &Modes) -> Vec<Doubt> {
     let size = mesh.bounding_box().map_or(0.0, |(low, high)| (high - low).amax());
     let first = held.frequencies_hz().first().copied();
-    let mut warnings = Vec::new();
+    let mut doubts = Vec::new();
     let mut see = |what: &str, value: f64, unit: &str, low: f64, high: f64, slip: &str| {
         if !(low..=high).contains(&value) {
-            warnings.push(format!(
+            let said = format!(
                 "{what} is {value:.3e} {unit}; links of robots lie between {low:.0e} and {high:.0e}: are the units those declared?{slip}"
-            ));
+            );
+            doubts.push(Doubt::found("size", value, if value < low { low } else { high }, said));
         }
     };
     let of_length = if (1e-2..=2e1).contains(&(size * 1e-3)) {
@@ -590,5 +594,5 @@ fn implausible(mesh: &Mesh, whole: &RigidPart, held: &Modes) -> Vec<String> {
     if let Some(first) = first {
         see("the first frequency with A held", first, "Hz", 1e0, 5e4, "");
     }
-    warnings
+    doubts
 }

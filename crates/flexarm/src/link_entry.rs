@@ -75,8 +75,7 @@ pub(crate) fn flexible_link(
             }
             warnings.extend(reduced.warnings(&Default::default()).into_iter().map(|w| format!("link {name:?}: {w}")));
             let order = reduced.details.as_ref().and_then(|details| details.gate.as_ref()?.order);
-            let stiff =
-                order.and_then(|order| order.caveat()).map(|caveat| format!("link {name:?}: its mesh: {caveat}"));
+            let stiff = order.and_then(|order| order.doubt()).map(|doubt| format!("link {name:?}: its mesh: {doubt}"));
             warnings.extend(stiff);
             (reduced, Parts::Reduced, None)
         }

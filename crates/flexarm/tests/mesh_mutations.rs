@@ -93,10 +93,10 @@ impl Bar {
             let lines: Vec<String> = words.chunks(12).map(|words| words.join(", ")).collect();
             let _ = writeln!(text, "*NSET, NSET={name}\n{}", lines.join(",\n"));
         }
-        let [E, nu, rho] = self.material;
+        let [young, nu, rho] = self.material;
         let _ = writeln!(
             text,
-            "*MATERIAL, NAME=M\n*ELASTIC\n{E:e}, {nu}\n*DENSITY\n{rho:e}\n*SOLID SECTION, ELSET=BODY, MATERIAL=M"
+            "*MATERIAL, NAME=M\n*ELASTIC\n{young:e}, {nu}\n*DENSITY\n{rho:e}\n*SOLID SECTION, ELSET=BODY, MATERIAL=M"
         );
         text
     }
@@ -347,7 +347,7 @@ fn interface_faults() -> Vec<Fault> {
         Box::new(move |job| (job.interface[1].at, job.interface[1].xyz) = (None, Some(xyz)))
     };
     list.push(("a frame in m in a mesh in mm", bar.deck(), place([0.6, 0.03, 0.02]), "in the unit of the mesh"));
-    list.push(("a frame far away", bar.deck(), place([6000.0, 30.0, 20.0]), "stands"));
+    list.push(("a frame far away", bar.deck(), place([600.0, 30.0, 900.0]), "stands"));
     list
 }
 
@@ -372,7 +372,7 @@ fn material_faults() -> Vec<Fault> {
     let metres = move |job: &mut ReduceJob, units: &str| {
         (job.units, job.material) = (Some(units.parse().unwrap()), Some(steel));
     };
-    list.push(("mm declared as m", bar.deck(), Box::new(move |job| metres(job, "m-kg-s")), "With mm for m"));
+    list.push(("mm declared as m", bar.deck(), Box::new(move |job| metres(job, "m-kg-s")), "millimetres"));
     let mut small = bar.clone();
     small.nodes.values_mut().for_each(|p| *p = p.map(|x| x * 1e-3));
     list.push(("m declared as mm", small.deck(), Box::new(move |job| metres(job, "mm-t-s")), "With m for mm"));

@@ -13,7 +13,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use super::error::{ExchangeError, ExchangeErrorKind, Place};
-use super::matrix::DofLabel;
+use super::matrix::{DofLabel, LabelledMatrix};
 
 /// What a map is called in messages.
 const ORIGIN: &str = "map of interfaces";
@@ -232,6 +232,26 @@ fn nodes_in(index: &HashMap<DofLabel, usize>) -> String {
     }
 }
 
+/// [`propose_map`] of a matrix: rows at its end that are coupled with nothing are modes.
+pub fn propose_map_of(matrix: &LabelledMatrix) -> Option<InterfaceMap> {
+    let n = matrix.size();
+    let unlabelled = matrix.rows.iter().all(|label| *label == DofLabel::UNKNOWN);
+    if !unlabelled || n > super::matrix::LARGEST_DENSE {
+        return propose_map(&matrix.rows);
+    }
+    let mut is_coupled = vec![false; n];
+    for (row, column, value) in matrix.to_sparse().triplets().filter(|(row, column, _)| row != column) {
+        is_coupled[row] |= value != 0.0;
+        is_coupled[column] |= value != 0.0;
+    }
+    let interfaces = n - is_coupled.iter().rev().take_while(|coupled| !**coupled).count();
+    if interfaces == n || interfaces < 12 || !interfaces.is_multiple_of(6) {
+        return propose_map(&matrix.rows);
+    }
+    let map = propose_map(&matrix.rows[..interfaces])?;
+    Some(InterfaceMap { modal: vec![RowPick::Rows { first: interfaces + 1, last: n }], ..map })
+}
+
 /// Nodes or sixes of rows beyond which no map is proposed: a full model, or modes.
 const MOST_PROPOSED: usize = 4;
 
@@ -258,12 +278,12 @@ pub fn propose_map(rows: &[DofLabel]) -> Option<InterfaceMap> {
     let node = |i: usize, last: u8| RowPick::Node { node: order[i], first: 1, last };
     match order.len() {
         n @ 2..=MOST_PROPOSED if all(6) => named((0..n).map(|k| vec![node(k, 6)]).collect()),
-        n @ 4..=MOST_PROPOSED if all(3) && n % 2 == 0 => {
+        n @ 4..=MOST_PROPOSED if all(3) && n.is_multiple_of(2) => {
             named((0..n / 2).map(|k| vec![node(2 * k, 3), node(2 * k + 1, 3)]).collect())
         }
         0 if rows.len() >= 12 && rows.len() <= super::matrix::LARGEST_DENSE => {
             let n = rows.len() / 6;
-            let n = if rows.len() % 6 == 0 && n <= MOST_PROPOSED { n } else { 2 };
+            let n = if rows.len().is_multiple_of(6) && n <= MOST_PROPOSED { n } else { 2 };
             named((0..n).map(|k| vec![RowPick::Rows { first: 6 * k + 1, last: 6 * k + 6 }]).collect())
         }
         _ => None,

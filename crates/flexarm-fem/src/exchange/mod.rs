@@ -55,7 +55,7 @@ pub use assemble::{InterfaceMatrices, assemble_interfaces};
 pub use diagnose::diagnose_substructure;
 pub use dmig::write_dmig;
 pub use error::{ExchangeError, ExchangeErrorKind};
-pub use interface::{Interface, InterfaceMap, RowPick, propose_map};
+pub use interface::{Interface, InterfaceMap, RowPick, propose_map, propose_map_of};
 pub use matrix::{
     DofLabel, Entries, ImportedMatrices, LARGEST_ASYMMETRY, LARGEST_DENSE, LabelledMatrix, SparseSymmetric,
 };

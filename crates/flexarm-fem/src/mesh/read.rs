@@ -104,8 +104,7 @@ const BY_GMSH: &str = "Gmsh reads it: gmsh INPUT -save -format msh41 -o OUTPUT.m
 /// What to do with a file that Gmsh does not read either.
 const BY_EXPORT: &str = "export the mesh as a CalculiX or Abaqus .inp, or as Gmsh .msh, from the program that wrote it";
 /// What to do with a shape.
-const BY_MESHING: &str =
-    "a shape is not a mesh: make one first, for example with Gmsh: gmsh INPUT -3 -order 2 -o OUTPUT.msh";
+const BY_MESHING: &str = "a shape must be meshed first, for example with Gmsh: gmsh INPUT -3 -order 2 -o OUTPUT.msh";
 
 /// The name of a known format that is not read, and how to convert it; by the first lines.
 fn foreign(text: &[u8]) -> Option<(&'static str, &'static str)> {
@@ -178,7 +177,7 @@ mod tests {
             (b"GRID           1             0.0     0.0     0.0\nCTETRA,1,1,1,2,3,4\n", "gmsh INPUT.bdf -save"),
             (b"    -1\n  2411\n", "universal file"),
             (b"*KEYWORD\n*NODE\n", "LS-DYNA"),
-            (b"ISO-10303-21;\nHEADER;\n", "a shape is not a mesh"),
+            (b"ISO-10303-21;\nHEADER;\n", "must be meshed first"),
             (b"# vtk DataFile Version 3.0\n", "VTK"),
         ] {
             let message = parse_mesh(bytes, "x", &options).unwrap_err().to_string();

@@ -303,7 +303,7 @@ impl<'m> Condensation<'m> {
         let K = self.K_g.view((6, 6), (n - 6, n - 6)).into_owned();
         match free_direction(&K) {
             Some((interface, direction)) => Err(ReductionError::FreeInterface { interface: interface + 1, direction }),
-            None => spd_inverse(&K).ok_or_else(|| ReductionError::Modes(ModesError::NotFinite)),
+            None => spd_inverse(&K).ok_or(ReductionError::Modes(ModesError::NotFinite)),
         }
     }
 

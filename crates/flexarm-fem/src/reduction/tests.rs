@@ -155,7 +155,10 @@ fn every_element_and_tie_passes_the_gate() {
                 let error = mode.reduced_error().unwrap();
                 assert!(error > -1e-9 && error < 4e-3, "{what}");
             }
-            assert!(result.warnings.is_empty(), "{:?}", result.warnings);
+            // Elements of first order in so few cells are too stiff, and that is said; nothing else.
+            let is_order = |doubt: &str| crate::mesh::second_order(kind).is_some() && doubt.contains("first order");
+            let others: Vec<_> = result.doubts.iter().filter(|doubt| !is_order(&doubt.message)).collect();
+            assert!(others.is_empty(), "{others:?}");
         }
     }
 }

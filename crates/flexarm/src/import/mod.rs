@@ -31,7 +31,7 @@ use std::time::Instant;
 
 use flexarm_fem::exchange::{
     ImportedMatrices, InputFile, InterfaceMap, MatrixFormat, MatrixNames, MatrixRole, RowPick, assemble_interfaces,
-    parse_matrices, propose_map, read_matrices, recognise,
+    parse_matrices, propose_map_of, read_matrices, recognise,
 };
 use flexarm_fem::gate::check_matrix12;
 use flexarm_fem::matrix_link::{MatrixPlan, MatrixReduction, link_from_superelement, turned};
@@ -200,11 +200,11 @@ fn matrices(job: &ImportJob, name: &str) -> Result<(MatrixReduction, Parts), Err
         let proposal = if is_full {
             full::propose(&imported)
         } else {
-            match propose_map(&imported.stiffness.rows) {
+            match propose_map_of(&imported.stiffness) {
                 Some(map) => {
                     let unnumbered = imported.stiffness.rows.iter().all(|label| label.node.is_none());
                     let rows = imported.stiffness.rows.len();
-                    let modal = match unnumbered && rows > 12 && map.interfaces.len() > 2 {
+                    let modal = match unnumbered && map.modal.is_empty() && map.interfaces.len() > 2 {
                         true => format!(
                             ", or, where modes follow two interfaces, --map \"A=#1-6,B=#7-12,modal=#13-{rows}\""
                         ),
@@ -224,7 +224,7 @@ fn matrices(job: &ImportJob, name: &str) -> Result<(MatrixReduction, Parts), Err
         None
     });
     if map.is_none() && imported.positions.is_empty() && imported.frames.is_empty() && job.at.is_empty() {
-        let names = propose_map(&imported.stiffness.rows).filter(|_| !is_full);
+        let names = propose_map_of(&imported.stiffness).filter(|_| !is_full);
         let names = names.map_or_else(
             || vec!["A".into(), "B".into()],
             |map| map.interfaces.iter().map(|interface| interface.name.clone()).collect(),
@@ -428,7 +428,7 @@ fn no_place(imported: &ImportedMatrices, map: Option<&ImportMap>, names: &[Strin
     let proposed = match map {
         Some(ImportMap::Rows(map)) => Some(map.clone()),
         Some(ImportMap::Nodes(_)) => None,
-        None => propose_map(&imported.stiffness.rows),
+        None => propose_map_of(&imported.stiffness),
     };
     // From the first interface to each other one, which takes the second place for it.
     let implied = proposed.and_then(|map| {

@@ -4,12 +4,13 @@ use std::fmt::Write as _;
 
 use flexarm_fem::matrix_link::MatrixReduction;
 use flexarm_fem::reduction::Superelement;
-use flexarm_fem::{GateLimits, ModalLink, RigidPart};
+use flexarm_fem::{Doubt, GateLimits, ModalLink, RigidPart};
 use nalgebra::{DMatrix, Matrix3, Matrix6};
 use serde::Serialize;
 
 use super::SECOND_ORDER_UNKNOWN;
-use crate::reduce::{ModalFigures, ReportTable, coarse, modal_table};
+use crate::caveat::Caveat;
+use crate::reduce::{ModalFigures, ReportTable, coarse, doubted, modal_table};
 
 /// Answer of `flexarm import`.
 #[derive(Clone, Debug, Serialize)]
@@ -60,6 +61,8 @@ pub struct ImportSummary {
     pub peak_rss_bytes: Option<u64>,
     /// Things worth telling.
     pub warnings: Vec<String>,
+    /// The same with code, value and yardstick.
+    pub caveats: Vec<Caveat>,
     /// Written files.
     pub files: ImportFiles,
 }
@@ -137,16 +140,18 @@ const MASS_ERROR: f64 = 1e-6;
 
 impl ImportSummary {
     pub(super) fn new(reduction: &MatrixReduction, parts: Parts) -> Self {
-        let MatrixReduction { link, whole, held_frequencies_hz, lumped_frequencies_hz, warnings } = reduction;
+        let MatrixReduction { link, whole, held_frequencies_hz, lumped_frequencies_hz, doubts } = reduction;
         let gate = &link.checks;
         let masses = parts.element.as_ref().map(masses_along_axes);
         let mass_error = masses.map(|m| m.iter().map(|m| (m / whole.mass - 1.0).abs()).fold(0.0, f64::max));
-        let mut all = parts.warnings;
-        all.extend(warnings.iter().cloned());
+        let said = |code: &'static str, sentence: &str| Doubt::said(code, sentence);
+        let mut all: Vec<Doubt> = parts.warnings.iter().map(|sentence| said("matrix-file", sentence)).collect();
+        all.extend(doubts.iter().cloned());
         if let (Some(error), Some(m)) = (mass_error, masses)
             && (error.is_nan() || error > MASS_ERROR)
         {
-            all.push(format!("the mass matrix holds {:.6}, {:.6}, {:.6} kg along x, y, z", m[0], m[1], m[2]));
+            let sentence = format!("the mass matrix holds {:.6}, {:.6}, {:.6} kg along x, y, z", m[0], m[1], m[2]);
+            all.push(Doubt::found("mass", error, MASS_ERROR, sentence));
         }
         let first = held_frequencies_hz.first().zip(lumped_frequencies_hz.first());
         all.extend(coarse("the matrices", first.map(|(hz, lumped)| lumped / hz - 1.0), None));
@@ -156,7 +161,7 @@ impl ImportSummary {
             let element = details.and_then(|details| details.superelement.as_ref())?;
             let link = ModalLink::from_superelement(&link.name, element).ok()?;
             if !link.has_second_order() {
-                all.push(SECOND_ORDER_UNKNOWN.into());
+                all.push(said("second-order", SECOND_ORDER_UNKNOWN));
             }
             Some(ModalFigures::from(&link))
         });
@@ -192,7 +197,8 @@ impl ImportSummary {
             wall_s: 0.0,
             cpu_s: 0.0,
             peak_rss_bytes: None,
-            warnings: all,
+            warnings: all.iter().map(|doubt| doubt.message.clone()).collect(),
+            caveats: all.into_iter().map(|doubt| doubted(&link.name, doubt)).collect(),
             files: ImportFiles::default(),
         }
     }

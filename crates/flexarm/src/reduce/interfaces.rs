@@ -27,7 +27,7 @@ pub(super) struct Chosen {
 
 impl Chosen {
     /// Sentences about nodes that are no seat: corners without the nodes between them, edges, nodes inside.
-    fn seat_doubts(&self) -> Vec<String> {
+    pub(super) fn seat_doubts(&self) -> Vec<String> {
         let (name, seat, chosen) = (&self.interface.name, &self.seat, self.chosen_nodes);
         let mut doubts = Vec::new();
         if !seat.missing.is_empty() {
@@ -211,7 +211,7 @@ impl Place<'_> {
     /// Sentences about positions that look like a mistake in the unit or the frame.
     pub(super) fn doubts(&self, chosen: &[Chosen]) -> Vec<String> {
         let size = self.mesh.bounding_box().map_or(0.0, |(low, high)| (high - low).norm());
-        let mut doubts: Vec<String> = chosen.iter().flat_map(Chosen::seat_doubts).collect();
+        let mut doubts = Vec::new();
         for one in chosen {
             let distance = (one.interface.X_LI.translation.vector - one.centroid).norm();
             if distance > 0.5 * size {

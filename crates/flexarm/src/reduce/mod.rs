@@ -47,11 +47,11 @@ pub use flexarm_fem::{NodeSelector, UnitSystem as Units};
 pub use job::{FrameEntry, InterfaceEntry, ReduceJob, UrdfEntry};
 pub use listing::{MeshListing, RegionListing, SetListing};
 pub use report::{ReportTable, headline, markdown, modal_table, tables};
-pub(crate) use summary::coarse;
 pub use summary::{
     ChainFigures, CheckFigures, InterfaceFigures, MaterialFigures, ModalFigures, ModeFigures, PartFigures,
     PhaseFigures, ReduceFiles, ReduceSummary, RegionFigures, SolverFigures,
 };
+pub(crate) use summary::{coarse, doubted};
 pub use words::{At, MaterialChoice, OrderingChoice, QuadratureChoice, SplitChoice, numbers};
 
 /// Modes that are kept if the job does not say.
@@ -96,7 +96,7 @@ pub fn reduce(
     progress(ReduceProgress { step: "reading the mesh", number: 1, of });
     let job = &with_defaults(job)?;
     let paths = outputs.map(|outputs| Paths::new(outputs, &job.link_name())).transpose()?;
-    let Prepared { plan, file, units, chosen, materials, warnings } = prepare(job, options)?;
+    let Prepared { plan, file, units, chosen, materials, doubts } = prepare(job, options)?;
     let read_s = started.elapsed();
 
     let mut starts = Vec::new();
@@ -108,8 +108,7 @@ pub fn reduce(
     let reduction = reduction.map_err(|source| failed(job, &file, units, source))?;
     starts.push(Instant::now());
 
-    let mut summary = summary_of(job, &plan, &file, units, &chosen, materials, &reduction);
-    summary.warnings.splice(0..0, warnings);
+    let mut summary = summary_of(job, &plan, &file, units, &chosen, materials, doubts, &reduction);
     summary.phases = phases(read_s, &starts);
     summary.wall_s = started.elapsed().as_secs_f64();
     summary.cpu_s = cpu.elapsed().as_secs_f64();

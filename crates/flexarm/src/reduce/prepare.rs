@@ -7,7 +7,7 @@ use flexarm_fem::model::AssemblyOptions;
 use flexarm_fem::reduction::{CondensationOptions, ReductionError, TieError};
 use flexarm_fem::sparse::{ModesWanted, Ordering, Threads};
 use flexarm_fem::{
-    GateLimits, LinkPlan, Material, MeshFile, Provenance, ReadOptions, SplitAt, UnitSystem, mass_properties,
+    Doubt, GateLimits, LinkPlan, Material, MeshFile, Provenance, ReadOptions, SplitAt, UnitSystem, mass_properties,
 };
 use flexarm_kinematics::Pose;
 use nalgebra::Vector3;
@@ -28,7 +28,7 @@ pub(super) struct Prepared {
     pub(super) units: UnitSystem,
     pub(super) chosen: Vec<Chosen>,
     pub(super) materials: Vec<RegionFigures>,
-    pub(super) warnings: Vec<String>,
+    pub(super) doubts: Vec<Doubt>,
 }
 
 pub(super) fn prepare(job: &ReduceJob, options: &ReduceOptions) -> Result<Prepared, Error> {
@@ -72,8 +72,11 @@ pub(super) fn prepare(job: &ReduceJob, options: &ReduceOptions) -> Result<Prepar
         1 => return Err(faults.remove(0)),
         _ => return Err(Error::Several(faults)),
     }
-    warnings.extend(place.doubts(&chosen));
-    warnings.extend(material_doubts(&file, units, &materials));
+    let said = |code: &'static str| move |sentence: String| Doubt::said(code, sentence);
+    let mut doubts: Vec<Doubt> = warnings.into_iter().map(said("mesh-file")).collect();
+    doubts.extend(chosen.iter().flat_map(Chosen::seat_doubts).map(said("interface-nodes")));
+    doubts.extend(place.doubts(&chosen).into_iter().map(said("interface-frame")));
+    doubts.extend(material_doubts(&file, units, &materials).into_iter().map(said("material")));
     let mut plan = plan(job, &file, units, &chosen, &materials);
     plan.assembly.quadrature = quadrature(job, &file)?;
     file.mesh = file.mesh.transformed(&X_LM);
@@ -85,7 +88,7 @@ pub(super) fn prepare(job: &ReduceJob, options: &ReduceOptions) -> Result<Prepar
         let along = plan.interfaces[1].X_LI.translation.vector - plan.interfaces[0].X_LI.translation.vector;
         plan.attached = robot.rest(&mesh, &along).map_err(fault)?.into();
     }
-    Ok(Prepared { plan, file, units, chosen, materials, warnings })
+    Ok(Prepared { plan, file, units, chosen, materials, doubts })
 }
 
 /// Joins nodes that lie in one place.

@@ -3,7 +3,7 @@
 use flexarm_fem::chain::Chain;
 use flexarm_fem::mesh_gate::ModeCheck;
 use flexarm_fem::sparse::Ordering;
-use flexarm_fem::{LinkPlan, Material, MeshFile, MeshReduction, ModalLink, RigidPart, UnitSystem};
+use flexarm_fem::{Doubt, LinkPlan, Material, MeshFile, MeshReduction, ModalLink, RigidPart, UnitSystem};
 use nalgebra::{Matrix3, Matrix6};
 use serde::Serialize;
 
@@ -12,6 +12,7 @@ use super::interfaces::Chosen;
 use super::job::ReduceJob;
 use super::prepare::quadrature_name;
 use super::words::described;
+use crate::caveat::{self, Caveat};
 
 /// Answer of `flexarm reduce`.
 #[derive(Clone, Debug, Serialize)]
@@ -78,6 +79,8 @@ pub struct ReduceSummary {
     pub peak_rss_bytes: Option<u64>,
     /// Things worth telling.
     pub warnings: Vec<String>,
+    /// The same with code, value and yardstick.
+    pub caveats: Vec<Caveat>,
     /// Written files.
     pub files: ReduceFiles,
 }
@@ -280,8 +283,8 @@ pub struct CheckFigures {
     pub smallest_fullness: f64,
     /// Largest distance of a mid-side node from the middle of its edge, over the length of the edge.
     pub largest_offset: f64,
-    /// Compliance with elements of second order over that of the mesh, the largest of any load at B; null for elements of
-    /// second order.
+    /// Compliance at B with elements of second order over that of the mesh, the component farthest from one; null for
+    /// elements of second order.
     pub order_ratio: Option<f64>,
     /// The same along x y z rx ry rz.
     pub order_ratios: Option<[f64; 6]>,
@@ -329,6 +332,7 @@ pub(super) fn summary_of(
     units: UnitSystem,
     chosen: &[Chosen],
     materials: Vec<RegionFigures>,
+    doubts: Vec<Doubt>,
     reduction: &MeshReduction,
 ) -> ReduceSummary {
     let link = &reduction.link;
@@ -364,13 +368,14 @@ pub(super) fn summary_of(
         worst_element: gate.quality.worst_element,
         smallest_fullness: gate.quality.smallest_fullness,
         largest_offset: gate.quality.largest_offset,
-        order_ratio: gate.order.map(|order| order.largest_ratio),
+        order_ratio: gate.order.map(|order| order.worst()),
         order_ratios: gate.order.map(|order| order.compliance_ratio),
     });
     let modes: Vec<_> = gate.map_or_else(Vec::new, |gate| gate.modes.iter().map(ModeFigures::from).collect());
     let coarse =
         modes.first().map_or_else(Vec::new, |first| coarse("the mesh", first.lumped_error, first.reduced_error));
-    let warnings = reduction.warnings.iter().cloned().chain(coarse).collect();
+    let doubts = doubts.into_iter().chain(reduction.doubts.iter().cloned()).chain(coarse);
+    let caveats: Vec<Caveat> = doubts.map(|doubt| doubted(&link.name, doubt)).collect();
     let kept = reduction.fixed_modes.len();
     let factor = reduction.solver.factor;
     ReduceSummary {
@@ -416,7 +421,8 @@ pub(super) fn summary_of(
         wall_s: 0.0,
         cpu_s: 0.0,
         peak_rss_bytes: None,
-        warnings,
+        warnings: caveat::warnings(&caveats),
+        caveats,
         files: ReduceFiles::default(),
     }
 }
@@ -429,17 +435,28 @@ const COARSE_MODES: f64 = 0.005;
 ///
 /// * `source`: whose frequency it is: that of the mesh, or of the matrices.
 /// * `parts`, `modes`: relative errors of the two rigid parts and of the kept modes.
-pub(crate) fn coarse(source: &str, parts: Option<f64>, modes: Option<f64>) -> Vec<String> {
-    let off = |error: Option<f64>, bound: f64| error.filter(|error| error.abs() > bound).map(|error| 100.0 * error);
-    let parts = off(parts, COARSE_PARTS).map(|percent| {
-        format!(
+pub(crate) fn coarse(source: &str, parts: Option<f64>, modes: Option<f64>) -> Vec<Doubt> {
+    let off = |error: Option<f64>, bound: f64| error.filter(|error| error.abs() > bound);
+    let parts = off(parts, COARSE_PARTS).map(|error| {
+        let percent = 100.0 * error;
+        let said = format!(
             "two rigid parts miss the first frequency of {source} by {percent:+.1} %: so will a simulation with them"
-        )
+        );
+        Doubt::found("coarse-parts", error, COARSE_PARTS, said)
     });
-    let modes = off(modes, COARSE_MODES).map(|percent| {
-        format!("the kept modes miss the first frequency by {percent:+.2} %: keep more of them (--modes)")
+    let modes = off(modes, COARSE_MODES).map(|error| {
+        let percent = 100.0 * error;
+        let said = format!("the kept modes miss the first frequency by {percent:+.2} %: keep more of them (--modes)");
+        Doubt::found("coarse-modes", error, COARSE_MODES, said)
     });
     parts.into_iter().chain(modes).collect()
+}
+
+/// A doubt about a link as a caveat.
+pub(crate) fn doubted(link: &str, doubt: Doubt) -> Caveat {
+    let Doubt { code, message, value, yardstick } = doubt;
+    let finite = |x: Option<f64>| x.filter(|x| x.is_finite());
+    Caveat { value: finite(value), yardstick: finite(yardstick), ..Caveat::said(code, link, message, "") }
 }
 
 fn rows3(M: &Matrix3<f64>) -> [[f64; 3]; 3] {
