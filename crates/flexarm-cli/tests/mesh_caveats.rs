@@ -111,3 +111,35 @@ fn a_beam_whose_link_cannot_be_cut_takes_the_mass_of_the_uniform_beam_and_says_s
     let output = place.command(&["check", "robot.toml"]).output().unwrap();
     assert_ne!(output.status.code(), Some(0));
 }
+
+/// Truth: the frequencies of the link that was exported.
+#[test]
+fn a_stiffness_finds_its_mass_and_two_coarse_parts_are_judged_as_in_a_reduction() {
+    let place = place("tet10_same");
+    let split = ["--split", "0.9"];
+    let (link, said) = reduced(&place, &[&arguments("A=A", "B=B")[..], &split].concat());
+    let coarse = "two rigid parts miss the first frequency";
+    assert!(said.contains(coarse), "{said}");
+
+    let list: Vec<&str> =
+        arguments("A=A", "B=B").into_iter().map(|word| if word == "--no-files" { "--force" } else { word }).collect();
+    reduced(&place, &[&list[..], &["--flex", "bar.flex", "--name", "bar"]].concat());
+    let export = ["export", "bar.flex", "--format", "matrix-market", "--units", "m-kg-s", "-o", "matrices"];
+    assert!(place.command(&export).output().unwrap().status.success());
+    std::fs::remove_file(place.path("matrices/bar.toml")).unwrap();
+
+    // Nothing tells rows and places any more; the matrix itself does.
+    let bare = ["import", "matrices/bar_K.mtx", "--units", "m-kg-s", "--no-files"];
+    let output = place.command(&bare).output().unwrap();
+    let asked = String::from_utf8_lossy(&output.stderr);
+    assert!(asked.contains("--map \"A=#1-6,B=#7-12,modal=#13-22\""), "{asked}");
+    assert!(asked.contains("B at (0.600000, 0.000000, 0.000000)"), "{asked}");
+
+    let map = ["--json", "--map", "A=#1-6,B=#7-12,modal=#13-22", "--at", "A=0,0.03,0.02", "--at", "B=0.6,0.03,0.02"];
+    let (imported, said) = reduced(&place, &[&bare[..], &map, &split].concat());
+    assert!(said.contains("bar_M.mtx, found beside") && said.contains(coarse), "{said}");
+    let [hz, truth] = [&imported, &link].map(|figures| figures["frequencies_hz"][0].as_f64().unwrap());
+    assert!((hz / truth - 1.0).abs() < 1e-3, "{hz} instead of {truth}"); // ten modes instead of all
+    let caveat = imported["caveats"].as_array().unwrap().iter().find(|caveat| caveat["code"] == "coarse-parts");
+    assert!(caveat.unwrap()["value"].as_f64().unwrap().abs() > caveat.unwrap()["yardstick"].as_f64().unwrap());
+}

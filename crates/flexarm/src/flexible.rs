@@ -6,8 +6,8 @@ use std::sync::Arc;
 use crate::bends::Bend;
 use flexarm_fem::{BeamLink, ModalLink, ModalOptions};
 use flexarm_flexlink::{
-    BranchJoint, FlexibleLink, FlexibleSpan, Gearbox, LinkForm, Parts, SubstitutionError, branch_joints, insert_gearboxes,
-    substitute,
+    BranchJoint, FlexibleLink, FlexibleSpan, Gearbox, LinkForm, Parts, SubstitutionError, branch_joints,
+    insert_gearboxes, substitute,
 };
 use flexarm_kinematics::{Data, MOST_COORDINATES, Model, mass_matrix};
 use flexarm_stepping::{
