@@ -108,7 +108,10 @@ pub fn reduce(
     let reduction = reduction.map_err(|source| failed(job, &file, units, source))?;
     starts.push(Instant::now());
 
-    let mut summary = summary_of(job, &plan, &file, units, &chosen, materials, doubts, &reduction);
+    let mut summary = summary_of(job, &plan, &file, units, &chosen, materials, &reduction);
+    let before: Vec<_> = doubts.into_iter().map(|doubt| doubted(&summary.link, doubt)).collect();
+    summary.caveats.splice(0..0, before);
+    summary.warnings = crate::caveat::warnings(&summary.caveats);
     summary.phases = phases(read_s, &starts);
     summary.wall_s = started.elapsed().as_secs_f64();
     summary.cpu_s = cpu.elapsed().as_secs_f64();

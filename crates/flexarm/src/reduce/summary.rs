@@ -332,7 +332,6 @@ pub(super) fn summary_of(
     units: UnitSystem,
     chosen: &[Chosen],
     materials: Vec<RegionFigures>,
-    doubts: Vec<Doubt>,
     reduction: &MeshReduction,
 ) -> ReduceSummary {
     let link = &reduction.link;
@@ -374,7 +373,7 @@ pub(super) fn summary_of(
     let modes: Vec<_> = gate.map_or_else(Vec::new, |gate| gate.modes.iter().map(ModeFigures::from).collect());
     let coarse =
         modes.first().map_or_else(Vec::new, |first| coarse("the mesh", first.lumped_error, first.reduced_error));
-    let doubts = doubts.into_iter().chain(reduction.doubts.iter().cloned()).chain(coarse);
+    let doubts = reduction.doubts.iter().cloned().chain(coarse);
     let caveats: Vec<Caveat> = doubts.map(|doubt| doubted(&link.name, doubt)).collect();
     let kept = reduction.fixed_modes.len();
     let factor = reduction.solver.factor;
