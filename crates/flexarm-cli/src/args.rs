@@ -264,6 +264,9 @@ pub(crate) struct CheckArgs {
     pub(crate) robot: PathBuf,
     /// Trajectory to check against the robot's limits
     pub(crate) trajectory: Option<PathBuf>,
+    /// File of loads during the trajectory to check as well
+    #[arg(long, value_name = "FILE")]
+    pub(crate) loads: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) load: RobotArgs,
 }

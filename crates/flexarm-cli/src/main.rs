@@ -283,7 +283,8 @@ fn inspect(cli: &Cli, args: &InspectArgs) -> Result<ExitCode, Error> {
 fn check(cli: &Cli, args: &CheckArgs) -> Result<ExitCode, Error> {
     let trajectory = args.trajectory.as_deref().map(shipped::trajectory);
     let robot = shipped::robot(Some(&args.robot));
-    let findings = flexarm::check(&robot, trajectory.as_deref(), &load_options(&args.load)?);
+    let findings =
+        flexarm::check_with_loads(&robot, trajectory.as_deref(), args.loads.as_deref(), &load_options(&args.load)?);
     let json = || serde_json::json!({ "findings": findings }).to_string();
     answer(cli, json, || print::findings(&findings));
     let wrong = findings.iter().any(|f| f.severity == "error");

@@ -496,6 +496,100 @@ mod check {
         }
     }
 
+    /// A run, statics and `check` say the same of the same slip, with value and yardstick.
+    #[test]
+    fn a_slip_is_told_by_check_runs_and_statics_alike() {
+        let place = Place::new();
+        place.write("robot.toml", with(ROBOT, "{ link = \"ball\" }", "{ link = \"ball\", xyz = [0.0, 0.0, 350.0] }"));
+        let far = |all: &Value| all.as_array().unwrap().iter().find(|c| c["code"] == "far").cloned().unwrap();
+        let run = place.json(&["compare", "robot.toml", "swing.toml", "--no-files"]);
+        let still = place.json(&["statics", "robot.toml"]);
+        let found = Value::Array(findings(&place, &["robot.toml"], 0));
+        for caveat in [far(&run["caveats"]), far(&still["caveats"]), far(&found)] {
+            assert_eq!(caveat["value"].as_f64(), Some(350.0), "{caveat}");
+            assert_eq!((&caveat["unit"], &caveat["severity"]), (&"m".into(), &"warning".into()));
+            assert_eq!(caveat["likely"], "about 1000 times: millimetres?");
+            assert!(caveat["message"].as_str().unwrap().contains("millimetres?"), "{caveat}");
+        }
+        assert!(run["warnings"].to_string().contains("350 m away"), "{run}");
+    }
+
+    #[test]
+    fn loads_are_checked_with_the_motion() {
+        let place = Place::new();
+        let loads = |text: &str| {
+            place.write("loads.toml", format!("format = 1\n{text}"));
+            place.flexarm(&["check", "robot.toml", "swing.toml", "--loads", "loads.toml", "--json"])
+        };
+        let step = "[[load]]\nkind = \"step\"\nforce = [0.0, 0.0, -1e6]\n";
+        let heavy = loads(step);
+        assert!(heavy.code == 0 && heavy.out.contains("\"code\":\"load\""), "{}", heavy.out);
+        let late = loads("[[load]]\nkind = \"step\"\nstart = 7.0\nforce = [0.0, 0.0, -1.0]\n");
+        assert!(late.out.contains("\"code\":\"no-effect\""), "{}", late.out);
+        let carried = loads("[[payload]]\nat = 0.1\nmass = 15000.0\n");
+        assert!(carried.out.contains("\"code\":\"payload-mass\""), "{}", carried.out);
+        let nowhere = loads("[[load]]\nframe = \"elbow\"\nkind = \"step\"\nforce = [0.0, 0.0, -1.0]\n");
+        assert!(nowhere.code == 2 && nowhere.out.contains("elbow"), "{}", nowhere.out);
+        // A run says the same.
+        loads("[[load]]\nkind = \"step\"\nstart = 0.3\nforce = [0.0, 0.0, -1e3]\n");
+        let run = place.json(&["compare", "robot.toml", "swing.toml", "--loads", "loads.toml", "--no-files"]);
+        let told = run["caveats"].as_array().unwrap().iter().find(|c| c["code"] == "load").unwrap();
+        assert_eq!(told["value"].as_f64(), Some(1e3), "{told}");
+    }
+
+    #[test]
+    fn a_payload_of_0_kg_is_noted_and_counts_as_none() {
+        let place = Place::new();
+        let none = place.json(&["statics", "robot.toml"]);
+        place.write(
+            "robot.toml",
+            with(ROBOT, "\ngravity", "\npayload = { mass = 0.0, com = [0.1, 0.0, 0.0] }\ngravity"),
+        );
+        let found = findings(&place, &["robot.toml"], 0);
+        assert!(codes(&found, "note").contains(&"no-payload".to_owned()), "{found:?}");
+        assert_eq!(place.json(&["statics", "robot.toml"])["sag_m"], none["sag_m"]);
+    }
+
+    /// At zero the shipped arm stands outside its limits.
+    #[test]
+    fn the_robot_is_held_where_the_motion_begins() {
+        let place = Place::new();
+        let at = |arguments: &[&str]| {
+            let found = findings(&place, arguments, 0);
+            let note = found.iter().find(|f| f["code"] == "modes").unwrap_or_else(|| panic!("{found:?}"));
+            note["message"].as_str().unwrap().to_owned()
+        };
+        let (robot, motion) = (shipped_robot("kr210"), shipped_trajectory("large_moves.toml"));
+        assert!(at(&[&robot, &motion]).contains("at the start of large_moves"));
+        assert!(at(&[&robot]).contains("at the start of pick_and_place"));
+        assert!(at(&["robot.toml"]).contains("in the middle of the joint ranges"));
+        // The frequencies are those of a run from there.
+        let run = place.json(&["compare", &robot, &motion, "--no-files", "--step", "2e-3"]);
+        let first = format!("{:.2}", numbers(&run["frequencies_hz"])[0]);
+        assert!(at(&[&robot, &motion]).contains(&first), "{first}");
+    }
+
+    /// Limits that the robot would have given are not missed beside its own faults.
+    #[test]
+    fn a_broken_robot_makes_no_fault_of_the_motion() {
+        let place = Place::new();
+        place.write("beam.urdf", with(URDF, "\"1.728\"", "\"-1.728\""));
+        let motion = "format = 1\nunit = \"deg\"\njoints = [\"swing\"]\nstart = [0.0]\n\n[[move]]\nto = [60.0]\n";
+        place.write("fast.toml", motion);
+        let found = findings(&place, &["robot.toml", "fast.toml"], 2);
+        assert_eq!(codes(&found, "error"), ["negative-mass"], "{found:?}");
+    }
+
+    #[test]
+    fn degrees_in_a_file_of_radians_are_named() {
+        let place = Place::new();
+        place.write("deg.csv", "time,swing\n0,0\n1,60\n2,0\n");
+        let found = findings(&place, &["robot.toml", "deg.csv"], 2);
+        let passed = found.iter().find(|f| f["code"] == "joint-limit").unwrap();
+        assert_eq!(passed["likely"], "about 57 times: degrees?", "{found:?}");
+        place.refused(&["compare", "robot.toml", "deg.csv", "-o", "result"], &["upper limit", "degrees?"]);
+    }
+
     #[test]
     fn motion_beside_a_faulty_robot() {
         let place = Place::new();

@@ -341,6 +341,18 @@ mod bad_loads_files {
         refused(&load("kind = \"expression\"\nfx = \"ln(t)\""), "fx", &["no finite number at t = 0 s"]);
     }
 
+    /// Of two columns with one name the last once won without a word.
+    #[test]
+    fn a_column_twice_is_refused() {
+        let place = Place::new();
+        place.write("loads.toml", "format = 1\n[[load]]\nkind = \"table\"\nfile = \"force.csv\"\n");
+        for (header, name) in [("time,fx,fx", "fx"), ("time,fx,time", "time")] {
+            place.write("force.csv", format!("{header}\n0,1,2\n1,1,2\n"));
+            let words = ["force.csv", &format!("{name:?} twice")];
+            place.refused(&[&RUN[..], &["--loads", "loads.toml"]].concat(), &words);
+        }
+    }
+
     /// Loads that come to nothing, or that the steps do not see, are told of.
     #[test]
     fn doubts() {

@@ -267,6 +267,15 @@ mod compare {
         near(number(&fall["tcp"], "peak_m"), sag * (1.0 + (-0.03 * std::f64::consts::PI).exp()), 0.02);
     }
 
+    /// There is nothing to log between two steps.
+    #[test]
+    fn a_log_rate_above_the_rate_of_the_steps_is_told() {
+        let place = Place::new();
+        let run = place.json(&["compare", "robot.toml", "swing.toml", "--no-files", "--log-rate", "5000"]);
+        let told = run["caveats"].as_array().unwrap().iter().find(|c| c["code"] == "log-rate").unwrap();
+        assert_eq!((told["value"].as_f64(), told["yardstick"].as_f64()), (Some(5000.0), Some(1000.0)), "{told}");
+    }
+
     #[test]
     fn peak_at_a_low_log_rate() {
         let place = Place::new();

@@ -353,6 +353,12 @@ impl Reader<'_, '_> {
             q.to_rotation_matrix()
         } else {
             let rpy = self.vector(origin, &owner, "rpy", Vector3::zeros());
+            let largest = rpy.amax();
+            if largest > std::f64::consts::TAU + 1e-6 {
+                let message =
+                    format!("{owner}: an angle of {largest} rad is more than a turn (about 57 times: degrees?)");
+                self.report.warning(&self.lines.of(origin), "angle", message, "angles of a URDF are in rad");
+            }
             Rotation3::from_euler_angles(rpy.x, rpy.y, rpy.z)
         };
         Pose::from_parts(Translation3::from(xyz), rotation)

@@ -59,7 +59,7 @@ pub(crate) fn link_inertias(
             report.warning(&raw.place, "massless-shape", message, "give the link its mass");
         }
         without_extent[i] = check_moments(&link.name, raw, inertia, moves[i], options, report);
-        if raw.mass > 0.0 {
+        if raw.mass > 0.0 && !options.waive.contains(&link.name) {
             plausible(&link.name, raw, inertia, &shapes[i], report);
         }
     }

@@ -2,13 +2,15 @@
 
 use std::path::Path;
 
-use flexarm_kinematics::Coordinate;
 use flexarm_trajectory::{FileError, PlanError, Problem, TrajectoryError};
 use flexarm_urdf::{Finding as UrdfFinding, Severity};
 use nalgebra::Vector6;
 use serde::Serialize;
 
-use crate::caveat::Caveat;
+use crate::caveat::motion::of_motion;
+use crate::caveat::size::{Size, middle};
+use crate::caveat::{self, Caveat};
+use crate::disturbance::Disturbances;
 use crate::drive_entry::DriveKind;
 use crate::error::Error;
 use crate::motion::Motion;
@@ -56,7 +58,9 @@ impl Finding {
     /// A caveat about something in a file.
     fn caveat(file: &Path, caveat: Caveat) -> Self {
         let severity = caveat.severity.word();
+        let prefix = format!("{}: ", file.display());
         let Caveat { code, message, value, yardstick, unit, likely, help, .. } = caveat;
+        let message = message.strip_prefix(&prefix).map_or(message.clone(), str::to_owned);
         Self { severity, code, location: file.display().to_string(), message, help, value, yardstick, unit, likely }
     }
 
@@ -82,6 +86,16 @@ impl From<&UrdfFinding> for Finding {
 /// Never fails: what cannot be loaded is a finding of severity `error`. The robot is held where the trajectory begins,
 /// else its default trajectory, else in the middle of its joint ranges.
 pub fn check(robot: &Path, trajectory: Option<&Path>, options: &LoadOptions) -> Vec<Finding> {
+    check_with_loads(robot, trajectory, None, options)
+}
+
+/// As [`check()`], and about the loads that a file puts on the robot during the trajectory.
+pub fn check_with_loads(
+    robot: &Path,
+    trajectory: Option<&Path>,
+    loads: Option<&Path>,
+    options: &LoadOptions,
+) -> Vec<Finding> {
     let mut findings = Vec::new();
     let path = robot;
     let robot = match Robot::load(path, options) {
@@ -104,11 +118,37 @@ pub fn check(robot: &Path, trajectory: Option<&Path>, options: &LoadOptions) -> 
         }
         (Some(path), _) => check_motion(&robot, path, &mut findings),
         // Its own faults are told when it is asked for.
-        (None, Some(own)) => robot.rigid_model().and_then(|model| Motion::load(own, &model)).ok(),
+        (None, Some(own)) => robot.rigid_model().ok().and_then(|model| {
+            let motion = Motion::load(own, &model).ok()?;
+            let along = of_motion(&motion.name, &motion.trajectory, &model);
+            findings.extend(along.into_iter().map(|caveat| Finding::caveat(own, caveat)));
+            Some(motion)
+        }),
         (None, None) => None,
     };
     check_flexible(&robot, motion.as_ref(), &mut findings);
+    if let Some(path) = loads {
+        check_loads(&robot, motion.as_ref(), path, &mut findings);
+    }
     findings
+}
+
+/// What is to be said of a file of loads.
+fn check_loads(robot: &Robot, motion: Option<&Motion>, path: &Path, findings: &mut Vec<Finding>) {
+    let Some(duration) = motion.map(|motion| motion.trajectory.duration()) else {
+        let message = "loads belong to a motion, which is missing or cannot be read";
+        findings.push(Finding::error("loads", path.display().to_string(), &message));
+        return;
+    };
+    let read = robot.flexible_robot().and_then(|f| Disturbances::load(path, robot, &f.model, duration));
+    match read {
+        Err(error) => findings.push(Finding::error("loads", path.display().to_string(), &error)),
+        Ok(read) => {
+            let heavy = caveat::motion::of_loads(&read.loads, duration, &Size::of(&robot.rigid));
+            let told = read.caveats.into_iter().chain(heavy);
+            findings.extend(told.map(|caveat| Finding::caveat(path, caveat)));
+        }
+    }
 }
 
 /// What is wrong with a motion whose robot cannot be loaded; limits that the robot would give are not missed.
@@ -157,7 +197,7 @@ fn check_flexible(robot: &Robot, motion: Option<&Motion>, findings: &mut Vec<Fin
                 let message = format!("first frequencies {words} {:.2?} Hz", &hz[..hz.len().min(4)]);
                 findings.push(Finding::note("modes", file, message));
             }
-            let told = posed.flexible.caveats().into_iter().chain(posed.validity(&linear));
+            let told = posed.flexible.caveats().into_iter().chain(posed.validity(robot, &linear));
             findings.extend(told.map(|caveat| Finding::caveat(&robot.path, caveat)));
         }
     }
@@ -194,11 +234,7 @@ impl Pose {
     /// Where the motion begins, else in the middle of the joint ranges.
     fn of(robot: &Robot, motion: Option<&Motion>) -> Result<Self, Error> {
         let model = robot.rigid_model()?;
-        let middle = |c: &Coordinate| match (c.limits.lower, c.limits.upper) {
-            (lower, upper) if lower.is_finite() && upper.is_finite() => 0.5 * (lower + upper),
-            (lower, upper) => 0.0f64.max(lower).min(upper),
-        };
-        let mut at: Vec<f64> = model.coordinates().iter().map(middle).collect();
+        let mut at: Vec<f64> = model.coordinates().iter().map(|c| middle(c.limits.lower, c.limits.upper)).collect();
         let Some(motion) = motion else {
             return Ok(Self { at, words: "in the middle of the joint ranges".into() });
         };
@@ -218,9 +254,13 @@ fn check_motion(robot: &Robot, path: &Path, findings: &mut Vec<Finding>) -> Opti
         }
         Ok(motion) => {
             let help = "slow the motion down or keep away from the limit";
-            let passed = |v| Finding { help: help.into(), ..Finding::error("joint-limit", file(), v) };
+            let likely = || motion.likely.to_owned();
+            let passed =
+                |v| Finding { help: help.into(), likely: likely(), ..Finding::error("joint-limit", file(), v) };
             findings.extend(motion.violations.iter().map(|v| passed(v)));
-            findings.extend(motion.caveats().into_iter().map(|caveat| Finding::caveat(path, caveat)));
+            let along = robot.rigid_model().map(|model| of_motion(&motion.name, &motion.trajectory, &model));
+            let told = motion.caveats().into_iter().chain(along.unwrap_or_default());
+            findings.extend(told.map(|caveat| Finding::caveat(path, caveat)));
             Some(motion)
         }
     }

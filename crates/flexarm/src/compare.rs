@@ -20,7 +20,8 @@ use flexarm_trajectory::LimitViolation;
 use nalgebra::{Matrix6, Vector3, Vector6};
 
 use crate::bends::stations;
-use crate::caveat::{self, Caveat, kinds, validity};
+use crate::caveat::pose::Standing;
+use crate::caveat::{self, Caveat, drives, kinds, validity};
 use crate::energy_book::EnergyBook;
 use crate::error::Error;
 use crate::flexible::{FlexibleRobot, Owner};
@@ -486,7 +487,7 @@ impl<'a> Run<'a> {
         caveats.extend(motion.caveats());
         let passed = |v: &LimitViolation| Caveat::said("joint-limit", &v.joint, format!("joint limit: {v}"), "");
         caveats.extend(motion.violations.iter().map(passed));
-        caveats.extend(self.caveats(&links));
+        caveats.extend(self.caveats(robot, &links));
         let events = self.events(metrics.as_ref().filter(|_| options.with_twin));
         let bends = Bending {
             links: links.iter().map(|link| link.name.clone()).collect(),
@@ -613,9 +614,17 @@ impl<'a> Run<'a> {
     }
 
     /// Whether the models held in what was seen so far.
-    fn caveats(&self, links: &[LinkFigures]) -> Vec<Caveat> {
-        let coordinates = self.arm.model.coordinates();
-        let mut caveats = Vec::new();
+    fn caveats(&self, robot: &Robot, links: &[LinkFigures]) -> Vec<Caveat> {
+        let (arm, flexible, coordinates) = (&self.arm, self.flexible, self.arm.model.coordinates());
+        let elastic = arm.modes.equilibrium.as_slice();
+        let mut caveats = Standing { robot, flexible, arm, elastic, sag_m: self.static_sag() }.caveats();
+        for (k, drive) in robot.drives.iter().enumerate().filter(|(k, _)| flexible.owners.contains(&Owner::Drive(*k))) {
+            let joint = coordinates.iter().find(|c| c.joint == drive.joint);
+            let slides = joint.is_some_and(|c| c.kind == "prismatic");
+            let [turned, moved] = if slides { [0.0, self.give[k]] } else { [self.give[k], 0.0] };
+            let effort = joint.map_or(f64::INFINITY, |c| c.limits.effort);
+            caveats.extend(drives::give(drive, effort, (turned - drive.backlash).max(0.0), moved, 2.0));
+        }
         if let Some(first) = self.arm.modes.frequencies_hz().first() {
             let logged_hz = 1.0 / (self.every as f64 * self.options.step_s);
             caveats.extend(validity::sampling(*first, self.options.step_s, logged_hz));

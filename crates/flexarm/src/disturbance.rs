@@ -15,7 +15,8 @@ use nalgebra::{Matrix3, Vector3};
 use serde::Deserialize;
 use toml::Spanned;
 
-use crate::caveat::Caveat;
+use crate::caveat::size::Size;
+use crate::caveat::{Caveat, parts};
 use crate::error::Error;
 use crate::input::read_text;
 use crate::robot::{PAYLOAD_LINK, Robot, TCP_FRAME};
@@ -135,12 +136,16 @@ impl Disturbances {
                 disturbances.caveats.push(Caveat::said("no-effect", "loads", text, "move it into the run"));
             }
         }
+        let size = Size::of(&robot.urdf.mechanism);
         let mut changes: Vec<&Spanned<PayloadChange>> = file.payload.iter().collect();
         changes.sort_by(|a, b| a.get_ref().at.total_cmp(&b.get_ref().at));
         for entry in changes {
             let earlier = disturbances.changes.clone();
             disturbances.changes.push(change(entry, robot, model, &earlier, &source)?);
             let at = entry.get_ref().at;
+            let weighs = robot.rigid.gravity.norm() > 0.0;
+            let what = format!("the payload from {at} s on");
+            disturbances.caveats.extend(parts::payload(&what, &carried(entry.get_ref()), &size, weighs));
             if at > duration {
                 let text = format!("the payload changes at {at} s, the run ends at {duration} s: it stays as it is");
                 disturbances.caveats.push(Caveat::said("no-effect", "loads", text, "move it into the run"));
@@ -420,6 +425,13 @@ fn expression(e: &LoadEntry, source: &Source, (start, end): (f64, f64)) -> Resul
     }))
 }
 
+/// What the entry hangs on its link, about its centre of mass.
+fn carried(e: &PayloadChange) -> LinkInertia {
+    let [xx, yy, zz, xy, xz, yz] = e.inertia.as_ref().map_or([0.0; 6], |inertia| *inertia.get_ref());
+    let inertia_com = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+    LinkInertia { mass: e.mass, com: e.com.into(), inertia_com }
+}
+
 fn change(
     entry: &Spanned<PayloadChange>,
     robot: &Robot,
@@ -451,9 +463,8 @@ fn change(
         );
         return Err(source.error(span_or(e.link.as_ref(), entry), message));
     }
-    let [xx, yy, zz, xy, xz, yz] = inertia_given;
-    let inertia_com = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
-    if inertia_com.symmetric_eigenvalues().min() < -1e-9 * inertia_com.norm() {
+    let added = carried(e);
+    if added.inertia_com.symmetric_eigenvalues().min() < -1e-9 * added.inertia_com.norm() {
         let message = "payload inertia has a negative principal moment; the order is ixx iyy izz ixy ixz iyz";
         return Err(source.error(span_or(e.inertia.as_ref(), entry), message));
     }
@@ -475,7 +486,6 @@ fn change(
         let name = &model.bodies()[other.body].name;
         return Err(fail(format!("payloads on two bodies ({name:?} and {link:?}): one changes in a run")));
     }
-    let added = LinkInertia { mass: e.mass, com: e.com.into(), inertia_com };
     if e.mass > 0.0 {
         let X_BF: Pose = frame.X_BF;
         inertia += added.spatial().at_parent(&X_BF);

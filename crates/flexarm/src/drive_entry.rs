@@ -126,10 +126,14 @@ pub struct Drive {
     pub joint: String,
     /// How it is driven.
     pub kind: DriveKind,
+    /// Turns of the motor per turn of the joint.
+    pub ratio: f64,
     /// Inertia of the rotor seen from the joint (kg m²).
     pub armature: f64,
     /// Spring of the gearbox.
     pub gearbox: Option<(Gearbox, GearDamping)>,
+    /// Its play to each side (rad or m).
+    pub backlash: f64,
     /// Friction.
     pub friction: Friction,
     /// Largest torque (N m).
@@ -292,7 +296,8 @@ fn drive(
         }
     };
     let torque_limit = number(&entry.torque_limit, "torque_limit", joint.limits.effort, 0.0)?;
-    Ok(Drive { joint: name.clone(), kind, armature, gearbox, friction, torque_limit, servo })
+    let backlash = entry.gearbox.as_ref().and_then(|g| g.get_ref().backlash).unwrap_or(0.0);
+    Ok(Drive { joint: name.clone(), kind, ratio, armature, gearbox, backlash, friction, torque_limit, servo })
 }
 
 fn gear(

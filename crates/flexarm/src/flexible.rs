@@ -260,7 +260,7 @@ impl FlexibleRobot {
     }
 
     /// Inertia that each torque-driven joint feels at once, all other free coordinates yielding: `1 / (M_ff^-1)_ii`.
-    fn quick_inertia(&self, actuated: &DVector<f64>) -> Vec<f64> {
+    pub(crate) fn quick_inertia(&self, actuated: &DVector<f64>) -> Vec<f64> {
         let (model, n) = (&self.model, self.model.n_actuated());
         let mut q = DVector::zeros(model.nv());
         q.rows_mut(0, n).copy_from(actuated);

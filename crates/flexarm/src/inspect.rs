@@ -174,7 +174,7 @@ pub fn inspect(robot: &Robot, at: Option<&str>, velocity: Option<&str>) -> Resul
     let values =
         |text: Option<&str>| text.map_or_else(|| Ok(vec![0.0; names.len()]), |t| parse_joint_values(t, &names));
     let (q, v) = (values(at)?, values(velocity)?);
-    let mut warnings = robot.warnings.clone();
+    let mut warnings = crate::caveat::warnings(&robot.caveats());
     for (c, q) in model.coordinates().iter().zip(&q) {
         if *q < c.limits.lower || *q > c.limits.upper {
             let (lower, upper) = (c.limits.lower, c.limits.upper);

@@ -60,7 +60,7 @@ mod twin;
 
 pub use bends::Bend;
 pub use caveat::Caveat;
-pub use check::{Finding, check};
+pub use check::{Finding, check, check_with_loads};
 pub use compare::{Progress, simulate, simulate_traced};
 pub use convert::{ConvertOptions, ConvertSummary, convert, convert_until, parse_recording_format, read_run};
 pub use disturbance::Disturbances;

@@ -7,7 +7,7 @@ use flexarm_kinematics::Model;
 use flexarm_stepping::PrescribedMotion;
 use flexarm_trajectory::{JointLimits, LimitViolation, Trajectory};
 
-use crate::caveat::Caveat;
+use crate::caveat::{self, Caveat};
 use crate::error::Error;
 
 /// A trajectory whose joints are the model's actuated coordinates.
@@ -21,6 +21,8 @@ pub struct Motion {
     pub trajectory: Arc<Trajectory>,
     /// Limits that it passes.
     pub violations: Vec<LimitViolation>,
+    /// The slip that would explain positions beyond their limits; empty if none would.
+    pub likely: &'static str,
     /// Things worth telling.
     pub warnings: Vec<String>,
 }
@@ -70,8 +72,9 @@ impl Motion {
             .with_joint_order(&names)
             .map_err(|e| Error::File { path: path.to_owned(), what: e.to_string() })?;
         let violations = trajectory.check_limits(&limits);
+        let likely = caveat::motion::degrees(&violations, model);
         let name = path.file_stem().map_or_else(|| "trajectory".into(), |s| s.to_string_lossy().into_owned());
-        Ok(Self { name, path: path.to_owned(), trajectory: Arc::new(trajectory), violations, warnings })
+        Ok(Self { name, path: path.to_owned(), trajectory: Arc::new(trajectory), violations, likely, warnings })
     }
 
     /// The same motion with each corner, where a velocity jumps, replaced by a blend that lasts `seconds`.

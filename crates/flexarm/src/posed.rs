@@ -6,6 +6,7 @@ use flexarm_kinematics::{Data, Frame, Pose, State, Wrench, forward_kinematics, r
 use flexarm_stepping::{FlexibleArm, Held, Linear, StepError, linearise};
 use nalgebra::{DVector, Vector6};
 
+use crate::caveat::pose::Standing;
 use crate::caveat::{Caveat, kinds, validity};
 use crate::error::Error;
 use crate::flexible::FlexibleRobot;
@@ -99,11 +100,20 @@ impl Posed {
     }
 
     /// Whether the models hold at an equilibrium: deflections of links, forces of drives.
-    pub(crate) fn validity(&self, linear: &Linear) -> Vec<Caveat> {
+    pub(crate) fn validity(&self, robot: &Robot, linear: &Linear) -> Vec<Caveat> {
         let links = self.flexible.spans.iter().zip(self.strains(&linear.q));
         let links = links.flat_map(|(span, (strain, rotation))| validity::link(&span.link, rotation, strain));
         let holding = linear.holding.as_slice();
-        links.chain(validity::efforts(&kinds::HOLDING, self.arm.model.coordinates(), holding)).collect()
+        let efforts = validity::efforts(&kinds::HOLDING, self.arm.model.coordinates(), holding);
+        links.chain(efforts).chain(self.standing(robot, linear)).collect()
+    }
+
+    /// What the arm does at rest.
+    pub(crate) fn standing(&self, robot: &Robot, linear: &Linear) -> Vec<Caveat> {
+        let moved = linear.X_WT.translation.vector - self.rigid_tool().translation.vector;
+        let elastic = &linear.q.as_slice()[self.arm.model.n_actuated()..];
+        let (flexible, arm) = (&self.flexible, &self.arm);
+        Standing { robot, flexible, arm, elastic, sag_m: moved.norm() }.caveats()
     }
 
     /// Joints at the pose, elastic coordinates zero.

@@ -2,7 +2,8 @@
 
 use flexarm_stepping::{FlexibleArm, Load, StepError, Stepper, StepperKind, new_stepper};
 
-use crate::caveat::Caveat;
+use crate::caveat::size::Size;
+use crate::caveat::{self, Caveat, kinds};
 use crate::compare::tool_frame;
 use crate::disturbance::{Disturbances, EXPRESSION_PERIOD};
 use crate::error::Error;
@@ -30,7 +31,10 @@ impl Checked {
 /// Everything about the input of a run that can be told before the first step.
 pub(crate) fn checked(robot: &Robot, motion: &Motion, options: &RunOptions) -> Result<Checked, Error> {
     if !motion.violations.is_empty() && !options.ignore_limits {
-        let violations = motion.violations.iter().map(ToString::to_string).collect();
+        let mut violations: Vec<String> = motion.violations.iter().map(ToString::to_string).collect();
+        if let Some(first) = violations.first_mut().filter(|_| !motion.likely.is_empty()) {
+            *first += &format!(" ({})", motion.likely);
+        }
         return Err(Error::Limits { path: motion.path.clone(), violations });
     }
     check_options(motion, options)?;
@@ -41,11 +45,16 @@ pub(crate) fn checked(robot: &Robot, motion: &Motion, options: &RunOptions) -> R
     if let Some(path) = &options.loads {
         let disturbances = Disturbances::load(path, robot, &arm.model, motion.trajectory.duration())?;
         load_caveats = disturbances.caveats;
+        let duration = motion.trajectory.duration();
+        load_caveats.extend(caveat::motion::of_loads(&disturbances.loads, duration, &Size::of(&robot.rigid)));
         if !matches!(options.stepper, StepperKind::Reference(_)) {
             load_caveats.extend(short_loads(&disturbances.loads, options.step_s));
         }
         arm.inertia_changes = disturbances.changes;
         arm = arm.with_timed_loads(disturbances.loads).map_err(failed)?;
+    }
+    if options.log_rate_hz * options.step_s > 1.0 + 1e-9 && options.log_rate_hz != RunOptions::default().log_rate_hz {
+        load_caveats.push(kinds::LOG_RATE.found("run", options.log_rate_hz, 1.0 / options.step_s));
     }
     let stepper = new_stepper(options.stepper, arm.clone(), options.step_s, options.start).map_err(failed)?;
     Ok(Checked { flexible, arm, stepper, load_caveats })

@@ -229,6 +229,7 @@ pub fn response(
         }
     }
     let mut caveats = posed.caveats.clone();
+    caveats.extend(posed.standing(robot, &linear));
     let within = |k: &usize| damping_ratio[*k] < UNDAMPED && (from..=to).contains(&frequencies_hz[*k]);
     if let Some(k) = (0..modes.len()).find(within) {
         let hz = frequencies_hz[k];

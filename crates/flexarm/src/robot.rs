@@ -8,7 +8,7 @@ use flexarm_urdf::{ReadOptions, UrdfRobot, default_tcp, read_urdf};
 use nalgebra::{Matrix3, Rotation3, Translation3, Vector3};
 use toml::Spanned;
 
-use crate::caveat::Caveat;
+use crate::caveat::{self, Caveat};
 use crate::drive_entry::{Drive, drives};
 use crate::error::Error;
 use crate::flexible::RobotLink;
@@ -53,6 +53,8 @@ pub struct Robot {
     pub default_trajectory: Option<PathBuf>,
     /// Things worth telling.
     pub warnings: Vec<String>,
+    /// What only the text of the file shows.
+    written: Vec<Caveat>,
 }
 
 impl Robot {
@@ -92,6 +94,7 @@ impl Robot {
             tcp: (link, Pose::identity()),
             default_trajectory: None,
             warnings: Vec::new(),
+            written: Vec::new(),
         };
         robot.finish(None)?;
         Ok(robot)
@@ -141,6 +144,7 @@ impl Robot {
             tcp: tcp.unwrap_or_default(),
             default_trajectory: file.default_trajectory.as_ref().map(|t| folder.join(t.get_ref())),
             warnings: Vec::new(),
+            written: written_caveats(&file),
         };
         if let Some(payload) = &file.payload {
             let link = file.tcp.as_ref().map(|t| t.get_ref().link.get_ref().as_str());
@@ -210,10 +214,15 @@ impl Robot {
             return Err(source.error(span, unknown_link("payload", &link, &self.rigid)).into());
         }
         let mass = *payload.mass.get_ref();
-        if !(mass.is_finite() && mass > 0.0) {
-            let message =
-                format!("payload mass is {mass} kg, it must be positive; leave the payload out if there is none");
+        if !(mass.is_finite() && mass >= 0.0) {
+            let message = format!("payload mass is {mass} kg, it must be 0 or positive");
             return Err(source.error(payload.mass.span(), message).into());
+        }
+        if mass == 0.0 {
+            let help = "leave the payload out if there is none";
+            let none = Caveat::said("no-payload", "the payload", "the payload has 0 kg: it counts as none", help);
+            self.written.push(none.as_note());
+            return Ok(());
         }
         let [xx, yy, zz, xy, xz, yz] = payload.inertia;
         let inertia_com = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
@@ -235,7 +244,14 @@ impl Robot {
         let of_urdf = |text: &&String| self.urdf.warnings_only().any(|w| **text == told(w));
         let own = self.warnings.iter().filter(|text| !of_urdf(text));
         let own = own.map(|text| Caveat::said("flexible-link", &file, text, "compare both sources"));
-        own.chain(self.urdf.warnings_only().map(|w| Caveat::said(w.code, &w.location, told(w), &w.help))).collect()
+        let urdf = self.urdf.warnings_only().map(|w| Caveat::said(w.code, &w.location, told(w), &w.help));
+        let mut caveats: Vec<Caveat> = own.chain(urdf).chain(self.written.iter().cloned()).collect();
+        caveats.extend(caveat::parts::of_robot(self));
+        caveats.extend(self.flexible.iter().flat_map(caveat::links::of_link));
+        if let Ok(rigid) = self.rigid_model() {
+            caveats.extend(caveat::drives::of_drives(&self.drives, &self.rigid, &rigid));
+        }
+        caveats
     }
 
     /// The rigid robot's tree.
@@ -245,6 +261,24 @@ impl Robot {
     pub fn rigid_model(&self) -> Result<Arc<Model>, Error> {
         Model::new(&self.rigid).map(Arc::new).map_err(|source| Error::Model { path: self.urdf_path.clone(), source })
     }
+}
+
+/// Angles as they were written, and materials that nothing uses: only the text of the file shows them.
+fn written_caveats(file: &RobotFile) -> Vec<Caveat> {
+    let rpy = file.tcp.as_ref().and_then(|tcp| caveat::parts::angles("rpy of the TCP", &tcp.get_ref().rpy));
+    let beams = file.flexible_link.iter().filter_map(|link| {
+        let roll = link.beam.as_ref()?.get_ref().roll;
+        caveat::parts::angles(&format!("roll of link {:?}", link.link.get_ref()), &[roll])
+    });
+    let unused = file.flexible_link.iter().filter(|link| {
+        link.beam.as_ref().is_some_and(|beam| beam.get_ref().section == "given" && beam.get_ref().material.is_some())
+    });
+    let unused = unused.map(|link| {
+        let name = link.link.get_ref();
+        let message = format!("the material of link {name:?} has no effect: its section is given by its stiffness");
+        Caveat::said("no-effect", format!("link {name:?}"), message, "leave it out").as_note()
+    });
+    rpy.into_iter().chain(beams).chain(unused).collect()
 }
 
 /// A finding with its place, as a sentence.

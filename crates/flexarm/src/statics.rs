@@ -126,7 +126,7 @@ pub fn statics(robot: &Robot, modelling: &Modelling, at: Option<&str>, wrench: [
             deflection: deflection.as_slice().to_vec(),
         });
     }
-    caveats.extend(posed.validity(&loaded));
+    caveats.extend(posed.validity(robot, &loaded));
     let [x, y, z, rx, ry, rz] = displacement;
     let [sx, sy, sz, srx, sry, srz] = sag;
     Ok(Statics {

@@ -6,7 +6,13 @@
 //!
 //! Not here: what makes a model impossible. That is an [`crate::Error`].
 
+pub(crate) mod drives;
 pub mod kinds;
+pub(crate) mod links;
+pub(crate) mod motion;
+pub(crate) mod parts;
+pub(crate) mod pose;
+pub(crate) mod size;
 pub mod slip;
 pub(crate) mod validity;
 

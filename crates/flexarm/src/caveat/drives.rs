@@ -1,0 +1,193 @@
+//! Drives of a robot file: gear stiffness against effort limit, play, ratio, rotor, friction, gains.
+
+use std::ops::RangeInclusive;
+
+use flexarm_flexlink::GearStiffness;
+use flexarm_kinematics::{JointKind, Mechanism, Model};
+
+use super::links::CREEP;
+use super::size::Loads;
+use super::slip::{self, slip};
+use super::{Caveat, kinds};
+use crate::drive_entry::{Drive, DriveKind};
+
+/// Drives above this (N m) are geared stiffly; springs are put into weaker ones on purpose.
+const STRONG: f64 = 150.0;
+/// Rotation of a strong gear under its effort limit (rad): note, warning. Reducers have 1e-3 at rated torque, 5e-3 at peak.
+const TURNED: [f64; 2] = [0.01, 0.08];
+/// The same of weak drives, springs in series included.
+const TURNED_WEAK: [f64; 2] = [0.3, 3.0];
+/// A note this many times beyond its yardstick names the slip too.
+const HINTED: f64 = 3.0;
+/// The same of gears that are too stiff: note, warning.
+const RIGID: [f64; 2] = [1e-4, 1e-5];
+/// Elastic rotation of gears under weight: note, warning; strong drives, weak ones (rad).
+const SAGS: [[f64; 2]; 2] = [[0.01, 0.05], [0.05, 0.15]];
+/// Elastic translation of a gear's bearings (m).
+const BEARING: f64 = 5e-3;
+/// Translational stiffness over rotational stiffness gives the lever of a bearing (m).
+const LEVER: RangeInclusive<f64> = 1e-3..=1.0;
+/// Play to each side: note, warning (rad).
+const PLAY: [f64; 2] = [0.01, 0.05];
+/// Turns of the motor per turn of the joint.
+const RATIO: RangeInclusive<f64> = 1.0..=5000.0;
+/// Inertia of a rotor over the largest inertia that a joint moves.
+const ROTOR: f64 = 10.0;
+/// Time between samples of a servo (s).
+const SAMPLE: RangeInclusive<f64> = 1e-6..=0.05;
+/// Position loops are slower than this (1/s).
+const POSITION_GAIN: f64 = 1000.0;
+/// Velocity gain times sampling time over the inertia felt at once: a sampled speed loop is stable below it.
+const STABLE: f64 = 2.0;
+
+/// All of them about the drives as they are written.
+pub(crate) fn of_drives(drives: &[Drive], mechanism: &Mechanism, rigid: &Model) -> Vec<Caveat> {
+    let mut caveats = Vec::new();
+    let heaviest = Loads::of(rigid).inertia.into_iter().zip(rigid.coordinates());
+    let armature = |joint: &str| drives.iter().find(|d| d.joint == joint).map_or(0.0, |d| d.armature);
+    let heaviest = heaviest.map(|(inertia, c)| inertia - armature(&c.joint)).fold(0.0, f64::max);
+    for drive in drives {
+        let joint = mechanism.joints.iter().find(|j| j.name == drive.joint);
+        let slides = joint.is_some_and(|j| matches!(j.kind, JointKind::Prismatic(_)));
+        let effort = joint.map_or(f64::INFINITY, |j| j.limits.effort);
+        let speed = joint.map_or(f64::INFINITY, |j| j.limits.velocity);
+        caveats.extend(motor(drive, heaviest));
+        caveats.extend(friction(drive, effort, speed));
+        caveats.extend(servo(drive));
+        if !slides && drive.kind != DriveKind::Prescribed {
+            caveats.extend(gear(drive, effort));
+        }
+    }
+    caveats
+}
+
+fn name(drive: &Drive) -> String {
+    format!("joint {:?}", drive.joint)
+}
+
+/// Stiffness about the axis (N m/rad), and along translations (N/m) where there are some.
+fn stiffness(drive: &Drive) -> Option<(f64, Option<f64>)> {
+    match &drive.gearbox.as_ref()?.0.stiffness {
+        GearStiffness::Axis(k) => Some((*k, None)),
+        GearStiffness::Tilting(k) => Some((k.iter().copied().fold(f64::INFINITY, f64::min), None)),
+        GearStiffness::Full(K) => {
+            let least = |r: std::ops::Range<usize>| r.map(|i| K[(i, i)]).fold(f64::INFINITY, f64::min);
+            Some((least(3..6), Some(least(0..3))))
+        }
+    }
+}
+
+/// Stiffness, damping and play of a gearbox.
+fn gear(drive: &Drive, effort: f64) -> Vec<Caveat> {
+    let (Some((k, along)), Some((_, gear))) = (stiffness(drive), &drive.gearbox) else { return Vec::new() };
+    let mut caveats = Vec::new();
+    let turned = effort / k;
+    let [unusual, wrong] = if effort > STRONG { TURNED } else { TURNED_WEAK };
+    let sound = RIGID[0]..=unusual;
+    let factors: Vec<slip::Factor> = slip::TURNING.iter().map(|(f, words)| (1.0 / f, *words)).collect();
+    let likely = || slip(turned, &sound, &factors, 1.0);
+    if effort.is_finite() && turned > unusual {
+        let hinted = turned > wrong || (effort > STRONG && turned > HINTED * unusual);
+        let caveat = kinds::GEAR_SOFT.found(name(drive), turned, unusual);
+        let caveat = if hinted { caveat.likely(likely()) } else { caveat };
+        caveats.push(if turned > wrong { caveat } else { caveat.as_note() });
+    } else if effort.is_finite() && turned < RIGID[0] {
+        let caveat = kinds::GEAR_STIFF.found(name(drive), turned, RIGID[0]).likely(likely());
+        caveats.push(if turned < RIGID[1] { caveat } else { caveat.as_note() });
+    }
+    if let Some(along) = along {
+        let lever = (k / along).sqrt();
+        let end = if lever < *LEVER.start() { *LEVER.start() } else { *LEVER.end() };
+        let caveat = kinds::LEVER.found(name(drive), lever, end);
+        let factors = &[(1e3, "translations in kN/m or N/mm"), (1.0 / 57.3, "rotations per degree")];
+        caveats.extend((!LEVER.contains(&lever)).then(|| caveat.likely(slip(lever, &LEVER, factors, 0.5))));
+    }
+    let relaxation = gear.dampers.iter().flatten().map(|d| d / k).fold(0.0, f64::max);
+    if gear.dampers.as_ref().is_some_and(|d| d.len() == 1) && relaxation > CREEP {
+        caveats.push(kinds::CREEP.found(name(drive), relaxation, CREEP));
+    }
+    if drive.backlash > PLAY[0] {
+        let likely = slip(drive.backlash, &(0.0..=PLAY[0]), slip::ANGLE, 1.0);
+        let caveat = kinds::BACKLASH.found(name(drive), drive.backlash, PLAY[0]).likely(likely);
+        caveats.push(if drive.backlash > PLAY[1] { caveat } else { caveat.as_note() });
+    }
+    caveats
+}
+
+/// Ratio and rotor.
+fn motor(drive: &Drive, heaviest: f64) -> Vec<Caveat> {
+    let mut caveats = Vec::new();
+    let ratio = drive.ratio.abs();
+    if !RATIO.contains(&ratio) {
+        let end = if ratio < 1.0 { *RATIO.start() } else { *RATIO.end() };
+        let inverted = if ratio < 1.0 && RATIO.contains(&(1.0 / ratio)) {
+            "turns of the joint per turn of the motor?"
+        } else {
+            ""
+        };
+        caveats.push(kinds::RATIO.found(name(drive), ratio, end).likely(inverted));
+    }
+    if heaviest > 0.0 && drive.armature > ROTOR * heaviest {
+        let caveat = kinds::ROTOR.found(name(drive), drive.armature, heaviest);
+        caveats.push(caveat.likely(slip(drive.armature, &(0.0..=heaviest), slip::INERTIA, 1.0)));
+    }
+    caveats
+}
+
+/// Friction that eats up the drive.
+fn friction(drive: &Drive, effort: f64, speed: f64) -> Option<Caveat> {
+    let f = &drive.friction;
+    let viscous = if speed.is_finite() { f.viscous * speed } else { 0.0 };
+    let torque = (f.coulomb + f.stribeck).max(viscous);
+    let over = effort.is_finite() && torque > effort;
+    over.then(|| {
+        kinds::FRICTION.found(name(drive), torque, effort).likely(slip(
+            torque,
+            &(0.0..=0.3 * effort),
+            slip::EFFORT,
+            1.0,
+        ))
+    })
+}
+
+/// Sampling and position gain of a servo.
+fn servo(drive: &Drive) -> Vec<Caveat> {
+    let mut caveats = Vec::new();
+    if drive.kind != DriveKind::Torque {
+        return caveats;
+    }
+    if let Some(sample) = drive.servo.sample_s.filter(|s| !SAMPLE.contains(s)) {
+        let end = if sample < *SAMPLE.start() { *SAMPLE.start() } else { *SAMPLE.end() };
+        let likely = slip(sample, &(1e-5..=0.02), &[(1e3, "milliseconds")], 1.0);
+        caveats.push(kinds::SAMPLE.found(name(drive), sample, end).likely(likely));
+    }
+    if let Some(gain) = drive.servo.position_gain.filter(|g| *g > POSITION_GAIN) {
+        caveats.push(kinds::POSITION_GAIN.found(name(drive), gain, POSITION_GAIN));
+    }
+    caveats
+}
+
+/// A velocity gain that the sampled loop does not bear: `inertia` is what the motor feels at once (kg m²).
+pub(crate) fn speed_loop(joint: &str, gain: f64, sample_s: f64, inertia: f64) -> Option<Caveat> {
+    let most = STABLE * inertia / sample_s;
+    (inertia > 0.0 && gain > most).then(|| kinds::VELOCITY_GAIN.found(format!("joint {joint:?}"), gain, most))
+}
+
+/// How far the spring of a drive has turned (rad) or moved (m): under weight, or in motion (`times` 2).
+pub(crate) fn give(drive: &Drive, effort: f64, rotation: f64, translation: f64, times: f64) -> Vec<Caveat> {
+    let [unusual, wrong] = SAGS[usize::from(effort <= STRONG)].map(|limit| times * limit);
+    let mut caveats = Vec::new();
+    // What weak drives do in motion is what they are made for.
+    let judged = effort > STRONG || times <= 1.0;
+    if judged && rotation > unusual {
+        let caveat = kinds::GEAR_ROTATION.found(name(drive), rotation, unusual);
+        let likely =
+            slip(rotation, &(1e-5..=unusual), &[(57.3, "stiffness in N m/deg"), (1e3, "stiffness in kN m/rad")], 1.0);
+        caveats.push(if rotation > wrong { caveat.likely(likely) } else { caveat.as_note() });
+    }
+    if translation > times * BEARING {
+        let likely = slip(translation, &(1e-7..=BEARING), &[(1e3, "stiffness in kN/m or N/mm")], 1.0);
+        caveats.push(kinds::BEARING.found(name(drive), translation, times * BEARING).likely(likely));
+    }
+    caveats
+}

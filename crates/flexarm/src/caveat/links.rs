@@ -1,0 +1,111 @@
+//! Beams and damping of a robot file: material, section against length, mass against the section's.
+
+use std::ops::RangeInclusive;
+
+use flexarm_fem::{BeamLink, Material, Section};
+use flexarm_stepping::Damping;
+
+use super::slip::{self, slip};
+use super::{Caveat, CaveatKind, kinds};
+use crate::flexible::RobotLink;
+
+/// Young's modulus from polymers to diamond (Pa).
+const YOUNG: RangeInclusive<f64> = 1e8..=1.3e12;
+/// Density from foam to osmium (kg/m³).
+const RHO: RangeInclusive<f64> = 20.0..=22_600.0;
+/// Poisson's ratio of what robots are made of; rubber has almost 0.5, foams that get thicker when pulled have less than 0.
+const NU: RangeInclusive<f64> = 0.0..=0.495;
+/// A section is at most this many times as thick as the beam is long.
+const THICK: f64 = 3.0;
+/// Radius of gyration of a section over the length of the beam: thinner are wires, thicker no beams.
+const SLENDER: RangeInclusive<f64> = 5e-4..=1.0;
+/// Torsional over bending stiffness.
+const TORSION: RangeInclusive<f64> = 1e-3..=1e3;
+/// Mass of the link over that of its section.
+const MASS: RangeInclusive<f64> = 0.02..=50.0;
+/// Damping ratios of joined structures are at most this.
+const RATIO: f64 = 0.2;
+/// `D = beta K` with a larger beta creeps (s).
+pub(crate) const CREEP: f64 = 0.05;
+
+/// All of them about a link.
+pub(crate) fn of_link(link: &RobotLink) -> Vec<Caveat> {
+    let name = format!("link {:?}", link.flexible.link);
+    let mut caveats: Vec<Caveat> = damping(&name, &link.damping).into_iter().collect();
+    if let Some(beam) = &link.beam {
+        if !matches!(beam.section, Section::Given(_)) {
+            caveats.extend(material(&name, &beam.material));
+        }
+        caveats.extend(section(&name, beam));
+    }
+    caveats
+}
+
+/// Elastic constants and density.
+fn material(name: &str, material: &Material) -> impl Iterator<Item = Caveat> {
+    let young = outside(&kinds::MODULUS, name, material.E, &YOUNG, slip::MODULUS);
+    let rho = outside(&kinds::MATERIAL_DENSITY, name, material.rho, &RHO, slip::DENSITY);
+    let nu = outside(&kinds::POISSON, name, material.nu, &NU, &[(100.0, "per cent")]);
+    young.into_iter().chain(rho).chain(nu)
+}
+
+/// A value outside its range, against the nearer end of it.
+fn outside(
+    kind: &CaveatKind,
+    name: &str,
+    value: f64,
+    range: &RangeInclusive<f64>,
+    factors: &[slip::Factor],
+) -> Option<Caveat> {
+    let end = if value < *range.start() { *range.start() } else { *range.end() };
+    (!range.contains(&value)).then(|| kind.found(name, value, end).likely(slip(value, range, factors, 1.0)))
+}
+
+/// Section against the length of the beam, and its mass against the link's.
+fn section(name: &str, beam: &BeamLink) -> Vec<Caveat> {
+    let mut caveats = Vec::new();
+    let length = beam.length;
+    let thick = match beam.section {
+        Section::Box { width, height, .. } | Section::Rectangle { width, height } => width.max(height),
+        Section::Tube { outer_diameter: d, .. } | Section::Circle { diameter: d } => d,
+        Section::Given(_) => 0.0,
+    };
+    if thick > THICK * length {
+        let likely = slip(thick, &(0.0..=length), slip::LENGTH, 1.0);
+        caveats.push(kinds::SECTION.found(name, thick, length).likely(likely));
+    }
+    let Ok(bar) = beam.section.bar(&beam.material) else { return caveats };
+    let bending = bar.EI_y.max(bar.EI_z);
+    if thick == 0.0 {
+        let radius = (bending / bar.EA).sqrt();
+        let factors = &[(1e6, "N mm2"), (1e-6, "EA in N beside EI in MN m2"), (1e-3, "kN m2"), (1e3, "EA in kN")];
+        let range = SLENDER.start() * length..=SLENDER.end() * length;
+        let end = if radius < *range.start() { *range.start() } else { *range.end() };
+        let caveat = kinds::SECTION_RADIUS.found(name, radius, end);
+        caveats.extend((!range.contains(&radius)).then(|| caveat.likely(slip(radius, &range, factors, 0.5))));
+        caveats.extend(outside(&kinds::TORSION, name, bar.GJ / bending, &TORSION, &[]));
+    }
+    let own = bar.mass_per_length * length;
+    if let Some(mass) = beam.mass.filter(|m| *m > 0.0 && RHO.contains(&beam.material.rho))
+        && !MASS.contains(&(mass / own))
+    {
+        let likely = slip(mass / own, &(0.1..=20.0), slip::MASS, 1.0);
+        caveats.push(kinds::BEAM_MASS.found(name, mass, own).likely(likely));
+    }
+    caveats
+}
+
+/// Damping as it is written; what it does to the first mode is looked at where the arm stands.
+fn damping(name: &str, damping: &Damping) -> Option<Caveat> {
+    match damping {
+        Damping::Modal(ratio) if *ratio > RATIO => {
+            let likely = slip(*ratio, &(1e-3..=0.1), &[(100.0, "per cent"), (10.0, "a digit")], 1.0);
+            Some(kinds::DAMPING_RATIO.found(name, *ratio, RATIO).likely(likely))
+        }
+        Damping::StiffnessProportional(beta) | Damping::Rayleigh(_, beta) if *beta > CREEP => {
+            let likely = slip(*beta, &(0.0..=CREEP), &[(1e3, "milliseconds")], 1.0);
+            Some(kinds::CREEP.found(name, *beta, CREEP).likely(likely))
+        }
+        _ => None,
+    }
+}

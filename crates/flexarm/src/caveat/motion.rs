@@ -1,0 +1,101 @@
+//! A motion against the robot that is to follow it, and loads against the robot that is to bear them.
+
+use flexarm_kinematics::{Data, Model, State, inverse_dynamics};
+use flexarm_stepping::Load;
+use flexarm_trajectory::{LimitKind, LimitViolation, Trajectory};
+use nalgebra::DVector;
+
+use super::size::Size;
+use super::slip::{self, DEGREES, slip};
+use super::{Caveat, kinds};
+
+/// Times at which a motion and its loads are looked at.
+const TIMES: usize = 200;
+/// Torque of the rigid robot over the effort limit: above it the motion is not for this robot.
+const HASTE: f64 = 10.0;
+/// Part of the speed limit that a motion in s uses.
+const SLOW: f64 = 2e-3;
+/// Largest travel that is worth a motion (rad).
+const SMALL: f64 = 0.02;
+/// Force over the weight of the arm, moment over its weight at full length: note, warning.
+const HEAVY: [f64; 2] = [2.0, 10.0];
+/// (m/s²)
+const EARTH: f64 = 9.81;
+
+/// What the rigid robot needs and uses along a motion.
+pub(crate) fn of_motion(name: &str, trajectory: &Trajectory, model: &Model) -> Vec<Caveat> {
+    let n = model.nv();
+    let (mut data, mut state, mut a) = (Data::new(model), State::zeros(model), DVector::zeros(n));
+    let (mut torque, mut speed) = (vec![0.0f64; n], vec![0.0f64; n]);
+    let mut range = vec![[f64::INFINITY, f64::NEG_INFINITY]; n];
+    for i in 0..=TIMES {
+        let t = trajectory.duration() * i as f64 / TIMES as f64;
+        trajectory.sample(t, state.q.as_mut_slice(), state.qdot.as_mut_slice(), a.as_mut_slice());
+        inverse_dynamics(model, &mut data, &state, &a);
+        for k in 0..n {
+            torque[k] = torque[k].max(data.tau[k].abs());
+            speed[k] = speed[k].max(state.qdot[k].abs());
+            range[k] = [range[k][0].min(state.q[k]), range[k][1].max(state.q[k])];
+        }
+    }
+    let mut caveats = Vec::new();
+    for (c, torque) in model.coordinates().iter().zip(&torque) {
+        if *torque > c.limits.effort {
+            let caveat = kinds::MOTION_EFFORT.found(format!("joint {:?}", c.joint), *torque, c.limits.effort);
+            caveats.push(if *torque > HASTE * c.limits.effort { caveat } else { caveat.as_note() });
+        }
+    }
+    let used = model.coordinates().iter().zip(&speed).filter(|(c, _)| c.limits.velocity.is_finite());
+    let used = used.map(|(c, v)| v / c.limits.velocity).fold(0.0, f64::max);
+    let turns = model.coordinates().iter().zip(&range).filter(|(c, _)| c.kind != "prismatic");
+    let travel = turns.map(|(_, [low, high])| high - low).fold(0.0, f64::max);
+    let still = range.iter().all(|[low, high]| high == low);
+    if !still && used > 0.0 && used < SLOW {
+        let likely = slip(SLOW / used, &(0.002..=1.0), &[(1e3, "milliseconds")], 1.0);
+        caveats.push(kinds::SLOW_MOTION.found(name, used, SLOW).likely(likely));
+    }
+    if travel > 0.0 && travel < SMALL {
+        let caveat = kinds::SMALL_MOTION.found(name, travel, SMALL);
+        let likely = slip(travel, &(SMALL..=7.0), &[(1.0 / DEGREES, "radians in a file in degrees")], 1.0);
+        caveats.push(caveat.likely(likely));
+    }
+    caveats
+}
+
+/// Whether angles beyond their limits would lie within them if they were degrees.
+pub(crate) fn degrees(violations: &[LimitViolation], model: &Model) -> &'static str {
+    let beyond = violations.iter().filter(|v| matches!(v.kind, LimitKind::Lower | LimitKind::Upper));
+    let mends = |v: &LimitViolation| {
+        let joint = model.coordinates().iter().find(|c| c.joint == v.joint);
+        let value = v.value / DEGREES;
+        v.value.abs() > std::f64::consts::TAU
+            && joint.is_some_and(|c| c.kind != "prismatic" && (c.limits.lower..=c.limits.upper).contains(&value))
+    };
+    let (mut any, mut all) = (false, true);
+    beyond.for_each(|v| (any, all) = (true, all && mends(v)));
+    if any && all { "about 57 times: degrees?" } else { "" }
+}
+
+/// Largest force and moment of the loads of a run, against weight and size of the arm with its payload.
+pub(crate) fn of_loads(loads: &[Load], duration: f64, size: &Size) -> Vec<Caveat> {
+    let weight = EARTH * size.mass;
+    let mut caveats = Vec::new();
+    for load in loads {
+        let even = (0..=TIMES).map(|i| duration * i as f64 / TIMES as f64);
+        let (mut force, mut moment) = (0.0f64, 0.0f64);
+        for t in even.chain(load.jumps.iter().copied()) {
+            let wrench = (load.wrench)(t);
+            force = force.max(wrench.force.norm());
+            moment = moment.max(wrench.torque.norm());
+        }
+        let judged = |kind: &super::CaveatKind, what: &str, value: f64, yardstick: f64| {
+            let caveat = kind.found(what, value, yardstick);
+            let likely = slip(value, &(0.0..=HEAVY[0] * yardstick), slip::EFFORT, 1.0);
+            let caveat = if value > HEAVY[1] * yardstick { caveat.likely(likely) } else { caveat.as_note() };
+            (yardstick > 0.0 && value > HEAVY[0] * yardstick).then_some(caveat)
+        };
+        caveats.extend(judged(&kinds::LOAD, "a force on the arm", force, weight));
+        caveats.extend(judged(&kinds::MOMENT, "a moment on the arm", moment, weight * size.extent));
+    }
+    caveats
+}

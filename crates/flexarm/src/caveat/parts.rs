@@ -1,0 +1,216 @@
+//! What the files say of tool, payload, gravity, masses and limits, against the size of the robot itself.
+
+use flexarm_kinematics::{Joint, JointKind, Link, LinkInertia, Mechanism, Model};
+use nalgebra::Vector3;
+
+use super::size::{Loads, Size, gyration, least_density};
+use super::slip::{self, slip};
+use super::{Caveat, kinds};
+use crate::robot::{PAYLOAD_LINK, Robot};
+
+/// A tool or payload this many times the robot's size away, and this far at least (m), is not held by it.
+const FAR: (f64, f64) = (3.0, 2.0);
+/// Arms longer than this have not been built (m): concrete pumps reach 70 m.
+const LONGEST: f64 = 100.0;
+/// A joint this many times farther from its parent than all others of the chain together.
+const ODD_DISTANCE: f64 = 20.0;
+/// Density of osmium (kg/m³): nothing is heavier.
+const OSMIUM: f64 = 22_600.0;
+/// Largest angle that anyone writes into a file in rad: a turn.
+const TURN: f64 = std::f64::consts::TAU;
+/// Payload over mass of the robot: heavier than that is not lifted, unusual.
+const PAYLOAD_SHARE: (f64, f64) = (10.0, 3.0);
+/// The same in orbit: the arm of the space shuttle moved 70 times its mass.
+const WEIGHTLESS: f64 = 30.0;
+/// Payloads above this are no points (kg).
+const POINT_MASS: f64 = 10.0;
+/// Joints faster than this (rad/s), with tips faster than that (m/s), are in degrees per second.
+const FAST: (f64, f64) = (30.0, 100.0);
+/// Effort limits are this many times the largest torque of weight at most.
+const STRONG: f64 = 300.0;
+/// Effort limits accelerate the tip by at most so much (m/s²).
+const TIP_ACCELERATION: f64 = 5e4;
+/// Weight on moon, Mars and earth (m/s²) and how far a file may be from it.
+const GRAVITIES: [(f64, &str); 3] = [(1.62, "on the moon"), (3.71, "on Mars"), (9.81, "")];
+
+/// All of them about a loaded robot.
+pub(crate) fn of_robot(robot: &Robot) -> Vec<Caveat> {
+    let mechanism = &robot.urdf.mechanism;
+    let size = Size::of(mechanism);
+    let mut caveats: Vec<Caveat> = distances(mechanism, &size).collect();
+    caveats.extend(bodies(mechanism, &size));
+    caveats.extend(gravity(&robot.rigid.gravity));
+    let tool = robot.tcp.1.translation.vector.norm();
+    caveats.extend(far("the TCP", tool, &size));
+    let joint = robot.rigid.joints.iter().find(|j| j.child == PAYLOAD_LINK);
+    if let (Some(joint), Some(inertia)) = (joint, robot.rigid.link(PAYLOAD_LINK).and_then(|l| l.inertia)) {
+        let carried = LinkInertia { com: joint.X_PJ.translation.vector, ..inertia };
+        let weighs = robot.rigid.gravity.norm() > 0.0;
+        caveats.extend(payload("the payload", &carried, &size, weighs));
+    }
+    caveats.extend(joint_limits(mechanism, &size));
+    if let Ok(model) = robot.rigid_model() {
+        caveats.extend(strong_drives(&model, &size));
+    }
+    caveats
+}
+
+/// Angles of a file that are more than a turn (rad).
+pub(crate) fn angles(of: &str, values: &[f64]) -> Option<Caveat> {
+    let largest = values.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+    let caveat = kinds::ANGLE.found(of, largest, TURN);
+    (largest > TURN + 1e-9).then(|| caveat.likely(slip(largest, &(0.0..=TURN), slip::ANGLE, 1.0)))
+}
+
+/// Something that sits farther from its link than the robot is large.
+fn far(what: &str, distance: f64, size: &Size) -> Option<Caveat> {
+    let limit = (FAR.0 * size.extent).max(FAR.1);
+    let caveat = kinds::FAR.found(what, distance, size.extent);
+    (distance > limit).then(|| caveat.likely(slip(distance, &(0.0..=limit), slip::LENGTH, 1.0)))
+}
+
+/// Joints farther apart than any arm is long, or than the rest of this arm allows.
+fn distances<'a>(mechanism: &'a Mechanism, size: &'a Size) -> impl Iterator<Item = Caveat> + 'a {
+    let length = |j: &Joint| j.X_PJ.translation.vector.norm();
+    let all: f64 = mechanism.joints.iter().map(length).sum();
+    let odd = mechanism.joints.iter().filter_map(move |joint| {
+        let (own, others) = (length(joint), all - length(joint));
+        let sound = 0.0..=others.max(1.0);
+        let is_odd = own > LONGEST || (others > 1e-3 && own > ODD_DISTANCE * others && own > FAR.1);
+        let caveat = kinds::JOINT_DISTANCE.found(format!("joint {:?}", joint.name), own, others);
+        is_odd.then(|| caveat.likely(slip(own, &sound, slip::LENGTH, 1.0)))
+    });
+    let long = kinds::SIZE.found("the arm", size.extent, LONGEST);
+    let long = (size.extent > LONGEST).then(|| long.likely(slip(size.extent, &(0.05..=30.0), slip::LENGTH, 1.0)));
+    odd.chain(long)
+}
+
+/// Masses and inertias: radius of gyration against the arm, density against the heaviest metal.
+fn bodies(mechanism: &Mechanism, size: &Size) -> Vec<Caveat> {
+    let with_mass = || {
+        let of = |l: &Link| l.inertia.filter(|i| i.mass > 0.0).map(|i| (l.name.clone(), i));
+        mechanism.links.iter().filter_map(of)
+    };
+    let far_out = with_mass().map(|(name, i)| size.at(&name) + i.com.norm()).fold(0.0, f64::max);
+    let mut caveats = Vec::new();
+    // The worst link stands for all: a unit is wrong in a whole file.
+    let widest = with_mass().map(|(name, i)| (gyration(&i), name)).max_by(|a, b| a.0.total_cmp(&b.0));
+    let room = if far_out > 0.0 { 2.0 * far_out } else { LONGEST };
+    if let Some((radius, name)) = widest.filter(|(radius, _)| *radius > room) {
+        let caveat = kinds::INERTIA.found(format!("link {name:?}"), radius, far_out);
+        caveats.push(caveat.likely(slip(radius, &(0.0..=0.5 * room), slip::INERTIA, 0.5)));
+    }
+    let dense: Vec<_> = with_mass().filter(|(_, i)| gyration(i) > 0.0 && least_density(i) > OSMIUM).collect();
+    let share = dense.iter().map(|(_, i)| i.mass).sum::<f64>() / size.mass;
+    if let Some((name, inertia)) = dense.iter().max_by(|a, b| a.1.mass.total_cmp(&b.1.mass)) {
+        let density = least_density(inertia);
+        let caveat = kinds::DENSITY.found(format!("link {name:?}"), density, OSMIUM);
+        // A few points among bodies are a way to write what is not known.
+        let likely = slip(density, &(20.0..=OSMIUM), slip::MASS, 1.0);
+        caveats.push(if share > 0.5 { caveat.likely(likely) } else { caveat.as_note() });
+    }
+    caveats
+}
+
+/// Acceleration of gravity: on earth, elsewhere, or nowhere; upright or not.
+pub(crate) fn gravity(g: &Vector3<f64>) -> Option<Caveat> {
+    let size = g.norm();
+    let near = |(place, _): &&(f64, &str)| (size / place - 1.0).abs() < 0.03;
+    match GRAVITIES.iter().find(near) {
+        _ if size == 0.0 => Some(kinds::GRAVITY.found("gravity", 0.0, 9.81).as_note()),
+        Some((_, "")) if g.z < -0.99 * size => None,
+        Some((_, "")) => {
+            let way = if g.z > 0.99 * size { "upwards: the arm hangs from a ceiling" } else { "not along -z" };
+            let message = format!("gravity points {way}, as seen from the base");
+            Some(Caveat { value: Some(g.z), yardstick: Some(-9.81), ..tilted(message) })
+        }
+        Some((_, words)) => Some(kinds::GRAVITY.found("gravity", size, 9.81).likely(*words).as_note()),
+        None => {
+            let factors = &[(1e2, "cm/s2"), (1e3, "mm/s2"), (0.10197, "in g")];
+            Some(kinds::GRAVITY.found("gravity", size, 9.81).likely(slip(size, &(9.7..=9.9), factors, 1.0)))
+        }
+    }
+}
+
+fn tilted(message: String) -> Caveat {
+    let help = "right for a robot on a wall, a ceiling or a slope; else turn gravity over";
+    Caveat { unit: "m/s2".into(), ..Caveat::said("gravity-direction", "gravity", message, help) }.as_note()
+}
+
+/// What the tool carries; `inertia.com` in the axes of the link that carries it.
+pub(crate) fn payload(what: &str, inertia: &LinkInertia, size: &Size, weighs: bool) -> Vec<Caveat> {
+    let mut caveats: Vec<Caveat> = far(what, inertia.com.norm(), size).into_iter().collect();
+    if inertia.mass <= 0.0 {
+        return caveats;
+    }
+    let share = inertia.mass / size.mass;
+    let share = if weighs { share } else { share / WEIGHTLESS };
+    if share > PAYLOAD_SHARE.1 {
+        let caveat = kinds::PAYLOAD_MASS.found(what, inertia.mass, size.mass);
+        let likely = slip(inertia.mass, &(0.0..=2.0 * size.mass), slip::MASS, 1.0);
+        caveats.push(if share > PAYLOAD_SHARE.0 { caveat.likely(likely) } else { caveat.as_note() });
+    }
+    let mut moments: [f64; 3] = inertia.inertia_com.symmetric_eigenvalues().into();
+    moments.sort_by(f64::total_cmp);
+    let [low, middle, high] = moments;
+    if high == 0.0 {
+        let point = kinds::POINT_PAYLOAD.found(what, inertia.mass, POINT_MASS);
+        caveats.extend((inertia.mass > POINT_MASS).then_some(point));
+        return caveats;
+    }
+    if high > (low + middle) * (1.0 + 1e-6) {
+        caveats.push(kinds::TRIANGLE.found(what, high, low + middle));
+    }
+    let (radius, room) = (gyration(inertia), size.extent.max(0.2));
+    if radius > room {
+        let caveat = kinds::PAYLOAD_INERTIA.found(what, radius, size.extent);
+        caveats.push(caveat.likely(slip(radius, &(0.0..=0.5 * room), slip::INERTIA, 0.5)));
+    }
+    let density = least_density(inertia);
+    caveats.extend((density > OSMIUM).then(|| kinds::DENSITY.found(what, density, OSMIUM)));
+    caveats
+}
+
+/// Speeds and ranges that look like degrees.
+fn joint_limits(mechanism: &Mechanism, size: &Size) -> Vec<Caveat> {
+    let turning = |j: &&Joint| matches!(j.kind, JointKind::Revolute(_) | JointKind::Continuous(_));
+    let turning: Vec<_> = mechanism.joints.iter().filter(turning).collect();
+    let fast = turning.iter().filter(|j| j.limits.velocity.is_finite() && j.limits.velocity > FAST.0).map(|joint| {
+        let speed = joint.limits.velocity;
+        let caveat = kinds::SPEED_LIMIT.found(format!("joint {:?}", joint.name), speed, FAST.0);
+        let caveat = caveat.likely(slip(speed, &(0.05..=FAST.0), &slip::ANGLE[..1], 1.0));
+        if speed * size.beyond(&joint.parent) > FAST.1 { caveat } else { caveat.as_note() }
+    });
+    let ends = |j: &Joint| j.limits.lower.abs().max(j.limits.upper.abs());
+    let wide: Vec<_> = turning.iter().filter(|j| ends(j).is_finite() && ends(j) > 2.0 * TURN).collect();
+    let most = 2 * wide.len() > turning.len();
+    let ranges = wide.iter().map(|joint| {
+        let caveat = kinds::JOINT_RANGE.found(format!("joint {:?}", joint.name), ends(joint), 2.0 * TURN);
+        let caveat = caveat.likely(slip(ends(joint), &(0.0..=2.0 * TURN), &slip::ANGLE[..1], 1.0));
+        if most { caveat } else { caveat.as_note() }
+    });
+    fast.chain(ranges).collect()
+}
+
+/// Effort limits far beyond what the arm weighs and what its inertia asks for.
+fn strong_drives(model: &Model, size: &Size) -> Option<Caveat> {
+    let loads = Loads::of(model);
+    let most = loads.weight.iter().fold(0.0f64, |m, w| m.max(*w));
+    let limited = |k: &usize| model.coordinates()[*k].limits.effort.is_finite();
+    let effort = |k: usize| model.coordinates()[k].limits.effort;
+    let joints: Vec<usize> = (0..model.nv()).filter(limited).collect();
+    let least = joints.iter().filter(|k| loads.weight[**k] > 0.05 * most && most > 0.0);
+    let least = least.map(|k| (effort(*k) / loads.weight[*k], *k)).min_by(|a, b| a.0.total_cmp(&b.0));
+    let joint = |k: usize| format!("joint {:?}", model.coordinates()[k].joint);
+    if let Some((ratio, k)) = least {
+        let caveat = kinds::EFFORT_LIMIT.found(joint(k), effort(k), loads.weight[k]);
+        return (ratio > STRONG).then(|| caveat.likely(slip(ratio, &(0.5..=100.0), slip::EFFORT, 1.0)));
+    }
+    // Nothing weighs on a joint: by what it could accelerate.
+    let heaviest = joints.into_iter().max_by(|a, b| loads.inertia[*a].total_cmp(&loads.inertia[*b]))?;
+    let acceleration = effort(heaviest) / loads.inertia[heaviest] * size.extent;
+    let caveat = kinds::TIP_ACCELERATION.found(joint(heaviest), acceleration, TIP_ACCELERATION);
+    let turns = model.coordinates()[heaviest].kind != "prismatic";
+    (turns && acceleration > TIP_ACCELERATION)
+        .then(|| caveat.likely(slip(acceleration, &(0.1..=TIP_ACCELERATION), slip::EFFORT, 1.0)))
+}

@@ -1,0 +1,104 @@
+//! The arm at rest in a pose: how far it sags, how it would swing, what its gears give.
+
+use flexarm_stepping::FlexibleArm;
+
+use super::drives::{give, speed_loop};
+use super::size::Size;
+use super::{Caveat, kinds};
+use crate::flexible::{FlexibleRobot, Owner};
+use crate::robot::Robot;
+
+/// Sag of the TCP over the size of the arm: note, warning.
+const SAG: [f64; 2] = [0.03, 0.1];
+/// First frequency below which an arm with gears is unusual, any arm is wrong (Hz).
+const SLOW: [f64; 2] = [3.0, 0.02];
+/// First frequency times size: above the speed of sound in steel and aluminium nothing swings so fast (m/s).
+const SOUND: f64 = 5100.0;
+/// Damping ratio of the first mode: note, warning.
+const DAMPED: [f64; 2] = [0.2, 0.5];
+
+/// An arm at rest.
+pub(crate) struct Standing<'a> {
+    pub(crate) robot: &'a Robot,
+    pub(crate) flexible: &'a FlexibleRobot,
+    pub(crate) arm: &'a FlexibleArm,
+    /// Its elastic coordinates.
+    pub(crate) elastic: &'a [f64],
+    /// How far its TCP is from where it would be without deflections (m).
+    pub(crate) sag_m: f64,
+}
+
+impl Standing<'_> {
+    /// All of them.
+    pub(crate) fn caveats(&self) -> Vec<Caveat> {
+        let size = Size::of(&self.robot.urdf.mechanism);
+        let extent = size.extent.max(self.robot.tcp.1.translation.vector.norm());
+        let mut caveats = self.gears();
+        if extent > 0.0 && self.sag_m > SAG[0] * extent {
+            let caveat = kinds::SAG.found("the TCP", self.sag_m, extent);
+            caveats.push(if self.sag_m > SAG[1] * extent { caveat } else { caveat.as_note() });
+        }
+        caveats.extend(self.first_mode(extent));
+        caveats.extend(self.speed_loops());
+        caveats
+    }
+
+    fn gears(&self) -> Vec<Caveat> {
+        let mut caveats = Vec::new();
+        for (element, owner) in self.arm.elements.iter().zip(&self.flexible.owners) {
+            let Owner::Drive(k) = owner else { continue };
+            let drive = &self.robot.drives[*k];
+            let joint = self.robot.rigid.joints.iter().find(|j| j.name == drive.joint);
+            let effort = joint.map_or(f64::INFINITY, |j| j.limits.effort);
+            let slides = joint.is_some_and(|j| matches!(j.kind, flexarm_kinematics::JointKind::Prismatic(_)));
+            let e = &self.elastic[self.arm.offset(element)..][..element.size];
+            let norm = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
+            let (along, turned) = match (element.size, slides) {
+                (6, _) => (norm(&e[..3]), norm(&e[3..])),
+                (_, true) => (norm(e), 0.0),
+                _ => (0.0, norm(e)),
+            };
+            // Play is no deflection.
+            caveats.extend(give(drive, effort, (turned - drive.backlash).max(0.0), along, 1.0));
+        }
+        caveats
+    }
+
+    /// Frequency and damping of the first mode.
+    fn first_mode(&self, extent: f64) -> Vec<Caveat> {
+        let modes = &self.arm.modes;
+        let Some(omega) = modes.omega.first() else { return Vec::new() };
+        let hz = omega / std::f64::consts::TAU;
+        let mut caveats = Vec::new();
+        let geared = self.flexible.owners.iter().any(|owner| matches!(owner, Owner::Drive(_)));
+        if hz < SLOW[1] || (geared && hz < SLOW[0]) {
+            let caveat = kinds::SLOW_MODE.found("the arm", hz, if hz < SLOW[1] { SLOW[1] } else { SLOW[0] });
+            caveats.push(if hz < SLOW[1] { caveat } else { caveat.as_note() });
+        } else if hz * extent > SOUND {
+            caveats.push(kinds::FAST_MODE.found("the arm", hz, SOUND / extent));
+        }
+        let shape = modes.shapes.column(0);
+        let ratio = shape.dot(&(&self.arm.D * shape)) / (2.0 * omega);
+        if ratio > DAMPED[0] {
+            let caveat = kinds::DAMPED_MODE.found("the first mode", ratio, 1.0);
+            caveats.push(if ratio > DAMPED[1] { caveat } else { caveat.as_note() });
+        }
+        caveats
+    }
+
+    fn speed_loops(&self) -> Vec<Caveat> {
+        let Some(servo) = &self.arm.servo else { return Vec::new() };
+        let n = self.arm.model.n_actuated();
+        let mut q = nalgebra::DVector::zeros(n);
+        let (mut v, mut a) = (vec![0.0; n], vec![0.0; n]);
+        self.arm.motion.sample(0.0, q.as_mut_slice(), &mut v, &mut a);
+        let quick = self.flexible.quick_inertia(&q);
+        let name = |k: usize| self.arm.model.coordinates()[k].joint.as_str();
+        let loops = servo.axes.iter().zip(quick);
+        loops
+            .filter_map(|(axis, inertia)| {
+                speed_loop(name(axis.coordinate), axis.velocity_gain, servo.sample_s, inertia)
+            })
+            .collect()
+    }
+}

@@ -1,0 +1,141 @@
+//! How large and heavy a robot is: the yardsticks that it brings along itself.
+
+use std::collections::HashMap;
+
+use flexarm_kinematics::{Data, JointKind, LinkInertia, Mechanism, Model, State, gravity_forces, mass_matrix};
+use nalgebra::DVector;
+
+/// Poses at which torques of weight are looked at.
+const POSES: u32 = 32;
+
+/// Size of a robot, without its payload and tool.
+pub(crate) struct Size {
+    /// Distance from the base along the chain, per link (m).
+    distances: HashMap<String, f64>,
+    /// How far its mass reaches from the base: joint distances, mass centres and radii of gyration (m).
+    pub(crate) extent: f64,
+    /// Mass (kg).
+    pub(crate) mass: f64,
+}
+
+impl Size {
+    pub(crate) fn of(mechanism: &Mechanism) -> Self {
+        let mut distances = HashMap::new();
+        let children: Vec<&str> = mechanism.joints.iter().map(|j| j.child.as_str()).collect();
+        let base = mechanism.links.iter().find(|l| !children.contains(&l.name.as_str()));
+        let mut open: Vec<(&str, f64)> = base.map(|l| (l.name.as_str(), 0.0)).into_iter().collect();
+        while let Some((link, distance)) = open.pop() {
+            distances.insert(link.to_owned(), distance);
+            for joint in mechanism.child_joints(link) {
+                let travel = match joint.kind {
+                    JointKind::Prismatic(_) => joint.limits.lower.abs().max(joint.limits.upper.abs()),
+                    _ => 0.0,
+                };
+                let travel = if travel.is_finite() { travel } else { 0.0 };
+                open.push((&joint.child, distance + joint.X_PJ.translation.vector.norm() + travel));
+            }
+        }
+        let mut size = Self { distances, extent: 0.0, mass: 0.0 };
+        for link in &mechanism.links {
+            let own = link.inertia.filter(|i| i.mass > 0.0).map_or(0.0, |i| i.com.norm() + gyration(&i));
+            size.extent = size.extent.max(size.at(&link.name) + own);
+            size.mass += link.inertia.map_or(0.0, |i| i.mass);
+        }
+        size
+    }
+
+    /// Distance of a link from the base along the chain (m).
+    pub(crate) fn at(&self, link: &str) -> f64 {
+        self.distances.get(link).copied().unwrap_or(0.0)
+    }
+
+    /// What hangs on a link reaches at most so far from it (m).
+    pub(crate) fn beyond(&self, link: &str) -> f64 {
+        (self.extent - self.at(link)).max(0.0)
+    }
+}
+
+/// Largest radius of gyration of a body (m).
+pub(crate) fn gyration(inertia: &LinkInertia) -> f64 {
+    let largest = inertia.inertia_com.symmetric_eigenvalues().max();
+    (largest.max(0.0) / inertia.mass).sqrt()
+}
+
+/// Density that a body of this mass and inertia has at least (kg/m³): of all bodies of one volume the ball has the least
+/// moments, `tr(I) / 2 = 3/5 m R²`.
+pub(crate) fn least_density(inertia: &LinkInertia) -> f64 {
+    let squared = inertia.inertia_com.trace() / (2.0 * inertia.mass) * 5.0 / 3.0;
+    inertia.mass / (4.0 / 3.0 * std::f64::consts::PI * squared.max(0.0).powf(1.5))
+}
+
+/// What the joints of the rigid robot carry and move.
+pub(crate) struct Loads {
+    /// Largest torque of weight in poses spread over the joint ranges (N m or N).
+    pub(crate) weight: Vec<f64>,
+    /// Inertia in the middle of the ranges, rotors included (kg m² or kg).
+    pub(crate) inertia: Vec<f64>,
+}
+
+impl Loads {
+    pub(crate) fn of(model: &Model) -> Self {
+        let n = model.nv();
+        let (mut data, mut state) = (Data::new(model), State::zeros(model));
+        let mut weight = DVector::zeros(n);
+        for pose in 1..=POSES {
+            for (k, c) in model.coordinates().iter().enumerate() {
+                let range = |limit: f64, other: f64| if limit.is_finite() { limit } else { other };
+                let (low, high) = (range(c.limits.lower, -3.0), range(c.limits.upper, 3.0));
+                state.q[k] = low + (high - low) * halton(pose, k);
+            }
+            let torques = gravity_forces(model, &mut data, &state.q).abs();
+            weight = weight.sup(&torques);
+        }
+        for (q, c) in state.q.iter_mut().zip(model.coordinates()) {
+            *q = middle(c.limits.lower, c.limits.upper);
+        }
+        let M = mass_matrix(model, &mut data, &state.q);
+        Self { weight: weight.as_slice().to_vec(), inertia: M.diagonal().as_slice().to_vec() }
+    }
+}
+
+/// Middle of a joint range; of an open one what is nearest to zero.
+pub(crate) fn middle(lower: f64, upper: f64) -> f64 {
+    if lower.is_finite() && upper.is_finite() { 0.5 * (lower + upper) } else { 0.0f64.max(lower).min(upper) }
+}
+
+/// Entry of Halton's sequence in the base that belongs to a coordinate, between 0 and 1.
+fn halton(mut index: u32, coordinate: usize) -> f64 {
+    const PRIMES: [u32; 8] = [2, 3, 5, 7, 11, 13, 17, 19];
+    let base = PRIMES[coordinate % PRIMES.len()];
+    let (mut value, mut fraction) = (0.0, 1.0);
+    while index > 0 {
+        fraction /= f64::from(base);
+        value += fraction * f64::from(index % base);
+        index /= base;
+    }
+    value
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Matrix3, Vector3};
+
+    use super::*;
+
+    /// Truth: a ball of steel, and a rod of the same mass, which only looks lighter.
+    #[test]
+    fn no_body_is_lighter_than_the_ball_of_its_inertia() {
+        let (density, radius) = (7850.0, 0.1f64);
+        let mass = density * 4.0 / 3.0 * std::f64::consts::PI * radius.powi(3);
+        let ball = 0.4 * mass * radius * radius;
+        let inertia = |moments: [f64; 3]| LinkInertia {
+            mass,
+            com: Vector3::zeros(),
+            inertia_com: Matrix3::from_diagonal(&Vector3::from(moments)),
+        };
+        let found = least_density(&inertia([ball; 3]));
+        assert!((found / density - 1.0).abs() < 1e-12, "{found}");
+        let rod = mass * 1.0 / 12.0;
+        assert!(least_density(&inertia([0.01 * rod, rod, rod])) < 0.1 * density);
+    }
+}
