@@ -7,19 +7,22 @@ use nalgebra::Vector3;
 use crate::hold::{Hold, HoldMetrics};
 use crate::path_frame::{PathFrame, path_frames};
 use crate::record::{ErrorRecord, RecordError};
-use crate::spectrum::{Taper, strongest_line};
+use crate::spectrum::{Taper, strongest_line_from};
 
 /// What a user may choose about the figures.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MetricSettings {
     /// Half width of the band (radius of the ball) around the final value for settling and overshoot, m.
     pub settling_band_m: f64,
+    /// Frequency below which the arm does not ring by itself, Hz; 0 if that is not known. Where no stop is long enough to
+    /// show a line, slower ones in the whole record belong to the motion.
+    pub lowest_hz: f64,
 }
 
 impl Default for MetricSettings {
     /// A band of 0.1 mm.
     fn default() -> Self {
-        Self { settling_band_m: 1e-4 }
+        Self { settling_band_m: 1e-4, lowest_hz: 0.0 }
     }
 }
 
@@ -45,9 +48,9 @@ pub struct TcpMetrics {
     pub settling_s: Option<f64>,
     /// Largest [`HoldMetrics::overshoot_m`] of all holds, m (position overshoot OV); 0 without a hold.
     pub overshoot_m: f64,
-    /// Frequency of the strongest line in any hold after a move, Hz. Without one: the strongest line of the whole
-    /// record of `e` minus the quasi-static error (minus its mean when that is not known). `None` when nothing
-    /// oscillates.
+    /// Frequency of the strongest line in any hold after a move, Hz. Without one: the strongest line, not slower than
+    /// [`MetricSettings::lowest_hz`], of the whole record of `e` minus the quasi-static error (minus its mean when that is
+    /// not known). `None` when no line stands out.
     pub dominant_hz: Option<f64>,
     /// `max |e·t|`, m: ahead of or behind the rigid tool, along its path.
     pub tangential_peak_m: f64,
@@ -127,7 +130,7 @@ pub fn tcp_metrics_on_path(
         rms_rad: rms(record.times, &angles),
         settling_s: settling.flatten(),
         overshoot_m: holds.iter().map(|hold| hold.overshoot_m).fold(0.0, f64::max),
-        dominant_hz: dominant_hz(record, &holds),
+        dominant_hz: dominant_hz(record, &holds, settings.lowest_hz),
         tangential_peak_m,
         normal_peak_m,
         binormal_peak_m,
@@ -206,7 +209,7 @@ fn holds(record: &ErrorRecord<'_>, frames: &[PathFrame], band: f64) -> Vec<HoldM
     holds
 }
 
-fn dominant_hz(record: &ErrorRecord<'_>, holds: &[HoldMetrics]) -> Option<f64> {
+fn dominant_hz(record: &ErrorRecord<'_>, holds: &[HoldMetrics], lowest_hz: f64) -> Option<f64> {
     let lines = holds.iter().filter_map(|hold| hold.line);
     if let Some(line) = lines.max_by(|a, b| a.amplitude.total_cmp(&b.amplitude)) {
         return Some(line.hz);
@@ -214,5 +217,7 @@ fn dominant_hz(record: &ErrorRecord<'_>, holds: &[HoldMetrics]) -> Option<f64> {
     let trend = |i: usize, c: usize| record.quasi_static.map_or(0.0, |values| values[i][c]);
     let rest = record.errors.iter().enumerate();
     let rest: Vec<[f64; 3]> = rest.map(|(i, e)| std::array::from_fn(|c| e[c] - trend(i, c))).collect();
-    strongest_line(record.times, &rest, Taper::Both).map(|line| line.hz)
+    let line = |taper: Taper| strongest_line_from(record.times, &rest, taper, lowest_hz).map(|line| line.hz);
+    // What rings at the start and dies away is faded out by a taper at both ends.
+    line(Taper::Both).or_else(|| line(Taper::FadeOut))
 }

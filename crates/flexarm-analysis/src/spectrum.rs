@@ -46,6 +46,16 @@ pub struct SpectralLine {
 ///
 /// Accuracy, of an undamped sinusoid with `n` cycles in the record: about `0.2 / n²` of the frequency.
 pub fn strongest_line(times: &[f64], signal: &[[f64; 3]], taper: Taper) -> Option<SpectralLine> {
+    strongest_line_from(times, signal, taper, 0.0)
+}
+
+/// As [`strongest_line`], not below a frequency (Hz).
+pub(crate) fn strongest_line_from(
+    times: &[f64],
+    signal: &[[f64; 3]],
+    taper: Taper,
+    lowest_hz: f64,
+) -> Option<SpectralLine> {
     if times.len() < FEWEST_SAMPLES || times.len() != signal.len() {
         return None;
     }
@@ -55,7 +65,8 @@ pub fn strongest_line(times: &[f64], signal: &[[f64; 3]], taper: Taper) -> Optio
     let bin_hz = 1.0 / (bins as f64 * tapered.step);
 
     // Local maxima that have room for enough cycles, away from the Nyquist frequency.
-    let first = (FEWEST_CYCLES / (tapered.samples.len() as f64 * tapered.step * bin_hz)).ceil() as usize;
+    let few_cycles = FEWEST_CYCLES / (tapered.samples.len() as f64 * tapered.step);
+    let first = (few_cycles.max(lowest_hz) / bin_hz).ceil() as usize;
     let is_peak = |k: &usize| power[*k] >= power[k - 1] && power[*k] > power[k + 1];
     let peak = (first.max(1)..bins / 2 - 1).filter(is_peak).max_by(|&a, &b| power[a].total_cmp(&power[b]))?;
     let valley = power[1..=peak].iter().copied().fold(f64::INFINITY, f64::min);

@@ -46,12 +46,24 @@ pub struct RunHeader {
     pub bends: Vec<BendInfo>,
     /// Flexible links and drives that move the tool, in the order of [`Sample::contributions`].
     pub contributors: Vec<String>,
+    /// What is shown from which instant on, in a recording of shapes that have no size of their own, such as modes: errors and
+    /// deflections in it are drawn ones and are not told. Empty for a run.
+    pub captions: Vec<Caption>,
     /// Factor by which pictures show deflections; 0 for recordings without a magnified arm.
     pub magnification: f64,
     /// Deviation from the rigid twin that gets the last colour of the scale (m).
     pub color_scale_m: f64,
     /// Box in the world that holds all link frames at all times: lowest and highest corner (m). What to point a camera at.
     pub volume: Option<[[f64; 3]; 2]>,
+}
+
+/// The name of what is shown from an instant on.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Caption {
+    /// When (s).
+    pub from_s: f64,
+    /// In a few words.
+    pub text: String,
 }
 
 /// How a link bends: stations along the line from its near interface to its far one.

@@ -38,6 +38,9 @@ pub(crate) struct RunJson {
     has_static: bool,
     log_rate_hz: f64,
     step_s: f64,
+    /// Missing in files of older versions.
+    #[serde(default)]
+    captions: Vec<(f64, String)>,
     magnification: f64,
     color_scale_m: f64,
     volume: Option<[[f64; 3]; 2]>,
@@ -105,6 +108,7 @@ pub(crate) fn write(header: &RunHeader, meshes: bool) -> String {
         has_static: header.has_static,
         log_rate_hz: header.log_rate_hz,
         step_s: header.step_s,
+        captions: header.captions.iter().map(|caption| (caption.from_s, caption.text.clone())).collect(),
         magnification: header.magnification,
         color_scale_m: header.color_scale_m,
         volume: header.volume,
@@ -173,6 +177,7 @@ pub(crate) fn read(text: &[u8]) -> Result<(RunHeader, RunJson), String> {
         has_static: run.has_static,
         log_rate_hz: run.log_rate_hz,
         step_s: run.step_s,
+        captions: run.captions.drain(..).map(|(from_s, text)| crate::Caption { from_s, text }).collect(),
         magnification: run.magnification,
         color_scale_m: run.color_scale_m,
         volume: run.volume,

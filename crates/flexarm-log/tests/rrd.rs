@@ -10,7 +10,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use flexarm_kinematics::Pose;
-use flexarm_log::{CreateOptions, Recorder, RrdRecorder, RrdStudy, RunHeader};
+use flexarm_log::{Caption, CreateOptions, Recorder, RrdRecorder, RrdStudy, RunHeader};
 use rerun::external::re_log_encoding::DecoderApp;
 use rerun::log::{Chunk, LogMsg};
 
@@ -279,6 +279,21 @@ fn a_robot_without_meshes_is_drawn_as_lines_and_one_without_a_twin_alone() {
     assert_eq!(rows["/synthetic/flexible/skeleton"], 4);
     let twin = ["rigid", "tcp_error", "magnified"];
     assert!(!rows.keys().any(|entity| twin.iter().any(|word| entity.contains(word))), "{:?}", rows.keys());
+}
+
+/// Shapes of modes have no size: what swings is named, and no curve, mark or way tells its millimetres.
+#[test]
+fn a_recording_of_shapes_names_what_it_shows_and_has_no_curves() {
+    let caption = |from_s: f64, text: &str| Caption { from_s, text: text.into() };
+    let captions = vec![caption(0.0, "mode 1: 6.83 Hz"), caption(0.1, "mode 2: 7.76 Hz")];
+    let header = RunHeader { captions, magnification: 0.0, ..synthetic::header() };
+    let file = run("shapes.rrd", &header, 100, NEVER);
+    let rows = rows(&file);
+    assert_eq!((rows["/caption"], rows["/synthetic/caption"]), (2, 2));
+    assert!(!rows.keys().any(|entity| entity.starts_with("/plots")), "{:?}", rows.keys());
+    let fixed: Vec<_> = chunks(&file).iter().map(|chunk| chunk.entity_path().to_string()).collect();
+    assert!(!fixed.iter().any(|entity| entity.starts_with("/synthetic/path")), "{fixed:?}");
+    assert!(rows.contains_key("/synthetic/flexible/tcp"));
 }
 
 /// Names with characters that mean something in an entity path stay one part of it.

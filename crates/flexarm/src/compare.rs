@@ -39,6 +39,9 @@ use crate::twin::RigidTwin;
 /// What servos leave of the way to go, among the contributors to the TCP error.
 const FOLLOWING_ERROR: &str = "following error";
 
+/// Part of the first natural frequency at the start below which the arm does not ring anywhere on its way.
+const RINGING_FROM: f64 = 0.5;
+
 /// Coordinates times steps between two looks at the progress callback: a stop must not wait for many large steps.
 const POLL_EVERY: usize = 2000;
 /// Most steps between two looks.
@@ -455,7 +458,8 @@ impl<'a> Run<'a> {
     /// Figures of what was seen so far.
     fn summary(&self, robot: &Robot, motion: &Motion, options: &RunOptions) -> (Summary, Vec<Event>) {
         let moves: Vec<(f64, f64)> = motion.trajectory.moves().iter().map(|m| (m.start, m.end)).collect();
-        let settings = MetricSettings { settling_band_m: options.settling_band_m };
+        let first_hz = self.arm.modes.frequencies_hz().first().copied().unwrap_or(0.0);
+        let settings = MetricSettings { settling_band_m: options.settling_band_m, lowest_hz: RINGING_FROM * first_hz };
         let record = ErrorRecord {
             times: &self.times,
             errors: &self.errors,

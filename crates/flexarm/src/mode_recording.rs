@@ -2,7 +2,7 @@
 
 use flexarm_analysis::{DampedMode, tcp_error};
 use flexarm_kinematics::{Frame, forward_kinematics};
-use flexarm_log::{ElasticSample, RunResult, Sample, TwinSample};
+use flexarm_log::{Caption, ElasticSample, RunResult, Sample, TwinSample};
 use flexarm_stepping::Linear;
 use nalgebra::{DVector, Vector6};
 
@@ -79,30 +79,14 @@ pub fn record_modes(
     header.volume = Some(volume(&posed, motion));
     header.log_rate_hz = RATE_HZ;
     let swings = (movie.seconds * SHOWN_HZ).ceil();
-    let rows: Vec<(String, String)> = shown
-        .iter()
-        .enumerate()
-        .map(|(k, mode)| {
-            let start = k as f64 * swings / SHOWN_HZ;
-            (
-                format!("from {start} s"),
-                format!(
-                    "mode {}: {:.4} Hz, magnified {:.3e}",
-                    k + 1,
-                    mode.frequency_hz(),
-                    magnification(mode, &linear, motion)
-                ),
-            )
-        })
-        .collect();
-    header.description = format!(
-        "# Modes of {}\n\nEach mode swings once a second, whatever its frequency; the ghost is the rigid robot.\n\n| | |\n|---|---|\n",
-        robot.name
-    );
-    for (when, what) in &rows {
-        header.description += &format!("| {when} | {what} |\n");
-    }
-    header.metadata = vec![("flexarm.modes".into(), rows)];
+    let start = |k: usize| k as f64 * swings / SHOWN_HZ;
+    let caption = |(k, mode): (usize, &DampedMode)| Caption { from_s: start(k), text: name(k, mode) };
+    header.captions = shown.iter().enumerate().map(caption).collect();
+    header.description = list(&robot.name, shown, start);
+    let row = |(k, mode): (usize, &DampedMode)| {
+        (format!("mode {}", k + 1), format!("{:.4} Hz, from {} s", mode.frequency_hz(), start(k)))
+    };
+    header.metadata = vec![("flexarm.modes".into(), shown.iter().enumerate().map(row).collect())];
     files.set.begin(&header)?;
     let per_mode = (swings / SHOWN_HZ * RATE_HZ).round() as u64;
     let mut stage = Stage::new(robot, &posed, &linear, stations);
@@ -122,6 +106,24 @@ pub fn record_modes(
     let mut figures = table(robot, posed, &linear, &all, count)?;
     figures.files = names;
     Ok(figures)
+}
+
+/// What a mode is called while it swings.
+fn name(k: usize, mode: &DampedMode) -> String {
+    format!("mode {}: {:.2} Hz", k + 1, mode.frequency_hz())
+}
+
+/// The modes as a table of Markdown.
+fn list(robot: &str, shown: &[DampedMode], start: impl Fn(usize) -> f64) -> String {
+    let mut text = format!(
+        "# Modes of {robot}\n\nShapes have no size: each is drawn as large as can be seen and swings once a second, whatever its \
+         frequency. The ghost is the rigid robot.\n\n| mode | frequency | damping | shown from |\n| --- | --- | --- | --- |\n"
+    );
+    for (k, mode) in shown.iter().enumerate() {
+        let (hz, damping) = (mode.frequency_hz(), 100.0 * mode.damping_ratio());
+        text += &format!("| {} | {hz:.3} Hz | {damping:.2} % | {} s |\n", k + 1, start(k));
+    }
+    text
 }
 
 /// Box around all bodies and the tool, with room for the tool's motion (m).
@@ -212,5 +214,23 @@ impl<'a> Stage<'a> {
             }
         }
         sample
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use flexarm_analysis::damped_modes;
+    use nalgebra::dmatrix;
+
+    use super::*;
+
+    /// Truth: closed form, `ω = √(k/m)`, `ζ = d/(2 √(k m))`.
+    #[test]
+    fn modes_are_listed_by_frequency_and_damping_without_a_size() {
+        let found = damped_modes(&dmatrix![4.0], &dmatrix![8.0], &dmatrix![6400.0]).unwrap();
+        assert_eq!(name(0, &found[0]), "mode 1: 6.37 Hz");
+        let text = list("arm", &found, |_| 3.0);
+        assert!(text.contains("| 1 | 6.366 Hz | 2.50 % | 3 s |"), "{text}");
+        assert!(!text.contains("mm") && !text.contains("magnified"), "{text}");
     }
 }

@@ -334,6 +334,16 @@ impl TcpFigures {
         self
     }
 
+    /// Why there is no dominant frequency.
+    pub(crate) fn no_line(&self) -> &'static str {
+        /// Less than this is rounding (m).
+        const NOTHING_M: f64 = 1e-9;
+        match self.dynamic_peak_m.unwrap_or(self.peak_m) < NOTHING_M {
+            true => "nothing oscillates",
+            false => "no line stands out of the spectrum",
+        }
+    }
+
     /// With static and dynamic part.
     pub(crate) fn with_parts(self, parts: &ErrorParts) -> Self {
         Self {

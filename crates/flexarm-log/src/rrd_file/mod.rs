@@ -57,6 +57,7 @@ const CHUNK_ROWS: usize = 1024;
 /// | `/plots/joints/{position,velocity}`, `/plots/joints/effort/{flexible,rigid}` | in rad (m), rad/s (m/s), in N m (N) |
 /// | `/plots/elastic/<element>`, `/plots/elastic_load/<element>` | deflection, in **mm** and **mrad**; load, in N and N m |
 /// | `/plots/energy`, `/plots/solver` | in J; iterations and residual |
+/// | `/caption`, `/<robot>/caption` | in a recording of modes: name and frequency of the one that swings; such a recording has no curves |
 /// | `/events` | moves, largest error, settling, limits |
 /// | `/recording/run.json`, `/recording/result.json` | header and result for readers of flexarm |
 /// | `/summary`, `/urdf` | result and set-up, and the robot's description, as text |

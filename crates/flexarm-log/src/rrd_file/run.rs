@@ -1,7 +1,7 @@
 //! One run in a recording: its robots, ways of the tool, curves and events.
 
 use rerun::log::Chunk;
-use rerun::{Color, EntityPath, Points3D, Scalars, SeriesPoints, TextLog, TimePoint, Timeline};
+use rerun::{Color, EntityPath, Points3D, Scalars, SeriesPoints, TextDocument, TextLog, TimePoint, Timeline};
 
 use super::colors::{BLUE, ColorScale, LIGHT, ORANGE, RUNS};
 use super::curves::{Curves, size};
@@ -63,6 +63,8 @@ pub(crate) struct RunTracks {
     /// Of every run that is alone or the first of its study.
     curves: Option<Curves>,
     study_curves: Option<Curves>,
+    /// What is shown has no size: nothing is told about errors.
+    shapes: bool,
     last_pose_ns: Option<i64>,
     /// The last sample and its instant, if it has not been drawn.
     undrawn: Option<Instant>,
@@ -143,7 +145,8 @@ impl RunTracks {
             fixed.push(arrow.style(ids, seat.color().unwrap_or(Color::from_u32(LIGHT)))?);
         }
         let plots = path(["plots"]);
-        let curves = first.then(|| Curves::new(header, &plots));
+        let shapes = !header.captions.is_empty();
+        let curves = (first && !shapes).then(|| Curves::new(header, &plots));
         let study_curves = match seat {
             Seat::InStudy(_, label) if header.has_rigid => {
                 Some(Curves::of_study(label, &plots, seat.color().unwrap_or(Color::from_u32(ORANGE))))
@@ -166,6 +169,7 @@ impl RunTracks {
             scale,
             curves,
             study_curves,
+            shapes,
             last_pose_ns: None,
             undrawn: None,
             last: Sample::default(),
@@ -176,11 +180,30 @@ impl RunTracks {
 
     /// What is known of the robots with the first sample.
     pub(crate) fn tools(&self, header: &RunHeader, first: &Sample, ids: &mut Ids) -> Result<Vec<Chunk>, StreamError> {
-        let Some(link) = header.links.iter().position(|link| link.name == header.tcp) else { return Ok(Vec::new()) };
+        let captions = self.captions(header, first, ids)?;
+        let Some(link) = header.links.iter().position(|link| link.name == header.tcp) else { return Ok(captions) };
         let X_TL = first.flexible.X_WT.inv_mul(&first.flexible.X_WL[link]);
         let drawn = std::iter::once(&self.flexible).chain(&self.rigid).chain(&self.magnified);
         let lines = drawn.filter_map(|drawn| drawn.robot.as_ref()).map(|robot| robot.tool(&X_TL, ids));
-        lines.filter_map(Result::transpose).collect()
+        captions.into_iter().map(Ok).chain(lines.filter_map(Result::transpose)).collect()
+    }
+
+    /// Names of what is shown: beside the tool, and as a text of their own.
+    fn captions(&self, header: &RunHeader, first: &Sample, ids: &mut Ids) -> Result<Vec<Chunk>, StreamError> {
+        let mut chunks = Vec::new();
+        for caption in &header.captions {
+            let step = (caption.from_s * header.log_rate_hz).round() as i64;
+            let when = instant(((caption.from_s * 1e9).round() as i64, step));
+            let label = Points3D::new([point(&first.rigid.X_WT)])
+                .with_radii([rerun::Radius::new_ui_points(2.0)])
+                .with_colors([Color::from_u32(LIGHT)])
+                .with_labels([caption.text.as_str()])
+                .with_show_labels(true);
+            chunks.push(ids.single(&self.root.join(&path(["caption"])), &when, &label)?);
+            let text = TextDocument::from_markdown(format!("# {}", caption.text));
+            chunks.push(ids.single(&path(["caption"]), &when, &text)?);
+        }
+        Ok(chunks)
     }
 
     /// Adds an instant.
@@ -193,7 +216,7 @@ impl RunTracks {
             curves.push_study(sample);
         }
         let error = size(&sample.error_world[..3]);
-        let new_peak = self.rigid.is_some() && self.peak.is_none_or(|(largest, ..)| error > largest);
+        let new_peak = !self.shapes && self.rigid.is_some() && self.peak.is_none_or(|(largest, ..)| error > largest);
         let due = self.last_pose_ns.is_none_or(|last| when.0 - last >= POSE_EVERY_NS);
         if self.magnified.is_some() && (due || new_peak) {
             self.magnifier.magnify(sample, &mut self.enlarged);
@@ -286,6 +309,9 @@ impl RunTracks {
     /// The ways of the tool so far.
     pub(crate) fn ways(&self, ids: &mut Ids) -> Result<Vec<Chunk>, StreamError> {
         let mut chunks = Vec::new();
+        if self.shapes {
+            return Ok(chunks);
+        }
         for drawn in std::iter::once(&self.flexible).chain(&self.rigid).chain(&self.magnified) {
             chunks.push(match drawn.way_color {
                 Some(color) => drawn.way.line(ids, color)?,

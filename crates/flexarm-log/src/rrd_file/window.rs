@@ -9,6 +9,9 @@ use crate::RunHeader;
 
 /// The robots, below them the result; beside them the error and its causes.
 pub(crate) fn window(header: &RunHeader, seat: &Seat, labels: &[String]) -> Part {
+    if !header.captions.is_empty() {
+        return shapes(&seat.root(header));
+    }
     let plot = |title: &str, parts: &[&str]| Part::plot(title, path(["plots"].iter().chain(parts)));
     let causes = [
         (!header.contributors.is_empty()).then(|| plot("Shares of the error [mm]", &["contributions"])),
@@ -45,6 +48,14 @@ pub(crate) fn window(header: &RunHeader, seat: &Seat, labels: &[String]) -> Part
     };
     let left = Part::Column(vec![(7.0, robots(header, seat, labels)), (2.6, text)]);
     Part::Row(vec![(3.0, left), (2.0, Part::Column(right))])
+}
+
+/// Shapes that have no size: the robot, what it shows now, and the list of all.
+fn shapes(root: &EntityPath) -> Part {
+    let title = "Shapes without a size (colour: how far a place moves, grey not at all, red most)";
+    let scene = Part::scene(title, root.clone(), vec![format!("+ {root}/**")]);
+    let right = vec![(1.0, Part::text("Now", path(["caption"]))), (4.0, Part::text("All", path(["summary"])))];
+    Part::Row(vec![(3.0, scene), (2.0, Part::Column(right))])
 }
 
 /// Magnified and at life size, one behind the other.

@@ -222,7 +222,8 @@ fn computed(trace: &Trace) -> Summary {
         moves: &moves,
     };
     let usual = MetricSettings::default();
-    let settings = MetricSettings { settling_band_m: settling_band_m(header).unwrap_or(usual.settling_band_m) };
+    let settings =
+        MetricSettings { settling_band_m: settling_band_m(header).unwrap_or(usual.settling_band_m), ..usual };
     let along: Vec<[f64; 3]> = rows.iter().map(|row| [0, 1, 2].map(|c| row.error_path[c])).collect();
     let metrics = tcp_metrics_on_path(&record, Some(&along), &settings).ok();
     let band_m = settings.settling_band_m;

@@ -247,7 +247,7 @@ fn tiles(run: &ReportRun<'_>) -> String {
         match tcp.dominant_hz {
             _ if !s.knows_moves() => {}
             Some(hz) => tile("Dominant frequency", fixed(hz), "Hz", "strongest line of the ringing".into()),
-            None => tile("Dominant frequency", "–".into(), "", "nothing oscillates".into()),
+            None => tile("Dominant frequency", "–".into(), "", tcp.no_line().into()),
         }
     } else {
         tile("Simulated time", fixed(s.duration_s), "s", s.stepper.name.clone());

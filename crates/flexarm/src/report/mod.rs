@@ -187,9 +187,10 @@ fn tool_figures(summary: &Summary) -> Vec<Figure> {
         Some(s) => Figure::new("settling time", format!("{s:.3}"), "s", note),
         None => Figure::new("settling time", "", "", note),
     });
-    if let Some(hz) = tcp.dominant_hz {
-        rows.push(Figure::new("dominant frequency", format!("{hz:.2}"), "Hz", ""));
-    }
+    rows.push(match tcp.dominant_hz {
+        Some(hz) => Figure::new("dominant frequency", format!("{hz:.2}"), "Hz", ""),
+        None => Figure::new("dominant frequency", "", "", tcp.no_line()),
+    });
     rows
 }
 
