@@ -217,7 +217,5 @@ fn dominant_hz(record: &ErrorRecord<'_>, holds: &[HoldMetrics], lowest_hz: f64) 
     let trend = |i: usize, c: usize| record.quasi_static.map_or(0.0, |values| values[i][c]);
     let rest = record.errors.iter().enumerate();
     let rest: Vec<[f64; 3]> = rest.map(|(i, e)| std::array::from_fn(|c| e[c] - trend(i, c))).collect();
-    let line = |taper: Taper| strongest_line_from(record.times, &rest, taper, lowest_hz).map(|line| line.hz);
-    // What rings at the start and dies away is faded out by a taper at both ends.
-    line(Taper::Both).or_else(|| line(Taper::FadeOut))
+    strongest_line_from(record.times, &rest, Taper::Both, lowest_hz).map(|line| line.hz)
 }

@@ -519,6 +519,36 @@ mod first_line {
     }
 }
 
+mod robot_name {
+    use super::*;
+
+    /// A robot file without a name takes that of its folder, whatever way leads there.
+    #[test]
+    fn is_that_of_the_real_folder() {
+        let place = Place::new();
+        place.write("seven/robot.toml", with(ROBOT, "name = \"beam\"\n", ""));
+        for file in ["beam.urdf", "swing.toml"] {
+            place.write(&format!("seven/{file}"), place.read(file));
+        }
+        place.write("seven/inner/note.txt", "a way round");
+        let name = |folder: &str, robot: &str| {
+            let mut command = place.command(&["compare", robot, "swing.toml", "--no-files", "--json"]);
+            let answer = Answer::of(command.current_dir(place.path(folder)).output().unwrap());
+            assert_eq!(answer.code, 0, "{robot}: {}", answer.err);
+            answer.json()["robot"].as_str().unwrap().to_owned()
+        };
+        let ways = ["robot.toml", "./robot.toml", ".", "inner/../robot.toml", "inner/..", "../seven", "../seven/"];
+        for way in ways {
+            assert_eq!(name("seven", way), "seven", "{way}");
+        }
+        #[cfg(unix)]
+        {
+            std::os::unix::fs::symlink(place.path("seven"), place.path("link")).unwrap();
+            assert_eq!(name("seven", "../link"), "seven");
+        }
+    }
+}
+
 mod stopped {
     use super::*;
 

@@ -71,6 +71,7 @@ pub(crate) fn header() -> RunHeader {
             carries: vec![(3, 1)],
         }],
         contributors: vec!["upper_arm".into()],
+        captions: Vec::new(),
         magnification: 50.0,
         color_scale_m: 2.5e-3,
         volume: Some([[-1.4, -1.4, 0.0], [1.4, 1.4, 1.6]]),
