@@ -24,6 +24,7 @@ LINES = ["faces", "proof", "facade", "edges", "results", "motion", "links", "bas
 INNER = ["results", "motion", "links", "base"]
 OWNERS = {  # outside crate: crates or lines that may name it
     "rerun": ["flexarm-log"], "mcap": ["flexarm-log"], "parquet": ["flexarm-log"], "zstd": ["flexarm-log"], "png": ["flexarm-log"], "plotters": ["flexarm-log"], "faer": ["flexarm-fem"], "diffsol": ["flexarm-stepping"], "metis-sys": ["flexarm-fem"], "urdf-rs": ["flexarm-urdf"], "saphyr-parser": ["flexarm-urdf"],
+    "rustix": ["flexarm-log"], "signal-hook": ["faces"],
     "clap": ["faces"], "clap_complete": ["faces"], "clap_mangen": ["faces"], "indicatif": ["faces"],
 }
 PRINTS = re.compile(r"\b(?:e?print(?:ln)?|dbg)!\s*[(\[{]|\bstd::io::(?:stdout|stderr)\b")

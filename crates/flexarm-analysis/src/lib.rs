@@ -49,6 +49,7 @@ mod damped_modes;
 mod error_parts;
 mod hold;
 mod linear_system;
+mod long_record;
 mod metrics;
 mod participation;
 mod path_frame;
@@ -64,6 +65,7 @@ pub use hold::HoldMetrics;
 pub use linear_system::{
     LinearError, LinearSystem, Quantity, ResponsePeak, Spacing, frequency_grid, response_peaks, with_resonances,
 };
+pub use long_record::{ErrorSample, LongRecord};
 pub use metrics::{MetricSettings, TcpMetrics, tcp_metrics, tcp_metrics_on_path};
 pub use participation::{compliance_parts, effective_mass, mode_outputs, strain_energy_shares};
 pub use path_frame::{PathFrame, path_frames};

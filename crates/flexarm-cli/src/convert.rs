@@ -40,7 +40,7 @@ pub(crate) struct ConvertArgs {
 
 pub(crate) fn run(cli: &Cli, args: &ConvertArgs) -> Result<ExitCode, Error> {
     let options = ConvertOptions { from: args.from, to: args.to, overwrite: args.force };
-    let mut stop = crate::stop_on_ctrl_c();
+    let mut stop = crate::signals::stop_when_asked();
     let summary = flexarm::convert_until(&args.input, &args.output, &options, &mut |_| stop())?;
     if !cli.quiet {
         for warning in &summary.warnings {

@@ -8,18 +8,15 @@ use flexarm::import::{ImportFormat, ImportJob, ImportOutputs, Names, PartMasses,
 
 use crate::args::Cli;
 use crate::exchange_args::{ExportArgs, ExportFormatName, ImportArgs, ImportFormatName};
-use crate::{answer, print, shipped, to_json};
+use crate::shipped::OutputFolder;
+use crate::{answer, print, to_json};
 
 pub(crate) fn import(cli: &Cli, args: &ImportArgs) -> Result<ExitCode, Error> {
     let job = import_job(args)?;
-    let outputs = (!args.no_files).then(|| {
-        let new_folder = || args.flex.is_none().then(|| shipped::new_output_folder(&job.link_name()));
-        ImportOutputs {
-            folder: args.output.clone().or_else(new_folder),
-            flex: args.flex.clone(),
-            overwrite: args.force,
-        }
-    });
+    let in_folder = args.output.is_some() || args.flex.is_none();
+    let folder = OutputFolder::of(args.output.as_deref(), &job.link_name(), in_folder && !args.no_files)?;
+    let outputs = ImportOutputs { folder: folder.path(), flex: args.flex.clone(), overwrite: args.force };
+    let outputs = (!args.no_files).then_some(outputs);
     let summary = flexarm::import::import(&job, outputs.as_ref())?;
     warn(cli, &summary.warnings);
     answer(cli, || to_json(&summary), || print::imported(&summary));
@@ -28,6 +25,7 @@ pub(crate) fn import(cli: &Cli, args: &ImportArgs) -> Result<ExitCode, Error> {
 
 pub(crate) fn export(cli: &Cli, args: &ExportArgs) -> Result<ExitCode, Error> {
     let stem = args.link.file_stem().unwrap_or_default().to_string_lossy();
+    let folder = OutputFolder::of(args.output.as_deref(), &stem, true)?;
     let job = ExportJob {
         link: args.link.clone(),
         format: match args.format {
@@ -40,7 +38,7 @@ pub(crate) fn export(cli: &Cli, args: &ExportArgs) -> Result<ExitCode, Error> {
         },
         units: args.units,
         nodes: args.nodes.clone(),
-        folder: args.output.clone().unwrap_or_else(|| shipped::new_output_folder(&stem)),
+        folder: folder.path().unwrap_or_default(),
         overwrite: args.force,
     };
     let summary = flexarm::export::export(&job)?;

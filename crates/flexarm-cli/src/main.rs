@@ -12,16 +12,14 @@ mod reduce;
 mod reduce_args;
 mod report;
 mod shipped;
+mod signals;
 mod study;
 mod summary_table;
 mod verify;
 mod view;
 
 use std::io::{IsTerminal, Write};
-use std::ops::ControlFlow;
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use args::{
@@ -33,8 +31,10 @@ use flexarm::{
     ReferenceSettings, Robot, RunOptions, SpookPreset, SpookSettings, Start, StepperKind, Variant,
 };
 use indicatif::{ProgressBar, ProgressStyle};
+use shipped::OutputFolder;
 
 fn main() -> ExitCode {
+    signals::turn_into_errors();
     let cli = Cli::parse();
     match run(&cli) {
         Ok(code) => code,
@@ -224,14 +224,14 @@ fn simulate(cli: &Cli, args: &RunArgs, with_twin: bool) -> Result<ExitCode, Erro
     let Some(Variant { robot, motion, options, .. }) = variants.first() else {
         return Err(Error::Usage("there is nothing to run".into()));
     };
-    let outputs = (!args.no_files).then(|| {
-        let stem = format!("{}-{}", robot.name, motion.name);
-        let folder = args.output.clone().unwrap_or_else(|| shipped::new_output_folder(&stem));
+    let stem = format!("{}-{}", robot.name, motion.name);
+    let folder = OutputFolder::of(args.output.as_deref(), &stem, !args.no_files)?;
+    let outputs = folder.path().map(|folder| {
         let outputs = Outputs::everything(folder);
         Outputs { overwrite: args.force, figures: args.figures, parquet: args.parquet, ..outputs }
     });
 
-    let mut stop = stop_on_ctrl_c();
+    let mut stop = signals::stop_when_asked();
     let mut bar = Bar::new(cli);
     let mut progress = |t: f64, total: f64| {
         bar.show(t, total);
@@ -255,22 +255,6 @@ fn simulate(cli: &Cli, args: &RunArgs, with_twin: bool) -> Result<ExitCode, Erro
     }
     answer(cli, || to_json(&summary), || summary_table::summary(&summary, summary_table::terminal_width()));
     Ok(ExitCode::SUCCESS)
-}
-
-/// Says whether Ctrl-C was pressed since it was first asked.
-///
-/// Before that nothing is open that must be closed: a signal then ends the program at once, however long the preparation takes.
-fn stop_on_ctrl_c() -> impl FnMut() -> ControlFlow<()> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let mut armed = false;
-    move || {
-        if !std::mem::replace(&mut armed, true) {
-            let flag = stop.clone();
-            // A second handler cannot be set in one process; the first one then serves.
-            let _ = ctrlc::set_handler(move || flag.store(true, Ordering::SeqCst));
-        }
-        if stop.load(Ordering::SeqCst) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    }
 }
 
 fn inspect(cli: &Cli, args: &InspectArgs) -> Result<ExitCode, Error> {

@@ -10,6 +10,7 @@ use flexarm::{
 use crate::args::Cli;
 use crate::posed_args::{ModesArgs, PoseArgs, QuantityName, ResponseArgs, SpacingName, StaticsArgs};
 use crate::print::{lines, table, warning};
+use crate::shipped::OutputFolder;
 use crate::{answer, load_options, shipped, to_json};
 
 /// Directions at the TCP.
@@ -71,10 +72,9 @@ pub(crate) fn response(cli: &Cli, args: &ResponseArgs) -> Result<ExitCode, Error
         points: args.points,
         spacing: if args.spacing == SpacingName::Log { Spacing::Logarithmic } else { Spacing::Linear },
     };
-    let outputs = (!args.no_files).then(|| {
-        let new_folder = || shipped::new_output_folder(&format!("{}-response", robot.name));
-        ResponseOutputs { folder: args.folder.clone().unwrap_or_else(new_folder), overwrite: args.force }
-    });
+    let stem = format!("{}-response", robot.name);
+    let folder = OutputFolder::of(args.folder.as_deref(), &stem, !args.no_files)?;
+    let outputs = folder.path().map(|folder| ResponseOutputs { folder, overwrite: args.force });
     let found = flexarm::response(
         &robot,
         &args.pose.modelling.modelling(),

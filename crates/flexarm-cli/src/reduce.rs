@@ -15,7 +15,8 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::args::Cli;
 use crate::reduce_args::{Named, OrderingName, PlaceWord, QuadratureName, ReduceArgs};
-use crate::{answer, print, shipped, to_json};
+use crate::shipped::OutputFolder;
+use crate::{answer, print, to_json};
 
 pub(crate) fn run(cli: &Cli, args: &ReduceArgs) -> Result<ExitCode, Error> {
     let mut job = ReduceJob::load(&args.mesh)?;
@@ -25,14 +26,10 @@ pub(crate) fn run(cli: &Cli, args: &ReduceArgs) -> Result<ExitCode, Error> {
         answer(cli, || to_json(&listing), || print::listing(&listing));
         return Ok(ExitCode::SUCCESS);
     }
-    let outputs = (!args.no_files).then(|| {
-        let new_folder = || args.flex.is_none().then(|| shipped::new_output_folder(&job.link_name()));
-        ReduceOutputs {
-            folder: args.output.clone().or_else(new_folder),
-            flex: args.flex.clone(),
-            overwrite: args.force,
-        }
-    });
+    let in_folder = args.output.is_some() || args.flex.is_none();
+    let folder = OutputFolder::of(args.output.as_deref(), &job.link_name(), in_folder && !args.no_files)?;
+    let outputs = ReduceOutputs { folder: folder.path(), flex: args.flex.clone(), overwrite: args.force };
+    let outputs = (!args.no_files).then_some(outputs);
     let mut options = ReduceOptions::default();
     options.urdf.search_paths = flexarm::search_paths_from_environment();
 

@@ -1,6 +1,9 @@
 //! Where shipped robots and trajectories are found: by path, or by name in the folders that come with the program.
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
+
+use flexarm::Error;
 
 /// Folders that may hold `robots/` and `trajectories/`: here, beside the program, and where it was built.
 fn roots() -> Vec<PathBuf> {
@@ -36,11 +39,72 @@ pub(crate) fn trajectory(given: &Path) -> PathBuf {
     find(given, "trajectories", &["", ".toml", ".csv"])
 }
 
-/// A folder `out/<stem>-<n>` that is not there yet.
-pub(crate) fn new_output_folder(stem: &str) -> PathBuf {
-    let clean: String =
-        stem.chars().map(|c| if c.is_alphanumeric() || c == '-' || c == '_' { c } else { '_' }).collect();
-    (1..).map(|n| Path::new("out").join(format!("{clean}-{n:03}"))).find(|p| !p.exists()).expect("some number is free")
+/// Where a command puts its files: the folder that was asked for, else a new one that no other run can have.
+pub(crate) enum OutputFolder {
+    None,
+    Asked(PathBuf),
+    New(NewFolder),
+}
+
+/// A folder `out/<stem>-<n>` that was made just now. It goes away again if nothing was put into it.
+pub(crate) struct NewFolder {
+    path: PathBuf,
+    /// Whether `out` itself is new.
+    with_parent: bool,
+}
+
+impl OutputFolder {
+    /// The folder asked for, or a new one named after `stem`, or none if no files are wanted.
+    ///
+    /// # Errors
+    /// [`Error::Write`] if a new one cannot be made.
+    pub(crate) fn of(asked: Option<&Path>, stem: &str, wanted: bool) -> Result<Self, Error> {
+        match asked {
+            _ if !wanted => Ok(Self::None),
+            Some(folder) => Ok(Self::Asked(folder.to_owned())),
+            None => NewFolder::create(stem).map(Self::New),
+        }
+    }
+
+    pub(crate) fn path(&self) -> Option<PathBuf> {
+        match self {
+            Self::None => None,
+            Self::Asked(path) => Some(path.clone()),
+            Self::New(new) => Some(new.path.clone()),
+        }
+    }
+}
+
+impl NewFolder {
+    /// Takes the first number that is free. To make a folder and to find it free are one step, so runs that start at the
+    /// same time get different ones.
+    fn create(stem: &str) -> Result<Self, Error> {
+        let clean: String =
+            stem.chars().map(|c| if c.is_alphanumeric() || c == '-' || c == '_' { c } else { '_' }).collect();
+        let out = Path::new("out");
+        let with_parent = !out.exists();
+        let mut number = 1_u64;
+        loop {
+            std::fs::create_dir_all(out).map_err(|source| Error::Write { path: out.to_owned(), source })?;
+            let path = out.join(format!("{clean}-{number:03}"));
+            match std::fs::create_dir(&path) {
+                Ok(()) => return Ok(Self { path, with_parent }),
+                Err(error) if error.kind() == ErrorKind::AlreadyExists => number += 1,
+                // Another run has just removed `out`, which it had made and not used.
+                Err(error) if error.kind() == ErrorKind::NotFound && !out.exists() => {}
+                Err(source) => return Err(Error::Write { path, source }),
+            }
+        }
+    }
+}
+
+impl Drop for NewFolder {
+    /// Only empty folders can be removed so.
+    fn drop(&mut self) {
+        if std::fs::remove_dir(&self.path).is_ok() && self.with_parent {
+            let _ = std::fs::remove_dir("out");
+        }
+    }
 }
 
 /// The folder with `robots` and `tests`: the first root that has both, else where the program was built.

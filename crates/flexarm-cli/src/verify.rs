@@ -10,7 +10,8 @@ use flexarm_verify::bench::Bench;
 use flexarm_verify::{Verification, VerificationFiles, case_names, differences_from, verify};
 use serde_json::json;
 
-use crate::{Bar, Cli, answer, shipped, stop_on_ctrl_c};
+use crate::shipped::OutputFolder;
+use crate::{Bar, Cli, answer, shipped, signals};
 
 #[derive(Debug, Args)]
 pub(crate) struct VerifyArgs {
@@ -45,15 +46,13 @@ pub(crate) fn run(cli: &Cli, args: &VerifyArgs) -> Result<ExitCode, Error> {
         std::fs::read_to_string(path).map_err(what)
     });
     let stored = stored.transpose()?;
-    let files = (!args.no_files && stored.is_none()).then(|| {
-        let folder = args.output.clone().unwrap_or_else(|| shipped::new_output_folder("verification"));
-        VerificationFiles::new(folder, args.force)
-    });
-    let files = files.transpose()?;
+    let wanted = !args.no_files && stored.is_none();
+    let folder = OutputFolder::of(args.output.as_deref(), "verification", wanted)?;
+    let files = folder.path().map(|folder| VerificationFiles::new(folder, args.force)).transpose()?;
     let bench = Bench { root: args.data.clone().unwrap_or_else(shipped::checkout), quick: args.quick };
 
     let started = Instant::now();
-    let (mut stop, mut bar) = (stop_on_ctrl_c(), Bar::new(cli));
+    let (mut stop, mut bar) = (signals::stop_when_asked(), Bar::new(cli));
     let result = verify(&bench, &args.cases, &mut |share, name| {
         bar.show_as(share, 1.0, || format!("case {name}"));
         stop()

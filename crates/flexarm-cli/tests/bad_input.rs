@@ -893,3 +893,34 @@ mod outputs {
         );
     }
 }
+
+/// A column that comes twice has no meaning, whichever table it is in; both places are told.
+#[test]
+fn a_column_that_comes_twice_is_refused_with_both_places() {
+    let place = Place::new();
+    place.write("l.toml", "format = 1\n[[load]]\nkind = \"table\"\nfile = \"l.csv\"\n");
+    for (header, name) in [("time,time", "time"), ("time,fx,fy,fx", "fx"), ("time,fz,fz", "fz")] {
+        let row = |t: &str| [t].into_iter().chain(header.split(',').skip(1).map(|_| "1")).collect::<Vec<_>>().join(",");
+        place.write("l.csv", format!("{header}\n{}\n{}\n", row("0"), row("1")));
+        let columns = if name == "fx" {
+            "columns 2 and 4"
+        } else if name == "fz" {
+            "columns 2 and 3"
+        } else {
+            "columns 1 and 2"
+        };
+        let arguments = ["compare", "robot.toml", "swing.toml", "--loads", "l.toml", "--no-files"];
+        place.refused(&arguments, &["l.csv", columns, name]);
+    }
+    place.write("m.csv", "time,swing,swing\n0,0,0\n1,0.1,0.2\n");
+    place.refused(&["compare", "robot.toml", "m.csv", "--no-files"], &["m.csv", "column 3", "as column 2", "swing"]);
+    place.json(&["compare", "robot.toml", "swing.toml", "-o", "result"]);
+    let table = place.text("result/run.csv");
+    for name in ["time", "flexible_x_m", "swing_position_rad"] {
+        let doubled = table
+            .lines()
+            .map(|line| if line.starts_with("time") { format!("{line},{name}\n") } else { format!("{line},0\n") });
+        place.write("twice.csv", doubled.collect::<String>());
+        place.refused(&["convert", "twice.csv", "x.csv"], &["twice.csv", "columns", name]);
+    }
+}

@@ -2,7 +2,7 @@
 
 use std::fs::{File, OpenOptions};
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use crate::LogError;
@@ -29,10 +29,18 @@ impl CreateOptions {
         Self { overwrite, ..self }
     }
 
-    /// Whether `path` may be created: it does not exist, or may be overwritten.
+    /// Whether `path` may be created: it does not exist, or may be overwritten and can be.
     pub(crate) fn check(self, path: &Path) -> Result<(), LogError> {
-        if !self.overwrite && path.exists() {
+        let Ok(there) = path.metadata() else { return Ok(()) };
+        if !self.overwrite {
             return Err(LogError::Exists { path: path.to_owned() });
+        }
+        if there.is_dir() {
+            return Err(LogError::io(path, "replace a folder by a file")(io::ErrorKind::IsADirectory.into()));
+        }
+        if there.is_file() {
+            // Opened without a change: nothing is replaced before everything can be.
+            OpenOptions::new().write(true).open(path).map_err(LogError::io(path, "replace the file"))?;
         }
         Ok(())
     }
@@ -51,26 +59,76 @@ impl CreateOptions {
         })
     }
 
-    /// A clock that says when the next flush is due.
-    pub(crate) fn flush_clock(self) -> FlushClock {
-        FlushClock { every: self.flush_every, last: Instant::now() }
+    /// A clock that says when the next flush of a file is due.
+    pub(crate) fn flush_clock(self, file: &Path) -> FlushClock {
+        let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let now = Instant::now();
+        let scarce = is_scarce(folder);
+        FlushClock {
+            every: self.flush_every,
+            begun: now,
+            next: now + self.flush_every,
+            folder: folder.into(),
+            scarce,
+            waiting: 0,
+        }
     }
 }
 
-/// Wall time since the last flush. It decides when bytes reach the disk, never which bytes.
+/// Room on the disk below which files are flushed by the sample: all of a run's files together then fill the disk at the
+/// same pace, and what one of them takes last is not missing in the others.
+const SCARCE_BYTES: u64 = 64 << 20;
+/// Samples between two flushes when room is scarce.
+const SCARCE_EVERY: u32 = 64;
+/// Part of its time that a run spends on flushes at most.
+const LARGEST_SHARE: u32 = 20;
+
+/// When the next flush is due. It decides when bytes reach the disk, never which bytes.
 #[derive(Debug)]
 pub(crate) struct FlushClock {
     every: Duration,
-    last: Instant,
+    /// When the last flush was found to be due.
+    begun: Instant,
+    next: Instant,
+    folder: PathBuf,
+    scarce: bool,
+    /// Samples since the last flush.
+    waiting: u32,
 }
 
 impl FlushClock {
-    /// Whether a flush is due; if so, the next interval starts now.
+    /// Whether a flush is due, asked once for each sample; if so, the next interval starts now.
     pub(crate) fn due(&mut self) -> bool {
-        let due = self.last.elapsed() >= self.every;
+        self.waiting += 1;
+        let now = Instant::now();
+        let in_time = now >= self.next;
+        if in_time {
+            self.next = now + self.every;
+            self.scarce = is_scarce(&self.folder);
+        }
+        let due = in_time || self.scarce && self.waiting >= SCARCE_EVERY;
         if due {
-            self.last = Instant::now();
+            (self.begun, self.waiting) = (now, 0);
         }
         due
     }
+
+    /// To be told when a flush is over whose cost grows with the file: the next one waits so long that all of them take
+    /// only a small part of the run.
+    #[cfg(any(feature = "mcap", feature = "rerun"))]
+    pub(crate) fn done(&mut self) {
+        // Who asks for no pause gets none.
+        if !self.every.is_zero() {
+            self.next = self.next.max(self.begun + LARGEST_SHARE * self.begun.elapsed());
+        }
+    }
+}
+
+/// Whether a folder's disk is nearly full; `false` where that cannot be told.
+fn is_scarce(folder: &Path) -> bool {
+    #[cfg(unix)]
+    let free = rustix::fs::statvfs(folder).ok().map(|disk| disk.f_bavail.saturating_mul(disk.f_frsize));
+    #[cfg(not(unix))]
+    let free: Option<u64> = (!folder.as_os_str().is_empty()).then_some(u64::MAX);
+    free.is_some_and(|free| free < SCARCE_BYTES)
 }

@@ -1,6 +1,7 @@
 //! The scalars of a run as one table: SI units, one row per sample, units in the column names.
 
 use std::fs::File;
+use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use crate::create::FlushClock;
@@ -36,17 +37,79 @@ enum State {
 
 #[derive(Debug)]
 struct Open {
-    writer: csv::Writer<File>,
+    lines: Lines,
     shape: Shape,
     flush: FlushClock,
     /// Numbers of one line; used again for the next one.
     row: Vec<f64>,
 }
 
+/// Whole lines on their way into the file.
+#[derive(Debug)]
+struct Lines {
+    file: File,
+    /// Bytes of whole lines in the file.
+    written: u64,
+    waiting: csv::Writer<Vec<u8>>,
+    /// How many bytes wait, about.
+    size: usize,
+}
+
+/// Bytes that wait until they are worth a system call.
+const MOST_WAITING: usize = 8 << 10;
+
+impl Lines {
+    fn new(file: File) -> Self {
+        Self { file, written: 0, waiting: csv::Writer::from_writer(Vec::new()), size: 0 }
+    }
+
+    fn add(&mut self, fields: impl IntoIterator<Item = impl AsRef<[u8]>>) -> csv::Result<()> {
+        let size = &mut self.size;
+        self.waiting.write_record(fields.into_iter().inspect(|field| *size += field.as_ref().len() + 1))
+    }
+
+    fn is_full(&self) -> bool {
+        self.size > MOST_WAITING
+    }
+
+    /// Writes out what waits. If that fails, it is given up, and the file ends with its last whole line.
+    fn flush(&mut self) -> io::Result<()> {
+        let waiting = std::mem::replace(&mut self.waiting, csv::Writer::from_writer(Vec::new()));
+        let bytes = waiting.into_inner().map_err(|error| io::Error::other(error.to_string()))?;
+        self.size = 0;
+        if let Err(error) = self.file.write_all(&bytes) {
+            // What cannot be cut stays; the first error is the one to tell.
+            let _ = self.file.set_len(self.written).and_then(|()| self.file.seek(SeekFrom::Start(self.written)));
+            return Err(error);
+        }
+        self.written += bytes.len() as u64;
+        Ok(())
+    }
+}
+
+impl Drop for Lines {
+    /// A run that was given up still gets its last lines; errors have nowhere to go.
+    fn drop(&mut self) {
+        let _ = self.flush();
+    }
+}
+
 impl CsvRecorder {
     /// A recorder that will write `path`; the file is created by `begin`.
     pub fn create(path: impl Into<PathBuf>, options: CreateOptions) -> Self {
         Self { path: path.into(), options, state: State::New }
+    }
+}
+
+impl CsvRecorder {
+    /// Writes out what waits. A table that could not be written on has come to its end: a later line would follow a gap.
+    fn flush(&mut self, action: &'static str) -> Result<(), LogError> {
+        let State::Open(open) = &mut self.state else { return Ok(()) };
+        let written = open.lines.flush().map_err(LogError::io(&self.path, action));
+        if written.is_err() {
+            self.state = State::Finished;
+        }
+        written
     }
 }
 
@@ -59,10 +122,11 @@ impl Recorder for CsvRecorder {
         if !matches!(self.state, State::New) {
             return Err(LogError::begun_twice(&self.path));
         }
-        let mut writer = csv::Writer::from_writer(self.options.create(&self.path)?);
-        writer.write_record(table::columns(header)).map_err(csv_error(&self.path, "write the column names"))?;
-        writer.flush().map_err(LogError::io(&self.path, "write the column names"))?;
-        let open = Open { writer, shape: Shape::of(header), flush: self.options.flush_clock(), row: Vec::new() };
+        let mut lines = Lines::new(self.options.create(&self.path)?);
+        lines.add(table::columns(header)).map_err(csv_error(&self.path, "write the column names"))?;
+        lines.flush().map_err(LogError::io(&self.path, "write the column names"))?;
+        let flush = self.options.flush_clock(&self.path);
+        let open = Open { lines, shape: Shape::of(header), flush, row: Vec::new() };
         self.state = State::Open(Box::new(open));
         Ok(())
     }
@@ -73,16 +137,18 @@ impl Recorder for CsvRecorder {
         table::fill_row(sample, &open.shape, &mut open.row);
         // Rust's debug form of a float is the shortest that reads back, with an exponent where that is shorter.
         let fields = open.row.iter().map(|value| format!("{value:?}"));
-        open.writer.write_record(fields).map_err(csv_error(&self.path, "write a sample"))?;
-        if open.flush.due() {
-            open.writer.flush().map_err(LogError::io(&self.path, "write samples"))?;
+        open.lines.add(fields).map_err(csv_error(&self.path, "write a sample"))?;
+        if open.flush.due() || open.lines.is_full() {
+            self.flush("write samples")?;
         }
         Ok(())
     }
 
     fn finish(&mut self, _result: &RunResult) -> Result<(), LogError> {
-        let State::Open(open) = &mut self.state else { return Err(LogError::not_open(&self.path, "finish")) };
-        open.writer.flush().map_err(LogError::io(&self.path, "write the last samples"))?;
+        if !matches!(self.state, State::Open(_)) {
+            return Err(LogError::not_open(&self.path, "finish"));
+        }
+        self.flush("write the last samples")?;
         self.state = State::Finished;
         Ok(())
     }

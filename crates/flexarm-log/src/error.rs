@@ -76,6 +76,17 @@ pub enum LogError {
         mend: String,
     },
 
+    /// Files that a run wrote are no longer where they were made.
+    #[error(
+        "{}: no longer there: removed, moved or replaced while the run wrote it; what it held is lost from this place{}",
+        paths.first().map(|path| path.display().to_string()).unwrap_or_default(),
+        others(paths)
+    )]
+    Gone {
+        /// All such files.
+        paths: Vec<PathBuf>,
+    },
+
     /// The calls came in the wrong order: `begin`, any number of `record`, `finish`.
     #[error("{}: {call} was called {problem}", path.display())]
     Order {
@@ -99,7 +110,35 @@ fn remedy(source: &io::Error) -> &'static str {
     }
 }
 
+/// The paths after the first one, in words.
+fn others(paths: &[PathBuf]) -> String {
+    let others: Vec<String> = paths.iter().skip(1).map(|path| path.display().to_string()).collect();
+    if others.is_empty() { String::new() } else { format!(", and so is {}", others.join(", ")) }
+}
+
 impl LogError {
+    /// The same error with the name `shown` for every path in the folder `hidden`: files that come into being under a
+    /// provisional name are called what the user called them.
+    #[must_use]
+    pub fn with_path_for(mut self, hidden: &Path, shown: &Path) -> Self {
+        let rename = |path: &mut PathBuf| {
+            if path.starts_with(hidden) {
+                *path = shown.to_owned();
+            }
+        };
+        match &mut self {
+            Self::Exists { path }
+            | Self::Io { path, .. }
+            | Self::Format { path, .. }
+            | Self::Shape { path, .. }
+            | Self::Time { path, .. }
+            | Self::NotARecording { path, .. }
+            | Self::Order { path, .. } => rename(path),
+            Self::Gone { paths } => paths.iter_mut().for_each(rename),
+        }
+        self
+    }
+
     /// A closure for `map_err` that turns an [`io::Error`] into [`LogError::Io`].
     pub(crate) fn io(path: &Path, action: &'static str) -> impl FnOnce(io::Error) -> Self {
         move |source| Self::Io { path: path.to_owned(), action, source }

@@ -1,16 +1,31 @@
 //! Several recordings of one run.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::{LogError, Recorder, RunHeader, RunResult, Sample};
 
 /// Recorders that get the same header, samples and result.
 ///
 /// One that fails does not keep the others from their data: all are called, then the first error is returned.
-/// Each error names its file.
+/// Each error names its file. One that cannot begin ends the set, and the files that the others have made go away.
 #[derive(Default)]
 pub struct RecorderSet {
     recorders: Vec<Box<dyn Recorder>>,
+    /// Which file was made under which name.
+    made: Vec<(PathBuf, FileId)>,
+}
+
+/// What tells two files of one name apart: device and number on it.
+type FileId = (u64, u64);
+
+fn file_id(path: &Path) -> Option<FileId> {
+    let there = path.metadata().ok()?;
+    #[cfg(unix)]
+    let id = (std::os::unix::fs::MetadataExt::dev(&there), std::os::unix::fs::MetadataExt::ino(&there));
+    // Elsewhere a file that is open cannot be removed.
+    #[cfg(not(unix))]
+    let id = (0, u64::from(there.is_file()));
+    Some(id)
 }
 
 impl RecorderSet {
@@ -30,16 +45,32 @@ impl RecorderSet {
         self.recorders.iter().map(|recorder| recorder.path())
     }
 
+    /// Whether all files may be created, as far as can be told without creating one.
+    ///
+    /// # Errors
+    /// [`LogError::Exists`] for the first file that is there already; [`LogError::Io`] for one that cannot be replaced.
+    pub fn check(&self) -> Result<(), LogError> {
+        self.recorders.iter().try_for_each(|recorder| recorder.check())
+    }
+
     /// Starts all files, or none if one of them may not be written.
     ///
     /// # Errors
-    /// [`LogError::Exists`] for the first file that is there already, before any file is created; later, the
-    /// first error of a recorder.
+    /// As [`RecorderSet::check`], before any file is created; later, the first error of a recorder, and no new file is
+    /// left.
     pub fn begin(&mut self, header: &RunHeader) -> Result<(), LogError> {
-        for recorder in &self.recorders {
-            recorder.check()?;
+        self.check()?;
+        let new: Vec<PathBuf> = self.paths().filter(|path| !path.exists()).map(Path::to_owned).collect();
+        let begun = self.all(|recorder| recorder.begin(header));
+        if begun.is_err() {
+            self.recorders.clear(); // closes the files
+            for path in new {
+                let _ = std::fs::remove_file(path); // what cannot be removed stays; the error that led here is told
+            }
+            return begun;
         }
-        self.all(|recorder| recorder.begin(header))
+        self.made = self.paths().filter_map(|path| Some((path.to_owned(), file_id(path)?))).collect();
+        Ok(())
     }
 
     /// Adds one instant to all files.
@@ -53,9 +84,13 @@ impl RecorderSet {
     /// Adds the result to all files and closes them.
     ///
     /// # Errors
-    /// The first error of a recorder.
+    /// The first error of a recorder; [`LogError::Gone`] if files are no longer where they were made: what was written
+    /// to them cannot be found.
     pub fn finish(&mut self, result: &RunResult) -> Result<(), LogError> {
-        self.all(|recorder| recorder.finish(result))
+        self.all(|recorder| recorder.finish(result))?;
+        let is_gone = |(path, id): &&(PathBuf, FileId)| file_id(path) != Some(*id);
+        let paths: Vec<PathBuf> = self.made.iter().filter(is_gone).map(|(path, _)| path.clone()).collect();
+        if paths.is_empty() { Ok(()) } else { Err(LogError::Gone { paths }) }
     }
 
     fn all(&mut self, mut call: impl FnMut(&mut dyn Recorder) -> Result<(), LogError>) -> Result<(), LogError> {

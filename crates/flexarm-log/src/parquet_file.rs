@@ -70,7 +70,7 @@ impl Recorder for ParquetRecorder {
         }
         self.check()?;
         let partial = partial_path(&self.path);
-        let file = File::create(&partial).map_err(LogError::io(&partial, "create the file"))?;
+        let file = File::create(&partial).map_err(LogError::io(&self.path, "create the file"))?;
         let remove = RemoveOnDrop(Some(partial));
         let open = Open::new(file, remove, header).map_err(parquet_error(&self.path, "write the names of columns"))?;
         self.state = State::Open(Box::new(open));

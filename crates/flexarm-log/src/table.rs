@@ -1,6 +1,6 @@
 //! The table of a run: which numbers of a sample are its columns. CSV and Parquet files share it, both ways.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 use flexarm_kinematics::Pose;
 use nalgebra::{Translation3, Vector3};
@@ -147,7 +147,16 @@ impl TableLayout {
         header.bends = Vec::new();
         (header.magnification, header.urdf) = (0.0, String::new());
         let wanted = columns(&header);
-        let place = |name: &String| names.iter().position(|n| n == name);
+        let needed: HashSet<&String> = wanted.iter().collect();
+        let mut first_of: HashMap<&String, usize> = HashMap::new();
+        for (second, name) in names.iter().enumerate() {
+            let first = *first_of.entry(name).or_insert(second);
+            if first != second && needed.contains(name) {
+                let found = format!("columns {} and {} that are both called {name:?}", first + 1, second + 1);
+                return Err((found, "each column once".into()));
+            }
+        }
+        let place = |name: &String| first_of.get(name).copied();
         let missing: Vec<&str> = wanted.iter().filter(|name| place(name).is_none()).map(String::as_str).collect();
         if !missing.is_empty() {
             let found = match names.iter().all(|name| name.trim().is_empty()) {
@@ -161,9 +170,6 @@ impl TableLayout {
                 shortened(&missing)
             );
             return Err((found, expected));
-        }
-        if let Some(twice) = wanted.iter().find(|name| names.iter().filter(|n| n == name).count() > 1) {
-            return Err((format!("two columns of the name {twice}"), "each column once".into()));
         }
         let places = wanted.iter().filter_map(place).collect();
         Ok(Self { header, places })

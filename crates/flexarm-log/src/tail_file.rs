@@ -11,11 +11,9 @@
 use std::fs::File;
 use std::io::{self, Seek, SeekFrom, Write};
 
-/// Committed bytes held back until they are worth a system call.
-const PENDING_LIMIT: usize = 256 << 10;
-/// The same where the recorder decides when to write: what a full disk may cost.
-#[cfg(feature = "mcap")]
-const SHARED_PENDING_LIMIT: usize = 1 << 20;
+/// Committed bytes beyond which a recorder should set a new tail even before its time: what is held in memory, and what a
+/// full disk may cost.
+const PENDING_LIMIT: usize = 1 << 20;
 
 /// See the module.
 #[derive(Debug)]
@@ -38,6 +36,11 @@ impl TailFile {
     /// Number of committed bytes.
     pub(crate) fn position(&self) -> u64 {
         self.written + self.pending.len() as u64
+    }
+
+    /// Whether so much is held back that a new tail should be set even before its time.
+    pub(crate) fn is_full(&self) -> bool {
+        self.pending.len() > PENDING_LIMIT
     }
 
     /// Writes out what is committed, then `tail` behind it, in place of any earlier tail.
@@ -73,11 +76,9 @@ impl TailFile {
 }
 
 impl Write for TailFile {
+    /// Only holds the bytes back: a file whose tail were overwritten by them would have no end until the next one.
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.pending.extend_from_slice(bytes);
-        if self.pending.len() > PENDING_LIMIT {
-            self.flush()?;
-        }
         Ok(bytes.len())
     }
 
@@ -118,9 +119,9 @@ impl SharedTail {
         look(file.written, &file.pending);
     }
 
-    /// Whether enough is held back to be worth a system call.
+    /// See [`TailFile::is_full`].
     pub(crate) fn is_full(&self) -> bool {
-        self.pending() > SHARED_PENDING_LIMIT
+        self.lock().is_full()
     }
 
     pub(crate) fn flush(&self) -> io::Result<()> {

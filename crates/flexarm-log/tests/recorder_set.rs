@@ -5,8 +5,9 @@
 mod synthetic;
 
 use std::error::Error;
+use std::path::{Path, PathBuf};
 
-use flexarm_log::{CreateOptions, CsvRecorder, LogError, RecorderSet, RunResult};
+use flexarm_log::{CreateOptions, CsvRecorder, LogError, Recorder, RecorderSet, RunHeader, RunResult, Sample};
 
 fn pair(first: &std::path::Path, second: &std::path::Path, options: CreateOptions) -> RecorderSet {
     let mut set = RecorderSet::new();
@@ -44,13 +45,78 @@ fn an_error_names_the_file_and_the_cause() {
     assert!(error.source().unwrap().to_string().contains("No such file"), "{error:?}");
 }
 
+/// A recorder whose disk is full from the first sample on.
+struct Full(PathBuf);
+
+impl Recorder for Full {
+    fn begin(&mut self, _: &RunHeader) -> Result<(), LogError> {
+        std::fs::write(&self.0, "begun").map_err(|source| self.error(source))
+    }
+
+    fn record(&mut self, _: &Sample) -> Result<(), LogError> {
+        Err(self.error(std::io::ErrorKind::StorageFull.into()))
+    }
+
+    fn finish(&mut self, _: &RunResult) -> Result<(), LogError> {
+        self.record(&Sample::default())
+    }
+
+    fn path(&self) -> &Path {
+        &self.0
+    }
+}
+
+impl Full {
+    fn error(&self, source: std::io::Error) -> LogError {
+        LogError::Io { path: self.0.clone(), action: "write", source }
+    }
+}
+
 #[test]
 fn one_failing_recorder_does_not_cost_the_others_their_data() {
-    let (good, bad) = (synthetic::scratch("good.csv"), synthetic::scratch("missing").join("bad.csv"));
-    let mut set = pair(&bad, &good, CreateOptions::default());
-    assert!(set.begin(&synthetic::header()).is_err());
+    let (good, bad) = (synthetic::scratch("good.csv"), synthetic::scratch("full.csv"));
+    let mut set = RecorderSet::new();
+    set.push(Box::new(Full(bad.clone())));
+    set.push(Box::new(CsvRecorder::create(&good, CreateOptions::default())));
+    set.begin(&synthetic::header()).unwrap();
     assert!(set.record(&synthetic::sample(0)).is_err());
     assert!(set.finish(&RunResult::default()).is_err());
     assert_eq!(std::fs::read_to_string(&good).unwrap().lines().count(), 2);
-    std::fs::remove_file(good).unwrap();
+    [good, bad].iter().for_each(|path| std::fs::remove_file(path).unwrap());
+}
+
+/// One that cannot begin takes the others with it: no stray files, and what was there before is as it was.
+#[test]
+fn one_that_cannot_begin_leaves_no_file_of_the_others() {
+    let (new, bad) = (synthetic::scratch("new-too.csv"), synthetic::scratch("missing").join("bad.csv"));
+    let mut set = pair(&new, &bad, CreateOptions::default());
+    assert!(set.begin(&synthetic::header()).is_err());
+    assert!(!new.exists());
+
+    // A folder stands where the second file is to be: the first is not replaced.
+    let (old, folder) = (synthetic::scratch("precious.csv"), synthetic::scratch("folder.csv"));
+    std::fs::write(&old, "precious").unwrap();
+    std::fs::create_dir(&folder).unwrap();
+    let mut set = pair(&old, &folder, CreateOptions::default().with_overwrite(true));
+    let error = set.begin(&synthetic::header()).unwrap_err().to_string();
+    assert!(error.contains("folder.csv"), "{error}");
+    assert_eq!(std::fs::read_to_string(&old).unwrap(), "precious");
+    std::fs::remove_file(old).unwrap();
+    std::fs::remove_dir(folder).unwrap();
+}
+
+#[test]
+#[cfg(unix)]
+fn files_that_are_gone_at_the_end_are_all_named() {
+    let paths = ["a.csv", "b.csv", "c.csv"].map(synthetic::scratch);
+    let mut set = RecorderSet::new();
+    paths.iter().for_each(|path| set.push(Box::new(CsvRecorder::create(path, CreateOptions::default()))));
+    set.begin(&synthetic::header()).unwrap();
+    set.record(&synthetic::sample(0)).unwrap();
+    std::fs::remove_file(&paths[0]).unwrap();
+    std::fs::remove_file(&paths[2]).unwrap();
+    std::fs::write(&paths[2], "another file of that name").unwrap();
+    let Err(LogError::Gone { paths: gone }) = set.finish(&RunResult::default()) else { panic!("nothing is missed") };
+    assert_eq!(gone, [paths[0].clone(), paths[2].clone()]);
+    paths[1..].iter().for_each(|path| std::fs::remove_file(path).unwrap());
 }

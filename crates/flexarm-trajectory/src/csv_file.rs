@@ -152,8 +152,9 @@ impl Header {
             if name.is_empty() {
                 return Err(located(line, Some(i + 1), Problem::UnnamedColumn));
             }
-            if columns[..i].contains(name) {
-                return Err(located(line, Some(i + 1), Problem::RepeatedColumn { name: name.clone() }));
+            if let Some(first) = columns[..i].iter().position(|other| other == name) {
+                let problem = Problem::RepeatedColumn { name: name.clone(), first: first + 1 };
+                return Err(located(line, Some(i + 1), problem));
             }
             let (joint, quantity) = match (name.strip_suffix(".vel"), name.strip_suffix(".acc")) {
                 _ if name == "time" => ("time", Quantity::Time),

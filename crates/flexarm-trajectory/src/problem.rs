@@ -30,10 +30,12 @@ pub enum Problem {
     #[error("a column has no name; name each column of the header or remove the comma too much")]
     UnnamedColumn,
     /// The same column twice.
-    #[error("column {name:?} appears twice; remove or rename one of them")]
+    #[error("the column is called {name:?}, as column {first} is; remove or rename one of them")]
     RepeatedColumn {
         /// Its name.
         name: String,
+        /// Number of the first column of that name, from 1.
+        first: usize,
     },
     /// A `.vel` or `.acc` column without its position.
     #[error(

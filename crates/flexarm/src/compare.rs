@@ -5,8 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use flexarm_analysis::{
-    ContributionPeaks, ErrorRecord, MetricSettings, PathFrame, TcpMetrics, engineering_strain, error_parts, tcp_error,
-    tcp_metrics_on_path,
+    ContributionPeaks, ErrorSample, LongRecord, MetricSettings, PathFrame, TcpMetrics, engineering_strain, tcp_error,
 };
 use flexarm_kinematics::{
     Data, Frame, JointMotion, Pose, State, forward_kinematics, kinetic_energy, potential_energy, rotation_vector,
@@ -33,7 +32,7 @@ use crate::prepare::{Checked, checked};
 use crate::record::{header, link_frames, ordered_links, recorders};
 use crate::robot::{Robot, TCP_FRAME};
 use crate::static_part::StaticPart;
-use crate::summary::{DriveFigures, Files, LinkFigures, StepperFigures, Summary, TcpFigures};
+use crate::summary::{CURVE_PIECES, DriveFigures, Files, LinkFigures, StepperFigures, Summary, TcpFigures};
 use crate::twin::RigidTwin;
 
 /// What servos leave of the way to go, among the contributors to the TCP error.
@@ -119,7 +118,7 @@ pub(crate) fn run_traced(
     head.color_scale_m = expected.color_scale_m();
     head.volume = expected.volume;
     head.magnification = options.magnification.unwrap_or_else(|| expected.magnification());
-    files.set.begin(&head)?;
+    files.begin(&head)?;
     run.trace = Trace::new(head);
     let end = run.go(&mut files.set, outputs.is_some(), progress);
 
@@ -140,8 +139,17 @@ pub(crate) fn run_traced(
     let closed = files.set.finish(&run.trace.result).map_err(Error::from);
     let reported =
         closed.and_then(|()| outputs.map_or(Ok(()), |outputs| crate::report::write(outputs, &summary, &run.trace)));
-    // What stopped the run is the news: after a full disk, closing fails again.
-    end.and(reported).map(|()| (summary, run.trace))
+    how_it_ended(end, reported).map(|()| (summary, run.trace))
+}
+
+/// The error to tell, if the run or the writing of its result failed. What stopped the run is the news: after a full disk,
+/// closing fails again. But nobody must be told of a log that is not there.
+fn how_it_ended(end: Result<(), Error>, reported: Result<(), Error>) -> Result<(), Error> {
+    match (end, reported) {
+        (Err(Error::Interrupted { .. }), Err(lost)) => Err(lost),
+        (Err(Error::Step { source, .. }), Err(_)) => Err(Error::Step { source, partial: false }),
+        (end, reported) => end.and(reported),
+    }
 }
 
 /// What recordings are told at the end. Timings stay out of it: recordings of the same run are the same bytes.
@@ -189,7 +197,6 @@ struct Run<'a> {
     contributors: Vec<Contributor>,
     static_part: StaticPart,
     /// Static part of the error per sample (m).
-    statics: Vec<[f64; 3]>,
     trace: Trace,
     /// When the force of a drive first passed its limit.
     overloaded: Vec<Option<f64>>,
@@ -198,11 +205,7 @@ struct Run<'a> {
     seen: Observation,
     path: PathFrame,
     sample: Sample,
-    times: Vec<f64>,
-    errors: Vec<[f64; 6]>,
-    /// Translation along the path axes.
-    path_errors: Vec<[f64; 3]>,
-    positions: Vec<[f64; 3]>,
+    record: LongRecord,
     contributions: ContributionPeaks,
     /// Largest engineering strain and rotation of the far end, per flexible link.
     strains: Vec<f64>,
@@ -251,8 +254,11 @@ impl<'a> Run<'a> {
         }));
         let last = (motion.trajectory.duration() / options.step_s - 1e-9).ceil().max(0.0) as u64;
         let every = ((1.0 / (options.log_rate_hz * options.step_s)).round() as u64).max(1);
-        let moves = motion.trajectory.moves().iter().map(|m| (m.start, m.end)).collect();
-        let static_part = StaticPart::new(&arm, &tcp, moves, duration, every as f64 * options.step_s);
+        let static_part = StaticPart::new(&arm, &tcp, moves(motion), duration, every as f64 * options.step_s);
+        // Stops come to rest where the static part is, unless servos bring the joints elsewhere or a load moves it.
+        let rests_there = arm.torque_driven.is_empty() && arm.loads.is_empty();
+        let first_hz = arm.modes.frequencies_hz().first().copied().unwrap_or(0.0);
+        let settings = MetricSettings { settling_band_m: options.settling_band_m, lowest_hz: RINGING_FROM * first_hz };
         Self {
             motion,
             options,
@@ -263,7 +269,6 @@ impl<'a> Run<'a> {
             stations,
             contributors: contributors.collect(),
             static_part,
-            statics: Vec::new(),
             trace: Trace::default(),
             overloaded: vec![None; arm.model.n_actuated()],
             payload_times: arm.inertia_changes.iter().map(|change| change.t).collect(),
@@ -271,10 +276,7 @@ impl<'a> Run<'a> {
             seen: Observation::new(&arm),
             path,
             sample: Sample::default(),
-            times: Vec::new(),
-            errors: Vec::new(),
-            path_errors: Vec::new(),
-            positions: Vec::new(),
+            record: LongRecord::new(moves(motion), rests_there, settings),
             contributions: ContributionPeaks::new(n_links + n_drives + 1),
             strains: vec![0.0; n_links],
             rotations: vec![0.0; n_links],
@@ -338,10 +340,6 @@ impl<'a> Run<'a> {
         let [along, normal, binormal] = self.path.components(&Vector3::new(x, y, z));
         let [r_along, r_normal, r_binormal] = self.path.components(&Vector3::new(rx, ry, rz));
         let path_error = [along, normal, binormal, r_along, r_normal, r_binormal];
-        self.times.push(t);
-        self.errors.push(error);
-        self.path_errors.push([along, normal, binormal]);
-        self.positions.push(X_rigid.translation.vector.into());
         for (k, drive) in self.seen.drive.iter().enumerate() {
             self.peak_drive[k] = self.peak_drive[k].max(drive.abs());
             if drive.abs() > self.arm.model.coordinates()[k].limits.effort {
@@ -354,7 +352,13 @@ impl<'a> Run<'a> {
 
         let known = self.options.with_twin.then(|| self.static_part.at(t)).flatten();
         self.sample.static_m = known.unwrap_or([f64::NAN; 3]);
-        self.statics.push(self.sample.static_m);
+        self.record.push(&ErrorSample {
+            time_s: t,
+            error,
+            path_error: [along, normal, binormal],
+            rigid_position: X_rigid.translation.vector.into(),
+            static_m: self.sample.static_m,
+        });
         self.look_at_elements(t);
         let sample = &mut self.sample;
         sample.time_s = t;
@@ -457,18 +461,8 @@ impl<'a> Run<'a> {
 
     /// Figures of what was seen so far.
     fn summary(&self, robot: &Robot, motion: &Motion, options: &RunOptions) -> (Summary, Vec<Event>) {
-        let moves: Vec<(f64, f64)> = motion.trajectory.moves().iter().map(|m| (m.start, m.end)).collect();
-        let first_hz = self.arm.modes.frequencies_hz().first().copied().unwrap_or(0.0);
-        let settings = MetricSettings { settling_band_m: options.settling_band_m, lowest_hz: RINGING_FROM * first_hz };
-        let record = ErrorRecord {
-            times: &self.times,
-            errors: &self.errors,
-            rigid_positions: &self.positions,
-            quasi_static: self.resting_places(),
-            moves: &moves,
-        };
         // A run that stopped at once has nothing to measure.
-        let metrics = tcp_metrics_on_path(&record, Some(&self.path_errors), &settings).ok();
+        let metrics = self.record.metrics().ok();
         let peaks = self.contributions.peaks();
         let links: Vec<LinkFigures> = (self.flexible.spans.iter().enumerate())
             .map(|(k, span)| LinkFigures {
@@ -503,7 +497,7 @@ impl<'a> Run<'a> {
             robot: robot.name.clone(),
             trajectory: motion.name.clone(),
             links_model: self.flexible.links_model().into(),
-            duration_s: self.times.last().copied().unwrap_or(0.0),
+            duration_s: self.record.last_time_s().unwrap_or(0.0),
             stepper: StepperFigures::new(options, self.stepper.counts()),
             tcp: metrics.as_ref().filter(|_| options.with_twin).map(|m| self.tool_figures(m)),
             frequencies_hz: self.arm.modes.frequencies_hz(),
@@ -518,20 +512,13 @@ impl<'a> Run<'a> {
                 .zip(&self.peak_drive)
                 .map(|(c, peak)| (c.joint.clone(), *peak))
                 .collect(),
-            moves_s: moves.iter().map(|&(start, end)| [start, end]).collect(),
-            error_curve: crate::summary::thinned(&self.times, &self.errors),
+            moves_s: moves(motion).iter().map(|&(start, end)| [start, end]).collect(),
+            error_curve: self.record.largest_errors(CURVE_PIECES),
             caveats,
             ..Summary::default()
         };
         summary.headline = headline::headline(&summary, by_choice);
         (summary, events)
-    }
-
-    /// Where the tool comes to rest at each stop: the static part, unless servos bring the joints elsewhere or a load moves it.
-    fn resting_places(&self) -> Option<&[[f64; 3]]> {
-        let known = self.statics.iter().flatten().all(|x| x.is_finite());
-        let steady = self.arm.torque_driven.is_empty() && self.arm.loads.is_empty();
-        (known && steady).then_some(&self.statics)
     }
 
     fn tool_figures(&self, metrics: &TcpMetrics) -> TcpFigures {
@@ -540,7 +527,7 @@ impl<'a> Run<'a> {
             shares_at_peak: self.shares_at_peak(),
             ..TcpFigures::from(metrics).with_band(self.options.settling_band_m)
         };
-        match error_parts(&self.times, &self.errors, &self.statics) {
+        match self.record.parts() {
             Ok(parts) => figures.with_parts(&parts),
             Err(_) => figures,
         }
@@ -598,7 +585,7 @@ impl<'a> Run<'a> {
         for t in &self.payload_times {
             add(*t, EventKind::Load, "the payload changes".into());
         }
-        let reached = self.times.last().copied().unwrap_or(0.0);
+        let reached = self.record.last_time_s().unwrap_or(0.0);
         events.retain(|event| event.time_s <= reached + 1e-9);
         events.sort_by(|a, b| a.time_s.total_cmp(&b.time_s).then(a.kind.cmp(&b.kind)));
         events
@@ -639,7 +626,7 @@ impl<'a> Run<'a> {
         caveats.extend(validity::energy(self.energy.figures().imbalance));
         caveats.extend(validity::efforts(&kinds::EFFORT, coordinates, &self.peak_drive));
         for (c, count) in coordinates.iter().zip(&self.at_limit).filter(|(_, count)| **count > 0) {
-            let share = 100.0 * *count as f64 / self.times.len() as f64;
+            let share = 100.0 * *count as f64 / self.record.len() as f64;
             caveats.push(kinds::SERVO_LIMIT.found(format!("joint {:?}", c.joint), share, 0.0));
         }
         if matches!(self.options.stepper, StepperKind::Spook(_)) && !self.arm.proportional {
@@ -657,6 +644,11 @@ impl<'a> Run<'a> {
         }
         caveats
     }
+}
+
+/// Start and end of each move (s).
+fn moves(motion: &Motion) -> Vec<(f64, f64)> {
+    motion.trajectory.moves().iter().map(|m| (m.start, m.end)).collect()
 }
 
 /// Puts one deflection and its load along the axis of its joint.

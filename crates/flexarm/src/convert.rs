@@ -80,19 +80,14 @@ pub fn convert_until(
     }
     crate::result_files::check_free(&[output.to_owned()], options.overwrite)?;
 
+    if progress(0.0).is_break() {
+        return Err(Error::Interrupted { t: 0.0, partial: false });
+    }
     let mut partial = Partial::of(output)?;
     let mut recorder = recorder(&partial.path, to)?;
     // Messages name the file that was asked for.
-    let provisional = partial.path.clone();
-    let named = |error: LogError| match error {
-        LogError::Io { path, action, source } if path == provisional => {
-            LogError::Io { path: output.to_owned(), action, source }
-        }
-        LogError::Format { path, action, cause } if path == provisional => {
-            LogError::Format { path: output.to_owned(), action, cause }
-        }
-        other => other,
-    };
+    let hidden = partial.folder.clone();
+    let named = |error: LogError| error.with_path_for(&hidden, output);
     recorder.begin(source.header()).map_err(named)?;
     let (mut samples, mut span, mut stopped) = (0, None, None);
     let result = source.replay(&mut |sample: &Sample| -> Result<(), LogError> {
@@ -111,14 +106,7 @@ pub fn convert_until(
     }
     let result = result?;
     let Some((first, last)) = span else {
-        let what = source.warnings().pop().unwrap_or_else(|| "a recording without a single sample".into());
-        return Err(LogError::NotARecording {
-            path: input.to_owned(),
-            found: "no sample".into(),
-            expected: "at least one".into(),
-            mend: what,
-        }
-        .into());
+        return Err(no_sample(input, source.warnings().last()));
     };
     recorder.finish(&result).map_err(named)?;
     drop(recorder);
@@ -136,6 +124,13 @@ pub fn convert_until(
         lost,
         warnings: source.warnings(),
     })
+}
+
+/// A recording of which nothing can be shown; `why` is what its reader says about it.
+pub(crate) fn no_sample(path: &Path, why: Option<&String>) -> Error {
+    let mend = why.cloned().unwrap_or_else(|| "the run that should write it recorded nothing".into());
+    let (path, found, expected) = (path.to_owned(), "no sample".into(), "at least one".into());
+    LogError::NotARecording { path, found, expected, mend }.into()
 }
 
 /// Reads a recording into memory: its summary, if it holds one (MCAP, Parquet), its curves, and sentences about what is

@@ -328,8 +328,11 @@ fn table(path: &Path) -> Result<(WrenchFn, Vec<f64>), Error> {
     if header.first().is_none_or(|h| h != "time") || header.iter().any(|h| !NAMES.contains(&h.as_str())) {
         return Err(fail(format!("the header is {header:?}, expected time and some of fx, fy, fz, tx, ty, tz")));
     }
-    if let Some(twice) = (1..header.len()).find(|&k| header[..k].contains(&header[k])) {
-        return Err(fail(format!("the header names {:?} twice: remove or rename one of the columns", header[twice])));
+    let earlier = |k: usize| header[..k].iter().position(|name| *name == header[k]);
+    if let Some((k, first)) = (0..header.len()).find_map(|k| Some((k, earlier(k)?))) {
+        let (name, first, second) = (&header[k], first + 1, k + 1);
+        let mend = "remove or rename one of them";
+        return Err(fail(format!("the header names {name:?} twice, in columns {first} and {second}: {mend}")));
     }
     let mut rows: Vec<(f64, [f64; 6])> = Vec::new();
     for (number, line) in lines {

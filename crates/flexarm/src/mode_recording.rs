@@ -87,7 +87,7 @@ pub fn record_modes(
         (format!("mode {}", k + 1), format!("{:.4} Hz, from {} s", mode.frequency_hz(), start(k)))
     };
     header.metadata = vec![("flexarm.modes".into(), shown.iter().enumerate().map(row).collect())];
-    files.set.begin(&header)?;
+    files.begin(&header)?;
     let per_mode = (swings / SHOWN_HZ * RATE_HZ).round() as u64;
     let mut stage = Stage::new(robot, &posed, &linear, stations);
     for (k, mode) in shown.iter().enumerate() {

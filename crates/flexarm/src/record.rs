@@ -10,6 +10,7 @@ use flexarm_urdf::Geometry;
 use crate::error::Error;
 use crate::motion::Motion;
 use crate::options::{DriveModel, LinkModel, Outputs, RunOptions};
+use crate::result_files::Undo;
 use crate::robot::Robot;
 use crate::summary::Files;
 
@@ -17,6 +18,17 @@ use crate::summary::Files;
 pub(crate) struct Recordings {
     pub(crate) set: RecorderSet,
     pub(crate) names: Files,
+    /// Folders that were made for them.
+    folders: Undo,
+}
+
+impl Recordings {
+    /// Makes the files. If one cannot be made, none is left, nor is a folder that was made for them.
+    pub(crate) fn begin(&mut self, header: &RunHeader) -> Result<(), Error> {
+        self.set.begin(header)?;
+        self.folders.done = true;
+        Ok(())
+    }
 }
 
 /// Names of the files in an output folder.
@@ -72,7 +84,7 @@ fn remove_leftovers(outputs: &Outputs, ours: &[&str]) -> Result<(), Error> {
 /// Recorders for the outputs; refuses to overwrite before anything is made. `in_study`: the recording of the study is being
 /// written too.
 pub(crate) fn recorders(outputs: Option<&Outputs>, in_study: bool) -> Result<Recordings, Error> {
-    let mut recordings = Recordings { set: RecorderSet::new(), names: Files::default() };
+    let mut recordings = Recordings { set: RecorderSet::new(), names: Files::default(), folders: Undo::default() };
     let Some(outputs) = outputs else { return Ok(recordings) };
     let mut ours = vec!["report.html", "report.md", "summary.json"];
     let written = [
@@ -84,13 +96,6 @@ pub(crate) fn recorders(outputs: Option<&Outputs>, in_study: bool) -> Result<Rec
     ];
     ours.extend(written.into_iter().filter_map(|(is_written, file)| is_written.then_some(file)));
     refuse_others(outputs, if in_study { &[STUDY_FILE] } else { &[] })?;
-    if outputs.overwrite {
-        remove_leftovers(outputs, &ours)?;
-    }
-    std::fs::create_dir_all(&outputs.folder).map_err(|e| Error::File {
-        path: outputs.folder.clone(),
-        what: format!("the output folder cannot be made: {e}"),
-    })?;
     let options = CreateOptions::default().with_overwrite(outputs.overwrite);
     let path = |name: &str| outputs.folder.join(name);
     let text = |name: &str| Some(path(name).display().to_string());
@@ -122,6 +127,15 @@ pub(crate) fn recorders(outputs: Option<&Outputs>, in_study: bool) -> Result<Rec
     if outputs.figures {
         recordings.names.figures = text(FIGURES_FOLDER);
     }
+    // Nothing is removed before all that is to come in its place can be written.
+    recordings.set.check()?;
+    if outputs.overwrite {
+        remove_leftovers(outputs, &ours)?;
+    }
+    recordings.folders.make(&outputs.folder).map_err(|e| Error::File {
+        path: outputs.folder.clone(),
+        what: format!("the output folder cannot be made: {e}"),
+    })?;
     Ok(recordings)
 }
 

@@ -67,14 +67,15 @@ fn partial(path: &Path) -> PathBuf {
 
 /// Removes on its way out what was made, unless all went well.
 #[derive(Default)]
-struct Undo {
+pub(crate) struct Undo {
     files: Vec<PathBuf>,
     folders: Vec<PathBuf>,
-    done: bool,
+    pub(crate) done: bool,
 }
 
 impl Undo {
-    fn make(&mut self, folder: &Path) -> std::io::Result<()> {
+    /// Makes a folder, and those above it that are missing.
+    pub(crate) fn make(&mut self, folder: &Path) -> std::io::Result<()> {
         let missing: Vec<PathBuf> =
             folder.ancestors().take_while(|f| !f.as_os_str().is_empty() && !f.exists()).map(Path::to_owned).collect();
         std::fs::create_dir_all(folder)?;

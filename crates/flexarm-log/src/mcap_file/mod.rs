@@ -120,7 +120,7 @@ impl Recorder for McapRecorder {
         let meshes = mesh_files(header)?;
         let file = SharedTail::new(self.options.create(&self.path)?);
         let error = mcap_error(&self.path, "write the description of the run");
-        let mut open = Open::new(file, header, start, self.options.flush_clock()).map_err(error)?;
+        let mut open = Open::new(file, header, start, self.options.flush_clock(&self.path)).map_err(error)?;
         let error = mcap_error(&self.path, "write the description of the run");
         open.describe(header, &meshes).map_err(error)?;
         self.state = State::Open(Box::new(open));
@@ -134,6 +134,7 @@ impl Recorder for McapRecorder {
         open.sample(stamp, sample).map_err(mcap_error(&self.path, "write a sample"))?;
         if open.flush.due() || open.output.is_full() {
             open.output.flush().map_err(LogError::io(&self.path, "write samples"))?;
+            open.flush.done();
         }
         Ok(())
     }

@@ -7,7 +7,7 @@ use mcap::{McapResult, WriteOptions, Writer};
 
 use super::cdr::Cdr;
 use super::messages::Stamp;
-use super::provisional::{Index, MESSAGE_OVERHEAD, push_message};
+use super::provisional::{Index, MESSAGE_OVERHEAD, messages_within, push_message};
 use crate::tail_file::SharedTail;
 
 /// Uncompressed size at which a chunk is closed.
@@ -19,6 +19,8 @@ pub(crate) struct Output {
     file: SharedTail,
     /// Message records of the open chunk, as they are in it.
     chunk: Vec<u8>,
+    /// Bytes of the open chunk that are in the file already, provisionally.
+    shown: usize,
     /// What a provisional end says about the rest of the file.
     index: Index,
     cdr: Cdr,
@@ -33,7 +35,7 @@ impl Output {
             .disable_seeking(true)
             .compression_threads(0); // same bytes on every machine
         let writer = options.create(file.clone())?;
-        Ok(Self { writer, file, chunk: Vec::new(), index: Index::new(), cdr: Cdr::default() })
+        Ok(Self { writer, file, chunk: Vec::new(), shown: 0, index: Index::new(), cdr: Cdr::default() })
     }
 
     /// Adds a topic of ROS 2 messages; returns its number.
@@ -72,6 +74,7 @@ impl Output {
 
     pub(crate) fn close_chunk(&mut self) -> McapResult<()> {
         self.chunk.clear();
+        self.shown = 0;
         self.writer.flush()
     }
 
@@ -86,11 +89,28 @@ impl Output {
         self.file.look(|start, pending| index.read(start, pending));
         let end = self.file.position();
         let written = self.file.set_tail(&self.index.end(end, &self.chunk));
-        if written.is_err() && self.file.pending() > 0 {
-            // Perhaps there is room for the closed chunks at least.
-            let _ = self.file.set_tail(&self.index.end(end, &[]));
+        match written {
+            Ok(()) => self.shown = self.chunk.len(),
+            Err(_) => self.show_what_fits(end),
         }
         written
+    }
+
+    /// On a full disk: the closed chunks, and as much of the open one as there is room for.
+    fn show_what_fits(&mut self, end: u64) {
+        // Without a closed chunk that waits, the file must not be left with less than it shows.
+        let least = if self.file.pending() > 0 { None } else { Some(self.shown) };
+        let mut part = self.chunk.len();
+        while part > 0 {
+            part = messages_within(&self.chunk, part / 2);
+            if least.is_some_and(|least| part <= least) {
+                return;
+            }
+            if self.file.set_tail(&self.index.end(end, &self.chunk[..part])).is_ok() {
+                self.shown = part;
+                return;
+            }
+        }
     }
 
     pub(crate) fn metadata(&mut self, name: &str, pairs: impl IntoIterator<Item = (String, String)>) -> McapResult<()> {

@@ -231,6 +231,15 @@ fn push_chunk(file: &mut Vec<u8>, messages: &[u8]) {
     }
 }
 
+/// Length of the whole messages among the first `length` bytes of a chunk.
+pub(crate) fn messages_within(messages: &[u8], length: usize) -> usize {
+    let mut at = 0;
+    while let Some((_, body)) = record(&messages[..length], at) {
+        at += 9 + body.len();
+    }
+    at
+}
+
 /// Adds a message as it is inside a chunk.
 pub(crate) fn push_message(chunk: &mut Vec<u8>, header: &MessageHeader, data: &[u8]) {
     chunk.push(MESSAGE);

@@ -13,6 +13,7 @@ use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOp
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 
 use super::cdr::CdrReader;
+use super::wall::caught;
 use super::{broken_end, exact_time, not_a_recording, stem};
 use crate::mcap_file::channels::topic_names;
 use crate::run_json::{self, RESULT_JSON, RUN_JSON, meshes};
@@ -178,7 +179,7 @@ enum Flow {
 /// Calls `take` with every record, those in chunks included. Returns why the file ends before its end, if it does.
 fn walk(path: &Path, take: &mut dyn FnMut(Record<'_>) -> Result<Flow, LogError>) -> Result<Option<String>, LogError> {
     /// Sizes up to this are believed even in small files: what a chunk unpacks to.
-    const LARGE: u64 = 64 << 20;
+    const LARGE: u64 = 32 << 20;
     const READ_BYTES: usize = 64 << 10;
 
     let mut file = File::open(path).map_err(LogError::io(path, "open the recording"))?;
@@ -188,7 +189,13 @@ fn walk(path: &Path, take: &mut dyn FnMut(Record<'_>) -> Result<Flow, LogError>)
         .with_prevalidate_chunk_crcs(true) // a damaged chunk gives nothing, rather than some numbers and then an error
         .with_record_length_limit(usize::try_from(length.max(LARGE)).unwrap_or(usize::MAX));
     let mut reader = LinearReader::new_with_options(options);
-    while let Some(event) = reader.next_event() {
+    loop {
+        let from = &mut reader;
+        let event = match caught(move || from.next_event()) {
+            Ok(Some(event)) => event,
+            Ok(None) => break,
+            Err(cause) => return Ok(Some(cause)),
+        };
         match event {
             Ok(LinearReadEvent::ReadRequest(wanted)) => {
                 let size = usize::try_from(length.max(LARGE)).unwrap_or(usize::MAX).min(wanted).max(READ_BYTES);
@@ -196,9 +203,10 @@ fn walk(path: &Path, take: &mut dyn FnMut(Record<'_>) -> Result<Flow, LogError>)
                 reader.notify_read(read);
             }
             Ok(LinearReadEvent::Record { opcode, data }) => {
-                let record = match mcap::parse_record(opcode, data) {
-                    Ok(record) => record,
-                    Err(error) => return Ok(Some(in_words(&error))),
+                let record = match caught(move || mcap::parse_record(opcode, data)) {
+                    Ok(Ok(record)) => record,
+                    Ok(Err(error)) => return Ok(Some(in_words(&error))),
+                    Err(cause) => return Ok(Some(cause)),
                 };
                 if take(record)? == Flow::Stop {
                     return Ok(None);

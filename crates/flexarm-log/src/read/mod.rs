@@ -19,6 +19,8 @@ mod mcap_run;
 mod parquet_table;
 #[cfg(feature = "rerun")]
 mod rrd_run;
+#[cfg(feature = "mcap")]
+mod wall;
 
 use std::fmt;
 use std::io::Read;

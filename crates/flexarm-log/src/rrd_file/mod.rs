@@ -98,7 +98,7 @@ impl Recorder for RrdRecorder {
             return Err(LogError::begun_twice(&self.path));
         }
         let file = self.options.create(&self.path)?;
-        let clock = self.options.flush_clock();
+        let clock = self.options.flush_clock(&self.path);
         let open = || -> Result<Open, StreamError> {
             let mut store = Store::new(file, content_hash(header, &[]), clock)?;
             store.describe(header, &Seat::Alone)?;
@@ -253,12 +253,13 @@ impl RunWriter {
         if self.tracks.waiting() >= CHUNK_ROWS {
             self.commit(store)?;
         }
-        if store.flush.due() {
+        if store.flush.due() || store.stream.is_full() {
             // The rows that wait, and the ways so far, as a provisional end.
             let mut ids = *store.stream.ids();
             let mut chunks = self.tracks.rows(&mut ids)?;
             chunks.extend(self.tracks.ways(&mut ids)?);
             store.stream.set_tail(&store.recording, &chunks)?;
+            store.flush.done();
         }
         Ok(())
     }

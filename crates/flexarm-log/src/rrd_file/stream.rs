@@ -91,6 +91,11 @@ impl RrdStream {
         Ok(Self { file, ids: Ids::default(), manifests: Vec::new() })
     }
 
+    /// Whether so much waits that [`RrdStream::set_tail`] should be called even before its time.
+    pub(crate) fn is_full(&self) -> bool {
+        self.file.is_full()
+    }
+
     /// Identifiers for the next chunks. Chunks of a provisional end take a copy, so that they leave no gap.
     pub(crate) fn ids(&mut self) -> &mut Ids {
         &mut self.ids

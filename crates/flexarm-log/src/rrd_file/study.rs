@@ -91,7 +91,7 @@ impl Recorder for StudySeat {
         let error = stream_error(&self.path, "write the description of the run");
         if shared.is_none() {
             let file = self.options.create(&self.path)?;
-            let open = Store::new(file, content_hash(header, &self.labels), self.options.flush_clock())
+            let open = Store::new(file, content_hash(header, &self.labels), self.options.flush_clock(&self.path))
                 .and_then(|mut store| store.describe(header, &self.seat).map(|()| store));
             *shared = Some(open.map_err(stream_error(&self.path, "write the description of the study"))?);
         }

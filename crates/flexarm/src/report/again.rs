@@ -7,7 +7,7 @@ use flexarm_log::{EventKind, RunHeader, Trace};
 use serde::Serialize;
 
 use super::{ReportRun, figures, html};
-use crate::convert::{read_run, same_file};
+use crate::convert::{no_sample, read_run, same_file};
 use crate::error::Error;
 use crate::result_files::{check_free, write_all};
 use crate::summary::{StepperFigures, Summary, TcpFigures};
@@ -84,6 +84,9 @@ pub fn report(recordings: &[PathBuf], options: &ReportOptions) -> Result<ReportF
     let mut runs: Vec<(String, Summary, Trace)> = Vec::new();
     for Input { path, of_study } in &inputs {
         let (json, trace, told) = read_run(path)?;
+        if trace.rows.is_empty() {
+            return Err(no_sample(path, told.last()));
+        }
         let name = format!("{}: ", path.display());
         // Some sentences name the file already.
         let named = |sentence: String| if sentence.starts_with(&name) { sentence } else { name.clone() + &sentence };

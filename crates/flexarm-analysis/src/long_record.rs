@@ -1,0 +1,488 @@
+//! A record that grows while a run goes on, in memory that does not.
+//!
+//! Up to [`LongRecord::MOST`] samples all are kept, and the figures are those of [`tcp_metrics_on_path`]. Beyond, stops that
+//! are over are measured and their samples are dropped, and figures of the record as a whole are those that were gathered
+//! sample by sample, by the same sums. What is neither exact nor bounded otherwise:
+//!
+//! * a move or a stop that is longer than that by itself is thinned: the older half of it, except for the beginning of the
+//!   stop, loses every second sample, again and again, so that what is recent has all of them. Only how a stop ends
+//!   depends on it (final value, settling), to within one distance of samples;
+//! * where no stop has a frequency, that of the record is the one of the samples that are left: its end.
+//!
+//! Start at [`LongRecord::push`].
+
+use nalgebra::Vector3;
+
+use crate::error_parts::{ErrorParts, error_parts};
+use crate::hold::HoldMetrics;
+use crate::metrics::{MetricSettings, TcpMetrics, tcp_metrics_on_path};
+use crate::record::{ErrorRecord, RecordError};
+
+/// First samples of a stop that are never dropped, and last ones of a move: ringing is seen there, and the way of arrival.
+const RINGING: usize = 1 << 15;
+const ARRIVAL: usize = 64;
+/// Blocks of the curve of largest errors; half of them when there are more.
+const MOST_BLOCKS: usize = 1 << 13;
+
+/// One sample: see the fields of [`ErrorRecord`].
+#[derive(Debug, Clone, Copy)]
+pub struct ErrorSample {
+    /// s.
+    pub time_s: f64,
+    /// Translation (m) and rotation vector (rad), world axes.
+    pub error: [f64; 6],
+    /// Translation along the path axes, m.
+    pub path_error: [f64; 3],
+    /// Place of the rigid tool, m.
+    pub rigid_position: [f64; 3],
+    /// Static part of the translation, m; NaN where it is not known.
+    pub static_m: [f64; 3],
+}
+
+/// See the module.
+#[derive(Debug, Clone)]
+pub struct LongRecord {
+    settings: MetricSettings,
+    /// Start and end of each move, s.
+    moves: Vec<(f64, f64)>,
+    /// Whether the tool comes to rest where the static part is.
+    rests_there: bool,
+    most: usize,
+    times: Vec<f64>,
+    errors: Vec<[f64; 6]>,
+    path_errors: Vec<[f64; 3]>,
+    positions: Vec<[f64; 3]>,
+    statics: Vec<[f64; 3]>,
+    totals: Totals,
+    curve: Curve,
+    /// Moves whose samples are no longer kept, and the stops after them.
+    past: usize,
+    holds: Vec<HoldMetrics>,
+    condensed: bool,
+    /// The first thing that was wrong with a part that is no longer kept.
+    fault: Option<RecordError>,
+}
+
+impl LongRecord {
+    /// Samples that are kept one by one: 262,144, which is 8 minutes and 44 seconds at 500 samples a second.
+    pub const MOST: usize = 1 << 18;
+
+    /// An empty record of a motion with these moves (start and end, s, ascending). `rests_there` says that the tool comes
+    /// to rest where the static part of its error is: it is then the final value of stops ([`ErrorRecord::quasi_static`]).
+    #[must_use]
+    pub fn new(moves: Vec<(f64, f64)>, rests_there: bool, settings: MetricSettings) -> Self {
+        Self { rests_there, ..Self::keeping(Self::MOST, moves, settings) }
+    }
+
+    fn keeping(most: usize, moves: Vec<(f64, f64)>, settings: MetricSettings) -> Self {
+        Self {
+            settings,
+            moves,
+            rests_there: false,
+            most,
+            times: Vec::new(),
+            errors: Vec::new(),
+            path_errors: Vec::new(),
+            positions: Vec::new(),
+            statics: Vec::new(),
+            totals: Totals::default(),
+            curve: Curve::default(),
+            past: 0,
+            holds: Vec::new(),
+            condensed: false,
+            fault: None,
+        }
+    }
+
+    /// Adds a sample.
+    pub fn push(&mut self, sample: &ErrorSample) {
+        self.times.push(sample.time_s);
+        self.errors.push(sample.error);
+        self.path_errors.push(sample.path_error);
+        self.positions.push(sample.rigid_position);
+        self.statics.push(sample.static_m);
+        let begun = self.moves.partition_point(|(start, _)| *start <= sample.time_s);
+        let moves = begun > 0 && sample.time_s <= self.moves[begun - 1].1;
+        self.totals.add(sample, moves);
+        self.curve.add(norm3(&sample.error));
+        if self.times.len() > self.most {
+            self.condense();
+        }
+    }
+
+    /// Number of samples that were added.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.totals.count
+    }
+
+    /// Whether there is none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.totals.count == 0
+    }
+
+    /// Time of the last sample, s.
+    #[must_use]
+    pub fn last_time_s(&self) -> Option<f64> {
+        self.times.last().copied()
+    }
+
+    /// The figures of all samples so far.
+    ///
+    /// # Errors
+    /// As [`tcp_metrics_on_path`].
+    pub fn metrics(&self) -> Result<TcpMetrics, RecordError> {
+        let rest = self.part(self.times.len(), self.past..self.moves.len())?;
+        if !self.condensed {
+            return Ok(rest);
+        }
+        if let Some(fault) = &self.fault {
+            return Err(fault.clone());
+        }
+        let holds: Vec<HoldMetrics> = self.holds.iter().chain(&rest.holds).cloned().collect();
+        let settling = holds.iter().map(|hold| hold.settling_s).reduce(|a, b| Some(a?.max(b?)));
+        let strongest = holds.iter().filter_map(|hold| hold.line).max_by(|a, b| a.amplitude.total_cmp(&b.amplitude));
+        let totals = &self.totals;
+        let [tangential_peak_m, normal_peak_m, binormal_peak_m, lateral_peak_m] = totals.path_peaks;
+        Ok(TcpMetrics {
+            peak_m: totals.peak.1,
+            t_peak_s: totals.peak.0,
+            rms_m: totals.rms(0),
+            static_sag_m: totals.first_m,
+            peak_rad: totals.peak_rad,
+            rms_rad: totals.rms(1),
+            settling_s: settling.flatten(),
+            overshoot_m: holds.iter().map(|hold| hold.overshoot_m).fold(0.0, f64::max),
+            dominant_hz: strongest.map_or(rest.dominant_hz, |line| Some(line.hz)),
+            tangential_peak_m,
+            normal_peak_m,
+            binormal_peak_m,
+            lateral_peak_m,
+            path_accuracy_m: totals.off_path_m,
+            path_rms_m: (totals.squares / totals.moving.max(1) as f64).sqrt(),
+            holds,
+            ..rest
+        })
+    }
+
+    /// The translation in its static and its dynamic part.
+    ///
+    /// # Errors
+    /// As [`error_parts`].
+    pub fn parts(&self) -> Result<ErrorParts, RecordError> {
+        if !self.condensed {
+            return error_parts(&self.times, &self.errors, &self.statics);
+        }
+        let (totals, statics) = (&self.totals, &self.totals.statics);
+        if !statics.known {
+            return Err(RecordError::NotFinite { what: "statics", index: 0 });
+        }
+        let size = totals.peak.1;
+        let static_at_peak_m = if size > 0.0 { statics.along_peak / size } else { 0.0 };
+        Ok(ErrorParts {
+            static_at_peak_m,
+            dynamic_at_peak_m: size - static_at_peak_m,
+            static_peak_m: statics.peak_m,
+            dynamic_peak_m: statics.dynamic_peak.1,
+            t_dynamic_peak_s: statics.dynamic_peak.0,
+            dynamic_rms_m: (statics.area / (totals.last_s - totals.start_s)).sqrt(),
+        })
+    }
+
+    /// Largest size of the translation in each of `pieces` equal pieces of the record, fewer for a record of fewer samples.
+    #[must_use]
+    pub fn largest_errors(&self, pieces: usize) -> Vec<f64> {
+        if self.condensed {
+            return largest_of(&self.curve.blocks, pieces);
+        }
+        largest_of(&self.errors.iter().map(norm3).collect::<Vec<f64>>(), pieces)
+    }
+
+    /// The figures of the first `length` samples that are kept, with some of the moves.
+    fn part(&self, length: usize, moves: std::ops::Range<usize>) -> Result<TcpMetrics, RecordError> {
+        let record = ErrorRecord {
+            times: &self.times[..length],
+            errors: &self.errors[..length],
+            rigid_positions: &self.positions[..length],
+            quasi_static: (self.rests_there && self.totals.statics.known).then_some(&self.statics[..length]),
+            moves: &self.moves[moves],
+        };
+        tcp_metrics_on_path(&record, Some(&self.path_errors[..length]), &self.settings)
+    }
+
+    /// Measures the stops that are over and drops their samples; thins what is left if that is still much.
+    fn condense(&mut self) {
+        self.condensed = true;
+        let now = self.times[self.times.len() - 1];
+        // Times of moves and samples come from different sums.
+        let slack = 1e-9 * (now - self.totals.start_s);
+        let done = self.moves.partition_point(|(start, _)| *start + slack < now).saturating_sub(1);
+        if done > self.past {
+            // The sample at the start of the next move, or before it, is the last of this part and the first of the next.
+            let start = self.moves[done].0;
+            let end = self.times.partition_point(|t| *t <= start + slack);
+            match self.part(end, self.past..done) {
+                Ok(metrics) => self.holds.extend(metrics.holds),
+                Err(fault) => self.fault = self.fault.take().or(Some(fault)),
+            }
+            self.keep(|k, _| k + 1 >= end);
+            self.past = done;
+        }
+        if self.times.len() > self.most / 2 {
+            let stop = self.moves.get(self.past).map_or(0.0, |(_, end)| *end);
+            let (old, stop) = (self.times.len() / 2, self.times.partition_point(|t| *t < stop));
+            let (arrival, ringing) = (ARRIVAL.min(self.most / 8), RINGING.min(self.most / 8));
+            self.keep(|k, _| k >= old || k % 2 == 0 || k + arrival >= stop && k < stop + ringing);
+        }
+    }
+
+    /// Drops samples by their index and time.
+    fn keep(&mut self, keep: impl Fn(usize, f64) -> bool) {
+        let kept: Vec<bool> = self.times.iter().enumerate().map(|(k, t)| keep(k, *t)).collect();
+        fn retain<T>(values: &mut Vec<T>, kept: &[bool]) {
+            let mut kept = kept.iter();
+            values.retain(|_| kept.next().copied().unwrap_or(true));
+        }
+        retain(&mut self.times, &kept);
+        retain(&mut self.errors, &kept);
+        retain(&mut self.path_errors, &kept);
+        retain(&mut self.positions, &kept);
+        retain(&mut self.statics, &kept);
+    }
+}
+
+/// Largest value in each of equal pieces.
+fn largest_of(values: &[f64], pieces: usize) -> Vec<f64> {
+    let pieces = pieces.min(values.len());
+    let range = |k: usize| {
+        let start = k * values.len() / pieces;
+        start..((k + 1) * values.len() / pieces).max(start + 1)
+    };
+    (0..pieces).map(|k| values[range(k)].iter().copied().fold(0.0, f64::max)).collect()
+}
+
+fn norm3(error: &[f64; 6]) -> f64 {
+    (error[0] * error[0] + error[1] * error[1] + error[2] * error[2]).sqrt()
+}
+
+/// Figures of the record as a whole, in the order and by the sums of [`tcp_metrics_on_path`].
+#[derive(Debug, Clone, Default)]
+struct Totals {
+    count: usize,
+    start_s: f64,
+    last_s: f64,
+    /// Sizes of translation and rotation in the last sample.
+    last: [f64; 2],
+    first_m: f64,
+    /// Time and size.
+    peak: (f64, f64),
+    peak_rad: f64,
+    /// Integrals of the squares of both sizes.
+    areas: [f64; 2],
+    path_peaks: [f64; 4],
+    /// In moves: largest distance from the path, sum of its squares, number of samples.
+    off_path_m: f64,
+    squares: f64,
+    moving: usize,
+    statics: StaticTotals,
+}
+
+/// The same of the static part and the rest, in the order and by the sums of [`error_parts`].
+#[derive(Debug, Clone)]
+struct StaticTotals {
+    known: bool,
+    peak_m: f64,
+    /// Static part times error, where the error is largest (m²).
+    along_peak: f64,
+    /// Time and size.
+    dynamic_peak: (f64, f64),
+    /// Square of the rest in the last sample, and the integral of it.
+    last: f64,
+    area: f64,
+}
+
+impl Default for StaticTotals {
+    fn default() -> Self {
+        Self { known: true, peak_m: 0.0, along_peak: 0.0, dynamic_peak: (0.0, 0.0), last: 0.0, area: 0.0 }
+    }
+}
+
+impl StaticTotals {
+    /// `since` is the time since the sample before (s), `None` for the first one.
+    fn add(&mut self, time_s: f64, since: Option<f64>, error: Vector3<f64>, resting: Vector3<f64>, is_peak: bool) {
+        self.known &= resting.iter().all(|x| x.is_finite());
+        let rest = error - resting;
+        self.peak_m = if since.is_none() { resting.norm() } else { self.peak_m.max(resting.norm()) };
+        if since.is_none() || rest.norm() > self.dynamic_peak.1 {
+            self.dynamic_peak = (time_s, rest.norm());
+        }
+        if is_peak {
+            self.along_peak = resting.dot(&error);
+        }
+        let squares = rest.norm_squared();
+        self.area += since.map_or(0.0, |since| 0.5 * (self.last + squares) * since);
+        self.last = squares;
+    }
+}
+
+impl Totals {
+    fn add(&mut self, sample: &ErrorSample, moves: bool) {
+        let ErrorSample { time_s, error: e, path_error: [t, n, b], static_m, .. } = *sample;
+        let since = (self.count > 0).then_some(time_s - self.last_s);
+        let sizes = [Vector3::new(e[0], e[1], e[2]).norm(), Vector3::new(e[3], e[4], e[5]).norm()];
+        if self.count == 0 {
+            (self.start_s, self.first_m) = (time_s, sizes[0]);
+            self.peak_rad = sizes[1];
+        } else {
+            for ((area, before), size) in self.areas.iter_mut().zip(self.last).zip(sizes) {
+                *area += 0.5 * (before.powi(2) + size.powi(2)) * (time_s - self.last_s);
+            }
+        }
+        let is_peak = self.count == 0 || sizes[0] > self.peak.1;
+        if is_peak {
+            self.peak = (time_s, sizes[0]);
+        }
+        self.statics.add(time_s, since, Vector3::new(e[0], e[1], e[2]), static_m.into(), is_peak);
+        self.peak_rad = if sizes[1] > self.peak_rad { sizes[1] } else { self.peak_rad };
+        for (peak, value) in self.path_peaks.iter_mut().zip([t, n, b, n.hypot(b)]) {
+            *peak = peak.max(value.abs());
+        }
+        if moves {
+            self.off_path_m = self.off_path_m.max(n.hypot(b));
+            self.squares += n * n + b * b;
+            self.moving += 1;
+        }
+        (self.last_s, self.last) = (time_s, sizes);
+        self.count += 1;
+    }
+
+    /// Root of the time average of the squares of translation (0) or rotation (1).
+    fn rms(&self, which: usize) -> f64 {
+        match self.count {
+            0 | 1 => self.last[which],
+            _ => (self.areas[which] / (self.last_s - self.start_s)).sqrt(),
+        }
+    }
+}
+
+/// Largest errors in blocks of equally many samples, which double when there are too many.
+#[derive(Debug, Clone)]
+struct Curve {
+    blocks: Vec<f64>,
+    size: usize,
+    /// Samples in the last block.
+    filled: usize,
+}
+
+impl Default for Curve {
+    fn default() -> Self {
+        Self { blocks: Vec::new(), size: 1, filled: 1 }
+    }
+}
+
+impl Curve {
+    fn add(&mut self, value: f64) {
+        if self.filled < self.size {
+            self.filled += 1;
+            if let Some(last) = self.blocks.last_mut() {
+                *last = last.max(value);
+            }
+            return;
+        }
+        if self.blocks.len() == MOST_BLOCKS {
+            self.blocks = self.blocks.chunks(2).map(|pair| pair.iter().copied().fold(0.0, f64::max)).collect();
+            self.size *= 2;
+        }
+        self.blocks.push(value);
+        self.filled = 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A tool that moves along x for half a second and then rings, again and again.
+    fn sample(k: u32, moves: &[(f64, f64)]) -> ErrorSample {
+        let t = f64::from(k) * 1e-3;
+        let since = moves.iter().rev().find(|(_, end)| *end <= t).map_or(1e9, |(_, end)| t - end);
+        let ringing = 1e-3 * (1.0 + 0.1 * (0.7 * t).sin()) * (-6.0 * since).exp() * (60.0 * since).cos();
+        let travel: f64 = moves.iter().map(|(start, end)| (t.clamp(*start, *end) - start) * 0.3).sum();
+        ErrorSample {
+            time_s: t,
+            error: [ringing, 0.0, -2e-4, 0.0, 1e-4 * ringing, 0.0],
+            path_error: [ringing, 2e-4, 1e-5 * t.sin()],
+            rigid_position: [travel, 0.0, 0.5],
+            static_m: [0.0, 0.0, -2e-4],
+        }
+    }
+
+    /// Truth: the same samples measured as one record.
+    #[test]
+    fn stops_and_totals_of_a_condensed_record_are_those_of_the_whole() {
+        let moves: Vec<(f64, f64)> = (0..12).map(|k| (f64::from(k) * 2.0, f64::from(k) * 2.0 + 0.5)).collect();
+        let settings = MetricSettings::default();
+        let mut whole = LongRecord::keeping(usize::MAX, moves.clone(), settings);
+        let mut bounded = LongRecord::keeping(5000, moves.clone(), settings);
+        let mut most = 0;
+        for k in 0..24_000 {
+            let sample = sample(k, &moves);
+            whole.push(&sample);
+            bounded.push(&sample);
+            most = most.max(bounded.times.len());
+        }
+        assert!(bounded.condensed && most <= 5001 && bounded.past > 8, "{most} samples, {} moves", bounded.past);
+        assert_eq!((bounded.len(), bounded.last_time_s()), (whole.len(), whole.last_time_s()));
+        // To the last bit, but for the path axes of a stop, which are those of its own move.
+        assert_eq!(bounded.metrics().unwrap(), whole.metrics().unwrap());
+        assert_eq!(bounded.parts().unwrap(), whole.parts().unwrap());
+        let curves = [bounded.largest_errors(240), whole.largest_errors(240)];
+        assert_eq!(curves[0].len(), 240);
+        for (a, b) in curves[0].iter().zip(&curves[1]) {
+            assert!((a - b).abs() < 0.2 * b, "{a} {b}");
+        }
+    }
+
+    /// Truth: the closed form of a decaying exponential, t = ln(A/band)/rate; one stop longer than what is kept.
+    #[test]
+    fn a_stop_longer_than_what_is_kept_still_settles_when_it_does() {
+        let moves = vec![(0.0, 0.5)];
+        let mut record =
+            LongRecord::keeping(4000, moves, MetricSettings { settling_band_m: 1e-4, ..MetricSettings::default() });
+        for k in 0..200_000_u32 {
+            let t = f64::from(k) * 1e-3;
+            let error = if t < 0.5 { 0.0 } else { 1e-2 * (-0.05 * (t - 0.5)).exp() };
+            let rigid_position = [0.3 * t.min(0.5), 0.0, 0.0];
+            let path_error = [error, 0.0, 0.0];
+            record.push(&ErrorSample {
+                time_s: t,
+                error: [error, 0.0, 0.0, 0.0, 0.0, 0.0],
+                path_error,
+                rigid_position,
+                static_m: [f64::NAN; 3],
+            });
+            assert!(record.times.len() <= 4001);
+        }
+        let metrics = record.metrics().unwrap();
+        let truth = (1e-2_f64 / 1e-4).ln() / 0.05; // 92.1 s
+        let settling = metrics.settling_s.unwrap();
+        // The final value is an average over the last quarter, and samples are far apart there.
+        assert!((settling - truth).abs() < 1.0, "{settling} s, {truth} s");
+        assert_eq!(metrics.peak_m, 1e-2);
+        assert_eq!(metrics.holds.len(), 1);
+        assert!(record.parts().is_err(), "a static part that is not known");
+    }
+
+    #[test]
+    fn a_fault_in_a_part_that_was_dropped_is_not_forgotten() {
+        let moves: Vec<(f64, f64)> = (0..12).map(|k| (f64::from(k) * 2.0, f64::from(k) * 2.0 + 0.5)).collect();
+        let mut record = LongRecord::keeping(5000, moves.clone(), MetricSettings::default());
+        for k in 0..24_000 {
+            let mut sample = sample(k, &moves);
+            sample.error[1] = if k == 700 { f64::NAN } else { 0.0 };
+            record.push(&sample);
+        }
+        assert!(matches!(record.metrics(), Err(RecordError::NotFinite { .. })));
+    }
+}

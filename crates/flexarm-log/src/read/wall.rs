@@ -1,0 +1,51 @@
+//! The last wall before what a dependency makes of a damaged file.
+//!
+//! Sizes that a file claims are checked before a dependency sees them; what still goes wrong inside it ends here.
+
+use std::any::Any;
+use std::cell::Cell;
+use std::panic::AssertUnwindSafe;
+use std::sync::Once;
+
+thread_local! {
+    /// Whether a panic of this thread is one that is caught here.
+    static CAUGHT: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Calls a reader of a dependency. A panic in it is an error in words, and says nothing by itself. What the reader has
+/// changed must not be used after an error.
+pub(super) fn caught<T>(read: impl FnOnce() -> T) -> Result<T, String> {
+    static QUIET: Once = Once::new();
+    QUIET.call_once(|| {
+        let usual = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |panic| {
+            if !CAUGHT.get() {
+                usual(panic);
+            }
+        }));
+    });
+    let before = CAUGHT.replace(true);
+    let result = std::panic::catch_unwind(AssertUnwindSafe(read));
+    CAUGHT.set(before);
+    result.map_err(|panic| format!("its reader gave up: {}", message(panic.as_ref())))
+}
+
+/// What a panic says, on one short line.
+fn message(panic: &(dyn Any + Send)) -> String {
+    let text = panic.downcast_ref::<&str>().copied().or_else(|| panic.downcast_ref::<String>().map(String::as_str));
+    text.unwrap_or("without a word").chars().map(|c| if c.is_control() { ' ' } else { c }).take(120).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_behind_the_wall_is_an_error_with_its_words() {
+        assert_eq!(caught(|| 1 + 1), Ok(2));
+        let (empty, k) = (Vec::<u8>::new(), 3);
+        let error = caught(|| empty[k]).unwrap_err();
+        assert!(error.contains("index out of bounds"), "{error}");
+        assert!(!CAUGHT.get());
+    }
+}
