@@ -12,6 +12,7 @@ use nalgebra::{DMatrix, DVector, Matrix6};
 
 use crate::drive::{Friction, ServoAxis, TorqueCurve};
 use crate::error::StepError;
+use crate::events::SAME_TIME;
 use crate::load::Load;
 use crate::modes::{Modes, modes_at};
 use crate::motion::PrescribedMotion;
@@ -253,6 +254,26 @@ impl FlexibleArm {
         self.loads = loads;
         self.update_modes_and_damping()?;
         Ok(self)
+    }
+
+    /// The same arm with what it carries changing on the way; changes at 0 or before hold from the start.
+    ///
+    /// # Errors
+    /// As [`FlexibleArm::new`].
+    pub fn with_inertia_changes(mut self, mut changes: Vec<InertiaChange>) -> Result<Self, StepError> {
+        changes.sort_by(|a, b| a.t.total_cmp(&b.t));
+        self.inertia_changes = changes;
+        self.carry_from_start()?;
+        Ok(self)
+    }
+
+    /// Carries out the changes that are due at the start, so that it is found in equilibrium with them.
+    pub(crate) fn carry_from_start(&mut self) -> Result<(), StepError> {
+        let due = self.inertia_changes.iter().take_while(|change| change.t <= SAME_TIME).count();
+        for change in self.inertia_changes.drain(..due) {
+            self.model = Arc::new(self.model.with_inertia(change.body, change.inertia));
+        }
+        if due > 0 { self.update_modes_and_damping() } else { Ok(()) }
     }
 
     /// The same arm with some joints driven by torque, under a controller.

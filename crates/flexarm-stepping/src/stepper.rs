@@ -132,10 +132,16 @@ pub trait Stepper: Send {
 ///
 /// # Errors
 /// [`StepError`] if the start cannot be found or an explicit step is too large.
-pub fn new_stepper(kind: StepperKind, arm: FlexibleArm, h: f64, start: Start) -> Result<Box<dyn Stepper>, StepError> {
+pub fn new_stepper(
+    kind: StepperKind,
+    mut arm: FlexibleArm,
+    h: f64,
+    start: Start,
+) -> Result<Box<dyn Stepper>, StepError> {
     if !(h.is_finite() && h > 0.0) {
         return Err(StepError::Setup(format!("the step must be a positive time in seconds, found {h}")));
     }
+    arm.carry_from_start()?;
     let e = match start {
         Start::Equilibrium => static_equilibrium(&arm, 0.0)?,
         Start::Undeformed => DVector::zeros(arm.n_elastic_coordinates()),

@@ -111,6 +111,18 @@ fn an_arm_that_picks_up_fifty_times_its_mass_swings_about_the_new_sag() {
     }
 }
 
+/// A payload that is there from the start is part of the equilibrium in which the run starts. Truth: `m g / K`, at rest.
+#[test]
+fn a_payload_of_time_zero_hangs_still() {
+    let heavy = 7.0 * MASS;
+    let arm = pick_up(0.0, heavy, Damping::Modal(0.03));
+    for kind in [ALPHA, StepperKind::Rk4, reference(), SPOOK] {
+        let error = error(&arm, kind, 1e-3, 0.1, 2, |_| -heavy * 9.81 / K);
+        // The sag is 0.17 m; from the equilibrium without the payload it would swing by as much.
+        assert!(error < 1e-6, "{} {error}", kind.name());
+    }
+}
+
 /// Truth: a ratio of modal damping is one of the modes that the arm has: 3 % after the pick-up as before.
 #[test]
 fn modal_damping_keeps_its_ratio_with_another_payload() {

@@ -37,6 +37,11 @@ impl Bench {
         Robot::load(&path, &LoadOptions::default())
     }
 
+    /// Path of a shipped file.
+    pub fn file(&self, file: &str) -> PathBuf {
+        self.root.join(file)
+    }
+
     /// A shipped motion.
     pub fn motion(&self, robot: &Robot, file: &str) -> Result<Motion, Error> {
         Motion::load(&self.root.join(file), &*robot.rigid_model()?)

@@ -17,6 +17,7 @@ mod manipulator;
 mod meshed;
 mod one_beam;
 pub mod page;
+mod pick;
 mod programs;
 pub mod textbook;
 mod three_beams;

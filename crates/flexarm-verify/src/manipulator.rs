@@ -17,6 +17,7 @@ use crate::Pace;
 use crate::bench::{ALPHA, Bench, larger, modal, parts, spook};
 use crate::meshed::Meshed;
 use crate::page::{Bound, Case, Figure, Table, digits, error, fixed, signed, word};
+use crate::pick::pick;
 
 const LINKS: &str = "robots/kr210/links.toml";
 const DRIVES: &str = "robots/kr210/robot.toml";
@@ -27,13 +28,13 @@ const DRAWN: usize = 2;
 const AXES: [&str; 3] = ["x", "y", "z"];
 
 /// A run that was made, seen every 2 ms.
-struct Run {
-    summary: Summary,
+pub(crate) struct Run {
+    pub(crate) summary: Summary,
     trace: Trace,
 }
 
 /// Makes runs and tells how far it is.
-struct Runs<'a, 'p> {
+pub(crate) struct Runs<'a, 'p> {
     pace: &'a mut Pace<'p>,
     done: f64,
     all: f64,
@@ -48,8 +49,13 @@ impl Runs<'_, '_> {
         stepper: StepperKind,
         step_s: f64,
     ) -> Result<Run, Error> {
-        let options = RunOptions { stepper, step_s, modelling, log_rate_hz: 500.0, ..RunOptions::default() };
-        let weight = weight(stepper, step_s);
+        self.make_with(robot, motion, &RunOptions { stepper, step_s, modelling, ..RunOptions::default() })
+    }
+
+    /// With more than links, drives and stepper of one's own.
+    pub(crate) fn make_with(&mut self, robot: &Robot, motion: &Motion, options: &RunOptions) -> Result<Run, Error> {
+        let options = RunOptions { log_rate_hz: 500.0, ..options.clone() };
+        let weight = weight(options.stepper, options.step_s);
         let mut progress = |t: f64, total: f64| match self.pace.at((self.done + weight * t / total) / self.all) {
             Ok(()) => ControlFlow::Continue(()),
             Err(_) => ControlFlow::Break(()),
@@ -80,7 +86,7 @@ impl Run {
     }
 
     /// Deflection along an axis over time (mm).
-    fn curve(&self, name: &str, look: CurveLook, axis: usize) -> PlotCurve {
+    pub(crate) fn curve(&self, name: &str, look: CurveLook, axis: usize) -> PlotCurve {
         PlotCurve {
             name: name.into(),
             look,
@@ -90,12 +96,12 @@ impl Run {
     }
 
     /// Largest deflection, of all and of x, y, z.
-    fn peaks(&self) -> [f64; 4] {
+    pub(crate) fn peaks(&self) -> [f64; 4] {
         peaks(self.deflection())
     }
 
     /// Largest distance of the tools of two runs, of all and of x, y, z.
-    fn apart(&self, other: &Self) -> [f64; 4] {
+    pub(crate) fn apart(&self, other: &Self) -> [f64; 4] {
         if self.trace.rows.len() != other.trace.rows.len() {
             return [f64::NAN; 4];
         }
@@ -122,10 +128,14 @@ pub(crate) fn case(bench: &Bench, pace: &mut Pace<'_>) -> Result<Case, Error> {
     let robot = bench.robot(LINKS)?;
     let moves: &[&str] =
         if bench.quick { &["point_to_point"] } else { &["pick_and_place", "point_to_point", "large_moves"] };
-    // One motion of all methods weighs about 150 runs by generalised-alpha, the rest 80.
-    let mut runs = Runs { pace, done: 0.0, all: 150.0 * moves.len() as f64 + 80.0 };
+    // One motion of all methods weighs about 150 runs by generalised-alpha, a pick 55, the rest 80.
+    let pick_weight = if bench.quick { 0.0 } else { 55.0 };
+    let mut runs = Runs { pace, done: 0.0, all: 150.0 * moves.len() as f64 + 80.0 + pick_weight };
     for name in moves {
         methods(&mut case, bench, &mut runs, &robot, name)?;
+    }
+    if !bench.quick {
+        pick(&mut case, bench, &mut runs, &robot)?;
     }
     case.heading("What is left, and why");
     case.text(

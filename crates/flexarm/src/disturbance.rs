@@ -19,6 +19,7 @@ use crate::caveat::size::Size;
 use crate::caveat::{Caveat, parts};
 use crate::error::Error;
 use crate::input::read_text;
+use crate::load_jumps::jumps_of;
 use crate::robot::{PAYLOAD_LINK, Robot, TCP_FRAME};
 use crate::robot_file::{RobotFileError, Source};
 
@@ -265,7 +266,9 @@ fn load(
         }
         "expression" => {
             period = EXPRESSION_PERIOD;
-            expression(e, source, (start, end))?
+            let wrench = expression(e, source, (start, end))?;
+            rows = jumps_of(&*wrench, start.max(0.0), end.min(duration));
+            wrench
         }
         other => {
             let text = "use step, impulse, sine, sweep, milling, table or expression";

@@ -26,7 +26,8 @@ impl EnergyBook {
                 self.work[c] += 0.5 * (t - t_before) * (p[c] + power[c]);
             }
         }
-        self.work[0] += impulse_work - self.struck;
+        // A blow at the start is in the energy of the first sample.
+        self.work[0] += if self.first.is_some() { impulse_work - self.struck } else { 0.0 };
         self.struck = impulse_work;
         self.last = energy.iter().sum();
         self.before = Some((t, power));

@@ -9,7 +9,7 @@ use flexarm_flexlink::{
     BranchJoint, FlexibleLink, FlexibleSpan, Gearbox, LinkForm, Parts, SubstitutionError, branch_joints,
     insert_gearboxes, substitute,
 };
-use flexarm_kinematics::{Data, MOST_COORDINATES, Model, mass_matrix};
+use flexarm_kinematics::{Data, ElasticAngles, MOST_COORDINATES, Model, mass_matrix};
 use flexarm_stepping::{
     Damping, FlexibleArm, Friction, GeometricStiffness, PrescribedMotion, Servo, ServoAxis, Spring, StepError,
 };
@@ -22,6 +22,10 @@ use crate::import::SECOND_ORDER_UNKNOWN;
 use crate::options::{DriveModel, LinkModel, Modelling};
 use crate::robot::Robot;
 
+/// Springs along Euler angles are not the same seen from either end: a term of third order in the bending is left, which a
+/// chain of n parts divides by n only.
+const EULER_CHAIN: &str = "its chain has angles = \"euler-zyx\": where it bends about two axes or twists, its deflection \
+                           converges with the number of parts, not with the square of it as with rotation vectors";
 /// Default gain of the position loop (1/s), bandwidth of the speed loop (1/s), integral over speed gain (1/s), sample (s).
 const SERVO: [f64; 4] = [20.0, 100.0, 20.0, 1e-3];
 /// Most of the quick inertia over the sampling time that a default velocity gain takes: 2 is where a sampled speed loop
@@ -204,7 +208,7 @@ pub struct FlexibleRobot {
     /// Joints driven by torque: coordinate, servo, limit.
     torque: Vec<(usize, ServoEntry, f64)>,
     /// Doubts about the models of the links.
-    pub doubts: Vec<String>,
+    pub doubts: Vec<Caveat>,
     /// Links that bend in modes though rigid parts are asked for, and why: sentences.
     pub modal_instead: Vec<String>,
 }
@@ -270,13 +274,11 @@ impl FlexibleRobot {
         (0..self.torque.len()).map(|i| inverse.as_ref().map_or(0.0, |inverse| 1.0 / inverse[(i, i)])).collect()
     }
 
-    /// Doubts about the models of the links, as caveats.
+    /// Doubts about the models of the links.
     pub fn caveats(&self) -> Vec<Caveat> {
-        let help = "reduce the mesh itself (flexarm reduce) to have them";
-        let doubts = self.doubts.iter().map(|text| Caveat::said("second-order-unknown", "links", text, help));
         let help = "write model = \"modal\" into the robot file";
         let instead = self.modal_instead.iter().map(|text| Caveat::said("third-interface", "links", text, help));
-        doubts.chain(instead).collect()
+        self.doubts.iter().cloned().chain(instead).collect()
     }
 
     /// Whether some joint is driven by torque.
@@ -319,17 +321,24 @@ impl Robot {
     /// [`Error::Usage`] if a link or drive has no such model, [`Error::Model`] if the result is no tree.
     pub fn modelled(&self, modelling: &Modelling) -> Result<FlexibleRobot, Error> {
         let usage = |text: String| Error::Usage(text);
-        let (mut links, mut doubts): (Vec<FlexibleLink>, Vec<String>) = (Vec::new(), Vec::new());
+        let (mut links, mut doubts): (Vec<FlexibleLink>, Vec<Caveat>) = (Vec::new(), Vec::new());
         let mut modal_instead = Vec::new();
         if modelling.links != LinkModel::Rigid {
             for link in &self.flexible {
                 let (form, instead) = self.form_of(link, modelling)?;
                 modal_instead.extend(instead);
                 if matches!(&form, LinkForm::Modal(modal) if !modal.has_second_order()) {
-                    doubts.push(format!("link {:?}: {SECOND_ORDER_UNKNOWN}", link.flexible.link));
+                    let text = format!("link {:?}: {SECOND_ORDER_UNKNOWN}", link.flexible.link);
+                    let help = "reduce the mesh itself (flexarm reduce) to have them";
+                    doubts.push(Caveat::said("second-order-unknown", "links", text, help));
+                }
+                if matches!(form, LinkForm::Chain(_)) && link.flexible.angles == ElasticAngles::EulerZyx {
+                    let text = format!("link {:?}: {EULER_CHAIN}", link.flexible.link);
+                    doubts.push(Caveat::said("euler-chain", "links", text, "leave angles away: rotation vectors"));
                 }
                 let mut flexible = FlexibleLink { form, ..link.flexible.clone() };
-                doubts.extend(self.uncut(link, &mut flexible));
+                let uncut = self.uncut(link, &mut flexible);
+                doubts.extend(uncut.map(|text| Caveat::said("second-order-unknown", "links", text, "")));
                 links.push(flexible);
             }
         }

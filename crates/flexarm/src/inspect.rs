@@ -215,7 +215,7 @@ pub fn inspect(robot: &Robot, at: Option<&str>, velocity: Option<&str>) -> Resul
         LinkInfo { name: l.name.clone(), mass_kg, com_m, inertia }
     });
     let flexible = robot.flexible_robot()?;
-    warnings.extend(flexible.doubts.iter().chain(&flexible.modal_instead).cloned());
+    warnings.extend(flexible.caveats().into_iter().map(|caveat| caveat.message));
     let forms = robot.flexible.iter().map(|link| robot.form_of(link, &Modelling::default()).map(|(form, _)| form));
     let forms = forms.collect::<Result<Vec<_>, _>>()?;
     let flexible_links = flexible.spans.iter().zip(&robot.flexible).zip(&forms).map(|((span, link), form)| {

@@ -36,6 +36,7 @@ pub mod import;
 mod input;
 mod inspect;
 mod link_entry;
+mod load_jumps;
 mod magnification;
 mod mode_recording;
 mod modes;

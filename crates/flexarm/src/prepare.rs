@@ -50,7 +50,7 @@ pub(crate) fn checked(robot: &Robot, motion: &Motion, options: &RunOptions) -> R
         if !matches!(options.stepper, StepperKind::Reference(_)) {
             load_caveats.extend(short_loads(&disturbances.loads, options.step_s));
         }
-        arm.inertia_changes = disturbances.changes;
+        arm = arm.with_inertia_changes(disturbances.changes).map_err(failed)?;
         arm = arm.with_timed_loads(disturbances.loads).map_err(failed)?;
     }
     if options.log_rate_hz * options.step_s > 1.0 + 1e-9 && options.log_rate_hz != RunOptions::default().log_rate_hz {

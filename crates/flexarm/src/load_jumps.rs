@@ -1,0 +1,70 @@
+//! Where a load that is only known as a function of time jumps.
+
+use flexarm_kinematics::Wrench;
+
+/// Intervals that are looked at one by one; a jump back within one of them is not seen.
+const INTERVALS: u32 = 5000;
+/// Changes below this part of the largest load are none.
+const SMALLEST: f64 = 1e-9;
+/// A jump keeps this part of the change of its interval when that is halved,
+const KEPT: f64 = 0.1;
+/// which is looked at after so many halvings already: a curve has lost it by then.
+const FIRST_LOOK: u32 = 8;
+
+/// The times of jumps between `start` and `end` (s), to the last place, at most one per five thousandth of it.
+pub(crate) fn jumps_of(wrench: &(dyn Fn(f64) -> Wrench + Send + Sync), start: f64, end: f64) -> Vec<f64> {
+    if start >= end {
+        return Vec::new();
+    }
+    // Between the ends, where it begins and ends at the latest.
+    let inner = |k: u32| (start + (end - start) * f64::from(k) / f64::from(INTERVALS)).clamp(start, end);
+    let change = |a: f64, b: f64| (wrench(b).to_vector() - wrench(a).to_vector()).amax();
+    let size = (0..=INTERVALS).map(|k| wrench(inner(k)).to_vector().amax()).fold(0.0, f64::max);
+    let jump_in = |k: u32| {
+        let (mut a, mut b) = (inner(k), inner(k + 1));
+        let whole = change(a, b);
+        if !(whole.is_finite() && whole > SMALLEST * size) {
+            return None;
+        }
+        let mut halvings = 0;
+        loop {
+            let middle = 0.5 * (a + b);
+            if middle <= a || middle >= b {
+                break;
+            }
+            (a, b) = if change(a, middle) >= change(middle, b) { (a, middle) } else { (middle, b) };
+            halvings += 1;
+            if halvings == FIRST_LOOK && change(a, b) < KEPT * whole {
+                return None;
+            }
+        }
+        (change(a, b) > KEPT * whole).then_some(a)
+    };
+    (0..INTERVALS).filter_map(jump_in).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Vector3;
+
+    fn jumps(f: impl Fn(f64) -> f64 + Send + Sync) -> Vec<f64> {
+        jumps_of(&move |t| Wrench::new(Vector3::x() * f(t), Vector3::zeros()), 0.0, 4.0)
+    }
+
+    #[test]
+    fn jumps_are_found_where_they_are_and_curves_have_none() {
+        let near = |found: Vec<f64>, truth: &[f64]| {
+            assert_eq!(found.len(), truth.len(), "{found:?}");
+            assert!(found.iter().zip(truth).all(|(a, b)| (a - b).abs() < 1e-15 * 10.0), "{found:?}");
+        };
+        near(jumps(|t| 100.0 * (t - 1.23456).signum() + 3.0 * t), &[1.23456]);
+        near(jumps(|t| 5.0 * t.floor()), &[1.0, 2.0, 3.0, 4.0]);
+        near(jumps(|t| if (0.5..0.7091).contains(&t) { 40.0 * t.sin() } else { 0.0 }), &[0.5, 0.7091]);
+        assert!(jumps(|t| 1e4 * (300.0 * t).sin()).is_empty());
+        assert!(jumps(|t| 100.0 * (t - 2.0).abs()).is_empty());
+        assert!(jumps(|t| 100.0 * (200.0 * (t - 2.0)).tanh()).is_empty());
+        assert!(jumps(|_| 7.0).is_empty());
+        assert!(jumps(|t| 1.0 / (t - 2.0)).is_empty());
+    }
+}
