@@ -10,6 +10,7 @@ One line per check; exit status 1 if any fails, 0 else (also if checks were skip
 import argparse
 import collections
 import csv
+import json
 import math
 import os
 import pathlib
@@ -17,6 +18,7 @@ import shutil
 import signal
 import subprocess
 import sys
+from xml.etree import ElementTree
 
 # Largest difference between two files that hold the same number.
 SAME = 1e-12
@@ -177,7 +179,7 @@ def mcap_file(report, path, rows):
                 )
                 messages[topic].append([decoded.layout.dim[0].label.split(","), list(decoded.data)])
             # The frames of a time are complete when the next time comes.
-            if topic == "/diagnostics/solver":
+            if topic == "/solver":
                 for twin, time, tool in pending:
                     frame = f"{tcp}/tcp" if twin == "flexible" else f"{twin}/{tcp}/tcp"
                     if not frames.knows(frame):
@@ -194,6 +196,8 @@ def mcap_file(report, path, rows):
         print("        " + ", ".join(f"{topic} {seen[topic]}" for topic in sorted(seen)))
         report.check("messages come in order of time", order)
         report.check("header stamps are log times", stamps)
+        report.check("no stamp is 0, which ROS reads as no time", summary.statistics.message_start_time > 0)
+        layouts(report, path.parent, set(seen))
         spans = [(c.message_start_time, c.message_end_time) for c in summary.chunk_indexes]
         first, last = min(a for a, _ in spans), max(b for _, b in spans)
         whole = (summary.statistics.message_start_time, summary.statistics.message_end_time) == (first, last)
@@ -201,7 +205,7 @@ def mcap_file(report, path, rows):
 
         # Against the table.
         n = len(rows["time"])
-        per_sample = ["/tf", "/joint_states", "/tcp/flexible", "/energy", "/diagnostics/solver"]
+        per_sample = ["/tf", "/joint_states", "/tcp/flexible", "/energy", "/solver"]
         report.check("one message per row of run.csv", all(seen[t] == n for t in per_sample), f"{n} rows")
 
         def columns(names):
@@ -269,6 +273,21 @@ def mcap_file(report, path, rows):
         attachments = [a.name for a in reader.iter_attachments()]
         good = len(attachments) == summary.statistics.attachment_count and ("summary.json" in attachments or not is_run)
         report.check("attachments are readable", good, ", ".join(attachments))
+
+
+def layouts(report, folder, topics):
+    """The layouts beside the recording can be read, and refer to its topics."""
+    foxglove, plotjuggler = folder / "run.foxglove.json", folder / "run.plotjuggler.xml"
+    if not foxglove.is_file() or not plotjuggler.is_file():
+        report.skip("layouts", "the run did not write them")
+        return
+    panels = json.loads(foxglove.read_text("utf-8"))["configById"].values()
+    paths = [path["value"].split(".")[0] for panel in panels for path in panel.get("paths", [])]
+    lost = sorted(set(paths) - topics)
+    report.check("run.foxglove.json refers to topics of the recording", paths and not lost, f"{len(paths)} curves {lost or ''}")
+    curves = [curve.get("name") for curve in ElementTree.parse(plotjuggler).iter("curve")]
+    lost = [curve for curve in curves if not any(curve.startswith(topic + "/") for topic in topics)]
+    report.check("run.plotjuggler.xml refers to topics of the recording", curves and not lost, f"{len(curves)} curves {lost or ''}")
 
 
 def main():

@@ -4,7 +4,8 @@
     python3 tools/check_report.py out/run/report.html [more.html ...] [--pictures FOLDER] [--require]
 
 Checks: nothing is loaded but the file itself, nothing is said on the console, every view of every plot
-shows curves (and would not without values), links lead somewhere, dragging zooms,
+shows curves (and would not without values), x, y and z have one colour each, texts are large enough on a phone, pictures
+of the arm have no ground of their own, links lead somewhere, dragging zooms,
 other time plots follow, a double click resets, the cursor is shared, the page prints.
 Needs playwright (pip install playwright) and a Chromium on the PATH or in CHROMIUM; without them it says "skipped" and
 exits with 0, with 1 under --require. Exit code 1 if a check fails.
@@ -19,7 +20,7 @@ import tempfile
 from pathlib import Path
 
 BROWSERS = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"]
-WIDTHS = [1000, 1280, 1600]
+WIDTHS = [390, 1000, 1280, 1600]
 # Pixels within the axes in the colour of a curve; grid, axes and texts have others, and marks are left out.
 INK = """async id => {
   const drawn = () => new Promise(done => setTimeout(done, 0));
@@ -67,6 +68,31 @@ class Checks:
         print(f"{'ok    ' if good else 'FAILED'} {text}")
         self.failed += not good
         return good
+
+
+# Size (CSS pixels) of the smallest text that is not within a plot.
+SMALLEST = """() => Math.min(...[...document.querySelectorAll("p, figcaption, td, th, dd, dt, li, summary, .triad text")]
+  .filter(e => e.getClientRects().length && !e.closest(".u-legend")).map(e => parseFloat(getComputedStyle(e).fontSize)))"""
+# Of each curve of an axis, its colour; and the variables of the page.
+AXES = """() => {
+  const style = getComputedStyle(document.documentElement);
+  const wanted = Object.fromEntries(["x", "y", "z"].map(k => [k, style.getPropertyValue("--" + k).trim()]));
+  const found = [];
+  for (const { id, chart } of window.flexarmPlots())
+    chart.series.forEach((s, k) => { if (wanted[s.label]) found.push([id, s.label, s.stroke(chart, k), wanted[s.label]]); });
+  return found;
+}"""
+# Opacity of a corner of each picture of the arm.
+CORNERS = """async () => {
+  const found = [];
+  for (const image of document.querySelectorAll(".arm img")) {
+    const canvas = Object.assign(document.createElement("canvas"), { width: 1, height: 1 }).getContext("2d");
+    canvas.drawImage(image, 0, 0);
+    found.push(canvas.getImageData(0, 0, 1, 1).data[3]);
+  }
+  return found;
+}"""
+LEAST_SIZE = 12
 
 
 def open_page(context, path, checks):
@@ -177,6 +203,11 @@ def check(browser, path, folder, checks):
     checks.that(not dead, f"all links lead somewhere {' '.join(dead)}")
     pictures = page.evaluate("() => [...document.images].map(i => [i.complete && i.naturalWidth, i.clientWidth])")
     checks.that(all(natural >= shown > 0 for natural, shown in pictures), f"{len(pictures)} pictures, sharp: {pictures}")
+    axes = page.evaluate(AXES)
+    wrong = [a for a in axes if a[2] != a[3]]
+    checks.that(not wrong, f"x, y and z have their colours in {len(axes)} curves {wrong or ''}")
+    corners = page.evaluate(CORNERS)
+    checks.that(not any(corners), f"pictures have no ground of their own: {corners}")
     check_zoom(page, checks)
     check_cursor(page, checks)
     check_views(page, checks)
@@ -200,6 +231,8 @@ def check(browser, path, folder, checks):
         page, _, said = open_page(context, path, checks)
         extra = page.evaluate("() => document.documentElement.scrollWidth - window.innerWidth")
         checks.that(extra <= 0 and not said, f"fits into {width} pixels")
+        size = page.evaluate(SMALLEST)
+        checks.that(size >= LEAST_SIZE, f"its smallest text has {size:g} pixels")
         if folder:
             page.screenshot(path=folder / f"width_{width}.png", full_page=True)
         context.close()

@@ -63,7 +63,8 @@ pub use error_parts::{ErrorParts, error_parts};
 pub use flexarm_kinematics::{Pose, rotation_vector};
 pub use hold::HoldMetrics;
 pub use linear_system::{
-    LinearError, LinearSystem, Quantity, ResponsePeak, Spacing, frequency_grid, response_peaks, with_resonances,
+    LinearError, LinearSystem, Quantity, ResponsePeak, Spacing, frequency_grid, resolved_response, response_peaks,
+    with_resonances,
 };
 pub use long_record::{ErrorSample, LongRecord};
 pub use metrics::{MetricSettings, TcpMetrics, tcp_metrics, tcp_metrics_on_path};

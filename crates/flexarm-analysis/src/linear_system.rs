@@ -167,6 +167,58 @@ pub fn with_resonances(grid: &[f64], modes: &[(f64, f64)]) -> Vec<f64> {
     all
 }
 
+/// Deepest halving of an interval between two frequencies of a grid.
+const DEEPEST: u32 = 10;
+/// Entries below this part of the largest are rounding.
+const ROUNDING: f64 = 1e-9;
+
+/// A response over a grid, with frequencies put in until straight lines between the points are the curves of all magnitudes
+/// on logarithmic axes, within a tolerance: many around resonances and where a curve dips, few elsewhere.
+///
+/// * `grid`: ascending, with a point near each resonance ([`with_resonances`]): what is narrower than its steps is not found.
+/// * `answer`: the response at a frequency; `None` where there is none (an undamped resonance), which leaves that point out.
+/// * `tolerance`: relative, such as 0.01. An interval of the grid is halved ten times at most.
+///
+/// Returns the frequencies and the responses there.
+pub fn resolved_response(
+    grid: &[f64],
+    answer: impl Fn(f64) -> Option<DMatrix<Complex<f64>>>,
+    tolerance: f64,
+) -> (Vec<f64>, Vec<DMatrix<Complex<f64>>>) {
+    let mut found: Vec<(f64, DMatrix<Complex<f64>>)> = Vec::new();
+    for (frequency, response) in grid.iter().filter_map(|f| Some((*f, answer(*f)?))) {
+        // Intervals to the next point, the nearest last.
+        let mut open = vec![(frequency, response, 0)];
+        while let Some((b, H_b, depth)) = open.pop() {
+            let middle = found.last().filter(|_| depth < DEEPEST).and_then(|(a, H_a)| {
+                let m = if *a > 0.0 { (a * b).sqrt() } else { 0.5 * (a + b) };
+                let H_m = answer(m).filter(|H_m| *a < m && m < b && strays(H_a, H_m, &H_b, tolerance))?;
+                Some((m, H_m))
+            });
+            match middle {
+                Some((m, H_m)) => open.extend([(b, H_b, depth + 1), (m, H_m, depth + 1)]),
+                None => found.push((b, H_b)),
+            }
+        }
+    }
+    found.into_iter().unzip()
+}
+
+/// Whether a magnitude in the middle of an interval is off the line between its ends, on logarithmic axes.
+fn strays(
+    H_a: &DMatrix<Complex<f64>>,
+    H_m: &DMatrix<Complex<f64>>,
+    H_b: &DMatrix<Complex<f64>>,
+    tolerance: f64,
+) -> bool {
+    let largest = H_m.iter().map(|h| h.norm()).fold(0.0, f64::max);
+    let entries = H_a.iter().zip(H_m.iter()).zip(H_b.iter());
+    entries.map(|((a, m), b)| [a, m, b].map(|h| h.norm())).any(|sizes| {
+        let [a, m, b] = sizes.map(f64::ln);
+        sizes.iter().all(|size| *size > ROUNDING * largest) && (m - 0.5 * (a + b)).abs() > tolerance
+    })
+}
+
 /// A maximum of a response over frequency.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ResponsePeak {

@@ -224,6 +224,14 @@ pub(crate) struct RunArgs {
     /// Factor by which recordings and pictures show deflections [default: so that they are seen]
     #[arg(long, help_heading = "Results", hide_short_help = true, value_name = "FACTOR", allow_hyphen_values = true)]
     pub(crate) magnify: Option<f64>,
+    /// When the run begins in recordings whose times have a date (MCAP), as seconds since 1970 [default: 946684800, the
+    /// first of January 2000, so that equal runs are equal files]
+    #[arg(long, value_name = "now|SECONDS", value_parser = parse_start_time, allow_hyphen_values = true)]
+    pub(crate) start_time: Option<u64>,
+    /// Write the mesh files into the robot description of the MCAP, so that it has its shapes on any machine (Foxglove
+    /// draws them; Rerun and RViz want files)
+    #[arg(long)]
+    pub(crate) embed_meshes: bool,
     /// Output folder [default: a new one in out/]
     #[arg(short, long, help_heading = "Files", value_name = "FOLDER")]
     pub(crate) output: Option<PathBuf>,
@@ -363,4 +371,18 @@ pub(crate) enum MethodName {
     Esdirk34,
     /// Explicit, order 5: no stiff modes
     Tsit45,
+}
+
+/// A time as nanoseconds since 1970; ROS has no later ones than in 2038.
+fn parse_start_time(text: &str) -> Result<u64, String> {
+    const LATEST_S: f64 = i32::MAX as f64;
+    if text == "now" {
+        let since = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();
+        return Ok(u64::try_from(since.as_nanos()).unwrap_or(u64::MAX));
+    }
+    let seconds: f64 = text.parse().map_err(|_| format!("expected now or seconds since 1970, found {text:?}"))?;
+    if !(0.0..=LATEST_S).contains(&seconds) {
+        return Err(format!("expected seconds from 0 (1970) to {LATEST_S} (2038), found {seconds}"));
+    }
+    Ok((seconds * 1e9).round() as u64)
 }

@@ -180,6 +180,8 @@ fn run_options(args: &RunArgs, with_twin: bool) -> RunOptions {
         with_twin,
         settling_band_m: args.settling_band,
         magnification: args.magnify,
+        start_ns: args.start_time,
+        embed_meshes: args.embed_meshes,
     }
 }
 

@@ -4,7 +4,8 @@ use std::process::ExitCode;
 
 use comfy_table::CellAlignment;
 use flexarm::{
-    Error, ModeMovie, ModeTable, Outputs, Quantity, Response, ResponseOutputs, ResponseRequest, Robot, Spacing, Statics,
+    Error, ModeMovie, ModeTable, Outputs, Quantity, Response, ResponseOutputs, ResponseRequest, Robot, Spacing,
+    Statics, StaticsOutputs,
 };
 
 use crate::args::Cli;
@@ -30,8 +31,14 @@ fn warn(cli: &Cli, warnings: &[String]) {
 
 pub(crate) fn statics(cli: &Cli, args: &StaticsArgs) -> Result<ExitCode, Error> {
     let wrench = args.wrench.as_deref().map_or(Ok([0.0; 6]), flexarm::parse_wrench)?;
-    let found =
-        flexarm::statics(&load(&args.pose)?, &args.pose.modelling.modelling(), args.pose.at.as_deref(), wrench)?;
+    let (robot, modelling, at) = (load(&args.pose)?, args.pose.modelling.modelling(), args.pose.at.as_deref());
+    let found = match &args.output {
+        Some(folder) => {
+            let outputs = StaticsOutputs { folder: folder.clone(), overwrite: args.force };
+            flexarm::record_statics(&robot, &modelling, at, wrench, &outputs)?
+        }
+        None => flexarm::statics(&robot, &modelling, at, wrench)?,
+    };
     warn(cli, &found.warnings);
     answer(cli, || to_json(&found), || statics_text(&found));
     Ok(ExitCode::SUCCESS)
@@ -127,7 +134,13 @@ fn statics_text(s: &Statics) -> String {
     out += &lines(&t);
     let holding: Vec<String> =
         s.joints.iter().zip(&s.holding_torque).map(|(joint, torque)| format!("{joint} {torque:.2}")).collect();
-    out + &format!("\nholding torques [N m or N]: {}\n", holding.join(", "))
+    out += &format!("\nholding torques [N m or N]: {}\n", holding.join(", "));
+    for (what, path) in [("picture", &s.files.picture), ("figures", &s.files.json)] {
+        if let Some(path) = path {
+            out += &format!("{what:<7} {path}\n");
+        }
+    }
+    out
 }
 
 fn modes_text(m: &ModeTable) -> String {
@@ -199,10 +212,16 @@ fn response_text(r: &Response) -> String {
     let head: Vec<String> = head.chain((1..=SHOWN_PEAKS).map(|k| format!("peak {k}"))).collect();
     let mut t = table(&head.iter().map(String::as_str).collect::<Vec<_>>());
     for c in &r.curves {
-        let at_rest = c.at_rest.map_or_else(|| "-".into(), |x| format!("{x:.4e}"));
-        let mut row = vec![c.input.clone(), c.output.clone(), c.unit.clone(), at_rest];
+        let (unit, factor) = flexarm::readable_unit(&c.unit);
+        let number = |x: f64| match factor * x {
+            0.0 => "0".to_owned(),
+            x if (1e-3..1e5).contains(&x.abs()) => format!("{x:.4}"),
+            x => format!("{x:.3e}"),
+        };
+        let at_rest = c.at_rest.map_or_else(|| "-".into(), number);
+        let mut row = vec![c.input.clone(), c.output.clone(), unit, at_rest];
         row.extend(
-            c.peaks.iter().take(SHOWN_PEAKS).map(|p| format!("{:.4e} at {:.2} Hz", p.magnitude, p.frequency_hz)),
+            c.peaks.iter().take(SHOWN_PEAKS).map(|p| format!("{} at {:.2} Hz", number(p.magnitude), p.frequency_hz)),
         );
         t.add_row(row);
     }

@@ -39,6 +39,12 @@ pub(crate) struct StaticsArgs {
     /// Force and moment on the TCP besides weight, world axes (N, N m)
     #[arg(long, value_name = "FX,FY,FZ[,TX,TY,TZ]", allow_hyphen_values = true)]
     pub(crate) wrench: Option<String>,
+    /// Write to this folder a picture of the arm, its deflections magnified beside the rigid arm, and the figures
+    #[arg(short, long, value_name = "FOLDER")]
+    pub(crate) output: Option<PathBuf>,
+    /// Overwrite what is in the output folder
+    #[arg(long, requires = "output")]
+    pub(crate) force: bool,
 }
 
 #[derive(Debug, Args)]

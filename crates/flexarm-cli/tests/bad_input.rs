@@ -818,6 +818,8 @@ mod values_on_the_command_line {
     fn other_numbers() {
         options(&["--rho-inf", "2"], &["spectral radius", "between 0 and 1", "found 2"]);
         options(&["--rho-inf", "nan"], &["spectral radius", "NaN"]);
+        options(&["--start-time", "never"], &["--start-time", "now", "never"]);
+        options(&["--start-time", "1e12"], &["--start-time", "2038"]);
         options(&["--log-rate", "0"], &["log rate", "positive", "found 0"]);
         options(&["--log-rate=-5"], &["log rate", "positive", "-5"]);
         options(&["--log-rate", "nan"], &["log rate", "NaN"]);

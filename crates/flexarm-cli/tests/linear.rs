@@ -82,6 +82,25 @@ mod statics {
     }
 
     #[test]
+    fn the_arm_is_drawn_with_its_figures_and_nothing_is_overwritten() {
+        let place = Place::new();
+        let words = ["statics", "robot.toml", "--wrench", "0,0,-10", "-o", "sag"];
+        let seen = place.json(&words);
+        let stored: serde_json::Value = serde_json::from_str(&place.text("sag/statics.json")).unwrap();
+        assert_eq!(stored, seen);
+        let picture = seen["files"]["picture"].as_str();
+        if let Some(picture) = picture {
+            assert!(picture.ends_with("statics.png"));
+            let png = std::fs::read(place.path("sag/statics.png")).unwrap();
+            assert!(png.starts_with(b"\x89PNG") && png.len() > 10_000, "{} bytes", png.len());
+        } else {
+            assert!(seen["warnings"].to_string().contains("without the feature png"), "{}", seen["warnings"]);
+        }
+        place.refused(&words, &["sag", "--force"]);
+        assert_eq!(place.json(&[&words[..], &["--force"]].concat()), seen);
+    }
+
+    #[test]
     fn a_rigid_robot_does_not_yield_and_says_so() {
         let place = Place::new();
         let seen = place.json(&["statics", "beam.urdf", "--wrench", "0,0,-100"]);
@@ -205,7 +224,9 @@ mod response {
     #[test]
     fn keys_files_and_shapes() {
         let place = Place::new();
-        let words = ["response", "robot.toml", "--input", "force-z,swing", "--output", "y,z", "--points", "60"];
+        let words_of =
+            |points| ["response", "robot.toml", "--input", "force-z,swing", "--output", "y,z", "--points", points];
+        let words = words_of("60");
         let seen = place.json(&[&words[..], &["--from", "2", "--to", "300", "-o", "bode"]].concat());
         let hz = numbers(&seen["frequency_hz"]);
         assert_eq!((hz[0], *hz.last().unwrap(), seen["quantity"].as_str()), (2.0, 300.0, Some("displacement")));
@@ -236,7 +257,25 @@ mod response {
             assert!((csv / json - 1.0).abs() < 1e-12);
         }
         let plot = place.text("bode/response.svg");
-        assert!(plot.starts_with("<svg") && plot.contains("frequency [Hz]") && plot.contains("force-z to z"));
+        // What a person sees: readable units, the pose, the natural frequencies, z in the colour of z.
+        let shown =
+            ["<svg", "frequency [Hz]", "force-z to z", "magnitude [µm/N]", "magnitude [m/rad]", "at swing 0°", "f1"];
+        for word in shown {
+            assert!(plot.contains(word), "{word}");
+        }
+        assert!(plot.contains(&format!("f1 {}", (modes[0] * 100.0).round() / 100.0)));
+        assert!(plot.contains("stroke=\"#2A6FDB\""), "force-z to z");
+        // Straight lines between the points are the curve: twice as many points add nothing to it.
+        let finer = place.json(&[&words_of("120")[..], &["--from", "2", "--to", "300", "--no-files"]].concat());
+        let fine: Vec<(f64, f64)> =
+            numbers(&finer["frequency_hz"]).into_iter().zip(numbers(&finer["curves"][1]["magnitude"])).collect();
+        let z = numbers(&curves[1]["magnitude"]);
+        for (f, m) in fine {
+            let k = hz.partition_point(|known| *known <= f).clamp(1, hz.len() - 1);
+            let part = (f / hz[k - 1]).ln() / (hz[k] / hz[k - 1]).ln();
+            let line = z[k - 1].ln() * (1.0 - part) + z[k].ln() * part;
+            assert!((m.ln() - line).abs() < 0.02, "{f} Hz: {m:e} is off the line by {}", m.ln() - line);
+        }
         let stored: serde_json::Value = serde_json::from_str(&place.text("bode/response.json")).unwrap();
         assert_eq!(stored["curves"], seen["curves"]);
         place.refused(&[&words[..], &["-o", "bode"]].concat(), &["bode", "--force"]);

@@ -2,13 +2,15 @@
 //!
 //! The rigid twin is light grey with an outline, the flexible arm is magnified by [`RunHeader::magnification`]; colours
 //! show the true deviation, from 0 to [`RunHeader::color_scale_m`]. An arrow leads from the rigid tool centre point to
-//! the magnified one. Links without surfaces are drawn as rods. Start at [`arm_png`].
+//! the magnified one. Links without surfaces are drawn as rods. Start at [`arm_picture`] for pages, which say beside the
+//! picture what is in it, and at [`arm_png`] for a picture that says so itself; [`arm_sheet`] has both sides beside each
+//! other under a heading.
 
 use flexarm_kinematics::Pose;
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Matrix2x3, Matrix3, Point3, SymmetricEigen, Vector3};
 
 use crate::mesh_picture::draw::{Align, Style, text_width};
-use crate::mesh_picture::scene::{Paint, Scene, outline_of, render, render_over};
+use crate::mesh_picture::scene::{Paint, Scene, outline_of, render_over};
 use crate::mesh_picture::{Image, Rgb, View, color};
 use crate::{BendInfo, BentMesh, LinkMesh, Magnifier, RunHeader, Sample, TwinSample, stations_in_link};
 
@@ -64,7 +66,41 @@ pub enum ArmSide {
     Oblique,
 }
 
-/// The arm as a PNG picture: rigid twin and magnified flexible arm.
+/// A picture of the arm that says nothing about itself.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ArmPicture {
+    /// A PNG file, see-through where there is no arm: it stands on light and on dark ground.
+    pub png: Vec<u8>,
+    /// Where the axes x, y and z of the world point in it: right and up, as parts of their length.
+    pub axes: [[f64; 2]; 3],
+}
+
+/// Rigid twin and magnified flexible arm for a page that explains them: no scale, no axes, no ground.
+///
+/// * `size`: width and height, pixels.
+///
+/// The same input gives the same bytes.
+///
+/// # Errors
+/// [`ArmPictureError`].
+pub fn arm_picture(
+    header: &RunHeader,
+    sample: &Sample,
+    side: ArmSide,
+    size: [usize; 2],
+) -> Result<ArmPicture, ArmPictureError> {
+    let stage = Stage::new(header, sample)?;
+    let unit = size[0] as f64 / NOMINAL_WIDTH;
+    let view = stage.view(side, size, [26.0 * unit, 26.0 * unit], None);
+    let [mut white, mut black] = [[255; 3], [0; 3]].map(|ground| stage.draw(&view, size, ground));
+    for image in [&mut white, &mut black] {
+        arrow(image, &view, unit, &stage.tool, &stage.moved);
+    }
+    let png = without_ground(&white, &black).to_png().map_err(ArmPictureError::Encode)?;
+    Ok(ArmPicture { png, axes: [0, 1, 2].map(|k| [view.right[k], view.up[k]]) })
+}
+
+/// The arm as a PNG picture on white with a scale of its colours: rigid twin and magnified flexible arm.
 ///
 /// * `size`: width and height, pixels.
 ///
@@ -76,8 +112,139 @@ pub fn arm_png(
     header: &RunHeader,
     sample: &Sample,
     side: ArmSide,
-    [width, height]: [usize; 2],
+    size: [usize; 2],
 ) -> Result<Vec<u8>, ArmPictureError> {
+    let image = Stage::new(header, sample)?.explained(side, size, header, None);
+    image.to_png().map_err(ArmPictureError::Encode)
+}
+
+/// The arm from both sides on one sheet (PNG), under lines of text, the first of which is the heading.
+///
+/// * `width`: pixels.
+/// * `compliance`: displacement of the tool per force, world axes (m/N). Drawn at the tool as an ellipsoid: all places to which
+///   one force of any direction moves it, with its principal axes.
+///
+/// # Errors
+/// [`ArmPictureError`].
+pub fn arm_sheet(
+    header: &RunHeader,
+    sample: &Sample,
+    lines: &[String],
+    compliance: Option<&Matrix3<f64>>,
+    width: usize,
+) -> Result<Vec<u8>, ArmPictureError> {
+    let stage = Stage::new(header, sample)?;
+    let half = width / 2;
+    let unit = half as f64 / NOMINAL_WIDTH;
+    let ellipsoid = compliance.and_then(|C| Ellipsoid::new(C, stage.size));
+    let top = (unit * (24.0 + 24.0 * lines.len() as f64)) as usize;
+    let height = half * 7 / 9;
+    let mut sheet = Image::new(2 * half, top + height, color::PAPER);
+    for (k, side) in [ArmSide::Side, ArmSide::Oblique].into_iter().enumerate() {
+        sheet.paste(&stage.explained(side, [half, height], header, ellipsoid.as_ref()), k * half, top);
+    }
+    for (k, line) in lines.iter().enumerate() {
+        let at = [26.0 * unit, unit * (34.0 + 24.0 * k as f64)];
+        match k {
+            0 => sheet.text(line, at, Align::Left, Style::new(21.0 * unit, color::INK).bold()),
+            _ => sheet.text(line, at, Align::Left, Style::new(16.0 * unit, color::INK)),
+        }
+    }
+    sheet.to_png().map_err(ArmPictureError::Encode)
+}
+
+/// Surfaces of both arms at one instant.
+struct Stage {
+    rigid: Skin,
+    /// Magnified.
+    shown: Skin,
+    /// Of each corner, where on the scale it is.
+    values: Vec<f64>,
+    rigid_twin: TwinSample,
+    factor: f64,
+    /// Tool centre point of the rigid arm and of the magnified one (m).
+    tool: Vector3<f64>,
+    moved: Vector3<f64>,
+    /// Largest distance of a link from the base (m).
+    size: f64,
+}
+
+impl Stage {
+    fn new(header: &RunHeader, sample: &Sample) -> Result<Self, ArmPictureError> {
+        check(header, sample)?;
+        let bodies = bodies(header, sample);
+        let magnifier = Magnifier::new(header);
+        let magnified = magnifier.magnified(sample);
+        let rigid = Skin::rigid(&bodies, &sample.rigid);
+        let real = Skin::bent(&bodies, header, &sample.flexible);
+        let shown = Skin::bent(&bodies, header, &magnified);
+        if rigid.triangles.is_empty() {
+            return Err(ArmPictureError::Nothing);
+        }
+        let finite = |skin: &Skin| skin.positions.iter().all(|p| p.iter().all(|x| x.is_finite()));
+        if ![&rigid, &real, &shown].into_iter().all(finite) {
+            return Err(ArmPictureError::NotFinite);
+        }
+        let peak = if header.color_scale_m > 0.0 { header.color_scale_m } else { 1.0 };
+        let deviation = real.positions.iter().zip(&rigid.positions).map(|(a, b)| (a - b).norm());
+        let values = deviation.map(|d| on_scale((d / peak).min(1.0))).collect();
+        let [tool, moved] = [&sample.rigid.X_WT, &magnified.X_WT].map(|X| X.translation.vector);
+        let (factor, size) = (magnifier.factor(), reach(&sample.rigid));
+        Ok(Self { rigid, shown, values, rigid_twin: sample.rigid.clone(), factor, tool, moved, size })
+    }
+
+    /// From a side, with everything within the margins beside and below (pixels).
+    fn view(
+        &self,
+        side: ArmSide,
+        [width, height]: [usize; 2],
+        [margin, foot]: [f64; 2],
+        around: Option<&Ellipsoid>,
+    ) -> View {
+        let (toward, right) = directions(side, &self.rigid_twin);
+        let ellipsoid = around.into_iter().flat_map(|e| e.corners(&self.moved));
+        let points = self.rigid.positions.iter().chain(&self.shown.positions).copied();
+        let points = points.chain([self.tool, self.moved]).chain(ellipsoid);
+        View::fit(toward, right, points, [margin, margin, width as f64 - 2.0 * margin, height as f64 - margin - foot])
+    }
+
+    /// Both arms on a ground of one colour.
+    fn draw(&self, view: &View, [width, height]: [usize; 2], ground: Rgb) -> Image {
+        let count = self.rigid.triangles.len();
+        let (colors, bright) = (vec![[GHOST; 2]; count], vec![false; count]);
+        let side_of = vec![-1.0; self.rigid.positions.len()];
+        let paint = Paint::Faces { colors: &colors, bright: &bright, side: &side_of };
+        let ghost = Scene { positions: &self.rigid.positions, triangles: &self.rigid.triangles, paint, marks: &[] };
+        let mut under = render_over(&ghost, view, &Image::new(width, height, ground));
+        for y in 0..height {
+            for x in 0..width {
+                under.blend(x, y, ground, GHOST_FADE as f32);
+            }
+        }
+        let paint = Paint::Magnitude { values: &self.values, peak: 1.0 };
+        let flexible = Scene { positions: &self.shown.positions, triangles: &self.shown.triangles, paint, marks: &[] };
+        let mut image = render_over(&flexible, view, &under);
+        for (at, share) in outline_of(&ghost, view, width, height).into_iter().enumerate() {
+            image.blend(at % width, at / width, GHOST_LINE, 0.8 * share);
+        }
+        image
+    }
+
+    /// On white, with everything that is to be known.
+    fn explained(&self, side: ArmSide, size: [usize; 2], header: &RunHeader, around: Option<&Ellipsoid>) -> Image {
+        let unit = size[0] as f64 / NOMINAL_WIDTH;
+        let view = self.view(side, size, [26.0 * unit, 78.0 * unit], around);
+        let mut image = self.draw(&view, size, color::PAPER);
+        if let Some(ellipsoid) = around {
+            ellipsoid.draw(&mut image, &view, unit, &self.moved);
+        }
+        arrow(&mut image, &view, unit, &self.tool, &self.moved);
+        legend(&mut image, &view, unit, header, self.factor);
+        image
+    }
+}
+
+fn check(header: &RunHeader, sample: &Sample) -> Result<(), ArmPictureError> {
     if !header.has_rigid {
         return Err(ArmPictureError::NoTwin);
     }
@@ -92,51 +259,97 @@ pub fn arm_png(
             return Err(ArmPictureError::NotFinite);
         }
     }
-    let bodies = bodies(header, sample);
-    let magnifier = Magnifier::new(header);
-    let magnified = magnifier.magnified(sample);
-    let rigid = Skin::rigid(&bodies, &sample.rigid);
-    let real = Skin::bent(&bodies, header, &sample.flexible);
-    let shown = Skin::bent(&bodies, header, &magnified);
-    if rigid.triangles.is_empty() {
-        return Err(ArmPictureError::Nothing);
-    }
-    let finite = |skin: &Skin| skin.positions.iter().all(|p| p.iter().all(|x| x.is_finite()));
-    if ![&rigid, &real, &shown].into_iter().all(finite) {
-        return Err(ArmPictureError::NotFinite);
-    }
-    let deviation: Vec<f64> = real.positions.iter().zip(&rigid.positions).map(|(a, b)| (a - b).norm()).collect();
+    Ok(())
+}
 
-    let unit = width as f64 / NOMINAL_WIDTH;
-    let (toward, right) = directions(side, &sample.rigid);
-    let [tool, moved] = [&sample.rigid.X_WT, &magnified.X_WT].map(|X| X.translation.vector);
-    let points = rigid.positions.iter().chain(&shown.positions).copied().chain([tool, moved]);
-    let (margin, foot) = (26.0 * unit, 78.0 * unit);
-    let frame = [margin, margin, width as f64 - 2.0 * margin, height as f64 - margin - foot];
-    let view = View::fit(toward, right, points, frame);
+/// The same picture on white and on black, without its ground.
+fn without_ground(white: &Image, black: &Image) -> Image {
+    let mut image = black.clone();
+    for (pixel, white) in image.rgba.chunks_exact_mut(4).zip(white.rgba.chunks_exact(4)) {
+        // What shines through is what differs, alike in all colours but for rounding.
+        let through = (0..3).map(|c| f64::from(white[c].saturating_sub(pixel[c]))).sum::<f64>() / (3.0 * 255.0);
+        let covered = 1.0 - through;
+        for part in &mut pixel[..3] {
+            *part = if covered > 0.0 { (f64::from(*part) / covered).round().min(255.0) as u8 } else { 0 };
+        }
+        pixel[3] = (255.0 * covered).round() as u8;
+    }
+    image
+}
 
-    let plain = |count: usize| (vec![[GHOST; 2]; count], vec![false; count]);
-    let (colors, bright) = plain(rigid.triangles.len());
-    let side_of = vec![-1.0; rigid.positions.len()];
-    let paint = Paint::Faces { colors: &colors, bright: &bright, side: &side_of };
-    let ghost = Scene { positions: &rigid.positions, triangles: &rigid.triangles, paint, marks: &[] };
-    let mut under = render(&ghost, &view, width, height);
-    for y in 0..height {
-        for x in 0..width {
-            under.blend(x, y, color::PAPER, GHOST_FADE as f32);
+/// Places to which one force of any direction moves the tool.
+struct Ellipsoid {
+    /// From the direction of the force to the drawn displacement (m).
+    map: Matrix3<f64>,
+    /// Principal axes: drawn displacement (m), compliance (m/N).
+    axes: [(Vector3<f64>, f64); 3],
+}
+
+/// Length of its longest half axis, as a share of the size of the arm.
+const ELLIPSOID: f64 = 0.13;
+/// Pieces of its outline.
+const OUTLINE_PIECES: usize = 96;
+const ELLIPSOID_COLOR: Rgb = [126, 46, 132];
+
+impl Ellipsoid {
+    /// None for an arm that does not yield.
+    fn new(C: &Matrix3<f64>, size: f64) -> Option<Self> {
+        let eigen = SymmetricEigen::new(0.5 * (C + C.transpose()));
+        let largest = eigen.eigenvalues.amax();
+        if !(largest > 0.0 && largest.is_finite() && size > 0.0) {
+            return None;
+        }
+        let scale = ELLIPSOID * size / largest;
+        let axes = [0, 1, 2].map(|k| {
+            let value = eigen.eigenvalues[k];
+            (eigen.eigenvectors.column(k) * value * scale, value)
+        });
+        Some(Self { map: scale * C, axes })
+    }
+
+    /// Ends of its axes about a place.
+    fn corners(&self, at: &Vector3<f64>) -> Vec<Vector3<f64>> {
+        self.axes.iter().flat_map(|(axis, _)| [at + axis, at - axis]).collect()
+    }
+
+    /// Its outline, which is an ellipse, and its axes with their values.
+    fn draw(&self, image: &mut Image, view: &View, unit: f64, at: &Vector3<f64>) {
+        let point = |p: &Vector3<f64>| {
+            let [x, y, _] = view.project(p);
+            [x, y]
+        };
+        // The outline is where the two directions of the page move by unit forces: with P onto the page, P C Cᵀ Pᵀ has its
+        // half axes as eigenvectors, their squares as eigenvalues.
+        let P = Matrix2x3::from_rows(&[view.right.transpose(), view.up.transpose()]);
+        let A = P * self.map;
+        let eigen = SymmetricEigen::new(A * A.transpose());
+        let half = [0, 1].map(|k| P.transpose() * eigen.eigenvectors.column(k) * eigen.eigenvalues[k].max(0.0).sqrt());
+        let place = |k: usize| {
+            let (sin, cos) = (std::f64::consts::TAU * k as f64 / OUTLINE_PIECES as f64).sin_cos();
+            point(&(at + half[0] * cos + half[1] * sin))
+        };
+        for k in 0..OUTLINE_PIECES {
+            image.line(place(k), place(k + 1), 2.2 * unit, ELLIPSOID_COLOR, 0.9);
+        }
+        for (axis, value) in &self.axes {
+            let ends = [at - axis, at + axis].map(|p| point(&p));
+            image.line(ends[0], ends[1], 1.4 * unit, ELLIPSOID_COLOR, 0.8);
+            let length = (ends[1][0] - ends[0][0]).hypot(ends[1][1] - ends[0][1]);
+            // Of an axis that points at the viewer there is nothing to name.
+            if length > 44.0 * unit {
+                let right = usize::from(ends[1][0] > ends[0][0]);
+                let [x, y] = ends[right];
+                let style = Style::new(14.0 * unit, ELLIPSOID_COLOR).bold().halo(color::PAPER);
+                image.text(&format!("{} µm/N", short(1e6 * value)), [x + 5.0 * unit, y], Align::Left, style);
+            }
         }
     }
-    let peak = if header.color_scale_m > 0.0 { header.color_scale_m } else { 1.0 };
-    let values: Vec<f64> = deviation.iter().map(|d| on_scale((d / peak).min(1.0))).collect();
-    let paint = Paint::Magnitude { values: &values, peak: 1.0 };
-    let flexible = Scene { positions: &shown.positions, triangles: &shown.triangles, paint, marks: &[] };
-    let mut image = render_over(&flexible, &view, &under);
-    for (at, share) in outline_of(&ghost, &view, width, height).into_iter().enumerate() {
-        image.blend(at % width, at / width, GHOST_LINE, 0.8 * share);
-    }
-    arrow(&mut image, &view, unit, &tool, &moved);
-    legend(&mut image, &view, unit, header, magnifier.factor());
-    image.to_png().map_err(ArmPictureError::Encode)
+}
+
+/// Colour on the arm of a share of the largest deviation on the scale.
+#[must_use]
+pub fn arm_color(share: f64) -> Rgb {
+    color::magnitude(on_scale(share.clamp(0.0, 1.0)))
 }
 
 /// Place on the scale of colours of a share of the largest deviation.
@@ -289,16 +502,16 @@ fn legend(image: &mut Image, view: &View, unit: f64, header: &RunHeader, factor:
             continue;
         }
         let place = |length: f64| [0, 1].map(|i| origin[i] + length * unit * direction[i]);
-        image.arrow(origin, place(26.0), 1.8 * unit, color::AXES[k]);
+        image.arrow(origin, place(26.0), 1.8 * unit, color::axis(k));
         let [x, y] = place(36.0);
-        let style = Style::new(14.0 * unit, color::AXES[k]).bold();
+        let style = Style::new(14.0 * unit, color::axis(k)).bold();
         image.text(["x", "y", "z"][k], [x, y + 5.0 * unit], Align::Middle, style);
     }
 
     let (bar, left, top) = (240.0 * unit, width - 286.0 * unit, height - 42.0 * unit);
     let thick = 11.0 * unit;
     for x in 0..bar as usize {
-        image.fill(left + x as f64, top, 1.0, thick, color::magnitude(on_scale(x as f64 / (bar - 1.0))));
+        image.fill(left + x as f64, top, 1.0, thick, arm_color(x as f64 / (bar - 1.0)));
     }
     let scale = 1e3 * if header.color_scale_m > 0.0 { header.color_scale_m } else { 1.0 };
     for place in [0.0, 0.5, 1.0] {
@@ -355,10 +568,14 @@ mod tests {
     }
 
     fn decoded(png: &[u8]) -> Vec<Rgb> {
+        rgba(png).into_iter().map(|p| [p[0], p[1], p[2]]).collect()
+    }
+
+    fn rgba(png: &[u8]) -> Vec<[u8; 4]> {
         let mut reader = png::Decoder::new(std::io::Cursor::new(png)).read_info().unwrap();
         let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
         reader.next_frame(&mut bytes).unwrap();
-        bytes.chunks_exact(4).map(|p| [p[0], p[1], p[2]]).collect()
+        bytes.chunks_exact(4).map(|p| [p[0], p[1], p[2], p[3]]).collect()
     }
 
     #[test]
@@ -379,6 +596,61 @@ mod tests {
             let grey = |p: &&Rgb| p.iter().all(|c| (150..240).contains(c)) && p[0].abs_diff(p[2]) < 24;
             assert!(pixels.iter().filter(grey).count() > 400, "{side:?}: the ghost");
         }
+    }
+
+    /// Truth: the picture on paper, which is drawn without transparency.
+    #[test]
+    fn a_picture_without_ground_is_the_same_on_white_and_shows_dark_paper_where_there_is_no_arm() {
+        let (header, sample) = arm();
+        let size = [450, 350];
+        let picture = arm_picture(&header, &sample, ArmSide::Oblique, size).unwrap();
+        let pixels = rgba(&picture.png);
+        assert!(pixels.iter().filter(|p| p[3] == 0).count() > pixels.len() / 2, "most of it is ground");
+        assert!(pixels.iter().filter(|p| p[3] == 255).count() > 1000, "the arm covers");
+        assert!(pixels.iter().filter(|p| (100..220).contains(&p[3])).count() > 400, "the ghost is seen through");
+        let stage = Stage::new(&header, &sample).unwrap();
+        let view = stage.view(ArmSide::Oblique, size, [13.0, 13.0], None);
+        for ground in [[255; 3], [27, 31, 38]] {
+            let mut truth = stage.draw(&view, size, ground);
+            arrow(&mut truth, &view, 0.5, &stage.tool, &stage.moved);
+            let worst = pixels.iter().zip(truth.rgba.chunks_exact(4)).flat_map(|(p, truth)| {
+                let laid = |c: usize| {
+                    let a = f64::from(p[3]) / 255.0;
+                    (a * f64::from(p[c]) + (1.0 - a) * f64::from(ground[c]) - f64::from(truth[c])).abs()
+                };
+                [laid(0), laid(1), laid(2)]
+            });
+            let worst = worst.fold(0.0, f64::max);
+            assert!(worst < 3.0, "{worst} of 255 on {ground:?}"); // rounding of alpha and colour
+        }
+        // z is drawn upwards from every side.
+        let [right, up] = picture.axes[2];
+        assert!(right.abs() < 1e-9 && up > 0.5, "{:?}", picture.axes);
+    }
+
+    /// Truth: the ellipsoid's points `C f` of unit forces, none of which is outside of its outline while some touch it.
+    #[test]
+    fn the_outline_of_the_compliance_holds_what_every_force_does() {
+        let C = Matrix3::new(3.0, 0.4, -0.2, 0.4, 1.0, 0.3, -0.2, 0.3, 2.0) * 1e-6;
+        let ellipsoid = Ellipsoid::new(&C, 2.0).unwrap();
+        let (toward, right) = (Vector3::new(0.5, 0.6, 0.4), Vector3::new(0.6, -0.5, 0.0));
+        let view = View::fit(toward, right, ellipsoid.corners(&Vector3::zeros()).into_iter(), [0.0, 0.0, 100.0, 100.0]);
+        let P = Matrix2x3::from_rows(&[view.right.transpose(), view.up.transpose()]);
+        let A = P * ellipsoid.map;
+        let inverse = (A * A.transpose()).try_inverse().unwrap();
+        let mut largest = 0.0_f64;
+        for i in 0..60 {
+            for j in 0..60 {
+                let (theta, phi) = (0.0523 * f64::from(i), 0.1047 * f64::from(j));
+                let force = Vector3::new(theta.sin() * phi.cos(), theta.sin() * phi.sin(), theta.cos());
+                let moved = P * (ellipsoid.map * force);
+                largest = largest.max((moved.transpose() * inverse * moved)[0]);
+            }
+        }
+        assert!((0.995..1.0 + 1e-12).contains(&largest), "{largest}"); // measured 0.9995
+        let longest = ellipsoid.axes.iter().map(|(axis, _)| axis.norm()).fold(0.0, f64::max);
+        assert!((longest - ELLIPSOID * 2.0).abs() < 1e-12);
+        assert!(Ellipsoid::new(&Matrix3::zeros(), 2.0).is_none());
     }
 
     #[test]

@@ -4,7 +4,7 @@
 //! same three calls, and [`RecorderSet`] passes them to several files at once. Start at [`CsvRecorder`] for
 //! tables (`ParquetRecorder`, feature `parquet`, for the same table as Parquet), `McapRecorder` (feature `mcap`) for ROS 2 tools, Foxglove and PlotJuggler, `RrdRecorder` (feature
 //! `rerun`) for the Rerun viewer with meshes and a layout. Pictures of a mesh reduction are a module of their
-//! own, `mesh_picture` (feature `png`), `arm_png` draws the arm at one instant; curves as an SVG picture are drawn by [`line_plot`].
+//! own, `mesh_picture` (feature `png`), `arm_picture`, `arm_png` and `arm_sheet` draw the arm at one instant; curves as an SVG picture are drawn by [`LinePlot`]; all colours are in [`palette`].
 //!
 //! The way back is [`open_recording`]: a [`RunSource`] gives header, samples and result of a file, for reports and for
 //! other formats. What a format cannot hold is listed by [`RecordingFormat::lost_on_the_way_to`].
@@ -58,9 +58,12 @@ mod mcap_file;
 #[cfg(feature = "png")]
 pub mod mesh_picture;
 mod multi;
+pub mod palette;
 #[cfg(feature = "parquet")]
 mod parquet_file;
 mod plot;
+#[cfg(any(test, feature = "rerun"))]
+mod plot_room;
 mod read;
 mod record;
 #[cfg(feature = "rerun")]
@@ -75,7 +78,7 @@ mod tail_file;
 mod trace;
 
 #[cfg(feature = "png")]
-pub use arm_picture::{ArmPictureError, ArmSide, arm_png};
+pub use arm_picture::{ArmPicture, ArmPictureError, ArmSide, arm_color, arm_picture, arm_png, arm_sheet};
 pub use bend::{BendLine, BentMesh, BentPieces};
 pub use create::CreateOptions;
 pub use csv_file::CsvRecorder;
@@ -83,12 +86,15 @@ pub use error::LogError;
 pub use magnify::{Magnifier, stations_in_link};
 #[cfg(feature = "mcap")]
 pub use mcap_file::McapRecorder;
+#[cfg(feature = "mcap")]
+pub use mcap_file::layouts::{foxglove_layout, plotjuggler_layout};
 pub use multi::RecorderSet;
 #[cfg(feature = "parquet")]
 pub use parquet_file::ParquetRecorder;
-pub use plot::{CurveLook, Panel, PlotCurve, PlotError, line_plot, page_plot, paper_plot};
+pub use plot::{CurveLook, LinePlot, Panel, PlotCurve, PlotError, page_plot, paper_plot};
 pub use read::{RecordingFormat, open_recording};
 pub use record::*;
 #[cfg(feature = "rerun")]
 pub use rrd_file::{RrdRecorder, RrdStudy, StudySeat};
+pub use surface::mesh_media_type;
 pub use trace::{RunSource, Trace, TraceRow};

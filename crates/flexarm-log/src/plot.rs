@@ -1,7 +1,7 @@
 //! Curves over a common axis as a picture (SVG): panels one above the other with a legend.
 //!
 //! The one module that names `plotters`, with its SVG backend alone: no fonts, no files, no clock. Start at
-//! [`line_plot`] for the screen, [`paper_plot`] for a column of a paper.
+//! [`LinePlot`] for the screen, [`paper_plot`] for a column of a paper.
 
 use std::ops::Range;
 
@@ -9,19 +9,12 @@ use plotters::coord::Shift;
 use plotters::coord::ranged1d::{AsRangedCoord, ValueFormatter};
 use plotters::prelude::*;
 
+use crate::palette::{self, Ground, Rgb};
+
 /// Decades that a logarithmic panel shows at most below its highest value.
 const MOST_DECADES: f64 = 1e8;
-/// Colours of curves: Okabe and Ito's, without yellow, which colour-blind people tell apart.
-const COLORS: [RGBColor; 8] = [
-    RGBColor(0, 114, 178),
-    RGBColor(213, 94, 0),
-    RGBColor(0, 158, 115),
-    RGBColor(181, 80, 143),
-    RGBColor(230, 159, 0),
-    RGBColor(86, 180, 233),
-    RGBColor(122, 90, 46),
-    RGBColor(124, 135, 148),
-];
+/// Marks across a panel.
+const MARK: RGBColor = RGBColor(140, 146, 156);
 /// Behind stretches that are to be seen as one, such as moves.
 const BAND: RGBColor = RGBColor(234, 241, 247);
 
@@ -44,6 +37,8 @@ pub enum CurveLook {
     Dots,
     /// As [`CurveLook::Plain`] with a dot at each point.
     Marked,
+    /// In the colour of the axis x (0), y (1) or z (2).
+    Axis(usize),
 }
 
 /// A curve.
@@ -79,14 +74,12 @@ struct Style {
     margin: u32,
     x_area: u32,
     y_area: u32,
-    caption: u32,
+    title: u32,
     font: u32,
     legend_font: u32,
     stroke: u32,
     /// Width of the picture on paper (mm); without it units are pixels.
     width_mm: Option<f64>,
-    /// Curves are named above the panels, where they hide nothing.
-    legend_above: bool,
     x_labels: usize,
 }
 
@@ -95,12 +88,11 @@ const SCREEN: Style = Style {
     margin: 12,
     x_area: 36,
     y_area: 72,
-    caption: 18,
+    title: 18,
     font: 13,
-    legend_font: 12,
+    legend_font: 13,
     stroke: 2,
     width_mm: None,
-    legend_above: false,
     x_labels: 11,
 };
 
@@ -110,12 +102,11 @@ const PAGE: Style = Style {
     margin: 24,
     x_area: 88,
     y_area: 168,
-    caption: 36,
+    title: 36,
     font: 30,
     legend_font: 30,
     stroke: 4,
     width_mm: Some(254.0),
-    legend_above: true,
     x_labels: 11,
 };
 
@@ -125,74 +116,87 @@ const COLUMN: Style = Style {
     margin: 14,
     x_area: 84,
     y_area: 132,
-    caption: 36,
+    title: 36,
     font: 33,
     legend_font: 31,
     stroke: 4,
     width_mm: Some(88.0),
-    legend_above: true,
     x_labels: 8,
 };
 
-/// Draws panels over a common horizontal axis, logarithmic if asked for and possible; the text of an SVG file.
-///
-/// # Errors
-/// [`PlotError`] if nothing finite is to be drawn.
-pub fn line_plot(title: &str, x_label: &str, logarithmic_x: bool, panels: &[Panel]) -> Result<String, PlotError> {
-    plot(title, x_label, logarithmic_x, panels, &[], &SCREEN)
+/// Panels over a common horizontal axis, for the screen. Curves are named above the panels, where they hide nothing.
+#[derive(Clone, Debug, Default)]
+pub struct LinePlot<'a> {
+    /// What is shown.
+    pub title: &'a str,
+    /// What else is to be known, line by line, in smaller letters.
+    pub notes: &'a [String],
+    /// What is on the horizontal axis.
+    pub x_label: &'a str,
+    /// Logarithmic horizontal axis, if possible.
+    pub logarithmic_x: bool,
+    /// Places on it that are marked in every panel, with a name in the first.
+    pub marks: &'a [(f64, String)],
+    /// From top to bottom.
+    pub panels: &'a [Panel],
 }
 
-/// As [`line_plot`], in the size of a column of a two-column paper (88 mm, text of 8 points), without a title: that is
-/// the caption's work. Curves are named above the panels; `bands` are stretches of the horizontal axis to be tinted.
+impl LinePlot<'_> {
+    /// The text of an SVG file.
+    ///
+    /// # Errors
+    /// [`PlotError`] if nothing finite is to be drawn.
+    pub fn svg(&self) -> Result<String, PlotError> {
+        plot(self, &[], &SCREEN)
+    }
+}
+
+/// Panels in the size of a column of a two-column paper (88 mm, text of 8 points), without a title: that is the caption's
+/// work. Curves are named above the panels; `bands` are stretches of the horizontal axis to be tinted. SVG.
 ///
 /// # Errors
-/// As [`line_plot`].
+/// As [`LinePlot::svg`].
 pub fn paper_plot(x_label: &str, panels: &[Panel], bands: &[(f64, f64)]) -> Result<String, PlotError> {
-    plot("", x_label, false, panels, bands, &COLUMN)
+    plot(&LinePlot { x_label, panels, ..LinePlot::default() }, bands, &COLUMN)
 }
 
 /// Panels below each other for a page of text, 960 pixels wide, curves named above them, as SVG.
 ///
 /// # Errors
-/// As [`line_plot`].
+/// As [`LinePlot::svg`].
 pub fn page_plot(x_label: &str, logarithmic_x: bool, panels: &[Panel]) -> Result<String, PlotError> {
-    plot("", x_label, logarithmic_x, panels, &[], &PAGE)
+    plot(&LinePlot { x_label, logarithmic_x, panels, ..LinePlot::default() }, &[], &PAGE)
 }
 
-fn plot(
-    title: &str,
-    x_label: &str,
-    logarithmic_x: bool,
-    panels: &[Panel],
-    bands: &[(f64, f64)],
-    style: &Style,
-) -> Result<String, PlotError> {
-    let mut text = String::new();
+fn plot(what: &LinePlot<'_>, bands: &[(f64, f64)], style: &Style) -> Result<String, PlotError> {
+    let (mut text, panels) = (String::new(), what.panels);
     let mut curves: Vec<&PlotCurve> = Vec::new();
     for curve in panels.iter().flat_map(|panel| &panel.curves) {
         if !curves.iter().any(|known| known.name == curve.name) {
             curves.push(curve);
         }
     }
-    let legend =
-        if style.legend_above && panels.iter().any(|p| p.legend) { legend_rows(&curves, style) } else { Vec::new() };
+    let legend = if panels.iter().any(|p| p.legend) { legend_rows(&curves, style) } else { Vec::new() };
     let row = style.legend_font * 3 / 2;
-    let above = if legend.is_empty() { 0 } else { row * legend.len() as u32 + style.margin };
+    let above_legend = heading_height(what, style);
+    let above = above_legend + if legend.is_empty() { 0 } else { row * legend.len() as u32 + style.margin };
     let (width, height) = (style.panel.0, style.panel.1 * panels.len().max(1) as u32 + above);
     {
         let area = SVGBackend::with_string(&mut text, (width, height)).into_drawing_area();
         area.fill(&WHITE).map_err(fault)?;
         let (strip, area) = area.split_vertically(above);
+        let (heading, strip) = strip.split_vertically(above_legend);
+        draw_heading(&heading, what, style)?;
         draw_legend(&strip, &legend, &curves, style)?;
         for (k, (panel, part)) in panels.iter().zip(area.split_evenly((panels.len(), 1))).enumerate() {
-            let title = if k == 0 { title } else { "" };
-            let x_label = if k + 1 == panels.len() { x_label } else { "" };
+            let x_label = if k + 1 == panels.len() { what.x_label } else { "" };
             let points = points(panel);
             let ranges = ranges(&points, panel.logarithmic)
                 .ok_or_else(|| PlotError(format!("{:?} has nothing finite to draw", panel.label)))?;
             let (x, y) = ranges.clone();
-            let frame = Frame { title, x_label, panel, points: &points, all: &curves, bands, ranges, style };
-            match (logarithmic_x && x.start > 0.0, panel.logarithmic) {
+            let (marks, named) = (what.marks, k == 0);
+            let frame = Frame { x_label, panel, points: &points, all: &curves, bands, marks, named, ranges, style };
+            match (what.logarithmic_x && x.start > 0.0, panel.logarithmic) {
                 (true, true) => frame.draw(&part, x.log_scale(), y.log_scale()),
                 (true, false) => frame.draw(&part, x.log_scale(), y),
                 (false, true) => frame.draw(&part, x, y.log_scale()),
@@ -208,6 +212,33 @@ fn plot(
         text = text.replacen(&old, &new, 1);
     }
     Ok(text)
+}
+
+/// Room for the title and the notes below it.
+fn heading_height(what: &LinePlot<'_>, style: &Style) -> u32 {
+    match (what.title.is_empty(), what.notes.len() as u32) {
+        (true, 0) => 0,
+        (_, notes) => style.margin + style.title * 3 / 2 + notes * style.legend_font * 3 / 2,
+    }
+}
+
+fn draw_heading(
+    area: &DrawingArea<SVGBackend<'_>, Shift>,
+    what: &LinePlot<'_>,
+    style: &Style,
+) -> Result<(), PlotError> {
+    if heading_height(what, style) == 0 {
+        return Ok(());
+    }
+    let (x, mut y) = ((style.y_area + style.margin) as i32, style.margin as i32);
+    let title = ("sans-serif", style.title as i32).into_font().style(FontStyle::Bold);
+    area.draw(&Text::new(what.title, (x, y), title)).map_err(fault)?;
+    y += style.title as i32 * 3 / 2;
+    for note in what.notes {
+        area.draw(&Text::new(note.as_str(), (x, y), ("sans-serif", style.legend_font as i32))).map_err(fault)?;
+        y += style.legend_font as i32 * 3 / 2;
+    }
+    Ok(())
 }
 
 fn fault(error: impl std::fmt::Display) -> PlotError {
@@ -242,12 +273,16 @@ fn ranges(points: &[Vec<(f64, f64)>], logarithmic: bool) -> Option<(Range<f64>, 
 
 /// Colour and width of a curve; those of one name look the same in all panels.
 fn look_of(curve: &PlotCurve, all: &[&PlotCurve], style: &Style) -> ShapeStyle {
-    if curve.look == CurveLook::Total {
-        return BLACK.stroke_width(style.stroke + style.stroke / 3);
+    let color = |[red, green, blue]: Rgb| RGBColor(red, green, blue);
+    let counted = |look: CurveLook| !matches!(look, CurveLook::Total | CurveLook::Axis(_));
+    match curve.look {
+        CurveLook::Total => BLACK.stroke_width(style.stroke + style.stroke / 3),
+        CurveLook::Axis(k) => color(palette::axis(k, Ground::Paper)).stroke_width(style.stroke),
+        _ => {
+            let place = all.iter().filter(|known| counted(known.look)).position(|known| known.name == curve.name);
+            color(palette::series(place.unwrap_or(0), Ground::Paper)).stroke_width(style.stroke)
+        }
     }
-    let colored = all.iter().filter(|known| known.look != CurveLook::Total);
-    let place = colored.clone().position(|known| known.name == curve.name).unwrap_or(0);
-    COLORS[place % COLORS.len()].stroke_width(style.stroke)
 }
 
 /// Places of names above the panels: curve and distance from the left, row by row.
@@ -312,13 +347,15 @@ fn draw_legend(
 }
 
 struct Frame<'a> {
-    title: &'a str,
     x_label: &'a str,
     panel: &'a Panel,
     points: &'a [Vec<(f64, f64)>],
     /// Of all panels, in the order of their colours.
     all: &'a [&'a PlotCurve],
     bands: &'a [(f64, f64)],
+    marks: &'a [(f64, String)],
+    /// Whether the marks are named here.
+    named: bool,
     ranges: (Range<f64>, Range<f64>),
     style: &'a Style,
 }
@@ -338,9 +375,6 @@ impl Frame<'_> {
             .margin_right(2 * style.margin)
             .x_label_area_size(style.x_area)
             .y_label_area_size(style.y_area);
-        if !self.title.is_empty() {
-            chart.caption(self.title, ("sans-serif", style.caption));
-        }
         let mut chart = chart.build_cartesian_2d(x, y).map_err(fault)?;
         let (across, up) = &self.ranges;
         let bands = self.bands.iter().filter(|(from, to)| *to > across.start && *from < across.end);
@@ -358,36 +392,51 @@ impl Frame<'_> {
             .y_label_formatter(&|y| plain(*y))
             .draw()
             .map_err(fault)?;
+        self.draw_marks(&mut chart)?;
         for (curve, points) in self.panel.curves.iter().zip(self.points) {
             let look = look_of(curve, self.all, style);
-            let drawn = if curve.look == CurveLook::Dots {
-                let dots = points.iter().map(|point| Circle::new(*point, dot_radius(style), look.filled()));
-                chart.draw_series(dots).map_err(fault)?
-            } else if curve.look == CurveLook::Dashed {
+            if curve.look == CurveLook::Dashed {
                 let (dash, gap) = (6 * style.stroke, 4 * style.stroke);
                 let dashes = DashedLineSeries::new(points.iter().copied(), dash, gap, look);
-                chart.draw_series(dashes).map_err(fault)?
-            } else {
-                chart.draw_series(LineSeries::new(points.iter().copied(), look)).map_err(fault)?
-            };
-            drawn.label(&curve.name).legend(move |(x, y)| PathElement::new([(x, y), (x + 16, y)], look));
-            if curve.look == CurveLook::Marked {
+                chart.draw_series(dashes).map_err(fault)?;
+            } else if curve.look != CurveLook::Dots {
+                chart.draw_series(LineSeries::new(points.iter().copied(), look)).map_err(fault)?;
+            }
+            if matches!(curve.look, CurveLook::Dots | CurveLook::Marked) {
                 let dots = points.iter().map(|point| Circle::new(*point, dot_radius(style), look.filled()));
                 chart.draw_series(dots).map_err(fault)?;
             }
         }
-        if self.panel.legend && !style.legend_above && !self.panel.curves.is_empty() {
-            chart
-                .configure_series_labels()
-                .position(SeriesLabelPosition::UpperRight)
-                .background_style(WHITE.mix(0.8))
-                .label_font(("sans-serif", style.legend_font))
-                .draw()
-                .map_err(fault)?;
+        Ok(())
+    }
+
+    /// Dashed lines across the panel; names that would lie on each other are left out.
+    fn draw_marks<X, Y>(&self, chart: &mut Chart<'_, '_, X, Y>) -> Result<(), PlotError>
+    where
+        X: Ranged<ValueType = f64>,
+        Y: Ranged<ValueType = f64>,
+    {
+        let (across, up) = &self.ranges;
+        let (style, font) = (self.style, self.style.legend_font as i32);
+        let mut free = i32::MIN;
+        for (x, name) in self.marks.iter().filter(|(x, _)| across.contains(x)) {
+            let line = [(*x, up.start), (*x, up.end)];
+            let (dash, gap) = (2 * style.stroke, 2 * style.stroke);
+            chart.draw_series(DashedLineSeries::new(line, dash, gap, MARK.stroke_width(1))).map_err(fault)?;
+            let (left, _) = chart.backend_coord(&(*x, up.end));
+            if self.named && left >= free {
+                let look = ("sans-serif", font).into_font().color(&MARK);
+                let text = EmptyElement::at((*x, up.end)) + Text::new(name.clone(), (3, 2), look);
+                chart.draw_series(std::iter::once(text)).map_err(fault)?;
+                free = left + 6 + name.chars().count() as i32 * font * 6 / 10;
+            }
         }
         Ok(())
     }
 }
+
+/// A chart of `plotters` as SVG.
+type Chart<'a, 'b, X, Y> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<X, Y>>;
 
 /// Short form of a number on an axis.
 fn plain(x: f64) -> String {
@@ -420,21 +469,40 @@ mod tests {
             panel("size", true, vec![curve("a < b", &[1.0, 1e-3, f64::NAN, 0.0])]),
             panel("angle", false, vec![curve("flat", &[2.0, 2.0])]),
         ];
-        let text = line_plot("all of it", "time", true, &panels).unwrap();
+        let marks = [(2.0, "f1".to_owned()), (2.001, "f2".to_owned()), (99.0, "f3".to_owned())];
+        let notes = ["at rest".to_owned()];
+        let (title, x_label) = ("all of it", "time");
+        let plot = LinePlot { title, notes: &notes, x_label, logarithmic_x: true, marks: &marks, panels: &panels };
+        let text = plot.svg().unwrap();
         assert!(text.starts_with("<svg") && text.trim_end().ends_with("</svg>"));
-        for word in ["all of it", "time", "size", "angle", "a &lt; b"] {
+        for word in ["all of it", "at rest", "time", "size", "angle", "a &lt; b", "f1"] {
             assert!(text.contains(word), "{word}");
         }
+        // The second would lie on the first, the third is beyond the axis.
+        assert!(!text.contains("f2") && !text.contains("f3"));
         assert!(text.matches("<polyline").count() >= 2);
-        assert_eq!(text, line_plot("all of it", "time", true, &panels).unwrap());
+        assert_eq!(text, plot.svg().unwrap());
     }
 
     #[test]
     fn nothing_to_draw_is_an_error() {
         let curves = vec![curve("a", &[0.0, f64::INFINITY])];
         let panel = Panel { label: "size".into(), logarithmic: true, legend: true, curves };
-        let error = line_plot("", "", false, &[panel]).unwrap_err();
+        let error = LinePlot { panels: &[panel], ..LinePlot::default() }.svg().unwrap_err();
         assert!(error.to_string().contains("nothing finite"), "{error}");
+    }
+
+    #[test]
+    fn axes_have_their_colours_whatever_is_drawn_before_them() {
+        let mut curves: Vec<PlotCurve> = ["a", "x", "b", "z"].map(|n| curve(n, &[1.0, 2.0])).into();
+        (curves[1].look, curves[3].look) = (CurveLook::Axis(0), CurveLook::Axis(2));
+        let panel = Panel { label: "error".into(), logarithmic: false, legend: true, curves };
+        let text = paper_plot("", &[panel], &[]).unwrap();
+        let colors = [palette::series(0, Ground::Paper), palette::series(1, Ground::Paper)].into_iter();
+        for color in colors.chain([0, 2].map(|k| palette::axis(k, Ground::Paper))) {
+            let hex = palette::hex(color).to_uppercase();
+            assert_eq!(text.matches(&format!("stroke=\"{hex}\"")).count(), 2, "{hex}: the curve and its name");
+        }
     }
 
     /// Truth: the width of a column, and a picture's units per millimetre.

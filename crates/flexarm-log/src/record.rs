@@ -7,6 +7,10 @@ use std::path::PathBuf;
 
 use flexarm_kinematics::Pose;
 
+/// The first of January 2000, 0:00 UTC (ns since 1970): when runs begin that are not told when, so that equal runs are equal
+/// files. Not 0, which ROS reads as no time at all.
+pub const START_NS: u64 = 946_684_800_000_000_000;
+
 /// What stays the same during a run.
 #[derive(Clone, Debug, Default)]
 pub struct RunHeader {
@@ -40,6 +44,8 @@ pub struct RunHeader {
     pub has_static: bool,
     /// Samples per second.
     pub log_rate_hz: f64,
+    /// Time of simulated time zero in recordings whose times have a date (ns since 1970); [`START_NS`] without it.
+    pub start_ns: Option<u64>,
     /// Step of the stepper (s): times of samples are whole multiples of it; 0 if it is not known.
     pub step_s: f64,
     /// Links that bend.

@@ -41,6 +41,9 @@ pub(crate) struct RunJson {
     /// Missing in files of older versions.
     #[serde(default)]
     captions: Vec<(f64, String)>,
+    /// Left out where it is the usual one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    start_ns: Option<u64>,
     magnification: f64,
     color_scale_m: f64,
     volume: Option<[[f64; 3]; 2]>,
@@ -109,6 +112,7 @@ pub(crate) fn write(header: &RunHeader, meshes: bool) -> String {
         log_rate_hz: header.log_rate_hz,
         step_s: header.step_s,
         captions: header.captions.iter().map(|caption| (caption.from_s, caption.text.clone())).collect(),
+        start_ns: header.start_ns.filter(|start| *start != crate::START_NS),
         magnification: header.magnification,
         color_scale_m: header.color_scale_m,
         volume: header.volume,
@@ -178,6 +182,7 @@ pub(crate) fn read(text: &[u8]) -> Result<(RunHeader, RunJson), String> {
         log_rate_hz: run.log_rate_hz,
         step_s: run.step_s,
         captions: run.captions.drain(..).map(|(from_s, text)| crate::Caption { from_s, text }).collect(),
+        start_ns: run.start_ns,
         magnification: run.magnification,
         color_scale_m: run.color_scale_m,
         volume: run.volume,

@@ -116,6 +116,20 @@ impl LinkMesh {
     }
 }
 
+/// Media type of a mesh file, by the ending of its name.
+#[must_use]
+pub fn mesh_media_type(path: &std::path::Path) -> &'static str {
+    let extension = path.extension().and_then(std::ffi::OsStr::to_str).unwrap_or_default().to_ascii_lowercase();
+    match extension.as_str() {
+        "stl" => "model/stl",
+        "obj" => "model/obj",
+        "dae" => "model/vnd.collada+xml",
+        "glb" => "model/gltf-binary",
+        "gltf" => "model/gltf+json",
+        _ => "application/octet-stream",
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -9,7 +9,10 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Duration;
 
-use flexarm_log::{CreateOptions, LinkInfo, LogError, Magnifier, McapRecorder, Recorder, RunHeader, RunResult};
+use flexarm_log::{
+    CreateOptions, LinkInfo, LogError, Magnifier, McapRecorder, Recorder, RunHeader, RunResult, START_NS,
+    foxglove_layout, plotjuggler_layout,
+};
 use mcap::read::Options;
 use mcap::{MessageStream, Summary};
 
@@ -116,10 +119,11 @@ fn every_topic_is_there_with_schema_quality_of_service_and_all_samples() {
 
     let n = synthetic::SAMPLES;
     let expected = [
-        ("/diagnostics/solver", "std_msgs/msg/Float64MultiArray", n),
+        ("/deviation/tcp", "std_msgs/msg/Float64MultiArray", n),
+        ("/deviation/tcp_path", "std_msgs/msg/Float64MultiArray", n),
         ("/elastic/joint_states", "sensor_msgs/msg/JointState", n),
         ("/elastic/upper_arm", "geometry_msgs/msg/WrenchStamped", n),
-        ("/elastic/upper_arm/deflection", "std_msgs/msg/Float64MultiArray", n),
+        ("/elastic/upper_arm/deflection", "geometry_msgs/msg/TwistStamped", n),
         ("/energy", "std_msgs/msg/Float64MultiArray", n),
         ("/events", "rcl_interfaces/msg/Log", 3),
         ("/joint_states", "sensor_msgs/msg/JointState", n),
@@ -128,11 +132,10 @@ fn every_topic_is_there_with_schema_quality_of_service_and_all_samples() {
         ("/markers/path", "visualization_msgs/msg/MarkerArray", 2),   // at 1 s and 2 s; one point makes no line
         ("/rigid/joint_states", "sensor_msgs/msg/JointState", n),
         ("/robot_description", "std_msgs/msg/String", 1),
+        ("/solver", "std_msgs/msg/Float64MultiArray", n),
         ("/tcp/contributions", "std_msgs/msg/Float64MultiArray", n),
         ("/tcp/error", "geometry_msgs/msg/TwistStamped", n),
         ("/tcp/error_path", "geometry_msgs/msg/TwistStamped", n),
-        ("/tcp/error_path_plot", "std_msgs/msg/Float64MultiArray", n),
-        ("/tcp/error_plot", "std_msgs/msg/Float64MultiArray", n),
         ("/tcp/flexible", "geometry_msgs/msg/PoseStamped", n),
         ("/tcp/rigid", "geometry_msgs/msg/PoseStamped", n),
         ("/tcp/static_error", "std_msgs/msg/Float64MultiArray", n),
@@ -154,7 +157,7 @@ fn messages_hold_the_samples() {
         let mut cdr = CdrReader::new(&data);
         let (stamp, frame) = cdr.header();
         assert_eq!((stamp, frame.as_str()), (log_time, ""));
-        assert_eq!(stamp, step * 2_000_000, "epoch 0, 500 samples a second");
+        assert_eq!(stamp, START_NS + step * 2_000_000, "from the first of January 2000 on, 500 samples a second");
         let names: Vec<String> = (0..cdr.u32()).map(|_| cdr.string()).collect();
         assert_eq!(names, header.joints);
         assert_eq!(cdr.sequence(), sample.flexible.q);
@@ -168,11 +171,11 @@ fn messages_hold_the_samples() {
 
     let data = message("/tcp/error");
     let mut cdr = CdrReader::new(&data);
-    assert_eq!(cdr.header(), (200_000_000, "world".to_owned()));
+    assert_eq!(cdr.header(), (START_NS + 200_000_000, "world".to_owned()));
     assert_eq!(cdr.f64s(6), sample.error_world);
     cdr.end();
 
-    let data = message("/tcp/error_plot");
+    let data = message("/deviation/tcp");
     let mut cdr = CdrReader::new(&data);
     assert_eq!((cdr.u32(), cdr.string()), (1, "x [m],y [m],z [m],norm [m]".to_owned()));
     assert_eq!((cdr.u32(), cdr.u32(), cdr.u32()), (4, 4, 0), "size, stride, offset");
@@ -191,12 +194,18 @@ fn messages_hold_the_samples() {
 
     let data = message("/elastic/joint_states");
     let mut cdr = CdrReader::new(&data);
-    assert_eq!(cdr.header().0, 200_000_000);
+    assert_eq!(cdr.header().0, START_NS + 200_000_000);
     let names: Vec<String> = (0..cdr.u32()).map(|_| cdr.string()).collect();
     assert_eq!(names, ["x", "y", "z", "rx", "ry", "rz"].map(|part| format!("upper_arm/{part}")));
     assert_eq!(cdr.sequence(), sample.elastic[0].deflection);
     assert!(cdr.sequence().is_empty(), "velocities are not known");
     assert_eq!(cdr.sequence(), sample.elastic[0].load);
+    cdr.end();
+
+    let data = message("/elastic/upper_arm/deflection");
+    let mut cdr = CdrReader::new(&data);
+    assert_eq!(cdr.header(), (START_NS + 200_000_000, "upper_arm".to_owned()));
+    assert_eq!(cdr.f64s(6), sample.elastic[0].deflection);
     cdr.end();
 
     let data = message("/elastic/upper_arm");
@@ -391,7 +400,7 @@ fn events_stand_at_their_own_times() {
     for (event, (log_time, data)) in synthetic::result().events.iter().zip(&events) {
         let mut cdr = CdrReader::new(data);
         let stamp = u64::from(cdr.u32()) * 1_000_000_000 + u64::from(cdr.u32());
-        assert_eq!((stamp, *log_time), ((event.time_s * 1e9) as u64, stamp));
+        assert_eq!((stamp, *log_time), (START_NS + (event.time_s * 1e9) as u64, stamp));
         assert_eq!(cdr.take::<1>(), [20], "information");
         assert_eq!((cdr.string().as_str(), cdr.string()), (event.kind.word(), event.text.clone()));
         assert_eq!((cdr.string(), cdr.string(), cdr.u32()), (String::new(), String::new(), 0));
@@ -402,7 +411,7 @@ fn events_stand_at_their_own_times() {
     let (times, topics): (Vec<u64>, Vec<String>) = by_index(&file).into_iter().unzip();
     assert!(times.is_sorted());
     let peak = times.iter().zip(&topics).position(|(_, topic)| topic == "/events").unwrap();
-    assert_eq!(times[peak], 0, "the first event is at the start");
+    assert_eq!(times[peak], START_NS, "the first event is at the start");
     assert_eq!(topics.iter().filter(|topic| *topic == "/events").count(), 3);
     assert_ne!(topics.last().unwrap(), "/events", "the last event is before the last sample");
 }
@@ -504,7 +513,7 @@ fn chunks_keep_their_size_and_checksums() {
 /// Number of samples in the undamaged part of a file.
 fn samples_left(file: &[u8]) -> usize {
     let stream = MessageStream::new_with_options(file, Options::IgnoreEndMagic.into()).unwrap();
-    stream.map_while(Result::ok).filter(|message| message.channel.topic == "/diagnostics/solver").count()
+    stream.map_while(Result::ok).filter(|message| message.channel.topic == "/solver").count()
 }
 
 /// What a kill leaves is what is in the file at that moment: every sample up to the last flush.
@@ -526,7 +535,7 @@ fn a_killed_run_keeps_every_sample() {
             let stats = summary.stats.as_ref().unwrap();
             assert_eq!(stats.message_count, all.len() as u64);
             let times = all.iter().map(|message| message.log_time);
-            assert_eq!((stats.message_start_time, stats.message_end_time), (0, times.max().unwrap()));
+            assert_eq!((stats.message_start_time, stats.message_end_time), (START_NS, times.max().unwrap()));
             assert_eq!(stats.chunk_count as usize, summary.chunk_indexes.len());
             for (id, count) in &stats.channel_message_counts {
                 assert_eq!(all.iter().filter(|message| message.channel.id == *id).count() as u64, *count);
@@ -578,11 +587,11 @@ fn a_dropped_recorder_closes_its_file() {
 }
 
 #[test]
-fn the_epoch_moves_all_stamps_and_times_out_of_range_are_refused() {
+fn the_start_time_moves_all_stamps_and_times_out_of_range_are_refused() {
     let path = synthetic::scratch("epoch.mcap");
     let epoch = 1_700_000_000_000_000_000;
-    let mut recorder = McapRecorder::create(&path, CreateOptions::default()).with_epoch_ns(epoch);
-    recorder.begin(&synthetic::header()).unwrap();
+    let mut recorder = McapRecorder::create(&path, CreateOptions::default());
+    recorder.begin(&RunHeader { start_ns: Some(epoch), ..synthetic::header() }).unwrap();
     recorder.record(&synthetic::sample(3)).unwrap();
     for time_s in [-1.0, f64::NAN, 1e9] {
         let sample = flexarm_log::Sample { time_s, ..synthetic::sample(4) };
@@ -593,4 +602,108 @@ fn the_epoch_moves_all_stamps_and_times_out_of_range_are_refused() {
     let (log_time, data) = &messages(&file, "/joint_states")[0];
     assert_eq!((*log_time, CdrReader::new(data).header().0), (epoch + 6_000_000, epoch + 6_000_000));
     std::fs::remove_file(path).unwrap();
+}
+
+/// ROS reads 0 as "no time" (tf2: the latest). Truth: the date of the constant, as Python's
+/// `datetime.fromtimestamp(946684800, timezone.utc)` says it: 2000-01-01 00:00.
+#[test]
+fn no_stamp_is_zero_and_a_recording_read_back_keeps_its_start() {
+    assert_eq!(START_NS, 946_684_800 * 1_000_000_000);
+    for start_ns in [None, Some(0), Some(1_700_000_000_000_000_000)] {
+        let header = RunHeader { start_ns, ..synthetic::header() };
+        let path = synthetic::scratch(&format!("start-{start_ns:?}.mcap"));
+        std::fs::write(&path, run("start.mcap", &header, 30, NEVER)).unwrap();
+        let stamps = messages(&std::fs::read(&path).unwrap(), "/tf");
+        assert_eq!(stamps[0].0, start_ns.unwrap_or(START_NS));
+
+        let mut source = flexarm_log::open_recording(&path, flexarm_log::RecordingFormat::Mcap).unwrap();
+        assert_eq!(source.header().start_ns, start_ns);
+        let mut times = Vec::new();
+        source
+            .replay(&mut |sample| {
+                times.push(sample.time_s);
+                Ok(())
+            })
+            .unwrap();
+        assert_eq!(times, (0..30).map(|step| synthetic::sample(step).time_s).collect::<Vec<_>>(), "since the start");
+        std::fs::remove_file(path).unwrap();
+    }
+}
+
+/// Rerun shows plots in the order of their names, eight of them: the error of the tool must be first.
+#[test]
+fn the_first_plot_that_a_viewer_shows_by_itself_is_the_error_of_the_tool() {
+    let plotted = |count: usize| {
+        let elements: Vec<String> = (0..count).map(|k| format!("joint_{k}")).collect();
+        let header = RunHeader { elements, ..synthetic::header() };
+        let path = synthetic::scratch(&format!("order-{count}.mcap"));
+        let mut recorder = begin(&path, &header, NEVER);
+        let mut sample = synthetic::sample(0);
+        sample.elastic = vec![sample.elastic[0]; count];
+        recorder.record(&sample).unwrap();
+        recorder.finish(&RunResult::default()).unwrap();
+        let summary = Summary::read(&std::fs::read(&path).unwrap()).unwrap().unwrap();
+        let kinds = ["std_msgs/msg/Float64MultiArray", "sensor_msgs/msg/JointState"];
+        let of_kind = |channel: &mcap::Channel<'_>| kinds.contains(&channel.schema.as_ref().unwrap().name.as_str());
+        let channels = summary.channels.values().filter(|channel| of_kind(channel));
+        let mut topics: Vec<String> = channels.map(|channel| channel.topic.clone()).collect();
+        topics.sort();
+        std::fs::remove_file(path).unwrap();
+        topics
+    };
+    let topics = plotted(1);
+    assert_eq!(topics[..2], ["/deviation/tcp", "/deviation/tcp_path"]);
+    assert_eq!(plotted(12), topics, "however many elements there are");
+}
+
+/// Truth: the topics of a recording of the same run, and what a JSON and an XML reader make of the files.
+#[test]
+fn layouts_refer_to_what_is_in_the_recording() {
+    let mut header = synthetic::header();
+    header.joints[0] = "a <b> & \"c\"".into();
+    let summary = Summary::read(&run("layouts.mcap", &header, 5, NEVER)).unwrap().unwrap();
+    let topics: Vec<&str> = summary.channels.values().map(|channel| channel.topic.as_str()).collect();
+
+    let foxglove: serde_json::Value = serde_json::from_str(&foxglove_layout(&header)).unwrap();
+    let panels = foxglove["configById"].as_object().unwrap();
+    let paths: Vec<&str> = panels
+        .values()
+        .filter_map(|panel| panel["paths"].as_array())
+        .flatten()
+        .map(|path| path["value"].as_str().unwrap())
+        .collect();
+    assert!(paths.len() >= 4 + 3 + 6 + 3 + 3, "{paths:?}");
+    assert!(paths.iter().all(|path| topics.contains(&path.split_once('.').unwrap().0)), "{paths:?}");
+    for topic in panels["3D!arm"]["topics"].as_object().unwrap().keys() {
+        assert!(topics.contains(&topic.as_str()), "{topic}");
+    }
+    // Every panel has its place.
+    fn places(node: &serde_json::Value, found: &mut Vec<String>) {
+        match node.as_str() {
+            Some(name) => found.push(name.to_owned()),
+            None => ["first", "second"].iter().for_each(|side| places(&node[side], found)),
+        }
+    }
+    let mut found = Vec::new();
+    places(&foxglove["layout"], &mut found);
+    found.sort();
+    let mut names: Vec<String> = panels.keys().cloned().collect();
+    names.sort();
+    assert_eq!(found, names);
+
+    let plotjuggler = plotjuggler_layout(&header);
+    let curves: Vec<&str> =
+        plotjuggler.split("<curve name=\"").skip(1).map(|rest| rest.split_once('"').unwrap().0).collect();
+    assert_eq!(curves.len(), paths.len());
+    assert!(
+        curves.iter().all(|curve| topics.iter().any(|topic| curve.starts_with(&format!("{topic}/")))),
+        "{curves:?}"
+    );
+    assert!(curves.contains(&"/joint_states/a &lt;b&gt; &amp; &quot;c&quot;/effort"), "{curves:?}");
+    for tag in ["root", "tabbed_widget", "Tab", "Container", "DockSplitter", "DockArea", "plot"] {
+        let (open, close) = (format!("<{tag}"), format!("</{tag}>"));
+        let opened =
+            plotjuggler.match_indices(&open).filter(|(at, _)| plotjuggler[at + open.len()..].starts_with([' ', '>']));
+        assert_eq!(opened.count(), plotjuggler.matches(&close).count(), "{tag}");
+    }
 }

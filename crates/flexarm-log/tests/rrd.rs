@@ -10,6 +10,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use flexarm_kinematics::Pose;
+use flexarm_log::palette::{self, Ground};
 use flexarm_log::{Caption, CreateOptions, Recorder, RrdRecorder, RrdStudy, RunHeader};
 use rerun::external::re_log_encoding::DecoderApp;
 use rerun::log::{Chunk, LogMsg};
@@ -398,4 +399,113 @@ fn a_link_called_tcp_and_the_tool_centre_point_are_two_entities() {
     let file = run("tcp.rrd", &header, 30, NEVER);
     let rows = rows(&file);
     assert_eq!((rows["/synthetic/flexible/tcp"], rows["/synthetic/flexible/link_tcp"]), (11, 11));
+}
+
+/// Chunks of the layout.
+fn layout(file: &[u8]) -> Vec<Chunk> {
+    let messages = DecoderApp::decode_lazy(file).map(|message| message.unwrap());
+    let data = messages.filter_map(|message| match message {
+        LogMsg::ArrowMsg(store, message) if !store.is_recording() => Some(Chunk::from_arrow_msg(&message).unwrap()),
+        _ => None,
+    });
+    data.collect()
+}
+
+fn component(name: &'static str) -> rerun::external::re_types_core::ComponentIdentifier {
+    rerun::external::re_types_core::ComponentIdentifier::from(name)
+}
+
+fn texts(chunks: &[Chunk], name: &'static str) -> Vec<String> {
+    let of = |chunk: &Chunk| -> Vec<String> {
+        chunk.iter_slices::<String>(component(name)).flatten().map(|text| text.as_str().to_owned()).collect()
+    };
+    chunks.iter().flat_map(of).collect()
+}
+
+#[test]
+fn what_happened_is_information_and_not_for_debugging() {
+    let file = run("levels.rrd", &synthetic::header(), 100, NEVER);
+    let levels = texts(&chunks(&file), "TextLog:level");
+    assert_eq!(levels.len(), 3);
+    assert!(levels.iter().all(|level| level == "INFO"), "{levels:?}");
+}
+
+/// Truth: the rules of the viewer: it labels multiples of powers of ten that are 20 pixels apart.
+#[test]
+fn every_plot_has_an_axis_with_labels_at_the_end() {
+    let file = run("axes.rrd", &synthetic::header(), synthetic::SAMPLES, NEVER);
+    let mut axes = 0;
+    for chunk in layout(&file).iter().filter(|chunk| chunk.entity_path().to_string().ends_with("/ScalarAxis")) {
+        for range in chunk.iter_slices::<[f64; 2]>(component("ScalarAxis:range")).flatten() {
+            let [low, high] = *range;
+            let unit = 10f64.powf((20.0 * (high - low) / 425.0).log10().ceil());
+            let labels = (high / unit).floor() - (low / unit).ceil() + 1.0;
+            assert!(labels >= 2.0, "{low}..{high}: {labels}");
+            axes += 1;
+        }
+    }
+    assert!(axes >= 9, "{axes} axes");
+}
+
+/// Colours of the curves of an entity.
+fn colors(chunks: &[Chunk], entity: &str) -> Vec<u32> {
+    let own = chunks.iter().filter(|chunk| chunk.entity_path().to_string() == entity);
+    own.flat_map(|chunk| {
+        chunk.iter_slices::<u32>(component("SeriesLines:colors")).flatten().copied().collect::<Vec<_>>()
+    })
+    .collect()
+}
+
+fn number([red, green, blue]: palette::Rgb) -> u32 {
+    u32::from_be_bytes([red, green, blue, 0xff])
+}
+
+/// Truth: the table of colours that the report uses.
+#[test]
+fn colours_are_those_of_the_report_and_no_two_shares_have_the_same() {
+    let count = 14;
+    let contributors: Vec<String> = (0..count).map(|k| format!("part {k}")).collect();
+    let header = RunHeader { contributors, ..synthetic::header() };
+    let path = synthetic::scratch("colors.rrd");
+    let mut recorder = begin(&path, &header, NEVER);
+    let mut sample = synthetic::sample(0);
+    sample.contributions = vec![[0.0; 3]; count];
+    recorder.record(&sample).unwrap();
+    recorder.finish(&synthetic::result()).unwrap();
+    let chunks = chunks(&std::fs::read(&path).unwrap());
+    std::fs::remove_file(path).unwrap();
+    for (k, axis) in ["x", "y", "z"].iter().enumerate() {
+        for plot in ["tcp_error", "tcp_error_rotation"] {
+            assert_eq!(colors(&chunks, &format!("/plots/{plot}/{axis}")), [number(palette::axis(k, Ground::Dark))]);
+        }
+    }
+    let shares = colors(&chunks, "/plots/contributions");
+    assert_eq!(shares, (0..count).map(|k| number(palette::series(k, Ground::Dark))).collect::<Vec<_>>());
+    let distinct: std::collections::BTreeSet<u32> = shares.iter().copied().collect();
+    assert_eq!(distinct.len(), count);
+}
+
+#[test]
+fn a_study_has_its_runs_in_the_order_of_colours_and_says_whose_events_and_shares_it_shows() {
+    let path = synthetic::scratch("study_colors.rrd");
+    let options = CreateOptions { overwrite: true, flush_every: NEVER };
+    let labels = ["as given", "modal"];
+    let study = RrdStudy::create(&path, options, labels.map(str::to_owned).to_vec());
+    for number in 0..2 {
+        let mut seat = study.seat(number);
+        seat.begin(&synthetic::header()).unwrap();
+        (0..50).for_each(|step| seat.record(&synthetic::sample(step)).unwrap());
+        seat.finish(&synthetic::result()).unwrap();
+    }
+    study.finish("# Two runs").unwrap();
+    let file = std::fs::read(&path).unwrap();
+    std::fs::remove_file(path).unwrap();
+    let recording = chunks(&file);
+    for (k, label) in [r"/plots/study/error/as\ given", "/plots/study/error/modal"].iter().enumerate() {
+        assert_eq!(colors(&recording, label), [number(palette::series(k, Ground::Dark))], "{label}");
+    }
+    let titles = texts(&layout(&file), "ViewBlueprint:display_name");
+    for title in ["as given: events", "as given: shares of the error [mm]"] {
+        assert!(titles.iter().any(|known| known == title), "{titles:?}");
+    }
 }

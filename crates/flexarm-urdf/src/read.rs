@@ -70,6 +70,8 @@ pub struct UrdfRobot {
     pub text: String,
     /// What the links look like, in the order of the file.
     pub visuals: Vec<Visual>,
+    /// Mesh references as they stand in the file, those of collision shapes too, with the files that were found.
+    pub mesh_files: Vec<(String, PathBuf)>,
     /// Links that may be the tool centre point, the default first.
     pub tcp_candidates: Vec<String>,
     /// Warnings and notes; there are no errors.
@@ -275,6 +277,7 @@ fn assemble(
     let moving = raw.joints.iter().filter(|j| j.kind != RawKind::Fixed);
     UrdfRobot {
         text: text.to_owned(),
+        mesh_files: resolver.mesh_files(text),
         visuals,
         tcp_candidates,
         warnings: Vec::new(),

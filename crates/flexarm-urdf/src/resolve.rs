@@ -33,6 +33,22 @@ pub(crate) struct NotFound {
 }
 
 impl Resolver<'_> {
+    /// Each mesh reference of a URDF once, as it stands there, with its file; those without one are left out.
+    pub(crate) fn mesh_files(&self, urdf: &str) -> Vec<(String, PathBuf)> {
+        let mut files: Vec<(String, PathBuf)> = Vec::new();
+        for element in urdf.split("<mesh").skip(1).filter_map(|rest| rest.split('>').next()) {
+            let Some((_, value)) = element.split_once("filename") else { continue };
+            let Some(value) = value.trim_start().strip_prefix('=').map(str::trim_start) else { continue };
+            let reference = value.chars().next().filter(|quote| "\"'".contains(*quote));
+            let Some(reference) = reference.and_then(|quote| value[1..].split(quote).next()) else { continue };
+            if files.iter().all(|(known, _)| known != reference) {
+                let plain = reference.replace("&apos;", "'").replace("&quot;", "\"").replace("&amp;", "&");
+                files.extend(self.resolve(plain.trim()).ok().map(|file| (reference.to_owned(), file)));
+            }
+        }
+        files
+    }
+
     pub(crate) fn resolve(&self, uri: &str) -> Result<PathBuf, NotFound> {
         let not_found = |reason: String, help: &str| Err(NotFound { reason, help: help.to_owned() });
         if let Some(rest) = uri.strip_prefix("package://").or_else(|| uri.strip_prefix("model://")) {

@@ -15,14 +15,17 @@
     return node;
   };
   // The style of the page decides the colours, on paper always those of light paper.
-  const LIGHT = { ink: "#1c2128", faint: "#4d5663", grid: "#e3e6eb", band: "rgba(0,96,168,0.07)", rule: "#aab2bd",
-    c: ["#0072b2", "#d55e00", "#009e73", "#b5508f", "#c98500", "#3aa0dc", "#7a5a2e", "#7c8794"] };
+  const LIGHT = { ink: "#1c2128", faint: "#4d5663", grid: "#e3e6eb", band: "rgba(0,96,168,0.07)", rule: "#aab2bd" };
   const colors = () => {
-    if (printing) return LIGHT;
     const style = getComputedStyle(document.documentElement);
     const get = (name) => style.getPropertyValue("--" + name).trim();
-    return { ink: get("ink"), faint: get("faint"), grid: get("grid"), band: get("band"), rule: get("faint"),
-      c: [0, 1, 2, 3, 4, 5, 6, 7].map((k) => get("c" + k)) };
+    const of = (before) => {
+      const c = [];
+      for (let k = 0; get(before + "c" + k); k++) c.push(get(before + "c" + k));
+      return { c, x: get(before + "x"), y: get(before + "y"), z: get(before + "z"), rigid: get(before + "rigid") };
+    };
+    if (printing) return { ...LIGHT, ...of("paper-") };
+    return { ink: get("ink"), faint: get("faint"), grid: get("grid"), band: get("band"), rule: get("faint"), ...of("") };
   };
 
   // Numbers with as many digits as tell them apart.
@@ -168,7 +171,9 @@
     const series = curves.map((curve, k) => {
       const total = curve.kind === "total";
       const layer = several ? layers[Math.min(k, layers.length - 1)] : null;
-      const color = total ? look.ink : look.c[next++ % look.c.length];
+      // Axes and the rigid twin have colours of their own; all else is counted.
+      const own = { total: look.ink, dashed: look.rigid, x: look.x, y: look.y, z: look.z }[curve.kind];
+      const color = own || look.c[next++ % look.c.length];
       return {
         label: curve.name, stroke: color, width: layer ? layer[0] : total ? 1.8 : 1.4, spanGaps: several, points: { show: false },
         dash: layer ? layer[1] : curve.kind === "dashed" ? [6, 4] : undefined, value: (u, v) => shown(v),
@@ -178,7 +183,7 @@
       stroke: look.faint, grid: { stroke: look.grid, width: 1 }, ticks: { stroke: look.grid, width: 1, size: 5 },
       font: "12px system-ui, sans-serif", labelFont: "12.5px system-ui, sans-serif",
     };
-    const width = printing ? PRINT_WIDTH : Math.max(320, box.clientWidth);
+    const width = printing ? PRINT_WIDTH : Math.max(240, box.clientWidth);
     const old = entry.chart && !entry.fresh ? { min: entry.chart.scales.x.min, max: entry.chart.scales.x.max } : null;
     if (entry.chart) entry.chart.destroy();
     const table = tableOf(view);

@@ -29,7 +29,7 @@ use crate::magnification::Expected;
 use crate::motion::Motion;
 use crate::options::{Outputs, RunOptions};
 use crate::prepare::{Checked, checked};
-use crate::record::{header, link_frames, ordered_links, recorders};
+use crate::record::{header, link_frames, ordered_links, recorders, write_layouts};
 use crate::robot::{Robot, TCP_FRAME};
 use crate::static_part::StaticPart;
 use crate::summary::{CURVE_PIECES, DriveFigures, Files, LinkFigures, StepperFigures, Summary, TcpFigures};
@@ -119,6 +119,7 @@ pub(crate) fn run_traced(
     head.volume = expected.volume;
     head.magnification = options.magnification.unwrap_or_else(|| expected.magnification());
     files.begin(&head)?;
+    write_layouts(&files.names, &head)?;
     run.trace = Trace::new(head);
     let end = run.go(&mut files.set, outputs.is_some(), progress);
 
@@ -456,7 +457,8 @@ impl<'a> Run<'a> {
             self.strains[k] = self.strains[k].max(strain);
             self.rotations[k] = self.rotations[k].max(rotation_vector(turn.matrix()).norm());
         }
-        self.energy.add(t, self.seen.energy, self.seen.power, self.seen.impulse_work);
+        let drives = self.seen.drive.iter().zip(self.seen.qdot.iter()).map(|(force, rate)| force * rate);
+        self.energy.add(t, self.seen.energy, self.seen.power, self.seen.impulse_work, drives);
     }
 
     /// Figures of what was seen so far.

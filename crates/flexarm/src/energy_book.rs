@@ -10,6 +10,10 @@ pub(crate) struct EnergyBook {
     before: Option<(f64, [f64; 3])>,
     /// Drives, loads, dissipation (J).
     work: [f64; 3],
+    /// What the drives put in and what they took out, each drive by itself (J).
+    gross: [f64; 2],
+    /// Power of each drive at the sample before (W).
+    drives: Vec<f64>,
     /// Largest gap between what is stored and what was supplied, and largest change of what is stored (J).
     gap: f64,
     swing: f64,
@@ -19,15 +23,34 @@ pub(crate) struct EnergyBook {
 }
 
 impl EnergyBook {
-    /// `impulse_work`: work of the drives so far that is in no power, where velocities jumped (J).
-    pub(crate) fn add(&mut self, t: f64, energy: [f64; 3], power: [f64; 3], impulse_work: f64) {
+    /// Adds a sample. `power`: of drives, loads, dissipation; `impulse_work`: work of the drives so far that is in no power, where
+    /// velocities jumped (J); `drives`: power of each drive (W).
+    pub(crate) fn add(
+        &mut self,
+        t: f64,
+        energy: [f64; 3],
+        power: [f64; 3],
+        impulse_work: f64,
+        drives: impl Iterator<Item = f64>,
+    ) {
         if let Some((t_before, p)) = self.before {
             for c in 0..3 {
                 self.work[c] += 0.5 * (t - t_before) * (p[c] + power[c]);
             }
+            for (before, now) in self.drives.iter_mut().zip(drives) {
+                let [put_in, taken_out] = parts(t - t_before, *before, now);
+                self.gross[0] += put_in;
+                self.gross[1] += taken_out;
+                *before = now;
+            }
+        } else {
+            self.drives.extend(drives);
         }
         // A blow at the start is in the energy of the first sample.
-        self.work[0] += if self.first.is_some() { impulse_work - self.struck } else { 0.0 };
+        let struck = if self.first.is_some() { impulse_work - self.struck } else { 0.0 };
+        self.work[0] += struck;
+        self.gross[0] += struck.max(0.0);
+        self.gross[1] += (-struck).max(0.0);
         self.struck = impulse_work;
         self.last = energy.iter().sum();
         self.before = Some((t, power));
@@ -40,11 +63,50 @@ impl EnergyBook {
     pub(crate) fn figures(&self) -> EnergyFigures {
         EnergyFigures {
             drives_j: self.work[0],
+            drives_positive_j: self.gross[0],
+            drives_negative_j: self.gross[1],
             loads_j: self.work[1],
             dissipated_j: self.work[2],
             payload_j: self.exchanged,
             stored_j: self.last - self.first.unwrap_or(self.last),
             imbalance: if self.swing > 0.0 { self.gap / self.swing } else { 0.0 },
         }
+    }
+}
+
+/// Work of a power that goes from one value to another along a straight line: where it is positive, and where it is negative,
+/// both as positive numbers.
+fn parts(time: f64, from: f64, to: f64) -> [f64; 2] {
+    let whole = 0.5 * time * (from + to);
+    if from * to >= 0.0 {
+        return [whole.max(0.0), (-whole).max(0.0)];
+    }
+    let [low, high] = [from.min(to), from.max(to)];
+    [0.5 * time * high * high / (high - low), 0.5 * time * low * low / (high - low)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Truth: the integral of `A sin t` over a turn is 2 A - 2 A, of each drive by itself. Identity: what is put in without
+    /// what is taken out is the net work.
+    #[test]
+    fn drives_that_give_back_what_they_took_have_no_net_work_and_much_gross_work() {
+        let mut book = EnergyBook::default();
+        let n = 1000;
+        for k in 0..=n {
+            let t = f64::from(k) / f64::from(n) * std::f64::consts::TAU;
+            // The second brakes while the first drives: together they do nothing at any time.
+            let drives = [3.0 * t.sin(), -3.0 * t.sin()];
+            book.add(t, [0.0; 3], [drives.iter().sum(), 0.0, 0.0], 0.0, drives.into_iter());
+        }
+        let figures = book.figures();
+        assert!(figures.drives_j.abs() < 1e-12, "{}", figures.drives_j);
+        // Measured 3.9e-5 too little: the trapezoidal rule on a thousand samples.
+        assert!((figures.drives_positive_j - 12.0).abs() < 1e-4, "{}", figures.drives_positive_j);
+        assert!((figures.drives_negative_j - 12.0).abs() < 1e-4, "{}", figures.drives_negative_j);
+        assert_eq!(parts(2.0, -1.0, 3.0), [2.25, 0.25]);
+        assert_eq!(parts(2.0, -1.0, 0.0), [0.0, 1.0]);
     }
 }

@@ -55,6 +55,7 @@ mod settling;
 mod stamp;
 mod static_part;
 mod statics;
+mod statics_picture;
 mod study;
 mod summary;
 mod twin;
@@ -77,10 +78,13 @@ pub use options::{DriveModel, LinkModel, Modelling, Outputs, RunOptions};
 pub use report::{
     Figure, FigureGroup, ReportFiles, ReportOptions, ReportRun, Weight, figure_groups, html, markdown, report, rows,
 };
-pub use response::{PeakFigures, Response, ResponseCurve, ResponseFiles, ResponseOutputs, ResponseRequest, response};
+pub use response::{
+    PeakFigures, Response, ResponseCurve, ResponseFiles, ResponseOutputs, ResponseRequest, readable_unit, response,
+};
 pub use robot::{LoadOptions, Robot, TCP_FRAME};
 pub use settling::Settling;
-pub use statics::{ElementStatics, Statics, parse_wrench, statics};
+pub use statics::{ElementStatics, Statics, parse_wrench, record_statics, statics};
+pub use statics_picture::{StaticsFiles, StaticsOutputs};
 pub use study::{STUDY_NOTE, Variant, compare_study, study_rows};
 pub use summary::{
     CURVE_PIECES, DifferenceFigures, Files, HoldFigures, LinkFigures, StepperFigures, Summary, TcpFigures,

@@ -68,6 +68,10 @@ pub struct RunOptions {
     pub settling_band_m: f64,
     /// Factor by which recordings and pictures show deflections; chosen for the run without it.
     pub magnification: Option<f64>,
+    /// When the run begins in recordings whose times have a date (ns since 1970); [`flexarm_log::START_NS`] without it.
+    pub start_ns: Option<u64>,
+    /// Put mesh files into the robot description of recordings, instead of where they are on this machine.
+    pub embed_meshes: bool,
 }
 
 impl Default for RunOptions {
@@ -83,6 +87,8 @@ impl Default for RunOptions {
             with_twin: true,
             settling_band_m: 1e-4,
             magnification: None,
+            start_ns: None,
+            embed_meshes: false,
         }
     }
 }

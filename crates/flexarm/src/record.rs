@@ -32,7 +32,7 @@ impl Recordings {
 }
 
 /// Names of the files in an output folder.
-pub(crate) const RECORDING_FILES: [&str; 9] = [
+pub(crate) const RECORDING_FILES: [&str; 11] = [
     "run.mcap",
     "run.rrd",
     "run.csv",
@@ -42,7 +42,12 @@ pub(crate) const RECORDING_FILES: [&str; 9] = [
     "summary.json",
     STUDY_FILE,
     FIGURES_FOLDER,
+    LAYOUT_FILES[0],
+    LAYOUT_FILES[1],
 ];
+
+/// Layouts of viewers beside `run.mcap`: Foxglove, PlotJuggler.
+const LAYOUT_FILES: [&str; 2] = ["run.foxglove.json", "run.plotjuggler.xml"];
 
 /// Recording of all runs of a study.
 pub(crate) const STUDY_FILE: &str = "study.rrd";
@@ -103,6 +108,7 @@ pub(crate) fn recorders(outputs: Option<&Outputs>, in_study: bool) -> Result<Rec
     if outputs.mcap {
         recordings.set.push(Box::new(flexarm_log::McapRecorder::create(path("run.mcap"), options)));
         recordings.names.mcap = text("run.mcap");
+        [recordings.names.foxglove_layout, recordings.names.plotjuggler_layout] = LAYOUT_FILES.map(text);
     }
     #[cfg(feature = "rerun")]
     if outputs.rrd {
@@ -137,6 +143,23 @@ pub(crate) fn recorders(outputs: Option<&Outputs>, in_study: bool) -> Result<Rec
         what: format!("the output folder cannot be made: {e}"),
     })?;
     Ok(recordings)
+}
+
+/// Writes the layouts with which viewers open the MCAP recording, if there is one.
+#[cfg(feature = "mcap")]
+pub(crate) fn write_layouts(files: &Files, header: &RunHeader) -> Result<(), Error> {
+    let layouts = [
+        (&files.foxglove_layout, flexarm_log::foxglove_layout(header)),
+        (&files.plotjuggler_layout, flexarm_log::plotjuggler_layout(header)),
+    ];
+    let there = layouts.into_iter().filter_map(|(path, text)| Some((PathBuf::from(path.as_ref()?), text)));
+    crate::result_files::write_all(&there.collect::<Vec<_>>())
+}
+
+/// There is none without the feature `mcap`.
+#[cfg(not(feature = "mcap"))]
+pub(crate) fn write_layouts(_: &Files, _: &RunHeader) -> Result<(), Error> {
+    Ok(())
 }
 
 /// Links of the URDF, parents before children.
@@ -254,6 +277,8 @@ pub(crate) fn header(
         has_rigid: options.with_twin,
         log_rate_hz: options.log_rate_hz,
         step_s: options.step_s,
+        start_ns: options.start_ns,
+        urdf: located_urdf(robot, options.embed_meshes),
         ..robot_header(robot, arm)
     }
 }
@@ -269,9 +294,17 @@ pub(crate) fn robot_header(robot: &Robot, arm: &FlexibleArm) -> RunHeader {
     if robot.path != robot.urdf_path {
         attachments.extend(read("robot.toml", "application/toml", &robot.path));
     }
+    // The recorder attaches the files of what is drawn; those of collision shapes belong to the robot too.
+    let drawn = |path: &Path| {
+        robot.urdf.visuals.iter().any(|v| matches!(&v.geometry, Geometry::Mesh { path: Some(p), .. } if p == path))
+    };
+    for (k, (_, path)) in robot.urdf.mesh_files.iter().filter(|(_, path)| !drawn(path)).enumerate() {
+        let file = path.file_name().map(|name| name.to_string_lossy()).unwrap_or_default();
+        attachments.extend(read(&format!("collision/{k}/{file}"), flexarm_log::mesh_media_type(path), path));
+    }
     RunHeader {
         robot: robot.name.clone(),
-        urdf: located_urdf(robot),
+        urdf: located_urdf(robot, false),
         joints: model.coordinates()[..model.n_actuated()].iter().map(|c| c.joint.clone()).collect(),
         prismatic: model.coordinates()[..model.n_actuated()].iter().map(|c| c.kind == "prismatic").collect(),
         meshes: meshes(robot, &links),
@@ -283,17 +316,20 @@ pub(crate) fn robot_header(robot: &Robot, arm: &FlexibleArm) -> RunHeader {
     }
 }
 
-/// The URDF with the meshes that were found as `file://` references: viewers then find them without being told where
-/// the robot's folder is.
-fn located_urdf(robot: &Robot) -> String {
+/// The URDF with the meshes that were found, of visual and of collision shapes, as `file://` references: viewers then find
+/// them without being told where the robot's folder is. Or with their contents as `data:` references.
+fn located_urdf(robot: &Robot, embed: bool) -> String {
+    use base64::Engine as _;
     let mut text = robot.urdf.text.clone();
-    for visual in &robot.urdf.visuals {
-        if let Geometry::Mesh { uri, path: Some(path), .. } = &visual.geometry
-            && let Ok(path) = path.canonicalize()
-        {
-            let located = format!("file://{}", path.display());
-            text = text.replace(&format!("\"{uri}\""), &format!("\"{located}\""));
-            text = text.replace(&format!("'{uri}'"), &format!("'{located}'"));
+    for (reference, path) in &robot.urdf.mesh_files {
+        let embedded = || {
+            let data = base64::engine::general_purpose::STANDARD.encode(std::fs::read(path).ok()?);
+            Some(format!("data:{};base64,{data}", flexarm_log::mesh_media_type(path)))
+        };
+        let located = || Some(format!("file://{}", path.canonicalize().ok()?.display()));
+        if let Some(new) = embed.then(embedded).flatten().or_else(located) {
+            text = text.replace(&format!("\"{reference}\""), &format!("\"{new}\""));
+            text = text.replace(&format!("'{reference}'"), &format!("'{new}'"));
         }
     }
     text

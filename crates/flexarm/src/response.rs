@@ -2,8 +2,10 @@
 
 use std::path::PathBuf;
 
-use flexarm_analysis::{LinearSystem, Quantity, Spacing, frequency_grid, response_peaks, with_resonances};
-use flexarm_log::{Panel, PlotCurve, PlotError, line_plot};
+use flexarm_analysis::{
+    LinearSystem, Quantity, Spacing, frequency_grid, resolved_response, response_peaks, with_resonances,
+};
+use flexarm_log::{CurveLook, LinePlot, Panel, PlotCurve, PlotError};
 use flexarm_stepping::Linear;
 use nalgebra::{Complex, DMatrix, Vector6};
 use serde::Serialize;
@@ -24,6 +26,10 @@ const POINTS: std::ops::RangeInclusive<usize> = 2..=100_000;
 const HIGHEST_HZ: f64 = 1e6;
 /// A curve below this part of the largest of its unit is rounding.
 const NOTHING: f64 = 1e-12;
+/// Curves are drawn within this part of their height.
+const RESOLUTION: f64 = 0.01;
+/// Natural frequencies that a plot lists.
+const LISTED: usize = 8;
 /// Below this damping ratio a resonance is as good as undamped.
 const UNDAMPED: f64 = 1e-6;
 const AXES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
@@ -72,6 +78,9 @@ pub struct Response {
     pub joints: Vec<String>,
     /// Where they are held, or about where they move (rad or m).
     pub at: Vec<f64>,
+    /// Which of them slide.
+    #[serde(skip)]
+    pub slides: Vec<bool>,
     /// Link that carries the TCP.
     pub tcp: String,
     /// displacement, velocity or acceleration.
@@ -186,12 +195,12 @@ pub fn response(
     // One solution per frequency serves all curves; an undamped resonance has none and is left out.
     let resonances: Vec<(f64, f64)> = frequencies_hz.iter().copied().zip(damping_ratio.iter().copied()).collect();
     let grid = with_resonances(&frequency_grid(from, to, request.points, request.spacing), &resonances);
-    let answer = |hz: f64| {
-        let omega = std::f64::consts::TAU * hz;
-        system.response(omega).ok().map(|H| H * request.quantity.factor(omega))
-    };
-    let (frequency_hz, answers): (Vec<f64>, Vec<DMatrix<Complex<f64>>>) =
-        grid.into_iter().filter_map(|hz| Some((hz, answer(hz)?))).unzip();
+    let displacement = |hz: f64| system.response(std::f64::consts::TAU * hz).ok();
+    let factor = |hz: f64| request.quantity.factor(std::f64::consts::TAU * hz);
+    let answer = |hz: f64| displacement(hz).map(|H| H * factor(hz));
+    // All quantities have the same frequencies.
+    let (frequency_hz, answers) = resolved_response(&grid, displacement, RESOLUTION);
+    let answers: Vec<DMatrix<Complex<f64>>> = frequency_hz.iter().zip(answers).map(|(hz, H)| H * factor(*hz)).collect();
     system.check().map_err(linear_error)?;
 
     // A curve that is nothing beside the others of its unit has no peaks but rounding.
@@ -247,6 +256,7 @@ pub fn response(
         files: ResponseFiles::default(),
         warnings: caveat::warnings(&caveats),
         caveats,
+        slides: posed.prismatic,
         joints: posed.joints,
         at: posed.at,
     };
@@ -383,18 +393,39 @@ fn csv(response: &Response) -> String {
     text
 }
 
-/// Magnitude over frequency, a panel per unit, and phase of all curves below.
+/// A unit as people say it, and how many of it make one of the SI unit: `m/N` is 1e6 `µm/N`.
+#[must_use]
+pub fn readable_unit(unit: &str) -> (String, f64) {
+    let (of, per) = unit.rsplit_once('/').unwrap_or((unit, ""));
+    // Displacements of a tool for a joint's are of one size.
+    if ["rad", "m"].contains(&per) {
+        return (unit.to_owned(), 1.0);
+    }
+    (format!("µ{of}/{per}").replace("s2", "s²").replace("Nm", "N m"), 1e6)
+}
+
+/// Magnitude over frequency, a panel per unit, and phase of all curves below; the natural frequencies marked.
 fn plot(response: &Response) -> Result<String, PlotError> {
+    // What moves in the direction of its force has the colour of that axis.
+    let look = |c: &ResponseCurve| {
+        let direction = WRENCH.iter().position(|word| *word == c.input);
+        match direction.filter(|k| AXES[*k] == c.output) {
+            Some(k) => CurveLook::Axis(k % 3),
+            None if direction.is_some() => CurveLook::Dashed,
+            None => CurveLook::Plain,
+        }
+    };
     let curve = |c: &ResponseCurve, y: Vec<f64>| PlotCurve {
         name: format!("{} to {}", c.input, c.output),
+        look: look(c),
         x: response.frequency_hz.clone(),
         y,
-        ..PlotCurve::default()
     };
     let mut panels: Vec<Panel> = Vec::new();
     for c in response.curves.iter().filter(|c| c.magnitude.iter().any(|m| *m > 0.0)) {
-        let label = format!("magnitude [{}]", c.unit);
-        let magnitude = curve(c, c.magnitude.clone());
+        let (unit, factor) = readable_unit(&c.unit);
+        let label = format!("magnitude [{unit}]");
+        let magnitude = curve(c, c.magnitude.iter().map(|m| factor * m).collect());
         match panels.iter_mut().find(|panel| panel.label == label) {
             Some(panel) => panel.curves.push(magnitude),
             None => panels.push(Panel { label, logarithmic: true, legend: true, curves: vec![magnitude] }),
@@ -404,7 +435,48 @@ fn plot(response: &Response) -> Result<String, PlotError> {
     let phase = response.curves.iter().map(degrees).collect();
     panels.push(Panel { label: "phase [deg]".into(), logarithmic: false, legend: false, curves: phase });
     let title = format!("{}: {} of the TCP ({})", response.robot, response.quantity, response.tcp);
-    line_plot(&title, "frequency [Hz]", response.logarithmic, &panels)
+    let oscillates = |k: &usize| response.damping_ratio[*k] < 1.0;
+    let mut marks: Vec<(f64, String)> = Vec::new();
+    for (k, hz) in response.frequencies_hz.iter().enumerate().filter(|(k, _)| oscillates(k)) {
+        marks.push((*hz, format!("f{}", k + 1)));
+    }
+    let plot = LinePlot {
+        title: &title,
+        notes: &notes(response, &marks),
+        x_label: "frequency [Hz]",
+        logarithmic_x: response.logarithmic,
+        marks: &marks,
+        panels: &panels,
+    };
+    plot.svg()
+}
+
+/// The pose and the natural frequencies, in words.
+fn notes(response: &Response, marks: &[(f64, String)]) -> Vec<String> {
+    let named: Vec<String> =
+        marks.iter().take(LISTED).map(|(hz, name)| format!("{name} {}", rounded(*hz, 2))).collect();
+    let mut notes = vec![format!("at {}", pose_in_words(&response.joints, &response.at, &response.slides))];
+    if !named.is_empty() {
+        let more = if marks.len() > LISTED { ", ..." } else { "" };
+        notes.push(format!("natural frequencies {}{more} Hz", named.join(", ")));
+    }
+    notes
+}
+
+/// Joints and where they are, in degrees or millimetres.
+pub(crate) fn pose_in_words(joints: &[String], at: &[f64], slides: &[bool]) -> String {
+    let joint = |((joint, q), slides): ((&String, &f64), &bool)| match slides {
+        true => format!("{joint} {} mm", rounded(1e3 * q, 1)),
+        false => format!("{joint} {}°", rounded(q.to_degrees(), 1)),
+    };
+    joints.iter().zip(at).zip(slides).map(joint).collect::<Vec<_>>().join(", ")
+}
+
+/// A number with so many decimals at most.
+fn rounded(x: f64, decimals: i32) -> f64 {
+    let unit = 10f64.powi(decimals);
+    // Nothing is gained by -0.
+    (x * unit).round() / unit + 0.0
 }
 
 fn save(response: &mut Response, paths: Vec<PathBuf>) -> Result<(), Error> {

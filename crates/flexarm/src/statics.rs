@@ -11,6 +11,7 @@ use crate::options::Modelling;
 use crate::posed::{Posed, all_finite, step_error};
 use crate::reduce::numbers;
 use crate::robot::Robot;
+use crate::statics_picture::{self, StaticsFiles, StaticsOutputs};
 
 /// Answer of `flexarm statics`. SI units; world axes, at the TCP; six-vectors linear first.
 #[derive(Clone, Debug, Serialize)]
@@ -43,6 +44,8 @@ pub struct Statics {
     pub elements: Vec<ElementStatics>,
     /// Unbalanced force over the largest force.
     pub residual: f64,
+    /// Written files.
+    pub files: StaticsFiles,
     /// What the caveats warn of, as sentences.
     pub warnings: Vec<String>,
     /// What is probably wrong with the input, or limits the worth of the result.
@@ -89,6 +92,31 @@ pub fn parse_wrench(text: &str) -> Result<[f64; 6], Error> {
 /// # Errors
 /// [`Error::Usage`] for joint values that do not fit, [`Error::Step`] where there is no equilibrium.
 pub fn statics(robot: &Robot, modelling: &Modelling, at: Option<&str>, wrench: [f64; 6]) -> Result<Statics, Error> {
+    statics_of(robot, modelling, at, wrench, None)
+}
+
+/// As [`statics()`], and writes the answer and a picture of the arm, its deflections magnified beside the rigid arm.
+///
+/// # Errors
+/// As [`statics()`]; [`Error::File`] and [`Error::Write`] for files.
+pub fn record_statics(
+    robot: &Robot,
+    modelling: &Modelling,
+    at: Option<&str>,
+    wrench: [f64; 6],
+    outputs: &StaticsOutputs,
+) -> Result<Statics, Error> {
+    statics_of(robot, modelling, at, wrench, Some(outputs))
+}
+
+fn statics_of(
+    robot: &Robot,
+    modelling: &Modelling,
+    at: Option<&str>,
+    wrench: [f64; 6],
+    outputs: Option<&StaticsOutputs>,
+) -> Result<Statics, Error> {
+    let paths = outputs.map(statics_picture::places).transpose()?;
     let posed = Posed::new(robot, modelling, at)?;
     let X_rigid = posed.rigid_tool();
     let weight = posed.linear(&Vector6::zeros())?;
@@ -129,7 +157,7 @@ pub fn statics(robot: &Robot, modelling: &Modelling, at: Option<&str>, wrench: [
     caveats.extend(posed.validity(robot, &loaded));
     let [x, y, z, rx, ry, rz] = displacement;
     let [sx, sy, sz, srx, sry, srz] = sag;
-    Ok(Statics {
+    let mut statics = Statics {
         robot: robot.name.clone(),
         tcp: robot.tcp.0.clone(),
         wrench,
@@ -142,9 +170,14 @@ pub fn statics(robot: &Robot, modelling: &Modelling, at: Option<&str>, wrench: [
         holding_torque: loaded.holding.as_slice().to_vec(),
         elements,
         residual: loaded.residual,
+        files: StaticsFiles::default(),
         warnings: caveat::warnings(&caveats),
         caveats,
-        joints: posed.joints,
-        at: posed.at,
-    })
+        joints: posed.joints.clone(),
+        at: posed.at.clone(),
+    };
+    if let Some(paths) = paths {
+        statics_picture::save(&mut statics, paths, robot, &posed, &loaded)?;
+    }
+    Ok(statics)
 }

@@ -101,6 +101,10 @@ pub struct Files {
     pub report_md: Option<String>,
     /// Folder with figures for papers.
     pub figures: Option<String>,
+    /// Layout with which Foxglove opens the MCAP recording.
+    pub foxglove_layout: Option<String>,
+    /// The same for PlotJuggler.
+    pub plotjuggler_layout: Option<String>,
 }
 
 /// Stepper and its work.
@@ -191,8 +195,12 @@ pub struct DriveFigures {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct EnergyFigures {
-    /// Work of the drives (J).
+    /// Net work of the drives: [`EnergyFigures::drives_positive_j`] without [`EnergyFigures::drives_negative_j`] (J).
     pub drives_j: f64,
+    /// What the drives put in, each by itself while its power is positive (J).
+    pub drives_positive_j: f64,
+    /// What they took out while it is negative, as a positive number (J).
+    pub drives_negative_j: f64,
     /// Work of the external loads (J).
     pub loads_j: f64,
     /// Taken away by dampers and friction (J).

@@ -108,6 +108,48 @@ fn the_page_of_the_shipped_arm_is_small_and_complete() {
     }
 }
 
+/// Truth: the table of colours that recordings and figures use.
+#[test]
+fn x_y_and_z_have_one_colour_each_in_plots_pictures_and_figures() {
+    use flexarm_log::palette::{Ground, axis, hex, series};
+    let page = page_of(arm());
+    let (style, _) = page.split_once("</style>").unwrap();
+    for (k, name) in ["x", "y", "z"].into_iter().enumerate() {
+        for ground in [Ground::Paper, Ground::Dark] {
+            assert!(style.contains(&format!(" --{name}: {};", hex(axis(k, ground)))), "{name}");
+        }
+        assert!(style.contains(&format!(" --paper-{name}: {};", hex(axis(k, Ground::Paper)))), "print");
+    }
+    assert!(style.contains(&format!(" --c13: {};", hex(series(13, Ground::Paper)))));
+    for plot in data_of(&page)["runs"][0]["plots"].as_array().unwrap() {
+        for curve in plot["views"].as_array().unwrap().iter().flat_map(|view| {
+            view["tables"].as_array().unwrap().iter().flat_map(|table| table["curves"].as_array().unwrap())
+        }) {
+            let (name, kind) = (curve["name"].as_str().unwrap(), curve["kind"].as_str().unwrap());
+            assert_eq!(["x", "y", "z"].contains(&name), ["x", "y", "z"].contains(&kind), "{} {name}", plot["id"]);
+            assert!(!["x", "y", "z"].contains(&kind) || name == kind, "{} {name}", plot["id"]);
+        }
+    }
+    if cfg!(feature = "png") {
+        assert_eq!(page.matches("<svg class=\"triad\"").count(), 2, "the axes of both pictures");
+        assert!(page.contains("stroke:var(--z);fill:var(--z)") && page.contains("linear-gradient"));
+    }
+}
+
+/// Truth: the identity of net and gross work, and the energy that an arm of a tonne takes up and gives back.
+#[test]
+fn work_of_the_drives_is_called_net_and_stands_beside_what_they_put_in_and_took_out() {
+    let (summary, _) = arm();
+    let e = &summary.energy;
+    assert!((e.drives_positive_j - e.drives_negative_j - e.drives_j).abs() < 1e-9 * e.drives_positive_j);
+    assert!(e.drives_positive_j > 100.0 && e.drives_positive_j > 10.0 * e.drives_j.abs(), "{e:?}");
+    let page = page_of(arm());
+    for words in ["net work of the drives", "work put in by the drives", "taken out by the drives"] {
+        assert!(page.contains(words), "{words}");
+    }
+    assert!(markdown(summary).contains("they put in"));
+}
+
 #[test]
 fn the_same_run_gives_the_same_page_but_for_its_timings() {
     let options = RunOptions::default();
@@ -186,7 +228,7 @@ fn several_runs_lie_over_each_other() {
     let row =
         |name: &str| page.split_once(&format!("<th>{name}</th>")).unwrap().1.split_once("</tr>").unwrap().0.to_owned();
     assert!(row("peak TCP error").contains(" %)"));
-    for name in ["time of the peak", "settling time", "energy by the drives"] {
+    for name in ["time of the peak", "settling time", "work of the drives, net", "work put in by the drives"] {
         assert!(!row(name).contains(" %)"), "{name}");
     }
     links_lead_somewhere(&page);

@@ -1,4 +1,8 @@
 //! Topics of a recording: names, message types, qualities of service.
+//!
+//! Rerun plots eight topics of joint states and arrays by itself, in the order of their names: the error of the tool has a name
+//! that comes first, and what would fill all places, such as a deflection of each element, is of a type that it does not
+//! plot.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -88,22 +92,22 @@ impl Channels {
                     TWIST,
                     "not a velocity: TCP error, flexible minus rigid, world axes; linear = translation [m], angular = rotation vector [rad]",
                 )?,
-                error_plot: add("/tcp/error_plot", ARRAY, "translation of /tcp/error, for plotting")?,
+                error_plot: add("/deviation/tcp", ARRAY, "translation of /tcp/error, for plotting")?,
                 error_path: add(
                     "/tcp/error_path",
                     TWIST,
                     "not a velocity: TCP error, flexible minus rigid, along tangent, normal and binormal of the rigid path; linear = translation [m], angular = rotation vector [rad]",
                 )?,
-                error_path_plot: add("/tcp/error_path_plot", ARRAY, "translation of /tcp/error_path, for plotting")?,
+                error_path_plot: add("/deviation/tcp_path", ARRAY, "translation of /tcp/error_path, for plotting")?,
             }),
         };
         let mut elastic = Vec::new();
         for (name, element) in topic_names(&header.elements).iter().zip(&header.elements) {
             let load = format!("load of {element} on its distal part, axes of the proximal face [N, N m]");
-            let deflection = format!("deflection of {element}, axes of the proximal face [m, rad]");
+            let deflection = format!("not a velocity: deflection of {element}, axes of the proximal face [m, rad]");
             elastic.push(ElasticChannels {
                 load: add(&format!("/elastic/{name}"), "geometry_msgs/WrenchStamped", &load)?,
-                deflection: add(&format!("/elastic/{name}/deflection"), ARRAY, &deflection)?,
+                deflection: add(&format!("/elastic/{name}/deflection"), TWIST, &deflection)?,
             });
         }
         let mut add_if = |wanted: bool, topic: &str, kind: &str, note: &str| match wanted {
@@ -126,7 +130,7 @@ impl Channels {
             ARRAY,
             "displacement of the TCP that each flexible link or drive causes alone, world axes [m]",
         )?;
-        let solver = some(add_if(true, "/diagnostics/solver", ARRAY, "stepper")?);
+        let solver = some(add_if(true, "/solver", ARRAY, "stepper")?);
         let energy = some(add_if(true, "/energy", ARRAY, "energies of the flexible robot [J]")?);
         let what = "what happened when; name = kind; written at the end of the run, with the times of the events";
         let events = some(add_if(true, "/events", "rcl_interfaces/Log", what)?);

@@ -1,10 +1,8 @@
 //! The files that a robot's meshes came from, as attachments of a recording.
 
 use std::collections::BTreeSet;
-use std::ffi::OsStr;
-use std::path::Path;
 
-use crate::{Attachment, LogError, RunHeader};
+use crate::{Attachment, LogError, RunHeader, mesh_media_type};
 
 /// Each file once, as `meshes/<file name>`.
 pub(crate) fn mesh_files(header: &RunHeader) -> Result<Vec<Attachment>, LogError> {
@@ -20,19 +18,7 @@ pub(crate) fn mesh_files(header: &RunHeader) -> Result<Vec<Attachment>, LogError
             name = format!("meshes/{}/{file_name}", seen.len()); // another folder's file of that name
             names.insert(name.clone());
         }
-        files.push(Attachment { name, media_type: media_type(path).to_owned(), bytes });
+        files.push(Attachment { name, media_type: mesh_media_type(path).to_owned(), bytes });
     }
     Ok(files)
-}
-
-fn media_type(path: &Path) -> &'static str {
-    let extension = path.extension().and_then(OsStr::to_str).unwrap_or_default().to_ascii_lowercase();
-    match extension.as_str() {
-        "stl" => "model/stl",
-        "obj" => "model/obj",
-        "dae" => "model/vnd.collada+xml",
-        "glb" => "model/gltf-binary",
-        "gltf" => "model/gltf+json",
-        _ => "application/octet-stream",
-    }
 }

@@ -14,6 +14,7 @@ mod cdr;
 pub(crate) mod channels;
 mod definitions;
 mod frames;
+pub(crate) mod layouts;
 mod markers;
 mod mesh_files;
 mod messages;
@@ -34,7 +35,7 @@ use self::output::Output;
 use crate::create::FlushClock;
 use crate::shape::Shape;
 use crate::tail_file::SharedTail;
-use crate::{CreateOptions, EventKind, LogError, Recorder, RunHeader, RunResult, Sample, TwinSample};
+use crate::{CreateOptions, EventKind, LogError, Recorder, RunHeader, RunResult, START_NS, Sample, TwinSample};
 
 /// Writes a run as an MCAP file.
 ///
@@ -45,13 +46,13 @@ use crate::{CreateOptions, EventKind, LogError, Recorder, RunHeader, RunResult, 
 /// | `/joint_states`, `/rigid/joint_states` | `sensor_msgs/JointState` | effort: what the drives must supply |
 /// | `/tcp/flexible`, `/tcp/rigid` | `geometry_msgs/PoseStamped` | in `world` |
 /// | `/tcp/error`, `/tcp/error_path` | `geometry_msgs/TwistStamped` | an error: translation and rotation vector; world axes, path axes |
-/// | `/tcp/error_plot`, `/tcp/error_path_plot` | `std_msgs/Float64MultiArray` | its translation, which viewers plot unasked |
+/// | `/deviation/tcp`, `/deviation/tcp_path` | `std_msgs/Float64MultiArray` | its translation, which viewers plot unasked, and before all else |
 /// | `/tcp/static_error` | `std_msgs/Float64MultiArray` | what of the error the arm would have standing still: x, y, z, world axes |
 /// | `/tcp/contributions` | `std_msgs/Float64MultiArray` | what each of [`RunHeader::contributors`] does to the tool: x, y, z of each, world axes |
 /// | `/elastic/joint_states` | `sensor_msgs/JointState` | all elements as joints `<element>/x` to `<element>/rz`, so that curves have names: deflection, load |
 /// | `/elastic/<element>` | `geometry_msgs/WrenchStamped` | load |
-/// | `/elastic/<element>/deflection` | `std_msgs/Float64MultiArray` | deflection |
-/// | `/diagnostics/solver`, `/energy` | `std_msgs/Float64MultiArray` | |
+/// | `/elastic/<element>/deflection` | `geometry_msgs/TwistStamped` | not a velocity: deflection, translation and rotation |
+/// | `/energy`, `/solver` | `std_msgs/Float64MultiArray` | |
 /// | `/events` | `rcl_interfaces/Log` | what happened, at its own time: name is the kind |
 /// | `/markers` | `visualization_msgs/MarkerArray` | surfaces, once, latched; namespaces `flexible`, `rigid`, `magnified` |
 /// | `/markers/path` | `visualization_msgs/MarkerArray` | paths of the tool so far, each second; namespaces `path/flexible`, `path/rigid`, `path/magnified` |
@@ -64,8 +65,8 @@ use crate::{CreateOptions, EventKind, LogError, Recorder, RunHeader, RunResult, 
 ///
 /// The names of an array's entries are in the label of its one dimension, separated by commas. SI units.
 ///
-/// `header.stamp`, log time and publish time of a message are epoch + simulated time; the epoch is 0 unless
-/// [`McapRecorder::with_epoch_ns`] says otherwise, and viewers then show a time since the start.
+/// `header.stamp`, log time and publish time of a message are [`RunHeader::start_ns`], or [`START_NS`] without one, and
+/// simulated time.
 ///
 /// The file also holds `robot.urdf`, the mesh files, `RunHeader::attachments`, for readers of flexarm `run.json` and
 /// `meshes.bin.zst` (header and surfaces) and, at the end, `result.json` and `RunResult::attachments` as attachments, and the groups of `RunHeader::metadata`, `flexarm.recording`, `flexarm.units` and, at the end,
@@ -73,7 +74,7 @@ use crate::{CreateOptions, EventKind, LogError, Recorder, RunHeader, RunResult, 
 pub struct McapRecorder {
     path: PathBuf,
     options: CreateOptions,
-    epoch_ns: u64,
+    start_ns: u64,
     state: State,
 }
 
@@ -86,24 +87,17 @@ enum State {
 impl McapRecorder {
     /// A recorder that will write `path`; the file is created by `begin`.
     pub fn create(path: impl Into<PathBuf>, options: CreateOptions) -> Self {
-        Self { path: path.into(), options, epoch_ns: 0, state: State::New }
-    }
-
-    /// Sets the time of simulated time zero (ns since 1970), default 0. Files with the present time as epoch
-    /// are no longer the same on another day.
-    #[must_use]
-    pub fn with_epoch_ns(self, epoch_ns: u64) -> Self {
-        Self { epoch_ns, ..self }
+        Self { path: path.into(), options, start_ns: START_NS, state: State::New }
     }
 
     /// Stamp of a simulated time.
     fn stamp(&self, time_s: f64) -> Result<Stamp, LogError> {
-        let room_ns = Stamp::MAX.saturating_sub(self.epoch_ns);
+        let room_ns = Stamp::MAX.saturating_sub(self.start_ns);
         let time_ns = (time_s * 1e9).round();
-        if !(0.0..=room_ns as f64).contains(&time_ns) || self.epoch_ns > Stamp::MAX {
+        if !(0.0..=room_ns as f64).contains(&time_ns) || self.start_ns > Stamp::MAX {
             return Err(LogError::Time { path: self.path.clone(), time_s, limit_s: room_ns as f64 * 1e-9 });
         }
-        Ok(Stamp(self.epoch_ns + time_ns as u64))
+        Ok(Stamp(self.start_ns + time_ns as u64))
     }
 }
 
@@ -116,6 +110,7 @@ impl Recorder for McapRecorder {
         if !matches!(self.state, State::New) {
             return Err(LogError::begun_twice(&self.path));
         }
+        self.start_ns = header.start_ns.unwrap_or(START_NS);
         let start = self.stamp(0.0)?;
         let meshes = mesh_files(header)?;
         let file = SharedTail::new(self.options.create(&self.path)?);
@@ -315,12 +310,11 @@ impl Open {
 
     /// Deflections and loads: one topic pair per element, and all by name for tools that plot joints.
     fn elastic(&mut self, stamp: Stamp, sample: &Sample) -> McapResult<()> {
-        let labels = "x [m],y [m],z [m],rx [rad],ry [rad],rz [rad]";
         for (index, element) in sample.elastic.iter().enumerate() {
             let (channels, name) = (self.channels.elastic[index], &self.elements[index]);
             let load = |cdr: &mut Cdr| messages::six_vector_stamped(cdr, stamp, name, &element.load);
             self.output.send(channels.load, self.samples, stamp, load)?;
-            let deflection = |cdr: &mut Cdr| messages::labelled_array(cdr, labels, &element.deflection);
+            let deflection = |cdr: &mut Cdr| messages::six_vector_stamped(cdr, stamp, name, &element.deflection);
             self.output.send(channels.deflection, self.samples, stamp, deflection)?;
         }
         if let Some(channel) = self.channels.elastic_joint_states {

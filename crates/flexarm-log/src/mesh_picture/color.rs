@@ -1,6 +1,9 @@
 //! Colours: a scale for magnitudes, a palette for interfaces.
 
 use super::image::Rgb;
+use crate::palette::{self, Ground};
+
+pub use crate::palette::mix;
 
 /// Viridis (van der Walt and Smith, public domain) at nine places; between them linear.
 const SCALE: [Rgb; 9] = [
@@ -28,8 +31,6 @@ pub const CUT: Rgb = [200, 0, 60];
 pub const PROXIMAL: Rgb = [205, 207, 212];
 /// The part on the side of B.
 pub const DISTAL: Rgb = [163, 168, 178];
-/// Axes x, y, z of a frame.
-pub const AXES: [Rgb; 3] = [[210, 40, 40], [30, 150, 50], [40, 70, 220]];
 /// Text.
 pub const INK: Rgb = [30, 34, 42];
 /// Text of less weight.
@@ -50,9 +51,9 @@ pub fn magnitude(value: f64) -> Rgb {
     mix(SCALE[lower], SCALE[lower + 1], place - lower as f64)
 }
 
-/// `a` at 0, `b` at 1.
-pub fn mix(a: Rgb, b: Rgb, at: f64) -> Rgb {
-    std::array::from_fn(|k| (f64::from(a[k]) + (f64::from(b[k]) - f64::from(a[k])) * at).round() as u8)
+/// Axis x, y or z of a frame.
+pub fn axis(number: usize) -> Rgb {
+    palette::axis(number, Ground::Paper)
 }
 
 /// Colour of the interface with this number.

@@ -1,7 +1,7 @@
 //! An image in memory and its way into a PNG file.
 
 /// Red, green, blue.
-pub type Rgb = [u8; 3];
+pub use crate::palette::Rgb;
 
 /// Pixels of a picture, four bytes each, row by row from the top left.
 #[derive(Debug, Clone, PartialEq, Eq)]

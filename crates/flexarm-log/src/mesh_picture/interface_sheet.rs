@@ -169,7 +169,7 @@ impl Content {
             for (k, name) in ["x", "y", "z"].into_iter().enumerate() {
                 let tip = interface.X_LI * nalgebra::Point3::from(Vector3::ith(k, 1.22 * length));
                 let [x, y, _] = view.project(&tip.coords);
-                let style = Style::new(13.0, color::AXES[k]).bold().halo(color::PAPER);
+                let style = Style::new(13.0, color::axis(k)).bold().halo(color::PAPER);
                 // An axis that points to the viewer has no room for its letter.
                 let [x0, y0, _] = view.project(&interface.X_LI.translation.vector);
                 if (x - x0).hypot(y - y0) > 14.0 {
@@ -300,7 +300,7 @@ fn triad(X: &flexarm_fem::Pose, length: f64) -> Vec<Mark> {
     let origin = X.translation.vector;
     let axis = |k: usize| {
         let tip = origin + X.rotation * Vector3::ith(k, length);
-        sheet::arrow(origin, tip, 2.6, color::AXES[k], [1.0, 0.55])
+        sheet::arrow(origin, tip, 2.6, color::axis(k), [1.0, 0.55])
     };
     let mut marks: Vec<Mark> = (0..3).flat_map(axis).collect();
     marks.push(Mark::Dot { at: origin, diameter: 7.0, color: color::INK, alpha: [1.0, 0.6] });

@@ -35,9 +35,9 @@ pub(super) fn compass(image: &mut Image, view: &View) {
     for k in order {
         let direction = [view.right[k], -view.up[k]];
         let tip = [0, 1].map(|i| origin[i] + length * direction[i]);
-        image.arrow(origin, tip, 2.0, color::AXES[k]);
+        image.arrow(origin, tip, 2.0, color::axis(k));
         let label = [0, 1].map(|i| origin[i] + (length + 11.0) * direction[i] + [0.0, 5.0][i]);
-        image.text(["x", "y", "z"][k], label, Align::Middle, Style::new(15.0, color::AXES[k]).bold());
+        image.text(["x", "y", "z"][k], label, Align::Middle, Style::new(15.0, color::axis(k)).bold());
     }
 }
 

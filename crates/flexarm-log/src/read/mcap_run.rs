@@ -75,6 +75,7 @@ impl McapRun {
 
         // The first sample once more, now that names can be told apart: what it holds, all hold.
         let epoch_ns = found.recording("epoch_ns").and_then(|text| text.parse().ok()).unwrap_or(0);
+        header.start_ns = Some(epoch_ns).filter(|start| *start != crate::START_NS);
         let mut assembly = Assembly::new(&header, epoch_ns);
         let mut topics = Vec::new();
         walk(path, &mut |record| {
@@ -376,7 +377,8 @@ impl Assembly {
             ("/tcp/static_error", Topic::StaticError),
             ("/tcp/contributions", Topic::Contributions),
             ("/energy", Topic::Energy),
-            ("/diagnostics/solver", Topic::Solver),
+            ("/solver", Topic::Solver),
+            ("/diagnostics/solver", Topic::Solver), // of older files
             ("/events", Topic::Events),
         ]
         .map(|(name, topic)| (name.to_owned(), topic))
@@ -470,7 +472,16 @@ impl Assembly {
                 cdr.header()?;
                 sample.elastic[k].load = cdr.f64s()?;
             }
-            Topic::Deflection(k) => sample.elastic[k].deflection = cdr.labelled_array()?.1.try_into().ok()?,
+            Topic::Deflection(k) => {
+                // Older files have an array with names.
+                let array = cdr.labelled_array().and_then(|(_, values)| values.try_into().ok());
+                let stamped = || {
+                    let mut cdr = CdrReader::new(data)?;
+                    cdr.header()?;
+                    cdr.f64s()
+                };
+                sample.elastic[k].deflection = array.or_else(stamped)?;
+            }
             Topic::StaticError => sample.static_m = cdr.labelled_array()?.1.try_into().ok()?,
             Topic::Contributions => {
                 let (_, values) = cdr.labelled_array()?;

@@ -3,10 +3,10 @@
 use rerun::log::{Chunk, TimeColumn};
 use rerun::{Color, EntityPath};
 
-use super::colors::{BLUE, GREEN, LIGHT, RED};
+use super::colors::{axis, faint, series, total};
 use super::path;
 use super::stream::{Ids, StreamError};
-use super::tracks::ScalarTrack;
+use super::tracks::{ScalarTrack, Seen};
 use crate::{RunHeader, Sample};
 
 /// All curves of a run.
@@ -22,42 +22,50 @@ impl Curves {
     /// Curves below `root`.
     pub(crate) fn new(header: &RunHeader, root: &EntityPath) -> Self {
         let at = |parts: &[&str]| root.join(&path(parts));
-        let curve = |group: &str, key: &str, name: &str, color: u32| {
-            ScalarTrack::new(at(&[group, key]), [name]).with_colors([Color::from_u32(color)])
+        let curve = |group: &str, key: &str, name: &str, color: Color| {
+            ScalarTrack::new(at(&[group, key]), [name]).with_colors([color])
+        };
+        let counted = |path: EntityPath, names: Vec<String>, color: &dyn Fn(usize) -> Color| {
+            let colors: Vec<Color> = (0..names.len()).map(color).collect();
+            ScalarTrack::new(path, names).with_colors(colors)
         };
         let (mut error, mut tracks) = (Vec::new(), Vec::new());
         if header.has_rigid {
-            error.push(curve("tcp_error", "x", "x [mm]", RED));
-            error.push(curve("tcp_error", "y", "y [mm]", GREEN));
-            error.push(curve("tcp_error", "z", "z [mm]", BLUE));
-            error.push(curve("tcp_error", "norm", "norm [mm]", LIGHT));
-            error.push(curve("tcp_error_path", "tangential", "tangential [mm]", RED));
-            error.push(curve("tcp_error_path", "normal", "normal [mm]", GREEN));
-            error.push(curve("tcp_error_path", "binormal", "binormal [mm]", BLUE));
-            tracks.push(curve("tcp_error_rotation", "x", "about x [mrad]", RED));
-            tracks.push(curve("tcp_error_rotation", "y", "about y [mrad]", GREEN));
-            tracks.push(curve("tcp_error_rotation", "z", "about z [mrad]", BLUE));
+            error.push(curve("tcp_error", "x", "x [mm]", axis(0)));
+            error.push(curve("tcp_error", "y", "y [mm]", axis(1)));
+            error.push(curve("tcp_error", "z", "z [mm]", axis(2)));
+            error.push(curve("tcp_error", "norm", "norm [mm]", total()));
+            error.push(curve("tcp_error_path", "tangential", "tangential [mm]", series(0)));
+            error.push(curve("tcp_error_path", "normal", "normal [mm]", series(1)));
+            error.push(curve("tcp_error_path", "binormal", "binormal [mm]", series(2)));
+            tracks.push(curve("tcp_error_rotation", "x", "about x [mrad]", axis(0)));
+            tracks.push(curve("tcp_error_rotation", "y", "about y [mrad]", axis(1)));
+            tracks.push(curve("tcp_error_rotation", "z", "about z [mrad]", axis(2)));
         }
-        tracks.push(ScalarTrack::new(at(&["joints", "position"]), header.joints.clone()));
-        tracks.push(ScalarTrack::new(at(&["joints", "velocity"]), header.joints.clone()));
-        tracks.push(ScalarTrack::new(at(&["joints", "effort", "flexible"]), header.joints.clone()));
+        let joints = &header.joints;
+        tracks.push(counted(at(&["joints", "position"]), joints.clone(), &series));
+        tracks.push(counted(at(&["joints", "velocity"]), joints.clone(), &series));
+        tracks.push(counted(at(&["joints", "effort", "flexible"]), joints.clone(), &series));
         if header.has_rigid {
-            let names = header.joints.iter().map(|joint| format!("{joint} (rigid)"));
-            tracks.push(ScalarTrack::new(at(&["joints", "effort", "rigid"]), names));
+            let names = joints.iter().map(|joint| format!("{joint} (rigid)")).collect();
+            tracks.push(counted(at(&["joints", "effort", "rigid"]), names, &faint));
         }
-        for element in &header.elements {
-            let names = |parts: [&str; 6]| parts.map(|part| format!("{element} {part}"));
+        for (number, element) in header.elements.iter().enumerate() {
+            let names = |parts: [&str; 6]| parts.map(|part| format!("{element} {part}")).to_vec();
+            // All elements are in one plot.
+            let color = |part: usize| series(6 * number + part);
             let deflections = names(["x [mm]", "y [mm]", "z [mm]", "rx [mrad]", "ry [mrad]", "rz [mrad]"]);
-            tracks.push(ScalarTrack::new(at(&["elastic", element]), deflections));
+            tracks.push(counted(at(&["elastic", element]), deflections, &color));
             let loads = names(["Fx [N]", "Fy [N]", "Fz [N]", "Mx [N m]", "My [N m]", "Mz [N m]"]);
-            tracks.push(ScalarTrack::new(at(&["elastic_load", element]), loads));
+            tracks.push(counted(at(&["elastic_load", element]), loads, &color));
         }
         if !header.contributors.is_empty() {
-            let names = header.contributors.iter().map(|name| format!("{name} [mm]"));
-            tracks.push(ScalarTrack::new(at(&["contributions"]), names));
+            let names = header.contributors.iter().map(|name| format!("{name} [mm]")).collect();
+            tracks.push(counted(at(&["contributions"]), names, &series));
         }
-        tracks.push(ScalarTrack::new(at(&["energy"]), ["kinetic [J]", "potential [J]", "elastic [J]"]));
-        tracks.push(ScalarTrack::new(at(&["solver"]), ["iterations", "residual"]));
+        let energies = ["kinetic [J]", "potential [J]", "elastic [J]"].map(str::to_owned).to_vec();
+        tracks.push(counted(at(&["energy"]), energies, &series));
+        tracks.push(counted(at(&["solver"]), ["iterations", "residual"].map(str::to_owned).to_vec(), &series));
         Self { error, causes: tracks, has_rigid: header.has_rigid }
     }
 
@@ -133,6 +141,11 @@ impl Curves {
             chunks.extend(track.waiting().then(|| track.chunk(ids, pose_times)).transpose()?);
         }
         Ok(())
+    }
+
+    /// Where each group of curves is, how high and low it goes, and its names.
+    pub(crate) fn seen(&self) -> impl Iterator<Item = Seen> + '_ {
+        self.error.iter().chain(&self.causes).map(ScalarTrack::seen)
     }
 
     pub(crate) fn clear(&mut self) {

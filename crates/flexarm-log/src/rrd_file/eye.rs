@@ -11,6 +11,22 @@ pub(crate) struct Eye {
     pub(crate) target: [f32; 3],
 }
 
+/// How far beside the middle the scale of colours stands, and half its height, as shares of the distance of the eye: within
+/// a view that is wider than high, outside of the arm.
+const BESIDE: [f64; 2] = [0.62, 0.3];
+
+impl Eye {
+    /// Ends of an upright line at the left border of what is seen at first (m): foot and head.
+    pub(crate) fn beside(&self) -> [[f64; 3]; 2] {
+        let [position, target] = [self.position, self.target].map(|p| Vector3::from(p.map(f64::from)));
+        let ahead = target - position;
+        let right = ahead.cross(&Vector3::z()).try_normalize(0.0).unwrap_or_else(Vector3::x);
+        let [aside, half] = BESIDE.map(|share| share * ahead.norm());
+        let middle = target - right * aside;
+        [-half, half].map(|rise| (middle + Vector3::z() * rise).into())
+    }
+}
+
 /// From where the line of sight is turned against the direction in which the arm reaches (rad): aside of the plane in which
 /// it stands at first, so that bending in that plane is seen.
 const TURN_RAD: f64 = -1.15;

@@ -4,16 +4,19 @@
 //! its parts by chance and cannot set a plot's legend.
 
 use rerun::external::re_sdk_types::blueprint::archetypes::{
-    Background, ContainerBlueprint, EyeControls3D, PanelBlueprint, PlotLegend, TimeAxis, TimePanelBlueprint,
-    ViewBlueprint, ViewContents, ViewportBlueprint,
+    Background, ContainerBlueprint, EyeControls3D, PanelBlueprint, PlotLegend, ScalarAxis, TextLogColumns, TimeAxis,
+    TimePanelBlueprint, ViewBlueprint, ViewContents, ViewportBlueprint,
 };
 use rerun::external::re_sdk_types::blueprint::components::{
     BackgroundKind, ColumnShare, ContainerKind, Corner2D, LinkAxis, LoopMode, PanelState, PlayState, RowShare,
     TimelineName,
 };
+use rerun::external::re_sdk_types::blueprint::datatypes::{TextLogColumn, TextLogColumnKind};
 use rerun::{AsComponents, EntityPath};
 
 use super::eye::Eye;
+use super::tracks::Seen;
+use crate::plot_room::{Corner, arrange};
 
 const VIEW_3D: &str = "3D";
 const VIEW_PLOT: &str = "TimeSeries";
@@ -71,8 +74,8 @@ impl Part {
 
 /// The entities of a layout with `root` as the window, playing on `timeline`; without an eye the viewer
 /// chooses one.
-pub(crate) fn entities(root: &Part, timeline: &str, eye: Option<Eye>) -> Entities {
-    let mut layout = Layout { entities: Vec::new(), parts: 0, eye };
+pub(crate) fn entities(root: &Part, timeline: &str, eye: Option<Eye>) -> (Entities, Vec<PlotPlace>) {
+    let mut layout = Layout { entities: Vec::new(), plots: Vec::new(), parts: 0, eye };
     let root_id = layout.add(root).id;
     let viewport = ViewportBlueprint::new().with_root_container(root_id).with_auto_layout(false).with_auto_views(false);
     layout.log("viewport", viewport);
@@ -84,11 +87,40 @@ pub(crate) fn entities(root: &Part, timeline: &str, eye: Option<Eye>) -> Entitie
         .with_play_state(PlayState::Playing)
         .with_loop_mode(LoopMode::All);
     layout.log("time_panel", time);
-    layout.entities
+    (layout.entities, layout.plots)
+}
+
+/// A plot in the layout: what it shows, and its place in the blueprint.
+#[derive(Clone, Debug)]
+pub(crate) struct PlotPlace {
+    origin: EntityPath,
+    path: String,
+}
+
+/// For each plot an axis that shows all its curves with labels, and a corner in which their names hide nothing.
+pub(crate) fn rooms(plots: &[PlotPlace], seen: &[Seen]) -> Entities {
+    let mut entities: Entities = Vec::new();
+    for plot in plots {
+        let own: Vec<&Seen> = seen.iter().filter(|seen| seen.path.starts_with(&plot.origin)).collect();
+        let names: Vec<usize> = own.iter().flat_map(|seen| seen.names.iter().copied()).collect();
+        let envelopes: Vec<_> = own.iter().map(|seen| &seen.envelope).collect();
+        let Some(room) = arrange(&envelopes, &names) else { continue };
+        let corner = match room.corner {
+            Corner { left: true, top: true } => Corner2D::LeftTop,
+            Corner { left: false, top: true } => Corner2D::RightTop,
+            Corner { left: true, top: false } => Corner2D::LeftBottom,
+            Corner { left: false, top: false } => Corner2D::RightBottom,
+        };
+        let at = |what: &str| EntityPath::from(format!("{}/{what}", plot.path).as_str());
+        entities.push((at("PlotLegend"), Box::new(PlotLegend::new().with_corner(corner))));
+        entities.push((at("ScalarAxis"), Box::new(ScalarAxis::new().with_range(room.range))));
+    }
+    entities
 }
 
 struct Layout {
     entities: Entities,
+    plots: Vec<PlotPlace>,
     parts: u8,
     eye: Option<Eye>,
 }
@@ -134,9 +166,20 @@ impl Layout {
         let contents = ViewContents::new(view.contents.iter().map(String::as_str));
         self.log(&format!("{}/ViewContents", placed.path), contents);
         if view.class == VIEW_PLOT {
-            // All plots zoom together; the legend stays off the newest end of the curves.
+            // All plots zoom together; the legend gets its place when the curves are known ([`rooms`]).
             self.log(&format!("{}/PlotLegend", placed.path), PlotLegend::new().with_corner(Corner2D::LeftTop));
             self.log(&format!("{}/TimeAxis", placed.path), TimeAxis::new().with_link(LinkAxis::LinkToGlobal));
+            self.plots.push(PlotPlace { origin: view.origin.clone(), path: placed.path.clone() });
+        }
+        if view.class == VIEW_LOG {
+            // All messages are of one entity: its path says nothing.
+            let column = |kind, visible: bool| TextLogColumn { visible: visible.into(), kind };
+            let columns = TextLogColumns::new().with_text_log_columns([
+                column(TextLogColumnKind::EntityPath, false),
+                column(TextLogColumnKind::LogLevel, true),
+                column(TextLogColumnKind::Body, true),
+            ]);
+            self.log(&format!("{}/TextLogColumns", placed.path), columns);
         }
         if let (VIEW_3D, Some(Eye { position, target })) = (view.class, self.eye) {
             let eye = EyeControls3D::new().with_position(position).with_look_target(target);

@@ -23,10 +23,10 @@ use rerun::external::re_log_types::StoreKind;
 use rerun::log::Chunk;
 use rerun::{EntityPath, StoreId, TextDocument, TimePoint, Timeline, ViewCoordinates};
 
-use self::layout::Part;
+use self::layout::{Part, PlotPlace};
 use self::run::{RunTracks, Seat};
 use self::stream::{Ids, RrdStream, StreamError};
-use self::tracks::SIM_TIME;
+use self::tracks::{SIM_TIME, Seen};
 use crate::create::FlushClock;
 use crate::shape::Shape;
 use crate::{CreateOptions, LogError, Recorder, RunHeader, RunResult, Sample};
@@ -46,6 +46,7 @@ const CHUNK_ROWS: usize = 1024;
 /// | entity | contents |
 /// | --- | --- |
 /// | `/<robot>/magnified/<link>` | the flexible arm with its deflections multiplied by [`RunHeader::magnification`], every place in the colour of its real distance from the rigid twin |
+/// | `/<robot>/magnified/color_scale` | the colours with their distances |
 /// | `/<robot>/magnified/error` | arrow from the rigid tool centre point to the magnified one, with the real error as text |
 /// | `/<robot>/flexible/<link>`, `/<robot>/rigid/<link>` | pose in the world at true scale; below it the link's meshes, those of the rigid twin as a ghost |
 /// | `/<robot>/<robot of the three>/<link>/<mesh>/bending`, `.../far` | surface of a link that bends: what lies between its interfaces, corner by corner, and what is rigid with the far one |
@@ -144,7 +145,7 @@ impl Open {
         }
         let result = crate::run_json::write_result(result);
         self.store.constant(&path(RESULT_ENTITY), &TextDocument::new(result))?;
-        self.store.stream.finish()
+        self.store.finish()
     }
 }
 
@@ -163,6 +164,9 @@ pub(crate) struct Store {
     recording: StoreId,
     blueprint: StoreId,
     flush: FlushClock,
+    /// Plots of the layout, once it is written, and the curves of all runs that are finished.
+    plots: Vec<PlotPlace>,
+    seen: Vec<Seen>,
 }
 
 impl Store {
@@ -172,7 +176,7 @@ impl Store {
         let recording = StoreId::new(StoreKind::Recording, "flexarm", id);
         let mut stream = RrdStream::new(file)?;
         stream.open_store(&recording)?;
-        Ok(Self { stream, recording, blueprint, flush })
+        Ok(Self { stream, recording, blueprint, flush, plots: Vec::new(), seen: Vec::new() })
     }
 
     /// What is said once about a recording.
@@ -201,6 +205,22 @@ impl Store {
     fn constant(&mut self, at: &EntityPath, what: &dyn rerun::AsComponents) -> Result<(), StreamError> {
         let chunk = self.stream.ids().constant(at, what)?;
         self.stream.append(&self.recording, &chunk)
+    }
+
+    /// Gives the plots room for their curves and for the names of these, now that all are known, and ends the file.
+    fn finish(&mut self) -> Result<(), StreamError> {
+        let rooms = layout::rooms(&self.plots, &self.seen);
+        if !rooms.is_empty() {
+            let when = TimePoint::default().with(Timeline::new_sequence("blueprint"), 1);
+            let blueprint = self.blueprint.clone();
+            for (at, what) in rooms {
+                let chunk = self.stream.ids().single(&at, &when, what.as_ref())?;
+                self.stream.append(&blueprint, &chunk)?;
+            }
+            // A viewer that has shown the layout takes it again.
+            self.stream.activate(&blueprint)?;
+        }
+        self.stream.finish()
     }
 
     fn append_all(&mut self, ids: Ids, chunks: &[Chunk]) -> Result<(), StreamError> {
@@ -279,7 +299,9 @@ impl RunWriter {
         let when = TimePoint::default().with(Timeline::new_sequence("blueprint"), 0);
         let blueprint = store.blueprint.clone();
         store.stream.open_store(&blueprint)?;
-        for (at, what) in layout::entities(&window, SIM_TIME, eye) {
+        let (entities, plots) = layout::entities(&window, SIM_TIME, eye);
+        store.plots = plots;
+        for (at, what) in entities {
             let chunk = store.stream.ids().single(&at, &when, what.as_ref())?;
             store.stream.append(&blueprint, &chunk)?;
         }
@@ -291,6 +313,7 @@ impl RunWriter {
         self.layout(store, None)?;
         self.tracks.close();
         self.commit(store)?;
+        store.seen.extend(self.tracks.seen());
         let mut ids = *store.stream.ids();
         let mut chunks = self.tracks.ways(&mut ids)?;
         chunks.extend(self.tracks.marks(&mut ids, result)?);
@@ -298,17 +321,14 @@ impl RunWriter {
     }
 }
 
-/// The text panel: the result once it is known, then the set-up.
+/// The text panel: the result once it is known, then the set-up. A list, because its lines break where the panel ends.
 fn summary(description: &str, result: &RunResult) -> String {
     if result.readable.is_empty() {
         return description.to_owned();
     }
-    let mut text = String::from("| result | |\n| --- | --- |\n");
-    let cell = |text: &str| text.replace('|', "\\|");
-    for (name, value) in &result.readable {
-        text.push_str(&format!("| {} | {} |\n", cell(name), cell(value)));
-    }
-    text + "\n" + description
+    let plain = |text: &str| text.replace('*', "\\*").replace('_', "\\_");
+    let line = |(name, value): &(String, String)| format!("- **{}** {}\n", plain(name), plain(value));
+    result.readable.iter().map(line).collect::<String>() + "\n" + description
 }
 
 /// An entity path of parts that may hold any character.
@@ -319,7 +339,7 @@ pub(crate) fn path<S: AsRef<str>>(parts: impl IntoIterator<Item = S>) -> EntityP
 /// Entity name of a link. Names that a robot's own entities have are for those.
 pub(crate) fn link_part(name: &str) -> String {
     match name {
-        "tcp" | "skeleton" | "error" => format!("link_{name}"),
+        "tcp" | "skeleton" | "error" | "color_scale" => format!("link_{name}"),
         _ => name.to_owned(),
     }
 }

@@ -6,7 +6,7 @@ use rerun::components::MeshFaceRendering;
 use rerun::log::Chunk;
 use rerun::{AlbedoFactor, Color, EntityPath, LineStrips3D, Mesh3D, Rgba32, TransformAxes3D};
 
-use super::colors::{ColorScale, GHOST};
+use super::colors::{self, ColorScale};
 use super::stream::{Ids, StreamError};
 use super::tracks::{Instant, PoseTrack, ShapeTrack, SkeletonTrack, TintTrack, Track, point};
 use super::{link_part, path};
@@ -78,9 +78,9 @@ impl RobotTracks {
         let pairs = header.links.iter().enumerate();
         let pairs = pairs.filter_map(|(child, link)| Some((child, link.parent?))).collect();
         let line_color = match look.paint {
-            Paint::Ghost => Color::from_u32(super::colors::BLUE),
+            Paint::Ghost => colors::rigid(),
             Paint::Plain(color) => color,
-            Paint::Own | Paint::Deviation(_) => Color::from_u32(super::colors::ORANGE),
+            Paint::Own | Paint::Deviation(_) => colors::series(1),
         };
         // Frames without a surface are told once, by the robot at true scale.
         let shown = |(k, _): &(usize, &crate::LinkInfo)| {
@@ -179,9 +179,9 @@ impl RobotTracks {
         };
         match self.look.paint {
             // Its back faces only: they are hidden wherever the flexible robot is in the same place.
-            Paint::Ghost => surface
-                .with_albedo_factor(AlbedoFactor(Rgba32::from_u32(GHOST)))
-                .with_face_rendering(MeshFaceRendering::Back),
+            Paint::Ghost => {
+                surface.with_albedo_factor(AlbedoFactor(colors::ghost())).with_face_rendering(MeshFaceRendering::Back)
+            }
             Paint::Plain(color) => surface.with_albedo_factor(AlbedoFactor(color.0)),
             Paint::Own => surface.with_albedo_factor(AlbedoFactor(own())),
             Paint::Deviation(_) => self.strip(mesh, 1, mesh.positions.iter().map(|_| 0.5)),
@@ -197,6 +197,16 @@ impl RobotTracks {
         surface.with_albedo_texture_format(TintTrack::format(width))
     }
 
+    /// Whether its colours tell how far it is from the rigid twin, and it has surfaces that show them.
+    pub(crate) fn is_colored(&self) -> bool {
+        matches!(self.look.paint, Paint::Deviation(_)) && self.skeleton.is_none()
+    }
+
+    /// Entity below which it is.
+    pub(crate) fn root(&self) -> &EntityPath {
+        &self.look.root
+    }
+
     /// The tool as a line from the frame that carries it to the tool centre point: most robot files have no mesh for it.
     pub(crate) fn tool(&self, X_TL: &Pose, ids: &mut Ids) -> Result<Option<Chunk>, StreamError> {
         const SHORTEST_M: f64 = 0.01;
@@ -204,9 +214,9 @@ impl RobotTracks {
             return Ok(None);
         }
         let color = match self.look.paint {
-            Paint::Ghost => Color(Rgba32::from_u32(GHOST)),
+            Paint::Ghost => Color(colors::ghost()),
             Paint::Plain(color) => color,
-            Paint::Own | Paint::Deviation(_) => Color::from_u32(super::colors::LIGHT),
+            Paint::Own | Paint::Deviation(_) => colors::total(),
         };
         let line = LineStrips3D::new([[point(X_TL), [0.0; 3]]])
             .with_colors([color])

@@ -1,14 +1,19 @@
 //! One run in a recording: its robots, ways of the tool, curves and events.
 
 use rerun::log::Chunk;
-use rerun::{Color, EntityPath, Points3D, Scalars, SeriesPoints, TextDocument, TextLog, TimePoint, Timeline};
+use rerun::{
+    Color, EntityPath, LineStrip3D, LineStrips3D, Points3D, Scalars, SeriesPoints, TextDocument, TextLog, TimePoint,
+    Timeline,
+};
 
-use super::colors::{BLUE, ColorScale, LIGHT, ORANGE, RUNS};
+use super::colors::{self, ColorScale};
 use super::curves::{Curves, size};
+use super::eye::{Eye, eye};
 use super::path;
 use super::robot::{Look, Paint, RobotTracks};
 use super::stream::{Ids, StreamError};
-use super::tracks::{ArrowTrack, Instant, PathTrack, SIM_TIME, Times, Track, point};
+use super::tracks::{ArrowTrack, Instant, PathTrack, SIM_TIME, Seen, Times, Track, point};
+use crate::plot_room::Envelope;
 use crate::{EventKind, Magnifier, RunHeader, RunResult, Sample, TwinSample};
 
 /// Shortest time between two poses (ns): every sample of a run logged at up to 200 Hz, fewer of faster ones. Curves have all.
@@ -35,7 +40,7 @@ impl Seat {
     pub(crate) fn color(&self) -> Option<Color> {
         match self {
             Self::Alone => None,
-            Self::InStudy(k, _) => Some(Color::from_u32(RUNS[k % RUNS.len()])),
+            Self::InStudy(k, _) => Some(colors::series(*k)),
         }
     }
 }
@@ -121,7 +126,7 @@ impl RunTracks {
                     false => None,
                 },
                 way: way("rigid"),
-                way_color: Some(Color::from_u32(BLUE)),
+                way_color: Some(colors::rigid()),
             }),
         };
         let magnified = match with_magnified {
@@ -142,14 +147,14 @@ impl RunTracks {
         };
         let arrow = with_magnified.then(|| ArrowTrack::new(root.join(&path(["magnified", "error"]))));
         if let Some(arrow) = &arrow {
-            fixed.push(arrow.style(ids, seat.color().unwrap_or(Color::from_u32(LIGHT)))?);
+            fixed.push(arrow.style(ids, seat.color().unwrap_or_else(colors::total))?);
         }
         let plots = path(["plots"]);
         let shapes = !header.captions.is_empty();
         let curves = (first && !shapes).then(|| Curves::new(header, &plots));
         let study_curves = match seat {
             Seat::InStudy(_, label) if header.has_rigid => {
-                Some(Curves::of_study(label, &plots, seat.color().unwrap_or(Color::from_u32(ORANGE))))
+                Some(Curves::of_study(label, &plots, seat.color().unwrap_or_else(|| colors::series(0))))
             }
             _ => None,
         };
@@ -178,8 +183,19 @@ impl RunTracks {
         Ok((run, fixed))
     }
 
-    /// What is known of the robots with the first sample.
+    /// What is known of the robots with the first sample: their tools, and where the scale of their colours stands.
     pub(crate) fn tools(&self, header: &RunHeader, first: &Sample, ids: &mut Ids) -> Result<Vec<Chunk>, StreamError> {
+        let mut chunks = self.tool_lines(header, first, ids)?;
+        let colored = std::iter::once(&self.flexible).chain(&self.magnified).filter_map(|drawn| drawn.robot.as_ref());
+        // Shapes of modes have no size: their colours are no millimetres.
+        let mut colored = colored.filter(|robot| robot.is_colored() && header.captions.is_empty());
+        if let (Some(robot), Some(eye)) = (colored.next_back(), eye(header, Some(first))) {
+            chunks.extend(color_bar(robot.root(), self.scale, &eye, ids)?);
+        }
+        Ok(chunks)
+    }
+
+    fn tool_lines(&self, header: &RunHeader, first: &Sample, ids: &mut Ids) -> Result<Vec<Chunk>, StreamError> {
         let captions = self.captions(header, first, ids)?;
         let Some(link) = header.links.iter().position(|link| link.name == header.tcp) else { return Ok(captions) };
         let X_TL = first.flexible.X_WT.inv_mul(&first.flexible.X_WL[link]);
@@ -196,7 +212,7 @@ impl RunTracks {
             let when = instant(((caption.from_s * 1e9).round() as i64, step));
             let label = Points3D::new([point(&first.rigid.X_WT)])
                 .with_radii([rerun::Radius::new_ui_points(2.0)])
-                .with_colors([Color::from_u32(LIGHT)])
+                .with_colors([colors::total()])
                 .with_labels([caption.text.as_str()])
                 .with_show_labels(true);
             chunks.push(ids.single(&self.root.join(&path(["caption"])), &when, &label)?);
@@ -270,6 +286,16 @@ impl RunTracks {
         }
     }
 
+    /// Where each group of curves is, how high and low it goes, and its names.
+    pub(crate) fn seen(&self) -> Vec<Seen> {
+        let mut seen: Vec<Seen> = self.curves.iter().chain(&self.study_curves).flat_map(Curves::seen).collect();
+        if let (Some((error, when, _)), Some(_)) = (&self.peak, &self.curves) {
+            let names = vec![peak_label(*error, *when).chars().count()];
+            seen.push(Seen { path: path(["plots", "tcp_error", "peak"]), envelope: Envelope::default(), names });
+        }
+        seen
+    }
+
     /// Rows that wait, as of the number of samples.
     pub(crate) fn waiting(&self) -> usize {
         self.times.rows()
@@ -325,7 +351,7 @@ impl RunTracks {
     pub(crate) fn marks(&self, ids: &mut Ids, result: &RunResult) -> Result<Vec<Chunk>, StreamError> {
         let mut chunks = Vec::new();
         if let Some((error, when, place)) = &self.peak {
-            let label = format!("peak {:.3} mm at {:.3} s", 1e3 * error, when.0 as f64 * 1e-9);
+            let label = peak_label(*error, *when);
             let mark = Points3D::new([*place])
                 .with_radii([rerun::Radius::new_ui_points(5.0)])
                 .with_colors([Color::from_rgb(255, 255, 255)])
@@ -347,8 +373,11 @@ impl RunTracks {
                 let level = match event.kind {
                     EventKind::Stopped => "ERROR",
                     EventKind::Limit => "WARN",
-                    EventKind::Peak | EventKind::Settled => "INFO",
-                    EventKind::MoveStart | EventKind::MoveEnd | EventKind::Load => "DEBUG",
+                    EventKind::MoveStart
+                    | EventKind::MoveEnd
+                    | EventKind::Load
+                    | EventKind::Peak
+                    | EventKind::Settled => "INFO",
                 };
                 let text = TextLog::new(event.text.as_str()).with_level(level);
                 let time_ns = (event.time_s * 1e9).round() as i64;
@@ -358,6 +387,32 @@ impl RunTracks {
         }
         Ok(chunks)
     }
+}
+
+fn peak_label(error_m: f64, (nanoseconds, _): Instant) -> String {
+    format!("peak {:.3} mm at {:.3} s", 1e3 * error_m, nanoseconds as f64 * 1e-9)
+}
+
+/// The scale of the colours, upright beside the robot as it is seen at first, with its numbers.
+fn color_bar(root: &EntityPath, scale: ColorScale, eye: &Eye, ids: &mut Ids) -> Result<Vec<Chunk>, StreamError> {
+    let [foot, head] = eye.beside();
+    let at = |share: f64| [0, 1, 2].map(|c| (foot[c] + (head[c] - foot[c]) * share) as f32);
+    let steps = ColorScale::STEPS;
+    let piece =
+        |k: u32| LineStrip3D::from_iter([at(f64::from(k) / f64::from(steps)), at(f64::from(k + 1) / f64::from(steps))]);
+    let color = |k: u32| scale.color(scale.full_m * (f64::from(k) + 0.5) / f64::from(steps));
+    let bar = LineStrips3D::new((0..steps).map(piece))
+        .with_colors((0..steps).map(color))
+        .with_radii([rerun::Radius::new_ui_points(5.0)]);
+    let mm = |share: f64| 1e3 * scale.full_m * share;
+    let labels = [format!("{}", mm(0.0)), format!("{} mm", mm(0.5)), format!("{} mm off the rigid arm", mm(1.0))];
+    let numbers = Points3D::new([0.0, 0.5, 1.0].map(at))
+        .with_radii([rerun::Radius::new_ui_points(1.0)])
+        .with_colors([colors::total()])
+        .with_labels(labels.iter().map(String::as_str))
+        .with_show_labels(true);
+    let place = |what: &str| root.join(&path(["color_scale", what]));
+    Ok(vec![ids.constant(&place("bar"), &bar)?, ids.constant(&place("numbers"), &numbers)?])
 }
 
 fn instant((nanoseconds, step): Instant) -> TimePoint {

@@ -50,7 +50,7 @@ impl RrdStudy {
         let Some(mut store) = lock(&self.store).take() else { return Err(LogError::not_open(&self.path, "finish")) };
         let mut close = || {
             store.constant(&path(["summary"]), &TextDocument::from_markdown(text))?;
-            store.stream.finish()
+            store.finish()
         };
         close().map_err(stream_error(&self.path, "write the result and the index"))
     }
@@ -60,7 +60,7 @@ impl Drop for RrdStudy {
     /// A study that was given up still gets its index; errors have nowhere to go.
     fn drop(&mut self) {
         if let Some(mut store) = lock(&self.store).take() {
-            let _ = store.stream.finish();
+            let _ = store.finish();
         }
     }
 }

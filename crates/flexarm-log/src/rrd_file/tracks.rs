@@ -10,6 +10,7 @@ use rerun::{
 };
 
 use super::stream::{Ids, StreamError};
+use crate::plot_room::Envelope;
 
 /// Name of the timeline of simulated time.
 pub(crate) const SIM_TIME: &str = "sim_time";
@@ -288,6 +289,15 @@ impl Track for SkeletonTrack {
     }
 }
 
+/// What is to be known of curves to give them room in a plot.
+#[derive(Clone, Debug)]
+pub(crate) struct Seen {
+    pub(crate) path: EntityPath,
+    pub(crate) envelope: Envelope,
+    /// Letters of each name.
+    pub(crate) names: Vec<usize>,
+}
+
 /// Curves of one plot, drawn from one entity; all curves share the times of the samples.
 #[derive(Debug)]
 pub(crate) struct ScalarTrack {
@@ -295,12 +305,13 @@ pub(crate) struct ScalarTrack {
     names: Vec<String>,
     colors: Vec<Color>,
     values: Vec<f64>,
+    envelope: Envelope,
 }
 
 impl ScalarTrack {
     pub(crate) fn new(path: EntityPath, names: impl IntoIterator<Item = impl Into<String>>) -> Self {
         let names = names.into_iter().map(Into::into).collect();
-        Self { path, names, colors: Vec::new(), values: Vec::new() }
+        Self { path, names, colors: Vec::new(), values: Vec::new(), envelope: Envelope::default() }
     }
 
     pub(crate) fn with_colors(self, colors: impl IntoIterator<Item = Color>) -> Self {
@@ -309,7 +320,9 @@ impl ScalarTrack {
 
     /// Adds a row: one value per name.
     pub(crate) fn push(&mut self, values: impl IntoIterator<Item = f64>) {
+        let first = self.values.len();
         self.values.extend(values);
+        self.envelope.push(self.values[first..].iter().copied());
         debug_assert!(self.values.len().is_multiple_of(self.names.len().max(1)), "{}: a value per curve", self.path);
     }
 
@@ -320,6 +333,11 @@ impl ScalarTrack {
     /// Whether there are rows that have not been written.
     pub(crate) fn waiting(&self) -> bool {
         !self.values.is_empty()
+    }
+
+    pub(crate) fn seen(&self) -> Seen {
+        let names = self.names.iter().map(|name| name.chars().count()).collect();
+        Seen { path: self.path.clone(), envelope: self.envelope.clone(), names }
     }
 
     /// Names and colours of the curves.

@@ -13,40 +13,48 @@ pub(crate) fn window(header: &RunHeader, seat: &Seat, labels: &[String]) -> Part
         return shapes(&seat.root(header));
     }
     let plot = |title: &str, parts: &[&str]| Part::plot(title, path(["plots"].iter().chain(parts)));
+    // What a study shows of its first run alone says so.
+    let own = |title: &str| match seat {
+        Seat::Alone => title.to_owned(),
+        Seat::InStudy(_, label) => format!("{label}: {}{}", title[..1].to_lowercase(), &title[1..]),
+    };
+    let cause = |title: &str, parts: &[&str]| plot(&own(title), parts);
     let causes = [
-        (!header.contributors.is_empty()).then(|| plot("Shares of the error [mm]", &["contributions"])),
-        (!header.elements.is_empty()).then(|| plot("Deflections [mm, mrad]", &["elastic"])),
-        (!header.elements.is_empty()).then(|| plot("Loads [N, N m]", &["elastic_load"])),
-        Some(plot("Joint positions", &["joints", "position"])),
-        Some(plot("Joint efforts", &["joints", "effort"])),
-        Some(plot("Energy [J]", &["energy"])),
-        header.has_rigid.then(|| plot("TCP rotation error [mrad]", &["tcp_error_rotation"])),
-        Some(plot("Joint velocities", &["joints", "velocity"])),
-        Some(plot("Solver", &["solver"])),
+        (!header.contributors.is_empty()).then(|| cause("Shares of the error [mm]", &["contributions"])),
+        (!header.elements.is_empty()).then(|| cause("Deflections [mm, mrad]", &["elastic"])),
+        (!header.elements.is_empty()).then(|| cause("Loads [N, N m]", &["elastic_load"])),
+        Some(cause("Joint positions", &["joints", "position"])),
+        Some(cause("Joint efforts", &["joints", "effort"])),
+        Some(cause("Energy [J]", &["energy"])),
+        Some(cause("Joint velocities", &["joints", "velocity"])),
+        Some(cause("Solver", &["solver"])),
     ];
     // A recording of modes has neither a path nor events.
     let moves = !header.contributors.is_empty() || header.magnification > 0.0 || header.elements.is_empty();
-    let mut right = Vec::new();
-    match seat {
-        Seat::InStudy(..) => {
-            right.push((3.0, plot("TCP error of all runs [mm]", &["study", "error"])));
-            right.push((3.0, plot("TCP error across the path [mm]", &["study", "lateral"])));
-        }
-        Seat::Alone if header.has_rigid => {
-            right.push((3.0, plot("TCP error [mm], world axes", &["tcp_error"])));
-            if moves {
-                right.push((3.0, plot("TCP error [mm], along and across the path", &["tcp_error_path"])));
-            }
-        }
-        Seat::Alone => {}
-    }
-    right.push((3.0, Part::Tabs(causes.into_iter().flatten().collect())));
+    // Two plots below each other, no more: the viewer labels an axis at powers of ten where there is little room.
+    let errors = match seat {
+        Seat::InStudy(..) => vec![
+            plot("TCP error of all runs [mm]", &["study", "error"]),
+            plot("Across the path [mm]", &["study", "lateral"]),
+        ],
+        Seat::Alone if header.has_rigid => [
+            Some(plot("TCP error [mm], world axes", &["tcp_error"])),
+            moves.then(|| plot("Along and across the path [mm]", &["tcp_error_path"])),
+            Some(plot("Rotation [mrad]", &["tcp_error_rotation"])),
+        ]
+        .into_iter()
+        .flatten()
+        .collect(),
+        Seat::Alone => Vec::new(),
+    };
+    let tabs = [errors, causes.into_iter().flatten().collect()];
+    let right = tabs.into_iter().filter(|tabs| !tabs.is_empty()).map(|tabs| (1.0, Part::Tabs(tabs))).collect();
     let summary = Part::text("Summary", path(["summary"]));
     let text = match moves {
-        true => Part::Row(vec![(3.0, summary), (2.0, Part::log("Events", path(["events"])))]),
+        true => Part::Row(vec![(1.0, summary), (1.0, Part::log(&own("Events"), path(["events"])))]),
         false => summary,
     };
-    let left = Part::Column(vec![(7.0, robots(header, seat, labels)), (2.6, text)]);
+    let left = Part::Column(vec![(5.8, robots(header, seat, labels)), (3.6, text)]);
     Part::Row(vec![(3.0, left), (2.0, Part::Column(right))])
 }
 
@@ -74,17 +82,10 @@ fn robots(header: &RunHeader, seat: &Seat, labels: &[String]) -> Part {
     };
     let life_size =
         |title: &str| Part::scene(title, root.clone(), without(&["magnified", "path/magnified", "path/peak"]));
-    let scale = 1e3 * header.color_scale_m;
     if !(header.has_rigid && factor > 0.0) {
-        return life_size(&match header.has_rigid && scale > 0.0 {
-            true => format!("Robot (colour: off the rigid robot, grey 0 to red {scale} mm)"),
-            false => "Robot".to_owned(),
-        });
+        return life_size("Robot");
     }
-    let title = match header.meshes.is_empty() {
-        true => format!("Deflections x {factor}"),
-        false => format!("Deflections x {factor} (colour: off the rigid robot, grey 0 to red {scale} mm)"),
-    };
+    let title = format!("Deflections x {factor}");
     let magnified = Part::scene(&title, root.clone(), without(&["flexible", "path/flexible"]));
     Part::Tabs(vec![magnified, life_size("True scale")])
 }

@@ -65,6 +65,7 @@ pub(crate) fn header() -> RunHeader {
         has_static: true,
         log_rate_hz: RATE_HZ,
         step_s: STEP_S,
+        start_ns: None,
         bends: vec![BendInfo {
             link: 2,
             X_LS: vec![Pose::identity(), Pose::from(Translation3::new(UPPER_ARM, 0.0, 0.0))],

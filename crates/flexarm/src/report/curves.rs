@@ -75,6 +75,8 @@ pub(super) enum Kind {
     Total,
     /// What others are compared with.
     Dashed,
+    /// Along the axis x (0), y (1) or z (2) of the world: in its colour.
+    Axis(usize),
 }
 
 impl Table {
@@ -172,7 +174,7 @@ fn error(trace: &Trace) -> Plot {
         ["x", "y", "z"]
             .iter()
             .enumerate()
-            .map(|(k, name)| curve(trace, *name, Kind::Plain, move |row| 1e3 * row.error_world[k])),
+            .map(|(k, name)| curve(trace, *name, Kind::Axis(k), move |row| 1e3 * row.error_world[k])),
     );
     let mut views = one_view(Table::new(times(trace), curves, MOST_POINTS));
     let mut note = "Flexible minus rigid tool centre point, world axes.".to_owned();
@@ -209,7 +211,7 @@ fn rotation(trace: &Trace) -> Plot {
         ["x", "y", "z"]
             .iter()
             .enumerate()
-            .map(|(k, name)| curve(trace, *name, Kind::Plain, move |row| 1e3 * row.error_world[3 + k])),
+            .map(|(k, name)| curve(trace, *name, Kind::Axis(k), move |row| 1e3 * row.error_world[3 + k])),
     );
     Plot {
         y_label: "rotation error",
@@ -274,7 +276,7 @@ fn amplitudes(rows: &[TraceRow]) -> Option<(Vec<f64>, Vec<Curve>)> {
         vec![Curve { name: "all axes".into(), kind: Kind::Total, y: total.into_iter().map(seen).collect() }];
     curves.extend(["x", "y", "z"].iter().enumerate().map(|(k, name)| Curve {
         name: (*name).into(),
-        kind: Kind::Plain,
+        kind: Kind::Axis(k),
         y: spectrum.amplitude.iter().map(|a| seen(a[k])).collect(),
     }));
     Some((spectrum.hz, curves))
@@ -366,7 +368,7 @@ fn elements(summary: &Summary, trace: &Trace) -> Vec<Plot> {
             let axes = ["x", "y", "z"]
                 .iter()
                 .enumerate()
-                .map(|(c, axis)| curve(trace, *axis, Kind::Plain, |row| value(row, k, &|v| v[c])));
+                .map(|(c, axis)| curve(trace, *axis, Kind::Axis(c), |row| value(row, k, &|v| v[c])));
             let table = Table::new(times(trace), axes.collect(), MOST_DETAIL);
             views.push(PlotView { name: name.clone(), tables: vec![table], ..PlotView::default() });
         }

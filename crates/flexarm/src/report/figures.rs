@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use flexarm_log::{CurveLook, EventKind, Panel, PlotCurve, Trace, paper_plot};
 
 use super::curves::{Kind, Plot, PlotView, plots};
-use super::picture::pictures;
+use super::picture::printed;
 use crate::error::Error;
 use crate::result_files::{file_stem, write_all};
 use crate::summary::Summary;
@@ -31,10 +31,8 @@ pub(super) fn write(folder: &Path, summary: &Summary, trace: &Trace) -> Result<(
             }
         }
     }
-    for picture in pictures(trace, PICTURE_WIDTH) {
-        if let Ok(png) = picture.png {
-            files.push((folder.join(format!("{}.png", picture.name)), png));
-        }
+    for (name, png) in printed(trace, PICTURE_WIDTH) {
+        files.push((folder.join(format!("{name}.png")), png));
     }
     write_all(&files)
 }
@@ -64,6 +62,7 @@ fn svg(plot: &Plot, view: &PlotView, bands: &[(f64, f64)]) -> Result<String, fle
                 Kind::Plain => CurveLook::Plain,
                 Kind::Total => CurveLook::Total,
                 Kind::Dashed => CurveLook::Dashed,
+                Kind::Axis(k) => CurveLook::Axis(k),
             },
             x: table.x.clone(),
             y: curve.y.clone(),

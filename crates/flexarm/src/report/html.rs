@@ -6,12 +6,13 @@
 use std::fmt::Write as _;
 
 use base64::Engine as _;
+use flexarm_log::palette::{self, Ground, hex};
 use flexarm_log::{EventKind, RunHeader, Trace};
 
 use super::again::settling_band_m;
 use super::curves::{Kind, Plot, overlays, plots};
-use super::picture::pictures;
-use crate::summary::{Summary, TcpFigures};
+use super::picture::{pictures, scale_colors};
+use crate::summary::{EnergyFigures, Summary, TcpFigures};
 
 const STYLE: &str = include_str!("../../assets/report.css");
 const BEHAVIOUR: &str = include_str!("../../assets/report.js");
@@ -55,9 +56,10 @@ pub fn html(runs: &[ReportRun<'_>]) -> String {
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
          <meta name=\"generator\" content=\"flexarm {}\">\n<title>{}</title>\n\
-         <style>\n{UPLOT_STYLE}\n{STYLE}</style>\n</head>\n<body>\n",
+         <style>\n{UPLOT_STYLE}\n{}{STYLE}</style>\n</head>\n<body>\n",
         env!("CARGO_PKG_VERSION"),
-        escaped(&title)
+        escaped(&title),
+        colors()
     );
     let body = body(main, runs);
     page += &heading(&title, runs, &body);
@@ -71,6 +73,23 @@ pub fn html(runs: &[ReportRun<'_>]) -> String {
         uplot.trim_start()
     );
     page
+}
+
+/// The colours of curves as variables of the style: `--c0` and so on, `--x`, `--y`, `--z`, `--rigid`, dark where the reader
+/// wants it dark; and under `--paper-...` for print.
+fn colors() -> String {
+    let list = |prefix: &str, ground: Ground| {
+        let series = (0..palette::SERIES_LENGTH).map(|k| (format!("c{k}"), palette::series(k, ground)));
+        let axes = ["x", "y", "z"].into_iter().enumerate().map(|(k, name)| (name.to_owned(), palette::axis(k, ground)));
+        let all = series.chain(axes).chain([("rigid".to_owned(), palette::rigid(ground))]);
+        all.map(|(name, color)| format!(" --{prefix}{name}: {};", hex(color))).collect::<String>()
+    };
+    format!(
+        ":root {{{}{} }}\n@media screen and (prefers-color-scheme: dark) {{ :root {{{} }} }}\n",
+        list("", Ground::Paper),
+        list("paper-", Ground::Paper),
+        list("", Ground::Dark)
+    )
 }
 
 fn body(main: &ReportRun<'_>, runs: &[ReportRun<'_>]) -> String {
@@ -259,10 +278,16 @@ fn tiles(run: &ReportRun<'_>) -> String {
         }
         if !s.computed {
             let open = format!("balance open by {:.1e}", s.energy.imbalance);
-            tile("Energy by the drives", fixed(s.energy.drives_j), "J", open);
+            let gross = format!("{} by the drives, {open}", gross(&s.energy));
+            tile("Net work of the drives", fixed(s.energy.drives_j), "J", gross);
         }
     }
     out + "</section>\n"
+}
+
+/// What the drives put in and took out.
+fn gross(e: &EnergyFigures) -> String {
+    format!("+{} −{} J", number(e.drives_positive_j, 4), number(e.drives_negative_j, 4))
 }
 
 /// A figure of the comparison: name, unit, and its value of a run.
@@ -276,7 +301,7 @@ fn moving(s: &Summary) -> Option<&TcpFigures> {
 /// Units of figures of which a change in per cent says something; a time or an energy has no natural zero.
 const RELATIVE: [&str; 3] = ["mm", "mrad", "Hz"];
 
-const COMPARED: [Compared; 17] = [
+const COMPARED: [Compared; 18] = [
     ("peak TCP error", "mm", |s| s.tcp.as_ref().map(|t| 1e3 * t.peak_m)),
     ("static part of the peak", "mm", |s| Some(1e3 * s.tcp.as_ref()?.static_at_peak_m?)),
     ("part of the peak in motion", "mm", |s| Some(1e3 * s.tcp.as_ref()?.dynamic_at_peak_m?)),
@@ -293,7 +318,8 @@ const COMPARED: [Compared; 17] = [
     ("peak rotation", "mrad", |s| s.tcp.as_ref().map(|t| 1e3 * t.peak_rad)),
     ("dominant frequency", "Hz", |s| moving(s).and_then(|t| t.dominant_hz)),
     ("first natural frequency", "Hz", |s| s.frequencies_hz.first().copied()),
-    ("energy by the drives", "J", |s| (!s.computed).then_some(s.energy.drives_j)),
+    ("work of the drives, net", "J", |s| (!s.computed).then_some(s.energy.drives_j)),
+    ("work put in by the drives", "J", |s| (!s.computed).then_some(s.energy.drives_positive_j)),
 ];
 
 /// The figure that is a word where there is no number.
@@ -316,7 +342,10 @@ fn comparison(runs: &[ReportRun<'_>]) -> String {
                    <th>figure</th><th>unit</th>"
             .to_owned();
     for (k, run) in runs.iter().enumerate() {
-        let _ = write!(out, "<th class=\"number\"><i class=\"key c{}\"></i>{}</th>", k % 8, escaped(run.label));
+        let color = k % palette::SERIES_LENGTH;
+        let label = escaped(run.label);
+        let _ =
+            write!(out, "<th class=\"number\"><i class=\"key\" style=\"background:var(--c{color})\"></i>{label}</th>");
     }
     out += "</tr></thead><tbody>";
     let row = |name: &str, unit: &str, cells: Vec<String>| {
@@ -380,25 +409,17 @@ fn arm_pictures(runs: &[ReportRun<'_>]) -> String {
         } else {
             String::new()
         };
-        let factor = if header.magnification > 0.0 { header.magnification } else { 1.0 };
         for picture in pictures(run.trace, PICTURE_WIDTH) {
-            let caption = format!(
-                "{who}{}, at {:.3} s. {}oloured by the true deviation from the rigid arm (grey).{beyond}",
-                picture.title,
-                run.trace.peak.time_s,
-                if factor == 1.0 {
-                    "C".into()
-                } else {
-                    format!("Deflections magnified {} times, c", number(factor, 3))
-                },
-            );
-            match picture.png {
-                Ok(png) => {
+            let caption = format!("{who}{}, at {:.3} s.{beyond}", picture.title, run.trace.peak.time_s);
+            match picture.drawn {
+                Ok((png, axes)) => {
                     let data = base64::engine::general_purpose::STANDARD.encode(png);
                     let caption = escaped(&caption);
                     let _ = writeln!(
                         out,
-                        "<figure><img alt=\"{caption}\" src=\"data:image/png;base64,{data}\"><figcaption>{caption}</figcaption></figure>"
+                        "<figure><div class=\"arm\"><img alt=\"{caption}\" src=\"data:image/png;base64,{data}\">{}</div>\
+                         <figcaption>{caption}</figcaption></figure>",
+                        triad(&axes)
                     );
                 }
                 Err(why) => {
@@ -407,8 +428,54 @@ fn arm_pictures(runs: &[ReportRun<'_>]) -> String {
             }
         }
         out += "</div>\n";
+        out += &picture_key(header);
     }
     out + "</section>\n"
+}
+
+/// The axes of the world as they lie in a picture; those that point at the viewer are left out.
+fn triad(axes: &[[f64; 2]; 3]) -> String {
+    const LENGTH: f64 = 24.0;
+    let mut out = "<svg class=\"triad\" viewBox=\"-40 -40 80 80\" aria-hidden=\"true\">".to_owned();
+    for (name, [right, up]) in ["x", "y", "z"].into_iter().zip(axes) {
+        if right.hypot(*up) < 0.15 {
+            continue;
+        }
+        let at = |length: f64| (short(length * right, 3), short(-length * up, 3));
+        let ((x, y), (s, t)) = (at(LENGTH), at(LENGTH + 9.0));
+        let _ = write!(
+            out,
+            "<g style=\"stroke:var(--{name});fill:var(--{name})\"><line x1=\"0\" y1=\"0\" x2=\"{x}\" y2=\"{y}\"/>\
+             <text x=\"{s}\" y=\"{t}\">{name}</text></g>"
+        );
+    }
+    out + "</svg>"
+}
+
+/// What the pictures of a run mean: colours, magnification, ghost and arrow.
+fn picture_key(header: &RunHeader) -> String {
+    let factor = if header.magnification > 0.0 { header.magnification } else { 1.0 };
+    let how = match factor {
+        1.0 => "Deflections as they are".to_owned(),
+        _ => format!("Deflections magnified {} times", number(factor, 3)),
+    };
+    let mut out = format!(
+        "<div class=\"key-of-arm\"><p>{how}. <i class=\"ghost\"></i>rigid arm, <i class=\"way\"></i>way of the tool.</p>"
+    );
+    let colors: Vec<String> = scale_colors().into_iter().map(hex).collect();
+    if header.color_scale_m > 0.0 && !colors.is_empty() {
+        let at = |share: f64| number(1e3 * share * header.color_scale_m, 3);
+        let _ = write!(
+            out,
+            "<div class=\"scale\"><p>True deviation from the rigid arm</p>\
+             <div style=\"background:linear-gradient(to right,{})\"></div>\
+             <p><span>0</span><span>{}</span><span>{} mm</span></p></div>",
+            colors.join(","),
+            at(0.5),
+            at(1.0)
+        );
+    }
+    out + "</div>\n"
 }
 
 /// A row of the ISO table: name, meaning, unit, value.
@@ -551,7 +618,9 @@ fn parts_tables(s: &Summary, of: &str) -> String {
         .collect();
     let e = &s.energy;
     let energies = [
-        ("work of the drives", e.drives_j, "J"),
+        ("work put in by the drives", e.drives_positive_j, "J"),
+        ("taken out by the drives", e.drives_negative_j, "J"),
+        ("net work of the drives", e.drives_j, "J"),
         ("work of external loads", e.loads_j, "J"),
         ("came with payloads", e.payload_j, "J"),
         ("dissipated", e.dissipated_j, "J"),
@@ -688,6 +757,7 @@ fn json_plot(plot: &Plot) -> String {
                     Kind::Plain => "",
                     Kind::Total => "total",
                     Kind::Dashed => "dashed",
+                    Kind::Axis(k) => ["x", "y", "z"][k % 3],
                 };
                 let name = json_text(&curve.name);
                 format!("{{\"name\":{name},\"kind\":\"{kind}\",\"y\":[{}]}}", numbers(&curve.y, 5))

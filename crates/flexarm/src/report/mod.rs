@@ -212,7 +212,8 @@ fn part_figures(summary: &Summary) -> Vec<Figure> {
     }
     let e = &summary.energy;
     if e.drives_j != 0.0 || e.loads_j != 0.0 {
-        let mut note = String::new();
+        let (put_in, taken_out) = (e.drives_positive_j, e.drives_negative_j);
+        let mut note = format!("they put in {put_in:.3} J and took out {taken_out:.3} J; ");
         if e.loads_j != 0.0 {
             let _ = write!(note, "by loads {:.3} J, ", e.loads_j);
         }
@@ -221,7 +222,7 @@ fn part_figures(summary: &Summary) -> Vec<Figure> {
         }
         let (dissipated, stored) = (e.dissipated_j, e.stored_j);
         let _ = write!(note, "dissipated {dissipated:.3} J, stored {stored:.3} J; open by {:.1e}", e.imbalance);
-        rows.push(Figure::new("energy by the drives", format!("{:.3}", e.drives_j), "J", note));
+        rows.push(Figure::new("net work of the drives", format!("{:.3}", e.drives_j), "J", note));
     }
     rows
 }

@@ -2,33 +2,61 @@
 
 use flexarm_log::Trace;
 
-/// A picture with what it shows.
+/// A picture for the page, which says beside it what is in it.
 pub(super) struct Picture {
-    /// For file names.
-    pub(super) name: &'static str,
     /// For the caption.
     pub(super) title: &'static str,
-    /// The PNG file, or why there is none.
-    pub(super) png: Result<Vec<u8>, String>,
+    /// PNG file without a ground, and where x, y and z point on it (right and up); or why there is none.
+    pub(super) drawn: Result<(Vec<u8>, [[f64; 2]; 3]), String>,
+}
+
+/// Height of a picture of this width.
+#[cfg(feature = "png")]
+const fn height(width: usize) -> usize {
+    width * 7 / 9
 }
 
 /// Both pictures; `width` in pixels.
 #[cfg(feature = "png")]
 pub(super) fn pictures(trace: &Trace, width: usize) -> Vec<Picture> {
-    use flexarm_log::{ArmSide, arm_png};
-    let draw = |name, title, side| {
-        let png = arm_png(&trace.header, &trace.peak, side, [width, width * 7 / 9]);
-        Picture { name, title, png: png.map_err(|error| error.to_string()) }
+    use flexarm_log::{ArmSide, arm_picture};
+    let draw = |title, side| {
+        let drawn = arm_picture(&trace.header, &trace.peak, side, [width, height(width)]);
+        Picture { title, drawn: drawn.map(|p| (p.png, p.axes)).map_err(|error| error.to_string()) }
     };
-    vec![
-        draw("arm_side", "From the side", ArmSide::Side),
-        draw("arm_oblique", "From the front and above", ArmSide::Oblique),
-    ]
+    vec![draw("From the side", ArmSide::Side), draw("From the front and above", ArmSide::Oblique)]
 }
 
 /// Without the feature `png` there are none, and the reason is said.
 #[cfg(not(feature = "png"))]
 pub(super) fn pictures(_trace: &Trace, _width: usize) -> Vec<Picture> {
-    let png = Err("this build has no pictures: it was made without the feature png".to_owned());
-    vec![Picture { name: "arm", title: "", png }]
+    let drawn = Err("this build has no pictures: it was made without the feature png".to_owned());
+    vec![Picture { title: "", drawn }]
+}
+
+/// Both pictures for paper, with their scales, by the names of their files. Those that cannot be drawn are left out.
+#[cfg(feature = "png")]
+pub(super) fn printed(trace: &Trace, width: usize) -> Vec<(&'static str, Vec<u8>)> {
+    use flexarm_log::{ArmSide, arm_png};
+    let draw = |name, side| Some((name, arm_png(&trace.header, &trace.peak, side, [width, height(width)]).ok()?));
+    let all = [draw("arm_side", ArmSide::Side), draw("arm_oblique", ArmSide::Oblique)];
+    all.into_iter().flatten().collect()
+}
+
+/// Without the feature `png` there are none.
+#[cfg(not(feature = "png"))]
+pub(super) fn printed(_trace: &Trace, _width: usize) -> Vec<(&'static str, Vec<u8>)> {
+    Vec::new()
+}
+
+/// Colours of a deviation from 0 to the end of the scale, as they are on the arm.
+#[cfg(feature = "png")]
+pub(super) fn scale_colors() -> Vec<flexarm_log::palette::Rgb> {
+    (0..=12).map(|k| flexarm_log::arm_color(f64::from(k) / 12.0)).collect()
+}
+
+/// None where nothing is drawn.
+#[cfg(not(feature = "png"))]
+pub(super) fn scale_colors() -> Vec<flexarm_log::palette::Rgb> {
+    Vec::new()
 }

@@ -1,0 +1,179 @@
+//! Layouts for viewers of a recording: files that lie beside it and are opened with it.
+//!
+//! Both show the same: the error of the tool, what causes it, what the drives do; Foxglove the arm as well. Curves have the
+//! colours that they have elsewhere ([`crate::palette`]).
+
+use serde_json::{Value, json};
+
+use super::frames::is_magnified;
+use crate::RunHeader;
+use crate::palette::{self, Ground, Rgb, hex};
+
+/// A plot: its title, and its curves.
+struct Plot {
+    title: &'static str,
+    curves: Vec<Curve>,
+}
+
+/// A number of a message: topic, path in it as Foxglove and as PlotJuggler write it, name, colour.
+struct Curve {
+    topic: String,
+    foxglove: String,
+    plotjuggler: String,
+    name: String,
+    color: Rgb,
+}
+
+const GROUND: Ground = Ground::Dark;
+
+fn plots(header: &RunHeader) -> Vec<Plot> {
+    let mut plots = Vec::new();
+    let array = |topic: &str, k: usize, name: &str, color: Rgb| Curve {
+        topic: topic.to_owned(),
+        foxglove: format!(".data[{k}]"),
+        plotjuggler: format!("/data[{k}]"),
+        name: name.to_owned(),
+        color,
+    };
+    let joint = |topic: &str, k: usize, name: &str, part: &str, color: Rgb| Curve {
+        topic: topic.to_owned(),
+        foxglove: format!(".{part}[{k}]"),
+        plotjuggler: format!("/{name}/{part}"),
+        name: name.to_owned(),
+        color,
+    };
+    if header.has_rigid {
+        let world = ["x", "y", "z"].into_iter().enumerate();
+        let mut curves: Vec<Curve> =
+            world.map(|(k, name)| array("/deviation/tcp", k, name, palette::axis(k, GROUND))).collect();
+        curves.push(array("/deviation/tcp", 3, "size", palette::total(GROUND)));
+        plots.push(Plot { title: "TCP error, world axes [m]", curves });
+        let along = ["tangential", "normal", "binormal"].into_iter().enumerate();
+        let curves = along.map(|(k, name)| array("/deviation/tcp_path", k, name, palette::series(k, GROUND)));
+        plots.push(Plot { title: "TCP error along and across the path [m]", curves: curves.collect() });
+    }
+    if !header.elements.is_empty() {
+        let parts = ["x", "y", "z", "rx", "ry", "rz"];
+        let names = header.elements.iter().flat_map(|name| parts.map(|part| format!("{name}/{part}")));
+        let color = |k| palette::series(k, GROUND);
+        let curves = names.enumerate().map(|(k, name)| joint("/elastic/joint_states", k, &name, "position", color(k)));
+        plots.push(Plot { title: "Deflections [m, rad]", curves: curves.collect() });
+    }
+    for (title, part) in [("Joint efforts [N m, N]", "effort"), ("Joint positions [rad, m]", "position")] {
+        let color = |k| palette::series(k, GROUND);
+        let joints = header.joints.iter().enumerate();
+        let curves = joints.map(|(k, name)| joint("/joint_states", k, name, part, color(k))).collect();
+        plots.push(Plot { title, curves });
+    }
+    plots.retain(|plot| !plot.curves.is_empty());
+    plots
+}
+
+/// A layout for [Foxglove](https://foxglove.dev): the arm with its ghost on the left, plots on the right, events below.
+#[must_use]
+pub fn foxglove_layout(header: &RunHeader) -> String {
+    let plots = plots(header);
+    let mut panels = serde_json::Map::new();
+    panels.insert("3D!arm".into(), scene(header));
+    panels.insert("RosOut!events".into(), json!({ "searchTerms": [], "minLogLevel": 1, "topicToRender": "/events" }));
+    for (k, plot) in plots.iter().enumerate() {
+        let paths = plot.curves.iter().map(|curve| {
+            json!({
+                "value": format!("{}{}", curve.topic, curve.foxglove), "label": curve.name, "color": hex(curve.color),
+                "enabled": true, "timestampMethod": "receiveTime",
+            })
+        });
+        let plot = json!({
+            "title": plot.title, "paths": paths.collect::<Vec<_>>(), "xAxisVal": "timestamp", "isSynced": true,
+            "showXAxisLabels": true, "showYAxisLabels": true, "showLegend": true, "legendDisplay": "floating",
+            "showPlotValuesInLegend": false, "sidebarDimension": 240,
+        });
+        panels.insert(format!("Plot!plot{k}"), plot);
+    }
+    // Plots below each other, each as high as the others.
+    let names = (0..plots.len()).map(|k| json!(format!("Plot!plot{k}")));
+    let column = names.rev().fold((Value::Null, 0), |(below, count): (Value, usize), name| match count {
+        0 => (name, 1),
+        _ => {
+            let share = 100.0 / (count as f64 + 1.0);
+            (json!({ "direction": "column", "first": name, "second": below, "splitPercentage": share }), count + 1)
+        }
+    });
+    let left = json!({ "direction": "column", "first": "3D!arm", "second": "RosOut!events", "splitPercentage": 78 });
+    let layout = match column {
+        (_, 0) => left,
+        (column, _) => json!({ "direction": "row", "first": left, "second": column, "splitPercentage": 58 }),
+    };
+    let all = json!({
+        "configById": panels, "globalVariables": {}, "userNodes": {}, "playbackConfig": { "speed": 1 },
+        "layout": layout,
+    });
+    serde_json::to_string_pretty(&all).expect("names and numbers are JSON") + "\n"
+}
+
+/// The 3D panel: the magnified arm and its ghost, or the arm as it is.
+fn scene(header: &RunHeader) -> Value {
+    let magnified = is_magnified(header);
+    let [low, high] = header.volume.unwrap_or([[-1.5, -1.5, 0.0], [1.5, 1.5, 2.0]]);
+    let middle = [0, 1, 2].map(|c| 0.5 * (low[c] + high[c]));
+    let size = (0..3).map(|c| (high[c] - low[c]).powi(2)).sum::<f64>().sqrt();
+    json!({
+        "followMode": "follow-none", "followTf": "world",
+        "scene": { "meshUpAxis": "z_up", "transforms": { "showLabel": false, "axisScale": 0 } },
+        "cameraState": {
+            "perspective": true, "distance": 1.4 * size, "phi": 68, "thetaOffset": 24, "fovy": 45, "near": 0.01,
+            "far": 5000, "target": middle, "targetOffset": [0, 0, 0], "targetOrientation": [0, 0, 0, 1],
+        },
+        "transforms": {},
+        "topics": {
+            "/markers": { "visible": true, "namespaces": {
+                "flexible": { "visible": !magnified }, "rigid": { "visible": true }, "magnified": { "visible": magnified },
+            } },
+            "/markers/path": { "visible": true }, "/markers/error": { "visible": magnified },
+            "/robot_description": { "visible": false },
+        },
+        "layers": { "grid": {
+            "layerId": "foxglove.Grid", "instanceId": "grid", "label": "Grid", "visible": true, "frameLocked": true,
+            "size": 10, "divisions": 10, "lineWidth": 1, "color": "#63707f", "position": [0, 0, 0], "rotation": [0, 0, 0],
+            "order": 1,
+        } },
+        "publish": {}, "imageMode": {},
+    })
+}
+
+/// A layout for [PlotJuggler](https://plotjuggler.io): the plots, two on a tab.
+#[must_use]
+pub fn plotjuggler_layout(header: &RunHeader) -> String {
+    let plots = plots(header);
+    let mut tabs = String::new();
+    for pair in plots.chunks(2) {
+        let area = |plot: &Plot| {
+            let curves = plot.curves.iter().map(|curve| {
+                let name = escaped(&format!("{}{}", curve.topic, curve.plotjuggler));
+                format!("       <curve name=\"{name}\" color=\"{}\"/>\n", hex(curve.color))
+            });
+            format!(
+                "     <DockArea name=\"{}\">\n      <plot mode=\"TimeSeries\" style=\"Lines\" flip_x=\"false\" flip_y=\"false\">\n\
+                 {}      </plot>\n     </DockArea>\n",
+                escaped(plot.title),
+                curves.collect::<String>()
+            )
+        };
+        let (areas, count): (String, usize) = (pair.iter().map(area).collect(), pair.len());
+        let sizes = vec![format!("{}", 1.0 / count as f64); count].join(";");
+        tabs += &format!(
+            "  <Tab tab_name=\"{}\" containers=\"1\">\n   <Container>\n    <DockSplitter orientation=\"-\" sizes=\"{sizes}\" \
+             count=\"{count}\">\n{areas}    </DockSplitter>\n   </Container>\n  </Tab>\n",
+            escaped(pair[0].title)
+        );
+    }
+    format!(
+        "<?xml version='1.0' encoding='UTF-8'?>\n<root>\n <tabbed_widget name=\"Main Window\" parent=\"main_window\">\n{tabs}  \
+         <currentTabIndex index=\"0\"/>\n </tabbed_widget>\n <use_relative_time_offset enabled=\"1\"/>\n \
+         <Plugins/>\n <customMathEquations/>\n <snippets/>\n</root>\n"
+    )
+}
+
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}

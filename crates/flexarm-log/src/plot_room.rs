@@ -1,0 +1,236 @@
+//! Room in a plot: an axis with labels, and a corner in which the names of the curves hide nothing.
+//!
+//! The Rerun viewer labels an axis at powers of ten and their multiples only, and lays the legend over the curves; what it
+//! shows can be told it once the curves are known. Start at [`arrange`].
+
+/// Most pieces that an [`Envelope`] keeps.
+const PIECES: usize = 256;
+/// Columns in which the room is looked for.
+const COLUMNS: usize = 64;
+/// Part of the height that stays empty above and below the curves.
+const MARGIN: f64 = 0.05;
+/// Size of a plot in a window of 1600 by 1000 (pixels), as measured on a picture of the viewer, version 0.36.
+const PLOT: [f64; 2] = [610.0, 425.0];
+/// Height of a row of the legend, of its frame, and width of a letter and of what is beside the letters (pixels), likewise.
+const LEGEND: [f64; 4] = [23.0, 10.0, 6.4, 36.0];
+/// Labels are at least so far apart (pixels), likewise.
+const APART: f64 = 20.0;
+/// Part of its length by which an axis grows for a third label.
+const FOR_A_LABEL: f64 = 0.2;
+/// Most by which an axis grows for the legend, as a part of what the curves need.
+const MOST_ROOM: f64 = 0.8;
+
+/// Lowest and highest values of curves over the run, in equal pieces of it.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Envelope {
+    pieces: Vec<[f64; 2]>,
+    /// Rows of a piece; of the last one, how many it has.
+    rows: u64,
+    in_last: u64,
+}
+
+impl Envelope {
+    /// Adds the values of one instant; what is not finite is not seen.
+    pub(crate) fn push(&mut self, values: impl IntoIterator<Item = f64>) {
+        let none = [f64::INFINITY, f64::NEG_INFINITY];
+        let grown = |[low, high]: [f64; 2], x: f64| [low.min(x), high.max(x)];
+        let row = values.into_iter().filter(|x| x.is_finite()).fold(none, grown);
+        self.rows = self.rows.max(1);
+        match self.pieces.last_mut() {
+            Some(last) if self.in_last < self.rows => *last = [last[0].min(row[0]), last[1].max(row[1])],
+            _ => {
+                if self.pieces.len() == PIECES {
+                    let pairs = self.pieces.chunks(2).map(|pair| {
+                        pair.iter().fold(none, |[low, high], piece| [low.min(piece[0]), high.max(piece[1])])
+                    });
+                    self.pieces = pairs.collect();
+                    self.rows *= 2;
+                }
+                self.pieces.push(row);
+                self.in_last = 0;
+            }
+        }
+        self.in_last += 1;
+    }
+
+    /// Lowest and highest value in a column of [`COLUMNS`].
+    fn column(&self, column: usize) -> [f64; 2] {
+        let count = self.pieces.len();
+        let (from, to) = (column * count / COLUMNS, ((column + 1) * count).div_ceil(COLUMNS));
+        let pieces = self.pieces.get(from..to).unwrap_or_default();
+        let none = [f64::INFINITY, f64::NEG_INFINITY];
+        pieces.iter().fold(none, |[low, high], piece| [low.min(piece[0]), high.max(piece[1])])
+    }
+}
+
+/// A corner of a plot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Corner {
+    pub(crate) left: bool,
+    pub(crate) top: bool,
+}
+
+/// Where the names of the curves are, and what the axis shows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Arrangement {
+    pub(crate) corner: Corner,
+    pub(crate) range: [f64; 2],
+}
+
+/// Room for the curves and for their names, the length of each being its number of letters; `None` without a finite value.
+pub(crate) fn arrange(curves: &[&Envelope], names: &[usize]) -> Option<Arrangement> {
+    let columns: Vec<[f64; 2]> = (0..COLUMNS)
+        .map(|k| curves.iter().map(|curve| curve.column(k)).fold([f64::INFINITY, f64::NEG_INFINITY], wider))
+        .collect();
+    let [low, high] = columns.iter().copied().fold([f64::INFINITY, f64::NEG_INFINITY], wider);
+    if low > high {
+        return None;
+    }
+    // A curve that stays where it is still gets an axis.
+    let room = match MARGIN * (high - low) {
+        room if room > 0.0 => room,
+        _ => 0.5 * high.abs().max(1e-6),
+    };
+    let base = labelled([low - room, high + room]);
+    let [row, frame, letter, beside] = LEGEND;
+    let width = (names.iter().max().copied().unwrap_or(0) as f64 * letter + beside) / PLOT[0];
+    let height = (names.len() as f64 * row + frame) / PLOT[1];
+    // One more: pieces need not end where columns do.
+    let across = ((width * COLUMNS as f64).ceil() as usize + 1).clamp(1, COLUMNS);
+    let free = |corner: Corner, [low, high]: [f64; 2]| {
+        let under = if corner.left { &columns[..across] } else { &columns[COLUMNS - across..] };
+        let [below, above] = under.iter().copied().fold([f64::INFINITY, f64::NEG_INFINITY], wider);
+        match (corner.top, height < 1.0 && below <= above) {
+            (_, false) => [low, high],
+            (true, true) => [low, high.max((above - height * low) / (1.0 - height))],
+            (false, true) => [low.min((below - height * high) / (1.0 - height)), high],
+        }
+    };
+    // Room for the legend asks for other labels, and these for other room.
+    let grown = |corner: Corner| (0..6).fold(base, |range, _| labelled(free(corner, range)));
+    let corners = [(true, true), (false, true), (true, false), (false, false)];
+    let found = corners.map(|(left, top)| Corner { left, top }).map(|corner| (corner, grown(corner)));
+    let length = |[low, high]: [f64; 2]| high - low;
+    let least = found.into_iter().min_by(|(_, a), (_, b)| length(*a).total_cmp(&length(*b)));
+    let (corner, range) = least.unwrap_or(found[0]);
+    let fits = length(range) <= (1.0 + MOST_ROOM) * length(base);
+    Some(Arrangement { corner, range: if fits { range } else { base } })
+}
+
+fn wider(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [a[0].min(b[0]), a[1].max(b[1])]
+}
+
+/// The range, a little wider if need be, with three labels in a large window if these cost little, and with two in a plot
+/// that is 200 pixels high: the viewer labels multiples of a power of ten that it has room for, and then often only 0.
+fn labelled(range: [f64; 2]) -> [f64; 2] {
+    let length = |[low, high]: [f64; 2]| high - low;
+    let shown = 10f64.powf((APART * length(range) / PLOT[1]).log10().ceil());
+    let three = with_multiples(range, shown, 3);
+    let range = if length(three) <= (1.0 + FOR_A_LABEL) * length(range) { three } else { range };
+    with_multiples(range, 10f64.powf(length(range).log10().floor()), 2)
+}
+
+/// The range, grown on the side where it costs less until it has so many multiples of a unit.
+fn with_multiples([mut low, mut high]: [f64; 2], unit: f64, count: i32) -> [f64; 2] {
+    if !unit.is_normal() {
+        return [low, high];
+    }
+    let (mut first, mut last) = ((low / unit).ceil(), (high / unit).floor());
+    while last - first + 1.0 < f64::from(count) {
+        if low - (first - 1.0) * unit < (last + 1.0) * unit - high {
+            first -= 1.0;
+            low = first * unit;
+        } else {
+            last += 1.0;
+            high = last * unit;
+        }
+    }
+    [low, high]
+}
+
+/// Multiples of powers of ten in a range that a viewer labels which wants them so many pixels apart.
+#[cfg(test)]
+pub(crate) fn labels([low, high]: [f64; 2], height: f64, apart: f64) -> usize {
+    let least = apart * (high - low) / height;
+    let unit = 10f64.powf(least.log10().ceil());
+    ((high / unit).floor() - (low / unit).ceil() + 1.0).max(0.0) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn envelope(values: impl Iterator<Item = f64>) -> Envelope {
+        let mut envelope = Envelope::default();
+        values.for_each(|x| envelope.push([x]));
+        envelope
+    }
+
+    /// Parts of the plot that the legend covers: from left to right and from bottom to top.
+    fn covered(a: &Arrangement, names: &[usize]) -> [[f64; 2]; 2] {
+        let width = (*names.iter().max().unwrap() as f64 * LEGEND[2] + LEGEND[3]) / PLOT[0];
+        let height = (names.len() as f64 * LEGEND[0] + LEGEND[1]) / PLOT[1];
+        let side = |first: bool, size: f64| if first { [0.0, size] } else { [1.0 - size, 1.0] };
+        [side(a.corner.left, width), side(!a.corner.top, height)]
+    }
+
+    proptest! {
+        /// Truth: the curve's own points. Amplitudes are those at which an axis that takes what comes has the label 0 alone.
+        #[test]
+        fn no_curve_is_under_its_legend_and_the_axis_has_labels(
+            (scale, shift) in (-6.0..4.0, -1.5..1.5),
+            (waves, spike) in (0.3..9.0, 0.0..1.0),
+            names in prop::collection::vec(4_usize..20, 1..6),
+        ) {
+            let size = 10f64.powf(scale);
+            let n = 3000;
+            let value = |k: usize| {
+                let x = k as f64 / n as f64;
+                size * (shift + (waves * std::f64::consts::TAU * x).sin() + 3.0 * f64::from(u8::from((x - spike).abs() < 1e-3)))
+            };
+            let a = arrange(&[&envelope((0..n).map(value))], &names).unwrap();
+            let [across, up] = covered(&a, &names);
+            let [low, high] = a.range;
+            for k in 0..n {
+                let (x, y) = ((k as f64 + 0.5) / n as f64, (value(k) - low) / (high - low));
+                prop_assert!((0.0..=1.0).contains(&y));
+                let hidden = x > across[0] && x < across[1] && y > up[0] && y < up[1];
+                prop_assert!(!hidden, "{x} {y} {a:?}");
+            }
+            // In a window of 1600 by 1000, with labels at least 20 pixels apart; and on any screen at all.
+            prop_assert!(labels(a.range, PLOT[1], APART) >= 2, "{a:?}");
+            prop_assert!(labels(a.range, 200.0, APART) >= 2, "in a small window: {a:?}");
+        }
+    }
+
+    #[test]
+    fn an_error_of_some_millimetres_has_more_labels_than_zero() {
+        // Truth: the fault as it was seen, plus and minus 6 mm in a plot 160 pixels high.
+        assert_eq!(labels([-6.0, 6.0], 160.0, 20.0), 1);
+        let wave = envelope((0..500).map(|k| 6.0 * (f64::from(k) * 0.05).sin()));
+        let a = arrange(&[&wave], &[6, 6, 6, 9]).unwrap();
+        assert!(labels(a.range, PLOT[1], APART) >= 3, "{a:?}");
+        // As seen in the viewer: -8.9 to 13.1 had the labels 0 and 10.
+        assert_eq!(labels([-8.9, 13.1], PLOT[1], APART), 2);
+        assert_eq!(labelled([-8.9, 13.1]), [-10.0, 13.1]);
+        assert_eq!(labelled([-0.9, 0.8]), [-1.0, 0.8]);
+        assert_eq!(labelled([-1.5, 1.5]), [-1.5, 1.5]);
+    }
+
+    #[test]
+    fn long_runs_keep_their_extremes() {
+        let mut many = Envelope::default();
+        for k in 0..100_000_u32 {
+            many.push([if k == 77_777 { 9.0 } else { 0.0 }, -1.0, f64::NAN]);
+        }
+        assert!(many.pieces.len() <= PIECES);
+        let columns: Vec<_> = (0..COLUMNS).map(|k| many.column(k)).collect();
+        assert_eq!(columns.iter().filter(|[_, high]| *high == 9.0).count(), 1);
+        assert!(columns.iter().all(|[low, _]| *low == -1.0));
+        assert!(arrange(&[&Envelope::default()], &[3]).is_none());
+        assert_eq!(arrange(&[&envelope([2.0; 9].into_iter())], &[3]).unwrap().range, [1.0, 3.0]);
+    }
+}
