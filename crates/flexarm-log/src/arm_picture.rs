@@ -340,7 +340,10 @@ impl Ellipsoid {
                 let right = usize::from(ends[1][0] > ends[0][0]);
                 let [x, y] = ends[right];
                 let style = Style::new(14.0 * unit, ELLIPSOID_COLOR).bold().halo(color::PAPER);
-                image.text(&format!("{} µm/N", short(1e6 * value)), [x + 5.0 * unit, y], Align::Left, style);
+                let text = format!("{} µm/N", short(1e6 * value));
+                // Within the picture, whatever is at its border.
+                let most = image.width as f64 - text_width(&text, style) - 6.0 * unit;
+                image.text(&text, [(x + 5.0 * unit).min(most), y - 6.0 * unit], Align::Left, style);
             }
         }
     }
