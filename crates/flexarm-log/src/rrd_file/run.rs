@@ -404,7 +404,8 @@ fn color_bar(root: &EntityPath, scale: ColorScale, eye: &Eye, ids: &mut Ids) -> 
     let bar = LineStrips3D::new((0..steps).map(piece))
         .with_colors((0..steps).map(color))
         .with_radii([rerun::Radius::new_ui_points(5.0)]);
-    let mm = |share: f64| 1e3 * scale.full_m * share;
+    // Tenths of micrometres are enough, and rounding is not shown.
+    let mm = |share: f64| (1e7 * scale.full_m * share).round() / 1e4;
     let labels = [format!("{}", mm(0.0)), format!("{} mm", mm(0.5)), format!("{} mm off the rigid arm", mm(1.0))];
     let numbers = Points3D::new([0.0, 0.5, 1.0].map(at))
         .with_radii([rerun::Radius::new_ui_points(1.0)])
