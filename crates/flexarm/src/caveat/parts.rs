@@ -25,7 +25,7 @@ const WEIGHTLESS: f64 = 30.0;
 /// Payloads above this are no points (kg).
 const POINT_MASS: f64 = 10.0;
 /// Joints faster than this (rad/s), with tips faster than that (m/s), are in degrees per second.
-const FAST: (f64, f64) = (30.0, 100.0);
+const FAST: (f64, f64) = (30.0, 120.0);
 /// Effort limits are this many times the largest torque of weight at most.
 const STRONG: f64 = 300.0;
 /// Effort limits accelerate the tip by at most so much (m/s²).
