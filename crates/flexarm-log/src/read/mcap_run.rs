@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use flexarm_kinematics::Pose;
 use mcap::McapError;
-use mcap::records::Record;
+use mcap::records::{Record, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 
@@ -204,6 +204,11 @@ fn walk(path: &Path, take: &mut dyn FnMut(Record<'_>) -> Result<Flow, LogError>)
                 reader.notify_read(read);
             }
             Ok(LinearReadEvent::Record { opcode, data }) => {
+                match texts_fit(opcode, data) {
+                    Some(true) => {}
+                    Some(false) => return Ok(Some("damaged: a text is longer than its record".into())),
+                    None => continue,
+                }
                 let record = match caught(move || mcap::parse_record(opcode, data)) {
                     Ok(Ok(record)) => record,
                     Ok(Err(error)) => return Ok(Some(in_words(&error))),
@@ -217,6 +222,39 @@ fn walk(path: &Path, take: &mut dyn FnMut(Record<'_>) -> Result<Flow, LogError>)
         }
     }
     Ok(None)
+}
+
+/// Whether the texts of a record are within it: the library takes memory for them before it looks. `None` for records that
+/// say nothing about a run, such as the index.
+fn texts_fit(kind: u8, record: &[u8]) -> Option<bool> {
+    // Bytes before the first text; texts, or what has its length before it likewise; whether pairs of texts follow.
+    let (before, texts, pairs) = match kind {
+        op::HEADER => (0, 2, false),
+        op::FOOTER | op::MESSAGE => return Some(true),
+        op::SCHEMA => (2, 3, false),
+        op::CHANNEL => (4, 2, true),
+        op::ATTACHMENT => (16, 2, false),
+        op::METADATA => (0, 1, true),
+        _ => return None,
+    };
+    fn text<'r>(rest: &mut &'r [u8]) -> Option<&'r [u8]> {
+        let (length, behind) = rest.split_first_chunk()?;
+        let (text, behind) = behind.split_at_checked(usize::try_from(u32::from_le_bytes(*length)).ok()?)?;
+        *rest = behind;
+        Some(text)
+    }
+    let walk = || {
+        let mut rest = record.get(before..)?;
+        for _ in 0..texts {
+            text(&mut rest)?;
+        }
+        let mut list = if pairs { text(&mut rest)? } else { &[] };
+        while !list.is_empty() {
+            text(&mut list)?;
+        }
+        Some(())
+    };
+    Some(walk().is_some())
 }
 
 fn in_words(error: &McapError) -> String {

@@ -18,8 +18,12 @@ mod mcap_run;
 #[cfg(feature = "parquet")]
 mod parquet_table;
 #[cfg(feature = "rerun")]
+mod rrd_messages;
+#[cfg(feature = "rerun")]
 mod rrd_run;
-#[cfg(feature = "mcap")]
+#[cfg(feature = "rerun")]
+mod rrd_track;
+#[cfg(any(feature = "mcap", feature = "parquet", feature = "rerun"))]
 mod wall;
 
 use std::fmt;

@@ -9,6 +9,7 @@ use parquet::data_type::DoubleType;
 use parquet::errors::ParquetError;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 
+use super::wall::caught;
 use super::{not_a_recording, stem};
 use crate::parquet_file::{RESULT_KEY, RUN_FILE, RUN_KEY};
 use crate::table::{self, TableLayout};
@@ -27,7 +28,7 @@ pub(super) struct ParquetRun {
 impl ParquetRun {
     pub(super) fn open(path: &Path) -> Result<Self, LogError> {
         let file = File::open(path).map_err(LogError::io(path, "open the recording"))?;
-        let file = SerializedFileReader::new(file).map_err(|error| broken(path, error))?;
+        let file = read(path, || SerializedFileReader::new(file))?;
         let names: Vec<String> = {
             let schema = file.metadata().file_metadata().schema_descr();
             schema.columns().iter().map(|column| column.path().string()).collect()
@@ -89,18 +90,20 @@ impl ParquetRun {
 
     /// Numbers of the column `index` of the table in a row group; missing ones are NaN.
     fn column(&self, group: usize, index: usize, values: &mut Vec<f64>) -> Result<(), LogError> {
-        let broken = |error| broken(&self.path, error);
         let place = self.layout.places[index];
-        let group = self.file.get_row_group(group).map_err(broken)?;
-        let rows = usize::try_from(group.metadata().num_rows()).unwrap_or(0);
-        let mut reader = get_typed_column_reader::<DoubleType>(group.get_column_reader(place).map_err(broken)?);
         let (mut present, mut levels) = (Vec::new(), Vec::new());
-        while levels.len().max(present.len()) < rows {
-            let (records, ..) = reader.read_records(rows, Some(&mut levels), None, &mut present).map_err(broken)?;
-            if records == 0 {
-                break;
+        let rows = read(&self.path, || {
+            let group = self.file.get_row_group(group)?;
+            let rows = usize::try_from(group.metadata().num_rows()).unwrap_or(0);
+            let mut reader = get_typed_column_reader::<DoubleType>(group.get_column_reader(place)?);
+            while levels.len().max(present.len()) < rows {
+                let (records, ..) = reader.read_records(rows, Some(&mut levels), None, &mut present)?;
+                if records == 0 {
+                    break;
+                }
             }
-        }
+            Ok(rows)
+        })?;
         values.clear();
         match levels.is_empty() {
             true => values.append(&mut present),
@@ -151,6 +154,14 @@ fn media_type(name: &str) -> &'static str {
         Some("json") => "application/json",
         Some("toml") => "application/toml",
         _ => "text/plain",
+    }
+}
+
+/// Calls the library, which may panic on a damaged file.
+fn read<T>(path: &Path, read: impl FnOnce() -> Result<T, ParquetError>) -> Result<T, LogError> {
+    match caught(read) {
+        Ok(result) => result.map_err(|error| broken(path, error)),
+        Err(cause) => Err(not_a_recording(path, format!("a damaged file ({cause})"), "a whole Parquet file")),
     }
 }
 

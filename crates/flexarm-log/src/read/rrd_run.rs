@@ -1,17 +1,17 @@
 //! A Rerun recording of a run. It is made to be looked at: the error is in millimetres and has every sample, other curves and
 //! poses (in single precision) are fewer and interpolated. All of it is read into memory, since a viewer may have written the chunks in any order.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::fs::File;
-use std::io::BufReader;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use flexarm_kinematics::Pose;
 use nalgebra::{Quaternion, Translation3, UnitQuaternion, Vector3};
-use rerun::external::re_log_encoding::DecoderApp;
-use rerun::log::{Chunk, LogMsg};
+use rerun::log::Chunk;
 use rerun::{EntityPath, Scalars, SeriesLines, TextDocument, Timeline, Transform3D};
 
+use super::rrd_messages::{Message, Messages};
+use super::rrd_track::Track;
+use super::wall::caught;
 use super::{broken_end, exact_time, not_a_recording};
 use crate::rrd_file::tracks::SIM_TIME;
 use crate::rrd_file::{RESULT_ENTITY, RUN_ENTITY, link_part, path as entity};
@@ -32,37 +32,39 @@ pub(super) struct RrdRun {
     warnings: Vec<String>,
 }
 
-/// What changes with time, by entity and time (ns).
+/// What changes with time, by entity.
 #[derive(Default)]
 struct Data {
-    scalars: BTreeMap<EntityPath, BTreeMap<i64, Vec<f64>>>,
-    poses: BTreeMap<EntityPath, BTreeMap<i64, Pose>>,
-    /// Instants at which anything moved.
-    pictures: BTreeSet<i64>,
+    scalars: BTreeMap<EntityPath, Track>,
+    poses: BTreeMap<EntityPath, Track>,
+    /// Instants at which anything moved (ns), ascending.
+    pictures: Vec<i64>,
     names: BTreeMap<EntityPath, Vec<String>>,
     texts: BTreeMap<EntityPath, String>,
 }
 
 impl RrdRun {
     pub(super) fn open(path: &Path) -> Result<Self, LogError> {
-        let file = File::open(path).map_err(LogError::io(path, "open the recording"))?;
         let (mut data, mut broken, mut application) = (Data::default(), None, None);
-        for message in DecoderApp::decode_lazy(BufReader::new(file)) {
-            match message {
-                Ok(LogMsg::SetStoreInfo(store)) if store.info.store_id.is_recording() => {
-                    application = Some(store.info.store_id.application_id().to_string());
+        let mut messages = Messages::open(path)?;
+        loop {
+            match messages.next() {
+                Ok(Some(Message::Recording(name))) => application = Some(name),
+                Ok(Some(Message::Rows(chunk))) => {
+                    if let Err(cause) = caught(|| data.take(&chunk)) {
+                        broken = Some(cause);
+                        break;
+                    }
                 }
-                Ok(LogMsg::ArrowMsg(store, message)) if store.is_recording() => match Chunk::from_arrow_msg(&message) {
-                    Ok(chunk) => data.take(&chunk),
-                    Err(error) => broken = Some(format!("damaged: {error}")),
-                },
-                Ok(_) => {}
-                Err(error) => {
-                    broken = Some(format!("damaged: {error}"));
+                Ok(Some(Message::Other)) => {}
+                Ok(None) => break,
+                Err(cause) => {
+                    broken = Some(cause);
                     break;
                 }
             }
         }
+        data.sort();
         let is_ours = application.as_deref() == Some("flexarm");
         if !is_ours || data.scalars.is_empty() && data.text(RUN_ENTITY).is_none() {
             let found = match (application, &broken) {
@@ -155,8 +157,8 @@ impl RrdRun {
         let (header, data) = (&self.header, &self.data);
         let joints = header.joints.len();
         let row = |parts: &[&str], width: usize| -> Vec<f64> {
-            let row = data.scalars.get(&entity(parts)).and_then(|rows| between(rows, time_ns));
-            row.filter(|row| row.len() == width).unwrap_or_else(|| vec![f64::NAN; width])
+            let track = data.scalars.get(&entity(parts)).filter(|track| track.width() == width);
+            track.map_or_else(|| vec![f64::NAN; width], |track| track.between(time_ns))
         };
         let one = |group: &str, key: &str| MILLI * row(&["plots", group, key], 1)[0];
         let six = |parts: [f64; 3], angles: [f64; 3]| [parts[0], parts[1], parts[2], angles[0], angles[1], angles[2]];
@@ -232,7 +234,7 @@ impl Data {
         let scalars = Scalars::descriptor_scalars().component;
         let times = || chunk.iter_component_indices(timeline, scalars).map(|(time, _)| time.as_i64());
         for (time, values) in times().zip(chunk.iter_slices::<f64>(scalars)) {
-            self.scalars.entry(at.clone()).or_default().insert(time, values.to_vec());
+            track(&mut self.scalars, at, values.len()).push(time, values);
         }
         let translation = Transform3D::descriptor_translation().component;
         let translations = chunk.iter_slices::<[f32; 3]>(translation);
@@ -240,12 +242,20 @@ impl Data {
         let times = chunk.iter_component_indices(timeline, translation).map(|(time, _)| time.as_i64());
         for ((time, places), turns) in times.zip(translations).zip(rotations) {
             let (Some(&[x, y, z]), Some(&[qx, qy, qz, qw])) = (places.first(), turns.first()) else { continue };
-            let [x, y, z, qx, qy, qz, qw] = [x, y, z, qx, qy, qz, qw].map(f64::from);
-            let rotation = UnitQuaternion::from_quaternion(Quaternion::new(qw, qx, qy, qz));
-            let X = Pose::from_parts(Translation3::new(x, y, z), rotation.to_rotation_matrix());
-            self.poses.entry(at.clone()).or_default().insert(time, X);
-            self.pictures.insert(time);
+            track(&mut self.poses, at, 7).push(time, &[x, y, z, qx, qy, qz, qw].map(f64::from));
         }
+    }
+
+    /// Brings everything in order of time; to be called once all has been taken.
+    fn sort(&mut self) {
+        self.scalars.values_mut().chain(self.poses.values_mut()).for_each(Track::sort);
+        let mut pictures: Vec<i64> = Vec::new();
+        for track in self.poses.values() {
+            pictures.extend(track.times());
+            pictures.sort_unstable();
+            pictures.dedup();
+        }
+        self.pictures = pictures;
     }
 
     fn text(&self, parts: [&str; 2]) -> Option<&str> {
@@ -260,38 +270,41 @@ impl Data {
         if !finished && self.names.keys().any(|curve| !self.scalars.contains_key(curve)) {
             return Vec::new();
         }
-        let fullest = self.scalars.values().max_by_key(|rows| rows.len());
-        let first = fullest.and_then(|rows| rows.keys().next());
-        let curves = self.scalars.values().filter(|rows| rows.keys().next() == first);
-        let shortest = curves.filter_map(|rows| rows.keys().next_back()).min().copied();
+        let fullest = self.scalars.values().max_by_key(|track| track.times().len());
+        let first = fullest.and_then(|track| track.times().first());
+        let curves = self.scalars.values().filter(|track| track.times().first() == first);
+        let shortest = curves.filter_map(|track| track.times().last()).min().copied();
         let end = shortest.filter(|_| !finished).unwrap_or(i64::MAX);
-        fullest.map(|rows| rows.range(..=end).map(|(time, _)| *time).collect()).unwrap_or_default()
+        let until = |track: &Track| Some(track.times()[..=track.last_until(end)?].to_vec());
+        fullest.and_then(until).unwrap_or_default()
     }
 
     /// The last pose at or before a time, or the first one.
     fn pose(&self, at: &EntityPath, time_ns: i64) -> Option<Pose> {
-        let rows = self.poses.get(at)?;
-        rows.range(..=time_ns).next_back().or_else(|| rows.iter().next()).map(|(_, X)| *X)
+        let track = self.poses.get(at)?;
+        Some(pose(track.row(track.last_until(time_ns).unwrap_or(0))))
     }
 
     /// Whether there is a pose for just this time.
     fn drawn(&self, at: &EntityPath, time_ns: i64) -> bool {
-        self.poses.get(at).is_some_and(|rows| rows.contains_key(&time_ns))
+        self.poses.get(at).is_some_and(|track| track.times().binary_search(&time_ns).is_ok())
     }
 
     /// Pose of a tool, between two pictures on the straight way from one to the other; without any its place is NaN.
     fn tool(&self, at: &EntityPath, time_ns: i64) -> Pose {
-        let Some(rows) = self.poses.get(at) else { return Translation3::from(Vector3::repeat(f64::NAN)).into() };
-        // A row is left out where nothing moves: the way begins at the last picture before the next row.
-        let (before, after) = (rows.range(..=time_ns).next_back(), rows.range(time_ns..).next());
-        let (Some((_, start)), Some((end_ns, end))) = (before, after) else {
-            return before.or(after).map(|(_, X)| *X).unwrap_or_default();
+        let Some(track) = self.poses.get(at) else { return Translation3::from(Vector3::repeat(f64::NAN)).into() };
+        let (before, after) = track.around(time_ns);
+        let (Some(before), Some(after)) = (before, after) else {
+            return before.or(after).map(|k| pose(track.row(k))).unwrap_or_default();
         };
-        let start_ns = self.pictures.range(..*end_ns).next_back().copied().unwrap_or(*end_ns);
-        if time_ns <= start_ns || *end_ns == start_ns {
-            return if time_ns == *end_ns { *end } else { *start };
+        let (start, end, end_ns) = (pose(track.row(before)), pose(track.row(after)), track.times()[after]);
+        // A row is left out where nothing moves: the way begins at the last picture before the next row.
+        let earlier = self.pictures.partition_point(|picture| *picture < end_ns);
+        let start_ns = if earlier > 0 { self.pictures[earlier - 1] } else { end_ns };
+        if time_ns <= start_ns || end_ns == start_ns {
+            return if time_ns == end_ns { end } else { start };
         }
-        let share = (time_ns - start_ns) as f64 / (end_ns - start_ns) as f64;
+        let share = time_ns.saturating_sub(start_ns) as f64 / end_ns.saturating_sub(start_ns) as f64;
         let place = start.translation.vector.lerp(&end.translation.vector, share);
         Pose::from_parts(place.into(), start.rotation.slerp(&end.rotation, share))
     }
@@ -314,14 +327,13 @@ impl Data {
     }
 }
 
-/// The row at a time, or what lies between the two around it; before the first and beyond the last one that.
-fn between(rows: &BTreeMap<i64, Vec<f64>>, time_ns: i64) -> Option<Vec<f64>> {
-    let (before, after) = (rows.range(..=time_ns).next_back(), rows.range(time_ns..).next());
-    match (before, after) {
-        (Some((start, a)), Some((end, b))) if start < end => {
-            let share = (time_ns - start) as f64 / (end - start) as f64;
-            Some(a.iter().zip(b).map(|(a, b)| a + (b - a) * share).collect())
-        }
-        _ => before.or(after).map(|(_, row)| row.clone()),
-    }
+/// The track of an entity; a new one has rows of `width` numbers.
+fn track<'t>(tracks: &'t mut BTreeMap<EntityPath, Track>, at: &EntityPath, width: usize) -> &'t mut Track {
+    tracks.entry(at.clone()).or_insert_with(|| Track::new(width))
+}
+
+/// Translation, then quaternion x, y, z, w.
+fn pose(row: &[f64]) -> Pose {
+    let rotation = UnitQuaternion::from_quaternion(Quaternion::new(row[6], row[3], row[4], row[5]));
+    Pose::from_parts(Translation3::new(row[0], row[1], row[2]), rotation.to_rotation_matrix())
 }

@@ -11,8 +11,8 @@ use std::io::{self, Write};
 use rerun::external::arrow::datatypes::Schema;
 use rerun::external::re_chunk_store::external::re_chunk::Span;
 use rerun::external::re_log_encoding::{
-    CodecError, CrateVersion, Encodable, EncodingOptions, MessageHeader, MessageKind, RRD_FOURCC, RrdFooter,
-    RrdManifestBuilder, StreamFooter, StreamHeader, ToTransport,
+    CodecError, CrateVersion, Encodable, EncodingOptions, MessageHeader, MessageKind, RRD_FOURCC, RawRrdManifest,
+    RrdFooter, RrdManifestBuilder, StreamFooter, StreamHeader, ToTransport,
 };
 use rerun::external::re_log_types::{BlueprintActivationCommand, SetStoreInfo, StoreInfo, StoreSource};
 use rerun::external::re_tuid::Tuid;
@@ -76,7 +76,44 @@ pub(crate) struct RrdStream {
     file: TailFile,
     ids: Ids,
     /// Per recording or blueprint, in the order of their appearance.
-    manifests: Vec<(StoreId, RrdManifestBuilder)>,
+    manifests: Vec<(StoreId, Manifest)>,
+}
+
+/// The list of a recording's chunks in the making.
+#[derive(Default)]
+struct Manifest {
+    /// All chunks, for the end of the file.
+    all: RrdManifestBuilder,
+    /// The same for provisional ends, because a builder can be used only once: the chunks up to the last such end, and those
+    /// since, with their number.
+    before: Option<RawRrdManifest>,
+    since: RrdManifestBuilder,
+    new: usize,
+}
+
+impl Manifest {
+    fn append(&mut self, chunk: &Chunk, span: Span<u64>, uncompressed: u64) -> Result<()> {
+        let batch = chunk.to_chunk_batch()?;
+        self.since.append(&batch, span, uncompressed)?;
+        self.new += 1;
+        Ok(self.all.append(&batch, span, uncompressed)?)
+    }
+
+    /// The list so far and, behind it, the chunks of a provisional end; `None` while there is none.
+    fn so_far(&mut self, store: &StoreId, end: RrdManifestBuilder, with_end: bool) -> Result<Option<RawRrdManifest>> {
+        let with = |before: Option<RawRrdManifest>, new: RrdManifestBuilder| {
+            let new = new.build(store.clone())?;
+            match before {
+                Some(before) => RawRrdManifest::merge(store.clone(), vec![before, new]),
+                None => Ok(new),
+            }
+        };
+        if std::mem::take(&mut self.new) > 0 {
+            self.before = Some(with(self.before.take(), std::mem::take(&mut self.since))?);
+        }
+        let before = self.before.clone();
+        Ok(if with_end { Some(with(before, end)?) } else { before })
+    }
 }
 
 impl RrdStream {
@@ -106,7 +143,7 @@ impl RrdStream {
         let source = StoreSource::Other(concat!("flexarm ", env!("CARGO_PKG_VERSION")).to_owned());
         let info = StoreInfo::new(store.clone(), source);
         let row_id = self.ids.chunk().as_tuid();
-        self.manifests.push((store.clone(), RrdManifestBuilder::default()));
+        self.manifests.push((store.clone(), Manifest::default()));
         let bytes = encode(&LogMsg::SetStoreInfo(SetStoreInfo { row_id, info }))?.0;
         Ok(self.file.write_all(&bytes)?)
     }
@@ -128,40 +165,60 @@ impl RrdStream {
         let span = Span::from_start_end(start, self.file.position());
         let manifest = self.manifests.iter_mut().find(|(known, _)| known == store);
         let (_, manifest) = manifest.expect("a store is opened before chunks are added to it");
-        Ok(manifest.append(&chunk.to_chunk_batch()?, span, uncompressed)?)
+        manifest.append(chunk, span, uncompressed)
     }
 
-    /// Writes out everything, with these chunks as the provisional end.
+    /// Writes out everything, with these chunks as the provisional end, and a footer: what a killed run leaves is a whole
+    /// file.
     pub(crate) fn set_tail(&mut self, store: &StoreId, chunks: &[Chunk]) -> Result<()> {
-        let mut tail = Vec::new();
+        let position = self.file.position();
+        let (mut tail, mut builder) = (Vec::new(), RrdManifestBuilder::default());
         for chunk in chunks {
-            tail.extend(encode(&LogMsg::ArrowMsg(store.clone(), chunk.to_arrow_msg()?))?.0);
+            let start = position + (tail.len() + MessageHeader::ENCODED_SIZE_BYTES) as u64;
+            let (bytes, uncompressed) = encode(&LogMsg::ArrowMsg(store.clone(), chunk.to_arrow_msg()?))?;
+            tail.extend(bytes);
+            let span = Span::from_start_end(start, position + tail.len() as u64);
+            builder.append(&chunk.to_chunk_batch()?, span, uncompressed)?;
         }
+        let mut manifests = Vec::new();
+        for (known, manifest) in &mut self.manifests {
+            let ends_here = *known == *store && !chunks.is_empty();
+            let end = if ends_here { std::mem::take(&mut builder) } else { RrdManifestBuilder::default() };
+            manifests.extend(manifest.so_far(known, end, ends_here)?);
+        }
+        tail.extend(end(manifests, position + tail.len() as u64)?);
         Ok(self.file.set_tail(&tail)?)
     }
 
     /// Ends the file with the list of its chunks.
     pub(crate) fn finish(&mut self) -> Result<()> {
-        let mut footer = RrdFooter { manifests: HashMap::new() }.to_transport(())?;
-        for (store, manifest) in std::mem::take(&mut self.manifests) {
-            // The library has manifests, and the fields of their schemas, in random order.
-            let mut manifest = manifest.build(store)?;
-            let mut fields = manifest.sorbet_schema.fields().to_vec();
-            fields.sort();
-            manifest.sorbet_schema = Schema::new(fields);
-            footer.manifests.push(manifest.to_transport(())?);
-        }
-        let mut payload = Vec::new();
-        footer.to_rrd_bytes(&mut payload)?;
-
-        let mut end = Vec::new();
-        MessageHeader { kind: MessageKind::End, len: payload.len() as u64 }.to_rrd_bytes(&mut end)?;
-        let payload_start = self.file.position() + end.len() as u64;
-        end.extend(&payload);
-        StreamFooter::from_rrd_footer_bytes(payload_start, &payload).to_rrd_bytes(&mut end)?;
+        let manifests = std::mem::take(&mut self.manifests).into_iter();
+        let manifests = manifests.map(|(store, manifest)| Ok(manifest.all.build(store)?)).collect::<Result<_>>()?;
+        let end = end(manifests, self.file.position())?;
         self.file.write_all(&end)?;
         Ok(self.file.flush()?)
     }
+}
+
+/// The end of a file, to be put at `position`: the last message, with lists of all chunks, and where it is.
+fn end(manifests: Vec<RawRrdManifest>, position: u64) -> Result<Vec<u8>> {
+    let mut footer = RrdFooter { manifests: HashMap::new() }.to_transport(())?;
+    for mut manifest in manifests {
+        // The library has manifests, and the fields of their schemas, in random order.
+        let mut fields = manifest.sorbet_schema.fields().to_vec();
+        fields.sort();
+        manifest.sorbet_schema = Schema::new(fields);
+        footer.manifests.push(manifest.to_transport(())?);
+    }
+    let mut payload = Vec::new();
+    footer.to_rrd_bytes(&mut payload)?;
+
+    let mut end = Vec::new();
+    MessageHeader { kind: MessageKind::End, len: payload.len() as u64 }.to_rrd_bytes(&mut end)?;
+    let payload_start = position + end.len() as u64;
+    end.extend(&payload);
+    StreamFooter::from_rrd_footer_bytes(payload_start, &payload).to_rrd_bytes(&mut end)?;
+    Ok(end)
 }
 
 /// A message with its header, and its size without compression.

@@ -1,0 +1,82 @@
+//! Damaged recordings: whatever their bytes say, reading them ends with samples or with an error, in bounded memory.
+#![allow(non_snake_case, reason = "monogram notation: X_WT, pose of T in W")]
+#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
+
+mod synthetic;
+
+use flexarm_log::{CreateOptions, Recorder, RecordingFormat, open_recording};
+use flexarm_testkit::allocations::{CountingAllocator, most_bytes};
+
+#[global_allocator]
+static ALLOCATOR: CountingAllocator = CountingAllocator;
+
+/// What reading a small file may take.
+const MOST_BYTES: usize = 200 << 20;
+const CHANGES: u64 = 400;
+
+fn recorder(format: RecordingFormat, path: &std::path::Path) -> Box<dyn Recorder> {
+    let options = CreateOptions::default().with_overwrite(true);
+    match format {
+        #[cfg(feature = "mcap")]
+        RecordingFormat::Mcap => Box::new(flexarm_log::McapRecorder::create(path, options)),
+        #[cfg(feature = "rerun")]
+        RecordingFormat::Rrd => Box::new(flexarm_log::RrdRecorder::create(path, options)),
+        #[cfg(feature = "parquet")]
+        RecordingFormat::Parquet => Box::new(flexarm_log::ParquetRecorder::create(path, options)),
+        _ => Box::new(flexarm_log::CsvRecorder::create(path, options)),
+    }
+}
+
+/// Numbers that look random and are the same every time (xorshift).
+fn next(seed: &mut u64) -> u64 {
+    *seed ^= *seed << 13;
+    *seed ^= *seed >> 7;
+    *seed ^= *seed << 17;
+    *seed
+}
+
+/// One change of the kinds that broke readers: a byte inverted, zeros, an end cut off, and lengths that nobody has.
+fn changed(file: &[u8], kind: u64, seed: &mut u64) -> Vec<u8> {
+    let mut file = file.to_vec();
+    let at = (next(seed) % (file.len() as u64 - 8)) as usize;
+    let lengths = [1_u64 << 31, 1 << 63, u64::MAX, 1 << 40];
+    match kind % 5 {
+        0 | 1 => file[at] = !file[at],
+        2 => file[at..at + 8].fill(0),
+        3 => file.truncate(at),
+        _ => file[at..at + 8].copy_from_slice(&lengths[(next(seed) % 4) as usize].to_le_bytes()),
+    }
+    file
+}
+
+#[test]
+fn a_damaged_recording_is_read_or_refused_in_bounded_memory() {
+    for format in RecordingFormat::ALL.into_iter().filter(|format| format.is_built_in()) {
+        let path = synthetic::scratch(&format!("damaged.{}", format.extension()));
+        let mut recorder = recorder(format, &path);
+        recorder.begin(&synthetic::header()).unwrap();
+        (0..60).for_each(|step| recorder.record(&synthetic::sample(step)).unwrap());
+        recorder.finish(&synthetic::result()).unwrap();
+        drop(recorder);
+        let whole = std::fs::read(&path).unwrap();
+        let mut seed = 0x9e37_79b9_7f4a_7c15;
+        let (mut read, mut refused) = (0, 0);
+        for kind in 0..CHANGES {
+            std::fs::write(&path, changed(&whole, kind, &mut seed)).unwrap();
+            let mut outcome = Ok(());
+            let most = most_bytes(|| {
+                outcome = open_recording(&path, format).and_then(|mut run| run.replay(&mut |_| Ok(())).map(|_| ()));
+            });
+            assert!(most < MOST_BYTES, "{format}, change {kind}: {most} bytes");
+            match outcome {
+                Ok(()) => read += 1,
+                Err(error) => {
+                    assert!(error.to_string().contains(&format!("damaged.{}", format.extension())), "{error}");
+                    refused += 1;
+                }
+            }
+        }
+        assert!(read > 0 && refused > 0, "{format}: {read} read, {refused} refused");
+        std::fs::remove_file(path).unwrap();
+    }
+}
