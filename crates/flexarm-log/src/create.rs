@@ -67,7 +67,7 @@ impl CreateOptions {
         FlushClock {
             every: self.flush_every,
             begun: now,
-            next: now + self.flush_every,
+            next: now + self.flush_every.min(NEVER),
             folder: folder.into(),
             scarce,
             waiting: 0,
@@ -80,6 +80,8 @@ impl CreateOptions {
 const SCARCE_BYTES: u64 = 64 << 20;
 /// Samples between two flushes when room is scarce.
 const SCARCE_EVERY: u32 = 64;
+/// Longest time between two flushes: clocks do not hold all that a duration does.
+const NEVER: Duration = Duration::from_secs(10 * 365 * 24 * 3600);
 /// Part of its time that a run spends on flushes at most.
 const LARGEST_SHARE: u32 = 20;
 
@@ -103,7 +105,7 @@ impl FlushClock {
         let now = Instant::now();
         let in_time = now >= self.next;
         if in_time {
-            self.next = now + self.every;
+            self.next = now + self.every.min(NEVER);
             self.scarce = is_scarce(&self.folder);
         }
         let due = in_time || self.scarce && self.waiting >= SCARCE_EVERY;

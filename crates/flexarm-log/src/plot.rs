@@ -469,7 +469,7 @@ mod tests {
             panel("size", true, vec![curve("a < b", &[1.0, 1e-3, f64::NAN, 0.0])]),
             panel("angle", false, vec![curve("flat", &[2.0, 2.0])]),
         ];
-        let marks = [(2.0, "f1".to_owned()), (2.001, "f2".to_owned()), (99.0, "f3".to_owned())];
+        let marks = [(1.5, "f1".to_owned()), (1.501, "f2".to_owned()), (99.0, "f3".to_owned())];
         let notes = ["at rest".to_owned()];
         let (title, x_label) = ("all of it", "time");
         let plot = LinePlot { title, notes: &notes, x_label, logarithmic_x: true, marks: &marks, panels: &panels };

@@ -51,7 +51,11 @@ pub(crate) fn window(header: &RunHeader, seat: &Seat, labels: &[String]) -> Part
     let right = tabs.into_iter().filter(|tabs| !tabs.is_empty()).map(|tabs| (1.0, Part::Tabs(tabs))).collect();
     let summary = Part::text("Summary", path(["summary"]));
     let text = match moves {
-        true => Part::Row(vec![(1.0, summary), (1.0, Part::log(&own("Events"), path(["events"])))]),
+        true => {
+            // The table of a study is wide.
+            let share = if matches!(seat, Seat::Alone) { 1.0 } else { 1.7 };
+            Part::Row(vec![(share, summary), (1.0, Part::log(&own("Events"), path(["events"])))])
+        }
         false => summary,
     };
     let left = Part::Column(vec![(5.8, robots(header, seat, labels)), (3.6, text)]);
