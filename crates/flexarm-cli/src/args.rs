@@ -86,6 +86,9 @@ pub(crate) struct RobotArgs {
     /// Argument of a xacro file, before those of the robot file (may be repeated)
     #[arg(long = "arg", value_name = "NAME=VALUE")]
     pub(crate) arguments: Vec<String>,
+    /// Link whose inertia may be one that no body has (may be repeated)
+    #[arg(long, value_name = "LINK")]
+    pub(crate) waive_inertia: Vec<String>,
     /// Estimate missing inertias from the meshes with this density (kg/m^3)
     #[arg(
         long,

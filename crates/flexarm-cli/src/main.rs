@@ -27,7 +27,7 @@ use args::{
 };
 use clap::{CommandFactory, Parser};
 use flexarm::{
-    AlphaSettings, ConstraintForm, Error, InertiaEstimate, LoadOptions, Motion, Outputs, ReadOptions, ReferenceMethod,
+    AlphaSettings, ConstraintForm, Error, InertiaEstimate, LoadOptions, Outputs, ReadOptions, ReferenceMethod,
     ReferenceSettings, Robot, RunOptions, SpookPreset, SpookSettings, Start, StepperKind, Variant,
 };
 use indicatif::{ProgressBar, ProgressStyle};
@@ -146,6 +146,7 @@ fn load_options(args: &RobotArgs) -> Result<LoadOptions, Error> {
     if let Some(mass) = args.inertia_from_total_mass {
         urdf.inertia_from_mesh = Some(InertiaEstimate::TotalMass(positive(mass, "--inertia-from-total-mass")?));
     }
+    urdf.waive.extend(args.waive_inertia.iter().cloned());
     Ok(LoadOptions { tcp: args.tcp.clone(), urdf })
 }
 
@@ -187,7 +188,7 @@ fn run_options(args: &RunArgs, with_twin: bool) -> RunOptions {
 
 /// Robot, motion and choices of a run.
 fn variant(label: String, args: &RunArgs, with_twin: bool) -> Result<Variant, Error> {
-    let robot = Robot::load(&shipped::robot(args.robot.as_deref()), &load_options(&args.load)?)?;
+    let robot = Robot::load(&shipped::robot(args.robot.as_deref())?, &load_options(&args.load)?)?;
     let trajectory = match (&args.trajectory, &robot.default_trajectory) {
         (Some(given), _) => shipped::trajectory(given),
         (None, Some(own)) => own.clone(),
@@ -196,15 +197,14 @@ fn variant(label: String, args: &RunArgs, with_twin: bool) -> Result<Variant, Er
             return Err(Error::Usage(text.into()));
         }
     };
-    let model = robot.rigid_model()?;
-    let motion = Motion::load(&trajectory, &model).map_err(|error| match error {
+    let motion = robot.motion(&trajectory).map_err(|error| match error {
         Error::File { path, what } if args.trajectory.is_none() => {
             Error::File { path, what: format!("{what} (it is the default_trajectory of {})", robot.path.display()) }
         }
         other => other,
     })?;
     let motion = match args.round_corners {
-        Some(seconds) => motion.with_rounded_corners(seconds, &model)?,
+        Some(seconds) => motion.with_rounded_corners(seconds, &*robot.rigid_model()?)?,
         None => motion,
     };
     Ok(Variant { label, robot, motion, options: run_options(args, with_twin) })
@@ -260,7 +260,7 @@ fn simulate(cli: &Cli, args: &RunArgs, with_twin: bool) -> Result<ExitCode, Erro
 }
 
 fn inspect(cli: &Cli, args: &InspectArgs) -> Result<ExitCode, Error> {
-    let robot = Robot::load(&shipped::robot(Some(&args.robot)), &load_options(&args.load)?)?;
+    let robot = Robot::load(&shipped::robot(Some(&args.robot))?, &load_options(&args.load)?)?;
     let inspection = flexarm::inspect(&robot, args.at.as_deref(), args.velocity.as_deref())?;
     answer(cli, || to_json(&inspection), || print::inspection(&inspection));
     Ok(ExitCode::SUCCESS)
@@ -268,7 +268,7 @@ fn inspect(cli: &Cli, args: &InspectArgs) -> Result<ExitCode, Error> {
 
 fn check(cli: &Cli, args: &CheckArgs) -> Result<ExitCode, Error> {
     let trajectory = args.trajectory.as_deref().map(shipped::trajectory);
-    let robot = shipped::robot(Some(&args.robot));
+    let robot = shipped::robot(Some(&args.robot))?;
     let findings =
         flexarm::check_with_loads(&robot, trajectory.as_deref(), args.loads.as_deref(), &load_options(&args.load)?);
     let json = || serde_json::json!({ "findings": findings }).to_string();

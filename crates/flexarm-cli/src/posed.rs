@@ -20,7 +20,7 @@ const AXES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
 const SHOWN_PEAKS: usize = 3;
 
 fn load(pose: &PoseArgs) -> Result<Robot, Error> {
-    Robot::load(&shipped::robot(Some(&pose.robot)), &load_options(&pose.load)?)
+    Robot::load(&shipped::robot(Some(&pose.robot))?, &load_options(&pose.load)?)
 }
 
 fn warn(cli: &Cli, warnings: &[String]) {

@@ -3,7 +3,7 @@
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use flexarm::Error;
+use flexarm::{Error, closest};
 
 /// Folders that may hold `robots/` and `trajectories/`: here, beside the program, and where it was built.
 fn roots() -> Vec<PathBuf> {
@@ -30,8 +30,29 @@ pub(crate) fn find(given: &Path, folder: &str, endings: &[&str]) -> PathBuf {
 }
 
 /// A robot by path or name.
-pub(crate) fn robot(given: Option<&Path>) -> PathBuf {
-    find(given.unwrap_or(Path::new("kr210")), "robots", &["/robot.toml"])
+///
+/// # Errors
+/// A name that no robot has, with the ones that there are.
+pub(crate) fn robot(given: Option<&Path>) -> Result<PathBuf, Error> {
+    let given = given.unwrap_or(Path::new("kr210"));
+    let path = find(given, "robots", &["/robot.toml"]);
+    if path.exists() || given.components().count() != 1 || given.extension().is_some() {
+        return Ok(path);
+    }
+    let folders =
+        roots().into_iter().flat_map(|root| std::fs::read_dir(root.join("robots")).into_iter().flatten().flatten());
+    let whole = folders.filter(|entry| entry.path().join("robot.toml").is_file());
+    let mut names: Vec<String> = whole.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    names.dedup();
+    let meant = closest(&given.to_string_lossy(), names.iter().map(String::as_str));
+    let meant = meant.map_or_else(String::new, |name| format!("did you mean {name:?}? "));
+    let what = format!(
+        "there is no such file and no shipped robot of this name; {meant}shipped are {}; or give a robot.toml, a folder \
+         with one, or a .urdf or .xacro file",
+        names.join(", ")
+    );
+    Err(Error::File { path, what })
 }
 
 /// A trajectory by path or name.

@@ -103,6 +103,12 @@ mod missing {
     }
 
     #[test]
+    fn a_robot_that_is_not_shipped() {
+        let place = Place::new();
+        place.refused(&["inspect", "kr211"], &["kr211", "did you mean \"kr210\"?", "manutec_r3"]);
+    }
+
+    #[test]
     fn xacro_that_is_not_whole() {
         let place = Place::new();
         let text = with(URDF, "<robot ", "<robot xmlns:xacro=\"http://wiki.ros.org/xacro\" ");
@@ -384,8 +390,6 @@ mod robot_description {
 
     #[test]
     fn masses() {
-        let text = with(&with(URDF, "\"1.728\"", "\"0\""), "\"0.5\"", "\"0\"");
-        urdf(&text, "<inertial>", &["link \"bar\"", "\"swing\"", "no mass", "(\"ball\")"]);
         let text = with(URDF, "\"1.728\"", "\"-1.728\"");
         urdf(&text, "<inertial>", &["link \"bar\"", "-1.728 kg", "positive", "sign"]);
         let text = with(URDF, "\"1.728\"", "\"nan\"");
@@ -404,20 +408,25 @@ mod robot_description {
         urdf(&text, "<inertial>", &["link \"bar\"", "triangle inequality", "5.0", "order ixx ixy ixz iyy iyz izz"]);
     }
 
+    /// A bare arm without masses can be moved; that it has none is told, with options that exist.
     #[test]
     fn missing_inertial() {
-        let text = URDF.replace("inertial>", "inertia_tensor>");
-        urdf(
-            &text,
-            "<link name=\"bar\">",
-            &["link \"bar\"", "\"swing\"", "no <inertial>", "(\"ball\")", "add <inertial>"],
-        );
-    }
-
-    #[test]
-    fn missing_inertial_with_options_that_exist() {
-        let text = URDF.replace("inertial>", "inertia_tensor>");
-        urdf(&text, "<link name=\"bar\">", &["--inertia-from-density", "--inertia-from-total-mass"]);
+        let place = Place::new();
+        place.write("arm.urdf", URDF.replace("inertial>", "inertia_tensor>"));
+        let answer = place.flexarm(&["check", "arm.urdf"]);
+        assert_eq!(answer.code, 0, "{}{}", answer.out, answer.err);
+        for piece in [
+            "\"bar\"",
+            "\"swing\"",
+            "no <inertial>",
+            "(\"ball\")",
+            "--inertia-from-density",
+            "--inertia-from-total-mass",
+        ] {
+            assert!(format!("{}{}", answer.out, answer.err).contains(piece), "{piece}: {}{}", answer.out, answer.err);
+        }
+        assert_eq!(place.flexarm(&["inspect", "arm.urdf"]).code, 0);
+        assert_eq!(place.flexarm(&["compare", "arm.urdf", "swing.toml", "--no-files"]).code, 0);
     }
 
     #[test]

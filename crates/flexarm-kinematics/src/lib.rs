@@ -59,7 +59,9 @@ pub use kinematics::{
 };
 pub use mechanism::{Joint, JointKind, Limits, Link, LinkInertia, Mechanism, Mimic};
 pub use modal::{InterfaceShape, ModalBody};
-pub use model::{Body, Coordinate, ElasticGroup, Frame, JointMotion, MOST_COORDINATES, Model, ModelError};
+pub use model::{
+    Body, Coordinate, ElasticGroup, Frame, JointMotion, MOST_COORDINATES, Model, ModelError, moment_floor,
+};
 pub use rnea::{gravity_forces, inverse_dynamics, nonlinear_effects};
 pub use rotation::{AngleKinematics, ElasticAngles, rotation_vector};
 pub use spatial::{ArticulatedInertia, Pose, SpatialInertia, Twist, Wrench, adjoint, skew};

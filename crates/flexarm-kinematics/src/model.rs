@@ -201,9 +201,10 @@ pub enum ModelError {
         /// The links that cannot be reached from a base.
         links: Vec<String>,
     },
-    /// A body that moves without mass.
+    /// A body on a spring without mass: nothing says how it would move.
     #[error(
-        "link {link:?} moves (joint {joint:?}) but has mass {mass} kg with all that is fixed to it: give it a positive mass"
+        "link {link:?} gives way (joint {joint:?}) and has mass {mass} kg with all that it carries: give it a positive mass, \
+         or let nothing give way before it"
     )]
     NoMass {
         /// The link.
@@ -456,14 +457,14 @@ impl<'a> Builder<'a> {
             (body, X_BL) = self.cross(joint, parent, on, &X_BP)?;
             self.lump(link, body, X_BL)?;
         }
-        (1..self.bodies.len()).try_for_each(|body| self.check_mass(body))
+        self.check_masses()
     }
 
     /// Adds a link to the body that carries it.
     fn lump(&mut self, link: usize, body: usize, X_BL: Pose) -> Result<(), ModelError> {
         let link = &self.mechanism.links[link];
         if let Some(inertia) = &link.inertia {
-            check_inertia(&link.name, inertia)?;
+            check_inertia(&link.name, inertia, body != 0)?;
             self.bodies[body].inertia += inertia.spatial().at_parent(&X_BL);
         }
         self.frames.push(Frame { name: link.name.clone(), body, X_BF: X_BL });
@@ -542,23 +543,24 @@ impl<'a> Builder<'a> {
         Ok((index, Pose::identity()))
     }
 
-    /// A body that moves needs a mass, with all that is fixed to it.
-    fn check_mass(&self, index: usize) -> Result<(), ModelError> {
-        let body = &self.bodies[index];
-        let mass = body.inertia.mass + body.modal.map_or(0.0, |m| self.modal[m].tables.shapes.mass);
-        // Interfaces and what stands between a motor and its spring need no mass of their own.
-        let springs = |b: &Body| b.parent == index && b.elastic && b.X_PJ == Pose::identity();
-        let carrier =
-            || matches!(body.motion, JointMotion::Interface { .. }) || self.bodies[index + 1..].iter().any(springs);
-        if mass.is_nan() || mass < 0.0 || (mass == 0.0 && !carrier()) {
-            return Err(ModelError::NoMass { link: body.name.clone(), joint: body.joint.clone(), mass });
-        }
-        Ok(())
-    }
-
     /// Whether the body's frame is that of the link.
     fn frames_are_at(&self, body: usize, link: &str) -> bool {
         self.frames.iter().any(|f| f.body == body && f.name == *link && f.X_BF == Pose::identity())
+    }
+
+    /// What gives way is solved for, so it must carry mass. A joint that is moved along a motion needs none behind it.
+    fn check_masses(&self) -> Result<(), ModelError> {
+        let own = |b: &Body| b.inertia.mass + b.modal.map_or(0.0, |m| self.modal[m].tables.shapes.mass);
+        let mut carried: Vec<f64> = self.bodies.iter().map(own).collect();
+        for i in (1..self.bodies.len()).rev() {
+            let body = &self.bodies[i];
+            let mass = carried[i];
+            if mass.is_nan() || mass < 0.0 || (mass == 0.0 && body.elastic) {
+                return Err(ModelError::NoMass { link: body.name.clone(), joint: body.joint.clone(), mass });
+            }
+            carried[body.parent] += mass;
+        }
+        Ok(())
     }
 
     /// Numbers the coordinates: actuated, then elastic, then mimic joints take their leader's.
@@ -652,17 +654,35 @@ impl<'a> Builder<'a> {
     }
 }
 
-fn check_inertia(link: &str, inertia: &crate::mechanism::LinkInertia) -> Result<(), ModelError> {
+/// Principal moments below minus this part of the largest are wrong, not rounded: files have six digits.
+const MOMENT_TOLERANCE: f64 = 1e-6;
+
+/// What a principal moment of inertia may be below zero by rounding (kg m²).
+///
+/// ```text
+/// floor = 1e-6 |I| + m (1 um)^2 + 1e-20 kg m^2
+/// ```
+/// * `mass` in kg, `largest` the largest principal moment by size in kg m².
+pub fn moment_floor(mass: f64, largest: f64) -> f64 {
+    MOMENT_TOLERANCE * largest.abs() + 1e-12 * mass.abs() + 1e-20
+}
+
+/// Finite, and of a body that there can be. What stands on the base does not move: nothing follows from its inertia.
+fn check_inertia(link: &str, inertia: &crate::mechanism::LinkInertia, moves: bool) -> Result<(), ModelError> {
     let finite =
         inertia.mass.is_finite() && inertia.com.iter().chain(inertia.inertia_com.iter()).all(|x| x.is_finite());
     if !finite {
         return Err(ModelError::NotFinite { what: "inertia", name: link.to_owned() });
     }
+    if !moves {
+        return Ok(());
+    }
     if inertia.mass < 0.0 {
         return Err(ModelError::BadInertia { link: link.to_owned(), what: "mass [kg]", value: inertia.mass });
     }
-    let smallest = inertia.inertia_com.symmetric_eigenvalues().min();
-    if smallest < -1e-9 * inertia.inertia_com.norm() {
+    let moments = inertia.inertia_com.symmetric_eigenvalues();
+    let smallest = moments.min();
+    if smallest < -moment_floor(inertia.mass, moments.amax()) {
         let what = "smallest principal moment of inertia [kg m²]";
         return Err(ModelError::BadInertia { link: link.to_owned(), what, value: smallest });
     }

@@ -154,6 +154,24 @@ impl Trajectory {
         })
     }
 
+    /// The same motion with further joints, each held where it is told (rad or m) from the start to the end.
+    ///
+    /// # Errors
+    /// [`TrajectoryError::OutOfRange`] for a value that is not finite.
+    ///
+    /// # Panics
+    /// When a joint is there already.
+    pub fn with_held_joints(&self, held: &[(&str, f64)]) -> Result<Self, TrajectoryError> {
+        let (mut joints, mut curves) = (self.joints.clone(), self.curves.clone());
+        for (joint, value) in held {
+            assert!(!joints.iter().any(|j| j == joint), "joint {joint:?} moves already");
+            joints.push((*joint).to_owned());
+            let pieces = vec![Piece::hold(self.duration, *value)];
+            curves.push(Curve { knots: vec![0.0, self.duration], pieces });
+        }
+        Self::from_curves(joints, curves, self.duration, self.notes.clone())
+    }
+
     /// The same path run through in `factor` times the time: 2 halves every velocity.
     ///
     /// # Errors

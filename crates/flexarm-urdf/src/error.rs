@@ -191,9 +191,6 @@ pub enum Problem {
     /// A mimic joint whose leader is not there.
     #[error("joint {joint:?} mimics {leader:?}, which does not exist")]
     UnknownMimic { joint: String, leader: String, closest: Option<String> },
-    /// A mimic joint whose leader cannot move, or that cannot move itself.
-    #[error("joint {joint:?} mimics {leader:?}, and {fixed:?} is fixed")]
-    MimicFixed { joint: String, leader: String, fixed: String },
     /// Joints that mimic each other.
     #[error("the joints {} mimic each other in a circle", quoted(joints))]
     MimicCycle { joints: Vec<String> },
@@ -249,7 +246,6 @@ impl Problem {
             Self::NegativeLimit { .. } => "negative-limit",
             Self::ZeroAxis { .. } => "zero-axis",
             Self::UnknownMimic { .. } => "unknown-mimic",
-            Self::MimicFixed { .. } => "mimic-fixed",
             Self::MimicCycle { .. } => "mimic-cycle",
             Self::NegativeMass { .. } => "negative-mass",
             Self::ZeroMass { .. } => "zero-mass",
@@ -312,26 +308,24 @@ impl Problem {
             Self::LimitsReversed { .. } => "exchange lower and upper; angles are in radians".into(),
             Self::NegativeLimit { .. } => "limits of speed and effort are magnitudes; 0 stands for unknown".into(),
             Self::ZeroAxis { .. } => "write the axis as a unit vector, such as xyz=\"0 0 1\"".into(),
-            Self::MimicFixed { .. } => "remove <mimic> or let the joint move".into(),
             Self::MimicCycle { .. } => "let one of them go without <mimic>".into(),
             Self::NegativeMass { .. } => "correct the sign; a counterweight has positive mass too".into(),
             Self::ZeroMass { .. } => {
-                "give the link its mass and inertia; motion of a massless body is undefined".into()
+                "give the link its mass and inertia: without them it needs no force to move, and nothing bends under it".into()
             }
             Self::MissingInertial { no_estimate, .. } => match no_estimate {
                 None => "add <inertial> with mass and inertia, or have it estimated from the meshes \
-                         (--inertia-from-density or --inertia-from-total-mass)"
+                         (--inertia-from-density or --inertia-from-total-mass, or such keys in the robot file): without \
+                         them the link needs no force to move, and nothing bends under it"
                     .into(),
                 Some(why) => format!("add <inertial> with mass and inertia; it could not be estimated: {why}"),
             },
             Self::InertiaNotPositiveDefinite { .. } => {
-                "check signs, units (kg m^2) and that the values are about the centre of mass; if the model means it, \
-                 waive the check by waive_inertia = [\"link\"] in robot.toml"
-                    .into()
+                "check signs, units (kg m^2) and that the values are about the centre of mass".into()
             }
             Self::TriangleInequality { .. } => {
                 "check the order ixx ixy ixz iyy iyz izz and that the values are about the centre of mass; if the \
-                 model means it, waive the check by waive_inertia = [\"link\"] in robot.toml"
+                 model means it, waive the check by --waive-inertia LINK, or waive_inertia = [\"link\"] in the robot file"
                     .into()
             }
             Self::BadEstimate { .. } => "give a density in kg/m^3 (steel 7850, aluminium 2700) or a mass in kg".into(),

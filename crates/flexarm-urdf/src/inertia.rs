@@ -7,10 +7,11 @@
 //! ```
 //! Start at [`link_inertias`]. Checks are about the centre of mass and relative to the largest principal moment.
 
-use flexarm_kinematics::{LinkInertia, SpatialInertia};
+use flexarm_kinematics::{LinkInertia, SpatialInertia, moment_floor};
 use nalgebra::{Matrix3, Vector3};
 
 use crate::error::Problem;
+use crate::finding::Place;
 use crate::mesh::MassProperties;
 use crate::raw::{RawInertial, RawRobot};
 use crate::read::{InertiaEstimate, ReadOptions};
@@ -64,9 +65,11 @@ pub(crate) fn link_inertias(
         }
     }
 
+    let mut massless = Vec::new();
     for body in bodies.iter().filter(|b| b.moved_by.is_some()) {
-        check_body(robot, body, &inertias, &without_extent, &failures, options, report);
+        massless.extend(check_body(robot, body, &inertias, &without_extent, &failures, options, report));
     }
+    tell_massless(robot, massless, report);
     // An <inertial> of zeros is a way to write a frame.
     for inertia in &mut inertias {
         if inertia.is_some_and(|i| i.mass == 0.0 && i.inertia_com == Matrix3::zeros()) {
@@ -125,15 +128,19 @@ fn check_moments(
     let waived = options.waive.iter().any(|n| n == name);
     let link = name.to_owned();
     let excess = high - (low + middle);
-    let problem = if low.is_nan() || low < -TOLERANCE * scale {
-        // no waiver: this adds energy where it should take some
+    let floor = moment_floor(raw.mass, scale);
+    let problem = if low.is_nan() || low < -floor {
+        // no waiver where it moves: this adds energy where it should take some
         Problem::InertiaNotPositiveDefinite { link, moments }
-    } else if excess > TOLERANCE * scale && !waived {
+    } else if excess > floor && !waived {
         Problem::TriangleInequality { link, moments, excess }
     } else {
-        return low <= TOLERANCE * scale;
+        return low <= TOLERANCE * scale || high <= floor;
     };
-    // Without mass, without motion: nothing follows from it.
+    // Without motion nothing follows from it.
+    if !moves && waived {
+        return false;
+    }
     if moves {
         report.error(&raw.place, problem);
     } else {
@@ -142,7 +149,28 @@ fn check_moments(
     false
 }
 
-/// A moving body needs mass, and inertia about every axis.
+/// Joints can be moved without mass behind them; what that leaves out must be known. One warning stands for many.
+fn tell_massless(robot: &RawRobot, massless: Vec<(Place, Problem)>, report: &mut Report) {
+    const MOST: usize = 3;
+    if massless.len() <= MOST {
+        for (place, problem) in massless {
+            report.warning(&place, problem.code(), problem.to_string(), problem.help());
+        }
+        return;
+    }
+    let name = |problem: &Problem| match problem {
+        Problem::MissingInertial { link, .. } | Problem::ZeroMass { link, .. } => link.clone(),
+        _ => String::new(),
+    };
+    let names: Vec<String> = massless.iter().map(|(_, problem)| name(problem)).collect();
+    let shown = names.iter().take(6).map(|n| format!("{n:?}")).collect::<Vec<_>>().join(", ");
+    let rest = if names.len() > 6 { format!(" and {} more", names.len() - 6) } else { String::new() };
+    let message = format!("{} moving links have no mass: {shown}{rest}", names.len());
+    let (_, first) = &massless[0];
+    report.warning(&robot.place, "missing-inertial", message, first.help());
+}
+
+/// Mass and inertia of a moving body; what it lacks altogether comes back.
 fn check_body(
     robot: &RawRobot,
     body: &Body,
@@ -151,21 +179,26 @@ fn check_body(
     failures: &[Option<String>],
     options: &ReadOptions,
     report: &mut Report,
-) {
-    let Some(joint) = body.moved_by.map(|j| robot.joints[j].name.clone()) else { return };
+) -> Option<(Place, Problem)> {
+    let joint = body.moved_by.map(|j| robot.joints[j].name.clone())?;
     let root = &robot.links[body.root];
     let link = root.name.clone();
     let lumped = || body.members[1..].iter().map(|&(i, _)| robot.links[i].name.clone()).collect();
     let with_inertia: Vec<usize> = body.members.iter().map(|m| m.0).filter(|&i| inertias[i].is_some()).collect();
     if with_inertia.is_empty() {
         let no_estimate = body.members.iter().find_map(|&(i, _)| failures[i].clone());
-        report.error(&root.place, Problem::MissingInertial { link, joint, lumped: lumped(), no_estimate });
-        return;
+        let asked = no_estimate.is_some();
+        let problem = Problem::MissingInertial { link, joint, lumped: lumped(), no_estimate };
+        if asked {
+            report.error(&root.place, problem);
+            return None;
+        }
+        return Some((root.place.clone(), problem));
     }
     // Unreadable or negative masses were reported; what follows from them is not.
     let unsound = |&i: &usize| robot.links[i].inertial.as_ref().is_some_and(|raw| raw.faulty || raw.mass < 0.0);
     if with_inertia.iter().any(unsound) {
-        return;
+        return None;
     }
     let mut M_R = SpatialInertia::zeros();
     for (i, X_RL) in &body.members {
@@ -175,21 +208,18 @@ fn check_body(
     }
     let place = |i: usize| robot.links[i].inertial.as_ref().map_or(&robot.links[i].place, |raw| &raw.place);
     if M_R.mass == 0.0 {
-        report.error(place(with_inertia[0]), Problem::ZeroMass { link, joint, lumped: lumped() });
-        return;
+        return Some((place(with_inertia[0]).clone(), Problem::ZeroMass { link, joint, lumped: lumped() }));
     }
 
     // A point mass is sound where other links of the same body give it inertia.
     let thin = with_inertia.iter().copied().filter(|&i| without_extent[i]);
-    let Some(thin) = thin.into_iter().find(|&i| !options.waive.contains(&robot.links[i].name)) else { return };
-    let moments @ [low, _, high] = principal_moments(&M_R.inertia_com());
-    let name = robot.links[thin].name.clone();
-    if low <= TOLERANCE * high {
-        report.error(place(thin), Problem::InertiaNotPositiveDefinite { link: name, moments });
-    } else if robot.links[thin].inertial.as_ref().is_some_and(|raw| raw.mass > 0.0) {
+    let thin = thin.into_iter().find(|&i| !options.waive.contains(&robot.links[i].name))?;
+    let name = &robot.links[thin].name;
+    if robot.links[thin].inertial.as_ref().is_some_and(|raw| raw.mass > 0.0) {
         let message = format!("link {name:?} has mass and no inertia about some axis: it counts as a point or a rod");
         report.warning(place(thin), "point-mass", message, "give the inertia about the centre of mass");
     }
+    None
 }
 
 /// Compares radii of gyration and centre of mass with the box around the shapes of the link.

@@ -2,8 +2,8 @@
 
 use std::collections::HashMap;
 
-use flexarm_kinematics::{Joint, JointKind, Limits, Mimic};
-use nalgebra::{Unit, Vector3};
+use flexarm_kinematics::{Joint, JointKind, Limits, Mimic, Pose};
+use nalgebra::{Rotation3, Translation3, Unit, Vector3};
 
 use crate::error::Problem;
 use crate::raw::{RawJoint, RawKind, RawLimit, RawRobot};
@@ -12,6 +12,39 @@ use crate::spelling::closest;
 
 /// Axes written with four digits of 1/√2 pass without a warning.
 const UNIT_TOLERANCE: f64 = 1e-4;
+
+/// Takes `<mimic>` from joints that cannot move, and fixes joints that follow one which cannot: their value is constant.
+pub(crate) fn fix_still_followers(robot: &mut RawRobot, report: &mut Report) {
+    let mut still: HashMap<String, f64> =
+        robot.joints.iter().filter(|j| j.kind == RawKind::Fixed).map(|j| (j.name.clone(), 0.0)).collect();
+    for joint in robot.joints.iter_mut().filter(|j| j.kind == RawKind::Fixed) {
+        if let Some(mimic) = joint.mimic.take() {
+            let message = format!("joint {:?} is fixed: its <mimic> is ignored", joint.name);
+            report.warning(&mimic.place, "mimic-fixed", message, "remove <mimic>, or let the joint move");
+        }
+    }
+    // each round fixes the followers of what the round before has fixed
+    loop {
+        let follows = |j: &&mut RawJoint| j.mimic.as_ref().is_some_and(|m| still.contains_key(&m.joint));
+        let Some(joint) = robot.joints.iter_mut().find(follows) else { return };
+        let Some(mimic) = joint.mimic.take() else { return };
+        let value = mimic.ratio * still.get(&mimic.joint).copied().unwrap_or(0.0) + mimic.offset;
+        let axis = joint.axis.as_ref().map_or(Vector3::x(), |(axis, _)| *axis);
+        if let Some(axis) = Unit::try_new(axis, 1e-12) {
+            joint.X_PJ *= match joint.kind {
+                RawKind::Prismatic => {
+                    Pose::from_parts(Translation3::from(axis.into_inner() * value), Rotation3::identity())
+                }
+                _ => Pose::from_parts(Translation3::identity(), Rotation3::from_axis_angle(&axis, value)),
+            };
+        }
+        let message =
+            format!("joint {:?} follows {:?}, which is fixed: it is fixed at {value}", joint.name, mimic.joint);
+        report.warning(&mimic.place, "mimic-fixed", message, "remove <mimic>, or let the leader move");
+        joint.kind = RawKind::Fixed;
+        still.insert(joint.name.clone(), value);
+    }
+}
 
 /// All joints in the order of the file; faults go to the report.
 pub(crate) fn convert_joints(robot: &RawRobot, report: &mut Report) -> Vec<Joint> {
@@ -127,11 +160,6 @@ fn check_mimics(robot: &RawRobot, report: &mut Report) {
             report.error(&mimic.place, problem);
             continue;
         };
-        if let Some(fixed) = [*leader, joint].into_iter().find(|j| j.kind == RawKind::Fixed) {
-            let (joint, fixed) = (joint.name.clone(), fixed.name.clone());
-            report.error(&mimic.place, Problem::MimicFixed { joint, leader: mimic.joint.clone(), fixed });
-            continue;
-        }
         if in_reported_circle.contains(&joint.name.as_str()) {
             continue;
         }

@@ -73,4 +73,5 @@ pub use read::{
     parse_urdf, read_urdf,
 };
 pub use resolve::search_paths_from_environment;
+pub use spelling::closest;
 pub use tcp::{default_tcp, tcp_candidates};

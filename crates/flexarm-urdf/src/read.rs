@@ -230,6 +230,7 @@ fn parse_expanded(
     };
     let robot = raw.map(|mut raw| {
         raw.idle_macros = idle_macros.to_vec();
+        joints::fix_still_followers(&mut raw, report);
         assemble(&raw, text, resolver, options, report)
     });
     match robot {

@@ -4,7 +4,7 @@
 const LONGEST_WORD: usize = 200;
 
 /// The candidate closest to `name`, if it is close enough to be a slip of the pen.
-pub(crate) fn closest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<String> {
+pub fn closest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<String> {
     let length = name.chars().count();
     // What is this long was not typed.
     if length > LONGEST_WORD {

@@ -68,6 +68,10 @@ pub(crate) fn parse<'t>(text: &'t str, lines: &Lines<'_>) -> Result<Document<'t>
 }
 
 fn describe(text: &str, lines: &Lines<'_>, error: &Error) -> Issue {
+    if matches!(error, Error::DtdDetected) {
+        let place = lines.place(text.find("<!DOCTYPE").unwrap_or(0));
+        return issue(place, "a document type declaration", "plain XML: remove <!DOCTYPE ...> and what it declares");
+    }
     // A file that simply ends: name the element that is still open.
     let cut_off = matches!(error, Error::UnclosedRootNode | Error::UnexpectedEndOfStream | Error::NoRootNode)
         || position(lines, error).is_none_or(|place| place.line >= lines.end().line && ends_inside(text));
@@ -100,7 +104,6 @@ fn describe(text: &str, lines: &Lines<'_>, error: &Error) -> Issue {
         Error::UnknownEntityReference(name, _) => issue(place, format!("the unknown entity &{name};"), "plain text"),
         Error::NonXmlChar(c, _) => issue(place, format!("the character {c:?}"), "text"),
         Error::InvalidAttributeValue(_) => issue(place, "'<' inside an attribute value", "a closing quote before it"),
-        Error::DtdDetected => issue(place, "a document type declaration", "plain XML without <!DOCTYPE>"),
         other => issue(place, other.to_string(), "well-formed XML"),
     }
 }

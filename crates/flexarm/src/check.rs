@@ -119,7 +119,7 @@ pub fn check_with_loads(
         (Some(path), _) => check_motion(&robot, path, &mut findings),
         // Its own faults are told when it is asked for.
         (None, Some(own)) => robot.rigid_model().ok().and_then(|model| {
-            let motion = Motion::load(own, &model).ok()?;
+            let motion = robot.motion(own).ok()?;
             let along = of_motion(&motion.name, &motion.trajectory, &model);
             findings.extend(along.into_iter().map(|caveat| Finding::caveat(own, caveat)));
             Some(motion)
@@ -247,7 +247,7 @@ impl Pose {
 /// The motion, if it can be used, with its findings.
 fn check_motion(robot: &Robot, path: &Path, findings: &mut Vec<Finding>) -> Option<Motion> {
     let file = || path.display().to_string();
-    match robot.rigid_model().and_then(|model| Motion::load(path, &model)) {
+    match robot.motion(path) {
         Err(error) => {
             findings.push(Finding::error("trajectory", file(), &error));
             None

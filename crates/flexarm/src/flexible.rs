@@ -1,6 +1,7 @@
 //! A robot with its flexible links and elastic drives in place: which model each of them gets, and the arm that results.
 
 use std::collections::HashMap;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::bends::Bend;
@@ -201,6 +202,8 @@ pub struct FlexibleRobot {
     pub spans: Vec<FlexibleSpan>,
     /// How they are drawn bent, in the order of the spans.
     pub bends: Vec<Bend>,
+    /// Its URDF.
+    pub(crate) path: PathBuf,
     /// The same robot with rigid links and without gearboxes.
     pub rigid: Arc<Model>,
     /// Friction per actuated coordinate.
@@ -261,6 +264,55 @@ impl FlexibleRobot {
             }
         });
         arm.with_servo(Servo { sample_s, axes: axes.collect(), rigid: self.rigid.clone() })
+    }
+
+    /// An error with the links that lack inertia, if that is the reason.
+    pub(crate) fn explained(&self, source: StepError) -> Error {
+        let light = match source {
+            StepError::Singular { matrix: "mass matrix", .. } => self.without_inertia(),
+            _ => Vec::new(),
+        };
+        if light.is_empty() {
+            return Error::Step { source, partial: false };
+        }
+        Error::Usage(format!(
+            "{}: {source}: {} lacks inertia about some axis, with all that it carries; give the links <inertial> with mass \
+             and inertia, have them estimated (inertia_from_density in the robot file), or let nothing give way before them",
+            self.path.display(),
+            light.join(", ")
+        ))
+    }
+
+    /// What gives way and carries no inertia in some direction: the rows of the mass matrix that depend on earlier ones.
+    fn without_inertia(&self) -> Vec<String> {
+        /// Squared share of a row that the rows before leave over.
+        const LEAST: f64 = 1e-13;
+        let (model, n) = (&self.model, self.model.n_actuated());
+        let M = mass_matrix(model, &mut Data::new(model), &DVector::zeros(model.nv())).clone();
+        let free: Vec<usize> = self.torque.iter().map(|t| t.0).chain(n..model.nv()).collect();
+        let mut L: DMatrix<f64> = DMatrix::zeros(free.len(), free.len());
+        let mut names: Vec<String> = Vec::new();
+        for (i, &row) in free.iter().enumerate() {
+            for j in 0..i {
+                let known: f64 = (0..j).map(|k| L[(i, k)] * L[(j, k)]).sum();
+                L[(i, j)] = if L[(j, j)] > 0.0 { (M[(row, free[j])] - known) / L[(j, j)] } else { 0.0 };
+            }
+            let left = M[(row, row)] - (0..i).map(|k| L[(i, k)].powi(2)).sum::<f64>();
+            if left > LEAST * M[(row, row)] {
+                L[(i, i)] = left.sqrt();
+                continue;
+            }
+            let group = model.elastic().iter().position(|g| (g.coordinate..g.coordinate + g.size).contains(&row));
+            let name = match group.map(|k| self.owners[k]) {
+                Some(Owner::Link(k)) => format!("link {:?}", self.spans[k].link),
+                Some(Owner::Drive(_)) => format!("link {:?}", model.bodies()[model.coordinates()[row].body].name),
+                None => format!("what joint {:?} moves by torque", model.coordinates()[row].joint),
+            };
+            if !names.contains(&name) {
+                names.push(name);
+            }
+        }
+        names
     }
 
     /// Inertia that each torque-driven joint feels at once, all other free coordinates yielding: `1 / (M_ff^-1)_ii`.
@@ -427,6 +479,7 @@ impl Robot {
         }
         let (spans, rigid) = (substituted.spans, self.rigid_model()?);
         Ok(FlexibleRobot {
+            path: self.urdf_path.clone(),
             model: Arc::new(model),
             springs,
             owners,

@@ -97,4 +97,4 @@ pub use flexarm_stepping::{
     StepperKind,
 };
 pub use flexarm_trajectory::TrajectoryError;
-pub use flexarm_urdf::{InertiaEstimate, ReadOptions, search_paths_from_environment};
+pub use flexarm_urdf::{InertiaEstimate, ReadOptions, closest, search_paths_from_environment};

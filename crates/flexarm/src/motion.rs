@@ -3,9 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use flexarm_kinematics::Model;
+use flexarm_kinematics::{Coordinate, Model};
 use flexarm_stepping::PrescribedMotion;
 use flexarm_trajectory::{JointLimits, LimitViolation, Trajectory};
+use flexarm_urdf::closest;
 
 use crate::caveat::{self, Caveat};
 use crate::error::Error;
@@ -25,6 +26,8 @@ pub struct Motion {
     pub likely: &'static str,
     /// Things worth telling.
     pub warnings: Vec<String>,
+    /// Joints that the file does not name, and where they stay (rad or m).
+    pub held: Vec<(String, f64)>,
 }
 
 struct Along(Arc<Trajectory>);
@@ -53,11 +56,20 @@ fn limits(model: &Model) -> Vec<JointLimits> {
 }
 
 impl Motion {
-    /// Reads a trajectory file for a model.
+    /// Reads a trajectory file for a model; joints that it does not name stay at zero, or at the limit nearest to it.
     ///
     /// # Errors
-    /// [`Error::File`] or [`Error::Trajectory`]: format, units, times, joints that are missing or unknown.
+    /// As [`Motion::load_with_held`].
     pub fn load(path: &Path, model: &Model) -> Result<Self, Error> {
+        Self::load_with_held(path, model, &[])
+    }
+
+    /// Reads a trajectory file for a model. A joint that it does not name stays where `hold` says (rad or m), else at
+    /// zero, or at the limit nearest to it.
+    ///
+    /// # Errors
+    /// [`Error::File`] or [`Error::Trajectory`]: format, units, times, joints that the model does not have.
+    pub fn load_with_held(path: &Path, model: &Model, hold: &[(String, f64)]) -> Result<Self, Error> {
         if !path.is_file() {
             let what = "there is no such trajectory file; give a .csv or .toml file".into();
             return Err(Error::File { path: path.to_owned(), what });
@@ -68,13 +80,23 @@ impl Motion {
         let named: Vec<(&str, JointLimits)> = names.iter().copied().zip(limits.iter().copied()).collect();
         let trajectory = Trajectory::from_path(path, &named)?;
         let warnings = warnings(&trajectory, path);
+        check_joints(path, trajectory.joints(), &names)?;
+        let still = actuated.iter().filter(|c| !trajectory.joints().contains(&c.joint));
+        let place = |c: &Coordinate| {
+            let told = hold.iter().find(|(joint, _)| *joint == c.joint).map(|(_, value)| *value);
+            (c.joint.clone(), told.unwrap_or(0.0f64.max(c.limits.lower).min(c.limits.upper)))
+        };
+        let held: Vec<(String, f64)> = still.map(place).collect();
+        let named_held: Vec<(&str, f64)> = held.iter().map(|(joint, value)| (joint.as_str(), *value)).collect();
+        let trajectory = trajectory.with_held_joints(&named_held)?;
         let trajectory = trajectory
             .with_joint_order(&names)
             .map_err(|e| Error::File { path: path.to_owned(), what: e.to_string() })?;
         let violations = trajectory.check_limits(&limits);
         let likely = caveat::motion::degrees(&violations, model);
         let name = path.file_stem().map_or_else(|| "trajectory".into(), |s| s.to_string_lossy().into_owned());
-        Ok(Self { name, path: path.to_owned(), trajectory: Arc::new(trajectory), violations, likely, warnings })
+        let (path, trajectory) = (path.to_owned(), Arc::new(trajectory));
+        Ok(Self { name, path, trajectory, violations, likely, warnings, held })
     }
 
     /// The same motion with each corner, where a velocity jumps, replaced by a blend that lasts `seconds`.
@@ -95,13 +117,45 @@ impl Motion {
     /// What is worth knowing about it.
     pub fn caveats(&self) -> Vec<Caveat> {
         let file = self.path.display().to_string();
-        self.warnings.iter().map(|text| Caveat::said("trajectory", &file, text, "")).collect()
+        let told = self.warnings.iter().map(|text| Caveat::said("trajectory", &file, text, ""));
+        told.chain(self.held_note()).collect()
+    }
+
+    /// Which joints stay where, if the file does not name all.
+    fn held_note(&self) -> Option<Caveat> {
+        let places: Vec<String> = self.held.iter().map(|(joint, value)| format!("{joint:?} at {value}")).collect();
+        let help =
+            "name them in the motion to move them, or say where they stay by [hold] in the robot file (rad or m)";
+        let message =
+            format!("{}: joints that the motion does not name are held: {}", self.path.display(), places.join(", "));
+        let note = Caveat::said("held-joints", self.path.display().to_string(), message, help).as_note();
+        (!places.is_empty()).then_some(note)
     }
 
     /// For steppers.
     pub fn prescribed(&self) -> Arc<dyn PrescribedMotion> {
         Arc::new(Along(self.trajectory.clone()))
     }
+}
+
+/// A motion must move joints that there are, and at least one of them.
+fn check_joints(path: &Path, moved: &[String], joints: &[&str]) -> Result<(), Error> {
+    let unknown: Vec<String> = (moved.iter().filter(|name| !joints.contains(&name.as_str())))
+        .map(|name| match closest(name, joints.iter().copied()) {
+            Some(meant) => format!("{name:?} (did you mean {meant:?}?)"),
+            None => format!("{name:?}"),
+        })
+        .collect();
+    if unknown.is_empty() {
+        return Ok(());
+    }
+    let joints = joints.iter().map(|name| format!("{name:?}")).collect::<Vec<_>>().join(", ");
+    let what = format!(
+        "the motion moves {}, which the robot does not have; its joints are {joints}: rename them in the motion, or remove \
+         them",
+        unknown.join(", ")
+    );
+    Err(Error::File { path: path.to_owned(), what })
 }
 
 fn warnings(trajectory: &Trajectory, path: &Path) -> Vec<String> {

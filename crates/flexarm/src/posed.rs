@@ -61,7 +61,7 @@ impl Posed {
             ));
         }
         let prismatic = actuated.iter().map(|c| c.kind == "prismatic").collect();
-        let arm = flexible.arm(Arc::new(Held(at.clone()))).map_err(failed)?;
+        let arm = flexible.arm(Arc::new(Held(at.clone()))).map_err(|error| flexible.explained(error))?;
         let tool = arm.model.frame(TCP_FRAME).expect("added when the robot was loaded").clone();
         Ok(Self { flexible, arm, tool, joints, prismatic, at, caveats })
     }
@@ -69,7 +69,7 @@ impl Posed {
     /// The linear structure about the equilibrium under weight and a wrench at the TCP (world axes).
     pub(crate) fn linear(&self, wrench: &Vector6<f64>) -> Result<Linear, Error> {
         let F = Wrench::new(wrench.fixed_rows::<3>(0).into(), wrench.fixed_rows::<3>(3).into());
-        linearise(&self.arm, &self.tool, &F, 0.0).map_err(failed)
+        linearise(&self.arm, &self.tool, &F, 0.0).map_err(|error| self.flexible.explained(error))
     }
 
     /// The tool with every elastic coordinate at zero.

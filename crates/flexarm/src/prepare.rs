@@ -40,7 +40,7 @@ pub(crate) fn checked(robot: &Robot, motion: &Motion, options: &RunOptions) -> R
     check_options(motion, options)?;
     let failed = |source: StepError| Error::Step { source, partial: false };
     let flexible = robot.modelled(&options.modelling)?;
-    let mut arm = flexible.arm(motion.prescribed()).map_err(failed)?;
+    let mut arm = flexible.arm(motion.prescribed()).map_err(|error| flexible.explained(error))?;
     let mut load_caveats = Vec::new();
     if let Some(path) = &options.loads {
         let disturbances = Disturbances::load(path, robot, &arm.model, motion.trajectory.duration())?;
@@ -56,7 +56,8 @@ pub(crate) fn checked(robot: &Robot, motion: &Motion, options: &RunOptions) -> R
     if options.log_rate_hz * options.step_s > 1.0 + 1e-9 && options.log_rate_hz != RunOptions::default().log_rate_hz {
         load_caveats.push(kinds::LOG_RATE.found("run", options.log_rate_hz, 1.0 / options.step_s));
     }
-    let stepper = new_stepper(options.stepper, arm.clone(), options.step_s, options.start).map_err(failed)?;
+    let stepper = new_stepper(options.stepper, arm.clone(), options.step_s, options.start)
+        .map_err(|error| flexible.explained(error))?;
     Ok(Checked { flexible, arm, stepper, load_caveats })
 }
 

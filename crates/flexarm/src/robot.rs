@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use flexarm_kinematics::{Joint, JointKind, Link, LinkInertia, Mechanism, Model, Pose};
-use flexarm_urdf::{ReadOptions, UrdfRobot, default_tcp, read_urdf};
+use flexarm_urdf::{InertiaEstimate, ReadOptions, UrdfRobot, closest, default_tcp, read_urdf};
 use nalgebra::{Matrix3, Rotation3, Translation3, Vector3};
 use toml::Spanned;
 
@@ -51,6 +51,8 @@ pub struct Robot {
     pub tcp: (String, Pose),
     /// Trajectory for runs without one.
     pub default_trajectory: Option<PathBuf>,
+    /// Where joints stay that a motion does not name (rad or m).
+    pub hold: Vec<(String, f64)>,
     /// Things worth telling.
     pub warnings: Vec<String>,
     /// What only the text of the file shows.
@@ -93,6 +95,7 @@ impl Robot {
             drives: Vec::new(),
             tcp: (link, Pose::identity()),
             default_trajectory: None,
+            hold: Vec::new(),
             warnings: Vec::new(),
             written: Vec::new(),
         };
@@ -119,6 +122,9 @@ impl Robot {
                 urdf_options.arguments.push((name.clone(), value));
             }
         }
+        if let Some(estimate) = inertia_estimate(&file, &source)? {
+            urdf_options.inertia_from_mesh.get_or_insert(estimate);
+        }
         let urdf = read_urdf(&urdf_path, &urdf_options)?;
 
         let mut faults: Vec<Error> = Vec::new();
@@ -143,9 +149,14 @@ impl Robot {
             drives: Vec::new(),
             tcp: tcp.unwrap_or_default(),
             default_trajectory: file.default_trajectory.as_ref().map(|t| folder.join(t.get_ref())),
+            hold: Vec::new(),
             warnings: Vec::new(),
             written: written_caveats(&file),
         };
+        for (joint, value) in &file.hold {
+            let held = held_joint(joint, value, &robot.rigid, &source).map_err(Error::from);
+            robot.hold.extend(keep(held, &mut faults));
+        }
         if let Some(payload) = &file.payload {
             let link = file.tcp.as_ref().map(|t| t.get_ref().link.get_ref().as_str());
             let link = link.or_else(|| default_tcp(&robot.urdf.mechanism)).unwrap_or_default().to_owned();
@@ -254,6 +265,14 @@ impl Robot {
         caveats
     }
 
+    /// A motion of this robot: joints that the file does not name stay where the robot file says, else at zero.
+    ///
+    /// # Errors
+    /// As [`crate::Motion::load_with_held`], and [`Error::Model`].
+    pub fn motion(&self, path: &Path) -> Result<crate::Motion, Error> {
+        crate::Motion::load_with_held(path, &*self.rigid_model()?, &self.hold)
+    }
+
     /// The rigid robot's tree.
     ///
     /// # Errors
@@ -284,6 +303,48 @@ fn written_caveats(file: &RobotFile) -> Vec<Caveat> {
 /// A finding with its place, as a sentence.
 fn told(finding: &flexarm_urdf::Finding) -> String {
     format!("{}: {}", finding.location, finding.message)
+}
+
+/// How the file has missing masses estimated.
+fn inertia_estimate(file: &RobotFile, source: &Source) -> Result<Option<InertiaEstimate>, RobotFileError> {
+    let positive = |what: &str, value: &Spanned<f64>| match *value.get_ref() {
+        x if x.is_finite() && x > 0.0 => Ok(x),
+        x => Err(source.error(value.span(), format!("{what} is {x}, it must be positive"))),
+    };
+    match (&file.inertia_from_density, &file.inertia_from_total_mass) {
+        (Some(_), Some(mass)) => {
+            let message = "inertia_from_density and inertia_from_total_mass are both given: keep one of them";
+            Err(source.error(mass.span(), message))
+        }
+        (Some(density), None) => positive("inertia_from_density", density).map(InertiaEstimate::Density).map(Some),
+        (None, Some(mass)) => positive("inertia_from_total_mass", mass).map(InertiaEstimate::TotalMass).map(Some),
+        (None, None) => Ok(None),
+    }
+}
+
+/// An entry of `[hold]`: a joint that moves by itself, within its limits.
+fn held_joint(
+    name: &str,
+    value: &Spanned<f64>,
+    mechanism: &Mechanism,
+    source: &Source,
+) -> Result<(String, f64), RobotFileError> {
+    let free = |joint: &&Joint| joint.kind.degrees_of_freedom() == 1 && joint.mimic.is_none();
+    let at = *value.get_ref();
+    let Some(joint) = mechanism.joints.iter().filter(free).find(|joint| joint.name == name) else {
+        let names: Vec<&str> = mechanism.joints.iter().filter(free).map(|joint| joint.name.as_str()).collect();
+        let meant = closest(name, names.iter().copied());
+        let meant =
+            meant.map_or_else(|| format!("its joints are {names:?}"), |meant| format!("did you mean {meant:?}?"));
+        let message = format!("hold: {name:?} is no joint of the robot that moves by itself; {meant}");
+        return Err(source.error(value.span(), message));
+    };
+    let (lower, upper) = (joint.limits.lower, joint.limits.upper);
+    if !(at.is_finite() && lower <= at && at <= upper) {
+        let message = format!("hold: {name:?} is to stay at {at}, outside of its limits {lower} to {upper} (rad or m)");
+        return Err(source.error(value.span(), message));
+    }
+    Ok((name.to_owned(), at))
 }
 
 /// The text of an argument for a xacro file.

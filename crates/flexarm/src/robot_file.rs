@@ -36,6 +36,13 @@ pub struct RobotFile {
     /// Links whose inertia may be one that no body has (published data sometimes do).
     #[serde(default)]
     pub waive_inertia: Vec<String>,
+    /// Density for links without `<inertial>` (kg/m³): masses from their meshes.
+    pub inertia_from_density: Option<Spanned<f64>>,
+    /// Mass of all links without `<inertial>` together (kg), distributed by volume.
+    pub inertia_from_total_mass: Option<Spanned<f64>>,
+    /// Where joints stay that a motion does not name (rad or m).
+    #[serde(default)]
+    pub hold: std::collections::BTreeMap<String, Spanned<f64>>,
     /// Links that bend.
     #[serde(default)]
     pub flexible_link: Vec<FlexibleLinkEntry>,
