@@ -135,9 +135,9 @@ mod trajectory {
     #[test]
     fn joint_that_the_robot_lacks() {
         let csv = "time,swing,swong\n0,0,0\n1,0.5,0\n";
-        compare_motion("extra.csv", csv, &["unknown \"swong\"", "wanted are \"swing\"", "rename"]);
+        compare_motion("extra.csv", csv, &["extra.csv", "\"swong\"", "its joints are \"swing\"", "rename"]);
         let toml = with(SWING, "\"swing\"", "\"swong\"");
-        compare_motion("other.toml", toml, &["missing \"swing\"", "unknown \"swong\"", "rename"]);
+        compare_motion("other.toml", toml, &["other.toml", "\"swong\"", "its joints are \"swing\"", "rename"]);
     }
 
     #[test]
@@ -145,13 +145,14 @@ mod trajectory {
         let place = Place::new();
         place.write("motion.csv", "time,joint_1\n0,0\n1,0.5\n");
         let robot = common::shipped_robot("reference_arm");
-        let words = ["missing", "\"joint_2\"", "\"joint_6\"", "it has \"joint_1\""];
-        place.refused(&["compare", &robot, "motion.csv", "-o", "result"], &words);
+        let answer = place.flexarm(&["compare", &robot, "motion.csv", "-o", "result"]);
+        assert_eq!(answer.code, 0, "{}", answer.err);
+        answer.says(&["motion.csv", "joints that the motion does not name are held", "\"joint_2\" at 0", "[hold]"]);
     }
 
     #[test]
     fn joints_that_do_not_match_with_file() {
-        compare_motion("other.csv", "time,swong\n0,0\n1,0.5\n", &["other.csv", "missing \"swing\""]);
+        compare_motion("other.csv", "time,swong\n0,0\n1,0.5\n", &["other.csv", "\"swong\"", "did you mean \"swing\"?"]);
     }
 
     #[test]

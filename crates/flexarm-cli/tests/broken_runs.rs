@@ -18,7 +18,8 @@ fn place() -> Place {
     place
 }
 
-/// Last time in any chunk of a file that must be whole from magic to magic (s); `None` without chunks.
+/// Last time in any chunk of a file that must be whole from magic to magic, since the start of the run (s); `None` without
+/// chunks.
 ///
 /// A chunk record begins with the first and last time of its messages.
 fn last_time(file: &[u8]) -> Option<f64> {
@@ -33,7 +34,8 @@ fn last_time(file: &[u8]) -> Option<f64> {
         }
         rest = &rest[9 + length..];
     }
-    last.map(|nanoseconds| nanoseconds as f64 * 1e-9)
+    // Times have a date: 2000-01-01.
+    last.map(|nanoseconds| (nanoseconds - 946_684_800_000_000_000) as f64 * 1e-9)
 }
 
 /// Truth: the promise of the recorder, at most a second of wall time is lost. What was in the file a second before the

@@ -84,7 +84,8 @@ fn on_a_disk_that_fills_up_all_recordings_reach_about_as_far() {
         let reached = last_time(&place.text(&format!("{name}.csv")));
         // Measured: MCAP and table both end at 0.864 s. Flushes are 64 samples apart.
         assert!(reached > table - 0.2, "{name} reaches {reached} s, the table {table} s");
-        assert_eq!(summary["warnings"].as_array().unwrap().len(), 1, "{summary}");
+        // Of a file whose end had no room; one that was closed in time is whole.
+        assert!(summary["warnings"].as_array().unwrap().len() <= 1, "{summary}");
     }
 }
 

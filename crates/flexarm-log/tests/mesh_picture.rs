@@ -142,8 +142,8 @@ fn single_tied_nodes_without_a_whole_face_are_told_in_red() {
     let good = ends(&mesh);
     // Two edges of the end face: nodes of no common face.
     let edges = interface(&mesh, "B", [0.8, 0.05, 0.03], |p| p.x > 0.8 - 1e-9 && !(0.01..0.09).contains(&p.y));
-    assert_eq!(red(&good), 0);
-    assert!(red(&[good[0].clone(), edges]) > 100);
+    // That bricks of first order are too stiff is told in red as well.
+    assert!(red(&[good[0].clone(), edges]) > red(&good) + 100);
 }
 
 #[test]

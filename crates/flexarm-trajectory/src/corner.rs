@@ -13,6 +13,10 @@ const AROUND: usize = 4;
 const LEAST_AROUND: usize = 2;
 /// Smaller jumps are left to the spline, as parts of the top speed.
 const SMALLEST: f64 = 1e-4;
+/// Samples on either side over which rounded data must differ from a smooth curve, in steps of the rounding. Half a step is
+/// what rounding leaves; a corner of one step per sample leaves 1.5 of them over the shorter window.
+const WINDOWS: [usize; 2] = [16, 8];
+const BEYOND_ROUNDING: f64 = 1.0;
 /// A corner nearer to a sample than this part of the interval is at the sample.
 const AT_SAMPLE: f64 = 0.01;
 
@@ -52,6 +56,16 @@ pub(crate) fn corners(t: &[f64], q: &[f64]) -> Vec<Corner> {
         jump.abs() > STANDS_OUT * (most * span(i) + rounding(i)) && jump.abs() > SMALLEST * top
     };
 
+    let resolution = resolution(q);
+    // Whether a parabola, rounded, would give the same samples: then what stands out is a step of the rounding.
+    let is_rounding = |i: usize| {
+        resolution > 0.0
+            && WINDOWS.iter().any(|window| {
+                let range = i.saturating_sub(*window)..(i + window + 1).min(q.len());
+                distance_from_parabola(&t[range.clone()], &q[range]) < BEYOND_ROUNDING * resolution
+            })
+    };
+
     let mut corners = Vec::new();
     let mut i = 1;
     while i < last {
@@ -70,7 +84,7 @@ pub(crate) fn corners(t: &[f64], q: &[f64]) -> Vec<Corner> {
             let (most, ..) = around(i, i)?;
             stands_out(change(i), i, most).then_some(Corner { sample: i, fraction: 0.0, position: q[i] })
         };
-        match between.or_else(at) {
+        match between.or_else(at).filter(|corner| !is_rounding(corner.sample)) {
             Some(corner) => {
                 corners.push(corner);
                 i += 2;
@@ -79,6 +93,50 @@ pub(crate) fn corners(t: &[f64], q: &[f64]) -> Vec<Corner> {
         }
     }
     corners
+}
+
+/// The step that all positions are multiples of, but for an offset: decimals of a table, counts of an encoder. 0 when
+/// there is none that matters.
+fn resolution(q: &[f64]) -> f64 {
+    let differences = || q.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+    let least = 1e-5 * differences().fold(0.0, f64::max);
+    // Euclid's algorithm; what is below `least` is zero, as is what is short of a multiple by less.
+    let divisor = |mut a: f64, mut b: f64| {
+        while b > least {
+            let rest = a % b;
+            (a, b) = (b, if b - rest < least { 0.0 } else { rest });
+        }
+        a
+    };
+    let mut step = 0.0_f64;
+    for difference in differences() {
+        step = divisor(step.max(difference), step.min(difference));
+        if difference > 0.0 && step < 10.0 * least {
+            return 0.0;
+        }
+    }
+    step
+}
+
+/// Largest distance of samples from the parabola of least squares through them.
+fn distance_from_parabola(t: &[f64], q: &[f64]) -> f64 {
+    let (first, last) = (t[0], t[t.len() - 1]);
+    let x: Vec<f64> = t.iter().map(|t| 2.0 * (t - first) / (last - first) - 1.0).collect();
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let mut rest = q.to_vec();
+    // 1, x and x², each without its part along those before: the sums of squares fall apart.
+    let mut basis: Vec<Vec<f64>> = Vec::new();
+    for power in 0..3 {
+        let mut column: Vec<f64> = x.iter().map(|x| x.powi(power)).collect();
+        for before in &basis {
+            let part = dot(&column, before) / dot(before, before);
+            column.iter_mut().zip(before).for_each(|(x, b)| *x -= part * b);
+        }
+        let part = dot(&rest, &column) / dot(&column, &column);
+        rest.iter_mut().zip(&column).for_each(|(q, c)| *q -= part * c);
+        basis.push(column);
+    }
+    rest.iter().fold(0.0, |most: f64, q| most.max(q.abs()))
 }
 
 #[cfg(test)]
@@ -106,6 +164,16 @@ mod tests {
         }
     }
 
+    /// Truth: a path to and fro, in a table whose last digit is as large as one sample's way.
+    #[test]
+    fn corners_of_rounded_data_are_found() {
+        for step in [1e-3, 1e-4, 1e-6] {
+            let f = |t: f64| ((0.3 - (t - 0.3).abs()) / step).round() * step;
+            let found = found(600, 1e-3, f);
+            assert!(found.len() == 1 && (found[0].0 - 0.3).abs() < 1e-3, "{step:e}: {found:?}");
+        }
+    }
+
     /// Accelerations that jump, fast curvature, coarse data, rounding to five digits, noise: no corner in any of them.
     #[test]
     fn smooth_and_rough_data_have_no_corners() {
@@ -121,6 +189,12 @@ mod tests {
         assert_eq!(found(20, 0.05, |t| (20.0 * t).sin()), []);
         assert_eq!(found(1000, 1e-3, |t| (1e5 * (2.0 * t).sin()).round() * 1e-5), []);
         assert_eq!(found(1000, 1e-3, |t| (1e5 * 0.123 * t).round() * 1e-5), []);
+        for step in [1e-3, 2e-4, 1e-5, 3e-6, 1e-7, 2.0 * std::f64::consts::PI / 2f64.powi(19)] {
+            for speed in [0.1, 0.5, 2.0, 5.0] {
+                let rounded = |t: f64| ((speed * t).sin() / step).round() * step;
+                assert_eq!(found(3000, 1e-3, rounded), [], "{speed} rad/s in steps of {step:e} rad");
+            }
+        }
         assert_eq!(found(19_999, 1e-3, |t| t + rough[(t * 1e3).round() as usize]), []);
         assert_eq!(found(8, 1.0, |t| [0.0, 0.0, 1.0, 2.0, 2.0, 2.0, 1.0, 0.0, 0.0][t as usize]), []);
         assert_eq!(found(500, 2e-3, |_| 1.7), []);

@@ -253,7 +253,7 @@ pub fn inspect(robot: &Robot, at: Option<&str>, velocity: Option<&str>) -> Resul
         coriolis: (&bias - &gravity).as_slice().to_vec(),
         gravity_torque: gravity.as_slice().to_vec(),
         bias: bias.as_slice().to_vec(),
-        mass_kg: robot.rigid.links.iter().filter_map(|l| l.inertia).map(|i| i.mass).sum(),
+        mass_kg: robot.rigid.links.iter().filter_map(|l| l.inertia).map(|i| i.mass).fold(0.0, |sum, mass| sum + mass),
         warnings,
     })
 }

@@ -73,7 +73,7 @@ pub use headline::{Bending, ShareFigures};
 pub use inspect::{FlexibleInfo, Inspection, JointInfo, LinkInfo, TcpInfo, inspect, parse_joint_values};
 pub use mode_recording::{ModeMovie, record_modes};
 pub use modes::{ModeFigures, ModeTable, modes};
-pub use motion::Motion;
+pub use motion::{HeldJoint, Motion};
 pub use options::{DriveModel, LinkModel, Modelling, Outputs, RunOptions};
 pub use report::{
     Figure, FigureGroup, ReportFiles, ReportOptions, ReportRun, Weight, figure_groups, html, markdown, report, rows,

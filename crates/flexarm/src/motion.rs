@@ -26,8 +26,19 @@ pub struct Motion {
     pub likely: &'static str,
     /// Things worth telling.
     pub warnings: Vec<String>,
-    /// Joints that the file does not name, and where they stay (rad or m).
-    pub held: Vec<(String, f64)>,
+    /// Joints that the file does not name.
+    pub held: Vec<HeldJoint>,
+}
+
+/// A joint that a motion does not name.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeldJoint {
+    /// Its name.
+    pub joint: String,
+    /// Where it stays, rad or m.
+    pub at: f64,
+    /// Whether the robot file says so.
+    pub told: bool,
 }
 
 struct Along(Arc<Trajectory>);
@@ -84,10 +95,11 @@ impl Motion {
         let still = actuated.iter().filter(|c| !trajectory.joints().contains(&c.joint));
         let place = |c: &Coordinate| {
             let told = hold.iter().find(|(joint, _)| *joint == c.joint).map(|(_, value)| *value);
-            (c.joint.clone(), told.unwrap_or(0.0f64.max(c.limits.lower).min(c.limits.upper)))
+            let at = told.unwrap_or(0.0f64.max(c.limits.lower).min(c.limits.upper));
+            HeldJoint { joint: c.joint.clone(), at, told: told.is_some() }
         };
-        let held: Vec<(String, f64)> = still.map(place).collect();
-        let named_held: Vec<(&str, f64)> = held.iter().map(|(joint, value)| (joint.as_str(), *value)).collect();
+        let held: Vec<HeldJoint> = still.map(place).collect();
+        let named_held: Vec<(&str, f64)> = held.iter().map(|held| (held.joint.as_str(), held.at)).collect();
         let trajectory = trajectory.with_held_joints(&named_held)?;
         let trajectory = trajectory
             .with_joint_order(&names)
@@ -121,15 +133,20 @@ impl Motion {
         told.chain(self.held_note()).collect()
     }
 
-    /// Which joints stay where, if the file does not name all.
-    fn held_note(&self) -> Option<Caveat> {
-        let places: Vec<String> = self.held.iter().map(|(joint, value)| format!("{joint:?} at {value}")).collect();
-        let help =
-            "name them in the motion to move them, or say where they stay by [hold] in the robot file (rad or m)";
-        let message =
-            format!("{}: joints that the motion does not name are held: {}", self.path.display(), places.join(", "));
-        let note = Caveat::said("held-joints", self.path.display().to_string(), message, help).as_note();
-        (!places.is_empty()).then_some(note)
+    /// Which joints stay where, if the file does not name all: a note where the robot file says so, else a warning.
+    fn held_note(&self) -> Vec<Caveat> {
+        let (told, assumed): (Vec<&HeldJoint>, Vec<&HeldJoint>) = self.held.iter().partition(|held| held.told);
+        let file = self.path.display().to_string();
+        let said = |held: &[&HeldJoint], end: &str| {
+            let places: Vec<String> = held.iter().map(|held| format!("{:?} at {}", held.joint, held.at)).collect();
+            let places = places.join(", ");
+            let message = format!("{file}: joints that the motion does not name are held: {places}{end}");
+            Caveat::said("held-joints", &file, message, "name them in the motion to move them")
+        };
+        let assumed =
+            (!assumed.is_empty()).then(|| said(&assumed, " ([hold] in the robot file says where, in rad or m)"));
+        let told = (!told.is_empty()).then(|| said(&told, "").as_note());
+        assumed.into_iter().chain(told).collect()
     }
 
     /// For steppers.

@@ -336,6 +336,7 @@ mod tests {
         assert_eq!(text(&rows(&[1001, 1002], 6)).unwrap(), "A=1001,B=1002");
         assert_eq!(text(&rows(&[947, 948, 949, 950], 3)).unwrap(), "A=947:1-3+948:1-3,B=949:1-3+950:1-3");
         assert_eq!(text(&[DofLabel::UNKNOWN; 22]).unwrap(), "A=#1-6,B=#7-12");
-        assert_eq!(text(&rows(&[1, 2, 3], 6)), None);
+        assert_eq!(text(&rows(&[1, 2, 3], 6)).unwrap(), "A=1,B=2,C=3");
+        assert_eq!(text(&rows(&[1], 6)), None);
     }
 }
