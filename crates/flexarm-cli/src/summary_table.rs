@@ -391,12 +391,12 @@ files
         let text = plain(&summary, 60);
         let expected = "\
 runs
-  run           as given  links=modal
-  peak [mm]       1.4159       1.4159
-  at [s]           0.600        0.600
-  static [mm]          -            -
-  in motion [mm]       -            -
-  RMS [mm]        1.1000       1.1000
+  run             as given  links=modal
+  peak [mm]         1.4159       1.4159
+  at [s]             0.600        0.600
+  static [mm]            -            -
+  in motion [mm]         -            -
+  RMS [mm]          1.1000       1.1000
 ";
         assert!(text.contains(expected), "{text}");
     }

@@ -14,8 +14,8 @@ const LEAST_AROUND: usize = 2;
 /// Smaller jumps are left to the spline, as parts of the top speed.
 const SMALLEST: f64 = 1e-4;
 /// Samples on either side over which rounded data must differ from a smooth curve, in steps of the rounding. Half a step is
-/// what rounding leaves; a corner of one step per sample leaves 1.5 of them over the shorter window.
-const WINDOWS: [usize; 2] = [16, 8];
+/// what rounding leaves; a corner of one step per sample leaves 3/32 of the window, 1.1 over the shorter one.
+const WINDOWS: [usize; 2] = [16, 12];
 const BEYOND_ROUNDING: f64 = 1.0;
 /// A corner nearer to a sample than this part of the interval is at the sample.
 const AT_SAMPLE: f64 = 0.01;
@@ -57,12 +57,12 @@ pub(crate) fn corners(t: &[f64], q: &[f64]) -> Vec<Corner> {
     };
 
     let resolution = resolution(q);
-    // Whether a parabola, rounded, would give the same samples: then what stands out is a step of the rounding.
+    // Whether a cubic, rounded, would give the same samples: then what stands out is a step of the rounding.
     let is_rounding = |i: usize| {
         resolution > 0.0
             && WINDOWS.iter().any(|window| {
                 let range = i.saturating_sub(*window)..(i + window + 1).min(q.len());
-                distance_from_parabola(&t[range.clone()], &q[range]) < BEYOND_ROUNDING * resolution
+                distance_from_cubic(&t[range.clone()], &q[range]) < BEYOND_ROUNDING * resolution
             })
     };
 
@@ -118,15 +118,15 @@ fn resolution(q: &[f64]) -> f64 {
     step
 }
 
-/// Largest distance of samples from the parabola of least squares through them.
-fn distance_from_parabola(t: &[f64], q: &[f64]) -> f64 {
+/// Largest distance of samples from the cubic of least squares through them.
+fn distance_from_cubic(t: &[f64], q: &[f64]) -> f64 {
     let (first, last) = (t[0], t[t.len() - 1]);
     let x: Vec<f64> = t.iter().map(|t| 2.0 * (t - first) / (last - first) - 1.0).collect();
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let mut rest = q.to_vec();
-    // 1, x and x², each without its part along those before: the sums of squares fall apart.
+    // 1, x, x² and x³, each without its part along those before: the sums of squares fall apart.
     let mut basis: Vec<Vec<f64>> = Vec::new();
-    for power in 0..3 {
+    for power in 0..4 {
         let mut column: Vec<f64> = x.iter().map(|x| x.powi(power)).collect();
         for before in &basis {
             let part = dot(&column, before) / dot(before, before);
@@ -170,6 +170,10 @@ mod tests {
         for step in [1e-3, 1e-4, 1e-6] {
             let f = |t: f64| ((0.3 - (t - 0.3).abs()) / step).round() * step;
             let found = found(600, 1e-3, f);
+            assert!(found.len() == 1 && (found[0].0 - 0.3).abs() < 1e-3, "{step:e}: {found:?}");
+            // From rest to one step per sample.
+            let f = |t: f64| ((t - 0.3).max(0.0) / step).round() * step;
+            let found = self::found(600, 1e-3, f);
             assert!(found.len() == 1 && (found[0].0 - 0.3).abs() < 1e-3, "{step:e}: {found:?}");
         }
     }
