@@ -659,7 +659,7 @@ mod stopped {
             std::thread::sleep(Duration::from_millis(20));
         }
         let sent = Instant::now();
-        let status = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+        let status = Command::new("kill").args([common::stop_signal(), &child.id().to_string()]).status().unwrap();
         assert!(status.success());
         let answer = Answer::of(child.wait_with_output().unwrap());
         assert!(sent.elapsed() < Duration::from_secs(10), "took {:?} to stop", sent.elapsed());

@@ -61,7 +61,7 @@ fn a_stopped_verification_leaves_nothing() {
     let mut child = command.stdout(std::process::Stdio::null()).stderr(std::process::Stdio::null()).spawn().unwrap();
     std::thread::sleep(std::time::Duration::from_secs(4));
     let pid = child.id().to_string();
-    assert!(std::process::Command::new("/bin/kill").args(["-INT", &pid]).status().unwrap().success());
+    assert!(std::process::Command::new("/bin/kill").args([common::stop_signal(), &pid]).status().unwrap().success());
     assert_eq!(child.wait().unwrap().code(), Some(1));
     assert!(place.snapshot() == before);
 }

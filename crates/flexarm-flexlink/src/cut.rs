@@ -36,6 +36,16 @@ pub enum CutError {
         /// Smallest principal moment that remains (kg m²).
         remaining: f64,
     },
+    /// No body with this mass, centre of mass and inertia bends in these shapes.
+    #[error(
+        "no body with its centre of mass and inertia bends in the shapes of the beam (the smallest eigenvalue of the mass \
+         matrix, with the diagonal scaled to one, is {smallest:.1e}, which must be positive): use parts = \"uniform\" or give \
+         the parts in a .flex file"
+    )]
+    Modes {
+        /// Smallest eigenvalue of the scaled mass matrix.
+        smallest: f64,
+    },
 }
 
 /// Proximal and distal part of a link cut at `split` of the line from `p_LA` to `p_LB` (link axes) (m).

@@ -6,7 +6,9 @@ use flexarm_fem::ModalLink;
 use flexarm_kinematics::{
     InterfaceShape, Joint, JointKind, Link, LinkInertia, Mechanism, ModalBody, Pose, SpatialInertia,
 };
+use nalgebra::DMatrix;
 
+use crate::cut::CutError;
 use crate::interfaces::nearest;
 use crate::substitute::{FlexibleLink, FlexibleSpan, Parts, Site, SubstitutionError, inertia_of, move_children};
 
@@ -27,6 +29,12 @@ pub fn modal_body(link: &ModalLink) -> ModalBody {
         M: link.M.clone(),
         interfaces: link.interfaces.iter().map(|i| InterfaceShape { X_LI: i.X_LI, Phi: i.Phi.clone() }).collect(),
     }
+}
+
+/// Smallest eigenvalue of a mass matrix after its diagonal is scaled to one; 0 or below: no body has it.
+fn smallest_scaled(M: &DMatrix<f64>) -> f64 {
+    let scale = M.diagonal().map(|x| 1.0 / x.max(f64::MIN_POSITIVE).sqrt());
+    DMatrix::from_fn(M.nrows(), M.ncols(), |i, j| M[(i, j)] * scale[i] * scale[j]).symmetric_eigenvalues().min()
 }
 
 /// Puts a modal body in the place of a link.
@@ -68,6 +76,10 @@ pub(crate) fn substitute_modal(
             return Err(fail(format!("it weighs {} kg, the link {} kg", body.mass, own.mass)));
         }
         (body.first_moment, body.inertia) = (own.first_moment, own.rotational);
+        let smallest = smallest_scaled(&body.mass_matrix());
+        if smallest <= 0.0 {
+            return Err(SubstitutionError::Cut { link: name.clone(), source: CutError::Modes { smallest } });
+        }
     }
 
     let rigid = |inertia: SpatialInertia| LinkInertia {

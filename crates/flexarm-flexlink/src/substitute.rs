@@ -190,7 +190,7 @@ pub enum SubstitutionError {
         interface: String,
     },
     /// The parts cannot be made.
-    #[error("link {link:?} cannot be cut in two: {source}")]
+    #[error("the mass of link {link:?} cannot be spread along it: {source}")]
     Cut {
         /// The link.
         link: String,

@@ -124,6 +124,11 @@ fn undeformed_robot_keeps_the_mass_properties_of_its_own_link() {
     eprintln!("{found:?}");
     assert!(found.iter().all(|d| *d < 1e-12), "{found:?}");
 
+    // With a tenth of its inertia no body of this mass bends like the beam: its modes would move more than all of it.
+    let light = robot(inertia(modal.mass, modal.rigid().com, 0.1));
+    let error = substitute(&light, &[flexible(&modal, Parts::FromLink(0.5))]).expect_err("no such body").to_string();
+    assert!(error.contains("boom") && error.contains("parts = \"uniform\""), "{error}");
+
     let other = robot(LinkInertia { mass: 1.01 * own.mass, ..own });
     let error = substitute(&other, &[flexible(&modal, Parts::FromLink(0.5))]).expect_err("another mass").to_string();
     assert!(error.contains("boom") && error.contains("kg"), "{error}");

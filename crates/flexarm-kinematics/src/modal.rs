@@ -68,6 +68,25 @@ impl ModalBody {
         SpatialInertia { mass: self.mass, first_moment: self.first_moment, rotational: self.inertia }
     }
 
+    /// Mass matrix of the undeformed body: acceleration and angular acceleration of the link's origin, then the modes; (5)
+    /// at rest, (6 + n)×(6 + n).
+    pub fn mass_matrix(&self) -> DMatrix<f64> {
+        let n = self.n();
+        let mut M = DMatrix::zeros(6 + n, 6 + n);
+        M.view_mut((0, 0), (3, 3)).copy_from(&(Matrix3::identity() * self.mass));
+        M.view_mut((3, 0), (3, 3)).copy_from(&self.first_moment.cross_matrix());
+        M.view_mut((0, 3), (3, 3)).copy_from(&self.first_moment.cross_matrix().transpose());
+        M.view_mut((3, 3), (3, 3)).copy_from(&self.inertia);
+        for (k, (t, r)) in self.C_t.iter().zip(&self.C_r).enumerate() {
+            for (row, column) in [t, r].into_iter().enumerate() {
+                M.view_mut((3 * row, 6 + k), (3, 1)).copy_from(column);
+                M.view_mut((6 + k, 3 * row), (1, 3)).copy_from(&column.transpose());
+            }
+        }
+        M.view_mut((6, 6), (n, n)).copy_from(&self.M);
+        M
+    }
+
     /// What is wrong with its sizes, if anything.
     pub(crate) fn fault(&self) -> Option<&'static str> {
         let n = self.n();

@@ -390,7 +390,7 @@ impl Robot {
                 }
                 let mut flexible = FlexibleLink { form, ..link.flexible.clone() };
                 let uncut = self.uncut(link, &mut flexible);
-                doubts.extend(uncut.map(|text| Caveat::said("second-order-unknown", "links", text, "")));
+                doubts.extend(uncut.map(|text| Caveat::said("uniform-mass", "links", text, "")));
                 links.push(flexible);
             }
         }

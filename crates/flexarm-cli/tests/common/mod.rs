@@ -11,6 +11,22 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use serde_json::Value;
 
+/// Whether the programs that a test starts ignore a signal, because the tests were started so: by nohup (SIGHUP, 1), in the
+/// background of a shell (SIGINT, 2).
+#[cfg(unix)]
+pub(crate) fn is_ignored(signal: u32) -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let ignored = ignored.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0);
+    ignored & (1 << (signal - 1)) != 0
+}
+
+/// What Ctrl-C sends, or where that is ignored, what a job scheduler sends.
+#[cfg(unix)]
+pub(crate) fn stop_signal() -> &'static str {
+    if is_ignored(2) { "-TERM" } else { "-INT" }
+}
+
 /// A beam on a vertical axis with a ball at its end; flexible in [`ROBOT`].
 pub(crate) const URDF: &str = r#"<?xml version="1.0"?>
 <robot name="beam">
