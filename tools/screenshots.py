@@ -82,8 +82,9 @@ def smaller(picture):
         from PIL import Image
     except ImportError:
         return
+    # Few pixels have the colours of curves: a median cut would merge them.
     image = Image.open(picture).convert("RGB")
-    image.quantize(256, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE).save(picture, optimize=True)
+    image.quantize(256, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(picture, optimize=True)
 
 
 def main():

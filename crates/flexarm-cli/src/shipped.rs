@@ -11,7 +11,7 @@ fn roots() -> Vec<PathBuf> {
     if let Some(folder) = std::env::current_exe().ok().as_deref().and_then(Path::parent) {
         roots.push(folder.join("../share/flexarm"));
     }
-    roots.push(Path::new(env!("CARGO_MANIFEST_DIR")).join("../.."));
+    roots.extend(Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).map(Path::to_owned));
     roots
 }
 
@@ -131,5 +131,5 @@ impl Drop for NewFolder {
 /// The folder with `robots` and `tests`: the first root that has both, else where the program was built.
 pub(crate) fn checkout() -> PathBuf {
     let has_both = |root: &PathBuf| root.join("robots").is_dir() && root.join("tests/verification").is_dir();
-    roots().into_iter().find(has_both).unwrap_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../.."))
+    roots().into_iter().find(has_both).unwrap_or_else(|| PathBuf::from("."))
 }
