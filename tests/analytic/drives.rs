@@ -15,7 +15,7 @@ fn root() -> PathBuf {
 }
 
 fn load(file: &str) -> Robot {
-    Robot::load(&root().join(file), &LoadOptions::default()).expect("a sound robot")
+    Robot::load_with(&root().join(file), &LoadOptions::default()).expect("a sound robot")
 }
 
 fn golden(file: &str) -> Value {
@@ -32,10 +32,6 @@ fn worst(found: &[f64], truth: &[f64]) -> f64 {
     found.iter().zip(truth).map(|(a, b)| (a / b - 1.0).abs()).fold(0.0, f64::max)
 }
 
-fn joined(values: &[f64]) -> String {
-    values.iter().map(f64::to_string).collect::<Vec<_>>().join(",")
-}
-
 /// KR 210 and KR 500 with identified gearboxes, with and without load, in two poses: frequencies, sag and compliance.
 ///
 /// Truth: Pinocchio and numpy, two ways (tools/golden_identified.py). Measured: frequencies without weight 2e-13, with it 1e-12,
@@ -47,17 +43,16 @@ fn identified_arms_have_the_frequencies_and_the_compliance_of_the_other_tool() {
         let file = case["file"].as_str().expect("a name");
         let q = numbers(&case["q"]);
         let robot = load(file);
-        let at = joined(&q);
-        let under_weight = modes(&robot, &Modelling::default(), Some(&at), 6).expect("modes");
+        let under_weight = modes(&robot, &Modelling::default(), Some(&q), 6).expect("modes");
         let weight = worst(&under_weight.undamped_frequencies_hz, &numbers(&case["gravity"]["frequencies_hz"]));
         let mut weightless = robot.clone();
         weightless.rigid.gravity = Vector3::zeros();
-        let springs = modes(&weightless, &Modelling::default(), Some(&at), 6).expect("modes");
+        let springs = modes(&weightless, &Modelling::default(), Some(&q), 6).expect("modes");
         let springs = worst(&springs.undamped_frequencies_hz, &numbers(&case["springs"]["frequencies_hz"]));
-        let held = statics(&robot, &Modelling::default(), Some(&at), [0.0; 6]).expect("statics");
+        let held = statics(&robot, &Modelling::default(), Some(&q), [0.0; 6]).expect("statics");
         let truth = numbers(&case["gravity"]["sag"]);
         let sag = (0..3).map(|k| (held.sag_m[k] - truth[k]).abs()).fold(0.0, f64::max);
-        let free = statics(&weightless, &Modelling::default(), Some(&at), [0.0; 6]).expect("statics");
+        let free = statics(&weightless, &Modelling::default(), Some(&q), [0.0; 6]).expect("statics");
         let C: Vec<Vec<f64>> = case["compliance"].as_array().expect("rows").iter().map(numbers).collect();
         let mut compliance = 0.0f64;
         for i in 0..6 {
@@ -75,7 +70,7 @@ fn identified_arms_have_the_frequencies_and_the_compliance_of_the_other_tool() {
 fn along(robot: &str, trajectory: &str, curve: &str) -> (f64, f64) {
     let robot = load(&format!("robots/{robot}"));
     let path = root().join("trajectories").join(trajectory);
-    let motion = Motion::load(&path, &robot.rigid_model().expect("a tree")).expect("a sound trajectory");
+    let motion = Motion::load_for(&path, &robot.rigid_model().expect("a tree")).expect("a sound trajectory");
     let arm = robot.flexible_robot().expect("a tree").arm(motion.prescribed()).expect("an arm");
     let tcp = arm.model.frame(flexarm::TCP_FRAME).expect("there").clone();
     let mut seen = Observation::new(&arm);

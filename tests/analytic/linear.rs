@@ -20,11 +20,7 @@ fn root() -> PathBuf {
 }
 
 fn load(robot: &str) -> Robot {
-    Robot::load(&root().join("robots").join(robot), &LoadOptions::default()).expect("a sound robot")
-}
-
-fn joined(values: &[f64]) -> String {
-    values.iter().map(f64::to_string).collect::<Vec<_>>().join(",")
+    Robot::load_with(&root().join("robots").join(robot), &LoadOptions::default()).expect("a sound robot")
 }
 
 /// The reference arm by file with another damping.
@@ -61,13 +57,13 @@ fn fitted(samples: &[(f64, f64)], omega: f64) -> (f64, f64) {
 fn modes_of_the_industrial_arm_are_those_that_compare_reports() {
     let robot = load("kr210/links.toml");
     let path = root().join("trajectories/pick_and_place.toml");
-    let motion = Motion::load(&path, &robot.rigid_model().expect("a tree")).expect("a sound trajectory");
+    let motion = Motion::load_for(&path, &robot.rigid_model().expect("a tree")).expect("a sound trajectory");
     let (mut q, mut v, mut a) = ([0.0; 6], [0.0; 6], [0.0; 6]);
     motion.trajectory.sample(0.0, &mut q, &mut v, &mut a);
     let options = RunOptions { log_rate_hz: 100.0, step_s: 0.01, ..RunOptions::default() };
     let summary = simulate(&robot, &motion, &options, None, &mut |_, _| ControlFlow::Continue(()));
     let reported = summary.expect("runs").frequencies_hz;
-    let found = modes(&robot, &Modelling::default(), Some(&joined(&q)), 100).expect("an equilibrium");
+    let found = modes(&robot, &Modelling::default(), Some(q.as_slice()), 100).expect("an equilibrium");
     assert_eq!((found.total, found.frequencies_hz.len()), (12, reported.len()));
     let mut worst = 0.0f64;
     for (mode, truth) in found.modes.iter().zip(&reported) {
@@ -88,7 +84,7 @@ fn modes_of_the_industrial_arm_are_those_that_compare_reports() {
 #[test]
 fn response_at_rest_is_the_compliance() {
     let robot = load("kr210/links.toml");
-    let at = "0.2,-1.1,1.2,0.3,0.4,0.5";
+    let at: &[f64] = &[0.2, -1.1, 1.2, 0.3, 0.4, 0.5];
     let C = statics(&robot, &Modelling::default(), Some(at), [0.0; 6]).expect("an equilibrium").compliance;
     let words = |words: [&str; 6]| words.map(str::to_owned).to_vec();
     let request = ResponseRequest {
@@ -223,7 +219,7 @@ fn a_force_at_a_resonance_shakes_the_tool_as_high_as_the_peak() {
         to_hz: Some(60.0),
         ..ResponseRequest::default()
     };
-    let found = response(&robot, &Modelling::default(), Some(&joined(&POSE)), &request, None).expect("a response");
+    let found = response(&robot, &Modelling::default(), Some(&POSE[..]), &request, None).expect("a response");
     let own = robot.flexible_robot().expect("a tree");
     let arm = own.arm(held()).expect("carries its weight");
     let tool = arm.model.frame("__tcp").expect("there").clone();
@@ -270,7 +266,7 @@ fn a_joint_at_a_resonance_shakes_the_tool_as_high_as_the_peak() {
         to_hz: Some(60.0),
         ..ResponseRequest::default()
     };
-    let found = response(&robot, &Modelling::default(), Some(&joined(&POSE)), &request, None).expect("a response");
+    let found = response(&robot, &Modelling::default(), Some(&POSE[..]), &request, None).expect("a response");
     for (curve, axis) in found.curves.iter().zip([0, 2]) {
         let peak = &curve.peaks[0];
         let omega = TAU * peak.frequency_hz;

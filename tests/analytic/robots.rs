@@ -13,14 +13,14 @@ fn root() -> PathBuf {
 }
 
 fn load(robot: &str) -> Robot {
-    Robot::load(&root().join("robots").join(robot), &LoadOptions::default()).expect("a sound robot")
+    Robot::load_with(&root().join("robots").join(robot), &LoadOptions::default()).expect("a sound robot")
 }
 
 /// Runs a robot and reads its table back: column name to values.
 fn run(robot: &str, trajectory: &str, options: &RunOptions) -> (Summary, HashMap<String, Vec<f64>>) {
     let robot = load(robot);
     let path = root().join("trajectories").join(trajectory);
-    let motion = Motion::load(&path, &robot.rigid_model().expect("a tree")).expect("a sound trajectory");
+    let motion = Motion::load_for(&path, &robot.rigid_model().expect("a tree")).expect("a sound trajectory");
     let unique = format!("flexarm-robots-{}-{}-{trajectory}-{}", std::process::id(), robot.name, options.log_rate_hz);
     let folder = std::env::temp_dir().join(unique);
     let outputs = Outputs { mcap: false, rrd: false, ..Outputs::everything(&folder) };
@@ -124,7 +124,7 @@ fn steppers_agree_on_the_shipped_arm() {
         let options = RunOptions { stepper, step_s, ..RunOptions::default() };
         let robot = load("kr210");
         let path = root().join("trajectories/point_to_point.toml");
-        let motion = Motion::load(&path, &robot.rigid_model().expect("a tree")).expect("sound");
+        let motion = Motion::load_for(&path, &robot.rigid_model().expect("a tree")).expect("sound");
         let summary = simulate(&robot, &motion, &options, None, &mut |_, _| ControlFlow::Continue(())).expect("runs");
         summary.tcp.expect("compared").peak_m
     };

@@ -15,6 +15,7 @@ mod shipped;
 mod signals;
 mod study;
 mod summary_table;
+mod values;
 mod verify;
 mod view;
 
@@ -188,7 +189,7 @@ fn run_options(args: &RunArgs, with_twin: bool) -> RunOptions {
 
 /// Robot, motion and choices of a run.
 fn variant(label: String, args: &RunArgs, with_twin: bool) -> Result<Variant, Error> {
-    let robot = Robot::load(&shipped::robot(args.robot.as_deref())?, &load_options(&args.load)?)?;
+    let robot = Robot::load_with(&shipped::robot(args.robot.as_deref())?, &load_options(&args.load)?)?;
     let trajectory = match (&args.trajectory, &robot.default_trajectory) {
         (Some(given), _) => shipped::trajectory(given),
         (None, Some(own)) => own.clone(),
@@ -197,7 +198,7 @@ fn variant(label: String, args: &RunArgs, with_twin: bool) -> Result<Variant, Er
             return Err(Error::Usage(text.into()));
         }
     };
-    let motion = robot.motion(&trajectory).map_err(|error| match error {
+    let motion = flexarm::Motion::load(&trajectory, &robot).map_err(|error| match error {
         Error::File { path, what } if args.trajectory.is_none() => {
             Error::File { path, what: format!("{what} (it is the default_trajectory of {})", robot.path.display()) }
         }
@@ -260,8 +261,9 @@ fn simulate(cli: &Cli, args: &RunArgs, with_twin: bool) -> Result<ExitCode, Erro
 }
 
 fn inspect(cli: &Cli, args: &InspectArgs) -> Result<ExitCode, Error> {
-    let robot = Robot::load(&shipped::robot(Some(&args.robot))?, &load_options(&args.load)?)?;
-    let inspection = flexarm::inspect(&robot, args.at.as_deref(), args.velocity.as_deref())?;
+    let robot = Robot::load_with(&shipped::robot(Some(&args.robot))?, &load_options(&args.load)?)?;
+    let values = |text: &Option<String>| values::joint_values(text.as_deref(), &robot);
+    let inspection = flexarm::inspect(&robot, values(&args.at)?.as_deref(), values(&args.velocity)?.as_deref())?;
     answer(cli, || to_json(&inspection), || print::inspection(&inspection));
     Ok(ExitCode::SUCCESS)
 }

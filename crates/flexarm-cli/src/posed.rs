@@ -12,7 +12,7 @@ use crate::args::Cli;
 use crate::posed_args::{ModesArgs, PoseArgs, QuantityName, ResponseArgs, SpacingName, StaticsArgs};
 use crate::print::{lines, table, warning};
 use crate::shipped::OutputFolder;
-use crate::{answer, load_options, shipped, to_json};
+use crate::{answer, load_options, shipped, to_json, values};
 
 /// Directions at the TCP.
 const AXES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
@@ -20,7 +20,7 @@ const AXES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
 const SHOWN_PEAKS: usize = 3;
 
 fn load(pose: &PoseArgs) -> Result<Robot, Error> {
-    Robot::load(&shipped::robot(Some(&pose.robot))?, &load_options(&pose.load)?)
+    Robot::load_with(&shipped::robot(Some(&pose.robot))?, &load_options(&pose.load)?)
 }
 
 fn warn(cli: &Cli, warnings: &[String]) {
@@ -30,8 +30,10 @@ fn warn(cli: &Cli, warnings: &[String]) {
 }
 
 pub(crate) fn statics(cli: &Cli, args: &StaticsArgs) -> Result<ExitCode, Error> {
-    let wrench = args.wrench.as_deref().map_or(Ok([0.0; 6]), flexarm::parse_wrench)?;
-    let (robot, modelling, at) = (load(&args.pose)?, args.pose.modelling.modelling(), args.pose.at.as_deref());
+    let wrench = args.wrench.as_deref().map_or(Ok([0.0; 6]), values::wrench)?;
+    let (robot, modelling) = (load(&args.pose)?, args.pose.modelling.modelling());
+    let at = values::joint_values(args.pose.at.as_deref(), &robot)?;
+    let at = at.as_deref();
     let found = match &args.output {
         Some(folder) => {
             let outputs = StaticsOutputs { folder: folder.clone(), overwrite: args.force };
@@ -48,7 +50,9 @@ pub(crate) fn modes(cli: &Cli, args: &ModesArgs) -> Result<ExitCode, Error> {
     if args.count == 0 {
         return Err(Error::Usage("--count must be at least 1".into()));
     }
-    let (robot, at) = (load(&args.pose)?, args.pose.at.as_deref());
+    let robot = load(&args.pose)?;
+    let at = values::joint_values(args.pose.at.as_deref(), &robot)?;
+    let at = at.as_deref();
     let modelling = args.pose.modelling.modelling();
     let found = match &args.output {
         Some(folder) => {
@@ -85,7 +89,7 @@ pub(crate) fn response(cli: &Cli, args: &ResponseArgs) -> Result<ExitCode, Error
     let found = flexarm::response(
         &robot,
         &args.pose.modelling.modelling(),
-        args.pose.at.as_deref(),
+        values::joint_values(args.pose.at.as_deref(), &robot)?.as_deref(),
         &request,
         outputs.as_ref(),
     )?;

@@ -49,6 +49,7 @@
 #[cfg(feature = "png")]
 mod arm_picture;
 mod bend;
+mod columns;
 mod create;
 mod csv_file;
 mod error;
@@ -80,6 +81,7 @@ mod trace;
 #[cfg(feature = "png")]
 pub use arm_picture::{ArmPicture, ArmPictureError, ArmSide, arm_color, arm_picture, arm_png, arm_sheet};
 pub use bend::{BendLine, BentMesh, BentPieces};
+pub use columns::{Column, Columns};
 pub use create::CreateOptions;
 pub use csv_file::CsvRecorder;
 pub use error::LogError;

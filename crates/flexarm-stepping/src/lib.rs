@@ -33,6 +33,7 @@
 
 mod arm;
 mod drive;
+mod eigenvalues;
 mod error;
 mod events;
 mod generalized_alpha;
@@ -40,6 +41,7 @@ mod linear;
 mod load;
 mod modes;
 mod motion;
+mod operating_point;
 mod reduced;
 mod reference;
 mod rk4;
@@ -58,6 +60,7 @@ pub use linear::{Linear, linearise};
 pub use load::{Load, LoadAxes};
 pub use modes::{Modes, modes_at};
 pub use motion::{Held, MotionFn, PrescribedMotion};
+pub use operating_point::OperatingPoint;
 pub use reduced::ReducedArm;
 pub use reference::{Reference, ReferenceMethod, ReferenceSettings};
 pub use rk4::{Rk4, STABILITY_LIMIT};

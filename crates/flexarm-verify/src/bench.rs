@@ -34,7 +34,7 @@ impl Bench {
                         project: give its folder (--data)";
             return Err(Error::File { path, what: what.into() });
         }
-        Robot::load(&path, &LoadOptions::default())
+        Robot::load_with(&path, &LoadOptions::default())
     }
 
     /// Path of a shipped file.
@@ -44,7 +44,7 @@ impl Bench {
 
     /// A shipped motion.
     pub fn motion(&self, robot: &Robot, file: &str) -> Result<Motion, Error> {
-        Motion::load(&self.root.join(file), &*robot.rigid_model()?)
+        Motion::load_for(&self.root.join(file), &*robot.rigid_model()?)
     }
 
     /// Stored results of another program: `tests/verification/<name>`.

@@ -47,9 +47,9 @@ fn run(arm: &FlexibleArm, kind: StepperKind, duration: f64) -> (Vec<Vector3<f64>
 fn main() {
     let mut arguments = std::env::args().skip(1);
     let robot = PathBuf::from(arguments.next().unwrap_or_else(|| "robots/reference_arm".into()));
-    let mut robot = Robot::load(&robot, &LoadOptions::default()).unwrap();
+    let mut robot = Robot::load_with(&robot, &LoadOptions::default()).unwrap();
     let trajectory = arguments.next().map_or_else(|| robot.default_trajectory.clone().unwrap(), PathBuf::from);
-    let motion = Motion::load(&trajectory, &robot.rigid_model().unwrap()).unwrap();
+    let motion = Motion::load_for(&trajectory, &robot.rigid_model().unwrap()).unwrap();
     let duration = motion.trajectory.duration();
     let arm =
         |robot: &Robot, modelling: &Modelling| robot.modelled(modelling).unwrap().arm(motion.prescribed()).unwrap();

@@ -11,9 +11,9 @@ use flexarm::{LinkModel, LoadOptions, Modelling, Motion, ReportRun, Robot, RunOp
 fn main() -> Result<(), Box<dyn Error>> {
     let path = std::env::args().nth(1).ok_or("give the file to write")?;
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let robot = Robot::load(&root.join("robots/kr210"), &LoadOptions::default())?;
+    let robot = Robot::load_with(&root.join("robots/kr210"), &LoadOptions::default())?;
     let model = robot.rigid_model()?;
-    let motion = Motion::load(&root.join("trajectories/pick_and_place.toml"), &model)?;
+    let motion = Motion::load_for(&root.join("trajectories/pick_and_place.toml"), &model)?;
     let choices = [
         ("2 parts", Modelling { links: LinkModel::Lumped, ..Modelling::default() }),
         ("8 parts", Modelling { links: LinkModel::Lumped, segments: Some(8), ..Modelling::default() }),

@@ -98,7 +98,7 @@ pub fn check_with_loads(
 ) -> Vec<Finding> {
     let mut findings = Vec::new();
     let path = robot;
-    let robot = match Robot::load(path, options) {
+    let robot = match Robot::load_with(path, options) {
         Ok(robot) => robot,
         Err(error) => {
             load_findings(&error, path, &mut findings);
@@ -119,7 +119,7 @@ pub fn check_with_loads(
         (Some(path), _) => check_motion(&robot, path, &mut findings),
         // Its own faults are told when it is asked for.
         (None, Some(own)) => robot.rigid_model().ok().and_then(|model| {
-            let motion = robot.motion(own).ok()?;
+            let motion = crate::Motion::load(own, &robot).ok()?;
             let along = of_motion(&motion.name, &motion.trajectory, &model);
             findings.extend(along.into_iter().map(|caveat| Finding::caveat(own, caveat)));
             Some(motion)
@@ -247,7 +247,7 @@ impl Pose {
 /// The motion, if it can be used, with its findings.
 fn check_motion(robot: &Robot, path: &Path, findings: &mut Vec<Finding>) -> Option<Motion> {
     let file = || path.display().to_string();
-    match robot.motion(path) {
+    match crate::Motion::load(path, robot) {
         Err(error) => {
             findings.push(Finding::error("trajectory", file(), &error));
             None

@@ -11,8 +11,8 @@ use flexarm_kinematics::{
     Data, Frame, JointMotion, Pose, State, forward_kinematics, kinetic_energy, potential_energy, rotation_vector,
 };
 use flexarm_log::{
-    Attachment, BendInfo, ElasticSample, EnergySample, Event, EventKind, Recorder, RecorderSet, RunResult, Sample,
-    Trace,
+    Attachment, BendInfo, ElasticSample, EnergySample, Event, EventKind, Recorder, RecorderSet, RunHeader, RunResult,
+    Sample, Trace,
 };
 use flexarm_stepping::{FlexibleArm, Observation, Stepper, StepperKind};
 use flexarm_trajectory::LimitViolation;
@@ -80,13 +80,20 @@ pub fn simulate_traced(
     run_traced(robot, motion, options, outputs, Together::default(), progress)
 }
 
-/// What a run shares with others that it is seen with.
+/// Called with each logged sample of a run and what stays the same; breaking off stops it.
+pub(crate) type Observer<'a> = dyn FnMut(&RunHeader, &Sample) -> ControlFlow<()> + 'a;
+
+/// What a run shares with others that it is seen with, or gets from who prepared it.
 #[derive(Default)]
-pub(crate) struct Together {
+pub(crate) struct Together<'a> {
     /// Recorders beside those of its own outputs.
     pub(crate) recorders: Vec<Box<dyn Recorder>>,
     /// Deflections of all of them, for a scale in common.
     pub(crate) expected: Option<Expected>,
+    /// Who looks at the samples.
+    pub(crate) observer: Option<&'a mut Observer<'a>>,
+    /// The robot as it is to be modelled, if that has been done.
+    pub(crate) prepared: Option<FlexibleRobot>,
 }
 
 /// As [`simulate_traced`], as one of several runs.
@@ -95,12 +102,12 @@ pub(crate) fn run_traced(
     motion: &Motion,
     options: &RunOptions,
     outputs: Option<&Outputs>,
-    together: Together,
+    together: Together<'_>,
     progress: &mut Progress<'_>,
 ) -> Result<(Summary, Trace), Error> {
     let started = Instant::now();
     let cpu = cpu_time::ProcessTime::now();
-    let Checked { flexible, arm, stepper, load_caveats } = checked(robot, motion, options)?;
+    let Checked { flexible, arm, stepper, load_caveats } = checked(robot, motion, options, together.prepared)?;
 
     // Before the first file is made, so that a stop during the preparation leaves none.
     if progress(0.0, motion.trajectory.duration()).is_break() {
@@ -121,7 +128,7 @@ pub(crate) fn run_traced(
     files.begin(&head)?;
     write_layouts(&files.names, &head)?;
     run.trace = Trace::new(head);
-    let end = run.go(&mut files.set, outputs.is_some(), progress);
+    let end = run.go(&mut files.set, outputs.is_some(), progress, together.observer);
 
     let (mut summary, mut events) = run.summary(robot, motion, options);
     if let Err(error) = &end {
@@ -295,7 +302,13 @@ impl<'a> Run<'a> {
     }
 
     /// Steps to the end, logging on the way.
-    fn go(&mut self, files: &mut RecorderSet, partial: bool, progress: &mut Progress<'_>) -> Result<(), Error> {
+    fn go(
+        &mut self,
+        files: &mut RecorderSet,
+        partial: bool,
+        progress: &mut Progress<'_>,
+        mut observer: Option<&mut Observer<'_>>,
+    ) -> Result<(), Error> {
         let total = self.last as f64 * self.options.step_s;
         let poll_every = (POLL_EVERY / self.arm.model.nv().max(1)).clamp(1, RAREST_POLL) as u64;
         for step in 0..=self.last {
@@ -303,6 +316,11 @@ impl<'a> Run<'a> {
                 self.observe(step);
                 files.record(&self.sample)?;
                 self.trace.push(&self.sample);
+                if let Some(observer) = &mut observer
+                    && observer(&self.trace.header, &self.sample).is_break()
+                {
+                    return Err(Error::Interrupted { t: self.stepper.time(), partial });
+                }
             }
             if step % poll_every == 0 && progress(self.stepper.time(), total).is_break() {
                 return Err(Error::Interrupted { t: self.stepper.time(), partial });

@@ -117,63 +117,33 @@ fn rows(M: &DMatrix<f64>) -> Vec<Vec<f64>> {
     M.row_iter().map(|r| r.iter().copied().collect()).collect()
 }
 
-/// Reads a joint vector: `v1,v2,...` in coordinate order, or `name=value,...` with the rest zero; rad or m, or degrees
-/// with the ending `deg`.
+/// Values of all actuated joints; zeros without any.
 ///
 /// # Errors
-/// [`Error::Usage`] saying which joints there are.
-pub fn parse_joint_values(text: &str, joints: &[&str]) -> Result<Vec<f64>, Error> {
-    let mut values = vec![0.0; joints.len()];
-    let items: Vec<&str> = text.split(',').map(str::trim).filter(|s| !s.is_empty()).collect();
-    let number = |s: &str| {
-        let (digits, unit) = match s.trim().strip_suffix("deg") {
-            Some(digits) => (digits.trim(), std::f64::consts::PI / 180.0),
-            None => (s.trim(), 1.0),
-        };
-        let value: Option<f64> = digits.parse().ok().filter(|x: &f64| x.is_finite());
-        value.map(|x| x * unit).ok_or_else(|| {
-            Error::Usage(format!("joint value {s:?} is not a finite number (rad or m, or degrees as in 30deg)"))
-        })
-    };
-    if items.iter().any(|i| i.contains('=')) {
-        let mut given = vec![false; joints.len()];
-        for item in items {
-            let (name, value) = item
-                .split_once('=')
-                .ok_or_else(|| Error::Usage(format!("{item:?}: either all joint values have names or none")))?;
-            let k = joints.iter().position(|j| *j == name.trim()).ok_or_else(|| {
-                Error::Usage(format!("there is no movable joint {:?}; the joints are {joints:?}", name.trim()))
-            })?;
-            if std::mem::replace(&mut given[k], true) {
-                return Err(Error::Usage(format!("joint {:?} is given twice", joints[k])));
-            }
-            values[k] = number(value)?;
-        }
-    } else {
-        if items.len() != joints.len() {
-            return Err(Error::Usage(format!(
-                "{} joint values given, the robot has {} movable joints: {joints:?}",
-                items.len(),
-                joints.len()
-            )));
-        }
-        for (value, item) in values.iter_mut().zip(items) {
-            *value = number(item)?;
-        }
+/// [`Error::Usage`] for another number of them, and for values that are no finite numbers.
+pub(crate) fn joint_values(values: Option<&[f64]>, joints: &[&str]) -> Result<Vec<f64>, Error> {
+    let Some(values) = values else { return Ok(vec![0.0; joints.len()]) };
+    if values.len() != joints.len() {
+        return Err(Error::Usage(format!(
+            "{} joint values given, the robot has {} movable joints: {joints:?}",
+            values.len(),
+            joints.len()
+        )));
     }
-    Ok(values)
+    match values.iter().zip(joints).find(|(value, _)| !value.is_finite()) {
+        Some((value, joint)) => Err(Error::Usage(format!("joint {joint:?} at {value} is at no finite number"))),
+        None => Ok(values.to_vec()),
+    }
 }
 
-/// The rigid robot (with payload) at a pose; `at` and `velocity` as for [`parse_joint_values`].
+/// The rigid robot (with payload) at a pose; `at` (rad or m) and `velocity` of all actuated joints, zero without.
 ///
 /// # Errors
 /// [`Error::Usage`] for joint values that do not fit.
-pub fn inspect(robot: &Robot, at: Option<&str>, velocity: Option<&str>) -> Result<Inspection, Error> {
+pub fn inspect(robot: &Robot, at: Option<&[f64]>, velocity: Option<&[f64]>) -> Result<Inspection, Error> {
     let model = robot.rigid_model()?;
     let names: Vec<&str> = model.coordinates().iter().map(|c| c.joint.as_str()).collect();
-    let values =
-        |text: Option<&str>| text.map_or_else(|| Ok(vec![0.0; names.len()]), |t| parse_joint_values(t, &names));
-    let (q, v) = (values(at)?, values(velocity)?);
+    let (q, v) = (joint_values(at, &names)?, joint_values(velocity, &names)?);
     let mut warnings = crate::caveat::warnings(&robot.caveats());
     for (c, q) in model.coordinates().iter().zip(&q) {
         if *q < c.limits.lower || *q > c.limits.upper {

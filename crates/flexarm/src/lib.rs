@@ -1,24 +1,31 @@
 //! From a robot file and a trajectory to a result: the facade of the flexarm workspace.
 //!
-//! Data path: robot file → rigid model → substitution → system → stepper → recorder → metrics. [`Robot::load`] does
-//! the first three, [`Motion::load`] reads the trajectory, [`simulate`] runs both robots and returns a [`Summary`].
-//! [`inspect()`] and [`check()`] look at what was loaded; [`statics()`], [`modes()`] and [`response()`] hold it at a pose; [`mod@reduce`] makes a flexible link of a mesh. Both faces (command line, Python) use this crate alone.
-//!
 //! ```no_run
-//! use std::ops::ControlFlow;
-//! use flexarm::{LoadOptions, Motion, Outputs, Robot, RunOptions, simulate};
+//! use flexarm::{Modelling, Motion, Robot, RunOptions, Wrench};
 //!
-//! let robot = Robot::load("robots/kr210".as_ref(), &LoadOptions::default())?;
-//! let motion = Motion::load("trajectories/pick_and_place.toml".as_ref(), &*robot.rigid_model()?)?;
-//! let outputs = Outputs::everything("out/first");
-//! let options = RunOptions::default();
-//! let summary = simulate(&robot, &motion, &options, Some(&outputs), &mut |_, _| ControlFlow::Continue(()))?;
-//! println!("peak TCP error {:.3} mm", 1e3 * summary.tcp.unwrap().peak_m);
-//! # Ok::<(), flexarm::Error>(())
+//! let robot = Robot::load("robots/kr210")?;
+//! let motion = Motion::load("trajectories/pick_and_place.toml", &robot)?;
+//! let arm = robot.flexible(Modelling::default())?; // substitution once
+//! let run = arm.simulate(&motion, &RunOptions::default())?;
+//! let (t, e) = (run.time_s(), run.error_world_m()); // n, and n x 3, row after row
+//! println!("{} samples, first error {:?} m", t.len(), &e[..3]);
+//!
+//! let mut at = arm.operating_point()?; // a workspace
+//! at.solve(&[0.0, -1.2, 1.5, 0.0, 0.4, 0.0], &Wrench::zeros())?;
+//! println!("{} m/N down, {} Hz", at.compliance()[(2, 2)], at.frequencies_hz()[0]);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
+//!
+//! Build is apart from query: [`Robot::load`] reads, [`Robot::flexible`] puts links and drives in place, and the [`Arm`] that it
+//! returns is asked with numbers, by any number of threads. [`Arm::simulate`] runs a [`Motion`] and returns a [`Run`] with figures
+//! and columns; [`Arm::operating_point`] answers statics, compliance and frequencies at thousands of poses without allocation.
+//!
+//! [`simulate`] writes recordings and a report as well. [`inspect()`] and [`check()`] look at what was loaded; [`statics()`],
+//! [`modes()`] and [`response()`] answer one pose in full; [`mod@reduce`] makes a flexible link of a mesh.
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
+mod arm;
 mod beam_entry;
 mod bends;
 pub mod caveat;
@@ -60,6 +67,7 @@ mod study;
 mod summary;
 mod twin;
 
+pub use arm::{Arm, Run};
 pub use bends::Bend;
 pub use caveat::Caveat;
 pub use check::{Finding, check, check_with_loads};
@@ -70,7 +78,7 @@ pub use drive_entry::{Drive, DriveKind};
 pub use error::Error;
 pub use flexible::{FlexibleRobot, LinkChoices, Owner, RobotLink};
 pub use headline::{Bending, ShareFigures};
-pub use inspect::{FlexibleInfo, Inspection, JointInfo, LinkInfo, TcpInfo, inspect, parse_joint_values};
+pub use inspect::{FlexibleInfo, Inspection, JointInfo, LinkInfo, TcpInfo, inspect};
 pub use mode_recording::{ModeMovie, record_modes};
 pub use modes::{ModeFigures, ModeTable, modes};
 pub use motion::{HeldJoint, Motion};
@@ -83,7 +91,7 @@ pub use response::{
 };
 pub use robot::{LoadOptions, Robot, TCP_FRAME};
 pub use settling::Settling;
-pub use statics::{ElementStatics, Statics, parse_wrench, record_statics, statics};
+pub use statics::{ElementStatics, Statics, record_statics, statics};
 pub use statics_picture::{StaticsFiles, StaticsOutputs};
 pub use study::{STUDY_NOTE, Variant, compare_study, study_rows};
 pub use summary::{
@@ -91,10 +99,11 @@ pub use summary::{
 };
 
 pub use flexarm_analysis::{Quantity, Spacing};
-pub use flexarm_log::{RecordingFormat, Trace};
+pub use flexarm_kinematics::{Pose, Wrench};
+pub use flexarm_log::{Column, Columns, RecordingFormat, Sample, Trace};
 pub use flexarm_stepping::{
-    AlphaSettings, ConstraintForm, ReferenceMethod, ReferenceSettings, SpookPreset, SpookSettings, Start, StepError,
-    StepperKind,
+    AlphaSettings, ConstraintForm, OperatingPoint, ReferenceMethod, ReferenceSettings, SpookPreset, SpookSettings,
+    Start, StepError, StepperKind,
 };
-pub use flexarm_trajectory::TrajectoryError;
+pub use flexarm_trajectory::{Trajectory, TrajectoryError};
 pub use flexarm_urdf::{InertiaEstimate, ReadOptions, closest, search_paths_from_environment};

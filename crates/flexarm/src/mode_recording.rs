@@ -47,7 +47,7 @@ impl Default for ModeMovie {
 pub fn record_modes(
     robot: &Robot,
     modelling: &Modelling,
-    at: Option<&str>,
+    at: Option<&[f64]>,
     count: usize,
     movie: &ModeMovie,
     outputs: &Outputs,

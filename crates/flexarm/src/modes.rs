@@ -122,11 +122,11 @@ pub(crate) fn linear_error(error: LinearError) -> Error {
 
 /// The lowest `count` modes of the flexible robot at a pose, under its weight, drives locked.
 ///
-/// `at` as for [`crate::parse_joint_values`].
+/// `at`: all actuated joints (rad or m), zero without it.
 ///
 /// # Errors
 /// [`Error::Usage`] for joint values that do not fit, [`Error::Step`] where there is no equilibrium.
-pub fn modes(robot: &Robot, modelling: &Modelling, at: Option<&str>, count: usize) -> Result<ModeTable, Error> {
+pub fn modes(robot: &Robot, modelling: &Modelling, at: Option<&[f64]>, count: usize) -> Result<ModeTable, Error> {
     let posed = Posed::new(robot, modelling, at)?;
     let linear = posed.linear(&Vector6::zeros())?;
     let all = modes_of(&linear)?;

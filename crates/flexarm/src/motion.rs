@@ -5,11 +5,12 @@ use std::sync::Arc;
 
 use flexarm_kinematics::{Coordinate, Model};
 use flexarm_stepping::PrescribedMotion;
-use flexarm_trajectory::{JointLimits, LimitViolation, Trajectory};
+use flexarm_trajectory::{JointLimits, JointSamples, LimitViolation, Samples, Trajectory};
 use flexarm_urdf::closest;
 
 use crate::caveat::{self, Caveat};
 use crate::error::Error;
+use crate::robot::Robot;
 
 /// A trajectory whose joints are the model's actuated coordinates.
 #[derive(Clone, Debug)]
@@ -67,29 +68,76 @@ fn limits(model: &Model) -> Vec<JointLimits> {
 }
 
 impl Motion {
-    /// Reads a trajectory file for a model; joints that it does not name stay at zero, or at the limit nearest to it.
+    /// Reads a motion file for a robot. A joint that it does not name stays where the robot file says, else at zero, or at the
+    /// limit nearest to it.
     ///
     /// # Errors
-    /// As [`Motion::load_with_held`].
-    pub fn load(path: &Path, model: &Model) -> Result<Self, Error> {
-        Self::load_with_held(path, model, &[])
+    /// [`Error::File`] or [`Error::Trajectory`]: format, units, times, joints that the robot does not have; [`Error::Model`].
+    pub fn load(path: impl AsRef<Path>, robot: &Robot) -> Result<Self, Error> {
+        Self::read(path.as_ref(), &*robot.rigid_model()?, &robot.hold)
     }
 
-    /// Reads a trajectory file for a model. A joint that it does not name stays where `hold` says (rad or m), else at
-    /// zero, or at the limit nearest to it.
+    /// As [`Motion::load`], for a model alone.
     ///
     /// # Errors
-    /// [`Error::File`] or [`Error::Trajectory`]: format, units, times, joints that the model does not have.
-    pub fn load_with_held(path: &Path, model: &Model, hold: &[(String, f64)]) -> Result<Self, Error> {
+    /// As [`Motion::load`].
+    pub fn load_for(path: &Path, model: &Model) -> Result<Self, Error> {
+        Self::read(path, model, &[])
+    }
+
+    /// The motion through sampled positions, by a spline as through the rows of a CSV file.
+    ///
+    /// * `t`: n times (s), increasing; the first becomes 0.
+    /// * `q`: n rows of all actuated joints in coordinate order, one after the other (rad or m).
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for another number of values, [`Error::Trajectory`] for values that are no numbers or times that do
+    /// not increase; [`Error::Model`].
+    pub fn from_samples(t: &[f64], q: &[f64], robot: &Robot) -> Result<Self, Error> {
+        let model = robot.rigid_model()?;
+        let actuated = &model.coordinates()[..model.n_actuated()];
+        let n = actuated.len();
+        if q.len() != n * t.len() {
+            let (found, rows) = (q.len(), t.len());
+            return Err(Error::Usage(format!(
+                "{found} joint values are given for {rows} times; the robot has {n} joints, so {} are expected",
+                n * rows
+            )));
+        }
+        let column = |k: usize| q.iter().skip(k).step_by(n.max(1)).copied().collect();
+        let joint = |(k, c): (usize, &Coordinate)| JointSamples {
+            name: c.joint.clone(),
+            position: column(k),
+            ..JointSamples::default()
+        };
+        let samples = Samples { times: t.to_vec(), joints: actuated.iter().enumerate().map(joint).collect() };
+        Self::along(samples.interpolate()?, "samples", robot)
+    }
+
+    /// A motion along a trajectory that was made, not read: splines, plans of moves.
+    ///
+    /// * `name`: for logs and messages.
+    ///
+    /// # Errors
+    /// [`Error::File`] for joints that the robot does not have; [`Error::Model`].
+    pub fn along(trajectory: Trajectory, name: &str, robot: &Robot) -> Result<Self, Error> {
+        Self::of(trajectory, Path::new(name), &*robot.rigid_model()?, &robot.hold)
+    }
+
+    fn read(path: &Path, model: &Model, hold: &[(String, f64)]) -> Result<Self, Error> {
         if !path.is_file() {
             let what = "there is no such trajectory file; give a .csv or .toml file".into();
             return Err(Error::File { path: path.to_owned(), what });
         }
         let actuated = &model.coordinates()[..model.n_actuated()];
+        let named: Vec<(&str, JointLimits)> = actuated.iter().map(|c| c.joint.as_str()).zip(limits(model)).collect();
+        Self::of(Trajectory::from_path(path, &named)?, path, model, hold)
+    }
+
+    fn of(trajectory: Trajectory, path: &Path, model: &Model, hold: &[(String, f64)]) -> Result<Self, Error> {
+        let actuated = &model.coordinates()[..model.n_actuated()];
         let limits = limits(model);
         let names: Vec<&str> = actuated.iter().map(|c| c.joint.as_str()).collect();
-        let named: Vec<(&str, JointLimits)> = names.iter().copied().zip(limits.iter().copied()).collect();
-        let trajectory = Trajectory::from_path(path, &named)?;
         let warnings = warnings(&trajectory, path);
         check_joints(path, trajectory.joints(), &names)?;
         let still = actuated.iter().filter(|c| !trajectory.joints().contains(&c.joint));

@@ -10,7 +10,7 @@ use crate::caveat::pose::Standing;
 use crate::caveat::{Caveat, kinds, validity};
 use crate::error::Error;
 use crate::flexible::FlexibleRobot;
-use crate::inspect::parse_joint_values;
+use crate::inspect::joint_values;
 use crate::options::Modelling;
 use crate::robot::{Robot, TCP_FRAME};
 
@@ -34,11 +34,11 @@ fn failed(source: StepError) -> Error {
 }
 
 impl Posed {
-    /// `at` as for [`parse_joint_values`]; all joints at zero without it.
-    pub(crate) fn new(robot: &Robot, modelling: &Modelling, at: Option<&str>) -> Result<Self, Error> {
+    /// `at`: all actuated joints (rad or m), zero without it.
+    pub(crate) fn new(robot: &Robot, modelling: &Modelling, at: Option<&[f64]>) -> Result<Self, Error> {
         let model = robot.rigid_model()?;
         let names: Vec<&str> = model.coordinates().iter().map(|c| c.joint.as_str()).collect();
-        let at = at.map_or_else(|| Ok(vec![0.0; names.len()]), |text| parse_joint_values(text, &names))?;
+        let at = joint_values(at, &names)?;
         Self::held(robot, modelling, at)
     }
 

@@ -28,8 +28,13 @@ impl Checked {
     }
 }
 
-/// Everything about the input of a run that can be told before the first step.
-pub(crate) fn checked(robot: &Robot, motion: &Motion, options: &RunOptions) -> Result<Checked, Error> {
+/// Everything about the input of a run that can be told before the first step. `prepared`: the robot as the options model it.
+pub(crate) fn checked(
+    robot: &Robot,
+    motion: &Motion,
+    options: &RunOptions,
+    prepared: Option<FlexibleRobot>,
+) -> Result<Checked, Error> {
     if !motion.violations.is_empty() && !options.ignore_limits {
         let mut violations: Vec<String> = motion.violations.iter().map(ToString::to_string).collect();
         if let Some(first) = violations.first_mut().filter(|_| !motion.likely.is_empty()) {
@@ -39,7 +44,7 @@ pub(crate) fn checked(robot: &Robot, motion: &Motion, options: &RunOptions) -> R
     }
     check_options(motion, options)?;
     let failed = |source: StepError| Error::Step { source, partial: false };
-    let flexible = robot.modelled(&options.modelling)?;
+    let flexible = prepared.map_or_else(|| robot.modelled(&options.modelling), Ok)?;
     let mut arm = flexible.arm(motion.prescribed()).map_err(|error| flexible.explained(error))?;
     let mut load_caveats = Vec::new();
     if let Some(path) = &options.loads {

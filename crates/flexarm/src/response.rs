@@ -163,7 +163,7 @@ struct Channel {
 
 /// Frequency response of the flexible robot at a pose, about its equilibrium under weight, other drives locked.
 ///
-/// `at` as for [`crate::parse_joint_values`].
+/// `at`: all actuated joints (rad or m), zero without it.
 ///
 /// # Errors
 /// [`Error::Usage`] for words and numbers that make no sense, [`Error::Step`] where there is no equilibrium,
@@ -171,7 +171,7 @@ struct Channel {
 pub fn response(
     robot: &Robot,
     modelling: &Modelling,
-    at: Option<&str>,
+    at: Option<&[f64]>,
     request: &ResponseRequest,
     outputs: Option<&ResponseOutputs>,
 ) -> Result<Response, Error> {

@@ -64,7 +64,15 @@ impl Robot {
     ///
     /// # Errors
     /// [`Error`] with file, place, what was found and how to mend it.
-    pub fn load(path: &Path, options: &LoadOptions) -> Result<Self, Error> {
+    pub fn load(path: impl AsRef<Path>) -> Result<Self, Error> {
+        Self::load_with(path.as_ref(), &LoadOptions::default())
+    }
+
+    /// As [`Robot::load`], with choices.
+    ///
+    /// # Errors
+    /// As [`Robot::load`].
+    pub fn load_with(path: &Path, options: &LoadOptions) -> Result<Self, Error> {
         let path = if path.is_dir() { path.join("robot.toml") } else { path.to_owned() };
         if !path.exists() {
             let what = "there is no such file; give a robot.toml, a folder with one, or a .urdf or .xacro file".into();
@@ -263,14 +271,6 @@ impl Robot {
             caveats.extend(caveat::drives::of_drives(&self.drives, &self.rigid, &rigid));
         }
         caveats
-    }
-
-    /// A motion of this robot: joints that the file does not name stay where the robot file says, else at zero.
-    ///
-    /// # Errors
-    /// As [`crate::Motion::load_with_held`], and [`Error::Model`].
-    pub fn motion(&self, path: &Path) -> Result<crate::Motion, Error> {
-        crate::Motion::load_with_held(path, &*self.rigid_model()?, &self.hold)
     }
 
     /// The rigid robot's tree.

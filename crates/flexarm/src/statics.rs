@@ -9,7 +9,6 @@ use crate::caveat::{self, Caveat};
 use crate::error::Error;
 use crate::options::Modelling;
 use crate::posed::{Posed, all_finite, step_error};
-use crate::reduce::numbers;
 use crate::robot::Robot;
 use crate::statics_picture::{self, StaticsFiles, StaticsOutputs};
 
@@ -69,29 +68,13 @@ pub struct ElementStatics {
     pub energy_j: f64,
 }
 
-/// Reads a wrench: `fx,fy,fz` or `fx,fy,fz,tx,ty,tz` (N, N m).
-///
-/// # Errors
-/// [`Error::Usage`].
-pub fn parse_wrench(text: &str) -> Result<[f64; 6], Error> {
-    let values = numbers(text).map_err(|what| Error::Usage(format!("--wrench: {what} (N, N m)")))?;
-    match values.as_slice() {
-        [fx, fy, fz] => Ok([*fx, *fy, *fz, 0.0, 0.0, 0.0]),
-        [fx, fy, fz, tx, ty, tz] => Ok([*fx, *fy, *fz, *tx, *ty, *tz]),
-        other => Err(Error::Usage(format!(
-            "--wrench has {} numbers; expected fx,fy,fz or fx,fy,fz,tx,ty,tz in world axes",
-            other.len()
-        ))),
-    }
-}
-
 /// Equilibrium of the flexible robot at a pose under its weight and a wrench at the TCP, drives locked.
 ///
-/// `at` as for [`crate::parse_joint_values`]; `wrench` in world axes, constant while the arm yields.
+/// `at`: all actuated joints (rad or m), zero without it; `wrench` in world axes, constant while the arm yields.
 ///
 /// # Errors
 /// [`Error::Usage`] for joint values that do not fit, [`Error::Step`] where there is no equilibrium.
-pub fn statics(robot: &Robot, modelling: &Modelling, at: Option<&str>, wrench: [f64; 6]) -> Result<Statics, Error> {
+pub fn statics(robot: &Robot, modelling: &Modelling, at: Option<&[f64]>, wrench: [f64; 6]) -> Result<Statics, Error> {
     statics_of(robot, modelling, at, wrench, None)
 }
 
@@ -102,7 +85,7 @@ pub fn statics(robot: &Robot, modelling: &Modelling, at: Option<&str>, wrench: [
 pub fn record_statics(
     robot: &Robot,
     modelling: &Modelling,
-    at: Option<&str>,
+    at: Option<&[f64]>,
     wrench: [f64; 6],
     outputs: &StaticsOutputs,
 ) -> Result<Statics, Error> {
@@ -112,7 +95,7 @@ pub fn record_statics(
 fn statics_of(
     robot: &Robot,
     modelling: &Modelling,
-    at: Option<&str>,
+    at: Option<&[f64]>,
     wrench: [f64; 6],
     outputs: Option<&StaticsOutputs>,
 ) -> Result<Statics, Error> {

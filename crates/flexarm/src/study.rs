@@ -62,7 +62,7 @@ pub fn compare_study(
     // Minutes of running are not spent before something that could be told at once.
     let mut expected = Expected::default();
     for (number, variant) in variants.iter().enumerate() {
-        let run = checked(&variant.robot, &variant.motion, &variant.options).map_err(named(number))?;
+        let run = checked(&variant.robot, &variant.motion, &variant.options, None).map_err(named(number))?;
         expected = expected.or(run.expected(&variant.motion, &variant.options));
         own_outputs(number).as_ref().map_or(Ok(()), refuse_to_overwrite)?;
     }
@@ -76,7 +76,7 @@ pub fn compare_study(
         }
         // All arms are magnified and coloured alike, or they could not be compared by eye.
         let recorders = recording.seat(number).into_iter().collect();
-        let together = Together { recorders, expected: Some(expected) };
+        let together = Together { recorders, expected: Some(expected), ..Together::default() };
         let mut shown = |t: f64, _: f64| progress(before + t, total);
         let run = run_traced(&variant.robot, &variant.motion, &options, own.as_ref(), together, &mut shown);
         let (mut summary, trace) = run.map_err(named(number))?;

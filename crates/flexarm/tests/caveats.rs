@@ -60,8 +60,8 @@ impl Place {
         let found = check(&file, None, &options);
         let found = found.iter().filter(|f| f.code != "missing-mesh"); // the copy leaves them behind
         let loud = found.filter(|f| f.severity != "note").map(|f| f.code.clone()).collect();
-        let held = Robot::load(&file, &options).and_then(|robot| {
-            let motion = Motion::load(robot.default_trajectory.as_ref().unwrap(), &*robot.rigid_model()?)?;
+        let held = Robot::load_with(&file, &options).and_then(|robot| {
+            let motion = Motion::load_for(robot.default_trajectory.as_ref().unwrap(), &*robot.rigid_model()?)?;
             let n = motion.trajectory.joints().len();
             let mut q = vec![0.0; n];
             motion.trajectory.sample(0.0, &mut q, &mut vec![0.0; n], &mut vec![0.0; n]);

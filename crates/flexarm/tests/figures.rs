@@ -12,8 +12,8 @@ use flexarm_log::{Trace, TraceRow};
 
 fn variant(label: &str, robot: &str, trajectory: &str, options: RunOptions) -> Variant {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let robot = Robot::load(&root.join("robots").join(robot), &LoadOptions::default()).unwrap();
-    let motion = Motion::load(&root.join("trajectories").join(trajectory), &robot.rigid_model().unwrap()).unwrap();
+    let robot = Robot::load_with(&root.join("robots").join(robot), &LoadOptions::default()).unwrap();
+    let motion = Motion::load_for(&root.join("trajectories").join(trajectory), &robot.rigid_model().unwrap()).unwrap();
     Variant { label: label.into(), robot, motion, options }
 }
 

@@ -15,9 +15,9 @@ type Run = (Summary, Trace);
 
 fn run(robot: &str, trajectory: &str, options: &RunOptions, outputs: Option<&Outputs>) -> Run {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let robot = Robot::load(&root.join("robots").join(robot), &LoadOptions::default()).unwrap();
+    let robot = Robot::load_with(&root.join("robots").join(robot), &LoadOptions::default()).unwrap();
     let model = robot.rigid_model().unwrap();
-    let motion = Motion::load(&root.join("trajectories").join(trajectory), &model).unwrap();
+    let motion = Motion::load_for(&root.join("trajectories").join(trajectory), &model).unwrap();
     simulate_traced(&robot, &motion, options, outputs, &mut |_, _| ControlFlow::Continue(())).unwrap()
 }
 
@@ -354,8 +354,9 @@ fn the_files_of_a_run_are_written_and_not_overwritten() {
         std::fs::write(other.0.join(name), "mine").unwrap();
         let outputs = Outputs { folder: other.0.clone(), ..outputs.clone() };
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-        let robot = Robot::load(&root.join("robots/one_beam"), &LoadOptions::default()).unwrap();
-        let motion = Motion::load(&root.join("trajectories/beam_swing.toml"), &robot.rigid_model().unwrap()).unwrap();
+        let robot = Robot::load_with(&root.join("robots/one_beam"), &LoadOptions::default()).unwrap();
+        let motion =
+            Motion::load_for(&root.join("trajectories/beam_swing.toml"), &robot.rigid_model().unwrap()).unwrap();
         let go = &mut |_, _| ControlFlow::Continue(());
         let error = simulate_traced(&robot, &motion, &RunOptions::default(), Some(&outputs), go).unwrap_err();
         assert!(error.to_string().contains(name), "{error}");

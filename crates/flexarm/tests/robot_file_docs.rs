@@ -35,7 +35,7 @@ impl Place {
 
     fn robot(&self, text: &str) -> Robot {
         std::fs::write(self.0.join("robot.toml"), text).unwrap();
-        Robot::load(&self.0, &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}\n{text}"))
+        Robot::load_with(&self.0, &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}\n{text}"))
     }
 }
 
@@ -103,7 +103,7 @@ const RAIL: &str = r#"<robot name="rail">
 fn every_example_of_a_motion_file_loads_and_goes_where_it_says() {
     let (page, place) = (read("docs/motions.md"), Place::new("motions"));
     std::fs::write(place.0.join("rail.urdf"), RAIL).unwrap();
-    let robot = Robot::load(&place.0.join("rail.urdf"), &LoadOptions::default()).unwrap();
+    let robot = Robot::load_with(&place.0.join("rail.urdf"), &LoadOptions::default()).unwrap();
     let model = robot.rigid_model().unwrap();
     for language in ["toml", "csv"] {
         let examples = blocks(&page, language);
@@ -111,7 +111,7 @@ fn every_example_of_a_motion_file_loads_and_goes_where_it_says() {
         for block in examples {
             let path = place.0.join(format!("motion.{language}"));
             std::fs::write(&path, &block).unwrap();
-            let motion = Motion::load(&path, &model).unwrap_or_else(|e| panic!("{e}"));
+            let motion = Motion::load_for(&path, &model).unwrap_or_else(|e| panic!("{e}"));
             assert!(motion.violations.is_empty(), "{:?}", motion.violations);
             let (mut q, mut v, mut a) = ([0.0; 3], [0.0; 3], [0.0; 3]);
             let t = if language == "toml" { 1.6 } else { 0.04 };

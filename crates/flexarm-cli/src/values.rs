@@ -1,0 +1,78 @@
+//! Joint values and wrenches as people type them.
+
+use flexarm::reduce::numbers;
+use flexarm::{Error, Robot};
+
+/// Reads a joint vector: `v1,v2,...` in coordinate order, or `name=value,...` with the rest zero; rad or m, or degrees
+/// with the ending `deg`.
+///
+/// # Errors
+/// [`Error::Usage`] saying which joints there are.
+fn parse_joint_values(text: &str, joints: &[&str]) -> Result<Vec<f64>, Error> {
+    let mut values = vec![0.0; joints.len()];
+    let items: Vec<&str> = text.split(',').map(str::trim).filter(|s| !s.is_empty()).collect();
+    let number = |s: &str| {
+        let (digits, unit) = match s.trim().strip_suffix("deg") {
+            Some(digits) => (digits.trim(), std::f64::consts::PI / 180.0),
+            None => (s.trim(), 1.0),
+        };
+        let value: Option<f64> = digits.parse().ok().filter(|x: &f64| x.is_finite());
+        value.map(|x| x * unit).ok_or_else(|| {
+            Error::Usage(format!("joint value {s:?} is not a finite number (rad or m, or degrees as in 30deg)"))
+        })
+    };
+    if items.iter().any(|i| i.contains('=')) {
+        let mut given = vec![false; joints.len()];
+        for item in items {
+            let (name, value) = item
+                .split_once('=')
+                .ok_or_else(|| Error::Usage(format!("{item:?}: either all joint values have names or none")))?;
+            let k = joints.iter().position(|j| *j == name.trim()).ok_or_else(|| {
+                Error::Usage(format!("there is no movable joint {:?}; the joints are {joints:?}", name.trim()))
+            })?;
+            if std::mem::replace(&mut given[k], true) {
+                return Err(Error::Usage(format!("joint {:?} is given twice", joints[k])));
+            }
+            values[k] = number(value)?;
+        }
+    } else {
+        if items.len() != joints.len() {
+            return Err(Error::Usage(format!(
+                "{} joint values given, the robot has {} movable joints: {joints:?}",
+                items.len(),
+                joints.len()
+            )));
+        }
+        for (value, item) in values.iter_mut().zip(items) {
+            *value = number(item)?;
+        }
+    }
+    Ok(values)
+}
+
+/// Values of a robot's joints, if any are given; see [`parse_joint_values`].
+///
+/// # Errors
+/// As [`parse_joint_values`], and [`Error::Model`].
+pub(crate) fn joint_values(text: Option<&str>, robot: &Robot) -> Result<Option<Vec<f64>>, Error> {
+    let Some(text) = text else { return Ok(None) };
+    let model = robot.rigid_model()?;
+    let joints: Vec<&str> = model.coordinates().iter().map(|c| c.joint.as_str()).collect();
+    parse_joint_values(text, &joints).map(Some)
+}
+
+/// Reads a wrench: `fx,fy,fz` or `fx,fy,fz,tx,ty,tz` (N, N m).
+///
+/// # Errors
+/// [`Error::Usage`].
+pub(crate) fn wrench(text: &str) -> Result<[f64; 6], Error> {
+    let values = numbers(text).map_err(|what| Error::Usage(format!("--wrench: {what} (N, N m)")))?;
+    match values.as_slice() {
+        [fx, fy, fz] => Ok([*fx, *fy, *fz, 0.0, 0.0, 0.0]),
+        [fx, fy, fz, tx, ty, tz] => Ok([*fx, *fy, *fz, *tx, *ty, *tz]),
+        other => Err(Error::Usage(format!(
+            "--wrench has {} numbers; expected fx,fy,fz or fx,fy,fz,tx,ty,tz in world axes",
+            other.len()
+        ))),
+    }
+}

@@ -1,0 +1,135 @@
+//! A run as columns: each signal one contiguous array with a name, a unit and a width. Every sample is kept.
+//!
+//! Start at [`Columns::push`]. Rows of [`crate::Trace`], which thins long runs, are for pictures.
+
+use crate::{RunHeader, Sample};
+
+/// One signal of a run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Column {
+    /// Name, such as `error_world`.
+    pub name: String,
+    /// Unit of its numbers, such as `m`; empty where joints turn and slide side by side.
+    pub unit: &'static str,
+    /// Numbers per row.
+    pub width: usize,
+    /// Rows after each other: row `i` is `values[i * width..][..width]`.
+    pub values: Vec<f64>,
+}
+
+/// What is written into a column at each sample.
+type Fill = fn(&Sample, &mut Vec<f64>);
+
+/// What there is to know of a signal before a run.
+struct Signal {
+    name: &'static str,
+    unit: &'static str,
+    width: Width,
+    fill: Fill,
+}
+
+/// Numbers per row.
+#[derive(Clone, Copy)]
+enum Width {
+    Numbers(usize),
+    PerJoint,
+    PerContributor(usize),
+    PerElement(usize),
+}
+
+const fn signal(name: &'static str, unit: &'static str, width: Width, fill: Fill) -> Signal {
+    Signal { name, unit, width, fill }
+}
+
+use Width::{Numbers, PerContributor, PerElement, PerJoint};
+
+/// Every signal there is; what needs the rigid twin comes from the error on.
+const SIGNALS: [Signal; 18] = [
+    signal("time", "s", Numbers(1), |s, to| to.push(s.time_s)),
+    signal("position", "", PerJoint, |s, to| to.extend_from_slice(&s.flexible.q)),
+    signal("velocity", "", PerJoint, |s, to| to.extend_from_slice(&s.flexible.qdot)),
+    signal("effort", "", PerJoint, |s, to| to.extend_from_slice(&s.flexible.effort)),
+    signal("tcp_position", "m", Numbers(3), |s, to| to.extend(s.flexible.X_WT.translation.vector.iter())),
+    signal("tcp_quaternion_wxyz", "", Numbers(4), |s, to| to.extend(wxyz(&s.flexible))),
+    signal("deflection", "m, rad", PerElement(6), |s, to| s.elastic.iter().for_each(|e| to.extend(e.deflection))),
+    signal("load", "N, N m", PerElement(6), |s, to| s.elastic.iter().for_each(|e| to.extend(e.load))),
+    signal("energy", "J", Numbers(3), |s, to| to.extend([s.energy.kinetic, s.energy.potential, s.energy.elastic])),
+    signal("error_world", "m", Numbers(3), |s, to| to.extend_from_slice(&s.error_world[..3])),
+    signal("error_rotation", "rad", Numbers(3), |s, to| to.extend_from_slice(&s.error_world[3..])),
+    signal("error_path", "m", Numbers(3), |s, to| to.extend_from_slice(&s.error_path[..3])),
+    signal("error_static", "m", Numbers(3), |s, to| to.extend_from_slice(&s.static_m)),
+    signal("contribution", "m", PerContributor(3), |s, to| s.contributions.iter().for_each(|c| to.extend(c))),
+    signal("rigid_position", "", PerJoint, |s, to| to.extend_from_slice(&s.rigid.q)),
+    signal("rigid_effort", "", PerJoint, |s, to| to.extend_from_slice(&s.rigid.effort)),
+    signal("rigid_tcp_position", "m", Numbers(3), |s, to| to.extend(s.rigid.X_WT.translation.vector.iter())),
+    signal("rigid_tcp_quaternion_wxyz", "", Numbers(4), |s, to| to.extend(wxyz(&s.rigid))),
+];
+/// The first signal that needs the rigid twin.
+const OF_TWIN: usize = 9;
+
+fn wxyz(twin: &crate::TwinSample) -> [f64; 4] {
+    let q = nalgebra::UnitQuaternion::from_rotation_matrix(&twin.X_WT.rotation);
+    [q.w, q.i, q.j, q.k]
+}
+
+/// The signals of a run, with the names of what they belong to.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Columns {
+    /// Joints, in the order of `position`, `velocity` and `effort`.
+    pub joints: Vec<String>,
+    /// Elastic elements, in the order of `deflection` and `load`: six numbers each.
+    pub elements: Vec<String>,
+    /// Who moves the tool, in the order of `contribution`: three numbers each.
+    pub contributors: Vec<String>,
+    columns: Vec<Column>,
+    rows: usize,
+}
+
+impl Columns {
+    /// Empty columns of a run.
+    #[must_use]
+    pub fn new(header: &RunHeader) -> Self {
+        let signals = if header.has_rigid { &SIGNALS[..] } else { &SIGNALS[..OF_TWIN] };
+        let width = |width: Width| match width {
+            Numbers(n) => n,
+            PerJoint => header.joints.len(),
+            PerContributor(n) => n * header.contributors.len(),
+            PerElement(n) => n * header.elements.len(),
+        };
+        let column =
+            |s: &Signal| Column { name: s.name.into(), unit: s.unit, width: width(s.width), values: Vec::new() };
+        Self {
+            joints: header.joints.clone(),
+            elements: header.elements.clone(),
+            contributors: header.contributors.clone(),
+            columns: signals.iter().map(column).collect(),
+            rows: 0,
+        }
+    }
+
+    /// Adds one instant.
+    pub fn push(&mut self, sample: &Sample) {
+        for (column, signal) in self.columns.iter_mut().zip(&SIGNALS) {
+            (signal.fill)(sample, &mut column.values);
+        }
+        self.rows += 1;
+    }
+
+    /// Number of instants.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// All signals.
+    #[must_use]
+    pub fn columns(&self) -> &[Column] {
+        &self.columns
+    }
+
+    /// The signal of this name.
+    #[must_use]
+    pub fn column(&self, name: &str) -> Option<&Column> {
+        self.columns.iter().find(|column| column.name == name)
+    }
+}

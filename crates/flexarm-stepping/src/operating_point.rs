@@ -1,0 +1,338 @@
+//! An arm held at one pose after another: equilibrium, compliance, Jacobian, frequencies, without allocation.
+//!
+//! ```text
+//! K e + p(q_a, e) = 0          C = J (K + dp/de)^-1 Jᵀ          (K + dp/de) φ = ω² M φ
+//! ```
+//! with the elastic coordinates e, the springs K, and p the forces that hold weight and loads. Drives are locked. Newton goes on
+//! with the factor of the pose before, so a pose costs one tangent: 2 n passes of the recursion.
+//!
+//! Start at [`OperatingPoint::new`]. For damping, servos and inputs about one pose: [`crate::linearise`].
+
+use flexarm_kinematics::{Data, Frame, Pose, Wrench, forward_kinematics, frame_jacobian, gravity_forces, mass_matrix};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix6, Matrix6xX};
+
+use crate::arm::FlexibleArm;
+use crate::eigenvalues::symmetric_eigenvalues;
+use crate::error::StepError;
+use crate::motion::Held;
+use crate::reduced::add_geometric_forces;
+use crate::statics::static_equilibrium;
+
+/// Accepted unbalanced force over the largest force.
+const TOLERANCE: f64 = 1e-13;
+/// Step of the central differences of static forces (m, rad).
+const DIFFERENCE: f64 = 1e-6;
+/// Most Newton iterations.
+const MOST_ITERATIONS: usize = 60;
+/// A step that leaves more than this part of the residual asks for a new tangent.
+const SLOW: f64 = 0.1;
+/// Passes of refinement where a constant moment makes the tangent unsymmetric: each leaves a thousandth or less.
+const REFINEMENTS: usize = 8;
+
+/// Equilibria of an arm at given poses, with the workspace that they need.
+///
+/// World axes, at the tool point, linear first. The load of the arm at time 0 acts as well.
+pub struct OperatingPoint {
+    arm: FlexibleArm,
+    tool: Frame,
+    data: Data,
+    /// Any joint with play or a curved spring.
+    curved: bool,
+    /// Springs at rest, n×n.
+    K: DMatrix<f64>,
+    /// All coordinates: joints, then elastic ones.
+    q: DVector<f64>,
+    F_T_W: Wrench,
+    /// Static forces, all coordinates: where the joints' part stays.
+    p: DVector<f64>,
+    up: DVector<f64>,
+    down: DVector<f64>,
+    /// Unbalanced forces, and Newton's step.
+    r: DVector<f64>,
+    /// `K + dp/de` as it is, n×n.
+    tangent: DMatrix<f64>,
+    /// Factor of its symmetric part.
+    factor: Option<Cholesky<f64, Dyn>>,
+    symmetric: bool,
+    X_WT: Pose,
+    X_WT_rigid: Pose,
+    J: Matrix6xX<f64>,
+    residual: f64,
+    iterations: usize,
+    /// Workspaces of compliance and frequencies.
+    Jt: DMatrix<f64>,
+    Y: DMatrix<f64>,
+    R: DMatrix<f64>,
+    A: DMatrix<f64>,
+    d: Vec<f64>,
+    e: Vec<f64>,
+}
+
+impl OperatingPoint {
+    /// The workspace for an arm and a frame on it; nothing is solved yet.
+    ///
+    /// * `tool`: a frame of the arm's model.
+    pub fn new(arm: FlexibleArm, tool: Frame) -> Self {
+        let (n, nv) = (arm.n_elastic_coordinates(), arm.model.nv());
+        Self {
+            data: Data::new(&arm.model),
+            curved: arm.elements.iter().any(|element| element.curve.is_some()),
+            K: arm.stiffness(),
+            q: DVector::zeros(nv),
+            F_T_W: Wrench::zeros(),
+            p: DVector::zeros(nv),
+            up: DVector::zeros(n),
+            down: DVector::zeros(n),
+            r: DVector::zeros(n),
+            tangent: DMatrix::zeros(n, n),
+            factor: None,
+            symmetric: true,
+            X_WT: Pose::identity(),
+            X_WT_rigid: Pose::identity(),
+            J: Matrix6xX::zeros(nv),
+            residual: f64::NAN,
+            iterations: 0,
+            Jt: DMatrix::zeros(n, 6),
+            Y: DMatrix::zeros(n, 6),
+            R: DMatrix::zeros(n, 6),
+            A: DMatrix::zeros(n, n),
+            d: vec![0.0; n],
+            e: vec![0.0; n],
+            arm,
+            tool,
+        }
+    }
+
+    /// Finds the equilibrium with the joints at `q` under weight and a wrench at the tool.
+    ///
+    /// * `q`: actuated joints in coordinate order (rad or m).
+    /// * `F_T_W`: force and moment on the tool at its origin, world axes (N, N m), the same when the arm yields.
+    ///
+    /// Cost: one tangent, two at most for small deflections; no allocation after the first, but for joints with play.
+    ///
+    /// # Errors
+    /// [`StepError::Setup`] for another number of joints or values that are no numbers, [`StepError::NoEquilibrium`], and
+    /// [`StepError::Singular`] beyond a buckling load.
+    pub fn solve(&mut self, q: &[f64], F_T_W: &Wrench) -> Result<(), StepError> {
+        let m = self.arm.model.n_actuated();
+        let finite = q.iter().chain(F_T_W.force.iter()).chain(F_T_W.torque.iter()).all(|x| x.is_finite());
+        if q.len() != m || !finite {
+            let text = format!("{} joint values are given, the arm has {m}; all must be finite numbers", q.len());
+            return Err(StepError::Setup(text));
+        }
+        self.residual = f64::NAN;
+        self.F_T_W = *F_T_W;
+        self.q.fill(0.0);
+        self.q.rows_mut(0, m).copy_from_slice(q);
+        forward_kinematics(&self.arm.model, &mut self.data, &self.q);
+        self.X_WT_rigid = self.data.X_WF(&self.tool);
+        if self.curved {
+            // Out of a play by a way of its own.
+            let held = FlexibleArm { motion: std::sync::Arc::new(Held(q.to_vec())), ..self.arm.clone() };
+            let e = static_equilibrium(&held, 0.0)?;
+            self.q.rows_mut(m, e.len()).copy_from(&e);
+            self.factor = None;
+        }
+        let residual = self.newton()?;
+        // What is asked for next belongs to the equilibrium itself.
+        self.refactor()?;
+        forward_kinematics(&self.arm.model, &mut self.data, &self.q);
+        self.X_WT = self.data.X_WF(&self.tool);
+        frame_jacobian(&self.arm.model, &self.data, &self.tool, &mut self.J);
+        self.residual = residual;
+        Ok(())
+    }
+
+    /// Newton's iteration from the elastic coordinates in `q`; returns the residual.
+    fn newton(&mut self) -> Result<f64, StepError> {
+        let (m, n) = (self.arm.model.n_actuated(), self.r.len());
+        let mut residual = f64::INFINITY;
+        for iteration in 0..MOST_ITERATIONS {
+            self.iterations = iteration;
+            self.forces();
+            let scale = self.unbalance();
+            let previous = residual;
+            residual = if n == 0 { 0.0 } else { self.r.amax() / scale };
+            if residual <= TOLERANCE || (iteration > 2 && residual < 1e-9 && residual >= 0.5 * previous) {
+                return Ok(residual);
+            }
+            if !residual.is_finite() {
+                break;
+            }
+            if self.factor.is_none() || residual > SLOW * previous {
+                self.refactor()?;
+                self.forces();
+                self.unbalance();
+            }
+            let Some(factor) = &self.factor else { break };
+            factor.solve_mut(&mut self.r);
+            // Far from small deflections the full step may overshoot: no coordinate moves by more than 0.5.
+            let shorten = (0.5 / self.r.amax()).min(1.0);
+            self.q.rows_mut(m, n).axpy(-shorten, &self.r, 1.0);
+        }
+        Err(StepError::NoEquilibrium { t: 0.0, iterations: MOST_ITERATIONS, residual })
+    }
+
+    /// Weight, loads and stiffness by load at `q`, without springs, into `p`.
+    fn forces(&mut self) {
+        let Self { arm, tool, data, q, F_T_W, p, .. } = self;
+        let model = &arm.model;
+        forward_kinematics(model, data, q);
+        data.clear_external_wrenches();
+        arm.apply_loads(data, 0.0);
+        let R = data.X_WF(tool).rotation.inverse();
+        let F_T = Wrench::new(R * F_T_W.force, R * F_T_W.torque);
+        data.F_ext[tool.body] += F_T.at_parent(&tool.X_BF);
+        p.copy_from(gravity_forces(model, data, q));
+        let m = model.n_actuated();
+        add_geometric_forces(arm, data, &q.as_slice()[m..], &mut p.as_mut_slice()[m..]);
+    }
+
+    /// `r = K e + p`; returns the largest of both.
+    fn unbalance(&mut self) -> f64 {
+        let m = self.arm.model.n_actuated();
+        let (e, p) = (&self.q.as_slice()[m..], &self.p.as_slice()[m..]);
+        self.r.fill(0.0);
+        for element in &self.arm.elements {
+            let range = self.arm.offset(element)..self.arm.offset(element) + element.size;
+            element.add_spring_force(&e[range.clone()], &mut self.r.as_mut_slice()[range]);
+        }
+        let springs = self.r.amax();
+        let mut carried = 0.0_f64;
+        for (r, p) in self.r.iter_mut().zip(p) {
+            carried = carried.max(p.abs());
+            *r += p;
+        }
+        springs.max(carried).max(f64::MIN_POSITIVE)
+    }
+
+    /// The tangent at `q` and the factor of its symmetric part.
+    fn refactor(&mut self) -> Result<(), StepError> {
+        let (m, n) = (self.arm.model.n_actuated(), self.r.len());
+        for k in 0..n {
+            let at = self.q[m + k];
+            self.q[m + k] = at + DIFFERENCE;
+            self.forces();
+            self.up.copy_from(&self.p.rows(m, n));
+            self.q[m + k] = at - DIFFERENCE;
+            self.forces();
+            self.down.copy_from(&self.p.rows(m, n));
+            self.q[m + k] = at;
+            let slopes = self.up.iter().zip(&self.down).map(|(up, down)| (up - down) / (2.0 * DIFFERENCE));
+            self.tangent.column_mut(k).iter_mut().zip(slopes).for_each(|(t, slope)| *t = slope);
+        }
+        self.forces();
+        self.tangent += &self.K;
+        for element in &self.arm.elements {
+            if let Some(curve) = &element.curve {
+                let k = self.arm.offset(element);
+                let slope = curve.slope(self.q[m + k]);
+                self.tangent[(k, k)] += if slope > 0.0 { slope } else { curve.stiffest() } - self.K[(k, k)];
+            }
+        }
+        // A constant moment is not conservative; what differences leave without one is their error.
+        let moments = self.arm.loads.iter().any(|load| (load.wrench)(0.0).torque.norm() > 0.0);
+        self.symmetric = self.F_T_W.torque.norm() == 0.0 && !moments;
+        let mut S = match self.factor.take() {
+            Some(factor) => factor.unpack_dirty(),
+            None => DMatrix::zeros(n, n),
+        };
+        for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+            S[(i, j)] = 0.5 * (self.tangent[(i, j)] + self.tangent[(j, i)]);
+        }
+        if self.symmetric {
+            self.tangent.copy_from(&S);
+        }
+        if n > 0 {
+            let singular =
+                StepError::Singular { matrix: "static stiffness (with the effect of weight and load)", t: 0.0 };
+            self.factor = Some(Cholesky::new(S).ok_or(singular)?);
+        }
+        Ok(())
+    }
+
+    /// The arm, driven along a motion of its own; its springs and loads are those here.
+    pub fn arm(&self) -> &FlexibleArm {
+        &self.arm
+    }
+
+    /// Tool in the world at the equilibrium.
+    pub fn tcp_pose(&self) -> Pose {
+        self.X_WT
+    }
+
+    /// Tool in the world with every elastic coordinate at zero.
+    pub fn rigid_tcp_pose(&self) -> Pose {
+        self.X_WT_rigid
+    }
+
+    /// Elastic coordinates (m, rad) in the order of the elements.
+    pub fn deflections(&self) -> &[f64] {
+        &self.q.as_slice()[self.arm.model.n_actuated()..]
+    }
+
+    /// Forces with which the drives hold the pose (N m or N), in coordinate order.
+    pub fn holding_efforts(&self) -> &[f64] {
+        &self.p.as_slice()[..self.arm.model.n_actuated()]
+    }
+
+    /// Twist of the tool per rate of the coordinates, joints first, 6×(m + n).
+    pub fn jacobian(&self) -> &Matrix6xX<f64> {
+        &self.J
+    }
+
+    /// Unbalanced force over the largest force; NaN before the first pose and after one that failed.
+    pub fn residual(&self) -> f64 {
+        self.residual
+    }
+
+    /// Newton iterations of the last pose.
+    pub fn iterations(&self) -> usize {
+        self.iterations
+    }
+
+    /// Displacement of the tool per wrench on it, drives locked, 6×6 (m/N, rad/N; m/(N m), rad/(N m)).
+    ///
+    /// Cost: six solutions with the factor that is there.
+    pub fn compliance(&mut self) -> Matrix6<f64> {
+        let (m, n) = (self.arm.model.n_actuated(), self.r.len());
+        let Some(factor) = &self.factor else { return Matrix6::zeros() };
+        let J = self.J.columns(m, n);
+        self.Jt.iter_mut().zip(J.row_iter().flat_map(|row| row.into_iter())).for_each(|(t, x)| *t = *x);
+        self.Y.copy_from(&self.Jt);
+        factor.solve_mut(&mut self.Y);
+        if !self.symmetric {
+            for _ in 0..REFINEMENTS {
+                // Y += S^-1 (Jᵀ - K Y)
+                self.R.copy_from(&self.Jt);
+                for (mut r, y) in self.R.column_iter_mut().zip(self.Y.column_iter()) {
+                    r.gemv(-1.0, &self.tangent, &y, 1.0);
+                }
+                factor.solve_mut(&mut self.R);
+                self.Y += &self.R;
+            }
+        }
+        Matrix6::from_fn(|i, j| self.Jt.column(i).dot(&self.Y.column(j)))
+    }
+
+    /// Natural frequencies (Hz), ascending, undamped, drives locked; of the symmetric part of the stiffness.
+    ///
+    /// Cost: a mass matrix and the eigenvalues of an n×n matrix. Not a number where a coordinate moves no mass.
+    pub fn frequencies_hz(&mut self) -> &[f64] {
+        let (m, n) = (self.arm.model.n_actuated(), self.r.len());
+        let Some(factor) = &self.factor else { return &[] };
+        let M = mass_matrix(&self.arm.model, &mut self.data, &self.q);
+        self.A.copy_from(&M.view((m, m), (n, n)));
+        // 1/ω² are the eigenvalues of L^-1 M L^-T: the low modes are the largest and most accurate.
+        let L = factor.l_dirty();
+        L.solve_lower_triangular_mut(&mut self.A);
+        self.A.transpose_mut();
+        L.solve_lower_triangular_mut(&mut self.A);
+        if !symmetric_eigenvalues(&mut self.A, &mut self.d, &mut self.e) {
+            self.d.fill(f64::NAN);
+        }
+        self.d.sort_unstable_by(|a, b| b.total_cmp(a));
+        self.d.iter_mut().for_each(|x| *x = 1.0 / (x.sqrt() * std::f64::consts::TAU));
+        &self.d
+    }
+}

@@ -1,0 +1,143 @@
+//! A robot that bends, built once and asked often: runs with columns, operating points.
+//!
+//! [`Robot::flexible`] does what costs (substitution, modes); what it returns is immutable, `Send` and `Sync`, and shared by
+//! threads. Each query takes numbers and a workspace of its own.
+
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+use flexarm_log::{Columns, RunHeader, Sample};
+use flexarm_stepping::{Held, OperatingPoint};
+
+use crate::compare::{Together, run_traced};
+use crate::error::Error;
+use crate::flexible::FlexibleRobot;
+use crate::motion::Motion;
+use crate::options::{Modelling, Outputs, RunOptions};
+use crate::robot::{Robot, TCP_FRAME};
+use crate::summary::Summary;
+
+/// A robot with its flexible links and drives in place.
+#[derive(Clone)]
+pub struct Arm {
+    robot: Arc<Robot>,
+    modelling: Modelling,
+    flexible: Arc<FlexibleRobot>,
+}
+
+/// What a run gives: figures, and every logged sample as columns.
+#[derive(Clone, Debug)]
+pub struct Run {
+    /// The figures, as in `summary.json`.
+    pub summary: Summary,
+    /// The signals.
+    pub columns: Columns,
+}
+
+impl Run {
+    /// Times of the samples (s).
+    pub fn time_s(&self) -> &[f64] {
+        self.values("time")
+    }
+
+    /// TCP error, flexible minus rigid, world axes (m): three numbers per sample. Empty without the rigid twin.
+    pub fn error_world_m(&self) -> &[f64] {
+        self.values("error_world")
+    }
+
+    /// Numbers of a signal, rows after each other; empty if there is none of this name. [`Columns::columns`] lists them.
+    pub fn values(&self, name: &str) -> &[f64] {
+        self.columns.column(name).map_or(&[], |column| &column.values)
+    }
+}
+
+impl Robot {
+    /// The robot with its links and drives modelled as asked for.
+    ///
+    /// Cost: reading of modes, substitution; milliseconds.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if a link or drive has no such model, [`Error::Model`] if the result is no tree.
+    pub fn flexible(&self, modelling: Modelling) -> Result<Arm, Error> {
+        Ok(Arm { robot: Arc::new(self.clone()), modelling, flexible: Arc::new(self.modelled(&modelling)?) })
+    }
+}
+
+impl Arm {
+    /// The robot that it was made of.
+    pub fn robot(&self) -> &Robot {
+        &self.robot
+    }
+
+    /// Tree, springs and drives.
+    pub fn flexible(&self) -> &FlexibleRobot {
+        &self.flexible
+    }
+
+    /// Actuated joints, in the order in which poses and motions have them.
+    pub fn joints(&self) -> impl Iterator<Item = &str> {
+        let model = &self.flexible.model;
+        model.coordinates()[..model.n_actuated()].iter().map(|coordinate| coordinate.joint.as_str())
+    }
+
+    /// Runs a motion; the options' own modelling does not count.
+    ///
+    /// # Errors
+    /// As [`crate::simulate`].
+    pub fn simulate(&self, motion: &Motion, options: &RunOptions) -> Result<Run, Error> {
+        self.simulate_with(motion, options, None, &mut |_| ControlFlow::Continue(()))
+    }
+
+    /// As [`Arm::simulate`], writes recordings if asked to, and shows each logged sample to `observer`, which may break off.
+    ///
+    /// # Errors
+    /// As [`crate::simulate`]; [`Error::Interrupted`] if the observer breaks off.
+    pub fn simulate_with(
+        &self,
+        motion: &Motion,
+        options: &RunOptions,
+        outputs: Option<&Outputs>,
+        observer: &mut dyn FnMut(&Sample) -> ControlFlow<()>,
+    ) -> Result<Run, Error> {
+        let options = RunOptions { modelling: self.modelling, ..options.clone() };
+        let mut columns = Columns::default();
+        let mut watch = |header: &RunHeader, sample: &Sample| {
+            if columns.rows() == 0 {
+                columns = Columns::new(header);
+            }
+            columns.push(sample);
+            observer(sample)
+        };
+        let prepared = Some(FlexibleRobot::clone(&self.flexible));
+        let together = Together { observer: Some(&mut watch), prepared, ..Together::default() };
+        let go_on = &mut |_, _| ControlFlow::Continue(());
+        let (summary, _) = run_traced(&self.robot, motion, &options, outputs, together, go_on)?;
+        Ok(Run { summary, columns })
+    }
+
+    /// A workspace for equilibria, compliances and frequencies at any number of poses.
+    ///
+    /// # Errors
+    /// [`Error::Step`] if a spring is not positive definite, or the arm cannot carry its weight at the middle of its joint
+    /// ranges.
+    pub fn operating_point(&self) -> Result<OperatingPoint, Error> {
+        let model = &self.flexible.model;
+        // Any pose will do; this one is within the limits.
+        let middle = |lower: f64, upper: f64| match (lower.is_finite(), upper.is_finite()) {
+            (true, true) => 0.5 * (lower + upper),
+            (false, false) => 0.0,
+            (finite, _) => {
+                if finite {
+                    lower.max(0.0)
+                } else {
+                    upper.min(0.0)
+                }
+            }
+        };
+        let actuated = &model.coordinates()[..model.n_actuated()];
+        let pose = actuated.iter().map(|c| middle(c.limits.lower, c.limits.upper)).collect();
+        let arm = self.flexible.arm(Arc::new(Held(pose))).map_err(|error| self.flexible.explained(error))?;
+        let tool = arm.model.frame(TCP_FRAME).expect("added when the robot was loaded").clone();
+        Ok(OperatingPoint::new(arm, tool))
+    }
+}

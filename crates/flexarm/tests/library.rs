@@ -1,0 +1,176 @@
+//! The library as other programs use it: numbers in, columns out, built once and asked often.
+#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
+
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+use flexarm::{Arm, DriveModel, Error, LinkModel, Modelling, Motion, Robot, Run, RunOptions, Wrench};
+use nalgebra::Vector3;
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+fn is_shared<T: Send + Sync + 'static>() {}
+fn is_sent<T: Send + 'static>() {}
+
+#[test]
+fn arms_are_shared_by_threads_and_workspaces_are_sent_to_them() {
+    is_shared::<Arm>();
+    is_shared::<Motion>();
+    is_shared::<Run>();
+    is_sent::<flexarm::OperatingPoint>();
+    is_sent::<Error>();
+}
+
+/// Truth: the run that writes files, whose figures the other tests hold against physics.
+#[test]
+fn a_run_by_values_is_the_run_by_files() {
+    let robot = Robot::load(root().join("robots/kr210")).unwrap();
+    let motion = Motion::load(root().join("trajectories/pick_and_place.toml"), &robot).unwrap();
+    let arm = robot.flexible(Modelling::default()).unwrap();
+    let options = RunOptions::default();
+    let run = arm.simulate(&motion, &options).unwrap();
+    let by_files = flexarm::simulate(&robot, &motion, &options, None, &mut |_, _| ControlFlow::Continue(())).unwrap();
+    assert_eq!(run.summary.tcp, by_files.tcp);
+
+    let (t, e) = (run.time_s(), run.error_world_m());
+    assert_eq!((t.len(), e.len()), (5001, 3 * 5001));
+    let peak = e.chunks_exact(3).map(|e| Vector3::from_row_slice(e).norm()).fold(0.0, f64::max);
+    assert_eq!(peak, run.summary.tcp.as_ref().unwrap().peak_m);
+    for column in run.columns.columns() {
+        assert_eq!(column.values.len(), column.width * run.columns.rows(), "{}", column.name);
+    }
+    // What moves the tool adds up to its error, to first order in the deflection.
+    let shares = run.values("contribution");
+    let n = run.columns.contributors.len();
+    for (e, shares) in e.chunks_exact(3).zip(shares.chunks_exact(3 * n)) {
+        let sum = shares.chunks_exact(3).fold(Vector3::zeros(), |sum, s| sum + Vector3::from_row_slice(s));
+        assert!((sum - Vector3::from_row_slice(e)).norm() < 2e-5); // measured 9e-6 m of 6 mm
+    }
+}
+
+/// Truth: the same motion, read from a file. Measured: the same bits.
+#[test]
+fn a_motion_of_arrays_is_that_of_the_file() {
+    let robot = Robot::load(root().join("robots/one_beam")).unwrap();
+    let t: Vec<f64> = (0..=200).map(|k| 0.01 * f64::from(k)).collect();
+    let q: Vec<f64> = t.iter().map(|t| 0.3 * (1.0 - (std::f64::consts::PI * t).cos())).collect();
+    let motion = Motion::from_samples(&t, &q, &robot).unwrap();
+    let rows = t.iter().zip(&q).map(|(t, q)| format!("{t},{q}\n")).collect::<String>();
+    let arm = robot.flexible(Modelling::default()).unwrap();
+    let joint = arm.joints().next().unwrap();
+    let file = std::env::temp_dir().join(format!("flexarm-library-{}.csv", std::process::id()));
+    std::fs::write(&file, format!("time,{joint}\n{rows}")).unwrap();
+    let read = Motion::load(&file, &robot).unwrap();
+    std::fs::remove_file(&file).unwrap();
+    let run = |motion: &Motion| arm.simulate(motion, &RunOptions::default()).unwrap();
+    assert_eq!(run(&motion).error_world_m(), run(&read).error_world_m());
+
+    for (t, q, words) in [
+        (&t[..], &q[1..], "200 joint values are given for 201 times"),
+        (&[0.0, 0.0][..], &[0.0, 1.0][..], "does not follow"),
+        (&[0.0, 1.0][..], &[0.0, f64::NAN][..], "NaN"),
+    ] {
+        let said = Motion::from_samples(t, q, &robot).unwrap_err().to_string();
+        assert!(said.contains(words), "{said}");
+    }
+}
+
+#[test]
+fn an_observer_sees_every_sample_and_can_stop_the_run() {
+    let robot = Robot::load(root().join("robots/one_beam")).unwrap();
+    let motion = Motion::load(root().join("trajectories/beam_swing.toml"), &robot).unwrap();
+    let arm = robot.flexible(Modelling::default()).unwrap();
+    let mut seen = 0;
+    let run = arm
+        .simulate_with(&motion, &RunOptions::default(), None, &mut |_| {
+            seen += 1;
+            ControlFlow::Continue(())
+        })
+        .unwrap();
+    assert_eq!(seen, run.columns.rows());
+    let stopped = arm.simulate_with(&motion, &RunOptions::default(), None, &mut |sample| {
+        if sample.time_s > 0.1 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    });
+    assert!(matches!(stopped, Err(Error::Interrupted { t, .. }) if (t - 0.102).abs() < 1e-9), "{:?}", stopped.err());
+}
+
+/// Truth: [`flexarm::statics`] and [`flexarm::modes`], which find equilibrium and modes by other code, with an eigenvalue
+/// solver for damped modes. Every shipped robot, link model and drive, with force and moment at the tool.
+#[test]
+fn operating_points_are_what_statics_and_modes_say() {
+    let modellings = [
+        Modelling::default(),
+        Modelling { links: LinkModel::Modal, ..Modelling::default() },
+        Modelling { drives: DriveModel::Rigid, ..Modelling::default() },
+    ];
+    let (mut checked, mut worst) = (0, [0.0_f64; 4]);
+    for entry in std::fs::read_dir(root().join("robots")).unwrap() {
+        let folder = entry.unwrap().path();
+        if !folder.join("robot.toml").is_file() {
+            continue;
+        }
+        let robot = Robot::load(&folder).unwrap();
+        for modelling in modellings {
+            let Ok(arm) = robot.flexible(modelling) else { continue };
+            if arm.flexible().springs.is_empty() {
+                continue;
+            }
+            let model = &arm.flexible().model;
+            let ranges: Vec<(f64, f64)> = model.coordinates()[..model.n_actuated()]
+                .iter()
+                .map(|c| (c.limits.lower.max(-3.0), c.limits.upper.min(3.0)))
+                .collect();
+            let mut at = arm.operating_point().unwrap();
+            for k in 0..4 {
+                let place = |i: usize| 0.2 + 0.6 * (0.618 * (7 * k + i + 1) as f64).fract();
+                let q: Vec<f64> = ranges.iter().enumerate().map(|(i, (a, b))| a + (b - a) * place(i)).collect();
+                let moment = if k % 2 == 0 { 0.0 } else { 5.0 };
+                let wrench = [10.0, -20.0, 15.0 * k as f64, moment, 0.0, -moment];
+                let truth = flexarm::statics(&robot, &modelling, Some(&q), wrench).unwrap();
+                let F = Wrench::new(Vector3::from_row_slice(&wrench[..3]), Vector3::from_row_slice(&wrench[3..]));
+                at.solve(&q, &F).unwrap();
+                let moved = at.tcp_pose().translation.vector - at.rigid_tcp_pose().translation.vector;
+                let expected = Vector3::from(truth.tcp_displacement_m);
+                worst[0] = worst[0].max((moved - expected).norm() / expected.norm().max(1e-6));
+                let C = at.compliance();
+                let largest = truth.compliance.iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
+                for (i, row) in truth.compliance.iter().enumerate() {
+                    for (j, expected) in row.iter().enumerate() {
+                        worst[1] = worst[1].max((C[(i, j)] - expected).abs() / largest);
+                    }
+                }
+                let efforts = at.holding_efforts().iter().zip(&truth.holding_torque);
+                let scale = truth.holding_torque.iter().fold(1.0, |m: f64, x| m.max(x.abs()));
+                worst[2] = efforts.fold(worst[2], |worst, (a, b)| worst.max((a - b).abs() / scale));
+                at.solve(&q, &Wrench::zeros()).unwrap();
+                let torque_driven = robot.drives.iter().any(|drive| drive.kind == flexarm::DriveKind::Torque);
+                if !torque_driven {
+                    let modes = flexarm::modes(&robot, &modelling, Some(&q), 6).unwrap();
+                    for (found, truth) in at.frequencies_hz().iter().zip(&modes.undamped_frequencies_hz) {
+                        worst[3] = worst[3].max((found / truth - 1.0).abs());
+                    }
+                }
+                checked += 1;
+            }
+        }
+    }
+    eprintln!(
+        "{checked} poses: displacement {:e}, compliance {:e}, efforts {:e}, frequencies {:e}",
+        worst[0], worst[1], worst[2], worst[3]
+    );
+    assert!(checked > 60);
+    assert!(worst[0] < 1e-9 && worst[1] < 1e-7 && worst[2] < 1e-9 && worst[3] < 1e-3, "{worst:?}");
+}
+
+#[test]
+fn poses_of_another_length_and_without_numbers_are_refused() {
+    let arm = Robot::load(root().join("robots/kr210")).unwrap().flexible(Modelling::default()).unwrap();
+    let mut at = arm.operating_point().unwrap();
+    for q in [&[0.0; 5][..], &[0.0, f64::NAN, 0.0, 0.0, 0.0, 0.0]] {
+        assert!(at.solve(q, &Wrench::zeros()).unwrap_err().to_string().contains("6"));
+    }
+    at.solve(&[0.0, -1.0, 1.0, 0.0, 0.5, 0.0], &Wrench::zeros()).unwrap();
+    assert!(at.residual() < 1e-12 && at.iterations() < 8, "{} {}", at.residual(), at.iterations());
+}
