@@ -65,8 +65,7 @@ impl Place {
             let n = motion.trajectory.joints().len();
             let mut q = vec![0.0; n];
             motion.trajectory.sample(0.0, &mut q, &mut vec![0.0; n], &mut vec![0.0; n]);
-            let at: Vec<String> = q.iter().map(f64::to_string).collect();
-            statics(&robot, &Modelling::default(), Some(&at.join(",")), [0.0; 6])
+            statics(&robot, &Modelling::default(), Some(&q), [0.0; 6])
         });
         let loud_too = match held {
             Ok(held) => {

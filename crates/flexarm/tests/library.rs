@@ -1,4 +1,5 @@
 //! The library as other programs use it: numbers in, columns out, built once and asked often.
+#![allow(non_snake_case, reason = "monogram notation: F, C; see docs/references.md")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 use std::ops::ControlFlow;

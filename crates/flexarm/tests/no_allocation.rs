@@ -36,8 +36,8 @@ fn poses_after_the_first_do_not_allocate() {
         let mut sum = 0.0;
         let mut visit = |k: u32| {
             let a = 0.1 * f64::from(k);
-            let F = Wrench::new([0.0, 10.0 * a, -50.0].into(), [a, 0.0, 0.0].into());
-            at.solve(&[a, -1.0 - 0.1 * a, 1.0 + 0.1 * a, 0.0, 0.5, a], &F).unwrap();
+            let load = Wrench::new([0.0, 10.0 * a, -50.0].into(), [a, 0.0, 0.0].into());
+            at.solve(&[a, -1.0 - 0.1 * a, 1.0 + 0.1 * a, 0.0, 0.5, a], &load).unwrap();
             sum +=
                 at.compliance()[(2, 2)] + at.frequencies_hz()[0] + at.jacobian()[(0, 0)] + at.tcp_pose().translation.x;
         };
