@@ -140,9 +140,12 @@ pub fn linearise(arm: &FlexibleArm, tool: &Frame, F_T_W: &Wrench, t: f64) -> Res
         if !residual.is_finite() || iterations == MOST_ITERATIONS {
             return Err(StepError::NoEquilibrium { t, iterations, residual });
         }
-        let tangent = with_curves(arm, &at_rest, &e) + statics.slopes(&mut data, &q).view((m, m), (ne, ne));
+        let springs = with_curves(arm, &at_rest, &e);
+        let tangent = &springs + statics.slopes(&mut data, &q).view((m, m), (ne, ne));
+        // Where the tangent is not positive definite its step leads uphill, to a saddle: the springs alone lead down.
+        let stable = ((&tangent + tangent.transpose()) * 0.5).cholesky().is_some();
         let singular = StepError::Singular { matrix: "static stiffness (with the effect of weight and load)", t };
-        let step = tangent.lu().solve(&r).ok_or(singular)?;
+        let step = if stable { tangent } else { springs }.lu().solve(&r).ok_or(singular)?;
         // Far from small deflections the full step may overshoot: no coordinate moves by more than 0.5.
         e -= &step * (0.5 / step.amax()).min(1.0);
         iterations += 1;

@@ -160,7 +160,10 @@ impl OperatingPoint {
                 break;
             }
             if self.factor.is_none() || residual > SLOW * previous {
-                self.refactor()?;
+                if self.refactor().is_err() {
+                    // Its step would lead uphill, to a saddle: the springs alone lead down.
+                    self.factor = Cholesky::new(self.K.clone());
+                }
                 self.forces();
                 self.unbalance();
             }

@@ -98,7 +98,8 @@ fn an_observer_sees_every_sample_and_can_stop_the_run() {
 }
 
 /// Truth: [`flexarm::statics`] and [`flexarm::modes`], which find equilibrium and modes by other code, with an eigenvalue
-/// solver for damped modes. Every shipped robot, link model and drive, with force and moment at the tool.
+/// solver for damped modes. Every shipped robot, link model and drive, with force and moment at the tool; the three-mass arm
+/// turns by half a radian under them. Measured over 104 poses: 6e-13, 1e-10 (tangents by differences), 2e-14, 1e-13.
 #[test]
 fn operating_points_are_what_statics_and_modes_say() {
     let modellings = [
@@ -129,8 +130,8 @@ fn operating_points_are_what_statics_and_modes_say() {
                 let q: Vec<f64> = ranges.iter().enumerate().map(|(i, (a, b))| a + (b - a) * place(i)).collect();
                 let moment = if k % 2 == 0 { 0.0 } else { 5.0 };
                 let wrench = [10.0, -20.0, 15.0 * k as f64, moment, 0.0, -moment];
-                let truth = flexarm::statics(&robot, &modelling, Some(&q), wrench).unwrap();
                 let F = Wrench::new(Vector3::from_row_slice(&wrench[..3]), Vector3::from_row_slice(&wrench[3..]));
+                let truth = flexarm::statics(&robot, &modelling, Some(&q), wrench).unwrap();
                 at.solve(&q, &F).unwrap();
                 let moved = at.tcp_pose().translation.vector - at.rigid_tcp_pose().translation.vector;
                 let expected = Vector3::from(truth.tcp_displacement_m);
@@ -157,12 +158,13 @@ fn operating_points_are_what_statics_and_modes_say() {
             }
         }
     }
+    let [displacement, compliance, effort, frequency] = worst;
     eprintln!(
-        "{checked} poses: displacement {:e}, compliance {:e}, efforts {:e}, frequencies {:e}",
-        worst[0], worst[1], worst[2], worst[3]
+        "{checked} poses: displacement {displacement:.1e}, compliance {compliance:.1e}, efforts {effort:.1e}, \
+         frequencies {frequency:.1e}"
     );
     assert!(checked > 60);
-    assert!(worst[0] < 1e-9 && worst[1] < 1e-7 && worst[2] < 1e-9 && worst[3] < 1e-3, "{worst:?}");
+    assert!(worst[0] < 1e-10 && worst[1] < 1e-8 && worst[2] < 1e-11 && worst[3] < 1e-10, "{worst:?}");
 }
 
 #[test]
