@@ -124,7 +124,8 @@ pub fn linearise(arm: &FlexibleArm, tool: &Frame, F_T_W: &Wrench, t: f64) -> Res
 
     // K e + p(e) = 0 with the motors held, from the equilibrium under weight.
     let (at_rest, mut e) = (arm.stiffness(), static_equilibrium(arm, t)?);
-    let (mut residual, mut iterations) = (f64::INFINITY, 0);
+    let (mut residual, mut iterations, mut buckled) = (f64::INFINITY, 0, false);
+    let singular = StepError::Singular { matrix: "static stiffness (with the effect of weight and load)", t };
     let (q, p) = loop {
         let q = all_coordinates(arm, t, &e);
         let p = statics.forces(&mut data, &q);
@@ -138,14 +139,14 @@ pub fn linearise(arm: &FlexibleArm, tool: &Frame, F_T_W: &Wrench, t: f64) -> Res
             break (q, p);
         }
         if !residual.is_finite() || iterations == MOST_ITERATIONS {
-            return Err(StepError::NoEquilibrium { t, iterations, residual });
+            return Err(if buckled { singular } else { StepError::NoEquilibrium { t, iterations, residual } });
         }
         let springs = with_curves(arm, &at_rest, &e);
         let tangent = &springs + statics.slopes(&mut data, &q).view((m, m), (ne, ne));
         // Where the tangent is not positive definite its step leads uphill, to a saddle: the springs alone lead down.
         let stable = ((&tangent + tangent.transpose()) * 0.5).cholesky().is_some();
-        let singular = StepError::Singular { matrix: "static stiffness (with the effect of weight and load)", t };
-        let step = if stable { tangent } else { springs }.lu().solve(&r).ok_or(singular)?;
+        buckled |= !stable;
+        let step = if stable { tangent } else { springs }.lu().solve(&r).ok_or_else(|| singular.clone())?;
         // Far from small deflections the full step may overshoot: no coordinate moves by more than 0.5.
         e -= &step * (0.5 / step.amax()).min(1.0);
         iterations += 1;
@@ -166,7 +167,7 @@ pub fn linearise(arm: &FlexibleArm, tool: &Frame, F_T_W: &Wrench, t: f64) -> Res
     let mut K = &springs + change;
     let elastic = K.view((driven, driven), (ne, ne)).into_owned();
     if ne > 0 && ((&elastic + elastic.transpose()) * 0.5).cholesky().is_none() {
-        return Err(StepError::Singular { matrix: "static stiffness (with the effect of weight and load)", t });
+        return Err(singular);
     }
     let M = mass_matrix(model, &mut data, &q).clone();
     forward_kinematics(model, &mut data, &q);

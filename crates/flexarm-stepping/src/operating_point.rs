@@ -68,6 +68,11 @@ pub struct OperatingPoint {
     e: Vec<f64>,
 }
 
+/// The arm does not stay at an equilibrium whose tangent is not positive definite.
+fn beyond_buckling() -> StepError {
+    StepError::Singular { matrix: "static stiffness (with the effect of weight and load)", t: 0.0 }
+}
+
 impl OperatingPoint {
     /// The workspace for an arm and a frame on it; nothing is solved yet.
     ///
@@ -146,7 +151,7 @@ impl OperatingPoint {
     /// Newton's iteration from the elastic coordinates in `q`; returns the residual.
     fn newton(&mut self) -> Result<f64, StepError> {
         let (m, n) = (self.arm.model.n_actuated(), self.r.len());
-        let mut residual = f64::INFINITY;
+        let (mut residual, mut buckled) = (f64::INFINITY, false);
         for iteration in 0..MOST_ITERATIONS {
             self.iterations = iteration;
             self.forces();
@@ -161,6 +166,7 @@ impl OperatingPoint {
             }
             if self.factor.is_none() || residual > SLOW * previous {
                 if self.refactor().is_err() {
+                    buckled = true;
                     // Its step would lead uphill, to a saddle: the springs alone lead down.
                     self.factor = Cholesky::new(self.K.clone());
                 }
@@ -173,7 +179,10 @@ impl OperatingPoint {
             let shorten = (0.5 / self.r.amax()).min(1.0);
             self.q.rows_mut(m, n).axpy(-shorten, &self.r, 1.0);
         }
-        Err(StepError::NoEquilibrium { t: 0.0, iterations: MOST_ITERATIONS, residual })
+        match buckled {
+            true => Err(beyond_buckling()),
+            false => Err(StepError::NoEquilibrium { t: 0.0, iterations: MOST_ITERATIONS, residual }),
+        }
     }
 
     /// Weight, loads and stiffness by load at `q`, without springs, into `p`.
@@ -247,9 +256,7 @@ impl OperatingPoint {
             self.tangent.copy_from(&S);
         }
         if n > 0 {
-            let singular =
-                StepError::Singular { matrix: "static stiffness (with the effect of weight and load)", t: 0.0 };
-            self.factor = Some(Cholesky::new(S).ok_or(singular)?);
+            self.factor = Some(Cholesky::new(S).ok_or_else(beyond_buckling)?);
         }
         Ok(())
     }

@@ -177,3 +177,13 @@ fn poses_of_another_length_and_without_numbers_are_refused() {
     at.solve(&[0.0, -1.0, 1.0, 0.0, 0.5, 0.0], &Wrench::zeros()).unwrap();
     assert!(at.residual() < 1e-12 && at.iterations() < 8, "{} {}", at.residual(), at.iterations());
 }
+
+#[test]
+fn a_load_beyond_buckling_is_no_operating_point_and_the_next_pose_is() {
+    let arm = Robot::load(root().join("robots/one_beam")).unwrap().flexible(Modelling::default()).unwrap();
+    let mut at = arm.operating_point().unwrap();
+    let push = Wrench::new(Vector3::new(-1e9, 0.0, 0.0), Vector3::zeros());
+    assert!(at.solve(&[0.0], &push).is_err() && at.residual().is_nan());
+    at.solve(&[0.0], &Wrench::zeros()).unwrap();
+    assert!(at.residual() < 1e-12, "{}", at.residual());
+}
