@@ -1,4 +1,5 @@
 //! Load, run, print: `cargo run --release -p flexarm --no-default-features --example five_lines`
+#![allow(clippy::print_stdout, reason = "an example shows its answer")]
 
 use flexarm::{Error, Modelling, Motion, Robot, RunOptions};
 

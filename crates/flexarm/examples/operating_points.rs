@@ -2,6 +2,7 @@
 //! `cargo run --release -p flexarm --no-default-features --example operating_points [POSES]`
 //!
 //! Each thread has a workspace of its own; the arm is shared. After its first pose a thread allocates nothing.
+#![allow(clippy::print_stdout, reason = "an example shows its answer")]
 
 use std::time::Instant;
 

@@ -1,5 +1,6 @@
 //! The library as other programs use it: numbers in, columns out, built once and asked often.
 #![allow(non_snake_case, reason = "monogram notation: F, C; see docs/references.md")]
+#![allow(clippy::print_stderr, reason = "what was measured stands beside the bound")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 use std::ops::ControlFlow;
