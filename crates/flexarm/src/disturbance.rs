@@ -157,12 +157,13 @@ impl Disturbances {
 }
 
 /// Names of the links that move, for messages.
-fn moving_links(model: &Model) -> Vec<&str> {
+pub(crate) fn moving_links(model: &Model) -> Vec<&str> {
     let named = model.frames().iter().filter(|f| f.body > 0 && !f.name.starts_with("__"));
     named.map(|f| f.name.as_str()).collect()
 }
 
-fn frame_of<'m>(name: &str, model: &'m Model) -> Option<&'m Frame> {
+/// The frame of this name; `tcp` is that of the tool.
+pub(crate) fn frame_of<'m>(name: &str, model: &'m Model) -> Option<&'m Frame> {
     model.frame(if name == "tcp" { TCP_FRAME } else { name })
 }
 

@@ -25,6 +25,7 @@
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
+mod applied_load;
 mod arm;
 mod beam_entry;
 mod bends;
@@ -67,6 +68,7 @@ mod study;
 mod summary;
 mod twin;
 
+pub use applied_load::AppliedLoad;
 pub use arm::{Arm, Run};
 pub use bends::Bend;
 pub use caveat::Caveat;
@@ -102,8 +104,8 @@ pub use flexarm_analysis::{Quantity, Spacing};
 pub use flexarm_kinematics::{Pose, Wrench};
 pub use flexarm_log::{Column, Columns, RecordingFormat, Sample, Trace};
 pub use flexarm_stepping::{
-    AlphaSettings, ConstraintForm, OperatingPoint, ReferenceMethod, ReferenceSettings, SpookPreset, SpookSettings,
-    Start, StepError, StepperKind,
+    AlphaSettings, ConstraintForm, LoadAxes, OperatingPoint, ReferenceMethod, ReferenceSettings, SpookPreset,
+    SpookSettings, Start, StepError, StepperKind,
 };
 pub use flexarm_trajectory::{Trajectory, TrajectoryError};
 pub use flexarm_urdf::{InertiaEstimate, ReadOptions, closest, search_paths_from_environment};

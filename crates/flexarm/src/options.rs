@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use flexarm_stepping::{AlphaSettings, Start, StepperKind};
 
+use crate::applied_load::AppliedLoad;
+
 /// How links are modelled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum LinkModel {
@@ -56,6 +58,8 @@ pub struct RunOptions {
     pub modelling: Modelling,
     /// File with loads and changes of payload.
     pub loads: Option<PathBuf>,
+    /// Loads besides.
+    pub applied: Vec<AppliedLoad>,
     /// Logged samples per second; the nearest whole number of steps is used.
     pub log_rate_hz: f64,
     /// Start in equilibrium or undeformed.
@@ -81,6 +85,7 @@ impl Default for RunOptions {
             step_s: 1e-3,
             modelling: Modelling::default(),
             loads: None,
+            applied: Vec::new(),
             log_rate_hz: 500.0,
             start: Start::Equilibrium,
             ignore_limits: false,

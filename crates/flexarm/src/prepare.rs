@@ -47,10 +47,14 @@ pub(crate) fn checked(
     let flexible = prepared.map_or_else(|| robot.modelled(&options.modelling), Ok)?;
     let mut arm = flexible.arm(motion.prescribed()).map_err(|error| flexible.explained(error))?;
     let mut load_caveats = Vec::new();
-    if let Some(path) = &options.loads {
-        let disturbances = Disturbances::load(path, robot, &arm.model, motion.trajectory.duration())?;
-        load_caveats = disturbances.caveats;
+    if options.loads.is_some() || !options.applied.is_empty() {
         let duration = motion.trajectory.duration();
+        let read = options.loads.as_ref().map(|path| Disturbances::load(path, robot, &arm.model, duration));
+        let mut disturbances = read.transpose()?.unwrap_or_default();
+        for load in &options.applied {
+            disturbances.loads.push(load.on(&arm.model, duration)?);
+        }
+        load_caveats = disturbances.caveats;
         load_caveats.extend(caveat::motion::of_loads(&disturbances.loads, duration, &Size::of(&robot.rigid)));
         if !matches!(options.stepper, StepperKind::Reference(_)) {
             load_caveats.extend(short_loads(&disturbances.loads, options.step_s));

@@ -6,7 +6,7 @@
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use flexarm::{Arm, DriveModel, Error, LinkModel, Modelling, Motion, Robot, Run, RunOptions, Wrench};
+use flexarm::{AppliedLoad, Arm, DriveModel, Error, LinkModel, Modelling, Motion, Robot, Run, RunOptions, Wrench};
 use nalgebra::Vector3;
 
 fn root() -> PathBuf {
@@ -77,6 +77,36 @@ fn a_motion_of_arrays_is_that_of_the_file() {
         let said = Motion::from_samples(t, q, &robot).unwrap_err().to_string();
         assert!(said.contains(words), "{said}");
     }
+}
+
+/// Truth: the same load from a file. Measured: the same bits.
+#[test]
+fn a_load_by_value_is_that_of_the_file() {
+    let robot = Robot::load(root().join("robots/one_beam")).unwrap();
+    let motion = Motion::load(root().join("trajectories/beam_swing.toml"), &robot).unwrap();
+    let arm = robot.flexible(Modelling::default()).unwrap();
+    let file = std::env::temp_dir().join(format!("flexarm-library-{}.loads.toml", std::process::id()));
+    let text = "format = 1\n[[load]]\nkind = \"step\"\nforce = [0.0, 3.0, -5.0]\nstart = 0.2\nend = 0.7\n";
+    std::fs::write(&file, text).unwrap();
+    let error = |options: RunOptions| arm.simulate(&motion, &options).unwrap().error_world_m().to_vec();
+    let by_file = error(RunOptions { loads: Some(file.clone()), ..RunOptions::default() });
+    std::fs::remove_file(&file).unwrap();
+    let F = Wrench::new(Vector3::new(0.0, 3.0, -5.0), Vector3::zeros());
+    let applied = |load: AppliedLoad| RunOptions { applied: vec![load], ..RunOptions::default() };
+    assert_eq!(error(applied(AppliedLoad::during("tcp", F, 0.2, 0.7))), by_file);
+    assert_ne!(error(RunOptions::default()), by_file);
+
+    // Samples that say the same, within and without: nothing before, nothing after.
+    let sampled = AppliedLoad::sampled("tcp", &[0.2, 0.4, 0.7], &[F; 3]).unwrap();
+    for t in [0.1999, 0.2, 0.3, 0.7, 0.7001] {
+        assert_eq!((sampled.wrench)(t).force.y, if (0.2..=0.7).contains(&t) { 3.0 } else { 0.0 }, "{t}");
+    }
+    let worst = error(applied(sampled)).iter().zip(&by_file).fold(0.0_f64, |worst, (a, b)| worst.max((a - b).abs()));
+    eprintln!("sampled and constant: {worst:e} m");
+    assert!(worst < 1e-12, "{worst:e}"); // measured 6e-17
+    assert!(AppliedLoad::sampled("tcp", &[0.2, 0.2], &[F; 2]).is_err());
+    let elsewhere = applied(AppliedLoad::during("nowhere", F, 0.2, 0.7));
+    assert!(arm.simulate(&motion, &elsewhere).unwrap_err().to_string().contains("\"nowhere\": expected \"tcp\""));
 }
 
 #[test]
