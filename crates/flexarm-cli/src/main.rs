@@ -175,6 +175,7 @@ fn run_options(args: &RunArgs, with_twin: bool) -> RunOptions {
         stepper,
         step_s: args.step,
         modelling: args.modelling.modelling(),
+        applied: Vec::new(),
         loads: args.loads.clone(),
         log_rate_hz: args.log_rate,
         start: if args.from_rest == StartName::Equilibrium { Start::Equilibrium } else { Start::Undeformed },

@@ -101,6 +101,37 @@ fn every_stepper_takes_the_blow_of_a_corner() {
     }
 }
 
+/// From rest to 2 rad/s within a few samples of 1 ms and back: no corner, and as hard a blow. Truth: RK4 in fine steps.
+///
+/// Accelerations at the ends of steps alone say another impulse: a default run had 0.034 m of 0.063 m for three samples and
+/// 15 % too little for ten. Measured with steps that are cut: within 0.4 %.
+#[test]
+fn every_stepper_takes_the_blow_of_a_short_ramp() {
+    let place = Place::new();
+    let robot = shipped_robot("reference_arm");
+    for samples in [3.0, 4.0, 6.0, 10.0] {
+        let (mut text, mut q) = ("time,joint_1,joint_2,joint_3,joint_4,joint_5,joint_6\n".to_owned(), 0.0);
+        for k in 0..=1500 {
+            let k = f64::from(k);
+            writeln!(text, "{:.3},{q:.9},0,0,0,0,0", 1e-3 * k).unwrap();
+            q += 2e-3 * (((k - 300.0) / samples).clamp(0.0, 1.0) - ((k - 1000.0) / samples).clamp(0.0, 1.0));
+        }
+        place.write("ramp.csv", text);
+        let peak =
+            |options: &[&str]| {
+                peak_m(&place.json(
+                    &[&["compare", &robot, "ramp.csv", "--no-files", "--log-rate", "1000"][..], options].concat(),
+                ))
+            };
+        let truth = peak(&["--stepper", "rk4", "--step", "1e-4"]);
+        for options in [&["--step", "1e-3"][..], &["--step", "2e-3"], &["--step", "5e-4"], &["--step", "7e-4"]] {
+            let found = peak(options);
+            eprintln!("{samples} samples {options:?}: {found:.5} m of {truth:.5}");
+            assert!((found / truth - 1.0).abs() < 1e-2, "{samples} samples {options:?}: {found} {truth}");
+        }
+    }
+}
+
 #[test]
 fn corners_are_told_and_can_be_rounded() {
     let place = Place::new();

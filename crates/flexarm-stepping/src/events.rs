@@ -8,6 +8,11 @@
 //! ```text
 //! M_ff Δv_f = -M_fp Δv_p                                   springs, dampers, friction and weight are finite: no impulse
 //! ```
+//!
+//! An integrator that asks for accelerations at the ends of its steps alone takes the impulse of a prescribed joint for
+//! `h (a_n + a_n+1) / 2`. Where that is not how the velocity changes, because it rises within a few samples, the step is cut
+//! ([`ReducedArm::resolved`]).
+//!
 //! Not here: the integrators, which are told by [`Change`] what to renew.
 
 use std::sync::Arc;
@@ -22,6 +27,29 @@ use crate::reduced::ReducedArm;
 
 /// Times closer than this are the same (s).
 pub(crate) const SAME_TIME: f64 = 1e-9;
+
+/// By which part of the speed a velocity may change otherwise than accelerations at the ends of a step say.
+const IMPULSE_DEFECT: f64 = 3e-3;
+/// Speeds below this are no measure (rad/s or m/s).
+const SLOW: f64 = 0.01;
+/// Most halvings of a step.
+const MOST_CUTS: u32 = 7;
+
+/// Velocities and accelerations of the actuated joints at the start of a step.
+pub(crate) struct StepStart {
+    /// When (s); NaN when it is not known.
+    time: f64,
+    qdot: Vec<f64>,
+    qddot: Vec<f64>,
+    /// Largest speeds so far.
+    top: Vec<f64>,
+}
+
+impl StepStart {
+    pub(crate) fn new(joints: usize) -> Self {
+        Self { time: f64::NAN, qdot: vec![0.0; joints], qddot: vec![0.0; joints], top: vec![SLOW; joints] }
+    }
+}
 
 /// What an event leaves behind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -115,7 +143,7 @@ impl ReducedArm {
             what = Change::Matrices;
         }
         if let Some((before, after)) = self.breaks.pass(t) {
-            self.sampled_at = f64::NAN;
+            (self.sampled_at, self.step_start.time) = (f64::NAN, f64::NAN);
             self.strike(t, before, after, x, v)?;
             what = what.max(Change::Motion);
         }
@@ -125,6 +153,49 @@ impl ReducedArm {
             what = what.max(Change::Motion);
         }
         Ok(what)
+    }
+
+    /// Where a step from t to `stop` has to end: there, or before it; see the module page. No allocation.
+    pub(crate) fn resolved(&mut self, t: f64, mut stop: f64) -> f64 {
+        let n = self.arm.model.n_actuated();
+        if self.step_start.time != t {
+            self.sample_joints(t);
+            self.keep_start(t);
+        }
+        for _ in 0..MOST_CUTS {
+            self.sample_joints(stop);
+            let (half, start) = (0.5 * (stop - t), &self.step_start);
+            let smooth = (0..n).filter(|k| !self.arm.torque_driven.contains(k)).all(|k| {
+                let (before, after) = (start.qdot[k], self.state.qdot[k]);
+                let defect = after - before - half * (start.qddot[k] + self.qddot[k]);
+                defect.abs() <= IMPULSE_DEFECT * start.top[k].max(after.abs())
+            });
+            if smooth {
+                break;
+            }
+            stop = t + half;
+        }
+        self.sample_joints(stop);
+        self.keep_start(stop);
+        stop
+    }
+
+    /// Joint motion at t into the state, as [`ReducedArm::set`] keeps it.
+    pub(crate) fn sample_joints(&mut self, t: f64) {
+        let t = self.breaks.side(t);
+        if t != self.sampled_at {
+            self.arm.prescribed_state(t, &mut self.state, &mut self.qddot);
+            self.sampled_at = t;
+        }
+    }
+
+    fn keep_start(&mut self, t: f64) {
+        let n = self.arm.model.n_actuated();
+        let start = &mut self.step_start;
+        start.time = t;
+        start.qdot.copy_from_slice(&self.state.qdot.as_slice()[..n]);
+        start.qddot.copy_from_slice(&self.qddot.as_slice()[..n]);
+        start.top.iter_mut().zip(&start.qdot).for_each(|(top, speed)| *top = top.max(speed.abs()));
     }
 
     /// The impulse of prescribed velocities that jump between two times; see the module page.

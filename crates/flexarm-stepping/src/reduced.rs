@@ -14,7 +14,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::arm::{FlexibleArm, GeometricStiffness, add_product};
 use crate::error::StepError;
-use crate::events::{ArmDamping, Breaks, damping_after_changes};
+use crate::events::{ArmDamping, Breaks, StepStart, damping_after_changes};
 use crate::servo::ServoState;
 use crate::system::SecondOrderSystem;
 
@@ -41,6 +41,7 @@ pub struct ReducedArm {
     pub(crate) struck: f64,
     geometric: bool,
     pub(crate) sampled_at: f64,
+    pub(crate) step_start: StepStart,
     factor: Option<Cholesky<f64, Dyn>>,
     /// Inverse of the iteration matrix: it is used dozens of times before it is renewed, and a product costs a third of
     /// two triangular solutions.
@@ -75,6 +76,7 @@ impl ReducedArm {
             struck: 0.0,
             geometric: arm.elements.iter().any(|e| e.geometric.is_some()),
             sampled_at: f64::NAN,
+            step_start: StepStart::new(model.n_actuated()),
             factor: None,
             inverse: DMatrix::zeros(n, n),
             matrix: DMatrix::zeros(n, n),
@@ -122,10 +124,7 @@ impl ReducedArm {
     /// Joint motion at t (once per time) and free coordinates into the full state.
     pub(crate) fn set(&mut self, t: f64, x: &DVector<f64>, v: &DVector<f64>) {
         let t = self.breaks.side(t);
-        if t != self.sampled_at {
-            self.arm.prescribed_state(t, &mut self.state, &mut self.qddot);
-            self.sampled_at = t;
-        }
+        self.sample_joints(t);
         let n = self.arm.model.n_actuated();
         let driven = self.arm.torque_driven.len();
         for (i, &k) in self.arm.torque_driven.iter().enumerate() {

@@ -323,6 +323,8 @@ fn check_deflection(arm: &FlexibleArm, x: &DVector<f64>, t: f64, h: f64) -> Resu
 
 /// What the steppers of reduced coordinates need of their integrators.
 trait Integrator: Send {
+    /// Whether it asks for prescribed accelerations at the ends of its steps alone.
+    const ENDS_ALONE: bool = false;
     fn time(&self) -> f64;
     /// Next multiple of the step.
     fn next_time(&self) -> f64;
@@ -340,6 +342,7 @@ trait Integrator: Send {
 }
 
 impl Integrator for GeneralizedAlpha {
+    const ENDS_ALONE: bool = true;
     fn time(&self) -> f64 {
         self.time()
     }
@@ -448,6 +451,7 @@ impl<I: Integrator> Stepper for ReducedStepper<I> {
             let event = system.next_event(integrator.time());
             let event = event.map(|t| if (t - end).abs() <= SAME_TIME { end } else { t });
             let stop = event.filter(|t| *t < end).unwrap_or(end);
+            let stop = if I::ENDS_ALONE { system.resolved(integrator.time(), stop) } else { stop };
             integrator.advance_to(system, stop, event)?;
             let h = integrator.step_size();
             let (x, v) = integrator.state();
