@@ -132,6 +132,25 @@ fn every_stepper_takes_the_blow_of_a_short_ramp() {
     }
 }
 
+/// A table of a slow motion with five digits, at 1 kHz: its steps are as large as the way of a sample at the ends. Truth: RK4 on
+/// the same table. Measured: within 0.41 %; with accelerations at the ends of steps alone 7 %.
+#[test]
+fn a_table_of_few_digits_moves_the_arm_alike_in_every_stepper() {
+    let place = Place::new();
+    let robot = shipped_robot("reference_arm");
+    let mut text = "time,joint_1,joint_2,joint_3,joint_4,joint_5,joint_6\n".to_owned();
+    for k in 0..=4000 {
+        let t = 1e-3 * f64::from(k);
+        writeln!(text, "{t:.3},{:.5},0,0,0,0,0", 0.2 * (1.0 - t.cos())).unwrap();
+    }
+    place.write("slow.csv", text);
+    let peak =
+        |options: &[&str]| peak_m(&place.json(&[&["compare", &robot, "slow.csv", "--no-files"][..], options].concat()));
+    let (found, truth) = (peak(&["--step", "1e-3"]), peak(&["--stepper", "rk4", "--step", "1e-4"]));
+    eprintln!("{:.4} mm of {:.4}", 1e3 * found, 1e3 * truth);
+    assert!((found / truth - 1.0).abs() < 1e-2, "{found} {truth}");
+}
+
 #[test]
 fn corners_are_told_and_can_be_rounded() {
     let place = Place::new();

@@ -29,7 +29,7 @@ use crate::reduced::ReducedArm;
 pub(crate) const SAME_TIME: f64 = 1e-9;
 
 /// By which part of the speed a velocity may change otherwise than accelerations at the ends of a step say.
-const IMPULSE_DEFECT: f64 = 3e-3;
+const IMPULSE_DEFECT: f64 = 1e-3;
 /// Speeds below this are no measure (rad/s or m/s).
 const SLOW: f64 = 0.01;
 /// Most halvings of a step.
