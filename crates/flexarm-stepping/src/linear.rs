@@ -18,8 +18,7 @@ use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX};
 
 use crate::arm::{FlexibleArm, Servo};
 use crate::error::StepError;
-use crate::reduced::add_geometric_forces;
-use crate::statics::{spring_forces, static_equilibrium, with_curves};
+use crate::statics::{spring_forces, static_equilibrium, static_forces, with_curves};
 
 /// Accepted unbalanced force over the largest force, as in [`static_equilibrium`].
 const TOLERANCE: f64 = 1e-13;
@@ -270,18 +269,10 @@ struct Statics<'a> {
 }
 
 impl Statics<'_> {
-    /// What holds the arm still at `q` without its springs: weight, loads, stiffness by load; all coordinates.
+    /// As [`static_forces`].
     fn forces(&self, data: &mut Data, q: &DVector<f64>) -> DVector<f64> {
-        let (model, m) = (&self.arm.model, self.arm.model.n_actuated());
-        forward_kinematics(model, data, q);
-        data.clear_external_wrenches();
-        self.arm.apply_loads(data, self.t);
-        let R = data.X_WF(self.tool).rotation.inverse();
-        let F_T = Wrench::new(R * self.F_T_W.force, R * self.F_T_W.torque);
-        data.F_ext[self.tool.body] += F_T.at_parent(&self.tool.X_BF);
-        let mut p = gravity_forces(model, data, q).clone();
-        let e = &q.as_slice()[m..];
-        add_geometric_forces(self.arm, data, e, &mut p.as_mut_slice()[m..]);
+        let mut p = DVector::zeros(q.len());
+        static_forces(self.arm, (self.tool, &self.F_T_W), self.t, data, q, &mut p);
         p
     }
 

@@ -8,15 +8,14 @@
 //!
 //! Start at [`OperatingPoint::new`]. For damping, servos and inputs about one pose: [`crate::linearise`].
 
-use flexarm_kinematics::{Data, Frame, Pose, Wrench, forward_kinematics, frame_jacobian, gravity_forces, mass_matrix};
+use flexarm_kinematics::{Data, Frame, Pose, Wrench, forward_kinematics, frame_jacobian, mass_matrix};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix6, Matrix6xX};
 
 use crate::arm::FlexibleArm;
 use crate::eigenvalues::symmetric_eigenvalues;
 use crate::error::StepError;
 use crate::motion::Held;
-use crate::reduced::add_geometric_forces;
-use crate::statics::static_equilibrium;
+use crate::statics::{add_spring_forces, static_equilibrium, static_forces};
 
 /// Accepted unbalanced force over the largest force.
 const TOLERANCE: f64 = 1e-13;
@@ -113,19 +112,25 @@ impl OperatingPoint {
     /// * `q`: actuated joints in coordinate order (rad or m).
     /// * `F_T_W`: force and moment on the tool at its origin, world axes (N, N m), the same when the arm yields.
     ///
-    /// Cost: one tangent, two at most for small deflections; no allocation after the first, but for joints with play.
+    /// Cost: one tangent, two at most for small deflections; no allocation after the first, but for joints with play and where
+    /// a load turns the arm so far that the tangent is not positive definite on the way.
     ///
     /// # Errors
     /// [`StepError::Setup`] for another number of joints or values that are no numbers, [`StepError::NoEquilibrium`], and
     /// [`StepError::Singular`] beyond a buckling load.
     pub fn solve(&mut self, q: &[f64], F_T_W: &Wrench) -> Result<(), StepError> {
         let m = self.arm.model.n_actuated();
-        let finite = q.iter().chain(F_T_W.force.iter()).chain(F_T_W.torque.iter()).all(|x| x.is_finite());
-        if q.len() != m || !finite {
-            let text = format!("{} joint values are given, the arm has {m}; all must be finite numbers", q.len());
-            return Err(StepError::Setup(text));
-        }
         self.residual = f64::NAN;
+        if q.len() != m {
+            return Err(StepError::Setup(format!("{} joint values are given, the arm has {m} joints", q.len())));
+        }
+        let finite = |mut values: std::slice::Iter<'_, f64>| values.all(|x| x.is_finite());
+        if !finite(q.iter()) {
+            return Err(StepError::Setup(format!("the {m} joint values must be finite numbers, found {q:?}")));
+        }
+        if !(finite(F_T_W.force.as_slice().iter()) && finite(F_T_W.torque.as_slice().iter())) {
+            return Err(StepError::Setup(format!("force and moment must be finite numbers, found {F_T_W:?}")));
+        }
         self.F_T_W = *F_T_W;
         self.q.fill(0.0);
         self.q.rows_mut(0, m).copy_from_slice(q);
@@ -187,17 +192,7 @@ impl OperatingPoint {
 
     /// Weight, loads and stiffness by load at `q`, without springs, into `p`.
     fn forces(&mut self) {
-        let Self { arm, tool, data, q, F_T_W, p, .. } = self;
-        let model = &arm.model;
-        forward_kinematics(model, data, q);
-        data.clear_external_wrenches();
-        arm.apply_loads(data, 0.0);
-        let R = data.X_WF(tool).rotation.inverse();
-        let F_T = Wrench::new(R * F_T_W.force, R * F_T_W.torque);
-        data.F_ext[tool.body] += F_T.at_parent(&tool.X_BF);
-        p.copy_from(gravity_forces(model, data, q));
-        let m = model.n_actuated();
-        add_geometric_forces(arm, data, &q.as_slice()[m..], &mut p.as_mut_slice()[m..]);
+        static_forces(&self.arm, (&self.tool, &self.F_T_W), 0.0, &mut self.data, &self.q, &mut self.p);
     }
 
     /// `r = K e + p`; returns the largest of both.
@@ -205,10 +200,7 @@ impl OperatingPoint {
         let m = self.arm.model.n_actuated();
         let (e, p) = (&self.q.as_slice()[m..], &self.p.as_slice()[m..]);
         self.r.fill(0.0);
-        for element in &self.arm.elements {
-            let range = self.arm.offset(element)..self.arm.offset(element) + element.size;
-            element.add_spring_force(&e[range.clone()], &mut self.r.as_mut_slice()[range]);
-        }
+        add_spring_forces(&self.arm, e, self.r.as_mut_slice());
         let springs = self.r.amax();
         let mut carried = 0.0_f64;
         for (r, p) in self.r.iter_mut().zip(p) {

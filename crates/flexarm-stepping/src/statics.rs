@@ -1,6 +1,6 @@
 //! Static equilibrium of the elastic coordinates, drives held: Newton on `K e + g_e(q_a, e) = 0`.
 
-use flexarm_kinematics::{Data, State, forward_kinematics, gravity_forces};
+use flexarm_kinematics::{Data, Frame, State, Wrench, forward_kinematics, gravity_forces};
 use nalgebra::{DMatrix, DVector};
 
 use crate::arm::FlexibleArm;
@@ -63,11 +63,37 @@ fn unbalanced(arm: &FlexibleArm, data: &mut Data, t: f64, e: &DVector<f64>) -> (
 
 pub(crate) fn spring_forces(arm: &FlexibleArm, e: &DVector<f64>) -> DVector<f64> {
     let mut f = DVector::zeros(e.len());
+    add_spring_forces(arm, e.as_slice(), f.as_mut_slice());
+    f
+}
+
+/// `f += K e`, or the curves; over the elastic coordinates.
+pub(crate) fn add_spring_forces(arm: &FlexibleArm, e: &[f64], f: &mut [f64]) {
     for element in &arm.elements {
         let range = arm.offset(element)..arm.offset(element) + element.size;
-        element.add_spring_force(&e.as_slice()[range.clone()], &mut f.as_mut_slice()[range]);
+        element.add_spring_force(&e[range.clone()], &mut f[range]);
     }
-    f
+}
+
+/// What holds the arm still at `q` without its springs: weight, the loads of time t, a wrench at the tool's origin (world axes),
+/// stiffness by load; all coordinates, into `p`. No allocation.
+pub(crate) fn static_forces(
+    arm: &FlexibleArm,
+    (tool, F_T_W): (&Frame, &Wrench),
+    t: f64,
+    data: &mut Data,
+    q: &DVector<f64>,
+    p: &mut DVector<f64>,
+) {
+    let (model, m) = (&arm.model, arm.model.n_actuated());
+    forward_kinematics(model, data, q);
+    data.clear_external_wrenches();
+    arm.apply_loads(data, t);
+    let R = data.X_WF(tool).rotation.inverse();
+    let F_T = Wrench::new(R * F_T_W.force, R * F_T_W.torque);
+    data.F_ext[tool.body] += F_T.at_parent(&tool.X_BF);
+    p.copy_from(gravity_forces(model, data, q));
+    add_geometric_forces(arm, data, &q.as_slice()[m..], &mut p.as_mut_slice()[m..]);
 }
 
 fn gravity_part(arm: &FlexibleArm, data: &mut Data, t: f64, e: &DVector<f64>) -> DVector<f64> {
