@@ -84,7 +84,7 @@ def smaller(picture):
         return
     # Few pixels have the colours of curves: a median cut would merge them.
     image = Image.open(picture).convert("RGB")
-    image.quantize(256, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE).save(picture, optimize=True)
+    image.quantize(256, method=Image.Quantize.MAXCOVERAGE, kmeans=2, dither=Image.Dither.NONE).save(picture, optimize=True)
 
 
 def main():
