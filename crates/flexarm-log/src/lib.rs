@@ -68,6 +68,8 @@ mod plot_room;
 mod read;
 mod record;
 #[cfg(feature = "rerun")]
+mod rerun;
+#[cfg(feature = "rerun")]
 mod rrd_file;
 #[cfg(any(feature = "mcap", feature = "parquet", feature = "rerun"))]
 mod run_json;

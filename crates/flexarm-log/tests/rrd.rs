@@ -12,8 +12,9 @@ use std::time::Duration;
 use flexarm_kinematics::Pose;
 use flexarm_log::palette::{self, Ground};
 use flexarm_log::{Caption, CreateOptions, Recorder, RrdRecorder, RrdStudy, RunHeader};
-use rerun::external::re_log_encoding::DecoderApp;
-use rerun::log::{Chunk, LogMsg};
+use re_log_encoding::DecoderApp;
+use re_chunk::Chunk;
+use re_log_types::LogMsg;
 
 const NEVER: Duration = Duration::MAX;
 
@@ -118,7 +119,7 @@ fn column(file: &[u8], entity: &str, component: &'static str, width: usize) -> V
     for chunk in chunks(file).iter().filter(|c| !c.is_static() && c.entity_path().to_string() == entity) {
         let times =
             chunk.timelines().iter().find(|(name, _)| name.as_str() == "sim_time").unwrap().1.times_raw().to_vec();
-        let id = rerun::external::re_types_core::ComponentIdentifier::from(component);
+        let id = re_sdk_types::ComponentIdentifier::from(component);
         let rows: Vec<Vec<f32>> = match width {
             3 => chunk.iter_slices::<[f32; 3]>(id).map(|row| row.iter().flatten().copied().collect()).collect(),
             _ => chunk.iter_slices::<[f32; 4]>(id).map(|row| row.iter().flatten().copied().collect()).collect(),
@@ -193,7 +194,7 @@ fn the_bent_surface_ends_where_the_far_interface_is() {
             .iter()
             .find(|c| c.is_static() && c.entity_path().to_string() == entity)
             .map(|chunk| {
-                let id = rerun::external::re_types_core::ComponentIdentifier::from("Mesh3D:vertex_positions");
+                let id = re_sdk_types::ComponentIdentifier::from("Mesh3D:vertex_positions");
                 chunk.iter_slices::<[f32; 3]>(id).flatten().flatten().copied().collect()
             })
             .unwrap();
@@ -220,7 +221,7 @@ fn curves_hold_the_samples() {
     let values = |entity: &str| -> Vec<f64> {
         let chunks = chunks(&file);
         let chunk = chunks.iter().find(|c| !c.is_static() && c.entity_path().to_string() == entity).unwrap();
-        let scalars = rerun::Scalars::descriptor_scalars().component;
+        let scalars = re_sdk_types::archetypes::Scalars::descriptor_scalars().component;
         chunk.iter_slices::<f64>(scalars).flatten().copied().collect()
     };
     let samples: Vec<_> = (0..21).map(synthetic::sample).collect();
@@ -411,8 +412,8 @@ fn layout(file: &[u8]) -> Vec<Chunk> {
     data.collect()
 }
 
-fn component(name: &'static str) -> rerun::external::re_types_core::ComponentIdentifier {
-    rerun::external::re_types_core::ComponentIdentifier::from(name)
+fn component(name: &'static str) -> re_sdk_types::ComponentIdentifier {
+    re_sdk_types::ComponentIdentifier::from(name)
 }
 
 fn texts(chunks: &[Chunk], name: &'static str) -> Vec<String> {

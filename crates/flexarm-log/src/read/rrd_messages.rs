@@ -12,14 +12,14 @@ use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::Path;
 
-use rerun::external::arrow::ipc;
-use rerun::external::re_log_encoding::external::lz4_flex;
-use rerun::external::re_log_encoding::{
+use crate::rerun::arrow::ipc;
+use crate::rerun::lz4_flex;
+use crate::rerun::re_log_encoding::{
     CachingApplicationIdInjector, CrateVersion, Decodable, DecoderEntrypoint, MessageHeader, MessageKind, StreamHeader,
     ToApplication, ToTransport,
 };
-use rerun::external::re_log_types::ArrowMsg;
-use rerun::log::{Chunk, LogMsg};
+use crate::rerun::re_log_types::ArrowMsg;
+use crate::rerun::{Chunk, LogMsg};
 
 use super::wall::caught;
 use crate::LogError;

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use flexarm_kinematics::Pose;
 use nalgebra::{Quaternion, Translation3, UnitQuaternion, Vector3};
-use rerun::log::Chunk;
-use rerun::{EntityPath, Scalars, SeriesLines, TextDocument, Timeline, Transform3D};
+use crate::rerun::Chunk;
+use crate::rerun::{EntityPath, Scalars, SeriesLines, TextDocument, Timeline, Transform3D};
 
 use super::rrd_messages::{Message, Messages};
 use super::rrd_track::Track;

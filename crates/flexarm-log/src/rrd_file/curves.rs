@@ -1,7 +1,7 @@
 //! The curves of a run: which plots there are and what goes into them.
 
-use rerun::log::{Chunk, TimeColumn};
-use rerun::{Color, EntityPath};
+use crate::rerun::{Chunk, TimeColumn};
+use crate::rerun::{Color, EntityPath};
 
 use super::colors::{axis, faint, series, total};
 use super::path;

@@ -19,9 +19,9 @@ mod window;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-use rerun::external::re_log_types::StoreKind;
-use rerun::log::Chunk;
-use rerun::{EntityPath, StoreId, TextDocument, TimePoint, Timeline, ViewCoordinates};
+use crate::rerun::re_log_types::StoreKind;
+use crate::rerun::Chunk;
+use crate::rerun::{EntityPath, StoreId, TextDocument, TimePoint, Timeline, ViewCoordinates};
 
 use self::layout::{Part, PlotPlace};
 use self::run::{RunTracks, Seat};
@@ -186,7 +186,7 @@ impl Store {
             (Seat::Alone, true) => header.robot.clone(),
             (Seat::Alone, false) => format!("{}: {}", header.robot, header.trajectory),
         };
-        self.constant(&EntityPath::properties(), &rerun::RecordingInfo::new().with_name(name))?;
+        self.constant(&EntityPath::properties(), &crate::rerun::RecordingInfo::new().with_name(name))?;
         self.constant(&EntityPath::root(), &ViewCoordinates::RIGHT_HAND_Z_UP())?;
         let text = summary(&header.description, &RunResult::default());
         self.constant(&path(["summary"]), &TextDocument::from_markdown(text))?;
@@ -202,7 +202,7 @@ impl Store {
         Ok(())
     }
 
-    fn constant(&mut self, at: &EntityPath, what: &dyn rerun::AsComponents) -> Result<(), StreamError> {
+    fn constant(&mut self, at: &EntityPath, what: &dyn crate::rerun::AsComponents) -> Result<(), StreamError> {
         let chunk = self.stream.ids().constant(at, what)?;
         self.stream.append(&self.recording, &chunk)
     }

@@ -2,9 +2,9 @@
 
 use flexarm_kinematics::{Pose, rotation_vector};
 use nalgebra::{Point3, Vector3};
-use rerun::components::MeshFaceRendering;
-use rerun::log::Chunk;
-use rerun::{AlbedoFactor, Color, EntityPath, LineStrips3D, Mesh3D, Rgba32, TransformAxes3D};
+use crate::rerun::components::MeshFaceRendering;
+use crate::rerun::Chunk;
+use crate::rerun::{AlbedoFactor, Color, EntityPath, LineStrips3D, Mesh3D, Rgba32, TransformAxes3D};
 
 use super::colors::{self, ColorScale};
 use super::stream::{Ids, StreamError};
@@ -220,7 +220,7 @@ impl RobotTracks {
         };
         let line = LineStrips3D::new([[point(X_TL), [0.0; 3]]])
             .with_colors([color])
-            .with_radii([rerun::Radius::new_ui_points(2.5)]);
+            .with_radii([crate::rerun::Radius::new_ui_points(2.5)]);
         ids.constant(&self.look.root.join(&path(["tcp", "tool"])), &line).map(Some)
     }
 

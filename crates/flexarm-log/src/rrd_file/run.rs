@@ -1,7 +1,7 @@
 //! One run in a recording: its robots, ways of the tool, curves and events.
 
-use rerun::log::Chunk;
-use rerun::{
+use crate::rerun::Chunk;
+use crate::rerun::{
     Color, EntityPath, LineStrip3D, LineStrips3D, Points3D, Scalars, SeriesPoints, TextDocument, TextLog, TimePoint,
     Timeline,
 };
@@ -211,7 +211,7 @@ impl RunTracks {
             let step = (caption.from_s * header.log_rate_hz).round() as i64;
             let when = instant(((caption.from_s * 1e9).round() as i64, step));
             let label = Points3D::new([point(&first.rigid.X_WT)])
-                .with_radii([rerun::Radius::new_ui_points(2.0)])
+                .with_radii([crate::rerun::Radius::new_ui_points(2.0)])
                 .with_colors([colors::total()])
                 .with_labels([caption.text.as_str()])
                 .with_show_labels(true);
@@ -353,7 +353,7 @@ impl RunTracks {
         if let Some((error, when, place)) = &self.peak {
             let label = peak_label(*error, *when);
             let mark = Points3D::new([*place])
-                .with_radii([rerun::Radius::new_ui_points(5.0)])
+                .with_radii([crate::rerun::Radius::new_ui_points(5.0)])
                 .with_colors([Color::from_rgb(255, 255, 255)])
                 .with_labels([label.as_str()])
                 .with_show_labels(false);
@@ -403,12 +403,12 @@ fn color_bar(root: &EntityPath, scale: ColorScale, eye: &Eye, ids: &mut Ids) -> 
     let color = |k: u32| scale.color(scale.full_m * (f64::from(k) + 0.5) / f64::from(steps));
     let bar = LineStrips3D::new((0..steps).map(piece))
         .with_colors((0..steps).map(color))
-        .with_radii([rerun::Radius::new_ui_points(5.0)]);
+        .with_radii([crate::rerun::Radius::new_ui_points(5.0)]);
     // Tenths of micrometres are enough, and rounding is not shown.
     let mm = |share: f64| (1e7 * scale.full_m * share).round() / 1e4;
     let labels = [format!("{}", mm(0.0)), format!("{} mm", mm(0.5)), format!("{} mm off the rigid arm", mm(1.0))];
     let numbers = Points3D::new([0.0, 0.5, 1.0].map(at))
-        .with_radii([rerun::Radius::new_ui_points(1.0)])
+        .with_radii([crate::rerun::Radius::new_ui_points(1.0)])
         .with_colors([colors::total()])
         .with_labels(labels.iter().map(String::as_str))
         .with_show_labels(true);

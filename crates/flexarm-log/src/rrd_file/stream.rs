@@ -8,16 +8,16 @@ use std::collections::HashMap;
 use std::fs::File;
 use std::io::{self, Write};
 
-use rerun::external::arrow::datatypes::Schema;
-use rerun::external::re_chunk_store::external::re_chunk::Span;
-use rerun::external::re_log_encoding::{
+use crate::rerun::arrow::datatypes::Schema;
+use crate::rerun::Span;
+use crate::rerun::re_log_encoding::{
     CodecError, CrateVersion, Encodable, EncodingOptions, MessageHeader, MessageKind, RRD_FOURCC, RawRrdManifest,
     RrdFooter, RrdManifestBuilder, StreamFooter, StreamHeader, ToTransport,
 };
-use rerun::external::re_log_types::{BlueprintActivationCommand, SetStoreInfo, StoreInfo, StoreSource};
-use rerun::external::re_tuid::Tuid;
-use rerun::log::{Chunk, ChunkComponents, ChunkError, ChunkId, LogMsg, RowId, TimeColumn};
-use rerun::{AsComponents, EntityPath, SerializationError, SerializedComponentColumn, StoreId, TimePoint};
+use crate::rerun::re_log_types::{BlueprintActivationCommand, SetStoreInfo, StoreInfo, StoreSource};
+use crate::rerun::re_tuid::Tuid;
+use crate::rerun::{Chunk, ChunkComponents, ChunkError, ChunkId, LogMsg, RowId, TimeColumn};
+use crate::rerun::{AsComponents, EntityPath, SerializationError, SerializedComponentColumn, StoreId, TimePoint};
 
 use crate::tail_file::TailFile;
 

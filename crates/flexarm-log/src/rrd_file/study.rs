@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use rerun::TextDocument;
+use crate::rerun::TextDocument;
 
 use super::run::Seat;
 use super::{RunWriter, Store, content_hash, path, stream_error};

@@ -2,9 +2,9 @@
 
 use flexarm_kinematics::Pose;
 use nalgebra::UnitQuaternion;
-use rerun::components::{ImageBuffer, ImageFormat};
-use rerun::log::{Chunk, TimeColumn};
-use rerun::{
+use crate::rerun::components::{ImageBuffer, ImageFormat};
+use crate::rerun::{Chunk, TimeColumn};
+use crate::rerun::{
     Arrows3D, Color, EntityPath, LineStrip3D, LineStrips3D, Mesh3D, Quaternion, Scalars, SeriesLines, TimePoint,
     Transform3D,
 };
@@ -213,7 +213,7 @@ impl ArrowTrack {
     pub(crate) fn style(&self, ids: &mut Ids, color: Color) -> Result<Chunk, StreamError> {
         let style = Arrows3D::update_fields()
             .with_colors([color])
-            .with_radii([rerun::Radius::new_ui_points(3.0)])
+            .with_radii([crate::rerun::Radius::new_ui_points(3.0)])
             .with_show_labels(true);
         ids.single(&self.path, &TimePoint::default(), &style)
     }
@@ -268,7 +268,7 @@ impl SkeletonTrack {
     pub(crate) fn style(&self, ids: &mut Ids) -> Result<Chunk, StreamError> {
         let style = LineStrips3D::update_fields()
             .with_colors([self.color])
-            .with_radii([rerun::Radius::new_ui_points(Self::RADIUS)]);
+            .with_radii([crate::rerun::Radius::new_ui_points(Self::RADIUS)]);
         ids.single(&self.path, &TimePoint::default(), &style)
     }
 }
@@ -421,7 +421,7 @@ impl PathTrack {
         colors: impl IntoIterator<Item = Color>,
     ) -> Result<Chunk, StreamError> {
         let strips =
-            LineStrips3D::new(lines).with_colors(colors).with_radii([rerun::Radius::new_ui_points(Self::RADIUS)]);
+            LineStrips3D::new(lines).with_colors(colors).with_radii([crate::rerun::Radius::new_ui_points(Self::RADIUS)]);
         ids.single(&self.path, &TimePoint::default(), &strips)
     }
 }
