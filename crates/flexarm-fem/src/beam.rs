@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::{FemError, positive};
 use crate::rigid_part::RigidPart;
 use crate::section::Bar;
-use crate::spatial::Matrix12;
+use flexarm_spatial::Matrix12;
 
 /// Whether a beam yields to shear.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]

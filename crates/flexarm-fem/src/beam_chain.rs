@@ -8,7 +8,7 @@ use crate::beam_link::BeamLink;
 use crate::chain::Chain;
 use crate::error::{FemError, positive};
 use crate::reduced::{ElasticSplit, stiffness_at_split};
-use crate::spatial::Pose;
+use flexarm_spatial::Pose;
 
 impl BeamLink {
     /// The beam as a chain of `parts` rigid parts, link axes.

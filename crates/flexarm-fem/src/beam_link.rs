@@ -18,7 +18,7 @@ use crate::material::Material;
 use crate::reduced::{Provenance, ReducedLink};
 use crate::rigid_part::RigidPart;
 use crate::section::Section;
-use crate::spatial::{Pose, adjoint};
+use flexarm_spatial::{Pose, adjoint};
 
 /// Recipe of a link that is one uniform beam between two joints.
 #[derive(Debug, Clone, PartialEq)]

@@ -28,7 +28,7 @@ use crate::model::FeModel;
 use crate::reduced::ElasticSplit;
 use crate::reduction::generalised_frequencies;
 use crate::rigid_part::RigidPart;
-use crate::spatial::{Pose, adjoint, skew, symmetric_part};
+use flexarm_spatial::{Pose, adjoint, skew, symmetric_part};
 
 /// A matrix with one column per unit wrench at B.
 type Loads = SMatrix<f64, 6, 6>;

@@ -5,7 +5,7 @@
 use nalgebra::Vector3;
 
 use crate::error::FemError;
-use crate::spatial::Pose;
+use flexarm_spatial::Pose;
 
 /// No link is longer than this, m: a larger distance is a mistake in the units.
 const LONGEST_LINK: f64 = 100.0;

@@ -18,7 +18,7 @@ use nalgebra::{Matrix6, SMatrix, SVector, SymmetricEigen, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{COMPONENTS, Direction, FemError};
-use crate::spatial::{Matrix12, Pose, adjoint, symmetric_part};
+use flexarm_spatial::{Matrix12, Pose, adjoint, symmetric_part};
 
 /// How much each measure of the gate may be.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -23,7 +23,7 @@ use crate::reduced::{LinkDetails, Provenance, ReducedLink};
 use crate::reduction::{Boundary, Condensation, CondensationOptions, InterfaceFrame, Superelement, stiffness12};
 use crate::rigid_part::RigidPart;
 use crate::sparse::{ModesWanted, SparseSymmetric};
-use crate::spatial::Pose;
+use flexarm_spatial::Pose;
 
 /// Where the masses of the two parts come from.
 #[derive(Debug, Clone, PartialEq)]

@@ -29,7 +29,7 @@ use crate::reduction::{
 };
 use crate::rigid_part::RigidPart;
 use crate::sparse::{Modes, ModesError, ModesWanted};
-use crate::spatial::{Matrix12, Pose, symmetric_part};
+use flexarm_spatial::{Matrix12, Pose, symmetric_part};
 
 /// Where the elastic joint of the two-part link sits.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

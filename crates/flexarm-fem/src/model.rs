@@ -16,7 +16,7 @@ use crate::error::FemError;
 use crate::material::Material;
 use crate::mesh::{ElementBlock, Mesh, Region};
 use crate::sparse::SparseSymmetric;
-use crate::spatial::Matrix12;
+use flexarm_spatial::Matrix12;
 
 pub use mass::MassMatrix;
 use scatter::NodeGraph;

@@ -25,7 +25,7 @@ use crate::mesh_gate::MeshGate;
 use crate::modal::ModalLink;
 use crate::reduction::Superelement;
 use crate::rigid_part::RigidPart;
-use crate::spatial::{Matrix12, Pose, adjoint, symmetric_part};
+use flexarm_spatial::{Matrix12, Pose, adjoint, symmetric_part};
 
 /// Elastic joint between the two parts of a link.
 #[derive(Debug, Clone, PartialEq)]

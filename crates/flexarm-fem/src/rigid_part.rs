@@ -3,7 +3,7 @@
 use nalgebra::{Matrix3, Matrix6, SymmetricEigen, Vector3};
 
 use crate::error::{FemError, positive};
-use crate::spatial::{Pose, skew};
+use flexarm_spatial::{Pose, skew};
 
 /// Slack in the triangle inequality of principal moments, relative to the largest: printed digits.
 const INERTIA_SLACK: f64 = 1e-6;
@@ -153,7 +153,7 @@ mod tests {
     #[test]
     fn spatial_inertia_follows_the_frame() {
         let X_LE = Pose::from_parts(Translation3::new(0.3, -0.1, 0.8), Rotation3::from_euler_angles(0.4, 0.7, -1.1));
-        let Ad_LE = crate::spatial::adjoint(&X_LE);
+        let Ad_LE = flexarm_spatial::adjoint(&X_LE);
         let M_L = bar(1.0).transformed(&X_LE).spatial_inertia();
         let back = Ad_LE.transpose() * M_L * Ad_LE;
         assert!((back - bar(1.0).spatial_inertia()).amax() < 1e-14); // measured 4e-16

@@ -5,8 +5,8 @@
 use std::f64::consts::PI;
 
 use approx::assert_relative_eq;
-use flexarm_fem::spatial::{adjoint, skew};
 use flexarm_fem::{Bar, Beam, BeamTheory, FemError, Material, Pose, Section};
+use flexarm_spatial::{adjoint, skew};
 use nalgebra::{DMatrix, Matrix6, SMatrix, Vector6};
 
 const THEORIES: [BeamTheory; 2] = [BeamTheory::EulerBernoulli, BeamTheory::Timoshenko];

@@ -6,11 +6,11 @@ mod common;
 
 use approx::assert_relative_eq;
 use common::{fixed_cases, lower_arm, offset_arm, pose, spd_stiffness, turned_arm};
-use flexarm_fem::spatial::{turn6, twice};
 use flexarm_fem::{
     FemError, FlexErrorKind, FlexFileError, GateLimits, LinkFrames, Provenance, ReducedLink, parse_flex, read_flex,
     write_flex,
 };
+use flexarm_spatial::{turn6, twice};
 use nalgebra::{DMatrix, Matrix6};
 use proptest::prelude::*;
 

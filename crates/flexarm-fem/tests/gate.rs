@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 
 use common::{lower_arm, turned_arm};
 use flexarm_fem::gate::{check_matrix6, check_matrix12};
-use flexarm_fem::spatial::Matrix12;
 use flexarm_fem::{FemError, GateLimits};
+use flexarm_spatial::Matrix12;
 use nalgebra::Vector3;
 
 const L: f64 = 1.095;
@@ -92,7 +92,7 @@ fn a_mechanism_is_singular_in_its_direction() {
 
     // The same mechanism away from the axes: the free direction mixes uy and rx.
     let X = flexarm_fem::Pose::translation(0.0, 0.0, 0.3);
-    let Ad = flexarm_fem::spatial::adjoint(&X);
+    let Ad = flexarm_spatial::adjoint(&X);
     K[(3, 3)] = 1e-7;
     let moved = Ad.transpose() * K * Ad;
     let moved = (moved + moved.transpose()) * 0.5;

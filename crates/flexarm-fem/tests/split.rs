@@ -6,10 +6,10 @@ mod common;
 
 use approx::assert_relative_eq;
 use common::{fixed_cases, frames, lower_arm, offset_arm, pose, spd_stiffness, turned_arm, vector6};
-use flexarm_fem::spatial::adjoint;
 use flexarm_fem::{
     Bar, Beam, BeamLink, BeamTheory, FemError, Material, Pose, Section, drop_coupling, stiffness_at_split,
 };
+use flexarm_spatial::adjoint;
 use nalgebra::{Matrix6, Vector3, Vector6};
 use proptest::prelude::*;
 

@@ -17,7 +17,8 @@ use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Vector3};
 use crate::data::{Data, State, add_projection, joint_motion, place_modal, subspace_times};
 use crate::model::{Body, JointMotion, Model};
 use crate::rnea::nonlinear_effects;
-use crate::spatial::{ArticulatedInertia, SpatialInertia, Twist, Wrench, mul, mul3, tr_mul, tr_mul3};
+use flexarm_spatial::products::{mul, mul3, tr_mul, tr_mul3};
+use flexarm_spatial::{ArticulatedInertia, SpatialInertia, Twist, Wrench};
 
 /// Which joints are prescribed; the rest are free.
 #[derive(Clone, Debug, PartialEq)]

@@ -7,8 +7,9 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use crate::modal::ModalData;
 use crate::model::{JointMotion, Model};
-use crate::rotation::ElasticAngles;
-use crate::spatial::{ArticulatedInertia, Pose, SpatialInertia, Twist, Wrench, mul, mul3, tr_mul};
+use flexarm_spatial::ElasticAngles;
+use flexarm_spatial::products::{mul, mul3, tr_mul};
+use flexarm_spatial::{ArticulatedInertia, Pose, SpatialInertia, Twist, Wrench};
 
 /// Positions and velocities of all independent coordinates, in the model's coordinate order.
 #[derive(Clone, Debug, PartialEq)]

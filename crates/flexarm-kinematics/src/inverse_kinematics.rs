@@ -11,8 +11,8 @@ use nalgebra::{DMatrix, DVector, Matrix6xX, Vector6};
 use crate::data::Data;
 use crate::kinematics::{forward_kinematics, frame_jacobian};
 use crate::model::{Frame, Model};
-use crate::rotation::rotation_vector;
-use crate::spatial::Pose;
+use flexarm_spatial::Pose;
+use flexarm_spatial::rotation_vector;
 
 /// Tolerances and bounds of the iteration.
 #[derive(Clone, Copy, Debug)]

@@ -7,8 +7,9 @@ use nalgebra::{Matrix6xX, Vector3};
 
 use crate::data::{Data, State, joint_motion, joint_position, place_modal, rotor_energy};
 use crate::model::{Frame, JointMotion, Model};
-use crate::rotation::ElasticAngles;
-use crate::spatial::{Pose, Twist, mul, mul3};
+use flexarm_spatial::ElasticAngles;
+use flexarm_spatial::products::{mul, mul3};
+use flexarm_spatial::{Pose, Twist};
 
 /// Poses of all bodies: fills `data.{X_PB, X_WB}`.
 pub fn forward_kinematics(model: &Model, data: &mut Data, q: &nalgebra::DVector<f64>) {

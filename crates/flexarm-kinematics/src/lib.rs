@@ -43,8 +43,11 @@ mod mechanism;
 mod modal;
 mod model;
 mod rnea;
-mod rotation;
-mod spatial;
+
+pub use flexarm_spatial::{
+    AngleKinematics, ArticulatedInertia, ElasticAngles, Pose, SpatialInertia, Twist, Wrench, adjoint, rotation_vector,
+    skew,
+};
 
 pub use aba::{Roles, forward_dynamics, hybrid_dynamics};
 pub use crba::{mass_matrix, mass_matrix_at_poses};
@@ -63,5 +66,3 @@ pub use model::{
     Body, Coordinate, ElasticGroup, Frame, JointMotion, MOST_COORDINATES, Model, ModelError, moment_floor,
 };
 pub use rnea::{gravity_forces, inverse_dynamics, nonlinear_effects};
-pub use rotation::{AngleKinematics, ElasticAngles, rotation_vector};
-pub use spatial::{ArticulatedInertia, Pose, SpatialInertia, Twist, Wrench, adjoint, skew};

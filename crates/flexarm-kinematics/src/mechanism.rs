@@ -9,8 +9,8 @@ use std::sync::Arc;
 use nalgebra::{Matrix3, Unit, Vector3};
 
 use crate::modal::ModalBody;
-use crate::rotation::ElasticAngles;
-use crate::spatial::{Pose, SpatialInertia};
+use flexarm_spatial::ElasticAngles;
+use flexarm_spatial::{Pose, SpatialInertia};
 
 /// Links joined by joints into one tree. SI units.
 #[derive(Clone, Debug, PartialEq)]

@@ -23,7 +23,8 @@
 
 use nalgebra::{Cholesky, DMatrix, Dyn, Matrix3, Matrix6xX, Vector3};
 
-use crate::spatial::{Pose, SpatialInertia, Twist, Wrench, mul, tr_mul};
+use flexarm_spatial::products::{mul, tr_mul};
+use flexarm_spatial::{Pose, SpatialInertia, Twist, Wrench};
 
 /// Shapes at the interfaces and mass integrals over them; n coordinates, link axes, about the link's origin. SI units.
 #[derive(Clone, Debug, PartialEq)]

@@ -13,8 +13,8 @@ use nalgebra::{Matrix3, Vector3};
 
 use crate::mechanism::{Joint, JointKind, Limits, Mechanism};
 use crate::modal::ModalTables;
-use crate::rotation::ElasticAngles;
-use crate::spatial::{Pose, SpatialInertia, skew};
+use flexarm_spatial::ElasticAngles;
+use flexarm_spatial::{Pose, SpatialInertia, skew};
 
 /// A checked tree of bodies; built once, then only read and shared between threads.
 #[derive(Clone, Debug)]

@@ -15,7 +15,7 @@ use nalgebra::{DVector, Vector3};
 
 use crate::data::{Data, State, add_projection, joint_motion, place_modal, rotor_energy, subspace_times};
 use crate::model::Model;
-use crate::spatial::{Twist, Wrench};
+use flexarm_spatial::{Twist, Wrench};
 
 /// Generalised forces `τ = M(q) q̈ + bias(q, q̇)` (N m or N) for the accelerations `qddot`.
 ///

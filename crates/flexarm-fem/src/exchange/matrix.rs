@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, Vector3};
 use super::error::{ExchangeError, ExchangeErrorKind, Place};
 use super::recognise::MatrixFormat;
 use super::sidecar::Sidecar;
-use crate::spatial::Pose;
+use flexarm_spatial::Pose;
 
 /// Up to this many rows a matrix is stored dense (32 MB).
 pub const LARGEST_DENSE: usize = 2000;

@@ -14,7 +14,7 @@ use super::{
     abaqus_text, dmig, exudyn, harwell_boeing, matrix_market, op4_binary, op4_text, sidecar, simscape, user_element,
 };
 use crate::input::read_file;
-use crate::spatial::Pose;
+use flexarm_spatial::Pose;
 
 /// What a matrix is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

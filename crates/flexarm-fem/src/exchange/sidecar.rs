@@ -22,8 +22,8 @@ use serde::Deserialize;
 use super::error::{ExchangeError, ExchangeErrorKind};
 use super::interface::{Interface, InterfaceMap};
 use super::text::Text;
-use crate::spatial::Pose;
 use crate::units::UnitSystem;
+use flexarm_spatial::Pose;
 
 /// Value of `format` in every sidecar.
 pub(super) const FORMAT: &str = "flexarm-matrices";

@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, Quaternion, Translation3, UnitQuaternion};
 use super::error::{ExchangeError, ExchangeErrorKind};
 use super::matrix::{LabelledMatrix, Storage, Triplets};
 use super::text::{Text, words};
-use crate::spatial::Pose;
+use flexarm_spatial::Pose;
 
 /// Lines with numbers, without comments.
 fn rows<'a>(text: &Text<'a>) -> impl Iterator<Item = (super::error::Place<'a>, &'a str)> + use<'a> {

@@ -7,7 +7,7 @@ use super::error::{FlexErrorKind, FlexFileError};
 use super::read::{refused, required_table};
 use super::units::Units;
 use crate::frames::LinkFrames;
-use crate::spatial::Pose;
+use flexarm_spatial::Pose;
 
 /// Interfaces and split, in SI; the split in the middle where it is not given.
 pub(super) fn read_frames(root: &Table<'_, '_>, units: &Units) -> Result<LinkFrames, FlexFileError> {

@@ -17,7 +17,7 @@ use crate::gate::GateLimits;
 use crate::input::read_file;
 use crate::reduced::{Provenance, ReducedLink};
 use crate::rigid_part::RigidPart;
-use crate::spatial::{Matrix12, turn6, twice};
+use flexarm_spatial::{Matrix12, turn6, twice};
 
 const PARTS: [&str; 2] = ["proximal", "distal"];
 /// A file larger than this is refused (bytes): a link with 100 modes and stiffness by load has 10 MB.

@@ -174,7 +174,7 @@ impl Mesh {
     }
 
     /// The mesh with its nodes moved from frame M into frame L; sections of beams turn with it.
-    pub fn transformed(mut self, X_LM: &crate::spatial::Pose) -> Self {
+    pub fn transformed(mut self, X_LM: &flexarm_spatial::Pose) -> Self {
         for p in &mut self.nodes {
             *p = X_LM.rotation * *p + X_LM.translation.vector;
         }

@@ -41,7 +41,7 @@ use nalgebra::{DMatrix, Matrix3, Matrix3xX, Matrix6xX, Vector3};
 use crate::error::FemError;
 use crate::reduction::{generalised_frequencies, spd_inverse};
 use crate::rigid_part::RigidPart;
-use crate::spatial::Pose;
+use flexarm_spatial::Pose;
 
 pub use source::ModalSource;
 
@@ -198,7 +198,7 @@ impl ModalLink {
         let C = spd_inverse(&self.K).ok_or(loose)?;
         let Phi = DMatrix::from_column_slice(6, self.coordinates(), at.Phi.as_slice());
         let C = &Phi * C * Phi.transpose();
-        Ok(crate::spatial::symmetric_part(&nalgebra::Matrix6::from_column_slice(C.as_slice())))
+        Ok(flexarm_spatial::symmetric_part(&nalgebra::Matrix6::from_column_slice(C.as_slice())))
     }
 
     /// Whether the coordinates are those of Craig and Bampton: six per interface, then modes that move none of them.

@@ -16,7 +16,7 @@ use nalgebra::{DMatrix, Matrix3, Matrix3xX, Matrix6xX, Rotation3, Translation3, 
 
 use super::{GeometricStiffness, ModalInterface, ModalLink, axial, symmetric};
 use crate::exchange::{ExchangeError, ExchangeErrorKind, GyroLayout, OeOrder, Sid, SidMatrix, SidNode};
-use crate::spatial::Pose;
+use flexarm_spatial::Pose;
 
 /// Start of the comment in which the names of the link and its nodes are kept.
 const COMMENT: &str = "modal link";

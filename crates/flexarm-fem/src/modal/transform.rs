@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Matrix6xX, Rotation3, Trans
 use super::sid::PRODUCTS;
 use super::{GeometricStiffness, ModalInterface, ModalLink};
 use crate::error::FemError;
-use crate::spatial::Pose;
+use flexarm_spatial::Pose;
 
 /// Modes with `ΦᵀKΦ = diag(ω²)`, `ΦᵀMΦ = 1`.
 pub(super) struct Eigenpairs {

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, Matrix3, SymmetricEigen, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::model::FeModel;
-use crate::spatial::Pose;
+use flexarm_spatial::Pose;
 
 /// How the six DoF of an interface act on the nodes of its surface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, SymmetricEigen};
 
 use super::boundary::Tie;
 use super::condensation::spd_inverse;
-use crate::spatial::{Matrix12, Pose};
+use flexarm_spatial::{Matrix12, Pose};
 
 /// One interface of a superelement.
 #[derive(Debug, Clone, PartialEq)]

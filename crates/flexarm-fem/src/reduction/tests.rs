@@ -14,8 +14,8 @@ use crate::model::{AssemblyOptions, FeModel};
 use crate::reduced::Provenance;
 use crate::section::Section;
 use crate::sparse::ModesWanted;
-use crate::spatial::Pose;
 use crate::test_mesh::{Noise, cube};
+use flexarm_spatial::Pose;
 
 const STEEL: Material = Material::STEEL;
 
@@ -286,7 +286,7 @@ fn the_joints_of_a_uniform_beam_are_those_of_its_pieces() {
     let piece = Section::Rectangle { width: 0.05, height: 0.08 }.bar(&material).unwrap();
     let piece = Beam::new(piece, BeamTheory::Timoshenko, 0.25).unwrap();
     // From the end of the piece to its middle.
-    let Ad = crate::spatial::adjoint(&Pose::translation(-0.125, 0.0, 0.0).inverse());
+    let Ad = flexarm_spatial::adjoint(&Pose::translation(-0.125, 0.0, 0.0).inverse());
     let C_S = Ad * piece.tip_compliance() * Ad.transpose();
     for (k, joint) in chain.joints.iter().enumerate() {
         let x = joint.X_LS.translation.vector;
@@ -486,7 +486,7 @@ fn the_stiffness_of_a_turned_mesh_is_the_turned_stiffness() {
     let turned: Vec<Interface> =
         interfaces.iter().map(|i| Interface { X_LI: at(place(i.X_LI.translation.vector)), ..i.clone() }).collect();
     let moved = reduce_mesh(&mesh.transformed(&X), &plan(turned, STEEL, 0), &mut |_| ()).unwrap();
-    let Q: Matrix6<f64> = crate::spatial::turn6(X.rotation.matrix());
+    let Q: Matrix6<f64> = flexarm_spatial::turn6(X.rotation.matrix());
     let expected = Q * straight.link.K_BB * Q.transpose();
     let error = (moved.link.K_BB - expected).amax() / expected.amax();
     assert!(error < 1e-9, "{error:.1e}");
@@ -572,7 +572,7 @@ fn segments_as_superelements_of_their_own_do_not_add_up_to_the_link() {
         let C_1 = compliance(&front, [interfaces[0].clone(), cut.clone()]);
         let C_2 = compliance(&back, [cut, interfaces[1].clone()]);
         let lever = p_S - p_B;
-        let Ad_BS = crate::spatial::adjoint(&Pose::translation(lever.x, lever.y, lever.z));
+        let Ad_BS = flexarm_spatial::adjoint(&Pose::translation(lever.x, lever.y, lever.z));
         let sum = Ad_BS * C_1 * Ad_BS.transpose() + C_2;
         let gap = sum.diagonal().component_div(&C.diagonal()).map(|r| r - 1.0);
         eprintln!("{tie:?} section: diagonal of the sum off by {:+.1e} to {:+.1e}", gap.min(), gap.max());

@@ -9,66 +9,7 @@
 use nalgebra::{IsometryMatrix3, Matrix3, Matrix6, Vector3, Vector6};
 use std::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 
-/// `A v`, written out on columns: nalgebra's general product of small matrices costs twice as many instructions.
-#[inline(always)]
-pub(crate) fn mul(A: &Matrix3<f64>, v: &Vector3<f64>) -> Vector3<f64> {
-    let [a, b, c] = &A.data.0;
-    let (x, y, z) = (v.x, v.y, v.z);
-    Vector3::new(a[0] * x + b[0] * y + c[0] * z, a[1] * x + b[1] * y + c[1] * z, a[2] * x + b[2] * y + c[2] * z)
-}
-
-/// `Aᵀ v`.
-#[inline(always)]
-pub(crate) fn tr_mul(A: &Matrix3<f64>, v: &Vector3<f64>) -> Vector3<f64> {
-    let [a, b, c] = &A.data.0;
-    let (x, y, z) = (v.x, v.y, v.z);
-    Vector3::new(a[0] * x + a[1] * y + a[2] * z, b[0] * x + b[1] * y + b[2] * z, c[0] * x + c[1] * y + c[2] * z)
-}
-
-/// Matrix of three columns.
-#[inline(always)]
-fn columns(a: Vector3<f64>, b: Vector3<f64>, c: Vector3<f64>) -> Matrix3<f64> {
-    Matrix3::new(a.x, b.x, c.x, a.y, b.y, c.y, a.z, b.z, c.z)
-}
-
-/// Column j as a vector.
-#[inline(always)]
-fn column(A: &Matrix3<f64>, j: usize) -> Vector3<f64> {
-    let c = &A.data.0[j];
-    Vector3::new(c[0], c[1], c[2])
-}
-
-/// `A B`.
-#[inline(always)]
-pub(crate) fn mul3(A: &Matrix3<f64>, B: &Matrix3<f64>) -> Matrix3<f64> {
-    columns(mul(A, &column(B, 0)), mul(A, &column(B, 1)), mul(A, &column(B, 2)))
-}
-
-/// `Aᵀ B`.
-#[inline(always)]
-pub(crate) fn tr_mul3(A: &Matrix3<f64>, B: &Matrix3<f64>) -> Matrix3<f64> {
-    columns(tr_mul(A, &column(B, 0)), tr_mul(A, &column(B, 1)), tr_mul(A, &column(B, 2)))
-}
-
-/// `R A Rᵀ` for a symmetric A.
-#[inline(always)]
-pub(crate) fn turn_symmetric(R: &Matrix3<f64>, A: &Matrix3<f64>) -> Matrix3<f64> {
-    let [t0, t1, t2] = &mul3(R, A).data.0;
-    let [r0, r1, r2] = &R.data.0;
-    let xx = t0[0] * r0[0] + t1[0] * r1[0] + t2[0] * r2[0];
-    let xy = t0[0] * r0[1] + t1[0] * r1[1] + t2[0] * r2[1];
-    let xz = t0[0] * r0[2] + t1[0] * r1[2] + t2[0] * r2[2];
-    let yy = t0[1] * r0[1] + t1[1] * r1[1] + t2[1] * r2[1];
-    let yz = t0[1] * r0[2] + t1[1] * r1[2] + t2[1] * r2[2];
-    let zz = t0[2] * r0[2] + t1[2] * r1[2] + t2[2] * r2[2];
-    Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
-}
-
-/// `[p]x A`.
-#[inline(always)]
-pub(crate) fn cross3(p: &Vector3<f64>, A: &Matrix3<f64>) -> Matrix3<f64> {
-    columns(p.cross(&column(A, 0)), p.cross(&column(A, 1)), p.cross(&column(A, 2)))
-}
+use crate::products::{cross3, mul, mul3, tr_mul, turn_symmetric};
 
 /// Pose `X_AB` of frame B in frame A, as rotation matrix and translation (m). `p_A = X_AB * p_B`.
 pub type Pose = IsometryMatrix3<f64>;
@@ -429,5 +370,20 @@ mod tests {
         // and the two cross products are adjoint: (V × U)ᵀ F = -Uᵀ (V ×* F)
         let U = Twist::new(vector![0.3, 0.2, -0.1], vector![-0.5, 0.6, 0.1]);
         assert_relative_eq!(V.cross(&U).power(&F), -U.power(&V.cross_force(&F)), epsilon = 1e-13);
+    }
+
+    /// Truth: the velocity of a point of a rigid body, `v_B = v_A + w × p_AB`, in turned axes.
+    #[test]
+    fn adjoint_carries_a_rigid_displacement() {
+        let R_BA = Rotation3::from_euler_angles(0.3, -0.8, 1.9);
+        let p_BA = Vector3::new(0.2, -0.5, 0.7);
+        let u_A = Vector6::new(0.1, -0.2, 0.3, 0.4, 0.5, -0.6);
+        let (v_A, w_A) = (u_A.fixed_rows::<3>(0), u_A.fixed_rows::<3>(3));
+
+        let u_B = adjoint(&Pose::from_parts(Translation3::from(p_BA), R_BA)) * u_A;
+
+        let v_B = R_BA * v_A + (R_BA * w_A).cross(&-p_BA);
+        assert!((u_B.fixed_rows::<3>(0) - v_B).norm() < 1e-14); // measured 1e-16
+        assert!((u_B.fixed_rows::<3>(3) - R_BA * w_A).norm() < 1e-15);
     }
 }

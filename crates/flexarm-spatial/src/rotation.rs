@@ -7,7 +7,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use crate::spatial::skew;
+use crate::vectors::skew;
 
 /// Below this cosine the axis is taken from the symmetric part of the rotation, above from the skew part.
 const NEAR_HALF_TURN: f64 = -0.9;

@@ -1,0 +1,37 @@
+//! Spatial algebra: poses, twists, wrenches, inertias and rotations, as the other crates use them.
+//!
+//! A frame is a letter, `X_AB` the pose of frame B in frame A, `p_A = X_AB p_B`. Six-vectors have the linear part first.
+//! A twist and a wrench belong to a point and to axes: [`Twist::at_parent`] and [`Wrench::at_parent`] carry them to another
+//! frame of the same body.
+//!
+//! ```
+//! use flexarm_spatial::{Pose, Twist, Wrench, adjoint};
+//! use nalgebra::{Translation3, Rotation3, vector};
+//!
+//! // Frame B sits 0.5 m along z of A, a quarter turn about z.
+//! let X_AB = Pose::from_parts(Translation3::new(0.0, 0.0, 0.5), Rotation3::from_euler_angles(0.0, 0.0, std::f64::consts::FRAC_PI_2));
+//!
+//! // A body that turns about x of A at 2 rad/s moves Bo at -1 m/s along y of A.
+//! let V_A = Twist::new(vector![0.0, 0.0, 0.0], vector![2.0, 0.0, 0.0]);
+//! let V_B = V_A.at_child(&X_AB);
+//! let v_Bo_A = X_AB.rotation * V_B.linear;
+//! assert!((v_Bo_A - vector![0.0, -1.0, 0.0]).norm() < 1e-15);
+//!
+//! // The power of a wrench on it is the same wherever it is reckoned, and Ad carries what at_child does.
+//! let F_B = Wrench::new(vector![3.0, -1.0, 2.0], vector![0.1, 0.0, 0.4]);
+//! assert!((V_B.power(&F_B) - V_A.power(&F_B.at_parent(&X_AB))).abs() < 1e-15);
+//! assert!((adjoint(&X_AB) * V_B.to_vector() - V_A.to_vector()).norm() < 1e-15);
+//! ```
+//!
+//! Not here: joints, trees, stiffness. Notation: `docs/references.md`.
+#![allow(non_snake_case, reason = "monogram notation: X_AB, Ad_BA, R_AB; see docs/references.md")]
+#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test stops at the first failure"))]
+
+mod blocks;
+pub mod products;
+mod rotation;
+mod vectors;
+
+pub use blocks::{Matrix12, symmetric_part, turn6, twice};
+pub use rotation::{AngleKinematics, ElasticAngles, rotation_vector};
+pub use vectors::{ArticulatedInertia, Pose, SpatialInertia, Twist, Wrench, adjoint, skew};
