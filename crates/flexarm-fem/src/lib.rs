@@ -47,11 +47,10 @@ pub mod cut;
 mod doubt;
 pub mod element;
 pub mod error;
-pub mod exchange;
 pub mod flex_file;
 pub mod frames;
 pub mod gate;
-mod input;
+pub mod input;
 pub mod material;
 pub mod matrix_link;
 pub mod mesh;
@@ -65,7 +64,7 @@ pub mod reduction;
 pub mod rigid_part;
 pub mod section;
 pub mod sparse;
-mod spelling;
+pub mod spelling;
 #[cfg(test)]
 pub(crate) mod test_mesh;
 pub mod units;
@@ -80,9 +79,7 @@ pub use flexarm_spatial::{Matrix12, Pose};
 pub use frames::LinkFrames;
 pub use gate::{GateLimits, GateReport};
 pub use material::Material;
-pub use mesh::{
-    ElementBlock, ElementKind, Mesh, MeshError, MeshFile, NodeSelector, ReadOptions, SelectError, parse_mesh, read_mesh,
-};
+pub use mesh::{ElementBlock, ElementKind, Mesh, NodeSelector, SelectError};
 pub use mesh_gate::MeshGate;
 pub use mesh_link::{LinkPlan, MeshReduction, SplitAt, reduce_mesh};
 pub use modal::{GeometricStiffness, ModalInterface, ModalLink, ModalOptions};

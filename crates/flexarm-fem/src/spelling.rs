@@ -1,7 +1,7 @@
-//! The nearest of some known words, for messages about one that is not known.
+//! Words in messages: the nearest of some known ones, lists that do not run on.
 
 /// Number of letters to insert, delete or change (Levenshtein).
-pub(crate) fn distance(a: &str, b: &str) -> usize {
+pub fn distance(a: &str, b: &str) -> usize {
     let b: Vec<char> = b.chars().collect();
     let mut row: Vec<usize> = (0..=b.len()).collect();
     for (i, x) in a.chars().enumerate() {
@@ -16,8 +16,20 @@ pub(crate) fn distance(a: &str, b: &str) -> usize {
 }
 
 /// The known word that `word` is most like, if at most a third of its letters differ.
-pub(crate) fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let with_distance = known.into_iter().map(|one| (distance(word, one), one));
     let (distance, found) = with_distance.min_by_key(|(distance, _)| *distance)?;
     (3 * distance <= found.chars().count().max(3)).then_some(found)
+}
+
+/// `items` joined for a message, at most eight of them.
+pub fn listed<T: std::fmt::Display>(items: impl IntoIterator<Item = T>) -> String {
+    const MOST: usize = 8;
+    let mut items = items.into_iter();
+    let shown: Vec<String> = items.by_ref().take(MOST).map(|item| item.to_string()).collect();
+    match (shown.is_empty(), items.count()) {
+        (true, _) => "none".into(),
+        (false, 0) => shown.join(", "),
+        (false, more) => format!("{} and {more} more", shown.join(", ")),
+    }
 }

@@ -10,10 +10,9 @@ mod common;
 
 use std::f64::consts::TAU;
 
-use common::{lower_arm, offset_arm};
-use flexarm_fem::exchange::{ExchangeErrorKind, SidMatrix, parse_sid, write_sid};
-use flexarm_fem::{Bar, BeamLink, BeamTheory, FemError, Material, ModalLink, ModalOptions, Pose, Section};
-use nalgebra::{DMatrix, Matrix6, Rotation3, Translation3, Vector6};
+use common::{lower_arm, turned};
+use flexarm_fem::{Bar, BeamLink, BeamTheory, FemError, Material, ModalOptions, Section};
+use nalgebra::{DMatrix, Matrix6, Vector6};
 
 /// A slender uniform beam of unit length and mass, its bending stiffness 1 and 1.7, stiff in stretch and torsion.
 fn slender() -> BeamLink {
@@ -32,19 +31,6 @@ fn slender() -> BeamLink {
     BeamLink {
         theory: BeamTheory::EulerBernoulli,
         ..BeamLink::new("slender", Section::Given(bar), Material::STEEL, 1.0)
-    }
-}
-
-/// An arm beside its joint line, with every frame turned: every coupling lives.
-fn turned() -> BeamLink {
-    let pose = |x, y, z, roll, pitch, yaw| {
-        Pose::from_parts(Translation3::new(x, y, z), Rotation3::from_euler_angles(roll, pitch, yaw))
-    };
-    BeamLink {
-        X_LA: pose(0.01, -0.02, 0.03, 0.3, 0.2, -0.9),
-        X_LB: pose(0.1, 0.2, 1.2, -1.3, 0.4, 2.0),
-        mass: Some(60.0),
-        ..offset_arm()
     }
 }
 
@@ -248,55 +234,6 @@ fn a_truncated_link_is_the_one_with_fewer_modes() {
     eprintln!("truncated: N {N:.1e} K {K:.1e}");
     assert!(N < 1e-10 && K < 1e-12, "{N:.1e} {K:.1e}"); // measured 1.5e-13, 1.3e-15
     assert!(matches!(many.truncated(10), Err(FemError::OutOfRange { .. })));
-}
-
-#[test]
-fn a_modal_link_survives_standard_input_data() {
-    let link = turned().modal_with(&ModalOptions { modes: 5, geometric: true, ..ModalOptions::default() }).unwrap();
-    let sid = link.to_sid();
-    let text = write_sid(&sid);
-    let read = parse_sid(&text, "arm.SID_FEM").unwrap();
-    assert_eq!(read, sid);
-    let found = read.conventions("arm").unwrap();
-    assert!(found.gyro_residual < 1e-14 && found.oe_residual < 1e-14); // measured 0
-    let back = ModalLink::from_sid("other name", &read).unwrap();
-    let n = link.coordinates();
-    let size = |k: usize| link.M[(k, k)].sqrt();
-    let P = worst((0..n).map(|k| (link.P[k] - back.P[k]).amax() / (link.inertia.amax().sqrt() * size(k))));
-    let N = worst((0..n * n).map(|at| (link.N[at] - back.N[at]).amax() / (size(at / n) * size(at % n))));
-    eprintln!("SID: P {P:.1e} N {N:.1e}");
-    assert!(P < 1e-12 && N < 1e-12, "{P:.1e} {N:.1e}"); // measured 7e-17, 1.1e-15
-    assert_eq!(ModalLink { P: link.P.clone(), N: link.N.clone(), ..back }, link);
-
-    // Without the blocks of its own the stiffening comes from where the standard has it, but for the centrifugal part.
-    let mut plain = read.clone();
-    plain.others.clear();
-    let (standard, own) = (ModalLink::from_sid("arm", &plain).unwrap().geometric.unwrap(), link.geometric.unwrap());
-    let gap = |a: &[DMatrix<f64>], b: &[DMatrix<f64>]| {
-        let size = b.iter().fold(0.0_f64, |s, b| s.max(b.amax()));
-        worst(a.iter().zip(b).map(|(a, b)| (a - b).amax() / size))
-    };
-    let gaps = [
-        gap(&standard.acceleration, &own.acceleration),
-        gap(&standard.angular, &own.angular),
-        gap(&standard.interface[0], &own.interface[0]),
-    ];
-    eprintln!("stiffening {gaps:?}");
-    assert!(gaps.iter().all(|gap| *gap < 1e-12), "{gaps:?}"); // measured 1e-17
-
-    // What cannot be a modal link is refused by name.
-    let mut stressed = read.clone();
-    stressed.ksigma = SidMatrix::constant(n, &DMatrix::from_element(n, 1, 1.0));
-    assert_eq!(ModalLink::from_sid("arm", &stressed).unwrap_err().kind, ExchangeErrorKind::Unsupported);
-    let mut adrift = read.clone();
-    adrift.nodes.remove(0);
-    assert_eq!(ModalLink::from_sid("arm", &adrift).unwrap_err().kind, ExchangeErrorKind::Missing);
-    let mut loose = read.clone();
-    loose.Ke = SidMatrix::constant(n, &DMatrix::zeros(n, n));
-    assert_eq!(ModalLink::from_sid("arm", &loose).unwrap_err().kind, ExchangeErrorKind::Defective);
-    let mut skewed = read;
-    skewed.nodes[1].AP = SidMatrix::constant(n, &DMatrix::from_element(3, 3, 0.5));
-    assert_eq!(ModalLink::from_sid("arm", &skewed).unwrap_err().kind, ExchangeErrorKind::Defective);
 }
 
 /// Truth: the sum over the static shape of a cantilever under its own weight, `w l⁴/(8 EI)` at the tip.

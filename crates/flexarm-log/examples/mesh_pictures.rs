@@ -12,7 +12,7 @@
 use std::path::Path;
 use std::time::Instant;
 
-use flexarm_fem::mesh::{ReadOptions, read_mesh};
+use flexarm_fe_io::mesh::{ReadOptions, read_mesh};
 use flexarm_fem::reduction::{CondensationOptions, Interface, Tie};
 use flexarm_fem::sparse::ModesWanted;
 use flexarm_fem::{GateLimits, LinkPlan, Pose, Provenance, SplitAt, UnitSystem, reduce_mesh};

@@ -9,7 +9,7 @@
 
 use std::path::PathBuf;
 
-use flexarm_fem::mesh::{ReadOptions, read_mesh};
+use flexarm_fe_io::mesh::{ReadOptions, read_mesh};
 use flexarm_fem::reduction::{CondensationOptions, Interface, Tie};
 use flexarm_fem::sparse::ModesWanted;
 use flexarm_fem::{

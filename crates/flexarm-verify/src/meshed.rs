@@ -3,9 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use flexarm::Error;
+use flexarm_fe_io::mesh::{ReadOptions, read_mesh};
 use flexarm_fem::chain::{Chain, ChainSource, energy_by_slice};
 use flexarm_fem::element::Quadrature;
-use flexarm_fem::mesh::{Mesh, ReadOptions, read_mesh};
+use flexarm_fem::mesh::Mesh;
 use flexarm_fem::model::{AssemblyOptions, FeModel};
 use flexarm_fem::reduction::{Condensation, CondensationOptions, Interface, Tie};
 use flexarm_fem::sparse::ModesWanted;

@@ -50,7 +50,7 @@ pub enum Error {
     Flex(#[from] Box<flexarm_fem::FlexFileError>),
     /// A mesh file.
     #[error(transparent)]
-    Mesh(#[from] Box<flexarm_fem::MeshError>),
+    Mesh(#[from] Box<flexarm_fe_io::MeshError>),
     /// An interface of a link to be reduced.
     #[error("{place}: interface {interface:?}: {what}")]
     Interface {
@@ -117,7 +117,7 @@ pub enum Error {
     Log(#[from] flexarm_log::LogError),
     /// A file of matrices of another FE program.
     #[error(transparent)]
-    Exchange(#[from] Box<flexarm_fem::exchange::ExchangeError>),
+    Exchange(#[from] Box<flexarm_fe_io::exchange::ExchangeError>),
     /// Matrices that could not become a link.
     #[error("{}: {source}", path.display())]
     Import {

@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::Instant;
 
-use flexarm_fem::exchange::{
+use flexarm_fe_io::exchange::{
     DofLabel, InputFile, Interface, InterfaceMap, MatrixNames, RowPick, Sidecar, SidecarInterface, assemble_interfaces,
     parse_matrices, write_dmig, write_matrix_market, write_op4, write_sidecar, write_simscape, write_user_element,
 };

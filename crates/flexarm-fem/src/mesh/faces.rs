@@ -3,7 +3,7 @@
 use super::ElementKind;
 
 /// Number of corner nodes; they come first.
-pub(super) const fn corner_count(kind: ElementKind) -> usize {
+pub fn corner_count(kind: ElementKind) -> usize {
     match kind {
         ElementKind::Beam2 => 2,
         ElementKind::Tet4 | ElementKind::Tet10 => 4,
@@ -41,12 +41,12 @@ pub(super) const fn face_corners(kind: ElementKind) -> &'static [&'static [u8]] 
 }
 
 /// Whether the kind has mid-side nodes.
-pub(super) const fn is_second_order(kind: ElementKind) -> bool {
+pub const fn is_second_order(kind: ElementKind) -> bool {
     matches!(kind, ElementKind::Tet10 | ElementKind::Hex20 | ElementKind::Wedge15)
 }
 
 /// All nodes of each face: its corners, then the mid-side nodes of the edges between them in turn.
-pub(super) fn face_nodes(kind: ElementKind) -> Vec<Vec<u8>> {
+pub fn face_nodes(kind: ElementKind) -> Vec<Vec<u8>> {
     let middle = |a: u8, b: u8| {
         let edge = edges(kind).iter().position(|edge| *edge == [a, b] || *edge == [b, a]);
         edge.map(|edge| (corner_count(kind) + edge) as u8)

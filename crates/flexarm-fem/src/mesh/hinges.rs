@@ -107,7 +107,7 @@ pub fn bodies(mesh: &Mesh) -> Bodies {
 impl std::fmt::Display for Hinge {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let ((large, a), (small, b)) = (self.first, self.second);
-        let nodes = super::source::listed(&self.node_ids);
+        let nodes = crate::spelling::listed(&self.node_ids);
         write!(
             f,
             "the body of {large} elements with element {a} and that of {small} with element {b} share {} node(s) ({nodes}), \

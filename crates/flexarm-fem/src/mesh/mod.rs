@@ -1,31 +1,24 @@
 //! A finite element mesh in SI units: nodes, blocks of elements, regions with materials, named sets.
 //!
-//! Plain data. Readers fill it and convert node order and units on the way; here
+//! Plain data. Readers (`flexarm-fe-io`) fill it and convert node order and units on the way; here
 //! positions are in m, in the frame of the mesh, and the nodes of an element are in the order of
 //! CalculiX and Abaqus ([`ElementKind`]).
 //!
-//! Start at [`read_mesh`] for a file, [`select`](select()) for the nodes of an interface, [`skin`] for a
+//! Start at [`Mesh`], [`select`](select()) for the nodes of an interface, [`skin`] for a
 //! picture, [`connected_parts`] to see whether the mesh is in one piece.
 //!
 //! Not here: shape functions and matrices of elements ([`crate::element`]), ties, reduction.
 
 mod coincident;
-mod draft;
-mod error;
 mod faces;
 mod fit;
-mod gmsh;
 mod hinges;
-mod ids;
-mod inp;
 mod orientation;
 mod parts;
 mod promote;
-mod read;
 mod seat;
 mod select;
 mod selector;
-mod source;
 mod surface;
 
 use std::collections::BTreeMap;
@@ -37,12 +30,12 @@ use crate::material::Material;
 use crate::section::Section;
 
 pub use coincident::{COINCIDENT, Coincident, coincident};
-pub use error::{MeshError, MeshErrorKind, Place};
+pub use faces::{corner_count, face_nodes, is_second_order};
 pub use fit::{Misfit, misfits};
 pub use hinges::{Bodies, Hinge, bodies};
+pub use orientation::turn_reversed;
 pub use parts::{Part, connected_parts};
 pub use promote::{Promoted, added_nodes, promoted, second_order};
-pub use read::{MeshFile, ReadOptions, parse_mesh, read_mesh};
 pub use seat::{Seat, Surface};
 pub use select::{SelectError, select};
 pub use selector::{NodeSelector, SelectorSyntaxError};

@@ -9,7 +9,7 @@ use crate::element::jacobian_range;
 /// Turns the elements of every kind of which all are inside out; a sentence for each such kind.
 ///
 /// Single inverted elements among sound ones stay: they are folded, not reversed.
-pub(super) fn turn_reversed(mesh: &mut Mesh) -> Vec<String> {
+pub fn turn_reversed(mesh: &mut Mesh) -> Vec<String> {
     let mut said = Vec::new();
     let mut kinds: Vec<ElementKind> =
         mesh.blocks.iter().filter(|block| !block.kind.is_beam()).map(|block| block.kind).collect();

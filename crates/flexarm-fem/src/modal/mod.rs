@@ -21,7 +21,7 @@
 //! | a mesh | [`ModalSource`], in [`LinkDetails::modal`](crate::LinkDetails) after [`reduce_mesh`](crate::reduce_mesh) |
 //! | a uniform beam | [`BeamLink::modal`](crate::BeamLink::modal) |
 //! | a condensed stiffness and mass | [`ModalLink::from_superelement`]: first order only |
-//! | Standard Input Data | [`ModalLink::from_sid`], [`ModalLink::from_sid_held_at`], and back: [`ModalLink::to_sid`] |
+//! | Standard Input Data | `flexarm_fe_io::exchange::modal_link_from_sid`, and back: `sid_of_modal_link` |
 //!
 //! Source: Shabana (2013), chapter 5; Wallrapp (1994).
 //!
@@ -29,7 +29,6 @@
 
 mod beam;
 mod geometric;
-mod sid;
 mod source;
 mod superelement;
 #[cfg(test)]
@@ -201,6 +200,11 @@ impl ModalLink {
         Ok(flexarm_spatial::symmetric_part(&nalgebra::Matrix6::from_column_slice(C.as_slice())))
     }
 
+    /// Whether mass and stiffness are positive definite, so that all frequencies with A held are real and above zero.
+    pub fn is_positive_definite(&self) -> bool {
+        transform::eigenpairs(&self.K, &self.M).is_some()
+    }
+
     /// Whether the coordinates are those of Craig and Bampton: six per interface, then modes that move none of them.
     pub fn is_craig_bampton(&self) -> bool {
         let unit = |(i, interface): (usize, &ModalInterface)| {
@@ -211,8 +215,11 @@ impl ModalLink {
     }
 }
 
+/// Products of ω in the order of the second-order loads: xx yy zz xy xz yz.
+pub const PRODUCTS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
+
 /// The axial vector of the skew part, doubled: `∫ s × φ dm` of `∫ s φᵀ dm`.
-pub(crate) fn axial(A: &Matrix3<f64>) -> Vector3<f64> {
+pub fn axial(A: &Matrix3<f64>) -> Vector3<f64> {
     Vector3::new(A[(1, 2)] - A[(2, 1)], A[(2, 0)] - A[(0, 2)], A[(0, 1)] - A[(1, 0)])
 }
 
@@ -223,6 +230,6 @@ pub(crate) fn inertia_of(S: &Matrix3<f64>) -> Matrix3<f64> {
 }
 
 /// `(A + Aᵀ)/2`.
-pub(crate) fn symmetric(A: &DMatrix<f64>) -> DMatrix<f64> {
+pub fn symmetric(A: &DMatrix<f64>) -> DMatrix<f64> {
     (A + A.transpose()) * 0.5
 }

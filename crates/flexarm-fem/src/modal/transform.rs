@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Matrix6xX, Rotation3, Translation3, Vector3};
 
-use super::sid::PRODUCTS;
+use super::PRODUCTS;
 use super::{GeometricStiffness, ModalInterface, ModalLink};
 use crate::error::FemError;
 use flexarm_spatial::Pose;
@@ -169,7 +169,7 @@ impl ModalLink {
     /// order stay unknown.
     ///
     /// * `motion`: c_k (at Lo) over θ_k, link axes, one column per coordinate.
-    pub(super) fn without_rigid_motion(self, motion: &Matrix6xX<f64>) -> Self {
+    pub fn without_rigid_motion(self, motion: &Matrix6xX<f64>) -> Self {
         let n = self.coordinates();
         let (m, mc) = (self.mass, self.first_moment);
         // ∫ s sᵀ dm

@@ -70,3 +70,16 @@ pub(crate) fn spd_stiffness() -> impl Strategy<Value = Matrix6<f64>> {
 pub(crate) fn frames(length: f64) -> LinkFrames {
     LinkFrames::new(Pose::identity(), Pose::translation(length, 0.0, 0.0))
 }
+
+/// An arm beside its joint line, with every frame turned: every coupling lives.
+pub(crate) fn turned() -> BeamLink {
+    let pose = |x, y, z, roll, pitch, yaw| {
+        Pose::from_parts(Translation3::new(x, y, z), Rotation3::from_euler_angles(roll, pitch, yaw))
+    };
+    BeamLink {
+        X_LA: pose(0.01, -0.02, 0.03, 0.3, 0.2, -0.9),
+        X_LB: pose(0.1, 0.2, 1.2, -1.3, 0.4, 2.0),
+        mass: Some(60.0),
+        ..offset_arm()
+    }
+}

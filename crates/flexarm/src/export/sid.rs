@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::time::Instant;
 
-use flexarm_fem::exchange::{parse_sid, write_sid};
+use flexarm_fe_io::exchange::{modal_link_held_at, parse_sid, sid_of_modal_link, write_sid};
 use flexarm_fem::{ModalLink, ReducedLink, UnitSystem};
 use nalgebra::{DMatrix, Matrix3};
 
@@ -31,7 +31,7 @@ pub(super) fn export(job: &ExportJob, link: &ReducedLink, started: Instant) -> R
 
     let count = modal.interfaces.len() + 1;
     let ids = if job.nodes.is_empty() { (1..=count as i64).collect() } else { nodes(job, count)? };
-    let mut sid = modal.to_sid();
+    let mut sid = sid_of_modal_link(modal);
     for (node, id) in sid.nodes.iter_mut().zip(&ids) {
         node.id = *id;
     }
@@ -52,7 +52,7 @@ pub(super) fn export(job: &ExportJob, link: &ReducedLink, started: Instant) -> R
     // Back as every import reads it, before anything is written: what cannot be read leaves no file.
     let origin = paths[0].display().to_string();
     let back = parse_sid(&texts[0].1, &origin).map_err(Box::new)?.in_units(&job.units, &UnitSystem::SI);
-    let back = ModalLink::from_sid_held_at(&link.name, &back, ids[0]).map_err(Box::new)?;
+    let back = modal_link_held_at(&link.name, &back, ids[0]).map_err(Box::new)?;
     let (stiffness_error, mass_error) = (difference(&modal.K, &back.K), difference(&modal.M, &back.M));
     let integrals_error = integrals(modal, &back);
     for (what, error) in [("stiffness", stiffness_error), ("mass", mass_error), ("integrals", integrals_error)] {

@@ -2,8 +2,8 @@
 
 use std::collections::HashMap;
 
+use flexarm_fe_io::exchange::{Entries, ImportedMatrices, InterfaceMap, LabelledMatrix, MatrixFormat, RowPick};
 use flexarm_fem::UnitSystem;
-use flexarm_fem::exchange::{Entries, ImportedMatrices, InterfaceMap, LabelledMatrix, MatrixFormat, RowPick};
 use flexarm_fem::matrix_link::reduce_matrices;
 use flexarm_fem::model::FeModel;
 use flexarm_fem::reduction::{Condensation, CondensationOptions, Interface, InterfaceFrame, Superelement, Tie};

@@ -29,7 +29,7 @@ mod words;
 use std::path::PathBuf;
 use std::time::Instant;
 
-use flexarm_fem::exchange::{
+use flexarm_fe_io::exchange::{
     ImportedMatrices, InputFile, InterfaceMap, MatrixFormat, MatrixNames, MatrixRole, RowPick, assemble_interfaces,
     parse_matrices, propose_map_of, read_matrices, recognise,
 };
@@ -43,7 +43,7 @@ use crate::error::Error;
 use crate::{result_files, stamp};
 use summary::Parts;
 
-pub use flexarm_fem::exchange::MatrixNames as Names;
+pub use flexarm_fe_io::exchange::MatrixNames as Names;
 pub use flexarm_fem::matrix_link::PartMasses;
 pub use flexarm_fem::{RigidPart, SplitAt as Split, UnitSystem as UnitsOfFile};
 pub use summary::{ImportChecks, ImportFiles, ImportInterface, ImportPart, ImportSummary, markdown, tables};
@@ -314,7 +314,7 @@ fn plan(job: &ImportJob, name: &str, units: UnitSystem, source: &str, method: &s
     }
 }
 
-fn read(job: &ImportJob) -> Result<ImportedMatrices, flexarm_fem::exchange::ExchangeError> {
+fn read(job: &ImportJob) -> Result<ImportedMatrices, flexarm_fe_io::exchange::ExchangeError> {
     let Some(mass) = &job.mass_file else {
         let imported = read_matrices(&job.files, &job.names)?;
         // A sidecar that was found beside the stiffness names the mass.

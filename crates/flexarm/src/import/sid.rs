@@ -7,7 +7,7 @@
 //! ```
 //! The two rigid parts have the mass, centre and inertia of the body. Inside, all is in SI.
 
-use flexarm_fem::exchange::{InputFile, InterfaceMap, RowPick, Sid, parse_sid};
+use flexarm_fe_io::exchange::{InputFile, InterfaceMap, RowPick, Sid, modal_link_held_at, parse_sid};
 use flexarm_fem::matrix_link::{MatrixReduction, PartMasses, link_from_superelement};
 use flexarm_fem::reduction::{InterfaceFrame, Superelement};
 use flexarm_fem::{GeometricStiffness, LinkDetails, ModalInterface, ModalLink, Pose, RigidPart, UnitSystem};
@@ -112,7 +112,7 @@ fn modal_link(
     warnings: &mut Vec<String>,
 ) -> Option<ModalLink> {
     let A = nodes[0].1;
-    let link = match ModalLink::from_sid_held_at(name, sid, sid.nodes[A].id) {
+    let link = match modal_link_held_at(name, sid, sid.nodes[A].id) {
         Ok(link) => link,
         Err(error) => {
             let used = "only the stiffness between A and B and the rigid mass are used";

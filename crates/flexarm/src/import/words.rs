@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use flexarm_fem::exchange::{InterfaceMap, MatrixFormat};
+use flexarm_fe_io::exchange::{InterfaceMap, MatrixFormat};
 use flexarm_fem::{RigidPart, SplitAt};
 use nalgebra::{Matrix3, Vector3};
 
@@ -41,7 +41,7 @@ impl FromStr for ImportMap {
             return text
                 .parse()
                 .map(Self::Rows)
-                .map_err(|error: flexarm_fem::exchange::ExchangeError| error.to_string());
+                .map_err(|error: flexarm_fe_io::exchange::ExchangeError| error.to_string());
         }
         let one = |part: &&str| {
             let wrong =

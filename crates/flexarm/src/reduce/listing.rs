@@ -3,8 +3,9 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use flexarm_fe_io::mesh::MeshFile;
+use flexarm_fem::Mesh;
 use flexarm_fem::mesh::connected_parts;
-use flexarm_fem::{Mesh, MeshFile};
 use nalgebra::Vector3;
 use serde::Serialize;
 

@@ -30,9 +30,10 @@ mod words;
 
 use std::time::{Duration, Instant};
 
-use flexarm_fem::mesh::read_mesh;
+use flexarm_fe_io::mesh::ReadOptions;
+use flexarm_fe_io::read_mesh;
 use flexarm_fem::mesh_link::ReductionStep;
-use flexarm_fem::{ReadOptions, UnitSystem, reduce_mesh, write_flex};
+use flexarm_fem::{UnitSystem, reduce_mesh, write_flex};
 use flexarm_kinematics::Pose;
 
 use crate::error::Error;

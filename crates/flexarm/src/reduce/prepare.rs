@@ -1,14 +1,13 @@
 //! From a job to a mesh with materials and a plan, everything checked before the work starts.
 
+use flexarm_fe_io::mesh::{MeshFile, ReadOptions};
+use flexarm_fe_io::read_mesh;
 use flexarm_fem::element::Quadrature;
-use flexarm_fem::mesh::read_mesh;
 use flexarm_fem::mesh_link::MeshLinkError;
 use flexarm_fem::model::AssemblyOptions;
 use flexarm_fem::reduction::{CondensationOptions, ReductionError, TieError};
 use flexarm_fem::sparse::{ModesWanted, Ordering, Threads};
-use flexarm_fem::{
-    Doubt, GateLimits, LinkPlan, Material, MeshFile, Provenance, ReadOptions, SplitAt, UnitSystem, mass_properties,
-};
+use flexarm_fem::{Doubt, GateLimits, LinkPlan, Material, Provenance, SplitAt, UnitSystem, mass_properties};
 use flexarm_kinematics::Pose;
 use nalgebra::Vector3;
 

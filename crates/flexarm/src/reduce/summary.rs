@@ -1,9 +1,10 @@
 //! Figures of a reduction; the JSON keys are stable. SI units, link axes.
 
+use flexarm_fe_io::mesh::MeshFile;
 use flexarm_fem::chain::Chain;
 use flexarm_fem::mesh_gate::ModeCheck;
 use flexarm_fem::sparse::Ordering;
-use flexarm_fem::{Doubt, LinkPlan, Material, MeshFile, MeshReduction, ModalLink, RigidPart, UnitSystem};
+use flexarm_fem::{Doubt, LinkPlan, Material, MeshReduction, ModalLink, RigidPart, UnitSystem};
 use nalgebra::{Matrix3, Matrix6};
 use serde::Serialize;
 

@@ -1,0 +1,83 @@
+//! Substructure files that are wrong although they are well formed, with the reason.
+
+use nalgebra::DMatrix;
+
+use super::error::{ExchangeError, ExchangeErrorKind, Place};
+use super::matrix::ImportedMatrices;
+use super::recognise::MatrixFormat;
+
+/// A relative force under translation of the whole above this is of order one: nothing cancels.
+const OF_ORDER_ONE: f64 = 0.5;
+
+/// Coupling below this, relative to the diagonal, is rounding.
+const ROUND_OFF: f64 = 1e-10;
+
+/// Refuses a matrix with an interface that knows nothing of the others, and is held all the same.
+///
+/// Debian's CalculiX 2.20 writes substructures without condensing them: the block between the
+/// interfaces is then exactly zero (or rounding), and a translation of both meets a force of full
+/// size. The gate ([`flexarm_fem::gate::check_matrix12`]) refuses such a matrix too, but cannot know why.
+/// Everything else, such as rows in another order or a support that was left in, is for the gate.
+///
+/// * `K`: rows of the interfaces first, six each; any units.
+///
+/// # Errors
+/// [`ExchangeErrorKind::Defective`].
+pub fn diagnose_substructure(
+    imported: &ImportedMatrices,
+    K: &DMatrix<f64>,
+    interfaces: usize,
+) -> Result<(), ExchangeError> {
+    if interfaces < 2 || K.nrows() < 6 * interfaces {
+        return Ok(());
+    }
+    // Layouts of CalculiX and Abaqus.
+    let is_substructure = matches!(imported.format, MatrixFormat::UserElement | MatrixFormat::LabelledText);
+    let largest = |i: usize| largest_coupling(K, i, interfaces);
+    let mut couplings = (0..interfaces).map(|i| (i, largest(i)));
+    let uncoupled = couplings.rfind(|(_, k)| *k == 0.0 || (is_substructure && *k <= ROUND_OFF));
+    let residual = translation_residual(K, interfaces);
+    let Some((i, coupling)) = uncoupled.filter(|_| residual > OF_ORDER_ONE) else { return Ok(()) };
+    let (i, others) = (i + 1, if interfaces == 2 { "the other" } else { "all others" });
+    let how = if coupling == 0.0 { "exactly zero".to_owned() } else { format!("only rounding ({coupling:.1e})") };
+    let found = format!(
+        "a block between interface {i} and {others} that is {how} (relative force under translation {residual:.1e})"
+    );
+    let help = if is_substructure {
+        "CalculiX 2.20 as built by Debian writes substructures without condensing them; instead write the full \
+         matrices with *FREQUENCY, SOLVER=MATRIXSTORAGE and import .sti, .mas and .dof, or reduce the mesh itself \
+         with `flexarm reduce`"
+    } else {
+        "was the matrix not condensed, or do the rows belong to other interfaces?"
+    };
+    let expected = "a free structure whose interfaces feel each other";
+    Err(Place::file(&imported.origin).fail(ExchangeErrorKind::Defective, "stiffness", found, expected, help))
+}
+
+/// Largest `|k_ij| / sqrt(|k_ii k_jj|)` between an interface and the others; 0 only if all are zero.
+fn largest_coupling(K: &DMatrix<f64>, interface: usize, interfaces: usize) -> f64 {
+    let own = 6 * interface..6 * interface + 6;
+    let others = || (0..6 * interfaces).filter(|j| !own.contains(j));
+    let entries = own.clone().flat_map(|i| others().map(move |j| (i, j))).filter(|place| K[*place] != 0.0);
+    let relative = |(i, j): (usize, usize)| {
+        let size = K[(i, i)].abs().sqrt() * K[(j, j)].abs().sqrt();
+        (K[(i, j)].abs() / size).max(f64::MIN_POSITIVE)
+    };
+    entries.map(relative).fold(0.0, f64::max)
+}
+
+/// Largest force under a translation of all interfaces, over the size of the terms that should cancel.
+fn translation_residual(K: &DMatrix<f64>, interfaces: usize) -> f64 {
+    let mut worst = 0.0_f64;
+    for axis in 0..3 {
+        let moving = || (0..interfaces).map(|i| 6 * i + axis);
+        for row in moving() {
+            let force: f64 = moving().map(|column| K[(row, column)]).sum();
+            let size: f64 = moving().map(|column| K[(row, column)].abs()).sum();
+            if size > 0.0 {
+                worst = worst.max(force.abs() / size);
+            }
+        }
+    }
+    worst
+}

@@ -1,0 +1,461 @@
+//! A modal link from and to Standard Input Data.
+//!
+//! ```text
+//! mdCM = ∫ s dm + Σ C_t,k η_k          J = inertia + Σ J1_k η_k      J1 = 2 tr(Ps) 1 - 2 Ps,  Ps: symmetric part of P
+//! Ct0 = C_tᵀ                           Cr0 = C_rᵀ,  Cr1_kl = ∫ φ_l × φ_k dm                     from N_lk
+//! Gr_k = -2 ∫ [s]x [φ_k]x dm = 2 (tr(P_k) 1 - P_kᵀ)                    Ge_kl = 2 ∫ φ_l × φ_k dm
+//! Oe0 = ∫ φ_kᵀ [ω]x² s dm,  Oe1 = ∫ φ_kᵀ [ω]x² φ_l dm                  by products ω_i ω_j
+//! ```
+//! Stiffness by initial stress goes where the standard has it, as first-order parts of Ct, Cr, Oe and, with the
+//! other sign, of phi and psi of the nodes; and once more by itself, in blocks `K0t`, `K0r`, `K0omega` and `K0F`, since
+//! nobody can take it out of `Oe` again. Column `i n + l` of a block: entry l for load i.
+//!
+//! Source: Wallrapp (1994), *Mech. Struct. & Mach.* 22.
+
+use nalgebra::{DMatrix, Matrix3, Matrix3xX, Matrix6xX, Rotation3, Translation3, Vector3};
+
+use flexarm_fem::modal::{GeometricStiffness, ModalInterface, ModalLink, PRODUCTS, axial, symmetric};
+
+use super::{GyroLayout, OeOrder, Sid, SidMatrix, SidNode};
+use crate::exchange::{ExchangeError, ExchangeErrorKind};
+use flexarm_spatial::Pose;
+
+/// Start of the comment in which the names of the link and its nodes are kept.
+const COMMENT: &str = "modal link";
+/// Where they stand in the columns of `Oe` as it is written: xx yy zz xy yz xz.
+const OE_COLUMNS: [usize; 6] = [0, 1, 2, 3, 5, 4];
+/// Largest `|RᵀR - 1|` of a node frame: files have few digits.
+const ROTATION: f64 = 1e-6;
+
+/// `φᵀ [ω]x² s` per product of ω, from `A = ∫ s φᵀ dm`.
+fn centrifugal(A: &Matrix3<f64>) -> [f64; 6] {
+    PRODUCTS.map(|(a, b)| if a == b { A[(a, a)] - A.trace() } else { A[(a, b)] + A[(b, a)] })
+}
+
+/// The symmetric part of A from [`centrifugal`].
+fn from_centrifugal(O: [f64; 6]) -> Matrix3<f64> {
+    let trace = -0.5 * (O[0] + O[1] + O[2]);
+    let mut A = Matrix3::zeros();
+    for ((a, b), O) in PRODUCTS.into_iter().zip(O) {
+        let value = if a == b { O + trace } else { 0.5 * O };
+        (A[(a, b)], A[(b, a)]) = (value, value);
+    }
+    A
+}
+
+/// The skew matrix A with `axial(A) = c`.
+fn skew_of(c: &Vector3<f64>) -> Matrix3<f64> {
+    c.cross_matrix() * -0.5
+}
+
+/// A modal link as Standard Input Data, SI; node 1 is A, the others follow in order.
+///
+/// `De` is zero: a modal link has no damping of its own.
+pub fn sid_of_modal_link(link: &ModalLink) -> Sid {
+    let n = link.coordinates();
+    let dense = |A: &Matrix3xX<f64>| DMatrix::from_fn(n, 3, |k, a| A[(a, k)]);
+    let column = |v: &Vector3<f64>| DMatrix::from_column_slice(3, 1, v.as_slice());
+    let six = |J: &Matrix3<f64>| DMatrix::from_iterator(6, 1, PRODUCTS.into_iter().map(|place| J[place]));
+    let J1 = |P: &Matrix3<f64>| Matrix3::identity() * (2.0 * P.trace()) - (P + P.transpose());
+    let square = |A: &DMatrix<f64>| SidMatrix { structure: 2, ..SidMatrix::constant(n, A) };
+    let G = link.geometric.as_ref();
+
+    let (mut Gr, mut Ge) = (DMatrix::zeros(3, 3 * n), DMatrix::zeros(n, 3 * n));
+    let mut Oe0 = DMatrix::zeros(n, 6);
+    // By mode, as the first-order parts are.
+    let zeros = |columns| vec![DMatrix::zeros(n, columns); n];
+    let (mut Ct1, mut Cr1, mut Oe1) = (zeros(3), zeros(3), zeros(6));
+    for k in 0..n {
+        let gyro = (Matrix3::identity() * link.P[k].trace() - link.P[k].transpose()) * 2.0;
+        for (row, axis) in (0..9).map(|e| (e / 3, e % 3)) {
+            Gr[(row, GyroLayout::ComponentMajor.column(n, axis, k))] = gyro[(row, axis)];
+        }
+        for (value, at) in centrifugal(&link.P[k]).into_iter().zip(OE_COLUMNS) {
+            Oe0[(k, at)] = value;
+        }
+        for l in 0..n {
+            let cross = axial(&link.N[l * n + k]);
+            for axis in 0..3 {
+                Ge[(k, GyroLayout::ComponentMajor.column(n, axis, l))] = 2.0 * cross[axis];
+                Ct1[l][(k, axis)] = G.map_or(0.0, |G| G.acceleration[axis][(k, l)]);
+                Cr1[l][(k, axis)] = cross[axis] + G.map_or(0.0, |G| G.angular[axis][(k, l)]);
+            }
+            for (i, value) in centrifugal(&link.N[k * n + l]).into_iter().enumerate() {
+                Oe1[l][(k, OE_COLUMNS[i])] = value + G.map_or(0.0, |G| G.centrifugal[i][(k, l)]);
+            }
+        }
+    }
+
+    let first: Vec<_> = (0..n).map(|k| column(&link.C_t.column(k).into_owned())).collect();
+    let turning: Vec<_> = link.P.iter().map(|P| six(&J1(P))).collect();
+    let mut nodes = vec![node(1, &link.X_LA, &Matrix6xX::zeros(n), None)];
+    for (i, interface) in link.interfaces.iter().enumerate() {
+        nodes.push(node(i as i64 + 2, &interface.X_LI, &interface.Phi, G.map(|G| &G.interface[i])));
+    }
+    let one_line = |text: &str| text.replace(['\n', '\r', '|'], " ").trim().to_owned();
+    let names: Vec<_> = link.interfaces.iter().map(|interface| one_line(&interface.name)).collect();
+    Sid {
+        comment: format!(" {COMMENT} | {} | A | {}", one_line(&link.name), names.join(" | ")),
+        mass: link.mass,
+        modes: link.labels.iter().map(|label| one_line(label)).collect(),
+        nodes,
+        mdCM: SidMatrix::linear(&column(&link.first_moment), &first),
+        J: SidMatrix::linear(&six(&link.inertia), &turning),
+        Ct: if G.is_some() {
+            SidMatrix::linear(&dense(&link.C_t), &Ct1)
+        } else {
+            SidMatrix::constant(n, &dense(&link.C_t))
+        },
+        Cr: SidMatrix::linear(&dense(&link.C_r), &Cr1),
+        Me: square(&link.M),
+        Gr: SidMatrix::constant(n, &Gr),
+        Ge: SidMatrix::constant(n, &Ge),
+        Oe: SidMatrix::linear(&Oe0, &Oe1),
+        ksigma: SidMatrix::constant(n, &DMatrix::zeros(n, 1)),
+        Ke: square(&link.K),
+        De: SidMatrix::constant(n, &DMatrix::zeros(n, n)),
+        others: G.map_or_else(Vec::new, |G| {
+            let all: Vec<_> = G.interface.iter().flatten().cloned().collect();
+            vec![
+                ("K0t".into(), side_by_side(n, &G.acceleration)),
+                ("K0r".into(), side_by_side(n, &G.angular)),
+                ("K0omega".into(), side_by_side(n, &G.centrifugal)),
+                ("K0F".into(), side_by_side(n, &all)),
+            ]
+        }),
+    }
+}
+
+/// The modal link that Standard Input Data describe.
+///
+/// A is the first node that no coordinate moves (else see [`modal_link_held_at`]); every other node becomes an
+/// interface, in the order of the file. The names of the link and of the nodes are those that [`sid_of_modal_link`] wrote, else `name` and the numbers of the
+/// nodes. Damping (`De`) is not taken over. In a file without the block `K0omega` centrifugal stiffening stays in
+/// `Oe`, so in N.
+///
+/// * `name`: name of the link, and of the data in messages.
+/// * `sid`: in SI.
+///
+/// # Errors
+/// [`ExchangeErrorKind::Ambiguous`] as [`Sid::conventions`]; [`ExchangeErrorKind::Missing`] without a node A or
+/// another one; [`ExchangeErrorKind::Unsupported`] with initial stress; [`ExchangeErrorKind::Defective`] for a
+/// mass or stiffness that is not positive definite, and for frames that are not orthonormal;
+/// [`ExchangeErrorKind::WrongSize`] for blocks of other sizes than the modes say.
+pub fn modal_link_from_sid(name: &str, sid: &Sid) -> Result<ModalLink, ExchangeError> {
+    check_sizes(name, sid)?;
+    of_node(name, sid, held_node(name, sid)?)
+}
+
+/// As [`modal_link_from_sid`], with a given node as A, whatever frame the data have.
+///
+/// Where the coordinates move that node, its motion is taken out of all shapes as that of a rigid body; stiffness by
+/// initial stress belongs to the frame of the data and is then left out.
+///
+/// # Errors
+/// As [`modal_link_from_sid`]; [`ExchangeErrorKind::Missing`] if there is no such node.
+pub fn modal_link_held_at(name: &str, sid: &Sid, node: i64) -> Result<ModalLink, ExchangeError> {
+    check_sizes(name, sid)?;
+    let ids: Vec<i64> = sid.nodes.iter().map(|node| node.id).collect();
+    let Some(A) = ids.iter().position(|id| *id == node) else {
+        let (found, expected) = (format!("the nodes {ids:?}"), format!("node {node}"));
+        return Err(fail(name, ExchangeErrorKind::Missing, "frame", found, &expected, ""));
+    };
+    of_node(name, sid, A)
+}
+
+/// * `A`: index of the node that is held.
+fn of_node(name: &str, sid: &Sid, A: usize) -> Result<ModalLink, ExchangeError> {
+    let conventions = sid.conventions(name)?;
+    if sid.ksigma.m0().iter().any(|x| *x != 0.0) {
+        let help = "a modal link is free of stress where its coordinates are zero";
+        return Err(fail(name, ExchangeErrorKind::Unsupported, "ksigma", "initial stress", "zeros", help));
+    }
+    let n = sid.nq();
+    let names = node_names(sid);
+    let interfaces = sid.nodes.iter().zip(&names).enumerate().filter(|(at, _)| *at != A);
+    let interfaces = interfaces
+        .map(|(_, (node, node_name))| {
+            let (phi, psi) = (node.phi.m0(), node.psi.m0());
+            let Phi = Matrix6xX::from_fn(n, |r, k| if r < 3 { phi[(r, k)] } else { psi[(r - 3, k)] });
+            Ok(ModalInterface { name: node_name.clone(), X_LI: frame(name, node)?, Phi })
+        })
+        .collect::<Result<Vec<_>, ExchangeError>>()?;
+    if interfaces.is_empty() {
+        let (found, help) = ("one node", "the distal interface must be a node of the file");
+        return Err(fail(name, ExchangeErrorKind::Missing, "frame", found, "a node that moves", help));
+    }
+
+    let (Ct, Cr) = (sid.Ct.m0(), sid.Cr.m0());
+    let C_r = Matrix3xX::from_fn(n, |a, k| Cr[(k, a)]);
+    let P: Vec<Matrix3<f64>> = (0..n)
+        .map(|k| {
+            let J1 = sid.J1(k);
+            (Matrix3::identity() * (0.5 * J1.trace()) - J1) * 0.5 + skew_of(&C_r.column(k).into_owned())
+        })
+        .collect();
+    let geometric = geometric(sid, A);
+    let N = second_order(sid, conventions.gyro, conventions.oe);
+    let J = sid.J0();
+    let link = ModalLink {
+        name: link_name(sid).unwrap_or_else(|| name.to_owned()),
+        interfaces,
+        mass: sid.mass,
+        first_moment: Vector3::from_iterator(sid.mdCM.m0().iter().copied()),
+        inertia: (J + J.transpose()) * 0.5,
+        C_t: Matrix3xX::from_fn(n, |a, k| Ct[(k, a)]),
+        C_r,
+        P,
+        N,
+        M: symmetric(&sid.Me.m0()),
+        K: symmetric(&sid.Ke.m0()),
+        geometric,
+        labels: sid.modes.clone(),
+        X_LA: frame(name, &sid.nodes[A])?,
+    };
+    let link = if is_still(&sid.nodes[A]) { link } else { link.without_rigid_motion(&motion_of(&sid.nodes[A], n)) };
+    if !(link.mass > 0.0) || !link.is_positive_definite() {
+        let expected = "a positive mass, Me and Ke positive definite with A held";
+        let help = "are rigid motions among the modes?";
+        return Err(fail(name, ExchangeErrorKind::Defective, "Me, Ke", "others", expected, help));
+    }
+    Ok(link)
+}
+
+fn fail(
+    origin: &str,
+    kind: ExchangeErrorKind,
+    element: &str,
+    found: impl Into<Box<str>>,
+    expected: &str,
+    help: &str,
+) -> ExchangeError {
+    ExchangeError {
+        kind,
+        origin: origin.into(),
+        line: None,
+        element: element.into(),
+        found: found.into(),
+        expected: expected.into(),
+        help: help.into(),
+    }
+}
+
+/// A block with its name and the sizes that it may have.
+type Block<'a> = (&'a str, &'a SidMatrix, &'a [(usize, usize)]);
+
+/// Data made by hand may have any size; those of a file were checked.
+fn check_sizes(origin: &str, sid: &Sid) -> Result<(), ExchangeError> {
+    let n = sid.nq();
+    let body: [Block<'_>; 9] = [
+        ("mdCM", &sid.mdCM, &[(3, 1)]),
+        ("J", &sid.J, &[(6, 1), (3, 3)]),
+        ("Ct", &sid.Ct, &[(n, 3)]),
+        ("Cr", &sid.Cr, &[(n, 3)]),
+        ("Me", &sid.Me, &[(n, n)]),
+        ("Gr", &sid.Gr, &[(3, 3 * n)]),
+        ("Ge", &sid.Ge, &[(n, 3 * n)]),
+        ("Oe", &sid.Oe, &[(n, 6)]),
+        ("Ke", &sid.Ke, &[(n, n)]),
+    ];
+    let of_nodes = sid.nodes.iter().flat_map(|node| {
+        let (vector, shapes): (&[_], &[_]) = (&[(3, 1)], &[(3, 0)]);
+        [
+            ("origin", &node.origin, vector),
+            ("phi", &node.phi, shapes),
+            ("psi", &node.psi, shapes),
+            ("AP", &node.AP, &[(3, 3)]),
+        ]
+    });
+    for (name, matrix, sizes) in body.into_iter().chain(of_nodes) {
+        // Shapes have a column per mode.
+        let fits = sizes
+            .iter()
+            .any(|(rows, columns)| (matrix.nrow, matrix.ncol) == (*rows, if *columns == 0 { n } else { *columns }));
+        if !fits || n == 0 {
+            let found = format!("{} x {} with {n} modes", matrix.nrow, matrix.ncol);
+            return Err(fail(origin, ExchangeErrorKind::WrongSize, name, found, "the size of the standard", ""));
+        }
+    }
+    Ok(())
+}
+
+fn node(id: i64, X: &Pose, Phi: &Matrix6xX<f64>, G: Option<&[DMatrix<f64>; 6]>) -> SidNode {
+    let n = Phi.ncols();
+    let vector = |v: &Vector3<f64>| DMatrix::from_column_slice(3, 1, v.as_slice());
+    let dense = |A: &Matrix3<f64>| DMatrix::from_column_slice(3, 3, A.as_slice());
+    let half = |k: usize, at: usize| Vector3::from_fn(|a, _| Phi[(at + a, k)]);
+    let R = *X.rotation.matrix();
+    let shapes = |at: usize| {
+        let m0 = DMatrix::from_fn(3, n, |a, k| Phi[(at + a, k)]);
+        match G {
+            None => SidMatrix::constant(n, &m0),
+            Some(G) => {
+                let m1 = (0..n).map(|k| DMatrix::from_fn(3, n, |a, j| -G[at + a][(j, k)])).collect::<Vec<_>>();
+                SidMatrix::linear(&m0, &m1)
+            }
+        }
+    };
+    let moves = (0..n).map(|k| vector(&half(k, 0))).collect::<Vec<_>>();
+    let turns = (0..n).map(|k| dense(&(half(k, 3).cross_matrix() * R))).collect::<Vec<_>>();
+    SidNode {
+        id,
+        rframe: "body ref".into(),
+        origin: SidMatrix::linear(&vector(&X.translation.vector), &moves),
+        phi: shapes(0),
+        psi: shapes(3),
+        AP: SidMatrix::linear(&dense(&R), &turns),
+        sigma: None,
+    }
+}
+
+fn side_by_side(n: usize, G: &[DMatrix<f64>]) -> SidMatrix {
+    SidMatrix::constant(n, &DMatrix::from_fn(n, n * G.len(), |k, at| G[at / n][(k, at % n)]))
+}
+
+/// The matrices of a block by loads, if it is there with that size.
+fn by_loads<const LOADS: usize>(sid: &Sid, name: &str, from: usize, all: usize) -> Option<[DMatrix<f64>; LOADS]> {
+    let n = sid.nq();
+    let (_, block) = sid.others.iter().find(|(other, _)| other.eq_ignore_ascii_case(name))?;
+    if (block.nrow, block.ncol) != (n, n * all) {
+        return None;
+    }
+    let dense = block.m0();
+    Some(std::array::from_fn(|i| symmetric(&dense.columns((from + i) * n, n).into_owned())))
+}
+
+/// From the blocks `K0t` to `K0F`, else from the first-order parts of the standard.
+fn geometric(sid: &Sid, A: usize) -> Option<GeometricStiffness> {
+    let n = sid.nq();
+    let nodes: Vec<&SidNode> = sid.nodes.iter().enumerate().filter(|(at, _)| *at != A).map(|(_, node)| node).collect();
+    let own = || -> Option<GeometricStiffness> {
+        let interface =
+            (0..nodes.len()).map(|i| by_loads(sid, "K0F", 6 * i, 6 * nodes.len())).collect::<Option<_>>()?;
+        Some(GeometricStiffness {
+            acceleration: by_loads(sid, "K0t", 0, 3)?,
+            angular: by_loads(sid, "K0r", 0, 3)?,
+            centrifugal: by_loads(sid, "K0omega", 0, 6)?,
+            interface,
+        })
+    };
+    if let Some(own) = own() {
+        return Some(own);
+    }
+    let is_stressed = sid.Ct.order == 1 || nodes.iter().any(|node| node.phi.order == 1 || node.psi.order == 1);
+    is_stressed.then(|| {
+        let first = |matrix: &SidMatrix, axis: usize| {
+            let mut G = DMatrix::zeros(n, n);
+            for l in 0..n {
+                G.set_column(l, &matrix.m1(l).column(axis));
+            }
+            symmetric(&G)
+        };
+        let of_node = |shapes: &SidMatrix, axis: usize| {
+            let mut G = DMatrix::zeros(n, n);
+            for l in 0..n {
+                G.set_column(l, &-shapes.m1(l).row(axis).transpose());
+            }
+            symmetric(&G)
+        };
+        let of_nodes = |node: &&SidNode| {
+            std::array::from_fn(|i| if i < 3 { of_node(&node.phi, i) } else { of_node(&node.psi, i - 3) })
+        };
+        GeometricStiffness {
+            acceleration: std::array::from_fn(|axis| first(&sid.Ct, axis)),
+            // The part of Cr1 from N is skew in the coordinates.
+            angular: std::array::from_fn(|axis| first(&sid.Cr, axis)),
+            centrifugal: std::array::from_fn(|_| DMatrix::zeros(n, n)),
+            interface: nodes.iter().map(of_nodes).collect(),
+        }
+    })
+}
+
+/// N: symmetric parts from `Oe1` without the stiffening in it, skew ones from `Ge`, or `Cr1` where that is empty.
+fn second_order(sid: &Sid, gyro: GyroLayout, oe: OeOrder) -> Vec<Matrix3<f64>> {
+    let n = sid.nq();
+    let stiffening: Option<[DMatrix<f64>; 6]> = by_loads(sid, "K0omega", 0, 6);
+    let from_Ge = !sid.Ge.entries0.is_empty();
+    let Oe_column = match oe {
+        OeOrder::XyYzXz => OE_COLUMNS,
+        OeOrder::XyXzYz => [0, 1, 2, 3, 4, 5],
+    };
+    let Ge: Vec<_> = (0..n).map(|l| sid.Ge(gyro, l)).collect();
+    let Cr1: Vec<_> = (0..n).map(|l| sid.Cr.m1(l)).collect();
+    let Oe1: Vec<_> = (0..n).map(|l| sid.Oe.m1(l)).collect();
+    // ∫ φ_l × φ_k dm
+    let cross = |k: usize, l: usize| {
+        Vector3::from_fn(|axis, _| {
+            if from_Ge {
+                (Ge[l][(k, axis)] - Ge[k][(l, axis)]) * 0.25
+            } else {
+                (Cr1[l][(k, axis)] - Cr1[k][(l, axis)]) * 0.5
+            }
+        })
+    };
+    let mut N = vec![Matrix3::zeros(); n * n];
+    for k in 0..n {
+        for l in k..n {
+            let product = |i: usize| {
+                let sum = Oe1[l][(k, Oe_column[i])] + Oe1[k][(l, Oe_column[i])];
+                0.5 * sum - stiffening.as_ref().map_or(0.0, |G| G[i][(k, l)])
+            };
+            let N_kl = from_centrifugal(std::array::from_fn(product)) + skew_of(&cross(l, k));
+            N[k * n + l] = N_kl;
+            N[l * n + k] = N_kl.transpose();
+        }
+    }
+    N
+}
+
+fn is_still(node: &SidNode) -> bool {
+    let still = |shapes: &SidMatrix| shapes.m0().iter().all(|x| *x == 0.0);
+    still(&node.phi) && still(&node.psi)
+}
+
+/// The rigid motions of the whole link that move it as the coordinates move a node: at Lo, then rotation.
+fn motion_of(node: &SidNode, n: usize) -> Matrix6xX<f64> {
+    let (phi, psi) = (node.phi.m0(), node.psi.m0());
+    let p = Vector3::from_iterator(node.origin.m0().iter().copied());
+    let column = |A: &DMatrix<f64>, k: usize| Vector3::from_iterator(A.column(k).iter().copied());
+    let mut motion = Matrix6xX::zeros(n);
+    for k in 0..n {
+        let theta = column(&psi, k);
+        motion.fixed_view_mut::<3, 1>(0, k).copy_from(&(column(&phi, k) - theta.cross(&p)));
+        motion.fixed_view_mut::<3, 1>(3, k).copy_from(&theta);
+    }
+    motion
+}
+
+/// The first node that no coordinate moves.
+fn held_node(origin: &str, sid: &Sid) -> Result<usize, ExchangeError> {
+    sid.nodes.iter().position(is_still).ok_or_else(|| {
+        let expected = "a node without displacement: interface A, at which the frame is tangent";
+        let help = "say which node is A, or make the file with the proximal interface as its frame";
+        fail(origin, ExchangeErrorKind::Missing, "frame", "nodes that all move", expected, help)
+    })
+}
+
+fn frame(origin: &str, node: &SidNode) -> Result<Pose, ExchangeError> {
+    let R = Matrix3::from_iterator(node.AP.m0().iter().copied());
+    let gap = (R.transpose() * R - Matrix3::identity()).amax();
+    if !(gap <= ROTATION && R.determinant() > 0.0) {
+        let found = format!("|RᵀR - 1| = {gap:.1e} at node {}", node.id);
+        return Err(fail(origin, ExchangeErrorKind::Defective, "AP", found, "a rotation matrix", ""));
+    }
+    let p = Vector3::from_iterator(node.origin.m0().iter().copied());
+    Ok(Pose::from_parts(Translation3::from(p), Rotation3::from_matrix_unchecked(R)))
+}
+
+/// Name of the link, if it is in the comment.
+fn link_name(sid: &Sid) -> Option<String> {
+    let mut parts = sid.comment.split('|').map(str::trim);
+    (parts.next() == Some(COMMENT)).then(|| parts.next().unwrap_or("").to_owned())
+}
+
+/// Names of the nodes from the comment, else their numbers.
+fn node_names(sid: &Sid) -> Vec<String> {
+    let names: Vec<String> = sid.comment.split('|').skip(2).map(|name| name.trim().to_owned()).collect();
+    if link_name(sid).is_some() && names.len() == sid.nodes.len() {
+        return names;
+    }
+    sid.nodes.iter().map(|node| node.id.to_string()).collect()
+}

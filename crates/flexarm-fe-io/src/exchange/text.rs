@@ -1,0 +1,174 @@
+//! Bytes to lines, words and numbers, as Fortran and C programs write them.
+
+use std::borrow::Cow;
+use std::io::Read;
+
+use flate2::read::MultiGzDecoder;
+
+use super::error::{ExchangeError, ExchangeErrorKind, Place};
+use crate::unpack::{is_gzip, unpacked};
+
+/// No file is unpacked to more than this: a full model of 300 000 unknowns has half of it.
+pub(super) const LARGEST_UNPACKED: u64 = 2 << 30;
+
+/// The bytes, unpacked if they are packed with gzip.
+pub(super) fn unpack<'b>(bytes: &'b [u8], origin: &str) -> Result<Cow<'b, [u8]>, ExchangeError> {
+    if !is_gzip(bytes) {
+        return Ok(Cow::Borrowed(bytes));
+    }
+    let unpacked = unpacked(bytes, LARGEST_UNPACKED);
+    unpacked
+        .map(Cow::Owned)
+        .map_err(|e| Place::file(origin).fail(ExchangeErrorKind::Unreadable, "gzip data", e.found, e.expected, e.help))
+}
+
+/// The first bytes, unpacked; what cannot be unpacked ends the result without an error.
+pub(super) fn unpack_head(bytes: &[u8], length: usize) -> Cow<'_, [u8]> {
+    if !is_gzip(bytes) {
+        return Cow::Borrowed(&bytes[..bytes.len().min(length)]);
+    }
+    let mut head = Vec::new();
+    // What was unpacked before an error is still there, and is all that recognition needs.
+    let _ = MultiGzDecoder::new(bytes).take(length as u64).read_to_end(&mut head);
+    Cow::Owned(head)
+}
+
+/// A text file and what to call it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Text<'a> {
+    pub(super) origin: &'a str,
+    pub(super) text: &'a str,
+}
+
+impl<'a> Text<'a> {
+    pub(super) fn new(text: &'a str, origin: &'a str) -> Self {
+        Self { origin, text }
+    }
+
+    pub(super) fn file(&self) -> Place<'a> {
+        Place::file(self.origin)
+    }
+
+    /// All lines with their places, without line ends.
+    pub(super) fn lines(&self) -> impl Iterator<Item = (Place<'a>, &'a str)> + use<'a> {
+        let origin = self.origin;
+        self.text.lines().enumerate().map(move |(i, line)| (Place::line(origin, i + 1), line))
+    }
+}
+
+/// Words between blanks and commas.
+pub(super) fn words(line: &str) -> impl Iterator<Item = &str> {
+    line.split([',', ' ', '\t', '\r']).filter(|word| !word.is_empty())
+}
+
+/// A real number, also with the exponent letter D, or with none as in `1.5-3`.
+///
+/// NaN and infinity come back as such, for the caller to refuse.
+pub(super) fn real(text: &str) -> Option<f64> {
+    let text = text.trim();
+    if let Ok(number) = text.parse() {
+        return Some(number);
+    }
+    // The sign of an exponent without a letter is the last sign that follows a digit or a point.
+    let bytes = text.as_bytes();
+    let digit = |i: usize| bytes[i].is_ascii_digit() || bytes[i] == b'.';
+    let exponent = (1..bytes.len()).rev().find(|&i| matches!(bytes[i], b'+' | b'-') && digit(i - 1));
+    let letters = |c| if matches!(c, 'd' | 'D') { 'e' } else { c };
+    let mended: String = match exponent {
+        Some(i) => format!("{}e{}", &text[..i], &text[i..]),
+        None => text.chars().map(letters).collect(),
+    };
+    mended.parse().ok()
+}
+
+impl Place<'_> {
+    /// A finite number.
+    pub(super) fn number(&self, element: &str, text: &str) -> Result<f64, ExchangeError> {
+        match real(text) {
+            Some(number) if number.is_finite() => Ok(number),
+            Some(_) => {
+                let help = "NaN and infinity in a matrix mean that the program that wrote it failed";
+                Err(self.fail(ExchangeErrorKind::NotFinite, element, shown(text), "a finite number", help))
+            }
+            None => Err(self.fail(ExchangeErrorKind::Syntax, element, shown(text), "a number", "")),
+        }
+    }
+
+    pub(super) fn integer(&self, element: &str, text: &str) -> Result<i64, ExchangeError> {
+        let wrong = || self.fail(ExchangeErrorKind::Syntax, element, shown(text), "a whole number", "");
+        text.trim().parse().map_err(|_| wrong())
+    }
+
+    /// A row or column number of a file, from 1, returned from 0.
+    pub(super) fn index(&self, element: &str, text: &str) -> Result<usize, ExchangeError> {
+        let wrong = || {
+            let expected = "a row or column number from 1 to 4294967295";
+            self.fail(ExchangeErrorKind::Syntax, element, shown(text), expected, "")
+        };
+        match text.trim().parse::<u32>() {
+            Ok(index) if index > 0 => Ok(index as usize - 1),
+            _ => Err(wrong()),
+        }
+    }
+
+    /// The next word of a line.
+    pub(super) fn word<'w>(
+        &self,
+        element: &str,
+        words: &mut impl Iterator<Item = &'w str>,
+    ) -> Result<&'w str, ExchangeError> {
+        words.next().ok_or_else(|| {
+            self.fail(
+                ExchangeErrorKind::Syntax,
+                element,
+                "the end of the line",
+                "one more value",
+                "is the file cut off?",
+            )
+        })
+    }
+
+    /// Refuses anything after the last value of a line.
+    pub(super) fn end<'w>(&self, words: &mut impl Iterator<Item = &'w str>) -> Result<(), ExchangeError> {
+        let Some(word) = words.next() else { return Ok(()) };
+        Err(self.fail(ExchangeErrorKind::Syntax, "line", shown(word), "the end of the line", ""))
+    }
+}
+
+/// Text of a file in quotes, shortened.
+pub(super) fn shown(text: &str) -> String {
+    const LONGEST: usize = 40;
+    let text = text.trim();
+    if text.is_empty() {
+        return "nothing".into();
+    }
+    match text.char_indices().nth(LONGEST) {
+        Some((end, _)) => format!("{:?}...", &text[..end]),
+        None => format!("{text:?}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_of_fortran_are_read_with_d_and_without_letter() {
+        for (text, value) in [
+            ("1.5", 1.5),
+            (" 1.055845337D+09", 1.055_845_337e9),
+            ("-2.5d-3", -2.5e-3),
+            ("1.5-3", 1.5e-3),
+            ("-1.5+3", -1.5e3),
+            ("1.-3", 1e-3),
+            (".5", 0.5),
+            ("7", 7.0),
+        ] {
+            assert_eq!(real(text), Some(value), "{text}");
+        }
+        for text in ["", "-", "1.5-", "1-5-3e", "d", "1,5", "--1", "1e"] {
+            assert_eq!(real(text), None, "{text}");
+        }
+        assert!(real("nan").unwrap().is_nan() && real("1e999").unwrap().is_infinite());
+    }
+}

@@ -1,0 +1,35 @@
+//! Files of other finite element programs: meshes ([`mesh`]) and condensed or full matrices ([`exchange`]).
+//!
+//! ```
+//! use flexarm_fe_io::{ReadOptions, parse_mesh};
+//!
+//! // One tetrahedron in millimetres, as CalculiX and Abaqus write it.
+//! let deck = "*NODE\n1,0,0,0\n2,100,0,0\n3,0,100,0\n4,0,0,100\n*ELEMENT,TYPE=C3D4,ELSET=body\n1,1,2,3,4\n";
+//! let options = ReadOptions { units: "mm-t-s".parse()?, ..Default::default() };
+//! let mesh = parse_mesh(deck.as_bytes(), "one.inp", &options)?.mesh;
+//! assert_eq!((mesh.nodes[1].x, mesh.blocks[0].kind.name()), (0.1, "TET4"));
+//!
+//! // What is wrong with a file is said with its place.
+//! let error = parse_mesh(deck.replace(",4\n", ",9\n").as_bytes(), "one.inp", &options).unwrap_err();
+//! assert!(error.to_string().contains("one.inp"), "{error}");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! Everything ends in types of [`flexarm_fem`]: a [`Mesh`](flexarm_fem::Mesh) in SI, matrices over interfaces, a
+//! [`ModalLink`](flexarm_fem::ModalLink) from Standard Input Data. Packed files are unpacked no further than a real file
+//! would go.
+//!
+//! Not here: elements, reduction, the checks of a stiffness, the `.flex` file.
+#![allow(non_snake_case, reason = "monogram notation: X_LB is the pose of B in L, K_BB a stiffness block")]
+#![allow(
+    clippy::neg_cmp_op_on_partial_ord,
+    reason = "a NaN must fail a check: !(x <= bound) refuses it, x > bound lets it pass"
+)]
+#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test stops at the first failure"))]
+
+pub mod exchange;
+pub mod mesh;
+mod unpack;
+
+pub use exchange::ExchangeError;
+pub use mesh::{MeshError, MeshFile, ReadOptions, parse_mesh, read_mesh};

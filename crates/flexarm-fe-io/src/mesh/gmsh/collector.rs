@@ -1,0 +1,290 @@
+//! Elements of a Gmsh file sorted by physical group.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+
+use super::reader::Reader;
+use super::shapes::{Shape, advice, shape};
+use crate::mesh::draft::Draft;
+use crate::mesh::error::{MeshError, MeshErrorKind as Kind, Place};
+use crate::mesh::ids::IdIndex;
+use crate::mesh::read::ReadOptions;
+use crate::mesh::source::{Source, shown};
+use flexarm_fem::mesh::{ElementKind, Mesh, Region};
+use flexarm_fem::spelling::listed;
+
+/// Dimension and tag of a physical group; tag 0 stands for no group.
+type GroupKey = (u8, i64);
+
+/// Gathers a mesh while the sections go by.
+pub(super) struct Collector {
+    pub(super) draft: Draft,
+    keep_lines: bool,
+    names: HashMap<GroupKey, String>,
+    entities: HashMap<(u8, i64), Vec<i64>>,
+    /// Region of the draft for each group with elements.
+    regions: HashMap<GroupKey, usize>,
+    region_keys: Vec<GroupKey>,
+    sets: BTreeMap<GroupKey, GroupNodes>,
+    /// Nodes of all sets together when each was last tidied.
+    kept: usize,
+}
+
+#[derive(Default)]
+struct GroupNodes {
+    ids: Vec<u64>,
+    /// How many of them are sorted and unique.
+    tidied: usize,
+    /// Where its first element stands.
+    at: usize,
+    /// Where a line with more than two nodes stands, if there is one.
+    bent_line: Option<usize>,
+}
+
+/// A set is tidied when it has twice as many nodes as after the last time, and this many more.
+const FEW: usize = 32;
+
+/// Nodes in all sets: so many in any file, so many more per byte. 160 groups of all nodes at 40 bytes per node.
+const MOST_MEMBERS: (usize, usize) = (1 << 20, 4);
+
+impl GroupNodes {
+    /// Sorts and removes duplicates: neighbouring elements share most of their nodes. Returns how many are new.
+    fn tidy(&mut self) -> usize {
+        self.ids.sort_unstable();
+        self.ids.dedup();
+        self.ids.len() - std::mem::replace(&mut self.tidied, self.ids.len())
+    }
+}
+
+impl Collector {
+    /// `keep_lines`: whether line elements may turn out to be beams.
+    pub(super) fn new(keep_lines: bool) -> Self {
+        Self {
+            draft: Draft::default(),
+            keep_lines,
+            names: HashMap::new(),
+            entities: HashMap::new(),
+            regions: HashMap::new(),
+            region_keys: Vec::new(),
+            sets: BTreeMap::new(),
+            kept: 0,
+        }
+    }
+
+    /// `$PhysicalNames`: dimension, tag and quoted name of each group.
+    pub(super) fn physical_names(&mut self, reader: &mut Reader) -> Result<(), MeshError> {
+        let count = reader.size("number of physical names")?;
+        let count = reader.checked(count, "number of physical names", [2, 0, 0])?;
+        for _ in 0..count {
+            let at = reader.pos + 1;
+            let dim = reader.int("dimension of a physical group")?;
+            let tag = reader.int("tag of a physical group")?;
+            let quoted = reader.rest_of_line();
+            let name = quoted.strip_prefix(b"\"").and_then(|name| name.strip_suffix(b"\""));
+            let (Some(name), 0..=3) = (name, dim) else {
+                let found = format!("dimension {dim}, name {}", shown(quoted));
+                let expected = "a dimension 0 to 3 and a name in quotes";
+                return Err(reader.src.error(Kind::Syntax, at, "$PhysicalNames", found, expected));
+            };
+            self.names.insert((dim as u8, tag.abs()), String::from_utf8_lossy(name).into_owned());
+        }
+        Ok(())
+    }
+
+    /// Notes the physical groups of an entity.
+    pub(super) fn entity(&mut self, dim: u8, tag: i64, groups: Vec<i64>) {
+        self.entities.insert((dim, tag), groups);
+    }
+
+    /// The physical groups of an entity.
+    pub(super) fn groups_of(&self, dim: u8, tag: i64) -> Vec<i64> {
+        self.entities.get(&(dim, tag)).cloned().unwrap_or_default()
+    }
+
+    /// Looks up an element type; volumes that are not supported are refused here.
+    pub(super) fn shape(&self, reader: &Reader, at: usize, number: i64) -> Result<Shape, MeshError> {
+        let known = "4, 8, 6 nodes (tetrahedron, hexahedron, prism) or 10, 20, 15";
+        match shape(number) {
+            Some(found) if found.dim < 3 || found.solid.is_some() => Ok(found),
+            Some(found) => {
+                let found = format!("{} (Gmsh type {number})", found.name);
+                Err(reader.src.error(Kind::Unsupported, at, "$Elements", found, known).help(advice(number)))
+            }
+            None => {
+                let found = format!("Gmsh element type {number}");
+                Err(reader.src.error(Kind::Unsupported, at, "$Elements", found, known).help(advice(number)))
+            }
+        }
+    }
+
+    /// Takes one element with the physical groups it is in.
+    pub(super) fn element(
+        &mut self,
+        src: &Source,
+        shape: &Shape,
+        id: u64,
+        at: usize,
+        groups: &[i64],
+        nodes: &[u64],
+    ) -> Result<(), MeshError> {
+        if let Some((kind, order)) = shape.solid {
+            if let [first, second, ..] = groups {
+                let both = [first, second].map(|tag| format!("{:?}", self.name((3, *tag)))).join(" and ");
+                let found = format!("the physical volumes {both}");
+                return Err(src
+                    .error(Kind::Region, at, format!("element {id}"), found, "one physical volume")
+                    .help("leave each volume in one physical group"));
+            }
+            self.keep(
+                kind,
+                (3, groups.first().copied().unwrap_or(0)),
+                id,
+                at,
+                order.iter().map(|k| nodes[*k as usize]),
+            );
+            return Ok(());
+        }
+        for tag in groups {
+            let key = (shape.dim, *tag);
+            let set = self.sets.entry(key).or_insert_with(|| GroupNodes { at, ..GroupNodes::default() });
+            set.ids.extend_from_slice(nodes);
+            if shape.dim == 1 && nodes.len() > 2 {
+                set.bent_line.get_or_insert(at);
+            }
+            if set.ids.len() > 2 * set.tidied + FEW {
+                self.kept += set.tidy();
+                if self.kept > MOST_MEMBERS.0 + MOST_MEMBERS.1 * src.bytes.len() {
+                    let element = format!("physical group {:?}", self.name(key));
+                    let expected = format!("at most {} nodes per byte of the file in all groups", MOST_MEMBERS.1);
+                    return Err(src.error(Kind::TooLarge, at, element, "too many nodes", expected));
+                }
+            }
+            if self.keep_lines && shape.dim == 1 && nodes.len() == 2 {
+                self.keep(ElementKind::Beam2, key, id, at, nodes.iter().copied());
+            }
+        }
+        Ok(())
+    }
+
+    fn keep(&mut self, kind: ElementKind, key: GroupKey, id: u64, at: usize, nodes: impl Iterator<Item = u64>) {
+        let region = *self.regions.entry(key).or_insert_with(|| {
+            self.region_keys.push(key);
+            self.region_keys.len() - 1
+        });
+        let block = self.draft.block(kind, region);
+        block.ids.push(id);
+        block.offsets.push(at);
+        block.nodes.extend(nodes);
+    }
+
+    fn name(&self, key: GroupKey) -> String {
+        self.names.get(&key).cloned().unwrap_or_else(|| format!("physical_{}_{}", key.0, key.1))
+    }
+
+    /// Names regions and sets, makes beams of the lines that are some, and checks all.
+    pub(super) fn finish(mut self, src: &Source, options: &ReadOptions) -> Result<(Mesh, Vec<String>), MeshError> {
+        let has_volume_groups = self.region_keys.iter().any(|(dim, tag)| *dim == 3 && *tag != 0);
+        self.check_beams(src, options)?;
+        let mut keep = Vec::with_capacity(self.region_keys.len());
+        for key in &self.region_keys {
+            let name = if *key == (3, 0) { "all".to_owned() } else { self.name(*key) };
+            let beam = options.beams.iter().find(|(group, _)| key.0 == 1 && *group == name);
+            keep.push(beam.is_some() || (key.0 == 3 && (key.1 != 0 || !has_volume_groups)));
+            self.draft.regions.push(Region { name, material: None, beam: beam.map(|(_, beam)| beam.clone()) });
+        }
+        let loose = self.regions.get(&(3, 0)).map_or(0, |region| {
+            let of_none = self.draft.blocks.iter().filter(|block| block.region == *region);
+            of_none.map(|block| block.ids.len()).sum::<usize>()
+        });
+        if has_volume_groups && loose > 0 {
+            let warning = format!("{loose} volume elements are in no physical volume and were left out");
+            self.draft.warnings.push(warning);
+        }
+        self.draft.retain_regions(&keep);
+
+        let index = self.draft.index_nodes(src)?;
+        let sets = self.node_sets(src, &index)?;
+        self.draft.finish(src, &index, sets, &options.units)
+    }
+
+    /// Every group that the options call a beam must be a physical curve of two-node lines.
+    fn check_beams(&self, src: &Source, options: &ReadOptions) -> Result<(), MeshError> {
+        for (group, _) in &options.beams {
+            let curves = || self.sets.iter().filter(|(key, _)| key.0 == 1);
+            let Some((_, set)) = curves().find(|(key, _)| self.name(**key) == *group) else {
+                let element = format!("beam group {group:?}");
+                let expected = format!("a physical curve: {}", listed(curves().map(|(key, _)| self.name(*key))));
+                return Err(src.error_in(Kind::Missing, Place::File, element, "no such physical curve", expected));
+            };
+            if let Some(at) = set.bent_line {
+                let element = format!("beam group {group:?}");
+                let error = src.error(Kind::Unsupported, at, element, "a line of second order", "2-node lines");
+                return Err(error.help("mesh beams with Mesh.ElementOrder=1"));
+            }
+        }
+        Ok(())
+    }
+
+    /// Node sets by name; where dimensions share a name, the highest keeps it.
+    fn node_sets(&mut self, src: &Source, index: &IdIndex) -> Result<Vec<(String, Vec<u32>)>, MeshError> {
+        // The last duplicates go first: neighbouring elements share most of their nodes.
+        for set in self.sets.values_mut() {
+            set.tidy();
+        }
+        let mut sets: BTreeMap<String, (u8, Vec<u32>)> = BTreeMap::new();
+        let taken: BTreeSet<String> = self.sets.keys().map(|key| self.name(*key)).collect();
+        for (key, set) in self.sets.iter().rev() {
+            let mut name = self.name(*key);
+            if sets.get(&name).is_some_and(|(dim, _)| *dim != key.0) {
+                let plain = name.clone();
+                name.push_str(["_point", "_curve", "_surface"][usize::from(key.0.min(2))]);
+                while taken.contains(&name) {
+                    name.push('_');
+                }
+                self.draft.warnings.push(format!("the name {plain:?} is used twice; its smaller group is {name:?}"));
+            }
+            let nodes = set.ids.iter().map(|id| {
+                index.get(*id).ok_or_else(|| {
+                    let found = format!("node {id}");
+                    src.error(Kind::Missing, set.at, format!("physical group {name:?}"), found, "a node of the file")
+                })
+            });
+            let nodes = nodes.collect::<Result<Vec<u32>, _>>()?;
+            sets.entry(name).or_insert((key.0, vec![])).1.extend(nodes);
+        }
+        // A group with a name but without elements is worth a warning, which an empty set gives.
+        for (key, name) in self.names.iter().filter(|(key, _)| key.0 < 3) {
+            sets.entry(name.clone()).or_insert((key.0, vec![]));
+        }
+        Ok(sets.into_iter().map(|(name, (_, nodes))| (name, nodes)).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Puts triangles into 64 groups as a file of 8 bytes per triangle; returns the numbers that are held.
+    fn held(triangles: impl ExactSizeIterator<Item = [u64; 3]>) -> Result<usize, MeshError> {
+        let bytes = vec![b'\n'; 8 * triangles.len()];
+        let src = Source { bytes: &bytes, origin: "t.msh", binary: false };
+        let groups: Vec<i64> = (1..=64).collect();
+        let mut collector = Collector::new(false);
+        for (id, nodes) in (1..).zip(triangles) {
+            collector.element(&src, &shape(2).unwrap(), id, 0, &groups, &nodes)?;
+        }
+        Ok(collector.sets.values().map(|set| set.ids.capacity()).sum())
+    }
+
+    #[test]
+    fn many_groups_of_shared_nodes_do_not_grow_with_the_elements() {
+        let numbers = held((0..20_000_u32).map(u64::from).map(|k| [k % 7, 7, 8 + k % 5])).unwrap();
+        assert!(numbers <= 64 * 128, "{numbers}"); // 24 million bytes / 8 without tidying
+    }
+
+    #[test]
+    fn many_groups_of_many_nodes_are_refused() {
+        let error = held((0..40_000_u32).map(u64::from).map(|k| [3 * k, 3 * k + 1, 3 * k + 2])).unwrap_err();
+        assert_eq!(error.kind, Kind::TooLarge);
+        assert!(error.to_string().contains("at most 4 nodes per byte"), "{error}");
+    }
+}

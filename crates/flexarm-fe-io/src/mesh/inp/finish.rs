@@ -1,0 +1,286 @@
+//! From the cards to a mesh: sets are resolved, elements sorted into regions.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::deck::{Deck, Surface};
+use super::lines::squeezed;
+use super::sets::{Budget, Scope, unknown};
+use super::types::Class;
+use crate::mesh::error::{MeshError, MeshErrorKind as Kind};
+use crate::mesh::ids::IdIndex;
+use crate::mesh::read::ReadOptions;
+use crate::mesh::source::parse_u64;
+use flexarm_fem::beam::BeamTheory;
+use flexarm_fem::mesh::face_nodes;
+use flexarm_fem::mesh::{ElementKind, Mesh, Region};
+use flexarm_fem::spelling::listed;
+
+const NONE: u32 = u32::MAX;
+
+/// A node set with its name.
+type Named = (String, Vec<u32>);
+
+impl Deck<'_> {
+    /// Puts all together and checks it.
+    pub(super) fn finish(mut self, options: &ReadOptions) -> Result<(Mesh, Vec<String>), MeshError> {
+        let src = self.lines.src;
+        let nodes = self.draft.index_nodes(&src)?;
+        let elements = self.index_elements()?;
+        let mut budget = Budget::new(&src);
+        let elsets = self.elsets.resolve(&src, &elements, Vec::new(), &mut budget)?;
+        let sets = self.node_sets(&nodes, &elements, &elsets, &mut budget)?;
+
+        let region_of = self.regions(&elsets)?;
+        self.beams_of_options(options, &region_of)?;
+        for (k, region) in region_of.iter().enumerate() {
+            let kind = match self.class(k) {
+                Class::Solid(kind) => kind,
+                Class::Beam(_) => ElementKind::Beam2,
+                Class::Skin(_) => continue,
+            };
+            let start = self.elements.starts[k];
+            let block = self.draft.block(kind, *region as usize);
+            block.ids.push(self.elements.ids[k]);
+            block.offsets.push(self.elements.offsets[k]);
+            block.nodes.extend_from_slice(&self.elements.nodes[start..start + kind.nodes()]);
+        }
+        self.draft.finish(&src, &nodes, sets, &options.units)
+    }
+
+    fn class(&self, element: usize) -> Class {
+        self.elements.groups[self.elements.cards[element] as usize].class
+    }
+
+    fn index_elements(&self) -> Result<IdIndex, MeshError> {
+        let (src, elements) = (self.lines.src, &self.elements);
+        if elements.ids.len() >= NONE as usize {
+            let found = format!("{} elements", elements.ids.len());
+            return Err(src.error(Kind::TooLarge, 0, "mesh", found, "fewer than 4294967295 elements"));
+        }
+        IdIndex::new(&elements.ids).map_err(|(_, again)| {
+            let element = format!("element {}", elements.ids[again]);
+            let found = "a second element with this number";
+            src.error(Kind::Duplicate, elements.offsets[again], element, found, "every element once")
+        })
+    }
+
+    /// Index of the region of every element: of its section, or of its set where it has none.
+    fn regions(&mut self, elsets: &[Vec<u32>]) -> Result<Vec<u32>, MeshError> {
+        let src = self.lines.src;
+        let mut region_of = vec![NONE; self.elements.ids.len()];
+        for section in &self.sections {
+            let set = self.elsets.find(&src, &section.elset, section.scope, section.at)?;
+            let material = section
+                .find(&src, &self.materials, &self.material_by_name)?
+                .material(&src, &mut self.draft.warnings)?;
+            let region = self.draft.regions.len();
+            let mut theory: Option<BeamTheory> = None;
+            for element in elsets[set].iter().map(|element| *element as usize) {
+                let what = || format!("element {} of section {:?}", self.elements.ids[element], section.elset);
+                let card = &self.elements.groups[self.elements.cards[element] as usize];
+                let fault = |kind, found: String, expected: &str| src.error(kind, section.at, what(), found, expected);
+                if region_of[element] != NONE {
+                    let other = &self.draft.regions[region_of[element] as usize].name;
+                    return Err(fault(
+                        Kind::Region,
+                        format!("a second section; the first is {other:?}"),
+                        "one section",
+                    ));
+                }
+                match (card.class, section.beam.is_some()) {
+                    (Class::Solid(_), false) => {}
+                    (Class::Beam(of_card), true) if theory.is_none_or(|known| known == of_card) => {
+                        theory = Some(of_card);
+                    }
+                    (Class::Beam(_), true) => {
+                        return Err(fault(Kind::Unsupported, "both B31 and B33".into(), "one of them per section"));
+                    }
+                    _ => {
+                        let found = format!("{} with {}", card.type_name, section.title);
+                        return Err(fault(
+                            Kind::Unsupported,
+                            found,
+                            "solids with *SOLID SECTION, beams with *BEAM SECTION",
+                        ));
+                    }
+                }
+                region_of[element] = region as u32;
+            }
+            if elsets[set].is_empty() {
+                self.draft.warnings.push(format!("section {:?} has no elements", section.elset));
+                continue;
+            }
+            let beam = theory.and_then(|theory| section.beam_properties(theory));
+            self.draft.regions.push(Region { name: self.elsets.list[set].name.clone(), material, beam });
+        }
+
+        // Without a section: by the set of the element card.
+        let mut by_name = BTreeMap::new();
+        for (element, region) in region_of.iter_mut().enumerate().filter(|(_, region)| **region == NONE) {
+            let card = &self.elements.groups[self.elements.cards[element] as usize];
+            if matches!(card.class, Class::Skin(_)) {
+                continue;
+            }
+            let name = card.elset.as_deref().unwrap_or("all");
+            *region = *by_name.entry(squeezed(name)).or_insert_with(|| {
+                self.draft.regions.push(Region { name: name.to_owned(), material: None, beam: None });
+                self.draft.regions.len() as u32 - 1
+            });
+        }
+        if !by_name.is_empty() {
+            let regions =
+                listed(self.draft.regions.iter().skip(self.draft.regions.len() - by_name.len()).map(|r| &r.name));
+            self.draft.warnings.push(format!("elements without a section, hence without a material: {regions}"));
+        }
+        Ok(region_of)
+    }
+
+    /// Sections of beams that the caller gives.
+    fn beams_of_options(&mut self, options: &ReadOptions, region_of: &[u32]) -> Result<(), MeshError> {
+        let mut with_beams = BTreeSet::new();
+        for (element, region) in region_of.iter().enumerate() {
+            if matches!(self.class(element), Class::Beam(_)) {
+                with_beams.insert(*region as usize);
+            }
+        }
+        for (name, beam) in &options.beams {
+            let wanted = squeezed(name);
+            let mut regions = with_beams.iter().filter(|k| squeezed(&self.draft.regions[**k].name) == wanted);
+            let Some(region) = regions.next().copied() else {
+                let known = listed(with_beams.iter().map(|k| &self.draft.regions[*k].name));
+                let element = format!("beam group {name:?}");
+                let expected = format!("a set of beam elements: {known}");
+                return Err(unknown(&self.lines.src, element, "no such set".into(), expected));
+            };
+            self.draft.regions[region].beam = Some(beam.clone());
+        }
+        Ok(())
+    }
+
+    /// Node sets, nodes of surfaces, and nodes of the element sets that are skins; names differ.
+    fn node_sets(
+        &self,
+        nodes: &IdIndex,
+        elements: &IdIndex,
+        elsets: &[Vec<u32>],
+        budget: &mut Budget,
+    ) -> Result<Vec<Named>, MeshError> {
+        let src = self.lines.src;
+        let mut own = Vec::with_capacity(self.nsets.list.len());
+        for set in &self.nsets.list {
+            let mut members = Vec::new();
+            for elset in &set.of_elements {
+                budget.spend(&src, set.at, &set.name, elsets[*elset].len())?;
+                self.nodes_of(nodes, &elsets[*elset], &mut members)?;
+            }
+            own.push(members);
+        }
+        let resolved = self.nsets.resolve(&src, nodes, own, budget)?;
+
+        let mut named = Vec::new();
+        let mut taken = BTreeSet::new();
+        // Sets of the assembly keep their names, those of the part give way.
+        for scope in [Scope::Assembly, Scope::Part] {
+            let of_scope = self.nsets.list.iter().zip(&resolved).filter(|(set, _)| set.scope == scope);
+            for (set, members) in of_scope {
+                let clash = !taken.insert(squeezed(&set.name));
+                let name = if clash { format!("part.{}", set.name) } else { set.name.clone() };
+                named.push((name, members.clone()));
+            }
+        }
+        for surface in &self.surfaces {
+            let members = self.surface_nodes(surface, nodes, elements, elsets, &resolved, budget)?;
+            let clash = !taken.insert(squeezed(&surface.name));
+            named.push((format!("{}{}", surface.name, if clash { "_surface" } else { "" }), members));
+        }
+        for (set, members) in self.elsets.list.iter().zip(elsets) {
+            let is_skin = |element: &u32| matches!(self.class(*element as usize), Class::Skin(_));
+            if !members.is_empty() && members.iter().all(is_skin) && taken.insert(squeezed(&set.name)) {
+                let mut of_skin = Vec::new();
+                self.nodes_of(nodes, members, &mut of_skin)?;
+                named.push((set.name.clone(), of_skin));
+            }
+        }
+        Ok(named)
+    }
+
+    /// Appends the nodes of elements.
+    fn nodes_of(&self, nodes: &IdIndex, elements: &[u32], out: &mut Vec<u32>) -> Result<(), MeshError> {
+        for element in elements {
+            let count = self.class(*element as usize).nodes();
+            self.some_nodes(nodes, *element as usize, 0..count, out)?;
+        }
+        out.sort_unstable();
+        out.dedup();
+        Ok(())
+    }
+
+    /// Appends the nodes of one element at some local places.
+    fn some_nodes(
+        &self,
+        nodes: &IdIndex,
+        element: usize,
+        places: impl IntoIterator<Item = usize>,
+        out: &mut Vec<u32>,
+    ) -> Result<(), MeshError> {
+        let start = self.elements.starts[element];
+        for place in places {
+            let id = self.elements.nodes[start + place];
+            out.push(nodes.get(id).ok_or_else(|| {
+                let what = format!("element {}", self.elements.ids[element]);
+                let at = self.elements.offsets[element];
+                self.lines.src.error(Kind::Missing, at, what, format!("node {id}"), "a node of the file")
+            })?);
+        }
+        Ok(())
+    }
+
+    fn surface_nodes(
+        &self,
+        surface: &Surface,
+        nodes: &IdIndex,
+        elements: &IdIndex,
+        elsets: &[Vec<u32>],
+        nsets: &[Vec<u32>],
+        budget: &mut Budget,
+    ) -> Result<Vec<u32>, MeshError> {
+        let src = self.lines.src;
+        let mut out = Vec::new();
+        for (at, member, face) in &surface.items {
+            let what = || format!("surface {:?}", surface.name);
+            let number = parse_u64(member.as_bytes());
+            let missing = || src.error(Kind::Missing, *at, what(), member.as_str(), "a number or set of the file");
+            if surface.of_nodes {
+                match number {
+                    Some(id) => out.push(nodes.get(id).ok_or_else(missing)?),
+                    None => {
+                        let members = &nsets[self.nsets.find(&src, member, surface.scope, *at)?];
+                        budget.spend(&src, *at, &surface.name, members.len())?;
+                        out.extend_from_slice(members);
+                    }
+                }
+                continue;
+            }
+            let single;
+            let members: &[u32] = match number {
+                Some(id) => {
+                    single = [elements.get(id).ok_or_else(missing)?];
+                    &single
+                }
+                None => &elsets[self.elsets.find(&src, member, surface.scope, *at)?],
+            };
+            budget.spend(&src, *at, &surface.name, 8 * members.len())?;
+            for element in members {
+                let found = |text: &str| src.error(Kind::Unsupported, *at, what(), text, "a face S1 to S6 of a solid");
+                let Class::Solid(kind) = self.class(*element as usize) else {
+                    return Err(found("a face of an element that is no solid"));
+                };
+                let faces = face_nodes(kind);
+                let places = face.and_then(|face| faces.get(usize::from(face)));
+                let places = places.ok_or_else(|| found("no face, or one that the element has not"))?;
+                self.some_nodes(nodes, *element as usize, places.iter().map(|place| usize::from(*place)), &mut out)?;
+            }
+        }
+        Ok(out)
+    }
+}

@@ -1,0 +1,79 @@
+//! Element types of Abaqus and CalculiX.
+
+use flexarm_fem::beam::BeamTheory;
+use flexarm_fem::mesh::ElementKind;
+
+/// What an element type is to us.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum Class {
+    /// A volume.
+    Solid(ElementKind),
+    /// A straight beam.
+    Beam(BeamTheory),
+    /// A plane element or line with so many nodes that mesh programs write along with a solid: a group of nodes.
+    Skin(usize),
+}
+
+impl Class {
+    /// Nodes of one element.
+    pub(super) const fn nodes(self) -> usize {
+        match self {
+            Self::Solid(kind) => kind.nodes(),
+            Self::Beam(_) => 2,
+            Self::Skin(nodes) => nodes,
+        }
+    }
+}
+
+/// Looks up a type in capitals; with it a remark where the file asks for something that is not done.
+pub(super) fn class(name: &str) -> Option<(Class, Option<&'static str>)> {
+    const REDUCED: Option<&str> = Some("reduced integration is not used: the program has its own rules");
+    let solid = |kind, remark| Some((Class::Solid(kind), remark));
+    match name {
+        "C3D4" => solid(ElementKind::Tet4, None),
+        "C3D10" => solid(ElementKind::Tet10, None),
+        "C3D10M" | "C3D10HS" | "C3D10T" => solid(ElementKind::Tet10, Some("read as plain C3D10")),
+        // The own rules have incompatible modes always, those of CalculiX with C3D8I alone.
+        "C3D8" => solid(ElementKind::Hex8, Some("read with incompatible modes unless quadrature = calculix")),
+        "C3D8I" => solid(ElementKind::Hex8, None),
+        "C3D8R" => solid(ElementKind::Hex8, REDUCED),
+        "C3D20" => solid(ElementKind::Hex20, None),
+        "C3D20R" => solid(ElementKind::Hex20, REDUCED),
+        "C3D6" => solid(ElementKind::Wedge6, None),
+        "C3D15" => solid(ElementKind::Wedge15, None),
+        "B31" => Some((Class::Beam(BeamTheory::Timoshenko), None)),
+        "B33" => Some((Class::Beam(BeamTheory::EulerBernoulli), None)),
+        // What Gmsh writes for the surfaces and curves of a solid.
+        "CPS3" => Some((Class::Skin(3), None)),
+        "CPS4" => Some((Class::Skin(4), None)),
+        "CPS6" => Some((Class::Skin(6), None)),
+        "CPS8" => Some((Class::Skin(8), None)),
+        "T3D2" => Some((Class::Skin(2), None)),
+        "T3D3" => Some((Class::Skin(3), None)),
+        _ => None,
+    }
+}
+
+/// What to do about a type that is not supported.
+pub(super) fn advice(name: &str) -> &'static str {
+    match name {
+        "B32" | "B32R" | "B21" | "B22" | "B23" => "beams must be two-node ones in space: B31 or B33",
+        _ if name.starts_with('S') || name.starts_with("CPE") || name.starts_with("CAX") || name.starts_with('M') => {
+            "shells, membranes, plane elements and masses are not read: mesh the part with solids"
+        }
+        _ => "remove these elements from the deck, or mesh with a supported type",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_bricks_that_are_not_what_they_say_are_remarked_on() {
+        let remark = |name| class(name).unwrap().1.unwrap_or("");
+        assert_eq!(remark("C3D8I"), "");
+        assert_eq!(remark("C3D8"), "read with incompatible modes unless quadrature = calculix");
+        assert!(remark("C3D8R").starts_with("reduced integration is not used"));
+    }
+}

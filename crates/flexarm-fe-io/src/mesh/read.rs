@@ -1,0 +1,191 @@
+//! From a file to a checked mesh: recognises the format by content and calls its reader.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use super::error::{MeshError, MeshErrorKind as Kind, Place};
+use super::source::{Source, shown};
+use flexarm_fem::mesh::{BeamProperties, Mesh};
+
+use super::{gmsh, inp};
+use crate::unpack::{is_gzip, unpacked};
+use flexarm_fem::input::read_file;
+use flexarm_fem::units::UnitSystem;
+
+/// A file larger than this is refused, packed or not.
+const LARGEST: u64 = 8 << 30;
+
+/// What a mesh file does not say itself.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReadOptions {
+    /// Units of the numbers in the file.
+    pub units: UnitSystem,
+    /// Groups of line elements that are beams: name of the physical curve or element set, section in SI.
+    pub beams: Vec<(String, BeamProperties)>,
+}
+
+impl Default for ReadOptions {
+    /// SI, no beams.
+    fn default() -> Self {
+        Self { units: UnitSystem::SI, beams: Vec::new() }
+    }
+}
+
+/// A mesh, and what was noticed on the way.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MeshFile {
+    /// The mesh, SI.
+    pub mesh: Mesh,
+    /// The format, such as `Gmsh MSH 4.1 binary`.
+    pub format: &'static str,
+    /// What was left out or assumed, one sentence each.
+    pub warnings: Vec<String>,
+    /// Element types as the file names them, such as `C3D8I`; empty for formats that number them.
+    pub element_types: BTreeSet<String>,
+}
+
+/// Reads a mesh file: Gmsh `.msh` 2.2 or 4.1, CalculiX or Abaqus `.inp`, each also compressed by gzip.
+///
+/// ```no_run
+/// use flexarm_fe_io::{ReadOptions, read_mesh};
+/// let file = read_mesh("arm.msh", &ReadOptions { units: "mm-t-s".parse()?, ..Default::default() })?;
+/// assert!(file.mesh.node_sets.contains_key("interface_A"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// [`MeshError`] with file, place, what was found and what was expected.
+pub fn read_mesh(path: impl AsRef<Path>, options: &ReadOptions) -> Result<MeshFile, MeshError> {
+    let path = path.as_ref();
+    let origin = path.display().to_string();
+    let src = Source { bytes: &[], origin: &origin, binary: false };
+    let unreadable = |error: std::io::Error| {
+        src.error_in(Kind::Unreadable, Place::File, "file", error.to_string(), "a file that can be read")
+    };
+    let bytes = read_file(path, LARGEST).map_err(unreadable)?;
+    parse_mesh(&bytes, &origin, options)
+}
+
+/// Reads a mesh from the bytes of a file; `origin` names them in messages.
+///
+/// # Errors
+/// As [`read_mesh`].
+pub fn parse_mesh(bytes: &[u8], origin: &str, options: &ReadOptions) -> Result<MeshFile, MeshError> {
+    let src = Source { bytes, origin, binary: false };
+    if is_gzip(bytes) {
+        let unpacked = unpacked(bytes, LARGEST).map_err(|e| {
+            let kind = if e.too_large { Kind::TooLarge } else { Kind::Unreadable };
+            src.error_in(kind, Place::File, "gzip", e.found, e.expected).help(e.help)
+        })?;
+        return parse_plain(&Source { bytes: &unpacked, ..src }, options);
+    }
+    parse_plain(&src, options)
+}
+
+fn parse_plain(src: &Source, options: &ReadOptions) -> Result<MeshFile, MeshError> {
+    let text = src.bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(src.bytes).trim_ascii_start();
+    if let Some((name, help)) = foreign(text) {
+        let expected = "Gmsh .msh (2.2, 4.1), or .inp of CalculiX or Abaqus";
+        return Err(src.error_in(Kind::Format, Place::File, "format", name, expected).help(help));
+    }
+    match text.first() {
+        Some(b'$') => gmsh::parse(src, options),
+        Some(b'*') => inp::parse(src, options),
+        Some(_) => {
+            let first_line = text.split(|byte| matches!(byte, b'\n' | b'\r')).next().unwrap_or(text);
+            let expected = "$MeshFormat (Gmsh .msh) or a line with * (CalculiX or Abaqus .inp)";
+            let error = src.error_in(Kind::Format, Place::File, "format", shown(first_line), expected);
+            Err(error.help("geometry such as STEP or STL must be meshed first, for example with Gmsh"))
+        }
+        None => Err(src.error_in(Kind::Truncated, Place::File, "file", "nothing", "a mesh")),
+    }
+}
+
+/// How Gmsh makes a file that is read of one that is not.
+const BY_GMSH: &str = "Gmsh reads it: gmsh INPUT -save -format msh41 -o OUTPUT.msh; node sets may get lost, choose interfaces by \
+                       place then, such as plane(0,0,0; 1,0,0)";
+/// What to do with a file that Gmsh does not read either.
+const BY_EXPORT: &str = "export the mesh as a CalculiX or Abaqus .inp, or as Gmsh .msh, from the program that wrote it";
+/// What to do with a shape.
+const BY_MESHING: &str = "a shape must be meshed first, for example with Gmsh: gmsh INPUT -3 -order 2 -o OUTPUT.msh";
+
+/// The name of a known format that is not read, and how to convert it; by the first lines.
+fn foreign(text: &[u8]) -> Option<(&'static str, &'static str)> {
+    const STARTS: [(&[u8], &str, &str); 9] = [
+        (b"# vtk DataFile", "a VTK file", BY_GMSH),
+        (b"<VTKFile", "a VTK file in XML", BY_EXPORT),
+        (b"<?xml", "XML", BY_EXPORT),
+        (b"MeshVersionFormatted", "a Medit mesh", BY_GMSH),
+        (b"\x89HDF", "HDF5, as MED, CGNS or Exodus", BY_GMSH),
+        (b"CDF", "NetCDF, as Exodus", BY_EXPORT),
+        (b"ISO-10303-21", "a STEP file", BY_MESHING),
+        (b"*KEYWORD", "a deck of LS-DYNA", BY_EXPORT),
+        (b"/PREP7", "a deck of ANSYS", BY_EXPORT),
+    ];
+    let starts = |mark: &[u8]| text.len() >= mark.len() && text[..mark.len()].eq_ignore_ascii_case(mark);
+    if let Some((_, name, help)) = STARTS.iter().find(|(mark, _, _)| starts(mark)) {
+        return Some((name, help));
+    }
+    // Nastran begins with $ as Gmsh does; universal files with -1.
+    let head = &text[..text.len().min(65_536)];
+    let mut lines = head.split(|byte| *byte == b'\n').map(<[u8]>::trim_ascii).filter(|line| !line.is_empty());
+    let first = lines.clone().next()?;
+    if first == b"-1" {
+        return Some(("a universal file (.unv)", BY_GMSH));
+    }
+    if first.starts_with(b"$MeshFormat") || first.starts_with(b"*") {
+        return None;
+    }
+    const CARDS: [&[u8]; 11] = [
+        b"BEGIN BULK",
+        b"GRID",
+        b"CTETRA",
+        b"CHEXA",
+        b"CPENTA",
+        b"CQUAD4",
+        b"PSOLID",
+        b"CEND",
+        b"NASTRAN",
+        b"ENDDATA",
+        b"MAT1",
+    ];
+    let is_card = |line: &[u8]| {
+        CARDS.iter().any(|card| {
+            line.len() >= card.len()
+                && line[..card.len()].eq_ignore_ascii_case(card)
+                && line.get(card.len()).is_none_or(|next| !next.is_ascii_alphanumeric())
+        })
+    };
+    let nastran = lines.any(is_card);
+    nastran.then_some(("Nastran bulk data (.bdf, .dat, .nas)", NASTRAN))
+}
+
+/// What to do with Nastran's bulk data.
+const NASTRAN: &str = "Gmsh reads it: gmsh INPUT.bdf -save -format msh41 -o OUTPUT.msh; node sets may get lost, choose interfaces by \
+                       place then, such as plane(0,0,0; 1,0,0); matrices that Nastran reduced (DMIG .pch, OP4) are imported as \
+                       matrices";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_unknown_format_is_answered_with_the_known_ones() {
+        let options = ReadOptions::default();
+        for (bytes, word) in [
+            (&b"solid cube\n"[..], "solid cube"),
+            (b"", "nothing"),
+            (b"\x1f\x8bxx", "gzip"),
+            (b"$ made by hand\nSOL 101\nCEND\nBEGIN BULK\nGRID,1,,0.,0.,0.\n", "Nastran bulk data"),
+            (b"GRID           1             0.0     0.0     0.0\nCTETRA,1,1,1,2,3,4\n", "gmsh INPUT.bdf -save"),
+            (b"    -1\n  2411\n", "universal file"),
+            (b"*KEYWORD\n*NODE\n", "LS-DYNA"),
+            (b"ISO-10303-21;\nHEADER;\n", "must be meshed first"),
+            (b"# vtk DataFile Version 3.0\n", "VTK"),
+        ] {
+            let message = parse_mesh(bytes, "x", &options).unwrap_err().to_string();
+            assert!(message.contains(word), "{message}");
+        }
+        assert_eq!(read_mesh("no/such/file.msh", &options).unwrap_err().kind, Kind::Unreadable);
+    }
+}

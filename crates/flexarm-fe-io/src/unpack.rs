@@ -1,0 +1,84 @@
+//! Packed files into memory, no further than a real file would go: a few kilobytes of gzip can unpack to gigabytes.
+
+use std::io::Read;
+
+use flate2::read::MultiGzDecoder;
+
+/// What any packed file may unpack to (bytes).
+const ALWAYS_UNPACKED: u64 = 64 << 20;
+/// Beyond that, so many times its packed size: meshes and matrices written as text pack 3 to 30 times.
+const LARGEST_RATIO: u64 = 50;
+
+/// Whether the bytes are packed with gzip.
+pub(crate) fn is_gzip(bytes: &[u8]) -> bool {
+    bytes.starts_with(&[0x1f, 0x8b])
+}
+
+/// What packed bytes may unpack to, at most `largest`.
+pub(crate) fn allowed_unpacked(packed: usize, largest: u64) -> u64 {
+    ALWAYS_UNPACKED.max(LARGEST_RATIO.saturating_mul(packed as u64)).min(largest)
+}
+
+/// Why packed bytes were not unpacked: what was found, what was expected, how to mend it.
+pub(crate) struct NotUnpacked {
+    pub(crate) too_large: bool,
+    pub(crate) found: String,
+    pub(crate) expected: String,
+    pub(crate) help: &'static str,
+}
+
+/// Unpacks gzip, at most to `largest` bytes and no more than a sound file of this size holds.
+pub(crate) fn unpacked(packed: &[u8], largest: u64) -> Result<Vec<u8>, NotUnpacked> {
+    let allowed = allowed_unpacked(packed.len(), largest);
+    let mut bytes = Vec::new();
+    let result = MultiGzDecoder::new(packed).take(allowed + 1).read_to_end(&mut bytes);
+    if let Err(error) = result {
+        return Err(NotUnpacked {
+            too_large: false,
+            found: format!("{error} after {} bytes", bytes.len()),
+            expected: "a whole gzip file".into(),
+            help: "is the file cut off? unpack it with gunzip to see",
+        });
+    }
+    if bytes.len() as u64 > allowed {
+        return Err(NotUnpacked {
+            too_large: true,
+            found: format!("{} bytes that unpack to more than {allowed} bytes", packed.len()),
+            expected: format!("at most {LARGEST_RATIO} times the packed size, or {ALWAYS_UNPACKED} bytes"),
+            help: "if the file is sound, unpack it with gunzip and give the unpacked file",
+        });
+    }
+    Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write;
+
+    use super::*;
+
+    fn packed(bytes: &[u8]) -> Vec<u8> {
+        let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+        encoder.write_all(bytes).unwrap();
+        encoder.finish().unwrap()
+    }
+
+    #[test]
+    fn a_packed_file_that_grows_without_end_is_refused_early() {
+        let bytes = packed(&vec![b'*'; 100_000]);
+        let refused = unpacked(&bytes, 1000).err().unwrap();
+        assert!(refused.too_large && refused.found.contains("more than 1000 bytes"), "{}", refused.found);
+        assert_eq!(unpacked(&bytes, 100_000).ok().unwrap().len(), 100_000);
+        assert!(!unpacked(&bytes[..bytes.len() / 2], 100_000).err().unwrap().too_large);
+    }
+
+    /// 1000 to 1, as no mesh packs: 71 MB of blanks in 71 kB.
+    #[test]
+    fn a_ratio_that_no_mesh_has_is_refused_beyond_64_megabytes() {
+        let bytes = packed(&vec![b' '; 71 << 20]);
+        assert!(bytes.len() < 1 << 20, "{}", bytes.len());
+        assert!(unpacked(&bytes, u64::MAX).err().unwrap().too_large);
+        assert_eq!(allowed_unpacked(10 << 20, u64::MAX), 500 << 20);
+        assert_eq!(allowed_unpacked(10 << 20, 1 << 20), 1 << 20);
+    }
+}

@@ -1,0 +1,19 @@
+//! Matrices of other FE programs: samples, units, writers, and bytes that are no matrices.
+//!
+//! The samples of `shared/fe` are all of one structure: case A1, a steel beam along x, interface A
+//! at (0, 0, 0) and B at (1, 0, 0), SI. They are no part of the repository; without them the tests
+//! that need them say "skipped". The small texts here are enough for every branch.
+#![allow(non_snake_case, reason = "monogram notation, as in the crate")]
+#![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
+
+#[path = "../../../flexarm-fem/tests/common/mod.rs"]
+mod common;
+
+mod defective;
+mod fuzz;
+mod op4;
+mod samples;
+mod shared;
+mod sid;
+mod units;
+mod writers;
