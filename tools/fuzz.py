@@ -483,7 +483,7 @@ def own_targets():
         Target("mesh-inp", "bar.inp", {"bar.inp": deck}, [["reduce", "bar.inp", *seats, *reduce], ["reduce", "bar.inp", "--list", "--json"]]),
         Target("mesh-gz", "bar.inp.gz", {"bar.inp.gz": gzip.compress(deck.encode(), mtime=0)}, [["reduce", "bar.inp.gz", *seats, *reduce]]),
     ]
-    data = ROOT / "crates/flexarm-fem/tests/data"
+    data = ROOT / "crates/flexarm-fe-io/tests/data"
     for kind in ("v22_ascii", "v22_binary", "v41_ascii", "v41_binary"):
         name = f"three_blocks_{kind}.msh"
         targets.append(Target(f"mesh-msh-{kind}", name, {name: (data / name).read_bytes()}, [["reduce", name, "--list", "--json"]]))

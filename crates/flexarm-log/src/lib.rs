@@ -3,8 +3,7 @@
 //! A run hands over one [`RunHeader`], then [`Sample`]s, then its result figures; every [`Recorder`] takes the
 //! same three calls, and [`RecorderSet`] passes them to several files at once. Start at [`CsvRecorder`] for
 //! tables (`ParquetRecorder`, feature `parquet`, for the same table as Parquet), `McapRecorder` (feature `mcap`) for ROS 2 tools, Foxglove and PlotJuggler, `RrdRecorder` (feature
-//! `rerun`) for the Rerun viewer with meshes and a layout. Pictures of a mesh reduction are a module of their
-//! own, `mesh_picture` (feature `png`), `arm_picture`, `arm_png` and `arm_sheet` draw the arm at one instant; curves as an SVG picture are drawn by [`LinePlot`]; all colours are in [`palette`].
+//! `rerun`) for the Rerun viewer with meshes and a layout.
 //!
 //! The way back is [`open_recording`]: a [`RunSource`] gives header, samples and result of a file, for reports and for
 //! other formats. What a format cannot hold is listed by [`RecordingFormat::lost_on_the_way_to`].
@@ -46,23 +45,14 @@
 #![allow(non_snake_case, reason = "monogram notation: X_WL, pose of L in W")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
-#[cfg(feature = "png")]
-mod arm_picture;
-mod bend;
-mod columns;
 mod create;
 mod csv_file;
 mod error;
-mod magnify;
 #[cfg(feature = "mcap")]
 mod mcap_file;
-#[cfg(feature = "png")]
-pub mod mesh_picture;
 mod multi;
-pub mod palette;
 #[cfg(feature = "parquet")]
 mod parquet_file;
-mod plot;
 #[cfg(any(test, feature = "rerun"))]
 mod plot_room;
 mod read;
@@ -74,20 +64,15 @@ mod rrd_file;
 #[cfg(any(feature = "mcap", feature = "parquet", feature = "rerun"))]
 mod run_json;
 mod shape;
-mod surface;
 mod table;
 #[cfg(any(feature = "mcap", feature = "rerun"))]
 mod tail_file;
 mod trace;
 
-#[cfg(feature = "png")]
-pub use arm_picture::{ArmPicture, ArmPictureError, ArmSide, arm_color, arm_picture, arm_png, arm_sheet};
-pub use bend::{BendLine, BentMesh, BentPieces};
-pub use columns::{Column, Columns};
 pub use create::CreateOptions;
 pub use csv_file::CsvRecorder;
 pub use error::LogError;
-pub use magnify::{Magnifier, stations_in_link};
+pub use flexarm_sample::*;
 #[cfg(feature = "mcap")]
 pub use mcap_file::McapRecorder;
 #[cfg(feature = "mcap")]
@@ -95,10 +80,8 @@ pub use mcap_file::layouts::{foxglove_layout, plotjuggler_layout};
 pub use multi::RecorderSet;
 #[cfg(feature = "parquet")]
 pub use parquet_file::ParquetRecorder;
-pub use plot::{CurveLook, LinePlot, Panel, PlotCurve, PlotError, page_plot, paper_plot};
 pub use read::{RecordingFormat, open_recording};
-pub use record::*;
+pub use record::Recorder;
 #[cfg(feature = "rerun")]
 pub use rrd_file::{RrdRecorder, RrdStudy, StudySeat};
-pub use surface::mesh_media_type;
 pub use trace::{RunSource, Trace, TraceRow};

@@ -3,8 +3,9 @@
 
 mod synthetic;
 
+use flexarm_draw::Magnifier;
 use flexarm_kinematics::{Pose, rotation_vector};
-use flexarm_log::{Magnifier, RunHeader};
+use flexarm_log::RunHeader;
 
 fn distance(a: &Pose, b: &Pose) -> f64 {
     (a.translation.vector - b.translation.vector).norm()

@@ -9,9 +9,10 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Duration;
 
+use flexarm_draw::Magnifier;
 use flexarm_log::{
-    CreateOptions, LinkInfo, LogError, Magnifier, McapRecorder, Recorder, RunHeader, RunResult, START_NS,
-    foxglove_layout, plotjuggler_layout,
+    CreateOptions, LinkInfo, LogError, McapRecorder, Recorder, RunHeader, RunResult, START_NS, foxglove_layout,
+    plotjuggler_layout,
 };
 use mcap::read::Options;
 use mcap::{MessageStream, Summary};

@@ -9,8 +9,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Duration;
 
+use flexarm_draw::palette::{self, Ground};
 use flexarm_kinematics::Pose;
-use flexarm_log::palette::{self, Ground};
 use flexarm_log::{Caption, CreateOptions, Recorder, RrdRecorder, RrdStudy, RunHeader};
 use re_chunk::Chunk;
 use re_log_encoding::DecoderApp;
@@ -198,7 +198,7 @@ fn the_bent_surface_ends_where_the_far_interface_is() {
                 chunk.iter_slices::<[f32; 3]>(id).flatten().flatten().copied().collect()
             })
             .unwrap();
-        let magnifier = flexarm_log::Magnifier::new(&synthetic::header());
+        let magnifier = flexarm_draw::Magnifier::new(&synthetic::header());
         let mut worst: f64 = 0.0;
         for (time_ns, shape) in &shapes {
             let sample = synthetic::sample((*time_ns as f64 * 1e-9 * synthetic::RATE_HZ).round() as u64);

@@ -4,6 +4,15 @@
 //! that takes a [`Bench`] and returns a [`page::Case`]; a new one gets a line in `CASES`. What other programs computed is
 //! stored in `tests/verification`, with the script that writes it.
 //!
+//! ```
+//! use flexarm_verify::{case_names, textbook::rectangle_torsion};
+//!
+//! assert!(case_names().contains(&"three-beams"));
+//! // Saint-Venant's torsion: 0.1406 a^4 for a square, a b^3 / 3 towards a thin strip.
+//! assert!((rectangle_torsion(1.0, 1.0) - 0.140577).abs() < 1e-6);
+//! assert!((rectangle_torsion(1.0, 1e-3) * 3e9 - 1.0).abs() < 1e-3);
+//! ```
+//!
 //! Not here: methods. Everything is done through the public faces of the other crates, and closed forms are written down
 //! again in [`textbook`], apart from the code that they judge.
 #![allow(non_snake_case, reason = "monogram notation: X_WF, EI_y, C; see docs/references.md")]

@@ -1,10 +1,10 @@
 //! A cast lower arm: from a mesh of tetrahedra to a link, each step against the mesh and against two other programs.
 
 use flexarm::{Error, Modelling, Robot};
+use flexarm_draw::{CurveLook, Panel, PlotCurve};
 use flexarm_fem::chain::Chain;
 use flexarm_fem::reduction::Tie;
 use flexarm_fem::{ElasticSplit, UnitSystem};
-use flexarm_log::{CurveLook, Panel, PlotCurve};
 use nalgebra::{Matrix6, Vector3, Vector6};
 
 use crate::Pace;

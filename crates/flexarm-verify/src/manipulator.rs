@@ -6,10 +6,10 @@ use flexarm::{
     ConstraintForm, DriveModel, Error, LinkModel, Modelling, Motion, ReferenceSettings, Robot, RunOptions, SpookPreset,
     SpookSettings, StepperKind, Summary, Trace, simulate_traced,
 };
+use flexarm_draw::{CurveLook, Panel, PlotCurve};
 use flexarm_fem::element::Quadrature;
 use flexarm_fem::reduction::Tie;
 use flexarm_fem::{Material, UnitSystem};
-use flexarm_log::{CurveLook, Panel, PlotCurve};
 use flexarm_stepping::Damping;
 use nalgebra::{Matrix6, Vector3, Vector6};
 

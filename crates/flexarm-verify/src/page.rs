@@ -3,7 +3,7 @@
 //! Numbers keep their value until they are printed. Relative errors below [`FLOOR`] are printed as that: what lies below is
 //! rounding and differs between machines.
 
-use flexarm_log::{Panel, PlotError};
+use flexarm_draw::{Panel, PlotError};
 use serde::Serialize;
 
 /// Relative errors below this are printed as "< 1e-9".
@@ -207,7 +207,7 @@ impl Figure {
     /// # Errors
     /// Where there is nothing to draw.
     pub fn svg(&self) -> Result<String, PlotError> {
-        flexarm_log::page_plot(&self.x_label, self.logarithmic_x, &self.panels)
+        flexarm_draw::page_plot(&self.x_label, self.logarithmic_x, &self.panels)
     }
 }
 

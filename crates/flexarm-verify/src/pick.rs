@@ -1,7 +1,7 @@
 //! The manipulator picks something up and sets it down: every stepper over payloads that change at once.
 
 use flexarm::{DriveModel, Error, Modelling, ReferenceSettings, Robot, RunOptions, StepperKind};
-use flexarm_log::{CurveLook, Panel, PlotCurve};
+use flexarm_draw::{CurveLook, Panel, PlotCurve};
 
 use crate::bench::{ALPHA, Bench, modal, parts};
 use crate::manipulator::{Run, Runs};

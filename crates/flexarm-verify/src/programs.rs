@@ -4,8 +4,8 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use flexarm::{ConstraintForm, Error, Modelling, ReferenceSettings, RunOptions, StepperKind, simulate_traced};
+use flexarm_draw::{CurveLook, Panel, PlotCurve};
 use flexarm_kinematics::ElasticAngles;
-use flexarm_log::{CurveLook, Panel, PlotCurve};
 use flexarm_stepping::Damping;
 use nalgebra::Vector3;
 use serde_json::Value;

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use flexarm::{Error, LinkModel, Modelling, Robot, Start, StepperKind};
+use flexarm_draw::{CurveLook, Panel, PlotCurve};
 use flexarm_fem::element::Quadrature;
 use flexarm_fem::reduction::Tie;
 use flexarm_fem::{Material, UnitSystem};
-use flexarm_log::{CurveLook, Panel, PlotCurve};
 use flexarm_stepping::{Damping, MotionFn, ReferenceSettings};
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use flexarm_analysis::{
     LinearSystem, Quantity, Spacing, frequency_grid, resolved_response, response_peaks, with_resonances,
 };
-use flexarm_log::{CurveLook, LinePlot, Panel, PlotCurve, PlotError};
+use flexarm_draw::{CurveLook, LinePlot, Panel, PlotCurve, PlotError};
 use flexarm_stepping::Linear;
 use nalgebra::{Complex, DMatrix, Vector6};
 use serde::Serialize;

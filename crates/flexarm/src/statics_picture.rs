@@ -79,7 +79,7 @@ pub(crate) fn save(
 #[cfg(feature = "png")]
 fn draw(header: &RunHeader, sample: &Sample, statics: &Statics, slides: &[bool]) -> Result<Vec<u8>, String> {
     let C = nalgebra::Matrix3::from_fn(|row, column| statics.compliance[row][column]);
-    flexarm_log::arm_sheet(header, sample, &lines(statics, slides), Some(&C), WIDTH).map_err(|error| error.to_string())
+    flexarm_draw::arm_sheet(header, sample, &lines(statics, slides), Some(&C), WIDTH).map_err(|error| error.to_string())
 }
 
 #[cfg(not(feature = "png"))]

@@ -111,7 +111,7 @@ fn the_page_of_the_shipped_arm_is_small_and_complete() {
 /// Truth: the table of colours that recordings and figures use.
 #[test]
 fn x_y_and_z_have_one_colour_each_in_plots_pictures_and_figures() {
-    use flexarm_log::palette::{Ground, axis, hex, series};
+    use flexarm_draw::palette::{Ground, axis, hex, series};
     let page = page_of(arm());
     let (style, _) = page.split_once("</style>").unwrap();
     for (k, name) in ["x", "y", "z"].into_iter().enumerate() {

@@ -7,7 +7,8 @@
 use flexarm_kinematics::Pose;
 use nalgebra::{Matrix3, Rotation3, Translation3, Vector3};
 
-use crate::{BendInfo, BendLine, BentMesh, LinkMesh, RunHeader, TwinSample, stations_in_link};
+use crate::{BendInfo, LinkMesh, RunHeader, TwinSample};
+use flexarm_draw::{BendLine, BentMesh, stations_in_link};
 
 /// Slabs between the interfaces; one more before and one behind them.
 const INNER: usize = 8;

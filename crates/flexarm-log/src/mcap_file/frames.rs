@@ -6,7 +6,8 @@ use super::beat::Beat;
 use super::bent::BentLink;
 use super::cdr::Cdr;
 use super::messages::{self, Stamp, Transform};
-use crate::{LinkInfo, Magnifier, RunHeader, Sample, TwinSample};
+use crate::{LinkInfo, RunHeader, Sample, TwinSample};
+use flexarm_draw::Magnifier;
 
 /// Root of all trees.
 pub(crate) const WORLD: &str = "world";

@@ -1,13 +1,13 @@
 //! Layouts for viewers of a recording: files that lie beside it and are opened with it.
 //!
 //! Both show the same: the error of the tool, what causes it, what the drives do; Foxglove the arm as well. Curves have the
-//! colours that they have elsewhere ([`crate::palette`]).
+//! colours that they have elsewhere ([`flexarm_draw::palette`]).
 
 use serde_json::{Value, json};
 
 use super::frames::is_magnified;
 use crate::RunHeader;
-use crate::palette::{self, Ground, Rgb, hex};
+use flexarm_draw::palette::{self, Ground, Rgb, hex};
 
 /// A plot: its title, and its curves.
 struct Plot {

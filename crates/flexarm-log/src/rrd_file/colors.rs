@@ -2,7 +2,7 @@
 
 use crate::rerun::{Color, Rgba32};
 
-use crate::palette::{self, Ground, Rgb};
+use flexarm_draw::palette::{self, Ground, Rgb};
 
 /// How much of the ghost is seen.
 const GHOST_ALPHA: u8 = 0x68;

@@ -10,7 +10,8 @@ use super::colors::{self, ColorScale};
 use super::stream::{Ids, StreamError};
 use super::tracks::{Instant, PoseTrack, ShapeTrack, SkeletonTrack, TintTrack, Track, point};
 use super::{link_part, path};
-use crate::{BendLine, BentMesh, BentPieces, LinkMesh, RunHeader, Sample, TwinSample, stations_in_link};
+use crate::{LinkMesh, RunHeader, Sample, TwinSample};
+use flexarm_draw::{BendLine, BentMesh, BentPieces, stations_in_link};
 
 /// How a robot is painted.
 #[derive(Clone, Copy, Debug)]

@@ -14,7 +14,8 @@ use super::robot::{Look, Paint, RobotTracks};
 use super::stream::{Ids, StreamError};
 use super::tracks::{ArrowTrack, Instant, PathTrack, SIM_TIME, Seen, Times, Track, point};
 use crate::plot_room::Envelope;
-use crate::{EventKind, Magnifier, RunHeader, RunResult, Sample, TwinSample};
+use crate::{EventKind, RunHeader, RunResult, Sample, TwinSample};
+use flexarm_draw::Magnifier;
 
 /// Shortest time between two poses (ns): every sample of a run logged at up to 200 Hz, fewer of faster ones. Curves have all.
 const POSE_EVERY_NS: i64 = 5_000_000;

@@ -1,10 +1,10 @@
 //! The bar as a mesh: own finite elements, CalculiX, beam theory, the reduced link; and loads so large that geometry counts.
 
 use flexarm::{Error, Robot};
+use flexarm_draw::{CurveLook, Panel, PlotCurve};
 use flexarm_fem::UnitSystem;
 use flexarm_fem::reduction::Tie;
 use flexarm_fem::sparse::ModesWanted;
-use flexarm_log::{CurveLook, Panel, PlotCurve};
 use nalgebra::{Matrix6, Vector3, Vector6};
 
 use super::{G, bar, bar_with_shear, nth, without_ball};

@@ -5,8 +5,8 @@ mod mesh;
 use std::sync::Arc;
 
 use flexarm::{ConstraintForm, Error, LinkModel, Modelling, Robot, SpookPreset, SpookSettings, Start, StepperKind};
+use flexarm_draw::{CurveLook, Panel, PlotCurve};
 use flexarm_kinematics::LinkInertia;
-use flexarm_log::{CurveLook, Panel, PlotCurve};
 use flexarm_stepping::{Damping, MotionFn, ReferenceSettings};
 use nalgebra::{Matrix6, Vector3, Vector6};
 

@@ -200,7 +200,7 @@ fn pictures(
     plan: &flexarm_fem::LinkPlan,
     reduction: &flexarm_fem::MeshReduction,
 ) -> Result<Vec<(&'static str, Vec<u8>)>, Error> {
-    use flexarm_log::mesh_picture::MeshPictures;
+    use flexarm_draw::mesh_picture::MeshPictures;
     fn failed(error: impl std::fmt::Display) -> Error {
         Error::Usage(format!("the pictures failed: {error}"))
     }

@@ -3,7 +3,8 @@
 
 use std::path::{Path, PathBuf};
 
-use flexarm_log::{CurveLook, EventKind, Panel, PlotCurve, Trace, paper_plot};
+use flexarm_draw::{CurveLook, Panel, PlotCurve, paper_plot};
+use flexarm_log::{EventKind, Trace};
 
 use super::curves::{Kind, Plot, PlotView, plots};
 use super::picture::printed;
@@ -54,7 +55,7 @@ fn unit_of<'a>(plot: &'a Plot, view: &'a PlotView) -> &'a str {
     if view.y_unit.is_empty() { plot.y_unit } else { view.y_unit }
 }
 
-fn svg(plot: &Plot, view: &PlotView, bands: &[(f64, f64)]) -> Result<String, flexarm_log::PlotError> {
+fn svg(plot: &Plot, view: &PlotView, bands: &[(f64, f64)]) -> Result<String, flexarm_draw::PlotError> {
     let curves = view.tables.iter().flat_map(|table| {
         table.curves.iter().map(|curve| PlotCurve {
             name: curve.name.clone(),

@@ -6,7 +6,7 @@
 use std::fmt::Write as _;
 
 use base64::Engine as _;
-use flexarm_log::palette::{self, Ground, hex};
+use flexarm_draw::palette::{self, Ground, hex};
 use flexarm_log::{EventKind, RunHeader, Trace};
 
 use super::again::settling_band_m;

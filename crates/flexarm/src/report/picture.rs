@@ -19,7 +19,7 @@ const fn height(width: usize) -> usize {
 /// Both pictures; `width` in pixels.
 #[cfg(feature = "png")]
 pub(super) fn pictures(trace: &Trace, width: usize) -> Vec<Picture> {
-    use flexarm_log::{ArmSide, arm_picture};
+    use flexarm_draw::{ArmSide, arm_picture};
     let draw = |title, side| {
         let drawn = arm_picture(&trace.header, &trace.peak, side, [width, height(width)]);
         Picture { title, drawn: drawn.map(|p| (p.png, p.axes)).map_err(|error| error.to_string()) }
@@ -37,7 +37,7 @@ pub(super) fn pictures(_trace: &Trace, _width: usize) -> Vec<Picture> {
 /// Both pictures for paper, with their scales, by the names of their files. Those that cannot be drawn are left out.
 #[cfg(feature = "png")]
 pub(super) fn printed(trace: &Trace, width: usize) -> Vec<(&'static str, Vec<u8>)> {
-    use flexarm_log::{ArmSide, arm_png};
+    use flexarm_draw::{ArmSide, arm_png};
     let draw = |name, side| Some((name, arm_png(&trace.header, &trace.peak, side, [width, height(width)]).ok()?));
     let all = [draw("arm_side", ArmSide::Side), draw("arm_oblique", ArmSide::Oblique)];
     all.into_iter().flatten().collect()
@@ -51,12 +51,12 @@ pub(super) fn printed(_trace: &Trace, _width: usize) -> Vec<(&'static str, Vec<u
 
 /// Colours of a deviation from 0 to the end of the scale, as they are on the arm.
 #[cfg(feature = "png")]
-pub(super) fn scale_colors() -> Vec<flexarm_log::palette::Rgb> {
-    (0..=12).map(|k| flexarm_log::arm_color(f64::from(k) / 12.0)).collect()
+pub(super) fn scale_colors() -> Vec<flexarm_draw::palette::Rgb> {
+    (0..=12).map(|k| flexarm_draw::arm_color(f64::from(k) / 12.0)).collect()
 }
 
 /// None where nothing is drawn.
 #[cfg(not(feature = "png"))]
-pub(super) fn scale_colors() -> Vec<flexarm_log::palette::Rgb> {
+pub(super) fn scale_colors() -> Vec<flexarm_draw::palette::Rgb> {
     Vec::new()
 }

@@ -12,11 +12,11 @@
 use std::path::Path;
 use std::time::Instant;
 
+use flexarm_draw::mesh_picture::{MeshPictures, write_pictures};
 use flexarm_fe_io::mesh::{ReadOptions, read_mesh};
 use flexarm_fem::reduction::{CondensationOptions, Interface, Tie};
 use flexarm_fem::sparse::ModesWanted;
 use flexarm_fem::{GateLimits, LinkPlan, Pose, Provenance, SplitAt, UnitSystem, reduce_mesh};
-use flexarm_log::mesh_picture::{MeshPictures, write_pictures};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let words: Vec<String> = std::env::args().skip(1).collect();

@@ -9,6 +9,8 @@
 
 use std::path::PathBuf;
 
+use flexarm_draw::mesh_picture::scene::{Paint, Scene, render};
+use flexarm_draw::mesh_picture::{Image, MeshPictures, PictureError, Rgb, View, color, write_pictures};
 use flexarm_fe_io::mesh::{ReadOptions, read_mesh};
 use flexarm_fem::reduction::{CondensationOptions, Interface, Tie};
 use flexarm_fem::sparse::ModesWanted;
@@ -16,8 +18,6 @@ use flexarm_fem::{
     ElementBlock, ElementKind, GateLimits, LinkPlan, Material, Mesh, MeshReduction, Pose, Provenance, SplitAt,
     UnitSystem, reduce_mesh,
 };
-use flexarm_log::mesh_picture::scene::{Paint, Scene, render};
-use flexarm_log::mesh_picture::{Image, MeshPictures, PictureError, Rgb, View, color, write_pictures};
 use nalgebra::Vector3;
 
 /// A steel bar of bricks along x, 0.8 x 0.1 x 0.06 m.

@@ -50,7 +50,7 @@ impl LinkMesh {
     /// About the same surface with at most so many corners: corners that share a cell of a grid become one, the grid being as
     /// fine as that allows.
     #[must_use]
-    pub(crate) fn simplified(self, corners: usize) -> Self {
+    pub fn simplified(self, corners: usize) -> Self {
         if self.positions.len() <= corners {
             return self;
         }
@@ -96,7 +96,7 @@ impl LinkMesh {
     }
 
     /// The part of the surface whose triangles are wanted, without corners that no triangle uses.
-    pub(crate) fn part(&self, wanted: impl Fn(&[u32; 3]) -> bool) -> Self {
+    pub fn part(&self, wanted: impl Fn(&[u32; 3]) -> bool) -> Self {
         let with_normals = self.normals.len() == self.positions.len();
         let mut new_index: HashMap<u32, u32> = HashMap::new();
         let mut part = Self { positions: Vec::new(), normals: Vec::new(), triangles: Vec::new(), ..self.clone() };

@@ -5,10 +5,10 @@
 //! deflection line itself; at the stations it is exact for every model. Before the first station the surface is
 //! rigid with it, beyond the last one with that.
 
-use flexarm_kinematics::{Pose, rotation_vector};
+use flexarm_spatial::{Pose, rotation_vector};
 use nalgebra::{Point3, Rotation3, Translation3, Vector3};
 
-use crate::{BendInfo, LinkMesh};
+use flexarm_sample::{BendInfo, LinkMesh};
 
 /// Slabs into which a surface is cut along the link, so that it can bend.
 const SLABS: f64 = 12.0;

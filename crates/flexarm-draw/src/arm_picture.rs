@@ -6,13 +6,14 @@
 //! picture what is in it, and at [`arm_png`] for a picture that says so itself; [`arm_sheet`] has both sides beside each
 //! other under a heading.
 
-use flexarm_kinematics::Pose;
+use flexarm_spatial::Pose;
 use nalgebra::{Matrix2x3, Matrix3, Point3, SymmetricEigen, Vector3};
 
 use crate::mesh_picture::draw::{Align, Style, text_width};
 use crate::mesh_picture::scene::{Paint, Scene, outline_of, render_over};
 use crate::mesh_picture::{Image, Rgb, View, color};
-use crate::{BendInfo, BentMesh, LinkMesh, Magnifier, RunHeader, Sample, TwinSample, stations_in_link};
+use crate::{BentMesh, Magnifier, stations_in_link};
+use flexarm_sample::{BendInfo, LinkMesh, RunHeader, Sample, TwinSample};
 
 /// Width of a picture at which lines and text have their nominal size (pixels).
 const NOMINAL_WIDTH: f64 = 900.0;
@@ -546,7 +547,7 @@ fn short(x: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::LinkInfo;
+    use flexarm_sample::LinkInfo;
     use nalgebra::Translation3;
 
     /// An arm without surfaces: base, upright link, arm that reaches out along x; its tool sags by 2 mm.

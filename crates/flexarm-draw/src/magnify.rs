@@ -1,9 +1,9 @@
 //! The arm with its deflections magnified, made from the flexible robot and its rigid twin.
 
-use flexarm_kinematics::{Pose, rotation_vector};
+use flexarm_spatial::{Pose, rotation_vector};
 use nalgebra::{Rotation3, Translation3};
 
-use crate::{RunHeader, Sample, TwinSample};
+use flexarm_sample::{RunHeader, Sample, TwinSample};
 
 /// Draws deflections larger than they are.
 ///
@@ -34,7 +34,7 @@ impl Magnifier {
     #[must_use]
     pub fn new(header: &RunHeader) -> Self {
         let factor = if header.magnification > 0.0 { header.magnification } else { 1.0 };
-        let parent = |link: &crate::LinkInfo| link.parent.map_or(Carrier::World, Carrier::Link);
+        let parent = |link: &flexarm_sample::LinkInfo| link.parent.map_or(Carrier::World, Carrier::Link);
         let mut carriers: Vec<Carrier> = header.links.iter().map(parent).collect();
         let (mut bends, mut first) = (Vec::new(), 0);
         for bend in &header.bends {

@@ -1,6 +1,6 @@
 //! A run as columns: each signal one contiguous array with a name, a unit and a width. Every sample is kept.
 //!
-//! Start at [`Columns::push`]. Rows of [`crate::Trace`], which thins long runs, are for pictures.
+//! Start at [`Columns::push`]. What thins long runs for pictures is `flexarm_log::Trace`.
 
 use crate::{RunHeader, Sample};
 

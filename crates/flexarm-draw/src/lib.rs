@@ -1,0 +1,39 @@
+//! How an arm, a mesh and curves are drawn.
+//!
+//! What recordings, markers and pictures show alike is decided here once: [`Magnifier`] enlarges deflections, [`BendLine`]
+//! and [`BentMesh`] bend surfaces, [`palette`] has the colours. Pictures need no graphics card: `arm_picture`, `arm_png` and
+//! `arm_sheet` draw an arm at one instant, `mesh_picture` the sheets of a mesh reduction (feature `png`), [`LinePlot`] curves
+//! as SVG.
+//!
+//! ```
+//! use flexarm_draw::Magnifier;
+//! use flexarm_sample::{LinkInfo, RunHeader, Sample, TwinSample};
+//! use flexarm_spatial::Pose;
+//!
+//! // One link at the base whose tool sags by 2 mm: drawn fifty times as large.
+//! let base = LinkInfo { name: "base".into(), parent: None, fixed: true };
+//! let header = RunHeader { links: vec![base], tcp: "tool".into(), magnification: 50.0, ..RunHeader::default() };
+//! let twin = |z: f64| TwinSample { X_WL: vec![Pose::identity()], X_WT: Pose::translation(1.0, 0.0, z), ..Default::default() };
+//! let sample = Sample { flexible: twin(-0.002), rigid: twin(0.0), ..Sample::default() };
+//! let shown = Magnifier::new(&header).magnified(&sample);
+//! assert!((shown.X_WT.translation.z + 0.1).abs() < 1e-12);
+//! ```
+//!
+//! Not here: files of recordings, what the numbers mean.
+#![allow(non_snake_case, reason = "monogram notation: X_WL, pose of L in W")]
+#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
+
+#[cfg(feature = "png")]
+mod arm_picture;
+mod bend;
+mod magnify;
+#[cfg(feature = "png")]
+pub mod mesh_picture;
+pub mod palette;
+mod plot;
+
+#[cfg(feature = "png")]
+pub use arm_picture::{ArmPicture, ArmPictureError, ArmSide, arm_color, arm_picture, arm_png, arm_sheet};
+pub use bend::{BendLine, BentMesh, BentPieces};
+pub use magnify::{Magnifier, stations_in_link};
+pub use plot::{CurveLook, LinePlot, Panel, PlotCurve, PlotError, page_plot, paper_plot};
