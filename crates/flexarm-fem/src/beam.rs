@@ -8,13 +8,13 @@
 //!
 //! Not here: distributed loads, buckling, offsets from beam to joint ([`crate::BeamLink`]).
 
+use flexarm_spatial::Matrix12;
 use nalgebra::{Matrix3, Matrix4, Matrix6, SMatrix, Vector3, Vector4};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{FemError, positive};
 use crate::rigid_part::RigidPart;
 use crate::section::Bar;
-use flexarm_spatial::Matrix12;
 
 /// Whether a beam yields to shear.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]

@@ -8,6 +8,7 @@
 //! u_E2 = Ad_E2B u_B,    K_BB = Ad_E2Bᵀ K_E2E2 Ad_E2B        E2: distal end of the beam, beam axes
 //! ```
 
+use flexarm_spatial::{Pose, adjoint};
 use nalgebra::{Matrix3, Rotation3, Translation3, Vector3};
 
 use crate::beam::{Beam, BeamTheory};
@@ -18,7 +19,6 @@ use crate::material::Material;
 use crate::reduced::{Provenance, ReducedLink};
 use crate::rigid_part::RigidPart;
 use crate::section::Section;
-use flexarm_spatial::{Pose, adjoint};
 
 /// Recipe of a link that is one uniform beam between two joints.
 #[derive(Debug, Clone, PartialEq)]

@@ -18,6 +18,7 @@
 //!
 //! Source: Castigliano's theorem for `C_BB`; the sharing by energy is ours.
 
+use flexarm_spatial::{Pose, adjoint, skew, symmetric_part};
 use nalgebra::{DMatrix, Matrix3, Matrix6, SMatrix, Vector3, Vector6};
 
 use crate::cut::{CutError, CutPlane, cut, volume_fractions};
@@ -28,7 +29,6 @@ use crate::model::FeModel;
 use crate::reduced::ElasticSplit;
 use crate::reduction::generalised_frequencies;
 use crate::rigid_part::RigidPart;
-use flexarm_spatial::{Pose, adjoint, skew, symmetric_part};
 
 /// A matrix with one column per unit wrench at B.
 type Loads = SMatrix<f64, 6, 6>;

@@ -2,10 +2,10 @@
 //!
 //! All in the link frame L: A proximal interface, B distal interface, S split.
 
+use flexarm_spatial::Pose;
 use nalgebra::Vector3;
 
 use crate::error::FemError;
-use flexarm_spatial::Pose;
 
 /// No link is longer than this, m: a larger distance is a mistake in the units.
 const LONGEST_LINK: f64 = 100.0;

@@ -14,11 +14,11 @@
 //!
 //! Start at [`check_matrix12`] or [`check_matrix6`].
 
+use flexarm_spatial::{Matrix12, Pose, adjoint, symmetric_part};
 use nalgebra::{Matrix6, SMatrix, SVector, SymmetricEigen, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{COMPONENTS, Direction, FemError};
-use flexarm_spatial::{Matrix12, Pose, adjoint, symmetric_part};
 
 /// How much each measure of the gate may be.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -10,6 +10,7 @@
 //! are the halves of the uniform bar with the same mass, centre of mass and inertia
 //! ([`halves_of_bar`]), which is said in a warning.
 
+use flexarm_spatial::Pose;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use crate::chain::Chain;
@@ -23,7 +24,6 @@ use crate::reduced::{LinkDetails, Provenance, ReducedLink};
 use crate::reduction::{Boundary, Condensation, CondensationOptions, InterfaceFrame, Superelement, stiffness12};
 use crate::rigid_part::RigidPart;
 use crate::sparse::{ModesWanted, SparseSymmetric};
-use flexarm_spatial::Pose;
 
 /// Where the masses of the two parts come from.
 #[derive(Debug, Clone, PartialEq)]

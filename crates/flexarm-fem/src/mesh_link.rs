@@ -9,6 +9,7 @@
 //!
 //! Not here: files, clocks, pictures.
 
+use flexarm_spatial::{Matrix12, Pose, symmetric_part};
 use nalgebra::{DMatrix, Matrix3, Matrix6, Vector3};
 
 use crate::chain::{Chain, ChainError, ChainSource, centre_of_compliance};
@@ -29,7 +30,6 @@ use crate::reduction::{
 };
 use crate::rigid_part::RigidPart;
 use crate::sparse::{Modes, ModesError, ModesWanted};
-use flexarm_spatial::{Matrix12, Pose, symmetric_part};
 
 /// Where the elastic joint of the two-part link sits.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

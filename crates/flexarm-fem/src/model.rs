@@ -8,6 +8,7 @@
 mod mass;
 mod scatter;
 
+use flexarm_spatial::Matrix12;
 use nalgebra::{DMatrix, Vector3};
 
 use crate::beam::Beam;
@@ -16,7 +17,6 @@ use crate::error::FemError;
 use crate::material::Material;
 use crate::mesh::{ElementBlock, Mesh, Region};
 use crate::sparse::SparseSymmetric;
-use flexarm_spatial::Matrix12;
 
 pub use mass::MassMatrix;
 use scatter::NodeGraph;

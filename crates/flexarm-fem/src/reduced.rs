@@ -15,6 +15,7 @@
 //! More than two interfaces, modes and chains of parts are in [`LinkDetails`]. Not here: how meshes are
 //! reduced ([`crate::mesh_link`]).
 
+use flexarm_spatial::{Matrix12, Pose, adjoint, symmetric_part};
 use nalgebra::{Matrix6, Vector3};
 
 use crate::chain::Chain;
@@ -25,7 +26,6 @@ use crate::mesh_gate::MeshGate;
 use crate::modal::ModalLink;
 use crate::reduction::Superelement;
 use crate::rigid_part::RigidPart;
-use flexarm_spatial::{Matrix12, Pose, adjoint, symmetric_part};
 
 /// Elastic joint between the two parts of a link.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,9 +1,9 @@
 //! The rigid half of a cut link: mass, centre of mass, inertia, and what no body can have.
 
+use flexarm_spatial::{Pose, skew};
 use nalgebra::{Matrix3, Matrix6, SymmetricEigen, Vector3};
 
 use crate::error::{FemError, positive};
-use flexarm_spatial::{Pose, skew};
 
 /// Slack in the triangle inequality of principal moments, relative to the largest: printed digits.
 const INERTIA_SLACK: f64 = 1e-6;

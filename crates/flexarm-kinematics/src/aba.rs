@@ -12,13 +12,13 @@
 //!
 //! Source: [Featherstone 2008], Table 7.1 (articulated bodies) and section 9.2 (hybrid dynamics).
 
+use flexarm_spatial::products::{mul, mul3, tr_mul, tr_mul3};
+use flexarm_spatial::{ArticulatedInertia, SpatialInertia, Twist, Wrench};
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Vector3};
 
 use crate::data::{Data, State, add_projection, joint_motion, place_modal, subspace_times};
 use crate::model::{Body, JointMotion, Model};
 use crate::rnea::nonlinear_effects;
-use flexarm_spatial::products::{mul, mul3, tr_mul, tr_mul3};
-use flexarm_spatial::{ArticulatedInertia, SpatialInertia, Twist, Wrench};
 
 /// Which joints are prescribed; the rest are free.
 #[derive(Clone, Debug, PartialEq)]

@@ -5,12 +5,12 @@
 //! axes, where its translations are constant. The coordinates of a modal body are n columns more: its own `C_t` and `C_r`
 //! and what its interfaces carry. Source: [Featherstone 2008], Table 6.2.
 
+use flexarm_spatial::products::{cross3, mul, mul3, tr_mul, tr_mul3};
+use flexarm_spatial::{SpatialInertia, Wrench};
 use nalgebra::{DMatrix, DVector, Matrix3};
 
 use crate::data::{Data, ElasticSubspace, joint_position, place_modal};
 use crate::model::{JointMotion, Model};
-use flexarm_spatial::products::{cross3, mul, mul3, tr_mul, tr_mul3};
-use flexarm_spatial::{SpatialInertia, Wrench};
 
 /// Mass matrix `M(q)`, nv×nv, both triangles (kg, kg m, kg m²). Fills `data.{X_PB, M}`. No allocation.
 pub fn mass_matrix<'d>(model: &Model, data: &'d mut Data, q: &DVector<f64>) -> &'d DMatrix<f64> {

@@ -3,13 +3,12 @@
 //! [`State`] is small and copyable between steppers; [`Data`] holds results and scratch of every algorithm,
 //! sized once by [`Data::new`], so that no algorithm allocates. Threads share a `Model`, each with its own `Data`.
 
+use flexarm_spatial::products::{mul, mul3, tr_mul};
+use flexarm_spatial::{ArticulatedInertia, ElasticAngles, Pose, SpatialInertia, Twist, Wrench};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use crate::modal::ModalData;
 use crate::model::{JointMotion, Model};
-use flexarm_spatial::ElasticAngles;
-use flexarm_spatial::products::{mul, mul3, tr_mul};
-use flexarm_spatial::{ArticulatedInertia, Pose, SpatialInertia, Twist, Wrench};
 
 /// Positions and velocities of all independent coordinates, in the model's coordinate order.
 #[derive(Clone, Debug, PartialEq)]

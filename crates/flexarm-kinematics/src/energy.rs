@@ -1,11 +1,11 @@
 //! Energies and centre of mass.
 
+use flexarm_spatial::{Pose, SpatialInertia, Wrench};
 use nalgebra::Vector3;
 
 use crate::data::{Data, State};
 use crate::kinematics::{forward_kinematics, forward_kinematics_velocity};
 use crate::model::Model;
-use flexarm_spatial::{Pose, SpatialInertia, Wrench};
 
 /// Kinetic energy (J); fills `data.{X_PB, X_WB, V}`.
 pub fn kinetic_energy(model: &Model, data: &mut Data, state: &State) -> f64 {

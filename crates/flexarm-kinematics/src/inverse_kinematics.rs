@@ -6,13 +6,12 @@
 //!
 //! Source: [Nakamura & Hanafusa 1986], [Wampler 1986]; damping update as in [Marquardt 1963].
 
+use flexarm_spatial::{Pose, rotation_vector};
 use nalgebra::{DMatrix, DVector, Matrix6xX, Vector6};
 
 use crate::data::Data;
 use crate::kinematics::{forward_kinematics, frame_jacobian};
 use crate::model::{Frame, Model};
-use flexarm_spatial::Pose;
-use flexarm_spatial::rotation_vector;
 
 /// Tolerances and bounds of the iteration.
 #[derive(Clone, Copy, Debug)]

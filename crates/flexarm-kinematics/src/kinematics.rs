@@ -3,13 +3,12 @@
 //! Frames: W world, B a body, T any frame fixed to a body (usually the tool). `J_WT_W` maps `q̇` to the
 //! twist of T: velocity of the point To and angular velocity, both in **world axes** (rows linear first).
 
+use flexarm_spatial::products::{mul, mul3};
+use flexarm_spatial::{ElasticAngles, Pose, Twist};
 use nalgebra::{Matrix6xX, Vector3};
 
 use crate::data::{Data, State, joint_motion, joint_position, place_modal, rotor_energy};
 use crate::model::{Frame, JointMotion, Model};
-use flexarm_spatial::ElasticAngles;
-use flexarm_spatial::products::{mul, mul3};
-use flexarm_spatial::{Pose, Twist};
 
 /// Poses of all bodies: fills `data.{X_PB, X_WB}`.
 pub fn forward_kinematics(model: &Model, data: &mut Data, q: &nalgebra::DVector<f64>) {

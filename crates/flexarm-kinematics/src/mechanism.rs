@@ -6,11 +6,10 @@
 
 use std::sync::Arc;
 
+use flexarm_spatial::{ElasticAngles, Pose, SpatialInertia};
 use nalgebra::{Matrix3, Unit, Vector3};
 
 use crate::modal::ModalBody;
-use flexarm_spatial::ElasticAngles;
-use flexarm_spatial::{Pose, SpatialInertia};
 
 /// Links joined by joints into one tree. SI units.
 #[derive(Clone, Debug, PartialEq)]

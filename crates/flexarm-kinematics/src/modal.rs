@@ -21,10 +21,9 @@
 //! Start at [`ModalBody`]. Sources: [Shabana 2013], chapter 5; [Wallrapp 1994] for the set of integrals.
 //! Not here: stiffness and damping of the modes, where shapes come from.
 
-use nalgebra::{Cholesky, DMatrix, Dyn, Matrix3, Matrix6xX, Vector3};
-
 use flexarm_spatial::products::{mul, tr_mul};
 use flexarm_spatial::{Pose, SpatialInertia, Twist, Wrench};
+use nalgebra::{Cholesky, DMatrix, Dyn, Matrix3, Matrix6xX, Vector3};
 
 /// Shapes at the interfaces and mass integrals over them; n coordinates, link axes, about the link's origin. SI units.
 #[derive(Clone, Debug, PartialEq)]

@@ -9,12 +9,11 @@
 
 use std::collections::HashMap;
 
+use flexarm_spatial::{ElasticAngles, Pose, SpatialInertia, skew};
 use nalgebra::{Matrix3, Vector3};
 
 use crate::mechanism::{Joint, JointKind, Limits, Mechanism};
 use crate::modal::ModalTables;
-use flexarm_spatial::ElasticAngles;
-use flexarm_spatial::{Pose, SpatialInertia, skew};
 
 /// A checked tree of bodies; built once, then only read and shared between threads.
 #[derive(Clone, Debug)]

@@ -11,11 +11,11 @@
 //! `Ṡ_B` is the rate of S in B axes: zero for one-DoF joints, not for elastic ones. A body that bends in modes adds its
 //! own inertia forces to (3) and to the forces of its coordinates, see [`crate::ModalBody`].
 
+use flexarm_spatial::{Twist, Wrench};
 use nalgebra::{DVector, Vector3};
 
 use crate::data::{Data, State, add_projection, joint_motion, place_modal, rotor_energy, subspace_times};
 use crate::model::Model;
-use flexarm_spatial::{Twist, Wrench};
 
 /// Generalised forces `τ = M(q) q̈ + bias(q, q̇)` (N m or N) for the accelerations `qddot`.
 ///

@@ -3,12 +3,12 @@
 use std::collections::{BTreeMap, HashMap};
 use std::fmt;
 
+use flexarm_spatial::Pose;
 use nalgebra::{DMatrix, Vector3};
 
 use super::error::{ExchangeError, ExchangeErrorKind, Place};
 use super::recognise::MatrixFormat;
 use super::sidecar::Sidecar;
-use flexarm_spatial::Pose;
 
 /// Up to this many rows a matrix is stored dense (32 MB).
 pub const LARGEST_DENSE: usize = 2000;

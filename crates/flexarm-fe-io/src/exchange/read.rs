@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 
+use flexarm_spatial::Pose;
 use nalgebra::Vector3;
 
 use super::error::{ExchangeError, ExchangeErrorKind, Place};
@@ -14,7 +15,6 @@ use super::{
     abaqus_text, dmig, exudyn, harwell_boeing, matrix_market, op4_binary, op4_text, sidecar, simscape, user_element,
 };
 use flexarm_fem::input::read_file;
-use flexarm_spatial::Pose;
 
 /// What a matrix is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

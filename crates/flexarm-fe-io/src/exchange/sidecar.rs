@@ -16,6 +16,7 @@
 //! Rows after the interfaces are modal coordinates. The components of all interfaces are along the
 //! link axes; the rotation of a frame is for its joint, not for the matrix.
 
+use flexarm_spatial::Pose;
 use nalgebra::{Matrix3, Rotation3, Translation3, Vector3};
 use serde::Deserialize;
 
@@ -23,7 +24,6 @@ use super::error::{ExchangeError, ExchangeErrorKind};
 use super::interface::{Interface, InterfaceMap};
 use super::text::Text;
 use flexarm_fem::units::UnitSystem;
-use flexarm_spatial::Pose;
 
 /// Value of `format` in every sidecar.
 pub(super) const FORMAT: &str = "flexarm-matrices";

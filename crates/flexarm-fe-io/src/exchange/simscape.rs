@@ -3,12 +3,12 @@
 //! The rows are those of the interfaces one after the other, translations first, then modes. That is
 //! our reading of the documentation and was not tried in Simscape.
 
+use flexarm_spatial::Pose;
 use nalgebra::{DMatrix, Quaternion, Translation3, UnitQuaternion};
 
 use super::error::{ExchangeError, ExchangeErrorKind};
 use super::matrix::{LabelledMatrix, Storage, Triplets};
 use super::text::{Text, words};
-use flexarm_spatial::Pose;
 
 /// Lines with numbers, without comments.
 fn rows<'a>(text: &Text<'a>) -> impl Iterator<Item = (super::error::Place<'a>, &'a str)> + use<'a> {

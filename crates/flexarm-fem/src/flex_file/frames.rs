@@ -1,5 +1,6 @@
 //! The frames of a reduced-link file: `[interface.A]`, `[interface.B]`, `[split]`.
 
+use flexarm_spatial::Pose;
 use nalgebra::{Matrix3, Rotation3, Translation3};
 
 use super::document::{Node, Table};
@@ -7,7 +8,6 @@ use super::error::{FlexErrorKind, FlexFileError};
 use super::read::{refused, required_table};
 use super::units::Units;
 use crate::frames::LinkFrames;
-use flexarm_spatial::Pose;
 
 /// Interfaces and split, in SI; the split in the middle where it is not given.
 pub(super) fn read_frames(root: &Table<'_, '_>, units: &Units) -> Result<LinkFrames, FlexFileError> {

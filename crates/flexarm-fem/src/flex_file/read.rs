@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use flexarm_spatial::{Matrix12, turn6, twice};
 use nalgebra::{Matrix3, Matrix6};
 use toml::de::DeTable;
 
@@ -17,7 +18,6 @@ use crate::gate::GateLimits;
 use crate::input::read_file;
 use crate::reduced::{Provenance, ReducedLink};
 use crate::rigid_part::RigidPart;
-use flexarm_spatial::{Matrix12, turn6, twice};
 
 const PARTS: [&str; 2] = ["proximal", "distal"];
 /// A file larger than this is refused (bytes): a link with 100 modes and stiffness by load has 10 MB.

@@ -2,12 +2,12 @@
 
 use std::fmt::Write;
 
+use flexarm_spatial::Pose;
 use nalgebra::{Matrix3, Rotation3};
 
 use super::{FORMAT, ORDER, VERSION};
 use crate::reduced::{Provenance, ReducedLink};
 use crate::rigid_part::RigidPart;
-use flexarm_spatial::Pose;
 
 /// The text of a reduced-link file: SI units, `K_BB` in link axes, one matrix row per line.
 ///

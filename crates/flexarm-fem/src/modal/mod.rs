@@ -35,12 +35,12 @@ mod superelement;
 mod tests;
 mod transform;
 
+use flexarm_spatial::Pose;
 use nalgebra::{DMatrix, Matrix3, Matrix3xX, Matrix6xX, Vector3};
 
 use crate::error::FemError;
 use crate::reduction::{generalised_frequencies, spd_inverse};
 use crate::rigid_part::RigidPart;
-use flexarm_spatial::Pose;
 
 pub use source::ModalSource;
 

@@ -1,11 +1,11 @@
 //! Other coordinates for the same shapes: orthogonalised, or fewer.
 
+use flexarm_spatial::Pose;
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Matrix6xX, Rotation3, Translation3, Vector3};
 
 use super::PRODUCTS;
 use super::{GeometricStiffness, ModalInterface, ModalLink};
 use crate::error::FemError;
-use flexarm_spatial::Pose;
 
 /// Modes with `ΦᵀKΦ = diag(ω²)`, `ΦᵀMΦ = 1`.
 pub(super) struct Eigenpairs {

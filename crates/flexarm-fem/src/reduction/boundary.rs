@@ -1,10 +1,10 @@
 //! Interfaces of a link and how they are tied to the mesh.
 
+use flexarm_spatial::Pose;
 use nalgebra::{DMatrix, Matrix3, SymmetricEigen, Vector3};
 use serde::{Deserialize, Serialize};
 
 use crate::model::FeModel;
-use flexarm_spatial::Pose;
 
 /// How the six DoF of an interface act on the nodes of its surface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]

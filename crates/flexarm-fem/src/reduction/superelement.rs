@@ -1,10 +1,10 @@
 //! The reduced model: a small dense stiffness and mass over interfaces and modes.
 
+use flexarm_spatial::{Matrix12, Pose};
 use nalgebra::{DMatrix, SymmetricEigen};
 
 use super::boundary::Tie;
 use super::condensation::spd_inverse;
-use flexarm_spatial::{Matrix12, Pose};
 
 /// One interface of a superelement.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,6 +1,7 @@
 //! Condensation against closed forms, itself, and the whole mesh.
 #![allow(clippy::print_stderr, reason = "tables of measured errors, shown with --nocapture")]
 
+use flexarm_spatial::Pose;
 use nalgebra::{DMatrix, Matrix6, Rotation3, Vector3, Vector6};
 
 use super::*;
@@ -15,7 +16,6 @@ use crate::reduced::Provenance;
 use crate::section::Section;
 use crate::sparse::ModesWanted;
 use crate::test_mesh::{Noise, cube};
-use flexarm_spatial::Pose;
 
 const STEEL: Material = Material::STEEL;
 

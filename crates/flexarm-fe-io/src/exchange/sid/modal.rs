@@ -12,13 +12,13 @@
 //!
 //! Source: Wallrapp (1994), *Mech. Struct. & Mach.* 22.
 
+use flexarm_spatial::Pose;
 use nalgebra::{DMatrix, Matrix3, Matrix3xX, Matrix6xX, Rotation3, Translation3, Vector3};
 
 use flexarm_fem::modal::{GeometricStiffness, ModalInterface, ModalLink, PRODUCTS, axial, symmetric};
 
 use super::{GyroLayout, OeOrder, Sid, SidMatrix, SidNode};
 use crate::exchange::{ExchangeError, ExchangeErrorKind};
-use flexarm_spatial::Pose;
 
 /// Start of the comment in which the names of the link and its nodes are kept.
 const COMMENT: &str = "modal link";
