@@ -53,6 +53,7 @@ mod columns;
 mod create;
 mod csv_file;
 mod error;
+mod formats;
 mod magnify;
 #[cfg(feature = "mcap")]
 mod mcap_file;
@@ -87,6 +88,7 @@ pub use columns::{Column, Columns};
 pub use create::CreateOptions;
 pub use csv_file::CsvRecorder;
 pub use error::LogError;
+pub use formats::*;
 pub use magnify::{Magnifier, stations_in_link};
 #[cfg(feature = "mcap")]
 pub use mcap_file::McapRecorder;
@@ -96,7 +98,6 @@ pub use multi::RecorderSet;
 #[cfg(feature = "parquet")]
 pub use parquet_file::ParquetRecorder;
 pub use plot::{CurveLook, LinePlot, Panel, PlotCurve, PlotError, page_plot, paper_plot};
-pub use read::{RecordingFormat, open_recording};
 pub use record::*;
 #[cfg(feature = "rerun")]
 pub use rrd_file::{RrdRecorder, RrdStudy, StudySeat};

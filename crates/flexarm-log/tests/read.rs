@@ -8,8 +8,7 @@ use std::path::{Path, PathBuf};
 
 use flexarm_kinematics::Pose;
 use flexarm_log::{
-    CreateOptions, CsvRecorder, LogError, Recorder, RecordingFormat, RunHeader, RunResult, RunSource, Sample,
-    open_recording,
+    CreateOptions, Holds, LogError, Recorder, RecordingFormat, RunHeader, RunResult, RunSource, Sample, open_recording,
 };
 
 /// Samples of most tests: more than one chunk of MCAP.
@@ -17,23 +16,13 @@ const SAMPLES: u64 = 400;
 
 fn recorder(path: &Path, format: RecordingFormat) -> Box<dyn Recorder> {
     let options = CreateOptions::default().with_overwrite(true);
-    match format {
-        RecordingFormat::Csv => Box::new(CsvRecorder::create(path, options)),
-        #[cfg(feature = "mcap")]
-        RecordingFormat::Mcap => Box::new(flexarm_log::McapRecorder::create(path, options)),
-        #[cfg(feature = "parquet")]
-        RecordingFormat::Parquet => Box::new(flexarm_log::ParquetRecorder::create(path, options)),
-        #[cfg(feature = "rerun")]
-        RecordingFormat::Rrd => Box::new(flexarm_log::RrdRecorder::create(path, options)),
-        #[allow(unreachable_patterns, reason = "which formats are left depends on the features")]
-        _ => unreachable!("only formats of this build are asked for"),
-    }
+    format.recorder(path, options).expect("only formats of this build are asked for")
 }
 
 /// Formats of this build whose numbers come back to the last bit.
 fn exact_formats() -> Vec<RecordingFormat> {
-    let exact = [RecordingFormat::Mcap, RecordingFormat::Csv, RecordingFormat::Parquet];
-    exact.into_iter().filter(|format| format.is_built_in()).collect()
+    let exact = |format: &RecordingFormat| format.is_built_in() && format.info().holds != Holds::Pictures;
+    RecordingFormat::ALL.into_iter().filter(exact).collect()
 }
 
 fn scratch(name: &str, format: RecordingFormat) -> PathBuf {
@@ -559,9 +548,9 @@ fn a_rerun_file_gives_back_its_curves_and_poses() {
 #[cfg(all(feature = "rerun", feature = "mcap"))]
 #[test]
 fn a_rerun_file_made_of_an_mcap_file_shows_the_same() {
-    use re_log_encoding::DecoderApp;
     use re_chunk::Chunk;
-use re_log_types::LogMsg;
+    use re_log_encoding::DecoderApp;
+    use re_log_types::LogMsg;
 
     let direct = written("direct", RecordingFormat::Rrd, &synthetic::header(), 60);
     let mcap = written("way", RecordingFormat::Mcap, &synthetic::header(), 60);

@@ -25,7 +25,7 @@ const URDF: &str = "robot.urdf";
 const OWN_GROUPS: [&str; 3] = ["flexarm.recording", "flexarm.units", "flexarm.result"];
 
 /// See the module.
-pub(super) struct McapRun {
+pub(crate) struct McapRun {
     path: PathBuf,
     header: RunHeader,
     epoch_ns: u64,
@@ -65,7 +65,7 @@ impl Topic {
 }
 
 impl McapRun {
-    pub(super) fn open(path: &Path) -> Result<Self, LogError> {
+    pub(crate) fn open(path: &Path) -> Result<Self, LogError> {
         let mut found = Found::default();
         let broken = walk(path, &mut |record| {
             found.take(record);

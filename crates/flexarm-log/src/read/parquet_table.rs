@@ -16,7 +16,7 @@ use crate::table::{self, TableLayout};
 use crate::{Attachment, LogError, RunHeader, RunResult, RunSource, Sample, run_json};
 
 /// See the module.
-pub(super) struct ParquetRun {
+pub(crate) struct ParquetRun {
     path: PathBuf,
     file: SerializedFileReader<File>,
     layout: TableLayout,
@@ -26,7 +26,7 @@ pub(super) struct ParquetRun {
 }
 
 impl ParquetRun {
-    pub(super) fn open(path: &Path) -> Result<Self, LogError> {
+    pub(crate) fn open(path: &Path) -> Result<Self, LogError> {
         let file = File::open(path).map_err(LogError::io(path, "open the recording"))?;
         let file = read(path, || SerializedFileReader::new(file))?;
         let names: Vec<String> = {

@@ -4,10 +4,10 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use flexarm_kinematics::Pose;
-use nalgebra::{Quaternion, Translation3, UnitQuaternion, Vector3};
 use crate::rerun::Chunk;
 use crate::rerun::{EntityPath, Scalars, SeriesLines, TextDocument, Timeline, Transform3D};
+use flexarm_kinematics::Pose;
+use nalgebra::{Quaternion, Translation3, UnitQuaternion, Vector3};
 
 use super::rrd_messages::{Message, Messages};
 use super::rrd_track::Track;
@@ -20,7 +20,7 @@ use crate::{ElasticSample, EnergySample, LogError, RunHeader, RunResult, RunSour
 const MILLI: f64 = 1e-3;
 
 /// See the module.
-pub(super) struct RrdRun {
+pub(crate) struct RrdRun {
     path: PathBuf,
     header: RunHeader,
     result: RunResult,
@@ -44,7 +44,7 @@ struct Data {
 }
 
 impl RrdRun {
-    pub(super) fn open(path: &Path) -> Result<Self, LogError> {
+    pub(crate) fn open(path: &Path) -> Result<Self, LogError> {
         let (mut data, mut broken, mut application) = (Data::default(), None, None);
         let mut messages = Messages::open(path)?;
         loop {

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use flexarm_analysis::{ErrorRecord, MetricSettings, error_parts, tcp_metrics_on_path};
-use flexarm_log::{EventKind, RunHeader, Trace};
+use flexarm_log::{EventKind, RecordingFormat, RunHeader, Trace};
 use serde::Serialize;
 
 use super::{ReportRun, figures, html};
@@ -35,9 +35,6 @@ pub struct ReportFiles {
     /// Things worth telling: sentences.
     pub warnings: Vec<String>,
 }
-
-/// Recordings in the folder of a run, the one that holds most first.
-const IN_FOLDER: [&str; 4] = ["run.mcap", "run.parquet", "run.csv", "run.rrd"];
 
 /// The trajectory of a recording that names none, for readers of tables.
 const UNKNOWN: &str = "unknown";
@@ -154,17 +151,23 @@ fn recording(path: &Path) -> Result<PathBuf, Error> {
     }
     match in_folder(path) {
         Some(path) => Ok(path),
-        None => fail(format!("the folder has no recording: expected one of {}", IN_FOLDER.join(", "))),
+        None => {
+            let names: Vec<_> = RecordingFormat::by_content().iter().map(|format| format.info().file_name).collect();
+            fail(format!("the folder has no recording: expected one of {}", names.join(", ")))
+        }
     }
 }
 
+/// The recording in the folder of a run that holds most.
 fn in_folder(folder: &Path) -> Option<PathBuf> {
+    let there: Vec<(RecordingFormat, PathBuf)> = RecordingFormat::by_content()
+        .into_iter()
+        .map(|format| (format, folder.join(format.info().file_name)))
+        .filter(|(_, path)| path.is_file())
+        .collect();
     // What this program cannot read is no reason to fail while there is something that it can.
-    let there = || IN_FOLDER.iter().map(|name| folder.join(name)).filter(|path| path.is_file());
-    let readable = |path: &PathBuf| {
-        flexarm_log::RecordingFormat::from_path(path).is_some_and(flexarm_log::RecordingFormat::is_built_in)
-    };
-    there().find(readable).or_else(|| there().next())
+    let readable = there.iter().find(|(format, _)| format.is_built_in());
+    readable.or(there.first()).map(|(_, path)| path.clone())
 }
 
 /// The summary of a folder, if it is one of several runs.

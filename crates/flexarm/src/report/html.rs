@@ -672,9 +672,10 @@ fn inputs(run: &ReportRun<'_>, named: bool) -> String {
     group("stepper", &rows.map(|(key, value)| (key.to_owned(), value)));
     // File names alone: the same run in another folder is the same page.
     let f = &s.files;
-    let names: Vec<String> = [&f.report, &f.report_md, &f.mcap, &f.rrd, &f.csv, &f.figures]
-        .into_iter()
-        .flatten()
+    let pages = [&f.report, &f.report_md].into_iter().flatten().map(String::as_str);
+    let names: Vec<String> = pages
+        .chain(f.recordings.iter().map(|(_, path)| path))
+        .chain(f.figures.as_deref())
         .filter_map(|path| std::path::Path::new(path).file_name().map(|name| name.to_string_lossy().into_owned()))
         .collect();
     group("files beside this page", &[("files".to_owned(), names.join(", "))]);
