@@ -13,7 +13,7 @@
 //! * a file is created by [`Recorder::begin`] and replaces an existing one only if told to
 //!   ([`CreateOptions::overwrite`]);
 //! * a killed run loses at most the last moment ([`CreateOptions::flush_every`]), and what is left can be read;
-//!   Parquet is the exception, it comes into being under another name and is there whole or not at all;
+//!   the exceptions ([`FormatInfo::survives_a_kill`]) come into being under another name and are there whole or not at all;
 //! * the same samples give the same bytes, on any day and at any speed: nothing in a file depends on the clock.
 //!
 //! Not here: what the numbers mean (`flexarm-analysis`), running the simulation (`flexarm`).
@@ -52,7 +52,10 @@ mod bend;
 mod columns;
 mod create;
 mod csv_file;
+#[cfg(feature = "described-tables")]
+mod described_table;
 mod error;
+mod file_recorder;
 mod formats;
 mod magnify;
 #[cfg(feature = "mcap")]
@@ -72,7 +75,7 @@ mod record;
 mod rerun;
 #[cfg(feature = "rerun")]
 mod rrd_file;
-#[cfg(any(feature = "mcap", feature = "parquet", feature = "rerun"))]
+#[cfg(any(feature = "mcap", feature = "described-tables", feature = "rerun"))]
 mod run_json;
 mod shape;
 mod surface;
@@ -80,6 +83,8 @@ mod table;
 #[cfg(any(feature = "mcap", feature = "rerun"))]
 mod tail_file;
 mod trace;
+#[cfg(feature = "described-tables")]
+mod whole_file;
 
 #[cfg(feature = "png")]
 pub use arm_picture::{ArmPicture, ArmPictureError, ArmSide, arm_color, arm_picture, arm_png, arm_sheet};
@@ -88,6 +93,7 @@ pub use columns::{Column, Columns};
 pub use create::CreateOptions;
 pub use csv_file::CsvRecorder;
 pub use error::LogError;
+pub use file_recorder::{FileRecorder, OpenFile};
 pub use formats::*;
 pub use magnify::{Magnifier, stations_in_link};
 #[cfg(feature = "mcap")]

@@ -2,6 +2,13 @@
 //!
 //! A format is its module and its row. From the row come the files of a run, the words of `convert`, what reports look for,
 //! the keys of summaries and the flags of the command line. Start at [`RecordingFormat`]; [`open_recording`] is the way back.
+//!
+//! | format | what comes back |
+//! | --- | --- |
+//! | MCAP | everything; numbers exactly, poses of links to 1e-13 (they are stored as quaternions from link to link) |
+//! | Parquet | the numbers of the columns exactly; names, set-up, result and events; no poses of links, no velocities |
+//! | CSV | the numbers of the columns exactly (times to 1 ns once they went through MCAP); no poses, velocities, result, nor names of robot and trajectory |
+//! | .rrd | the error to rounding (it is stored in mm); other curves and poses, these as `f32`, at the rate of the pictures, interpolated between them |
 
 mod open;
 

@@ -1,11 +1,6 @@
 //! Recordings read back: start at [`crate::open_recording`].
 //!
-//! | format | what comes back |
-//! | --- | --- |
-//! | MCAP | everything; numbers exactly, poses of links to 1e-13 (they are stored as quaternions from link to link) |
-//! | Parquet | the numbers of its columns exactly; names, set-up, result and events; no poses of links, no velocities |
-//! | CSV | the numbers of its columns exactly (times to 1 ns once they went through MCAP); no poses, velocities, result, nor names of robot and trajectory |
-//! | .rrd | the error to rounding (it is stored in mm); other curves and poses, these as `f32`, at the rate of the pictures, interpolated between them |
+//! What comes back of a run is said beside the table of formats (`formats/mod.rs`).
 //!
 //! A file that a killed run left, or a copy that broke off, is read up to its break; [`crate::RunSource::warnings`] says so.
 //! What a format does not hold is not made up: numbers are NaN, lists empty, and [`crate::RunSource::missing`] lists it.
@@ -23,8 +18,8 @@ mod rrd_messages;
 mod rrd_run;
 #[cfg(feature = "rerun")]
 mod rrd_track;
-#[cfg(any(feature = "mcap", feature = "parquet", feature = "rerun"))]
-mod wall;
+#[cfg(any(feature = "mcap", feature = "described-tables", feature = "rerun"))]
+pub(crate) mod wall;
 
 use std::path::{Path, PathBuf};
 
@@ -38,7 +33,7 @@ pub(crate) use self::rrd_run::RrdRun;
 use crate::LogError;
 
 /// A refusal in one's own words.
-fn not_a_recording(path: &Path, found: impl Into<String>, expected: impl Into<String>) -> LogError {
+pub(crate) fn not_a_recording(path: &Path, found: impl Into<String>, expected: impl Into<String>) -> LogError {
     LogError::NotARecording {
         path: path.to_owned(),
         found: found.into(),
@@ -56,7 +51,7 @@ fn broken_end(path: &Path, cause: &str, samples: u64, time_s: f64) -> String {
 }
 
 /// The file's name without folder and ending: the robot's name where the file has none.
-fn stem(path: &Path) -> String {
+pub(crate) fn stem(path: &Path) -> String {
     PathBuf::from(path.file_stem().unwrap_or_default()).display().to_string()
 }
 
