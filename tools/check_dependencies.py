@@ -23,7 +23,7 @@ PAGE = "ARCHITECTURE.md"
 LINES = ["faces", "proof", "facade", "edges", "results", "motion", "links", "base"]       # top to bottom
 INNER = ["results", "motion", "links", "base"]
 OWNERS = {  # outside crate: crates or lines that may name it
-    "rerun": ["flexarm-log"], "mcap": ["flexarm-log"], "parquet": ["flexarm-log"], "zstd": ["flexarm-log"], "png": ["flexarm-log"], "plotters": ["flexarm-log"], "faer": ["flexarm-fem"], "diffsol": ["flexarm-stepping"], "metis-sys": ["flexarm-fem"], "urdf-rs": ["flexarm-urdf"], "saphyr-parser": ["flexarm-urdf"],
+    "rerun": ["flexarm-log"], "mcap": ["flexarm-log"], "parquet": ["flexarm-log"], "arrow-array": ["flexarm-log"], "arrow-ipc": ["flexarm-log"], "arrow-schema": ["flexarm-log"], "zstd": ["flexarm-log"], "png": ["flexarm-log"], "plotters": ["flexarm-log"], "faer": ["flexarm-fem"], "diffsol": ["flexarm-stepping"], "metis-sys": ["flexarm-fem"], "urdf-rs": ["flexarm-urdf"], "saphyr-parser": ["flexarm-urdf"],
     "rustix": ["flexarm-log"], "signal-hook": ["faces"],
     "clap": ["faces"], "clap_complete": ["faces"], "clap_mangen": ["faces"], "indicatif": ["faces"],
 }

@@ -6,15 +6,19 @@
 //! | format | what comes back |
 //! | --- | --- |
 //! | MCAP | everything; numbers exactly, poses of links to 1e-13 (they are stored as quaternions from link to link) |
-//! | Parquet | the numbers of the columns exactly; names, set-up, result and events; no poses of links, no velocities |
+//! | Parquet, Arrow | the numbers of the columns exactly; names, set-up, result and events; no poses of links, no velocities |
 //! | CSV | the numbers of the columns exactly (times to 1 ns once they went through MCAP); no poses, velocities, result, nor names of robot and trajectory |
 //! | .rrd | the error to rounding (it is stored in mm); other curves and poses, these as `f32`, at the rate of the pictures, interpolated between them |
 
+#[cfg(feature = "arrow")]
+mod arrow_file;
 mod open;
 
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+#[cfg(feature = "arrow")]
+pub use self::arrow_file::{ArrowFile, ArrowRecorder};
 pub use self::open::open_recording;
 use crate::{CreateOptions, LogError, Recorder, RunHeader, RunSource, table};
 
@@ -29,6 +33,8 @@ pub enum RecordingFormat {
     Csv,
     /// Apache Parquet.
     Parquet,
+    /// Apache Arrow IPC, also called Feather, version 2.
+    Arrow,
 }
 
 /// The module of a format, if this build has its feature: its recorder and its reader.
@@ -109,6 +115,21 @@ const FORMATS: &[FormatInfo] = &[
         most_samples: Some(16_384 * i16::MAX as u64), // row groups are counted in 16 bits
         latest_s: None,
         code: code!("parquet", crate::ParquetRecorder, crate::read::ParquetRun),
+    },
+    FormatInfo {
+        format: RecordingFormat::Arrow,
+        name: "Arrow",
+        extension: "arrow",
+        other_extensions: &["feather"],
+        file_name: "run.arrow",
+        magic: b"ARROW1",
+        holds: Holds::DescribedTable,
+        by_default: false,
+        feature: Some("arrow"),
+        survives_a_kill: false,
+        most_samples: None,
+        latest_s: None,
+        code: code!("arrow", arrow_file::ArrowRecorder, arrow_file::ArrowRun),
     },
 ];
 
