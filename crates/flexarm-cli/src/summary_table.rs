@@ -4,7 +4,7 @@
 
 use anstyle::{AnsiColor, Style};
 use comfy_table::Table;
-use flexarm::{Figure, Holds, RecordingFormat, STUDY_NOTE, Summary, Weight, figure_groups, study_rows};
+use flexarm::{Figure, Files, Holds, RecordingFormat, STUDY_NOTE, Summary, Weight, figure_groups, study_rows};
 
 /// Columns where the terminal does not say how many it has.
 const USUAL_WIDTH: usize = 80;
@@ -73,7 +73,12 @@ pub(crate) fn summary(summary: &Summary, width: usize) -> String {
         out += &plot(summary, width.min(WIDEST_PLOT));
     }
     out += &study(summary, width);
-    let f = &summary.files;
+    out + &files(&summary.files)
+}
+
+/// Where the files are, and how to look at them.
+fn files(f: &Files) -> String {
+    let mut out = String::new();
     // Recordings for the eye before those for programs.
     let mut recordings: Vec<(RecordingFormat, &str)> = f.recordings.iter().collect();
     recordings.sort_by_key(|(format, _)| format.info().holds != Holds::Pictures);

@@ -196,6 +196,29 @@ pub(crate) fn header(
     arm: &FlexibleArm,
     links_model: &str,
 ) -> RunHeader {
+    let frequencies: Vec<String> = arm.modes.frequencies_hz().iter().map(|f| format!("{f:.4}")).collect();
+    RunHeader {
+        trajectory: motion.name.clone(),
+        metadata: metadata(robot, motion, options, arm, links_model, &frequencies),
+        description: description(robot, motion, options, links_model, &frequencies),
+        has_rigid: options.with_twin,
+        log_rate_hz: options.log_rate_hz,
+        step_s: options.step_s,
+        start_ns: options.start_ns,
+        urdf: located_urdf(robot, options.embed_meshes),
+        ..robot_header(robot, arm)
+    }
+}
+
+/// How the run was made, in groups of key-value pairs.
+fn metadata(
+    robot: &Robot,
+    motion: &Motion,
+    options: &RunOptions,
+    arm: &FlexibleArm,
+    links_model: &str,
+    frequencies: &[String],
+) -> Vec<(String, Vec<(String, String)>)> {
     let group = |name: &str, rows: &[(&str, String)]| {
         (name.to_owned(), rows.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect::<Vec<_>>())
     };
@@ -206,7 +229,6 @@ pub(crate) fn header(
         .iter()
         .map(|f| format!("{}: {}", f.flexible.link, f.flexible.reduced.provenance.method))
         .collect();
-    let frequencies: Vec<String> = arm.modes.frequencies_hz().iter().map(|f| format!("{f:.4}")).collect();
     let mut inputs = vec![
         ("robot_file", straight(&robot.path)),
         ("urdf_file", straight(&robot.urdf_path)),
@@ -225,7 +247,7 @@ pub(crate) fn header(
         LinkModel::Lumped => "lumped",
         LinkModel::Modal => "modal",
     };
-    let metadata = vec![
+    vec![
         group(
             "flexarm.run",
             &[
@@ -252,18 +274,7 @@ pub(crate) fn header(
             ],
         ),
         group("flexarm.inputs", &inputs),
-    ];
-    RunHeader {
-        trajectory: motion.name.clone(),
-        metadata,
-        description: description(robot, motion, options, links_model, &frequencies),
-        has_rigid: options.with_twin,
-        log_rate_hz: options.log_rate_hz,
-        step_s: options.step_s,
-        start_ns: options.start_ns,
-        urdf: located_urdf(robot, options.embed_meshes),
-        ..robot_header(robot, arm)
-    }
+    ]
 }
 
 /// The part of a header that the robot alone decides.

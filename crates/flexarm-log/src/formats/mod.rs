@@ -18,7 +18,7 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 
 #[cfg(feature = "arrow")]
-pub use self::arrow_file::{ArrowFile, ArrowRecorder};
+pub use self::arrow_file::ArrowRecorder;
 pub use self::open::open_recording;
 use crate::{CreateOptions, LogError, Recorder, RunHeader, RunSource, table};
 

@@ -78,8 +78,25 @@ pub fn report(recordings: &[PathBuf], options: &ReportOptions) -> Result<ReportF
     let folder = page.with_file_name(crate::record::FIGURES_FOLDER);
     check_places(&inputs, &page, &folder, options)?;
 
+    let runs = read_all(&inputs, &mut warnings)?;
+    let reports: Vec<ReportRun<'_>> =
+        runs.iter().map(|(label, summary, trace)| ReportRun { label, summary, trace }).collect();
+    write_all(&[(page.clone(), html(&reports))])?;
+    if let (true, Some((_, summary, trace))) = (options.figures, runs.first()) {
+        figures::write(&folder, summary, trace)?;
+    }
+    Ok(ReportFiles {
+        inputs: inputs.iter().map(|input| input.path.display().to_string()).collect(),
+        report: page.display().to_string(),
+        figures: options.figures.then(|| folder.display().to_string()),
+        warnings,
+    })
+}
+
+/// Label, figures and curves of each recording.
+fn read_all(inputs: &[Input], warnings: &mut Vec<String>) -> Result<Vec<(String, Summary, Trace)>, Error> {
     let mut runs: Vec<(String, Summary, Trace)> = Vec::new();
-    for Input { path, of_study } in &inputs {
+    for Input { path, of_study } in inputs {
         let (json, trace, told) = read_run(path)?;
         if trace.rows.is_empty() {
             return Err(no_sample(path, told.last()));
@@ -107,18 +124,7 @@ pub fn report(recordings: &[PathBuf], options: &ReportOptions) -> Result<ReportF
         };
         runs.push((label, summary, trace));
     }
-    let reports: Vec<ReportRun<'_>> =
-        runs.iter().map(|(label, summary, trace)| ReportRun { label, summary, trace }).collect();
-    write_all(&[(page.clone(), html(&reports))])?;
-    if let (true, Some((_, summary, trace))) = (options.figures, runs.first()) {
-        figures::write(&folder, summary, trace)?;
-    }
-    Ok(ReportFiles {
-        inputs: inputs.iter().map(|input| input.path.display().to_string()).collect(),
-        report: page.display().to_string(),
-        figures: options.figures.then(|| folder.display().to_string()),
-        warnings,
-    })
+    Ok(runs)
 }
 
 /// Refuses places that are taken, before anything is read at length or written.
