@@ -25,6 +25,7 @@ INNER = ["results", "motion", "links", "base", "algebra"]
 OWNERS = {  # outside crate: crates or lines that may name it
     "rerun": ["flexarm-log"], "re_chunk": ["flexarm-log"], "re_log_encoding": ["flexarm-log"], "re_log_types": ["flexarm-log"],
     "re_sdk_types": ["flexarm-log"], "re_tuid": ["flexarm-log"], "mcap": ["flexarm-log"], "parquet": ["flexarm-log"], "zstd": ["flexarm-log"],
+    "arrow-array": ["flexarm-log"], "arrow-ipc": ["flexarm-log"], "arrow-schema": ["flexarm-log"],
     "png": ["flexarm-draw"], "plotters": ["flexarm-draw"], "hdf5-pure": ["flexarm-fe-io"],
     "faer": ["flexarm-fem"], "diffsol": ["flexarm-stepping"], "metis-sys": ["flexarm-fem"], "urdf-rs": ["flexarm-urdf"], "saphyr-parser": ["flexarm-urdf"],
     "rustix": ["flexarm-log"], "signal-hook": ["faces"],

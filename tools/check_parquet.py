@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""Reads a Parquet recording with another program's reader and compares it with the CSV of the same run.
+"""Reads Parquet and Arrow recordings with another program's reader and compares them with the CSV of the same run.
 
-    python3 tools/check_parquet.py FOLDER                   run.parquet and run.csv in FOLDER
-    python3 tools/check_parquet.py FILE.parquet FILE.csv
+    python3 tools/check_parquet.py FOLDER                   run.parquet and run.arrow, as far as there, and run.csv in FOLDER
+    python3 tools/check_parquet.py FILE.parquet FILE.csv    or FILE.arrow
 
-    flexarm compare --parquet -o FOLDER                     makes both
+    flexarm compare --also parquet --also arrow -o FOLDER   makes all
 
 Checked: the names of the columns and their order, every number to the last bit, doubles without missing values, row
 groups of bounded size, and the texts beside the table. Needs pyarrow (Apache-2.0); says so and ends well without it.
@@ -23,13 +23,25 @@ def bits(x):
     return struct.pack("<d", x)
 
 
-def check(parquet_path, csv_path):
+def read(path):
+    """The table of a file, the rows of its groups or batches, and its texts."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
+    if path.suffix == ".parquet":
+        file = pq.ParquetFile(path)
+        groups = [file.metadata.row_group(k).num_rows for k in range(file.metadata.num_row_groups)]
+        return file.read(), groups, file.metadata.metadata
+    file = pa.ipc.open_file(pa.memory_map(str(path)))
+    groups = [file.get_batch(k).num_rows for k in range(file.num_record_batches)]
+    return file.read_all(), groups, file.schema.metadata
+
+
+def check(path, csv_path):
+    import pyarrow as pa
+
     problems = []
-    file = pq.ParquetFile(parquet_path)
-    table = file.read()
+    table, groups, texts = read(path)
     with open(csv_path, newline="", encoding="utf-8") as lines:
         rows = csv.reader(lines)
         names = next(rows)
@@ -49,10 +61,9 @@ def check(parquet_path, csv_path):
             k = different[0]
             problems.append(f"{name}: {len(different)} numbers differ, first in row {k}: {found[k]!r}, expected {expected[k]!r}")
 
-    groups = [file.metadata.row_group(k).num_rows for k in range(file.metadata.num_row_groups)]
     if any(rows > MOST_ROWS for rows in groups):
         problems.append(f"row groups of {groups} rows, expected at most {MOST_ROWS}")
-    texts = {key.decode(): value.decode() for key, value in (file.metadata.metadata or {}).items()}
+    texts = {key.decode(): value.decode() for key, value in (texts or {}).items()}
     for key in ("robot", "trajectory", "units", "version", "flexarm.run", "flexarm.result"):
         if not texts.get(key):
             problems.append(f"text {key}: not there")
@@ -70,9 +81,10 @@ def check(parquet_path, csv_path):
 def main(arguments):
     if len(arguments) == 1:
         folder = Path(arguments[0])
-        paths = [folder / "run.parquet", folder / "run.csv"]
+        recordings = [path for path in (folder / "run.parquet", folder / "run.arrow") if path.exists()]
+        csv_path = folder / "run.csv"
     elif len(arguments) == 2:
-        paths = [Path(a) for a in arguments]
+        recordings, csv_path = [Path(arguments[0])], Path(arguments[1])
     else:
         sys.exit(__doc__)
     try:
@@ -80,14 +92,18 @@ def main(arguments):
     except ImportError:
         print("skipped: pyarrow is not installed (pip install pyarrow)")
         return 0
-    missing = [str(path) for path in paths if not path.exists()]
-    if missing:
-        sys.exit(f"error: {', '.join(missing)}: no such file; flexarm compare --parquet -o FOLDER makes them")
-    problems, seen = check(*paths)
-    for problem in problems:
-        print(f"error: {paths[0]}: {problem}", file=sys.stderr)
-    print(f"parquet: {seen}, {len(problems)} problems (pyarrow {pyarrow.__version__})")
-    return 1 if problems else 0
+    missing = [str(path) for path in recordings + [csv_path] if not path.exists()]
+    if missing or not recordings:
+        files = ", ".join(missing) or f"{arguments[0]}: run.parquet, run.arrow"
+        sys.exit(f"error: {files}: no such file; flexarm compare --also parquet --also arrow -o FOLDER makes them")
+    status = 0
+    for path in recordings:
+        problems, seen = check(path, csv_path)
+        for problem in problems:
+            print(f"error: {path}: {problem}", file=sys.stderr)
+        print(f"{path.suffix[1:]}: {seen}, {len(problems)} problems (pyarrow {pyarrow.__version__})")
+        status = 1 if problems else status
+    return status
 
 
 if __name__ == "__main__":

@@ -535,8 +535,8 @@ def made_targets(run, folder):
             units = ["--units", "mm-t-s"]
         command = ["import", *given, *units, *words, "--no-files", "--json"]
         targets.append(Target(f"matrix-{change}", change, files, [command]))
-    run(["compare", "robot.toml", "motion.toml", "-o", "run", "--log-rate", "50", "--parquet", "--quiet"], ["compare", "robot.toml", "motion.toml", "-o", "run", "--log-rate", "50", "--quiet"])
-    for name in ("run.csv", "run.mcap", "run.parquet", "run.rrd"):
+    run(["compare", "robot.toml", "motion.toml", "-o", "run", "--log-rate", "50", "--parquet", "--also", "arrow", "--quiet"], ["compare", "robot.toml", "motion.toml", "-o", "run", "--log-rate", "50", "--quiet"])
+    for name in ("run.csv", "run.mcap", "run.parquet", "run.arrow", "run.rrd"):
         path = folder / "run" / name
         if not path.exists():
             print(f"left out: recordings {name} (this build writes none)")

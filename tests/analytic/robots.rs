@@ -6,7 +6,9 @@ use std::collections::HashMap;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use flexarm::{LinkModel, LoadOptions, Modelling, Motion, Outputs, Robot, RunOptions, Summary, simulate};
+use flexarm::{
+    LinkModel, LoadOptions, Modelling, Motion, Outputs, RecordingFormat, Robot, RunOptions, Summary, simulate,
+};
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("inside the workspace").to_owned()
@@ -23,7 +25,7 @@ fn run(robot: &str, trajectory: &str, options: &RunOptions) -> (Summary, HashMap
     let motion = Motion::load_for(&path, &robot.rigid_model().expect("a tree")).expect("a sound trajectory");
     let unique = format!("flexarm-robots-{}-{}-{trajectory}-{}", std::process::id(), robot.name, options.log_rate_hz);
     let folder = std::env::temp_dir().join(unique);
-    let outputs = Outputs { mcap: false, rrd: false, ..Outputs::everything(&folder) };
+    let outputs = Outputs { recordings: [RecordingFormat::Csv].into(), ..Outputs::everything(&folder) };
     let summary = simulate(&robot, &motion, options, Some(&outputs), &mut |_, _| ControlFlow::Continue(()));
     let summary = summary.expect("runs");
     let text = std::fs::read_to_string(folder.join("run.csv")).expect("the table");

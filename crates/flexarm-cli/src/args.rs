@@ -3,10 +3,11 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use flexarm::{DriveModel, LinkModel, Modelling};
+use flexarm::{DriveModel, LinkModel, Modelling, RecordingFormat};
 
 use crate::convert::ConvertArgs;
 use crate::exchange_args::{ExportArgs, ImportArgs};
+use crate::formats;
 use crate::posed_args::{ModesArgs, ResponseArgs, StaticsArgs};
 use crate::reduce_args::ReduceArgs;
 use crate::report::ReportArgs;
@@ -47,7 +48,7 @@ pub(crate) enum Command {
     Response(ResponseArgs),
     /// Make the HTML report of recorded runs
     Report(ReportArgs),
-    /// Write a recording as MCAP, Rerun, CSV or Parquet, from any of them
+    #[command(about = formats::about_convert())]
     Convert(ConvertArgs),
     /// Make a flexible link of a finite element mesh, with its checks
     Reduce(Box<ReduceArgs>),
@@ -247,6 +248,9 @@ pub(crate) struct RunArgs {
     /// Write the table as Parquet too (run.parquet); not readable before the run ends
     #[arg(long, help_heading = "Files", hide_short_help = true, conflicts_with = "no_files")]
     pub(crate) parquet: bool,
+    /// Write the run in this format too (may be repeated)
+    #[arg(long, help_heading = "Files", hide_short_help = true, value_name = "FORMAT", conflicts_with = "no_files", value_parser = formats::also())]
+    pub(crate) also: Vec<RecordingFormat>,
     /// Write nothing, only print the figures
     #[arg(long, help_heading = "Files", conflicts_with_all = ["output", "force", "figures"])]
     pub(crate) no_files: bool,
@@ -304,7 +308,7 @@ pub(crate) enum PageName {
     Motion,
     /// What acts on the arm during a run (.toml)
     Loads,
-    /// Recordings: MCAP, Rerun, CSV, Parquet
+    #[value(help = formats::help_page())]
     Recordings,
     /// Reduced links (.flex)
     Flex,

@@ -7,6 +7,7 @@ use clap::Args;
 use flexarm::{ConvertOptions, ConvertSummary, Error, RecordingFormat, parse_recording_format};
 
 use crate::args::Cli;
+use crate::formats;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -21,14 +22,12 @@ Examples:
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct ConvertArgs {
-    /// Recording to read: .mcap, .rrd, .csv or .parquet
-    #[arg(value_name = "IN")]
+    #[arg(value_name = "IN", help = formats::help_input())]
     pub(crate) input: PathBuf,
     /// Recording to write; its ending says the format
     #[arg(value_name = "OUT")]
     pub(crate) output: PathBuf,
-    /// Format of IN, whatever its name ends with: mcap, rrd, csv, parquet
-    #[arg(long, value_name = "FORMAT", value_parser = parse_recording_format)]
+    #[arg(long, value_name = "FORMAT", value_parser = parse_recording_format, help = formats::help_from())]
     pub(crate) from: Option<RecordingFormat>,
     /// Format of OUT, whatever its name ends with
     #[arg(long, value_name = "FORMAT", value_parser = parse_recording_format)]

@@ -5,6 +5,7 @@ mod args;
 mod convert;
 mod exchange;
 mod exchange_args;
+mod formats;
 mod posed;
 mod posed_args;
 mod print;
@@ -28,7 +29,7 @@ use args::{
 };
 use clap::{CommandFactory, Parser};
 use flexarm::{
-    AlphaSettings, ConstraintForm, Error, InertiaEstimate, LoadOptions, Outputs, ReadOptions, ReferenceMethod,
+    AlphaSettings, ConstraintForm, Error, InertiaEstimate, LoadOptions, ReadOptions, ReferenceMethod,
     ReferenceSettings, Robot, RunOptions, SpookPreset, SpookSettings, Start, StepperKind, Variant,
 };
 use indicatif::{ProgressBar, ProgressStyle};
@@ -230,10 +231,7 @@ fn simulate(cli: &Cli, args: &RunArgs, with_twin: bool) -> Result<ExitCode, Erro
     };
     let stem = format!("{}-{}", robot.name, motion.name);
     let folder = OutputFolder::of(args.output.as_deref(), &stem, !args.no_files)?;
-    let outputs = folder.path().map(|folder| {
-        let outputs = Outputs::everything(folder);
-        Outputs { overwrite: args.force, figures: args.figures, parquet: args.parquet, ..outputs }
-    });
+    let outputs = folder.path().map(|folder| formats::outputs(args, folder)).transpose()?;
 
     let mut stop = signals::stop_when_asked();
     let mut bar = Bar::new(cli);

@@ -180,11 +180,8 @@ fn modes_text(m: &ModeTable) -> String {
     }
     right(&mut t, 1);
     out += &lines(&t);
-    let f = &m.files;
-    for (what, path) in [("MCAP", &f.mcap), ("Rerun", &f.rrd), ("CSV", &f.csv)] {
-        if let Some(path) = path {
-            out += &format!("{what:<7} {path}\n");
-        }
+    for (format, path) in m.files.recordings.iter() {
+        out += &format!("{:<7} {path}\n", format.info().name);
     }
     if m.total > m.modes.len() {
         out += &format!("{} more modes: --count\n", m.total - m.modes.len());

@@ -18,8 +18,7 @@ Examples:
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(crate) struct ReportArgs {
-    /// Recordings (.mcap holds most; .parquet, .csv, .rrd) or folders of runs; several are compared in one page
-    #[arg(required = true, value_name = "RECORDING")]
+    #[arg(required = true, value_name = "RECORDING", help = crate::formats::help_report())]
     pub(crate) recordings: Vec<PathBuf>,
     /// The page to write [default: report.html beside the first recording]
     #[arg(short, long, value_name = "FILE")]

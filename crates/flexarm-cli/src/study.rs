@@ -18,7 +18,8 @@ pub(crate) struct Part<'a> {
 const MOST_OTHERS: usize = 50;
 
 /// Options that belong to the study as a whole.
-const SHARED: [&str; 9] = ["with", "output", "force", "no-files", "magnify", "json", "quiet", "figures", "parquet"];
+const SHARED: [&str; 10] =
+    ["with", "output", "force", "no-files", "magnify", "json", "quiet", "figures", "parquet", "also"];
 
 /// The runs of a study, the one that was asked for first. `line` is the command line as given.
 pub(crate) fn parts<'a>(main: &'a RunArgs, line: &[OsString]) -> Result<Vec<Part<'a>>, Error> {

@@ -4,7 +4,7 @@
 
 use anstyle::{AnsiColor, Style};
 use comfy_table::Table;
-use flexarm::{Figure, STUDY_NOTE, Summary, Weight, figure_groups, study_rows};
+use flexarm::{Figure, Files, Holds, RecordingFormat, STUDY_NOTE, Summary, Weight, figure_groups, study_rows};
 
 /// Columns where the terminal does not say how many it has.
 const USUAL_WIDTH: usize = 80;
@@ -73,24 +73,26 @@ pub(crate) fn summary(summary: &Summary, width: usize) -> String {
         out += &plot(summary, width.min(WIDEST_PLOT));
     }
     out += &study(summary, width);
-    let f = &summary.files;
-    let files = [
-        ("report", &f.report),
-        ("study", &f.study),
-        ("Rerun", &f.rrd),
-        ("MCAP", &f.mcap),
-        ("CSV", &f.csv),
-        ("Parquet", &f.parquet),
-        ("figures", &f.figures),
-    ];
-    let mut files = files.into_iter().filter_map(|(what, path)| path.as_ref().map(|path| (what, path))).peekable();
+    out + &files(&summary.files)
+}
+
+/// Where the files are, and how to look at them.
+fn files(f: &Files) -> String {
+    let mut out = String::new();
+    // Recordings for the eye before those for programs.
+    let mut recordings: Vec<(RecordingFormat, &str)> = f.recordings.iter().collect();
+    recordings.sort_by_key(|(format, _)| format.info().holds != Holds::Pictures);
+    let recordings = recordings.iter().map(|(format, path)| (format.info().name, Some(*path)));
+    let pages = [("report", f.report.as_deref()), ("study", f.study.as_deref())];
+    let files = pages.into_iter().chain(recordings).chain([("figures", f.figures.as_deref())]);
+    let mut files = files.filter_map(|(what, path)| path.map(|path| (what, path))).peekable();
     if files.peek().is_some() {
         out += &format!("\n{HEADING}files{HEADING:#}\n");
     }
     for (what, path) in files {
         out += &format!("  {what:<7}  {path}\n");
     }
-    if let Some(path) = f.study.as_ref().or(f.rrd.as_ref()) {
+    if let Some(path) = f.study.as_deref().or(f.recordings.get(RecordingFormat::Rrd)) {
         out += &format!("  look:    flexarm view {path}\n");
     }
     out

@@ -87,6 +87,29 @@ fn parquet_is_written_by_a_run_that_is_asked_for_it() {
     assert!(!place.path("result/run.parquet.partial").exists());
 }
 
+/// What a run does not write by itself it writes when it is asked to, and its summary names the file.
+#[cfg(feature = "arrow")]
+#[test]
+fn a_run_that_is_asked_for_arrow_writes_it_and_a_report_is_made_of_it() {
+    let place = Place::new();
+    let run = ["compare", "robot.toml", "swing.toml", "-o", "result"];
+    assert!(place.json(&run)["files"].get("arrow").is_none());
+    let summary = place.json(&[&run[..], &["--also", "arrow", "--force"]].concat());
+    assert_eq!(summary["files"]["arrow"], "result/run.arrow");
+    assert!(!place.path("result/run.arrow.partial").exists());
+    convert(&place, "result/run.arrow", "a.csv");
+    assert!(place.read("a.csv") == place.read("result/run.csv"));
+    convert(&place, "a.csv", "b.feather");
+    let summary = convert(&place, "b.feather", "b.csv");
+    assert_eq!((&summary["from"], &summary["to"]), (&Value::from("arrow"), &Value::from("csv")));
+    assert!(place.read("b.csv") == place.read("a.csv"));
+    place.json(&["report", "result/run.arrow", "-o", "page.html"]);
+    assert!(place.text("page.html").contains("run.arrow"));
+    // A later run without it leaves none behind.
+    place.json(&[&run[..], &["--force"]].concat());
+    assert!(!place.path("result/run.arrow").exists());
+}
+
 #[cfg(feature = "mcap")]
 #[test]
 fn a_recording_without_its_end_is_read_with_a_warning() {

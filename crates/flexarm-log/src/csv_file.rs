@@ -2,12 +2,13 @@
 
 use std::fs::File;
 use std::io::{self, Seek, SeekFrom, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use crate::create::FlushClock;
+use crate::file_recorder::{FileRecorder, OpenFile};
 use crate::shape::Shape;
 use crate::table;
-use crate::{CreateOptions, LogError, Recorder, RunHeader, RunResult, Sample};
+use crate::{CreateOptions, LogError, RunHeader, RunResult, Sample};
 
 /// Writes a run as comma-separated values with a header line.
 ///
@@ -21,23 +22,13 @@ use crate::{CreateOptions, LogError, Recorder, RunHeader, RunResult, Sample};
 ///
 /// Numbers are the shortest that read back as the same `f64`. Result figures of `finish` are not written:
 /// a table has no place for them.
-#[derive(Debug)]
-pub struct CsvRecorder {
-    path: PathBuf,
-    options: CreateOptions,
-    state: State,
-}
+pub type CsvRecorder = FileRecorder<CsvFile>;
 
+/// A CSV file that is being written.
 #[derive(Debug)]
-enum State {
-    New,
-    Open(Box<Open>),
-    Finished,
-}
-
-#[derive(Debug)]
-struct Open {
-    lines: Lines,
+pub struct CsvFile {
+    /// None once lines could not be written: a later line would follow a gap.
+    lines: Option<Lines>,
     shape: Shape,
     flush: FlushClock,
     /// Numbers of one line; used again for the next one.
@@ -94,67 +85,45 @@ impl Drop for Lines {
     }
 }
 
-impl CsvRecorder {
-    /// A recorder that will write `path`; the file is created by `begin`.
-    pub fn create(path: impl Into<PathBuf>, options: CreateOptions) -> Self {
-        Self { path: path.into(), options, state: State::New }
+impl OpenFile for CsvFile {
+    fn begin(path: &Path, options: CreateOptions, header: &RunHeader) -> Result<Self, LogError> {
+        let mut lines = Lines::new(options.create(path)?);
+        lines.add(table::columns(header)).map_err(csv_error(path, "write the column names"))?;
+        lines.flush().map_err(LogError::io(path, "write the column names"))?;
+        let flush = options.flush_clock(path);
+        Ok(Self { lines: Some(lines), shape: Shape::of(header), flush, row: Vec::new() })
+    }
+
+    fn record(&mut self, path: &Path, sample: &Sample) -> Result<(), LogError> {
+        let Some(lines) = &mut self.lines else { return Err(LogError::not_open(path, "record")) };
+        self.shape.check(path, sample)?;
+        table::fill_row(sample, &self.shape, &mut self.row);
+        // Rust's debug form of a float is the shortest that reads back, with an exponent where that is shorter.
+        let fields = self.row.iter().map(|value| format!("{value:?}"));
+        lines.add(fields).map_err(csv_error(path, "write a sample"))?;
+        if self.flush.due() || lines.is_full() {
+            self.flush(path, "write samples")?;
+        }
+        Ok(())
+    }
+
+    fn finish(&mut self, path: &Path, _result: &RunResult) -> Result<(), LogError> {
+        match self.lines {
+            Some(_) => self.flush(path, "write the last samples"),
+            None => Err(LogError::not_open(path, "finish")),
+        }
     }
 }
 
-impl CsvRecorder {
-    /// Writes out what waits. A table that could not be written on has come to its end: a later line would follow a gap.
-    fn flush(&mut self, action: &'static str) -> Result<(), LogError> {
-        let State::Open(open) = &mut self.state else { return Ok(()) };
-        let written = open.lines.flush().map_err(LogError::io(&self.path, action));
+impl CsvFile {
+    /// Writes out what waits. A table that could not be written on has come to its end.
+    fn flush(&mut self, path: &Path, action: &'static str) -> Result<(), LogError> {
+        let Some(lines) = &mut self.lines else { return Ok(()) };
+        let written = lines.flush().map_err(LogError::io(path, action));
         if written.is_err() {
-            self.state = State::Finished;
+            self.lines = None;
         }
         written
-    }
-}
-
-impl Recorder for CsvRecorder {
-    fn check(&self) -> Result<(), LogError> {
-        self.options.check(&self.path)
-    }
-
-    fn begin(&mut self, header: &RunHeader) -> Result<(), LogError> {
-        if !matches!(self.state, State::New) {
-            return Err(LogError::begun_twice(&self.path));
-        }
-        let mut lines = Lines::new(self.options.create(&self.path)?);
-        lines.add(table::columns(header)).map_err(csv_error(&self.path, "write the column names"))?;
-        lines.flush().map_err(LogError::io(&self.path, "write the column names"))?;
-        let flush = self.options.flush_clock(&self.path);
-        let open = Open { lines, shape: Shape::of(header), flush, row: Vec::new() };
-        self.state = State::Open(Box::new(open));
-        Ok(())
-    }
-
-    fn record(&mut self, sample: &Sample) -> Result<(), LogError> {
-        let State::Open(open) = &mut self.state else { return Err(LogError::not_open(&self.path, "record")) };
-        open.shape.check(&self.path, sample)?;
-        table::fill_row(sample, &open.shape, &mut open.row);
-        // Rust's debug form of a float is the shortest that reads back, with an exponent where that is shorter.
-        let fields = open.row.iter().map(|value| format!("{value:?}"));
-        open.lines.add(fields).map_err(csv_error(&self.path, "write a sample"))?;
-        if open.flush.due() || open.lines.is_full() {
-            self.flush("write samples")?;
-        }
-        Ok(())
-    }
-
-    fn finish(&mut self, _result: &RunResult) -> Result<(), LogError> {
-        if !matches!(self.state, State::Open(_)) {
-            return Err(LogError::not_open(&self.path, "finish"));
-        }
-        self.flush("write the last samples")?;
-        self.state = State::Finished;
-        Ok(())
-    }
-
-    fn path(&self) -> &Path {
-        &self.path
     }
 }
 

@@ -12,7 +12,7 @@
 //! * a file is created by [`Recorder::begin`] and replaces an existing one only if told to
 //!   ([`CreateOptions::overwrite`]);
 //! * a killed run loses at most the last moment ([`CreateOptions::flush_every`]), and what is left can be read;
-//!   Parquet is the exception, it comes into being under another name and is there whole or not at all;
+//!   the exceptions ([`FormatInfo::survives_a_kill`]) come into being under another name and are there whole or not at all;
 //! * the same samples give the same bytes, on any day and at any speed: nothing in a file depends on the clock.
 //!
 //! Not here: what the numbers mean (`flexarm-analysis`), running the simulation (`flexarm`).
@@ -47,7 +47,11 @@
 
 mod create;
 mod csv_file;
+#[cfg(feature = "described-tables")]
+mod described_table;
 mod error;
+mod file_recorder;
+mod formats;
 #[cfg(feature = "mcap")]
 mod mcap_file;
 mod multi;
@@ -61,18 +65,22 @@ mod record;
 mod rerun;
 #[cfg(feature = "rerun")]
 mod rrd_file;
-#[cfg(any(feature = "mcap", feature = "parquet", feature = "rerun"))]
+#[cfg(any(feature = "mcap", feature = "described-tables", feature = "rerun"))]
 mod run_json;
 mod shape;
 mod table;
 #[cfg(any(feature = "mcap", feature = "rerun"))]
 mod tail_file;
 mod trace;
+#[cfg(feature = "described-tables")]
+mod whole_file;
 
 pub use create::CreateOptions;
 pub use csv_file::CsvRecorder;
 pub use error::LogError;
+pub use file_recorder::{FileRecorder, OpenFile};
 pub use flexarm_sample::*;
+pub use formats::*;
 #[cfg(feature = "mcap")]
 pub use mcap_file::McapRecorder;
 #[cfg(feature = "mcap")]
@@ -80,8 +88,7 @@ pub use mcap_file::layouts::{foxglove_layout, plotjuggler_layout};
 pub use multi::RecorderSet;
 #[cfg(feature = "parquet")]
 pub use parquet_file::ParquetRecorder;
-pub use read::{RecordingFormat, open_recording};
-pub use record::Recorder;
+pub use record::*;
 #[cfg(feature = "rerun")]
 pub use rrd_file::{RrdRecorder, RrdStudy, StudySeat};
 pub use trace::{RunSource, Trace, TraceRow};

@@ -4,13 +4,16 @@ use crate::{Event, LogError, RunHeader, RunResult, Sample};
 
 /// A run as columns of scalars, with the sample of the largest error.
 ///
-/// Filled like a recorder, by [`Trace::push`] and [`Trace::finish`]. Long runs are thinned: beyond [`Trace::LIMIT`] rows every
+/// For pictures of a run, not for its numbers: [`crate::Columns`] hold every sample.
+///
+/// Filled like a recorder, by [`Trace::push`] and [`Trace::finish`]. **Long runs are thinned**: at [`Trace::LIMIT`] rows every
 /// second one is dropped and only every second sample is taken from then on, so rows stay evenly spaced.
+/// [`Trace::stride`] tells; the sample of the largest error ([`Trace::peak`]) is always kept.
 #[derive(Clone, Debug, Default)]
 pub struct Trace {
     /// What stays the same.
     pub header: RunHeader,
-    /// Rows, in order of time.
+    /// Rows, in order of time; one of every [`Trace::stride`] samples.
     pub rows: Vec<TraceRow>,
     /// The sample with the largest TCP error, for pictures.
     pub peak: Sample,
@@ -93,6 +96,18 @@ impl Trace {
             });
             self.stride = self.stride.max(1) * 2;
         }
+    }
+
+    /// Samples that were pushed, kept or not.
+    #[must_use]
+    pub fn samples(&self) -> u64 {
+        self.seen
+    }
+
+    /// One of so many samples is kept: 1 for a run that is not thinned, otherwise a power of two.
+    #[must_use]
+    pub fn stride(&self) -> u64 {
+        self.stride.max(1)
     }
 
     /// Adds what is known at the end.

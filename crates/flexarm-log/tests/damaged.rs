@@ -4,7 +4,7 @@
 
 mod synthetic;
 
-use flexarm_log::{CreateOptions, Recorder, RecordingFormat, open_recording};
+use flexarm_log::{CreateOptions, RecordingFormat, open_recording};
 use flexarm_testkit::allocations::{CountingAllocator, most_bytes};
 
 #[global_allocator]
@@ -13,19 +13,6 @@ static ALLOCATOR: CountingAllocator = CountingAllocator;
 /// What reading a small file may take.
 const MOST_BYTES: usize = 200 << 20;
 const CHANGES: u64 = 400;
-
-fn recorder(format: RecordingFormat, path: &std::path::Path) -> Box<dyn Recorder> {
-    let options = CreateOptions::default().with_overwrite(true);
-    match format {
-        #[cfg(feature = "mcap")]
-        RecordingFormat::Mcap => Box::new(flexarm_log::McapRecorder::create(path, options)),
-        #[cfg(feature = "rerun")]
-        RecordingFormat::Rrd => Box::new(flexarm_log::RrdRecorder::create(path, options)),
-        #[cfg(feature = "parquet")]
-        RecordingFormat::Parquet => Box::new(flexarm_log::ParquetRecorder::create(path, options)),
-        _ => Box::new(flexarm_log::CsvRecorder::create(path, options)),
-    }
-}
 
 /// Numbers that look random and are the same every time (xorshift).
 fn next(seed: &mut u64) -> u64 {
@@ -53,7 +40,8 @@ fn changed(file: &[u8], kind: u64, seed: &mut u64) -> Vec<u8> {
 fn a_damaged_recording_is_read_or_refused_in_bounded_memory() {
     for format in RecordingFormat::ALL.into_iter().filter(|format| format.is_built_in()) {
         let path = synthetic::scratch(&format!("damaged.{}", format.extension()));
-        let mut recorder = recorder(format, &path);
+        let options = CreateOptions::default().with_overwrite(true);
+        let mut recorder = format.recorder(&path, options).unwrap();
         recorder.begin(&synthetic::header()).unwrap();
         (0..60).for_each(|step| recorder.record(&synthetic::sample(step)).unwrap());
         recorder.finish(&synthetic::result()).unwrap();

@@ -8,8 +8,7 @@ use std::path::{Path, PathBuf};
 
 use flexarm_kinematics::Pose;
 use flexarm_log::{
-    CreateOptions, CsvRecorder, LogError, Recorder, RecordingFormat, RunHeader, RunResult, RunSource, Sample,
-    open_recording,
+    CreateOptions, Holds, LogError, Recorder, RecordingFormat, RunHeader, RunResult, RunSource, Sample, open_recording,
 };
 
 /// Samples of most tests: more than one chunk of MCAP.
@@ -17,23 +16,13 @@ const SAMPLES: u64 = 400;
 
 fn recorder(path: &Path, format: RecordingFormat) -> Box<dyn Recorder> {
     let options = CreateOptions::default().with_overwrite(true);
-    match format {
-        RecordingFormat::Csv => Box::new(CsvRecorder::create(path, options)),
-        #[cfg(feature = "mcap")]
-        RecordingFormat::Mcap => Box::new(flexarm_log::McapRecorder::create(path, options)),
-        #[cfg(feature = "parquet")]
-        RecordingFormat::Parquet => Box::new(flexarm_log::ParquetRecorder::create(path, options)),
-        #[cfg(feature = "rerun")]
-        RecordingFormat::Rrd => Box::new(flexarm_log::RrdRecorder::create(path, options)),
-        #[allow(unreachable_patterns, reason = "which formats are left depends on the features")]
-        _ => unreachable!("only formats of this build are asked for"),
-    }
+    format.recorder(path, options).expect("only formats of this build are asked for")
 }
 
 /// Formats of this build whose numbers come back to the last bit.
 fn exact_formats() -> Vec<RecordingFormat> {
-    let exact = [RecordingFormat::Mcap, RecordingFormat::Csv, RecordingFormat::Parquet];
-    exact.into_iter().filter(|format| format.is_built_in()).collect()
+    let exact = |format: &RecordingFormat| format.is_built_in() && format.info().holds != Holds::Pictures;
+    RecordingFormat::ALL.into_iter().filter(exact).collect()
 }
 
 fn scratch(name: &str, format: RecordingFormat) -> PathBuf {

@@ -66,7 +66,8 @@ pub fn simulate(
     simulate_traced(robot, motion, options, outputs, progress).map(|(summary, _)| summary)
 }
 
-/// As [`simulate`], and returns the curves of the run.
+/// As [`simulate`], and returns the curves of the run, which are thinned if it is long ([`Trace`]). All samples are in the
+/// recordings and in the columns of [`crate::Run`].
 ///
 /// # Errors
 /// As [`simulate`].

@@ -5,9 +5,7 @@ use std::io::ErrorKind;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use flexarm_log::{
-    CreateOptions, CsvRecorder, LogError, Recorder, RecordingFormat, RunSource, Sample, Trace, open_recording,
-};
+use flexarm_log::{CreateOptions, LogError, RecordingFormat, RunSource, Sample, Trace, open_recording};
 use serde::Serialize;
 
 use crate::error::Error;
@@ -35,7 +33,7 @@ pub struct ConvertSummary {
     pub input: String,
     /// The one that was written.
     pub output: String,
-    /// Ending of the input's format: mcap, rrd, csv or parquet.
+    /// Ending of the input's format, such as mcap or csv.
     pub from: &'static str,
     /// The same of the output.
     pub to: &'static str,
@@ -84,7 +82,8 @@ pub fn convert_until(
         return Err(Error::Interrupted { t: 0.0, partial: false });
     }
     let mut partial = Partial::of(output)?;
-    let mut recorder = recorder(&partial.path, to)?;
+    // Overwrites nothing: its file is a new one under a provisional name.
+    let mut recorder = crate::record::recorder(to, &partial.path, CreateOptions::default())?;
     // Messages name the file that was asked for.
     let hidden = partial.folder.clone();
     let named = |error: LogError| error.with_path_for(&hidden, output);
@@ -133,7 +132,7 @@ pub(crate) fn no_sample(path: &Path, why: Option<&String>) -> Error {
     LogError::NotARecording { path, found, expected, mend }.into()
 }
 
-/// Reads a recording into memory: its summary, if it holds one (MCAP, Parquet), its curves, and sentences about what is
+/// Reads a recording into memory: its summary, if it holds one (MCAP and tables with texts), its curves, and sentences about what is
 /// missing.
 ///
 /// What the format does not hold is NaN or empty ([`flexarm_log::RunSource::missing`]); a broken end is no error here, but
@@ -151,7 +150,14 @@ pub fn read_run(path: &Path) -> Result<(Option<serde_json::Value>, Trace, Vec<St
     let summary = result.attachments.iter().find(|file| file.name == "summary.json");
     let summary = summary.and_then(|file| serde_json::from_slice(&file.bytes).ok());
     trace.finish(result);
-    let told = [source.missing(), source.warnings()].concat();
+    let mut told = [source.missing(), source.warnings()].concat();
+    if trace.stride() > 1 {
+        told.push(format!(
+            "of its {} samples one of every {} is kept for curves, and for figures that the recording does not hold",
+            trace.samples(),
+            trace.stride()
+        ));
+    }
     Ok((summary, trace, told))
 }
 
@@ -160,8 +166,7 @@ pub fn read_run(path: &Path) -> Result<(Option<serde_json::Value>, Trace, Vec<St
 /// # Errors
 /// Which words there are.
 pub fn parse_recording_format(word: &str) -> Result<RecordingFormat, String> {
-    let known = |format: &RecordingFormat| format.extension() == word.to_ascii_lowercase();
-    RecordingFormat::ALL.into_iter().find(known).ok_or_else(|| format!("expected one of {}", words()))
+    RecordingFormat::from_word(word).ok_or_else(|| format!("expected one of {}", words()))
 }
 
 fn words() -> String {
@@ -199,22 +204,6 @@ fn open(path: &Path, format: RecordingFormat) -> Result<Box<dyn RunSource>, Erro
 
 pub(crate) fn same_file(a: &Path, b: &Path) -> bool {
     a.canonicalize().ok().zip(b.canonicalize().ok()).is_some_and(|(a, b)| a == b)
-}
-
-/// A recorder that overwrites nothing: its file is a new one under a provisional name.
-fn recorder(path: &Path, format: RecordingFormat) -> Result<Box<dyn Recorder>, Error> {
-    let options = CreateOptions::default();
-    match format {
-        RecordingFormat::Csv => Ok(Box::new(CsvRecorder::create(path, options))),
-        #[cfg(feature = "mcap")]
-        RecordingFormat::Mcap => Ok(Box::new(flexarm_log::McapRecorder::create(path, options))),
-        #[cfg(feature = "rerun")]
-        RecordingFormat::Rrd => Ok(Box::new(flexarm_log::RrdRecorder::create(path, options))),
-        #[cfg(feature = "parquet")]
-        RecordingFormat::Parquet => Ok(Box::new(flexarm_log::ParquetRecorder::create(path, options))),
-        #[allow(unreachable_patterns, reason = "which formats are left depends on the features")]
-        _ => Err(Error::Usage(format!("this program was built without {format}; use a build with it"))),
-    }
 }
 
 /// A file in a folder of its own beside the output, so that its name is nobody else's. The folder goes away in the end.

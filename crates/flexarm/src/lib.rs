@@ -97,12 +97,13 @@ pub use statics::{ElementStatics, Statics, record_statics, statics};
 pub use statics_picture::{StaticsFiles, StaticsOutputs};
 pub use study::{STUDY_NOTE, Variant, compare_study, study_rows};
 pub use summary::{
-    CURVE_PIECES, DifferenceFigures, Files, HoldFigures, LinkFigures, StepperFigures, Summary, TcpFigures,
+    CURVE_PIECES, DifferenceFigures, Files, HoldFigures, LinkFigures, RecordingFiles, StepperFigures, Summary,
+    TcpFigures,
 };
 
 pub use flexarm_analysis::{Quantity, Spacing};
 pub use flexarm_kinematics::{Pose, Wrench};
-pub use flexarm_log::{Column, Columns, RecordingFormat, Sample, Trace};
+pub use flexarm_log::{Column, Columns, FormatInfo, Holds, RecordingFormat, Sample, Trace};
 pub use flexarm_stepping::{
     AlphaSettings, ConstraintForm, LoadAxes, OperatingPoint, ReferenceMethod, ReferenceSettings, SpookPreset,
     SpookSettings, Start, StepError, StepperKind,

@@ -1,7 +1,9 @@
 //! Choices of a run, with defaults that work.
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
+use flexarm_log::RecordingFormat;
 use flexarm_stepping::{AlphaSettings, Start, StepperKind};
 
 use crate::applied_load::AppliedLoad;
@@ -98,37 +100,44 @@ impl Default for RunOptions {
     }
 }
 
-/// Where recordings go.
+/// Where recordings go, and which.
 #[derive(Clone, Debug)]
 pub struct Outputs {
     /// Folder; made if it is not there.
     pub folder: PathBuf,
     /// Overwrite what is there.
     pub overwrite: bool,
-    /// Write MCAP (needs the feature `mcap`).
-    pub mcap: bool,
-    /// Write .rrd (needs the feature `rerun`).
-    pub rrd: bool,
-    /// Write CSV.
-    pub csv: bool,
+    /// Formats of the recordings, one file each. Each must be one that this build can write
+    /// ([`RecordingFormat::is_built_in`]).
+    pub recordings: BTreeSet<RecordingFormat>,
     /// Write a folder `figures` with plots and pictures for papers.
     pub figures: bool,
-    /// Write Parquet (needs the feature `parquet`).
-    pub parquet: bool,
 }
 
 impl Outputs {
-    /// Every recording that this build can write, into a folder; no figures for papers, and no Parquet, which holds what the
-    /// CSV does.
+    /// Into a folder, what a run writes without being asked to: every recording that this build can write, but for tables
+    /// that hold what the CSV does; no figures for papers.
     pub fn everything(folder: impl Into<PathBuf>) -> Self {
+        let usual = |format: &RecordingFormat| format.info().by_default && format.is_built_in();
         Self {
             folder: folder.into(),
             overwrite: false,
-            mcap: cfg!(feature = "mcap"),
-            rrd: cfg!(feature = "rerun"),
-            csv: true,
+            recordings: RecordingFormat::ALL.into_iter().filter(usual).collect(),
             figures: false,
-            parquet: false,
         }
+    }
+
+    /// The same with a recording of this format too.
+    #[must_use]
+    pub fn with(mut self, format: RecordingFormat) -> Self {
+        self.recordings.insert(format);
+        self
+    }
+
+    /// The same without a recording of this format.
+    #[must_use]
+    pub fn without(mut self, format: RecordingFormat) -> Self {
+        self.recordings.remove(&format);
+        self
     }
 }

@@ -3,7 +3,7 @@
 use std::path::{Component, Path, PathBuf};
 
 use flexarm_kinematics::{Frame, JointKind, Model};
-use flexarm_log::{Attachment, CreateOptions, CsvRecorder, LinkInfo, LinkMesh, RecorderSet, RunHeader};
+use flexarm_log::{Attachment, CreateOptions, LinkInfo, LinkMesh, Recorder, RecorderSet, RecordingFormat, RunHeader};
 use flexarm_stepping::FlexibleArm;
 use flexarm_urdf::Geometry;
 
@@ -31,20 +31,12 @@ impl Recordings {
     }
 }
 
-/// Names of the files in an output folder.
-pub(crate) const RECORDING_FILES: [&str; 11] = [
-    "run.mcap",
-    "run.rrd",
-    "run.csv",
-    "run.parquet",
-    "report.html",
-    "report.md",
-    "summary.json",
-    STUDY_FILE,
-    FIGURES_FOLDER,
-    LAYOUT_FILES[0],
-    LAYOUT_FILES[1],
-];
+/// Names of the files that a run writes into its folder, recordings first.
+pub(crate) fn files_of_a_run() -> impl Iterator<Item = &'static str> {
+    let recordings = RecordingFormat::ALL.into_iter().map(|format| format.info().file_name);
+    let [foxglove, plotjuggler] = LAYOUT_FILES;
+    recordings.chain(["report.html", "report.md", "summary.json", STUDY_FILE, FIGURES_FOLDER, foxglove, plotjuggler])
+}
 
 /// Layouts of viewers beside `run.mcap`: Foxglove, PlotJuggler.
 const LAYOUT_FILES: [&str; 2] = ["run.foxglove.json", "run.plotjuggler.xml"];
@@ -62,7 +54,7 @@ pub(crate) fn refuse_to_overwrite(outputs: &Outputs) -> Result<(), Error> {
 
 /// The same, whatever is there under the names in `ours`.
 fn refuse_others(outputs: &Outputs, ours: &[&str]) -> Result<(), Error> {
-    let files = RECORDING_FILES.iter().filter(|file| !ours.contains(file));
+    let files = files_of_a_run().filter(|file| !ours.contains(file));
     let mut files = files.map(|file| outputs.folder.join(file));
     match files.find(|path| path.exists()).filter(|_| !outputs.overwrite) {
         None => Ok(()),
@@ -75,7 +67,7 @@ fn refuse_others(outputs: &Outputs, ours: &[&str]) -> Result<(), Error> {
 
 /// Removes what an earlier run left that this one does not write: beside the new files it would be taken for its own.
 fn remove_leftovers(outputs: &Outputs, ours: &[&str]) -> Result<(), Error> {
-    for file in RECORDING_FILES.iter().filter(|file| !ours.contains(file)) {
+    for file in files_of_a_run().filter(|file| !ours.contains(file)) {
         let path = outputs.folder.join(file);
         // Neither folders nor links were written by a run.
         if path.symlink_metadata().is_ok_and(|there| there.is_file()) {
@@ -86,47 +78,38 @@ fn remove_leftovers(outputs: &Outputs, ours: &[&str]) -> Result<(), Error> {
     Ok(())
 }
 
+/// A recorder of this format.
+///
+/// # Errors
+/// [`Error::Usage`] if this build has none.
+pub(crate) fn recorder(
+    format: RecordingFormat,
+    path: impl Into<PathBuf>,
+    options: CreateOptions,
+) -> Result<Box<dyn Recorder>, Error> {
+    let missing = || Error::Usage(format!("this program was built without {format}; use a build with it"));
+    format.recorder(path, options).ok_or_else(missing)
+}
+
 /// Recorders for the outputs; refuses to overwrite before anything is made. `in_study`: the recording of the study is being
 /// written too.
 pub(crate) fn recorders(outputs: Option<&Outputs>, in_study: bool) -> Result<Recordings, Error> {
     let mut recordings = Recordings { set: RecorderSet::new(), names: Files::default(), folders: Undo::default() };
     let Some(outputs) = outputs else { return Ok(recordings) };
     let mut ours = vec!["report.html", "report.md", "summary.json"];
-    let written = [
-        (outputs.mcap && cfg!(feature = "mcap"), "run.mcap"),
-        (outputs.rrd && cfg!(feature = "rerun"), "run.rrd"),
-        (outputs.csv, "run.csv"),
-        (outputs.parquet, "run.parquet"),
-        (in_study, STUDY_FILE),
-    ];
-    ours.extend(written.into_iter().filter_map(|(is_written, file)| is_written.then_some(file)));
+    ours.extend(outputs.recordings.iter().map(|format| format.info().file_name));
+    ours.extend(in_study.then_some(STUDY_FILE));
     refuse_others(outputs, if in_study { &[STUDY_FILE] } else { &[] })?;
     let options = CreateOptions::default().with_overwrite(outputs.overwrite);
     let path = |name: &str| outputs.folder.join(name);
     let text = |name: &str| Some(path(name).display().to_string());
-    #[cfg(feature = "mcap")]
-    if outputs.mcap {
-        recordings.set.push(Box::new(flexarm_log::McapRecorder::create(path("run.mcap"), options)));
-        recordings.names.mcap = text("run.mcap");
+    for &format in &outputs.recordings {
+        let name = format.info().file_name;
+        recordings.set.push(recorder(format, path(name), options)?);
+        recordings.names.recordings.insert(format, path(name).display().to_string());
+    }
+    if outputs.recordings.contains(&RecordingFormat::Mcap) {
         [recordings.names.foxglove_layout, recordings.names.plotjuggler_layout] = LAYOUT_FILES.map(text);
-    }
-    #[cfg(feature = "rerun")]
-    if outputs.rrd {
-        recordings.set.push(Box::new(flexarm_log::RrdRecorder::create(path("run.rrd"), options)));
-        recordings.names.rrd = text("run.rrd");
-    }
-    if outputs.csv {
-        recordings.set.push(Box::new(CsvRecorder::create(path("run.csv"), options)));
-        recordings.names.csv = text("run.csv");
-    }
-    if outputs.parquet {
-        #[cfg(not(feature = "parquet"))]
-        return Err(Error::Usage("this program was built without Parquet: leave --parquet out".into()));
-        #[cfg(feature = "parquet")]
-        {
-            recordings.set.push(Box::new(flexarm_log::ParquetRecorder::create(path("run.parquet"), options)));
-            recordings.names.parquet = text("run.parquet");
-        }
     }
     recordings.names.report = text("report.html");
     recordings.names.report_md = text("report.md");
@@ -213,6 +196,29 @@ pub(crate) fn header(
     arm: &FlexibleArm,
     links_model: &str,
 ) -> RunHeader {
+    let frequencies: Vec<String> = arm.modes.frequencies_hz().iter().map(|f| format!("{f:.4}")).collect();
+    RunHeader {
+        trajectory: motion.name.clone(),
+        metadata: metadata(robot, motion, options, arm, links_model, &frequencies),
+        description: description(robot, motion, options, links_model, &frequencies),
+        has_rigid: options.with_twin,
+        log_rate_hz: options.log_rate_hz,
+        step_s: options.step_s,
+        start_ns: options.start_ns,
+        urdf: located_urdf(robot, options.embed_meshes),
+        ..robot_header(robot, arm)
+    }
+}
+
+/// How the run was made, in groups of key-value pairs.
+fn metadata(
+    robot: &Robot,
+    motion: &Motion,
+    options: &RunOptions,
+    arm: &FlexibleArm,
+    links_model: &str,
+    frequencies: &[String],
+) -> Vec<(String, Vec<(String, String)>)> {
     let group = |name: &str, rows: &[(&str, String)]| {
         (name.to_owned(), rows.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect::<Vec<_>>())
     };
@@ -223,7 +229,6 @@ pub(crate) fn header(
         .iter()
         .map(|f| format!("{}: {}", f.flexible.link, f.flexible.reduced.provenance.method))
         .collect();
-    let frequencies: Vec<String> = arm.modes.frequencies_hz().iter().map(|f| format!("{f:.4}")).collect();
     let mut inputs = vec![
         ("robot_file", straight(&robot.path)),
         ("urdf_file", straight(&robot.urdf_path)),
@@ -242,7 +247,7 @@ pub(crate) fn header(
         LinkModel::Lumped => "lumped",
         LinkModel::Modal => "modal",
     };
-    let metadata = vec![
+    vec![
         group(
             "flexarm.run",
             &[
@@ -269,18 +274,7 @@ pub(crate) fn header(
             ],
         ),
         group("flexarm.inputs", &inputs),
-    ];
-    RunHeader {
-        trajectory: motion.name.clone(),
-        metadata,
-        description: description(robot, motion, options, links_model, &frequencies),
-        has_rigid: options.with_twin,
-        log_rate_hz: options.log_rate_hz,
-        step_s: options.step_s,
-        start_ns: options.start_ns,
-        urdf: located_urdf(robot, options.embed_meshes),
-        ..robot_header(robot, arm)
-    }
+    ]
 }
 
 /// The part of a header that the robot alone decides.

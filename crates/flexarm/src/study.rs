@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
-use flexarm_log::{Recorder, Trace, TraceRow};
+use flexarm_log::{Recorder, RecordingFormat, Trace, TraceRow};
 
 use crate::compare::{Progress, Together, run_traced};
 use crate::error::Error;
@@ -11,7 +11,7 @@ use crate::magnification::Expected;
 use crate::motion::Motion;
 use crate::options::{Outputs, RunOptions};
 use crate::prepare::checked;
-use crate::record::{RECORDING_FILES, refuse_to_overwrite};
+use crate::record::{files_of_a_run, refuse_to_overwrite};
 use crate::robot::Robot;
 use crate::summary::{DifferenceFigures, Summary, TcpFigures};
 
@@ -52,7 +52,9 @@ pub fn compare_study(
     let own_outputs = |number: usize| {
         outputs.map(|outputs| match number {
             0 => outputs.clone(),
-            _ => Outputs { folder: outputs.folder.join(&folders[number]), rrd: false, ..outputs.clone() },
+            // The viewer gets all of them in one recording.
+            _ => Outputs { folder: outputs.folder.join(&folders[number]), ..outputs.clone() }
+                .without(RecordingFormat::Rrd),
         })
     };
     let named = |number: usize| {
@@ -113,7 +115,7 @@ fn folders(variants: &[Variant]) -> Result<Vec<String>, Error> {
                 variant.label
             )));
         }
-        if RECORDING_FILES.contains(&name.to_lowercase().as_str()) {
+        if files_of_a_run().any(|file| file == name.to_lowercase()) {
             let text = "is the name of a file of the study: give its --with another name=...";
             return Err(Error::Usage(format!("the label {:?} {text}", variant.label)));
         }
@@ -301,7 +303,9 @@ struct StudyRecording {
 #[cfg(feature = "rerun")]
 impl StudyRecording {
     fn new(variants: &[Variant], outputs: Option<&Outputs>) -> Result<Self, Error> {
-        let Some(outputs) = outputs.filter(|outputs| outputs.rrd && variants.len() > 1) else {
+        let Some(outputs) =
+            outputs.filter(|outputs| outputs.recordings.contains(&RecordingFormat::Rrd) && variants.len() > 1)
+        else {
             return Ok(Self { study: None });
         };
         let path = outputs.folder.join(crate::record::STUDY_FILE);

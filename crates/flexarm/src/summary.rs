@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use flexarm_analysis::{ErrorParts, HoldMetrics, TcpMetrics};
+use flexarm_log::RecordingFormat;
 use flexarm_stepping::{ConstraintForm, Counts, SpookPreset, StepperKind};
 use serde::{Deserialize, Serialize};
 
@@ -84,14 +85,9 @@ pub struct Summary {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Files {
-    /// MCAP recording.
-    pub mcap: Option<String>,
-    /// Rerun recording.
-    pub rrd: Option<String>,
-    /// Table.
-    pub csv: Option<String>,
-    /// The same table as Parquet.
-    pub parquet: Option<String>,
+    /// Recordings.
+    #[serde(flatten)]
+    pub recordings: RecordingFiles,
     /// Report: a page for the browser, with plots and pictures.
     pub report: Option<String>,
     /// Rerun recording of all runs of a study.
@@ -105,6 +101,49 @@ pub struct Files {
     pub foxglove_layout: Option<String>,
     /// The same for PlotJuggler.
     pub plotjuggler_layout: Option<String>,
+}
+
+/// Names of the recordings of a run, by format. In JSON a key for each: the ending of the format's files.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct RecordingFiles(BTreeMap<RecordingFormat, String>);
+
+/// Formats whose key is in every summary, null where none was written; others are there where they were written.
+const ALWAYS_TOLD: [RecordingFormat; 4] =
+    [RecordingFormat::Mcap, RecordingFormat::Rrd, RecordingFormat::Csv, RecordingFormat::Parquet];
+
+impl RecordingFiles {
+    /// The recording of this format.
+    #[must_use]
+    pub fn get(&self, format: RecordingFormat) -> Option<&str> {
+        self.0.get(&format).map(String::as_str)
+    }
+
+    /// All that there are, in the order of the formats.
+    pub fn iter(&self) -> impl Iterator<Item = (RecordingFormat, &str)> {
+        self.0.iter().map(|(format, file)| (*format, file.as_str()))
+    }
+
+    /// Adds the recording of a format.
+    pub(crate) fn insert(&mut self, format: RecordingFormat, file: String) {
+        self.0.insert(format, file);
+    }
+}
+
+impl Serialize for RecordingFiles {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let told = |format: &RecordingFormat| ALWAYS_TOLD.contains(format) || self.get(*format).is_some();
+        let formats = RecordingFormat::ALL.into_iter().filter(told);
+        serializer.collect_map(formats.map(|format| (format.extension(), self.get(format))))
+    }
+}
+
+impl<'de> Deserialize<'de> for RecordingFiles {
+    /// Passes over keys that are no formats, among them those of the other files.
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let keys = BTreeMap::<String, serde_json::Value>::deserialize(deserializer)?;
+        let file = |format: RecordingFormat| Some((format, keys.get(format.extension())?.as_str()?.to_owned()));
+        Ok(Self(RecordingFormat::ALL.into_iter().filter_map(file).collect()))
+    }
 }
 
 /// Stepper and its work.

@@ -5,8 +5,8 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use flexarm::{
-    ConvertOptions, Error, LinkModel, LoadOptions, Modelling, Motion, Outputs, Robot, RunOptions, Summary, Variant,
-    compare_study, convert_until, simulate_traced,
+    ConvertOptions, Error, LinkModel, LoadOptions, Modelling, Motion, Outputs, RecordingFormat, Robot, RunOptions,
+    Summary, Variant, compare_study, convert_until, simulate_traced,
 };
 use flexarm_log::{Trace, TraceRow};
 
@@ -81,7 +81,7 @@ fn runs_with_other_steps_are_apart_by_what_their_errors_differ() {
 #[test]
 fn a_conversion_that_is_stopped_leaves_nothing() {
     let folder = std::env::temp_dir().join(format!("flexarm-figures-{}", std::process::id()));
-    let outputs = Outputs { mcap: false, rrd: false, ..Outputs::everything(&folder) };
+    let outputs = Outputs { recordings: [RecordingFormat::Csv].into(), ..Outputs::everything(&folder) };
     run("one_beam", "beam_swing.toml", Some(&outputs));
     let names = || std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().file_name()).collect::<Vec<_>>();
     let before = names();

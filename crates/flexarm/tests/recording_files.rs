@@ -23,7 +23,7 @@ fn recorded(name: &str, options: &RunOptions) -> (Folder, RunHeader) {
     let robot = Robot::load_with(&root.join("robots/kr210"), &LoadOptions::default()).unwrap();
     let motion =
         Motion::load_for(&root.join("trajectories/pick_and_place.toml"), &robot.rigid_model().unwrap()).unwrap();
-    let outputs = Outputs { csv: false, rrd: false, ..Outputs::everything(&folder.0) };
+    let outputs = Outputs { recordings: [RecordingFormat::Mcap].into(), ..Outputs::everything(&folder.0) };
     let mut under_way = |t: f64, _: f64| if t > 0.0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
     let end = simulate(&robot, &motion, options, Some(&outputs), &mut under_way);
     assert!(matches!(end, Err(Error::Interrupted { .. })), "{end:?}");

@@ -1,6 +1,7 @@
 //! The report page of real runs: it loads nothing, says what the runs said, and is the same for the same run.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
+use std::collections::BTreeSet;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -323,7 +324,7 @@ fn the_summary_can_be_read_back() {
 #[test]
 fn the_files_of_a_run_are_written_and_not_overwritten() {
     let folder = Folder::new("files");
-    let outputs = Outputs { csv: false, mcap: false, rrd: false, figures: true, ..Outputs::everything(&folder.0) };
+    let outputs = Outputs { recordings: BTreeSet::new(), figures: true, ..Outputs::everything(&folder.0) };
     let (summary, _) = run("one_beam", "beam_swing.toml", &RunOptions::default(), Some(&outputs));
     let text = |name: &str| std::fs::read_to_string(folder.0.join(name)).unwrap();
     assert!(summary.files.report.as_ref().unwrap().ends_with("report.html"));

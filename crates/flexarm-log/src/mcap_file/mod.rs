@@ -21,7 +21,7 @@ mod messages;
 mod output;
 mod provisional;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use mcap::{McapError, McapResult};
 
@@ -33,9 +33,10 @@ use self::mesh_files::mesh_files;
 use self::messages::{Level, Stamp};
 use self::output::Output;
 use crate::create::FlushClock;
+use crate::file_recorder::{FileRecorder, OpenFile};
 use crate::shape::Shape;
 use crate::tail_file::SharedTail;
-use crate::{CreateOptions, EventKind, LogError, Recorder, RunHeader, RunResult, START_NS, Sample, TwinSample};
+use crate::{CreateOptions, EventKind, LogError, RunHeader, RunResult, START_NS, Sample, TwinSample};
 
 /// Writes a run as an MCAP file.
 ///
@@ -71,84 +72,50 @@ use crate::{CreateOptions, EventKind, LogError, Recorder, RunHeader, RunResult, 
 /// The file also holds `robot.urdf`, the mesh files, `RunHeader::attachments`, for readers of flexarm `run.json` and
 /// `meshes.bin.zst` (header and surfaces) and, at the end, `result.json` and `RunResult::attachments` as attachments, and the groups of `RunHeader::metadata`, `flexarm.recording`, `flexarm.units` and, at the end,
 /// `flexarm.result` as metadata.
-pub struct McapRecorder {
-    path: PathBuf,
-    options: CreateOptions,
-    start_ns: u64,
-    state: State,
+pub type McapRecorder = FileRecorder<McapFile>;
+
+/// Stamp of a simulated time in a file whose time zero is `start_ns`.
+fn stamp(path: &Path, start_ns: u64, time_s: f64) -> Result<Stamp, LogError> {
+    let room_ns = Stamp::MAX.saturating_sub(start_ns);
+    let time_ns = (time_s * 1e9).round();
+    if !(0.0..=room_ns as f64).contains(&time_ns) || start_ns > Stamp::MAX {
+        return Err(LogError::Time { path: path.to_owned(), time_s, limit_s: room_ns as f64 * 1e-9 });
+    }
+    Ok(Stamp(start_ns + time_ns as u64))
 }
 
-enum State {
-    New,
-    Open(Box<Open>),
-    Finished,
-}
-
-impl McapRecorder {
-    /// A recorder that will write `path`; the file is created by `begin`.
-    pub fn create(path: impl Into<PathBuf>, options: CreateOptions) -> Self {
-        Self { path: path.into(), options, start_ns: START_NS, state: State::New }
-    }
-
-    /// Stamp of a simulated time.
-    fn stamp(&self, time_s: f64) -> Result<Stamp, LogError> {
-        let room_ns = Stamp::MAX.saturating_sub(self.start_ns);
-        let time_ns = (time_s * 1e9).round();
-        if !(0.0..=room_ns as f64).contains(&time_ns) || self.start_ns > Stamp::MAX {
-            return Err(LogError::Time { path: self.path.clone(), time_s, limit_s: room_ns as f64 * 1e-9 });
-        }
-        Ok(Stamp(self.start_ns + time_ns as u64))
-    }
-}
-
-impl Recorder for McapRecorder {
-    fn check(&self) -> Result<(), LogError> {
-        self.options.check(&self.path)
-    }
-
-    fn begin(&mut self, header: &RunHeader) -> Result<(), LogError> {
-        if !matches!(self.state, State::New) {
-            return Err(LogError::begun_twice(&self.path));
-        }
-        self.start_ns = header.start_ns.unwrap_or(START_NS);
-        let start = self.stamp(0.0)?;
+impl OpenFile for McapFile {
+    fn begin(path: &Path, options: CreateOptions, header: &RunHeader) -> Result<Self, LogError> {
+        let start = stamp(path, header.start_ns.unwrap_or(START_NS), 0.0)?;
         let meshes = mesh_files(header)?;
-        let file = SharedTail::new(self.options.create(&self.path)?);
-        let error = mcap_error(&self.path, "write the description of the run");
-        let mut open = Open::new(file, header, start, self.options.flush_clock(&self.path)).map_err(error)?;
-        let error = mcap_error(&self.path, "write the description of the run");
+        let file = SharedTail::new(options.create(path)?);
+        let error = mcap_error(path, "write the description of the run");
+        let mut open = Self::new(file, header, start, options.flush_clock(path)).map_err(error)?;
+        let error = mcap_error(path, "write the description of the run");
         open.describe(header, &meshes).map_err(error)?;
-        self.state = State::Open(Box::new(open));
-        Ok(())
+        Ok(open)
     }
 
-    fn record(&mut self, sample: &Sample) -> Result<(), LogError> {
-        let stamp = self.stamp(sample.time_s)?;
-        let State::Open(open) = &mut self.state else { return Err(LogError::not_open(&self.path, "record")) };
-        open.shape.check(&self.path, sample)?;
-        open.sample(stamp, sample).map_err(mcap_error(&self.path, "write a sample"))?;
-        if open.flush.due() || open.output.is_full() {
-            open.output.flush().map_err(LogError::io(&self.path, "write samples"))?;
-            open.flush.done();
+    fn record(&mut self, path: &Path, sample: &Sample) -> Result<(), LogError> {
+        let stamp = stamp(path, self.start.0, sample.time_s)?;
+        self.shape.check(path, sample)?;
+        self.sample(stamp, sample).map_err(mcap_error(path, "write a sample"))?;
+        if self.flush.due() || self.output.is_full() {
+            self.output.flush().map_err(LogError::io(path, "write samples"))?;
+            self.flush.done();
         }
         Ok(())
     }
 
-    fn finish(&mut self, result: &RunResult) -> Result<(), LogError> {
-        let times = result.events.iter().map(|event| self.stamp(event.time_s)).collect::<Result<Vec<_>, _>>()?;
-        let State::Open(open) = &mut self.state else { return Err(LogError::not_open(&self.path, "finish")) };
-        open.finish(result, &times).map_err(mcap_error(&self.path, "write the result and the index"))?;
-        self.state = State::Finished;
-        Ok(())
-    }
-
-    fn path(&self) -> &Path {
-        &self.path
+    fn finish(&mut self, path: &Path, result: &RunResult) -> Result<(), LogError> {
+        let times = result.events.iter().map(|event| stamp(path, self.start.0, event.time_s));
+        let times = times.collect::<Result<Vec<_>, _>>()?;
+        self.end(result, &times).map_err(mcap_error(path, "write the result and the index"))
     }
 }
 
-/// A file between `begin` and `finish`.
-struct Open {
+/// An MCAP file that is being written.
+pub struct McapFile {
     output: Output,
     channels: Channels,
     shape: Shape,
@@ -171,7 +138,7 @@ struct Open {
     paths_at: Option<Stamp>,
 }
 
-impl Open {
+impl McapFile {
     fn new(file: SharedTail, header: &RunHeader, start: Stamp, flush: FlushClock) -> McapResult<Self> {
         let mut output = Output::new(file)?;
         let channels = Channels::add(&mut output, header)?;
@@ -350,7 +317,8 @@ impl Open {
         Ok(())
     }
 
-    fn finish(&mut self, result: &RunResult, event_times: &[Stamp]) -> McapResult<()> {
+    /// The last paths, the events, the result and the index.
+    fn end(&mut self, result: &RunResult, event_times: &[Stamp]) -> McapResult<()> {
         self.paths()?;
         // In a chunk of their own: their times span the run, those of the chunk before need not.
         self.output.close_chunk()?;
@@ -371,7 +339,7 @@ impl Open {
     }
 }
 
-impl Drop for Open {
+impl Drop for McapFile {
     /// A run that was given up still gets its index; errors have nowhere to go.
     fn drop(&mut self) {
         let _ = self.output.finish();

@@ -9,14 +9,14 @@ use crate::table::{self, TableLayout};
 use crate::{LogError, RunHeader, RunResult, RunSource, Sample};
 
 /// See the module.
-pub(super) struct CsvRun {
+pub(crate) struct CsvRun {
     path: PathBuf,
     layout: TableLayout,
     warnings: Vec<String>,
 }
 
 impl CsvRun {
-    pub(super) fn open(path: &Path) -> Result<Self, LogError> {
+    pub(crate) fn open(path: &Path) -> Result<Self, LogError> {
         let mut reader = rows(path)?;
         let names = reader.headers().map_err(|error| broken(path, &error))?;
         let names: Vec<String> = names.iter().map(|name| name.trim().to_owned()).collect();

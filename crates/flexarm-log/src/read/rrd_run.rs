@@ -20,7 +20,7 @@ use crate::{ElasticSample, EnergySample, LogError, RunHeader, RunResult, RunSour
 const MILLI: f64 = 1e-3;
 
 /// See the module.
-pub(super) struct RrdRun {
+pub(crate) struct RrdRun {
     path: PathBuf,
     header: RunHeader,
     result: RunResult,
@@ -44,44 +44,8 @@ struct Data {
 }
 
 impl RrdRun {
-    pub(super) fn open(path: &Path) -> Result<Self, LogError> {
-        let (mut data, mut broken, mut application) = (Data::default(), None, None);
-        let mut messages = Messages::open(path)?;
-        loop {
-            match messages.next() {
-                Ok(Some(Message::Recording(name))) => application = Some(name),
-                Ok(Some(Message::Rows(chunk))) => {
-                    if let Err(cause) = caught(|| data.take(&chunk)) {
-                        broken = Some(cause);
-                        break;
-                    }
-                }
-                Ok(Some(Message::Other)) => {}
-                Ok(None) => break,
-                Err(cause) => {
-                    broken = Some(cause);
-                    break;
-                }
-            }
-        }
-        data.sort();
-        let is_ours = application.as_deref() == Some("flexarm");
-        if !is_ours || data.scalars.is_empty() && data.text(RUN_ENTITY).is_none() {
-            let found = match (application, &broken) {
-                (Some(name), _) if !is_ours => format!("a Rerun recording of {name:?}"),
-                (_, Some(cause)) => format!("a Rerun recording without a run ({cause})"),
-                _ => "a Rerun recording without a run".into(),
-            };
-            return Err(not_a_recording(path, found, "one that flexarm wrote, with curves below /plots"));
-        }
-        let of_study = |at: &&EntityPath| at.to_string().starts_with("/plots/study/");
-        if data.scalars.keys().find(of_study).is_some() {
-            return Err(not_a_recording(
-                path,
-                "a study of several runs",
-                "one run: run.mcap beside it, or in a folder below",
-            ));
-        }
+    pub(crate) fn open(path: &Path) -> Result<Self, LogError> {
+        let (data, broken) = gathered(path)?;
         let mut missing = vec!["the file has no stations of bent links: they are straight".to_owned()];
         let header = match data.text(RUN_ENTITY).map(|text| run_json::read(text.as_bytes())) {
             Some(Ok((header, _))) => header,
@@ -117,6 +81,51 @@ impl RrdRun {
         let path = path.to_owned();
         Ok(Self { path, header, result, broken, finished, data, missing, warnings: Vec::new() })
     }
+}
+
+/// What a file holds, and why it ends before its end, if it does.
+///
+/// # Errors
+/// [`LogError::NotARecording`] for a recording of another program, and for one of several runs.
+fn gathered(path: &Path) -> Result<(Data, Option<String>), LogError> {
+    let (mut data, mut broken, mut application) = (Data::default(), None, None);
+    let mut messages = Messages::open(path)?;
+    loop {
+        match messages.next() {
+            Ok(Some(Message::Recording(name))) => application = Some(name),
+            Ok(Some(Message::Rows(chunk))) => {
+                if let Err(cause) = caught(|| data.take(&chunk)) {
+                    broken = Some(cause);
+                    break;
+                }
+            }
+            Ok(Some(Message::Other)) => {}
+            Ok(None) => break,
+            Err(cause) => {
+                broken = Some(cause);
+                break;
+            }
+        }
+    }
+    data.sort();
+    let is_ours = application.as_deref() == Some("flexarm");
+    if !is_ours || data.scalars.is_empty() && data.text(RUN_ENTITY).is_none() {
+        let found = match (application, &broken) {
+            (Some(name), _) if !is_ours => format!("a Rerun recording of {name:?}"),
+            (_, Some(cause)) => format!("a Rerun recording without a run ({cause})"),
+            _ => "a Rerun recording without a run".into(),
+        };
+        return Err(not_a_recording(path, found, "one that flexarm wrote, with curves below /plots"));
+    }
+    let of_study = |at: &&EntityPath| at.to_string().starts_with("/plots/study/");
+    if data.scalars.keys().find(of_study).is_some() {
+        return Err(not_a_recording(
+            path,
+            "a study of several runs",
+            "one run: run.mcap beside it, or in a folder below",
+        ));
+    }
+    Ok((data, broken))
 }
 
 impl RunSource for RrdRun {

@@ -14,7 +14,7 @@ thread_local! {
 
 /// Calls a reader of a dependency. A panic in it is an error in words, and says nothing by itself. What the reader has
 /// changed must not be used after an error.
-pub(super) fn caught<T>(read: impl FnOnce() -> T) -> Result<T, String> {
+pub(crate) fn caught<T>(read: impl FnOnce() -> T) -> Result<T, String> {
     static QUIET: Once = Once::new();
     QUIET.call_once(|| {
         let usual = std::panic::take_hook();

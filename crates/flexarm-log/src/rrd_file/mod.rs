@@ -17,7 +17,7 @@ pub(crate) mod tracks;
 mod window;
 
 use std::fs::File;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use crate::rerun::Chunk;
 use crate::rerun::re_log_types::StoreKind;
@@ -28,8 +28,9 @@ use self::run::{RunTracks, Seat};
 use self::stream::{Ids, RrdStream, StreamError};
 use self::tracks::{SIM_TIME, Seen};
 use crate::create::FlushClock;
+use crate::file_recorder::{FileRecorder, OpenFile};
 use crate::shape::Shape;
-use crate::{CreateOptions, LogError, Recorder, RunHeader, RunResult, Sample};
+use crate::{CreateOptions, LogError, RunHeader, RunResult, Sample};
 
 pub use self::study::{RrdStudy, StudySeat};
 
@@ -70,73 +71,40 @@ const CHUNK_ROWS: usize = 1024;
 ///
 /// Timelines: `sim_time` (a duration) and `step`. Nothing in the file depends on the clock: the recording's
 /// identifier is a hash of the header, rows are numbered in order.
-pub struct RrdRecorder {
-    path: PathBuf,
-    options: CreateOptions,
-    state: State,
-}
+pub type RrdRecorder = FileRecorder<RrdFile>;
 
-enum State {
-    New,
-    Open(Box<Open>),
-    Finished,
-}
-
-impl RrdRecorder {
-    /// A recorder that will write `path`; the file is created by `begin`.
-    pub fn create(path: impl Into<PathBuf>, options: CreateOptions) -> Self {
-        Self { path: path.into(), options, state: State::New }
-    }
-}
-
-impl Recorder for RrdRecorder {
-    fn check(&self) -> Result<(), LogError> {
-        self.options.check(&self.path)
-    }
-
-    fn begin(&mut self, header: &RunHeader) -> Result<(), LogError> {
-        if !matches!(self.state, State::New) {
-            return Err(LogError::begun_twice(&self.path));
-        }
-        let file = self.options.create(&self.path)?;
-        let clock = self.options.flush_clock(&self.path);
-        let open = || -> Result<Open, StreamError> {
+impl OpenFile for RrdFile {
+    fn begin(path: &Path, options: CreateOptions, header: &RunHeader) -> Result<Self, LogError> {
+        let file = options.create(path)?;
+        let clock = options.flush_clock(path);
+        let open = || -> Result<Self, StreamError> {
             let mut store = Store::new(file, content_hash(header, &[]), clock)?;
             store.describe(header, &Seat::Alone)?;
             let run = RunWriter::begin(&mut store, header, Seat::Alone, &[])?;
-            Ok(Open { store, run, closed: false })
+            Ok(Self { store, run, closed: false })
         };
-        self.state =
-            State::Open(Box::new(open().map_err(stream_error(&self.path, "write the description of the run"))?));
-        Ok(())
+        open().map_err(stream_error(path, "write the description of the run"))
     }
 
-    fn record(&mut self, sample: &Sample) -> Result<(), LogError> {
-        let State::Open(open) = &mut self.state else { return Err(LogError::not_open(&self.path, "record")) };
-        open.run.record(&mut open.store, &self.path, sample)
+    fn record(&mut self, path: &Path, sample: &Sample) -> Result<(), LogError> {
+        self.run.record(&mut self.store, path, sample)
     }
 
-    fn finish(&mut self, result: &RunResult) -> Result<(), LogError> {
-        let State::Open(open) = &mut self.state else { return Err(LogError::not_open(&self.path, "finish")) };
-        open.finish(result).map_err(stream_error(&self.path, "write the result and the index"))?;
-        self.state = State::Finished;
-        Ok(())
-    }
-
-    fn path(&self) -> &Path {
-        &self.path
+    fn finish(&mut self, path: &Path, result: &RunResult) -> Result<(), LogError> {
+        self.end(result).map_err(stream_error(path, "write the result and the index"))
     }
 }
 
-/// A file between `begin` and `finish`.
-struct Open {
+/// An `.rrd` file that is being written.
+pub struct RrdFile {
     store: Store,
     run: RunWriter,
     closed: bool,
 }
 
-impl Open {
-    fn finish(&mut self, result: &RunResult) -> Result<(), StreamError> {
+impl RrdFile {
+    /// The last rows, the result, the layout and the index.
+    fn end(&mut self, result: &RunResult) -> Result<(), StreamError> {
         self.closed = true;
         self.run.finish(&mut self.store, result)?;
         if !result.figures.is_empty() {
@@ -149,11 +117,11 @@ impl Open {
     }
 }
 
-impl Drop for Open {
+impl Drop for RrdFile {
     /// A run that was given up still gets its last rows and its index; errors have nowhere to go.
     fn drop(&mut self) {
         if !self.closed {
-            let _ = self.finish(&RunResult::default());
+            let _ = self.end(&RunResult::default());
         }
     }
 }

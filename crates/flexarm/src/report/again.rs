@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use flexarm_analysis::{ErrorRecord, MetricSettings, error_parts, tcp_metrics_on_path};
-use flexarm_log::{EventKind, RunHeader, Trace};
+use flexarm_log::{EventKind, RecordingFormat, RunHeader, Trace};
 use serde::Serialize;
 
 use super::{ReportRun, figures, html};
@@ -35,9 +35,6 @@ pub struct ReportFiles {
     /// Things worth telling: sentences.
     pub warnings: Vec<String>,
 }
-
-/// Recordings in the folder of a run, the one that holds most first.
-const IN_FOLDER: [&str; 4] = ["run.mcap", "run.parquet", "run.csv", "run.rrd"];
 
 /// The trajectory of a recording that names none, for readers of tables.
 const UNKNOWN: &str = "unknown";
@@ -81,8 +78,25 @@ pub fn report(recordings: &[PathBuf], options: &ReportOptions) -> Result<ReportF
     let folder = page.with_file_name(crate::record::FIGURES_FOLDER);
     check_places(&inputs, &page, &folder, options)?;
 
+    let runs = read_all(&inputs, &mut warnings)?;
+    let reports: Vec<ReportRun<'_>> =
+        runs.iter().map(|(label, summary, trace)| ReportRun { label, summary, trace }).collect();
+    write_all(&[(page.clone(), html(&reports))])?;
+    if let (true, Some((_, summary, trace))) = (options.figures, runs.first()) {
+        figures::write(&folder, summary, trace)?;
+    }
+    Ok(ReportFiles {
+        inputs: inputs.iter().map(|input| input.path.display().to_string()).collect(),
+        report: page.display().to_string(),
+        figures: options.figures.then(|| folder.display().to_string()),
+        warnings,
+    })
+}
+
+/// Label, figures and curves of each recording.
+fn read_all(inputs: &[Input], warnings: &mut Vec<String>) -> Result<Vec<(String, Summary, Trace)>, Error> {
     let mut runs: Vec<(String, Summary, Trace)> = Vec::new();
-    for Input { path, of_study } in &inputs {
+    for Input { path, of_study } in inputs {
         let (json, trace, told) = read_run(path)?;
         if trace.rows.is_empty() {
             return Err(no_sample(path, told.last()));
@@ -110,18 +124,7 @@ pub fn report(recordings: &[PathBuf], options: &ReportOptions) -> Result<ReportF
         };
         runs.push((label, summary, trace));
     }
-    let reports: Vec<ReportRun<'_>> =
-        runs.iter().map(|(label, summary, trace)| ReportRun { label, summary, trace }).collect();
-    write_all(&[(page.clone(), html(&reports))])?;
-    if let (true, Some((_, summary, trace))) = (options.figures, runs.first()) {
-        figures::write(&folder, summary, trace)?;
-    }
-    Ok(ReportFiles {
-        inputs: inputs.iter().map(|input| input.path.display().to_string()).collect(),
-        report: page.display().to_string(),
-        figures: options.figures.then(|| folder.display().to_string()),
-        warnings,
-    })
+    Ok(runs)
 }
 
 /// Refuses places that are taken, before anything is read at length or written.
@@ -154,17 +157,23 @@ fn recording(path: &Path) -> Result<PathBuf, Error> {
     }
     match in_folder(path) {
         Some(path) => Ok(path),
-        None => fail(format!("the folder has no recording: expected one of {}", IN_FOLDER.join(", "))),
+        None => {
+            let names: Vec<_> = RecordingFormat::by_content().iter().map(|format| format.info().file_name).collect();
+            fail(format!("the folder has no recording: expected one of {}", names.join(", ")))
+        }
     }
 }
 
+/// The recording in the folder of a run that holds most.
 fn in_folder(folder: &Path) -> Option<PathBuf> {
+    let there: Vec<(RecordingFormat, PathBuf)> = RecordingFormat::by_content()
+        .into_iter()
+        .map(|format| (format, folder.join(format.info().file_name)))
+        .filter(|(_, path)| path.is_file())
+        .collect();
     // What this program cannot read is no reason to fail while there is something that it can.
-    let there = || IN_FOLDER.iter().map(|name| folder.join(name)).filter(|path| path.is_file());
-    let readable = |path: &PathBuf| {
-        flexarm_log::RecordingFormat::from_path(path).is_some_and(flexarm_log::RecordingFormat::is_built_in)
-    };
-    there().find(readable).or_else(|| there().next())
+    let readable = there.iter().find(|(format, _)| format.is_built_in());
+    readable.or(there.first()).map(|(_, path)| path.clone())
 }
 
 /// The summary of a folder, if it is one of several runs.

@@ -57,6 +57,8 @@ pub(super) struct PlotView {
 pub(super) struct Table {
     pub(super) x: Vec<f64>,
     pub(super) curves: Vec<Curve>,
+    /// Whether there were more points.
+    pub(super) is_thinned: bool,
 }
 
 #[derive(Clone, Debug, Default)]
@@ -85,7 +87,7 @@ impl Table {
         let keep = thinned(&curves.iter().map(|c| c.y.as_slice()).collect::<Vec<_>>(), x.len(), most);
         let pick = |values: &[f64]| keep.iter().map(|k| values[*k]).collect();
         let curves = curves.iter().map(|c| Curve { y: pick(&c.y), ..c.clone() }).collect();
-        Self { x: pick(&x), curves }
+        Self { x: pick(&x), curves, is_thinned: keep.len() < x.len() }
     }
 }
 

@@ -61,14 +61,15 @@ pub fn html(runs: &[ReportRun<'_>]) -> String {
         escaped(&title),
         colors()
     );
-    let body = body(main, runs);
+    let drawn: Vec<Vec<Plot>> = runs.iter().map(|run| plots(run.summary, run.trace)).collect();
+    let body = body(main, runs, &thinning(runs, &drawn));
     page += &heading(&title, runs, &body);
     let _ = write!(page, "<main>\n{body}</main>\n");
     let _ = write!(
         page,
         "<script type=\"application/json\" id=\"data\">{}</script>\n\
          <script>\n/* uPlot {UPLOT_VERSION}\n\n{}\n*/\n{}</script>\n<script>\n{BEHAVIOUR}</script>\n</body>\n</html>\n",
-        data(runs),
+        data(runs, &drawn),
         UPLOT_LICENSE.trim(),
         uplot.trim_start()
     );
@@ -92,7 +93,7 @@ fn colors() -> String {
     )
 }
 
-fn body(main: &ReportRun<'_>, runs: &[ReportRun<'_>]) -> String {
+fn body(main: &ReportRun<'_>, runs: &[ReportRun<'_>], thinning: &str) -> String {
     let mut body: String = runs.iter().map(|run| troubles(run, runs.len() > 1)).collect();
     if let [run] = runs {
         body += &tiles(run);
@@ -101,6 +102,7 @@ fn body(main: &ReportRun<'_>, runs: &[ReportRun<'_>]) -> String {
     }
     body += &arm_pictures(runs);
     body += "<section id=\"plots\"><noscript><p>The plots need JavaScript.</p></noscript></section>\n";
+    body += thinning;
     body += &iso_table(runs);
     let of = if runs.len() > 1 { format!(" of {}", escaped(main.label)) } else { String::new() };
     body += &stops_table(main.summary, &of);
@@ -672,9 +674,10 @@ fn inputs(run: &ReportRun<'_>, named: bool) -> String {
     group("stepper", &rows.map(|(key, value)| (key.to_owned(), value)));
     // File names alone: the same run in another folder is the same page.
     let f = &s.files;
-    let names: Vec<String> = [&f.report, &f.report_md, &f.mcap, &f.rrd, &f.csv, &f.figures]
-        .into_iter()
-        .flatten()
+    let pages = [&f.report, &f.report_md].into_iter().flatten().map(String::as_str);
+    let names: Vec<String> = pages
+        .chain(f.recordings.iter().map(|(_, path)| path))
+        .chain(f.figures.as_deref())
         .filter_map(|path| std::path::Path::new(path).file_name().map(|name| name.to_string_lossy().into_owned()))
         .collect();
     group("files beside this page", &[("files".to_owned(), names.join(", "))]);
@@ -707,17 +710,39 @@ fn timings(runs: &[ReportRun<'_>]) -> String {
     format!("<p id=\"timings\" class=\"note\">{}</p>\n", lines.join("<br>"))
 }
 
+/// What of the samples the plots do not show, if there is something.
+fn thinning(runs: &[ReportRun<'_>], drawn: &[Vec<Plot>]) -> String {
+    let mut sentences = Vec::new();
+    let mut tables = drawn.iter().flatten().flat_map(|plot| &plot.views).flat_map(|view| &view.tables);
+    if tables.any(|table| table.is_thinned) {
+        sentences.push(
+            "Plots of many samples are thinned: of equal pieces of a curve the smallest and the largest value are kept, so \
+             that peaks stay. Recordings have every sample."
+                .to_owned(),
+        );
+    }
+    for run in runs.iter().filter(|run| run.trace.stride() > 1) {
+        let (stride, all) = (run.trace.stride(), run.trace.samples());
+        let label = escaped(run.label);
+        sentences.push(format!("{label}: plots are made of one of every {stride} of the run's {all} samples."));
+    }
+    match sentences.is_empty() {
+        true => String::new(),
+        false => format!("<p id=\"thinning\" class=\"note\">{}</p>\n", sentences.join("<br>")),
+    }
+}
+
 /// What the plots are made of, as JSON that may stand in a script element.
-fn data(runs: &[ReportRun<'_>]) -> String {
+fn data(runs: &[ReportRun<'_>], drawn: &[Vec<Plot>]) -> String {
     let list = |items: Vec<String>| format!("[{}]", items.join(","));
-    let run = |run: &ReportRun<'_>| {
+    let run = |(run, drawn): (&ReportRun<'_>, &Vec<Plot>)| {
         let still = lies_on_twin(run);
         let events = run.trace.result.events.iter().filter(|event| !(still && event.kind == EventKind::Peak));
         let events = events.map(|event| {
             let (kind, text) = (json_text(event.kind.word()), json_text(&event.text));
             format!("{{\"t\":{},\"kind\":{kind},\"text\":{text}}}", short(event.time_s, 7))
         });
-        let plots = plots(run.summary, run.trace).iter().map(json_plot).collect();
+        let plots = drawn.iter().map(json_plot).collect();
         format!(
             "{{\"label\":{},\"events\":{},\"plots\":{}}}",
             json_text(run.label),
@@ -728,7 +753,7 @@ fn data(runs: &[ReportRun<'_>]) -> String {
     let several: Vec<_> = runs.iter().map(|run| (run.label, run.summary, run.trace)).collect();
     let overlays = if runs.len() > 1 { overlays(&several) } else { Vec::new() };
     let overlays = list(overlays.iter().map(json_plot).collect());
-    let json = format!("{{\"runs\":{},\"overlays\":{overlays}}}", list(runs.iter().map(run).collect()));
+    let json = format!("{{\"runs\":{},\"overlays\":{overlays}}}", list(runs.iter().zip(drawn).map(run).collect()));
     // No text in it can end the script element or begin a comment.
     json.replace('<', "\\u003c")
 }

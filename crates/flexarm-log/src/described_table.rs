@@ -1,0 +1,183 @@
+//! A table with texts beside it, which say what it has no columns for: what Parquet and its like share, both ways.
+//!
+//! Written: [`texts_at_start`], [`texts_at_end`], and samples in blocks of columns ([`Block`]). Read: a [`DescribedTable`] of
+//! the names and texts of a file, and [`TableRun`] over anything that gives the numbers of a block ([`Blocks`]).
+
+use std::path::{Path, PathBuf};
+
+use crate::read::{not_a_recording, stem};
+use crate::shape::Shape;
+use crate::table::{self, TableLayout};
+use crate::{Attachment, LogError, RunHeader, RunResult, RunSource, Sample, run_json};
+
+/// Key under which the header is stored, as `run.json` of MCAP files.
+const RUN_KEY: &str = "flexarm.run";
+/// Key of figures, events and attached texts of the result (JSON).
+const RESULT_KEY: &str = "flexarm.result";
+/// Before the name of an attached text of the set-up.
+const RUN_FILE: &str = "flexarm.run_file.";
+
+/// Texts that are known at the start, as pairs of key and value.
+pub(crate) fn texts_at_start(header: &RunHeader) -> Vec<(String, String)> {
+    let mut pairs = vec![
+        ("robot".to_owned(), header.robot.clone()),
+        ("trajectory".into(), header.trajectory.clone()),
+        ("units".into(), "SI: m, rad, s, N, N m, J; as in the names of the columns".into()),
+        ("version".into(), env!("CARGO_PKG_VERSION").into()),
+        (RUN_KEY.into(), run_json::write(header, false)),
+    ];
+    // Attached files as far as they are text.
+    let text = |file: &Attachment| {
+        let text = String::from_utf8(file.bytes.clone()).ok()?;
+        Some((format!("{RUN_FILE}{}", file.name), text))
+    };
+    pairs.extend(header.attachments.iter().filter_map(text));
+    pairs
+}
+
+/// Texts that are known at the end.
+pub(crate) fn texts_at_end(result: &RunResult) -> Vec<(String, String)> {
+    let label = |(label, value): &(String, String)| (format!("figure.{label}"), value.clone());
+    let mut pairs: Vec<_> = result.figures.iter().map(label).collect();
+    pairs.push((RESULT_KEY.into(), run_json::write_result(result)));
+    pairs
+}
+
+/// Samples that wait to be written, column by column.
+#[derive(Debug)]
+pub(crate) struct Block {
+    shape: Shape,
+    row: Vec<f64>,
+    pub(crate) columns: Vec<Vec<f64>>,
+}
+
+impl Block {
+    /// Samples after which a block is to be written: what is held in memory.
+    pub(crate) const ROWS: usize = 16_384;
+
+    pub(crate) fn new(header: &RunHeader) -> Self {
+        let columns = vec![Vec::new(); table::columns(header).len()];
+        Self { shape: Shape::of(header), row: Vec::new(), columns }
+    }
+
+    /// Adds a sample.
+    pub(crate) fn push(&mut self, path: &Path, sample: &Sample) -> Result<(), LogError> {
+        self.shape.check(path, sample)?;
+        table::fill_row(sample, &self.shape, &mut self.row);
+        for (column, value) in self.columns.iter_mut().zip(&self.row) {
+            column.push(*value);
+        }
+        Ok(())
+    }
+
+    /// Number of samples.
+    pub(crate) fn rows(&self) -> usize {
+        self.columns[0].len()
+    }
+}
+
+/// What names of columns and texts say of a table.
+#[derive(Debug)]
+pub(crate) struct DescribedTable {
+    pub(crate) layout: TableLayout,
+    result: RunResult,
+    /// Whether the file says which run it is of.
+    described: bool,
+}
+
+impl DescribedTable {
+    /// Of a file with these columns and texts.
+    pub(crate) fn of(path: &Path, names: &[String], texts: &[(String, String)]) -> Result<Self, LogError> {
+        let value = |key: &str| texts.iter().find(|(k, _)| k == key).map(|(_, value)| value.as_str());
+        let attached = |(key, text): &(String, String)| {
+            let name = key.strip_prefix(RUN_FILE)?.to_owned();
+            let media_type = media_type(&name).to_owned();
+            Some(Attachment { name, media_type, bytes: text.clone().into_bytes() })
+        };
+        let mut attachments: Vec<Attachment> = texts.iter().filter_map(attached).collect();
+        let refuse = |(found, expected)| not_a_recording(path, found, expected);
+        let layout = match value(RUN_KEY).map(|text| run_json::read(text.as_bytes())) {
+            Some(Ok((header, run))) => {
+                // Not every format keeps the order of its texts.
+                attachments.sort_by_key(|file| run.attachments.iter().position(|name| *name == file.name));
+                TableLayout::of_header(header, names)
+            }
+            Some(Err(what)) => Err((what, "the description of a run".to_owned())),
+            None => TableLayout::of_names(names),
+        };
+        let mut layout = layout.map_err(refuse)?;
+        let described = value(RUN_KEY).is_some();
+        if !described {
+            (layout.header.robot, layout.header.trajectory) = (stem(path), "unknown".into());
+        }
+        layout.header.attachments = attachments;
+        let result = value(RESULT_KEY).map(run_json::read_result).unwrap_or_default();
+        Ok(Self { layout, result, described })
+    }
+}
+
+fn media_type(name: &str) -> &'static str {
+    match Path::new(name).extension().and_then(std::ffi::OsStr::to_str) {
+        Some("json") => "application/json",
+        Some("toml") => "application/toml",
+        _ => "text/plain",
+    }
+}
+
+/// The numbers of a table in blocks of rows.
+pub(crate) trait Blocks {
+    /// How many blocks there are.
+    fn count(&self) -> usize;
+
+    /// The numbers of some columns, by their places in the file, of one block; missing ones are NaN. As many numbers for
+    /// each column.
+    fn read(&self, path: &Path, block: usize, places: &[usize], columns: &mut [Vec<f64>]) -> Result<(), LogError>;
+}
+
+/// A run from a table with texts.
+#[derive(Debug)]
+pub(crate) struct TableRun<B> {
+    path: PathBuf,
+    table: DescribedTable,
+    blocks: B,
+}
+
+impl<B: Blocks> TableRun<B> {
+    pub(crate) fn new(path: &Path, mut table: DescribedTable, blocks: B) -> Result<Self, LogError> {
+        if !table.described && blocks.count() > 0 {
+            let mut times = [Vec::new()];
+            blocks.read(path, 0, &table.layout.places[..1], &mut times)?;
+            if let [first, second, ..] = times[0][..] {
+                table.layout.header.log_rate_hz = table::rate_hz(first, second);
+            }
+        }
+        Ok(Self { path: path.to_owned(), table, blocks })
+    }
+}
+
+impl<B: Blocks> RunSource for TableRun<B> {
+    fn header(&self) -> &RunHeader {
+        &self.table.layout.header
+    }
+
+    fn missing(&self) -> Vec<String> {
+        let undescribed = "the file does not say which robot and trajectory it is of: another program wrote it";
+        if self.table.described { Vec::new() } else { vec![undescribed.into()] }
+    }
+
+    fn replay(&mut self, take: &mut dyn FnMut(&Sample) -> Result<(), LogError>) -> Result<RunResult, LogError> {
+        let layout = &self.table.layout;
+        let mut columns = vec![Vec::new(); layout.places.len()];
+        let (mut sample, mut row) = (Sample::default(), Vec::new());
+        for block in 0..self.blocks.count() {
+            self.blocks.read(&self.path, block, &layout.places, &mut columns)?;
+            for k in 0..columns[0].len() {
+                row.clear();
+                row.extend(columns.iter().map(|column| column[k]));
+                layout.sample(&row, &mut sample);
+                take(&sample)?;
+            }
+        }
+        Ok(self.table.result.clone())
+    }
+}

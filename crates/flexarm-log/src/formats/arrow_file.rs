@@ -1,0 +1,280 @@
+//! The table of a run as an Arrow IPC file (Feather, version 2), written and read: the columns of the CSV as `double`, the
+//! header and the result beside them.
+//!
+//! Numbers lie in the file as they do in memory, uncompressed: pyarrow, polars and DuckDB map it instead of reading it. Start
+//! at [`ArrowRecorder`].
+
+use std::fs::File;
+use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::path::Path;
+use std::sync::Arc;
+
+use arrow_array::cast::AsArray;
+use arrow_array::types::Float64Type;
+use arrow_array::{Array, ArrayRef, Float64Array, RecordBatch};
+use arrow_ipc::convert::{IpcSchemaEncoder, fb_to_schema};
+use arrow_ipc::reader::{FileDecoder, read_footer_length};
+use arrow_ipc::writer::{DictionaryTracker, EncodedData, IpcDataGenerator, IpcWriteOptions, write_message};
+use arrow_ipc::{FooterBuilder, MetadataVersion, root_as_footer, root_as_message};
+use arrow_schema::{ArrowError, DataType, Field, Schema, SchemaRef};
+
+use crate::described_table::{Block, Blocks, DescribedTable, TableRun, texts_at_end, texts_at_start};
+use crate::file_recorder::{FileRecorder, OpenFile};
+use crate::read::not_a_recording;
+use crate::read::wall::caught;
+use crate::whole_file::WholeFile;
+use crate::{CreateOptions, LogError, RunHeader, RunResult, Sample, table};
+
+/// First and last bytes of a file.
+const MAGIC: &[u8; 6] = b"ARROW1";
+/// Where the first message begins: numbers lie on multiples of this.
+const START: usize = 64;
+/// Marks a message; with a length of zero, that none follows.
+const CONTINUATION: [u8; 4] = [0xff; 4];
+
+/// Writes a run as an Arrow IPC file, which is also called Feather, version 2.
+///
+/// Columns are those of [`crate::CsvRecorder`], all `double` without missing values, in record batches of at most 16,384
+/// rows, not compressed. The metadata of the schema say what a table has no column for, under the keys of
+/// `ParquetRecorder`'s. They are in the footer; the copy of the schema at the start of the file, which streaming readers
+/// take, lacks what is known only at the end of the run.
+///
+/// As a Parquet file it comes into being under the name `<file>.partial` and is renamed by `finish`.
+pub type ArrowRecorder = FileRecorder<ArrowFile>;
+
+/// An Arrow file that is being written.
+#[derive(Debug)]
+pub struct ArrowFile {
+    /// None once it is closed.
+    file: Option<File>,
+    whole: WholeFile,
+    schema: SchemaRef,
+    /// The open record batch.
+    block: Block,
+    /// Those in the file.
+    batches: Vec<arrow_ipc::Block>,
+    /// Length of the file.
+    length: usize,
+}
+
+impl OpenFile for ArrowFile {
+    fn begin(path: &Path, options: CreateOptions, header: &RunHeader) -> Result<Self, LogError> {
+        const ACTION: &str = "write the names of columns";
+        let (mut file, whole) = WholeFile::create(path, options)?;
+        let mut start = [0; START];
+        start[..MAGIC.len()].copy_from_slice(MAGIC);
+        file.write_all(&start).map_err(LogError::io(path, ACTION))?;
+
+        let fields = table::columns(header).into_iter().map(|name| Field::new(name, DataType::Float64, false));
+        let texts = texts_at_start(header).into_iter().collect();
+        let schema = Arc::new(Schema::new_with_metadata(fields.collect::<Vec<_>>(), texts));
+        let (block, batches) = (Block::new(header), Vec::new());
+        let mut new = Self { file: Some(file), whole, schema, block, batches, length: START };
+        let message = IpcDataGenerator::default().schema_to_bytes_with_dictionary_tracker(
+            &new.schema,
+            &mut DictionaryTracker::new(true),
+            &IpcWriteOptions::default(),
+        );
+        new.message(message).map_err(arrow_error(path, ACTION))?;
+        Ok(new)
+    }
+
+    fn record(&mut self, path: &Path, sample: &Sample) -> Result<(), LogError> {
+        self.block.push(path, sample)?;
+        match self.block.rows() < Block::ROWS {
+            true => Ok(()),
+            false => self.close_batch().map_err(arrow_error(path, "write samples")),
+        }
+    }
+
+    fn finish(&mut self, path: &Path, result: &RunResult) -> Result<(), LogError> {
+        const ACTION: &str = "write the result and the index";
+        if self.block.rows() > 0 {
+            self.close_batch().map_err(arrow_error(path, ACTION))?;
+        }
+        let end = self.end(result);
+        let Some(mut file) = self.file.take() else { return Err(LogError::not_open(path, "finish")) };
+        file.write_all(&end).map_err(LogError::io(path, ACTION))?;
+        self.whole.finish(file, path, ACTION)
+    }
+}
+
+impl ArrowFile {
+    /// Appends a message; returns where it begins and how long its description and its numbers are.
+    fn message(&mut self, message: EncodedData) -> Result<arrow_ipc::Block, ArrowError> {
+        let Some(file) = &mut self.file else { return Ok(arrow_ipc::Block::default()) };
+        let (description, numbers) = write_message(file, message, &IpcWriteOptions::default())?;
+        let place = arrow_ipc::Block::new(self.length as i64, description as i32, numbers as i64);
+        self.length += description + numbers;
+        Ok(place)
+    }
+
+    /// Writes the samples that wait as a record batch.
+    fn close_batch(&mut self) -> Result<(), ArrowError> {
+        let numbers = |column: &mut Vec<f64>| Arc::new(Float64Array::from(std::mem::take(column))) as ArrayRef;
+        let columns = self.block.columns.iter_mut().map(numbers).collect();
+        let batch = RecordBatch::try_new(self.schema.clone(), columns)?;
+        let (_, message) = IpcDataGenerator::default().encode(
+            &batch,
+            &mut DictionaryTracker::new(true),
+            &IpcWriteOptions::default(),
+            &mut Default::default(),
+        )?;
+        let place = self.message(message)?;
+        self.batches.push(place);
+        Ok(())
+    }
+
+    /// What follows the last record batch: the footer with the schema, all its texts, and the places of the batches.
+    fn end(&self, result: &RunResult) -> Vec<u8> {
+        let mut texts = self.schema.metadata().clone();
+        texts.extend(texts_at_end(result));
+        let schema = self.schema.as_ref().clone().with_metadata(texts);
+
+        // A builder as the library makes it, emptied again.
+        let mut footer = IpcSchemaEncoder::new().schema_to_fb(&Schema::empty());
+        footer.reset();
+        let dictionaries = footer.create_vector::<arrow_ipc::Block>(&[]);
+        let batches = footer.create_vector(&self.batches);
+        let schema = IpcSchemaEncoder::new().schema_to_fb_offset(&mut footer, &schema);
+        let mut parts = FooterBuilder::new(&mut footer);
+        parts.add_version(MetadataVersion::V5);
+        parts.add_schema(schema);
+        parts.add_dictionaries(dictionaries);
+        parts.add_recordBatches(batches);
+        let root = parts.finish();
+        footer.finish(root, None);
+
+        let footer = footer.finished_data();
+        let length = (footer.len() as i32).to_le_bytes();
+        [&CONTINUATION, &[0; 4], footer, &length, MAGIC].concat()
+    }
+}
+
+fn arrow_error(path: &Path, action: &'static str) -> impl FnOnce(ArrowError) -> LogError {
+    move |error| match error {
+        ArrowError::IoError(_, source) => LogError::io(path, action)(source),
+        other => LogError::Format { path: path.to_owned(), action, cause: other.to_string() },
+    }
+}
+
+/// A run from an Arrow file.
+pub(crate) type ArrowRun = TableRun<Batches>;
+
+impl ArrowRun {
+    pub(crate) fn open(path: &Path) -> Result<Self, LogError> {
+        let mut file = File::open(path).map_err(LogError::io(path, "open the recording"))?;
+        let footer = footer(&mut file).map_err(LogError::io(path, "read the recording"))?;
+        let footer = footer.ok_or_else(|| damaged(path, "it has no end"))?;
+        let (batches, texts) = decoded(path, || Batches::of(file, &footer))?;
+        let names: Vec<String> = batches.schema.fields().iter().map(|field| field.name().clone()).collect();
+        let table = DescribedTable::of(path, &names, &texts)?;
+        for &place in &table.layout.places {
+            let field = batches.schema.field(place);
+            if *field.data_type() != DataType::Float64 {
+                let found = format!("column {} of type {}", field.name(), field.data_type());
+                return Err(not_a_recording(path, found, "double, one number per row"));
+            }
+        }
+        Self::new(path, table, batches)
+    }
+}
+
+/// The bytes of a file's footer; none if it is no whole file.
+fn footer(file: &mut File) -> io::Result<Option<Vec<u8>>> {
+    let mut end = [0; 10];
+    let length = file.metadata()?.len();
+    let Some(at) = length.checked_sub(end.len() as u64) else { return Ok(None) };
+    file.seek(SeekFrom::Start(at))?;
+    file.read_exact(&mut end)?;
+    let Some(start) = read_footer_length(end).ok().and_then(|footer| at.checked_sub(footer as u64)) else {
+        return Ok(None);
+    };
+    let mut footer = vec![0; (at - start) as usize];
+    file.seek(SeekFrom::Start(start))?;
+    file.read_exact(&mut footer)?;
+    Ok(Some(footer))
+}
+
+/// The record batches of a file.
+#[derive(Debug)]
+pub(crate) struct Batches {
+    file: File,
+    length: u64,
+    schema: SchemaRef,
+    version: MetadataVersion,
+    places: Vec<arrow_ipc::Block>,
+}
+
+impl Batches {
+    /// As a footer lists them, with the texts beside the table, sorted by key.
+    fn of(file: File, footer: &[u8]) -> Result<(Self, Vec<(String, String)>), String> {
+        let footer = root_as_footer(footer).map_err(|error| error.to_string())?;
+        let schema = fb_to_schema(footer.schema().ok_or("its footer has no schema")?);
+        let mut texts: Vec<(String, String)> = schema.metadata().clone().into_iter().collect();
+        texts.sort();
+        let places = footer.recordBatches().map(|places| places.iter().copied().collect()).unwrap_or_default();
+        let length = file.metadata().map_err(|error| error.to_string())?.len();
+        Ok((Self { file, length, schema: Arc::new(schema), version: footer.version(), places }, texts))
+    }
+
+    /// The bytes of a record batch; none if they are not in the file.
+    fn bytes(&self, place: &arrow_ipc::Block) -> io::Result<Option<Vec<u8>>> {
+        let size = |length: i64| u64::try_from(length).ok();
+        let start_and_length = || {
+            let length = size(place.metaDataLength().into())?.checked_add(size(place.bodyLength())?)?;
+            let start = size(place.offset())?;
+            // Nothing is allocated that a file only claims to have.
+            (start.checked_add(length)? <= self.length).then_some((start, length))
+        };
+        let Some((start, length)) = start_and_length() else { return Ok(None) };
+        let mut bytes = vec![0; length as usize];
+        let mut file = &self.file;
+        file.seek(SeekFrom::Start(start))?;
+        file.read_exact(&mut bytes)?;
+        Ok(Some(bytes))
+    }
+
+    /// Some columns of a record batch.
+    fn batch(&self, place: &arrow_ipc::Block, bytes: Vec<u8>, columns: &[usize]) -> Result<RecordBatch, String> {
+        let message = root_as_message(bytes.get(8..).ok_or("a record batch is cut off")?);
+        let message = message.map_err(|error| error.to_string())?;
+        if message.header_as_record_batch().is_some_and(|batch| batch.compression().is_some()) {
+            return Err("its columns are compressed, which is not read here: write them uncompressed".into());
+        }
+        let decoder = FileDecoder::new(self.schema.clone(), self.version).with_projection(columns.to_vec());
+        let batch = decoder.read_record_batch(place, &bytes.into()).map_err(|error| error.to_string())?;
+        batch.ok_or_else(|| "a record batch is missing".into())
+    }
+}
+
+impl Blocks for Batches {
+    fn count(&self) -> usize {
+        self.places.len()
+    }
+
+    fn read(&self, path: &Path, block: usize, places: &[usize], columns: &mut [Vec<f64>]) -> Result<(), LogError> {
+        let place = &self.places[block];
+        let bytes = self.bytes(place).map_err(LogError::io(path, "read the recording"))?;
+        let bytes = bytes.ok_or_else(|| damaged(path, "a record batch lies outside of it"))?;
+        let batch = decoded(path, || self.batch(place, bytes, places))?;
+        for (array, values) in batch.columns().iter().zip(columns) {
+            values.clear();
+            match array.as_primitive_opt::<Float64Type>() {
+                Some(array) if array.null_count() == 0 => values.extend_from_slice(array.values()),
+                Some(array) => values.extend(array.iter().map(|value| value.unwrap_or(f64::NAN))),
+                None => return Err(damaged(path, "a column is not double")),
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Calls the library, which may panic on a damaged file.
+fn decoded<T>(path: &Path, decode: impl FnOnce() -> Result<T, String>) -> Result<T, LogError> {
+    caught(decode).and_then(|result| result).map_err(|cause| damaged(path, &cause))
+}
+
+fn damaged(path: &Path, cause: &str) -> LogError {
+    not_a_recording(path, format!("a damaged file ({cause})"), "a whole Arrow file")
+}

@@ -1,0 +1,82 @@
+//! A file that is to be a recording: is it what its name says, and who reads it.
+
+use std::io::Read;
+use std::path::Path;
+
+use super::RecordingFormat;
+use crate::{LogError, RunSource};
+
+/// Opens a recording of flexarm and reads what it says about the run as a whole.
+///
+/// # Errors
+/// [`LogError::Io`] if it cannot be read, [`LogError::NotARecording`] if it is something else, or of a format that this
+/// build has no feature for.
+pub fn open_recording(path: &Path, format: RecordingFormat) -> Result<Box<dyn RunSource>, LogError> {
+    check_kind(path, format)?;
+    match format.info().code {
+        Some(code) => (code.reader)(path),
+        None => Err(LogError::NotARecording {
+            path: path.to_owned(),
+            found: format!("a file in the format {format}"),
+            expected: "a format that this build can read".into(),
+            mend: format!("use a build with {format}, or convert the file there"),
+        }),
+    }
+}
+
+/// Looks at the first bytes, so that a file under a wrong name is called what it is.
+fn check_kind(path: &Path, expected: RecordingFormat) -> Result<(), LogError> {
+    let refuse = |found: &str, mend: String| {
+        let (found, expected) = (found.to_owned(), format!("a recording of flexarm in the format {expected}"));
+        Err(LogError::NotARecording { path: path.to_owned(), found, expected, mend })
+    };
+    if path.is_dir() {
+        let inside = path.join(expected.info().file_name);
+        return refuse("a folder", format!("give a file in it, such as {}", inside.display()));
+    }
+    // A device might never end, a pipe never begin.
+    if path.exists() && !path.is_file() {
+        return refuse("what is not a file", "write it to a file first".into());
+    }
+    let mut start = Vec::new();
+    let file = std::fs::File::open(path).map_err(LogError::io(path, "open the recording"))?;
+    file.take(64).read_to_end(&mut start).map_err(LogError::io(path, "read the recording"))?;
+    if start.is_empty() {
+        return refuse("an empty file", "the run that should write it did not begin".into());
+    }
+    let begins = |format: &RecordingFormat| {
+        let magic = format.info().magic;
+        !magic.is_empty() && start.starts_with(magic)
+    };
+    let found = RecordingFormat::ALL.into_iter().find(begins);
+    let text = !start.contains(&0) && std::str::from_utf8(&start).is_ok_or_cut();
+    match found {
+        Some(found) if found == expected => Ok(()),
+        Some(found) => {
+            let mend = format!("name the file *.{0}, or say --from {0}", found.extension());
+            refuse(&format!("a file in the format {found}"), mend)
+        }
+        None if expected.info().magic.is_empty() && text => Ok(()),
+        None if text => {
+            let line: String =
+                String::from_utf8_lossy(&start).chars().take_while(|c| !c.is_control()).take(30).collect();
+            let mend = match line.starts_with("time,") {
+                true => "it looks like a table: name the file *.csv, or say --from csv",
+                false => "give a file that flexarm compare or run wrote",
+            };
+            refuse(&format!("text, beginning {line:?}"), mend.into())
+        }
+        None => refuse("something else", "give a file that flexarm compare or run wrote".into()),
+    }
+}
+
+/// UTF-8, perhaps with a character cut at the end.
+trait OkOrCut {
+    fn is_ok_or_cut(&self) -> bool;
+}
+
+impl OkOrCut for Result<&str, std::str::Utf8Error> {
+    fn is_ok_or_cut(&self) -> bool {
+        self.map_or_else(|error| error.error_len().is_none(), |_| true)
+    }
+}

@@ -1,0 +1,213 @@
+//! Samples from the messages of their topics.
+
+use std::collections::HashMap;
+
+use mcap::records::Record;
+
+use super::frames::{Frames, pose};
+use crate::mcap_file::channels::topic_names;
+use crate::read::cdr::CdrReader;
+use crate::read::exact_time;
+use crate::{Event, EventKind, RunHeader, Sample, TwinSample};
+
+/// What a message of a topic holds; several topics make one sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Topic {
+    Frames,
+    FixedFrames,
+    Joints,
+    RigidJoints,
+    Tool,
+    RigidTool,
+    Error,
+    PathError,
+    Load(usize),
+    Deflection(usize),
+    StaticError,
+    Contributions,
+    Energy,
+    Solver,
+    Events,
+}
+
+impl Topic {
+    /// Whether there is one such message per sample.
+    fn is_of_a_sample(self) -> bool {
+        !matches!(self, Self::FixedFrames | Self::Events)
+    }
+}
+
+/// Puts the messages of a sample together.
+pub(super) struct Assembly {
+    channels: HashMap<u16, Topic>,
+    /// Topic names of this run.
+    known: HashMap<String, Topic>,
+    epoch_ns: u64,
+    step_s: f64,
+    joints: usize,
+    pub(super) frames: Frames,
+    sequence: Option<u32>,
+    sample: Sample,
+    seen: Vec<Topic>,
+    /// The last sample that [`Assembly::take`] or [`Assembly::close`] finished, and its topics in order.
+    pub(super) done: Sample,
+    pub(super) done_topics: Vec<Topic>,
+    pub(super) events: Vec<Event>,
+}
+
+impl Assembly {
+    pub(super) fn new(header: &RunHeader, epoch_ns: u64) -> Self {
+        let mut known: HashMap<String, Topic> = [
+            ("/tf", Topic::Frames),
+            ("/tf_static", Topic::FixedFrames),
+            ("/joint_states", Topic::Joints),
+            ("/rigid/joint_states", Topic::RigidJoints),
+            ("/tcp/flexible", Topic::Tool),
+            ("/tcp/rigid", Topic::RigidTool),
+            ("/tcp/error", Topic::Error),
+            ("/tcp/error_path", Topic::PathError),
+            ("/tcp/static_error", Topic::StaticError),
+            ("/tcp/contributions", Topic::Contributions),
+            ("/energy", Topic::Energy),
+            ("/solver", Topic::Solver),
+            ("/diagnostics/solver", Topic::Solver), // of older files
+            ("/events", Topic::Events),
+        ]
+        .map(|(name, topic)| (name.to_owned(), topic))
+        .into();
+        for (k, name) in topic_names(&header.elements).into_iter().enumerate() {
+            known.insert(format!("/elastic/{name}"), Topic::Load(k));
+            known.insert(format!("/elastic/{name}/deflection"), Topic::Deflection(k));
+        }
+        let elastic = vec![crate::ElasticSample::default(); header.elements.len()];
+        Self {
+            channels: HashMap::new(),
+            known,
+            epoch_ns,
+            step_s: header.step_s,
+            joints: header.joints.len(),
+            frames: Frames::of(header),
+            sequence: None,
+            sample: Sample { elastic, ..Sample::default() },
+            seen: Vec::new(),
+            done: Sample::default(),
+            done_topics: Vec::new(),
+            events: Vec::new(),
+        }
+    }
+
+    /// Takes a record. If it begins the next sample, the one before is [`Assembly::done`].
+    ///
+    /// # Errors
+    /// In words, what is wrong with a message.
+    pub(super) fn take(&mut self, record: &Record<'_>) -> Result<Option<()>, String> {
+        match record {
+            Record::Channel(channel) => {
+                if let Some(topic) = self.known.get(&channel.topic) {
+                    self.channels.insert(channel.id, *topic);
+                }
+                Ok(None)
+            }
+            Record::Message { header, data } => {
+                let Some(&topic) = self.channels.get(&header.channel_id) else { return Ok(None) };
+                let next = topic.is_of_a_sample() && self.sequence != Some(header.sequence);
+                let closed = next && self.close();
+                if next {
+                    self.sequence = Some(header.sequence);
+                    let time_ns = header.log_time.saturating_sub(self.epoch_ns);
+                    (self.sample.time_s, self.sample.step) = exact_time(time_ns, self.step_s);
+                }
+                if self.message(topic, data).is_none() {
+                    return Err(format!("a message {topic:?} that cannot be read, at {} ns", header.log_time));
+                }
+                if topic.is_of_a_sample() {
+                    self.seen.push(topic);
+                }
+                Ok(closed.then_some(()))
+            }
+            _ => Ok(None),
+        }
+    }
+
+    /// Ends the sample at hand; whether there was one.
+    pub(super) fn close(&mut self) -> bool {
+        if self.seen.is_empty() {
+            return false;
+        }
+        self.frames.poses(&mut self.sample);
+        self.done.clone_from(&self.sample);
+        self.seen.sort_unstable();
+        self.done_topics.clone_from(&self.seen);
+        self.seen.clear();
+        true
+    }
+
+    /// Puts a message's numbers into their places; `None` if it is not what its topic says.
+    fn message(&mut self, topic: Topic, data: &[u8]) -> Option<()> {
+        let mut cdr = CdrReader::new(data)?;
+        let sample = &mut self.sample;
+        match topic {
+            Topic::Frames | Topic::FixedFrames => self.frames.take(&mut cdr)?,
+            Topic::Joints => joint_state(&mut cdr, self.joints, &mut sample.flexible)?,
+            Topic::RigidJoints => joint_state(&mut cdr, self.joints, &mut sample.rigid)?,
+            Topic::Tool | Topic::RigidTool => {
+                cdr.header()?;
+                let twin = if topic == Topic::Tool { &mut sample.flexible } else { &mut sample.rigid };
+                twin.X_WT = pose(cdr.f64s()?);
+            }
+            Topic::Error | Topic::PathError => {
+                cdr.header()?;
+                let error = if topic == Topic::Error { &mut sample.error_world } else { &mut sample.error_path };
+                *error = cdr.f64s()?;
+            }
+            Topic::Load(k) => {
+                cdr.header()?;
+                sample.elastic[k].load = cdr.f64s()?;
+            }
+            Topic::Deflection(k) => {
+                // Older files have an array with names.
+                let array = cdr.labelled_array().and_then(|(_, values)| values.try_into().ok());
+                let stamped = || {
+                    let mut cdr = CdrReader::new(data)?;
+                    cdr.header()?;
+                    cdr.f64s()
+                };
+                sample.elastic[k].deflection = array.or_else(stamped)?;
+            }
+            Topic::StaticError => sample.static_m = cdr.labelled_array()?.1.try_into().ok()?,
+            Topic::Contributions => {
+                let (_, values) = cdr.labelled_array()?;
+                sample.contributions = values.chunks_exact(3).map(|part| [part[0], part[1], part[2]]).collect();
+            }
+            Topic::Energy => {
+                let (_, values) = cdr.labelled_array()?;
+                let [kinetic, potential, elastic] = values.try_into().ok()?;
+                sample.energy = crate::EnergySample { kinetic, potential, elastic };
+            }
+            Topic::Solver => sample.solver = cdr.labelled_array()?.1.try_into().ok()?,
+            Topic::Events => {
+                let time_s = cdr.time()?.saturating_sub(self.epoch_ns) as f64 / 1e9;
+                cdr.u8()?;
+                let kind = EventKind::from_word(cdr.string()?);
+                let text = cdr.string()?.to_owned();
+                self.events.extend(kind.map(|kind| Event { time_s, kind, text }));
+            }
+        }
+        Some(())
+    }
+}
+
+fn joint_state(cdr: &mut CdrReader<'_>, joints: usize, twin: &mut TwinSample) -> Option<()> {
+    cdr.header()?;
+    let names = cdr.u32()?;
+    for _ in 0..names {
+        cdr.string()?;
+    }
+    for values in [&mut twin.q, &mut twin.qdot, &mut twin.effort] {
+        *values = cdr.f64_sequence()?;
+        if values.len() != joints {
+            return None;
+        }
+    }
+    Some(())
+}

@@ -1,0 +1,140 @@
+//! An MCAP file of a run, record by record: memory does not grow with the length of the run, and a file without an end
+//! is read up to its last whole chunk.
+//!
+//! [`walk`] gives the records, [`found`] keeps what is said once, [`assembly`] makes samples of messages, [`frames`] poses in
+//! the world of transforms between neighbours.
+
+mod assembly;
+mod found;
+mod frames;
+mod walk;
+
+use std::path::{Path, PathBuf};
+
+use mcap::records::Record;
+
+use self::assembly::{Assembly, Topic};
+use self::found::Found;
+use self::walk::{Flow, walk};
+use super::{broken_end, not_a_recording};
+use crate::{LogError, RunHeader, RunResult, RunSource, Sample, run_json};
+
+/// See the module.
+pub(crate) struct McapRun {
+    path: PathBuf,
+    header: RunHeader,
+    epoch_ns: u64,
+    /// Topics that every sample has: those of the first.
+    topics: Vec<Topic>,
+    /// Number of attached files that belong to the header.
+    files_of_header: usize,
+    missing: Vec<String>,
+    warnings: Vec<String>,
+}
+
+impl McapRun {
+    pub(crate) fn open(path: &Path) -> Result<Self, LogError> {
+        let mut found = Found::default();
+        let broken = walk(path, &mut |record| {
+            found.take(record);
+            Ok(if found.samples > 1 { Flow::Stop } else { Flow::On })
+        })?;
+        let (mut header, files_of_header, mut missing) = found.header(path, broken.as_deref())?;
+
+        // The first sample once more, now that names can be told apart: what it holds, all hold.
+        let epoch_ns = found.recording("epoch_ns").and_then(|text| text.parse().ok()).unwrap_or(0);
+        header.start_ns = Some(epoch_ns).filter(|start| *start != crate::START_NS);
+        let mut assembly = Assembly::new(&header, epoch_ns);
+        let mut topics = Vec::new();
+        walk(path, &mut |record| {
+            let done = assembly.take(&record).map_err(|what| not_a_recording(path, what, "messages of flexarm"))?;
+            if done.is_some() {
+                topics.clone_from(&assembly.done_topics);
+            }
+            Ok(if done.is_some() { Flow::Stop } else { Flow::On })
+        })?;
+        if topics.is_empty() {
+            assembly.close();
+            topics.clone_from(&assembly.done_topics); // the only sample, or none
+        }
+        if !header.contributors.is_empty() && !topics.is_empty() && !topics.contains(&Topic::Contributions) {
+            header.contributors.clear();
+            missing.push("the file has no shares of the tool error (/tcp/contributions)".into());
+        }
+        if header.has_static && !topics.is_empty() && !topics.contains(&Topic::StaticError) {
+            header.has_static = false;
+            missing.push("the file has no static part of the tool error (/tcp/static_error)".into());
+        }
+        if !header.bends.is_empty() && !topics.is_empty() && !assembly.frames.stations_seen {
+            header.bends.clear();
+            missing.push("the file has no frames of stations along bent links".into());
+        }
+        let path = path.to_owned();
+        Ok(Self { path, header, epoch_ns, topics, files_of_header, missing, warnings: Vec::new() })
+    }
+}
+
+impl RunSource for McapRun {
+    fn header(&self) -> &RunHeader {
+        &self.header
+    }
+
+    fn missing(&self) -> Vec<String> {
+        self.missing.clone()
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        self.warnings.clone()
+    }
+
+    fn replay(&mut self, take: &mut dyn FnMut(&Sample) -> Result<(), LogError>) -> Result<RunResult, LogError> {
+        self.warnings.clear();
+        let path = &self.path;
+        let mut assembly = Assembly::new(&self.header, self.epoch_ns);
+        let mut found = Found::default();
+        let (mut count, mut last_s) = (0_u64, 0.0);
+        let topics = &self.topics;
+        let mut give = |assembly: &Assembly| -> Result<(), LogError> {
+            // One that the end of the file cut short is no sample.
+            if assembly.done_topics == *topics && !topics.is_empty() {
+                take(&assembly.done)?;
+                (count, last_s) = (count + 1, assembly.done.time_s);
+            }
+            Ok(())
+        };
+        let broken = walk(path, &mut |record| {
+            let done = assembly.take(&record).map_err(|what| not_a_recording(path, what, "messages of flexarm"))?;
+            if done.is_some() {
+                give(&assembly)?;
+            }
+            if !matches!(record, Record::Message { .. }) {
+                found.take(record);
+            }
+            Ok(Flow::On)
+        })?;
+        if assembly.close() {
+            give(&assembly)?;
+        }
+        let figures = found.metadata.iter().find(|(name, _)| name == "flexarm.result").map(|(_, pairs)| pairs);
+        match (&broken, figures) {
+            (Some(cause), _) => self.warnings.push(broken_end(path, cause, count, last_s)),
+            (None, None) => self.warnings.push(format!(
+                "{}: the run was not finished; {count} samples, up to t = {last_s} s, were read",
+                path.display()
+            )),
+            _ if !found.whole => self.warnings.push(broken_end(path, "its index is missing", count, last_s)),
+            _ => {}
+        }
+        // Topic and metadata are for other programs; the file of its own has kinds and order as well.
+        let mut result = match &found.result {
+            Some(text) => run_json::read_result(&String::from_utf8_lossy(text)),
+            None => RunResult {
+                figures: figures.map(|pairs| pairs.clone().into_iter().collect()).unwrap_or_default(),
+                events: std::mem::take(&mut assembly.events),
+                ..RunResult::default()
+            },
+        };
+        result.attachments.extend(found.files.into_iter().skip(self.files_of_header));
+        Ok(result)
+    }
+}
