@@ -1,45 +1,30 @@
 //! Loads as values: what programs apply where people write a file of loads.
 
-use std::fmt;
-use std::sync::Arc;
-
 use flexarm_kinematics::{Model, Wrench};
-use flexarm_stepping::{Load, LoadAxes};
+use flexarm_stepping::{Load, TimedWrench};
 
 use crate::disturbance::{frame_of, moving_links};
 use crate::error::Error;
 
 /// A wrench on a frame of the robot as a function of time.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub struct AppliedLoad {
     /// `tcp`, or a link that moves.
     pub frame: String,
-    /// Whether its direction stays in the world or turns with the frame.
-    pub axes: LoadAxes,
-    /// Force (N) and moment (N m) at the frame's origin at time t (s).
-    pub wrench: Arc<dyn Fn(f64) -> Wrench + Send + Sync>,
-    /// Times at which it begins, ends, jumps or bends (s): steps end there.
-    pub jumps_s: Vec<f64>,
-    /// Shortest period in it (s), infinite without one.
-    pub period_s: f64,
-}
-
-impl fmt::Debug for AppliedLoad {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("AppliedLoad").field("frame", &self.frame).field("axes", &self.axes).finish_non_exhaustive()
-    }
+    /// What acts at the frame's origin.
+    pub wrench: TimedWrench,
 }
 
 impl AppliedLoad {
+    /// A wrench at the origin of a frame: `tcp`, or a link that moves.
+    pub fn new(frame: &str, wrench: TimedWrench) -> Self {
+        Self { frame: frame.to_owned(), wrench }
+    }
+
     /// A wrench in world axes that stays the same from `start_s` to `end_s` (s) and is zero before and after.
     pub fn during(frame: &str, F_W: Wrench, start_s: f64, end_s: f64) -> Self {
-        Self {
-            frame: frame.to_owned(),
-            axes: LoadAxes::World,
-            wrench: Arc::new(move |t| if t >= start_s && t <= end_s { F_W } else { Wrench::zeros() }),
-            jumps_s: vec![start_s, end_s],
-            period_s: f64::INFINITY,
-        }
+        let wrench = TimedWrench::new(move |t| if t >= start_s && t <= end_s { F_W } else { Wrench::zeros() });
+        Self::new(frame, wrench.with_jumps(vec![start_s, end_s]))
     }
 
     /// A wrench in world axes that is linear between samples and zero before and after them.
@@ -68,8 +53,7 @@ impl AppliedLoad {
                 _ => Wrench::zeros(),
             }
         };
-        let (frame, period_s) = (frame.to_owned(), f64::INFINITY);
-        Ok(Self { frame, axes: LoadAxes::World, wrench: Arc::new(wrench), jumps_s: times, period_s })
+        Ok(Self::new(frame, TimedWrench::new(wrench).with_jumps(times)))
     }
 
     /// On a model, up to the end of a run (s).
@@ -78,8 +62,7 @@ impl AppliedLoad {
             let known = moving_links(model);
             Error::Usage(format!("load on frame {:?}: expected \"tcp\" or a link that moves, of {known:?}", self.frame))
         })?;
-        let jumps = self.jumps_s.iter().copied().filter(|t| *t <= duration_s).collect();
-        let (axes, wrench, period) = (self.axes, self.wrench.clone(), self.period_s);
-        Ok(Load { body: frame.body, X_BF: frame.X_BF, axes, wrench, jumps, period })
+        let jumps = self.wrench.jumps.iter().copied().filter(|t| *t <= duration_s).collect();
+        Ok(Load { body: frame.body, X_BF: frame.X_BF, wrench: self.wrench.clone().with_jumps(jumps) })
     }
 }

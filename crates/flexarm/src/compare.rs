@@ -338,16 +338,10 @@ impl<'a> Run<'a> {
         self.stepper.observe(&mut self.seen);
         let t = self.seen.t;
         // The twin carries what the arm carries.
-        let due = self.arm.inertia_changes.first().is_some_and(|change| change.t <= t + 1e-9);
-        let before = if due { self.energy_with_payload() } else { 0.0 };
-        while let Some(change) = self.arm.inertia_changes.first()
-            && change.t <= t + 1e-9
-        {
-            let change = self.arm.inertia_changes.remove(0);
-            self.arm.model = Arc::new(self.arm.model.with_inertia(change.body, change.inertia));
-        }
-        if due {
+        if !Arc::ptr_eq(&self.arm.model, &self.seen.model) {
             // At the start the arm carries it already.
+            let before = if step > 0 { self.energy_with_payload() } else { 0.0 };
+            self.arm.model.clone_from(&self.seen.model);
             self.energy.exchanged += if step > 0 { self.energy_with_payload() - before } else { 0.0 };
         }
         self.twin.update(&self.arm, &self.tcp, t);
@@ -594,7 +588,7 @@ impl<'a> Run<'a> {
                 add(*since, EventKind::Limit, text);
             }
         }
-        let mut jumps: Vec<f64> = self.arm.loads.iter().flat_map(|load| load.jumps.iter().copied()).collect();
+        let mut jumps: Vec<f64> = self.arm.loads.iter().flat_map(|load| load.wrench.jumps.iter().copied()).collect();
         jumps.sort_by(f64::total_cmp);
         jumps.dedup();
         // A table or a milling load has a corner at every row; a list of those tells nobody anything.

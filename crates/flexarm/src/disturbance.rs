@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use exmex::{Express, FlatEx};
 use flexarm_kinematics::{Frame, LinkInertia, Model, Pose, SpatialInertia, Wrench};
-use flexarm_stepping::{InertiaChange, Load, LoadAxes};
+use flexarm_stepping::{InertiaChange, Load, LoadAxes, TimedWrench};
 use nalgebra::{Matrix3, Vector3};
 use serde::Deserialize;
 use toml::Spanned;
@@ -277,7 +277,7 @@ fn load(
         }
     };
     let jumps = [start].into_iter().chain(last).chain(rows).filter(|t| *t <= duration).collect();
-    Ok(Load { body: frame.body, X_BF: frame.X_BF, axes, wrench, jumps, period })
+    Ok(Load { body: frame.body, X_BF: frame.X_BF, wrench: TimedWrench { axes, value: wrench, jumps, period } })
 }
 
 /// A key that the kind of load would not use, and the kinds that would.

@@ -105,7 +105,7 @@ pub use flexarm_kinematics::{Pose, Wrench};
 pub use flexarm_log::{Column, Columns, RecordingFormat, Sample, Trace};
 pub use flexarm_stepping::{
     AlphaSettings, ConstraintForm, LoadAxes, OperatingPoint, ReferenceMethod, ReferenceSettings, SpookPreset,
-    SpookSettings, Start, StepError, StepperKind,
+    SpookSettings, Start, StepError, StepperKind, TimedWrench,
 };
 pub use flexarm_trajectory::{Trajectory, TrajectoryError};
 pub use flexarm_urdf::{InertiaEstimate, ReadOptions, closest, search_paths_from_environment};

@@ -114,7 +114,7 @@ const STEPS_PER_LOAD: f64 = 8.0;
 /// Loads that last so few steps that they do not act as the file says.
 fn short_loads(loads: &[Load], h: f64) -> Vec<Caveat> {
     let brief = |load: &Load| {
-        let (first, last) = load.jumps.iter().fold((f64::INFINITY, 0.0f64), |(a, b), t| (a.min(*t), b.max(*t)));
+        let (first, last) = load.wrench.jumps.iter().fold((f64::INFINITY, 0.0f64), |(a, b), t| (a.min(*t), b.max(*t)));
         let steps = (last - first) / h;
         (last > first && steps < STEPS_PER_LOAD).then(|| {
             format!(
@@ -123,9 +123,10 @@ fn short_loads(loads: &[Load], h: f64) -> Vec<Caveat> {
         })
     };
     let fast = |load: &Load| {
-        let steps = load.period / h;
-        (load.period != EXPRESSION_PERIOD && steps < STEPS_PER_LOAD).then(|| {
-            let hz = 1.0 / load.period;
+        let period = load.wrench.period;
+        let steps = period / h;
+        (period != EXPRESSION_PERIOD && steps < STEPS_PER_LOAD).then(|| {
+            let hz = 1.0 / period;
             format!("a load of {hz:.1} Hz has {steps:.1} steps per period: it does not act as written; lower --step")
         })
     };

@@ -99,7 +99,7 @@ fn a_load_by_value_is_that_of_the_file() {
     // Samples that say the same, within and without: nothing before, nothing after.
     let sampled = AppliedLoad::sampled("tcp", &[0.2, 0.4, 0.7], &[F; 3]).unwrap();
     for t in [0.1999, 0.2, 0.3, 0.7, 0.7001] {
-        assert_eq!((sampled.wrench)(t).force.y, if (0.2..=0.7).contains(&t) { 3.0 } else { 0.0 }, "{t}");
+        assert_eq!(sampled.wrench.at(t).force.y, if (0.2..=0.7).contains(&t) { 3.0 } else { 0.0 }, "{t}");
     }
     let worst = error(applied(sampled)).iter().zip(&by_file).fold(0.0_f64, |worst, (a, b)| worst.max((a - b).abs()));
     eprintln!("sampled and constant: {worst:e} m");

@@ -77,7 +77,7 @@ fn every_example_of_a_loads_file_loads() {
         assert_eq!(read.changes.len(), block.matches("[[payload]]").count());
         for t in [0.0, 0.3, 1.0005, 2.9] {
             for load in &read.loads {
-                let wrench = (load.wrench)(t);
+                let wrench = load.wrench.at(t);
                 assert!(wrench.force.iter().chain(wrench.torque.iter()).all(|x| x.is_finite()), "at {t} s");
             }
         }
