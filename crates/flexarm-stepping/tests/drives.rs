@@ -707,8 +707,7 @@ fn the_reference_stepper_sees_short_loads_and_fast_ones() {
         moment(if (start..start + T).contains(&t) { 30.0 * (PI * (t - start) / T).sin() } else { 0.0 })
     });
     let pulse = pulse.with_jumps([0.0, 0.137, 0.5, 0.863, 1.0].iter().map(|s| start + s * T).collect());
-    let sine =
-        TimedWrench::new(move |t| moment(if t >= 1.0 { 30.0 * (TAU * 50.0 * (t - 1.0)).sin() } else { 0.0 }));
+    let sine = TimedWrench::new(move |t| moment(if t >= 1.0 { 30.0 * (TAU * 50.0 * (t - 1.0)).sin() } else { 0.0 }));
     let sine = sine.with_jumps(vec![1.0]).with_period(0.02);
     // The sine: after a whole period at rest again, on the way at most twice its amplitude over J omega.
     for (wrench, truth) in [(pulse, 30.0 * T * 2.0 / PI / J), (sine, 2.0 * 30.0 / (J * TAU * 50.0))] {

@@ -12,6 +12,7 @@ use crate::motion::Motion;
 use crate::options::{DriveModel, LinkModel, Outputs, RunOptions};
 use crate::result_files::Undo;
 use crate::robot::Robot;
+use crate::scenario::Scenario;
 use crate::summary::Files;
 
 /// Recorders of a run with the names of their files.
@@ -208,11 +209,12 @@ fn straight(path: &Path) -> String {
 /// Everything about a run that does not change.
 pub(crate) fn header(
     robot: &Robot,
-    motion: &Motion,
+    scenario: &Scenario,
     options: &RunOptions,
     arm: &FlexibleArm,
     links_model: &str,
 ) -> RunHeader {
+    let motion = &scenario.motion;
     let group = |name: &str, rows: &[(&str, String)]| {
         (name.to_owned(), rows.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect::<Vec<_>>())
     };
@@ -229,7 +231,7 @@ pub(crate) fn header(
         ("urdf_file", straight(&robot.urdf_path)),
         ("trajectory_file", straight(&motion.path)),
     ];
-    inputs.extend(options.loads.as_ref().map(|path| ("loads_file", straight(path))));
+    inputs.extend(scenario.loads_file.as_ref().map(|path| ("loads_file", straight(path))));
     let drives = match options.modelling.drives {
         DriveModel::AsFiled => AS_FILED,
         DriveModel::Rigid => "rigid",
@@ -252,7 +254,7 @@ pub(crate) fn header(
                 ("stepper", stepper.name.clone()),
                 ("step_s", options.step_s.to_string()),
                 ("rho_inf", stepper.rho_inf.map_or_else(String::new, |r| r.to_string())),
-                ("start", format!("{:?}", options.start).to_lowercase()),
+                ("start", format!("{:?}", scenario.start).to_lowercase()),
                 ("log_rate_hz", options.log_rate_hz.to_string()),
                 ("settling_band_m", options.settling_band_m.to_string()),
             ],
