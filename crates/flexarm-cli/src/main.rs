@@ -30,7 +30,7 @@ use args::{
 use clap::{CommandFactory, Parser};
 use flexarm::{
     AlphaSettings, ConstraintForm, Error, InertiaEstimate, LoadOptions, ReadOptions, ReferenceMethod,
-    ReferenceSettings, Robot, RunOptions, SpookPreset, SpookSettings, Start, StepperKind, Variant,
+    ReferenceSettings, Robot, RunOptions, Scenario, SpookPreset, SpookSettings, Start, StepperKind, Variant,
 };
 use indicatif::{ProgressBar, ProgressStyle};
 use shipped::OutputFolder;
@@ -176,10 +176,7 @@ fn run_options(args: &RunArgs, with_twin: bool) -> RunOptions {
         stepper,
         step_s: args.step,
         modelling: args.modelling.modelling(),
-        applied: Vec::new(),
-        loads: args.loads.clone(),
         log_rate_hz: args.log_rate,
-        start: if args.from_rest == StartName::Equilibrium { Start::Equilibrium } else { Start::Undeformed },
         ignore_limits: args.ignore_limits,
         with_twin,
         settling_band_m: args.settling_band,
@@ -210,7 +207,10 @@ fn variant(label: String, args: &RunArgs, with_twin: bool) -> Result<Variant, Er
         Some(seconds) => motion.with_rounded_corners(seconds, &*robot.rigid_model()?)?,
         None => motion,
     };
-    Ok(Variant { label, robot, motion, options: run_options(args, with_twin) })
+    let start = if args.from_rest == StartName::Equilibrium { Start::Equilibrium } else { Start::Undeformed };
+    let scenario = Scenario::new(motion).with_start(start);
+    let scenario = args.loads.iter().try_fold(scenario, |scenario, path| scenario.with_loads_file(path))?;
+    Ok(Variant { label, robot, scenario, options: run_options(args, with_twin) })
 }
 
 fn simulate(cli: &Cli, args: &RunArgs, with_twin: bool) -> Result<ExitCode, Error> {
@@ -226,10 +226,10 @@ fn simulate(cli: &Cli, args: &RunArgs, with_twin: bool) -> Result<ExitCode, Erro
         })
     });
     let variants = variants.collect::<Result<Vec<Variant>, Error>>()?;
-    let Some(Variant { robot, motion, options, .. }) = variants.first() else {
+    let Some(Variant { robot, scenario, options, .. }) = variants.first() else {
         return Err(Error::Usage("there is nothing to run".into()));
     };
-    let stem = format!("{}-{}", robot.name, motion.name);
+    let stem = format!("{}-{}", robot.name, scenario.motion.name);
     let folder = OutputFolder::of(args.output.as_deref(), &stem, !args.no_files)?;
     let outputs = folder.path().map(|folder| formats::outputs(args, folder)).transpose()?;
 
@@ -240,7 +240,7 @@ fn simulate(cli: &Cli, args: &RunArgs, with_twin: bool) -> Result<ExitCode, Erro
         stop()
     };
     let result = match variants.len() {
-        1 => flexarm::simulate(robot, motion, options, outputs.as_ref(), &mut progress),
+        1 => flexarm::simulate(robot, scenario, options, outputs.as_ref(), &mut progress),
         _ => flexarm::compare_study(&variants, outputs.as_ref(), &mut progress).map(|(summary, _)| summary),
     };
     bar.clear();

@@ -1,7 +1,9 @@
 //! What happens at discrete times: payloads, samples of the controller, jumps of loads and of prescribed velocities.
 //!
 //! Between two events everything is smooth. A step ends at each of them, wherever it lies, and what is asked for at that
-//! time belongs to the side from which it is asked ([`Breaks::side`]). Start at [`ReducedArm::at_time`].
+//! time belongs to the side from which it is asked ([`EventQueue::side`]). What is to come and what is over stands in one
+//! place of a run's state, the [`EventQueue`]; who else follows a run learns of it from the observation. Start at
+//! [`ReducedArm::at_time`].
 //!
 //! A joint whose prescribed velocity jumps by Δv_p strikes the arm: positions stay, the free velocities take the impulse,
 //!
@@ -20,7 +22,7 @@ use std::sync::Arc;
 use flexarm_kinematics::mass_matrix;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
-use crate::arm::FlexibleArm;
+use crate::arm::{FlexibleArm, InertiaChange};
 use crate::error::StepError;
 use crate::load::Load;
 use crate::reduced::ReducedArm;
@@ -62,42 +64,103 @@ pub(crate) enum Change {
     Matrices,
 }
 
-/// Times at which loads or prescribed velocities jump, and which of them are over.
-pub(crate) struct Breaks {
-    times: Vec<f64>,
-    passed: usize,
+/// What happens at discrete times, and how much of it is over: the part of a run's state that knows. Times nearer than
+/// [`SAME_TIME`] are one.
+pub(crate) struct EventQueue {
+    /// When loads or prescribed velocities jump, ascending, and how many of these times are over.
+    jumps: Vec<f64>,
+    jumps_over: usize,
+    /// Changes of inertia, by time, and how many of them have been carried out.
+    changes: Vec<InertiaChange>,
+    changes_over: usize,
+    /// When the controller takes its samples.
+    clock: Option<SampleClock>,
 }
 
-impl Breaks {
+impl EventQueue {
+    /// Of an arm whose run begins: nothing is over.
     pub(crate) fn of(arm: &FlexibleArm) -> Self {
-        let loads = arm.loads.iter().flat_map(|load| load.jumps.iter().copied().filter(|t| jumps_at(load, *t)));
-        let mut times: Vec<f64> = loads.chain(arm.motion.velocity_jumps()).collect();
-        times.sort_by(f64::total_cmp);
-        Self { times, passed: 0 }
+        let loads = arm.loads.iter().flat_map(|load| load.wrench.jumps.iter().copied().filter(|t| jumps_at(load, *t)));
+        let mut jumps: Vec<f64> = loads.chain(arm.motion.velocity_jumps()).collect();
+        jumps.sort_by(f64::total_cmp);
+        let clock = arm.servo.as_ref().map(|servo| SampleClock { sample_s: servo.sample_s, next: 0 });
+        Self { jumps, jumps_over: 0, changes: arm.inertia_changes.clone(), changes_over: 0, clock }
     }
 
-    /// The first that is not over.
-    pub(crate) fn next(&self) -> Option<f64> {
-        self.times.get(self.passed).copied()
+    /// The next event after `t`, if any: at `end` if that is the same time.
+    pub(crate) fn next(&self, t: f64, end: f64) -> Option<f64> {
+        let change = self.changes.get(self.changes_over).map(|change| change.t);
+        let sample = self.clock.as_ref().map(|clock| clock.after(t));
+        let next = [change, sample, self.next_jump()].into_iter().flatten().reduce(f64::min);
+        next.map(|event| if (event - end).abs() <= SAME_TIME { end } else { event })
     }
 
-    /// The time nearest to t between the last event and the next one.
+    fn next_jump(&self) -> Option<f64> {
+        self.jumps.get(self.jumps_over).copied()
+    }
+
+    /// The time nearest to t between the last jump and the next one.
     pub(crate) fn side(&self, t: f64) -> f64 {
-        let after = self.passed.checked_sub(1).map_or(t, |k| t.max(self.times[k].next_up()));
-        self.next().map_or(after, |next| after.min(next.next_down()))
+        let after = self.jumps_over.checked_sub(1).map_or(t, |k| t.max(self.jumps[k].next_up()));
+        self.next_jump().map_or(after, |next| after.min(next.next_down()))
     }
 
-    /// Leaves those at t behind; the times just before the first and just after the last of them.
-    pub(crate) fn pass(&mut self, t: f64) -> Option<(f64, f64)> {
-        let first = self.next().filter(|first| *first <= t + SAME_TIME)?;
-        self.passed = self.times.partition_point(|time| *time <= t + SAME_TIME);
-        Some((first.next_down(), self.times[self.passed - 1].next_up()))
+    /// Leaves the jumps at t behind; the times just before the first and just after the last of them.
+    pub(crate) fn pass_jumps(&mut self, t: f64) -> Option<(f64, f64)> {
+        let first = self.next_jump().filter(|first| *first <= t + SAME_TIME)?;
+        self.jumps_over = self.jumps.partition_point(|time| *time <= t + SAME_TIME);
+        Some((first.next_down(), self.jumps[self.jumps_over - 1].next_up()))
+    }
+
+    /// The next change of inertia that is due at t, which is over with that, and its number.
+    pub(crate) fn due_change(&mut self, t: f64) -> Option<(usize, &InertiaChange)> {
+        self.changes_before(t + SAME_TIME)
+    }
+
+    /// As [`EventQueue::due_change`] as far as `t` is approached from below: what happens there is still to come.
+    pub(crate) fn change_before(&mut self, t: f64) -> Option<(usize, &InertiaChange)> {
+        self.changes_before((t - SAME_TIME).next_down())
+    }
+
+    fn changes_before(&mut self, latest: f64) -> Option<(usize, &InertiaChange)> {
+        let number = self.changes_over;
+        let change = self.changes.get(number).filter(|change| change.t <= latest)?;
+        self.changes_over += 1;
+        Some((number, change))
+    }
+
+    /// Whether the controller takes a sample at t, which is over with that.
+    pub(crate) fn sample_due(&mut self, t: f64) -> bool {
+        self.clock.as_mut().is_some_and(|clock| clock.is_due(t))
+    }
+}
+
+/// Evenly spaced samples from 0 on.
+struct SampleClock {
+    sample_s: f64,
+    /// Number of the next sample.
+    next: u64,
+}
+
+impl SampleClock {
+    /// Time of the first sample after t.
+    fn after(&self, t: f64) -> f64 {
+        let s = self.sample_s;
+        ((t + SAME_TIME) / s).floor() * s + s
+    }
+
+    fn is_due(&mut self, t: f64) -> bool {
+        if t + SAME_TIME < self.next as f64 * self.sample_s {
+            return false;
+        }
+        self.next = (t / self.sample_s + SAME_TIME).floor() as u64 + 1;
+        true
     }
 }
 
 /// Does the load jump there, or only begin, end or bend?
 fn jumps_at(load: &Load, t: f64) -> bool {
-    let (before, after) = ((load.wrench)(t.next_down()).to_vector(), (load.wrench)(t.next_up()).to_vector());
+    let (before, after) = (load.wrench.at(t.next_down()).to_vector(), load.wrench.at(t.next_up()).to_vector());
     (after - before).amax() > 1e-9 * before.amax().max(after.amax())
 }
 
@@ -108,7 +171,7 @@ pub(crate) type ArmDamping = (DMatrix<f64>, Vec<f64>, bool);
 /// has. An arm that cannot stand with its new payload keeps the damping it had.
 pub(crate) fn damping_after_changes(arm: &FlexibleArm) -> Vec<ArmDamping> {
     let mut changed = arm.clone();
-    let damping = |change: &crate::arm::InertiaChange| {
+    let damping = |change: &InertiaChange| {
         changed.model = Arc::new(changed.model.with_inertia(change.body, change.inertia));
         let mut renewed = changed.clone();
         if renewed.update_modes_and_damping().is_ok() {
@@ -120,36 +183,32 @@ pub(crate) fn damping_after_changes(arm: &FlexibleArm) -> Vec<ArmDamping> {
 }
 
 impl ReducedArm {
-    /// The next time after `t` at which something happens, if any.
-    pub fn next_event(&self, t: f64) -> Option<f64> {
-        let change = self.arm.inertia_changes.get(self.changes).map(|c| c.t);
-        let sample = self.servo.as_ref().map(|s| s.next_sample(t));
-        [change, sample, self.breaks.next()].into_iter().flatten().reduce(f64::min)
+    /// The next time after `t` at which something happens, if any; that of `end` if it is the same.
+    pub fn next_event(&self, t: f64, end: f64) -> Option<f64> {
+        self.events.next(t, end)
     }
 
     /// Carries out what happens at t; free velocities may jump.
     pub(crate) fn at_time(&mut self, t: f64, x: &DVector<f64>, v: &mut DVector<f64>) -> Result<Change, StepError> {
         let mut what = Change::Nothing;
-        while let Some(change) = self.arm.inertia_changes.get(self.changes)
-            && change.t <= t + SAME_TIME
-        {
+        while let Some((number, change)) = self.events.due_change(t) {
             self.arm.model = Arc::new(self.arm.model.with_inertia(change.body, change.inertia));
-            if let Some((D, tau, proportional)) = self.dampings.get_mut(self.changes) {
+            if let Some((D, tau, proportional)) = self.dampings.get_mut(number) {
                 std::mem::swap(&mut self.arm.D, D);
                 std::mem::swap(&mut self.arm.tau, tau);
                 self.arm.proportional = *proportional;
             }
-            self.changes += 1;
             what = Change::Matrices;
         }
-        if let Some((before, after)) = self.breaks.pass(t) {
+        if let Some((before, after)) = self.events.pass_jumps(t) {
             (self.sampled_at, self.step_start.time) = (f64::NAN, f64::NAN);
             self.strike(t, before, after, x, v)?;
             what = what.max(Change::Motion);
         }
         if let Some(servo) = &mut self.servo
-            && servo.sample(t, &self.arm, x.as_slice(), v.as_slice())
+            && self.events.sample_due(t)
         {
+            servo.sample(t, &self.arm, x.as_slice(), v.as_slice());
             what = what.max(Change::Motion);
         }
         Ok(what)
@@ -182,7 +241,7 @@ impl ReducedArm {
 
     /// Joint motion at t into the state, as [`ReducedArm::set`] keeps it.
     pub(crate) fn sample_joints(&mut self, t: f64) {
-        let t = self.breaks.side(t);
+        let t = self.events.side(t);
         if t != self.sampled_at {
             self.arm.prescribed_state(t, &mut self.state, &mut self.qddot);
             self.sampled_at = t;
@@ -248,5 +307,69 @@ impl ReducedArm {
         self.struck += (0..M.nrows()).map(|k| (new(k) - 0.5 * self.tau[k]) * row(k)).sum::<f64>();
         *v += &self.shifted;
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn queue(jumps: &[f64], sample_s: Option<f64>) -> EventQueue {
+        EventQueue {
+            jumps: jumps.to_vec(),
+            jumps_over: 0,
+            changes: Vec::new(),
+            changes_over: 0,
+            clock: sample_s.map(|sample_s| SampleClock { sample_s, next: 0 }),
+        }
+    }
+
+    #[test]
+    fn what_is_asked_for_at_a_jump_belongs_to_the_side_from_which_it_is_asked() {
+        let mut events = queue(&[0.5, 0.5 + 0.4 * SAME_TIME, 0.7], None);
+        assert_eq!(events.side(0.3), 0.3);
+        assert!(events.side(0.5) < 0.5 && events.side(0.6) < 0.5);
+        let (before, after) = events.pass_jumps(0.5).unwrap();
+        assert!(before < 0.5 && after > 0.5 + 0.4 * SAME_TIME, "both jumps are over at once: {before} {after}");
+        assert!(events.side(0.5) > 0.5 && events.side(0.6) == 0.6 && events.side(0.8) < 0.7);
+        assert_eq!(events.pass_jumps(0.6), None);
+    }
+
+    /// A step that ends at an event, but for rounding, ends there: no second step of a rounding's length.
+    #[test]
+    fn an_event_at_the_end_of_a_step_but_for_rounding_is_at_its_end() {
+        let events = queue(&[0.1 + 0.2], None);
+        assert_eq!(events.next(0.2, 0.3), Some(0.3));
+        assert_eq!(events.next(0.2, 0.25), Some(0.1 + 0.2));
+    }
+
+    /// Truth: a clock of 1 ms ticks 1001 times from 0 to 1 s, at times that are sums of steps and multiples of them.
+    #[test]
+    fn a_controller_takes_each_sample_once() {
+        for h in [1e-3, 2.5e-4] {
+            let mut events = queue(&[], Some(1e-3));
+            let (mut t, mut sum, mut taken) = (0.0, 0.0, [0, 0]);
+            taken[0] += usize::from(events.sample_due(t));
+            while sum < 1.0 - 0.5 * h {
+                sum += h;
+                t = events.next(t, sum).unwrap();
+                taken[usize::from(t > 0.5 + SAME_TIME)] += usize::from(events.sample_due(t));
+                assert!(!events.sample_due(t));
+                if t < sum {
+                    t = sum;
+                }
+            }
+            assert_eq!(taken, [501, 500], "{h}");
+        }
+    }
+
+    #[test]
+    fn a_payload_is_carried_from_its_time_on_and_not_before() {
+        let change = |t: f64| InertiaChange { t, body: 1, inertia: flexarm_kinematics::SpatialInertia::zeros() };
+        let mut events = EventQueue { changes: vec![change(0.5), change(0.5), change(0.9)], ..queue(&[], None) };
+        assert!(events.change_before(0.5).is_none() && events.due_change(0.4).is_none());
+        let numbers: Vec<usize> = std::iter::from_fn(|| events.due_change(0.5).map(|(number, _)| number)).collect();
+        assert_eq!(numbers, [0, 1]);
+        assert!(events.due_change(0.6).is_none() && events.change_before(1.0).is_some());
     }
 }

@@ -57,7 +57,7 @@ pub use drive::{CurveError, Friction, ServoAxis, TorqueCurve};
 pub use error::StepError;
 pub use generalized_alpha::{AlphaSettings, GeneralizedAlpha};
 pub use linear::{Linear, linearise};
-pub use load::{Load, LoadAxes};
+pub use load::{Load, LoadAxes, TimedWrench};
 pub use modes::{Modes, modes_at};
 pub use motion::{Held, MotionFn, PrescribedMotion};
 pub use operating_point::OperatingPoint;

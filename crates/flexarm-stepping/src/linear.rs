@@ -154,7 +154,7 @@ pub fn linearise(arm: &FlexibleArm, tool: &Frame, F_T_W: &Wrench, t: f64) -> Res
     let slopes = statics.slopes(&mut data, &q);
     let select = |A: &DMatrix<f64>| A.select_rows(&free).select_columns(&free);
     let mut change = select(&slopes);
-    let moments = arm.loads.iter().any(|load| (load.wrench)(t).torque.norm() > 0.0);
+    let moments = arm.loads.iter().any(|load| load.wrench.at(t).torque.norm() > 0.0);
     if F_T_W.torque.norm() == 0.0 && !moments {
         change = (&change + change.transpose()) * 0.5;
     }

@@ -16,46 +16,83 @@ pub enum LoadAxes {
     Frame,
 }
 
-/// A wrench that acts on a body.
+/// A wrench as a function of time, with what a stepper must know of its curve.
 #[derive(Clone)]
-pub struct Load {
-    /// The body.
-    pub body: usize,
-    /// Frame on the body at whose origin it acts.
-    pub X_BF: Pose,
-    /// Axes of the wrench.
+pub struct TimedWrench {
+    /// Axes in which force and moment are given.
     pub axes: LoadAxes,
-    /// Force (N) and moment (N m) at time t.
-    pub wrench: Arc<dyn Fn(f64) -> Wrench + Send + Sync>,
+    /// Force (N) and moment (N m) at time t (s).
+    pub value: Arc<dyn Fn(f64) -> Wrench + Send + Sync>,
     /// Times at which it begins, ends, jumps or bends (s); the reference stepper steps over none of them.
     pub jumps: Vec<f64>,
     /// Shortest period in it (s), infinite without one: the steps of the reference stepper stay well below.
     pub period: f64,
 }
 
-impl fmt::Debug for Load {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Load").field("body", &self.body).field("X_BF", &self.X_BF).field("axes", &self.axes).finish()
+impl TimedWrench {
+    /// In world axes, without jumps and without a period.
+    pub fn new(value: impl Fn(f64) -> Wrench + Send + Sync + 'static) -> Self {
+        Self { axes: LoadAxes::World, value: Arc::new(value), jumps: Vec::new(), period: f64::INFINITY }
+    }
+
+    /// The same in these axes.
+    #[must_use]
+    pub fn in_axes(self, axes: LoadAxes) -> Self {
+        Self { axes, ..self }
+    }
+
+    /// The same with these times at which it begins, ends, jumps or bends (s).
+    #[must_use]
+    pub fn with_jumps(self, jumps: Vec<f64>) -> Self {
+        Self { jumps, ..self }
+    }
+
+    /// The same with this as the shortest period in it (s).
+    #[must_use]
+    pub fn with_period(self, period: f64) -> Self {
+        Self { period, ..self }
+    }
+
+    /// Force (N) and moment (N m) at time t (s).
+    pub fn at(&self, t: f64) -> Wrench {
+        (self.value)(t)
     }
 }
 
+impl fmt::Debug for TimedWrench {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut shown = f.debug_struct("TimedWrench");
+        shown.field("axes", &self.axes).field("jumps", &self.jumps).field("period", &self.period);
+        shown.finish_non_exhaustive()
+    }
+}
+
+/// A wrench that acts on a body.
+#[derive(Clone, Debug)]
+pub struct Load {
+    /// The body.
+    pub body: usize,
+    /// Frame on the body at whose origin it acts.
+    pub X_BF: Pose,
+    /// What acts there.
+    pub wrench: TimedWrench,
+}
+
 impl Load {
+    /// A wrench at the body's origin.
+    pub fn at_origin(body: usize, wrench: TimedWrench) -> Self {
+        Self { body, X_BF: Pose::identity(), wrench }
+    }
+
     /// A constant wrench at the body's origin, world axes.
     pub fn constant(body: usize, F_W: Wrench) -> Self {
-        Self {
-            body,
-            X_BF: Pose::identity(),
-            axes: LoadAxes::World,
-            wrench: Arc::new(move |_| F_W),
-            jumps: Vec::new(),
-            period: f64::INFINITY,
-        }
+        Self::at_origin(body, TimedWrench::new(move |_| F_W))
     }
 
     /// At Bo in body axes.
     pub(crate) fn on_body(&self, t: f64, X_WB: &Pose) -> Wrench {
-        let F = (self.wrench)(t);
-        match self.axes {
+        let F = self.wrench.at(t);
+        match self.wrench.axes {
             LoadAxes::Frame => F.at_parent(&self.X_BF),
             LoadAxes::World => {
                 let turned = Wrench::new(X_WB.rotation.inverse() * F.force, X_WB.rotation.inverse() * F.torque);

@@ -235,7 +235,7 @@ impl OperatingPoint {
             }
         }
         // A constant moment is not conservative; what differences leave without one is their error.
-        let moments = self.arm.loads.iter().any(|load| (load.wrench)(0.0).torque.norm() > 0.0);
+        let moments = self.arm.loads.iter().any(|load| load.wrench.at(0.0).torque.norm() > 0.0);
         self.symmetric = self.F_T_W.torque.norm() == 0.0 && !moments;
         let mut S = match self.factor.take() {
             Some(factor) => factor.unpack_dirty(),

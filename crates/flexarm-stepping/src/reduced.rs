@@ -14,7 +14,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::arm::{FlexibleArm, GeometricStiffness, add_product};
 use crate::error::StepError;
-use crate::events::{ArmDamping, Breaks, StepStart, damping_after_changes};
+use crate::events::{ArmDamping, EventQueue, StepStart, damping_after_changes};
 use crate::servo::ServoState;
 use crate::system::SecondOrderSystem;
 
@@ -32,11 +32,9 @@ pub struct ReducedArm {
     /// Free coordinates in the model's order.
     pub(crate) free: Vec<usize>,
     pub(crate) servo: Option<ServoState>,
-    /// Next change of inertia.
-    pub(crate) changes: usize,
-    /// Damping after each of them.
+    pub(crate) events: EventQueue,
+    /// Damping after each change of inertia.
     pub(crate) dampings: Vec<ArmDamping>,
-    pub(crate) breaks: Breaks,
     /// Work of the drives where prescribed velocities jumped (J).
     pub(crate) struck: f64,
     geometric: bool,
@@ -70,9 +68,8 @@ impl ReducedArm {
             free: roles.free_coordinates().to_vec(),
             roles,
             servo: arm.servo.clone().map(|servo| ServoState::new(servo, &arm)),
-            changes: 0,
+            events: EventQueue::of(&arm),
             dampings: damping_after_changes(&arm),
-            breaks: Breaks::of(&arm),
             struck: 0.0,
             geometric: arm.elements.iter().any(|e| e.geometric.is_some()),
             sampled_at: f64::NAN,
@@ -123,7 +120,7 @@ impl ReducedArm {
 
     /// Joint motion at t (once per time) and free coordinates into the full state.
     pub(crate) fn set(&mut self, t: f64, x: &DVector<f64>, v: &DVector<f64>) {
-        let t = self.breaks.side(t);
+        let t = self.events.side(t);
         self.sample_joints(t);
         let n = self.arm.model.n_actuated();
         let driven = self.arm.torque_driven.len();

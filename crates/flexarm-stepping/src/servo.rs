@@ -1,4 +1,5 @@
-//! The sampled controller of the joints that are driven by torque: what it remembers between samples.
+//! The sampled controller of the joints that are driven by torque: what it remembers between samples. Not here: when it
+//! takes them (`events`).
 
 use std::sync::Arc;
 
@@ -7,7 +8,6 @@ use nalgebra::DVector;
 
 use crate::arm::{FlexibleArm, Servo};
 use crate::drive::Friction;
-use crate::events::SAME_TIME;
 
 /// State of a [`Servo`] in a run.
 pub(crate) struct ServoState {
@@ -19,7 +19,6 @@ pub(crate) struct ServoState {
     integral: Vec<f64>,
     /// The first sample sets the integrals so that the torques stay what they are.
     fresh: bool,
-    next: u64,
     data: Data,
     reference: State,
     qddot: DVector<f64>,
@@ -33,7 +32,6 @@ impl ServoState {
             torque: vec![0.0; n],
             integral: vec![0.0; n],
             fresh: false,
-            next: 0,
             data: Data::new(&servo.rigid),
             reference: State::zeros(&servo.rigid),
             qddot: DVector::zeros(servo.rigid.nv()),
@@ -63,12 +61,8 @@ impl ServoState {
         self.fresh = true;
     }
 
-    /// Takes a sample if one is due at t; `true` if it was.
-    pub(crate) fn sample(&mut self, t: f64, arm: &FlexibleArm, x: &[f64], v: &[f64]) -> bool {
-        if t + SAME_TIME < self.next as f64 * self.servo.sample_s {
-            return false;
-        }
-        self.next = (t / self.servo.sample_s + SAME_TIME).floor() as u64 + 1;
+    /// Takes the sample of time t.
+    pub(crate) fn sample(&mut self, t: f64, arm: &FlexibleArm, x: &[f64], v: &[f64]) {
         self.update_reference(t, arm);
         for axis in 0..self.servo.axes.len() {
             let a = self.servo.axes[axis];
@@ -88,12 +82,5 @@ impl ServoState {
             }
         }
         self.fresh = false;
-        true
-    }
-
-    /// Time of the first sample after t.
-    pub(crate) fn next_sample(&self, t: f64) -> f64 {
-        let s = self.servo.sample_s;
-        ((t + SAME_TIME) / s).floor() * s + s
     }
 }

@@ -7,6 +7,7 @@ use nalgebra::{Cholesky, DVector, Dyn};
 
 use crate::arm::FlexibleArm;
 use crate::error::StepError;
+use crate::events::EventQueue;
 use crate::reduced::add_geometric_forces;
 use crate::statics::{static_equilibrium, tangent_stiffness, with_curves};
 
@@ -17,12 +18,18 @@ const NOTHING: f64 = 1e-15;
 /// Corrections with one factor; a factor of the right place needs three or four.
 const MOST_CORRECTIONS: usize = 8;
 
+/// An instant before t (s), nearer than anything happens.
+pub(crate) fn before(t: f64) -> f64 {
+    t - 1e-12 * t.max(1.0)
+}
+
 /// The elastic coordinates of an arm that stands still wherever its motion is, for times in ascending order.
 ///
 /// The same equilibria as [`static_equilibrium`], at the price of a few evaluations of weight each: the tangent stiffness
 /// changes little along a motion, so that one factor serves many instants.
 pub struct StaticPath {
     arm: FlexibleArm,
+    events: EventQueue,
     data: Data,
     state: State,
     qddot: DVector<f64>,
@@ -37,7 +44,8 @@ impl StaticPath {
         let (nv, n) = (arm.model.nv(), arm.n_elastic_coordinates());
         let (data, state) = (Data::new(&arm.model), State::zeros(&arm.model));
         let e = if arm.modes.equilibrium.len() == n { arm.modes.equilibrium.clone() } else { DVector::zeros(n) };
-        Self { data, state, qddot: DVector::zeros(nv), unbalanced: DVector::zeros(n), e, factor: None, arm }
+        let (qddot, unbalanced) = (DVector::zeros(nv), DVector::zeros(n));
+        Self { events: EventQueue::of(&arm), data, state, qddot, unbalanced, e, factor: None, arm }
     }
 
     /// All coordinates at time `t` (s), not before the last one asked for: drives where the motion is, springs in balance
@@ -46,10 +54,24 @@ impl StaticPath {
     /// # Errors
     /// As [`static_equilibrium`].
     pub fn at(&mut self, t: f64) -> Result<&DVector<f64>, StepError> {
-        while self.arm.inertia_changes.first().is_some_and(|change| change.t <= t) {
-            let change = self.arm.inertia_changes.remove(0);
+        while let Some((_, change)) = self.events.due_change(t) {
             self.arm.model = Arc::new(self.arm.model.with_inertia(change.body, change.inertia));
         }
+        self.balanced(t)
+    }
+
+    /// As [`StaticPath::at`], just before `t`: what happens at that time is still to come.
+    ///
+    /// # Errors
+    /// As [`static_equilibrium`].
+    pub fn just_before(&mut self, t: f64) -> Result<&DVector<f64>, StepError> {
+        while let Some((_, change)) = self.events.change_before(t) {
+            self.arm.model = Arc::new(self.arm.model.with_inertia(change.body, change.inertia));
+        }
+        self.balanced(before(t))
+    }
+
+    fn balanced(&mut self, t: f64) -> Result<&DVector<f64>, StepError> {
         if self.e.is_empty() || self.correct(t) {
             self.place(t);
             return Ok(&self.state.q);

@@ -3,12 +3,12 @@
 
 use std::sync::Arc;
 
-use flexarm_kinematics::{Data, Pose, State, kinetic_energy_of, mass_matrix, potential_energy_of};
+use flexarm_kinematics::{Data, Model, Pose, State, kinetic_energy_of, mass_matrix, potential_energy_of};
 use nalgebra::{DMatrix, DVector, Vector6};
 
 use crate::arm::FlexibleArm;
 use crate::error::StepError;
-use crate::events::{Change, SAME_TIME};
+use crate::events::Change;
 use crate::generalized_alpha::{AlphaSettings, GeneralizedAlpha};
 use crate::reduced::ReducedArm;
 use crate::reference::{Reference, ReferenceSettings};
@@ -56,6 +56,8 @@ pub enum Start {
 pub struct Observation {
     /// Time (s).
     pub t: f64,
+    /// The tree, with what it carries at this time.
+    pub model: Arc<Model>,
     /// All coordinates, actuated then elastic.
     pub q: DVector<f64>,
     /// Their velocities.
@@ -81,6 +83,7 @@ impl Observation {
         let model = &arm.model;
         Self {
             t: 0.0,
+            model: model.clone(),
             q: DVector::zeros(model.nv()),
             qdot: DVector::zeros(model.nv()),
             X_WB: vec![Pose::identity(); model.bodies().len()],
@@ -177,11 +180,11 @@ pub fn new_stepper(
             let (x, v) = system.start(&e)?;
             let mut integrator = Reference::new(&mut system, 0.0, h, settings, x, v)?;
             // Else a solver that takes long steps may not see a short load at all.
-            for t in system.arm.loads.iter().flat_map(|load| &load.jumps).filter(|t| **t > 0.0) {
+            for t in system.arm.loads.iter().flat_map(|load| &load.wrench.jumps).filter(|t| **t > 0.0) {
                 integrator.restart_at(*t);
             }
             // No whole part of a period, or a sine would look like nothing at all.
-            let period = system.arm.loads.iter().map(|load| load.period).fold(f64::INFINITY, f64::min);
+            let period = system.arm.loads.iter().map(|load| load.wrench.period).fold(f64::INFINITY, f64::min);
             integrator.limit_steps(0.137 * period);
             Box::new(ReducedStepper { system, integrator })
         }
@@ -263,6 +266,7 @@ fn observe_reduced(
     let driven = &system.arm.torque_driven;
     let (e, rates) = (&x.as_slice()[driven.len()..], &v.as_slice()[driven.len()..]);
     out.t = t;
+    out.model.clone_from(model);
     out.q.copy_from(&system.state.q);
     out.qdot.copy_from(&system.state.qdot);
     out.X_WB.copy_from_slice(&system.data.X_WB);
@@ -293,7 +297,7 @@ fn observe_reduced(
         damping += system.arm.friction_torque(k, rate) * rate;
     }
     let loads = system.arm.loads.iter().map(|load| {
-        let F = load.on_body(system.breaks.side(t), &system.data.X_WB[load.body]);
+        let F = load.on_body(system.events.side(t), &system.data.X_WB[load.body]);
         system.data.V[load.body].power(&F)
     });
     out.power = [out.drive.dot(&out.qdot.rows(0, n)), loads.sum(), damping];
@@ -448,8 +452,7 @@ impl<I: Integrator> Stepper for ReducedStepper<I> {
         let Self { system, integrator } = self;
         let end = integrator.next_time();
         loop {
-            let event = system.next_event(integrator.time());
-            let event = event.map(|t| if (t - end).abs() <= SAME_TIME { end } else { t });
+            let event = system.next_event(integrator.time(), end);
             let stop = event.filter(|t| *t < end).unwrap_or(end);
             let stop = if I::ENDS_ALONE { system.resolved(integrator.time(), stop) } else { stop };
             integrator.advance_to(system, stop, event)?;

@@ -376,14 +376,7 @@ fn pulse(body: usize, peak: f64, T: f64) -> Load {
         let m = if t < T { peak * (PI * t / T).sin() } else { 0.0 };
         Wrench::new(Vector3::zeros(), Vector3::z() * m)
     };
-    Load {
-        body,
-        X_BF: Pose::identity(),
-        axes: LoadAxes::World,
-        wrench: Arc::new(wrench),
-        jumps: Vec::new(),
-        period: f64::INFINITY,
-    }
+    Load::at_origin(body, TimedWrench::new(wrench))
 }
 
 /// Motor and body, free, with a spring between: after an impulse on the body the momentum is the impulse, and both swing
@@ -486,14 +479,7 @@ fn harmonic_force_swings_the_tip_as_the_frequency_response_says() {
         let p = TAU * hz;
         let force = vector![0.01, -0.02, 0.03];
         let wrench = move |t: f64| Wrench::new(force * (p * t).sin(), Vector3::zeros());
-        let load = Load {
-            body: 1,
-            X_BF,
-            axes: LoadAxes::World,
-            wrench: Arc::new(wrench),
-            jumps: Vec::new(),
-            period: f64::INFINITY,
-        };
+        let load = Load { body: 1, X_BF, wrench: TimedWrench::new(wrench) };
         let arm = arm.clone().with_timed_loads(vec![load]).expect("valid");
         // Sine and cosine parts: [K - p² M, -p D; p D, K - p² M] [s; c] = [F; 0].
         let mut A = DMatrix::zeros(12, 12);
@@ -530,14 +516,7 @@ fn impulse_changes_the_momentum_by_its_integral() {
     let arm = sprung_body(Vector3::zeros());
     let (T, force, X_BF) = (1e-5, vector![300.0, -200.0, 500.0], Pose::translation(0.5, 0.1, 0.0));
     let wrench = move |t: f64| Wrench::new(force * if t < T { (PI * t / T).sin() } else { 0.0 }, Vector3::zeros());
-    let load = Load {
-        body: 1,
-        X_BF,
-        axes: LoadAxes::World,
-        wrench: Arc::new(wrench),
-        jumps: Vec::new(),
-        period: f64::INFINITY,
-    };
+    let load = Load { body: 1, X_BF, wrench: TimedWrench::new(wrench) };
     let arm = arm.with_timed_loads(vec![load]).expect("valid");
     let impulse = force * (T * 2.0 / PI);
     let p = vector![0.4, 0.0, 0.0] + X_BF.translation.vector;
@@ -564,14 +543,8 @@ fn load_in_frame_axes_turns_along() {
     let X_BF = Pose::from_parts(vector![0.5, 0.2, 0.0].into(), nalgebra::Rotation3::from_euler_angles(0.0, 0.0, 0.7));
     let F = vector![3.0, -4.0, 1.0];
     for axes in [LoadAxes::Frame, LoadAxes::World] {
-        let load = Load {
-            body: 1,
-            X_BF,
-            axes,
-            wrench: Arc::new(move |t| Wrench::new(F * (1.0 + t), Vector3::z() * 0.3)),
-            jumps: Vec::new(),
-            period: f64::INFINITY,
-        };
+        let wrench = TimedWrench::new(move |t| Wrench::new(F * (1.0 + t), Vector3::z() * 0.3)).in_axes(axes);
+        let load = Load { body: 1, X_BF, wrench };
         let arm = arm(&rotor(None, 0.0), None, path()).with_timed_loads(vec![load]).expect("valid");
         for o in run(&arm, ALPHA, 1e-2, 3.0) {
             let turn = nalgebra::Rotation3::from_axis_angle(&Vector3::z_axis(), 2.0 * o.t);
@@ -730,22 +703,15 @@ fn the_reference_stepper_sees_short_loads_and_fast_ones() {
     let arm = arm(&rotor(None, 0.0), None, Arc::new(Held(vec![0.0]))).with_servo(servo(100.0, IDLE)).expect("valid");
     let (start, T) = (1.0105, 0.002);
     let moment = |m: f64| Wrench::new(Vector3::zeros(), Vector3::z() * m);
-    let pulse = Load {
-        jumps: [0.0, 0.137, 0.5, 0.863, 1.0].iter().map(|s| start + s * T).collect(),
-        wrench: Arc::new(move |t| {
-            moment(if (start..start + T).contains(&t) { 30.0 * (PI * (t - start) / T).sin() } else { 0.0 })
-        }),
-        ..Load::constant(1, moment(0.0))
-    };
-    let sine = Load {
-        jumps: vec![1.0],
-        period: 0.02,
-        wrench: Arc::new(move |t| moment(if t >= 1.0 { 30.0 * (TAU * 50.0 * (t - 1.0)).sin() } else { 0.0 })),
-        ..Load::constant(1, moment(0.0))
-    };
+    let pulse = TimedWrench::new(move |t| {
+        moment(if (start..start + T).contains(&t) { 30.0 * (PI * (t - start) / T).sin() } else { 0.0 })
+    });
+    let pulse = pulse.with_jumps([0.0, 0.137, 0.5, 0.863, 1.0].iter().map(|s| start + s * T).collect());
+    let sine = TimedWrench::new(move |t| moment(if t >= 1.0 { 30.0 * (TAU * 50.0 * (t - 1.0)).sin() } else { 0.0 }));
+    let sine = sine.with_jumps(vec![1.0]).with_period(0.02);
     // The sine: after a whole period at rest again, on the way at most twice its amplitude over J omega.
-    for (load, truth) in [(pulse, 30.0 * T * 2.0 / PI / J), (sine, 2.0 * 30.0 / (J * TAU * 50.0))] {
-        let arm = arm.clone().with_timed_loads(vec![load]).expect("valid");
+    for (wrench, truth) in [(pulse, 30.0 * T * 2.0 / PI / J), (sine, 2.0 * 30.0 / (J * TAU * 50.0))] {
+        let arm = arm.clone().with_timed_loads(vec![Load::at_origin(1, wrench)]).expect("valid");
         for method in [ReferenceMethod::Bdf, ReferenceMethod::Esdirk34, ReferenceMethod::Tsit45] {
             let kind = StepperKind::Reference(ReferenceSettings { method, ..ReferenceSettings::new(1e-6) });
             let top = run(&arm, kind, 1e-3, 1.5).iter().map(|o| o.qdot[0]).fold(0.0, f64::max);
@@ -759,9 +725,8 @@ fn the_reference_stepper_sees_short_loads_and_fast_ones() {
 fn a_load_that_is_no_number_stops_the_run() {
     let arm = arm(&rotor(Some(GEAR), 0.5), Some(GEAR), Arc::new(Held(vec![0.0])));
     let body = arm.model.frame("body").expect("there").body;
-    let wrench = Arc::new(|t: f64| Wrench::new(Vector3::zeros(), Vector3::z() / (t - 0.5)));
-    let load = Load { wrench, ..Load::constant(body, Wrench::zeros()) };
-    let arm = arm.with_timed_loads(vec![load]).expect("valid");
+    let wrench = TimedWrench::new(|t: f64| Wrench::new(Vector3::zeros(), Vector3::z() / (t - 0.5)));
+    let arm = arm.with_timed_loads(vec![Load::at_origin(body, wrench)]).expect("valid");
     for kind in [ALPHA, StepperKind::Rk4] {
         let mut stepper = new_stepper(kind, arm.clone(), 1e-3, Start::Undeformed).expect("starts");
         let end = (0..1000).find_map(|_| stepper.step().err());

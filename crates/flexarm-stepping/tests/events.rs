@@ -149,15 +149,13 @@ fn modal_damping_keeps_its_ratio_with_another_payload() {
 #[test]
 fn a_load_that_begins_and_ends_between_steps_acts_as_long_as_it_lasts() {
     let (from, to, F) = (0.01034, 0.05271, 300.0);
-    let wrench = Arc::new(move |t: f64| {
+    let wrench = TimedWrench::new(move |t: f64| {
         let force = if (from..=to).contains(&t) { F } else { 0.0 };
         Wrench::new(Vector3::x() * force, Vector3::zeros())
     });
     let mut arm = slide(held(), 0.0, Damping::StiffnessProportional(0.0));
     let body = arm.model.frame("body").unwrap().body;
-    arm = arm
-        .with_timed_loads(vec![Load { wrench, jumps: vec![from, to], ..Load::constant(body, Wrench::zeros()) }])
-        .unwrap();
+    arm = arm.with_timed_loads(vec![Load::at_origin(body, wrench.with_jumps(vec![from, to]))]).unwrap();
     let omega = (K / MASS).sqrt();
     let ramp = |t: f64, s: f64| if t > s { F / K * (1.0 - (omega * (t - s)).cos()) } else { 0.0 };
     let truth = |t: f64| ramp(t, from) - ramp(t, to);
@@ -233,10 +231,9 @@ fn events_at_one_time_and_events_within_one_step_are_all_met() {
         InertiaChange { t, body, inertia: inertia.spatial() }
     };
     arm.inertia_changes = vec![change(0.05, 80.0), change(0.0508, 5.0), change(0.06, 30.0)];
-    let wrench = Arc::new(|t: f64| Wrench::new(Vector3::x() * if t >= 0.0505 { 500.0 } else { 0.0 }, Vector3::zeros()));
-    arm = arm
-        .with_timed_loads(vec![Load { wrench, jumps: vec![0.0505], ..Load::constant(body, Wrench::zeros()) }])
-        .unwrap();
+    let force = |t: f64| Vector3::x() * if t >= 0.0505 { 500.0 } else { 0.0 };
+    let wrench = TimedWrench::new(move |t| Wrench::new(force(t), Vector3::zeros())).with_jumps(vec![0.0505]);
+    arm = arm.with_timed_loads(vec![Load::at_origin(body, wrench)]).unwrap();
     let end = |kind: StepperKind, h: f64| {
         let mut stepper = new_stepper(kind, arm.clone(), h, Start::Equilibrium).unwrap();
         let mut seen = Observation::new(&arm);

@@ -10,7 +10,7 @@ use flexarm::{
 use flexarm_analysis::tcp_error;
 use flexarm_kinematics::{Data, Frame, Pose, State, Wrench, forward_kinematics};
 use flexarm_stepping::{
-    AlphaSettings, Damping, FlexibleArm, Held, Load, LoadAxes, Observation, PrescribedMotion, new_stepper,
+    AlphaSettings, Damping, FlexibleArm, Held, Load, Observation, PrescribedMotion, TimedWrench, new_stepper,
     static_equilibrium,
 };
 use nalgebra::{DVector, Matrix6, Vector3, Vector6};
@@ -211,14 +211,7 @@ impl Rig {
     /// The arm under a wrench at the frame, world axes.
     pub fn loaded(&self, wrench: &Vector6<f64>) -> Result<FlexibleArm, Error> {
         let F = Wrench::new(wrench.fixed_rows::<3>(0).into(), wrench.fixed_rows::<3>(3).into());
-        let load = Load {
-            body: self.frame.body,
-            X_BF: self.frame.X_BF,
-            axes: LoadAxes::World,
-            wrench: Arc::new(move |_| F),
-            jumps: Vec::new(),
-            period: f64::INFINITY,
-        };
+        let load = Load { body: self.frame.body, X_BF: self.frame.X_BF, wrench: TimedWrench::new(move |_| F) };
         self.arm.clone().with_timed_loads(vec![load]).map_err(step_error)
     }
 

@@ -3,8 +3,8 @@
 use std::ops::ControlFlow;
 
 use flexarm::{
-    ConstraintForm, DriveModel, Error, LinkModel, Modelling, Motion, ReferenceSettings, Robot, RunOptions, SpookPreset,
-    SpookSettings, StepperKind, Summary, Trace, simulate_traced,
+    ConstraintForm, DriveModel, Error, LinkModel, Modelling, Motion, ReferenceSettings, Robot, RunOptions, Scenario,
+    SpookPreset, SpookSettings, StepperKind, Summary, Trace, simulate_traced,
 };
 use flexarm_draw::{CurveLook, Panel, PlotCurve};
 use flexarm_fem::element::Quadrature;
@@ -49,18 +49,18 @@ impl Runs<'_, '_> {
         stepper: StepperKind,
         step_s: f64,
     ) -> Result<Run, Error> {
-        self.make_with(robot, motion, &RunOptions { stepper, step_s, modelling, ..RunOptions::default() })
+        self.make_with(robot, &motion.into(), &RunOptions { stepper, step_s, modelling, ..RunOptions::default() })
     }
 
-    /// With more than links, drives and stepper of one's own.
-    pub(crate) fn make_with(&mut self, robot: &Robot, motion: &Motion, options: &RunOptions) -> Result<Run, Error> {
+    /// With more than motion, links, drives and stepper of one's own.
+    pub(crate) fn make_with(&mut self, robot: &Robot, scenario: &Scenario, options: &RunOptions) -> Result<Run, Error> {
         let options = RunOptions { log_rate_hz: 500.0, ..options.clone() };
         let weight = weight(options.stepper, options.step_s);
         let mut progress = |t: f64, total: f64| match self.pace.at((self.done + weight * t / total) / self.all) {
             Ok(()) => ControlFlow::Continue(()),
             Err(_) => ControlFlow::Break(()),
         };
-        let (summary, trace) = simulate_traced(robot, motion, &options, None, &mut progress)?;
+        let (summary, trace) = simulate_traced(robot, scenario, &options, None, &mut progress)?;
         self.done += weight;
         Ok(Run { summary, trace })
     }

@@ -1,6 +1,6 @@
 //! The manipulator picks something up and sets it down: every stepper over payloads that change at once.
 
-use flexarm::{DriveModel, Error, Modelling, ReferenceSettings, Robot, RunOptions, StepperKind};
+use flexarm::{DriveModel, Error, Modelling, ReferenceSettings, Robot, RunOptions, Scenario, StepperKind};
 use flexarm_draw::{CurveLook, Panel, PlotCurve};
 
 use crate::bench::{ALPHA, Bench, modal, parts};
@@ -12,12 +12,11 @@ const LOADS: &str = "trajectories/pick_and_place.loads.toml";
 
 /// Steppers against the one with error control, links in two parts and in modes.
 pub(crate) fn pick(case: &mut Case, bench: &Bench, runs: &mut Runs<'_, '_>, robot: &Robot) -> Result<(), Error> {
-    let motion = bench.motion(robot, MOTION)?;
+    let scenario = Scenario::new(bench.motion(robot, MOTION)?).with_loads_file(bench.file(LOADS))?;
     case.heading(&format!("`{LOADS}`, links alone"));
     let mut make = |links: Modelling, stepper: StepperKind, step_s: f64| {
         let modelling = Modelling { drives: DriveModel::Rigid, ..links };
-        let loads = Some(bench.file(LOADS));
-        runs.make_with(robot, &motion, &RunOptions { stepper, step_s, modelling, loads, ..RunOptions::default() })
+        runs.make_with(robot, &scenario, &RunOptions { stepper, step_s, modelling, ..RunOptions::default() })
     };
     let reference = StepperKind::Reference(ReferenceSettings::new(1e-8));
     let mut table = Table::new(

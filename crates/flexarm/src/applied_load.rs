@@ -1,45 +1,41 @@
 //! Loads as values: what programs apply where people write a file of loads.
 
-use std::fmt;
-use std::sync::Arc;
+use flexarm_kinematics::{Frame, Model, Wrench};
+use flexarm_stepping::{Load, TimedWrench};
 
-use flexarm_kinematics::{Model, Wrench};
-use flexarm_stepping::{Load, LoadAxes};
-
-use crate::disturbance::{frame_of, moving_links};
 use crate::error::Error;
+use crate::loads_file::Written;
+use crate::robot::TCP_FRAME;
 
 /// A wrench on a frame of the robot as a function of time.
-#[derive(Clone)]
+#[derive(Clone, Debug)]
 pub struct AppliedLoad {
     /// `tcp`, or a link that moves.
     pub frame: String,
-    /// Whether its direction stays in the world or turns with the frame.
-    pub axes: LoadAxes,
-    /// Force (N) and moment (N m) at the frame's origin at time t (s).
-    pub wrench: Arc<dyn Fn(f64) -> Wrench + Send + Sync>,
-    /// Times at which it begins, ends, jumps or bends (s): steps end there.
-    pub jumps_s: Vec<f64>,
-    /// Shortest period in it (s), infinite without one.
-    pub period_s: f64,
-}
-
-impl fmt::Debug for AppliedLoad {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("AppliedLoad").field("frame", &self.frame).field("axes", &self.axes).finish_non_exhaustive()
-    }
+    /// What acts at the frame's origin.
+    pub wrench: TimedWrench,
+    /// When it begins (s), if it has a beginning.
+    pub start_s: Option<f64>,
+    /// Where it is written, if a file was read.
+    pub(crate) written: Option<Written>,
 }
 
 impl AppliedLoad {
+    /// A wrench at the origin of a frame: `tcp`, or a link that moves.
+    pub fn new(frame: &str, wrench: TimedWrench) -> Self {
+        Self { frame: frame.to_owned(), wrench, start_s: None, written: None }
+    }
+
+    /// The same, known to begin then (s): a load that begins after the run is told as a caveat.
+    #[must_use]
+    pub fn starting_at(self, start_s: f64) -> Self {
+        Self { start_s: Some(start_s), ..self }
+    }
+
     /// A wrench in world axes that stays the same from `start_s` to `end_s` (s) and is zero before and after.
     pub fn during(frame: &str, F_W: Wrench, start_s: f64, end_s: f64) -> Self {
-        Self {
-            frame: frame.to_owned(),
-            axes: LoadAxes::World,
-            wrench: Arc::new(move |t| if t >= start_s && t <= end_s { F_W } else { Wrench::zeros() }),
-            jumps_s: vec![start_s, end_s],
-            period_s: f64::INFINITY,
-        }
+        let wrench = TimedWrench::new(move |t| if t >= start_s && t <= end_s { F_W } else { Wrench::zeros() });
+        Self::new(frame, wrench.with_jumps(vec![start_s, end_s])).starting_at(start_s)
     }
 
     /// A wrench in world axes that is linear between samples and zero before and after them.
@@ -68,18 +64,30 @@ impl AppliedLoad {
                 _ => Wrench::zeros(),
             }
         };
-        let (frame, period_s) = (frame.to_owned(), f64::INFINITY);
-        Ok(Self { frame, axes: LoadAxes::World, wrench: Arc::new(wrench), jumps_s: times, period_s })
+        let start_s = times[0];
+        Ok(Self::new(frame, TimedWrench::new(wrench).with_jumps(times)).starting_at(start_s))
     }
 
     /// On a model, up to the end of a run (s).
     pub(crate) fn on(&self, model: &Model, duration_s: f64) -> Result<Load, Error> {
         let frame = frame_of(&self.frame, model).filter(|frame| frame.body > 0).ok_or_else(|| {
             let known = moving_links(model);
-            Error::Usage(format!("load on frame {:?}: expected \"tcp\" or a link that moves, of {known:?}", self.frame))
+            let message =
+                format!("load on frame {:?}: expected \"tcp\" or a link that moves, of {known:?}", self.frame);
+            Written::frame(self.written.as_ref(), message)
         })?;
-        let jumps = self.jumps_s.iter().copied().filter(|t| *t <= duration_s).collect();
-        let (axes, wrench, period) = (self.axes, self.wrench.clone(), self.period_s);
-        Ok(Load { body: frame.body, X_BF: frame.X_BF, axes, wrench, jumps, period })
+        let jumps = self.wrench.jumps.iter().copied().filter(|t| *t <= duration_s).collect();
+        Ok(Load { body: frame.body, X_BF: frame.X_BF, wrench: self.wrench.clone().with_jumps(jumps) })
     }
+}
+
+/// Names of the links that move, for messages.
+pub(crate) fn moving_links(model: &Model) -> Vec<&str> {
+    let named = model.frames().iter().filter(|f| f.body > 0 && !f.name.starts_with("__"));
+    named.map(|f| f.name.as_str()).collect()
+}
+
+/// The frame of this name; `tcp` is that of the tool.
+fn frame_of<'m>(name: &str, model: &'m Model) -> Option<&'m Frame> {
+    model.frame(if name == "tcp" { TCP_FRAME } else { name })
 }

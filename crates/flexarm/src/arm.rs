@@ -9,12 +9,12 @@ use std::sync::Arc;
 use flexarm_log::{Columns, RunHeader, Sample};
 use flexarm_stepping::{Held, OperatingPoint};
 
-use crate::compare::{Together, run_traced};
 use crate::error::Error;
 use crate::flexible::FlexibleRobot;
-use crate::motion::Motion;
 use crate::options::{Modelling, Outputs, RunOptions};
 use crate::robot::{Robot, TCP_FRAME};
+use crate::run::{Together, run_traced};
+use crate::scenario::Scenario;
 use crate::summary::Summary;
 
 /// A robot with its flexible links and drives in place.
@@ -80,12 +80,13 @@ impl Arm {
         model.coordinates()[..model.n_actuated()].iter().map(|coordinate| coordinate.joint.as_str())
     }
 
-    /// Runs a motion; the options' own modelling does not count.
+    /// Runs a motion (`&motion`), or a motion with loads, payloads and a start of its own (`&scenario`); the options' own
+    /// modelling does not count.
     ///
     /// # Errors
     /// As [`crate::simulate`].
-    pub fn simulate(&self, motion: &Motion, options: &RunOptions) -> Result<Run, Error> {
-        self.simulate_with(motion, options, None, &mut |_| ControlFlow::Continue(()))
+    pub fn simulate(&self, scenario: impl Into<Scenario>, options: &RunOptions) -> Result<Run, Error> {
+        self.simulate_with(scenario, options, None, &mut |_| ControlFlow::Continue(()))
     }
 
     /// As [`Arm::simulate`], writes recordings if asked to, and shows each logged sample to `observer`, which may break off.
@@ -94,7 +95,7 @@ impl Arm {
     /// As [`crate::simulate`]; [`Error::Interrupted`] if the observer breaks off.
     pub fn simulate_with(
         &self,
-        motion: &Motion,
+        scenario: impl Into<Scenario>,
         options: &RunOptions,
         outputs: Option<&Outputs>,
         observer: &mut dyn FnMut(&Sample) -> ControlFlow<()>,
@@ -111,7 +112,7 @@ impl Arm {
         let prepared = Some(FlexibleRobot::clone(&self.flexible));
         let together = Together { observer: Some(&mut watch), prepared, ..Together::default() };
         let go_on = &mut |_, _| ControlFlow::Continue(());
-        let (summary, _) = run_traced(&self.robot, motion, &options, outputs, together, go_on)?;
+        let (summary, _) = run_traced(&self.robot, &scenario.into(), &options, outputs, together, go_on)?;
         Ok(Run { summary, columns })
     }
 

@@ -10,13 +10,13 @@ use serde::Serialize;
 use crate::caveat::motion::of_motion;
 use crate::caveat::size::{Size, middle};
 use crate::caveat::{self, Caveat};
-use crate::disturbance::Disturbances;
 use crate::drive_entry::DriveKind;
 use crate::error::Error;
 use crate::motion::Motion;
 use crate::options::{LinkModel, Modelling};
 use crate::posed::Posed;
 use crate::robot::{LoadOptions, Robot};
+use crate::scenario::Scenario;
 
 /// One thing found.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -135,17 +135,20 @@ pub fn check_with_loads(
 
 /// What is to be said of a file of loads.
 fn check_loads(robot: &Robot, motion: Option<&Motion>, path: &Path, findings: &mut Vec<Finding>) {
-    let Some(duration) = motion.map(|motion| motion.trajectory.duration()) else {
+    let Some(motion) = motion else {
         let message = "loads belong to a motion, which is missing or cannot be read";
         findings.push(Finding::error("loads", path.display().to_string(), &message));
         return;
     };
-    let read = robot.flexible_robot().and_then(|f| Disturbances::load(path, robot, &f.model, duration));
-    match read {
+    let acting = robot.flexible_robot().and_then(|flexible| {
+        Scenario::from(motion).with_loads_file(path).and_then(|scenario| scenario.acting_on(robot, &flexible.model))
+    });
+    match acting {
         Err(error) => findings.push(Finding::error("loads", path.display().to_string(), &error)),
-        Ok(read) => {
-            let heavy = caveat::motion::of_loads(&read.loads, duration, &Size::of(&robot.rigid));
-            let told = read.caveats.into_iter().chain(heavy);
+        Ok(acting) => {
+            let duration = motion.trajectory.duration();
+            let heavy = caveat::motion::of_loads(&acting.loads, duration, &Size::of(&robot.rigid));
+            let told = acting.caveats.into_iter().chain(heavy);
             findings.extend(told.map(|caveat| Finding::caveat(path, caveat)));
         }
     }

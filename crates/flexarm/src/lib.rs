@@ -17,11 +17,23 @@
 //! ```
 //!
 //! Build is apart from query: [`Robot::load`] reads, [`Robot::flexible`] puts links and drives in place, and the [`Arm`] that it
-//! returns is asked with numbers, by any number of threads. [`Arm::simulate`] runs a [`Motion`] and returns a [`Run`] with figures
-//! and columns; [`Arm::operating_point`] answers statics, compliance and frequencies at thousands of poses without allocation.
+//! returns is asked with numbers, by any number of threads. [`Arm::simulate`] runs a [`Motion`], or a [`Scenario`] with loads and
+//! payloads besides, and returns a [`Run`] with figures and columns; [`Arm::operating_point`] answers statics, compliance and
+//! frequencies at thousands of poses without allocation.
 //!
 //! [`simulate`] writes recordings and a report as well. [`inspect()`] and [`check()`] look at what was loaded; [`statics()`],
 //! [`modes()`] and [`response()`] answer one pose in full; [`mod@reduce`] makes a flexible link of a mesh.
+//!
+//! Examples, in rising order (`cargo run --release -p flexarm --no-default-features --example NAME`):
+//!
+//! | name | what it shows |
+//! | --- | --- |
+//! | `five_lines` | load, run, print |
+//! | `operating_points` | an arm shared by threads, a workspace each: compliance and frequency at 10,000 poses |
+//! | `stop_at_rest` | an observer that looks at every sample and ends the run |
+//! | `servo_study` | a study: gains of the servos against settling time and overshoot |
+//! | `study_report` | link models compared on one page for the browser |
+//! | `link_models` | every link model against a reference: accuracy and cost |
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
@@ -31,11 +43,8 @@ mod beam_entry;
 mod bends;
 pub mod caveat;
 mod check;
-mod compare;
 mod convert;
-mod disturbance;
 mod drive_entry;
-mod energy_book;
 mod error;
 pub mod export;
 mod flexible;
@@ -45,11 +54,14 @@ mod input;
 mod inspect;
 mod link_entry;
 mod load_jumps;
+mod loads_file;
 mod magnification;
 mod mode_recording;
 mod modes;
+mod monitor;
 mod motion;
 mod options;
+mod payload;
 mod posed;
 mod prepare;
 mod record;
@@ -59,6 +71,8 @@ mod response;
 pub mod result_files;
 mod robot;
 pub mod robot_file;
+mod run;
+mod scenario;
 mod settling;
 mod stamp;
 mod static_part;
@@ -73,9 +87,7 @@ pub use arm::{Arm, Run};
 pub use bends::Bend;
 pub use caveat::Caveat;
 pub use check::{Finding, check, check_with_loads};
-pub use compare::{Progress, simulate, simulate_traced};
 pub use convert::{ConvertOptions, ConvertSummary, convert, convert_until, parse_recording_format, read_run};
-pub use disturbance::Disturbances;
 pub use drive_entry::{Drive, DriveKind};
 pub use error::Error;
 pub use flexible::{FlexibleRobot, LinkChoices, Owner, RobotLink};
@@ -85,6 +97,7 @@ pub use mode_recording::{ModeMovie, record_modes};
 pub use modes::{ModeFigures, ModeTable, modes};
 pub use motion::{HeldJoint, Motion};
 pub use options::{DriveModel, LinkModel, Modelling, Outputs, RunOptions};
+pub use payload::PayloadChange;
 pub use report::{
     Figure, FigureGroup, ReportFiles, ReportOptions, ReportRun, Weight, figure_groups, html, markdown, report, rows,
 };
@@ -92,6 +105,8 @@ pub use response::{
     PeakFigures, Response, ResponseCurve, ResponseFiles, ResponseOutputs, ResponseRequest, readable_unit, response,
 };
 pub use robot::{LoadOptions, Robot, TCP_FRAME};
+pub use run::{Progress, simulate, simulate_traced};
+pub use scenario::{Disturbances, Scenario};
 pub use settling::Settling;
 pub use statics::{ElementStatics, Statics, record_statics, statics};
 pub use statics_picture::{StaticsFiles, StaticsOutputs};
@@ -102,11 +117,11 @@ pub use summary::{
 };
 
 pub use flexarm_analysis::{Quantity, Spacing};
-pub use flexarm_kinematics::{Pose, Wrench};
+pub use flexarm_kinematics::{LinkInertia, Pose, Wrench};
 pub use flexarm_log::{Column, Columns, FormatInfo, Holds, RecordingFormat, Sample, Trace};
 pub use flexarm_stepping::{
     AlphaSettings, ConstraintForm, LoadAxes, OperatingPoint, ReferenceMethod, ReferenceSettings, SpookPreset,
-    SpookSettings, Start, StepError, StepperKind,
+    SpookSettings, Start, StepError, StepperKind, TimedWrench,
 };
 pub use flexarm_trajectory::{Trajectory, TrajectoryError};
 pub use flexarm_urdf::{InertiaEstimate, ReadOptions, closest, search_paths_from_environment};

@@ -39,7 +39,8 @@ impl Expected {
         let mut expected = Self::default();
         // What acts for a short time only acts on the arm as its mean over half a period of the first mode.
         let window = 0.5 / arm.modes.frequencies_hz().first().copied().unwrap_or(f64::INFINITY).max(1e-3);
-        let jumps = arm.loads.iter().flat_map(|load| &load.jumps).map(|t| t + 0.5 * window).take(INSTANTS as usize);
+        let jumps =
+            arm.loads.iter().flat_map(|load| &load.wrench.jumps).map(|t| t + 0.5 * window).take(INSTANTS as usize);
         let evenly = (0..=INSTANTS).map(|k| duration * f64::from(k) / f64::from(INSTANTS));
         for t in evenly.chain(jumps.filter(|t| *t < duration)) {
             twin.update(arm, tcp, t);
@@ -48,11 +49,11 @@ impl Expected {
                 let frame = Frame { name: String::new(), body: load.body, X_BF: load.X_BF };
                 frame_jacobian(&arm.model, &twin.data, &frame, &mut J);
                 let R = twin.data.X_WF(&frame).rotation;
-                let turn = |v| if load.axes == LoadAxes::Frame { R * v } else { v };
+                let turn = |v| if load.wrench.axes == LoadAxes::Frame { R * v } else { v };
                 let mut F = Vector6::zeros();
                 for k in 0..PIECES {
                     let share = (f64::from(k) + 0.5) / f64::from(PIECES) - 0.5;
-                    let now = (load.wrench)((t + share * window).max(0.0));
+                    let now = load.wrench.at((t + share * window).max(0.0));
                     let (force, torque) = (turn(now.force), turn(now.torque));
                     F += Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z) / f64::from(PIECES);
                 }

@@ -4,9 +4,7 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use flexarm_log::RecordingFormat;
-use flexarm_stepping::{AlphaSettings, Start, StepperKind};
-
-use crate::applied_load::AppliedLoad;
+use flexarm_stepping::{AlphaSettings, StepperKind};
 
 /// How links are modelled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -49,7 +47,7 @@ pub struct Modelling {
     pub modes: Option<usize>,
 }
 
-/// Choices of a run.
+/// Choices of a run: how it is stepped, logged and measured. What happens in it is the [`Scenario`](crate::Scenario).
 #[derive(Clone, Debug)]
 pub struct RunOptions {
     /// Time stepper.
@@ -58,14 +56,8 @@ pub struct RunOptions {
     pub step_s: f64,
     /// Link and drive models.
     pub modelling: Modelling,
-    /// File with loads and changes of payload.
-    pub loads: Option<PathBuf>,
-    /// Loads besides.
-    pub applied: Vec<AppliedLoad>,
     /// Logged samples per second; the nearest whole number of steps is used.
     pub log_rate_hz: f64,
-    /// Start in equilibrium or undeformed.
-    pub start: Start,
     /// Run although the trajectory passes joint limits; they become warnings.
     pub ignore_limits: bool,
     /// Log and measure against the rigid twin.
@@ -86,10 +78,7 @@ impl Default for RunOptions {
             stepper: StepperKind::GeneralizedAlpha(AlphaSettings::default()),
             step_s: 1e-3,
             modelling: Modelling::default(),
-            loads: None,
-            applied: Vec::new(),
             log_rate_hz: 500.0,
-            start: Start::Equilibrium,
             ignore_limits: false,
             with_twin: true,
             settling_band_m: 1e-4,

@@ -4,14 +4,15 @@ use flexarm_stepping::{FlexibleArm, Load, StepError, Stepper, StepperKind, new_s
 
 use crate::caveat::size::Size;
 use crate::caveat::{self, Caveat, kinds};
-use crate::compare::tool_frame;
-use crate::disturbance::{Disturbances, EXPRESSION_PERIOD};
 use crate::error::Error;
 use crate::flexible::FlexibleRobot;
+use crate::loads_file::EXPRESSION_PERIOD;
 use crate::magnification::Expected;
 use crate::motion::Motion;
 use crate::options::RunOptions;
 use crate::robot::Robot;
+use crate::run::tool_frame;
+use crate::scenario::Scenario;
 
 /// A run whose input makes sense.
 pub(crate) struct Checked {
@@ -23,18 +24,19 @@ pub(crate) struct Checked {
 
 impl Checked {
     /// Deflections that the run will have, roughly.
-    pub(crate) fn expected(&self, motion: &Motion, options: &RunOptions) -> Expected {
-        Expected::of(&self.arm, &tool_frame(&self.arm), motion.trajectory.duration(), options.start)
+    pub(crate) fn expected(&self, scenario: &Scenario) -> Expected {
+        Expected::of(&self.arm, &tool_frame(&self.arm), scenario.duration_s(), scenario.start)
     }
 }
 
 /// Everything about the input of a run that can be told before the first step. `prepared`: the robot as the options model it.
 pub(crate) fn checked(
     robot: &Robot,
-    motion: &Motion,
+    scenario: &Scenario,
     options: &RunOptions,
     prepared: Option<FlexibleRobot>,
 ) -> Result<Checked, Error> {
+    let motion = &scenario.motion;
     if !motion.violations.is_empty() && !options.ignore_limits {
         let mut violations: Vec<String> = motion.violations.iter().map(ToString::to_string).collect();
         if let Some(first) = violations.first_mut().filter(|_| !motion.likely.is_empty()) {
@@ -47,25 +49,21 @@ pub(crate) fn checked(
     let flexible = prepared.map_or_else(|| robot.modelled(&options.modelling), Ok)?;
     let mut arm = flexible.arm(motion.prescribed()).map_err(|error| flexible.explained(error))?;
     let mut load_caveats = Vec::new();
-    if options.loads.is_some() || !options.applied.is_empty() {
-        let duration = motion.trajectory.duration();
-        let read = options.loads.as_ref().map(|path| Disturbances::load(path, robot, &arm.model, duration));
-        let mut disturbances = read.transpose()?.unwrap_or_default();
-        for load in &options.applied {
-            disturbances.loads.push(load.on(&arm.model, duration)?);
-        }
-        load_caveats = disturbances.caveats;
-        load_caveats.extend(caveat::motion::of_loads(&disturbances.loads, duration, &Size::of(&robot.rigid)));
+    if !scenario.loads.is_empty() || !scenario.payloads.is_empty() {
+        let duration = scenario.duration_s();
+        let acting = scenario.acting_on(robot, &arm.model)?;
+        load_caveats = acting.caveats;
+        load_caveats.extend(caveat::motion::of_loads(&acting.loads, duration, &Size::of(&robot.rigid)));
         if !matches!(options.stepper, StepperKind::Reference(_)) {
-            load_caveats.extend(short_loads(&disturbances.loads, options.step_s));
+            load_caveats.extend(short_loads(&acting.loads, options.step_s));
         }
-        arm = arm.with_inertia_changes(disturbances.changes).map_err(failed)?;
-        arm = arm.with_timed_loads(disturbances.loads).map_err(failed)?;
+        arm = arm.with_inertia_changes(acting.changes).map_err(failed)?;
+        arm = arm.with_timed_loads(acting.loads).map_err(failed)?;
     }
     if options.log_rate_hz * options.step_s > 1.0 + 1e-9 && options.log_rate_hz != RunOptions::default().log_rate_hz {
         load_caveats.push(kinds::LOG_RATE.found("run", options.log_rate_hz, 1.0 / options.step_s));
     }
-    let stepper = new_stepper(options.stepper, arm.clone(), options.step_s, options.start)
+    let stepper = new_stepper(options.stepper, arm.clone(), options.step_s, scenario.start)
         .map_err(|error| flexible.explained(error))?;
     Ok(Checked { flexible, arm, stepper, load_caveats })
 }
@@ -114,7 +112,7 @@ const STEPS_PER_LOAD: f64 = 8.0;
 /// Loads that last so few steps that they do not act as the file says.
 fn short_loads(loads: &[Load], h: f64) -> Vec<Caveat> {
     let brief = |load: &Load| {
-        let (first, last) = load.jumps.iter().fold((f64::INFINITY, 0.0f64), |(a, b), t| (a.min(*t), b.max(*t)));
+        let (first, last) = load.wrench.jumps.iter().fold((f64::INFINITY, 0.0f64), |(a, b), t| (a.min(*t), b.max(*t)));
         let steps = (last - first) / h;
         (last > first && steps < STEPS_PER_LOAD).then(|| {
             format!(
@@ -123,9 +121,10 @@ fn short_loads(loads: &[Load], h: f64) -> Vec<Caveat> {
         })
     };
     let fast = |load: &Load| {
-        let steps = load.period / h;
-        (load.period != EXPRESSION_PERIOD && steps < STEPS_PER_LOAD).then(|| {
-            let hz = 1.0 / load.period;
+        let period = load.wrench.period;
+        let steps = period / h;
+        (period != EXPRESSION_PERIOD && steps < STEPS_PER_LOAD).then(|| {
+            let hz = 1.0 / period;
             format!("a load of {hz:.1} Hz has {steps:.1} steps per period: it does not act as written; lower --step")
         })
     };

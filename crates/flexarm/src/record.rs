@@ -12,6 +12,7 @@ use crate::motion::Motion;
 use crate::options::{DriveModel, LinkModel, Outputs, RunOptions};
 use crate::result_files::Undo;
 use crate::robot::Robot;
+use crate::scenario::Scenario;
 use crate::summary::Files;
 
 /// Recorders of a run with the names of their files.
@@ -191,16 +192,16 @@ fn straight(path: &Path) -> String {
 /// Everything about a run that does not change.
 pub(crate) fn header(
     robot: &Robot,
-    motion: &Motion,
+    scenario: &Scenario,
     options: &RunOptions,
     arm: &FlexibleArm,
     links_model: &str,
 ) -> RunHeader {
     let frequencies: Vec<String> = arm.modes.frequencies_hz().iter().map(|f| format!("{f:.4}")).collect();
     RunHeader {
-        trajectory: motion.name.clone(),
-        metadata: metadata(robot, motion, options, arm, links_model, &frequencies),
-        description: description(robot, motion, options, links_model, &frequencies),
+        trajectory: scenario.motion.name.clone(),
+        metadata: metadata(robot, scenario, options, arm, links_model, &frequencies),
+        description: description(robot, &scenario.motion, options, links_model, &frequencies),
         has_rigid: options.with_twin,
         log_rate_hz: options.log_rate_hz,
         step_s: options.step_s,
@@ -213,12 +214,13 @@ pub(crate) fn header(
 /// How the run was made, in groups of key-value pairs.
 fn metadata(
     robot: &Robot,
-    motion: &Motion,
+    scenario: &Scenario,
     options: &RunOptions,
     arm: &FlexibleArm,
     links_model: &str,
     frequencies: &[String],
 ) -> Vec<(String, Vec<(String, String)>)> {
+    let motion = &scenario.motion;
     let group = |name: &str, rows: &[(&str, String)]| {
         (name.to_owned(), rows.iter().map(|(k, v)| ((*k).to_owned(), v.clone())).collect::<Vec<_>>())
     };
@@ -234,7 +236,7 @@ fn metadata(
         ("urdf_file", straight(&robot.urdf_path)),
         ("trajectory_file", straight(&motion.path)),
     ];
-    inputs.extend(options.loads.as_ref().map(|path| ("loads_file", straight(path))));
+    inputs.extend(scenario.loads_file.as_ref().map(|path| ("loads_file", straight(path))));
     let drives = match options.modelling.drives {
         DriveModel::AsFiled => AS_FILED,
         DriveModel::Rigid => "rigid",
@@ -257,7 +259,7 @@ fn metadata(
                 ("stepper", stepper.name.clone()),
                 ("step_s", options.step_s.to_string()),
                 ("rho_inf", stepper.rho_inf.map_or_else(String::new, |r| r.to_string())),
-                ("start", format!("{:?}", options.start).to_lowercase()),
+                ("start", format!("{:?}", scenario.start).to_lowercase()),
                 ("log_rate_hz", options.log_rate_hz.to_string()),
                 ("settling_band_m", options.settling_band_m.to_string()),
             ],

@@ -3,7 +3,7 @@
 //! Drives at their commanded places, springs in balance with weight and with the loads of the instant, no inertia force. The
 //! curve is smooth between the instants at which something jumps: it is computed on a grid and interpolated by cubics.
 
-use flexarm_kinematics::{Data, Frame, State, forward_kinematics};
+use flexarm_kinematics::{Data, Frame, forward_kinematics};
 use flexarm_stepping::{FlexibleArm, StaticPath};
 use nalgebra::{DVector, Vector3};
 
@@ -27,8 +27,6 @@ pub(crate) struct StaticPart {
     grid_s: f64,
     block: Block,
     data: Data,
-    state: State,
-    qddot: DVector<f64>,
     failed: bool,
 }
 
@@ -43,13 +41,13 @@ struct Block {
 
 impl StaticPart {
     pub(crate) fn new(arm: &FlexibleArm, tcp: &Frame, moves: Vec<(f64, f64)>, duration: f64, sample_s: f64) -> Self {
-        let jumps = arm.loads.iter().flat_map(|load| load.jumps.iter().copied());
+        let jumps = arm.loads.iter().flat_map(|load| load.wrench.jumps.iter().copied());
         let changes = arm.inertia_changes.iter().map(|change| change.t);
         let ends = moves.iter().flat_map(|&(start, end)| [start, end]);
         let mut breaks: Vec<f64> = jumps.chain(changes).chain(ends).chain([duration]).filter(|t| *t > 0.0).collect();
         breaks.sort_by(f64::total_cmp);
         breaks.dedup();
-        let period = arm.loads.iter().map(|load| load.period).fold(f64::INFINITY, f64::min);
+        let period = arm.loads.iter().map(|load| load.wrench.period).fold(f64::INFINITY, f64::min);
         Self {
             path: StaticPath::new(arm.clone()),
             tcp: tcp.clone(),
@@ -59,8 +57,6 @@ impl StaticPart {
             grid_s: GRID_S.min(period / PER_PERIOD).max(sample_s),
             block: Block::default(),
             data: Data::new(&arm.model),
-            state: State::zeros(&arm.model),
-            qddot: DVector::zeros(arm.model.nv()),
             failed: false,
         }
     }
@@ -92,12 +88,13 @@ impl StaticPart {
             // A cubic needs three; between samples there is nothing to be told.
             false => ((intervals as usize).max(if end - start > 3.0 * self.sample_s { 3 } else { 1 }), end),
         };
-        let node = |k: usize| match k == intervals {
-            // What happens at the end belongs to what follows.
-            true => end - 1e-12 * end.max(1.0),
-            false => start + (end - start) * k as f64 / intervals as f64,
-        };
-        let values = (0..=intervals).map(|k| self.displacement(node(k))).collect::<Option<_>>()?;
+        let mut values = Vec::with_capacity(intervals + 1);
+        for k in 0..intervals {
+            values.push(self.displacement(start + (end - start) * k as f64 / intervals as f64)?);
+        }
+        // What happens at the end belongs to what follows.
+        let q = self.path.just_before(end).ok()?.clone();
+        values.push(self.beside_the_twin(q));
         Some(Block { start, end, values })
     }
 
@@ -105,15 +102,20 @@ impl StaticPart {
         !self.path.arm().loads.is_empty()
     }
 
-    /// Tool of the arm at rest minus that of the rigid twin.
     fn displacement(&mut self, t: f64) -> Option<Vector3<f64>> {
         let q = self.path.at(t).ok()?.clone();
+        Some(self.beside_the_twin(q))
+    }
+
+    /// Tool of the arm at rest with coordinates `q` minus that of the rigid twin.
+    fn beside_the_twin(&mut self, mut q: DVector<f64>) -> Vector3<f64> {
         let model = &self.path.arm().model;
         forward_kinematics(model, &mut self.data, &q);
         let yielding = self.data.X_WF(&self.tcp).translation.vector;
-        self.path.arm().prescribed_state(t, &mut self.state, &mut self.qddot);
-        forward_kinematics(model, &mut self.data, &self.state.q);
-        Some(yielding - self.data.X_WF(&self.tcp).translation.vector)
+        let n = model.n_actuated();
+        q.rows_mut(n, model.nv() - n).fill(0.0);
+        forward_kinematics(model, &mut self.data, &q);
+        yielding - self.data.X_WF(&self.tcp).translation.vector
     }
 }
 

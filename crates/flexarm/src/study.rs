@@ -5,14 +5,14 @@ use std::path::PathBuf;
 
 use flexarm_log::{Recorder, RecordingFormat, Trace, TraceRow};
 
-use crate::compare::{Progress, Together, run_traced};
 use crate::error::Error;
 use crate::magnification::Expected;
-use crate::motion::Motion;
 use crate::options::{Outputs, RunOptions};
 use crate::prepare::checked;
 use crate::record::{files_of_a_run, refuse_to_overwrite};
 use crate::robot::Robot;
+use crate::run::{Progress, Together, run_traced};
+use crate::scenario::Scenario;
 use crate::summary::{DifferenceFigures, Summary, TcpFigures};
 
 /// One run of a study.
@@ -22,8 +22,8 @@ pub struct Variant {
     pub label: String,
     /// Its robot.
     pub robot: Robot,
-    /// Its motion.
-    pub motion: Motion,
+    /// What happens in it.
+    pub scenario: Scenario,
     /// Its choices.
     pub options: RunOptions,
 }
@@ -46,7 +46,7 @@ pub fn compare_study(
     };
     let folders = folders(variants)?;
     let mut options = main.options.clone();
-    let total: f64 = variants.iter().map(|v| v.motion.trajectory.duration()).sum();
+    let total: f64 = variants.iter().map(|v| v.scenario.duration_s()).sum();
     let mut before = 0.0;
 
     let own_outputs = |number: usize| {
@@ -64,8 +64,8 @@ pub fn compare_study(
     // Minutes of running are not spent before something that could be told at once.
     let mut expected = Expected::default();
     for (number, variant) in variants.iter().enumerate() {
-        let run = checked(&variant.robot, &variant.motion, &variant.options, None).map_err(named(number))?;
-        expected = expected.or(run.expected(&variant.motion, &variant.options));
+        let run = checked(&variant.robot, &variant.scenario, &variant.options, None).map_err(named(number))?;
+        expected = expected.or(run.expected(&variant.scenario));
         own_outputs(number).as_ref().map_or(Ok(()), refuse_to_overwrite)?;
     }
     let recording = StudyRecording::new(variants, outputs)?;
@@ -80,9 +80,9 @@ pub fn compare_study(
         let recorders = recording.seat(number).into_iter().collect();
         let together = Together { recorders, expected: Some(expected), ..Together::default() };
         let mut shown = |t: f64, _: f64| progress(before + t, total);
-        let run = run_traced(&variant.robot, &variant.motion, &options, own.as_ref(), together, &mut shown);
+        let run = run_traced(&variant.robot, &variant.scenario, &options, own.as_ref(), together, &mut shown);
         let (mut summary, trace) = run.map_err(named(number))?;
-        before += variant.motion.trajectory.duration();
+        before += variant.scenario.duration_s();
         summary.label = Some(variant.label.clone());
         summary.difference = traces.first().and_then(|(_, first)| difference(first, &trace));
         summaries.push(summary);

@@ -14,12 +14,12 @@ fn variant(label: &str, robot: &str, trajectory: &str, options: RunOptions) -> V
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let robot = Robot::load_with(&root.join("robots").join(robot), &LoadOptions::default()).unwrap();
     let motion = Motion::load_for(&root.join("trajectories").join(trajectory), &robot.rigid_model().unwrap()).unwrap();
-    Variant { label: label.into(), robot, motion, options }
+    Variant { label: label.into(), robot, scenario: motion.into(), options }
 }
 
 fn run(robot: &str, trajectory: &str, outputs: Option<&Outputs>) -> (Summary, Trace) {
     let v = variant("", robot, trajectory, RunOptions::default());
-    simulate_traced(&v.robot, &v.motion, &v.options, outputs, &mut |_, _| ControlFlow::Continue(())).unwrap()
+    simulate_traced(&v.robot, &v.scenario, &v.options, outputs, &mut |_, _| ControlFlow::Continue(())).unwrap()
 }
 
 /// Truth: the recorded parts of the error. The beam swings in a plane and sags out of it: nothing is normal to its path.

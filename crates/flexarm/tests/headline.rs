@@ -139,7 +139,7 @@ fn a_study_has_both_parts_and_the_word_of_each_run() {
     let variant = |label: &str, robot: &str| {
         let robot = load(robot);
         let motion = motion(&robot, "pick_and_place.toml");
-        Variant { label: label.into(), robot, motion, options: RunOptions::default() }
+        Variant { label: label.into(), robot, scenario: motion.into(), options: RunOptions::default() }
     };
     let variants = [variant("as given", "kr210"), variant("castings", "kr210/links.toml")];
     let (summary, _) = compare_study(&variants, None, &mut |_, _| ControlFlow::Continue(())).unwrap();

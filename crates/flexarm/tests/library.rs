@@ -6,7 +6,10 @@
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use flexarm::{AppliedLoad, Arm, DriveModel, Error, LinkModel, Modelling, Motion, Robot, Run, RunOptions, Wrench};
+use flexarm::{
+    AppliedLoad, Arm, DriveModel, Error, LinkModel, Modelling, Motion, PayloadChange, Robot, Run, RunOptions, Scenario,
+    Wrench,
+};
 use nalgebra::Vector3;
 
 fn root() -> PathBuf {
@@ -79,34 +82,55 @@ fn a_motion_of_arrays_is_that_of_the_file() {
     }
 }
 
-/// Truth: the same load from a file. Measured: the same bits.
+/// Truth: the same loads and payloads from a file. Measured: the same bits.
 #[test]
-fn a_load_by_value_is_that_of_the_file() {
+fn loads_and_payloads_by_value_are_those_of_the_file() {
     let robot = Robot::load(root().join("robots/one_beam")).unwrap();
     let motion = Motion::load(root().join("trajectories/beam_swing.toml"), &robot).unwrap();
     let arm = robot.flexible(Modelling::default()).unwrap();
     let file = std::env::temp_dir().join(format!("flexarm-library-{}.loads.toml", std::process::id()));
-    let text = "format = 1\n[[load]]\nkind = \"step\"\nforce = [0.0, 3.0, -5.0]\nstart = 0.2\nend = 0.7\n";
-    std::fs::write(&file, text).unwrap();
-    let error = |options: RunOptions| arm.simulate(&motion, &options).unwrap().error_world_m().to_vec();
-    let by_file = error(RunOptions { loads: Some(file.clone()), ..RunOptions::default() });
-    std::fs::remove_file(&file).unwrap();
+    let by_file = |text: &str| {
+        std::fs::write(&file, format!("format = 1\n{text}")).unwrap();
+        let read = Scenario::from(&motion).with_loads_file(&file);
+        std::fs::remove_file(&file).unwrap();
+        read.unwrap()
+    };
+    let run = |scenario: &Scenario| arm.simulate(scenario, &RunOptions::default()).unwrap();
+    let error = |scenario: &Scenario| run(scenario).error_world_m().to_vec();
+    let pushed = error(&by_file("[[load]]\nkind = \"step\"\nforce = [0.0, 3.0, -5.0]\nstart = 0.2\nend = 0.7\n"));
     let F = Wrench::new(Vector3::new(0.0, 3.0, -5.0), Vector3::zeros());
-    let applied = |load: AppliedLoad| RunOptions { applied: vec![load], ..RunOptions::default() };
-    assert_eq!(error(applied(AppliedLoad::during("tcp", F, 0.2, 0.7))), by_file);
-    assert_ne!(error(RunOptions::default()), by_file);
+    let applied = |load: AppliedLoad| Scenario::from(&motion).with_load(load);
+    assert_eq!(error(&applied(AppliedLoad::during("tcp", F, 0.2, 0.7))), pushed);
+    assert_ne!(error(&Scenario::from(&motion)), pushed);
 
     // Samples that say the same, within and without: nothing before, nothing after.
     let sampled = AppliedLoad::sampled("tcp", &[0.2, 0.4, 0.7], &[F; 3]).unwrap();
     for t in [0.1999, 0.2, 0.3, 0.7, 0.7001] {
-        assert_eq!((sampled.wrench)(t).force.y, if (0.2..=0.7).contains(&t) { 3.0 } else { 0.0 }, "{t}");
+        assert_eq!(sampled.wrench.at(t).force.y, if (0.2..=0.7).contains(&t) { 3.0 } else { 0.0 }, "{t}");
     }
-    let worst = error(applied(sampled)).iter().zip(&by_file).fold(0.0_f64, |worst, (a, b)| worst.max((a - b).abs()));
+    let worst = error(&applied(sampled)).iter().zip(&pushed).fold(0.0_f64, |worst, (a, b)| worst.max((a - b).abs()));
     eprintln!("sampled and constant: {worst:e} m");
     assert!(worst < 1e-12, "{worst:e}"); // measured 6e-17
     assert!(AppliedLoad::sampled("tcp", &[0.2, 0.2], &[F; 2]).is_err());
     let elsewhere = applied(AppliedLoad::during("nowhere", F, 0.2, 0.7));
-    assert!(arm.simulate(&motion, &elsewhere).unwrap_err().to_string().contains("\"nowhere\": expected \"tcp\""));
+    let said = |scenario: &Scenario| arm.simulate(scenario, &RunOptions::default()).unwrap_err().to_string();
+    assert!(said(&elsewhere).contains("\"nowhere\": expected \"tcp\""));
+
+    // A payload is picked up and put down again; what comes and goes with it stands in the energy.
+    let text = "[[payload]]\nat = 0.3\nmass = 0.4\ncom = [0.0, 0.1, 0.0]\ninertia = [2e-3, 3e-3, 4e-3, 1e-4, 0.0, 0.0]\n\
+                [[payload]]\nat = 0.8\nmass = 0.0\n";
+    let inertia = nalgebra::Matrix3::new(2e-3, 1e-4, 0.0, 1e-4, 3e-3, 0.0, 0.0, 0.0, 4e-3);
+    let pick = PayloadChange::attach(0.3, 0.4, Vector3::new(0.0, 0.1, 0.0)).with_inertia(inertia);
+    let carried = Scenario::from(&motion).with_payload(PayloadChange::release(0.8)).with_payload(pick);
+    let (by_file, by_value) = (run(&by_file(text)), run(&carried));
+    assert_eq!(by_file.error_world_m(), by_value.error_world_m());
+    assert_eq!(by_file.summary.energy, by_value.summary.energy);
+    assert!(by_value.summary.energy.payload_j.abs() > 1e-3, "{:?}", by_value.summary.energy);
+    let nowhere = Scenario::from(&motion).with_payload(PayloadChange::release(0.8).on_link("nowhere"));
+    assert!(said(&nowhere).starts_with("payload link \"nowhere\": expected a link that moves"));
+    // The caveats too: a load after the end does nothing, wherever it is written.
+    let late = applied(AppliedLoad::during("tcp", F, 90.0, 91.0));
+    assert!(run(&late).summary.warnings.iter().any(|warning| warning.contains("it does nothing")));
 }
 
 #[test]

@@ -4,7 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use flexarm::{Disturbances, DriveKind, LinkModel, LoadOptions, Motion, Robot};
+use flexarm::{DriveKind, LinkModel, LoadOptions, Motion, Robot, Scenario};
 
 fn project(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(path)
@@ -67,17 +67,19 @@ fn every_example_of_a_loads_file_loads() {
     std::fs::write(place.0.join("force.csv"), &blocks(&page, "csv")[0]).unwrap();
     let robot = place.robot("format = 1\nurdf = \"kr210.urdf\"\ntcp = { link = \"tool0\" }\n");
     let model = robot.rigid_model().unwrap();
+    let motion = Motion::from_samples(&[0.0, 3.0], &[0.0; 12], &robot).unwrap();
     let examples = blocks(&page, "toml");
     assert!(!examples.is_empty());
     for block in examples {
         let path = place.0.join("loads.toml");
         std::fs::write(&path, &block).unwrap();
-        let read = Disturbances::load(&path, &robot, &model, 3.0).unwrap_or_else(|e| panic!("{e}"));
+        let scenario = Scenario::from(&motion).with_loads_file(&path).unwrap_or_else(|e| panic!("{e}"));
+        let read = scenario.acting_on(&robot, &model).unwrap_or_else(|e| panic!("{e}"));
         assert_eq!(read.loads.len(), block.matches("[[load]]").count());
         assert_eq!(read.changes.len(), block.matches("[[payload]]").count());
         for t in [0.0, 0.3, 1.0005, 2.9] {
             for load in &read.loads {
-                let wrench = (load.wrench)(t);
+                let wrench = load.wrench.at(t);
                 assert!(wrench.force.iter().chain(wrench.torque.iter()).all(|x| x.is_finite()), "at {t} s");
             }
         }

@@ -28,7 +28,7 @@ use nalgebra::{DVector, Matrix3, Matrix6, Rotation3, UnitQuaternion, Vector3, Ve
 
 use crate::arm::FlexibleArm;
 use crate::error::StepError;
-use crate::events::{Breaks, SAME_TIME};
+use crate::events::{EventQueue, SAME_TIME};
 use crate::stepper::{Counts, LARGEST_DEFLECTION, Observation, Stepper};
 use constraint::Rows;
 use solve::TreeSolver;
@@ -105,7 +105,7 @@ pub struct Spook {
     t: f64,
     /// Step to which `compliance` belongs, and that of the impulses in `lambda` (s).
     dt: f64,
-    breaks: Breaks,
+    events: EventQueue,
     settings: SpookSettings,
     /// Index 0 is the world and never moves.
     bodies: Vec<BodyState>,
@@ -157,8 +157,8 @@ impl Spook {
         arm.prescribed_state(0.0, &mut state, &mut qddot);
         let na = model.n_actuated();
         state.q.rows_mut(na, e.len()).copy_from(e);
-        let mut breaks = Breaks::of(&arm);
-        breaks.pass(0.0);
+        let mut events = EventQueue::of(&arm);
+        events.pass_jumps(0.0);
         if arm.motion.velocity_jumps().iter().any(|t| t.abs() <= SAME_TIME) {
             state.qdot.fill(0.0);
         }
@@ -192,7 +192,7 @@ impl Spook {
             steps: 0,
             t: 0.0,
             dt: h,
-            breaks,
+            events,
             settings,
             trial: bodies.clone(),
             bodies,
@@ -267,10 +267,10 @@ impl Stepper for Spook {
     fn step(&mut self) -> Result<(), StepError> {
         let (start, end) = (self.steps as f64 * self.h, (self.steps + 1) as f64 * self.h);
         loop {
-            let stop = self.breaks.next().filter(|t| *t < end - SAME_TIME).unwrap_or(end);
+            let stop = self.events.next(self.t, end).filter(|t| *t < end).unwrap_or(end);
             let dt = if self.t == start && stop == end { self.h } else { stop - self.t };
             self.advance(stop, dt)?;
-            self.breaks.pass(stop);
+            self.events.pass_jumps(stop);
             if stop == end {
                 self.steps += 1;
                 return Ok(());
@@ -284,6 +284,7 @@ impl Stepper for Spook {
         let model = self.arm.model.clone();
         let n = model.n_actuated();
         out.t = t;
+        out.model.clone_from(&model);
         out.q.rows_mut(0, n).copy_from(&self.q);
         out.qdot.rows_mut(0, n).copy_from(&self.qdot);
         let (mut kinetic, mut potential) = (0.0, 0.0);
@@ -345,7 +346,7 @@ impl Stepper for Spook {
         for load in &self.arm.loads {
             let body = &self.bodies[load.body];
             let X = body.X_WB();
-            let F = load.on_body(self.breaks.side(t), &X);
+            let F = load.on_body(self.events.side(t), &X);
             let v = body.V.linear - body.V.angular.cross(&(X.rotation * body.com));
             loads += v.dot(&(X.rotation * F.force)) + body.V.angular.dot(&(X.rotation * F.torque));
         }
@@ -410,7 +411,7 @@ impl Spook {
         for load in &self.arm.loads {
             // At Bo in world axes.
             let X_WB = self.bodies[load.body].X_WB();
-            let F = load.on_body(self.breaks.side(t), &X_WB);
+            let F = load.on_body(self.events.side(t), &X_WB);
             self.loads[load.body] += Wrench::new(X_WB.rotation * F.force, X_WB.rotation * F.torque).to_vector();
         }
 
@@ -484,8 +485,8 @@ impl Spook {
 
     /// Prescribed motion at t into `q`, `qdot`, `qddot`.
     fn sample(&mut self, t: f64) {
-        let Self { arm, breaks, q, qdot, qddot, .. } = self;
-        arm.motion.sample(breaks.side(t), q.as_mut_slice(), qdot.as_mut_slice(), qddot.as_mut_slice());
+        let Self { arm, events, q, qdot, qddot, .. } = self;
+        arm.motion.sample(events.side(t), q.as_mut_slice(), qdot.as_mut_slice(), qddot.as_mut_slice());
     }
 }
 

@@ -83,8 +83,8 @@ pub(crate) fn of_loads(loads: &[Load], duration: f64, size: &Size) -> Vec<Caveat
     for load in loads {
         let even = (0..=TIMES).map(|i| duration * i as f64 / TIMES as f64);
         let (mut force, mut moment) = (0.0f64, 0.0f64);
-        for t in even.chain(load.jumps.iter().copied()) {
-            let wrench = (load.wrench)(t);
+        for t in even.chain(load.wrench.jumps.iter().copied()) {
+            let wrench = load.wrench.at(t);
             force = force.max(wrench.force.norm());
             moment = moment.max(wrench.torque.norm());
         }

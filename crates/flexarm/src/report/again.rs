@@ -114,6 +114,10 @@ fn read_all(inputs: &[Input], warnings: &mut Vec<String>) -> Result<Vec<(String,
             ));
             computed(&trace)
         });
+        // Results of older versions do not say how wide the band was; their recordings do.
+        if let Some(tcp) = summary.tcp.as_mut().filter(|tcp| tcp.settling_band_m.is_none()) {
+            tcp.settling_band_m = settling_band_m(&trace.header);
+        }
         if summary.difference.is_none() {
             summary.difference = runs.first().and_then(|(_, _, first)| crate::study::difference(first, &trace));
         }
@@ -212,8 +216,8 @@ pub(super) fn told<'a>(header: &'a RunHeader, group: &str, key: &str) -> Option<
     Some(value.as_str()).filter(|value| !value.is_empty())
 }
 
-/// Half width of the band in which the tool counts as settled (m).
-pub(super) fn settling_band_m(header: &RunHeader) -> Option<f64> {
+/// Half width of the band in which the tool counts as settled (m), as a recording has it: text.
+fn settling_band_m(header: &RunHeader) -> Option<f64> {
     told(header, "flexarm.run", "settling_band_m")?.parse().ok()
 }
 

@@ -9,7 +9,6 @@ use base64::Engine as _;
 use flexarm_draw::palette::{self, Ground, hex};
 use flexarm_log::{EventKind, RunHeader, Trace};
 
-use super::again::settling_band_m;
 use super::curves::{Kind, Plot, overlays, plots};
 use super::picture::{pictures, scale_colors};
 use crate::summary::{EnergyFigures, Summary, TcpFigures};
@@ -224,9 +223,9 @@ fn fixed(x: f64) -> String {
     format!("{x:.digits$}")
 }
 
-/// A band in words, such as "within 0.1 mm".
-fn within(header: &RunHeader) -> Option<String> {
-    settling_band_m(header).map(crate::settling::within)
+/// The settling band of a run in words, such as "within 0.1 mm".
+fn within(run: &ReportRun<'_>) -> Option<String> {
+    run.summary.tcp.as_ref()?.settling_band_m.map(crate::settling::within)
 }
 
 /// Whether the tool never leaves its rigid twin.
@@ -236,7 +235,7 @@ fn lies_on_twin(run: &ReportRun<'_>) -> bool {
 
 fn tiles(run: &ReportRun<'_>) -> String {
     let s = run.summary;
-    let band = within(&run.trace.header).unwrap_or_default();
+    let band = within(run).unwrap_or_default();
     let mut out = "<section id=\"summary\" class=\"tiles\">\n".to_owned();
     let mut tile = |name: &str, value: String, unit: &str, note: String| {
         let class = if out.contains("<div") { "tile" } else { "tile main" };
@@ -533,7 +532,7 @@ fn iso_table(runs: &[ReportRun<'_>]) -> String {
         let _ = write!(out, "<th class=\"number\">{name}</th>");
     }
     out += "<th>unit</th></tr></thead><tbody>";
-    let mut bands = runs.iter().map(|run| within(&run.trace.header));
+    let mut bands = runs.iter().filter(|run| run.summary.tcp.is_some()).map(within);
     let first = bands.next().flatten();
     let band = first.filter(|first| bands.all(|band| band.as_ref() == Some(first)));
     let band = band.unwrap_or_else(|| "within the settling band".into());

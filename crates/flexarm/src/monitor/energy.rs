@@ -1,10 +1,52 @@
 //! The energy balance of a run: what drives and loads put in, what dampers took, what is stored.
 
+use std::sync::Arc;
+
+use flexarm_kinematics::{Data, Model, State, kinetic_energy, potential_energy};
+use flexarm_stepping::Observation;
+
 use crate::summary::EnergyFigures;
+
+/// Watches the energy.
+pub(crate) struct Energy {
+    /// What the arm carried at the sample before.
+    model: Arc<Model>,
+    book: EnergyBook,
+}
+
+impl Energy {
+    /// `model`: the arm at the start.
+    pub(crate) fn new(model: &Arc<Model>) -> Self {
+        Self { model: model.clone(), book: EnergyBook::default() }
+    }
+
+    pub(crate) fn update(&mut self, seen: &Observation) {
+        if !Arc::ptr_eq(&self.model, &seen.model) {
+            // At the start the arm carries it already.
+            if self.book.first.is_some() {
+                self.book.exchanged += mechanical_energy(&seen.model, seen) - mechanical_energy(&self.model, seen);
+            }
+            self.model.clone_from(&seen.model);
+        }
+        let drives = seen.drive.iter().zip(seen.qdot.iter()).map(|(force, rate)| force * rate);
+        self.book.add(seen.t, seen.energy, seen.power, seen.impulse_work, drives);
+    }
+
+    pub(crate) fn result(&self) -> EnergyFigures {
+        self.book.figures()
+    }
+}
+
+/// Kinetic and gravitational energy (J) of a state, with what the model carries.
+fn mechanical_energy(model: &Model, seen: &Observation) -> f64 {
+    let mut data = Data::new(model);
+    let state = State { q: seen.q.clone(), qdot: seen.qdot.clone() };
+    kinetic_energy(model, &mut data, &state) + potential_energy(model, &mut data, &state.q)
+}
 
 /// Work that goes in and out between samples, by the trapezoidal rule.
 #[derive(Default)]
-pub(crate) struct EnergyBook {
+struct EnergyBook {
     first: Option<f64>,
     last: f64,
     before: Option<(f64, [f64; 3])>,
@@ -19,20 +61,13 @@ pub(crate) struct EnergyBook {
     swing: f64,
     struck: f64,
     /// Energy that came or went with a payload (J).
-    pub(crate) exchanged: f64,
+    exchanged: f64,
 }
 
 impl EnergyBook {
     /// Adds a sample. `power`: of drives, loads, dissipation; `impulse_work`: work of the drives so far that is in no power, where
     /// velocities jumped (J); `drives`: power of each drive (W).
-    pub(crate) fn add(
-        &mut self,
-        t: f64,
-        energy: [f64; 3],
-        power: [f64; 3],
-        impulse_work: f64,
-        drives: impl Iterator<Item = f64>,
-    ) {
+    fn add(&mut self, t: f64, energy: [f64; 3], power: [f64; 3], impulse_work: f64, drives: impl Iterator<Item = f64>) {
         if let Some((t_before, p)) = self.before {
             for c in 0..3 {
                 self.work[c] += 0.5 * (t - t_before) * (p[c] + power[c]);
@@ -60,7 +95,7 @@ impl EnergyBook {
         self.swing = self.swing.max((self.last - first).abs()).max(self.work[0].abs());
     }
 
-    pub(crate) fn figures(&self) -> EnergyFigures {
+    fn figures(&self) -> EnergyFigures {
         EnergyFigures {
             drives_j: self.work[0],
             drives_positive_j: self.gross[0],

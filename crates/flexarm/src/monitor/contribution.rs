@@ -1,0 +1,61 @@
+//! Who moves the tool how far: flexible links, elastic drives, and what servos leave of the way to go.
+//!
+//! ```text
+//! u_T = J_e e        first order: columns of the twin's Jacobian that belong to the deflections e
+//! ```
+
+use flexarm_analysis::{ContributionPeak, ContributionPeaks};
+use flexarm_stepping::{FlexibleArm, Observation};
+use nalgebra::{Matrix6, Vector6};
+
+use crate::flexible::{FlexibleRobot, Owner};
+use crate::twin::RigidTwin;
+
+/// Watches all that moves the tool: links, then drives, then what servos leave.
+pub(crate) struct Contributions {
+    /// Place of each elastic element.
+    places: Vec<usize>,
+    /// Displacement of the tool by each at the last sample: m and rad, world axes.
+    moved: Vec<Vector6<f64>>,
+    peaks: ContributionPeaks,
+}
+
+impl Contributions {
+    pub(crate) fn new(flexible: &FlexibleRobot, n_drives: usize) -> Self {
+        let n_links = flexible.spans.len();
+        let places = flexible.owners.iter().map(|owner| match owner {
+            Owner::Link(link) => *link,
+            Owner::Drive(drive) => n_links + drive,
+        });
+        let count = n_links + n_drives + 1;
+        Self { places: places.collect(), moved: vec![Vector6::zeros(); count], peaks: ContributionPeaks::new(count) }
+    }
+
+    pub(crate) fn update(&mut self, seen: &Observation, twin: &RigidTwin, arm: &FlexibleArm) {
+        self.moved.fill(Vector6::zeros());
+        for (element, place) in arm.elements.iter().zip(&self.places) {
+            let e = seen.q.rows(element.coordinate, element.size);
+            let displacement: Vector6<f64> = twin.J.columns(element.coordinate, element.size) * e;
+            self.moved[*place] += displacement;
+        }
+        // Motors under servos are not where the trajectory wants them.
+        if let Some(following) = self.moved.last_mut() {
+            for &k in &arm.torque_driven {
+                *following += twin.J.column(k) * (seen.q[k] - twin.state.q[k]);
+            }
+        }
+        for (place, displacement) in self.moved.iter().enumerate() {
+            self.peaks.update(place, seen.t, &Matrix6::identity(), displacement);
+        }
+    }
+
+    /// Displacements of the tool at the last sample (m, rad, world axes).
+    pub(crate) fn moved(&self) -> &[Vector6<f64>] {
+        &self.moved
+    }
+
+    /// Largest displacement by each.
+    pub(crate) fn result(&self) -> &[ContributionPeak] {
+        self.peaks.peaks()
+    }
+}

@@ -1,0 +1,111 @@
+//! Payloads that are picked up and put down during a run.
+
+use flexarm_kinematics::{LinkInertia, Model, Pose, SpatialInertia};
+use flexarm_stepping::InertiaChange;
+use nalgebra::{Matrix3, Vector3};
+
+use crate::applied_load::moving_links;
+use crate::error::Error;
+use crate::loads_file::Written;
+use crate::robot::{PAYLOAD_LINK, Robot};
+
+/// What a link carries from an instant on, in the place of what was carried before.
+#[derive(Clone, Debug)]
+pub struct PayloadChange {
+    /// When (s).
+    pub at_s: f64,
+    /// The link that carries it; that of the robot's own payload, else that of the TCP, without it.
+    pub link: Option<String>,
+    /// What it carries from then on, link axes; a mass of 0 is nothing.
+    pub carried: LinkInertia,
+    /// Where it is written, if a file was read.
+    pub(crate) written: Option<Written>,
+}
+
+impl PayloadChange {
+    /// A payload is picked up.
+    ///
+    /// * `at_s`: when (s). `mass`: kg. `com`: `p_LoLcm_L`, its centre of mass in the carrying link L (m).
+    pub fn attach(at_s: f64, mass: f64, com: Vector3<f64>) -> Self {
+        let carried = LinkInertia { mass, com, inertia_com: Matrix3::zeros() };
+        Self { at_s, link: None, carried, written: None }
+    }
+
+    /// Whatever is carried is put down; `at_s`: when (s).
+    pub fn release(at_s: f64) -> Self {
+        Self::attach(at_s, 0.0, Vector3::zeros())
+    }
+
+    /// The same with an inertia about its centre of mass, link axes (kg m²); without one it is a point.
+    #[must_use]
+    pub fn with_inertia(mut self, inertia_com: Matrix3<f64>) -> Self {
+        self.carried.inertia_com = inertia_com;
+        self
+    }
+
+    /// The same on a link of this name.
+    #[must_use]
+    pub fn on_link(self, link: &str) -> Self {
+        Self { link: Some(link.to_owned()), ..self }
+    }
+
+    /// On a model of the robot; `earlier`: changes before it.
+    pub(crate) fn on(&self, robot: &Robot, model: &Model, earlier: &[InertiaChange]) -> Result<InertiaChange, Error> {
+        let fail = |message: String| Written::entry(self.written.as_ref(), message);
+        let at_inertia = |message: String| Written::inertia(self.written.as_ref(), message);
+        let LinkInertia { mass, com, inertia_com } = &self.carried;
+        let mut numbers = [self.at_s, *mass].into_iter().chain(com.iter().copied()).chain(inertia_com.iter().copied());
+        if numbers.any(|x| !x.is_finite()) || *mass < 0.0 || self.at_s < 0.0 {
+            return Err(fail("a payload needs a time and a mass of at least 0, and finite numbers".into()));
+        }
+        let (link, body, X_BF) = self.carrier(robot, model)?;
+        if inertia_com.symmetric_eigenvalues().min() < -1e-9 * inertia_com.norm() {
+            let message = "payload inertia has a negative principal moment; the order is ixx iyy izz ixy ixz iyz";
+            return Err(at_inertia(message.into()));
+        }
+        let mut inertia = without_payload(robot, model, body)
+            .ok_or_else(|| fail(format!("the robot's own payload does not ride on link {link:?}: give that link")))?;
+        if let Some(other) = earlier.iter().find(|c| c.body != body) {
+            let name = &model.bodies()[other.body].name;
+            return Err(fail(format!("payloads on two bodies ({name:?} and {link:?}): one changes in a run")));
+        }
+        if *mass > 0.0 {
+            inertia += self.carried.spatial().at_parent(&X_BF);
+        }
+        Ok(InertiaChange { t: self.at_s, body, inertia })
+    }
+
+    /// The link that carries it, its body, and its frame there.
+    fn carrier(&self, robot: &Robot, model: &Model) -> Result<(String, usize, Pose), Error> {
+        let fail = |message: String| Written::frame(self.written.as_ref(), message);
+        let own = || robot.rigid.joints.iter().find(|j| j.child == PAYLOAD_LINK).map(|j| j.parent.clone());
+        let link = self.link.clone().or_else(own).unwrap_or_else(|| robot.tcp.0.clone());
+        let frame = model.frame(&link).filter(|f| f.body > 0).ok_or_else(|| {
+            let known = moving_links(model);
+            fail(format!("payload link {link:?}: expected a link that moves, of {known:?}"))
+        })?;
+        if robot.flexible.iter().any(|f| f.flexible.link == link) && model.frame(&format!("{link}__distal")).is_some() {
+            let beyond = robot.urdf.mechanism.child_joints(&link).map(|j| j.child.as_str()).collect::<Vec<_>>();
+            return Err(fail(format!(
+                "payload link {link:?} bends, so that it is not clear how the payload rides on it: name a link beyond it, of {beyond:?}"
+            )));
+        }
+        Ok((link, frame.body, frame.X_BF))
+    }
+}
+
+/// A body without what it carries at the start; `None` if the robot's own payload rides on another body.
+fn without_payload(robot: &Robot, model: &Model, body: usize) -> Option<SpatialInertia> {
+    let inertia = model.bodies()[body].inertia;
+    let at_start = robot.rigid.link(PAYLOAD_LINK).and_then(|l| l.inertia);
+    let (Some(payload), Some(own)) = (at_start, model.frame(PAYLOAD_LINK)) else { return Some(inertia) };
+    if own.body != body {
+        return None;
+    }
+    let carried = payload.spatial().at_parent(&own.X_BF);
+    Some(SpatialInertia {
+        mass: inertia.mass - carried.mass,
+        first_moment: inertia.first_moment - carried.first_moment,
+        rotational: inertia.rotational - carried.rotational,
+    })
+}

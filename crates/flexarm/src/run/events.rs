@@ -1,0 +1,53 @@
+//! What happened when in a run, for recordings and reports.
+
+use flexarm_analysis::TcpMetrics;
+use flexarm_log::{Event, EventKind};
+
+use super::Run;
+
+impl Run<'_> {
+    /// What happened when, in order of time, as far as the run came.
+    pub(super) fn events(&self, metrics: Option<&TcpMetrics>) -> Vec<Event> {
+        let mut events = Vec::new();
+        let mut add = |time_s: f64, kind: EventKind, text: String| events.push(Event { time_s, kind, text });
+        for (k, m) in self.motion.trajectory.moves().iter().enumerate() {
+            add(m.start, EventKind::MoveStart, format!("move {} begins", k + 1));
+            add(m.end, EventKind::MoveEnd, format!("move {} ends", k + 1));
+        }
+        if let Some(metrics) = metrics {
+            add(metrics.t_peak_s, EventKind::Peak, format!("largest TCP error: {:.3} mm", 1e3 * metrics.peak_m));
+            for hold in &metrics.holds {
+                if let Some(settling) = hold.settling_s {
+                    let band = 1e3 * self.options.settling_band_m;
+                    let text = format!("settled to within {band} mm, {settling:.3} s after the move");
+                    add(hold.start_s + settling, EventKind::Settled, text);
+                }
+            }
+        }
+        for v in &self.motion.violations {
+            add(v.since_s, EventKind::Limit, v.to_string());
+        }
+        for (c, load) in self.arm.model.coordinates().iter().zip(self.monitors.drive_loads.result()) {
+            if let Some(since) = load.over_since_s {
+                let text =
+                    format!("joint {:?} needs more than its limit of {:.0} N m (or N)", c.joint, c.limits.effort);
+                add(since, EventKind::Limit, text);
+            }
+        }
+        let mut jumps: Vec<f64> = self.arm.loads.iter().flat_map(|load| load.wrench.jumps.iter().copied()).collect();
+        jumps.sort_by(f64::total_cmp);
+        jumps.dedup();
+        // A table or a milling load has a corner at every row; a list of those tells nobody anything.
+        const MOST_JUMPS: usize = 20;
+        for t in jumps.iter().take(if jumps.len() <= MOST_JUMPS { MOST_JUMPS } else { 1 }) {
+            add(*t, EventKind::Load, "an external load changes".into());
+        }
+        for t in &self.payload_times {
+            add(*t, EventKind::Load, "the payload changes".into());
+        }
+        let reached = self.monitors.tool.result().last_time_s().unwrap_or(0.0);
+        events.retain(|event| event.time_s <= reached + 1e-9);
+        events.sort_by(|a, b| a.time_s.total_cmp(&b.time_s).then(a.kind.cmp(&b.kind)));
+        events
+    }
+}

@@ -1,0 +1,184 @@
+//! The figures of a run, from what its monitors have seen, and whether its models held.
+
+use flexarm_analysis::TcpMetrics;
+use flexarm_kinematics::{Data, State, forward_kinematics};
+use flexarm_log::Event;
+use flexarm_stepping::StepperKind;
+use flexarm_trajectory::LimitViolation;
+use nalgebra::Vector3;
+
+use super::{Run, moves};
+use crate::caveat::pose::Standing;
+use crate::caveat::{Caveat, drives, kinds, validity};
+use crate::flexible::Owner;
+use crate::headline::{self, Bending, ShareFigures};
+use crate::summary::{CURVE_PIECES, DriveFigures, LinkFigures, StepperFigures, Summary, TcpFigures};
+
+impl Run<'_> {
+    /// Figures of what was seen so far.
+    pub(super) fn summary(&self) -> (Summary, Vec<Event>) {
+        // A run that stopped at once has nothing to measure.
+        let metrics = self.monitors.tool.result().metrics().ok();
+        let metrics = metrics.as_ref().filter(|_| self.options.with_twin);
+        let (links, elastic_drives) = (self.link_figures(), self.drive_figures());
+        let robot = self.robot;
+        let by_choice = !robot.flexible.is_empty() || robot.drives.iter().any(|drive| drive.gearbox.is_some());
+        let coordinates = self.arm.model.coordinates().iter();
+        let peaks = coordinates.zip(self.monitors.drive_loads.result());
+        let mut summary = Summary {
+            bends: Bending {
+                links: links.iter().map(|link| link.name.clone()).collect(),
+                gearboxes: elastic_drives.iter().map(|drive| drive.joint.clone()).collect(),
+            },
+            robot: robot.name.clone(),
+            trajectory: self.motion.name.clone(),
+            links_model: self.flexible.links_model().into(),
+            duration_s: self.monitors.tool.result().last_time_s().unwrap_or(0.0),
+            stepper: StepperFigures::new(self.options, self.stepper.counts()),
+            tcp: metrics.map(|m| self.tool_figures(m)),
+            frequencies_hz: self.arm.modes.frequencies_hz(),
+            energy: self.monitors.energy.result(),
+            drives: peaks.map(|(c, load)| (c.joint.clone(), load.peak)).collect(),
+            moves_s: moves(self.motion).iter().map(|&(start, end)| [start, end]).collect(),
+            error_curve: self.monitors.tool.result().largest_errors(CURVE_PIECES),
+            caveats: self.caveats(&links),
+            links,
+            elastic_drives,
+            ..Summary::default()
+        };
+        summary.headline = headline::headline(&summary, by_choice);
+        (summary, self.events(metrics))
+    }
+
+    fn link_figures(&self) -> Vec<LinkFigures> {
+        let seen = self.monitors.contributions.result().iter().zip(self.monitors.strains.result());
+        let figures = self.flexible.spans.iter().zip(seen).map(|(span, (moved, strained))| LinkFigures {
+            name: span.link.clone(),
+            peak_contribution_m: moved.peak_m,
+            engineering_strain: strained.strain,
+            peak_rotation_rad: strained.rotation,
+        });
+        figures.collect()
+    }
+
+    fn drive_figures(&self) -> Vec<DriveFigures> {
+        let moved = &self.monitors.contributions.result()[self.flexible.spans.len()..];
+        let seen = moved.iter().zip(self.monitors.deflections.result());
+        let drives = self.robot.drives.iter().zip(seen).enumerate();
+        let elastic = drives.filter(|(k, _)| self.flexible.owners.contains(&Owner::Drive(*k)));
+        let figures = elastic.map(|(_, (drive, (moved, deflection)))| DriveFigures {
+            joint: drive.joint.clone(),
+            peak_contribution_m: moved.peak_m,
+            peak_deflection_rad: *deflection,
+        });
+        figures.collect()
+    }
+
+    fn tool_figures(&self, metrics: &TcpMetrics) -> TcpFigures {
+        let figures = TcpFigures {
+            static_sag_m: self.static_sag(),
+            shares_at_peak: self.shares_at_peak(),
+            ..TcpFigures::from(metrics).with_band(self.options.settling_band_m)
+        };
+        match self.monitors.tool.result().parts() {
+            Ok(parts) => figures.with_parts(&parts),
+            Err(_) => figures,
+        }
+    }
+
+    /// What each contributor has in the largest error, along its direction.
+    fn shares_at_peak(&self) -> Vec<ShareFigures> {
+        let peak = &self.trace.peak;
+        let error = Vector3::from_row_slice(&peak.error_world[..3]);
+        let along = error.try_normalize(0.0).unwrap_or_default();
+        let shares = self.contributors.iter().zip(&peak.contributions).map(|(who, moved)| ShareFigures {
+            name: who.name.clone(),
+            kind: who.kind.into(),
+            along_m: along.dot(&Vector3::from(*moved)),
+        });
+        shares.collect()
+    }
+
+    /// TCP error with the drives at rest in their first position, also for runs that start undeformed (m).
+    fn static_sag(&self) -> f64 {
+        let model = &self.arm.model;
+        let (mut data, mut state) = (Data::new(model), State::zeros(model));
+        self.arm.prescribed_state(0.0, &mut state, &mut nalgebra::DVector::zeros(model.nv()));
+        forward_kinematics(model, &mut data, &state.q);
+        let rigid = data.X_WF(&self.tcp).translation.vector;
+        let n = model.n_actuated();
+        state.q.rows_mut(n, model.nv() - n).copy_from(&self.arm.modes.equilibrium);
+        forward_kinematics(model, &mut data, &state.q);
+        (data.X_WF(&self.tcp).translation.vector - rigid).norm()
+    }
+
+    /// What is probably wrong with the input, and whether the models held in what was seen so far.
+    fn caveats(&self, links: &[LinkFigures]) -> Vec<Caveat> {
+        let mut caveats = self.robot.caveats();
+        caveats.extend(self.flexible.caveats());
+        caveats.extend(self.motion.caveats());
+        let passed = |v: &LimitViolation| Caveat::said("joint-limit", &v.joint, format!("joint limit: {v}"), "");
+        caveats.extend(self.motion.violations.iter().map(passed));
+        let (arm, flexible, robot) = (&self.arm, self.flexible, self.robot);
+        let elastic = arm.modes.equilibrium.as_slice();
+        caveats.extend(Standing { robot, flexible, arm, elastic, sag_m: self.static_sag() }.caveats());
+        caveats.extend(self.drive_caveats());
+        if let Some(first) = arm.modes.frequencies_hz().first() {
+            let logged_hz = 1.0 / (self.every as f64 * self.options.step_s);
+            caveats.extend(validity::sampling(*first, self.options.step_s, logged_hz));
+        }
+        for link in links {
+            caveats.extend(validity::link(&link.name, link.peak_rotation_rad, link.engineering_strain));
+        }
+        caveats.extend(validity::energy(self.monitors.energy.result().imbalance));
+        caveats.extend(self.effort_caveats());
+        caveats.extend(self.method_caveats());
+        caveats
+    }
+
+    /// How far gearboxes give way.
+    fn drive_caveats(&self) -> Vec<Caveat> {
+        let coordinates = self.arm.model.coordinates();
+        let drives = self.robot.drives.iter().zip(self.monitors.deflections.result()).enumerate();
+        let elastic = drives.filter(|(k, _)| self.flexible.owners.contains(&Owner::Drive(*k)));
+        let found = elastic.flat_map(|(_, (drive, give))| {
+            let joint = coordinates.iter().find(|c| c.joint == drive.joint);
+            let slides = joint.is_some_and(|c| c.kind == "prismatic");
+            let [turned, moved] = if slides { [0.0, *give] } else { [*give, 0.0] };
+            let effort = joint.map_or(f64::INFINITY, |c| c.limits.effort);
+            drives::give(drive, effort, (turned - drive.backlash).max(0.0), moved, 2.0)
+        });
+        found.collect()
+    }
+
+    /// Forces of drives against their limits.
+    fn effort_caveats(&self) -> Vec<Caveat> {
+        let (coordinates, loads) = (self.arm.model.coordinates(), self.monitors.drive_loads.result());
+        let peaks: Vec<f64> = loads.iter().map(|load| load.peak).collect();
+        let mut caveats: Vec<Caveat> = validity::efforts(&kinds::EFFORT, coordinates, &peaks).into_iter().collect();
+        for (c, load) in coordinates.iter().zip(loads).filter(|(_, load)| load.at_limit > 0) {
+            let share = 100.0 * load.at_limit as f64 / self.monitors.tool.result().len() as f64;
+            caveats.push(kinds::SERVO_LIMIT.found(format!("joint {:?}", c.joint), share, 0.0));
+        }
+        caveats
+    }
+
+    /// What stepper and start make of the run.
+    fn method_caveats(&self) -> Vec<Caveat> {
+        let mut caveats = Vec::new();
+        if matches!(self.options.stepper, StepperKind::Spook(_)) && !self.arm.proportional {
+            let betas: Vec<String> = self.arm.tau.iter().map(|b| format!("{b:.2e}")).collect();
+            let message = format!(
+                "spook damps each spring in proportion to its stiffness: modal damping became D = beta K with beta = {} s, \
+                 exact for the first mode",
+                betas.join(", ")
+            );
+            caveats.push(Caveat::said("spook-damping", "run", message, ""));
+        }
+        if self.motion.trajectory.initial_speed() > 1e-6 {
+            let message = "the motion starts at speed: the first ringing is an artefact of the sudden start";
+            caveats.push(Caveat::said("starts-moving", "run", message, ""));
+        }
+        caveats
+    }
+}

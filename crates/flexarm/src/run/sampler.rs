@@ -1,0 +1,121 @@
+//! What recordings, curves and observers are shown of an instant of a run: one [`Sample`], filled again and again.
+
+use flexarm_kinematics::{Frame, JointMotion};
+use flexarm_log::{ElasticSample, EnergySample, Sample};
+use flexarm_stepping::{FlexibleArm, Observation};
+use nalgebra::Vector3;
+
+use crate::flexible::{FlexibleRobot, Owner};
+use crate::monitor::tool::ToolError;
+use crate::robot::Robot;
+use crate::twin::RigidTwin;
+
+/// What of an arm stands in a sample.
+pub(super) struct Sampler {
+    link_frames: Vec<Frame>,
+    /// Places along the flexible links.
+    stations: Vec<Frame>,
+    /// Link-side angle of a joint: actuated coordinate, elastic coordinate, weight.
+    angles: Vec<(usize, usize, f64)>,
+}
+
+impl Sampler {
+    pub(super) fn new(robot: &Robot, flexible: &FlexibleRobot, link_frames: Vec<Frame>, stations: Vec<Frame>) -> Self {
+        Self { link_frames, stations, angles: link_side_angles(robot, flexible) }
+    }
+
+    /// The arm beside its twin.
+    pub(super) fn fill(&self, sample: &mut Sample, seen: &Observation, twin: &RigidTwin, tool: &ToolError) {
+        sample.time_s = seen.t;
+        sample.error_world = tool.error;
+        sample.error_path = tool.path_error;
+        sample.static_m = tool.static_m;
+        let [kinetic, potential, elastic] = seen.energy;
+        sample.energy = EnergySample { kinetic, potential, elastic };
+        self.fill_flexible(sample, seen, tool);
+        self.fill_rigid(sample, twin, tool);
+    }
+
+    fn fill_flexible(&self, sample: &mut Sample, seen: &Observation, tool: &ToolError) {
+        let n = seen.drive.len();
+        let flexible = &mut sample.flexible;
+        flexible.q.clear();
+        flexible.q.extend_from_slice(&seen.q.as_slice()[..n]);
+        flexible.qdot.clear();
+        flexible.qdot.extend_from_slice(&seen.qdot.as_slice()[..n]);
+        for &(k, e, weight) in &self.angles {
+            flexible.q[k] += weight * seen.q[e];
+            flexible.qdot[k] += weight * seen.qdot[e];
+        }
+        flexible.effort.clear();
+        flexible.effort.extend_from_slice(seen.drive.as_slice());
+        flexible.X_WL.clear();
+        flexible.X_WL.extend(self.link_frames.iter().map(|f| seen.X_WB[f.body] * f.X_BF));
+        flexible.X_WT = tool.X_flexible;
+        flexible.X_WS.clear();
+        flexible.X_WS.extend(self.stations.iter().map(|f| seen.X_WB[f.body] * f.X_BF));
+    }
+
+    fn fill_rigid(&self, sample: &mut Sample, twin: &RigidTwin, tool: &ToolError) {
+        let n = sample.flexible.q.len();
+        let rigid = &mut sample.rigid;
+        rigid.q.clear();
+        rigid.q.extend_from_slice(&twin.state.q.as_slice()[..n]);
+        rigid.qdot.clear();
+        rigid.qdot.extend_from_slice(&twin.state.qdot.as_slice()[..n]);
+        rigid.effort.clear();
+        rigid.effort.extend_from_slice(&twin.data.tau.as_slice()[..n]);
+        rigid.X_WL.clear();
+        rigid.X_WL.extend(self.link_frames.iter().map(|f| twin.data.X_WF(f)));
+        rigid.X_WT = tool.X_rigid;
+    }
+}
+
+/// Deflection and load of each spring, along the axes of its joint.
+pub(super) fn fill_elastic(sample: &mut Sample, seen: &Observation, arm: &FlexibleArm) {
+    sample.elastic.resize(arm.elements.len(), ElasticSample::default());
+    for (k, element) in arm.elements.iter().enumerate() {
+        let e = seen.q.rows(element.coordinate, element.size);
+        let (mut deflection, mut load) = ([0.0; 6], seen.load[k].into());
+        match (element.size, arm.model.bodies()[element.body].motion) {
+            (1, JointMotion::Revolute(axis)) => place(&mut deflection, &mut load, 3, &axis, e[0]),
+            (1, JointMotion::Prismatic(axis)) => place(&mut deflection, &mut load, 0, &axis, e[0]),
+            (n, _) => (0..n.min(6)).for_each(|c| deflection[c] = e[c]),
+        }
+        sample.elastic[k] = ElasticSample { deflection, load };
+    }
+}
+
+/// Puts one deflection and its load along the axis of its joint.
+fn place(deflection: &mut [f64; 6], load: &mut [f64; 6], first: usize, axis: &Vector3<f64>, e: f64) {
+    let torque = load[0];
+    *load = [0.0; 6];
+    for c in 0..3 {
+        deflection[first + c] = e * axis[c];
+        load[first + c] = torque * axis[c];
+    }
+}
+
+/// What the springs of gearboxes add to the motor's angle at the link.
+fn link_side_angles(robot: &Robot, flexible: &FlexibleRobot) -> Vec<(usize, usize, f64)> {
+    let mut angles = Vec::new();
+    for (group, owner) in flexible.model.elastic().iter().zip(&flexible.owners) {
+        let Owner::Drive(drive) = owner else { continue };
+        let joint = &robot.drives[*drive].joint;
+        let actuated = &flexible.model.coordinates()[..flexible.model.n_actuated()];
+        let Some(k) = actuated.iter().position(|c| c.joint == *joint) else { continue };
+        let motor = &flexible.model.bodies()[actuated[k].body];
+        let (JointMotion::Revolute(axis) | JointMotion::Prismatic(axis)) = motor.motion else { continue };
+        let slides = matches!(motor.motion, JointMotion::Prismatic(_));
+        match flexible.model.bodies()[group.body].motion {
+            JointMotion::Revolute(own) | JointMotion::Prismatic(own) => {
+                angles.push((k, group.coordinate, axis.dot(&own)));
+            }
+            _ => {
+                let first = group.coordinate + if slides { 0 } else { 3 };
+                angles.extend((0..3).map(|c| (k, first + c, axis[c])));
+            }
+        }
+    }
+    angles
+}
