@@ -2,6 +2,7 @@
 //!
 //! The upper arm gives way like a damped oscillator that the motion's acceleration pushes, so that the files
 //! show what real ones do: an error while the arm speeds up and slows down, and ringing afterwards.
+#![allow(non_snake_case, reason = "monogram notation: X_WL, pose of L in W")]
 #![allow(dead_code, reason = "every test and the example use their own part")]
 
 use std::f64::consts::TAU;
