@@ -559,9 +559,9 @@ fn a_rerun_file_gives_back_its_curves_and_poses() {
 #[cfg(all(feature = "rerun", feature = "mcap"))]
 #[test]
 fn a_rerun_file_made_of_an_mcap_file_shows_the_same() {
-    use re_log_encoding::DecoderApp;
     use re_chunk::Chunk;
-use re_log_types::LogMsg;
+    use re_log_encoding::DecoderApp;
+    use re_log_types::LogMsg;
 
     let direct = written("direct", RecordingFormat::Rrd, &synthetic::header(), 60);
     let mcap = written("way", RecordingFormat::Mcap, &synthetic::header(), 60);

@@ -12,8 +12,8 @@ use std::time::Duration;
 use flexarm_kinematics::Pose;
 use flexarm_log::palette::{self, Ground};
 use flexarm_log::{Caption, CreateOptions, Recorder, RrdRecorder, RrdStudy, RunHeader};
-use re_log_encoding::DecoderApp;
 use re_chunk::Chunk;
+use re_log_encoding::DecoderApp;
 use re_log_types::LogMsg;
 
 const NEVER: Duration = Duration::MAX;

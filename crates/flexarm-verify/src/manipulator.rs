@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use flexarm::{
-    ConstraintForm, DriveModel, Error, LinkModel, Modelling, Motion, ReferenceSettings, Robot, RunOptions, SpookPreset,
+    ConstraintForm, DriveModel, LinkModel, Modelling, Motion, ReferenceSettings, Robot, RunOptions, SpookPreset,
     SpookSettings, StepperKind, Summary, Trace, simulate_traced,
 };
 use flexarm_fem::element::Quadrature;
@@ -13,6 +13,7 @@ use flexarm_log::{CurveLook, Panel, PlotCurve};
 use flexarm_stepping::Damping;
 use nalgebra::{Matrix6, Vector3, Vector6};
 
+use crate::Error;
 use crate::Pace;
 use crate::bench::{ALPHA, Bench, larger, modal, parts, spook};
 use crate::meshed::Meshed;

@@ -7,7 +7,7 @@ use flexarm_kinematics::{Model, Wrench};
 use flexarm_stepping::{Load, LoadAxes};
 
 use crate::disturbance::{frame_of, moving_links};
-use crate::error::Error;
+use crate::error::{Error, LoadError};
 
 /// A wrench on a frame of the robot as a function of time.
 #[derive(Clone)]
@@ -48,12 +48,10 @@ impl AppliedLoad {
     /// * `F`: n wrenches.
     ///
     /// # Errors
-    /// [`Error::Usage`] for fewer than two samples, other numbers of them, and times that do not increase.
+    /// [`Error::Load`] for fewer than two samples, other numbers of them, and times that do not increase.
     pub fn sampled(frame: &str, t: &[f64], F: &[Wrench]) -> Result<Self, Error> {
         if t.len() != F.len() || t.len() < 2 || t.windows(2).any(|pair| pair[1].is_nan() || pair[1] <= pair[0]) {
-            let (times, wrenches) = (t.len(), F.len());
-            let what = "a load needs at least two samples, one wrench for each time, and times that increase";
-            return Err(Error::Usage(format!("{what}; found {times} times and {wrenches} wrenches")));
+            return Err(LoadError::Samples { times: t.len(), wrenches: F.len() }.into());
         }
         let (times, F) = (t.to_vec(), F.to_vec());
         let wrench = {
@@ -74,10 +72,11 @@ impl AppliedLoad {
 
     /// On a model, up to the end of a run (s).
     pub(crate) fn on(&self, model: &Model, duration_s: f64) -> Result<Load, Error> {
-        let frame = frame_of(&self.frame, model).filter(|frame| frame.body > 0).ok_or_else(|| {
-            let known = moving_links(model);
-            Error::Usage(format!("load on frame {:?}: expected \"tcp\" or a link that moves, of {known:?}", self.frame))
-        })?;
+        let frame =
+            frame_of(&self.frame, model).filter(|frame| frame.body > 0).ok_or_else(|| LoadError::UnknownFrame {
+                frame: self.frame.clone(),
+                known: moving_links(model).into_iter().map(str::to_owned).collect(),
+            })?;
         let jumps = self.jumps_s.iter().copied().filter(|t| *t <= duration_s).collect();
         let (axes, wrench, period) = (self.axes, self.wrench.clone(), self.period_s);
         Ok(Load { body: frame.body, X_BF: frame.X_BF, axes, wrench, jumps, period })

@@ -22,6 +22,9 @@
 //!
 //! [`simulate`] writes recordings and a report as well. [`inspect()`] and [`check()`] look at what was loaded; [`statics()`],
 //! [`modes()`] and [`response()`] answer one pose in full; [`mod@reduce`] makes a flexible link of a mesh.
+//!
+//! What goes wrong is an [`Error`] by cause with its numbers, what is doubtful a [`Caveat`]. Both carry settings that mend them
+//! as values ([`Setting`]); a face with names of its own for them gives these once ([`name_settings`]).
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
@@ -77,7 +80,10 @@ pub use compare::{Progress, simulate, simulate_traced};
 pub use convert::{ConvertOptions, ConvertSummary, convert, convert_until, parse_recording_format, read_run};
 pub use disturbance::Disturbances;
 pub use drive_entry::{Drive, DriveKind};
-pub use error::Error;
+pub use error::{
+    ChannelError, Error, Fault, ImportError, LoadError, ModellingError, PoseError, RecordingError, StudyError,
+    ValueError,
+};
 pub use flexible::{FlexibleRobot, LinkChoices, Owner, RobotLink};
 pub use headline::{Bending, ShareFigures};
 pub use inspect::{FlexibleInfo, Inspection, JointInfo, LinkInfo, TcpInfo, inspect};
@@ -103,6 +109,7 @@ pub use summary::{
 pub use flexarm_analysis::{Quantity, Spacing};
 pub use flexarm_kinematics::{Pose, Wrench};
 pub use flexarm_log::{Column, Columns, RecordingFormat, Sample, Trace};
+pub use flexarm_settings::{Names, Setting, name_settings};
 pub use flexarm_stepping::{
     AlphaSettings, ConstraintForm, LoadAxes, OperatingPoint, ReferenceMethod, ReferenceSettings, SpookPreset,
     SpookSettings, Start, StepError, StepperKind,

@@ -66,10 +66,7 @@ fn refuse_others(outputs: &Outputs, ours: &[&str]) -> Result<(), Error> {
     let mut files = files.map(|file| outputs.folder.join(file));
     match files.find(|path| path.exists()).filter(|_| !outputs.overwrite) {
         None => Ok(()),
-        Some(there) => {
-            let what = "exists already and is not overwritten: choose another folder with -o or give --force";
-            Err(Error::File { path: there, what: what.into() })
-        }
+        Some(path) => Err(Error::Taken { path, place: "folder", movable: true }),
     }
 }
 
@@ -121,7 +118,7 @@ pub(crate) fn recorders(outputs: Option<&Outputs>, in_study: bool) -> Result<Rec
     }
     if outputs.parquet {
         #[cfg(not(feature = "parquet"))]
-        return Err(Error::Usage("this program was built without Parquet: leave --parquet out".into()));
+        return Err(crate::error::RecordingError::NoParquet.into());
         #[cfg(feature = "parquet")]
         {
             recordings.set.push(Box::new(flexarm_log::ParquetRecorder::create(path("run.parquet"), options)));

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use flexarm_log::{Recorder, Trace, TraceRow};
 
 use crate::compare::{Progress, Together, run_traced};
-use crate::error::Error;
+use crate::error::{Error, StudyError};
 use crate::magnification::Expected;
 use crate::motion::Motion;
 use crate::options::{Outputs, RunOptions};
@@ -35,14 +35,14 @@ pub struct Variant {
 /// [`Summary::with`].
 ///
 /// # Errors
-/// As [`crate::simulate`], with the label of the run that failed; [`Error::Usage`] for labels that are not distinct.
+/// As [`crate::simulate`], with the label of the run that failed; [`Error::Study`] for labels that are not distinct.
 pub fn compare_study(
     variants: &[Variant],
     outputs: Option<&Outputs>,
     progress: &mut Progress<'_>,
 ) -> Result<(Summary, Vec<(String, Trace)>), Error> {
     let Some(main) = variants.first() else {
-        return Err(Error::Usage("a study needs at least one run".into()));
+        return Err(StudyError::Empty.into());
     };
     let folders = folders(variants)?;
     let mut options = main.options.clone();
@@ -101,28 +101,24 @@ pub fn compare_study(
 const LONGEST_NAME: usize = 100;
 
 /// Names of the runs' folders: the labels, with letters that every file system takes.
-fn folders(variants: &[Variant]) -> Result<Vec<String>, Error> {
+fn folders(variants: &[Variant]) -> Result<Vec<String>, StudyError> {
     let mut taken = BTreeSet::new();
     let mut names = Vec::new();
     for variant in variants {
         let plain = |c: char| if c.is_ascii_alphanumeric() || "-_.=".contains(c) { c } else { '_' };
         let name: String = variant.label.chars().map(plain).collect();
         if name.is_empty() || name.starts_with('.') || !taken.insert(name.to_lowercase()) {
-            return Err(Error::Usage(format!(
-                "the label {:?} names two runs of the study, or none: give each --with a name=... of its own",
-                variant.label
-            )));
+            return Err(StudyError::LabelTwice { label: variant.label.clone() });
         }
         if RECORDING_FILES.contains(&name.to_lowercase().as_str()) {
-            let text = "is the name of a file of the study: give its --with another name=...";
-            return Err(Error::Usage(format!("the label {:?} {text}", variant.label)));
+            return Err(StudyError::LabelOfFile { label: variant.label.clone() });
         }
         if name.len() > LONGEST_NAME {
-            return Err(Error::Usage(format!(
-                "the label {:?} has {} letters, at most {LONGEST_NAME} make a folder: give its --with a short name=...",
-                variant.label,
-                name.len()
-            )));
+            return Err(StudyError::LongLabel {
+                label: variant.label.clone(),
+                letters: name.len(),
+                most: LONGEST_NAME,
+            });
         }
         names.push(name);
     }

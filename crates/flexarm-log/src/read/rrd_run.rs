@@ -4,10 +4,10 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use flexarm_kinematics::Pose;
-use nalgebra::{Quaternion, Translation3, UnitQuaternion, Vector3};
 use crate::rerun::Chunk;
 use crate::rerun::{EntityPath, Scalars, SeriesLines, TextDocument, Timeline, Transform3D};
+use flexarm_kinematics::Pose;
+use nalgebra::{Quaternion, Translation3, UnitQuaternion, Vector3};
 
 use super::rrd_messages::{Message, Messages};
 use super::rrd_track::Track;

@@ -19,8 +19,8 @@ mod window;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-use crate::rerun::re_log_types::StoreKind;
 use crate::rerun::Chunk;
+use crate::rerun::re_log_types::StoreKind;
 use crate::rerun::{EntityPath, StoreId, TextDocument, TimePoint, Timeline, ViewCoordinates};
 
 use self::layout::{Part, PlotPlace};

@@ -1,10 +1,10 @@
 //! One of the robots of a recording: rigid twin, flexible arm, or the flexible arm with its deflections magnified.
 
+use crate::rerun::Chunk;
+use crate::rerun::components::MeshFaceRendering;
+use crate::rerun::{AlbedoFactor, Color, EntityPath, LineStrips3D, Mesh3D, Rgba32, TransformAxes3D};
 use flexarm_kinematics::{Pose, rotation_vector};
 use nalgebra::{Point3, Vector3};
-use crate::rerun::components::MeshFaceRendering;
-use crate::rerun::Chunk;
-use crate::rerun::{AlbedoFactor, Color, EntityPath, LineStrips3D, Mesh3D, Rgba32, TransformAxes3D};
 
 use super::colors::{self, ColorScale};
 use super::stream::{Ids, StreamError};

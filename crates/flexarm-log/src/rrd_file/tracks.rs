@@ -1,13 +1,13 @@
 //! Rows that wait to be written as columns: one track for each entity that changes with time.
 
-use flexarm_kinematics::Pose;
-use nalgebra::UnitQuaternion;
 use crate::rerun::components::{ImageBuffer, ImageFormat};
-use crate::rerun::{Chunk, TimeColumn};
 use crate::rerun::{
     Arrows3D, Color, EntityPath, LineStrip3D, LineStrips3D, Mesh3D, Quaternion, Scalars, SeriesLines, TimePoint,
     Transform3D,
 };
+use crate::rerun::{Chunk, TimeColumn};
+use flexarm_kinematics::Pose;
+use nalgebra::UnitQuaternion;
 
 use super::stream::{Ids, StreamError};
 use crate::plot_room::Envelope;
@@ -420,8 +420,9 @@ impl PathTrack {
         lines: impl IntoIterator<Item = LineStrip3D>,
         colors: impl IntoIterator<Item = Color>,
     ) -> Result<Chunk, StreamError> {
-        let strips =
-            LineStrips3D::new(lines).with_colors(colors).with_radii([crate::rerun::Radius::new_ui_points(Self::RADIUS)]);
+        let strips = LineStrips3D::new(lines)
+            .with_colors(colors)
+            .with_radii([crate::rerun::Radius::new_ui_points(Self::RADIUS)]);
         ids.single(&self.path, &TimePoint::default(), &strips)
     }
 }
