@@ -8,7 +8,10 @@ Rules:
  * a crate uses crates of lower lines of the table only; the line "tests" is for dev-dependencies; flexarm-testkit uses
    the base line and below, flexarm-tests whatever it likes;
  * outside crates that belong to one crate or line (OWNERS) are named nowhere else, dev-dependencies included;
- * no source file but the faces' prints, and none from base to results reads a clock or the environment;
+ * no source file but the faces' prints, and none from words to results reads a clock;
+ * no text and no code of a library crate (all but the faces and the tests) knows a command line: flags, its words, the
+   environment, the exit of the process (ALLOWED lists what may, and why);
+ * what a crate "must not know" by the page is not in its code (MUST_NOT_KNOW), as far as a word shows it;
  * every crate takes the workspace's lints;
  * ARCHITECTURE.md mentions every crate there is, in both tables, and no other.
 """
@@ -20,8 +23,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = "ARCHITECTURE.md"
-LINES = ["faces", "proof", "facade", "edges", "results", "motion", "links", "base", "algebra"]       # top to bottom
-INNER = ["results", "motion", "links", "base", "algebra"]
+LINES = ["faces", "proof", "facade", "edges", "results", "motion", "links", "base", "words", "algebra"]  # top to bottom
+INNER = ["results", "motion", "links", "base", "words", "algebra"]
 OWNERS = {  # outside crate: crates or lines that may name it
     "rerun": ["flexarm-log"], "re_chunk": ["flexarm-log"], "re_log_encoding": ["flexarm-log"], "re_log_types": ["flexarm-log"],
     "re_sdk_types": ["flexarm-log"], "re_tuid": ["flexarm-log"], "mcap": ["flexarm-log"], "parquet": ["flexarm-log"], "zstd": ["flexarm-log"],
@@ -32,7 +35,38 @@ OWNERS = {  # outside crate: crates or lines that may name it
     "clap": ["faces"], "clap_complete": ["faces"], "clap_mangen": ["faces"], "indicatif": ["faces"],
 }
 PRINTS = re.compile(r"\b(?:e?print(?:ln)?|dbg)!\s*[(\[{]|\bstd::io::(?:stdout|stderr)\b")
-OUTSIDE_WORLD = re.compile(r"\b(?:Instant|SystemTime)::now\b|\bstd::env::|\benv::(?:var|args|current)")
+CLOCK = re.compile(r"\b(?:Instant|SystemTime)::now\b")
+ENVIRONMENT = re.compile(r"\bstd::env\b|\benv::(?:var|args|current)")
+EXIT = re.compile(r"\bprocess::(?:exit|abort|ExitCode)\b|\bExitCode\b|\bexit_code\b")
+FLAG = re.compile(r"(?<![\w-])--[a-z][a-z-]*|(?<![\w/-])-o(?![\w-])")
+FACE_WORDS = re.compile(r"\b(?:command line|exit code|terminal|stdout|stderr)\b")
+ALLOWED = {  # file: what it may have (a pattern of the hit), and why
+    "crates/flexarm-fem/src/mesh/read.rs": (r"-o", "tells how to call another program, Gmsh"),
+    "crates/flexarm-urdf/src/resolve.rs": (r"std::env", "search_paths_from_environment, which the caller may use or not"),
+    "crates/flexarm-urdf/src/xacro/substitution.rs": (r"std::env|env::var|env::current", "xacro's own $(env NAME), $(optenv NAME) and $(cwd)"),
+    "crates/flexarm/src/report/html.rs": (r"--c", "a custom property of a style sheet"),
+    "crates/flexarm-verify/src/files.rs": (r"--force|--check|-o", "the page tells how it is written, and is compared letter by letter"),
+    "crates/flexarm-verify/src/one_beam/mod.rs": (r"--[a-z-]+|-o", "the page tells how a figure is had by hand"),
+    "crates/flexarm-verify/src/three_beams.rs": (r"--[a-z-]+|-o", "the page tells how a figure is had by hand"),
+    "crates/flexarm-verify/src/lower_arm.rs": (r"--[a-z-]+|-o", "the page tells how a figure is had by hand"),
+    "crates/flexarm-verify/src/manipulator.rs": (r"--[a-z-]+|-o", "the page tells how a figure is had by hand"),
+}
+FILES = (r"\bstd::(?:fs|path)\b|\bPathBuf\b|\bFile::open\b", "files")
+MUST_NOT_KNOW = {  # crate: what its code must not have, and what it is; imports of other crates are the manifest's matter
+    "flexarm-settings": [FILES, (r"\bflexarm_(?!settings\b)\w+", "other crates of the workspace")],
+    "flexarm-kinematics": [FILES, (r"\b[Ss]tiffness\b", "stiffness")],
+    "flexarm-fem": [(r"\b(?:Joint|Robot|Mechanism)\b", "joints and robots")],
+    "flexarm-trajectory": [(r"\b(?:Robot|Mechanism|inverse_kinematics)\b", "robots and inverse kinematics")],
+    "flexarm-flexlink": [FILES],
+    "flexarm-stepping": [FILES, (r"\b(?:TcpMetrics|substitute)\b", "metrics and substitution")],
+    "flexarm-analysis": [FILES, (r"\bflexarm_(?!analysis\b|kinematics\b)\w+", "other crates than the one of poses")],
+    "flexarm-urdf": [(r"\b(?:inverse_dynamics|mass_matrix|forward_dynamics)\b", "dynamics")],
+    "flexarm-log": [(r"\bflexarm_stepping\b|\bStepper\b", "how a simulation runs")],
+    "flexarm": [(r"\bclap\b|\bindicatif\b", "arguments and terminals")],
+    "flexarm-verify": [(r"\bclap\b|\bindicatif\b", "arguments and terminals")],
+    "flexarm-cli": [(r"\bflexarm_(?!verify\b)\w+", "other crates than the facade and the case studies")],
+    "flexarm-testkit": [], "flexarm-tests": [],      # truths and privacy show in no word
+}
 CRATE_NAME = re.compile(r"(?<![\w/-])flexarm(?:-[a-z0-9]+)+(?![\w-])")
 
 
@@ -70,6 +104,8 @@ def check_page(page, packages):
         problems.append(f"{PAGE}: crate {crate} is missing from the table of lines: put it on one")
     for crate in sorted(existing - set(described)):
         problems.append(f"{PAGE}: crate {crate} is missing from the table of crates: say what it is and must not know")
+    for crate in sorted(existing - set(MUST_NOT_KNOW)):
+        problems.append(f"tools/check_dependencies.py: what {crate} must not know is not checked: add it to MUST_NOT_KNOW")
     for crate in sorted((set(CRATE_NAME.findall(page)) | set(line_of) | set(described)) - existing):
         problems.append(f"{PAGE}: mentions {crate}, which is not a crate of the workspace")
     return problems, line_of
@@ -109,15 +145,82 @@ def code_of(text):
     return re.sub(r"//[^\n]*", "", text)
 
 
+def scan(text):
+    """Pieces of Rust source: (kind, start, end) with kind "code", "comment" or "literal" (between its quotes)."""
+    at, done, end = 0, 0, len(text)
+    while at < end:
+        char, stop, inner = text[at], None, None
+        if text.startswith("//", at):
+            stop = text.find("\n", at)
+        elif text.startswith("/*", at):
+            stop = text.find("*/", at) + 2
+        elif char == '"' or (char in "br" and not (at and (text[at - 1].isalnum() or text[at - 1] == "_"))):
+            opened = re.compile(r'b?(?:r(#*))?"').match(text, at)
+            if opened:
+                raw = opened.group(1)
+                closed = re.compile(r'"' if raw is None else '"' + raw)
+                quote = opened.end()
+                while raw is None and text[quote:quote + 1] not in ('"', ""):
+                    quote += 2 if text[quote] == "\\" else 1
+                found = closed.search(text, quote)
+                inner, stop = (opened.end(), found.start() if found else end), found.end() if found else end
+        elif char == "'":
+            quoted = re.compile(r"'(?:\\[^']+|[^\\'])'").match(text, at)
+            if quoted:
+                at = quoted.end()
+                continue
+        if stop is None:
+            at += 1
+            continue
+        stop = end if stop <= at else stop
+        if done < at:
+            yield "code", done, at
+        yield ("comment", at, stop) if inner is None else ("literal", *inner)
+        at = done = stop
+    if done < end:
+        yield "code", done, end
+
+
+def literals(text):
+    """Line and text of each string literal."""
+    return [(text.count("\n", 0, start) + 1, text[start:end]) for kind, start, end in scan(text) if kind == "literal"]
+
+
+def without_literals(text):
+    """The code alone; line breaks stay."""
+    kept = list(re.sub(r"[^\n]", " ", text))
+    for kind, start, end in scan(text):
+        if kind == "code":
+            kept[start:end] = text[start:end]
+    return "".join(kept)
+
+
 def check_source(crate, line, path, text):
     problems = []
-    if str(path).endswith("/tests.rs"):  # a module of unit tests
+    if re.search(r"/(?:tests|test_\w+)\.rs$", str(path)):  # a module of unit tests
         return problems
+    pattern, _ = ALLOWED.get(str(path), (r"(?!)", ""))
+    may = lambda hit: re.fullmatch(pattern, hit.group())
+    is_library = line not in ("faces", "tests")
+    before_tests = text.split("\n#[cfg(test)]\nmod ", 1)[0]
+    for number, literal in literals(before_tests) if is_library else []:
+        for hit in [h for h in FLAG.finditer(literal) if not may(h)][:1]:
+            problems.append(f"{path}:{number}: {crate} names the flag {hit.group()}: name a Setting, each face has its own words for it")
+        for hit in [h for h in FACE_WORDS.finditer(literal) if not may(h)][:1]:
+            problems.append(f"{path}:{number}: {crate} speaks of the {hit.group()}, which only a face has")
+    for number, code in enumerate(without_literals(before_tests).splitlines(), 1):
+        if is_library and EXIT.search(code):
+            problems.append(f"{path}:{number}: {crate} ends the process or knows its exit code: return an error, the face ends")
+        for word, what in MUST_NOT_KNOW.get(crate, []):
+            if re.search(word, code):
+                problems.append(f"{path}:{number}: {crate} knows {what}, which {PAGE} says it must not")
     for number, code in enumerate(code_of(text).splitlines(), 1):
         if line not in ("faces", "tests") and PRINTS.search(code):
             problems.append(f"{path}:{number}: {crate} prints; only the faces do: return what is to be said")
-        if line in INNER and OUTSIDE_WORLD.search(code):
-            problems.append(f"{path}:{number}: {crate} ({line}) reads a clock or the environment: pass the value in")
+        if line in INNER and CLOCK.search(code):
+            problems.append(f"{path}:{number}: {crate} ({line}) reads a clock: pass the value in")
+        if is_library and any(not may(hit) for hit in ENVIRONMENT.finditer(code)):
+            problems.append(f"{path}:{number}: {crate} ({line}) reads the environment: pass the value in")
     return problems
 
 
@@ -185,6 +288,7 @@ def self_test():
         ("clap in the facade", found({"flexarm": ["clap"]}), "only faces may name it"),
         ("urdf-rs below", found({"flexarm-kinematics": ["urdf-rs"]}), "only flexarm-urdf may name it"),
         ("a crate the page forgot", found({"flexarm-new": []}), "flexarm-new is missing from the table of lines"),
+        ("a crate nobody watches", found({"flexarm-new": []}), "what flexarm-new must not know is not checked"),
         ("a crate that is gone", found(lines={**lines, "results": ["flexarm-analysis"]}), "mentions flexarm-analysis, which is not"),
         ("a crate that is gone, in the text", found(extra="see flexarm-gone/src/lib.rs"), "mentions flexarm-gone, which is not"),
         ("two lines", found(lines={**lines, "links": ["flexarm-fem"]}), "flexarm-fem stands on two lines, links and base"),
@@ -197,6 +301,29 @@ def self_test():
         ("a clock inside", source("motion", "let t = Instant::now();"), "clock"),
         ("the environment inside", source("base", 'std::env::var("X")'), "environment"),
         ("a clock in the facade", source("facade", "let t = Instant::now();"), None),
+        ("the environment in the facade", source("facade", "let x = std::env::var(y);"), "reads the environment"),
+        ("the environment in a face", source("faces", "let x = std::env::args();"), None),
+        ("the environment where it is allowed", check_source("flexarm-urdf", "edges", "crates/flexarm-urdf/src/resolve.rs", ".filter_map(std::env::var_os)"), None),
+        ("a flag in a text", source("facade", 'f("ok");\ng("use --step, or so");'), "c.rs:2: c names the flag --step"),
+        ("a flag in a text of many lines", source("base", 'f("a \\\n  b (--step)");'), "names the flag --step"),
+        ("a flag in a raw text", source("base", 'f(r#"say "--step""#);'), "names the flag --step"),
+        ("a flag at the start", source("proof", 'f("--from");'), "names the flag --from"),
+        ("a short flag", source("edges", 'f("choose another with -o");'), "names the flag -o"),
+        ("a flag in a face", source("faces", 'f("use --step");'), None),
+        ("a flag in a comment, a dash, an axis, a difference", source("facade", '// use --step\nf("a -- b, well-known, not along -z");\nlet x = a --b;'), None),
+        ("a flag of another program", check_source("flexarm-fem", "base", "crates/flexarm-fem/src/mesh/read.rs", 'f("gmsh -o OUT");'), None),
+        ("its own flag there", check_source("flexarm-fem", "base", "crates/flexarm-fem/src/mesh/read.rs", 'f("gmsh --force");'), "names the flag --force"),
+        ("a flag after a quoted quote and a lifetime", source("facade", "fn f<'a>(x: &'a str) -> char { '\"' }\ng(\"--step\");"), "c.rs:2: c names the flag --step"),
+        ("a flag in a test", source("facade", 'fn f() {}\n#[cfg(test)]\nmod tests { fn g() { h("--step"); } }'), None),
+        ("a word of a terminal", source("facade", 'f("the command line says");'), "speaks of the command line"),
+        ("the end of the process", source("facade", "std::process::exit(2);"), "ends the process"),
+        ("an exit code", source("proof", "pub fn exit_code(&self) -> u8 {"), "exit code"),
+        ("a face ends", source("faces", "std::process::exit(2);"), None),
+        ("files in the motion", check_source("flexarm-stepping", "motion", "c.rs", "use std::path::PathBuf;"), "flexarm-stepping knows files"),
+        ("stiffness in a text of the kinematics", check_source("flexarm-kinematics", "base", "c.rs", 'f("stiffness"); // stiffness'), None),
+        ("stiffness in the kinematics", check_source("flexarm-kinematics", "base", "c.rs", "let stiffness = 1.0;"), "knows stiffness"),
+        ("a face below the facade", check_source("flexarm-cli", "faces", "c.rs", "use flexarm_log::Sample;"), "other crates than the facade"),
+        ("a face and the facade", check_source("flexarm-cli", "faces", "c.rs", "use flexarm::Error;\nuse flexarm_verify::verify;"), None),
         ("no lints", check_manifest("c", "c/Cargo.toml", "[package]\n"), "lints"),
         ("lints", check_manifest("c", "c/Cargo.toml", "[lints]\nworkspace = true\n"), None),
     ]

@@ -4,9 +4,10 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use flexarm::{ConvertOptions, ConvertSummary, Error, RecordingFormat, parse_recording_format};
+use flexarm::{ConvertOptions, ConvertSummary, RecordingFormat, parse_recording_format};
 
 use crate::args::Cli;
+use crate::failure::Failure;
 use crate::formats;
 
 const EXAMPLES: &str = "\
@@ -37,7 +38,7 @@ pub(crate) struct ConvertArgs {
     pub(crate) force: bool,
 }
 
-pub(crate) fn run(cli: &Cli, args: &ConvertArgs) -> Result<ExitCode, Error> {
+pub(crate) fn run(cli: &Cli, args: &ConvertArgs) -> Result<ExitCode, Failure> {
     let options = ConvertOptions { from: args.from, to: args.to, overwrite: args.force };
     let mut stop = crate::signals::stop_when_asked();
     let summary = flexarm::convert_until(&args.input, &args.output, &options, &mut |_| stop())?;

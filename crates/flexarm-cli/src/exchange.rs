@@ -2,16 +2,16 @@
 
 use std::process::ExitCode;
 
-use flexarm::Error;
 use flexarm::export::{ExportFormat, ExportJob};
 use flexarm::import::{ImportFormat, ImportJob, ImportOutputs, Names, PartMasses, RigidPart, parse_inertia, triple};
 
 use crate::args::Cli;
 use crate::exchange_args::{ExportArgs, ExportFormatName, ImportArgs, ImportFormatName};
+use crate::failure::Failure;
 use crate::shipped::OutputFolder;
 use crate::{answer, print, to_json};
 
-pub(crate) fn import(cli: &Cli, args: &ImportArgs) -> Result<ExitCode, Error> {
+pub(crate) fn import(cli: &Cli, args: &ImportArgs) -> Result<ExitCode, Failure> {
     let job = import_job(args)?;
     let in_folder = args.output.is_some() || args.flex.is_none();
     let folder = OutputFolder::of(args.output.as_deref(), &job.link_name(), in_folder && !args.no_files)?;
@@ -23,7 +23,7 @@ pub(crate) fn import(cli: &Cli, args: &ImportArgs) -> Result<ExitCode, Error> {
     Ok(ExitCode::SUCCESS)
 }
 
-pub(crate) fn export(cli: &Cli, args: &ExportArgs) -> Result<ExitCode, Error> {
+pub(crate) fn export(cli: &Cli, args: &ExportArgs) -> Result<ExitCode, Failure> {
     let stem = args.link.file_stem().unwrap_or_default().to_string_lossy();
     let folder = OutputFolder::of(args.output.as_deref(), &stem, true)?;
     let job = ExportJob {
@@ -55,8 +55,8 @@ fn warn(cli: &Cli, warnings: &[String]) {
     }
 }
 
-fn import_job(args: &ImportArgs) -> Result<ImportJob, Error> {
-    let usage = |flag: &'static str| move |what: String| Error::Usage(format!("{flag}: {what}"));
+fn import_job(args: &ImportArgs) -> Result<ImportJob, Failure> {
+    let usage = |flag: &'static str| move |what: String| Failure::Usage(format!("{flag}: {what}"));
     let masses = match (&args.part_a, &args.part_b, args.mass, &args.com, &args.inertia) {
         (Some(a), Some(b), ..) => PartMasses::Given([a.clone(), b.clone()]),
         (_, _, Some(mass), Some(com), Some(inertia)) => PartMasses::Whole(RigidPart {

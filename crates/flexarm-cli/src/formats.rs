@@ -3,9 +3,10 @@
 use std::path::PathBuf;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use flexarm::{Error, Outputs, RecordingFormat};
+use flexarm::{Outputs, RecordingFormat};
 
 use crate::args::RunArgs;
+use crate::failure::Failure;
 
 /// `a, b or c`
 fn listed(words: &[String]) -> String {
@@ -66,14 +67,14 @@ pub(crate) fn also() -> impl TypedValueParser<Value = RecordingFormat> {
 /// Where a run's files go, and which are asked for.
 ///
 /// # Errors
-/// [`Error::Usage`] for a format that this program was built without.
-pub(crate) fn outputs(args: &RunArgs, folder: PathBuf) -> Result<Outputs, Error> {
+/// [`Failure::Usage`] for a format that this program was built without.
+pub(crate) fn outputs(args: &RunArgs, folder: PathBuf) -> Result<Outputs, Failure> {
     let mut outputs = Outputs { overwrite: args.force, figures: args.figures, ..Outputs::everything(folder) };
     let parquet = args.parquet.then(|| (RecordingFormat::Parquet, "--parquet".to_owned()));
     let also = args.also.iter().map(|&format| (format, format!("--also {}", format.extension())));
     for (format, flag) in parquet.into_iter().chain(also) {
         if !format.is_built_in() {
-            return Err(Error::Usage(format!("this program was built without {format}: leave {flag} out")));
+            return Err(Failure::Usage(format!("this program was built without {format}: leave {flag} out")));
         }
         outputs = outputs.with(format);
     }

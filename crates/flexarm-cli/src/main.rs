@@ -5,6 +5,8 @@ mod args;
 mod convert;
 mod exchange;
 mod exchange_args;
+mod failure;
+mod flags;
 mod formats;
 mod posed;
 mod posed_args;
@@ -28,46 +30,24 @@ use args::{
     CheckArgs, Cli, Command, FormName, InspectArgs, MethodName, PresetName, RobotArgs, RunArgs, StartName, StepperName,
 };
 use clap::{CommandFactory, Parser};
+use failure::Failure;
 use flexarm::{
-    AlphaSettings, ConstraintForm, Error, InertiaEstimate, LoadOptions, ReadOptions, ReferenceMethod,
-    ReferenceSettings, Robot, RunOptions, Scenario, SpookPreset, SpookSettings, Start, StepperKind, Variant,
+    AlphaSettings, ConstraintForm, InertiaEstimate, LoadOptions, ReadOptions, ReferenceMethod, ReferenceSettings,
+    Robot, RunOptions, Scenario, SpookPreset, SpookSettings, Start, StepperKind, Variant,
 };
 use indicatif::{ProgressBar, ProgressStyle};
 use shipped::OutputFolder;
 
 fn main() -> ExitCode {
     signals::turn_into_errors();
+    flexarm::name_settings(flags::NAMES);
     let cli = Cli::parse();
     match run(&cli) {
         Ok(code) => code,
-        Err(error) => {
-            eprintln!("error: {error}");
-            let mut source = std::error::Error::source(&error);
-            while let Some(cause) = source {
-                // Messages that already contain their cause do not say it twice.
-                if !error.to_string().contains(&cause.to_string()) {
-                    eprintln!("  because: {cause}");
-                }
-                source = cause.source();
-            }
-            if let Some(page) = page_of(&error) {
-                eprintln!("  help: `flexarm format {page}` prints the keys with their units, and examples");
-            }
-            ExitCode::from(error.exit_code())
+        Err(failure) => {
+            failure.print();
+            failure.exit_code()
         }
-    }
-}
-
-/// The page of the format of a file that is not as it should be.
-fn page_of(error: &Error) -> Option<&'static str> {
-    match error {
-        Error::InStudy { source, .. } => page_of(source),
-        Error::Trajectory(flexarm::TrajectoryError::File(_)) => Some("motion"),
-        Error::RobotFile(fault) if fault.message.contains("unknown field") => {
-            let loads = fault.message.contains("`payload`, ") || fault.message.contains("spindle_rpm");
-            Some(if loads && !fault.message.contains("`urdf`") { "loads" } else { "robot" })
-        }
-        _ => None,
     }
 }
 
@@ -90,7 +70,7 @@ fn to_json(value: &impl serde::Serialize) -> String {
     serde_json::to_string(value).expect("plain numbers and strings")
 }
 
-fn run(cli: &Cli) -> Result<ExitCode, Error> {
+fn run(cli: &Cli) -> Result<ExitCode, Failure> {
     match &cli.command {
         Command::Compare(args) => simulate(cli, args, true),
         Command::Run(args) => simulate(cli, args, false),
@@ -122,12 +102,12 @@ fn run(cli: &Cli) -> Result<ExitCode, Error> {
     }
 }
 
-fn load_options(args: &RobotArgs) -> Result<LoadOptions, Error> {
+fn load_options(args: &RobotArgs) -> Result<LoadOptions, Failure> {
     let mut urdf = ReadOptions { search_paths: flexarm::search_paths_from_environment(), ..ReadOptions::default() };
     for package in &args.packages {
         let (name, folder) = package
             .split_once('=')
-            .ok_or_else(|| Error::Usage(format!("--package {package:?}: expected NAME=FOLDER")))?;
+            .ok_or_else(|| Failure::Usage(format!("--package {package:?}: expected NAME=FOLDER")))?;
         urdf.packages.push((name.to_owned(), folder.into()));
     }
     for argument in &args.arguments {
@@ -136,11 +116,15 @@ fn load_options(args: &RobotArgs) -> Result<LoadOptions, Error> {
             .split_once(":=")
             .or_else(|| argument.split_once('='))
             .filter(|(name, _)| !name.trim().is_empty())
-            .ok_or_else(|| Error::Usage(format!("--arg {argument:?}: expected NAME=VALUE")))?;
+            .ok_or_else(|| Failure::Usage(format!("--arg {argument:?}: expected NAME=VALUE")))?;
         urdf.arguments.push((name.trim().to_owned(), value.to_owned()));
     }
     let positive = |x: f64, what: &str| {
-        if x.is_finite() && x > 0.0 { Ok(x) } else { Err(Error::Usage(format!("{what} must be positive, found {x}"))) }
+        if x.is_finite() && x > 0.0 {
+            Ok(x)
+        } else {
+            Err(Failure::Usage(format!("{what} must be positive, found {x}")))
+        }
     };
     if let Some(density) = args.inertia_from_density {
         urdf.inertia_from_mesh = Some(InertiaEstimate::Density(positive(density, "--inertia-from-density")?));
@@ -187,19 +171,20 @@ fn run_options(args: &RunArgs, with_twin: bool) -> RunOptions {
 }
 
 /// Robot, motion and choices of a run.
-fn variant(label: String, args: &RunArgs, with_twin: bool) -> Result<Variant, Error> {
+fn variant(label: String, args: &RunArgs, with_twin: bool) -> Result<Variant, Failure> {
     let robot = Robot::load_with(&shipped::robot(args.robot.as_deref())?, &load_options(&args.load)?)?;
     let trajectory = match (&args.trajectory, &robot.default_trajectory) {
         (Some(given), _) => shipped::trajectory(given),
         (None, Some(own)) => own.clone(),
         (None, None) => {
             let text = "the robot has no default_trajectory: give a .csv or .toml trajectory after the robot";
-            return Err(Error::Usage(text.into()));
+            return Err(Failure::Usage(text.into()));
         }
     };
     let motion = flexarm::Motion::load(&trajectory, &robot).map_err(|error| match error {
-        Error::File { path, what } if args.trajectory.is_none() => {
-            Error::File { path, what: format!("{what} (it is the default_trajectory of {})", robot.path.display()) }
+        flexarm::Error::File { path, what } if args.trajectory.is_none() => {
+            let what = format!("{what} (it is the default_trajectory of {})", robot.path.display());
+            flexarm::Error::File { path, what }
         }
         other => other,
     })?;
@@ -213,21 +198,21 @@ fn variant(label: String, args: &RunArgs, with_twin: bool) -> Result<Variant, Er
     Ok(Variant { label, robot, scenario, options: run_options(args, with_twin) })
 }
 
-fn simulate(cli: &Cli, args: &RunArgs, with_twin: bool) -> Result<ExitCode, Error> {
+fn simulate(cli: &Cli, args: &RunArgs, with_twin: bool) -> Result<ExitCode, Failure> {
     let line: Vec<std::ffi::OsString> = std::env::args_os().collect();
     if !with_twin && !args.with.is_empty() {
-        return Err(Error::Usage("--with belongs to compare: run has one run only".into()));
+        return Err(Failure::Usage("--with belongs to compare: run has one run only".into()));
     }
     let parts = study::parts(args, &line)?;
     let variants = parts.iter().map(|part| {
         variant(part.label.clone(), &part.args, with_twin).map_err(|error| match parts.len() {
             1 => error,
-            _ => Error::InStudy { label: part.label.clone(), source: Box::new(error) },
+            _ => Failure::InStudy { label: part.label.clone(), source: Box::new(error) },
         })
     });
-    let variants = variants.collect::<Result<Vec<Variant>, Error>>()?;
+    let variants = variants.collect::<Result<Vec<Variant>, Failure>>()?;
     let Some(Variant { robot, scenario, options, .. }) = variants.first() else {
-        return Err(Error::Usage("there is nothing to run".into()));
+        return Err(Failure::Usage("there is nothing to run".into()));
     };
     let stem = format!("{}-{}", robot.name, scenario.motion.name);
     let folder = OutputFolder::of(args.output.as_deref(), &stem, !args.no_files)?;
@@ -259,7 +244,7 @@ fn simulate(cli: &Cli, args: &RunArgs, with_twin: bool) -> Result<ExitCode, Erro
     Ok(ExitCode::SUCCESS)
 }
 
-fn inspect(cli: &Cli, args: &InspectArgs) -> Result<ExitCode, Error> {
+fn inspect(cli: &Cli, args: &InspectArgs) -> Result<ExitCode, Failure> {
     let robot = Robot::load_with(&shipped::robot(Some(&args.robot))?, &load_options(&args.load)?)?;
     let values = |text: &Option<String>| values::joint_values(text.as_deref(), &robot);
     let inspection = flexarm::inspect(&robot, values(&args.at)?.as_deref(), values(&args.velocity)?.as_deref())?;
@@ -267,7 +252,7 @@ fn inspect(cli: &Cli, args: &InspectArgs) -> Result<ExitCode, Error> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn check(cli: &Cli, args: &CheckArgs) -> Result<ExitCode, Error> {
+fn check(cli: &Cli, args: &CheckArgs) -> Result<ExitCode, Failure> {
     let trajectory = args.trajectory.as_deref().map(shipped::trajectory);
     let robot = shipped::robot(Some(&args.robot))?;
     let findings =

@@ -4,11 +4,12 @@ use std::process::ExitCode;
 
 use comfy_table::CellAlignment;
 use flexarm::{
-    Error, ModeMovie, ModeTable, Outputs, Quantity, Response, ResponseOutputs, ResponseRequest, Robot, Spacing,
-    Statics, StaticsOutputs,
+    ModeMovie, ModeTable, Outputs, Quantity, Response, ResponseOutputs, ResponseRequest, Robot, Spacing, Statics,
+    StaticsOutputs,
 };
 
 use crate::args::Cli;
+use crate::failure::Failure;
 use crate::posed_args::{ModesArgs, PoseArgs, QuantityName, ResponseArgs, SpacingName, StaticsArgs};
 use crate::print::{lines, table, warning};
 use crate::shipped::OutputFolder;
@@ -19,8 +20,8 @@ const AXES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
 /// Columns that a terminal has room for: peaks of a response.
 const SHOWN_PEAKS: usize = 3;
 
-fn load(pose: &PoseArgs) -> Result<Robot, Error> {
-    Robot::load_with(&shipped::robot(Some(&pose.robot))?, &load_options(&pose.load)?)
+fn load(pose: &PoseArgs) -> Result<Robot, Failure> {
+    Ok(Robot::load_with(&shipped::robot(Some(&pose.robot))?, &load_options(&pose.load)?)?)
 }
 
 fn warn(cli: &Cli, warnings: &[String]) {
@@ -29,7 +30,7 @@ fn warn(cli: &Cli, warnings: &[String]) {
     }
 }
 
-pub(crate) fn statics(cli: &Cli, args: &StaticsArgs) -> Result<ExitCode, Error> {
+pub(crate) fn statics(cli: &Cli, args: &StaticsArgs) -> Result<ExitCode, Failure> {
     let wrench = args.wrench.as_deref().map_or(Ok([0.0; 6]), values::wrench)?;
     let (robot, modelling) = (load(&args.pose)?, args.pose.modelling.modelling());
     let at = values::joint_values(args.pose.at.as_deref(), &robot)?;
@@ -46,9 +47,9 @@ pub(crate) fn statics(cli: &Cli, args: &StaticsArgs) -> Result<ExitCode, Error> 
     Ok(ExitCode::SUCCESS)
 }
 
-pub(crate) fn modes(cli: &Cli, args: &ModesArgs) -> Result<ExitCode, Error> {
+pub(crate) fn modes(cli: &Cli, args: &ModesArgs) -> Result<ExitCode, Failure> {
     if args.count == 0 {
-        return Err(Error::Usage("--count must be at least 1".into()));
+        return Err(Failure::Usage("--count must be at least 1".into()));
     }
     let robot = load(&args.pose)?;
     let at = values::joint_values(args.pose.at.as_deref(), &robot)?;
@@ -67,7 +68,7 @@ pub(crate) fn modes(cli: &Cli, args: &ModesArgs) -> Result<ExitCode, Error> {
     Ok(ExitCode::SUCCESS)
 }
 
-pub(crate) fn response(cli: &Cli, args: &ResponseArgs) -> Result<ExitCode, Error> {
+pub(crate) fn response(cli: &Cli, args: &ResponseArgs) -> Result<ExitCode, Failure> {
     let robot = load(&args.pose)?;
     let trimmed = |words: &[String]| words.iter().map(|w| w.trim().to_owned()).collect();
     let request = ResponseRequest {

@@ -6,7 +6,6 @@ use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use flexarm::Error;
 use flexarm::reduce::{
     At, InterfaceEntry, OrderingChoice, QuadratureChoice, ReduceJob, ReduceOptions, ReduceOutputs, ReduceProgress,
     UrdfEntry,
@@ -14,11 +13,12 @@ use flexarm::reduce::{
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::args::Cli;
+use crate::failure::Failure;
 use crate::reduce_args::{Named, OrderingName, PlaceWord, QuadratureName, ReduceArgs};
 use crate::shipped::OutputFolder;
 use crate::{answer, print, to_json};
 
-pub(crate) fn run(cli: &Cli, args: &ReduceArgs) -> Result<ExitCode, Error> {
+pub(crate) fn run(cli: &Cli, args: &ReduceArgs) -> Result<ExitCode, Failure> {
     let mut job = ReduceJob::load(&args.mesh)?;
     job.put_over(flags(args)?);
     if args.list {
@@ -47,7 +47,7 @@ pub(crate) fn run(cli: &Cli, args: &ReduceArgs) -> Result<ExitCode, Error> {
 }
 
 /// What the flags say, as a job without a mesh.
-fn flags(args: &ReduceArgs) -> Result<ReduceJob, Error> {
+fn flags(args: &ReduceArgs) -> Result<ReduceJob, Failure> {
     let urdf = args.urdf.clone().zip(args.link.clone());
     let mut job = ReduceJob {
         link: args.name.clone(),
@@ -88,11 +88,11 @@ fn flags(args: &ReduceArgs) -> Result<ReduceJob, Error> {
     for Named { name, value } in &args.at {
         let Some(name) = name else {
             let text = "--at needs the name of an interface: --at A=x,y,z, --at A=centroid or --at A=joint:NAME";
-            return Err(Error::Usage(text.into()));
+            return Err(Failure::Usage(text.into()));
         };
         let own = entry(&mut job, name);
         if own.xyz.is_some() || own.at.is_some() || own.joint.is_some() {
-            return Err(Error::Usage(format!("--at {name}=... is given twice")));
+            return Err(Failure::Usage(format!("--at {name}=... is given twice")));
         }
         match value {
             PlaceWord::Centroid => own.at = Some(At::Centroid),
@@ -109,10 +109,10 @@ fn flags(args: &ReduceArgs) -> Result<ReduceJob, Error> {
     Ok(job)
 }
 
-fn once<T>(own: &mut Option<T>, value: T, flag: &str) -> Result<(), Error> {
+fn once<T>(own: &mut Option<T>, value: T, flag: &str) -> Result<(), Failure> {
     match own.replace(value) {
         None => Ok(()),
-        Some(_) => Err(Error::Usage(format!("{flag} is given twice"))),
+        Some(_) => Err(Failure::Usage(format!("{flag} is given twice"))),
     }
 }
 

@@ -4,9 +4,10 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
-use flexarm::{Error, ReportFiles, ReportOptions};
+use flexarm::{ReportFiles, ReportOptions};
 
 use crate::args::Cli;
+use crate::failure::Failure;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -31,7 +32,7 @@ pub(crate) struct ReportArgs {
     pub(crate) force: bool,
 }
 
-pub(crate) fn run(cli: &Cli, args: &ReportArgs) -> Result<ExitCode, Error> {
+pub(crate) fn run(cli: &Cli, args: &ReportArgs) -> Result<ExitCode, Failure> {
     let options = ReportOptions { output: args.output.clone(), figures: args.figures, overwrite: args.force };
     let files = flexarm::report(&args.recordings, &options)?;
     if !cli.quiet {

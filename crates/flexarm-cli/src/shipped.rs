@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 
 use flexarm::{Error, closest};
 
+use crate::failure::Failure;
+
 /// Folders that may hold `robots/` and `trajectories/`: here, beside the program, and where it was built.
 fn roots() -> Vec<PathBuf> {
     let mut roots = vec![PathBuf::from(".")];
@@ -33,7 +35,7 @@ pub(crate) fn find(given: &Path, folder: &str, endings: &[&str]) -> PathBuf {
 ///
 /// # Errors
 /// A name that no robot has, with the ones that there are.
-pub(crate) fn robot(given: Option<&Path>) -> Result<PathBuf, Error> {
+pub(crate) fn robot(given: Option<&Path>) -> Result<PathBuf, Failure> {
     let given = given.unwrap_or(Path::new("kr210"));
     let path = find(given, "robots", &["/robot.toml"]);
     if path.exists() || given.components().count() != 1 || given.extension().is_some() {
@@ -52,7 +54,7 @@ pub(crate) fn robot(given: Option<&Path>) -> Result<PathBuf, Error> {
          with one, or a .urdf or .xacro file",
         names.join(", ")
     );
-    Err(Error::File { path, what })
+    Err(Error::File { path, what }.into())
 }
 
 /// A trajectory by path or name.
@@ -79,7 +81,7 @@ impl OutputFolder {
     ///
     /// # Errors
     /// [`Error::Write`] if a new one cannot be made.
-    pub(crate) fn of(asked: Option<&Path>, stem: &str, wanted: bool) -> Result<Self, Error> {
+    pub(crate) fn of(asked: Option<&Path>, stem: &str, wanted: bool) -> Result<Self, Failure> {
         match asked {
             _ if !wanted => Ok(Self::None),
             Some(folder) => Ok(Self::Asked(folder.to_owned())),
@@ -99,7 +101,7 @@ impl OutputFolder {
 impl NewFolder {
     /// Takes the first number that is free. To make a folder and to find it free are one step, so runs that start at the
     /// same time get different ones.
-    fn create(stem: &str) -> Result<Self, Error> {
+    fn create(stem: &str) -> Result<Self, Failure> {
         let clean: String =
             stem.chars().map(|c| if c.is_alphanumeric() || c == '-' || c == '_' { c } else { '_' }).collect();
         let out = Path::new("out");
@@ -113,7 +115,7 @@ impl NewFolder {
                 Err(error) if error.kind() == ErrorKind::AlreadyExists => number += 1,
                 // Another run has just removed `out`, which it had made and not used.
                 Err(error) if error.kind() == ErrorKind::NotFound && !out.exists() => {}
-                Err(source) => return Err(Error::Write { path, source }),
+                Err(source) => return Err(Error::Write { path, source }.into()),
             }
         }
     }

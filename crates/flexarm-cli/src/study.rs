@@ -4,9 +4,9 @@ use std::borrow::Cow;
 use std::ffi::OsString;
 
 use clap::{CommandFactory, FromArgMatches};
-use flexarm::Error;
 
 use crate::args::{Cli, Command, RunArgs};
+use crate::failure::Failure;
 
 /// A run of a study: label, and the arguments that it would have on a command line of its own.
 pub(crate) struct Part<'a> {
@@ -22,10 +22,10 @@ const SHARED: [&str; 10] =
     ["with", "output", "force", "no-files", "magnify", "json", "quiet", "figures", "parquet", "also"];
 
 /// The runs of a study, the one that was asked for first. `line` is the command line as given.
-pub(crate) fn parts<'a>(main: &'a RunArgs, line: &[OsString]) -> Result<Vec<Part<'a>>, Error> {
+pub(crate) fn parts<'a>(main: &'a RunArgs, line: &[OsString]) -> Result<Vec<Part<'a>>, Failure> {
     if main.with.len() > MOST_OTHERS {
         let found = main.with.len();
-        return Err(Error::Usage(format!(
+        return Err(Failure::Usage(format!(
             "--with is given {found} times: at most {MOST_OTHERS}, for their curves are drawn over each other; more need runs of their own, \
              with --no-files --json for instance"
         )));
@@ -34,7 +34,7 @@ pub(crate) fn parts<'a>(main: &'a RunArgs, line: &[OsString]) -> Result<Vec<Part
     let mut varied: Vec<String> = Vec::new();
     let mut others = Vec::new();
     for text in &main.with {
-        let usage = |what: String| Error::Usage(format!("--with {text:?}: {what}"));
+        let usage = |what: String| Failure::Usage(format!("--with {text:?}: {what}"));
         let (mut label, mut words) = (None, Vec::new());
         for pair in text.split(',').map(str::trim) {
             let (key, value) = pair.split_once('=').unwrap_or((pair, ""));

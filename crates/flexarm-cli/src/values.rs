@@ -1,14 +1,16 @@
 //! Joint values and wrenches as people type them.
 
+use flexarm::Robot;
 use flexarm::reduce::numbers;
-use flexarm::{Error, Robot};
+
+use crate::failure::Failure;
 
 /// Reads a joint vector: `v1,v2,...` in coordinate order, or `name=value,...` with the rest zero; rad or m, or degrees
 /// with the ending `deg`.
 ///
 /// # Errors
-/// [`Error::Usage`] saying which joints there are.
-fn parse_joint_values(text: &str, joints: &[&str]) -> Result<Vec<f64>, Error> {
+/// [`Failure::Usage`] saying which joints there are.
+fn parse_joint_values(text: &str, joints: &[&str]) -> Result<Vec<f64>, Failure> {
     let mut values = vec![0.0; joints.len()];
     let items: Vec<&str> = text.split(',').map(str::trim).filter(|s| !s.is_empty()).collect();
     let number = |s: &str| {
@@ -18,7 +20,7 @@ fn parse_joint_values(text: &str, joints: &[&str]) -> Result<Vec<f64>, Error> {
         };
         let value: Option<f64> = digits.parse().ok().filter(|x: &f64| x.is_finite());
         value.map(|x| x * unit).ok_or_else(|| {
-            Error::Usage(format!("joint value {s:?} is not a finite number (rad or m, or degrees as in 30deg)"))
+            Failure::Usage(format!("joint value {s:?} is not a finite number (rad or m, or degrees as in 30deg)"))
         })
     };
     if items.iter().any(|i| i.contains('=')) {
@@ -26,18 +28,18 @@ fn parse_joint_values(text: &str, joints: &[&str]) -> Result<Vec<f64>, Error> {
         for item in items {
             let (name, value) = item
                 .split_once('=')
-                .ok_or_else(|| Error::Usage(format!("{item:?}: either all joint values have names or none")))?;
+                .ok_or_else(|| Failure::Usage(format!("{item:?}: either all joint values have names or none")))?;
             let k = joints.iter().position(|j| *j == name.trim()).ok_or_else(|| {
-                Error::Usage(format!("there is no movable joint {:?}; the joints are {joints:?}", name.trim()))
+                Failure::Usage(format!("there is no movable joint {:?}; the joints are {joints:?}", name.trim()))
             })?;
             if std::mem::replace(&mut given[k], true) {
-                return Err(Error::Usage(format!("joint {:?} is given twice", joints[k])));
+                return Err(Failure::Usage(format!("joint {:?} is given twice", joints[k])));
             }
             values[k] = number(value)?;
         }
     } else {
         if items.len() != joints.len() {
-            return Err(Error::Usage(format!(
+            return Err(Failure::Usage(format!(
                 "{} joint values given, the robot has {} movable joints: {joints:?}",
                 items.len(),
                 joints.len()
@@ -54,7 +56,7 @@ fn parse_joint_values(text: &str, joints: &[&str]) -> Result<Vec<f64>, Error> {
 ///
 /// # Errors
 /// As [`parse_joint_values`], and [`Error::Model`].
-pub(crate) fn joint_values(text: Option<&str>, robot: &Robot) -> Result<Option<Vec<f64>>, Error> {
+pub(crate) fn joint_values(text: Option<&str>, robot: &Robot) -> Result<Option<Vec<f64>>, Failure> {
     let Some(text) = text else { return Ok(None) };
     let model = robot.rigid_model()?;
     let joints: Vec<&str> = model.coordinates().iter().map(|c| c.joint.as_str()).collect();
@@ -64,13 +66,13 @@ pub(crate) fn joint_values(text: Option<&str>, robot: &Robot) -> Result<Option<V
 /// Reads a wrench: `fx,fy,fz` or `fx,fy,fz,tx,ty,tz` (N, N m).
 ///
 /// # Errors
-/// [`Error::Usage`].
-pub(crate) fn wrench(text: &str) -> Result<[f64; 6], Error> {
-    let values = numbers(text).map_err(|what| Error::Usage(format!("--wrench: {what} (N, N m)")))?;
+/// [`Failure::Usage`].
+pub(crate) fn wrench(text: &str) -> Result<[f64; 6], Failure> {
+    let values = numbers(text).map_err(|what| Failure::Usage(format!("--wrench: {what} (N, N m)")))?;
     match values.as_slice() {
         [fx, fy, fz] => Ok([*fx, *fy, *fz, 0.0, 0.0, 0.0]),
         [fx, fy, fz, tx, ty, tz] => Ok([*fx, *fy, *fz, *tx, *ty, *tz]),
-        other => Err(Error::Usage(format!(
+        other => Err(Failure::Usage(format!(
             "--wrench has {} numbers; expected fx,fy,fz or fx,fy,fz,tx,ty,tz in world axes",
             other.len()
         ))),

@@ -10,6 +10,7 @@ use flexarm_verify::bench::Bench;
 use flexarm_verify::{Verification, VerificationFiles, case_names, differences_from, verify};
 use serde_json::json;
 
+use crate::failure::Failure;
 use crate::shipped::OutputFolder;
 use crate::{Bar, Cli, answer, shipped, signals};
 
@@ -40,7 +41,7 @@ pub(crate) struct VerifyArgs {
 /// Differences that are shown.
 const SHOWN: usize = 20;
 
-pub(crate) fn run(cli: &Cli, args: &VerifyArgs) -> Result<ExitCode, Error> {
+pub(crate) fn run(cli: &Cli, args: &VerifyArgs) -> Result<ExitCode, Failure> {
     let stored = args.check.as_ref().map(|path| {
         let what = |e| Error::File { path: path.clone(), what: format!("the stored page cannot be read: {e}") };
         std::fs::read_to_string(path).map_err(what)
@@ -59,7 +60,7 @@ pub(crate) fn run(cli: &Cli, args: &VerifyArgs) -> Result<ExitCode, Error> {
     });
     bar.clear();
     let verification = match result {
-        Err(Error::Interrupted { .. }) => {
+        Err(flexarm_verify::Error::Library(Error::Interrupted { .. })) => {
             eprintln!("error: stopped; nothing was written");
             return Ok(ExitCode::from(1));
         }

@@ -10,6 +10,7 @@ use clap::Args;
 use flexarm::Error;
 
 use crate::args::Cli;
+use crate::failure::Failure;
 use crate::{answer, to_json};
 
 /// Version of the viewer that this program writes `.rrd` files for.
@@ -28,7 +29,7 @@ pub(crate) struct ViewArgs {
     pub(crate) wait: bool,
 }
 
-pub(crate) fn run(cli: &Cli, args: &ViewArgs) -> Result<ExitCode, Error> {
+pub(crate) fn run(cli: &Cli, args: &ViewArgs) -> Result<ExitCode, Failure> {
     let file = recording(&args.file)?;
     match ending(&file).as_str() {
         "html" | "htm" => Ok(browse(cli, &file)),
@@ -53,8 +54,8 @@ pub(crate) fn run(cli: &Cli, args: &ViewArgs) -> Result<ExitCode, Error> {
 }
 
 /// The file to show: the one given, or that of a run's folder.
-fn recording(given: &Path) -> Result<PathBuf, Error> {
-    let fault = |what: &str| Err(Error::File { path: given.to_owned(), what: what.to_owned() });
+fn recording(given: &Path) -> Result<PathBuf, Failure> {
+    let fault = |what: &str| Err(Error::File { path: given.to_owned(), what: what.to_owned() }.into());
     if given.is_dir() {
         let names = ["study.rrd", "run.rrd", "run.mcap", "report.html"];
         let found = names.map(|name| given.join(name)).into_iter().find(|path| path.is_file());

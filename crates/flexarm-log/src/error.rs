@@ -3,12 +3,14 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use flexarm_settings::Setting;
+
 /// A recording could not be started, continued or closed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LogError {
     /// The file is there already and overwriting was not asked for.
-    #[error("{}: the file exists already; choose another output folder or overwrite it with --force", path.display())]
+    #[error("{}: the file exists already; choose another output folder or overwrite it with {}", path.display(), Setting::Overwrite)]
     Exists {
         /// The existing file.
         path: PathBuf,
@@ -100,13 +102,18 @@ pub enum LogError {
 }
 
 /// What to do when a file may not grow any more; nothing for other troubles, which name themselves.
-fn remedy(source: &io::Error) -> &'static str {
+fn remedy(source: &io::Error) -> String {
     use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
     match source.kind() {
-        StorageFull => ": the disk is full; free space or choose another folder with -o",
-        QuotaExceeded => ": the disk quota is used up; free space or choose another folder with -o",
-        FileTooLarge => ": the file may not grow further (ulimit -f); raise the limit or lower --log-rate",
-        _ => "",
+        StorageFull => format!(": the disk is full; free space or choose another folder with {}", Setting::Output),
+        QuotaExceeded => {
+            format!(": the disk quota is used up; free space or choose another folder with {}", Setting::Output)
+        }
+        FileTooLarge => {
+            let what = "the file may not grow further (ulimit -f)";
+            format!(": {what}; raise the limit or lower {}", Setting::LogRate)
+        }
+        _ => String::new(),
     }
 }
 

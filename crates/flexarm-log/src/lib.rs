@@ -38,7 +38,7 @@
 //!
 //! // A second run does not silently replace the first.
 //! let again = CsvRecorder::create(&path, CreateOptions::default()).begin(&header);
-//! assert!(again.unwrap_err().to_string().contains("--force"));
+//! assert!(again.unwrap_err().to_string().contains("overwrite"));
 //! # std::fs::remove_file(&path)?;
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

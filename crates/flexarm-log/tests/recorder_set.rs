@@ -24,7 +24,7 @@ fn an_existing_file_stops_the_run_before_any_file_is_made() {
     let error = pair(&new, &old, CreateOptions::default()).begin(&synthetic::header()).unwrap_err();
     let LogError::Exists { path } = &error else { panic!("{error}") };
     assert_eq!(path, &old);
-    assert!(error.to_string().contains("--force"), "{error}");
+    assert!(error.to_string().ends_with("overwrite it with overwrite"), "{error}");
     assert!(!new.exists());
     assert_eq!(std::fs::read_to_string(&old).unwrap(), "precious");
 

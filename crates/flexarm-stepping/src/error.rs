@@ -1,12 +1,15 @@
 //! Why a simulation stops.
 
+use flexarm_settings::Setting;
+
 /// A step, a start or a set-up that failed; carries what is needed to understand it.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum StepError {
     /// The state left every plausible range.
     #[error(
-        "the simulation diverged at t = {t:.6} s (step {h:e} s): {what}; try a smaller --step; a motion so fast that the links cannot hold it also ends like this"
+        "the simulation diverged at t = {t:.6} s (step {h:e} s): {what}; try a smaller {}; a motion so fast that the links cannot hold it also ends like this",
+        Setting::Step
     )]
     Diverged {
         /// Time (s).
@@ -18,7 +21,8 @@ pub enum StepError {
     },
     /// The iteration of an implicit step did not end.
     #[error(
-        "the step to t = {t:.6} s (step {h:e} s) did not converge in {iterations} iterations; last relative correction {correction:.1e}: try a smaller --step"
+        "the step to t = {t:.6} s (step {h:e} s) did not converge in {iterations} iterations; last relative correction {correction:.1e}: try a smaller {}",
+        Setting::Step
     )]
     NotConverged {
         /// Time (s).
@@ -40,7 +44,8 @@ pub enum StepError {
     },
     /// No static equilibrium was found.
     #[error(
-        "no static equilibrium at t = {t:.6} s: after {iterations} Newton iterations the forces are out of balance by {residual:.1e} (relative); is the structure too soft for its weight? --from-rest undeformed starts without it"
+        "no static equilibrium at t = {t:.6} s: after {iterations} Newton iterations the forces are out of balance by {residual:.1e} (relative); is the structure too soft for its weight? {} undeformed starts without it",
+        Setting::Start
     )]
     NoEquilibrium {
         /// Time (s).
@@ -52,7 +57,9 @@ pub enum StepError {
     },
     /// The solver with error control found no step that keeps the tolerance.
     #[error(
-        "the reference stepper gave up at t = {t:.6} s (step {h:e} s): {what}; try a larger --rtol or another --reference-method"
+        "the reference stepper gave up at t = {t:.6} s (step {h:e} s): {what}; try a larger {} or another {}",
+        Setting::Tolerance,
+        Setting::ReferenceMethod
     )]
     SolverGaveUp {
         /// Time (s).
@@ -64,7 +71,9 @@ pub enum StepError {
     },
     /// An explicit stepper cannot work with this step.
     #[error(
-        "{stepper} with step {h:e} s is unstable here: the highest frequency is {highest_hz:.1} Hz, which needs a step below {largest_s:.2e} s; use --step or --stepper generalized-alpha"
+        "{stepper} with step {h:e} s is unstable here: the highest frequency is {highest_hz:.1} Hz, which needs a step below {largest_s:.2e} s; use {} or {} generalized-alpha",
+        Setting::Step,
+        Setting::Stepper
     )]
     UnstableStep {
         /// Name of the stepper.
@@ -79,4 +88,24 @@ pub enum StepError {
     /// The parts of the arm do not fit together.
     #[error("{0}")]
     Setup(String),
+    /// A stepper in maximal coordinates was given links with modal coordinates.
+    #[error(
+        "spook works in maximal coordinates and does not know links that bend in modes ({} lumped would do): use generalized-alpha",
+        Setting::Links
+    )]
+    ModalLinks,
+}
+
+impl StepError {
+    /// The settings whose change may mend it; empty where it is the model or the motion.
+    pub fn settings(&self) -> &'static [Setting] {
+        match self {
+            Self::Diverged { .. } | Self::NotConverged { .. } => &[Setting::Step],
+            Self::NoEquilibrium { .. } => &[Setting::Start],
+            Self::SolverGaveUp { .. } => &[Setting::Tolerance, Setting::ReferenceMethod],
+            Self::UnstableStep { .. } => &[Setting::Step, Setting::Stepper],
+            Self::ModalLinks => &[Setting::Links, Setting::Stepper],
+            Self::Singular { .. } | Self::Setup(_) => &[],
+        }
+    }
 }

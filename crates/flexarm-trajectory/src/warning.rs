@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use flexarm_settings::Setting;
+
 use crate::trajectory::Curve;
 
 /// Speeds below this, in rad/s or m/s, are not worth a warning.
@@ -87,9 +89,10 @@ impl fmt::Display for Warning {
             Self::VelocityJumps { joint, time_s, jump, count } => write!(
                 f,
                 "the velocity of joint {joint:?} jumps at {count} {times}, most at t = {time_s:.4} s by {jump:.4} rad/s \
-                 (or m/s): no drive can do that, and the arm is struck with just this impulse; round the corners (--round-corners), or \
+                 (or m/s): no drive can do that, and the arm is struck with just this impulse; round the corners ({setting}), or \
                  give samples of a motion without them",
-                times = if *count == 1 { "time" } else { "times" }
+                times = if *count == 1 { "time" } else { "times" },
+                setting = Setting::RoundCorners
             ),
             Self::AccelerationJumps { joint, time_s, jump, count } => write!(
                 f,

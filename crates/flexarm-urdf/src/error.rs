@@ -3,6 +3,8 @@
 use std::fmt;
 use std::path::PathBuf;
 
+use flexarm_settings::Setting;
+
 use crate::finding::{Finding, Place, Severity};
 
 /// Why a file could not be turned into a robot.
@@ -311,22 +313,27 @@ impl Problem {
             Self::MimicCycle { .. } => "let one of them go without <mimic>".into(),
             Self::NegativeMass { .. } => "correct the sign; a counterweight has positive mass too".into(),
             Self::ZeroMass { .. } => {
-                "give the link its mass and inertia: without them it needs no force to move, and nothing bends under it".into()
+                "give the link its mass and inertia: without them it needs no force to move, and nothing bends under it"
+                    .into()
             }
             Self::MissingInertial { no_estimate, .. } => match no_estimate {
-                None => "add <inertial> with mass and inertia, or have it estimated from the meshes \
-                         (--inertia-from-density or --inertia-from-total-mass, or such keys in the robot file): without \
-                         them the link needs no force to move, and nothing bends under it"
-                    .into(),
+                None => format!(
+                    "add <inertial> with mass and inertia, or have it estimated from the meshes ({} or {}, or such keys in \
+                     the robot file): without them the link needs no force to move, and nothing bends under it",
+                    Setting::InertiaFromDensity,
+                    Setting::InertiaFromTotalMass
+                ),
                 Some(why) => format!("add <inertial> with mass and inertia; it could not be estimated: {why}"),
             },
             Self::InertiaNotPositiveDefinite { .. } => {
                 "check signs, units (kg m^2) and that the values are about the centre of mass".into()
             }
             Self::TriangleInequality { .. } => {
-                "check the order ixx ixy ixz iyy iyz izz and that the values are about the centre of mass; if the \
-                 model means it, waive the check by --waive-inertia LINK, or waive_inertia = [\"link\"] in the robot file"
-                    .into()
+                format!(
+                    "check the order ixx ixy ixz iyy iyz izz and that the values are about the centre of mass; if the \
+                     model means it, waive the check by {} LINK, or waive_inertia = [\"link\"] in the robot file",
+                    Setting::WaiveInertia
+                )
             }
             Self::BadEstimate { .. } => "give a density in kg/m^3 (steel 7850, aluminium 2700) or a mass in kg".into(),
         }

@@ -5,6 +5,8 @@
 
 use std::path::{Path, PathBuf};
 
+use flexarm_settings::Setting;
+
 /// Folders from `ROS_PACKAGE_PATH` and `AMENT_PREFIX_PATH`, for [`crate::ReadOptions::search_paths`].
 ///
 /// The one function of this crate that reads the environment.
@@ -84,7 +86,10 @@ impl Resolver<'_> {
             },
             None => NotFound {
                 reason: format!("the package {package:?} was not found"),
-                help: format!("say where it is with --package {package}=FOLDER, or put the URDF inside the package"),
+                help: format!(
+                    "say where it is with {} {package}=FOLDER, or put the URDF inside the package",
+                    Setting::Package
+                ),
             },
         })
     }
@@ -98,7 +103,10 @@ impl Resolver<'_> {
         let found = found.map(|folder| std::path::absolute(&folder).unwrap_or(folder));
         found.ok_or_else(|| NotFound {
             reason: format!("the package {package:?} was not found"),
-            help: format!("say where it is with --package {package}=FOLDER, or by packages in the robot file"),
+            help: format!(
+                "say where it is with {} {package}=FOLDER, or by packages in the robot file",
+                Setting::Package
+            ),
         })
     }
 

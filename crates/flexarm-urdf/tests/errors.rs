@@ -205,7 +205,7 @@ fn a_moving_link_without_mass_is_told_and_taken() {
     let robot = parse_urdf(&text, "r.urdf", &ReadOptions::default()).unwrap();
     let told: Vec<_> = robot.warnings_only().collect();
     assert!(told.len() == 1 && told[0].message.contains("4 moving links have no mass: \"b\", \"c\""), "{told:?}");
-    assert!(told[0].help.contains("--inertia-from-density"));
+    assert!(told[0].help.contains("(inertia_from_density or inertia_from_total_mass, "));
 }
 
 /// What rounding leaves below zero is no fault: six digits of the file, a micrometre about the mass, nothing at all.

@@ -337,7 +337,7 @@ fn meshes_are_found_by_package_path_and_neighbourhood() {
         assert_eq!(codes(&warnings), [], "{uri}");
     }
     for (uri, part) in [
-        ("package://unknown/m.obj", "--package unknown=FOLDER"),
+        ("package://unknown/m.obj", "packages unknown=FOLDER"),
         ("package://mapped/meshes/ARM.OBJ", "the case of letters differs"),
         ("package://mapped/none.obj", "complete"),
         ("none.obj", "relative to the URDF"),

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use flexarm::{
-    ConstraintForm, Error, LinkModel, LoadOptions, Modelling, Motion, Robot, SpookPreset, SpookSettings, Start,
+    ConstraintForm, LinkModel, LoadOptions, Modelling, Motion, Robot, Setting, SpookPreset, SpookSettings, Start,
     StepError, StepperKind, TCP_FRAME,
 };
 use flexarm_analysis::tcp_error;
@@ -15,6 +15,8 @@ use flexarm_stepping::{
 };
 use nalgebra::{DVector, Matrix6, Vector3, Vector6};
 use serde_json::Value;
+
+use crate::Error;
 
 /// The folder with `robots`, `trajectories` and `tests`, and how much is asked for.
 #[derive(Clone, Debug)]
@@ -31,10 +33,10 @@ impl Bench {
         let path = self.root.join(file);
         if !path.is_file() {
             let what = "there is no such file; the case studies need robots, trajectories and tests/verification of a checkout of the \
-                        project: give its folder (--data)";
-            return Err(Error::File { path, what: what.into() });
+                        project: give its folder";
+            return Err(flexarm::Error::File { path, what: format!("{what} ({})", Setting::Data) }.into());
         }
-        Robot::load_with(&path, &LoadOptions::default())
+        Ok(Robot::load_with(&path, &LoadOptions::default())?)
     }
 
     /// Path of a shipped file.
@@ -44,7 +46,7 @@ impl Bench {
 
     /// A shipped motion.
     pub fn motion(&self, robot: &Robot, file: &str) -> Result<Motion, Error> {
-        Motion::load_for(&self.root.join(file), &*robot.rigid_model()?)
+        Ok(Motion::load_for(&self.root.join(file), &*robot.rigid_model()?)?)
     }
 
     /// Stored results of another program: `tests/verification/<name>`.
@@ -62,7 +64,7 @@ pub struct Stored {
 
 impl Stored {
     fn read(path: &Path) -> Result<Self, Error> {
-        let fail = |what: String| Error::File { path: path.to_owned(), what };
+        let fail = |what: String| flexarm::Error::File { path: path.to_owned(), what };
         let text = std::fs::read_to_string(path)
             .map_err(|e| fail(format!("stored results cannot be read: {e}; they are in a checkout of the project")))?;
         let value = serde_json::from_str(&text).map_err(|e| fail(format!("is no JSON: {e}")))?;
@@ -113,7 +115,7 @@ impl Stored {
 
     fn fault(&self, pointer: &str, what: &str) -> Error {
         let what = format!("{pointer:?} {what}; the script named in it writes the file again");
-        Error::File { path: self.path.clone(), what }
+        flexarm::Error::File { path: self.path.clone(), what }.into()
     }
 }
 
@@ -173,7 +175,7 @@ impl Rig {
         let joints = vec![0.0; flexible.model.n_actuated()];
         let arm = flexible.arm(Arc::new(Held(joints))).map_err(step_error)?;
         let name = frame.unwrap_or(TCP_FRAME);
-        let known = || Error::Usage(format!("there is no frame {name:?}"));
+        let known = || Error::NoFrame { name: name.to_owned() };
         let frame = arm.model.frame(name).ok_or_else(known)?.clone();
         let X_WF = place(&arm, &frame, &DVector::zeros(arm.model.n_elastic()));
         Ok(Self { arm, frame, X_WF })
@@ -250,8 +252,7 @@ impl Rig {
                 return Ok(before);
             }
         }
-        let what = format!("the arm does not come to rest within {AT_MOST} steps of {h} s ({})", kind.name());
-        Err(Error::Usage(what))
+        Err(Error::NotAtRest { steps: AT_MOST, step_s: h, stepper: kind.name() })
     }
 
     /// Way of the frame from its undeformed place, let go there, seen at the start and every so often.
@@ -309,7 +310,7 @@ pub fn tool_path(
         link.damping = Damping::StiffnessProportional(5e-4);
     }
     let arm = robot.modelled(modelling)?.arm(motion).map_err(step_error)?;
-    let frame = arm.model.frame(TCP_FRAME).ok_or_else(|| Error::Usage("the robot has no tool".into()))?.clone();
+    let frame = arm.model.frame(TCP_FRAME).ok_or(Error::NoTool)?.clone();
     let mut stepper = new_stepper(ALPHA, arm.clone(), h, start).map_err(step_error)?;
     let mut seen = Observation::new(&arm);
     let mut path = Vec::new();
@@ -368,7 +369,7 @@ pub const LOADS: [&str; 6] = ["F_x", "F_y", "F_z", "M_x", "M_y", "M_z"];
 
 /// A step error of a verification.
 pub fn step_error(source: StepError) -> Error {
-    Error::Step { source, partial: false }
+    flexarm::Error::Step { source, partial: false }.into()
 }
 
 /// Displacement and rotation of a frame per acceleration of gravity (m/s², world axes), times `g`: from a hundredth of it up and

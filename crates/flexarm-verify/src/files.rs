@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use flexarm::Error;
 use flexarm::result_files::{check_free, write_all};
 
+use crate::Error;
 use crate::Verification;
 use crate::check::{Difference, differences, same_picture};
 use crate::page::{Block, Table, claims_table, markdown, table_text, word};
@@ -47,7 +47,7 @@ pub struct VerificationFiles {
 /// Lines and pictures in which a stored page differs from a verification.
 ///
 /// # Errors
-/// [`Error::File`] where a figure has nothing to draw.
+/// [`flexarm::Error::File`] where a figure has nothing to draw.
 pub fn differences_from(stored: &str, path: &Path, verification: &Verification) -> Result<Vec<Difference>, Error> {
     let mut found = differences(stored, &verification.page());
     let folder = path.parent().unwrap_or(Path::new(".")).join(PICTURES);
@@ -67,19 +67,18 @@ impl VerificationFiles {
     /// there.
     ///
     /// # Errors
-    /// [`Error::File`].
+    /// [`flexarm::Error::File`].
     pub fn new(folder: impl Into<PathBuf>, overwrite: bool) -> Result<Self, Error> {
         let folder = folder.into();
         check_free(&[folder.join(PAGE), folder.join(NUMBERS)], overwrite)?;
         let pictures = folder.join(PICTURES);
         if !overwrite && pictures.exists() {
-            let what = "exists already and is not overwritten: choose another folder, or give --force".into();
-            return Err(Error::File { path: pictures, what });
+            return Err(flexarm::Error::Taken { path: pictures, place: "folder", movable: false }.into());
         }
         // Better now than after a minute.
         let there = folder.ancestors().find(|above| above.is_dir()).unwrap_or(Path::new("."));
         let probe = there.join(format!(".flexarm-{}", std::process::id()));
-        std::fs::write(&probe, "").map_err(|source| Error::Write { path: there.to_owned(), source })?;
+        std::fs::write(&probe, "").map_err(|source| flexarm::Error::Write { path: there.to_owned(), source })?;
         let _ = std::fs::remove_file(&probe);
         Ok(Self { folder, overwrite })
     }
@@ -92,7 +91,7 @@ impl VerificationFiles {
     /// Writes page, pictures and numbers, all or nothing.
     ///
     /// # Errors
-    /// [`Error::File`], [`Error::Write`].
+    /// [`flexarm::Error::File`], [`flexarm::Error::Write`].
     pub fn write(&self, verification: &Verification) -> Result<(), Error> {
         let mut files: Vec<(PathBuf, String)> = Vec::new();
         files.push((self.page(), verification.page()));
@@ -102,7 +101,7 @@ impl VerificationFiles {
         }
         let paths: Vec<PathBuf> = files.iter().map(|(path, _)| path.clone()).collect();
         check_free(&paths, self.overwrite)?;
-        write_all(&files)
+        Ok(write_all(&files)?)
     }
 }
 
@@ -136,7 +135,7 @@ impl Verification {
     /// Name and SVG of each picture.
     ///
     /// # Errors
-    /// [`Error::File`] where a figure has nothing to draw.
+    /// [`flexarm::Error::File`] where a figure has nothing to draw.
     pub fn pictures(&self) -> Result<Vec<(String, String)>, Error> {
         let figures = self.cases.iter().flat_map(|case| &case.blocks).filter_map(|block| match block {
             Block::Figure(figure) => Some(figure),
@@ -144,7 +143,7 @@ impl Verification {
         });
         figures
             .map(|figure| {
-                let fault = |e| Error::File { path: Path::new(&figure.name).to_owned(), what: format!("{e}") };
+                let fault = |e| flexarm::Error::File { path: Path::new(&figure.name).to_owned(), what: format!("{e}") };
                 Ok((figure.name.clone(), figure.svg().map_err(fault)?))
             })
             .collect()

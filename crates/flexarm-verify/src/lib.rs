@@ -20,6 +20,7 @@
 
 pub mod bench;
 pub mod check;
+mod error;
 mod files;
 mod lower_arm;
 mod manipulator;
@@ -33,11 +34,10 @@ mod three_beams;
 
 use std::ops::ControlFlow;
 
-use flexarm::Error;
-
 use bench::Bench;
 use page::Case;
 
+pub use error::Error;
 pub use files::{PAGE, VerificationFiles, differences_from};
 
 /// A case study: name, how long it takes beside the others, how it is run.
@@ -85,7 +85,7 @@ impl Pace<'_> {
     pub(crate) fn at(&mut self, share: f64) -> Result<(), Error> {
         match (self.progress)(self.begin + self.own * share, self.name) {
             ControlFlow::Continue(()) => Ok(()),
-            ControlFlow::Break(()) => Err(Error::Interrupted { t: 0.0, partial: false }),
+            ControlFlow::Break(()) => Err(flexarm::Error::Interrupted { t: 0.0, partial: false }.into()),
         }
     }
 }
@@ -93,12 +93,12 @@ impl Pace<'_> {
 /// Runs cases, all if none is named.
 ///
 /// # Errors
-/// [`Error::Usage`] for an unknown name, [`Error::File`] where files of the checkout are missing, [`Error::Interrupted`], and what
+/// [`Error::UnknownCase`], [`flexarm::Error::File`] where files of the checkout are missing, [`flexarm::Error::Interrupted`], and what
 /// the steps of a case may end with.
 pub fn verify(bench: &Bench, names: &[String], progress: &mut Progress<'_>) -> Result<Verification, Error> {
     if let Some(unknown) = names.iter().find(|name| !case_names().contains(&name.as_str())) {
         let known = case_names().join(", ");
-        return Err(Error::Usage(format!("there is no case {unknown:?}; the cases are {known}")));
+        return Err(Error::UnknownCase { name: unknown.clone(), known });
     }
     let wanted: Vec<&Entry> =
         CASES.iter().filter(|(name, ..)| names.is_empty() || names.iter().any(|n| n == name)).collect();
@@ -113,7 +113,7 @@ pub fn verify(bench: &Bench, names: &[String], progress: &mut Progress<'_>) -> R
     }
     // The last chance to stop before anything is written.
     if progress(1.0, "").is_break() {
-        return Err(Error::Interrupted { t: 0.0, partial: false });
+        return Err(flexarm::Error::Interrupted { t: 0.0, partial: false }.into());
     }
     let passed = cases.iter().flat_map(Case::claims).all(|claim| claim.holds);
     Ok(Verification { cases, passed, quick: bench.quick })

@@ -1,12 +1,13 @@
 //! A cast lower arm: from a mesh of tetrahedra to a link, each step against the mesh and against two other programs.
 
-use flexarm::{Error, Modelling, Robot};
+use flexarm::{Modelling, Robot};
 use flexarm_draw::{CurveLook, Panel, PlotCurve};
 use flexarm_fem::chain::Chain;
 use flexarm_fem::reduction::Tie;
 use flexarm_fem::{ElasticSplit, UnitSystem};
 use nalgebra::{Matrix6, Vector3, Vector6};
 
+use crate::Error;
 use crate::Pace;
 use crate::bench::{
     Bench, LOADS, LUMPED, Rig, Stored, Worst, column_error, compliance_error, damped, larger, modal, parts,
@@ -46,8 +47,8 @@ impl Truth {
     fn filed(robot: &Robot, hz: Vec<f64>) -> Result<Self, Error> {
         let reduced = &robot.flexible[0].flexible.reduced;
         let element = reduced.details.as_ref().and_then(|details| details.superelement.as_ref());
-        let element = element.ok_or_else(|| Error::Usage("the link file has no condensed mass".into()))?;
-        let C = inverse(&reduced.K_BB).ok_or_else(|| Error::Usage("K_BB of the link file is singular".into()))?;
+        let element = element.ok_or(Error::NoCondensedMass)?;
+        let C = inverse(&reduced.K_BB).ok_or(Error::SingularLink)?;
         let sag = [0, 1, 2].map(|axis| {
             // Both interfaces move alike, and the mass says what that loads B with.
             let load = element.M.column(axis) + element.M.column(6 + axis);
@@ -88,7 +89,7 @@ pub(crate) fn case(bench: &Bench, _pace: &mut Pace<'_>) -> Result<Case, Error> {
         frequencies(&mut case, &robot, &truth, &others)?;
         return Ok(case);
     }
-    let units = "mm-t-s".parse::<UnitSystem>().map_err(|e| Error::Usage(e.to_string()))?;
+    let units = "mm-t-s".parse::<UnitSystem>()?;
     let mesh = Meshed::read(bench, MESH, units)?;
     let reduced = &robot.flexible[0].flexible.reduced;
     let (p_A, p_B) = (reduced.X_LA.translation.vector, reduced.X_LB.translation.vector);
@@ -112,7 +113,7 @@ fn flange_loads(case: &mut Case, robot: &Robot, truth: &Truth, others: &[(&str, 
     let mut methods: Vec<(String, Matrix6<f64>)> =
         others.iter().map(|(name, other)| ((*name).to_owned(), other.C)).collect();
     let filed = inverse(&robot.flexible[0].flexible.reduced.K_BB);
-    methods.push(("link file".into(), filed.ok_or_else(|| Error::Usage("K_BB of the link file is singular".into()))?));
+    methods.push(("link file".into(), filed.ok_or(Error::SingularLink)?));
     let (light, usual) = (damped(weightless(robot.clone())), small_loads(&truth.C));
     let mut loads = usual;
     loads[2] *= 0.1;

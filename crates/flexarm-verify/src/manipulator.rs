@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use flexarm::{
-    ConstraintForm, DriveModel, Error, LinkModel, Modelling, Motion, ReferenceSettings, Robot, RunOptions, Scenario,
+    ConstraintForm, DriveModel, LinkModel, Modelling, Motion, ReferenceSettings, Robot, RunOptions, Scenario,
     SpookPreset, SpookSettings, StepperKind, Summary, Trace, simulate_traced,
 };
 use flexarm_draw::{CurveLook, Panel, PlotCurve};
@@ -13,6 +13,7 @@ use flexarm_fem::{Material, UnitSystem};
 use flexarm_stepping::Damping;
 use nalgebra::{Matrix6, Vector3, Vector6};
 
+use crate::Error;
 use crate::Pace;
 use crate::bench::{ALPHA, Bench, larger, modal, parts, spook};
 use crate::meshed::Meshed;

@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use flexarm::Error;
 use flexarm_fe_io::mesh::{ReadOptions, read_mesh};
 use flexarm_fem::chain::{Chain, ChainSource, energy_by_slice};
 use flexarm_fem::element::Quadrature;
@@ -13,6 +12,7 @@ use flexarm_fem::sparse::ModesWanted;
 use flexarm_fem::{CutPlane, Material, Pose, UnitSystem};
 use nalgebra::{DMatrix, Matrix6, Vector3, Vector6};
 
+use crate::Error;
 use crate::bench::Bench;
 
 /// A mesh with its stiffness and mass, all in SI.
@@ -106,7 +106,7 @@ impl Condensed<'_> {
     /// Motion of B (rows) under unit wrenches on it, A held.
     pub(crate) fn compliance(&self) -> Result<Matrix6<f64>, Error> {
         let K: Matrix6<f64> = self.inner.stiffness().fixed_view::<6, 6>(6, 6).into();
-        inverse(&K).ok_or_else(|| Error::Usage("interface B can move without force".into()))
+        inverse(&K).ok_or(Error::FreeInterface)
     }
 
     /// Motion of B under an acceleration (m/s²) of everything, A held.
@@ -171,5 +171,5 @@ pub(crate) fn inverse(K: &Matrix6<f64>) -> Option<Matrix6<f64>> {
 }
 
 fn fault(path: &Path, e: impl std::fmt::Display) -> Error {
-    Error::File { path: path.to_owned(), what: e.to_string() }
+    flexarm::Error::File { path: path.to_owned(), what: e.to_string() }.into()
 }

@@ -1,8 +1,9 @@
 //! The manipulator picks something up and sets it down: every stepper over payloads that change at once.
 
-use flexarm::{DriveModel, Error, Modelling, ReferenceSettings, Robot, RunOptions, Scenario, StepperKind};
+use flexarm::{DriveModel, Modelling, ReferenceSettings, Robot, RunOptions, Scenario, StepperKind};
 use flexarm_draw::{CurveLook, Panel, PlotCurve};
 
+use crate::Error;
 use crate::bench::{ALPHA, Bench, modal, parts};
 use crate::manipulator::{Run, Runs};
 use crate::page::{Bound, Case, Figure, Table, error, fixed, word};

@@ -3,13 +3,14 @@
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use flexarm::{ConstraintForm, Error, Modelling, ReferenceSettings, RunOptions, StepperKind, simulate_traced};
+use flexarm::{ConstraintForm, Modelling, ReferenceSettings, RunOptions, StepperKind, simulate_traced};
 use flexarm_draw::{CurveLook, Panel, PlotCurve};
 use flexarm_kinematics::ElasticAngles;
 use flexarm_stepping::Damping;
 use nalgebra::Vector3;
 use serde_json::Value;
 
+use crate::Error;
 use crate::Pace;
 use crate::bench::{ALPHA, Bench, Stored, Worst, larger, spook};
 use crate::page::{Bound, Case, Cell, Figure, Table, digits, error, word};
@@ -88,7 +89,7 @@ fn today(case: &mut Case, bench: &Bench, beta: f64) -> Result<(), Error> {
         let tools: Vec<Vector3<f64>> = trace.rows.iter().map(|row| Vector3::from(row.flexible_m)).collect();
         if tools.len() != truth.flexible.len() {
             let what = format!("has {} samples, the run {}: not the same motion", truth.flexible.len(), tools.len());
-            return Err(Error::File { path: bench.root.join(CURVE), what });
+            return Err(flexarm::Error::File { path: bench.root.join(CURVE), what }.into());
         }
         let apart: Vec<Vector3<f64>> = tools.iter().zip(&truth.flexible).map(|(a, b)| a - b).collect();
         let most = |f: &dyn Fn(&Vector3<f64>) -> f64| apart.iter().map(f).worst() / truth.peak;
@@ -113,7 +114,7 @@ struct Curve {
 
 impl Curve {
     fn read(path: &Path) -> Result<Self, Error> {
-        let fail = |what: String| Error::File { path: path.to_owned(), what };
+        let fail = |what: String| flexarm::Error::File { path: path.to_owned(), what };
         let text = std::fs::read_to_string(path).map_err(|e| fail(format!("cannot be read: {e}")))?;
         let rows = text.lines().filter(|line| !line.starts_with('#')).skip(1);
         let (mut flexible, mut peak) = (Vec::new(), 0.0f64);

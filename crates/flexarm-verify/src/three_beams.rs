@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use flexarm::{Error, LinkModel, Modelling, Robot, Start, StepperKind};
+use flexarm::{LinkModel, Modelling, Robot, Start, StepperKind};
 use flexarm_draw::{CurveLook, Panel, PlotCurve};
 use flexarm_fem::element::Quadrature;
 use flexarm_fem::reduction::Tie;
@@ -10,6 +10,7 @@ use flexarm_fem::{Material, UnitSystem};
 use flexarm_stepping::{Damping, MotionFn, ReferenceSettings};
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
+use crate::Error;
 use crate::Pace;
 use crate::bench::{
     ALPHA, Bench, LOADS, LUMPED, Rig, Worst, column_error, compliance_error, damped, larger, modal, parts, place,

@@ -85,7 +85,7 @@ fn a_run_tells_how_far_it_is_and_can_be_stopped() {
     let stopped = verify(&bench(), &["manipulator".into()], &mut |share, _| {
         if share > 0.01 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
-    assert!(matches!(stopped, Err(flexarm::Error::Interrupted { .. })));
+    assert!(matches!(stopped, Err(flexarm_verify::Error::Library(flexarm::Error::Interrupted { .. }))));
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use flexarm_kinematics::{Frame, Model, Wrench};
 use flexarm_stepping::{Load, TimedWrench};
 
-use crate::error::Error;
+use crate::error::{Error, LoadError};
 use crate::loads_file::Written;
 use crate::robot::TCP_FRAME;
 
@@ -44,12 +44,10 @@ impl AppliedLoad {
     /// * `F`: n wrenches.
     ///
     /// # Errors
-    /// [`Error::Usage`] for fewer than two samples, other numbers of them, and times that do not increase.
+    /// [`Error::Load`] for fewer than two samples, other numbers of them, and times that do not increase.
     pub fn sampled(frame: &str, t: &[f64], F: &[Wrench]) -> Result<Self, Error> {
         if t.len() != F.len() || t.len() < 2 || t.windows(2).any(|pair| pair[1].is_nan() || pair[1] <= pair[0]) {
-            let (times, wrenches) = (t.len(), F.len());
-            let what = "a load needs at least two samples, one wrench for each time, and times that increase";
-            return Err(Error::Usage(format!("{what}; found {times} times and {wrenches} wrenches")));
+            return Err(LoadError::Samples { times: t.len(), wrenches: F.len() }.into());
         }
         let (times, F) = (t.to_vec(), F.to_vec());
         let wrench = {
@@ -71,10 +69,8 @@ impl AppliedLoad {
     /// On a model, up to the end of a run (s).
     pub(crate) fn on(&self, model: &Model, duration_s: f64) -> Result<Load, Error> {
         let frame = frame_of(&self.frame, model).filter(|frame| frame.body > 0).ok_or_else(|| {
-            let known = moving_links(model);
-            let message =
-                format!("load on frame {:?}: expected \"tcp\" or a link that moves, of {known:?}", self.frame);
-            Written::frame(self.written.as_ref(), message)
+            let known = moving_links(model).into_iter().map(str::to_owned).collect();
+            Written::frame(self.written.as_ref(), LoadError::UnknownFrame { frame: self.frame.clone(), known })
         })?;
         let jumps = self.wrench.jumps.iter().copied().filter(|t| *t <= duration_s).collect();
         Ok(Load { body: frame.body, X_BF: frame.X_BF, wrench: self.wrench.clone().with_jumps(jumps) })

@@ -57,7 +57,7 @@ impl Robot {
     /// Cost: reading of modes, substitution; milliseconds.
     ///
     /// # Errors
-    /// [`Error::Usage`] if a link or drive has no such model, [`Error::Model`] if the result is no tree.
+    /// [`Error::Modelling`] if a link or drive has no such model, [`Error::Model`] if the result is no tree.
     pub fn flexible(&self, modelling: Modelling) -> Result<Arm, Error> {
         Ok(Arm { robot: Arc::new(self.clone()), modelling, flexible: Arc::new(self.modelled(&modelling)?) })
     }

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use flexarm_settings::Setting;
 use flexarm_trajectory::{FileError, PlanError, Problem, TrajectoryError};
 use flexarm_urdf::{Finding as UrdfFinding, Severity};
 use nalgebra::Vector6;
@@ -215,15 +216,15 @@ fn check_geometric(robot: &Robot, findings: &mut Vec<Finding>) {
                 format!(
                     "link {name:?}: geometric_stiffening is asked for, but its .flex file has no stiffness by load"
                 ),
-                "make it with flexarm reduce --geometric",
+                format!("make it with flexarm reduce {}", Setting::Geometric),
             ),
             (LinkModel::Modal, true) => continue,
             (_, true) => (
                 format!("link {name:?}: geometric_stiffening only counts for model = \"modal\""),
-                "add model = \"modal\", or run with --links modal",
+                format!("add model = \"modal\", or run with {} modal", Setting::Links),
             ),
         };
-        findings.push(Finding::warning("geometric-stiffening", robot.path.display().to_string(), message, help));
+        findings.push(Finding::warning("geometric-stiffening", robot.path.display().to_string(), message, &help));
     }
 }
 

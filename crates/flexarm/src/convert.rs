@@ -6,9 +6,10 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use flexarm_log::{CreateOptions, LogError, RecordingFormat, RunSource, Sample, Trace, open_recording};
+use flexarm_settings::Setting;
 use serde::Serialize;
 
-use crate::error::Error;
+use crate::error::{Error, RecordingError};
 
 /// Samples between two looks at the callback.
 const POLL_EVERY: u64 = 1000;
@@ -53,7 +54,7 @@ pub struct ConvertSummary {
 /// at all, and what was there before stays until then.
 ///
 /// # Errors
-/// [`Error::Usage`] if a format is not known or input and output are one file; [`Error::File`] if the input is not there or
+/// [`Error::Recording`] if a format is not known or input and output are one file; [`Error::File`] if the input is not there or
 /// the output is and may not be overwritten; [`Error::Log`] for what the files say.
 pub fn convert(input: &Path, output: &Path, options: &ConvertOptions) -> Result<ConvertSummary, Error> {
     convert_until(input, output, options, &mut |_| ControlFlow::Continue(()))
@@ -69,12 +70,11 @@ pub fn convert_until(
     options: &ConvertOptions,
     progress: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<ConvertSummary, Error> {
-    let from = format(input, options.from, "--from")?;
-    let to = format(output, options.to, "--to")?;
+    let from = format(input, options.from, Some(Setting::ReadFormat))?;
+    let to = format(output, options.to, Some(Setting::WrittenFormat))?;
     let mut source = open(input, from)?;
     if same_file(input, output) {
-        let text = format!("{} is input and output: give the output another name", input.display());
-        return Err(Error::Usage(text));
+        return Err(RecordingError::SameFile { path: input.to_owned() }.into());
     }
     crate::result_files::check_free(&[output.to_owned()], options.overwrite)?;
 
@@ -141,7 +141,7 @@ pub(crate) fn no_sample(path: &Path, why: Option<&String>) -> Error {
 /// # Errors
 /// As [`convert()`].
 pub fn read_run(path: &Path) -> Result<(Option<serde_json::Value>, Trace, Vec<String>), Error> {
-    let mut source = open(path, format(path, None, "")?)?;
+    let mut source = open(path, format(path, None, None)?)?;
     let mut trace = Trace::new(source.header().clone());
     let result = source.replay(&mut |sample: &Sample| {
         trace.push(sample);
@@ -161,7 +161,7 @@ pub fn read_run(path: &Path) -> Result<(Option<serde_json::Value>, Trace, Vec<St
     Ok((summary, trace, told))
 }
 
-/// The formats of recordings by the words that `--from` and `--to` take.
+/// The formats of recordings by their words.
 ///
 /// # Errors
 /// Which words there are.
@@ -173,23 +173,15 @@ fn words() -> String {
     RecordingFormat::ALL.map(RecordingFormat::extension).join(", ")
 }
 
-fn format(path: &Path, given: Option<RecordingFormat>, flag: &str) -> Result<RecordingFormat, Error> {
+fn format(path: &Path, given: Option<RecordingFormat>, setting: Option<Setting>) -> Result<RecordingFormat, Error> {
     if path.is_dir() {
         let what = "is a folder, a recording is a file: give one in it, such as run.mcap".into();
         return Err(Error::File { path: path.to_owned(), what });
     }
-    let format = given.or_else(|| RecordingFormat::from_path(path)).ok_or_else(|| {
-        let ending = path.extension().map_or("no ending".into(), |e| format!("the ending .{}", e.to_string_lossy()));
-        let or = if flag.is_empty() { String::new() } else { format!(" or give its format with {flag}") };
-        Error::Usage(format!(
-            "{}: the name has {ending}, expected one of {}: rename the file{or}",
-            path.display(),
-            RecordingFormat::ALL.map(|format| format!(".{}", format.extension())).join(", ")
-        ))
-    })?;
+    let unknown = || RecordingError::UnknownEnding { path: path.to_owned(), setting };
+    let format = given.or_else(|| RecordingFormat::from_path(path)).ok_or_else(unknown)?;
     if !format.is_built_in() {
-        let text = format!("{}: this program was built without {format}; use a build with it", path.display());
-        return Err(Error::Usage(text));
+        return Err(RecordingError::NotBuiltIn { path: path.to_owned(), format }.into());
     }
     Ok(format)
 }

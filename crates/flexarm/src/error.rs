@@ -1,14 +1,37 @@
-//! One error type for the faces: what went wrong, and whether the input or the run is to blame.
+//! One error type for the faces: what went wrong, by cause and with the numbers, and whether the input or the run is to blame.
+//!
+//! Settings in the messages are values ([`Setting`]) that each face names in its own words
+//! ([`crate::name_settings`]). What a face makes of an error, such as the number that its process ends with, is its own.
+
+mod job;
+mod model;
+mod recording;
+mod value;
 
 use std::path::PathBuf;
 
 use flexarm_fem::mesh_link::MeshLinkError;
 use flexarm_fem::reduction::ReductionError;
 use flexarm_fem::sparse::ModesError;
+use flexarm_settings::Setting;
 
 use crate::robot_file::RobotFileError;
 
-/// Anything that ends a command.
+pub use job::ImportError;
+pub use model::{ChannelError, LoadError, ModellingError, PayloadError, PoseError};
+pub use recording::{RecordingError, StudyError};
+pub use value::ValueError;
+
+/// Whom an error is to blame on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// What was given: files, values, places of results. The same call would end in the same way.
+    Input,
+    /// The run: it stopped on its way, was stopped, or its results could not be written.
+    Run,
+}
+
+/// Anything that keeps an answer from being given.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -54,7 +77,7 @@ pub enum Error {
     /// An interface of a link to be reduced.
     #[error("{place}: interface {interface:?}: {what}")]
     Interface {
-        /// File, file with line, or flag that it comes from.
+        /// File, file with line, or setting that it comes from.
         place: String,
         /// Its name.
         interface: String,
@@ -84,8 +107,8 @@ pub enum Error {
     Trajectory(#[from] flexarm_trajectory::TrajectoryError),
     /// The trajectory asks for more than the joints can do.
     #[error(
-        "{}: the trajectory passes {} joint limits:\n  {}\nslow it down, change it, or go on anyway with --ignore-limits",
-        path.display(), violations.len(), violations.join("\n  ")
+        "{}: the trajectory passes {} joint limits:\n  {}\nslow it down, change it, or go on anyway with {}",
+        path.display(), violations.len(), violations.join("\n  "), Setting::IgnoreLimits
     )]
     Limits {
         /// The trajectory.
@@ -93,9 +116,63 @@ pub enum Error {
         /// One line each.
         violations: Vec<String>,
     },
-    /// A value on the command line or in an option.
-    #[error("{0}")]
-    Usage(String),
+    /// A place of a result that is taken.
+    #[error(
+        "{}: exists already and is not overwritten: choose another {place}{} give {}",
+        path.display(), if *movable { format!(" with {} or", Setting::Output) } else { ", or".into() }, Setting::Overwrite
+    )]
+    Taken {
+        /// What is there.
+        path: PathBuf,
+        /// What another one of is to be chosen: `place` or `folder`.
+        place: &'static str,
+        /// Whether [`Setting::Output`] chooses it.
+        movable: bool,
+    },
+    /// A number of an option that makes no sense.
+    #[error(transparent)]
+    Value(#[from] ValueError),
+    /// Links and drives that cannot be modelled as asked for.
+    #[error(transparent)]
+    Modelling(#[from] ModellingError),
+    /// Joint values that do not fit the robot, and poses without an answer.
+    #[error(transparent)]
+    Pose(#[from] PoseError),
+    /// Inputs and outputs of a frequency response.
+    #[error(transparent)]
+    Channel(#[from] ChannelError),
+    /// A load as values.
+    #[error(transparent)]
+    Load(#[from] LoadError),
+    /// The runs of a study.
+    #[error(transparent)]
+    Study(#[from] StudyError),
+    /// A recording that cannot be read, written or reported as asked for.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// Frames of interfaces in an import.
+    #[error(transparent)]
+    ImportJob(#[from] ImportError),
+    /// A robot none of whose links could be the tool.
+    #[error(
+        "the robot has no link that could be the TCP: {}",
+        if *in_file { "add tcp = { link = ... }".to_owned() } else { format!("use {}", Setting::Tcp) }
+    )]
+    NoTcp {
+        /// Whether it comes from a robot file, which can name one.
+        in_file: bool,
+    },
+    /// A tool on a link that is not there.
+    #[error("TCP frame {link:?} is not a link of the robot; its links are {known:?}")]
+    UnknownTcp {
+        /// The link.
+        link: String,
+        /// The links of the robot.
+        known: Vec<String>,
+    },
+    /// Pictures of a reduction that could not be drawn.
+    #[error("the pictures failed: {0}")]
+    Pictures(Box<dyn std::error::Error + Send + Sync>),
     /// The simulation could not start or stopped.
     #[error("{source}{}", if *partial { "; the log up to there is complete and readable" } else { "" })]
     Step {
@@ -129,28 +206,30 @@ pub enum Error {
 }
 
 impl Error {
-    /// Exit code of a command that ends with this: 2 for bad input, 1 for a run that failed.
-    pub fn exit_code(&self) -> u8 {
+    /// Whether the input or the run is to blame.
+    pub fn fault(&self) -> Fault {
+        use flexarm_log::LogError;
+        use flexarm_stepping::StepError;
         match self {
             Self::Step { source, partial } => match source {
-                flexarm_stepping::StepError::Setup(_) | flexarm_stepping::StepError::UnstableStep { .. } => 2,
+                StepError::Setup(_) | StepError::ModalLinks | StepError::UnstableStep { .. } => Fault::Input,
                 // At the start it is the input, later the run.
-                flexarm_stepping::StepError::Singular { t, .. } if !partial && *t == 0.0 => 2,
-                _ => 1,
+                StepError::Singular { t, .. } if !partial && *t == 0.0 => Fault::Input,
+                _ => Fault::Run,
             },
-            Self::InStudy { source, .. } => source.exit_code(),
-            Self::Interrupted { .. } | Self::Write { .. } => 1,
+            Self::InStudy { source, .. } => source.fault(),
+            Self::Interrupted { .. } | Self::Write { .. } => Fault::Run,
             Self::Reduction { source, .. } | Self::Import { source, .. } => match source.as_ref() {
                 MeshLinkError::Reduction(ReductionError::OutOfMemory { .. })
                 | MeshLinkError::Modes(ModesError::NotConverged { .. } | ModesError::NotFinite)
                 | MeshLinkError::Reduction(ReductionError::Modes(
                     ModesError::NotConverged { .. } | ModesError::NotFinite,
-                )) => 1,
-                _ => 2,
+                )) => Fault::Run,
+                _ => Fault::Input,
             },
-            Self::Log(flexarm_log::LogError::Exists { .. } | flexarm_log::LogError::NotARecording { .. }) => 2,
-            Self::Log(_) => 1,
-            _ => 2,
+            Self::Log(LogError::Exists { .. } | LogError::NotARecording { .. }) => Fault::Input,
+            Self::Log(_) => Fault::Run,
+            _ => Fault::Input,
         }
     }
 }

@@ -19,10 +19,11 @@ use flexarm_fe_io::exchange::{
 };
 use flexarm_fem::reduction::{InterfaceFrame, Superelement};
 use flexarm_fem::{Pose, ReducedLink, UnitSystem, read_flex};
+use flexarm_settings::Setting;
 use nalgebra::{DMatrix, Translation3};
 use serde::Serialize;
 
-use crate::error::Error;
+use crate::error::{Error, ValueError};
 use crate::{result_files, stamp};
 
 /// Formats that can be written.
@@ -133,7 +134,7 @@ pub struct ExportChecks {
 /// Writes a link in another format and reads it back.
 ///
 /// # Errors
-/// [`Error`]; see [`Error::exit_code`].
+/// [`Error`]; see [`Error::fault`].
 pub fn export(job: &ExportJob) -> Result<ExportSummary, Error> {
     let started = Instant::now();
     let link = read_flex(&job.link).map_err(Box::new)?;
@@ -215,12 +216,7 @@ fn nodes(job: &ExportJob, interfaces: usize) -> Result<Vec<i64>, Error> {
     }
     let distinct = job.nodes.iter().collect::<std::collections::BTreeSet<_>>().len() == job.nodes.len();
     if job.nodes.len() != interfaces || !distinct || job.nodes.iter().any(|node| !(1..=99_999_999).contains(node)) {
-        let text = format!(
-            "--nodes has {:?}; {interfaces} different numbers between 1 and 99999999 are needed, one per interface, \
-             proximal first",
-            job.nodes
-        );
-        return Err(Error::Usage(text));
+        return Err(ValueError::NodeNumbers { found: job.nodes.clone(), interfaces }.into());
     }
     Ok(job.nodes.clone())
 }
@@ -361,31 +357,34 @@ impl Content<'_> {
         let mut text = format!(
             "Link {}, written by flexarm export as {}\n\nrows: {}\naxes: those of the link at every interface\n\
              units: {units} (length-mass-time; forces follow: 1 unit = {} N); angles in rad\n\nmap for flexarm import: \
-             --map \"{}\" --units {units}\n\ninterfaces (position in the unit of length, link axes):\n",
+             {} \"{}\" {} {units}\n\ninterfaces (position in the unit of length, link axes):\n",
             self.link.name,
             self.job.format.name(),
             self.row_order(),
             units.force(),
-            self.map()
+            Setting::Map,
+            self.map(),
+            Setting::Units
         );
         for ((interface, X), node) in self.element.interfaces.iter().zip(self.frames()).zip(self.nodes) {
             let p = X.translation.vector;
             let node = if self.is_labelled() { format!(", node {node}") } else { String::new() };
-            text += &format!("  {}{node}: --at {}={},{},{}\n", interface.name, interface.name, p.x, p.y, p.z);
+            let (name, at) = (&interface.name, Setting::At);
+            text += &format!("  {name}{node}: {at} {name}={},{},{}\n", p.x, p.y, p.z);
         }
         text += &part_lines(self.link);
         text
     }
 }
 
-/// The rigid parts, with the flags of `flexarm import`.
+/// The rigid parts, as an import takes them.
 fn part_lines(link: &ReducedLink) -> String {
     let mut text =
         String::from("\nrigid parts (kg; m; kg m2: ixx,iyy,izz,ixy,ixz,iyz about the centre of mass, link axes):\n");
-    for (flag, part) in [("--part-a", &link.proximal), ("--part-b", &link.distal)] {
+    for (setting, part) in [(Setting::PartA, &link.proximal), (Setting::PartB, &link.distal)] {
         let (c, I) = (part.com, part.inertia);
         text += &format!(
-            "  {flag} \"{};{},{},{};{},{},{},{},{},{}\"\n",
+            "  {setting} \"{};{},{},{};{},{},{},{},{},{}\"\n",
             part.mass,
             c.x,
             c.y,

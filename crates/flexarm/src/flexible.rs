@@ -11,6 +11,7 @@ use flexarm_flexlink::{
     insert_gearboxes, substitute,
 };
 use flexarm_kinematics::{Data, ElasticAngles, MOST_COORDINATES, Model, mass_matrix};
+use flexarm_settings::Setting;
 use flexarm_stepping::{
     Damping, FlexibleArm, Friction, GeometricStiffness, PrescribedMotion, Servo, ServoAxis, Spring, StepError,
 };
@@ -18,7 +19,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::caveat::Caveat;
 use crate::drive_entry::{Drive, DriveKind, GearDamping, ServoEntry};
-use crate::error::Error;
+use crate::error::{Error, ModellingError, PoseError};
 use crate::import::SECOND_ORDER_UNKNOWN;
 use crate::options::{DriveModel, LinkModel, Modelling};
 use crate::robot::Robot;
@@ -127,7 +128,8 @@ impl RobotLink {
                 if there.is_empty() { "only two parts".into() } else { format!("2, {} parts", there.join(", ")) };
             format!(
                 "link {name:?}: its .flex file has no chain of {segments} parts (it has {there}): make it with flexarm \
-                 reduce --chains {segments}, or choose another number of segments"
+                 reduce {} {segments}, or choose another number of segments",
+                Setting::Chains
             )
         })
     }
@@ -178,7 +180,8 @@ impl RobotLink {
         };
         if self.choices.geometric && full.geometric.is_none() {
             let message = format!(
-                "link {name:?}: geometric_stiffening needs a beam, or a .flex file made with flexarm reduce --geometric"
+                "link {name:?}: geometric_stiffening needs a beam, or a .flex file made with flexarm reduce {}",
+                Setting::Geometric
             );
             return Err((Asked::Geometric, message));
         }
@@ -275,12 +278,7 @@ impl FlexibleRobot {
         if light.is_empty() {
             return Error::Step { source, partial: false };
         }
-        Error::Usage(format!(
-            "{}: {source}: {} lacks inertia about some axis, with all that it carries; give the links <inertial> with mass \
-             and inertia, have them estimated (inertia_from_density in the robot file), or let nothing give way before them",
-            self.path.display(),
-            light.join(", ")
-        ))
+        PoseError::WithoutInertia { path: self.path.clone(), source, links: light }.into()
     }
 
     /// What gives way and carries no inertia in some direction: the rows of the mass matrix that depend on earlier ones.
@@ -370,9 +368,8 @@ impl Robot {
     /// The robot with its links and drives modelled as asked for.
     ///
     /// # Errors
-    /// [`Error::Usage`] if a link or drive has no such model, [`Error::Model`] if the result is no tree.
+    /// [`Error::Modelling`] if a link or drive has no such model, [`Error::Model`] if the result is no tree.
     pub fn modelled(&self, modelling: &Modelling) -> Result<FlexibleRobot, Error> {
-        let usage = |text: String| Error::Usage(text);
         let (mut links, mut doubts): (Vec<FlexibleLink>, Vec<Caveat>) = (Vec::new(), Vec::new());
         let mut modal_instead = Vec::new();
         if modelling.links != LinkModel::Rigid {
@@ -397,17 +394,12 @@ impl Robot {
         // An option that nothing takes up is a mistake, not a wish.
         let modal = links.iter().filter(|link| matches!(link.form, LinkForm::Modal(_))).count();
         if let (Some(n), true) = (modelling.segments, modal == links.len()) {
-            return Err(usage(format!(
-                "{n} segments are asked for, but no link of the robot is lumped: {}",
-                if modal_instead.is_empty() { "add --links lumped".to_owned() } else { modal_instead.join("; ") }
-            )));
+            return Err(ModellingError::NoLumpedLink { segments: n, modal_instead }.into());
         }
         if let (Some(n), 0) = (modelling.modes, modal) {
-            return Err(usage(format!(
-                "{n} modes are asked for, but no link of the robot is modal: add --links modal"
-            )));
+            return Err(ModellingError::NoModalLink { modes: n }.into());
         }
-        let mut substituted = substitute(&self.rigid, &links).map_err(|e| usage(e.to_string()))?;
+        let mut substituted = substitute(&self.rigid, &links).map_err(ModellingError::from)?;
 
         let bends = crate::bends::bends(&substituted);
 
@@ -422,7 +414,7 @@ impl Robot {
         let with_spring: Vec<(usize, &Drive)> = self.drives.iter().enumerate().filter(|(_, d)| soft(d)).collect();
         let gearboxes: Vec<Gearbox> =
             with_spring.iter().filter_map(|(_, d)| d.gearbox.as_ref().map(|g| g.0.clone())).collect();
-        let gears = insert_gearboxes(&mut substituted.mechanism, &gearboxes).map_err(|e| usage(e.to_string()))?;
+        let gears = insert_gearboxes(&mut substituted.mechanism, &gearboxes).map_err(ModellingError::from)?;
         let model = Model::new(&substituted.mechanism)
             .map_err(|source| Error::Model { path: self.urdf_path.clone(), source })?;
 
@@ -459,7 +451,7 @@ impl Robot {
         for group in model.elastic() {
             let (spring, owner) = found
                 .remove(group.name.as_str())
-                .ok_or_else(|| usage(format!("elastic joint {:?} has no stiffness", group.name)))?;
+                .ok_or_else(|| ModellingError::NoStiffness { joint: group.name.clone() })?;
             springs.push(spring);
             owners.push(owner);
         }
@@ -496,7 +488,7 @@ impl Robot {
     /// The model of a link on this robot, and a sentence if it is another one than asked for: a link with load on a third
     /// interface bends in modes, because rigid parts with springs know two.
     pub(crate) fn form_of(&self, link: &RobotLink, modelling: &Modelling) -> Result<(LinkForm, Option<String>), Error> {
-        let form = link.form(modelling).map_err(Error::Usage)?;
+        let form = link.form(modelling).map_err(ModellingError::NoSuchModel)?;
         let branches =
             if matches!(form, LinkForm::Modal(_)) { Vec::new() } else { branch_joints(&self.rigid, &link.flexible) };
         let Some(BranchJoint { joint, interface }) = branches.first() else { return Ok((form, None)) };
@@ -505,8 +497,11 @@ impl Robot {
             "joint {joint:?} hangs on its interface {interface:?}, and rigid parts with springs know its two ends alone"
         );
         let modelling = Modelling { links: LinkModel::Modal, ..*modelling };
-        let modal =
-            link.form(&modelling).map_err(|message| Error::Usage(format!("link {name:?}: {why}; {message}")))?;
+        let modal = link.form(&modelling).map_err(|instead| ModellingError::Branch {
+            link: name.clone(),
+            why: why.clone(),
+            instead,
+        })?;
         Ok((modal, Some(format!("link {name:?} bends in modes (model = \"modal\"): {why}"))))
     }
 

@@ -7,7 +7,7 @@ use flexarm_kinematics::{
 use nalgebra::{DMatrix, Matrix6xX, UnitQuaternion};
 use serde::Serialize;
 
-use crate::error::Error;
+use crate::error::{Error, PoseError};
 use crate::options::Modelling;
 use crate::posed::all_finite;
 use crate::robot::{Robot, TCP_FRAME};
@@ -120,18 +120,15 @@ fn rows(M: &DMatrix<f64>) -> Vec<Vec<f64>> {
 /// Values of all actuated joints; zeros without any.
 ///
 /// # Errors
-/// [`Error::Usage`] for another number of them, and for values that are no finite numbers.
+/// [`Error::Pose`] for another number of them, and for values that are no finite numbers.
 pub(crate) fn joint_values(values: Option<&[f64]>, joints: &[&str]) -> Result<Vec<f64>, Error> {
     let Some(values) = values else { return Ok(vec![0.0; joints.len()]) };
     if values.len() != joints.len() {
-        return Err(Error::Usage(format!(
-            "{} joint values given, the robot has {} movable joints: {joints:?}",
-            values.len(),
-            joints.len()
-        )));
+        let joints = joints.iter().map(|joint| (*joint).to_owned()).collect();
+        return Err(PoseError::Count { found: values.len(), joints }.into());
     }
     match values.iter().zip(joints).find(|(value, _)| !value.is_finite()) {
-        Some((value, joint)) => Err(Error::Usage(format!("joint {joint:?} at {value} is at no finite number"))),
+        Some((value, joint)) => Err(PoseError::NotFinite { joint: (*joint).to_owned(), value: *value }.into()),
         None => Ok(values.to_vec()),
     }
 }
@@ -139,7 +136,7 @@ pub(crate) fn joint_values(values: Option<&[f64]>, joints: &[&str]) -> Result<Ve
 /// The rigid robot (with payload) at a pose; `at` (rad or m) and `velocity` of all actuated joints, zero without.
 ///
 /// # Errors
-/// [`Error::Usage`] for joint values that do not fit.
+/// [`Error::Pose`] for joint values that do not fit.
 pub fn inspect(robot: &Robot, at: Option<&[f64]>, velocity: Option<&[f64]>) -> Result<Inspection, Error> {
     let model = robot.rigid_model()?;
     let names: Vec<&str> = model.coordinates().iter().map(|c| c.joint.as_str()).collect();

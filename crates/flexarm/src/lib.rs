@@ -34,6 +34,9 @@
 //! | `servo_study` | a study: gains of the servos against settling time and overshoot |
 //! | `study_report` | link models compared on one page for the browser |
 //! | `link_models` | every link model against a reference: accuracy and cost |
+//!
+//! What goes wrong is an [`Error`] by cause with its numbers, what is doubtful a [`Caveat`]. Both carry settings that mend them
+//! as values ([`Setting`]); a face with names of its own for them gives these once ([`name_settings`]).
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
@@ -89,7 +92,10 @@ pub use caveat::Caveat;
 pub use check::{Finding, check, check_with_loads};
 pub use convert::{ConvertOptions, ConvertSummary, convert, convert_until, parse_recording_format, read_run};
 pub use drive_entry::{Drive, DriveKind};
-pub use error::Error;
+pub use error::{
+    ChannelError, Error, Fault, ImportError, LoadError, ModellingError, PayloadError, PoseError, RecordingError,
+    StudyError, ValueError,
+};
 pub use flexible::{FlexibleRobot, LinkChoices, Owner, RobotLink};
 pub use headline::{Bending, ShareFigures};
 pub use inspect::{FlexibleInfo, Inspection, JointInfo, LinkInfo, TcpInfo, inspect};
@@ -119,6 +125,7 @@ pub use summary::{
 pub use flexarm_analysis::{Quantity, Spacing};
 pub use flexarm_kinematics::{LinkInertia, Pose, Wrench};
 pub use flexarm_log::{Column, Columns, FormatInfo, Holds, RecordingFormat, Sample, Trace};
+pub use flexarm_settings::{Names, Setting, name_settings};
 pub use flexarm_stepping::{
     AlphaSettings, ConstraintForm, LoadAxes, OperatingPoint, ReferenceMethod, ReferenceSettings, SpookPreset,
     SpookSettings, Start, StepError, StepperKind, TimedWrench,

@@ -17,7 +17,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use crate::applied_load::AppliedLoad;
-use crate::error::Error;
+use crate::error::{Error, LoadError};
 use crate::input::read_text;
 use crate::load_jumps::jumps_of;
 use crate::payload::PayloadChange;
@@ -115,24 +115,24 @@ impl Written {
     }
 
     /// What is wrong with a value as a whole, at its place if it was read from a file.
-    pub(crate) fn entry(written: Option<&Self>, message: String) -> Error {
-        Self::error(written.map(|written| &written.entry), message)
+    pub(crate) fn entry(written: Option<&Self>, cause: impl Into<LoadError>) -> Error {
+        Self::error(written.map(|written| &written.entry), cause.into())
     }
 
     /// What is wrong with its frame or link.
-    pub(crate) fn frame(written: Option<&Self>, message: String) -> Error {
-        Self::error(written.map(|written| &written.frame), message)
+    pub(crate) fn frame(written: Option<&Self>, cause: impl Into<LoadError>) -> Error {
+        Self::error(written.map(|written| &written.frame), cause.into())
     }
 
     /// What is wrong with its inertia.
-    pub(crate) fn inertia(written: Option<&Self>, message: String) -> Error {
-        Self::error(written.map(|written| &written.inertia), message)
+    pub(crate) fn inertia(written: Option<&Self>, cause: impl Into<LoadError>) -> Error {
+        Self::error(written.map(|written| &written.inertia), cause.into())
     }
 
-    fn error(place: Option<&RobotFileError>, message: String) -> Error {
+    fn error(place: Option<&RobotFileError>, cause: LoadError) -> Error {
         match place {
-            Some(place) => RobotFileError { message, ..place.clone() }.into(),
-            None => Error::Usage(message),
+            Some(place) => RobotFileError { message: cause.to_string(), ..place.clone() }.into(),
+            None => cause.into(),
         }
     }
 }

@@ -7,7 +7,7 @@ use flexarm_stepping::Linear;
 use nalgebra::{DVector, Vector6};
 
 use crate::bends::stations;
-use crate::error::Error;
+use crate::error::{Error, PoseError, ValueError};
 use crate::modes::{ModeTable, modes_of, table};
 use crate::options::Modelling;
 use crate::options::Outputs;
@@ -43,7 +43,7 @@ impl Default for ModeMovie {
 /// the rigid robot at rest.
 ///
 /// # Errors
-/// As [`crate::modes()`]; [`Error::Usage`] for a robot without modes, [`Error::File`] and [`Error::Log`] for files.
+/// As [`crate::modes()`]; [`Error::Pose`] for a robot without modes, [`Error::Value`], [`Error::File`] and [`Error::Log`] for files.
 pub fn record_modes(
     robot: &Robot,
     modelling: &Modelling,
@@ -52,17 +52,15 @@ pub fn record_modes(
     movie: &ModeMovie,
     outputs: &Outputs,
 ) -> Result<ModeTable, Error> {
-    let positive = |what: &str, x: f64, unit: &str| {
-        let message = || Error::Usage(format!("{what} must be positive and below 1000, found {x} {unit}"));
-        if x > 0.0 && x < 1000.0 { Ok(()) } else { Err(message()) }
-    };
-    positive("--seconds", movie.seconds, "s")?;
-    movie.tool_motion_m.map_or(Ok(()), |x| positive("--tool-motion", x, "m"))?;
+    let within =
+        |x: f64, otherwise: fn(f64) -> ValueError| if x > 0.0 && x < 1000.0 { Ok(()) } else { Err(otherwise(x)) };
+    within(movie.seconds, ValueError::Seconds)?;
+    movie.tool_motion_m.map_or(Ok(()), |x| within(x, ValueError::ToolMotion))?;
     let posed = Posed::new(robot, modelling, at)?;
     let linear = posed.linear(&Vector6::zeros())?;
     let all = modes_of(&linear)?;
     if all.is_empty() {
-        return Err(Error::Usage("the robot has no flexible link, so there are no modes to record".into()));
+        return Err(PoseError::NoModes.into());
     }
     let shown = &all[..count.min(all.len())];
     let motion = movie.tool_motion_m.unwrap_or_else(|| PART_OF_REACH * reach(&posed));

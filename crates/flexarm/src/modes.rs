@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, Vector6};
 use serde::Serialize;
 
 use crate::caveat::{self, Caveat};
-use crate::error::Error;
+use crate::error::{Error, PoseError};
 use crate::options::Modelling;
 use crate::posed::{Posed, step_error};
 use crate::robot::Robot;
@@ -117,7 +117,7 @@ pub(crate) fn modes_of(linear: &Linear) -> Result<Vec<DampedMode>, Error> {
 }
 
 pub(crate) fn linear_error(error: LinearError) -> Error {
-    Error::Usage(format!("the linear model at this pose: {error}"))
+    PoseError::Linear(error).into()
 }
 
 /// The lowest `count` modes of the flexible robot at a pose, under its weight, drives locked.
@@ -125,7 +125,7 @@ pub(crate) fn linear_error(error: LinearError) -> Error {
 /// `at`: all actuated joints (rad or m), zero without it.
 ///
 /// # Errors
-/// [`Error::Usage`] for joint values that do not fit, [`Error::Step`] where there is no equilibrium.
+/// [`Error::Pose`] for joint values that do not fit, [`Error::Step`] where there is no equilibrium.
 pub fn modes(robot: &Robot, modelling: &Modelling, at: Option<&[f64]>, count: usize) -> Result<ModeTable, Error> {
     let posed = Posed::new(robot, modelling, at)?;
     let linear = posed.linear(&Vector6::zeros())?;

@@ -9,7 +9,7 @@ use flexarm_trajectory::{JointLimits, JointSamples, LimitViolation, Samples, Tra
 use flexarm_urdf::closest;
 
 use crate::caveat::{self, Caveat};
-use crate::error::Error;
+use crate::error::{Error, PoseError, ValueError};
 use crate::robot::Robot;
 
 /// A trajectory whose joints are the model's actuated coordinates.
@@ -91,18 +91,15 @@ impl Motion {
     /// * `q`: n rows of all actuated joints in coordinate order, one after the other (rad or m).
     ///
     /// # Errors
-    /// [`Error::Usage`] for another number of values, [`Error::Trajectory`] for values that are no numbers or times that do
+    /// [`Error::Pose`] for another number of values, [`Error::Trajectory`] for values that are no numbers or times that do
     /// not increase; [`Error::Model`].
     pub fn from_samples(t: &[f64], q: &[f64], robot: &Robot) -> Result<Self, Error> {
         let model = robot.rigid_model()?;
         let actuated = &model.coordinates()[..model.n_actuated()];
         let n = actuated.len();
         if q.len() != n * t.len() {
-            let (found, rows) = (q.len(), t.len());
-            return Err(Error::Usage(format!(
-                "{found} joint values are given for {rows} times; the robot has {n} joints, so {} are expected",
-                n * rows
-            )));
+            let (found, times) = (q.len(), t.len());
+            return Err(PoseError::Samples { found, times, joints: n }.into());
         }
         let column = |k: usize| q.iter().skip(k).step_by(n.max(1)).copied().collect();
         let joint = |(k, c): (usize, &Coordinate)| JointSamples {
@@ -162,11 +159,10 @@ impl Motion {
     /// The same motion with each corner, where a velocity jumps, replaced by a blend that lasts `seconds`.
     ///
     /// # Errors
-    /// [`Error::Usage`] unless `seconds` is positive, [`Error::Trajectory`] if numbers become too extreme.
+    /// [`Error::Value`] unless `seconds` is positive, [`Error::Trajectory`] if numbers become too extreme.
     pub fn with_rounded_corners(self, seconds: f64, model: &Model) -> Result<Self, Error> {
         if !(seconds > 0.0 && seconds.is_finite()) {
-            let message = format!("corners are rounded within a positive time, found {seconds} s: try 0.02");
-            return Err(Error::Usage(message));
+            return Err(ValueError::CornerTime(seconds).into());
         }
         let trajectory = self.trajectory.with_rounded_corners(seconds)?;
         let warnings = warnings(&trajectory, &self.path);

@@ -5,7 +5,7 @@ use flexarm_stepping::InertiaChange;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::applied_load::moving_links;
-use crate::error::Error;
+use crate::error::{Error, PayloadError};
 use crate::loads_file::Written;
 use crate::robot::{PAYLOAD_LINK, Robot};
 
@@ -51,23 +51,21 @@ impl PayloadChange {
 
     /// On a model of the robot; `earlier`: changes before it.
     pub(crate) fn on(&self, robot: &Robot, model: &Model, earlier: &[InertiaChange]) -> Result<InertiaChange, Error> {
-        let fail = |message: String| Written::entry(self.written.as_ref(), message);
-        let at_inertia = |message: String| Written::inertia(self.written.as_ref(), message);
+        let fail = |cause: PayloadError| Written::entry(self.written.as_ref(), cause);
         let LinkInertia { mass, com, inertia_com } = &self.carried;
         let mut numbers = [self.at_s, *mass].into_iter().chain(com.iter().copied()).chain(inertia_com.iter().copied());
         if numbers.any(|x| !x.is_finite()) || *mass < 0.0 || self.at_s < 0.0 {
-            return Err(fail("a payload needs a time and a mass of at least 0, and finite numbers".into()));
+            return Err(fail(PayloadError::Numbers));
         }
         let (link, body, X_BF) = self.carrier(robot, model)?;
         if inertia_com.symmetric_eigenvalues().min() < -1e-9 * inertia_com.norm() {
-            let message = "payload inertia has a negative principal moment; the order is ixx iyy izz ixy ixz iyz";
-            return Err(at_inertia(message.into()));
+            return Err(Written::inertia(self.written.as_ref(), PayloadError::NegativeMoment));
         }
-        let mut inertia = without_payload(robot, model, body)
-            .ok_or_else(|| fail(format!("the robot's own payload does not ride on link {link:?}: give that link")))?;
+        let mut inertia =
+            without_payload(robot, model, body).ok_or_else(|| fail(PayloadError::OtherLink { link: link.clone() }))?;
         if let Some(other) = earlier.iter().find(|c| c.body != body) {
-            let name = &model.bodies()[other.body].name;
-            return Err(fail(format!("payloads on two bodies ({name:?} and {link:?}): one changes in a run")));
+            let first = model.bodies()[other.body].name.clone();
+            return Err(fail(PayloadError::TwoBodies { first, second: link }));
         }
         if *mass > 0.0 {
             inertia += self.carried.spatial().at_parent(&X_BF);
@@ -77,18 +75,16 @@ impl PayloadChange {
 
     /// The link that carries it, its body, and its frame there.
     fn carrier(&self, robot: &Robot, model: &Model) -> Result<(String, usize, Pose), Error> {
-        let fail = |message: String| Written::frame(self.written.as_ref(), message);
+        let fail = |cause: PayloadError| Written::frame(self.written.as_ref(), cause);
         let own = || robot.rigid.joints.iter().find(|j| j.child == PAYLOAD_LINK).map(|j| j.parent.clone());
         let link = self.link.clone().or_else(own).unwrap_or_else(|| robot.tcp.0.clone());
         let frame = model.frame(&link).filter(|f| f.body > 0).ok_or_else(|| {
-            let known = moving_links(model);
-            fail(format!("payload link {link:?}: expected a link that moves, of {known:?}"))
+            let known = moving_links(model).into_iter().map(str::to_owned).collect();
+            fail(PayloadError::UnknownLink { link: link.clone(), known })
         })?;
         if robot.flexible.iter().any(|f| f.flexible.link == link) && model.frame(&format!("{link}__distal")).is_some() {
-            let beyond = robot.urdf.mechanism.child_joints(&link).map(|j| j.child.as_str()).collect::<Vec<_>>();
-            return Err(fail(format!(
-                "payload link {link:?} bends, so that it is not clear how the payload rides on it: name a link beyond it, of {beyond:?}"
-            )));
+            let beyond = robot.urdf.mechanism.child_joints(&link).map(|j| j.child.clone()).collect();
+            return Err(fail(PayloadError::Bends { link, beyond }));
         }
         Ok((link, frame.body, frame.X_BF))
     }

@@ -8,7 +8,7 @@ use nalgebra::{DVector, Vector6};
 
 use crate::caveat::pose::Standing;
 use crate::caveat::{Caveat, kinds, validity};
-use crate::error::Error;
+use crate::error::{Error, PoseError};
 use crate::flexible::FlexibleRobot;
 use crate::inspect::joint_values;
 use crate::options::Modelling;
@@ -133,12 +133,10 @@ pub(crate) fn step_error(source: StepError) -> Error {
 /// Figures of an answer, which must be numbers.
 ///
 /// # Errors
-/// [`Error::Usage`]: masses, lengths or joint values of 1e200 overflow on the way.
+/// [`Error::Pose`]: masses, lengths or joint values of 1e200 overflow on the way.
 pub(crate) fn all_finite<'a>(what: &str, values: impl IntoIterator<Item = &'a f64>) -> Result<(), Error> {
     match values.into_iter().all(|x| x.is_finite()) {
         true => Ok(()),
-        false => Err(Error::Usage(format!(
-            "{what} are no finite numbers: a mass, a length, a stiffness, a force or a joint value is far too large or too small"
-        ))),
+        false => Err(PoseError::Overflow { what: what.to_owned() }.into()),
     }
 }

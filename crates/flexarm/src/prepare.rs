@@ -1,10 +1,11 @@
 //! Everything about a run that can be told before its first step.
 
+use flexarm_settings::Setting;
 use flexarm_stepping::{FlexibleArm, Load, StepError, Stepper, StepperKind, new_stepper};
 
 use crate::caveat::size::Size;
 use crate::caveat::{self, Caveat, kinds};
-use crate::error::Error;
+use crate::error::{Error, ValueError};
 use crate::flexible::FlexibleRobot;
 use crate::loads_file::EXPRESSION_PERIOD;
 use crate::magnification::Expected;
@@ -75,33 +76,23 @@ const MAGNIFICATIONS: std::ops::RangeInclusive<f64> = 1e-3..=1e6;
 
 /// Numbers must make sense, and step and duration make a run that comes to an end.
 fn check_options(motion: &Motion, options: &RunOptions) -> Result<(), Error> {
-    let positive = |what: &str, x: f64, unit: &str| {
-        let message = || Error::Usage(format!("the {what} must be positive, found {x} {unit}"));
-        if x.is_finite() && x > 0.0 { Ok(()) } else { Err(message()) }
-    };
-    positive("step", options.step_s, "s")?;
-    positive("log rate", options.log_rate_hz, "Hz")?;
-    positive("settling band", options.settling_band_m, "m")?;
-    positive("factor of deflections (--magnify)", options.magnification.unwrap_or(1.0), "times")?;
+    let positive =
+        |x: f64, otherwise: fn(f64) -> ValueError| if x.is_finite() && x > 0.0 { Ok(()) } else { Err(otherwise(x)) };
+    positive(options.step_s, ValueError::Step)?;
+    positive(options.log_rate_hz, ValueError::LogRate)?;
+    positive(options.settling_band_m, ValueError::SettlingBand)?;
+    positive(options.magnification.unwrap_or(1.0), ValueError::Magnification)?;
     if let Some(factor) = options.magnification.filter(|factor| !MAGNIFICATIONS.contains(factor)) {
-        let (least, most) = (MAGNIFICATIONS.start(), MAGNIFICATIONS.end());
-        let message = format!(
-            "the factor of deflections (--magnify) is {factor:e}: expected one from {least} to {most}, 1 shows them as they are"
-        );
-        return Err(Error::Usage(message));
+        let (least, most) = (*MAGNIFICATIONS.start(), *MAGNIFICATIONS.end());
+        return Err(ValueError::MagnificationRange { found: factor, least, most }.into());
     }
     let duration = motion.trajectory.duration();
-    if options.step_s > duration {
-        let message = format!("the step (--step {} s) is longer than the motion ({duration} s)", options.step_s);
-        return Err(Error::Usage(message));
+    let (step_s, duration_s) = (options.step_s, duration);
+    if step_s > duration_s {
+        return Err(ValueError::StepBeyondMotion { step_s, duration_s }.into());
     }
-    if duration / options.step_s > MOST_STEPS {
-        return Err(Error::Usage(format!(
-            "{duration} s in steps of {:e} s make {:.1e} steps, at most {MOST_STEPS:.0e} are taken: raise --step or cut the \
-             trajectory",
-            options.step_s,
-            duration / options.step_s
-        )));
+    if duration_s / step_s > MOST_STEPS {
+        return Err(ValueError::TooManySteps { step_s, duration_s, most: MOST_STEPS }.into());
     }
     Ok(())
 }
@@ -116,7 +107,8 @@ fn short_loads(loads: &[Load], h: f64) -> Vec<Caveat> {
         let steps = (last - first) / h;
         (last > first && steps < STEPS_PER_LOAD).then(|| {
             format!(
-                "a load from {first} s to {last} s lasts {steps:.1} steps: its impulse is not met well; lower --step"
+                "a load from {first} s to {last} s lasts {steps:.1} steps: its impulse is not met well; lower {}",
+                Setting::Step
             )
         })
     };
@@ -125,9 +117,10 @@ fn short_loads(loads: &[Load], h: f64) -> Vec<Caveat> {
         let steps = period / h;
         (period != EXPRESSION_PERIOD && steps < STEPS_PER_LOAD).then(|| {
             let hz = 1.0 / period;
-            format!("a load of {hz:.1} Hz has {steps:.1} steps per period: it does not act as written; lower --step")
+            let step = Setting::Step;
+            format!("a load of {hz:.1} Hz has {steps:.1} steps per period: it does not act as written; lower {step}")
         })
     };
-    let told = |text: String| Caveat::said("short-load", "loads", text, "lower the step");
+    let told = |text: String| Caveat::said("short-load", "loads", text, "lower the step").mended_by(&[Setting::Step]);
     loads.iter().filter_map(|load| brief(load).or_else(|| fast(load)).map(told)).collect()
 }

@@ -7,7 +7,7 @@ use flexarm_log::{Attachment, CreateOptions, LinkInfo, LinkMesh, Recorder, Recor
 use flexarm_stepping::FlexibleArm;
 use flexarm_urdf::Geometry;
 
-use crate::error::Error;
+use crate::error::{Error, RecordingError};
 use crate::motion::Motion;
 use crate::options::{DriveModel, LinkModel, Outputs, RunOptions};
 use crate::result_files::Undo;
@@ -59,10 +59,7 @@ fn refuse_others(outputs: &Outputs, ours: &[&str]) -> Result<(), Error> {
     let mut files = files.map(|file| outputs.folder.join(file));
     match files.find(|path| path.exists()).filter(|_| !outputs.overwrite) {
         None => Ok(()),
-        Some(there) => {
-            let what = "exists already and is not overwritten: choose another folder with -o or give --force";
-            Err(Error::File { path: there, what: what.into() })
-        }
+        Some(path) => Err(Error::Taken { path, place: "folder", movable: true }),
     }
 }
 
@@ -82,14 +79,13 @@ fn remove_leftovers(outputs: &Outputs, ours: &[&str]) -> Result<(), Error> {
 /// A recorder of this format.
 ///
 /// # Errors
-/// [`Error::Usage`] if this build has none.
+/// [`RecordingError::WithoutFormat`] if this build has none.
 pub(crate) fn recorder(
     format: RecordingFormat,
     path: impl Into<PathBuf>,
     options: CreateOptions,
 ) -> Result<Box<dyn Recorder>, Error> {
-    let missing = || Error::Usage(format!("this program was built without {format}; use a build with it"));
-    format.recorder(path, options).ok_or_else(missing)
+    format.recorder(path, options).ok_or_else(|| RecordingError::WithoutFormat { format }.into())
 }
 
 /// Recorders for the outputs; refuses to overwrite before anything is made. `in_study`: the recording of the study is being

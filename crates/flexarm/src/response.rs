@@ -11,7 +11,7 @@ use nalgebra::{Complex, DMatrix, Vector6};
 use serde::Serialize;
 
 use crate::caveat::{self, Caveat, kinds};
-use crate::error::Error;
+use crate::error::{ChannelError, Error, ValueError};
 use crate::modes::{linear_error, modes_of, tool_map};
 use crate::options::Modelling;
 use crate::posed::Posed;
@@ -166,7 +166,7 @@ struct Channel {
 /// `at`: all actuated joints (rad or m), zero without it.
 ///
 /// # Errors
-/// [`Error::Usage`] for words and numbers that make no sense, [`Error::Step`] where there is no equilibrium,
+/// [`Error::Channel`] and [`Error::Value`] for words and numbers that make no sense, [`Error::Step`] where there is no equilibrium,
 /// [`Error::File`] and [`Error::Write`] for files.
 pub fn response(
     robot: &Robot,
@@ -179,8 +179,8 @@ pub fn response(
     let inputs = input_channels(&request.inputs, &posed)?;
     let channels = output_channels(&request.outputs)?;
     if !POINTS.contains(&request.points) {
-        let (few, most) = (POINTS.start(), POINTS.end());
-        return Err(Error::Usage(format!("--points must lie between {few} and {most}, found {}", request.points)));
+        let (least, most) = (*POINTS.start(), *POINTS.end());
+        return Err(ValueError::Points { found: request.points, least, most }.into());
     }
     let paths: Vec<PathBuf> = outputs.iter().flat_map(|o| RESPONSE_FILES.map(|name| o.folder.join(name))).collect();
     check_free(&paths, outputs.is_some_and(|o| o.overwrite))?;
@@ -272,13 +272,13 @@ fn range(request: &ResponseRequest, modes_hz: &[f64]) -> Result<(f64, f64), Erro
     let from = request.from_hz.unwrap_or_else(|| first.map_or(1.0, |f| 0.1 * f));
     let sixth = modes_hz.get(5).or(modes_hz.last());
     let to = request.to_hz.unwrap_or_else(|| sixth.map_or(200.0, |f| 2.0 * f).max(10.0 * from).min(HIGHEST_HZ));
-    let lowest = if request.spacing == Spacing::Logarithmic { f64::MIN_POSITIVE } else { 0.0 };
+    let logarithmic = request.spacing == Spacing::Logarithmic;
+    let lowest = if logarithmic { f64::MIN_POSITIVE } else { 0.0 };
     if !(from.is_finite() && from >= lowest) {
-        let zero = if lowest > 0.0 { "positive (0 needs --spacing linear)" } else { "positive or zero" };
-        return Err(Error::Usage(format!("--from must be {zero}, found {from} Hz")));
+        return Err(ValueError::LowestFrequency { found: from, logarithmic }.into());
     }
     if !(to.is_finite() && to > from && to <= HIGHEST_HZ) {
-        return Err(Error::Usage(format!("--to must lie above --from ({from} Hz) and below 1e6 Hz, found {to} Hz")));
+        return Err(ValueError::HighestFrequency { found: to, lowest: from }.into());
     }
     Ok((from, to))
 }
@@ -290,35 +290,31 @@ fn input_channels(words: &[String], posed: &Posed) -> Result<Vec<Channel>, Error
             return Ok(Channel { word: word.clone(), unit, index, joint: false });
         }
         let Some(index) = posed.joints.iter().position(|j| j == word) else {
-            return Err(Error::Usage(format!(
-                "input {word:?} is not known; inputs are {WRENCH:?} and the joints {:?}",
-                posed.joints
-            )));
+            let (word, joints) = (word.clone(), posed.joints.clone());
+            return Err(ChannelError::UnknownInput { word, forces: WRENCH, joints });
         };
         let unit = if posed.prismatic[index] { "m" } else { "rad" };
         Ok(Channel { word: word.clone(), unit, index, joint: true })
     };
-    once(words.iter().map(channel).collect::<Result<_, _>>()?, "input")
+    once(words.iter().map(channel).collect::<Result<_, ChannelError>>()?, "input")
 }
 
 fn output_channels(words: &[String]) -> Result<Vec<Channel>, Error> {
     let channel = |word: &String| {
         let index = AXES.iter().position(|w| w == word);
-        let index = index.ok_or_else(|| {
-            Error::Usage(format!("output {word:?} is not known; outputs are {AXES:?} (the folder is -o)"))
-        })?;
+        let index = index.ok_or_else(|| ChannelError::UnknownOutput { word: word.clone(), axes: AXES })?;
         Ok(Channel { word: word.clone(), unit: if index < 3 { "m" } else { "rad" }, index, joint: false })
     };
-    once(words.iter().map(channel).collect::<Result<_, Error>>()?, "output")
+    once(words.iter().map(channel).collect::<Result<_, ChannelError>>()?, "output")
 }
 
-fn once(channels: Vec<Channel>, side: &str) -> Result<Vec<Channel>, Error> {
+fn once(channels: Vec<Channel>, side: &'static str) -> Result<Vec<Channel>, Error> {
     if channels.is_empty() {
-        return Err(Error::Usage(format!("no {side} is given")));
+        return Err(ChannelError::Missing { side }.into());
     }
     for (k, channel) in channels.iter().enumerate() {
         if channels[..k].iter().any(|c| c.word == channel.word) {
-            return Err(Error::Usage(format!("{side} {:?} is given twice", channel.word)));
+            return Err(ChannelError::Twice { side, word: channel.word.clone() }.into());
         }
     }
     Ok(channels)

@@ -7,7 +7,7 @@ use crate::error::Error;
 /// Refuses places that are taken.
 ///
 /// # Errors
-/// [`Error::File`].
+/// [`Error::Taken`], and [`Error::File`] for a folder in the place of a file or the other way round.
 pub fn check_free(paths: &[PathBuf], overwrite: bool) -> Result<(), Error> {
     for path in paths {
         let fail = |what: &str| Err(Error::File { path: path.clone(), what: what.into() });
@@ -15,7 +15,7 @@ pub fn check_free(paths: &[PathBuf], overwrite: bool) -> Result<(), Error> {
             return fail("is a folder, a file is to be written there");
         }
         if !overwrite && path.exists() {
-            return fail("exists already and is not overwritten: choose another place, or give --force");
+            return Err(Error::Taken { path: path.clone(), place: "place", movable: false });
         }
         if let Some(above) = path.ancestors().skip(1).find(|above| above.exists())
             && !above.is_dir()

@@ -92,7 +92,7 @@ impl Robot {
         let urdf = read_urdf(path, &options.urdf)?;
         let name = urdf.mechanism.name.clone();
         let link = options.tcp.clone().or_else(|| default_tcp(&urdf.mechanism).map(str::to_owned));
-        let link = link.ok_or_else(|| Error::Usage("the robot has no link that could be the TCP: use --tcp".into()))?;
+        let link = link.ok_or(Error::NoTcp { in_file: false })?;
         let mut robot = Self {
             name,
             path: path.to_owned(),
@@ -194,10 +194,8 @@ impl Robot {
     fn finish(&mut self, file: Option<(&RobotFile, &Source)>) -> Result<(), Error> {
         let (link, X_LT) = self.tcp.clone();
         if self.rigid.link(&link).is_none() {
-            let known: Vec<_> = self.rigid.links.iter().map(|l| l.name.as_str()).collect();
-            return Err(Error::Usage(format!(
-                "TCP frame {link:?} is not a link of the robot; its links are {known:?}"
-            )));
+            let known = self.rigid.links.iter().map(|l| l.name.clone()).collect();
+            return Err(Error::UnknownTcp { link, known });
         }
         self.rigid.joints.push(Joint::new("__tcp_joint", JointKind::Fixed, link, TCP_FRAME, X_LT));
         self.rigid.links.push(Link { name: TCP_FRAME.into(), inertia: None });
@@ -217,7 +215,7 @@ impl Robot {
                 }
                 Ok(())
             }
-            (Err(Error::Usage(message)), Some((source, span))) => Err(source.error(span, message).into()),
+            (Err(Error::Modelling(fault)), Some((source, span))) => Err(source.error(span, fault.to_string()).into()),
             (Err(error), _) => Err(error),
         }
     }
@@ -384,9 +382,7 @@ fn tcp_of(file: &RobotFile, source: &Source, urdf: &UrdfRobot, options: &LoadOpt
         }
         Some(tcp) => Ok((tcp.link.get_ref().clone(), pose(tcp.xyz, tcp.rpy))),
         None => {
-            let link = default_tcp(&urdf.mechanism).ok_or_else(|| {
-                Error::Usage("the robot has no link that could be the TCP: add tcp = { link = ... }".into())
-            })?;
+            let link = default_tcp(&urdf.mechanism).ok_or(Error::NoTcp { in_file: true })?;
             Ok((link.to_owned(), Pose::identity()))
         }
     }

@@ -73,7 +73,7 @@ pub struct ElementStatics {
 /// `at`: all actuated joints (rad or m), zero without it; `wrench` in world axes, constant while the arm yields.
 ///
 /// # Errors
-/// [`Error::Usage`] for joint values that do not fit, [`Error::Step`] where there is no equilibrium.
+/// [`Error::Pose`] for joint values that do not fit, [`Error::Step`] where there is no equilibrium.
 pub fn statics(robot: &Robot, modelling: &Modelling, at: Option<&[f64]>, wrench: [f64; 6]) -> Result<Statics, Error> {
     statics_of(robot, modelling, at, wrench, None)
 }

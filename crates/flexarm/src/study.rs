@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use flexarm_log::{Recorder, RecordingFormat, Trace, TraceRow};
 
-use crate::error::Error;
+use crate::error::{Error, StudyError};
 use crate::magnification::Expected;
 use crate::options::{Outputs, RunOptions};
 use crate::prepare::checked;
@@ -35,14 +35,14 @@ pub struct Variant {
 /// [`Summary::with`].
 ///
 /// # Errors
-/// As [`crate::simulate`], with the label of the run that failed; [`Error::Usage`] for labels that are not distinct.
+/// As [`crate::simulate`], with the label of the run that failed; [`Error::Study`] for labels that are not distinct.
 pub fn compare_study(
     variants: &[Variant],
     outputs: Option<&Outputs>,
     progress: &mut Progress<'_>,
 ) -> Result<(Summary, Vec<(String, Trace)>), Error> {
     let Some(main) = variants.first() else {
-        return Err(Error::Usage("a study needs at least one run".into()));
+        return Err(StudyError::Empty.into());
     };
     let folders = folders(variants)?;
     let mut options = main.options.clone();
@@ -103,28 +103,24 @@ pub fn compare_study(
 const LONGEST_NAME: usize = 100;
 
 /// Names of the runs' folders: the labels, with letters that every file system takes.
-fn folders(variants: &[Variant]) -> Result<Vec<String>, Error> {
+fn folders(variants: &[Variant]) -> Result<Vec<String>, StudyError> {
     let mut taken = BTreeSet::new();
     let mut names = Vec::new();
     for variant in variants {
         let plain = |c: char| if c.is_ascii_alphanumeric() || "-_.=".contains(c) { c } else { '_' };
         let name: String = variant.label.chars().map(plain).collect();
         if name.is_empty() || name.starts_with('.') || !taken.insert(name.to_lowercase()) {
-            return Err(Error::Usage(format!(
-                "the label {:?} names two runs of the study, or none: give each --with a name=... of its own",
-                variant.label
-            )));
+            return Err(StudyError::LabelTwice { label: variant.label.clone() });
         }
         if files_of_a_run().any(|file| file == name.to_lowercase()) {
-            let text = "is the name of a file of the study: give its --with another name=...";
-            return Err(Error::Usage(format!("the label {:?} {text}", variant.label)));
+            return Err(StudyError::LabelOfFile { label: variant.label.clone() });
         }
         if name.len() > LONGEST_NAME {
-            return Err(Error::Usage(format!(
-                "the label {:?} has {} letters, at most {LONGEST_NAME} make a folder: give its --with a short name=...",
-                variant.label,
-                name.len()
-            )));
+            return Err(StudyError::LongLabel {
+                label: variant.label.clone(),
+                letters: name.len(),
+                most: LONGEST_NAME,
+            });
         }
         names.push(name);
     }

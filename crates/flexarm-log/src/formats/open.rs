@@ -3,6 +3,8 @@
 use std::io::Read;
 use std::path::Path;
 
+use flexarm_settings::Setting;
+
 use super::RecordingFormat;
 use crate::{LogError, RunSource};
 
@@ -53,7 +55,7 @@ fn check_kind(path: &Path, expected: RecordingFormat) -> Result<(), LogError> {
     match found {
         Some(found) if found == expected => Ok(()),
         Some(found) => {
-            let mend = format!("name the file *.{0}, or say --from {0}", found.extension());
+            let mend = format!("name the file *.{0}, or say {1} {0}", found.extension(), Setting::ReadFormat);
             refuse(&format!("a file in the format {found}"), mend)
         }
         None if expected.info().magic.is_empty() && text => Ok(()),
@@ -61,10 +63,10 @@ fn check_kind(path: &Path, expected: RecordingFormat) -> Result<(), LogError> {
             let line: String =
                 String::from_utf8_lossy(&start).chars().take_while(|c| !c.is_control()).take(30).collect();
             let mend = match line.starts_with("time,") {
-                true => "it looks like a table: name the file *.csv, or say --from csv",
-                false => "give a file that flexarm compare or run wrote",
+                true => format!("it looks like a table: name the file *.csv, or say {} csv", Setting::ReadFormat),
+                false => "give a file that flexarm compare or run wrote".into(),
             };
-            refuse(&format!("text, beginning {line:?}"), mend.into())
+            refuse(&format!("text, beginning {line:?}"), mend)
         }
         None => refuse("something else", "give a file that flexarm compare or run wrote".into()),
     }

@@ -137,7 +137,7 @@ impl Spook {
             Err(StepError::Setup(text))
         };
         if model.has_modal() {
-            return refuse("links that bend in modes (--links lumped would do)");
+            return Err(StepError::ModalLinks);
         }
         if !arm.torque_driven.is_empty() {
             return refuse("joints driven by torque");

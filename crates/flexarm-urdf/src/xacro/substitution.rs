@@ -3,6 +3,8 @@
 
 use std::path::{Path, PathBuf};
 
+use flexarm_settings::Setting;
+
 use super::Interpreter;
 use super::expression::value::{Value, float_of, int_of};
 use super::expression::{Trouble, shortened};
@@ -45,7 +47,9 @@ impl Interpreter<'_> {
     pub(crate) fn argument(&mut self, name: &str) -> Result<String, Trouble> {
         self.used_arguments.insert(name.to_owned());
         self.arguments.get(name).cloned().ok_or_else(|| {
-            let help = format!("give it with --arg {name}=VALUE, or by args = {{ {name} = ... }} in the robot file");
+            let setting = Setting::Argument;
+            let help =
+                format!("give it with {setting} {name}=VALUE, or by args = {{ {name} = ... }} in the robot file");
             Trouble::new(format!("the argument {name:?} has no value")).help(help)
         })
     }

@@ -1,6 +1,6 @@
 //! The bar as a mesh: own finite elements, CalculiX, beam theory, the reduced link; and loads so large that geometry counts.
 
-use flexarm::{Error, Robot};
+use flexarm::Robot;
 use flexarm_draw::{CurveLook, Panel, PlotCurve};
 use flexarm_fem::UnitSystem;
 use flexarm_fem::reduction::Tie;
@@ -8,6 +8,7 @@ use flexarm_fem::sparse::ModesWanted;
 use nalgebra::{Matrix6, Vector3, Vector6};
 
 use super::{G, bar, bar_with_shear, nth, without_ball};
+use crate::Error;
 use crate::bench::{
     Bench, LOADS, LUMPED, Rig, Stored, Worst, column_error, compliance_error, damped, larger, modal, parts,
     small_loads, weightless,
@@ -37,7 +38,7 @@ pub(super) fn mesh(case: &mut Case, bench: &Bench, meshed: &Robot) -> Result<(),
     let condensation = fe.condense(&interfaces)?;
     let K = condensation.stiffness();
     let held = K.view((6, 6), (24, 24)).into_owned();
-    let C = held.try_inverse().ok_or_else(|| Error::Usage(format!("{MESH}: the held mesh is a mechanism")))?;
+    let C = held.try_inverse().ok_or(Error::Mechanism { mesh: MESH })?;
     let C_BB = Matrix6::from_fn(|i, j| C[(i, j)]);
     let calculix = stored.matrix6("C_BB")?;
 
@@ -139,7 +140,7 @@ pub(super) fn mesh(case: &mut Case, bench: &Bench, meshed: &Robot) -> Result<(),
     without_ball(&mut bare);
     let held = condensation
         .held_modes(ModesWanted::Count(4))
-        .map_err(|e| Error::Usage(format!("{MESH}: {e}")))?
+        .map_err(|source| Error::Modes { mesh: MESH, source })?
         .frequencies_hz();
     let mut table = Table::new(
         "Bar without the ball, link reduced from the mesh, against CalculiX on the mesh: sag of the end under weight along -z and -y, first frequencies with A held.",

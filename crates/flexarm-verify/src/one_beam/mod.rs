@@ -4,12 +4,13 @@ mod mesh;
 
 use std::sync::Arc;
 
-use flexarm::{ConstraintForm, Error, LinkModel, Modelling, Robot, SpookPreset, SpookSettings, Start, StepperKind};
+use flexarm::{ConstraintForm, LinkModel, Modelling, Robot, SpookPreset, SpookSettings, Start, StepperKind};
 use flexarm_draw::{CurveLook, Panel, PlotCurve};
 use flexarm_kinematics::LinkInertia;
 use flexarm_stepping::{Damping, MotionFn, ReferenceSettings};
 use nalgebra::{Matrix6, Vector3, Vector6};
 
+use crate::Error;
 use crate::Pace;
 use crate::bench::{
     ALPHA, Bench, LOADS, LUMPED, Rig, Worst, column_error, compliance_error, damped, larger, modal, parts, small_loads,
@@ -238,7 +239,7 @@ fn splits(case: &mut Case, robot: &Robot) -> Result<(), Error> {
         let link = &mut robot.flexible[0];
         if let Some(beam) = &mut link.beam {
             beam.split_fraction = fraction;
-            link.flexible.reduced = beam.reduce().map_err(|e| Error::Usage(e.to_string()))?;
+            link.flexible.reduced = beam.reduce()?;
         }
         let light = weightless(robot.clone());
         let C = Rig::new(&light, &parts(2), None)?.compliance(&small_loads(&truth), Rig::statics)?;

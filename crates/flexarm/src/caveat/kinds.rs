@@ -42,22 +42,22 @@ pub const SERVO_LIMIT: CaveatKind = CaveatKind::warning(
 pub const FEW_SAMPLES: CaveatKind = CaveatKind::warning(
     "few-samples",
     "{value} logged samples a second are few for a first frequency of {yardstick} Hz: peaks between them are missed; raise \
-     --log-rate or lower --step",
+     {log_rate_hz} or lower {step_s}",
     "1/s",
     "ten samples per period show its peak to 5 %",
 );
 /// Few steps.
 pub const COARSE_STEP: CaveatKind = CaveatKind::warning(
     "coarse-step",
-    "{value} steps per period of the first mode are coarse: lower --step",
+    "{value} steps per period of the first mode are coarse: lower {step_s}",
     "",
     "twenty steps per period or more follow it",
 );
 /// Energy.
 pub const ENERGY_OPEN: CaveatKind = CaveatKind::warning(
     "energy-open",
-    "the energy balance is open by {value} % of the energy in it: the samples are too far apart (--log-rate), the step too \
-     coarse (--step), or the stepper damps by itself",
+    "the energy balance is open by {value} % of the energy in it: the samples are too far apart ({log_rate_hz}), the step too \
+     coarse ({step_s}), or the stepper damps by itself",
     "%",
     "halve the step and compare",
 );

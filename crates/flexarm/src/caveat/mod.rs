@@ -16,6 +16,7 @@ pub(crate) mod size;
 pub mod slip;
 pub(crate) mod validity;
 
+use flexarm_settings::Setting;
 use serde::{Deserialize, Serialize};
 
 /// How much a caveat weighs.
@@ -46,7 +47,7 @@ pub struct CaveatKind {
     pub code: &'static str,
     /// How much it weighs, unless the finder says otherwise.
     pub severity: Severity,
-    /// One sentence with `{where}`, `{value}` and `{yardstick}` in it.
+    /// One sentence with `{where}`, `{value}` and `{yardstick}` in it, and settings by their keys, such as `{step_s}`.
     pub says: &'static str,
     /// Unit of value and yardstick; empty for plain numbers.
     pub unit: &'static str,
@@ -77,6 +78,9 @@ pub struct Caveat {
     pub likely: String,
     /// What to look at, or how to mend it.
     pub help: String,
+    /// Settings of the call whose change may mend it, as far as it is one of them.
+    #[serde(skip)]
+    pub settings: Vec<Setting>,
 }
 
 impl CaveatKind {
@@ -93,7 +97,11 @@ impl CaveatKind {
     /// The caveat about a thing with its value and yardstick, in words.
     pub fn found(&self, location: impl Into<String>, value: f64, yardstick: f64) -> Caveat {
         let location = location.into();
-        let message = (self.says.replace("{where}", &location))
+        let settings = self.settings();
+        // The names of the settings come first: a location may hold braces.
+        let named = |text: String, setting: &Setting| text.replace(&placeholder(*setting), &setting.to_string());
+        let message = (settings.iter().fold(self.says.to_owned(), named))
+            .replace("{where}", &location)
             .replace("{value}", &figure(value))
             .replace("{yardstick}", &figure(yardstick));
         Caveat {
@@ -106,7 +114,13 @@ impl CaveatKind {
             unit: self.unit.into(),
             likely: String::new(),
             help: self.help.into(),
+            settings,
         }
+    }
+
+    /// Settings whose change may mend what it tells.
+    pub fn settings(&self) -> Vec<Setting> {
+        Setting::ALL.into_iter().filter(|setting| self.says.contains(&placeholder(*setting))).collect()
     }
 }
 
@@ -120,6 +134,13 @@ impl Caveat {
             help: help.into(),
             ..Self::default()
         }
+    }
+
+    /// With settings whose change may mend it.
+    #[must_use]
+    pub fn mended_by(mut self, settings: &[Setting]) -> Self {
+        self.settings.extend(settings);
+        self
     }
 
     /// With the slip that would explain it.
@@ -143,6 +164,11 @@ impl Caveat {
     pub fn warns(&self) -> bool {
         self.severity == Severity::Warning
     }
+}
+
+/// How the sentence of a kind names a setting.
+fn placeholder(setting: Setting) -> String {
+    format!("{{{}}}", setting.key())
 }
 
 /// The sentences of the caveats that warn.
@@ -197,6 +223,18 @@ mod tests {
         }
         assert_eq!(serde_json::from_value::<Caveat>(json).unwrap(), caveat);
         assert_eq!(warnings(&[caveat.clone(), caveat.as_note()]), [message]);
+    }
+
+    #[test]
+    fn a_caveat_carries_the_settings_that_mend_it_as_values_and_names_them() {
+        let caveat = kinds::FEW_SAMPLES.found("run", 20.0, 12.5);
+        assert_eq!(caveat.settings, [Setting::Step, Setting::LogRate]);
+        let advice = format!("raise {} or lower {}", Setting::LogRate, Setting::Step);
+        assert!(caveat.message.ends_with(&advice), "{}", caveat.message);
+        assert!(!caveat.message.contains(['{', '}']), "{}", caveat.message);
+        // The values are for programs in the process; files and texts hold the sentence.
+        assert!(serde_json::to_value(&caveat).unwrap().get("settings").is_none());
+        assert!(kinds::EFFORT.found("joint 1", 3.0, 2.0).settings.is_empty());
     }
 
     #[test]

@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use flexarm_fe_io::exchange::{modal_link_held_at, parse_sid, sid_of_modal_link, write_sid};
 use flexarm_fem::{ModalLink, ReducedLink, UnitSystem};
+use flexarm_settings::Setting;
 use nalgebra::{DMatrix, Matrix3};
 
 use super::{ExportChecks, ExportFormat, ExportJob, ExportSummary, difference, nodes, part_lines};
@@ -131,11 +132,13 @@ fn readme(job: &ExportJob, link: &ReducedLink, modal: &ModalLink, map: &str) -> 
     let mut text = format!(
         "Link {}, written by flexarm export as {}\n\nbody reference frame: the link frame, tangent at interface A, whose node does \
          not move\naxes: those of the link\nunits: {units} (length-mass-time; forces follow: 1 unit = {} N); angles in rad\n\
-         Gr, Ge: column (axis-1) nq + mode; Oe: xx yy zz xy yz xz; De is empty\n\nmap for flexarm import: --map \"{map}\" --units \
+         Gr, Ge: column (axis-1) nq + mode; Oe: xx yy zz xy yz xz; De is empty\n\nmap for flexarm import: {} \"{map}\" {} \
          {units}\n\nshape coordinates:\n",
         link.name,
         job.format.name(),
         units.force(),
+        Setting::Map,
+        Setting::Units,
     );
     for (k, label) in modal.labels.iter().enumerate() {
         text += &format!("  {} {label}\n", k + 1);

@@ -8,6 +8,7 @@ use flexarm_fem::matrix_link::reduce_matrices;
 use flexarm_fem::model::FeModel;
 use flexarm_fem::reduction::{Condensation, CondensationOptions, Interface, InterfaceFrame, Superelement, Tie};
 use flexarm_fem::sparse::{ModesWanted, SparseSymmetric};
+use flexarm_settings::Setting;
 use nalgebra::{Matrix3, Vector3};
 
 use super::words::{ImportMap, NodeChoice};
@@ -24,15 +25,16 @@ pub(super) fn is_full(imported: &ImportedMatrices, map: Option<&InterfaceMap>) -
 
 /// What to type where the map of a full model is missing.
 pub(super) fn propose(imported: &ImportedMatrices) -> String {
+    let setting = Setting::Map;
     if is_solid(imported) && !imported.positions.is_empty() {
         let sets: Vec<String> =
             imported.node_sets.iter().map(|(name, nodes)| format!("{name:?} ({} nodes)", nodes.len())).collect();
         let list = if sets.is_empty() { "none".into() } else { sets.join(", ") };
         let (low, high) = box_of(imported);
         return format!(
-            "choose the nodes of each interface, which are tied rigidly: --map A=set:NAME,B=set:NAME with the sets of the \
-             file ({list}), or by planes such as --map \"A=plane({},0,0;1,0,0),B=plane({},0,0;1,0,0)\"; the nodes lie \
-             between {:?} and {:?}",
+            "choose the nodes of each interface, which are tied rigidly: {setting} A=set:NAME,B=set:NAME with the sets of \
+             the file ({list}), or by planes such as {setting} \"A=plane({},0,0;1,0,0),B=plane({},0,0;1,0,0)\"; the nodes \
+             lie between {:?} and {:?}",
             low.x,
             high.x,
             <[f64; 3]>::from(low),
@@ -44,13 +46,13 @@ pub(super) fn propose(imported: &ImportedMatrices) -> String {
     nodes.dedup();
     match nodes[..] {
         [.., a, b, c, d] => format!(
-            "give --map with the reference nodes: CalculiX has them after *RIGID BODY, REF NODE= (translations) and ROT \
-             NODE= (rotations); if they are the last nodes of the model: --map A={a}:1-3+{b}:1-3,B={c}:1-3+{d}:1-3; with \
-             six components per node: --map A={c},B={d}"
+            "give {setting} with the reference nodes: CalculiX has them after *RIGID BODY, REF NODE= (translations) and \
+             ROT NODE= (rotations); if they are the last nodes of the model: {setting} \
+             A={a}:1-3+{b}:1-3,B={c}:1-3+{d}:1-3; with six components per node: {setting} A={c},B={d}"
         ),
-        _ => {
-            "the rows have no node numbers; give the list of rows too (.dof, .mapping), or --map A=#1-6,B=#7-12".into()
-        }
+        _ => format!(
+            "the rows have no node numbers; give the list of rows too (.dof, .mapping), or {setting} A=#1-6,B=#7-12"
+        ),
     }
 }
 
@@ -81,8 +83,8 @@ pub(super) fn reduce(imported: &ImportedMatrices, map: &ImportMap, target: Targe
     let path = || imported.origin.clone().into();
     let refuse = |what: String| Error::File { path: path(), what };
     let Some(mass) = &imported.mass else {
-        let what = "a full model can only be reduced with its mass: give the mass matrix too (.mas, --mass-file)";
-        return Err(refuse(what.into()));
+        let what = "a full model can only be reduced with its mass: give the mass matrix too";
+        return Err(refuse(format!("{what} (.mas, {})", Setting::MassFile)));
     };
     let failed = |source| Error::Import { path: path(), source: Box::new(source) };
     let modes = ModesWanted::Count(target.modes);
@@ -105,8 +107,8 @@ pub(super) fn reduce(imported: &ImportedMatrices, map: &ImportMap, target: Targe
         ImportMap::Nodes(list) => {
             if !is_solid(imported) || imported.positions.is_empty() {
                 let what = "sets and planes need three components at every node and positions, which only Exudyn files \
-                            have; pick rows by node: --map A=947:1-3+948:1-3,B=949:1-3+950:1-3";
-                return Err(refuse(what.into()));
+                            have; pick rows by node:";
+                return Err(refuse(format!("{what} {} A=947:1-3+948:1-3,B=949:1-3+950:1-3", Setting::Map)));
             }
             let nodes: Vec<i64> = rows.iter().step_by(3).filter_map(|label| label.node).collect();
             let position = |node: &i64| imported.positions.get(node).map(|p| p * target.units.length);

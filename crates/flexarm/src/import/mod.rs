@@ -37,9 +37,10 @@ use flexarm_fem::gate::check_matrix12;
 use flexarm_fem::matrix_link::{MatrixPlan, MatrixReduction, link_from_superelement, turned};
 use flexarm_fem::reduction::{InterfaceFrame, Superelement, stiffness12};
 use flexarm_fem::{FemError, GateLimits, Pose, Provenance, SplitAt, UnitSystem, write_flex};
+use flexarm_settings::{Caller, Setting};
 use nalgebra::{DMatrix, Rotation3, Translation3, Vector3};
 
-use crate::error::Error;
+use crate::error::{Error, ImportError};
 use crate::{result_files, stamp};
 use summary::Parts;
 
@@ -130,7 +131,7 @@ pub struct ImportOutputs {
 /// Reads matrices, makes a link of them, writes the files.
 ///
 /// # Errors
-/// [`Error`]; what is missing is asked for all at once. See [`Error::exit_code`].
+/// [`Error`]; what is missing is asked for all at once. See [`Error::fault`].
 pub fn import(job: &ImportJob, outputs: Option<&ImportOutputs>) -> Result<ImportSummary, Error> {
     let (started, cpu) = (Instant::now(), cpu_time::ProcessTime::now());
     let name = job.link_name();
@@ -138,7 +139,7 @@ pub fn import(job: &ImportJob, outputs: Option<&ImportOutputs>) -> Result<Import
     if let Some(targets) = &targets {
         result_files::check_free(&targets.all(), targets.overwrite)?;
     }
-    let first = job.files.first().ok_or_else(|| Error::Usage("no file to import is given".into()))?;
+    let first = job.files.first().ok_or_else(|| ImportError::NoFile)?;
     let head = InputFile::open(first).map_err(Box::new)?;
     let (reduction, parts) = if recognise(&head.bytes) == Some(MatrixFormat::Sid) {
         expect_format(job, MatrixFormat::Sid, &head.origin)?;
@@ -161,7 +162,8 @@ pub fn import(job: &ImportJob, outputs: Option<&ImportOutputs>) -> Result<Import
 fn expect_format(job: &ImportJob, found: MatrixFormat, origin: &str) -> Result<(), Error> {
     match job.format {
         Some(format) if !format.covers(found) => {
-            let what = format!("is {} by its content, --format says otherwise: leave it out", found.name());
+            let what =
+                format!("is {} by its content, {} says otherwise: leave it out", found.name(), Setting::MatrixFormat);
             Err(Error::File { path: origin.into(), what })
         }
         _ => Ok(()),
@@ -178,8 +180,7 @@ fn matrices(job: &ImportJob, name: &str) -> Result<(MatrixReduction, Parts), Err
     if let (Some(given), Some(sidecar)) = (job.units, sidecar)
         && given != sidecar.units
     {
-        warnings
-            .push(format!("the sidecar says the units are {}, the command line {given}, which counts", sidecar.units));
+        warnings.push(format!("the sidecar says the units are {}, {Caller} {given}, which counts", sidecar.units));
     }
     let from_sidecar = || sidecar.map(|sidecar| ImportMap::Rows(sidecar.map()));
     let map = job.map.clone().or_else(from_sidecar).filter(|map| !map.entries().is_empty());
@@ -192,8 +193,11 @@ fn matrices(job: &ImportJob, name: &str) -> Result<(MatrixReduction, Parts), Err
 
     let mut faults = Vec::new();
     if units.is_none() {
-        let what = "the units of the file are not declared: --units LENGTH-MASS-TIME, such as --units m-kg-s (N, Pa) or \
-                    --units mm-t-s (N, MPa); no matrix says them itself";
+        let what = format!(
+            "the units of the file are not declared: {units} LENGTH-MASS-TIME, such as {units} m-kg-s (N, Pa) or {units} \
+             mm-t-s (N, MPa); no matrix says them itself",
+            units = Setting::Units
+        );
         faults.push(file_error(&imported, what));
     }
     if map.is_none() {
@@ -206,13 +210,14 @@ fn matrices(job: &ImportJob, name: &str) -> Result<(MatrixReduction, Parts), Err
                     let rows = imported.stiffness.rows.len();
                     let modal = match unnumbered && map.modal.is_empty() && map.interfaces.len() > 2 {
                         true => format!(
-                            ", or, where modes follow two interfaces, --map \"A=#1-6,B=#7-12,modal=#13-{rows}\""
+                            ", or, where modes follow two interfaces, {} \"A=#1-6,B=#7-12,modal=#13-{rows}\"",
+                            Setting::Map
                         ),
                         false => String::new(),
                     };
-                    format!("if the proximal interface comes first: --map \"{map}\"{modal}")
+                    format!("if the proximal interface comes first: {} \"{map}\"{modal}", Setting::Map)
                 }
-                None => "give --map, such as A=1001,B=1002 or A=#1-6,B=#7-12".into(),
+                None => format!("give {}, such as A=1001,B=1002 or A=#1-6,B=#7-12", Setting::Map),
             }
         };
         faults.push(file_error(&imported, format!("which rows are interface A and which B is not said: {proposal}")));
@@ -251,7 +256,8 @@ fn matrices(job: &ImportJob, name: &str) -> Result<(MatrixReduction, Parts), Err
         (full::reduce(&imported, &map, target)?, true, imported.stiffness.asymmetry)
     } else {
         if job.modes.is_some() {
-            warnings.push("--modes only counts for full models; these matrices are reduced already".into());
+            let modes = Setting::Modes;
+            warnings.push(format!("{modes} only counts for full models; these matrices are reduced already"));
         }
         let rows = rows_of(&map);
         let reduced = assemble_interfaces(&imported, rows.as_ref(), Some(&units)).map_err(Box::new)?;
@@ -364,10 +370,10 @@ fn place(
     }
     for (k, at) in job.at.iter().enumerate() {
         if !names.contains(&at.name) {
-            return Err(Error::Usage(format!("--at names interface {:?}, the map has {names:?}", at.name)));
+            return Err(ImportError::UnknownInterface { interface: at.name.clone(), known: names }.into());
         }
         if job.at[..k].iter().any(|other| other.name == at.name) {
-            return Err(Error::Usage(format!("--at {}=... is given twice", at.name)));
+            return Err(ImportError::FrameTwice { interface: at.name.clone() }.into());
         }
     }
     let mut placed = Vec::new();
@@ -382,7 +388,8 @@ fn place(
                     && (p - at.xyz).norm() > 1e-6 * p.norm().max(at.xyz.norm())
                 {
                     let (p, q): ([f64; 3], [f64; 3]) = (p.into(), at.xyz.into());
-                    warnings.push(format!("interface {name}: {from} is {p:?}, --at says {q:?}, which counts"));
+                    warnings
+                        .push(format!("interface {name}: {from} is {p:?}, {} says {q:?}, which counts", Setting::At));
                 }
                 Placed { name: name.clone(), xyz: at.xyz, rotation: rotation(&at.rpy), from: "given" }
             }
@@ -392,8 +399,7 @@ fn place(
         placed.push(one);
     }
     if (placed[0].xyz - placed[1].xyz).norm() == 0.0 {
-        let what = format!("interfaces {:?} and {:?} are at the same point; a link needs a length", names[0], names[1]);
-        return Err(Error::Usage(what));
+        return Err(ImportError::SamePoint { first: names[0].clone(), second: names[1].clone() }.into());
     }
     Ok(placed)
 }
@@ -444,17 +450,18 @@ fn no_place(imported: &ImportedMatrices, map: Option<&ImportMap>, names: &[Strin
         Some(places) if places.len() + 1 == names.len() => {
             let place = |(name, p): (&String, &Vector3<f64>)| {
                 let [x, y, z] = <[f64; 3]>::from(*p).map(|x| if x.abs() < 1e-9 * p.norm() { 0.0 } else { x });
-                (format!("{name} at ({x:.6}, {y:.6}, {z:.6})"), format!(" --at {name}={x:.6},{y:.6},{z:.6}"))
+                (format!("{name} at ({x:.6}, {y:.6}, {z:.6})"), format!(" {} {name}={x:.6},{y:.6},{z:.6}", Setting::At))
             };
             let (where_they_are, flags): (Vec<String>, Vec<String>) = names[1..].iter().zip(&places).map(place).unzip();
             format!(
-                "the stiffness itself says, from {a}: {}; if {a} is the origin of the link: --at {a}=0,0,0{}",
+                "the stiffness itself says, from {a}: {}; if {a} is the origin of the link: {} {a}=0,0,0{}",
                 where_they_are.join(", "),
+                Setting::At,
                 flags.concat()
             )
         }
         _ => {
-            let flags: Vec<String> = names.iter().map(|name| format!("--at {name}=x,y,z")).collect();
+            let flags: Vec<String> = names.iter().map(|name| format!("{} {name}=x,y,z", Setting::At)).collect();
             format!("give {}", flags.join(" "))
         }
     };

@@ -11,12 +11,13 @@ use flexarm_fe_io::exchange::{InputFile, InterfaceMap, RowPick, Sid, modal_link_
 use flexarm_fem::matrix_link::{MatrixReduction, PartMasses, link_from_superelement};
 use flexarm_fem::reduction::{InterfaceFrame, Superelement};
 use flexarm_fem::{GeometricStiffness, LinkDetails, ModalInterface, ModalLink, Pose, RigidPart, UnitSystem};
+use flexarm_settings::Setting;
 use nalgebra::{DMatrix, Matrix6, Rotation3, Translation3, Vector3};
 
 use super::summary::{ImportInterface, Parts};
 use super::words::ImportMap;
 use super::{ImportJob, SECOND_ORDER_UNKNOWN, plan, rotation};
-use crate::error::Error;
+use crate::error::{Error, ImportError};
 
 pub(super) fn import(job: &ImportJob, file: &InputFile, name: &str) -> Result<(MatrixReduction, Parts), Error> {
     let refuse = |what: String| Error::File { path: file.origin.clone().into(), what };
@@ -24,13 +25,15 @@ pub(super) fn import(job: &ImportJob, file: &InputFile, name: &str) -> Result<(M
     let ids: Vec<i64> = sid.nodes.iter().map(|node| node.id).collect();
     let mut faults = Vec::new();
     if job.units.is_none() {
-        faults.push(refuse("the units of the file are not declared: --units m-kg-s is usual for SID".into()));
+        let units = Setting::Units;
+        faults.push(refuse(format!("the units of the file are not declared: {units} m-kg-s is usual for SID")));
     }
     let nodes = match &job.map {
         Some(map) => named_nodes(map, &ids),
         None => {
             let (first, last) = (ids.first().copied().unwrap_or(1), ids.last().copied().unwrap_or(2));
-            Err(format!("which nodes are A and B is not said; its nodes are {ids:?}: --map \"A={first},B={last}\""))
+            let setting = Setting::Map;
+            Err(format!("which nodes are A and B is not said; its nodes are {ids:?}: {setting} \"A={first},B={last}\""))
         }
     };
     let nodes = nodes.map_err(|what| faults.push(refuse(what))).ok();
@@ -38,12 +41,11 @@ pub(super) fn import(job: &ImportJob, file: &InputFile, name: &str) -> Result<(M
         return Err(if faults.len() == 1 { faults.remove(0) } else { Error::Several(faults) });
     };
     if let Some(at) = job.at.first() {
-        let what = format!("--at {}=...: the positions are in the SID file; leave --at out", at.name);
-        return Err(Error::Usage(what));
+        return Err(ImportError::FrameOfSid { interface: at.name.clone() }.into());
     }
     let mut warnings = Vec::new();
     if job.modes.is_some() {
-        warnings.push("--modes only counts for full models; the modes of a SID are all kept".into());
+        warnings.push(format!("{} only counts for full models; the modes of a SID are all kept", Setting::Modes));
     }
 
     let sid = sid.in_units(&units, &UnitSystem::SI);

@@ -6,6 +6,7 @@ use flexarm_fem::reduction::{Interface, Tie};
 use flexarm_fem::{Mesh, NodeSelector, RigidPart};
 use flexarm_flexlink::{SubstitutionError, distal_joint};
 use flexarm_kinematics::{Mechanism, Pose};
+use flexarm_settings::Setting;
 use flexarm_urdf::{ReadOptions, read_urdf};
 use nalgebra::{Rotation3, Translation3, Vector3};
 
@@ -112,7 +113,7 @@ impl Place<'_> {
         let shown: Vec<String> =
             sets.iter().take(MOST).map(|(name, nodes)| format!("{name:?} ({} nodes)", nodes.len())).collect();
         let more = sets.len().saturating_sub(MOST);
-        let rest = if more > 0 { format!(" and {more} more (--list shows all)") } else { String::new() };
+        let rest = if more > 0 { format!(" and {more} more ({} shows all)", Setting::List) } else { String::new() };
         format!("node sets of the mesh: {}{rest}", shown.join(", "))
     }
 
@@ -123,9 +124,10 @@ impl Place<'_> {
             let found = job.interface.len();
             let what = format!(
                 "{found} interface(s) given, a link needs at least two, the proximal one first: \
-                 --interface A=SELECTOR --interface B=SELECTOR, where SELECTOR is a node set or a place such as \
-                 plane(x,y,z; nx,ny,nz); {}",
-                self.known_sets()
+                 {interface} A=SELECTOR {interface} B=SELECTOR, where SELECTOR is a node set or a place such as \
+                 plane(x,y,z; nx,ny,nz); {sets}",
+                interface = Setting::Interface,
+                sets = self.known_sets()
             );
             faults.push(Error::File { path: job.mesh.clone(), what });
         }
@@ -152,7 +154,8 @@ impl Place<'_> {
         let fail = |what: String| Error::Interface { place: place.clone(), interface: name.clone(), what };
         let Some(selector) = &entry.select else {
             return Err(fail(format!(
-                "it has no nodes: --interface {name}=SELECTOR or select = \"...\"; {}",
+                "it has no nodes: {} {name}=SELECTOR or select = \"...\"; {}",
+                Setting::Interface,
                 self.known_sets()
             )));
         };
@@ -176,7 +179,8 @@ impl Place<'_> {
             (None, Some(_), None) => turned(centroid),
             (None, None, Some(joint)) => {
                 let robot = robot.ok_or_else(|| {
-                    fail(format!("joint {joint:?} needs a robot: --urdf FILE --link NAME, or [urdf] in the job file"))
+                    let (urdf, link) = (Setting::Urdf, Setting::Link);
+                    fail(format!("joint {joint:?} needs a robot: {urdf} FILE {link} NAME, or [urdf] in the job file"))
                 })?;
                 robot.joint(joint).map_err(fail)?
             }
@@ -185,7 +189,8 @@ impl Place<'_> {
                 (Some(robot), 1) => robot.X_LB,
                 (Some(robot), _) => {
                     let joints = robot.joints();
-                    let hint = joints.iter().map(|joint| format!("--at {name}=joint:{joint}")).collect::<Vec<_>>();
+                    let hint =
+                        joints.iter().map(|joint| format!("{} {name}=joint:{joint}", Setting::At)).collect::<Vec<_>>();
                     let hint = format!("; at a joint of the link: {}", hint.join(" or "));
                     return Err(fail(self.no_position(&name, nodes.len(), &centroid) + &hint));
                 }
@@ -201,10 +206,13 @@ impl Place<'_> {
     fn no_position(&self, name: &str, nodes: usize, centroid: &Vector3<f64>) -> String {
         let xyz = self.typed(centroid);
         format!(
-            "it has no position: --at {name}={xyz} (that is the centroid of its {nodes} nodes; link frame, in the \
-             unit of the mesh), --at {name}=centroid, or frames from a robot with --urdf FILE --link NAME; in a job \
-             file xyz = [{}], at = \"centroid\" or [urdf]",
-            xyz.replace(',', ", ")
+            "it has no position: {at} {name}={xyz} (that is the centroid of its {nodes} nodes; link frame, in the \
+             unit of the mesh), {at} {name}=centroid, or frames from a robot with {urdf} FILE {link} NAME; in a job \
+             file xyz = [{list}], at = \"centroid\" or [urdf]",
+            at = Setting::At,
+            urdf = Setting::Urdf,
+            link = Setting::Link,
+            list = xyz.replace(',', ", ")
         )
     }
 
@@ -251,9 +259,12 @@ impl RobotLink {
         let X_LB = X_LB.map_err(|e| {
             let what = match &e {
                 SubstitutionError::DistalUnclear { link, children } => format!(
-                    "link {link:?} has {} joints that lead on ({children:?}): name the one at B with --joint NAME, or joint = \
-                     \"NAME\" in [urdf]; the others may be further interfaces, such as --interface C=SELECTOR --at C=joint:{}",
+                    "link {link:?} has {} joints that lead on ({children:?}): name the one at B with {} NAME, or joint = \
+                     \"NAME\" in [urdf]; the others may be further interfaces, such as {} C=SELECTOR {} C=joint:{}",
                     children.len(),
+                    Setting::Joint,
+                    Setting::Interface,
+                    Setting::At,
                     children.last().map_or("NAME", String::as_str)
                 ),
                 other => other.to_string(),

@@ -36,7 +36,7 @@ use flexarm_fem::mesh_link::ReductionStep;
 use flexarm_fem::{UnitSystem, reduce_mesh, write_flex};
 use flexarm_kinematics::Pose;
 
-use crate::error::Error;
+use crate::error::{Error, ValueError};
 use files::Paths;
 use interfaces::Place;
 use prepare::{Prepared, failed, prepare};
@@ -85,7 +85,7 @@ pub struct ReduceProgress {
 /// Everything that can be checked is checked before the work starts; nothing is written if it fails.
 ///
 /// # Errors
-/// [`Error`]; several faults of a job come together. See [`Error::exit_code`].
+/// [`Error`]; several faults of a job come together. See [`Error::fault`].
 pub fn reduce(
     job: &ReduceJob,
     options: &ReduceOptions,
@@ -149,20 +149,20 @@ pub fn list_mesh(job: &ReduceJob) -> Result<MeshListing, Error> {
 }
 
 /// The job with every default written out.
-fn with_defaults(job: &ReduceJob) -> Result<ReduceJob, Error> {
+fn with_defaults(job: &ReduceJob) -> Result<ReduceJob, ValueError> {
     let mut job = job.clone();
     job.put_over(ReduceJob::default()); // names the interfaces
     job.link = Some(job.link_name());
     match (job.modes, job.modes_up_to_hz) {
         (None, None) => job.modes = Some(MODES),
         (Some(_), Some(_)) => {
-            return Err(Error::Usage("modes and modes_up_to_hz exclude each other: give one of them".into()));
+            return Err(ValueError::ModesTwice);
         }
         (Some(modes), None) if modes > MOST_MODES => {
-            return Err(Error::Usage(format!("--modes {modes}: at most {MOST_MODES} can be kept")));
+            return Err(ValueError::TooManyModes { found: modes, most: MOST_MODES });
         }
         (None, Some(hz)) if !(hz.is_finite() && hz > 0.0) => {
-            return Err(Error::Usage(format!("--modes-up-to {hz}: a positive frequency in Hz is expected")));
+            return Err(ValueError::ModesUpTo(hz));
         }
         _ => {}
     }
@@ -170,7 +170,7 @@ fn with_defaults(job: &ReduceJob) -> Result<ReduceJob, Error> {
     chains.sort_unstable();
     chains.dedup();
     if let Some(parts) = chains.iter().find(|parts| !(2..=100).contains(*parts)) {
-        return Err(Error::Usage(format!("--chains {parts}: a chain has 2 to 100 parts")));
+        return Err(ValueError::ChainParts(*parts));
     }
     job.geometric.get_or_insert(false);
     job.tie.get_or_insert(Tie::Rigid);
@@ -179,7 +179,7 @@ fn with_defaults(job: &ReduceJob) -> Result<ReduceJob, Error> {
     job.ordering.get_or_insert(OrderingChoice::Auto);
     let threads = *job.threads.get_or_insert(1);
     if !(1..=1024).contains(&threads) {
-        return Err(Error::Usage(format!("--threads {threads}: 1 to 1024 are possible")));
+        return Err(ValueError::Threads(threads));
     }
     Ok(job)
 }
@@ -201,8 +201,8 @@ fn pictures(
     reduction: &flexarm_fem::MeshReduction,
 ) -> Result<Vec<(&'static str, Vec<u8>)>, Error> {
     use flexarm_draw::mesh_picture::MeshPictures;
-    fn failed(error: impl std::fmt::Display) -> Error {
-        Error::Usage(format!("the pictures failed: {error}"))
+    fn failed(error: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Error {
+        Error::Pictures(error.into())
     }
     let sheets = MeshPictures::new(mesh, &plan.interfaces, reduction).map_err(failed)?;
     let mut all = vec![("interfaces.png", sheets.render_interfaces()), ("unit_loads.png", sheets.render_unit_loads())];

@@ -9,6 +9,7 @@ use flexarm_fem::reduction::{CondensationOptions, ReductionError, TieError};
 use flexarm_fem::sparse::{ModesWanted, Ordering, Threads};
 use flexarm_fem::{Doubt, GateLimits, LinkPlan, Material, Provenance, SplitAt, UnitSystem, mass_properties};
 use flexarm_kinematics::Pose;
+use flexarm_settings::Setting;
 use nalgebra::Vector3;
 
 use super::interfaces::{Chosen, Place, RobotLink, pose};
@@ -16,7 +17,7 @@ use super::job::ReduceJob;
 use super::summary::{MaterialFigures, RegionFigures};
 use super::words::{MATERIAL_FORMS, OrderingChoice, QuadratureChoice, SplitChoice, described};
 use super::{JUDGED_MODES, MODES, MOST_MODES, ReduceOptions};
-use crate::error::Error;
+use crate::error::{Error, ValueError};
 use crate::stamp;
 
 /// All that a reduction needs.
@@ -47,9 +48,7 @@ pub(super) fn prepare(job: &ReduceJob, options: &ReduceOptions) -> Result<Prepar
     }
     let materials = materials(job, &mut file, &mut faults, &mut warnings);
     if job.link_name().trim().is_empty() || job.link_name().contains(['/', '\\', '\n']) {
-        let what =
-            format!("{:?} is no name for a link: give one that can be part of a file name (--name)", job.link_name());
-        faults.push(Error::Usage(what));
+        faults.push(ValueError::LinkName(job.link_name()).into());
     }
     // Said by the reader about a deck without sections; the job has the material.
     warnings.retain(|said| !said.contains("hence without a material") || materials.is_empty());
@@ -93,7 +92,7 @@ pub(super) fn prepare(job: &ReduceJob, options: &ReduceOptions) -> Result<Prepar
 /// Joins nodes that lie in one place.
 fn merge(file: &mut MeshFile, distance: f64, units: UnitSystem, warnings: &mut Vec<String>) -> Result<(), Error> {
     if !(distance.is_finite() && distance >= 0.0) {
-        return Err(Error::Usage(format!("merge = {distance}: a distance of zero or more, in the unit of the mesh")));
+        return Err(ValueError::MergeDistance(distance).into());
     }
     let merged = file.mesh.merge_coincident(distance * units.length);
     let before = file.mesh.nodes.len();
@@ -125,9 +124,10 @@ fn material_doubts(file: &MeshFile, units: UnitSystem, figures: &[RegionFigures]
 fn no_units(job: &ReduceJob, file: &MeshFile) -> Error {
     let size = file.mesh.bounding_box().map_or(0.0, |(low, high)| (high - low).amax());
     let what = format!(
-        "the units of the mesh are not declared: --units LENGTH-MASS-TIME or units = \"...\"; the mesh is {size:.6} long in \
+        "the units of the mesh are not declared: {setting} LENGTH-MASS-TIME or units = \"...\"; the mesh is {size:.6} long in \
          its own unit, so {size:.4} m with m-kg-s (N, Pa) and {:.4} m with mm-t-s (N, MPa)",
-        1e-3 * size
+        1e-3 * size,
+        setting = Setting::Units
     );
     Error::File { path: job.mesh.clone(), what }
 }
@@ -174,10 +174,11 @@ fn materials(
     }
     if !missing.is_empty() {
         faults.push(fault(format!(
-            "no material for {} {missing:?}: --material MATERIAL for all, --material REGION=MATERIAL for one, or \
+            "no material for {} {missing:?}: {setting} MATERIAL for all, {setting} REGION=MATERIAL for one, or \
              material = ... in the job file, where MATERIAL is {}",
             if missing.len() == 1 { "region" } else { "regions" },
-            MATERIAL_FORMS
+            MATERIAL_FORMS,
+            setting = Setting::Material
         )));
     }
     figures

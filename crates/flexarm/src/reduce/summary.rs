@@ -5,6 +5,7 @@ use flexarm_fem::chain::Chain;
 use flexarm_fem::mesh_gate::ModeCheck;
 use flexarm_fem::sparse::Ordering;
 use flexarm_fem::{Doubt, LinkPlan, Material, MeshReduction, ModalLink, RigidPart, UnitSystem};
+use flexarm_settings::Setting;
 use nalgebra::{Matrix3, Matrix6};
 use serde::Serialize;
 
@@ -429,7 +430,9 @@ pub(super) fn summary_of(
 
 /// Errors of the first frequency beyond which a model is called too coarse.
 const COARSE_PARTS: f64 = 0.05;
-const COARSE_MODES: f64 = 0.005;
+const MODES_MISS: f64 = 0.005;
+/// Code of the caveat that the kept modes miss it.
+const COARSE_MODES: &str = "coarse-modes";
 
 /// Sentences about reduced models that miss the first frequency.
 ///
@@ -444,10 +447,11 @@ pub(crate) fn coarse(source: &str, parts: Option<f64>, modes: Option<f64>) -> Ve
         );
         Doubt::found("coarse-parts", error, COARSE_PARTS, said)
     });
-    let modes = off(modes, COARSE_MODES).map(|error| {
+    let modes = off(modes, MODES_MISS).map(|error| {
         let percent = 100.0 * error;
-        let said = format!("the kept modes miss the first frequency by {percent:+.2} %: keep more of them (--modes)");
-        Doubt::found("coarse-modes", error, COARSE_MODES, said)
+        let setting = Setting::Modes;
+        let said = format!("the kept modes miss the first frequency by {percent:+.2} %: keep more of them ({setting})");
+        Doubt::found(COARSE_MODES, error, MODES_MISS, said)
     });
     parts.into_iter().chain(modes).collect()
 }
@@ -456,7 +460,8 @@ pub(crate) fn coarse(source: &str, parts: Option<f64>, modes: Option<f64>) -> Ve
 pub(crate) fn doubted(link: &str, doubt: Doubt) -> Caveat {
     let Doubt { code, message, value, yardstick } = doubt;
     let finite = |x: Option<f64>| x.filter(|x| x.is_finite());
-    Caveat { value: finite(value), yardstick: finite(yardstick), ..Caveat::said(code, link, message, "") }
+    let settings = if code == COARSE_MODES { vec![Setting::Modes] } else { Vec::new() };
+    Caveat { value: finite(value), yardstick: finite(yardstick), settings, ..Caveat::said(code, link, message, "") }
 }
 
 fn rows3(M: &Matrix3<f64>) -> [[f64; 3]; 3] {

@@ -4,11 +4,12 @@ use std::path::{Path, PathBuf};
 
 use flexarm_analysis::{ErrorRecord, MetricSettings, error_parts, tcp_metrics_on_path};
 use flexarm_log::{EventKind, RecordingFormat, RunHeader, Trace};
+use flexarm_settings::Setting;
 use serde::Serialize;
 
 use super::{ReportRun, figures, html};
 use crate::convert::{no_sample, read_run, same_file};
-use crate::error::Error;
+use crate::error::{Error, RecordingError};
 use crate::result_files::{check_free, write_all};
 use crate::summary::{StepperFigures, Summary, TcpFigures};
 
@@ -53,7 +54,7 @@ struct Input {
 /// its curves, and what curves cannot tell is left out.
 ///
 /// # Errors
-/// As [`read_run`]; [`Error::File`] for a folder without a recording and for places that are taken; [`Error::Usage`] if
+/// As [`read_run`]; [`Error::File`] for a folder without a recording; [`Error::Taken`]; [`Error::Recording`] if
 /// the page would replace a recording that it is made of.
 pub fn report(recordings: &[PathBuf], options: &ReportOptions) -> Result<ReportFiles, Error> {
     let mut warnings = Vec::new();
@@ -72,7 +73,7 @@ pub fn report(recordings: &[PathBuf], options: &ReportOptions) -> Result<ReportF
         }
     }
     let Some(first) = inputs.first() else {
-        return Err(Error::Usage("give at least one recording, or the folder of a run".into()));
+        return Err(RecordingError::NothingToReport.into());
     };
     let page = options.output.clone().unwrap_or_else(|| first.path.with_file_name("report.html"));
     let folder = page.with_file_name(crate::record::FIGURES_FOLDER);
@@ -134,18 +135,16 @@ fn read_all(inputs: &[Input], warnings: &mut Vec<String>) -> Result<Vec<(String,
 /// Refuses places that are taken, before anything is read at length or written.
 fn check_places(inputs: &[Input], page: &Path, folder: &Path, options: &ReportOptions) -> Result<(), Error> {
     if let Some(input) = inputs.iter().find(|input| same_file(&input.path, page)) {
-        let path = input.path.display();
-        let text = format!("{path} is a recording and the page to be written: give the page another name with -o");
-        return Err(Error::Usage(text));
+        return Err(RecordingError::PageOverRecording { path: input.path.clone() }.into());
     }
     check_free(&[page.to_owned()], options.overwrite)?;
-    let fail = |what: &str| Err(Error::File { path: folder.to_owned(), what: what.into() });
     if !options.figures || !folder.exists() {
         Ok(())
     } else if !folder.is_dir() {
-        fail("is a file, a folder with figures is to be written there: choose another place with -o")
+        let what = "is a file, a folder with figures is to be written there: choose another place with";
+        Err(Error::File { path: folder.to_owned(), what: format!("{what} {}", Setting::Output) })
     } else if !options.overwrite {
-        fail("exists already and is not overwritten: choose another place with -o or give --force")
+        Err(Error::Taken { path: folder.to_owned(), place: "place", movable: true })
     } else {
         Ok(())
     }

@@ -54,7 +54,7 @@ pub type Progress<'a> = dyn FnMut(f64, f64) -> ControlFlow<()> + 'a;
 /// closed so that every reader takes them.
 ///
 /// # Errors
-/// [`Error`]; see [`Error::exit_code`].
+/// [`Error`]; see [`Error::fault`].
 pub fn simulate(
     robot: &Robot,
     scenario: impl Into<Scenario>,

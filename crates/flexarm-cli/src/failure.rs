@@ -1,0 +1,110 @@
+//! What ends a command: an error of the library, of the case studies, or words on the command line that make no sense; its
+//! message, and the code that the process ends with.
+
+use std::process::ExitCode;
+
+use flexarm::{Fault, TrajectoryError};
+
+/// What ends a command.
+#[derive(Debug)]
+pub(crate) enum Failure {
+    /// Words on the command line that make no sense together.
+    Usage(String),
+    /// A run of a study whose command line makes no sense.
+    InStudy { label: String, source: Box<Failure> },
+    /// What the library says.
+    Library(flexarm::Error),
+    /// What the case studies say.
+    Verify(flexarm_verify::Error),
+}
+
+impl From<flexarm::Error> for Failure {
+    fn from(error: flexarm::Error) -> Self {
+        Self::Library(error)
+    }
+}
+
+impl From<flexarm_verify::Error> for Failure {
+    fn from(error: flexarm_verify::Error) -> Self {
+        match error {
+            flexarm_verify::Error::Library(error) => Self::Library(error),
+            other => Self::Verify(other),
+        }
+    }
+}
+
+impl std::fmt::Display for Failure {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Usage(text) => f.write_str(text),
+            Self::InStudy { label, source } => write!(f, "run {label:?} of the study: {source}"),
+            Self::Library(error) => error.fmt(f),
+            Self::Verify(error) => error.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for Failure {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            Self::Usage(_) => None,
+            Self::InStudy { source, .. } => Some(source),
+            Self::Library(error) => error.source(),
+            Self::Verify(error) => error.source(),
+        }
+    }
+}
+
+impl Failure {
+    /// What the process ends with: 2 for bad input, 1 for a run that failed.
+    pub(crate) fn exit_code(&self) -> ExitCode {
+        let fault = match self {
+            Self::Usage(_) => Fault::Input,
+            Self::InStudy { source, .. } => return source.exit_code(),
+            Self::Library(error) => error.fault(),
+            Self::Verify(error) => error.fault(),
+        };
+        ExitCode::from(match fault {
+            Fault::Input => 2,
+            Fault::Run => 1,
+        })
+    }
+
+    /// The message with its causes, and where help is to be had.
+    pub(crate) fn print(&self) {
+        let text = self.to_string();
+        eprintln!("error: {text}");
+        let mut source = std::error::Error::source(self);
+        while let Some(cause) = source {
+            // Messages that already contain their cause do not say it twice.
+            if !text.contains(&cause.to_string()) {
+                eprintln!("  because: {cause}");
+            }
+            source = cause.source();
+        }
+        if let Some(page) = self.page() {
+            eprintln!("  help: `flexarm format {page}` prints the keys with their units, and examples");
+        }
+    }
+
+    /// The page of the format of a file that is not as it should be.
+    fn page(&self) -> Option<&'static str> {
+        match self {
+            Self::InStudy { source, .. } => source.page(),
+            Self::Library(error) => page_of(error),
+            Self::Usage(_) | Self::Verify(_) => None,
+        }
+    }
+}
+
+fn page_of(error: &flexarm::Error) -> Option<&'static str> {
+    match error {
+        flexarm::Error::InStudy { source, .. } => page_of(source),
+        flexarm::Error::Trajectory(TrajectoryError::File(_)) => Some("motion"),
+        flexarm::Error::RobotFile(fault) if fault.message.contains("unknown field") => {
+            let loads = fault.message.contains("`payload`, ") || fault.message.contains("spindle_rpm");
+            Some(if loads && !fault.message.contains("`urdf`") { "loads" } else { "robot" })
+        }
+        _ => None,
+    }
+}

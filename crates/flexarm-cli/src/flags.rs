@@ -1,0 +1,82 @@
+//! What the settings of the library are called on the command line.
+
+use flexarm::{Names, Setting};
+
+/// The flags, for all messages of this process.
+pub(crate) const NAMES: Names = Names { setting: flag, caller: "the command line" };
+
+fn flag(setting: Setting) -> &'static str {
+    match setting {
+        Setting::Step => "--step",
+        Setting::LogRate => "--log-rate",
+        Setting::Stepper => "--stepper",
+        Setting::Tolerance => "--rtol",
+        Setting::ReferenceMethod => "--reference-method",
+        Setting::Start => "--from-rest",
+        Setting::Links => "--links",
+        Setting::Magnification => "--magnify",
+        Setting::IgnoreLimits => "--ignore-limits",
+        Setting::RoundCorners => "--round-corners",
+        Setting::Variant => "--with",
+        Setting::Output => "-o",
+        Setting::Overwrite => "--force",
+        Setting::Parquet => "--parquet",
+        Setting::ReadFormat => "--from",
+        Setting::WrittenFormat => "--to",
+        Setting::Tcp => "--tcp",
+        Setting::Package => "--package",
+        Setting::Argument => "--arg",
+        Setting::InertiaFromDensity => "--inertia-from-density",
+        Setting::InertiaFromTotalMass => "--inertia-from-total-mass",
+        Setting::WaiveInertia => "--waive-inertia",
+        Setting::Seconds => "--seconds",
+        Setting::ToolMotion => "--tool-motion",
+        Setting::LowestFrequency => "--from",
+        Setting::HighestFrequency => "--to",
+        Setting::Points => "--points",
+        Setting::Spacing => "--spacing",
+        Setting::Units => "--units",
+        Setting::Name => "--name",
+        Setting::Interface => "--interface",
+        Setting::At => "--at",
+        Setting::Material => "--material",
+        Setting::List => "--list",
+        Setting::Urdf => "--urdf",
+        Setting::Link => "--link",
+        Setting::Joint => "--joint",
+        Setting::Modes => "--modes",
+        Setting::ModesUpTo => "--modes-up-to",
+        Setting::Chains => "--chains",
+        Setting::Geometric => "--geometric",
+        Setting::Threads => "--threads",
+        Setting::Map => "--map",
+        Setting::MassFile => "--mass-file",
+        Setting::MatrixFormat => "--format",
+        Setting::Nodes => "--nodes",
+        Setting::PartA => "--part-a",
+        Setting::PartB => "--part-b",
+        Setting::Data => "--data",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+    use crate::args::Cli;
+
+    #[test]
+    fn every_setting_that_a_message_names_is_a_flag_of_some_command() {
+        let program = Cli::command();
+        let arguments = || program.get_subcommands().flat_map(|command| command.get_arguments());
+        for setting in Setting::ALL {
+            let flag = flag(setting);
+            let known = match flag.strip_prefix("--") {
+                Some(long) => arguments().any(|a| a.get_long() == Some(long)),
+                None => arguments().any(|a| a.get_short().is_some_and(|short| flag == format!("-{short}"))),
+            };
+            assert!(known, "{setting:?} is called {flag:?}, which no command takes");
+        }
+    }
+}

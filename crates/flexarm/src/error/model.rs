@@ -1,0 +1,231 @@
+//! Models that a robot cannot have, and poses that cannot be answered.
+
+use std::path::PathBuf;
+
+use flexarm_analysis::LinearError;
+use flexarm_flexlink::{GearboxError, SubstitutionError};
+use flexarm_settings::Setting;
+use flexarm_stepping::StepError;
+
+/// Links and drives that cannot be modelled as asked for.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ModellingError {
+    /// A link that does not have the model asked for; the sentence names the link and what is missing.
+    #[error("{0}")]
+    NoSuchModel(String),
+    /// A link with load on a third interface that cannot bend in modes either.
+    #[error("link {link:?}: {why}; {instead}")]
+    Branch {
+        /// The link.
+        link: String,
+        /// What hangs on which interface.
+        why: String,
+        /// Why it cannot bend in modes.
+        instead: String,
+    },
+    /// A number of segments, and no lumped link that takes it.
+    #[error("{segments} segments are asked for, but no link of the robot is lumped: {}", lumped_remedy(modal_instead))]
+    NoLumpedLink {
+        /// Segments asked for.
+        segments: usize,
+        /// Links that are modal although lumped was asked for, each with the reason.
+        modal_instead: Vec<String>,
+    },
+    /// A number of modes, and no modal link that takes it.
+    #[error("{modes} modes are asked for, but no link of the robot is modal: add {} modal", Setting::Links)]
+    NoModalLink {
+        /// Modes asked for.
+        modes: usize,
+    },
+    /// The substitution of the links.
+    #[error(transparent)]
+    Substitution(#[from] SubstitutionError),
+    /// The springs of the gearboxes.
+    #[error(transparent)]
+    Gearbox(#[from] GearboxError),
+    /// An elastic joint that the substitution made and that no link owns.
+    #[error("elastic joint {joint:?} has no stiffness")]
+    NoStiffness {
+        /// The joint.
+        joint: String,
+    },
+}
+
+fn lumped_remedy(modal_instead: &[String]) -> String {
+    if modal_instead.is_empty() { format!("add {} lumped", Setting::Links) } else { modal_instead.join("; ") }
+}
+
+/// Joint values that do not fit the robot, and poses without an answer.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PoseError {
+    /// Another number of joint values than there are movable joints.
+    #[error("{found} joint values given, the robot has {} movable joints: {joints:?}", joints.len())]
+    Count {
+        /// Values given.
+        found: usize,
+        /// The movable joints in coordinate order.
+        joints: Vec<String>,
+    },
+    /// A joint value that is no number.
+    #[error("joint {joint:?} at {value} is at no finite number")]
+    NotFinite {
+        /// The joint.
+        joint: String,
+        /// Its value (rad or m).
+        value: f64,
+    },
+    /// Samples of a motion that do not fill all times and joints.
+    #[error(
+        "{found} joint values are given for {times} times; the robot has {joints} joints, so {} are expected",
+        joints * times
+    )]
+    Samples {
+        /// Values given.
+        found: usize,
+        /// Times given.
+        times: usize,
+        /// Movable joints of the robot.
+        joints: usize,
+    },
+    /// What moves and has no inertia about some axis.
+    #[error(
+        "{}: {source}: {} lacks inertia about some axis, with all that it carries; give the links <inertial> with mass \
+         and inertia, have them estimated (inertia_from_density in the robot file), or let nothing give way before them",
+        path.display(),
+        links.join(", ")
+    )]
+    WithoutInertia {
+        /// The URDF.
+        path: PathBuf,
+        /// The matrix that is singular.
+        source: StepError,
+        /// What gives way and carries no inertia.
+        links: Vec<String>,
+    },
+    /// The linear structure at the pose.
+    #[error("the linear model at this pose: {0}")]
+    Linear(#[source] LinearError),
+    /// Figures that overflowed: masses, lengths or joint values of 1e200.
+    #[error(
+        "{what} are no finite numbers: a mass, a length, a stiffness, a force or a joint value is far too large or too small"
+    )]
+    Overflow {
+        /// The figures.
+        what: String,
+    },
+    /// Modes are to be recorded of a robot that has none.
+    #[error("the robot has no flexible link, so there are no modes to record")]
+    NoModes,
+}
+
+/// Inputs and outputs of a frequency response that make no sense.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ChannelError {
+    /// An input that is neither a force at the tool nor a joint.
+    #[error("input {word:?} is not known; inputs are {forces:?} and the joints {joints:?}")]
+    UnknownInput {
+        /// The word.
+        word: String,
+        /// Forces and moments at the tool.
+        forces: [&'static str; 6],
+        /// Joints of the robot.
+        joints: Vec<String>,
+    },
+    /// An output that is no axis of the tool.
+    #[error("output {word:?} is not known; outputs are {axes:?} (the folder is {})", Setting::Output)]
+    UnknownOutput {
+        /// The word.
+        word: String,
+        /// The axes.
+        axes: [&'static str; 6],
+    },
+    /// No input, or no output.
+    #[error("no {side} is given")]
+    Missing {
+        /// `input` or `output`.
+        side: &'static str,
+    },
+    /// The same one twice.
+    #[error("{side} {word:?} is given twice")]
+    Twice {
+        /// `input` or `output`.
+        side: &'static str,
+        /// The word.
+        word: String,
+    },
+}
+
+/// A load as values that makes no sense.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum LoadError {
+    /// Samples that are no function of time.
+    #[error(
+        "a load needs at least two samples, one wrench for each time, and times that increase; found {times} times and \
+         {wrenches} wrenches"
+    )]
+    Samples {
+        /// Times given.
+        times: usize,
+        /// Wrenches given.
+        wrenches: usize,
+    },
+    /// A frame that is neither the tool nor a link that moves.
+    #[error("load on frame {frame:?}: expected \"tcp\" or a link that moves, of {known:?}")]
+    UnknownFrame {
+        /// The frame.
+        frame: String,
+        /// Links that move.
+        known: Vec<String>,
+    },
+    /// A change of what a link carries.
+    #[error(transparent)]
+    Payload(#[from] PayloadError),
+}
+
+/// Changes of payload that a robot cannot have.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PayloadError {
+    /// A time, mass or other number that is negative or not finite.
+    #[error("a payload needs a time and a mass of at least 0, and finite numbers")]
+    Numbers,
+    /// An inertia that no body has.
+    #[error("payload inertia has a negative principal moment; the order is ixx iyy izz ixy ixz iyz")]
+    NegativeMoment,
+    /// A link that is not the one of the robot's own payload, which would stay where it is.
+    #[error("the robot's own payload does not ride on link {link:?}: give that link")]
+    OtherLink {
+        /// The link.
+        link: String,
+    },
+    /// Two links that carry in one run.
+    #[error("payloads on two bodies ({first:?} and {second:?}): one changes in a run")]
+    TwoBodies {
+        /// The body of an earlier change.
+        first: String,
+        /// The link of this one.
+        second: String,
+    },
+    /// A link that does not move or is not there.
+    #[error("payload link {link:?}: expected a link that moves, of {known:?}")]
+    UnknownLink {
+        /// The link.
+        link: String,
+        /// Links that move.
+        known: Vec<String>,
+    },
+    /// A link that bends.
+    #[error(
+        "payload link {link:?} bends, so that it is not clear how the payload rides on it: name a link beyond it, of {beyond:?}"
+    )]
+    Bends {
+        /// The link.
+        link: String,
+        /// Links that hang on it.
+        beyond: Vec<String>,
+    },
+}
