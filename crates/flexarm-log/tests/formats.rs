@@ -1,4 +1,5 @@
 //! The table of the formats: what every row must keep.
+#![allow(non_snake_case, reason = "monogram notation: X_WT, pose of T in W")]
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 mod synthetic;
