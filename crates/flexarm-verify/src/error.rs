@@ -58,13 +58,19 @@ pub enum Error {
     },
     /// A beam in closed form, or units of a mesh.
     #[error(transparent)]
-    Fem(#[from] FemError),
+    Fem(Box<FemError>),
     /// A link file without the mass over its interfaces and modes.
     #[error("the link file has no condensed mass")]
     NoCondensedMass,
     /// A link file whose stiffness has no inverse.
     #[error("K_BB of the link file is singular")]
     SingularLink,
+}
+
+impl From<FemError> for Error {
+    fn from(error: FemError) -> Self {
+        Self::Fem(Box::new(error))
+    }
 }
 
 impl From<Box<MeshError>> for Error {

@@ -291,7 +291,7 @@ fn input_channels(words: &[String], posed: &Posed) -> Result<Vec<Channel>, Error
         }
         let Some(index) = posed.joints.iter().position(|j| j == word) else {
             let (word, joints) = (word.clone(), posed.joints.clone());
-            return Err(ChannelError::UnknownInput { word, forces: WRENCH, joints });
+            return Err(ChannelError::UnknownInput { word, forces: &WRENCH, joints });
         };
         let unit = if posed.prismatic[index] { "m" } else { "rad" };
         Ok(Channel { word: word.clone(), unit, index, joint: true })
@@ -302,7 +302,7 @@ fn input_channels(words: &[String], posed: &Posed) -> Result<Vec<Channel>, Error
 fn output_channels(words: &[String]) -> Result<Vec<Channel>, Error> {
     let channel = |word: &String| {
         let index = AXES.iter().position(|w| w == word);
-        let index = index.ok_or_else(|| ChannelError::UnknownOutput { word: word.clone(), axes: AXES })?;
+        let index = index.ok_or_else(|| ChannelError::UnknownOutput { word: word.clone(), axes: &AXES })?;
         Ok(Channel { word: word.clone(), unit: if index < 3 { "m" } else { "rad" }, index, joint: false })
     };
     once(words.iter().map(channel).collect::<Result<_, ChannelError>>()?, "output")

@@ -130,7 +130,7 @@ pub enum ChannelError {
         /// The word.
         word: String,
         /// Forces and moments at the tool.
-        forces: [&'static str; 6],
+        forces: &'static [&'static str],
         /// Joints of the robot.
         joints: Vec<String>,
     },
@@ -140,7 +140,7 @@ pub enum ChannelError {
         /// The word.
         word: String,
         /// The axes.
-        axes: [&'static str; 6],
+        axes: &'static [&'static str],
     },
     /// No input, or no output.
     #[error("no {side} is given")]
