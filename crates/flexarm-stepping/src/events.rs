@@ -158,6 +158,13 @@ impl SampleClock {
     }
 }
 
+impl FlexibleArm {
+    /// Times at which a load begins, ends, jumps or bends (s), load by load.
+    pub fn load_jumps(&self) -> impl Iterator<Item = f64> {
+        self.loads.iter().flat_map(|load| load.wrench.jumps.iter().copied())
+    }
+}
+
 /// Does the load jump there, or only begin, end or bend?
 fn jumps_at(load: &Load, t: f64) -> bool {
     let (before, after) = (load.wrench.at(t.next_down()).to_vector(), load.wrench.at(t.next_up()).to_vector());

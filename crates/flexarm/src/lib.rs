@@ -119,8 +119,8 @@ pub use flexarm_analysis::{Quantity, Spacing};
 pub use flexarm_kinematics::{LinkInertia, Pose, Wrench};
 pub use flexarm_log::{Column, Columns, RecordingFormat, Sample, Trace};
 pub use flexarm_stepping::{
-    AlphaSettings, ConstraintForm, LoadAxes, OperatingPoint, ReferenceMethod, ReferenceSettings, SpookPreset,
-    SpookSettings, Start, StepError, StepperKind, TimedWrench,
+    AlphaSettings, ConstraintForm, InertiaChange, Load, LoadAxes, OperatingPoint, ReferenceMethod, ReferenceSettings,
+    SpookPreset, SpookSettings, Start, StepError, StepperKind, TimedWrench,
 };
 pub use flexarm_trajectory::{Trajectory, TrajectoryError};
 pub use flexarm_urdf::{InertiaEstimate, ReadOptions, closest, search_paths_from_environment};
