@@ -16,7 +16,7 @@ use flexarm_kinematics::{
 };
 use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX};
 
-use crate::arm::{FlexibleArm, Servo};
+use crate::arm::{ElasticElement, FlexibleArm, Servo};
 use crate::error::StepError;
 use crate::statics::{spring_forces, static_equilibrium, static_forces, with_curves};
 
@@ -113,116 +113,78 @@ impl Linear {
 /// [`StepError::NoEquilibrium`], [`StepError::Singular`].
 pub fn linearise(arm: &FlexibleArm, tool: &Frame, F_T_W: &Wrench, t: f64) -> Result<Linear, StepError> {
     let model = &arm.model;
-    let (m, nv, ne) = (model.n_actuated(), model.nv(), model.n_elastic());
-    let driven = arm.torque_driven.len();
+    let (m, nv, driven) = (model.n_actuated(), model.nv(), arm.torque_driven.len());
     // Places of the free coordinates among all.
     let free: Vec<usize> = arm.torque_driven.iter().copied().chain(m..nv).collect();
     let n = free.len();
     let mut data = Data::new(model);
     let statics = Statics { arm, tool, F_T_W: *F_T_W, t };
-
-    // K e + p(e) = 0 with the motors held, from the equilibrium under weight.
-    let (at_rest, mut e) = (arm.stiffness(), static_equilibrium(arm, t)?);
-    let (mut residual, mut iterations, mut buckled) = (f64::INFINITY, 0, false);
-    let singular = StepError::Singular { matrix: "static stiffness (with the effect of weight and load)", t };
-    let (q, p) = loop {
-        let q = all_coordinates(arm, t, &e);
-        let p = statics.forces(&mut data, &q);
-        let spring = spring_forces(arm, &e);
-        let elastic_p = p.rows(m, ne);
-        let scale = elastic_p.amax().max(spring.amax()).max(f64::MIN_POSITIVE);
-        let r = &spring + elastic_p;
-        let previous = residual;
-        residual = if ne == 0 { 0.0 } else { r.amax() / scale };
-        if residual <= TOLERANCE || (iterations > 2 && residual < 1e-9 && residual >= 0.5 * previous) {
-            break (q, p);
-        }
-        if !residual.is_finite() || iterations == MOST_ITERATIONS {
-            return Err(if buckled { singular } else { StepError::NoEquilibrium { t, iterations, residual } });
-        }
-        let springs = with_curves(arm, &at_rest, &e);
-        let tangent = &springs + statics.slopes(&mut data, &q).view((m, m), (ne, ne));
-        // Where the tangent is not positive definite its step leads uphill, to a saddle: the springs alone lead down.
-        let stable = ((&tangent + tangent.transpose()) * 0.5).cholesky().is_some();
-        buckled |= !stable;
-        let step = if stable { tangent } else { springs }.lu().solve(&r).ok_or_else(|| singular.clone())?;
-        // Far from small deflections the full step may overshoot: no coordinate moves by more than 0.5.
-        e -= &step * (0.5 / step.amax()).min(1.0);
-        iterations += 1;
-    };
+    let Equilibrium { q, e, p, residual, iterations } = statics.equilibrium(&mut data)?;
 
     let slopes = statics.slopes(&mut data, &q);
-    let select = |A: &DMatrix<f64>| A.select_rows(&free).select_columns(&free);
-    let mut change = select(&slopes);
-    let moments = arm.loads.iter().any(|load| load.wrench.at(t).torque.norm() > 0.0);
-    if F_T_W.torque.norm() == 0.0 && !moments {
-        change = (&change + change.transpose()) * 0.5;
-    }
     let mut springs = DMatrix::zeros(n, n);
-    springs.view_mut((driven, driven), (ne, ne)).copy_from(&with_curves(arm, &at_rest, &e));
+    springs.view_mut((driven, driven), (e.len(), e.len())).copy_from(&with_curves(arm, &arm.stiffness(), &e));
+    let K = statics.tangent(&springs, &slopes, &free)?;
     let mut D = DMatrix::zeros(n, n);
-    D.view_mut((driven, driven), (ne, ne)).copy_from(&arm.D);
-    // Beyond a buckling load there is an equilibrium too, but the arm does not stay there.
-    let mut K = &springs + change;
-    let elastic = K.view((driven, driven), (ne, ne)).into_owned();
-    if ne > 0 && ((&elastic + elastic.transpose()) * 0.5).cholesky().is_none() {
-        return Err(singular);
-    }
+    D.view_mut((driven, driven), (e.len(), e.len())).copy_from(&arm.D);
     let M = mass_matrix(model, &mut data, &q).clone();
     forward_kinematics(model, &mut data, &q);
     let mut J = Matrix6xX::zeros(nv);
     frame_jacobian(model, &data, tool, &mut J);
+
+    // Commands move prescribed joints; those that are driven by torque hear of them by their servos alone.
     let (mut M_a, mut K_a) = (M.columns(0, m).select_rows(&free), slopes.columns(0, m).select_rows(&free));
-    let (mut D_a, mut J_a) = (DMatrix::zeros(n, m), J.columns(0, m).into_owned());
+    let mut J_a = J.columns(0, m).into_owned();
     for &k in &arm.torque_driven {
         M_a.column_mut(k).fill(0.0);
         K_a.column_mut(k).fill(0.0);
         J_a.column_mut(k).fill(0.0);
     }
-    if let Some(servo) = &arm.servo {
-        let pose = q.rows(0, m).into_owned();
-        let ahead = FeedForward::new(servo, &pose);
-        for (i, axis) in servo.axes.iter().enumerate() {
-            let (position, rate) = (axis.velocity_gain * axis.position_gain, axis.velocity_gain);
-            K[(i, i)] += position;
-            D[(i, i)] += rate + arm.friction.get(axis.coordinate).map_or(0.0, |f| f.viscous);
-            K_a[(i, axis.coordinate)] -= position;
-            D_a[(i, axis.coordinate)] -= rate;
-            if axis.feed_forward {
-                for k in 0..m {
-                    M_a[(i, k)] -= ahead.M[(axis.coordinate, k)];
-                    K_a[(i, k)] -= ahead.K[(axis.coordinate, k)];
-                }
-            }
-        }
-    }
-    let mut equilibrium = DVector::zeros(n);
-    for (x, &k) in equilibrium.iter_mut().zip(&free) {
-        *x = q[k];
-    }
-    Ok(Linear {
-        M: select(&M),
+    let place = |e: &ElasticElement| driven + arm.offset(e)..driven + arm.offset(e) + e.size;
+    let mut linear = Linear {
+        equilibrium: q.select_rows(&free),
+        M: M.select_rows(&free).select_columns(&free),
         D,
         K,
         driven,
         springs,
-        elements: arm
-            .elements
-            .iter()
-            .map(|e| (e.name.clone(), driven + arm.offset(e)..driven + arm.offset(e) + e.size))
-            .collect(),
+        elements: arm.elements.iter().map(|e| (e.name.clone(), place(e))).collect(),
         M_a,
-        D_a,
+        D_a: DMatrix::zeros(n, m),
         K_a,
         J: Matrix6xX::from_fn(n, |i, j| J[(i, free[j])]),
         J_a,
         X_WT: data.X_WF(tool),
         holding: p.rows(0, m).into_owned(),
-        equilibrium,
         q,
         residual,
         iterations,
-    })
+    };
+    if let Some(servo) = &arm.servo {
+        linear.close_loops(arm, servo);
+    }
+    Ok(linear)
+}
+
+impl Linear {
+    /// Servos: springs and dampers towards the commands, and what they feed forward.
+    fn close_loops(&mut self, arm: &FlexibleArm, servo: &Servo) {
+        let m = arm.model.n_actuated();
+        let ahead = FeedForward::new(servo, &self.q.rows(0, m).into_owned());
+        for (i, axis) in servo.axes.iter().enumerate() {
+            let (position, rate) = (axis.velocity_gain * axis.position_gain, axis.velocity_gain);
+            self.K[(i, i)] += position;
+            self.D[(i, i)] += rate + arm.friction.get(axis.coordinate).map_or(0.0, |f| f.viscous);
+            self.K_a[(i, axis.coordinate)] -= position;
+            self.D_a[(i, axis.coordinate)] -= rate;
+            if axis.feed_forward {
+                for k in 0..m {
+                    self.M_a[(i, k)] -= ahead.M[(axis.coordinate, k)];
+                    self.K_a[(i, k)] -= ahead.K[(axis.coordinate, k)];
+                }
+            }
+        }
+    }
 }
 
 /// What the feed-forward of a servo adds per acceleration and per displacement of the commands.
@@ -268,7 +230,80 @@ struct Statics<'a> {
     t: f64,
 }
 
+/// The arm at rest under weight and loads, motors held.
+struct Equilibrium {
+    /// All coordinates.
+    q: DVector<f64>,
+    /// Elastic ones.
+    e: DVector<f64>,
+    /// Static forces on all coordinates.
+    p: DVector<f64>,
+    residual: f64,
+    iterations: usize,
+}
+
 impl Statics<'_> {
+    fn singular(&self) -> StepError {
+        StepError::Singular { matrix: "static stiffness (with the effect of weight and load)", t: self.t }
+    }
+
+    /// `K e + p(e) = 0` by Newton's method, from the equilibrium under weight.
+    fn equilibrium(&self, data: &mut Data) -> Result<Equilibrium, StepError> {
+        let Self { arm, t, .. } = *self;
+        let (m, ne) = (arm.model.n_actuated(), arm.model.n_elastic());
+        let (at_rest, mut e) = (arm.stiffness(), static_equilibrium(arm, t)?);
+        let (mut residual, mut iterations, mut buckled) = (f64::INFINITY, 0, false);
+        loop {
+            let q = all_coordinates(arm, t, &e);
+            let p = self.forces(data, &q);
+            let spring = spring_forces(arm, &e);
+            let elastic_p = p.rows(m, ne);
+            let scale = elastic_p.amax().max(spring.amax()).max(f64::MIN_POSITIVE);
+            let r = &spring + elastic_p;
+            let previous = residual;
+            residual = if ne == 0 { 0.0 } else { r.amax() / scale };
+            if residual <= TOLERANCE || (iterations > 2 && residual < 1e-9 && residual >= 0.5 * previous) {
+                return Ok(Equilibrium { q, e, p, residual, iterations });
+            }
+            if !residual.is_finite() || iterations == MOST_ITERATIONS {
+                let lost = StepError::NoEquilibrium { t, iterations, residual };
+                return Err(if buckled { self.singular() } else { lost });
+            }
+            let springs = with_curves(arm, &at_rest, &e);
+            let tangent = &springs + self.slopes(data, &q).view((m, m), (ne, ne));
+            // Where the tangent is not positive definite its step leads uphill, to a saddle: the springs alone lead down.
+            let stable = ((&tangent + tangent.transpose()) * 0.5).cholesky().is_some();
+            buckled |= !stable;
+            let step = if stable { tangent } else { springs }.lu().solve(&r).ok_or_else(|| self.singular())?;
+            // Far from small deflections the full step may overshoot: no coordinate moves by more than 0.5.
+            e -= &step * (0.5 / step.amax()).min(1.0);
+            iterations += 1;
+        }
+    }
+
+    /// Tangent stiffness of the free coordinates: springs and the slopes of weight and loads.
+    fn tangent(
+        &self,
+        springs: &DMatrix<f64>,
+        slopes: &DMatrix<f64>,
+        free: &[usize],
+    ) -> Result<DMatrix<f64>, StepError> {
+        let (driven, ne) = (self.arm.torque_driven.len(), self.arm.model.n_elastic());
+        let mut change = slopes.select_rows(free).select_columns(free);
+        // Without constant moments the forces have a potential; what is not symmetric is rounding.
+        let moments = self.arm.loads.iter().any(|load| load.wrench.at(self.t).torque.norm() > 0.0);
+        if self.F_T_W.torque.norm() == 0.0 && !moments {
+            change = (&change + change.transpose()) * 0.5;
+        }
+        let K = springs + change;
+        // Beyond a buckling load there is an equilibrium too, but the arm does not stay there.
+        let elastic = K.view((driven, driven), (ne, ne));
+        if ne > 0 && ((elastic + elastic.transpose()) * 0.5).cholesky().is_none() {
+            return Err(self.singular());
+        }
+        Ok(K)
+    }
+
     /// As [`static_forces`].
     fn forces(&self, data: &mut Data, q: &DVector<f64>) -> DVector<f64> {
         let mut p = DVector::zeros(q.len());

@@ -180,8 +180,8 @@ pub fn new_stepper(
             let (x, v) = system.start(&e)?;
             let mut integrator = Reference::new(&mut system, 0.0, h, settings, x, v)?;
             // Else a solver that takes long steps may not see a short load at all.
-            for t in system.arm.loads.iter().flat_map(|load| &load.wrench.jumps).filter(|t| **t > 0.0) {
-                integrator.restart_at(*t);
+            for t in system.arm.load_jumps().filter(|t| *t > 0.0) {
+                integrator.restart_at(t);
             }
             // No whole part of a period, or a sine would look like nothing at all.
             let period = system.arm.loads.iter().map(|load| load.wrench.period).fold(f64::INFINITY, f64::min);

@@ -127,8 +127,8 @@ pub use flexarm_kinematics::{LinkInertia, Pose, Wrench};
 pub use flexarm_log::{Column, Columns, FormatInfo, Holds, RecordingFormat, Sample, Trace};
 pub use flexarm_settings::{Names, Setting, name_settings};
 pub use flexarm_stepping::{
-    AlphaSettings, ConstraintForm, LoadAxes, OperatingPoint, ReferenceMethod, ReferenceSettings, SpookPreset,
-    SpookSettings, Start, StepError, StepperKind, TimedWrench,
+    AlphaSettings, ConstraintForm, InertiaChange, Load, LoadAxes, OperatingPoint, ReferenceMethod, ReferenceSettings,
+    SpookPreset, SpookSettings, Start, StepError, StepperKind, TimedWrench,
 };
 pub use flexarm_trajectory::{Trajectory, TrajectoryError};
 pub use flexarm_urdf::{InertiaEstimate, ReadOptions, closest, search_paths_from_environment};

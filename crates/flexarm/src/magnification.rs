@@ -39,8 +39,7 @@ impl Expected {
         let mut expected = Self::default();
         // What acts for a short time only acts on the arm as its mean over half a period of the first mode.
         let window = 0.5 / arm.modes.frequencies_hz().first().copied().unwrap_or(f64::INFINITY).max(1e-3);
-        let jumps =
-            arm.loads.iter().flat_map(|load| &load.wrench.jumps).map(|t| t + 0.5 * window).take(INSTANTS as usize);
+        let jumps = arm.load_jumps().map(|t| t + 0.5 * window).take(INSTANTS as usize);
         let evenly = (0..=INSTANTS).map(|k| duration * f64::from(k) / f64::from(INSTANTS));
         for t in evenly.chain(jumps.filter(|t| *t < duration)) {
             twin.update(arm, tcp, t);

@@ -3,20 +3,6 @@
 //! A scenario is a value and knows no arm: the same one is run with many, and one arm, which does not change, takes many.
 //! A file of loads fills the same values that a program makes, so that both are checked and act in one way
 //! ([`Scenario::acting_on`]). Not here: how a run is stepped and recorded ([`crate::RunOptions`]).
-//!
-//! ```no_run
-//! use flexarm::{AppliedLoad, Modelling, Motion, PayloadChange, Robot, RunOptions, Scenario, Wrench};
-//!
-//! let robot = Robot::load("robots/kr210")?;
-//! let motion = Motion::load("trajectories/pick_and_place.toml", &robot)?;
-//! let push = Wrench::new([0.0, 0.0, -200.0].into(), [0.0; 3].into());
-//! let scenario = Scenario::new(motion)
-//!     .with_load(AppliedLoad::during("tcp", push, 1.0, 1.5)) // 200 N down for half a second
-//!     .with_payload(PayloadChange::attach(2.0, 80.0, [0.0, 0.0, 0.2].into()))
-//!     .with_payload(PayloadChange::release(6.0));
-//! let run = robot.flexible(Modelling::default())?.simulate(&scenario, &RunOptions::default())?;
-//! # Ok::<(), Box<dyn std::error::Error>>(())
-//! ```
 
 use std::path::{Path, PathBuf};
 
@@ -32,7 +18,24 @@ use crate::motion::Motion;
 use crate::payload::PayloadChange;
 use crate::robot::Robot;
 
-/// Motion, loads, changes of payload and start of a run; see the module's page.
+/// Motion, loads, changes of payload and start of a run.
+///
+/// A value that knows no arm: the same scenario is run with many arms, and an arm takes many. A file of loads fills the same
+/// values as a program.
+///
+/// ```no_run
+/// use flexarm::{AppliedLoad, Modelling, Motion, PayloadChange, Robot, RunOptions, Scenario, Wrench};
+///
+/// let robot = Robot::load("robots/kr210")?;
+/// let motion = Motion::load("trajectories/pick_and_place.toml", &robot)?;
+/// let push = Wrench::new([0.0, 0.0, -200.0].into(), [0.0; 3].into());
+/// let scenario = Scenario::new(motion)
+///     .with_load(AppliedLoad::during("tcp", push, 1.0, 1.5)) // 200 N down for half a second
+///     .with_payload(PayloadChange::attach(2.0, 80.0, [0.0, 0.0, 0.2].into()))
+///     .with_payload(PayloadChange::release(6.0));
+/// let run = robot.flexible(Modelling::default())?.simulate(&scenario, &RunOptions::default())?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Scenario {
     /// Where the joints go; it says when the run ends.

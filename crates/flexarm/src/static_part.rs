@@ -41,10 +41,10 @@ struct Block {
 
 impl StaticPart {
     pub(crate) fn new(arm: &FlexibleArm, tcp: &Frame, moves: Vec<(f64, f64)>, duration: f64, sample_s: f64) -> Self {
-        let jumps = arm.loads.iter().flat_map(|load| load.wrench.jumps.iter().copied());
         let changes = arm.inertia_changes.iter().map(|change| change.t);
         let ends = moves.iter().flat_map(|&(start, end)| [start, end]);
-        let mut breaks: Vec<f64> = jumps.chain(changes).chain(ends).chain([duration]).filter(|t| *t > 0.0).collect();
+        let mut breaks: Vec<f64> =
+            arm.load_jumps().chain(changes).chain(ends).chain([duration]).filter(|t| *t > 0.0).collect();
         breaks.sort_by(f64::total_cmp);
         breaks.dedup();
         let period = arm.loads.iter().map(|load| load.wrench.period).fold(f64::INFINITY, f64::min);

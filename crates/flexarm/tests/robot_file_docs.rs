@@ -158,7 +158,7 @@ fn keys(sources: &[&str]) -> BTreeMap<String, BTreeSet<String>> {
 
 const ROBOT: [&str; 2] = ["crates/flexarm/src/robot_file.rs", "crates/flexarm/src/drive_entry.rs"];
 
-const LOADS: [&str; 1] = ["crates/flexarm/src/disturbance.rs"];
+const LOADS: [&str; 1] = ["crates/flexarm/src/loads_file.rs"];
 const MOTION: [&str; 1] = ["crates/flexarm-trajectory/src/waypoints_toml.rs"];
 
 #[test]
@@ -211,6 +211,6 @@ fn the_schemas_have_the_same_keys() {
         ("servo", "ServoEntry"),
     ];
     same_keys("docs/robot.schema.json", &ROBOT, "RobotFile", &robot);
-    same_keys("docs/loads.schema.json", &LOADS, "LoadsFile", &[("load", "LoadEntry"), ("payload", "PayloadChange")]);
+    same_keys("docs/loads.schema.json", &LOADS, "LoadsFile", &[("load", "LoadEntry"), ("payload", "PayloadEntry")]);
     same_keys("docs/motion.schema.json", &MOTION, "FileToml", &[("move", "MoveToml"), ("limits", "LimitsToml")]);
 }

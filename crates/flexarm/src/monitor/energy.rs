@@ -121,8 +121,52 @@ fn parts(time: f64, from: f64, to: f64) -> [f64; 2] {
 }
 
 #[cfg(test)]
+#[allow(clippy::print_stderr, reason = "what was measured stands beside the bound")]
 mod tests {
     use super::*;
+    use flexarm_kinematics::{LinkInertia, forward_kinematics};
+    use flexarm_stepping::{FlexibleArm, Spring};
+
+    /// Truth: a mass m that is picked up at p with the velocity v brings `m v²/2 - m g·p`, and takes it along when it is put
+    /// down; v by differences of p.
+    #[test]
+    fn a_payload_brings_its_energy_and_takes_it_along() {
+        let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+        let model = crate::Robot::load(root.join("robots/one_beam")).unwrap().rigid_model().unwrap();
+        let still = Arc::new(flexarm_stepping::Held(vec![0.3]));
+        let arm = FlexibleArm::new(model.clone(), Vec::<Spring>::new(), still).unwrap();
+        let mut seen = Observation::new(&arm);
+        (seen.q[0], seen.qdot[0]) = (0.3, 0.5);
+        let frame = model.frame(crate::TCP_FRAME).unwrap().clone();
+        let (mass, com) = (2.0, nalgebra::Vector3::new(0.1, -0.2, 0.3));
+        let mut data = Data::new(&model);
+        let mut place = |q: f64| {
+            forward_kinematics(&model, &mut data, &nalgebra::DVector::from_element(1, q));
+            (data.X_WF(&frame) * nalgebra::Point3::from(com)).coords
+        };
+        let (p, v) = (place(0.3), (place(0.3 + 1e-5) - place(0.3 - 1e-5)) * (0.5 / 2e-5));
+        let truth = 0.5 * mass * v.norm_squared() - mass * model.gravity.dot(&p);
+
+        let added = LinkInertia { mass, com, inertia_com: nalgebra::Matrix3::zeros() }.spatial().at_parent(&frame.X_BF);
+        let mut inertia = model.bodies()[frame.body].inertia;
+        inertia += added;
+        let carrying = Arc::new(model.with_inertia(frame.body, inertia));
+        let mut energy = Energy::new(&model);
+        let mut payload = Vec::new();
+        for model in [&model, &model, &carrying, &carrying, &model] {
+            seen.model.clone_from(model);
+            energy.update(&seen);
+            payload.push(energy.result().payload_j);
+        }
+        eprintln!("{payload:?} J, truth {truth}");
+        assert!(payload[1] == 0.0 && payload[2] == payload[3] && payload[4].abs() < 1e-12);
+        assert!((payload[2] / truth - 1.0).abs() < 1e-9, "{} {truth}", payload[2]);
+        // Who carries it from the start has it already.
+        let mut energy = Energy::new(&model);
+        seen.model.clone_from(&carrying);
+        energy.update(&seen);
+        assert_eq!(energy.result().payload_j, 0.0);
+    }
 
     /// Truth: the integral of `A sin t` over a turn is 2 A - 2 A, of each drive by itself. Identity: what is put in without
     /// what is taken out is the net work.

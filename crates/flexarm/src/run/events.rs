@@ -34,7 +34,7 @@ impl Run<'_> {
                 add(since, EventKind::Limit, text);
             }
         }
-        let mut jumps: Vec<f64> = self.arm.loads.iter().flat_map(|load| load.wrench.jumps.iter().copied()).collect();
+        let mut jumps: Vec<f64> = self.arm.load_jumps().collect();
         jumps.sort_by(f64::total_cmp);
         jumps.dedup();
         // A table or a milling load has a corner at every row; a list of those tells nobody anything.
@@ -42,8 +42,8 @@ impl Run<'_> {
         for t in jumps.iter().take(if jumps.len() <= MOST_JUMPS { MOST_JUMPS } else { 1 }) {
             add(*t, EventKind::Load, "an external load changes".into());
         }
-        for t in &self.payload_times {
-            add(*t, EventKind::Load, "the payload changes".into());
+        for change in &self.arm.inertia_changes {
+            add(change.t, EventKind::Load, "the payload changes".into());
         }
         let reached = self.monitors.tool.result().last_time_s().unwrap_or(0.0);
         events.retain(|event| event.time_s <= reached + 1e-9);

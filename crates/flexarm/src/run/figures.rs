@@ -155,7 +155,7 @@ impl Run<'_> {
     fn effort_caveats(&self) -> Vec<Caveat> {
         let (coordinates, loads) = (self.arm.model.coordinates(), self.monitors.drive_loads.result());
         let peaks: Vec<f64> = loads.iter().map(|load| load.peak).collect();
-        let mut caveats: Vec<Caveat> = validity::efforts(&kinds::EFFORT, coordinates, &peaks).into_iter().collect();
+        let mut caveats: Vec<Caveat> = validity::efforts(&kinds::EFFORT, coordinates, &peaks).collect();
         for (c, load) in coordinates.iter().zip(loads).filter(|(_, load)| load.at_limit > 0) {
             let share = 100.0 * load.at_limit as f64 / self.monitors.tool.result().len() as f64;
             caveats.push(kinds::SERVO_LIMIT.found(format!("joint {:?}", c.joint), share, 0.0));

@@ -221,7 +221,6 @@ struct Run<'a> {
     trace: Trace,
     bends: Vec<BendInfo>,
     contributors: Vec<Contributor>,
-    payload_times: Vec<f64>,
     /// Steps between two samples, and all.
     every: u64,
     last: u64,
@@ -257,7 +256,6 @@ impl<'a> Run<'a> {
             trace: Trace::default(),
             bends,
             contributors: contributors(robot, flexible, &arm),
-            payload_times: arm.inertia_changes.iter().map(|change| change.t).collect(),
             every,
             last,
             arm,
