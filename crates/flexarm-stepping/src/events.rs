@@ -22,6 +22,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 
 use crate::arm::FlexibleArm;
 use crate::error::StepError;
+use crate::iteration_matrix::storage_of;
 use crate::load::Load;
 use crate::reduced::ReducedArm;
 
@@ -224,10 +225,7 @@ impl ReducedArm {
         self.set(t, x, v);
         let M = mass_matrix(&self.arm.model, &mut self.data, &self.state.q);
         let size = self.free.len();
-        let mut M_ff = match self.mass_factor.take() {
-            Some(old) => old.unpack_dirty(),
-            None => DMatrix::zeros(size, size),
-        };
+        let mut M_ff = storage_of(&mut self.mass_factor, size);
         for (i, &k) in self.free.iter().enumerate() {
             self.shifted[i] = -(0..n).map(|p| M[(k, p)] * self.tau[p]).sum::<f64>();
             self.free.iter().enumerate().for_each(|(j, &l)| M_ff[(i, j)] = M[(k, l)]);
