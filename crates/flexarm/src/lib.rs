@@ -64,6 +64,7 @@ mod stamp;
 mod static_part;
 mod statics;
 mod statics_picture;
+mod stepper_settings;
 mod study;
 mod summary;
 mod twin;
@@ -95,6 +96,7 @@ pub use robot::{LoadOptions, Robot, TCP_FRAME};
 pub use settling::Settling;
 pub use statics::{ElementStatics, Statics, record_statics, statics};
 pub use statics_picture::{StaticsFiles, StaticsOutputs};
+pub use stepper_settings::{SettingValue, StepperSettings};
 pub use study::{STUDY_NOTE, Variant, compare_study, study_rows};
 pub use summary::{
     CURVE_PIECES, DifferenceFigures, Files, HoldFigures, LinkFigures, StepperFigures, Summary, TcpFigures,
@@ -104,8 +106,8 @@ pub use flexarm_analysis::{Quantity, Spacing};
 pub use flexarm_kinematics::{Pose, Wrench};
 pub use flexarm_log::{Column, Columns, RecordingFormat, Sample, Trace};
 pub use flexarm_stepping::{
-    AlphaSettings, ConstraintForm, LoadAxes, OperatingPoint, ReferenceMethod, ReferenceSettings, SpookPreset,
-    SpookSettings, Start, StepError, StepperKind,
+    AlphaSettings, ConstraintForm, LoadAxes, OperatingPoint, ReferenceMethod, ReferenceSettings, STEPPERS, Setting,
+    SpookPreset, SpookSettings, Start, StepError, StepRule, StepperEntry, StepperKind, StepperOptions,
 };
 pub use flexarm_trajectory::{Trajectory, TrajectoryError};
 pub use flexarm_urdf::{InertiaEstimate, ReadOptions, closest, search_paths_from_environment};

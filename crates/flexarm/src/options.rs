@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use flexarm_stepping::{AlphaSettings, Start, StepperKind};
+use flexarm_stepping::{Start, StepperKind};
 
 use crate::applied_load::AppliedLoad;
 
@@ -81,7 +81,7 @@ pub struct RunOptions {
 impl Default for RunOptions {
     fn default() -> Self {
         Self {
-            stepper: StepperKind::GeneralizedAlpha(AlphaSettings::default()),
+            stepper: StepperKind::default(),
             step_s: 1e-3,
             modelling: Modelling::default(),
             loads: None,

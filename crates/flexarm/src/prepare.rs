@@ -1,6 +1,6 @@
 //! Everything about a run that can be told before its first step.
 
-use flexarm_stepping::{FlexibleArm, Load, StepError, Stepper, StepperKind, new_stepper};
+use flexarm_stepping::{FlexibleArm, Load, StepError, StepRule, Stepper, new_stepper};
 
 use crate::caveat::size::Size;
 use crate::caveat::{self, Caveat, kinds};
@@ -56,7 +56,7 @@ pub(crate) fn checked(
         }
         load_caveats = disturbances.caveats;
         load_caveats.extend(caveat::motion::of_loads(&disturbances.loads, duration, &Size::of(&robot.rigid)));
-        if !matches!(options.stepper, StepperKind::Reference(_)) {
+        if options.stepper.entry().steps != StepRule::ByErrorControl {
             load_caveats.extend(short_loads(&disturbances.loads, options.step_s));
         }
         arm = arm.with_inertia_changes(disturbances.changes).map_err(failed)?;
