@@ -73,9 +73,9 @@ impl TimeGrid {
 ///
 /// After an error the state is that of the last good time.
 pub trait Integrator: Send {
-    /// Whether it asks for prescribed accelerations at the ends of its steps alone; steps are then cut where these miss the
-    /// impulse of a velocity that rises within them.
-    const ENDS_ALONE: bool = false;
+    /// Where in a step it asks for prescribed accelerations, as parts of the step, and with which weights they make the
+    /// impulse. Steps are cut where this misses the change of a velocity that rises within them; empty: they are short anyway.
+    const MOTION_RULE: &'static [(f64, f64)] = &[];
 
     /// Where it is.
     fn grid(&self) -> &TimeGrid;
@@ -180,7 +180,7 @@ impl<I: Integrator> Stepper for ReducedStepper<I> {
             let event = system.next_event(integrator.time());
             let event = event.map(|t| if (t - end).abs() <= SAME_TIME { end } else { t });
             let stop = event.filter(|t| *t < end).unwrap_or(end);
-            let stop = if I::ENDS_ALONE { system.resolved(integrator.time(), stop) } else { stop };
+            let stop = system.resolved(integrator.time(), stop, I::MOTION_RULE);
             if let Some(event) = event {
                 integrator.expect_event(event);
             }

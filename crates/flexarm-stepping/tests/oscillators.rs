@@ -4,7 +4,7 @@
 
 use std::sync::Arc;
 
-use flexarm_kinematics::{ElasticAngles, Joint, JointKind, Link, LinkInertia, Mechanism, Model, Pose};
+use flexarm_kinematics::{ElasticAngles, Joint, JointKind, Link, LinkInertia, Mechanism, Model, Pose, Wrench};
 use flexarm_stepping::*;
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Vector3};
 
@@ -231,6 +231,33 @@ fn spook_frequency_is_accurate_to_second_order() {
     let order = (errors[0] / errors[1]).log2();
     eprintln!("spook: frequency error {:.2e} at 8 ms, order {order:.2}", errors[0]);
     assert!((order - 2.0).abs() < 0.1, "{order}");
+}
+
+/// Truth: a damped oscillator under a constant force, `x = F/k (1 - e^(-ζωt) (cos wt + ζω/w sin wt))`. The error of every
+/// stepper that takes the steps it is given falls at least with the power of the step that its entry says.
+#[test]
+fn every_stepper_is_of_the_order_that_it_states() {
+    let (m, k, zeta, F, t) = (3.0f64, 4e3f64, 0.05f64, 20.0, 0.2f64);
+    let omega = (k / m).sqrt();
+    let w = omega * (1.0 - zeta * zeta).sqrt();
+    let swing = (w * t).cos() + zeta * omega / w * (w * t).sin();
+    let truth = F / k * (1.0 - (-zeta * omega * t).exp() * swing);
+    let arm = body_on_spring(k, 2.0 * zeta / omega);
+    let arm = arm.clone().with_loads(vec![(arm.elements[0].body, Wrench::new(Vector3::x() * F, Vector3::zeros()))]);
+    let arm = arm.expect("valid");
+    for entry in STEPPERS.into_iter().filter(|entry| entry.steps != StepRule::ByErrorControl) {
+        let errors = [4e-4, 2e-4].map(|h| {
+            let kind = (entry.with)(&StepperOptions::default());
+            let mut stepper = new_stepper(kind, arm.clone(), h, Start::Undeformed).expect("starts");
+            (0..(t / h).round() as usize).for_each(|_| stepper.step().expect("steps"));
+            let mut seen = Observation::new(&arm);
+            stepper.observe(&mut seen);
+            (seen.q[0] - truth).abs() / (F / k)
+        });
+        let order = (errors[0] / errors[1]).log2();
+        eprintln!("{:<18} error {:.1e} at 0.4 ms, order {order:.2} of {}", entry.name, errors[0], entry.order);
+        assert!(order > f64::from(entry.order) - 0.1, "{}: {order}", entry.name);
+    }
 }
 
 /// Modal damping gives every mode the ratio asked for: from the eigenvalues of the damped system; measured 1e-12.

@@ -314,7 +314,8 @@ impl ImplicitStep for GeneralizedAlpha {
 }
 
 impl Integrator for GeneralizedAlpha {
-    const ENDS_ALONE: bool = true;
+    /// At the ends alone.
+    const MOTION_RULE: &'static [(f64, f64)] = &[(0.0, 0.5), (1.0, 0.5)];
 
     fn grid(&self) -> &TimeGrid {
         &self.grid
