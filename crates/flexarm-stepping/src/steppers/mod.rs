@@ -9,6 +9,7 @@
 mod generalized_alpha;
 mod reference;
 mod rk4;
+mod sdirk3;
 mod spook;
 
 use nalgebra::DVector;
@@ -21,6 +22,7 @@ use crate::stepper::{Start, Stepper};
 pub use generalized_alpha::{AlphaSettings, GeneralizedAlpha};
 pub use reference::{Reference, ReferenceMethod, ReferenceSettings};
 pub use rk4::{Rk4, STABILITY_LIMIT};
+pub use sdirk3::Sdirk3;
 pub use spook::{ConstraintForm, Spook, SpookPreset, SpookSettings};
 
 /// Which time stepper, with its settings.
@@ -34,10 +36,13 @@ pub enum StepperKind {
     Rk4,
     /// Steps of its own choice under error control, reduced coordinates.
     Reference(ReferenceSettings),
+    /// Implicit, third order, L-stable, reduced coordinates.
+    Sdirk3,
 }
 
 /// All steppers, the default first.
-pub static STEPPERS: [&StepperEntry; 4] = [&generalized_alpha::ENTRY, &spook::ENTRY, &rk4::ENTRY, &reference::ENTRY];
+pub static STEPPERS: [&StepperEntry; 5] =
+    [&generalized_alpha::ENTRY, &spook::ENTRY, &rk4::ENTRY, &reference::ENTRY, &sdirk3::ENTRY];
 
 impl StepperKind {
     fn method(&self) -> &dyn Method {
@@ -46,6 +51,7 @@ impl StepperKind {
             Self::Spook(settings) => settings,
             Self::Rk4 => &rk4::Rk4Settings,
             Self::Reference(settings) => settings,
+            Self::Sdirk3 => &sdirk3::Sdirk3Settings,
         }
     }
 
