@@ -197,14 +197,14 @@ impl SecondOrderSystem for Shaken {
         a.axpy((self.omega * t).sin(), &push, 1.0);
         Ok(())
     }
-    fn factor_iteration_matrix(&mut self, t: f64, c_D: f64, c_K: f64, c_h2: f64) -> Result<(), StepError> {
-        self.arm.factor_iteration_matrix(t, c_D, c_K, c_h2)
+    fn mass(&mut self, M: &mut DMatrix<f64>) {
+        self.arm.mass(M);
     }
-    fn solve_iteration(&mut self, r: &mut DVector<f64>) {
-        self.arm.solve_iteration(r);
+    fn damping_and_stiffness(&mut self, c_D: f64, c_K: f64, C: &mut DMatrix<f64>) {
+        self.arm.damping_and_stiffness(c_D, c_K, C);
     }
-    fn inverse_mass_times_stiffness(&mut self, a: &DVector<f64>, out: &mut DVector<f64>) {
-        self.arm.inverse_mass_times_stiffness(a, out);
+    fn stiffness(&mut self, K: &mut DMatrix<f64>) {
+        self.arm.stiffness(K);
     }
 }
 

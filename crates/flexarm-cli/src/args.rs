@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
-use flexarm::{DriveModel, LinkModel, Modelling, RecordingFormat};
+use flexarm::{DriveModel, LinkModel, Modelling, RecordingFormat, STEPPERS, StepperEntry};
 
 use crate::convert::ConvertArgs;
 use crate::exchange_args::{ExportArgs, ImportArgs};
@@ -151,8 +152,8 @@ pub(crate) struct RunArgs {
     /// .csv or .toml trajectory, or the name of a shipped one [default: the robot's own]
     pub(crate) trajectory: Option<PathBuf>,
     /// Time stepper
-    #[arg(long, help_heading = "Stepper", value_name = "NAME", value_enum, default_value_t = StepperName::GeneralizedAlpha)]
-    pub(crate) stepper: StepperName,
+    #[arg(long, help_heading = "Stepper", value_name = "NAME", value_parser = stepper_words(), default_value = STEPPERS[0].name)]
+    pub(crate) stepper: &'static StepperEntry,
     /// Step of the stepper (s)
     #[arg(long, help_heading = "Stepper", value_name = "SECONDS", default_value_t = 1e-3, allow_hyphen_values = true)]
     pub(crate) step: f64,
@@ -286,17 +287,13 @@ pub(crate) struct CheckArgs {
     pub(crate) load: RobotArgs,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum StepperName {
-    /// Implicit, second order, damps what is too fast for the step; for all models
-    #[value(alias = "generalised-alpha")]
-    GeneralizedAlpha,
-    /// Bodies with compliant constraints, first order; lumped links without motors
-    Spook,
-    /// Explicit, fourth order; small steps only
-    Rk4,
-    /// Error control instead of a fixed step, for converged results
-    Reference,
+/// Words and help of the registry of steppers.
+fn stepper_words() -> impl TypedValueParser<Value = &'static StepperEntry> {
+    let words = STEPPERS.map(|entry| PossibleValue::new(entry.name).help(entry.help).aliases(entry.aliases));
+    PossibleValuesParser::new(words).map(|word| {
+        let named = |entry: &&StepperEntry| entry.name == word || entry.aliases.contains(&word.as_str());
+        STEPPERS.into_iter().find(named).expect("the parser lets no other word pass")
+    })
 }
 
 /// Pages of file formats.

@@ -26,14 +26,12 @@ use std::io::{IsTerminal, Write};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use args::{
-    CheckArgs, Cli, Command, FormName, InspectArgs, MethodName, PresetName, RobotArgs, RunArgs, StartName, StepperName,
-};
+use args::{CheckArgs, Cli, Command, FormName, InspectArgs, MethodName, PresetName, RobotArgs, RunArgs, StartName};
 use clap::{CommandFactory, Parser};
 use failure::Failure;
 use flexarm::{
     AlphaSettings, ConstraintForm, InertiaEstimate, LoadOptions, ReadOptions, ReferenceMethod, ReferenceSettings,
-    Robot, RunOptions, Scenario, SpookPreset, SpookSettings, Start, StepperKind, Variant,
+    Robot, RunOptions, Scenario, SpookPreset, SpookSettings, Start, StepperOptions, Variant,
 };
 use indicatif::{ProgressBar, ProgressStyle};
 use shipped::OutputFolder;
@@ -137,27 +135,23 @@ fn load_options(args: &RobotArgs) -> Result<LoadOptions, Failure> {
 }
 
 fn run_options(args: &RunArgs, with_twin: bool) -> RunOptions {
-    let stepper = match args.stepper {
-        StepperName::GeneralizedAlpha => StepperKind::GeneralizedAlpha(AlphaSettings {
-            rho: args.rho_inf,
-            dispersion_correction: !args.no_dispersion_correction,
-        }),
-        StepperName::Spook => StepperKind::Spook(SpookSettings {
+    let stepper_options = StepperOptions {
+        alpha: AlphaSettings { rho: args.rho_inf, dispersion_correction: !args.no_dispersion_correction },
+        spook: SpookSettings {
             form: if args.spook_form == FormName::Local { ConstraintForm::Local } else { ConstraintForm::Global },
             preset: if args.spook_preset == PresetName::Exact { SpookPreset::Exact } else { SpookPreset::Source },
-        }),
-        StepperName::Rk4 => StepperKind::Rk4,
-        StepperName::Reference => StepperKind::Reference(ReferenceSettings {
+        },
+        reference: ReferenceSettings {
             method: match args.reference_method {
                 MethodName::Bdf => ReferenceMethod::Bdf,
                 MethodName::Esdirk34 => ReferenceMethod::Esdirk34,
                 MethodName::Tsit45 => ReferenceMethod::Tsit45,
             },
             ..ReferenceSettings::new(args.rtol)
-        }),
+        },
     };
     RunOptions {
-        stepper,
+        stepper: (args.stepper.with)(&stepper_options),
         step_s: args.step,
         modelling: args.modelling.modelling(),
         log_rate_hz: args.log_rate,

@@ -780,7 +780,8 @@ mod values_on_the_command_line {
 
     #[test]
     fn words() {
-        options(&["--stepper", "euler"], &["'euler'", "--stepper", "generalized-alpha", "spook", "rk4", "reference"]);
+        let steppers = flexarm::STEPPERS.map(|entry| entry.name);
+        options(&["--stepper", "euler"], &[&["'euler'", "--stepper"][..], &steppers].concat());
         options(&["--reference-method", "euler"], &["'euler'", "--reference-method", "bdf", "esdirk34", "tsit45"]);
         options(&["--links", "stiff"], &["'stiff'", "--links", "rigid", "lumped"]);
         options(&["--from-rest", "flying"], &["'flying'", "--from-rest", "equilibrium", "undeformed"]);

@@ -8,7 +8,22 @@ mod common;
 use std::fmt::Write as _;
 
 use common::{Place, shipped_robot, shipped_trajectory};
+use flexarm::{STEPPERS, StepRule, StepperEntry};
 use serde_json::Value;
+
+/// Options with which each stepper of the registry meets what is sudden.
+fn steppers() -> impl Iterator<Item = Vec<&'static str>> {
+    let options = |entry: &StepperEntry| {
+        let step = match entry.steps {
+            StepRule::AnyLength if entry.maximal => ["--step", "1e-4"],
+            StepRule::AnyLength => ["--step", "1e-3"],
+            StepRule::UpToTheStabilityLimit => ["--step", "2e-4"],
+            StepRule::ByErrorControl => ["--rtol", "1e-7"],
+        };
+        vec!["--stepper", entry.name, step[0], step[1]]
+    };
+    STEPPERS.into_iter().map(options)
+}
 
 fn peak_m(summary: &Value) -> f64 {
     assert_eq!(summary["end"], "complete", "{summary}");
@@ -84,17 +99,14 @@ fn every_stepper_takes_the_blow_of_a_corner() {
             peak_m(&place.json(&line.concat()))
         };
         let truth = peak(&["--stepper", "rk4", "--step", "2e-5"]);
-        for options in [
-            &["--step", "1e-3"][..],
-            &["--step", "2e-3"],
-            &["--step", "5e-4"],
-            &["--step", "7e-4"],
-            &["--step", "1e-3", "--no-dispersion-correction"],
-            &["--stepper", "rk4", "--step", "2e-4"],
-            &["--stepper", "reference", "--rtol", "1e-7"],
-            &["--stepper", "spook", "--step", "1e-4"],
-        ] {
-            let found = peak(options);
+        let more = [
+            vec!["--step", "2e-3"],
+            vec!["--step", "5e-4"],
+            vec!["--step", "7e-4"],
+            vec!["--step", "1e-3", "--no-dispersion-correction"],
+        ];
+        for options in steppers().chain(more) {
+            let found = peak(&options);
             eprintln!("{rate} Hz {options:?}: {found:.4} m of {truth:.4}");
             assert!((found / truth - 1.0).abs() < 1e-2, "{rate} Hz {options:?}: {found} {truth}");
         }
@@ -124,16 +136,14 @@ fn every_stepper_takes_the_blow_of_a_short_ramp() {
                 ))
             };
         let truth = peak(&["--stepper", "rk4", "--step", "1e-4"]);
-        for options in [
-            &["--step", "1e-3"][..],
-            &["--step", "2e-3"],
-            &["--step", "5e-4"],
-            &["--step", "7e-4"],
-            &["--step", "1e-3", "--no-dispersion-correction"],
-            &["--stepper", "reference", "--rtol", "1e-7"],
-            &["--stepper", "spook", "--step", "1e-4"],
-        ] {
-            let found = peak(options);
+        let more = [
+            vec!["--step", "2e-3"],
+            vec!["--step", "5e-4"],
+            vec!["--step", "7e-4"],
+            vec!["--step", "1e-3", "--no-dispersion-correction"],
+        ];
+        for options in steppers().chain(more) {
+            let found = peak(&options);
             eprintln!("{samples} samples {options:?}: {found:.5} m of {truth:.5}");
             assert!((found / truth - 1.0).abs() < 1e-2, "{samples} samples {options:?}: {found} {truth}");
         }
@@ -155,12 +165,8 @@ fn a_table_of_few_digits_moves_the_arm_alike_in_every_stepper() {
     let peak =
         |options: &[&str]| peak_m(&place.json(&[&["compare", &robot, "slow.csv", "--no-files"][..], options].concat()));
     let truth = peak(&["--stepper", "rk4", "--step", "1e-4"]);
-    for options in [
-        &["--step", "1e-3"][..],
-        &["--stepper", "reference", "--rtol", "1e-7"],
-        &["--stepper", "spook", "--step", "1e-4"],
-    ] {
-        let found = peak(options);
+    for options in steppers() {
+        let found = peak(&options);
         eprintln!("{options:?}: {:.4} mm of {:.4}", 1e3 * found, 1e3 * truth);
         assert!((found / truth - 1.0).abs() < 1e-2, "{options:?}: {found} {truth}");
     }

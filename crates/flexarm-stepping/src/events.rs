@@ -11,9 +11,9 @@
 //! M_ff Δv_f = -M_fp Δv_p                                   springs, dampers, friction and weight are finite: no impulse
 //! ```
 //!
-//! An integrator that asks for accelerations at the ends of its steps alone takes the impulse of a prescribed joint for
-//! `h (a_n + a_n+1) / 2`. Where that is not how the velocity changes, because it rises within a few samples, the step is cut
-//! ([`ReducedArm::resolved`]).
+//! An integrator that asks for accelerations at few times of its steps takes the impulse of a prescribed joint for
+//! `h Σ w_i a(t + c_i h)` ([`crate::Integrator::MOTION_RULE`]; at the ends alone `h (a_n + a_n+1) / 2`). Where that is not how the
+//! velocity changes, because it rises within a few samples, the step is cut ([`ReducedArm::resolved`]).
 //!
 //! Not here: the integrators, which are told by [`Change`] what to renew.
 
@@ -24,6 +24,7 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 
 use crate::arm::{FlexibleArm, InertiaChange};
 use crate::error::StepError;
+use crate::iteration_matrix::storage_of;
 use crate::load::Load;
 use crate::reduced::ReducedArm;
 
@@ -45,11 +46,19 @@ pub(crate) struct StepStart {
     qddot: Vec<f64>,
     /// Largest speeds so far.
     top: Vec<f64>,
+    /// Mean accelerations over the step as an integrator takes them.
+    mean: Vec<f64>,
 }
 
 impl StepStart {
     pub(crate) fn new(joints: usize) -> Self {
-        Self { time: f64::NAN, qdot: vec![0.0; joints], qddot: vec![0.0; joints], top: vec![SLOW; joints] }
+        Self {
+            time: f64::NAN,
+            qdot: vec![0.0; joints],
+            qddot: vec![0.0; joints],
+            top: vec![SLOW; joints],
+            mean: vec![0.0; joints],
+        }
     }
 }
 
@@ -221,29 +230,47 @@ impl ReducedArm {
         Ok(what)
     }
 
-    /// Where a step from t to `stop` has to end: there, or before it; see the module page. No allocation.
-    pub(crate) fn resolved(&mut self, t: f64, mut stop: f64) -> f64 {
-        let n = self.arm.model.n_actuated();
+    /// Where a step from t to `stop` has to end so that the rule of the integrator meets the impulse of the prescribed joints:
+    /// there, or before it; see the module page. No allocation.
+    pub(crate) fn resolved(&mut self, t: f64, mut stop: f64, rule: &[(f64, f64)]) -> f64 {
+        if rule.is_empty() {
+            return stop;
+        }
         if self.step_start.time != t {
             self.sample_joints(t);
             self.keep_start(t);
         }
         for _ in 0..MOST_CUTS {
-            self.sample_joints(stop);
-            let (half, start) = (0.5 * (stop - t), &self.step_start);
-            let smooth = (0..n).filter(|k| !self.arm.torque_driven.contains(k)).all(|k| {
-                let (before, after) = (start.qdot[k], self.state.qdot[k]);
-                let defect = after - before - half * (start.qddot[k] + self.qddot[k]);
-                defect.abs() <= IMPULSE_DEFECT * start.top[k].max(after.abs())
-            });
-            if smooth {
+            if self.meets_impulse(t, stop, rule) {
                 break;
             }
-            stop = t + half;
+            stop = t + 0.5 * (stop - t);
         }
         self.sample_joints(stop);
         self.keep_start(stop);
         stop
+    }
+
+    /// Whether accelerations by the rule say how the prescribed velocities change from t to `stop`.
+    fn meets_impulse(&mut self, t: f64, stop: f64, rule: &[(f64, f64)]) -> bool {
+        let (n, h) = (self.arm.model.n_actuated(), stop - t);
+        // Σ w_i a(t + c_i h)
+        self.step_start.mean.fill(0.0);
+        for &(node, weight) in rule {
+            if node > 0.0 {
+                self.sample_joints(if node == 1.0 { stop } else { t + node * h });
+            }
+            let StepStart { qddot, mean, .. } = &mut self.step_start;
+            let accelerations = if node > 0.0 { self.qddot.as_slice() } else { qddot };
+            mean.iter_mut().zip(accelerations).for_each(|(mean, a)| *mean += weight * a);
+        }
+        self.sample_joints(stop);
+        let start = &self.step_start;
+        (0..n).filter(|k| !self.arm.torque_driven.contains(k)).all(|k| {
+            let (before, after) = (start.qdot[k], self.state.qdot[k]);
+            let defect = after - before - h * start.mean[k];
+            defect.abs() <= IMPULSE_DEFECT * start.top[k].max(after.abs())
+        })
     }
 
     /// Joint motion at t into the state, as [`ReducedArm::set`] keeps it.
@@ -290,10 +317,7 @@ impl ReducedArm {
         self.set(t, x, v);
         let M = mass_matrix(&self.arm.model, &mut self.data, &self.state.q);
         let size = self.free.len();
-        let mut M_ff = match self.mass_factor.take() {
-            Some(old) => old.unpack_dirty(),
-            None => DMatrix::zeros(size, size),
-        };
+        let mut M_ff = storage_of(&mut self.mass_factor, size);
         for (i, &k) in self.free.iter().enumerate() {
             self.shifted[i] = -(0..n).map(|p| M[(k, p)] * self.tau[p]).sum::<f64>();
             self.free.iter().enumerate().for_each(|(j, &l)| M_ff[(i, j)] = M[(k, l)]);

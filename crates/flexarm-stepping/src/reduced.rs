@@ -3,8 +3,8 @@
 //! ```text
 //! M_ff ẍ + h_f(q, q̇, [q̈_p, 0]) + K x + D ẋ + friction(ẋ) = τ
 //! ```
-//! The residual is one Newton-Euler pass, the acceleration one hybrid pass; the iteration matrix
-//! `M_ff + c_D D + c_K K` is dense in the free coordinates. Torques of a sampled controller stay constant between
+//! The residual is one Newton-Euler pass, the acceleration one hybrid pass; mass matrix, damping and stiffness are dense in
+//! the free coordinates. Torques of a sampled controller stay constant between
 //! its samples. What happens at discrete times is in `events`. Not here: integration.
 
 use flexarm_kinematics::{
@@ -40,15 +40,8 @@ pub struct ReducedArm {
     geometric: bool,
     pub(crate) sampled_at: f64,
     pub(crate) step_start: StepStart,
-    factor: Option<Cholesky<f64, Dyn>>,
-    /// Inverse of the iteration matrix: it is used dozens of times before it is renewed, and a product costs a third of
-    /// two triangular solutions.
-    inverse: DMatrix<f64>,
-    matrix: DMatrix<f64>,
-    /// Storage of the mass matrix's factor, `M^-1 K`, and a product.
+    /// Storage of the factor of `M_ff` in a blow.
     pub(crate) mass_factor: Option<Cholesky<f64, Dyn>>,
-    M_inverse_K: DMatrix<f64>,
-    product: DMatrix<f64>,
     pub(crate) shifted: DVector<f64>,
     geometric_force: DVector<f64>,
 }
@@ -74,12 +67,7 @@ impl ReducedArm {
             geometric: arm.elements.iter().any(|e| e.geometric.is_some()),
             sampled_at: f64::NAN,
             step_start: StepStart::new(model.n_actuated()),
-            factor: None,
-            inverse: DMatrix::zeros(n, n),
-            matrix: DMatrix::zeros(n, n),
-            mass_factor: None,
-            M_inverse_K: DMatrix::zeros(n, n),
-            product: DMatrix::zeros(n, n),
+            mass_factor: Cholesky::new(DMatrix::identity(n, n)),
             shifted: DVector::zeros(n),
             geometric_force: DVector::zeros(n),
             arm,
@@ -193,30 +181,6 @@ impl ReducedArm {
     /// Torques that the controller holds now, in the order of [`FlexibleArm::torque_driven`]; empty without one.
     pub(crate) fn held_torques(&self) -> &[f64] {
         self.servo.as_ref().map_or(&[], |s| &s.torque)
-    }
-}
-
-/// Solves `A X = B` for all columns at once; takes `Bᵀ`, leaves `Xᵀ`.
-///
-/// Turned round, elimination goes over whole contiguous columns; on right-hand sides one after another (nalgebra's
-/// `solve_mut`) it takes six times as long at 24 coordinates.
-fn solve_transposed(factor: &Cholesky<f64, Dyn>, Bt: &mut DMatrix<f64>) {
-    let (L, n) = (factor.l_dirty(), Bt.ncols());
-    for k in 0..n {
-        let scale = 1.0 / L[(k, k)];
-        Bt.column_mut(k).scale_mut(scale);
-        for i in k + 1..n {
-            let (from, mut to) = Bt.columns_range_pair_mut(k, i);
-            to.axpy(-L[(i, k)], &from, 1.0);
-        }
-    }
-    for k in (0..n).rev() {
-        for i in k + 1..n {
-            let (mut to, from) = Bt.columns_range_pair_mut(k, i);
-            to.axpy(-L[(i, k)], &from, 1.0);
-        }
-        let scale = 1.0 / L[(k, k)];
-        Bt.column_mut(k).scale_mut(scale);
     }
 }
 
@@ -335,22 +299,24 @@ impl SecondOrderSystem for ReducedArm {
         Ok(())
     }
 
-    fn factor_iteration_matrix(&mut self, t: f64, c_D: f64, c_K: f64, c_h2: f64) -> Result<(), StepError> {
+    fn mass(&mut self, M: &mut DMatrix<f64>) {
         mass_matrix_at_poses(&self.arm.model, &mut self.data);
-        let n = self.dimension();
+        for (column, &l) in self.free.iter().enumerate() {
+            for (row, &k) in self.free.iter().enumerate() {
+                M[(row, column)] = self.data.M[(k, l)];
+            }
+        }
+    }
+
+    fn damping_and_stiffness(&mut self, c_D: f64, c_K: f64, C: &mut DMatrix<f64>) {
         let driven = self.arm.torque_driven.len();
-        // The factor's storage is taken back and filled again: no allocation.
-        let reuse = |factor: &mut Option<Cholesky<f64, Dyn>>| match factor.take() {
-            Some(old) => old.unpack_dirty(),
-            None => DMatrix::zeros(n, n),
-        };
-        // c_D D + c_K K
-        let C = &mut self.matrix;
         C.as_mut_slice().fill(0.0);
+        // Friction of the joints driven by torque.
         for (i, &k) in self.arm.torque_driven.iter().enumerate() {
             // A falling friction would take away from what must stay positive.
             C[(i, i)] = c_D * self.arm.friction.get(k).map_or(0.0, |f| f.slope(self.state.qdot[k]).max(0.0));
         }
+        // Springs, with their dampers where these are in proportion.
         for (k, element) in self.arm.elements.iter().enumerate() {
             let (first, size) = (driven + self.arm.offset(element), element.size);
             let damping = if self.arm.proportional { c_D * self.arm.tau[k] } else { 0.0 };
@@ -362,62 +328,19 @@ impl SecondOrderSystem for ReducedArm {
                 block.zip_apply(&element.K, |c, k| *c += (c_K + damping) * k);
             }
         }
+        // Else the damping couples the elements.
         if !self.arm.proportional {
-            let ne = n - driven;
+            let ne = self.dimension() - driven;
             C.view_mut((driven, driven), (ne, ne)).zip_apply(&self.arm.D, |s, d| *s += c_D * d);
         }
-
-        let mut S = reuse(&mut self.factor);
-        for (column, &l) in self.free.iter().enumerate() {
-            for (row, &k) in self.free.iter().enumerate() {
-                S[(row, column)] = self.data.M[(k, l)];
-            }
-        }
-        if c_h2 > 0.0 {
-            let mut M = reuse(&mut self.mass_factor);
-            M.copy_from(&S);
-            let factor = Cholesky::new(M).ok_or(StepError::Singular { matrix: "mass matrix", t })?;
-            self.M_inverse_K.as_mut_slice().fill(0.0);
-            for element in &self.arm.elements {
-                let (first, size) = (driven + self.arm.offset(element), element.size);
-                self.M_inverse_K.view_mut((first, first), (size, size)).copy_from(&element.K);
-            }
-            solve_transposed(&factor, &mut self.M_inverse_K);
-            self.M_inverse_K.transpose_mut();
-            self.mass_factor = Some(factor);
-            // J = M + C Sᵀ with Sᵀ = 1 + c M^-1 K is not symmetric in general; S J = M + c K + S C Sᵀ is, for every
-            // damping, and is factorised in its place.
-            self.product.copy_from(&self.matrix);
-            // Column by column: the product of whole matrices allocates.
-            for (mut column, x) in self.product.column_iter_mut().zip(self.M_inverse_K.column_iter()) {
-                column.gemv(c_h2, &self.matrix, &x, 1.0);
-            }
-            self.matrix.copy_from(&self.product);
-            self.matrix.gemm_tr(c_h2, &self.M_inverse_K, &self.product, 1.0);
-            for element in &self.arm.elements {
-                let (first, size) = (driven + self.arm.offset(element), element.size);
-                S.view_mut((first, first), (size, size)).zip_apply(&element.K, |s, k| *s += c_h2 * k);
-            }
-        }
-        S += &self.matrix;
-        let factor = Cholesky::new(S).ok_or(StepError::Singular { matrix: "iteration matrix", t })?;
-        // ((S J)^-1 S)ᵀ, turned round.
-        self.inverse.fill_with_identity();
-        if c_h2 > 0.0 {
-            self.inverse.zip_apply(&self.M_inverse_K, |i, s| *i += c_h2 * s);
-        }
-        solve_transposed(&factor, &mut self.inverse);
-        self.inverse.transpose_mut();
-        self.factor = Some(factor);
-        Ok(())
     }
 
-    fn inverse_mass_times_stiffness(&mut self, a: &DVector<f64>, out: &mut DVector<f64>) {
-        out.gemv(1.0, &self.M_inverse_K, a, 0.0);
-    }
-
-    fn solve_iteration(&mut self, r: &mut DVector<f64>) {
-        self.shifted.gemv(1.0, &self.inverse, r, 0.0);
-        r.copy_from(&self.shifted);
+    fn stiffness(&mut self, K: &mut DMatrix<f64>) {
+        let driven = self.arm.torque_driven.len();
+        K.as_mut_slice().fill(0.0);
+        for element in &self.arm.elements {
+            let (first, size) = (driven + self.arm.offset(element), element.size);
+            K.view_mut((first, first), (size, size)).copy_from(&element.K);
+        }
     }
 }

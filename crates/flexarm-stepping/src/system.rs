@@ -3,14 +3,15 @@
 //! ```text
 //! r(t, x, v, a) = M(x) a + D v + K x + b(t, x, v) = 0
 //! ```
-//! The integrators ([`crate::GeneralizedAlpha`], [`crate::Rk4`]) know this trait and nothing of robots.
+//! The integrators ([`crate::GeneralizedAlpha`], [`crate::Rk4`]) know this trait and nothing of robots; the trait knows
+//! nothing of any integrator: it gives residual, acceleration and matrices, and what is made of these is theirs.
 //! [`crate::ReducedArm`] is the flexible arm behind it; the tests put a pendulum and an oscillator there.
 
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 use crate::error::StepError;
 
-/// A mechanical system in coordinates x of a vector space.
+/// A mechanical system in n coordinates x of a vector space.
 pub trait SecondOrderSystem {
     /// Number of coordinates.
     fn dimension(&self) -> usize;
@@ -30,15 +31,13 @@ pub trait SecondOrderSystem {
         a: &mut DVector<f64>,
     ) -> Result<(), StepError>;
 
-    /// Factors `M + (c_D D + c_K K)(1 + c_h2 M^-1 K)` at the configuration of the last `residual` call.
-    ///
-    /// # Errors
-    /// [`StepError::Singular`] if it is not positive definite.
-    fn factor_iteration_matrix(&mut self, t: f64, c_D: f64, c_K: f64, c_h2: f64) -> Result<(), StepError>;
+    /// Mass matrix M at the configuration of the last `residual` call, n × n, written over all of `M`.
+    fn mass(&mut self, M: &mut DMatrix<f64>);
 
-    /// Replaces `r` by the solution with the last factorised matrix.
-    fn solve_iteration(&mut self, r: &mut DVector<f64>);
+    /// `c_D D + c_K K`, damping and stiffness as they are tangent to the residual at the configuration of its last call,
+    /// n × n, written over all of `C`. For Newton's method: what is left out costs iterations and no accuracy.
+    fn damping_and_stiffness(&mut self, c_D: f64, c_K: f64, C: &mut DMatrix<f64>);
 
-    /// `M^-1 K a` with the mass matrix of the last factorisation with `c_h2 > 0`, written into `out`.
-    fn inverse_mass_times_stiffness(&mut self, a: &DVector<f64>, out: &mut DVector<f64>);
+    /// K of the springs about their relaxed places, constant and symmetric, n × n, written over all of `K`.
+    fn stiffness(&mut self, K: &mut DMatrix<f64>);
 }

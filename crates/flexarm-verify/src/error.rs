@@ -1,9 +1,9 @@
 //! What keeps a case study from being done: the library's errors, and truths that cannot be computed.
 
 use flexarm::Fault;
-use flexarm_fem::sparse::ModesError;
 use flexarm_fe_io::MeshError;
 use flexarm_fem::FemError;
+use flexarm_fem::sparse::ModesError;
 
 /// What keeps a case study from being done.
 #[derive(Debug, thiserror::Error)]

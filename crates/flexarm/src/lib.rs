@@ -81,6 +81,7 @@ mod stamp;
 mod static_part;
 mod statics;
 mod statics_picture;
+mod stepper_settings;
 mod study;
 mod summary;
 mod twin;
@@ -116,6 +117,7 @@ pub use scenario::{Disturbances, Scenario};
 pub use settling::Settling;
 pub use statics::{ElementStatics, Statics, record_statics, statics};
 pub use statics_picture::{StaticsFiles, StaticsOutputs};
+pub use stepper_settings::{SettingValue, StepperSettings};
 pub use study::{STUDY_NOTE, Variant, compare_study, study_rows};
 pub use summary::{
     CURVE_PIECES, DifferenceFigures, Files, HoldFigures, LinkFigures, RecordingFiles, StepperFigures, Summary,
@@ -128,7 +130,8 @@ pub use flexarm_log::{Column, Columns, FormatInfo, Holds, RecordingFormat, Sampl
 pub use flexarm_settings::{Names, Setting, name_settings};
 pub use flexarm_stepping::{
     AlphaSettings, ConstraintForm, InertiaChange, Load, LoadAxes, OperatingPoint, ReferenceMethod, ReferenceSettings,
-    SpookPreset, SpookSettings, Start, StepError, StepperKind, TimedWrench,
+    STEPPERS, SpookPreset, SpookSettings, Start, StepError, StepRule, StepperEntry, StepperKind, StepperOptions,
+    StepperSetting, TimedWrench,
 };
 pub use flexarm_trajectory::{Trajectory, TrajectoryError};
 pub use flexarm_urdf::{InertiaEstimate, ReadOptions, closest, search_paths_from_environment};

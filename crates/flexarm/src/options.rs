@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use flexarm_log::RecordingFormat;
-use flexarm_stepping::{AlphaSettings, StepperKind};
+use flexarm_stepping::StepperKind;
 
 /// How links are modelled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -75,7 +75,7 @@ pub struct RunOptions {
 impl Default for RunOptions {
     fn default() -> Self {
         Self {
-            stepper: StepperKind::GeneralizedAlpha(AlphaSettings::default()),
+            stepper: StepperKind::default(),
             step_s: 1e-3,
             modelling: Modelling::default(),
             log_rate_hz: 500.0,

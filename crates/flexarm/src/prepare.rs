@@ -1,7 +1,7 @@
 //! Everything about a run that can be told before its first step.
 
 use flexarm_settings::Setting;
-use flexarm_stepping::{FlexibleArm, Load, StepError, Stepper, StepperKind, new_stepper};
+use flexarm_stepping::{FlexibleArm, Load, StepError, StepRule, Stepper, new_stepper};
 
 use crate::caveat::size::Size;
 use crate::caveat::{self, Caveat, kinds};
@@ -55,7 +55,7 @@ pub(crate) fn checked(
         let acting = scenario.acting_on(robot, &arm.model)?;
         load_caveats = acting.caveats;
         load_caveats.extend(caveat::motion::of_loads(&acting.loads, duration, &Size::of(&robot.rigid)));
-        if !matches!(options.stepper, StepperKind::Reference(_)) {
+        if options.stepper.entry().steps != StepRule::ByErrorControl {
             load_caveats.extend(short_loads(&acting.loads, options.step_s));
         }
         arm = arm.with_inertia_changes(acting.changes).map_err(failed)?;

@@ -254,7 +254,7 @@ fn metadata(
                 ("trajectory", motion.name.clone()),
                 ("stepper", stepper.name.clone()),
                 ("step_s", options.step_s.to_string()),
-                ("rho_inf", stepper.rho_inf.map_or_else(String::new, |r| r.to_string())),
+                ("rho_inf", stepper.settings.get("rho_inf").map_or_else(String::new, ToString::to_string)),
                 ("start", format!("{:?}", scenario.start).to_lowercase()),
                 ("log_rate_hz", options.log_rate_hz.to_string()),
                 ("settling_band_m", options.settling_band_m.to_string()),

@@ -4,13 +4,14 @@ use std::collections::BTreeMap;
 
 use flexarm_analysis::{ErrorParts, HoldMetrics, TcpMetrics};
 use flexarm_log::RecordingFormat;
-use flexarm_stepping::{ConstraintForm, Counts, SpookPreset, StepperKind};
+use flexarm_stepping::Counts;
 use serde::{Deserialize, Serialize};
 
 use crate::caveat::Caveat;
 use crate::headline::{Bending, ShareFigures};
 use crate::options::RunOptions;
 use crate::settling::within;
+use crate::stepper_settings::StepperSettings;
 
 /// Answer of `flexarm compare` and `flexarm run`. SI units.
 ///
@@ -154,24 +155,10 @@ pub struct StepperFigures {
     pub name: String,
     /// Step (s).
     pub h_s: f64,
-    /// Spectral radius (generalised-alpha).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub rho_inf: Option<f64>,
-    /// Whether the leading frequency error is cancelled (generalised-alpha).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub dispersion_correction: Option<bool>,
-    /// local or global (SPOOK).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub form: Option<String>,
-    /// exact or source (SPOOK).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub preset: Option<String>,
-    /// Relative tolerance (reference).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub rtol: Option<f64>,
-    /// bdf, esdirk34 or tsit45 (reference).
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub method: Option<String>,
+    /// Settings of its own, each under its key: `rho_inf`, `dispersion_correction` (generalised-alpha), `form`, `preset`
+    /// (SPOOK), `rtol`, `method` (reference).
+    #[serde(flatten)]
+    pub settings: StepperSettings,
     /// Steps taken.
     pub steps: u64,
     /// Evaluations of the equations of motion.
@@ -184,23 +171,8 @@ impl StepperFigures {
     pub(crate) fn new(options: &RunOptions, counts: Counts) -> Self {
         let Counts { steps, evaluations, factorisations } = counts;
         let (name, h_s) = (options.stepper.name().to_owned(), options.step_s);
-        let mut figures = Self { name, h_s, steps, evaluations, factorisations, ..Self::default() };
-        match options.stepper {
-            StepperKind::GeneralizedAlpha(s) => {
-                figures.rho_inf = Some(s.rho);
-                figures.dispersion_correction = Some(s.dispersion_correction);
-            }
-            StepperKind::Spook(s) => {
-                figures.form = Some(if s.form == ConstraintForm::Local { "local" } else { "global" }.into());
-                figures.preset = Some(if s.preset == SpookPreset::Exact { "exact" } else { "source" }.into());
-            }
-            StepperKind::Rk4 => {}
-            StepperKind::Reference(s) => {
-                figures.rtol = Some(s.rtol);
-                figures.method = Some(s.method.name().into());
-            }
-        }
-        figures
+        let settings = StepperSettings::of(&options.stepper);
+        Self { name, h_s, settings, steps, evaluations, factorisations }
     }
 }
 

@@ -11,6 +11,7 @@ use super::{ReportRun, figures, html};
 use crate::convert::{no_sample, read_run, same_file};
 use crate::error::{Error, RecordingError};
 use crate::result_files::{check_free, write_all};
+use crate::stepper_settings::{SettingValue, StepperSettings};
 use crate::summary::{StepperFigures, Summary, TcpFigures};
 
 /// Choices of a report.
@@ -257,6 +258,7 @@ fn computed(trace: &Trace) -> Summary {
     let flexible = if header.elements.is_empty() { "" } else { "flexible" };
     let robot = run("robot").unwrap_or(&header.robot);
     let trajectory = run("trajectory").unwrap_or(&header.trajectory);
+    let rho = run("rho_inf").and_then(|rho| rho.parse().ok()).into_iter();
     Summary {
         robot: named(robot, "recorded run"),
         trajectory: if trajectory == UNKNOWN { String::new() } else { trajectory.to_owned() },
@@ -264,7 +266,7 @@ fn computed(trace: &Trace) -> Summary {
         stepper: StepperFigures {
             name: run("stepper").unwrap_or_default().to_owned(),
             h_s: run("step_s").and_then(|h| h.parse().ok()).unwrap_or(header.step_s),
-            rho_inf: run("rho_inf").and_then(|rho| rho.parse().ok()),
+            settings: StepperSettings(rho.map(|rho| ("rho_inf".to_owned(), SettingValue::Number(rho))).collect()),
             ..StepperFigures::default()
         },
         duration_s: trace.rows.last().map_or(0.0, |row| row.time_s),

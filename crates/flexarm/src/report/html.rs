@@ -11,6 +11,7 @@ use flexarm_log::{EventKind, RunHeader, Trace};
 
 use super::curves::{Kind, Plot, overlays, plots};
 use super::picture::{pictures, scale_colors};
+use crate::stepper_settings::SettingValue;
 use crate::summary::{EnergyFigures, Summary, TcpFigures};
 
 const STYLE: &str = include_str!("../../assets/report.css");
@@ -653,24 +654,21 @@ fn inputs(run: &ReportRun<'_>, named: bool) -> String {
     for (title, rows) in &header.metadata {
         group(title, rows);
     }
-    let text = |x: Option<f64>| x.map_or_else(String::new, |x| number(x, 6));
-    let word = |x: &Option<String>| x.clone().unwrap_or_default();
     let count = |n: u64| if s.computed { String::new() } else { n.to_string() };
     let step = &s.stepper;
-    let rows = [
-        ("name", step.name.clone()),
-        ("step_s", if step.h_s > 0.0 { number(step.h_s, 6) } else { String::new() }),
-        ("rho_inf", text(step.rho_inf)),
-        ("dispersion_correction", step.dispersion_correction.map_or_else(String::new, |on| on.to_string())),
-        ("form", word(&step.form)),
-        ("preset", word(&step.preset)),
-        ("rtol", text(step.rtol)),
-        ("method", word(&step.method)),
-        ("steps", count(step.steps)),
-        ("evaluations", count(step.evaluations)),
-        ("factorisations", count(step.factorisations)),
+    let row = |key: &str, value: String| (key.to_owned(), value);
+    let mut rows = vec![
+        row("name", step.name.clone()),
+        row("step_s", if step.h_s > 0.0 { number(step.h_s, 6) } else { String::new() }),
     ];
-    group("stepper", &rows.map(|(key, value)| (key.to_owned(), value)));
+    rows.extend(step.settings.0.iter().map(|(key, value)| match value {
+        SettingValue::Number(x) => row(key, number(*x, 6)),
+        SettingValue::Flag(_) | SettingValue::Word(_) => row(key, value.to_string()),
+    }));
+    rows.push(row("steps", count(step.steps)));
+    rows.push(row("evaluations", count(step.evaluations)));
+    rows.push(row("factorisations", count(step.factorisations)));
+    group("stepper", &rows);
     // File names alone: the same run in another folder is the same page.
     let f = &s.files;
     let pages = [&f.report, &f.report_md].into_iter().flatten().map(String::as_str);

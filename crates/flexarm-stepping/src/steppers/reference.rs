@@ -2,7 +2,7 @@
 //!
 //! The second-order system is seen as `y = [x; v]`, `ẏ = [v; a(t, x, v)]`. The solver chooses order and step so that its
 //! estimate of the local error stays below the tolerance, and takes its own steps past the points `t0 + k h`; there its
-//! continuous output is read ([`Reference::step`]), which is as good there as the steps are at their ends. The error of a
+//! continuous output is read ([`Integrator::step`]), which is as good there as the steps are at their ends. The error of a
 //! whole run is larger than the tolerance: over 4 s of the reference arm 100 to 200 times (BDF, 1e-6 to 1e-9).
 //!
 //! **Which method.** The highest modes decide (measured in `tests/reference_arm.rs`, `tests/reference_stepper.rs`).
@@ -12,7 +12,7 @@
 //! third order, so it pays where modes are in the kHz or the tolerance is loose.
 //!
 //! **Restarts.** A jump of the load inside a step costs rejected steps: [`Reference::restart_at`] makes the solver end a
-//! step there and start anew. [`Reference::restart`] is for a system that was changed from outside.
+//! step there and start anew. [`Integrator::restart`] is for a system that was changed from outside.
 //!
 //! **Who owns what.** A solver of `diffsol` borrows its problem and the problem holds the equations, so none of them can be
 //! kept beside a system that the caller lends for one call. Each call that needs more of the solution builds problem and
@@ -32,8 +32,23 @@ use diffsol::{
 };
 use nalgebra::DVector;
 
+use crate::arm::FlexibleArm;
 use crate::error::StepError;
+use crate::integrator::{Integrator, ReducedStepper, TimeGrid};
+use crate::stepper::{Counts, Stepper};
+use crate::steppers::{Method, StepRule, StepperEntry, StepperKind, StepperSetting};
 use crate::system::SecondOrderSystem;
+
+pub(super) static ENTRY: StepperEntry = StepperEntry {
+    name: "reference",
+    aliases: &[],
+    help: "Error control instead of a fixed step, for converged results",
+    steps: StepRule::ByErrorControl,
+    order: 0,
+    maximal: false,
+    allocates: true,
+    with: |options| StepperKind::Reference(options.reference),
+};
 
 /// Positions below this count as small: absolute over relative tolerance (m, rad).
 const SMALL: f64 = 1e-3;
@@ -111,6 +126,30 @@ impl Default for ReferenceSettings {
     }
 }
 
+impl Method for ReferenceSettings {
+    fn entry(&self) -> &'static StepperEntry {
+        &ENTRY
+    }
+
+    fn settings(&self) -> Vec<(&'static str, StepperSetting)> {
+        vec![("rtol", StepperSetting::Number(self.rtol)), ("method", StepperSetting::Word(self.method.name()))]
+    }
+
+    fn start(&self, arm: FlexibleArm, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
+        ReducedStepper::start(arm, e, |system, x, v| {
+            let mut integrator = Reference::new(system, 0.0, h, *self, x, v)?;
+            // Else a solver that takes long steps may not see a short load at all.
+            for t in system.arm.load_jumps().filter(|t| *t > 0.0) {
+                integrator.restart_at(t);
+            }
+            // No whole part of a period, or a sine would look like nothing at all.
+            let period = system.arm.loads.iter().map(|load| load.wrench.period).fold(f64::INFINITY, f64::min);
+            integrator.limit_steps(0.137 * period);
+            Ok(integrator)
+        })
+    }
+}
+
 type V = NalgebraVec<f64>;
 type Lu = NalgebraLU<f64>;
 
@@ -136,10 +175,7 @@ impl Kept {
 /// The integrator with its state; see the module page.
 pub struct Reference {
     settings: ReferenceSettings,
-    h: f64,
-    t0: f64,
-    t: f64,
-    done: u64,
+    grid: TimeGrid,
     /// Positions at the current time.
     pub x: DVector<f64>,
     /// Velocities.
@@ -162,7 +198,7 @@ pub struct Reference {
 }
 
 impl Reference {
-    /// Starts at `t0`; [`Reference::step`] goes from one multiple of `h` (s) to the next.
+    /// Starts at `t0`; [`Integrator::step`] goes from one multiple of `h` (s) to the next.
     ///
     /// # Errors
     /// [`StepError::Setup`] for tolerances that make no sense, [`StepError::Singular`] if the first acceleration cannot be
@@ -185,10 +221,7 @@ impl Reference {
         let kept = Kept::Start(t0, together(&x, &v));
         Ok(Self {
             settings,
-            h,
-            t0,
-            t: t0,
-            done: 0,
+            grid: TimeGrid::new(t0, h),
             x,
             v,
             acceleration,
@@ -202,24 +235,9 @@ impl Reference {
         })
     }
 
-    /// Distance of the points (s); the solver's own steps are its affair.
-    pub fn step_size(&self) -> f64 {
-        self.h
-    }
-
-    /// Current time (s).
-    pub fn time(&self) -> f64 {
-        self.t
-    }
-
-    /// Next multiple of `h` (s).
-    pub fn next_time(&self) -> f64 {
-        self.t0 + (self.done + 1) as f64 * self.h
-    }
-
     /// First point that is neither reached nor waiting.
     fn next_point(&self) -> f64 {
-        self.t0 + (self.done + 1 + self.ahead.len() as u64) as f64 * self.h
+        self.grid.after(1 + self.ahead.len() as u64)
     }
 
     /// Makes the solver end a step at `t` (s) and start anew, because the load jumps there: before `t` the system is only
@@ -231,7 +249,8 @@ impl Reference {
         assert!(t.is_finite(), "a restart has a time");
         let near = self.near(t);
         // A point is met exactly: a restart that is a rounding beyond it would be met again.
-        let point = self.t0 + ((t - self.t0) / self.h).round() * self.h;
+        let (t0, h) = (self.grid.start(), self.grid.step_size());
+        let point = t0 + ((t - t0) / h).round() * h;
         let t = if (t - point).abs() <= near { point } else { t };
         if self.restarts.iter().any(|other| (other - t).abs() <= near) {
             return;
@@ -247,33 +266,19 @@ impl Reference {
         self.longest = self.longest.min(longest);
     }
 
-    /// Starts anew at the current time with the system as it is now: position and velocity are kept, the acceleration is
-    /// evaluated again, the step is chosen again.
-    ///
-    /// # Errors
-    /// [`StepError::Singular`] if the acceleration cannot be found.
-    pub fn restart(&mut self, system: &mut impl SecondOrderSystem) -> Result<(), StepError> {
-        self.start_again();
-        self.evaluations += 1;
-        system.acceleration(self.time(), &self.x, &self.v, &mut self.acceleration)
-    }
-
     /// Drops what the solver knows beyond the current time.
     fn start_again(&mut self) {
         self.ahead.clear();
-        self.kept = Kept::Start(self.time(), together(&self.x, &self.v));
+        self.kept = Kept::Start(self.grid.time(), together(&self.x, &self.v));
     }
 
     /// Times closer than this to t are the same (s).
     fn near(&self, t: f64) -> f64 {
-        TOGETHER * self.h + ROUNDING * t.abs()
+        TOGETHER * self.grid.step_size() + ROUNDING * t.abs()
     }
 
-    /// Advances to the next multiple of h. On error the state stays at the last good time. Allocates.
-    ///
-    /// # Errors
-    /// [`StepError::SolverGaveUp`], [`StepError::Diverged`] or [`StepError::Singular`].
-    pub fn step(&mut self, system: &mut impl SecondOrderSystem) -> Result<(), StepError> {
+    /// Advances to the next multiple of h.
+    fn step_to_point(&mut self, system: &mut impl SecondOrderSystem) -> Result<(), StepError> {
         while self.ahead.is_empty() && !self.x.is_empty() {
             if let Err(error) = self.advance(system) {
                 // Points that were passed before the failure are good; the solver tries again from the last one.
@@ -281,21 +286,16 @@ impl Reference {
                     self.start_again();
                     return Err(error);
                 };
-                self.kept = Kept::Start(self.next_point() - self.h, last);
+                self.kept = Kept::Start(self.next_point() - self.grid.step_size(), last);
             }
         }
         let y = self.ahead.pop_front().unwrap_or_default();
-        self.arrive(system, self.next_time(), &y)?;
-        self.done += 1;
-        Ok(())
+        self.arrive(system, self.next_time(), &y)
     }
 
     /// Advances to a restart that lies before the next multiple of h ([`Reference::restart_at`]); what is left of the step
     /// starts anew there.
-    ///
-    /// # Errors
-    /// As [`Reference::step`].
-    pub fn step_to_restart(&mut self, system: &mut impl SecondOrderSystem, t: f64) -> Result<(), StepError> {
+    fn step_to_restart(&mut self, system: &mut impl SecondOrderSystem, t: f64) -> Result<(), StepError> {
         while self.kept.time() < t - self.near(t) && !self.x.is_empty() {
             if let Err(error) = self.advance(system) {
                 self.start_again();
@@ -318,7 +318,8 @@ impl Reference {
         let mut acceleration = DVector::zeros(n);
         self.evaluations += 1;
         system.acceleration(t, &x, &v, &mut acceleration)?;
-        (self.x, self.v, self.acceleration, self.t) = (x, v, acceleration, t);
+        (self.x, self.v, self.acceleration) = (x, v, acceleration);
+        self.grid.reach(t);
         Ok(())
     }
 
@@ -347,7 +348,7 @@ impl Reference {
         equations: &RefCell<FirstOrder<'_, S>>,
     ) -> Result<Kept, StepError> {
         let n = self.x.len();
-        let (start, h) = (kept.time(), self.h);
+        let (start, h) = (kept.time(), self.grid.step_size());
         let fault = |error: DiffsolError| gave_up(start, h, &error);
         let (y0, bdf, runge_kutta) = match kept {
             Kept::Start(_, y) => (y, None, None),
@@ -450,6 +451,41 @@ impl Reference {
             self.ahead.push_back(y.inner().as_slice().to_vec());
         }
         Ok(restart.then(|| Kept::Start(stop, solver.state().y.inner().as_slice().to_vec())))
+    }
+}
+
+impl Integrator for Reference {
+    fn grid(&self) -> &TimeGrid {
+        &self.grid
+    }
+
+    fn state(&self) -> [&DVector<f64>; 3] {
+        [&self.x, &self.v, &self.acceleration]
+    }
+
+    fn state_at_event(&mut self) -> (&DVector<f64>, &mut DVector<f64>) {
+        (&self.x, &mut self.v)
+    }
+
+    /// To a multiple of the step, or to a restart before it ([`Reference::restart_at`]). Allocates.
+    fn advance_to(&mut self, system: &mut impl SecondOrderSystem, t: f64) -> Result<(), StepError> {
+        if t == self.next_time() { self.step_to_point(system) } else { self.step_to_restart(system, t) }
+    }
+
+    /// Position and velocity are kept, the acceleration is evaluated again, the step is chosen again.
+    fn restart(&mut self, system: &mut impl SecondOrderSystem) -> Result<(), StepError> {
+        self.start_again();
+        self.evaluations += 1;
+        system.acceleration(self.time(), &self.x, &self.v, &mut self.acceleration)
+    }
+
+    /// The solver must not look past an event.
+    fn expect_event(&mut self, t: f64) {
+        self.restart_at(t);
+    }
+
+    fn counts(&self) -> Counts {
+        Counts { steps: self.solver_steps, evaluations: self.evaluations, factorisations: self.factorisations }
     }
 }
 

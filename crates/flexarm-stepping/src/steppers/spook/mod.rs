@@ -29,9 +29,22 @@ use nalgebra::{DVector, Matrix3, Matrix6, Rotation3, UnitQuaternion, Vector3, Ve
 use crate::arm::FlexibleArm;
 use crate::error::StepError;
 use crate::events::{EventQueue, SAME_TIME};
-use crate::stepper::{Counts, LARGEST_DEFLECTION, Observation, Stepper};
+use crate::observation::Observation;
+use crate::stepper::{Counts, LARGEST_DEFLECTION, Stepper};
+use crate::steppers::{Method, StepRule, StepperEntry, StepperKind, StepperSetting};
 use constraint::Rows;
 use solve::TreeSolver;
+
+pub(super) static ENTRY: StepperEntry = StepperEntry {
+    name: "spook",
+    aliases: &[],
+    help: "Bodies with compliant constraints, first order; lumped links without motors",
+    steps: StepRule::AnyLength,
+    order: 1,
+    maximal: true,
+    allocates: false,
+    with: |options| StepperKind::Spook(options.spook),
+};
 
 /// Compliance of a rigid joint (m/N, rad/(N m)): 1e4 N move it by 1e-13 m.
 const RIGID_COMPLIANCE: f64 = 1e-17;
@@ -63,6 +76,22 @@ pub struct SpookSettings {
     pub form: ConstraintForm,
     /// Exact or source preset.
     pub preset: SpookPreset,
+}
+
+impl Method for SpookSettings {
+    fn entry(&self) -> &'static StepperEntry {
+        &ENTRY
+    }
+
+    fn settings(&self) -> Vec<(&'static str, StepperSetting)> {
+        let form = if self.form == ConstraintForm::Local { "local" } else { "global" };
+        let preset = if self.preset == SpookPreset::Exact { "exact" } else { "source" };
+        vec![("form", StepperSetting::Word(form)), ("preset", StepperSetting::Word(preset))]
+    }
+
+    fn start(&self, arm: FlexibleArm, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
+        Ok(Box::new(Spook::new(arm, h, *self, e)?))
+    }
 }
 
 /// A body of the tree in maximal coordinates.
@@ -131,27 +160,8 @@ impl Spook {
     /// [`StepError::Setup`] for what has no place in maximal coordinates here: mimic joints, modal links, torques, payloads
     /// that change, curved springs, links without mass or moments of inertia at an end of the arm.
     pub fn new(arm: FlexibleArm, h: f64, settings: SpookSettings, e: &DVector<f64>) -> Result<Self, StepError> {
+        check_known(&arm)?;
         let model = arm.model.clone();
-        let refuse = |what: &str| {
-            let text = format!("spook works in maximal coordinates and does not know {what}: use generalized-alpha");
-            Err(StepError::Setup(text))
-        };
-        if model.has_modal() {
-            return Err(StepError::ModalLinks);
-        }
-        if !arm.torque_driven.is_empty() {
-            return refuse("joints driven by torque");
-        }
-        if !arm.inertia_changes.is_empty() {
-            return refuse("payloads that change");
-        }
-        if arm.elements.iter().any(|e| e.curve.is_some()) {
-            return refuse("springs with play or curves");
-        }
-        if model.has_mimic() {
-            let text = "spook works in maximal coordinates and does not know mimic joints: use generalized-alpha";
-            return Err(StepError::Setup(text.to_owned()));
-        }
         check_ends(&model)?;
         let (mut state, mut qddot) = (State::zeros(&model), DVector::zeros(model.nv()));
         arm.prescribed_state(0.0, &mut state, &mut qddot);
@@ -166,23 +176,8 @@ impl Spook {
         let mut data = Data::new(&model);
         forward_kinematics_velocity(&model, &mut data, &state);
 
-        let mut bodies = Vec::new();
-        let mut compliance = Vec::new();
-        for (i, body) in model.bodies().iter().enumerate() {
-            let X = data.X_WB[i];
-            let (com, mass) = (body.inertia.com(), body.inertia.mass);
-            let w = X.rotation * data.V[i].angular;
-            let linear = X.rotation * (data.V[i].linear + data.V[i].angular.cross(&com));
-            bodies.push(BodyState {
-                x: X.translation.vector + X.rotation * com,
-                R: UnitQuaternion::from_rotation_matrix(&X.rotation),
-                V: Twist::new(linear, w),
-                mass,
-                J: if mass > 0.0 { body.inertia.inertia_com() } else { Matrix3::zeros() },
-                com,
-            });
-            compliance.push(joint_compliance(&arm, i, h, settings.preset));
-        }
+        let bodies: Vec<BodyState> = (0..model.bodies().len()).map(|i| body_state(&model, &data, i)).collect();
+        let compliance = (0..bodies.len()).map(|i| joint_compliance(&arm, i, h, settings.preset)).collect();
         let n = bodies.len();
         let loads = vec![Vector6::zeros(); n];
         let mut spook = Self {
@@ -211,6 +206,48 @@ impl Spook {
         spook.solve(h)?;
         Ok(spook)
     }
+}
+
+/// Body i as `data` has it.
+fn body_state(model: &Model, data: &Data, i: usize) -> BodyState {
+    let (body, X) = (&model.bodies()[i], data.X_WB[i]);
+    let (com, mass) = (body.inertia.com(), body.inertia.mass);
+    let w = X.rotation * data.V[i].angular;
+    let linear = X.rotation * (data.V[i].linear + data.V[i].angular.cross(&com));
+    BodyState {
+        x: X.translation.vector + X.rotation * com,
+        R: UnitQuaternion::from_rotation_matrix(&X.rotation),
+        V: Twist::new(linear, w),
+        mass,
+        J: if mass > 0.0 { body.inertia.inertia_com() } else { Matrix3::zeros() },
+        com,
+    }
+}
+
+/// Refuses what has no place in maximal coordinates here.
+fn check_known(arm: &FlexibleArm) -> Result<(), StepError> {
+    let model = &arm.model;
+    let refuse = |what: &str| {
+        let text = format!("spook works in maximal coordinates and does not know {what}: use generalized-alpha");
+        Err(StepError::Setup(text))
+    };
+    if model.has_modal() {
+        return refuse("links that bend in modes (--links lumped would do)");
+    }
+    if !arm.torque_driven.is_empty() {
+        return refuse("joints driven by torque");
+    }
+    if !arm.inertia_changes.is_empty() {
+        return refuse("payloads that change");
+    }
+    if arm.elements.iter().any(|e| e.curve.is_some()) {
+        return refuse("springs with play or curves");
+    }
+    if model.has_mimic() {
+        let text = "spook works in maximal coordinates and does not know mimic joints: use generalized-alpha";
+        return Err(StepError::Setup(text.to_owned()));
+    }
+    Ok(())
 }
 
 /// Least moment of inertia over the largest with which a body can be turned about all its axes.
@@ -281,77 +318,26 @@ impl Stepper for Spook {
     fn observe(&mut self, out: &mut Observation) {
         let (h, t) = (self.dt, self.t);
         self.sample(t);
-        let model = self.arm.model.clone();
-        let n = model.n_actuated();
+        let n = self.arm.model.n_actuated();
         out.t = t;
-        out.model.clone_from(&model);
+        out.model.clone_from(&self.arm.model);
         out.q.rows_mut(0, n).copy_from(&self.q);
         out.qdot.rows_mut(0, n).copy_from(&self.qdot);
-        let (mut kinetic, mut potential) = (0.0, 0.0);
-        for (i, state) in self.bodies.iter().enumerate() {
-            out.X_WB[i] = state.X_WB();
-            let w = state.R.inverse() * state.V.angular;
-            kinetic += 0.5 * (state.mass * state.V.linear.norm_squared() + w.dot(&(state.J * w)));
-            potential -= state.mass * model.gravity.dot(&state.x);
-        }
-        for (i, body) in model.bodies().iter().enumerate().skip(1) {
+        let (mut kinetic, potential) = self.observe_bodies(out);
+        for i in 1..self.bodies.len() {
             // Mean force over the last step (before the first one: over that).
-            let force = self.lambda[i] / h;
-            match body.motion {
-                JointMotion::Revolute(axis) | JointMotion::Prismatic(axis) if body.elastic => {
-                    let first = if matches!(body.motion, JointMotion::Revolute(_)) { 3 } else { 0 };
-                    let rows = &self.rows_now(i, Default::default());
-                    let (parent, child) = (&self.bodies[body.parent], &self.bodies[i]);
-                    let rate = rows.G_parent * parent.V.to_vector() + rows.G_child * child.V.to_vector();
-                    let (e, rate) = (axis.dot(&rows.g.fixed_rows::<3>(first)), axis.dot(&rate.fixed_rows::<3>(first)));
-                    out.q[body.coordinate] = e;
-                    out.qdot[body.coordinate] = rate;
-                    if let Some(k) = self.arm.elements.iter().position(|element| element.body == i) {
-                        out.load[k] = Vector6::zeros();
-                        out.load[k][0] = -self.arm.elements[k].K[(0, 0)] * (e + rate * self.arm.tau[k]);
-                    }
-                }
-                JointMotion::Revolute(axis) => out.drive[body.coordinate] = axis.dot(&force.fixed_rows::<3>(3)),
-                JointMotion::Prismatic(axis) => out.drive[body.coordinate] = axis.dot(&force.fixed_rows::<3>(0)),
-                JointMotion::Interface { .. } | JointMotion::Welded => {}
-                JointMotion::Elastic(angles) => {
-                    let (parent, child) = (&self.bodies[body.parent], &self.bodies[i]);
-                    let rows = self.rows_now(i, angles);
-                    let rate = rows.G_parent * parent.V.to_vector() + rows.G_child * child.V.to_vector();
-                    out.q.fixed_rows_mut::<6>(body.coordinate).copy_from(&rows.g);
-                    out.qdot.fixed_rows_mut::<6>(body.coordinate).copy_from(&rate);
-                    if let Some(k) = self.arm.elements.iter().position(|element| element.body == i) {
-                        let K = Matrix6::from_column_slice(self.arm.elements[k].K.as_slice());
-                        out.load[k] = -(K * (rows.g + rate * self.arm.tau[k]));
-                    }
-                }
-            }
+            self.observe_joint(i, self.lambda[i] / h, out);
         }
+        // Drives: friction and rotors are no rows of the constraints.
         for (k, rate) in self.qdot.iter().enumerate() {
             out.drive[k] += self.arm.friction_torque(k, *rate);
         }
-        for body in model.bodies().iter().skip(1).filter(|b| b.armature != 0.0) {
+        for body in self.arm.model.bodies().iter().skip(1).filter(|b| b.armature != 0.0) {
             let k = body.coordinate;
             out.drive[k] += body.armature * self.qddot[k];
             kinetic += 0.5 * body.armature * self.qdot[k].powi(2);
         }
-        let (mut damping, mut loads) = (0.0, 0.0);
-        for (k, element) in self.arm.elements.iter().enumerate() {
-            let rate = out.qdot.rows(element.coordinate, element.size);
-            damping += self.arm.tau[k] * rate.dot(&(&element.K * rate));
-        }
-        for (k, rate) in self.qdot.iter().enumerate() {
-            damping += self.arm.friction_torque(k, *rate) * rate;
-        }
-        for load in &self.arm.loads {
-            let body = &self.bodies[load.body];
-            let X = body.X_WB();
-            let F = load.on_body(self.events.side(t), &X);
-            let v = body.V.linear - body.V.angular.cross(&(X.rotation * body.com));
-            loads += v.dot(&(X.rotation * F.force)) + body.V.angular.dot(&(X.rotation * F.torque));
-        }
-        let drives = out.drive.dot(&out.qdot.rows(0, n));
-        out.power = [drives, loads, damping];
+        out.power = [out.drive.dot(&out.qdot.rows(0, n)), self.load_power(), self.damping_power(&out.qdot)];
         out.energy = [kinetic, potential, self.arm.elastic_energy(&out.q.as_slice()[n..])];
     }
 
@@ -361,12 +347,83 @@ impl Stepper for Spook {
 }
 
 impl Spook {
-    /// Rows of the joint of body i for the present poses, in the local form.
-    fn rows_now(&self, i: usize, angles: ElasticAngles) -> Rows {
+    /// Poses of the bodies; their kinetic and gravitational energy (J).
+    fn observe_bodies(&self, out: &mut Observation) -> (f64, f64) {
+        let (mut kinetic, mut potential) = (0.0, 0.0);
+        for (i, state) in self.bodies.iter().enumerate() {
+            out.X_WB[i] = state.X_WB();
+            let w = state.R.inverse() * state.V.angular;
+            kinetic += 0.5 * (state.mass * state.V.linear.norm_squared() + w.dot(&(state.J * w)));
+            potential -= state.mass * self.arm.model.gravity.dot(&state.x);
+        }
+        (kinetic, potential)
+    }
+
+    /// What the joint of body i shows: drive forces, or the coordinates of a spring, their rates and its load. `force`: what
+    /// the joint puts on the body, in its proximal frame.
+    fn observe_joint(&self, i: usize, force: Vector6<f64>, out: &mut Observation) {
+        let body = &self.arm.model.bodies()[i];
+        let element = || self.arm.elements.iter().position(|element| element.body == i);
+        match body.motion {
+            JointMotion::Revolute(axis) | JointMotion::Prismatic(axis) if body.elastic => {
+                let first = if matches!(body.motion, JointMotion::Revolute(_)) { 3 } else { 0 };
+                let (g, rate) = self.deflection_now(i, Default::default());
+                let (e, rate) = (axis.dot(&g.fixed_rows::<3>(first)), axis.dot(&rate.fixed_rows::<3>(first)));
+                out.q[body.coordinate] = e;
+                out.qdot[body.coordinate] = rate;
+                if let Some(k) = element() {
+                    out.load[k] = Vector6::zeros();
+                    out.load[k][0] = -self.arm.elements[k].K[(0, 0)] * (e + rate * self.arm.tau[k]);
+                }
+            }
+            JointMotion::Revolute(axis) => out.drive[body.coordinate] = axis.dot(&force.fixed_rows::<3>(3)),
+            JointMotion::Prismatic(axis) => out.drive[body.coordinate] = axis.dot(&force.fixed_rows::<3>(0)),
+            JointMotion::Interface { .. } | JointMotion::Welded => {}
+            JointMotion::Elastic(angles) => {
+                let (g, rate) = self.deflection_now(i, angles);
+                out.q.fixed_rows_mut::<6>(body.coordinate).copy_from(&g);
+                out.qdot.fixed_rows_mut::<6>(body.coordinate).copy_from(&rate);
+                if let Some(k) = element() {
+                    let K = Matrix6::from_column_slice(self.arm.elements[k].K.as_slice());
+                    out.load[k] = -(K * (g + rate * self.arm.tau[k]));
+                }
+            }
+        }
+    }
+
+    /// Power of dampers and friction (W) at all rates `qdot`.
+    fn damping_power(&self, qdot: &DVector<f64>) -> f64 {
+        let mut damping = 0.0;
+        for (k, element) in self.arm.elements.iter().enumerate() {
+            let rate = qdot.rows(element.coordinate, element.size);
+            damping += self.arm.tau[k] * rate.dot(&(&element.K * rate));
+        }
+        for (k, rate) in self.qdot.iter().enumerate() {
+            damping += self.arm.friction_torque(k, *rate) * rate;
+        }
+        damping
+    }
+
+    /// Power of the external loads (W).
+    fn load_power(&self) -> f64 {
+        let mut power = 0.0;
+        for load in &self.arm.loads {
+            let body = &self.bodies[load.body];
+            let X = body.X_WB();
+            let F = load.on_body(self.events.side(self.t), &X);
+            let v = body.V.linear - body.V.angular.cross(&(X.rotation * body.com));
+            power += v.dot(&(X.rotation * F.force)) + body.V.angular.dot(&(X.rotation * F.torque));
+        }
+        power
+    }
+
+    /// Relative motion of the two faces of the joint of body i and its rate for the present poses, in the local form.
+    fn deflection_now(&self, i: usize, angles: ElasticAngles) -> (Vector6<f64>, Vector6<f64>) {
         let body = &self.arm.model.bodies()[i];
         let (parent, child) = (&self.bodies[body.parent], &self.bodies[i]);
         let (X_WP, X_WQ) = (parent.X_WB() * body.X_PJ, child.X_WB());
-        Rows::new(ConstraintForm::Local, angles, &X_WP, &parent.x, &X_WQ, &child.x)
+        let rows = Rows::new(ConstraintForm::Local, angles, &X_WP, &parent.x, &X_WQ, &child.x);
+        (rows.g, rows.G_parent * parent.V.to_vector() + rows.G_child * child.V.to_vector())
     }
 
     /// Velocities and impulses of the step from the current time; poses stay.
@@ -376,65 +433,13 @@ impl Spook {
         self.sample(t_next);
         self.rates_next.copy_from(&self.qdot);
         self.sample(t);
-        let model = &self.arm.model;
-        let form = self.settings.form;
+        self.update_rows()?;
+        self.update_loads();
+        self.update_body_blocks();
 
-        // Rows of every joint, and what its prescribed coordinate does to them.
-        for (i, body) in model.bodies().iter().enumerate().skip(1) {
-            let (parent, child) = (&self.bodies[body.parent], &self.bodies[i]);
-            let (X_WP, X_WQ) = (parent.X_WB() * body.X_PJ, child.X_WB());
-            let (moved, angles) = match body.motion {
-                JointMotion::Elastic(angles) => (X_WP, angles),
-                // A single spring is measured from its relaxed place.
-                _ if body.elastic => (X_WP, Default::default()),
-                JointMotion::Interface { .. } | JointMotion::Welded => (X_WP, Default::default()),
-                JointMotion::Revolute(axis) => {
-                    let turn = Rotation3::from_scaled_axis(axis * self.q[body.coordinate]);
-                    (Pose::from_parts(X_WP.translation, X_WP.rotation * turn), Default::default())
-                }
-                JointMotion::Prismatic(axis) => (
-                    X_WP * Pose::from_parts((axis * self.q[body.coordinate]).into(), Rotation3::identity()),
-                    Default::default(),
-                ),
-            };
-            // Rigid joints have no deflection to speak of: the local form serves both.
-            let form = if matches!(body.motion, JointMotion::Elastic(_)) { form } else { ConstraintForm::Local };
-            self.rows[i] = Rows::new(form, angles, &moved, &parent.x, &X_WQ, &child.x);
-            let deflection = self.rows[i].g.amax();
-            if deflection > LARGEST_DEFLECTION || deflection.is_nan() {
-                let what = format!("joint {:?} came apart by {deflection:.1e} m or rad", body.joint);
-                return Err(StepError::Diverged { t, h, what });
-            }
-        }
-
-        self.loads.iter_mut().for_each(|load| *load = Vector6::zeros());
-        for load in &self.arm.loads {
-            // At Bo in world axes.
-            let X_WB = self.bodies[load.body].X_WB();
-            let F = load.on_body(self.events.side(t), &X_WB);
-            self.loads[load.body] += Wrench::new(X_WB.rotation * F.force, X_WB.rotation * F.torque).to_vector();
-        }
-
-        // Body blocks: mass, momentum, impulse of gravity, gyroscopic moment and loads.
-        for (i, body) in self.bodies.iter().enumerate().skip(1) {
-            let R = body.R.to_rotation_matrix();
-            let J = R.matrix() * body.J * R.matrix().transpose();
-            let M = &mut self.solver.M[i];
-            M.fill(0.0);
-            M.fixed_view_mut::<3, 3>(0, 0).fill_diagonal(body.mass);
-            M.fixed_view_mut::<3, 3>(3, 3).copy_from(&J);
-            let spin = J * body.V.angular;
-            let load = &self.loads[i];
-            let arm = -(R * body.com);
-            let force = model.gravity * body.mass + load.fixed_rows::<3>(0);
-            let torque = load.fixed_rows::<3>(3) + arm.cross(&load.fixed_rows::<3>(0).into_owned())
-                - body.V.angular.cross(&spin);
-            let b = &mut self.solver.b[i];
-            b.fixed_rows_mut::<3>(0).copy_from(&(body.V.linear * body.mass + force * h));
-            b.fixed_rows_mut::<3>(3).copy_from(&(spin + torque * h));
-        }
-
-        let Self { rows, compliance, bodies, solver, velocities, lambda, rates, rates_next, .. } = self;
+        // (G Σ) λ of every joint: Jacobians, compliance, right-hand side of the equations on the module page.
+        let Self { arm, settings, rows, compliance, bodies, solver, velocities, lambda, rates, rates_next, .. } = self;
+        let (model, form) = (&arm.model, settings.form);
         let right_hand_side = |i: usize| {
             let (row, c, body) = (&rows[i], &compliance[i], &model.bodies()[i]);
             let mut sigma = c.C;
@@ -453,6 +458,73 @@ impl Spook {
         solver
             .solve(right_hand_side, velocities, lambda)
             .map_err(|_| StepError::Singular { matrix: "constraint matrix", t })
+    }
+
+    /// Rows of every joint, and what its prescribed coordinate does to them.
+    fn update_rows(&mut self) -> Result<(), StepError> {
+        let (h, t) = (self.dt, self.t);
+        for (i, body) in self.arm.model.bodies().iter().enumerate().skip(1) {
+            let (parent, child) = (&self.bodies[body.parent], &self.bodies[i]);
+            let (X_WP, X_WQ) = (parent.X_WB() * body.X_PJ, child.X_WB());
+            let (moved, angles) = match body.motion {
+                JointMotion::Elastic(angles) => (X_WP, angles),
+                // A single spring is measured from its relaxed place.
+                _ if body.elastic => (X_WP, Default::default()),
+                JointMotion::Interface { .. } | JointMotion::Welded => (X_WP, Default::default()),
+                JointMotion::Revolute(axis) => {
+                    let turn = Rotation3::from_scaled_axis(axis * self.q[body.coordinate]);
+                    (Pose::from_parts(X_WP.translation, X_WP.rotation * turn), Default::default())
+                }
+                JointMotion::Prismatic(axis) => (
+                    X_WP * Pose::from_parts((axis * self.q[body.coordinate]).into(), Rotation3::identity()),
+                    Default::default(),
+                ),
+            };
+            // Rigid joints have no deflection to speak of: the local form serves both.
+            let elastic = matches!(body.motion, JointMotion::Elastic(_));
+            let form = if elastic { self.settings.form } else { ConstraintForm::Local };
+            self.rows[i] = Rows::new(form, angles, &moved, &parent.x, &X_WQ, &child.x);
+            let deflection = self.rows[i].g.amax();
+            if deflection > LARGEST_DEFLECTION || deflection.is_nan() {
+                let what = format!("joint {:?} came apart by {deflection:.1e} m or rad", body.joint);
+                return Err(StepError::Diverged { t, h, what });
+            }
+        }
+        Ok(())
+    }
+
+    /// External loads on each body at Bo in world axes.
+    fn update_loads(&mut self) {
+        self.loads.iter_mut().for_each(|load| *load = Vector6::zeros());
+        for load in &self.arm.loads {
+            let X_WB = self.bodies[load.body].X_WB();
+            let F = load.on_body(self.events.side(self.t), &X_WB);
+            self.loads[load.body] += Wrench::new(X_WB.rotation * F.force, X_WB.rotation * F.torque).to_vector();
+        }
+    }
+
+    /// Body blocks: mass, momentum, impulse of gravity, gyroscopic moment and loads, about the centre of mass in world axes.
+    fn update_body_blocks(&mut self) {
+        let (h, gravity) = (self.dt, self.arm.model.gravity);
+        for (i, body) in self.bodies.iter().enumerate().skip(1) {
+            // M
+            let R = body.R.to_rotation_matrix();
+            let J = R.matrix() * body.J * R.matrix().transpose();
+            let M = &mut self.solver.M[i];
+            M.fill(0.0);
+            M.fixed_view_mut::<3, 3>(0, 0).fill_diagonal(body.mass);
+            M.fixed_view_mut::<3, 3>(3, 3).copy_from(&J);
+            // M v + h f
+            let spin = J * body.V.angular;
+            let load = &self.loads[i];
+            let arm = -(R * body.com);
+            let force = gravity * body.mass + load.fixed_rows::<3>(0);
+            let torque = load.fixed_rows::<3>(3) + arm.cross(&load.fixed_rows::<3>(0).into_owned())
+                - body.V.angular.cross(&spin);
+            let b = &mut self.solver.b[i];
+            b.fixed_rows_mut::<3>(0).copy_from(&(body.V.linear * body.mass + force * h));
+            b.fixed_rows_mut::<3>(3).copy_from(&(spin + torque * h));
+        }
     }
 
     /// A step of length `h` to `t_next`. The old poses stay until all new ones are known to be sound.

@@ -1,0 +1,207 @@
+//! What implicit integrators share: a matrix that is kept, when Newton's method ends, what becomes of a step that fails.
+//!
+//! ```text
+//! r(ẍ) = 0        ẍ ← ẍ - J^-1 r        J: kept until an iteration slows down
+//! ```
+//! A step whose iteration fails is tried again with a matrix of its start, then in halves, down to `h/64`.
+
+use nalgebra::DVector;
+
+use crate::error::StepError;
+use crate::integrator::TimeGrid;
+use crate::iteration_matrix::IterationMatrix;
+use crate::stepper::Counts;
+use crate::system::SecondOrderSystem;
+
+/// Most Newton iterations for one set of accelerations before they count as not found.
+const MAX_ITERATIONS: usize = 25;
+/// A step that fails is halved so many times before the run is given up.
+const MOST_HALVINGS: u32 = 6;
+/// A step that needed more iterations than this renews the matrix for the next one; twice as many, for itself.
+const RENEW_ABOVE: usize = 4;
+/// Accepted correction over the size of the acceleration.
+const TOLERANCE: f64 = 1e-9;
+/// Corrections of x below this fraction of x are rounding.
+const ROUNDING: f64 = 1e-14;
+
+/// Newton's matrix with the step that it belongs to, and the work done with it.
+#[derive(Clone, Debug)]
+pub(crate) struct Newton {
+    pub(crate) matrix: IterationMatrix,
+    /// Residual, after a solution the correction.
+    pub(crate) r: DVector<f64>,
+    /// Step to which matrix and memory belong (s).
+    pub(crate) dt: f64,
+    /// Whether the matrix is still good.
+    pub(crate) factored: bool,
+    /// Whether what is remembered of the steps before is to be taken anew.
+    pub(crate) fresh: bool,
+    iterations: u64,
+    factorisations: u64,
+    last_iterations: usize,
+    last_correction: f64,
+}
+
+impl Newton {
+    /// For n coordinates and steps of length h (s).
+    pub(crate) fn new(n: usize, h: f64) -> Self {
+        Self {
+            matrix: IterationMatrix::new(n),
+            r: DVector::zeros(n),
+            dt: h,
+            factored: false,
+            fresh: true,
+            iterations: 0,
+            factorisations: 0,
+            last_iterations: 0,
+            last_correction: 0.0,
+        }
+    }
+
+    /// Matrix and memory are out of date.
+    fn forget(&mut self) {
+        (self.factored, self.fresh) = (false, true);
+    }
+
+    /// The matrix in `self.matrix` was inverted.
+    pub(crate) fn renewed(&mut self) {
+        self.factored = true;
+        self.factorisations += 1;
+    }
+
+    /// A step was found in so many iterations, at most `longest` of them for one set of accelerations.
+    pub(crate) fn found(&mut self, iterations: usize, longest: usize) {
+        self.iterations += iterations as u64;
+        self.last_iterations += iterations;
+        self.factored = longest <= RENEW_ABOVE;
+    }
+
+    /// Work after so many steps.
+    pub(crate) fn counts(&self, steps: u64) -> Counts {
+        Counts { steps, evaluations: self.iterations, factorisations: self.factorisations }
+    }
+
+    /// Iterations of the last step and the relative correction with which it ended.
+    pub(crate) fn last(&self) -> (usize, f64) {
+        (self.last_iterations, self.last_correction)
+    }
+}
+
+/// Sizes of one Newton correction, the largest over all coordinates.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Sizes {
+    correction: f64,
+    acceleration: f64,
+    place: f64,
+}
+
+impl Sizes {
+    /// Takes in one coordinate: correction and value of its acceleration, and its place.
+    pub(crate) fn include(&mut self, correction: f64, acceleration: f64, place: f64) {
+        // `max` passes over NaN.
+        let finite = correction.is_finite();
+        self.correction = if finite { self.correction.max(correction.abs()) } else { f64::INFINITY };
+        self.acceleration = self.acceleration.max(acceleration.abs());
+        self.place = self.place.max(place.abs());
+    }
+}
+
+/// One use of Newton's method, for accelerations at `t`.
+pub(crate) struct Search {
+    t: f64,
+    h: f64,
+    /// `dx/dẍ` of the method (s²).
+    c_K: f64,
+    pub(crate) iterations: usize,
+    last: f64,
+}
+
+impl Search {
+    pub(crate) fn new(t: f64, h: f64, c_K: f64) -> Self {
+        Self { t, h, c_K, iterations: 0, last: f64::INFINITY }
+    }
+
+    /// Whether the iteration stalls: it gets a fresh matrix.
+    pub(crate) fn stalls(&self) -> bool {
+        self.iterations == 2 * RENEW_ABOVE
+    }
+
+    /// Counts a correction; whether it was the last one that is needed.
+    ///
+    /// # Errors
+    /// [`StepError::Diverged`] where values are out of all range, [`StepError::NotConverged`] after too many iterations.
+    pub(crate) fn ends(&mut self, sizes: Sizes, newton: &mut Newton) -> Result<bool, StepError> {
+        let Sizes { correction, acceleration: size, place } = sizes;
+        let Self { t, h, c_K, .. } = *self;
+        self.iterations += 1;
+        if !correction.is_finite() || place > 1e6 {
+            let place = if correction.is_finite() { place } else { f64::INFINITY };
+            let what = format!("a coordinate reached {place:.1e}");
+            return Err(StepError::Diverged { t, h, what });
+        }
+        newton.last_correction = if size > 0.0 { correction / size } else { 0.0 };
+        if correction <= TOLERANCE * size || c_K * correction <= ROUNDING * place {
+            return Ok(true);
+        }
+        if self.iterations == MAX_ITERATIONS {
+            return Err(StepError::NotConverged { t, h, iterations: self.iterations, correction: correction / size });
+        }
+        // Else the contraction seen so far tells whether the next correction would be small enough.
+        let contraction = correction / self.last;
+        self.last = correction;
+        Ok(self.iterations > 1 && contraction < 0.1 && correction * contraction <= TOLERANCE * size)
+    }
+}
+
+/// What an implicit integrator does of its own.
+pub(crate) trait ImplicitStep {
+    fn newton(&mut self) -> &mut Newton;
+
+    /// What depends on the length of the step, other than Newton's matrix.
+    fn set_length(&mut self, _dt: f64) {}
+
+    /// One step of length `newton().dt` to t; on error nothing but the matrix has changed.
+    fn attempt(&mut self, system: &mut impl SecondOrderSystem, t: f64) -> Result<(), StepError>;
+}
+
+/// Advances to t, which lies after the current time and not beyond the next multiple of the step.
+pub(crate) fn advance(
+    method: &mut impl ImplicitStep,
+    system: &mut impl SecondOrderSystem,
+    grid: TimeGrid,
+    t: f64,
+) -> Result<(), StepError> {
+    // Whole steps are all the same, so that their matrix lasts.
+    let dt = if t == grid.next_time() && grid.is_on_step() { grid.step_size() } else { t - grid.time() };
+    method.newton().last_iterations = 0;
+    cross(method, system, t, dt, MOST_HALVINGS)
+}
+
+/// From the current time to t: in one step, else in two halves.
+fn cross(
+    method: &mut impl ImplicitStep,
+    system: &mut impl SecondOrderSystem,
+    t: f64,
+    dt: f64,
+    halvings: u32,
+) -> Result<(), StepError> {
+    if dt != method.newton().dt {
+        method.newton().dt = dt;
+        method.set_length(dt);
+        method.newton().forget();
+    }
+    // With the matrix that is there, then with one of the step's start.
+    let kept = method.newton().factored;
+    let mut result = method.attempt(system, t);
+    if result.is_err() && kept {
+        method.newton().forget();
+        result = method.attempt(system, t);
+    }
+    let Err(error) = result else { return Ok(()) };
+    method.newton().forget();
+    if halvings == 0 {
+        return Err(error);
+    }
+    cross(method, system, t - 0.5 * dt, 0.5 * dt, halvings - 1)?;
+    cross(method, system, t, 0.5 * dt, halvings - 1)
+}

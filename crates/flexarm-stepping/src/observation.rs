@@ -1,0 +1,119 @@
+//! What a run sees of a stepper: state, poses, forces, energies, powers.
+
+use std::sync::Arc;
+
+use flexarm_kinematics::{Model, Pose, kinetic_energy_of, potential_energy_of};
+use nalgebra::{DVector, Vector6};
+
+use crate::arm::FlexibleArm;
+use crate::reduced::ReducedArm;
+
+/// What a run can see of a stepper at its current time.
+#[derive(Clone, Debug)]
+pub struct Observation {
+    /// Time (s).
+    pub t: f64,
+    /// The tree, with what it carries at this time.
+    pub model: Arc<Model>,
+    /// All coordinates, actuated then elastic.
+    pub q: DVector<f64>,
+    /// Their velocities.
+    pub qdot: DVector<f64>,
+    /// Poses of all bodies in the world.
+    pub X_WB: Vec<Pose>,
+    /// Forces that the drives must supply, per actuated coordinate.
+    pub drive: DVector<f64>,
+    /// Generalised elastic load per element: what the spring and damper put on the distal part; of modal bodies the
+    /// forces of the first six coordinates, of single springs the first component.
+    pub load: Vec<Vector6<f64>>,
+    /// Kinetic, gravitational and elastic energy (J).
+    pub energy: [f64; 3],
+    /// Power of the drives, of the external loads, and what dampers and friction take away (W).
+    pub power: [f64; 3],
+    /// Work of the drives so far where velocities of the motion jumped (J); not in their power, which has no impulses.
+    pub impulse_work: f64,
+}
+
+impl Observation {
+    /// Space for the arm's figures.
+    pub fn new(arm: &FlexibleArm) -> Self {
+        let model = &arm.model;
+        Self {
+            t: 0.0,
+            model: model.clone(),
+            q: DVector::zeros(model.nv()),
+            qdot: DVector::zeros(model.nv()),
+            X_WB: vec![Pose::identity(); model.bodies().len()],
+            drive: DVector::zeros(model.n_actuated()),
+            load: vec![Vector6::zeros(); arm.elements.len()],
+            energy: [0.0; 3],
+            power: [0.0; 3],
+            impulse_work: 0.0,
+        }
+    }
+}
+
+/// Fills an observation from the reduced arm after [`ReducedArm::evaluate`].
+pub(crate) fn observe_reduced(
+    system: &mut ReducedArm,
+    t: f64,
+    x: &DVector<f64>,
+    v: &DVector<f64>,
+    a: &DVector<f64>,
+    out: &mut Observation,
+) {
+    system.evaluate(t, x, v, a);
+    let (arm, data, state) = (&system.arm, &system.data, &system.state);
+    let (n, driven) = (arm.model.n_actuated(), &arm.torque_driven);
+    let (e, rates) = (&x.as_slice()[driven.len()..], &v.as_slice()[driven.len()..]);
+    out.t = t;
+    out.model.clone_from(&arm.model);
+    out.q.copy_from(&state.q);
+    out.qdot.copy_from(&state.qdot);
+    out.X_WB.copy_from_slice(&data.X_WB);
+
+    // Drives: what the prescribed motion needs, what the controller holds.
+    out.drive.copy_from(&data.tau.rows(0, n));
+    for (&k, torque) in driven.iter().zip(system.held_torques()) {
+        out.drive[k] = *torque;
+    }
+
+    // Springs, and what dampers and friction take away.
+    let mut damping = element_loads(arm, e, rates, &mut out.load);
+    for k in 0..n {
+        let rate = state.qdot[k];
+        damping += arm.friction_torque(k, rate) * rate;
+    }
+
+    // Powers and energies.
+    let loads = arm.loads.iter().map(|load| {
+        let F = load.on_body(system.events.side(t), &data.X_WB[load.body]);
+        data.V[load.body].power(&F)
+    });
+    out.power = [out.drive.dot(&out.qdot.rows(0, n)), loads.sum(), damping];
+    out.impulse_work = system.struck;
+    out.energy = [kinetic_energy_of(&arm.model, data), potential_energy_of(&arm.model, data), arm.elastic_energy(e)];
+}
+
+/// Loads `-(K e + D ė)` of the elements, their first six components; the power that the dampers take, `ėᵀ D ė` (W).
+fn element_loads(arm: &FlexibleArm, e: &[f64], rates: &[f64], loads: &mut [Vector6<f64>]) -> f64 {
+    let mut damping = 0.0;
+    for (load, element) in loads.iter_mut().zip(&arm.elements) {
+        let first = arm.offset(element);
+        let mut force = [0.0; 6];
+        for c in 0..element.size {
+            let row: f64 = rates.iter().enumerate().map(|(j, rate)| arm.D[(first + c, j)] * rate).sum();
+            damping += row * rates[first + c];
+            if c < 6 {
+                let own = &e[first..first + element.size];
+                let spring: f64 = match &element.curve {
+                    Some(curve) => curve.torque(own[0]),
+                    None => own.iter().enumerate().map(|(j, e)| element.K[(c, j)] * e).sum(),
+                };
+                force[c] = -(spring + row);
+            }
+        }
+        *load = Vector6::from(force);
+    }
+    damping
+}

@@ -1,0 +1,101 @@
+//! The dispersion correction of generalised-alpha, (5) of the module above: what it does to accelerations and to the matrix
+//! of Newton's method.
+//!
+//! ```text
+//! x̃ = Sᵀ ẍ,   Sᵀ = 1 + c h² M^-1 K                                  (6)
+//! J = M + C Sᵀ,   C = h γ' D + h² β' K                              (7)  derivative of (1) with respect to ẍ⁺
+//! S J = M + c h² K + S C Sᵀ,   J^-1 = (S J)^-1 S                    (8)  symmetric for every damping, unlike J
+//! ```
+
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+
+use crate::error::StepError;
+use crate::iteration_matrix::{IterationMatrix, solve_transposed, storage_of};
+use crate::system::SecondOrderSystem;
+
+/// The correction for steps of one length. Allocates when it is made and for its first matrix, not after.
+#[derive(Clone, Debug)]
+pub(super) struct DispersionCorrection {
+    /// c of (5).
+    c: f64,
+    /// `c h²`.
+    c_h2: f64,
+    /// K, n × n.
+    K: DMatrix<f64>,
+    /// `M^-1 K` at the configuration of the last matrix.
+    M_inverse_K: DMatrix<f64>,
+    mass_factor: Option<Cholesky<f64, Dyn>>,
+    product: DMatrix<f64>,
+    /// `M^-1 K` times a vector.
+    shift: DVector<f64>,
+}
+
+impl DispersionCorrection {
+    /// For n coordinates and steps of length h (s).
+    pub(super) fn new(c: f64, h: f64, n: usize) -> Self {
+        let zeros = DMatrix::zeros(n, n);
+        Self {
+            c,
+            c_h2: c * h * h,
+            K: zeros.clone(),
+            M_inverse_K: zeros.clone(),
+            mass_factor: None,
+            product: zeros,
+            shift: DVector::zeros(n),
+        }
+    }
+
+    /// The next steps have the length dt (s).
+    pub(super) fn set_length(&mut self, dt: f64) {
+        self.c_h2 = self.c * dt * dt;
+    }
+
+    /// Makes of M and C, as they were read, what (8) has in their places.
+    ///
+    /// # Errors
+    /// [`StepError::Singular`] if the mass matrix is not positive definite.
+    pub(super) fn correct(
+        &mut self,
+        system: &mut impl SecondOrderSystem,
+        matrix: &mut IterationMatrix,
+        t: f64,
+    ) -> Result<(), StepError> {
+        let Self { c_h2, K, M_inverse_K, mass_factor, product, .. } = self;
+        let c_h2 = *c_h2;
+        // M^-1 K
+        let mut M = storage_of(mass_factor, K.nrows());
+        M.copy_from(&matrix.S);
+        let factor = Cholesky::new(M).ok_or(StepError::Singular { matrix: "mass matrix", t })?;
+        system.stiffness(K);
+        M_inverse_K.copy_from(K);
+        solve_transposed(&factor, M_inverse_K);
+        M_inverse_K.transpose_mut();
+        *mass_factor = Some(factor);
+
+        // S C Sᵀ. Column by column: the product of whole matrices allocates.
+        product.copy_from(&matrix.C);
+        for (mut column, x) in product.column_iter_mut().zip(M_inverse_K.column_iter()) {
+            column.gemv(c_h2, &matrix.C, &x, 1.0);
+        }
+        matrix.C.copy_from(product);
+        matrix.C.gemm_tr(c_h2, M_inverse_K, product, 1.0);
+
+        // M + c h² K, and Sᵀ on the right-hand side, which is kept transposed.
+        matrix.S.zip_apply(K, |s, k| *s += c_h2 * k);
+        matrix.inverse.zip_apply(M_inverse_K, |i, s| *i += c_h2 * s);
+        Ok(())
+    }
+
+    /// x̃ of an acceleration by (6).
+    pub(super) fn corrected(&mut self, acceleration: &DVector<f64>, x_tilde: &mut DVector<f64>) {
+        self.shift.gemv(1.0, &self.M_inverse_K, acceleration, 0.0);
+        x_tilde.copy_from(acceleration);
+        x_tilde.axpy(self.c_h2, &self.shift, 1.0);
+    }
+
+    /// What a change of ẍ adds to the change of x̃, coordinate by coordinate: `c h²` and `M^-1 K d`.
+    pub(super) fn shift(&mut self, d: &DVector<f64>) -> (f64, &DVector<f64>) {
+        self.shift.gemv(1.0, &self.M_inverse_K, d, 0.0);
+        (self.c_h2, &self.shift)
+    }
+}

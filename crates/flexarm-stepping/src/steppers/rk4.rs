@@ -1,0 +1,220 @@
+//! The classical explicit Runge-Kutta method of fourth order, for systems that are not stiff.
+//!
+//! Stable while `h ω < 2.78` for every undamped mode; stiffness-proportional damping narrows this further.
+//! Source: [Hairer, Nørsett & Wanner 1993], section II.1.
+
+use std::sync::Arc;
+
+use flexarm_kinematics::{Data, State, mass_matrix};
+use nalgebra::{DMatrix, DVector};
+
+use crate::arm::FlexibleArm;
+use crate::error::StepError;
+use crate::integrator::{Integrator, ReducedStepper, TimeGrid};
+use crate::stepper::{Counts, Stepper};
+use crate::steppers::{Method, StepRule, StepperEntry, StepperKind};
+use crate::system::SecondOrderSystem;
+
+pub(super) static ENTRY: StepperEntry = StepperEntry {
+    name: "rk4",
+    aliases: &[],
+    help: "Explicit, fourth order; small steps only",
+    steps: StepRule::UpToTheStabilityLimit,
+    order: 4,
+    maximal: false,
+    allocates: false,
+    with: |_| StepperKind::Rk4,
+};
+
+/// There is nothing to set.
+pub(super) struct Rk4Settings;
+
+impl Method for Rk4Settings {
+    fn entry(&self) -> &'static StepperEntry {
+        &ENTRY
+    }
+
+    fn start(&self, arm: FlexibleArm, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
+        check_explicit_step(&arm, h)?;
+        let mut changed = arm.clone();
+        for change in &arm.inertia_changes {
+            changed.model = Arc::new(changed.model.with_inertia(change.body, change.inertia));
+            // An arm that cannot stand with this payload may be able to move with it.
+            if changed.update_modes_and_damping().is_ok() {
+                check_explicit_step(&changed, h)?;
+            }
+        }
+        ReducedStepper::start(arm, e, |system, x, v| Rk4::new(system, 0.0, h, x, v))
+    }
+}
+
+/// Bound of `h ω` on the imaginary axis.
+pub const STABILITY_LIMIT: f64 = 2.78;
+
+/// The integrator with its state.
+#[derive(Clone, Debug)]
+pub struct Rk4 {
+    grid: TimeGrid,
+    /// Positions at the current time.
+    pub x: DVector<f64>,
+    /// Velocities.
+    pub v: DVector<f64>,
+    /// Accelerations at the current time.
+    pub acceleration: DVector<f64>,
+    x_stage: DVector<f64>,
+    v_stage: DVector<f64>,
+    a_stage: DVector<f64>,
+    dx: DVector<f64>,
+    dv: DVector<f64>,
+}
+
+impl Rk4 {
+    /// Starts at `t0` with step `h` (s).
+    ///
+    /// # Errors
+    /// [`StepError::Singular`] if the first acceleration cannot be found.
+    pub fn new(
+        system: &mut impl SecondOrderSystem,
+        t0: f64,
+        h: f64,
+        x: DVector<f64>,
+        v: DVector<f64>,
+    ) -> Result<Self, StepError> {
+        let zeros = DVector::zeros(system.dimension());
+        let mut acceleration = zeros.clone();
+        system.acceleration(t0, &x, &v, &mut acceleration)?;
+        Ok(Self {
+            grid: TimeGrid::new(t0, h),
+            x,
+            v,
+            acceleration,
+            x_stage: zeros.clone(),
+            v_stage: zeros.clone(),
+            a_stage: zeros.clone(),
+            dx: zeros.clone(),
+            dv: zeros,
+        })
+    }
+}
+
+impl Integrator for Rk4 {
+    fn grid(&self) -> &TimeGrid {
+        &self.grid
+    }
+
+    fn state(&self) -> [&DVector<f64>; 3] {
+        [&self.x, &self.v, &self.acceleration]
+    }
+
+    fn state_at_event(&mut self) -> (&DVector<f64>, &mut DVector<f64>) {
+        (&self.x, &mut self.v)
+    }
+
+    fn restart(&mut self, system: &mut impl SecondOrderSystem) -> Result<(), StepError> {
+        system.acceleration(self.grid.time(), &self.x, &self.v, &mut self.acceleration)
+    }
+
+    fn counts(&self) -> Counts {
+        Counts { steps: self.grid.steps(), evaluations: 4 * self.grid.steps(), factorisations: 0 }
+    }
+
+    fn advance_to(&mut self, system: &mut impl SecondOrderSystem, t_new: f64) -> Result<(), StepError> {
+        let t = self.grid.time();
+        let h = t_new - t;
+        // Stage 1 is the acceleration kept from the end of the last step.
+        self.dx.copy_from(&self.v);
+        self.dv.copy_from(&self.acceleration);
+        self.v_stage.copy_from(&self.v);
+        self.a_stage.copy_from(&self.acceleration);
+        // Stages 2 to 4.
+        for (fraction, weight) in [(0.5, 2.0), (0.5, 2.0), (1.0, 1.0)] {
+            for k in 0..self.x.len() {
+                self.x_stage[k] = self.x[k] + fraction * h * self.v_stage[k];
+                self.v_stage[k] = self.v[k] + fraction * h * self.a_stage[k];
+            }
+            system.acceleration(t + fraction * h, &self.x_stage, &self.v_stage, &mut self.a_stage)?;
+            self.dx.axpy(weight, &self.v_stage, 1.0);
+            self.dv.axpy(weight, &self.a_stage, 1.0);
+        }
+        // x⁺ = x + h/6 Σ w_i v_i, v⁺ likewise.
+        let mut largest = 0.0f64;
+        for k in 0..self.x.len() {
+            self.x_stage[k] = self.x[k] + h / 6.0 * self.dx[k];
+            self.v_stage[k] = self.v[k] + h / 6.0 * self.dv[k];
+            largest = largest.max(self.x_stage[k].abs());
+            if !self.x_stage[k].is_finite() {
+                largest = f64::INFINITY;
+            }
+        }
+        if largest > 1e6 {
+            let what = format!("a coordinate reached {largest:.1e}");
+            return Err(StepError::Diverged { t: t_new, h, what });
+        }
+        system.acceleration(t_new, &self.x_stage, &self.v_stage, &mut self.a_stage)?;
+        std::mem::swap(&mut self.x, &mut self.x_stage);
+        std::mem::swap(&mut self.v, &mut self.v_stage);
+        std::mem::swap(&mut self.acceleration, &mut self.a_stage);
+        self.grid.reach(t_new);
+        Ok(())
+    }
+}
+
+/// Every mode must lie inside the stability region: on the imaginary axis up to 2.78, 2.61 where damping turns it
+/// inwards, on the negative real axis up to 2.78 again.
+fn check_explicit_step(arm: &FlexibleArm, h: f64) -> Result<(), StepError> {
+    let mut rate = 0.0f64;
+    for (j, omega) in arm.modes.omega.iter().enumerate() {
+        let phi = arm.modes.shapes.column(j);
+        rate = rate.max(omega * STABILITY_LIMIT / 2.61).max(fastest_decay(phi.dot(&(&arm.D * phi)), *omega));
+    }
+    let mut highest = arm.modes.omega.last().copied().unwrap_or(0.0);
+    if !arm.torque_driven.is_empty() {
+        // Motors that are free swing against their springs.
+        let (omega, decay) = free_rates(arm)?;
+        rate = rate.max(omega * STABILITY_LIMIT / 2.61).max(decay);
+        highest = highest.max(omega);
+    }
+    if h * rate <= STABILITY_LIMIT {
+        return Ok(());
+    }
+    Err(StepError::UnstableStep {
+        stepper: "rk4",
+        h,
+        highest_hz: highest / std::f64::consts::TAU,
+        largest_s: STABILITY_LIMIT / rate,
+    })
+}
+
+/// Decay (1/s) of a mode with damping `2 ζ ω`; an oscillating one is bounded by its frequency alone.
+fn fastest_decay(damping: f64, omega: f64) -> f64 {
+    let squared = damping * damping - 4.0 * omega * omega;
+    if squared > 0.0 { 0.5 * (damping + squared.sqrt()) } else { 0.0 }
+}
+
+/// Highest angular frequency and decay (1/s) with the joints driven by torque free, friction near standstill left out.
+fn free_rates(arm: &FlexibleArm) -> Result<(f64, f64), StepError> {
+    let (model, na) = (&arm.model, arm.model.n_actuated());
+    let (mut state, mut qddot) = (State::zeros(model), DVector::zeros(model.nv()));
+    arm.prescribed_state(0.0, &mut state, &mut qddot);
+    state.q.rows_mut(na, arm.modes.equilibrium.len()).copy_from(&arm.modes.equilibrium);
+    let mut data = Data::new(model);
+    let M = mass_matrix(model, &mut data, &state.q);
+    let free: Vec<usize> = arm.torque_driven.iter().copied().chain(na..model.nv()).collect();
+    let (n, driven) = (free.len(), arm.torque_driven.len());
+    let M = DMatrix::from_fn(n, n, |i, j| M[(free[i], free[j])]);
+    let (mut K, mut D) = (DMatrix::zeros(n, n), DMatrix::zeros(n, n));
+    K.view_mut((driven, driven), (n - driven, n - driven)).copy_from(&arm.stiffness());
+    D.view_mut((driven, driven), (n - driven, n - driven)).copy_from(&arm.D);
+    for (i, k) in arm.torque_driven.iter().enumerate() {
+        D[(i, i)] = arm.friction.get(*k).map_or(0.0, |f| f.viscous);
+    }
+    let singular = StepError::Singular { matrix: "mass matrix", t: 0.0 };
+    let L = M.cholesky().ok_or(singular.clone())?.l();
+    let largest = |A: &DMatrix<f64>| {
+        let half = L.solve_lower_triangular(A)?;
+        let whole = L.solve_lower_triangular(&half.transpose())?;
+        Some((&whole + whole.transpose()).symmetric_eigenvalues().max() * 0.5)
+    };
+    let (stiff, damped) = (largest(&K).ok_or(singular.clone())?, largest(&D).ok_or(singular)?);
+    Ok((stiff.max(0.0).sqrt(), damped.max(0.0)))
+}

@@ -1,0 +1,45 @@
+//! What a run costs each stepper: steps, evaluations of the equations of motion (Newton iterations) and factorisations.
+//!
+//! These numbers only show change: the program itself printed them. A change that gives the same results and works twice as
+//! hard is seen here. Whoever means it writes the new numbers down; a new stepper gets a line.
+#![allow(non_snake_case, reason = "monogram notation")]
+
+use std::sync::Arc;
+
+use flexarm_kinematics::Model;
+use flexarm_stepping::*;
+use flexarm_testkit::{reference_arm, reference_motion};
+
+/// Stepper, step (s), then the work: steps, evaluations, factorisations. The reference takes steps of its own.
+const WORK: [(&str, f64, [u64; 3]); 5] = [
+    ("generalized-alpha", 1e-3, [500, 1678, 72]),
+    ("spook", 1e-3, [500, 500, 500]),
+    ("rk4", 1e-4, [5000, 20000, 0]),
+    ("reference", 1e-3, [2750, 6362, 599]),
+    ("sdirk3", 1e-3, [500, 4614, 54]),
+];
+
+/// Half a second of the motion of the reference arm, with default settings and modal damping of 3 %.
+#[test]
+fn every_stepper_works_as_hard_as_it_did() {
+    let reference = reference_arm(true);
+    let model = Arc::new(Model::new(&reference.mechanism).expect("valid"));
+    let springs = reference.K_S.map(|K| ("spring".to_owned(), K, Damping::Modal(0.03))).to_vec();
+    let motion = MotionFn(|t: f64, q: &mut [f64], v: &mut [f64], a: &mut [f64]| {
+        let (x, y, z) = reference_motion(t);
+        q.copy_from_slice(&x);
+        v.copy_from_slice(&y);
+        a.copy_from_slice(&z);
+    });
+    let arm = FlexibleArm::new(model, springs, Arc::new(motion)).expect("valid");
+    let found = STEPPERS.map(|entry| {
+        let told = WORK.iter().find(|work| work.0 == entry.name);
+        let h = told.unwrap_or_else(|| panic!("{} has no line in WORK", entry.name)).1;
+        let kind = (entry.with)(&StepperOptions::default());
+        let mut stepper = new_stepper(kind, arm.clone(), h, Start::Equilibrium).expect("starts");
+        (0..(0.5 / h).round() as usize).for_each(|_| stepper.step().expect("steps"));
+        let Counts { steps, evaluations, factorisations } = stepper.counts();
+        (entry.name, h, [steps, evaluations, factorisations])
+    });
+    assert_eq!(found, WORK);
+}

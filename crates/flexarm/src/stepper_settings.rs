@@ -1,0 +1,143 @@
+//! Settings of a stepper in a summary: keys and values as its entry in the registry tells them, so that a summary knows no
+//! stepper.
+
+use std::fmt;
+
+use flexarm_stepping::{StepperKind, StepperSetting};
+use serde::de::{IgnoredAny, MapAccess, Visitor};
+use serde::ser::SerializeMap;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+/// Settings under their keys, in the order of the registry. In JSON they are keys of the object around them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct StepperSettings(pub Vec<(String, SettingValue)>);
+
+/// Value of a setting.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum SettingValue {
+    /// On or off.
+    Flag(bool),
+    /// A number.
+    Number(f64),
+    /// One of several words.
+    Word(String),
+}
+
+impl fmt::Display for SettingValue {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Flag(on) => on.fmt(f),
+            Self::Number(x) => x.fmt(f),
+            Self::Word(word) => word.fmt(f),
+        }
+    }
+}
+
+impl StepperSettings {
+    /// What the stepper tells of itself.
+    pub(crate) fn of(stepper: &StepperKind) -> Self {
+        let value = |setting| match setting {
+            StepperSetting::Flag(on) => SettingValue::Flag(on),
+            StepperSetting::Number(x) => SettingValue::Number(x),
+            StepperSetting::Word(word) => SettingValue::Word(word.to_owned()),
+        };
+        Self(stepper.settings().into_iter().map(|(key, setting)| (key.to_owned(), value(setting))).collect())
+    }
+
+    /// The setting of that key, if the stepper has it.
+    pub fn get(&self, key: &str) -> Option<&SettingValue> {
+        self.0.iter().find(|(own, _)| own == key).map(|(_, value)| value)
+    }
+}
+
+impl Serialize for StepperSettings {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(Some(self.0.len()))?;
+        for (key, value) in &self.0 {
+            map.serialize_entry(key, value)?;
+        }
+        map.end()
+    }
+}
+
+impl<'de> Deserialize<'de> for StepperSettings {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Settings;
+
+        /// A key of another kind belongs to a file of another version.
+        #[derive(Deserialize)]
+        #[serde(untagged)]
+        enum Known {
+            Value(SettingValue),
+            Other(IgnoredAny),
+        }
+
+        impl<'de> Visitor<'de> for Settings {
+            type Value = StepperSettings;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("settings of a stepper")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<StepperSettings, A::Error> {
+                let mut settings = Vec::new();
+                while let Some((key, value)) = map.next_entry::<String, Known>()? {
+                    if let Known::Value(value) = value {
+                        settings.push((key, value));
+                    }
+                }
+                Ok(StepperSettings(settings))
+            }
+        }
+        deserializer.deserialize_map(Settings)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use flexarm_stepping::{AlphaSettings, Counts, ReferenceSettings, SpookSettings};
+
+    use super::*;
+    use crate::options::RunOptions;
+    use crate::summary::StepperFigures;
+
+    fn json(stepper: StepperKind) -> String {
+        let options = RunOptions { stepper, ..RunOptions::default() };
+        let counts = Counts { steps: 1, evaluations: 2, factorisations: 3 };
+        serde_json::to_string(&StepperFigures::new(&options, counts)).expect("plain values")
+    }
+
+    /// Truth: the keys as summaries of version 0.1 have them, in their order.
+    #[test]
+    fn summaries_keep_their_keys() {
+        let with = |settings: &str, name: &str| {
+            format!(r#"{{"name":"{name}","h_s":0.001,{settings}"steps":1,"evaluations":2,"factorisations":3}}"#)
+        };
+        let cases = [
+            (
+                StepperKind::GeneralizedAlpha(AlphaSettings::default()),
+                r#""rho_inf":0.9,"dispersion_correction":true,"#,
+                "generalized-alpha",
+            ),
+            (StepperKind::Spook(SpookSettings::default()), r#""form":"local","preset":"exact","#, "spook"),
+            (StepperKind::Rk4, "", "rk4"),
+            (StepperKind::Reference(ReferenceSettings::new(1e-7)), r#""rtol":1e-7,"method":"bdf","#, "reference"),
+        ];
+        for (stepper, settings, name) in cases {
+            assert_eq!(json(stepper), with(settings, name));
+        }
+    }
+
+    /// A summary of every stepper is read back as it was written; what a later version says besides is passed over.
+    #[test]
+    fn summaries_of_every_stepper_are_read_back() {
+        for entry in flexarm_stepping::STEPPERS {
+            let text = json((entry.with)(&Default::default()));
+            let read: StepperFigures = serde_json::from_str(&text).expect("reads");
+            assert_eq!(serde_json::to_string(&read).expect("plain values"), text);
+            let later = text.replace("{", r#"{"later":{"a":[1]},"#);
+            assert_eq!(serde_json::from_str::<StepperFigures>(&later).expect("reads"), read);
+        }
+    }
+}
