@@ -93,7 +93,43 @@ pub struct Bar {
     pub rotary_z: f64,
 }
 
+/// The words of the shapes with the lengths that each takes, and the shape of a word: one line per shape.
+macro_rules! shapes {
+    ($($word:literal => $shape:ident { $($length:ident),+ }),+ $(,)?) => {
+        /// The shapes by the word that files use, with the lengths (m) that each takes.
+        pub const SHAPES: &'static [(&'static str, &'static [&'static str])] =
+            &[$(($word, &[$(stringify!($length)),+])),+];
+
+        /// The shape of that word of [`Self::SHAPES`], its lengths (m) from `length`; none for another word.
+        ///
+        /// # Errors
+        /// The first error of `length`.
+        pub fn from_lengths<E>(word: &str, length: impl Fn(&'static str) -> Result<f64, E>) -> Result<Option<Self>, E> {
+            Ok(Some(match word {
+                $($word => Self::$shape { $($length: length(stringify!($length))?),+ },)+
+                _ => return Ok(None),
+            }))
+        }
+    };
+}
+
 impl Section {
+    shapes! {
+        "box" => Box { width, height, wall },
+        "rectangle" => Rectangle { width, height },
+        "tube" => Tube { outer_diameter, wall },
+        "circle" => Circle { diameter },
+    }
+
+    /// Largest outer size (m); none for [`Section::Given`].
+    pub fn largest_size(&self) -> Option<f64> {
+        match *self {
+            Self::Box { width, height, .. } | Self::Rectangle { width, height } => Some(width.max(height)),
+            Self::Tube { outer_diameter: d, .. } | Self::Circle { diameter: d } => Some(d),
+            Self::Given(_) => None,
+        }
+    }
+
     /// Area, second moments, torsion constant and shear factors of the shape.
     ///
     /// * `nu`: Poisson's ratio, for the shear factors of Cowper.

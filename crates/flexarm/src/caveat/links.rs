@@ -65,11 +65,7 @@ fn outside(
 fn section(name: &str, beam: &BeamLink) -> Vec<Caveat> {
     let mut caveats = Vec::new();
     let length = beam.length;
-    let thick = match beam.section {
-        Section::Box { width, height, .. } | Section::Rectangle { width, height } => width.max(height),
-        Section::Tube { outer_diameter: d, .. } | Section::Circle { diameter: d } => d,
-        Section::Given(_) => 0.0,
-    };
+    let thick = beam.section.largest_size().unwrap_or(0.0);
     if thick > THICK * length {
         let likely = slip(thick, &(0.0..=length), slip::LENGTH, 1.0);
         caveats.push(kinds::SECTION.found(name, thick, length).likely(likely));
