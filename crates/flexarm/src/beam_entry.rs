@@ -11,7 +11,7 @@ use crate::robot_file::MaterialEntry;
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct BeamEntry {
-    /// box, rectangle, tube, circle or given.
+    /// box, rectangle, tube, circle, i_beam, channel or given.
     pub section: String,
     /// Along section axis y (m).
     pub width: Option<f64>,
@@ -23,6 +23,12 @@ pub struct BeamEntry {
     pub outer_diameter: Option<f64>,
     /// Of circles (m).
     pub diameter: Option<f64>,
+    /// Thickness of the web of I-beams and channels (m).
+    pub web: Option<f64>,
+    /// Thickness of their flanges (m).
+    pub flange: Option<f64>,
+    /// Radius between both (m); 0 if not given.
+    pub fillet: Option<f64>,
     /// Stretching stiffness (N).
     #[serde(rename = "EA")]
     pub ea: Option<f64>,
@@ -76,13 +82,16 @@ const GIVEN_KEYS: &[&str] = &["EA", "EI_y", "EI_z", "GJ", "kGA_y", "kGA_z", "mas
 
 impl BeamEntry {
     /// Every number that describes a section, by its key.
-    fn section_numbers(&self) -> [(&'static str, Option<f64>); 14] {
+    fn section_numbers(&self) -> [(&'static str, Option<f64>); 17] {
         [
             ("width", self.width),
             ("height", self.height),
             ("wall", self.wall),
             ("outer_diameter", self.outer_diameter),
             ("diameter", self.diameter),
+            ("web", self.web),
+            ("flange", self.flange),
+            ("fillet", self.fillet),
             ("EA", self.ea),
             ("EI_y", self.ei_y),
             ("EI_z", self.ei_z),
@@ -136,8 +145,11 @@ fn section(beam: &BeamEntry) -> Result<(Section, &'static [&'static str]), Strin
         };
         return Ok((Section::Given(bar), GIVEN_KEYS));
     }
+    let length = |key: &str, default: Option<f64>| {
+        default.map_or_else(|| beam.needed(key), |d| Ok(beam.number(key).unwrap_or(d)))
+    };
     let shape = Section::SHAPES.iter().find(|(word, _)| *word == beam.section);
-    match (Section::from_lengths(&beam.section, |key| beam.needed(key))?, shape) {
+    match (Section::from_lengths(&beam.section, length)?, shape) {
         (Some(section), Some((_, keys))) => Ok((section, keys)),
         _ => {
             let words: Vec<&str> = Section::SHAPES.iter().map(|(word, _)| *word).collect();
