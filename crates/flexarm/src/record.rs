@@ -9,7 +9,7 @@ use flexarm_urdf::Geometry;
 
 use crate::error::Error;
 use crate::motion::Motion;
-use crate::options::{DriveModel, LinkModel, Outputs, RunOptions};
+use crate::options::{Outputs, RunOptions};
 use crate::result_files::Undo;
 use crate::robot::Robot;
 use crate::summary::Files;
@@ -230,18 +230,8 @@ pub(crate) fn header(
         ("trajectory_file", straight(&motion.path)),
     ];
     inputs.extend(options.loads.as_ref().map(|path| ("loads_file", straight(path))));
-    let drives = match options.modelling.drives {
-        DriveModel::AsFiled => AS_FILED,
-        DriveModel::Rigid => "rigid",
-        DriveModel::Elastic => "elastic",
-        DriveModel::Servo => "servo",
-    };
-    let links_choice = match options.modelling.links {
-        LinkModel::AsFiled => AS_FILED,
-        LinkModel::Rigid => "rigid",
-        LinkModel::Lumped => "lumped",
-        LinkModel::Modal => "modal",
-    };
+    let drives = options.modelling.drives.word().unwrap_or(AS_FILED);
+    let links_choice = options.modelling.links.word().unwrap_or(AS_FILED);
     let metadata = vec![
         group(
             "flexarm.run",
