@@ -7,6 +7,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix3};
 
+use crate::axis_motion::AxisMotion;
 use crate::data::{Data, ElasticSubspace, joint_position, place_modal};
 use crate::model::{JointMotion, Model};
 use crate::spatial::{SpatialInertia, Wrench, cross3, mul, mul3, tr_mul, tr_mul3};
@@ -42,16 +43,11 @@ pub fn mass_matrix_at_poses(model: &Model, data: &mut Data) {
         let (composite, X_PB) = (data.composite[i], data.X_PB[i]);
         let k = body.coordinate;
         match body.motion {
-            JointMotion::Revolute(axis) => {
-                let a = axis * body.ratio;
-                let F = Wrench::new(a.cross(&composite.first_moment), mul(&composite.rotational, &a));
-                data.M.as_mut_slice()[k * nv + k] += a.dot(&F.torque) + body.ratio * body.ratio * body.armature;
-                data.U[i] = F;
-            }
-            JointMotion::Prismatic(axis) => {
-                let a = axis * body.ratio;
-                let F = Wrench::new(a * composite.mass, composite.first_moment.cross(&a));
-                data.M.as_mut_slice()[k * nv + k] += a.dot(&F.force) + body.ratio * body.ratio * body.armature;
+            JointMotion::Axis(motion) => {
+                let F = axis_wrench(motion, &composite, body.ratio);
+                let own =
+                    motion.linear(|axis| (axis * body.ratio).dot(&F.torque), |axis| (axis * body.ratio).dot(&F.force));
+                data.M.as_mut_slice()[k * nv + k] += own + body.ratio * body.ratio * body.armature;
                 data.U[i] = F;
             }
             JointMotion::Welded => {}
@@ -74,6 +70,21 @@ pub fn mass_matrix_at_poses(model: &Model, data: &mut Data) {
     }
 }
 
+/// `I_c S` of a joint of one coordinate: the wrench that moves all that is outward of it, at Bo in B axes.
+#[inline(always)]
+fn axis_wrench(motion: AxisMotion, composite: &SpatialInertia, ratio: f64) -> Wrench {
+    motion.linear(
+        |axis| {
+            let a = axis * ratio;
+            Wrench::new(a.cross(&composite.first_moment), mul(&composite.rotational, &a))
+        },
+        |axis| {
+            let l = axis * ratio;
+            Wrench::new(l * composite.mass, composite.first_moment.cross(&l))
+        },
+    )
+}
+
 /// Carries the wrenches of all one-DoF joints from body i outward over to its parent and meets the parent's joint:
 /// one level for all of them at once, because they do not wait for each other.
 #[inline(always)]
@@ -85,14 +96,13 @@ fn carry_columns(model: &Model, data: &mut Data, i: usize) {
     let M = data.M.as_mut_slice();
     let outward = i..model.bodies[i].subtree_end;
     for (F, body) in data.U[outward.clone()].iter_mut().zip(&model.bodies[outward]) {
-        if !matches!(body.motion, JointMotion::Revolute(_) | JointMotion::Prismatic(_)) {
+        if !matches!(body.motion, JointMotion::Axis(_)) {
             continue;
         }
         *F = F.at_parent(&X_PB);
         let column = body.coordinate;
         match inward.motion {
-            JointMotion::Revolute(axis) => add_pair(M, nv, row, column, inward.ratio * axis.dot(&F.torque)),
-            JointMotion::Prismatic(axis) => add_pair(M, nv, row, column, inward.ratio * axis.dot(&F.force)),
+            JointMotion::Axis(motion) => add_pair(M, nv, row, column, inward.ratio * motion.project(F)),
             JointMotion::Elastic(_) => {
                 let S = &data.elastic[parent];
                 let (f, t) = (tr_mul(&S.L, &F.force), tr_mul(&S.B, &F.torque));
@@ -118,8 +128,7 @@ fn meet(model: &Model, elastic: &[ElasticSubspace], M: &mut [f64], nv: usize, j:
     let body = &model.bodies[j];
     let row = body.coordinate;
     match body.motion {
-        JointMotion::Revolute(axis) => add_pair(M, nv, row, column, body.ratio * axis.dot(&F.torque)),
-        JointMotion::Prismatic(axis) => add_pair(M, nv, row, column, body.ratio * axis.dot(&F.force)),
+        JointMotion::Axis(motion) => add_pair(M, nv, row, column, body.ratio * motion.project(F)),
         JointMotion::Welded => {}
         JointMotion::Elastic(_) => {
             let S = &elastic[j];
@@ -226,15 +235,19 @@ fn elastic_columns(model: &Model, data: &mut Data, i: usize, composite: &Spatial
         let inward = &model.bodies[j];
         let row = inward.coordinate;
         match inward.motion {
-            JointMotion::Revolute(axis) => {
-                let a = tr_mul(&R_AP, &(axis * inward.ratio));
-                let t = tr_mul(U, &a.cross(&(r * mass + h_B)));
-                let q = tr_mul(&W, &a) - tr_mul(&Omega, &a.cross(&r).cross(&h_B));
-                add_six(M, nv, k, row, [t.x, t.y, t.z, q.x, q.y, q.z]);
-            }
-            JointMotion::Prismatic(axis) => {
-                let a = tr_mul(&R_AP, &(axis * inward.ratio));
-                let (t, q) = (tr_mul(U, &a) * mass, tr_mul(&force_r, &a));
+            JointMotion::Axis(motion) => {
+                // Forces of the translations and of the angles.
+                let Wrench { force: t, torque: q } = motion.linear(
+                    |axis| {
+                        let a = tr_mul(&R_AP, &(axis * inward.ratio));
+                        let t = tr_mul(U, &a.cross(&(r * mass + h_B)));
+                        Wrench::new(t, tr_mul(&W, &a) - tr_mul(&Omega, &a.cross(&r).cross(&h_B)))
+                    },
+                    |axis| {
+                        let l = tr_mul(&R_AP, &(axis * inward.ratio));
+                        Wrench::new(tr_mul(U, &l) * mass, tr_mul(&force_r, &l))
+                    },
+                );
                 add_six(M, nv, k, row, [t.x, t.y, t.z, q.x, q.y, q.z]);
             }
             JointMotion::Welded => {}

@@ -34,6 +34,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
 mod aba;
+mod axis_motion;
 mod crba;
 mod data;
 mod energy;
@@ -47,6 +48,7 @@ mod rotation;
 mod spatial;
 
 pub use aba::{Roles, forward_dynamics, hybrid_dynamics};
+pub use axis_motion::AxisMotion;
 pub use crba::{mass_matrix, mass_matrix_at_poses};
 pub use data::{Data, State};
 pub use energy::{

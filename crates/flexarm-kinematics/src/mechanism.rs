@@ -8,6 +8,7 @@ use std::sync::Arc;
 
 use nalgebra::{Matrix3, Unit, Vector3};
 
+use crate::axis_motion::AxisMotion;
 use crate::modal::ModalBody;
 use crate::rotation::ElasticAngles;
 use crate::spatial::{Pose, SpatialInertia};
@@ -105,6 +106,46 @@ impl JointKind {
             Self::ElasticRevolute(_) | Self::ElasticPrismatic(_) => 1,
             Self::Elastic(_) => 6,
         }
+    }
+
+    /// Motion of its coordinate, where it has one.
+    pub fn axis_motion(&self) -> Option<AxisMotion> {
+        match *self {
+            Self::Revolute(axis) | Self::Continuous(axis) | Self::ElasticRevolute(axis) => {
+                Some(AxisMotion::Revolute(axis.into_inner()))
+            }
+            Self::Prismatic(axis) | Self::ElasticPrismatic(axis) => Some(AxisMotion::Prismatic(axis.into_inner())),
+            Self::Fixed | Self::Elastic(_) | Self::Interface(_) => None,
+        }
+    }
+
+    /// Whether its coordinates are small elastic ones.
+    pub fn is_elastic(&self) -> bool {
+        matches!(self, Self::Elastic(_) | Self::ElasticRevolute(_) | Self::ElasticPrismatic(_))
+    }
+
+    /// The spring that moves as this joint of one coordinate does.
+    pub fn spring(&self) -> Option<JointKind> {
+        match *self {
+            Self::Revolute(axis) | Self::Continuous(axis) => Some(Self::ElasticRevolute(axis)),
+            Self::Prismatic(axis) => Some(Self::ElasticPrismatic(axis)),
+            _ => None,
+        }
+    }
+
+    /// Whether its coordinate is a joint angle (rad).
+    pub fn turns(&self) -> bool {
+        !self.is_elastic() && self.axis_motion().is_some_and(|motion| !motion.slides())
+    }
+
+    /// Whether its coordinate is a joint translation (m).
+    pub fn slides(&self) -> bool {
+        !self.is_elastic() && self.axis_motion().is_some_and(AxisMotion::slides)
+    }
+
+    /// Translation per unit of its coordinate: 1 where it slides (m/m).
+    pub fn travel(&self) -> f64 {
+        self.axis_motion().map_or(0.0, AxisMotion::travel)
     }
 
     /// The word of URDF files.

@@ -9,12 +9,13 @@
 
 use std::collections::HashMap;
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 
+use crate::axis_motion::{AxisMotion, RevoluteTable};
 use crate::mechanism::{Joint, JointKind, Limits, Mechanism};
 use crate::modal::ModalTables;
 use crate::rotation::ElasticAngles;
-use crate::spatial::{Pose, SpatialInertia, skew};
+use crate::spatial::{Pose, SpatialInertia};
 
 /// A checked tree of bodies; built once, then only read and shared between threads.
 #[derive(Clone, Debug)]
@@ -70,10 +71,8 @@ pub struct Body {
 /// Motion of a joint in the recursions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum JointMotion {
-    /// Rotation about a unit axis (same components in J and B axes).
-    Revolute(Vector3<f64>),
-    /// Translation along a unit axis.
-    Prismatic(Vector3<f64>),
+    /// One coordinate along a constant column.
+    Axis(AxisMotion),
     /// Translation in P axes, then angles.
     Elastic(ElasticAngles),
     /// None: a modal link on a fixed joint is a body of its own, without a coordinate.
@@ -109,22 +108,6 @@ pub struct ElasticGroup {
     pub size: usize,
     /// Whether these are modal coordinates.
     pub modal: bool,
-}
-
-/// `R_PB(q) = K0 + sin q K1 + cos q K2`: Rodrigues' formula with the placement multiplied in.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct RevoluteTable {
-    pub(crate) K0: Matrix3<f64>,
-    pub(crate) K1: Matrix3<f64>,
-    pub(crate) K2: Matrix3<f64>,
-}
-
-impl RevoluteTable {
-    fn new(X_PJ: &Pose, axis: &Vector3<f64>) -> Self {
-        let (R, A) = (X_PJ.rotation.matrix(), skew(axis));
-        let A2 = axis * axis.transpose() - Matrix3::identity();
-        Self { K0: R + R * A2, K1: R * A, K2: -(R * A2) }
-    }
 }
 
 /// A named frame fixed to a body: every link of the mechanism is one.
@@ -282,7 +265,7 @@ impl Model {
             parent: 0,
             X_PJ: Pose::identity(),
             inertia: SpatialInertia::zeros(),
-            motion: JointMotion::Prismatic(Vector3::z()),
+            motion: JointMotion::Welded,
             coordinate: usize::MAX,
             ratio: 1.0,
             offset: 0.0,
@@ -491,16 +474,14 @@ impl<'a> Builder<'a> {
         let mechanism = self.mechanism;
         let link = &mechanism.links[parent];
         let X_BJ = X_BL * joint.X_PJ;
-        let motion = match joint.kind {
+        let motion = match (joint.kind, joint.kind.axis_motion()) {
             // A link that bends in modes needs a body whose frame is its own.
-            JointKind::Fixed if mechanism.modal.iter().any(|(name, _)| *name == joint.child) => JointMotion::Welded,
-            JointKind::Fixed => return Ok((body, X_BJ)),
-            JointKind::Revolute(axis) | JointKind::Continuous(axis) | JointKind::ElasticRevolute(axis) => {
-                JointMotion::Revolute(axis.into_inner())
+            (JointKind::Fixed, _) if mechanism.modal.iter().any(|(name, _)| *name == joint.child) => {
+                JointMotion::Welded
             }
-            JointKind::Prismatic(axis) | JointKind::ElasticPrismatic(axis) => JointMotion::Prismatic(axis.into_inner()),
-            JointKind::Elastic(angles) => JointMotion::Elastic(angles),
-            JointKind::Interface(interface) => match self.bodies[body].modal {
+            (_, Some(motion)) => JointMotion::Axis(motion),
+            (JointKind::Elastic(angles), _) => JointMotion::Elastic(angles),
+            (JointKind::Interface(interface), _) => match self.bodies[body].modal {
                 Some(modal) if modal_has(&self.modal[modal], interface) && self.frames_are_at(body, &link.name) => {
                     JointMotion::Interface { modal, interface }
                 }
@@ -509,15 +490,9 @@ impl<'a> Builder<'a> {
                     return Err(ModelError::BadModal { link: link.name.clone(), what });
                 }
             },
+            _ => return Ok((body, X_BJ)),
         };
-        let elastic = matches!(
-            joint.kind,
-            JointKind::Elastic(_) | JointKind::ElasticRevolute(_) | JointKind::ElasticPrismatic(_)
-        );
-        let axis = match motion {
-            JointMotion::Revolute(axis) => axis,
-            _ => Vector3::z(),
-        };
+        let axis = joint.kind.axis_motion().map_or(Vector3::z(), AxisMotion::axis);
         let (ratio, offset) = joint.mimic.as_ref().map_or((1.0, 0.0), |m| (m.ratio, m.offset));
         let index = self.bodies.len();
         if let Some(mimic) = &joint.mimic {
@@ -535,7 +510,7 @@ impl<'a> Builder<'a> {
             ratio,
             offset,
             armature: joint.armature,
-            elastic,
+            elastic: joint.kind.is_elastic(),
             modal: None,
             turn: RevoluteTable::new(&X_BJ, &axis),
             subtree_end: 0,

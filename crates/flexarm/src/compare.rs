@@ -8,7 +8,8 @@ use flexarm_analysis::{
     ContributionPeaks, ErrorSample, LongRecord, MetricSettings, PathFrame, TcpMetrics, engineering_strain, tcp_error,
 };
 use flexarm_kinematics::{
-    Data, Frame, JointMotion, Pose, State, forward_kinematics, kinetic_energy, potential_energy, rotation_vector,
+    AxisMotion, Data, Frame, JointMotion, Pose, State, forward_kinematics, kinetic_energy, potential_energy,
+    rotation_vector,
 };
 use flexarm_log::{
     Attachment, BendInfo, ElasticSample, EnergySample, Event, EventKind, Recorder, RecorderSet, RunHeader, RunResult,
@@ -446,8 +447,7 @@ impl<'a> Run<'a> {
             let body = &self.arm.model.bodies()[element.body];
             let (mut deflection, mut load) = ([0.0; 6], self.seen.load[k].into());
             match (element.size, body.motion) {
-                (1, JointMotion::Revolute(axis)) => place(&mut deflection, &mut load, 3, &axis, e[0]),
-                (1, JointMotion::Prismatic(axis)) => place(&mut deflection, &mut load, 0, &axis, e[0]),
+                (1, JointMotion::Axis(motion)) => place(&mut deflection, &mut load, motion, e[0]),
                 (n, _) => (0..n.min(6)).for_each(|c| deflection[c] = e[c]),
             }
             self.sample.elastic[k] = ElasticSample { deflection, load };
@@ -672,12 +672,17 @@ fn moves(motion: &Motion) -> Vec<(f64, f64)> {
 }
 
 /// Puts one deflection and its load along the axis of its joint.
-fn place(deflection: &mut [f64; 6], load: &mut [f64; 6], first: usize, axis: &Vector3<f64>, e: f64) {
-    let torque = load[0];
+fn place(deflection: &mut [f64; 6], load: &mut [f64; 6], motion: AxisMotion, e: f64) {
+    let (torque, axis, first) = (load[0], motion.axis(), if motion.slides() { 0 } else { 3 });
+    let slides_as_it_turns = !motion.slides() && motion.travel() > 0.0;
+    let S = motion.column();
     *load = [0.0; 6];
     for c in 0..3 {
         deflection[first + c] = e * axis[c];
         load[first + c] = torque * axis[c];
+        if slides_as_it_turns {
+            deflection[c] = e * S[c];
+        }
     }
 }
 
@@ -690,14 +695,14 @@ fn link_side_angles(robot: &Robot, flexible: &FlexibleRobot) -> Vec<(usize, usiz
         let actuated = &flexible.model.coordinates()[..flexible.model.n_actuated()];
         let Some(k) = actuated.iter().position(|c| c.joint == *joint) else { continue };
         let motor = &flexible.model.bodies()[actuated[k].body];
-        let (JointMotion::Revolute(axis) | JointMotion::Prismatic(axis)) = motor.motion else { continue };
-        let slides = matches!(motor.motion, JointMotion::Prismatic(_));
+        let JointMotion::Axis(motion) = motor.motion else { continue };
+        let axis = motion.axis();
         match flexible.model.bodies()[group.body].motion {
-            JointMotion::Revolute(own) | JointMotion::Prismatic(own) => {
-                angles.push((k, group.coordinate, axis.dot(&own)));
+            JointMotion::Axis(own) => {
+                angles.push((k, group.coordinate, axis.dot(&own.axis())));
             }
             _ => {
-                let first = group.coordinate + if slides { 0 } else { 3 };
+                let first = group.coordinate + if motion.slides() { 0 } else { 3 };
                 angles.extend((0..3).map(|c| (k, first + c, axis[c])));
             }
         }

@@ -24,7 +24,7 @@ mod solve;
 use flexarm_kinematics::{
     Data, ElasticAngles, JointMotion, Model, Pose, State, Twist, Wrench, forward_kinematics_velocity,
 };
-use nalgebra::{DVector, Matrix3, Matrix6, Rotation3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{DVector, Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
 use crate::arm::FlexibleArm;
 use crate::error::StepError;
@@ -243,10 +243,9 @@ fn joint_compliance(arm: &FlexibleArm, body: usize, h: f64, preset: SpookPreset)
         // One compliant row among rigid ones.
         Some(k) => {
             let mut C = Matrix6::identity() * RIGID_COMPLIANCE;
-            if let Some((turns, axis)) = arm.single_axis(body) {
-                let first = if turns { 3 } else { 0 };
-                let mut block = C.fixed_view_mut::<3, 3>(first, first);
-                block += axis * axis.transpose() * arm.elements[k].C[(0, 0)];
+            if let Some(motion) = arm.single_axis(body) {
+                let S = motion.column();
+                C += S * S.transpose() * arm.elements[k].C[(0, 0)];
             }
             (C, arm.tau[k])
         }
@@ -297,12 +296,11 @@ impl Stepper for Spook {
             // Mean force over the last step (before the first one: over that).
             let force = self.lambda[i] / h;
             match body.motion {
-                JointMotion::Revolute(axis) | JointMotion::Prismatic(axis) if body.elastic => {
-                    let first = if matches!(body.motion, JointMotion::Revolute(_)) { 3 } else { 0 };
+                JointMotion::Axis(motion) if body.elastic => {
                     let rows = &self.rows_now(i, Default::default());
                     let (parent, child) = (&self.bodies[body.parent], &self.bodies[i]);
                     let rate = rows.G_parent * parent.V.to_vector() + rows.G_child * child.V.to_vector();
-                    let (e, rate) = (axis.dot(&rows.g.fixed_rows::<3>(first)), axis.dot(&rate.fixed_rows::<3>(first)));
+                    let (e, rate) = (motion.coordinate_of(&rows.g), motion.coordinate_of(&rate));
                     out.q[body.coordinate] = e;
                     out.qdot[body.coordinate] = rate;
                     if let Some(k) = self.arm.elements.iter().position(|element| element.body == i) {
@@ -310,8 +308,9 @@ impl Stepper for Spook {
                         out.load[k][0] = -self.arm.elements[k].K[(0, 0)] * (e + rate * self.arm.tau[k]);
                     }
                 }
-                JointMotion::Revolute(axis) => out.drive[body.coordinate] = axis.dot(&force.fixed_rows::<3>(3)),
-                JointMotion::Prismatic(axis) => out.drive[body.coordinate] = axis.dot(&force.fixed_rows::<3>(0)),
+                JointMotion::Axis(motion) => {
+                    out.drive[body.coordinate] = motion.project(&Wrench::from_vector(&force));
+                }
                 JointMotion::Interface { .. } | JointMotion::Welded => {}
                 JointMotion::Elastic(angles) => {
                     let (parent, child) = (&self.bodies[body.parent], &self.bodies[i]);
@@ -387,14 +386,7 @@ impl Spook {
                 // A single spring is measured from its relaxed place.
                 _ if body.elastic => (X_WP, Default::default()),
                 JointMotion::Interface { .. } | JointMotion::Welded => (X_WP, Default::default()),
-                JointMotion::Revolute(axis) => {
-                    let turn = Rotation3::from_scaled_axis(axis * self.q[body.coordinate]);
-                    (Pose::from_parts(X_WP.translation, X_WP.rotation * turn), Default::default())
-                }
-                JointMotion::Prismatic(axis) => (
-                    X_WP * Pose::from_parts((axis * self.q[body.coordinate]).into(), Rotation3::identity()),
-                    Default::default(),
-                ),
+                JointMotion::Axis(motion) => (X_WP * motion.pose(self.q[body.coordinate]), Default::default()),
             };
             // Rigid joints have no deflection to speak of: the local form serves both.
             let form = if matches!(body.motion, JointMotion::Elastic(_)) { form } else { ConstraintForm::Local };
@@ -509,8 +501,7 @@ fn explicit_rates(
     qdot_next: &DVector<f64>,
 ) -> (Vector6<f64>, Vector6<f64>) {
     let direction = match motion {
-        JointMotion::Revolute(axis) => Vector6::new(0.0, 0.0, 0.0, -axis.x, -axis.y, -axis.z),
-        JointMotion::Prismatic(axis) => Vector6::new(-axis.x, -axis.y, -axis.z, 0.0, 0.0, 0.0),
+        JointMotion::Axis(motion) => -motion.column(),
         _ => return (Vector6::zeros(), Vector6::zeros()),
     };
     (direction * rate_of(qdot), direction * rate_of(qdot_next))
