@@ -18,6 +18,13 @@ pub enum AxisMotion {
     Revolute(Vector3<f64>),
     /// Translation along the axis, m.
     Prismatic(Vector3<f64>),
+    /// Rotation about the axis, rad, which moves along it as a nut on a spindle does.
+    Helical {
+        /// The axis.
+        axis: Vector3<f64>,
+        /// Translation per rad, m; the lead of the thread over 2π, positive for right-handed threads.
+        pitch: f64,
+    },
 }
 
 impl AxisMotion {
@@ -25,7 +32,7 @@ impl AxisMotion {
     #[inline(always)]
     pub fn axis(self) -> Vector3<f64> {
         match self {
-            Self::Revolute(axis) | Self::Prismatic(axis) => axis,
+            Self::Revolute(axis) | Self::Prismatic(axis) | Self::Helical { axis, .. } => axis,
         }
     }
 
@@ -39,6 +46,7 @@ impl AxisMotion {
         match self {
             Self::Revolute(_) => 0.0,
             Self::Prismatic(_) => 1.0,
+            Self::Helical { pitch, .. } => pitch.abs(),
         }
     }
 
@@ -52,6 +60,7 @@ impl AxisMotion {
         match self {
             Self::Revolute(axis) => rotation(axis),
             Self::Prismatic(axis) => translation(axis),
+            Self::Helical { axis, pitch } => rotation(axis) + translation(axis * pitch),
         }
     }
 
@@ -62,6 +71,9 @@ impl AxisMotion {
                 Pose::from_parts(Vector3::zeros().into(), Rotation3::from_scaled_axis(axis * value))
             }
             Self::Prismatic(axis) => Pose::from_parts((axis * value).into(), Rotation3::identity()),
+            Self::Helical { axis, pitch } => {
+                Pose::from_parts((axis * (pitch * value)).into(), Rotation3::from_scaled_axis(axis * value))
+            }
         }
     }
 
@@ -76,6 +88,10 @@ impl AxisMotion {
             Self::Prismatic(axis) => {
                 X_PB.rotation = X_PJ.rotation;
                 X_PB.translation.vector = X_PJ.translation.vector + X_PJ.rotation * (axis * value);
+            }
+            Self::Helical { axis, pitch } => {
+                *X_PB.rotation.matrix_mut_unchecked() = turn.at(value);
+                X_PB.translation.vector = X_PJ.translation.vector + X_PJ.rotation * (axis * (pitch * value));
             }
         }
     }
@@ -102,10 +118,14 @@ impl AxisMotion {
 
     /// The coordinate of a small displacement `S q` (linear first): the inverse of [`Self::column`] on its line.
     pub fn coordinate_of(self, displacement: &Vector6<f64>) -> f64 {
-        self.linear(
+        let along = self.linear(
             |axis| axis.dot(&displacement.fixed_rows::<3>(3)),
             |axis| axis.dot(&displacement.fixed_rows::<3>(0)),
-        )
+        );
+        match self {
+            Self::Revolute(_) | Self::Prismatic(_) => along,
+            Self::Helical { pitch, .. } => along / (1.0 + pitch * pitch),
+        }
     }
 }
 

@@ -87,12 +87,26 @@ pub enum JointKind {
     Continuous(Unit<Vector3<f64>>),
     /// One translation.
     Prismatic(Unit<Vector3<f64>>),
+    /// One rotation that slides along its axis as a nut on a spindle does.
+    Helical {
+        /// The axis.
+        axis: Unit<Vector3<f64>>,
+        /// Translation per rad (m).
+        pitch: f64,
+    },
     /// Six small elastic coordinates: translation in P axes, then three angles.
     Elastic(ElasticAngles),
     /// One small elastic rotation (the spring of a gearbox).
     ElasticRevolute(Unit<Vector3<f64>>),
     /// One small elastic translation.
     ElasticPrismatic(Unit<Vector3<f64>>),
+    /// One small elastic rotation that slides along its axis (the spring behind a helical joint).
+    ElasticHelical {
+        /// The axis.
+        axis: Unit<Vector3<f64>>,
+        /// Translation per rad (m).
+        pitch: f64,
+    },
     /// Interface of that number of the parent link, which must have a [`ModalBody`]: moves with its coordinates.
     Interface(usize),
 }
@@ -104,6 +118,7 @@ impl JointKind {
             Self::Fixed | Self::Interface(_) => 0,
             Self::Revolute(_) | Self::Continuous(_) | Self::Prismatic(_) => 1,
             Self::ElasticRevolute(_) | Self::ElasticPrismatic(_) => 1,
+            Self::Helical { .. } | Self::ElasticHelical { .. } => 1,
             Self::Elastic(_) => 6,
         }
     }
@@ -115,13 +130,19 @@ impl JointKind {
                 Some(AxisMotion::Revolute(axis.into_inner()))
             }
             Self::Prismatic(axis) | Self::ElasticPrismatic(axis) => Some(AxisMotion::Prismatic(axis.into_inner())),
+            Self::Helical { axis, pitch } | Self::ElasticHelical { axis, pitch } => {
+                Some(AxisMotion::Helical { axis: axis.into_inner(), pitch })
+            }
             Self::Fixed | Self::Elastic(_) | Self::Interface(_) => None,
         }
     }
 
     /// Whether its coordinates are small elastic ones.
     pub fn is_elastic(&self) -> bool {
-        matches!(self, Self::Elastic(_) | Self::ElasticRevolute(_) | Self::ElasticPrismatic(_))
+        matches!(
+            self,
+            Self::Elastic(_) | Self::ElasticRevolute(_) | Self::ElasticPrismatic(_) | Self::ElasticHelical { .. }
+        )
     }
 
     /// The spring that moves as this joint of one coordinate does.
@@ -129,6 +150,7 @@ impl JointKind {
         match *self {
             Self::Revolute(axis) | Self::Continuous(axis) => Some(Self::ElasticRevolute(axis)),
             Self::Prismatic(axis) => Some(Self::ElasticPrismatic(axis)),
+            Self::Helical { axis, pitch } => Some(Self::ElasticHelical { axis, pitch }),
             _ => None,
         }
     }
@@ -148,14 +170,17 @@ impl JointKind {
         self.axis_motion().map_or(0.0, AxisMotion::travel)
     }
 
-    /// The word of URDF files.
+    /// The word of URDF files, and `helical`, which these do not have.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Fixed => "fixed",
             Self::Revolute(_) => "revolute",
             Self::Continuous(_) => "continuous",
             Self::Prismatic(_) => "prismatic",
-            Self::Elastic(_) | Self::ElasticRevolute(_) | Self::ElasticPrismatic(_) => "elastic",
+            Self::Helical { .. } => "helical",
+            Self::Elastic(_) | Self::ElasticRevolute(_) | Self::ElasticPrismatic(_) | Self::ElasticHelical { .. } => {
+                "elastic"
+            }
             Self::Interface(_) => "interface",
         }
     }

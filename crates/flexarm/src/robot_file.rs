@@ -44,6 +44,9 @@ pub struct RobotFile {
     /// Where joints stay that a motion does not name (rad or m).
     #[serde(default)]
     pub hold: std::collections::BTreeMap<String, Spanned<f64>>,
+    /// Joints that slide as they turn: how far in a turn (m), right-handed threads positive.
+    #[serde(default)]
+    pub lead: std::collections::BTreeMap<String, Spanned<f64>>,
     /// Links that bend.
     #[serde(default)]
     pub flexible_link: Vec<FlexibleLinkEntry>,
