@@ -132,26 +132,7 @@ impl Spook {
     /// that change, curved springs, links without mass or moments of inertia at an end of the arm.
     pub fn new(arm: FlexibleArm, h: f64, settings: SpookSettings, e: &DVector<f64>) -> Result<Self, StepError> {
         let model = arm.model.clone();
-        let refuse = |what: &str| {
-            let text = format!("spook works in maximal coordinates and does not know {what}: use generalized-alpha");
-            Err(StepError::Setup(text))
-        };
-        if model.has_modal() {
-            return refuse("links that bend in modes (--links lumped would do)");
-        }
-        if !arm.torque_driven.is_empty() {
-            return refuse("joints driven by torque");
-        }
-        if !arm.inertia_changes.is_empty() {
-            return refuse("payloads that change");
-        }
-        if arm.elements.iter().any(|e| e.curve.is_some()) {
-            return refuse("springs with play or curves");
-        }
-        if model.has_mimic() {
-            let text = "spook works in maximal coordinates and does not know mimic joints: use generalized-alpha";
-            return Err(StepError::Setup(text.to_owned()));
-        }
+        check_known(&arm)?;
         check_ends(&model)?;
         let (mut state, mut qddot) = (State::zeros(&model), DVector::zeros(model.nv()));
         arm.prescribed_state(0.0, &mut state, &mut qddot);
@@ -210,6 +191,23 @@ impl Spook {
         // The impulses of the first step, so that the forces are known before it.
         spook.solve(h)?;
         Ok(spook)
+    }
+}
+
+/// What has no place in maximal coordinates here.
+fn check_known(arm: &FlexibleArm) -> Result<(), StepError> {
+    let unknown = [
+        (arm.model.has_modal(), "links that bend in modes (--links lumped would do)"),
+        (!arm.torque_driven.is_empty(), "joints driven by torque"),
+        (!arm.inertia_changes.is_empty(), "payloads that change"),
+        (arm.elements.iter().any(|e| e.curve.is_some()), "springs with play or curves"),
+        (arm.model.has_mimic(), "mimic joints"),
+    ];
+    match unknown.iter().find(|(there, _)| *there) {
+        None => Ok(()),
+        Some((_, what)) => Err(StepError::Setup(format!(
+            "spook works in maximal coordinates and does not know {what}: use generalized-alpha"
+        ))),
     }
 }
 
@@ -292,38 +290,8 @@ impl Stepper for Spook {
             kinetic += 0.5 * (state.mass * state.V.linear.norm_squared() + w.dot(&(state.J * w)));
             potential -= state.mass * model.gravity.dot(&state.x);
         }
-        for (i, body) in model.bodies().iter().enumerate().skip(1) {
-            // Mean force over the last step (before the first one: over that).
-            let force = self.lambda[i] / h;
-            match body.motion {
-                JointMotion::Axis(motion) if body.elastic => {
-                    let rows = &self.rows_now(i, Default::default());
-                    let (parent, child) = (&self.bodies[body.parent], &self.bodies[i]);
-                    let rate = rows.G_parent * parent.V.to_vector() + rows.G_child * child.V.to_vector();
-                    let (e, rate) = (motion.coordinate_of(&rows.g), motion.coordinate_of(&rate));
-                    out.q[body.coordinate] = e;
-                    out.qdot[body.coordinate] = rate;
-                    if let Some(k) = self.arm.elements.iter().position(|element| element.body == i) {
-                        out.load[k] = Vector6::zeros();
-                        out.load[k][0] = -self.arm.elements[k].K[(0, 0)] * (e + rate * self.arm.tau[k]);
-                    }
-                }
-                JointMotion::Axis(motion) => {
-                    out.drive[body.coordinate] = motion.project(&Wrench::from_vector(&force));
-                }
-                JointMotion::Interface { .. } | JointMotion::Welded => {}
-                JointMotion::Elastic(angles) => {
-                    let (parent, child) = (&self.bodies[body.parent], &self.bodies[i]);
-                    let rows = self.rows_now(i, angles);
-                    let rate = rows.G_parent * parent.V.to_vector() + rows.G_child * child.V.to_vector();
-                    out.q.fixed_rows_mut::<6>(body.coordinate).copy_from(&rows.g);
-                    out.qdot.fixed_rows_mut::<6>(body.coordinate).copy_from(&rate);
-                    if let Some(k) = self.arm.elements.iter().position(|element| element.body == i) {
-                        let K = Matrix6::from_column_slice(self.arm.elements[k].K.as_slice());
-                        out.load[k] = -(K * (rows.g + rate * self.arm.tau[k]));
-                    }
-                }
-            }
+        for i in 1..model.bodies().len() {
+            self.observe_joint(i, h, out);
         }
         for (k, rate) in self.qdot.iter().enumerate() {
             out.drive[k] += self.arm.friction_torque(k, *rate);
@@ -333,23 +301,7 @@ impl Stepper for Spook {
             out.drive[k] += body.armature * self.qddot[k];
             kinetic += 0.5 * body.armature * self.qdot[k].powi(2);
         }
-        let (mut damping, mut loads) = (0.0, 0.0);
-        for (k, element) in self.arm.elements.iter().enumerate() {
-            let rate = out.qdot.rows(element.coordinate, element.size);
-            damping += self.arm.tau[k] * rate.dot(&(&element.K * rate));
-        }
-        for (k, rate) in self.qdot.iter().enumerate() {
-            damping += self.arm.friction_torque(k, *rate) * rate;
-        }
-        for load in &self.arm.loads {
-            let body = &self.bodies[load.body];
-            let X = body.X_WB();
-            let F = load.on_body(self.breaks.side(t), &X);
-            let v = body.V.linear - body.V.angular.cross(&(X.rotation * body.com));
-            loads += v.dot(&(X.rotation * F.force)) + body.V.angular.dot(&(X.rotation * F.torque));
-        }
-        let drives = out.drive.dot(&out.qdot.rows(0, n));
-        out.power = [drives, loads, damping];
+        out.power = self.power(out);
         out.energy = [kinetic, potential, self.arm.elastic_energy(&out.q.as_slice()[n..])];
     }
 
@@ -367,17 +319,67 @@ impl Spook {
         Rows::new(ConstraintForm::Local, angles, &X_WP, &parent.x, &X_WQ, &child.x)
     }
 
-    /// Velocities and impulses of the step from the current time; poses stay.
-    fn solve(&mut self, t_next: f64) -> Result<(), StepError> {
-        let (h, t) = (self.dt, self.t);
-        // Rates at the end of the step belong to the new velocities, positions at its start to g.
-        self.sample(t_next);
-        self.rates_next.copy_from(&self.qdot);
-        self.sample(t);
-        let model = &self.arm.model;
-        let form = self.settings.form;
+    /// Coordinates and load of the joint of body i, with the mean force of the last step of length h (before the first one: of
+    /// that).
+    fn observe_joint(&self, i: usize, h: f64, out: &mut Observation) {
+        let body = &self.arm.model.bodies()[i];
+        let force = self.lambda[i] / h;
+        match body.motion {
+            JointMotion::Axis(motion) if body.elastic => {
+                let rows = &self.rows_now(i, Default::default());
+                let (parent, child) = (&self.bodies[body.parent], &self.bodies[i]);
+                let rate = rows.G_parent * parent.V.to_vector() + rows.G_child * child.V.to_vector();
+                let (e, rate) = (motion.coordinate_of(&rows.g), motion.coordinate_of(&rate));
+                out.q[body.coordinate] = e;
+                out.qdot[body.coordinate] = rate;
+                if let Some(k) = self.arm.elements.iter().position(|element| element.body == i) {
+                    out.load[k] = Vector6::zeros();
+                    out.load[k][0] = -self.arm.elements[k].K[(0, 0)] * (e + rate * self.arm.tau[k]);
+                }
+            }
+            JointMotion::Axis(motion) => {
+                out.drive[body.coordinate] = motion.project(&Wrench::from_vector(&force));
+            }
+            JointMotion::Interface { .. } | JointMotion::Welded => {}
+            JointMotion::Elastic(angles) => {
+                let (parent, child) = (&self.bodies[body.parent], &self.bodies[i]);
+                let rows = self.rows_now(i, angles);
+                let rate = rows.G_parent * parent.V.to_vector() + rows.G_child * child.V.to_vector();
+                out.q.fixed_rows_mut::<6>(body.coordinate).copy_from(&rows.g);
+                out.qdot.fixed_rows_mut::<6>(body.coordinate).copy_from(&rate);
+                if let Some(k) = self.arm.elements.iter().position(|element| element.body == i) {
+                    let K = Matrix6::from_column_slice(self.arm.elements[k].K.as_slice());
+                    out.load[k] = -(K * (rows.g + rate * self.arm.tau[k]));
+                }
+            }
+        }
+    }
 
-        // Rows of every joint, and what its prescribed coordinate does to them.
+    /// Power of drives, loads and damping (W).
+    fn power(&self, out: &Observation) -> [f64; 3] {
+        let (t, n) = (self.t, self.arm.model.n_actuated());
+        let (mut damping, mut loads) = (0.0, 0.0);
+        for (k, element) in self.arm.elements.iter().enumerate() {
+            let rate = out.qdot.rows(element.coordinate, element.size);
+            damping += self.arm.tau[k] * rate.dot(&(&element.K * rate));
+        }
+        for (k, rate) in self.qdot.iter().enumerate() {
+            damping += self.arm.friction_torque(k, *rate) * rate;
+        }
+        for load in &self.arm.loads {
+            let body = &self.bodies[load.body];
+            let X = body.X_WB();
+            let F = load.on_body(self.breaks.side(t), &X);
+            let v = body.V.linear - body.V.angular.cross(&(X.rotation * body.com));
+            loads += v.dot(&(X.rotation * F.force)) + body.V.angular.dot(&(X.rotation * F.torque));
+        }
+        let drives = out.drive.dot(&out.qdot.rows(0, n));
+        [drives, loads, damping]
+    }
+
+    /// Rows of every joint at the present poses, and what its prescribed coordinate does to them.
+    fn update_rows(&mut self, t: f64, h: f64) -> Result<(), StepError> {
+        let (model, form) = (&self.arm.model, self.settings.form);
         for (i, body) in model.bodies().iter().enumerate().skip(1) {
             let (parent, child) = (&self.bodies[body.parent], &self.bodies[i]);
             let (X_WP, X_WQ) = (parent.X_WB() * body.X_PJ, child.X_WB());
@@ -397,16 +399,22 @@ impl Spook {
                 return Err(StepError::Diverged { t, h, what });
             }
         }
+        Ok(())
+    }
 
+    /// Loads at `t`, at Bo in world axes.
+    fn update_loads(&mut self, t: f64) {
         self.loads.iter_mut().for_each(|load| *load = Vector6::zeros());
         for load in &self.arm.loads {
-            // At Bo in world axes.
             let X_WB = self.bodies[load.body].X_WB();
             let F = load.on_body(self.breaks.side(t), &X_WB);
             self.loads[load.body] += Wrench::new(X_WB.rotation * F.force, X_WB.rotation * F.torque).to_vector();
         }
+    }
 
-        // Body blocks: mass, momentum, impulse of gravity, gyroscopic moment and loads.
+    /// Body blocks: mass, momentum, impulse of gravity, gyroscopic moment and loads.
+    fn update_bodies(&mut self, h: f64) {
+        let model = &self.arm.model;
         for (i, body) in self.bodies.iter().enumerate().skip(1) {
             let R = body.R.to_rotation_matrix();
             let J = R.matrix() * body.J * R.matrix().transpose();
@@ -424,7 +432,20 @@ impl Spook {
             b.fixed_rows_mut::<3>(0).copy_from(&(body.V.linear * body.mass + force * h));
             b.fixed_rows_mut::<3>(3).copy_from(&(spin + torque * h));
         }
+    }
 
+    /// Velocities and impulses of the step from the current time; poses stay.
+    fn solve(&mut self, t_next: f64) -> Result<(), StepError> {
+        let (h, t) = (self.dt, self.t);
+        // Rates at the end of the step belong to the new velocities, positions at its start to g.
+        self.sample(t_next);
+        self.rates_next.copy_from(&self.qdot);
+        self.sample(t);
+        self.update_rows(t, h)?;
+        self.update_loads(t);
+        self.update_bodies(h);
+
+        let (model, form) = (&self.arm.model, self.settings.form);
         let Self { rows, compliance, bodies, solver, velocities, lambda, rates, rates_next, .. } = self;
         let right_hand_side = |i: usize| {
             let (row, c, body) = (&rows[i], &compliance[i], &model.bodies()[i]);
