@@ -1,12 +1,14 @@
-"""Writes tests/golden/{kr210,ur10_like,seven_axis,branched}.json: dynamics of rigid robots by Pinocchio.
+"""Writes tests/golden/{kr210,ur10_like,seven_axis,branched,scara}.json: dynamics of rigid robots by Pinocchio.
 
-    python tools/golden_pinocchio.py             (pip install pin)
+    python tools/golden_pinocchio.py [NAME ...]          (pip install pin)
 
 Models: robots/kr210/kr210.urdf, the others beside the JSON files; made-up, plausible numbers. Rerunning writes
 the same files up to rounding. Before writing, the data are checked against each other: M q'' + bias = tau,
 forward dynamics back to q'', J' against central differences, energy against the mass matrix.
 """
 import json
+import sys
+import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +20,9 @@ MODELS = {  # name: (URDF, frame)
     "ur10_like": ("tests/golden/ur10_like.urdf", "tip"),
     "seven_axis": ("tests/golden/seven_axis.urdf", "tip"),
     "branched": ("tests/golden/branched.urdf", "tip"),
+    "scara": ("tests/golden/scara.urdf", "tip"),
 }
+LEADS = {"scara": {"quill": 0.05}}  # joints that slide along their axis as they turn, m per turn
 SEED, CASES = 20240607, 6
 GRAVITY = [0.0, 0.0, -9.81]
 FIELDS = {
@@ -48,6 +52,25 @@ def row(a):
 def jacobian(model, q, frame):
     data = model.createData()
     return pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL_WORLD_ALIGNED)
+
+
+def with_leads(model, urdf, leads):
+    """The model with helical joints in place of revolute ones: built anew, joint by joint (URDF has no such joints)."""
+    axes = {j.get("name"): np.array([float(x) for x in j.find("axis").get("xyz").split()])
+            for j in ET.parse(urdf).getroot().iter("joint") if j.find("axis") is not None}
+    made = pin.Model()
+    for i in range(1, model.njoints):
+        name, joint = model.names[i], model.joints[i]
+        if name in leads:
+            axis = axes[name] / np.linalg.norm(axes[name])
+            joint = pin.JointModelHelicalUnaligned(axis, leads[name] / (2 * np.pi))
+        limits = [a[model.joints[i].idx_v:][:1] for a in (model.effortLimit, model.velocityLimit, model.lowerPositionLimit,
+                                                         model.upperPositionLimit)]
+        j = made.addJoint(model.parents[i], joint, model.jointPlacements[i], name, *limits)
+        made.appendBodyToJoint(j, model.inertias[i], pin.SE3.Identity())
+    for frame in list(model.frames)[1:]:
+        made.addFrame(pin.Frame(frame.name, frame.parentJoint, 0, frame.placement, frame.type), False)
+    return made
 
 
 def case(model, frame, rng):
@@ -101,7 +124,12 @@ def written(value, indent=1):
 
 if __name__ == "__main__":
     for name, (urdf, frame) in MODELS.items():
+        if sys.argv[1:] and name not in sys.argv[1:]:
+            continue
         model = pin.buildModelFromUrdf(str(ROOT / urdf))
+        leads = LEADS.get(name, {})
+        if leads:
+            model = with_leads(model, ROOT / urdf, leads)
         model.gravity.linear = np.array(GRAVITY)
         assert model.nq == model.nv, "a continuous joint would take two numbers in q"
         rng = np.random.default_rng(SEED)
@@ -112,6 +140,8 @@ if __name__ == "__main__":
         doc = dict(provenance=header, urdf=urdf, frame=frame, gravity=GRAVITY, joints=list(model.names)[1:],
                    moving_mass=float(sum(i.mass for i in list(model.inertias)[1:])),
                    cases=[case(model, model.getFrameId(frame), rng) for _ in range(CASES)])
+        if leads:
+            doc["leads"] = leads
         text = written(doc)
         assert json.loads(text) == doc                       # every digit survives
         (ROOT / "tests" / "golden" / f"{name}.json").write_text(text + "\n")

@@ -41,6 +41,11 @@ fn check(name: &str) {
     let robot = flexarm_urdf::read_urdf(&urdf, &Default::default()).expect("readable");
     let mut mechanism = robot.mechanism;
     mechanism.gravity = Vector3::from_iterator(vector(&golden["gravity"]).iter().copied());
+    for (name, lead) in golden["leads"].as_object().into_iter().flatten() {
+        let joint = mechanism.joints.iter_mut().find(|j| j.name == *name).expect("the joint");
+        let JointKind::Revolute(axis) = joint.kind else { panic!("{name} does not turn") };
+        joint.kind = JointKind::Helical { axis, pitch: lead.as_f64().expect("m") / std::f64::consts::TAU };
+    }
     let model = Model::new(&mechanism).expect("a tree");
     let mut data = Data::new(&model);
     let names: Vec<&str> = golden["joints"].as_array().expect("names").iter().filter_map(Value::as_str).collect();
@@ -122,4 +127,9 @@ fn seven_axis_arm_equals_pinocchio() {
 #[test]
 fn branched_tree_with_prismatic_joint_equals_pinocchio() {
     check("branched");
+}
+
+#[test]
+fn scara_with_a_helical_joint_equals_pinocchio() {
+    check("scara");
 }

@@ -110,11 +110,11 @@ pub(crate) struct RobotArgs {
 #[command(next_help_heading = "Models")]
 pub(crate) struct ModellingArgs {
     /// Model of the links [default: as the robot file says]
-    #[arg(long, value_enum)]
-    pub(crate) links: Option<LinksName>,
+    #[arg(long, value_parser = word_of(&LinkModel::WORDS))]
+    pub(crate) links: Option<LinkModel>,
     /// Model of the drives [default: as the robot file says]
-    #[arg(long, value_enum)]
-    pub(crate) drives: Option<DrivesName>,
+    #[arg(long, value_parser = word_of(&DriveModel::WORDS))]
+    pub(crate) drives: Option<DriveModel>,
     /// Rigid parts of every lumped link, instead of the robot file's
     #[arg(long, value_name = "N", hide_short_help = true, value_parser = clap::value_parser!(u32).range(2..))]
     pub(crate) segments: Option<u32>,
@@ -123,21 +123,22 @@ pub(crate) struct ModellingArgs {
     pub(crate) modes: Option<u32>,
 }
 
+/// One of the words of a list of the facade, each with what it means.
+fn word_of<T: Copy + Send + Sync + 'static>(
+    words: &'static [(&'static str, T, &'static str)],
+) -> impl TypedValueParser<Value = T> {
+    let known = words.iter().map(|(word, _, means)| PossibleValue::new(*word).help(*means));
+    PossibleValuesParser::new(known).try_map(|given| {
+        let found = words.iter().find(|(word, ..)| *word == given).map(|(_, value, _)| *value);
+        found.ok_or_else(|| format!("{given:?} is not known"))
+    })
+}
+
 impl ModellingArgs {
     pub(crate) fn modelling(&self) -> Modelling {
         Modelling {
-            links: match self.links {
-                None => LinkModel::AsFiled,
-                Some(LinksName::Rigid) => LinkModel::Rigid,
-                Some(LinksName::Lumped) => LinkModel::Lumped,
-                Some(LinksName::Modal) => LinkModel::Modal,
-            },
-            drives: match self.drives {
-                None => DriveModel::AsFiled,
-                Some(DrivesName::Rigid) => DriveModel::Rigid,
-                Some(DrivesName::Elastic) => DriveModel::Elastic,
-                Some(DrivesName::Servo) => DriveModel::Servo,
-            },
+            links: self.links.unwrap_or_default(),
+            drives: self.drives.unwrap_or_default(),
             segments: self.segments.map(|n| n as usize),
             modes: self.modes.map(|n| n as usize),
         }
@@ -321,26 +322,6 @@ impl PageName {
             Self::Flex => include_str!("../../flexarm-fem/src/flex_file/format.md"),
         }
     }
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum LinksName {
-    /// No link bends
-    Rigid,
-    /// Rigid parts with coupled 6x6 springs
-    Lumped,
-    /// Bodies that bend in modes (floating frame, Craig-Bampton)
-    Modal,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum DrivesName {
-    /// Every joint exactly along the trajectory, no springs
-    Rigid,
-    /// Gearboxes give way, motors exactly along the trajectory
-    Elastic,
-    /// Motors by torque under servos
-    Servo,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

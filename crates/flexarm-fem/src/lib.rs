@@ -58,6 +58,7 @@ pub mod mesh_gate;
 pub mod mesh_link;
 pub mod modal;
 pub mod model;
+mod open_section;
 pub mod order_check;
 pub mod reduced;
 pub mod reduction;

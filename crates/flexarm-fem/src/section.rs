@@ -2,8 +2,8 @@
 //!
 //! Beam axes E: x along the beam, y and z in the section. `width` lies along y, `height` along z.
 //! `I_y` is the second moment *about* y (bending that deflects along z), `k_y` the shear factor for a
-//! force *along* y. y and z are principal axes and the beam axis runs through the centroid, which is
-//! also the shear centre in all shapes here.
+//! force *along* y. y and z are principal axes and the beam axis runs through the centroid, which is also the shear centre
+//! of all shapes but the channel: see [`SectionProperties::shear_centre_y`].
 //!
 //! Start at [`Section::bar`]; [`Section::properties`] shows the purely geometric step.
 
@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{FemError, positive};
 use crate::material::Material;
+use crate::open_section::Open;
 
 /// Cross section of a straight beam; lengths in m.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -46,6 +47,34 @@ pub enum Section {
         /// Diameter, m.
         diameter: f64,
     },
+    /// I-beam with parallel flanges: web along z in the middle, both flanges along y.
+    IBeam {
+        /// Width of the flanges along y, m.
+        width: f64,
+        /// Outer size along z, m.
+        height: f64,
+        /// Thickness of the web, m.
+        web: f64,
+        /// Thickness of the flanges, m.
+        flange: f64,
+        /// Radius of the four fillets between web and flanges, m; 0 for sharp corners.
+        #[serde(default)]
+        fillet: f64,
+    },
+    /// Channel (U) with parallel flanges: web along z, both flanges from it along +y.
+    Channel {
+        /// Outer size along y, web included, m.
+        width: f64,
+        /// Outer size along z, m.
+        height: f64,
+        /// Thickness of the web, m.
+        web: f64,
+        /// Thickness of the flanges, m.
+        flange: f64,
+        /// Radius of the two fillets between web and flanges, m; 0 for sharp corners.
+        #[serde(default)]
+        fillet: f64,
+    },
     /// Any section, by its stiffness and mass per length; the material is not used.
     Given(Bar),
 }
@@ -65,6 +94,10 @@ pub struct SectionProperties {
     pub k_y: f64,
     /// Shear factor for a force along z.
     pub k_z: f64,
+    /// Place of the shear centre along y from the centroid, m; 0 but for channels. A force along z that passes it by twists
+    /// the beam. [`crate::Beam`] bends and twists about the centroid whatever stands here: who lets a channel bend across
+    /// its web must know what that leaves out (the caveat `shear-centre` of robots).
+    pub shear_centre_y: f64,
 }
 
 /// Stiffness and mass of a bar per unit of its length: all that a beam needs to know of its section.
@@ -93,7 +126,52 @@ pub struct Bar {
     pub rotary_z: f64,
 }
 
+/// The words of the shapes with the lengths that each takes, and the shape of a word: one line per shape.
+macro_rules! shapes {
+    ($($word:literal => $shape:ident { $($length:ident $(= $default:literal)?),+ }),+ $(,)?) => {
+        /// The shapes by the word that files use, with the lengths (m) that each takes.
+        pub const SHAPES: &'static [(&'static str, &'static [&'static str])] =
+            &[$(($word, &[$(stringify!($length)),+])),+];
+
+        /// The shape of that word of [`Self::SHAPES`], its lengths (m) from `length`, which is given the key and what to take
+        /// where it is left out; none for another word.
+        ///
+        /// # Errors
+        /// The first error of `length`.
+        pub fn from_lengths<E>(
+            word: &str,
+            length: impl Fn(&'static str, Option<f64>) -> Result<f64, E>,
+        ) -> Result<Option<Self>, E> {
+            Ok(Some(match word {
+                $($word => Self::$shape { $($length: length(stringify!($length), None$(.or(Some($default)))?)?),+ },)+
+                _ => return Ok(None),
+            }))
+        }
+    };
+}
+
 impl Section {
+    shapes! {
+        "box" => Box { width, height, wall },
+        "rectangle" => Rectangle { width, height },
+        "tube" => Tube { outer_diameter, wall },
+        "circle" => Circle { diameter },
+        "i_beam" => IBeam { width, height, web, flange, fillet = 0.0 },
+        "channel" => Channel { width, height, web, flange, fillet = 0.0 },
+    }
+
+    /// Largest outer size (m); none for [`Section::Given`].
+    pub fn largest_size(&self) -> Option<f64> {
+        match *self {
+            Self::Box { width, height, .. }
+            | Self::Rectangle { width, height }
+            | Self::IBeam { width, height, .. }
+            | Self::Channel { width, height, .. } => Some(width.max(height)),
+            Self::Tube { outer_diameter: d, .. } | Self::Circle { diameter: d } => Some(d),
+            Self::Given(_) => None,
+        }
+    }
+
     /// Area, second moments, torsion constant and shear factors of the shape.
     ///
     /// * `nu`: Poisson's ratio, for the shear factors of Cowper.
@@ -105,7 +183,8 @@ impl Section {
     /// # Source
     /// Shear factors: Cowper (1966), table 1, circle, hollow circle, rectangle; thin box: walls
     /// parallel to the force over the whole area. Torsion: rectangle by St. Venant's series
-    /// (Timoshenko & Goodier, art. 109), box by Bredt's formula on the midline of the wall.
+    /// (Timoshenko & Goodier, art. 109), box by Bredt's formula on the midline of the wall. I-beam and channel:
+    /// the module `open_section` beside this one.
     pub fn properties(&self, nu: f64) -> Result<SectionProperties, FemError> {
         match *self {
             Self::Rectangle { width, height } => rectangle(width, height, nu),
@@ -115,6 +194,12 @@ impl Section {
                 positive("outer diameter (m)", outer_diameter)?;
                 check_wall(wall, outer_diameter)?;
                 ring(outer_diameter, outer_diameter - 2.0 * wall, nu)
+            }
+            Self::IBeam { width, height, web, flange, fillet } => {
+                Open { width, height, web, flange, fillet }.i_beam(nu)
+            }
+            Self::Channel { width, height, web, flange, fillet } => {
+                Open { width, height, web, flange, fillet }.channel(nu)
             }
             Self::Given(_) => Err(FemError::Missing {
                 what: "the shape of a section",
@@ -188,6 +273,7 @@ fn rectangle(width: f64, height: f64, nu: f64) -> Result<SectionProperties, FemE
         J: rectangle_torsion(width, height),
         k_y: k,
         k_z: k,
+        shear_centre_y: 0.0,
     })
 }
 
@@ -223,6 +309,7 @@ fn hollow_box(width: f64, height: f64, wall: f64, nu: f64) -> Result<SectionProp
         J: 4.0 * (w_mid * h_mid).powi(2) * wall / (2.0 * (w_mid + h_mid)),
         k_y: box_shear_factor(w_mid, h_mid, nu),
         k_z: box_shear_factor(h_mid, w_mid, nu),
+        shear_centre_y: 0.0,
     })
 }
 
@@ -253,7 +340,15 @@ fn ring(outer: f64, inner: f64, nu: f64) -> Result<SectionProperties, FemError> 
     let m2 = (ri / ro).powi(2);
     let q = (1.0 + m2).powi(2);
     let k = 6.0 * (1.0 + nu) * q / ((7.0 + 6.0 * nu) * q + (20.0 + 12.0 * nu) * m2);
-    Ok(SectionProperties { A: PI * (ro * ro - ri * ri), I_y: I, I_z: I, J: 2.0 * I, k_y: k, k_z: k })
+    Ok(SectionProperties {
+        A: PI * (ro * ro - ri * ri),
+        I_y: I,
+        I_z: I,
+        J: 2.0 * I,
+        k_y: k,
+        k_z: k,
+        shear_centre_y: 0.0,
+    })
 }
 
 fn check_wall(wall: f64, smallest: f64) -> Result<(), FemError> {

@@ -130,13 +130,8 @@ pub fn insert_gearboxes(mechanism: &mut Mechanism, gearboxes: &[Gearbox]) -> Res
         if joint.mimic.is_some() {
             return Err(GearboxError::Mimic { joint: name.clone() });
         }
-        let elastic = match joint.kind {
-            JointKind::Revolute(axis) | JointKind::Continuous(axis) => JointKind::ElasticRevolute(axis),
-            JointKind::Prismatic(axis) => JointKind::ElasticPrismatic(axis),
-            _ => return Err(missing()),
-        };
-        let slides = matches!(elastic, JointKind::ElasticPrismatic(_));
-        if slides && matches!(gearbox.stiffness, GearStiffness::Tilting(_)) {
+        let elastic = joint.kind.spring().ok_or_else(missing)?;
+        if joint.kind.slides() && matches!(gearbox.stiffness, GearStiffness::Tilting(_)) {
             return Err(GearboxError::Slides { joint: name.clone() });
         }
         check_stiffness(name, &gearbox.stiffness)?;

@@ -114,9 +114,42 @@ fn solve(model: &Model, data: &mut Data, state: &State, roles: &Roles) {
     }
 }
 
+/// Articulated bodies in three passes. For body B with parent P, each quantity at its own origin, in its own axes; S, V and A
+/// as in `rnea.rs`:
+///
+/// ```text
+/// outward   V_WB = Ad_BP V_WP + S q̇                              (1)  [Featherstone 2008, Table 7.1]
+///           c    = Ṡ q̇ + V_WB × S q̇                              (2)  prescribed: + S q̈
+///           I_A  = M_BBo,   p_A = V_WB ×* M_BBo V_WB - F_ext       (3)
+/// inward    U = I_A S,   d = Sᵀ U + armature,   u = τ - Sᵀ p_A    (4)
+///           I_a = I_A - U Uᵀ/d,   p_a = p_A + I_a c + U u/d       (5)  prescribed: I_a = I_A, p_a = p_A + I_A c
+///           I_A of P += Ad_BPᵀ I_a Ad_BP,   p_A of P += Ad_BPᵀ p_a  (6)
+/// outward   A' = Ad_BP A_P + c                                   (7)  A_0 = -g
+///           q̈  = (u - Uᵀ A')/d,   A_B = A' + S q̈                 (8)  prescribed: τ = Sᵀ (I_A A' + p_A), A_B = A'
+/// ```
+/// The S of a free elastic joint is square. It passes its own wrench and no inertia:
+///
+/// ```text
+/// inward    F = S^-T τ,   p_a = F,   I_a = 0                     (9)
+/// outward   A_B = I_A^-1 (F - p_A),   q̈ = S^-1 (A_B - A')        (10)
+/// ```
 #[inline(always)]
 fn solve_articulated(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], roles: &Roles) {
-    let (n, prescribed) = (model.bodies.len(), &roles.prescribed_body);
+    begin_bodies(model, data, q, qdot, roles);
+    for i in (1..model.bodies.len()).rev() {
+        pass_inward(model, data, i, roles);
+    }
+    data.A[0] = Twist::new(-model.gravity, Vector3::zeros());
+    if let Some(m) = model.bodies[0].modal {
+        eliminate_modal(model, data, 0, m, roles.prescribed_modal[m]);
+        finish_modal(model, data, 0, m, roles.prescribed_modal[m]);
+    }
+    finish_bodies(model, data, roles);
+}
+
+/// Outward: poses, velocities and the body's own inertia and forces, (1) to (3).
+#[inline(always)]
+fn begin_bodies(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], roles: &Roles) {
     data.V[0] = Twist::zeros();
     data.pA[0] = Wrench::zeros();
     data.articulated[0] = ArticulatedInertia::from_rigid(&SpatialInertia::zeros());
@@ -124,75 +157,73 @@ fn solve_articulated(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], ro
     if let Some(m) = model.bodies[0].modal {
         begin_modal(model, data, 0, m, qdot);
     }
-    for (i, &is_prescribed) in prescribed.iter().enumerate().skip(1) {
+    for (i, &is_prescribed) in roles.prescribed_body.iter().enumerate().skip(1) {
         let body = &model.bodies[i];
         let (V_PB, bias) = joint_motion(model, data, i, q, qdot);
-        let V = data.V[body.parent].at_child(&data.X_PB[i]) + V_PB;
-        let mut c = bias + V.cross(&V_PB);
+        let V = data.V[body.parent].at_child(&data.X_PB[i]) + V_PB; // (1)
+        let mut c = bias + V.cross(&V_PB); // (2)
         if is_prescribed {
             c += subspace_times(model, data, i, data.qddot.as_slice());
         }
         data.V[i] = V;
         data.bias[i] = c;
-        data.pA[i] = V.cross_force(&body.inertia.mul_twist(&V)) - data.F_ext[i];
+        data.pA[i] = V.cross_force(&body.inertia.mul_twist(&V)) - data.F_ext[i]; // (3)
         data.articulated[i] = ArticulatedInertia::from_rigid(&body.inertia);
         if let Some(m) = body.modal {
             begin_modal(model, data, i, m, qdot);
         }
     }
+}
 
-    for i in (1..n).rev() {
-        let body = &model.bodies[i];
-        if let Some(m) = body.modal {
-            eliminate_modal(model, data, i, m, roles.prescribed_modal[m]);
-        }
-        if let JointMotion::Interface { modal, interface } = body.motion {
-            gather_interface(model, data, i, modal, interface);
-            continue;
-        }
-        let (pA, c) = (data.pA[i], data.bias[i]);
-        let (passed_inertia, passed_force) = match body.motion {
-            _ if prescribed[i] || body.motion == JointMotion::Welded => {
-                let I = data.articulated[i];
-                (Some(I), pA + I.mul_twist(&c))
-            }
-            JointMotion::Elastic(_) => {
-                let F = elastic_wrench(data, i, body.coordinate);
-                data.F[i] = F;
-                (None, F)
-            }
-            JointMotion::Revolute(axis) => {
-                let I = &data.articulated[i];
-                let U = Wrench::new(mul(&I.coupling, &axis), mul(&I.angular, &axis));
-                let d = axis.dot(&U.torque) + body.armature;
-                let u = data.tau[body.coordinate] * body.ratio - axis.dot(&pA.torque);
-                one_dof_inward(data, i, U, d, u, &c, pA)
-            }
-            JointMotion::Prismatic(axis) => {
-                let I = &data.articulated[i];
-                let U = Wrench::new(mul(&I.linear, &axis), tr_mul(&I.coupling, &axis));
-                let d = axis.dot(&U.force) + body.armature;
-                let u = data.tau[body.coordinate] * body.ratio - axis.dot(&pA.force);
-                one_dof_inward(data, i, U, d, u, &c, pA)
-            }
-            JointMotion::Interface { .. } | JointMotion::Welded => continue,
-        };
-        if body.parent > 0 {
-            let X_PB = data.X_PB[i];
-            if let Some(I) = passed_inertia {
-                let I_P = I.at_parent(&X_PB);
-                data.articulated[body.parent] += I_P;
-            }
-            data.pA[body.parent] += passed_force.at_parent(&X_PB);
-        }
+/// Inward: what body i passes to its parent through the joint, (4) to (6) and (9).
+#[inline(always)]
+fn pass_inward(model: &Model, data: &mut Data, i: usize, roles: &Roles) {
+    let body = &model.bodies[i];
+    if let Some(m) = body.modal {
+        eliminate_modal(model, data, i, m, roles.prescribed_modal[m]);
     }
+    if let JointMotion::Interface { modal, interface } = body.motion {
+        gather_interface(model, data, i, modal, interface);
+        return;
+    }
+    let (pA, c) = (data.pA[i], data.bias[i]);
+    let (passed_inertia, passed_force) = match body.motion {
+        _ if roles.prescribed_body[i] || body.motion == JointMotion::Welded => {
+            let I = data.articulated[i];
+            (Some(I), pA + I.mul_twist(&c))
+        }
+        JointMotion::Elastic(_) => {
+            let F = elastic_wrench(data, i, body.coordinate); // (9)
+            data.F[i] = F;
+            (None, F)
+        }
+        JointMotion::Axis(motion) => {
+            let I = &data.articulated[i];
+            let U = motion.linear(
+                |axis| Wrench::new(mul(&I.coupling, &axis), mul(&I.angular, &axis)),
+                |axis| Wrench::new(mul(&I.linear, &axis), tr_mul(&I.coupling, &axis)),
+            );
+            let d = motion.project(&U) + body.armature; // (4)
+            let u = data.tau[body.coordinate] * body.ratio - motion.project(&pA);
+            one_dof_inward(data, i, U, d, u, &c, pA) // (5)
+        }
+        JointMotion::Interface { .. } | JointMotion::Welded => return,
+    };
+    if body.parent > 0 {
+        let X_PB = data.X_PB[i];
+        if let Some(I) = passed_inertia {
+            let I_P = I.at_parent(&X_PB); // (6)
+            data.articulated[body.parent] += I_P;
+        }
+        data.pA[body.parent] += passed_force.at_parent(&X_PB);
+    }
+}
 
-    data.A[0] = Twist::new(-model.gravity, Vector3::zeros());
-    if let Some(m) = model.bodies[0].modal {
-        eliminate_modal(model, data, 0, m, roles.prescribed_modal[m]);
-        finish_modal(model, data, 0, m, roles.prescribed_modal[m]);
-    }
-    for (i, &is_prescribed) in prescribed.iter().enumerate().skip(1) {
+/// Outward: accelerations of free joints and forces of prescribed ones, (7), (8) and (10).
+#[inline(always)]
+fn finish_bodies(model: &Model, data: &mut Data, roles: &Roles) {
+    // A coordinate may move several joints: their forces add up.
+    for (i, &is_prescribed) in roles.prescribed_body.iter().enumerate().skip(1) {
         if is_prescribed {
             data.tau[model.bodies[i].coordinate] = 0.0;
             if let JointMotion::Elastic(_) = model.bodies[i].motion {
@@ -200,10 +231,10 @@ fn solve_articulated(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], ro
             }
         }
     }
-    for (i, &is_prescribed) in prescribed.iter().enumerate().skip(1) {
+    for (i, &is_prescribed) in roles.prescribed_body.iter().enumerate().skip(1) {
         let body = &model.bodies[i];
         let k = body.coordinate;
-        let A = data.A[body.parent].at_child(&data.X_PB[i]) + data.bias[i];
+        let A = data.A[body.parent].at_child(&data.X_PB[i]) + data.bias[i]; // (7)
         data.A[i] = match body.motion {
             JointMotion::Interface { .. } => A + subspace_times(model, data, i, data.qddot.as_slice()),
             JointMotion::Welded => A,
@@ -214,31 +245,30 @@ fn solve_articulated(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], ro
                 data.tau[k] += body.ratio * body.ratio * body.armature * data.qddot[k];
                 A
             }
-            JointMotion::Revolute(axis) => {
-                let qddot = data.inverse_d[i] * (data.u[i] - A.power(&data.U[i]));
+            JointMotion::Axis(motion) => {
+                let qddot = data.inverse_d[i] * (data.u[i] - A.power(&data.U[i])); // (8)
                 data.qddot[k] = qddot / body.ratio;
-                Twist::new(A.linear, A.angular + axis * qddot)
+                A + motion.twist(qddot)
             }
-            JointMotion::Prismatic(axis) => {
-                let qddot = data.inverse_d[i] * (data.u[i] - A.power(&data.U[i]));
-                data.qddot[k] = qddot / body.ratio;
-                Twist::new(A.linear + axis * qddot, A.angular)
-            }
-            JointMotion::Elastic(_) => {
-                let A_B = solve_inertia(&data.articulated[i], &(data.F[i] - data.pA[i]));
-                let relative = A_B - A;
-                let S = &data.elastic[i];
-                let linear = tr_mul(&S.L, &relative.linear);
-                let angular = mul(&inverse_3x3(&S.B), &relative.angular);
-                data.qddot.as_mut_slice()[k..k + 3].copy_from_slice(linear.as_slice());
-                data.qddot.as_mut_slice()[k + 3..k + 6].copy_from_slice(angular.as_slice());
-                A_B
-            }
+            JointMotion::Elastic(_) => free_elastic(data, i, k, &A),
         };
         if let Some(m) = body.modal {
             finish_modal(model, data, i, m, roles.prescribed_modal[m]);
         }
     }
+}
+
+/// Outward over a free elastic joint: the accelerations of its six coordinates and that of body i, (10).
+#[inline(always)]
+fn free_elastic(data: &mut Data, i: usize, k: usize, A: &Twist) -> Twist {
+    let A_B = solve_inertia(&data.articulated[i], &(data.F[i] - data.pA[i]));
+    let relative = A_B - *A;
+    let S = &data.elastic[i];
+    let linear = tr_mul(&S.L, &relative.linear);
+    let angular = mul(&inverse_3x3(&S.B), &relative.angular);
+    data.qddot.as_mut_slice()[k..k + 3].copy_from_slice(linear.as_slice());
+    data.qddot.as_mut_slice()[k + 3..k + 6].copy_from_slice(angular.as_slice());
+    A_B
 }
 
 /// Outward: own inertia and velocity terms of the modal body m on body i.

@@ -6,11 +6,12 @@
 //! and what its interfaces carry. Source: [Featherstone 2008], Table 6.2.
 
 use flexarm_spatial::products::{cross3, mul, mul3, tr_mul, tr_mul3};
-use flexarm_spatial::{SpatialInertia, Wrench};
-use nalgebra::{DMatrix, DVector, Matrix3};
+use flexarm_spatial::{Pose, SpatialInertia, Wrench};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
+use crate::axis_motion::AxisMotion;
 use crate::data::{Data, ElasticSubspace, joint_position, place_modal};
-use crate::model::{JointMotion, Model};
+use crate::model::{Body, JointMotion, Model};
 
 /// Mass matrix `M(q)`, nv×nv, both triangles (kg, kg m, kg m²). Fills `data.{X_PB, M}`. No allocation.
 pub fn mass_matrix<'d>(model: &Model, data: &'d mut Data, q: &DVector<f64>) -> &'d DMatrix<f64> {
@@ -43,16 +44,11 @@ pub fn mass_matrix_at_poses(model: &Model, data: &mut Data) {
         let (composite, X_PB) = (data.composite[i], data.X_PB[i]);
         let k = body.coordinate;
         match body.motion {
-            JointMotion::Revolute(axis) => {
-                let a = axis * body.ratio;
-                let F = Wrench::new(a.cross(&composite.first_moment), mul(&composite.rotational, &a));
-                data.M.as_mut_slice()[k * nv + k] += a.dot(&F.torque) + body.ratio * body.ratio * body.armature;
-                data.U[i] = F;
-            }
-            JointMotion::Prismatic(axis) => {
-                let a = axis * body.ratio;
-                let F = Wrench::new(a * composite.mass, composite.first_moment.cross(&a));
-                data.M.as_mut_slice()[k * nv + k] += a.dot(&F.force) + body.ratio * body.ratio * body.armature;
+            JointMotion::Axis(motion) => {
+                let F = axis_wrench(motion, &composite, body.ratio);
+                let own =
+                    motion.linear(|axis| (axis * body.ratio).dot(&F.torque), |axis| (axis * body.ratio).dot(&F.force));
+                data.M.as_mut_slice()[k * nv + k] += own + body.ratio * body.ratio * body.armature;
                 data.U[i] = F;
             }
             JointMotion::Welded => {}
@@ -75,6 +71,21 @@ pub fn mass_matrix_at_poses(model: &Model, data: &mut Data) {
     }
 }
 
+/// `I_c S` of a joint of one coordinate: the wrench that moves all that is outward of it, at Bo in B axes.
+#[inline(always)]
+fn axis_wrench(motion: AxisMotion, composite: &SpatialInertia, ratio: f64) -> Wrench {
+    motion.linear(
+        |axis| {
+            let a = axis * ratio;
+            Wrench::new(a.cross(&composite.first_moment), mul(&composite.rotational, &a))
+        },
+        |axis| {
+            let l = axis * ratio;
+            Wrench::new(l * composite.mass, composite.first_moment.cross(&l))
+        },
+    )
+}
+
 /// Carries the wrenches of all one-DoF joints from body i outward over to its parent and meets the parent's joint:
 /// one level for all of them at once, because they do not wait for each other.
 #[inline(always)]
@@ -86,14 +97,13 @@ fn carry_columns(model: &Model, data: &mut Data, i: usize) {
     let M = data.M.as_mut_slice();
     let outward = i..model.bodies[i].subtree_end;
     for (F, body) in data.U[outward.clone()].iter_mut().zip(&model.bodies[outward]) {
-        if !matches!(body.motion, JointMotion::Revolute(_) | JointMotion::Prismatic(_)) {
+        if !matches!(body.motion, JointMotion::Axis(_)) {
             continue;
         }
         *F = F.at_parent(&X_PB);
         let column = body.coordinate;
         match inward.motion {
-            JointMotion::Revolute(axis) => add_pair(M, nv, row, column, inward.ratio * axis.dot(&F.torque)),
-            JointMotion::Prismatic(axis) => add_pair(M, nv, row, column, inward.ratio * axis.dot(&F.force)),
+            JointMotion::Axis(motion) => add_pair(M, nv, row, column, inward.ratio * motion.project(F)),
             JointMotion::Elastic(_) => {
                 let S = &data.elastic[parent];
                 let (f, t) = (tr_mul(&S.L, &F.force), tr_mul(&S.B, &F.torque));
@@ -119,8 +129,7 @@ fn meet(model: &Model, elastic: &[ElasticSubspace], M: &mut [f64], nv: usize, j:
     let body = &model.bodies[j];
     let row = body.coordinate;
     match body.motion {
-        JointMotion::Revolute(axis) => add_pair(M, nv, row, column, body.ratio * axis.dot(&F.torque)),
-        JointMotion::Prismatic(axis) => add_pair(M, nv, row, column, body.ratio * axis.dot(&F.force)),
+        JointMotion::Axis(motion) => add_pair(M, nv, row, column, body.ratio * motion.project(F)),
         JointMotion::Welded => {}
         JointMotion::Elastic(_) => {
             let S = &elastic[j];
@@ -183,68 +192,115 @@ fn add_six(M: &mut [f64], nv: usize, row: usize, column: usize, values: [f64; 6]
 /// All columns of an elastic joint of body i, whose composite inertia is `composite` (about Bo, B axes).
 ///
 /// Everything is kept in the axes of the parent P, and the axes of the joints inward are turned there, one rotation
-/// per level instead of four. With `U = R_PJ` and `Ω = R_PB B` the joint moves Bo by `U d'` and turns B by `Ω φ'`; the
-/// composite's first moment `h_B` and inertia `J_B` about Bo answer with
-///
-/// ```text
-/// translations: force m U,          moment about Bo  [h_B]x U
-/// angles:       force -[h_B]x Ω,    moment about Bo  W = J_B Ω
-/// ```
-/// About the origin of a joint inward, `r` before Bo, an axis a meets them as
-/// `Uᵀ (a × (m r + h_B))` and `Wᵀ a - Ωᵀ ((a × r) × h_B)`.
+/// per level instead of four.
 #[inline(always)]
 fn elastic_columns(model: &Model, data: &mut Data, i: usize, composite: &SpatialInertia) {
-    let body = &model.bodies[i];
-    let (X_PB, nv, mass) = (&data.X_PB[i], data.M.nrows(), composite.mass);
-    let (R_PB, U) = (X_PB.rotation.matrix(), body.X_PJ.rotation.matrix());
-    let B = &data.elastic[i].B;
-    let Omega = mul3(R_PB, B);
-    let W = mul3(R_PB, &mul3(&composite.rotational, B));
-    let h_B = mul(R_PB, &composite.first_moment);
-    let force_r = -cross3(&h_B, &Omega);
-
-    // Own block: the translations meet the mass alone.
-    let k = body.coordinate;
-    let (tr, rr) = (tr_mul3(U, &force_r), tr_mul3(&Omega, &W));
+    let (body, X_PB) = (&model.bodies[i], &data.X_PB[i]);
+    let columns = ElasticColumns::new(body, X_PB, &data.elastic[i].B, composite, data.M.nrows());
     let M = data.M.as_mut_slice();
-    for c in 0..3 {
-        let column = &mut M[(k + c) * nv + k..][..6];
-        column[c] = mass;
-        for r in 0..3 {
-            column[3 + r] = tr[(c, r)];
-        }
-        let column = &mut M[(k + 3 + c) * nv + k..][..6];
-        for r in 0..3 {
-            column[r] = tr[(r, c)];
-            column[3 + r] = rr[(r, c)];
-        }
-    }
+    columns.write_own_block(M);
 
     // From joint to joint inward: A the body there, R_AP its rotation, r from Ao to Bo in P axes.
     let mut j = body.parent;
     let (mut R_AP, mut r) = (Matrix3::identity(), X_PB.translation.vector);
     while j > 0 {
+        columns.meet(model, &data.elastic[j], M, j, &R_AP, &r);
         let inward = &model.bodies[j];
-        let row = inward.coordinate;
-        match inward.motion {
-            JointMotion::Revolute(axis) => {
-                let a = tr_mul(&R_AP, &(axis * inward.ratio));
-                let t = tr_mul(U, &a.cross(&(r * mass + h_B)));
-                let q = tr_mul(&W, &a) - tr_mul(&Omega, &a.cross(&r).cross(&h_B));
-                add_six(M, nv, k, row, [t.x, t.y, t.z, q.x, q.y, q.z]);
+        if inward.parent > 0 {
+            let X = &data.X_PB[j];
+            R_AP = mul3(X.rotation.matrix(), &R_AP);
+            r += tr_mul(&R_AP, &X.translation.vector);
+        }
+        j = inward.parent;
+    }
+}
+
+/// How what an elastic joint carries answers to its coordinates, in the axes of the parent P.
+///
+/// With `U = R_PJ` and `Ω = R_PB B` the joint moves Bo by `U d'` and turns B by `Ω φ'`; the composite's first moment `h_B` and
+/// inertia `J_B` about Bo answer with
+///
+/// ```text
+/// translations: force m U,          moment about Bo  [h_B]x U                (1)
+/// angles:       force -[h_B]x Ω,    moment about Bo  W = J_B Ω               (2)
+/// ```
+/// About the origin of a joint inward, `r` before Bo, an axis a meets them as
+///
+/// ```text
+/// Uᵀ (a × (m r + h_B)),   Wᵀ a - Ωᵀ ((a × r) × h_B)                          (3)
+/// ```
+struct ElasticColumns {
+    /// First coordinate of the joint.
+    k: usize,
+    /// Rows of M.
+    nv: usize,
+    mass: f64,
+    U: Matrix3<f64>,
+    Omega: Matrix3<f64>,
+    W: Matrix3<f64>,
+    h_B: Vector3<f64>,
+    /// Force of the angles.
+    force_r: Matrix3<f64>,
+}
+
+impl ElasticColumns {
+    #[inline(always)]
+    fn new(body: &Body, X_PB: &Pose, B: &Matrix3<f64>, composite: &SpatialInertia, nv: usize) -> Self {
+        let (R_PB, U) = (X_PB.rotation.matrix(), *body.X_PJ.rotation.matrix());
+        let Omega = mul3(R_PB, B);
+        let W = mul3(R_PB, &mul3(&composite.rotational, B)); // (2)
+        let h_B = mul(R_PB, &composite.first_moment);
+        let force_r = -cross3(&h_B, &Omega);
+        Self { k: body.coordinate, nv, mass: composite.mass, U, Omega, W, h_B, force_r }
+    }
+
+    /// The joint's own six columns: the translations meet the mass alone.
+    #[inline(always)]
+    fn write_own_block(&self, M: &mut [f64]) {
+        let (k, nv) = (self.k, self.nv);
+        let (tr, rr) = (tr_mul3(&self.U, &self.force_r), tr_mul3(&self.Omega, &self.W));
+        for c in 0..3 {
+            let column = &mut M[(k + c) * nv + k..][..6];
+            column[c] = self.mass;
+            for r in 0..3 {
+                column[3 + r] = tr[(c, r)];
             }
-            JointMotion::Prismatic(axis) => {
-                let a = tr_mul(&R_AP, &(axis * inward.ratio));
-                let (t, q) = (tr_mul(U, &a) * mass, tr_mul(&force_r, &a));
-                add_six(M, nv, k, row, [t.x, t.y, t.z, q.x, q.y, q.z]);
+            let column = &mut M[(k + 3 + c) * nv + k..][..6];
+            for r in 0..3 {
+                column[r] = tr[(r, c)];
+                column[3 + r] = rr[(r, c)];
+            }
+        }
+    }
+
+    /// Adds what the joint of body j, inward, meets: `S` its subspace if it is elastic, `R_AP` and r as in [`elastic_columns`].
+    #[inline(always)]
+    fn meet(&self, model: &Model, S: &ElasticSubspace, M: &mut [f64], j: usize, R_AP: &Matrix3<f64>, r: &Vector3<f64>) {
+        let Self { k, nv, mass, U, Omega, W, h_B, force_r } = self;
+        let inward = &model.bodies[j];
+        let (row, nv, mass) = (inward.coordinate, *nv, *mass);
+        match inward.motion {
+            JointMotion::Axis(motion) => {
+                // Forces of the translations and of the angles, (3).
+                let Wrench { force: t, torque: q } = motion.linear(
+                    |axis| {
+                        let a = tr_mul(R_AP, &(axis * inward.ratio));
+                        let t = tr_mul(U, &a.cross(&(r * mass + h_B)));
+                        Wrench::new(t, tr_mul(W, &a) - tr_mul(Omega, &a.cross(r).cross(h_B)))
+                    },
+                    |axis| {
+                        let l = tr_mul(R_AP, &(axis * inward.ratio));
+                        Wrench::new(tr_mul(U, &l) * mass, tr_mul(force_r, &l))
+                    },
+                );
+                add_six(M, nv, *k, row, [t.x, t.y, t.z, q.x, q.y, q.z]);
             }
             JointMotion::Welded => {}
             JointMotion::Elastic(_) => {
-                let S = &data.elastic[j];
-                let (L, B) = (tr_mul3(&R_AP, &S.L), tr_mul3(&R_AP, &S.B));
-                let (tt, tr) = (tr_mul3(&L, &(U * mass)), tr_mul3(&L, &force_r));
+                let (L, B) = (tr_mul3(R_AP, &S.L), tr_mul3(R_AP, &S.B));
+                let (tt, tr) = (tr_mul3(&L, &(U * mass)), tr_mul3(&L, force_r));
                 let rt = tr_mul3(&B, &cross3(&(r * mass + h_B), U));
-                let rr = tr_mul3(&B, &(W + cross3(&r, &force_r)));
+                let rr = tr_mul3(&B, &(W + cross3(r, force_r)));
                 for c in 0..3 {
                     let six = |t: &Matrix3<f64>, r: &Matrix3<f64>| {
                         [t[(0, c)], t[(1, c)], t[(2, c)], r[(0, c)], r[(1, c)], r[(2, c)]]
@@ -254,22 +310,16 @@ fn elastic_columns(model: &Model, data: &mut Data, i: usize, composite: &Spatial
                 }
             }
             JointMotion::Interface { modal, interface } => {
-                let (S, entry) = (&data.elastic[j], &model.modal[modal]);
+                let entry = &model.modal[modal];
                 let shape = &entry.tables.shapes.interfaces[interface];
                 for m in 0..entry.n {
                     let column = shape.twist(m, &S.L, &S.B);
-                    let (l, a) = (tr_mul(&R_AP, &column.linear), tr_mul(&R_AP, &column.angular));
+                    let (l, a) = (tr_mul(R_AP, &column.linear), tr_mul(R_AP, &column.angular));
                     let t = tr_mul(U, &(l * mass + a.cross(&(r * mass + h_B))));
-                    let q = tr_mul(&force_r, &l) + tr_mul(&W, &a) - tr_mul(&Omega, &a.cross(&r).cross(&h_B));
-                    add_six(M, nv, k, row + m, [t.x, t.y, t.z, q.x, q.y, q.z]);
+                    let q = tr_mul(force_r, &l) + tr_mul(W, &a) - tr_mul(Omega, &a.cross(r).cross(h_B));
+                    add_six(M, nv, *k, row + m, [t.x, t.y, t.z, q.x, q.y, q.z]);
                 }
             }
         }
-        if inward.parent > 0 {
-            let X = &data.X_PB[j];
-            R_AP = mul3(X.rotation.matrix(), &R_AP);
-            r += tr_mul(&R_AP, &X.translation.vector);
-        }
-        j = inward.parent;
     }
 }

@@ -121,13 +121,9 @@ pub(crate) fn joint_motion(model: &Model, data: &mut Data, i: usize, q: &[f64], 
     let body = &model.bodies[i];
     let k = body.coordinate;
     match body.motion {
-        JointMotion::Revolute(axis) => {
-            joint_position(model, data, i, q);
-            (Twist::new(Vector3::zeros(), axis * (body.ratio * qdot[k])), Twist::zeros())
-        }
-        JointMotion::Prismatic(axis) => {
-            joint_position(model, data, i, q);
-            (Twist::new(axis * (body.ratio * qdot[k]), Vector3::zeros()), Twist::zeros())
+        JointMotion::Axis(motion) => {
+            motion.place(&body.X_PJ, &body.turn, body.ratio * q[k] + body.offset, &mut data.X_PB[i]);
+            (motion.twist(body.ratio * qdot[k]), Twist::zeros())
         }
         JointMotion::Welded => {
             data.X_PB[i] = body.X_PJ;
@@ -166,18 +162,8 @@ pub(crate) fn joint_position(model: &Model, data: &mut Data, i: usize, q: &[f64]
     let body = &model.bodies[i];
     let k = body.coordinate;
     match body.motion {
-        JointMotion::Revolute(_) => {
-            let (s, c) = (body.ratio * q[k] + body.offset).sin_cos();
-            let turn = &body.turn;
-            let X = &mut data.X_PB[i];
-            *X.rotation.matrix_mut_unchecked() = turn.K0 + turn.K1 * s + turn.K2 * c;
-            X.translation = body.X_PJ.translation;
-        }
-        JointMotion::Prismatic(axis) => {
-            let X = &mut data.X_PB[i];
-            X.rotation = body.X_PJ.rotation;
-            X.translation.vector =
-                body.X_PJ.translation.vector + body.X_PJ.rotation * (axis * (body.ratio * q[k] + body.offset));
+        JointMotion::Axis(motion) => {
+            motion.place(&body.X_PJ, &body.turn, body.ratio * q[k] + body.offset, &mut data.X_PB[i]);
         }
         JointMotion::Welded => data.X_PB[i] = body.X_PJ,
         JointMotion::Elastic(angles) => {
@@ -221,8 +207,7 @@ pub(crate) fn subspace_times(model: &Model, data: &Data, i: usize, qddot: &[f64]
     let body = &model.bodies[i];
     let k = body.coordinate;
     match body.motion {
-        JointMotion::Revolute(axis) => Twist::new(Vector3::zeros(), axis * (body.ratio * qddot[k])),
-        JointMotion::Prismatic(axis) => Twist::new(axis * (body.ratio * qddot[k]), Vector3::zeros()),
+        JointMotion::Axis(motion) => motion.twist(body.ratio * qddot[k]),
         JointMotion::Welded => Twist::zeros(),
         JointMotion::Elastic(_) => {
             let S = &data.elastic[i];
@@ -245,8 +230,7 @@ pub(crate) fn add_projection(model: &Model, data_elastic: &ElasticSubspace, i: u
     let body = &model.bodies[i];
     let k = body.coordinate;
     match body.motion {
-        JointMotion::Revolute(axis) => tau[k] += body.ratio * axis.dot(&F.torque),
-        JointMotion::Prismatic(axis) => tau[k] += body.ratio * axis.dot(&F.force),
+        JointMotion::Axis(motion) => tau[k] += body.ratio * motion.project(F),
         JointMotion::Welded => {}
         JointMotion::Elastic(_) => {
             let f = tr_mul(&data_elastic.L, &F.force);

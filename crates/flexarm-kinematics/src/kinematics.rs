@@ -5,8 +5,9 @@
 
 use flexarm_spatial::products::{mul, mul3};
 use flexarm_spatial::{ElasticAngles, Pose, Twist};
-use nalgebra::{Matrix6xX, Vector3};
+use nalgebra::{Matrix3, Matrix6xX, Vector3};
 
+use crate::axis_motion::AxisMotion;
 use crate::data::{Data, State, joint_motion, joint_position, place_modal, rotor_energy};
 use crate::model::{Frame, JointMotion, Model};
 
@@ -75,8 +76,10 @@ pub fn frame_jacobian(model: &Model, data: &Data, frame: &Frame, J: &mut Matrix6
             }
         };
         match body.motion {
-            JointMotion::Revolute(axis) => add(body.coordinate, Vector3::zeros(), R * axis * body.ratio),
-            JointMotion::Prismatic(axis) => add(body.coordinate, R * axis * body.ratio, Vector3::zeros()),
+            JointMotion::Axis(motion) => {
+                let column = turned(motion, R, body.ratio);
+                add(body.coordinate, column.linear, column.angular);
+            }
             JointMotion::Welded => {}
             JointMotion::Elastic(_) => {
                 let S = &data.elastic[i];
@@ -96,6 +99,15 @@ pub fn frame_jacobian(model: &Model, data: &Data, frame: &Frame, J: &mut Matrix6
         }
         i = body.parent;
     }
+}
+
+/// `R_WB S` times the ratio of a mimic joint: a column of the Jacobian at Bo, in W axes.
+#[inline(always)]
+fn turned(motion: AxisMotion, R_WB: &Matrix3<f64>, ratio: f64) -> Twist {
+    motion.linear(
+        |axis| Twist::new(Vector3::zeros(), R_WB * axis * ratio),
+        |axis| Twist::new(R_WB * axis * ratio, Vector3::zeros()),
+    )
 }
 
 /// `dJ_WT_W/dt`, 6×nv, from the last [`forward_kinematics_velocity`] at `state`; written into `Jdot`.
@@ -124,13 +136,9 @@ pub fn frame_jacobian_derivative(model: &Model, data: &Data, state: &State, fram
             }
         };
         match body.motion {
-            JointMotion::Revolute(axis) => {
-                let a = R * axis * body.ratio;
-                add(body.coordinate, Vector3::zeros(), a, w_B.cross(&a));
-            }
-            JointMotion::Prismatic(axis) => {
-                let l = R * axis * body.ratio;
-                add(body.coordinate, w_B.cross(&l), Vector3::zeros(), Vector3::zeros());
+            JointMotion::Axis(motion) => {
+                let Twist { linear: l, angular: a } = turned(motion, R, body.ratio);
+                add(body.coordinate, w_B.cross(&l), a, w_B.cross(&a));
             }
             JointMotion::Welded => {}
             JointMotion::Elastic(angles) => {

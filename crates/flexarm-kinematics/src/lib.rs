@@ -34,6 +34,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
 mod aba;
+mod axis_motion;
 mod crba;
 mod data;
 mod energy;
@@ -50,6 +51,7 @@ pub use flexarm_spatial::{
 };
 
 pub use aba::{Roles, forward_dynamics, hybrid_dynamics};
+pub use axis_motion::AxisMotion;
 pub use crba::{mass_matrix, mass_matrix_at_poses};
 pub use data::{Data, State};
 pub use energy::{

@@ -9,6 +9,7 @@ use std::sync::Arc;
 use flexarm_spatial::{ElasticAngles, Pose, SpatialInertia};
 use nalgebra::{Matrix3, Unit, Vector3};
 
+use crate::axis_motion::AxisMotion;
 use crate::modal::ModalBody;
 
 /// Links joined by joints into one tree. SI units.
@@ -85,12 +86,26 @@ pub enum JointKind {
     Continuous(Unit<Vector3<f64>>),
     /// One translation.
     Prismatic(Unit<Vector3<f64>>),
+    /// One rotation that slides along its axis as a nut on a spindle does.
+    Helical {
+        /// The axis.
+        axis: Unit<Vector3<f64>>,
+        /// Translation per rad (m).
+        pitch: f64,
+    },
     /// Six small elastic coordinates: translation in P axes, then three angles.
     Elastic(ElasticAngles),
     /// One small elastic rotation (the spring of a gearbox).
     ElasticRevolute(Unit<Vector3<f64>>),
     /// One small elastic translation.
     ElasticPrismatic(Unit<Vector3<f64>>),
+    /// One small elastic rotation that slides along its axis (the spring behind a helical joint).
+    ElasticHelical {
+        /// The axis.
+        axis: Unit<Vector3<f64>>,
+        /// Translation per rad (m).
+        pitch: f64,
+    },
     /// Interface of that number of the parent link, which must have a [`ModalBody`]: moves with its coordinates.
     Interface(usize),
 }
@@ -102,18 +117,69 @@ impl JointKind {
             Self::Fixed | Self::Interface(_) => 0,
             Self::Revolute(_) | Self::Continuous(_) | Self::Prismatic(_) => 1,
             Self::ElasticRevolute(_) | Self::ElasticPrismatic(_) => 1,
+            Self::Helical { .. } | Self::ElasticHelical { .. } => 1,
             Self::Elastic(_) => 6,
         }
     }
 
-    /// The word of URDF files.
+    /// Motion of its coordinate, where it has one.
+    pub fn axis_motion(&self) -> Option<AxisMotion> {
+        match *self {
+            Self::Revolute(axis) | Self::Continuous(axis) | Self::ElasticRevolute(axis) => {
+                Some(AxisMotion::Revolute(axis.into_inner()))
+            }
+            Self::Prismatic(axis) | Self::ElasticPrismatic(axis) => Some(AxisMotion::Prismatic(axis.into_inner())),
+            Self::Helical { axis, pitch } | Self::ElasticHelical { axis, pitch } => {
+                Some(AxisMotion::Helical { axis: axis.into_inner(), pitch })
+            }
+            Self::Fixed | Self::Elastic(_) | Self::Interface(_) => None,
+        }
+    }
+
+    /// Whether its coordinates are small elastic ones.
+    pub fn is_elastic(&self) -> bool {
+        matches!(
+            self,
+            Self::Elastic(_) | Self::ElasticRevolute(_) | Self::ElasticPrismatic(_) | Self::ElasticHelical { .. }
+        )
+    }
+
+    /// The spring that moves as this joint of one coordinate does.
+    pub fn spring(&self) -> Option<JointKind> {
+        match *self {
+            Self::Revolute(axis) | Self::Continuous(axis) => Some(Self::ElasticRevolute(axis)),
+            Self::Prismatic(axis) => Some(Self::ElasticPrismatic(axis)),
+            Self::Helical { axis, pitch } => Some(Self::ElasticHelical { axis, pitch }),
+            _ => None,
+        }
+    }
+
+    /// Whether its coordinate is a joint angle (rad).
+    pub fn turns(&self) -> bool {
+        !self.is_elastic() && self.axis_motion().is_some_and(|motion| !motion.slides())
+    }
+
+    /// Whether its coordinate is a joint translation (m).
+    pub fn slides(&self) -> bool {
+        !self.is_elastic() && self.axis_motion().is_some_and(AxisMotion::slides)
+    }
+
+    /// Translation per unit of its coordinate: 1 where it slides (m/m).
+    pub fn travel(&self) -> f64 {
+        self.axis_motion().map_or(0.0, AxisMotion::travel)
+    }
+
+    /// The word of URDF files, and `helical`, which these do not have.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Fixed => "fixed",
             Self::Revolute(_) => "revolute",
             Self::Continuous(_) => "continuous",
             Self::Prismatic(_) => "prismatic",
-            Self::Elastic(_) | Self::ElasticRevolute(_) | Self::ElasticPrismatic(_) => "elastic",
+            Self::Helical { .. } => "helical",
+            Self::Elastic(_) | Self::ElasticRevolute(_) | Self::ElasticPrismatic(_) | Self::ElasticHelical { .. } => {
+                "elastic"
+            }
             Self::Interface(_) => "interface",
         }
     }

@@ -9,9 +9,10 @@
 
 use std::collections::HashMap;
 
-use flexarm_spatial::{ElasticAngles, Pose, SpatialInertia, skew};
-use nalgebra::{Matrix3, Vector3};
+use flexarm_spatial::{ElasticAngles, Pose, SpatialInertia};
+use nalgebra::Vector3;
 
+use crate::axis_motion::{AxisMotion, RevoluteTable};
 use crate::mechanism::{Joint, JointKind, Limits, Mechanism};
 use crate::modal::ModalTables;
 
@@ -69,10 +70,8 @@ pub struct Body {
 /// Motion of a joint in the recursions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum JointMotion {
-    /// Rotation about a unit axis (same components in J and B axes).
-    Revolute(Vector3<f64>),
-    /// Translation along a unit axis.
-    Prismatic(Vector3<f64>),
+    /// One coordinate along a constant column.
+    Axis(AxisMotion),
     /// Translation in P axes, then angles.
     Elastic(ElasticAngles),
     /// None: a modal link on a fixed joint is a body of its own, without a coordinate.
@@ -108,22 +107,6 @@ pub struct ElasticGroup {
     pub size: usize,
     /// Whether these are modal coordinates.
     pub modal: bool,
-}
-
-/// `R_PB(q) = K0 + sin q K1 + cos q K2`: Rodrigues' formula with the placement multiplied in.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct RevoluteTable {
-    pub(crate) K0: Matrix3<f64>,
-    pub(crate) K1: Matrix3<f64>,
-    pub(crate) K2: Matrix3<f64>,
-}
-
-impl RevoluteTable {
-    fn new(X_PJ: &Pose, axis: &Vector3<f64>) -> Self {
-        let (R, A) = (X_PJ.rotation.matrix(), skew(axis));
-        let A2 = axis * axis.transpose() - Matrix3::identity();
-        Self { K0: R + R * A2, K1: R * A, K2: -(R * A2) }
-    }
 }
 
 /// A named frame fixed to a body: every link of the mechanism is one.
@@ -281,7 +264,7 @@ impl Model {
             parent: 0,
             X_PJ: Pose::identity(),
             inertia: SpatialInertia::zeros(),
-            motion: JointMotion::Prismatic(Vector3::z()),
+            motion: JointMotion::Welded,
             coordinate: usize::MAX,
             ratio: 1.0,
             offset: 0.0,
@@ -490,16 +473,14 @@ impl<'a> Builder<'a> {
         let mechanism = self.mechanism;
         let link = &mechanism.links[parent];
         let X_BJ = X_BL * joint.X_PJ;
-        let motion = match joint.kind {
+        let motion = match (joint.kind, joint.kind.axis_motion()) {
             // A link that bends in modes needs a body whose frame is its own.
-            JointKind::Fixed if mechanism.modal.iter().any(|(name, _)| *name == joint.child) => JointMotion::Welded,
-            JointKind::Fixed => return Ok((body, X_BJ)),
-            JointKind::Revolute(axis) | JointKind::Continuous(axis) | JointKind::ElasticRevolute(axis) => {
-                JointMotion::Revolute(axis.into_inner())
+            (JointKind::Fixed, _) if mechanism.modal.iter().any(|(name, _)| *name == joint.child) => {
+                JointMotion::Welded
             }
-            JointKind::Prismatic(axis) | JointKind::ElasticPrismatic(axis) => JointMotion::Prismatic(axis.into_inner()),
-            JointKind::Elastic(angles) => JointMotion::Elastic(angles),
-            JointKind::Interface(interface) => match self.bodies[body].modal {
+            (_, Some(motion)) => JointMotion::Axis(motion),
+            (JointKind::Elastic(angles), _) => JointMotion::Elastic(angles),
+            (JointKind::Interface(interface), _) => match self.bodies[body].modal {
                 Some(modal) if modal_has(&self.modal[modal], interface) && self.frames_are_at(body, &link.name) => {
                     JointMotion::Interface { modal, interface }
                 }
@@ -508,15 +489,9 @@ impl<'a> Builder<'a> {
                     return Err(ModelError::BadModal { link: link.name.clone(), what });
                 }
             },
+            _ => return Ok((body, X_BJ)),
         };
-        let elastic = matches!(
-            joint.kind,
-            JointKind::Elastic(_) | JointKind::ElasticRevolute(_) | JointKind::ElasticPrismatic(_)
-        );
-        let axis = match motion {
-            JointMotion::Revolute(axis) => axis,
-            _ => Vector3::z(),
-        };
+        let axis = joint.kind.axis_motion().map_or(Vector3::z(), AxisMotion::axis);
         let (ratio, offset) = joint.mimic.as_ref().map_or((1.0, 0.0), |m| (m.ratio, m.offset));
         let index = self.bodies.len();
         if let Some(mimic) = &joint.mimic {
@@ -534,7 +509,7 @@ impl<'a> Builder<'a> {
             ratio,
             offset,
             armature: joint.armature,
-            elastic,
+            elastic: joint.kind.is_elastic(),
             modal: None,
             turn: RevoluteTable::new(&X_BJ, &axis),
             subtree_end: 0,
@@ -562,78 +537,14 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// Numbers the coordinates: actuated, then elastic, then mimic joints take their leader's.
+    /// Numbers the coordinates, ties the joints that share them, and makes the model.
     fn finish(mut self) -> Result<Model, ModelError> {
-        let follows = |body: usize, followers: &[Follower]| followers.iter().any(|f| f.body == body);
-        let mut coordinates: Vec<Coordinate> = Vec::new();
-        let mut elastic: Vec<ElasticGroup> = Vec::new();
-        let mut n_actuated = 0;
-        let joints: HashMap<&str, &Joint> = self.children.values().flatten().map(|j| (j.name.as_str(), *j)).collect();
-        for elastic_pass in [false, true] {
-            for i in 0..self.bodies.len() {
-                let body = &self.bodies[i];
-                let none = matches!(body.motion, JointMotion::Interface { .. } | JointMotion::Welded);
-                let own = body.elastic == elastic_pass && !none;
-                let joint = joints.get(body.joint.as_str()).filter(|_| own && !follows(i, &self.followers));
-                if let Some(joint) = joint {
-                    let (coordinate, size) = (coordinates.len(), joint.kind.degrees_of_freedom());
-                    self.bodies[i].coordinate = coordinate;
-                    coordinates.extend((0..size).map(|component| Coordinate {
-                        joint: joint.name.clone(),
-                        component,
-                        body: i,
-                        limits: joint.limits,
-                        kind: joint.kind.name(),
-                    }));
-                    if elastic_pass {
-                        let name = joint.name.clone();
-                        elastic.push(ElasticGroup { name, body: i, coordinate, size, modal: false });
-                    } else {
-                        n_actuated += size;
-                    }
-                }
-                if elastic_pass && let Some(m) = self.bodies[i].modal {
-                    let modal = &mut self.modal[m];
-                    modal.coordinate = coordinates.len();
-                    let link = self.frames.iter().find(|f| f.body == i && f.X_BF == Pose::identity());
-                    let name = link.map_or_else(String::new, |f| f.name.clone());
-                    coordinates.extend((0..modal.n).map(|component| Coordinate {
-                        joint: name.clone(),
-                        component,
-                        body: i,
-                        limits: Limits::NONE,
-                        kind: "modal",
-                    }));
-                    let (coordinate, size) = (modal.coordinate, modal.n);
-                    elastic.push(ElasticGroup { name, body: i, coordinate, size, modal: true });
-                }
-            }
-        }
+        let Numbering { coordinates, elastic, n_actuated } = self.number();
         if coordinates.len() > MOST_COORDINATES {
             return Err(ModelError::TooManyCoordinates { found: coordinates.len() });
         }
-        for body in &mut self.bodies {
-            if let JointMotion::Interface { modal, .. } = body.motion {
-                body.coordinate = self.modal[modal].coordinate;
-            }
-        }
-        for follower in &self.followers {
-            let leader = coordinates[..n_actuated].iter().position(|c| c.joint == follower.leader);
-            let is_elastic = self.bodies[follower.body].elastic;
-            match leader {
-                Some(index) if !is_elastic => self.bodies[follower.body].coordinate = index,
-                _ => {
-                    let (joint, leader) = (follower.joint.clone(), follower.leader.clone());
-                    return Err(ModelError::BadMimic { joint, leader });
-                }
-            }
-        }
-        for i in (0..self.bodies.len()).rev() {
-            let end = self.bodies[i].subtree_end.max(i + 1);
-            self.bodies[i].subtree_end = end;
-            let parent = self.bodies[i].parent;
-            self.bodies[parent].subtree_end = self.bodies[parent].subtree_end.max(end);
-        }
+        self.share(&coordinates[..n_actuated])?;
+        self.close_subtrees();
         let with_rotor = self.bodies[1..].iter().filter(|b| b.armature != 0.0);
         let rotors = with_rotor.map(|b| (b.coordinate, b.ratio * b.ratio * b.armature)).collect();
         let frame_by_name = self.frames.iter().enumerate().map(|(i, f)| (f.name.clone(), i)).collect();
@@ -650,6 +561,101 @@ impl<'a> Builder<'a> {
             rotors,
             gravity: self.mechanism.gravity,
         })
+    }
+
+    /// Coordinates of the joints that have some of their own, and of the modal bodies: actuated ones first.
+    fn number(&mut self) -> Numbering {
+        let mut to = Numbering { coordinates: Vec::new(), elastic: Vec::new(), n_actuated: 0 };
+        let joints: HashMap<&str, &Joint> = self.children.values().flatten().map(|j| (j.name.as_str(), *j)).collect();
+        for elastic_pass in [false, true] {
+            for i in 0..self.bodies.len() {
+                let body = &self.bodies[i];
+                let none = matches!(body.motion, JointMotion::Interface { .. } | JointMotion::Welded);
+                let follows = self.followers.iter().any(|f| f.body == i);
+                let own = body.elastic == elastic_pass && !none && !follows;
+                if let Some(joint) = joints.get(body.joint.as_str()).filter(|_| own) {
+                    self.bodies[i].coordinate = to.joint(joint, i, elastic_pass);
+                }
+                if elastic_pass && let Some(m) = self.bodies[i].modal {
+                    let link = self.frames.iter().find(|f| f.body == i && f.X_BF == Pose::identity());
+                    let name = link.map_or_else(String::new, |f| f.name.clone());
+                    self.modal[m].coordinate = to.modal(name, i, self.modal[m].n);
+                }
+            }
+        }
+        to
+    }
+
+    /// Interfaces take the coordinates of their modal body, mimic joints that of their leader.
+    fn share(&mut self, actuated: &[Coordinate]) -> Result<(), ModelError> {
+        for body in &mut self.bodies {
+            if let JointMotion::Interface { modal, .. } = body.motion {
+                body.coordinate = self.modal[modal].coordinate;
+            }
+        }
+        for follower in &self.followers {
+            let leader = actuated.iter().position(|c| c.joint == follower.leader);
+            let is_elastic = self.bodies[follower.body].elastic;
+            match leader {
+                Some(index) if !is_elastic => self.bodies[follower.body].coordinate = index,
+                _ => {
+                    let (joint, leader) = (follower.joint.clone(), follower.leader.clone());
+                    return Err(ModelError::BadMimic { joint, leader });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Where the subtree of each body ends.
+    fn close_subtrees(&mut self) {
+        for i in (0..self.bodies.len()).rev() {
+            let end = self.bodies[i].subtree_end.max(i + 1);
+            self.bodies[i].subtree_end = end;
+            let parent = self.bodies[i].parent;
+            self.bodies[parent].subtree_end = self.bodies[parent].subtree_end.max(end);
+        }
+    }
+}
+
+/// Coordinates as they are numbered.
+struct Numbering {
+    coordinates: Vec<Coordinate>,
+    elastic: Vec<ElasticGroup>,
+    n_actuated: usize,
+}
+
+impl Numbering {
+    /// Adds the coordinates of the joint that moves that body; returns the first.
+    fn joint(&mut self, joint: &Joint, body: usize, elastic: bool) -> usize {
+        let (coordinate, size) = (self.coordinates.len(), joint.kind.degrees_of_freedom());
+        self.coordinates.extend((0..size).map(|component| Coordinate {
+            joint: joint.name.clone(),
+            component,
+            body,
+            limits: joint.limits,
+            kind: joint.kind.name(),
+        }));
+        if elastic {
+            self.elastic.push(ElasticGroup { name: joint.name.clone(), body, coordinate, size, modal: false });
+        } else {
+            self.n_actuated += size;
+        }
+        coordinate
+    }
+
+    /// Adds the coordinates of a modal body, by the name of its link; returns the first.
+    fn modal(&mut self, name: String, body: usize, size: usize) -> usize {
+        let coordinate = self.coordinates.len();
+        self.coordinates.extend((0..size).map(|component| Coordinate {
+            joint: name.clone(),
+            component,
+            body,
+            limits: Limits::NONE,
+            kind: "modal",
+        }));
+        self.elastic.push(ElasticGroup { name, body, coordinate, size, modal: true });
+        coordinate
     }
 }
 

@@ -7,7 +7,7 @@
 
 use std::sync::Arc;
 
-use flexarm_kinematics::{Data, JointMotion, Model, SpatialInertia, State, Wrench, mass_matrix};
+use flexarm_kinematics::{AxisMotion, Data, JointMotion, Model, SpatialInertia, State, Wrench, mass_matrix};
 use nalgebra::{DMatrix, DVector, Matrix6};
 
 use crate::drive::{Friction, ServoAxis, TorqueCurve};
@@ -366,11 +366,10 @@ impl FlexibleArm {
         self.friction.get(coordinate).map_or(0.0, |f| f.torque(rate))
     }
 
-    /// Whether a one-DoF spring turns (or slides) about that axis, for the rows of SPOOK.
-    pub(crate) fn single_axis(&self, body: usize) -> Option<(bool, nalgebra::Vector3<f64>)> {
+    /// Motion of a spring of one coordinate, for the rows of SPOOK.
+    pub(crate) fn single_axis(&self, body: usize) -> Option<AxisMotion> {
         match self.model.bodies()[body].motion {
-            JointMotion::Revolute(axis) => Some((true, axis)),
-            JointMotion::Prismatic(axis) => Some((false, axis)),
+            JointMotion::Axis(motion) => Some(motion),
             _ => None,
         }
     }

@@ -1,70 +1,159 @@
-//! Section and material of a `beam = { ... }` entry.
+//! A `beam = { ... }` entry: its keys, and the section and material that they make.
+//!
+//! Which lengths a shape takes is said once, in [`Section::SHAPES`].
 
 use flexarm_fem::{Bar, Material, Section};
+use serde::Deserialize;
 
-use crate::robot_file::{BeamEntry, MaterialEntry};
+use crate::robot_file::MaterialEntry;
+
+/// A closed-form beam from the link's frame to the distal joint.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BeamEntry {
+    /// box, rectangle, tube, circle, i_beam, channel or given.
+    pub section: String,
+    /// Along section axis y (m).
+    pub width: Option<f64>,
+    /// Along section axis z (m).
+    pub height: Option<f64>,
+    /// Thickness (m).
+    pub wall: Option<f64>,
+    /// Of tubes (m).
+    pub outer_diameter: Option<f64>,
+    /// Of circles (m).
+    pub diameter: Option<f64>,
+    /// Thickness of the web of I-beams and channels (m).
+    pub web: Option<f64>,
+    /// Thickness of their flanges (m).
+    pub flange: Option<f64>,
+    /// Radius between both (m); 0 if not given.
+    pub fillet: Option<f64>,
+    /// Stretching stiffness (N).
+    #[serde(rename = "EA")]
+    pub ea: Option<f64>,
+    /// Bending stiffness about y (N m²).
+    #[serde(rename = "EI_y")]
+    pub ei_y: Option<f64>,
+    /// Bending stiffness about z (N m²).
+    #[serde(rename = "EI_z")]
+    pub ei_z: Option<f64>,
+    /// Torsional stiffness (N m²).
+    #[serde(rename = "GJ")]
+    pub gj: Option<f64>,
+    /// Shear stiffness along y (N).
+    #[serde(rename = "kGA_y")]
+    pub kga_y: Option<f64>,
+    /// Shear stiffness along z (N).
+    #[serde(rename = "kGA_z")]
+    pub kga_z: Option<f64>,
+    /// For given sections (kg/m).
+    pub mass_per_length: Option<f64>,
+    /// Rotary inertia about y, `rho I_y`, for given sections (kg m).
+    pub rotary_y: Option<f64>,
+    /// Rotary inertia about z, for given sections (kg m).
+    pub rotary_z: Option<f64>,
+    /// A name or elastic constants.
+    pub material: Option<MaterialEntry>,
+    /// euler-bernoulli or timoshenko.
+    pub theory: Option<String>,
+    /// Direction of the section's y axis in link axes; chosen if not given.
+    pub y_axis: Option<[f64; 3]>,
+    /// Turn of the section about the beam (rad).
+    #[serde(default)]
+    pub roll: f64,
+    /// From the line A-B to the beam, link axes (m).
+    #[serde(default)]
+    pub offset: [f64; 3],
+    /// Where the link is split, as a fraction of A-B.
+    #[serde(default = "half")]
+    pub split: f64,
+    /// from-link or uniform.
+    pub parts: Option<String>,
+}
+
+fn half() -> f64 {
+    0.5
+}
+
+/// The section by its stiffness instead of a shape.
+const GIVEN: &str = "given";
+const GIVEN_KEYS: &[&str] = &["EA", "EI_y", "EI_z", "GJ", "kGA_y", "kGA_z", "mass_per_length", "rotary_y", "rotary_z"];
+
+impl BeamEntry {
+    /// Every number that describes a section, by its key.
+    fn section_numbers(&self) -> [(&'static str, Option<f64>); 17] {
+        [
+            ("width", self.width),
+            ("height", self.height),
+            ("wall", self.wall),
+            ("outer_diameter", self.outer_diameter),
+            ("diameter", self.diameter),
+            ("web", self.web),
+            ("flange", self.flange),
+            ("fillet", self.fillet),
+            ("EA", self.ea),
+            ("EI_y", self.ei_y),
+            ("EI_z", self.ei_z),
+            ("GJ", self.gj),
+            ("kGA_y", self.kga_y),
+            ("kGA_z", self.kga_z),
+            ("mass_per_length", self.mass_per_length),
+            ("rotary_y", self.rotary_y),
+            ("rotary_z", self.rotary_z),
+        ]
+    }
+
+    fn number(&self, key: &str) -> Option<f64> {
+        self.section_numbers().into_iter().find(|(name, _)| *name == key).and_then(|(_, value)| value)
+    }
+
+    fn needed(&self, key: &str) -> Result<f64, String> {
+        self.number(key).ok_or_else(|| format!("section {:?} needs {key}", self.section))
+    }
+}
 
 /// Section and material; messages say which key is missing or too much.
 pub(crate) fn beam_section(beam: &BeamEntry) -> Result<(Section, Material), String> {
-    let given = beam.section == "given";
     let material = match &beam.material {
         Some(MaterialEntry::Named(name)) => Material::named(name).map_err(|e| e.to_string())?,
         Some(MaterialEntry::Given(m)) => Material::isotropic(m.young, m.nu, m.rho),
         // A given section carries its own stiffness.
-        None if given => Material::STEEL,
+        None if beam.section == GIVEN => Material::STEEL,
         None => return Err("material is missing: a name such as \"steel\" or { E = ..., nu = ..., rho = ... }".into()),
     };
-    let need = |value: Option<f64>, key: &str| value.ok_or_else(|| format!("section {:?} needs {key}", beam.section));
-    let section = match beam.section.as_str() {
-        "box" => Section::Box {
-            width: need(beam.width, "width")?,
-            height: need(beam.height, "height")?,
-            wall: need(beam.wall, "wall")?,
-        },
-        "rectangle" => Section::Rectangle { width: need(beam.width, "width")?, height: need(beam.height, "height")? },
-        "tube" => Section::Tube {
-            outer_diameter: need(beam.outer_diameter, "outer_diameter")?,
-            wall: need(beam.wall, "wall")?,
-        },
-        "circle" => Section::Circle { diameter: need(beam.diameter, "diameter")? },
-        "given" => Section::Given(Bar {
-            EA: need(beam.ea, "EA")?,
-            EI_y: need(beam.ei_y, "EI_y")?,
-            EI_z: need(beam.ei_z, "EI_z")?,
-            GJ: need(beam.gj, "GJ")?,
-            kGA_y: beam.kga_y,
-            kGA_z: beam.kga_z,
-            mass_per_length: need(beam.mass_per_length, "mass_per_length")?,
-            rotary_y: need(beam.rotary_y, "rotary_y")?,
-            rotary_z: need(beam.rotary_z, "rotary_z")?,
-        }),
-        other => return Err(format!("section {other:?} is not known; use box, rectangle, tube, circle or given")),
-    };
-    let used: &[&str] = match beam.section.as_str() {
-        "box" => &["width", "height", "wall"],
-        "rectangle" => &["width", "height"],
-        "tube" => &["outer_diameter", "wall"],
-        "circle" => &["diameter"],
-        _ => &["EA", "EI_y", "EI_z", "GJ", "kGA_y", "kGA_z", "mass_per_length", "rotary_y", "rotary_z"],
-    };
-    let present = [
-        ("width", beam.width),
-        ("height", beam.height),
-        ("wall", beam.wall),
-        ("outer_diameter", beam.outer_diameter),
-        ("diameter", beam.diameter),
-        ("EA", beam.ea),
-        ("EI_y", beam.ei_y),
-        ("EI_z", beam.ei_z),
-        ("GJ", beam.gj),
-        ("kGA_y", beam.kga_y),
-        ("kGA_z", beam.kga_z),
-        ("mass_per_length", beam.mass_per_length),
-        ("rotary_y", beam.rotary_y),
-        ("rotary_z", beam.rotary_z),
-    ];
-    if let Some((key, _)) = present.iter().find(|(key, value)| value.is_some() && !used.contains(key)) {
+    let (section, used) = section(beam)?;
+    if let Some((key, _)) = beam.section_numbers().iter().find(|(key, value)| value.is_some() && !used.contains(key)) {
         return Err(format!("section {:?} does not take {key}; it takes {used:?}", beam.section));
     }
     Ok((section, material))
+}
+
+/// The section and the keys that it takes.
+fn section(beam: &BeamEntry) -> Result<(Section, &'static [&'static str]), String> {
+    if beam.section == GIVEN {
+        let bar = Bar {
+            EA: beam.needed("EA")?,
+            EI_y: beam.needed("EI_y")?,
+            EI_z: beam.needed("EI_z")?,
+            GJ: beam.needed("GJ")?,
+            kGA_y: beam.kga_y,
+            kGA_z: beam.kga_z,
+            mass_per_length: beam.needed("mass_per_length")?,
+            rotary_y: beam.needed("rotary_y")?,
+            rotary_z: beam.needed("rotary_z")?,
+        };
+        return Ok((Section::Given(bar), GIVEN_KEYS));
+    }
+    let length = |key: &str, default: Option<f64>| {
+        default.map_or_else(|| beam.needed(key), |d| Ok(beam.number(key).unwrap_or(d)))
+    };
+    let shape = Section::SHAPES.iter().find(|(word, _)| *word == beam.section);
+    match (Section::from_lengths(&beam.section, length)?, shape) {
+        (Some(section), Some((_, keys))) => Ok((section, keys)),
+        _ => {
+            let words: Vec<&str> = Section::SHAPES.iter().map(|(word, _)| *word).collect();
+            Err(format!("section {:?} is not known; use {} or {GIVEN}", beam.section, words.join(", ")))
+        }
+    }
 }

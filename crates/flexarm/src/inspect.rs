@@ -187,13 +187,13 @@ pub fn inspect(robot: &Robot, at: Option<&[f64]>, velocity: Option<&[f64]>) -> R
     let forms = forms.collect::<Result<Vec<_>, _>>()?;
     let flexible_links = flexible.spans.iter().zip(&robot.flexible).zip(&forms).map(|((span, link), form)| {
         let K = link.flexible.reduced.split.K_S;
-        let (model, coordinates, modal_frequencies_hz) = match form {
-            LinkForm::TwoParts => ("lumped", 6, None),
-            LinkForm::Chain(chain) => ("lumped", 6 * chain.joints.len(), None),
-            LinkForm::Modal(modal) => ("modal", modal.coordinates(), Some(modal.held_frequencies_hz())),
+        let (coordinates, modal_frequencies_hz) = match form {
+            LinkForm::TwoParts => (6, None),
+            LinkForm::Chain(chain) => (6 * chain.joints.len(), None),
+            LinkForm::Modal(modal) => (modal.coordinates(), Some(modal.held_frequencies_hz())),
         };
         FlexibleInfo {
-            model,
+            model: form.name(),
             coordinates,
             modal_frequencies_hz,
             name: span.link.clone(),

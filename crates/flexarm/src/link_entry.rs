@@ -26,13 +26,15 @@ pub(crate) fn flexible_link(
 ) -> Result<RobotLink, Error> {
     let name = entry.link.get_ref();
     let at = |span: std::ops::Range<usize>, message: String| source.error(span, message);
-    let model = match entry.model.as_ref().map(|m| m.get_ref().as_str()) {
-        None | Some("lumped") => LinkModel::Lumped,
-        Some("modal") => LinkModel::Modal,
-        Some(other) => {
-            let message = format!("model {other:?} is not known; use \"lumped\" or \"modal\"");
-            return Err(at(entry.model.as_ref().map_or(0..0, Spanned::span), message).into());
-        }
+    let model = match &entry.model {
+        None => LinkModel::Lumped,
+        Some(word) => match LinkModel::from_word(word.get_ref()) {
+            Some(model @ (LinkModel::Lumped | LinkModel::Modal)) => model,
+            _ => {
+                let message = format!("model {:?} is not known; use \"lumped\" or \"modal\"", word.get_ref());
+                return Err(at(word.span(), message).into());
+            }
+        },
     };
     let count = |value: &Option<Spanned<i64>>, what: &str, lowest: i64| match value {
         None => Ok(None),

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use flexarm_log::RecordingFormat;
 use flexarm_stepping::StepperKind;
 
-/// How links are modelled.
+/// How links are modelled: what is asked for. What a link then becomes on the tree is a [`flexarm_flexlink::LinkForm`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum LinkModel {
     /// As the robot file says.
@@ -18,6 +18,25 @@ pub enum LinkModel {
     Lumped,
     /// Flexible links as bodies that bend in modes.
     Modal,
+}
+
+impl LinkModel {
+    /// What can be asked for: the word of robot files, command line and recordings, and what it means.
+    pub const WORDS: [(&'static str, Self, &'static str); 3] = [
+        ("rigid", Self::Rigid, "No link bends"),
+        ("lumped", Self::Lumped, "Rigid parts with coupled 6x6 springs"),
+        ("modal", Self::Modal, "Bodies that bend in modes (floating frame, Craig-Bampton)"),
+    ];
+
+    /// The model of that word.
+    pub fn from_word(word: &str) -> Option<Self> {
+        Self::WORDS.iter().find(|(known, ..)| *known == word).map(|(_, model, _)| *model)
+    }
+
+    /// Its word; none where the robot file decides.
+    pub fn word(self) -> Option<&'static str> {
+        Self::WORDS.iter().find(|(_, model, _)| *model == self).map(|(word, ..)| *word)
+    }
 }
 
 /// How drives are modelled.
@@ -32,6 +51,20 @@ pub enum DriveModel {
     Elastic,
     /// All joints by torque under servos, gearboxes give way.
     Servo,
+}
+
+impl DriveModel {
+    /// What can be asked for: the word of command line and recordings, and what it means.
+    pub const WORDS: [(&'static str, Self, &'static str); 3] = [
+        ("rigid", Self::Rigid, "Every joint exactly along the trajectory, no springs"),
+        ("elastic", Self::Elastic, "Gearboxes give way, motors exactly along the trajectory"),
+        ("servo", Self::Servo, "Motors by torque under servos"),
+    ];
+
+    /// Its word; none where the robot file decides.
+    pub fn word(self) -> Option<&'static str> {
+        Self::WORDS.iter().find(|(_, model, _)| *model == self).map(|(word, ..)| *word)
+    }
 }
 
 /// How links and drives are modelled, where that differs from the robot file.

@@ -9,7 +9,7 @@ use flexarm_urdf::Geometry;
 
 use crate::error::{Error, RecordingError};
 use crate::motion::Motion;
-use crate::options::{DriveModel, LinkModel, Outputs, RunOptions};
+use crate::options::{Outputs, RunOptions};
 use crate::result_files::Undo;
 use crate::robot::Robot;
 use crate::scenario::Scenario;
@@ -233,18 +233,8 @@ fn metadata(
         ("trajectory_file", straight(&motion.path)),
     ];
     inputs.extend(scenario.loads_file.as_ref().map(|path| ("loads_file", straight(path))));
-    let drives = match options.modelling.drives {
-        DriveModel::AsFiled => AS_FILED,
-        DriveModel::Rigid => "rigid",
-        DriveModel::Elastic => "elastic",
-        DriveModel::Servo => "servo",
-    };
-    let links_choice = match options.modelling.links {
-        LinkModel::AsFiled => AS_FILED,
-        LinkModel::Rigid => "rigid",
-        LinkModel::Lumped => "lumped",
-        LinkModel::Modal => "modal",
-    };
+    let drives = options.modelling.drives.word().unwrap_or(AS_FILED);
+    let links_choice = options.modelling.links.word().unwrap_or(AS_FILED);
     vec![
         group(
             "flexarm.run",

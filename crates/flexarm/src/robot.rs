@@ -141,6 +141,9 @@ impl Robot {
             rigid.gravity = (*gravity.get_ref()).into();
             keep(check_finite("gravity", gravity.get_ref(), gravity.span(), &source).map_err(Error::from), &mut faults);
         }
+        for (joint, lead) in &file.lead {
+            keep(make_helical(&mut rigid, joint, lead, &source).map_err(Error::from), &mut faults);
+        }
         let tcp = keep(tcp_of(&file, &source, &urdf, options), &mut faults);
         // `robot.toml`, `.` and links to folders have no name to be read off the path.
         let real_folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
@@ -318,6 +321,27 @@ fn inertia_estimate(file: &RobotFile, source: &Source) -> Result<Option<InertiaE
         (None, Some(mass)) => positive("inertia_from_total_mass", mass).map(InertiaEstimate::TotalMass).map(Some),
         (None, None) => Ok(None),
     }
+}
+
+/// Lets a joint that turns slide along its axis, `lead` (m) in a turn.
+fn make_helical(
+    mechanism: &mut Mechanism,
+    name: &str,
+    lead: &Spanned<f64>,
+    source: &Source,
+) -> Result<(), RobotFileError> {
+    let fail = |message: String| source.error(lead.span(), format!("lead of joint {name:?}: {message}"));
+    let turning: Vec<String> = mechanism.joints.iter().filter(|j| j.kind.turns()).map(|j| j.name.clone()).collect();
+    let joint = mechanism.joints.iter_mut().find(|j| j.name == name && j.kind.turns());
+    let joint = joint.ok_or_else(|| fail(format!("the robot has no such joint that turns; it has {turning:?}")))?;
+    let lead = *lead.get_ref();
+    if !lead.is_finite() || lead == 0.0 {
+        return Err(fail(format!("is {lead}, expected metres per turn: 0.02 for 20 mm")));
+    }
+    if let JointKind::Revolute(axis) | JointKind::Continuous(axis) = joint.kind {
+        joint.kind = JointKind::Helical { axis, pitch: lead / std::f64::consts::TAU };
+    }
+    Ok(())
 }
 
 /// An entry of `[hold]`: a joint that moves by itself, within its limits.

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use toml::Spanned;
 
+pub use crate::beam_entry::BeamEntry;
 use crate::drive_entry::DriveEntry;
 
 /// The file as written.
@@ -43,6 +44,9 @@ pub struct RobotFile {
     /// Where joints stay that a motion does not name (rad or m).
     #[serde(default)]
     pub hold: std::collections::BTreeMap<String, Spanned<f64>>,
+    /// Joints that slide as they turn: how far in a turn (m), right-handed threads positive.
+    #[serde(default)]
+    pub lead: std::collections::BTreeMap<String, Spanned<f64>>,
     /// Links that bend.
     #[serde(default)]
     pub flexible_link: Vec<FlexibleLinkEntry>,
@@ -125,69 +129,6 @@ pub struct DampingEntry {
     pub stiffness_beta: Option<f64>,
     /// `D = a M + b K` (1/s, s).
     pub rayleigh: Option<[f64; 2]>,
-}
-
-/// A closed-form beam from the link's frame to the distal joint.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct BeamEntry {
-    /// box, rectangle, tube, circle or given.
-    pub section: String,
-    /// Along section axis y (m).
-    pub width: Option<f64>,
-    /// Along section axis z (m).
-    pub height: Option<f64>,
-    /// Thickness (m).
-    pub wall: Option<f64>,
-    /// Of tubes (m).
-    pub outer_diameter: Option<f64>,
-    /// Of circles (m).
-    pub diameter: Option<f64>,
-    /// Stretching stiffness (N).
-    #[serde(rename = "EA")]
-    pub ea: Option<f64>,
-    /// Bending stiffness about y (N m²).
-    #[serde(rename = "EI_y")]
-    pub ei_y: Option<f64>,
-    /// Bending stiffness about z (N m²).
-    #[serde(rename = "EI_z")]
-    pub ei_z: Option<f64>,
-    /// Torsional stiffness (N m²).
-    #[serde(rename = "GJ")]
-    pub gj: Option<f64>,
-    /// Shear stiffness along y (N).
-    #[serde(rename = "kGA_y")]
-    pub kga_y: Option<f64>,
-    /// Shear stiffness along z (N).
-    #[serde(rename = "kGA_z")]
-    pub kga_z: Option<f64>,
-    /// For given sections (kg/m).
-    pub mass_per_length: Option<f64>,
-    /// Rotary inertia about y, `rho I_y`, for given sections (kg m).
-    pub rotary_y: Option<f64>,
-    /// Rotary inertia about z, for given sections (kg m).
-    pub rotary_z: Option<f64>,
-    /// A name or elastic constants.
-    pub material: Option<MaterialEntry>,
-    /// euler-bernoulli or timoshenko.
-    pub theory: Option<String>,
-    /// Direction of the section's y axis in link axes; chosen if not given.
-    pub y_axis: Option<[f64; 3]>,
-    /// Turn of the section about the beam (rad).
-    #[serde(default)]
-    pub roll: f64,
-    /// From the line A-B to the beam, link axes (m).
-    #[serde(default)]
-    pub offset: [f64; 3],
-    /// Where the link is split, as a fraction of A-B.
-    #[serde(default = "half")]
-    pub split: f64,
-    /// from-link or uniform.
-    pub parts: Option<String>,
-}
-
-fn half() -> f64 {
-    0.5
 }
 
 /// Name of a preset, or constants.

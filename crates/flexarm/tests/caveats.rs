@@ -189,6 +189,17 @@ fn material(text: &'static str) -> Change {
     })
 }
 
+/// Channels across their webs instead of boxes and tubes.
+fn channels() -> Change {
+    let channel = "{ section = \"channel\", width = 0.1, height = 0.2, web = 0.01, flange = 0.01, material = \"steel\", \
+                   parts = \"uniform\" }";
+    let new = set("flexible_link.*.beam", channel);
+    Box::new(move |texts| {
+        let shaped = |link: &Value| link.get("beam").is_some_and(|b| b.get("wall").is_some());
+        links(texts).iter().any(shaped) && new(texts)
+    })
+}
+
 fn links(texts: &Texts) -> Vec<Value> {
     texts.robot.get("flexible_link").and_then(Value::as_array).cloned().unwrap_or_default()
 }
@@ -287,6 +298,7 @@ fn slips() -> Vec<(&'static str, Change, &'static [&'static str])> {
         ("damping of 30 per cent", set("flexible_link.*.damping", "{ modal = 0.3 }"), &["damping-ratio"]),
         ("stiffness_beta of 1e3", set("flexible_link.*.damping", "{ stiffness_beta = 1e3 }"), &["creep"]),
         ("Rayleigh damping of 1e4", set("flexible_link.*.damping", "{ rayleigh = [1e4, 1e-4] }"), &["damped-mode"]),
+        ("channels that bend across their webs", channels(), &["shear-centre"]),
         ("roll in degrees", set("flexible_link.*.beam.roll", "90.0"), &["angle"]),
         ("gears in N m/deg", key("drive.*.gearbox.stiffness", 1.0 / deg), soft),
         ("gears in kN m/rad", key("drive.*.gearbox.stiffness", 1e-3), soft),

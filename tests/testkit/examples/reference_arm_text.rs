@@ -19,8 +19,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         println!("model {name}");
         for body in &model.bodies()[1..] {
             let (kind, axis) = match body.motion {
-                JointMotion::Revolute(axis) => ("revolute", axis),
-                JointMotion::Prismatic(axis) => ("prismatic", axis),
+                JointMotion::Axis(motion) if motion.slides() => ("prismatic", motion.axis()),
+                JointMotion::Axis(motion) => ("revolute", motion.axis()),
                 JointMotion::Elastic(_) => ("elastic", nalgebra::Vector3::zeros()),
                 JointMotion::Welded => ("fixed", nalgebra::Vector3::zeros()),
                 JointMotion::Interface { .. } => ("interface", nalgebra::Vector3::zeros()),

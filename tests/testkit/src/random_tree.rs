@@ -65,11 +65,12 @@ pub fn random_tree(seed: u64, n_joints: usize) -> Mechanism {
         // Mostly chains, some branches.
         let parent = if draw.signed() > -0.6 { tree.links.len() - 1 } else { draw.index(tree.links.len()) };
         let axis = Unit::new_normalize(draw.vector(1.0) + Vector3::new(0.01, 0.02, 1.5 * draw.signed()));
-        let kind = match draw.index(6) {
+        let kind = match draw.index(7) {
             0 => JointKind::Prismatic(axis),
             1 => JointKind::Elastic(ElasticAngles::RotationVector),
             2 => JointKind::Elastic(ElasticAngles::EulerZyx),
             3 => JointKind::Continuous(axis),
+            4 => JointKind::Helical { axis, pitch: 0.2 * draw.signed() },
             _ => JointKind::Revolute(axis),
         };
         let (name, parent) = (format!("link_{i}"), tree.links[parent].name.clone());
@@ -147,7 +148,12 @@ pub fn random_flexible_tree(seed: u64, n_joints: usize) -> Mechanism {
         match joint.kind {
             JointKind::Revolute(axis) if draw.signed() > 0.6 => joint.kind = JointKind::ElasticRevolute(axis),
             JointKind::Prismatic(axis) if draw.signed() > 0.6 => joint.kind = JointKind::ElasticPrismatic(axis),
-            JointKind::Revolute(_) | JointKind::Prismatic(_) => joint.armature = draw.between(-1.0, 2.0).max(0.0),
+            JointKind::Helical { axis, pitch } if draw.signed() > 0.6 => {
+                joint.kind = JointKind::ElasticHelical { axis, pitch };
+            }
+            JointKind::Revolute(_) | JointKind::Prismatic(_) | JointKind::Helical { .. } => {
+                joint.armature = draw.between(-1.0, 2.0).max(0.0)
+            }
             _ => {}
         }
     }

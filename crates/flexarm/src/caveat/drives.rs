@@ -3,7 +3,7 @@
 use std::ops::RangeInclusive;
 
 use flexarm_flexlink::GearStiffness;
-use flexarm_kinematics::{JointKind, Mechanism, Model};
+use flexarm_kinematics::{Mechanism, Model};
 
 use super::links::CREEP;
 use super::size::Loads;
@@ -48,7 +48,7 @@ pub(crate) fn of_drives(drives: &[Drive], mechanism: &Mechanism, rigid: &Model) 
     let heaviest = heaviest.map(|(inertia, c)| inertia - armature(&c.joint)).fold(0.0, f64::max);
     for drive in drives {
         let joint = mechanism.joints.iter().find(|j| j.name == drive.joint);
-        let slides = joint.is_some_and(|j| matches!(j.kind, JointKind::Prismatic(_)));
+        let slides = joint.is_some_and(|j| j.kind.slides());
         let effort = joint.map_or(f64::INFINITY, |j| j.limits.effort);
         let speed = joint.map_or(f64::INFINITY, |j| j.limits.velocity);
         caveats.extend(motor(drive, heaviest));

@@ -228,6 +228,14 @@ pub const TORSION: CaveatKind = CaveatKind::warning(
     "",
     "GJ and EI are in N m2",
 );
+/// Channels, which bend and twist about different lines.
+pub const SHEAR_CENTRE: CaveatKind = CaveatKind::warning(
+    "shear-centre",
+    "the shear centre of {where} lies {value} m beside its centroid: a side force through the centroid would twist it by more than \
+     1 % of its bending ({yardstick} m would), which its beam leaves out",
+    "m",
+    "beams bend and twist about the centroid: reduce a mesh of the link, or bend the section in the plane of its flanges only",
+);
 /// Mass of the link against that of the beam.
 pub const BEAM_MASS: CaveatKind = CaveatKind::warning(
     "beam-mass",

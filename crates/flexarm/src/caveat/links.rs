@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use flexarm_fem::{BeamLink, Material, Section};
+use flexarm_fem::{Bar, BeamLink, Material, Section};
 use flexarm_stepping::Damping;
 
 use super::slip::{self, slip};
@@ -21,6 +21,8 @@ const THICK: f64 = 3.0;
 const SLENDER: RangeInclusive<f64> = 5e-4..=1.0;
 /// Torsional over bending stiffness.
 const TORSION: RangeInclusive<f64> = 1e-3..=1e3;
+/// What an eccentric shear centre may add to the bending of a tip.
+const TWIST: f64 = 0.01;
 /// Mass of the link over that of its section.
 const MASS: RangeInclusive<f64> = 0.02..=50.0;
 /// Damping ratios of joined structures are at most this.
@@ -65,11 +67,7 @@ fn outside(
 fn section(name: &str, beam: &BeamLink) -> Vec<Caveat> {
     let mut caveats = Vec::new();
     let length = beam.length;
-    let thick = match beam.section {
-        Section::Box { width, height, .. } | Section::Rectangle { width, height } => width.max(height),
-        Section::Tube { outer_diameter: d, .. } | Section::Circle { diameter: d } => d,
-        Section::Given(_) => 0.0,
-    };
+    let thick = beam.section.largest_size().unwrap_or(0.0);
     if thick > THICK * length {
         let likely = slip(thick, &(0.0..=length), slip::LENGTH, 1.0);
         caveats.push(kinds::SECTION.found(name, thick, length).likely(likely));
@@ -85,6 +83,7 @@ fn section(name: &str, beam: &BeamLink) -> Vec<Caveat> {
         caveats.extend((!range.contains(&radius)).then(|| caveat.likely(slip(radius, &range, factors, 0.5))));
         caveats.extend(outside(&kinds::TORSION, name, bar.GJ / bending, &TORSION, &[]));
     }
+    caveats.extend(shear_centre(name, beam, &bar));
     let own = bar.mass_per_length * length;
     if let Some(mass) = beam.mass.filter(|m| *m > 0.0 && RHO.contains(&beam.material.rho))
         && !MASS.contains(&(mass / own))
@@ -93,6 +92,17 @@ fn section(name: &str, beam: &BeamLink) -> Vec<Caveat> {
         caveats.push(kinds::BEAM_MASS.found(name, mass, own).likely(likely));
     }
     caveats
+}
+
+/// Where the shear centre is not the centroid: the twist that a force at the tip would add there, against its bending.
+///
+/// ```text
+/// F e² l/GJ < 0.01 F l³/(3 EI_y)      e_max = l √(0.01 GJ/(3 EI_y))
+/// ```
+fn shear_centre(name: &str, beam: &BeamLink, bar: &Bar) -> Option<Caveat> {
+    let e = beam.section.properties(beam.material.nu).ok()?.shear_centre_y.abs();
+    let most = beam.length * (TWIST * bar.GJ / (3.0 * bar.EI_y)).sqrt();
+    (e > most).then(|| kinds::SHEAR_CENTRE.found(name, e, most))
 }
 
 /// Damping as it is written; what it does to the first mode is looked at where the arm stands.

@@ -1,6 +1,6 @@
 //! What the files say of tool, payload, gravity, masses and limits, against the size of the robot itself.
 
-use flexarm_kinematics::{Joint, JointKind, Link, LinkInertia, Mechanism, Model};
+use flexarm_kinematics::{Joint, Link, LinkInertia, Mechanism, Model};
 use nalgebra::Vector3;
 
 use super::size::{Loads, Size, gyration, least_density};
@@ -173,8 +173,7 @@ pub(crate) fn payload(what: &str, inertia: &LinkInertia, size: &Size, weighs: bo
 
 /// Speeds and ranges that look like degrees.
 fn joint_limits(mechanism: &Mechanism, size: &Size) -> Vec<Caveat> {
-    let turning = |j: &&Joint| matches!(j.kind, JointKind::Revolute(_) | JointKind::Continuous(_));
-    let turning: Vec<_> = mechanism.joints.iter().filter(turning).collect();
+    let turning: Vec<&Joint> = mechanism.joints.iter().filter(|j| j.kind.turns()).collect();
     let fast = turning.iter().filter(|j| j.limits.velocity.is_finite() && j.limits.velocity > FAST.0).map(|joint| {
         let speed = joint.limits.velocity;
         let caveat = kinds::SPEED_LIMIT.found(format!("joint {:?}", joint.name), speed, FAST.0);

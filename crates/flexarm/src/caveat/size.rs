@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use flexarm_kinematics::{Data, JointKind, LinkInertia, Mechanism, Model, State, gravity_forces, mass_matrix};
+use flexarm_kinematics::{Data, LinkInertia, Mechanism, Model, State, gravity_forces, mass_matrix};
 use nalgebra::DVector;
 
 /// Poses at which torques of weight are looked at.
@@ -27,10 +27,8 @@ impl Size {
         while let Some((link, distance)) = open.pop() {
             distances.insert(link.to_owned(), distance);
             for joint in mechanism.child_joints(link) {
-                let travel = match joint.kind {
-                    JointKind::Prismatic(_) => joint.limits.lower.abs().max(joint.limits.upper.abs()),
-                    _ => 0.0,
-                };
+                let range = joint.limits.lower.abs().max(joint.limits.upper.abs());
+                let travel = range * joint.kind.travel();
                 let travel = if travel.is_finite() { travel } else { 0.0 };
                 open.push((&joint.child, distance + joint.X_PJ.translation.vector.norm() + travel));
             }

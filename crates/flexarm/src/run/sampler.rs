@@ -1,9 +1,8 @@
 //! What recordings, curves and observers are shown of an instant of a run: one [`Sample`], filled again and again.
 
-use flexarm_kinematics::{Frame, JointMotion};
+use flexarm_kinematics::{AxisMotion, Frame, JointMotion};
 use flexarm_log::{ElasticSample, EnergySample, Sample};
 use flexarm_stepping::{FlexibleArm, Observation};
-use nalgebra::Vector3;
 
 use crate::flexible::{FlexibleRobot, Owner};
 use crate::monitor::tool::ToolError;
@@ -78,8 +77,7 @@ pub(super) fn fill_elastic(sample: &mut Sample, seen: &Observation, arm: &Flexib
         let e = seen.q.rows(element.coordinate, element.size);
         let (mut deflection, mut load) = ([0.0; 6], seen.load[k].into());
         match (element.size, arm.model.bodies()[element.body].motion) {
-            (1, JointMotion::Revolute(axis)) => place(&mut deflection, &mut load, 3, &axis, e[0]),
-            (1, JointMotion::Prismatic(axis)) => place(&mut deflection, &mut load, 0, &axis, e[0]),
+            (1, JointMotion::Axis(motion)) => place(&mut deflection, &mut load, motion, e[0]),
             (n, _) => (0..n.min(6)).for_each(|c| deflection[c] = e[c]),
         }
         sample.elastic[k] = ElasticSample { deflection, load };
@@ -87,12 +85,17 @@ pub(super) fn fill_elastic(sample: &mut Sample, seen: &Observation, arm: &Flexib
 }
 
 /// Puts one deflection and its load along the axis of its joint.
-fn place(deflection: &mut [f64; 6], load: &mut [f64; 6], first: usize, axis: &Vector3<f64>, e: f64) {
-    let torque = load[0];
+fn place(deflection: &mut [f64; 6], load: &mut [f64; 6], motion: AxisMotion, e: f64) {
+    let (torque, axis, first) = (load[0], motion.axis(), if motion.slides() { 0 } else { 3 });
+    let slides_as_it_turns = !motion.slides() && motion.travel() > 0.0;
+    let S = motion.column();
     *load = [0.0; 6];
     for c in 0..3 {
         deflection[first + c] = e * axis[c];
         load[first + c] = torque * axis[c];
+        if slides_as_it_turns {
+            deflection[c] = e * S[c];
+        }
     }
 }
 
@@ -105,14 +108,14 @@ fn link_side_angles(robot: &Robot, flexible: &FlexibleRobot) -> Vec<(usize, usiz
         let actuated = &flexible.model.coordinates()[..flexible.model.n_actuated()];
         let Some(k) = actuated.iter().position(|c| c.joint == *joint) else { continue };
         let motor = &flexible.model.bodies()[actuated[k].body];
-        let (JointMotion::Revolute(axis) | JointMotion::Prismatic(axis)) = motor.motion else { continue };
-        let slides = matches!(motor.motion, JointMotion::Prismatic(_));
+        let JointMotion::Axis(motion) = motor.motion else { continue };
+        let axis = motion.axis();
         match flexible.model.bodies()[group.body].motion {
-            JointMotion::Revolute(own) | JointMotion::Prismatic(own) => {
-                angles.push((k, group.coordinate, axis.dot(&own)));
+            JointMotion::Axis(own) => {
+                angles.push((k, group.coordinate, axis.dot(&own.axis())));
             }
             _ => {
-                let first = group.coordinate + if slides { 0 } else { 3 };
+                let first = group.coordinate + if motion.slides() { 0 } else { 3 };
                 angles.extend((0..3).map(|c| (k, first + c, axis[c])));
             }
         }

@@ -24,7 +24,7 @@ mod solve;
 use flexarm_kinematics::{
     Data, ElasticAngles, JointMotion, Model, Pose, State, Twist, Wrench, forward_kinematics_velocity,
 };
-use nalgebra::{DVector, Matrix3, Matrix6, Rotation3, UnitQuaternion, Vector3, Vector6};
+use nalgebra::{DVector, Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
 use crate::arm::FlexibleArm;
 use crate::error::StepError;
@@ -226,28 +226,19 @@ fn body_state(model: &Model, data: &Data, i: usize) -> BodyState {
 
 /// Refuses what has no place in maximal coordinates here.
 fn check_known(arm: &FlexibleArm) -> Result<(), StepError> {
-    let model = &arm.model;
-    let refuse = |what: &str| {
-        let text = format!("spook works in maximal coordinates and does not know {what}: use generalized-alpha");
-        Err(StepError::Setup(text))
-    };
-    if model.has_modal() {
-        return refuse("links that bend in modes (--links lumped would do)");
+    let unknown = [
+        (!arm.torque_driven.is_empty(), "joints driven by torque"),
+        (!arm.inertia_changes.is_empty(), "payloads that change"),
+        (arm.elements.iter().any(|e| e.curve.is_some()), "springs with play or curves"),
+        (arm.model.has_mimic(), "mimic joints"),
+    ];
+    match unknown.iter().find(|(there, _)| *there) {
+        _ if arm.model.has_modal() => Err(StepError::ModalLinks),
+        None => Ok(()),
+        Some((_, what)) => Err(StepError::Setup(format!(
+            "spook works in maximal coordinates and does not know {what}: use generalized-alpha"
+        ))),
     }
-    if !arm.torque_driven.is_empty() {
-        return refuse("joints driven by torque");
-    }
-    if !arm.inertia_changes.is_empty() {
-        return refuse("payloads that change");
-    }
-    if arm.elements.iter().any(|e| e.curve.is_some()) {
-        return refuse("springs with play or curves");
-    }
-    if model.has_mimic() {
-        let text = "spook works in maximal coordinates and does not know mimic joints: use generalized-alpha";
-        return Err(StepError::Setup(text.to_owned()));
-    }
-    Ok(())
 }
 
 /// Least moment of inertia over the largest with which a body can be turned about all its axes.
@@ -280,10 +271,9 @@ fn joint_compliance(arm: &FlexibleArm, body: usize, h: f64, preset: SpookPreset)
         // One compliant row among rigid ones.
         Some(k) => {
             let mut C = Matrix6::identity() * RIGID_COMPLIANCE;
-            if let Some((turns, axis)) = arm.single_axis(body) {
-                let first = if turns { 3 } else { 0 };
-                let mut block = C.fixed_view_mut::<3, 3>(first, first);
-                block += axis * axis.transpose() * arm.elements[k].C[(0, 0)];
+            if let Some(motion) = arm.single_axis(body) {
+                let S = motion.column();
+                C += S * S.transpose() * arm.elements[k].C[(0, 0)];
             }
             (C, arm.tau[k])
         }
@@ -365,10 +355,9 @@ impl Spook {
         let body = &self.arm.model.bodies()[i];
         let element = || self.arm.elements.iter().position(|element| element.body == i);
         match body.motion {
-            JointMotion::Revolute(axis) | JointMotion::Prismatic(axis) if body.elastic => {
-                let first = if matches!(body.motion, JointMotion::Revolute(_)) { 3 } else { 0 };
+            JointMotion::Axis(motion) if body.elastic => {
                 let (g, rate) = self.deflection_now(i, Default::default());
-                let (e, rate) = (axis.dot(&g.fixed_rows::<3>(first)), axis.dot(&rate.fixed_rows::<3>(first)));
+                let (e, rate) = (motion.coordinate_of(&g), motion.coordinate_of(&rate));
                 out.q[body.coordinate] = e;
                 out.qdot[body.coordinate] = rate;
                 if let Some(k) = element() {
@@ -376,8 +365,7 @@ impl Spook {
                     out.load[k][0] = -self.arm.elements[k].K[(0, 0)] * (e + rate * self.arm.tau[k]);
                 }
             }
-            JointMotion::Revolute(axis) => out.drive[body.coordinate] = axis.dot(&force.fixed_rows::<3>(3)),
-            JointMotion::Prismatic(axis) => out.drive[body.coordinate] = axis.dot(&force.fixed_rows::<3>(0)),
+            JointMotion::Axis(motion) => out.drive[body.coordinate] = motion.project(&Wrench::from_vector(&force)),
             JointMotion::Interface { .. } | JointMotion::Welded => {}
             JointMotion::Elastic(angles) => {
                 let (g, rate) = self.deflection_now(i, angles);
@@ -471,14 +459,7 @@ impl Spook {
                 // A single spring is measured from its relaxed place.
                 _ if body.elastic => (X_WP, Default::default()),
                 JointMotion::Interface { .. } | JointMotion::Welded => (X_WP, Default::default()),
-                JointMotion::Revolute(axis) => {
-                    let turn = Rotation3::from_scaled_axis(axis * self.q[body.coordinate]);
-                    (Pose::from_parts(X_WP.translation, X_WP.rotation * turn), Default::default())
-                }
-                JointMotion::Prismatic(axis) => (
-                    X_WP * Pose::from_parts((axis * self.q[body.coordinate]).into(), Rotation3::identity()),
-                    Default::default(),
-                ),
+                JointMotion::Axis(motion) => (X_WP * motion.pose(self.q[body.coordinate]), Default::default()),
             };
             // Rigid joints have no deflection to speak of: the local form serves both.
             let elastic = matches!(body.motion, JointMotion::Elastic(_));
@@ -582,8 +563,7 @@ fn explicit_rates(
     qdot_next: &DVector<f64>,
 ) -> (Vector6<f64>, Vector6<f64>) {
     let direction = match motion {
-        JointMotion::Revolute(axis) => Vector6::new(0.0, 0.0, 0.0, -axis.x, -axis.y, -axis.z),
-        JointMotion::Prismatic(axis) => Vector6::new(-axis.x, -axis.y, -axis.z, 0.0, 0.0, 0.0),
+        JointMotion::Axis(motion) => -motion.column(),
         _ => return (Vector6::zeros(), Vector6::zeros()),
     };
     (direction * rate_of(qdot), direction * rate_of(qdot_next))
