@@ -103,8 +103,11 @@ fn a_run_that_is_asked_for_arrow_writes_it_and_a_report_is_made_of_it() {
     let summary = convert(&place, "b.feather", "b.csv");
     assert_eq!((&summary["from"], &summary["to"]), (&Value::from("arrow"), &Value::from("csv")));
     assert!(place.read("b.csv") == place.read("a.csv"));
-    place.json(&["report", "result/run.arrow", "-o", "page.html"]);
-    assert!(place.text("page.html").contains("run.arrow"));
+    // The file holds the result: the report needs no other.
+    let report = place.json(&["report", "result/run.arrow", "-o", "page.html"]);
+    assert_eq!(report["inputs"][0], "result/run.arrow");
+    assert_eq!(report["warnings"].as_array().unwrap().len(), 0);
+    assert!(place.text("page.html").contains("id=\"plots\""));
     // A later run without it leaves none behind.
     place.json(&[&run[..], &["--force"]].concat());
     assert!(!place.path("result/run.arrow").exists());
