@@ -9,7 +9,7 @@ use std::ops::ControlFlow;
 use flexarm::{Error, Modelling, Motion, Robot, RunOptions, Sample};
 
 /// The tool stands still when it is this near to where it comes to rest (m), for so long (s).
-const NEAR_M: f64 = 2e-5;
+const NEAR_M: f64 = 2e-4;
 const LONG_S: f64 = 0.25;
 
 /// Distance of the tool from where the arm would have it at rest (m): what its motion alone causes.
