@@ -41,7 +41,7 @@ EXIT = re.compile(r"\bprocess::(?:exit|abort|ExitCode)\b|\bExitCode\b|\bexit_cod
 FLAG = re.compile(r"(?<![\w-])--[a-z][a-z-]*|(?<![\w/-])-o(?![\w-])")
 FACE_WORDS = re.compile(r"\b(?:command line|exit code|terminal|stdout|stderr)\b")
 ALLOWED = {  # file: what it may have (a pattern of the hit), and why
-    "crates/flexarm-fem/src/mesh/read.rs": (r"-o", "tells how to call another program, Gmsh"),
+    "crates/flexarm-fe-io/src/mesh/read.rs": (r"-o", "tells how to call another program, Gmsh"),
     "crates/flexarm-urdf/src/resolve.rs": (r"std::env", "search_paths_from_environment, which the caller may use or not"),
     "crates/flexarm-urdf/src/xacro/substitution.rs": (r"std::env|env::var|env::current", "xacro's own $(env NAME), $(optenv NAME) and $(cwd)"),
     "crates/flexarm/src/report/html.rs": (r"--c", "a custom property of a style sheet"),
@@ -54,14 +54,18 @@ ALLOWED = {  # file: what it may have (a pattern of the hit), and why
 FILES = (r"\bstd::(?:fs|path)\b|\bPathBuf\b|\bFile::open\b", "files")
 MUST_NOT_KNOW = {  # crate: what its code must not have, and what it is; imports of other crates are the manifest's matter
     "flexarm-settings": [FILES, (r"\bflexarm_(?!settings\b)\w+", "other crates of the workspace")],
+    "flexarm-spatial": [FILES, (r"\bflexarm_(?!spatial\b)\w+", "other crates of the workspace")],
+    "flexarm-sample": [(r"\bstd::fs\b|\bFile::open\b", "files"), (r"\bflexarm_(?!sample\b|spatial\b)\w+", "how a run is made")],
     "flexarm-kinematics": [FILES, (r"\b[Ss]tiffness\b", "stiffness")],
-    "flexarm-fem": [(r"\b(?:Joint|Robot|Mechanism)\b", "joints and robots")],
+    "flexarm-fem": [(r"\b(?:Joint|Robot|Mechanism)\b", "joints and robots"), (r"\b(?:flate2|hdf5_pure)\b", "files of other programs")],
+    "flexarm-fe-io": [(r"\breduction::|\bCondensation\b|\breduce_mesh\b", "reduction"), (r"\b(?:Robot|Mechanism)\b", "robots")],
+    "flexarm-draw": [(r"\bflexarm_log\b|\bRecorder\b", "files of recordings"), (r"\bflexarm_(?:stepping|analysis)\b", "what numbers mean")],
     "flexarm-trajectory": [(r"\b(?:Robot|Mechanism|inverse_kinematics)\b", "robots and inverse kinematics")],
     "flexarm-flexlink": [FILES],
     "flexarm-stepping": [FILES, (r"\b(?:TcpMetrics|substitute)\b", "metrics and substitution")],
     "flexarm-analysis": [FILES, (r"\bflexarm_(?!analysis\b|kinematics\b)\w+", "other crates than the one of poses")],
     "flexarm-urdf": [(r"\b(?:inverse_dynamics|mass_matrix|forward_dynamics)\b", "dynamics")],
-    "flexarm-log": [(r"\bflexarm_stepping\b|\bStepper\b", "how a simulation runs")],
+    "flexarm-log": [(r"\bflexarm_stepping\b|\bStepper\b", "how a simulation runs"), (r"\bflexarm_fem\b", "finite elements")],
     "flexarm": [(r"\bclap\b|\bindicatif\b", "arguments and terminals")],
     "flexarm-verify": [(r"\bclap\b|\bindicatif\b", "arguments and terminals")],
     "flexarm-cli": [(r"\bflexarm_(?!verify\b)\w+", "other crates than the facade and the case studies")],
@@ -311,8 +315,8 @@ def self_test():
         ("a short flag", source("edges", 'f("choose another with -o");'), "names the flag -o"),
         ("a flag in a face", source("faces", 'f("use --step");'), None),
         ("a flag in a comment, a dash, an axis, a difference", source("facade", '// use --step\nf("a -- b, well-known, not along -z");\nlet x = a --b;'), None),
-        ("a flag of another program", check_source("flexarm-fem", "base", "crates/flexarm-fem/src/mesh/read.rs", 'f("gmsh -o OUT");'), None),
-        ("its own flag there", check_source("flexarm-fem", "base", "crates/flexarm-fem/src/mesh/read.rs", 'f("gmsh --force");'), "names the flag --force"),
+        ("a flag of another program", check_source("flexarm-fem", "base", "crates/flexarm-fe-io/src/mesh/read.rs", 'f("gmsh -o OUT");'), None),
+        ("its own flag there", check_source("flexarm-fem", "base", "crates/flexarm-fe-io/src/mesh/read.rs", 'f("gmsh --force");'), "names the flag --force"),
         ("a flag after a quoted quote and a lifetime", source("facade", "fn f<'a>(x: &'a str) -> char { '\"' }\ng(\"--step\");"), "c.rs:2: c names the flag --step"),
         ("a flag in a test", source("facade", 'fn f() {}\n#[cfg(test)]\nmod tests { fn g() { h("--step"); } }'), None),
         ("a word of a terminal", source("facade", 'f("the command line says");'), "speaks of the command line"),

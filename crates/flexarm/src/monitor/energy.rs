@@ -158,7 +158,6 @@ mod tests {
             energy.update(&seen);
             payload.push(energy.result().payload_j);
         }
-        eprintln!("{payload:?} J, truth {truth}");
         assert!(payload[1] == 0.0 && payload[2] == payload[3] && payload[4].abs() < 1e-12);
         assert!((payload[2] / truth - 1.0).abs() < 1e-9, "{} {truth}", payload[2]);
         // Who carries it from the start has it already.

@@ -105,7 +105,6 @@ mod tests {
             seen.update(&at(1.9995, -0.01), &at(2.0, 0.0));
         }
         let LinkStrain { strain, rotation } = seen.result()[0];
-        // Measured: 2e-16, 2e-17.
         assert!((strain - 5e-4).abs() < 1e-14 && (rotation - 0.02).abs() < 1e-14, "{strain} {rotation}");
     }
 }
