@@ -5,12 +5,14 @@
     python3 tools/public_surface.py            writes docs/public-surface.txt
     python3 tools/public_surface.py --check    status 1 if the file is not what the pages say
 
+Pages differ between versions of rustdoc: with another one than the list was made with, the check is skipped and says so.
 The list is kept so that a change of the surface is seen in review: a line that goes is a break for those who build on it.
 """
 import html
 import os
 import pathlib
 import re
+import subprocess
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
@@ -65,11 +67,22 @@ def surface():
     return lines, items
 
 
+def rustdoc():
+    """Version of rustdoc without its patch: 1.95."""
+    said = subprocess.run(["rustdoc", "--version"], stdout=subprocess.PIPE, text=True, check=True).stdout
+    return re.match(r"rustdoc (\d+\.\d+)", said).group(1)
+
+
 def main():
     lines, items = surface()
+    head = f"# What the library flexarm offers: tools/public_surface.py, from the pages of rustdoc {rustdoc()}"
+    lines.insert(0, head)
     wanted = "\n".join(lines) + "\n"
     if sys.argv[1:] == ["--check"]:
         have = PAGE.read_text(encoding="utf-8") if PAGE.exists() else ""
+        if have and have.splitlines()[0] != head:
+            print(f"skipped: the list was made with another rustdoc ({have.splitlines()[0].rsplit(' ', 1)[-1]}, here {rustdoc()})")
+            return 0
         if have == wanted:
             print(f"public surface: {items} items, as listed")
             return 0

@@ -20,7 +20,6 @@ fn flag(setting: Setting) -> &'static str {
         Setting::Variant => "--with",
         Setting::Output => "-o",
         Setting::Overwrite => "--force",
-        Setting::Parquet => "--parquet",
         Setting::ReadFormat => "--from",
         Setting::WrittenFormat => "--to",
         Setting::Tcp => "--tcp",

@@ -49,8 +49,6 @@ pub enum Setting {
     Output,
     /// Replace files that are there.
     Overwrite,
-    /// Record Parquet too.
-    Parquet,
     /// Format of a recording that is read.
     ReadFormat,
     /// Format of a recording that is written.
@@ -147,7 +145,6 @@ impl Setting {
         Self::Variant,
         Self::Output,
         Self::Overwrite,
-        Self::Parquet,
         Self::ReadFormat,
         Self::WrittenFormat,
         Self::Tcp,
@@ -201,7 +198,6 @@ impl Setting {
             Self::Variant => "variants",
             Self::Output => "output",
             Self::Overwrite => "overwrite",
-            Self::Parquet => "parquet",
             Self::ReadFormat => "from",
             Self::WrittenFormat => "to",
             Self::Tcp => "tcp",
