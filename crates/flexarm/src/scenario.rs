@@ -99,7 +99,7 @@ impl Scenario {
     /// What acts on a model of the robot.
     ///
     /// # Errors
-    /// [`Error::Usage`], or [`Error::RobotFile`] with the place if the value was read from a file: a load on a frame, or a
+    /// [`Error::Load`], or [`Error::RobotFile`] with the place if the value was read from a file: a load on a frame, or a
     /// payload on a link, that the model does not move; a payload whose link bends, without a mass or with an inertia that
     /// no body has; payloads on two bodies.
     pub fn acting_on(&self, robot: &Robot, model: &Model) -> Result<Disturbances, Error> {
