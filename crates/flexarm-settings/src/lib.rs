@@ -131,7 +131,7 @@ pub enum Setting {
 
 impl Setting {
     /// Every setting.
-    pub const ALL: [Self; 49] = [
+    pub const ALL: [Self; 48] = [
         Self::Step,
         Self::LogRate,
         Self::Stepper,
