@@ -44,7 +44,9 @@ fn last_time(file: &[u8]) -> Option<f64> {
 fn a_killed_run_leaves_a_whole_recording_up_to_the_last_second() {
     let place = place();
     let mut run = place.command(&LONG).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
-    let read = || std::fs::read(place.path("result/run.mcap")).ok().filter(|file| file.len() > 16);
+    // Who reads while the program writes may see the half of a write; after the kill there are no halves.
+    let whole = |file: &Vec<u8>| file.len() > 16 && file.ends_with(b"\x89MCAP0\r\n");
+    let read = || std::fs::read(place.path("result/run.mcap")).ok().filter(whole);
     let begin = Instant::now();
     // Until the run is under way.
     while read().and_then(|file| last_time(&file)).is_none_or(|t| t < 0.5) {
@@ -52,7 +54,7 @@ fn a_killed_run_leaves_a_whole_recording_up_to_the_last_second() {
         assert!(begin.elapsed() < Duration::from_secs(60), "the run does not get going");
         std::thread::sleep(Duration::from_millis(50));
     }
-    let before = last_time(&read().unwrap()).unwrap();
+    let before = std::iter::repeat_with(read).take(1000).flatten().find_map(|file| last_time(&file)).unwrap();
     std::thread::sleep(Duration::from_secs(1));
     assert!(run.try_wait().unwrap().is_none(), "the run was over too soon");
     run.kill().unwrap(); // SIGKILL

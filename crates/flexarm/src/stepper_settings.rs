@@ -3,7 +3,7 @@
 
 use std::fmt;
 
-use flexarm_stepping::{StepperKind, StepperSetting};
+use flexarm_stepping::{STEPPERS, StepperKind, StepperOptions, StepperSetting};
 use serde::de::{IgnoredAny, MapAccess, Visitor};
 use serde::ser::SerializeMap;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -51,6 +51,12 @@ impl StepperSettings {
     }
 }
 
+/// The keys of all steppers, each stepper's in its order.
+fn known_keys() -> Vec<&'static str> {
+    let options = StepperOptions::default();
+    STEPPERS.iter().flat_map(|entry| (entry.with)(&options).settings()).map(|(key, _)| key).collect()
+}
+
 impl Serialize for StepperSettings {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(Some(self.0.len()))?;
@@ -87,6 +93,9 @@ impl<'de> Deserialize<'de> for StepperSettings {
                         settings.push((key, value));
                     }
                 }
+                // A reader of JSON may give the keys in another order.
+                let order = known_keys();
+                settings.sort_by_key(|(key, _)| order.iter().position(|known| known == key).unwrap_or(order.len()));
                 Ok(StepperSettings(settings))
             }
         }
