@@ -10,10 +10,14 @@
 //! use flexarm_sample::{LinkInfo, RunHeader, Sample, TwinSample};
 //! use flexarm_spatial::Pose;
 //!
-//! // One link at the base whose tool sags by 2 mm: drawn fifty times as large.
+//! // A tool that sags by 2 mm is drawn fifty times as low.
 //! let base = LinkInfo { name: "base".into(), parent: None, fixed: true };
-//! let header = RunHeader { links: vec![base], tcp: "tool".into(), magnification: 50.0, ..RunHeader::default() };
-//! let twin = |z: f64| TwinSample { X_WL: vec![Pose::identity()], X_WT: Pose::translation(1.0, 0.0, z), ..Default::default() };
+//! let tool = LinkInfo { name: "tool".into(), parent: Some(0), fixed: false };
+//! let header = RunHeader { links: vec![base, tool], tcp: "tool".into(), magnification: 50.0, ..RunHeader::default() };
+//! let twin = |z: f64| {
+//!     let X_WT = Pose::translation(1.0, 0.0, z);
+//!     TwinSample { X_WL: vec![Pose::identity(), X_WT], X_WT, ..Default::default() }
+//! };
 //! let sample = Sample { flexible: twin(-0.002), rigid: twin(0.0), ..Sample::default() };
 //! let shown = Magnifier::new(&header).magnified(&sample);
 //! assert!((shown.X_WT.translation.z + 0.1).abs() < 1e-12);

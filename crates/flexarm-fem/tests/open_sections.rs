@@ -1,9 +1,13 @@
 //! I-beams and channels against tables of rolled profiles, finite elements over the section, and thin walls.
 #![allow(non_snake_case, reason = "monogram notation, as in the crate")]
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
+#![allow(clippy::print_stderr, reason = "tables of measured errors, shown with --nocapture")]
 
 use approx::assert_relative_eq;
 use flexarm_fem::{FemError, Section, SectionProperties};
+
+/// Place from the middle of a cell, shape functions, their slopes.
+type GaussPoint = ([f64; 2], [f64; 4], [[f64; 2]; 4]);
 
 /// Lengths of the profiles below: whether a channel; width, height, web, flange, fillet (mm).
 type Profile = (bool, [f64; 5]);
@@ -68,7 +72,7 @@ fn sections_agree_with_finite_elements_over_them() {
         let J = cells.torsion();
         let s = properties(profile);
         let off = |found: f64, truth: f64| 100.0 * (found / truth - 1.0);
-        println!(
+        eprintln!(
             "{profile:?}: A {:.2} %, I_y {:.2} %, I_z {:.2} %, J {:.2} %, k_y {:.1} %, k_z {:.1} %, shear centre {:.1} %",
             off(s.A, cells.A),
             off(s.I_y, cells.I_y),
@@ -236,8 +240,8 @@ impl Cells {
         shear
     }
 
-    /// Gauss points of a cell: place from its middle, shape functions, their slopes.
-    fn points(&self) -> Vec<([f64; 2], [f64; 4], [[f64; 2]; 4])> {
+    /// Gauss points of a cell.
+    fn points(&self) -> Vec<GaussPoint> {
         let g = 0.5 / 3f64.sqrt();
         let h = self.size;
         [(-g, -g), (g, -g), (g, g), (-g, g)]

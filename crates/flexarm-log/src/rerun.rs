@@ -5,14 +5,10 @@
 pub(crate) use re_chunk::Span;
 pub(crate) use re_chunk::external::arrow;
 pub(crate) use re_chunk::{Chunk, ChunkComponents, ChunkError, ChunkId, RowId, TimeColumn};
-pub(crate) use re_log_encoding;
 pub(crate) use re_log_encoding::external::lz4_flex;
-pub(crate) use re_log_types;
 pub(crate) use re_log_types::{EntityPath, LogMsg, StoreId, TimePoint, Timeline};
-pub(crate) use re_sdk_types;
 pub(crate) use re_sdk_types::archetypes::*;
 pub(crate) use re_sdk_types::components::{AlbedoFactor, Color, LineStrip3D, Radius};
 pub(crate) use re_sdk_types::datatypes::{Quaternion, Rgba32};
 pub(crate) use re_sdk_types::{AsComponents, SerializationError, SerializedComponentColumn};
 pub(crate) use re_sdk_types::{components, datatypes};
-pub(crate) use re_tuid;

@@ -13,7 +13,7 @@
 //!     let flexible = TwinSample { q: vec![0.1 * step as f64], qdot: vec![2.0], effort: vec![0.5], ..Default::default() };
 //!     columns.push(&Sample { time_s: step as f64 * 1e-3, step, flexible, ..Sample::default() });
 //! }
-//! let position = columns.get("position").unwrap();
+//! let position = columns.column("position").unwrap();
 //! assert_eq!((position.width, position.values.as_slice()), (1, &[0.0, 0.1, 0.2][..]));
 //! ```
 //!

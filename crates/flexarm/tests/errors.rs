@@ -25,7 +25,7 @@ fn refused(modelling: Modelling, change: impl FnOnce(&mut RunOptions)) -> Error 
     let (robot, motion) = beam();
     let mut options = RunOptions { modelling, ..RunOptions::default() };
     change(&mut options);
-    robot.flexible(modelling).and_then(|arm| arm.simulate(&motion, &options)).err().expect("it is refused")
+    robot.flexible(modelling).and_then(|arm| arm.simulate(&motion, &options)).map(drop).expect_err("it is refused")
 }
 
 #[test]

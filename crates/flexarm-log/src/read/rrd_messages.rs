@@ -14,12 +14,12 @@ use std::path::Path;
 
 use crate::rerun::arrow::ipc;
 use crate::rerun::lz4_flex;
-use crate::rerun::re_log_encoding::{
+use crate::rerun::{Chunk, LogMsg};
+use re_log_encoding::{
     CachingApplicationIdInjector, CrateVersion, Decodable, DecoderEntrypoint, MessageHeader, MessageKind, StreamHeader,
     ToApplication, ToTransport,
 };
-use crate::rerun::re_log_types::ArrowMsg;
-use crate::rerun::{Chunk, LogMsg};
+use re_log_types::ArrowMsg;
 
 use super::wall::caught;
 use crate::LogError;

@@ -3,16 +3,16 @@
 //! Written as the entities of a blueprint store, not with the `rerun` crate's builder, which draws the names of
 //! its parts by chance and cannot set a plot's legend.
 
-use crate::rerun::re_sdk_types::blueprint::archetypes::{
+use crate::rerun::{AsComponents, EntityPath};
+use re_sdk_types::blueprint::archetypes::{
     Background, ContainerBlueprint, EyeControls3D, PanelBlueprint, PlotLegend, ScalarAxis, TextLogColumns, TimeAxis,
     TimePanelBlueprint, ViewBlueprint, ViewContents, ViewportBlueprint,
 };
-use crate::rerun::re_sdk_types::blueprint::components::{
+use re_sdk_types::blueprint::components::{
     BackgroundKind, ColumnShare, ContainerKind, Corner2D, LinkAxis, LoopMode, PanelState, PlayState, RowShare,
     TimelineName,
 };
-use crate::rerun::re_sdk_types::blueprint::datatypes::{TextLogColumn, TextLogColumnKind};
-use crate::rerun::{AsComponents, EntityPath};
+use re_sdk_types::blueprint::datatypes::{TextLogColumn, TextLogColumnKind};
 
 use super::eye::Eye;
 use super::tracks::Seen;

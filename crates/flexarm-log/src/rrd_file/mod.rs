@@ -20,8 +20,8 @@ use std::fs::File;
 use std::path::Path;
 
 use crate::rerun::Chunk;
-use crate::rerun::re_log_types::StoreKind;
 use crate::rerun::{EntityPath, StoreId, TextDocument, TimePoint, Timeline, ViewCoordinates};
+use re_log_types::StoreKind;
 
 use self::layout::{Part, PlotPlace};
 use self::run::{RunTracks, Seat};

@@ -10,14 +10,14 @@ use std::io::{self, Write};
 
 use crate::rerun::Span;
 use crate::rerun::arrow::datatypes::Schema;
-use crate::rerun::re_log_encoding::{
+use crate::rerun::{AsComponents, EntityPath, SerializationError, SerializedComponentColumn, StoreId, TimePoint};
+use crate::rerun::{Chunk, ChunkComponents, ChunkError, ChunkId, LogMsg, RowId, TimeColumn};
+use re_log_encoding::{
     CodecError, CrateVersion, Encodable, EncodingOptions, MessageHeader, MessageKind, RRD_FOURCC, RawRrdManifest,
     RrdFooter, RrdManifestBuilder, StreamFooter, StreamHeader, ToTransport,
 };
-use crate::rerun::re_log_types::{BlueprintActivationCommand, SetStoreInfo, StoreInfo, StoreSource};
-use crate::rerun::re_tuid::Tuid;
-use crate::rerun::{AsComponents, EntityPath, SerializationError, SerializedComponentColumn, StoreId, TimePoint};
-use crate::rerun::{Chunk, ChunkComponents, ChunkError, ChunkId, LogMsg, RowId, TimeColumn};
+use re_log_types::{BlueprintActivationCommand, SetStoreInfo, StoreInfo, StoreSource};
+use re_tuid::Tuid;
 
 use crate::tail_file::TailFile;
 

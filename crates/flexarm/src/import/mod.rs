@@ -139,7 +139,7 @@ pub fn import(job: &ImportJob, outputs: Option<&ImportOutputs>) -> Result<Import
     if let Some(targets) = &targets {
         result_files::check_free(&targets.all(), targets.overwrite)?;
     }
-    let first = job.files.first().ok_or_else(|| ImportError::NoFile)?;
+    let first = job.files.first().ok_or(ImportError::NoFile)?;
     let head = InputFile::open(first).map_err(Box::new)?;
     let (reduction, parts) = if recognise(&head.bytes) == Some(MatrixFormat::Sid) {
         expect_format(job, MatrixFormat::Sid, &head.origin)?;
