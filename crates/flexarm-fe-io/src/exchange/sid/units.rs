@@ -12,7 +12,7 @@ use super::{Sid, SidMatrix, SidNode};
 use flexarm_fem::units::UnitSystem;
 
 impl Sid {
-    /// The same body in other units; blocks beyond the standard and those that [`ModalLink`](crate::ModalLink) writes stay as they are.
+    /// The same body in other units; blocks beyond the standard and those that [`ModalLink`](flexarm_fem::ModalLink) writes stay as they are.
     pub fn in_units(&self, from: &UnitSystem, to: &UnitSystem) -> Self {
         let [length, mass, time] = [from.length / to.length, from.mass / to.mass, from.time / to.time];
         let (first, second) = (mass * length, mass * length * length);
