@@ -30,7 +30,7 @@ RUNS = [
     ["--stepper", "spook", "--spook-form", "global", "--spook-preset", "source", "--links", "lumped"],
     ["--stepper", "reference", "--rtol", "1e-6", "--from-rest", "undeformed"],
     ["--links", "lumped", "--segments", "2", "--drives", "elastic"],
-    ["--drives", "servo", "--loads", "pick_and_place"],
+    ["--drives", "servo", "--loads", "trajectories/pick_and_place.loads.toml"],
 ]
 POINTS = [["inspect"], ["check"], ["statics"], ["modes"], ["response", "--points", "50"]]
 CLOCK = re.compile(r"cpu|wall|elapsed|real_time", re.I)
