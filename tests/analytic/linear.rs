@@ -128,7 +128,7 @@ fn ringing_from_a_shape_has_the_frequency_of_its_mode() {
         for step in 0..200 * cycles {
             if step % 8 == 0 {
                 times.push(alpha.time());
-                signal.push((position(&model, &mut data, &tool, &alpha.x) - still.X_WT.translation.vector).into());
+                signal.push((position(&model, &mut data, &tool, &alpha.now.x) - still.X_WT.translation.vector).into());
             }
             alpha.step(&mut system).expect("steps");
         }
@@ -157,7 +157,7 @@ fn ringing_after_release_from_a_load_has_the_frequency_of_a_mode() {
         let (mut times, mut signal) = (Vec::new(), Vec::new());
         let duration = 5.0;
         while alpha.time() < duration {
-            let moved = position(&model, &mut data, &tool, &alpha.x) - still.X_WT.translation.vector;
+            let moved = position(&model, &mut data, &tool, &alpha.now.x) - still.X_WT.translation.vector;
             times.push(alpha.time());
             signal.push(moved.into());
             alpha.step(&mut system).expect("steps");
@@ -243,7 +243,7 @@ fn a_force_at_a_resonance_shakes_the_tool_as_high_as_the_peak() {
         let periods = 80;
         for step in 0..200 * periods {
             if step >= 200 * (periods - 10) {
-                samples.push((alpha.time(), position(&model, &mut data, &tool, &alpha.x).z));
+                samples.push((alpha.time(), position(&model, &mut data, &tool, &alpha.now.x).z));
             }
             alpha.step(&mut system).expect("steps");
         }

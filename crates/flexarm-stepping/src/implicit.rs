@@ -8,7 +8,7 @@
 use nalgebra::DVector;
 
 use crate::error::StepError;
-use crate::integrator::TimeGrid;
+use crate::integrator::{Current, Integrator};
 use crate::iteration_matrix::IterationMatrix;
 use crate::stepper::Counts;
 use crate::system::SecondOrderSystem;
@@ -153,9 +153,18 @@ impl Search {
     }
 }
 
-/// What an implicit integrator does of its own.
-pub(crate) trait ImplicitStep {
-    fn newton(&mut self) -> &mut Newton;
+/// What an implicit integrator does of its own; the rest of an [`Integrator`] is the same for all.
+pub(crate) trait ImplicitStep: Send {
+    /// [`Integrator::MOTION_RULE`].
+    const MOTION_RULE: &'static [(f64, f64)];
+
+    fn current(&self) -> &Current;
+
+    fn current_mut(&mut self) -> &mut Current;
+
+    fn newton(&self) -> &Newton;
+
+    fn newton_mut(&mut self) -> &mut Newton;
 
     /// What depends on the length of the step, other than Newton's matrix.
     fn set_length(&mut self, _dt: f64) {}
@@ -164,17 +173,43 @@ pub(crate) trait ImplicitStep {
     fn attempt(&mut self, system: &mut impl SecondOrderSystem, t: f64) -> Result<(), StepError>;
 }
 
-/// Advances to t, which lies after the current time and not beyond the next multiple of the step.
-pub(crate) fn advance(
-    method: &mut impl ImplicitStep,
-    system: &mut impl SecondOrderSystem,
-    grid: TimeGrid,
-    t: f64,
-) -> Result<(), StepError> {
-    // Whole steps are all the same, so that their matrix lasts.
-    let dt = if t == grid.next_time() && grid.is_on_step() { grid.step_size() } else { t - grid.time() };
-    method.newton().last_iterations = 0;
-    cross(method, system, t, dt, MOST_HALVINGS)
+impl<M: ImplicitStep> Integrator for M {
+    const MOTION_RULE: &'static [(f64, f64)] = M::MOTION_RULE;
+
+    fn current(&self) -> &Current {
+        ImplicitStep::current(self)
+    }
+
+    fn current_mut(&mut self) -> &mut Current {
+        ImplicitStep::current_mut(self)
+    }
+
+    fn advance_to(&mut self, system: &mut impl SecondOrderSystem, t: f64) -> Result<(), StepError> {
+        let grid = &ImplicitStep::current(self).grid;
+        // Whole steps are all the same, so that their matrix lasts.
+        let dt = if t == grid.next_time() && grid.is_on_step() { grid.step_size() } else { t - grid.time() };
+        self.newton_mut().last_iterations = 0;
+        cross(self, system, t, dt, MOST_HALVINGS)
+    }
+
+    fn restart(&mut self, system: &mut impl SecondOrderSystem) -> Result<(), StepError> {
+        ImplicitStep::current_mut(self).accelerate(system)?;
+        self.newton_mut().fresh = true;
+        Ok(())
+    }
+
+    fn renew(&mut self, system: &mut impl SecondOrderSystem) -> Result<(), StepError> {
+        self.newton_mut().factored = false;
+        self.restart(system)
+    }
+
+    fn counts(&self) -> Counts {
+        self.newton().counts(ImplicitStep::current(self).grid.steps())
+    }
+
+    fn last_iteration(&self) -> (usize, f64) {
+        self.newton().last()
+    }
 }
 
 /// From the current time to t: in one step, else in two halves.
@@ -186,19 +221,19 @@ fn cross(
     halvings: u32,
 ) -> Result<(), StepError> {
     if dt != method.newton().dt {
-        method.newton().dt = dt;
+        method.newton_mut().dt = dt;
         method.set_length(dt);
-        method.newton().forget();
+        method.newton_mut().forget();
     }
     // With the matrix that is there, then with one of the step's start.
     let kept = method.newton().factored;
     let mut result = method.attempt(system, t);
     if result.is_err() && kept {
-        method.newton().forget();
+        method.newton_mut().forget();
         result = method.attempt(system, t);
     }
     let Err(error) = result else { return Ok(()) };
-    method.newton().forget();
+    method.newton_mut().forget();
     if halvings == 0 {
         return Err(error);
     }

@@ -69,6 +69,50 @@ impl TimeGrid {
     }
 }
 
+/// Where an integrator is: on its grid, and what moves how.
+#[derive(Clone, Debug)]
+pub struct Current {
+    /// The times.
+    pub grid: TimeGrid,
+    /// Positions.
+    pub x: DVector<f64>,
+    /// Velocities.
+    pub v: DVector<f64>,
+    /// Accelerations that fulfil the equations of motion.
+    pub acceleration: DVector<f64>,
+}
+
+impl Current {
+    /// At `t0` (s), on a grid of step `h` (s).
+    ///
+    /// # Errors
+    /// [`StepError::Singular`] if the acceleration cannot be found.
+    ///
+    /// # Panics
+    /// If `h` is not positive.
+    pub fn new(
+        system: &mut impl SecondOrderSystem,
+        t0: f64,
+        h: f64,
+        x: DVector<f64>,
+        v: DVector<f64>,
+    ) -> Result<Self, StepError> {
+        assert!(h > 0.0, "the step is positive");
+        let acceleration = DVector::zeros(system.dimension());
+        let mut current = Self { grid: TimeGrid::new(t0, h), x, v, acceleration };
+        current.accelerate(system)?;
+        Ok(current)
+    }
+
+    /// Takes the acceleration from the equations of motion.
+    ///
+    /// # Errors
+    /// [`StepError::Singular`] if it cannot be found.
+    pub fn accelerate(&mut self, system: &mut impl SecondOrderSystem) -> Result<(), StepError> {
+        system.acceleration(self.grid.time(), &self.x, &self.v, &mut self.acceleration)
+    }
+}
+
 /// An integrator of second-order systems; it steps along a grid and stops between its times where it is told to.
 ///
 /// After an error the state is that of the last good time.
@@ -78,13 +122,10 @@ pub trait Integrator: Send {
     const MOTION_RULE: &'static [(f64, f64)] = &[];
 
     /// Where it is.
-    fn grid(&self) -> &TimeGrid;
+    fn current(&self) -> &Current;
 
-    /// Positions, velocities and accelerations at the current time.
-    fn state(&self) -> [&DVector<f64>; 3];
-
-    /// Positions, and the velocities that an event may change; [`Integrator::restart`] follows.
-    fn state_at_event(&mut self) -> (&DVector<f64>, &mut DVector<f64>);
+    /// The same; of what an event may change, the velocities, [`Integrator::restart`] must follow.
+    fn current_mut(&mut self) -> &mut Current;
 
     /// Advances to t (s), which lies after the current time and not beyond the next multiple of the step.
     ///
@@ -97,7 +138,9 @@ pub trait Integrator: Send {
     ///
     /// # Errors
     /// [`StepError::Singular`] if the acceleration cannot be found.
-    fn restart(&mut self, system: &mut impl SecondOrderSystem) -> Result<(), StepError>;
+    fn restart(&mut self, system: &mut impl SecondOrderSystem) -> Result<(), StepError> {
+        self.current_mut().accelerate(system)
+    }
 
     /// As [`Integrator::restart`], when masses, stiffness or damping have changed: matrices too are out of date.
     ///
@@ -128,22 +171,22 @@ pub trait Integrator: Send {
 
     /// Current time (s).
     fn time(&self) -> f64 {
-        self.grid().time()
+        self.current().grid.time()
     }
 
     /// Next multiple of the step (s).
     fn next_time(&self) -> f64 {
-        self.grid().next_time()
+        self.current().grid.next_time()
     }
 
     /// Step (s).
     fn step_size(&self) -> f64 {
-        self.grid().step_size()
+        self.current().grid.step_size()
     }
 
     /// Whole steps taken.
     fn steps(&self) -> u64 {
-        self.grid().steps()
+        self.current().grid.steps()
     }
 }
 
@@ -186,9 +229,9 @@ impl<I: Integrator> Stepper for ReducedStepper<I> {
             integrator.advance_to(system, stop)?;
             // What happens there.
             let h = integrator.step_size();
-            let (x, v) = integrator.state_at_event();
-            check_deflection(&system.arm, x, stop, h)?;
-            match system.at_time(stop, x, v)? {
+            let now = integrator.current_mut();
+            check_deflection(&system.arm, &now.x, stop, h)?;
+            match system.at_time(stop, &now.x, &mut now.v)? {
                 Change::Nothing => {}
                 Change::Motion => integrator.restart(system)?,
                 Change::Matrices => integrator.renew(system)?,
@@ -200,8 +243,8 @@ impl<I: Integrator> Stepper for ReducedStepper<I> {
     }
 
     fn observe(&mut self, out: &mut Observation) {
-        let [x, v, a] = self.integrator.state();
-        observe_reduced(&mut self.system, self.integrator.time(), x, v, a, out);
+        let now = self.integrator.current();
+        observe_reduced(&mut self.system, now.grid.time(), &now.x, &now.v, &now.acceleration, out);
     }
 
     fn counts(&self) -> Counts {

@@ -56,7 +56,7 @@ mod system;
 pub use arm::{Damping, ElasticElement, FlexibleArm, GeometricStiffness, InertiaChange, Servo, Spring};
 pub use drive::{CurveError, Friction, ServoAxis, TorqueCurve};
 pub use error::StepError;
-pub use integrator::{Integrator, TimeGrid};
+pub use integrator::{Current, Integrator, TimeGrid};
 pub use linear::{Linear, linearise};
 pub use load::{Load, LoadAxes, TimedWrench};
 pub use modes::{Modes, modes_at};

@@ -337,12 +337,12 @@ fn a_step_that_fails_is_taken_in_shorter_ones() {
     let mut g = GeneralizedAlpha::new(&mut walls, 0.0, 0.05, settings, x, v).unwrap();
     let (mut bounces, mut worst) = (0, 0.0f64);
     for k in 1..=2000 {
-        let before = g.v[0];
+        let before = g.now.v[0];
         g.step(&mut walls).unwrap();
         assert!((g.time() - 0.05 * f64::from(k)).abs() < 1e-9 && g.steps() == k as u64);
-        bounces += u32::from(before * g.v[0] < 0.0);
-        if g.x[0].abs() < 0.5 {
-            worst = worst.max((0.5 * g.v[0].powi(2) - 0.5 * (1.0 - g.x[0].powi(2)).ln() - 2.0).abs() / 2.0);
+        bounces += u32::from(before * g.now.v[0] < 0.0);
+        if g.now.x[0].abs() < 0.5 {
+            worst = worst.max((0.5 * g.now.v[0].powi(2) - 0.5 * (1.0 - g.now.x[0].powi(2)).ln() - 2.0).abs() / 2.0);
         }
     }
     eprintln!("{bounces} bounces in 100 s, energy within {worst:.1e}");

@@ -70,7 +70,7 @@ fn alpha(h: f64, settings: AlphaSettings) -> impl Fn(&mut Oscillators) -> f64 {
         let mut g = GeneralizedAlpha::new(s, 0.0, h, settings, DVector::from_element(1, 1.0), DVector::zeros(1))
             .expect("starts");
         (0..(1.0 / h).round() as usize).for_each(|_| g.step(s).expect("steps"));
-        g.x[0]
+        g.now.x[0]
     }
 }
 
@@ -115,10 +115,10 @@ fn corrected_scheme_is_stable_for_any_step() {
             let mut largest = 0.0f64;
             for _ in 0..5000 {
                 g.step(&mut s).expect("steps");
-                largest = largest.max(g.x[0].abs());
+                largest = largest.max(g.now.x[0].abs());
             }
             // The start is not on the scheme's own orbit: a bounded overshoot, no growth.
-            let end = g.x[0].abs();
+            let end = g.now.x[0].abs();
             assert!(largest < 1e5 && end <= largest && end < 20.0, "rho {rho} omega {omega}: {largest} {end}");
         }
     }
@@ -131,7 +131,7 @@ fn rk4_is_of_fourth_order() {
         free_vibration_error(move |s| {
             let mut g = Rk4::new(s, 0.0, h, DVector::from_element(1, 1.0), DVector::zeros(1)).expect("starts");
             (0..(1.0 / h).round() as usize).for_each(|_| g.step(s).expect("steps"));
-            g.x[0]
+            g.now.x[0]
         })
     };
     let errors = [4e-3, 2e-3].map(run);
@@ -149,7 +149,7 @@ fn spectral_radius_one_keeps_the_energy_and_less_loses_it() {
             GeneralizedAlpha::new(&mut s, 0.0, 0.02, plain(rho), DVector::from_element(1, 1.0), DVector::zeros(1))
                 .expect("starts");
         (0..2000).for_each(|_| g.step(&mut s).expect("steps"));
-        (0.5 * g.v[0] * g.v[0] + 0.5e4 * g.x[0] * g.x[0]) / 0.5e4
+        (0.5 * g.now.v[0] * g.now.v[0] + 0.5e4 * g.now.x[0] * g.now.x[0]) / 0.5e4
     };
     assert!((energy_after(1.0) - 1.0).abs() < 1e-9, "{}", energy_after(1.0));
     assert!(energy_after(0.5) < 1e-10);
@@ -163,9 +163,9 @@ fn stiff_modes_shrink_by_the_spectral_radius_each_step() {
     let mut g = GeneralizedAlpha::new(&mut s, 0.0, 1e-3, plain(rho), DVector::from_element(1, 1e-3), DVector::zeros(1))
         .expect("starts");
     (0..40).for_each(|_| g.step(&mut s).expect("steps"));
-    let before = g.x[0].abs().max(1e-3 * g.v[0].abs());
+    let before = g.now.x[0].abs().max(1e-3 * g.now.v[0].abs());
     (0..20).for_each(|_| g.step(&mut s).expect("steps"));
-    let after = g.x[0].abs().max(1e-3 * g.v[0].abs());
+    let after = g.now.x[0].abs().max(1e-3 * g.now.v[0].abs());
     let measured = (after / before).powf(1.0 / 20.0);
     assert!((measured - rho).abs() < 0.03, "{measured}");
 }

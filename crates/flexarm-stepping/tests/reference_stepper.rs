@@ -71,8 +71,8 @@ fn run<F: Fn(f64) -> f64>(
         g.step(system).expect("steps");
         assert!((g.time() - k as f64 * h).abs() < 1e-12);
         let [x, v] = truth(g.time());
-        worst[0] = worst[0].max((g.x[0] - x).abs());
-        worst[1] = worst[1].max((g.v[0] - v).abs() / system.omega[0]);
+        worst[0] = worst[0].max((g.now.x[0] - x).abs());
+        worst[1] = worst[1].max((g.now.v[0] - v).abs() / system.omega[0]);
     }
     (worst, g)
 }
@@ -216,11 +216,11 @@ fn restart_sees_a_system_changed_from_outside() {
         }
         load.set(OMEGA * OMEGA);
         g.restart(&mut system).expect("restarts");
-        assert_eq!(g.acceleration[0], OMEGA * OMEGA);
+        assert_eq!(g.now.acceleration[0], OMEGA * OMEGA);
         let mut worst = 0.0f64;
         for _ in 250..1000 {
             g.step(&mut system).expect("steps");
-            worst = worst.max((g.x[0] - after_jump(g.time(), s)[0]).abs());
+            worst = worst.max((g.now.x[0] - after_jump(g.time(), s)[0]).abs());
         }
         eprintln!("{:<8} {worst:.1e}", method.name());
         assert!(worst < 1e3 * rtol, "{method:?}: {worst}");
@@ -243,7 +243,7 @@ fn restart_may_be_announced_late_and_twice() {
                 g.restart_at(s + 1e-13);
             }
             g.step(&mut system).expect("steps");
-            let error = (g.x[0] - after_jump(g.time(), s)[0]).abs();
+            let error = (g.now.x[0] - after_jump(g.time(), s)[0]).abs();
             assert!(error < 1e3 * 1e-6, "{method:?} at {}: {error}", g.time());
         }
     }
@@ -258,7 +258,7 @@ fn a_pulse_after_a_long_rest_is_seen() {
     let pulse = |t: f64| if (0.507..0.527).contains(&t) { (25.0 * TAU * (t - 0.507)).sin().powi(2) * 1e3 } else { 0.0 };
     let end = |settings: ReferenceSettings, restarts: &[f64]| {
         let mut system = Oscillators { omega: vec![OMEGA], zeta: 0.0, load: pulse, evaluations: 0 };
-        run(&mut system, settings, 1e-3, [0.0; 2], restarts, |_| [0.0; 2]).1.x[0]
+        run(&mut system, settings, 1e-3, [0.0; 2], restarts, |_| [0.0; 2]).1.now.x[0]
     };
     let truth = end(settings(Tsit45, 1e-9), &[0.507, 0.527]);
     assert!(truth.abs() > 0.05);
@@ -287,7 +287,7 @@ fn a_fast_mode_is_stepped_over_by_the_method_made_for_it() {
             g.step(&mut system).expect("steps");
         }
         let truth = driven(1.0, zeta, 4e3, 20.0)[0];
-        assert!((g.x[0] - truth).abs() < 1e-4, "{method:?} {zeta}: {} {truth}", g.x[0]);
+        assert!((g.now.x[0] - truth).abs() < 1e-4, "{method:?} {zeta}: {} {truth}", g.now.x[0]);
         g.evaluations
     };
     for zeta in [0.01, 0.9] {
@@ -329,13 +329,13 @@ fn failures_say_what_happened() {
             let mut g =
                 Reference::new(&mut system, 0.0, 1e-3, settings(method, 1e-6), one.clone(), one).expect("starts");
             let error = (0..1000).find_map(|_| g.step(&mut system).err()).expect("fails");
-            let (t, x) = (g.time(), g.x[0]);
+            let (t, x) = (g.time(), g.now.x[0]);
             match fault {
                 // All points before the failure were delivered, and it does not go away.
                 Some(_) => {
                     assert!(error == singular && (0.098..0.101).contains(&t), "{method:?}: {error} {t}");
                     assert_eq!(g.step(&mut system), Err(singular.clone()));
-                    assert_eq!((g.time(), g.x[0]), (t, x));
+                    assert_eq!((g.time(), g.now.x[0]), (t, x));
                 }
                 None => {
                     assert!(matches!(error, StepError::Diverged { .. }), "{error}");

@@ -34,7 +34,7 @@ use nalgebra::DVector;
 
 use crate::arm::FlexibleArm;
 use crate::error::StepError;
-use crate::integrator::{Integrator, ReducedStepper, TimeGrid};
+use crate::integrator::{Current, Integrator, ReducedStepper};
 use crate::stepper::{Counts, Stepper};
 use crate::steppers::{Method, StepRule, StepperEntry, StepperKind, StepperSetting};
 use crate::system::SecondOrderSystem;
@@ -175,13 +175,8 @@ impl Kept {
 /// The integrator with its state; see the module page.
 pub struct Reference {
     settings: ReferenceSettings,
-    grid: TimeGrid,
-    /// Positions at the current time.
-    pub x: DVector<f64>,
-    /// Velocities.
-    pub v: DVector<f64>,
-    /// Accelerations at the current time.
-    pub acceleration: DVector<f64>,
+    /// Time, positions, velocities and accelerations.
+    pub now: Current,
     kept: Kept,
     /// `[x; v]` at the points after the current time that the solver has passed.
     ahead: VecDeque<Vec<f64>>,
@@ -214,17 +209,12 @@ impl Reference {
         x: DVector<f64>,
         v: DVector<f64>,
     ) -> Result<Self, StepError> {
-        assert!(h > 0.0, "the step is positive");
         settings.check()?;
-        let mut acceleration = DVector::zeros(system.dimension());
-        system.acceleration(t0, &x, &v, &mut acceleration)?;
-        let kept = Kept::Start(t0, together(&x, &v));
+        let now = Current::new(system, t0, h, x, v)?;
+        let kept = Kept::Start(t0, together(&now.x, &now.v));
         Ok(Self {
             settings,
-            grid: TimeGrid::new(t0, h),
-            x,
-            v,
-            acceleration,
+            now,
             kept,
             ahead: VecDeque::new(),
             restarts: Vec::new(),
@@ -237,7 +227,7 @@ impl Reference {
 
     /// First point that is neither reached nor waiting.
     fn next_point(&self) -> f64 {
-        self.grid.after(1 + self.ahead.len() as u64)
+        self.now.grid.after(1 + self.ahead.len() as u64)
     }
 
     /// Makes the solver end a step at `t` (s) and start anew, because the load jumps there: before `t` the system is only
@@ -249,7 +239,7 @@ impl Reference {
         assert!(t.is_finite(), "a restart has a time");
         let near = self.near(t);
         // A point is met exactly: a restart that is a rounding beyond it would be met again.
-        let (t0, h) = (self.grid.start(), self.grid.step_size());
+        let (t0, h) = (self.now.grid.start(), self.now.grid.step_size());
         let point = t0 + ((t - t0) / h).round() * h;
         let t = if (t - point).abs() <= near { point } else { t };
         if self.restarts.iter().any(|other| (other - t).abs() <= near) {
@@ -269,24 +259,24 @@ impl Reference {
     /// Drops what the solver knows beyond the current time.
     fn start_again(&mut self) {
         self.ahead.clear();
-        self.kept = Kept::Start(self.grid.time(), together(&self.x, &self.v));
+        self.kept = Kept::Start(self.now.grid.time(), together(&self.now.x, &self.now.v));
     }
 
     /// Times closer than this to t are the same (s).
     fn near(&self, t: f64) -> f64 {
-        TOGETHER * self.grid.step_size() + ROUNDING * t.abs()
+        TOGETHER * self.now.grid.step_size() + ROUNDING * t.abs()
     }
 
     /// Advances to the next multiple of h.
     fn step_to_point(&mut self, system: &mut impl SecondOrderSystem) -> Result<(), StepError> {
-        while self.ahead.is_empty() && !self.x.is_empty() {
+        while self.ahead.is_empty() && !self.now.x.is_empty() {
             if let Err(error) = self.advance(system) {
                 // Points that were passed before the failure are good; the solver tries again from the last one.
                 let Some(last) = self.ahead.back().cloned() else {
                     self.start_again();
                     return Err(error);
                 };
-                self.kept = Kept::Start(self.next_point() - self.grid.step_size(), last);
+                self.kept = Kept::Start(self.next_point() - self.now.grid.step_size(), last);
             }
         }
         let y = self.ahead.pop_front().unwrap_or_default();
@@ -296,7 +286,7 @@ impl Reference {
     /// Advances to a restart that lies before the next multiple of h ([`Reference::restart_at`]); what is left of the step
     /// starts anew there.
     fn step_to_restart(&mut self, system: &mut impl SecondOrderSystem, t: f64) -> Result<(), StepError> {
-        while self.kept.time() < t - self.near(t) && !self.x.is_empty() {
+        while self.kept.time() < t - self.near(t) && !self.now.x.is_empty() {
             if let Err(error) = self.advance(system) {
                 self.start_again();
                 return Err(error);
@@ -304,7 +294,7 @@ impl Reference {
         }
         let y = match &self.kept {
             Kept::Start(_, y) => y.clone(),
-            _ => together(&self.x, &self.v),
+            _ => together(&self.now.x, &self.now.v),
         };
         self.arrive(system, t, &y)?;
         self.start_again();
@@ -313,13 +303,13 @@ impl Reference {
 
     /// Takes over position and velocity at t.
     fn arrive(&mut self, system: &mut impl SecondOrderSystem, t: f64, y: &[f64]) -> Result<(), StepError> {
-        let n = self.x.len();
+        let n = self.now.x.len();
         let (x, v) = (DVector::from_column_slice(&y[..n]), DVector::from_column_slice(&y[n..]));
         let mut acceleration = DVector::zeros(n);
         self.evaluations += 1;
         system.acceleration(t, &x, &v, &mut acceleration)?;
-        (self.x, self.v, self.acceleration) = (x, v, acceleration);
-        self.grid.reach(t);
+        (self.now.x, self.now.v, self.now.acceleration) = (x, v, acceleration);
+        self.now.grid.reach(t);
         Ok(())
     }
 
@@ -347,8 +337,8 @@ impl Reference {
         stop: f64,
         equations: &RefCell<FirstOrder<'_, S>>,
     ) -> Result<Kept, StepError> {
-        let n = self.x.len();
-        let (start, h) = (kept.time(), self.grid.step_size());
+        let n = self.now.x.len();
+        let (start, h) = (kept.time(), self.now.grid.step_size());
         let fault = |error: DiffsolError| gave_up(start, h, &error);
         let (y0, bdf, runge_kutta) = match kept {
             Kept::Start(_, y) => (y, None, None),
@@ -439,7 +429,7 @@ impl Reference {
 
         let state = solver.state();
         let t = if restart { stop } else { state.t };
-        let x = &state.y.inner().as_slice()[..self.x.len()];
+        let x = &state.y.inner().as_slice()[..self.now.x.len()];
         let largest = x.iter().fold(0.0f64, |m, x| if x.is_finite() { m.max(x.abs()) } else { f64::INFINITY });
         if largest > 1e6 {
             let what = format!("a coordinate reached {largest:.1e}");
@@ -455,16 +445,12 @@ impl Reference {
 }
 
 impl Integrator for Reference {
-    fn grid(&self) -> &TimeGrid {
-        &self.grid
+    fn current(&self) -> &Current {
+        &self.now
     }
 
-    fn state(&self) -> [&DVector<f64>; 3] {
-        [&self.x, &self.v, &self.acceleration]
-    }
-
-    fn state_at_event(&mut self) -> (&DVector<f64>, &mut DVector<f64>) {
-        (&self.x, &mut self.v)
+    fn current_mut(&mut self) -> &mut Current {
+        &mut self.now
     }
 
     /// To a multiple of the step, or to a restart before it ([`Reference::restart_at`]). Allocates.
@@ -476,7 +462,7 @@ impl Integrator for Reference {
     fn restart(&mut self, system: &mut impl SecondOrderSystem) -> Result<(), StepError> {
         self.start_again();
         self.evaluations += 1;
-        system.acceleration(self.time(), &self.x, &self.v, &mut self.acceleration)
+        self.now.accelerate(system)
     }
 
     /// The solver must not look past an event.

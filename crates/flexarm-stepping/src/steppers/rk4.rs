@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::arm::FlexibleArm;
 use crate::error::StepError;
-use crate::integrator::{Integrator, ReducedStepper, TimeGrid};
+use crate::integrator::{Current, Integrator, ReducedStepper};
 use crate::stepper::{Counts, Stepper};
 use crate::steppers::{Method, StepRule, StepperEntry, StepperKind};
 use crate::system::SecondOrderSystem;
@@ -54,13 +54,8 @@ pub const STABILITY_LIMIT: f64 = 2.78;
 /// The integrator with its state.
 #[derive(Clone, Debug)]
 pub struct Rk4 {
-    grid: TimeGrid,
-    /// Positions at the current time.
-    pub x: DVector<f64>,
-    /// Velocities.
-    pub v: DVector<f64>,
-    /// Accelerations at the current time.
-    pub acceleration: DVector<f64>,
+    /// Time, positions, velocities and accelerations.
+    pub now: Current,
     x_stage: DVector<f64>,
     v_stage: DVector<f64>,
     a_stage: DVector<f64>,
@@ -73,6 +68,9 @@ impl Rk4 {
     ///
     /// # Errors
     /// [`StepError::Singular`] if the first acceleration cannot be found.
+    ///
+    /// # Panics
+    /// If `h` is not positive.
     pub fn new(
         system: &mut impl SecondOrderSystem,
         t0: f64,
@@ -81,13 +79,8 @@ impl Rk4 {
         v: DVector<f64>,
     ) -> Result<Self, StepError> {
         let zeros = DVector::zeros(system.dimension());
-        let mut acceleration = zeros.clone();
-        system.acceleration(t0, &x, &v, &mut acceleration)?;
         Ok(Self {
-            grid: TimeGrid::new(t0, h),
-            x,
-            v,
-            acceleration,
+            now: Current::new(system, t0, h, x, v)?,
             x_stage: zeros.clone(),
             v_stage: zeros.clone(),
             a_stage: zeros.clone(),
@@ -98,39 +91,31 @@ impl Rk4 {
 }
 
 impl Integrator for Rk4 {
-    fn grid(&self) -> &TimeGrid {
-        &self.grid
+    fn current(&self) -> &Current {
+        &self.now
     }
 
-    fn state(&self) -> [&DVector<f64>; 3] {
-        [&self.x, &self.v, &self.acceleration]
-    }
-
-    fn state_at_event(&mut self) -> (&DVector<f64>, &mut DVector<f64>) {
-        (&self.x, &mut self.v)
-    }
-
-    fn restart(&mut self, system: &mut impl SecondOrderSystem) -> Result<(), StepError> {
-        system.acceleration(self.grid.time(), &self.x, &self.v, &mut self.acceleration)
+    fn current_mut(&mut self) -> &mut Current {
+        &mut self.now
     }
 
     fn counts(&self) -> Counts {
-        Counts { steps: self.grid.steps(), evaluations: 4 * self.grid.steps(), factorisations: 0 }
+        Counts { steps: self.now.grid.steps(), evaluations: 4 * self.now.grid.steps(), factorisations: 0 }
     }
 
     fn advance_to(&mut self, system: &mut impl SecondOrderSystem, t_new: f64) -> Result<(), StepError> {
-        let t = self.grid.time();
+        let t = self.now.grid.time();
         let h = t_new - t;
         // Stage 1 is the acceleration kept from the end of the last step.
-        self.dx.copy_from(&self.v);
-        self.dv.copy_from(&self.acceleration);
-        self.v_stage.copy_from(&self.v);
-        self.a_stage.copy_from(&self.acceleration);
+        self.dx.copy_from(&self.now.v);
+        self.dv.copy_from(&self.now.acceleration);
+        self.v_stage.copy_from(&self.now.v);
+        self.a_stage.copy_from(&self.now.acceleration);
         // Stages 2 to 4.
         for (fraction, weight) in [(0.5, 2.0), (0.5, 2.0), (1.0, 1.0)] {
-            for k in 0..self.x.len() {
-                self.x_stage[k] = self.x[k] + fraction * h * self.v_stage[k];
-                self.v_stage[k] = self.v[k] + fraction * h * self.a_stage[k];
+            for k in 0..self.now.x.len() {
+                self.x_stage[k] = self.now.x[k] + fraction * h * self.v_stage[k];
+                self.v_stage[k] = self.now.v[k] + fraction * h * self.a_stage[k];
             }
             system.acceleration(t + fraction * h, &self.x_stage, &self.v_stage, &mut self.a_stage)?;
             self.dx.axpy(weight, &self.v_stage, 1.0);
@@ -138,9 +123,9 @@ impl Integrator for Rk4 {
         }
         // x⁺ = x + h/6 Σ w_i v_i, v⁺ likewise.
         let mut largest = 0.0f64;
-        for k in 0..self.x.len() {
-            self.x_stage[k] = self.x[k] + h / 6.0 * self.dx[k];
-            self.v_stage[k] = self.v[k] + h / 6.0 * self.dv[k];
+        for k in 0..self.now.x.len() {
+            self.x_stage[k] = self.now.x[k] + h / 6.0 * self.dx[k];
+            self.v_stage[k] = self.now.v[k] + h / 6.0 * self.dv[k];
             largest = largest.max(self.x_stage[k].abs());
             if !self.x_stage[k].is_finite() {
                 largest = f64::INFINITY;
@@ -151,10 +136,10 @@ impl Integrator for Rk4 {
             return Err(StepError::Diverged { t: t_new, h, what });
         }
         system.acceleration(t_new, &self.x_stage, &self.v_stage, &mut self.a_stage)?;
-        std::mem::swap(&mut self.x, &mut self.x_stage);
-        std::mem::swap(&mut self.v, &mut self.v_stage);
-        std::mem::swap(&mut self.acceleration, &mut self.a_stage);
-        self.grid.reach(t_new);
+        std::mem::swap(&mut self.now.x, &mut self.x_stage);
+        std::mem::swap(&mut self.now.v, &mut self.v_stage);
+        std::mem::swap(&mut self.now.acceleration, &mut self.a_stage);
+        self.now.grid.reach(t_new);
         Ok(())
     }
 }

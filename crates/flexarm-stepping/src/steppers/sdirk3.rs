@@ -32,9 +32,9 @@ use nalgebra::DVector;
 
 use crate::arm::FlexibleArm;
 use crate::error::StepError;
-use crate::implicit::{ImplicitStep, Newton, Search, Sizes, advance};
-use crate::integrator::{Integrator, ReducedStepper, TimeGrid};
-use crate::stepper::{Counts, Stepper};
+use crate::implicit::{ImplicitStep, Newton, Search, Sizes};
+use crate::integrator::{Current, ReducedStepper};
+use crate::stepper::Stepper;
 use crate::steppers::{Method, StepRule, StepperEntry, StepperKind};
 use crate::system::SecondOrderSystem;
 
@@ -76,14 +76,9 @@ const WEIGHTS: [[f64; 3]; 3] = [
 /// The integrator with its state; see the module page.
 #[derive(Clone, Debug)]
 pub struct Sdirk3 {
-    grid: TimeGrid,
     newton: Newton,
-    /// Positions at the current time.
-    pub x: DVector<f64>,
-    /// Velocities.
-    pub v: DVector<f64>,
-    /// Accelerations that fulfil the equations of motion.
-    pub acceleration: DVector<f64>,
+    /// Time, positions, velocities and accelerations.
+    pub now: Current,
     /// A_i and V_i of the stages, X of the one on trial.
     A: [DVector<f64>; 3],
     V: [DVector<f64>; 3],
@@ -107,17 +102,12 @@ impl Sdirk3 {
         x: DVector<f64>,
         v: DVector<f64>,
     ) -> Result<Self, StepError> {
-        assert!(h > 0.0, "the step is positive");
-        let n = system.dimension();
-        let mut acceleration = DVector::zeros(n);
-        system.acceleration(t0, &x, &v, &mut acceleration)?;
+        let now = Current::new(system, t0, h, x, v)?;
+        let n = now.x.len();
         let zeros = || DVector::zeros(n);
         Ok(Self {
-            grid: TimeGrid::new(t0, h),
             newton: Newton::new(n, h),
-            x,
-            v,
-            acceleration,
+            now,
             A: [zeros(), zeros(), zeros()],
             V: [zeros(), zeros(), zeros()],
             X: zeros(),
@@ -138,12 +128,12 @@ impl Sdirk3 {
     fn predict(&mut self, i: usize) {
         let (done, rest) = self.A.split_at_mut(i);
         let (earlier, later, ratio) = match done {
-            [] if self.newton.fresh => (&self.acceleration, &self.acceleration, 0.0),
-            [] => (&self.before, &self.acceleration, NODES[0] / (1.0 - NODES[1])),
-            [first] => (&self.acceleration, &*first, (NODES[1] - NODES[0]) / NODES[0]),
+            [] if self.newton.fresh => (&self.now.acceleration, &self.now.acceleration, 0.0),
+            [] => (&self.before, &self.now.acceleration, NODES[0] / (1.0 - NODES[1])),
+            [first] => (&self.now.acceleration, &*first, (NODES[1] - NODES[0]) / NODES[0]),
             [first, second, ..] => (&*first, &*second, (NODES[2] - NODES[1]) / (NODES[1] - NODES[0])),
         };
-        for k in 0..self.x.len() {
+        for k in 0..self.now.x.len() {
             rest[0][k] = later[k] + ratio * (later[k] - earlier[k]);
         }
     }
@@ -151,8 +141,8 @@ impl Sdirk3 {
     /// V_i and X_i of the trial A_i by (2) and (3).
     fn place(&mut self, i: usize) {
         let h = self.newton.dt;
-        for k in 0..self.x.len() {
-            let (mut v, mut x) = (self.v[k], self.x[k]);
+        for k in 0..self.now.x.len() {
+            let (mut v, mut x) = (self.now.v[k], self.now.x[k]);
             for (a, (A, V)) in WEIGHTS[i].iter().zip(self.A.iter().zip(&self.V)).take(i) {
                 v += h * a * A[k];
                 x += h * a * V[k];
@@ -167,7 +157,7 @@ impl Sdirk3 {
     fn correct(&mut self, i: usize) -> Sizes {
         let c = GAMMA * self.newton.dt;
         let mut sizes = Sizes::default();
-        for k in 0..self.x.len() {
+        for k in 0..self.now.x.len() {
             let d = self.newton.r[k];
             self.A[i][k] -= d;
             self.V[i][k] -= c * d;
@@ -198,14 +188,29 @@ impl Sdirk3 {
 }
 
 impl ImplicitStep for Sdirk3 {
-    fn newton(&mut self) -> &mut Newton {
+    const MOTION_RULE: &'static [(f64, f64)] =
+        &[(NODES[0], WEIGHTS[2][0]), (NODES[1], WEIGHTS[2][1]), (NODES[2], WEIGHTS[2][2])];
+
+    fn current(&self) -> &Current {
+        &self.now
+    }
+
+    fn current_mut(&mut self) -> &mut Current {
+        &mut self.now
+    }
+
+    fn newton(&self) -> &Newton {
+        &self.newton
+    }
+
+    fn newton_mut(&mut self) -> &mut Newton {
         &mut self.newton
     }
 
     fn attempt(&mut self, system: &mut impl SecondOrderSystem, t: f64) -> Result<(), StepError> {
         if !self.newton.factored {
             // The matrix belongs to the configuration of the last residual.
-            system.residual(self.grid.time(), &self.x, &self.v, &self.acceleration, &mut self.newton.r);
+            system.residual(self.now.grid.time(), &self.now.x, &self.now.v, &self.now.acceleration, &mut self.newton.r);
             self.factor(system, t)?;
         }
 
@@ -218,54 +223,13 @@ impl ImplicitStep for Sdirk3 {
         self.newton.found(iterations.iter().sum(), iterations.into_iter().max().unwrap_or(0));
 
         // (4)
-        std::mem::swap(&mut self.x, &mut self.X);
-        std::mem::swap(&mut self.v, &mut self.V[2]);
-        std::mem::swap(&mut self.acceleration, &mut self.A[2]);
+        std::mem::swap(&mut self.now.x, &mut self.X);
+        std::mem::swap(&mut self.now.v, &mut self.V[2]);
+        std::mem::swap(&mut self.now.acceleration, &mut self.A[2]);
         std::mem::swap(&mut self.before, &mut self.A[1]);
         self.newton.fresh = false;
-        self.grid.reach(t);
+        self.now.grid.reach(t);
         Ok(())
-    }
-}
-
-impl Integrator for Sdirk3 {
-    const MOTION_RULE: &'static [(f64, f64)] =
-        &[(NODES[0], WEIGHTS[2][0]), (NODES[1], WEIGHTS[2][1]), (NODES[2], WEIGHTS[2][2])];
-
-    fn grid(&self) -> &TimeGrid {
-        &self.grid
-    }
-
-    fn state(&self) -> [&DVector<f64>; 3] {
-        [&self.x, &self.v, &self.acceleration]
-    }
-
-    fn state_at_event(&mut self) -> (&DVector<f64>, &mut DVector<f64>) {
-        (&self.x, &mut self.v)
-    }
-
-    fn advance_to(&mut self, system: &mut impl SecondOrderSystem, t: f64) -> Result<(), StepError> {
-        let grid = self.grid;
-        advance(self, system, grid, t)
-    }
-
-    fn restart(&mut self, system: &mut impl SecondOrderSystem) -> Result<(), StepError> {
-        system.acceleration(self.grid.time(), &self.x, &self.v, &mut self.acceleration)?;
-        self.newton.fresh = true;
-        Ok(())
-    }
-
-    fn renew(&mut self, system: &mut impl SecondOrderSystem) -> Result<(), StepError> {
-        self.newton.factored = false;
-        self.restart(system)
-    }
-
-    fn counts(&self) -> Counts {
-        self.newton.counts(self.grid.steps())
-    }
-
-    fn last_iteration(&self) -> (usize, f64) {
-        self.newton.last()
     }
 }
 
@@ -274,6 +238,7 @@ mod tests {
     use nalgebra::{Complex, DMatrix};
 
     use super::*;
+    use crate::integrator::Integrator;
 
     /// `ẍ + 2 ζ ω ẋ + ω² x = f sin 3t`.
     struct Oscillator {
@@ -315,7 +280,7 @@ mod tests {
     fn after(system: &mut Oscillator, h: f64, steps: usize) -> [f64; 2] {
         let mut g = Sdirk3::new(system, 0.0, h, DVector::from_element(1, 1.0), DVector::zeros(1)).unwrap();
         (0..steps).for_each(|_| g.step(system).unwrap());
-        [g.x[0], g.v[0]]
+        [g.now.x[0], g.now.v[0]]
     }
 
     /// (6)

@@ -38,9 +38,9 @@ use nalgebra::DVector;
 
 use crate::arm::FlexibleArm;
 use crate::error::StepError;
-use crate::implicit::{ImplicitStep, Newton, Search, Sizes, advance};
-use crate::integrator::{Integrator, ReducedStepper, TimeGrid};
-use crate::stepper::{Counts, Stepper};
+use crate::implicit::{ImplicitStep, Newton, Search, Sizes};
+use crate::integrator::{Current, ReducedStepper};
+use crate::stepper::Stepper;
 use crate::steppers::{Method, StepRule, StepperEntry, StepperKind, StepperSetting};
 use crate::system::SecondOrderSystem;
 use dispersion::DispersionCorrection;
@@ -95,14 +95,9 @@ impl Method for AlphaSettings {
 pub struct GeneralizedAlpha {
     coefficients: Coefficients,
     correction: Option<DispersionCorrection>,
-    grid: TimeGrid,
     newton: Newton,
-    /// Positions at the current time.
-    pub x: DVector<f64>,
-    /// Velocities.
-    pub v: DVector<f64>,
-    /// Accelerations ẍ that fulfil the equations of motion.
-    pub acceleration: DVector<f64>,
+    /// Time, positions, velocities and accelerations.
+    pub now: Current,
     /// a and x̃ at the current time, ẍ one step before it.
     a: DVector<f64>,
     x_tilde: DVector<f64>,
@@ -162,26 +157,21 @@ impl GeneralizedAlpha {
     ) -> Result<Self, StepError> {
         let AlphaSettings { rho, dispersion_correction } = settings;
         assert!((0.0..=1.0).contains(&rho), "the spectral radius lies between 0 and 1");
-        assert!(h > 0.0, "the step is positive");
-        let n = system.dimension();
-        let mut acceleration = DVector::zeros(n);
-        system.acceleration(t0, &x, &v, &mut acceleration)?;
+        let now = Current::new(system, t0, h, x, v)?;
+        let n = now.x.len();
         let zeros = DVector::zeros(n);
         let coefficients = Coefficients::new(rho);
         let c = coefficients.dispersion();
         Ok(Self {
             coefficients,
             correction: (dispersion_correction && c > 0.0).then(|| DispersionCorrection::new(c, h, n)),
-            grid: TimeGrid::new(t0, h),
             newton: Newton::new(n, h),
-            x_new: x.clone(),
-            v_new: v.clone(),
-            x,
-            v,
-            a: acceleration.clone(),
-            x_tilde: acceleration.clone(),
-            previous: acceleration.clone(),
-            acceleration,
+            x_new: now.x.clone(),
+            v_new: now.v.clone(),
+            a: now.acceleration.clone(),
+            x_tilde: now.acceleration.clone(),
+            previous: now.acceleration.clone(),
+            now,
             trial: zeros.clone(),
             x_tilde_new: zeros,
         })
@@ -190,9 +180,9 @@ impl GeneralizedAlpha {
     /// a and x̃ of the current acceleration alone. With the correction in x̃, a jump would set modes of `hω >> 1` ringing
     /// from one step to the next.
     fn remember(&mut self) {
-        self.a.copy_from(&self.acceleration);
-        self.previous.copy_from(&self.acceleration);
-        self.x_tilde.copy_from(&self.acceleration);
+        self.a.copy_from(&self.now.acceleration);
+        self.previous.copy_from(&self.now.acceleration);
+        self.x_tilde.copy_from(&self.now.acceleration);
         self.newton.fresh = false;
     }
 
@@ -217,11 +207,11 @@ impl GeneralizedAlpha {
             Some(correction) => correction.corrected(&self.trial, &mut self.x_tilde_new),
             None => self.x_tilde_new.copy_from(&self.trial),
         }
-        for k in 0..self.x.len() {
+        for k in 0..self.now.x.len() {
             let a_new =
                 (alpha_f * self.x_tilde[k] - alpha_m * self.a[k]) / (1.0 - alpha_m) + ratio * self.x_tilde_new[k];
-            self.x_new[k] = self.x[k] + h * self.v[k] + h * h * ((0.5 - beta) * self.a[k] + beta * a_new);
-            self.v_new[k] = self.v[k] + h * ((1.0 - gamma) * self.a[k] + gamma * a_new);
+            self.x_new[k] = self.now.x[k] + h * self.now.v[k] + h * h * ((0.5 - beta) * self.a[k] + beta * a_new);
+            self.v_new[k] = self.now.v[k] + h * ((1.0 - gamma) * self.a[k] + gamma * a_new);
         }
     }
 
@@ -251,21 +241,36 @@ impl GeneralizedAlpha {
     fn accept(&mut self, t: f64) {
         let Coefficients { alpha_m, alpha_f, .. } = self.coefficients;
         // a⁺ of (4).
-        for k in 0..self.x.len() {
+        for k in 0..self.now.x.len() {
             self.a[k] = ((1.0 - alpha_f) * self.x_tilde_new[k] + alpha_f * self.x_tilde[k] - alpha_m * self.a[k])
                 / (1.0 - alpha_m);
         }
-        std::mem::swap(&mut self.x, &mut self.x_new);
-        std::mem::swap(&mut self.v, &mut self.v_new);
+        std::mem::swap(&mut self.now.x, &mut self.x_new);
+        std::mem::swap(&mut self.now.v, &mut self.v_new);
         std::mem::swap(&mut self.x_tilde, &mut self.x_tilde_new);
-        std::mem::swap(&mut self.previous, &mut self.acceleration);
-        std::mem::swap(&mut self.acceleration, &mut self.trial);
-        self.grid.reach(t);
+        std::mem::swap(&mut self.previous, &mut self.now.acceleration);
+        std::mem::swap(&mut self.now.acceleration, &mut self.trial);
+        self.now.grid.reach(t);
     }
 }
 
 impl ImplicitStep for GeneralizedAlpha {
-    fn newton(&mut self) -> &mut Newton {
+    /// At the ends alone.
+    const MOTION_RULE: &'static [(f64, f64)] = &[(0.0, 0.5), (1.0, 0.5)];
+
+    fn current(&self) -> &Current {
+        &self.now
+    }
+
+    fn current_mut(&mut self) -> &mut Current {
+        &mut self.now
+    }
+
+    fn newton(&self) -> &Newton {
+        &self.newton
+    }
+
+    fn newton_mut(&mut self) -> &mut Newton {
         &mut self.newton
     }
 
@@ -278,7 +283,7 @@ impl ImplicitStep for GeneralizedAlpha {
     fn attempt(&mut self, system: &mut impl SecondOrderSystem, t: f64) -> Result<(), StepError> {
         if !self.newton.factored {
             // The matrix belongs to the configuration of the last residual.
-            system.residual(self.grid.time(), &self.x, &self.v, &self.acceleration, &mut self.newton.r);
+            system.residual(self.now.grid.time(), &self.now.x, &self.now.v, &self.now.acceleration, &mut self.newton.r);
             self.factor(system, t)?;
         }
         if self.newton.fresh {
@@ -286,8 +291,8 @@ impl ImplicitStep for GeneralizedAlpha {
         }
 
         // Predict ẍ⁺ by extrapolation.
-        for k in 0..self.x.len() {
-            self.trial[k] = 2.0 * self.acceleration[k] - self.previous[k];
+        for k in 0..self.now.x.len() {
+            self.trial[k] = 2.0 * self.now.acceleration[k] - self.previous[k];
         }
         self.place();
 
@@ -310,46 +315,5 @@ impl ImplicitStep for GeneralizedAlpha {
         self.newton.found(search.iterations, search.iterations);
         self.accept(t);
         Ok(())
-    }
-}
-
-impl Integrator for GeneralizedAlpha {
-    /// At the ends alone.
-    const MOTION_RULE: &'static [(f64, f64)] = &[(0.0, 0.5), (1.0, 0.5)];
-
-    fn grid(&self) -> &TimeGrid {
-        &self.grid
-    }
-
-    fn state(&self) -> [&DVector<f64>; 3] {
-        [&self.x, &self.v, &self.acceleration]
-    }
-
-    fn state_at_event(&mut self) -> (&DVector<f64>, &mut DVector<f64>) {
-        (&self.x, &mut self.v)
-    }
-
-    fn advance_to(&mut self, system: &mut impl SecondOrderSystem, t: f64) -> Result<(), StepError> {
-        let grid = self.grid;
-        advance(self, system, grid, t)
-    }
-
-    fn restart(&mut self, system: &mut impl SecondOrderSystem) -> Result<(), StepError> {
-        system.acceleration(self.grid.time(), &self.x, &self.v, &mut self.acceleration)?;
-        self.newton.fresh = true;
-        Ok(())
-    }
-
-    fn renew(&mut self, system: &mut impl SecondOrderSystem) -> Result<(), StepError> {
-        self.newton.factored = false;
-        self.restart(system)
-    }
-
-    fn counts(&self) -> Counts {
-        self.newton.counts(self.grid.steps())
-    }
-
-    fn last_iteration(&self) -> (usize, f64) {
-        self.newton.last()
     }
 }
