@@ -12,7 +12,7 @@ use flexarm_stepping::{Held, OperatingPoint};
 use crate::error::Error;
 use crate::flexible::FlexibleRobot;
 use crate::options::{Modelling, Outputs, RunOptions};
-use crate::robot::{Robot, TCP_FRAME};
+use crate::robot::Robot;
 use crate::run::{Together, run_traced};
 use crate::scenario::Scenario;
 use crate::summary::Summary;
@@ -138,7 +138,6 @@ impl Arm {
         let actuated = &model.coordinates()[..model.n_actuated()];
         let pose = actuated.iter().map(|c| middle(c.limits.lower, c.limits.upper)).collect();
         let arm = self.flexible.arm(Arc::new(Held(pose))).map_err(|error| self.flexible.explained(error))?;
-        let tool = arm.model.frame(TCP_FRAME).expect("added when the robot was loaded").clone();
-        Ok(OperatingPoint::new(arm, tool))
+        Ok(OperatingPoint::new(arm, self.flexible.tcp.clone()))
     }
 }

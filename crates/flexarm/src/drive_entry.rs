@@ -10,6 +10,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use crate::error::Error;
+use crate::options::DriveModel;
 use crate::robot_file::{RobotFileError, Source};
 
 /// Shortest time between two samples of a servo (s): each is an event of the run.
@@ -149,6 +150,25 @@ pub struct GearDamping {
     pub dampers: Option<Vec<f64>>,
     /// Torque curve of the axis.
     pub curve: Option<TorqueCurve>,
+}
+
+impl Drive {
+    /// How it is driven where drives are modelled so.
+    pub(crate) fn kind_as(&self, drives: DriveModel) -> DriveKind {
+        match drives {
+            DriveModel::AsFiled => self.kind,
+            DriveModel::Rigid => DriveKind::Prescribed,
+            DriveModel::Elastic if self.gearbox.is_some() => DriveKind::Gearbox,
+            DriveModel::Elastic => DriveKind::Prescribed,
+            DriveModel::Servo => DriveKind::Torque,
+        }
+    }
+
+    /// Its gearbox, if it gives way where drives are modelled so.
+    pub(crate) fn gearbox_as(&self, drives: DriveModel) -> Option<Gearbox> {
+        let gives_way = self.kind_as(drives) != DriveKind::Prescribed;
+        self.gearbox.as_ref().filter(|_| gives_way).map(|(gearbox, _)| gearbox.clone())
+    }
 }
 
 impl GearDamping {

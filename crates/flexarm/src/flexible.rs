@@ -7,10 +7,10 @@ use std::sync::Arc;
 use crate::bends::Bend;
 use flexarm_fem::{BeamLink, ModalLink, ModalOptions};
 use flexarm_flexlink::{
-    BranchJoint, FlexibleLink, FlexibleSpan, Gearbox, LinkForm, Parts, SubstitutionError, branch_joints,
-    insert_gearboxes, substitute,
+    BranchJoint, FlexibleLink, FlexibleSpan, GearSpring, Gearbox, LinkForm, Parts, Substituted, SubstitutionError,
+    branch_joints, insert_gearboxes, substitute,
 };
-use flexarm_kinematics::{Data, ElasticAngles, MOST_COORDINATES, Model, mass_matrix};
+use flexarm_kinematics::{Coordinate, Data, ElasticAngles, ElasticGroup, Frame, MOST_COORDINATES, Model, mass_matrix};
 use flexarm_settings::Setting;
 use flexarm_stepping::{
     Damping, FlexibleArm, Friction, GeometricStiffness, PrescribedMotion, Servo, ServoAxis, Spring, StepError,
@@ -18,11 +18,11 @@ use flexarm_stepping::{
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::caveat::Caveat;
-use crate::drive_entry::{Drive, DriveKind, GearDamping, ServoEntry};
+use crate::drive_entry::{DriveKind, ServoEntry};
 use crate::error::{Error, ModellingError, PoseError};
 use crate::import::SECOND_ORDER_UNKNOWN;
 use crate::options::{DriveModel, LinkModel, Modelling};
-use crate::robot::Robot;
+use crate::robot::{Robot, tcp_frame};
 
 /// Springs along Euler angles are not the same seen from either end: a term of third order in the bending is left, which a
 /// chain of n parts divides by n only.
@@ -201,6 +201,8 @@ pub struct FlexibleRobot {
     pub springs: Vec<Spring>,
     /// Owner of each spring.
     pub owners: Vec<Owner>,
+    /// The tool, on the body that carries it.
+    pub tcp: Frame,
     /// Flexible links.
     pub spans: Vec<FlexibleSpan>,
     /// How they are drawn bent, in the order of the spans.
@@ -370,119 +372,126 @@ impl Robot {
     /// # Errors
     /// [`Error::Modelling`] if a link or drive has no such model, [`Error::Model`] if the result is no tree.
     pub fn modelled(&self, modelling: &Modelling) -> Result<FlexibleRobot, Error> {
-        let (mut links, mut doubts): (Vec<FlexibleLink>, Vec<Caveat>) = (Vec::new(), Vec::new());
-        let mut modal_instead = Vec::new();
-        if modelling.links != LinkModel::Rigid {
-            for link in &self.flexible {
-                let (form, instead) = self.form_of(link, modelling)?;
-                modal_instead.extend(instead);
-                if matches!(&form, LinkForm::Modal(modal) if !modal.has_second_order()) {
-                    let text = format!("link {:?}: {SECOND_ORDER_UNKNOWN}", link.flexible.link);
-                    let help = "reduce the mesh itself (flexarm reduce) to have them";
-                    doubts.push(Caveat::said("second-order-unknown", "links", text, help));
-                }
-                if matches!(form, LinkForm::Chain(_)) && link.flexible.angles == ElasticAngles::EulerZyx {
-                    let text = format!("link {:?}: {EULER_CHAIN}", link.flexible.link);
-                    doubts.push(Caveat::said("euler-chain", "links", text, "leave angles away: rotation vectors"));
-                }
-                let mut flexible = FlexibleLink { form, ..link.flexible.clone() };
-                let uncut = self.uncut(link, &mut flexible);
-                doubts.extend(uncut.map(|text| Caveat::said("uniform-mass", "links", text, "")));
-                links.push(flexible);
-            }
-        }
-        // An option that nothing takes up is a mistake, not a wish.
-        let modal = links.iter().filter(|link| matches!(link.form, LinkForm::Modal(_))).count();
-        if let (Some(n), true) = (modelling.segments, modal == links.len()) {
-            return Err(ModellingError::NoLumpedLink { segments: n, modal_instead }.into());
-        }
-        if let (Some(n), 0) = (modelling.modes, modal) {
-            return Err(ModellingError::NoModalLink { modes: n }.into());
-        }
+        let ChosenLinks { links, doubts, modal_instead } = self.chosen_links(modelling)?;
         let mut substituted = substitute(&self.rigid, &links).map_err(ModellingError::from)?;
-
         let bends = crate::bends::bends(&substituted);
-
-        let kind = |drive: &Drive| match modelling.drives {
-            DriveModel::AsFiled => drive.kind,
-            DriveModel::Rigid => DriveKind::Prescribed,
-            DriveModel::Elastic if drive.gearbox.is_some() => DriveKind::Gearbox,
-            DriveModel::Elastic => DriveKind::Prescribed,
-            DriveModel::Servo => DriveKind::Torque,
-        };
-        let soft = |drive: &Drive| kind(drive) != DriveKind::Prescribed && drive.gearbox.is_some();
-        let with_spring: Vec<(usize, &Drive)> = self.drives.iter().enumerate().filter(|(_, d)| soft(d)).collect();
         let gearboxes: Vec<Gearbox> =
-            with_spring.iter().filter_map(|(_, d)| d.gearbox.as_ref().map(|g| g.0.clone())).collect();
+            self.drives.iter().filter_map(|drive| drive.gearbox_as(modelling.drives)).collect();
         let gears = insert_gearboxes(&mut substituted.mechanism, &gearboxes).map_err(ModellingError::from)?;
         let model = Model::new(&substituted.mechanism)
             .map_err(|source| Error::Model { path: self.urdf_path.clone(), source })?;
 
-        // Each group of elastic coordinates belongs to a joint of a lumped link, to a modal link or to a gearbox.
-        let span_of = |link: &str| substituted.spans.iter().position(|s| s.link == link);
-        let mut found: HashMap<&str, (Spring, Owner)> = HashMap::new();
-        for spring in &substituted.springs {
-            let Some(k) = span_of(&spring.link) else { continue };
-            let chained = substituted.springs.iter().filter(|s| s.link == spring.link).count() > 1;
-            let number = substituted.springs.iter().filter(|s| s.link == spring.link);
-            let number = 1 + number.take_while(|s| s.joint != spring.joint).count();
-            let name = if chained { format!("{}.{number}", spring.link) } else { spring.link.clone() };
-            let spring_of = Spring::from((name, spring.K_S, self.flexible[k].damping));
-            found.insert(&spring.joint, (spring_of, Owner::Link(k)));
-        }
-        for link in &links {
-            if let (LinkForm::Modal(modal), Some(k)) = (&link.form, span_of(&link.link)) {
-                let geometric = if self.flexible[k].choices.geometric { modal.geometric.as_ref() } else { None };
-                let (name, K, damping) = (link.link.clone(), modal.K.clone(), self.flexible[k].damping);
-                let geometric = geometric.map(|g| Arc::new(stiffening(g)));
-                found.insert(&link.link, (Spring { name, K, damping, curve: None, geometric }, Owner::Link(k)));
-            }
-        }
-        for gear in &gears {
-            let Some((number, drive)) = with_spring.iter().find(|(_, d)| d.joint == gear.gearbox) else { continue };
-            let Some((_, GearDamping { curve, .. })) = &drive.gearbox else { continue };
-            let damping = drive.gearbox.as_ref().map(|g| g.1.of(gear.component, gear.K.nrows()));
-            let damping = damping.unwrap_or(Damping::Modal(0.0));
-            let (name, K): (String, DMatrix<f64>) = (gear.name.clone(), gear.K.clone());
-            let spring = Spring { name, K, damping, curve: curve.clone(), geometric: None };
-            found.insert(&gear.joint, (spring, Owner::Drive(*number)));
-        }
-        let (mut springs, mut owners) = (Vec::new(), Vec::new());
-        for group in model.elastic() {
-            let (spring, owner) = found
-                .remove(group.name.as_str())
-                .ok_or_else(|| ModellingError::NoStiffness { joint: group.name.clone() })?;
-            springs.push(spring);
-            owners.push(owner);
-        }
-
-        let actuated = &model.coordinates()[..model.n_actuated()];
-        let drive_of = |joint: &str| self.drives.iter().find(|d| d.joint == joint);
-        let friction = actuated.iter().map(|c| drive_of(&c.joint).map_or(Friction::NONE, |d| d.friction)).collect();
-        let mut torque = Vec::new();
-        for (k, coordinate) in actuated.iter().enumerate() {
-            match drive_of(&coordinate.joint) {
-                Some(d) if kind(d) == DriveKind::Torque => torque.push((k, d.servo, d.torque_limit)),
-                None if modelling.drives == DriveModel::Servo => {
-                    torque.push((k, ServoEntry::default(), coordinate.limits.effort));
-                }
-                _ => {}
-            }
-        }
-        let (spans, rigid) = (substituted.spans, self.rigid_model()?);
+        let mut owned = self.lumped_springs(&substituted);
+        owned.extend(self.modal_springs(&links, &substituted));
+        owned.extend(self.gear_springs(&gears));
+        let (springs, owners) = in_coordinate_order(&model, owned)?;
+        let (friction, torque) = self.actuation(&model, modelling.drives);
         Ok(FlexibleRobot {
             path: self.urdf_path.clone(),
+            tcp: tcp_frame(&model),
             model: Arc::new(model),
             springs,
             owners,
-            spans,
+            spans: substituted.spans,
             bends,
-            rigid,
+            rigid: self.rigid_model()?,
             friction,
             torque,
             doubts,
             modal_instead,
         })
+    }
+
+    /// Which model each flexible link gets.
+    fn chosen_links(&self, modelling: &Modelling) -> Result<ChosenLinks, Error> {
+        let mut chosen = ChosenLinks::default();
+        let wanted = if modelling.links == LinkModel::Rigid { &[][..] } else { &self.flexible[..] };
+        for link in wanted {
+            let (form, instead) = self.form_of(link, modelling)?;
+            chosen.modal_instead.extend(instead);
+            chosen.doubts.extend(doubts_of(&link.flexible, &form));
+            let mut flexible = FlexibleLink { form, ..link.flexible.clone() };
+            let uncut = self.uncut(link, &mut flexible);
+            chosen.doubts.extend(uncut.map(|text| Caveat::said("uniform-mass", "links", text, "")));
+            chosen.links.push(flexible);
+        }
+        // An option that nothing takes up is a mistake, not a wish.
+        let modal = chosen.links.iter().filter(|link| matches!(link.form, LinkForm::Modal(_))).count();
+        if let (Some(n), true) = (modelling.segments, modal == chosen.links.len()) {
+            return Err(ModellingError::NoLumpedLink { segments: n, modal_instead: chosen.modal_instead }.into());
+        }
+        if let (Some(n), 0) = (modelling.modes, modal) {
+            return Err(ModellingError::NoModalLink { modes: n }.into());
+        }
+        Ok(chosen)
+    }
+
+    /// Springs of the lumped links.
+    fn lumped_springs(&self, substituted: &Substituted) -> Vec<OwnedSpring> {
+        let springs = &substituted.springs;
+        let mut owned = Vec::new();
+        for (k, span) in substituted.spans.iter().enumerate() {
+            let of_link: Vec<_> = springs.iter().filter(|spring| spring.link == span.link).collect();
+            for (number, spring) in of_link.iter().enumerate() {
+                let name = match of_link.len() {
+                    1 => span.link.clone(),
+                    _ => format!("{}.{}", span.link, number + 1),
+                };
+                let (group, damping) = (spring.joint.clone(), self.flexible[k].damping);
+                owned.push(OwnedSpring {
+                    group,
+                    spring: Spring::from((name, spring.K_S, damping)),
+                    owner: Owner::Link(k),
+                });
+            }
+        }
+        owned
+    }
+
+    /// Springs of the links that bend in modes.
+    fn modal_springs(&self, links: &[FlexibleLink], substituted: &Substituted) -> Vec<OwnedSpring> {
+        let mut owned = Vec::new();
+        for link in links {
+            let span = substituted.spans.iter().position(|span| span.link == link.link);
+            let (LinkForm::Modal(modal), Some(k)) = (&link.form, span) else { continue };
+            let source = &self.flexible[k];
+            let geometric = modal.geometric.as_ref().filter(|_| source.choices.geometric);
+            let geometric = geometric.map(|g| Arc::new(stiffening(g)));
+            let (name, K, damping) = (link.link.clone(), modal.K.clone(), source.damping);
+            let spring = Spring { name, K, damping, curve: None, geometric };
+            owned.push(OwnedSpring { group: link.link.clone(), spring, owner: Owner::Link(k) });
+        }
+        owned
+    }
+
+    /// Springs of the gearboxes.
+    fn gear_springs(&self, gears: &[GearSpring]) -> Vec<OwnedSpring> {
+        let mut owned = Vec::new();
+        for gear in gears {
+            let found = self.drives.iter().enumerate().find(|(_, drive)| drive.joint == gear.gearbox);
+            let Some((number, Some((_, damping)))) = found.map(|(n, drive)| (n, &drive.gearbox)) else { continue };
+            let spring = Spring {
+                name: gear.name.clone(),
+                K: gear.K.clone(),
+                damping: damping.of(gear.component, gear.K.nrows()),
+                curve: damping.curve.clone(),
+                geometric: None,
+            };
+            owned.push(OwnedSpring { group: gear.joint.clone(), spring, owner: Owner::Drive(number) });
+        }
+        owned
+    }
+
+    /// Friction of each actuated coordinate, and the joints that are driven by torque: coordinate, servo, limit.
+    fn actuation(&self, model: &Model, drives: DriveModel) -> (Vec<Friction>, Vec<(usize, ServoEntry, f64)>) {
+        let actuated = &model.coordinates()[..model.n_actuated()];
+        let drive_of = |joint: &str| self.drives.iter().find(|d| d.joint == joint);
+        let friction = actuated.iter().map(|c| drive_of(&c.joint).map_or(Friction::NONE, |d| d.friction)).collect();
+        let servo = |(k, coordinate): (usize, &Coordinate)| match drive_of(&coordinate.joint) {
+            Some(d) => (d.kind_as(drives) == DriveKind::Torque).then_some((k, d.servo, d.torque_limit)),
+            None => (drives == DriveModel::Servo).then(|| (k, ServoEntry::default(), coordinate.limits.effort)),
+        };
+        (friction, actuated.iter().enumerate().filter_map(servo).collect())
     }
 
     /// The model of a link on this robot, and a sentence if it is another one than asked for: a link with load on a third
@@ -525,6 +534,49 @@ impl Robot {
             (middle - own).norm()
         ))
     }
+}
+
+/// The flexible links with the model that each gets.
+#[derive(Default)]
+struct ChosenLinks {
+    links: Vec<FlexibleLink>,
+    doubts: Vec<Caveat>,
+    modal_instead: Vec<String>,
+}
+
+/// Doubts about a link in this form.
+fn doubts_of(link: &FlexibleLink, form: &LinkForm) -> Vec<Caveat> {
+    let mut doubts = Vec::new();
+    if matches!(form, LinkForm::Modal(modal) if !modal.has_second_order()) {
+        let text = format!("link {:?}: {SECOND_ORDER_UNKNOWN}", link.link);
+        let help = "reduce the mesh itself (flexarm reduce) to have them";
+        doubts.push(Caveat::said("second-order-unknown", "links", text, help));
+    }
+    if matches!(form, LinkForm::Chain(_)) && link.angles == ElasticAngles::EulerZyx {
+        let text = format!("link {:?}: {EULER_CHAIN}", link.link);
+        doubts.push(Caveat::said("euler-chain", "links", text, "leave angles away: rotation vectors"));
+    }
+    doubts
+}
+
+/// A spring with the group of elastic coordinates that it acts on ([`flexarm_kinematics::ElasticGroup::name`]).
+struct OwnedSpring {
+    group: String,
+    spring: Spring,
+    owner: Owner,
+}
+
+/// Springs and their owners in the order of the model's elastic coordinates.
+///
+/// # Errors
+/// [`ModellingError::NoStiffness`] for a group without a spring.
+fn in_coordinate_order(model: &Model, owned: Vec<OwnedSpring>) -> Result<(Vec<Spring>, Vec<Owner>), ModellingError> {
+    let mut by_group: HashMap<String, (Spring, Owner)> =
+        owned.into_iter().map(|owned| (owned.group, (owned.spring, owned.owner))).collect();
+    let of_group = |group: &ElasticGroup| {
+        by_group.remove(&group.name).ok_or_else(|| ModellingError::NoStiffness { joint: group.name.clone() })
+    };
+    model.elastic().iter().map(of_group).collect::<Result<Vec<_>, _>>().map(|found| found.into_iter().unzip())
 }
 
 fn stiffening(g: &flexarm_fem::GeometricStiffness) -> GeometricStiffness {

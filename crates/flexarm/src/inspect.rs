@@ -10,7 +10,7 @@ use serde::Serialize;
 use crate::error::{Error, PoseError};
 use crate::options::Modelling;
 use crate::posed::all_finite;
-use crate::robot::{Robot, TCP_FRAME};
+use crate::robot::{Robot, tcp_frame};
 
 /// Answer of `flexarm inspect`. SI units; the Jacobian's rows are linear first, world axes, at the TCP.
 #[derive(Clone, Debug, Serialize)]
@@ -157,10 +157,10 @@ pub fn inspect(robot: &Robot, at: Option<&[f64]>, velocity: Option<&[f64]>) -> R
     let gravity = gravity_forces(&model, &mut data, &state.q).clone();
     let bias = nonlinear_effects(&model, &mut data, &state).clone();
     forward_kinematics_velocity(&model, &mut data, &state);
-    let tcp = model.frame(TCP_FRAME).expect("added when the robot was loaded");
+    let tcp = tcp_frame(&model);
     let mut J = Matrix6xX::zeros(model.nv());
-    frame_jacobian(&model, &data, tcp, &mut J);
-    let X = data.X_WF(tcp);
+    frame_jacobian(&model, &data, &tcp, &mut J);
+    let X = data.X_WF(&tcp);
     let attitude = UnitQuaternion::from_rotation_matrix(&X.rotation);
     all_finite("the place of the TCP and its Jacobian", X.translation.vector.iter().chain(&J))?;
     all_finite("the mass matrix and the torques", M.iter().chain(&gravity).chain(&bias))?;

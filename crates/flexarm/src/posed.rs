@@ -12,7 +12,7 @@ use crate::error::{Error, PoseError};
 use crate::flexible::FlexibleRobot;
 use crate::inspect::joint_values;
 use crate::options::Modelling;
-use crate::robot::{Robot, TCP_FRAME};
+use crate::robot::Robot;
 
 /// Flexible arm with its drives locked at a pose.
 pub(crate) struct Posed {
@@ -62,8 +62,7 @@ impl Posed {
         }
         let prismatic = actuated.iter().map(|c| c.kind == "prismatic").collect();
         let arm = flexible.arm(Arc::new(Held(at.clone()))).map_err(|error| flexible.explained(error))?;
-        let tool = arm.model.frame(TCP_FRAME).expect("added when the robot was loaded").clone();
-        Ok(Self { flexible, arm, tool, joints, prismatic, at, caveats })
+        Ok(Self { tool: flexible.tcp.clone(), flexible, arm, joints, prismatic, at, caveats })
     }
 
     /// The linear structure about the equilibrium under weight and a wrench at the TCP (world axes).

@@ -12,7 +12,6 @@ use crate::magnification::Expected;
 use crate::motion::Motion;
 use crate::options::RunOptions;
 use crate::robot::Robot;
-use crate::run::tool_frame;
 use crate::scenario::Scenario;
 
 /// A run whose input makes sense.
@@ -26,7 +25,7 @@ pub(crate) struct Checked {
 impl Checked {
     /// Deflections that the run will have, roughly.
     pub(crate) fn expected(&self, scenario: &Scenario) -> Expected {
-        Expected::of(&self.arm, &tool_frame(&self.arm), scenario.duration_s(), scenario.start)
+        Expected::of(&self.arm, &self.flexible.tcp, scenario.duration_s(), scenario.start)
     }
 }
 

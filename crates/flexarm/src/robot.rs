@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use flexarm_kinematics::{Joint, JointKind, Link, LinkInertia, Mechanism, Model, Pose};
+use flexarm_kinematics::{Frame, Joint, JointKind, Link, LinkInertia, Mechanism, Model, Pose};
 use flexarm_urdf::{InertiaEstimate, ReadOptions, UrdfRobot, closest, default_tcp, read_urdf};
 use nalgebra::{Matrix3, Rotation3, Translation3, Vector3};
 use toml::Spanned;
@@ -281,6 +281,11 @@ impl Robot {
     pub fn rigid_model(&self) -> Result<Arc<Model>, Error> {
         Model::new(&self.rigid).map(Arc::new).map_err(|source| Error::Model { path: self.urdf_path.clone(), source })
     }
+}
+
+/// The tool's frame in a tree of the robot.
+pub(crate) fn tcp_frame(model: &Model) -> Frame {
+    model.frame(TCP_FRAME).expect("added when the robot was loaded").clone()
 }
 
 /// Angles as they were written, and materials that nothing uses: only the text of the file shows them.

@@ -27,7 +27,7 @@ use crate::motion::Motion;
 use crate::options::{Outputs, RunOptions};
 use crate::prepare::{Checked, checked};
 use crate::record::{header, link_frames, ordered_links, recorders, write_layouts};
-use crate::robot::{Robot, TCP_FRAME};
+use crate::robot::Robot;
 use crate::run::sampler::Sampler;
 use crate::scenario::Scenario;
 use crate::static_part::StaticPart;
@@ -113,7 +113,7 @@ pub(crate) fn run_traced(
     if progress(0.0, scenario.duration_s()).is_break() {
         return Err(Error::Interrupted { t: 0.0, partial: false });
     }
-    let own = || Expected::of(&arm, &tool_frame(&arm), scenario.duration_s(), scenario.start);
+    let own = || Expected::of(&arm, &flexible.tcp, scenario.duration_s(), scenario.start);
     let expected = together.expected.unwrap_or_else(own);
     let mut run = Run::new(robot, &scenario.motion, options, &flexible, arm, stepper);
     let mut files = recorders(outputs, !together.recorders.is_empty())?;
@@ -178,10 +178,6 @@ fn result(summary: &Summary, events: Vec<Event>) -> RunResult {
     }
 }
 
-pub(crate) fn tool_frame(arm: &FlexibleArm) -> Frame {
-    arm.model.frame(TCP_FRAME).expect("added when the robot was loaded").clone()
-}
-
 /// Who moves the tool.
 struct Contributor {
     /// Place among all displacements: links, then drives, then what servos leave.
@@ -235,7 +231,7 @@ impl<'a> Run<'a> {
         arm: FlexibleArm,
         stepper: Box<dyn Stepper>,
     ) -> Self {
-        let tcp = tool_frame(&arm);
+        let tcp = flexible.tcp.clone();
         let duration = motion.trajectory.duration();
         let last = (duration / options.step_s - 1e-9).ceil().max(0.0) as u64;
         let every = ((1.0 / (options.log_rate_hz * options.step_s)).round() as u64).max(1);
