@@ -44,6 +44,7 @@ mod mechanism;
 mod modal;
 mod model;
 mod rnea;
+mod static_tangent;
 
 pub use flexarm_spatial::{
     AngleKinematics, ArticulatedInertia, ElasticAngles, Pose, SpatialInertia, Twist, Wrench, adjoint, rotation_vector,
@@ -68,3 +69,4 @@ pub use model::{
     Body, Coordinate, ElasticGroup, Frame, JointMotion, MOST_COORDINATES, Model, ModelError, moment_floor,
 };
 pub use rnea::{gravity_forces, inverse_dynamics, nonlinear_effects};
+pub use static_tangent::{PointLoad, StaticTangent};
