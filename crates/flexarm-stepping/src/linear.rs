@@ -12,18 +12,16 @@
 use std::ops::Range;
 
 use flexarm_kinematics::{
-    Data, Frame, Pose, State, Wrench, forward_kinematics, frame_jacobian, gravity_forces, mass_matrix,
+    Data, Frame, Pose, State, StaticTangent, Wrench, forward_kinematics, frame_jacobian, mass_matrix,
 };
 use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX};
 
 use crate::arm::{ElasticElement, FlexibleArm, Servo};
 use crate::error::StepError;
-use crate::statics::{spring_forces, static_equilibrium, static_forces, with_curves};
+use crate::statics::{StaticSlopes, spring_forces, static_equilibrium, static_forces, with_curves};
 
 /// Accepted unbalanced force over the largest force, as in [`static_equilibrium`].
 const TOLERANCE: f64 = 1e-13;
-/// Step of the central differences of static forces (m, rad).
-const DIFFERENCE: f64 = 1e-6;
 /// Most Newton iterations.
 const MOST_ITERATIONS: usize = 30;
 
@@ -199,15 +197,8 @@ impl FeedForward {
         let mut data = Data::new(model);
         let M = mass_matrix(model, &mut data, pose).clone();
         let mut K = DMatrix::zeros(pose.len(), pose.len());
-        let mut moved = pose.clone();
-        for k in 0..pose.len() {
-            moved[k] = pose[k] + DIFFERENCE;
-            let up = gravity_forces(model, &mut data, &moved).clone();
-            moved[k] = pose[k] - DIFFERENCE;
-            let down = gravity_forces(model, &mut data, &moved).clone();
-            moved[k] = pose[k];
-            K.set_column(k, &((up - down) / (2.0 * DIFFERENCE)));
-        }
+        forward_kinematics(model, &mut data, pose);
+        StaticTangent::new(model, 0).compute(model, &data, pose, &[], &mut K);
         Self { M, K }
     }
 }
@@ -307,22 +298,15 @@ impl Statics<'_> {
     /// As [`static_forces`].
     fn forces(&self, data: &mut Data, q: &DVector<f64>) -> DVector<f64> {
         let mut p = DVector::zeros(q.len());
-        static_forces(self.arm, (self.tool, &self.F_T_W), self.t, data, q, &mut p);
+        static_forces(self.arm, Some((self.tool, &self.F_T_W)), self.t, data, q, &mut p);
         p
     }
 
-    /// Their derivatives by all coordinates, central differences.
+    /// Their derivatives by all coordinates.
     fn slopes(&self, data: &mut Data, q: &DVector<f64>) -> DMatrix<f64> {
         let mut P = DMatrix::zeros(q.len(), q.len());
-        let mut moved = q.clone();
-        for k in 0..q.len() {
-            moved[k] = q[k] + DIFFERENCE;
-            let up = self.forces(data, &moved);
-            moved[k] = q[k] - DIFFERENCE;
-            let down = self.forces(data, &moved);
-            moved[k] = q[k];
-            P.set_column(k, &((up - down) / (2.0 * DIFFERENCE)));
-        }
+        let tool = Some((self.tool, &self.F_T_W));
+        StaticSlopes::new(self.arm, 0).compute(self.arm, tool, self.t, data, q, &mut P);
         P
     }
 }

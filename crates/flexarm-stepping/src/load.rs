@@ -3,8 +3,8 @@
 use std::fmt;
 use std::sync::Arc;
 
-use flexarm_kinematics::{Pose, Wrench};
-use nalgebra::Vector3;
+use flexarm_kinematics::{PointLoad, Pose, Wrench};
+use nalgebra::{Rotation3, Vector3};
 
 /// Axes in which a load keeps its direction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -87,6 +87,14 @@ impl Load {
     /// A constant wrench at the body's origin, world axes.
     pub fn constant(body: usize, F_W: Wrench) -> Self {
         Self::at_origin(body, TimedWrench::new(move |_| F_W))
+    }
+
+    /// At time t (s), for the tangent of the static forces.
+    pub(crate) fn point_load(&self, t: f64, X_WB: &Pose) -> PointLoad {
+        let (F, turns) = (self.wrench.at(t), self.wrench.axes == LoadAxes::Frame);
+        let R = if turns { X_WB.rotation * self.X_BF.rotation } else { Rotation3::identity() };
+        let F_W = Wrench::new(R * F.force, R * F.torque);
+        PointLoad { body: self.body, p_B: self.X_BF.translation.vector, F_W, turns }
     }
 
     /// At Bo in body axes.

@@ -4,7 +4,7 @@
 //! K e + p(q_a, e) = 0          C = J (K + dp/de)^-1 Jᵀ          (K + dp/de) φ = ω² M φ
 //! ```
 //! with the elastic coordinates e, the springs K, and p the forces that hold weight and loads. Drives are locked. Newton goes on
-//! with the factor of the pose before, so a pose costs one tangent: 2 n passes of the recursion.
+//! with the factor of the pose before, so a pose costs one tangent, in closed form ([`flexarm_kinematics::StaticTangent`]).
 //!
 //! Start at [`OperatingPoint::new`]. For damping, servos and inputs about one pose: [`crate::linearise`].
 
@@ -15,12 +15,10 @@ use crate::arm::FlexibleArm;
 use crate::eigenvalues::symmetric_eigenvalues;
 use crate::error::StepError;
 use crate::motion::Held;
-use crate::statics::{add_spring_forces, static_equilibrium, static_forces};
+use crate::statics::{StaticSlopes, add_spring_forces, static_equilibrium, static_forces};
 
 /// Accepted unbalanced force over the largest force.
 const TOLERANCE: f64 = 1e-13;
-/// Step of the central differences of static forces (m, rad).
-const DIFFERENCE: f64 = 1e-6;
 /// Most Newton iterations.
 const MOST_ITERATIONS: usize = 60;
 /// A step that leaves more than this part of the residual asks for a new tangent.
@@ -44,8 +42,7 @@ pub struct OperatingPoint {
     F_T_W: Wrench,
     /// Static forces, all coordinates: where the joints' part stays.
     p: DVector<f64>,
-    up: DVector<f64>,
-    down: DVector<f64>,
+    slopes: StaticSlopes,
     /// Unbalanced forces, and Newton's step.
     r: DVector<f64>,
     /// `K + dp/de` as it is, n×n.
@@ -85,8 +82,7 @@ impl OperatingPoint {
             q: DVector::zeros(nv),
             F_T_W: Wrench::zeros(),
             p: DVector::zeros(nv),
-            up: DVector::zeros(n),
-            down: DVector::zeros(n),
+            slopes: StaticSlopes::new(&arm, arm.model.n_actuated()),
             r: DVector::zeros(n),
             tangent: DMatrix::zeros(n, n),
             factor: None,
@@ -192,7 +188,7 @@ impl OperatingPoint {
 
     /// Weight, loads and stiffness by load at `q`, without springs, into `p`.
     fn forces(&mut self) {
-        static_forces(&self.arm, (&self.tool, &self.F_T_W), 0.0, &mut self.data, &self.q, &mut self.p);
+        static_forces(&self.arm, Some((&self.tool, &self.F_T_W)), 0.0, &mut self.data, &self.q, &mut self.p);
     }
 
     /// `r = K e + p`; returns the largest of both.
@@ -213,19 +209,8 @@ impl OperatingPoint {
     /// The tangent at `q` and the factor of its symmetric part.
     fn refactor(&mut self) -> Result<(), StepError> {
         let (m, n) = (self.arm.model.n_actuated(), self.r.len());
-        for k in 0..n {
-            let at = self.q[m + k];
-            self.q[m + k] = at + DIFFERENCE;
-            self.forces();
-            self.up.copy_from(&self.p.rows(m, n));
-            self.q[m + k] = at - DIFFERENCE;
-            self.forces();
-            self.down.copy_from(&self.p.rows(m, n));
-            self.q[m + k] = at;
-            let slopes = self.up.iter().zip(&self.down).map(|(up, down)| (up - down) / (2.0 * DIFFERENCE));
-            self.tangent.column_mut(k).iter_mut().zip(slopes).for_each(|(t, slope)| *t = slope);
-        }
-        self.forces();
+        let tool = Some((&self.tool, &self.F_T_W));
+        self.slopes.compute(&self.arm, tool, 0.0, &mut self.data, &self.q, &mut self.tangent);
         self.tangent += &self.K;
         for element in &self.arm.elements {
             if let Some(curve) = &element.curve {

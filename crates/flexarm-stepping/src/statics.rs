@@ -1,6 +1,6 @@
 //! Static equilibrium of the elastic coordinates, drives held: Newton on `K e + g_e(q_a, e) = 0`.
 
-use flexarm_kinematics::{Data, Frame, State, Wrench, forward_kinematics, gravity_forces};
+use flexarm_kinematics::{Data, Frame, PointLoad, State, StaticTangent, Wrench, forward_kinematics, gravity_forces};
 use nalgebra::{DMatrix, DVector};
 
 use crate::arm::FlexibleArm;
@@ -18,7 +18,9 @@ const TOLERANCE: f64 = 1e-13;
 /// [`StepError::NoEquilibrium`] or [`StepError::Singular`].
 pub fn static_equilibrium(arm: &FlexibleArm, t: f64) -> Result<DVector<f64>, StepError> {
     let n = arm.n_elastic_coordinates();
-    let mut e = DVector::zeros(n);
+    // What was found with the modes is found again at once if nothing has changed since.
+    let known = t == 0.0 && arm.modes.equilibrium.len() == n;
+    let mut e = if known { arm.modes.equilibrium.clone() } else { DVector::zeros(n) };
     if n == 0 {
         return Ok(e);
     }
@@ -79,7 +81,7 @@ pub(crate) fn add_spring_forces(arm: &FlexibleArm, e: &[f64], f: &mut [f64]) {
 /// stiffness by load; all coordinates, into `p`. No allocation.
 pub(crate) fn static_forces(
     arm: &FlexibleArm,
-    (tool, F_T_W): (&Frame, &Wrench),
+    tool: Option<(&Frame, &Wrench)>,
     t: f64,
     data: &mut Data,
     q: &DVector<f64>,
@@ -89,9 +91,11 @@ pub(crate) fn static_forces(
     forward_kinematics(model, data, q);
     data.clear_external_wrenches();
     arm.apply_loads(data, t);
-    let R = data.X_WF(tool).rotation.inverse();
-    let F_T = Wrench::new(R * F_T_W.force, R * F_T_W.torque);
-    data.F_ext[tool.body] += F_T.at_parent(&tool.X_BF);
+    if let Some((tool, F_T_W)) = tool {
+        let R = data.X_WF(tool).rotation.inverse();
+        let F_T = Wrench::new(R * F_T_W.force, R * F_T_W.torque);
+        data.F_ext[tool.body] += F_T.at_parent(&tool.X_BF);
+    }
     p.copy_from(gravity_forces(model, data, q));
     add_geometric_forces(arm, data, &q.as_slice()[m..], &mut p.as_mut_slice()[m..]);
 }
@@ -138,7 +142,7 @@ fn leave_play(arm: &FlexibleArm, e: &DVector<f64>, g: &DVector<f64>, K: &DMatrix
     K
 }
 
-/// `K + dg/de` by central differences of the gravity forces, symmetrised.
+/// `K + dg/de` under weight and the loads of time t, symmetrised.
 pub(crate) fn tangent_stiffness(
     arm: &FlexibleArm,
     data: &mut Data,
@@ -146,17 +150,87 @@ pub(crate) fn tangent_stiffness(
     e: &DVector<f64>,
     K: &DMatrix<f64>,
 ) -> DMatrix<f64> {
-    let n = e.len();
-    let step = 1e-6;
+    let (m, n) = (arm.model.n_actuated(), e.len());
+    let (mut state, mut qddot) = (State::zeros(&arm.model), DVector::zeros(arm.model.nv()));
+    arm.prescribed_state(t, &mut state, &mut qddot);
+    state.q.rows_mut(m, n).copy_from(e);
     let mut G = DMatrix::zeros(n, n);
-    let mut moved = e.clone();
-    for k in 0..n {
-        moved[k] = e[k] + step;
-        let up = gravity_part(arm, data, t, &moved);
-        moved[k] = e[k] - step;
-        let down = gravity_part(arm, data, t, &moved);
-        moved[k] = e[k];
-        G.set_column(k, &((up - down) / (2.0 * step)));
-    }
+    StaticSlopes::new(arm, m).compute(arm, None, t, data, &state.q, &mut G);
     K + (&G + G.transpose()) * 0.5
+}
+
+/// Step of the central differences (m, rad).
+const DIFFERENCE: f64 = 1e-6;
+
+/// Derivatives of [`static_forces`] by the coordinates, with their workspace: in closed form; by central differences where
+/// loads change the stiffness of modal bodies.
+#[derive(Clone, Debug)]
+pub(crate) struct StaticSlopes {
+    /// First coordinate, 0 or that of the first spring.
+    first: usize,
+    exact: StaticTangent,
+    loads: Vec<PointLoad>,
+    moved: DVector<f64>,
+    up: DVector<f64>,
+    down: DVector<f64>,
+}
+
+impl StaticSlopes {
+    pub(crate) fn new(arm: &FlexibleArm, first: usize) -> Self {
+        let zeros = DVector::zeros(arm.model.nv());
+        Self {
+            first,
+            exact: StaticTangent::new(&arm.model, first),
+            loads: Vec::with_capacity(arm.loads.len() + 1),
+            moved: zeros.clone(),
+            up: zeros.clone(),
+            down: zeros,
+        }
+    }
+
+    /// Into `G`, a row and a column per coordinate from the first one on; leaves `data` with the poses at `q`.
+    pub(crate) fn compute(
+        &mut self,
+        arm: &FlexibleArm,
+        tool: Option<(&Frame, &Wrench)>,
+        t: f64,
+        data: &mut Data,
+        q: &DVector<f64>,
+        G: &mut DMatrix<f64>,
+    ) {
+        if arm.elements.iter().any(|element| element.geometric.is_some()) {
+            self.difference(arm, tool, t, data, q, G);
+            return forward_kinematics(&arm.model, data, q);
+        }
+        forward_kinematics(&arm.model, data, q);
+        self.loads.clear();
+        self.loads.extend(arm.loads.iter().map(|load| load.point_load(t, &data.X_WB[load.body])));
+        self.loads.extend(tool.map(|(tool, F_T_W)| {
+            let p_B = tool.X_BF.translation.vector;
+            PointLoad { body: tool.body, p_B, F_W: *F_T_W, turns: false }
+        }));
+        self.exact.compute(&arm.model, data, q, &self.loads, G);
+    }
+
+    fn difference(
+        &mut self,
+        arm: &FlexibleArm,
+        tool: Option<(&Frame, &Wrench)>,
+        t: f64,
+        data: &mut Data,
+        q: &DVector<f64>,
+        G: &mut DMatrix<f64>,
+    ) {
+        let Self { first, moved, up, down, .. } = self;
+        moved.copy_from(q);
+        for (k, mut column) in (*first..q.len()).zip(G.column_iter_mut()) {
+            moved[k] = q[k] + DIFFERENCE;
+            static_forces(arm, tool, t, data, moved, up);
+            moved[k] = q[k] - DIFFERENCE;
+            static_forces(arm, tool, t, data, moved, down);
+            moved[k] = q[k];
+            let slopes = up.iter().zip(down.iter()).skip(*first).map(|(up, down)| (up - down) / (2.0 * DIFFERENCE));
+            column.iter_mut().zip(slopes).for_each(|(to, slope)| *to = slope);
+        }
+    }
 }

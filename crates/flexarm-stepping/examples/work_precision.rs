@@ -1,0 +1,110 @@
+//! Time against error: every stepper on the reference arm, 4 s, steps alone.
+//!
+//! ```text
+//! cargo run --release -p flexarm-stepping --example work_precision
+//! ```
+//! The error is the largest distance of the tool at 10 ms from the reference's, over its peak deflection; CPU time of one
+//! thread, the smallest of five runs, all lines in turn.
+#![allow(non_snake_case, reason = "monogram notation")]
+#![allow(clippy::print_stdout, clippy::unwrap_used, reason = "an example")]
+
+use std::sync::Arc;
+
+use flexarm_kinematics::{Data, Model, State, forward_kinematics};
+use flexarm_stepping::*;
+use flexarm_testkit::{reference_arm, reference_motion};
+use nalgebra::{DVector, Vector3};
+
+const DURATION: f64 = 4.0;
+/// Distance of the points that are compared (s).
+const POINTS: f64 = 10e-3;
+
+fn arm() -> FlexibleArm {
+    let reference = reference_arm(true);
+    let model = Arc::new(Model::new(&reference.mechanism).unwrap());
+    let damping = Damping::StiffnessProportional(reference.beta);
+    let springs = reference.K_S.map(|K| ("spring".to_owned(), K, damping)).to_vec();
+    let motion = MotionFn(|t: f64, q: &mut [f64], v: &mut [f64], a: &mut [f64]| {
+        let (x, y, z) = reference_motion(t);
+        q.copy_from_slice(&x);
+        v.copy_from_slice(&y);
+        a.copy_from_slice(&z);
+    });
+    FlexibleArm::new(model, springs, Arc::new(motion)).unwrap()
+}
+
+/// Tool positions every [`POINTS`], and the work.
+fn path(arm: &FlexibleArm, kind: StepperKind, h: f64) -> (Vec<Vector3<f64>>, Counts) {
+    let tool = arm.model.frame("tcp").unwrap();
+    let mut stepper = new_stepper(kind, arm.clone(), h, Start::Equilibrium).unwrap();
+    let mut seen = Observation::new(arm);
+    let every = (POINTS / h).round() as usize;
+    let mut points = Vec::new();
+    for step in 0..=(DURATION / h).round() as usize {
+        if step % every == 0 {
+            stepper.observe(&mut seen);
+            points.push((seen.X_WB[tool.body] * tool.X_BF).translation.vector);
+        }
+        stepper.step().unwrap();
+    }
+    (points, stepper.counts())
+}
+
+/// CPU time of the steps alone (s).
+fn cost(arm: &FlexibleArm, kind: StepperKind, h: f64) -> f64 {
+    let mut stepper = new_stepper(kind, arm.clone(), h, Start::Equilibrium).unwrap();
+    let start = cpu_time::ThreadTime::now();
+    for _ in 0..(DURATION / h).round() as usize {
+        stepper.step().unwrap();
+    }
+    start.elapsed().as_secs_f64()
+}
+
+/// The same points of the rigid twin.
+fn rigid_path(arm: &FlexibleArm, count: usize) -> Vec<Vector3<f64>> {
+    let (mut data, mut state) = (Data::new(&arm.model), State::zeros(&arm.model));
+    let mut qddot = DVector::zeros(arm.model.nv());
+    let place = |k: usize| {
+        arm.prescribed_state(k as f64 * POINTS, &mut state, &mut qddot);
+        forward_kinematics(&arm.model, &mut data, &state.q);
+        data.X_WF(arm.model.frame("tcp").unwrap()).translation.vector
+    };
+    (0..count).map(place).collect()
+}
+
+fn main() {
+    let arm = arm();
+    let alpha = StepperKind::GeneralizedAlpha(AlphaSettings::default());
+    let reference = StepperKind::Reference(ReferenceSettings::new(1e-12));
+    let (truth, _) = path(&arm, reference, 10e-3);
+    let rigid = rigid_path(&arm, truth.len());
+    let peak = truth.iter().zip(&rigid).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+
+    let mut lines: Vec<(StepperKind, f64)> = Vec::new();
+    lines.extend([10e-3, 5e-3, 2.5e-3, 2e-3, 1e-3, 0.5e-3, 0.25e-3].map(|h| (alpha, h)));
+    lines.extend([10e-3, 5e-3, 2.5e-3, 1e-3, 0.5e-3].map(|h| (StepperKind::Sdirk3, h)));
+    lines.extend([1e-6, 1e-8].map(|rtol| (StepperKind::Reference(ReferenceSettings::new(rtol)), 10e-3)));
+    let mut least = vec![f64::INFINITY; lines.len()];
+    for _ in 0..5 {
+        for (least, (kind, h)) in least.iter_mut().zip(&lines) {
+            *least = least.min(cost(&arm, *kind, *h));
+        }
+    }
+    println!(
+        "{:<18} {:>8} {:>10} {:>10} {:>10} {:>12}",
+        "stepper", "step ms", "error/peak", "eval/step", "factors", "CPU ms per s"
+    );
+    for ((kind, h), cost) in lines.iter().zip(&least) {
+        let (points, counts) = path(&arm, *kind, *h);
+        let error = points.iter().zip(&truth).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+        println!(
+            "{:<18} {:>8} {:>10.1e} {:>10.2} {:>10} {:>12.3}",
+            kind.name(),
+            h * 1e3,
+            error / peak,
+            counts.evaluations as f64 / counts.steps as f64,
+            counts.factorisations,
+            cost * 1e3 / DURATION
+        );
+    }
+}
