@@ -3,6 +3,11 @@
 //! ```text
 //! r(ẍ) = 0        ẍ ← ẍ - J^-1 r        J: kept until an iteration slows down
 //! ```
+//! The first correction `d = J^-1 r` is the error of an extrapolation over the step, in the norm `√(r · d)`, which weighs
+//! coordinates by their inertia and stiffness. Each iteration leaves ρ of the one before; what a search may leave of the first
+//! one is a part of it ([`Newton::leaving`]). ρ is measured where two iterations are made, and grows as the arm moves away from
+//! where J was taken: while it is known to be small enough, a step needs one evaluation.
+//!
 //! A step whose iteration fails is tried again with a matrix of its start, then in halves, down to `h/64`.
 
 use nalgebra::DVector;
@@ -19,8 +24,20 @@ const MAX_ITERATIONS: usize = 25;
 const MOST_HALVINGS: u32 = 6;
 /// A step that needed more iterations than this renews the matrix for the next one; twice as many, for itself.
 const RENEW_ABOVE: usize = 4;
+/// Largest ρ of a matrix that is kept.
+const STALE: f64 = 0.01;
 /// Accepted correction over the size of the acceleration.
 const TOLERANCE: f64 = 1e-9;
+/// Part of the first correction that a search may leave unless it is told otherwise: errors that nothing damps add up.
+const TO_THE_END: f64 = 1e-6;
+/// Searches that may end on a ρ measured before them.
+const MOST_UNMEASURED: u32 = 6;
+/// A first correction so many times as large as the largest of late comes from something new, of which ρ says nothing.
+const SUDDEN: f64 = 1.2;
+/// What is left of the largest of late after each search.
+const FADING: f64 = 0.95;
+/// Corrections below this, over the size of the acceleration, are too near to rounding to measure ρ.
+const MEASURABLE: f64 = 1e-9;
 /// Corrections of x below this fraction of x are rounding.
 const ROUNDING: f64 = 1e-14;
 
@@ -40,6 +57,16 @@ pub(crate) struct Newton {
     factorisations: u64,
     last_iterations: usize,
     last_correction: f64,
+    /// ρ as measured last, infinite with a new matrix.
+    contraction: f64,
+    /// Searches since then.
+    unmeasured: u32,
+    /// Part of the first correction that a search may leave.
+    left: f64,
+    /// Whether the matrix was taken in the search under way.
+    new: bool,
+    /// Largest first correction of late.
+    largest_first: f64,
 }
 
 impl Newton {
@@ -55,7 +82,17 @@ impl Newton {
             factorisations: 0,
             last_iterations: 0,
             last_correction: 0.0,
+            contraction: f64::INFINITY,
+            unmeasured: 0,
+            left: TO_THE_END,
+            new: false,
+            largest_first: 0.0,
         }
+    }
+
+    /// The same, with searches that may leave this part of their first correction.
+    pub(crate) fn leaving(self, left: f64) -> Self {
+        Self { left, ..self }
     }
 
     /// Matrix and memory are out of date.
@@ -65,7 +102,8 @@ impl Newton {
 
     /// The matrix in `self.matrix` was inverted.
     pub(crate) fn renewed(&mut self) {
-        self.factored = true;
+        (self.factored, self.new) = (true, true);
+        self.contraction = f64::INFINITY;
         self.factorisations += 1;
     }
 
@@ -73,7 +111,26 @@ impl Newton {
     pub(crate) fn found(&mut self, iterations: usize, longest: usize) {
         self.iterations += iterations as u64;
         self.last_iterations += iterations;
-        self.factored = longest <= RENEW_ABOVE;
+        let stale = self.contraction.is_finite() && self.contraction > STALE;
+        self.new = false;
+        self.factored = longest <= RENEW_ABOVE && !stale;
+    }
+
+    /// Whether a search may end with its first correction, of that norm.
+    fn ends_at_once(&mut self, norm: f64) -> bool {
+        let calm = norm <= SUDDEN * self.largest_first;
+        self.largest_first = norm.max(FADING * self.largest_first);
+        let ends = calm && self.unmeasured < MOST_UNMEASURED && self.contraction <= self.left;
+        self.unmeasured += u32::from(ends);
+        ends
+    }
+
+    /// An iteration left this part of the one before. With the matrix of the search itself it says nothing of those to come.
+    fn measured(&mut self, contraction: f64) {
+        if !self.new {
+            self.contraction = contraction;
+            self.unmeasured = 0;
+        }
     }
 
     /// Work after so many steps.
@@ -90,12 +147,19 @@ impl Newton {
 /// Sizes of one Newton correction, the largest over all coordinates.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Sizes {
+    /// `√(r · d)` of residual and correction.
+    norm: f64,
     correction: f64,
     acceleration: f64,
     place: f64,
 }
 
 impl Sizes {
+    /// Of a correction with this norm, before any coordinate.
+    pub(crate) fn of(norm: f64) -> Self {
+        Self { norm, ..Self::default() }
+    }
+
     /// Takes in one coordinate: correction and value of its acceleration, and its place.
     pub(crate) fn include(&mut self, correction: f64, acceleration: f64, place: f64) {
         // `max` passes over NaN.
@@ -113,12 +177,14 @@ pub(crate) struct Search {
     /// `dx/dẍ` of the method (s²).
     c_K: f64,
     pub(crate) iterations: usize,
+    /// Norms of the first correction and of the last one.
+    first: f64,
     last: f64,
 }
 
 impl Search {
     pub(crate) fn new(t: f64, h: f64, c_K: f64) -> Self {
-        Self { t, h, c_K, iterations: 0, last: f64::INFINITY }
+        Self { t, h, c_K, iterations: 0, first: 0.0, last: f64::INFINITY }
     }
 
     /// Whether the iteration stalls: it gets a fresh matrix.
@@ -131,7 +197,7 @@ impl Search {
     /// # Errors
     /// [`StepError::Diverged`] where values are out of all range, [`StepError::NotConverged`] after too many iterations.
     pub(crate) fn ends(&mut self, sizes: Sizes, newton: &mut Newton) -> Result<bool, StepError> {
-        let Sizes { correction, acceleration: size, place } = sizes;
+        let Sizes { norm, correction, acceleration: size, place } = sizes;
         let Self { t, h, c_K, .. } = *self;
         self.iterations += 1;
         if !correction.is_finite() || place > 1e6 {
@@ -140,16 +206,22 @@ impl Search {
             return Err(StepError::Diverged { t, h, what });
         }
         newton.last_correction = if size > 0.0 { correction / size } else { 0.0 };
-        if correction <= TOLERANCE * size || c_K * correction <= ROUNDING * place {
+        let (first, contraction) = (self.iterations == 1, norm / self.last);
+        if first {
+            self.first = norm;
+        } else if correction > MEASURABLE * size {
+            newton.measured(contraction);
+        }
+        let enough = first && newton.ends_at_once(norm);
+        if enough || correction <= TOLERANCE * size || c_K * correction <= ROUNDING * place {
             return Ok(true);
         }
         if self.iterations == MAX_ITERATIONS {
             return Err(StepError::NotConverged { t, h, iterations: self.iterations, correction: correction / size });
         }
         // Else the contraction seen so far tells whether the next correction would be small enough.
-        let contraction = correction / self.last;
-        self.last = correction;
-        Ok(self.iterations > 1 && contraction < 0.1 && correction * contraction <= TOLERANCE * size)
+        self.last = norm;
+        Ok(!first && contraction < 0.1 && norm * contraction <= newton.left * self.first)
     }
 }
 

@@ -57,10 +57,12 @@ impl IterationMatrix {
         Ok(())
     }
 
-    /// Replaces `r` by `J^-1 r`.
-    pub(crate) fn solve(&mut self, r: &mut DVector<f64>) {
+    /// Replaces `r` by `d = J^-1 r`; returns `√(r · d)`.
+    pub(crate) fn solve(&mut self, r: &mut DVector<f64>) -> f64 {
         self.product.gemv(1.0, &self.inverse, r, 0.0);
+        let squared = self.product.dot(r);
         r.copy_from(&self.product);
+        squared.abs().sqrt()
     }
 }
 

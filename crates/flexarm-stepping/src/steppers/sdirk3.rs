@@ -62,6 +62,8 @@ impl Method for Sdirk3Settings {
     }
 }
 
+/// Part of the first correction of Newton's method that a stage may leave: the stages are of higher order than the extrapolation.
+const LEFT: f64 = 1e-4;
 /// γ: the root of the cubic in (5) for which the method is L-stable.
 const GAMMA: f64 = 0.435_866_521_508_459;
 /// c_i of (1).
@@ -106,7 +108,7 @@ impl Sdirk3 {
         let n = now.x.len();
         let zeros = || DVector::zeros(n);
         Ok(Self {
-            newton: Newton::new(n, h),
+            newton: Newton::new(n, h).leaving(LEFT),
             now,
             A: [zeros(), zeros(), zeros()],
             V: [zeros(), zeros(), zeros()],
@@ -154,9 +156,8 @@ impl Sdirk3 {
     }
 
     /// Takes the correction `d = J^-1 r` of A_i off everything on trial.
-    fn correct(&mut self, i: usize) -> Sizes {
+    fn correct(&mut self, i: usize, mut sizes: Sizes) -> Sizes {
         let c = GAMMA * self.newton.dt;
-        let mut sizes = Sizes::default();
         for k in 0..self.now.x.len() {
             let d = self.newton.r[k];
             self.A[i][k] -= d;
@@ -175,11 +176,11 @@ impl Sdirk3 {
         let mut search = Search::new(t, h, (GAMMA * h).powi(2));
         loop {
             system.residual(t, &self.X, &self.V[i], &self.A[i], &mut self.newton.r);
-            if search.stalls() {
+            if !self.newton.factored || search.stalls() {
                 self.factor(system, t)?;
             }
-            self.newton.matrix.solve(&mut self.newton.r);
-            let sizes = self.correct(i);
+            let norm = self.newton.matrix.solve(&mut self.newton.r);
+            let sizes = self.correct(i, Sizes::of(norm));
             if search.ends(sizes, &mut self.newton)? {
                 return Ok(search.iterations);
             }
@@ -208,12 +209,6 @@ impl ImplicitStep for Sdirk3 {
     }
 
     fn attempt(&mut self, system: &mut impl SecondOrderSystem, t: f64) -> Result<(), StepError> {
-        if !self.newton.factored {
-            // The matrix belongs to the configuration of the last residual.
-            system.residual(self.now.grid.time(), &self.now.x, &self.now.v, &self.now.acceleration, &mut self.newton.r);
-            self.factor(system, t)?;
-        }
-
         let start = t - self.newton.dt;
         let mut iterations = [0; 3];
         for (i, c) in NODES.into_iter().enumerate() {
