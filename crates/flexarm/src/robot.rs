@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use flexarm_files::read_text;
 use flexarm_kinematics::{Joint, JointKind, Link, LinkInertia, Mechanism, Model, Pose};
 use flexarm_urdf::{InertiaEstimate, ReadOptions, UrdfRobot, closest, default_tcp, read_urdf};
 use nalgebra::{Matrix3, Rotation3, Translation3, Vector3};
@@ -12,7 +13,6 @@ use crate::caveat::{self, Caveat};
 use crate::drive_entry::{Drive, drives};
 use crate::error::Error;
 use crate::flexible::RobotLink;
-use crate::input::read_text;
 use crate::link_entry::flexible_link;
 use crate::robot_file::{PayloadEntry, RobotFile, RobotFileError, Source, parse_robot_file};
 
