@@ -120,6 +120,7 @@ pub use summary::{
 };
 
 pub use flexarm_analysis::{Quantity, Spacing};
+pub use flexarm_files::FileError;
 pub use flexarm_kinematics::{LinkInertia, Pose, Wrench};
 pub use flexarm_linkmaker::{ImportError, JobError, LinkError, export, import};
 pub use flexarm_log::{Column, Columns, FormatInfo, Holds, RecordingFormat, Sample, Trace};
