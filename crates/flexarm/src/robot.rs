@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use flexarm_files::read_text;
 use flexarm_kinematics::{Joint, JointKind, Link, LinkInertia, Mechanism, Model, Pose};
 use flexarm_urdf::{InertiaEstimate, ReadOptions, UrdfRobot, closest, default_tcp, read_urdf};
 use nalgebra::{Matrix3, Rotation3, Translation3, Vector3};
@@ -112,7 +111,7 @@ impl Robot {
     }
 
     fn from_robot_file(path: &Path, options: &LoadOptions) -> Result<Self, Error> {
-        let text = read_text(path)?;
+        let text = flexarm_files::read_text(path)?;
         let (file, source) = parse_robot_file(&text, path)?;
         let folder = path.parent().unwrap_or(Path::new("."));
         let urdf_path = folder.join(file.urdf.get_ref());
