@@ -24,6 +24,12 @@ impl From<flexarm::Error> for Failure {
     }
 }
 
+impl From<flexarm::LinkError> for Failure {
+    fn from(error: flexarm::LinkError) -> Self {
+        Self::Library(error.into())
+    }
+}
+
 impl From<flexarm_verify::Error> for Failure {
     fn from(error: flexarm_verify::Error) -> Self {
         match error {

@@ -1,4 +1,5 @@
-//! The settings that messages speak of, as values that each face names in its own words.
+//! What errors and caveats are made of: the settings that they speak of, as values that each face names in its own words
+//! ([`Setting`]); the [`Caveat`], which compares a value with a yardstick; whom an error is to blame on ([`Fault`]).
 //!
 //! An error that says "try a smaller step" means a field of a struct to a Rust program, a keyword argument to a Python one
 //! and a flag to somebody at a terminal. Errors and caveats therefore carry a [`Setting`], and its name is asked for when
@@ -12,10 +13,18 @@
 //! assert_eq!(format!("try a smaller {}", Setting::Step), "try a smaller step_s");
 //! ```
 //!
-//! Not here: values, defaults and meaning of the settings. They are fields of the crate that each belongs to.
+//! Not here: values, defaults and meaning of the settings, which are fields of the crate that each belongs to; the kinds of
+//! caveats and their yardsticks, which are in the crates that find them.
+#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
+
+pub mod caveat;
+mod fault;
 
 use std::fmt;
 use std::sync::OnceLock;
+
+pub use caveat::Caveat;
+pub use fault::Fault;
 
 /// A setting that a message speaks of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -4,6 +4,7 @@ use flexarm::Fault;
 use flexarm_fe_io::MeshError;
 use flexarm_fem::FemError;
 use flexarm_fem::sparse::ModesError;
+use flexarm_files::FileError;
 
 /// What keeps a case study from being done.
 #[derive(Debug, thiserror::Error)]
@@ -75,6 +76,12 @@ impl From<FemError> for Error {
 
 impl From<Box<MeshError>> for Error {
     fn from(error: Box<MeshError>) -> Self {
+        Self::Library(flexarm::LinkError::from(error).into())
+    }
+}
+
+impl From<FileError> for Error {
+    fn from(error: FileError) -> Self {
         Self::Library(error.into())
     }
 }

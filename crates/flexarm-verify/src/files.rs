@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use flexarm::result_files::{check_free, write_all};
+use flexarm_files::{check_free, write_all};
 
 use crate::Error;
 use crate::Verification;

@@ -76,7 +76,7 @@ pub fn convert_until(
     if same_file(input, output) {
         return Err(RecordingError::SameFile { path: input.to_owned() }.into());
     }
-    crate::result_files::check_free(&[output.to_owned()], options.overwrite)?;
+    flexarm_files::check_free(&[output.to_owned()], options.overwrite)?;
 
     if progress(0.0).is_break() {
         return Err(Error::Interrupted { t: 0.0, partial: false });

@@ -3,33 +3,22 @@
 //! Settings in the messages are values ([`Setting`]) that each face names in its own words
 //! ([`crate::name_settings`]). What a face makes of an error, such as the number that its process ends with, is its own.
 
-mod job;
 mod model;
 mod recording;
 mod value;
 
 use std::path::PathBuf;
 
-use flexarm_fem::mesh_link::MeshLinkError;
-use flexarm_fem::reduction::ReductionError;
-use flexarm_fem::sparse::ModesError;
+use flexarm_files::FileError;
+use flexarm_linkmaker::LinkError;
 use flexarm_settings::Setting;
 
 use crate::robot_file::RobotFileError;
 
-pub use job::ImportError;
+pub use flexarm_settings::Fault;
 pub use model::{ChannelError, LoadError, ModellingError, PayloadError, PoseError};
 pub use recording::{RecordingError, StudyError};
 pub use value::ValueError;
-
-/// Whom an error is to blame on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fault {
-    /// What was given: files, values, places of results. The same call would end in the same way.
-    Input,
-    /// The run: it stopped on its way, was stopped, or its results could not be written.
-    Run,
-}
 
 /// Anything that keeps an answer from being given.
 #[derive(Debug, thiserror::Error)]
@@ -51,7 +40,7 @@ pub enum Error {
         /// Why.
         source: Box<Error>,
     },
-    /// Something in the robot file or in a job file.
+    /// Something in the robot file, a file of loads or a job file.
     #[error(transparent)]
     RobotFile(#[from] RobotFileError),
     /// Several faults of one robot file or job.
@@ -71,29 +60,6 @@ pub enum Error {
     /// A reduced-link file.
     #[error(transparent)]
     Flex(#[from] Box<flexarm_fem::FlexFileError>),
-    /// A mesh file.
-    #[error(transparent)]
-    Mesh(#[from] Box<flexarm_fe_io::MeshError>),
-    /// An interface of a link to be reduced.
-    #[error("{place}: interface {interface:?}: {what}")]
-    Interface {
-        /// File, file with line, or setting that it comes from.
-        place: String,
-        /// Its name.
-        interface: String,
-        /// What is wrong and how to mend it.
-        what: String,
-    },
-    /// A mesh that could not be reduced to a link.
-    #[error("{}: {source}{note}", path.display())]
-    Reduction {
-        /// The mesh.
-        path: PathBuf,
-        /// What the file can add: numbers of nodes.
-        note: String,
-        /// Why.
-        source: Box<flexarm_fem::mesh_link::MeshLinkError>,
-    },
     /// A result could not be written.
     #[error("{}: cannot be written: {source}", path.display())]
     Write {
@@ -117,10 +83,7 @@ pub enum Error {
         violations: Vec<String>,
     },
     /// A place of a result that is taken.
-    #[error(
-        "{}: exists already and is not overwritten: choose another {place}{} give {}",
-        path.display(), if *movable { format!(" with {} or", Setting::Output) } else { ", or".into() }, Setting::Overwrite
-    )]
+    #[error("{}", flexarm_files::taken(path, place, *movable))]
     Taken {
         /// What is there.
         path: PathBuf,
@@ -150,9 +113,6 @@ pub enum Error {
     /// A recording that cannot be read, written or reported as asked for.
     #[error(transparent)]
     Recording(#[from] RecordingError),
-    /// Frames of interfaces in an import.
-    #[error(transparent)]
-    ImportJob(#[from] ImportError),
     /// A robot none of whose links could be the tool.
     #[error(
         "the robot has no link that could be the TCP: {}",
@@ -170,9 +130,6 @@ pub enum Error {
         /// The links of the robot.
         known: Vec<String>,
     },
-    /// Pictures of a reduction that could not be drawn.
-    #[error("the pictures failed: {0}")]
-    Pictures(Box<dyn std::error::Error + Send + Sync>),
     /// The simulation could not start or stopped.
     #[error("{source}{}", if *partial { "; the log up to there is complete and readable" } else { "" })]
     Step {
@@ -192,17 +149,10 @@ pub enum Error {
     /// A recording could not be written.
     #[error(transparent)]
     Log(#[from] flexarm_log::LogError),
-    /// A file of matrices of another FE program.
+    /// A link that could not be made of a mesh or of matrices, or not exported. Files, jobs and `.flex` files have the variants
+    /// above, whoever finds what is wrong with them.
     #[error(transparent)]
-    Exchange(#[from] Box<flexarm_fe_io::exchange::ExchangeError>),
-    /// Matrices that could not become a link.
-    #[error("{}: {source}", path.display())]
-    Import {
-        /// The file of the stiffness.
-        path: PathBuf,
-        /// Why.
-        source: Box<flexarm_fem::mesh_link::MeshLinkError>,
-    },
+    Link(LinkError),
 }
 
 impl Error {
@@ -219,17 +169,32 @@ impl Error {
             },
             Self::InStudy { source, .. } => source.fault(),
             Self::Interrupted { .. } | Self::Write { .. } => Fault::Run,
-            Self::Reduction { source, .. } | Self::Import { source, .. } => match source.as_ref() {
-                MeshLinkError::Reduction(ReductionError::OutOfMemory { .. })
-                | MeshLinkError::Modes(ModesError::NotConverged { .. } | ModesError::NotFinite)
-                | MeshLinkError::Reduction(ReductionError::Modes(
-                    ModesError::NotConverged { .. } | ModesError::NotFinite,
-                )) => Fault::Run,
-                _ => Fault::Input,
-            },
+            Self::Link(error) => error.fault(),
             Self::Log(LogError::Exists { .. } | LogError::NotARecording { .. }) => Fault::Input,
             Self::Log(_) => Fault::Run,
             _ => Fault::Input,
+        }
+    }
+}
+
+impl From<FileError> for Error {
+    fn from(error: FileError) -> Self {
+        match error {
+            FileError::Unusable { path, what } => Self::File { path, what },
+            FileError::Taken { path, place, movable } => Self::Taken { path, place, movable },
+            FileError::Write { path, source } => Self::Write { path, source },
+        }
+    }
+}
+
+impl From<LinkError> for Error {
+    fn from(error: LinkError) -> Self {
+        match error {
+            LinkError::Files(error) => error.into(),
+            LinkError::JobFile(error) => Self::RobotFile(error),
+            LinkError::Several(faults) => Self::Several(faults.into_iter().map(Self::from).collect()),
+            LinkError::Flex(error) => Self::Flex(error),
+            other => Self::Link(other),
         }
     }
 }

@@ -49,11 +49,8 @@ mod check;
 mod convert;
 mod drive_entry;
 mod error;
-pub mod export;
 mod flexible;
 mod headline;
-pub mod import;
-mod input;
 mod inspect;
 mod link_entry;
 mod load_jumps;
@@ -71,13 +68,11 @@ mod record;
 pub mod reduce;
 mod report;
 mod response;
-pub mod result_files;
 mod robot;
 pub mod robot_file;
 mod run;
 mod scenario;
 mod settling;
-mod stamp;
 mod static_part;
 mod statics;
 mod statics_picture;
@@ -94,8 +89,8 @@ pub use check::{Finding, check, check_with_loads};
 pub use convert::{ConvertOptions, ConvertSummary, convert, convert_until, parse_recording_format, read_run};
 pub use drive_entry::{Drive, DriveKind};
 pub use error::{
-    ChannelError, Error, Fault, ImportError, LoadError, ModellingError, PayloadError, PoseError, RecordingError,
-    StudyError, ValueError,
+    ChannelError, Error, Fault, LoadError, ModellingError, PayloadError, PoseError, RecordingError, StudyError,
+    ValueError,
 };
 pub use flexible::{FlexibleRobot, LinkChoices, Owner, RobotLink};
 pub use headline::{Bending, ShareFigures};
@@ -125,7 +120,9 @@ pub use summary::{
 };
 
 pub use flexarm_analysis::{Quantity, Spacing};
+pub use flexarm_files::FileError;
 pub use flexarm_kinematics::{LinkInertia, Pose, Wrench};
+pub use flexarm_linkmaker::{ImportError, JobError, LinkError, export, import};
 pub use flexarm_log::{Column, Columns, FormatInfo, Holds, RecordingFormat, Sample, Trace};
 pub use flexarm_settings::{Names, Setting, name_settings};
 pub use flexarm_stepping::{

@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use exmex::{Express, FlatEx};
+use flexarm_files::read_text;
 use flexarm_kinematics::{LinkInertia, Wrench};
 use flexarm_stepping::{LoadAxes, TimedWrench};
 use nalgebra::{Matrix3, Vector3};
@@ -18,7 +19,6 @@ use toml::Spanned;
 
 use crate::applied_load::AppliedLoad;
 use crate::error::{Error, LoadError};
-use crate::input::read_text;
 use crate::load_jumps::jumps_of;
 use crate::payload::PayloadChange;
 use crate::robot_file::{RobotFileError, Source};

@@ -2,6 +2,7 @@
 
 use std::path::{Component, Path, PathBuf};
 
+use flexarm_files::Undo;
 use flexarm_kinematics::{Frame, JointKind, Model};
 use flexarm_log::{Attachment, CreateOptions, LinkInfo, LinkMesh, Recorder, RecorderSet, RecordingFormat, RunHeader};
 use flexarm_stepping::FlexibleArm;
@@ -10,7 +11,6 @@ use flexarm_urdf::Geometry;
 use crate::error::{Error, RecordingError};
 use crate::motion::Motion;
 use crate::options::{Outputs, RunOptions};
-use crate::result_files::Undo;
 use crate::robot::Robot;
 use crate::scenario::Scenario;
 use crate::summary::Files;
@@ -27,7 +27,7 @@ impl Recordings {
     /// Makes the files. If one cannot be made, none is left, nor is a folder that was made for them.
     pub(crate) fn begin(&mut self, header: &RunHeader) -> Result<(), Error> {
         self.set.begin(header)?;
-        self.folders.done = true;
+        self.folders.keep();
         Ok(())
     }
 }
@@ -133,7 +133,7 @@ pub(crate) fn write_layouts(files: &Files, header: &RunHeader) -> Result<(), Err
         (&files.plotjuggler_layout, flexarm_log::plotjuggler_layout(header)),
     ];
     let there = layouts.into_iter().filter_map(|(path, text)| Some((PathBuf::from(path.as_ref()?), text)));
-    crate::result_files::write_all(&there.collect::<Vec<_>>())
+    Ok(flexarm_files::write_all(&there.collect::<Vec<_>>())?)
 }
 
 /// There is none without the feature `mcap`.

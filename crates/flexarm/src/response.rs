@@ -6,6 +6,7 @@ use flexarm_analysis::{
     LinearSystem, Quantity, Spacing, frequency_grid, resolved_response, response_peaks, with_resonances,
 };
 use flexarm_draw::{CurveLook, LinePlot, Panel, PlotCurve, PlotError};
+use flexarm_files::{check_free, write_all};
 use flexarm_stepping::Linear;
 use nalgebra::{Complex, DMatrix, Vector6};
 use serde::Serialize;
@@ -15,7 +16,6 @@ use crate::error::{ChannelError, Error, ValueError};
 use crate::modes::{linear_error, modes_of, tool_map};
 use crate::options::Modelling;
 use crate::posed::Posed;
-use crate::result_files::{check_free, write_all};
 use crate::robot::Robot;
 
 /// Files of a response in its output folder: table, plot, figures.
@@ -483,5 +483,5 @@ fn save(response: &mut Response, paths: Vec<PathBuf>) -> Result<(), Error> {
     let json = serde_json::to_string_pretty(response).expect("plain numbers and strings") + "\n";
     let contents = [Some(csv(response)), picture, Some(json)];
     let files = paths.into_iter().zip(contents).filter_map(|(path, content)| Some((path, content?)));
-    write_all(&files.collect::<Vec<_>>())
+    Ok(write_all(&files.collect::<Vec<_>>())?)
 }

@@ -12,7 +12,6 @@ use crate::caveat::{self, Caveat};
 use crate::drive_entry::{Drive, drives};
 use crate::error::Error;
 use crate::flexible::RobotLink;
-use crate::input::read_text;
 use crate::link_entry::flexible_link;
 use crate::robot_file::{PayloadEntry, RobotFile, RobotFileError, Source, parse_robot_file};
 
@@ -112,7 +111,7 @@ impl Robot {
     }
 
     fn from_robot_file(path: &Path, options: &LoadOptions) -> Result<Self, Error> {
-        let text = read_text(path)?;
+        let text = flexarm_files::read_text(path)?;
         let (file, source) = parse_robot_file(&text, path)?;
         let folder = path.parent().unwrap_or(Path::new("."));
         let urdf_path = folder.join(file.urdf.get_ref());

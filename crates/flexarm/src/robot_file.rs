@@ -7,6 +7,9 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use toml::Spanned;
 
+pub use flexarm_files::{Source, TextFileError as RobotFileError};
+pub use flexarm_linkmaker::{MaterialConstants, MaterialEntry};
+
 pub use crate::beam_entry::BeamEntry;
 use crate::drive_entry::DriveEntry;
 
@@ -129,86 +132,6 @@ pub struct DampingEntry {
     pub stiffness_beta: Option<f64>,
     /// `D = a M + b K` (1/s, s).
     pub rayleigh: Option<[f64; 2]>,
-}
-
-/// Name of a preset, or constants.
-#[derive(Clone, Debug)]
-pub enum MaterialEntry {
-    /// steel, aluminium, cast_iron, ductile_iron.
-    Named(String),
-    /// Elastic constants and density.
-    Given(MaterialConstants),
-}
-
-impl<'de> Deserialize<'de> for MaterialEntry {
-    /// By hand, because an untagged enum would not say which constant is missing.
-    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Either;
-        impl<'de> serde::de::Visitor<'de> for Either {
-            type Value = MaterialEntry;
-            fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-                f.write_str("the name of a material or { E = ..., nu = ..., rho = ... }")
-            }
-            fn visit_str<E: serde::de::Error>(self, name: &str) -> Result<MaterialEntry, E> {
-                Ok(MaterialEntry::Named(name.to_owned()))
-            }
-            fn visit_map<A: serde::de::MapAccess<'de>>(self, map: A) -> Result<MaterialEntry, A::Error> {
-                let constants = MaterialConstants::deserialize(serde::de::value::MapAccessDeserializer::new(map))?;
-                Ok(MaterialEntry::Given(constants))
-            }
-        }
-        deserializer.deserialize_any(Either)
-    }
-}
-
-/// Isotropic material.
-#[derive(Clone, Copy, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct MaterialConstants {
-    /// Young's modulus (Pa).
-    #[serde(rename = "E")]
-    pub young: f64,
-    /// Poisson's ratio.
-    pub nu: f64,
-    /// Density (kg/m³).
-    pub rho: f64,
-}
-
-/// What is wrong in a robot file, and where.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{}:{line}:{column}: {message}", path.display())]
-pub struct RobotFileError {
-    /// The file.
-    pub path: PathBuf,
-    /// Line, from 1.
-    pub line: usize,
-    /// Column, from 1.
-    pub column: usize,
-    /// What was found, what was expected, how to mend it.
-    pub message: String,
-}
-
-/// The text of a robot file with its place, to point into it.
-#[derive(Clone, Debug)]
-pub struct Source {
-    /// The file.
-    pub path: PathBuf,
-    text: String,
-}
-
-impl Source {
-    /// The text of the file at `path`.
-    pub fn new(path: &Path, text: &str) -> Self {
-        Self { path: path.to_owned(), text: text.to_owned() }
-    }
-
-    /// An error at a byte range of the text.
-    pub fn error(&self, span: std::ops::Range<usize>, message: impl Into<String>) -> RobotFileError {
-        let before = self.text.get(..span.start).unwrap_or(&self.text);
-        let line = before.matches('\n').count() + 1;
-        let column = before.len() - before.rfind('\n').map_or(0, |i| i + 1) + 1;
-        RobotFileError { path: self.path.clone(), line, column, message: message.into() }
-    }
 }
 
 /// Reads the text of a robot file.

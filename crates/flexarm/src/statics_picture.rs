@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use flexarm_files::{check_free, write_all};
 use flexarm_kinematics::{Pose, forward_kinematics};
 use flexarm_log::{RunHeader, Sample, TwinSample};
 use flexarm_stepping::Linear;
@@ -14,7 +15,6 @@ use crate::magnification::Expected;
 use crate::posed::Posed;
 use crate::record::{link_frames, robot_header};
 use crate::response::pose_in_words;
-use crate::result_files::{check_free, write_all};
 use crate::robot::Robot;
 use crate::statics::Statics;
 
@@ -73,7 +73,7 @@ pub(crate) fn save(
     let text = serde_json::to_string_pretty(statics).expect("plain numbers and strings") + "\n";
     let files: Vec<(PathBuf, Vec<u8>)> =
         picture.map(|bytes| (png, bytes)).into_iter().chain([(json, text.into_bytes())]).collect();
-    write_all(&files)
+    Ok(write_all(&files)?)
 }
 
 #[cfg(feature = "png")]

@@ -4,10 +4,11 @@
 
 use std::path::{Path, PathBuf};
 
+use flexarm::reduce::{ReduceJob, ReduceOptions, UrdfEntry, reduce};
 use flexarm::{
-    AppliedLoad, ConstraintForm, Error, Fault, LinkModel, LoadError, Modelling, ModellingError, Motion, PoseError,
-    ResponseRequest, Robot, RunOptions, Setting, SpookPreset, SpookSettings, StepError, StepperKind, ValueError,
-    Wrench,
+    AppliedLoad, ConstraintForm, Error, Fault, JobError, LinkError, LinkModel, LoadError, Modelling, ModellingError,
+    Motion, PoseError, ResponseRequest, Robot, RunOptions, Setting, SpookPreset, SpookSettings, StepError, StepperKind,
+    ValueError, Wrench,
 };
 
 fn root() -> PathBuf {
@@ -84,4 +85,27 @@ fn poses_loads_and_responses_name_joint_frame_and_bound() {
     let error = flexarm::response(&robot, &modelling, None, &request, None).unwrap_err();
     assert!(matches!(error, Error::Value(ValueError::Points { found: 1, least: 2, most: 100_000 })), "{error}");
     assert_eq!(error.to_string(), "points must lie between 2 and 100000, found 1");
+}
+
+#[test]
+fn what_the_link_maker_finds_has_one_place_beside_what_the_rest_finds() {
+    let options = ReduceOptions::default();
+    let refused = |job: &ReduceJob| reduce(job, &options, None, &mut |_| {}).unwrap_err();
+    // Files are files, whoever looks for them.
+    let error = Error::from(ReduceJob::load(Path::new("no_such_mesh.msh")).unwrap_err());
+    assert!(matches!(&error, Error::File { path, .. } if path == Path::new("no_such_mesh.msh")), "{error}");
+    // A number of a job is the link maker's own.
+    let mesh = root().join("crates/flexarm-fe-io/tests/data/three_blocks_v41_ascii.msh");
+    let error = refused(&ReduceJob { modes: Some(2000), ..ReduceJob::for_mesh(&mesh) });
+    assert!(
+        matches!(error, Error::Link(LinkError::Job(JobError::TooManyModes { found: 2000, most: 1000 }))),
+        "{error}"
+    );
+    assert_eq!(error.to_string(), "modes 2000: at most 1000 can be kept");
+    // The robot of a job is read by the facade.
+    let urdf =
+        UrdfEntry { file: root().join("robots/kr210/no_such.urdf"), link: "link_2".into(), ..UrdfEntry::default() };
+    let error = refused(&ReduceJob { urdf: Some(urdf), ..ReduceJob::for_mesh(&mesh) });
+    assert!(matches!(error, Error::Urdf(_)), "{error}");
+    assert_eq!(error.fault(), Fault::Input);
 }

@@ -156,8 +156,12 @@ fn keys(sources: &[&str]) -> BTreeMap<String, BTreeSet<String>> {
     found
 }
 
-const ROBOT: [&str; 3] =
-    ["crates/flexarm/src/robot_file.rs", "crates/flexarm/src/beam_entry.rs", "crates/flexarm/src/drive_entry.rs"];
+const ROBOT: [&str; 4] = [
+    "crates/flexarm/src/robot_file.rs",
+    "crates/flexarm/src/beam_entry.rs",
+    "crates/flexarm/src/drive_entry.rs",
+    "crates/flexarm-linkmaker/src/material_entry.rs",
+];
 
 const LOADS: [&str; 1] = ["crates/flexarm/src/loads_file.rs"];
 const MOTION: [&str; 1] = ["crates/flexarm-trajectory/src/waypoints_toml.rs"];

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use flexarm_analysis::{ErrorRecord, MetricSettings, error_parts, tcp_metrics_on_path};
+use flexarm_files::{check_free, write_all};
 use flexarm_log::{EventKind, RecordingFormat, RunHeader, Trace};
 use flexarm_settings::Setting;
 use serde::Serialize;
@@ -10,7 +11,6 @@ use serde::Serialize;
 use super::{ReportRun, figures, html};
 use crate::convert::{no_sample, read_run, same_file};
 use crate::error::{Error, RecordingError};
-use crate::result_files::{check_free, write_all};
 use crate::stepper_settings::{SettingValue, StepperSettings};
 use crate::summary::{StepperFigures, Summary, TcpFigures};
 

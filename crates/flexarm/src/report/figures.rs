@@ -4,12 +4,12 @@
 use std::path::{Path, PathBuf};
 
 use flexarm_draw::{CurveLook, Panel, PlotCurve, paper_plot};
+use flexarm_files::{file_stem, write_all};
 use flexarm_log::{EventKind, Trace};
 
 use super::curves::{Kind, Plot, PlotView, plots};
 use super::picture::printed;
 use crate::error::Error;
-use crate::result_files::{file_stem, write_all};
 use crate::summary::Summary;
 
 /// Width of the pictures of the arm (pixels): 300 a inch across both columns of a paper.
@@ -35,7 +35,7 @@ pub(super) fn write(folder: &Path, summary: &Summary, trace: &Trace) -> Result<(
     for (name, png) in printed(trace, PICTURE_WIDTH) {
         files.push((folder.join(format!("{name}.png")), png));
     }
-    write_all(&files)
+    Ok(write_all(&files)?)
 }
 
 /// Beginnings and ends of the moves (s).

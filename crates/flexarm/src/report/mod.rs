@@ -11,12 +11,12 @@ mod picture;
 
 use std::fmt::Write as _;
 
+use flexarm_files::write_all;
 use flexarm_log::Trace;
 
 use crate::error::Error;
 use crate::options::Outputs;
 use crate::record::FIGURES_FOLDER;
-use crate::result_files::write_all;
 use crate::settling::within;
 use crate::summary::Summary;
 
@@ -52,7 +52,7 @@ pub(crate) fn write_study(outputs: &Outputs, summary: &Summary, traces: &[(Strin
 fn write_page(outputs: &Outputs, summary: &Summary, page: &str) -> Result<(), Error> {
     let json = serde_json::to_string_pretty(summary).expect("plain numbers and strings") + "\n";
     let files = [("report.md", markdown(summary)), ("report.html", page.to_owned()), ("summary.json", json)];
-    write_all(&files.map(|(name, text)| (outputs.folder.join(name), text)))
+    Ok(write_all(&files.map(|(name, text)| (outputs.folder.join(name), text)))?)
 }
 
 /// The figures for people without what depends on the machine and its load.

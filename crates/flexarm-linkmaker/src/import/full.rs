@@ -12,7 +12,7 @@ use flexarm_settings::Setting;
 use nalgebra::{Matrix3, Vector3};
 
 use super::words::{ImportMap, NodeChoice};
-use crate::error::Error;
+use crate::LinkError;
 
 /// Whether more than the interfaces is in the matrices, so that they must be condensed.
 pub(super) fn is_full(imported: &ImportedMatrices, map: Option<&InterfaceMap>) -> bool {
@@ -78,15 +78,18 @@ pub(super) struct Target<'a> {
 /// The model reduced to its interfaces, matrix axes; frames are those of the link.
 ///
 /// # Errors
-/// [`Error::File`] for a map that does not fit, [`Error::Import`] from the reduction.
-pub(super) fn reduce(imported: &ImportedMatrices, map: &ImportMap, target: Target<'_>) -> Result<Superelement, Error> {
-    let path = || imported.origin.clone().into();
-    let refuse = |what: String| Error::File { path: path(), what };
+/// [`LinkError::Files`] for a map that does not fit, [`LinkError::Import`] from the reduction.
+pub(super) fn reduce(
+    imported: &ImportedMatrices,
+    map: &ImportMap,
+    target: Target<'_>,
+) -> Result<Superelement, LinkError> {
+    let refuse = |what: String| LinkError::file(&imported.origin, what);
     let Some(mass) = &imported.mass else {
         let what = "a full model can only be reduced with its mass: give the mass matrix too";
         return Err(refuse(format!("{what} (.mas, {})", Setting::MassFile)));
     };
-    let failed = |source| Error::Import { path: path(), source: Box::new(source) };
+    let failed = |source| LinkError::Import { path: imported.origin.clone().into(), source: Box::new(source) };
     let modes = ModesWanted::Count(target.modes);
     let options = CondensationOptions::default();
     let rows = &imported.stiffness.rows;
@@ -125,7 +128,7 @@ pub(super) fn reduce(imported: &ImportedMatrices, map: &ImportMap, target: Targe
                 nodes.dedup();
                 // The tie works in the axes of the matrices.
                 let p = target.R_LM.transpose() * frame.X_LI.translation.vector;
-                let X_LI = flexarm_kinematics::Pose::translation(p.x, p.y, p.z);
+                let X_LI = flexarm_spatial::Pose::translation(p.x, p.y, p.z);
                 interfaces.push(Interface { name: name.clone(), X_LI, nodes, tie: Tie::Rigid });
             }
             let is_turn = vec![false; rows.len()];
@@ -141,15 +144,14 @@ pub(super) fn reduce(imported: &ImportedMatrices, map: &ImportMap, target: Targe
 }
 
 /// Rows of the interfaces, six each.
-fn boundary_rows(imported: &ImportedMatrices, map: &InterfaceMap) -> Result<Vec<u32>, Error> {
+fn boundary_rows(imported: &ImportedMatrices, map: &InterfaceMap) -> Result<Vec<u32>, LinkError> {
     let rows = &imported.stiffness.rows;
     let index: HashMap<(i64, u8), u32> =
         rows.iter().enumerate().filter_map(|(i, label)| Some(((label.node?, label.dof), i as u32))).collect();
     let mut boundary: Vec<u32> = Vec::new();
     for interface in &map.interfaces {
-        let refuse = |what: String| Error::File {
-            path: imported.origin.clone().into(),
-            what: format!("interface {}: {what}; {}", interface.name, propose(imported)),
+        let refuse = |what: String| {
+            LinkError::file(&imported.origin, format!("interface {}: {what}; {}", interface.name, propose(imported)))
         };
         let before = boundary.len();
         for pick in &interface.picks {
@@ -176,8 +178,7 @@ fn boundary_rows(imported: &ImportedMatrices, map: &InterfaceMap) -> Result<Vec<
     sorted.sort_unstable();
     sorted.dedup();
     if sorted.len() != boundary.len() {
-        let path = imported.origin.clone().into();
-        return Err(Error::File { path, what: format!("the map {map} names a row twice") });
+        return Err(LinkError::file(&imported.origin, format!("the map {map} names a row twice")));
     }
     Ok(boundary)
 }

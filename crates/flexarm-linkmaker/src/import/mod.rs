@@ -5,7 +5,7 @@
 //! passes the gate of the link, and its figures are in the [`ImportSummary`].
 //!
 //! ```no_run
-//! use flexarm::import::{ImportJob, ImportOutputs, import};
+//! use flexarm_linkmaker::import::{ImportJob, ImportOutputs, import};
 //!
 //! let job = ImportJob {
 //!     files: vec!["arm.pch".into()],
@@ -16,10 +16,10 @@
 //! let outputs = ImportOutputs { folder: Some("out/arm".into()), ..ImportOutputs::default() };
 //! let summary = import(&job, Some(&outputs))?;
 //! println!("{:.2} kg", summary.mass_kg);
-//! # Ok::<(), flexarm::Error>(())
+//! # Ok::<(), flexarm_linkmaker::LinkError>(())
 //! ```
 //!
-//! Lengths in a job are in the unit of the files, masses in SI. Not here: parsers and reduction (`flexarm-fem`).
+//! Lengths in a job are in the unit of the files, masses in SI. Not here: parsers and reduction (`flexarm-fe-io`, `flexarm-fem`).
 
 pub(crate) mod full;
 mod sid;
@@ -37,11 +37,11 @@ use flexarm_fem::gate::check_matrix12;
 use flexarm_fem::matrix_link::{MatrixPlan, MatrixReduction, link_from_superelement, turned};
 use flexarm_fem::reduction::{InterfaceFrame, Superelement, stiffness12};
 use flexarm_fem::{FemError, GateLimits, Pose, Provenance, SplitAt, UnitSystem, write_flex};
+use flexarm_files::{check_free, file_stem, write_all};
 use flexarm_settings::{Caller, Setting};
 use nalgebra::{DMatrix, Rotation3, Translation3, Vector3};
 
-use crate::error::{Error, ImportError};
-use crate::{result_files, stamp};
+use crate::{ImportError, LinkError, stamp};
 use summary::Parts;
 
 pub use flexarm_fe_io::exchange::MatrixNames as Names;
@@ -50,8 +50,8 @@ pub use flexarm_fem::{RigidPart, SplitAt as Split, UnitSystem as UnitsOfFile};
 pub use summary::{ImportChecks, ImportFiles, ImportInterface, ImportPart, ImportSummary, markdown, tables};
 pub use words::{FrameAt, ImportFormat, ImportMap, NodeChoice, parse_inertia, parse_part, parse_split, triple};
 
-/// Said where a modal link lacks terms.
-pub(crate) const SECOND_ORDER_UNKNOWN: &str = "second-order terms of the modal link are unknown: a condensed mass does not \
+/// What is said of a modal link without its terms of second order, here and where a robot takes one.
+pub const SECOND_ORDER_UNKNOWN: &str = "second-order terms of the modal link are unknown: a condensed mass does not \
      tell where inside the link it is; what turning does to the bending is left out";
 
 /// Modes that are kept of a full model if the job does not say.
@@ -131,13 +131,13 @@ pub struct ImportOutputs {
 /// Reads matrices, makes a link of them, writes the files.
 ///
 /// # Errors
-/// [`Error`]; what is missing is asked for all at once. See [`Error::fault`].
-pub fn import(job: &ImportJob, outputs: Option<&ImportOutputs>) -> Result<ImportSummary, Error> {
+/// [`LinkError`]; what is missing is asked for all at once. See [`LinkError::fault`].
+pub fn import(job: &ImportJob, outputs: Option<&ImportOutputs>) -> Result<ImportSummary, LinkError> {
     let (started, cpu) = (Instant::now(), cpu_time::ProcessTime::now());
     let name = job.link_name();
     let targets = outputs.map(|outputs| Targets::new(outputs, &name));
     if let Some(targets) = &targets {
-        result_files::check_free(&targets.all(), targets.overwrite)?;
+        check_free(&targets.all(), targets.overwrite)?;
     }
     let first = job.files.first().ok_or(ImportError::NoFile)?;
     let head = InputFile::open(first).map_err(Box::new)?;
@@ -159,19 +159,19 @@ pub fn import(job: &ImportJob, outputs: Option<&ImportOutputs>) -> Result<Import
     Ok(summary)
 }
 
-fn expect_format(job: &ImportJob, found: MatrixFormat, origin: &str) -> Result<(), Error> {
+fn expect_format(job: &ImportJob, found: MatrixFormat, origin: &str) -> Result<(), LinkError> {
     match job.format {
         Some(format) if !format.covers(found) => {
             let what =
                 format!("is {} by its content, {} says otherwise: leave it out", found.name(), Setting::MatrixFormat);
-            Err(Error::File { path: origin.into(), what })
+            Err(LinkError::file(origin, what))
         }
         _ => Ok(()),
     }
 }
 
 /// All formats with a stiffness over physical coordinates.
-fn matrices(job: &ImportJob, name: &str) -> Result<(MatrixReduction, Parts), Error> {
+fn matrices(job: &ImportJob, name: &str) -> Result<(MatrixReduction, Parts), LinkError> {
     let imported = read(job).map_err(Box::new)?;
     expect_format(job, imported.format, &imported.origin)?;
     let sidecar = imported.sidecar.as_ref();
@@ -236,11 +236,9 @@ fn matrices(job: &ImportJob, name: &str) -> Result<(MatrixReduction, Parts), Err
         );
         faults.push(file_error(&imported, no_place(&imported, None, &names)));
     }
-    let (Some(units), Some(map), Some(placed)) = (units, map, placed) else {
-        return Err(if faults.len() == 1 { faults.remove(0) } else { Error::Several(faults) });
-    };
+    let (Some(units), Some(map), Some(placed)) = (units, map, placed) else { return Err(LinkError::of_all(faults)) };
     if !faults.is_empty() {
-        return Err(if faults.len() == 1 { faults.remove(0) } else { Error::Several(faults) });
+        return Err(LinkError::of_all(faults));
     }
 
     let frames: Vec<InterfaceFrame> = placed
@@ -277,7 +275,7 @@ fn matrices(job: &ImportJob, name: &str) -> Result<(MatrixReduction, Parts), Err
     let checked = if has_mass { Some(element.clone()) } else { None };
     let reduction = link_from_superelement(element, has_mass, &plan).map_err(|source| {
         let path = imported.origin.clone().into();
-        Error::Import { path, source: Box::new(source) }
+        LinkError::Import { path, source: Box::new(source) }
     })?;
     let interfaces = placed.iter().zip(map.entries()).map(|(p, (_, rows))| summary::ImportInterface {
         name: p.name.clone(),
@@ -342,8 +340,8 @@ fn rotation(rpy: &Vector3<f64>) -> Rotation3<f64> {
     Rotation3::from_euler_angles(rpy.x, rpy.y, rpy.z)
 }
 
-fn file_error(imported: &ImportedMatrices, what: impl Into<String>) -> Error {
-    Error::File { path: imported.origin.clone().into(), what: what.into() }
+fn file_error(imported: &ImportedMatrices, what: impl Into<String>) -> LinkError {
+    LinkError::file(&imported.origin, what)
 }
 
 /// Frame of an interface, unit of the file.
@@ -361,7 +359,7 @@ fn place(
     map: &ImportMap,
     R_LM: &Rotation3<f64>,
     warnings: &mut Vec<String>,
-) -> Result<Vec<Placed>, Error> {
+) -> Result<Vec<Placed>, LinkError> {
     let entries = map.entries();
     let names: Vec<String> = entries.iter().map(|(name, _)| name.clone()).collect();
     if names.len() < 2 {
@@ -489,7 +487,7 @@ struct Targets {
 
 impl Targets {
     fn new(outputs: &ImportOutputs, link: &str) -> Self {
-        let stem = result_files::file_stem(link);
+        let stem = file_stem(link);
         let in_folder = |f: &PathBuf| [f.join(format!("{stem}.flex")), f.join("summary.json"), f.join("report.md")];
         let folder = outputs.folder.as_ref().map(in_folder);
         Self { folder, flex: outputs.flex.clone(), overwrite: outputs.overwrite }
@@ -499,7 +497,7 @@ impl Targets {
         self.folder.iter().flatten().chain(&self.flex).cloned().collect()
     }
 
-    fn write(&self, flex: &str, summary: &mut ImportSummary) -> Result<(), Error> {
+    fn write(&self, flex: &str, summary: &mut ImportSummary) -> Result<(), LinkError> {
         let text = |path: &PathBuf| Some(path.display().to_string());
         summary.files.flex = self.flex.as_ref().or(self.folder.as_ref().map(|f| &f[0])).and_then(text);
         let mut contents = Vec::new();
@@ -512,7 +510,7 @@ impl Targets {
             contents.push((report.clone(), markdown(summary)));
         }
         contents.extend(self.flex.iter().map(|path| (path.clone(), flex.to_owned())));
-        result_files::check_free(&self.all(), self.overwrite)?;
-        result_files::write_all(&contents)
+        check_free(&self.all(), self.overwrite)?;
+        Ok(write_all(&contents)?)
     }
 }

@@ -6,6 +6,7 @@ use flexarm_fem::mesh_gate::ModeCheck;
 use flexarm_fem::sparse::Ordering;
 use flexarm_fem::{Doubt, LinkPlan, Material, MeshReduction, ModalLink, RigidPart, UnitSystem};
 use flexarm_settings::Setting;
+use flexarm_settings::caveat::{self, Caveat};
 use nalgebra::{Matrix3, Matrix6};
 use serde::Serialize;
 
@@ -14,7 +15,6 @@ use super::interfaces::Chosen;
 use super::job::ReduceJob;
 use super::prepare::quadrature_name;
 use super::words::described;
-use crate::caveat::{self, Caveat};
 
 /// Answer of `flexarm reduce`.
 #[derive(Clone, Debug, Serialize)]

@@ -1,17 +1,15 @@
 //! From the interfaces of a job to nodes and frames of a mesh, with messages that say what to type.
 
-use flexarm_fem::matrix_link::halves_of_bar;
 use flexarm_fem::mesh::{Seat, Surface, select};
 use flexarm_fem::reduction::{Interface, Tie};
-use flexarm_fem::{Mesh, NodeSelector, RigidPart};
-use flexarm_flexlink::{SubstitutionError, distal_joint};
-use flexarm_kinematics::{Mechanism, Pose};
+use flexarm_fem::{Mesh, NodeSelector};
 use flexarm_settings::Setting;
-use flexarm_urdf::{ReadOptions, read_urdf};
+use flexarm_spatial::Pose;
 use nalgebra::{Rotation3, Translation3, Vector3};
 
-use super::job::{FrameEntry, InterfaceEntry, ReduceJob, UrdfEntry};
-use crate::error::Error;
+use super::job::{FrameEntry, InterfaceEntry, ReduceJob};
+use super::urdf_link::UrdfLink;
+use crate::LinkError;
 
 /// An interface of the mesh, with what a person wants to see of it. Link axes, m.
 #[derive(Clone, Debug)]
@@ -118,7 +116,7 @@ impl Place<'_> {
     }
 
     /// Nodes and frames of all interfaces, or all that is wrong with them.
-    pub(super) fn choose(&self, job: &ReduceJob, robot: Option<&RobotLink>) -> Result<Vec<Chosen>, Vec<Error>> {
+    pub(super) fn choose(&self, job: &ReduceJob, robot: Option<&UrdfLink>) -> Result<Vec<Chosen>, Vec<LinkError>> {
         let (mut chosen, mut faults) = (Vec::new(), Vec::new());
         if job.interface.len() < 2 {
             let found = job.interface.len();
@@ -129,7 +127,7 @@ impl Place<'_> {
                 interface = Setting::Interface,
                 sets = self.known_sets()
             );
-            faults.push(Error::File { path: job.mesh.clone(), what });
+            faults.push(LinkError::file(&job.mesh, what));
         }
         let surface = Surface::new(self.mesh);
         for (index, entry) in job.interface.iter().enumerate() {
@@ -146,12 +144,12 @@ impl Place<'_> {
         job: &ReduceJob,
         index: usize,
         entry: &InterfaceEntry,
-        robot: Option<&RobotLink>,
+        robot: Option<&UrdfLink>,
         surface: &Surface,
-    ) -> Result<Chosen, Error> {
+    ) -> Result<Chosen, LinkError> {
         let name = entry.name.clone().unwrap_or_default();
         let place = if entry.place.is_empty() { job.mesh.display().to_string() } else { entry.place.clone() };
-        let fail = |what: String| Error::Interface { place: place.clone(), interface: name.clone(), what };
+        let fail = |what: String| LinkError::Interface { place: place.clone(), interface: name.clone(), what };
         let Some(selector) = &entry.select else {
             return Err(fail(format!(
                 "it has no nodes: {} {name}=SELECTOR or select = \"...\"; {}",
@@ -188,9 +186,8 @@ impl Place<'_> {
                 (Some(_), 0) => Pose::identity(),
                 (Some(robot), 1) => robot.X_LB,
                 (Some(robot), _) => {
-                    let joints = robot.joints();
-                    let hint =
-                        joints.iter().map(|joint| format!("{} {name}=joint:{joint}", Setting::At)).collect::<Vec<_>>();
+                    let joints = robot.leading_on().map(|joint| format!("{} {name}=joint:{}", Setting::At, joint.name));
+                    let hint = joints.collect::<Vec<_>>();
                     let hint = format!("; at a joint of the link: {}", hint.join(" or "));
                     return Err(fail(self.no_position(&name, nodes.len(), &centroid) + &hint));
                 }
@@ -242,85 +239,5 @@ impl Place<'_> {
             }
         }
         doubts
-    }
-}
-
-/// A link of a robot with the joints on it.
-pub(super) struct RobotLink {
-    mechanism: Mechanism,
-    link: String,
-    X_LB: Pose,
-}
-
-impl RobotLink {
-    pub(super) fn read(entry: &UrdfEntry, options: &ReadOptions) -> Result<Self, Error> {
-        let mechanism = read_urdf(&entry.file, options)?.mechanism;
-        let X_LB = distal_joint(&mechanism, &entry.link, entry.joint.as_deref()).map(|joint| joint.X_PJ);
-        let X_LB = X_LB.map_err(|e| {
-            let what = match &e {
-                SubstitutionError::DistalUnclear { link, children } => format!(
-                    "link {link:?} has {} joints that lead on ({children:?}): name the one at B with {} NAME, or joint = \
-                     \"NAME\" in [urdf]; the others may be further interfaces, such as {} C=SELECTOR {} C=joint:{}",
-                    children.len(),
-                    Setting::Joint,
-                    Setting::Interface,
-                    Setting::At,
-                    children.last().map_or("NAME", String::as_str)
-                ),
-                other => other.to_string(),
-            };
-            Error::File { path: entry.file.clone(), what }
-        })?;
-        Ok(Self { mechanism, link: entry.link.clone(), X_LB })
-    }
-
-    /// What the link weighs beyond its mesh, as two halves along the line from A to B, link axes.
-    pub(super) fn rest(&self, mesh: &RigidPart, along: &Vector3<f64>) -> Result<[RigidPart; 2], String> {
-        let inertia = self.mechanism.link(&self.link).and_then(|link| link.inertia.as_ref());
-        let Some(whole) = inertia else {
-            return Err(format!("link {:?} has no inertial, so there is no rest", self.link));
-        };
-        let mass = whole.mass - mesh.mass;
-        if mass.is_nan() || mass <= 0.0 {
-            return Err(format!(
-                "the mesh weighs {:.4} kg, link {:?} of the URDF {:.4} kg: nothing is left that could ride on it; \
-                 leave `rest` out, or correct the density",
-                mesh.mass, self.link, whole.mass
-            ));
-        }
-        let com = (whole.com * whole.mass - mesh.com * mesh.mass) / mass;
-        // Second moments about the centre of the rest.
-        let about = |part: f64, com_part: Vector3<f64>| {
-            let c = (com_part - com).cross_matrix();
-            -c * c * part
-        };
-        let inertia = whole.inertia_com + about(whole.mass, whole.com) - mesh.inertia - about(mesh.mass, mesh.com);
-        let halves = halves_of_bar(&RigidPart { mass, com, inertia }, along);
-        for half in &halves {
-            half.check("what link and mesh differ by").map_err(|error| {
-                format!(
-                    "{error}: the mesh has more inertia than the URDF's link; leave `rest` out, or correct one of them"
-                )
-            })?;
-        }
-        Ok(halves)
-    }
-
-    /// Names of the joints that lead on from the link.
-    fn joints(&self) -> Vec<&str> {
-        self.mechanism.child_joints(&self.link).map(|joint| joint.name.as_str()).collect()
-    }
-
-    /// Frame in the link of a joint at either of its ends.
-    fn joint(&self, name: &str) -> Result<Pose, String> {
-        if let Some(joint) = self.mechanism.child_joints(&self.link).find(|joint| joint.name == name) {
-            return Ok(joint.X_PJ);
-        }
-        if self.mechanism.joints.iter().any(|joint| joint.name == name && joint.child == self.link) {
-            return Ok(Pose::identity());
-        }
-        let on_link = |joint: &&flexarm_kinematics::Joint| joint.parent == self.link || joint.child == self.link;
-        let known: Vec<&str> = self.mechanism.joints.iter().filter(on_link).map(|joint| joint.name.as_str()).collect();
-        Err(format!("link {:?} has no joint {name:?}; its joints are {known:?}", self.link))
     }
 }

@@ -5,11 +5,11 @@ use std::fmt::Write as _;
 use flexarm_fem::matrix_link::MatrixReduction;
 use flexarm_fem::reduction::Superelement;
 use flexarm_fem::{Doubt, GateLimits, ModalLink, RigidPart};
+use flexarm_settings::Caveat;
 use nalgebra::{DMatrix, Matrix3, Matrix6};
 use serde::Serialize;
 
 use super::SECOND_ORDER_UNKNOWN;
-use crate::caveat::Caveat;
 use crate::reduce::{ModalFigures, ReportTable, coarse, doubted, modal_table};
 
 /// Answer of `flexarm import`.

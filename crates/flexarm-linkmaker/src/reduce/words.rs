@@ -7,7 +7,7 @@ use flexarm_fem::Material;
 use serde::de::{Error as _, SeqAccess, Visitor, value::SeqAccessDeserializer};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use crate::robot_file::MaterialEntry;
+use crate::MaterialEntry;
 
 /// A material by the name of a preset or by its constants.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,9 +2,9 @@
 
 use std::path::{Component, Path, PathBuf};
 
+use flexarm_files::{FileError, check_free, file_stem, write_all};
+
 use super::job::ReduceJob;
-use crate::error::Error;
-use crate::result_files::{check_free, file_stem, write_all};
 
 /// Where the results go.
 #[derive(Clone, Debug, Default)]
@@ -18,6 +18,7 @@ pub struct ReduceOutputs {
 }
 
 /// The paths of one reduction.
+#[derive(Debug)]
 pub(super) struct Paths {
     pub(super) folder: Option<Folder>,
     pub(super) flex: Option<PathBuf>,
@@ -25,6 +26,7 @@ pub(super) struct Paths {
 }
 
 /// Names in the output folder.
+#[derive(Debug)]
 pub(super) struct Folder {
     pub(super) path: PathBuf,
     pub(super) flex: PathBuf,
@@ -35,8 +37,8 @@ pub(super) struct Folder {
 
 impl Paths {
     /// # Errors
-    /// [`Error::File`] for what is there already.
-    pub(super) fn new(outputs: &ReduceOutputs, link: &str) -> Result<Self, Error> {
+    /// [`FileError::Taken`] for what is there already, [`FileError::Unusable`] for a folder in the place of a file.
+    pub(super) fn new(outputs: &ReduceOutputs, link: &str) -> Result<Self, FileError> {
         let file = file_stem(link);
         let folder = outputs.folder.as_ref().map(|path| Folder {
             flex: path.join(format!("{file}.flex")),
@@ -61,12 +63,12 @@ impl Paths {
         in_folder.chain(self.flex.clone()).collect()
     }
 
-    fn check(&self) -> Result<(), Error> {
+    fn check(&self) -> Result<(), FileError> {
         check_free(&self.all(), self.overwrite)
     }
 
     /// Writes all files; see [`write_all`].
-    pub(super) fn write(&self, files: &[(PathBuf, &[u8])]) -> Result<(), Error> {
+    pub(super) fn write(&self, files: &[(PathBuf, &[u8])]) -> Result<(), FileError> {
         self.check()?;
         write_all(files)
     }

@@ -5,19 +5,19 @@ use std::time::Instant;
 
 use flexarm_fe_io::exchange::{modal_link_held_at, parse_sid, sid_of_modal_link, write_sid};
 use flexarm_fem::{ModalLink, ReducedLink, UnitSystem};
+use flexarm_files::{check_free, file_stem, write_all};
 use flexarm_settings::Setting;
 use nalgebra::{DMatrix, Matrix3};
 
 use super::{ExportChecks, ExportFormat, ExportJob, ExportSummary, difference, nodes, part_lines};
-use crate::error::Error;
-use crate::{result_files, stamp};
+use crate::{LinkError, stamp};
 
-pub(super) fn export(job: &ExportJob, link: &ReducedLink, started: Instant) -> Result<ExportSummary, Error> {
+pub(super) fn export(job: &ExportJob, link: &ReducedLink, started: Instant) -> Result<ExportSummary, LinkError> {
     let details = link.details.as_deref();
     let Some(modal) = details.and_then(|details| details.modal.as_ref()) else {
         let what = "has no [modal] section, and SID is nothing else: reduce the mesh again with this version (flexarm reduce), \
                     or export its matrices in another format";
-        return Err(Error::File { path: job.link.clone(), what: what.into() });
+        return Err(LinkError::file(&job.link, what));
     };
     let mut warnings = Vec::new();
     let riding: f64 = details.map_or(0.0, |details| details.attached.iter().map(|body| body.mass).sum());
@@ -42,13 +42,13 @@ pub(super) fn export(job: &ExportJob, link: &ReducedLink, started: Instant) -> R
     let pairs: Vec<String> = names.iter().zip(&ids).map(|(name, id)| format!("{name}={id}")).collect();
     let map = pairs.join(",");
 
-    let stem = result_files::file_stem(&link.name);
+    let stem = file_stem(&link.name);
     let texts: [(PathBuf, String); 2] = [
         (job.folder.join(format!("{stem}.SID_FEM")), text),
         (job.folder.join(format!("{stem}_README.txt")), readme(job, link, modal, &map)),
     ];
     let paths: Vec<PathBuf> = texts.iter().map(|(path, _)| path.clone()).collect();
-    result_files::check_free(&paths, job.overwrite)?;
+    check_free(&paths, job.overwrite)?;
 
     // Back as every import reads it, before anything is written: what cannot be read leaves no file.
     let origin = paths[0].display().to_string();
@@ -61,7 +61,7 @@ pub(super) fn export(job: &ExportJob, link: &ReducedLink, started: Instant) -> R
             warnings.push(format!("the {what} read back differs by {error:.1e} (relative to its diagonal)"));
         }
     }
-    result_files::write_all(&texts)?;
+    write_all(&texts)?;
     let whole = modal.rigid();
     Ok(ExportSummary {
         link: link.name.clone(),

@@ -1,4 +1,4 @@
-//! Jobs of a reduction or an import that contradict themselves or their files.
+//! Frames of an import that contradict its matrices.
 
 use flexarm_settings::Setting;
 

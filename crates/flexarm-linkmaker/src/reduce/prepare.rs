@@ -8,17 +8,17 @@ use flexarm_fem::model::AssemblyOptions;
 use flexarm_fem::reduction::{CondensationOptions, ReductionError, TieError};
 use flexarm_fem::sparse::{ModesWanted, Ordering, Threads};
 use flexarm_fem::{Doubt, GateLimits, LinkPlan, Material, Provenance, SplitAt, UnitSystem, mass_properties};
-use flexarm_kinematics::Pose;
 use flexarm_settings::Setting;
+use flexarm_spatial::Pose;
 use nalgebra::Vector3;
 
-use super::interfaces::{Chosen, Place, RobotLink, pose};
+use super::interfaces::{Chosen, Place, pose};
 use super::job::ReduceJob;
 use super::summary::{MaterialFigures, RegionFigures};
+use super::urdf_link::UrdfLink;
 use super::words::{MATERIAL_FORMS, OrderingChoice, QuadratureChoice, SplitChoice, described};
-use super::{JUDGED_MODES, MODES, MOST_MODES, ReduceOptions};
-use crate::error::{Error, ValueError};
-use crate::stamp;
+use super::{JUDGED_MODES, MODES, MOST_MODES};
+use crate::{JobError, LinkError, stamp};
 
 /// All that a reduction needs.
 pub(super) struct Prepared {
@@ -31,15 +31,32 @@ pub(super) struct Prepared {
     pub(super) doubts: Vec<Doubt>,
 }
 
-pub(super) fn prepare(job: &ReduceJob, options: &ReduceOptions) -> Result<Prepared, Error> {
-    // Without units the mesh is still read, to say what could be typed.
-    let units = job.units.unwrap_or(UnitSystem::SI);
+/// The mesh of a job in its own axes, SI, with its nodes merged as the job says and what is to be told of it.
+pub(super) fn read(job: &ReduceJob) -> Result<(MeshFile, Vec<String>), LinkError> {
+    let units = units_of(job);
     let mut file = read_mesh(&job.mesh, &ReadOptions { units, ..ReadOptions::default() }).map_err(Box::new)?;
     let mut warnings = std::mem::take(&mut file.warnings);
     if let Some(distance) = job.merge {
         merge(&mut file, distance, units, &mut warnings)?;
     }
-    let robot = job.urdf.as_ref().map(|entry| RobotLink::read(entry, &options.urdf)).transpose()?;
+    Ok((file, warnings))
+}
+
+/// Without units the mesh is still read, to say what could be typed.
+fn units_of(job: &ReduceJob) -> UnitSystem {
+    job.units.unwrap_or(UnitSystem::SI)
+}
+
+pub(super) fn prepare(
+    job: &ReduceJob,
+    (mut file, mut warnings): (MeshFile, Vec<String>),
+    robot: Option<&UrdfLink>,
+) -> Result<Prepared, LinkError> {
+    if let Some(entry) = job.urdf.as_ref().filter(|_| robot.is_none()) {
+        let what = "is the robot of the job: what it says of the link is needed";
+        return Err(LinkError::file(&entry.file, what));
+    }
+    let units = units_of(job);
     let X_LM = job.mesh_frame.map_or_else(Pose::identity, |frame| pose(&frame, units.length));
 
     let mut faults = Vec::new();
@@ -48,12 +65,12 @@ pub(super) fn prepare(job: &ReduceJob, options: &ReduceOptions) -> Result<Prepar
     }
     let materials = materials(job, &mut file, &mut faults, &mut warnings);
     if job.link_name().trim().is_empty() || job.link_name().contains(['/', '\\', '\n']) {
-        faults.push(ValueError::LinkName(job.link_name()).into());
+        faults.push(JobError::LinkName(job.link_name()).into());
     }
     // Said by the reader about a deck without sections; the job has the material.
     warnings.retain(|said| !said.contains("hence without a material") || materials.is_empty());
     let place = Place { mesh: &file.mesh, unit: units.length, X_LM };
-    let chosen = place.choose(job, robot.as_ref()).unwrap_or_else(|more| {
+    let chosen = place.choose(job, robot).unwrap_or_else(|more| {
         faults.extend(more);
         Vec::new()
     });
@@ -63,12 +80,10 @@ pub(super) fn prepare(job: &ReduceJob, options: &ReduceOptions) -> Result<Prepar
     {
         let names = [&a.interface.name, &b.interface.name];
         let what = format!("interfaces {names:?} are at the same point; a link needs a length");
-        faults.push(Error::File { path: job.mesh.clone(), what });
+        faults.push(LinkError::file(&job.mesh, what));
     }
-    match faults.len() {
-        0 => {}
-        1 => return Err(faults.remove(0)),
-        _ => return Err(Error::Several(faults)),
+    if !faults.is_empty() {
+        return Err(LinkError::of_all(faults));
     }
     let said = |code: &'static str| move |sentence: String| Doubt::said(code, sentence);
     let mut doubts: Vec<Doubt> = warnings.into_iter().map(said("mesh-file")).collect();
@@ -78,21 +93,20 @@ pub(super) fn prepare(job: &ReduceJob, options: &ReduceOptions) -> Result<Prepar
     let mut plan = plan(job, &file, units, &chosen, &materials);
     plan.assembly.quadrature = quadrature(job, &file)?;
     file.mesh = file.mesh.transformed(&X_LM);
-    if let (Some(robot), Some(entry)) = (&robot, job.urdf.as_ref().filter(|entry| entry.rest)) {
-        let fault = |what| Error::File { path: entry.file.clone(), what };
+    if let (Some(robot), Some(entry)) = (robot, job.urdf.as_ref().filter(|entry| entry.rest)) {
         let densities: Vec<f64> = file.mesh.regions.iter().map(|r| r.material.map_or(0.0, |m| m.rho)).collect();
-        let mesh = mass_properties(&file.mesh, &densities)
-            .map_err(|error| Error::File { path: job.mesh.clone(), what: error.to_string() })?;
+        let mesh =
+            mass_properties(&file.mesh, &densities).map_err(|error| LinkError::file(&job.mesh, error.to_string()))?;
         let along = plan.interfaces[1].X_LI.translation.vector - plan.interfaces[0].X_LI.translation.vector;
-        plan.attached = robot.rest(&mesh, &along).map_err(fault)?.into();
+        plan.attached = robot.rest(&mesh, &along).map_err(|what| LinkError::file(&entry.file, what))?.into();
     }
     Ok(Prepared { plan, file, units, chosen, materials, doubts })
 }
 
 /// Joins nodes that lie in one place.
-fn merge(file: &mut MeshFile, distance: f64, units: UnitSystem, warnings: &mut Vec<String>) -> Result<(), Error> {
+fn merge(file: &mut MeshFile, distance: f64, units: UnitSystem, warnings: &mut Vec<String>) -> Result<(), LinkError> {
     if !(distance.is_finite() && distance >= 0.0) {
-        return Err(ValueError::MergeDistance(distance).into());
+        return Err(JobError::MergeDistance(distance).into());
     }
     let merged = file.mesh.merge_coincident(distance * units.length);
     let before = file.mesh.nodes.len();
@@ -121,7 +135,7 @@ fn material_doubts(file: &MeshFile, units: UnitSystem, figures: &[RegionFigures]
     doubts.into_iter().map(|(doubt, regions)| format!("material of {}: {doubt}", regions.join(", "))).collect()
 }
 
-fn no_units(job: &ReduceJob, file: &MeshFile) -> Error {
+fn no_units(job: &ReduceJob, file: &MeshFile) -> LinkError {
     let size = file.mesh.bounding_box().map_or(0.0, |(low, high)| (high - low).amax());
     let what = format!(
         "the units of the mesh are not declared: {setting} LENGTH-MASS-TIME or units = \"...\"; the mesh is {size:.6} long in \
@@ -129,17 +143,17 @@ fn no_units(job: &ReduceJob, file: &MeshFile) -> Error {
         1e-3 * size,
         setting = Setting::Units
     );
-    Error::File { path: job.mesh.clone(), what }
+    LinkError::file(&job.mesh, what)
 }
 
 /// Puts the materials of the job into the mesh; says of each region which one counts.
 fn materials(
     job: &ReduceJob,
     file: &mut MeshFile,
-    faults: &mut Vec<Error>,
+    faults: &mut Vec<LinkError>,
     warnings: &mut Vec<String>,
 ) -> Vec<RegionFigures> {
-    let fault = |what: String| Error::File { path: job.mesh.clone(), what };
+    let fault = |what: String| LinkError::file(&job.mesh, what);
     let mesh = &mut file.mesh;
     let names: Vec<&str> = mesh.regions.iter().map(|region| region.name.as_str()).collect();
     for name in job.materials.keys().filter(|name| !names.contains(&name.as_str())) {
@@ -255,14 +269,14 @@ fn plan(
 }
 
 /// The rules of a job, with incompatible modes under those of CalculiX where the deck has C3D8I.
-fn quadrature(job: &ReduceJob, file: &MeshFile) -> Result<Quadrature, Error> {
+fn quadrature(job: &ReduceJob, file: &MeshFile) -> Result<Quadrature, LinkError> {
     let has = |name: &str| file.element_types.contains(name);
     match job.quadrature.unwrap_or_default() {
         QuadratureChoice::Exact => Ok(Quadrature::Exact),
         QuadratureChoice::Calculix if has("C3D8I") && (has("C3D8") || has("C3D8R")) => {
             let what = "the deck has C3D8I beside C3D8 or C3D8R; the rules of CalculiX can be had for bricks of one of them: give \
                         all bricks one type, or leave quadrature out, with which all have incompatible modes";
-            Err(Error::File { path: job.mesh.clone(), what: what.into() })
+            Err(LinkError::file(&job.mesh, what))
         }
         QuadratureChoice::Calculix if has("C3D8I") => Ok(Quadrature::CalculixModes),
         QuadratureChoice::Calculix => Ok(Quadrature::Calculix),
@@ -277,7 +291,7 @@ pub(super) fn quadrature_name(job: &ReduceJob) -> &'static str {
 }
 
 /// The error with what the file knows of it: numbers and places of nodes.
-pub(super) fn failed(job: &ReduceJob, file: &MeshFile, units: UnitSystem, source: MeshLinkError) -> Error {
+pub(super) fn failed(job: &ReduceJob, file: &MeshFile, units: UnitSystem, source: MeshLinkError) -> LinkError {
     let node = match &source {
         MeshLinkError::Reduction(ReductionError::Tie(TieError::Overlap { node, .. })) => Some(*node as usize),
         MeshLinkError::Reduction(ReductionError::Loose { node, .. })
@@ -288,5 +302,5 @@ pub(super) fn failed(job: &ReduceJob, file: &MeshFile, units: UnitSystem, source
         let (id, p) = (file.mesh.node_ids.get(node)?, file.mesh.nodes.get(node)? / units.length);
         Some(format!("; in the file this is node {id}, at {:.6}, {:.6}, {:.6} in the unit of the mesh", p.x, p.y, p.z))
     });
-    Error::Reduction { path: job.mesh.clone(), note: described.unwrap_or_default(), source: Box::new(source) }
+    LinkError::Reduction { path: job.mesh.clone(), note: described.unwrap_or_default(), source: Box::new(source) }
 }

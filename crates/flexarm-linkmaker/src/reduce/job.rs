@@ -8,13 +8,13 @@ use std::path::{Path, PathBuf};
 
 use flexarm_fem::reduction::Tie;
 use flexarm_fem::{NodeSelector, UnitSystem};
+use flexarm_files::Source;
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
 use super::words::{At, MaterialChoice, OrderingChoice, QuadratureChoice, SplitChoice, text};
-use crate::error::Error;
-use crate::robot_file::Source;
+use crate::LinkError;
 
 /// What to reduce, and how. Whatever is `None` has a default or is asked for when it is needed.
 ///
@@ -162,16 +162,16 @@ impl ReduceJob {
     /// A job file, or a job with nothing but this mesh; told apart by content: a job is TOML with `mesh = ...`.
     ///
     /// # Errors
-    /// [`Error::File`] if it cannot be read, [`Error::RobotFile`] with line and column for what is not the format.
-    pub fn load(path: &Path) -> Result<Self, Error> {
+    /// [`LinkError::Files`] if it cannot be read, [`LinkError::JobFile`] with line and column for what is not the format.
+    pub fn load(path: &Path) -> Result<Self, LinkError> {
         let unreadable = |e: std::io::Error| {
             let what = match e.kind() {
                 std::io::ErrorKind::NotFound => {
-                    "there is no such file; give a mesh (.msh or .inp, also .gz) or a job file (.toml)".into()
+                    "there is no such file; give a mesh (.msh or .inp, also .gz) or a job file (.toml)".to_owned()
                 }
                 _ => format!("cannot be read: {e}"),
             };
-            Error::File { path: path.to_owned(), what }
+            LinkError::file(path, what)
         };
         let mut bytes = Vec::new();
         // A device might never end, a pipe never begin.
@@ -183,10 +183,7 @@ impl ReduceJob {
         let is_toml = path.extension().is_some_and(|e| e == "toml");
         match std::str::from_utf8(&bytes) {
             Ok(text) if is_toml || is_job(text) => parse_job(text, path),
-            Err(_) if is_toml => {
-                let what = "a job file is text in UTF-8; this is not".into();
-                Err(Error::File { path: path.to_owned(), what })
-            }
+            Err(_) if is_toml => Err(LinkError::file(path, "a job file is text in UTF-8; this is not")),
             _ => Ok(Self::for_mesh(path)),
         }
     }
@@ -263,14 +260,14 @@ fn is_job(text: &str) -> bool {
         && keys.any(|line| line.strip_prefix("mesh").is_some_and(|rest| rest.trim_start().starts_with('=')))
 }
 
-fn parse_job(text: &str, path: &Path) -> Result<ReduceJob, Error> {
+fn parse_job(text: &str, path: &Path) -> Result<ReduceJob, LinkError> {
     let source = Source::new(path, text);
     let failed = |error: toml::de::Error| {
         let mut message = error.message().trim().replace('\n', " ");
         if message.contains("missing field `mesh`") {
             message += ": add mesh = \"file.msh\"";
         }
-        Error::from(source.error(error.span().unwrap_or(0..0), message))
+        LinkError::from(source.error(error.span().unwrap_or(0..0), message))
     };
     let mut job: ReduceJob = toml::from_str(text).map_err(failed)?;
     let places: Places = toml::from_str(text).map_err(failed)?;
@@ -328,7 +325,7 @@ at = "centroid"
 tie = "distributing"
 "#;
 
-    fn parse(text: &str) -> Result<ReduceJob, Error> {
+    fn parse(text: &str) -> Result<ReduceJob, LinkError> {
         parse_job(text, Path::new("jobs/arm.toml"))
     }
 

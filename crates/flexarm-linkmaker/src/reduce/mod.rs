@@ -1,23 +1,24 @@
 //! From a mesh to a flexible link with its files: what `flexarm reduce` does.
 //!
-//! A [`ReduceJob`] comes from a file, from flags, or from both ([`ReduceJob::put_over`]); [`reduce()`] checks it,
-//! reduces the mesh and writes the link file, the complete job, the figures and a report. [`list_mesh`] shows what is
-//! in a mesh, to see what can be typed.
+//! A [`ReduceJob`] comes from a file, from flags, or from both ([`ReduceJob::put_over`]). [`Reduction::open`] checks it and
+//! reads the mesh; [`Reduction::finish`] reduces it and writes the link file, the complete job, the figures and a report.
+//! Between the two a caller with a robot says what that knows of the link ([`UrdfLink`]). [`list_mesh`] shows what is in a
+//! mesh, to see what can be typed.
 //!
 //! ```no_run
-//! use flexarm::reduce::{ReduceJob, ReduceOptions, ReduceOutputs, reduce};
+//! use flexarm_linkmaker::reduce::{ReduceJob, ReduceOutputs, Reduction};
 //!
 //! let job = ReduceJob::load("lower_arm.reduce.toml".as_ref())?;
 //! let outputs = ReduceOutputs { folder: Some("out/lower_arm".into()), ..ReduceOutputs::default() };
-//! let summary = reduce(&job, &ReduceOptions::default(), Some(&outputs), &mut |_| {})?;
+//! let summary = Reduction::open(&job, Some(&outputs), &mut |_| {})?.finish(None, &mut |_| {})?;
 //! println!("{:.2} kg, first frequency {:.1} Hz", summary.mass_kg, summary.frequencies_hz[0]);
-//! # Ok::<(), flexarm::Error>(())
+//! # Ok::<(), flexarm_linkmaker::LinkError>(())
 //! ```
 //!
 //! Units: SI, except lengths in a job, which are in the unit of its mesh. Positions of interfaces are in the link
 //! frame; places that choose nodes are in the frame of the mesh, as a mesher shows them.
 //!
-//! Not here: the reduction itself (`flexarm-fem`).
+//! Not here: the reduction itself (`flexarm-fem`), the file of the robot.
 
 mod files;
 mod interfaces;
@@ -26,20 +27,23 @@ mod listing;
 mod prepare;
 mod report;
 mod summary;
+mod urdf_link;
 mod words;
 
 use std::time::{Duration, Instant};
 
-use flexarm_fe_io::mesh::ReadOptions;
+use cpu_time::ProcessTime;
+use flexarm_fe_io::mesh::{MeshFile, ReadOptions};
 use flexarm_fe_io::read_mesh;
 use flexarm_fem::mesh_link::ReductionStep;
 use flexarm_fem::{UnitSystem, reduce_mesh, write_flex};
-use flexarm_kinematics::Pose;
+use flexarm_settings::caveat;
+use flexarm_spatial::Pose;
 
-use crate::error::{Error, ValueError};
+use crate::{JobError, LinkError};
 use files::Paths;
 use interfaces::Place;
-use prepare::{Prepared, failed, prepare};
+use prepare::{Prepared, failed, prepare, read};
 use summary::summary_of;
 
 pub use files::ReduceOutputs;
@@ -53,6 +57,7 @@ pub use summary::{
     PhaseFigures, ReduceFiles, ReduceSummary, RegionFigures, SolverFigures,
 };
 pub(crate) use summary::{coarse, doubted};
+pub use urdf_link::{LinkJoint, UrdfLink};
 pub use words::{At, MaterialChoice, OrderingChoice, QuadratureChoice, SplitChoice, numbers};
 
 /// Modes that are kept if the job does not say.
@@ -61,13 +66,6 @@ const MODES: usize = 10;
 const MOST_MODES: usize = 1000;
 /// Modes with A held against which the reduced models are judged.
 const JUDGED_MODES: usize = 10;
-
-/// What a job does not say.
-#[derive(Clone, Debug, Default)]
-pub struct ReduceOptions {
-    /// For the reader of the URDF.
-    pub urdf: flexarm_urdf::ReadOptions,
-}
 
 /// A step that begins.
 #[derive(Clone, Copy, Debug)]
@@ -80,55 +78,87 @@ pub struct ReduceProgress {
     pub of: usize,
 }
 
-/// Reduces a mesh to a link and writes the files.
-///
-/// Everything that can be checked is checked before the work starts; nothing is written if it fails.
-///
-/// # Errors
-/// [`Error`]; several faults of a job come together. See [`Error::fault`].
-pub fn reduce(
-    job: &ReduceJob,
-    options: &ReduceOptions,
-    outputs: Option<&ReduceOutputs>,
-    progress: &mut dyn FnMut(ReduceProgress),
-) -> Result<ReduceSummary, Error> {
-    let (started, cpu) = (Instant::now(), cpu_time::ProcessTime::now());
-    let of = ReductionStep::ALL.len() + 1;
-    progress(ReduceProgress { step: "reading the mesh", number: 1, of });
-    let job = &with_defaults(job)?;
-    let paths = outputs.map(|outputs| Paths::new(outputs, &job.link_name())).transpose()?;
-    let Prepared { plan, file, units, chosen, materials, doubts } = prepare(job, options)?;
-    let read_s = started.elapsed();
+/// Steps of a reduction: those of the numbers, after the reading.
+const STEPS: usize = ReductionStep::ALL.len() + 1;
 
-    let mut starts = Vec::new();
-    let reduction = reduce_mesh(&file.mesh, &plan, &mut |step| {
-        starts.push(Instant::now());
-        let number = starts.len() + 1;
-        progress(ReduceProgress { step: step.name(), number, of });
-    });
-    let reduction = reduction.map_err(|source| failed(job, &file, units, source))?;
-    starts.push(Instant::now());
+/// A job whose mesh is read and whose places of results are free.
+#[derive(Debug)]
+pub struct Reduction {
+    /// Every default written out.
+    job: ReduceJob,
+    paths: Option<Paths>,
+    /// In its own axes, with what is to be told of it.
+    mesh: (MeshFile, Vec<String>),
+    started: Instant,
+    cpu: ProcessTime,
+}
 
-    let mut summary = summary_of(job, &plan, &file, units, &chosen, materials, &reduction);
-    let before: Vec<_> = doubts.into_iter().map(|doubt| doubted(&summary.link, doubt)).collect();
-    summary.caveats.splice(0..0, before);
-    summary.warnings = crate::caveat::warnings(&summary.caveats);
-    summary.phases = phases(read_s, &starts);
-    summary.wall_s = started.elapsed().as_secs_f64();
-    summary.cpu_s = cpu.elapsed().as_secs_f64();
-    summary.peak_rss_bytes = crate::stamp::peak_rss_bytes();
-    if let Some(paths) = paths {
-        let pictures = if paths.folder.is_some() { pictures(&file.mesh, &plan, &reduction)? } else { Vec::new() };
-        write(job, &paths, &write_flex(&reduction.link), &pictures, &mut summary)?;
+impl Reduction {
+    /// Reads the mesh of a job. The numbers of the job and the places of the results are checked before.
+    ///
+    /// # Errors
+    /// [`LinkError::Job`] for numbers that make no sense, [`LinkError::Files`] for places that are taken,
+    /// [`LinkError::Mesh`].
+    pub fn open(
+        job: &ReduceJob,
+        outputs: Option<&ReduceOutputs>,
+        progress: &mut dyn FnMut(ReduceProgress),
+    ) -> Result<Self, LinkError> {
+        let (started, cpu) = (Instant::now(), ProcessTime::now());
+        progress(ReduceProgress { step: "reading the mesh", number: 1, of: STEPS });
+        let job = with_defaults(job)?;
+        let paths = outputs.map(|outputs| Paths::new(outputs, &job.link_name())).transpose()?;
+        let mesh = read(&job)?;
+        Ok(Self { job, paths, mesh, started, cpu })
     }
-    Ok(summary)
+
+    /// Reduces the mesh to a link and writes the files.
+    ///
+    /// * `robot`: what the robot of the job ([`ReduceJob::urdf`]) says of the link; `None` if the job has none.
+    ///
+    /// Everything that can be checked is checked before the work starts; nothing is written if it fails.
+    ///
+    /// # Errors
+    /// [`LinkError`]; several faults of a job come together. See [`LinkError::fault`].
+    pub fn finish(
+        self,
+        robot: Option<&UrdfLink>,
+        progress: &mut dyn FnMut(ReduceProgress),
+    ) -> Result<ReduceSummary, LinkError> {
+        let Self { job, paths, mesh, started, cpu } = self;
+        let Prepared { plan, file, units, chosen, materials, doubts } = prepare(&job, mesh, robot)?;
+        let read_s = started.elapsed();
+
+        let mut starts = Vec::new();
+        let reduction = reduce_mesh(&file.mesh, &plan, &mut |step| {
+            starts.push(Instant::now());
+            let number = starts.len() + 1;
+            progress(ReduceProgress { step: step.name(), number, of: STEPS });
+        });
+        let reduction = reduction.map_err(|source| failed(&job, &file, units, source))?;
+        starts.push(Instant::now());
+
+        let mut summary = summary_of(&job, &plan, &file, units, &chosen, materials, &reduction);
+        let before: Vec<_> = doubts.into_iter().map(|doubt| doubted(&summary.link, doubt)).collect();
+        summary.caveats.splice(0..0, before);
+        summary.warnings = caveat::warnings(&summary.caveats);
+        summary.phases = phases(read_s, &starts);
+        summary.wall_s = started.elapsed().as_secs_f64();
+        summary.cpu_s = cpu.elapsed().as_secs_f64();
+        summary.peak_rss_bytes = crate::stamp::peak_rss_bytes();
+        if let Some(paths) = paths {
+            let pictures = if paths.folder.is_some() { pictures(&file.mesh, &plan, &reduction)? } else { Vec::new() };
+            write(&job, &paths, &write_flex(&reduction.link), &pictures, &mut summary)?;
+        }
+        Ok(summary)
+    }
 }
 
 /// What is in the mesh of a job. Units, materials and positions may be missing.
 ///
 /// # Errors
-/// [`Error::Mesh`], and [`Error::Interface`] for interfaces that choose no nodes.
-pub fn list_mesh(job: &ReduceJob) -> Result<MeshListing, Error> {
+/// [`LinkError::Mesh`], and [`LinkError::Interface`] for interfaces that choose no nodes.
+pub fn list_mesh(job: &ReduceJob) -> Result<MeshListing, LinkError> {
     let read = ReadOptions { units: job.units.unwrap_or(UnitSystem::SI), ..ReadOptions::default() };
     let file = read_mesh(&job.mesh, &read).map_err(Box::new)?;
     let unit = read.units.length;
@@ -138,7 +168,7 @@ pub fn list_mesh(job: &ReduceJob) -> Result<MeshListing, Error> {
     for entry in &job.interface {
         let Some(selector) = &entry.select else { continue };
         let interface = entry.name.clone().unwrap_or_default();
-        let nodes = flexarm_fem::mesh::select(&file.mesh, selector, unit).map_err(|source| Error::Interface {
+        let nodes = flexarm_fem::mesh::select(&file.mesh, selector, unit).map_err(|source| LinkError::Interface {
             place: if entry.place.is_empty() { listing.mesh.clone() } else { entry.place.clone() },
             interface: interface.clone(),
             what: source.to_string(),
@@ -149,20 +179,20 @@ pub fn list_mesh(job: &ReduceJob) -> Result<MeshListing, Error> {
 }
 
 /// The job with every default written out.
-fn with_defaults(job: &ReduceJob) -> Result<ReduceJob, ValueError> {
+fn with_defaults(job: &ReduceJob) -> Result<ReduceJob, JobError> {
     let mut job = job.clone();
     job.put_over(ReduceJob::default()); // names the interfaces
     job.link = Some(job.link_name());
     match (job.modes, job.modes_up_to_hz) {
         (None, None) => job.modes = Some(MODES),
         (Some(_), Some(_)) => {
-            return Err(ValueError::ModesTwice);
+            return Err(JobError::ModesTwice);
         }
         (Some(modes), None) if modes > MOST_MODES => {
-            return Err(ValueError::TooManyModes { found: modes, most: MOST_MODES });
+            return Err(JobError::TooManyModes { found: modes, most: MOST_MODES });
         }
         (None, Some(hz)) if !(hz.is_finite() && hz > 0.0) => {
-            return Err(ValueError::ModesUpTo(hz));
+            return Err(JobError::ModesUpTo(hz));
         }
         _ => {}
     }
@@ -170,7 +200,7 @@ fn with_defaults(job: &ReduceJob) -> Result<ReduceJob, ValueError> {
     chains.sort_unstable();
     chains.dedup();
     if let Some(parts) = chains.iter().find(|parts| !(2..=100).contains(*parts)) {
-        return Err(ValueError::ChainParts(*parts));
+        return Err(JobError::ChainParts(*parts));
     }
     job.geometric.get_or_insert(false);
     job.tie.get_or_insert(Tie::Rigid);
@@ -179,7 +209,7 @@ fn with_defaults(job: &ReduceJob) -> Result<ReduceJob, ValueError> {
     job.ordering.get_or_insert(OrderingChoice::Auto);
     let threads = *job.threads.get_or_insert(1);
     if !(1..=1024).contains(&threads) {
-        return Err(ValueError::Threads(threads));
+        return Err(JobError::Threads(threads));
     }
     Ok(job)
 }
@@ -199,10 +229,10 @@ fn pictures(
     mesh: &flexarm_fem::Mesh,
     plan: &flexarm_fem::LinkPlan,
     reduction: &flexarm_fem::MeshReduction,
-) -> Result<Vec<(&'static str, Vec<u8>)>, Error> {
+) -> Result<Vec<(&'static str, Vec<u8>)>, LinkError> {
     use flexarm_draw::mesh_picture::MeshPictures;
-    fn failed(error: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Error {
-        Error::Pictures(error.into())
+    fn failed(error: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> LinkError {
+        LinkError::Pictures(error.into())
     }
     let sheets = MeshPictures::new(mesh, &plan.interfaces, reduction).map_err(failed)?;
     let mut all = vec![("interfaces.png", sheets.render_interfaces()), ("unit_loads.png", sheets.render_unit_loads())];
@@ -218,7 +248,7 @@ fn pictures(
     _: &flexarm_fem::Mesh,
     _: &flexarm_fem::LinkPlan,
     _: &flexarm_fem::MeshReduction,
-) -> Result<Vec<(&'static str, Vec<u8>)>, Error> {
+) -> Result<Vec<(&'static str, Vec<u8>)>, LinkError> {
     Ok(Vec::new())
 }
 
@@ -228,7 +258,7 @@ fn write(
     flex: &str,
     pictures: &[(&'static str, Vec<u8>)],
     summary: &mut ReduceSummary,
-) -> Result<(), Error> {
+) -> Result<(), LinkError> {
     let text = |path: &std::path::Path| Some(path.display().to_string());
     summary.files.flex = paths.flex.as_deref().or(paths.folder.as_ref().map(|f| f.flex.as_path())).and_then(text);
     let (mut job_text, mut json, mut page) = (String::new(), String::new(), String::new());
@@ -253,5 +283,5 @@ fn write(
         files.extend(pictures.iter().map(|(name, png)| (folder.path.join(name), png.as_slice())));
     }
     files.extend(paths.flex.clone().map(|path| (path, flex.as_bytes())));
-    paths.write(&files)
+    Ok(paths.write(&files)?)
 }

@@ -5,7 +5,7 @@
 //! rows and the units, which most formats do not hold. A link without superelement gives its static stiffness alone.
 //! SID holds the modal link instead.
 //!
-//! Not here: the formats (`flexarm-fem`).
+//! Not here: the formats (`flexarm-fe-io`).
 
 mod sid;
 
@@ -19,12 +19,12 @@ use flexarm_fe_io::exchange::{
 };
 use flexarm_fem::reduction::{InterfaceFrame, Superelement};
 use flexarm_fem::{Pose, ReducedLink, UnitSystem, read_flex};
+use flexarm_files::{check_free, file_stem, write_all};
 use flexarm_settings::Setting;
 use nalgebra::{DMatrix, Translation3};
 use serde::Serialize;
 
-use crate::error::{Error, ValueError};
-use crate::{result_files, stamp};
+use crate::{JobError, LinkError, stamp};
 
 /// Formats that can be written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -134,8 +134,8 @@ pub struct ExportChecks {
 /// Writes a link in another format and reads it back.
 ///
 /// # Errors
-/// [`Error`]; see [`Error::fault`].
-pub fn export(job: &ExportJob) -> Result<ExportSummary, Error> {
+/// [`LinkError`]; see [`LinkError::fault`].
+pub fn export(job: &ExportJob) -> Result<ExportSummary, LinkError> {
     let started = Instant::now();
     let link = read_flex(&job.link).map_err(Box::new)?;
     if job.format == ExportFormat::Sid {
@@ -148,7 +148,7 @@ pub fn export(job: &ExportJob) -> Result<ExportSummary, Error> {
     let texts: Vec<(PathBuf, String)> =
         content.files().into_iter().map(|(name, text)| (job.folder.join(name), text)).collect();
     let paths: Vec<PathBuf> = texts.iter().map(|(path, _)| path.clone()).collect();
-    result_files::check_free(&paths, job.overwrite)?;
+    check_free(&paths, job.overwrite)?;
 
     // Back through the door of every import, before anything is written: what cannot be read leaves no file.
     let is_readable = |path: &PathBuf| path.extension().is_none_or(|ending| ending != "txt" && ending != "m");
@@ -166,7 +166,7 @@ pub fn export(job: &ExportJob) -> Result<ExportSummary, Error> {
             warnings.push(format!("the {what} read back differs by {error:.1e} (relative to its diagonal)"));
         }
     }
-    result_files::write_all(&texts)?;
+    write_all(&texts)?;
     let whole = link.rigid();
     Ok(ExportSummary {
         link: link.name.clone(),
@@ -210,13 +210,13 @@ fn element_of(link: &ReducedLink, warnings: &mut Vec<String>) -> (Superelement, 
     (Superelement { interfaces, K, M: DMatrix::zeros(12, 12) }, false)
 }
 
-fn nodes(job: &ExportJob, interfaces: usize) -> Result<Vec<i64>, Error> {
+fn nodes(job: &ExportJob, interfaces: usize) -> Result<Vec<i64>, LinkError> {
     if job.nodes.is_empty() {
         return Ok((1001..1001 + interfaces as i64).collect());
     }
     let distinct = job.nodes.iter().collect::<std::collections::BTreeSet<_>>().len() == job.nodes.len();
     if job.nodes.len() != interfaces || !distinct || job.nodes.iter().any(|node| !(1..=99_999_999).contains(node)) {
-        return Err(ValueError::NodeNumbers { found: job.nodes.clone(), interfaces }.into());
+        return Err(JobError::NodeNumbers { found: job.nodes.clone(), interfaces }.into());
     }
     Ok(job.nodes.clone())
 }
@@ -289,7 +289,7 @@ impl Content<'_> {
 
     /// Names and texts.
     fn files(&self) -> Vec<(String, String)> {
-        let stem = result_files::file_stem(&self.link.name);
+        let stem = file_stem(&self.link.name);
         let (K, M) = self.matrices();
         let said = format!("{}: {}; rows {}", self.link.name, self.job.units, self.row_order());
         let mut files = match self.job.format {

@@ -2,26 +2,26 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::error::Error;
+use crate::FileError;
 
 /// Refuses places that are taken.
 ///
 /// # Errors
-/// [`Error::Taken`], and [`Error::File`] for a folder in the place of a file or the other way round.
-pub fn check_free(paths: &[PathBuf], overwrite: bool) -> Result<(), Error> {
+/// [`FileError::Taken`], and [`FileError::Unusable`] for a folder in the place of a file or the other way round.
+pub fn check_free(paths: &[PathBuf], overwrite: bool) -> Result<(), FileError> {
     for path in paths {
-        let fail = |what: &str| Err(Error::File { path: path.clone(), what: what.into() });
+        let fail = |what: &str| Err(FileError::Unusable { path: path.clone(), what: what.into() });
         if path.is_dir() {
             return fail("is a folder, a file is to be written there");
         }
         if !overwrite && path.exists() {
-            return Err(Error::Taken { path: path.clone(), place: "place", movable: false });
+            return Err(FileError::Taken { path: path.clone(), place: "place", movable: false });
         }
         if let Some(above) = path.ancestors().skip(1).find(|above| above.exists())
             && !above.is_dir()
         {
             let what = "is a file; the results need a folder".into();
-            return Err(Error::File { path: above.to_owned(), what });
+            return Err(FileError::Unusable { path: above.to_owned(), what });
         }
     }
     Ok(())
@@ -31,11 +31,11 @@ pub fn check_free(paths: &[PathBuf], overwrite: bool) -> Result<(), Error> {
 /// rename that fails leaves new files behind. Files that were overwritten before it stay as they are now.
 ///
 /// # Errors
-/// [`Error::Write`].
-pub fn write_all(files: &[(PathBuf, impl AsRef<[u8]>)]) -> Result<(), Error> {
+/// [`FileError::Write`].
+pub fn write_all(files: &[(PathBuf, impl AsRef<[u8]>)]) -> Result<(), FileError> {
     let mut undo = Undo::default();
     for (path, bytes) in files {
-        let failed = |source| Error::Write { path: path.clone(), source };
+        let failed = |source| FileError::Write { path: path.clone(), source };
         if let Some(folder) = path.parent().filter(|folder| !folder.as_os_str().is_empty()) {
             undo.make(folder).map_err(failed)?;
         }
@@ -45,17 +45,17 @@ pub fn write_all(files: &[(PathBuf, impl AsRef<[u8]>)]) -> Result<(), Error> {
     }
     for (path, _) in files {
         let is_new = !path.exists();
-        std::fs::rename(partial(path), path).map_err(|source| Error::Write { path: path.clone(), source })?;
+        std::fs::rename(partial(path), path).map_err(|source| FileError::Write { path: path.clone(), source })?;
         if is_new {
             undo.files.push(path.clone());
         }
     }
-    undo.done = true;
+    undo.keep();
     Ok(())
 }
 
 /// A name as it may stand in a file name.
-pub(crate) fn file_stem(name: &str) -> String {
+pub fn file_stem(name: &str) -> String {
     name.chars().map(|c| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' }).collect()
 }
 
@@ -66,21 +66,29 @@ fn partial(path: &Path) -> PathBuf {
 }
 
 /// Removes on its way out what was made, unless all went well.
-#[derive(Default)]
-pub(crate) struct Undo {
+#[derive(Debug, Default)]
+pub struct Undo {
     files: Vec<PathBuf>,
     folders: Vec<PathBuf>,
-    pub(crate) done: bool,
+    done: bool,
 }
 
 impl Undo {
     /// Makes a folder, and those above it that are missing.
-    pub(crate) fn make(&mut self, folder: &Path) -> std::io::Result<()> {
+    ///
+    /// # Errors
+    /// What the file system says.
+    pub fn make(&mut self, folder: &Path) -> std::io::Result<()> {
         let missing: Vec<PathBuf> =
             folder.ancestors().take_while(|f| !f.as_os_str().is_empty() && !f.exists()).map(Path::to_owned).collect();
         std::fs::create_dir_all(folder)?;
         self.folders.extend(missing.into_iter().rev());
         Ok(())
+    }
+
+    /// All went well: what was made stays.
+    pub fn keep(&mut self) {
+        self.done = true;
     }
 }
 
@@ -96,5 +104,30 @@ impl Drop for Undo {
         for folder in self.folders.iter().rev() {
             let _ = std::fs::remove_dir(folder);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn results_that_cannot_all_be_written_leave_no_file_and_no_folder() {
+        let place = std::env::temp_dir().join(format!("flexarm-files-undo-{}", std::process::id()));
+        std::fs::create_dir_all(&place).unwrap();
+        let folder = place.join("made/for/it");
+        // The second one needs a folder where there is a file.
+        let in_the_way = place.join("file");
+        std::fs::write(&in_the_way, "x").unwrap();
+        let failed = write_all(&[(folder.join("a"), "a"), (in_the_way.join("b"), "b")]);
+        assert!(matches!(failed, Err(FileError::Write { path, .. }) if path == in_the_way.join("b")));
+        let left: Vec<_> = std::fs::read_dir(&place).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+        assert_eq!(left, ["file"]);
+        std::fs::remove_dir_all(&place).unwrap();
+    }
+
+    #[test]
+    fn names_of_links_become_names_of_files() {
+        assert_eq!(file_stem("link 2/á*.v1"), "link_2_á_.v1");
     }
 }

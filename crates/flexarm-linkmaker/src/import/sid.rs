@@ -17,10 +17,10 @@ use nalgebra::{DMatrix, Matrix6, Rotation3, Translation3, Vector3};
 use super::summary::{ImportInterface, Parts};
 use super::words::ImportMap;
 use super::{ImportJob, SECOND_ORDER_UNKNOWN, plan, rotation};
-use crate::error::{Error, ImportError};
+use crate::{ImportError, LinkError};
 
-pub(super) fn import(job: &ImportJob, file: &InputFile, name: &str) -> Result<(MatrixReduction, Parts), Error> {
-    let refuse = |what: String| Error::File { path: file.origin.clone().into(), what };
+pub(super) fn import(job: &ImportJob, file: &InputFile, name: &str) -> Result<(MatrixReduction, Parts), LinkError> {
+    let refuse = |what: String| LinkError::file(&file.origin, what);
     let sid = parse_sid(&String::from_utf8_lossy(&file.bytes), &file.origin).map_err(Box::new)?;
     let ids: Vec<i64> = sid.nodes.iter().map(|node| node.id).collect();
     let mut faults = Vec::new();
@@ -37,9 +37,7 @@ pub(super) fn import(job: &ImportJob, file: &InputFile, name: &str) -> Result<(M
         }
     };
     let nodes = nodes.map_err(|what| faults.push(refuse(what))).ok();
-    let (Some(units), Some(nodes)) = (job.units, nodes) else {
-        return Err(if faults.len() == 1 { faults.remove(0) } else { Error::Several(faults) });
-    };
+    let (Some(units), Some(nodes)) = (job.units, nodes) else { return Err(LinkError::of_all(faults)) };
     if let Some(at) = job.at.first() {
         return Err(ImportError::FrameOfSid { interface: at.name.clone() }.into());
     }
@@ -72,7 +70,7 @@ pub(super) fn import(job: &ImportJob, file: &InputFile, name: &str) -> Result<(M
     if plan.masses == PartMasses::FromMatrix {
         plan.masses = PartMasses::Whole(body(&sid, &R_LM));
     }
-    let failed = |source| Error::Import { path: file.origin.clone().into(), source: Box::new(source) };
+    let failed = |source| LinkError::Import { path: file.origin.clone().into(), source: Box::new(source) };
     let mut reduction = link_from_superelement(element, false, &plan).map_err(failed)?;
     if let Some(modal) = modal {
         if (modal.mass / reduction.whole.mass - 1.0).abs() > 0.01 {

@@ -1,0 +1,31 @@
+//! Text files into memory, with the place of what is wrong in them; results onto the disk, all or none.
+//!
+//! ```
+//! use flexarm_files::{FileError, Source, check_free, write_all};
+//!
+//! // What is wrong in a text is said with line and column.
+//! let text = "format = 1\nmodes = -3\n";
+//! let error = Source::new("arm.toml".as_ref(), text).error(19..21, "modes is -3, at least 0 is needed");
+//! assert_eq!(error.to_string(), "arm.toml:2:9: modes is -3, at least 0 is needed");
+//!
+//! // Results come together, and what is there is not replaced unasked.
+//! let folder = std::env::temp_dir().join(format!("flexarm-files-{}", std::process::id()));
+//! let files = ["link.flex", "summary.json"].map(|name| (folder.join(name), "..."));
+//! let paths = files.clone().map(|(path, _)| path);
+//! check_free(&paths, false)?;
+//! write_all(&files)?;
+//! assert!(matches!(check_free(&paths, false), Err(FileError::Taken { .. })));
+//! # std::fs::remove_dir_all(&folder).unwrap();
+//! # Ok::<(), FileError>(())
+//! ```
+//!
+//! Not here: what the files mean.
+#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
+
+mod error;
+mod results;
+mod text;
+
+pub use error::{FileError, taken};
+pub use results::{Undo, check_free, file_stem, write_all};
+pub use text::{Source, TextFileError, read_text};

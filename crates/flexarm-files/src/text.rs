@@ -1,0 +1,71 @@
+//! Text files into memory: files only, and none larger than a person or a program writes for this purpose. What is wrong in
+//! one is said with line and column.
+
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use crate::FileError;
+
+/// A file larger than this is refused (bytes).
+const LARGEST: u64 = 256 << 20;
+
+/// The text of a file.
+///
+/// # Errors
+/// [`FileError::Unusable`] for what cannot be read, is no file, is too large or no text in UTF-8.
+pub fn read_text(path: &Path) -> Result<String, FileError> {
+    let fail = |what: String| FileError::Unusable { path: path.to_owned(), what };
+    let unreadable = |error: std::io::Error| match error.kind() {
+        std::io::ErrorKind::InvalidData => {
+            fail("cannot be read: it is not text in UTF-8; save it as that, or is it another file?".into())
+        }
+        _ => fail(format!("cannot be read: {error}")),
+    };
+    // A device might never end, a pipe never begin.
+    if !std::fs::metadata(path).map_err(unreadable)?.is_file() {
+        return Err(fail("cannot be read: this is not a file".into()));
+    }
+    let mut text = String::new();
+    let size = std::fs::File::open(path).and_then(|file| file.take(LARGEST + 1).read_to_string(&mut text));
+    if size.map_err(unreadable)? as u64 > LARGEST {
+        return Err(fail(format!("has more than {LARGEST} bytes, which is more than is read")));
+    }
+    Ok(text)
+}
+
+/// What is wrong in a text file, and where.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{}:{line}:{column}: {message}", path.display())]
+pub struct TextFileError {
+    /// The file.
+    pub path: PathBuf,
+    /// Line, from 1.
+    pub line: usize,
+    /// Column, from 1.
+    pub column: usize,
+    /// What was found, what was expected, how to mend it.
+    pub message: String,
+}
+
+/// The text of a file with its place, to point into it.
+#[derive(Clone, Debug)]
+pub struct Source {
+    /// The file.
+    pub path: PathBuf,
+    text: String,
+}
+
+impl Source {
+    /// The text of the file at `path`.
+    pub fn new(path: &Path, text: &str) -> Self {
+        Self { path: path.to_owned(), text: text.to_owned() }
+    }
+
+    /// An error at a byte range of the text.
+    pub fn error(&self, span: std::ops::Range<usize>, message: impl Into<String>) -> TextFileError {
+        let before = self.text.get(..span.start).unwrap_or(&self.text);
+        let line = before.matches('\n').count() + 1;
+        let column = before.len() - before.rfind('\n').map_or(0, |i| i + 1) + 1;
+        TextFileError { path: self.path.clone(), line, column, message: message.into() }
+    }
+}

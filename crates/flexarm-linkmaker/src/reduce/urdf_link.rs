@@ -1,0 +1,127 @@
+//! What a robot says of the link that is made of a mesh.
+
+use flexarm_fem::RigidPart;
+use flexarm_fem::matrix_link::halves_of_bar;
+use flexarm_spatial::Pose;
+use nalgebra::Vector3;
+
+/// What a robot says of the link that is made: where its joints are, and what it weighs. Whoever reads the file of the robot
+/// ([`UrdfEntry::file`](super::UrdfEntry::file)) fills it in. SI, link axes.
+#[derive(Clone, Debug)]
+pub struct UrdfLink {
+    /// Name of the link in the robot.
+    pub name: String,
+    /// Frame of the distal interface: that of the joint at B.
+    pub X_LB: Pose,
+    /// The joints on the link, in the order of the robot.
+    pub joints: Vec<LinkJoint>,
+    /// Mass, centre and inertia about the centre (kg, m, kg m²), if the robot has them.
+    pub inertia: Option<RigidPart>,
+}
+
+/// A joint on a link.
+#[derive(Clone, Debug)]
+pub struct LinkJoint {
+    /// Its name.
+    pub name: String,
+    /// Its frame in the link: of the joint that carries the link, the link's own.
+    pub X_LJ: Pose,
+    /// Whether it leads on from the link; the other one carries it.
+    pub leads_on: bool,
+}
+
+impl UrdfLink {
+    /// What the link weighs beyond its mesh, as two halves along the line from A to B, link axes.
+    pub(super) fn rest(&self, mesh: &RigidPart, along: &Vector3<f64>) -> Result<[RigidPart; 2], String> {
+        let Some(whole) = &self.inertia else {
+            return Err(format!("link {:?} has no inertial, so there is no rest", self.name));
+        };
+        let mass = whole.mass - mesh.mass;
+        if mass.is_nan() || mass <= 0.0 {
+            return Err(format!(
+                "the mesh weighs {:.4} kg, link {:?} of the URDF {:.4} kg: nothing is left that could ride on it; \
+                 leave `rest` out, or correct the density",
+                mesh.mass, self.name, whole.mass
+            ));
+        }
+        let com = (whole.com * whole.mass - mesh.com * mesh.mass) / mass;
+        // Second moments about the centre of the rest.
+        let about = |part: f64, com_part: Vector3<f64>| {
+            let c = (com_part - com).cross_matrix();
+            -c * c * part
+        };
+        let inertia = whole.inertia + about(whole.mass, whole.com) - mesh.inertia - about(mesh.mass, mesh.com);
+        let halves = halves_of_bar(&RigidPart { mass, com, inertia }, along);
+        for half in &halves {
+            half.check("what link and mesh differ by").map_err(|error| {
+                format!(
+                    "{error}: the mesh has more inertia than the URDF's link; leave `rest` out, or correct one of them"
+                )
+            })?;
+        }
+        Ok(halves)
+    }
+
+    /// The joints that lead on from the link.
+    pub(super) fn leading_on(&self) -> impl Iterator<Item = &LinkJoint> {
+        self.joints.iter().filter(|joint| joint.leads_on)
+    }
+
+    /// Frame in the link of a joint at either of its ends.
+    pub(super) fn joint(&self, name: &str) -> Result<Pose, String> {
+        // One that leads on goes before the one that carries the link.
+        let found = self.leading_on().chain(&self.joints).find(|joint| joint.name == name);
+        found.map(|joint| joint.X_LJ).ok_or_else(|| {
+            let known: Vec<&str> = self.joints.iter().map(|joint| joint.name.as_str()).collect();
+            format!("link {:?} has no joint {name:?}; its joints are {known:?}", self.name)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Matrix3;
+
+    use super::*;
+
+    /// Truth: mass, first moment and moment of inertia of bodies that are joined add up (Steiner).
+    #[test]
+    fn mesh_and_what_rides_on_it_have_the_mass_and_the_inertia_of_the_robots_link() {
+        let body = |mass, com, moments| RigidPart { mass, com, inertia: Matrix3::from_diagonal(&moments) };
+        let whole = body(30.0, Vector3::new(0.40, 0.01, -0.02), Vector3::new(0.9, 3.0, 3.2));
+        let mesh = body(18.0, Vector3::new(0.45, 0.0, 0.0), Vector3::new(0.2, 1.4, 1.5));
+        let link = UrdfLink {
+            name: "upper arm".into(),
+            X_LB: Pose::translation(0.8, 0.0, 0.0),
+            joints: Vec::new(),
+            inertia: Some(whole.clone()),
+        };
+        let [near, far] = link.rest(&mesh, &Vector3::x()).unwrap();
+        let joined = mesh.merged(&near).merged(&far);
+        assert!((joined.mass - whole.mass).abs() < 1e-12 * whole.mass);
+        assert!((joined.com - whole.com).norm() < 1e-12);
+        assert!((joined.inertia - whole.inertia).amax() < 1e-12 * whole.inertia.amax());
+        assert!(near.com.x < far.com.x, "proximal first");
+        // A mesh that is heavier than the link leaves nothing to ride on it.
+        assert!(link.rest(&mesh.with_mass(31.0), &Vector3::x()).unwrap_err().contains("correct the density"));
+    }
+
+    #[test]
+    fn a_joint_is_found_at_either_end_and_the_one_that_carries_the_link_is_at_its_origin() {
+        let joint = |name: &str, x: f64, leads_on| LinkJoint {
+            name: name.into(),
+            X_LJ: Pose::translation(x, 0.0, 0.0),
+            leads_on,
+        };
+        let link = UrdfLink {
+            name: "upper arm".into(),
+            X_LB: Pose::translation(0.8, 0.0, 0.0),
+            joints: vec![joint("shoulder", 0.0, false), joint("elbow", 0.8, true)],
+            inertia: None,
+        };
+        assert_eq!(link.joint("elbow").unwrap().translation.vector.x, 0.8);
+        assert_eq!(link.joint("shoulder").unwrap(), Pose::identity());
+        assert!(link.joint("wrist").unwrap_err().contains(r#"["shoulder", "elbow"]"#));
+        assert_eq!(link.leading_on().count(), 1);
+    }
+}
