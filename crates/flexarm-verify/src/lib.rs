@@ -20,6 +20,7 @@
 
 pub mod bench;
 pub mod check;
+mod compliance;
 mod error;
 mod files;
 mod lower_arm;
