@@ -46,10 +46,10 @@ ALLOWED = {  # file: what it may have (a pattern of the hit), and why
     "crates/flexarm-urdf/src/xacro/substitution.rs": (r"std::env|env::var|env::current", "xacro's own $(env NAME), $(optenv NAME) and $(cwd)"),
     "crates/flexarm/src/report/html.rs": (r"--c", "a custom property of a style sheet"),
     "crates/flexarm-verify/src/files.rs": (r"--force|--check|-o", "the page tells how it is written, and is compared letter by letter"),
-    "crates/flexarm-verify/src/one_beam/mod.rs": (r"--[a-z-]+|-o", "the page tells how a figure is had by hand"),
-    "crates/flexarm-verify/src/three_beams.rs": (r"--[a-z-]+|-o", "the page tells how a figure is had by hand"),
-    "crates/flexarm-verify/src/lower_arm.rs": (r"--[a-z-]+|-o", "the page tells how a figure is had by hand"),
-    "crates/flexarm-verify/src/manipulator.rs": (r"--[a-z-]+|-o", "the page tells how a figure is had by hand"),
+    "crates/flexarm-verify/src/one_beam/page.rs": (r"--[a-z-]+|-o", "the page tells how a figure is had by hand"),
+    "crates/flexarm-verify/src/three_beams/page.rs": (r"--[a-z-]+|-o", "the page tells how a figure is had by hand"),
+    "crates/flexarm-verify/src/lower_arm/page.rs": (r"--[a-z-]+|-o", "the page tells how a figure is had by hand"),
+    "crates/flexarm-verify/src/manipulator/page.rs": (r"--[a-z-]+|-o", "the page tells how a figure is had by hand"),
 }
 FILES = (r"\bstd::(?:fs|path)\b|\bPathBuf\b|\bFile::open\b", "files")
 MUST_NOT_KNOW = {  # crate: what its code must not have, and what it is; imports of other crates are the manifest's matter

@@ -144,6 +144,16 @@ pub fn modal(modes: usize) -> Modelling {
     Modelling { links: LinkModel::Modal, modes: Some(modes), ..Modelling::default() }
 }
 
+/// Links in rigid parts, with their name on the page.
+pub fn in_parts(n: usize) -> (String, Modelling) {
+    (format!("{n} parts"), parts(n))
+}
+
+/// Links that bend in modes, with their name on the page.
+pub fn in_modes(modes: usize) -> (String, Modelling) {
+    (format!("modal, {modes} modes"), modal(modes))
+}
+
 /// A robot without weight.
 pub fn weightless(mut robot: Robot) -> Robot {
     robot.rigid.gravity = Vector3::zeros();
@@ -293,9 +303,12 @@ impl Rig {
     }
 }
 
+/// Damping of [`tool_path`] over stiffness (s).
+pub const PATH_DAMPING_S: f64 = 5e-4;
+
 /// Places of the tool at the end of each step of generalised-alpha, world axes.
 ///
-/// `stiffening`: whether loads change the stiffness of modal links. Damping is proportional to stiffness, 0.5 ms, in every model.
+/// `stiffening`: whether loads change the stiffness of modal links. Damping is [`PATH_DAMPING_S`] times stiffness in every model.
 pub fn tool_path(
     robot: &Robot,
     modelling: &Modelling,
@@ -307,7 +320,7 @@ pub fn tool_path(
     let mut robot = robot.clone();
     for link in &mut robot.flexible {
         link.choices.geometric = stiffening;
-        link.damping = Damping::StiffnessProportional(5e-4);
+        link.damping = Damping::StiffnessProportional(PATH_DAMPING_S);
     }
     let arm = robot.modelled(modelling)?.arm(motion).map_err(step_error)?;
     let frame = arm.model.frame(TCP_FRAME).ok_or(Error::NoTool)?.clone();
@@ -332,10 +345,12 @@ pub fn place(arm: &FlexibleArm, frame: &Frame, e: &DVector<f64>) -> Pose {
     data.X_WF(frame)
 }
 
-/// Loads that move a point with compliance `C` by about 10 µm or 10 µrad each: far above rounding, far below where
-/// geometry counts.
+/// A motion far above rounding, far below where geometry counts (m, rad).
+pub const SMALL_MOTION: f64 = 1e-5;
+
+/// Loads that move a point with compliance `C` by [`SMALL_MOTION`] each.
 pub fn small_loads(C: &Matrix6<f64>) -> Vector6<f64> {
-    Vector6::from_fn(|j, _| 1e-5 / C[(j, j)])
+    Vector6::from_fn(|j, _| SMALL_MOTION / C[(j, j)])
 }
 
 /// Largest difference of the response to load `j`, relative to `sqrt(C_ii C_jj)`.
@@ -347,6 +362,19 @@ pub fn column_error(C: &Matrix6<f64>, truth: &Matrix6<f64>, j: usize) -> f64 {
 /// The same over all loads.
 pub fn compliance_error(C: &Matrix6<f64>, truth: &Matrix6<f64>) -> f64 {
     (0..6).map(|j| column_error(C, truth, j)).worst()
+}
+
+/// Errors of the shift and of the rotation of a six-vector, each as a vector over its size.
+pub fn shift_and_turn_errors(u: &Vector6<f64>, truth: &Vector6<f64>) -> [f64; 2] {
+    [0, 3].map(|from| {
+        let truth = truth.fixed_rows::<3>(from);
+        (u.fixed_rows::<3>(from) - truth).norm() / truth.norm()
+    })
+}
+
+/// Largest distance of two paths that are seen at the same instants (m).
+pub fn farthest(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| (a - b).norm()).worst()
 }
 
 /// The larger of two errors; what is no number is the worst of all, where `f64::max` would drop it.
@@ -392,6 +420,31 @@ pub fn weight_response(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Truth by hand: (3, 4, 0) against (3, 0, 0) is off by 4 of 3, a rotation of 1.1 against 1 by a tenth.
+    #[test]
+    fn shift_and_turn_are_judged_by_their_own_sizes() {
+        let truth = Vector6::new(3.0, 0.0, 0.0, 0.0, 0.0, 1.0);
+        let [shift, turn] = shift_and_turn_errors(&Vector6::new(3.0, 4.0, 0.0, 0.0, 0.0, 1.1), &truth);
+        assert!((shift - 4.0 / 3.0).abs() < 1e-15 && (turn - 0.1).abs() < 1e-15, "{shift} {turn}");
+    }
+
+    /// Truth by hand: C = diag(2, 8, ...), an entry (0, 1) of 4 over sqrt(2 * 8) is 1.
+    #[test]
+    fn an_entry_is_judged_by_the_root_of_its_diagonal_and_loads_by_what_they_move() {
+        let truth = Matrix6::from_diagonal(&Vector6::new(2.0, 8.0, 1.0, 1.0, 1.0, 1.0));
+        let mut C = truth;
+        C[(0, 1)] = 4.0;
+        assert!((column_error(&C, &truth, 1) - 1.0).abs() < 1e-15 && column_error(&C, &truth, 0) == 0.0);
+        assert!((small_loads(&truth)[1] * truth[(1, 1)] - SMALL_MOTION).abs() < 1e-20);
+    }
+
+    #[test]
+    fn paths_are_as_far_apart_as_at_their_worst_instant() {
+        let at = |x: f64, y: f64| Vector3::new(x, y, 0.0);
+        assert_eq!(farthest(&[at(0.0, 0.0), at(3.0, 0.0)], &[at(1.0, 0.0), at(0.0, 4.0)]), 5.0);
+        assert!(farthest(&[at(f64::NAN, 0.0)], &[at(0.0, 0.0)]).is_nan() && farthest(&[], &[]).is_nan());
+    }
 
     /// A number that is none must not be dropped, as `f64::max` does, nor may an empty comparison pass.
     #[test]

@@ -189,6 +189,24 @@ mod tests {
         assert_eq!(differences(page, &page.replace("nothing", "something"))[0].line, 2);
     }
 
+    /// Truth by hand: sign, digits, point, exponent; a point or an `e` without digits after it belongs to the words.
+    #[test]
+    fn a_number_ends_where_its_digits_end() {
+        for (text, length, unit) in [
+            ("12", 2, 1.0),
+            ("-0.50 mm", 5, 0.01),
+            ("4.6e-7,", 6, 1e-8),
+            ("+1e9", 4, 1e9),
+            ("3. Then", 1, 1.0),
+            ("2em", 1, 1.0),
+            ("1e-", 1, 1.0),
+        ] {
+            assert_eq!(number(text.as_bytes()), Some(length), "{text}");
+            assert!((last_digit(&text[..length]) / unit - 1.0).abs() < 1e-12, "{text}");
+        }
+        assert_eq!([number(b"x"), number(b"-"), number(b".5"), number(b"")], [None; 4]);
+    }
+
     #[test]
     fn pictures_may_move_by_a_unit_and_not_by_ten() {
         let picture = "<polyline stroke=\"#000\" points=\"10,20 30,40\"/><text>w [mm]</text>";

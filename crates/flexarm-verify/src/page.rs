@@ -268,6 +268,26 @@ pub(crate) fn bare_error(x: f64) -> String {
     }
 }
 
+/// A number within a sentence: what six significant digits tell of it, without zeros at their end.
+pub(crate) fn plain(x: f64) -> String {
+    let rounded: f64 = format!("{x:.5e}").parse().unwrap_or(x);
+    if rounded != 0.0 && !(1e-4..1e6).contains(&rounded.abs()) { format!("{rounded:e}") } else { rounded.to_string() }
+}
+
+/// Percents within a sentence, so many decimals, sign as it is.
+pub(crate) fn percent(x: f64, decimals: usize) -> String {
+    format!("{:.decimals$}", 100.0 * x)
+}
+
+/// Names with commas between them and a word before the last: `3, 4 and 8`.
+pub(crate) fn listed(names: &[impl ToString]) -> String {
+    let names: Vec<String> = names.iter().map(ToString::to_string).collect();
+    match names.split_last() {
+        Some((last, rest)) if !rest.is_empty() => format!("{} and {last}", rest.join(", ")),
+        _ => names.concat(),
+    }
+}
+
 /// `n` significant digits without an exponent between 1e-4 and 1e6.
 fn significant(x: f64, n: usize) -> String {
     if x == 0.0 {
@@ -344,6 +364,43 @@ mod tests {
         for (cell, text) in cases {
             assert_eq!(cell.print(), text);
         }
+    }
+
+    #[test]
+    fn numbers_in_sentences_have_no_more_digits_than_they_need() {
+        let found = [1e6 * 1e-5, 1e3 * 1e-4, 0.8, 1.0, 1e-9, 1e-4, 1e3 * 0.3, 2e7, -0.5].map(plain);
+        assert_eq!(found, ["10", "0.1", "0.8", "1", "1e-9", "0.0001", "300", "2e7", "-0.5"]);
+        assert_eq!([percent(0.0394, 0), percent(-0.3, 0), percent(0.00617, 1)], ["4", "-30", "0.6"]);
+        assert_eq!([listed(&[3, 4, 8]), listed(&[2, 3]), listed(&[7])], ["3, 4 and 8", "2 and 3", "7"]);
+    }
+
+    /// Truth: Markdown by hand.
+    #[test]
+    fn a_table_is_caption_heads_line_and_rows() {
+        let mut table = Table::new("What it shows.", &["model", "error"]);
+        table.rows.push(vec![word("2 parts"), signed(-0.166)]);
+        assert_eq!(table_text(&table), "What it shows.\n\n| model | error |\n| --- | --- |\n| 2 parts | -17 % |\n");
+        table.caption.clear();
+        assert!(table_text(&table).starts_with("\n| model |"));
+    }
+
+    /// A bound that is met exactly holds; what passes it does not, is counted, and is printed in bold.
+    #[test]
+    fn a_claim_fails_when_its_bound_is_passed() {
+        let bounds = [(Bound::AtMost(0.01), [true, true, false]), (Bound::AtLeast(0.01), [false, true, true])];
+        for (bound, expected) in bounds {
+            let mut case = Case::new("a", "A");
+            for measured in [0.0099, 0.01, 0.0101] {
+                case.claim("x", "y", measured, bound);
+            }
+            assert_eq!(case.claims().map(|claim| claim.holds).collect::<Vec<_>>(), expected, "{bound:?}");
+            let printed = table_text(&claims_table(&[case]));
+            assert_eq!(printed.matches("**does not hold**").count(), expected.iter().filter(|holds| !**holds).count());
+        }
+        let mut case = Case::new("a", "A");
+        case.claim("sag", "by hand", 2e-3, Bound::AtMost(1e-3));
+        let row = "| a | sag | by hand | 0.20 % | ≤ 0.10 % | **does not hold** |\n";
+        assert!(table_text(&claims_table(&[case])).ends_with(row));
     }
 
     #[test]

@@ -255,4 +255,41 @@ mod tests {
             assert!((a - b).abs() < 1e-12 && (da - db).abs() < 1e-12);
         }
     }
+
+    /// Truth: the weight of each slice deflects the end as a force of its own; the sum over 1000 slices by the midpoint rule.
+    #[test]
+    fn own_weight_is_the_sum_of_the_weights_of_its_slices() {
+        let slices = 1000;
+        let length = BAR.l / f64::from(slices);
+        let by_slice = |k: i32| BAR.under_force(BAR.mu * 9.81 * length, (f64::from(k) + 0.5) * length, BAR.l)[0];
+        let sum: f64 = (0..slices).map(by_slice).sum();
+        assert!((sum / BAR.own_weight(9.81) - 1.0).abs() < 1e-6, "{sum}");
+    }
+
+    /// Truth by hand: under F_z at T, 0.5 m along x beyond B, B sees a moment -0.5 about y; T moves by C_zz + 2 (-0.5) C_zy + 0.25 C_yy.
+    #[test]
+    fn a_lever_makes_a_force_a_moment_and_a_turn_a_shift() {
+        let C = BAR.tip_compliance();
+        let at_T = at_lever(&C, &Vector3::new(0.5, 0.0, 0.0));
+        assert!((at_T[(2, 2)] - (C[(2, 2)] - C[(2, 4)] + 0.25 * C[(4, 4)])).abs() < 1e-18);
+        assert!((at_T[(4, 4)] - C[(4, 4)]).abs() < 1e-18 && (at_T - at_T.transpose()).amax() < 1e-18);
+        // A bar that is 0.5 m longer and does not bend there.
+        assert!(at_T[(2, 2)] > C[(2, 2)] && at_T[(2, 2)] < C[(2, 2)] * (1.3f64 / 0.8).powi(3));
+    }
+
+    /// Truth by hand: with the beam's x along z, its bending along z is the world's along x.
+    #[test]
+    fn a_beam_that_stands_bends_sideways() {
+        let (C, R) = (BAR.tip_compliance(), Matrix3::from_columns(&[Vector3::z(), Vector3::y(), -Vector3::x()]));
+        let standing = turned(&C, &R);
+        assert!((standing[(0, 0)] - C[(2, 2)]).abs() < 1e-18 && (standing[(2, 2)] - C[(0, 0)]).abs() < 1e-18);
+        assert!((standing[(5, 5)] - C[(3, 3)]).abs() < 1e-18);
+    }
+
+    #[test]
+    fn bisection_finds_a_root_whichever_way_the_function_goes() {
+        for sign in [1.0, -1.0] {
+            assert!((bisect(|x| sign * (x * x - 2.0), 0.0, 2.0) - 2f64.sqrt()).abs() < 1e-15);
+        }
+    }
 }

@@ -1,0 +1,230 @@
+//! The page of the case.
+
+use flexarm_draw::{CurveLook, Panel, PlotCurve};
+
+use super::drives_page::{elastic_drives, which_flexibility};
+use super::forearm::{Forearm, PARTS};
+use super::methods::{CONSTRAINTS, EIGHT_PARTS, FINE_CONSTRAINTS, FINE_STEP_S, MODAL, Methods, TWO_PARTS};
+use super::pick::{self, LOADS, Pick};
+use super::runs::{Run, SEEN_EVERY_MS, Sizes};
+use super::{ALL_MODES, AXES, DAMPING, Findings, LINKS, TOLERANCE};
+use crate::bench::{in_modes, larger};
+use crate::page::{Bound, Case, Cell, Figure, Table, digits, error, fixed, listed, percent, plain, signed, word};
+
+/// Every so many samples are drawn: 4 ms, a seventh of the period of the fourth mode.
+const DRAWN: usize = 2;
+/// Payload of the arm (kg): `robots/kr210/README.md`.
+const PAYLOAD_KG: f64 = 150.0;
+/// Outer radius of the forearm's seat (m): `robots/kr210/fe/README.md`.
+const SEAT_RADIUS_M: f64 = 0.168;
+
+pub(super) fn page(found: &Findings) -> Case {
+    let mut case = Case::new("manipulator", "4. A whole manipulator");
+    case.text(format!(
+        "`{LINKS}`: a six-axis arm of the KR 210 class with {PAYLOAD_KG} kg; link arm and forearm are castings, reduced from meshes of 10-node tetrahedra. \
+         Joints follow the motion exactly. Deflection is the flexible tool minus the rigid one, world axes. Truth is the same robot with modal links \
+         (all ten fixed-interface modes) by the stepper with error control, tolerance {TOLERANCE:e}. By hand: `flexarm compare {LINKS} large_moves --links modal --stepper reference --rtol {TOLERANCE:e}`, \
+         `--with links=lumped,segments=4` beside it; `--stepper spook --step 1e-4`."
+    ));
+    for motion in &found.motions {
+        methods(&mut case, motion);
+    }
+    if let Some(found) = &found.pick {
+        pick(&mut case, found);
+    }
+    case.heading("What is left, and why");
+    case.text(what_is_left(found));
+    if let Some(forearm) = &found.forearm {
+        where_chains_stop(&mut case, forearm, &found.motions);
+    }
+    which_flexibility(&mut case, &found.flexibilities);
+    elastic_drives(&mut case, &found.elastic_drives);
+    case
+}
+
+/// Largest deflections along x, y, z and in all, and sag at the start, in millimetres.
+pub(super) fn deflections(run: &Run, decimals: usize) -> impl Iterator<Item = Cell> {
+    let [x, y, z, all] = run.peaks().listed();
+    [x, y, z, all, run.sag_m].into_iter().map(move |u| fixed(1e3 * u, decimals))
+}
+
+/// Distances along x, y, z and in all.
+pub(super) fn distances(error_of: Sizes) -> [Cell; 4] {
+    error_of.listed().map(error)
+}
+
+/// Deflection of a run along an axis over time (mm).
+pub(super) fn curve(run: &Run, name: &str, look: CurveLook, axis: usize) -> PlotCurve {
+    PlotCurve {
+        name: name.into(),
+        look,
+        x: run.times_s.iter().step_by(DRAWN).copied().collect(),
+        y: run.deflection_m.iter().step_by(DRAWN).map(|d| 1e3 * d[axis]).collect(),
+    }
+}
+
+/// One motion, every model and stepper.
+fn methods(case: &mut Case, found: &Methods) {
+    case.heading(&format!("`trajectories/{}.toml`, links alone", found.motion));
+    case.table(methods_table(found));
+    // Spring-damper and compliant constraints with two parts; the chain that closes what is left; the stepper alone.
+    let bounds =
+        [(TWO_PARTS, 0.01), (CONSTRAINTS, 0.01), (FINE_CONSTRAINTS, 0.01), (EIGHT_PARTS, 0.004), (MODAL, 2e-4)];
+    for (k, bound) in bounds {
+        let made = &found.made[k];
+        let text = format!("tool on {}, {}: largest distance over the peak deflection", found.motion, made.name());
+        case.claim(text, "modal links, error control", made.error.all, Bound::AtMost(bound));
+    }
+    let caption = format!(
+        "Compliant constraints (local) taken apart, same two parts: distance of the tool from the stepper with error control, over the peak, with damping \
+         proportional to stiffness in both ({} % of {:.2} Hz). What is left is the stepper's own error.",
+        plain(100.0 * DAMPING),
+        found.truth.frequencies_hz[0]
+    );
+    let mut table = Table::new(caption, &["step", "distance", "spring-damper, same step"]);
+    for step in &found.steps {
+        let name = format!("{} ms", plain(1e3 * step.step_s));
+        table.rows.push(vec![word(name), error(step.constraints), error(step.spring_damper)]);
+    }
+    case.table(table);
+    case.figure(methods_figure(found));
+}
+
+fn methods_table(found: &Methods) -> Table {
+    let caption = format!(
+        "Largest deflection along x, y, z and in all [mm], sag at the start [mm], first frequency there [Hz]; then the largest distance of the tool from that of the \
+         truth along x, y, z and in all, over the truth's peak of {:.4} mm. {} s, tool seen every {} ms.",
+        1e3 * found.peak_m,
+        found.truth.duration_s,
+        plain(SEEN_EVERY_MS)
+    );
+    let heads = ["links", "stepper", "x", "y", "z", "peak", "sag", "f_1", "Δx", "Δy", "Δz", "Δ"];
+    let mut table = Table::new(caption, &heads);
+    let row = |links: &str, stepper: &str, run: &Run, distances: [Cell; 4]| {
+        let mut cells = vec![word(links), word(stepper)];
+        cells.extend(deflections(run, 4));
+        cells.push(digits(run.frequencies_hz.first().copied().unwrap_or(f64::NAN), 5));
+        cells.extend(distances);
+        cells
+    };
+    table.rows.push(row("rigid", "-", &found.rigid, distances(found.rigid_error)));
+    for made in &found.made {
+        table.rows.push(row(&made.links, &made.stepper, &made.run, distances(made.error)));
+    }
+    let nothing = [(); 4].map(|()| word(""));
+    table.rows.push(row(&in_modes(ALL_MODES).0, "error control (truth)", &found.truth, nothing));
+    table
+}
+
+fn methods_figure(found: &Methods) -> Figure {
+    let Methods { motion, truth, peak_m, made, .. } = found;
+    let mut panels = Vec::new();
+    for (axis, letter) in AXES.iter().enumerate() {
+        let mut curves = vec![curve(truth, "modal", CurveLook::Total, axis)];
+        let shown = [TWO_PARTS, FINE_CONSTRAINTS].map(|k| &made[k]);
+        curves.extend(shown.map(|made| curve(&made.run, &made.name(), CurveLook::Dashed, axis)));
+        panels.push(Panel { label: format!("deflection {letter} [mm]"), logarithmic: false, legend: true, curves });
+    }
+    let distances = [TWO_PARTS, EIGHT_PARTS, FINE_CONSTRAINTS].map(|k| {
+        let pairs = made[k].run.tool_m.iter().zip(&truth.tool_m).step_by(DRAWN);
+        PlotCurve {
+            name: made[k].name(),
+            look: CurveLook::Plain,
+            x: truth.times_s.iter().step_by(DRAWN).copied().collect(),
+            y: pairs.map(|(a, b)| 100.0 * (a - b).norm() / peak_m).collect(),
+        }
+    });
+    panels.push(Panel { label: "Δ [% of peak]".into(), logarithmic: false, legend: true, curves: distances.into() });
+    Figure {
+        name: format!("manipulator-{}", motion.replace('_', "-")),
+        caption: format!("{motion}: deflection of the tool, and distance from modal links"),
+        x_label: "time [s]".into(),
+        logarithmic_x: false,
+        panels,
+    }
+}
+
+/// A workpiece that is picked up and set down.
+fn pick(case: &mut Case, found: &Pick) {
+    case.heading(&format!("`{LOADS}`, links alone"));
+    let caption = format!(
+        "The gripper of {} kg picks a workpiece of {} kg up at {} s and sets it down at {} s: its weight comes and goes at once, and the arm rings. Largest deflection along \
+         x, y, z and in all [mm], sag at the start [mm]; largest distance of the tool from that of the stepper with error control (tolerance {TOLERANCE:e}), over its peak, same links.",
+        plain(found.gripper_kg),
+        plain(found.workpiece_kg),
+        plain(found.picked_s),
+        plain(found.placed_s)
+    );
+    let mut table = Table::new(caption, &["links", "stepper", "x", "y", "z", "peak", "sag", "Δ"]);
+    let row = |links: &str, stepper: &str, run: &Run, distance: Cell| {
+        let cells = [word(links), word(stepper)].into_iter().chain(deflections(run, 4));
+        cells.chain([distance]).collect()
+    };
+    for picked in &found.picked {
+        let pick::Picked { links, stepper, explicit, run, error: apart } = picked;
+        table.rows.push(row(links, stepper, run, error(*apart)));
+        let text =
+            format!("tool with a workpiece picked up and set down, {links}, {stepper}: largest distance over the peak");
+        let bound = if *explicit { 1e-4 } else { 5e-3 };
+        case.claim(text, "the same links, error control", *apart, Bound::AtMost(bound));
+    }
+    for (links, run) in &found.truths {
+        table.rows.push(row(links, "error control", run, word("")));
+    }
+    case.table(table);
+    let drawn = &found.picked[pick::DRAWN];
+    let curves = vec![
+        curve(&found.truths[0].1, "error control", CurveLook::Total, 2),
+        curve(&drawn.run, &drawn.stepper, CurveLook::Dashed, 2),
+    ];
+    case.figure(Figure {
+        name: "manipulator-pick".into(),
+        caption: "pick_and_place with its workpiece: deflection of the tool".into(),
+        x_label: "time [s]".into(),
+        logarithmic_x: false,
+        panels: vec![Panel { label: "deflection z [mm]".into(), logarithmic: false, legend: true, curves }],
+    });
+}
+
+fn what_is_left(found: &Findings) -> String {
+    let of_two_parts = || found.motions.iter().map(|motion| motion.made[TWO_PARTS].error.all);
+    let frequency =
+        |k: usize| found.motions.iter().filter_map(move |motion| motion.truth.frequencies_hz.get(k).copied());
+    format!(
+        "*Two parts* miss the modal links by {} to {} % of the peak, half of it or more at rest too: they carry the weight of each casting in two lumps (cases 1 and 3). *Chains* close two thirds of it and then \
+         stop; the table below says why. *Modal links* need no inner modes here: with both ends held a casting rings above {:.0} Hz, the arm at {:.0} to {:.0} Hz. *Compliant constraints* have two causes more: \
+         damping in proportion to stiffness where the others damp each mode by {} % (the rows at {} ms), and their first order in the step. The preset `source` ties damping to the step.",
+        percent(of_two_parts().fold(f64::INFINITY, f64::min), 1),
+        percent(of_two_parts().fold(0.0, larger), 1),
+        10.0 * (found.held_hz / 10.0).floor(),
+        frequency(0).fold(f64::INFINITY, f64::min),
+        frequency(3).fold(0.0, larger),
+        plain(100.0 * DAMPING),
+        plain(1e3 * FINE_STEP_S)
+    )
+}
+
+/// The forearm's sag under its own weight, part by part.
+fn where_chains_stop(case: &mut Case, found: &Forearm, motions: &[Methods]) {
+    let counts = listed(&found.counts);
+    let caption = format!(
+        "Forearm casting alone, A held: sag of B along an axis under its own weight along it. Chains of {counts} parts over the full mesh; then where the {PARTS} parts lose it, part by part from A to B, as a share of \
+         the mesh's sag."
+    );
+    let mut table = Table::new(caption, &["along"]);
+    table.columns.extend(found.counts.iter().map(|n| format!("{n} parts")));
+    table.columns.extend((1..=PARTS).map(|k| format!("part {k}")));
+    for (letter, sag) in AXES.iter().zip(&found.axes) {
+        let cells = sag.chains.iter().chain(&sag.by_part).map(|e| signed(*e));
+        table.rows.push(std::iter::once(word(*letter)).chain(cells).collect());
+    }
+    case.table(table);
+    let of_the_tool = motions.iter().map(|motion| motion.made[EIGHT_PARTS].error.all).fold(0.0, larger);
+    case.text(format!(
+        "A chain's slices stand across the line from A to B and their strain energy becomes the joints, which is exact for loads at B. Weight sits within. The forearm's seat A lies *along* that line (an annulus of \
+         {} mm radius in the plane of the line): the slices next to it cut through seat and drum, whose material is held here and gives there and does not move as rigid sections. That is where the weight is lost, and more \
+         parts do not bring it back. A modal link, even without inner modes, has it exactly. Drives and gears, half of the forearm's mass, ride on the joints in all models alike, so a few per cent of the casting's own sag across are {} % of the tool's.",
+        plain(1e3 * SEAT_RADIUS_M),
+        percent(of_the_tool, 1)
+    ));
+}

@@ -1,0 +1,58 @@
+//! The same arm and motion in other programs: stored results, and our curve of today against the stored truth.
+//!
+//! `today` and `stored` compute findings, `page` says them.
+
+mod page;
+mod stored;
+mod today;
+
+use crate::Error;
+use crate::Pace;
+use crate::bench::{Bench, Stored};
+use crate::page::Case;
+
+use stored::StoredRuns;
+use today::Today;
+
+const STORED: &str = "other_programs.json";
+
+/// What the case finds.
+struct Findings {
+    about: About,
+    today: Today,
+    /// Nothing if the stored file has not two motions.
+    stored: Option<StoredRuns>,
+}
+
+/// Where the stored results come from.
+struct About {
+    /// Names and versions.
+    programs: Vec<String>,
+    date: String,
+    machine: String,
+    /// Damping over stiffness (s).
+    damping_s: f64,
+}
+
+impl About {
+    fn new(stored: &Stored) -> Result<Self, Error> {
+        let versions = stored.at("versions")?.as_object().into_iter().flatten();
+        let named = versions.filter(|(name, _)| ["exudyn", "mujoco", "pinocchio"].contains(&name.as_str()));
+        let text = |key: &str| Ok::<_, Error>(stored.at(key)?.as_str().unwrap_or("?").to_owned());
+        Ok(Self {
+            programs: named.map(|(name, version)| format!("{name} {}", version.as_str().unwrap_or("?"))).collect(),
+            date: text("date")?,
+            machine: text("machine")?,
+            damping_s: stored.number("model/damping_beta_s")?,
+        })
+    }
+}
+
+/// The case.
+pub(crate) fn case(bench: &Bench, _pace: &mut Pace<'_>) -> Result<Case, Error> {
+    let stored = bench.stored(STORED)?;
+    let about = About::new(&stored)?;
+    let today = Today::new(bench, about.damping_s)?;
+    let stored = StoredRuns::new(&stored)?;
+    Ok(page::page(&Findings { about, today, stored }))
+}

@@ -1,0 +1,155 @@
+//! What this build gives on this machine.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use flexarm::{ConstraintForm, Modelling, Motion, ReferenceSettings, Robot, RunOptions, StepperKind, simulate_traced};
+use flexarm_kinematics::ElasticAngles;
+use flexarm_stepping::Damping;
+use nalgebra::Vector3;
+
+use crate::Error;
+use crate::bench::{ALPHA, Bench, Worst, larger, spook};
+
+const ROBOT: &str = "robots/kr210/links.toml";
+pub(super) const MOTION: &str = "pick_and_place";
+const CURVE: &str = "tests/verification/kr210_pick_and_place_pinocchio.csv";
+/// How often the stored curve was seen (1/s).
+pub(super) const SEEN_HZ: f64 = 100.0;
+/// Half of the last digit of the stored curve (m).
+pub(super) const ROUNDING_M: f64 = 0.5e-9;
+/// Tolerance of the stepper with error control.
+const TOLERANCE: f64 = 1e-9;
+/// The finest step of a quick run (s).
+const QUICK_STEP_S: f64 = 2.5e-4;
+
+/// One stepper.
+pub(super) struct Stepped {
+    pub(super) name: String,
+    pub(super) step_s: f64,
+    /// What its error is claimed to be at most.
+    pub(super) bound: f64,
+    /// Largest distance of the tool from the truth over the peak: along x, y, z, and in all.
+    pub(super) axis_errors: [f64; 3],
+    pub(super) error: f64,
+    /// The same at the start.
+    pub(super) start_error: f64,
+}
+
+/// All of them.
+pub(super) struct Today {
+    /// Largest deflection of the truth (m).
+    pub(super) peak_m: f64,
+    pub(super) steppers: Vec<Stepped>,
+}
+
+/// Name, stepper, step (s), bound.
+type Method = (String, StepperKind, f64, f64);
+
+fn methods() -> [Method; 7] {
+    let (local, global) = (spook(ConstraintForm::Local), spook(ConstraintForm::Global));
+    let reference = StepperKind::Reference(ReferenceSettings::new(TOLERANCE));
+    [
+        ("RK4".into(), StepperKind::Rk4, 2.5e-4, 1e-6),
+        ("generalised-alpha".into(), ALPHA, 1e-3, 1e-4),
+        ("generalised-alpha".into(), ALPHA, 2.5e-4, 1e-5),
+        ("SPOOK, local".into(), local, 1e-3, 0.01),
+        ("SPOOK, local".into(), local, 1e-4, 5e-4),
+        ("SPOOK, global".into(), global, 1e-4, 5e-4),
+        (format!("error control, {TOLERANCE:e}"), reference, 1e-2, 2e-6),
+    ]
+}
+
+impl Today {
+    /// * `damping_s`: damping of the links over their stiffness, as in the other programs (s).
+    pub(super) fn new(bench: &Bench, damping_s: f64) -> Result<Self, Error> {
+        let truth = Curve::read(&bench.root.join(CURVE))?;
+        let mut robot = bench.robot(ROBOT)?;
+        for link in &mut robot.flexible {
+            link.damping = Damping::StiffnessProportional(damping_s);
+            link.flexible.angles = ElasticAngles::EulerZyx;
+        }
+        let motion = bench.motion(&robot, &format!("trajectories/{MOTION}.toml"))?;
+        let methods = methods().into_iter().filter(|(_, _, h, _)| !bench.quick || *h >= QUICK_STEP_S);
+        let steppers = methods.map(|method| Stepped::new(bench, (&robot, &motion), &truth, method));
+        Ok(Self { peak_m: truth.peak, steppers: steppers.collect::<Result<_, Error>>()? })
+    }
+}
+
+impl Stepped {
+    fn new(
+        bench: &Bench,
+        (robot, motion): (&Robot, &Motion),
+        truth: &Curve,
+        (name, stepper, step_s, bound): Method,
+    ) -> Result<Self, Error> {
+        let (log_rate_hz, modelling) = (SEEN_HZ, Modelling::default());
+        let options = RunOptions { stepper, step_s, log_rate_hz, modelling, ..RunOptions::default() };
+        let (_, trace) = simulate_traced(robot, motion, &options, None, &mut |_, _| ControlFlow::Continue(()))?;
+        if trace.rows.len() != truth.flexible.len() {
+            let (stored, run) = (truth.flexible.len(), trace.rows.len());
+            let what = format!("has {stored} samples, the run {run}: not the same motion");
+            return Err(flexarm::Error::File { path: bench.root.join(CURVE), what }.into());
+        }
+        let tools = trace.rows.iter().map(|row| Vector3::from(row.flexible_m));
+        let apart: Vec<Vector3<f64>> = tools.zip(&truth.flexible).map(|(a, b)| a - b).collect();
+        let most = |size: &dyn Fn(&Vector3<f64>) -> f64| apart.iter().map(size).worst() / truth.peak;
+        Ok(Self {
+            name,
+            step_s,
+            bound,
+            axis_errors: [0, 1, 2].map(|i| most(&|d| d[i].abs())),
+            error: most(&|d| d.norm()),
+            start_error: apart[0].norm() / truth.peak,
+        })
+    }
+}
+
+/// The stored truth.
+struct Curve {
+    flexible: Vec<Vector3<f64>>,
+    /// Largest deflection (m).
+    peak: f64,
+}
+
+impl Curve {
+    fn read(path: &Path) -> Result<Self, Error> {
+        let text = std::fs::read_to_string(path).map_err(|e| format!("cannot be read: {e}"));
+        let curve = text.and_then(|text| Self::parse(&text));
+        curve.map_err(|what| flexarm::Error::File { path: path.to_owned(), what }.into())
+    }
+
+    /// Rows of time, rigid and flexible tool, below a head; lines with `#` are notes.
+    fn parse(text: &str) -> Result<Self, String> {
+        let rows = text.lines().filter(|line| !line.starts_with('#')).skip(1);
+        let (mut flexible, mut peak) = (Vec::new(), 0.0f64);
+        for row in rows {
+            let values: Option<Vec<f64>> = row.split(',').map(|word| word.trim().parse().ok()).collect();
+            let values = values
+                .filter(|v| v.len() == 7 && v.iter().all(|x| x.is_finite()))
+                .ok_or_else(|| format!("row {row:?}: expected seven finite numbers"))?;
+            let (rigid, tool) = (Vector3::from_column_slice(&values[1..4]), Vector3::from_column_slice(&values[4..7]));
+            peak = larger(peak, (tool - rigid).norm());
+            flexible.push(tool);
+        }
+        Ok(Self { flexible, peak })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Truth by hand: the tools are (3, 4, 0) and (0, 0, 1) apart.
+    #[test]
+    fn a_stored_curve_is_read_with_its_peak_and_refused_with_its_row() {
+        let text = "# note\nt,x,y,z,a,b,c\n0, 1,1,1, 4,5,1\n1, 0,0,0, 0,0,1\n";
+        let curve = Curve::parse(text).expect("well formed");
+        assert_eq!((curve.flexible.len(), curve.peak), (2, 5.0));
+        assert_eq!(curve.flexible[0], Vector3::new(4.0, 5.0, 1.0));
+        for (good, bad) in [("0,0,1\n", "0,0\n"), ("0,0,1\n", "0,0,NaN\n"), ("0,0,1\n", "0,0,x\n")] {
+            let refused = Curve::parse(&text.replace(good, bad)).err().unwrap_or_default();
+            assert!(refused.contains("expected seven finite numbers") && refused.contains(bad.trim()), "{refused}");
+        }
+    }
+}

@@ -1,0 +1,54 @@
+//! Three beams with right-angle corners: every load bends and twists some of them.
+//!
+//! `beams` has the closed forms, `study`, `sections`, `ring_down` and `whirl` compute findings, `page` says them.
+
+mod beams;
+mod page;
+mod ring_down;
+mod sections;
+mod study;
+mod whirl;
+
+use crate::Error;
+use crate::Pace;
+use crate::bench::Bench;
+use crate::page::Case;
+
+use ring_down::RingDown;
+use sections::Sections;
+use study::{Meshes, TipLoads};
+use whirl::Whirl;
+
+const ROBOT: &str = "robots/three_beams/robot.toml";
+const MESH: &str = "robots/three_beams/mesh.toml";
+/// Acceleration of gravity (m/s²).
+const G: f64 = 9.81;
+
+/// What the case finds.
+struct Findings {
+    tip_loads: TipLoads,
+    meshes: Meshes,
+    /// Nothing in a quick run.
+    sections: Option<Sections>,
+    ring_down: RingDown,
+    whirl: Whirl,
+}
+
+impl Findings {
+    fn new(bench: &Bench) -> Result<Self, Error> {
+        let robot = bench.robot(ROBOT)?;
+        let meshed = bench.robot(MESH)?;
+        Ok(Self {
+            tip_loads: TipLoads::new(&robot)?,
+            meshes: Meshes::new(bench, &meshed)?,
+            sections: if bench.quick { None } else { Some(Sections::new(bench, &meshed)?) },
+            ring_down: RingDown::new(&robot, bench.quick)?,
+            whirl: Whirl::new(&robot)?,
+        })
+    }
+}
+
+/// The case.
+pub(crate) fn case(bench: &Bench, _pace: &mut Pace<'_>) -> Result<Case, Error> {
+    Ok(page::page(&Findings::new(bench)?))
+}

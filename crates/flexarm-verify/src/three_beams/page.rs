@@ -1,0 +1,423 @@
+//! The page of the case.
+
+use flexarm_draw::{CurveLook, Panel, PlotCurve};
+
+use super::beams::{
+    BALL_KG, BEAMS, BOX, LENGTHS_M, RECTANGLE, TUBE, bar_shear_factors, box_walls_over_cowper, thin_tube_shear_factors,
+    tip,
+};
+use super::ring_down::{
+    self, Causes, DAMPING, FIVE_PARTS, LINEAR, ModelCauses, RingDown, Run, STEP_S, SUMMED, TOLERANCE, TWO_PARTS,
+};
+use super::sections::{Sections, TIES, TORSION};
+use super::study::{Meshes, Model, TipLoads};
+use super::whirl::{self, TRUE_PARTS, Whirl};
+use super::{Findings, MESH};
+use crate::bench::{LOADS, PATH_DAMPING_S, SMALL_MOTION, column_error, compliance_error};
+use crate::compliance::{add_errors, claim_each};
+use crate::page::{Bound, Case, Cell, Figure, Table, bare_error, digits, error, fixed, percent, plain, signed, word};
+
+/// Points of CalculiX's rule of integration along each axis of an element.
+const CALCULIX_POINTS: usize = 3;
+/// Elements around the tube (`robots/three_beams/fe/README.md`).
+const AROUND_THE_TUBE: usize = 24;
+/// Every so many samples are drawn: ten curves per panel would hide each other, and a point every 2 ms draws 100 Hz.
+const DRAWN: usize = 2;
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+pub(super) fn page(found: &Findings) -> Case {
+    let mut case = Case::new("three-beams", "2. Three beams");
+    let ([up, forwards, sideways], tip) = (LENGTHS_M, tip());
+    case.text(format!(
+        "`robots/three_beams`: three aluminium beams joined at right angles, a tube of {up} m upwards, a box of {forwards} m forwards (x), a rectangle of {sideways} m sideways (y), \
+         a ball of {BALL_KG} kg at the tip ({}, {}, {}) m; the joint at the base is held at 0. Every load at the tip bends and twists some of them, and no entry of a beam \
+         reaches the tip without a turn and a lever. World axes, z upwards; Timoshenko's theory. By hand: `flexarm statics three_beams --wrench 0,0,10`, `flexarm compare three_beams`.",
+        tip.x, tip.y, tip.z
+    ));
+    tip_loads(&mut case, &found.tip_loads);
+    meshes(&mut case, &found.meshes);
+    if let Some(found) = &found.sections {
+        sections(&mut case, found);
+    }
+    ring_down(&mut case, &found.ring_down);
+    whirl(&mut case, &found.whirl);
+    case
+}
+
+/// Six loads at the tip, each method against the closed form.
+fn tip_loads(case: &mut Case, found: &TipLoads) {
+    case.heading("Six loads at the tip");
+    let TipLoads { truth, of_beams, methods } = found;
+    let small = plain(1e6 * SMALL_MOTION);
+    let caption = format!(
+        "Motion of the tip along each load, per unit of it, by the sum over the beams `Ad_k R_k C_k R_kᵀ Ad_kᵀ` of textbook cantilevers C_k (Timoshenko; factors of shear by \
+         Cowper, torsion of the box by Bredt), and what each beam has in it; then the error of each method: the largest of the six components of the tip's motion, over \
+         `sqrt(C_ii C_jj)`. Compliant constraints and spring-damper run in time from the undeformed arm until they rest, loads that move the tip by {small} µm or {small} µrad, up and down."
+    );
+    let mut table = Table::new(caption, &["load", "closed form [µm, µrad per N, N m]"]);
+    table.columns.extend(BEAMS.map(String::from));
+    for (j, load) in LOADS.into_iter().enumerate() {
+        let mut row = vec![word(load), digits(1e6 * truth[(j, j)], 6)];
+        row.extend(of_beams.iter().map(|C| word(format!("{:.1} %", 100.0 * C[(j, j)] / truth[(j, j)]))));
+        table.rows.push(row);
+    }
+    add_errors(&mut table, truth, methods);
+    case.table(table);
+    claim_each(case, "loads at the tip", ("closed form", truth), methods, 1e-7);
+}
+
+/// The same arm from meshes, against the mesh of the whole arm in two other programs.
+fn meshes(case: &mut Case, found: &Meshes) {
+    case.heading("The same arm from meshes, against two other programs");
+    case.text(format!(
+        "`{MESH}`: each beam is meshed with HEX20 and reduced on its own, ends tied rigidly, ten modes. The other programs solve the whole arm as one mesh of \
+         the same elements with the same ties. Truth: {}, which integrates to rounding, as flexarm does; {} takes {p} x {p} x {p} points, which are not exact in the curved elements of the tube.",
+        found.ngsolve.provenance,
+        found.calculix.provenance,
+        p = CALCULIX_POINTS
+    ));
+    let (truth, theirs) = (&found.ngsolve.C_tip, &found.calculix.C_tip);
+    let caption = "Motion of the tip along each load, per unit of it, and the error of each method, all as above; truth: NGSolve.";
+    let mut table = Table::new(caption, &["load", "NGSolve [µm, µrad per N, N m]", "CalculiX"]);
+    for (j, load) in LOADS.into_iter().enumerate() {
+        table.rows.push(vec![word(load), digits(1e6 * truth[(j, j)], 6), error(column_error(theirs, truth, j))]);
+    }
+    add_errors(&mut table, truth, &found.methods);
+    case.table(table);
+    if let Some(rule) = found.tube_rule_error {
+        case.text(format!(
+            "What is left is rounding and a rule. The stiffness of thin walls in double precision holds eight to nine digits of such a compliance (the stored files say so of their own; the tube's matrix has a condition number of {:.0e}). \
+             With CalculiX's rule the tube alone changes by {} here.",
+            found.tube_condition,
+            bare_error(rule)
+        ));
+    }
+    let by = "NGSolve, whole mesh";
+    claim_each(case, "meshed arm, loads at the tip", (by, truth), &found.methods, 1e-7);
+    let between = compliance_error(theirs, truth);
+    case.claim("meshed arm, loads at the tip: CalculiX against NGSolve", by, between, Bound::AtMost(1e-7));
+    case.table(sag_and_frequencies(found));
+    case.text(why_sag_and_frequencies(found));
+    let claims = [
+        ("sag, modal links with any number of modes", found.modal_sag_error(), 1e-7),
+        ("sag, two parts", found.shift_error("2 parts"), 0.015),
+        ("sag, five parts", found.shift_error("5 parts"), 1e-3),
+        ("first four frequencies, two parts", found.worst_hz_error("2 parts", 4), 0.014),
+        ("eight frequencies, modal, 10 modes", found.worst_hz_error("modal, 10 modes", found.ngsolve.hz.len()), 1.1e-4),
+    ];
+    for (what, measured, bound) in claims {
+        case.claim(format!("meshed arm, {what}"), "NGSolve", measured, Bound::AtMost(bound));
+    }
+    case.figure(frequency_figure(&found.models));
+}
+
+/// Sag under weight and frequencies of every model.
+fn sag_and_frequencies(found: &Meshes) -> Table {
+    let (sag, hz) = (&found.ngsolve.sag, &found.ngsolve.hz);
+    let caption = format!(
+        "Sag of the tip under the weight of beams and ball, linear (a hundredth of the weight, up and down): error of the shift and of the rotation as vectors over their sizes, {:.5} mm \
+         and {:.5} mrad; frequencies with the ball, without the stiffness of weight: {} Hz. Truth: NGSolve.",
+        1e3 * sag.fixed_rows::<3>(0).norm(),
+        1e3 * sag.fixed_rows::<3>(3).norm(),
+        hz.iter().map(|f| format!("{f:.4}")).collect::<Vec<_>>().join(", ")
+    );
+    let mut table = Table::new(caption, &["model", "elastic coordinates", "sag, shift", "sag, rotation"]);
+    table.columns.extend((1..=hz.len()).map(|k| format!("f_{k}")));
+    let row = |name: &str, coordinates: Cell, sag: &[f64; 2], hz: &[f64]| {
+        let mut row = vec![word(name), coordinates];
+        row.extend(sag.map(error));
+        row.extend(hz.iter().map(|e| signed(*e)));
+        row
+    };
+    table.rows.push(row("CalculiX", word(""), &found.calculix_sag_errors, &found.calculix_hz_errors));
+    for model in &found.models {
+        let coordinates = fixed(model.elastic_coordinates as f64, 0);
+        table.rows.push(row(&model.name, coordinates, &model.sag_errors, &model.hz_errors));
+    }
+    let shares = [
+        ("ball's share of the kinetic energy", &found.ball_shares),
+        ("share of the strain energy between held ends", &found.held_shares),
+    ];
+    for (name, shares) in shares {
+        let mut row = vec![word(name), word(""), word(""), word("")];
+        row.extend(shares.iter().map(|share| word(format!("{:.0} %", 100.0 * share))));
+        table.rows.push(row);
+    }
+    table
+}
+
+fn why_sag_and_frequencies(found: &Meshes) -> String {
+    // Modes in which the ball has most of the motion, and those in which the beams bend between their ends.
+    let moving = found.ball_shares.iter().take_while(|share| **share > 0.5).count();
+    let held: Vec<usize> = (0..found.held_shares.len()).filter(|k| found.held_shares[*k] > 0.1).collect();
+    let two_parts = found.model("2 parts").map_or(&[][..], |model| &model.hz_errors);
+    let lowest = held.iter().filter_map(|k| two_parts.get(*k)).copied().fold(0.0, f64::min);
+    let held: Vec<String> = held.iter().map(|k| format!("f_{}", k + 1)).collect();
+    format!(
+        "Sag: two parts carry the weight of a beam at two points; the ball, which is most of the load, is carried exactly, so less is missing than in a bare bar, and the rest falls with the square of the length of a part. \
+         Frequencies: the last rows say, by modal links with ten modes, how much the ball moves in a mode, and how much of the strain energy is in shapes whose ends are held. In f_1 to f_{moving} the ball moves, and any model has them. \
+         In {} the beams bend between their ends: two parts have one joint in each beam for that and come {} % too low, a modal link without modes has static shapes alone and comes too high, from above as in \
+         any Ritz method. Modal links have the sag exactly with any number of modes.",
+        held.join(" and "),
+        percent(-lowest, 0)
+    )
+}
+
+fn frequency_figure(models: &[Model]) -> Figure {
+    let curve = |model: &Model| {
+        let errors = model.hz_errors.iter().map(|e| e.abs());
+        let (x, y) = (1..=model.hz_errors.len()).map(|k| k as f64).zip(errors).unzip();
+        PlotCurve { name: model.name.clone(), look: CurveLook::Marked, x, y }
+    };
+    let curves = models.iter().map(curve).collect();
+    Figure {
+        name: "three-beams-frequencies".into(),
+        caption: "Three beams from meshes: error of each frequency, by model".into(),
+        x_label: "frequency number".into(),
+        logarithmic_x: false,
+        panels: vec![Panel { label: "relative error".into(), logarithmic: true, legend: true, curves }],
+    }
+}
+
+/// How far the sections of beam theory are from the meshes, beam by beam.
+fn sections(case: &mut Case, found: &Sections) {
+    case.heading("Beam theory against the meshes");
+    let mut ends = Table::new(
+        "Compliance of the end of each beam from its mesh, over that of beam theory, less one; axes of the beam (x along it, y and z across). Both ends tied rigidly or by the mean of \
+         their nodes.",
+        &[
+            "beam",
+            "ties",
+            "u_x by F_x",
+            "u_y by F_y",
+            "u_z by F_z",
+            "theta_x by M_x",
+            "theta_y by M_y",
+            "theta_z by M_z",
+        ],
+    );
+    let caption = "The same meshes, stiffness of the section in the middle tenth of the length (strain energy of two layers of elements under end loads), over that of beam theory, less one.";
+    let mut middles = Table::new(caption, &["beam", "EA", "EI_y", "EI_z", "GJ", "kGA_y", "kGA_z", "mass"]);
+    for (name, beam) in BEAMS.into_iter().zip(&found.beams) {
+        for (tie, errors) in TIES.iter().zip(&beam.end_errors) {
+            let cells = [word(name), word(tie.name())].into_iter();
+            ends.rows.push(cells.chain(errors.map(signed)).collect());
+        }
+        middles.rows.push(std::iter::once(word(name)).chain(beam.middle_errors.map(signed)).collect());
+    }
+    case.table(ends);
+    case.table(middles);
+    case.text(why_sections_differ(found));
+    let middle = found.worst_in_the_middle();
+    case.claim("meshed beams, EA and EI in the middle", "beam theory", middle, Bound::AtMost(2e-5));
+    let tube_torsion = found.beams[TUBE].end_errors[0][TORSION].abs();
+    case.claim("meshed tube in torsion, ends tied rigidly", "beam theory", tube_torsion, Bound::AtMost(1e-7));
+    case.claim(
+        "meshed box in torsion over beam theory, ends tied by the mean: an effect of the tie",
+        "beam theory",
+        found.beams[BOX].end_errors[1][TORSION],
+        Bound::AtLeast(0.1),
+    );
+    let filed = found.worst_file();
+    case.claim("files of the reduced beams: compliance", "the same meshes reduced here", filed, Bound::AtMost(1e-7));
+}
+
+fn why_sections_differ(found: &Sections) -> String {
+    let (tube, bar) = (thin_tube_shear_factors(), bar_shear_factors());
+    let walls = box_walls_over_cowper();
+    format!(
+        "Away from the ends the meshes are the beams of the textbook in stretch and bending (the tube's {:.0e} are its {AROUND_THE_TUBE} curved elements, which do not contain the quadratic shape of Poisson's \
+         contraction), and what differs has four causes. *Torsion of the box*: Bredt's formula leaves out the thickness of the wall and its corners; St. Venant's problem of this section, by finite \
+         differences, is {:+.1} % above it. The rest, and the {} % of the rectangle, is the mesh: one element through the wall, three by two in the bar. *Shear*: Cowper's factors compare mean displacements, \
+         energy compares work (thin tube {:.2} against {:.2}, bar {:.2} against {:.2}); for the box his factor is that of thin walls, those across the force included (the walls along the force alone, as tables often have it, \
+         would be {:+.0} and {:+.0} % stiffer, y and z). Shear is little of these compliances. *Rigid ties*: they keep the ends from contracting sideways and from warping, so the last half width at each end is stiffer; that is most of the {} % in stretch and bending, \
+         which falls with the length of a beam. *Ties by the mean*: all nodes of an end carry the same force, corner nodes too, and nothing keeps the end in shape. A torque so spread is not the shear flow of a box: \
+         its section is pushed out of square, and that dies out only after a quarter of the length.",
+        found.beams[TUBE].middle_errors[1],
+        100.0 * found.box_over_bredt,
+        percent(found.beams[RECTANGLE].middle_errors[3], 1),
+        tube.cowper,
+        tube.energy,
+        bar.cowper,
+        bar.energy,
+        100.0 * walls[0],
+        100.0 * walls[1],
+        percent(found.stiffer_by_rigid_ties(), 1)
+    )
+}
+
+/// Let go under gravity: what the stepper costs, and what the model.
+fn ring_down(case: &mut Case, found: &RingDown) {
+    case.heading("Ring-down");
+    let caption = format!(
+        "The arm of beam theory let go undeformed under its weight, {} s, damping proportional to stiffness ({} % of the first mode, {:.2} Hz, the same constant for all models). \
+         Largest distance of the tip from where it should be, every ms, over the largest deflection ({:.4} mm). Truth of the method: modal links with {} modes each and stiffness by load. Truth of the stepper: \
+         its own model. Both by the stepper with error control, tolerance {TOLERANCE:e}. The last column is the distance of these two truths; x, y, z are the parts of the method's error.",
+        found.duration_s,
+        plain(100.0 * DAMPING),
+        found.first_hz,
+        1e3 * found.peak_m,
+        ring_down::MODES
+    );
+    let heads = ["model", "stepper", "h [ms]", "method", "x", "y", "z", "stepper alone", "model alone"];
+    let mut table = Table::new(caption, &heads);
+    for run in &found.runs {
+        let [x, y, z] = run.axis_errors;
+        let errors = [run.method_error, x, y, z, run.stepper_error, found.model_error(run.model)];
+        let cells = [word(&found.models[run.model].name), word(run.stepper), digits(1e3 * run.step_s, 1)].into_iter();
+        table.rows.push(cells.chain(errors.map(error)).collect());
+    }
+    for run in found.runs.iter().filter(|run| run.step_s == STEP_S) {
+        let bound = if run.compliant { 0.045 } else { 3e-4 };
+        case.claim(
+            format!("three beams, ring-down, {}, {} ms: stepper alone", run_name(found, run), plain(1e3 * STEP_S)),
+            "stepper with error control",
+            run.stepper_error,
+            Bound::AtMost(bound),
+        );
+    }
+    case.table(table);
+    for (name, model, bound) in [("two", TWO_PARTS, 0.05), ("five", FIVE_PARTS, 3e-3)] {
+        let text = format!("three beams, ring-down, {name} parts: model alone");
+        let truth = format!("modal links, {} modes", ring_down::MODES);
+        case.claim(text, truth, found.model_error(model), Bound::AtMost(bound));
+    }
+    causes(case, found);
+    case.figure(ring_down_figure(found));
+}
+
+/// Stepper and model of a run.
+fn run_name(found: &RingDown, run: &Run) -> String {
+    format!("{}, {}", run.stepper, found.models[run.model].name)
+}
+
+fn ring_down_figure(found: &RingDown) -> Figure {
+    let truth = found.truth();
+    let curve = |name: &str, look, y: &dyn Fn(usize) -> f64| {
+        let drawn = (0..truth.len()).step_by(DRAWN);
+        PlotCurve {
+            name: name.into(),
+            look,
+            x: drawn.clone().map(|k| k as f64 * STEP_S).collect(),
+            y: drawn.map(y).collect(),
+        }
+    };
+    let drawn: Vec<&Run> = found.runs.iter().filter(|run| run.step_s == STEP_S && run.model != LINEAR).collect();
+    let mut panels: Vec<Panel> = Vec::new();
+    for (i, axis) in AXES.iter().enumerate() {
+        let mut curves = vec![curve("modal, stepper with error control", CurveLook::Total, &|k| 1e3 * truth[k][i])];
+        let of = |run: &&Run| curve(&run_name(found, run), CurveLook::Plain, &|k| 1e3 * run.path[k][i]);
+        curves.extend(drawn.iter().map(of));
+        panels.push(Panel { label: format!("{axis} [mm]"), logarithmic: false, legend: true, curves });
+    }
+    let apart = |run: &&Run| {
+        let share = |k: usize| 100.0 * (run.path[k] - truth[k]).norm() / found.peak_m;
+        curve(&run_name(found, run), CurveLook::Plain, &share)
+    };
+    let curves = drawn.iter().map(apart).collect();
+    panels.push(Panel { label: "difference [% of peak]".into(), logarithmic: false, legend: true, curves });
+    Figure {
+        name: "three-beams-ring-down".into(),
+        caption: format!(
+            "Tip of the three beams, let go under gravity, and the distance of each method from modal links; steps of {} ms",
+            plain(1e3 * STEP_S)
+        ),
+        x_label: "t [s]".into(),
+        logarithmic_x: false,
+        panels,
+    }
+}
+
+/// Why the models differ, and why compliant constraints do.
+fn causes(case: &mut Case, found: &RingDown) {
+    /// Frequencies of the table.
+    const SHOWN: usize = 4;
+    let Causes { sum_error, models, constraints } = &found.causes;
+    let caption = format!(
+        "Why: the arm as a sum of its {SUMMED} lowest modes about the sag, each swinging in closed form `a_k (1 - exp(-ζωt) (cos ω_d t + ζω/ω_d sin ω_d t))`. For modal links with stiffness by load this sum is within {} \
+         of the peak of the stepped motion. Frequencies of the other models over its frequencies; then the sum with their frequencies and its shares a_k of the sag, with their shares and its frequencies, and with both, \
+         against its own, over the peak; last the distance of the stepped motions.",
+        bare_error(*sum_error)
+    );
+    let mut table = Table::new(caption, &["model"]);
+    table.columns.extend((1..=SHOWN).map(|k| format!("f_{k}")));
+    table.columns.extend(["frequencies alone", "shares alone", "both", "stepped"].map(String::from));
+    for causes in models {
+        let ModelCauses { model, hz_errors, by_frequencies, by_shares, by_both, stepped, unexplained } = causes;
+        let mut row = vec![word(&found.models[*model].name)];
+        row.extend(hz_errors.iter().take(SHOWN).map(|e| signed(*e)));
+        row.extend([by_frequencies, by_shares, by_both, stepped].map(|e| error(*e)));
+        table.rows.push(row);
+        if *model == TWO_PARTS {
+            case.claim(
+                "three beams, ring-down, two parts: what frequencies and shares of six modes do not explain",
+                "stepped motions",
+                *unexplained,
+                Bound::AtMost(5e-4),
+            );
+        }
+    }
+    case.table(table);
+    case.text(why_they_differ(&found.causes, SHOWN));
+    case.claim(
+        format!(
+            "three beams, ring-down, compliant constraints, local, {} ms: what half a step and the frequency do not explain",
+            plain(1e3 * STEP_S)
+        ),
+        "stepped motions",
+        constraints.unexplained,
+        Bound::AtMost(2.6e-3),
+    );
+}
+
+/// * `shown`: frequencies of the table.
+fn why_they_differ(found: &Causes, shown: usize) -> String {
+    let linear = found.models.iter().find(|causes| causes.model == LINEAR);
+    let higher = linear.and_then(|causes| causes.hz_errors.iter().take(shown).copied().reduce(f64::max));
+    let c = &found.constraints;
+    format!(
+        "*Model.* Two parts put a third of a per cent on the first two frequencies; the phase that this adds is most of the difference, which is largest after a third of a second, when damping begins to win. The rest is the sag, which two \
+         parts miss by a little. Stiffness by load (weight turns with what bends) is in chains of parts by themselves and an option of modal links: without it their frequencies are {:.0e} higher. \
+         *Stepper.* Compliant constraints at {} ms are off by {} of the peak, in two ways. Positions are half a step ahead (`x⁺ = x + h v⁺` from rest): {} in such a sum of modes. And damping taken at the \
+         end of the step makes the frequency lower by ζhω/2, beside the second-order (hω)²/12 of the trapezoidal rule: {}; both together {}, and {} of the stepped motion is left. Local and global form differ by {} here, little, as they do with the size of the deflection.",
+        higher.unwrap_or(f64::NAN),
+        plain(1e3 * STEP_S),
+        bare_error(c.stepped),
+        bare_error(c.by_half_a_step),
+        bare_error(c.by_frequency),
+        bare_error(c.by_both),
+        bare_error(c.unexplained),
+        bare_error(c.local_from_global)
+    )
+}
+
+/// Ringing while it turns.
+fn whirl(case: &mut Case, found: &Whirl) {
+    /// Bounds, one per speed.
+    const BOUNDS: [f64; 2] = [1.7e-3, 6e-3];
+    case.heading("Ringing while it turns");
+    let caption = format!(
+        "The joint turns steadily, and the arm is let go undeformed under its weight and the centrifugal force, {} s, damping proportional to stiffness ({} ms), generalised-alpha at {} ms: largest distance of the tip from that of {TRUE_PARTS} parts per \
+         beam, over their largest deflection.",
+        plain(whirl::STEP_S * whirl::STEPS as f64),
+        plain(1e3 * PATH_DAMPING_S),
+        plain(1e3 * whirl::STEP_S)
+    );
+    let mut table = Table::new(caption, &["model"]);
+    table.rows = found.models.iter().map(|model| vec![word(&model.name)]).collect();
+    for (turn, bound) in found.turns.iter().zip(BOUNDS) {
+        table.columns.push(format!("{} rad/s, peak {:.2} mm", turn.speed_rad_s, 1e3 * turn.peak_m));
+        for ((row, model), found) in table.rows.iter_mut().zip(&found.models).zip(&turn.errors) {
+            row.push(error(*found));
+            if model.stiffening {
+                let text = format!("three beams, ringing at {} rad/s, {}", turn.speed_rad_s, model.name);
+                case.claim(text, format!("chains of {TRUE_PARTS} rigid parts"), *found, Bound::AtMost(bound));
+            }
+        }
+    }
+    case.table(table);
+    case.text(
+        "Here beams carry beams, and all bend in space while the base turns: Coriolis and centrifugal terms of the modal links against rigid bodies that have none of them. What is left with stiffness by load goes with the deflection, so it is of second \
+         order: the end of a modal link moves along its shapes, straight (case 1).",
+    );
+}
