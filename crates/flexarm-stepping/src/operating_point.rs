@@ -29,6 +29,7 @@ const REFINEMENTS: usize = 8;
 /// Equilibria of an arm at given poses, with the workspace that they need.
 ///
 /// World axes, at the tool point, linear first. The load of the arm at time 0 acts as well.
+#[derive(Clone)]
 pub struct OperatingPoint {
     arm: FlexibleArm,
     tool: Frame,
@@ -147,6 +148,12 @@ impl OperatingPoint {
         frame_jacobian(&self.arm.model, &self.data, &self.tool, &mut self.J);
         self.residual = residual;
         Ok(())
+    }
+
+    /// Drops what is known from the poses before: the next answer is that of a new workspace, to the last bit.
+    pub fn forget(&mut self) {
+        self.factor = None;
+        self.residual = f64::NAN;
     }
 
     /// Newton's iteration from the elastic coordinates in `q`; returns the residual.

@@ -8,9 +8,11 @@ use std::sync::Arc;
 
 use flexarm_log::{Columns, RunHeader, Sample};
 use flexarm_stepping::{Held, OperatingPoint};
+use rayon::prelude::*;
 
 use crate::error::Error;
 use crate::flexible::FlexibleRobot;
+use crate::magnification::Expected;
 use crate::options::{Modelling, Outputs, RunOptions};
 use crate::robot::Robot;
 use crate::run::{Together, run_traced};
@@ -109,11 +111,20 @@ impl Arm {
             columns.push(sample);
             observer(sample)
         };
-        let prepared = Some(FlexibleRobot::clone(&self.flexible));
-        let together = Together { observer: Some(&mut watch), prepared, ..Together::default() };
+        let prepared = Some(self.flexible.clone());
+        // How far things are shown enlarged is asked by nobody but recordings.
+        let expected = outputs.is_none().then(Expected::default);
+        let together = Together { observer: Some(&mut watch), prepared, expected, ..Together::default() };
         let go_on = &mut |_, _| ControlFlow::Continue(());
         let (summary, _) = run_traced(&self.robot, &scenario.into(), &options, outputs, together, go_on)?;
         Ok(Run { summary, columns })
+    }
+
+    /// Runs all scenarios, on all cores; each is the same to the last bit as by [`Arm::simulate`], for every number of threads.
+    ///
+    /// Threads are those of `rayon`'s pool. A run that fails does not stop the others.
+    pub fn simulate_batch(&self, scenarios: &[Scenario], options: &RunOptions) -> Vec<Result<Run, Error>> {
+        scenarios.par_iter().map(|scenario| self.simulate(scenario, options)).collect()
     }
 
     /// A workspace for equilibria, compliances and frequencies at any number of poses.

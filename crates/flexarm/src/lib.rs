@@ -60,6 +60,7 @@ mod mode_recording;
 mod modes;
 mod monitor;
 mod motion;
+mod operating_points;
 mod options;
 mod payload;
 mod posed;
@@ -98,6 +99,7 @@ pub use inspect::{FlexibleInfo, Inspection, JointInfo, LinkInfo, TcpInfo, inspec
 pub use mode_recording::{ModeMovie, record_modes};
 pub use modes::{ModeFigures, ModeTable, modes};
 pub use motion::{HeldJoint, Motion};
+pub use operating_points::OperatingPoints;
 pub use options::{DriveModel, LinkModel, Modelling, Outputs, RunOptions};
 pub use payload::PayloadChange;
 pub use report::{

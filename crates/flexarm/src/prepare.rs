@@ -1,5 +1,7 @@
 //! Everything about a run that can be told before its first step.
 
+use std::sync::Arc;
+
 use flexarm_settings::Setting;
 use flexarm_stepping::{FlexibleArm, Load, StepError, StepRule, Stepper, new_stepper};
 
@@ -16,7 +18,7 @@ use crate::scenario::Scenario;
 
 /// A run whose input makes sense.
 pub(crate) struct Checked {
-    pub(crate) flexible: FlexibleRobot,
+    pub(crate) flexible: Arc<FlexibleRobot>,
     pub(crate) arm: FlexibleArm,
     pub(crate) stepper: Box<dyn Stepper>,
     pub(crate) load_caveats: Vec<Caveat>,
@@ -34,7 +36,7 @@ pub(crate) fn checked(
     robot: &Robot,
     scenario: &Scenario,
     options: &RunOptions,
-    prepared: Option<FlexibleRobot>,
+    prepared: Option<Arc<FlexibleRobot>>,
 ) -> Result<Checked, Error> {
     let motion = &scenario.motion;
     if !motion.violations.is_empty() && !options.ignore_limits {
@@ -46,7 +48,7 @@ pub(crate) fn checked(
     }
     check_options(motion, options)?;
     let failed = |source: StepError| Error::Step { source, partial: false };
-    let flexible = prepared.map_or_else(|| robot.modelled(&options.modelling), Ok)?;
+    let flexible = prepared.map_or_else(|| robot.modelled(&options.modelling).map(Arc::new), Ok)?;
     let mut arm = flexible.arm(motion.prescribed()).map_err(|error| flexible.explained(error))?;
     let mut load_caveats = Vec::new();
     if !scenario.loads.is_empty() || !scenario.payloads.is_empty() {

@@ -30,6 +30,16 @@ impl RigidTwin {
         }
     }
 
+    /// Velocity and acceleration of the TCP at time t; zero, and nothing computed, while all joints stand still.
+    pub(crate) fn rates(&mut self, arm: &FlexibleArm, tcp: &Frame, t: f64) -> [Vector3<f64>; 2] {
+        arm.prescribed_state(t, &mut self.state, &mut self.qddot);
+        if self.state.qdot.iter().all(|rate| *rate == 0.0) {
+            return [Vector3::zeros(); 2];
+        }
+        self.update(arm, tcp, t);
+        [self.velocity, self.acceleration]
+    }
+
     /// Everything at time t; `data.tau` holds the torques that the drives must supply.
     pub(crate) fn update(&mut self, arm: &FlexibleArm, tcp: &Frame, t: f64) {
         let model = &arm.model;

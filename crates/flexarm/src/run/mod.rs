@@ -8,6 +8,7 @@ mod figures;
 mod sampler;
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 use std::time::Instant;
 
 use flexarm_analysis::{LongRecord, MetricSettings, PathFrame};
@@ -93,7 +94,7 @@ pub(crate) struct Together<'a> {
     /// Who looks at the samples.
     pub(crate) observer: Option<&'a mut Observer<'a>>,
     /// The robot as it is to be modelled, if that has been done.
-    pub(crate) prepared: Option<FlexibleRobot>,
+    pub(crate) prepared: Option<Arc<FlexibleRobot>>,
 }
 
 /// As [`simulate_traced`], as one of several runs.
@@ -320,10 +321,7 @@ fn tool_monitor(
 ) -> ToolMonitor {
     // Before the first motion the path axes are those of its beginning.
     let duration = motion.trajectory.duration();
-    let path = PathFrame::before((0..=1000).map(|k| {
-        twin.update(arm, tcp, duration * f64::from(k) * 1e-3);
-        [twin.velocity, twin.acceleration]
-    }));
+    let path = PathFrame::before((0..=1000).map(|k| twin.rates(arm, tcp, duration * f64::from(k) * 1e-3)));
     let static_part = options.with_twin.then(|| StaticPart::new(arm, tcp, moves(motion), duration, sample_s));
     // Stops come to rest where the static part is, unless servos bring the joints elsewhere or a load moves it.
     let rests_there = arm.torque_driven.is_empty() && arm.loads.is_empty();

@@ -1,0 +1,142 @@
+//! Equilibrium, compliance and frequencies at any number of poses, on all cores.
+
+use flexarm_kinematics::Wrench;
+use flexarm_stepping::{OperatingPoint, StepError};
+use rayon::prelude::*;
+
+use crate::arm::Arm;
+use crate::error::Error;
+
+/// Poses that one workspace answers one after another. The answers depend on nothing else, so they are the same bytes for
+/// every number of threads.
+const CHUNK: usize = 256;
+
+/// Answers at m poses, each a contiguous array, pose after pose; world axes at the tool point, linear first. Poses without an
+/// equilibrium have NaN everywhere.
+#[derive(Clone, Debug, Default)]
+pub struct OperatingPoints {
+    /// Place of the tool, m×3 (m).
+    pub tcp_m: Vec<f64>,
+    /// The same minus that of the rigid twin, m×3 (m).
+    pub deflection_m: Vec<f64>,
+    /// Displacement of the tool per wrench on it, drives locked, m×6×6 (m/N, rad/N; m/(N m), rad/(N m)).
+    pub compliance: Vec<f64>,
+    /// Natural frequencies, ascending, m×n with the n elastic coordinates of the arm (Hz).
+    pub frequencies_hz: Vec<f64>,
+    /// Poses without an answer, and why.
+    pub failures: Vec<(usize, StepError)>,
+    /// n.
+    elastic: usize,
+}
+
+impl OperatingPoints {
+    /// Number of poses.
+    pub fn len(&self) -> usize {
+        self.tcp_m.len() / 3
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.tcp_m.is_empty()
+    }
+
+    /// Number of frequencies of a pose.
+    pub fn frequencies(&self) -> usize {
+        self.elastic
+    }
+
+    fn with_room(poses: usize, elastic: usize) -> Self {
+        let holes = |n: usize| vec![f64::NAN; n * poses];
+        Self {
+            tcp_m: holes(3),
+            deflection_m: holes(3),
+            compliance: holes(36),
+            frequencies_hz: holes(elastic),
+            failures: Vec::new(),
+            elastic,
+        }
+    }
+}
+
+/// The rows of a chunk of poses.
+struct Rows<'a> {
+    first: usize,
+    poses: &'a [f64],
+    tcp_m: &'a mut [f64],
+    deflection_m: &'a mut [f64],
+    compliance: &'a mut [f64],
+    frequencies_hz: &'a mut [f64],
+}
+
+impl Arm {
+    /// Static equilibrium, compliance and frequencies at each pose under weight and a wrench on the tool, on all cores.
+    ///
+    /// * `poses`: m×n, the n actuated joints in coordinate order, pose after pose (rad or m).
+    /// * `wrench`: force and moment on the tool at its origin, world axes (N, N m).
+    ///
+    /// Cost: about ten microseconds a pose and core with twelve elastic coordinates. Threads are those of `rayon`'s pool.
+    ///
+    /// # Errors
+    /// [`Error::Step`] with [`StepError::Setup`] if the number of values is no multiple of that of the joints, and as
+    /// [`Arm::operating_point`]. A pose without equilibrium is no error, see [`OperatingPoints::failures`].
+    pub fn operating_points(&self, poses: &[f64], wrench: &Wrench) -> Result<OperatingPoints, Error> {
+        let joints = self.joints().count();
+        if joints == 0 || !poses.len().is_multiple_of(joints) {
+            let text = format!("{} joint values are given, expected a multiple of the {joints} joints", poses.len());
+            return Err(Error::Step { source: StepError::Setup(text), partial: false });
+        }
+        let start = self.operating_point()?;
+        let elastic = self.flexible().model.n_elastic();
+        // Chunks of nothing are none: a rigid arm gets a column that is dropped again.
+        let mut found = OperatingPoints::with_room(poses.len() / joints, elastic.max(1));
+        let rows = found
+            .tcp_m
+            .par_chunks_mut(3 * CHUNK)
+            .zip(found.deflection_m.par_chunks_mut(3 * CHUNK))
+            .zip(found.compliance.par_chunks_mut(36 * CHUNK))
+            .zip(found.frequencies_hz.par_chunks_mut(elastic.max(1) * CHUNK))
+            .zip(poses.par_chunks(joints * CHUNK))
+            .enumerate();
+        let rows = rows.map(|(chunk, ((((tcp_m, deflection_m), compliance), frequencies_hz), poses))| Rows {
+            first: chunk * CHUNK,
+            poses,
+            tcp_m,
+            deflection_m,
+            compliance,
+            frequencies_hz,
+        });
+        let failures: Vec<_> = rows.map_with(start, |at, rows| answer(at, rows, joints, elastic, wrench)).collect();
+        found.failures = failures.into_iter().flatten().collect();
+        found.elastic = elastic;
+        found.frequencies_hz.truncate(found.len() * elastic);
+        Ok(found)
+    }
+}
+
+/// Fills the rows of a chunk; what fails.
+fn answer(
+    at: &mut OperatingPoint,
+    rows: Rows<'_>,
+    joints: usize,
+    elastic: usize,
+    wrench: &Wrench,
+) -> Vec<(usize, StepError)> {
+    let mut failures = Vec::new();
+    at.forget();
+    for (k, q) in rows.poses.chunks_exact(joints).enumerate() {
+        if let Err(error) = at.solve(q, wrench) {
+            failures.push((rows.first + k, error));
+            at.forget();
+            continue;
+        }
+        let tool = at.tcp_pose().translation.vector;
+        let moved = tool - at.rigid_tcp_pose().translation.vector;
+        rows.tcp_m[3 * k..][..3].copy_from_slice(tool.as_slice());
+        rows.deflection_m[3 * k..][..3].copy_from_slice(moved.as_slice());
+        // Symmetric but for constant moments; rows first.
+        let C = at.compliance().transpose();
+        rows.compliance[36 * k..][..36].copy_from_slice(C.as_slice());
+        rows.frequencies_hz[elastic * k..][..elastic].copy_from_slice(at.frequencies_hz());
+    }
+    failures
+}
