@@ -100,9 +100,10 @@ const QUICK: f64 = 0.01;
 /// Damping ratio of every mode above which the error of a step has faded before many others have come to it.
 const DAMPED: f64 = 1e-3;
 
-/// Whether nothing in the arm keeps what a step leaves: joints are where their motion is, springs straight, modes damped.
+/// Whether nothing in the arm keeps what a step leaves: joints are where their motion is, springs straight and in Newton's
+/// matrix whole, modes damped.
 fn forgets_errors(arm: &FlexibleArm) -> bool {
-    let straight = arm.elements.iter().all(|element| element.curve.is_none());
+    let straight = arm.elements.iter().all(|element| element.curve.is_none() && element.geometric.is_none());
     let damped = arm.modes.omega.iter().zip(arm.modes.shapes.column_iter()).all(|(omega, shape)| {
         let twice = shape.dot(&(&arm.D * shape));
         twice >= 2.0 * DAMPED * omega
