@@ -3,10 +3,10 @@
 //! ```text
 //! r(ẍ) = 0        ẍ ← ẍ - J^-1 r        J: kept until an iteration slows down
 //! ```
-//! The first correction `d = J^-1 r` is the error of an extrapolation over the step, in the norm `√(r · d)`, which weighs
-//! coordinates by their inertia and stiffness. Each iteration leaves ρ of the one before; what a search may leave of the first
-//! one is a part of it ([`Newton::leaving`]). ρ is measured where two iterations are made, and grows as the arm moves away from
-//! where J was taken: while it is known to be small enough, a step needs one evaluation.
+//! The first correction `d = J^-1 r` is the error of an extrapolation over the step. Each iteration leaves a part ρ of the one
+//! before, as lengths of vectors; what a search may leave of the first one is a part of it ([`Newton::leaving`]). ρ is measured
+//! where two iterations are made, and grows as the arm moves away from where J was taken: while it is known to be small enough, a
+//! step needs one evaluation.
 //!
 //! A step whose iteration fails is tried again with a matrix of its start, then in halves, down to `h/64`.
 
@@ -25,7 +25,7 @@ const MOST_HALVINGS: u32 = 6;
 /// A step that needed more iterations than this renews the matrix for the next one; twice as many, for itself.
 const RENEW_ABOVE: usize = 4;
 /// Largest ρ of a matrix that is kept.
-const STALE: f64 = 0.01;
+const STALE: f64 = 0.03;
 /// Accepted correction over the size of the acceleration.
 const TOLERANCE: f64 = 1e-9;
 /// Part of the first correction that a search may leave unless it is told otherwise: errors that nothing damps add up.
@@ -147,7 +147,7 @@ impl Newton {
 /// Sizes of one Newton correction, the largest over all coordinates.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Sizes {
-    /// `√(r · d)` of residual and correction.
+    /// Length of the correction.
     norm: f64,
     correction: f64,
     acceleration: f64,

@@ -57,12 +57,11 @@ impl IterationMatrix {
         Ok(())
     }
 
-    /// Replaces `r` by `d = J^-1 r`; returns `√(r · d)`.
+    /// Replaces `r` by `d = J^-1 r`; returns `|d|`.
     pub(crate) fn solve(&mut self, r: &mut DVector<f64>) -> f64 {
         self.product.gemv(1.0, &self.inverse, r, 0.0);
-        let squared = self.product.dot(r);
         r.copy_from(&self.product);
-        squared.abs().sqrt()
+        r.norm()
     }
 }
 
