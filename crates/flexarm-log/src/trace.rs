@@ -21,6 +21,7 @@ pub struct Trace {
     pub result: RunResult,
     stride: u64,
     seen: u64,
+    without_curves: bool,
     peak_error: f64,
 }
 
@@ -77,6 +78,12 @@ impl Trace {
         Self { header, stride: 1, peak_error: -1.0, ..Self::default() }
     }
 
+    /// An empty trace that keeps no rows, only the sample of the largest error.
+    #[must_use]
+    pub fn without_curves(header: RunHeader) -> Self {
+        Self { without_curves: true, ..Self::new(header) }
+    }
+
     /// Adds one instant.
     pub fn push(&mut self, sample: &Sample) {
         let error = size(&sample.error_world);
@@ -84,7 +91,7 @@ impl Trace {
             self.peak_error = error;
             self.peak.clone_from(sample);
         }
-        if self.seen.is_multiple_of(self.stride.max(1)) {
+        if !self.without_curves && self.seen.is_multiple_of(self.stride.max(1)) {
             self.rows.push(TraceRow::from(sample));
         }
         self.seen += 1;

@@ -86,8 +86,9 @@ impl ElasticElement {
         match &self.curve {
             Some(curve) => curve.energy(e[0]),
             None => {
-                let x = DVector::from_column_slice(e);
-                0.5 * x.dot(&(&self.K * &x))
+                let columns = self.K.as_slice().chunks_exact(self.size);
+                let row = |column: &[f64]| -> f64 { column.iter().zip(e).map(|(k, e)| k * e).sum() };
+                columns.zip(e).map(|(column, e)| 0.5 * e * row(column)).sum()
             }
         }
     }

@@ -15,7 +15,16 @@ const MOST_STEPS: usize = 60;
 /// Returns false where the iteration does not end, as with entries that are no numbers.
 pub(crate) fn symmetric_eigenvalues(A: &mut DMatrix<f64>, d: &mut [f64], e: &mut [f64]) -> bool {
     tridiagonalise(A, d, e);
-    ql(d, e)
+    // About one, so that squares neither overflow nor vanish.
+    let largest = d.iter().chain(e.iter()).fold(0.0_f64, |m, x| m.max(x.abs()));
+    if largest > 0.0 && largest.is_finite() {
+        d.iter_mut().chain(e.iter_mut()).for_each(|x| *x /= largest);
+    }
+    let ends = ql(d, e);
+    if largest > 0.0 && largest.is_finite() {
+        d.iter_mut().for_each(|x| *x *= largest);
+    }
+    ends
 }
 
 /// Diagonal into `d`, subdiagonal into `e[..n-1]`, `e[n-1] = 0`.
@@ -74,12 +83,12 @@ fn ql(d: &mut [f64], e: &mut [f64]) -> bool {
             }
             // Wilkinson's shift, then rotations that chase the bulge from the bottom up.
             let mut g = (d[l + 1] - d[l]) / (2.0 * e[l]);
-            g = d[m] - d[l] + e[l] / (g + g.hypot(1.0).copysign(g));
+            g = d[m] - d[l] + e[l] / (g + (g * g + 1.0).sqrt().copysign(g));
             let (mut s, mut c, mut p) = (1.0, 1.0, 0.0);
             let mut whole = true;
             for i in (l..m).rev() {
                 let (f, b) = (s * e[i], c * e[i]);
-                let r = f.hypot(g);
+                let r = (f * f + g * g).sqrt();
                 e[i + 1] = r;
                 if r == 0.0 {
                     d[i + 1] -= p;

@@ -73,11 +73,8 @@ pub(crate) fn storage_of(factor: &mut Option<Cholesky<f64, Dyn>>, n: usize) -> D
     }
 }
 
-/// Solves `A X = B` for all columns at once; takes `Bᵀ`, leaves `Xᵀ`.
-///
-/// Turned round, elimination goes over whole contiguous columns; on right-hand sides one after another (nalgebra's
-/// `solve_mut`) it takes six times as long at 24 coordinates.
-pub(crate) fn solve_transposed(factor: &Cholesky<f64, Dyn>, Bt: &mut DMatrix<f64>) {
+/// Solves `L X = B` with the factor `A = L Lᵀ`, likewise.
+pub(crate) fn solve_lower_transposed(factor: &Cholesky<f64, Dyn>, Bt: &mut DMatrix<f64>) {
     let (L, n) = (factor.l_dirty(), Bt.ncols());
     for k in 0..n {
         let scale = 1.0 / L[(k, k)];
@@ -87,6 +84,15 @@ pub(crate) fn solve_transposed(factor: &Cholesky<f64, Dyn>, Bt: &mut DMatrix<f64
             to.axpy(-L[(i, k)], &from, 1.0);
         }
     }
+}
+
+/// Solves `A X = B` for all columns at once; takes `Bᵀ`, leaves `Xᵀ`.
+///
+/// Turned round, elimination goes over whole contiguous columns; on right-hand sides one after another (nalgebra's
+/// `solve_mut`) it takes six times as long at 24 coordinates.
+pub(crate) fn solve_transposed(factor: &Cholesky<f64, Dyn>, Bt: &mut DMatrix<f64>) {
+    solve_lower_transposed(factor, Bt);
+    let (L, n) = (factor.l_dirty(), Bt.ncols());
     for k in (0..n).rev() {
         for i in k + 1..n {
             let (mut to, from) = Bt.columns_range_pair_mut(k, i);

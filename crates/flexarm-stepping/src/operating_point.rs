@@ -14,6 +14,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix6, Matrix6xX};
 use crate::arm::FlexibleArm;
 use crate::eigenvalues::symmetric_eigenvalues;
 use crate::error::StepError;
+use crate::iteration_matrix::solve_lower_transposed;
 use crate::motion::Held;
 use crate::statics::{StaticSlopes, add_spring_forces, static_equilibrium, static_forces};
 
@@ -318,10 +319,9 @@ impl OperatingPoint {
         let M = mass_matrix(&self.arm.model, &mut self.data, &self.q);
         self.A.copy_from(&M.view((m, m), (n, n)));
         // 1/ω² are the eigenvalues of L^-1 M L^-T: the low modes are the largest and most accurate.
-        let L = factor.l_dirty();
-        L.solve_lower_triangular_mut(&mut self.A);
+        solve_lower_transposed(factor, &mut self.A);
         self.A.transpose_mut();
-        L.solve_lower_triangular_mut(&mut self.A);
+        solve_lower_transposed(factor, &mut self.A);
         if !symmetric_eigenvalues(&mut self.A, &mut self.d, &mut self.e) {
             self.d.fill(f64::NAN);
         }

@@ -112,9 +112,11 @@ impl Arm {
             observer(sample)
         };
         let prepared = Some(self.flexible.clone());
-        // How far things are shown enlarged is asked by nobody but recordings.
-        let expected = outputs.is_none().then(Expected::default);
-        let together = Together { observer: Some(&mut watch), prepared, expected, ..Together::default() };
+        // How far things are shown enlarged, and what they look like, is asked by nobody but recordings.
+        let figures_alone = outputs.is_none();
+        let expected = figures_alone.then(Expected::default);
+        let together =
+            Together { observer: Some(&mut watch), prepared, expected, figures_alone, ..Together::default() };
         let go_on = &mut |_, _| ControlFlow::Continue(());
         let (summary, _) = run_traced(&self.robot, &scenario.into(), &options, outputs, together, go_on)?;
         Ok(Run { summary, columns })

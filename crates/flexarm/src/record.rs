@@ -128,11 +128,12 @@ pub(crate) fn recorders(outputs: Option<&Outputs>, in_study: bool) -> Result<Rec
 /// Writes the layouts with which viewers open the MCAP recording, if there is one.
 #[cfg(feature = "mcap")]
 pub(crate) fn write_layouts(files: &Files, header: &RunHeader) -> Result<(), Error> {
-    let layouts = [
-        (&files.foxglove_layout, flexarm_log::foxglove_layout(header)),
-        (&files.plotjuggler_layout, flexarm_log::plotjuggler_layout(header)),
+    type Layout = fn(&RunHeader) -> String;
+    let layouts: [(_, Layout); 2] = [
+        (&files.foxglove_layout, flexarm_log::foxglove_layout),
+        (&files.plotjuggler_layout, flexarm_log::plotjuggler_layout),
     ];
-    let there = layouts.into_iter().filter_map(|(path, text)| Some((PathBuf::from(path.as_ref()?), text)));
+    let there = layouts.into_iter().filter_map(|(path, text)| Some((PathBuf::from(path.as_ref()?), text(header))));
     Ok(flexarm_files::write_all(&there.collect::<Vec<_>>())?)
 }
 
@@ -265,10 +266,23 @@ fn metadata(
     ]
 }
 
+/// The part of a header that names the signals.
+pub(crate) fn signals(robot: &Robot, arm: &FlexibleArm) -> RunHeader {
+    let actuated = &arm.model.coordinates()[..arm.model.n_actuated()];
+    RunHeader {
+        robot: robot.name.clone(),
+        joints: actuated.iter().map(|c| c.joint.clone()).collect(),
+        prismatic: actuated.iter().map(|c| c.kind == "prismatic").collect(),
+        links: ordered_links(robot),
+        elements: arm.elements.iter().map(|e| e.name.clone()).collect(),
+        tcp: robot.tcp.0.clone(),
+        ..RunHeader::default()
+    }
+}
+
 /// The part of a header that the robot alone decides.
 pub(crate) fn robot_header(robot: &Robot, arm: &FlexibleArm) -> RunHeader {
-    let model = &arm.model;
-    let links = ordered_links(robot);
+    let header = signals(robot, arm);
     let read = |name: &str, media_type: &str, path: &std::path::Path| {
         std::fs::read(path).ok().map(|bytes| Attachment { name: name.into(), media_type: media_type.into(), bytes })
     };
@@ -284,18 +298,7 @@ pub(crate) fn robot_header(robot: &Robot, arm: &FlexibleArm) -> RunHeader {
         let file = path.file_name().map(|name| name.to_string_lossy()).unwrap_or_default();
         attachments.extend(read(&format!("collision/{k}/{file}"), flexarm_log::mesh_media_type(path), path));
     }
-    RunHeader {
-        robot: robot.name.clone(),
-        urdf: located_urdf(robot, false),
-        joints: model.coordinates()[..model.n_actuated()].iter().map(|c| c.joint.clone()).collect(),
-        prismatic: model.coordinates()[..model.n_actuated()].iter().map(|c| c.kind == "prismatic").collect(),
-        meshes: meshes(robot, &links),
-        links,
-        elements: arm.elements.iter().map(|e| e.name.clone()).collect(),
-        tcp: robot.tcp.0.clone(),
-        attachments,
-        ..RunHeader::default()
-    }
+    RunHeader { urdf: located_urdf(robot, false), meshes: meshes(robot, &header.links), attachments, ..header }
 }
 
 /// The URDF with the meshes that were found, of visual and of collision shapes, as `file://` references: viewers then find

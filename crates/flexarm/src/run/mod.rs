@@ -27,7 +27,7 @@ use crate::monitor::tool::ToolMonitor;
 use crate::motion::Motion;
 use crate::options::{Outputs, RunOptions};
 use crate::prepare::{Checked, checked};
-use crate::record::{header, link_frames, ordered_links, recorders, write_layouts};
+use crate::record::{header, link_frames, ordered_links, recorders, signals, write_layouts};
 use crate::robot::Robot;
 use crate::run::sampler::Sampler;
 use crate::scenario::Scenario;
@@ -91,6 +91,8 @@ pub(crate) struct Together<'a> {
     pub(crate) recorders: Vec<Box<dyn Recorder>>,
     /// Deflections of all of them, for a scale in common.
     pub(crate) expected: Option<Expected>,
+    /// Nobody sees the trace: neither curves nor meshes, texts and attachments of the header are wanted.
+    pub(crate) figures_alone: bool,
     /// Who looks at the samples.
     pub(crate) observer: Option<&'a mut Observer<'a>>,
     /// The robot as it is to be modelled, if that has been done.
@@ -119,7 +121,11 @@ pub(crate) fn run_traced(
     let mut run = Run::new(robot, &scenario.motion, options, &flexible, arm, stepper);
     let mut files = recorders(outputs, !together.recorders.is_empty())?;
     files.set.extend(together.recorders);
-    let mut head = header(robot, scenario, options, &run.arm, flexible.links_model());
+    let mut head = match together.figures_alone {
+        true => signals(robot, &run.arm),
+        false => header(robot, scenario, options, &run.arm, flexible.links_model()),
+    };
+    head.has_rigid = options.with_twin;
     head.bends.clone_from(&run.bends);
     head.contributors = run.contributors.iter().map(|c| c.name.clone()).collect();
     head.has_static = options.with_twin;
@@ -128,7 +134,7 @@ pub(crate) fn run_traced(
     head.magnification = options.magnification.unwrap_or_else(|| expected.magnification());
     files.begin(&head)?;
     write_layouts(&files.names, &head)?;
-    run.trace = Trace::new(head);
+    run.trace = if together.figures_alone { Trace::without_curves(head) } else { Trace::new(head) };
     let end = run.go(&mut files.set, outputs.is_some(), progress, together.observer);
 
     let (mut summary, mut events) = run.summary();
