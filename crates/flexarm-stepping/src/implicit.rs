@@ -30,6 +30,9 @@ const STALE: f64 = 0.03;
 const TOLERANCE: f64 = 1e-9;
 /// Part of the first correction that a search may leave unless it is told otherwise: errors that nothing damps add up.
 const TO_THE_END: f64 = 1e-6;
+/// Part of what may be left that ρ may be with a matrix just taken: more is no age of the matrix but something that it does not
+/// know (weight, loads, speeds), whose error has the same sign in every step and may feed a mode.
+const EXACT: f64 = 0.5;
 /// Searches that may end on a ρ measured before them.
 const MOST_UNMEASURED: u32 = 6;
 /// A first correction so many times as large as the largest of late comes from something new, of which ρ says nothing.
@@ -57,8 +60,9 @@ pub(crate) struct Newton {
     factorisations: u64,
     last_iterations: usize,
     last_correction: f64,
-    /// ρ as measured last, infinite with a new matrix.
+    /// ρ as measured last, infinite with a new matrix, and as measured first with this one.
     contraction: f64,
+    first_contraction: f64,
     /// Searches since then.
     unmeasured: u32,
     /// Part of the first correction that a search may leave.
@@ -83,6 +87,7 @@ impl Newton {
             last_iterations: 0,
             last_correction: 0.0,
             contraction: f64::INFINITY,
+            first_contraction: f64::INFINITY,
             unmeasured: 0,
             left: TO_THE_END,
             new: false,
@@ -103,8 +108,13 @@ impl Newton {
     /// The matrix in `self.matrix` was inverted.
     pub(crate) fn renewed(&mut self) {
         (self.factored, self.new) = (true, true);
-        self.contraction = f64::INFINITY;
+        (self.contraction, self.first_contraction) = (f64::INFINITY, f64::INFINITY);
         self.factorisations += 1;
+    }
+
+    /// The matrix was taken between two steps: what the next search measures counts.
+    pub(crate) fn renewed_between(&mut self) {
+        self.new = false;
     }
 
     /// A step was found in so many iterations, at most `longest` of them for one set of accelerations.
@@ -120,7 +130,8 @@ impl Newton {
     fn ends_at_once(&mut self, norm: f64) -> bool {
         let calm = norm <= SUDDEN * self.largest_first;
         self.largest_first = norm.max(FADING * self.largest_first);
-        let ends = calm && self.unmeasured < MOST_UNMEASURED && self.contraction <= self.left;
+        let exact = self.first_contraction <= EXACT * self.left;
+        let ends = calm && exact && self.unmeasured < MOST_UNMEASURED && self.contraction <= self.left;
         self.unmeasured += u32::from(ends);
         ends
     }
@@ -128,6 +139,9 @@ impl Newton {
     /// An iteration left this part of the one before. With the matrix of the search itself it says nothing of those to come.
     fn measured(&mut self, contraction: f64) {
         if !self.new {
+            if self.contraction.is_infinite() {
+                self.first_contraction = contraction;
+            }
             self.contraction = contraction;
             self.unmeasured = 0;
         }

@@ -71,6 +71,13 @@ impl Default for AlphaSettings {
     }
 }
 
+impl AlphaSettings {
+    /// What the steps of a damped arm may leave.
+    fn may_leave(&self) -> f64 {
+        (OF_DAMPING * (1.0 - self.rho)).min(QUICK)
+    }
+}
+
 impl Method for AlphaSettings {
     fn entry(&self) -> &'static StepperEntry {
         &ENTRY
@@ -86,17 +93,25 @@ impl Method for AlphaSettings {
         if !(0.0..=1.0).contains(&rho) {
             return Err(StepError::Setup(format!("the spectral radius must lie between 0 and 1, found {rho}")));
         }
-        let quick = forgets_errors(&arm);
+        let left = forgets_errors(&arm).then(|| self.may_leave()).filter(|left| *left > 0.0);
         ReducedStepper::start(arm, e, |system, x, v| {
             let integrator = GeneralizedAlpha::new(system, 0.0, h, *self, x, v)?;
-            Ok(if quick { integrator.leaving(QUICK) } else { integrator })
+            Ok(match left {
+                Some(left) => integrator.leaving(left),
+                None => integrator,
+            })
         })
     }
 }
 
 /// Part of the first correction of Newton's method that steps of a damped arm may leave: an error well below the scheme's own, for
 /// half the evaluations (`what_a_quick_iteration_leaves_is_small_beside_the_error_of_its_step`).
+///
+/// What is left comes back enlarged by the next extrapolation, up to `2 + 1/ρ` times for a mode that changes its sign in every step; the
+/// damping of the scheme, `1 - ρ` for such modes, must outweigh it ([`AlphaSettings::may_leave`]).
 const QUICK: f64 = 0.03;
+/// Part of `1 - ρ` that may be left.
+const OF_DAMPING: f64 = 0.3;
 /// Damping ratio of every mode above which the error of a step has faded before many others have come to it.
 const DAMPED: f64 = 1e-3;
 
@@ -344,6 +359,7 @@ impl ImplicitStep for GeneralizedAlpha {
         if !self.newton.factored {
             // The last residual was as good as here, and (6) is the same for all that a step places.
             let _singular_is_found_again_in_the_next_step = self.factor(system, t);
+            self.newton.renewed_between();
         }
         Ok(())
     }
