@@ -10,6 +10,7 @@ use flexarm_log::{Columns, RunHeader, Sample};
 use flexarm_stepping::{Held, OperatingPoint};
 use rayon::prelude::*;
 
+use crate::caveat::Caveat;
 use crate::error::Error;
 use crate::flexible::FlexibleRobot;
 use crate::magnification::Expected;
@@ -25,6 +26,8 @@ pub struct Arm {
     robot: Arc<Robot>,
     modelling: Modelling,
     flexible: Arc<FlexibleRobot>,
+    /// [`Robot::caveats`].
+    caveats: Arc<[Caveat]>,
 }
 
 /// What a run gives: figures, and every logged sample as columns.
@@ -61,7 +64,8 @@ impl Robot {
     /// # Errors
     /// [`Error::Modelling`] if a link or drive has no such model, [`Error::Model`] if the result is no tree.
     pub fn flexible(&self, modelling: Modelling) -> Result<Arm, Error> {
-        Ok(Arm { robot: Arc::new(self.clone()), modelling, flexible: Arc::new(self.modelled(&modelling)?) })
+        let flexible = Arc::new(self.modelled(&modelling)?);
+        Ok(Arm { robot: Arc::new(self.clone()), modelling, flexible, caveats: self.caveats().into() })
     }
 }
 
@@ -115,8 +119,14 @@ impl Arm {
         // How far things are shown enlarged, and what they look like, is asked by nobody but recordings.
         let figures_alone = outputs.is_none();
         let expected = figures_alone.then(Expected::default);
-        let together =
-            Together { observer: Some(&mut watch), prepared, expected, figures_alone, ..Together::default() };
+        let together = Together {
+            observer: Some(&mut watch),
+            prepared,
+            expected,
+            figures_alone,
+            robot_caveats: Some(self.caveats.clone()),
+            ..Together::default()
+        };
         let go_on = &mut |_, _| ControlFlow::Continue(());
         let (summary, _) = run_traced(&self.robot, &scenario.into(), &options, outputs, together, go_on)?;
         Ok(Run { summary, columns })

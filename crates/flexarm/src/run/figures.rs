@@ -15,8 +15,8 @@ use crate::headline::{self, Bending, ShareFigures};
 use crate::summary::{CURVE_PIECES, DriveFigures, LinkFigures, StepperFigures, Summary, TcpFigures};
 
 impl Run<'_> {
-    /// Figures of what was seen so far.
-    pub(super) fn summary(&self) -> (Summary, Vec<Event>) {
+    /// Figures of what was seen so far; `robot_caveats` stand before those of the run.
+    pub(super) fn summary(&self, robot_caveats: Vec<Caveat>) -> (Summary, Vec<Event>) {
         // A run that stopped at once has nothing to measure.
         let metrics = self.monitors.tool.result().metrics().ok();
         let metrics = metrics.as_ref().filter(|_| self.options.with_twin);
@@ -41,7 +41,7 @@ impl Run<'_> {
             drives: peaks.map(|(c, load)| (c.joint.clone(), load.peak)).collect(),
             moves_s: moves(self.motion).iter().map(|&(start, end)| [start, end]).collect(),
             error_curve: self.monitors.tool.result().largest_errors(CURVE_PIECES),
-            caveats: self.caveats(&links),
+            caveats: self.caveats(&links, robot_caveats),
             links,
             elastic_drives,
             ..Summary::default()
@@ -113,8 +113,7 @@ impl Run<'_> {
     }
 
     /// What is probably wrong with the input, and whether the models held in what was seen so far.
-    fn caveats(&self, links: &[LinkFigures]) -> Vec<Caveat> {
-        let mut caveats = self.robot.caveats();
+    fn caveats(&self, links: &[LinkFigures], mut caveats: Vec<Caveat>) -> Vec<Caveat> {
         caveats.extend(self.flexible.caveats());
         caveats.extend(self.motion.caveats());
         let passed = |v: &LimitViolation| Caveat::said("joint-limit", &v.joint, format!("joint limit: {v}"), "");

@@ -17,7 +17,7 @@ use flexarm_log::{Attachment, BendInfo, Event, EventKind, Recorder, RecorderSet,
 use flexarm_stepping::{FlexibleArm, Observation, Stepper};
 
 use crate::bends::stations;
-use crate::caveat;
+use crate::caveat::{self, Caveat};
 use crate::error::Error;
 use crate::flexible::{FlexibleRobot, Owner};
 use crate::headline;
@@ -93,6 +93,8 @@ pub(crate) struct Together<'a> {
     pub(crate) expected: Option<Expected>,
     /// Nobody sees the trace: neither curves nor meshes, texts and attachments of the header are wanted.
     pub(crate) figures_alone: bool,
+    /// [`Robot::caveats`], if they are known.
+    pub(crate) robot_caveats: Option<Arc<[Caveat]>>,
     /// Who looks at the samples.
     pub(crate) observer: Option<&'a mut Observer<'a>>,
     /// The robot as it is to be modelled, if that has been done.
@@ -137,7 +139,8 @@ pub(crate) fn run_traced(
     run.trace = if together.figures_alone { Trace::without_curves(head) } else { Trace::new(head) };
     let end = run.go(&mut files.set, outputs.is_some(), progress, together.observer);
 
-    let (mut summary, mut events) = run.summary();
+    let robot_caveats = together.robot_caveats.map_or_else(|| robot.caveats(), |known| known.to_vec());
+    let (mut summary, mut events) = run.summary(robot_caveats);
     if let Err(error) = &end {
         events.push(Event { time_s: run.seen.t, kind: EventKind::Stopped, text: error.to_string() });
     }
@@ -150,7 +153,7 @@ pub(crate) fn run_traced(
     summary.real_time_factor = summary.duration_s / summary.wall_s.max(1e-9);
     summary.cpu_s_per_simulated_s = summary.cpu_s / summary.duration_s.max(1e-9);
     summary.files = files.names.clone();
-    run.trace.finish(result(&summary, events));
+    run.trace.finish(if together.figures_alone { RunResult::default() } else { result(&summary, events) });
     let closed = files.set.finish(&run.trace.result).map_err(Error::from);
     let reported =
         closed.and_then(|()| outputs.map_or(Ok(()), |outputs| crate::report::write(outputs, &summary, &run.trace)));
