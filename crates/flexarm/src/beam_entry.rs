@@ -10,7 +10,7 @@ use crate::robot_file::MaterialEntry;
 /// A closed-form beam from the link's frame to the distal joint.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct BeamEntry {
+pub(crate) struct BeamEntry {
     /// box, rectangle, tube, circle, i_beam, channel or given.
     pub section: String,
     /// Along section axis y (m).

@@ -19,7 +19,7 @@ const SHORTEST_SAMPLE: f64 = 1e-6;
 /// Drive of a joint. Quantities are on the joint's side of the gear unless they say otherwise.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct DriveEntry {
+pub(crate) struct DriveEntry {
     /// Joint of the URDF.
     pub joint: Spanned<String>,
     /// prescribed, gearbox or torque.
@@ -41,7 +41,7 @@ pub struct DriveEntry {
 /// A number, a list of them or a matrix.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(untagged, expecting = "expected a number, a list of 3 or 6 numbers, or a 6x6 matrix")]
-pub enum Numbers {
+pub(crate) enum Numbers {
     /// One.
     One(f64),
     /// Several.
@@ -53,7 +53,7 @@ pub enum Numbers {
 /// Spring and damper of a gearbox.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct GearboxEntry {
+pub(crate) struct GearboxEntry {
     /// About the axis (N m/rad); or about x, y, z of the joint frame; or for its three translations and rotations; or 6x6.
     pub stiffness: Option<Numbers>,
     /// Likewise, without the 6x6 (N m s/rad); 3 % modal if not given.
@@ -67,7 +67,7 @@ pub struct GearboxEntry {
 /// Friction of a drive.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct FrictionEntry {
+pub(crate) struct FrictionEntry {
     /// (N m s/rad).
     #[serde(default)]
     pub viscous: f64,

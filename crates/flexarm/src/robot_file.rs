@@ -7,16 +7,17 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use toml::Spanned;
 
-pub use flexarm_files::{Source, TextFileError as RobotFileError};
-pub use flexarm_linkmaker::{MaterialConstants, MaterialEntry};
+pub(crate) use flexarm_files::Source;
+pub use flexarm_files::TextFileError as RobotFileError;
+pub(crate) use flexarm_linkmaker::MaterialEntry;
 
-pub use crate::beam_entry::BeamEntry;
+pub(crate) use crate::beam_entry::BeamEntry;
 use crate::drive_entry::DriveEntry;
 
 /// The file as written.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct RobotFile {
+pub(crate) struct RobotFile {
     /// Version of the format: 1.
     pub format: Spanned<i64>,
     /// Name for logs; the folder's name if not given.
@@ -61,7 +62,7 @@ pub struct RobotFile {
 /// Pose of the tool centre point in a link.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct TcpEntry {
+pub(crate) struct TcpEntry {
     /// Link that carries it.
     pub link: Spanned<String>,
     /// Position (m).
@@ -75,7 +76,7 @@ pub struct TcpEntry {
 /// A rigid body fixed to a link.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct PayloadEntry {
+pub(crate) struct PayloadEntry {
     /// Link that carries it; that of the TCP if not given.
     pub link: Option<Spanned<String>>,
     /// Mass (kg).
@@ -90,7 +91,7 @@ pub struct PayloadEntry {
 /// A link that bends.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct FlexibleLinkEntry {
+pub(crate) struct FlexibleLinkEntry {
     /// Link of the URDF.
     pub link: Spanned<String>,
     /// Joint at the far interface.
@@ -125,7 +126,7 @@ fn yes() -> bool {
 /// One of the ways to damp.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct DampingEntry {
+pub(crate) struct DampingEntry {
     /// Ratio to critical, per mode.
     pub modal: Option<f64>,
     /// `D = beta K` (s).
@@ -138,7 +139,7 @@ pub struct DampingEntry {
 ///
 /// # Errors
 /// [`RobotFileError`] with line and column for anything that is not the format.
-pub fn parse_robot_file(text: &str, path: &Path) -> Result<(RobotFile, Source), RobotFileError> {
+pub(crate) fn parse_robot_file(text: &str, path: &Path) -> Result<(RobotFile, Source), RobotFileError> {
     let source = Source::new(path, text);
     let file: RobotFile = toml::from_str(text).map_err(|error| {
         let mut message = error.message().trim().replace('\n', " ");

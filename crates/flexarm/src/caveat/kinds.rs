@@ -3,35 +3,35 @@
 use super::CaveatKind;
 
 /// Far end of a flexible link turned beyond small rotations.
-pub const LARGE_DEFORMATION: CaveatKind = CaveatKind::warning(
+pub(crate) const LARGE_DEFORMATION: CaveatKind = CaveatKind::warning(
     "large-deformation",
     "{where} bends by {value} rad, beyond the {yardstick} rad for which the linear elastic model is good",
     "rad",
     "the model is linear elastic: check stiffness, loads and units",
 );
 /// Distance of the interfaces of a flexible link changed.
-pub const LARGE_STRAIN: CaveatKind = CaveatKind::warning(
+pub(crate) const LARGE_STRAIN: CaveatKind = CaveatKind::warning(
     "large-strain",
     "{where} changes its length by {value} of it, beyond {yardstick}: check stiffness and loads",
     "",
     "metals yield at 1e-3 to 5e-3: check stiffness, loads and units",
 );
 /// A drive needs more in a run than it has.
-pub const EFFORT: CaveatKind = CaveatKind::warning(
+pub(crate) const EFFORT: CaveatKind = CaveatKind::warning(
     "effort",
     "{where} needs {value} N m (or N), its limit is {yardstick}: the real drive would not follow",
     "N m",
     "check masses, payload, loads and the effort limit of the URDF",
 );
 /// A drive needs more than it has to hold a pose.
-pub const HOLDING: CaveatKind = CaveatKind::warning(
+pub(crate) const HOLDING: CaveatKind = CaveatKind::warning(
     "effort",
     "{where} needs {value} N m (or N) to hold the pose, its limit is {yardstick}",
     "N m",
     "check masses, payload, loads and the effort limit of the URDF",
 );
 /// A servo at its limit.
-pub const SERVO_LIMIT: CaveatKind = CaveatKind::warning(
+pub(crate) const SERVO_LIMIT: CaveatKind = CaveatKind::warning(
     "servo-limit",
     "the servo of {where} is at its torque limit in {value} % of the samples: it cannot follow, or its loop is unstable \
      (gains too high for the inertia and sampling; is motor_inertia given?)",
@@ -39,7 +39,7 @@ pub const SERVO_LIMIT: CaveatKind = CaveatKind::warning(
     "check gains, sampling, torque limit and motor inertia",
 );
 /// Few samples.
-pub const FEW_SAMPLES: CaveatKind = CaveatKind::warning(
+pub(crate) const FEW_SAMPLES: CaveatKind = CaveatKind::warning(
     "few-samples",
     "{value} logged samples a second are few for a first frequency of {yardstick} Hz: peaks between them are missed; raise \
      {log_rate_hz} or lower {step_s}",
@@ -47,14 +47,14 @@ pub const FEW_SAMPLES: CaveatKind = CaveatKind::warning(
     "ten samples per period show its peak to 5 %",
 );
 /// Few steps.
-pub const COARSE_STEP: CaveatKind = CaveatKind::warning(
+pub(crate) const COARSE_STEP: CaveatKind = CaveatKind::warning(
     "coarse-step",
     "{value} steps per period of the first mode are coarse: lower {step_s}",
     "",
     "twenty steps per period or more follow it",
 );
 /// Energy.
-pub const ENERGY_OPEN: CaveatKind = CaveatKind::warning(
+pub(crate) const ENERGY_OPEN: CaveatKind = CaveatKind::warning(
     "energy-open",
     "the energy balance is open by {value} % of the energy in it: the samples are too far apart ({log_rate_hz}), the step too \
      coarse ({step_s}), or the stepper damps by itself",
@@ -62,14 +62,14 @@ pub const ENERGY_OPEN: CaveatKind = CaveatKind::warning(
     "halve the step and compare",
 );
 /// A mode without damping in a response.
-pub const UNDAMPED: CaveatKind = CaveatKind::warning(
+pub(crate) const UNDAMPED: CaveatKind = CaveatKind::warning(
     "undamped",
     "{where} has no damping: the height of its peak means nothing",
     "",
     "give the springs damping",
 );
 /// A joint outside its range at a pose.
-pub const OUTSIDE_LIMITS: CaveatKind = CaveatKind::warning(
+pub(crate) const OUTSIDE_LIMITS: CaveatKind = CaveatKind::warning(
     "outside-limits",
     "{where} at {value} is outside its limits",
     "rad",
@@ -79,105 +79,105 @@ pub const OUTSIDE_LIMITS: CaveatKind = CaveatKind::warning(
 // What the files say of the robot.
 
 /// An angle of more than a turn.
-pub const ANGLE: CaveatKind = CaveatKind::warning(
+pub(crate) const ANGLE: CaveatKind = CaveatKind::warning(
     "angle",
     "{where} has an angle of {value} rad, more than a turn ({yardstick} rad)",
     "rad",
     "angles of robot files are in rad: write 90 degrees as 1.5707963",
 );
 /// Tool or payload out of reach.
-pub const FAR: CaveatKind = CaveatKind::warning(
+pub(crate) const FAR: CaveatKind = CaveatKind::warning(
     "far",
     "{where} is {value} m away from its link, the whole arm reaches {yardstick} m",
     "m",
     "lengths are in m",
 );
 /// A joint far from its parent.
-pub const JOINT_DISTANCE: CaveatKind = CaveatKind::warning(
+pub(crate) const JOINT_DISTANCE: CaveatKind = CaveatKind::warning(
     "joint-distance",
     "{where} is {value} m away from its parent, all other joints together {yardstick} m",
     "m",
     "lengths of a URDF are in m",
 );
 /// An arm larger than any.
-pub const SIZE: CaveatKind = CaveatKind::warning(
+pub(crate) const SIZE: CaveatKind = CaveatKind::warning(
     "size",
     "{where} reaches {value} m, the largest ever built less than {yardstick} m",
     "m",
     "lengths of a URDF are in m",
 );
 /// Radius of gyration larger than the arm.
-pub const INERTIA: CaveatKind = CaveatKind::warning(
+pub(crate) const INERTIA: CaveatKind = CaveatKind::warning(
     "inertia",
     "{where} has a radius of gyration of {value} m, all mass of the arm lies within {yardstick} m",
     "m",
     "check mass (kg), inertia (kg m2) and lengths (m) of the URDF",
 );
 /// Denser than the heaviest metal.
-pub const DENSITY: CaveatKind = CaveatKind::warning(
+pub(crate) const DENSITY: CaveatKind = CaveatKind::warning(
     "density",
     "{where} has at least {value} kg/m3 by its mass and inertia, osmium has {yardstick}",
     "kg/m3",
     "check mass (kg) and inertia (kg m2)",
 );
 /// Size of gravity.
-pub const GRAVITY: CaveatKind = CaveatKind::warning(
+pub(crate) const GRAVITY: CaveatKind = CaveatKind::warning(
     "gravity",
     "{where} is {value} m/s2, on earth it is {yardstick}",
     "m/s2",
     "gravity is in m/s2, in the axes of the base",
 );
 /// Payload against the robot.
-pub const PAYLOAD_MASS: CaveatKind = CaveatKind::warning(
+pub(crate) const PAYLOAD_MASS: CaveatKind = CaveatKind::warning(
     "payload-mass",
     "{where} weighs {value} kg, the robot itself {yardstick} kg",
     "kg",
     "masses are in kg; robots carry less than they weigh",
 );
 /// A heavy point.
-pub const POINT_PAYLOAD: CaveatKind = CaveatKind::note(
+pub(crate) const POINT_PAYLOAD: CaveatKind = CaveatKind::note(
     "point-payload",
     "{where} of {value} kg is a point: it has no inertia of its own (told above {yardstick} kg)",
     "kg",
     "give inertia about its centre of mass if the tool turns fast",
 );
 /// Moments that no body has.
-pub const TRIANGLE: CaveatKind = CaveatKind::warning(
+pub(crate) const TRIANGLE: CaveatKind = CaveatKind::warning(
     "impossible-inertia",
     "{where} has a principal moment of {value} kg m2, more than the other two together ({yardstick}): no body has that",
     "kg m2",
     "the order is ixx iyy izz ixy ixz iyz, about the centre of mass",
 );
 /// A payload wider than the arm.
-pub const PAYLOAD_INERTIA: CaveatKind = CaveatKind::warning(
+pub(crate) const PAYLOAD_INERTIA: CaveatKind = CaveatKind::warning(
     "payload-inertia",
     "{where} has a radius of gyration of {value} m, the whole arm reaches {yardstick} m",
     "m",
     "inertia is in kg m2, about the centre of mass",
 );
 /// A speed limit that no joint has.
-pub const SPEED_LIMIT: CaveatKind = CaveatKind::warning(
+pub(crate) const SPEED_LIMIT: CaveatKind = CaveatKind::warning(
     "speed-limit",
     "{where} has a speed limit of {value} rad/s, joints of robots turn with less than {yardstick}",
     "rad/s",
     "limits of a URDF are in rad and rad/s",
 );
 /// A range of many turns.
-pub const JOINT_RANGE: CaveatKind = CaveatKind::warning(
+pub(crate) const JOINT_RANGE: CaveatKind = CaveatKind::warning(
     "joint-range",
     "{where} has a limit at {value} rad, more than two turns ({yardstick} rad)",
     "rad",
     "limits of a URDF are in rad and rad/s",
 );
 /// Effort limits far beyond the weight.
-pub const EFFORT_LIMIT: CaveatKind = CaveatKind::warning(
+pub(crate) const EFFORT_LIMIT: CaveatKind = CaveatKind::warning(
     "effort-limit",
     "{where} has an effort limit of {value} N m, of weight it has to carry {yardstick} at most",
     "N m",
     "limits of a URDF are in N m and N; too small a mass has the same effect",
 );
 /// Effort limits far beyond the inertia.
-pub const TIP_ACCELERATION: CaveatKind = CaveatKind::warning(
+pub(crate) const TIP_ACCELERATION: CaveatKind = CaveatKind::warning(
     "effort-limit",
     "the effort limit of {where} would accelerate the tip by {value} m/s2 (at most {yardstick} are plausible)",
     "m/s2",
@@ -187,49 +187,49 @@ pub const TIP_ACCELERATION: CaveatKind = CaveatKind::warning(
 // Links that bend.
 
 /// Young's modulus.
-pub const MODULUS: CaveatKind = CaveatKind::warning(
+pub(crate) const MODULUS: CaveatKind = CaveatKind::warning(
     "modulus",
     "{where} has a Young's modulus of {value} Pa, solids end at {yardstick}",
     "Pa",
     "E is in Pa: steel has 210e9, aluminium 70e9",
 );
 /// Density of a material.
-pub const MATERIAL_DENSITY: CaveatKind = CaveatKind::warning(
+pub(crate) const MATERIAL_DENSITY: CaveatKind = CaveatKind::warning(
     "material-density",
     "{where} has a material of {value} kg/m3, solids end at {yardstick}",
     "kg/m3",
     "rho is in kg/m3: steel has 7850, aluminium 2700",
 );
 /// Poisson's ratio.
-pub const POISSON: CaveatKind = CaveatKind::warning(
+pub(crate) const POISSON: CaveatKind = CaveatKind::warning(
     "poisson",
     "{where} has a Poisson's ratio of {value}, structural materials end at {yardstick}",
     "",
     "metals have 0.26 to 0.35; 0.5 is a liquid, less than 0 a foam that thickens when pulled",
 );
 /// Section against length.
-pub const SECTION: CaveatKind = CaveatKind::warning(
+pub(crate) const SECTION: CaveatKind = CaveatKind::warning(
     "section",
     "the section of {where} is {value} m thick, its beam {yardstick} m long",
     "m",
     "sections are in m",
 );
 /// Radius of gyration of a section.
-pub const SECTION_RADIUS: CaveatKind = CaveatKind::warning(
+pub(crate) const SECTION_RADIUS: CaveatKind = CaveatKind::warning(
     "section",
     "the section of {where} has a radius of gyration sqrt(EI/EA) of {value} m, beams of its length end at {yardstick}",
     "m",
     "EA is in N, EI in N m2",
 );
 /// Torsion against bending.
-pub const TORSION: CaveatKind = CaveatKind::warning(
+pub(crate) const TORSION: CaveatKind = CaveatKind::warning(
     "torsion",
     "the section of {where} has GJ/EI = {value}, sections end at {yardstick}",
     "",
     "GJ and EI are in N m2",
 );
 /// Channels, which bend and twist about different lines.
-pub const SHEAR_CENTRE: CaveatKind = CaveatKind::warning(
+pub(crate) const SHEAR_CENTRE: CaveatKind = CaveatKind::warning(
     "shear-centre",
     "the shear centre of {where} lies {value} m beside its centroid: a side force through the centroid would twist it by more than \
      1 % of its bending ({yardstick} m would), which its beam leaves out",
@@ -237,21 +237,21 @@ pub const SHEAR_CENTRE: CaveatKind = CaveatKind::warning(
     "beams bend and twist about the centroid: reduce a mesh of the link, or bend the section in the plane of its flanges only",
 );
 /// Mass of the link against that of the beam.
-pub const BEAM_MASS: CaveatKind = CaveatKind::warning(
+pub(crate) const BEAM_MASS: CaveatKind = CaveatKind::warning(
     "beam-mass",
     "{where} weighs {value} kg, its beam would weigh {yardstick} kg",
     "kg",
     "check the mass of the URDF, section and density",
 );
 /// Modal damping.
-pub const DAMPING_RATIO: CaveatKind = CaveatKind::warning(
+pub(crate) const DAMPING_RATIO: CaveatKind = CaveatKind::warning(
     "damping-ratio",
     "{where} has a damping ratio of {value}, jointed structures have less than {yardstick}",
     "",
     "3 per cent is 0.03",
 );
 /// Relaxation time.
-pub const CREEP: CaveatKind = CaveatKind::warning(
+pub(crate) const CREEP: CaveatKind = CaveatKind::warning(
     "creep",
     "the damping of {where} over its stiffness is {value} s, springs of robots have less than {yardstick}: it creeps instead \
      of swinging",
@@ -262,70 +262,70 @@ pub const CREEP: CaveatKind = CaveatKind::warning(
 // Drives.
 
 /// Soft gear.
-pub const GEAR_SOFT: CaveatKind = CaveatKind::warning(
+pub(crate) const GEAR_SOFT: CaveatKind = CaveatKind::warning(
     "gear-stiffness",
     "the gearbox of {where} turns by {value} rad under its effort limit, such drives by less than {yardstick}",
     "rad",
     "stiffness is in N m/rad on the joint's side; published gears turn by 1e-3 (rated) to 1e-2 rad (peak)",
 );
 /// Stiff gear.
-pub const GEAR_STIFF: CaveatKind = CaveatKind::warning(
+pub(crate) const GEAR_STIFF: CaveatKind = CaveatKind::warning(
     "gear-stiffness",
     "the gearbox of {where} turns by {value} rad under its effort limit, such drives by more than {yardstick}",
     "rad",
     "stiffness is in N m/rad on the joint's side; published gears turn by 1e-3 (rated) to 1e-2 rad (peak)",
 );
 /// Translations against rotations.
-pub const LEVER: CaveatKind = CaveatKind::warning(
+pub(crate) const LEVER: CaveatKind = CaveatKind::warning(
     "gear-lever",
     "rotations over translations in the stiffness of {where} make a lever of {value} m, bearings end at {yardstick}",
     "m",
     "three translations in N/m, then three rotations in N m/rad",
 );
 /// Play.
-pub const BACKLASH: CaveatKind = CaveatKind::warning(
+pub(crate) const BACKLASH: CaveatKind = CaveatKind::warning(
     "backlash",
     "{where} has a play of {value} rad to each side, gears of robots have less than {yardstick}",
     "rad",
     "reducers have 1 to 30 arc minutes, 3e-4 to 9e-3 rad",
 );
 /// Ratio of a gear.
-pub const RATIO: CaveatKind = CaveatKind::warning(
+pub(crate) const RATIO: CaveatKind = CaveatKind::warning(
     "ratio",
     "the motor of {where} turns {value} times per turn of the joint, gears of robots end at {yardstick}",
     "",
     "ratio is the motor's turns per turn of the joint",
 );
 /// Rotor.
-pub const ROTOR: CaveatKind = CaveatKind::warning(
+pub(crate) const ROTOR: CaveatKind = CaveatKind::warning(
     "rotor",
     "the rotor of {where} has {value} kg m2 as seen from the joint, no joint moves more than {yardstick} kg m2 of the arm",
     "kg m2",
     "motor_inertia is in kg m2 on the motor's side; the ratio counts squared",
 );
 /// Friction.
-pub const FRICTION: CaveatKind = CaveatKind::warning(
+pub(crate) const FRICTION: CaveatKind = CaveatKind::warning(
     "friction",
     "friction of {where} takes {value} N m, its effort limit is {yardstick}",
     "N m",
     "coulomb in N m and viscous in N m s/rad on the joint's side",
 );
 /// Sampling.
-pub const SAMPLE: CaveatKind = CaveatKind::warning(
+pub(crate) const SAMPLE: CaveatKind = CaveatKind::warning(
     "sampling",
     "the servo of {where} samples every {value} s, controllers of robots end at {yardstick}",
     "s",
     "sample_s is in s: 1 ms is 0.001",
 );
 /// Position loop.
-pub const POSITION_GAIN: CaveatKind = CaveatKind::warning(
+pub(crate) const POSITION_GAIN: CaveatKind = CaveatKind::warning(
     "position-gain",
     "the position gain of {where} is {value} 1/s, position loops are slower than {yardstick}",
     "1/s",
     "position_gain is in 1/s: 5 to 50",
 );
 /// Speed loop.
-pub const VELOCITY_GAIN: CaveatKind = CaveatKind::warning(
+pub(crate) const VELOCITY_GAIN: CaveatKind = CaveatKind::warning(
     "velocity-gain",
     "the velocity gain of {where} is {value} N m s/rad, its sampled loop is unstable above {yardstick}",
     "N m s/rad",
@@ -335,42 +335,42 @@ pub const VELOCITY_GAIN: CaveatKind = CaveatKind::warning(
 // The arm at rest.
 
 /// Deflection of a gear.
-pub const GEAR_ROTATION: CaveatKind = CaveatKind::warning(
+pub(crate) const GEAR_ROTATION: CaveatKind = CaveatKind::warning(
     "gear-rotation",
     "the gearbox of {where} gives by {value} rad, gears by less than {yardstick}",
     "rad",
     "check stiffness (N m/rad on the joint's side), masses and loads",
 );
 /// Deflection of a bearing.
-pub const BEARING: CaveatKind = CaveatKind::warning(
+pub(crate) const BEARING: CaveatKind = CaveatKind::warning(
     "bearing",
     "the bearing of {where} gives by {value} m, bearings by less than {yardstick}",
     "m",
     "translational stiffness is in N/m: bearings have 1e7 to 1e10",
 );
 /// Sag of the tool.
-pub const SAG: CaveatKind = CaveatKind::warning(
+pub(crate) const SAG: CaveatKind = CaveatKind::warning(
     "sag",
     "{where} sags by {value} m, the arm reaches {yardstick} m",
     "m",
     "robots sag by 1e-4 to 1e-2 of their reach: check stiffness, masses and units",
 );
 /// Low first frequency.
-pub const SLOW_MODE: CaveatKind = CaveatKind::warning(
+pub(crate) const SLOW_MODE: CaveatKind = CaveatKind::warning(
     "first-frequency",
     "{where} has a first frequency of {value} Hz, such arms have more than {yardstick}",
     "Hz",
     "geared arms have 5 to 30 Hz: check stiffness, masses and units",
 );
 /// High first frequency.
-pub const FAST_MODE: CaveatKind = CaveatKind::warning(
+pub(crate) const FAST_MODE: CaveatKind = CaveatKind::warning(
     "first-frequency",
     "{where} has a first frequency of {value} Hz; sound in steel runs along it {yardstick} times a second",
     "Hz",
     "nothing of this size swings so fast: check stiffness, masses and units",
 );
 /// Damping of the first mode.
-pub const DAMPED_MODE: CaveatKind = CaveatKind::warning(
+pub(crate) const DAMPED_MODE: CaveatKind = CaveatKind::warning(
     "damped-mode",
     "{where} has a damping ratio of {value}, from {yardstick} on it does not swing at all",
     "",
@@ -380,42 +380,42 @@ pub const DAMPED_MODE: CaveatKind = CaveatKind::warning(
 // Motions, loads, sampling.
 
 /// Effort along a motion.
-pub const MOTION_EFFORT: CaveatKind = CaveatKind::warning(
+pub(crate) const MOTION_EFFORT: CaveatKind = CaveatKind::warning(
     "motion-effort",
     "{where} needs up to {value} N m (or N) along the motion, its limit is {yardstick}",
     "N m",
     "slow the motion down; check masses, payload, unit and time of the motion",
 );
 /// A motion much slower than the robot.
-pub const SLOW_MOTION: CaveatKind = CaveatKind::note(
+pub(crate) const SLOW_MOTION: CaveatKind = CaveatKind::note(
     "slow-motion",
     "{where} never uses more than {value} of a joint's speed limit (told below {yardstick})",
     "",
     "times are in s",
 );
 /// A motion that hardly moves.
-pub const SMALL_MOTION: CaveatKind = CaveatKind::note(
+pub(crate) const SMALL_MOTION: CaveatKind = CaveatKind::note(
     "small-motion",
     "{where} turns no joint by more than {value} rad (told below {yardstick})",
     "rad",
     "is the unit of the angles right?",
 );
 /// A load against what the arm weighs and drives.
-pub const LOAD: CaveatKind = CaveatKind::warning(
+pub(crate) const LOAD: CaveatKind = CaveatKind::warning(
     "load",
     "{where} is {value} N, the arm with its payload weighs {yardstick} N on earth",
     "N",
     "forces are in N, moments in N m",
 );
 /// A moment against what the drives have.
-pub const MOMENT: CaveatKind = CaveatKind::warning(
+pub(crate) const MOMENT: CaveatKind = CaveatKind::warning(
     "load",
     "{where} is {value} N m, what the arm weighs makes {yardstick} N m at its full length",
     "N m",
     "forces are in N, moments in N m",
 );
 /// More samples than steps.
-pub const LOG_RATE: CaveatKind = CaveatKind::warning(
+pub(crate) const LOG_RATE: CaveatKind = CaveatKind::warning(
     "log-rate",
     "{value} samples a second are asked for, there are {yardstick} steps a second: every step is logged, no more",
     "1/s",

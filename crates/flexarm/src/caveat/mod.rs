@@ -7,16 +7,17 @@
 //! Not here: what makes a model impossible. That is an [`crate::Error`].
 
 pub(crate) mod drives;
-pub mod kinds;
+pub(crate) mod kinds;
 pub(crate) mod links;
 pub(crate) mod motion;
 pub(crate) mod parts;
 pub(crate) mod pose;
 pub(crate) mod size;
-pub mod slip;
+pub(crate) mod slip;
 pub(crate) mod validity;
 
-pub use flexarm_settings::caveat::{Caveat, CaveatKind, Severity, figure, once_each, warnings};
+pub use flexarm_settings::caveat::{Caveat, Severity};
+pub(crate) use flexarm_settings::caveat::{CaveatKind, once_each, warnings};
 
 #[cfg(test)]
 mod tests {

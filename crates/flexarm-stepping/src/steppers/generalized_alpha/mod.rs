@@ -93,7 +93,8 @@ impl Method for AlphaSettings {
         if !(0.0..=1.0).contains(&rho) {
             return Err(StepError::Setup(format!("the spectral radius must lie between 0 and 1, found {rho}")));
         }
-        let left = forgets_errors(&arm).then(|| self.may_leave()).filter(|left| *left > 0.0);
+        let followed = arm.modes.omega.first().is_none_or(|omega| h * omega <= FOLLOWED);
+        let left = (followed && forgets_errors(&arm)).then(|| self.may_leave()).filter(|left| *left > 0.0);
         ReducedStepper::start(arm, e, |system, x, v| {
             let integrator = GeneralizedAlpha::new(system, 0.0, h, *self, x, v)?;
             Ok(match left {
@@ -114,6 +115,8 @@ const QUICK: f64 = 0.03;
 const OF_DAMPING: f64 = 0.3;
 /// Damping ratio of every mode above which the error of a step has faded before many others have come to it.
 const DAMPED: f64 = 1e-3;
+/// `h ω` of the first mode up to which a step follows it, twelve steps in its period; beyond, extrapolations are no guide.
+const FOLLOWED: f64 = 0.5;
 
 /// Whether nothing in the arm keeps what a step leaves: joints are where their motion is, springs straight and in Newton's
 /// matrix whole, modes damped.
