@@ -83,6 +83,7 @@ const SCARCE_EVERY: u32 = 64;
 /// Longest time between two flushes: clocks do not hold all that a duration does.
 const NEVER: Duration = Duration::from_secs(10 * 365 * 24 * 3600);
 /// Part of its time that a run spends on flushes at most.
+#[cfg(any(feature = "mcap", feature = "rerun"))]
 const LARGEST_SHARE: u32 = 20;
 
 /// When the next flush is due. It decides when bytes reach the disk, never which bytes.
