@@ -6,7 +6,7 @@
 //! ```text
 //! τ_i = -s_i · W_i                                                           (1)
 //! dW  = T s_j,   T = [   0    A ]    weight m g at c: f = m g, A = 0, N = c fᵀ - (c · f) 1
-//!                    [ -[f]x  N ]    loads: see `LoadTangent`                    (2)
+//!                    [ -[f]x  N ]    loads that turn with their body have A and more in N   (2)
 //!
 //! j outward of i, or in the same joint:   ∂τ_i/∂q_j = -s_i · T_j s_j             (3)
 //! j inward of i:                          ∂τ_i/∂q_j = -(s_j × s_i) · W_i - s_i · T_i s_j
@@ -19,7 +19,7 @@
 //! τ_k = -(R C_t,k) · g,    ∂τ_k/∂q_j = ∂τ_j/∂η_k = -w_j · (R C_t,k × g)       j inward of the body      (6)
 //! ```
 //! One pass over the bodies and one over the pairs of coordinates; central differences of [`crate::gravity_forces`] take 2 n
-//! passes and leave 1e-9 of the largest entry as their error.
+//! passes over the bodies.
 
 use flexarm_spatial::products::{mul, tr_mul};
 use flexarm_spatial::{ElasticAngles, Twist, Wrench};
@@ -87,7 +87,7 @@ impl Carried {
         N: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
     };
 
-    /// A force f whose points, weighted by their shares, have the first moment `f` makes of `c`: weight `m g` at c.
+    /// A force that keeps its direction, at the point c.
     fn weight(f: Vector3<f64>, c: &Vector3<f64>) -> Self {
         Self { f, n: c.cross(&f), A: Matrix3::zeros(), N: arm_turns(c, &f) }
     }

@@ -18,8 +18,9 @@ const TOLERANCE: f64 = 1e-13;
 /// [`StepError::NoEquilibrium`] or [`StepError::Singular`].
 pub fn static_equilibrium(arm: &FlexibleArm, t: f64) -> Result<DVector<f64>, StepError> {
     let n = arm.n_elastic_coordinates();
-    // What was found with the modes is found again at once if nothing has changed since.
-    let known = t == 0.0 && arm.modes.equilibrium.len() == n;
+    // What was found with the modes is found again at once if nothing has changed since; a play is left from its middle.
+    let straight = arm.elements.iter().all(|element| element.curve.is_none());
+    let known = t == 0.0 && straight && arm.modes.equilibrium.len() == n;
     let mut e = if known { arm.modes.equilibrium.clone() } else { DVector::zeros(n) };
     if n == 0 {
         return Ok(e);
