@@ -7,7 +7,8 @@
 
 use std::ops::Add;
 
-use flexarm_spatial::{Pose, Twist, Wrench, skew};
+use flexarm_spatial::products::{lift, lift3, mul};
+use flexarm_spatial::{Pose, Real, Twist, Wrench, skew};
 use nalgebra::{Matrix3, Rotation3, Vector3, Vector6};
 
 /// Motion of a joint with one coordinate; axes are unit vectors, with the same components in J and B axes.
@@ -51,11 +52,11 @@ impl AxisMotion {
 
     /// A linear map of `S`, from what it makes of a rotation about the axis and of a translation along it.
     #[inline(always)]
-    pub(crate) fn linear<T: Add<Output = T>>(
+    pub(crate) fn linear<R: Add<Output = R>>(
         self,
-        rotation: impl FnOnce(Vector3<f64>) -> T,
-        translation: impl FnOnce(Vector3<f64>) -> T,
-    ) -> T {
+        rotation: impl FnOnce(Vector3<f64>) -> R,
+        translation: impl FnOnce(Vector3<f64>) -> R,
+    ) -> R {
         match self {
             Self::Revolute(axis) => rotation(axis),
             Self::Prismatic(axis) => translation(axis),
@@ -78,33 +79,38 @@ impl AxisMotion {
 
     /// `X_PB` at the joint value: the same as [`Self::pose`] behind `X_PJ`, from the table of the rotation.
     #[inline(always)]
-    pub(crate) fn place(self, X_PJ: &Pose, turn: &RevoluteTable, value: f64, X_PB: &mut Pose) {
+    pub(crate) fn place<T: Real>(self, X_PJ: &Pose, turn: &RevoluteTable, value: T, X_PB: &mut Pose<T>) {
+        let p_PJ = lift(&X_PJ.translation.vector);
+        let along = |travel: &Vector3<f64>| p_PJ + mul(&lift3(X_PJ.rotation.matrix()), &(lift::<T>(travel) * value));
         match self {
             Self::Revolute(_) => {
                 *X_PB.rotation.matrix_mut_unchecked() = turn.at(value);
-                X_PB.translation = X_PJ.translation;
+                X_PB.translation.vector = p_PJ;
             }
             Self::Prismatic(axis) => {
-                X_PB.rotation = X_PJ.rotation;
-                X_PB.translation.vector = X_PJ.translation.vector + X_PJ.rotation * (axis * value);
+                *X_PB.rotation.matrix_mut_unchecked() = lift3(X_PJ.rotation.matrix());
+                X_PB.translation.vector = along(&axis);
             }
             Self::Helical { axis, pitch } => {
                 *X_PB.rotation.matrix_mut_unchecked() = turn.at(value);
-                X_PB.translation.vector = X_PJ.translation.vector + X_PJ.rotation * (axis * (pitch * value));
+                X_PB.translation.vector = along(&(axis * pitch));
             }
         }
     }
 
     /// `S q̇` in B axes, at Bo.
     #[inline(always)]
-    pub fn twist(self, rate: f64) -> Twist {
-        self.linear(|axis| Twist::new(Vector3::zeros(), axis * rate), |axis| Twist::new(axis * rate, Vector3::zeros()))
+    pub fn twist<T: Real>(self, rate: T) -> Twist<T> {
+        self.linear(
+            |axis| Twist::new(Vector3::zeros(), lift::<T>(&axis) * rate),
+            |axis| Twist::new(lift::<T>(&axis) * rate, Vector3::zeros()),
+        )
     }
 
     /// `Sᵀ F` (N m or N) of a wrench at Bo in B axes.
     #[inline(always)]
-    pub fn project(self, F: &Wrench) -> f64 {
-        self.linear(|axis| axis.dot(&F.torque), |axis| axis.dot(&F.force))
+    pub fn project<T: Real>(self, F: &Wrench<T>) -> T {
+        self.linear(|axis| lift(&axis).dot(&F.torque), |axis| lift(&axis).dot(&F.force))
     }
 
     /// `S` as six numbers, linear first.
@@ -144,8 +150,8 @@ impl RevoluteTable {
     }
 
     #[inline(always)]
-    fn at(&self, angle: f64) -> Matrix3<f64> {
-        let (s, c) = angle.sin_cos();
-        self.K0 + self.K1 * s + self.K2 * c
+    fn at<T: Real>(&self, angle: T) -> Matrix3<T> {
+        let (s, c) = Real::sin_cos(angle);
+        lift3::<T>(&self.K0) + lift3::<T>(&self.K1) * s + lift3::<T>(&self.K2) * c
     }
 }

@@ -5,13 +5,13 @@
 //! axes, where its translations are constant. The coordinates of a modal body are n columns more: its own `C_t` and `C_r`
 //! and what its interfaces carry. Source: [Featherstone 2008], Table 6.2.
 
-use flexarm_spatial::products::{cross3, mul, mul3, tr_mul, tr_mul3};
-use flexarm_spatial::{Pose, SpatialInertia, Wrench};
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use flexarm_spatial::products::{cross3, lift, lift3, mul, mul3, tr_mul, tr_mul3};
+use flexarm_spatial::{Pose, Real, SpatialInertia, Wrench};
+use nalgebra::{DMatrix, DVector, Matrix3, Scalar, Vector3};
 
 use crate::axis_motion::AxisMotion;
 use crate::data::{Data, ElasticSubspace, joint_position, place_modal};
-use crate::model::{Body, JointMotion, Model};
+use crate::model::{Body, JointMotion, Model, Tree};
 
 /// Mass matrix `M(q)`, nv×nv, both triangles (kg, kg m, kg m²). Fills `data.{X_PB, M}`. No allocation.
 pub fn mass_matrix<'d>(model: &Model, data: &'d mut Data, q: &DVector<f64>) -> &'d DMatrix<f64> {
@@ -25,18 +25,25 @@ pub fn mass_matrix<'d>(model: &Model, data: &'d mut Data, q: &DVector<f64>) -> &
 
 /// As [`mass_matrix`], for the joint poses that the last pass of another algorithm left in `data`.
 pub fn mass_matrix_at_poses(model: &Model, data: &mut Data) {
+    composite_bodies(model, data);
+}
+
+/// [`mass_matrix_at_poses`] over any scalar.
+#[inline(always)]
+pub(crate) fn composite_bodies<T: Real>(tree: &impl Tree<T>, data: &mut Data<T>) {
+    let model = tree.model();
     let n = model.bodies.len();
-    for (composite, body) in data.composite.iter_mut().zip(&model.bodies) {
-        *composite = body.inertia;
+    for (i, composite) in data.composite.iter_mut().enumerate() {
+        *composite = tree.inertia(i);
     }
-    data.M.as_mut_slice().fill(0.0);
+    data.M.as_mut_slice().fill(T::zero());
     let nv = data.M.nrows();
     for (entry, modal) in model.modal.iter().zip(&mut data.modal) {
         data.composite[entry.body] += modal.inertia;
         let (c, shapes) = (entry.coordinate, &entry.tables.shapes);
-        data.M.view_mut((c, c), (entry.n, entry.n)).copy_from(&shapes.M);
+        data.M.view_mut((c, c), (entry.n, entry.n)).zip_apply(&shapes.M, |to, m| *to = T::splat(m));
         for (k, column) in modal.columns.iter_mut().enumerate() {
-            *column = Wrench::new(shapes.C_t[k], modal.C_r[k]);
+            *column = Wrench::new(lift(&shapes.C_t[k]), modal.C_r[k]);
         }
     }
     for i in (1..n).rev() {
@@ -46,9 +53,11 @@ pub fn mass_matrix_at_poses(model: &Model, data: &mut Data) {
         match body.motion {
             JointMotion::Axis(motion) => {
                 let F = axis_wrench(motion, &composite, body.ratio);
-                let own =
-                    motion.linear(|axis| (axis * body.ratio).dot(&F.torque), |axis| (axis * body.ratio).dot(&F.force));
-                data.M.as_mut_slice()[k * nv + k] += own + body.ratio * body.ratio * body.armature;
+                let own = motion.linear(
+                    |axis| lift(&(axis * body.ratio)).dot(&F.torque),
+                    |axis| lift(&(axis * body.ratio)).dot(&F.force),
+                );
+                data.M.as_mut_slice()[k * nv + k] += own + T::splat(body.ratio * body.ratio * body.armature);
                 data.U[i] = F;
             }
             JointMotion::Welded => {}
@@ -73,14 +82,14 @@ pub fn mass_matrix_at_poses(model: &Model, data: &mut Data) {
 
 /// `I_c S` of a joint of one coordinate: the wrench that moves all that is outward of it, at Bo in B axes.
 #[inline(always)]
-fn axis_wrench(motion: AxisMotion, composite: &SpatialInertia, ratio: f64) -> Wrench {
+fn axis_wrench<T: Real>(motion: AxisMotion, composite: &SpatialInertia<T>, ratio: f64) -> Wrench<T> {
     motion.linear(
         |axis| {
-            let a = axis * ratio;
+            let a = lift::<T>(&(axis * ratio));
             Wrench::new(a.cross(&composite.first_moment), mul(&composite.rotational, &a))
         },
         |axis| {
-            let l = axis * ratio;
+            let l = lift::<T>(&(axis * ratio));
             Wrench::new(l * composite.mass, composite.first_moment.cross(&l))
         },
     )
@@ -89,7 +98,7 @@ fn axis_wrench(motion: AxisMotion, composite: &SpatialInertia, ratio: f64) -> Wr
 /// Carries the wrenches of all one-DoF joints from body i outward over to its parent and meets the parent's joint:
 /// one level for all of them at once, because they do not wait for each other.
 #[inline(always)]
-fn carry_columns(model: &Model, data: &mut Data, i: usize) {
+fn carry_columns<T: Real>(model: &Model, data: &mut Data<T>, i: usize) {
     let (nv, X_PB) = (data.M.nrows(), data.X_PB[i]);
     let parent = model.bodies[i].parent;
     let inward = &model.bodies[parent];
@@ -103,7 +112,7 @@ fn carry_columns(model: &Model, data: &mut Data, i: usize) {
         *F = F.at_parent(&X_PB);
         let column = body.coordinate;
         match inward.motion {
-            JointMotion::Axis(motion) => add_pair(M, nv, row, column, inward.ratio * motion.project(F)),
+            JointMotion::Axis(motion) => add_pair(M, nv, row, column, T::splat(inward.ratio) * motion.project(F)),
             JointMotion::Elastic(_) => {
                 let S = &data.elastic[parent];
                 let (f, t) = (tr_mul(&S.L, &F.force), tr_mul(&S.B, &F.torque));
@@ -125,11 +134,19 @@ fn carry_columns(model: &Model, data: &mut Data, i: usize) {
 
 /// Adds `Sᵀ F` of the joint that moves body j to one column, and the mirror image; F at Bo in B axes of that body.
 #[inline(always)]
-fn meet(model: &Model, elastic: &[ElasticSubspace], M: &mut [f64], nv: usize, j: usize, column: usize, F: &Wrench) {
+fn meet<T: Real>(
+    model: &Model,
+    elastic: &[ElasticSubspace<T>],
+    M: &mut [T],
+    nv: usize,
+    j: usize,
+    column: usize,
+    F: &Wrench<T>,
+) {
     let body = &model.bodies[j];
     let row = body.coordinate;
     match body.motion {
-        JointMotion::Axis(motion) => add_pair(M, nv, row, column, body.ratio * motion.project(F)),
+        JointMotion::Axis(motion) => add_pair(M, nv, row, column, T::splat(body.ratio) * motion.project(F)),
         JointMotion::Welded => {}
         JointMotion::Elastic(_) => {
             let S = &elastic[j];
@@ -141,7 +158,8 @@ fn meet(model: &Model, elastic: &[ElasticSubspace], M: &mut [f64], nv: usize, j:
             let (f, t) = (tr_mul(&S.L, &F.force), tr_mul(&S.B, &F.torque));
             let columns = entry.tables.shapes.interfaces[interface].Phi.as_slice().chunks_exact(6);
             for (k, c) in columns.enumerate() {
-                let value = c[0] * f.x + c[1] * f.y + c[2] * f.z + c[3] * t.x + c[4] * t.y + c[5] * t.z;
+                let c = |k: usize| T::splat(c[k]);
+                let value = c(0) * f.x + c(1) * f.y + c(2) * f.z + c(3) * t.x + c(4) * t.y + c(5) * t.z;
                 add_pair(M, nv, row + k, column, value);
             }
         }
@@ -150,13 +168,13 @@ fn meet(model: &Model, elastic: &[ElasticSubspace], M: &mut [f64], nv: usize, j:
 
 /// What the composite body behind an interface adds to the coordinates of its modal body.
 #[inline(always)]
-fn interface_columns(
+fn interface_columns<T: Real>(
     model: &Model,
-    data: &mut Data,
+    data: &mut Data<T>,
     i: usize,
     modal: usize,
     interface: usize,
-    composite: &SpatialInertia,
+    composite: &SpatialInertia<T>,
 ) {
     let (entry, S) = (&model.modal[modal], data.elastic[i]);
     let (nv, c) = (data.M.nrows(), entry.coordinate);
@@ -171,14 +189,14 @@ fn interface_columns(
 
 /// Adds to both triangles; on the diagonal (a joint that mimics one inward of it) that is twice.
 #[inline(always)]
-fn add_pair(M: &mut [f64], nv: usize, row: usize, column: usize, value: f64) {
+fn add_pair<T: Real>(M: &mut [T], nv: usize, row: usize, column: usize, value: T) {
     M[column * nv + row] += value;
     M[row * nv + column] += value;
 }
 
 /// Adds six rows from `row` on in one column, and their mirror image.
 #[inline(always)]
-fn add_six(M: &mut [f64], nv: usize, row: usize, column: usize, values: [f64; 6]) {
+fn add_six<T: Real>(M: &mut [T], nv: usize, row: usize, column: usize, values: [T; 6]) {
     for (entry, value) in M[column * nv + row..][..6].iter_mut().zip(values) {
         *entry += value;
     }
@@ -194,7 +212,7 @@ fn add_six(M: &mut [f64], nv: usize, row: usize, column: usize, values: [f64; 6]
 /// Everything is kept in the axes of the parent P, and the axes of the joints inward are turned there, one rotation
 /// per level instead of four.
 #[inline(always)]
-fn elastic_columns(model: &Model, data: &mut Data, i: usize, composite: &SpatialInertia) {
+fn elastic_columns<T: Real>(model: &Model, data: &mut Data<T>, i: usize, composite: &SpatialInertia<T>) {
     let (body, X_PB) = (&model.bodies[i], &data.X_PB[i]);
     let columns = ElasticColumns::new(body, X_PB, &data.elastic[i].B, composite, data.M.nrows());
     let M = data.M.as_mut_slice();
@@ -229,24 +247,24 @@ fn elastic_columns(model: &Model, data: &mut Data, i: usize, composite: &Spatial
 /// ```text
 /// Uᵀ (a × (m r + h_B)),   Wᵀ a - Ωᵀ ((a × r) × h_B)                          (3)
 /// ```
-struct ElasticColumns {
+struct ElasticColumns<T: Scalar> {
     /// First coordinate of the joint.
     k: usize,
     /// Rows of M.
     nv: usize,
-    mass: f64,
-    U: Matrix3<f64>,
-    Omega: Matrix3<f64>,
-    W: Matrix3<f64>,
-    h_B: Vector3<f64>,
+    mass: T,
+    U: Matrix3<T>,
+    Omega: Matrix3<T>,
+    W: Matrix3<T>,
+    h_B: Vector3<T>,
     /// Force of the angles.
-    force_r: Matrix3<f64>,
+    force_r: Matrix3<T>,
 }
 
-impl ElasticColumns {
+impl<T: Real> ElasticColumns<T> {
     #[inline(always)]
-    fn new(body: &Body, X_PB: &Pose, B: &Matrix3<f64>, composite: &SpatialInertia, nv: usize) -> Self {
-        let (R_PB, U) = (X_PB.rotation.matrix(), *body.X_PJ.rotation.matrix());
+    fn new(body: &Body, X_PB: &Pose<T>, B: &Matrix3<T>, composite: &SpatialInertia<T>, nv: usize) -> Self {
+        let (R_PB, U) = (X_PB.rotation.matrix(), lift3(body.X_PJ.rotation.matrix()));
         let Omega = mul3(R_PB, B);
         let W = mul3(R_PB, &mul3(&composite.rotational, B)); // (2)
         let h_B = mul(R_PB, &composite.first_moment);
@@ -256,7 +274,7 @@ impl ElasticColumns {
 
     /// The joint's own six columns: the translations meet the mass alone.
     #[inline(always)]
-    fn write_own_block(&self, M: &mut [f64]) {
+    fn write_own_block(&self, M: &mut [T]) {
         let (k, nv) = (self.k, self.nv);
         let (tr, rr) = (tr_mul3(&self.U, &self.force_r), tr_mul3(&self.Omega, &self.W));
         for c in 0..3 {
@@ -275,7 +293,7 @@ impl ElasticColumns {
 
     /// Adds what the joint of body j, inward, meets: `S` its subspace if it is elastic, `R_AP` and r as in [`elastic_columns`].
     #[inline(always)]
-    fn meet(&self, model: &Model, S: &ElasticSubspace, M: &mut [f64], j: usize, R_AP: &Matrix3<f64>, r: &Vector3<f64>) {
+    fn meet(&self, model: &Model, S: &ElasticSubspace<T>, M: &mut [T], j: usize, R_AP: &Matrix3<T>, r: &Vector3<T>) {
         let Self { k, nv, mass, U, Omega, W, h_B, force_r } = self;
         let inward = &model.bodies[j];
         let (row, nv, mass) = (inward.coordinate, *nv, *mass);
@@ -284,12 +302,12 @@ impl ElasticColumns {
                 // Forces of the translations and of the angles, (3).
                 let Wrench { force: t, torque: q } = motion.linear(
                     |axis| {
-                        let a = tr_mul(R_AP, &(axis * inward.ratio));
+                        let a = tr_mul(R_AP, &lift(&(axis * inward.ratio)));
                         let t = tr_mul(U, &a.cross(&(r * mass + h_B)));
                         Wrench::new(t, tr_mul(W, &a) - tr_mul(Omega, &a.cross(r).cross(h_B)))
                     },
                     |axis| {
-                        let l = tr_mul(R_AP, &(axis * inward.ratio));
+                        let l = tr_mul(R_AP, &lift(&(axis * inward.ratio)));
                         Wrench::new(tr_mul(U, &l) * mass, tr_mul(force_r, &l))
                     },
                 );
@@ -302,7 +320,7 @@ impl ElasticColumns {
                 let rt = tr_mul3(&B, &cross3(&(r * mass + h_B), U));
                 let rr = tr_mul3(&B, &(W + cross3(r, force_r)));
                 for c in 0..3 {
-                    let six = |t: &Matrix3<f64>, r: &Matrix3<f64>| {
+                    let six = |t: &Matrix3<T>, r: &Matrix3<T>| {
                         [t[(0, c)], t[(1, c)], t[(2, c)], r[(0, c)], r[(1, c)], r[(2, c)]]
                     };
                     add_six(M, nv, row, k + c, six(&tt, &rt));

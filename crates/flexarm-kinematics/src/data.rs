@@ -3,23 +3,23 @@
 //! [`State`] is small and copyable between steppers; [`Data`] holds results and scratch of every algorithm,
 //! sized once by [`Data::new`], so that no algorithm allocates. Threads share a `Model`, each with its own `Data`.
 
-use flexarm_spatial::products::{mul, mul3, tr_mul};
-use flexarm_spatial::{ArticulatedInertia, ElasticAngles, Pose, SpatialInertia, Twist, Wrench};
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use flexarm_spatial::products::{lift, lift3, mul, mul3, tr_mul};
+use flexarm_spatial::{ArticulatedInertia, ElasticAngles, Pose, Real, SpatialInertia, Twist, Wrench};
+use nalgebra::{DMatrix, DVector, Isometry, Matrix3, Rotation3, Scalar, Translation3, Vector3};
 
 use crate::modal::ModalData;
 use crate::model::{JointMotion, Model};
 
 /// Positions and velocities of all independent coordinates, in the model's coordinate order.
 #[derive(Clone, Debug, PartialEq)]
-pub struct State {
+pub struct State<T: Scalar = f64> {
     /// Positions (rad or m).
-    pub q: DVector<f64>,
+    pub q: DVector<T>,
     /// Velocities (rad/s or m/s).
-    pub qdot: DVector<f64>,
+    pub qdot: DVector<T>,
 }
 
-impl State {
+impl<T: Real> State<T> {
     /// All coordinates zero, at rest.
     pub fn zeros(model: &Model) -> Self {
         Self { q: DVector::zeros(model.nv()), qdot: DVector::zeros(model.nv()) }
@@ -28,59 +28,59 @@ impl State {
 
 /// Motion subspace of an elastic joint or an interface in B axes: `V_PB_B = [L d'; B angles']`.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct ElasticSubspace {
+pub(crate) struct ElasticSubspace<T: Scalar = f64> {
     /// `R_PBᵀ` on the translation rates.
-    pub(crate) L: Matrix3<f64>,
+    pub(crate) L: Matrix3<T>,
     /// Rate map of the angles.
-    pub(crate) B: Matrix3<f64>,
+    pub(crate) B: Matrix3<T>,
 }
 
 /// Results and workspaces; see the function that fills each field.
 #[derive(Clone, Debug)]
-pub struct Data {
+pub struct Data<T: Scalar = f64> {
     /// Pose of each body in its parent.
-    pub X_PB: Vec<Pose>,
+    pub X_PB: Vec<Pose<T>>,
     /// Pose of each body in the world ([`crate::forward_kinematics`]).
-    pub X_WB: Vec<Pose>,
+    pub X_WB: Vec<Pose<T>>,
     /// Twist `V_WB_B` of each body at Bo in B axes.
-    pub V: Vec<Twist>,
+    pub V: Vec<Twist<T>>,
     /// Spatial acceleration `As_WB_B`, minus gravity where the algorithm says so.
-    pub A: Vec<Twist>,
+    pub A: Vec<Twist<T>>,
     /// Wrench that the joint puts on each body, at Bo in B axes ([`crate::inverse_dynamics`]).
-    pub F: Vec<Wrench>,
+    pub F: Vec<Wrench<T>>,
     /// External wrench on each body, at Bo in B axes; set by the caller, zero at the start.
-    pub F_ext: Vec<Wrench>,
+    pub F_ext: Vec<Wrench<T>>,
     /// Generalised forces.
-    pub tau: DVector<f64>,
+    pub tau: DVector<T>,
     /// Generalised accelerations.
-    pub qddot: DVector<f64>,
+    pub qddot: DVector<T>,
     /// Mass matrix, both triangles ([`crate::mass_matrix`]).
-    pub M: DMatrix<f64>,
+    pub M: DMatrix<T>,
 
-    pub(crate) elastic: Vec<ElasticSubspace>,
-    pub(crate) bias: Vec<Twist>,
-    pub(crate) composite: Vec<SpatialInertia>,
+    pub(crate) elastic: Vec<ElasticSubspace<T>>,
+    pub(crate) bias: Vec<Twist<T>>,
+    pub(crate) composite: Vec<SpatialInertia<T>>,
     pub(crate) articulated: Vec<ArticulatedInertia>,
     pub(crate) pA: Vec<Wrench>,
     /// One-DoF joints: U = I S, 1/(Sᵀ U), u.
-    pub(crate) U: Vec<Wrench>,
+    pub(crate) U: Vec<Wrench<T>>,
     pub(crate) inverse_d: Vec<f64>,
     pub(crate) u: Vec<f64>,
-    pub(crate) scratch: Vec<f64>,
+    pub(crate) scratch: Vec<T>,
     /// One per modal body.
-    pub(crate) modal: Vec<ModalData>,
+    pub(crate) modal: Vec<ModalData<T>>,
     /// Kinetic energy of the rotors in the last velocity pass.
-    pub(crate) rotor_energy: f64,
+    pub(crate) rotor_energy: T,
 }
 
-impl Data {
+impl<T: Real> Data<T> {
     /// Workspaces for a model.
     pub fn new(model: &Model) -> Self {
         let n = model.bodies.len();
         let zero = Twist::zeros();
         Self {
-            X_PB: vec![Pose::identity(); n],
-            X_WB: vec![Pose::identity(); n],
+            X_PB: vec![identity(); n],
+            X_WB: vec![identity(); n],
             V: vec![zero; n],
             A: vec![zero; n],
             F: vec![Wrench::zeros(); n],
@@ -90,15 +90,15 @@ impl Data {
             M: DMatrix::zeros(model.nv(), model.nv()),
             elastic: vec![ElasticSubspace { L: Matrix3::identity(), B: Matrix3::identity() }; n],
             bias: vec![zero; n],
-            composite: vec![SpatialInertia::zeros(); n],
+            composite: vec![SpatialInertia::lift(&SpatialInertia::zeros()); n],
             articulated: vec![ArticulatedInertia::from_rigid(&SpatialInertia::zeros()); n],
             pA: vec![Wrench::zeros(); n],
             U: vec![Wrench::zeros(); n],
             inverse_d: vec![0.0; n],
             u: vec![0.0; n],
-            scratch: vec![0.0; model.nv()],
+            scratch: vec![T::zero(); model.nv()],
             modal: model.modal.iter().map(|m| ModalData::new(&m.tables)).collect(),
-            rotor_energy: 0.0,
+            rotor_energy: T::zero(),
         }
     }
 
@@ -106,27 +106,52 @@ impl Data {
     pub fn clear_external_wrenches(&mut self) {
         self.F_ext.fill(Wrench::zeros());
     }
+}
 
+impl Data {
     /// Pose of a frame in the world, from the last [`crate::forward_kinematics`].
     pub fn X_WF(&self, frame: &crate::model::Frame) -> Pose {
         self.X_WB[frame.body] * frame.X_BF
     }
 }
 
+/// No displacement.
+#[inline(always)]
+pub(crate) fn identity<T: Real>() -> Pose<T> {
+    pose(Matrix3::identity(), Vector3::zeros())
+}
+
+/// From its parts.
+#[inline(always)]
+pub(crate) fn pose<T: Real>(R: Matrix3<T>, p: Vector3<T>) -> Pose<T> {
+    Isometry { rotation: Rotation3::from_matrix_unchecked(R), translation: Translation3 { vector: p } }
+}
+
 /// Joint pose, joint twist and its bias in B axes; fills `X_PB`, `elastic` for one body.
 ///
 /// `V_PB_B = S q̇` and `bias = dS/dt q̇` (zero for one-DoF joints).
 #[inline(always)]
-pub(crate) fn joint_motion(model: &Model, data: &mut Data, i: usize, q: &[f64], qdot: &[f64]) -> (Twist, Twist) {
+pub(crate) fn joint_motion<T: Real>(
+    model: &Model,
+    data: &mut Data<T>,
+    i: usize,
+    q: &[T],
+    qdot: &[T],
+) -> (Twist<T>, Twist<T>) {
     let body = &model.bodies[i];
     let k = body.coordinate;
     match body.motion {
         JointMotion::Axis(motion) => {
-            motion.place(&body.X_PJ, &body.turn, body.ratio * q[k] + body.offset, &mut data.X_PB[i]);
-            (motion.twist(body.ratio * qdot[k]), Twist::zeros())
+            motion.place(
+                &body.X_PJ,
+                &body.turn,
+                T::splat(body.ratio) * q[k] + T::splat(body.offset),
+                &mut data.X_PB[i],
+            );
+            (motion.twist(T::splat(body.ratio) * qdot[k]), Twist::zeros())
         }
         JointMotion::Welded => {
-            data.X_PB[i] = body.X_PJ;
+            data.X_PB[i] = pose(lift3(body.X_PJ.rotation.matrix()), lift(&body.X_PJ.translation.vector));
             (Twist::zeros(), Twist::zeros())
         }
         JointMotion::Elastic(angles) => {
@@ -158,14 +183,21 @@ pub(crate) fn joint_motion(model: &Model, data: &mut Data, i: usize, q: &[f64], 
 
 /// Joint pose alone; fills `X_PB` and `elastic` for one body.
 #[inline(always)]
-pub(crate) fn joint_position(model: &Model, data: &mut Data, i: usize, q: &[f64]) {
+pub(crate) fn joint_position<T: Real>(model: &Model, data: &mut Data<T>, i: usize, q: &[T]) {
     let body = &model.bodies[i];
     let k = body.coordinate;
     match body.motion {
         JointMotion::Axis(motion) => {
-            motion.place(&body.X_PJ, &body.turn, body.ratio * q[k] + body.offset, &mut data.X_PB[i]);
+            motion.place(
+                &body.X_PJ,
+                &body.turn,
+                T::splat(body.ratio) * q[k] + T::splat(body.offset),
+                &mut data.X_PB[i],
+            );
         }
-        JointMotion::Welded => data.X_PB[i] = body.X_PJ,
+        JointMotion::Welded => {
+            data.X_PB[i] = pose(lift3(body.X_PJ.rotation.matrix()), lift(&body.X_PJ.translation.vector))
+        }
         JointMotion::Elastic(angles) => {
             let (R, B) = angles.pose(&Vector3::new(q[k + 3], q[k + 4], q[k + 5]));
             place_elastic(&mut data.X_PB[i], &body.X_PJ, &R, &Vector3::new(q[k], q[k + 1], q[k + 2]));
@@ -183,31 +215,32 @@ pub(crate) fn joint_position(model: &Model, data: &mut Data, i: usize, q: &[f64]
 
 /// `Σ ½ a q̇²` of the rotors.
 #[inline(always)]
-pub(crate) fn rotor_energy(model: &Model, qdot: &[f64]) -> f64 {
-    model.rotors.iter().map(|&(k, a)| 0.5 * a * qdot[k] * qdot[k]).sum()
+pub(crate) fn rotor_energy<T: Real>(model: &Model, qdot: &[T]) -> T {
+    model.rotors.iter().fold(T::zero(), |sum, &(k, a)| sum + T::splat(0.5 * a) * qdot[k] * qdot[k])
 }
 
 /// Mass integrals of all modal bodies at the coordinates; fills `modal`.
 #[inline(always)]
-pub(crate) fn place_modal(model: &Model, data: &mut Data, q: &[f64]) {
+pub(crate) fn place_modal<T: Real>(model: &Model, data: &mut Data<T>, q: &[T]) {
     for (modal, entry) in data.modal.iter_mut().zip(&model.modal) {
         modal.place(&entry.tables, &q[entry.coordinate..entry.coordinate + entry.n]);
     }
 }
 
 #[inline(always)]
-fn place_elastic(X_PB: &mut Pose, X_PJ: &Pose, R: &Matrix3<f64>, d: &Vector3<f64>) {
-    *X_PB.rotation.matrix_mut_unchecked() = mul3(X_PJ.rotation.matrix(), R);
-    X_PB.translation.vector = X_PJ.translation.vector + mul(X_PJ.rotation.matrix(), d);
+fn place_elastic<T: Real>(X_PB: &mut Pose<T>, X_PJ: &Pose, R: &Matrix3<T>, d: &Vector3<T>) {
+    let R_PJ = lift3(X_PJ.rotation.matrix());
+    *X_PB.rotation.matrix_mut_unchecked() = mul3(&R_PJ, R);
+    X_PB.translation.vector = lift::<T>(&X_PJ.translation.vector) + mul(&R_PJ, d);
 }
 
 /// `S q̈` in B axes.
 #[inline(always)]
-pub(crate) fn subspace_times(model: &Model, data: &Data, i: usize, qddot: &[f64]) -> Twist {
+pub(crate) fn subspace_times<T: Real>(model: &Model, data: &Data<T>, i: usize, qddot: &[T]) -> Twist<T> {
     let body = &model.bodies[i];
     let k = body.coordinate;
     match body.motion {
-        JointMotion::Axis(motion) => motion.twist(body.ratio * qddot[k]),
+        JointMotion::Axis(motion) => motion.twist(T::splat(body.ratio) * qddot[k]),
         JointMotion::Welded => Twist::zeros(),
         JointMotion::Elastic(_) => {
             let S = &data.elastic[i];
@@ -226,11 +259,17 @@ pub(crate) fn subspace_times(model: &Model, data: &Data, i: usize, qddot: &[f64]
 
 /// `tau += Sᵀ F`.
 #[inline(always)]
-pub(crate) fn add_projection(model: &Model, data_elastic: &ElasticSubspace, i: usize, F: &Wrench, tau: &mut [f64]) {
+pub(crate) fn add_projection<T: Real>(
+    model: &Model,
+    data_elastic: &ElasticSubspace<T>,
+    i: usize,
+    F: &Wrench<T>,
+    tau: &mut [T],
+) {
     let body = &model.bodies[i];
     let k = body.coordinate;
     match body.motion {
-        JointMotion::Axis(motion) => tau[k] += body.ratio * motion.project(F),
+        JointMotion::Axis(motion) => tau[k] += T::splat(body.ratio) * motion.project(F),
         JointMotion::Welded => {}
         JointMotion::Elastic(_) => {
             let f = tr_mul(&data_elastic.L, &F.force);

@@ -4,20 +4,26 @@
 //! twist of T: velocity of the point To and angular velocity, both in **world axes** (rows linear first).
 
 use flexarm_spatial::products::{mul, mul3};
-use flexarm_spatial::{ElasticAngles, Pose, Twist};
+use flexarm_spatial::{ElasticAngles, Real, Twist};
 use nalgebra::{Matrix3, Matrix6xX, Vector3};
 
 use crate::axis_motion::AxisMotion;
-use crate::data::{Data, State, joint_motion, joint_position, place_modal, rotor_energy};
+use crate::data::{Data, State, identity, joint_motion, joint_position, place_modal, rotor_energy};
 use crate::model::{Frame, JointMotion, Model};
 
 /// Poses of all bodies: fills `data.{X_PB, X_WB}`.
 pub fn forward_kinematics(model: &Model, data: &mut Data, q: &nalgebra::DVector<f64>) {
-    place_modal(model, data, q.as_slice());
+    place_bodies(model, data, q.as_slice());
+}
+
+/// [`forward_kinematics`] over any scalar.
+#[inline(always)]
+pub(crate) fn place_bodies<T: Real>(model: &Model, data: &mut Data<T>, q: &[T]) {
+    place_modal(model, data, q);
     for i in 1..model.bodies.len() {
-        joint_position(model, data, i, q.as_slice());
+        joint_position(model, data, i, q);
     }
-    world_poses(model, data);
+    place_in_world(model, data);
 }
 
 /// Poses and twists of all bodies: fills `data.{X_PB, X_WB, V}`.
@@ -38,7 +44,13 @@ pub fn forward_kinematics_velocity(model: &Model, data: &mut Data, state: &State
 
 /// World poses from the joint poses that the last algorithm left in `data`.
 pub fn world_poses(model: &Model, data: &mut Data) {
-    data.X_WB[0] = Pose::identity();
+    place_in_world(model, data);
+}
+
+/// [`world_poses`] over any scalar.
+#[inline(always)]
+pub(crate) fn place_in_world<T: Real>(model: &Model, data: &mut Data<T>) {
+    data.X_WB[0] = identity();
     for i in 1..model.bodies.len() {
         let (X_WP, X_PB) = (data.X_WB[model.bodies[i].parent], data.X_PB[i]);
         let R_WP = X_WP.rotation.matrix();

@@ -40,6 +40,7 @@ mod data;
 mod energy;
 mod inverse_kinematics;
 mod kinematics;
+pub mod lanes;
 mod mechanism;
 mod modal;
 mod model;
@@ -47,8 +48,8 @@ mod rnea;
 mod static_tangent;
 
 pub use flexarm_spatial::{
-    AngleKinematics, ArticulatedInertia, ElasticAngles, Pose, SpatialInertia, Twist, Wrench, adjoint, rotation_vector,
-    skew,
+    AngleKinematics, ArticulatedInertia, ElasticAngles, Pose, Real, SpatialInertia, Twist, Wrench, adjoint,
+    rotation_vector, skew,
 };
 
 pub use aba::{Roles, forward_dynamics, hybrid_dynamics};

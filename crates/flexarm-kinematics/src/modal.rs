@@ -21,9 +21,9 @@
 //! Start at [`ModalBody`]. Sources: [Shabana 2013], chapter 5; [Wallrapp 1994] for the set of integrals.
 //! Not here: stiffness and damping of the modes, where shapes come from.
 
-use flexarm_spatial::products::{mul, tr_mul};
-use flexarm_spatial::{Pose, SpatialInertia, Twist, Wrench};
-use nalgebra::{Cholesky, DMatrix, Dyn, Matrix3, Matrix6xX, Vector3};
+use flexarm_spatial::products::{lift, lift3, mul, tr_mul};
+use flexarm_spatial::{Pose, Real, SpatialInertia, Twist, Wrench};
+use nalgebra::{Cholesky, DMatrix, Dyn, Matrix3, Matrix6xX, Scalar, Vector3};
 
 /// Shapes at the interfaces and mass integrals over them; n coordinates, link axes, about the link's origin. SI units.
 #[derive(Clone, Debug, PartialEq)]
@@ -147,20 +147,20 @@ impl ModalTables {
 
 /// Configuration, momentum terms and workspaces of one modal body.
 #[derive(Clone, Debug)]
-pub(crate) struct ModalData {
+pub(crate) struct ModalData<T: Scalar = f64> {
     /// `η̇` of the last velocity pass.
-    pub(crate) rates: Vec<f64>,
+    pub(crate) rates: Vec<T>,
     /// (1) and (3) with the mass: the body as if it were rigid now.
-    pub(crate) inertia: SpatialInertia,
+    pub(crate) inertia: SpatialInertia<T>,
     /// (2), column-major.
-    Q: Vec<f64>,
-    g_rate: Vec<f64>,
+    Q: Vec<T>,
+    g_rate: Vec<T>,
     /// (4).
-    pub(crate) C_r: Vec<Vector3<f64>>,
+    pub(crate) C_r: Vec<Vector3<T>>,
     /// Generalised forces on the coordinates.
-    pub(crate) f: Vec<f64>,
+    pub(crate) f: Vec<T>,
     /// Wrench columns of the mass matrix, or `H_rη` of the articulated recursion.
-    pub(crate) columns: Vec<Wrench>,
+    pub(crate) columns: Vec<Wrench<T>>,
     /// `H_ηη` and its factor's storage.
     pub(crate) H: DMatrix<f64>,
     pub(crate) factor: Option<Cholesky<f64, Dyn>>,
@@ -170,7 +170,7 @@ pub(crate) struct ModalData {
 
 /// `y += A x`, four columns at a time: y then goes through the registers once for all four.
 #[inline(always)]
-fn add_product(A: &DMatrix<f64>, x: &[f64], y: &mut [f64]) {
+fn add_product<T: Real>(A: &DMatrix<f64>, x: &[T], y: &mut [T]) {
     let rows = A.nrows();
     let (a, y) = (A.as_slice(), &mut y[..rows]);
     let mut fours = a.chunks_exact(4 * rows);
@@ -180,26 +180,27 @@ fn add_product(A: &DMatrix<f64>, x: &[f64], y: &mut [f64]) {
         let (a1, rest) = rest.split_at(rows);
         let (a2, a3) = rest.split_at(rows);
         for ((((y, a0), a1), a2), a3) in y.iter_mut().zip(a0).zip(a1).zip(a2).zip(a3) {
+            let (a0, a1, a2, a3) = (T::splat(*a0), T::splat(*a1), T::splat(*a2), T::splat(*a3));
             *y += (a0 * x[0] + a1 * x[1]) + (a2 * x[2] + a3 * x[3]);
         }
     }
     for (column, x) in fours.remainder().chunks_exact(rows).zip(x.remainder()) {
         for (y, a) in y.iter_mut().zip(column) {
-            *y += a * x;
+            *y += T::splat(*a) * *x;
         }
     }
 }
 
-impl ModalData {
+impl<T: Real> ModalData<T> {
     pub(crate) fn new(tables: &ModalTables) -> Self {
         let n = tables.shapes.n();
         Self {
-            rates: vec![0.0; n],
-            inertia: tables.shapes.undeformed(),
-            Q: tables.Pt.clone(),
-            g_rate: vec![0.0; 3 * n],
-            C_r: tables.shapes.C_r.clone(),
-            f: vec![0.0; n],
+            rates: vec![T::zero(); n],
+            inertia: SpatialInertia::lift(&tables.shapes.undeformed()),
+            Q: tables.Pt.iter().map(|x| T::splat(*x)).collect(),
+            g_rate: vec![T::zero(); 3 * n],
+            C_r: tables.shapes.C_r.iter().map(lift).collect(),
+            f: vec![T::zero(); n],
             columns: vec![Wrench::zeros(); n],
             H: DMatrix::zeros(n, n),
             factor: Cholesky::new(DMatrix::identity(n, n)),
@@ -209,40 +210,44 @@ impl ModalData {
 
     /// (1) to (4) at coordinates `eta`.
     #[inline(always)]
-    pub(crate) fn place(&mut self, tables: &ModalTables, eta: &[f64]) {
+    pub(crate) fn place(&mut self, tables: &ModalTables, eta: &[T]) {
         let shapes = &tables.shapes;
-        self.Q.copy_from_slice(&tables.Pt);
+        for (q, p) in self.Q.iter_mut().zip(&tables.Pt) {
+            *q = T::splat(*p);
+        }
         if !tables.N.is_empty() {
             add_product(&tables.N, eta, &mut self.Q);
         }
         // Only the symmetric part of E counts, and P and Pᵀ have the same.
-        let (mut h, mut E) = (shapes.first_moment, [0.0; 9]);
+        let (mut h, mut E) = (lift::<T>(&shapes.first_moment), [T::zero(); 9]);
         let matrices = self.Q.chunks_exact(9).zip(tables.Pt.chunks_exact(9));
         for ((k, &eta_k), (Q, Pt)) in eta.iter().enumerate().zip(matrices) {
-            h += shapes.C_t[k] * eta_k;
+            h += lift::<T>(&shapes.C_t[k]) * eta_k;
             for ((e, p), q) in E.iter_mut().zip(Pt).zip(Q) {
-                *e += (p + q) * eta_k;
+                *e += (T::splat(*p) + *q) * eta_k;
             }
-            self.C_r[k] = tables.C_rotary[k] + Vector3::new(Q[5] - Q[7], Q[6] - Q[2], Q[1] - Q[3]);
+            self.C_r[k] = lift::<T>(&tables.C_rotary[k]) + Vector3::new(Q[5] - Q[7], Q[6] - Q[2], Q[1] - Q[3]);
         }
-        let (xy, xz, yz) = (0.5 * (E[3] + E[1]), 0.5 * (E[6] + E[2]), 0.5 * (E[7] + E[5]));
+        let half = T::splat(0.5);
+        let (xy, xz, yz) = (half * (E[3] + E[1]), half * (E[6] + E[2]), half * (E[7] + E[5]));
         let (x, y, z) = (E[0], E[4], E[8]);
-        let J = shapes.inertia + Matrix3::new(y + z, -xy, -xz, -xy, x + z, -yz, -xz, -yz, x + y);
-        self.inertia = SpatialInertia { mass: shapes.mass, first_moment: h, rotational: J };
+        let J = lift3::<T>(&shapes.inertia) + Matrix3::new(y + z, -xy, -xz, -xy, x + z, -yz, -xz, -yz, x + y);
+        self.inertia = SpatialInertia { mass: T::splat(shapes.mass), first_moment: h, rotational: J };
     }
 
     /// What (5) gives without spatial acceleration and `η̈`: returns `[F; T]`, sets `f`.
     #[inline(always)]
-    pub(crate) fn bias(&mut self, tables: &ModalTables, V: &Twist, rates: &[f64]) -> Wrench {
+    pub(crate) fn bias(&mut self, tables: &ModalTables, V: &Twist<T>, rates: &[T]) -> Wrench<T> {
         let (w, v) = (V.angular, V.linear);
         self.rates.copy_from_slice(rates);
         let second = !tables.N.is_empty();
         if second {
-            self.g_rate.fill(0.0);
+            self.g_rate.fill(T::zero());
             add_product(&tables.g, rates, &mut self.g_rate);
         }
         let shapes = &tables.shapes;
-        let (mut Wt, mut c, mut rotary) = ([0.0; 9], Vector3::zeros(), Vector3::zeros());
+        let (mut Wt, mut c, mut rotary) = ([T::zero(); 9], Vector3::zeros(), Vector3::zeros());
+        let two = T::splat(2.0);
         // ω × v is the part of the origin's acceleration that a spatial acceleration leaves out.
         let wv = w.cross(&v);
         // ωᵀ Q ω - tr(Q) ω·ω is a sum over the entries of Q, with these weights.
@@ -250,43 +255,51 @@ impl ModalData {
         let (xy, xz, yz) = (w.x * w.y, w.x * w.z, w.y * w.z);
         let weights = [-(yy + zz), xy, xz, xy, -(xx + zz), yz, xz, yz, -(xx + yy)];
         for ((k, &rate), Q) in rates.iter().enumerate().zip(self.Q.chunks_exact(9)) {
-            let mut f = shapes.C_t[k].dot(&wv);
+            let C_t = lift::<T>(&shapes.C_t[k]);
+            let mut f = C_t.dot(&wv);
             for ((W, q), weight) in Wt.iter_mut().zip(Q).zip(&weights) {
-                *W += q * rate;
-                f += q * weight;
+                *W += *q * rate;
+                f += *q * *weight;
             }
-            c += shapes.C_t[k] * rate;
-            rotary += tables.C_rotary[k] * rate;
+            c += C_t * rate;
+            rotary += lift::<T>(&tables.C_rotary[k]) * rate;
             if second {
-                f += 2.0 * (w.x * self.g_rate[3 * k] + w.y * self.g_rate[3 * k + 1] + w.z * self.g_rate[3 * k + 2]);
+                f += two * (w.x * self.g_rate[3 * k] + w.y * self.g_rate[3 * k + 1] + w.z * self.g_rate[3 * k + 2]);
             }
             self.f[k] = f;
         }
         let Wt = Matrix3::from_column_slice(&Wt);
         let SpatialInertia { mass, first_moment: h, rotational: J } = &self.inertia;
-        let force = wv * *mass + w.cross(&(c * 2.0 + w.cross(h)));
-        let torque = h.cross(&wv) + w.cross(&(mul(J, &w) + rotary)) + (w * Wt.trace() - mul(&Wt, &w)) * 2.0;
+        let force = wv * *mass + w.cross(&(c * two + w.cross(h)));
+        let torque = h.cross(&wv) + w.cross(&(mul(J, &w) + rotary)) + (w * Wt.trace() - mul(&Wt, &w)) * two;
         Wrench::new(force, torque)
     }
 
     /// Mass terms of (5): adds to `f` and returns the wrench, for spatial acceleration A and `η̈` (none: zero).
     #[inline(always)]
-    pub(crate) fn inertia_forces(&mut self, tables: &ModalTables, A: &Twist, accelerations: Option<&[f64]>) -> Wrench {
+    pub(crate) fn inertia_forces(
+        &mut self,
+        tables: &ModalTables,
+        A: &Twist<T>,
+        accelerations: Option<&[T]>,
+    ) -> Wrench<T> {
         let shapes = &tables.shapes;
         let mut F = self.inertia.mul_twist(A);
         for (k, f) in self.f.iter_mut().enumerate() {
-            *f += shapes.C_t[k].dot(&A.linear) + self.C_r[k].dot(&A.angular);
+            *f += lift(&shapes.C_t[k]).dot(&A.linear) + self.C_r[k].dot(&A.angular);
         }
         if let Some(accelerations) = accelerations {
             for (k, &a) in accelerations.iter().enumerate() {
-                F.force += shapes.C_t[k] * a;
+                F.force += lift::<T>(&shapes.C_t[k]) * a;
                 F.torque += self.C_r[k] * a;
             }
             add_product(&shapes.M, accelerations, &mut self.f);
         }
         F
     }
+}
 
+impl ModalData {
     /// Kinetic energy (J) for the twist of the body frame and the rates of the last velocity pass.
     pub(crate) fn kinetic_energy(&self, tables: &ModalTables, V: &Twist) -> f64 {
         let mut energy = 0.5 * V.power(&self.inertia.mul_twist(V));
@@ -312,11 +325,11 @@ impl ModalData {
 impl InterfaceShape {
     /// Displacement and rotation vector at the coordinates (or their rates).
     #[inline(always)]
-    pub(crate) fn times(&self, eta: &[f64]) -> (Vector3<f64>, Vector3<f64>) {
-        let mut y = [0.0; 6];
+    pub(crate) fn times<T: Real>(&self, eta: &[T]) -> (Vector3<T>, Vector3<T>) {
+        let mut y = [T::zero(); 6];
         for (column, x) in self.Phi.as_slice().chunks_exact(6).zip(eta) {
             for (y, a) in y.iter_mut().zip(column) {
-                *y += a * x;
+                *y += T::splat(*a) * *x;
             }
         }
         (Vector3::new(y[0], y[1], y[2]), Vector3::new(y[3], y[4], y[5]))
@@ -324,27 +337,25 @@ impl InterfaceShape {
 
     /// `f += Φᵀ [force; moment]`.
     #[inline(always)]
-    pub(crate) fn add_transposed(&self, force: &Vector3<f64>, moment: &Vector3<f64>, f: &mut [f64]) {
+    pub(crate) fn add_transposed<T: Real>(&self, force: &Vector3<T>, moment: &Vector3<T>, f: &mut [T]) {
         for (column, f) in self.Phi.as_slice().chunks_exact(6).zip(f) {
-            *f += column[0] * force.x
-                + column[1] * force.y
-                + column[2] * force.z
-                + column[3] * moment.x
-                + column[4] * moment.y
-                + column[5] * moment.z;
+            let c = |k: usize| T::splat(column[k]);
+            *f +=
+                c(0) * force.x + c(1) * force.y + c(2) * force.z + c(3) * moment.x + c(4) * moment.y + c(5) * moment.z;
         }
     }
 
     /// Column k of the motion subspace in the child's axes, for its maps L (translations) and B (rotations).
     #[inline(always)]
-    pub(crate) fn twist(&self, k: usize, L: &Matrix3<f64>, B: &Matrix3<f64>) -> Twist {
-        let c = &self.Phi.as_slice()[6 * k..6 * k + 6];
+    pub(crate) fn twist<T: Real>(&self, k: usize, L: &Matrix3<T>, B: &Matrix3<T>) -> Twist<T> {
+        let column = &self.Phi.as_slice()[6 * k..6 * k + 6];
+        let c: [T; 6] = std::array::from_fn(|row| T::splat(column[row]));
         Twist::new(mul(L, &Vector3::new(c[0], c[1], c[2])), mul(B, &Vector3::new(c[3], c[4], c[5])))
     }
 
     /// `Sᵀ F` for all coordinates, F in the child's axes: added to `f`.
     #[inline(always)]
-    pub(crate) fn project(&self, L: &Matrix3<f64>, B: &Matrix3<f64>, F: &Wrench, f: &mut [f64]) {
+    pub(crate) fn project<T: Real>(&self, L: &Matrix3<T>, B: &Matrix3<T>, F: &Wrench<T>, f: &mut [T]) {
         self.add_transposed(&tr_mul(L, &F.force), &tr_mul(B, &F.torque), f);
     }
 }

@@ -9,7 +9,7 @@
 
 use std::collections::HashMap;
 
-use flexarm_spatial::{ElasticAngles, Pose, SpatialInertia};
+use flexarm_spatial::{ElasticAngles, Pose, Real, SpatialInertia};
 use nalgebra::Vector3;
 
 use crate::axis_motion::{AxisMotion, RevoluteTable};
@@ -137,6 +137,28 @@ pub struct Coordinate {
 
 /// Most independent coordinates of a model.
 pub const MOST_COORDINATES: usize = 600;
+
+/// A tree whose inertias are in the scalar of a recursion: a [`Model`], or one with several sets of them
+/// ([`crate::lanes::LaneTree`]).
+pub(crate) trait Tree<T: Real> {
+    /// Bodies and joints, alike in all lanes.
+    fn model(&self) -> &Model;
+
+    /// Inertia of a body about Bo, B axes.
+    fn inertia(&self, body: usize) -> SpatialInertia<T>;
+}
+
+impl Tree<f64> for Model {
+    #[inline(always)]
+    fn model(&self) -> &Model {
+        self
+    }
+
+    #[inline(always)]
+    fn inertia(&self, body: usize) -> SpatialInertia {
+        self.bodies[body].inertia
+    }
+}
 
 /// Why a mechanism is not a usable tree.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -339,6 +361,22 @@ impl Model {
         let mut model = self.clone();
         model.bodies[body].inertia = inertia;
         model
+    }
+
+    /// Whether the other model has the same joints, frames, modal bodies and gravity, to the last bit; inertias may differ.
+    pub fn is_same_tree(&self, other: &Self) -> bool {
+        let body =
+            |b: &Body| (b.parent, b.X_PJ, b.motion, b.coordinate, b.ratio, b.offset, b.armature, b.elastic, b.modal);
+        self.gravity == other.gravity
+            && self.bodies.len() == other.bodies.len()
+            && self.bodies.iter().zip(&other.bodies).all(|(a, b)| body(a) == body(b))
+            && self
+                .frames
+                .iter()
+                .map(|f| (&f.name, f.body, f.X_BF))
+                .eq(other.frames.iter().map(|f| (&f.name, f.body, f.X_BF)))
+            && self.modal.len() == other.modal.len()
+            && self.modal.iter().zip(&other.modal).all(|(a, b)| a.body == b.body && a.tables.shapes == b.tables.shapes)
     }
 }
 

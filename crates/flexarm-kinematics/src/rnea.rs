@@ -11,11 +11,12 @@
 //! `Ṡ_B` is the rate of S in B axes: zero for one-DoF joints, not for elastic ones. A body that bends in modes adds its
 //! own inertia forces to (3) and to the forces of its coordinates, see [`crate::ModalBody`].
 
-use flexarm_spatial::{Twist, Wrench};
+use flexarm_spatial::products::lift;
+use flexarm_spatial::{Real, Twist, Wrench};
 use nalgebra::{DVector, Vector3};
 
 use crate::data::{Data, State, add_projection, joint_motion, place_modal, rotor_energy, subspace_times};
-use crate::model::Model;
+use crate::model::{Model, Tree};
 
 /// Generalised forces `τ = M(q) q̈ + bias(q, q̇)` (N m or N) for the accelerations `qddot`.
 ///
@@ -50,11 +51,13 @@ pub fn gravity_forces<'d>(model: &Model, data: &'d mut Data, q: &DVector<f64>) -
     &data.tau
 }
 
+/// Over any scalar; `data.tau` has the result.
 #[inline(always)]
-fn newton_euler(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], qddot: Option<&[f64]>) {
+pub(crate) fn newton_euler<T: Real>(tree: &impl Tree<T>, data: &mut Data<T>, q: &[T], qdot: &[T], qddot: Option<&[T]>) {
+    let model = tree.model();
     let n = model.bodies.len();
     data.V[0] = Twist::zeros();
-    data.A[0] = Twist::new(-model.gravity, Vector3::zeros());
+    data.A[0] = Twist::new(lift(&-model.gravity), Vector3::zeros());
     data.F[0] = Wrench::zeros();
     data.rotor_energy = rotor_energy(model, qdot);
     place_modal(model, data, q);
@@ -70,15 +73,16 @@ fn newton_euler(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], qddot: 
         if let Some(qddot) = qddot {
             A += subspace_times(model, data, i, qddot);
         }
-        let momentum = body.inertia.mul_twist(&V);
-        data.F[i] = body.inertia.mul_twist(&A) + V.cross_force(&momentum) - data.F_ext[i]; // (3)
+        let inertia = tree.inertia(i);
+        let momentum = inertia.mul_twist(&V);
+        data.F[i] = inertia.mul_twist(&A) + V.cross_force(&momentum) - data.F_ext[i]; // (3)
         data.V[i] = V;
         data.A[i] = A;
         if let Some(m) = body.modal {
             add_modal_forces(model, data, i, m, qdot, qddot);
         }
     }
-    data.tau.as_mut_slice().fill(0.0);
+    data.tau.as_mut_slice().fill(T::zero());
     for i in (1..n).rev() {
         let F = data.F[i];
         add_projection(model, &data.elastic[i], i, &F, data.tau.as_mut_slice()); // (4)
@@ -90,19 +94,19 @@ fn newton_euler(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], qddot: 
     }
     for (entry, modal) in model.modal.iter().zip(&data.modal) {
         for (tau, f) in data.tau.as_mut_slice()[entry.coordinate..].iter_mut().zip(&modal.f) {
-            *tau += f;
+            *tau += *f;
         }
     }
     if let Some(qddot) = qddot {
         for &(k, armature) in &model.rotors {
-            data.tau[k] += armature * qddot[k];
+            data.tau[k] += T::splat(armature) * qddot[k];
         }
     }
 }
 
 /// Inertia forces of the modal body m on body i: adds to `F`, sets the forces of its coordinates.
 #[inline(always)]
-fn add_modal_forces(model: &Model, data: &mut Data, i: usize, m: usize, qdot: &[f64], qddot: Option<&[f64]>) {
+fn add_modal_forces<T: Real>(model: &Model, data: &mut Data<T>, i: usize, m: usize, qdot: &[T], qddot: Option<&[T]>) {
     let entry = &model.modal[m];
     let (modal, range) = (&mut data.modal[m], entry.coordinate..entry.coordinate + entry.n);
     let bias = modal.bias(&entry.tables, &data.V[i], &qdot[range.clone()]);

@@ -28,10 +28,14 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test stops at the first failure"))]
 
 mod blocks;
+#[cfg(target_arch = "x86_64")]
+pub mod lanes;
 pub mod products;
+mod real;
 mod rotation;
 mod vectors;
 
 pub use blocks::{Matrix12, symmetric_part, turn6, twice};
+pub use real::Real;
 pub use rotation::{AngleKinematics, ElasticAngles, rotation_vector};
 pub use vectors::{ArticulatedInertia, Pose, SpatialInertia, Twist, Wrench, adjoint, skew};

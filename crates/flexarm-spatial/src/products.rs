@@ -4,9 +4,11 @@
 
 use nalgebra::{Matrix3, Vector3};
 
+use crate::real::Real;
+
 /// `A v`.
 #[inline(always)]
-pub fn mul(A: &Matrix3<f64>, v: &Vector3<f64>) -> Vector3<f64> {
+pub fn mul<T: Real>(A: &Matrix3<T>, v: &Vector3<T>) -> Vector3<T> {
     let [a, b, c] = &A.data.0;
     let (x, y, z) = (v.x, v.y, v.z);
     Vector3::new(a[0] * x + b[0] * y + c[0] * z, a[1] * x + b[1] * y + c[1] * z, a[2] * x + b[2] * y + c[2] * z)
@@ -14,7 +16,7 @@ pub fn mul(A: &Matrix3<f64>, v: &Vector3<f64>) -> Vector3<f64> {
 
 /// `Aᵀ v`.
 #[inline(always)]
-pub fn tr_mul(A: &Matrix3<f64>, v: &Vector3<f64>) -> Vector3<f64> {
+pub fn tr_mul<T: Real>(A: &Matrix3<T>, v: &Vector3<T>) -> Vector3<T> {
     let [a, b, c] = &A.data.0;
     let (x, y, z) = (v.x, v.y, v.z);
     Vector3::new(a[0] * x + a[1] * y + a[2] * z, b[0] * x + b[1] * y + b[2] * z, c[0] * x + c[1] * y + c[2] * z)
@@ -22,32 +24,32 @@ pub fn tr_mul(A: &Matrix3<f64>, v: &Vector3<f64>) -> Vector3<f64> {
 
 /// Matrix of three columns.
 #[inline(always)]
-fn columns(a: Vector3<f64>, b: Vector3<f64>, c: Vector3<f64>) -> Matrix3<f64> {
+fn columns<T: Real>(a: Vector3<T>, b: Vector3<T>, c: Vector3<T>) -> Matrix3<T> {
     Matrix3::new(a.x, b.x, c.x, a.y, b.y, c.y, a.z, b.z, c.z)
 }
 
 /// Column j as a vector.
 #[inline(always)]
-fn column(A: &Matrix3<f64>, j: usize) -> Vector3<f64> {
+fn column<T: Real>(A: &Matrix3<T>, j: usize) -> Vector3<T> {
     let c = &A.data.0[j];
     Vector3::new(c[0], c[1], c[2])
 }
 
 /// `A B`.
 #[inline(always)]
-pub fn mul3(A: &Matrix3<f64>, B: &Matrix3<f64>) -> Matrix3<f64> {
+pub fn mul3<T: Real>(A: &Matrix3<T>, B: &Matrix3<T>) -> Matrix3<T> {
     columns(mul(A, &column(B, 0)), mul(A, &column(B, 1)), mul(A, &column(B, 2)))
 }
 
 /// `Aᵀ B`.
 #[inline(always)]
-pub fn tr_mul3(A: &Matrix3<f64>, B: &Matrix3<f64>) -> Matrix3<f64> {
+pub fn tr_mul3<T: Real>(A: &Matrix3<T>, B: &Matrix3<T>) -> Matrix3<T> {
     columns(tr_mul(A, &column(B, 0)), tr_mul(A, &column(B, 1)), tr_mul(A, &column(B, 2)))
 }
 
 /// `R A Rᵀ` for a symmetric A.
 #[inline(always)]
-pub fn turn_symmetric(R: &Matrix3<f64>, A: &Matrix3<f64>) -> Matrix3<f64> {
+pub fn turn_symmetric<T: Real>(R: &Matrix3<T>, A: &Matrix3<T>) -> Matrix3<T> {
     let [t0, t1, t2] = &mul3(R, A).data.0;
     let [r0, r1, r2] = &R.data.0;
     let xx = t0[0] * r0[0] + t1[0] * r1[0] + t2[0] * r2[0];
@@ -61,6 +63,23 @@ pub fn turn_symmetric(R: &Matrix3<f64>, A: &Matrix3<f64>) -> Matrix3<f64> {
 
 /// `[p]x A`.
 #[inline(always)]
-pub fn cross3(p: &Vector3<f64>, A: &Matrix3<f64>) -> Matrix3<f64> {
+pub fn cross3<T: Real>(p: &Vector3<T>, A: &Matrix3<T>) -> Matrix3<T> {
     columns(p.cross(&column(A, 0)), p.cross(&column(A, 1)), p.cross(&column(A, 2)))
+}
+
+/// A constant vector in the scalar of a recursion.
+#[inline(always)]
+pub fn lift<T: Real>(v: &Vector3<f64>) -> Vector3<T> {
+    Vector3::new(T::splat(v.x), T::splat(v.y), T::splat(v.z))
+}
+
+/// A constant matrix in the scalar of a recursion.
+#[inline(always)]
+pub fn lift3<T: Real>(A: &Matrix3<f64>) -> Matrix3<T> {
+    let [a, b, c] = &A.data.0;
+    columns(
+        Vector3::new(T::splat(a[0]), T::splat(a[1]), T::splat(a[2])),
+        Vector3::new(T::splat(b[0]), T::splat(b[1]), T::splat(b[2])),
+        Vector3::new(T::splat(c[0]), T::splat(c[1]), T::splat(c[2])),
+    )
 }

@@ -5,8 +5,9 @@
 //!
 //! Source: [Shabana 2013], chapter 2, for Euler angles; [Bullo & Murray 1995] for the exponential map.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Scalar, Vector3};
 
+use crate::real::Real;
 use crate::vectors::skew;
 
 /// Below this cosine the axis is taken from the symmetric part of the rotation, above from the skew part.
@@ -24,19 +25,19 @@ pub enum ElasticAngles {
 
 /// Rotation, rate map and its bias for one set of angles and rates.
 #[derive(Clone, Copy, Debug)]
-pub struct AngleKinematics {
+pub struct AngleKinematics<T: Scalar = f64> {
     /// `R_PQ`.
-    pub R: Matrix3<f64>,
+    pub R: Matrix3<T>,
     /// `B` with `w_PQ_Q = B rates`.
-    pub B: Matrix3<f64>,
+    pub B: Matrix3<T>,
     /// `dB/dt rates`: the part of the angular acceleration that is quadratic in the rates.
-    pub bias: Vector3<f64>,
+    pub bias: Vector3<T>,
 }
 
 impl ElasticAngles {
     /// Rotation, rate map and bias at `angles` (rad) and `rates` (rad/s).
-    #[inline]
-    pub fn kinematics(self, angles: &Vector3<f64>, rates: &Vector3<f64>) -> AngleKinematics {
+    #[inline(always)]
+    pub fn kinematics<T: Real>(self, angles: &Vector3<T>, rates: &Vector3<T>) -> AngleKinematics<T> {
         match self {
             Self::RotationVector => rotation_vector_kinematics(angles, rates),
             Self::EulerZyx => euler_zyx_kinematics(angles, rates),
@@ -44,10 +45,10 @@ impl ElasticAngles {
     }
 
     /// Rotation and rate map alone.
-    #[inline]
-    pub fn pose(self, angles: &Vector3<f64>) -> (Matrix3<f64>, Matrix3<f64>) {
+    #[inline(always)]
+    pub fn pose<T: Real>(self, angles: &Vector3<T>) -> (Matrix3<T>, Matrix3<T>) {
         match self {
-            Self::RotationVector => rotation_vector_pose(angles, &exponential_coefficients(angles.norm_squared())),
+            Self::RotationVector => rotation_vector_pose(angles, &exponential_coefficients(angles.dot(angles))),
             Self::EulerZyx => {
                 let k = euler_zyx_kinematics(angles, &Vector3::zeros());
                 (k.R, k.B)
@@ -59,7 +60,7 @@ impl ElasticAngles {
     pub fn rate_map_derivative(self, angles: &Vector3<f64>, rates: &Vector3<f64>) -> Matrix3<f64> {
         match self {
             Self::RotationVector => {
-                let (_, a, b, da, db) = exponential_coefficients(angles.norm_squared());
+                let [_, a, b, da, db] = exponential_coefficients(angles.dot(angles));
                 let (P, Pdot) = (skew(angles), skew(rates));
                 let xdot = 2.0 * angles.dot(rates);
                 P * (-da * xdot) - Pdot * a + P * P * (db * xdot) + (Pdot * P + P * Pdot) * b
@@ -102,56 +103,68 @@ pub fn rotation_vector(R: &Matrix3<f64>) -> Vector3<f64> {
     if axis.dot(&skew) < 0.0 { -axis * angle } else { axis * angle }
 }
 
-/// Coefficients of the exponential map at `x = theta²`, with the derivatives of the last two by x.
+/// Coefficients of the exponential map at `x = theta²`, with the derivatives of the last two by x: `[s, a, b, da, db]`.
 ///
 /// `s = sin(theta)/theta`, `a = (1 - cos)/theta²`, `b = (theta - sin)/theta³`.
-#[inline]
-fn exponential_coefficients(x: f64) -> (f64, f64, f64, f64, f64) {
-    if x < 0.01 {
-        // Taylor series; the first omitted terms are below 1e-17 relative.
-        let s = 1.0 - x / 6.0 * (1.0 - x / 20.0 * (1.0 - x / 42.0 * (1.0 - x / 72.0)));
-        let a = 0.5 * (1.0 - x / 12.0 * (1.0 - x / 30.0 * (1.0 - x / 56.0 * (1.0 - x / 90.0))));
-        let b = (1.0 / 6.0) * (1.0 - x / 20.0 * (1.0 - x / 42.0 * (1.0 - x / 72.0 * (1.0 - x / 110.0))));
-        let da = -1.0 / 24.0 * (1.0 - x / 15.0 * (1.0 - 3.0 * x / 112.0 * (1.0 - 2.0 * x / 135.0)));
-        let db = -1.0 / 120.0 * (1.0 - x / 21.0 * (1.0 - x / 48.0 * (1.0 - 2.0 * x / 165.0)));
-        return (s, a, b, da, db);
-    }
+#[inline(always)]
+fn exponential_coefficients<T: Real>(x: T) -> [T; 5] {
+    x.branch_below(0.01, || coefficients_by_series(x), || coefficients_in_closed_form(x))
+}
+
+/// Taylor series; the first omitted terms are below 1e-17 relative.
+#[inline(always)]
+fn coefficients_by_series<T: Real>(x: T) -> [T; 5] {
+    let sum = |terms: [f64; 4]| {
+        let [p, q, r, s] = terms.map(T::splat);
+        p + x * (q + x * (r + x * s))
+    };
+    let s = T::one() + x * sum([-1.0 / 6.0, 1.0 / 120.0, -1.0 / 5040.0, 1.0 / 362_880.0]);
+    let a = T::splat(0.5) + x * sum([-1.0 / 24.0, 1.0 / 720.0, -1.0 / 40_320.0, 1.0 / 3_628_800.0]);
+    let b = T::splat(1.0 / 6.0) + x * sum([-1.0 / 120.0, 1.0 / 5040.0, -1.0 / 362_880.0, 1.0 / 39_916_800.0]);
+    let da = sum([-1.0 / 24.0, 1.0 / 360.0, -1.0 / 13_440.0, 1.0 / 907_200.0]);
+    let db = sum([-1.0 / 120.0, 1.0 / 2520.0, -1.0 / 120_960.0, 1.0 / 9_979_200.0]);
+    [s, a, b, da, db]
+}
+
+#[inline(always)]
+fn coefficients_in_closed_form<T: Real>(x: T) -> [T; 5] {
+    let (one, two) = (T::one(), T::splat(2.0));
     let theta = x.sqrt();
     let (sine, cosine) = theta.sin_cos();
-    let (s, a) = (sine / theta, (1.0 - cosine) / x);
-    let b = (1.0 - s) / x;
-    let da = (0.5 * s - a) / x;
+    let (s, a) = (sine / theta, (one - cosine) / x);
+    let b = (one - s) / x;
+    let da = (T::splat(0.5) * s - a) / x;
     // ds/dx = (cos - s)/(2x) and b = (1 - s)/x
-    let db = ((s - cosine) / (2.0 * x) - b) / x;
-    (s, a, b, da, db)
+    let db = ((s - cosine) / (two * x) - b) / x;
+    [s, a, b, da, db]
 }
 
 /// `R` and `B` from the coefficients at `|phi|²`.
-#[inline]
-fn rotation_vector_pose(phi: &Vector3<f64>, coefficients: &(f64, f64, f64, f64, f64)) -> (Matrix3<f64>, Matrix3<f64>) {
-    let (s, a, b, ..) = *coefficients;
-    let (x, P) = (phi.norm_squared(), skew(phi));
+#[inline(always)]
+fn rotation_vector_pose<T: Real>(phi: &Vector3<T>, coefficients: &[T; 5]) -> (Matrix3<T>, Matrix3<T>) {
+    let [s, a, b, ..] = *coefficients;
+    let (x, P) = (phi.dot(phi), skew(phi));
     // [phi]x² = phi phiᵀ - x 1
     let square = Matrix3::from_columns(&[phi * phi.x, phi * phi.y, phi * phi.z]);
-    let R = P * s + square * a + Matrix3::from_diagonal_element(1.0 - x * a);
-    let B = square * b - P * a + Matrix3::from_diagonal_element(1.0 - x * b);
+    let R = P * s + square * a + Matrix3::from_diagonal_element(T::one() - x * a);
+    let B = square * b - P * a + Matrix3::from_diagonal_element(T::one() - x * b);
     (R, B)
 }
 
-#[inline]
-fn rotation_vector_kinematics(phi: &Vector3<f64>, rates: &Vector3<f64>) -> AngleKinematics {
-    let coefficients = exponential_coefficients(phi.norm_squared());
+#[inline(always)]
+fn rotation_vector_kinematics<T: Real>(phi: &Vector3<T>, rates: &Vector3<T>) -> AngleKinematics<T> {
+    let coefficients = exponential_coefficients(phi.dot(phi));
     let (R, B) = rotation_vector_pose(phi, &coefficients);
-    let (_, _, b, da, db) = coefficients;
+    let [_, _, b, da, db] = coefficients;
     // bias = (dB/dt) rates = -a' x' phi×rates + b' x' phi×(phi×rates) + b (rates×(phi×rates)),  x' = 2 phi·rates
-    let xdot = 2.0 * phi.dot(rates);
+    let xdot = T::splat(2.0) * phi.dot(rates);
     let c = phi.cross(rates);
     let bias = c * (-da * xdot) + phi.cross(&c) * (db * xdot) + rates.cross(&c) * b;
     AngleKinematics { R, B, bias }
 }
 
-#[inline]
-fn euler_zyx_kinematics(angles: &Vector3<f64>, rates: &Vector3<f64>) -> AngleKinematics {
+#[inline(always)]
+fn euler_zyx_kinematics<T: Real>(angles: &Vector3<T>, rates: &Vector3<T>) -> AngleKinematics<T> {
     let ((sx, cx), (sy, cy), (sz, cz)) = (angles.x.sin_cos(), angles.y.sin_cos(), angles.z.sin_cos());
     let R = Matrix3::new(
         cz * cy,
@@ -164,22 +177,24 @@ fn euler_zyx_kinematics(angles: &Vector3<f64>, rates: &Vector3<f64>) -> AngleKin
         cy * sx,
         cy * cx,
     );
-    let B = Matrix3::new(1.0, 0.0, -sy, 0.0, cx, sx * cy, 0.0, -sx, cx * cy);
+    let (zero, one) = (T::zero(), T::one());
+    let B = Matrix3::new(one, zero, -sy, zero, cx, sx * cy, zero, -sx, cx * cy);
     let Bdot = euler_zyx_rate_derivative(angles, rates);
     AngleKinematics { R, B, bias: Bdot * rates }
 }
 
-#[inline]
-fn euler_zyx_rate_derivative(angles: &Vector3<f64>, rates: &Vector3<f64>) -> Matrix3<f64> {
+#[inline(always)]
+fn euler_zyx_rate_derivative<T: Real>(angles: &Vector3<T>, rates: &Vector3<T>) -> Matrix3<T> {
+    let zero = T::zero();
     let ((sx, cx), (sy, cy)) = (angles.x.sin_cos(), angles.y.sin_cos());
     Matrix3::new(
-        0.0,
-        0.0,
+        zero,
+        zero,
         -cy * rates.y,
-        0.0,
+        zero,
         -sx * rates.x,
         cx * cy * rates.x - sx * sy * rates.y,
-        0.0,
+        zero,
         -cx * rates.x,
         -sx * cy * rates.x - cx * sy * rates.y,
     )
@@ -232,11 +247,11 @@ mod tests {
     fn series_and_closed_form_agree_where_they_meet() {
         let below = exponential_coefficients(0.01 - 1e-15);
         let above = exponential_coefficients(0.01 + 1e-15);
-        assert_relative_eq!(below.0, above.0, epsilon = 1e-14);
-        assert_relative_eq!(below.1, above.1, epsilon = 1e-13);
-        assert_relative_eq!(below.2, above.2, epsilon = 1e-13);
-        assert_relative_eq!(below.3, above.3, epsilon = 1e-11);
-        assert_relative_eq!(below.4, above.4, epsilon = 1e-10);
+        assert_relative_eq!(below[0], above[0], epsilon = 1e-14);
+        assert_relative_eq!(below[1], above[1], epsilon = 1e-13);
+        assert_relative_eq!(below[2], above[2], epsilon = 1e-13);
+        assert_relative_eq!(below[3], above[3], epsilon = 1e-11);
+        assert_relative_eq!(below[4], above[4], epsilon = 1e-10);
     }
 
     /// Half a turn about any axis is found again; measured 1e-15.

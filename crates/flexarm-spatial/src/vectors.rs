@@ -6,38 +6,39 @@
 //!
 //! Source: [Featherstone 2008], chapter 2, with linear and angular parts exchanged.
 
-use nalgebra::{IsometryMatrix3, Matrix3, Matrix6, Vector3, Vector6};
+use nalgebra::{IsometryMatrix3, Matrix3, Matrix6, Scalar, Vector3, Vector6};
 use std::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 
-use crate::products::{cross3, mul, mul3, tr_mul, turn_symmetric};
+use crate::products::{cross3, lift, lift3, mul, mul3, tr_mul, turn_symmetric};
+use crate::real::Real;
 
 /// Pose `X_AB` of frame B in frame A, as rotation matrix and translation (m). `p_A = X_AB * p_B`.
-pub type Pose = IsometryMatrix3<f64>;
+pub type Pose<T = f64> = IsometryMatrix3<T>;
 
 /// Velocity (or acceleration) of a frame: linear part of its origin (m/s), angular part (rad/s).
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
-pub struct Twist {
+pub struct Twist<T: Scalar = f64> {
     /// Velocity of the origin.
-    pub linear: Vector3<f64>,
+    pub linear: Vector3<T>,
     /// Angular velocity.
-    pub angular: Vector3<f64>,
+    pub angular: Vector3<T>,
 }
 
 /// Force (N) through a frame's origin and moment (N m) about it.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
-pub struct Wrench {
+pub struct Wrench<T: Scalar = f64> {
     /// Force.
-    pub force: Vector3<f64>,
+    pub force: Vector3<T>,
     /// Moment about the origin.
-    pub torque: Vector3<f64>,
+    pub torque: Vector3<T>,
 }
 
 macro_rules! pair_algebra {
     ($type:ident, $first:ident, $second:ident) => {
-        impl $type {
+        impl<T: Real> $type<T> {
             /// From the two parts.
             #[inline(always)]
-            pub fn new($first: Vector3<f64>, $second: Vector3<f64>) -> Self {
+            pub fn new($first: Vector3<T>, $second: Vector3<T>) -> Self {
                 Self { $first, $second }
             }
             /// All six components zero.
@@ -47,52 +48,52 @@ macro_rules! pair_algebra {
             }
             /// As one 6-vector, linear first.
             #[inline(always)]
-            pub fn to_vector(&self) -> Vector6<f64> {
+            pub fn to_vector(&self) -> Vector6<T> {
                 let (a, b) = (&self.$first, &self.$second);
                 Vector6::new(a.x, a.y, a.z, b.x, b.y, b.z)
             }
             /// From one 6-vector, linear first.
             #[inline(always)]
-            pub fn from_vector(v: &Vector6<f64>) -> Self {
+            pub fn from_vector(v: &Vector6<T>) -> Self {
                 Self { $first: Vector3::new(v[0], v[1], v[2]), $second: Vector3::new(v[3], v[4], v[5]) }
             }
         }
-        impl Add for $type {
+        impl<T: Real> Add for $type<T> {
             type Output = Self;
             #[inline(always)]
             fn add(self, o: Self) -> Self {
                 Self { $first: self.$first + o.$first, $second: self.$second + o.$second }
             }
         }
-        impl Sub for $type {
+        impl<T: Real> Sub for $type<T> {
             type Output = Self;
             #[inline(always)]
             fn sub(self, o: Self) -> Self {
                 Self { $first: self.$first - o.$first, $second: self.$second - o.$second }
             }
         }
-        impl Neg for $type {
+        impl<T: Real> Neg for $type<T> {
             type Output = Self;
             #[inline(always)]
             fn neg(self) -> Self {
                 Self { $first: -self.$first, $second: -self.$second }
             }
         }
-        impl Mul<f64> for $type {
+        impl<T: Real> Mul<T> for $type<T> {
             type Output = Self;
             #[inline(always)]
-            fn mul(self, s: f64) -> Self {
+            fn mul(self, s: T) -> Self {
                 Self { $first: self.$first * s, $second: self.$second * s }
             }
         }
-        impl AddAssign for $type {
+        impl<T: Real> AddAssign for $type<T> {
             #[inline(always)]
             fn add_assign(&mut self, o: Self) {
                 self.$first += o.$first;
                 self.$second += o.$second;
             }
         }
-        impl SubAssign for $type {
+        impl<T: Real> SubAssign for $type<T> {
             #[inline(always)]
             fn sub_assign(&mut self, o: Self) {
                 self.$first -= o.$first;
@@ -104,28 +105,28 @@ macro_rules! pair_algebra {
 pair_algebra!(Twist, linear, angular);
 pair_algebra!(Wrench, force, torque);
 
-impl Twist {
+impl<T: Real> Twist<T> {
     /// Power `Fᵀ V` (W); both at the same point, in the same axes.
     #[inline(always)]
-    pub fn power(&self, F: &Wrench) -> f64 {
+    pub fn power(&self, F: &Wrench<T>) -> T {
         self.linear.dot(&F.force) + self.angular.dot(&F.torque)
     }
 
     /// Motion cross product `V × U`: the rate of `U` when it is carried along by `V`.
     #[inline(always)]
-    pub fn cross(&self, U: &Twist) -> Twist {
+    pub fn cross(&self, U: &Twist<T>) -> Twist<T> {
         Twist::new(self.angular.cross(&U.linear) + self.linear.cross(&U.angular), self.angular.cross(&U.angular))
     }
 
     /// Force cross product `V ×* F`: the rate of `F` when it is carried along by `V`.
     #[inline(always)]
-    pub fn cross_force(&self, F: &Wrench) -> Wrench {
+    pub fn cross_force(&self, F: &Wrench<T>) -> Wrench<T> {
         Wrench::new(self.angular.cross(&F.force), self.angular.cross(&F.torque) + self.linear.cross(&F.force))
     }
 
     /// `Ad_BA V_A`: the same motion seen at Bo in B axes, for `X_AB` (B fixed in A's body).
     #[inline(always)]
-    pub fn at_child(&self, X_AB: &Pose) -> Twist {
+    pub fn at_child(&self, X_AB: &Pose<T>) -> Twist<T> {
         let R = X_AB.rotation.matrix();
         let p = &X_AB.translation.vector;
         Twist::new(tr_mul(R, &(self.linear + self.angular.cross(p))), tr_mul(R, &self.angular))
@@ -133,17 +134,17 @@ impl Twist {
 
     /// The inverse of [`Twist::at_child`]: from Bo, B axes to Ao, A axes.
     #[inline(always)]
-    pub fn at_parent(&self, X_AB: &Pose) -> Twist {
+    pub fn at_parent(&self, X_AB: &Pose<T>) -> Twist<T> {
         let R = X_AB.rotation.matrix();
         let angular = mul(R, &self.angular);
         Twist::new(mul(R, &self.linear) + X_AB.translation.vector.cross(&angular), angular)
     }
 }
 
-impl Wrench {
+impl<T: Real> Wrench<T> {
     /// `Ad_BAᵀ F_B`: the same wrench at Ao in A axes, for `X_AB`.
     #[inline(always)]
-    pub fn at_parent(&self, X_AB: &Pose) -> Wrench {
+    pub fn at_parent(&self, X_AB: &Pose<T>) -> Wrench<T> {
         let R = X_AB.rotation.matrix();
         let force = mul(R, &self.force);
         Wrench::new(force, mul(R, &self.torque) + X_AB.translation.vector.cross(&force))
@@ -151,7 +152,7 @@ impl Wrench {
 
     /// The inverse of [`Wrench::at_parent`]: from Ao, A axes to Bo, B axes.
     #[inline(always)]
-    pub fn at_child(&self, X_AB: &Pose) -> Wrench {
+    pub fn at_child(&self, X_AB: &Pose<T>) -> Wrench<T> {
         let R = X_AB.rotation.matrix();
         let p = &X_AB.translation.vector;
         Wrench::new(tr_mul(R, &self.force), tr_mul(R, &(self.torque - p.cross(&self.force))))
@@ -160,8 +161,9 @@ impl Wrench {
 
 /// Skew matrix `[r]x` with `[r]x b = r × b`.
 #[inline(always)]
-pub fn skew(r: &Vector3<f64>) -> Matrix3<f64> {
-    Matrix3::new(0.0, -r.z, r.y, r.z, 0.0, -r.x, -r.y, r.x, 0.0)
+pub fn skew<T: Real>(r: &Vector3<T>) -> Matrix3<T> {
+    let zero = T::zero();
+    Matrix3::new(zero, -r.z, r.y, r.z, zero, -r.x, -r.y, r.x, zero)
 }
 
 /// `Ad_AB = [[R, [p]x R], [0, R]]` for `X_AB`: maps a twist from B to A.
@@ -178,13 +180,13 @@ pub fn adjoint(X_AB: &Pose) -> Matrix6<f64> {
 
 /// Spatial inertia `M_BBo_B` of a rigid body about Bo, in B axes, by its ten parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SpatialInertia {
+pub struct SpatialInertia<T: Scalar = f64> {
     /// Mass m (kg).
-    pub mass: f64,
+    pub mass: T,
     /// First moment `m p_BoBcm_B` (kg m).
-    pub first_moment: Vector3<f64>,
+    pub first_moment: Vector3<T>,
     /// Rotational inertia about Bo (not the centre of mass) (kg m²).
-    pub rotational: Matrix3<f64>,
+    pub rotational: Matrix3<T>,
 }
 
 impl SpatialInertia {
@@ -210,27 +212,6 @@ impl SpatialInertia {
         self.rotational + c * c * self.mass
     }
 
-    /// Momentum (or inertia force) `M V`.
-    #[inline(always)]
-    pub fn mul_twist(&self, V: &Twist) -> Wrench {
-        let h = &self.first_moment;
-        Wrench::new(V.linear * self.mass - h.cross(&V.angular), h.cross(&V.linear) + mul(&self.rotational, &V.angular))
-    }
-
-    /// The same body about Ao in A axes, for `X_AB`.
-    #[inline(always)]
-    pub fn at_parent(&self, X_AB: &Pose) -> SpatialInertia {
-        let R = X_AB.rotation.matrix();
-        let p = &X_AB.translation.vector;
-        let h = mul(R, &self.first_moment);
-        // I_A = R I Rᵀ + (2 p·h + m p·p) 1 - (p hᵀ + h pᵀ + m p pᵀ)
-        let k = h + p * (0.5 * self.mass);
-        let (x, y, z) = (2.0 * p.x * k.x, 2.0 * p.y * k.y, 2.0 * p.z * k.z);
-        let (xy, xz, yz) = (p.x * k.y + k.x * p.y, p.x * k.z + k.x * p.z, p.y * k.z + k.y * p.z);
-        let I = turn_symmetric(R, &self.rotational) + Matrix3::new(y + z, -xy, -xz, -xy, x + z, -yz, -xz, -yz, x + y);
-        SpatialInertia { mass: self.mass, first_moment: h + p * self.mass, rotational: I }
-    }
-
     /// As a 6×6 matrix, linear first: `[[m 1, -[h]x], [[h]x, I]]`.
     pub fn to_matrix(&self) -> Matrix6<f64> {
         let h = skew(&self.first_moment);
@@ -243,7 +224,38 @@ impl SpatialInertia {
     }
 }
 
-impl AddAssign for SpatialInertia {
+impl<T: Real> SpatialInertia<T> {
+    /// Momentum (or inertia force) `M V`.
+    #[inline(always)]
+    pub fn mul_twist(&self, V: &Twist<T>) -> Wrench<T> {
+        let h = &self.first_moment;
+        Wrench::new(V.linear * self.mass - h.cross(&V.angular), h.cross(&V.linear) + mul(&self.rotational, &V.angular))
+    }
+
+    /// The same body about Ao in A axes, for `X_AB`.
+    #[inline(always)]
+    pub fn at_parent(&self, X_AB: &Pose<T>) -> SpatialInertia<T> {
+        let R = X_AB.rotation.matrix();
+        let p = &X_AB.translation.vector;
+        let h = mul(R, &self.first_moment);
+        let (half, two) = (T::splat(0.5), T::splat(2.0));
+        // I_A = R I Rᵀ + (2 p·h + m p·p) 1 - (p hᵀ + h pᵀ + m p pᵀ)
+        let k = h + p * (self.mass * half);
+        let (x, y, z) = (p.x * two * k.x, p.y * two * k.y, p.z * two * k.z);
+        let (xy, xz, yz) = (p.x * k.y + k.x * p.y, p.x * k.z + k.x * p.z, p.y * k.z + k.y * p.z);
+        let I = turn_symmetric(R, &self.rotational) + Matrix3::new(y + z, -xy, -xz, -xy, x + z, -yz, -xz, -yz, x + y);
+        SpatialInertia { mass: self.mass, first_moment: h + p * self.mass, rotational: I }
+    }
+
+    /// Inertia of a constant body in the scalar of a recursion.
+    #[inline(always)]
+    pub fn lift(constant: &SpatialInertia) -> Self {
+        let SpatialInertia { mass, first_moment, rotational } = constant;
+        Self { mass: T::splat(*mass), first_moment: lift(first_moment), rotational: lift3(rotational) }
+    }
+}
+
+impl<T: Real> AddAssign for SpatialInertia<T> {
     #[inline(always)]
     fn add_assign(&mut self, o: Self) {
         self.mass += o.mass;

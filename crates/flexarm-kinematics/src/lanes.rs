@@ -1,0 +1,88 @@
+//! The recursions over several runs or poses of one tree at once, in the lanes of a scalar type.
+//!
+//! Poses, speeds and inertias differ from lane to lane; bodies, joints and shapes of links are those of one [`Model`]. Every
+//! lane has the bits of the function of the same name over one number. Functions are inlined into what calls them, so that
+//! the instructions of the lanes are at hand ([`flexarm_spatial::lanes::with_lanes`]).
+
+use std::sync::Arc;
+
+use flexarm_spatial::{Real, SpatialInertia};
+
+use crate::crba::composite_bodies;
+use crate::data::{Data, State};
+use crate::kinematics::{place_bodies, place_in_world};
+use crate::model::{Model, Tree};
+use crate::rnea::newton_euler;
+
+/// A tree with inertias of its own in each lane.
+#[derive(Clone, Debug)]
+pub struct LaneTree<T: Real> {
+    model: Arc<Model>,
+    inertia: Vec<SpatialInertia<T>>,
+}
+
+impl<T: Real> LaneTree<T> {
+    /// A tree for each lane; `None` where they differ in more than their inertias, or are not as many as lanes.
+    pub fn new(models: &[Arc<Model>]) -> Option<Self> {
+        let first = models.first().filter(|_| models.len() == T::LANES)?;
+        if !models.iter().all(|model| Arc::ptr_eq(model, first) || model.is_same_tree(first)) {
+            return None;
+        }
+        let inertia = |body: usize| {
+            let mut all = SpatialInertia::<T>::lift(&first.bodies[body].inertia);
+            for (lane, model) in models.iter().enumerate() {
+                let own = &model.bodies[body].inertia;
+                all.mass.set_lane(lane, own.mass);
+                for (to, from) in all.first_moment.iter_mut().zip(&own.first_moment) {
+                    to.set_lane(lane, *from);
+                }
+                for (to, from) in all.rotational.iter_mut().zip(&own.rotational) {
+                    to.set_lane(lane, *from);
+                }
+            }
+            all
+        };
+        Some(Self { model: first.clone(), inertia: (0..first.bodies.len()).map(inertia).collect() })
+    }
+
+    /// The tree of the first lane.
+    pub fn model(&self) -> &Model {
+        &self.model
+    }
+}
+
+impl<T: Real> Tree<T> for LaneTree<T> {
+    #[inline(always)]
+    fn model(&self) -> &Model {
+        &self.model
+    }
+
+    #[inline(always)]
+    fn inertia(&self, body: usize) -> SpatialInertia<T> {
+        self.inertia[body]
+    }
+}
+
+/// [`crate::inverse_dynamics`]: `data.tau` has the generalised forces.
+#[inline(always)]
+pub fn inverse_dynamics<T: Real>(tree: &LaneTree<T>, data: &mut Data<T>, state: &State<T>, qddot: &[T]) {
+    newton_euler(tree, data, state.q.as_slice(), state.qdot.as_slice(), Some(qddot));
+}
+
+/// [`crate::mass_matrix_at_poses`]: `data.M` has the mass matrix.
+#[inline(always)]
+pub fn mass_matrix_at_poses<T: Real>(tree: &LaneTree<T>, data: &mut Data<T>) {
+    composite_bodies(tree, data);
+}
+
+/// [`crate::forward_kinematics`]: `data.X_WB` has the poses.
+#[inline(always)]
+pub fn forward_kinematics<T: Real>(tree: &LaneTree<T>, data: &mut Data<T>, q: &[T]) {
+    place_bodies(&tree.model, data, q);
+}
+
+/// [`crate::world_poses`].
+#[inline(always)]
+pub fn world_poses<T: Real>(tree: &LaneTree<T>, data: &mut Data<T>) {
+    place_in_world(&tree.model, data);
+}

@@ -1,0 +1,251 @@
+//! The scalar of the recursions: one number, or several side by side ([`crate::lanes`]).
+//!
+//! A recursion that is written over [`Real`] gives every lane the bits that it gives one number: all operations are rounded
+//! alike, none is contracted to a fused one, sums keep their order, and where numbers choose a formula each lane gets its own.
+//!
+//! Sine and cosine are computed here, so that they too are the same on every machine: a system's library differs in the last
+//! bit from one processor to the next. Source: [Cody & Waite 1980] for the reduction; coefficients of the polynomials as in
+//! FreeBSD's `k_sin.c` and `k_cos.c`.
+
+use std::f64::consts::FRAC_2_PI;
+use std::ops::Neg;
+
+use nalgebra::{ClosedAddAssign, ClosedDivAssign, ClosedMulAssign, ClosedSubAssign, Scalar};
+use num_traits::{One, Zero};
+
+/// Angles up to this (rad) have sine and cosine of this module; beyond, a quarter of a million turns, of the system.
+const LARGEST_ANGLE: f64 = 1.5e6;
+
+/// A real number of a recursion, or lanes of them.
+pub trait Real:
+    Scalar
+    + Copy
+    + Send
+    + Sync
+    + Zero
+    + One
+    + ClosedAddAssign
+    + ClosedSubAssign
+    + ClosedMulAssign
+    + ClosedDivAssign
+    + Neg<Output = Self>
+{
+    /// Number of lanes.
+    const LANES: usize;
+
+    /// The same number in all lanes.
+    fn splat(x: f64) -> Self;
+
+    /// The number in one lane.
+    fn lane(self, k: usize) -> f64;
+
+    /// Another number in one lane.
+    fn set_lane(&mut self, k: usize, x: f64);
+
+    /// Square root.
+    fn sqrt(self) -> Self;
+
+    /// Whether all lanes are below the bound.
+    fn all_below(self, bound: f64) -> bool;
+
+    /// Whether some lane is below the bound.
+    fn any_below(self, bound: f64) -> bool;
+
+    /// `yes` where `self < bound`, else `no`.
+    fn pick_below(self, bound: Self, yes: Self, no: Self) -> Self;
+
+    /// What the first formula gives where `self < bound`, else what the second one gives. A formula that no lane needs is not
+    /// computed.
+    #[inline(always)]
+    fn branch_below<const N: usize>(
+        self,
+        bound: f64,
+        yes: impl FnOnce() -> [Self; N],
+        no: impl FnOnce() -> [Self; N],
+    ) -> [Self; N] {
+        if self.all_below(bound) {
+            return yes();
+        }
+        if !self.any_below(bound) {
+            return no();
+        }
+        let (yes, no) = (yes(), no());
+        std::array::from_fn(|k| self.pick_below(Self::splat(bound), yes[k], no[k]))
+    }
+
+    /// Absolute value.
+    #[inline(always)]
+    fn abs(self) -> Self {
+        self.pick_below(Self::zero(), -self, self)
+    }
+
+    /// Sine and cosine (rad), within one unit of the last place.
+    #[inline(always)]
+    fn sin_cos(self) -> (Self, Self) {
+        if self.abs().all_below(LARGEST_ANGLE) { sine_and_cosine(self) } else { sin_cos_by_lane(self) }
+    }
+}
+
+/// Where some lane is out of range, or not a number.
+#[cold]
+#[inline(never)]
+fn sin_cos_by_lane<T: Real>(x: T) -> (T, T) {
+    let (mut sine, mut cosine) = (x, x);
+    for k in 0..T::LANES {
+        let angle = x.lane(k);
+        let (s, c) = if angle.abs() < LARGEST_ANGLE { sine_and_cosine(angle) } else { f64::sin_cos(angle) };
+        sine.set_lane(k, s);
+        cosine.set_lane(k, c);
+    }
+    (sine, cosine)
+}
+
+/// `x = k π/2 + (y + tail)`, sine and cosine of the rest, then the quarter of the turn.
+#[inline(always)]
+fn sine_and_cosine<T: Real>(x: T) -> (T, T) {
+    // π/2 in three parts: products of k with the first two are exact.
+    const PARTS: [f64; 3] = [1.570_796_326_734_125_6, 6.077_100_506_303_966e-11, 2.022_266_248_795_950_6e-21];
+    let [first, second, third] = PARTS.map(T::splat);
+    let k = rounded(x * T::splat(FRAC_2_PI));
+    let a = x - k * first;
+    let b = k * second;
+    let r = a - b;
+    let c = k * third - ((a - r) - b);
+    let y = r - c;
+    let (sine, cosine) = (sine_near_zero(y, (r - y) - c), cosine_near_zero(y, (r - y) - c));
+
+    // k modulo 4 as -2, -1, 0, 1 or 2: odd quarters change sine and cosine, half of them a sign.
+    let quarter = k - rounded(k * T::splat(0.25)) * T::splat(4.0);
+    let (half, one) = (T::splat(0.5), T::one());
+    let odd = (quarter.abs() - one).abs();
+    let (s, c) = (odd.pick_below(half, cosine, sine), odd.pick_below(half, sine, cosine));
+    ((quarter - half).abs().pick_below(one, s, -s), (quarter + half).abs().pick_below(one, c, -c))
+}
+
+/// The nearest whole number, for `|x| < 2^51`.
+#[inline(always)]
+fn rounded<T: Real>(x: T) -> T {
+    let large = T::splat(6_755_399_441_055_744.0); // 1.5 * 2^52: its last place is 1
+    (x + large) - large
+}
+
+/// Sine of `x + tail`, `|x| <= π/4`.
+#[inline(always)]
+fn sine_near_zero<T: Real>(x: T, tail: T) -> T {
+    const S: [f64; 6] = [
+        -1.666_666_666_666_663_2e-1,
+        8.333_333_333_322_49e-3,
+        -1.984_126_982_985_795e-4,
+        2.755_731_370_707_006_8e-6,
+        -2.505_076_025_340_686_3e-8,
+        1.589_690_995_211_55e-10,
+    ];
+    let [s1, s2, s3, s4, s5, s6] = S.map(T::splat);
+    let z = x * x;
+    let r = s2 + z * (s3 + z * s4) + z * (z * z) * (s5 + z * s6);
+    let v = z * x;
+    x - ((z * (tail * T::splat(0.5) - v * r) - tail) - v * s1)
+}
+
+/// Cosine of `x + tail`, `|x| <= π/4`.
+#[inline(always)]
+fn cosine_near_zero<T: Real>(x: T, tail: T) -> T {
+    const C: [f64; 6] = [
+        4.166_666_666_666_66e-2,
+        -1.388_888_888_887_411e-3,
+        2.480_158_728_947_673e-5,
+        -2.755_731_435_139_066_3e-7,
+        2.087_572_321_298_175e-9,
+        -1.135_964_755_778_819_5e-11,
+    ];
+    let [c1, c2, c3, c4, c5, c6] = C.map(T::splat);
+    let z = x * x;
+    let r = z * (c1 + z * (c2 + z * c3)) + (z * z) * (z * z) * (c4 + z * (c5 + z * c6));
+    let half = z * T::splat(0.5);
+    let w = T::one() - half;
+    w + (((T::one() - w) - half) + (z * r - x * tail))
+}
+
+impl Real for f64 {
+    const LANES: usize = 1;
+
+    #[inline(always)]
+    fn splat(x: f64) -> Self {
+        x
+    }
+
+    #[inline(always)]
+    fn lane(self, _k: usize) -> f64 {
+        self
+    }
+
+    #[inline(always)]
+    fn set_lane(&mut self, _k: usize, x: f64) {
+        *self = x;
+    }
+
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        f64::sqrt(self)
+    }
+
+    #[inline(always)]
+    fn all_below(self, bound: f64) -> bool {
+        self < bound
+    }
+
+    #[inline(always)]
+    fn any_below(self, bound: f64) -> bool {
+        self < bound
+    }
+
+    #[inline(always)]
+    fn pick_below(self, bound: Self, yes: Self, no: Self) -> Self {
+        if self < bound { yes } else { no }
+    }
+
+    #[inline(always)]
+    fn abs(self) -> Self {
+        f64::abs(self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Units of the last place between two numbers of one sign.
+    fn places(a: f64, b: f64) -> u64 {
+        a.to_bits().abs_diff(b.to_bits())
+    }
+
+    /// Truth: the system's functions, which are right to half a unit or a little more; measured 1 unit.
+    #[test]
+    fn sine_and_cosine_are_within_a_unit_of_the_last_place() {
+        let quarters = (-4000..4000).map(|k| f64::from(k) * 0.25 * std::f64::consts::PI);
+        let small = (0..300).map(|k| 0.5f64.powi(k));
+        let spread = (0..200_000).map(|k| f64::from(k) * 0.618_033_988_749 - 6e4);
+        let far = (0..20_000).map(|k| 1.49e6 - f64::from(k) * 7.7);
+        for x in quarters.chain(small).chain(spread).chain(far) {
+            let (sine, cosine) = Real::sin_cos(x);
+            let (s, c) = f64::sin_cos(x);
+            assert!(places(sine, s) <= 1, "sin {x}: {sine} against {s}");
+            assert!(places(cosine, c) <= 1, "cos {x}: {cosine} against {c}");
+        }
+    }
+
+    #[test]
+    fn beyond_a_quarter_of_a_million_turns_the_system_is_asked() {
+        assert_eq!(Real::sin_cos(1e22), f64::sin_cos(1e22));
+        assert!(Real::sin_cos(f64::NAN).0.is_nan() && Real::sin_cos(f64::INFINITY).1.is_nan());
+        assert_eq!(Real::sin_cos(-0.0), (-0.0, 1.0));
+    }
+
+    #[test]
+    fn a_formula_is_chosen_by_the_number() {
+        let choose = |x: f64| x.branch_below(1.0, || [1.0, 2.0], || [3.0, 4.0]);
+        assert_eq!(choose(0.5), [1.0, 2.0]);
+        assert_eq!(choose(1.0), [3.0, 4.0]);
+        assert_eq!(choose(f64::NAN), [3.0, 4.0]);
+    }
+}
