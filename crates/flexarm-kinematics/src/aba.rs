@@ -16,7 +16,7 @@ use flexarm_spatial::products::{mul, mul3, tr_mul, tr_mul3};
 use flexarm_spatial::{ArticulatedInertia, SpatialInertia, Twist, Wrench};
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Vector3};
 
-use crate::data::{Data, State, add_projection, joint_motion, place_modal, subspace_times};
+use crate::data::{Data, State, add_projection, begin, joint_motion, subspace_times};
 use crate::model::{Body, JointMotion, Model};
 use crate::rnea::nonlinear_effects;
 
@@ -153,7 +153,7 @@ fn begin_bodies(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], roles: 
     data.V[0] = Twist::zeros();
     data.pA[0] = Wrench::zeros();
     data.articulated[0] = ArticulatedInertia::from_rigid(&SpatialInertia::zeros());
-    place_modal(model, data, q);
+    begin(model, data, q);
     if let Some(m) = model.bodies[0].modal {
         begin_modal(model, data, 0, m, qdot);
     }

@@ -77,14 +77,22 @@ impl AxisMotion {
         }
     }
 
-    /// `X_PB` at the joint value: the same as [`Self::pose`] behind `X_PJ`, from the table of the rotation.
+    /// `X_PB` at the joint value: the same as [`Self::pose`] behind `X_PJ`, from the table of the rotation and the sine and cosine of the value (of
+    /// joints that turn).
     #[inline(always)]
-    pub(crate) fn place<T: Real>(self, X_PJ: &Pose, turn: &RevoluteTable, value: T, X_PB: &mut Pose<T>) {
+    pub(crate) fn place<T: Real>(
+        self,
+        X_PJ: &Pose,
+        turn: &RevoluteTable,
+        value: T,
+        (sine, cosine): (T, T),
+        X_PB: &mut Pose<T>,
+    ) {
         let p_PJ = lift(&X_PJ.translation.vector);
         let along = |travel: &Vector3<f64>| p_PJ + mul(&lift3(X_PJ.rotation.matrix()), &(lift::<T>(travel) * value));
         match self {
             Self::Revolute(_) => {
-                *X_PB.rotation.matrix_mut_unchecked() = turn.at(value);
+                *X_PB.rotation.matrix_mut_unchecked() = turn.at(sine, cosine);
                 X_PB.translation.vector = p_PJ;
             }
             Self::Prismatic(axis) => {
@@ -92,7 +100,7 @@ impl AxisMotion {
                 X_PB.translation.vector = along(&axis);
             }
             Self::Helical { axis, pitch } => {
-                *X_PB.rotation.matrix_mut_unchecked() = turn.at(value);
+                *X_PB.rotation.matrix_mut_unchecked() = turn.at(sine, cosine);
                 X_PB.translation.vector = along(&(axis * pitch));
             }
         }
@@ -150,8 +158,7 @@ impl RevoluteTable {
     }
 
     #[inline(always)]
-    fn at<T: Real>(&self, angle: T) -> Matrix3<T> {
-        let (s, c) = Real::sin_cos(angle);
-        lift3::<T>(&self.K0) + lift3::<T>(&self.K1) * s + lift3::<T>(&self.K2) * c
+    fn at<T: Real>(&self, sine: T, cosine: T) -> Matrix3<T> {
+        lift3::<T>(&self.K0) + lift3::<T>(&self.K1) * sine + lift3::<T>(&self.K2) * cosine
     }
 }

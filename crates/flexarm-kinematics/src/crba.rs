@@ -10,12 +10,12 @@ use flexarm_spatial::{Pose, Real, SpatialInertia, Wrench};
 use nalgebra::{DMatrix, DVector, Matrix3, Scalar, Vector3};
 
 use crate::axis_motion::AxisMotion;
-use crate::data::{Data, ElasticSubspace, joint_position, place_modal};
+use crate::data::{Data, ElasticSubspace, begin, joint_position};
 use crate::model::{Body, JointMotion, Model, Tree};
 
 /// Mass matrix `M(q)`, nv×nv, both triangles (kg, kg m, kg m²). Fills `data.{X_PB, M}`. No allocation.
 pub fn mass_matrix<'d>(model: &Model, data: &'d mut Data, q: &DVector<f64>) -> &'d DMatrix<f64> {
-    place_modal(model, data, q.as_slice());
+    begin(model, data, q.as_slice());
     for i in 1..model.bodies.len() {
         joint_position(model, data, i, q.as_slice());
     }

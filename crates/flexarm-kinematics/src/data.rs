@@ -4,11 +4,12 @@
 //! sized once by [`Data::new`], so that no algorithm allocates. Threads share a `Model`, each with its own `Data`.
 
 use flexarm_spatial::products::{lift, lift3, mul, mul3, tr_mul};
-use flexarm_spatial::{ArticulatedInertia, ElasticAngles, Pose, Real, SpatialInertia, Twist, Wrench};
+use flexarm_spatial::{ArticulatedInertia, ElasticAngles, Pose, Real, SpatialInertia, Twist, Wrench, sin_cos_all};
 use nalgebra::{DMatrix, DVector, Isometry, Matrix3, Rotation3, Scalar, Translation3, Vector3};
 
+use crate::axis_motion::AxisMotion;
 use crate::modal::ModalData;
-use crate::model::{JointMotion, Model};
+use crate::model::{Body, JointMotion, Model};
 
 /// Positions and velocities of all independent coordinates, in the model's coordinate order.
 #[derive(Clone, Debug, PartialEq)]
@@ -69,6 +70,10 @@ pub struct Data<T: Scalar = f64> {
     pub(crate) scratch: Vec<T>,
     /// One per modal body.
     pub(crate) modal: Vec<ModalData<T>>,
+    /// Angles of the joints that turn (rad), their sines and cosines.
+    pub(crate) angles: Vec<T>,
+    pub(crate) sines: Vec<T>,
+    pub(crate) cosines: Vec<T>,
     /// Kinetic energy of the rotors in the last velocity pass.
     pub(crate) rotor_energy: T,
 }
@@ -98,6 +103,9 @@ impl<T: Real> Data<T> {
             u: vec![0.0; n],
             scratch: vec![T::zero(); model.nv()],
             modal: model.modal.iter().map(|m| ModalData::new(&m.tables)).collect(),
+            angles: vec![T::zero(); model.turning.len()],
+            sines: vec![T::zero(); model.turning.len()],
+            cosines: vec![T::zero(); model.turning.len()],
             rotor_energy: T::zero(),
         }
     }
@@ -142,12 +150,7 @@ pub(crate) fn joint_motion<T: Real>(
     let k = body.coordinate;
     match body.motion {
         JointMotion::Axis(motion) => {
-            motion.place(
-                &body.X_PJ,
-                &body.turn,
-                T::splat(body.ratio) * q[k] + T::splat(body.offset),
-                &mut data.X_PB[i],
-            );
+            place_axis(body, motion, data, i, q);
             (motion.twist(T::splat(body.ratio) * qdot[k]), Twist::zeros())
         }
         JointMotion::Welded => {
@@ -188,12 +191,7 @@ pub(crate) fn joint_position<T: Real>(model: &Model, data: &mut Data<T>, i: usiz
     let k = body.coordinate;
     match body.motion {
         JointMotion::Axis(motion) => {
-            motion.place(
-                &body.X_PJ,
-                &body.turn,
-                T::splat(body.ratio) * q[k] + T::splat(body.offset),
-                &mut data.X_PB[i],
-            );
+            place_axis(body, motion, data, i, q);
         }
         JointMotion::Welded => {
             data.X_PB[i] = pose(lift3(body.X_PJ.rotation.matrix()), lift(&body.X_PJ.translation.vector))
@@ -213,15 +211,37 @@ pub(crate) fn joint_position<T: Real>(model: &Model, data: &mut Data<T>, i: usiz
     }
 }
 
+/// Value of a joint of one coordinate (rad or m).
+#[inline(always)]
+fn joint_value<T: Real>(body: &Body, q: &[T]) -> T {
+    T::splat(body.ratio) * q[body.coordinate] + T::splat(body.offset)
+}
+
+#[inline(always)]
+fn place_axis<T: Real>(body: &Body, motion: AxisMotion, data: &mut Data<T>, i: usize, q: &[T]) {
+    // A joint that slides may be the only one.
+    let (sine, cosine) = match motion.slides() {
+        true => (T::zero(), T::one()),
+        false => (data.sines[body.turning], data.cosines[body.turning]),
+    };
+    motion.place(&body.X_PJ, &body.turn, joint_value(body, q), (sine, cosine), &mut data.X_PB[i]);
+}
+
 /// `Σ ½ a q̇²` of the rotors.
 #[inline(always)]
 pub(crate) fn rotor_energy<T: Real>(model: &Model, qdot: &[T]) -> T {
     model.rotors.iter().fold(T::zero(), |sum, &(k, a)| sum + T::splat(0.5 * a) * qdot[k] * qdot[k])
 }
 
-/// Mass integrals of all modal bodies at the coordinates; fills `modal`.
+/// What an algorithm begins with at new coordinates: mass integrals of all modal bodies and, in one go, sines and cosines of
+/// the joints; fills `modal`, `angles`, `sines` and `cosines`.
 #[inline(always)]
-pub(crate) fn place_modal<T: Real>(model: &Model, data: &mut Data<T>, q: &[T]) {
+pub(crate) fn begin<T: Real>(model: &Model, data: &mut Data<T>, q: &[T]) {
+    for (angle, &i) in data.angles.iter_mut().zip(&model.turning) {
+        let body = &model.bodies[i];
+        *angle = joint_value(body, q);
+    }
+    sin_cos_all(&data.angles, &mut data.sines, &mut data.cosines);
     for (modal, entry) in data.modal.iter_mut().zip(&model.modal) {
         modal.place(&entry.tables, &q[entry.coordinate..entry.coordinate + entry.n]);
     }

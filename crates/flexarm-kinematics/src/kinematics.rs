@@ -8,7 +8,7 @@ use flexarm_spatial::{ElasticAngles, Real, Twist};
 use nalgebra::{Matrix3, Matrix6xX, Vector3};
 
 use crate::axis_motion::AxisMotion;
-use crate::data::{Data, State, identity, joint_motion, joint_position, place_modal, rotor_energy};
+use crate::data::{Data, State, begin, identity, joint_motion, joint_position, rotor_energy};
 use crate::model::{Frame, JointMotion, Model};
 
 /// Poses of all bodies: fills `data.{X_PB, X_WB}`.
@@ -19,7 +19,7 @@ pub fn forward_kinematics(model: &Model, data: &mut Data, q: &nalgebra::DVector<
 /// [`forward_kinematics`] over any scalar.
 #[inline(always)]
 pub(crate) fn place_bodies<T: Real>(model: &Model, data: &mut Data<T>, q: &[T]) {
-    place_modal(model, data, q);
+    begin(model, data, q);
     for i in 1..model.bodies.len() {
         joint_position(model, data, i, q);
     }
@@ -30,7 +30,7 @@ pub(crate) fn place_bodies<T: Real>(model: &Model, data: &mut Data<T>, q: &[T]) 
 pub fn forward_kinematics_velocity(model: &Model, data: &mut Data, state: &State) {
     data.V[0] = Twist::zeros();
     data.rotor_energy = rotor_energy(model, state.qdot.as_slice());
-    place_modal(model, data, state.q.as_slice());
+    begin(model, data, state.q.as_slice());
     for (modal, entry) in data.modal.iter_mut().zip(&model.modal) {
         modal.rates.copy_from_slice(&state.qdot.as_slice()[entry.coordinate..entry.coordinate + entry.n]);
     }

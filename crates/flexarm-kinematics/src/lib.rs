@@ -52,6 +52,10 @@ pub use flexarm_spatial::{
     rotation_vector, skew,
 };
 
+#[cfg(target_arch = "x86_64")]
+pub use flexarm_spatial::lanes::{Four, OverLanes, with_lanes};
+pub use flexarm_spatial::products;
+
 pub use aba::{Roles, forward_dynamics, hybrid_dynamics};
 pub use axis_motion::AxisMotion;
 pub use crba::{mass_matrix, mass_matrix_at_poses};

@@ -31,6 +31,8 @@ pub struct Model {
     /// Coordinates with rotors, and the inertia of these seen from there.
     pub(crate) rotors: Vec<(usize, f64)>,
     pub(crate) has_mimic: bool,
+    /// Bodies on joints of one coordinate that turn.
+    pub(crate) turning: Vec<usize>,
     /// Acceleration of gravity in world axes (m/s²).
     pub gravity: Vector3<f64>,
 }
@@ -63,6 +65,8 @@ pub struct Body {
     /// Number of its modal body, if it bends in modes.
     pub(crate) modal: Option<usize>,
     pub(crate) turn: RevoluteTable,
+    /// Number of its joint among those that turn.
+    pub(crate) turning: usize,
     /// One past the last body outward of this one; depth-first order makes a subtree a range.
     pub(crate) subtree_end: usize,
 }
@@ -294,6 +298,7 @@ impl Model {
             elastic: false,
             modal: None,
             turn: RevoluteTable::new(&Pose::identity(), &Vector3::z()),
+            turning: 0,
             subtree_end: 0,
         });
         build.grow(base)?;
@@ -550,6 +555,7 @@ impl<'a> Builder<'a> {
             elastic: joint.kind.is_elastic(),
             modal: None,
             turn: RevoluteTable::new(&X_BJ, &axis),
+            turning: 0,
             subtree_end: 0,
         });
         Ok((index, Pose::identity()))
@@ -583,12 +589,18 @@ impl<'a> Builder<'a> {
         }
         self.share(&coordinates[..n_actuated])?;
         self.close_subtrees();
+        let turns = |b: &Body| matches!(b.motion, JointMotion::Axis(motion) if !motion.slides());
+        let turning: Vec<usize> = (1..self.bodies.len()).filter(|i| turns(&self.bodies[*i])).collect();
+        for (number, &i) in turning.iter().enumerate() {
+            self.bodies[i].turning = number;
+        }
         let with_rotor = self.bodies[1..].iter().filter(|b| b.armature != 0.0);
         let rotors = with_rotor.map(|b| (b.coordinate, b.ratio * b.ratio * b.armature)).collect();
         let frame_by_name = self.frames.iter().enumerate().map(|(i, f)| (f.name.clone(), i)).collect();
         Ok(Model {
             name: self.mechanism.name.clone(),
             has_mimic: !self.followers.is_empty(),
+            turning,
             bodies: self.bodies,
             frames: self.frames,
             frame_by_name,

@@ -15,7 +15,7 @@ use flexarm_spatial::products::lift;
 use flexarm_spatial::{Real, Twist, Wrench};
 use nalgebra::{DVector, Vector3};
 
-use crate::data::{Data, State, add_projection, joint_motion, place_modal, rotor_energy, subspace_times};
+use crate::data::{Data, State, add_projection, begin, joint_motion, rotor_energy, subspace_times};
 use crate::model::{Model, Tree};
 
 /// Generalised forces `τ = M(q) q̈ + bias(q, q̇)` (N m or N) for the accelerations `qddot`.
@@ -60,7 +60,7 @@ pub(crate) fn newton_euler<T: Real>(tree: &impl Tree<T>, data: &mut Data<T>, q: 
     data.A[0] = Twist::new(lift(&-model.gravity), Vector3::zeros());
     data.F[0] = Wrench::zeros();
     data.rotor_energy = rotor_energy(model, qdot);
-    place_modal(model, data, q);
+    begin(model, data, q);
     if let Some(m) = model.bodies[0].modal {
         add_modal_forces(model, data, 0, m, qdot, qddot);
     }

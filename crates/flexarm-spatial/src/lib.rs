@@ -36,6 +36,6 @@ mod rotation;
 mod vectors;
 
 pub use blocks::{Matrix12, symmetric_part, turn6, twice};
-pub use real::Real;
+pub use real::{Real, sin_cos_all};
 pub use rotation::{AngleKinematics, ElasticAngles, rotation_vector};
 pub use vectors::{ArticulatedInertia, Pose, SpatialInertia, Twist, Wrench, adjoint, skew};

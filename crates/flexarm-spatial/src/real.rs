@@ -51,6 +51,12 @@ pub trait Real:
     /// Whether some lane is below the bound.
     fn any_below(self, bound: f64) -> bool;
 
+    /// Whether some lane is above the bound.
+    #[inline(always)]
+    fn any_above(self, bound: f64) -> bool {
+        (-self).any_below(-bound)
+    }
+
     /// `yes` where `self < bound`, else `no`.
     fn pick_below(self, bound: Self, yes: Self, no: Self) -> Self;
 
@@ -83,6 +89,25 @@ pub trait Real:
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
         if self.abs().all_below(LARGEST_ANGLE) { sine_and_cosine(self) } else { sin_cos_by_lane(self) }
+    }
+}
+
+/// Sines and cosines of many angles (rad), each as [`Real::sin_cos`] has it.
+///
+/// # Panics
+/// If the slices differ in length.
+#[inline(always)]
+pub fn sin_cos_all<T: Real>(angles: &[T], sines: &mut [T], cosines: &mut [T]) {
+    assert!(sines.len() == angles.len() && cosines.len() == angles.len(), "a sine and a cosine for each angle");
+    // Without a branch in between, numbers too go side by side.
+    if angles.iter().all(|angle| angle.abs().all_below(LARGEST_ANGLE)) {
+        for ((angle, sine), cosine) in angles.iter().zip(sines).zip(cosines) {
+            (*sine, *cosine) = sine_and_cosine(*angle);
+        }
+    } else {
+        for ((angle, sine), cosine) in angles.iter().zip(sines).zip(cosines) {
+            (*sine, *cosine) = sin_cos_by_lane(*angle);
+        }
     }
 }
 

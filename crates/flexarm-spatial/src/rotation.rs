@@ -126,7 +126,9 @@ fn coefficients_by_series<T: Real>(x: T) -> [T; 5] {
     [s, a, b, da, db]
 }
 
-#[inline(always)]
+/// Links hardly turn so far: this stays out of the recursions' code.
+#[cold]
+#[inline(never)]
 fn coefficients_in_closed_form<T: Real>(x: T) -> [T; 5] {
     let (one, two) = (T::one(), T::splat(2.0));
     let theta = x.sqrt();

@@ -32,6 +32,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
 mod arm;
+mod batch;
 mod drive;
 mod eigenvalues;
 mod error;
@@ -54,6 +55,7 @@ pub mod steppers;
 mod system;
 
 pub use arm::{Damping, ElasticElement, FlexibleArm, GeometricStiffness, InertiaChange, Servo, Spring};
+pub use batch::{Batch, BatchRun, ToolDeflection};
 pub use drive::{CurveError, Friction, ServoAxis, TorqueCurve};
 pub use error::StepError;
 pub use integrator::{Current, Integrator, TimeGrid};

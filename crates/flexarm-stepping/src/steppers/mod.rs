@@ -20,6 +20,7 @@ use crate::statics::static_equilibrium;
 use crate::stepper::{Start, Stepper};
 
 pub use generalized_alpha::{AlphaSettings, GeneralizedAlpha};
+pub(crate) use generalized_alpha::{Coefficients, leave_of};
 pub use reference::{Reference, ReferenceMethod, ReferenceSettings};
 pub use rk4::{Rk4, STABILITY_LIMIT};
 pub use sdirk3::Sdirk3;

@@ -34,6 +34,7 @@
 
 mod dispersion;
 
+use flexarm_kinematics::Real;
 use nalgebra::DVector;
 
 use crate::arm::FlexibleArm;
@@ -93,8 +94,7 @@ impl Method for AlphaSettings {
         if !(0.0..=1.0).contains(&rho) {
             return Err(StepError::Setup(format!("the spectral radius must lie between 0 and 1, found {rho}")));
         }
-        let followed = arm.modes.omega.first().is_none_or(|omega| h * omega <= FOLLOWED);
-        let left = (followed && forgets_errors(&arm)).then(|| self.may_leave()).filter(|left| *left > 0.0);
+        let left = leave_of(*self, &arm, h);
         ReducedStepper::start(arm, e, |system, x, v| {
             let integrator = GeneralizedAlpha::new(system, 0.0, h, *self, x, v)?;
             Ok(match left {
@@ -103,6 +103,12 @@ impl Method for AlphaSettings {
             })
         })
     }
+}
+
+/// What the steps of an arm may leave; `None`: nothing.
+pub(crate) fn leave_of(settings: AlphaSettings, arm: &FlexibleArm, h: f64) -> Option<f64> {
+    let followed = arm.modes.omega.first().is_none_or(|omega| h * omega <= FOLLOWED);
+    (followed && forgets_errors(arm)).then(|| settings.may_leave()).filter(|left| *left > 0.0)
 }
 
 /// Part of the first correction of Newton's method that steps of a damped arm may leave: an error well below the scheme's own, for
@@ -149,7 +155,7 @@ pub struct GeneralizedAlpha {
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Coefficients {
+pub(crate) struct Coefficients {
     alpha_m: f64,
     alpha_f: f64,
     beta: f64,
@@ -158,23 +164,44 @@ struct Coefficients {
 
 impl Coefficients {
     /// `h γ'` and `h² β'`: derivatives of v⁺ and x⁺ with respect to x̃⁺.
-    fn derivatives(&self, h: f64) -> (f64, f64) {
+    pub(crate) fn derivatives(&self, h: f64) -> (f64, f64) {
         let ratio = (1.0 - self.alpha_f) / (1.0 - self.alpha_m);
         (h * self.gamma * ratio, h * h * self.beta * ratio)
     }
 
     /// `c` of (5).
-    fn dispersion(&self) -> f64 {
+    pub(crate) fn dispersion(&self) -> f64 {
         let Self { alpha_m, alpha_f, beta, .. } = *self;
         let shift = alpha_f - alpha_m;
         let filter = 0.5 * (alpha_f * (1.0 - alpha_f) - alpha_m * (1.0 - alpha_m));
         beta - 0.5 * shift + filter - 0.5 * shift * shift - 1.0 / 12.0
     }
 
-    fn new(rho: f64) -> Self {
+    pub(crate) fn new(rho: f64) -> Self {
         let (alpha_m, alpha_f) = ((2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0));
         let gamma = 0.5 + alpha_f - alpha_m;
         Self { alpha_m, alpha_f, beta: 0.25 * (gamma + 0.5).powi(2), gamma }
+    }
+
+    /// x⁺ and v⁺ by (4), (2), (3) from x, v, a and x̃ of one coordinate and x̃⁺.
+    #[inline(always)]
+    pub(crate) fn advance<T: Real>(&self, h: f64, x: T, v: T, a: T, x_tilde: T, x_tilde_new: T) -> (T, T) {
+        let Self { alpha_m, alpha_f, beta, gamma } = *self;
+        let c = T::splat;
+        let ratio = (1.0 - alpha_f) / (1.0 - alpha_m);
+        let a_new = (c(alpha_f) * x_tilde - c(alpha_m) * a) / c(1.0 - alpha_m) + c(ratio) * x_tilde_new;
+        (
+            x + c(h) * v + c(h * h) * (c(0.5 - beta) * a + c(beta) * a_new),
+            v + c(h) * (c(1.0 - gamma) * a + c(gamma) * a_new),
+        )
+    }
+
+    /// a⁺ of (4).
+    #[inline(always)]
+    pub(crate) fn remembered<T: Real>(&self, a: T, x_tilde: T, x_tilde_new: T) -> T {
+        let Self { alpha_m, alpha_f, .. } = *self;
+        let c = T::splat;
+        (c(1.0 - alpha_f) * x_tilde_new + c(alpha_f) * x_tilde - c(alpha_m) * a) / c(1.0 - alpha_m)
     }
 }
 
@@ -247,17 +274,15 @@ impl GeneralizedAlpha {
 
     /// x̃⁺, a⁺, x⁺, v⁺ of the trial ẍ⁺ by (5), (4), (2), (3).
     fn place(&mut self) {
-        let Coefficients { alpha_m, alpha_f, beta, gamma } = self.coefficients;
-        let (h, ratio) = (self.newton.dt, (1.0 - alpha_f) / (1.0 - alpha_m));
+        let h = self.newton.dt;
         match &mut self.correction {
             Some(correction) => correction.corrected(&self.trial, &mut self.x_tilde_new),
             None => self.x_tilde_new.copy_from(&self.trial),
         }
         for k in 0..self.now.x.len() {
-            let a_new =
-                (alpha_f * self.x_tilde[k] - alpha_m * self.a[k]) / (1.0 - alpha_m) + ratio * self.x_tilde_new[k];
-            self.x_new[k] = self.now.x[k] + h * self.now.v[k] + h * h * ((0.5 - beta) * self.a[k] + beta * a_new);
-            self.v_new[k] = self.now.v[k] + h * ((1.0 - gamma) * self.a[k] + gamma * a_new);
+            let (x, v, a) = (self.now.x[k], self.now.v[k], self.a[k]);
+            (self.x_new[k], self.v_new[k]) =
+                self.coefficients.advance(h, x, v, a, self.x_tilde[k], self.x_tilde_new[k]);
         }
     }
 
@@ -284,11 +309,8 @@ impl GeneralizedAlpha {
 
     /// What was on trial becomes the state at t.
     fn accept(&mut self, t: f64) {
-        let Coefficients { alpha_m, alpha_f, .. } = self.coefficients;
-        // a⁺ of (4).
         for k in 0..self.now.x.len() {
-            self.a[k] = ((1.0 - alpha_f) * self.x_tilde_new[k] + alpha_f * self.x_tilde[k] - alpha_m * self.a[k])
-                / (1.0 - alpha_m);
+            self.a[k] = self.coefficients.remembered(self.a[k], self.x_tilde[k], self.x_tilde_new[k]);
         }
         std::mem::swap(&mut self.now.x, &mut self.x_new);
         std::mem::swap(&mut self.now.v, &mut self.v_new);

@@ -1,0 +1,190 @@
+//! Arms of one tree side by side: the equations of motion of [`crate::ReducedArm`] in lanes.
+//!
+//! What they share is the tree. Inertias, stiffness, damping and motion differ. All joints are prescribed, springs straight;
+//! nothing happens at discrete times.
+
+use flexarm_kinematics::lanes::{LaneTree, inverse_dynamics, mass_matrix_at_poses};
+use flexarm_kinematics::{Data, Real, State};
+
+use crate::arm::FlexibleArm;
+use crate::batch::dense::add_product;
+
+/// A spring in its place.
+struct Element<T> {
+    /// First of its coordinates among the elastic ones.
+    first: usize,
+    size: usize,
+    /// Stiffness, size × size.
+    K: Vec<T>,
+    /// `D = tau K` (s).
+    tau: T,
+}
+
+/// Arms in lanes, with the workspaces of their equations of motion.
+pub(super) struct LaneArm<T: Real> {
+    pub(super) tree: LaneTree<T>,
+    data: Data<T>,
+    state: State<T>,
+    qddot: Vec<T>,
+    elements: Vec<Element<T>>,
+    /// Damping where it is not in proportion to the stiffness, n × n.
+    D: Option<Vec<T>>,
+    shifted: Vec<T>,
+}
+
+/// A number of each arm.
+fn gather<'a, T: Real>(arms: &[&'a FlexibleArm], number: impl Fn(&'a FlexibleArm) -> f64) -> T {
+    let mut all = T::zero();
+    for (lane, arm) in arms.iter().enumerate() {
+        all.set_lane(lane, number(arm));
+    }
+    all
+}
+
+impl<T: Real> LaneArm<T> {
+    /// Arms in lanes; `None` where they do not share a tree, or are what lanes do not know.
+    pub(super) fn new(arms: &[&FlexibleArm]) -> Option<Self> {
+        let first = arms.first()?;
+        let plain = |arm: &&FlexibleArm| {
+            arm.torque_driven.is_empty()
+                && arm.loads.is_empty()
+                && arm.inertia_changes.is_empty()
+                && arm.proportional == first.proportional
+                && arm.motion.velocity_jumps().is_empty()
+                && arm.elements.iter().all(|element| element.curve.is_none() && element.geometric.is_none())
+        };
+        if !arms.iter().all(plain) {
+            return None;
+        }
+        let models: Vec<_> = arms.iter().map(|arm| arm.model.clone()).collect();
+        let tree = LaneTree::new(&models)?;
+        let element = |k: usize| {
+            let own = &first.elements[k];
+            Element {
+                first: first.offset(own),
+                size: own.size,
+                K: (0..own.size * own.size).map(|i| gather(arms, |arm| arm.elements[k].K[i])).collect(),
+                tau: gather(arms, |arm| arm.tau[k]),
+            }
+        };
+        let n = first.n_elastic_coordinates();
+        let D = (!first.proportional).then(|| (0..n * n).map(|i| gather(arms, |arm| arm.D[i])).collect());
+        let model = tree.model();
+        Some(Self {
+            data: Data::new(model),
+            state: State::zeros(model),
+            qddot: vec![T::zero(); model.nv()],
+            elements: (0..first.elements.len()).map(element).collect(),
+            D,
+            shifted: vec![T::zero(); n],
+            tree,
+        })
+    }
+
+    /// Number of joints, all prescribed; their coordinates come first.
+    pub(super) fn joints(&self) -> usize {
+        self.tree.model().n_actuated()
+    }
+
+    /// Number of elastic coordinates.
+    pub(super) fn dimension(&self) -> usize {
+        self.tree.model().n_elastic()
+    }
+
+    /// Motion of the joints of one arm, until it is set again.
+    pub(super) fn set_joints(&mut self, lane: usize, q: &[f64], qdot: &[f64], qddot: &[f64]) {
+        for k in 0..self.joints() {
+            self.state.q[k].set_lane(lane, q[k]);
+            self.state.qdot[k].set_lane(lane, qdot[k]);
+            self.qddot[k].set_lane(lane, qddot[k]);
+        }
+    }
+
+    /// Coordinates of the joints.
+    pub(super) fn joint_coordinates(&self) -> &[T] {
+        &self.state.q.as_slice()[..self.joints()]
+    }
+
+    /// `r(x, v, a)` into r. Where `active` is not 1 the elastic state stays that of the call before, and r belongs to it.
+    #[inline(always)]
+    pub(super) fn residual(&mut self, active: T, x: &[T], v: &[T], a: &[T], r: &mut [T]) {
+        let n = self.joints();
+        set(active, x, &mut self.state.q.as_mut_slice()[n..]);
+        set(active, v, &mut self.state.qdot.as_mut_slice()[n..]);
+        set(active, a, &mut self.qddot[n..]);
+        inverse_dynamics(&self.tree, &mut self.data, &self.state, &self.qddot);
+        r.copy_from_slice(&self.data.tau.as_slice()[n..]);
+        let (x, v) = (&self.state.q.as_slice()[n..], &self.state.qdot.as_slice()[n..]);
+        for element in &self.elements {
+            let range = element.first..element.first + element.size;
+            let y = &mut self.shifted[..element.size];
+            y.copy_from_slice(&x[range.clone()]);
+            if self.D.is_none() {
+                for (y, v) in y.iter_mut().zip(&v[range.clone()]) {
+                    *y += element.tau * *v;
+                }
+            }
+            add_product(&element.K, y, &mut r[range]);
+        }
+        if let Some(D) = &self.D {
+            add_product(D, v, r);
+        }
+    }
+
+    /// Mass matrix at the configuration of the last residual.
+    #[inline(always)]
+    pub(super) fn mass(&mut self, M: &mut [T]) {
+        mass_matrix_at_poses(&self.tree, &mut self.data);
+        let (n, joints) = (self.dimension(), self.joints());
+        for (column, to) in M.chunks_exact_mut(n).enumerate() {
+            to.copy_from_slice(&self.data.M.as_slice()[(joints + column) * (joints + n) + joints..][..n]);
+        }
+    }
+
+    /// `c_D D + c_K K`.
+    #[inline(always)]
+    pub(super) fn damping_and_stiffness(&self, c_D: f64, c_K: f64, C: &mut [T]) {
+        C.fill(T::zero());
+        let proportional = self.D.is_none();
+        self.blocks(C, |element| {
+            let damping = if proportional { T::splat(c_D) * element.tau } else { T::zero() };
+            T::splat(c_K) + damping
+        });
+        if let Some(D) = &self.D {
+            for (c, d) in C.iter_mut().zip(D) {
+                *c += T::splat(c_D) * *d;
+            }
+        }
+    }
+
+    /// K.
+    #[inline(always)]
+    pub(super) fn stiffness(&self, K: &mut [T]) {
+        K.fill(T::zero());
+        self.blocks(K, |_| T::one());
+    }
+
+    /// Adds a multiple of each stiffness in its place.
+    #[inline(always)]
+    fn blocks(&self, C: &mut [T], factor: impl Fn(&Element<T>) -> T) {
+        let n = self.dimension();
+        for element in &self.elements {
+            let factor = factor(element);
+            for (column, own) in element.K.chunks_exact(element.size).enumerate() {
+                let to = &mut C[(element.first + column) * n + element.first..][..element.size];
+                for (c, k) in to.iter_mut().zip(own) {
+                    *c += factor * *k;
+                }
+            }
+        }
+    }
+}
+
+/// Where `active` is 1, `to` becomes `from`.
+#[inline(always)]
+pub(super) fn set<T: Real>(active: T, from: &[T], to: &mut [T]) {
+    let half = T::splat(0.5);
+    for (to, from) in to.iter_mut().zip(from) {
+        *to = active.pick_below(half, *to, *from);
+    }
+}

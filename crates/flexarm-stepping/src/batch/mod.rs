@@ -1,0 +1,222 @@
+//! Many runs of one tree: payload, motion, stiffness, damping and duration differ from run to run.
+//!
+//! Four runs go side by side in the lanes of vector instructions, where the processor has them; what comes out is, to the last
+//! bit, that of the same run alone ([`Batch::run_alone`]). Runs that lanes do not know (other trees, servos, loads, payloads that
+//! change, curved springs, velocities that jump), and those whose steps have to be cut or do not converge, are taken alone.
+//! What a batch tells of a run is how far the tool is from where the rigid arm has it. Start at [`Batch::run`]; threads are
+//! the caller's. Not here: recordings, figures of settling, drives.
+
+mod dense;
+mod lane_alpha;
+mod lane_arm;
+
+use flexarm_kinematics::lanes::{LaneTree, forward_kinematics};
+use flexarm_kinematics::products::{lift, mul};
+use flexarm_kinematics::{Data, Frame, Real};
+use nalgebra::Vector3;
+
+use crate::arm::FlexibleArm;
+use crate::error::StepError;
+use crate::observation::Observation;
+use crate::stepper::Start;
+use crate::steppers::{AlphaSettings, StepperKind, new_stepper};
+use lane_alpha::LaneAlpha;
+
+/// What all runs of a batch have in common.
+#[derive(Clone, Debug)]
+pub struct Batch {
+    /// Step (s).
+    pub step_s: f64,
+    /// The stepper's settings.
+    pub settings: AlphaSettings,
+    /// Where runs start.
+    pub start: Start,
+    /// The frame whose deflection is told.
+    pub tool: Frame,
+    /// Whether to keep the deflection after every step.
+    pub keep_samples: bool,
+}
+
+/// One run.
+#[derive(Clone)]
+pub struct BatchRun {
+    /// Tree, springs, damping and motion.
+    pub arm: FlexibleArm,
+    /// How long it lasts (s); its last step may pass that.
+    pub duration_s: f64,
+}
+
+/// How far the tool of a run was from that of the rigid arm on the same motion, at the start and after every step.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ToolDeflection {
+    /// Steps taken.
+    pub steps: u64,
+    /// Largest distance (m).
+    pub peak_m: f64,
+    /// When (s).
+    pub t_peak_s: f64,
+    /// Root of the mean square distance (m).
+    pub rms_m: f64,
+    /// Flexible minus rigid at the end, world axes (m).
+    pub end_m: [f64; 3],
+    /// The same at the start and after every step, if the batch keeps them.
+    pub samples_m: Vec<[f64; 3]>,
+}
+
+impl ToolDeflection {
+    fn include(&mut self, t: f64, deflection: Vector3<f64>, keep: bool) {
+        let square = deflection.dot(&deflection);
+        // Until the end the sum of squares.
+        self.rms_m += square;
+        if square > self.peak_m * self.peak_m {
+            (self.peak_m, self.t_peak_s) = (square.sqrt(), t);
+        }
+        self.end_m = deflection.into();
+        if keep {
+            self.samples_m.push(self.end_m);
+        }
+    }
+
+    fn finished(mut self, steps: u64) -> Self {
+        self.steps = steps;
+        self.rms_m = (self.rms_m / (steps + 1) as f64).sqrt();
+        self
+    }
+}
+
+impl Batch {
+    /// The runs, four side by side where that is possible. Runs that last equally long waste least.
+    ///
+    /// # Errors
+    /// Of each run its own: [`StepError`] as by a stepper.
+    pub fn run(&self, runs: &[BatchRun]) -> Vec<Result<ToolDeflection, StepError>> {
+        let mut all = Vec::with_capacity(runs.len());
+        for group in runs.chunks(4) {
+            match self.side_by_side(group) {
+                Some(results) => {
+                    let pairs = results.into_iter().zip(group);
+                    all.extend(pairs.map(|(result, run)| result.map_or_else(|| self.run_alone(run), Ok)));
+                }
+                None => all.extend(group.iter().map(|run| self.run_alone(run))),
+            }
+        }
+        all
+    }
+
+    /// One run by itself.
+    ///
+    /// # Errors
+    /// [`StepError`] as by a stepper.
+    pub fn run_alone(&self, run: &BatchRun) -> Result<ToolDeflection, StepError> {
+        let mut stepper =
+            new_stepper(StepperKind::GeneralizedAlpha(self.settings), run.arm.clone(), self.step_s, self.start)?;
+        let mut seen = Observation::new(&run.arm);
+        let mut tool = None;
+        let mut result = ToolDeflection::default();
+        let steps = self.steps(run);
+        for step in 0..=steps {
+            if step > 0 {
+                stepper.step()?;
+            }
+            stepper.observe(&mut seen);
+            // A new tree where what it carries has changed.
+            let same = |tree: &LaneTree<f64>| std::ptr::eq(tree.model(), std::sync::Arc::as_ptr(&seen.model));
+            if !tool.as_ref().is_some_and(|(tree, _)| same(tree)) {
+                tool = LaneTree::new(std::slice::from_ref(&seen.model)).map(|tree| {
+                    let places = ToolPlaces::new(&tree);
+                    (tree, places)
+                });
+            }
+            let (joints, elastic) = seen.q.as_slice().split_at(seen.model.n_actuated());
+            if let Some((tree, places)) = &mut tool {
+                result.include(seen.t, places.deflection(tree, &self.tool, joints, elastic), self.keep_samples);
+            }
+        }
+        Ok(result.finished(steps))
+    }
+
+    /// Steps of a run: the last one may pass its end.
+    fn steps(&self, run: &BatchRun) -> u64 {
+        (run.duration_s / self.step_s - 1e-9).ceil().max(0.0) as u64
+    }
+
+    /// Runs in lanes: `None` where that is not possible, of all or of one of them.
+    #[cfg(target_arch = "x86_64")]
+    fn side_by_side(&self, runs: &[BatchRun]) -> Option<Vec<Option<ToolDeflection>>> {
+        use flexarm_kinematics::{Four, OverLanes, with_lanes};
+
+        struct Group<'a>(&'a Batch, &'a [BatchRun]);
+        impl OverLanes for Group<'_> {
+            type Output = Option<Vec<Option<ToolDeflection>>>;
+
+            #[inline(always)]
+            fn run(self) -> Self::Output {
+                self.0.in_lanes::<Four>(self.1)
+            }
+        }
+        with_lanes(Group(self, runs))?
+    }
+
+    #[cfg(not(target_arch = "x86_64"))]
+    fn side_by_side(&self, _runs: &[BatchRun]) -> Option<Vec<Option<ToolDeflection>>> {
+        None
+    }
+
+    /// As many runs as lanes, or fewer.
+    #[inline(always)]
+    fn in_lanes<T: Real>(&self, runs: &[BatchRun]) -> Option<Vec<Option<ToolDeflection>>> {
+        let arms: Vec<&FlexibleArm> = runs.iter().map(|run| &run.arm).collect();
+        // Lanes that are left over repeat the last run.
+        let mut filled = arms.clone();
+        filled.resize(T::LANES, arms.last()?);
+        let mut lanes = LaneAlpha::<T>::new(&filled, self.settings, self.step_s, self.start)?.ok()?;
+        let mut tool = ToolPlaces::new(&lanes.arm.tree);
+        let steps: Vec<u64> = runs.iter().map(|run| self.steps(run)).collect();
+        let mut results = vec![ToolDeflection::default(); runs.len()];
+        for step in 0..=steps.iter().copied().max()? {
+            if step > 0 {
+                lanes.step();
+            }
+            let deflection = tool.deflection(&lanes.arm.tree, &self.tool, lanes.arm.joint_coordinates(), &lanes.x);
+            for (lane, result) in results.iter_mut().enumerate() {
+                if step <= steps[lane] {
+                    let own = deflection.map(|x| x.lane(lane));
+                    result.include(lanes.grid.time(), own, self.keep_samples);
+                }
+            }
+        }
+        let finished = results.into_iter().zip(&steps).enumerate();
+        let finished = finished.map(|(k, (result, steps))| (!lanes.left_behind(k)).then(|| result.finished(*steps)));
+        Some(finished.collect())
+    }
+}
+
+/// Places of the tool of flexible and rigid arm, with the workspaces of their kinematics.
+struct ToolPlaces<T: Real> {
+    data: Data<T>,
+    q: Vec<T>,
+}
+
+impl<T: Real> ToolPlaces<T> {
+    fn new(tree: &LaneTree<T>) -> Self {
+        Self { data: Data::new(tree.model()), q: vec![T::zero(); tree.model().nv()] }
+    }
+
+    /// Flexible minus rigid, world axes (m).
+    #[inline(always)]
+    fn deflection(&mut self, tree: &LaneTree<T>, tool: &Frame, joints: &[T], elastic: &[T]) -> Vector3<T> {
+        let n = joints.len();
+        self.q[..n].copy_from_slice(joints);
+        self.q[n..].fill(T::zero());
+        let rigid = self.place(tree, tool);
+        self.q[n..].copy_from_slice(elastic);
+        self.place(tree, tool) - rigid
+    }
+
+    #[inline(always)]
+    fn place(&mut self, tree: &LaneTree<T>, tool: &Frame) -> Vector3<T> {
+        forward_kinematics(tree, &mut self.data, &self.q);
+        let X_WB = &self.data.X_WB[tool.body];
+        X_WB.translation.vector + mul(X_WB.rotation.matrix(), &lift(&tool.X_BF.translation.vector))
+    }
+}
