@@ -7,7 +7,7 @@
 
 use std::ops::Add;
 
-use flexarm_spatial::products::{lift, lift3, mul};
+use flexarm_spatial::products::{add, add3, dot, lift, lift3, mul, scaled, scaled3};
 use flexarm_spatial::{Pose, Real, Twist, Wrench, skew};
 use nalgebra::{Matrix3, Rotation3, Vector3, Vector6};
 
@@ -89,7 +89,8 @@ impl AxisMotion {
         X_PB: &mut Pose<T>,
     ) {
         let p_PJ = lift(&X_PJ.translation.vector);
-        let along = |travel: &Vector3<f64>| p_PJ + mul(&lift3(X_PJ.rotation.matrix()), &(lift::<T>(travel) * value));
+        let along =
+            |travel: &Vector3<f64>| add(&p_PJ, &mul(&lift3(X_PJ.rotation.matrix()), &scaled(&lift(travel), value)));
         match self {
             Self::Revolute(_) => {
                 *X_PB.rotation.matrix_mut_unchecked() = turn.at(sine, cosine);
@@ -110,15 +111,15 @@ impl AxisMotion {
     #[inline(always)]
     pub fn twist<T: Real>(self, rate: T) -> Twist<T> {
         self.linear(
-            |axis| Twist::new(Vector3::zeros(), lift::<T>(&axis) * rate),
-            |axis| Twist::new(lift::<T>(&axis) * rate, Vector3::zeros()),
+            |axis| Twist::new(Vector3::zeros(), scaled(&lift(&axis), rate)),
+            |axis| Twist::new(scaled(&lift(&axis), rate), Vector3::zeros()),
         )
     }
 
     /// `Sᵀ F` (N m or N) of a wrench at Bo in B axes.
     #[inline(always)]
     pub fn project<T: Real>(self, F: &Wrench<T>) -> T {
-        self.linear(|axis| lift(&axis).dot(&F.torque), |axis| lift(&axis).dot(&F.force))
+        self.linear(|axis| dot(&lift(&axis), &F.torque), |axis| dot(&lift(&axis), &F.force))
     }
 
     /// `S` as six numbers, linear first.
@@ -159,6 +160,6 @@ impl RevoluteTable {
 
     #[inline(always)]
     fn at<T: Real>(&self, sine: T, cosine: T) -> Matrix3<T> {
-        lift3::<T>(&self.K0) + lift3::<T>(&self.K1) * sine + lift3::<T>(&self.K2) * cosine
+        add3(&add3(&lift3(&self.K0), &scaled3(&lift3(&self.K1), sine)), &scaled3(&lift3(&self.K2), cosine))
     }
 }

@@ -5,7 +5,9 @@
 //! axes, where its translations are constant. The coordinates of a modal body are n columns more: its own `C_t` and `C_r`
 //! and what its interfaces carry. Source: [Featherstone 2008], Table 6.2.
 
-use flexarm_spatial::products::{cross3, lift, lift3, mul, mul3, tr_mul, tr_mul3};
+use flexarm_spatial::products::{
+    add, add3, cross, cross3, dot, lift, lift3, mul, mul3, scaled, scaled3, sub, tr_mul, tr_mul3,
+};
 use flexarm_spatial::{Pose, Real, SpatialInertia, Wrench};
 use nalgebra::{DMatrix, DVector, Matrix3, Scalar, Vector3};
 
@@ -54,8 +56,8 @@ pub(crate) fn composite_bodies<T: Real>(tree: &impl Tree<T>, data: &mut Data<T>)
             JointMotion::Axis(motion) => {
                 let F = axis_wrench(motion, &composite, body.ratio);
                 let own = motion.linear(
-                    |axis| lift(&(axis * body.ratio)).dot(&F.torque),
-                    |axis| lift(&(axis * body.ratio)).dot(&F.force),
+                    |axis| dot(&lift(&(axis * body.ratio)), &F.torque),
+                    |axis| dot(&lift(&(axis * body.ratio)), &F.force),
                 );
                 data.M.as_mut_slice()[k * nv + k] += own + T::splat(body.ratio * body.ratio * body.armature);
                 data.U[i] = F;
@@ -86,11 +88,11 @@ fn axis_wrench<T: Real>(motion: AxisMotion, composite: &SpatialInertia<T>, ratio
     motion.linear(
         |axis| {
             let a = lift::<T>(&(axis * ratio));
-            Wrench::new(a.cross(&composite.first_moment), mul(&composite.rotational, &a))
+            Wrench::new(cross(&a, &composite.first_moment), mul(&composite.rotational, &a))
         },
         |axis| {
             let l = lift::<T>(&(axis * ratio));
-            Wrench::new(l * composite.mass, composite.first_moment.cross(&l))
+            Wrench::new(scaled(&l, composite.mass), cross(&composite.first_moment, &l))
         },
     )
 }
@@ -227,7 +229,7 @@ fn elastic_columns<T: Real>(model: &Model, data: &mut Data<T>, i: usize, composi
         if inward.parent > 0 {
             let X = &data.X_PB[j];
             R_AP = mul3(X.rotation.matrix(), &R_AP);
-            r += tr_mul(&R_AP, &X.translation.vector);
+            r = add(&r, &tr_mul(&R_AP, &X.translation.vector));
         }
         j = inward.parent;
     }
@@ -268,7 +270,7 @@ impl<T: Real> ElasticColumns<T> {
         let Omega = mul3(R_PB, B);
         let W = mul3(R_PB, &mul3(&composite.rotational, B)); // (2)
         let h_B = mul(R_PB, &composite.first_moment);
-        let force_r = -cross3(&h_B, &Omega);
+        let force_r = scaled3(&cross3(&h_B, &Omega), -T::one());
         Self { k: body.coordinate, nv, mass: composite.mass, U, Omega, W, h_B, force_r }
     }
 
@@ -297,18 +299,20 @@ impl<T: Real> ElasticColumns<T> {
         let Self { k, nv, mass, U, Omega, W, h_B, force_r } = self;
         let inward = &model.bodies[j];
         let (row, nv, mass) = (inward.coordinate, *nv, *mass);
+        // m r + h_B of (3).
+        let moment = add(&scaled(r, mass), h_B);
         match inward.motion {
             JointMotion::Axis(motion) => {
                 // Forces of the translations and of the angles, (3).
                 let Wrench { force: t, torque: q } = motion.linear(
                     |axis| {
                         let a = tr_mul(R_AP, &lift(&(axis * inward.ratio)));
-                        let t = tr_mul(U, &a.cross(&(r * mass + h_B)));
-                        Wrench::new(t, tr_mul(W, &a) - tr_mul(Omega, &a.cross(r).cross(h_B)))
+                        let t = tr_mul(U, &cross(&a, &moment));
+                        Wrench::new(t, sub(&tr_mul(W, &a), &tr_mul(Omega, &cross(&cross(&a, r), h_B))))
                     },
                     |axis| {
                         let l = tr_mul(R_AP, &lift(&(axis * inward.ratio)));
-                        Wrench::new(tr_mul(U, &l) * mass, tr_mul(force_r, &l))
+                        Wrench::new(scaled(&tr_mul(U, &l), mass), tr_mul(force_r, &l))
                     },
                 );
                 add_six(M, nv, *k, row, [t.x, t.y, t.z, q.x, q.y, q.z]);
@@ -316,9 +320,9 @@ impl<T: Real> ElasticColumns<T> {
             JointMotion::Welded => {}
             JointMotion::Elastic(_) => {
                 let (L, B) = (tr_mul3(R_AP, &S.L), tr_mul3(R_AP, &S.B));
-                let (tt, tr) = (tr_mul3(&L, &(U * mass)), tr_mul3(&L, force_r));
-                let rt = tr_mul3(&B, &cross3(&(r * mass + h_B), U));
-                let rr = tr_mul3(&B, &(W + cross3(r, force_r)));
+                let (tt, tr) = (tr_mul3(&L, &scaled3(U, mass)), tr_mul3(&L, force_r));
+                let rt = tr_mul3(&B, &cross3(&moment, U));
+                let rr = tr_mul3(&B, &add3(W, &cross3(r, force_r)));
                 for c in 0..3 {
                     let six = |t: &Matrix3<T>, r: &Matrix3<T>| {
                         [t[(0, c)], t[(1, c)], t[(2, c)], r[(0, c)], r[(1, c)], r[(2, c)]]
@@ -333,8 +337,9 @@ impl<T: Real> ElasticColumns<T> {
                 for m in 0..entry.n {
                     let column = shape.twist(m, &S.L, &S.B);
                     let (l, a) = (tr_mul(R_AP, &column.linear), tr_mul(R_AP, &column.angular));
-                    let t = tr_mul(U, &(l * mass + a.cross(&(r * mass + h_B))));
-                    let q = tr_mul(force_r, &l) + tr_mul(W, &a) - tr_mul(Omega, &a.cross(r).cross(h_B));
+                    let t = tr_mul(U, &add(&scaled(&l, mass), &cross(&a, &moment)));
+                    let turned = sub(&tr_mul(W, &a), &tr_mul(Omega, &cross(&cross(&a, r), h_B)));
+                    let q = add(&tr_mul(force_r, &l), &turned);
                     add_six(M, nv, *k, row + m, [t.x, t.y, t.z, q.x, q.y, q.z]);
                 }
             }

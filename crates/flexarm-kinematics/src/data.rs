@@ -3,7 +3,7 @@
 //! [`State`] is small and copyable between steppers; [`Data`] holds results and scratch of every algorithm,
 //! sized once by [`Data::new`], so that no algorithm allocates. Threads share a `Model`, each with its own `Data`.
 
-use flexarm_spatial::products::{lift, lift3, mul, mul3, tr_mul};
+use flexarm_spatial::products::{add, cross, lift, lift3, mul, mul3, tr_mul, transposed};
 use flexarm_spatial::{ArticulatedInertia, ElasticAngles, Pose, Real, SpatialInertia, Twist, Wrench, sin_cos_all};
 use nalgebra::{DMatrix, DVector, Isometry, Matrix3, Rotation3, Scalar, Translation3, Vector3};
 
@@ -163,11 +163,11 @@ pub(crate) fn joint_motion<T: Real>(
             let rates = Vector3::new(qdot[3], qdot[4], qdot[5]);
             let kin = angles.kinematics(&Vector3::new(q[3], q[4], q[5]), &rates);
             place_elastic(&mut data.X_PB[i], &body.X_PJ, &kin.R, &Vector3::new(q[0], q[1], q[2]));
-            let L = kin.R.transpose();
+            let L = transposed(&kin.R);
             data.elastic[i] = ElasticSubspace { L, B: kin.B };
             let V = Twist::new(mul(&L, &ddot), mul(&kin.B, &rates));
             // d(R_PBᵀ)/dt d' = -w × (R_PBᵀ d')
-            (V, Twist::new(V.linear.cross(&V.angular), kin.bias))
+            (V, Twist::new(cross(&V.linear, &V.angular), kin.bias))
         }
         JointMotion::Interface { modal, interface } => {
             let modal = &model.modal[modal];
@@ -176,10 +176,10 @@ pub(crate) fn joint_motion<T: Real>(
             let (ddot, rates) = shape.times(&qdot[k..k + modal.n]);
             let kin = ElasticAngles::RotationVector.kinematics(&phi, &rates);
             place_elastic(&mut data.X_PB[i], &body.X_PJ, &kin.R, &d);
-            let L = kin.R.transpose();
+            let L = transposed(&kin.R);
             data.elastic[i] = ElasticSubspace { L, B: kin.B };
             let V = Twist::new(mul(&L, &ddot), mul(&kin.B, &rates));
-            (V, Twist::new(V.linear.cross(&V.angular), kin.bias))
+            (V, Twist::new(cross(&V.linear, &V.angular), kin.bias))
         }
     }
 }
@@ -199,14 +199,14 @@ pub(crate) fn joint_position<T: Real>(model: &Model, data: &mut Data<T>, i: usiz
         JointMotion::Elastic(angles) => {
             let (R, B) = angles.pose(&Vector3::new(q[k + 3], q[k + 4], q[k + 5]));
             place_elastic(&mut data.X_PB[i], &body.X_PJ, &R, &Vector3::new(q[k], q[k + 1], q[k + 2]));
-            data.elastic[i] = ElasticSubspace { L: R.transpose(), B };
+            data.elastic[i] = ElasticSubspace { L: transposed(&R), B };
         }
         JointMotion::Interface { modal, interface } => {
             let modal = &model.modal[modal];
             let (d, phi) = modal.tables.shapes.interfaces[interface].times(&q[k..k + modal.n]);
             let (R, B) = ElasticAngles::RotationVector.pose(&phi);
             place_elastic(&mut data.X_PB[i], &body.X_PJ, &R, &d);
-            data.elastic[i] = ElasticSubspace { L: R.transpose(), B };
+            data.elastic[i] = ElasticSubspace { L: transposed(&R), B };
         }
     }
 }
@@ -251,7 +251,7 @@ pub(crate) fn begin<T: Real>(model: &Model, data: &mut Data<T>, q: &[T]) {
 fn place_elastic<T: Real>(X_PB: &mut Pose<T>, X_PJ: &Pose, R: &Matrix3<T>, d: &Vector3<T>) {
     let R_PJ = lift3(X_PJ.rotation.matrix());
     *X_PB.rotation.matrix_mut_unchecked() = mul3(&R_PJ, R);
-    X_PB.translation.vector = lift::<T>(&X_PJ.translation.vector) + mul(&R_PJ, d);
+    X_PB.translation.vector = add(&lift(&X_PJ.translation.vector), &mul(&R_PJ, d));
 }
 
 /// `S q̈` in B axes.

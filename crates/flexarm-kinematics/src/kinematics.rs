@@ -3,7 +3,7 @@
 //! Frames: W world, B a body, T any frame fixed to a body (usually the tool). `J_WT_W` maps `q̇` to the
 //! twist of T: velocity of the point To and angular velocity, both in **world axes** (rows linear first).
 
-use flexarm_spatial::products::{mul, mul3};
+use flexarm_spatial::products::{add, mul, mul3};
 use flexarm_spatial::{ElasticAngles, Real, Twist};
 use nalgebra::{Matrix3, Matrix6xX, Vector3};
 
@@ -56,7 +56,7 @@ pub(crate) fn place_in_world<T: Real>(model: &Model, data: &mut Data<T>) {
         let R_WP = X_WP.rotation.matrix();
         let X_WB = &mut data.X_WB[i];
         *X_WB.rotation.matrix_mut_unchecked() = mul3(R_WP, X_PB.rotation.matrix());
-        X_WB.translation.vector = X_WP.translation.vector + mul(R_WP, &X_PB.translation.vector);
+        X_WB.translation.vector = add(&X_WP.translation.vector, &mul(R_WP, &X_PB.translation.vector));
     }
 }
 

@@ -1,10 +1,64 @@
-//! Products of 3×3 matrices and vectors, written out on columns for the inner loops of the recursions: nalgebra's general
-//! product of small matrices costs twice as many instructions. The order of the sums is fixed, so results are the same on
-//! every machine.
+//! Vectors and 3×3 matrices in the inner loops of the recursions, written out: nalgebra's general product of small matrices
+//! costs twice as many instructions, and over lanes none of its operations is sure to be inlined, which they must be
+//! ([`crate::lanes`]). The order of the sums is fixed, so results are the same on every machine.
 
 use nalgebra::{Matrix3, Vector3};
 
 use crate::real::Real;
+
+/// `a + b`.
+#[inline(always)]
+pub fn add<T: Real>(a: &Vector3<T>, b: &Vector3<T>) -> Vector3<T> {
+    Vector3::new(a.x + b.x, a.y + b.y, a.z + b.z)
+}
+
+/// `a - b`.
+#[inline(always)]
+pub fn sub<T: Real>(a: &Vector3<T>, b: &Vector3<T>) -> Vector3<T> {
+    Vector3::new(a.x - b.x, a.y - b.y, a.z - b.z)
+}
+
+/// `a s`.
+#[inline(always)]
+pub fn scaled<T: Real>(a: &Vector3<T>, s: T) -> Vector3<T> {
+    Vector3::new(a.x * s, a.y * s, a.z * s)
+}
+
+/// `a × b`.
+#[inline(always)]
+pub fn cross<T: Real>(a: &Vector3<T>, b: &Vector3<T>) -> Vector3<T> {
+    Vector3::new(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
+}
+
+/// `aᵀ b`.
+#[inline(always)]
+pub fn dot<T: Real>(a: &Vector3<T>, b: &Vector3<T>) -> T {
+    a.x * b.x + a.y * b.y + a.z * b.z
+}
+
+/// `A + B`.
+#[inline(always)]
+pub fn add3<T: Real>(A: &Matrix3<T>, B: &Matrix3<T>) -> Matrix3<T> {
+    by_columns(|j| add(&column(A, j), &column(B, j)))
+}
+
+/// `A s`.
+#[inline(always)]
+pub fn scaled3<T: Real>(A: &Matrix3<T>, s: T) -> Matrix3<T> {
+    by_columns(|j| scaled(&column(A, j), s))
+}
+
+/// `Aᵀ`.
+#[inline(always)]
+pub fn transposed<T: Real>(A: &Matrix3<T>) -> Matrix3<T> {
+    let [a, b, c] = &A.data.0;
+    Matrix3::new(a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2])
+}
+
+#[inline(always)]
+fn by_columns<T: Real>(column: impl Fn(usize) -> Vector3<T>) -> Matrix3<T> {
+    columns(column(0), column(1), column(2))
+}
 
 /// `A v`.
 #[inline(always)]
@@ -64,7 +118,7 @@ pub fn turn_symmetric<T: Real>(R: &Matrix3<T>, A: &Matrix3<T>) -> Matrix3<T> {
 /// `[p]x A`.
 #[inline(always)]
 pub fn cross3<T: Real>(p: &Vector3<T>, A: &Matrix3<T>) -> Matrix3<T> {
-    columns(p.cross(&column(A, 0)), p.cross(&column(A, 1)), p.cross(&column(A, 2)))
+    by_columns(|j| cross(p, &column(A, j)))
 }
 
 /// A constant vector in the scalar of a recursion.

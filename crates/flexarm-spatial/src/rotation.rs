@@ -7,6 +7,7 @@
 
 use nalgebra::{Matrix3, Scalar, Vector3};
 
+use crate::products::{add, cross, dot, mul, scaled};
 use crate::real::Real;
 use crate::vectors::skew;
 
@@ -48,7 +49,7 @@ impl ElasticAngles {
     #[inline(always)]
     pub fn pose<T: Real>(self, angles: &Vector3<T>) -> (Matrix3<T>, Matrix3<T>) {
         match self {
-            Self::RotationVector => rotation_vector_pose(angles, &exponential_coefficients(angles.dot(angles))),
+            Self::RotationVector => rotation_vector_pose(angles, &exponential_coefficients(dot(angles, angles))),
             Self::EulerZyx => {
                 let k = euler_zyx_kinematics(angles, &Vector3::zeros());
                 (k.R, k.B)
@@ -145,23 +146,29 @@ fn coefficients_in_closed_form<T: Real>(x: T) -> [T; 5] {
 #[inline(always)]
 fn rotation_vector_pose<T: Real>(phi: &Vector3<T>, coefficients: &[T; 5]) -> (Matrix3<T>, Matrix3<T>) {
     let [s, a, b, ..] = *coefficients;
-    let (x, P) = (phi.dot(phi), skew(phi));
-    // [phi]x² = phi phiᵀ - x 1
-    let square = Matrix3::from_columns(&[phi * phi.x, phi * phi.y, phi * phi.z]);
-    let R = P * s + square * a + Matrix3::from_diagonal_element(T::one() - x * a);
-    let B = square * b - P * a + Matrix3::from_diagonal_element(T::one() - x * b);
-    (R, B)
+    let (x, y, z) = (phi.x, phi.y, phi.z);
+    let square = dot(phi, phi);
+    // p [phi]x + r [phi]x² + 1,  [phi]x² = phi phiᵀ - phi·phi 1
+    let combined = |p: T, r: T| {
+        let rest = T::one() - square * r;
+        let (px, py, pz) = (x * p, y * p, z * p);
+        let (xy, xz, yz) = (x * y * r, x * z * r, y * z * r);
+        let (xx, yy, zz) = (x * x * r + rest, y * y * r + rest, z * z * r + rest);
+        Matrix3::new(xx, xy - pz, xz + py, xy + pz, yy, yz - px, xz - py, yz + px, zz)
+    };
+    (combined(s, a), combined(-a, b))
 }
 
 #[inline(always)]
 fn rotation_vector_kinematics<T: Real>(phi: &Vector3<T>, rates: &Vector3<T>) -> AngleKinematics<T> {
-    let coefficients = exponential_coefficients(phi.dot(phi));
+    let coefficients = exponential_coefficients(dot(phi, phi));
     let (R, B) = rotation_vector_pose(phi, &coefficients);
     let [_, _, b, da, db] = coefficients;
     // bias = (dB/dt) rates = -a' x' phi×rates + b' x' phi×(phi×rates) + b (rates×(phi×rates)),  x' = 2 phi·rates
-    let xdot = T::splat(2.0) * phi.dot(rates);
-    let c = phi.cross(rates);
-    let bias = c * (-da * xdot) + phi.cross(&c) * (db * xdot) + rates.cross(&c) * b;
+    let xdot = T::splat(2.0) * dot(phi, rates);
+    let c = cross(phi, rates);
+    let first = add(&scaled(&c, -da * xdot), &scaled(&cross(phi, &c), db * xdot));
+    let bias = add(&first, &scaled(&cross(rates, &c), b));
     AngleKinematics { R, B, bias }
 }
 
@@ -182,7 +189,7 @@ fn euler_zyx_kinematics<T: Real>(angles: &Vector3<T>, rates: &Vector3<T>) -> Ang
     let (zero, one) = (T::zero(), T::one());
     let B = Matrix3::new(one, zero, -sy, zero, cx, sx * cy, zero, -sx, cx * cy);
     let Bdot = euler_zyx_rate_derivative(angles, rates);
-    AngleKinematics { R, B, bias: Bdot * rates }
+    AngleKinematics { R, B, bias: mul(&Bdot, rates) }
 }
 
 #[inline(always)]

@@ -9,7 +9,7 @@
 use nalgebra::{IsometryMatrix3, Matrix3, Matrix6, Scalar, Vector3, Vector6};
 use std::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 
-use crate::products::{cross3, lift, lift3, mul, mul3, tr_mul, turn_symmetric};
+use crate::products::{add, add3, cross, cross3, dot, lift, lift3, mul, mul3, scaled, sub, tr_mul, turn_symmetric};
 use crate::real::Real;
 
 /// Pose `X_AB` of frame B in frame A, as rotation matrix and translation (m). `p_A = X_AB * p_B`.
@@ -62,14 +62,14 @@ macro_rules! pair_algebra {
             type Output = Self;
             #[inline(always)]
             fn add(self, o: Self) -> Self {
-                Self { $first: self.$first + o.$first, $second: self.$second + o.$second }
+                Self { $first: add(&self.$first, &o.$first), $second: add(&self.$second, &o.$second) }
             }
         }
         impl<T: Real> Sub for $type<T> {
             type Output = Self;
             #[inline(always)]
             fn sub(self, o: Self) -> Self {
-                Self { $first: self.$first - o.$first, $second: self.$second - o.$second }
+                Self { $first: sub(&self.$first, &o.$first), $second: sub(&self.$second, &o.$second) }
             }
         }
         impl<T: Real> Neg for $type<T> {
@@ -83,21 +83,19 @@ macro_rules! pair_algebra {
             type Output = Self;
             #[inline(always)]
             fn mul(self, s: T) -> Self {
-                Self { $first: self.$first * s, $second: self.$second * s }
+                Self { $first: scaled(&self.$first, s), $second: scaled(&self.$second, s) }
             }
         }
         impl<T: Real> AddAssign for $type<T> {
             #[inline(always)]
             fn add_assign(&mut self, o: Self) {
-                self.$first += o.$first;
-                self.$second += o.$second;
+                *self = *self + o;
             }
         }
         impl<T: Real> SubAssign for $type<T> {
             #[inline(always)]
             fn sub_assign(&mut self, o: Self) {
-                self.$first -= o.$first;
-                self.$second -= o.$second;
+                *self = *self - o;
             }
         }
     };
@@ -109,19 +107,21 @@ impl<T: Real> Twist<T> {
     /// Power `Fᵀ V` (W); both at the same point, in the same axes.
     #[inline(always)]
     pub fn power(&self, F: &Wrench<T>) -> T {
-        self.linear.dot(&F.force) + self.angular.dot(&F.torque)
+        dot(&self.linear, &F.force) + dot(&self.angular, &F.torque)
     }
 
     /// Motion cross product `V × U`: the rate of `U` when it is carried along by `V`.
     #[inline(always)]
     pub fn cross(&self, U: &Twist<T>) -> Twist<T> {
-        Twist::new(self.angular.cross(&U.linear) + self.linear.cross(&U.angular), self.angular.cross(&U.angular))
+        let (v, w) = (&self.linear, &self.angular);
+        Twist::new(add(&cross(w, &U.linear), &cross(v, &U.angular)), cross(w, &U.angular))
     }
 
     /// Force cross product `V ×* F`: the rate of `F` when it is carried along by `V`.
     #[inline(always)]
     pub fn cross_force(&self, F: &Wrench<T>) -> Wrench<T> {
-        Wrench::new(self.angular.cross(&F.force), self.angular.cross(&F.torque) + self.linear.cross(&F.force))
+        let (v, w) = (&self.linear, &self.angular);
+        Wrench::new(cross(w, &F.force), add(&cross(w, &F.torque), &cross(v, &F.force)))
     }
 
     /// `Ad_BA V_A`: the same motion seen at Bo in B axes, for `X_AB` (B fixed in A's body).
@@ -129,7 +129,7 @@ impl<T: Real> Twist<T> {
     pub fn at_child(&self, X_AB: &Pose<T>) -> Twist<T> {
         let R = X_AB.rotation.matrix();
         let p = &X_AB.translation.vector;
-        Twist::new(tr_mul(R, &(self.linear + self.angular.cross(p))), tr_mul(R, &self.angular))
+        Twist::new(tr_mul(R, &add(&self.linear, &cross(&self.angular, p))), tr_mul(R, &self.angular))
     }
 
     /// The inverse of [`Twist::at_child`]: from Bo, B axes to Ao, A axes.
@@ -137,7 +137,7 @@ impl<T: Real> Twist<T> {
     pub fn at_parent(&self, X_AB: &Pose<T>) -> Twist<T> {
         let R = X_AB.rotation.matrix();
         let angular = mul(R, &self.angular);
-        Twist::new(mul(R, &self.linear) + X_AB.translation.vector.cross(&angular), angular)
+        Twist::new(add(&mul(R, &self.linear), &cross(&X_AB.translation.vector, &angular)), angular)
     }
 }
 
@@ -147,7 +147,7 @@ impl<T: Real> Wrench<T> {
     pub fn at_parent(&self, X_AB: &Pose<T>) -> Wrench<T> {
         let R = X_AB.rotation.matrix();
         let force = mul(R, &self.force);
-        Wrench::new(force, mul(R, &self.torque) + X_AB.translation.vector.cross(&force))
+        Wrench::new(force, add(&mul(R, &self.torque), &cross(&X_AB.translation.vector, &force)))
     }
 
     /// The inverse of [`Wrench::at_parent`]: from Ao, A axes to Bo, B axes.
@@ -155,7 +155,7 @@ impl<T: Real> Wrench<T> {
     pub fn at_child(&self, X_AB: &Pose<T>) -> Wrench<T> {
         let R = X_AB.rotation.matrix();
         let p = &X_AB.translation.vector;
-        Wrench::new(tr_mul(R, &self.force), tr_mul(R, &(self.torque - p.cross(&self.force))))
+        Wrench::new(tr_mul(R, &self.force), tr_mul(R, &sub(&self.torque, &cross(p, &self.force))))
     }
 }
 
@@ -229,7 +229,10 @@ impl<T: Real> SpatialInertia<T> {
     #[inline(always)]
     pub fn mul_twist(&self, V: &Twist<T>) -> Wrench<T> {
         let h = &self.first_moment;
-        Wrench::new(V.linear * self.mass - h.cross(&V.angular), h.cross(&V.linear) + mul(&self.rotational, &V.angular))
+        Wrench::new(
+            sub(&scaled(&V.linear, self.mass), &cross(h, &V.angular)),
+            add(&cross(h, &V.linear), &mul(&self.rotational, &V.angular)),
+        )
     }
 
     /// The same body about Ao in A axes, for `X_AB`.
@@ -240,11 +243,12 @@ impl<T: Real> SpatialInertia<T> {
         let h = mul(R, &self.first_moment);
         let (half, two) = (T::splat(0.5), T::splat(2.0));
         // I_A = R I Rᵀ + (2 p·h + m p·p) 1 - (p hᵀ + h pᵀ + m p pᵀ)
-        let k = h + p * (self.mass * half);
+        let k = add(&h, &scaled(p, self.mass * half));
         let (x, y, z) = (p.x * two * k.x, p.y * two * k.y, p.z * two * k.z);
         let (xy, xz, yz) = (p.x * k.y + k.x * p.y, p.x * k.z + k.x * p.z, p.y * k.z + k.y * p.z);
-        let I = turn_symmetric(R, &self.rotational) + Matrix3::new(y + z, -xy, -xz, -xy, x + z, -yz, -xz, -yz, x + y);
-        SpatialInertia { mass: self.mass, first_moment: h + p * self.mass, rotational: I }
+        let moved = Matrix3::new(y + z, -xy, -xz, -xy, x + z, -yz, -xz, -yz, x + y);
+        let I = add3(&turn_symmetric(R, &self.rotational), &moved);
+        SpatialInertia { mass: self.mass, first_moment: add(&h, &scaled(p, self.mass)), rotational: I }
     }
 
     /// Inertia of a constant body in the scalar of a recursion.
@@ -259,8 +263,8 @@ impl<T: Real> AddAssign for SpatialInertia<T> {
     #[inline(always)]
     fn add_assign(&mut self, o: Self) {
         self.mass += o.mass;
-        self.first_moment += o.first_moment;
-        self.rotational += o.rotational;
+        self.first_moment = add(&self.first_moment, &o.first_moment);
+        self.rotational = add3(&self.rotational, &o.rotational);
     }
 }
 

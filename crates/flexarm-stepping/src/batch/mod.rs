@@ -11,7 +11,7 @@ mod lane_alpha;
 mod lane_arm;
 
 use flexarm_kinematics::lanes::{LaneTree, forward_kinematics};
-use flexarm_kinematics::products::{lift, mul};
+use flexarm_kinematics::products::{add, dot, lift, mul, sub};
 use flexarm_kinematics::{Data, Frame, Real};
 use nalgebra::Vector3;
 
@@ -65,7 +65,7 @@ pub struct ToolDeflection {
 
 impl ToolDeflection {
     fn include(&mut self, t: f64, deflection: Vector3<f64>, keep: bool) {
-        let square = deflection.dot(&deflection);
+        let square = dot(&deflection, &deflection);
         // Until the end the sum of squares.
         self.rms_m += square;
         if square > self.peak_m * self.peak_m {
@@ -210,13 +210,13 @@ impl<T: Real> ToolPlaces<T> {
         self.q[n..].fill(T::zero());
         let rigid = self.place(tree, tool);
         self.q[n..].copy_from_slice(elastic);
-        self.place(tree, tool) - rigid
+        sub(&self.place(tree, tool), &rigid)
     }
 
     #[inline(always)]
     fn place(&mut self, tree: &LaneTree<T>, tool: &Frame) -> Vector3<T> {
         forward_kinematics(tree, &mut self.data, &self.q);
         let X_WB = &self.data.X_WB[tool.body];
-        X_WB.translation.vector + mul(X_WB.rotation.matrix(), &lift(&tool.X_BF.translation.vector))
+        add(&X_WB.translation.vector, &mul(X_WB.rotation.matrix(), &lift(&tool.X_BF.translation.vector)))
     }
 }
