@@ -89,8 +89,6 @@ impl AxisMotion {
         X_PB: &mut Pose<T>,
     ) {
         let p_PJ = lift(&X_PJ.translation.vector);
-        let along =
-            |travel: &Vector3<f64>| add(&p_PJ, &mul(&lift3(X_PJ.rotation.matrix()), &scaled(&lift(travel), value)));
         match self {
             Self::Revolute(_) => {
                 *X_PB.rotation.matrix_mut_unchecked() = turn.at(sine, cosine);
@@ -98,11 +96,11 @@ impl AxisMotion {
             }
             Self::Prismatic(axis) => {
                 *X_PB.rotation.matrix_mut_unchecked() = lift3(X_PJ.rotation.matrix());
-                X_PB.translation.vector = along(&axis);
+                X_PB.translation.vector = add(&p_PJ, &shifted(X_PJ, &axis, value));
             }
             Self::Helical { axis, pitch } => {
                 *X_PB.rotation.matrix_mut_unchecked() = turn.at(sine, cosine);
-                X_PB.translation.vector = along(&(axis * pitch));
+                X_PB.translation.vector = add(&p_PJ, &shifted(X_PJ, &(axis * pitch), value));
             }
         }
     }
@@ -111,7 +109,9 @@ impl AxisMotion {
     #[inline(always)]
     pub fn twist<T: Real>(self, rate: T) -> Twist<T> {
         self.linear(
+            #[inline(always)]
             |axis| Twist::new(Vector3::zeros(), scaled(&lift(&axis), rate)),
+            #[inline(always)]
             |axis| Twist::new(scaled(&lift(&axis), rate), Vector3::zeros()),
         )
     }
@@ -119,7 +119,12 @@ impl AxisMotion {
     /// `Sᵀ F` (N m or N) of a wrench at Bo in B axes.
     #[inline(always)]
     pub fn project<T: Real>(self, F: &Wrench<T>) -> T {
-        self.linear(|axis| dot(&lift(&axis), &F.torque), |axis| dot(&lift(&axis), &F.force))
+        self.linear(
+            #[inline(always)]
+            |axis| dot(&lift(&axis), &F.torque),
+            #[inline(always)]
+            |axis| dot(&lift(&axis), &F.force),
+        )
     }
 
     /// `S` as six numbers, linear first.
@@ -141,6 +146,12 @@ impl AxisMotion {
             Self::Helical { pitch, .. } => along / (1.0 + pitch * pitch),
         }
     }
+}
+
+/// `R_PJ travel value`: where a translation leads, in P axes.
+#[inline(always)]
+fn shifted<T: Real>(X_PJ: &Pose, travel: &Vector3<f64>, value: T) -> Vector3<T> {
+    mul(&lift3(X_PJ.rotation.matrix()), &scaled(&lift(travel), value))
 }
 
 /// `R_PB(q) = K0 + sin q K1 + cos q K2`: Rodrigues' formula with the placement multiplied in.

@@ -56,7 +56,9 @@ pub(crate) fn composite_bodies<T: Real>(tree: &impl Tree<T>, data: &mut Data<T>)
             JointMotion::Axis(motion) => {
                 let F = axis_wrench(motion, &composite, body.ratio);
                 let own = motion.linear(
+                    #[inline(always)]
                     |axis| dot(&lift(&(axis * body.ratio)), &F.torque),
+                    #[inline(always)]
                     |axis| dot(&lift(&(axis * body.ratio)), &F.force),
                 );
                 data.M.as_mut_slice()[k * nv + k] += own + T::splat(body.ratio * body.ratio * body.armature);
@@ -86,10 +88,12 @@ pub(crate) fn composite_bodies<T: Real>(tree: &impl Tree<T>, data: &mut Data<T>)
 #[inline(always)]
 fn axis_wrench<T: Real>(motion: AxisMotion, composite: &SpatialInertia<T>, ratio: f64) -> Wrench<T> {
     motion.linear(
+        #[inline(always)]
         |axis| {
             let a = lift::<T>(&(axis * ratio));
             Wrench::new(cross(&a, &composite.first_moment), mul(&composite.rotational, &a))
         },
+        #[inline(always)]
         |axis| {
             let l = lift::<T>(&(axis * ratio));
             Wrench::new(scaled(&l, composite.mass), cross(&composite.first_moment, &l))
@@ -160,8 +164,8 @@ fn meet<T: Real>(
             let (f, t) = (tr_mul(&S.L, &F.force), tr_mul(&S.B, &F.torque));
             let columns = entry.tables.shapes.interfaces[interface].Phi.as_slice().chunks_exact(6);
             for (k, c) in columns.enumerate() {
-                let c = |k: usize| T::splat(c[k]);
-                let value = c(0) * f.x + c(1) * f.y + c(2) * f.z + c(3) * t.x + c(4) * t.y + c(5) * t.z;
+                let (l, a) = (Vector3::new(c[0], c[1], c[2]), Vector3::new(c[3], c[4], c[5]));
+                let value = dot(&lift(&l), &f) + dot(&lift(&a), &t);
                 add_pair(M, nv, row + k, column, value);
             }
         }
@@ -194,6 +198,13 @@ fn interface_columns<T: Real>(
 fn add_pair<T: Real>(M: &mut [T], nv: usize, row: usize, column: usize, value: T) {
     M[column * nv + row] += value;
     M[row * nv + column] += value;
+}
+
+/// Column c of two matrices, one below the other.
+#[inline(always)]
+fn six<T: Real>(upper: &Matrix3<T>, lower: &Matrix3<T>, c: usize) -> [T; 6] {
+    let ([a, b, d], [e, f, g]) = (upper.data.0[c], lower.data.0[c]);
+    [a, b, d, e, f, g]
 }
 
 /// Adds six rows from `row` on in one column, and their mirror image.
@@ -305,11 +316,13 @@ impl<T: Real> ElasticColumns<T> {
             JointMotion::Axis(motion) => {
                 // Forces of the translations and of the angles, (3).
                 let Wrench { force: t, torque: q } = motion.linear(
+                    #[inline(always)]
                     |axis| {
                         let a = tr_mul(R_AP, &lift(&(axis * inward.ratio)));
                         let t = tr_mul(U, &cross(&a, &moment));
                         Wrench::new(t, sub(&tr_mul(W, &a), &tr_mul(Omega, &cross(&cross(&a, r), h_B))))
                     },
+                    #[inline(always)]
                     |axis| {
                         let l = tr_mul(R_AP, &lift(&(axis * inward.ratio)));
                         Wrench::new(scaled(&tr_mul(U, &l), mass), tr_mul(force_r, &l))
@@ -324,11 +337,8 @@ impl<T: Real> ElasticColumns<T> {
                 let rt = tr_mul3(&B, &cross3(&moment, U));
                 let rr = tr_mul3(&B, &add3(W, &cross3(r, force_r)));
                 for c in 0..3 {
-                    let six = |t: &Matrix3<T>, r: &Matrix3<T>| {
-                        [t[(0, c)], t[(1, c)], t[(2, c)], r[(0, c)], r[(1, c)], r[(2, c)]]
-                    };
-                    add_six(M, nv, row, k + c, six(&tt, &rt));
-                    add_six(M, nv, row, k + 3 + c, six(&tr, &rr));
+                    add_six(M, nv, row, k + c, six(&tt, &rt, c));
+                    add_six(M, nv, row, k + 3 + c, six(&tr, &rr, c));
                 }
             }
             JointMotion::Interface { modal, interface } => {

@@ -21,7 +21,7 @@
 //! Start at [`ModalBody`]. Sources: [Shabana 2013], chapter 5; [Wallrapp 1994] for the set of integrals.
 //! Not here: stiffness and damping of the modes, where shapes come from.
 
-use flexarm_spatial::products::{lift, lift3, mul, tr_mul};
+use flexarm_spatial::products::{dot, lift, lift3, mul, tr_mul};
 use flexarm_spatial::{Pose, Real, SpatialInertia, Twist, Wrench};
 use nalgebra::{Cholesky, DMatrix, Dyn, Matrix3, Matrix6xX, Scalar, Vector3};
 
@@ -339,18 +339,17 @@ impl InterfaceShape {
     #[inline(always)]
     pub(crate) fn add_transposed<T: Real>(&self, force: &Vector3<T>, moment: &Vector3<T>, f: &mut [T]) {
         for (column, f) in self.Phi.as_slice().chunks_exact(6).zip(f) {
-            let c = |k: usize| T::splat(column[k]);
-            *f +=
-                c(0) * force.x + c(1) * force.y + c(2) * force.z + c(3) * moment.x + c(4) * moment.y + c(5) * moment.z;
+            let (l, a) = (Vector3::new(column[0], column[1], column[2]), Vector3::new(column[3], column[4], column[5]));
+            *f += dot(&lift(&l), force) + dot(&lift(&a), moment);
         }
     }
 
     /// Column k of the motion subspace in the child's axes, for its maps L (translations) and B (rotations).
     #[inline(always)]
     pub(crate) fn twist<T: Real>(&self, k: usize, L: &Matrix3<T>, B: &Matrix3<T>) -> Twist<T> {
-        let column = &self.Phi.as_slice()[6 * k..6 * k + 6];
-        let c: [T; 6] = std::array::from_fn(|row| T::splat(column[row]));
-        Twist::new(mul(L, &Vector3::new(c[0], c[1], c[2])), mul(B, &Vector3::new(c[3], c[4], c[5])))
+        let c = &self.Phi.as_slice()[6 * k..6 * k + 6];
+        let (l, a) = (Vector3::new(c[0], c[1], c[2]), Vector3::new(c[3], c[4], c[5]));
+        Twist::new(mul(L, &lift(&l)), mul(B, &lift(&a)))
     }
 
     /// `Sᵀ F` for all coordinates, F in the child's axes: added to `f`.

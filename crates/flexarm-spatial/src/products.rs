@@ -39,13 +39,19 @@ pub fn dot<T: Real>(a: &Vector3<T>, b: &Vector3<T>) -> T {
 /// `A + B`.
 #[inline(always)]
 pub fn add3<T: Real>(A: &Matrix3<T>, B: &Matrix3<T>) -> Matrix3<T> {
-    by_columns(|j| add(&column(A, j), &column(B, j)))
+    by_columns(
+        #[inline(always)]
+        |j| add(&column(A, j), &column(B, j)),
+    )
 }
 
 /// `A s`.
 #[inline(always)]
 pub fn scaled3<T: Real>(A: &Matrix3<T>, s: T) -> Matrix3<T> {
-    by_columns(|j| scaled(&column(A, j), s))
+    by_columns(
+        #[inline(always)]
+        |j| scaled(&column(A, j), s),
+    )
 }
 
 /// `Aᵀ`.
@@ -118,7 +124,10 @@ pub fn turn_symmetric<T: Real>(R: &Matrix3<T>, A: &Matrix3<T>) -> Matrix3<T> {
 /// `[p]x A`.
 #[inline(always)]
 pub fn cross3<T: Real>(p: &Vector3<T>, A: &Matrix3<T>) -> Matrix3<T> {
-    by_columns(|j| cross(p, &column(A, j)))
+    by_columns(
+        #[inline(always)]
+        |j| cross(p, &column(A, j)),
+    )
 }
 
 /// A constant vector in the scalar of a recursion.

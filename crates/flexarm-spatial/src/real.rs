@@ -76,7 +76,10 @@ pub trait Real:
             return no();
         }
         let (yes, no) = (yes(), no());
-        std::array::from_fn(|k| self.pick_below(Self::splat(bound), yes[k], no[k]))
+        std::array::from_fn(
+            #[inline(always)]
+            |k| self.pick_below(Self::splat(bound), yes[k], no[k]),
+        )
     }
 
     /// Absolute value.

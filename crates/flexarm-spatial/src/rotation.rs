@@ -109,22 +109,30 @@ pub fn rotation_vector(R: &Matrix3<f64>) -> Vector3<f64> {
 /// `s = sin(theta)/theta`, `a = (1 - cos)/theta²`, `b = (theta - sin)/theta³`.
 #[inline(always)]
 fn exponential_coefficients<T: Real>(x: T) -> [T; 5] {
-    x.branch_below(0.01, || coefficients_by_series(x), || coefficients_in_closed_form(x))
+    x.branch_below(
+        0.01,
+        #[inline(always)]
+        || coefficients_by_series(x),
+        #[inline(always)]
+        || coefficients_in_closed_form(x),
+    )
 }
 
 /// Taylor series; the first omitted terms are below 1e-17 relative.
 #[inline(always)]
 fn coefficients_by_series<T: Real>(x: T) -> [T; 5] {
-    let sum = |terms: [f64; 4]| {
-        let [p, q, r, s] = terms.map(T::splat);
-        p + x * (q + x * (r + x * s))
-    };
-    let s = T::one() + x * sum([-1.0 / 6.0, 1.0 / 120.0, -1.0 / 5040.0, 1.0 / 362_880.0]);
-    let a = T::splat(0.5) + x * sum([-1.0 / 24.0, 1.0 / 720.0, -1.0 / 40_320.0, 1.0 / 3_628_800.0]);
-    let b = T::splat(1.0 / 6.0) + x * sum([-1.0 / 120.0, 1.0 / 5040.0, -1.0 / 362_880.0, 1.0 / 39_916_800.0]);
-    let da = sum([-1.0 / 24.0, 1.0 / 360.0, -1.0 / 13_440.0, 1.0 / 907_200.0]);
-    let db = sum([-1.0 / 120.0, 1.0 / 2520.0, -1.0 / 120_960.0, 1.0 / 9_979_200.0]);
+    let s = T::one() + x * cubic(x, [-1.0 / 6.0, 1.0 / 120.0, -1.0 / 5040.0, 1.0 / 362_880.0]);
+    let a = T::splat(0.5) + x * cubic(x, [-1.0 / 24.0, 1.0 / 720.0, -1.0 / 40_320.0, 1.0 / 3_628_800.0]);
+    let b = T::splat(1.0 / 6.0) + x * cubic(x, [-1.0 / 120.0, 1.0 / 5040.0, -1.0 / 362_880.0, 1.0 / 39_916_800.0]);
+    let da = cubic(x, [-1.0 / 24.0, 1.0 / 360.0, -1.0 / 13_440.0, 1.0 / 907_200.0]);
+    let db = cubic(x, [-1.0 / 120.0, 1.0 / 2520.0, -1.0 / 120_960.0, 1.0 / 9_979_200.0]);
     [s, a, b, da, db]
+}
+
+/// `p + q x + r x² + s x³`.
+#[inline(always)]
+fn cubic<T: Real>(x: T, [p, q, r, s]: [f64; 4]) -> T {
+    T::splat(p) + x * (T::splat(q) + x * (T::splat(r) + x * T::splat(s)))
 }
 
 /// Links hardly turn so far: this stays out of the recursions' code.
@@ -146,17 +154,18 @@ fn coefficients_in_closed_form<T: Real>(x: T) -> [T; 5] {
 #[inline(always)]
 fn rotation_vector_pose<T: Real>(phi: &Vector3<T>, coefficients: &[T; 5]) -> (Matrix3<T>, Matrix3<T>) {
     let [s, a, b, ..] = *coefficients;
+    (by_powers(phi, s, a), by_powers(phi, -a, b))
+}
+
+/// `1 + p [phi]x + r [phi]x²`, with `[phi]x² = phi phiᵀ - phi·phi 1`.
+#[inline(always)]
+fn by_powers<T: Real>(phi: &Vector3<T>, p: T, r: T) -> Matrix3<T> {
     let (x, y, z) = (phi.x, phi.y, phi.z);
-    let square = dot(phi, phi);
-    // p [phi]x + r [phi]x² + 1,  [phi]x² = phi phiᵀ - phi·phi 1
-    let combined = |p: T, r: T| {
-        let rest = T::one() - square * r;
-        let (px, py, pz) = (x * p, y * p, z * p);
-        let (xy, xz, yz) = (x * y * r, x * z * r, y * z * r);
-        let (xx, yy, zz) = (x * x * r + rest, y * y * r + rest, z * z * r + rest);
-        Matrix3::new(xx, xy - pz, xz + py, xy + pz, yy, yz - px, xz - py, yz + px, zz)
-    };
-    (combined(s, a), combined(-a, b))
+    let rest = T::one() - dot(phi, phi) * r;
+    let (px, py, pz) = (x * p, y * p, z * p);
+    let (xy, xz, yz) = (x * y * r, x * z * r, y * z * r);
+    let (xx, yy, zz) = (x * x * r + rest, y * y * r + rest, z * z * r + rest);
+    Matrix3::new(xx, xy - pz, xz + py, xy + pz, yy, yz - px, xz - py, yz + px, zz)
 }
 
 #[inline(always)]

@@ -21,7 +21,9 @@ fn runs(number: usize, duration_s: f64) -> Vec<BatchRun> {
         let speed = 0.8 + 0.4 * part;
         let springs = reference
             .K_S
-            .map(|K| ("spring".to_owned(), K * (0.7 + 0.6 * part), Damping::StiffnessProportional(reference.beta)))
+            .map(|stiffness| {
+                ("spring".to_owned(), stiffness * (0.7 + 0.6 * part), Damping::StiffnessProportional(reference.beta))
+            })
             .to_vec();
         let motion = MotionFn(move |t: f64, q: &mut [f64], v: &mut [f64], a: &mut [f64]| {
             let (x, y, z) = reference_motion(speed * t);

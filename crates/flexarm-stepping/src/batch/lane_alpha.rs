@@ -206,14 +206,13 @@ impl<T: Real> LaneAlpha<T> {
     #[inline(always)]
     fn place(&mut self, active: T) {
         product(&self.M_inverse_K, &self.trial, &mut self.shift);
-        let (h, half) = (self.grid.step_size(), T::splat(0.5));
-        let keep = |old: T, new: T| active.pick_below(half, old, new);
+        let h = self.grid.step_size();
         for k in 0..self.x.len() {
             let x_tilde = self.c_h2 * self.shift[k] + self.trial[k];
             let (x, v) = self.coefficients.advance(h, self.x[k], self.v[k], self.a[k], self.x_tilde[k], x_tilde);
-            self.x_tilde_new[k] = keep(self.x_tilde_new[k], x_tilde);
-            self.x_new[k] = keep(self.x_new[k], x);
-            self.v_new[k] = keep(self.v_new[k], v);
+            self.x_tilde_new[k] = picked(active, self.x_tilde_new[k], x_tilde);
+            self.x_new[k] = picked(active, self.x_new[k], x);
+            self.v_new[k] = picked(active, self.v_new[k], v);
         }
     }
 
@@ -266,7 +265,7 @@ impl<T: Real> LaneAlpha<T> {
         product(&self.inverse, &self.r, &mut self.d);
         let norm = dot(&self.d, &self.d).sqrt();
         for d in &mut self.d {
-            *d = active.pick_below(T::splat(0.5), zero, *d);
+            *d = picked(active, zero, *d);
         }
         product(&self.M_inverse_K, &self.d, &mut self.shift);
         let (c_D, c_K) = self.coefficients.derivatives(self.grid.step_size());
@@ -386,7 +385,6 @@ impl<T: Real> LaneSizes<T> {
     fn include(&mut self, correction: T, acceleration: T, place: T) {
         // What is not a number stays in a sum, and passes by in a largest value.
         let broken = correction - correction;
-        let larger = |a: T, b: T| a.pick_below(b, b, a);
         self.correction = larger(self.correction, correction.abs()) + broken;
         self.acceleration = larger(self.acceleration, acceleration.abs());
         self.place = larger(self.place, place.abs());
@@ -398,4 +396,15 @@ impl<T: Real> LaneSizes<T> {
         sizes.include(self.correction.lane(k), self.acceleration.lane(k), self.place.lane(k));
         sizes
     }
+}
+
+/// The new value where `active` is 1, else the old one.
+#[inline(always)]
+fn picked<T: Real>(active: T, old: T, new: T) -> T {
+    active.pick_below(T::splat(0.5), old, new)
+}
+
+#[inline(always)]
+fn larger<T: Real>(a: T, b: T) -> T {
+    a.pick_below(b, b, a)
 }

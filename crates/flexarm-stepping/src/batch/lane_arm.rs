@@ -146,10 +146,14 @@ impl<T: Real> LaneArm<T> {
     pub(super) fn damping_and_stiffness(&self, c_D: f64, c_K: f64, C: &mut [T]) {
         C.fill(T::zero());
         let proportional = self.D.is_none();
-        self.blocks(C, |element| {
-            let damping = if proportional { T::splat(c_D) * element.tau } else { T::zero() };
-            T::splat(c_K) + damping
-        });
+        self.blocks(
+            C,
+            #[inline(always)]
+            |element| {
+                let damping = if proportional { T::splat(c_D) * element.tau } else { T::zero() };
+                T::splat(c_K) + damping
+            },
+        );
         if let Some(D) = &self.D {
             for (c, d) in C.iter_mut().zip(D) {
                 *c += T::splat(c_D) * *d;
@@ -161,7 +165,11 @@ impl<T: Real> LaneArm<T> {
     #[inline(always)]
     pub(super) fn stiffness(&self, K: &mut [T]) {
         K.fill(T::zero());
-        self.blocks(K, |_| T::one());
+        self.blocks(
+            K,
+            #[inline(always)]
+            |_| T::one(),
+        );
     }
 
     /// Adds a multiple of each stiffness in its place.
