@@ -52,9 +52,9 @@ pub fn world_poses(model: &Model, data: &mut Data) {
 pub(crate) fn place_in_world<T: Real>(model: &Model, data: &mut Data<T>) {
     data.X_WB[0] = identity();
     for i in 1..model.bodies.len() {
-        let (X_WP, X_PB) = (data.X_WB[model.bodies[i].parent], data.X_PB[i]);
+        let (inward, outward) = data.X_WB.split_at_mut(i);
+        let (X_WP, X_PB, X_WB) = (&inward[model.bodies[i].parent], &data.X_PB[i], &mut outward[0]);
         let R_WP = X_WP.rotation.matrix();
-        let X_WB = &mut data.X_WB[i];
         *X_WB.rotation.matrix_mut_unchecked() = mul3(R_WP, X_PB.rotation.matrix());
         X_WB.translation.vector = add(&X_WP.translation.vector, &mul(R_WP, &X_PB.translation.vector));
     }

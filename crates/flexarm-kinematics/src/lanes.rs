@@ -6,12 +6,14 @@
 
 use std::sync::Arc;
 
-use flexarm_spatial::{Real, SpatialInertia};
+use flexarm_spatial::products::{add, lift, lift3, mul};
+use flexarm_spatial::{ElasticAngles, Pose, Real, SpatialInertia};
+use nalgebra::Vector3;
 
 use crate::crba::composite_bodies;
 use crate::data::{Data, State};
-use crate::kinematics::{place_bodies, place_in_world};
-use crate::model::{Model, Tree};
+use crate::kinematics::place_bodies;
+use crate::model::{Frame, JointMotion, Model, Tree};
 use crate::rnea::newton_euler;
 
 /// A tree with inertias of its own in each lane.
@@ -81,8 +83,49 @@ pub fn forward_kinematics<T: Real>(tree: &LaneTree<T>, data: &mut Data<T>, q: &[
     place_bodies(&tree.model, data, q);
 }
 
-/// [`crate::world_poses`].
+/// Places of a frame's origin in the world (m): with all elastic coordinates at zero, and at `q`.
+///
+/// For the poses of the joints that the last algorithm left in `data`, at the same joint coordinates; the elastic ones may be others.
 #[inline(always)]
-pub fn world_poses<T: Real>(tree: &LaneTree<T>, data: &mut Data<T>) {
-    place_in_world(&tree.model, data);
+pub fn rigid_and_flexible<T: Real>(tree: &LaneTree<T>, data: &Data<T>, frame: &Frame, q: &[T]) -> [Vector3<T>; 2] {
+    let model = tree.model();
+    let own = lift(&frame.X_BF.translation.vector);
+    let [mut rigid, mut flexible] = [own; 2];
+    let mut i = frame.body;
+    while i > 0 {
+        let body = &model.bodies[i];
+        let elastic = match body.motion {
+            JointMotion::Axis(_) | JointMotion::Welded => {
+                let X_PB = &data.X_PB[i];
+                rigid = carried(X_PB, &rigid);
+                flexible = carried(X_PB, &flexible);
+                i = body.parent;
+                continue;
+            }
+            JointMotion::Elastic(angles) => {
+                let own = &q[body.coordinate..body.coordinate + 6];
+                let (R, _) = angles.pose(&Vector3::new(own[3], own[4], own[5]));
+                add(&mul(&R, &flexible), &Vector3::new(own[0], own[1], own[2]))
+            }
+            JointMotion::Interface { modal, interface } => {
+                let modal = &model.modal[modal];
+                let shape = &modal.tables.shapes.interfaces[interface];
+                let (d, phi) = shape.times(&q[body.coordinate..body.coordinate + modal.n]);
+                let (R, _) = ElasticAngles::RotationVector.pose(&phi);
+                add(&mul(&R, &flexible), &d)
+            }
+        };
+        // The joint frame in the parent holds for both.
+        let (R_PJ, p_PJ) = (lift3(body.X_PJ.rotation.matrix()), lift(&body.X_PJ.translation.vector));
+        rigid = add(&p_PJ, &mul(&R_PJ, &rigid));
+        flexible = add(&p_PJ, &mul(&R_PJ, &elastic));
+        i = body.parent;
+    }
+    [rigid, flexible]
+}
+
+/// A point of B in P.
+#[inline(always)]
+fn carried<T: Real>(X_PB: &Pose<T>, p: &Vector3<T>) -> Vector3<T> {
+    add(&X_PB.translation.vector, &mul(X_PB.rotation.matrix(), p))
 }

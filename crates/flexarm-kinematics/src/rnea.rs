@@ -67,9 +67,9 @@ pub(crate) fn newton_euler<T: Real>(tree: &impl Tree<T>, data: &mut Data<T>, q: 
     for i in 1..n {
         let body = &model.bodies[i];
         let (V_PB, bias) = joint_motion(model, data, i, q, qdot);
-        let X_PB = data.X_PB[i];
-        let V = data.V[body.parent].at_child(&X_PB) + V_PB; // (1)
-        let mut A = data.A[body.parent].at_child(&X_PB) + bias + V.cross(&V_PB); // (2)
+        let X_PB = &data.X_PB[i];
+        let V = data.V[body.parent].at_child(X_PB) + V_PB; // (1)
+        let mut A = data.A[body.parent].at_child(X_PB) + bias + V.cross(&V_PB); // (2)
         if let Some(qddot) = qddot {
             A += subspace_times(model, data, i, qddot);
         }

@@ -145,6 +145,18 @@ impl Real for Four {
     }
 
     #[inline(always)]
+    fn flat(all: &[Self]) -> &[f64] {
+        // SAFETY: each is four numbers without gaps, and more strictly aligned.
+        unsafe { std::slice::from_raw_parts(all.as_ptr().cast(), 4 * all.len()) }
+    }
+
+    #[inline(always)]
+    fn flat_mut(all: &mut [Self]) -> &mut [f64] {
+        // SAFETY: as in `flat`; every bit pattern is a number.
+        unsafe { std::slice::from_raw_parts_mut(all.as_mut_ptr().cast(), 4 * all.len()) }
+    }
+
+    #[inline(always)]
     fn sqrt(self) -> Self {
         // SAFETY: see the module page.
         Self(unsafe { _mm256_sqrt_pd(self.0) })

@@ -42,6 +42,12 @@ pub trait Real:
     /// Another number in one lane.
     fn set_lane(&mut self, k: usize, x: f64);
 
+    /// Numbers lane by lane: those of entry i begin at `i LANES`.
+    fn flat(all: &[Self]) -> &[f64];
+
+    /// The same, to be changed.
+    fn flat_mut(all: &mut [Self]) -> &mut [f64];
+
     /// Square root.
     fn sqrt(self) -> Self;
 
@@ -103,7 +109,10 @@ pub trait Real:
 pub fn sin_cos_all<T: Real>(angles: &[T], sines: &mut [T], cosines: &mut [T]) {
     assert!(sines.len() == angles.len() && cosines.len() == angles.len(), "a sine and a cosine for each angle");
     // Without a branch in between, numbers too go side by side.
-    if angles.iter().all(|angle| angle.abs().all_below(LARGEST_ANGLE)) {
+    if angles.iter().all(
+        #[inline(always)]
+        |angle| angle.abs().all_below(LARGEST_ANGLE),
+    ) {
         for ((angle, sine), cosine) in angles.iter().zip(sines).zip(cosines) {
             (*sine, *cosine) = sine_and_cosine(*angle);
         }
@@ -210,6 +219,16 @@ impl Real for f64 {
     #[inline(always)]
     fn set_lane(&mut self, _k: usize, x: f64) {
         *self = x;
+    }
+
+    #[inline(always)]
+    fn flat(all: &[Self]) -> &[f64] {
+        all
+    }
+
+    #[inline(always)]
+    fn flat_mut(all: &mut [Self]) -> &mut [f64] {
+        all
     }
 
     #[inline(always)]

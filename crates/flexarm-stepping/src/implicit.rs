@@ -33,8 +33,8 @@ const TO_THE_END: f64 = 1e-6;
 /// Part of what may be left that ρ may be with a matrix just taken: more is no age of the matrix but something that it does not
 /// know (weight, loads, speeds), whose error has the same sign in every step and may feed a mode.
 const EXACT: f64 = 0.5;
-/// Searches that may end on a ρ measured before them.
-const MOST_UNMEASURED: u32 = 6;
+/// In every step whose number is a multiple of this ρ is measured anew: in all runs that go side by side at once.
+const MEASURED_EVERY: u64 = 8;
 /// A first correction so many times as large as the largest of late comes from something new, of which ρ says nothing.
 const SUDDEN: f64 = 1.2;
 /// What is left of the largest of late after each search.
@@ -63,8 +63,8 @@ pub(crate) struct Newton {
     /// ρ as measured last, infinite with a new matrix, and as measured first with this one.
     contraction: f64,
     first_contraction: f64,
-    /// Searches since then.
-    unmeasured: u32,
+    /// Whether it is to be measured in this step.
+    measuring: bool,
     /// Part of the first correction that a search may leave.
     left: f64,
     /// Whether the matrix was taken in the search under way.
@@ -88,7 +88,7 @@ impl Newton {
             last_correction: 0.0,
             contraction: f64::INFINITY,
             first_contraction: f64::INFINITY,
-            unmeasured: 0,
+            measuring: false,
             left: TO_THE_END,
             new: false,
             largest_first: 0.0,
@@ -98,6 +98,11 @@ impl Newton {
     /// The same, with searches that may leave this part of their first correction.
     pub(crate) fn leaving(self, left: f64) -> Self {
         Self { left, ..self }
+    }
+
+    /// After so many whole steps the next one begins.
+    pub(crate) fn begin_step(&mut self, steps: u64) {
+        self.measuring = steps.is_multiple_of(MEASURED_EVERY);
     }
 
     /// Matrix and memory are out of date.
@@ -131,9 +136,7 @@ impl Newton {
         let calm = norm <= SUDDEN * self.largest_first;
         self.largest_first = norm.max(FADING * self.largest_first);
         let exact = self.first_contraction <= EXACT * self.left;
-        let ends = calm && exact && self.unmeasured < MOST_UNMEASURED && self.contraction <= self.left;
-        self.unmeasured += u32::from(ends);
-        ends
+        calm && exact && !self.measuring && self.contraction <= self.left
     }
 
     /// An iteration left this part of the one before. With the matrix of the search itself it says nothing of those to come.
@@ -143,7 +146,6 @@ impl Newton {
                 self.first_contraction = contraction;
             }
             self.contraction = contraction;
-            self.unmeasured = 0;
         }
     }
 
@@ -191,6 +193,8 @@ pub(crate) struct Search {
     /// `dx/dẍ` of the method (s²).
     c_K: f64,
     pub(crate) iterations: usize,
+    /// Whether it got a fresh matrix; for those who do not compute one at once.
+    pub(crate) renewed: bool,
     /// Norms of the first correction and of the last one.
     first: f64,
     last: f64,
@@ -198,7 +202,7 @@ pub(crate) struct Search {
 
 impl Search {
     pub(crate) fn new(t: f64, h: f64, c_K: f64) -> Self {
-        Self { t, h, c_K, iterations: 0, first: 0.0, last: f64::INFINITY }
+        Self { t, h, c_K, iterations: 0, renewed: false, first: 0.0, last: f64::INFINITY }
     }
 
     /// Whether the iteration stalls: it gets a fresh matrix.
@@ -274,7 +278,9 @@ impl<M: ImplicitStep> Integrator for M {
         let grid = &ImplicitStep::current(self).grid;
         // Whole steps are all the same, so that their matrix lasts.
         let dt = if t == grid.next_time() && grid.is_on_step() { grid.step_size() } else { t - grid.time() };
+        let steps = grid.steps();
         self.newton_mut().last_iterations = 0;
+        self.newton_mut().begin_step(steps);
         cross(self, system, t, dt, MOST_HALVINGS)
     }
 

@@ -1,4 +1,4 @@
-//! Small dense matrices over any scalar, column after column in a slice; n is their number of rows.
+//! Small dense matrices, column after column in a slice; n is their number of rows.
 //!
 //! Sums have the order of the same operations in nalgebra, which a single run uses: each lane has its bits.
 
@@ -49,65 +49,68 @@ pub(super) fn dot<T: Real>(a: &[T], b: &[T]) -> T {
     total
 }
 
-/// Cholesky's factor in the lower triangle; what is returned is zero in the lanes whose matrix is positive definite.
+/// Cholesky's factor in the lower triangle; false if the matrix is not positive definite.
 #[inline(always)]
-pub(super) fn cholesky<T: Real>(A: &mut [T], n: usize) -> T {
-    let (zero, one) = (T::zero(), T::one());
-    let mut failed = zero;
+pub(super) fn cholesky(A: &mut [f64], n: usize) -> bool {
+    let mut positive = true;
     for j in 0..n {
-        for k in 0..j {
-            let factor = -A[k * n + j];
-            for i in j..n {
-                A[j * n + i] = factor * A[k * n + i] + A[j * n + i];
-            }
+        let (before, rest) = A.split_at_mut(j * n);
+        let column = &mut rest[j..n];
+        for inward in before.chunks_exact(n) {
+            let inward = &inward[j..];
+            subtract(column, inward[0], inward);
         }
-        let pivot = A[j * n + j];
-        failed += zero.pick_below(pivot, zero, one);
-        let denominator = pivot.sqrt();
-        A[j * n + j] = denominator;
-        for entry in &mut A[j * n + j + 1..(j + 1) * n] {
+        positive &= column[0] > 0.0;
+        let denominator = column[0].sqrt();
+        column[0] = denominator;
+        for entry in &mut column[1..] {
             *entry /= denominator;
         }
     }
-    failed
+    positive
 }
 
 /// Solves `A X = B` with the factor of A; takes `Bᵀ`, leaves `Xᵀ`.
 #[inline(always)]
-pub(super) fn solve_transposed<T: Real>(L: &[T], Bt: &mut [T], n: usize) {
+pub(super) fn solve_transposed(L: &[f64], Bt: &mut [f64], n: usize) {
     for k in 0..n {
-        scale(&mut Bt[k * n..(k + 1) * n], T::one() / L[k * n + k]);
-        for i in k + 1..n {
-            subtract(Bt, n, k, i, L[k * n + i]);
+        let (inward, outward) = Bt.split_at_mut((k + 1) * n);
+        let column = &mut inward[k * n..];
+        let factors = &L[k * n + k..(k + 1) * n];
+        scale(column, 1.0 / factors[0]);
+        for (to, factor) in outward.chunks_exact_mut(n).zip(&factors[1..]) {
+            subtract(to, *factor, column);
         }
     }
     for k in (0..n).rev() {
-        for i in k + 1..n {
-            subtract(Bt, n, i, k, L[k * n + i]);
+        let (inward, outward) = Bt.split_at_mut((k + 1) * n);
+        let column = &mut inward[k * n..];
+        let factors = &L[k * n + k..(k + 1) * n];
+        for (from, factor) in outward.chunks_exact(n).zip(&factors[1..]) {
+            subtract(column, *factor, from);
         }
-        scale(&mut Bt[k * n..(k + 1) * n], T::one() / L[k * n + k]);
+        scale(column, 1.0 / factors[0]);
     }
 }
 
 #[inline(always)]
-fn scale<T: Real>(column: &mut [T], by: T) {
+fn scale(column: &mut [f64], by: f64) {
     for entry in column {
         *entry *= by;
     }
 }
 
-/// Takes a multiple of column `from` off column `to`.
+/// Takes a multiple of one column off another.
 #[inline(always)]
-fn subtract<T: Real>(A: &mut [T], n: usize, from: usize, to: usize, factor: T) {
-    let factor = -factor;
-    for r in 0..n {
-        A[to * n + r] = factor * A[from * n + r] + A[to * n + r];
+fn subtract(to: &mut [f64], factor: f64, from: &[f64]) {
+    for (to, from) in to.iter_mut().zip(from) {
+        *to = -factor * *from + *to;
     }
 }
 
 /// `A ← Aᵀ`.
 #[inline(always)]
-pub(super) fn transpose<T: Real>(A: &mut [T], n: usize) {
+pub(super) fn transpose(A: &mut [f64], n: usize) {
     for j in 0..n {
         for i in j + 1..n {
             A.swap(j * n + i, i * n + j);
@@ -136,7 +139,7 @@ mod tests {
             assert_eq!(dot(x.as_slice(), &y), x.dot(&expected));
 
             let mut L = A.as_slice().to_vec();
-            assert_eq!(cholesky(&mut L, n), 0.0);
+            assert!(cholesky(&mut L, n));
             let factor = Cholesky::new(A.clone()).unwrap();
             let lower = DMatrix::from_column_slice(n, n, &L).lower_triangle();
             assert_eq!(lower, factor.l());
@@ -147,7 +150,7 @@ mod tests {
             transpose(ours.as_mut_slice(), n);
             assert_eq!(ours, theirs.transpose());
         }
-        assert_eq!(cholesky(&mut [1.0, 2.0, 2.0, 1.0], 2), 1.0);
-        assert_eq!(cholesky(&mut [f64::NAN], 1), 1.0);
+        assert!(!cholesky(&mut [1.0, 2.0, 2.0, 1.0], 2));
+        assert!(!cholesky(&mut [f64::NAN], 1));
     }
 }

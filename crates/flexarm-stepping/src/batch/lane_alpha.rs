@@ -4,11 +4,12 @@
 //! one lane needs a matrix, all compute one and the others keep theirs. A lane that would do anything else than take whole
 //! steps, or whose step fails, is left behind ([`LaneAlpha::left_behind`]): its run is to be taken alone.
 
-use flexarm_kinematics::Real;
+use flexarm_kinematics::{Frame, Real};
+use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::arm::FlexibleArm;
 use crate::batch::dense::{cholesky, dot, product, solve_transposed, transpose};
-use crate::batch::lane_arm::{LaneArm, set};
+use crate::batch::lane_arm::{LaneArm, set_lane};
 use crate::error::StepError;
 use crate::implicit::{ImplicitStep, Newton, Search, Sizes};
 use crate::integrator::TimeGrid;
@@ -16,11 +17,26 @@ use crate::reduced::ReducedArm;
 use crate::statics::static_equilibrium;
 use crate::stepper::{LARGEST_DEFLECTION, Start};
 use crate::steppers::{AlphaSettings, Coefficients, GeneralizedAlpha, leave_of};
+use crate::system::SecondOrderSystem;
+
+/// Parts of a step.
+#[derive(Clone, Copy, PartialEq)]
+enum Part {
+    /// A matrix at its start.
+    Begin,
+    /// Newton's method.
+    Iterate,
+    /// Matrices for the next one.
+    End,
+}
 
 /// One run: its own view of motion and events, and the memory of its Newton iterations.
 struct Lane {
     system: ReducedArm,
     newton: Newton,
+    /// `c_D D + c_K K` and K, which do not change.
+    C: DMatrix<f64>,
+    K: DMatrix<f64>,
     /// Whether its run goes on here.
     alive: bool,
 }
@@ -28,14 +44,14 @@ struct Lane {
 /// Runs in lanes, at one time.
 pub(super) struct LaneAlpha<T: Real> {
     coefficients: Coefficients,
-    /// c of the dispersion correction, 0 without.
-    c_h2: T,
+    /// `c h²` of the dispersion correction, 0 without.
+    c_h2: f64,
     lanes: Vec<Lane>,
     searches: Vec<Search>,
-    pub(super) arm: LaneArm<T>,
+    arm: LaneArm<T>,
     pub(super) grid: TimeGrid,
     /// Positions, velocities, accelerations; ẍ one step before, a and x̃.
-    pub(super) x: Vec<T>,
+    x: Vec<T>,
     v: Vec<T>,
     acceleration: Vec<T>,
     previous: Vec<T>,
@@ -55,10 +71,7 @@ pub(super) struct LaneAlpha<T: Real> {
     inverse: Vec<T>,
     /// Workspaces of the matrices.
     S: Vec<T>,
-    C: Vec<T>,
-    K: Vec<T>,
-    L: Vec<T>,
-    work: Vec<T>,
+    matrices: Matrices,
 }
 
 impl<T: Real> LaneAlpha<T> {
@@ -80,7 +93,7 @@ impl<T: Real> LaneAlpha<T> {
         let c = if settings.dispersion_correction { coefficients.dispersion().max(0.0) } else { 0.0 };
         let mut all = Self {
             coefficients,
-            c_h2: T::splat(c * h * h),
+            c_h2: c * h * h,
             lanes: Vec::new(),
             searches: Vec::with_capacity(T::LANES),
             arm,
@@ -101,10 +114,7 @@ impl<T: Real> LaneAlpha<T> {
             M_inverse_K: square(),
             inverse: square(),
             S: square(),
-            C: square(),
-            K: square(),
-            L: square(),
-            work: square(),
+            matrices: Matrices::new(n),
         };
         for (lane, arm) in arms.iter().enumerate() {
             match all.begin(lane, arm, settings, start) {
@@ -112,6 +122,7 @@ impl<T: Real> LaneAlpha<T> {
                 Err(error) => return Some(Err((lane, error))),
             }
         }
+        all.arm.place_joints();
         all.a.copy_from_slice(&all.acceleration);
         all.x_tilde.copy_from_slice(&all.acceleration);
         all.previous.copy_from_slice(&all.acceleration);
@@ -130,29 +141,37 @@ impl<T: Real> LaneAlpha<T> {
         let n = arm.n_elastic_coordinates();
         let e = match start {
             Start::Equilibrium if n > 0 => static_equilibrium(arm, 0.0)?,
-            _ => nalgebra::DVector::zeros(n),
+            _ => DVector::zeros(n),
         };
         let mut system = ReducedArm::new(arm.clone());
         let (x, v) = system.start(&e)?;
         let alone = GeneralizedAlpha::new(&mut system, 0.0, h, settings, x, v)?;
         let now = ImplicitStep::current(&alone);
-        for k in 0..n {
-            self.x[k].set_lane(lane, now.x[k]);
-            self.v[k].set_lane(lane, now.v[k]);
-            self.acceleration[k].set_lane(lane, now.acceleration[k]);
-        }
+        set_lane(&mut self.x, lane, now.x.as_slice());
+        set_lane(&mut self.v, lane, now.v.as_slice());
+        set_lane(&mut self.acceleration, lane, now.acceleration.as_slice());
         system.sample_joints(0.0);
         self.place_joints(lane, &system);
         let mut newton = Newton::new(0, h);
         if let Some(left) = leave_of(settings, arm, h) {
             newton = newton.leaving(left);
         }
-        Ok(Lane { system, newton, alive: true })
+        let [mut C, mut K] = [DMatrix::zeros(n, n), DMatrix::zeros(n, n)];
+        let (c_D, c_K) = self.coefficients.derivatives(h);
+        system.damping_and_stiffness(c_D, c_K, &mut C);
+        system.stiffness(&mut K);
+        Ok(Lane { system, newton, C, K, alive: true })
     }
 
     fn place_joints(&mut self, lane: usize, system: &ReducedArm) {
         let (q, qdot) = (system.state.q.as_slice(), system.state.qdot.as_slice());
         self.arm.set_joints(lane, q, qdot, system.qddot.as_slice());
+    }
+
+    /// Flexible minus rigid place of a frame now (m, world axes).
+    #[inline(always)]
+    pub(super) fn deflection(&mut self, tool: &Frame) -> Vector3<T> {
+        self.arm.deflection(tool, &self.x)
     }
 
     /// Whether the run of a lane is to be taken alone.
@@ -161,24 +180,93 @@ impl<T: Real> LaneAlpha<T> {
     }
 
     /// One step of all lanes that are not left behind; of others the state means nothing.
+    ///
+    /// Equations of motion and matrices have one place each in it: inlined twice, the code would not fit the processor's
+    /// cache.
     #[inline(always)]
     pub(super) fn step(&mut self) {
         let (t, h) = (self.grid.next_time(), self.grid.step_size());
-        let mut unfactored = T::zero();
-        for (k, lane) in self.lanes.iter().enumerate() {
-            unfactored.set_lane(k, f64::from(u8::from(!lane.newton.factored)));
-        }
-        if unfactored.any_above(0.5) {
+        let c_K = self.coefficients.derivatives(h).1;
+        self.searches.clear();
+        self.searches.extend((0..T::LANES).map(|_| Search::new(t, h, c_K)));
+        let steps = self.grid.steps();
+        self.lanes.iter_mut().for_each(|lane| lane.newton.begin_step(steps));
+        let mut active = T::one();
+        let mut part = Part::Iterate;
+        if self.mask(|lane| !lane.newton.factored).any_above(0.5) {
             // The first step: the joints are still where they start.
-            self.arm.residual(T::one(), &self.x, &self.v, &self.acceleration, &mut self.r);
-            self.factor(unfactored);
+            part = Part::Begin;
+            self.x_new.copy_from_slice(&self.x);
+            self.v_new.copy_from_slice(&self.v);
+            self.trial.copy_from_slice(&self.acceleration);
+        } else {
+            active = self.begin_search(t);
         }
+        loop {
+            if part != Part::End {
+                self.arm.residual(active, &self.x_new, &self.v_new, &self.trial, &mut self.r);
+            }
+            let wanted = match part {
+                Part::Begin => T::one(),
+                Part::Iterate => self.stalled(active),
+                Part::End => self.mask(|lane| lane.alive && !lane.newton.factored),
+            };
+            let renewed = wanted.any_above(0.5);
+            if renewed {
+                self.factor(wanted);
+            }
+            match part {
+                Part::Begin => {
+                    active = self.begin_search(t);
+                    part = Part::Iterate;
+                }
+                Part::Iterate if renewed => self.place(wanted),
+                Part::Iterate => {
+                    active = self.correct(active);
+                    if !active.any_above(0.5) {
+                        self.accept();
+                        self.grid.reach(t);
+                        part = Part::End;
+                    }
+                }
+                Part::End => {
+                    let own = self.lanes.iter_mut().enumerate().filter(|(k, _)| wanted.lane(*k) == 1.0);
+                    own.for_each(|(_, lane)| lane.newton.renewed_between());
+                    return;
+                }
+            }
+        }
+    }
+
+    /// 1 in the lanes that fulfil a condition, else 0.
+    fn mask(&self, condition: impl Fn(&Lane) -> bool) -> T {
+        let mut mask = T::zero();
+        for (k, lane) in self.lanes.iter().enumerate() {
+            mask.set_lane(k, f64::from(u8::from(condition(lane))));
+        }
+        mask
+    }
+
+    /// Puts the joints and the prediction at the end of the step; the lanes that take it.
+    #[inline(always)]
+    fn begin_search(&mut self, t: f64) -> T {
         self.sample(t);
-        self.predict();
-        self.search(t, h);
-        self.accept();
-        self.grid.reach(t);
-        self.renew_matrices();
+        for k in 0..self.x.len() {
+            self.trial[k] = T::splat(2.0) * self.acceleration[k] - self.previous[k];
+        }
+        self.place(T::one());
+        self.mask(|lane| lane.alive)
+    }
+
+    /// Lanes whose iteration is to get a fresh matrix, which they get once.
+    fn stalled(&mut self, active: T) -> T {
+        let mut stalled = T::zero();
+        for (k, search) in self.searches.iter_mut().enumerate() {
+            let stalls = active.lane(k) == 1.0 && search.stalls() && !search.renewed;
+            search.renewed |= stalls;
+            stalled.set_lane(k, f64::from(u8::from(stalls)));
+        }
+        stalled
     }
 
     /// Joints of all lanes at the end of the step; a step that has to be cut is none for lanes.
@@ -193,22 +281,13 @@ impl<T: Real> LaneAlpha<T> {
         }
     }
 
-    /// ẍ⁺ by extrapolation, and the rest by the scheme.
-    #[inline(always)]
-    fn predict(&mut self) {
-        for k in 0..self.x.len() {
-            self.trial[k] = T::splat(2.0) * self.acceleration[k] - self.previous[k];
-        }
-        self.place(T::one());
-    }
-
     /// As in a single run, where `active` is 1.
     #[inline(always)]
     fn place(&mut self, active: T) {
         product(&self.M_inverse_K, &self.trial, &mut self.shift);
         let h = self.grid.step_size();
         for k in 0..self.x.len() {
-            let x_tilde = self.c_h2 * self.shift[k] + self.trial[k];
+            let x_tilde = T::splat(self.c_h2) * self.shift[k] + self.trial[k];
             let (x, v) = self.coefficients.advance(h, self.x[k], self.v[k], self.a[k], self.x_tilde[k], x_tilde);
             self.x_tilde_new[k] = picked(active, self.x_tilde_new[k], x_tilde);
             self.x_new[k] = picked(active, self.x_new[k], x);
@@ -216,51 +295,9 @@ impl<T: Real> LaneAlpha<T> {
         }
     }
 
-    /// Newton's method in all lanes until none goes on.
+    /// Takes the correction `d = J^-1 r` off everything on trial, where `active` is 1; the lanes that go on.
     #[inline(always)]
-    fn search(&mut self, t: f64, h: f64) {
-        let c_K = self.coefficients.derivatives(h).1;
-        let mut searches = std::mem::take(&mut self.searches);
-        searches.clear();
-        searches.extend((0..T::LANES).map(|_| Search::new(t, h, c_K)));
-        let mut active = T::zero();
-        for (k, lane) in self.lanes.iter().enumerate() {
-            active.set_lane(k, f64::from(u8::from(lane.alive)));
-        }
-        while active.any_above(0.5) {
-            self.arm.residual(active, &self.x_new, &self.v_new, &self.trial, &mut self.r);
-            let mut stalled = T::zero();
-            for (k, search) in searches.iter().enumerate() {
-                let stalls = search.stalls() && active.lane(k) == 1.0;
-                stalled.set_lane(k, f64::from(u8::from(stalls)));
-            }
-            if stalled.any_above(0.5) {
-                self.factor(stalled);
-                self.place(stalled);
-                self.arm.residual(active, &self.x_new, &self.v_new, &self.trial, &mut self.r);
-            }
-            let sizes = self.correct(active);
-            for (k, search) in searches.iter_mut().enumerate() {
-                if active.lane(k) != 1.0 {
-                    continue;
-                }
-                let lane = &mut self.lanes[k];
-                match search.ends(sizes.lane(k), &mut lane.newton) {
-                    Ok(false) => continue,
-                    Ok(true) => lane.newton.found(search.iterations, search.iterations),
-                    Err(_) => lane.alive = false,
-                }
-                // A link that has come apart is told by the run alone.
-                lane.alive &= sizes.place.lane(k) <= LARGEST_DEFLECTION;
-                active.set_lane(k, 0.0);
-            }
-        }
-        self.searches = searches;
-    }
-
-    /// Takes the correction `d = J^-1 r` off everything on trial, where `active` is 1.
-    #[inline(always)]
-    fn correct(&mut self, active: T) -> LaneSizes<T> {
+    fn correct(&mut self, active: T) -> T {
         let zero = T::zero();
         product(&self.inverse, &self.r, &mut self.d);
         let norm = dot(&self.d, &self.d).sqrt();
@@ -272,14 +309,33 @@ impl<T: Real> LaneAlpha<T> {
         let mut sizes = LaneSizes { norm, correction: zero, acceleration: zero, place: zero };
         for k in 0..self.d.len() {
             let d = self.d[k];
-            let d_tilde = d + self.c_h2 * self.shift[k];
+            let d_tilde = d + T::splat(self.c_h2) * self.shift[k];
             self.trial[k] -= d;
             self.x_tilde_new[k] -= d_tilde;
             self.x_new[k] -= T::splat(c_K) * d_tilde;
             self.v_new[k] -= T::splat(c_D) * d_tilde;
             sizes.include(d, self.trial[k], self.x_new[k]);
         }
-        sizes
+        self.judge(active, &sizes)
+    }
+
+    /// Whether the iteration of each lane goes on.
+    fn judge(&mut self, mut active: T, sizes: &LaneSizes<T>) -> T {
+        for (k, search) in self.searches.iter_mut().enumerate() {
+            if active.lane(k) != 1.0 {
+                continue;
+            }
+            let lane = &mut self.lanes[k];
+            match search.ends(sizes.lane(k), &mut lane.newton) {
+                Ok(false) => continue,
+                Ok(true) => lane.newton.found(search.iterations, search.iterations),
+                Err(_) => lane.alive = false,
+            }
+            // A link that has come apart is told by the run alone.
+            lane.alive &= sizes.place.lane(k) <= LARGEST_DEFLECTION;
+            active.set_lane(k, 0.0);
+        }
+        active
     }
 
     /// What was on trial becomes the state.
@@ -295,80 +351,88 @@ impl<T: Real> LaneAlpha<T> {
         std::mem::swap(&mut self.acceleration, &mut self.trial);
     }
 
-    /// New matrices for the lanes whose matrix is not good any more.
-    #[inline(always)]
-    fn renew_matrices(&mut self) {
-        let mut stale = T::zero();
-        for (k, lane) in self.lanes.iter().enumerate() {
-            stale.set_lane(k, f64::from(u8::from(lane.alive && !lane.newton.factored)));
-        }
-        if stale.any_above(0.5) {
-            self.factor(stale);
-            for (k, lane) in self.lanes.iter_mut().enumerate() {
-                if stale.lane(k) == 1.0 {
-                    lane.newton.renewed_between();
-                }
-            }
-        }
-    }
-
-    /// Newton's matrix at the configuration of the last residual, in the lanes where `wanted` is 1: see the dispersion
-    /// correction of a single run.
+    /// Newton's matrix at the configuration of the last residual, in the lanes where `wanted` is 1.
+    ///
+    /// Mostly it is one lane, so matrices are factorised one by one: there the instructions go along the columns.
     #[inline(always)]
     fn factor(&mut self, wanted: T) {
-        let n = self.x.len();
-        let (c_D, c_K) = self.coefficients.derivatives(self.grid.step_size());
-        let Self { arm, S, C, K, L, work, c_h2, .. } = self;
-        arm.mass(S);
-        arm.damping_and_stiffness(c_D, c_K, C);
-        arm.stiffness(K);
-        // M^-1 K into `work`, and its place where it is wanted.
+        self.arm.mass(&mut self.S);
+        for k in (0..T::LANES).filter(|k| wanted.lane(*k) == 1.0) {
+            let (lane, matrices) = (&mut self.lanes[k], &mut self.matrices);
+            for (to, from) in matrices.S.iter_mut().zip(T::flat(&self.S).chunks_exact(T::LANES)) {
+                *to = from[k];
+            }
+            // A run alone goes on without a matrix, or fails: it will tell.
+            lane.alive &= matrices.invert(self.c_h2, lane.C.as_slice(), lane.K.as_slice());
+            lane.newton.renewed();
+            lane.newton.fresh = false;
+            set_lane(&mut self.M_inverse_K, k, &matrices.M_inverse_K);
+            set_lane(&mut self.inverse, k, &matrices.inverse);
+        }
+    }
+}
+
+/// Newton's matrix of one lane; n × n, column after column.
+struct Matrices {
+    n: usize,
+    /// M, then `M + c h² K + S C Sᵀ` and its factor.
+    S: Vec<f64>,
+    /// `S C Sᵀ`.
+    product: Vec<f64>,
+    L: Vec<f64>,
+    M_inverse_K: Vec<f64>,
+    inverse: Vec<f64>,
+}
+
+impl Matrices {
+    fn new(n: usize) -> Self {
+        let square = || vec![0.0; n * n];
+        Self { n, S: square(), product: square(), L: square(), M_inverse_K: square(), inverse: square() }
+    }
+
+    /// `M^-1 K` and the inverse of Newton's matrix from S and a run's C and K, as the dispersion correction of a single run has them; false
+    /// if there is none.
+    #[inline(always)]
+    fn invert(&mut self, c_h2: f64, C: &[f64], K: &[f64]) -> bool {
+        let Self { n, S, product, L, M_inverse_K, inverse } = self;
+        let n = *n;
         L.copy_from_slice(S);
-        let mut failed = cholesky(L, n);
-        work.copy_from_slice(K);
-        solve_transposed(L, work, n);
-        transpose(work, n);
-        set(wanted, work, &mut self.M_inverse_K);
+        let positive = cholesky(L, n);
+        M_inverse_K.copy_from_slice(K);
+        solve_transposed(L, M_inverse_K, n);
+        transpose(M_inverse_K, n);
 
         // S C Sᵀ
         L.copy_from_slice(C);
-        for (column, x) in L.chunks_exact_mut(n).zip(work.chunks_exact(n)) {
+        for (column, x) in L.chunks_exact_mut(n).zip(M_inverse_K.chunks_exact(n)) {
             for (c, x) in C.chunks_exact(n).zip(x) {
                 for (y, c) in column.iter_mut().zip(c) {
-                    *y = *c_h2 * *c * *x + *y;
+                    *y += c_h2 * *c * *x;
                 }
             }
         }
-        C.copy_from_slice(L);
-        for (column, x) in C.chunks_exact_mut(n).zip(L.chunks_exact(n)) {
-            for (y, a) in column.iter_mut().zip(work.chunks_exact(n)) {
-                *y = *c_h2 * dot(a, x) + *y;
+        product.copy_from_slice(L);
+        for (column, x) in product.chunks_exact_mut(n).zip(L.chunks_exact(n)) {
+            for (y, a) in column.iter_mut().zip(M_inverse_K.chunks_exact(n)) {
+                *y = c_h2 * dot(a, x) + *y;
             }
         }
         // M + c h² K + S C Sᵀ, and Sᵀ on the right-hand side, which is kept transposed.
-        for ((s, k), c) in S.iter_mut().zip(K.iter()).zip(C.iter()) {
-            *s += *c_h2 * *k;
+        for ((s, k), c) in S.iter_mut().zip(K).zip(product.iter()) {
+            *s += c_h2 * *k;
             *s += *c;
         }
-        K.fill(T::zero());
+        inverse.fill(0.0);
         for j in 0..n {
-            K[j * n + j] = T::one();
+            inverse[j * n + j] = 1.0;
         }
-        for (i, s) in K.iter_mut().zip(work.iter()) {
-            *i += *c_h2 * *s;
+        for (i, s) in inverse.iter_mut().zip(M_inverse_K.iter()) {
+            *i += c_h2 * *s;
         }
-        failed += cholesky(S, n);
-        solve_transposed(S, K, n);
-        transpose(K, n);
-        set(wanted, K, &mut self.inverse);
-        for (k, lane) in self.lanes.iter_mut().enumerate() {
-            if wanted.lane(k) == 1.0 {
-                lane.newton.renewed();
-                lane.newton.fresh = false;
-                // A run alone goes on without a matrix, or fails: it will tell.
-                lane.alive &= failed.lane(k) == 0.0;
-            }
-        }
+        let positive = cholesky(S, n) && positive;
+        solve_transposed(S, inverse, n);
+        transpose(inverse, n);
+        positive
     }
 }
 

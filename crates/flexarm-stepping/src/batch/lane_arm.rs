@@ -3,8 +3,12 @@
 //! What they share is the tree. Inertias, stiffness, damping and motion differ. All joints are prescribed, springs straight;
 //! nothing happens at discrete times.
 
-use flexarm_kinematics::lanes::{LaneTree, inverse_dynamics, mass_matrix_at_poses};
-use flexarm_kinematics::{Data, Real, State};
+use flexarm_kinematics::lanes::{
+    LaneTree, forward_kinematics, inverse_dynamics, mass_matrix_at_poses, rigid_and_flexible,
+};
+use flexarm_kinematics::products::sub;
+use flexarm_kinematics::{Data, Frame, Real, State};
+use nalgebra::Vector3;
 
 use crate::arm::FlexibleArm;
 use crate::batch::dense::add_product;
@@ -22,7 +26,7 @@ struct Element<T> {
 
 /// Arms in lanes, with the workspaces of their equations of motion.
 pub(super) struct LaneArm<T: Real> {
-    pub(super) tree: LaneTree<T>,
+    tree: LaneTree<T>,
     data: Data<T>,
     state: State<T>,
     qddot: Vec<T>,
@@ -30,6 +34,8 @@ pub(super) struct LaneArm<T: Real> {
     /// Damping where it is not in proportion to the stiffness, n × n.
     D: Option<Vec<T>>,
     shifted: Vec<T>,
+    /// All coordinates, of which the elastic ones count.
+    q: Vec<T>,
 }
 
 /// A number of each arm.
@@ -77,6 +83,7 @@ impl<T: Real> LaneArm<T> {
             elements: (0..first.elements.len()).map(element).collect(),
             D,
             shifted: vec![T::zero(); n],
+            q: vec![T::zero(); model.nv()],
             tree,
         })
     }
@@ -93,16 +100,24 @@ impl<T: Real> LaneArm<T> {
 
     /// Motion of the joints of one arm, until it is set again.
     pub(super) fn set_joints(&mut self, lane: usize, q: &[f64], qdot: &[f64], qddot: &[f64]) {
-        for k in 0..self.joints() {
-            self.state.q[k].set_lane(lane, q[k]);
-            self.state.qdot[k].set_lane(lane, qdot[k]);
-            self.qddot[k].set_lane(lane, qddot[k]);
-        }
+        let n = self.joints();
+        set_lane(&mut self.state.q.as_mut_slice()[..n], lane, q);
+        set_lane(&mut self.state.qdot.as_mut_slice()[..n], lane, qdot);
+        set_lane(&mut self.qddot[..n], lane, qddot);
     }
 
-    /// Coordinates of the joints.
-    pub(super) fn joint_coordinates(&self) -> &[T] {
-        &self.state.q.as_slice()[..self.joints()]
+    /// Poses of the joints before any residual.
+    #[inline(always)]
+    pub(super) fn place_joints(&mut self) {
+        forward_kinematics(&self.tree, &mut self.data, self.state.q.as_slice());
+    }
+
+    /// Flexible minus rigid place of a frame (m, world axes), for the joints of the last residual and elastic coordinates x.
+    #[inline(always)]
+    pub(super) fn deflection(&mut self, tool: &Frame, x: &[T]) -> Vector3<T> {
+        self.q[self.tree.model().n_actuated()..].copy_from_slice(x);
+        let [rigid, flexible] = rigid_and_flexible(&self.tree, &self.data, tool, &self.q);
+        sub(&flexible, &rigid)
     }
 
     /// `r(x, v, a)` into r. Where `active` is not 1 the elastic state stays that of the call before, and r belongs to it.
@@ -140,57 +155,19 @@ impl<T: Real> LaneArm<T> {
             to.copy_from_slice(&self.data.M.as_slice()[(joints + column) * (joints + n) + joints..][..n]);
         }
     }
+}
 
-    /// `c_D D + c_K K`.
-    #[inline(always)]
-    pub(super) fn damping_and_stiffness(&self, c_D: f64, c_K: f64, C: &mut [T]) {
-        C.fill(T::zero());
-        let proportional = self.D.is_none();
-        self.blocks(
-            C,
-            #[inline(always)]
-            |element| {
-                let damping = if proportional { T::splat(c_D) * element.tau } else { T::zero() };
-                T::splat(c_K) + damping
-            },
-        );
-        if let Some(D) = &self.D {
-            for (c, d) in C.iter_mut().zip(D) {
-                *c += T::splat(c_D) * *d;
-            }
-        }
-    }
-
-    /// K.
-    #[inline(always)]
-    pub(super) fn stiffness(&self, K: &mut [T]) {
-        K.fill(T::zero());
-        self.blocks(
-            K,
-            #[inline(always)]
-            |_| T::one(),
-        );
-    }
-
-    /// Adds a multiple of each stiffness in its place.
-    #[inline(always)]
-    fn blocks(&self, C: &mut [T], factor: impl Fn(&Element<T>) -> T) {
-        let n = self.dimension();
-        for element in &self.elements {
-            let factor = factor(element);
-            for (column, own) in element.K.chunks_exact(element.size).enumerate() {
-                let to = &mut C[(element.first + column) * n + element.first..][..element.size];
-                for (c, k) in to.iter_mut().zip(own) {
-                    *c += factor * *k;
-                }
-            }
-        }
+/// Numbers of one lane.
+#[inline(always)]
+pub(super) fn set_lane<T: Real>(to: &mut [T], lane: usize, from: &[f64]) {
+    for (to, from) in T::flat_mut(to).chunks_exact_mut(T::LANES).zip(from) {
+        to[lane] = *from;
     }
 }
 
 /// Where `active` is 1, `to` becomes `from`.
 #[inline(always)]
-pub(super) fn set<T: Real>(active: T, from: &[T], to: &mut [T]) {
+fn set<T: Real>(active: T, from: &[T], to: &mut [T]) {
     let half = T::splat(0.5);
     for (to, from) in to.iter_mut().zip(from) {
         *to = active.pick_below(half, *to, *from);

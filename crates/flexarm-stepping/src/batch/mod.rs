@@ -10,8 +10,8 @@ mod dense;
 mod lane_alpha;
 mod lane_arm;
 
-use flexarm_kinematics::lanes::{LaneTree, forward_kinematics};
-use flexarm_kinematics::products::{add, dot, lift, mul, sub};
+use flexarm_kinematics::lanes::{LaneTree, forward_kinematics, rigid_and_flexible};
+use flexarm_kinematics::products::{dot, sub};
 use flexarm_kinematics::{Data, Frame, Real};
 use nalgebra::Vector3;
 
@@ -122,14 +122,13 @@ impl Batch {
             // A new tree where what it carries has changed.
             let same = |tree: &LaneTree<f64>| std::ptr::eq(tree.model(), std::sync::Arc::as_ptr(&seen.model));
             if !tool.as_ref().is_some_and(|(tree, _)| same(tree)) {
-                tool = LaneTree::new(std::slice::from_ref(&seen.model)).map(|tree| {
-                    let places = ToolPlaces::new(&tree);
-                    (tree, places)
-                });
+                tool = LaneTree::new(std::slice::from_ref(&seen.model)).map(|tree| (tree, Data::new(&seen.model)));
             }
-            let (joints, elastic) = seen.q.as_slice().split_at(seen.model.n_actuated());
-            if let Some((tree, places)) = &mut tool {
-                result.include(seen.t, places.deflection(tree, &self.tool, joints, elastic), self.keep_samples);
+            if let Some((tree, data)) = &mut tool {
+                let q = seen.q.as_slice();
+                forward_kinematics(tree, data, q);
+                let [rigid, flexible] = rigid_and_flexible(tree, data, &self.tool, q);
+                result.include(seen.t, sub(&flexible, &rigid), self.keep_samples);
             }
         }
         Ok(result.finished(steps))
@@ -170,14 +169,13 @@ impl Batch {
         let mut filled = arms.clone();
         filled.resize(T::LANES, arms.last()?);
         let mut lanes = LaneAlpha::<T>::new(&filled, self.settings, self.step_s, self.start)?.ok()?;
-        let mut tool = ToolPlaces::new(&lanes.arm.tree);
         let steps: Vec<u64> = runs.iter().map(|run| self.steps(run)).collect();
         let mut results = vec![ToolDeflection::default(); runs.len()];
         for step in 0..=steps.iter().copied().max()? {
             if step > 0 {
                 lanes.step();
             }
-            let deflection = tool.deflection(&lanes.arm.tree, &self.tool, lanes.arm.joint_coordinates(), &lanes.x);
+            let deflection = lanes.deflection(&self.tool);
             for (lane, result) in results.iter_mut().enumerate() {
                 if step <= steps[lane] {
                     let own = deflection.map(|x| x.lane(lane));
@@ -188,35 +186,5 @@ impl Batch {
         let finished = results.into_iter().zip(&steps).enumerate();
         let finished = finished.map(|(k, (result, steps))| (!lanes.left_behind(k)).then(|| result.finished(*steps)));
         Some(finished.collect())
-    }
-}
-
-/// Places of the tool of flexible and rigid arm, with the workspaces of their kinematics.
-struct ToolPlaces<T: Real> {
-    data: Data<T>,
-    q: Vec<T>,
-}
-
-impl<T: Real> ToolPlaces<T> {
-    fn new(tree: &LaneTree<T>) -> Self {
-        Self { data: Data::new(tree.model()), q: vec![T::zero(); tree.model().nv()] }
-    }
-
-    /// Flexible minus rigid, world axes (m).
-    #[inline(always)]
-    fn deflection(&mut self, tree: &LaneTree<T>, tool: &Frame, joints: &[T], elastic: &[T]) -> Vector3<T> {
-        let n = joints.len();
-        self.q[..n].copy_from_slice(joints);
-        self.q[n..].fill(T::zero());
-        let rigid = self.place(tree, tool);
-        self.q[n..].copy_from_slice(elastic);
-        sub(&self.place(tree, tool), &rigid)
-    }
-
-    #[inline(always)]
-    fn place(&mut self, tree: &LaneTree<T>, tool: &Frame) -> Vector3<T> {
-        forward_kinematics(tree, &mut self.data, &self.q);
-        let X_WB = &self.data.X_WB[tool.body];
-        add(&X_WB.translation.vector, &mul(X_WB.rotation.matrix(), &lift(&tool.X_BF.translation.vector)))
     }
 }
