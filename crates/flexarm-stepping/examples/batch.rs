@@ -49,8 +49,8 @@ fn main() {
     println!("{:>8} {:>10} {:>12} {:>12} {:>7}", "step ms", "start us", "alone us", "together us", "ratio");
     for step_s in [8e-3, 5e-3, 2.5e-3, 1e-3] {
         let tool = runs[0].arm.model.frame("tcp").unwrap().clone();
-        let settings = AlphaSettings::default();
-        let batch = Batch { step_s, settings, start: Start::Equilibrium, tool, keep_samples: false };
+        let batch =
+            Batch { step_s, stepper: StepperKind::default(), start: Start::Equilibrium, tool, keep_samples: false };
         let mut best = [f64::INFINITY; 3];
         for _ in 0..5 {
             let times = [

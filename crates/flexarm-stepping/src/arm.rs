@@ -133,6 +133,19 @@ pub enum Damping {
     Dampers([f64; 6]),
 }
 
+impl Damping {
+    /// So many times as much of it.
+    #[must_use]
+    pub fn scaled(self, factor: f64) -> Self {
+        match self {
+            Self::Modal(zeta) => Self::Modal(factor * zeta),
+            Self::StiffnessProportional(beta) => Self::StiffnessProportional(factor * beta),
+            Self::Rayleigh(a, b) => Self::Rayleigh(factor * a, factor * b),
+            Self::Dampers(d) => Self::Dampers(d.map(|d| factor * d)),
+        }
+    }
+}
+
 /// A change of what a body carries while the arm moves.
 #[derive(Clone, Debug, PartialEq)]
 pub struct InertiaChange {

@@ -53,6 +53,12 @@ impl TorqueCurve {
         Self { x: vec![-reach, -half, half, reach], y: vec![-stiffness, 0.0, 0.0, stiffness] }
     }
 
+    /// The same deflections with so many times the torque.
+    #[must_use]
+    pub fn scaled(&self, factor: f64) -> Self {
+        Self { x: self.x.clone(), y: self.y.iter().map(|y| factor * y).collect() }
+    }
+
     fn piece(&self, e: f64) -> usize {
         let inner = &self.x[1..self.x.len() - 1];
         inner.iter().take_while(|x| e >= **x).count()

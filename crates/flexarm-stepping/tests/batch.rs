@@ -48,7 +48,7 @@ fn run(of: Variation) -> BatchRun {
 fn batch(step_s: f64, runs: &[BatchRun]) -> Batch {
     Batch {
         step_s,
-        settings: AlphaSettings::default(),
+        stepper: StepperKind::default(),
         start: Start::Equilibrium,
         tool: runs[0].arm.model.frame("tcp").unwrap().clone(),
         keep_samples: true,
@@ -103,7 +103,8 @@ fn damping_ratios_and_other_settings_have_the_bits_of_the_run_alone() {
     for (rho, dispersion_correction) in [(0.9, true), (0.5, true), (0.0, false), (1.0, false)] {
         let settings = AlphaSettings { rho, dispersion_correction };
         for start in [Start::Equilibrium, Start::Undeformed] {
-            assert_equal_alone(&Batch { settings, start, ..batch(2e-3, &runs) }, &runs);
+            let stepper = StepperKind::GeneralizedAlpha(settings);
+            assert_equal_alone(&Batch { stepper, start, ..batch(2e-3, &runs) }, &runs);
         }
     }
 }

@@ -236,7 +236,16 @@ impl FlexibleRobot {
     /// # Errors
     /// As [`FlexibleArm::new`] and [`FlexibleArm::with_servo`].
     pub fn arm(&self, motion: Arc<dyn PrescribedMotion>) -> Result<FlexibleArm, StepError> {
-        let mut arm = FlexibleArm::new(self.model.clone(), self.springs.clone(), motion)?;
+        self.arm_with(self.springs.clone(), motion)
+    }
+
+    /// The same with other springs in the same places.
+    pub(crate) fn arm_with(
+        &self,
+        springs: Vec<Spring>,
+        motion: Arc<dyn PrescribedMotion>,
+    ) -> Result<FlexibleArm, StepError> {
+        let mut arm = FlexibleArm::new(self.model.clone(), springs, motion)?;
         if self.friction.iter().any(|f| *f != Friction::NONE) {
             arm.friction.clone_from(&self.friction);
         }

@@ -47,6 +47,7 @@ mod bends;
 mod caveat;
 mod check;
 mod convert;
+mod deflections;
 mod drive_entry;
 mod error;
 mod flexible;
@@ -88,6 +89,7 @@ pub use bends::Bend;
 pub use caveat::{Caveat, Severity};
 pub use check::{Finding, check, check_with_loads};
 pub use convert::{ConvertOptions, ConvertSummary, convert, convert_until, parse_recording_format, read_run};
+pub use deflections::Variation;
 pub use drive_entry::{Drive, DriveKind};
 pub use error::{
     ChannelError, Error, Fault, LoadError, ModellingError, PayloadError, PoseError, RecordingError, StudyError,
@@ -131,7 +133,7 @@ pub use flexarm_settings::{Names, Setting, name_settings};
 pub use flexarm_stepping::{
     AlphaSettings, ConstraintForm, InertiaChange, Load, LoadAxes, OperatingPoint, ReferenceMethod, ReferenceSettings,
     STEPPERS, SpookPreset, SpookSettings, Start, StepError, StepRule, StepperEntry, StepperKind, StepperOptions,
-    StepperSetting, TimedWrench,
+    StepperSetting, TimedWrench, ToolDeflection,
 };
 pub use flexarm_trajectory::{Trajectory, TrajectoryError};
 pub use flexarm_urdf::{InertiaEstimate, ReadOptions, closest, search_paths_from_environment};

@@ -39,6 +39,20 @@ pub(crate) fn checked(
     prepared: Option<Arc<FlexibleRobot>>,
 ) -> Result<Checked, Error> {
     let motion = &scenario.motion;
+    runnable(motion, options)?;
+    let flexible = prepared.map_or_else(|| robot.modelled(&options.modelling).map(Arc::new), Ok)?;
+    let arm = flexible.arm(motion.prescribed()).map_err(|error| flexible.explained(error))?;
+    let (arm, mut load_caveats) = loaded(robot, scenario, options, arm)?;
+    if options.log_rate_hz * options.step_s > 1.0 + 1e-9 && options.log_rate_hz != RunOptions::default().log_rate_hz {
+        load_caveats.push(kinds::LOG_RATE.found("run", options.log_rate_hz, 1.0 / options.step_s));
+    }
+    let stepper = new_stepper(options.stepper, arm.clone(), options.step_s, scenario.start)
+        .map_err(|error| flexible.explained(error))?;
+    Ok(Checked { flexible, arm, stepper, load_caveats })
+}
+
+/// Whether a motion keeps the joints' limits, and the options make sense with it.
+pub(crate) fn runnable(motion: &Motion, options: &RunOptions) -> Result<(), Error> {
     if !motion.violations.is_empty() && !options.ignore_limits {
         let mut violations: Vec<String> = motion.violations.iter().map(ToString::to_string).collect();
         if let Some(first) = violations.first_mut().filter(|_| !motion.likely.is_empty()) {
@@ -46,10 +60,17 @@ pub(crate) fn checked(
         }
         return Err(Error::Limits { path: motion.path.clone(), violations });
     }
-    check_options(motion, options)?;
+    check_options(motion, options)
+}
+
+/// The arm with the loads and payloads of a scenario, and what is to be said of them.
+pub(crate) fn loaded(
+    robot: &Robot,
+    scenario: &Scenario,
+    options: &RunOptions,
+    mut arm: FlexibleArm,
+) -> Result<(FlexibleArm, Vec<Caveat>), Error> {
     let failed = |source: StepError| Error::Step { source, partial: false };
-    let flexible = prepared.map_or_else(|| robot.modelled(&options.modelling).map(Arc::new), Ok)?;
-    let mut arm = flexible.arm(motion.prescribed()).map_err(|error| flexible.explained(error))?;
     let mut load_caveats = Vec::new();
     if !scenario.loads.is_empty() || !scenario.payloads.is_empty() {
         let duration = scenario.duration_s();
@@ -62,12 +83,7 @@ pub(crate) fn checked(
         arm = arm.with_inertia_changes(acting.changes).map_err(failed)?;
         arm = arm.with_timed_loads(acting.loads).map_err(failed)?;
     }
-    if options.log_rate_hz * options.step_s > 1.0 + 1e-9 && options.log_rate_hz != RunOptions::default().log_rate_hz {
-        load_caveats.push(kinds::LOG_RATE.found("run", options.log_rate_hz, 1.0 / options.step_s));
-    }
-    let stepper = new_stepper(options.stepper, arm.clone(), options.step_s, scenario.start)
-        .map_err(|error| flexible.explained(error))?;
-    Ok(Checked { flexible, arm, stepper, load_caveats })
+    Ok((arm, load_caveats))
 }
 
 /// Most steps of a run: some hours.

@@ -52,7 +52,8 @@ impl<T: Real> LaneArm<T> {
     pub(super) fn new(arms: &[&FlexibleArm]) -> Option<Self> {
         let first = arms.first()?;
         let plain = |arm: &&FlexibleArm| {
-            arm.torque_driven.is_empty()
+            arm.n_elastic_coordinates() > 0
+                && arm.torque_driven.is_empty()
                 && arm.loads.is_empty()
                 && arm.inertia_changes.is_empty()
                 && arm.proportional == first.proportional

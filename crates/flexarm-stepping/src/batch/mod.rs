@@ -19,7 +19,7 @@ use crate::arm::FlexibleArm;
 use crate::error::StepError;
 use crate::observation::Observation;
 use crate::stepper::Start;
-use crate::steppers::{AlphaSettings, StepperKind, new_stepper};
+use crate::steppers::{StepperKind, new_stepper};
 use lane_alpha::LaneAlpha;
 
 /// What all runs of a batch have in common.
@@ -27,8 +27,8 @@ use lane_alpha::LaneAlpha;
 pub struct Batch {
     /// Step (s).
     pub step_s: f64,
-    /// The stepper's settings.
-    pub settings: AlphaSettings,
+    /// The stepper; only generalised-alpha takes runs side by side.
+    pub stepper: StepperKind,
     /// Where runs start.
     pub start: Start,
     /// The frame whose deflection is told.
@@ -108,8 +108,7 @@ impl Batch {
     /// # Errors
     /// [`StepError`] as by a stepper.
     pub fn run_alone(&self, run: &BatchRun) -> Result<ToolDeflection, StepError> {
-        let mut stepper =
-            new_stepper(StepperKind::GeneralizedAlpha(self.settings), run.arm.clone(), self.step_s, self.start)?;
+        let mut stepper = new_stepper(self.stepper, run.arm.clone(), self.step_s, self.start)?;
         let mut seen = Observation::new(&run.arm);
         let mut tool = None;
         let mut result = ToolDeflection::default();
@@ -164,11 +163,16 @@ impl Batch {
     /// As many runs as lanes, or fewer.
     #[inline(always)]
     fn in_lanes<T: Real>(&self, runs: &[BatchRun]) -> Option<Vec<Option<ToolDeflection>>> {
+        // Settings that make no stepper are told by the run alone.
+        let StepperKind::GeneralizedAlpha(settings) = self.stepper else { return None };
+        if !(0.0..=1.0).contains(&settings.rho) || self.step_s.is_nan() || self.step_s <= 0.0 {
+            return None;
+        }
         let arms: Vec<&FlexibleArm> = runs.iter().map(|run| &run.arm).collect();
         // Lanes that are left over repeat the last run.
         let mut filled = arms.clone();
         filled.resize(T::LANES, arms.last()?);
-        let mut lanes = LaneAlpha::<T>::new(&filled, self.settings, self.step_s, self.start)?.ok()?;
+        let mut lanes = LaneAlpha::<T>::new(&filled, settings, self.step_s, self.start)?.ok()?;
         let steps: Vec<u64> = runs.iter().map(|run| self.steps(run)).collect();
         let mut results = vec![ToolDeflection::default(); runs.len()];
         for step in 0..=steps.iter().copied().max()? {

@@ -18,6 +18,14 @@ pub enum ValueError {
     /// The factor of deflections, which must be positive.
     #[error("the factor of deflections ({setting}) must be positive, found {0} times", setting = Setting::Magnification)]
     Magnification(f64),
+    /// The factor of a parameter, which must be positive.
+    #[error("the factor of the {what} must be positive, found {found}")]
+    Factor {
+        /// Of which parameter.
+        what: &'static str,
+        /// The factor.
+        found: f64,
+    },
     /// A factor of deflections that no picture can have.
     #[error(
         "the factor of deflections ({}) is {found:e}: expected one from {least} to {most}, 1 shows them as they are",

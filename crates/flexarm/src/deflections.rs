@@ -1,0 +1,140 @@
+//! How far the tool is off in many runs of one arm, on all cores and four runs at a time in each.
+//!
+//! For studies: payload, motion, stiffness and damping vary, and of each run the deflection is wanted, not recordings, drives or
+//! settling; these are [`Arm::simulate_batch`]'s. Start at [`Arm::deflections`].
+
+use flexarm_stepping::{Batch, BatchRun, FlexibleArm, Spring, StepError, ToolDeflection};
+use rayon::prelude::*;
+
+use crate::arm::Arm;
+use crate::error::{Error, ValueError};
+use crate::options::RunOptions;
+use crate::prepare::{loaded, runnable};
+use crate::scenario::Scenario;
+
+/// Runs of which one thread takes care at a time.
+const CHUNK: usize = 4;
+
+/// One run of [`Arm::deflections`]: what happens, and what is different in the arm.
+#[derive(Clone, Debug)]
+pub struct Variation {
+    /// Motion, loads, payloads, start. A payload that is attached at 0 is carried from the start.
+    pub scenario: Scenario,
+    /// Factor of all stiffnesses.
+    pub stiffness: f64,
+    /// Factor of all damping: ratios, coefficients, dampers. What is in proportion to the stiffness follows that as well.
+    pub damping: f64,
+}
+
+impl Variation {
+    /// The arm as it is.
+    pub fn new(scenario: impl Into<Scenario>) -> Self {
+        Self { scenario: scenario.into(), stiffness: 1.0, damping: 1.0 }
+    }
+
+    /// The same with all springs so many times as stiff.
+    #[must_use]
+    pub fn with_stiffness(self, factor: f64) -> Self {
+        Self { stiffness: factor, ..self }
+    }
+
+    /// The same with so many times the damping.
+    #[must_use]
+    pub fn with_damping(self, factor: f64) -> Self {
+        Self { damping: factor, ..self }
+    }
+}
+
+impl Arm {
+    /// Peak, RMS and final deflection of the tool in each run; with `keep_samples` also after every step.
+    ///
+    /// Figures are taken at the start and at the end of every step, not at the log rate. Runs of one tree (same links and
+    /// joints, whatever their inertias, stiffness, damping and motion) go four at a time through the vector instructions of
+    /// processors with AVX2; loads, torque-driven joints, curved springs, motions with corners and other steppers than
+    /// generalised-alpha take a run out of that. The numbers are the same to the last bit in any company, order and number of
+    /// threads. A run that fails does not stop the others.
+    ///
+    /// # Errors
+    /// Of each run its own: as [`crate::simulate`]; [`ValueError::Factor`] unless both factors are positive.
+    pub fn deflections(
+        &self,
+        runs: &[Variation],
+        options: &RunOptions,
+        keep_samples: bool,
+    ) -> Vec<Result<ToolDeflection, Error>> {
+        // Side by side go runs that last about equally long.
+        let mut order: Vec<usize> = (0..runs.len()).collect();
+        order.sort_by(|a, b| runs[*a].scenario.duration_s().total_cmp(&runs[*b].scenario.duration_s()));
+        let found = order.par_chunks(CHUNK).flat_map_iter(|numbers| {
+            let group: Vec<&Variation> = numbers.iter().map(|k| &runs[*k]).collect();
+            numbers.iter().copied().zip(self.deflections_of(&group, options, keep_samples)).collect::<Vec<_>>()
+        });
+        let mut found: Vec<_> = found.collect();
+        found.sort_by_key(|(number, _)| *number);
+        found.into_iter().map(|(_, result)| result).collect()
+    }
+
+    /// A few runs, on this thread.
+    fn deflections_of(
+        &self,
+        runs: &[&Variation],
+        options: &RunOptions,
+        keep_samples: bool,
+    ) -> Vec<Result<ToolDeflection, Error>> {
+        let flexible = self.flexible();
+        let mut results: Vec<Option<Result<ToolDeflection, Error>>> = Vec::new();
+        let (mut going, mut starts) = (Vec::new(), Vec::new());
+        for run in runs {
+            match self.varied(run, options) {
+                Ok(arm) => {
+                    going.push(BatchRun { arm, duration_s: run.scenario.duration_s() });
+                    starts.push(run.scenario.start);
+                    results.push(None);
+                }
+                Err(error) => results.push(Some(Err(error))),
+            }
+        }
+        let batch = |start| Batch {
+            step_s: options.step_s,
+            stepper: options.stepper,
+            start,
+            tool: flexible.tcp.clone(),
+            keep_samples,
+        };
+        // Starts rarely differ.
+        let one = starts.windows(2).all(|pair| pair[0] == pair[1]);
+        let found: Vec<Result<ToolDeflection, StepError>> = match starts.first() {
+            Some(start) if one => batch(*start).run(&going),
+            _ => going.iter().zip(&starts).map(|(run, start)| batch(*start).run_alone(run)).collect(),
+        };
+        let mut found = found.into_iter().map(|result| result.map_err(|error| flexible.explained(error)));
+        results.into_iter().filter_map(|result| result.or_else(|| found.next())).collect()
+    }
+
+    /// The arm of a run.
+    fn varied(&self, run: &Variation, options: &RunOptions) -> Result<FlexibleArm, Error> {
+        let Variation { scenario, stiffness, damping } = run;
+        for (what, found) in [("stiffness", *stiffness), ("damping", *damping)] {
+            if !(found > 0.0 && found.is_finite()) {
+                return Err(ValueError::Factor { what, found }.into());
+            }
+        }
+        runnable(&scenario.motion, options)?;
+        let flexible = self.flexible();
+        let springs = flexible.springs.iter().map(|spring| scaled(spring, *stiffness, *damping)).collect();
+        let arm =
+            flexible.arm_with(springs, scenario.motion.prescribed()).map_err(|error| flexible.explained(error))?;
+        Ok(loaded(self.robot(), scenario, options, arm)?.0)
+    }
+}
+
+/// A spring with other figures.
+fn scaled(spring: &Spring, stiffness: f64, damping: f64) -> Spring {
+    Spring {
+        name: spring.name.clone(),
+        K: &spring.K * stiffness,
+        damping: spring.damping.scaled(damping),
+        curve: spring.curve.as_ref().map(|curve| curve.scaled(stiffness)),
+        geometric: spring.geometric.clone(),
+    }
+}
