@@ -5,8 +5,8 @@
 //! ```
 //! The first correction `d = J^-1 r` is the error of an extrapolation over the step. Each iteration leaves a part ρ of the one
 //! before, as lengths of vectors; what a search may leave of the first one is a part of it ([`Newton::leaving`]). ρ is measured
-//! where two iterations are made, and grows as the arm moves away from where J was taken: while it is known to be small enough, a
-//! step needs one evaluation.
+//! where two iterations are made, in every eighth step for certain, and grows as the arm moves away from where J was taken:
+//! while it is known to be small enough, a step needs one evaluation.
 //!
 //! A step whose iteration fails is tried again with a matrix of its start, then in halves, down to `h/64`.
 
