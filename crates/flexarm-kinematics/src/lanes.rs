@@ -10,10 +10,11 @@ use flexarm_spatial::products::{add, lift, lift3, mul};
 use flexarm_spatial::{ElasticAngles, Pose, Real, SpatialInertia};
 use nalgebra::Vector3;
 
+use crate::axis_motion::AxisMotion;
 use crate::crba::composite_bodies;
-use crate::data::{Data, State};
+use crate::data::{Data, State, identity};
 use crate::kinematics::place_bodies;
-use crate::model::{Frame, JointMotion, Model, Tree};
+use crate::model::{Body, Frame, JointMotion, Model, Tree};
 use crate::rnea::newton_euler;
 
 /// A tree with inertias of its own in each lane.
@@ -95,6 +96,14 @@ pub fn rigid_and_flexible<T: Real>(tree: &LaneTree<T>, data: &Data<T>, frame: &F
     while i > 0 {
         let body = &model.bodies[i];
         let elastic = match body.motion {
+            // A spring of one coordinate.
+            JointMotion::Axis(motion) if body.elastic => {
+                let value = q[body.coordinate];
+                rigid = carried(&along_axis(body, motion, T::zero()), &rigid);
+                flexible = carried(&along_axis(body, motion, value), &flexible);
+                i = body.parent;
+                continue;
+            }
             JointMotion::Axis(_) | JointMotion::Welded => {
                 let X_PB = &data.X_PB[i];
                 rigid = carried(X_PB, &rigid);
@@ -122,6 +131,15 @@ pub fn rigid_and_flexible<T: Real>(tree: &LaneTree<T>, data: &Data<T>, frame: &F
         i = body.parent;
     }
     [rigid, flexible]
+}
+
+/// `X_PB` of a joint of one coordinate.
+#[inline(always)]
+fn along_axis<T: Real>(body: &Body, motion: AxisMotion, coordinate: T) -> Pose<T> {
+    let value = T::splat(body.ratio) * coordinate + T::splat(body.offset);
+    let mut X_PB = identity();
+    motion.place(&body.X_PJ, &body.turn, value, Real::sin_cos(value), &mut X_PB);
+    X_PB
 }
 
 /// A point of B in P.

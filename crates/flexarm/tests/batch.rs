@@ -123,7 +123,8 @@ fn study(robot: &Robot) -> Vec<Variation> {
         .map(|k| {
             let part = f64::from(k);
             let motion = if k % 3 == 0 { &slower } else { &motion };
-            of(motion, 20.0 + 15.0 * part).with_stiffness(0.6 + 0.1 * part).with_damping(0.5 + 0.2 * part)
+            let run = of(motion, 20.0 + 15.0 * part);
+            if k < 4 { run } else { run.with_stiffness(0.6 + 0.05 * part).with_damping(0.5 + 0.2 * part) }
         })
         .collect();
     let push =
@@ -139,7 +140,9 @@ fn deflections_of_a_study_are_those_of_whole_runs() {
     let options = RunOptions { step_s: 5e-3, log_rate_hz: 200.0, ..RunOptions::default() };
     let runs = study(&robot);
     let found = arm.deflections(&runs, &options, true);
-    for (k, (run, found)) in runs.iter().zip(found).enumerate().filter(|(_, (run, _))| run.stiffness == 1.0) {
+    for (k, (run, found)) in
+        runs.iter().zip(found).enumerate().filter(|(_, (run, _))| (run.stiffness, run.damping) == (1.0, 1.0))
+    {
         let (found, whole) = (found.unwrap(), arm.simulate(&run.scenario, &options).unwrap());
         let tcp = whole.summary.tcp.as_ref().unwrap();
         let error = whole.error_world_m();
