@@ -34,6 +34,7 @@
 mod arm;
 mod drive;
 mod eigenvalues;
+mod elastic_tree;
 mod error;
 mod events;
 mod implicit;
@@ -52,6 +53,7 @@ mod statics;
 mod stepper;
 pub mod steppers;
 mod system;
+mod tree_matrix;
 
 pub use arm::{Damping, ElasticElement, FlexibleArm, GeometricStiffness, InertiaChange, Servo, Spring};
 pub use drive::{CurveError, Friction, ServoAxis, TorqueCurve};
@@ -69,3 +71,4 @@ pub use statics::static_equilibrium;
 pub use stepper::{Counts, Start, Stepper};
 pub use steppers::*;
 pub use system::SecondOrderSystem;
+pub use tree_matrix::{TreeMatrices, TreeNode};

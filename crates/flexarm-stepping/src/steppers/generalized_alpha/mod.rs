@@ -236,7 +236,7 @@ impl GeneralizedAlpha {
     fn factor(&mut self, system: &mut impl SecondOrderSystem, t: f64) -> Result<(), StepError> {
         let (c_D, c_K) = self.coefficients.derivatives(self.newton.dt);
         let matrix = &mut self.newton.matrix;
-        matrix.read(system, c_D, c_K);
+        matrix.read(system, c_D, c_K, self.correction.as_ref().map(DispersionCorrection::c_h2));
         if let Some(correction) = &mut self.correction {
             correction.correct(system, matrix, t)?;
         }
@@ -250,7 +250,7 @@ impl GeneralizedAlpha {
         let Coefficients { alpha_m, alpha_f, beta, gamma } = self.coefficients;
         let (h, ratio) = (self.newton.dt, (1.0 - alpha_f) / (1.0 - alpha_m));
         match &mut self.correction {
-            Some(correction) => correction.corrected(&self.trial, &mut self.x_tilde_new),
+            Some(correction) => correction.corrected(&mut self.newton.matrix, &self.trial, &mut self.x_tilde_new),
             None => self.x_tilde_new.copy_from(&self.trial),
         }
         for k in 0..self.now.x.len() {
@@ -270,7 +270,7 @@ impl GeneralizedAlpha {
     fn correct(&mut self, mut sizes: Sizes) -> Sizes {
         let (c_D, c_K) = self.coefficients.derivatives(self.newton.dt);
         let d = &self.newton.r;
-        let shift = self.correction.as_mut().map(|correction| correction.shift(d));
+        let shift = self.correction.as_mut().map(|correction| correction.shift(&self.newton.matrix, d));
         for k in 0..d.len() {
             let d_tilde = d[k] + shift.map_or(0.0, |(c_h2, stiff)| c_h2 * stiff[k]);
             self.trial[k] -= d[k];
