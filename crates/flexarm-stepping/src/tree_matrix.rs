@@ -446,8 +446,6 @@ impl TreeInverse {
 
 #[cfg(test)]
 mod tests {
-    use std::cell::Cell;
-
     use super::*;
     use nalgebra::DMatrix;
     use proptest::prelude::*;
@@ -520,7 +518,6 @@ mod tests {
     /// Truth: the dense matrices of the same tree, by LU. Measured: 3e-13.
     #[test]
     fn a_tree_is_solved_as_its_dense_matrix_is() {
-        let worst = Cell::new(0.0f64);
         let mut runner = TestRunner::new(ProptestConfig::with_cases(60));
         let cases = (any::<u64>(), 1_usize..=32);
         let result = runner.run(&cases, |(seed, count)| {
@@ -532,11 +529,9 @@ mod tests {
             inverse.factor(None, 0.0).unwrap();
             let mut d = r.clone();
             inverse.solve(&mut d);
-            worst.set(worst.get().max(far(&d, &truth)));
             prop_assert!(far(&d, &truth) < 1e-12, "{:e}", far(&d, &truth));
             Ok(())
         });
-        eprintln!("without correction: {:.1e}", worst.get());
         result.unwrap();
     }
 
@@ -545,7 +540,6 @@ mod tests {
     /// Measured: 3e-13, 7e-14, 5e-14.
     #[test]
     fn the_corrected_matrix_is_solved_by_one_elimination_whatever_its_roots() {
-        let worst = Cell::new([0.0f64; 3]);
         let mut runner = TestRunner::new(ProptestConfig::with_cases(60));
         let cases = (any::<u64>(), 1_usize..=32, prop::sample::select(vec![0.02, 1.0, 2.0, 2.1, 50.0]), -2.0..1.0f64);
         let result = runner.run(&cases, |(seed, count, tau, size)| {
@@ -569,11 +563,9 @@ mod tests {
                 far(inverse.shift(), &(&M_inverse_K * &truth * s)),
                 far(&corrected, &(&r + &M_inverse_K * &r * s)),
             ];
-            worst.set([0, 1, 2].map(|k| worst.get()[k].max(errors[k])));
             prop_assert!(errors.iter().all(|error| *error < 1e-10), "{errors:?} {tau}");
             Ok(())
         });
-        eprintln!("with correction: solution, shift, correction {:?}", worst.get());
         result.unwrap();
     }
 

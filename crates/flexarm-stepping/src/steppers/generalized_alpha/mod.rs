@@ -122,8 +122,11 @@ const FOLLOWED: f64 = 0.5;
 /// matrix whole, modes damped.
 fn forgets_errors(arm: &FlexibleArm) -> bool {
     let straight = arm.elements.iter().all(|element| element.curve.is_none() && element.geometric.is_none());
+    let mut force = DVector::zeros(arm.n_elastic_coordinates());
     let damped = arm.modes.omega.iter().zip(arm.modes.shapes.column_iter()).all(|(omega, shape)| {
-        let twice = shape.dot(&(&arm.D * shape));
+        force.fill(0.0);
+        arm.add_damping(shape.as_slice(), force.as_mut_slice());
+        let twice = shape.dot(&force);
         twice >= 2.0 * DAMPED * omega
     });
     arm.torque_driven.is_empty() && straight && damped
