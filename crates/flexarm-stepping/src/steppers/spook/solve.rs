@@ -1,74 +1,343 @@
 //! Elimination of the saddle-point matrix over a tree of bodies, leaves first: O(bodies).
 //!
 //! ```text
-//! body c:   M_c v_c - G_cᵀ λ - (children) = b_c              joint of c:  G_p v_p + G_c v_c + Σ λ = s
+//! body c:   M_c v_c - G_cᵀ λ - (children) = b_c              joint of c:  G_p v_p + G_c v_c + Σ λ = s        (1)
 //! M̂_c v_c = b̂_c + G_cᵀ λ                                       (children eliminated)
-//! S λ = ŝ - G_p v_p,   S = Σ + G_c M̂_c^-1 G_cᵀ,   ŝ = s - G_c M̂_c^-1 b̂_c
-//! M̂_p += G_pᵀ S^-1 G_p,   b̂_p += G_pᵀ S^-1 ŝ
+//! S λ = ŝ - G_p v_p,   S = Σ + G_c M̂_c^-1 G_cᵀ,   ŝ = s - G_c M̂_c^-1 b̂_c                                    (2)
+//! M̂_p += G_pᵀ S^-1 G_p,   b̂_p += G_pᵀ S^-1 ŝ                                                              (3)
 //! ```
-//! For a serial arm this is the block tridiagonal LDLᵀ in body order. M̂ and S are symmetric positive definite.
+//! For a serial arm this is the block tridiagonal LDLᵀ in body order. M̂ and S are symmetric positive definite. `G_c` is square,
+//! a block triangle whose inverse is known, so that neither M̂ nor S is factorised; in the coordinates of the rows
+//!
+//! ```text
+//! M̃ = G_c^-T M̂_c G_c^-1,   b̃ = G_c^-T b̂_c,   H = M̃ + Σ^-1
+//! S^-1 = Σ^-1 H^-1 M̃,   S^-1 ŝ = Σ^-1 H^-1 (M̃ s - b̃),   v_c = G_c^-1 (s - Σ λ - G_p v_p)               (4)
+//! ```
+//! which holds for hard joints (Σ next to nothing) and soft ones alike. Where Σ is hard in some directions and soft in others,
+//! `S = Σ + M̃^-1` is inverted itself.
 
-use nalgebra::{Cholesky, Const, Matrix6, Vector6};
+use flexarm_spatial::products::{cross3, mul, mul3, tr_mul, tr_mul3, turn_symmetric};
+use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
-type Factor = Cholesky<f64, Const<6>>;
+/// `[[A, B], [Bᵀ, C]]`, symmetric.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Symmetric {
+    pub(super) A: Matrix3<f64>,
+    pub(super) B: Matrix3<f64>,
+    pub(super) C: Matrix3<f64>,
+}
+
+/// `[[tv, tw], [0, rw]]`.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Triangle {
+    pub(super) tv: Matrix3<f64>,
+    pub(super) tw: Matrix3<f64>,
+    pub(super) rw: Matrix3<f64>,
+}
+
+#[inline(always)]
+fn halves(v: &Vector6<f64>) -> (Vector3<f64>, Vector3<f64>) {
+    (Vector3::new(v[0], v[1], v[2]), Vector3::new(v[3], v[4], v[5]))
+}
+
+#[inline(always)]
+pub(super) fn joined(a: &Vector3<f64>, b: &Vector3<f64>) -> Vector6<f64> {
+    Vector6::new(a.x, a.y, a.z, b.x, b.y, b.z)
+}
+
+#[inline(always)]
+fn mean(X: &Matrix3<f64>) -> Matrix3<f64> {
+    (X + X.transpose()) * 0.5
+}
+
+/// Inverse by cofactors, none if the determinant is not positive.
+#[inline(always)]
+fn inverse(X: &Matrix3<f64>) -> Option<Matrix3<f64>> {
+    let (a, b, c): (Vector3<f64>, Vector3<f64>, Vector3<f64>) =
+        (X.column(0).into(), X.column(1).into(), X.column(2).into());
+    let (r0, r1, r2) = (b.cross(&c), c.cross(&a), a.cross(&b));
+    let determinant = a.dot(&r0);
+    let s = 1.0 / determinant;
+    let inverse = Matrix3::from_columns(&[r0 * s, r1 * s, r2 * s]).transpose();
+    (determinant > 0.0 && determinant.is_finite()).then_some(inverse)
+}
+
+impl Symmetric {
+    pub(super) fn zeros() -> Self {
+        Self { A: Matrix3::zeros(), B: Matrix3::zeros(), C: Matrix3::zeros() }
+    }
+
+    /// Of a symmetric matrix.
+    pub(super) fn new(X: &Matrix6<f64>) -> Self {
+        let block = |i, j| X.fixed_view::<3, 3>(i, j).into_owned();
+        Self { A: block(0, 0), B: block(0, 3), C: block(3, 3) }
+    }
+
+    pub(super) fn scaled(&self, s: f64) -> Self {
+        Self { A: self.A * s, B: self.B * s, C: self.C * s }
+    }
+
+    /// `blkdiag(R, R) X blkdiag(R, R)ᵀ`.
+    pub(super) fn turned(&self, R: &Matrix3<f64>) -> Self {
+        let B = mul3(&mul3(R, &self.B), &R.transpose());
+        Self { A: turn_symmetric(R, &self.A), B, C: turn_symmetric(R, &self.C) }
+    }
+
+    #[inline(always)]
+    fn plus(&self, o: &Self) -> Self {
+        Self { A: self.A + o.A, B: self.B + o.B, C: self.C + o.C }
+    }
+
+    #[inline(always)]
+    fn times(&self, v: &Vector6<f64>) -> Vector6<f64> {
+        let (a, b) = halves(v);
+        joined(&(mul(&self.A, &a) + mul(&self.B, &b)), &(tr_mul(&self.B, &a) + mul(&self.C, &b)))
+    }
+
+    /// `X Y` for a symmetric product.
+    #[inline(always)]
+    fn commuting_product(&self, Y: &Self) -> Self {
+        let Bt = Y.B.transpose();
+        let A = mul3(&self.A, &Y.A) + mul3(&self.B, &Bt);
+        let B = mul3(&self.A, &Y.B) + mul3(&self.B, &Y.C);
+        let C = tr_mul3(&self.B, &Y.B) + mul3(&self.C, &Y.C);
+        Self { A: mean(&A), B, C: mean(&C) }
+    }
+
+    /// `X Y Z` for a symmetric product.
+    #[inline(always)]
+    fn symmetric_product(&self, Y: &Self, Z: &Self) -> Self {
+        // The columns of Y Z.
+        let Bt = Z.B.transpose();
+        let (tt, tr) = (mul3(&Y.A, &Z.A) + mul3(&Y.B, &Bt), mul3(&Y.A, &Z.B) + mul3(&Y.B, &Z.C));
+        let (rt, rr) = (tr_mul3(&Y.B, &Z.A) + mul3(&Y.C, &Bt), tr_mul3(&Y.B, &Z.B) + mul3(&Y.C, &Z.C));
+        let A = mul3(&self.A, &tt) + mul3(&self.B, &rt);
+        let B = mul3(&self.A, &tr) + mul3(&self.B, &rr);
+        let C = tr_mul3(&self.B, &tr) + mul3(&self.C, &rr);
+        Self { A: mean(&A), B, C: mean(&C) }
+    }
+
+    /// By elimination of A; none if not positive definite.
+    #[inline(always)]
+    fn inverse(&self) -> Option<Self> {
+        let A = inverse(&self.A)?;
+        let G = mul3(&A, &self.B);
+        let C = inverse(&mean(&(self.C - tr_mul3(&self.B, &G))))?;
+        let B = -mul3(&G, &C);
+        Some(Self { A: mean(&(A - mul3(&B, &G.transpose()))), B, C: mean(&C) })
+    }
+}
+
+impl Triangle {
+    #[inline(always)]
+    fn times(&self, v: &Vector6<f64>) -> Vector6<f64> {
+        let (a, b) = halves(v);
+        joined(&(mul(&self.tv, &a) + mul(&self.tw, &b)), &mul(&self.rw, &b))
+    }
+
+    #[inline(always)]
+    fn tr_times(&self, f: &Vector6<f64>) -> Vector6<f64> {
+        let (a, b) = halves(f);
+        joined(&tr_mul(&self.tv, &a), &(tr_mul(&self.tw, &a) + tr_mul(&self.rw, &b)))
+    }
+
+    /// `Gᵀ X G`.
+    #[inline(always)]
+    fn congruent(&self, X: &Symmetric) -> Symmetric {
+        let Self { tv, tw, rw } = self;
+        let (t, r) = (mul3(&X.A, tw) + mul3(&X.B, rw), tr_mul3(&X.B, tw) + mul3(&X.C, rw));
+        let C = tr_mul3(tw, &t) + tr_mul3(rw, &r);
+        Symmetric { A: mean(&tr_mul3(tv, &mul3(&X.A, tv))), B: tr_mul3(tv, &t), C: mean(&C) }
+    }
+}
+
+/// `Gᵀ X G` for `G = [[1, [r]x], [0, 1]]`.
+#[inline(always)]
+fn shifted(X: &Symmetric, r: &Vector3<f64>) -> Symmetric {
+    // A [r]x = -([r]x A)ᵀ for a symmetric A.
+    let B = X.B - cross3(r, &X.A).transpose();
+    Symmetric { A: X.A, B, C: mean(&(X.C - cross3(r, &B) - cross3(r, &X.B).transpose())) }
+}
+
+/// `G_p` and `G_c` of a joint, and the inverse of `G_c`.
+#[derive(Clone, Copy, Debug)]
+#[expect(clippy::large_enum_variant, reason = "a box per joint would be in the way of every step")]
+pub(super) enum Jacobian {
+    /// `[[-1, [parent]x], [0, -1]]` and `[[1, -[child]x], [0, 1]]`: rows in world axes.
+    Levers { parent: Vector3<f64>, child: Vector3<f64> },
+    /// Anything.
+    Turned { parent: Triangle, child: Triangle, back: Triangle },
+}
+
+impl Jacobian {
+    /// `G_p v`.
+    #[inline(always)]
+    pub(super) fn of_parent(&self, v: &Vector6<f64>) -> Vector6<f64> {
+        match self {
+            Self::Levers { parent, .. } => {
+                let (v, w) = halves(v);
+                joined(&(parent.cross(&w) - v), &-w)
+            }
+            Self::Turned { parent, .. } => parent.times(v),
+        }
+    }
+
+    /// `G_c v`.
+    #[inline(always)]
+    pub(super) fn of_child(&self, v: &Vector6<f64>) -> Vector6<f64> {
+        match self {
+            Self::Levers { child, .. } => {
+                let (v, w) = halves(v);
+                joined(&(v - child.cross(&w)), &w)
+            }
+            Self::Turned { child, .. } => child.times(v),
+        }
+    }
+
+    /// `G_c^-1 u`.
+    #[inline(always)]
+    fn back(&self, u: &Vector6<f64>) -> Vector6<f64> {
+        match self {
+            Self::Levers { child, .. } => {
+                let (v, w) = halves(u);
+                joined(&(v + child.cross(&w)), &w)
+            }
+            Self::Turned { back, .. } => back.times(u),
+        }
+    }
+
+    /// `G_c^-T M G_c^-1` and `G_c^-T b`.
+    #[inline(always)]
+    fn in_rows(&self, M: &Symmetric, b: &Vector6<f64>) -> (Symmetric, Vector6<f64>) {
+        match self {
+            Self::Levers { child, .. } => {
+                let (f, t) = halves(b);
+                (shifted(M, child), joined(&f, &(t - child.cross(&f))))
+            }
+            Self::Turned { back, .. } => (back.congruent(M), back.tr_times(b)),
+        }
+    }
+
+    /// `G_pᵀ S G_p` and `G_pᵀ y`.
+    #[inline(always)]
+    fn on_parent(&self, S: &Symmetric, y: &Vector6<f64>) -> (Symmetric, Vector6<f64>) {
+        match self {
+            Self::Levers { parent, .. } => {
+                let (f, t) = halves(y);
+                (shifted(S, &-parent), joined(&-f, &(-t - parent.cross(&f))))
+            }
+            Self::Turned { parent, .. } => (parent.congruent(S), parent.tr_times(y)),
+        }
+    }
+}
+
+/// Σ of a joint.
+#[derive(Clone, Copy, Debug)]
+#[expect(clippy::large_enum_variant, reason = "a box per joint would be in the way of every step")]
+pub(super) enum Sigma {
+    /// This times the identity.
+    Hard(f64),
+    /// Σ and its inverse.
+    Soft(Symmetric, Symmetric),
+    /// Σ alone.
+    Mixed(Symmetric),
+}
+
+impl Sigma {
+    #[inline(always)]
+    fn times(&self, v: &Vector6<f64>) -> Vector6<f64> {
+        match self {
+            Self::Hard(sigma) => v * *sigma,
+            Self::Soft(sigma, _) | Self::Mixed(sigma) => sigma.times(v),
+        }
+    }
+
+    /// `S^-1`, and `S^-1 ŝ`, by (4).
+    #[inline(always)]
+    fn hold(&self, M: &Symmetric, b: &Vector6<f64>, s: &Vector6<f64>) -> Option<(Symmetric, Vector6<f64>)> {
+        let push = M.times(s) - b;
+        Some(match self {
+            Self::Hard(sigma) => {
+                // Σ^-1 H^-1 = (1 + σ M̃)^-1, which commutes with M̃.
+                let mut E = M.scaled(*sigma);
+                E.A += Matrix3::identity();
+                E.C += Matrix3::identity();
+                let E = E.inverse()?;
+                (E.commuting_product(M), E.times(&push))
+            }
+            Self::Soft(_, K) => {
+                let H = M.plus(K).inverse()?;
+                (K.symmetric_product(&H, M), K.times(&H.times(&push)))
+            }
+            Self::Mixed(sigma) => {
+                let light = M.inverse()?;
+                let S = sigma.plus(&light).inverse()?;
+                let y = S.times(&(s - light.times(b)));
+                (S, y)
+            }
+        })
+    }
+}
+
+/// What the joint of a body adds to (1).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct JointRows {
+    pub(super) G: Jacobian,
+    pub(super) sigma: Sigma,
+    pub(super) s: Vector6<f64>,
+}
+
+/// A joint with what lies outward of it eliminated.
+#[derive(Clone, Copy, Debug)]
+struct Held {
+    rows: JointRows,
+    /// `S^-1` and `S^-1 ŝ`.
+    S_inverse: Symmetric,
+    y: Vector6<f64>,
+}
 
 /// Workspaces of the elimination.
 pub(super) struct TreeSolver {
     parent: Vec<usize>,
-    pub(super) M: Vec<Matrix6<f64>>,
+    pub(super) M: Vec<Symmetric>,
     pub(super) b: Vec<Vector6<f64>>,
-    body: Vec<Option<Factor>>,
-    joint: Vec<Option<Factor>>,
-    s: Vec<Vector6<f64>>,
+    joints: Vec<Option<Held>>,
 }
 
 impl TreeSolver {
     pub(super) fn new(parent: Vec<usize>) -> Self {
         let n = parent.len();
-        Self {
-            parent,
-            M: vec![Matrix6::zeros(); n],
-            b: vec![Vector6::zeros(); n],
-            body: vec![None; n],
-            joint: vec![None; n],
-            s: vec![Vector6::zeros(); n],
-        }
+        Self { parent, M: vec![Symmetric::zeros(); n], b: vec![Vector6::zeros(); n], joints: vec![None; n] }
     }
 
     /// Solves for velocities and impulses; `M` and `b` hold the bodies' blocks and are used up.
     ///
-    /// `joint(i)` gives `(G_p, G_c, Σ, s)` of the joint that carries body i. Returns the body whose block is not
-    /// positive definite, if any.
-    pub(super) fn solve<'r>(
+    /// `joint(i)` gives the rows of the joint that carries body i. Returns the body whose block is not positive definite, if any.
+    pub(super) fn solve(
         &mut self,
-        joint: impl Fn(usize) -> (&'r Matrix6<f64>, &'r Matrix6<f64>, Matrix6<f64>, Vector6<f64>),
+        joint: impl Fn(usize) -> JointRows,
         v: &mut [Vector6<f64>],
         lambda: &mut [Vector6<f64>],
     ) -> Result<(), usize> {
         let n = self.parent.len();
         for i in (1..n).rev() {
-            let (G_p, G_c, sigma, s) = joint(i);
-            let body = Cholesky::new(self.M[i]).ok_or(i)?;
-            let W = body.solve(&G_c.transpose());
-            let S = sigma + G_c * W;
-            let factor = Cholesky::new((S + S.transpose()) * 0.5).ok_or(i)?;
-            let s = s - W.tr_mul(&self.b[i]);
+            let rows = joint(i);
+            let (M, b) = rows.G.in_rows(&self.M[i], &self.b[i]);
+            let (S_inverse, y) = rows.sigma.hold(&M, &b, &rows.s).ok_or(i)?;
             let p = self.parent[i];
             if p > 0 {
-                let Z = factor.solve(G_p);
-                self.M[p] += G_p.tr_mul(&Z);
-                self.b[p] += Z.tr_mul(&s);
+                let (M, b) = rows.G.on_parent(&S_inverse, &y);
+                self.M[p] = self.M[p].plus(&M);
+                self.b[p] += b;
             }
-            self.s[i] = s;
-            self.body[i] = Some(body);
-            self.joint[i] = Some(factor);
+            self.joints[i] = Some(Held { rows, S_inverse, y });
         }
         v[0] = Vector6::zeros();
         for i in 1..n {
-            let (G_p, G_c, ..) = joint(i);
-            let (Some(body), Some(factor)) = (&self.body[i], &self.joint[i]) else { return Err(i) };
-            lambda[i] = factor.solve(&(self.s[i] - G_p * v[self.parent[i]]));
-            v[i] = body.solve(&(self.b[i] + G_c.tr_mul(&lambda[i])));
+            let Some(Held { rows, S_inverse, y }) = &self.joints[i] else { return Err(i) };
+            let moved = rows.G.of_parent(&v[self.parent[i]]);
+            lambda[i] = y - S_inverse.times(&moved);
+            v[i] = rows.G.back(&(rows.s - rows.sigma.times(&lambda[i]) - moved));
         }
         Ok(())
     }
