@@ -34,7 +34,7 @@ use crate::observation::Observation;
 use crate::stepper::{Counts, LARGEST_DEFLECTION, Stepper};
 use crate::steppers::{Method, StepRule, StepperEntry, StepperKind, StepperSetting};
 use constraint::Rows;
-use solve::{JointRows, Sigma, Symmetric, TreeSolver, joined};
+use solve::{Sigma, Symmetric, TreeSolver, joined};
 
 pub(super) static ENTRY: StepperEntry = StepperEntry {
     name: "spook",
@@ -166,6 +166,8 @@ pub struct Spook {
     /// Index 0 is the world and never moves.
     bodies: Vec<BodyState>,
     compliance: Vec<JointCompliance>,
+    /// Σ in the axes of the rows.
+    sigma: Vec<Sigma>,
     rows: Vec<Rows>,
     lambda: Vec<Vector6<f64>>,
     solver: TreeSolver,
@@ -205,7 +207,7 @@ impl Spook {
         forward_kinematics_velocity(&model, &mut data, &state);
 
         let bodies: Vec<BodyState> = (0..model.bodies().len()).map(|i| body_state(&model, &data, i)).collect();
-        let compliance = (0..bodies.len()).map(|i| joint_compliance(&arm, i, h, settings.preset)).collect();
+        let compliance: Vec<_> = (0..bodies.len()).map(|i| joint_compliance(&arm, i, h, settings.preset)).collect();
         let n = bodies.len();
         let loads = vec![Vector6::zeros(); n];
         let mut spook = Self {
@@ -219,6 +221,7 @@ impl Spook {
             settings,
             trial: bodies.clone(),
             bodies,
+            sigma: compliance.iter().map(|compliance| compliance.sigma).collect(),
             compliance,
             rows: vec![Rows::zeros(); n],
             lambda: vec![Vector6::zeros(); n],
@@ -448,7 +451,7 @@ impl Spook {
 
     /// Velocities and impulses of the step from the current time; poses stay.
     fn solve(&mut self, t_next: f64) -> Result<(), StepError> {
-        let (h, t) = (self.dt, self.t);
+        let t = self.t;
         // Rates at the end of the step belong to the new velocities, positions at its start to g.
         self.next.take(&self.arm, &self.events, t_next);
         self.now.take(&self.arm, &self.events, t);
@@ -459,28 +462,33 @@ impl Spook {
         self.update_loads();
         self.update_body_blocks();
 
-        // Jacobians, compliance, right-hand side of the equations on the module page, of every joint.
-        let Self { arm, settings, rows, compliance, bodies, poses, solver, velocities, lambda, rates, next, .. } = self;
-        let (model, form) = (&arm.model, settings.form);
-        let joint_rows = |i: usize| {
-            let (row, JointCompliance { sigma, upsilon }, body) = (&rows[i], compliance[i], &model.bodies()[i]);
-            let sigma = match sigma {
-                Sigma::Soft(C, K) if form == ConstraintForm::Global => {
-                    let R = poses[body.parent].rotation * body.X_PJ.rotation;
-                    Sigma::Soft(C.turned(R.matrix()), K.turned(R.matrix()))
-                }
-                sigma => sigma,
-            };
-            let (parent, child) = (&bodies[body.parent], &bodies[i]);
+        self.update_right_hand_sides();
+        let Self { rows, sigma, solver, velocities, lambda, .. } = self;
+        solver
+            .solve(rows, sigma, velocities, lambda)
+            .map_err(|_| StepError::Singular { matrix: "constraint matrix", t })
+    }
+
+    /// Right-hand sides of the joints, and compliances in the axes of their rows.
+    fn update_right_hand_sides(&mut self) {
+        let h = self.dt;
+        for (i, body) in self.arm.model.bodies().iter().enumerate().skip(1) {
+            let (row, JointCompliance { sigma, upsilon }) = (&self.rows[i], &self.compliance[i]);
+            if let Sigma::Soft(C, K) = sigma
+                && self.settings.form == ConstraintForm::Global
+            {
+                let R = self.poses[body.parent].rotation * body.X_PJ.rotation;
+                self.sigma[i] = Sigma::Soft(C.turned(R.matrix()), K.turned(R.matrix()));
+            }
+            let (parent, child) = (&self.bodies[body.parent], &self.bodies[i]);
             let rate = row.G.of_parent(&parent.V.to_vector()) + row.G.of_child(&child.V.to_vector());
-            let mut s = row.g * (-4.0 / h * upsilon) + rate * upsilon;
+            let mut s = row.g * (-4.0 / h * upsilon) + rate * *upsilon;
             if matches!(body.motion, JointMotion::Axis(_)) && !body.elastic {
                 // g_t = -S q̇, now and at the end of the step.
-                s -= row.S * (upsilon * rates[body.coordinate] - next.qdot[body.coordinate]);
+                s -= row.S * (upsilon * self.rates[body.coordinate] - self.next.qdot[body.coordinate]);
             }
-            JointRows { G: row.G, sigma, s }
-        };
-        solver.solve(joint_rows, velocities, lambda).map_err(|_| StepError::Singular { matrix: "constraint matrix", t })
+            self.solver.s[i] = s;
+        }
     }
 
     /// Rows of every joint, and what its prescribed coordinate does to them.
@@ -550,6 +558,7 @@ impl Spook {
             self.dt = h;
             for (i, compliance) in self.compliance.iter_mut().enumerate() {
                 *compliance = joint_compliance(&self.arm, i, h, self.settings.preset);
+                self.sigma[i] = compliance.sigma;
             }
         }
         self.solve(t_next)?;

@@ -19,6 +19,8 @@
 use flexarm_spatial::products::{cross3, mul, mul3, tr_mul, tr_mul3, turn_symmetric};
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
+use super::constraint::Rows;
+
 /// `[[A, B], [Bᵀ, C]]`, symmetric.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Symmetric {
@@ -45,12 +47,14 @@ pub(super) fn joined(a: &Vector3<f64>, b: &Vector3<f64>) -> Vector6<f64> {
     Vector6::new(a.x, a.y, a.z, b.x, b.y, b.z)
 }
 
+/// A symmetric matrix from its lower triangle; what is above is not computed at all.
 #[inline(always)]
-fn mean(X: &Matrix3<f64>) -> Matrix3<f64> {
-    (X + X.transpose()) * 0.5
+fn mirrored(X: &Matrix3<f64>) -> Matrix3<f64> {
+    let (xy, xz, yz) = (X[(1, 0)], X[(2, 0)], X[(2, 1)]);
+    Matrix3::new(X[(0, 0)], xy, xz, xy, X[(1, 1)], yz, xz, yz, X[(2, 2)])
 }
 
-/// Inverse by cofactors, none if the determinant is not positive.
+/// Inverse of a symmetric matrix by cofactors, none if the determinant is not positive.
 #[inline(always)]
 fn inverse(X: &Matrix3<f64>) -> Option<Matrix3<f64>> {
     let (a, b, c): (Vector3<f64>, Vector3<f64>, Vector3<f64>) =
@@ -59,7 +63,7 @@ fn inverse(X: &Matrix3<f64>) -> Option<Matrix3<f64>> {
     let determinant = a.dot(&r0);
     let s = 1.0 / determinant;
     let inverse = Matrix3::from_columns(&[r0 * s, r1 * s, r2 * s]).transpose();
-    (determinant > 0.0 && determinant.is_finite()).then_some(inverse)
+    (determinant > 0.0 && determinant.is_finite()).then_some(mirrored(&inverse))
 }
 
 impl Symmetric {
@@ -101,7 +105,7 @@ impl Symmetric {
         let A = mul3(&self.A, &Y.A) + mul3(&self.B, &Bt);
         let B = mul3(&self.A, &Y.B) + mul3(&self.B, &Y.C);
         let C = tr_mul3(&self.B, &Y.B) + mul3(&self.C, &Y.C);
-        Self { A: mean(&A), B, C: mean(&C) }
+        Self { A: mirrored(&A), B, C: mirrored(&C) }
     }
 
     /// `X Y Z` for a symmetric product.
@@ -114,7 +118,7 @@ impl Symmetric {
         let A = mul3(&self.A, &tt) + mul3(&self.B, &rt);
         let B = mul3(&self.A, &tr) + mul3(&self.B, &rr);
         let C = tr_mul3(&self.B, &tr) + mul3(&self.C, &rr);
-        Self { A: mean(&A), B, C: mean(&C) }
+        Self { A: mirrored(&A), B, C: mirrored(&C) }
     }
 
     /// By elimination of A; none if not positive definite.
@@ -122,9 +126,9 @@ impl Symmetric {
     fn inverse(&self) -> Option<Self> {
         let A = inverse(&self.A)?;
         let G = mul3(&A, &self.B);
-        let C = inverse(&mean(&(self.C - tr_mul3(&self.B, &G))))?;
+        let C = inverse(&mirrored(&(self.C - tr_mul3(&self.B, &G))))?;
         let B = -mul3(&G, &C);
-        Some(Self { A: mean(&(A - mul3(&B, &G.transpose()))), B, C: mean(&C) })
+        Some(Self { A: mirrored(&(A - mul3(&B, &G.transpose()))), B, C: mirrored(&C) })
     }
 }
 
@@ -147,7 +151,7 @@ impl Triangle {
         let Self { tv, tw, rw } = self;
         let (t, r) = (mul3(&X.A, tw) + mul3(&X.B, rw), tr_mul3(&X.B, tw) + mul3(&X.C, rw));
         let C = tr_mul3(tw, &t) + tr_mul3(rw, &r);
-        Symmetric { A: mean(&tr_mul3(tv, &mul3(&X.A, tv))), B: tr_mul3(tv, &t), C: mean(&C) }
+        Symmetric { A: mirrored(&tr_mul3(tv, &mul3(&X.A, tv))), B: tr_mul3(tv, &t), C: mirrored(&C) }
     }
 }
 
@@ -156,7 +160,7 @@ impl Triangle {
 fn shifted(X: &Symmetric, r: &Vector3<f64>) -> Symmetric {
     // A [r]x = -([r]x A)ᵀ for a symmetric A.
     let B = X.B - cross3(r, &X.A).transpose();
-    Symmetric { A: X.A, B, C: mean(&(X.C - cross3(r, &B) - cross3(r, &X.B).transpose())) }
+    Symmetric { A: X.A, B, C: mirrored(&(X.C - cross3(r, &B) - cross3(r, &X.B).transpose())) }
 }
 
 /// `G_p` and `G_c` of a joint, and the inverse of `G_c`.
@@ -279,19 +283,9 @@ impl Sigma {
     }
 }
 
-/// What the joint of a body adds to (1).
-#[derive(Clone, Copy, Debug)]
-pub(super) struct JointRows {
-    pub(super) G: Jacobian,
-    pub(super) sigma: Sigma,
-    pub(super) s: Vector6<f64>,
-}
-
-/// A joint with what lies outward of it eliminated.
+/// A joint with what lies outward of it eliminated: `S^-1` and `S^-1 ŝ`.
 #[derive(Clone, Copy, Debug)]
 struct Held {
-    rows: JointRows,
-    /// `S^-1` and `S^-1 ŝ`.
     S_inverse: Symmetric,
     y: Vector6<f64>,
 }
@@ -301,43 +295,48 @@ pub(super) struct TreeSolver {
     parent: Vec<usize>,
     pub(super) M: Vec<Symmetric>,
     pub(super) b: Vec<Vector6<f64>>,
-    joints: Vec<Option<Held>>,
+    /// Right-hand sides s of the joints.
+    pub(super) s: Vec<Vector6<f64>>,
+    joints: Vec<Held>,
 }
 
 impl TreeSolver {
     pub(super) fn new(parent: Vec<usize>) -> Self {
-        let n = parent.len();
-        Self { parent, M: vec![Symmetric::zeros(); n], b: vec![Vector6::zeros(); n], joints: vec![None; n] }
+        let (n, zero) = (parent.len(), Vector6::zeros());
+        let joints = vec![Held { S_inverse: Symmetric::zeros(), y: zero }; n];
+        Self { parent, M: vec![Symmetric::zeros(); n], b: vec![zero; n], s: vec![zero; n], joints }
     }
 
-    /// Solves for velocities and impulses; `M` and `b` hold the bodies' blocks and are used up.
+    /// Solves for velocities and impulses; `M`, `b` and `s` hold the blocks of bodies and joints, `M` and `b` are used up.
     ///
-    /// `joint(i)` gives the rows of the joint that carries body i. Returns the body whose block is not positive definite, if any.
+    /// * `rows`, `sigma`: of the joint that carries each body.
+    ///
+    /// Returns the body whose block is not positive definite, if any.
     pub(super) fn solve(
         &mut self,
-        joint: impl Fn(usize) -> JointRows,
+        rows: &[Rows],
+        sigma: &[Sigma],
         v: &mut [Vector6<f64>],
         lambda: &mut [Vector6<f64>],
     ) -> Result<(), usize> {
         let n = self.parent.len();
         for i in (1..n).rev() {
-            let rows = joint(i);
-            let (M, b) = rows.G.in_rows(&self.M[i], &self.b[i]);
-            let (S_inverse, y) = rows.sigma.hold(&M, &b, &rows.s).ok_or(i)?;
+            let (M, b) = rows[i].G.in_rows(&self.M[i], &self.b[i]);
+            let (S_inverse, y) = sigma[i].hold(&M, &b, &self.s[i]).ok_or(i)?;
             let p = self.parent[i];
             if p > 0 {
-                let (M, b) = rows.G.on_parent(&S_inverse, &y);
+                let (M, b) = rows[i].G.on_parent(&S_inverse, &y);
                 self.M[p] = self.M[p].plus(&M);
                 self.b[p] += b;
             }
-            self.joints[i] = Some(Held { rows, S_inverse, y });
+            self.joints[i] = Held { S_inverse, y };
         }
         v[0] = Vector6::zeros();
         for i in 1..n {
-            let Some(Held { rows, S_inverse, y }) = &self.joints[i] else { return Err(i) };
-            let moved = rows.G.of_parent(&v[self.parent[i]]);
+            let Held { S_inverse, y } = &self.joints[i];
+            let moved = rows[i].G.of_parent(&v[self.parent[i]]);
             lambda[i] = y - S_inverse.times(&moved);
-            v[i] = rows.G.back(&(rows.s - rows.sigma.times(&lambda[i]) - moved));
+            v[i] = rows[i].G.back(&(self.s[i] - sigma[i].times(&lambda[i]) - moved));
         }
         Ok(())
     }
