@@ -32,6 +32,8 @@
 //!
 //! Source of (4) to (6): [Featherstone 2008], Table 7.1. Not here: bodies and joints.
 
+use std::array::from_fn;
+
 use nalgebra::{DVector, Matrix3, Matrix6, Vector6};
 
 use crate::error::StepError;
@@ -157,13 +159,13 @@ impl<const F: usize> Numbers<F> {
     /// Puts the inverse of a symmetric matrix in its place, by Gauss and Jordan; false where a pivot is not positive.
     fn invert(self, A: &mut Matrices<F>) -> bool {
         for k in 0..6 {
-            let Some(inverse) = self.inverse(A.map(|part| part[(k, k)])) else { return false };
+            let Some(inverse) = self.inverse(from_fn(|part| A[part][(k, k)])) else { return false };
             // Column k with its pivot taken out.
-            let mut own: Vectors<F> = A.map(|part| part.column(k).into());
+            let mut own: Vectors<F> = from_fn(|part| A[part].column(k).into());
             own.iter_mut().for_each(|part| part[k] = 0.0);
             for j in (0..6).filter(|j| *j != k) {
                 // A_j -= A_k A_kj/A_kk,   A_kj = A_kj/A_kk
-                let factor = self.scalar(A.map(|part| part[(k, j)]), inverse);
+                let factor = self.scalar(from_fn(|part| A[part][(k, j)]), inverse);
                 let column = self.scaled(&own, factor);
                 for ((part, column), factor) in A.iter_mut().zip(&column).zip(factor) {
                     part.column_mut(j).axpy(-1.0, column, 1.0);
@@ -281,13 +283,13 @@ impl<const F: usize> Elimination<F> {
                 return false;
             }
             for k in 0..6 {
-                let column = numbers.product(&node.inverse, &node.inertia.map(|part| part.column(k).into()));
+                let column = numbers.product(&node.inverse, &from_fn(|part| node.inertia[part].column(k).into()));
                 node.held.iter_mut().zip(&column).for_each(|(held, column)| held.set_column(k, column));
             }
             let Some(p) = own.parent else { continue };
             let mut passed = zero;
             for k in 0..6 {
-                let column = numbers.times_unit(nu, &node.held.map(|part| part.column(k).into()));
+                let column = numbers.times_unit(nu, &from_fn(|part| node.held[part].column(k).into()));
                 passed.iter_mut().zip(&column).for_each(|(to, column)| to.set_column(k, &product(block, column)));
             }
             for (to, passed) in inner[p].inertia.iter_mut().zip(&passed) {
