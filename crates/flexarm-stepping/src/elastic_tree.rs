@@ -151,7 +151,5 @@ impl FlexibleArm {
                 node.C = node.K * c_K + self.D.fixed_view::<6, 6>(first, first) * c_D;
             }
         }
-        let one = self.tau.windows(2).all(|pair| pair[0] == pair[1]);
-        to.ratio = self.tau.first().filter(|_| one && self.proportional).map(|tau| c_K + c_D * tau);
     }
 }

@@ -88,7 +88,7 @@ impl IterationMatrix {
         self.s = s;
         // A system whose matrices once were dense ones keeps them.
         if let Way::Tree(tree) = &mut self.way {
-            if system.along_tree(c_D, c_K, &mut tree.matrices) && tree.applies(s) {
+            if system.along_tree(c_D, c_K, &mut tree.matrices) {
                 return;
             }
             self.way = Way::Dense(DenseInverse::new(system.dimension()));

@@ -16,19 +16,19 @@
 //! outward   x_j = w_j - Δ_j^-1 Î_j X_j α_p                                                      (6)
 //! ```
 //!
-//! **With `κ K (1 + s M^-1 K)` instead of S** (the dispersion correction of generalised-alpha, damping in proportion to stiffness)
+//! **With a correction** by s, as the dispersion correction of generalised-alpha,
 //!
 //! ```text
-//! J = M + κ K (1 + s M^-1 K) = (M + a K) M^-1 (M + b K),   a + b = κ,   a b = κ s                 (7)
+//! J = M + C (1 + s M^-1 K)                                                                  (7)
 //! ```
-//! is in general no such matrix, and a, b are real, equal or complex. They are ν times the roots of `β² = τ β - 1` with `ν² = κ s`,
-//! `τ = κ/ν`. So J is eliminated once in numbers `p + q β` (complex ones are those of τ = 0): from (4) to (6) with `S = ν β K`,
+//! is no such matrix. But with `u = s M^-1 K x` beside x it is one of two vectors per node, to which (4) to (6) apply as they are:
 //!
 //! ```text
-//! y = p + q β = (M + ν β K)^-1 r,   J^-1 r = p + τ q,   s M^-1 K J^-1 r = -(s/ν) q                 (8)
+//! [ M + C    C ] [ x ]   [ r ]
+//! [ -s K     M ] [ u ] = [ 0 ]        S_j = [ C_j C_j; -s K_j 0 ],   I and X in both rows        (8)
 //! ```
-//! (8) are the partial fractions `(a y_a - b y_b)/(a - b)` and `s (y_b - y_a)/(a - b)`, without their division. M and K are
-//! positive definite, so that no pivot vanishes.
+//! and u is what a step needs besides. Where `C = κ K`, S is K times a 2×2 matrix with the eigenvalues a, b of
+//! `J = (M + a K) M^-1 (M + b K)`, `a + b = κ`, `a b = κ s`: real or complex, never negative. No pivot vanishes.
 //!
 //! Source of (4) to (6): [Featherstone 2008], Table 7.1. Not here: bodies and joints.
 
@@ -72,13 +72,12 @@ impl TreeNode {
 pub struct TreeMatrices {
     /// Parents before children.
     pub nodes: Vec<TreeNode>,
-    /// κ, where `c_D D + c_K K = κ K` on all nodes.
-    pub ratio: Option<f64>,
 }
 
-/// A vector of a node, and a matrix, of F = 1 real numbers or F = 2 parts of numbers `p + q β`.
+/// F vectors of a node, x alone or x and u, and what maps them.
 type Vectors<const F: usize> = [Vector6<f64>; F];
-type Matrices<const F: usize> = [Matrix6<f64>; F];
+type Matrices<const F: usize> = [[Matrix6<f64>; F]; F];
+type Scalars<const F: usize> = [[f64; F]; F];
 
 /// `y += A x`.
 #[inline(always)]
@@ -99,105 +98,82 @@ fn product(A: &Matrix6<f64>, x: &Vector6<f64>) -> Vector6<f64> {
     y
 }
 
-/// Numbers `p + q β`, of which F = 1 has p alone.
-#[derive(Clone, Copy, Debug, Default)]
-struct Numbers<const F: usize> {
-    /// `β² = τ β - 1`.
-    tau: f64,
-}
-
-impl<const F: usize> Numbers<F> {
-    /// `1/a`; none where there is no positive number of that kind.
-    fn inverse(self, a: [f64; F]) -> Option<[f64; F]> {
-        let mut inverse = [1.0 / a[0]; F];
-        let mut norm = a[0];
-        if F == 2 {
-            let [p, q] = [a[0], a[F - 1]];
-            norm = p * p + self.tau * p * q + q * q;
-            inverse = [(p + self.tau * q) / norm; F];
-            inverse[F - 1] = -q / norm;
-        }
-        (norm > 0.0 && norm.is_finite()).then_some(inverse)
-    }
-
-    /// `y += A x`.
-    #[inline(always)]
-    fn add_product(self, A: &Matrices<F>, x: &Vectors<F>, y: &mut Vectors<F>) {
-        if F == 1 {
-            return add_product(&A[0], &x[0], &mut y[0]);
-        }
-        let (mut p, mut q) = (y[0].data.0[0], y[F - 1].data.0[0]);
-        let columns = A[0].data.0.iter().zip(&A[F - 1].data.0);
-        for ((P, Q), (a, b)) in columns.zip(x[0].data.0[0].iter().zip(&x[F - 1].data.0[0])) {
-            let c = a + self.tau * b;
-            for i in 0..6 {
-                p[i] += P[i] * a - Q[i] * b;
-                q[i] += P[i] * b + Q[i] * c;
-            }
-        }
-        (y[0].data.0[0], y[F - 1].data.0[0]) = (p, q);
-    }
-
-    #[inline(always)]
-    fn product(self, A: &Matrices<F>, x: &Vectors<F>) -> Vectors<F> {
-        let mut y = [Vector6::zeros(); F];
-        self.add_product(A, x, &mut y);
-        y
-    }
-
-    /// `ν β x`; with F = 1, x.
-    #[inline(always)]
-    fn times_unit(self, nu: f64, x: &Vectors<F>) -> Vectors<F> {
-        let mut y = *x;
-        if F == 2 {
-            y[0] = x[F - 1] * -nu;
-            y[F - 1] = (x[0] + x[F - 1] * self.tau) * nu;
-        }
-        y
-    }
-
-    /// Puts the inverse of a symmetric matrix in its place, by Gauss and Jordan; false where a pivot is not positive.
-    fn invert(self, A: &mut Matrices<F>) -> bool {
-        for k in 0..6 {
-            let Some(inverse) = self.inverse(from_fn(|part| A[part][(k, k)])) else { return false };
-            // Column k with its pivot taken out.
-            let mut own: Vectors<F> = from_fn(|part| A[part].column(k).into());
-            own.iter_mut().for_each(|part| part[k] = 0.0);
-            for j in (0..6).filter(|j| *j != k) {
-                // A_j -= A_k A_kj/A_kk,   A_kj = A_kj/A_kk
-                let factor = self.scalar(from_fn(|part| A[part][(k, j)]), inverse);
-                let column = self.scaled(&own, factor);
-                for ((part, column), factor) in A.iter_mut().zip(&column).zip(factor) {
-                    part.column_mut(j).axpy(-1.0, column, 1.0);
-                    part[(k, j)] = factor;
+/// `A x`.
+#[inline(always)]
+fn products<const F: usize>(A: &Matrices<F>, x: &Vectors<F>) -> Vectors<F> {
+    let mut y = [[0.0; 6]; F];
+    for column in 0..6 {
+        for (y, row) in y.iter_mut().zip(A) {
+            for (A, x) in row.iter().zip(x) {
+                let a = x[column];
+                for (y, A) in y.iter_mut().zip(&A.data.0[column]) {
+                    *y += A * a;
                 }
             }
-            let column = self.scaled(&own, inverse);
-            for ((part, column), inverse) in A.iter_mut().zip(&column).zip(inverse) {
-                part.set_column(k, &-column);
-                part[(k, k)] = inverse;
+        }
+    }
+    y.map(Vector6::from)
+}
+
+/// Column k of all.
+fn column<const F: usize>(A: &Matrices<F>, k: usize) -> [Vectors<F>; F] {
+    from_fn(|i| from_fn(|j| A[i][j].column(k).into()))
+}
+
+/// Entry (i, j) of all.
+fn entry<const F: usize>(A: &Matrices<F>, i: usize, j: usize) -> Scalars<F> {
+    from_fn(|row| from_fn(|column| A[row][column][(i, j)]))
+}
+
+/// The inverse of one number, or of two by two; none where these have no positive determinant.
+fn inverse<const F: usize>(a: &Scalars<F>) -> Option<Scalars<F>> {
+    let last = F - 1;
+    let determinant = if F == 1 { a[0][0] } else { a[0][0] * a[last][last] - a[0][last] * a[last][0] };
+    let mut inverse = [[1.0 / determinant; F]; F];
+    if F > 1 {
+        inverse[0][0] = a[last][last] / determinant;
+        inverse[last][last] = a[0][0] / determinant;
+        inverse[0][last] = -a[0][last] / determinant;
+        inverse[last][0] = -a[last][0] / determinant;
+    }
+    (determinant > 0.0 && determinant.is_finite()).then_some(inverse)
+}
+
+/// `a b`.
+fn scalar_product<const F: usize>(a: &Scalars<F>, b: &Scalars<F>) -> Scalars<F> {
+    from_fn(|i| from_fn(|j| (0..F).map(|k| a[i][k] * b[k][j]).sum()))
+}
+
+/// `x a`.
+fn scaled<const F: usize>(x: &[Vectors<F>; F], a: &Scalars<F>) -> [Vectors<F>; F] {
+    from_fn(|i| from_fn(|j| (0..F).fold(Vector6::zeros(), |sum, k| sum + x[i][k] * a[k][j])))
+}
+
+/// Puts the inverse in the place of a matrix, by Gauss and Jordan; false where a pivot is not positive.
+fn invert<const F: usize>(A: &mut Matrices<F>) -> bool {
+    for k in 0..6 {
+        let Some(pivot) = inverse(&entry(A, k, k)) else { return false };
+        // Column k with its pivot taken out.
+        let mut own = column(A, k);
+        own.iter_mut().flatten().for_each(|part| part[k] = 0.0);
+        for j in (0..6).filter(|j| *j != k) {
+            // A_kj = A_kk^-1 A_kj,   A_j -= A_k A_kj
+            let factor = scalar_product(&pivot, &entry(A, k, j));
+            let taken = scaled(&own, &factor);
+            for (row, column) in (0..F).flat_map(|row| (0..F).map(move |column| (row, column))) {
+                let part = &mut A[row][column];
+                part.column_mut(j).axpy(-1.0, &taken[row][column], 1.0);
+                part[(k, j)] = factor[row][column];
             }
         }
-        true
-    }
-
-    fn scalar(self, a: [f64; F], b: [f64; F]) -> [f64; F] {
-        let mut y = [a[0] * b[0]; F];
-        if F == 2 {
-            y[0] -= a[F - 1] * b[F - 1];
-            y[F - 1] = a[0] * b[F - 1] + a[F - 1] * (b[0] + self.tau * b[F - 1]);
+        let own = scaled(&own, &pivot);
+        for (row, column) in (0..F).flat_map(|row| (0..F).map(move |column| (row, column))) {
+            let part = &mut A[row][column];
+            part.set_column(k, &-own[row][column]);
+            part[(k, k)] = pivot[row][column];
         }
-        y
     }
-
-    fn scaled(self, x: &Vectors<F>, a: [f64; F]) -> Vectors<F> {
-        let mut y = x.map(|x| x * a[0]);
-        if F == 2 {
-            y[0] -= x[F - 1] * a[F - 1];
-            y[F - 1] = x[0] * a[F - 1] + x[F - 1] * (a[0] + self.tau * a[F - 1]);
-        }
-        y
-    }
+    true
 }
 
 impl TreeNode {
@@ -228,11 +204,31 @@ impl TreeNode {
         Vector6::from(carried)
     }
 
-    /// `Xᵀ I X` for a symmetric I.
+    /// `Xᵀ I X`.
     fn inertia_inward(&self, I: &Matrix6<f64>) -> Matrix6<f64> {
         let half = Matrix6::from_columns(&[0, 1, 2, 3, 4, 5].map(|k| self.inward(&I.column(k).into()))).transpose();
-        let whole = Matrix6::from_columns(&[0, 1, 2, 3, 4, 5].map(|k| self.inward(&half.column(k).into())));
-        (whole + whole.transpose()) * 0.5
+        Matrix6::from_columns(&[0, 1, 2, 3, 4, 5].map(|k| self.inward(&half.column(k).into()))).transpose()
+    }
+
+    /// `S` of (4), or with F = 2 of (8).
+    fn springs<const F: usize>(&self, s: f64) -> Matrices<F> {
+        let mut S = [[self.C; F]; F];
+        if F > 1 {
+            S[F - 1] = [self.K * -s; F];
+            S[F - 1][F - 1] = Matrix6::zeros();
+        }
+        S
+    }
+
+    /// `S x`.
+    #[inline(always)]
+    fn stretched<const F: usize>(&self, s: f64, x: &Vectors<F>) -> Vectors<F> {
+        if F == 1 {
+            return [product(&self.C, &x[0]); F];
+        }
+        let mut y = [product(&self.C, &(x[0] + x[F - 1])); F];
+        y[F - 1] = product(&self.K, &(x[0] * -s));
+        y
     }
 }
 
@@ -243,82 +239,73 @@ struct Eliminated<const F: usize> {
     inverse: Matrices<F>,
     /// `Δ^-1 Î`.
     held: Matrices<F>,
-    /// Î before; in a solution what the children put on the node, then `α`.
+    /// `Î`.
     inertia: Matrices<F>,
+    /// In a solution what the children put on the node, then `α`.
     carried: Vectors<F>,
     w: Vectors<F>,
 }
 
-/// Elimination of `M + S`, or with F = 2 of `M + ν β K`.
+/// Elimination of `M + S`.
 #[derive(Clone, Debug, Default)]
 struct Elimination<const F: usize> {
-    numbers: Numbers<F>,
-    nu: f64,
+    s: f64,
     nodes: Vec<Eliminated<F>>,
 }
 
 impl<const F: usize> Elimination<F> {
-    /// What is on the springs of a node: with F = 2, before `ν β`.
-    #[inline(always)]
-    fn block(node: &TreeNode) -> &Matrix6<f64> {
-        if F == 2 { &node.K } else { &node.C }
-    }
-
     /// (4); false where a pivot is not positive.
-    fn factor(&mut self, tree: &[TreeNode], numbers: Numbers<F>, nu: f64) -> bool {
-        (self.numbers, self.nu) = (numbers, nu);
-        let (zero, none) = ([Matrix6::zeros(); F], [Vector6::zeros(); F]);
+    fn factor(&mut self, tree: &[TreeNode], s: f64) -> bool {
+        self.s = s;
+        let (zero, none) = ([[Matrix6::zeros(); F]; F], [Vector6::zeros(); F]);
         self.nodes.resize(tree.len(), Eliminated { inverse: zero, held: zero, inertia: zero, carried: none, w: none });
         for (node, own) in self.nodes.iter_mut().zip(tree) {
             node.inertia = zero;
-            node.inertia[0] = own.inertia;
+            (0..F).for_each(|i| node.inertia[i][i] = own.inertia);
         }
         for (j, own) in tree.iter().enumerate().rev() {
             let (inner, outer) = self.nodes.split_at_mut(j);
-            let (node, block) = (&mut outer[0], Self::block(own));
+            let node = &mut outer[0];
             node.inverse = node.inertia;
-            // ν β K has no first part.
-            node.inverse[F - 1] += block * if F == 2 { nu } else { 1.0 };
-            if !numbers.invert(&mut node.inverse) {
+            for (to, S) in node.inverse.iter_mut().flatten().zip(own.springs::<F>(s).iter().flatten()) {
+                *to += S;
+            }
+            if !invert(&mut node.inverse) {
                 return false;
             }
-            for k in 0..6 {
-                let column = numbers.product(&node.inverse, &from_fn(|part| node.inertia[part].column(k).into()));
-                node.held.iter_mut().zip(&column).for_each(|(held, column)| held.set_column(k, column));
+            // Columns of Δ^-1 Î and of S Δ^-1 Î, F vectors each.
+            let mut passed = zero;
+            for (c, k) in (0..F).flat_map(|c| (0..6).map(move |k| (c, k))) {
+                let held = products(&node.inverse, &from_fn(|i| node.inertia[i][c].column(k).into()));
+                let stretched = own.stretched(s, &held);
+                for i in 0..F {
+                    node.held[i][c].set_column(k, &held[i]);
+                    passed[i][c].set_column(k, &stretched[i]);
+                }
             }
             let Some(p) = own.parent else { continue };
-            let mut passed = zero;
-            for k in 0..6 {
-                let column = numbers.times_unit(nu, &from_fn(|part| node.held[part].column(k).into()));
-                passed.iter_mut().zip(&column).for_each(|(to, column)| to.set_column(k, &product(block, column)));
-            }
-            for (to, passed) in inner[p].inertia.iter_mut().zip(&passed) {
-                *to += own.inertia_inward(&((passed + passed.transpose()) * 0.5));
+            for (to, passed) in inner[p].inertia.iter_mut().flatten().zip(passed.iter().flatten()) {
+                *to += own.inertia_inward(passed);
             }
         }
         true
     }
 
-    /// (5) and (6): leaves the parts of the solution of node j in its `w`.
+    /// (5) and (6) for r in the first rows: leaves the solution of node j in its `w`.
     fn solve(&mut self, tree: &[TreeNode], r: &[f64]) {
-        let Self { numbers, nu, nodes } = self;
+        let Self { s, nodes } = self;
         let none = [Vector6::zeros(); F];
         nodes.iter_mut().for_each(|node| node.carried = none);
         for (j, own) in tree.iter().enumerate().rev() {
             let (inner, outer) = nodes.split_at_mut(j);
             let node = &mut outer[0];
-            let own_r = Vector6::from_column_slice(&r[6 * j..6 * j + 6]);
-            let mut z = node.carried.map(|f| -f);
-            z[0] += own_r;
-            node.w = numbers.product(&node.inverse, &z);
+            let mut f = none;
+            f[0] = Vector6::from_column_slice(&r[6 * j..6 * j + 6]);
+            node.w = products(&node.inverse, &from_fn(|i| f[i] - node.carried[i]));
             let Some(p) = own.parent else { continue };
-            let stretched = numbers.times_unit(*nu, &node.w);
-            for (part, (to, stretched)) in inner[p].carried.iter_mut().zip(&stretched).enumerate() {
-                let mut f = -product(Self::block(own), stretched);
-                if part == 0 {
-                    f += own_r;
-                }
-                *to += own.inward(&f);
+            let stretched = own.stretched(*s, &node.w);
+            for (i, to) in inner[p].carried.iter_mut().enumerate() {
+                *to += own.inward(&(f[i] - stretched[i]));
             }
         }
         for (j, own) in tree.iter().enumerate() {
@@ -328,11 +315,11 @@ impl<const F: usize> Elimination<F> {
                 node.carried = node.w;
                 continue;
             };
-            let moved = inner[p].carried.map(|alpha| own.outward(&alpha));
-            let held = numbers.product(&node.held, &moved);
-            for (part, w) in node.w.iter_mut().enumerate() {
-                *w -= held[part];
-                node.carried[part] = moved[part] + *w;
+            let moved: Vectors<F> = from_fn(|i| own.outward(&inner[p].carried[i]));
+            let held = products(&node.held, &moved);
+            for i in 0..F {
+                node.w[i] -= held[i];
+                node.carried[i] = moved[i] + node.w[i];
             }
         }
     }
@@ -355,25 +342,17 @@ pub(crate) struct TreeInverse {
 }
 
 impl TreeInverse {
-    /// Whether (7) with this s, or `M + C` without, can be eliminated from the matrices that are there.
-    pub(crate) fn applies(&self, s: Option<f64>) -> bool {
-        s.is_none() || self.matrices.ratio.is_some_and(|kappa| kappa > 0.0)
-    }
-
     /// Factorises what is in `matrices`, (7) with s or `M + C` without.
     ///
     /// # Errors
     /// [`StepError::Singular`] if an inertia or `J` is not positive definite.
     pub(crate) fn factor(&mut self, s: Option<f64>, t: f64) -> Result<(), StepError> {
-        let nodes = &self.matrices.nodes;
         self.s = s;
-        let kappa = self.matrices.ratio.unwrap_or(f64::NAN);
         let positive = match s {
-            None => self.plain.factor(nodes, Numbers::default(), 1.0),
+            None => self.plain.factor(&self.matrices.nodes, 0.0),
             Some(s) => {
-                let nu = (kappa * s).sqrt();
                 self.invert_inertias(t)?;
-                self.corrected.factor(&self.matrices.nodes, Numbers { tau: kappa / nu }, nu)
+                self.corrected.factor(&self.matrices.nodes, s)
             }
         };
         if positive { Ok(()) } else { Err(StepError::Singular { matrix: "iteration matrix", t }) }
@@ -387,11 +366,11 @@ impl TreeInverse {
             self.shift = DVector::zeros(6 * nodes.len());
         }
         for (inverse, node) in self.lightness.iter_mut().zip(nodes) {
-            let mut inertia = [node.inertia];
-            if !Numbers::default().invert(&mut inertia) {
+            let mut inertia = [[node.inertia]];
+            if !invert(&mut inertia) {
                 return Err(StepError::Singular { matrix: "mass matrix", t });
             }
-            *inverse = inertia[0];
+            *inverse = inertia[0][0];
         }
         Ok(())
     }
@@ -399,22 +378,18 @@ impl TreeInverse {
     /// Replaces `r` by `d = J^-1 r`; with s also finds [`TreeInverse::shift`].
     pub(crate) fn solve(&mut self, r: &mut DVector<f64>) {
         let nodes = &self.matrices.nodes;
-        let Some(s) = self.s else {
+        if self.s.is_none() {
             self.plain.solve(nodes, r.as_slice());
             for (d, node) in r.as_mut_slice().chunks_exact_mut(6).zip(&self.plain.nodes) {
                 d.copy_from_slice(node.w[0].as_slice());
             }
             return;
-        };
+        }
         self.corrected.solve(nodes, r.as_slice());
-        let (tau, scale) = (self.corrected.numbers.tau, -s / self.corrected.nu);
         let to = r.as_mut_slice().chunks_exact_mut(6).zip(self.shift.as_mut_slice().chunks_exact_mut(6));
         for ((d, shift), node) in to.zip(&self.corrected.nodes) {
-            let [p, q] = &node.w;
-            for i in 0..6 {
-                d[i] = p[i] + tau * q[i];
-                shift[i] = scale * q[i];
-            }
+            d.copy_from_slice(node.w[0].as_slice());
+            shift.copy_from_slice(node.w[1].as_slice());
         }
     }
 
@@ -485,7 +460,7 @@ mod tests {
                 K: draw.symmetric(0.1) * size,
             }
         });
-        TreeMatrices { nodes: nodes.collect(), ratio: None }
+        TreeMatrices { nodes: nodes.collect() }
     }
 
     /// (2), C and K as dense matrices.
@@ -537,21 +512,24 @@ mod tests {
         result.unwrap();
     }
 
-    /// Truth: `J = M + κ K + κ s K M^-1 K` dense, by LU, where a and b of (7) are complex, equal, real, and very different
-    /// (`τ = κ/ν` of 0.02, 1, 2, 2.1 and 50); solution, shift, and `x + s M^-1 K x`.
-    /// Measured: 3e-13, 7e-14, 5e-14.
+    /// Truth: `J = M + C (1 + s M^-1 K)` dense, by LU; solution, shift, and `x + s M^-1 K x`. Damping that has nothing to do with the
+    /// stiffness, and `C = κ K` where the roots a and b are complex, equal, real, and very different (`τ = (κ/s)^1/2` of 0.02, 1, 2,
+    /// 2.1 and 50). Measured: 2e-12, 2e-12, 1e-12.
     #[test]
-    fn the_corrected_matrix_is_solved_by_one_elimination_whatever_its_roots() {
-        let mut runner = TestRunner::new(ProptestConfig::with_cases(60));
-        let cases = (any::<u64>(), 1_usize..=32, prop::sample::select(vec![0.02, 1.0, 2.0, 2.1, 50.0]), -2.0..1.0f64);
+    fn the_corrected_matrix_is_solved_with_one_elimination_whatever_the_damping() {
+        let mut runner = TestRunner::new(ProptestConfig::with_cases(100));
+        let ratios = prop::sample::select(vec![None, Some(0.02), Some(1.0), Some(2.0), Some(2.1), Some(50.0)]);
+        let cases = (any::<u64>(), 1_usize..=32, ratios, -2.0..1.0f64);
         let result = runner.run(&cases, |(seed, count, tau, size)| {
             let mut matrices = tree(seed, count);
             let nu = 10f64.powf(size);
-            let (kappa, s) = (tau * nu, nu / tau);
-            matrices.ratio = Some(kappa);
-            let [M, _, K] = dense(&matrices);
+            let s = nu / tau.unwrap_or(1.0);
+            if let Some(tau) = tau {
+                matrices.nodes.iter_mut().for_each(|node| node.C = node.K * (tau * nu));
+            }
+            let [M, C, K] = dense(&matrices);
             let M_inverse_K = M.clone().lu().solve(&K).unwrap();
-            let J = &M + &K * kappa + &K * &M_inverse_K * (kappa * s);
+            let J = &M + &C + &C * &M_inverse_K * s;
             let r = DVector::from_fn(6 * count, |i, _| ((i * i) as f64).sin());
             let truth = J.lu().solve(&r).unwrap();
             let mut inverse = TreeInverse { matrices, ..Default::default() };
@@ -565,7 +543,7 @@ mod tests {
                 far(inverse.shift(), &(&M_inverse_K * &truth * s)),
                 far(&corrected, &(&r + &M_inverse_K * &r * s)),
             ];
-            prop_assert!(errors.iter().all(|error| *error < 1e-10), "{errors:?} {tau}");
+            prop_assert!(errors.iter().all(|error| *error < 1e-10), "{errors:?} {tau:?}");
             Ok(())
         });
         result.unwrap();
@@ -575,7 +553,6 @@ mod tests {
     #[test]
     fn a_node_without_inertia_is_found() {
         let mut matrices = tree(1, 3);
-        matrices.ratio = Some(1.0);
         matrices.nodes[2].inertia = Matrix6::zeros();
         let mut inverse = TreeInverse { matrices, ..Default::default() };
         assert!(matches!(inverse.factor(Some(1.0), 0.5), Err(StepError::Singular { matrix: "mass matrix", .. })));
