@@ -7,8 +7,12 @@ use std::sync::Arc;
 
 use flexarm_kinematics::{ElasticAngles, Model};
 use flexarm_stepping::*;
+use flexarm_testkit::allocations::{CountingAllocator, count_allocations};
 use flexarm_testkit::{Draw, chain_arm};
 use nalgebra::{DMatrix, DVector};
+
+#[global_allocator]
+static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 /// Chains of so many joints in two links and a branch, moved along all joints.
 fn arm(joints: usize, branch: usize, angles: ElasticAngles, damping: impl Fn(usize) -> Damping) -> FlexibleArm {
@@ -197,5 +201,25 @@ fn a_run_along_the_tree_is_the_dense_run() {
             eprintln!("{:?}, corrected {dispersion_correction}: {far:.1e}, {tree:?}", damping(0));
             assert!(far < 1e-9 && tree == dense, "{far:e}");
         }
+    }
+}
+
+/// Matrices that are taken anew included.
+#[test]
+fn steps_of_chains_do_not_allocate() {
+    let arm = arm(8, 2, ElasticAngles::RotationVector, |_| Damping::StiffnessProportional(1e-3));
+    let kinds = [
+        StepperKind::GeneralizedAlpha(AlphaSettings::default()),
+        StepperKind::GeneralizedAlpha(AlphaSettings { rho: 0.9, dispersion_correction: false }),
+        StepperKind::Sdirk3,
+        StepperKind::Spook(SpookSettings::default()),
+    ];
+    for kind in kinds {
+        let mut stepper = new_stepper(kind, arm.clone(), 1e-3, Start::Equilibrium).unwrap();
+        stepper.step().unwrap();
+        let before = stepper.counts().factorisations;
+        let allocations = count_allocations(|| (0..400).for_each(|_| stepper.step().unwrap()));
+        assert_eq!(allocations, 0, "{}", kind.name());
+        assert!(stepper.counts().factorisations > before, "{}", kind.name());
     }
 }
