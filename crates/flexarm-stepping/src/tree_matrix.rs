@@ -27,8 +27,9 @@
 //! [ M + C    C ] [ x ]   [ r ]
 //! [ -s K     M ] [ u ] = [ 0 ]        S_j = [ C_j C_j; -s K_j 0 ],   I and X in both rows        (8)
 //! ```
-//! and u is what a step needs besides. Where `C = κ K`, S is K times a 2×2 matrix with the eigenvalues a, b of
-//! `J = (M + a K) M^-1 (M + b K)`, `a + b = κ`, `a b = κ s`: real or complex, never negative. No pivot vanishes.
+//! and u is what a step needs besides. Coordinates that are held leave a matrix of the same kind, of determinant `det M det J > 0`,
+//! for `(1 + s K M^-1) J = M + s K + (1 + s K M^-1) C (1 + s M^-1 K)` is positive definite: no pivot of two by two vanishes, whatever
+//! the damping.
 //!
 //! Source of (4) to (6): [Featherstone 2008], Table 7.1. Not here: bodies and joints.
 
@@ -125,7 +126,7 @@ fn entry<const F: usize>(A: &Matrices<F>, i: usize, j: usize) -> Scalars<F> {
     from_fn(|row| from_fn(|column| A[row][column][(i, j)]))
 }
 
-/// The inverse of one number, or of two by two; none where these have no positive determinant.
+/// The inverse of a number, or of two by two; none where they have no positive determinant.
 fn inverse<const F: usize>(a: &Scalars<F>) -> Option<Scalars<F>> {
     let last = F - 1;
     let determinant = if F == 1 { a[0][0] } else { a[0][0] * a[last][last] - a[0][last] * a[last][0] };
