@@ -13,7 +13,7 @@ use crate::arm::{Damping, FlexibleArm, add_product};
 use crate::tree_matrix::{TreeMatrices, TreeNode};
 
 /// Fewest elastic joints for which elimination is faster than a dense inverse: with two, 12 coordinates, a step takes as long
-/// either way, with three 2.8 instead of 3.3 us, with five 4.0 instead of 7.5, with 64 48 instead of 1800 (`examples/chains.rs`).
+/// either way, with three 2.8 instead of 3.3 us, with five 4.0 instead of 7.5, with 64 48 instead of 7000 (`examples/chains.rs`).
 pub(crate) const FEWEST_NODES: usize = 3;
 
 /// Where the nodes are among the bodies, and workspaces.
