@@ -414,30 +414,12 @@ impl FlexibleArm {
         self.D.fill(0.0);
 
         // D = M Φ diag(2 ζ ω) Φᵀ M with ζ of each mode weighted by strain energy, plus blocks.
-        let model = self.model.clone();
-        let (mut state, mut qddot) = (State::zeros(&model), DVector::zeros(model.nv()));
-        self.prescribed_state(0.0, &mut state, &mut qddot);
-        state.q.rows_mut(model.n_actuated(), n).copy_from(&self.modes.equilibrium);
-        let mut data = Data::new(&model);
-        let M = mass_matrix(&model, &mut data, &state.q)
-            .view((model.n_actuated(), model.n_actuated()), (n, n))
-            .clone_owned();
-        for (j, omega) in self.modes.omega.iter().enumerate() {
-            let phi = self.modes.shapes.column(j);
-            let (mut zeta, mut total) = (0.0, 0.0);
-            for element in &self.elements {
-                let x = phi.rows(self.offset(element), element.size);
-                let energy = x.dot(&(&element.K * x));
-                total += energy;
-                if let Damping::Modal(z) = element.damping {
-                    zeta += z * energy;
-                }
-            }
-            let Mphi = &M * phi;
-            self.D.ger(2.0 * zeta / total * omega, &Mphi, &Mphi, 1.0);
+        let M = self.mass_at_start();
+        if !self.damps_by_element() {
+            self.add_modal_damping(&M);
         }
         for element in &self.elements {
-            let (k, size) = (element.coordinate - model.n_actuated(), element.size);
+            let (k, size) = (element.coordinate - self.model.n_actuated(), element.size);
             let mut block = self.D.view_mut((k, k), (size, size));
             match element.damping {
                 Damping::Modal(_) => {}
@@ -451,5 +433,33 @@ impl FlexibleArm {
             }
         }
         Ok(())
+    }
+
+    /// Mass matrix of the elastic coordinates where the modes are taken.
+    fn mass_at_start(&self) -> DMatrix<f64> {
+        let (model, n) = (&self.model, self.n_elastic_coordinates());
+        let (mut state, mut qddot) = (State::zeros(model), DVector::zeros(model.nv()));
+        self.prescribed_state(0.0, &mut state, &mut qddot);
+        state.q.rows_mut(model.n_actuated(), n).copy_from(&self.modes.equilibrium);
+        let mut data = Data::new(model);
+        let M = mass_matrix(model, &mut data, &state.q);
+        M.view((model.n_actuated(), model.n_actuated()), (n, n)).clone_owned()
+    }
+
+    fn add_modal_damping(&mut self, M: &DMatrix<f64>) {
+        for (j, omega) in self.modes.omega.iter().enumerate() {
+            let phi = self.modes.shapes.column(j);
+            let (mut zeta, mut total) = (0.0, 0.0);
+            for element in &self.elements {
+                let x = phi.rows(self.offset(element), element.size);
+                let energy = x.dot(&(&element.K * x));
+                total += energy;
+                if let Damping::Modal(z) = element.damping {
+                    zeta += z * energy;
+                }
+            }
+            let Mphi = M * phi;
+            self.D.ger(2.0 * zeta / total * omega, &Mphi, &Mphi, 1.0);
+        }
     }
 }

@@ -77,7 +77,7 @@ impl Newton {
     /// For n coordinates and steps of length h (s).
     pub(crate) fn new(n: usize, h: f64) -> Self {
         Self {
-            matrix: IterationMatrix::new(n),
+            matrix: IterationMatrix::new(),
             r: DVector::zeros(n),
             dt: h,
             factored: false,

@@ -1,17 +1,36 @@
-//! The matrix of Newton's method in an implicit step, `J = M + c_D D + c_K K`, as its inverse: it is used dozens of times
-//! before it is renewed, and a product costs a third of two triangular solutions.
+//! The matrix of Newton's method in an implicit step, `J = M + c_D D + c_K K`, in one of two ways: as its inverse, which is used
+//! dozens of times before it is renewed, and a product costs a third of two triangular solutions; or, where the coordinates
+//! sit on a tree and are many, eliminated along it ([`crate::tree_matrix`]).
 //!
-//! Between [`IterationMatrix::read`] and [`IterationMatrix::invert`] a method may change J ([`IterationMatrix`]'s fields).
+//! Between [`IterationMatrix::read`] and [`IterationMatrix::invert`] a method may change a dense J ([`DenseInverse`]'s fields).
 //! Nothing here allocates after the first time.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::error::StepError;
 use crate::system::SecondOrderSystem;
+use crate::tree_matrix::TreeInverse;
+
+/// `J^-1`, or of `J = M + (c_D D + c_K K) (1 + s M^-1 K)`.
+#[derive(Clone, Debug)]
+pub(crate) struct IterationMatrix {
+    pub(crate) way: Way,
+    /// s, if any.
+    s: Option<f64>,
+}
+
+/// How it is solved.
+#[derive(Clone, Debug)]
+pub(crate) enum Way {
+    /// By a dense inverse; s is the caller's to put in.
+    Dense(DenseInverse),
+    /// Along the tree, with s.
+    Tree(TreeInverse),
+}
 
 /// `(S + C)^-1 B`; as read, `S = M`, `C = c_D D + c_K K` and `B = 1`. All are n × n and symmetric but B.
 #[derive(Clone, Debug)]
-pub(crate) struct IterationMatrix {
+pub(crate) struct DenseInverse {
     /// M; empty when its storage is that of the factor.
     pub(crate) S: DMatrix<f64>,
     pub(crate) C: DMatrix<f64>,
@@ -21,9 +40,9 @@ pub(crate) struct IterationMatrix {
     product: DVector<f64>,
 }
 
-impl IterationMatrix {
+impl DenseInverse {
     /// Room for n coordinates.
-    pub(crate) fn new(n: usize) -> Self {
+    fn new(n: usize) -> Self {
         Self {
             S: DMatrix::zeros(0, 0),
             C: DMatrix::zeros(n, n),
@@ -33,8 +52,7 @@ impl IterationMatrix {
         }
     }
 
-    /// M and `c_D D + c_K K` at the configuration of the system's last residual.
-    pub(crate) fn read(&mut self, system: &mut impl SecondOrderSystem, c_D: f64, c_K: f64) {
+    fn read(&mut self, system: &mut impl SecondOrderSystem, c_D: f64, c_K: f64) {
         if self.S.is_empty() {
             self.S = storage_of(&mut self.factor, self.C.nrows());
         }
@@ -43,11 +61,7 @@ impl IterationMatrix {
         self.inverse.fill_with_identity();
     }
 
-    /// Factorises what was read, for [`IterationMatrix::solve`].
-    ///
-    /// # Errors
-    /// [`StepError::Singular`] if `S + C` is not positive definite.
-    pub(crate) fn invert(&mut self, t: f64) -> Result<(), StepError> {
+    fn invert(&mut self, t: f64) -> Result<(), StepError> {
         let mut S = std::mem::replace(&mut self.S, DMatrix::zeros(0, 0));
         S += &self.C;
         let factor = Cholesky::new(S).ok_or(StepError::Singular { matrix: "iteration matrix", t })?;
@@ -57,10 +71,50 @@ impl IterationMatrix {
         Ok(())
     }
 
-    /// Replaces `r` by `d = J^-1 r`; returns `|d|`.
-    pub(crate) fn solve(&mut self, r: &mut DVector<f64>) -> f64 {
+    fn solve(&mut self, r: &mut DVector<f64>) {
         self.product.gemv(1.0, &self.inverse, r, 0.0);
         r.copy_from(&self.product);
+    }
+}
+
+impl IterationMatrix {
+    /// For as many coordinates as the system will have that is read.
+    pub(crate) fn new() -> Self {
+        Self { way: Way::Tree(TreeInverse::default()), s: None }
+    }
+
+    /// M and `c_D D + c_K K` at the configuration of the system's last residual; `s` as above.
+    pub(crate) fn read(&mut self, system: &mut impl SecondOrderSystem, c_D: f64, c_K: f64, s: Option<f64>) {
+        self.s = s;
+        // A system whose matrices once were dense ones keeps them.
+        if let Way::Tree(tree) = &mut self.way {
+            if system.along_tree(c_D, c_K, &mut tree.matrices) {
+                return;
+            }
+            self.way = Way::Dense(DenseInverse::new(system.dimension()));
+        }
+        if let Way::Dense(dense) = &mut self.way {
+            dense.read(system, c_D, c_K);
+        }
+    }
+
+    /// Factorises what was read, for [`IterationMatrix::solve`].
+    ///
+    /// # Errors
+    /// [`StepError::Singular`] if J, or along a tree M, is not positive definite.
+    pub(crate) fn invert(&mut self, t: f64) -> Result<(), StepError> {
+        match &mut self.way {
+            Way::Dense(dense) => dense.invert(t),
+            Way::Tree(tree) => tree.factor(self.s, t),
+        }
+    }
+
+    /// Replaces `r` by `d = J^-1 r`; returns `|d|`.
+    pub(crate) fn solve(&mut self, r: &mut DVector<f64>) -> f64 {
+        match &mut self.way {
+            Way::Dense(dense) => dense.solve(r),
+            Way::Tree(tree) => tree.solve(r),
+        }
         r.norm()
     }
 }

@@ -66,9 +66,12 @@ pub fn modes_at(arm: &FlexibleArm, t: f64) -> Result<Modes, StepError> {
         }
         let y = eigen.eigenvectors.column(k).clone_owned();
         let mut phi = L.tr_solve_lower_triangular(&y).ok_or(singular.clone())?;
-        phi /= phi.dot(&(&M * &phi)).sqrt();
+        let mut Mphi = &M * &phi;
+        let norm = phi.dot(&Mphi).sqrt();
+        phi /= norm;
+        Mphi /= norm;
         let Kphi = &Kt * &phi;
-        modes.residual = modes.residual.max((&Kphi - &M * &phi / value).norm() / Kphi.norm());
+        modes.residual = modes.residual.max((&Kphi - Mphi / value).norm() / Kphi.norm());
         modes.omega.push(1.0 / value.sqrt());
         modes.shapes.set_column(column, &phi);
     }

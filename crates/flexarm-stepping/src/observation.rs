@@ -97,12 +97,13 @@ pub(crate) fn observe_reduced(
 
 /// Loads `-(K e + D ė)` of the elements, their first six components; the power that the dampers take, `ėᵀ D ė` (W).
 fn element_loads(arm: &FlexibleArm, e: &[f64], rates: &[f64], loads: &mut [Vector6<f64>]) -> f64 {
-    let mut damping = 0.0;
+    let (mut damping, by_element) = (0.0, arm.damps_by_element());
     for (load, element) in loads.iter_mut().zip(&arm.elements) {
         let first = arm.offset(element);
+        let coupled = if by_element { first..first + element.size } else { 0..rates.len() };
         let mut force = [0.0; 6];
         for c in 0..element.size {
-            let row: f64 = rates.iter().enumerate().map(|(j, rate)| arm.D[(first + c, j)] * rate).sum();
+            let row: f64 = coupled.clone().map(|j| arm.D[(first + c, j)] * rates[j]).sum();
             damping += row * rates[first + c];
             if c < 6 {
                 let own = &e[first..first + element.size];

@@ -13,10 +13,12 @@ use flexarm_kinematics::{
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::arm::{FlexibleArm, GeometricStiffness, add_product};
+use crate::elastic_tree::{ElasticTree, FEWEST_NODES};
 use crate::error::StepError;
 use crate::events::{ArmDamping, EventQueue, StepStart, damping_after_changes};
 use crate::servo::ServoState;
 use crate::system::SecondOrderSystem;
+use crate::tree_matrix::TreeMatrices;
 
 /// Passes after which the stiffness by load of an acceleration has settled.
 const GEOMETRIC_PASSES: usize = 12;
@@ -44,6 +46,8 @@ pub struct ReducedArm {
     pub(crate) mass_factor: Option<Cholesky<f64, Dyn>>,
     pub(crate) shifted: DVector<f64>,
     geometric_force: DVector<f64>,
+    /// The elastic joints as a tree, where they are enough and damped by element.
+    tree: Option<ElasticTree>,
 }
 
 impl ReducedArm {
@@ -70,6 +74,7 @@ impl ReducedArm {
             mass_factor: Cholesky::new(DMatrix::identity(n, n)),
             shifted: DVector::zeros(n),
             geometric_force: DVector::zeros(n),
+            tree: ElasticTree::of(&arm).filter(|tree| tree.len() >= FEWEST_NODES && arm.damps_by_element()),
             arm,
         }
     }
@@ -157,7 +162,7 @@ impl ReducedArm {
             }
         }
         if !self.arm.proportional {
-            add_product(&self.arm.D, v, f);
+            self.arm.add_damping(v, f);
         }
     }
 
@@ -342,5 +347,14 @@ impl SecondOrderSystem for ReducedArm {
             let (first, size) = (driven + self.arm.offset(element), element.size);
             K.view_mut((first, first), (size, size)).copy_from(&element.K);
         }
+    }
+
+    fn along_tree(&mut self, c_D: f64, c_K: f64, to: &mut TreeMatrices) -> bool {
+        let Some(tree) = &mut self.tree else { return false };
+        let placed = tree.place(&self.arm.model, &self.data, &self.state, &mut to.nodes);
+        if placed {
+            self.arm.blocks(c_D, c_K, to);
+        }
+        placed
     }
 }

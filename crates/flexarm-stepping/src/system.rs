@@ -10,6 +10,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::error::StepError;
+use crate::tree_matrix::TreeMatrices;
 
 /// A mechanical system in n coordinates x of a vector space.
 pub trait SecondOrderSystem {
@@ -40,4 +41,10 @@ pub trait SecondOrderSystem {
 
     /// K of the springs about their relaxed places, constant and symmetric, n × n, written over all of `K`.
     fn stiffness(&mut self, K: &mut DMatrix<f64>);
+
+    /// The same three matrices where they sit on a tree, into `to`, from which they are solved in O(n) instead of O(n²). False
+    /// where they do not, or where n is so small that dense ones are faster: `to` then holds anything.
+    fn along_tree(&mut self, _c_D: f64, _c_K: f64, _to: &mut TreeMatrices) -> bool {
+        false
+    }
 }

@@ -120,7 +120,7 @@ impl Sdirk3 {
     /// Newton's matrix `M + h γ D + (h γ)² K` at the configuration of the last residual.
     fn factor(&mut self, system: &mut impl SecondOrderSystem, t: f64) -> Result<(), StepError> {
         let c = GAMMA * self.newton.dt;
-        self.newton.matrix.read(system, c, c * c);
+        self.newton.matrix.read(system, c, c * c, None);
         self.newton.matrix.invert(t)?;
         self.newton.renewed();
         Ok(())

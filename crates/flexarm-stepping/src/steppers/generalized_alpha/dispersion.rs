@@ -6,11 +6,12 @@
 //! J = M + C Sᵀ,   C = h γ' D + h² β' K                              (7)  derivative of (1) with respect to ẍ⁺
 //! S J = M + c h² K + S C Sᵀ,   J^-1 = (S J)^-1 S                    (8)  symmetric for every damping, unlike J
 //! ```
+//! Along a tree the matrix has all of it in itself: [`crate::tree_matrix`].
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::error::StepError;
-use crate::iteration_matrix::{IterationMatrix, solve_transposed, storage_of};
+use crate::iteration_matrix::{IterationMatrix, Way, solve_transposed, storage_of};
 use crate::system::SecondOrderSystem;
 
 /// The correction for steps of one length. Allocates when it is made and for its first matrix, not after.
@@ -33,16 +34,21 @@ pub(super) struct DispersionCorrection {
 impl DispersionCorrection {
     /// For n coordinates and steps of length h (s).
     pub(super) fn new(c: f64, h: f64, n: usize) -> Self {
-        let zeros = DMatrix::zeros(n, n);
+        let none = DMatrix::zeros(0, 0);
         Self {
             c,
             c_h2: c * h * h,
-            K: zeros.clone(),
-            M_inverse_K: zeros.clone(),
+            K: none.clone(),
+            M_inverse_K: none.clone(),
             mass_factor: None,
-            product: zeros,
+            product: none,
             shift: DVector::zeros(n),
         }
+    }
+
+    /// `c h²`.
+    pub(super) fn c_h2(&self) -> f64 {
+        self.c_h2
     }
 
     /// The next steps have the length dt (s).
@@ -60,8 +66,14 @@ impl DispersionCorrection {
         matrix: &mut IterationMatrix,
         t: f64,
     ) -> Result<(), StepError> {
-        let Self { c_h2, K, M_inverse_K, mass_factor, product, .. } = self;
-        let c_h2 = *c_h2;
+        let Way::Dense(matrix) = &mut matrix.way else { return Ok(()) };
+        let Self { c_h2, K, M_inverse_K, mass_factor, product, shift, .. } = self;
+        let (c_h2, n) = (*c_h2, shift.len());
+        if K.nrows() != n {
+            for matrix in [&mut *K, &mut *M_inverse_K, &mut *product] {
+                *matrix = DMatrix::zeros(n, n);
+            }
+        }
         // M^-1 K
         let mut M = storage_of(mass_factor, K.nrows());
         M.copy_from(&matrix.S);
@@ -87,14 +99,26 @@ impl DispersionCorrection {
     }
 
     /// x̃ of an acceleration by (6).
-    pub(super) fn corrected(&mut self, acceleration: &DVector<f64>, x_tilde: &mut DVector<f64>) {
+    pub(super) fn corrected(
+        &mut self,
+        matrix: &mut IterationMatrix,
+        acceleration: &DVector<f64>,
+        x_tilde: &mut DVector<f64>,
+    ) {
+        if let Way::Tree(tree) = &mut matrix.way {
+            return tree.correct(acceleration, x_tilde);
+        }
         self.shift.gemv(1.0, &self.M_inverse_K, acceleration, 0.0);
         x_tilde.copy_from(acceleration);
         x_tilde.axpy(self.c_h2, &self.shift, 1.0);
     }
 
-    /// What a change of ẍ adds to the change of x̃, coordinate by coordinate: `c h²` and `M^-1 K d`.
-    pub(super) fn shift(&mut self, d: &DVector<f64>) -> (f64, &DVector<f64>) {
+    /// What a change d of ẍ, the last solution with the matrix, adds to the change of x̃, coordinate by coordinate: a factor and
+    /// numbers, together `c h² M^-1 K d`.
+    pub(super) fn shift<'a>(&'a mut self, matrix: &'a IterationMatrix, d: &DVector<f64>) -> (f64, &'a DVector<f64>) {
+        if let Way::Tree(tree) = &matrix.way {
+            return (1.0, tree.shift());
+        }
         self.shift.gemv(1.0, &self.M_inverse_K, d, 0.0);
         (self.c_h2, &self.shift)
     }

@@ -128,8 +128,11 @@ const FOLLOWED: f64 = 0.5;
 /// matrix whole, modes damped.
 fn forgets_errors(arm: &FlexibleArm) -> bool {
     let straight = arm.elements.iter().all(|element| element.curve.is_none() && element.geometric.is_none());
+    let mut force = DVector::zeros(arm.n_elastic_coordinates());
     let damped = arm.modes.omega.iter().zip(arm.modes.shapes.column_iter()).all(|(omega, shape)| {
-        let twice = shape.dot(&(&arm.D * shape));
+        force.fill(0.0);
+        arm.add_damping(shape.as_slice(), force.as_mut_slice());
+        let twice = shape.dot(&force);
         twice >= 2.0 * DAMPED * omega
     });
     arm.torque_driven.is_empty() && straight && damped
@@ -263,7 +266,7 @@ impl GeneralizedAlpha {
     fn factor(&mut self, system: &mut impl SecondOrderSystem, t: f64) -> Result<(), StepError> {
         let (c_D, c_K) = self.coefficients.derivatives(self.newton.dt);
         let matrix = &mut self.newton.matrix;
-        matrix.read(system, c_D, c_K);
+        matrix.read(system, c_D, c_K, self.correction.as_ref().map(DispersionCorrection::c_h2));
         if let Some(correction) = &mut self.correction {
             correction.correct(system, matrix, t)?;
         }
@@ -276,7 +279,7 @@ impl GeneralizedAlpha {
     fn place(&mut self) {
         let h = self.newton.dt;
         match &mut self.correction {
-            Some(correction) => correction.corrected(&self.trial, &mut self.x_tilde_new),
+            Some(correction) => correction.corrected(&mut self.newton.matrix, &self.trial, &mut self.x_tilde_new),
             None => self.x_tilde_new.copy_from(&self.trial),
         }
         for k in 0..self.now.x.len() {
@@ -295,7 +298,7 @@ impl GeneralizedAlpha {
     fn correct(&mut self, mut sizes: Sizes) -> Sizes {
         let (c_D, c_K) = self.coefficients.derivatives(self.newton.dt);
         let d = &self.newton.r;
-        let shift = self.correction.as_mut().map(|correction| correction.shift(d));
+        let shift = self.correction.as_mut().map(|correction| correction.shift(&self.newton.matrix, d));
         for k in 0..d.len() {
             let d_tilde = d[k] + shift.map_or(0.0, |(c_h2, stiff)| c_h2 * stiff[k]);
             self.trial[k] -= d[k];

@@ -5,35 +5,45 @@
 //!          G_t = R_Pᵀ [ -1, [r_1 + d]x, 1, -[r_2]x ],   G_r = B_P R_Pᵀ [ 0, -1, 0, 1 ]
 //! global:  g_t = d,       g_r = R_P angles(R_Pᵀ R_Q)
 //!          G_t = [ -1, [r_1]x, 1, -[r_2]x ],            G_r = [ 0, -1, 0, 1 ]
+//! hard:    g_t = d,       g_r = R_P angles
+//!          G_t = [ -1, [r_1 + d]x, 1, -[r_2]x ],        G_r = [ 0, -1, 0, 1 ]
 //! ```
+//! The hard rows are the local ones behind `blkdiag(R_P, R_P B_P^-1)`, which changes nothing where the compliance is next to
+//! nothing (angles are their own image). A prescribed joint moves P by `S = [l; a]` per rate of its coordinate, in the hard rows by
+//! `[R_P l; R_Q B a]`.
+//!
 //! Columns: (v, w) of the parent's centre of mass, then of the child's, world axes. `r_i` from the centre of mass to
-//! the joint's frame; `B_P` maps relative angular velocity in P axes to angle rates.
+//! the joint's frame; `B_P` maps relative angular velocity in P axes to angle rates. `G` on the child has the inverse
+//!
+//! ```text
+//! local:   [ R_P, [r_2]x R_P B_P^-1; 0, R_P B_P^-1 ],   B_P^-1 = R_PQ B        global:  [ 1, [r_2]x; 0, 1 ]
+//! ```
 
-use flexarm_kinematics::{ElasticAngles, Pose, skew};
-use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
+use flexarm_kinematics::{AxisMotion, ElasticAngles, Pose, rotation_vector, skew};
+use flexarm_spatial::products::{mul, mul3, tr_mul, tr_mul3};
+use nalgebra::{Matrix3, Vector3, Vector6};
 
 use super::ConstraintForm;
+use super::solve::{Jacobian, Triangle, joined};
 
 /// One joint's rows.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rows {
     /// Constraint value.
     pub(super) g: Vector6<f64>,
-    /// Jacobian on the parent's velocity.
-    pub(super) G_parent: Matrix6<f64>,
-    /// Jacobian on the child's velocity.
-    pub(super) G_child: Matrix6<f64>,
-    /// Axes of the rows in the world: `R_WP` in the local form, identity in the global one.
-    pub(super) axes: Matrix3<f64>,
+    pub(super) G: Jacobian,
+    /// Motion of a prescribed joint in the rows: minus their explicit rate per rate of its coordinate.
+    pub(super) S: Vector6<f64>,
 }
 
 impl Rows {
     pub(super) fn zeros() -> Self {
-        let zero = Matrix6::zeros();
-        Self { g: Vector6::zeros(), G_parent: zero, G_child: zero, axes: Matrix3::identity() }
+        let zero = Vector3::zeros();
+        Self { g: Vector6::zeros(), G: Jacobian::Levers { parent: zero, child: zero }, S: Vector6::zeros() }
     }
 
     /// Rows between frame P (pose in the world, on a body with centre of mass `x_1`) and frame Q (likewise `x_2`).
+    #[inline]
     pub(super) fn new(
         form: ConstraintForm,
         angles: ElasticAngles,
@@ -43,41 +53,52 @@ impl Rows {
         x_2: &Vector3<f64>,
     ) -> Self {
         let (R_P, p_P, p_Q) = (X_WP.rotation.matrix(), &X_WP.translation.vector, &X_WQ.translation.vector);
+        let R_Q = X_WQ.rotation.matrix();
         let (r_1, r_2, d) = (p_P - x_1, p_Q - x_2, p_Q - p_P);
-        let R_PQ = R_P.transpose() * X_WQ.rotation.matrix();
-        let phi = angles.from_rotation(&R_PQ);
-        let mut rows = Self::zeros();
+        let phi = angles.from_rotation(&tr_mul3(R_P, R_Q));
         match form {
             ConstraintForm::Local => {
                 let Rt = R_P.transpose();
-                // Angle rates from relative angular velocity in P axes: B^-1 R_PQᵀ.
-                let B = angles.kinematics(&phi, &Vector3::zeros()).B;
-                let B_P = B.try_inverse().unwrap_or_else(Matrix3::identity) * R_PQ.transpose();
-                let turn = B_P * Rt;
-                set(&mut rows.g, &(Rt * d), &phi);
-                set_blocks(&mut rows.G_parent, &-Rt, &(Rt * skew(&(r_1 + d))), &-turn);
-                set_blocks(&mut rows.G_child, &Rt, &-(Rt * skew(&r_2)), &turn);
-                rows.axes = *R_P;
+                // Angle rates from angular velocity in world axes, and the way back.
+                let B = angles.pose(&phi).1;
+                let turn = mul3(&B.try_inverse().unwrap_or_else(Matrix3::identity), &R_Q.transpose());
+                let back = mul3(R_Q, &B);
+                let parent = Triangle { tv: -Rt, tw: mul3(&Rt, &skew(&(r_1 + d))), rw: -turn };
+                let child = Triangle { tv: Rt, tw: -mul3(&Rt, &skew(&r_2)), rw: turn };
+                let back = Triangle { tv: *R_P, tw: mul3(&skew(&r_2), &back), rw: back };
+                Self {
+                    g: joined(&tr_mul(R_P, &d), &phi),
+                    G: Jacobian::Turned { parent, child, back },
+                    S: Vector6::zeros(),
+                }
             }
             ConstraintForm::Global => {
-                let one = Matrix3::identity();
-                set(&mut rows.g, &d, &(R_P * phi));
-                set_blocks(&mut rows.G_parent, &-one, &skew(&r_1), &-one);
-                set_blocks(&mut rows.G_child, &one, &-skew(&r_2), &one);
+                let G = Jacobian::Levers { parent: r_1, child: r_2 };
+                Self { g: joined(&d, &mul(R_P, &phi)), G, S: Vector6::zeros() }
             }
         }
-        rows
     }
-}
 
-fn set(g: &mut Vector6<f64>, t: &Vector3<f64>, r: &Vector3<f64>) {
-    g.fixed_rows_mut::<3>(0).copy_from(t);
-    g.fixed_rows_mut::<3>(3).copy_from(r);
-}
-
-/// `[[tv, tw], [0, rw]]`.
-fn set_blocks(G: &mut Matrix6<f64>, tv: &Matrix3<f64>, tw: &Matrix3<f64>, rw: &Matrix3<f64>) {
-    G.fixed_view_mut::<3, 3>(0, 0).copy_from(tv);
-    G.fixed_view_mut::<3, 3>(0, 3).copy_from(tw);
-    G.fixed_view_mut::<3, 3>(3, 3).copy_from(rw);
+    /// The local form of a joint with next to no compliance, without its turn into the axes and angles of P; likewise.
+    #[inline]
+    pub(super) fn hard(
+        motion: Option<AxisMotion>,
+        X_WP: &Pose,
+        x_1: &Vector3<f64>,
+        X_WQ: &Pose,
+        x_2: &Vector3<f64>,
+    ) -> Self {
+        let (R_P, p_P, p_Q) = (X_WP.rotation.matrix(), &X_WP.translation.vector, &X_WQ.translation.vector);
+        let R_Q = X_WQ.rotation.matrix();
+        let phi = rotation_vector(&tr_mul3(R_P, R_Q));
+        let S = motion.map_or(Vector6::zeros(), |motion| {
+            let S = motion.twist(1.0);
+            // R_Q B a with B = 1 - [φ]x/2 + [φ]x²/6.
+            let turned = phi.cross(&S.angular);
+            let B_a = S.angular - turned * 0.5 + phi.cross(&turned) / 6.0;
+            joined(&mul(R_P, &S.linear), &mul(R_Q, &B_a))
+        });
+        let g = joined(&(p_Q - p_P), &mul(R_P, &phi));
+        Self { g, S, G: Jacobian::Levers { parent: p_Q - x_1, child: p_Q - x_2 } }
+    }
 }

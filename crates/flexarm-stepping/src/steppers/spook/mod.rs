@@ -24,6 +24,7 @@ mod solve;
 use flexarm_kinematics::{
     Data, ElasticAngles, JointMotion, Model, Pose, State, Twist, Wrench, forward_kinematics_velocity,
 };
+use flexarm_spatial::products::{mul, turn_symmetric};
 use nalgebra::{DVector, Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
 
 use crate::arm::FlexibleArm;
@@ -33,7 +34,7 @@ use crate::observation::Observation;
 use crate::stepper::{Counts, LARGEST_DEFLECTION, Stepper};
 use crate::steppers::{Method, StepRule, StepperEntry, StepperKind, StepperSetting};
 use constraint::Rows;
-use solve::TreeSolver;
+use solve::{Sigma, Symmetric, TreeSolver, joined};
 
 pub(super) static ENTRY: StepperEntry = StepperEntry {
     name: "spook",
@@ -121,9 +122,35 @@ impl BodyState {
 /// What a joint's rows are made of.
 #[derive(Clone, Copy, Debug)]
 struct JointCompliance {
-    C: Matrix6<f64>,
-    sigma_factor: f64,
+    sigma: Sigma,
     upsilon: f64,
+}
+
+/// Prescribed motion at one time.
+#[derive(Clone, Debug)]
+struct Sampled {
+    /// The time, on its side of a jump (s).
+    at: f64,
+    q: DVector<f64>,
+    qdot: DVector<f64>,
+    qddot: DVector<f64>,
+}
+
+impl Sampled {
+    fn new(joints: usize) -> Self {
+        let zeros = DVector::zeros(joints);
+        Self { at: f64::NAN, q: zeros.clone(), qdot: zeros.clone(), qddot: zeros }
+    }
+
+    /// At t, unless it is there already.
+    fn take(&mut self, arm: &FlexibleArm, events: &EventQueue, t: f64) {
+        let t = events.side(t);
+        if t != self.at {
+            let Self { at, q, qdot, qddot } = self;
+            arm.motion.sample(t, q.as_mut_slice(), qdot.as_mut_slice(), qddot.as_mut_slice());
+            *at = t;
+        }
+    }
 }
 
 /// The stepper; see the module page.
@@ -139,15 +166,18 @@ pub struct Spook {
     /// Index 0 is the world and never moves.
     bodies: Vec<BodyState>,
     compliance: Vec<JointCompliance>,
+    /// Σ in the axes of the rows.
+    sigma: Vec<Sigma>,
     rows: Vec<Rows>,
     lambda: Vec<Vector6<f64>>,
     solver: TreeSolver,
-    q: DVector<f64>,
-    qdot: DVector<f64>,
-    qddot: DVector<f64>,
-    /// Prescribed velocities that the bodies have, and those at the end of the step.
+    /// Prescribed motion at the current time and at the end of the step.
+    now: Sampled,
+    next: Sampled,
+    /// Prescribed velocities that the bodies have.
     rates: DVector<f64>,
-    rates_next: DVector<f64>,
+    /// Poses of the bodies at the current time.
+    poses: Vec<Pose>,
     velocities: Vec<Vector6<f64>>,
     trial: Vec<BodyState>,
     loads: Vec<Vector6<f64>>,
@@ -177,7 +207,7 @@ impl Spook {
         forward_kinematics_velocity(&model, &mut data, &state);
 
         let bodies: Vec<BodyState> = (0..model.bodies().len()).map(|i| body_state(&model, &data, i)).collect();
-        let compliance = (0..bodies.len()).map(|i| joint_compliance(&arm, i, h, settings.preset)).collect();
+        let compliance: Vec<_> = (0..bodies.len()).map(|i| joint_compliance(&arm, i, h, settings.preset)).collect();
         let n = bodies.len();
         let loads = vec![Vector6::zeros(); n];
         let mut spook = Self {
@@ -191,14 +221,14 @@ impl Spook {
             settings,
             trial: bodies.clone(),
             bodies,
+            sigma: compliance.iter().map(|compliance| compliance.sigma).collect(),
             compliance,
             rows: vec![Rows::zeros(); n],
             lambda: vec![Vector6::zeros(); n],
-            q: DVector::zeros(na),
-            qdot: DVector::zeros(na),
-            qddot: DVector::zeros(na),
-            rates_next: rates.clone(),
+            now: Sampled::new(na),
+            next: Sampled::new(na),
             rates,
+            poses: vec![Pose::identity(); n],
             velocities: vec![Vector6::zeros(); n],
             loads,
         };
@@ -266,24 +296,29 @@ fn check_ends(model: &Model) -> Result<(), StepError> {
 
 fn joint_compliance(arm: &FlexibleArm, body: usize, h: f64, preset: SpookPreset) -> JointCompliance {
     let element = arm.elements.iter().position(|e| e.body == body);
-    let (C, tau) = match element {
-        Some(k) if arm.elements[k].size == 6 => (Matrix6::from_column_slice(arm.elements[k].C.as_slice()), arm.tau[k]),
-        // One compliant row among rigid ones.
-        Some(k) => {
-            let mut C = Matrix6::identity() * RIGID_COMPLIANCE;
-            if let Some(motion) = arm.single_axis(body) {
-                let S = motion.column();
-                C += S * S.transpose() * arm.elements[k].C[(0, 0)];
-            }
-            (C, arm.tau[k])
-        }
-        None => (Matrix6::identity() * RIGID_COMPLIANCE, 2.0 * h),
-    };
+    let tau = element.map_or(2.0 * h, |k| arm.tau[k]);
     let upsilon = match preset {
         SpookPreset::Exact => 1.0 / (1.0 + 4.0 * tau / h),
         SpookPreset::Source => 1.0 / 8.0,
     };
-    JointCompliance { C, sigma_factor: 4.0 / (h * h) * upsilon, upsilon }
+    let factor = 4.0 / (h * h) * upsilon;
+    let six = |X: &nalgebra::DMatrix<f64>| Symmetric::new(&Matrix6::from_column_slice(X.as_slice()));
+    let sigma = match element.map(|k| &arm.elements[k]) {
+        Some(element) if element.size == 6 => {
+            Sigma::Soft(six(&element.C).scaled(factor), six(&element.K).scaled(1.0 / factor))
+        }
+        // One compliant row among rigid ones.
+        Some(element) => {
+            let mut C = Matrix6::identity() * RIGID_COMPLIANCE;
+            if let Some(motion) = arm.single_axis(body) {
+                let S = motion.column();
+                C += S * S.transpose() * element.C[(0, 0)];
+            }
+            Sigma::Mixed(Symmetric::new(&C).scaled(factor))
+        }
+        None => Sigma::Hard(RIGID_COMPLIANCE * factor),
+    };
+    JointCompliance { sigma, upsilon }
 }
 
 impl Stepper for Spook {
@@ -307,25 +342,25 @@ impl Stepper for Spook {
 
     fn observe(&mut self, out: &mut Observation) {
         let (h, t) = (self.dt, self.t);
-        self.sample(t);
+        self.now.take(&self.arm, &self.events, t);
         let n = self.arm.model.n_actuated();
         out.t = t;
         out.model.clone_from(&self.arm.model);
-        out.q.rows_mut(0, n).copy_from(&self.q);
-        out.qdot.rows_mut(0, n).copy_from(&self.qdot);
+        out.q.rows_mut(0, n).copy_from(&self.now.q);
+        out.qdot.rows_mut(0, n).copy_from(&self.now.qdot);
         let (mut kinetic, potential) = self.observe_bodies(out);
         for i in 1..self.bodies.len() {
             // Mean force over the last step (before the first one: over that).
             self.observe_joint(i, self.lambda[i] / h, out);
         }
         // Drives: friction and rotors are no rows of the constraints.
-        for (k, rate) in self.qdot.iter().enumerate() {
+        for (k, rate) in self.now.qdot.iter().enumerate() {
             out.drive[k] += self.arm.friction_torque(k, *rate);
         }
         for body in self.arm.model.bodies().iter().skip(1).filter(|b| b.armature != 0.0) {
             let k = body.coordinate;
-            out.drive[k] += body.armature * self.qddot[k];
-            kinetic += 0.5 * body.armature * self.qdot[k].powi(2);
+            out.drive[k] += body.armature * self.now.qddot[k];
+            kinetic += 0.5 * body.armature * self.now.qdot[k].powi(2);
         }
         out.power = [out.drive.dot(&out.qdot.rows(0, n)), self.load_power(), self.damping_power(&out.qdot)];
         out.energy = [kinetic, potential, self.arm.elastic_energy(&out.q.as_slice()[n..])];
@@ -350,7 +385,7 @@ impl Spook {
     }
 
     /// What the joint of body i shows: drive forces, or the coordinates of a spring, their rates and its load. `force`: what
-    /// the joint puts on the body, in its proximal frame.
+    /// the joint puts on the body, in its rows.
     fn observe_joint(&self, i: usize, force: Vector6<f64>, out: &mut Observation) {
         let body = &self.arm.model.bodies()[i];
         let element = || self.arm.elements.iter().position(|element| element.body == i);
@@ -365,7 +400,7 @@ impl Spook {
                     out.load[k][0] = -self.arm.elements[k].K[(0, 0)] * (e + rate * self.arm.tau[k]);
                 }
             }
-            JointMotion::Axis(motion) => out.drive[body.coordinate] = motion.project(&Wrench::from_vector(&force)),
+            JointMotion::Axis(_) => out.drive[body.coordinate] = self.rows[i].S.dot(&force),
             JointMotion::Interface { .. } | JointMotion::Welded => {}
             JointMotion::Elastic(angles) => {
                 let (g, rate) = self.deflection_now(i, angles);
@@ -386,7 +421,7 @@ impl Spook {
             let rate = qdot.rows(element.coordinate, element.size);
             damping += self.arm.tau[k] * rate.dot(&(&element.K * rate));
         }
-        for (k, rate) in self.qdot.iter().enumerate() {
+        for (k, rate) in self.now.qdot.iter().enumerate() {
             damping += self.arm.friction_torque(k, *rate) * rate;
         }
         damping
@@ -411,41 +446,49 @@ impl Spook {
         let (parent, child) = (&self.bodies[body.parent], &self.bodies[i]);
         let (X_WP, X_WQ) = (parent.X_WB() * body.X_PJ, child.X_WB());
         let rows = Rows::new(ConstraintForm::Local, angles, &X_WP, &parent.x, &X_WQ, &child.x);
-        (rows.g, rows.G_parent * parent.V.to_vector() + rows.G_child * child.V.to_vector())
+        (rows.g, rows.G.of_parent(&parent.V.to_vector()) + rows.G.of_child(&child.V.to_vector()))
     }
 
     /// Velocities and impulses of the step from the current time; poses stay.
     fn solve(&mut self, t_next: f64) -> Result<(), StepError> {
-        let (h, t) = (self.dt, self.t);
+        let t = self.t;
         // Rates at the end of the step belong to the new velocities, positions at its start to g.
-        self.sample(t_next);
-        self.rates_next.copy_from(&self.qdot);
-        self.sample(t);
+        self.next.take(&self.arm, &self.events, t_next);
+        self.now.take(&self.arm, &self.events, t);
+        for (pose, body) in self.poses.iter_mut().zip(&self.bodies) {
+            *pose = body.X_WB();
+        }
         self.update_rows()?;
         self.update_loads();
         self.update_body_blocks();
 
-        // (G Σ) λ of every joint: Jacobians, compliance, right-hand side of the equations on the module page.
-        let Self { arm, settings, rows, compliance, bodies, solver, velocities, lambda, rates, rates_next, .. } = self;
-        let (model, form) = (&arm.model, settings.form);
-        let right_hand_side = |i: usize| {
-            let (row, c, body) = (&rows[i], &compliance[i], &model.bodies()[i]);
-            let mut sigma = c.C;
-            if matches!(body.motion, JointMotion::Elastic(_)) && form == ConstraintForm::Global {
-                let X_WP = bodies[body.parent].X_WB().rotation * body.X_PJ.rotation;
-                sigma = turn(X_WP.matrix(), &c.C);
-            }
-            let rate = row.G_parent * bodies[body.parent].V.to_vector() + row.G_child * bodies[i].V.to_vector();
-            let (g_t, g_t_next) = match body.elastic {
-                true => (Vector6::zeros(), Vector6::zeros()),
-                false => explicit_rates(body.motion, |v| v[body.coordinate], rates, rates_next),
-            };
-            let s = row.g * (-4.0 / h * c.upsilon) + (rate + g_t) * c.upsilon - g_t_next;
-            (&row.G_parent, &row.G_child, sigma * c.sigma_factor, s)
-        };
+        self.update_right_hand_sides();
+        let Self { rows, sigma, solver, velocities, lambda, .. } = self;
         solver
-            .solve(right_hand_side, velocities, lambda)
+            .solve(rows, sigma, velocities, lambda)
             .map_err(|_| StepError::Singular { matrix: "constraint matrix", t })
+    }
+
+    /// Right-hand sides of the joints, and compliances in the axes of their rows.
+    fn update_right_hand_sides(&mut self) {
+        let h = self.dt;
+        for (i, body) in self.arm.model.bodies().iter().enumerate().skip(1) {
+            let (row, JointCompliance { sigma, upsilon }) = (&self.rows[i], &self.compliance[i]);
+            if let Sigma::Soft(C, K) = sigma
+                && self.settings.form == ConstraintForm::Global
+            {
+                let R = self.poses[body.parent].rotation * body.X_PJ.rotation;
+                self.sigma[i] = Sigma::Soft(C.turned(R.matrix()), K.turned(R.matrix()));
+            }
+            let (parent, child) = (&self.bodies[body.parent], &self.bodies[i]);
+            let rate = row.G.of_parent(&parent.V.to_vector()) + row.G.of_child(&child.V.to_vector());
+            let mut s = row.g * (-4.0 / h * upsilon) + rate * *upsilon;
+            if matches!(body.motion, JointMotion::Axis(_)) && !body.elastic {
+                // g_t = -S q̇, now and at the end of the step.
+                s -= row.S * (upsilon * self.rates[body.coordinate] - self.next.qdot[body.coordinate]);
+            }
+            self.solver.s[i] = s;
+        }
     }
 
     /// Rows of every joint, and what its prescribed coordinate does to them.
@@ -453,18 +496,23 @@ impl Spook {
         let (h, t) = (self.dt, self.t);
         for (i, body) in self.arm.model.bodies().iter().enumerate().skip(1) {
             let (parent, child) = (&self.bodies[body.parent], &self.bodies[i]);
-            let (X_WP, X_WQ) = (parent.X_WB() * body.X_PJ, child.X_WB());
-            let (moved, angles) = match body.motion {
-                JointMotion::Elastic(angles) => (X_WP, angles),
+            let (X_WP, X_WQ) = (self.poses[body.parent] * body.X_PJ, self.poses[i]);
+            self.rows[i] = match body.motion {
+                JointMotion::Elastic(angles) => {
+                    Rows::new(self.settings.form, angles, &X_WP, &parent.x, &X_WQ, &child.x)
+                }
                 // A single spring is measured from its relaxed place.
-                _ if body.elastic => (X_WP, Default::default()),
-                JointMotion::Interface { .. } | JointMotion::Welded => (X_WP, Default::default()),
-                JointMotion::Axis(motion) => (X_WP * motion.pose(self.q[body.coordinate]), Default::default()),
+                _ if body.elastic => {
+                    Rows::new(ConstraintForm::Local, Default::default(), &X_WP, &parent.x, &X_WQ, &child.x)
+                }
+                JointMotion::Axis(motion) => {
+                    let moved = X_WP * motion.pose(self.now.q[body.coordinate]);
+                    Rows::hard(Some(motion), &moved, &parent.x, &X_WQ, &child.x)
+                }
+                JointMotion::Interface { .. } | JointMotion::Welded => {
+                    Rows::hard(None, &X_WP, &parent.x, &X_WQ, &child.x)
+                }
             };
-            // Rigid joints have no deflection to speak of: the local form serves both.
-            let elastic = matches!(body.motion, JointMotion::Elastic(_));
-            let form = if elastic { self.settings.form } else { ConstraintForm::Local };
-            self.rows[i] = Rows::new(form, angles, &moved, &parent.x, &X_WQ, &child.x);
             let deflection = self.rows[i].g.amax();
             if deflection > LARGEST_DEFLECTION || deflection.is_nan() {
                 let what = format!("joint {:?} came apart by {deflection:.1e} m or rad", body.joint);
@@ -478,7 +526,7 @@ impl Spook {
     fn update_loads(&mut self) {
         self.loads.iter_mut().for_each(|load| *load = Vector6::zeros());
         for load in &self.arm.loads {
-            let X_WB = self.bodies[load.body].X_WB();
+            let X_WB = self.poses[load.body];
             let F = load.on_body(self.events.side(self.t), &X_WB);
             self.loads[load.body] += Wrench::new(X_WB.rotation * F.force, X_WB.rotation * F.torque).to_vector();
         }
@@ -489,22 +537,18 @@ impl Spook {
         let (h, gravity) = (self.dt, self.arm.model.gravity);
         for (i, body) in self.bodies.iter().enumerate().skip(1) {
             // M
-            let R = body.R.to_rotation_matrix();
-            let J = R.matrix() * body.J * R.matrix().transpose();
-            let M = &mut self.solver.M[i];
-            M.fill(0.0);
-            M.fixed_view_mut::<3, 3>(0, 0).fill_diagonal(body.mass);
-            M.fixed_view_mut::<3, 3>(3, 3).copy_from(&J);
+            let R = self.poses[i].rotation.matrix();
+            let J = turn_symmetric(R, &body.J);
+            let mass = Matrix3::from_diagonal_element(body.mass);
+            self.solver.M[i] = Symmetric { A: mass, B: Matrix3::zeros(), C: J };
             // M v + h f
-            let spin = J * body.V.angular;
+            let spin = mul(&J, &body.V.angular);
             let load = &self.loads[i];
-            let arm = -(R * body.com);
-            let force = gravity * body.mass + load.fixed_rows::<3>(0);
-            let torque = load.fixed_rows::<3>(3) + arm.cross(&load.fixed_rows::<3>(0).into_owned())
-                - body.V.angular.cross(&spin);
-            let b = &mut self.solver.b[i];
-            b.fixed_rows_mut::<3>(0).copy_from(&(body.V.linear * body.mass + force * h));
-            b.fixed_rows_mut::<3>(3).copy_from(&(spin + torque * h));
+            let (F, T): (Vector3<f64>, Vector3<f64>) = (load.fixed_rows::<3>(0).into(), load.fixed_rows::<3>(3).into());
+            let arm = -mul(R, &body.com);
+            let force = gravity * body.mass + F;
+            let torque = T + arm.cross(&F) - body.V.angular.cross(&spin);
+            self.solver.b[i] = joined(&(body.V.linear * body.mass + force * h), &(spin + torque * h));
         }
     }
 
@@ -514,6 +558,7 @@ impl Spook {
             self.dt = h;
             for (i, compliance) in self.compliance.iter_mut().enumerate() {
                 *compliance = joint_compliance(&self.arm, i, h, self.settings.preset);
+                self.sigma[i] = compliance.sigma;
             }
         }
         self.solve(t_next)?;
@@ -531,40 +576,9 @@ impl Spook {
             return Err(StepError::Diverged { t: t_next, h, what });
         }
         std::mem::swap(&mut self.bodies, &mut self.trial);
-        std::mem::swap(&mut self.rates, &mut self.rates_next);
+        self.rates.copy_from(&self.next.qdot);
+        std::mem::swap(&mut self.now, &mut self.next);
         self.t = t_next;
         Ok(())
     }
-
-    /// Prescribed motion at t into `q`, `qdot`, `qddot`.
-    fn sample(&mut self, t: f64) {
-        let Self { arm, events, q, qdot, qddot, .. } = self;
-        arm.motion.sample(events.side(t), q.as_mut_slice(), qdot.as_mut_slice(), qddot.as_mut_slice());
-    }
-}
-
-/// `blkdiag(R, R) C blkdiag(R, R)ᵀ`.
-fn turn(R: &Matrix3<f64>, C: &Matrix6<f64>) -> Matrix6<f64> {
-    let mut turned = Matrix6::zeros();
-    for (i, j) in [(0, 0), (0, 3), (3, 0), (3, 3)] {
-        let block = R * C.fixed_view::<3, 3>(i, j) * R.transpose();
-        turned.fixed_view_mut::<3, 3>(i, j).copy_from(&block);
-    }
-    turned
-}
-
-/// Explicit time rates of a prescribed joint's rows now and at the end of the step.
-///
-/// The proximal frame moves by the prescribed coordinate: its share of `dg/dt` at the undeformed joint.
-fn explicit_rates(
-    motion: JointMotion,
-    rate_of: impl Fn(&DVector<f64>) -> f64,
-    qdot: &DVector<f64>,
-    qdot_next: &DVector<f64>,
-) -> (Vector6<f64>, Vector6<f64>) {
-    let direction = match motion {
-        JointMotion::Axis(motion) => -motion.column(),
-        _ => return (Vector6::zeros(), Vector6::zeros()),
-    };
-    (direction * rate_of(qdot), direction * rate_of(qdot_next))
 }

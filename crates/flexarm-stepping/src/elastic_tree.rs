@@ -1,0 +1,155 @@
+//! A flexible arm whose free coordinates are elastic joints, as matrices on a tree: a node per elastic joint, with what the
+//! prescribed joints behind it carry fixed to it.
+//!
+//! ```text
+//! V_B = Ad_BQ V_Q + S x'        Q: the body behind the next elastic joint inward, S the motion subspace of B's own
+//! α = S^-1 V_B                  I = Sᵀ M_BBo S,   X = S_B^-1 Ad_BQ S_Q
+//! ```
+
+use flexarm_kinematics::{Data, ElasticAngles, JointMotion, Model, Pose, SpatialInertia, State, skew};
+use nalgebra::{Matrix3, Matrix6};
+
+use crate::arm::{Damping, FlexibleArm, add_product};
+use crate::tree_matrix::{TreeMatrices, TreeNode};
+
+/// Fewest elastic joints for which elimination is faster than a dense inverse: with two, 12 coordinates, a step takes as long
+/// either way, with three 2.8 instead of 3.3 us, with five 4.0 instead of 7.5, with 64 48 instead of 7000 (`examples/chains.rs`).
+pub(crate) const FEWEST_NODES: usize = 3;
+
+/// Where the nodes are among the bodies, and workspaces.
+#[derive(Clone, Debug)]
+pub(crate) struct ElasticTree {
+    joints: Vec<ElasticJoint>,
+    /// One per body: the node that it is fixed to, and its pose there.
+    carriers: Vec<(Option<usize>, Pose)>,
+}
+
+#[derive(Clone, Debug)]
+struct ElasticJoint {
+    body: usize,
+    coordinate: usize,
+    angles: ElasticAngles,
+    /// S: `[L 0; 0 B]`.
+    L: Matrix3<f64>,
+    B: Matrix3<f64>,
+    /// Everything fixed to the body, about its origin, in its axes.
+    inertia: SpatialInertia,
+}
+
+impl ElasticTree {
+    /// None where a free coordinate is no elastic joint of six, or where a spring is not straight.
+    pub(crate) fn of(arm: &FlexibleArm) -> Option<Self> {
+        let model = &arm.model;
+        let straight = arm.elements.iter().all(|e| e.size == 6 && !e.modal && e.curve.is_none());
+        if model.has_modal() || !straight || !arm.torque_driven.is_empty() {
+            return None;
+        }
+        let mut joints = Vec::with_capacity(arm.elements.len());
+        for element in &arm.elements {
+            let JointMotion::Elastic(angles) = model.bodies()[element.body].motion else { return None };
+            let (body, coordinate, one) = (element.body, element.coordinate, Matrix3::identity());
+            // Coordinates in the order of nodes, nodes in the order of bodies.
+            let in_order = arm.offset(element) == 6 * joints.len();
+            let outward = joints.last().is_none_or(|last: &ElasticJoint| last.body < body);
+            if !(in_order && outward) {
+                return None;
+            }
+            joints.push(ElasticJoint { body, coordinate, angles, L: one, B: one, inertia: SpatialInertia::zeros() });
+        }
+        Some(Self { joints, carriers: vec![(None, Pose::identity()); model.bodies().len()] })
+    }
+
+    /// Number of nodes.
+    pub(crate) fn len(&self) -> usize {
+        self.joints.len()
+    }
+
+    /// Inertias and motions at the poses of the last pass in `data`, which was at `state`; false at a singularity of the angles.
+    pub(crate) fn place(&mut self, model: &Model, data: &Data, state: &State, nodes: &mut Vec<TreeNode>) -> bool {
+        nodes.resize_with(self.joints.len(), || TreeNode::new(None));
+        let mut next = 0;
+        for (i, body) in model.bodies().iter().enumerate().skip(1) {
+            let (carrier, X_QP) = self.carriers[body.parent];
+            let X_QB = X_QP * data.X_PB[i];
+            self.carriers[i] = (carrier, X_QB);
+            if self.joints.get(next).is_some_and(|joint| joint.body == i) {
+                let X_PB = &data.X_PB[i];
+                let joint = &mut self.joints[next];
+                let phi = state.q.fixed_rows::<3>(joint.coordinate + 3).into_owned();
+                joint.L = X_PB.rotation.matrix().transpose() * body.X_PJ.rotation.matrix();
+                joint.B = joint.angles.pose(&phi).1;
+                joint.inertia = SpatialInertia::zeros();
+                let Some(B_inverse) = joint.B.try_inverse() else { return false };
+                let node = &mut nodes[next];
+                node.parent = carrier;
+                if let Some(q) = carrier {
+                    node.carried = motion(&self.joints[next], &B_inverse, &X_QB, &self.joints[q]);
+                }
+                self.carriers[i] = (Some(next), Pose::identity());
+                next += 1;
+            }
+            if let (Some(j), X) = &self.carriers[i] {
+                self.joints[*j].inertia += body.inertia.at_parent(X);
+            }
+        }
+        for (node, joint) in nodes.iter_mut().zip(&self.joints) {
+            node.inertia = joint.inertia_of_coordinates();
+        }
+        true
+    }
+}
+
+/// `A`, `B`, `C` of `S_B^-1 Ad_BQ S_Q`.
+fn motion(own: &ElasticJoint, B_inverse: &Matrix3<f64>, X_QB: &Pose, inner: &ElasticJoint) -> [Matrix3<f64>; 3] {
+    let Rt = X_QB.rotation.matrix().transpose();
+    let turn = own.L.transpose() * Rt;
+    [turn * inner.L, -(turn * skew(&X_QB.translation.vector) * inner.B), B_inverse * Rt * inner.B]
+}
+
+impl ElasticJoint {
+    /// `Sᵀ M S`.
+    fn inertia_of_coordinates(&self) -> Matrix6<f64> {
+        let Self { L, B, inertia, .. } = self;
+        let coupling = -(L.transpose() * skew(&inertia.first_moment) * B);
+        let mut I = Matrix6::zeros();
+        I.fixed_view_mut::<3, 3>(0, 0).fill_diagonal(inertia.mass);
+        I.fixed_view_mut::<3, 3>(0, 3).copy_from(&coupling);
+        I.fixed_view_mut::<3, 3>(3, 0).copy_from(&coupling.transpose());
+        I.fixed_view_mut::<3, 3>(3, 3).copy_from(&(B.transpose() * inertia.rotational * B));
+        I
+    }
+}
+
+impl FlexibleArm {
+    /// Whether the damping matrix has blocks on its diagonal alone, one per element.
+    pub(crate) fn damps_by_element(&self) -> bool {
+        !self.elements.iter().any(|e| matches!(e.damping, Damping::Modal(zeta) if zeta != 0.0))
+    }
+
+    /// `f += D v` over the elastic coordinates: O(n) where the damping has a block per element.
+    pub(crate) fn add_damping(&self, v: &[f64], f: &mut [f64]) {
+        if !self.damps_by_element() {
+            return add_product(&self.D, v, f);
+        }
+        for element in &self.elements {
+            let (first, size) = (self.offset(element), element.size);
+            for (c, rate) in v[first..first + size].iter().enumerate() {
+                let column = &self.D.as_slice()[(first + c) * self.D.nrows() + first..][..size];
+                f[first..first + size].iter_mut().zip(column).for_each(|(f, d)| *f += d * rate);
+            }
+        }
+    }
+
+    /// Blocks of `c_D D + c_K K` and K, for straight springs of six coordinates that are damped by element.
+    pub(crate) fn blocks(&self, c_D: f64, c_K: f64, to: &mut TreeMatrices) {
+        for (k, (node, element)) in to.nodes.iter_mut().zip(&self.elements).enumerate() {
+            node.K.copy_from_slice(element.K.as_slice());
+            if self.proportional {
+                node.C = node.K * (c_K + c_D * self.tau[k]);
+            } else {
+                let first = self.offset(element);
+                node.C = node.K * c_K + self.D.fixed_view::<6, 6>(first, first) * c_D;
+            }
+        }
+    }
+}
