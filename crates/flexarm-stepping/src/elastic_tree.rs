@@ -12,9 +12,10 @@ use nalgebra::{Matrix3, Matrix6};
 use crate::arm::{Damping, FlexibleArm, add_product};
 use crate::tree_matrix::{TreeMatrices, TreeNode};
 
-/// Fewest elastic joints for which elimination is faster than a dense inverse: with two, 12 coordinates, a step takes as long
-/// either way, with three 2.8 instead of 3.3 us, with five 4.0 instead of 7.5, with 64 48 instead of 7000 (`examples/chains.rs`).
-pub(crate) const FEWEST_NODES: usize = 3;
+/// Fewest elastic joints for which elimination is taken instead of a dense inverse: with two, 12 coordinates, a step takes as
+/// long either way, with three 2.8 instead of 3.3 us, with five 4.0 instead of 7.5, with 64 48 instead of 1800
+/// (`examples/chains.rs`). With three a batch gains more from its lanes, whose matrices are dense.
+const FEWEST_NODES: usize = 4;
 
 /// Where the nodes are among the bodies, and workspaces.
 #[derive(Clone, Debug)]
@@ -37,6 +38,11 @@ struct ElasticJoint {
 }
 
 impl ElasticTree {
+    /// Of an arm whose steps are faster along its tree than with dense matrices.
+    pub(crate) fn that_pays(arm: &FlexibleArm) -> Option<Self> {
+        Self::of(arm).filter(|tree| tree.len() >= FEWEST_NODES && arm.damps_by_element())
+    }
+
     /// None where a free coordinate is no elastic joint of six, or where a spring is not straight.
     pub(crate) fn of(arm: &FlexibleArm) -> Option<Self> {
         let model = &arm.model;
@@ -60,7 +66,7 @@ impl ElasticTree {
     }
 
     /// Number of nodes.
-    pub(crate) fn len(&self) -> usize {
+    fn len(&self) -> usize {
         self.joints.len()
     }
 

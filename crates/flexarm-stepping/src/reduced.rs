@@ -13,7 +13,7 @@ use flexarm_kinematics::{
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::arm::{FlexibleArm, GeometricStiffness, add_product};
-use crate::elastic_tree::{ElasticTree, FEWEST_NODES};
+use crate::elastic_tree::ElasticTree;
 use crate::error::StepError;
 use crate::events::{ArmDamping, EventQueue, StepStart, damping_after_changes};
 use crate::servo::ServoState;
@@ -74,7 +74,7 @@ impl ReducedArm {
             mass_factor: Cholesky::new(DMatrix::identity(n, n)),
             shifted: DVector::zeros(n),
             geometric_force: DVector::zeros(n),
-            tree: ElasticTree::of(&arm).filter(|tree| tree.len() >= FEWEST_NODES && arm.damps_by_element()),
+            tree: ElasticTree::that_pays(&arm),
             arm,
         }
     }

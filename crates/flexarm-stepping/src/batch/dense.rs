@@ -104,7 +104,7 @@ fn scale(column: &mut [f64], by: f64) {
 #[inline(always)]
 fn subtract(to: &mut [f64], factor: f64, from: &[f64]) {
     for (to, from) in to.iter_mut().zip(from) {
-        *to = -factor * *from + *to;
+        *to += -factor * *from;
     }
 }
 

@@ -414,7 +414,7 @@ impl Matrices {
         product.copy_from_slice(L);
         for (column, x) in product.chunks_exact_mut(n).zip(L.chunks_exact(n)) {
             for (y, a) in column.iter_mut().zip(M_inverse_K.chunks_exact(n)) {
-                *y = c_h2 * dot(a, x) + *y;
+                *y += c_h2 * dot(a, x);
             }
         }
         // M + c h² K + S C Sᵀ, and Sᵀ on the right-hand side, which is kept transposed.
@@ -447,8 +447,8 @@ struct LaneSizes<T> {
 impl<T: Real> LaneSizes<T> {
     #[inline(always)]
     fn include(&mut self, correction: T, acceleration: T, place: T) {
-        // What is not a number stays in a sum, and passes by in a largest value.
-        let broken = correction - correction;
+        // Zero, or not a number: that stays in a sum and passes by in a largest value.
+        let broken = correction * T::zero();
         self.correction = larger(self.correction, correction.abs()) + broken;
         self.acceleration = larger(self.acceleration, acceleration.abs());
         self.place = larger(self.place, place.abs());
