@@ -179,6 +179,9 @@ impl Batch {
             if step > 0 {
                 lanes.step();
             }
+            if (0..runs.len()).all(|lane| lanes.left_behind(lane)) {
+                return None;
+            }
             let deflection = lanes.deflection(&self.tool);
             for (lane, result) in results.iter_mut().enumerate() {
                 if step <= steps[lane] {
