@@ -7,7 +7,7 @@ use flexarm_stepping::StepperKind;
 use flexarm_trajectory::LimitViolation;
 use nalgebra::Vector3;
 
-use super::{Run, moves};
+use super::{Run, Wanted, moves};
 use crate::caveat::pose::Standing;
 use crate::caveat::{Caveat, drives, kinds, validity};
 use crate::flexible::Owner;
@@ -47,7 +47,8 @@ impl Run<'_> {
             ..Summary::default()
         };
         summary.headline = headline::headline(&summary, by_choice);
-        (summary, self.events(metrics))
+        let events = if self.wanted == Wanted::Curves { self.events(metrics) } else { Vec::new() };
+        (summary, events)
     }
 
     fn link_figures(&self) -> Vec<LinkFigures> {
