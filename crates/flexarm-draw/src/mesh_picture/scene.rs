@@ -244,8 +244,10 @@ impl Canvas {
             let high = (a[k].max(b[k]).max(c[k]) + 0.5).floor().min(end as f64).max(0.0);
             low as usize..high as usize
         };
+        let columns = range(0, self.width);
         for y in range(1, self.height) {
-            for x in range(0, self.width) {
+            let columns = if columns.len() > NARROW { weights.columns(y, columns.clone()) } else { columns.clone() };
+            for x in columns {
                 if weights.are_far_out(x, y) {
                     continue;
                 }
@@ -349,6 +351,11 @@ impl Canvas {
 /// A sample belongs to a triangle if none of its weights is below minus this.
 const EDGE: f64 = 1e-9;
 
+/// So many samples of a row are looked at one by one: that costs no more than to ask where the triangle is in it.
+const NARROW: usize = 8;
+/// A side is steep if it moves down by more than this while twice the area to it changes by as much, samples.
+const STEEP: f64 = 1e-3;
+
 /// Weights of the corners of a triangle at the samples of a picture: 1 at its own corner, 0 on the side across.
 struct Weights {
     corners: [[f64; 3]; 3],
@@ -376,6 +383,24 @@ impl Weights {
 
     fn at(&self, x: usize, y: usize) -> [f64; 3] {
         self.areas(x, y).map(|area| area / self.double)
+    }
+
+    /// The part of a row that may be in the triangle: one sample more on either side than the sides say.
+    fn columns(&self, y: usize, mut row: std::ops::Range<usize>) -> std::ops::Range<usize> {
+        let (py, sign) = (y as f64 + 0.5, self.double.signum());
+        let [a, b, c] = self.corners;
+        for (p, q) in [(b, c), (c, a), (a, b)] {
+            // Twice the area to a side is linear along the row: first + px slope.
+            let slope = sign * (p[1] - q[1]);
+            let first = sign * (p[0] * (q[1] - py) - q[0] * (p[1] - py));
+            let limit = (self.far_out - first) / slope - 0.5;
+            if slope > STEEP {
+                row.start = row.start.max((limit - 1.0).max(0.0) as usize);
+            } else if slope < -STEEP {
+                row.end = row.end.min((limit + 2.0).max(0.0) as usize);
+            }
+        }
+        row.start..row.end.max(row.start)
     }
 
     /// Whether a sample is not in the triangle, as far as that is seen without a division.

@@ -159,6 +159,7 @@ pub(crate) fn run_traced(
     head.magnification = options.magnification.unwrap_or_else(|| expected.magnification());
     files.begin(&head)?;
     write_layouts(&files.names, &head)?;
+    files.set.on_threads();
     run.trace = if wanted < Wanted::Curves { Trace::without_curves(head) } else { Trace::new(head) };
     let end = run.go(&mut files.set, outputs.is_some(), progress, together.observer);
 
