@@ -246,6 +246,9 @@ mod tests {
         let way = |t: f64| if t < 1.0 { 0.0 } else { 0.1 * (1.0 - (3.0 * (t - 1.0)).cos()) };
         let positions: Vec<[f64; 3]> = times.iter().map(|&t| (direction * way(t)).into()).collect();
         let frames = path_frames(&times, &positions);
+        for sample in [0, 50, 99, 110, 250, times.len() - 1] {
+            assert_eq!(tangential_at(&times, &positions, sample), frames[sample].tangential);
+        }
         // at rest before the motion: the axes with which it begins
         assert!((frames[50].tangential - direction).norm() < 1e-12); // measured 2.2e-16
         assert_eq!(frames[50], frames[99]);

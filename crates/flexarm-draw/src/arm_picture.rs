@@ -642,6 +642,8 @@ mod tests {
         for side in [ArmSide::Side, ArmSide::Oblique] {
             let png = arm_png(&header, &sample, side, size).unwrap();
             assert_eq!(png, arm_png(&header, &sample, side, size).unwrap(), "the same bytes");
+            let [beside_another, _] = arm_pictures(&header, &sample, [side, ArmSide::Side], size).unwrap();
+            assert_eq!(beside_another, arm_picture(&header, &sample, side, size).unwrap());
             let pixels = decoded(&png);
             let count = |near: Rgb, within: i32| {
                 let close = |p: &&Rgb| (0..3).all(|k| (i32::from(p[k]) - i32::from(near[k])).abs() <= within);
