@@ -78,6 +78,8 @@ mod tests {
             let ten: f64 = format!("1e{power}").parse().unwrap();
             [ten, -ten, ten.next_up(), ten.next_down(), 1.5 * ten].into_iter().for_each(check);
         }
-        [0.0, -0.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::MAX, f64::MIN_POSITIVE].into_iter().for_each(check);
+        [0.0, -0.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::MAX, f64::MIN_POSITIVE]
+            .into_iter()
+            .for_each(check);
     }
 }

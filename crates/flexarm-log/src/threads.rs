@@ -4,13 +4,17 @@
 //! same samples in the same order as without threads, so its file has the same bytes. Start at [`Threads::record`].
 //!
 //! A batch is handed over when it is full or when the last one is [`PAUSE`] old, so that a slow run keeps nothing back. When
-//! a queue is full the run waits: memory stays what it is, however long the run.
+//! a queue is full the run waits: memory stays what it is, however long the run. On a disk that is nearly full it waits for
+//! each batch: then no file takes the room that another needs to reach as far.
 
+use std::collections::VecDeque;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use crate::create::{folder_of, is_scarce};
 use crate::{LogError, Recorder, RunResult, Sample};
 
 /// Samples of a batch.
@@ -21,6 +25,8 @@ const QUEUE: usize = 4;
 const BATCHES: usize = QUEUE + 2;
 /// Longest time between two batches while samples come.
 const PAUSE: Duration = Duration::from_millis(20);
+/// Time between two looks at how much room the disk has.
+const LOOK: Duration = Duration::from_millis(200);
 
 /// Some samples in a row.
 #[derive(Default)]
@@ -32,6 +38,8 @@ struct Batch {
 
 enum Message {
     Samples(Arc<Batch>),
+    /// To be answered when all before it is written.
+    Reach(SyncSender<()>),
     Finish(Arc<RunResult>),
 }
 
@@ -48,8 +56,12 @@ struct Worker {
 pub(crate) struct Threads {
     workers: Vec<Worker>,
     /// The one that is being filled comes first, then the oldest.
-    batches: std::collections::VecDeque<Arc<Batch>>,
+    batches: VecDeque<Arc<Batch>>,
     handed_over: Instant,
+    /// Folder of the first file, whether its disk is nearly full, and when that was seen.
+    folder: PathBuf,
+    scarce: bool,
+    looked: Instant,
 }
 
 impl Threads {
@@ -63,7 +75,10 @@ impl Threads {
             Worker { queue, thread, failed }
         };
         let batches = (0..BATCHES).map(|_| Arc::default()).collect();
-        Self { workers: recorders.into_iter().map(start).collect(), batches, handed_over: Instant::now() }
+        let folder = folder_of(recorders.first().map_or(Path::new(""), |recorder| recorder.path())).to_owned();
+        let (scarce, now) = (is_scarce(&folder), Instant::now());
+        let workers = recorders.into_iter().map(start).collect();
+        Self { workers, batches, handed_over: now, folder, scarce, looked: now }
     }
 
     /// Adds one instant.
@@ -99,10 +114,27 @@ impl Threads {
             let _ = worker.queue.send(Message::Samples(self.batches[0].clone()));
         }
         self.handed_over = Instant::now();
+        if self.handed_over - self.looked >= LOOK {
+            (self.scarce, self.looked) = (is_scarce(&self.folder), self.handed_over);
+        }
+        if self.scarce {
+            self.wait();
+        }
         self.batches.rotate_left(1);
         if let Some(next) = Arc::get_mut(&mut self.batches[0]) {
             next.used = 0;
         }
+    }
+
+    /// Until all recorders have written what they were given.
+    fn wait(&self) {
+        let (reached, all) = sync_channel(self.workers.len());
+        for worker in &self.workers {
+            let _ = worker.queue.send(Message::Reach(reached.clone()));
+        }
+        drop(reached);
+        // Ends when nobody can answer any more.
+        all.iter().for_each(drop);
     }
 
     /// Writes what waits and the result; the recorders again, and what went wrong first.
@@ -162,6 +194,9 @@ fn write(
                 }
             }
             Message::Samples(_) => {}
+            Message::Reach(reached) => {
+                let _ = reached.send(());
+            }
             Message::Finish(result) => {
                 let finished = recorder.finish(&result);
                 return (recorder, finished);

@@ -98,13 +98,7 @@ pub(crate) fn observe_reduced(
 /// Loads `-(K e + D ė)` of the elements, their first six components; the power that the dampers take, `ėᵀ D ė` (W).
 ///
 /// * `dampers`: scratch, a number per elastic coordinate at least.
-fn element_loads(
-    arm: &FlexibleArm,
-    e: &[f64],
-    rates: &[f64],
-    dampers: &mut [f64],
-    loads: &mut [Vector6<f64>],
-) -> f64 {
+fn element_loads(arm: &FlexibleArm, e: &[f64], rates: &[f64], dampers: &mut [f64], loads: &mut [Vector6<f64>]) -> f64 {
     if rates.is_empty() {
         return 0.0;
     }

@@ -147,7 +147,8 @@ impl Layer {
         let full = 255.0 - f32::from(ink[0]);
         let (width, height) = (self.0.width / FINE, self.0.height / FINE);
         let mean = |number: usize| {
-            let samples = self.0.samples_of(number).map(|at| usize::from(if self.0.lines[at] { ink } else { paper }[0]));
+            let samples =
+                self.0.samples_of(number).map(|at| usize::from(if self.0.lines[at] { ink } else { paper }[0]));
             (samples.iter().sum::<usize>() / samples.len()) as u8
         };
         (0..width * height).map(|number| (255.0 - f32::from(mean(number))) / full).collect()
@@ -218,11 +219,14 @@ impl Canvas {
 
         let normals = corner_normals(scene.positions, scene.triangles);
         let mean = |w: [f64; 3], x: [f64; 3]| w[0] * x[0] + w[1] * x[1] + w[2] * x[2];
-        let light = |normals: &[Vector3<f64>; 3]| normals.map(|n| brightness(right.dot(&n), up.dot(&n), toward.dot(&n)));
+        let light =
+            |normals: &[Vector3<f64>; 3]| normals.map(|n| brightness(right.dot(&n), up.dot(&n), toward.dot(&n)));
         let lights: Vec<[f64; 3]> = normals.iter().map(light).collect();
         for (at, number) in nearest.into_iter().enumerate().filter(|(_, number)| *number != u32::MAX) {
             let number = number as usize;
-            let Some(w) = Weights::new(corners(number)).map(|of| of.at(at % self.width, at / self.width)) else { continue };
+            let Some(w) = Weights::new(corners(number)).map(|of| of.at(at % self.width, at / self.width)) else {
+                continue;
+            };
             let own = |values: &[f64]| scene.triangles[number].map(|v| values[v as usize]);
             let light = lights[number];
             self.colors[at] = match scene.paint {

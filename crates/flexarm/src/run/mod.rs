@@ -383,7 +383,8 @@ fn tool_monitor(
     let rests_there = arm.torque_driven.is_empty() && arm.loads.is_empty();
     let first_hz = arm.modes.frequencies_hz().first().copied().unwrap_or(0.0);
     let settings = MetricSettings { settling_band_m: options.settling_band_m, lowest_hz: RINGING_FROM * first_hz };
-    ToolMonitor::new(path, static_part, LongRecord::new(moves(motion), rests_there, settings))
+    let record = LongRecord::new(moves(motion), rests_there, settings);
+    ToolMonitor::new(path, static_part, record.with_room((duration / sample_s) as usize + 2))
 }
 
 /// Start and end of each move (s).
