@@ -4,24 +4,35 @@
 
 use std::io::Write;
 
-/// Sizes from here on, and below the other, have an exponent, as in Rust's debug form.
-const LARGE: f64 = 1e16;
+/// Two shortest texts can be equally near, and then the algorithms choose differently. The number ends one decimal digit
+/// later, that is after 18 at most: with `k` binary digits behind the point it has `k` decimal ones there, and `k` is no more
+/// than this.
+const MOST_BINARY_DIGITS: i32 = 26;
+/// Sizes below have an exponent, as in Rust's debug form.
 const SMALL: f64 = 1e-4;
 
 /// Adds what `{value:?}` is.
 pub(crate) fn push_number(text: &mut Vec<u8>, value: f64) {
     let size = value.abs();
     let mut buffer = zmij::Buffer::new();
-    if value == 0.0 || (SMALL..LARGE).contains(&size) {
-        text.extend_from_slice(buffer.format_finite(value).as_bytes());
-    } else if value.is_finite() {
-        push_with_exponent(text, buffer.format_finite(value).as_bytes());
-    } else {
+    if value != 0.0 && binary_digits(value) <= MOST_BINARY_DIGITS {
         let _ = write!(text, "{value:?}"); // memory does not fail
+    } else if value == 0.0 || size >= SMALL {
+        text.extend_from_slice(buffer.format_finite(value).as_bytes());
+    } else {
+        push_with_exponent(text, buffer.format_finite(value).as_bytes());
     }
 }
 
-/// A number other than zero, written with or without an exponent, with one.
+/// Binary digits of a number behind the point; less than zero for multiples of powers of two, infinity and what is no number.
+fn binary_digits(value: f64) -> i32 {
+    let bits = value.to_bits();
+    let exponent = ((bits >> 52) & 0x7ff) as i32;
+    let digits = (bits & ((1 << 52) - 1)) | if exponent > 0 { 1 << 52 } else { 0 };
+    1075 - exponent.max(1) - digits.trailing_zeros() as i32
+}
+
+/// A number other than zero, written with or without an exponent: with one.
 fn push_with_exponent(text: &mut Vec<u8>, written: &[u8]) {
     let unsigned = written.strip_prefix(b"-").unwrap_or(written);
     let (mantissa, exponent) = match unsigned.iter().position(|letter| *letter == b'e') {
@@ -69,6 +80,8 @@ mod tests {
             let size = 10f64.powi((bits % 12) as i32 - 8);
             check((random() as i64) as f64 / i64::MAX as f64 * size);
             check((random() % 2000) as f64 * 1e-3 * size);
+            // Quarters, eighths and so on of all sizes.
+            check((bits >> 11) as f64 * 2f64.powi(-((random() % 64) as i32)));
         }
         for power in -1074..1024 {
             let two = 2f64.powi(power);
