@@ -49,15 +49,23 @@ impl ContributionPeaks {
     /// # Panics
     /// When there is no such element.
     pub fn update(&mut self, element: usize, t: f64, map: &Matrix6<f64>, deflection: &Vector6<f64>) -> Vector6<f64> {
-        assert!(element < self.peaks.len(), "element {element} of {}", self.peaks.len());
         let displacement = tcp_displacement(map, deflection);
+        self.add(element, t, &displacement);
+        displacement
+    }
+
+    /// Takes in the displacement of the tool (m, rad, world axes) that one element causes at time `t` (s).
+    ///
+    /// # Panics
+    /// When there is no such element.
+    pub fn add(&mut self, element: usize, t: f64, displacement: &Vector6<f64>) {
+        assert!(element < self.peaks.len(), "element {element} of {}", self.peaks.len());
         let peak = &mut self.peaks[element];
         let distance = displacement.fixed_rows::<3>(0).norm();
         if distance > peak.peak_m {
             (peak.peak_m, peak.t_peak_s) = (distance, t);
         }
         peak.peak_rad = peak.peak_rad.max(displacement.fixed_rows::<3>(3).norm());
-        displacement
     }
 
     /// One entry per element.

@@ -94,6 +94,18 @@ impl LongRecord {
         }
     }
 
+    /// The same with room for so many samples, as far as they are kept.
+    #[must_use]
+    pub fn with_room(mut self, samples: usize) -> Self {
+        let samples = samples.min(self.most + 1);
+        self.times.reserve_exact(samples);
+        self.errors.reserve_exact(samples);
+        self.path_errors.reserve_exact(samples);
+        self.positions.reserve_exact(samples);
+        self.statics.reserve_exact(samples);
+        self
+    }
+
     /// Adds a sample.
     pub fn push(&mut self, sample: &ErrorSample) {
         self.times.push(sample.time_s);

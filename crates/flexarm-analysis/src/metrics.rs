@@ -5,7 +5,7 @@
 use nalgebra::Vector3;
 
 use crate::hold::{Hold, HoldMetrics};
-use crate::path_frame::{PathFrame, path_frames};
+use crate::path_frame::{path_frames, tangential_at};
 use crate::record::{ErrorRecord, RecordError};
 use crate::spectrum::{Taper, strongest_line_from};
 
@@ -109,15 +109,16 @@ pub fn tcp_metrics_on_path(
     let (t_peak_s, peak_m) = peak(record.times, &distances);
     let (_, peak_rad) = peak(record.times, &angles);
 
-    let frames = path_frames(record.times, record.rigid_positions);
-    let from_positions = || {
+    let from_positions = || -> Vec<[f64; 3]> {
+        let frames = path_frames(record.times, record.rigid_positions);
         let pairs = record.errors.iter().zip(&frames);
         pairs.map(|(e, frame)| frame.components(&Vector3::new(e[0], e[1], e[2]))).collect()
     };
-    let path_errors: Vec<[f64; 3]> = path_errors.map_or_else(from_positions, <[_]>::to_vec);
-    let [tangential_peak_m, normal_peak_m, binormal_peak_m, lateral_peak_m] = path_peaks(&path_errors);
-    let [path_accuracy_m, path_rms_m] = path_accuracy(record, &path_errors);
-    let holds = holds(record, &frames, band);
+    let computed = if path_errors.is_none() { from_positions() } else { Vec::new() };
+    let path_errors = path_errors.unwrap_or(&computed);
+    let [tangential_peak_m, normal_peak_m, binormal_peak_m, lateral_peak_m] = path_peaks(path_errors);
+    let [path_accuracy_m, path_rms_m] = path_accuracy(record, path_errors);
+    let holds = holds(record, band);
     // One stop that does not settle is enough: the worst counts.
     let settling = holds.iter().map(|hold| hold.settling_s).reduce(|a, b| Some(a?.max(b?)));
     Ok(TcpMetrics {
@@ -183,7 +184,7 @@ fn path_accuracy(record: &ErrorRecord<'_>, path_errors: &[[f64; 3]]) -> [f64; 2]
 }
 
 /// The hold after each move that has one.
-fn holds(record: &ErrorRecord<'_>, frames: &[PathFrame], band: f64) -> Vec<HoldMetrics> {
+fn holds(record: &ErrorRecord<'_>, band: f64) -> Vec<HoldMetrics> {
     let mut holds = Vec::new();
     for (i, &(start, end)) in record.moves.iter().enumerate() {
         // Times of moves and samples come from different sums; a billionth of the record is no difference.
@@ -202,7 +203,7 @@ fn holds(record: &ErrorRecord<'_>, frames: &[PathFrame], band: f64) -> Vec<HoldM
             times: &record.times[first..after],
             errors: record.errors[first..after].iter().map(|e| [e[0], e[1], e[2]]).collect(),
             final_static: record.quasi_static.map(|values| values[after - 1]),
-            approach: has_moved.then(|| frames[first].tangential),
+            approach: has_moved.then(|| tangential_at(record.times, record.rigid_positions, first)),
         };
         holds.push(hold.metrics(end, band));
     }

@@ -124,6 +124,19 @@ pub fn path_frames(times: &[f64], positions: &[[f64; 3]]) -> Vec<PathFrame> {
     (0..n).map(rates).map(next).collect()
 }
 
+/// The tangential axis of [`path_frames`] at one sample, without the others.
+pub(crate) fn tangential_at(times: &[f64], positions: &[[f64; 3]], sample: usize) -> Vector3<f64> {
+    let n = times.len().min(positions.len());
+    if n < 3 {
+        return PathFrame::world().tangential;
+    }
+    let rates = |i: usize| parabola_rates(times, positions, i.clamp(1, n - 2), times[i]);
+    // At rest the axes are those of the last motion.
+    let moving = (0..=sample).rev().map(|i| rates(i)[0]).find(|velocity| velocity.norm() > REST_SPEED);
+    let at_rest = || PathFrame::before((0..n).map(rates)).tangential;
+    moving.map_or_else(at_rest, |velocity| velocity / velocity.norm())
+}
+
 /// Velocity at `t` and acceleration of the parabola through samples `i - 1`, `i` and `i + 1`.
 fn parabola_rates(times: &[f64], positions: &[[f64; 3]], i: usize, t: f64) -> [Vector3<f64>; 2] {
     let p = |k: usize| Vector3::from(positions[k]);
@@ -233,6 +246,9 @@ mod tests {
         let way = |t: f64| if t < 1.0 { 0.0 } else { 0.1 * (1.0 - (3.0 * (t - 1.0)).cos()) };
         let positions: Vec<[f64; 3]> = times.iter().map(|&t| (direction * way(t)).into()).collect();
         let frames = path_frames(&times, &positions);
+        for sample in [0, 50, 99, 110, 250, times.len() - 1] {
+            assert_eq!(tangential_at(&times, &positions, sample), frames[sample].tangential);
+        }
         // at rest before the motion: the axes with which it begins
         assert!((frames[50].tangential - direction).norm() < 1e-12); // measured 2.2e-16
         assert_eq!(frames[50], frames[99]);

@@ -10,7 +10,7 @@ use flexarm_spatial::Pose;
 use nalgebra::{Matrix2x3, Matrix3, Point3, SymmetricEigen, Vector3};
 
 use crate::mesh_picture::draw::{Align, Style, text_width};
-use crate::mesh_picture::scene::{Paint, Scene, outline_of, render_over};
+use crate::mesh_picture::scene::{Layer, Paint, Scene};
 use crate::mesh_picture::{Image, Rgb, View, color};
 use crate::{BentMesh, Magnifier, stations_in_link};
 use flexarm_sample::{BendInfo, LinkMesh, RunHeader, Sample, TwinSample};
@@ -90,15 +90,29 @@ pub fn arm_picture(
     side: ArmSide,
     size: [usize; 2],
 ) -> Result<ArmPicture, ArmPictureError> {
-    let stage = Stage::new(header, sample)?;
-    let unit = size[0] as f64 / NOMINAL_WIDTH;
-    let view = stage.view(side, size, [26.0 * unit, 26.0 * unit], None);
-    let [mut white, mut black] = [[255; 3], [0; 3]].map(|ground| stage.draw(&view, size, ground));
-    for image in [&mut white, &mut black] {
-        arrow(image, &view, unit, &stage.tool, &stage.moved);
+    Stage::new(header, sample)?.picture(side, size)
+}
+
+/// As [`arm_picture`], from several sides at once, each on a thread of its own.
+///
+/// # Errors
+/// [`ArmPictureError`].
+pub fn arm_pictures<const N: usize>(
+    header: &RunHeader,
+    sample: &Sample,
+    sides: [ArmSide; N],
+    size: [usize; 2],
+) -> Result<[ArmPicture; N], ArmPictureError> {
+    let stage = &Stage::new(header, sample)?;
+    let drawn = std::thread::scope(|scope| {
+        let threads = sides.map(|side| scope.spawn(move || stage.picture(side, size)));
+        threads.map(|thread| thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+    });
+    let mut pictures = Vec::with_capacity(N);
+    for picture in drawn {
+        pictures.push(picture?);
     }
-    let png = without_ground(&white, &black).to_png().map_err(ArmPictureError::Encode)?;
-    Ok(ArmPicture { png, axes: [0, 1, 2].map(|k| [view.right[k], view.up[k]]) })
+    Ok(pictures.try_into().unwrap_or_else(|_| unreachable!("a picture of each side")))
 }
 
 /// The arm as a PNG picture on white with a scale of its colours: rigid twin and magnified flexible arm.
@@ -209,38 +223,68 @@ impl Stage {
         View::fit(toward, right, points, [margin, margin, width as f64 - 2.0 * margin, height as f64 - margin - foot])
     }
 
-    /// Both arms on a ground of one colour.
-    fn draw(&self, view: &View, [width, height]: [usize; 2], ground: Rgb) -> Image {
+    /// See [`arm_picture`].
+    fn picture(&self, side: ArmSide, size: [usize; 2]) -> Result<ArmPicture, ArmPictureError> {
+        let unit = size[0] as f64 / NOMINAL_WIDTH;
+        let view = self.view(side, size, [26.0 * unit, 26.0 * unit], None);
+        let layers = self.layers(&view, size);
+        let [white, black] = [[255; 3], [0; 3]].map(|ground| {
+            let mut image = layers.on(ground, size);
+            arrow(&mut image, &view, unit, &self.tool, &self.moved);
+            image
+        });
+        let png = without_ground(&white, &black).to_png().map_err(ArmPictureError::Encode)?;
+        Ok(ArmPicture { png, axes: [0, 1, 2].map(|k| [view.right[k], view.up[k]]) })
+    }
+
+    /// Both arms.
+    fn layers(&self, view: &View, [width, height]: [usize; 2]) -> Layers {
         let count = self.rigid.triangles.len();
         let (colors, bright) = (vec![[GHOST; 2]; count], vec![false; count]);
         let side_of = vec![-1.0; self.rigid.positions.len()];
         let paint = Paint::Faces { colors: &colors, bright: &bright, side: &side_of };
         let ghost = Scene { positions: &self.rigid.positions, triangles: &self.rigid.triangles, paint, marks: &[] };
-        let mut under = render_over(&ghost, view, &Image::new(width, height, ground));
-        for y in 0..height {
-            for x in 0..width {
-                under.blend(x, y, ground, GHOST_FADE as f32);
-            }
-        }
+        let ghost = Layer::new(&ghost, view, width, height);
         let paint = Paint::Magnitude { values: &self.values, peak: 1.0 };
         let flexible = Scene { positions: &self.shown.positions, triangles: &self.shown.triangles, paint, marks: &[] };
-        let mut image = render_over(&flexible, view, &under);
-        for (at, share) in outline_of(&ghost, view, width, height).into_iter().enumerate() {
-            image.blend(at % width, at / width, GHOST_LINE, 0.8 * share);
-        }
-        image
+        Layers { outline: ghost.outline(), ghost, flexible: Layer::new(&flexible, view, width, height) }
     }
 
     /// On white, with everything that is to be known.
     fn explained(&self, side: ArmSide, size: [usize; 2], header: &RunHeader, around: Option<&Ellipsoid>) -> Image {
         let unit = size[0] as f64 / NOMINAL_WIDTH;
         let view = self.view(side, size, [26.0 * unit, 78.0 * unit], around);
-        let mut image = self.draw(&view, size, color::PAPER);
+        let mut image = self.layers(&view, size).on(color::PAPER, size);
         if let Some(ellipsoid) = around {
             ellipsoid.draw(&mut image, &view, unit, &self.moved);
         }
         arrow(&mut image, &view, unit, &self.tool, &self.moved);
         legend(&mut image, &view, unit, header, self.factor);
+        image
+    }
+}
+
+/// Both arms from one side, on no ground yet.
+struct Layers {
+    ghost: Layer,
+    flexible: Layer,
+    /// How much of each pixel the outline of the rigid arm covers.
+    outline: Vec<f32>,
+}
+
+impl Layers {
+    /// Both arms on a ground of one colour.
+    fn on(&self, ground: Rgb, [width, height]: [usize; 2]) -> Image {
+        let mut under = self.ghost.over(&Image::new(width, height, ground));
+        for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+            if under.pixel(x, y) != ground {
+                under.blend(x, y, ground, GHOST_FADE as f32);
+            }
+        }
+        let mut image = self.flexible.over(&under);
+        for (at, share) in self.outline.iter().enumerate().filter(|(_, share)| **share > 0.0) {
+            image.blend(at % width, at / width, GHOST_LINE, 0.8 * share);
+        }
         image
     }
 }
@@ -267,6 +311,15 @@ fn check(header: &RunHeader, sample: &Sample) -> Result<(), ArmPictureError> {
 fn without_ground(white: &Image, black: &Image) -> Image {
     let mut image = black.clone();
     for (pixel, white) in image.rgba.chunks_exact_mut(4).zip(white.rgba.chunks_exact(4)) {
+        // Most of a picture is ground, and of the rest most covers it.
+        if pixel[..3] == [0; 3] && white[..3] == [255; 3] {
+            pixel[3] = 0;
+            continue;
+        }
+        if pixel[..3] == white[..3] {
+            pixel[3] = 255;
+            continue;
+        }
         // What shines through is what differs, alike in all colours but for rounding.
         let through = (0..3).map(|c| f64::from(white[c].saturating_sub(pixel[c]))).sum::<f64>() / (3.0 * 255.0);
         let covered = 1.0 - through;
@@ -589,6 +642,8 @@ mod tests {
         for side in [ArmSide::Side, ArmSide::Oblique] {
             let png = arm_png(&header, &sample, side, size).unwrap();
             assert_eq!(png, arm_png(&header, &sample, side, size).unwrap(), "the same bytes");
+            let [beside_another, _] = arm_pictures(&header, &sample, [side, ArmSide::Side], size).unwrap();
+            assert_eq!(beside_another, arm_picture(&header, &sample, side, size).unwrap());
             let pixels = decoded(&png);
             let count = |near: Rgb, within: i32| {
                 let close = |p: &&Rgb| (0..3).all(|k| (i32::from(p[k]) - i32::from(near[k])).abs() <= within);
@@ -615,7 +670,7 @@ mod tests {
         let stage = Stage::new(&header, &sample).unwrap();
         let view = stage.view(ArmSide::Oblique, size, [13.0, 13.0], None);
         for ground in [[255; 3], [27, 31, 38]] {
-            let mut truth = stage.draw(&view, size, ground);
+            let mut truth = stage.layers(&view, size).on(ground, size);
             arrow(&mut truth, &view, 0.5, &stage.tool, &stage.moved);
             let worst = pixels.iter().zip(truth.rgba.chunks_exact(4)).flat_map(|(p, truth)| {
                 let laid = |c: usize| {

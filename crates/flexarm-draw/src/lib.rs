@@ -37,7 +37,7 @@ pub mod palette;
 mod plot;
 
 #[cfg(feature = "png")]
-pub use arm_picture::{ArmPicture, ArmPictureError, ArmSide, arm_color, arm_picture, arm_png, arm_sheet};
+pub use arm_picture::{ArmPicture, ArmPictureError, ArmSide, arm_color, arm_picture, arm_pictures, arm_png, arm_sheet};
 pub use bend::{BendLine, BentMesh, BentPieces};
 pub use magnify::{Magnifier, stations_in_link};
 pub use plot::{CurveLook, LinePlot, Panel, PlotCurve, PlotError, page_plot, paper_plot};

@@ -9,7 +9,7 @@
 
 use std::path::PathBuf;
 
-use flexarm_draw::mesh_picture::scene::{Paint, Scene, render};
+use flexarm_draw::mesh_picture::scene::{Layer, Paint, Scene, render, render_over};
 use flexarm_draw::mesh_picture::{Image, MeshPictures, PictureError, Rgb, View, color, write_pictures};
 use flexarm_fe_io::mesh::{ReadOptions, read_mesh};
 use flexarm_fem::reduction::{CondensationOptions, Interface, Tie};
@@ -19,6 +19,34 @@ use flexarm_fem::{
     UnitSystem, reduce_mesh,
 };
 use nalgebra::Vector3;
+
+/// Truth: the scene drawn over the ground, sample by sample. Thin and large triangles, some of them partly outside.
+#[test]
+fn a_layer_lies_over_any_ground_as_the_scene_does() {
+    let mut seed = 7_u64;
+    let mut random = || {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (seed >> 33) as f64 / (1_u64 << 31) as f64 * 1.6 - 0.8
+    };
+    let positions: Vec<Vector3<f64>> = (0..90).map(|_| Vector3::new(random(), random(), 0.3 * random())).collect();
+    let triangles: Vec<[u32; 3]> = (0..30).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]).collect();
+    let values: Vec<f64> = positions.iter().map(|p| p.x.abs()).collect();
+    let paint = Paint::Magnitude { values: &values, peak: 0.8 };
+    let scene = Scene { positions: &positions, triangles: &triangles, paint, marks: &[] };
+    let box_of_view = [10.0, 10.0, 180.0, 130.0];
+    let seen = positions.iter().copied().take(60);
+    let view = View::fit(Vector3::new(0.2, 0.3, 1.0), Vector3::x(), seen, box_of_view);
+    let layer = Layer::new(&scene, &view, 200, 150);
+    for ground in [[255; 3], [27, 31, 38]] {
+        let under = Image::new(200, 150, ground);
+        let over = layer.over(&under);
+        assert_eq!(over, render_over(&scene, &view, &under));
+        let ground_left = over.rgba.chunks_exact(4).filter(|pixel| pixel[..3] == ground).count();
+        assert!((1000..25_000).contains(&ground_left), "{ground_left}");
+    }
+    let outline = layer.outline();
+    assert!(outline.iter().any(|share| *share > 0.9) && outline.iter().filter(|share| **share == 0.0).count() > 15_000);
+}
 
 /// A steel bar of bricks along x, 0.8 x 0.1 x 0.06 m.
 fn bar() -> Mesh {

@@ -61,7 +61,7 @@ impl CreateOptions {
 
     /// A clock that says when the next flush of a file is due.
     pub(crate) fn flush_clock(self, file: &Path) -> FlushClock {
-        let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let folder = folder_of(file);
         let now = Instant::now();
         let scarce = is_scarce(folder);
         FlushClock {
@@ -127,8 +127,13 @@ impl FlushClock {
     }
 }
 
+/// The folder in which a file is.
+pub(crate) fn folder_of(file: &Path) -> &Path {
+    file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
 /// Whether a folder's disk is nearly full; `false` where that cannot be told.
-fn is_scarce(folder: &Path) -> bool {
+pub(crate) fn is_scarce(folder: &Path) -> bool {
     #[cfg(unix)]
     let free = rustix::fs::statvfs(folder).ok().map(|disk| disk.f_bavail.saturating_mul(disk.f_frsize));
     #[cfg(not(unix))]

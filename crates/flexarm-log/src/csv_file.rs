@@ -6,6 +6,7 @@ use std::path::Path;
 
 use crate::create::FlushClock;
 use crate::file_recorder::{FileRecorder, OpenFile};
+use crate::number_text::push_number;
 use crate::shape::Shape;
 use crate::table;
 use crate::{CreateOptions, LogError, RunHeader, RunResult, Sample};
@@ -41,9 +42,7 @@ struct Lines {
     file: File,
     /// Bytes of whole lines in the file.
     written: u64,
-    waiting: csv::Writer<Vec<u8>>,
-    /// How many bytes wait, about.
-    size: usize,
+    waiting: Vec<u8>,
 }
 
 /// Bytes that wait until they are worth a system call.
@@ -51,29 +50,41 @@ const MOST_WAITING: usize = 8 << 10;
 
 impl Lines {
     fn new(file: File) -> Self {
-        Self { file, written: 0, waiting: csv::Writer::from_writer(Vec::new()), size: 0 }
+        Self { file, written: 0, waiting: Vec::new() }
     }
 
-    fn add(&mut self, fields: impl IntoIterator<Item = impl AsRef<[u8]>>) -> csv::Result<()> {
-        let size = &mut self.size;
-        self.waiting.write_record(fields.into_iter().inspect(|field| *size += field.as_ref().len() + 1))
+    fn add_names(&mut self, names: &[String]) -> csv::Result<()> {
+        let mut writer = csv::Writer::from_writer(&mut self.waiting);
+        writer.write_record(names)?;
+        Ok(writer.flush()?)
+    }
+
+    /// A line of numbers: none of them needs quotes.
+    fn add_numbers(&mut self, row: &[f64]) {
+        for (k, value) in row.iter().enumerate() {
+            if k > 0 {
+                self.waiting.push(b',');
+            }
+            push_number(&mut self.waiting, *value);
+        }
+        self.waiting.push(b'\n');
     }
 
     fn is_full(&self) -> bool {
-        self.size > MOST_WAITING
+        self.waiting.len() > MOST_WAITING
     }
 
     /// Writes out what waits. If that fails, it is given up, and the file ends with its last whole line.
     fn flush(&mut self) -> io::Result<()> {
-        let waiting = std::mem::replace(&mut self.waiting, csv::Writer::from_writer(Vec::new()));
-        let bytes = waiting.into_inner().map_err(|error| io::Error::other(error.to_string()))?;
-        self.size = 0;
-        if let Err(error) = self.file.write_all(&bytes) {
+        let length = self.waiting.len() as u64;
+        let result = self.file.write_all(&self.waiting);
+        self.waiting.clear();
+        if let Err(error) = result {
             // What cannot be cut stays; the first error is the one to tell.
             let _ = self.file.set_len(self.written).and_then(|()| self.file.seek(SeekFrom::Start(self.written)));
             return Err(error);
         }
-        self.written += bytes.len() as u64;
+        self.written += length;
         Ok(())
     }
 }
@@ -88,7 +99,7 @@ impl Drop for Lines {
 impl OpenFile for CsvFile {
     fn begin(path: &Path, options: CreateOptions, header: &RunHeader) -> Result<Self, LogError> {
         let mut lines = Lines::new(options.create(path)?);
-        lines.add(table::columns(header)).map_err(csv_error(path, "write the column names"))?;
+        lines.add_names(&table::columns(header)).map_err(csv_error(path, "write the column names"))?;
         lines.flush().map_err(LogError::io(path, "write the column names"))?;
         let flush = options.flush_clock(path);
         Ok(Self { lines: Some(lines), shape: Shape::of(header), flush, row: Vec::new() })
@@ -98,9 +109,8 @@ impl OpenFile for CsvFile {
         let Some(lines) = &mut self.lines else { return Err(LogError::not_open(path, "record")) };
         self.shape.check(path, sample)?;
         table::fill_row(sample, &self.shape, &mut self.row);
-        // Rust's debug form of a float is the shortest that reads back, with an exponent where that is shorter.
-        let fields = self.row.iter().map(|value| format!("{value:?}"));
-        lines.add(fields).map_err(csv_error(path, "write a sample"))?;
+        // The shortest text that reads back, with an exponent where that is shorter.
+        lines.add_numbers(&self.row);
         if self.flush.due() || lines.is_full() {
             self.flush(path, "write samples")?;
         }

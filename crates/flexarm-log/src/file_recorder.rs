@@ -23,7 +23,7 @@ enum State<F> {
 }
 
 /// A file of one format that is being written. Dropped without `finish`, it closes itself as well as it can.
-pub trait OpenFile: Sized {
+pub trait OpenFile: Send + Sized {
     /// Makes the file and writes what is known before the first sample.
     ///
     /// # Errors

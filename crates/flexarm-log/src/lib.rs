@@ -55,6 +55,7 @@ mod formats;
 #[cfg(feature = "mcap")]
 mod mcap_file;
 mod multi;
+mod number_text;
 #[cfg(feature = "parquet")]
 mod parquet_file;
 #[cfg(any(test, feature = "rerun"))]
@@ -71,6 +72,7 @@ mod shape;
 mod table;
 #[cfg(any(feature = "mcap", feature = "rerun"))]
 mod tail_file;
+mod threads;
 mod trace;
 #[cfg(feature = "described-tables")]
 mod whole_file;

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::threads::Threads;
 use crate::{LogError, Recorder, RunHeader, RunResult, Sample};
 
 /// Recorders that get the same header, samples and result.
@@ -11,6 +12,8 @@ use crate::{LogError, Recorder, RunHeader, RunResult, Sample};
 #[derive(Default)]
 pub struct RecorderSet {
     recorders: Vec<Box<dyn Recorder>>,
+    /// The recorders in their place, between [`RecorderSet::on_threads`] and [`RecorderSet::finish`].
+    threads: Option<Threads>,
     /// Which file was made under which name.
     made: Vec<(PathBuf, FileId)>,
 }
@@ -40,7 +43,7 @@ impl RecorderSet {
         self.recorders.push(recorder);
     }
 
-    /// The files, in the order in which the recorders were added.
+    /// The files, in the order in which the recorders were added; none while they are written on threads.
     pub fn paths(&self) -> impl Iterator<Item = &Path> {
         self.recorders.iter().map(|recorder| recorder.path())
     }
@@ -73,12 +76,26 @@ impl RecorderSet {
         Ok(())
     }
 
+    /// Has each file written on a thread of its own from here on, after [`RecorderSet::begin`]. The files get the same bytes.
+    ///
+    /// Where there is one processor, nothing changes.
+    pub fn on_threads(&mut self) {
+        // To ask how many processors there are takes as long as to begin a run.
+        let several = || std::thread::available_parallelism().is_ok_and(|processors| processors.get() > 1);
+        if self.threads.is_none() && !self.recorders.is_empty() && several() {
+            self.threads = Some(Threads::start(std::mem::take(&mut self.recorders)));
+        }
+    }
+
     /// Adds one instant to all files.
     ///
     /// # Errors
-    /// The first error of a recorder.
+    /// The first error of a recorder; on threads it is told some samples after the one that it belongs to.
     pub fn record(&mut self, sample: &Sample) -> Result<(), LogError> {
-        self.all(|recorder| recorder.record(sample))
+        match &mut self.threads {
+            Some(threads) => threads.record(sample),
+            None => self.all(|recorder| recorder.record(sample)),
+        }
     }
 
     /// Adds the result to all files and closes them.
@@ -87,7 +104,14 @@ impl RecorderSet {
     /// The first error of a recorder; [`LogError::Gone`] if files are no longer where they were made: what was written
     /// to them cannot be found.
     pub fn finish(&mut self, result: &RunResult) -> Result<(), LogError> {
-        self.all(|recorder| recorder.finish(result))?;
+        match self.threads.take() {
+            Some(threads) => {
+                let (recorders, outcome) = threads.finish(result);
+                self.recorders = recorders;
+                outcome?;
+            }
+            None => self.all(|recorder| recorder.finish(result))?,
+        }
         let is_gone = |(path, id): &&(PathBuf, FileId)| file_id(path) != Some(*id);
         let paths: Vec<PathBuf> = self.made.iter().filter(is_gone).map(|(path, _)| path.clone()).collect();
         if paths.is_empty() { Ok(()) } else { Err(LogError::Gone { paths }) }

@@ -5,7 +5,7 @@ use crate::{RunHeader, RunResult, Sample};
 /// Writes a run while it goes on: `begin` once, `record` any number of times, `finish` once.
 ///
 /// A recorder that is dropped without `finish` closes its file as well as it can, without result figures.
-pub trait Recorder {
+pub trait Recorder: Send {
     /// Whether `begin` may create the file, as far as can be told without creating it.
     ///
     /// # Errors

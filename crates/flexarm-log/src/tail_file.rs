@@ -11,9 +11,9 @@
 use std::fs::File;
 use std::io::{self, Seek, SeekFrom, Write};
 
-/// Committed bytes beyond which a recorder should set a new tail even before its time: what is held in memory, and what a
-/// full disk may cost.
-const PENDING_LIMIT: usize = 1 << 20;
+/// Committed bytes beyond which a recorder should set a new tail even before its time: what is held in memory. Tails of long
+/// files are long themselves, so this is more than comes between two tails that are due.
+const PENDING_LIMIT: usize = 16 << 20;
 
 /// See the module.
 #[derive(Debug)]

@@ -85,6 +85,65 @@ fn one_failing_recorder_does_not_cost_the_others_their_data() {
     [good, bad].iter().for_each(|path| std::fs::remove_file(path).unwrap());
 }
 
+/// Truth: the files that are written one sample after another on one thread.
+#[test]
+fn files_that_are_written_on_threads_have_the_same_bytes() {
+    let paths = |folder: &str| {
+        let folder = synthetic::scratch(folder);
+        std::fs::create_dir(&folder).unwrap();
+        let formats = flexarm_log::RecordingFormat::ALL.into_iter().filter(|format| format.is_built_in());
+        formats.map(|format| (format, folder.join(format.info().file_name))).collect::<Vec<_>>()
+    };
+    let write = |paths: &[(flexarm_log::RecordingFormat, PathBuf)], on_threads: bool| {
+        let mut set = RecorderSet::new();
+        set.extend(paths.iter().map(|(format, path)| format.recorder(path, CreateOptions::default()).unwrap()));
+        set.begin(&synthetic::header()).unwrap();
+        if on_threads {
+            set.on_threads();
+        }
+        for k in 0..synthetic::SAMPLES {
+            set.record(&synthetic::sample(k)).unwrap();
+        }
+        set.finish(&synthetic::result()).unwrap();
+    };
+    let (here, there) = (paths("here"), paths("on-threads"));
+    write(&here, false);
+    write(&there, true);
+    for ((format, one), (_, other)) in here.iter().zip(&there) {
+        assert!(std::fs::read(one).unwrap() == std::fs::read(other).unwrap(), "{format} differs");
+    }
+    [here, there].iter().for_each(|paths| std::fs::remove_dir_all(paths[0].1.parent().unwrap()).unwrap());
+}
+
+/// The error comes after some samples more; what the others have is whole. Given up without an end, they close themselves.
+#[test]
+fn a_recorder_that_fails_on_its_thread_is_told_and_the_others_have_all_samples() {
+    for finished in [true, false] {
+        let (good, bad) = (synthetic::scratch("good-thread.csv"), synthetic::scratch("full-thread.csv"));
+        let mut set = RecorderSet::new();
+        set.push(Box::new(Full(bad.clone())));
+        set.push(Box::new(CsvRecorder::create(&good, CreateOptions::default())));
+        set.begin(&synthetic::header()).unwrap();
+        set.on_threads();
+        let mut samples = 0;
+        let told = loop {
+            samples += 1;
+            if let Err(error) = set.record(&synthetic::sample(samples % synthetic::SAMPLES)) {
+                break error;
+            }
+            assert!(samples < 1_000_000, "nothing is told");
+        };
+        assert!(matches!(told, LogError::Io { .. }), "{told}");
+        if finished {
+            assert!(set.finish(&RunResult::default()).is_err());
+        } else {
+            drop(set);
+        }
+        assert_eq!(std::fs::read_to_string(&good).unwrap().lines().count() as u64, samples + 1);
+        [good, bad].iter().for_each(|path| std::fs::remove_file(path).unwrap());
+    }
+}
+
 /// One that cannot begin takes the others with it: no stray files, and what was there before is as it was.
 #[test]
 fn one_that_cannot_begin_leaves_no_file_of_the_others() {

@@ -127,7 +127,7 @@ pub struct Attachment {
 }
 
 /// One of the two robots at one instant.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub struct TwinSample {
     /// Positions of the actuated joints (rad or m).
     pub q: Vec<f64>,
@@ -142,6 +142,25 @@ pub struct TwinSample {
     /// Poses of the stations of all [`RunHeader::bends`] in the world, one link after the other; empty for the rigid twin,
     /// whose stations are where [`BendInfo::X_LS`] says.
     pub X_WS: Vec<Pose>,
+}
+
+impl Clone for TwinSample {
+    fn clone(&self) -> Self {
+        let mut copy = Self::default();
+        copy.clone_from(self);
+        copy
+    }
+
+    /// Without allocation where there is room already.
+    fn clone_from(&mut self, source: &Self) {
+        let Self { q, qdot, effort, X_WL, X_WT, X_WS } = source;
+        self.q.clone_from(q);
+        self.qdot.clone_from(qdot);
+        self.effort.clone_from(effort);
+        self.X_WL.clone_from(X_WL);
+        self.X_WT = *X_WT;
+        self.X_WS.clone_from(X_WS);
+    }
 }
 
 /// One elastic element at one instant.
@@ -165,7 +184,7 @@ pub struct EnergySample {
 }
 
 /// One logged instant.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub struct Sample {
     /// Time since the start (s).
     pub time_s: f64,
@@ -190,6 +209,37 @@ pub struct Sample {
     pub energy: EnergySample,
     /// Iterations of the last step (0 for explicit steppers) and residual norm.
     pub solver: [f64; 2],
+}
+
+impl Clone for Sample {
+    fn clone(&self) -> Self {
+        let mut copy = Self::default();
+        copy.clone_from(self);
+        copy
+    }
+
+    /// Without allocation where there is room already.
+    fn clone_from(&mut self, source: &Self) {
+        let Self {
+            time_s,
+            step,
+            flexible,
+            rigid,
+            error_world,
+            error_path,
+            static_m,
+            elastic,
+            contributions,
+            energy,
+            solver,
+        } = source;
+        (self.time_s, self.step, self.energy, self.solver) = (*time_s, *step, *energy, *solver);
+        (self.error_world, self.error_path, self.static_m) = (*error_world, *error_path, *static_m);
+        self.flexible.clone_from(flexible);
+        self.rigid.clone_from(rigid);
+        self.elastic.clone_from(elastic);
+        self.contributions.clone_from(contributions);
+    }
 }
 
 /// What kind of thing happened at an instant of a run.

@@ -79,7 +79,7 @@ pub(crate) fn observe_reduced(
     }
 
     // Springs, and what dampers and friction take away.
-    let mut damping = element_loads(arm, e, rates, &mut out.load);
+    let mut damping = element_loads(arm, e, rates, system.shifted.as_mut_slice(), &mut out.load);
     for k in 0..n {
         let rate = state.qdot[k];
         damping += arm.friction_torque(k, rate) * rate;
@@ -96,25 +96,29 @@ pub(crate) fn observe_reduced(
 }
 
 /// Loads `-(K e + D ė)` of the elements, their first six components; the power that the dampers take, `ėᵀ D ė` (W).
-fn element_loads(arm: &FlexibleArm, e: &[f64], rates: &[f64], loads: &mut [Vector6<f64>]) -> f64 {
-    let (mut damping, by_element) = (0.0, arm.damps_by_element());
+///
+/// * `dampers`: scratch, a number per elastic coordinate at least.
+fn element_loads(arm: &FlexibleArm, e: &[f64], rates: &[f64], dampers: &mut [f64], loads: &mut [Vector6<f64>]) -> f64 {
+    if rates.is_empty() {
+        return 0.0;
+    }
+    let dampers = &mut dampers[..rates.len()];
+    dampers.fill(0.0);
+    arm.add_damping(rates, dampers);
     for (load, element) in loads.iter_mut().zip(&arm.elements) {
         let first = arm.offset(element);
-        let coupled = if by_element { first..first + element.size } else { 0..rates.len() };
+        let (own, dampers) = (&e[first..first + element.size], &dampers[first..first + element.size]);
         let mut force = [0.0; 6];
-        for c in 0..element.size {
-            let row: f64 = coupled.clone().map(|j| arm.D[(first + c, j)] * rates[j]).sum();
-            damping += row * rates[first + c];
-            if c < 6 {
-                let own = &e[first..first + element.size];
-                let spring: f64 = match &element.curve {
-                    Some(curve) => curve.torque(own[0]),
-                    None => own.iter().enumerate().map(|(j, e)| element.K[(c, j)] * e).sum(),
-                };
-                force[c] = -(spring + row);
+        match &element.curve {
+            Some(curve) => force[..dampers.len().min(6)].fill(curve.torque(own[0])),
+            None => {
+                for (column, e) in element.K.as_slice().chunks_exact(element.size).zip(own) {
+                    force.iter_mut().zip(column).for_each(|(force, k)| *force += k * e);
+                }
             }
         }
+        force.iter_mut().zip(dampers).for_each(|(force, damper)| *force = -(*force + damper));
         *load = Vector6::from(force);
     }
-    damping
+    dampers.iter().zip(rates).map(|(damper, rate)| damper * rate).sum()
 }

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use flexarm_kinematics::{Data, State, forward_kinematics, gravity_forces};
-use nalgebra::{Cholesky, DVector, Dyn};
+use flexarm_kinematics::{Data, Frame, State, forward_kinematics, gravity_forces};
+use nalgebra::{Cholesky, DVector, Dyn, Vector3};
 
 use crate::arm::FlexibleArm;
 use crate::error::StepError;
@@ -81,6 +81,19 @@ impl StaticPath {
         self.factor = tangent_stiffness(&self.arm, &mut self.data, t, &self.e, &K).cholesky();
         self.place(t);
         Ok(&self.state.q)
+    }
+
+    /// How far a frame is from where it would be with all springs undeformed (m, world axes), at the coordinates of the last
+    /// time asked for.
+    pub fn displacement(&mut self, frame: &Frame) -> Vector3<f64> {
+        let Self { arm, data, state, e, .. } = self;
+        let (model, n) = (&arm.model, arm.model.n_actuated());
+        forward_kinematics(model, data, &state.q);
+        let yielding = data.X_WF(frame).translation.vector;
+        state.q.as_mut_slice()[n..].fill(0.0);
+        forward_kinematics(model, data, &state.q);
+        state.q.as_mut_slice()[n..].copy_from_slice(e.as_slice());
+        yielding - data.X_WF(frame).translation.vector
     }
 
     /// The arm that stands still, with what it carries now.

@@ -62,6 +62,11 @@ impl Piece {
         self.width > 0.0 && self.width.is_finite() && self.c.iter().all(|c| c.is_finite())
     }
 
+    /// Does it stay exactly where it starts?
+    pub(crate) fn is_still(&self) -> bool {
+        self.c[1..].iter().all(|c| *c == 0.0)
+    }
+
     /// Bound on how far the piece leaves its starting value.
     pub(crate) fn excursion_bound(&self) -> f64 {
         (1..6).map(|k| self.c[k].abs() * self.width.powi(k as i32)).sum()

@@ -235,6 +235,18 @@ impl Trajectory {
         moves
     }
 
+    /// Time up to which every velocity is exactly zero from `t` on, s: `t` itself where a joint moves, infinity after the last
+    /// motion. Stricter than what lies between two [`Trajectory::moves`].
+    ///
+    /// * `t`: s, not NaN.
+    #[must_use]
+    pub fn still_until(&self, t: f64) -> f64 {
+        if t > self.duration {
+            return f64::INFINITY;
+        }
+        self.curves.iter().map(|curve| curve.still_until(t)).fold(f64::INFINITY, f64::min)
+    }
+
     /// Largest speed at `t = 0` over all joints, rad/s (or m/s): by how much the velocity jumps at the start.
     pub fn initial_speed(&self) -> f64 {
         self.curves.iter().map(|curve| curve.start()[1].abs()).fold(0.0, f64::max)
@@ -272,6 +284,17 @@ impl Curve {
         let i = self.knots[1..=last].partition_point(|&knot| knot <= t);
         let piece = &self.pieces[i];
         piece.at((t - self.knots[i]).clamp(0.0, piece.width))
+    }
+
+    /// As [`Trajectory::still_until`], of one joint.
+    fn still_until(&self, t: f64) -> f64 {
+        let last = self.pieces.len() - 1;
+        let first = self.knots[1..=last].partition_point(|&knot| knot <= t);
+        match self.pieces[first..].iter().position(|piece| !piece.is_still()) {
+            Some(0) => t,
+            Some(still) => self.knots[first + still],
+            None => f64::INFINITY,
+        }
     }
 
     pub(crate) fn start(&self) -> [f64; 4] {

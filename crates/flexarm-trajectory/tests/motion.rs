@@ -45,6 +45,23 @@ fn quintic_move_is_the_closed_form() {
     assert_eq!(trajectory.warnings(), []);
 }
 
+/// Truth: the velocities of samples.
+#[test]
+fn nothing_moves_until_the_motion_says_so() {
+    let rest = PlannedMove { hold: 0.7, ..PlannedMove::quintic(vec![0.2, 0.0], 0.5) };
+    let trajectory = plan(&[0.2, 0.0], vec![rest, PlannedMove::quintic(vec![0.2, 0.4], 0.8)]);
+    let trajectory = trajectory.with_held_joints(&[("held", 1.0)]).unwrap();
+    // The first move leads nowhere.
+    for (t, until) in [(0.0, 1.2), (0.6, 1.2), (1.2, 1.2), (1.5, 1.5), (2.1, f64::INFINITY)] {
+        assert_eq!(trajectory.still_until(t), until, "{t}");
+    }
+    for k in 0..=1000 {
+        let t = 2.0 * f64::from(k) / 1000.0;
+        let [_, qdot, _] = sample(&trajectory, t);
+        assert!(trajectory.still_until(t) <= t || qdot.iter().all(|v| *v == 0.0), "{t}");
+    }
+}
+
 /// Truth: the velocity of a trapezoid in 2 s with ramps of 0.5 s is D / 1.5 s, its acceleration that over 0.5 s.
 #[test]
 fn plain_trapezoid_of_given_duration_ramps_for_a_quarter() {

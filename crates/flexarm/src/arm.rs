@@ -13,10 +13,10 @@ use rayon::prelude::*;
 use crate::caveat::Caveat;
 use crate::error::Error;
 use crate::flexible::FlexibleRobot;
-use crate::magnification::Expected;
 use crate::options::{Modelling, Outputs, RunOptions};
+use crate::prepare::Prepared;
 use crate::robot::Robot;
-use crate::run::{Together, run_traced};
+use crate::run::{Observer, Together, Wanted, run_traced};
 use crate::scenario::Scenario;
 use crate::summary::Summary;
 
@@ -25,7 +25,7 @@ use crate::summary::Summary;
 pub struct Arm {
     robot: Arc<Robot>,
     modelling: Modelling,
-    flexible: Arc<FlexibleRobot>,
+    prepared: Arc<Prepared>,
     /// [`Robot::caveats`].
     caveats: Arc<[Caveat]>,
 }
@@ -64,8 +64,8 @@ impl Robot {
     /// # Errors
     /// [`Error::Modelling`] if a link or drive has no such model, [`Error::Model`] if the result is no tree.
     pub fn flexible(&self, modelling: Modelling) -> Result<Arm, Error> {
-        let flexible = Arc::new(self.modelled(&modelling)?);
-        Ok(Arm { robot: Arc::new(self.clone()), modelling, flexible, caveats: self.caveats().into() })
+        let prepared = Arc::new(Prepared::new(self.modelled(&modelling)?));
+        Ok(Arm { robot: Arc::new(self.clone()), modelling, prepared, caveats: self.caveats().into() })
     }
 }
 
@@ -77,12 +77,12 @@ impl Arm {
 
     /// Tree, springs and drives.
     pub fn flexible(&self) -> &FlexibleRobot {
-        &self.flexible
+        &self.prepared.flexible
     }
 
     /// Actuated joints, in the order in which poses and motions have them.
     pub fn joints(&self) -> impl Iterator<Item = &str> {
-        let model = &self.flexible.model;
+        let model = &self.flexible().model;
         model.coordinates()[..model.n_actuated()].iter().map(|coordinate| coordinate.joint.as_str())
     }
 
@@ -92,7 +92,17 @@ impl Arm {
     /// # Errors
     /// As [`crate::simulate`].
     pub fn simulate(&self, scenario: impl Into<Scenario>, options: &RunOptions) -> Result<Run, Error> {
-        self.simulate_with(scenario, options, None, &mut |_| ControlFlow::Continue(()))
+        let mut go_on = |_: &Sample| ControlFlow::Continue(());
+        self.run(&scenario.into(), options, None, Wanted::Columns, &mut go_on)
+    }
+
+    /// As [`Arm::simulate`], the figures alone: for studies of many runs of which nobody looks at the signals.
+    ///
+    /// # Errors
+    /// As [`crate::simulate`].
+    pub fn simulate_summary(&self, scenario: impl Into<Scenario>, options: &RunOptions) -> Result<Summary, Error> {
+        let options = RunOptions { modelling: self.modelling, ..options.clone() };
+        self.traced(&scenario.into(), &options, None, Wanted::Figures, None)
     }
 
     /// As [`Arm::simulate`], writes recordings if asked to, and shows each logged sample to `observer`, which may break off.
@@ -106,6 +116,20 @@ impl Arm {
         outputs: Option<&Outputs>,
         observer: &mut dyn FnMut(&Sample) -> ControlFlow<()>,
     ) -> Result<Run, Error> {
+        // What things look like is asked by nobody but recordings.
+        let wanted = if outputs.is_some() { Wanted::Curves } else { Wanted::Samples };
+        self.run(&scenario.into(), options, outputs, wanted, observer)
+    }
+
+    /// A run with its columns.
+    fn run(
+        &self,
+        scenario: &Scenario,
+        options: &RunOptions,
+        outputs: Option<&Outputs>,
+        wanted: Wanted,
+        observer: &mut dyn FnMut(&Sample) -> ControlFlow<()>,
+    ) -> Result<Run, Error> {
         let options = RunOptions { modelling: self.modelling, ..options.clone() };
         let mut columns = Columns::default();
         let mut watch = |header: &RunHeader, sample: &Sample| {
@@ -115,21 +139,28 @@ impl Arm {
             columns.push(sample);
             observer(sample)
         };
-        let prepared = Some(self.flexible.clone());
-        // How far things are shown enlarged, and what they look like, is asked by nobody but recordings.
-        let figures_alone = outputs.is_none();
-        let expected = figures_alone.then(Expected::default);
+        let summary = self.traced(scenario, &options, outputs, wanted, Some(&mut watch))?;
+        Ok(Run { summary, columns })
+    }
+
+    /// A run with all that is known of the arm; `options` with the arm's own modelling.
+    fn traced<'a>(
+        &'a self,
+        scenario: &Scenario,
+        options: &RunOptions,
+        outputs: Option<&Outputs>,
+        wanted: Wanted,
+        observer: Option<&'a mut Observer<'a>>,
+    ) -> Result<Summary, Error> {
         let together = Together {
-            observer: Some(&mut watch),
-            prepared,
-            expected,
-            figures_alone,
+            observer,
+            prepared: Some(&self.prepared),
+            wanted,
             robot_caveats: Some(self.caveats.clone()),
             ..Together::default()
         };
         let go_on = &mut |_, _| ControlFlow::Continue(());
-        let (summary, _) = run_traced(&self.robot, &scenario.into(), &options, outputs, together, go_on)?;
-        Ok(Run { summary, columns })
+        run_traced(&self.robot, scenario, options, outputs, together, go_on).map(|(summary, _)| summary)
     }
 
     /// Runs all scenarios, on all cores; each is the same to the last bit as by [`Arm::simulate`], for every number of threads.
@@ -145,7 +176,8 @@ impl Arm {
     /// [`Error::Step`] if a spring is not positive definite, or the arm cannot carry its weight at the middle of its joint
     /// ranges.
     pub fn operating_point(&self) -> Result<OperatingPoint, Error> {
-        let model = &self.flexible.model;
+        let flexible = self.flexible();
+        let model = &flexible.model;
         // Any pose will do; this one is within the limits.
         let middle = |lower: f64, upper: f64| match (lower.is_finite(), upper.is_finite()) {
             (true, true) => 0.5 * (lower + upper),
@@ -160,7 +192,7 @@ impl Arm {
         };
         let actuated = &model.coordinates()[..model.n_actuated()];
         let pose = actuated.iter().map(|c| middle(c.limits.lower, c.limits.upper)).collect();
-        let arm = self.flexible.arm(Arc::new(Held(pose))).map_err(|error| self.flexible.explained(error))?;
-        Ok(OperatingPoint::new(arm, self.flexible.tcp.clone()))
+        let arm = flexible.arm(Arc::new(Held(pose))).map_err(|error| flexible.explained(error))?;
+        Ok(OperatingPoint::new(arm, flexible.tcp.clone()))
     }
 }

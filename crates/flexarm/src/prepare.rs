@@ -1,9 +1,9 @@
 //! Everything about a run that can be told before its first step.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use flexarm_settings::Setting;
-use flexarm_stepping::{FlexibleArm, Load, StepError, StepRule, Stepper, new_stepper};
+use flexarm_stepping::{FlexibleArm, Load, PrescribedMotion, StepError, StepRule, Stepper, new_stepper};
 
 use crate::caveat::size::Size;
 use crate::caveat::{self, Caveat, kinds};
@@ -15,6 +15,33 @@ use crate::motion::Motion;
 use crate::options::RunOptions;
 use crate::robot::Robot;
 use crate::scenario::Scenario;
+
+/// A robot that is modelled already.
+pub(crate) struct Prepared {
+    pub(crate) flexible: Arc<FlexibleRobot>,
+    /// Where the last motion began, and the arm in equilibrium there: modes and damping depend on nothing else of a motion.
+    start: Mutex<Option<(Vec<f64>, Arc<FlexibleArm>)>>,
+}
+
+impl Prepared {
+    pub(crate) fn new(flexible: FlexibleRobot) -> Self {
+        Self { flexible: Arc::new(flexible), start: Mutex::new(None) }
+    }
+
+    /// As [`FlexibleRobot::arm`], found again for a motion that begins where the last one did.
+    pub(crate) fn arm(&self, motion: Arc<dyn PrescribedMotion>) -> Result<FlexibleArm, StepError> {
+        let n = self.flexible.model.n_actuated();
+        let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+        motion.sample(0.0, &mut q, &mut v, &mut a);
+        let known = self.start.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        if let Some((_, arm)) = known.filter(|(start, _)| *start == q) {
+            return Ok(FlexibleArm { motion, ..(*arm).clone() });
+        }
+        let arm = self.flexible.arm(motion)?;
+        *self.start.lock().unwrap_or_else(PoisonError::into_inner) = Some((q, Arc::new(arm.clone())));
+        Ok(arm)
+    }
+}
 
 /// A run whose input makes sense.
 pub(crate) struct Checked {
@@ -36,12 +63,19 @@ pub(crate) fn checked(
     robot: &Robot,
     scenario: &Scenario,
     options: &RunOptions,
-    prepared: Option<Arc<FlexibleRobot>>,
+    prepared: Option<&Prepared>,
 ) -> Result<Checked, Error> {
     let motion = &scenario.motion;
     runnable(motion, options)?;
-    let flexible = prepared.map_or_else(|| robot.modelled(&options.modelling).map(Arc::new), Ok)?;
-    let arm = flexible.arm(motion.prescribed()).map_err(|error| flexible.explained(error))?;
+    let flexible = match prepared {
+        Some(prepared) => prepared.flexible.clone(),
+        None => Arc::new(robot.modelled(&options.modelling)?),
+    };
+    let arm = match prepared {
+        Some(prepared) => prepared.arm(motion.prescribed()),
+        None => flexible.arm(motion.prescribed()),
+    };
+    let arm = arm.map_err(|error| flexible.explained(error))?;
     let (arm, mut load_caveats) = loaded(robot, scenario, options, arm)?;
     if options.log_rate_hz * options.step_s > 1.0 + 1e-9 && options.log_rate_hz != RunOptions::default().log_rate_hz {
         load_caveats.push(kinds::LOG_RATE.found("run", options.log_rate_hz, 1.0 / options.step_s));

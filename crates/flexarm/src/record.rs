@@ -268,12 +268,16 @@ fn metadata(
 
 /// The part of a header that names the signals.
 pub(crate) fn signals(robot: &Robot, arm: &FlexibleArm) -> RunHeader {
+    RunHeader { links: ordered_links(robot), ..names_of_signals(robot, arm) }
+}
+
+/// Names of joints, springs and tool: what columns are called after.
+pub(crate) fn names_of_signals(robot: &Robot, arm: &FlexibleArm) -> RunHeader {
     let actuated = &arm.model.coordinates()[..arm.model.n_actuated()];
     RunHeader {
         robot: robot.name.clone(),
         joints: actuated.iter().map(|c| c.joint.clone()).collect(),
         prismatic: actuated.iter().map(|c| c.kind == "prismatic").collect(),
-        links: ordered_links(robot),
         elements: arm.elements.iter().map(|e| e.name.clone()).collect(),
         tcp: robot.tcp.0.clone(),
         ..RunHeader::default()

@@ -3,9 +3,9 @@
 //! Drives at their commanded places, springs in balance with weight and with the loads of the instant, no inertia force. The
 //! curve is smooth between the instants at which something jumps: it is computed on a grid and interpolated by cubics.
 
-use flexarm_kinematics::{Data, Frame, forward_kinematics};
+use flexarm_kinematics::Frame;
 use flexarm_stepping::{FlexibleArm, StaticPath};
-use nalgebra::{DVector, Vector3};
+use nalgebra::Vector3;
 
 /// Time between two equilibria along a motion (s): a cubic through four of them is good to a thousandth of a millimetre.
 const GRID_S: f64 = 0.02;
@@ -26,7 +26,6 @@ pub(crate) struct StaticPart {
     sample_s: f64,
     grid_s: f64,
     block: Block,
-    data: Data,
     failed: bool,
 }
 
@@ -56,7 +55,6 @@ impl StaticPart {
             sample_s,
             grid_s: GRID_S.min(period / PER_PERIOD).max(sample_s),
             block: Block::default(),
-            data: Data::new(&arm.model),
             failed: false,
         }
     }
@@ -93,8 +91,8 @@ impl StaticPart {
             values.push(self.displacement(start + (end - start) * k as f64 / intervals as f64)?);
         }
         // What happens at the end belongs to what follows.
-        let q = self.path.just_before(end).ok()?.clone();
-        values.push(self.beside_the_twin(q));
+        self.path.just_before(end).ok()?;
+        values.push(self.path.displacement(&self.tcp));
         Some(Block { start, end, values })
     }
 
@@ -103,19 +101,8 @@ impl StaticPart {
     }
 
     fn displacement(&mut self, t: f64) -> Option<Vector3<f64>> {
-        let q = self.path.at(t).ok()?.clone();
-        Some(self.beside_the_twin(q))
-    }
-
-    /// Tool of the arm at rest with coordinates `q` minus that of the rigid twin.
-    fn beside_the_twin(&mut self, mut q: DVector<f64>) -> Vector3<f64> {
-        let model = &self.path.arm().model;
-        forward_kinematics(model, &mut self.data, &q);
-        let yielding = self.data.X_WF(&self.tcp).translation.vector;
-        let n = model.n_actuated();
-        q.rows_mut(n, model.nv() - n).fill(0.0);
-        forward_kinematics(model, &mut self.data, &q);
-        yielding - self.data.X_WF(&self.tcp).translation.vector
+        self.path.at(t).ok()?;
+        Some(self.path.displacement(&self.tcp))
     }
 }
 

@@ -1,6 +1,8 @@
 //! The rigid twin: the same robot on the same motion with every elastic coordinate held at zero.
 
-use flexarm_kinematics::{Data, Frame, State, frame_jacobian, frame_twist, inverse_dynamics, world_poses};
+use flexarm_kinematics::{
+    Data, Frame, State, forward_kinematics_velocity, frame_jacobian, frame_twist, inverse_dynamics, world_poses,
+};
 use flexarm_stepping::FlexibleArm;
 use nalgebra::{DVector, Matrix6xX, Vector3};
 
@@ -40,14 +42,26 @@ impl RigidTwin {
         [self.velocity, self.acceleration]
     }
 
+    /// Where everything is and how it moves at time t, by the sums of [`RigidTwin::update`]; neither forces nor acceleration.
+    pub(crate) fn place(&mut self, arm: &FlexibleArm, tcp: &Frame, t: f64) {
+        arm.prescribed_state(t, &mut self.state, &mut self.qddot);
+        forward_kinematics_velocity(&arm.model, &mut self.data, &self.state);
+        self.look_at_tool(arm, tcp);
+    }
+
+    /// Jacobian and velocity of the tool, from poses and twists.
+    fn look_at_tool(&mut self, arm: &FlexibleArm, tcp: &Frame) {
+        frame_jacobian(&arm.model, &self.data, tcp, &mut self.J);
+        self.velocity = frame_twist(&self.data, tcp).linear;
+    }
+
     /// Everything at time t; `data.tau` holds the torques that the drives must supply.
     pub(crate) fn update(&mut self, arm: &FlexibleArm, tcp: &Frame, t: f64) {
         let model = &arm.model;
         arm.prescribed_state(t, &mut self.state, &mut self.qddot);
         inverse_dynamics(model, &mut self.data, &self.state, &self.qddot);
         world_poses(model, &mut self.data);
-        frame_jacobian(model, &self.data, tcp, &mut self.J);
-        self.velocity = frame_twist(&self.data, tcp).linear;
+        self.look_at_tool(arm, tcp);
         // Acceleration of the point: spatial acceleration + w × v, gravity taken out again.
         let V = self.data.V[tcp.body].at_child(&tcp.X_BF);
         let A = self.data.A[tcp.body].at_child(&tcp.X_BF);

@@ -38,6 +38,18 @@ fn a_run_by_values_is_the_run_by_files() {
     let run = arm.simulate(&motion, &options).unwrap();
     let by_files = flexarm::simulate(&robot, &motion, &options, None, &mut |_, _| ControlFlow::Continue(())).unwrap();
     assert_eq!(run.summary.tcp, by_files.tcp);
+    // The figures are the same whatever else of a run is wanted.
+    let timeless = |mut summary: flexarm::Summary| {
+        (summary.wall_s, summary.cpu_s) = (0.0, 0.0);
+        (summary.real_time_factor, summary.cpu_s_per_simulated_s) = (0.0, 0.0);
+        serde_json::to_string(&summary).unwrap()
+    };
+    let figures = timeless(run.summary.clone());
+    for _ in 0..2 {
+        // The second finds the arm in equilibrium where the first left it.
+        assert_eq!(timeless(arm.simulate_summary(&motion, &options).unwrap()), figures);
+    }
+    assert_eq!(timeless(by_files), figures);
 
     let (t, e) = (run.time_s(), run.error_world_m());
     assert_eq!((t.len(), e.len()), (5001, 3 * 5001));

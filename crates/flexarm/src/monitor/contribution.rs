@@ -6,7 +6,7 @@
 
 use flexarm_analysis::{ContributionPeak, ContributionPeaks};
 use flexarm_stepping::{FlexibleArm, Observation};
-use nalgebra::{Matrix6, Vector6};
+use nalgebra::Vector6;
 
 use crate::flexible::{FlexibleRobot, Owner};
 use crate::twin::RigidTwin;
@@ -45,7 +45,7 @@ impl Contributions {
             }
         }
         for (place, displacement) in self.moved.iter().enumerate() {
-            self.peaks.update(place, seen.t, &Matrix6::identity(), displacement);
+            self.peaks.add(place, seen.t, displacement);
         }
     }
 

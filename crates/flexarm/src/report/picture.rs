@@ -19,12 +19,15 @@ const fn height(width: usize) -> usize {
 /// Both pictures; `width` in pixels.
 #[cfg(feature = "png")]
 pub(super) fn pictures(trace: &Trace, width: usize) -> Vec<Picture> {
-    use flexarm_draw::{ArmSide, arm_picture};
-    let draw = |title, side| {
-        let drawn = arm_picture(&trace.header, &trace.peak, side, [width, height(width)]);
-        Picture { title, drawn: drawn.map(|p| (p.png, p.axes)).map_err(|error| error.to_string()) }
-    };
-    vec![draw("From the side", ArmSide::Side), draw("From the front and above", ArmSide::Oblique)]
+    use flexarm_draw::{ArmSide, arm_pictures};
+    let titles = ["From the side", "From the front and above"];
+    match arm_pictures(&trace.header, &trace.peak, [ArmSide::Side, ArmSide::Oblique], [width, height(width)]) {
+        Ok(drawn) => {
+            let pictures = titles.into_iter().zip(drawn);
+            pictures.map(|(title, p)| Picture { title, drawn: Ok((p.png, p.axes)) }).collect()
+        }
+        Err(error) => titles.map(|title| Picture { title, drawn: Err(error.to_string()) }).into(),
+    }
 }
 
 /// Without the feature `png` there are none, and the reason is said.

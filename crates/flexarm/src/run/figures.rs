@@ -7,7 +7,7 @@ use flexarm_stepping::StepperKind;
 use flexarm_trajectory::LimitViolation;
 use nalgebra::Vector3;
 
-use super::{Run, moves};
+use super::{Run, Wanted, moves};
 use crate::caveat::pose::Standing;
 use crate::caveat::{Caveat, drives, kinds, validity};
 use crate::flexible::Owner;
@@ -21,6 +21,7 @@ impl Run<'_> {
         let metrics = self.monitors.tool.result().metrics().ok();
         let metrics = metrics.as_ref().filter(|_| self.options.with_twin);
         let (links, elastic_drives) = (self.link_figures(), self.drive_figures());
+        let sag_m = self.static_sag();
         let robot = self.robot;
         let by_choice = !robot.flexible.is_empty() || robot.drives.iter().any(|drive| drive.gearbox.is_some());
         let coordinates = self.arm.model.coordinates().iter();
@@ -35,19 +36,20 @@ impl Run<'_> {
             links_model: self.flexible.links_model().into(),
             duration_s: self.monitors.tool.result().last_time_s().unwrap_or(0.0),
             stepper: StepperFigures::new(self.options, self.stepper.counts()),
-            tcp: metrics.map(|m| self.tool_figures(m)),
+            tcp: metrics.map(|m| self.tool_figures(m, sag_m)),
             frequencies_hz: self.arm.modes.frequencies_hz(),
             energy: self.monitors.energy.result(),
             drives: peaks.map(|(c, load)| (c.joint.clone(), load.peak)).collect(),
             moves_s: moves(self.motion).iter().map(|&(start, end)| [start, end]).collect(),
             error_curve: self.monitors.tool.result().largest_errors(CURVE_PIECES),
-            caveats: self.caveats(&links, robot_caveats),
+            caveats: self.caveats(&links, sag_m, robot_caveats),
             links,
             elastic_drives,
             ..Summary::default()
         };
         summary.headline = headline::headline(&summary, by_choice);
-        (summary, self.events(metrics))
+        let events = if self.wanted == Wanted::Curves { self.events(metrics) } else { Vec::new() };
+        (summary, events)
     }
 
     fn link_figures(&self) -> Vec<LinkFigures> {
@@ -74,9 +76,9 @@ impl Run<'_> {
         figures.collect()
     }
 
-    fn tool_figures(&self, metrics: &TcpMetrics) -> TcpFigures {
+    fn tool_figures(&self, metrics: &TcpMetrics, static_sag_m: f64) -> TcpFigures {
         let figures = TcpFigures {
-            static_sag_m: self.static_sag(),
+            static_sag_m,
             shares_at_peak: self.shares_at_peak(),
             ..TcpFigures::from(metrics).with_band(self.options.settling_band_m)
         };
@@ -113,14 +115,14 @@ impl Run<'_> {
     }
 
     /// What is probably wrong with the input, and whether the models held in what was seen so far.
-    fn caveats(&self, links: &[LinkFigures], mut caveats: Vec<Caveat>) -> Vec<Caveat> {
+    fn caveats(&self, links: &[LinkFigures], sag_m: f64, mut caveats: Vec<Caveat>) -> Vec<Caveat> {
         caveats.extend(self.flexible.caveats());
         caveats.extend(self.motion.caveats());
         let passed = |v: &LimitViolation| Caveat::said("joint-limit", &v.joint, format!("joint limit: {v}"), "");
         caveats.extend(self.motion.violations.iter().map(passed));
         let (arm, flexible, robot) = (&self.arm, self.flexible, self.robot);
         let elastic = arm.modes.equilibrium.as_slice();
-        caveats.extend(Standing { robot, flexible, arm, elastic, sag_m: self.static_sag() }.caveats());
+        caveats.extend(Standing { robot, flexible, arm, elastic, sag_m }.caveats());
         caveats.extend(self.drive_caveats());
         if let Some(first) = arm.modes.frequencies_hz().first() {
             let logged_hz = 1.0 / (self.every as f64 * self.options.step_s);

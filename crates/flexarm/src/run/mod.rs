@@ -26,8 +26,8 @@ use crate::monitor::Monitors;
 use crate::monitor::tool::ToolMonitor;
 use crate::motion::Motion;
 use crate::options::{Outputs, RunOptions};
-use crate::prepare::{Checked, checked};
-use crate::record::{header, link_frames, ordered_links, recorders, signals, write_layouts};
+use crate::prepare::{Checked, Prepared, checked};
+use crate::record::{header, link_frames, names_of_signals, ordered_links, recorders, signals, write_layouts};
 use crate::robot::Robot;
 use crate::run::sampler::Sampler;
 use crate::scenario::Scenario;
@@ -63,7 +63,9 @@ pub fn simulate(
     outputs: Option<&Outputs>,
     progress: &mut Progress<'_>,
 ) -> Result<Summary, Error> {
-    simulate_traced(robot, scenario, options, outputs, progress).map(|(summary, _)| summary)
+    let wanted = if outputs.is_some() { Wanted::Curves } else { Wanted::Figures };
+    let together = Together { wanted, ..Together::default() };
+    run_traced(robot, &scenario.into(), options, outputs, together, progress).map(|(summary, _)| summary)
 }
 
 /// As [`simulate`], and returns the curves of the run, which are thinned if it is long ([`Trace`]). All samples are in the
@@ -84,6 +86,20 @@ pub fn simulate_traced(
 /// Called with each logged sample of a run and what stays the same; breaking off stops it.
 pub(crate) type Observer<'a> = dyn FnMut(&RunHeader, &Sample) -> ControlFlow<()> + 'a;
 
+/// What of a run is seen by others; each level has what is before it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Wanted {
+    /// The summary alone.
+    Figures,
+    /// The signals of [`flexarm_log::Columns`].
+    Columns,
+    /// Whole samples.
+    Samples,
+    /// Curves, and all that recordings say of a run.
+    #[default]
+    Curves,
+}
+
 /// What a run shares with others that it is seen with, or gets from who prepared it.
 #[derive(Default)]
 pub(crate) struct Together<'a> {
@@ -91,14 +107,14 @@ pub(crate) struct Together<'a> {
     pub(crate) recorders: Vec<Box<dyn Recorder>>,
     /// Deflections of all of them, for a scale in common.
     pub(crate) expected: Option<Expected>,
-    /// Nobody sees the trace: neither curves nor meshes, texts and attachments of the header are wanted.
-    pub(crate) figures_alone: bool,
+    /// What of it is seen; all if there are recorders.
+    pub(crate) wanted: Wanted,
     /// [`Robot::caveats`], if they are known.
     pub(crate) robot_caveats: Option<Arc<[Caveat]>>,
     /// Who looks at the samples.
     pub(crate) observer: Option<&'a mut Observer<'a>>,
     /// The robot as it is to be modelled, if that has been done.
-    pub(crate) prepared: Option<Arc<FlexibleRobot>>,
+    pub(crate) prepared: Option<&'a Prepared>,
 }
 
 /// As [`simulate_traced`], as one of several runs.
@@ -118,14 +134,21 @@ pub(crate) fn run_traced(
     if progress(0.0, scenario.duration_s()).is_break() {
         return Err(Error::Interrupted { t: 0.0, partial: false });
     }
-    let own = || Expected::of(&arm, &flexible.tcp, scenario.duration_s(), scenario.start);
+    let wanted = together.wanted;
+    let own = || match wanted {
+        Wanted::Curves => Expected::of(&arm, &flexible.tcp, scenario.duration_s(), scenario.start),
+        // How far things are shown enlarged is asked by nobody but recordings.
+        _ => Expected::default(),
+    };
     let expected = together.expected.unwrap_or_else(own);
-    let mut run = Run::new(robot, &scenario.motion, options, &flexible, arm, stepper);
+    let mut run = Run::new(robot, &scenario.motion, options, &flexible, arm, stepper, wanted);
     let mut files = recorders(outputs, !together.recorders.is_empty())?;
     files.set.extend(together.recorders);
-    let mut head = match together.figures_alone {
-        true => signals(robot, &run.arm),
-        false => header(robot, scenario, options, &run.arm, flexible.links_model()),
+    let mut head = match wanted {
+        Wanted::Figures => RunHeader::default(),
+        Wanted::Columns => names_of_signals(robot, &run.arm),
+        Wanted::Samples => signals(robot, &run.arm),
+        Wanted::Curves => header(robot, scenario, options, &run.arm, flexible.links_model()),
     };
     head.has_rigid = options.with_twin;
     head.bends.clone_from(&run.bends);
@@ -136,7 +159,8 @@ pub(crate) fn run_traced(
     head.magnification = options.magnification.unwrap_or_else(|| expected.magnification());
     files.begin(&head)?;
     write_layouts(&files.names, &head)?;
-    run.trace = if together.figures_alone { Trace::without_curves(head) } else { Trace::new(head) };
+    files.set.on_threads();
+    run.trace = if wanted < Wanted::Curves { Trace::without_curves(head) } else { Trace::new(head) };
     let end = run.go(&mut files.set, outputs.is_some(), progress, together.observer);
 
     let robot_caveats = together.robot_caveats.map_or_else(|| robot.caveats(), |known| known.to_vec());
@@ -153,7 +177,7 @@ pub(crate) fn run_traced(
     summary.real_time_factor = summary.duration_s / summary.wall_s.max(1e-9);
     summary.cpu_s_per_simulated_s = summary.cpu_s / summary.duration_s.max(1e-9);
     summary.files = files.names.clone();
-    run.trace.finish(if together.figures_alone { RunResult::default() } else { result(&summary, events) });
+    run.trace.finish(if wanted < Wanted::Curves { RunResult::default() } else { result(&summary, events) });
     let closed = files.set.finish(&run.trace.result).map_err(Error::from);
     let reported =
         closed.and_then(|()| outputs.map_or(Ok(()), |outputs| crate::report::write(outputs, &summary, &run.trace)));
@@ -227,6 +251,7 @@ struct Run<'a> {
     trace: Trace,
     bends: Vec<BendInfo>,
     contributors: Vec<Contributor>,
+    wanted: Wanted,
     /// Steps between two samples, and all.
     every: u64,
     last: u64,
@@ -240,6 +265,7 @@ impl<'a> Run<'a> {
         flexible: &'a FlexibleRobot,
         arm: FlexibleArm,
         stepper: Box<dyn Stepper>,
+        wanted: Wanted,
     ) -> Self {
         let tcp = flexible.tcp.clone();
         let duration = motion.trajectory.duration();
@@ -247,7 +273,11 @@ impl<'a> Run<'a> {
         let every = ((1.0 / (options.log_rate_hz * options.step_s)).round() as u64).max(1);
         let mut twin = RigidTwin::new(&arm);
         let tool = tool_monitor(&arm, &tcp, &mut twin, motion, options, every as f64 * options.step_s);
-        let (bends, stations) = stations(&flexible.bends, &arm.model, &ordered_links(robot));
+        let (mut bends, mut places, mut frames) = Default::default();
+        if wanted >= Wanted::Samples {
+            (bends, places) = stations(&flexible.bends, &arm.model, &ordered_links(robot));
+            frames = link_frames(robot, &arm.model);
+        }
         Self {
             robot,
             motion,
@@ -257,11 +287,12 @@ impl<'a> Run<'a> {
             twin,
             seen: Observation::new(&arm),
             monitors: Monitors::new(&arm, flexible, robot.drives.len(), tool),
-            sampler: Sampler::new(robot, flexible, link_frames(robot, &arm.model), stations),
+            sampler: Sampler::new(robot, flexible, frames, places),
             sample: Sample::default(),
             trace: Trace::default(),
             bends,
             contributors: contributors(robot, flexible, &arm),
+            wanted,
             every,
             last,
             arm,
@@ -300,16 +331,25 @@ impl<'a> Run<'a> {
         Ok(())
     }
 
-    /// Compares with the twin, shows the monitors what there is, and fills the sample.
+    /// Compares with the twin, shows the monitors what there is, and fills the sample as far as it is wanted.
     fn observe(&mut self, step: u64) {
         self.stepper.observe(&mut self.seen);
         // The twin carries what the arm carries.
-        self.arm.model.clone_from(&self.seen.model);
-        self.twin.update(&self.arm, &self.tcp, self.seen.t);
+        if !Arc::ptr_eq(&self.arm.model, &self.seen.model) {
+            self.arm.model.clone_from(&self.seen.model);
+        }
+        // What its drives must supply stands in samples alone.
+        match self.wanted {
+            Wanted::Figures => self.twin.place(&self.arm, &self.tcp, self.seen.t),
+            _ => self.twin.update(&self.arm, &self.tcp, self.seen.t),
+        }
         let tool = self.monitors.update(&self.seen, &self.twin, &self.arm, &self.tcp);
         let sample = &mut self.sample;
-        self.sampler.fill(sample, &self.seen, &self.twin, &tool);
-        sampler::fill_elastic(sample, &self.seen, &self.arm);
+        sample.error_world = tool.error;
+        if self.wanted > Wanted::Figures {
+            self.sampler.fill(sample, &self.seen, &self.twin, &tool);
+            sampler::fill_elastic(sample, &self.seen, &self.arm);
+        }
         let moved = self.monitors.contributions.moved();
         sample.contributions.clear();
         sample.contributions.extend(self.contributors.iter().map(|who| [0, 1, 2].map(|c| moved[who.place][c])));
@@ -329,14 +369,22 @@ fn tool_monitor(
     sample_s: f64,
 ) -> ToolMonitor {
     // Before the first motion the path axes are those of its beginning.
-    let duration = motion.trajectory.duration();
-    let path = PathFrame::before((0..=1000).map(|k| twin.rates(arm, tcp, duration * f64::from(k) * 1e-3)));
+    let (trajectory, duration) = (&motion.trajectory, motion.trajectory.duration());
+    let mut still_until = 0.0;
+    let instants = (0..=1000).map(|k| duration * f64::from(k) * 1e-3).filter(|t| {
+        if *t >= still_until {
+            still_until = trajectory.still_until(*t);
+        }
+        *t >= still_until
+    });
+    let path = PathFrame::before(instants.map(|t| twin.rates(arm, tcp, t)));
     let static_part = options.with_twin.then(|| StaticPart::new(arm, tcp, moves(motion), duration, sample_s));
     // Stops come to rest where the static part is, unless servos bring the joints elsewhere or a load moves it.
     let rests_there = arm.torque_driven.is_empty() && arm.loads.is_empty();
     let first_hz = arm.modes.frequencies_hz().first().copied().unwrap_or(0.0);
     let settings = MetricSettings { settling_band_m: options.settling_band_m, lowest_hz: RINGING_FROM * first_hz };
-    ToolMonitor::new(path, static_part, LongRecord::new(moves(motion), rests_there, settings))
+    let record = LongRecord::new(moves(motion), rests_there, settings);
+    ToolMonitor::new(path, static_part, record.with_room((duration / sample_s) as usize + 2))
 }
 
 /// Start and end of each move (s).
