@@ -33,6 +33,8 @@
 
 mod arm;
 mod batch;
+#[cfg(test)]
+mod draw;
 mod drive;
 mod eigenvalues;
 mod elastic_tree;

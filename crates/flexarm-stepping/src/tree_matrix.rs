@@ -425,24 +425,10 @@ impl TreeInverse {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::draw::Draw;
     use nalgebra::DMatrix;
     use proptest::prelude::*;
     use proptest::test_runner::TestRunner;
-
-    /// Numbers between -1 and 1 in turn.
-    struct Draw(u64);
-
-    impl Draw {
-        fn next(&mut self) -> f64 {
-            self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-        }
-
-        fn symmetric(&mut self, least: f64) -> Matrix6<f64> {
-            let A = Matrix6::from_fn(|_, _| self.next());
-            A * A.transpose() + Matrix6::identity() * least
-        }
-    }
 
     /// A random tree with branches and several roots; stiffness of very different size from node to node.
     fn tree(seed: u64, count: usize) -> TreeMatrices {
@@ -455,10 +441,10 @@ mod tests {
             let size = 10f64.powf(3.0 * draw.next());
             TreeNode {
                 parent: parent.checked_sub(1),
-                inertia: draw.symmetric(0.3),
+                inertia: draw.definite(0.3),
                 carried: [block(&mut draw), block(&mut draw), block(&mut draw)],
-                C: draw.symmetric(0.1) * size,
-                K: draw.symmetric(0.1) * size,
+                C: draw.definite(0.1) * size,
+                K: draw.definite(0.1) * size,
             }
         });
         TreeMatrices { nodes: nodes.collect() }

@@ -345,25 +345,13 @@ impl TreeSolver {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::draw::Draw;
     use nalgebra::{DMatrix, DVector};
     use proptest::prelude::*;
 
-    /// Numbers between -1 and 1 in turn.
-    struct Draw(u64);
-
     impl Draw {
-        fn next(&mut self) -> f64 {
-            self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-            (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-        }
-
         fn vector(&mut self) -> Vector6<f64> {
             Vector6::from_fn(|_, _| self.next())
-        }
-
-        fn symmetric(&mut self) -> Matrix6<f64> {
-            let A = Matrix6::from_fn(|_, _| self.next());
-            A * A.transpose() + Matrix6::identity() * 0.3
         }
 
         fn triangle(&mut self) -> Triangle {
@@ -389,7 +377,7 @@ mod tests {
             match kind % 3 {
                 0 => (Sigma::Hard(hard), Matrix6::identity() * hard),
                 1 => {
-                    let C = self.symmetric() * 1e-3;
+                    let C = self.definite(0.3) * 1e-3;
                     (Sigma::Soft(Symmetric::new(&C), Symmetric::new(&C.try_inverse().unwrap())), C)
                 }
                 _ => {
@@ -414,7 +402,7 @@ mod tests {
             let mut draw = Draw(seed);
             let n = count + 1;
             let parent: Vec<usize> = (0..n).map(|i| ((draw.next().abs() * i as f64) as usize).min(i.saturating_sub(1))).collect();
-            let M: Vec<Matrix6<f64>> = (0..n).map(|_| draw.symmetric()).collect();
+            let M: Vec<Matrix6<f64>> = (0..n).map(|_| draw.definite(0.3)).collect();
             let rows: Vec<Rows> = (0..n as u64).map(|i| draw.rows((seed >> i) & 1 == 0)).collect();
             let (sigma, C): (Vec<Sigma>, Vec<Matrix6<f64>>) = (0..n as u64).map(|i| draw.sigma((seed >> 8) + i)).unzip();
             let mut solver = TreeSolver::new(parent.clone());
