@@ -13,7 +13,8 @@ use nalgebra::{DMatrix, DVector, Matrix3, Scalar, Vector3};
 
 use crate::axis_motion::AxisMotion;
 use crate::data::{Data, ElasticSubspace, begin, joint_position};
-use crate::model::{Body, JointMotion, Model, Tree};
+use crate::lanes::Tree;
+use crate::model::{Body, JointMotion, Model};
 
 /// Mass matrix `M(q)`, nv×nv, both triangles (kg, kg m, kg m²). Fills `data.{X_PB, M}`. No allocation.
 pub fn mass_matrix<'d>(model: &Model, data: &'d mut Data, q: &DVector<f64>) -> &'d DMatrix<f64> {

@@ -14,8 +14,30 @@ use crate::axis_motion::AxisMotion;
 use crate::crba::composite_bodies;
 use crate::data::{Data, State, identity};
 use crate::kinematics::place_bodies;
-use crate::model::{Body, Frame, JointMotion, Model, Tree};
+use crate::model::{Body, Frame, JointMotion, Model};
 use crate::rnea::newton_euler;
+
+/// A tree whose inertias are in the scalar of a recursion: a [`Model`], or one with several sets of them
+/// ([`LaneTree`]).
+pub(crate) trait Tree<T: Real> {
+    /// Bodies and joints, alike in all lanes.
+    fn model(&self) -> &Model;
+
+    /// Inertia of a body about Bo, B axes.
+    fn inertia(&self, body: usize) -> SpatialInertia<T>;
+}
+
+impl Tree<f64> for Model {
+    #[inline(always)]
+    fn model(&self) -> &Model {
+        self
+    }
+
+    #[inline(always)]
+    fn inertia(&self, body: usize) -> SpatialInertia {
+        self.bodies[body].inertia
+    }
+}
 
 /// A tree with inertias of its own in each lane.
 #[derive(Clone, Debug)]

@@ -9,7 +9,7 @@
 
 use std::collections::HashMap;
 
-use flexarm_spatial::{ElasticAngles, Pose, Real, SpatialInertia};
+use flexarm_spatial::{ElasticAngles, Pose, SpatialInertia};
 use nalgebra::Vector3;
 
 use crate::axis_motion::{AxisMotion, RevoluteTable};
@@ -141,28 +141,6 @@ pub struct Coordinate {
 
 /// Most independent coordinates of a model.
 pub const MOST_COORDINATES: usize = 600;
-
-/// A tree whose inertias are in the scalar of a recursion: a [`Model`], or one with several sets of them
-/// ([`crate::lanes::LaneTree`]).
-pub(crate) trait Tree<T: Real> {
-    /// Bodies and joints, alike in all lanes.
-    fn model(&self) -> &Model;
-
-    /// Inertia of a body about Bo, B axes.
-    fn inertia(&self, body: usize) -> SpatialInertia<T>;
-}
-
-impl Tree<f64> for Model {
-    #[inline(always)]
-    fn model(&self) -> &Model {
-        self
-    }
-
-    #[inline(always)]
-    fn inertia(&self, body: usize) -> SpatialInertia {
-        self.bodies[body].inertia
-    }
-}
 
 /// Why a mechanism is not a usable tree.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -16,7 +16,8 @@ use flexarm_spatial::{Real, Twist, Wrench};
 use nalgebra::{DVector, Vector3};
 
 use crate::data::{Data, State, add_projection, begin, joint_motion, rotor_energy, subspace_times};
-use crate::model::{Model, Tree};
+use crate::lanes::Tree;
+use crate::model::Model;
 
 /// Generalised forces `τ = M(q) q̈ + bias(q, q̇)` (N m or N) for the accelerations `qddot`.
 ///
