@@ -1,7 +1,7 @@
 //! Four numbers side by side, for processors with AVX2: the scalar of recursions over four runs or poses at once.
 //!
-//! [`Four`] is a [`Real`]: each lane has the bits of the same recursion over `f64`. Its values exist only where
-//! [`with_lanes`] has seen that the processor has the instructions.
+//! `Four` is a [`Real`]: each lane has the bits of the same recursion over `f64`. Nobody outside can name it: it is what
+//! [`with_lanes`] hands to its work once it has seen that the processor has the instructions.
 
 #![allow(unsafe_code, reason = "vector instructions, which are called where they were found to be there")]
 
@@ -18,43 +18,38 @@ use crate::real::Real;
 /// Four numbers.
 #[derive(Clone, Copy, Debug)]
 #[repr(transparent)]
-pub struct Four(__m256d);
+struct Four(__m256d);
 
 /// Work over lanes. What it calls is inlined, down to the instructions: mark it `#[inline(always)]`.
 pub trait OverLanes {
     /// What comes of it.
     type Output;
 
-    /// Does it; values of [`Four`] may be made here.
-    fn run(self) -> Self::Output;
+    /// Does it over lanes of this type.
+    fn run<T: Real>(self) -> Self::Output;
 }
 
 /// Does the work with vector instructions; `None` where the processor has none.
 pub fn with_lanes<W: OverLanes>(work: W) -> Option<W::Output> {
     #[target_feature(enable = "avx2")]
     fn compiled<W: OverLanes>(work: W) -> W::Output {
-        work.run()
+        work.run::<Four>()
     }
     // SAFETY: the processor has what `compiled` is compiled for.
-    has_lanes().then(|| unsafe { compiled(work) })
-}
-
-/// Whether this processor has the instructions.
-pub fn has_lanes() -> bool {
-    std::arch::is_x86_feature_detected!("avx2")
+    std::arch::is_x86_feature_detected!("avx2").then(|| unsafe { compiled(work) })
 }
 
 impl Four {
     /// From the lanes.
     #[inline(always)]
-    pub fn new(lanes: [f64; 4]) -> Self {
+    fn new(lanes: [f64; 4]) -> Self {
         // SAFETY: the same four numbers in the same order.
         Self(unsafe { std::mem::transmute::<[f64; 4], __m256d>(lanes) })
     }
 
     /// The lanes.
     #[inline(always)]
-    pub fn lanes(self) -> [f64; 4] {
+    fn lanes(self) -> [f64; 4] {
         // SAFETY: the same four numbers in the same order.
         unsafe { std::mem::transmute::<__m256d, [f64; 4]>(self.0) }
     }
@@ -191,13 +186,16 @@ mod tests {
         type Output = [Vec<f64>; 4];
 
         #[inline(always)]
-        fn run(self) -> Self::Output {
-            let angles = Vector3::from_fn(|c, _| Four::new(std::array::from_fn(|lane| self.0[lane][c])));
-            let rates = Vector3::new(Four::splat(0.3), Four::splat(-1.1), Four::splat(0.7));
+        fn run<T: Real>(self) -> Self::Output {
+            let mut angles = Vector3::from_element(T::zero());
+            for (lane, own) in self.0.iter().enumerate() {
+                angles.iter_mut().zip(own).for_each(|(to, angle)| to.set_lane(lane, *angle));
+            }
+            let rates = Vector3::new(T::splat(0.3), T::splat(-1.1), T::splat(0.7));
             let kin = ElasticAngles::RotationVector.kinematics(&angles, &rates);
             let euler = ElasticAngles::EulerZyx.kinematics(&angles, &rates);
             let all = kin.R.iter().chain(&kin.B).chain(&kin.bias).chain(&euler.R).chain(&euler.B).chain(&euler.bias);
-            let all: Vec<Four> = all.copied().collect();
+            let all: Vec<T> = all.copied().collect();
             std::array::from_fn(|lane| all.iter().map(|x| x.lane(lane)).collect())
         }
     }

@@ -53,7 +53,7 @@ pub struct ToolDeflection {
     pub steps: u64,
     /// Largest distance (m).
     pub peak_m: f64,
-    /// When (s).
+    /// When, for the first time (s).
     pub t_peak_s: f64,
     /// Root of the mean square distance (m).
     pub rms_m: f64,
@@ -68,7 +68,7 @@ impl ToolDeflection {
         let square = dot(&deflection, &deflection);
         // Until the end the sum of squares.
         self.rms_m += square;
-        if square > self.peak_m * self.peak_m {
+        if square.sqrt() > self.peak_m {
             (self.peak_m, self.t_peak_s) = (square.sqrt(), t);
         }
         self.end_m = deflection.into();
@@ -141,15 +141,15 @@ impl Batch {
     /// Runs in lanes: `None` where that is not possible, of all or of one of them.
     #[cfg(target_arch = "x86_64")]
     fn side_by_side(&self, runs: &[BatchRun]) -> Option<Vec<Option<ToolDeflection>>> {
-        use flexarm_kinematics::{Four, OverLanes, with_lanes};
+        use flexarm_kinematics::{OverLanes, with_lanes};
 
         struct Group<'a>(&'a Batch, &'a [BatchRun]);
         impl OverLanes for Group<'_> {
             type Output = Option<Vec<Option<ToolDeflection>>>;
 
             #[inline(always)]
-            fn run(self) -> Self::Output {
-                self.0.in_lanes::<Four>(self.1)
+            fn run<T: Real>(self) -> Self::Output {
+                self.0.in_lanes::<T>(self.1)
             }
         }
         with_lanes(Group(self, runs))?
@@ -193,5 +193,21 @@ impl Batch {
         let finished = results.into_iter().zip(&steps).enumerate();
         let finished = finished.map(|(k, (result, steps))| (!lanes.left_behind(k)).then(|| result.finished(*steps)));
         Some(finished.collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The square of a rounded root may be less than the number.
+    #[test]
+    fn a_peak_that_lasts_is_told_with_its_first_time() {
+        for k in 1..200 {
+            let deflection = Vector3::new(1e-3 * f64::from(k), 0.3e-3, -0.7e-3);
+            let mut result = ToolDeflection::default();
+            (0..3).for_each(|step| result.include(f64::from(step), deflection, false));
+            assert_eq!(result.t_peak_s, 0.0, "{k}");
+        }
     }
 }
