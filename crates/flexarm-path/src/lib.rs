@@ -7,4 +7,10 @@
 #![allow(non_snake_case, reason = "monogram notation: X_WT, R_AB; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test stops at the first failure"))]
 
+mod curve;
+mod follow;
 pub mod program;
+pub mod time_law;
+
+pub use curve::{ArcError, TURN_LENGTH, ToolCurve, ToolJet};
+pub use follow::{Blocked, Follower, JointJet, coordinates_of};

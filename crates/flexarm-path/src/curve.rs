@@ -1,0 +1,354 @@
+//! Curves of the tool in space: position and orientation over one parameter, with two derivatives.
+//!
+//! The parameter `s` is metres along the path where the tool travels; where it only turns, an angle counts [`TURN_LENGTH`] for each
+//! radian. A [`ToolCurve`] is what a line, an arc, a blend or a piece of a spline all are: a law of the position and a law of the
+//! rotation over the same `s`.
+//!
+//! Rotation vectors beyond the identity: `R = R_ref exp(phi(s))`, with the rate map of [`ElasticAngles::RotationVector`]
+//! [Bullo & Murray 1995].
+
+use flexarm_spatial::{ElasticAngles, Pose, rotation_vector};
+use nalgebra::{Matrix3, Rotation3, Translation3, Vector3, Vector6};
+
+/// Metres that a radian counts where the tool turns without travelling.
+pub const TURN_LENGTH: f64 = 0.2;
+/// Points nearer than this are one, m.
+const SAME_POINT: f64 = 1e-9;
+
+/// Pose of the tool with its first and second derivative by `s`, in world axes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ToolJet {
+    /// `X_WT`.
+    pub X: Pose,
+    /// `[p'; w]`: m and rad for each unit of `s`.
+    pub V: Vector6<f64>,
+    /// `[p''; w']`.
+    pub A: Vector6<f64>,
+}
+
+/// A quintic in `s` with vector coefficients, lowest first.
+type Quintic = [Vector3<f64>; 6];
+
+#[derive(Debug, Clone, PartialEq)]
+enum Position {
+    /// `p0 + d s`.
+    Line {
+        p0: Vector3<f64>,
+        d: Vector3<f64>,
+    },
+    /// `c + cos(s/r) x + sin(s/r) y`, `x` and `y` of length r.
+    Arc {
+        c: Vector3<f64>,
+        x: Vector3<f64>,
+        y: Vector3<f64>,
+        r: f64,
+    },
+    Quintic(Quintic),
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum Rotation {
+    /// `exp(w s) R0`, w in world axes.
+    Even { R0: Matrix3<f64>, w: Vector3<f64> },
+    /// `exp(k s) exp(w s) R0`: evenly within axes that turn with an arc, `k` along its axis.
+    WithArc { R0: Matrix3<f64>, w: Vector3<f64>, k: Vector3<f64> },
+    /// `R_ref exp(phi(s))`.
+    Log { R_ref: Matrix3<f64>, phi: Quintic },
+}
+
+/// How the tool moves over `0 <= s <= length`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ToolCurve {
+    position: Position,
+    rotation: Rotation,
+    length: f64,
+}
+
+/// Why three points are no circle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum ArcError {
+    /// Two of them coincide.
+    #[error("two of the three points of the circle are the same point")]
+    SamePoint,
+    /// They are on a line.
+    #[error("the three points of the circle lie on a straight line")]
+    Straight,
+}
+
+fn exp(w: &Vector3<f64>) -> Matrix3<f64> {
+    Rotation3::new(*w).into_inner()
+}
+
+/// Rotation vector in world axes that turns `R0` into `R1`.
+fn turn(R0: &Matrix3<f64>, R1: &Matrix3<f64>) -> Vector3<f64> {
+    rotation_vector(&(R1 * R0.transpose()))
+}
+
+fn quintic(h: f64, [q0, v0, a0]: [Vector3<f64>; 3], [q1, v1, a1]: [Vector3<f64>; 3]) -> Quintic {
+    let step = q1 - q0;
+    let c3 = (step * 20.0 - (v1 * 8.0 + v0 * 12.0) * h - (a0 * 3.0 - a1) * (h * h)) / (2.0 * h.powi(3));
+    let c4 = (step * -30.0 + (v1 * 14.0 + v0 * 16.0) * h + (a0 * 3.0 - a1 * 2.0) * (h * h)) / (2.0 * h.powi(4));
+    let c5 = (step * 12.0 - (v1 + v0) * (6.0 * h) + (a1 - a0) * (h * h)) / (2.0 * h.powi(5));
+    [q0, v0, a0 / 2.0, c3, c4, c5]
+}
+
+/// Value, first and second derivative.
+fn at(c: &Quintic, s: f64) -> [Vector3<f64>; 3] {
+    let [c0, c1, c2, c3, c4, c5] = c;
+    [
+        c0 + (c1 + (c2 + (c3 + (c4 + c5 * s) * s) * s) * s) * s,
+        c1 + (c2 * 2.0 + (c3 * 3.0 + (c4 * 4.0 + c5 * (5.0 * s)) * s) * s) * s,
+        c2 * 2.0 + (c3 * 6.0 + (c4 * 12.0 + c5 * (20.0 * s)) * s) * s,
+    ]
+}
+
+impl ToolCurve {
+    /// A straight line, the orientation turned evenly about one axis by at most half a turn.
+    pub fn line(X0: &Pose, X1: &Pose) -> Self {
+        let (R0, R1) = (X0.rotation.into_inner(), X1.rotation.into_inner());
+        let way = X1.translation.vector - X0.translation.vector;
+        let turned = turn(&R0, &R1);
+        let length = if way.norm() > SAME_POINT { way.norm() } else { turned.norm() * TURN_LENGTH };
+        let per = if length > 0.0 { 1.0 / length } else { 0.0 };
+        let position = Position::Line { p0: X0.translation.vector, d: way * per };
+        Self { position, rotation: Rotation::Even { R0, w: turned * per }, length }
+    }
+
+    /// The arc from `X0` through `via` to `X1`; further or less far if `angle` (rad) is given.
+    ///
+    /// The orientation turns evenly in the world, or in axes that turn with the tangent, such that that of `X1` is met at the
+    /// point of `X1`; `via_rotation` is passed through if given.
+    ///
+    /// # Errors
+    /// [`ArcError`]: the points are no circle.
+    pub fn arc(
+        X0: &Pose,
+        via: &Vector3<f64>,
+        via_rotation: Option<&Rotation3<f64>>,
+        X1: &Pose,
+        angle: Option<f64>,
+        turns_with_path: bool,
+    ) -> Result<Self, ArcError> {
+        let Circle { c, x, y, r, to_via, to_end } =
+            Circle::through(&X0.translation.vector, via, &X1.translation.vector)?;
+        let sign = angle.map_or(1.0, f64::signum);
+        let length = angle.map_or(to_end, f64::abs) * r;
+        let (R0, R1) = (X0.rotation.into_inner(), X1.rotation.into_inner());
+        let k = x.cross(&y) / (r * r * r);
+        let end = to_end * r;
+        let rotation = match via_rotation {
+            Some(R_via) => {
+                let (middle, last) = (to_via * r, end);
+                let phi_via = rotation_vector(&(R0.transpose() * R_via.matrix()));
+                let phi_end = rotation_vector(&(R0.transpose() * R1));
+                // The parabola through (0, 0), (middle, phi_via), (last, phi_end).
+                let square = (phi_end / last - phi_via / middle) / (last - middle);
+                let mut phi = [Vector3::zeros(); 6];
+                (phi[1], phi[2]) = (phi_via / middle - square * middle, square);
+                Rotation::Log { R_ref: R0, phi }
+            }
+            None if turns_with_path => {
+                let within = exp(&(k * -end)) * R1;
+                Rotation::WithArc { R0, w: turn(&R0, &within) / end, k: k * sign }
+            }
+            None => Rotation::Even { R0, w: turn(&R0, &R1) / end },
+        };
+        let position = Position::Arc { c, x, y: y * sign, r };
+        Ok(Self { position, rotation, length })
+    }
+
+    /// The quintic in position and rotation vector that has both jets at its ends, `length` apart in `s`.
+    pub fn between(a: &ToolJet, b: &ToolJet, length: f64) -> Self {
+        let part = |v: &Vector6<f64>, row: usize| Vector3::new(v[row], v[row + 1], v[row + 2]);
+        let (Ra, Rb) = (a.X.rotation.into_inner(), b.X.rotation.into_inner());
+        let position = quintic(
+            length,
+            [a.X.translation.vector, part(&a.V, 0), part(&a.A, 0)],
+            [b.X.translation.vector, part(&b.V, 0), part(&b.A, 0)],
+        );
+        // At phi = 0 the rate map is the identity and its bias zero.
+        let at_a = [Vector3::zeros(), Ra.transpose() * part(&a.V, 3), Ra.transpose() * part(&a.A, 3)];
+        let phi = rotation_vector(&(Ra.transpose() * Rb));
+        let map = ElasticAngles::RotationVector.kinematics(&phi, &Vector3::zeros()).B;
+        let inverse = map.try_inverse().unwrap_or_else(Matrix3::identity);
+        let rate = inverse * (Rb.transpose() * part(&b.V, 3));
+        let bias = ElasticAngles::RotationVector.kinematics(&phi, &rate).bias;
+        let at_b = [phi, rate, inverse * (Rb.transpose() * part(&b.A, 3) - bias)];
+        let rotation = Rotation::Log { R_ref: Ra, phi: quintic(length, at_a, at_b) };
+        Self { position: Position::Quintic(position), rotation, length }
+    }
+
+    /// Where it ends, in `s`.
+    pub fn length(&self) -> f64 {
+        self.length
+    }
+
+    /// Pose and derivatives at `s`.
+    pub fn at(&self, s: f64) -> ToolJet {
+        let [p, dp, ddp] = match &self.position {
+            Position::Line { p0, d } => [p0 + d * s, *d, Vector3::zeros()],
+            Position::Arc { c, x, y, r } => {
+                let (sine, cosine) = (s / r).sin_cos();
+                let outwards = x * cosine + y * sine;
+                [c + outwards, (y * cosine - x * sine) / *r, -outwards / (r * r)]
+            }
+            Position::Quintic(c) => at(c, s),
+        };
+        let (R, w, dw) = match &self.rotation {
+            Rotation::Even { R0, w } => (exp(&(w * s)) * R0, *w, Vector3::zeros()),
+            Rotation::WithArc { R0, w, k } => {
+                let E = exp(&(k * s));
+                let w_W = E * w;
+                (E * exp(&(w * s)) * R0, k + w_W, k.cross(&w_W))
+            }
+            Rotation::Log { R_ref, phi } => {
+                let [phi, dphi, ddphi] = at(phi, s);
+                let map = ElasticAngles::RotationVector.kinematics(&phi, &dphi);
+                let R = R_ref * map.R;
+                (R, R * (map.B * dphi), R * (map.B * ddphi + map.bias))
+            }
+        };
+        let six = |v: Vector3<f64>, w: Vector3<f64>| Vector6::new(v.x, v.y, v.z, w.x, w.y, w.z);
+        let X = Pose::from_parts(Translation3::from(p), Rotation3::from_matrix_unchecked(R));
+        ToolJet { X, V: six(dp, w), A: six(ddp, dw) }
+    }
+}
+
+/// The circle through three points: `c + cos(a) x + sin(a) y`, first point at a = 0.
+struct Circle {
+    c: Vector3<f64>,
+    x: Vector3<f64>,
+    y: Vector3<f64>,
+    r: f64,
+    /// Angle of the second point, rad, 0 to 2 pi.
+    to_via: f64,
+    /// Angle of the third point, greater than that of the second.
+    to_end: f64,
+}
+
+impl Circle {
+    fn through(p0: &Vector3<f64>, p1: &Vector3<f64>, p2: &Vector3<f64>) -> Result<Self, ArcError> {
+        let (a, b) = (p1 - p0, p2 - p0);
+        let longest = a.norm().max(b.norm()).max((b - a).norm());
+        if a.norm() <= SAME_POINT || b.norm() <= SAME_POINT || (b - a).norm() <= SAME_POINT {
+            return Err(ArcError::SamePoint);
+        }
+        let n = a.cross(&b);
+        // Radii beyond a million times the size of the arc are straight.
+        if n.norm() <= 1e-6 * longest * longest.min(a.norm().min(b.norm())) {
+            return Err(ArcError::Straight);
+        }
+        let centre = (b.cross(&n) * a.norm_squared() - a.cross(&n) * b.norm_squared()) / (2.0 * n.norm_squared());
+        let (c, r) = (p0 + centre, centre.norm());
+        let x = -centre;
+        let axis = n.normalize();
+        let y = axis.cross(&x);
+        let angle = |p: &Vector3<f64>| (p - c).dot(&y).atan2((p - c).dot(&x)).rem_euclid(std::f64::consts::TAU);
+        // Seen along a x b, the three points follow each other counterclockwise.
+        Ok(Self { c, x, y, r, to_via: angle(p1), to_end: angle(p2) })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn pose(v: [f64; 6]) -> Pose {
+        Pose::from_parts(Translation3::new(v[0], v[1], v[2]), Rotation3::new(Vector3::new(v[3], v[4], v[5])))
+    }
+
+    fn apart(a: &Pose, b: &Pose) -> f64 {
+        let R = a.rotation.inverse() * b.rotation;
+        (a.translation.vector - b.translation.vector).norm() + rotation_vector(R.matrix()).norm()
+    }
+
+    /// Second algorithm: central differences of the poses and of the first derivative.
+    fn assert_derivatives(curve: &ToolCurve, bound: f64) -> Result<(), TestCaseError> {
+        for k in 1..8 {
+            let (s, h) = (curve.length() * f64::from(k) / 8.0, 1e-4 * curve.length());
+            let (low, mid, high) = (curve.at(s - h), curve.at(s), curve.at(s + h));
+            let dp = (high.X.translation.vector - low.X.translation.vector) / (2.0 * h);
+            let R = high.X.rotation.matrix() * low.X.rotation.matrix().transpose();
+            let w = rotation_vector(&R) / (2.0 * h);
+            let A = (high.V - low.V) / (2.0 * h);
+            let V = Vector6::new(dp.x, dp.y, dp.z, w.x, w.y, w.z);
+            let scale = 1.0 + mid.V.norm() + mid.A.norm() * curve.length();
+            prop_assert!((V - mid.V).norm() <= bound * scale, "V {:.2e} of {scale}", (V - mid.V).norm());
+            prop_assert!((A - mid.A).norm() * curve.length() <= bound * scale, "A {:.2e}", (A - mid.A).norm());
+        }
+        Ok(())
+    }
+
+    proptest! {
+        #[test]
+        fn a_line_meets_both_poses_and_turns_evenly(a in prop::array::uniform6(-1.0..1.0f64), b in prop::array::uniform6(-1.0..1.0f64)) {
+            let (X0, X1) = (pose(a), pose(b));
+            let line = ToolCurve::line(&X0, &X1);
+            prop_assert!(apart(&line.at(0.0).X, &X0) < 1e-14);
+            prop_assert!(apart(&line.at(line.length()).X, &X1) < 1e-12); // measured 6e-16
+            prop_assert_eq!(line.at(0.1).V, line.at(0.3).V);
+            assert_derivatives(&line, 1e-7)?;
+        }
+
+        /// Truth: every point is as far from the centre as the three given ones, and the target is met.
+        #[test]
+        fn an_arc_passes_its_three_points_at_one_distance_from_its_centre(
+            a in prop::array::uniform6(-1.0..1.0f64), b in prop::array::uniform6(-1.0..1.0f64),
+            via in prop::array::uniform3(-1.0..1.0f64), with_path in any::<bool>(), by_via in any::<bool>(),
+        ) {
+            let (X0, X1, via) = (pose(a), pose(b), Vector3::from(via));
+            let (u, v) = (via - X0.translation.vector, X1.translation.vector - X0.translation.vector);
+            prop_assume!(u.cross(&v).norm() > 0.05);
+            let R_via = Rotation3::new(Vector3::new(0.1, -0.2, 0.3)) * X0.rotation;
+            let arc = ToolCurve::arc(&X0, &via, by_via.then_some(&R_via), &X1, None, with_path).unwrap();
+            prop_assert!(apart(&arc.at(0.0).X, &X0) < 1e-12);
+            prop_assert!(apart(&arc.at(arc.length()).X, &X1) < 1e-10); // measured 4e-14
+            let nearest = |target: &Vector3<f64>| (0..=20000)
+                .map(|k| (arc.at(arc.length() * f64::from(k) / 2e4).X.translation.vector - target).norm())
+                .fold(f64::INFINITY, f64::min);
+            prop_assert!(nearest(&via) < 1e-4 * arc.length());
+            prop_assert!((arc.at(0.4 * arc.length()).V.fixed_rows::<3>(0).norm() - 1.0).abs() < 1e-12);
+            assert_derivatives(&arc, 1e-6)?;
+        }
+
+        #[test]
+        fn a_quintic_between_two_jets_has_both(
+            a in prop::array::uniform6(-1.0..1.0f64), b in prop::array::uniform6(-1.0..1.0f64),
+            v in prop::array::uniform6(-1.0..1.0f64), w in prop::array::uniform6(-1.0..1.0f64),
+            c in prop::array::uniform6(-1.0..1.0f64), d in prop::array::uniform6(-1.0..1.0f64),
+        ) {
+            let jet = |x, v, a| ToolJet { X: pose(x), V: Vector6::from(v), A: Vector6::from(a) };
+            let (start, end) = (jet(a, v, c), jet(b, w, d));
+            let curve = ToolCurve::between(&start, &end, 1.3);
+            for (found, truth) in [(curve.at(0.0), start), (curve.at(1.3), end)] {
+                prop_assert!(apart(&found.X, &truth.X) < 1e-11);
+                prop_assert!((found.V - truth.V).norm() < 1e-10); // measured 2e-14
+                prop_assert!((found.A - truth.A).norm() < 1e-9);
+            }
+            assert_derivatives(&curve, 2e-4)?;
+        }
+    }
+
+    /// Truth: a quarter circle of radius 1 about z from (1,0,0), continued to three quarters.
+    #[test]
+    fn an_angle_carries_an_arc_beyond_its_third_point_and_the_orientation_with_it() {
+        let X0 = Pose::from_parts(Translation3::new(1.0, 0.0, 0.0), Rotation3::identity());
+        let half = std::f64::consts::FRAC_1_SQRT_2;
+        let via = Vector3::new(half, half, 0.0);
+        let quarter = std::f64::consts::FRAC_PI_2;
+        let X1 = Pose::from_parts(Translation3::new(0.0, 1.0, 0.0), Rotation3::new(Vector3::z() * quarter));
+        for with_path in [false, true] {
+            let arc = ToolCurve::arc(&X0, &via, None, &X1, Some(3.0 * quarter), with_path).unwrap();
+            let end =
+                Pose::from_parts(Translation3::new(0.0, -1.0, 0.0), Rotation3::new(Vector3::z() * (3.0 * quarter)));
+            assert!(apart(&arc.at(arc.length()).X, &end) < 1e-14);
+            assert!((arc.length() - 3.0 * quarter).abs() < 1e-14);
+        }
+        // The other way round.
+        let back = ToolCurve::arc(&X0, &via, None, &X1, Some(-quarter), false).unwrap();
+        assert!((back.at(back.length()).X.translation.vector - Vector3::new(0.0, -1.0, 0.0)).norm() < 1e-14);
+        let line = Vector3::new(0.5, 0.5, 0.0);
+        assert_eq!(ToolCurve::arc(&X0, &line, None, &X1, None, false), Err(ArcError::Straight));
+    }
+}

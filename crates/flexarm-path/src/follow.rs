@@ -1,0 +1,280 @@
+//! Joints along a path of the tool: values and two derivatives by the parameter, by continuation from where the path begins.
+//!
+//! ```text
+//! J q' = V,    J q'' = A - J' q',    V, A: derivatives of the tool's pose by s
+//! ```
+//! From one point to the next the joints are predicted by their Taylor polynomial and corrected by Newton's method; steps are
+//! halved where the two disagree, so that the branch of the inverse kinematics is kept. An arm with fewer than six joints
+//! follows paths that it can follow (least squares, and a check); of an arm with more, joints are held until six are left.
+//!
+//! Start at [`Follower::start`], then [`Follower::advance`].
+
+use flexarm_kinematics::{
+    Data, Frame, Model, State, forward_kinematics, forward_kinematics_velocity, frame_jacobian,
+    frame_jacobian_derivative,
+};
+use flexarm_spatial::{Pose, rotation_vector};
+use nalgebra::{DMatrix, DVector, Matrix6xX, Vector6};
+
+use crate::curve::{TURN_LENGTH, ToolCurve, ToolJet};
+
+/// Newton's method has arrived below this, m and rad.
+const ARRIVED: f64 = 1e-12;
+/// An arm with fewer than six joints follows a path whose rest is below this, m and rad.
+const FOLLOWED: f64 = 1e-9;
+/// Prediction and correction may differ by this, rad or m, before a step is halved.
+const SURPRISE: f64 = 0.03;
+/// Shortest step along a path before it counts as blocked, of its length.
+const SHORTEST: f64 = 1e-7;
+/// Most corrections of a point.
+const CORRECTIONS: usize = 12;
+
+/// Values of all independent coordinates with their derivatives by the parameter of the path.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JointJet {
+    /// rad or m.
+    pub q: DVector<f64>,
+    /// First derivative.
+    pub d: DVector<f64>,
+    /// Second derivative.
+    pub dd: DVector<f64>,
+}
+
+/// The joints cannot follow the tool.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Blocked {
+    /// Parameter up to which they could.
+    pub s: f64,
+    /// Least singular value of the Jacobian there (rotation counted with [`TURN_LENGTH`]), m/rad.
+    pub sigma: f64,
+    /// Joint that would have to turn fastest there.
+    pub joint: String,
+    /// Whether the tool could not be followed because the arm has too few joints for its orientation or position.
+    pub too_few_joints: bool,
+}
+
+/// An arm whose frame follows a path.
+pub struct Follower<'m> {
+    model: &'m Model,
+    frame: Frame,
+    data: Data,
+    state: State,
+    J: Matrix6xX<f64>,
+    Jdot: Matrix6xX<f64>,
+    /// Coordinates that follow, ascending.
+    active: Vec<usize>,
+}
+
+/// Coordinates that move a frame, ascending.
+pub fn coordinates_of(model: &Model, frame: &Frame) -> Vec<usize> {
+    let mut data = Data::new(model);
+    let mut J = Matrix6xX::zeros(model.nv());
+    // At a pose that is special for no arm.
+    let q = DVector::from_fn(model.nv(), |k, _| if k < model.n_actuated() { 0.3 + 0.17 * k as f64 } else { 0.0 });
+    forward_kinematics(model, &mut data, &q);
+    frame_jacobian(model, &data, frame, &mut J);
+    (0..model.n_actuated()).filter(|&k| J.column(k).norm() > 1e-12).collect()
+}
+
+impl<'m> Follower<'m> {
+    /// For a frame of a model, at joint values from which the joints to hold are chosen: of an arm with more than six joints,
+    /// those without which the rest moves the tool best.
+    ///
+    /// * `q`: all independent coordinates.
+    pub fn new(model: &'m Model, frame: &Frame, q: &DVector<f64>) -> Self {
+        let mut follower = Self {
+            model,
+            frame: frame.clone(),
+            data: Data::new(model),
+            state: State::zeros(model),
+            J: Matrix6xX::zeros(model.nv()),
+            Jdot: Matrix6xX::zeros(model.nv()),
+            active: coordinates_of(model, frame),
+        };
+        while follower.active.len() > 6 {
+            follower.hold_one(q);
+        }
+        follower
+    }
+
+    /// Joints that stay while the others follow, of an arm with more than six.
+    pub fn held(&self) -> Vec<usize> {
+        let moving = coordinates_of(self.model, &self.frame);
+        moving.into_iter().filter(|k| !self.active.contains(k)).collect()
+    }
+
+    /// Leaves out the joint without which the least singular value is largest.
+    fn hold_one(&mut self, q: &DVector<f64>) {
+        forward_kinematics(self.model, &mut self.data, q);
+        frame_jacobian(self.model, &self.data, &self.frame, &mut self.J);
+        let without = |k: usize| {
+            let rest: Vec<usize> = self.active.iter().copied().filter(|&c| c != k).collect();
+            self.scaled(&rest).singular_values().min()
+        };
+        let best = self.active.iter().copied().max_by(|&a, &b| without(a).total_cmp(&without(b)));
+        self.active.retain(|&k| Some(k) != best);
+    }
+
+    /// Columns of the last Jacobian, rotation in metres.
+    fn scaled(&self, columns: &[usize]) -> DMatrix<f64> {
+        DMatrix::from_fn(6, columns.len(), |r, c| self.J[(r, columns[c])] * if r < 3 { 1.0 } else { TURN_LENGTH })
+    }
+
+    /// Solution of `J x = b` over the active joints (least squares if there are fewer than six).
+    fn solve(&self, b: &Vector6<f64>) -> Option<DVector<f64>> {
+        let scaled = DVector::from_fn(6, |r, _| b[r] * if r < 3 { 1.0 } else { TURN_LENGTH });
+        let J = self.scaled(&self.active);
+        let x = if self.active.len() == 6 {
+            J.lu().solve(&scaled)?
+        } else {
+            let qr = J.qr();
+            let rhs = qr.q().tr_mul(&scaled);
+            qr.r().solve_upper_triangular(&rhs)?
+        };
+        x.iter().all(|x| x.is_finite()).then_some(x)
+    }
+
+    /// Joint values at which the frame has the pose, from values near by; `None` if Newton's method does not arrive.
+    fn correct(&mut self, X_WT: &Pose, q: &mut DVector<f64>) -> Option<()> {
+        let mut last = f64::INFINITY;
+        for _ in 0..CORRECTIONS {
+            forward_kinematics(self.model, &mut self.data, q);
+            let X = self.data.X_WF(&self.frame);
+            let p = X_WT.translation.vector - X.translation.vector;
+            let r = rotation_vector((X_WT.rotation * X.rotation.inverse()).matrix());
+            let error = p.norm().max(r.norm());
+            frame_jacobian(self.model, &self.data, &self.frame, &mut self.J);
+            // Rounding ends the descent of large arms a little above.
+            if error <= ARRIVED || (error <= FOLLOWED && error > 0.5 * last) {
+                return Some(());
+            }
+            let step = self.solve(&Vector6::new(p.x, p.y, p.z, r.x, r.y, r.z))?;
+            if step.amax() > 0.5 {
+                return None;
+            }
+            for (x, &k) in step.iter().zip(&self.active) {
+                q[k] += x;
+            }
+            last = error;
+        }
+        None
+    }
+
+    /// Values and derivatives where the tool is `tool`, from values near by.
+    fn jet(&mut self, tool: &ToolJet, near: &DVector<f64>) -> Option<JointJet> {
+        let mut q = near.clone();
+        self.correct(&tool.X, &mut q)?;
+        let mut d = DVector::zeros(q.len());
+        for (x, &k) in self.solve(&tool.V)?.iter().zip(&self.active) {
+            d[k] = *x;
+        }
+        self.state.q.copy_from(&q);
+        self.state.qdot.copy_from(&d);
+        forward_kinematics_velocity(self.model, &mut self.data, &self.state);
+        frame_jacobian_derivative(self.model, &self.data, &self.state, &self.frame, &mut self.Jdot);
+        let bias: Vector6<f64> = (&self.Jdot * &d).fixed_rows::<6>(0).into();
+        let mut dd = DVector::zeros(q.len());
+        for (x, &k) in self.solve(&(tool.A - bias))?.iter().zip(&self.active) {
+            dd[k] = *x;
+        }
+        Some(JointJet { q, d, dd })
+    }
+
+    /// Least singular value of the Jacobian at the last point, m/rad.
+    pub fn sigma(&self) -> f64 {
+        self.scaled(&self.active).singular_values().min()
+    }
+
+    /// Values and derivatives where a curve begins at `s`, from joint values that bring the tool there or near.
+    ///
+    /// # Errors
+    /// [`Blocked`]: the pose is not met near these values, or the arm is singular there.
+    pub fn start(&mut self, curve: &ToolCurve, s: f64, q: &DVector<f64>) -> Result<JointJet, Blocked> {
+        self.jet(&curve.at(s), q).ok_or_else(|| self.blocked(s, q))
+    }
+
+    /// Values and derivatives at `to`, from those at `from`; either may be the larger.
+    ///
+    /// # Errors
+    /// [`Blocked`]: the arm cannot reach that far on this branch, or passes a singular pose.
+    pub fn advance(&mut self, curve: &ToolCurve, from: f64, at: &JointJet, to: f64) -> Result<JointJet, Blocked> {
+        let shortest = SHORTEST * curve.length().max((to - from).abs());
+        let (mut s, mut jet, mut h) = (from, at.clone(), to - from);
+        while s != to {
+            let next = if (to - s).abs() <= h.abs() { to } else { s + h };
+            let step = next - s;
+            let predicted = &jet.q + &jet.d * step + &jet.dd * (0.5 * step * step);
+            let moved = (&predicted - &jet.q).amax() <= 0.5;
+            let found = if moved { self.jet(&curve.at(next), &predicted) } else { None };
+            match found.filter(|found| (&found.q - &predicted).amax() <= SURPRISE) {
+                Some(found) => (s, jet, h) = (next, found, 2.0 * h),
+                None if 0.5 * step.abs() < shortest => return Err(self.blocked(s, &jet.q)),
+                None => h = 0.5 * step,
+            }
+        }
+        Ok(jet)
+    }
+
+    fn blocked(&mut self, s: f64, q: &DVector<f64>) -> Blocked {
+        forward_kinematics(self.model, &mut self.data, q);
+        frame_jacobian(self.model, &self.data, &self.frame, &mut self.J);
+        let svd = self.scaled(&self.active).svd(false, true);
+        let least = svd.singular_values.imin();
+        let fastest = svd.v_t.as_ref().map_or(0, |v| v.row(least).transpose().iamax());
+        let joint = self.active.get(fastest).map_or_else(String::new, |&k| self.model.coordinates()[k].joint.clone());
+        Blocked { s, sigma: svd.singular_values[least], joint, too_few_joints: self.active.len() < 6 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flexarm_testkit::reference_arm;
+    use nalgebra::{Rotation3, Translation3, Vector3};
+
+    fn arm() -> (Model, Frame, DVector<f64>) {
+        let model = Model::new(&reference_arm(false).mechanism).unwrap();
+        let frame = model.frame("tcp").unwrap().clone();
+        let q = DVector::from_vec(vec![0.2, 0.5, 0.7, 0.3, 0.8, -0.4]);
+        (model, frame, q)
+    }
+
+    fn pose_at(model: &Model, frame: &Frame, q: &DVector<f64>) -> Pose {
+        let mut data = Data::new(model);
+        forward_kinematics(model, &mut data, q);
+        data.X_WF(frame)
+    }
+
+    /// Truth: forward kinematics, and differences of the joints themselves.
+    #[test]
+    fn joints_follow_a_line_with_their_derivatives() {
+        let (model, frame, q) = arm();
+        let X0 = pose_at(&model, &frame, &q);
+        let turned = Rotation3::new(Vector3::new(0.2, -0.3, 0.1)) * X0.rotation;
+        let X1 = Pose::from_parts(Translation3::from(X0.translation.vector + Vector3::new(0.1, -0.2, 0.1)), turned);
+        let line = ToolCurve::line(&X0, &X1);
+        let mut follower = Follower::new(&model, &frame, &q);
+        let start = follower.start(&line, 0.0, &q).unwrap();
+        let end = follower.advance(&line, 0.0, &start, line.length()).unwrap();
+        let X = pose_at(&model, &frame, &end.q);
+        assert!((X.translation.vector - X1.translation.vector).norm() < 1e-12); // measured 1e-16
+        let middle = 0.4 * line.length();
+        let at = |follower: &mut Follower, s: f64| follower.advance(&line, 0.0, &start, s).unwrap();
+        let (h, mid) = (1e-4, at(&mut follower, middle));
+        let (low, high) = (at(&mut follower, middle - h), at(&mut follower, middle + h));
+        assert!(((&high.q - &low.q) / (2.0 * h) - &mid.d).amax() < 1e-6 * mid.d.amax());
+        assert!(((&high.d - &low.d) / (2.0 * h) - &mid.dd).amax() < 1e-5 * mid.dd.amax());
+    }
+
+    #[test]
+    fn a_line_that_leaves_the_reach_is_blocked_where_the_arm_is_stretched() {
+        let (model, frame, q) = arm();
+        let X0 = pose_at(&model, &frame, &q);
+        let far = X0.translation.vector + X0.translation.vector.normalize() * 20.0;
+        let line = ToolCurve::line(&X0, &Pose::from_parts(Translation3::from(far), X0.rotation));
+        let mut follower = Follower::new(&model, &frame, &q);
+        let start = follower.start(&line, 0.0, &q).unwrap();
+        let blocked = follower.advance(&line, 0.0, &start, line.length()).unwrap_err();
+        assert!(blocked.s > 0.0 && blocked.s < 20.0 && blocked.sigma < 0.05, "{blocked:?}");
+    }
+}

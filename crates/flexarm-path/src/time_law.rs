@@ -1,0 +1,344 @@
+//! How fast a path is run: the least time within bounds that are linear in the squared speed and the acceleration along it,
+//! and the same with accelerations that rise in a given time.
+//!
+//! ```text
+//! x = s'^2,  u = s'',     low <= a u + b x <= high at every point,   x <= x_max
+//! x(s + ds) = x + 2 u ds  between two points
+//! ```
+//! Backwards along the path the largest `x` from which the rest can be run, then forwards the largest `u` that stays below it:
+//! reachability analysis [Pham & Pham 2018]. Bounds hold at both ends of every interval. From a standstill no bound may be broken
+//! at `x = u = 0`.
+//!
+//! [`Law::smoothed`] is the moving average of the speed over a time T: the path stays, accelerations rise and fall in T, and the
+//! run lasts T longer.
+
+/// `low <= a u + b x <= high`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bound {
+    /// Factor of the acceleration along the path.
+    pub a: f64,
+    /// Factor of the squared speed.
+    pub b: f64,
+    /// Least value, not positive.
+    pub low: f64,
+    /// Greatest value, not negative.
+    pub high: f64,
+}
+
+/// What holds at a point of a path.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct PathPoint {
+    /// Parameter of the path, ascending from point to point.
+    pub s: f64,
+    /// Greatest squared speed; infinite where only the bounds rule.
+    pub x_max: f64,
+    /// Linear bounds.
+    pub bounds: Vec<Bound>,
+}
+
+/// The run cannot be timed.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum LawError {
+    /// Fewer than two points, or parameters that do not ascend.
+    #[error("a path needs two points or more, with ascending parameters (point {0})")]
+    Points(usize),
+    /// A bound does not allow to stand still, or speed and bounds leave no way on.
+    #[error("no speed along the path keeps all bounds at point {0}")]
+    Infeasible(usize),
+}
+
+/// Below this part of the largest factor of `u` at a point a bound does not hold `u`.
+const NO_FACTOR: f64 = 1e-12;
+
+/// Bounds at a point and, for the interval that begins there, at its end: lines `u <= p + q x` and `u >= p + q x`.
+#[derive(Default)]
+struct Lines {
+    upper: Vec<[f64; 2]>,
+    lower: Vec<[f64; 2]>,
+    x_max: f64,
+}
+
+impl Lines {
+    /// Lines of a point with `ds` to the next one, whose bounds hold as well; from `goal` on the rest can be run.
+    fn fill(&mut self, here: &PathPoint, next: &PathPoint, goal: f64) {
+        let ds = next.s - here.s;
+        self.upper.clear();
+        self.lower.clear();
+        self.x_max = here.x_max;
+        self.add(&Bound { a: 2.0 * ds, b: 1.0, low: 0.0, high: goal });
+        for bound in &here.bounds {
+            self.add(bound);
+        }
+        for bound in &next.bounds {
+            // x of the next point is x + 2 u ds.
+            self.add(&Bound { a: bound.a + 2.0 * ds * bound.b, ..*bound });
+        }
+    }
+
+    fn add(&mut self, &Bound { a, b, low, high }: &Bound) {
+        if a.abs() <= NO_FACTOR * b.abs() || a == 0.0 {
+            let most = if b > 0.0 {
+                high / b
+            } else if b < 0.0 {
+                low / b
+            } else {
+                f64::INFINITY
+            };
+            self.x_max = self.x_max.min(most);
+            return;
+        }
+        let (at_low, at_high, slope) = (low / a, high / a, -b / a);
+        let (least, most) = if a > 0.0 { (at_low, at_high) } else { (at_high, at_low) };
+        if most.is_finite() {
+            self.upper.push([most, slope]);
+        }
+        if least.is_finite() {
+            self.lower.push([least, slope]);
+        }
+    }
+
+    /// Lowest upper and highest lower line at `x`.
+    fn tightest(&self, x: f64) -> ([f64; 2], [f64; 2]) {
+        let value = |line: &[f64; 2]| line[0] + line[1] * x;
+        let none = [f64::INFINITY, 0.0];
+        let upper = self.upper.iter().copied().min_by(|a, b| value(a).total_cmp(&value(b))).unwrap_or(none);
+        let lower = self.lower.iter().copied().max_by(|a, b| value(a).total_cmp(&value(b)));
+        (upper, lower.unwrap_or([f64::NEG_INFINITY, 0.0]))
+    }
+
+    /// Largest `x` at which some `u` is left: the gap between the lines is concave in `x`, so Newton's method from above ends
+    /// at the root after finitely many lines.
+    fn largest_x(&self) -> Option<f64> {
+        let mut x = self.x_max;
+        if x == f64::INFINITY {
+            // Somewhere beyond all crossings.
+            x = 1e18;
+        }
+        for _ in 0..200 {
+            let (upper, lower) = self.tightest(x);
+            let gap = upper[0] - lower[0] + (upper[1] - lower[1]) * x;
+            let size = (upper[0] + upper[1] * x).abs().max((lower[0] + lower[1] * x).abs());
+            if gap >= -1e-12 * size {
+                return Some(x.max(0.0));
+            }
+            let slope = upper[1] - lower[1];
+            let crossing = (lower[0] - upper[0]) / slope;
+            if !(slope < 0.0 && crossing >= -1e-12 && crossing < x) {
+                return None;
+            }
+            x = crossing.max(0.0);
+        }
+        None
+    }
+
+    /// Largest `u` at `x`, not below the least.
+    fn largest_u(&self, x: f64) -> f64 {
+        let (upper, lower) = self.tightest(x);
+        (upper[0] + upper[1] * x).max(lower[0] + lower[1] * x)
+    }
+}
+
+/// Squared speeds at the points of a path that is run in the least time, from `x = 0` to `x = 0`.
+///
+/// # Errors
+/// [`LawError`]: points out of order, bounds that cannot be kept.
+pub fn least_time(points: &[PathPoint]) -> Result<Vec<f64>, LawError> {
+    let n = points.len();
+    if n < 2 {
+        return Err(LawError::Points(n));
+    }
+    if let Some(k) = (1..n).find(|&k| !(points[k].s > points[k - 1].s)) {
+        return Err(LawError::Points(k));
+    }
+    // Backwards: from these the end can be reached.
+    let mut lines = Lines::default();
+    let mut reach = vec![0.0; n];
+    for k in (0..n - 1).rev() {
+        lines.fill(&points[k], &points[k + 1], reach[k + 1]);
+        reach[k] = lines.largest_x().ok_or(LawError::Infeasible(k))?;
+    }
+    // Forwards: as fast as that allows.
+    let mut x = vec![0.0; n];
+    for k in 0..n - 1 {
+        lines.fill(&points[k], &points[k + 1], reach[k + 1]);
+        let u = lines.largest_u(x[k]);
+        let ds = points[k + 1].s - points[k].s;
+        x[k + 1] = (x[k] + 2.0 * ds * u).clamp(0.0, reach[k + 1]);
+        if x[k] <= 0.0 && x[k + 1] <= 0.0 {
+            return Err(LawError::Infeasible(k));
+        }
+    }
+    Ok(x)
+}
+
+/// A run along a path: the speed is linear in time between the points, and may be averaged over a window.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Law {
+    t: Vec<f64>,
+    s: Vec<f64>,
+    v: Vec<f64>,
+    /// Integral of `s` from the start to each point.
+    integral: Vec<f64>,
+    /// Width of the moving average, s; 0 for none.
+    window: f64,
+}
+
+/// Parameter of a path with its derivatives by time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Progress {
+    /// Parameter.
+    pub s: f64,
+    /// 1/s times its unit.
+    pub v: f64,
+    /// 1/s².
+    pub a: f64,
+    /// 1/s³, just after the time.
+    pub j: f64,
+}
+
+impl Law {
+    /// The run with squared speeds `x` at the parameters `s`.
+    ///
+    /// # Panics
+    /// Unless both are equally long.
+    pub fn new(s: &[f64], x: &[f64]) -> Self {
+        assert_eq!(s.len(), x.len(), "a speed at each point");
+        let v: Vec<f64> = x.iter().map(|x| x.sqrt()).collect();
+        let (mut t, mut integral) = (vec![0.0], vec![0.0]);
+        for k in 1..s.len() {
+            let dt = 2.0 * (s[k] - s[k - 1]) / (v[k] + v[k - 1]);
+            t.push(t[k - 1] + dt);
+            // s is a parabola in between.
+            let a = (v[k] - v[k - 1]) / dt;
+            integral.push(integral[k - 1] + dt * (s[k - 1] + dt * (v[k - 1] / 2.0 + dt * a / 6.0)));
+        }
+        Self { t, s: s.to_vec(), v, integral, window: 0.0 }
+    }
+
+    /// The same path with the speed averaged over `window` seconds.
+    #[must_use]
+    pub fn smoothed(self, window: f64) -> Self {
+        Self { window, ..self }
+    }
+
+    /// How long it lasts, s.
+    pub fn duration(&self) -> f64 {
+        self.t[self.t.len() - 1] + self.window
+    }
+
+    /// Times at which the acceleration or its rate may jump, ascending, with start and end.
+    pub fn knots(&self) -> Vec<f64> {
+        let mut knots = self.t.clone();
+        if self.window > 0.0 {
+            knots.extend(self.t.iter().map(|t| t + self.window));
+            knots.sort_unstable_by(f64::total_cmp);
+        }
+        knots
+    }
+
+    /// Integral of s, s, speed and acceleration just after `t`, without the average.
+    fn raw(&self, t: f64) -> [f64; 4] {
+        let last = self.t.len() - 1;
+        if t < 0.0 {
+            return [t * self.s[0], self.s[0], 0.0, 0.0];
+        }
+        if t >= self.t[last] {
+            return [self.integral[last] + (t - self.t[last]) * self.s[last], self.s[last], 0.0, 0.0];
+        }
+        let k = self.t.partition_point(|&knot| knot <= t).clamp(1, last) - 1;
+        let (dt, tau) = (self.t[k + 1] - self.t[k], t - self.t[k]);
+        let (s, v, a) = (self.s[k], self.v[k], (self.v[k + 1] - self.v[k]) / dt);
+        let integral = self.integral[k] + tau * (s + tau * (v / 2.0 + tau * a / 6.0));
+        [integral, s + tau * (v + tau * a / 2.0), v + a * tau, a]
+    }
+
+    /// Where the run is at `t` (s).
+    pub fn at(&self, t: f64) -> Progress {
+        let [integral, s, v, a] = self.raw(t);
+        if self.window <= 0.0 {
+            return Progress { s, v, a, j: 0.0 };
+        }
+        let [before, s0, v0, a0] = self.raw(t - self.window);
+        let T = self.window;
+        Progress { s: (integral - before) / T, v: (s - s0) / T, a: (v - v0) / T, j: (a - a0) / T }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn straight(n: usize, length: f64, speed: f64, acceleration: f64) -> Vec<PathPoint> {
+        let bound = Bound { a: 1.0, b: 0.0, low: -acceleration, high: acceleration };
+        (0..=n)
+            .map(|k| PathPoint { s: length * k as f64 / n as f64, x_max: speed * speed, bounds: vec![bound] })
+            .collect()
+    }
+
+    fn timed(points: &[PathPoint]) -> Law {
+        let s: Vec<f64> = points.iter().map(|p| p.s).collect();
+        Law::new(&s, &least_time(points).unwrap())
+    }
+
+    /// Truth: the trapezoid, L/v + v/a; the triangle, 2 sqrt(L/a).
+    #[test]
+    fn a_straight_path_is_run_as_a_trapezoid_or_a_triangle() {
+        let trapezoid = timed(&straight(400, 2.0, 0.5, 1.0));
+        assert!((trapezoid.duration() - 4.5).abs() < 1e-12, "{}", trapezoid.duration()); // measured 8.9e-16
+        // The peak of the triangle is a grid point.
+        let triangle = timed(&straight(400, 2.0, 100.0, 2.0));
+        assert!((triangle.duration() - 2.0).abs() < 1e-10, "{}", triangle.duration()); // measured 2.0e-12
+    }
+
+    /// Truth: one joint over q = s² + s, from 0 to 2, with an acceleration of 1 at most: 2 sqrt(2), whatever s is.
+    #[test]
+    fn a_curved_parameter_changes_nothing_of_the_least_time() {
+        let point = |k: usize| {
+            let s = k as f64 / 2000.0;
+            PathPoint {
+                s,
+                x_max: f64::INFINITY,
+                bounds: vec![Bound { a: 2.0 * s + 1.0, b: 2.0, low: -1.0, high: 1.0 }],
+            }
+        };
+        let law = timed(&(0..=2000).map(point).collect::<Vec<_>>());
+        let error = (law.duration() - 8f64.sqrt()).abs();
+        assert!(error < 1e-3, "{error:.1e}"); // measured 2.4e-4
+    }
+
+    /// Truth: the average has the exact path length, ends T later, and its acceleration is at most that of the trapezoid and
+    /// rises at a/T.
+    #[test]
+    fn a_smoothed_law_is_an_s_curve() {
+        let law = timed(&straight(400, 2.0, 0.5, 1.0)).smoothed(0.1);
+        assert!((law.duration() - 4.6).abs() < 1e-12);
+        assert!((law.at(4.6).s - 2.0).abs() < 1e-12 && law.at(4.6).v.abs() < 1e-12);
+        assert!((law.at(0.05).a - 0.5).abs() < 1e-9 && (law.at(0.05).j - 10.0).abs() < 1e-9);
+        assert!((law.at(2.0).v - 0.5).abs() < 1e-12);
+        // Second algorithm: differences.
+        for k in 1..460 {
+            let (t, h) = (0.01 * f64::from(k) + 0.0033, 1e-5);
+            let (low, mid, high) = (law.at(t - h), law.at(t), law.at(t + h));
+            assert!(((high.s - low.s) / (2.0 * h) - mid.v).abs() < 1e-8);
+            assert!(((high.v - low.v) / (2.0 * h) - mid.a).abs() < 1e-4);
+        }
+    }
+
+    #[test]
+    fn a_slow_place_in_the_middle_is_braked_for() {
+        let mut points = straight(1000, 2.0, 1.0, 2.0);
+        points[500].x_max = 0.01;
+        let law = timed(&points);
+        // Truth: two runs of 1 m between 0, 1 and 0.1 m/s: (1/2 + 1 + 1/2 ...) by hand.
+        let run = 0.5 + (1.0 - 0.25 - (1.0 - 0.01) / 4.0) / 1.0 + (1.0 - 0.1) / 2.0;
+        // The corner of the speed lies between two points.
+        assert!((law.duration() - 2.0 * run).abs() < 1e-5); // measured 1.5e-6
+    }
+
+    #[test]
+    fn a_bound_that_a_standstill_breaks_is_told_with_its_point() {
+        let mut points = straight(10, 1.0, 1.0, 1.0);
+        points[4].bounds.push(Bound { a: 1.0, b: 0.0, low: 2.0, high: 3.0 });
+        assert!(matches!(least_time(&points), Err(LawError::Infeasible(3 | 4))));
+    }
+}
