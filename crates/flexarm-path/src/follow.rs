@@ -180,6 +180,14 @@ impl<'m> Follower<'m> {
         Some(JointJet { q, d, dd })
     }
 
+    /// How far the frame is from a curve's pose at `s`, m and rad, whichever is more.
+    pub fn distance(&mut self, curve: &ToolCurve, s: f64, q: &DVector<f64>) -> f64 {
+        forward_kinematics(self.model, &mut self.data, q);
+        let (X, target) = (self.data.X_WF(&self.frame), curve.at(s).X);
+        let p = target.translation.vector - X.translation.vector;
+        p.norm().max(rotation_vector((target.rotation * X.rotation.inverse()).matrix()).norm())
+    }
+
     /// Least singular value of the Jacobian at the last point, m/rad.
     pub fn sigma(&self) -> f64 {
         self.scaled(&self.active).singular_values().min()

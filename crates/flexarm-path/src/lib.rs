@@ -7,10 +7,16 @@
 #![allow(non_snake_case, reason = "monogram notation: X_WT, R_AB; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test stops at the first failure"))]
 
+mod branch;
 mod curve;
 mod follow;
+mod legs;
+mod plan;
 pub mod program;
+mod route;
+mod schedule;
 pub mod time_law;
 
 pub use curve::{ArcError, TURN_LENGTH, ToolCurve, ToolJet};
 pub use follow::{Blocked, Follower, JointJet, coordinates_of};
+pub use plan::{JointBounds, PathError, PathOptions, Planned, PlannedMove, ProgramArm, Slowed, SlowedBy, plan};

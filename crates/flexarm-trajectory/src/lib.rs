@@ -73,6 +73,6 @@ pub use limits::{JointLimits, LimitKind, LimitViolation};
 pub use peak::{Extreme, JointPeak};
 pub use plan::{MotionLimits, Plan, PlannedMove, Profile};
 pub use problem::{PlanError, Problem, SampleError};
-pub use spline::{JointSamples, Samples};
+pub use spline::{JointKnots, JointSamples, Samples};
 pub use trajectory::{Move, Trajectory, VelocityJump};
 pub use warning::Warning;

@@ -95,6 +95,46 @@ impl Samples {
     }
 }
 
+/// Exact values of one joint at knots: nothing is estimated, no corner is looked for.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct JointKnots {
+    /// Joint name.
+    pub name: String,
+    /// rad or m, one per knot.
+    pub position: Vec<f64>,
+    /// rad/s or m/s.
+    pub velocity: Vec<f64>,
+    /// rad/s² or m/s²: just before and just after each knot.
+    pub acceleration: Vec<[f64; 2]>,
+}
+
+impl Trajectory {
+    /// The quintics through values that are known with their rates, as a planner computes them.
+    ///
+    /// * `times`: s, strictly increasing; the first becomes `t = 0`.
+    ///
+    /// # Errors
+    /// [`TrajectoryError::Samples`] for fewer than two knots, values that are not finite, columns of another length, repeated names;
+    /// [`TrajectoryError::OutOfRange`] for values too extreme for f64.
+    pub fn through_knots(times: &[f64], joints: &[JointKnots]) -> Result<Self, TrajectoryError> {
+        let as_samples = |joint: &JointKnots| JointSamples {
+            name: joint.name.clone(),
+            position: joint.position.clone(),
+            velocity: Some(joint.velocity.clone()),
+            acceleration: Some(joint.acceleration.iter().map(|[before, after]| before + after).collect()),
+        };
+        Samples { times: times.to_vec(), joints: joints.iter().map(as_samples).collect() }.check()?;
+        let knots: Vec<f64> = times.iter().map(|t| t - times[0]).collect();
+        let curve = |joint: &JointKnots| {
+            let end = |k: usize, side: usize| [joint.position[k], joint.velocity[k], joint.acceleration[k][side]];
+            let piece = |k: usize| Piece::hermite(knots[k] - knots[k - 1], end(k - 1, 1), end(k, 0));
+            Curve { pieces: (1..knots.len()).map(piece).collect(), knots: knots.clone() }
+        };
+        let names = joints.iter().map(|joint| joint.name.clone()).collect();
+        Self::from_curves(names, joints.iter().map(curve).collect(), knots[knots.len() - 1], Vec::new())
+    }
+}
+
 impl JointSamples {
     fn check(&self, n: usize) -> Result<(), SampleError> {
         if self.acceleration.is_some() && self.velocity.is_none() {

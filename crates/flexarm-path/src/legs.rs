@@ -1,0 +1,375 @@
+//! From the moves of a program to ways from target to target, with the joints at both ends.
+
+use flexarm_kinematics::Frame;
+use flexarm_spatial::{Pose, rotation_vector};
+use nalgebra::{DVector, Vector3, Vector6};
+
+use crate::branch::{Branches, NoBranch};
+use crate::curve::{ToolCurve, ToolJet};
+use crate::follow::{Blocked, Follower, JointJet};
+use crate::plan::{PathError, PathOptions, ProgramArm};
+use crate::program::{Blend, Item, Move, MoveKind, Target};
+
+/// Joint moves shorter than this, rad or m, are none.
+const NO_WAY: f64 = 1e-12;
+/// Length that a radian counts in a joint move that does not move the tool, m.
+const JOINT_LENGTH: f64 = 0.5;
+
+/// Along which way a leg goes, over a parameter in metres.
+#[derive(Debug, Clone)]
+pub(crate) enum Way {
+    /// A frame of the arm along a curve.
+    Tool { curve: ToolCurve, frame: Frame },
+    /// All joints straight: `q0 + d s`.
+    Joints { q0: DVector<f64>, d: DVector<f64> },
+    /// The quintic between two joint jets.
+    Bridge { from: JointJet, to: JointJet },
+}
+
+/// One move: its way and the joints at both ends.
+#[derive(Debug, Clone)]
+pub(crate) struct Leg {
+    /// The move.
+    pub(crate) of: Move,
+    pub(crate) way: Way,
+    pub(crate) length: f64,
+    pub(crate) q0: DVector<f64>,
+    pub(crate) q1: DVector<f64>,
+    /// Knot of a spline: the next leg goes on smoothly.
+    pub(crate) smooth: bool,
+}
+
+/// Where the arm is, and what is said next.
+pub(crate) struct Start {
+    pub(crate) q: DVector<f64>,
+    /// First item that is still to be done.
+    pub(crate) first: usize,
+    /// Whether `q` is where the program is, not only near it.
+    pub(crate) known: bool,
+}
+
+impl Start {
+    /// Before the first move.
+    pub(crate) fn of(items: &[Item], arm: &ProgramArm<'_>) -> Result<Self, PathError> {
+        let first = items.iter().find_map(|item| match item {
+            Item::Move(first) => Some(first),
+            Item::Dwell { .. } => None,
+        });
+        let first = first.ok_or(PathError::NoMove)?;
+        if !arm.starts_at_rest && first.kind != MoveKind::Joint {
+            return Err(PathError::NoStart { line: first.line, statement: first.statement.clone() });
+        }
+        Ok(Self { q: arm.rest.clone(), first: 0, known: arm.starts_at_rest })
+    }
+}
+
+/// The arm and its workspaces while legs are made.
+pub(crate) struct Legs<'m> {
+    pub(crate) arm: ProgramArm<'m>,
+    pub(crate) options: PathOptions,
+    branches: Branches<'m>,
+    followers: Vec<(Pose, Follower<'m>)>,
+}
+
+impl<'m> Legs<'m> {
+    pub(crate) fn new(arm: &ProgramArm<'m>, options: &PathOptions) -> Self {
+        let branches = Branches::new(arm.model);
+        Self { arm: arm.clone(), options: *options, branches, followers: Vec::new() }
+    }
+
+    /// The flange with the tool of a move.
+    pub(crate) fn tool_frame(&self, of: &Move) -> Frame {
+        let X_FT = of.X_FT.unwrap_or(self.arm.X_FT);
+        Frame { X_BF: self.arm.flange.X_BF * X_FT, ..self.arm.flange.clone() }
+    }
+
+    /// The follower of a frame: one for each tool, so that a redundant arm holds the same joints.
+    pub(crate) fn follower(&mut self, frame: &Frame, q: &DVector<f64>) -> &mut Follower<'m> {
+        let found = self.followers.iter().position(|(X, _)| *X == frame.X_BF);
+        let k = found.unwrap_or_else(|| {
+            self.followers.push((frame.X_BF, Follower::new(self.arm.model, frame, q)));
+            self.followers.len() - 1
+        });
+        &mut self.followers[k].1
+    }
+
+    /// Names of joints that stay although they could move the tool.
+    pub(crate) fn held(&self) -> Vec<String> {
+        let mut held: Vec<usize> = self.followers.iter().flat_map(|(_, follower)| follower.held()).collect();
+        held.sort_unstable();
+        held.dedup();
+        held.into_iter().map(|k| self.arm.model.coordinates()[k].joint.clone()).collect()
+    }
+
+    /// Pose of a frame at joint values, in the model's world.
+    pub(crate) fn pose(&mut self, frame: &Frame, q: &DVector<f64>) -> Pose {
+        self.branches.pose(frame, q)
+    }
+
+    /// Legs from here to the next stop; `k` is left behind the last of them.
+    pub(crate) fn up_to_stop(
+        &mut self,
+        items: &[Item],
+        k: &mut usize,
+        start: &mut Start,
+        stops: &mut Vec<(usize, String)>,
+    ) -> Result<Vec<Leg>, PathError> {
+        let mut legs: Vec<Leg> = Vec::new();
+        while let Some(Item::Move(of)) = items.get(*k) {
+            check(of)?;
+            let group = spline_group(items, *k);
+            if group.is_empty() {
+                *k += 1;
+                legs.extend(self.leg(of, start)?);
+            } else {
+                *k += group.len();
+                legs.extend(self.spline(&group, start)?);
+            }
+            let last = &items[*k - 1];
+            let Item::Move(last) = last else { break };
+            if last.blend == Blend::Stop {
+                break;
+            }
+            if let Some(Item::Dwell { line, .. }) = items.get(*k) {
+                stops.push((*line, "a dwell follows, so the tool stops".to_owned()));
+            }
+        }
+        Ok(legs)
+    }
+
+    /// The way of one move; nothing if the arm is there already.
+    fn leg(&mut self, of: &Move, start: &mut Start) -> Result<Option<Leg>, PathError> {
+        if of.kind == MoveKind::Joint {
+            return self.joint_leg(of, start);
+        }
+        let frame = self.tool_frame(of);
+        let X0 = self.pose(&frame, &start.q);
+        let curve = self.tool_curve(of, &X0)?;
+        self.tool_leg(of, frame, curve, start)
+    }
+
+    fn tool_curve(&mut self, of: &Move, X0: &Pose) -> Result<ToolCurve, PathError> {
+        let X_MB = self.arm.X_MW * of.X_WB;
+        let X1 = match &of.to {
+            Target::Pose { X_BT, .. } => X_MB * X_BT,
+            // A line to joint values (movel with a list of joints): to the pose that they have.
+            Target::Joints(values) => {
+                let q = self.with_axes(of, values, &self.arm.rest.clone())?;
+                let frame = self.tool_frame(of);
+                self.pose(&frame, &q)
+            }
+        };
+        let MoveKind::Arc { via, via_rotation, angle, turns_with_path } = &of.kind else {
+            return Ok(ToolCurve::line(X0, &X1));
+        };
+        let via = (X_MB * nalgebra::Point3::from(*via)).coords;
+        let via_rotation = via_rotation.map(|R| X_MB.rotation * R);
+        ToolCurve::arc(X0, &via, via_rotation.as_ref(), &X1, *angle, *turns_with_path)
+            .map_err(|source| PathError::Arc { line: of.line, statement: of.statement.clone(), source })
+    }
+
+    /// Follows a curve once to its end, for the joints there.
+    fn tool_leg(
+        &mut self,
+        of: &Move,
+        frame: Frame,
+        curve: ToolCurve,
+        start: &mut Start,
+    ) -> Result<Option<Leg>, PathError> {
+        let length = curve.length();
+        if length <= 1e-9 {
+            return Ok(None);
+        }
+        let q0 = start.q.clone();
+        let follower = self.follower(&frame, &q0);
+        let begun = follower.start(&curve, 0.0, &q0);
+        let ended = begun.and_then(|jet| follower.advance(&curve, 0.0, &jet, length));
+        let q1 = ended.map_err(|blocked| blocked_error(of, &curve, blocked))?.q;
+        start.q.copy_from(&q1);
+        Ok(Some(Leg { of: of.clone(), way: Way::Tool { curve, frame }, length, q0, q1, smooth: false }))
+    }
+
+    /// Values of the controller's axes put into all coordinates.
+    fn with_axes(&self, of: &Move, values: &[f64], q: &DVector<f64>) -> Result<DVector<f64>, PathError> {
+        let (found, axes) = (values.len(), self.arm.axes.len());
+        if found > axes {
+            return Err(PathError::Axes { line: of.line, statement: of.statement.clone(), found, axes });
+        }
+        let mut q = q.clone();
+        for (value, &k) in values.iter().zip(&self.arm.axes) {
+            q[k] = *value;
+        }
+        Ok(q)
+    }
+
+    fn joint_leg(&mut self, of: &Move, start: &mut Start) -> Result<Option<Leg>, PathError> {
+        let frame = self.tool_frame(of);
+        let q1 = match &of.to {
+            Target::Joints(values) => self.with_axes(of, values, &start.q)?,
+            Target::Pose { X_BT, configuration } => {
+                let X = self.arm.X_MW * of.X_WB * X_BT;
+                let choice = self.branches.choose(&frame, &X, configuration, &start.q, &self.arm.axes);
+                choice.map_err(|NoBranch(why)| PathError::Unreachable {
+                    line: of.line,
+                    statement: of.statement.clone(),
+                    why,
+                })?
+            }
+        };
+        let q0 = std::mem::replace(&mut start.q, q1.clone());
+        if !std::mem::replace(&mut start.known, true) {
+            return Ok(None);
+        }
+        let step = &q1 - &q0;
+        if step.amax() <= NO_WAY {
+            return Ok(None);
+        }
+        let length = self.travel(&frame, &q0, &step).max(JOINT_LENGTH * step.amax());
+        let way = Way::Joints { q0: q0.clone(), d: step / length };
+        Ok(Some(Leg { of: of.clone(), way, length, q0, q1, smooth: false }))
+    }
+
+    /// Length of the tool's path in a joint move, m, by chords.
+    fn travel(&mut self, frame: &Frame, q0: &DVector<f64>, step: &DVector<f64>) -> f64 {
+        const CHORDS: usize = 16;
+        let mut point = |k: usize| {
+            let q = q0 + step * (k as f64 / CHORDS as f64);
+            self.pose(frame, &q).translation.vector
+        };
+        let points: Vec<Vector3<f64>> = (0..=CHORDS).map(&mut point).collect();
+        points.windows(2).map(|pair| (pair[1] - pair[0]).norm()).sum()
+    }
+
+    /// Pieces of a spline through the targets of moves that follow each other.
+    fn spline(&mut self, group: &[&Move], start: &mut Start) -> Result<Vec<Leg>, PathError> {
+        let frame = self.tool_frame(group[0]);
+        let mut poses = vec![self.pose(&frame, &start.q)];
+        let mut owners: Vec<&Move> = Vec::new();
+        for of in group {
+            let Target::Pose { X_BT, .. } = &of.to else {
+                let why = "a spline goes through poses, not through joint values".to_owned();
+                return Err(PathError::Unreachable { line: of.line, statement: of.statement.clone(), why });
+            };
+            let X = self.arm.X_MW * of.X_WB * X_BT;
+            let last = &poses[poses.len() - 1];
+            if (X.translation.vector - last.translation.vector).norm() > 1e-9 {
+                poses.push(X);
+                owners.push(of);
+            }
+        }
+        let mut legs = Vec::new();
+        for (k, curve) in spline_curves(&poses).into_iter().enumerate() {
+            let leg = self.tool_leg(owners[k], frame.clone(), curve, start)?;
+            legs.extend(leg.map(|leg| Leg { smooth: k + 1 < owners.len(), ..leg }));
+        }
+        Ok(legs)
+    }
+}
+
+/// Moves from `k` on that are knots of one spline: same tool and base kinds of moves that follow each other.
+fn spline_group(items: &[Item], k: usize) -> Vec<&Move> {
+    let knot = |item: &'_ Item| matches!(item, Item::Move(of) if of.kind == MoveKind::Spline);
+    let mut group: Vec<&Move> = Vec::new();
+    for item in items[k..].iter().take_while(|item| knot(item)) {
+        let Item::Move(of) = item else { break };
+        if group.first().is_some_and(|first| first.X_FT != of.X_FT) {
+            break;
+        }
+        group.push(of);
+        // A stop within the block ends the curve.
+        if of.blend == Blend::Stop {
+            break;
+        }
+    }
+    group
+}
+
+/// The natural cubic spline through positions over their chords, orientations with continuous rates.
+fn spline_curves(poses: &[Pose]) -> Vec<ToolCurve> {
+    let p: Vec<Vector3<f64>> = poses.iter().map(|X| X.translation.vector).collect();
+    let h: Vec<f64> = p.windows(2).map(|pair| (pair[1] - pair[0]).norm()).collect();
+    let n = h.len();
+    let second = natural_second_derivatives(&p, &h);
+    let turns: Vec<Vector3<f64>> = poses
+        .windows(2)
+        .zip(&h)
+        .map(|(pair, h)| rotation_vector((pair[1].rotation * pair[0].rotation.inverse()).matrix()) / *h)
+        .collect();
+    let jet = |k: usize| {
+        let rate = if k < n {
+            (p[k + 1] - p[k]) / h[k] - (second[k] * 2.0 + second[k + 1]) * (h[k] / 6.0)
+        } else {
+            (p[k] - p[k - 1]) / h[k - 1] + (second[k - 1] + second[k] * 2.0) * (h[k - 1] / 6.0)
+        };
+        let turn = match k {
+            0 => turns[0],
+            k if k == n => turns[n - 1],
+            k => (turns[k - 1] * h[k] + turns[k] * h[k - 1]) / (h[k - 1] + h[k]),
+        };
+        let six = |v: Vector3<f64>, w: Vector3<f64>| Vector6::new(v.x, v.y, v.z, w.x, w.y, w.z);
+        ToolJet { X: poses[k], V: six(rate, turn), A: six(second[k], Vector3::zeros()) }
+    };
+    (0..n).map(|k| ToolCurve::between(&jet(k), &jet(k + 1), h[k])).collect()
+}
+
+/// Second derivatives at the knots of the natural cubic spline (Thomas' algorithm).
+fn natural_second_derivatives(p: &[Vector3<f64>], h: &[f64]) -> Vec<Vector3<f64>> {
+    let n = h.len();
+    let mut second = vec![Vector3::zeros(); n + 1];
+    let (mut factor, mut rhs) = (vec![0.0; n + 1], vec![Vector3::zeros(); n + 1]);
+    for k in 1..n {
+        let right = ((p[k + 1] - p[k]) / h[k] - (p[k] - p[k - 1]) / h[k - 1]) * 6.0;
+        let pivot = 2.0 * (h[k - 1] + h[k]) - h[k - 1] * factor[k - 1];
+        factor[k] = h[k] / pivot;
+        rhs[k] = (right - rhs[k - 1] * h[k - 1]) / pivot;
+    }
+    for k in (1..n).rev() {
+        second[k] = rhs[k] - second[k + 1] * factor[k];
+    }
+    second
+}
+
+/// Numbers of a move that must be positive.
+fn check(of: &Move) -> Result<(), PathError> {
+    let speed = &of.speed;
+    let blend = match of.blend {
+        Blend::Distance(value) | Blend::Fraction(value) | Blend::Velocity(value) if value != 0.0 => Some(value),
+        _ => None,
+    };
+    let values = [
+        ("the speed of the path", speed.linear_m_s),
+        ("the acceleration of the path", speed.linear_m_s2),
+        ("the jerk of the path", speed.linear_m_s3),
+        ("the speed of turning", speed.angular_rad_s),
+        ("the acceleration of turning", speed.angular_rad_s2),
+        ("the part of the joint speeds", speed.joint_fraction),
+        ("the part of the joint accelerations", speed.joint_acceleration_fraction),
+        ("the joint speed", speed.joint_rad_s),
+        ("the joint acceleration", speed.joint_rad_s2),
+        ("the duration", speed.duration_s),
+        ("the size of the blend", blend),
+    ];
+    for (what, value) in values {
+        if let Some(value) = value.filter(|value| !(*value > 0.0 && value.is_finite())) {
+            return Err(PathError::Value { line: of.line, statement: of.statement.clone(), what, value });
+        }
+    }
+    Ok(())
+}
+
+/// A path that cannot be followed, as a sentence.
+pub(crate) fn blocked_error(of: &Move, curve: &ToolCurve, blocked: Blocked) -> PathError {
+    let part = 100.0 * blocked.s / curve.length();
+    let p = curve.at(blocked.s).X.translation.vector;
+    let place = format!("{part:.1} % of the way, at ({:.4}, {:.4}, {:.4}) m", p.x, p.y, p.z);
+    let why = if blocked.too_few_joints {
+        format!("the arm has too few joints to follow this path with its orientation beyond {place}")
+    } else {
+        format!(
+            "the arm cannot go on beyond {place}: it is out of reach or at a singular pose, where joint {:?} would have to move \
+             without bound (least singular value {:.1e} m/rad): move the path or the workpiece, or go there by a joint move",
+            blocked.joint, blocked.sigma
+        )
+    };
+    PathError::Blocked { line: of.line, statement: of.statement.clone(), blocked, why }
+}

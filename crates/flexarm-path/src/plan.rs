@@ -1,0 +1,270 @@
+//! From a program to joints over time: the public face of the planner, what it is told and what it tells.
+
+use flexarm_kinematics::{Frame, Model};
+use flexarm_spatial::Pose;
+use flexarm_trajectory::{JointKnots, Trajectory, TrajectoryError};
+use nalgebra::DVector;
+
+use crate::curve::ArcError;
+use crate::follow::Blocked;
+use crate::legs::{Legs, Start};
+use crate::program::{Item, Program};
+use crate::route::Route;
+use crate::schedule::{Knot, Schedule};
+
+/// What a joint may do while it follows a program.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct JointBounds {
+    /// rad/s or m/s, positive, may be infinite.
+    pub velocity: f64,
+    /// rad/s² or m/s², positive.
+    pub acceleration: f64,
+    /// N m or N of the rigid arm, positive; `None`: not looked at.
+    pub torque: Option<f64>,
+}
+
+/// How paths are resolved.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PathOptions {
+    /// Points of the time law are no further apart than this, m of path.
+    pub spacing_m: f64,
+    /// The joints leave the path by no more than this between points, m and rad.
+    pub chord_m: f64,
+    /// Accelerations rise and fall in this time, s; 0: they jump.
+    pub rise_s: f64,
+}
+
+impl Default for PathOptions {
+    fn default() -> Self {
+        Self { spacing_m: 5e-3, chord_m: 1e-10, rise_s: 0.05 }
+    }
+}
+
+/// The arm that runs a program, as its controller sees it.
+#[derive(Debug, Clone)]
+pub struct ProgramArm<'m> {
+    /// Rigid arm.
+    pub model: &'m Model,
+    /// Flange of the controller, F.
+    pub flange: Frame,
+    /// The robot's own tool on it, `X_FT`, where the program tells none.
+    pub X_FT: Pose,
+    /// The controller's world in the model's, `X_MW`.
+    pub X_MW: Pose,
+    /// Coordinates in the order in which the controller counts its axes.
+    pub axes: Vec<usize>,
+    /// One for each independent coordinate.
+    pub bounds: Vec<JointBounds>,
+    /// All independent coordinates before the program; joints that it does not move stay there.
+    pub rest: DVector<f64>,
+    /// Whether the program begins there; otherwise it begins where its first move ends.
+    pub starts_at_rest: bool,
+}
+
+/// What became of a move.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlannedMove {
+    /// Line in the program.
+    pub line: usize,
+    /// Statement.
+    pub statement: String,
+    /// First and last moment, s; with a blend, the middle of it.
+    pub span_s: [f64; 2],
+    /// Greatest speed of the tool centre point on its path, m/s (`None` for joint moves).
+    pub top_m_s: Option<f64>,
+    /// Programmed speed, m/s.
+    pub programmed_m_s: Option<f64>,
+    /// Where it is slower than programmed because a limit demands it: the worst place.
+    pub slowed: Option<Slowed>,
+    /// Least singular value of the Jacobian on the way, m/rad, with its moment, s; tool paths only.
+    pub least_sigma: Option<(f64, f64)>,
+    /// Distance from the target at which its corner is left, m; 0 at a stop.
+    pub blend_m: f64,
+}
+
+/// A place where a limit of the robot slows a move.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Slowed {
+    /// s from the start of the motion.
+    pub time_s: f64,
+    /// Part of the programmed speed, or of the joints' own limits.
+    pub part: f64,
+    /// What demands it.
+    pub by: SlowedBy,
+}
+
+/// What slows a move.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum SlowedBy {
+    /// Speed of a joint.
+    JointSpeed(String),
+    /// Acceleration of a joint where the path bends.
+    JointAcceleration(String),
+    /// Torque of a joint.
+    JointTorque(String),
+    /// Turning of the tool.
+    Turning,
+    /// Acceleration of the tool across its path.
+    PathAcceleration,
+}
+
+/// A program as a motion.
+#[derive(Debug, Clone)]
+pub struct Planned {
+    /// All actuated joints over time.
+    pub trajectory: Trajectory,
+    /// Move by move.
+    pub moves: Vec<PlannedMove>,
+    /// Corners that are stops although a blend was asked for: line and why.
+    pub stops: Vec<(usize, String)>,
+    /// Joints that stay although they could move the tool (redundant arms).
+    pub held: Vec<String>,
+}
+
+/// A program that this arm cannot run.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum PathError {
+    /// Nothing moves.
+    #[error("the program has no move")]
+    NoMove,
+    /// A tool path from nowhere.
+    #[error(
+        "line {line}: {statement}: the program begins with a move of the tool, and where it starts is not known: begin with a \
+         joint move, or tell a start"
+    )]
+    NoStart {
+        /// Line.
+        line: usize,
+        /// Statement.
+        statement: String,
+    },
+    /// More axes than the arm has.
+    #[error("line {line}: {statement}: {found} axis values for an arm of {axes} axes")]
+    Axes {
+        /// Line.
+        line: usize,
+        /// Statement.
+        statement: String,
+        /// Values.
+        found: usize,
+        /// Axes of the arm.
+        axes: usize,
+    },
+    /// No joint values.
+    #[error("line {line}: {statement}: no joint values bring the tool there: {why}")]
+    Unreachable {
+        /// Line.
+        line: usize,
+        /// Statement.
+        statement: String,
+        /// What was found.
+        why: String,
+    },
+    /// A path that leads out of reach or through a singular pose.
+    #[error("line {line}: {statement}: {why}")]
+    Blocked {
+        /// Line.
+        line: usize,
+        /// Statement.
+        statement: String,
+        /// Where and why, as numbers.
+        blocked: Blocked,
+        /// The same as a sentence.
+        why: String,
+    },
+    /// Three points that are no circle.
+    #[error("line {line}: {statement}: {source}")]
+    Arc {
+        /// Line.
+        line: usize,
+        /// Statement.
+        statement: String,
+        /// Which.
+        source: ArcError,
+    },
+    /// A number that is none, or not positive where it must be.
+    #[error("line {line}: {statement}: {what} is {value}: it must be a positive number")]
+    Value {
+        /// Line.
+        line: usize,
+        /// Statement.
+        statement: String,
+        /// Of what.
+        what: &'static str,
+        /// The number.
+        value: f64,
+    },
+    /// The time law.
+    #[error("line {line}: {statement}: {why}")]
+    Law {
+        /// Line of the first move up to the next stop.
+        line: usize,
+        /// Statement.
+        statement: String,
+        /// Why.
+        why: String,
+    },
+    /// Joints over time.
+    #[error(transparent)]
+    Trajectory(#[from] TrajectoryError),
+}
+
+/// The motion that a program asks for.
+///
+/// # Errors
+/// [`PathError`]: targets out of reach, paths through singular poses, statements that contradict each other.
+pub fn plan(program: &Program, arm: &ProgramArm<'_>, options: &PathOptions) -> Result<Planned, PathError> {
+    let mut legs = Legs::new(arm, options);
+    let mut knots: Vec<Knot> = Vec::new();
+    let (mut moves, mut stops, mut now) = (Vec::new(), Vec::new(), 0.0);
+    let items = &program.items;
+    let mut start = Start::of(items, arm)?;
+    let mut k = start.first;
+    while k < items.len() {
+        if let Item::Dwell { seconds, line } = &items[k] {
+            if !(*seconds >= 0.0 && seconds.is_finite()) {
+                let (line, what) = (*line, "a dwell");
+                return Err(PathError::Value { line, statement: String::new(), what, value: *seconds });
+            }
+            if *seconds > 0.0 {
+                knots.push(Knot::rest(now, &start.q));
+                now += seconds;
+                knots.push(Knot::rest(now, &start.q));
+            }
+            k += 1;
+            continue;
+        }
+        let legs_here = legs.up_to_stop(items, &mut k, &mut start, &mut stops)?;
+        for route in Route::all(&mut legs, legs_here, &mut stops)? {
+            let schedule = Schedule::new(&route, arm, options)?;
+            schedule.write(now, &mut knots, &mut moves);
+            now += schedule.duration();
+        }
+    }
+    if knots.is_empty() {
+        return Err(PathError::NoMove);
+    }
+    let held = legs.held();
+    Ok(Planned { trajectory: trajectory(arm.model, knots)?, moves, stops, held })
+}
+
+/// Knots of all routes and dwells as curves.
+fn trajectory(model: &Model, mut knots: Vec<Knot>) -> Result<Trajectory, TrajectoryError> {
+    knots.dedup_by(|next, knot| {
+        let same = next.t - knot.t <= 1e-9;
+        if same {
+            knot.after.clone_from(&next.after);
+        }
+        same
+    });
+    let times: Vec<f64> = knots.iter().map(|knot| knot.t).collect();
+    let joint = |k: usize| JointKnots {
+        name: model.coordinates()[k].joint.clone(),
+        position: knots.iter().map(|knot| knot.q[k]).collect(),
+        velocity: knots.iter().map(|knot| knot.v[k]).collect(),
+        acceleration: knots.iter().map(|knot| [knot.before[k], knot.after[k]]).collect(),
+    };
+    let joints: Vec<JointKnots> = (0..model.n_actuated()).map(joint).collect();
+    Trajectory::through_knots(&times, &joints)
+}

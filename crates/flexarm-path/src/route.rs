@@ -1,0 +1,389 @@
+//! From one stop to the next: legs joined by blends, and the joints at points along all of it.
+
+use flexarm_spatial::rotation_vector;
+use nalgebra::{DVector, Vector3};
+
+use crate::curve::{TURN_LENGTH, ToolCurve, ToolJet};
+use crate::follow::{Follower, JointJet};
+use crate::legs::{Leg, Legs, Way, blocked_error};
+use crate::plan::{PathError, PathOptions};
+use crate::program::{Blend, Speed};
+
+/// Two legs go on without a corner if their derivatives agree to this (m/m, rad/m).
+const ALIGNED: f64 = 1e-6;
+/// Cosine between two tangents below which a corner turns back: within 10 degrees.
+const TURNED_BACK: f64 = -0.985;
+/// No blend is shorter than this, m.
+const SHORTEST_BLEND: f64 = 1e-7;
+/// Acceleration with which a blend by speed is measured where the program tells none, m/s².
+const BRAKING: f64 = 2.0;
+/// Least number of intervals of a piece.
+const LEAST_INTERVALS: usize = 24;
+/// Most of them before the path is refined.
+const MOST_INTERVALS: usize = 4000;
+/// Most halvings of an interval.
+const HALVINGS: usize = 12;
+
+/// A point of the route.
+#[derive(Debug, Clone)]
+pub(crate) struct Station {
+    /// Parameter from the start of the route, m.
+    pub(crate) s: f64,
+    pub(crate) q: DVector<f64>,
+    pub(crate) d: DVector<f64>,
+    /// Second derivative of the piece that ends here and of the one that begins here.
+    pub(crate) before: DVector<f64>,
+    pub(crate) after: DVector<f64>,
+}
+
+/// A stretch with one way and one set of speeds.
+#[derive(Debug, Clone)]
+pub(crate) struct Piece {
+    /// Leg that it belongs to, and for a blend the next one.
+    pub(crate) leg: usize,
+    pub(crate) is_blend: bool,
+    /// First and last station.
+    pub(crate) stations: [usize; 2],
+    /// The tool's derivatives at the stations; empty for joint moves.
+    pub(crate) tool: Vec<ToolJet>,
+    /// Least singular value and its parameter from the start of the route.
+    pub(crate) least_sigma: Option<(f64, f64)>,
+    pub(crate) speed: Speed,
+}
+
+/// Legs from one stop to the next.
+pub(crate) struct Route {
+    pub(crate) legs: Vec<Leg>,
+    /// Distance before its end at which each leg is left.
+    pub(crate) blends: Vec<f64>,
+    pub(crate) pieces: Vec<Piece>,
+    pub(crate) stations: Vec<Station>,
+}
+
+/// What happens between two legs.
+enum Corner {
+    Stop(&'static str),
+    Smooth,
+    Blend,
+}
+
+/// A piece before it has stations.
+struct Stretch {
+    leg: usize,
+    is_blend: bool,
+    way: Way,
+    range: [f64; 2],
+    speed: Speed,
+}
+
+impl Route {
+    /// Routes of legs between which the program does not stop; a corner that cannot be passed is a stop after all.
+    pub(crate) fn all(
+        owner: &mut Legs<'_>,
+        legs: Vec<Leg>,
+        stops: &mut Vec<(usize, String)>,
+    ) -> Result<Vec<Self>, PathError> {
+        let (mut routes, mut here) = (Vec::new(), Vec::new());
+        for leg in legs {
+            if let Some(last) = here.last()
+                && let Corner::Stop(why) = corner(last, &leg)
+            {
+                if last.of.blend != Blend::Pass {
+                    stops.push((last.of.line, why.to_owned()));
+                }
+                routes.push(Self::new(owner, std::mem::take(&mut here))?);
+            }
+            here.push(leg);
+        }
+        if !here.is_empty() {
+            routes.push(Self::new(owner, here)?);
+        }
+        Ok(routes)
+    }
+
+    fn new(owner: &mut Legs<'_>, legs: Vec<Leg>) -> Result<Self, PathError> {
+        let n = legs.len();
+        // How much of each leg its two blends take.
+        let mut taken = vec![[0.0, 0.0]; n];
+        for k in 0..n - 1 {
+            if matches!(corner(&legs[k], &legs[k + 1]), Corner::Blend) {
+                let reach = blend_reach(owner, &legs[k], &legs[k + 1]);
+                taken[k][1] = reach[0];
+                taken[k + 1][0] = reach[1];
+            }
+        }
+        let stretches = stretches(owner, &legs, &taken)?;
+        let blends = taken.iter().map(|taken| taken[1]).collect();
+        let mut route = Self { legs, blends, pieces: Vec::new(), stations: Vec::new() };
+        for stretch in stretches {
+            route.add(owner, stretch)?;
+        }
+        Ok(route)
+    }
+
+    /// Puts stations along a stretch behind those that are there.
+    fn add(&mut self, owner: &mut Legs<'_>, stretch: Stretch) -> Result<(), PathError> {
+        let options = owner.options;
+        let (points, tool, sigma) = match &stretch.way {
+            Way::Tool { curve, frame } => {
+                let near =
+                    self.stations.last().map_or_else(|| self.legs[stretch.leg].q0.clone(), |last| last.q.clone());
+                let follower = owner.follower(frame, &near);
+                let of = &self.legs[stretch.leg].of;
+                let walked = walk(follower, curve, stretch.range, &near, &options);
+                let (points, sigma) = walked.map_err(|blocked| blocked_error(of, curve, blocked))?;
+                let tool = points.iter().map(|(s, _)| curve.at(*s)).collect();
+                (points, tool, Some(sigma))
+            }
+            _ => (straight(&stretch.way, stretch.range, &options), Vec::new(), None),
+        };
+        let origin = self.stations.last().map_or(0.0, |last| last.s) - stretch.range[0];
+        let first = self.stations.len().saturating_sub(1);
+        for (k, (s, jet)) in points.into_iter().enumerate() {
+            match self.stations.last_mut() {
+                Some(last) if k == 0 => last.after = jet.dd,
+                _ => {
+                    let (before, after) = (jet.dd.clone(), jet.dd);
+                    self.stations.push(Station { s: origin + s, q: jet.q, d: jet.d, before, after });
+                }
+            }
+        }
+        let stations = [first, self.stations.len() - 1];
+        let least_sigma = sigma.map(|(value, s)| (value, origin + s));
+        let Stretch { leg, is_blend, speed, .. } = stretch;
+        self.pieces.push(Piece { leg, is_blend, stations, tool, least_sigma, speed });
+        Ok(())
+    }
+}
+
+/// What two legs that follow each other have between them.
+fn corner(a: &Leg, b: &Leg) -> Corner {
+    if a.smooth {
+        return Corner::Smooth;
+    }
+    if a.of.blend == Blend::Stop {
+        return Corner::Stop("the program stops here");
+    }
+    if let (Way::Tool { curve, frame }, Way::Tool { curve: next, frame: other }) = (&a.way, &b.way)
+        && frame.X_BF == other.X_BF
+    {
+        let (end, start) = (curve.at(a.length).V, next.at(0.0).V);
+        if (end - start).norm() <= ALIGNED {
+            return Corner::Smooth;
+        }
+        let (u, v): (Vector3<f64>, Vector3<f64>) = (end.fixed_rows::<3>(0).into(), start.fixed_rows::<3>(0).into());
+        if u.dot(&v) < TURNED_BACK * u.norm() * v.norm() && u.norm() > 0.5 {
+            return Corner::Stop("the path turns back, so the tool stops");
+        }
+    }
+    match a.of.blend {
+        Blend::Pass => Corner::Stop("the path has a corner"),
+        _ => Corner::Blend,
+    }
+}
+
+/// How far before and behind their common target two legs are left and entered.
+fn blend_reach(owner: &mut Legs<'_>, a: &Leg, b: &Leg) -> [f64; 2] {
+    // Each leg keeps a half for its other end.
+    let most = [0.5 * a.length, 0.5 * b.length];
+    let both = |reach: f64| [reach.min(most[0]), reach.min(most[1])];
+    match a.of.blend {
+        Blend::Fraction(part) => both(part.min(0.5) * a.length.min(b.length)),
+        Blend::Distance(distance) => {
+            [leave(owner, a, distance, true).min(most[0]), leave(owner, b, distance, false).min(most[1])]
+        }
+        Blend::Velocity(part) => {
+            let speed = a.of.speed.linear_m_s.unwrap_or(1.0);
+            let braking = a.of.speed.linear_m_s2.unwrap_or(BRAKING);
+            both(speed * speed * (1.0 - part.min(1.0).powi(2)) / (2.0 * braking))
+        }
+        Blend::Stop | Blend::Pass => [0.0, 0.0],
+    }
+}
+
+/// Parameter from the end (or from the start) of a leg at which the tool is `distance` from the corner.
+fn leave(owner: &mut Legs<'_>, leg: &Leg, distance: f64, at_end: bool) -> f64 {
+    let place = |s: f64| if at_end { leg.length - s } else { s };
+    match &leg.way {
+        Way::Tool { curve, .. } => {
+            let corner = curve.at(place(0.0)).X;
+            // A tool that only turns leaves its pose by an angle that counts as a length.
+            let away = |s: f64| {
+                let X = curve.at(place(s)).X;
+                let way = (X.translation.vector - corner.translation.vector).norm();
+                let turn = rotation_vector((X.rotation * corner.rotation.inverse()).matrix()).norm() * TURN_LENGTH;
+                if curve.at(0.0).V.fixed_rows::<3>(0).norm() > 0.0 { way } else { turn }
+            };
+            first_beyond(leg.length, distance, away)
+        }
+        Way::Joints { q0, d } => {
+            let frame = owner.tool_frame(&leg.of);
+            let corner = owner.pose(&frame, &(q0 + d * place(0.0))).translation.vector;
+            let away = |s: f64| (owner.pose(&frame, &(q0 + d * place(s))).translation.vector - corner).norm();
+            first_beyond(leg.length, distance, away)
+        }
+        Way::Bridge { .. } => 0.0,
+    }
+}
+
+/// The first parameter at which `away` reaches `distance`, or `length`: a coarse search, then bisection.
+fn first_beyond(length: f64, distance: f64, mut away: impl FnMut(f64) -> f64) -> f64 {
+    const COARSE: usize = 64;
+    let Some(k) = (1..=COARSE).find(|&k| away(length * k as f64 / COARSE as f64) >= distance) else { return length };
+    let (mut low, mut high) = (length * (k - 1) as f64 / COARSE as f64, length * k as f64 / COARSE as f64);
+    for _ in 0..50 {
+        let middle = 0.5 * (low + high);
+        if away(middle) < distance { low = middle } else { high = middle }
+    }
+    0.5 * (low + high)
+}
+
+/// Legs, trimmed, with the blends between them.
+fn stretches(owner: &mut Legs<'_>, legs: &[Leg], taken: &[[f64; 2]]) -> Result<Vec<Stretch>, PathError> {
+    let mut stretches = Vec::new();
+    for (k, leg) in legs.iter().enumerate() {
+        let range = [taken[k][0], leg.length - taken[k][1]];
+        if range[1] - range[0] > SHORTEST_BLEND {
+            stretches.push(Stretch { leg: k, is_blend: false, way: leg.way.clone(), range, speed: leg.of.speed });
+        }
+        let Some(next) = legs.get(k + 1) else { continue };
+        let (out, into) = (taken[k][1], taken[k + 1][0]);
+        if out + into <= SHORTEST_BLEND {
+            continue;
+        }
+        let length = out + into;
+        let way = match (&leg.way, &next.way) {
+            (Way::Tool { curve, frame }, Way::Tool { curve: other, frame: next_frame })
+                if frame.X_BF == next_frame.X_BF =>
+            {
+                let (a, b) = (curve.at(leg.length - out), other.at(into));
+                Way::Tool { curve: ToolCurve::between(&a, &b, length), frame: frame.clone() }
+            }
+            _ => {
+                let from = joints_at(owner, leg, leg.length - out, true)?;
+                let to = joints_at(owner, next, into, false)?;
+                Way::Bridge { from, to }
+            }
+        };
+        let speed = slower(&leg.of.speed, &next.of.speed);
+        stretches.push(Stretch { leg: k, is_blend: true, way, range: [0.0, length], speed });
+    }
+    Ok(stretches)
+}
+
+/// Joints on a leg at a parameter, continued from its end or its start.
+fn joints_at(owner: &mut Legs<'_>, leg: &Leg, s: f64, from_end: bool) -> Result<JointJet, PathError> {
+    match &leg.way {
+        Way::Tool { curve, frame } => {
+            let (origin, q) = if from_end { (leg.length, &leg.q1) } else { (0.0, &leg.q0) };
+            let follower = owner.follower(frame, q);
+            let found = follower.start(curve, origin, q).and_then(|jet| follower.advance(curve, origin, &jet, s));
+            found.map_err(|blocked| blocked_error(&leg.of, curve, blocked))
+        }
+        way => Ok(joint_jet(way, leg.length, s)),
+    }
+}
+
+fn joint_jet(way: &Way, length: f64, s: f64) -> JointJet {
+    match way {
+        Way::Bridge { from, to } => between(from, to, length, s).0,
+        Way::Joints { q0, d } => JointJet { q: q0 + d * s, d: d.clone(), dd: DVector::zeros(d.len()) },
+        Way::Tool { .. } => unreachable!("a tool's way has no joints of its own"),
+    }
+}
+
+/// The quintic between two joint jets at `s`, with its third derivative.
+pub(crate) fn between(a: &JointJet, b: &JointJet, h: f64, s: f64) -> (JointJet, DVector<f64>) {
+    let step = &b.q - &a.q;
+    let c3 = (&step * 20.0 - (&b.d * 8.0 + &a.d * 12.0) * h - (&a.dd * 3.0 - &b.dd) * (h * h)) / (2.0 * h.powi(3));
+    let c4 =
+        (&step * -30.0 + (&b.d * 14.0 + &a.d * 16.0) * h + (&a.dd * 3.0 - &b.dd * 2.0) * (h * h)) / (2.0 * h.powi(4));
+    let c5 = (step * 12.0 - (&b.d + &a.d) * (6.0 * h) + (&b.dd - &a.dd) * (h * h)) / (2.0 * h.powi(5));
+    let q = &a.q + (&a.d + (&a.dd * 0.5 + (&c3 + (&c4 + &c5 * s) * s) * s) * s) * s;
+    let d = &a.d + (&a.dd + (&c3 * 3.0 + (&c4 * 4.0 + &c5 * (5.0 * s)) * s) * s) * s;
+    let dd = &a.dd + (&c3 * 6.0 + (&c4 * 12.0 + &c5 * (20.0 * s)) * s) * s;
+    let ddd = c3 * 6.0 + (c4 * 24.0 + c5 * (60.0 * s)) * s;
+    (JointJet { q, d, dd }, ddd)
+}
+
+/// The slower of two speeds in every respect.
+fn slower(a: &Speed, b: &Speed) -> Speed {
+    let least = |a: Option<f64>, b: Option<f64>| match (a, b) {
+        (Some(a), Some(b)) => Some(a.min(b)),
+        (a, b) => a.or(b),
+    };
+    Speed {
+        linear_m_s: least(a.linear_m_s, b.linear_m_s),
+        linear_m_s2: least(a.linear_m_s2, b.linear_m_s2),
+        linear_m_s3: least(a.linear_m_s3, b.linear_m_s3),
+        angular_rad_s: least(a.angular_rad_s, b.angular_rad_s),
+        angular_rad_s2: least(a.angular_rad_s2, b.angular_rad_s2),
+        joint_fraction: least(a.joint_fraction, b.joint_fraction),
+        joint_acceleration_fraction: least(a.joint_acceleration_fraction, b.joint_acceleration_fraction),
+        joint_rad_s: least(a.joint_rad_s, b.joint_rad_s),
+        joint_rad_s2: least(a.joint_rad_s2, b.joint_rad_s2),
+        duration_s: None,
+    }
+}
+
+fn intervals(length: f64, options: &PathOptions) -> usize {
+    ((length / options.spacing_m).ceil() as usize).clamp(LEAST_INTERVALS, MOST_INTERVALS)
+}
+
+/// Points of a way in joint space.
+fn straight(way: &Way, [from, to]: [f64; 2], options: &PathOptions) -> Vec<(f64, JointJet)> {
+    let n = intervals(to - from, options);
+    let at = |k: usize| from + (to - from) * k as f64 / n as f64;
+    (0..=n).map(|k| (at(k), joint_jet(way, to, at(k)))).collect()
+}
+
+type Walked = (Vec<(f64, JointJet)>, (f64, f64));
+
+/// Joints along a curve of the tool at points so near that the quintics between them keep to the curve; the least singular
+/// value with its parameter.
+fn walk(
+    follower: &mut Follower<'_>,
+    curve: &ToolCurve,
+    [from, to]: [f64; 2],
+    near: &DVector<f64>,
+    options: &PathOptions,
+) -> Result<Walked, crate::follow::Blocked> {
+    let n = intervals(to - from, options);
+    let mut last = (from, follower.start(curve, from, near)?);
+    let mut least = (follower.sigma(), from);
+    let mut points = vec![last.clone()];
+    for k in 1..=n {
+        let s = if k == n { to } else { from + (to - from) * k as f64 / n as f64 };
+        let jet = follower.advance(curve, last.0, &last.1, s)?;
+        let sigma = follower.sigma();
+        if sigma < least.0 {
+            least = (sigma, s);
+        }
+        let next = (s, jet);
+        refine(follower, curve, &last, &next, options.chord_m, HALVINGS, &mut points)?;
+        points.push(next.clone());
+        last = next;
+    }
+    Ok((points, least))
+}
+
+/// Puts points between two until the quintics keep to the curve in the middle.
+fn refine(
+    follower: &mut Follower<'_>,
+    curve: &ToolCurve,
+    a: &(f64, JointJet),
+    b: &(f64, JointJet),
+    chord: f64,
+    depth: usize,
+    points: &mut Vec<(f64, JointJet)>,
+) -> Result<(), crate::follow::Blocked> {
+    let middle = 0.5 * (a.0 + b.0);
+    let (guess, _) = between(&a.1, &b.1, b.0 - a.0, middle - a.0);
+    if depth == 0 || follower.distance(curve, middle, &guess.q) <= chord {
+        return Ok(());
+    }
+    let found = (middle, follower.advance(curve, a.0, &a.1, middle)?);
+    refine(follower, curve, a, &found, chord, depth - 1, points)?;
+    points.push(found.clone());
+    refine(follower, curve, &found, b, chord, depth - 1, points)
+}

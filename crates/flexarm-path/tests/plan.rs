@@ -1,0 +1,300 @@
+//! Programs of moves as motions: the tool keeps to its path everywhere, and speeds and accelerations to their bounds.
+#![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
+#![allow(non_snake_case, reason = "monogram notation")]
+
+use flexarm_kinematics::{Data, Model, forward_kinematics};
+use flexarm_path::program::{Blend, Configuration, Item, Move, MoveKind, Program, Speed, Target};
+use flexarm_path::{JointBounds, PathError, PathOptions, Planned, ProgramArm, SlowedBy, plan};
+use flexarm_spatial::{Pose, rotation_vector};
+use flexarm_testkit::reference_arm;
+use nalgebra::{DVector, Rotation3, Translation3, Vector3};
+
+const START: [f64; 6] = [0.2, 0.5, 0.7, 0.3, 0.8, -0.4];
+
+struct Cell {
+    model: Model,
+}
+
+impl Cell {
+    fn new() -> Self {
+        Self { model: Model::new(&reference_arm(false).mechanism).unwrap() }
+    }
+
+    fn arm(&self) -> ProgramArm<'_> {
+        let bounds = JointBounds { velocity: 3.0, acceleration: 20.0, torque: None };
+        ProgramArm {
+            model: &self.model,
+            flange: self.model.frame("tcp").unwrap().clone(),
+            X_FT: Pose::identity(),
+            X_MW: Pose::identity(),
+            axes: (0..6).collect(),
+            bounds: vec![bounds; 6],
+            rest: DVector::from_row_slice(&START),
+            starts_at_rest: false,
+        }
+    }
+
+    fn pose(&self, q: &[f64]) -> Pose {
+        let mut data = Data::new(&self.model);
+        forward_kinematics(&self.model, &mut data, &DVector::from_row_slice(q));
+        data.X_WF(self.model.frame("tcp").unwrap())
+    }
+
+    /// Poses at `n + 1` times with the joints' values and rates.
+    fn sampled(&self, planned: &Planned, n: usize) -> Vec<Sampled> {
+        let sample = |k: usize| {
+            let t = planned.trajectory.duration() * k as f64 / n as f64;
+            let (mut q, mut v, mut a) = ([0.0; 6], [0.0; 6], [0.0; 6]);
+            planned.trajectory.sample(t, &mut q, &mut v, &mut a);
+            Sampled { t, X: self.pose(&q), v, a }
+        };
+        (0..=n).map(sample).collect()
+    }
+}
+
+struct Sampled {
+    t: f64,
+    X: Pose,
+    v: [f64; 6],
+    a: [f64; 6],
+}
+
+fn to(kind: MoveKind, to: Target, speed: Speed, blend: Blend) -> Item {
+    let statement = format!("{kind:?}").split_whitespace().next().unwrap().to_owned();
+    Item::Move(Move { line: 1, statement, kind, to, X_WB: Pose::identity(), X_FT: None, speed, blend })
+}
+
+fn joints(q: &[f64]) -> Item {
+    to(MoveKind::Joint, Target::Joints(q.to_vec()), Speed::default(), Blend::Stop)
+}
+
+fn pose(X: Pose) -> Target {
+    Target::Pose { X_BT: X, configuration: Configuration::Nearest }
+}
+
+fn feed(v: f64) -> Speed {
+    Speed { linear_m_s: Some(v), linear_m_s2: Some(2.0), ..Speed::default() }
+}
+
+fn shifted(X: &Pose, d: [f64; 3]) -> Pose {
+    Pose::from_parts(Translation3::from(X.translation.vector + Vector3::from(d)), X.rotation)
+}
+
+fn program(items: Vec<Item>) -> Program {
+    Program { name: "test".into(), items, ..Program::default() }
+}
+
+/// Distance of a point from a polyline.
+fn from_polyline(p: &Vector3<f64>, corners: &[Vector3<f64>]) -> f64 {
+    let from = |pair: &[Vector3<f64>]| {
+        let d = pair[1] - pair[0];
+        let part = ((p - pair[0]).dot(&d) / d.norm_squared()).clamp(0.0, 1.0);
+        (p - pair[0] - d * part).norm()
+    };
+    corners.windows(2).map(from).fold(f64::INFINITY, f64::min)
+}
+
+fn square(X: &Pose, side: f64) -> [Pose; 5] {
+    [[0.0; 3], [0.0, side, 0.0], [0.0, side, -side], [0.0, 0.0, -side], [0.0; 3]].map(|d| shifted(X, d))
+}
+
+#[test]
+fn the_tool_keeps_to_a_square_with_stops_at_every_moment_and_not_at_knots_alone() {
+    let cell = Cell::new();
+    let corners = square(&cell.pose(&START), 0.2);
+    let mut items = vec![joints(&START)];
+    items.extend(corners[1..].iter().map(|X| to(MoveKind::Line, pose(*X), feed(0.25), Blend::Stop)));
+    let planned = plan(&program(items), &cell.arm(), &PathOptions::default()).unwrap();
+    let way: Vec<Vector3<f64>> = corners.iter().map(|X| X.translation.vector).collect();
+    let (mut off, mut turned, mut top): (f64, f64, f64) = (0.0, 0.0, 0.0);
+    let samples = cell.sampled(&planned, 7919);
+    for pair in samples.windows(2) {
+        off = off.max(from_polyline(&pair[1].X.translation.vector, &way));
+        let R = corners[0].rotation.inverse() * pair[1].X.rotation;
+        turned = turned.max(rotation_vector(R.matrix()).norm());
+        let step = pair[1].X.translation.vector - pair[0].X.translation.vector;
+        top = top.max(step.norm() / (pair[1].t - pair[0].t));
+    }
+    println!("off {off:.1e} m, turned {turned:.1e} rad, top {top}");
+    assert!(off < 1e-9 && turned < 1e-9, "off {off:.1e}, turned {turned:.1e}");
+    assert!((top - 0.25).abs() < 2.5e-4, "{top}");
+    // Truth: four sides of 0.2 m: v/a + L/v each, and a rise of 0.05 s.
+    let truth = 4.0 * (0.25 / 2.0 + 0.2 / 0.25 + 0.05);
+    assert!((planned.trajectory.duration() - truth).abs() < 2e-3 * truth, "{} {truth}", planned.trajectory.duration());
+    assert_eq!(planned.moves.len(), 4);
+    assert!(planned.moves.iter().all(|m| m.slowed.is_none() && (m.top_m_s.unwrap() - 0.25).abs() < 3e-4));
+}
+
+#[test]
+fn a_blend_leaves_the_corner_within_its_distance_and_the_path_without_a_stop() {
+    let cell = Cell::new();
+    let corners = square(&cell.pose(&START), 0.2);
+    let mut items = vec![joints(&START)];
+    let blend = |k: usize| if k == 4 { Blend::Stop } else { Blend::Distance(0.02) };
+    items.extend((1..5).map(|k| to(MoveKind::Line, pose(corners[k]), feed(0.25), blend(k))));
+    let planned = plan(&program(items), &cell.arm(), &PathOptions::default()).unwrap();
+    let way: Vec<Vector3<f64>> = corners.iter().map(|X| X.translation.vector).collect();
+    let samples = cell.sampled(&planned, 6007);
+    let (mut near_corner, mut off): (f64, f64) = (f64::INFINITY, 0.0);
+    for sample in &samples {
+        let p = sample.X.translation.vector;
+        let distance = from_polyline(&p, &way);
+        let corner = way[1..4].iter().map(|c| (p - c).norm()).fold(f64::INFINITY, f64::min);
+        near_corner = near_corner.min(corner);
+        if corner > 0.02 + 1e-9 {
+            off = off.max(distance);
+        }
+    }
+    // The quintic passes a right angle at 0.2652 of its reach: 3/8 of the diagonal of the cut corner.
+    println!("passes the corner at {:.3} mm, off {off:.1e}", near_corner * 1e3);
+    assert!(off < 1e-9, "{off:.1e}");
+    assert!(near_corner > 0.003 && near_corner < 0.01);
+    let inner = &samples[samples.len() / 10..samples.len() * 9 / 10];
+    let slowest =
+        inner.windows(2).map(|p| (p[1].X.translation.vector - p[0].X.translation.vector).norm() / (p[1].t - p[0].t));
+    assert!(slowest.fold(f64::INFINITY, f64::min) > 0.1);
+}
+
+#[test]
+fn joint_limits_slow_a_line_and_say_which_joint_it_is() {
+    let cell = Cell::new();
+    let X = cell.pose(&START);
+    let mut arm = cell.arm();
+    arm.bounds[0].velocity = 0.2;
+    let target = shifted(&X, [-0.3, 0.5, 0.0]);
+    let items = vec![joints(&START), to(MoveKind::Line, pose(target), feed(1.0), Blend::Stop)];
+    let planned = plan(&program(items), &arm, &PathOptions::default()).unwrap();
+    let samples = cell.sampled(&planned, 4001);
+    let fastest = samples.iter().map(|s| s.v[0].abs()).fold(0.0, f64::max);
+    println!("fastest {fastest}");
+    assert!(fastest < 0.2 * 1.002 && fastest > 0.2 * 0.99, "{fastest}");
+    let slowed = planned.moves[0].slowed.as_ref().unwrap();
+    assert!(
+        matches!(&slowed.by, SlowedBy::JointSpeed(joint) if *joint == cell.model.coordinates()[0].joint),
+        "{slowed:?}"
+    );
+    let hardest = samples.iter().flat_map(|s| s.a).map(f64::abs).fold(0.0, f64::max);
+    assert!(hardest < 20.0 * 1.002, "{hardest}");
+}
+
+#[test]
+fn a_tool_that_turns_along_an_arc_keeps_both_its_circle_and_its_turn() {
+    let cell = Cell::new();
+    let X = cell.pose(&START);
+    let r = 0.1;
+    let centre = X.translation.vector - Vector3::y() * r;
+    let via = centre + Vector3::z() * r;
+    let end = Pose::from_parts(
+        Translation3::from(centre - Vector3::y() * r),
+        Rotation3::new(Vector3::z() * 0.3) * X.rotation,
+    );
+    let kind = MoveKind::Arc { via, via_rotation: None, angle: None, turns_with_path: false };
+    let items = vec![joints(&START), to(kind, pose(end), feed(0.3), Blend::Stop)];
+    let planned = plan(&program(items), &cell.arm(), &PathOptions::default()).unwrap();
+    let mut off: f64 = 0.0;
+    for sample in cell.sampled(&planned, 2003) {
+        let p = sample.X.translation.vector - centre;
+        off = off.max((p.norm() - r).abs().max(p.x.abs()));
+    }
+    assert!(off < 1e-9, "{off:.1e}");
+    let length = std::f64::consts::PI * r;
+    // Truth: half a circle, an acceleration of 2 m/s² and a rise of 0.05 s.
+    let truth = length / 0.3 + 0.3 / 2.0 + 0.05;
+    assert!((planned.trajectory.duration() - truth).abs() < 3e-3 * truth, "{} {truth}", planned.trajectory.duration());
+}
+
+#[test]
+fn joint_moves_lines_and_splines_blend_into_each_other_with_continuous_accelerations() {
+    let cell = Cell::new();
+    let X = cell.pose(&START);
+    let other = [0.5, 0.3, 0.9, 0.1, 0.9, 0.0];
+    let spline = |d: [f64; 3], blend| to(MoveKind::Spline, pose(shifted(&X, d)), feed(0.4), blend);
+    let items = vec![
+        joints(&other),
+        to(MoveKind::Joint, Target::Joints(START.to_vec()), Speed::default(), Blend::Distance(0.03)),
+        to(MoveKind::Line, pose(shifted(&X, [0.0, 0.15, 0.0])), feed(0.4), Blend::Fraction(0.3)),
+        spline([0.05, 0.2, 0.05], Blend::Pass),
+        spline([0.0, 0.25, 0.1], Blend::Pass),
+        spline([-0.05, 0.2, 0.0], Blend::Stop),
+        Item::Dwell { line: 9, seconds: 0.3 },
+        to(
+            MoveKind::Joint,
+            Target::Joints(other.to_vec()),
+            Speed { joint_fraction: Some(0.5), ..Speed::default() },
+            Blend::Stop,
+        ),
+    ];
+    let planned = plan(&program(items), &cell.arm(), &PathOptions::default()).unwrap();
+    let samples = cell.sampled(&planned, 20011);
+    // Two samples 0.2 ms apart differ by the jerk alone.
+    let jump = samples.windows(2).flat_map(|p| (0..6).map(move |k| (p[1].a[k] - p[0].a[k]).abs())).fold(0.0, f64::max);
+    let dt = samples[1].t;
+    println!("largest step of acceleration {jump:.2} rad/s² in {dt:.1e} s");
+    assert!(jump < 1.0, "{jump}");
+    assert!(planned.trajectory.velocity_jumps().is_empty());
+    let speed = samples.iter().rev().take(1000).flat_map(|s| s.v).map(f64::abs).fold(0.0, f64::max);
+    assert!(speed <= 1.5 * 1.002);
+    // The knot of the spline is met.
+    let knot = X.translation.vector + Vector3::new(0.0, 0.25, 0.1);
+    let near = samples.iter().map(|s| (s.X.translation.vector - knot).norm()).fold(f64::INFINITY, f64::min);
+    assert!(near < 1e-4, "{near}");
+}
+
+#[test]
+fn torque_limits_are_kept_by_inverse_dynamics() {
+    let cell = Cell::new();
+    let X = cell.pose(&START);
+    let mut arm = cell.arm();
+    for bounds in &mut arm.bounds {
+        bounds.acceleration = 1e3;
+    }
+    let line = |arm: &ProgramArm<'_>| {
+        let target = shifted(&X, [-0.3, 0.4, 0.1]);
+        let free = Speed::default();
+        plan(
+            &program(vec![joints(&START), to(MoveKind::Line, pose(target), free, Blend::Stop)]),
+            arm,
+            &PathOptions::default(),
+        )
+    };
+    let torque = |planned: &Planned| {
+        let mut data = Data::new(&cell.model);
+        let mut most = [0.0f64; 6];
+        for k in 0..=3000 {
+            let t = planned.trajectory.duration() * f64::from(k) / 3000.0;
+            let mut state = flexarm_kinematics::State::zeros(&cell.model);
+            let mut a = DVector::zeros(6);
+            planned.trajectory.sample(t, state.q.as_mut_slice(), state.qdot.as_mut_slice(), a.as_mut_slice());
+            let tau = flexarm_kinematics::inverse_dynamics(&cell.model, &mut data, &state, &a);
+            for joint in 0..6 {
+                most[joint] = most[joint].max(tau[joint].abs());
+            }
+        }
+        most
+    };
+    let free = torque(&line(&arm).unwrap());
+    // Four fifths of what the free run asks of joint 1, on which gravity does not act.
+    arm.bounds[0].torque = Some(0.8 * free[0]);
+    let bound = torque(&line(&arm).unwrap());
+    println!("free {:.1}, bound {:.1} N m", free[0], bound[0]);
+    assert!(bound[0] < 0.8 * free[0] * 1.003 && bound[0] > 0.8 * free[0] * 0.95);
+}
+
+#[test]
+fn a_program_that_begins_with_a_line_or_leaves_the_reach_is_refused_with_its_line() {
+    let cell = Cell::new();
+    let X = cell.pose(&START);
+    let line = |d: [f64; 3]| to(MoveKind::Line, pose(shifted(&X, d)), feed(0.2), Blend::Stop);
+    let run = |items| plan(&program(items), &cell.arm(), &PathOptions::default()).unwrap_err();
+    assert!(matches!(run(vec![line([0.0, 0.1, 0.0])]), PathError::NoStart { line: 1, .. }));
+    let far = run(vec![joints(&START), line([0.0, 0.0, 9.0])]);
+    println!("{far}");
+    assert!(matches!(far, PathError::Blocked { .. }));
+    assert!(matches!(run(vec![joints(&[0.0; 7])]), PathError::Axes { found: 7, axes: 6, .. }));
+    assert!(matches!(run(vec![]), PathError::NoMove));
+    let bad = Speed { linear_m_s: Some(0.0), ..Speed::default() };
+    assert!(matches!(
+        run(vec![joints(&START), to(MoveKind::Line, pose(X), bad, Blend::Stop)]),
+        PathError::Value { .. }
+    ));
+}
