@@ -71,6 +71,14 @@ pub enum Error {
     /// Something in the trajectory.
     #[error(transparent)]
     Trajectory(#[from] flexarm_trajectory::TrajectoryError),
+    /// A path of the tool that the arm cannot follow.
+    #[error("{}: {source}", path.display())]
+    Path {
+        /// The motion.
+        path: PathBuf,
+        /// Where and why.
+        source: Box<flexarm_path::PathError>,
+    },
     /// The trajectory asks for more than the joints can do.
     #[error(
         "{}: the trajectory passes {} joint limits:\n  {}\nslow it down, change it, or go on anyway with {}",

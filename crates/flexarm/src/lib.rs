@@ -81,6 +81,7 @@ mod statics_picture;
 mod stepper_settings;
 mod study;
 mod summary;
+mod tool_path;
 mod twin;
 
 pub use applied_load::AppliedLoad;
@@ -123,12 +124,14 @@ pub use summary::{
     CURVE_PIECES, DifferenceFigures, Files, HoldFigures, LinkFigures, RecordingFiles, StepperFigures, Summary,
     TcpFigures,
 };
+pub use tool_path::ToolPath;
 
 pub use flexarm_analysis::{Quantity, Spacing};
 pub use flexarm_files::FileError;
 pub use flexarm_kinematics::{LinkInertia, Pose, Wrench};
 pub use flexarm_linkmaker::{ImportError, JobError, LinkError, export, import};
 pub use flexarm_log::{Column, Columns, FormatInfo, Holds, RecordingFormat, Sample, Trace};
+pub use flexarm_path::{PathError, PlannedMove, Slowed, SlowedBy};
 pub use flexarm_settings::{Names, Setting, name_settings};
 pub use flexarm_stepping::{
     AlphaSettings, ConstraintForm, InertiaChange, Load, LoadAxes, OperatingPoint, ReferenceMethod, ReferenceSettings,

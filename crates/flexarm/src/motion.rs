@@ -11,6 +11,7 @@ use flexarm_urdf::closest;
 use crate::caveat::{self, Caveat};
 use crate::error::{Error, PoseError, ValueError};
 use crate::robot::Robot;
+use crate::tool_path::{Cell, ToolPath, is_path_file, read_path_file};
 
 /// A trajectory whose joints are the model's actuated coordinates.
 #[derive(Clone, Debug)]
@@ -29,6 +30,8 @@ pub struct Motion {
     pub warnings: Vec<String>,
     /// Joints that the file does not name.
     pub held: Vec<HeldJoint>,
+    /// What became of each move, of a motion that is told by the path of the tool.
+    pub tool_path: Option<Arc<ToolPath>>,
 }
 
 /// A joint that a motion does not name.
@@ -74,7 +77,7 @@ impl Motion {
     /// # Errors
     /// [`Error::File`] or [`Error::Trajectory`]: format, units, times, joints that the robot does not have; [`Error::Model`].
     pub fn load(path: impl AsRef<Path>, robot: &Robot) -> Result<Self, Error> {
-        Self::read(path.as_ref(), &*robot.rigid_model()?, &robot.hold)
+        Self::read(path.as_ref(), &*robot.rigid_model()?, Some(&robot.tcp.0), &robot.hold)
     }
 
     /// As [`Motion::load`], for a model alone.
@@ -82,7 +85,7 @@ impl Motion {
     /// # Errors
     /// As [`Motion::load`].
     pub fn load_for(path: &Path, model: &Model) -> Result<Self, Error> {
-        Self::read(path, model, &[])
+        Self::read(path, model, None, &[])
     }
 
     /// The motion through sampled positions, by a spline as through the rows of a CSV file.
@@ -121,10 +124,16 @@ impl Motion {
         Self::of(trajectory, Path::new(name), &*robot.rigid_model()?, &robot.hold)
     }
 
-    fn read(path: &Path, model: &Model, hold: &[(String, f64)]) -> Result<Self, Error> {
+    fn read(path: &Path, model: &Model, tcp_link: Option<&str>, hold: &[(String, f64)]) -> Result<Self, Error> {
         if !path.is_file() {
             let what = "there is no such trajectory file; give a .csv or .toml file".into();
             return Err(Error::File { path: path.to_owned(), what });
+        }
+        if let Some((trajectory, tool_path)) = read_tool_path(path, &Cell { model, tcp_link, hold })? {
+            let mut motion = Self::of(trajectory, path, model, hold)?;
+            motion.warnings.extend(tool_path.notes.iter().map(|note| format!("{}: {note}", path.display())));
+            motion.tool_path = Some(Arc::new(tool_path));
+            return Ok(motion);
         }
         let actuated = &model.coordinates()[..model.n_actuated()];
         let named: Vec<(&str, JointLimits)> = actuated.iter().map(|c| c.joint.as_str()).zip(limits(model)).collect();
@@ -153,7 +162,7 @@ impl Motion {
         let likely = caveat::motion::degrees(&violations, model);
         let name = path.file_stem().map_or_else(|| "trajectory".into(), |s| s.to_string_lossy().into_owned());
         let (path, trajectory) = (path.to_owned(), Arc::new(trajectory));
-        Ok(Self { name, path, trajectory, violations, likely, warnings, held })
+        Ok(Self { name, path, trajectory, violations, likely, warnings, held, tool_path: None })
     }
 
     /// The same motion with each corner, where a velocity jumps, replaced by a blend that lasts `seconds`.
@@ -197,6 +206,18 @@ impl Motion {
     pub fn prescribed(&self) -> Arc<dyn PrescribedMotion> {
         Arc::new(Along(self.trajectory.clone()))
     }
+}
+
+/// A motion that is told by the path of the tool, if the file is one.
+fn read_tool_path(path: &Path, cell: &Cell<'_>) -> Result<Option<(Trajectory, ToolPath)>, Error> {
+    if path.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("toml")) {
+        return Ok(None);
+    }
+    let text = flexarm_files::read_text(path)?;
+    if !is_path_file(&text) {
+        return Ok(None);
+    }
+    read_path_file(path, &text, cell).map(Some)
 }
 
 /// A motion must move joints that there are, and at least one of them.

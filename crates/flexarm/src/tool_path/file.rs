@@ -1,0 +1,414 @@
+//! Path files: moves of the tool in TOML, told by a table `[path]`.
+//!
+//! Start at [`read_path_file`]. Docs: `docs/motions.md`.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use flexarm_kinematics::Pose;
+use flexarm_kinematics::{Data, forward_kinematics};
+use flexarm_path::PathOptions;
+use flexarm_path::ProgramArm;
+use flexarm_path::program::{Blend, Configuration, Item, Move, MoveKind, Program, Speed, Target};
+use nalgebra::{DVector, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
+use serde::Deserialize;
+use toml::Spanned;
+
+use super::{Cell, Overrides, ToolPath};
+use crate::error::Error;
+use crate::robot_file::{RobotFileError, Source};
+
+/// The file as written.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PathFile {
+    format: Spanned<i64>,
+    path: PathTable,
+    #[serde(default)]
+    limits: BTreeMap<Spanned<String>, LimitsTable>,
+    #[serde(rename = "move", default)]
+    moves: Vec<Spanned<MoveTable>>,
+}
+
+/// `[path]`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PathTable {
+    /// "m" or "mm".
+    lengths: Spanned<String>,
+    /// "rad" or "deg".
+    angles: Spanned<String>,
+    base: Option<Spanned<FrameTable>>,
+    tool: Option<Spanned<FrameTable>>,
+    /// s.
+    rise: Option<Spanned<f64>>,
+    speed: Option<f64>,
+    acceleration: Option<f64>,
+    jerk: Option<f64>,
+    turning: Option<f64>,
+    turning_acceleration: Option<f64>,
+    joint_speed: Option<f64>,
+    joint_acceleration: Option<f64>,
+    blend: Option<f64>,
+}
+
+#[derive(Debug, Clone, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FrameTable {
+    xyz: [f64; 3],
+    rpy: Option<[f64; 3]>,
+    quaternion: Option<[f64; 4]>,
+}
+
+/// One line of `[limits]`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct LimitsTable {
+    velocity: Option<Spanned<f64>>,
+    acceleration: Option<Spanned<f64>>,
+    torque: Option<Spanned<f64>>,
+}
+
+/// One `[[move]]`.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MoveTable {
+    /// All joints to values.
+    joints: Option<Spanned<Vec<f64>>>,
+    /// All joints to a pose of the tool.
+    joint_to: Option<Spanned<[f64; 3]>>,
+    line: Option<Spanned<[f64; 3]>>,
+    arc: Option<Spanned<[f64; 3]>>,
+    spline: Option<Spanned<Vec<Vec<f64>>>>,
+    /// s.
+    dwell: Option<Spanned<f64>>,
+    via: Option<Spanned<[f64; 3]>>,
+    angle: Option<f64>,
+    turns_with_path: Option<bool>,
+    rpy: Option<[f64; 3]>,
+    quaternion: Option<Spanned<[f64; 4]>>,
+    near: Option<Vec<f64>>,
+    duration: Option<f64>,
+    speed: Option<f64>,
+    acceleration: Option<f64>,
+    jerk: Option<f64>,
+    turning: Option<f64>,
+    turning_acceleration: Option<f64>,
+    joint_speed: Option<f64>,
+    joint_acceleration: Option<f64>,
+    blend: Option<f64>,
+}
+
+/// Is this text a path file and no list of waypoints?
+pub(crate) fn is_path_file(text: &str) -> bool {
+    text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("path"))
+        || text.lines().any(|line| line.trim() == "[path]")
+}
+
+/// Factors from the units of a file to SI.
+#[derive(Clone, Copy)]
+struct Units {
+    length: f64,
+    angle: f64,
+}
+
+struct Reader<'a> {
+    source: &'a Source,
+    units: Units,
+    common: &'a PathTable,
+    X_WB: Pose,
+    X_FT: Option<Pose>,
+    arm: &'a ProgramArm<'a>,
+}
+
+/// Reads a path file and plans its motion.
+///
+/// # Errors
+/// [`Error::RobotFile`] with line and column of what is wrong; [`Error::Path`] for what the arm cannot do.
+pub(crate) fn read_path_file(
+    path: &Path,
+    text: &str,
+    cell: &Cell<'_>,
+) -> Result<(flexarm_trajectory::Trajectory, ToolPath), Error> {
+    let source = Source::new(path, text);
+    let file: PathFile = toml::from_str(text).map_err(|error| {
+        let message = format!("{}; docs/motions.md has all keys of path files", error.message());
+        source.error(error.span().unwrap_or(0..0), message)
+    })?;
+    if *file.format.get_ref() != 1 {
+        return Err(source.error(file.format.span(), "format must be 1").into());
+    }
+    let units = units(&file.path, &source)?;
+    let overrides = overrides(&file, &source, cell, units)?;
+    let (arm, mut notes) = cell.arm(&overrides);
+    if file.path.tool.is_none() {
+        // Nothing stands on the flange that the file would have to tell.
+        notes.retain(|note| !note.starts_with("tools of the program"));
+    }
+    let frame = |table: &Option<Spanned<FrameTable>>| {
+        table.as_ref().map(|table| frame_of(table.get_ref(), units, &source, table.span())).transpose()
+    };
+    let reader = Reader {
+        source: &source,
+        units,
+        common: &file.path,
+        X_WB: frame(&file.path.base)?.unwrap_or_else(Pose::identity),
+        X_FT: frame(&file.path.tool)?,
+        arm: &arm,
+    };
+    let items = reader.items(&file.moves)?;
+    let program = Program { name: path.display().to_string(), items, ..Program::default() };
+    let mut options = PathOptions::default();
+    if let Some(rise) = &file.path.rise {
+        if !(*rise.get_ref() > 0.0 && rise.get_ref().is_finite()) {
+            return Err(source.error(rise.span(), "rise must be a positive time in s").into());
+        }
+        options.rise_s = *rise.get_ref();
+    }
+    let planned = ToolPath::plan(&program, &arm, &options, notes);
+    planned.map_err(|source| Error::Path { path: path.to_owned(), source: Box::new(source) })
+}
+
+fn units(path: &PathTable, source: &Source) -> Result<Units, RobotFileError> {
+    let length = match path.lengths.get_ref().as_str() {
+        "m" => 1.0,
+        "mm" => 1e-3,
+        other => return Err(source.error(path.lengths.span(), format!("lengths = {other:?}: give \"m\" or \"mm\""))),
+    };
+    let angle = match path.angles.get_ref().as_str() {
+        "rad" => 1.0,
+        "deg" => std::f64::consts::PI / 180.0,
+        other => return Err(source.error(path.angles.span(), format!("angles = {other:?}: give \"deg\" or \"rad\""))),
+    };
+    Ok(Units { length, angle })
+}
+
+/// `[limits]` by coordinate.
+fn overrides(file: &PathFile, source: &Source, cell: &Cell<'_>, units: Units) -> Result<Overrides, RobotFileError> {
+    let coordinates = cell.model.coordinates();
+    let none = vec![None; cell.model.nv()];
+    let mut overrides = Overrides { velocities: none.clone(), accelerations: none.clone(), torques: none };
+    for (joint, limits) in &file.limits {
+        let Some(k) = coordinates.iter().position(|c| c.joint == *joint.get_ref()) else {
+            let names: Vec<&str> = coordinates.iter().map(|c| c.joint.as_str()).collect();
+            let message = format!("the robot has no joint {:?}; its joints are {}", joint.get_ref(), names.join(", "));
+            return Err(source.error(joint.span(), message));
+        };
+        let unit = if coordinates[k].kind == "prismatic" { units.length } else { units.angle };
+        let value = |value: &Option<Spanned<f64>>, factor: f64| match value {
+            Some(value) if !(*value.get_ref() > 0.0 && value.get_ref().is_finite()) => {
+                Err(source.error(value.span(), "a limit must be a positive number"))
+            }
+            value => Ok(value.as_ref().map(|value| value.get_ref() * factor)),
+        };
+        overrides.velocities[k] = value(&limits.velocity, unit)?;
+        overrides.accelerations[k] = value(&limits.acceleration, unit)?;
+        overrides.torques[k] = value(&limits.torque, 1.0)?;
+    }
+    Ok(overrides)
+}
+
+fn frame_of(
+    table: &FrameTable,
+    units: Units,
+    source: &Source,
+    span: std::ops::Range<usize>,
+) -> Result<Pose, RobotFileError> {
+    let R = rotation(table.rpy, table.quaternion, units).map_err(|message| source.error(span, message))?;
+    let p = Vector3::from(table.xyz) * units.length;
+    Ok(Pose::from_parts(Translation3::from(p), R.unwrap_or_else(Rotation3::identity)))
+}
+
+/// Fixed axes x, y, z (as in URDF), or w, x, y, z.
+fn rotation(
+    rpy: Option<[f64; 3]>,
+    quaternion: Option<[f64; 4]>,
+    units: Units,
+) -> Result<Option<Rotation3<f64>>, String> {
+    match (rpy, quaternion) {
+        (Some(_), Some(_)) => Err("give rpy or quaternion, not both".to_owned()),
+        (Some([r, p, y]), None) => {
+            Ok(Some(Rotation3::from_euler_angles(r * units.angle, p * units.angle, y * units.angle)))
+        }
+        (None, Some([w, x, y, z])) => {
+            let q = Quaternion::new(w, x, y, z);
+            if (q.norm() - 1.0).abs() > 1e-3 {
+                return Err(format!("quaternion = [w, x, y, z] has the length {:.6}: it must be 1", q.norm()));
+            }
+            Ok(Some(UnitQuaternion::from_quaternion(q).to_rotation_matrix()))
+        }
+        (None, None) => Ok(None),
+    }
+}
+
+impl Reader<'_> {
+    fn items(&self, moves: &[Spanned<MoveTable>]) -> Result<Vec<Item>, RobotFileError> {
+        let mut items = Vec::new();
+        // Orientation of the tool in the base where the last move ended.
+        let mut R: Option<Rotation3<f64>> = None;
+        for table in moves {
+            let (line, _) = self.place(table);
+            let entry = table.get_ref();
+            self.only_one(table)?;
+            if let Some(seconds) = &entry.dwell {
+                items.push(Item::Dwell { line, seconds: *seconds.get_ref() });
+            } else if let Some(points) = &entry.spline {
+                self.spline(table, points, &mut R, &mut items)?;
+            } else {
+                items.push(Item::Move(self.one(table, &mut R)?));
+            }
+        }
+        Ok(items)
+    }
+
+    fn place<T>(&self, at: &Spanned<T>) -> (usize, usize) {
+        let error = self.source.error(at.span(), "");
+        (error.line, error.column)
+    }
+
+    /// A move says one thing.
+    fn only_one(&self, table: &Spanned<MoveTable>) -> Result<(), RobotFileError> {
+        let entry = table.get_ref();
+        let said = [
+            ("joints", entry.joints.is_some()),
+            ("joint_to", entry.joint_to.is_some()),
+            ("line", entry.line.is_some()),
+            ("arc", entry.arc.is_some()),
+            ("spline", entry.spline.is_some()),
+            ("dwell", entry.dwell.is_some()),
+        ];
+        let said: Vec<&str> = said.iter().filter(|(_, given)| *given).map(|(name, _)| *name).collect();
+        match said.as_slice() {
+            [_] => Ok(()),
+            [] => {
+                Err(self.source.error(table.span(), "a move needs one of joints, joint_to, line, arc, spline, dwell"))
+            }
+            several => {
+                let message = format!("a move is one of {}: give one [[move]] for each", several.join(" and "));
+                Err(self.source.error(table.span(), message))
+            }
+        }
+    }
+
+    fn one(&self, table: &Spanned<MoveTable>, R: &mut Option<Rotation3<f64>>) -> Result<Move, RobotFileError> {
+        let entry = table.get_ref();
+        let (word, kind, point) = if let Some(values) = &entry.joints {
+            let q: Vec<f64> = values.get_ref().iter().enumerate().map(|(k, v)| v * self.joint_unit(k)).collect();
+            *R = Some(self.orientation_at(&q, values)?);
+            return Ok(self.of(table, "joints", MoveKind::Joint, Target::Joints(q)));
+        } else if let Some(point) = &entry.joint_to {
+            ("joint_to", MoveKind::Joint, point)
+        } else if let Some(point) = &entry.line {
+            ("line", MoveKind::Line, point)
+        } else if let Some(point) = &entry.arc {
+            let Some(via) = &entry.via else {
+                return Err(self.source.error(point.span(), "an arc needs via = [x, y, z], a point on its way"));
+            };
+            let kind = MoveKind::Arc {
+                via: Vector3::from(*via.get_ref()) * self.units.length,
+                via_rotation: None,
+                angle: entry.angle.map(|angle| angle * self.units.angle),
+                turns_with_path: entry.turns_with_path.unwrap_or(false),
+            };
+            ("arc", kind, point)
+        } else {
+            return Err(self
+                .source
+                .error(table.span(), "a move needs one of joints, joint_to, line, arc, spline, dwell"));
+        };
+        let quaternion = entry.quaternion.as_ref().map(|q| *q.get_ref());
+        let told = rotation(entry.rpy, quaternion, self.units).map_err(|m| self.source.error(table.span(), m))?;
+        let turned = told.or(*R).ok_or_else(|| {
+            let message = "how the tool stands is not known yet: give rpy or quaternion, or begin with a move joints";
+            self.source.error(table.span(), message)
+        })?;
+        *R = Some(turned);
+        let p = Vector3::from(*point.get_ref()) * self.units.length;
+        let near = entry.near.as_ref();
+        let configuration = near.map_or(Configuration::Nearest, |values| {
+            Configuration::Near(values.iter().enumerate().map(|(k, v)| v * self.joint_unit(k)).collect())
+        });
+        let X_BT = Pose::from_parts(Translation3::from(p), turned);
+        Ok(self.of(table, word, kind, Target::Pose { X_BT, configuration }))
+    }
+
+    fn spline(
+        &self,
+        table: &Spanned<MoveTable>,
+        points: &Spanned<Vec<Vec<f64>>>,
+        R: &mut Option<Rotation3<f64>>,
+        items: &mut Vec<Item>,
+    ) -> Result<(), RobotFileError> {
+        let n = points.get_ref().len();
+        for (k, point) in points.get_ref().iter().enumerate() {
+            let turned = match point.len() {
+                3 => *R,
+                6 => rotation(Some([point[3], point[4], point[5]]), None, self.units).unwrap_or_default(),
+                found => {
+                    let message =
+                        format!("point {} has {found} values: give x, y, z or x, y, z, roll, pitch, yaw", k + 1);
+                    return Err(self.source.error(points.span(), message));
+                }
+            };
+            let turned = turned.ok_or_else(|| {
+                self.source.error(points.span(), "how the tool stands is not known yet: give points of six values")
+            })?;
+            *R = Some(turned);
+            let p = Vector3::new(point[0], point[1], point[2]) * self.units.length;
+            let X_BT = Pose::from_parts(Translation3::from(p), turned);
+            let to = Target::Pose { X_BT, configuration: Configuration::Nearest };
+            let mut of = self.of(table, "spline", MoveKind::Spline, to);
+            if k + 1 < n {
+                of.blend = Blend::Pass;
+            }
+            items.push(Item::Move(of));
+        }
+        Ok(())
+    }
+
+    /// Unit of a value of the controller's axis `k`.
+    fn joint_unit(&self, k: usize) -> f64 {
+        let coordinate = self.arm.axes.get(k).map(|&k| &self.arm.model.coordinates()[k]);
+        if coordinate.is_some_and(|c| c.kind == "prismatic") { self.units.length } else { self.units.angle }
+    }
+
+    /// How the tool stands in the base at joint values.
+    fn orientation_at(&self, values: &[f64], at: &Spanned<Vec<f64>>) -> Result<Rotation3<f64>, RobotFileError> {
+        let axes = self.arm.axes.len();
+        if values.len() != axes {
+            let message = format!("{} values for the {axes} joints that move the tool", values.len());
+            return Err(self.source.error(at.span(), message));
+        }
+        let mut q: DVector<f64> = self.arm.rest.clone();
+        for (value, &k) in values.iter().zip(&self.arm.axes) {
+            q[k] = *value;
+        }
+        let mut data = Data::new(self.arm.model);
+        forward_kinematics(self.arm.model, &mut data, &q);
+        let X_FT = self.X_FT.unwrap_or(self.arm.X_FT);
+        let X = data.X_WF(&self.arm.flange) * X_FT;
+        Ok((self.arm.X_MW * self.X_WB).rotation.inverse() * X.rotation)
+    }
+
+    fn of(&self, table: &Spanned<MoveTable>, word: &str, kind: MoveKind, to: Target) -> Move {
+        let (entry, common, Units { length, angle }) = (table.get_ref(), self.common, self.units);
+        let speed = Speed {
+            linear_m_s: entry.speed.or(common.speed).map(|v| v * length),
+            linear_m_s2: entry.acceleration.or(common.acceleration).map(|v| v * length),
+            linear_m_s3: entry.jerk.or(common.jerk).map(|v| v * length),
+            angular_rad_s: entry.turning.or(common.turning).map(|v| v * angle),
+            angular_rad_s2: entry.turning_acceleration.or(common.turning_acceleration).map(|v| v * angle),
+            joint_fraction: entry.joint_speed.or(common.joint_speed),
+            joint_acceleration_fraction: entry.joint_acceleration.or(common.joint_acceleration),
+            joint_rad_s: None,
+            joint_rad_s2: None,
+            duration_s: entry.duration,
+        };
+        let blend = match entry.blend.or(common.blend) {
+            None | Some(0.0) => Blend::Stop,
+            Some(distance) => Blend::Distance(distance * length),
+        };
+        let (line, _) = self.place(table);
+        Move { line, statement: word.to_owned(), kind, to, X_WB: self.X_WB, X_FT: self.X_FT, speed, blend }
+    }
+}

@@ -1,0 +1,200 @@
+//! Motions told by the path of the tool: a program of moves and a robot become joints over time.
+//!
+//! `file` reads our own path files; robot programs come as a [`Program`] from elsewhere. Both end in [`ToolPath::plan`].
+
+mod file;
+
+use flexarm_kinematics::{Frame, Model, Pose};
+use flexarm_path::program::Program;
+use flexarm_path::{
+    JointBounds, PathError, PathOptions, PlannedMove, ProgramArm, Slowed, SlowedBy, coordinates_of, plan,
+};
+use flexarm_trajectory::Trajectory;
+use nalgebra::DVector;
+
+use crate::robot::tcp_frame;
+
+pub(crate) use file::{is_path_file, read_path_file};
+
+/// A joint reaches its top speed in this time where nothing is known of its acceleration, s.
+const TO_TOP_SPEED: f64 = 0.4;
+/// Acceleration of a joint whose speed is not limited either, rad/s² or m/s².
+const ACCELERATION: f64 = 10.0;
+/// Least singular value below which a path passes near a singular pose, m/rad.
+const NEAR_SINGULAR: f64 = 0.02;
+/// Notes of one kind that are told one by one.
+const TOLD: usize = 4;
+/// The link that ROS gives the axes of the controller's flange, and the one of its base.
+const FLANGE: &str = "tool0";
+const BASE: &str = "base";
+
+/// A motion of the tool with what became of each move.
+#[derive(Debug, Clone)]
+pub struct ToolPath {
+    /// Move by move.
+    pub moves: Vec<PlannedMove>,
+    /// Things worth telling.
+    pub(crate) notes: Vec<String>,
+}
+
+/// What is known of the robot beside its model.
+pub(crate) struct Cell<'a> {
+    pub(crate) model: &'a Model,
+    /// Link that carries the tool centre point.
+    pub(crate) tcp_link: Option<&'a str>,
+    /// Joints that stay, and where.
+    pub(crate) hold: &'a [(String, f64)],
+}
+
+/// Changes to what the robot's description says of its joints.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Overrides {
+    /// Fraction of the speed limits that joint moves use.
+    pub(crate) accelerations: Vec<Option<f64>>,
+    pub(crate) velocities: Vec<Option<f64>>,
+    pub(crate) torques: Vec<Option<f64>>,
+}
+
+impl<'a> Cell<'a> {
+    /// The flange of the controller, the robot's own tool on it, and a note if a link had to be chosen.
+    fn flange(&self) -> (Frame, Pose, Option<String>) {
+        let tcp = tcp_frame(self.model);
+        let named = |name: &str| self.model.frame(name).filter(|frame| frame.body == tcp.body).cloned();
+        let (flange, note) = match (named(FLANGE), self.tcp_link.and_then(named)) {
+            (Some(flange), _) => (flange, None),
+            (None, Some(link)) => {
+                let note = format!(
+                    "tools of the program are taken to stand on link {:?}: the robot has no link {FLANGE:?}",
+                    link.name
+                );
+                (link, Some(note))
+            }
+            (None, None) => {
+                (tcp.clone(), Some("tools of the program are taken to stand on the tool centre point".to_owned()))
+            }
+        };
+        let X_FT = flange.X_BF.inverse() * tcp.X_BF;
+        (flange, X_FT, note)
+    }
+
+    /// Where the controller's world stands in that of the model: its link `base`, if that does not move.
+    fn world(&self) -> Pose {
+        let base = self.model.frame(BASE).filter(|frame| frame.body == 0);
+        base.map_or_else(Pose::identity, |frame| frame.X_BF)
+    }
+
+    /// All coordinates before the program.
+    fn rest(&self) -> DVector<f64> {
+        let coordinates = self.model.coordinates();
+        DVector::from_fn(self.model.nv(), |k, _| {
+            let c = &coordinates[k];
+            let told = self.hold.iter().find(|(joint, _)| *joint == c.joint).map(|(_, value)| *value);
+            told.unwrap_or(0.0f64.max(c.limits.lower).min(c.limits.upper))
+        })
+    }
+
+    /// The arm as the program's controller sees it.
+    pub(crate) fn arm(&self, overrides: &Overrides) -> (ProgramArm<'a>, Vec<String>) {
+        let (flange, X_FT, note) = self.flange();
+        let mut notes: Vec<String> = note.into_iter().collect();
+        let mut assumed = false;
+        let of = |list: &[Option<f64>], k: usize| list.get(k).copied().flatten();
+        let bounds = (0..self.model.nv())
+            .map(|k| {
+                let velocity = of(&overrides.velocities, k).unwrap_or(self.model.coordinates()[k].limits.velocity);
+                let velocity = if velocity > 0.0 { velocity } else { f64::INFINITY };
+                let acceleration = of(&overrides.accelerations, k).unwrap_or_else(|| {
+                    assumed = true;
+                    if velocity.is_finite() { velocity / TO_TOP_SPEED } else { ACCELERATION }
+                });
+                JointBounds { velocity, acceleration, torque: of(&overrides.torques, k) }
+            })
+            .collect();
+        if assumed {
+            notes.push(format!(
+                "accelerations of the joints are not known: each is taken to reach its top speed in {TO_TOP_SPEED} s ([limits] of a \
+                 path file tells them)"
+            ));
+        }
+        let axes = coordinates_of(self.model, &tcp_frame(self.model));
+        let (X_MW, rest) = (self.world(), self.rest());
+        let arm = ProgramArm { model: self.model, flange, X_FT, X_MW, axes, bounds, rest, starts_at_rest: false };
+        (arm, notes)
+    }
+}
+
+impl ToolPath {
+    /// Joints over time for a program.
+    pub(crate) fn plan(
+        program: &Program,
+        arm: &ProgramArm<'_>,
+        options: &PathOptions,
+        mut notes: Vec<String>,
+    ) -> Result<(Trajectory, Self), PathError> {
+        let planned = plan(program, arm, options)?;
+        let place = |line: Option<usize>| line.map_or_else(String::new, |line| format!("line {line}: "));
+        notes.extend(program.notes.iter().map(|note| format!("{}{}", place(note.line), note.text)));
+        let stops = planned.stops.iter().map(|(line, why)| format!("line {line}: no blend: {why}")).collect();
+        notes.extend(first_of(stops));
+        let held = planned.held.join(", ");
+        if !held.is_empty() {
+            notes.push(format!(
+                "the arm has more joints than the path needs: {held} stay while the tool follows its path"
+            ));
+        }
+        notes.extend(tool_note(program, arm));
+        let slowed = planned.moves.iter().filter_map(|of| of.slowed.as_ref().map(|slowed| slowed_note(of, slowed)));
+        notes.extend(first_of(slowed.collect()));
+        let near = planned.moves.iter().filter_map(|of| {
+            let (sigma, t) = of.least_sigma.filter(|(sigma, _)| *sigma < NEAR_SINGULAR)?;
+            Some(format!(
+                "line {}: {}: passes near a singular pose at {t:.3} s (least singular value {sigma:.1e} m/rad): joints move fast \
+                 for little of the tool",
+                of.line, of.statement
+            ))
+        });
+        notes.extend(first_of(near.collect()));
+        Ok((planned.trajectory, Self { moves: planned.moves, notes }))
+    }
+}
+
+/// The first few of a list, and how many are left out.
+fn first_of(mut notes: Vec<String>) -> Vec<String> {
+    let more = notes.len().saturating_sub(TOLD);
+    if more > 0 {
+        notes.truncate(TOLD);
+        notes.push(format!("and {more} more like the last"));
+    }
+    notes
+}
+
+/// A tool of the program that is not the robot's: the error is measured at the robot's.
+fn tool_note(program: &Program, arm: &ProgramArm<'_>) -> Option<String> {
+    use flexarm_path::program::Item;
+    let other = program.items.iter().find_map(|item| match item {
+        Item::Move(of) => {
+            let X_FT = of.X_FT?;
+            let apart = (X_FT.translation.vector - arm.X_FT.translation.vector).norm();
+            (apart > 1e-6).then_some((of.line, apart))
+        }
+        Item::Dwell { .. } => None,
+    })?;
+    Some(format!(
+        "line {}: the program's tool ends {:.1} mm from the robot's tool centre point: the program's follows the path, the error \
+         is measured at the robot's (tcp of the robot file)",
+        other.0,
+        other.1 * 1e3
+    ))
+}
+
+fn slowed_note(of: &PlannedMove, slowed: &Slowed) -> String {
+    let by = match &slowed.by {
+        SlowedBy::JointSpeed(joint) => format!("the speed of joint {joint:?}"),
+        SlowedBy::JointAcceleration(joint) => format!("the acceleration of joint {joint:?}"),
+        SlowedBy::JointTorque(joint) => format!("the torque of joint {joint:?}"),
+        SlowedBy::Turning => "the turning of the tool".to_owned(),
+        SlowedBy::PathAcceleration => "the acceleration across the path".to_owned(),
+    };
+    let (line, statement, t, part) = (of.line, &of.statement, slowed.time_s, 100.0 * slowed.part);
+    format!("line {line}: {statement}: slowed to {part:.0} % of its speed at {t:.3} s by {by}")
+}
