@@ -123,8 +123,12 @@ impl Lines {
             }
             let slope = upper[1] - lower[1];
             let crossing = (lower[0] - upper[0]) / slope;
-            if !(slope < 0.0 && crossing >= -1e-12 && crossing < x) {
+            if !(slope < 0.0 && crossing >= -1e-12) {
                 return None;
+            }
+            // The same lines again: what is left is rounding.
+            if crossing >= x {
+                return Some(x);
             }
             x = crossing.max(0.0);
         }
