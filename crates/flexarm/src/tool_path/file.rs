@@ -14,6 +14,7 @@ use nalgebra::{DVector, Quaternion, Rotation3, Translation3, UnitQuaternion, Vec
 use serde::Deserialize;
 use toml::Spanned;
 
+use super::standard::{Standard, Step};
 use super::{Cell, Overrides, ToolPath};
 use crate::error::Error;
 use crate::robot_file::{RobotFileError, Source};
@@ -28,6 +29,22 @@ struct PathFile {
     limits: BTreeMap<Spanned<String>, LimitsTable>,
     #[serde(rename = "move", default)]
     moves: Vec<Spanned<MoveTable>>,
+    standard: Option<Spanned<StandardTable>>,
+}
+
+/// `[standard]`: a named motion in place of moves.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StandardTable {
+    motion: Standard,
+    /// Of the cube, in the base.
+    centre: [f64; 3],
+    /// Of the cube, or diameter of the circles, or length of the moves.
+    side: Spanned<f64>,
+    rpy: Option<[f64; 3]>,
+    quaternion: Option<[f64; 4]>,
+    near: Option<Vec<f64>>,
+    repeats: Option<usize>,
 }
 
 /// `[path]`.
@@ -156,7 +173,14 @@ pub(crate) fn read_path_file(
         X_FT: frame(&file.path.tool)?,
         arm: &arm,
     };
-    let items = reader.items(&file.moves)?;
+    let items = match &file.standard {
+        None => reader.items(&file.moves)?,
+        Some(standard) if file.moves.is_empty() => reader.standard(standard)?,
+        Some(standard) => {
+            let message = "[standard] is a motion of its own: leave out either it or the [[move]]s";
+            return Err(source.error(standard.span(), message).into());
+        }
+    };
     let program = Program { name: path.display().to_string(), items, ..Program::default() };
     let mut options = PathOptions::default();
     if let Some(rise) = &file.path.rise {
@@ -295,7 +319,8 @@ impl Reader<'_> {
         let (word, kind, point) = if let Some(values) = &entry.joints {
             let q: Vec<f64> = values.get_ref().iter().enumerate().map(|(k, v)| v * self.joint_unit(k)).collect();
             *R = Some(self.orientation_at(&q, values)?);
-            return Ok(self.of(table, "joints", MoveKind::Joint, Target::Joints(q)));
+            let said = format!("joints = {:?}", values.get_ref());
+            return Ok(self.of(table, &said, MoveKind::Joint, Target::Joints(q)));
         } else if let Some(point) = &entry.joint_to {
             ("joint_to", MoveKind::Joint, point)
         } else if let Some(point) = &entry.line {
@@ -329,7 +354,8 @@ impl Reader<'_> {
             Configuration::Near(values.iter().enumerate().map(|(k, v)| v * self.joint_unit(k)).collect())
         });
         let X_BT = Pose::from_parts(Translation3::from(p), turned);
-        Ok(self.of(table, word, kind, Target::Pose { X_BT, configuration }))
+        let said = format!("{word} = {:?}", point.get_ref());
+        Ok(self.of(table, &said, kind, Target::Pose { X_BT, configuration }))
     }
 
     fn spline(
@@ -357,13 +383,49 @@ impl Reader<'_> {
             let p = Vector3::new(point[0], point[1], point[2]) * self.units.length;
             let X_BT = Pose::from_parts(Translation3::from(p), turned);
             let to = Target::Pose { X_BT, configuration: Configuration::Nearest };
-            let mut of = self.of(table, "spline", MoveKind::Spline, to);
+            let mut of = self.of(table, &format!("spline through {point:?}"), MoveKind::Spline, to);
             if k + 1 < n {
                 of.blend = Blend::Pass;
             }
             items.push(Item::Move(of));
         }
         Ok(())
+    }
+
+    fn standard(&self, table: &Spanned<StandardTable>) -> Result<Vec<Item>, RobotFileError> {
+        let entry = table.get_ref();
+        let (line, _) = self.place(table);
+        let R = rotation(entry.rpy, entry.quaternion, self.units).map_err(|m| self.source.error(table.span(), m))?;
+        let R = R.ok_or_else(|| self.source.error(table.span(), "tell how the tool stands: rpy or quaternion"))?;
+        let side = *entry.side.get_ref() * self.units.length;
+        if !(side > 0.0 && side.is_finite()) {
+            return Err(self.source.error(entry.side.span(), "side must be a positive length"));
+        }
+        let (centre, repeats) = (Vector3::from(entry.centre) * self.units.length, entry.repeats.unwrap_or(1));
+        if !(1..=1000).contains(&repeats) {
+            return Err(self.source.error(table.span(), "repeats must be 1 to 1000"));
+        }
+        let steps = entry.motion.steps(centre, side, R, repeats);
+        let count = steps.len();
+        let item = |(k, step): (usize, Step)| {
+            let (kind, X_BT) = match step {
+                Step::Rest(seconds) => return Item::Dwell { line, seconds },
+                Step::To(kind, X_BT) => (kind, X_BT),
+            };
+            let configuration = match (&entry.near, &kind) {
+                (Some(values), MoveKind::Joint) => {
+                    Configuration::Near(values.iter().enumerate().map(|(k, v)| v * self.joint_unit(k)).collect())
+                }
+                _ => Configuration::Nearest,
+            };
+            // The halves of a circle go on into each other.
+            let passes = matches!(kind, MoveKind::Arc { .. }) && k + 1 < count;
+            let blend = if passes { Blend::Pass } else { self.blend(None) };
+            let statement = format!("step {k} of the standard motion");
+            let (speed, to) = (self.speed(None), Target::Pose { X_BT, configuration });
+            Item::Move(Move { line, statement, kind, to, X_WB: self.X_WB, X_FT: self.X_FT, speed, blend })
+        };
+        Ok(steps.into_iter().enumerate().map(item).collect())
     }
 
     /// Unit of a value of the controller's axis `k`.
@@ -390,25 +452,35 @@ impl Reader<'_> {
         Ok((self.arm.X_MW * self.X_WB).rotation.inverse() * X.rotation)
     }
 
-    fn of(&self, table: &Spanned<MoveTable>, word: &str, kind: MoveKind, to: Target) -> Move {
-        let (entry, common, Units { length, angle }) = (table.get_ref(), self.common, self.units);
-        let speed = Speed {
-            linear_m_s: entry.speed.or(common.speed).map(|v| v * length),
-            linear_m_s2: entry.acceleration.or(common.acceleration).map(|v| v * length),
-            linear_m_s3: entry.jerk.or(common.jerk).map(|v| v * length),
-            angular_rad_s: entry.turning.or(common.turning).map(|v| v * angle),
-            angular_rad_s2: entry.turning_acceleration.or(common.turning_acceleration).map(|v| v * angle),
-            joint_fraction: entry.joint_speed.or(common.joint_speed),
-            joint_acceleration_fraction: entry.joint_acceleration.or(common.joint_acceleration),
+    fn of(&self, table: &Spanned<MoveTable>, statement: &str, kind: MoveKind, to: Target) -> Move {
+        let entry = table.get_ref();
+        let (line, _) = self.place(table);
+        let (speed, blend) = (self.speed(Some(entry)), self.blend(entry.blend));
+        Move { line, statement: statement.to_owned(), kind, to, X_WB: self.X_WB, X_FT: self.X_FT, speed, blend }
+    }
+
+    /// What a move says of its speed, else `[path]`.
+    fn speed(&self, entry: Option<&MoveTable>) -> Speed {
+        let (common, Units { length, angle }) = (self.common, self.units);
+        let told = |of: fn(&MoveTable) -> Option<f64>| entry.and_then(of);
+        Speed {
+            linear_m_s: told(|e| e.speed).or(common.speed).map(|v| v * length),
+            linear_m_s2: told(|e| e.acceleration).or(common.acceleration).map(|v| v * length),
+            linear_m_s3: told(|e| e.jerk).or(common.jerk).map(|v| v * length),
+            angular_rad_s: told(|e| e.turning).or(common.turning).map(|v| v * angle),
+            angular_rad_s2: told(|e| e.turning_acceleration).or(common.turning_acceleration).map(|v| v * angle),
+            joint_fraction: told(|e| e.joint_speed).or(common.joint_speed),
+            joint_acceleration_fraction: told(|e| e.joint_acceleration).or(common.joint_acceleration),
             joint_rad_s: None,
             joint_rad_s2: None,
-            duration_s: entry.duration,
-        };
-        let blend = match entry.blend.or(common.blend) {
+            duration_s: told(|e| e.duration),
+        }
+    }
+
+    fn blend(&self, told: Option<f64>) -> Blend {
+        match told.or(self.common.blend) {
             None | Some(0.0) => Blend::Stop,
-            Some(distance) => Blend::Distance(distance * length),
-        };
-        let (line, _) = self.place(table);
-        Move { line, statement: word.to_owned(), kind, to, X_WB: self.X_WB, X_FT: self.X_FT, speed, blend }
+            Some(distance) => Blend::Distance(distance * self.units.length),
+        }
     }
 }

@@ -3,6 +3,7 @@
 //! `file` reads our own path files; robot programs come as a [`Program`] from elsewhere. Both end in [`ToolPath::plan`].
 
 mod file;
+mod standard;
 
 use flexarm_kinematics::{Frame, Model, Pose};
 use flexarm_path::program::Program;

@@ -1,0 +1,118 @@
+//! Named motions of standards within a cube of the workspace, as moves of the tool.
+//!
+//! * Poses and paths after ISO 9283: the test plane holds two opposite edges of the cube along y and its diagonal in x and z; pose
+//!   P1 is its centre, P2 to P5 lie at 80 % of the way to its corners, the square path runs through P2 to P5 with sharp corners,
+//!   the circles have diameters of 80 % and 10 % of the side.
+//! * Circles in the three planes of the cube, there and back, after ISO 230-4.
+//! * Settling: short moves along each axis, each followed by a rest.
+
+use flexarm_kinematics::Pose;
+use flexarm_path::program::MoveKind;
+use nalgebra::{Rotation3, Translation3, Vector3};
+use serde::Deserialize;
+
+/// Part of the way from the centre to a corner at which the poses lie.
+const TOWARDS_CORNER: f64 = 0.8;
+/// Diameters of the circles of the path test, of the side of the cube.
+const LARGE: f64 = 0.8;
+const SMALL: f64 = 0.1;
+/// Rest at each pose, s.
+const REST: f64 = 1.0;
+
+/// Which motion.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub(super) enum Standard {
+    /// P1 to P5, a rest at each.
+    Iso9283Poses,
+    /// The square and two circles in the test plane.
+    Iso9283Paths,
+    /// Circles in the planes xy, yz and zx, in both senses.
+    Circularity,
+    /// Moves along x, y and z, a rest after each.
+    Settle,
+}
+
+/// One step of a standard motion.
+pub(super) enum Step {
+    /// To a pose of the tool in the base.
+    To(MoveKind, Pose),
+    /// s.
+    Rest(f64),
+}
+
+impl Standard {
+    /// The steps in a cube; `repeats` cycles.
+    pub(super) fn steps(self, centre: Vector3<f64>, side: f64, R: Rotation3<f64>, repeats: usize) -> Vec<Step> {
+        let pose = |p: Vector3<f64>| Pose::from_parts(Translation3::from(p), R);
+        let joint = |p: Vector3<f64>| Step::To(MoveKind::Joint, pose(p));
+        let line = |p: Vector3<f64>| Step::To(MoveKind::Line, pose(p));
+        let corner = |y: f64, d: f64| centre + Vector3::new(d, y, -d) * (0.5 * side * TOWARDS_CORNER);
+        let corners = [corner(1.0, 1.0), corner(-1.0, 1.0), corner(-1.0, -1.0), corner(1.0, -1.0)];
+        let mut steps = vec![joint(centre)];
+        for _ in 0..repeats {
+            match self {
+                Self::Iso9283Poses => {
+                    for p in corners.iter().rev().chain([&centre]) {
+                        steps.extend([line(*p), Step::Rest(REST)]);
+                    }
+                }
+                Self::Iso9283Paths => {
+                    steps.extend(corners.iter().chain([&corners[0]]).map(|p| line(*p)));
+                    let (u, v) = (Vector3::y(), Vector3::new(1.0, 0.0, -1.0).normalize());
+                    for part in [LARGE, SMALL] {
+                        steps.extend(circle(centre, 0.5 * part * side, u, v, &pose));
+                    }
+                }
+                Self::Circularity => {
+                    let (x, y, z) = (Vector3::x(), Vector3::y(), Vector3::z());
+                    for (u, v) in [(x, y), (y, z), (z, x)] {
+                        steps.extend(circle(centre, 0.5 * side, u, v, &pose));
+                        steps.extend(circle(centre, 0.5 * side, u, -v, &pose));
+                    }
+                }
+                Self::Settle => {
+                    for axis in [Vector3::x(), Vector3::y(), Vector3::z()] {
+                        for p in [centre + axis * (0.5 * side), centre - axis * (0.5 * side)] {
+                            steps.extend([line(p), Step::Rest(REST)]);
+                        }
+                    }
+                }
+            }
+        }
+        steps
+    }
+}
+
+/// A line to the circle, once round by two halves without a stop between them, and a stop.
+fn circle(c: Vector3<f64>, r: f64, u: Vector3<f64>, v: Vector3<f64>, pose: &dyn Fn(Vector3<f64>) -> Pose) -> [Step; 3] {
+    let half = |via: Vector3<f64>, to: Vector3<f64>| {
+        let kind = MoveKind::Arc { via: c + via * r, via_rotation: None, angle: None, turns_with_path: false };
+        Step::To(kind, pose(c + to * r))
+    };
+    [Step::To(MoveKind::Line, pose(c + u * r)), half(v, -u), half(-v, u)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Truth: the standard's plane and distances, by hand for a cube of 1 m around the origin.
+    #[test]
+    fn poses_lie_in_the_test_plane_at_four_fifths_of_the_way_to_its_corners() {
+        let steps = Standard::Iso9283Poses.steps(Vector3::zeros(), 1.0, Rotation3::identity(), 2);
+        let points: Vec<Vector3<f64>> = steps
+            .iter()
+            .filter_map(|step| match step {
+                Step::To(_, X) => Some(X.translation.vector),
+                Step::Rest(_) => None,
+            })
+            .collect();
+        assert_eq!(points.len(), 11);
+        for p in &points {
+            assert!((p.x + p.z).abs() < 1e-15);
+            assert!(p.norm() < 1e-15 || (p.norm() - 0.4 * 3f64.sqrt()).abs() < 1e-15);
+        }
+        assert!((points[1] - Vector3::new(-0.4, 0.4, 0.4)).norm() < 1e-15);
+    }
+}
