@@ -34,6 +34,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
 mod aba;
+mod analytic_ik;
 mod axis_motion;
 mod crba;
 mod data;
@@ -41,9 +42,11 @@ mod energy;
 mod inverse_kinematics;
 mod kinematics;
 pub mod lanes;
+mod many_starts;
 mod mechanism;
 mod modal;
 mod model;
+mod redundancy;
 mod rnea;
 mod static_tangent;
 
@@ -57,6 +60,10 @@ pub use flexarm_spatial::lanes::{OverLanes, with_lanes};
 pub use flexarm_spatial::products;
 
 pub use aba::{Roles, forward_dynamics, hybrid_dynamics};
+pub use analytic_ik::{
+    AXIS_TOLERANCE, AXIS_TOLERANCE_RAD, AnalyticArm, ArmClass, Branch, ControllerAxes, Miss, NoAnalyticIk, POSE_TOLERANCE,
+    PositionForm, Selection, Solution, Solutions, abb_quadrant, kuka_turn,
+};
 pub use axis_motion::AxisMotion;
 pub use crba::{mass_matrix, mass_matrix_at_poses};
 pub use data::{Data, State};
@@ -68,10 +75,12 @@ pub use kinematics::{
     forward_kinematics, forward_kinematics_velocity, frame_jacobian, frame_jacobian_derivative, frame_twist,
     world_poses,
 };
+pub use many_starts::{FoundSolution, inverse_kinematics_from_many_starts};
 pub use mechanism::{Joint, JointKind, Limits, Link, LinkInertia, Mechanism, Mimic};
 pub use modal::{InterfaceShape, ModalBody};
 pub use model::{
     Body, Coordinate, ElasticGroup, Frame, JointMotion, MOST_COORDINATES, Model, ModelError, moment_floor,
 };
+pub use redundancy::{NullSpaceRule, RuledSolution, inverse_kinematics_with_rule};
 pub use rnea::{gravity_forces, inverse_dynamics, nonlinear_effects};
 pub use static_tangent::{PointLoad, StaticTangent};

@@ -1,0 +1,361 @@
+//! Which of the solutions: sides of shoulder, elbow and wrist, the words of programs, and whole turns within limits.
+//!
+//! Sources: [KUKA KSS] for status and turn, [ABB RAPID] for confdata.
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use nalgebra::Vector3;
+
+use super::position::{PositionForm, feet};
+use super::screw::{Screw, wrapped};
+use super::trig::across;
+use super::{AnalyticArm, ArmClass, Kernel, Solution, Solutions};
+
+/// Side of shoulder, elbow and wrist; functions of the joint values alone that tell the solutions of a pose apart.
+///
+/// Spherical wrist: `shoulder` is set where the wrist centre lies ahead of axis 1, `elbow` where joint 3 is beyond the angle at which
+/// the arm is stretched (in its positive sense, within half a turn), `wrist` where joint 5 is beyond the angle at which the wrist
+/// is straight (the one next to zero). Where axes 1 and 2 are parallel or axes 2 and 3 meet, `shoulder` and `elbow` are the two
+/// roots of the first and of the second equation solved. Arms solved from the tool have the same with `shoulder` and `wrist`
+/// exchanged. Three parallel axes: sides of the first angle, of the two bars, and of the other.
+///
+/// Each of the eight labels belongs to one solution at most, but where a quartic or a polynomial of degree eight is solved
+/// ([`PositionForm::General`], [`ArmClass::ThreeParallel`] without meeting axes): there several solutions may share one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Branch {
+    /// Wrist centre ahead of axis 1.
+    pub shoulder: bool,
+    /// Elbow bent in the positive sense of its joint.
+    pub elbow: bool,
+    /// Joint 5 beyond the straight wrist in its positive sense.
+    pub wrist: bool,
+}
+
+impl Branch {
+    /// 0 to 7: shoulder 4, elbow 2, wrist 1.
+    pub fn index(self) -> usize {
+        4 * usize::from(self.shoulder) + 2 * usize::from(self.elbow) + usize::from(self.wrist)
+    }
+}
+
+/// How the joint values of a model become the axes of the controller whose words are used: `axis = sign q + offset`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ControllerAxes {
+    /// 1 or -1 for each joint.
+    pub sign: [f64; 6],
+    /// Value of the axis where the joint is at zero (rad).
+    pub offset: [f64; 6],
+}
+
+impl ControllerAxes {
+    /// Joint values are the controller's.
+    pub const SAME: Self = Self { sign: [1.0; 6], offset: [0.0; 6] };
+
+    /// Value of an axis (rad), 0 to 5.
+    pub fn axis(&self, k: usize, q: &[f64; 6]) -> f64 {
+        self.sign[k] * q[k] + self.offset[k]
+    }
+}
+
+impl Default for ControllerAxes {
+    fn default() -> Self {
+        Self::SAME
+    }
+}
+
+/// What a program says of the solution it means.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Selection {
+    /// The nearest.
+    #[default]
+    Nearest,
+    /// KUKA's status and turn ([`AnalyticArm::kuka_status`], [`kuka_turn`]).
+    Kuka {
+        /// Bits of S; `None`: any.
+        status: Option<u8>,
+        /// Bits of T; `None`: any.
+        turn: Option<u8>,
+    },
+    /// ABB's confdata ([`AnalyticArm::abb_configuration`]).
+    Abb {
+        /// Quarter turns of axes 1, 4, 6.
+        quadrants: [i32; 3],
+        /// Configuration number, 0 to 7.
+        cfx: i32,
+    },
+    /// Words; what is `None` is the nearest.
+    Words {
+        /// Wrist centre ahead of axis 1.
+        front: Option<bool>,
+        /// Elbow up.
+        elbow_up: Option<bool>,
+        /// Axis 5 negative.
+        wrist_flipped: Option<bool>,
+    },
+    /// One label.
+    Branch(Branch),
+}
+
+/// KUKA's turn: bit k is set where axis k + 1 is negative (rad; a controller disregards it within some degrees of zero).
+pub fn kuka_turn(q: &[f64; 6], axes: &ControllerAxes) -> u8 {
+    (0..6).fold(0, |bits, k| bits | u8::from(axes.axis(k, q) < 0.0) << k)
+}
+
+/// ABB's quarter turn of an axis (rad): 0 for 0 to 90 degrees, -1 for -90 to 0, and so on.
+pub fn abb_quadrant(axis: f64) -> i32 {
+    (axis / FRAC_PI_2).floor() as i32
+}
+
+/// Directions by which sides are told, at zero joint values.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sides {
+    /// Across axes 1 and 2, ahead (unit).
+    front: Vector3<f64>,
+    /// Whether a positive angle of joint 3 turns the forearm ahead and down where the upper arm stands upright.
+    elbow_forward: bool,
+    /// Whether the positive side of the wrist is that above `phi` (else of `phi + π`).
+    wrist_at_phi: bool,
+}
+
+impl Sides {
+    pub(crate) fn new(kernel: &Kernel, reversed: bool, against_gravity: Vector3<f64>) -> Self {
+        let (axes, fan, reach) = match kernel {
+            Kernel::Wrist(k) => (&k.axes, Some(k.fan), k.reach),
+            Kernel::Parallel234(k) => (&k.axes, Some(k.fan), k.reach),
+            Kernel::Parallel123(k) => (&k.axes, None, k.reach),
+        };
+        let wrist_at_phi = fan.is_none_or(|f| wrapped(f.phi).abs() <= FRAC_PI_2 + 1e-9);
+        let side = axes[0].h.cross(&axes[1].h);
+        let mut sides = Self { front: across(&axes[0].h), elbow_forward: true, wrist_at_phi };
+        if side.norm() < 1e-6 {
+            return sides;
+        }
+        let (foot, shoulder) = feet(&axes[0], &axes[1]);
+        let floor = 1e-6 * reach;
+        let first = |values: &[f64]| values.iter().copied().find(|v| v.abs() > floor).unwrap_or(1.0).signum();
+        let front = side.normalize();
+        let center = if let Kernel::Wrist(k) = kernel { k.center - axes[0].o } else { Vector3::zeros() };
+        sides.front = front * first(&[front.dot(&(shoulder - foot)), front.dot(&center)]);
+        let up = axes[0].h;
+        let height = if reversed { 0.0 } else { up.dot(&foot) };
+        let up = up * first(&[height, up.dot(&against_gravity)]);
+        sides.elbow_forward = axes[2].h.dot(&up.cross(&sides.front)) > 0.0;
+        sides
+    }
+}
+
+impl AnalyticArm {
+    /// Label of joint values (rad).
+    pub fn branch(&self, q: &[f64; 6]) -> Branch {
+        let mut q = *q;
+        if self.reversed {
+            q.reverse();
+        }
+        let [near, elbow, far] = match &self.kernel {
+            Kernel::Wrist(k) => {
+                let [base, elbow] = self.arm_sides(&k.axes, k.form, &k.center, &q);
+                [base, elbow, self.beyond(k.fan.phi, q[4])]
+            }
+            Kernel::Parallel234(k) => {
+                let [s1, s2, s3, s4, s5, _] = &k.axes;
+                let (t2, t3, t4) = (s2.at(q[1]), s3.at(q[2]), s4.at(q[3]));
+                let point = t2.point(&t3.point(&t4.point(&s5.at(q[4]).point(&k.near.1))));
+                let base = s1.h.cross(&s2.h).dot(&(point - s1.o)) >= 0.0;
+                [base, bent(s2, s3, &t3.point(&s4.o)), self.beyond(k.fan.phi, q[4])]
+            }
+            Kernel::Parallel123(k) => {
+                let [s1, s2, s3, s4, s5, s6] = &k.axes;
+                let (t4, t5) = (s4.at(q[3]), s5.at(q[4]));
+                let lever = t4.vector(&(k.near.1 - s4.o));
+                let fifth = t4.inverse().vector(&s1.h).dot(&s5.h.cross(&t5.vector(&s6.h)));
+                [bent(s1, s2, &s2.at(q[1]).point(&s3.o)), s1.h.dot(&s4.h.cross(&lever)) <= 0.0, fifth <= 0.0]
+            }
+        };
+        match self.reversed {
+            true => Branch { shoulder: far, elbow, wrist: near },
+            false => Branch { shoulder: near, elbow, wrist: far },
+        }
+    }
+
+    /// Sides of the two roots of the position problem.
+    fn arm_sides(&self, axes: &[Screw; 6], form: PositionForm, center: &Vector3<f64>, q: &[f64; 6]) -> [bool; 2] {
+        let [s1, s2, s3, ..] = axes;
+        let c3 = s3.at(q[2]).point(center);
+        let c2 = s2.at(q[1]).point(&c3);
+        match form {
+            PositionForm::Parallel23 | PositionForm::Intersecting12 | PositionForm::General => {
+                // The distance of the centre from o_2 falls with the angle beyond the stretched arm.
+                let rate = (s3.o - s2.o).dot(&s3.h.cross(&(c3 - s3.o)));
+                [self.sides.front.dot(&(c2 - s1.o)) >= 0.0, rate <= 0.0]
+            }
+            PositionForm::Parallel12 => [bent(s1, s2, &c2), s1.h.dot(&s3.h.cross(&(c3 - s3.o))) <= 0.0],
+            PositionForm::Intersecting23 => {
+                [(s2.o - s1.o).dot(&s1.h.cross(&(c2 - s1.o))) >= 0.0, s3.h.dot(&s2.h.cross(&(c3 - s2.o))) >= 0.0]
+            }
+        }
+    }
+
+    fn beyond(&self, phi: f64, q: f64) -> bool {
+        let phi = if self.sides.wrist_at_phi { phi } else { phi + PI };
+        (q - phi).sin() >= 0.0
+    }
+
+    /// Whether words of industrial arms have a meaning: spherical wrist, axes 2 and 3 parallel and across axis 1.
+    fn is_industrial(&self) -> bool {
+        let Kernel::Wrist(k) = &self.kernel else { return false };
+        self.class == ArmClass::SphericalWrist(PositionForm::Parallel23) && k.axes[0].h.dot(&k.axes[1].h).abs() < 0.5
+    }
+
+    /// Whether the forearm is bent ahead and down of the upper arm, as seen where this stands upright.
+    fn bent_forward(&self, branch: Branch) -> bool {
+        branch.elbow == self.sides.elbow_forward
+    }
+
+    /// Whether the elbow is up: above the line from axis 2 to the wrist centre where this lies farther out than axis 2.
+    ///
+    /// `None` for other arms than those with a spherical wrist and axes 2 and 3 parallel.
+    pub fn elbow_up(&self, q: &[f64; 6]) -> Option<bool> {
+        let branch = self.branch(q);
+        self.is_industrial().then(|| self.bent_forward(branch) == branch.shoulder)
+    }
+
+    /// KUKA's status of joint values (rad): bit 0 set where the wrist centre lies behind axis 1 (x in the system that turns with axis
+    /// 1 negative), bit 1 where axis 3 is beyond the angle of the stretched arm, bit 2 where axis 5 is positive.
+    ///
+    /// Ahead is where axis 2 lies from axis 1; where they meet, where the wrist centre is at zero joint values. Bits 3 and 4 (accuracy
+    /// model) are zero. `None` for other arms than those with a spherical wrist and axes 2 and 3 parallel.
+    pub fn kuka_status(&self, q: &[f64; 6], axes: &ControllerAxes) -> Option<u8> {
+        let branch = self.branch(q);
+        let bits = u8::from(!branch.shoulder)
+            + 2 * u8::from(self.bent_forward(branch))
+            + 4 * u8::from(wrapped(axes.axis(4, q)) > 0.0);
+        self.is_industrial().then_some(bits)
+    }
+
+    /// ABB's quarter turns of axes 1, 4 and 6 and configuration number of joint values (rad).
+    ///
+    /// `cfx` = 4 where the wrist centre lies behind axis 1, + 2 where it lies behind the lower arm, + 1 where axis 5 is negative. `None`
+    /// for other arms than those with a spherical wrist and axes 2 and 3 parallel.
+    pub fn abb_configuration(&self, q: &[f64; 6], axes: &ControllerAxes) -> Option<([i32; 3], i32)> {
+        let branch = self.branch(q);
+        let cfx = 4 * i32::from(!branch.shoulder)
+            + 2 * i32::from(!self.bent_forward(branch))
+            + i32::from(wrapped(axes.axis(4, q)) < 0.0);
+        self.is_industrial().then(|| ([0, 3, 5].map(|k| abb_quadrant(axes.axis(k, q))), cfx))
+    }
+
+    /// Whether joint values are on the branch that is meant, whole turns apart.
+    fn is_on(&self, q: &[f64; 6], selection: &Selection, axes: &ControllerAxes) -> bool {
+        let agree = |wanted: Option<bool>, found: Option<bool>| wanted.is_none() || wanted == found;
+        match *selection {
+            Selection::Nearest => true,
+            Selection::Branch(branch) => self.branch(q) == branch,
+            Selection::Kuka { status, .. } => {
+                status.is_none_or(|s| self.kuka_status(q, axes).is_some_and(|found| found == s & 7))
+            }
+            Selection::Abb { cfx, .. } => self.abb_configuration(q, axes).is_some_and(|(_, found)| found == cfx),
+            Selection::Words { front, elbow_up, wrist_flipped } => {
+                let industrial = self.is_industrial();
+                agree(front, industrial.then(|| self.branch(q).shoulder))
+                    && agree(elbow_up, self.elbow_up(q))
+                    && agree(wrist_flipped, industrial.then(|| wrapped(axes.axis(4, q)) < 0.0))
+            }
+        }
+    }
+
+    /// The solution that is meant, with the whole turns that are meant, within the limits and nearest to `near` (rad).
+    ///
+    /// Bits and quadrants of whole turns are those of each axis with its turns, so that an axis at 200 degrees is not at -160. `None`: no
+    /// solution on that branch within the limits.
+    pub fn choose(
+        &self,
+        solutions: &Solutions,
+        selection: &Selection,
+        axes: &ControllerAxes,
+        near: &[f64; 6],
+    ) -> Option<[f64; 6]> {
+        let fits = |k: usize, q: f64| {
+            let axis = axes.sign[k] * q + axes.offset[k];
+            match *selection {
+                Selection::Kuka { turn: Some(turn), .. } => (axis < 0.0) == (turn >> k & 1 == 1),
+                Selection::Abb { quadrants, .. } => match k {
+                    0 => abb_quadrant(axis) == quadrants[0],
+                    3 => abb_quadrant(axis) == quadrants[1],
+                    5 => abb_quadrant(axis) == quadrants[2],
+                    _ => true,
+                },
+                _ => true,
+            }
+        };
+        let mut best: Option<(f64, [f64; 6])> = None;
+        for solution in solutions.iter().filter(|s| self.is_on(&s.q, selection, axes)) {
+            let Some(q) = self.nearest_copy(&solution.q, near, fits) else { continue };
+            let distance = q.iter().zip(near).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+            if best.is_none_or(|(d, _)| distance < d) {
+                best = Some((distance, q));
+            }
+        }
+        best.map(|(_, q)| q)
+    }
+
+    /// The copy of joint values by whole turns that is within the limits and nearest to `near` (rad).
+    pub fn nearest_within_limits(&self, q: &[f64; 6], near: &[f64; 6]) -> Option<[f64; 6]> {
+        self.nearest_copy(q, near, |_, _| true)
+    }
+
+    /// Shows every copy of joint values by whole turns that is within the limits; a joint without limits has the one in (-π, π].
+    pub fn copies_within_limits(&self, q: &[f64; 6], mut visit: impl FnMut(&[f64; 6])) {
+        let ranges: [_; 6] = std::array::from_fn(|k| self.turns(k, wrapped(q[k])));
+        if ranges.iter().any(|(low, high)| low > high) {
+            return;
+        }
+        let mut turns = ranges.map(|r| r.0);
+        loop {
+            visit(&std::array::from_fn(|k| wrapped(q[k]) + TAU * turns[k] as f64));
+            let Some(k) = (0..6).find(|&k| turns[k] < ranges[k].1) else { return };
+            turns[k] += 1;
+            for (turn, range) in turns[..k].iter_mut().zip(&ranges) {
+                *turn = range.0;
+            }
+        }
+    }
+
+    /// Whole turns that keep a joint within its limits, first and last.
+    fn turns(&self, k: usize, q: f64) -> (i64, i64) {
+        let (lower, upper) = self.limits[k];
+        if !(lower.is_finite() && upper.is_finite()) {
+            let inside = q >= lower - LIMIT_SLACK && q <= upper + LIMIT_SLACK;
+            return if inside { (0, 0) } else { (0, -1) };
+        }
+        (((lower - LIMIT_SLACK - q) / TAU).ceil() as i64, ((upper + LIMIT_SLACK - q) / TAU).floor() as i64)
+    }
+
+    fn nearest_copy(&self, q: &[f64; 6], near: &[f64; 6], fits: impl Fn(usize, f64) -> bool) -> Option<[f64; 6]> {
+        let mut nearest = [0.0; 6];
+        for k in 0..6 {
+            let (lower, upper) = self.limits[k];
+            let middle = ((near[k] - q[k]) / TAU).round();
+            // What fits may be some turns away; limits hold the search to a few.
+            let copies = (-4..=4).map(|turn| q[k] + TAU * (middle + f64::from(turn)));
+            let inside = copies.filter(|x| *x >= lower - LIMIT_SLACK && *x <= upper + LIMIT_SLACK && fits(k, *x));
+            nearest[k] = inside.min_by(|a, b| (a - near[k]).abs().total_cmp(&(b - near[k]).abs()))?;
+        }
+        Some(nearest)
+    }
+}
+
+/// By how much a joint may be beyond its limit, for rounding (rad).
+const LIMIT_SLACK: f64 = 1e-12;
+
+/// Whether the second of two parallel bars is turned in the positive sense of its joint against the first.
+fn bent(first: &Screw, second: &Screw, end: &Vector3<f64>) -> bool {
+    second.h.dot(&(second.o - first.o).cross(&(end - second.o))) >= 0.0
+}
+
+impl Solutions {
+    /// The solution nearest to joint values (rad), whole turns apart.
+    pub fn nearest(&self, q: &[f64; 6]) -> Option<&Solution> {
+        let distance = |s: &Solution| s.q.iter().zip(q).map(|(a, b)| wrapped(a - b).powi(2)).sum::<f64>();
+        self.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))
+    }
+}

@@ -1,0 +1,312 @@
+//! Equations in one angle, in closed form or by all roots of a polynomial.
+//!
+//! ```text
+//! a cos t + b sin t = c                          two roots, or the angle that misses least
+//! c_0 + 2 Re sum_k c_k e^{i k t} = 0             up to 2 n roots, as points of the unit circle
+//! ```
+
+use nalgebra::{Complex, Vector3};
+
+/// A list of bounded length that lives on the stack.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct List<T: Copy, const N: usize> {
+    items: [T; N],
+    n: usize,
+}
+
+impl<T: Copy, const N: usize> List<T, N> {
+    pub(crate) fn new(blank: T) -> Self {
+        Self { items: [blank; N], n: 0 }
+    }
+
+    /// Adds an item; the classes' numbers of roots bound how many there can be.
+    pub(crate) fn push(&mut self, item: T) {
+        assert!(self.n < N, "more roots than the equations can have");
+        self.items[self.n] = item;
+        self.n += 1;
+    }
+
+    pub(crate) fn as_slice(&self) -> &[T] {
+        &self.items[..self.n]
+    }
+
+    pub(crate) fn as_mut_slice(&mut self) -> &mut [T] {
+        &mut self.items[..self.n]
+    }
+
+    pub(crate) fn clear(&mut self) {
+        self.n = 0;
+    }
+}
+
+/// Roots of an equation in one angle (rad).
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Roots {
+    angles: [f64; 2],
+    n: usize,
+    /// Whether every angle solves it; the one given is the hint.
+    pub(crate) free: bool,
+}
+
+impl Roots {
+    pub(crate) fn two(center: f64, half: f64) -> Self {
+        Self { angles: [center + half, center - half], n: if half == 0.0 { 1 } else { 2 }, free: false }
+    }
+
+    pub(crate) fn angles(&self) -> &[f64] {
+        &self.angles[..self.n]
+    }
+}
+
+/// Roots of `a cos t + b sin t = c`; where there are none, the one angle that misses least.
+///
+/// * `floor`: where `hypot(a, b)` is not above it, the angle is free and the hint is its representative.
+pub(crate) fn linear(a: f64, b: f64, c: f64, floor: f64, hint: f64) -> Roots {
+    let size = a.hypot(b);
+    if size <= floor {
+        return Roots { angles: [hint; 2], n: 1, free: true };
+    }
+    let room = (size - c) * (size + c);
+    let half = if room > 0.0 { room.sqrt().atan2(c) } else if c > 0.0 { 0.0 } else { std::f64::consts::PI };
+    if half == std::f64::consts::PI {
+        return Roots::two(b.atan2(a) + half, 0.0);
+    }
+    Roots::two(b.atan2(a), half)
+}
+
+/// `(k, a, b)` of `u · R(h, t) v = k + a cos t + b sin t`.
+pub(crate) fn dot_turned(u: &Vector3<f64>, h: &Vector3<f64>, v: &Vector3<f64>) -> (f64, f64, f64) {
+    let k = u.dot(h) * h.dot(v);
+    (k, u.dot(v) - k, u.dot(&h.cross(v)))
+}
+
+/// The angle about `h` that turns the part of `a` across `h` onto that of `b`, and the smaller of their lengths.
+pub(crate) fn angle_about(h: &Vector3<f64>, a: &Vector3<f64>, b: &Vector3<f64>) -> (f64, f64) {
+    let (a, b) = (a - h * h.dot(a), b - h * h.dot(b));
+    (h.dot(&a.cross(&b)).atan2(a.dot(&b)), a.norm().min(b.norm()))
+}
+
+/// A vector across `h` of unit length.
+pub(crate) fn across(h: &Vector3<f64>) -> Vector3<f64> {
+    let e = Vector3::ith(h.iamin(), 1.0);
+    (e - h * h.dot(&e)).normalize()
+}
+
+/// Angles from a vector `v = R(h, t) w` at cosine `u · v`, near the ends of its range without loss of digits.
+///
+/// ```text
+/// u · R(h, t) w = a + b cos(t - phi),     t = phi ± d,     tan²(d/2) = (a + b - u·v) / (u·v - a + b)
+/// ```
+/// Where the range ends at ±1 (`w` can be turned onto `u`: the straight wrist), `1 - u·v` is `|u - v|²/2`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Fan {
+    pub(crate) phi: f64,
+    a: f64,
+    b: f64,
+}
+
+impl Fan {
+    pub(crate) fn new(u: &Vector3<f64>, h: &Vector3<f64>, w: &Vector3<f64>) -> Self {
+        let (a, cosine, sine) = dot_turned(u, h, w);
+        Self { phi: sine.atan2(cosine), a, b: cosine.hypot(sine) }
+    }
+
+    pub(crate) fn angles(&self, u: &Vector3<f64>, v: &Vector3<f64>) -> Roots {
+        const UNIT: f64 = 1e-14;
+        let cosine = u.dot(v);
+        let (top, bottom) = (self.a + self.b, self.a - self.b);
+        let below = if (top - 1.0).abs() < UNIT { 0.5 * (u - v).norm_squared() } else { (top - cosine).max(0.0) };
+        let above = if (bottom + 1.0).abs() < UNIT { 0.5 * (u + v).norm_squared() } else { (cosine - bottom).max(0.0) };
+        let half = 2.0 * below.sqrt().atan2(above.sqrt());
+        match half == std::f64::consts::PI {
+            true => Roots::two(self.phi + half, 0.0),
+            false => Roots::two(self.phi, half),
+        }
+    }
+}
+
+/// Highest degree of a [`TrigPolynomial`].
+const MOST: usize = 4;
+
+/// `c_0 + 2 Re sum_k c_k e^{i k t}`, degree at most four; `c_0` is real.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TrigPolynomial {
+    c: [Complex<f64>; MOST + 1],
+    degree: usize,
+}
+
+impl TrigPolynomial {
+    /// `k + a cos t + b sin t`.
+    pub(crate) fn affine(k: f64, a: f64, b: f64) -> Self {
+        let mut c = [Complex::new(0.0, 0.0); MOST + 1];
+        c[0].re = k;
+        c[1] = Complex::new(0.5 * a, -0.5 * b);
+        Self { c, degree: 1 }
+    }
+
+    fn coefficient(&self, k: isize) -> Complex<f64> {
+        let c = self.c[k.unsigned_abs()];
+        if k < 0 { c.conj() } else { c }
+    }
+
+    /// The product, whose degree is the sum of theirs.
+    pub(crate) fn times(&self, other: &Self) -> Self {
+        let degree = self.degree + other.degree;
+        let (n, m) = (self.degree as isize, other.degree as isize);
+        let mut c = [Complex::new(0.0, 0.0); MOST + 1];
+        for (k, c) in c.iter_mut().enumerate().take(degree + 1) {
+            let k = k as isize;
+            for j in (k - m).max(-n)..=n.min(k + m) {
+                *c += self.coefficient(j) * other.coefficient(k - j);
+            }
+        }
+        Self { c, degree }
+    }
+
+    pub(crate) fn plus(&self, other: &Self, factor: f64) -> Self {
+        let mut sum = *self;
+        sum.degree = self.degree.max(other.degree);
+        for (c, o) in sum.c.iter_mut().zip(&other.c) {
+            *c += o * factor;
+        }
+        sum
+    }
+
+    /// Value and slope.
+    pub(crate) fn at(&self, t: f64) -> (f64, f64) {
+        let turn = Complex::new(t.cos(), t.sin());
+        let (mut value, mut slope, mut power) = (self.c[0].re, 0.0, turn);
+        for k in 1..=self.degree {
+            let term = self.c[k] * power;
+            value += 2.0 * term.re;
+            slope -= 2.0 * k as f64 * term.im;
+            power *= turn;
+        }
+        (value, slope)
+    }
+
+    /// Angles of all roots that lie within `width` of the unit circle, refined; without one, those of all roots (which miss).
+    ///
+    /// The polynomial `z^n f(z)` of degree 2n is solved by Aberth's simultaneous iteration.
+    pub(crate) fn roots(&self, width: f64) -> List<f64, { 2 * MOST }> {
+        let mut angles = List::new(0.0);
+        let largest = self.c.iter().fold(0.0_f64, |m, c| m.max(c.norm()));
+        let mut degree = self.degree;
+        while degree > 0 && self.c[degree].norm() <= 1e-14 * largest {
+            degree -= 1;
+        }
+        if degree == 0 {
+            return angles;
+        }
+        let z = self.aberth(degree);
+        let z = &z[..2 * degree];
+        for only_near in [true, false] {
+            for z in z.iter().filter(|z| !only_near || (z.norm() - 1.0).abs() < width) {
+                angles.push(self.refined(z.arg()));
+            }
+            if !angles.as_slice().is_empty() {
+                break;
+            }
+        }
+        angles
+    }
+
+    /// All complex roots of `z^n f(z)`.
+    fn aberth(&self, degree: usize) -> [Complex<f64>; 2 * MOST] {
+        let n = 2 * degree;
+        let mut z = [Complex::new(0.0, 0.0); 2 * MOST];
+        for (j, z) in z.iter_mut().enumerate().take(n) {
+            // Off the circle and unevenly: points on it, or mirrored in it, would stay so.
+            let angle = 0.4 + std::f64::consts::TAU * j as f64 / n as f64;
+            *z = Complex::from_polar(0.8 + 0.13 * ((j * 5) % n) as f64 / n as f64, angle);
+        }
+        for _ in 0..80 {
+            let mut largest = 0.0_f64;
+            for j in 0..n {
+                let (mut p, mut slope) = (Complex::new(0.0, 0.0), Complex::new(0.0, 0.0));
+                for k in (0..=n).rev() {
+                    slope = slope * z[j] + p;
+                    p = p * z[j] + self.coefficient(k as isize - degree as isize);
+                }
+                if p == Complex::new(0.0, 0.0) {
+                    continue;
+                }
+                let repulsion: Complex<f64> =
+                    (0..n).filter(|&i| i != j && z[i] != z[j]).map(|i| (z[j] - z[i]).inv()).sum();
+                let step = (slope / p - repulsion).inv();
+                if step.re.is_finite() && step.im.is_finite() {
+                    z[j] -= step;
+                    largest = largest.max(step.norm() / z[j].norm().max(1e-3));
+                }
+            }
+            if largest < 1e-13 {
+                break;
+            }
+        }
+        z
+    }
+
+    /// Newton's method from an angle near a root; stays where it would go far (a double root).
+    fn refined(&self, start: f64) -> f64 {
+        let mut t = start;
+        let mut value = self.at(t);
+        for _ in 0..3 {
+            let trial = t - value.0 / value.1;
+            if !((trial - start).abs() < 1e-3) {
+                break;
+            }
+            let next = self.at(trial);
+            if next.0.abs() >= value.0.abs() {
+                break;
+            }
+            (t, value) = (trial, next);
+        }
+        t
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Truth: a product of factors whose roots are known.
+    #[test]
+    fn all_roots_of_a_trigonometric_polynomial_of_degree_four_are_found() {
+        // sin((t - r)/2) sin((t - s)/2) = (cos((r - s)/2) - cos(t - (r + s)/2)) / 2.
+        let factor = |r: f64, s: f64| {
+            let mean = 0.5 * (r + s);
+            TrigPolynomial::affine((0.5 * (r - s)).cos(), -mean.cos(), -mean.sin())
+        };
+        let known = [-3.0, -2.2, -1.1, -0.3, 0.4, 0.9, 2.0, 2.9];
+        let p = factor(known[0], known[4]).times(&factor(known[1], known[5]));
+        let p = p.times(&factor(known[2], known[7]).times(&factor(known[3], known[6])));
+        let found = p.roots(1e-3);
+        let mut found = found.as_slice().to_vec();
+        found.sort_by(f64::total_cmp);
+        assert_eq!(found.len(), 8);
+        for (f, k) in found.iter().zip(known) {
+            assert!((f - k).abs() < 1e-12, "{f} for {k}"); // measured 4e-15
+        }
+    }
+
+    /// Truth: a double root and a pair off the circle.
+    #[test]
+    fn a_double_root_is_found_and_complex_ones_are_not() {
+        let double = TrigPolynomial::affine(1.0, -(0.7_f64.cos()), -(0.7_f64.sin()));
+        let none = TrigPolynomial::affine(1.5, 1.0, 0.0);
+        let roots = double.times(&none).roots(1e-3);
+        assert!(!roots.as_slice().is_empty());
+        assert!(roots.as_slice().iter().all(|r| (r - 0.7).abs() < 1e-6)); // measured 1e-8
+    }
+
+    #[test]
+    fn a_vector_is_turned_to_a_cosine_without_loss_near_its_axis() {
+        let (u, h) = (Vector3::z(), Vector3::y());
+        let fan = Fan::new(&u, &h, &u);
+        for d in [1e-12, 1e-7, 0.3, 2.0, std::f64::consts::PI - 1e-9] {
+            let v = Vector3::new(d.sin() * 0.6, d.sin() * 0.8, d.cos());
+            let found = fan.angles(&u, &v).angles()[0];
+            assert!((found - d).abs() < 1e-15 + 4e-16 * d, "{found} for {d}"); // measured 2e-16
+        }
+    }
+}

@@ -1,0 +1,61 @@
+//! Arms whose last three axes meet: three joints place the meeting point, three turn the tool about it.
+
+use flexarm_spatial::Pose;
+use nalgebra::Vector3;
+
+use super::Candidates;
+use super::position::{PositionForm, place};
+use super::screw::Screw;
+use super::trig::{Fan, across, angle_about};
+
+/// What does not depend on the pose.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Wrist {
+    pub(crate) axes: [Screw; 6],
+    /// Meeting point at zero joint values (m).
+    pub(crate) center: Vector3<f64>,
+    pub(crate) form: PositionForm,
+    pub(crate) fan: Fan,
+    pub(crate) reach: f64,
+}
+
+/// Below this sine the last and the fourth axis are one line: only the sum of their angles matters.
+const STRAIGHT: f64 = 1e-13;
+
+impl Wrist {
+    pub(crate) fn new(axes: [Screw; 6], center: Vector3<f64>, form: PositionForm, reach: f64) -> Self {
+        let fan = Fan::new(&axes[3].h, &axes[4].h, &axes[5].h);
+        Self { axes, center, form, fan, reach }
+    }
+
+    /// All joint values with `E_1 ... E_6 = G`.
+    ///
+    /// `E_1 E_2 E_3 c = G c` at the meeting point c. Then with `Q = (R_1 R_2 R_3)ᵀ G_R` the angle of joint 5 follows from
+    /// `h_4 · R_5 h_6 = h_4 · Q h_6`, that of joint 4 from `R_4 R_5 h_6 = Q h_6`, and that of joint 6 from what is left.
+    pub(crate) fn solve(&self, G: &Pose, hint: &[f64; 6], found: &mut Candidates) {
+        let [s1, s2, s3, s4, s5, s6] = &self.axes;
+        let p = G.rotation * self.center + G.translation.vector;
+        let n = across(&s6.h);
+        let (tip, side) = (G.rotation * s6.h, G.rotation * n);
+        let base = [self.axes[0], self.axes[1], self.axes[2]];
+        let places = place(self.form, &base, &self.center, &p, &[hint[0], hint[1], hint[2]], self.reach);
+        for three in places.as_slice() {
+            let [q1, q2, q3] = three.q;
+            let (t1, t2, t3) = (s1.at(q1).inverse(), s2.at(q2).inverse(), s3.at(q3).inverse());
+            let Q = |v: &Vector3<f64>| t3.vector(&t2.vector(&t1.vector(v)));
+            let (tip, side) = (Q(&tip), Q(&side));
+            for &q5 in self.fan.angles(&s4.h, &tip).angles() {
+                let t5 = s5.at(q5);
+                let (angle, size) = angle_about(&s4.h, &t5.vector(&s6.h), &tip);
+                let straight = size < STRAIGHT;
+                let q4 = if straight { hint[3] } else { angle };
+                let rest = t5.inverse().vector(&s4.at(q4).inverse().vector(&side));
+                let (q6, _) = angle_about(&s6.h, &n, &rest);
+                found.add([q1, q2, q3, q4, q5, q6], three.free || straight);
+                if straight {
+                    break;
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,546 @@
+//! Analytic inverse kinematics against forward kinematics, against a search from many starts, and against what makers say.
+#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
+#![allow(non_snake_case, reason = "monogram notation")]
+
+mod arms;
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use arms::*;
+use flexarm_kinematics::*;
+use flexarm_testkit::Draw;
+use flexarm_testkit::allocations::{CountingAllocator, count_allocations};
+use nalgebra::{DVector, Rotation3, Vector3};
+
+#[global_allocator]
+static ALLOCATOR: CountingAllocator = CountingAllocator;
+
+fn apart(a: &[f64; 6], b: &[f64; 6]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| ((a - b) - TAU * ((a - b) / TAU).round()).abs()).fold(0.0, f64::max)
+}
+
+fn random_q(draw: &mut Draw) -> [f64; 6] {
+    std::array::from_fn(|_| PI * draw.signed())
+}
+
+fn forward(model: &Model, data: &mut Data, frame: &Frame, q: &[f64; 6]) -> Pose {
+    forward_kinematics(model, data, &DVector::from_column_slice(q));
+    data.X_WF(frame)
+}
+
+/// Distance (m) and angle (rad) of two poses.
+fn between(A: &Pose, B: &Pose) -> (f64, f64) {
+    let R = A.rotation * B.rotation.inverse();
+    ((A.translation.vector - B.translation.vector).norm(), rotation_vector(R.matrix()).norm())
+}
+
+/// Smallest over largest singular value of the Jacobian (lengths over the reach).
+fn dexterity(arm: &Named, data: &Data, reach: f64) -> f64 {
+    let mut J = nalgebra::Matrix6xX::zeros(6);
+    frame_jacobian(&arm.model, data, &arm.tool(), &mut J);
+    J.fixed_rows_mut::<3>(0).scale_mut(1.0 / reach);
+    let values = J.singular_values();
+    values.min() / values.max()
+}
+
+fn all_arms() -> Vec<Named> {
+    let mut arms = known_arms();
+    arms.extend((1..=4).flat_map(random_arms));
+    arms
+}
+
+#[test]
+fn the_class_of_an_arm_is_found_from_its_axes_alone() {
+    for arm in all_arms() {
+        let analytic = AnalyticArm::new(&arm.model, &arm.tool()).unwrap_or_else(|e| panic!("{}: {e}", arm.name));
+        assert_eq!(analytic.class(), arm.class, "{}", arm.name);
+        assert!(analytic.deviation() < 1e-10, "{}: {:.1e}", arm.name, analytic.deviation());
+    }
+}
+
+/// Truth: the model's own forward kinematics.
+#[test]
+fn joint_values_are_found_again_from_their_pose_and_every_solution_meets_it() {
+    let mut draw = Draw(11);
+    let (mut worst_q, mut worst_m, mut worst_rad) = (0.0_f64, 0.0_f64, 0.0_f64);
+    for arm in all_arms() {
+        let (frame, mut data) = (arm.tool(), Data::new(&arm.model));
+        let analytic = AnalyticArm::new(&arm.model, &frame).unwrap();
+        let mut solutions = Solutions::default();
+        for _ in 0..1500 {
+            let q = random_q(&mut draw);
+            let X_WT = forward(&arm.model, &mut data, &frame, &q);
+            let sharp = dexterity(&arm, &data, analytic.reach());
+            analytic.solve(&X_WT, &mut solutions);
+            let error = solutions.iter().map(|s| apart(&s.q, &q)).fold(f64::INFINITY, f64::min);
+            // What rounding of the pose makes of the joint values: 1e-14 over the dexterity.
+            assert!(error < 1e-9_f64.max(3e-13 / sharp), "{}: {q:?} is missed by {error:.1e}, {sharp:.1e}", arm.name);
+            worst_q = worst_q.max(error * sharp.min(1.0));
+            assert!(solutions.len() <= analytic.class().most_solutions(), "{}", arm.name);
+            for s in solutions.iter() {
+                assert!(s.q.iter().all(|x| *x > -PI && *x <= PI));
+                let (m, rad) = between(&forward(&arm.model, &mut data, &frame, &s.q), &X_WT);
+                (worst_m, worst_rad) = (worst_m.max(m), worst_rad.max(rad));
+                assert!(m <= 2e-12 * analytic.reach().max(1.0) && rad <= 2e-12, "{}: {m:.1e} m, {rad:.1e}", arm.name);
+                assert!(!s.free, "{}: {q:?}", arm.name);
+            }
+        }
+    }
+    println!("joint values times dexterity {worst_q:.1e}, {worst_m:.1e} m, {worst_rad:.1e} rad");
+}
+
+/// Truth: another algorithm, which knows of no geometry. It finds no solution that is missing here; it may miss some itself.
+#[test]
+fn a_search_from_many_starts_finds_the_same_solutions() {
+    let mut draw = Draw(5);
+    let (mut analytic_total, mut searched_total, mut poses) = (0, 0, 0);
+    let mut arms = known_arms();
+    arms.extend((1..=2).flat_map(random_arms));
+    let options = IkOptions { max_iterations: 60, ..IkOptions::default() };
+    for arm in arms {
+        let (frame, mut data) = (arm.tool(), Data::new(&arm.model));
+        let analytic = AnalyticArm::new(&arm.model, &frame).unwrap();
+        let mut solutions = Solutions::default();
+        for _ in 0..4 {
+            let q = random_q(&mut draw);
+            let X_WT = forward(&arm.model, &mut data, &frame, &q);
+            analytic.solve(&X_WT, &mut solutions);
+            let start = DVector::zeros(6);
+            let starts = 250;
+            let found =
+                inverse_kinematics_from_many_starts(&arm.model, &mut data, &frame, &X_WT, &start, &options, starts);
+            for one in found.iter().flatten() {
+                let q = std::array::from_fn(|k| one.q[k]);
+                let error = solutions.iter().map(|s| apart(&s.q, &q)).fold(f64::INFINITY, f64::min);
+                assert!(error < 1e-5, "{}: the search found {q:?}, {error:.1e} from {solutions:?}", arm.name);
+            }
+            poses += 1;
+            analytic_total += solutions.len();
+            searched_total += found.map_or(0, |f| f.len());
+        }
+    }
+    println!("{poses} poses: {analytic_total} solutions, {searched_total} by search");
+    assert!(searched_total <= analytic_total && searched_total as f64 > 0.97 * analytic_total as f64);
+}
+
+#[test]
+fn labels_tell_the_solutions_of_a_pose_apart() {
+    let mut draw = Draw(7);
+    for arm in all_arms() {
+        let several = matches!(
+            arm.class,
+            ArmClass::SphericalWrist(PositionForm::General)
+                | ArmClass::SphericalShoulder(PositionForm::General)
+                | ArmClass::ThreeParallel { meeting: false, .. }
+        );
+        if several {
+            continue;
+        }
+        let analytic = AnalyticArm::new(&arm.model, &arm.tool()).unwrap();
+        let mut solutions = Solutions::default();
+        for _ in 0..300 {
+            analytic.solve(&analytic.pose(&random_q(&mut draw)), &mut solutions);
+            let mut labels: Vec<_> = solutions.iter().map(|s| s.branch.index()).collect();
+            labels.sort_unstable();
+            labels.dedup();
+            assert_eq!(labels.len(), solutions.len(), "{}: {solutions:?}", arm.name);
+            for s in solutions.iter() {
+                let chosen =
+                    analytic.choose(&solutions, &Selection::Branch(s.branch), &ControllerAxes::SAME, &s.q).unwrap();
+                assert!(apart(&chosen, &s.q) < 1e-14);
+            }
+        }
+    }
+}
+
+/// The answer at the edge of the workspace: one elbow where the arm is stretched, none beyond it, told by how far.
+#[test]
+fn a_stretched_arm_has_one_elbow_and_a_pose_beyond_it_is_told_by_its_distance() {
+    let model = Model::new(&irb120()).unwrap();
+    let frame = model.frame("tool").unwrap().clone();
+    let arm = AnalyticArm::new(&model, &frame).unwrap();
+    let mut solutions = Solutions::default();
+    // Upper arm 0.27 m, forearm hypot(0.302, 0.07) m; stretched where joint 3 is at -(90° - atan2(70, 302)).
+    let stretched = -FRAC_PI_2 + 0.07_f64.atan2(0.302);
+    let q = [0.4, 0.7, stretched, 0.3, 0.8, -0.2];
+    let X = arm.pose(&q);
+    arm.solve(&X, &mut solutions);
+    assert!(solutions.iter().any(|s| apart(&s.q, &q) < 1e-7)); // measured 1e-8: the square root of rounding
+    let shoulder = Vector3::new(0.0, 0.0, 0.29);
+    let wrist = X * nalgebra::Point3::new(0.0, 0.0, -0.072);
+    let outward = (wrist.coords - shoulder).normalize();
+    for beyond in [1e-9, 1e-6, 1e-3, 0.1, 3.0] {
+        let far = Pose::from_parts((X.translation.vector + outward * beyond).into(), X.rotation);
+        arm.solve(&far, &mut solutions);
+        assert!(solutions.is_empty(), "{beyond}: {solutions:?}");
+        let miss = solutions.miss().unwrap();
+        assert!((miss.position_m / beyond - 1.0).abs() < 1e-5 + 1e-14 / beyond, "{miss:?}"); // measured 3e-7
+        assert!(miss.rotation_rad < 1e-6, "{miss:?}");
+        // Inside by the same: all eight (where the other shoulder reaches too).
+        let near = Pose::from_parts((X.translation.vector - outward * beyond.min(0.01)).into(), X.rotation);
+        arm.solve(&near, &mut solutions);
+        assert_eq!(solutions.len(), 8, "{beyond}");
+        assert_eq!(solutions.miss(), None);
+    }
+}
+
+#[test]
+fn a_straight_wrist_has_a_representative_that_keeps_joint_4_where_it_was() {
+    for arm in known_arms().iter().filter(|a| matches!(a.class, ArmClass::SphericalWrist(_))) {
+        let analytic = AnalyticArm::new(&arm.model, &arm.tool()).unwrap();
+        let mut draw = Draw(3);
+        let mut solutions = Solutions::default();
+        for _ in 0..100 {
+            let mut q = random_q(&mut draw);
+            for bend in [0.0, 1e-12, 1e-9, 1e-7, 1e-4] {
+                q[4] = bend;
+                let X = analytic.pose(&q);
+                analytic.solve_near(&X, &q, &mut solutions);
+                assert!(!solutions.is_empty(), "{}: {q:?}", arm.name);
+                // Joints 4 and 6 of a bent wrist are as sharp as rounding over the bend, their sum is sharp.
+                let nearest = solutions.nearest(&q).unwrap();
+                let tolerance = if bend == 0.0 { 1e-6 } else { 1e-6 + 2e-13 / bend };
+                assert!(apart(&nearest.q, &q) < tolerance, "{} {bend}: {q:?} {nearest:?}", arm.name);
+                if bend == 0.0 {
+                    assert!(solutions.iter().any(|s| s.free), "{}: {q:?} {solutions:?}", arm.name);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_wrist_centre_on_axis_1_leaves_joint_1_free_and_keeps_it() {
+    let model = Model::new(&irb120()).unwrap();
+    let arm = AnalyticArm::new(&model, model.frame("tool").unwrap()).unwrap();
+    let mut solutions = Solutions::default();
+    // The wrist centre above axis 2: upper arm and forearm make a triangle, turned back by its angle at the shoulder.
+    let (a, b) = (0.27_f64, 0.302_f64.hypot(0.07));
+    for q3 in [-0.6_f64, 0.2, 0.9] {
+        // Angle of the forearm against the upper arm: stretched at -(90° - atan2(70, 302)).
+        let bend = q3 + FRAC_PI_2 - 0.07_f64.atan2(0.302);
+        let back = (b * bend.sin()).atan2(a + b * bend.cos());
+        let q = [1.1, -back, q3, 0.4, -0.7, 0.3];
+        arm.solve_near(&arm.pose(&q), &q, &mut solutions);
+        let nearest = solutions.nearest(&q).unwrap();
+        assert!(nearest.free && apart(&nearest.q, &q) < 1e-9, "{nearest:?}"); // measured 1e-15
+    }
+}
+
+/// Truth: the closed form of the wrist centre in the plane of the arm, by the data sheet's lengths.
+#[test]
+fn kuka_status_and_turn_are_those_of_the_manual() {
+    let mut tree = kr300();
+    let limits = [185.0, 185.0, -140.0, -5.0, -120.0, 168.0, 350.0, 350.0, 125.0, 125.0, 350.0, 350.0];
+    for (k, joint) in tree.joints[..6].iter_mut().enumerate() {
+        let (low, high): (f64, f64) =
+            if k == 1 || k == 2 { (limits[2 * k], limits[2 * k + 1]) } else { (-limits[2 * k], limits[2 * k]) };
+        joint.limits = Limits { lower: low.to_radians(), upper: high.to_radians(), ..Limits::NONE };
+    }
+    let model = Model::new(&tree).unwrap();
+    let arm = AnalyticArm::new(&model, model.frame("tool").unwrap()).unwrap();
+    let axes = ControllerAxes::SAME;
+    let degrees = |q: [f64; 6]| q.map(f64::to_radians);
+    // The home position of every KUKA: S 'B010', T 'B000010'.
+    let home = degrees([0.0, -90.0, 90.0, 0.0, 0.0, 0.0]);
+    assert_eq!((arm.kuka_status(&home, &axes), kuka_turn(&home, &axes)), (Some(2), 2));
+    // Stretched where axis 3 is at -atan2(41 mm, 1000 mm) = -2.35°.
+    assert_eq!(arm.kuka_status(&degrees([10.0, -60.0, -2.3, 5.0, 20.0, 0.0]), &axes), Some(6));
+    assert_eq!(arm.kuka_status(&degrees([10.0, -60.0, -2.4, 5.0, -20.0, 0.0]), &axes), Some(0));
+
+    let mut draw = Draw(17);
+    let mut solutions = Solutions::default();
+    let (mut behind, mut solved) = (0, 0);
+    for _ in 0..2000 {
+        let q: [f64; 6] =
+            std::array::from_fn(|k| draw.between(model.coordinates()[k].limits.lower, model.coordinates()[k].limits.upper));
+        let (a2, a23) = (q[1], q[1] + q[2]);
+        let x = 0.35 + 1.15 * a2.cos() + 1.0 * a23.cos() - 0.041 * a23.sin();
+        let stretched = -(0.041_f64.atan2(1.0));
+        let status = u8::from(x < 0.0) + 2 * u8::from(q[2] > stretched) + 4 * u8::from(q[4] > 0.0);
+        assert_eq!(arm.kuka_status(&q, &axes), Some(status), "{q:?}");
+        behind += u32::from(x < 0.0);
+        // There and back: the pose with its S and T is the joint values, wherever one looks from.
+        arm.solve(&arm.pose(&q), &mut solutions);
+        let meant = Selection::Kuka { status: Some(status), turn: Some(kuka_turn(&q, &axes)) };
+        let chosen = arm.choose(&solutions, &meant, &axes, &[0.0; 6]).unwrap();
+        let error = chosen.iter().zip(&q).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(error < 1e-8, "{q:?} {chosen:?}"); // measured 4e-12
+        solved += 1;
+    }
+    assert!(behind > 200 && solved == 2000);
+}
+
+/// Truth: the table of the manual, by the wrist centre in the plane of the arm.
+#[test]
+fn abb_confdata_are_those_of_the_manual() {
+    let mut tree = irb120();
+    let limits = [(-165.0, 165.0), (-110.0, 110.0), (-110.0, 70.0), (-160.0, 160.0), (-120.0, 120.0), (-400.0, 400.0)];
+    for (joint, (low, high)) in tree.joints[..6].iter_mut().zip(limits) {
+        joint.limits = Limits { lower: f64::to_radians(low), upper: f64::to_radians(high), ..Limits::NONE };
+    }
+    let model = Model::new(&tree).unwrap();
+    let arm = AnalyticArm::new(&model, model.frame("tool").unwrap()).unwrap();
+    let axes = ControllerAxes::SAME;
+    assert_eq!(arm.abb_configuration(&[0.0, 0.0, 0.0, 0.0, 0.5, 0.0], &axes), Some(([0, 0, 0], 0)));
+    let mut draw = Draw(19);
+    let mut solutions = Solutions::default();
+    let mut seen = [0; 8];
+    for _ in 0..3000 {
+        let q: [f64; 6] = std::array::from_fn(|k| draw.between(arm.limits()[k].0, arm.limits()[k].1));
+        // Wrist centre in the plane of the arm, x ahead and z up, from axis 2; the upper arm leans ahead by axis 2.
+        let (lean, turned) = (q[1], q[1] + q[2]);
+        let forearm = [0.302 * turned.cos() + 0.07 * turned.sin(), -0.302 * turned.sin() + 0.07 * turned.cos()];
+        let x = 0.27 * lean.sin() + forearm[0];
+        // In front of the lower arm: on its side of the line along it, seen with the lower arm upright.
+        let ahead = forearm[0] * lean.cos() - forearm[1] * lean.sin();
+        let cfx = 4 * i32::from(x < 0.0) + 2 * i32::from(ahead < 0.0) + i32::from(q[4] < 0.0);
+        let quadrant = |a: f64| (a.to_degrees() / 90.0).floor() as i32;
+        let expected = ([quadrant(q[0]), quadrant(q[3]), quadrant(q[5])], cfx);
+        assert_eq!(arm.abb_configuration(&q, &axes), Some(expected), "{q:?}");
+        seen[cfx as usize] += 1;
+        arm.solve(&arm.pose(&q), &mut solutions);
+        let meant = Selection::Abb { quadrants: expected.0, cfx };
+        let chosen = arm.choose(&solutions, &meant, &axes, &[0.0; 6]).unwrap();
+        assert!(chosen.iter().zip(&q).all(|(a, b)| (a - b).abs() < 1e-8), "{q:?} {chosen:?}");
+    }
+    assert!(seen.iter().all(|n| *n > 50), "{seen:?}");
+}
+
+#[test]
+fn words_choose_the_elbow_above_the_line_from_shoulder_to_wrist() {
+    let model = Model::new(&kr300()).unwrap();
+    let arm = AnalyticArm::new(&model, model.frame("tool").unwrap()).unwrap();
+    let axes = ControllerAxes::SAME;
+    let mut draw = Draw(23);
+    let mut solutions = Solutions::default();
+    let mut compared = 0;
+    for _ in 0..500 {
+        let q = random_q(&mut draw);
+        arm.solve(&arm.pose(&q), &mut solutions);
+        for s in solutions.iter() {
+            // In the plane of the arm, x ahead and z up (KUKA's axis 2 turns down).
+            let (a2, a23) = (s.q[1], s.q[1] + s.q[2]);
+            let elbow = [1.15 * a2.cos(), -1.15 * a2.sin()];
+            let wrist = [elbow[0] + a23.cos() - 0.041 * a23.sin(), elbow[1] - a23.sin() - 0.041 * a23.cos()];
+            let (front, beyond_shoulder) = (wrist[0] + 0.35 > 0.0, wrist[0] > 0.0);
+            if front != beyond_shoulder {
+                continue;
+            }
+            let above = elbow[1] > wrist[1] * elbow[0] / wrist[0];
+            assert_eq!(arm.elbow_up(&s.q), Some(above), "{:?}", s.q);
+            let meant = Selection::Words { front: Some(front), elbow_up: Some(above), wrist_flipped: Some(s.q[4] < 0.0) };
+            let chosen = arm.choose(&solutions, &meant, &axes, &[0.0; 6]).unwrap();
+            assert!(apart(&chosen, &s.q) < 1e-12);
+            compared += 1;
+        }
+    }
+    assert!(compared > 1000, "{compared}");
+}
+
+#[test]
+fn whole_turns_within_limits_are_all_shown_and_the_nearest_is_chosen() {
+    let mut tree = ur5();
+    for joint in &mut tree.joints[..6] {
+        joint.limits = Limits { lower: -TAU, upper: TAU, ..Limits::NONE };
+    }
+    tree.joints[2].limits = Limits { lower: -PI, upper: PI, ..Limits::NONE };
+    let model = Model::new(&tree).unwrap();
+    let arm = AnalyticArm::new(&model, model.frame("tool").unwrap()).unwrap();
+    let q = [0.5, -1.0, 1.5, -2.0, 2.5, 3.0];
+    let mut copies: Vec<[f64; 6]> = Vec::new();
+    arm.copies_within_limits(&q, |copy| copies.push(*copy));
+    assert_eq!(copies.len(), 32);
+    assert!(copies.iter().all(|c| apart(c, &q) < 1e-14 && c.iter().all(|x| x.abs() <= TAU)));
+    for near in [[6.0; 6], [-6.0; 6], [1.0, -6.0, 0.0, 5.0, -3.0, 3.0]] {
+        let chosen = arm.nearest_within_limits(&q, &near).unwrap();
+        let distance = |c: &[f64; 6]| c.iter().zip(&near).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
+        let best = copies.iter().map(distance).fold(f64::INFINITY, f64::min);
+        assert!((distance(&chosen) - best).abs() < 1e-12);
+    }
+    assert_eq!(arm.nearest_within_limits(&[0.0, 0.0, 3.5, 0.0, 0.0, 0.0], &[0.0; 6]).map(|c| c[2]), Some(3.5 - TAU));
+}
+
+#[test]
+fn a_query_does_not_allocate() {
+    for arm in all_arms() {
+        let analytic = AnalyticArm::new(&arm.model, &arm.tool()).unwrap();
+        let mut draw = Draw(2);
+        let mut solutions = Solutions::default();
+        let X = analytic.pose(&random_q(&mut draw));
+        assert_eq!(count_allocations(|| analytic.solve(&X, &mut solutions)), 0, "{}", arm.name);
+        assert!(!solutions.is_empty());
+    }
+}
+
+/// Files with five digits: π/2 as 1.5708 and lengths to 10 µm.
+#[test]
+fn an_arm_of_rounded_numbers_is_solved_as_it_is() {
+    let mut tree = kr300();
+    let mut draw = Draw(29);
+    for joint in &mut tree.joints {
+        let (roll, pitch, yaw) = joint.X_PJ.rotation.euler_angles();
+        let cut = |x: f64| (x * 1e4).round() * 1e-4;
+        joint.X_PJ.rotation = Rotation3::from_euler_angles(cut(roll), cut(pitch), cut(yaw));
+        joint.X_PJ.translation.vector += draw.vector(5e-6);
+    }
+    // The tool is not of the arm's geometry.
+    let model = Model::new(&tree).unwrap();
+    let (frame, mut data) = (model.frame("tool").unwrap().clone(), Data::new(&model));
+    let arm = AnalyticArm::new(&model, &frame).unwrap();
+    assert_eq!(arm.class(), ArmClass::SphericalWrist(PositionForm::Parallel23));
+    assert!(arm.deviation() > 1e-7 && arm.deviation() < AXIS_TOLERANCE, "{:.1e}", arm.deviation());
+    let mut solutions = Solutions::default();
+    let mut found = 0;
+    for _ in 0..1000 {
+        let q = random_q(&mut draw);
+        let X_WT = forward(&model, &mut data, &frame, &q);
+        arm.solve(&X_WT, &mut solutions);
+        found += usize::from(solutions.iter().any(|s| apart(&s.q, &q) < 1e-9));
+        for s in solutions.iter() {
+            let (m, rad) = between(&forward(&model, &mut data, &frame, &s.q), &X_WT);
+            assert!(m < 3e-12 && rad < 2e-12, "{m:.1e} {rad:.1e}");
+        }
+    }
+    assert!(found >= 995, "{found}"); // the others are within the tolerance of a boundary
+    println!("{found} of 1000");
+}
+
+#[test]
+fn arms_without_a_closed_form_are_refused_with_what_they_lack() {
+    let refuse = |tree: &Mechanism| {
+        let model = Model::new(tree).unwrap();
+        AnalyticArm::new(&model, model.frame("tool").unwrap()).unwrap_err()
+    };
+    let mut draw = Draw(31);
+    let axes = std::array::from_fn(|_| (draw.vector(1.0), draw.vector(0.7)));
+    let error = refuse(&from_axes("skew", &axes, &mut draw));
+    assert!(matches!(error, NoAnalyticIk::NoClass { wrist_m, .. } if wrist_m > 1e-3), "{error}");
+
+    let mut five = kr300();
+    five.joints[3].kind = JointKind::Fixed;
+    assert!(refuse(&five).to_string().contains("found 5: [\"joint_1\", \"joint_2\", \"joint_3\", \"joint_5\", \"joint_6\"]"));
+    let mut slides = kr300();
+    slides.joints[2].kind = JointKind::Prismatic(Vector3::z_axis());
+    assert_eq!(refuse(&slides), NoAnalyticIk::Joint { joint: "joint_3".into(), what: "is not revolute" });
+    let mut flat = kr300();
+    // Axis 6 along axis 5: five directions.
+    flat.joints[5].X_PJ.rotation = Rotation3::identity();
+    assert!(matches!(refuse(&flat), NoAnalyticIk::Deficient { smallest, .. } if smallest < 1e-9));
+    // A wrist 1 mm off its centre is no spherical one.
+    let mut off = kr300();
+    off.joints[5].X_PJ.translation.vector.x += 1e-3;
+    assert!(matches!(refuse(&off), NoAnalyticIk::NoClass { wrist_m, .. } if (1e-4..1e-3).contains(&wrist_m)));
+}
+
+#[test]
+fn a_pose_of_numbers_that_are_none_has_no_solution() {
+    let model = Model::new(&kr300()).unwrap();
+    let arm = AnalyticArm::new(&model, model.frame("tool").unwrap()).unwrap();
+    let mut solutions = Solutions::default();
+    arm.solve(&Pose::translation(f64::NAN, 0.0, 1.0), &mut solutions);
+    assert!(solutions.is_empty() && solutions.miss().is_none());
+}
+
+/// A seventh axis held, and a rail in front: the same solutions with the held values in place.
+#[test]
+fn joints_that_are_held_are_part_of_the_geometry() {
+    let mut draw = Draw(37);
+    let model = Model::new(&iiwa()).unwrap();
+    let (frame, mut data) = (model.frame("tool").unwrap().clone(), Data::new(&model));
+    let mut solutions = Solutions::default();
+    for _ in 0..200 {
+        let q = DVector::from_fn(7, |_, _| 2.0 * draw.signed());
+        forward_kinematics(&model, &mut data, &q);
+        let X_WT = data.X_WF(&frame);
+        let arm = AnalyticArm::with_joints(&model, &frame, &[0, 1, 3, 4, 5, 6], &q).unwrap();
+        arm.solve(&X_WT, &mut solutions);
+        let six = [q[0], q[1], q[3], q[4], q[5], q[6]];
+        let error = solutions.iter().map(|s| apart(&s.q, &six)).fold(f64::INFINITY, f64::min);
+        assert!(error < 1e-9, "{q} {error:.1e}"); // measured 2e-13
+    }
+    let error = AnalyticArm::new(&model, &frame).unwrap_err();
+    assert!(matches!(error, NoAnalyticIk::JointCount { ref joints, .. } if joints.len() == 7), "{error}");
+}
+
+/// KUKA LBR iiwa 7 R800 by its data sheet.
+fn iiwa() -> Mechanism {
+    let (z, y) = (Vector3::z_axis(), Vector3::y_axis());
+    let at = |height: f64| Pose::translation(0.0, 0.0, height);
+    let rows = [(0.15, z, 170.0), (0.19, y, 120.0), (0.21, z, 170.0), (0.19, -y, 120.0), (0.21, z, 170.0), (0.19, y, 120.0), (0.081, z, 175.0)];
+    let joints: Vec<_> = rows.iter().map(|(h, axis, _)| (at(*h), JointKind::Revolute(*axis))).collect();
+    let mut arm = chain("iiwa 7", &joints, at(0.045));
+    for (joint, (_, _, limit)) in arm.joints.iter_mut().zip(rows) {
+        joint.limits = Limits { lower: -f64::to_radians(limit), upper: f64::to_radians(limit), ..Limits::NONE };
+    }
+    arm
+}
+
+/// Truth: the whole family of solutions, by the closed form at every value of joint 3.
+#[test]
+fn seven_joints_settle_at_a_minimum_of_the_rule_over_the_family_of_solutions() {
+    let model = Model::new(&iiwa()).unwrap();
+    let (frame, mut data) = (model.frame("tool").unwrap().clone(), Data::new(&model));
+    let mut draw = Draw(41);
+    let options = IkOptions::default();
+    for case in 0..12 {
+        let q = DVector::from_fn(7, |_, _| 0.9 * draw.signed());
+        forward_kinematics(&model, &mut data, &q);
+        let X_WT = data.X_WF(&frame);
+        let rest = &q + DVector::from_fn(7, |_, _| 0.3 * draw.signed());
+        let (rule, middle, weight): (_, _, Vec<f64>) = if case % 2 == 0 {
+            (NullSpaceRule::NearestTo(rest.clone()), rest, vec![1.0; 7])
+        } else {
+            let weight = model.coordinates().iter().map(|c| c.limits.upper.powi(-2)).collect();
+            (NullSpaceRule::AwayFromLimits, DVector::zeros(7), weight)
+        };
+        let found = inverse_kinematics_with_rule(&model, &mut data, &frame, &X_WT, &q, &options, &rule).unwrap();
+        assert!(found.settled, "{found:?}");
+        forward_kinematics(&model, &mut data, &found.q);
+        let (m, rad) = between(&data.X_WF(&frame), &X_WT);
+        assert!(m < 2e-10 && rad < 2e-10);
+        let measure = |q: &DVector<f64>| (0..7).map(|k| 0.5 * weight[k] * (q[k] - middle[k]).powi(2)).sum::<f64>();
+        assert!((measure(&found.q) - found.measure).abs() < 1e-12 && found.measure <= measure(&q));
+        // The family next to what was found: no member of it is better.
+        let mut solutions = Solutions::default();
+        let mut least = f64::INFINITY;
+        for k in -400..=400 {
+            let mut held = found.q.clone();
+            held[2] += 2e-4 * f64::from(k);
+            let six = [0, 1, 3, 4, 5, 6];
+            let arm = AnalyticArm::with_joints(&model, &frame, &six, &held).unwrap();
+            arm.solve(&X_WT, &mut solutions);
+            let near = six.map(|j| found.q[j]);
+            let Some(s) = solutions.nearest(&near) else { continue };
+            if apart(&s.q, &near) < 0.3 {
+                for (j, x) in six.into_iter().zip(s.q) {
+                    held[j] = x;
+                }
+                least = least.min(measure(&held));
+            }
+        }
+        // measured 2e-15
+        assert!(least.is_finite() && found.measure <= least + 1e-9, "{case}: {} above {least}", found.measure);
+    }
+}
+
+/// A joint at its limit stays there, and the rule is kept by the others.
+#[test]
+fn the_rule_holds_joints_at_their_limits() {
+    let model = Model::new(&iiwa()).unwrap();
+    let (frame, mut data) = (model.frame("tool").unwrap().clone(), Data::new(&model));
+    let q = DVector::from_vec(vec![0.3, 0.6, 0.2, -1.2, 0.4, 0.7, 0.1]);
+    forward_kinematics(&model, &mut data, &q);
+    let X_WT = data.X_WF(&frame);
+    let mut rest = q.clone();
+    rest[6] = 9.0; // beyond its limit of 175°
+    let rule = NullSpaceRule::NearestTo(rest);
+    let found =
+        inverse_kinematics_with_rule(&model, &mut data, &frame, &X_WT, &q, &IkOptions::default(), &rule).unwrap();
+    forward_kinematics(&model, &mut data, &found.q);
+    assert!(between(&data.X_WF(&frame), &X_WT).0 < 2e-10);
+    for (k, c) in model.coordinates().iter().enumerate() {
+        assert!(found.q[k] >= c.limits.lower && found.q[k] <= c.limits.upper);
+    }
+    assert!(found.q[6] > q[6] + 0.2, "{found:?}");
+}
