@@ -1,23 +1,35 @@
 //! Which of the inverse kinematics' solutions a target means.
+//!
+//! In closed form where the arm has one ([`AnalyticArm`]), else from many starts; the nearest to where the arm is if the
+//! target says no more.
 
-use flexarm_kinematics::{Data, Frame, IkOptions, Model, forward_kinematics, inverse_kinematics};
+use flexarm_kinematics::{
+    AnalyticArm, ControllerAxes, Data, Frame, IkOptions, Model, Selection, Solutions, forward_kinematics,
+    inverse_kinematics_from_many_starts, kuka_turn,
+};
 use flexarm_spatial::Pose;
 use nalgebra::DVector;
 
 use crate::program::Configuration;
 
+/// Starts of the numerical search.
+const STARTS: usize = 64;
+
 /// Why there is no solution, as a sentence.
 pub(crate) struct NoBranch(pub(crate) String);
 
-/// The arm and a workspace.
+/// The arm and its workspaces.
 pub(crate) struct Branches<'m> {
     model: &'m Model,
     data: Data,
+    solutions: Solutions,
+    /// One for each tool.
+    arms: Vec<(Pose, Option<AnalyticArm>)>,
 }
 
 impl<'m> Branches<'m> {
     pub(crate) fn new(model: &'m Model) -> Self {
-        Self { model, data: Data::new(model) }
+        Self { model, data: Data::new(model), solutions: Solutions::default(), arms: Vec::new() }
     }
 
     /// Pose of a frame at joint values, in the model's world.
@@ -41,7 +53,144 @@ impl<'m> Branches<'m> {
                 near[k] = *value;
             }
         }
-        inverse_kinematics(self.model, &mut self.data, frame, X, &near, &IkOptions::default())
-            .map_err(|error| NoBranch(error.to_string()))
+        let slot = self.arm_of(frame);
+        match self.arms[slot].1.take() {
+            Some(arm) => {
+                let chosen = self.in_closed_form(&arm, X, configuration, &near);
+                self.arms[slot].1 = Some(arm);
+                chosen
+            }
+            None => self.from_many_starts(frame, X, configuration, &near),
+        }
     }
+
+    fn arm_of(&mut self, frame: &Frame) -> usize {
+        let found = self.arms.iter().position(|(X, _)| *X == frame.X_BF);
+        found.unwrap_or_else(|| {
+            self.arms.push((frame.X_BF, AnalyticArm::new(self.model, frame).ok()));
+            self.arms.len() - 1
+        })
+    }
+
+    fn in_closed_form(
+        &mut self,
+        arm: &AnalyticArm,
+        X: &Pose,
+        configuration: &Configuration,
+        near: &DVector<f64>,
+    ) -> Result<DVector<f64>, NoBranch> {
+        let joints = arm.joints();
+        let six: [f64; 6] = joints.map(|k| near[k]);
+        let mut solutions = std::mem::take(&mut self.solutions);
+        arm.solve_near(X, &six, &mut solutions);
+        let selection = selection(configuration);
+        let chosen = arm.choose(&solutions, &selection, &ControllerAxes::SAME, &six);
+        let answer = chosen.map(|chosen| {
+            let mut q = near.clone();
+            for (value, &k) in chosen.iter().zip(joints) {
+                q[k] = *value;
+            }
+            q
+        });
+        let answer = answer.ok_or_else(|| NoBranch(why_none(arm, &solutions, &selection)));
+        self.solutions = solutions;
+        answer
+    }
+
+    fn from_many_starts(
+        &mut self,
+        frame: &Frame,
+        X: &Pose,
+        configuration: &Configuration,
+        near: &DVector<f64>,
+    ) -> Result<DVector<f64>, NoBranch> {
+        if !matches!(configuration, Configuration::Nearest | Configuration::Near(_)) {
+            let why = "the target names a branch of the inverse kinematics, and this arm is not of six revolute joints with a \
+                       solution in closed form: name joint values in its place";
+            return Err(NoBranch(why.to_owned()));
+        }
+        let options = IkOptions::default();
+        let found = inverse_kinematics_from_many_starts(self.model, &mut self.data, frame, X, near, &options, STARTS)
+            .map_err(|error| NoBranch(error.to_string()))?;
+        let distance = |q: &DVector<f64>| (q - near).norm_squared();
+        let nearest = found.into_iter().map(|found| found.q).min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        nearest.ok_or_else(|| NoBranch("the search found nothing".to_owned()))
+    }
+}
+
+fn selection(configuration: &Configuration) -> Selection {
+    match *configuration {
+        Configuration::Nearest | Configuration::Near(_) => Selection::Nearest,
+        Configuration::Kuka { status, turn } => Selection::Kuka { status, turn },
+        Configuration::Abb { quadrants, cfx } => Selection::Abb { quadrants, cfx },
+        Configuration::Words { front, elbow_up, wrist_flipped } => Selection::Words { front, elbow_up, wrist_flipped },
+    }
+}
+
+/// Why no solution was chosen: out of reach, beyond the limits, or on another branch.
+fn why_none(arm: &AnalyticArm, solutions: &Solutions, selection: &Selection) -> String {
+    if solutions.is_empty() {
+        return match solutions.miss() {
+            Some(miss) => format!(
+                "it is out of reach by about {:.1} mm and {:.2} mrad",
+                1e3 * miss.position_m,
+                1e3 * miss.rotation_rad
+            ),
+            None => "it is out of reach".to_owned(),
+        };
+    }
+    let mut within: Vec<[f64; 6]> = Vec::new();
+    for solution in solutions.iter() {
+        arm.copies_within_limits(&solution.q, |q| within.push(*q));
+    }
+    if within.is_empty() {
+        let joints = joints_beyond(arm, solutions);
+        return format!("all {} solutions pass the limits of joints ({joints})", solutions.len());
+    }
+    let said = |q: &[f64; 6]| match selection {
+        Selection::Kuka { .. } => {
+            let status = arm.kuka_status(q, &ControllerAxes::SAME)?;
+            Some(format!("S {status}, T {}", kuka_turn(q, &ControllerAxes::SAME)))
+        }
+        Selection::Abb { .. } => {
+            let ([a, b, c], cfx) = arm.abb_configuration(q, &ControllerAxes::SAME)?;
+            Some(format!("[{a}, {b}, {c}, {cfx}]"))
+        }
+        _ => None,
+    };
+    let mut others: Vec<String> = within.iter().filter_map(said).collect();
+    others.sort_unstable();
+    others.dedup();
+    match others.is_empty() {
+        true => {
+            "its branch cannot be told of this arm: it has no spherical wrist behind parallel axes 2 and 3".to_owned()
+        }
+        false => format!(
+            "the branch that it names ({}) has no solution within the joint limits; there are {}",
+            named(selection),
+            others.join("; ")
+        ),
+    }
+}
+
+fn named(selection: &Selection) -> String {
+    let told = |bits: Option<u8>| bits.map_or_else(|| "any".to_owned(), |bits| bits.to_string());
+    match selection {
+        Selection::Kuka { status, turn } => format!("S {}, T {}", told(*status), told(*turn)),
+        Selection::Abb { quadrants: [a, b, c], cfx } => format!("[{a}, {b}, {c}, {cfx}]"),
+        _ => "in words".to_owned(),
+    }
+}
+
+/// Joints, counted from 1, that no solution has within their limits.
+fn joints_beyond(arm: &AnalyticArm, solutions: &Solutions) -> String {
+    let beyond = |k: usize| {
+        let (lower, upper) = arm.limits()[k];
+        solutions.iter().any(|s| {
+            let turns = [-1.0, 0.0, 1.0].map(|turn| s.q[k] + turn * std::f64::consts::TAU);
+            turns.iter().all(|q| *q < lower || *q > upper)
+        })
+    };
+    let joints: Vec<String> = (0..6).filter(|&k| beyond(k)).map(|k| (k + 1).to_string()).collect();
+    if joints.is_empty() { "each in another joint".to_owned() } else { format!("of axes {}", joints.join(", ")) }
 }

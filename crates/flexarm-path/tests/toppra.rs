@@ -20,8 +20,12 @@ fn rates(knots: &[f64], pieces: &[Vec<Vec<f64>>], s: f64) -> Vec<[f64; 2]> {
 fn duration(case: &Value, intervals: usize) -> f64 {
     let (knots, speed, acceleration) =
         (numbers(&case["knots"]), numbers(&case["speed"]), numbers(&case["acceleration"]));
-    let pieces: Vec<Vec<Vec<f64>>> =
-        case["pieces"].as_array().unwrap().iter().map(|p| p.as_array().unwrap().iter().map(numbers).collect()).collect();
+    let pieces: Vec<Vec<Vec<f64>>> = case["pieces"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|p| p.as_array().unwrap().iter().map(numbers).collect())
+        .collect();
     let point = |k: usize| {
         let s = k as f64 / intervals as f64;
         let rates = rates(&knots, &pieces, s);
