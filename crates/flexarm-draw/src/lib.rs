@@ -40,4 +40,4 @@ mod plot;
 pub use arm_picture::{ArmPicture, ArmPictureError, ArmSide, arm_color, arm_picture, arm_pictures, arm_png, arm_sheet};
 pub use bend::{BendLine, BentMesh, BentPieces};
 pub use magnify::{Magnifier, stations_in_link};
-pub use plot::{CurveLook, LinePlot, Panel, PlotCurve, PlotError, page_plot, paper_plot};
+pub use plot::{CurveLook, LinePlot, Panel, PlotCurve, PlotError, page_plot, paper_plot, plan_plot};

@@ -81,6 +81,8 @@ struct Style {
     /// Width of the picture on paper (mm); without it units are pixels.
     width_mm: Option<f64>,
     x_labels: usize,
+    /// Whether a unit is as long on both axes.
+    equal: bool,
 }
 
 const SCREEN: Style = Style {
@@ -94,6 +96,7 @@ const SCREEN: Style = Style {
     stroke: 2,
     width_mm: None,
     x_labels: 11,
+    equal: false,
 };
 
 /// A picture between paragraphs, 960 pixels of the browser in halves.
@@ -108,6 +111,7 @@ const PAGE: Style = Style {
     stroke: 4,
     width_mm: Some(254.0),
     x_labels: 11,
+    equal: false,
 };
 
 /// A column of a paper, 88 mm, in twelfths of a millimetre: text of 8 points, lines of 0.3 mm.
@@ -122,7 +126,11 @@ const COLUMN: Style = Style {
     stroke: 4,
     width_mm: Some(88.0),
     x_labels: 8,
+    equal: false,
 };
+
+/// A plan: a unit is as long on both axes.
+const PLAN: Style = Style { panel: (1920, 1300), equal: true, ..PAGE };
 
 /// Panels over a common horizontal axis, for the screen. Curves are named above the panels, where they hide nothing.
 #[derive(Clone, Debug, Default)]
@@ -168,6 +176,14 @@ pub fn page_plot(x_label: &str, logarithmic_x: bool, panels: &[Panel]) -> Result
     plot(&LinePlot { x_label, logarithmic_x, panels, ..LinePlot::default() }, &[], &PAGE)
 }
 
+/// A plan for a page of text: one panel on which a unit is as long on both axes, curves that may go anywhere, named above it. SVG.
+///
+/// # Errors
+/// As [`LinePlot::svg`].
+pub fn plan_plot(x_label: &str, panel: &Panel) -> Result<String, PlotError> {
+    plot(&LinePlot { x_label, panels: std::slice::from_ref(panel), ..LinePlot::default() }, &[], &PLAN)
+}
+
 fn plot(what: &LinePlot<'_>, bands: &[(f64, f64)], style: &Style) -> Result<String, PlotError> {
     let (mut text, panels) = (String::new(), what.panels);
     let mut curves: Vec<&PlotCurve> = Vec::new();
@@ -193,6 +209,7 @@ fn plot(what: &LinePlot<'_>, bands: &[(f64, f64)], style: &Style) -> Result<Stri
             let points = points(panel);
             let ranges = ranges(&points, panel.logarithmic)
                 .ok_or_else(|| PlotError(format!("{:?} has nothing finite to draw", panel.label)))?;
+            let ranges = if style.equal { equally_long(ranges, style) } else { ranges };
             let (x, y) = ranges.clone();
             let (marks, named) = (what.marks, k == 0);
             let frame = Frame { x_label, panel, points: &points, all: &curves, bands, marks, named, ranges, style };
@@ -269,6 +286,18 @@ fn ranges(points: &[Vec<(f64, f64)>], logarithmic: bool) -> Option<(Range<f64>, 
         low - room..high + room
     };
     Some((x_low..if x_high > x_low { x_high } else { x_low + 1.0 }, y))
+}
+
+/// Ranges widened around their middles until a unit is as long on both axes, with some room.
+fn equally_long((x, y): (Range<f64>, Range<f64>), style: &Style) -> (Range<f64>, Range<f64>) {
+    let wide = f64::from(style.panel.0 - 3 * style.margin - style.y_area);
+    let high = f64::from(style.panel.1 - 2 * style.margin - style.x_area);
+    let unit = 1.05 * ((x.end - x.start) / wide).max((y.end - y.start) / high);
+    let around = |range: Range<f64>, pixels: f64| {
+        let (middle, half) = (0.5 * (range.start + range.end), 0.5 * unit * pixels);
+        middle - half..middle + half
+    };
+    (around(x, wide), around(y, high))
 }
 
 /// Colour and width of a curve; those of one name look the same in all panels.
@@ -482,6 +511,17 @@ mod tests {
         assert!(!text.contains("f2") && !text.contains("f3"));
         assert!(text.matches("<polyline").count() >= 2);
         assert_eq!(text, plot.svg().unwrap());
+    }
+
+    #[test]
+    fn a_unit_is_as_long_on_both_axes_of_a_plan() {
+        let (x, y) = equally_long((0.0..2.0, 5.0..6.0), &PLAN);
+        let (wide, high) = (f64::from(PLAN.panel.0 - 72 - PLAN.y_area), f64::from(PLAN.panel.1 - 48 - PLAN.x_area));
+        assert!(((x.end - x.start) / wide - (y.end - y.start) / high).abs() < 1e-15);
+        assert!(x.start < 0.0 && x.end > 2.0 && y.start < 5.0 && y.end > 6.0);
+        let curves = vec![PlotCurve { x: vec![0.0, 1.0, 0.0], y: vec![0.0, 1.0, 2.0], ..curve("path", &[]) }];
+        let panel = Panel { label: "y (mm)".into(), logarithmic: false, legend: true, curves };
+        assert!(plan_plot("x (mm)", &panel).unwrap().contains("y (mm)"));
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::monitor::tool_path::PathFigures;
 use crate::summary::{Summary, TcpFigures};
 
 /// Errors below this are rounding (m).
@@ -55,7 +56,8 @@ pub(crate) fn headline(summary: &Summary, by_choice: bool) -> String {
         }
         (Some(tcp), _) => {
             let nothing = if nothing { format!("; nothing bends: {why_nothing}") } else { String::new() };
-            format!("{}; {}{nothing}", parts(tcp), shares(tcp))
+            let path = summary.path.as_ref().map_or_else(String::new, across);
+            format!("{path}{}; {}{nothing}", parts(tcp), shares(tcp))
         }
     }
 }
@@ -98,6 +100,14 @@ fn parts(tcp: &TcpFigures) -> String {
         }
         _ => format!("{peak} (static part not known: the arm has no equilibrium somewhere on its way)"),
     }
+}
+
+/// What counts on a path of the tool, before everything else.
+fn across(path: &PathFigures) -> String {
+    let digits = digits(1e3 * path.across_peak_m);
+    let mm = |x: f64| format!("{:.digits$}", 1e3 * x);
+    let (peak, left) = (mm(path.across_peak_m), mm(path.left_m));
+    format!("{peak} mm across the path, {left} with the workpiece set where the tool is; ")
 }
 
 fn shares(tcp: &TcpFigures) -> String {

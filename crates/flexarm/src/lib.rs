@@ -101,6 +101,7 @@ pub use headline::{Bending, ShareFigures};
 pub use inspect::{FlexibleInfo, Inspection, JointInfo, LinkInfo, TcpInfo, inspect};
 pub use mode_recording::{ModeMovie, record_modes};
 pub use modes::{ModeFigures, ModeTable, modes};
+pub use monitor::tool_path::{PathFigures, PathMoveFigures};
 pub use motion::{HeldJoint, Motion};
 pub use operating_points::OperatingPoints;
 pub use options::{DriveModel, LinkModel, Modelling, Outputs, RunOptions};

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::caveat::Caveat;
 use crate::headline::{Bending, ShareFigures};
+use crate::monitor::tool_path::PathFigures;
 use crate::options::RunOptions;
 use crate::settling::within;
 use crate::stepper_settings::StepperSettings;
@@ -46,6 +47,9 @@ pub struct Summary {
     /// Flexible against rigid tool centre point; absent for runs without the twin.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tcp: Option<TcpFigures>,
+    /// The error across the path; absent unless the motion is told by the path of the tool.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub path: Option<PathFigures>,
     /// Natural frequencies at the start pose, drives locked (Hz).
     pub frequencies_hz: Vec<f64>,
     /// Flexible links.

@@ -10,6 +10,9 @@ pub(crate) mod drive_load;
 pub(crate) mod energy;
 pub(crate) mod strain;
 pub(crate) mod tool;
+pub(crate) mod tool_path;
+
+use std::sync::Arc;
 
 use flexarm_kinematics::Frame;
 use flexarm_stepping::{FlexibleArm, Observation};
@@ -21,6 +24,8 @@ use crate::monitor::drive_load::DriveLoads;
 use crate::monitor::energy::Energy;
 use crate::monitor::strain::Strains;
 use crate::monitor::tool::{ToolError, ToolMonitor};
+use crate::monitor::tool_path::ToolPathMonitor;
+use crate::tool_path::ToolPath;
 use crate::twin::RigidTwin;
 
 /// All monitors of a run.
@@ -31,6 +36,8 @@ pub(crate) struct Monitors {
     pub(crate) deflections: Deflections,
     pub(crate) drive_loads: DriveLoads,
     pub(crate) energy: Energy,
+    /// For motions that are told by the path of the tool.
+    pub(crate) tool_path: Option<ToolPathMonitor>,
 }
 
 impl Monitors {
@@ -43,7 +50,14 @@ impl Monitors {
             deflections: Deflections::new(arm, flexible, n_drives),
             drive_loads: DriveLoads::new(arm),
             energy: Energy::new(&arm.model),
+            tool_path: None,
         }
+    }
+
+    /// The same, with an eye on the path of the tool.
+    #[must_use]
+    pub(crate) fn along(self, path: Option<Arc<ToolPath>>) -> Self {
+        Self { tool_path: path.map(ToolPathMonitor::new), ..self }
     }
 
     /// Shows a sample to all; the error of the tool in it.
@@ -53,6 +67,10 @@ impl Monitors {
         self.strains.update(&seen.X_WB, &twin.data.X_WB);
         self.deflections.update(&seen.q);
         self.energy.update(seen);
-        self.tool.update(seen, twin, tcp)
+        let tool = self.tool.update(seen, twin, tcp);
+        if let Some(path) = &mut self.tool_path {
+            path.update(seen.t, &tool, &twin.velocity);
+        }
+        tool
     }
 }

@@ -10,7 +10,9 @@ use flexarm_draw::palette::{self, Ground, hex};
 use flexarm_log::{EventKind, RunHeader, Trace};
 
 use super::curves::{Kind, Plot, overlays, plots};
+use super::path_plan::path_plan;
 use super::picture::{pictures, scale_colors};
+use crate::monitor::tool_path::PathMoveFigures;
 use crate::stepper_settings::SettingValue;
 use crate::summary::{EnergyFigures, Summary, TcpFigures};
 
@@ -24,6 +26,8 @@ const UPLOT_VERSION: &str = "1.6.32";
 /// Errors below this are rounding (m).
 const NOTHING_M: f64 = 1e-12;
 
+/// Most moves of the tool in the table of the page.
+const MOST_MOVES: usize = 200;
 /// Width of the pictures of the arm (pixels): sharp at the width at which the page shows them.
 const PICTURE_WIDTH: usize = 1080;
 
@@ -103,6 +107,7 @@ fn body(main: &ReportRun<'_>, runs: &[ReportRun<'_>], thinning: &str) -> String 
     body += &arm_pictures(runs);
     body += "<section id=\"plots\"><noscript><p>The plots need JavaScript.</p></noscript></section>\n";
     body += thinning;
+    body += &tool_path(main);
     body += &iso_table(runs);
     let of = if runs.len() > 1 { format!(" of {}", escaped(main.label)) } else { String::new() };
     body += &stops_table(main.summary, &of);
@@ -382,6 +387,55 @@ fn comparison(runs: &[ReportRun<'_>]) -> String {
     };
     out += "</tbody></table></div><p class=\"note\">In brackets: against the first run.";
     out + apart + "</p></section>\n"
+}
+
+/// The plan of the tool's path and its moves, of a motion that is told by it.
+fn tool_path(run: &ReportRun<'_>) -> String {
+    let Some(path) = &run.summary.path else { return String::new() };
+    let mut out = "<section class=\"block\"><h2>Across the path of the tool</h2>\n".to_owned();
+    if let Some(plan) = path_plan(path) {
+        let data = base64::engine::general_purpose::STANDARD.encode(&plan.svg);
+        let caption = format!(
+            "The path of the tool and the tool with its error enlarged {} times, less the offset by which the workpiece would be moved.",
+            plan.factor
+        );
+        let _ = writeln!(
+            out,
+            "<figure><img alt=\"{caption}\" style=\"width:100%;background:#fff\" src=\"data:image/svg+xml;base64,{data}\">\
+             <figcaption>{caption}</figcaption></figure>"
+        );
+    }
+    let optional = |x: Option<f64>| x.map_or_else(|| "–".into(), |x| number(1e3 * x, 4));
+    let row = |of: &PathMoveFigures| {
+        vec![
+            of.line.to_string(),
+            of.statement.clone(),
+            number(of.span_s[0], 5),
+            number(of.span_s[1], 5),
+            number(1e3 * of.across_peak_m, 4),
+            number(1e3 * of.across_rms_m, 4),
+            number(1e3 * of.corner_overshoot_m, 3),
+            optional(of.programmed_m_s),
+            optional(of.top_m_s),
+        ]
+    };
+    let rows: Vec<Vec<String>> = path.moves.iter().take(MOST_MOVES).map(row).collect();
+    let head = [
+        "line",
+        "move",
+        "from (s)",
+        "to (s)",
+        "across, peak (mm)",
+        "across, RMS (mm)",
+        "corner overshoot (mm)",
+        "programmed (mm/s)",
+        "reached (mm/s)",
+    ];
+    out += &table("Moves of the tool", &head, &rows);
+    if path.moves.len() > MOST_MOVES {
+        let _ = writeln!(out, "<p class=\"note\">{} more moves are in the summary.</p>", path.moves.len() - MOST_MOVES);
+    }
+    out + "</section>\n"
 }
 
 fn arm_pictures(runs: &[ReportRun<'_>]) -> String {

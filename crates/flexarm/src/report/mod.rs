@@ -7,6 +7,7 @@ mod again;
 mod curves;
 mod figures;
 mod html;
+mod path_plan;
 mod picture;
 
 use std::fmt::Write as _;
@@ -176,6 +177,14 @@ fn tool_figures(summary: &Summary) -> Vec<Figure> {
     let across = format!("binormal {} mm", mm(binormal));
     rows.push(Figure::new("peak normal to the path", mm(normal), "mm", across));
     rows.push(Figure::new("path accuracy", mm(tcp.path_accuracy_m), "mm", "largest distance from the path in motion"));
+    if let Some(path) = &summary.path {
+        let note = format!("at {:.3} s, on moves of the tool; RMS {} mm", path.t_across_peak_s, mm(path.across_rms_m));
+        rows.push(Figure::new("across the path", mm(path.across_peak_m), "mm", note));
+        let [x, y, z] = path.offset_m.map(mm);
+        let note = format!("with the workpiece moved by ({x}, {y}, {z}) mm, where the tool is");
+        rows.push(Figure::new("left of it at most", mm(path.left_m), "mm", note));
+        rows.push(Figure::new("corner overshoot", mm(path.corner_overshoot_m), "mm", "beyond the static deflection"));
+    }
     rows.push(Figure::new("static sag at the start", mm(tcp.static_sag_m), "mm", ""));
     rows.push(Figure::new("error at the end", mm(tcp.end_m), "mm", ""));
     let rms = format!("RMS {} mrad", mm(tcp.rms_rad));

@@ -37,6 +37,7 @@ impl Run<'_> {
             duration_s: self.monitors.tool.result().last_time_s().unwrap_or(0.0),
             stepper: StepperFigures::new(self.options, self.stepper.counts()),
             tcp: metrics.map(|m| self.tool_figures(m, sag_m)),
+            path: metrics.and_then(|_| self.monitors.tool_path.as_ref()?.result()),
             frequencies_hz: self.arm.modes.frequencies_hz(),
             energy: self.monitors.energy.result(),
             drives: peaks.map(|(c, load)| (c.joint.clone(), load.peak)).collect(),

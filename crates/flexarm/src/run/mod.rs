@@ -286,7 +286,7 @@ impl<'a> Run<'a> {
             tcp,
             twin,
             seen: Observation::new(&arm),
-            monitors: Monitors::new(&arm, flexible, robot.drives.len(), tool),
+            monitors: Monitors::new(&arm, flexible, robot.drives.len(), tool).along(motion.tool_path.clone()),
             sampler: Sampler::new(robot, flexible, frames, places),
             sample: Sample::default(),
             trace: Trace::default(),

@@ -1,0 +1,234 @@
+//! The error across the path of a motion that is told by the path of the tool, move by move.
+//!
+//! Terms as in ISO 9283, of one run in place of many: path accuracy is the largest distance across the path; the corner overshoot is how
+//! far the tool swings on along the old direction behind a corner. A workpiece is often set where the tool really is; what is left
+//! then is bounded by half the diagonal of the box that the error vector stays in.
+
+use std::sync::Arc;
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use crate::monitor::tool::ToolError;
+use crate::tool_path::ToolPath;
+
+/// Slower than this the tool has no direction, m/s.
+const REST: f64 = 1e-5;
+/// Most points that are kept for a picture.
+const MOST_POINTS: usize = 8192;
+
+/// What a motion along a path of the tool has of errors across it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct PathFigures {
+    /// Largest distance from the path on moves of the tool (m), and when (s).
+    pub across_peak_m: f64,
+    /// See there.
+    pub t_across_peak_s: f64,
+    /// Root mean square of that distance over the samples of those moves (m).
+    pub across_rms_m: f64,
+    /// Middle of the box that the error stays in on those moves: by how much a workpiece would be moved (m, world axes).
+    pub offset_m: [f64; 3],
+    /// What is left then, at most (m): half the diagonal of the box.
+    pub left_m: f64,
+    /// How far the tool swings on behind a corner, beyond its static deflection (m); 0 without a corner.
+    pub corner_overshoot_m: f64,
+    /// Move by move, those of the tool alone.
+    pub moves: Vec<PathMoveFigures>,
+    /// Points of the path with the error there, some thousands of them: rigid tool and error (m, world axes). Not in files.
+    #[serde(skip)]
+    pub points: Vec<[f64; 6]>,
+}
+
+/// One move of the tool.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct PathMoveFigures {
+    /// Line of the program or file.
+    pub line: usize,
+    /// What stands there.
+    pub statement: String,
+    /// First and last moment (s).
+    pub span_s: [f64; 2],
+    /// Largest distance from the path (m).
+    pub across_peak_m: f64,
+    /// Root mean square of it (m).
+    pub across_rms_m: f64,
+    /// Swing along the direction of the move before, beyond the static deflection (m).
+    pub corner_overshoot_m: f64,
+    /// Programmed speed (m/s).
+    pub programmed_m_s: Option<f64>,
+    /// Greatest speed (m/s).
+    pub top_m_s: Option<f64>,
+}
+
+/// Sums over the samples of one move.
+#[derive(Clone, Debug, Default)]
+struct Sums {
+    samples: usize,
+    squares: f64,
+    peak: f64,
+    t_peak: f64,
+    overshoot: f64,
+}
+
+/// Watches the error across the path.
+pub(crate) struct ToolPathMonitor {
+    path: Arc<ToolPath>,
+    sums: Vec<Sums>,
+    /// First move that has not ended.
+    now: usize,
+    /// Direction of the rigid tool in the move before, world axes.
+    before: Vector3<f64>,
+    direction: Vector3<f64>,
+    low: Vector3<f64>,
+    high: Vector3<f64>,
+    /// Every so many samples a point is kept.
+    every: usize,
+    seen: usize,
+    points: Vec<[f64; 6]>,
+}
+
+impl ToolPathMonitor {
+    pub(crate) fn new(path: Arc<ToolPath>) -> Self {
+        let sums = vec![Sums::default(); path.moves.len()];
+        let (low, high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
+        Self {
+            path,
+            sums,
+            now: 0,
+            before: Vector3::zeros(),
+            direction: Vector3::zeros(),
+            low,
+            high,
+            every: 1,
+            seen: 0,
+            points: Vec::new(),
+        }
+    }
+
+    /// * `velocity`: of the rigid tool (m/s, world axes).
+    pub(crate) fn update(&mut self, t: f64, tool: &ToolError, velocity: &Vector3<f64>) {
+        let moves = &self.path.moves;
+        while self.now + 1 < moves.len() && t > moves[self.now].span_s[1] {
+            self.now += 1;
+            self.before = self.direction;
+        }
+        let Some(of) = moves.get(self.now) else { return };
+        if velocity.norm() > REST {
+            self.direction = velocity.normalize();
+        }
+        if of.top_m_s.is_none() || t < of.span_s[0] || t > of.span_s[1] {
+            return;
+        }
+        let error = Vector3::from_row_slice(&tool.error[..3]);
+        self.low = self.low.inf(&error);
+        self.high = self.high.sup(&error);
+        self.keep(tool.X_rigid.translation.vector, error);
+        let sums = &mut self.sums[self.now];
+        let across = tool.path_error[1].hypot(tool.path_error[2]);
+        sums.samples += 1;
+        sums.squares += across * across;
+        if across > sums.peak {
+            (sums.peak, sums.t_peak) = (across, t);
+        }
+        let swing = error - Vector3::from(tool.static_m);
+        let on = swing.dot(&self.before);
+        // Only across the new direction: along it, it is a lead and not an overshoot.
+        let turned = 1.0 - self.before.dot(&self.direction).powi(2).min(1.0);
+        if on.is_finite() && turned > 0.1 {
+            sums.overshoot = sums.overshoot.max(on);
+        }
+    }
+
+    /// Keeps a point now and then: every second of them goes when there are too many.
+    fn keep(&mut self, p: Vector3<f64>, e: Vector3<f64>) {
+        if self.seen.is_multiple_of(self.every) {
+            self.points.push([p.x, p.y, p.z, e.x, e.y, e.z]);
+        }
+        self.seen += 1;
+        if self.points.len() >= MOST_POINTS {
+            let mut k = 0;
+            self.points.retain(|_| {
+                k += 1;
+                k % 2 == 1
+            });
+            self.every *= 2;
+        }
+    }
+
+    /// Figures of what was seen so far; nothing without a sample on a move of the tool.
+    pub(crate) fn result(&self) -> Option<PathFigures> {
+        let samples: usize = self.sums.iter().map(|sums| sums.samples).sum();
+        let peak = self.sums.iter().max_by(|a, b| a.peak.total_cmp(&b.peak)).filter(|_| samples > 0)?;
+        let squares: f64 = self.sums.iter().map(|sums| sums.squares).sum();
+        let rms = |squares: f64, samples: usize| (squares / samples.max(1) as f64).sqrt();
+        let figures = |(of, sums): (&flexarm_path::PlannedMove, &Sums)| PathMoveFigures {
+            line: of.line,
+            statement: of.statement.clone(),
+            span_s: of.span_s,
+            across_peak_m: sums.peak,
+            across_rms_m: rms(sums.squares, sums.samples),
+            corner_overshoot_m: sums.overshoot,
+            programmed_m_s: of.programmed_m_s,
+            top_m_s: of.top_m_s,
+        };
+        let moves = self.path.moves.iter().zip(&self.sums).filter(|(_, sums)| sums.samples > 0);
+        Some(PathFigures {
+            across_peak_m: peak.peak,
+            t_across_peak_s: peak.t_peak,
+            across_rms_m: rms(squares, samples),
+            offset_m: (0.5 * (self.low + self.high)).into(),
+            left_m: 0.5 * (self.high - self.low).norm(),
+            corner_overshoot_m: self.sums.iter().map(|sums| sums.overshoot).fold(0.0, f64::max),
+            moves: moves.map(figures).collect(),
+            points: self.points.clone(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use flexarm_kinematics::Pose;
+    use flexarm_path::PlannedMove;
+
+    fn a_move(line: usize, span_s: [f64; 2]) -> PlannedMove {
+        PlannedMove {
+            line,
+            statement: "line".into(),
+            span_s,
+            top_m_s: Some(1.0),
+            programmed_m_s: Some(1.0),
+            slowed: None,
+            least_sigma: None,
+            blend_m: 0.0,
+        }
+    }
+
+    /// Truth: a tool that goes along x for a second, then along y, with a sag of 2 mm and a swing along x of 1 mm behind the corner.
+    #[test]
+    fn sag_is_an_offset_and_a_swing_behind_the_corner_an_overshoot() {
+        let path = ToolPath { moves: vec![a_move(3, [0.0, 1.0]), a_move(4, [1.0, 2.0])], notes: Vec::new() };
+        let mut monitor = ToolPathMonitor::new(Arc::new(path));
+        for k in 0..=200 {
+            let t = 0.01 * f64::from(k);
+            let behind = t > 1.0;
+            let swing = if behind { 1e-3 * (10.0 * (t - 1.0)).sin() * (-3.0 * (t - 1.0)).exp() } else { 0.0 };
+            let velocity = if behind { Vector3::y() } else { Vector3::x() };
+            let sag = [0.0, 0.0, -2e-3];
+            let error = [swing, 0.0, -2e-3, 0.0, 0.0, 0.0];
+            let path_error = if behind { [0.0, swing, -2e-3, 0.0, 0.0, 0.0] } else { [0.0, 0.0, -2e-3, 0.0, 0.0, 0.0] };
+            let (X_rigid, X_flexible) = (Pose::identity(), Pose::identity());
+            monitor.update(t, &ToolError { X_rigid, X_flexible, error, path_error, static_m: sag }, &velocity);
+        }
+        let figures = monitor.result().unwrap();
+        let peak =
+            (0..200).map(|k| 0.005 * f64::from(k)).map(|t| (10.0 * t).sin() * (-3.0 * t).exp()).fold(0.0, f64::max);
+        assert!((figures.corner_overshoot_m - 1e-3 * peak).abs() < 2e-5 * peak, "{}", figures.corner_overshoot_m);
+        assert_eq!(figures.offset_m[2], -2e-3);
+        assert!(figures.left_m < 1e-3 && figures.left_m > 0.4e-3);
+        assert_eq!((figures.moves[0].line, figures.moves[0].across_peak_m), (3, 2e-3));
+        assert!(figures.across_peak_m > 2e-3 && figures.t_across_peak_s > 1.0);
+    }
+}

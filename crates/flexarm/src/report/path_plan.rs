@@ -1,0 +1,114 @@
+//! The path of the tool in its plane, with the error across it enlarged.
+
+use flexarm_draw::{CurveLook, Panel, PlotCurve, plan_plot};
+use nalgebra::{Matrix3, Vector3};
+
+use crate::monitor::tool_path::PathFigures;
+
+/// The largest error is drawn as this part of the size of the path.
+const SHOWN: f64 = 0.06;
+
+/// The plan and what it shows; nothing where there is no path to draw.
+pub(crate) struct PathPlan {
+    /// SVG.
+    pub(crate) svg: String,
+    /// By how much errors are enlarged.
+    pub(crate) factor: f64,
+}
+
+/// Draws the path in the plane in which it lies best, and beside it the tool with its errors, less the offset of the workpiece.
+pub(crate) fn path_plan(figures: &PathFigures) -> Option<PathPlan> {
+    let split = |row: &[f64; 6]| (Vector3::new(row[0], row[1], row[2]), Vector3::new(row[3], row[4], row[5]));
+    let points: Vec<(Vector3<f64>, Vector3<f64>)> = figures.points.iter().map(split).collect();
+    if points.len() < 3 {
+        return None;
+    }
+    let mean = points.iter().map(|(p, _)| p).sum::<Vector3<f64>>() / points.len() as f64;
+    let [u, v] = plane(points.iter().map(|(p, _)| p - mean));
+    let offset = Vector3::from(figures.offset_m);
+    let within = |p: &Vector3<f64>| [u.dot(p), v.dot(p)];
+    let size = points.iter().map(|(p, _)| (p - mean).norm()).fold(0.0, f64::max);
+    let errors = points.iter().map(|(_, e)| e - offset);
+    let largest = errors.map(|e| within(&e)).map(|[a, b]| a.hypot(b)).fold(0.0, f64::max);
+    if !(size > 0.0 && largest > 0.0) {
+        return None;
+    }
+    let factor = rounded(SHOWN * size / largest);
+    let place = |enlarged: f64| points.iter().map(move |(p, e)| p + (e - offset) * enlarged);
+    let curve = |name: String, look: CurveLook, enlarged: f64| {
+        let places: Vec<[f64; 2]> = place(enlarged).map(|p| within(&p).map(|x| 1e3 * x)).collect();
+        let (x, y) = (places.iter().map(|p| p[0]).collect(), places.iter().map(|p| p[1]).collect());
+        PlotCurve { name, look, x, y }
+    };
+    let curves = vec![
+        curve("path of the rigid tool".into(), CurveLook::Dashed, 0.0),
+        curve(format!("flexible tool, error x {factor}, workpiece moved to it"), CurveLook::Plain, factor),
+    ];
+    let panel = Panel { label: format!("{} (mm)", named(&v)), logarithmic: false, legend: true, curves };
+    let svg = plan_plot(&format!("{} (mm)", named(&u)), &panel).ok()?;
+    Some(PathPlan { svg, factor })
+}
+
+/// Two world axes if the points lie square to the third, else the two directions in which they spread most.
+fn plane(points: impl Iterator<Item = Vector3<f64>>) -> [Vector3<f64>; 2] {
+    let spread: Matrix3<f64> = points.map(|p| p * p.transpose()).sum();
+    let eigen = spread.symmetric_eigen();
+    let normal: Vector3<f64> = eigen.eigenvectors.column(eigen.eigenvalues.imin()).into();
+    let flattest = normal.iamax();
+    // Within five degrees of a world axis the plan keeps the others.
+    if normal[flattest].abs() > 0.996 {
+        let axes = [[1, 2], [0, 2], [0, 1]][flattest];
+        return axes.map(|k| Vector3::ith(k, 1.0));
+    }
+    let widest: Vector3<f64> = eigen.eigenvectors.column(eigen.eigenvalues.imax()).into();
+    [widest, normal.cross(&widest)]
+}
+
+/// What an axis of the plan is called.
+fn named(axis: &Vector3<f64>) -> String {
+    let largest = axis.iamax();
+    if axis[largest].abs() > 0.999 {
+        return ["x", "y", "z"][largest].to_owned();
+    }
+    format!("along ({:.2}, {:.2}, {:.2})", axis.x, axis.y, axis.z)
+}
+
+/// 1, 2 or 5 times a power of ten, not above `x`.
+fn rounded(x: f64) -> f64 {
+    let power = 10f64.powf(x.log10().floor());
+    let digit = x / power;
+    power
+        * if digit >= 5.0 {
+            5.0
+        } else if digit >= 2.0 {
+            2.0
+        } else {
+            1.0
+        }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Truth: a circle in the plane x, y with a constant sag and an error of 1 mm outwards.
+    #[test]
+    fn a_sag_is_no_error_of_the_shape_and_errors_are_enlarged_by_a_round_number() {
+        let point = |k: u32| {
+            let a = f64::from(k) * std::f64::consts::TAU / 100.0;
+            let e = Vector3::new(a.cos(), a.sin(), 0.0) * 1e-3 - Vector3::z() * 4e-3;
+            [0.3 * a.cos(), 0.3 * a.sin(), 1.0, e.x, e.y, e.z]
+        };
+        let figures = PathFigures {
+            points: (0..=100).map(point).collect(),
+            offset_m: [0.0, 0.0, -4e-3],
+            ..PathFigures::default()
+        };
+        let plan = path_plan(&figures).unwrap();
+        assert!((plan.factor - 10.0).abs() < 1e-12, "{}", plan.factor); // 0.06 of 300 mm is 18 mm
+        for word in ["x (mm)", "y (mm)", "error x 10"] {
+            assert!(plan.svg.contains(word), "{word}");
+        }
+        assert!(path_plan(&PathFigures::default()).is_none());
+    }
+}
