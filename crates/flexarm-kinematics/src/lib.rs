@@ -61,8 +61,8 @@ pub use flexarm_spatial::products;
 
 pub use aba::{Roles, forward_dynamics, hybrid_dynamics};
 pub use analytic_ik::{
-    AXIS_TOLERANCE, AXIS_TOLERANCE_RAD, AnalyticArm, ArmClass, Branch, ControllerAxes, Miss, NoAnalyticIk, POSE_TOLERANCE,
-    PositionForm, Selection, Solution, Solutions, abb_quadrant, kuka_turn,
+    AXIS_TOLERANCE, AXIS_TOLERANCE_RAD, AnalyticArm, ArmClass, Branch, ControllerAxes, Miss, NoAnalyticIk,
+    POSE_TOLERANCE, PositionForm, Selection, Solution, Solutions, abb_quadrant, kuka_turn,
 };
 pub use axis_motion::AxisMotion;
 pub use crba::{mass_matrix, mass_matrix_at_poses};

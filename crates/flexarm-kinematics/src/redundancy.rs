@@ -104,9 +104,7 @@ impl Aim {
             let half = 0.5 * (limits.upper - limits.lower);
             let (middle, weight) = match rule {
                 NullSpaceRule::NearestTo(rest) => (rest[k], 1.0),
-                NullSpaceRule::AwayFromLimits if half.is_finite() && half > 0.0 => {
-                    (limits.lower + half, half.powi(-2))
-                }
+                NullSpaceRule::AwayFromLimits if half.is_finite() && half > 0.0 => (limits.lower + half, half.powi(-2)),
                 NullSpaceRule::AwayFromLimits => (0.0, 0.0),
             };
             AimedCoordinate { k, middle, weight, lower: limits.lower, upper: limits.upper }
@@ -128,9 +126,8 @@ impl Aim {
             let n = free.len();
             let Jf = DMatrix::from_fn(6, n, |r, c| J[(r, free[c].k)] / if r < 3 { length } else { 1.0 });
             let step = null_space_step(&Jf, &free, q);
-            let pushed = |(i, d): (&&AimedCoordinate, &f64)| {
-                (q[i.k] <= i.lower && *d < 0.0) || (q[i.k] >= i.upper && *d > 0.0)
-            };
+            let pushed =
+                |(i, d): (&&AimedCoordinate, &f64)| (q[i.k] <= i.lower && *d < 0.0) || (q[i.k] >= i.upper && *d > 0.0);
             let Some(out) = free.iter().zip(step.iter()).position(pushed) else {
                 let mut all = DVector::zeros(model.nv());
                 for (i, d) in free.iter().zip(step.iter()) {

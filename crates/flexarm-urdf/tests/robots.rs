@@ -376,3 +376,43 @@ fn inertia_from_a_mesh_file_needs_it_closed() {
     let error = read_mesh("none.obj").unwrap_err();
     assert!(error.to_string().contains("could not be estimated: the mesh \"none.obj\" was not found"), "{error}");
 }
+
+/// Every shipped arm of six joints, and the flanges of others' descriptions: the class by the axes of the file, and joint values
+/// found again from the pose of the tool.
+#[test]
+fn inverse_kinematics_of_the_shipped_arms_has_a_closed_form() {
+    use flexarm_kinematics::{AnalyticArm, ArmClass, Data, PositionForm, Solutions, forward_kinematics};
+    let arms = [
+        ("kr210", "tool0"),
+        ("kr210_identified", "tool0"),
+        ("kr500_identified", "tool0"),
+        ("manutec_r3", "link_6"),
+        ("reference_arm", "link_6"),
+        ("reference_arm_coupled", "link_6"),
+    ];
+    for (name, link) in arms {
+        let path = format!("{}/../../robots/{name}/{name}.urdf", env!("CARGO_MANIFEST_DIR"));
+        let robot = read_urdf(path, &ReadOptions::default()).unwrap();
+        let model = Model::new(&robot.mechanism).unwrap();
+        let (frame, mut data) = (model.frame(link).unwrap(), Data::new(&model));
+        let arm = AnalyticArm::new(&model, frame).unwrap();
+        assert_eq!(arm.class(), ArmClass::SphericalWrist(PositionForm::Parallel23), "{name}");
+        let mut solutions = Solutions::default();
+        for k in 0..200 {
+            // Joint values spread evenly within the limits.
+            let q: [f64; 6] = std::array::from_fn(|j| {
+                let (low, high) = arm.limits()[j];
+                low + (high - low) * (0.5 + f64::from(k) * [0.618, 0.382, 0.755, 0.570, 0.819, 0.671][j]).fract()
+            });
+            forward_kinematics(&model, &mut data, &nalgebra::DVector::from_column_slice(&q));
+            arm.solve(&data.X_WF(frame), &mut solutions);
+            let mut error = f64::INFINITY;
+            for s in solutions.iter() {
+                arm.copies_within_limits(&s.q, |copy| {
+                    error = error.min(copy.iter().zip(&q).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max));
+                });
+            }
+            assert!(error < 1e-9, "{name} {q:?}: {error:.1e}");
+        }
+    }
+}

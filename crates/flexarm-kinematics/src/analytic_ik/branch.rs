@@ -106,6 +106,29 @@ pub fn abb_quadrant(axis: f64) -> i32 {
     (axis / FRAC_PI_2).floor() as i32
 }
 
+impl Selection {
+    /// Whether the value of an axis (0 to 5, rad) has the turn or the quadrant that is meant.
+    fn allows(&self, k: usize, axis: f64) -> bool {
+        match *self {
+            Self::Kuka { turn: Some(turn), .. } => axis.abs() < BOUNDARY || (axis < 0.0) == (turn >> k & 1 == 1),
+            Self::Abb { quadrants: [first, fourth, sixth], .. } => match k {
+                0 => is_in_quadrant(axis, first),
+                3 => is_in_quadrant(axis, fourth),
+                5 => is_in_quadrant(axis, sixth),
+                _ => true,
+            },
+            _ => true,
+        }
+    }
+}
+
+fn is_in_quadrant(axis: f64, quadrant: i32) -> bool {
+    abb_quadrant(axis - BOUNDARY) == quadrant || abb_quadrant(axis + BOUNDARY) == quadrant
+}
+
+/// So near to where a bit or a quadrant changes (rad, sine, or part of the reach), a program may say either.
+const BOUNDARY: f64 = 1e-4;
+
 /// Directions by which sides are told, at zero joint values.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sides {
@@ -147,11 +170,17 @@ impl Sides {
 impl AnalyticArm {
     /// Label of joint values (rad).
     pub fn branch(&self, q: &[f64; 6]) -> Branch {
+        let [shoulder, elbow, wrist] = self.side_values(q).map(|v| v >= 0.0);
+        Branch { shoulder, elbow, wrist }
+    }
+
+    /// Numbers whose signs are the sides: sines of angles or lengths over the reach, zero where two branches meet.
+    fn side_values(&self, q: &[f64; 6]) -> [f64; 3] {
         let mut q = *q;
         if self.reversed {
             q.reverse();
         }
-        let [near, elbow, far] = match &self.kernel {
+        let mut values = match &self.kernel {
             Kernel::Wrist(k) => {
                 let [base, elbow] = self.arm_sides(&k.axes, k.form, &k.center, &q);
                 [base, elbow, self.beyond(k.fan.phi, q[4])]
@@ -160,44 +189,45 @@ impl AnalyticArm {
                 let [s1, s2, s3, s4, s5, _] = &k.axes;
                 let (t2, t3, t4) = (s2.at(q[1]), s3.at(q[2]), s4.at(q[3]));
                 let point = t2.point(&t3.point(&t4.point(&s5.at(q[4]).point(&k.near.1))));
-                let base = s1.h.cross(&s2.h).dot(&(point - s1.o)) >= 0.0;
-                [base, bent(s2, s3, &t3.point(&s4.o)), self.beyond(k.fan.phi, q[4])]
+                let base = s1.h.cross(&s2.h).dot(&(point - s1.o)) / k.reach;
+                [base, bend(s2, &s3.o, &t3.point(&s4.o), &s3.h), self.beyond(k.fan.phi, q[4])]
             }
             Kernel::Parallel123(k) => {
                 let [s1, s2, s3, s4, s5, s6] = &k.axes;
                 let (t4, t5) = (s4.at(q[3]), s5.at(q[4]));
                 let lever = t4.vector(&(k.near.1 - s4.o));
                 let fifth = t4.inverse().vector(&s1.h).dot(&s5.h.cross(&t5.vector(&s6.h)));
-                [bent(s1, s2, &s2.at(q[1]).point(&s3.o)), s1.h.dot(&s4.h.cross(&lever)) <= 0.0, fifth <= 0.0]
+                [bend(s1, &s2.o, &s2.at(q[1]).point(&s3.o), &s2.h), -s1.h.dot(&s4.h.cross(&lever)) / k.reach, -fifth]
             }
         };
-        match self.reversed {
-            true => Branch { shoulder: far, elbow, wrist: near },
-            false => Branch { shoulder: near, elbow, wrist: far },
+        if self.reversed {
+            values.reverse();
         }
+        values
     }
 
-    /// Sides of the two roots of the position problem.
-    fn arm_sides(&self, axes: &[Screw; 6], form: PositionForm, center: &Vector3<f64>, q: &[f64; 6]) -> [bool; 2] {
+    /// The same of the two roots of the position problem.
+    fn arm_sides(&self, axes: &[Screw; 6], form: PositionForm, center: &Vector3<f64>, q: &[f64; 6]) -> [f64; 2] {
         let [s1, s2, s3, ..] = axes;
         let c3 = s3.at(q[2]).point(center);
         let c2 = s2.at(q[1]).point(&c3);
+        let reach = self.chain.reach;
         match form {
+            // The distance of the centre from o_2 falls with the angle beyond the stretched arm.
             PositionForm::Parallel23 | PositionForm::Intersecting12 | PositionForm::General => {
-                // The distance of the centre from o_2 falls with the angle beyond the stretched arm.
-                let rate = (s3.o - s2.o).dot(&s3.h.cross(&(c3 - s3.o)));
-                [self.sides.front.dot(&(c2 - s1.o)) >= 0.0, rate <= 0.0]
+                [self.sides.front.dot(&(c2 - s1.o)) / reach, bend(s2, &s3.o, &c3, &s3.h)]
             }
-            PositionForm::Parallel12 => [bent(s1, s2, &c2), s1.h.dot(&s3.h.cross(&(c3 - s3.o))) <= 0.0],
+            PositionForm::Parallel12 => [bend(s1, &s2.o, &c2, &s2.h), -s1.h.dot(&s3.h.cross(&(c3 - s3.o))) / reach],
             PositionForm::Intersecting23 => {
-                [(s2.o - s1.o).dot(&s1.h.cross(&(c2 - s1.o))) >= 0.0, s3.h.dot(&s2.h.cross(&(c3 - s2.o))) >= 0.0]
+                let first = (s2.o - s1.o).dot(&s1.h.cross(&(c2 - s1.o))) / (reach * reach);
+                [first, s3.h.dot(&s2.h.cross(&(c3 - s2.o))) / reach]
             }
         }
     }
 
-    fn beyond(&self, phi: f64, q: f64) -> bool {
+    fn beyond(&self, phi: f64, q: f64) -> f64 {
         let phi = if self.sides.wrist_at_phi { phi } else { phi + PI };
-        (q - phi).sin() >= 0.0
+        (q - phi).sin()
     }
 
     /// Whether words of industrial arms have a meaning: spherical wrist, axes 2 and 3 parallel and across axis 1.
@@ -244,29 +274,46 @@ impl AnalyticArm {
         self.is_industrial().then(|| ([0, 3, 5].map(|k| abb_quadrant(axes.axis(k, q))), cfx))
     }
 
-    /// Whether joint values are on the branch that is meant, whole turns apart.
+    /// Whether joint values are on the branch that is meant, whole turns apart; where two branches meet they are on both.
     fn is_on(&self, q: &[f64; 6], selection: &Selection, axes: &ControllerAxes) -> bool {
-        let agree = |wanted: Option<bool>, found: Option<bool>| wanted.is_none() || wanted == found;
+        let [shoulder, elbow, wrist] = self.side_values(q);
+        let fifth = wrapped(axes.axis(4, q)).sin();
+        let agree = |wanted: Option<bool>, value: f64| {
+            wanted.is_none_or(|wanted| value.abs() < BOUNDARY || wanted == (value >= 0.0))
+        };
+        // Bent ahead is beyond the stretched arm, or before it where joint 3 turns the other way.
+        let bent = if self.sides.elbow_forward { elbow } else { -elbow };
+        let up = if shoulder >= 0.0 { bent } else { -bent };
+        let bits = |front: bool, ahead: bool, positive: bool| {
+            self.is_industrial()
+                && agree(Some(front), shoulder)
+                && agree(Some(ahead), bent)
+                && agree(Some(positive), fifth)
+        };
         match *selection {
             Selection::Nearest => true,
-            Selection::Branch(branch) => self.branch(q) == branch,
-            Selection::Kuka { status, .. } => {
-                status.is_none_or(|s| self.kuka_status(q, axes).is_some_and(|found| found == s & 7))
+            Selection::Branch(b) => {
+                agree(Some(b.shoulder), shoulder) && agree(Some(b.elbow), elbow) && agree(Some(b.wrist), wrist)
             }
-            Selection::Abb { cfx, .. } => self.abb_configuration(q, axes).is_some_and(|(_, found)| found == cfx),
+            Selection::Kuka { status: None, .. } => true,
+            Selection::Kuka { status: Some(s), .. } => bits(s & 1 == 0, s & 2 != 0, s & 4 != 0),
+            Selection::Abb { cfx, .. } => (0..8).contains(&cfx) && bits(cfx & 4 == 0, cfx & 2 == 0, cfx & 1 == 0),
+            Selection::Words { front: None, elbow_up: None, wrist_flipped: None } => true,
             Selection::Words { front, elbow_up, wrist_flipped } => {
-                let industrial = self.is_industrial();
-                agree(front, industrial.then(|| self.branch(q).shoulder))
-                    && agree(elbow_up, self.elbow_up(q))
-                    && agree(wrist_flipped, industrial.then(|| wrapped(axes.axis(4, q)) < 0.0))
+                self.is_industrial()
+                    && agree(front, shoulder)
+                    && agree(elbow_up, up)
+                    && agree(wrist_flipped.map(|flipped| !flipped), fifth)
             }
         }
     }
 
     /// The solution that is meant, with the whole turns that are meant, within the limits and nearest to `near` (rad).
     ///
-    /// Bits and quadrants of whole turns are those of each axis with its turns, so that an axis at 200 degrees is not at -160. `None`: no
-    /// solution on that branch within the limits.
+    /// Turn and quadrants are those of each axis with its whole turns, so that an axis at 200 degrees is not at -160. Programs have
+    /// rounded numbers: an axis or a side within 1e-4 (rad; sine or part of the reach) of where a bit changes may have either, and with axis 5 so
+    /// near to straight those of axes 4 and 6, of which the sum alone is sharp, are left out. `None`: no solution on that branch within the limits, or the arm is not one of which these words tell anything
+    /// ([`Self::kuka_status`], [`Self::abb_configuration`]).
     pub fn choose(
         &self,
         solutions: &Solutions,
@@ -274,21 +321,12 @@ impl AnalyticArm {
         axes: &ControllerAxes,
         near: &[f64; 6],
     ) -> Option<[f64; 6]> {
-        let fits = |k: usize, q: f64| {
-            let axis = axes.sign[k] * q + axes.offset[k];
-            match *selection {
-                Selection::Kuka { turn: Some(turn), .. } => (axis < 0.0) == (turn >> k & 1 == 1),
-                Selection::Abb { quadrants, .. } => match k {
-                    0 => abb_quadrant(axis) == quadrants[0],
-                    3 => abb_quadrant(axis) == quadrants[1],
-                    5 => abb_quadrant(axis) == quadrants[2],
-                    _ => true,
-                },
-                _ => true,
-            }
-        };
         let mut best: Option<(f64, [f64; 6])> = None;
         for solution in solutions.iter().filter(|s| self.is_on(&s.q, selection, axes)) {
+            let straight = self.is_industrial() && self.side_values(&solution.q)[2].abs() < BOUNDARY;
+            let fits = |k: usize, q: f64| {
+                (straight && (k == 3 || k == 5)) || selection.allows(k, axes.sign[k] * q + axes.offset[k])
+            };
             let Some(q) = self.nearest_copy(&solution.q, near, fits) else { continue };
             let distance = q.iter().zip(near).map(|(a, b)| (a - b).powi(2)).sum::<f64>();
             if best.is_none_or(|(d, _)| distance < d) {
@@ -347,9 +385,11 @@ impl AnalyticArm {
 /// By how much a joint may be beyond its limit, for rounding (rad).
 const LIMIT_SLACK: f64 = 1e-12;
 
-/// Whether the second of two parallel bars is turned in the positive sense of its joint against the first.
-fn bent(first: &Screw, second: &Screw, end: &Vector3<f64>) -> bool {
-    second.h.dot(&(second.o - first.o).cross(&(end - second.o))) >= 0.0
+/// Sine of the angle from one bar to the next about the joint `h` between them: from axis `first` to the elbow, from there to the end.
+fn bend(first: &Screw, elbow: &Vector3<f64>, end: &Vector3<f64>, h: &Vector3<f64>) -> f64 {
+    let across = |v: Vector3<f64>| v - h * h.dot(&v);
+    let (a, b) = (across(elbow - first.o), across(end - elbow));
+    h.dot(&a.cross(&b)) / (a.norm() * b.norm()).max(f64::MIN_POSITIVE)
 }
 
 impl Solutions {

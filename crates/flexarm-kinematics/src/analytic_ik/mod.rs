@@ -69,6 +69,9 @@ use screw::{Chain, wrapped};
 use trig::List;
 use wrist::Wrist;
 
+/// What a candidate may miss the pose by to be improved, lengths over the reach.
+const CAPTURE: f64 = 3e-3;
+
 /// Most solutions that a class has.
 const MOST_SOLUTIONS: usize = 16;
 
@@ -100,18 +103,46 @@ enum Kernel {
     Parallel123(Parallel123),
 }
 
-/// Joint values that may be solutions, as a kernel finds them, and whether one of the joints is free.
+/// Joint values that may be solutions, as a kernel finds them.
 pub(crate) struct Candidates {
-    list: List<([f64; 6], bool), 32>,
+    list: List<Candidate, 64>,
 }
+
+#[derive(Clone, Copy)]
+struct Candidate {
+    q: [f64; 6],
+    kind: Kind,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    /// One of its own; whether one of its joints is free.
+    Single { free: bool },
+    /// Stands for a whole family if it meets the pose as it is.
+    Representative { group: usize },
+    /// Of use only where the family of that number has no representative.
+    Member { group: usize },
+}
+
+impl Kind {
+    fn or_free(self, also: bool) -> Self {
+        match self {
+            Self::Single { free } => Self::Single { free: free || also },
+            other => other,
+        }
+    }
+}
+
+/// Below this sine two axes are one line to what a pose may be missed by: only the sum of their angles matters.
+const STRAIGHT: f64 = POSE_TOLERANCE;
 
 impl Candidates {
     fn new() -> Self {
-        Self { list: List::new(([0.0; 6], false)) }
+        Self { list: List::new(Candidate { q: [0.0; 6], kind: Kind::Single { free: false } }) }
     }
 
-    fn add(&mut self, q: [f64; 6], free: bool) {
-        self.list.push((q, free));
+    fn add(&mut self, q: [f64; 6], kind: Kind) {
+        self.list.push(Candidate { q, kind });
     }
 }
 
@@ -239,23 +270,39 @@ impl AnalyticArm {
             Kernel::Parallel234(kernel) => kernel.solve(&G, &hint, &mut found),
             Kernel::Parallel123(kernel) => kernel.solve(&G, &hint, &mut found),
         }
-        for &(mut q, free) in found.list.as_slice() {
+        let mut families = 0_u32;
+        for candidate in found.list.as_slice() {
+            let mut q = candidate.q;
             if self.reversed {
                 q.reverse();
             }
-            self.accept(q, free, X_WT, solutions);
+            match candidate.kind {
+                Kind::Single { free } => {
+                    self.accept(q, free, CAPTURE, X_WT, solutions);
+                }
+                // Not improved: that would lead from where the free joint is to be.
+                Kind::Representative { group } => {
+                    families |= u32::from(self.accept(q, true, 0.0, X_WT, solutions)) << group;
+                }
+                Kind::Member { group } if families >> group & 1 == 0 => {
+                    self.accept(q, true, CAPTURE, X_WT, solutions);
+                }
+                Kind::Member { .. } => {}
+            }
         }
     }
 
-    /// Improves a candidate and adds it if it meets the pose.
-    fn accept(&self, mut q: [f64; 6], free: bool, X_WT: &Pose, solutions: &mut Solutions) {
-        const CAPTURE: f64 = 3e-3;
-        let miss = self.chain.polish(&mut q, X_WT, CAPTURE);
+    /// Improves a candidate that misses by `capture` at most and adds it if it meets the pose.
+    fn accept(&self, mut q: [f64; 6], free: bool, capture: f64, X_WT: &Pose, solutions: &mut Solutions) -> bool {
+        let miss = self.chain.polish(&mut q, X_WT, capture);
         let q = q.map(wrapped);
-        if miss.position_m <= POSE_TOLERANCE * self.chain.reach.max(1.0) && miss.rotation_rad <= POSE_TOLERANCE {
+        let meets =
+            miss.position_m <= POSE_TOLERANCE * self.chain.reach.max(1.0) && miss.rotation_rad <= POSE_TOLERANCE;
+        if meets {
             solutions.add(Solution { q, branch: self.branch(&q), free, miss });
         } else {
             solutions.missed(miss);
         }
+        meets
     }
 }

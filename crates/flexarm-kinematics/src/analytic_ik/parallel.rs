@@ -1,12 +1,14 @@
 //! Arms with three parallel axes in a row: the plane across them leaves equations in the other angles only.
 
+use std::f64::consts::FRAC_PI_4;
+
 use flexarm_spatial::Pose;
 use nalgebra::{Point3, Vector3};
 
-use super::Candidates;
-use super::position::{ROUNDING, feet, two_bars};
+use super::position::{ROUNDING, bars_reach, feet, two_bars};
 use super::screw::Screw;
 use super::trig::{Fan, List, Roots, TrigPolynomial, across, angle_about, dot_turned, linear};
+use super::{Candidates, Kind, STRAIGHT};
 
 /// Axes 2, 3 and 4 are parallel (or, from the other end, 3, 4 and 5).
 #[derive(Clone, Copy, Debug)]
@@ -31,6 +33,27 @@ pub(crate) struct Parallel123 {
 /// Two angles and whether one of them is free.
 type Pairs = List<(f64, f64, bool), 16>;
 
+/// The last angle, or where its axis is along the parallel ones first the one next to the hint, in eighths of a turn, at which
+/// the bars reach.
+fn sixth_angles(
+    (angle, size): (f64, f64),
+    hint: f64,
+    group: usize,
+    free: bool,
+    reaches: impl Fn(f64) -> bool,
+) -> List<(f64, Kind), 2> {
+    let mut angles = List::new((0.0, Kind::Single { free }));
+    if size < STRAIGHT {
+        let near = [0, 1, -1, 2, -2, 3, -3, 4].map(|k| hint + FRAC_PI_4 * f64::from(k));
+        let held = near.into_iter().find(|q6| reaches(*q6)).unwrap_or(hint);
+        angles.push((held, Kind::Representative { group }));
+        angles.push((angle, Kind::Member { group }));
+    } else {
+        angles.push((angle, Kind::Single { free }));
+    }
+    angles
+}
+
 /// Points of the last two axes next to each other; one point where they meet.
 fn near_points(axes: &[Screw; 6], meet: bool) -> (Vector3<f64>, Vector3<f64>) {
     let (o5, o6) = feet(&axes[4], &axes[5]);
@@ -53,22 +76,23 @@ impl Parallel234 {
     pub(crate) fn solve(&self, G: &Pose, hint: &[f64; 6], found: &mut Candidates) {
         let [s1, s2, s3, s4, s5, s6] = &self.axes;
         let h = s2.h;
-        for &(q1, q5, free) in self.first_and_fifth(G, hint).as_slice() {
+        for (group, &(q1, q5, free)) in self.first_and_fifth(G, hint).as_slice().iter().enumerate() {
             let (t1, t5) = (s1.at(q1), s5.at(q5));
-            let (angle, size) =
-                angle_about(&s6.h, &(G.rotation.inverse() * t1.vector(&h)), &t5.inverse().vector(&h));
-            let straight = size < 1e-13;
-            let q6 = if straight { hint[5] } else { angle };
-            let t6 = s6.at(q6);
-            let n = across(&h);
-            let turned = G.rotation * t6.inverse().vector(&t5.inverse().vector(&n));
-            let (total, _) = angle_about(&h, &n, &t1.inverse().vector(&turned));
-            let end = G * Point3::from(t6.inverse().point(&t5.inverse().point(&s4.o)));
-            let end = t1.inverse().point(&end.coords);
-            for two in two_bars(s2, s3, &s4.o, &end, [hint[1], hint[2]], self.reach).as_slice() {
-                let [q2, q3] = two.q;
-                let q4 = s4.h.dot(&h) * (total - q2 - s3.h.dot(&h) * q3);
-                found.add([q1, q2, q3, q4, q5, q6], free || straight || two.free);
+            let turned = angle_about(&s6.h, &(G.rotation.inverse() * t1.vector(&h)), &t5.inverse().vector(&h));
+            let end = |q6: f64| {
+                let end = G * Point3::from(s6.at(q6).inverse().point(&t5.inverse().point(&s4.o)));
+                t1.inverse().point(&end.coords)
+            };
+            let sixth = sixth_angles(turned, hint[5], group, free, |q6| bars_reach(s2, s3, &s4.o, &end(q6)));
+            for &(q6, kind) in sixth.as_slice() {
+                let n = across(&h);
+                let turned = G.rotation * s6.at(q6).inverse().vector(&t5.inverse().vector(&n));
+                let (total, _) = angle_about(&h, &n, &t1.inverse().vector(&turned));
+                for two in two_bars(s2, s3, &s4.o, &end(q6), [hint[1], hint[2]], self.reach).as_slice() {
+                    let [q2, q3] = two.q;
+                    let q4 = s4.h.dot(&h) * (total - q2 - s3.h.dot(&h) * q3);
+                    found.add([q1, q2, q3, q4, q5, q6], kind.or_free(two.free));
+                }
             }
         }
     }
@@ -150,20 +174,20 @@ impl Parallel123 {
     pub(crate) fn solve(&self, G: &Pose, hint: &[f64; 6], found: &mut Candidates) {
         let [s1, s2, s3, s4, s5, s6] = &self.axes;
         let h = s1.h;
-        for &(q4, q5, free) in self.fourth_and_fifth(G, hint).as_slice() {
+        for (group, &(q4, q5, free)) in self.fourth_and_fifth(G, hint).as_slice().iter().enumerate() {
             let (t4, t5) = (s4.at(q4).inverse(), s5.at(q5).inverse());
-            let (angle, size) = angle_about(&s6.h, &(G.rotation.inverse() * h), &t5.vector(&t4.vector(&h)));
-            let straight = size < 1e-13;
-            let q6 = if straight { hint[5] } else { angle };
-            let t6 = s6.at(q6).inverse();
-            let n = across(&h);
-            let turned = G.rotation * t6.vector(&t5.vector(&t4.vector(&n)));
-            let (total, _) = angle_about(&h, &n, &turned);
-            let end = (G * Point3::from(t6.point(&t5.point(&t4.point(&s3.o))))).coords;
-            for two in two_bars(s1, s2, &s3.o, &end, [hint[0], hint[1]], self.reach).as_slice() {
-                let [q1, q2] = two.q;
-                let q3 = s3.h.dot(&h) * (total - q1 - s2.h.dot(&h) * q2);
-                found.add([q1, q2, q3, q4, q5, q6], free || straight || two.free);
+            let turned = angle_about(&s6.h, &(G.rotation.inverse() * h), &t5.vector(&t4.vector(&h)));
+            let end = |q6: f64| (G * Point3::from(s6.at(q6).inverse().point(&t5.point(&t4.point(&s3.o))))).coords;
+            let sixth = sixth_angles(turned, hint[5], group, free, |q6| bars_reach(s1, s2, &s3.o, &end(q6)));
+            for &(q6, kind) in sixth.as_slice() {
+                let n = across(&h);
+                let turned = G.rotation * s6.at(q6).inverse().vector(&t5.vector(&t4.vector(&n)));
+                let (total, _) = angle_about(&h, &n, &turned);
+                for two in two_bars(s1, s2, &s3.o, &end(q6), [hint[0], hint[1]], self.reach).as_slice() {
+                    let [q1, q2] = two.q;
+                    let q3 = s3.h.dot(&h) * (total - q1 - s2.h.dot(&h) * q2);
+                    found.add([q1, q2, q3, q4, q5, q6], kind.or_free(two.free));
+                }
             }
         }
     }
@@ -187,7 +211,8 @@ impl Parallel123 {
             return pairs;
         }
         let l = 1.0 / self.reach;
-        let rows = [self.row(&Vector3::zeros(), &s6.h, level), self.row(&((o5 - s4.o) * l), &((o6 - o5) * l), height * l)];
+        let rows =
+            [self.row(&Vector3::zeros(), &s6.h, level), self.row(&((o5 - s4.o) * l), &((o6 - o5) * l), height * l)];
         let [(a1, b1, k1), (a2, b2, k2)] = &rows;
         let D = a1.times(b2).plus(&a2.times(b1), -1.0);
         let C = k1.times(b2).plus(&k2.times(b1), -1.0);
@@ -200,7 +225,8 @@ impl Parallel123 {
                 continue;
             }
             // The two rows are one: its two roots, one of which may fail the other.
-            let at = |(a, b, k): &(TrigPolynomial, TrigPolynomial, TrigPolynomial)| (a.at(q5).0, b.at(q5).0, k.at(q5).0);
+            let at =
+                |(a, b, k): &(TrigPolynomial, TrigPolynomial, TrigPolynomial)| (a.at(q5).0, b.at(q5).0, k.at(q5).0);
             let (first, second) = (at(&rows[0]), at(&rows[1]));
             let (a, b, k) = if first.0.hypot(first.1) >= second.0.hypot(second.1) { first } else { second };
             let fourth = linear(a, b, k, ROUNDING, hint[3]);

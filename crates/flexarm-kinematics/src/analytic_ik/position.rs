@@ -131,11 +131,8 @@ impl Task {
         let v = self.c - s3.o;
         let along = s3.h * s3.h.dot(&v);
         let (w0, wc, ws) = (s3.o - o2 + along, v - along, s3.h.cross(&v));
-        let square = TrigPolynomial::affine(
-            w0.norm_squared() + wc.norm_squared(),
-            2.0 * w0.dot(&wc),
-            2.0 * w0.dot(&ws),
-        );
+        let square =
+            TrigPolynomial::affine(w0.norm_squared() + wc.norm_squared(), 2.0 * w0.dot(&wc), 2.0 * w0.dot(&ws));
         let height = TrigPolynomial::affine(s2.h.dot(&w0), s2.h.dot(&wc), s2.h.dot(&ws));
         let (r, z) = (self.p - o1, s1.h.dot(&(self.p - o1)));
         let constant = |k| TrigPolynomial::affine(k, 0.0, 0.0);
@@ -189,6 +186,13 @@ pub(crate) fn two_bars(
         found.push(Two { q: [if folded { hint[0] } else { angle }, qb], free: roots.free || folded });
     }
     found
+}
+
+/// Whether two bars come to a point, see [`two_bars`].
+pub(crate) fn bars_reach(first: &Screw, second: &Screw, c: &Vector3<f64>, p: &Vector3<f64>) -> bool {
+    let length = |v: Vector3<f64>| first.h.cross(&v).norm();
+    let (d, v, p) = (length(second.o - first.o), length(c - second.o), length(p - first.o));
+    (d - v).abs() <= p && p <= d + v
 }
 
 /// Ends of the common perpendicular of two lines that are not parallel, first on the first.

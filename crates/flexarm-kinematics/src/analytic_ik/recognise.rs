@@ -123,7 +123,9 @@ pub enum NoAnalyticIk {
         parallel_rad: f64,
     },
     /// Joint values that are not numbers.
-    #[error("analytic inverse kinematics: {found} held joint values for a model of {needed} coordinates, or some are not finite")]
+    #[error(
+        "analytic inverse kinematics: {found} held joint values for a model of {needed} coordinates, or some are not finite"
+    )]
     Held {
         /// Values given.
         found: usize,
@@ -200,7 +202,10 @@ fn chain_of(model: &Model, frame: &Frame, joints: &[usize; 6], q_held: &DVector<
     for &k in joints {
         let inside = model.coordinates().get(k).filter(|_| k < model.n_actuated());
         let Some(coordinate) = inside else {
-            return Err(NoAnalyticIk::Joint { joint: format!("number {k}"), what: "is no actuated joint of the model" });
+            return Err(NoAnalyticIk::Joint {
+                joint: format!("number {k}"),
+                what: "is no actuated joint of the model",
+            });
         };
         if !matches!(model.bodies()[coordinate.body].motion, JointMotion::Axis(AxisMotion::Revolute(_))) {
             return Err(NoAnalyticIk::Joint { joint: coordinate.joint.clone(), what: "is not revolute" });
@@ -238,7 +243,8 @@ fn chain_of(model: &Model, frame: &Frame, joints: &[usize; 6], q_held: &DVector<
 
 /// Smallest over largest singular value of the Jacobian (lengths over the reach), at the best of a few positions.
 fn dexterity(chain: &Chain) -> f64 {
-    let positions = [[0.3, -0.7, 1.1, 0.5, -0.9, 0.4], [-1.2, 0.4, -0.6, 1.3, 0.8, -0.2], [2.1, 0.9, 0.5, -1.6, 1.4, 1.0]];
+    let positions =
+        [[0.3, -0.7, 1.1, 0.5, -0.9, 0.4], [-1.2, 0.4, -0.6, 1.3, 0.8, -0.2], [2.1, 0.9, 0.5, -1.6, 1.4, 1.0]];
     let of = |q: &[f64; 6]| {
         let mut J = chain.jacobian(q);
         J.fixed_rows_mut::<3>(0).scale_mut(1.0 / chain.reach);
@@ -261,8 +267,7 @@ fn recognise(chain: &Chain, frame: &str) -> Result<Found, NoAnalyticIk> {
     let from_base = Lines::new(chain, false);
     for lines in [&from_base, &from_tool] {
         if let Some((kernel, form, deviation)) = lines.wrist() {
-            let class =
-                if lines.reversed { ArmClass::SphericalShoulder(form) } else { ArmClass::SphericalWrist(form) };
+            let class = if lines.reversed { ArmClass::SphericalShoulder(form) } else { ArmClass::SphericalWrist(form) };
             return Ok(Found { class, kernel, reversed: lines.reversed, deviation });
         }
     }

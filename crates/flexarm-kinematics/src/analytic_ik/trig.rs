@@ -67,7 +67,13 @@ pub(crate) fn linear(a: f64, b: f64, c: f64, floor: f64, hint: f64) -> Roots {
         return Roots { angles: [hint; 2], n: 1, free: true };
     }
     let room = (size - c) * (size + c);
-    let half = if room > 0.0 { room.sqrt().atan2(c) } else if c > 0.0 { 0.0 } else { std::f64::consts::PI };
+    let half = if room > 0.0 {
+        room.sqrt().atan2(c)
+    } else if c > 0.0 {
+        0.0
+    } else {
+        std::f64::consts::PI
+    };
     if half == std::f64::consts::PI {
         return Roots::two(b.atan2(a) + half, 0.0);
     }

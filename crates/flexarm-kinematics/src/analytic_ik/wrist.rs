@@ -3,10 +3,10 @@
 use flexarm_spatial::Pose;
 use nalgebra::Vector3;
 
-use super::Candidates;
 use super::position::{PositionForm, place};
 use super::screw::Screw;
 use super::trig::{Fan, across, angle_about};
+use super::{Candidates, Kind, STRAIGHT};
 
 /// What does not depend on the pose.
 #[derive(Clone, Copy, Debug)]
@@ -18,9 +18,6 @@ pub(crate) struct Wrist {
     pub(crate) fan: Fan,
     pub(crate) reach: f64,
 }
-
-/// Below this sine the last and the fourth axis are one line: only the sum of their angles matters.
-const STRAIGHT: f64 = 1e-13;
 
 impl Wrist {
     pub(crate) fn new(axes: [Screw; 6], center: Vector3<f64>, form: PositionForm, reach: f64) -> Self {
@@ -39,21 +36,23 @@ impl Wrist {
         let (tip, side) = (G.rotation * s6.h, G.rotation * n);
         let base = [self.axes[0], self.axes[1], self.axes[2]];
         let places = place(self.form, &base, &self.center, &p, &[hint[0], hint[1], hint[2]], self.reach);
-        for three in places.as_slice() {
+        for (group, three) in places.as_slice().iter().enumerate() {
             let [q1, q2, q3] = three.q;
             let (t1, t2, t3) = (s1.at(q1).inverse(), s2.at(q2).inverse(), s3.at(q3).inverse());
             let Q = |v: &Vector3<f64>| t3.vector(&t2.vector(&t1.vector(v)));
             let (tip, side) = (Q(&tip), Q(&side));
             for &q5 in self.fan.angles(&s4.h, &tip).angles() {
                 let t5 = s5.at(q5);
-                let (angle, size) = angle_about(&s4.h, &t5.vector(&s6.h), &tip);
-                let straight = size < STRAIGHT;
-                let q4 = if straight { hint[3] } else { angle };
-                let rest = t5.inverse().vector(&s4.at(q4).inverse().vector(&side));
-                let (q6, _) = angle_about(&s6.h, &n, &rest);
-                found.add([q1, q2, q3, q4, q5, q6], three.free || straight);
-                if straight {
-                    break;
+                let with_fourth = |q4: f64| {
+                    let rest = t5.inverse().vector(&s4.at(q4).inverse().vector(&side));
+                    [q1, q2, q3, q4, q5, angle_about(&s6.h, &n, &rest).0]
+                };
+                let (q4, size) = angle_about(&s4.h, &t5.vector(&s6.h), &tip);
+                if size < STRAIGHT {
+                    found.add(with_fourth(hint[3]), Kind::Representative { group });
+                    found.add(with_fourth(q4), Kind::Member { group });
+                } else {
+                    found.add(with_fourth(q4), Kind::Single { free: three.free });
                 }
             }
         }

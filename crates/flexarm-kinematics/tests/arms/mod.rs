@@ -47,9 +47,8 @@ fn named(arm: &Mechanism, class: ArmClass) -> Named {
 }
 
 pub(crate) fn from_rows(name: &str, rows: &[Row], tool: ([f64; 3], [f64; 3])) -> Mechanism {
-    let joint = |(xyz, rpy, axis): &Row| {
-        (pose(*xyz, *rpy), JointKind::Continuous(Unit::new_normalize(Vector3::from(*axis))))
-    };
+    let joint =
+        |(xyz, rpy, axis): &Row| (pose(*xyz, *rpy), JointKind::Continuous(Unit::new_normalize(Vector3::from(*axis))));
     chain(name, &rows.iter().map(joint).collect::<Vec<_>>(), pose(tool.0, tool.1))
 }
 
@@ -167,8 +166,7 @@ pub(crate) fn known_arms() -> Vec<Named> {
         [0.11985, 0.0, -Q],
         [0.11655, 0.0, 0.0],
     ];
-    let tx90 =
-        [[0.478, 0.05, -Q], [0.0, 0.425, 0.0], [0.05, 0.0, Q], [0.425, 0.0, -Q], [0.0, 0.0, Q], [0.1, 0.0, 0.0]];
+    let tx90 = [[0.478, 0.05, -Q], [0.0, 0.425, 0.0], [0.05, 0.0, Q], [0.425, 0.0, -Q], [0.0, 0.0, Q], [0.1, 0.0, 0.0]];
     vec![
         named(&from_rows("kr210", &kr210, ([0.0, 0.0, -0.0485], [0.0, PI, 0.0])), industrial),
         named(
