@@ -190,6 +190,8 @@ pub enum Blend {
     /// The corner is left from where the speed would fall below this part of the programmed one while braking, 0 to 1
     /// (C_VEL).
     Velocity(f64),
+    /// The corner is left out from where the orientation is within this angle of the target's, rad (C_ORI).
+    Orientation(f64),
     /// The tool passes the target without stopping and without leaving the path (`fine` off with the tangents in line; G-code
     /// in exact path mode).
     Pass,

@@ -1,0 +1,75 @@
+//! What the languages have in common: tokens, expressions, statements, the machine that runs them, frames, and the
+//! recorder of moves and notes.
+
+pub(crate) mod expressions;
+pub(crate) mod frames;
+pub(crate) mod lexer;
+pub(crate) mod machine;
+pub(crate) mod recorder;
+pub(crate) mod tree;
+pub(crate) mod value;
+
+use std::rc::Rc;
+
+/// A place in one of the files of a program, in bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Span {
+    pub(crate) file: usize,
+    pub(crate) start: usize,
+    pub(crate) end: usize,
+}
+
+impl Span {
+    /// From the start of this one to the end of the other.
+    pub(crate) fn to(self, other: Self) -> Self {
+        Self { end: other.end.max(self.end), ..self }
+    }
+}
+
+/// What is wrong, and where.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Fail {
+    pub(crate) span: Span,
+    pub(crate) message: String,
+}
+
+pub(crate) type Result<T> = std::result::Result<T, Fail>;
+
+/// The error of a reader at a place.
+pub(crate) fn fail<T>(span: Span, message: impl Into<String>) -> Result<T> {
+    Err(Fail { span, message: message.into() })
+}
+
+/// One file of a program in memory.
+#[derive(Debug, Clone)]
+pub(crate) struct Text {
+    pub(crate) path: std::path::PathBuf,
+    pub(crate) text: Rc<str>,
+    /// Where each line starts.
+    lines: Vec<usize>,
+}
+
+impl Text {
+    pub(crate) fn new(path: &std::path::Path, text: &str) -> Self {
+        let lines = std::iter::once(0).chain(text.match_indices('\n').map(|(at, _)| at + 1)).collect();
+        Self { path: path.to_owned(), text: text.into(), lines }
+    }
+
+    /// Line of a place, from 1.
+    pub(crate) fn line(&self, at: usize) -> usize {
+        self.lines.partition_point(|&start| start <= at)
+    }
+
+    /// What stands at a place, on one line and not longer than a message bears.
+    pub(crate) fn excerpt(&self, span: Span) -> String {
+        let text = self.text.get(span.start..span.end).unwrap_or_default();
+        let mut words = text.split_whitespace().collect::<Vec<_>>().join(" ");
+        if words.chars().count() > LONGEST_EXCERPT {
+            words = words.chars().take(LONGEST_EXCERPT - 3).collect::<String>() + "...";
+        }
+        words
+    }
+}
+
+/// Characters of a statement in a message or a move.
+const LONGEST_EXCERPT: usize = 100;

@@ -1,0 +1,190 @@
+//! KUKA's KRL: `.src` with its `.dat`, and what teach pendants write into both.
+//!
+//! [`parse`] makes statements of the lines, [`system`] knows BAS, the inline forms' helpers and the system variables,
+//! [`motion`] makes moves of PTP, LIN, CIRC and the splines.
+//!
+//! Frames: B `$BASE` in W `$WORLD` (less `$ROBROOT`), T `$TOOL` on the flange F. A, B, C are Z-Y'-X'' in degrees.
+
+mod motion;
+mod parse;
+mod system;
+
+use std::collections::HashSet;
+use std::path::Path;
+use std::rc::Rc;
+
+use flexarm_path::program::{Axes, Program};
+
+use crate::common::machine::{Flow, Machine};
+use crate::common::recorder::Recorder;
+use crate::common::tree::{Action, Routine, Statement};
+use crate::common::value::Value;
+use crate::common::{Result, Span, Text, fail};
+use crate::{ReadOptions, decode, given_text};
+
+use parse::Unit;
+use system::Krl;
+
+/// Files of routines beside the program that are read, at most.
+const MOST_SIBLINGS: usize = 64;
+
+pub(crate) fn read(texts: &mut Vec<Text>, options: &ReadOptions<'_>) -> Result<Program> {
+    let mut unit = parse::parse(&texts[0], 0)?;
+    let mut data = Vec::new();
+    let path = texts[0].path.clone();
+    for (companion, bytes) in &options.companions {
+        data.push(add(texts, companion, bytes)?);
+    }
+    if options.find_companions {
+        let taken = options.companions.iter().map(|(path, _)| path.clone()).collect::<Vec<_>>();
+        if let Some((found, bytes)) = beside(&path, &stem(&path), "dat").filter(|(found, _)| !taken.contains(found)) {
+            data.push(add(texts, &found, &bytes)?);
+        }
+    }
+    let entry = entry(&unit, options)?;
+    for further in data.iter_mut() {
+        unit.routines.append(&mut further.routines);
+    }
+    if options.find_companions {
+        add_siblings(texts, &path, &mut unit, &mut data)?;
+    }
+    texts.push(given_text(options, "=", ""));
+    let given = parse::parse(&texts[texts.len() - 1], texts.len() - 1)?;
+
+    let mut machine = Machine::new(Recorder::new(options, texts.clone()), Krl::new());
+    system::set_up(&mut machine);
+    machine.dialect.is_given = true;
+    machine.run(&given.main)?;
+    for further in &data {
+        run_data(&mut machine, &further.data);
+    }
+    run_data(&mut machine, &unit.data);
+    machine.run(&given.main)?; // goes before what the files say
+    machine.dialect.is_given = false;
+    for routine in unit.routines {
+        machine.routines.entry(routine.name.clone()).or_insert_with(|| Rc::new(routine));
+    }
+    let name = match &entry {
+        Some(name) => {
+            let Some(routine) = machine.routines.get(name).cloned() else {
+                return fail(Span::default(), format!("there is no routine `{name}` in this file"));
+            };
+            if let Some(parameter) =
+                routine.parameters.iter().find(|parameter| !machine.globals.contains_key(&parameter.name))
+            {
+                let hint = format!(
+                    "`{}` needs a value for `{}`: give it as an option (`given`)",
+                    routine.name, parameter.name
+                );
+                return fail(routine.span, hint);
+            }
+            match machine.run(&routine.body)? {
+                Flow::Leave | Flow::Again => return fail(routine.span, "EXIT stands outside of a loop"),
+                _ => {}
+            }
+            name.to_string()
+        }
+        None => {
+            machine.run(&unit.main)?;
+            stem(&path)
+        }
+    };
+    Ok(machine.recorder.finish(&name, Axes::Joints))
+}
+
+fn stem(path: &Path) -> String {
+    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// A further file of the program.
+fn add(texts: &mut Vec<Text>, path: &Path, bytes: &[u8]) -> Result<Unit> {
+    texts.push(Text::new(path, &decode(bytes)));
+    parse::parse(&texts[texts.len() - 1], texts.len() - 1)
+}
+
+/// A file in the folder of the program, whatever the case of its name.
+fn beside(path: &Path, stem: &str, ending: &str) -> Option<(std::path::PathBuf, Vec<u8>)> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let wanted = format!("{stem}.{ending}").to_lowercase();
+    let mut found: Vec<_> = std::fs::read_dir(folder).ok()?.flatten().map(|entry| entry.path()).collect();
+    found.sort();
+    let is_wanted = |candidate: &std::path::PathBuf| {
+        candidate.file_name().is_some_and(|name| name.to_string_lossy().to_lowercase() == wanted)
+    };
+    let file = found.into_iter().find(is_wanted)?;
+    let bytes = std::fs::read(&file).ok()?;
+    Some((file, bytes))
+}
+
+/// Routines that are called and are files of their own beside the program.
+fn add_siblings(texts: &mut Vec<Text>, path: &Path, unit: &mut Unit, data: &mut Vec<Unit>) -> Result<()> {
+    let mut asked: HashSet<Rc<str>> = unit.routines.iter().map(|routine| routine.name.clone()).collect();
+    let mut calls = Vec::new();
+    unit.routines.iter().for_each(|routine| called(&routine.body, &mut calls));
+    called(&unit.main, &mut calls);
+    let mut siblings = 0;
+    while let Some(name) = calls.pop() {
+        if siblings >= MOST_SIBLINGS || system::is_built_in(&name) || !asked.insert(name.clone()) {
+            continue;
+        }
+        let Some((file, bytes)) = beside(path, &name, "src") else { continue };
+        siblings += 1;
+        let mut further = add(texts, &file, &bytes)?;
+        if let Some((file, bytes)) = beside(path, &name, "dat") {
+            data.push(add(texts, &file, &bytes)?);
+        }
+        further.routines.iter().for_each(|routine| called(&routine.body, &mut calls));
+        unit.routines.append(&mut further.routines);
+    }
+    Ok(())
+}
+
+/// Names of all routines that statements call.
+fn called(body: &[Statement], names: &mut Vec<Rc<str>>) {
+    for statement in body {
+        match &statement.action {
+            Action::Call { name, .. } => names.push(name.clone()),
+            Action::If { branches, otherwise } => {
+                branches.iter().for_each(|(_, body)| called(body, names));
+                called(otherwise, names);
+            }
+            Action::Switch { cases, otherwise, .. } => {
+                cases.iter().for_each(|(_, body)| called(body, names));
+                called(otherwise, names);
+            }
+            Action::While { body, .. }
+            | Action::For { body, .. }
+            | Action::Repeat { body, .. }
+            | Action::Block { body, .. } => {
+                called(body, names);
+            }
+            _ => {}
+        }
+    }
+}
+
+/// Declarations of a data list; one that cannot be read is an error where its name is used.
+fn run_data(machine: &mut Machine<'_, Krl>, data: &[Statement]) {
+    for statement in data {
+        if let Err(fail) = machine.run(std::slice::from_ref(statement))
+            && let Action::Declare { name, .. } = &statement.action
+        {
+            let line = machine.recorder.line(statement.span);
+            let what = format!("`{name}`, whose declaration in line {line} cannot be read ({})", fail.message);
+            machine.set_global(name, Value::Outside(what.into()));
+        }
+    }
+}
+
+/// The routine with which the program starts; `None`: statements that stand outside of routines.
+fn entry(unit: &Unit, options: &ReadOptions<'_>) -> Result<Option<Rc<str>>> {
+    if let Some(entry) = &options.entry {
+        return Ok(Some(entry.to_lowercase().into()));
+    }
+    Ok(unit
+        .routines
+        .iter()
+        .find(|routine: &&Routine| !routine.body.is_empty())
+        .or(unit.routines.first())
+        .map(|routine| routine.name.clone()))
+}

@@ -1,0 +1,132 @@
+//! Robot programs as they come from controllers, read into moves: KUKA KRL, ABB RAPID, URScript and G-code.
+//!
+//! ```
+//! use flexarm_path::program::{Item, MoveKind};
+//! use flexarm_programs::{Language, ReadOptions, read_program, recognise};
+//!
+//! let text = b"DEF square()\n\
+//!     $VEL.CP = 0.25\n\
+//!     PTP {A1 0, A2 -90, A3 90, A4 0, A5 45, A6 0}\n\
+//!     LIN {X 1500, Y 0, Z 1200, A 0, B 90, C 0}\n\
+//!     LIN {Y 100}\n\
+//!     END\n";
+//! assert_eq!(recognise(text, "square.src"), Some(Language::Krl));
+//!
+//! let program = read_program("square.src".as_ref(), text, &ReadOptions::default())?;
+//! let Item::Move(last) = &program.items[2] else { panic!() };
+//! assert_eq!((last.line, last.statement.as_str()), (5, "LIN {Y 100}"));
+//! assert!(matches!(last.kind, MoveKind::Line));
+//! assert_eq!(last.speed.linear_m_s, Some(0.25));
+//! # Ok::<(), flexarm_programs::ProgramError>(())
+//! ```
+//!
+//! A reader runs the program: variables are computed, loops counted, routines called. What cannot change the motion is passed
+//! and noted; what could and is not understood is an error with file, line, column and statement. Units are converted here.
+//!
+//! Modules: one per language, and `common` with expressions, statements and the machine that runs them.
+//!
+//! Not here: how the moves are planned ([`flexarm_path`]), what robot runs them.
+#![allow(non_snake_case, reason = "monogram notation: X_WB, X_FT, R_BT; see docs/references.md")]
+#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
+
+mod common;
+mod gcode;
+mod krl;
+mod options;
+mod rapid;
+mod recognise;
+mod urscript;
+
+use std::path::{Path, PathBuf};
+
+use flexarm_files::{Source, TextFileError};
+use flexarm_path::program::Program;
+
+use common::{Fail, Text};
+pub use options::{ForwardKinematics, GCodeOptions, Language, ReadOptions, Rotary};
+pub use recognise::recognise;
+
+/// Why a robot program cannot be read.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ProgramError {
+    /// No language was recognised.
+    #[error("{}: this is no robot program that can be read: KUKA KRL, ABB RAPID, URScript and G-code are; if it is one of them, tell which (`language`)", path.display())]
+    Unknown {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A statement cannot be read, or what it does is not known here.
+    #[error(transparent)]
+    Statement(#[from] TextFileError),
+    /// The program runs through without a move.
+    #[error("{}: the program ({language}) runs through without a move: {hint}", path.display())]
+    NoMoves {
+        /// The file.
+        path: PathBuf,
+        /// The language it was read as.
+        language: &'static str,
+        /// What may be the reason.
+        hint: &'static str,
+    },
+}
+
+/// The moves of a robot program.
+///
+/// * `path`: of the file, for messages, and where its companions are ([`ReadOptions::find_companions`]).
+/// * `bytes`: what is in it, UTF-8 or Latin-1.
+///
+/// Angles of the program are rad, lengths m, whatever its language writes.
+///
+/// # Errors
+/// [`ProgramError::Unknown`] if no language is recognised; [`ProgramError::Statement`] at the first statement that cannot be
+/// read, that depends on what only the controller knows, or whose effect on the motion is not known here;
+/// [`ProgramError::NoMoves`] if nothing moves.
+pub fn read_program(path: &Path, bytes: &[u8], options: &ReadOptions<'_>) -> Result<Program, ProgramError> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let Some(language) = options.language.or_else(|| recognise(bytes, &name)) else {
+        return Err(ProgramError::Unknown { path: path.to_owned() });
+    };
+    let mut texts = vec![Text::new(path, &decode(bytes))];
+    let read = match language {
+        Language::Krl => krl::read(&mut texts, options),
+        Language::Rapid => rapid::read(&mut texts, options),
+        Language::UrScript => urscript::read(&mut texts, options),
+        Language::GCode => gcode::read(&mut texts, options),
+    };
+    let program = read.map_err(|fail| ProgramError::Statement(place(&texts, &fail)))?;
+    if program.items.is_empty() {
+        let hint = match language {
+            Language::Krl => {
+                "is this the data list (.dat) instead of the program (.src), or is another routine meant (`entry`)?"
+            }
+            Language::Rapid => "is another routine than `main` meant (`entry`)?",
+            Language::UrScript => "is another routine meant (`entry`)?",
+            Language::GCode => "it has no G0 to G3 with a coordinate",
+        };
+        return Err(ProgramError::NoMoves { path: path.to_owned(), language: language.name(), hint });
+    }
+    Ok(program)
+}
+
+/// Where and what, for people.
+fn place(texts: &[Text], fail: &Fail) -> TextFileError {
+    let text = &texts[fail.span.file];
+    let excerpt = text.excerpt(fail.span);
+    let message = if excerpt.is_empty() { fail.message.clone() } else { format!("`{excerpt}`: {}", fail.message) };
+    Source::new(&text.path, &text.text).error(fail.span.start..fail.span.end, message)
+}
+
+/// Text of UTF-8, else of Latin-1, which every byte is; ends of lines as they are.
+pub(crate) fn decode(bytes: &[u8]) -> String {
+    match std::str::from_utf8(bytes) {
+        Ok(text) => text.trim_start_matches('\u{feff}').to_owned(),
+        Err(_) => bytes.iter().map(|&byte| char::from(byte)).collect(),
+    }
+}
+
+/// What was given beside the file, as one text of assignments; its lines are the entries.
+pub(crate) fn given_text(options: &ReadOptions<'_>, assign: &str, end: &str) -> Text {
+    let lines = options.given.iter().map(|(name, value)| format!("{name}{assign}{value}{end}\n"));
+    Text::new(Path::new("given"), &lines.collect::<String>())
+}

@@ -1,0 +1,284 @@
+//! ABB's RAPID: modules with `main`, its data types and its moves.
+//!
+//! [`parse`] makes statements of the text, [`types`] knows the data types and what is predefined, [`functions`] the functions,
+//! [`motion`] the moves.
+//!
+//! Frames: B is the object frame of the work object (user frame, then object frame, then program displacement) in W; T the
+//! tool's frame on the flange F. Quaternions have their real part first.
+
+mod functions;
+mod motion;
+mod parse;
+mod types;
+
+use std::collections::HashMap;
+use std::rc::Rc;
+
+use flexarm_path::program::{Axes, Program};
+
+use crate::common::machine::{Dialect, Flow, Machine};
+use crate::common::recorder::Recorder;
+use crate::common::tree::{Argument, Operator, Statement};
+use crate::common::value::{Value, depends};
+use crate::common::{Result, Span, Text, fail};
+use crate::{ReadOptions, decode, given_text};
+
+use motion::Settings;
+
+/// What RAPID keeps beside its variables.
+pub(crate) struct Rapid {
+    settings: Settings,
+    /// Fields of types that the file declares.
+    records: HashMap<Rc<str>, Vec<(Rc<str>, Rc<str>)>>,
+    /// The tool whose data are not in the files.
+    unknown_tool: Option<Rc<str>>,
+    is_given: bool,
+}
+
+type Rapids<'a> = Machine<'a, Rapid>;
+
+pub(crate) fn read(texts: &mut Vec<Text>, options: &ReadOptions<'_>) -> Result<Program> {
+    let mut unit = parse::parse(&texts[0], 0)?;
+    for (path, bytes) in &options.companions {
+        texts.push(Text::new(path, &decode(bytes)));
+        let further = parse::parse(&texts[texts.len() - 1], texts.len() - 1)?;
+        unit.routines.extend(further.routines);
+        unit.records.extend(further.records);
+        unit.data.splice(0..0, further.data);
+    }
+    texts.push(given_text(options, ":=", ";"));
+    let given = parse::parse(&texts[texts.len() - 1], texts.len() - 1)?;
+
+    let rapid = Rapid { settings: Settings::default(), records: HashMap::new(), unknown_tool: None, is_given: true };
+    let mut machine = Machine::new(Recorder::new(options, texts.clone()), rapid);
+    machine.dialect.records = unit.records;
+    machine.run(&given.main)?;
+    declare(&mut machine, &unit.data);
+    machine.run(&given.main)?; // goes before what the files say
+    machine.dialect.is_given = false;
+    let file_entry = match unit.routines.as_slice() {
+        [only] => only.name.clone(),
+        _ => "main".into(),
+    };
+    let entry = options.entry.as_ref().map_or(file_entry, |entry| entry.to_lowercase().into());
+    for routine in unit.routines {
+        machine.routines.entry(routine.name.clone()).or_insert_with(|| Rc::new(routine));
+    }
+    let name = match machine.routines.get(&entry).cloned() {
+        Some(routine) => {
+            if let Flow::Leave | Flow::Again = machine.invoke(&routine, &[], routine.span)? {
+                return fail(routine.span, "a loop is left outside of a loop");
+            }
+            unit.name.unwrap_or(entry)
+        }
+        None if !unit.main.is_empty() => {
+            machine.run(&unit.main)?;
+            unit.name.unwrap_or_else(|| "main".into())
+        }
+        None => {
+            let mut names: Vec<String> = machine.routines.keys().map(|name| format!("`{name}`")).collect();
+            names.sort();
+            let hint =
+                if names.is_empty() { "it has no routines".into() } else { format!("it has {}", names.join(", ")) };
+            return fail(
+                Span::default(),
+                format!("there is no routine `{entry}` with which the program starts; {hint}: tell one (`entry`)"),
+            );
+        }
+    };
+    Ok(machine.recorder.finish(&name, Axes::Joints))
+}
+
+/// Declarations of modules, in any order of need; one that cannot be read is an error where its name is used.
+fn declare(machine: &mut Rapids<'_>, data: &[Statement]) {
+    use crate::common::tree::Action;
+    for statement in data {
+        if let Err(fail) = machine.run(std::slice::from_ref(statement))
+            && let Action::Declare { name, .. } = &statement.action
+        {
+            let line = machine.recorder.line(statement.span);
+            let what = format!("`{name}`, whose declaration in line {line} cannot be read ({})", fail.message);
+            machine.set_global(name, Value::Outside(what.into()));
+        }
+    }
+}
+
+impl Dialect for Rapid {
+    const FIRST_INDEX: i64 = 1;
+
+    fn name(machine: &mut Rapids<'_>, name: &str, span: Span) -> Result<Value> {
+        match types::predefined(name) {
+            Some((kind, value)) => Self::coerce(machine, kind, value, span),
+            None => Ok(Value::Outside(format!("`{name}`").into())),
+        }
+    }
+
+    fn function(machine: &mut Rapids<'_>, name: &str, arguments: &[Argument], span: Span) -> Result<Value> {
+        functions::function(machine, name, arguments, span)
+    }
+
+    fn instruction(machine: &mut Rapids<'_>, name: &str, arguments: &[Argument], span: Span) -> Result<Flow> {
+        if motion::motion(machine, name, arguments, span)? || motion::setting(machine, name, arguments, span)? {
+            return Ok(Flow::On);
+        }
+        match name {
+            "waittime" => {
+                let seconds = machine.number(arguments, 0, span)?;
+                machine.recorder.dwell(seconds, span)?;
+            }
+            "waituntil" | "waitdi" | "waitdo" | "waitgi" | "waitgo" | "waitai" | "waitao" | "waitsynctask"
+            | "waittestandset" => {
+                wait(machine, name, arguments, span)?;
+            }
+            "waitrob" => machine.recorder.stop(),
+            "stop" | "break" => {
+                machine.recorder.stop();
+                machine.recorder.note("the program stops for the operator: it goes on at once", span);
+            }
+            "exitcycle" => return Ok(Flow::Halt),
+            "incr" | "decr" | "add" | "clear" => count(machine, name, arguments, span)?,
+            "tpreadnum" | "tpreadfk" | "tpreaddnum" | "uimsgbox" | "clkread" => {
+                if let Some(place) = crate::common::machine::positional(arguments, 0).filter(|_| name.starts_with("tp"))
+                {
+                    machine.assign(place, Value::Outside(format!("what the operator answers to `{name}`").into()))?;
+                }
+                machine.recorder.note("messages are not shown", span);
+            }
+            _ if Self::is_still(name) => machine.recorder.note(still_words(name), span),
+            _ => {
+                return fail(
+                    span,
+                    format!(
+                        "the instruction or routine `{name}` is not known here: give the module that has it (`companions`), or take the \
+                         line out if it does not move the robot"
+                    ),
+                );
+            }
+        }
+        Ok(Flow::On)
+    }
+
+    fn block(_: &mut Rapids<'_>, _: &str, _: &[Argument], _: &[Statement], span: Span) -> Result<Flow> {
+        fail(span, "this block is not known")
+    }
+
+    fn undeclared(_: &mut Rapids<'_>, _: &str, _: Span) -> Result<bool> {
+        Ok(true)
+    }
+
+    fn coerce(machine: &mut Rapids<'_>, kind: &str, value: Value, span: Span) -> Result<Value> {
+        types::coerce(&machine.dialect.records, kind, value, span, 0)
+    }
+
+    fn binary(operator: Operator, left: &Value, right: &Value, span: Span) -> Option<Result<Value>> {
+        functions::binary(operator, left, right, span)
+    }
+
+    fn is_still(name: &str) -> bool {
+        const WORDS: [&str; 48] = [
+            "set",
+            "reset",
+            "setdo",
+            "setgo",
+            "setao",
+            "pulsedo",
+            "invertdo",
+            "tpwrite",
+            "tperase",
+            "tpshow",
+            "errwrite",
+            "errlog",
+            "clkstart",
+            "clkstop",
+            "clkreset",
+            "connect",
+            "idelete",
+            "ienable",
+            "idisable",
+            "iwatch",
+            "isleep",
+            "isignaldi",
+            "isignaldo",
+            "itimer",
+            "gripload",
+            "mechunitload",
+            "actunit",
+            "deactunit",
+            "open",
+            "close",
+            "write",
+            "writebin",
+            "rewind",
+            "print",
+            "softdeact",
+            "socketcreate",
+            "socketconnect",
+            "socketsend",
+            "socketclose",
+            "wzenable",
+            "wzdisable",
+            "triggio",
+            "triggequip",
+            "triggint",
+            "motionsup",
+            "eoffsoff",
+            "load0",
+            "bookerrno",
+        ];
+        WORDS.contains(&name)
+    }
+}
+
+fn still_words(name: &str) -> &'static str {
+    match name {
+        "set" | "reset" | "setdo" | "setgo" | "setao" | "pulsedo" | "invertdo" => "outputs are not simulated",
+        "gripload" | "mechunitload" => "loads of the program are not taken: the robot has its own",
+        "connect" | "idelete" | "ienable" | "idisable" | "iwatch" | "isleep" | "isignaldi" | "isignaldo" | "itimer" => {
+            "interrupts are not simulated: none comes"
+        }
+        "triggio" | "triggequip" | "triggint" => "what is switched on the path is not simulated",
+        "actunit" | "deactunit" => "mechanical units beside the robot are not simulated",
+        _ => "messages, files, clocks and monitoring are not simulated",
+    }
+}
+
+/// Waiting for the outside; a condition that the program knows to be true is over.
+fn wait(machine: &mut Rapids<'_>, name: &str, arguments: &[Argument], span: Span) -> Result<()> {
+    let known = if name == "waituntil" {
+        machine.argument(arguments, 0, span)?.0
+    } else {
+        Value::Outside(format!("`{name}`").into())
+    };
+    match known {
+        Value::Flag(true) => Ok(()),
+        _ if machine.recorder.options.waits_are_over => {
+            machine.recorder.note("waiting for the outside is taken as over at once", span);
+            machine.recorder.stop();
+            Ok(())
+        }
+        Value::Outside(what) => {
+            fail(span, format!("{}; or let waiting be over at once (`waits_are_over`)", depends(&what)))
+        }
+        _ => fail(span, "this condition never becomes true, so the program waits for ever: take the line out"),
+    }
+}
+
+/// `Incr`, `Decr`, `Add`, `Clear`.
+fn count(machine: &mut Rapids<'_>, name: &str, arguments: &[Argument], span: Span) -> Result<()> {
+    let Some(place) = crate::common::machine::positional(arguments, 0).cloned() else {
+        return fail(span, "the variable is missing");
+    };
+    let change = match name {
+        "incr" => 1.0,
+        "decr" => -1.0,
+        "add" => machine.number(arguments, 1, span)?,
+        _ => return machine.assign(&place, Value::Number(0.0)),
+    };
+    match machine.value(&place)? {
+        Value::Outside(_) => Ok(()),
+        old => {
+            let number = old.number(place.span)? + change;
+            machine.assign(&place, Value::Number(number))
+        }
+    }
+}

@@ -1,0 +1,182 @@
+//! RAPID's data types, and the speeds, zones, tool and work object that every controller has.
+
+use std::collections::HashMap;
+use std::rc::Rc;
+
+use crate::common::value::{Record, Value};
+use crate::common::{Result, Span, fail};
+
+/// Fields that a file declares for a type.
+pub(super) type Records = HashMap<Rc<str>, Vec<(Rc<str>, Rc<str>)>>;
+
+/// Fields of a type of the language, with their types.
+fn fields(kind: &str) -> Option<&'static [(&'static str, &'static str)]> {
+    Some(match kind {
+        "pos" => &[("x", "num"), ("y", "num"), ("z", "num")],
+        "orient" => &[("q1", "num"), ("q2", "num"), ("q3", "num"), ("q4", "num")],
+        "pose" => &[("trans", "pos"), ("rot", "orient")],
+        "confdata" => &[("cf1", "num"), ("cf4", "num"), ("cf6", "num"), ("cfx", "num")],
+        "extjoint" => &[
+            ("eax_a", "num"),
+            ("eax_b", "num"),
+            ("eax_c", "num"),
+            ("eax_d", "num"),
+            ("eax_e", "num"),
+            ("eax_f", "num"),
+        ],
+        "robjoint" => &[
+            ("rax_1", "num"),
+            ("rax_2", "num"),
+            ("rax_3", "num"),
+            ("rax_4", "num"),
+            ("rax_5", "num"),
+            ("rax_6", "num"),
+        ],
+        "robtarget" => &[("trans", "pos"), ("rot", "orient"), ("robconf", "confdata"), ("extax", "extjoint")],
+        "jointtarget" => &[("robax", "robjoint"), ("extax", "extjoint")],
+        "speeddata" => &[("v_tcp", "num"), ("v_ori", "num"), ("v_leax", "num"), ("v_reax", "num")],
+        "zonedata" => &[
+            ("finep", "bool"),
+            ("pzone_tcp", "num"),
+            ("pzone_ori", "num"),
+            ("pzone_eax", "num"),
+            ("zone_ori", "num"),
+            ("zone_leax", "num"),
+            ("zone_reax", "num"),
+        ],
+        "loaddata" => {
+            &[("mass", "num"), ("cog", "pos"), ("aom", "orient"), ("ix", "num"), ("iy", "num"), ("iz", "num")]
+        }
+        "tooldata" => &[("robhold", "bool"), ("tframe", "pose"), ("tload", "loaddata")],
+        "wobjdata" => {
+            &[("robhold", "bool"), ("ufprog", "bool"), ("ufmec", "string"), ("uframe", "pose"), ("oframe", "pose")]
+        }
+        _ => return None,
+    })
+}
+
+/// A value of a type: lists become records, what is not told gets the language's default. `kind` ends with `{}` for each
+/// dimension of an array.
+pub(super) fn coerce(records: &Records, kind: &str, value: Value, span: Span, depth: usize) -> Result<Value> {
+    if depth > 8 {
+        return fail(span, format!("the type `{kind}` contains itself"));
+    }
+    if let Some(element) = kind.strip_suffix("{}") {
+        let Value::List(values) = value else { return Ok(value) };
+        let values = values.iter().map(|value| coerce(records, element, value.clone(), span, depth + 1));
+        return Ok(Value::list(values.collect::<Result<_>>()?));
+    }
+    let declared: Option<Vec<(&str, &str)>> = match fields(kind) {
+        Some(fields) => Some(fields.to_vec()),
+        None => records.get(kind).map(|fields| fields.iter().map(|(name, kind)| (&**name, &**kind)).collect()),
+    };
+    let Some(fields) = declared else {
+        return Ok(match (kind, value) {
+            ("num" | "dnum" | "byte", Value::Nothing) => Value::Number(0.0),
+            ("bool", Value::Nothing) => Value::Flag(false),
+            ("string", Value::Nothing) => Value::text(""),
+            (_, value) => value,
+        });
+    };
+    let values = match &value {
+        Value::List(values) if values.len() == fields.len() => values.to_vec(),
+        Value::List(values) if kind == "robtarget" && values.len() == 2 => {
+            // Position and orientation alone, as some generators write them.
+            vec![values[0].clone(), values[1].clone(), Value::Nothing, Value::Nothing]
+        }
+        Value::List(values) => {
+            return fail(span, format!("{kind} has {} parts, found {}", fields.len(), values.len()));
+        }
+        Value::Nothing => vec![Value::Nothing; fields.len()],
+        Value::Record(_) | Value::Outside(_) => return Ok(value),
+        other => return fail(span, format!("{kind} is expected, this is {}", other.kind())),
+    };
+    let mut record = Record { kind: kind.into(), fields: Vec::with_capacity(fields.len()) };
+    let is_short = matches!(&value, Value::List(written) if written.len() < fields.len());
+    for ((name, kind), value) in fields.iter().zip(values) {
+        if is_short && matches!(value, Value::Nothing) {
+            record.fields.push(((*name).into(), value)); // not told, so not 0
+            continue;
+        }
+        record.fields.push(((*name).into(), coerce(records, kind, value, span, depth + 1)?));
+    }
+    Ok(Value::Record(Rc::new(record)))
+}
+
+fn numbers(values: &[f64]) -> Value {
+    Value::list(values.iter().map(|value| Value::Number(*value)).collect())
+}
+
+/// Data that every controller has, with their type.
+pub(super) fn predefined(name: &str) -> Option<(&'static str, Value)> {
+    let no_turn = || numbers(&[1.0, 0.0, 0.0, 0.0]);
+    let no_pose = || Value::list(vec![numbers(&[0.0; 3]), no_turn()]);
+    match name {
+        "fine" => return Some(("zonedata", zone(true, [0.0; 6]))),
+        "z0" => return Some(("zonedata", zone(false, [0.3, 0.3, 0.3, 0.03, 0.3, 0.03]))),
+        "tool0" => {
+            let zero = Value::Number(0.0);
+            let load = Value::list(vec![
+                Value::Number(0.001),
+                numbers(&[0.0, 0.0, 0.001]),
+                no_turn(),
+                zero.clone(),
+                zero.clone(),
+                zero,
+            ]);
+            return Some(("tooldata", Value::list(vec![Value::Flag(true), no_pose(), load])));
+        }
+        "wobj0" => {
+            let parts = vec![Value::Flag(false), Value::Flag(true), Value::text(""), no_pose(), no_pose()];
+            return Some(("wobjdata", Value::list(parts)));
+        }
+        "load0" => {
+            let zero = Value::Number(0.0);
+            let parts =
+                vec![Value::Number(0.001), numbers(&[0.0, 0.0, 0.001]), no_turn(), zero.clone(), zero.clone(), zero];
+            return Some(("loaddata", Value::list(parts)));
+        }
+        "vmax" => return Some(("speeddata", numbers(&[5000.0, 500.0, 5000.0, 1000.0]))),
+        "pi" => return Some(("num", Value::Number(std::f64::consts::PI))),
+        "high" | "edge" => return Some(("num", Value::Number(1.0))),
+        "low" => return Some(("num", Value::Number(0.0))),
+        _ => {}
+    }
+    let number = |prefix: &str| name.strip_prefix(prefix)?.parse::<u32>().ok();
+    if let Some(speed) = number("vrot") {
+        return [1, 2, 5, 10, 20, 50, 100]
+            .contains(&speed)
+            .then(|| ("speeddata", numbers(&[0.0, 0.0, 0.0, f64::from(speed)])));
+    }
+    if let Some(speed) = number("vlin") {
+        return [10, 20, 50, 100, 200, 500, 1000]
+            .contains(&speed)
+            .then(|| ("speeddata", numbers(&[0.0, 0.0, f64::from(speed), 0.0])));
+    }
+    const SPEEDS: [u32; 25] = [
+        5, 10, 20, 30, 40, 50, 60, 80, 100, 150, 200, 300, 400, 500, 600, 800, 1000, 1500, 2000, 2500, 3000, 4000,
+        5000, 6000, 7000,
+    ];
+    if let Some(speed) = number("v").filter(|speed| SPEEDS.contains(speed)) {
+        return Some(("speeddata", numbers(&[f64::from(speed), 500.0, 5000.0, 1000.0])));
+    }
+    const ZONES: [u32; 13] = [1, 5, 10, 15, 20, 30, 40, 50, 60, 80, 100, 150, 200];
+    if let Some(zone_tcp) = number("z").filter(|zone| ZONES.contains(zone)) {
+        let (tcp, other) = (f64::from(zone_tcp), if zone_tcp == 1 { 1.0 } else { 1.5 * f64::from(zone_tcp) });
+        let other = if zone_tcp == 5 {
+            8.0
+        } else if zone_tcp == 15 {
+            23.0
+        } else {
+            other
+        };
+        return Some(("zonedata", zone(false, [tcp, other, other, other / 10.0, other, other / 10.0])));
+    }
+    None
+}
+
+fn zone(fine: bool, values: [f64; 6]) -> Value {
+    let mut parts = vec![Value::Flag(fine)];
+    parts.extend(values.iter().map(|value| Value::Number(*value)));
+    Value::list(parts)
+}

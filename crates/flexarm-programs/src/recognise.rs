@@ -1,0 +1,144 @@
+//! Which language a file is in, by its content; the name decides where the content allows several.
+
+use crate::{Language, decode};
+
+/// The language of a program, or `None` if it is none that is read here.
+///
+/// * `bytes`: what is in the file.
+/// * `name`: of the file; only its ending is used, and only where the content leaves it open.
+pub fn recognise(bytes: &[u8], name: &str) -> Option<Language> {
+    let text = decode(&bytes[..bytes.len().min(LOOKED_AT)]);
+    if text.contains('\0') {
+        return None;
+    }
+    let lines: Vec<String> =
+        text.lines().map(|line| line.trim().to_lowercase()).filter(|line| !line.is_empty()).collect();
+    let share = |is: fn(&str) -> bool| lines.iter().filter(|line| is(line)).count();
+    let scores = [
+        (Language::Krl, share(is_krl)),
+        (Language::Rapid, share(is_rapid)),
+        (Language::UrScript, share(is_urscript)),
+        (Language::GCode, gcode_score(&lines)),
+    ];
+    let best = scores.iter().map(|(_, score)| *score).max().unwrap_or(0);
+    let named = language_of_ending(name);
+    if best == 0 {
+        return None;
+    }
+    let mut winners = scores.iter().filter(|(_, score)| *score == best).map(|(language, _)| *language);
+    match named {
+        Some(named) if scores.iter().any(|(language, score)| *language == named && 2 * score >= best) => Some(named),
+        _ => winners.next(),
+    }
+}
+
+/// Bytes at the beginning that are looked at.
+const LOOKED_AT: usize = 1 << 18;
+
+fn language_of_ending(name: &str) -> Option<Language> {
+    let ending = name.rsplit_once('.')?.1.to_lowercase();
+    match ending.as_str() {
+        "src" | "dat" | "sub" => Some(Language::Krl),
+        "mod" | "modx" | "prg" | "sys" | "sysx" => Some(Language::Rapid),
+        "script" | "urscript" => Some(Language::UrScript),
+        "nc" | "ngc" | "gcode" | "tap" | "cnc" | "gc" => Some(Language::GCode),
+        _ => None,
+    }
+}
+
+/// Does the line begin with one of the words, and does the word end there?
+fn begins(line: &str, words: &[&str]) -> bool {
+    words.iter().any(|word| {
+        line.strip_prefix(word).is_some_and(|rest| !rest.starts_with(|c: char| c.is_alphanumeric() || c == '_'))
+    })
+}
+
+fn is_krl(line: &str) -> bool {
+    const WORDS: [&str; 22] = [
+        "&access",
+        "&rel",
+        "&param",
+        "defdat",
+        "deffct",
+        "enddat",
+        "ptp",
+        "lin",
+        "circ",
+        "sptp",
+        "slin",
+        "scirc",
+        "ptp_rel",
+        "lin_rel",
+        "decl",
+        "bas",
+        "$vel",
+        "$vel_axis",
+        "$base",
+        "$tool",
+        "$apo",
+        "$acc",
+    ];
+    begins(line, &WORDS) || (begins(line, &["def", "global def"]) && !line.ends_with(':'))
+}
+
+fn is_rapid(line: &str) -> bool {
+    const WORDS: [&str; 14] = [
+        "module",
+        "endmodule",
+        "proc",
+        "endproc",
+        "local proc",
+        "pers",
+        "const",
+        "var",
+        "task pers",
+        "local const",
+        "movej",
+        "movel",
+        "movec",
+        "moveabsj",
+    ];
+    begins(line, &WORDS) && !line.contains("movej(") && !line.contains("movel(") && !line.contains("movec(")
+}
+
+fn is_urscript(line: &str) -> bool {
+    let calls = ["movej(", "movel(", "movec(", "movep(", "set_tcp(", "textmsg(", "set_digital_out(", "set_payload("];
+    calls.iter().any(|call| line.starts_with(call))
+        || (begins(line, &["def", "thread", "while", "if"]) && line.ends_with(':'))
+        || line.contains("=p[")
+        || line.contains("= p[")
+}
+
+/// Lines that are words of one letter and a number; a lone one is none.
+fn gcode_score(lines: &[String]) -> usize {
+    let blocks = lines.iter().filter(|line| is_gcode(line)).count();
+    let codes = lines.iter().filter(|line| is_gcode(line) && line.contains(['g', 'm'])).count();
+    if codes == 0 || 3 * blocks < lines.len() { 0 } else { blocks }
+}
+
+fn is_gcode(line: &str) -> bool {
+    let mut outside = String::new();
+    let mut in_comment = false;
+    for c in line.chars() {
+        match c {
+            '(' => in_comment = true,
+            ')' => in_comment = false,
+            ';' => break,
+            _ if in_comment || c.is_whitespace() => {}
+            _ => outside.push(c),
+        }
+    }
+    let words = outside.trim_start_matches('/').as_bytes();
+    let mut at = 0;
+    while at < words.len() {
+        if !words[at].is_ascii_lowercase() {
+            return false;
+        }
+        let number = words[at + 1..].iter().take_while(|b| b.is_ascii_digit() || b"+-.#[]*/".contains(b)).count();
+        if number == 0 {
+            return false;
+        }
+        at += 1 + number;
+    }
+    !words.is_empty()
+}
