@@ -52,6 +52,15 @@ fn read(path: &Path) -> std::io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
+/// The text of a motion file.
+///
+/// # Errors
+/// [`TrajectoryError::Read`], also for what is no file and for more than 1 GiB, and as [`text_of_bytes`].
+pub fn text_of_file(path: &Path) -> Result<String, TrajectoryError> {
+    let bytes = read(path).map_err(|source| TrajectoryError::Read { path: path.to_owned(), source })?;
+    text_of_bytes(bytes, &path.display().to_string())
+}
+
 /// The text of a file: UTF-8, or UTF-16 where the file begins with its mark, as spreadsheets write it.
 ///
 /// * `origin`: file name for messages.

@@ -41,7 +41,7 @@
 //!   S-curve moves, points passed on the way), [`Samples`] (splines through sampled joint values),
 //!   [`JointPeak`], [`LimitViolation`];
 //! * files: [`Trajectory::from_path`], [`Trajectory::parse_csv`], [`Trajectory::parse_toml`],
-//!   [`Trajectory::to_csv`], [`Trajectory::parse_table`] for tables of other programs. The module pages [`csv_file`],
+//!   [`Trajectory::to_csv`], [`Trajectory::to_waypoints_toml`], [`Trajectory::parse_table`] for tables of other programs. The module pages [`csv_file`],
 //!   [`waypoints`] and [`table`] describe the formats.
 //!
 //! Units: s, rad, rad/s, rad/s² (m, m/s, m/s² for a prismatic joint) everywhere except inside the files.
@@ -70,10 +70,11 @@ mod warning;
 pub mod waypoints;
 mod waypoints_check;
 mod waypoints_toml;
+mod waypoints_write;
 
 pub use column_map::{ColumnMap, ColumnMapError};
 pub use error::{FileError, TrajectoryError};
-pub use file::text_of_bytes;
+pub use file::{text_of_bytes, text_of_file};
 pub use limits::{JointLimits, LimitKind, LimitViolation};
 pub use peak::{Extreme, JointPeak};
 pub use plan::{MotionLimits, Plan, PlannedMove, Profile};

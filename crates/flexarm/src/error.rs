@@ -71,6 +71,9 @@ pub enum Error {
     /// Something in the trajectory.
     #[error(transparent)]
     Trajectory(#[from] flexarm_trajectory::TrajectoryError),
+    /// Something in a motion of another program.
+    #[error(transparent)]
+    Motion(#[from] flexarm_motion_io::MotionError),
     /// The trajectory asks for more than the joints can do.
     #[error(
         "{}: the trajectory passes {} joint limits:\n  {}\nslow it down, change it, or go on anyway with {}",

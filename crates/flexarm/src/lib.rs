@@ -61,6 +61,8 @@ mod mode_recording;
 mod modes;
 mod monitor;
 mod motion;
+mod motion_formats;
+mod motion_report;
 mod operating_points;
 mod options;
 mod payload;
@@ -87,7 +89,7 @@ pub use applied_load::AppliedLoad;
 pub use arm::{Arm, Run};
 pub use bends::Bend;
 pub use caveat::{Caveat, Severity};
-pub use check::{Finding, check, check_with_loads};
+pub use check::{Finding, check, check_with_loads, check_with_motion};
 pub use convert::{ConvertOptions, ConvertSummary, convert, convert_until, parse_recording_format, read_run};
 pub use deflections::Variation;
 pub use drive_entry::{Drive, DriveKind};
@@ -101,6 +103,8 @@ pub use inspect::{FlexibleInfo, Inspection, JointInfo, LinkInfo, TcpInfo, inspec
 pub use mode_recording::{ModeMovie, record_modes};
 pub use modes::{ModeFigures, ModeTable, modes};
 pub use motion::{HeldJoint, Motion};
+pub use motion_formats::MotionOptions;
+pub use motion_report::{MotionCurve, MotionFiles, MotionPeak, MotionReport, MotionViolation, motion_report};
 pub use operating_points::OperatingPoints;
 pub use options::{DriveModel, LinkModel, Modelling, Outputs, RunOptions};
 pub use payload::PayloadChange;
@@ -129,11 +133,12 @@ pub use flexarm_files::FileError;
 pub use flexarm_kinematics::{LinkInertia, Pose, Wrench};
 pub use flexarm_linkmaker::{ImportError, JobError, LinkError, export, import};
 pub use flexarm_log::{Column, Columns, FormatInfo, Holds, RecordingFormat, Sample, Trace};
+pub use flexarm_motion_io::MotionError;
 pub use flexarm_settings::{Names, Setting, name_settings};
 pub use flexarm_stepping::{
     AlphaSettings, ConstraintForm, InertiaChange, Load, LoadAxes, OperatingPoint, ReferenceMethod, ReferenceSettings,
     STEPPERS, SpookPreset, SpookSettings, Start, StepError, StepRule, StepperEntry, StepperKind, StepperOptions,
     StepperSetting, TimedWrench, ToolDeflection,
 };
-pub use flexarm_trajectory::{Trajectory, TrajectoryError};
+pub use flexarm_trajectory::{ColumnMap, ColumnMapError, Trajectory, TrajectoryError};
 pub use flexarm_urdf::{InertiaEstimate, ReadOptions, closest, search_paths_from_environment};

@@ -5,11 +5,11 @@ use std::sync::Arc;
 
 use flexarm_kinematics::{Coordinate, Model};
 use flexarm_stepping::PrescribedMotion;
-use flexarm_trajectory::{JointLimits, JointSamples, LimitViolation, Samples, Trajectory};
-use flexarm_urdf::closest;
+use flexarm_trajectory::{JointLimits, JointSamples, KnownJoint, LimitViolation, Samples, Trajectory};
 
 use crate::caveat::{self, Caveat};
 use crate::error::{Error, PoseError, ValueError};
+use crate::motion_formats::{self, MotionFile, MotionOptions, ReadMotion, unknown_joints};
 use crate::robot::Robot;
 
 /// A trajectory whose joints are the model's actuated coordinates.
@@ -29,6 +29,16 @@ pub struct Motion {
     pub warnings: Vec<String>,
     /// Joints that the file does not name.
     pub held: Vec<HeldJoint>,
+    /// What the file is, in words; empty for a motion that was made.
+    pub format: String,
+    /// The topic of a bag.
+    pub topic: Option<String>,
+    /// Rows, messages or points of the file; none for waypoints.
+    pub samples: Option<usize>,
+    /// Joints of messages that the robot does not have; they are left out.
+    pub dropped: Vec<String>,
+    /// What was chosen, assumed and left out when the file was read.
+    pub notes: Vec<Caveat>,
 }
 
 /// A joint that a motion does not name.
@@ -68,13 +78,22 @@ fn limits(model: &Model) -> Vec<JointLimits> {
 }
 
 impl Motion {
-    /// Reads a motion file for a robot. A joint that it does not name stays where the robot file says, else at zero, or at the
-    /// limit nearest to it.
+    /// Reads a motion file for a robot, of any format that `docs/motions.md` has. A joint that it does not name stays where
+    /// the robot file says, else at zero, or at the limit nearest to it.
     ///
     /// # Errors
-    /// [`Error::File`] or [`Error::Trajectory`]: format, units, times, joints that the robot does not have; [`Error::Model`].
+    /// [`Error::File`], [`Error::Trajectory`] or [`Error::Motion`]: format, units, times, joints that the robot does not have;
+    /// [`Error::Model`].
     pub fn load(path: impl AsRef<Path>, robot: &Robot) -> Result<Self, Error> {
-        Self::read(path.as_ref(), &*robot.rigid_model()?, &robot.hold)
+        Self::load_with(path, robot, &MotionOptions::default())
+    }
+
+    /// As [`Motion::load`], with the topic of a bag or the columns of a table told.
+    ///
+    /// # Errors
+    /// As [`Motion::load`], and for a topic or columns that are not there.
+    pub fn load_with(path: impl AsRef<Path>, robot: &Robot, options: &MotionOptions) -> Result<Self, Error> {
+        Self::read(path.as_ref(), &*robot.rigid_model()?, &robot.hold, options)
     }
 
     /// As [`Motion::load`], for a model alone.
@@ -82,7 +101,7 @@ impl Motion {
     /// # Errors
     /// As [`Motion::load`].
     pub fn load_for(path: &Path, model: &Model) -> Result<Self, Error> {
-        Self::read(path, model, &[])
+        Self::read(path, model, &[], &MotionOptions::default())
     }
 
     /// The motion through sampled positions, by a spline as through the rows of a CSV file.
@@ -121,14 +140,15 @@ impl Motion {
         Self::of(trajectory, Path::new(name), &*robot.rigid_model()?, &robot.hold)
     }
 
-    fn read(path: &Path, model: &Model, hold: &[(String, f64)]) -> Result<Self, Error> {
-        if !path.is_file() {
-            let what = "there is no such trajectory file; give a .csv or .toml file".into();
-            return Err(Error::File { path: path.to_owned(), what });
-        }
+    fn read(path: &Path, model: &Model, hold: &[(String, f64)], options: &MotionOptions) -> Result<Self, Error> {
         let actuated = &model.coordinates()[..model.n_actuated()];
         let named: Vec<(&str, JointLimits)> = actuated.iter().map(|c| c.joint.as_str()).zip(limits(model)).collect();
-        Self::of(Trajectory::from_path(path, &named)?, path, model, hold)
+        let joints: Vec<KnownJoint<'_>> =
+            actuated.iter().map(|c| KnownJoint { name: &c.joint, is_prismatic: c.kind == "prismatic" }).collect();
+        let file = MotionFile { path, joints: Some(&joints), limits: &named, options };
+        let ReadMotion { trajectory, format, topic, samples, dropped, caveats } = motion_formats::read(&file)?;
+        let motion = Self::of(trajectory, path, model, hold)?;
+        Ok(Self { format, topic, samples, dropped, notes: caveats, ..motion })
     }
 
     fn of(trajectory: Trajectory, path: &Path, model: &Model, hold: &[(String, f64)]) -> Result<Self, Error> {
@@ -153,7 +173,9 @@ impl Motion {
         let likely = caveat::motion::degrees(&violations, model);
         let name = path.file_stem().map_or_else(|| "trajectory".into(), |s| s.to_string_lossy().into_owned());
         let (path, trajectory) = (path.to_owned(), Arc::new(trajectory));
-        Ok(Self { name, path, trajectory, violations, likely, warnings, held })
+        let made = (String::new(), None, None, Vec::new(), Vec::new());
+        let (format, topic, samples, dropped, notes) = made;
+        Ok(Self { name, path, trajectory, violations, likely, warnings, held, format, topic, samples, dropped, notes })
     }
 
     /// The same motion with each corner, where a velocity jumps, replaced by a blend that lasts `seconds`.
@@ -174,7 +196,7 @@ impl Motion {
     pub fn caveats(&self) -> Vec<Caveat> {
         let file = self.path.display().to_string();
         let told = self.warnings.iter().map(|text| Caveat::said("trajectory", &file, text, ""));
-        told.chain(self.held_note()).collect()
+        self.notes.iter().cloned().chain(told).chain(self.held_note()).collect()
     }
 
     /// Which joints stay where, if the file does not name all: a note where the robot file says so, else a warning.
@@ -201,22 +223,8 @@ impl Motion {
 
 /// A motion must move joints that there are, and at least one of them.
 fn check_joints(path: &Path, moved: &[String], joints: &[&str]) -> Result<(), Error> {
-    let unknown: Vec<String> = (moved.iter().filter(|name| !joints.contains(&name.as_str())))
-        .map(|name| match closest(name, joints.iter().copied()) {
-            Some(meant) => format!("{name:?} (did you mean {meant:?}?)"),
-            None => format!("{name:?}"),
-        })
-        .collect();
-    if unknown.is_empty() {
-        return Ok(());
-    }
-    let joints = joints.iter().map(|name| format!("{name:?}")).collect::<Vec<_>>().join(", ");
-    let what = format!(
-        "the motion moves {}, which the robot does not have; its joints are {joints}: rename them in the motion, or remove \
-         them",
-        unknown.join(", ")
-    );
-    Err(Error::File { path: path.to_owned(), what })
+    let unknown: Vec<String> = moved.iter().filter(|name| !joints.contains(&name.as_str())).cloned().collect();
+    if unknown.is_empty() { Ok(()) } else { Err(unknown_joints(path, &unknown, joints)) }
 }
 
 fn warnings(trajectory: &Trajectory, path: &Path) -> Vec<String> {
