@@ -27,10 +27,11 @@ LINES = ["faces", "proof", "facade", "edges", "results", "motion", "links", "bas
 INNER = ["results", "motion", "links", "base", "words", "algebra"]
 OWNERS = {  # outside crate: crates or lines that may name it
     "rerun": ["flexarm-log"], "re_chunk": ["flexarm-log"], "re_log_encoding": ["flexarm-log"], "re_log_types": ["flexarm-log"],
-    "re_sdk_types": ["flexarm-log"], "re_tuid": ["flexarm-log"], "mcap": ["flexarm-log"], "parquet": ["flexarm-log"], "zstd": ["flexarm-log"],
+    "re_sdk_types": ["flexarm-log"], "re_tuid": ["flexarm-log"], "mcap": ["flexarm-log"], "parquet": ["flexarm-log"], "zstd": ["flexarm-log", "flexarm-motion-io"],
+    "rusqlite": ["flexarm-motion-io"], "lz4_flex": ["flexarm-motion-io"],
     "arrow-array": ["flexarm-log"], "arrow-ipc": ["flexarm-log"], "arrow-schema": ["flexarm-log"],
     "png": ["flexarm-draw"], "plotters": ["flexarm-draw"], "hdf5-pure": ["flexarm-fe-io"],
-    "faer": ["flexarm-fem"], "diffsol": ["flexarm-stepping"], "metis-sys": ["flexarm-fem"], "urdf-rs": ["flexarm-urdf"], "saphyr-parser": ["flexarm-urdf"],
+    "faer": ["flexarm-fem"], "diffsol": ["flexarm-stepping"], "metis-sys": ["flexarm-fem"], "urdf-rs": ["flexarm-urdf"], "saphyr-parser": ["flexarm-urdf", "flexarm-motion-io"],
     "rustix": ["flexarm-log"], "signal-hook": ["faces"],
     "clap": ["faces"], "clap_complete": ["faces"], "clap_mangen": ["faces"], "indicatif": ["faces"],
 }
@@ -64,6 +65,7 @@ MUST_NOT_KNOW = {  # crate: what its code must not have, and what it is; imports
                           (r"\bflexarm_(?!linkmaker\b|draw\b|fe_io\b|fem\b|files\b|settings\b|spatial\b)\w+", "more than links")],
     "flexarm-draw": [(r"\bflexarm_log\b|\bRecorder\b", "files of recordings"), (r"\bflexarm_(?:stepping|analysis)\b", "what numbers mean")],
     "flexarm-trajectory": [(r"\b(?:Robot|Mechanism|inverse_kinematics)\b", "robots and inverse kinematics")],
+    "flexarm-motion-io": [(r"\b(?:Robot|Mechanism|Model)\b", "robots"), (r"\bflexarm_(?!motion_io\b|trajectory\b|settings\b)\w+", "more than trajectories")],
     "flexarm-flexlink": [FILES],
     "flexarm-stepping": [FILES, (r"\b(?:TcpMetrics|substitute)\b", "metrics and substitution")],
     "flexarm-analysis": [FILES, (r"\bflexarm_(?!analysis\b|kinematics\b)\w+", "other crates than the one of poses")],

@@ -9,6 +9,7 @@ use flexarm::{DriveModel, LinkModel, Modelling, RecordingFormat, STEPPERS, Stepp
 use crate::convert::ConvertArgs;
 use crate::exchange_args::{ExportArgs, ImportArgs};
 use crate::formats;
+use crate::motion::{MotionArgs, MotionInputArgs};
 use crate::posed_args::{ModesArgs, ResponseArgs, StaticsArgs};
 use crate::reduce_args::ReduceArgs;
 use crate::report::ReportArgs;
@@ -41,6 +42,8 @@ pub(crate) enum Command {
     Inspect(InspectArgs),
     /// Look for everything that is wrong with a robot and a trajectory
     Check(CheckArgs),
+    /// Show what is in a motion, against the limits of a robot, and write it in other formats
+    Motion(MotionArgs),
     /// Equilibrium under weight and load at a pose, and the compliance of the TCP
     Statics(StaticsArgs),
     /// Natural frequencies, damping and shapes at a pose, drives locked
@@ -150,7 +153,7 @@ impl ModellingArgs {
 pub(crate) struct RunArgs {
     /// robot.toml, a folder with one, a .urdf or .xacro file, or the name of a shipped robot [default: kr210]
     pub(crate) robot: Option<PathBuf>,
-    /// .csv or .toml trajectory, or the name of a shipped one [default: the robot's own]
+    /// Motion of any format (flexarm format motion), or the name of a shipped one [default: the robot's own]
     pub(crate) trajectory: Option<PathBuf>,
     /// Time stepper
     #[arg(long, help_heading = "Stepper", value_name = "NAME", value_parser = stepper_words(), default_value = STEPPERS[0].name)]
@@ -162,6 +165,8 @@ pub(crate) struct RunArgs {
     pub(crate) modelling: ModellingArgs,
     #[command(flatten)]
     pub(crate) load: RobotArgs,
+    #[command(flatten)]
+    pub(crate) motion: MotionInputArgs,
     /// Round corners of the trajectory, where a velocity jumps, by blends that last this long (s)
     #[arg(long, help_heading = "Models", hide_short_help = true, value_name = "SECONDS", allow_hyphen_values = true)]
     pub(crate) round_corners: Option<f64>,
@@ -285,6 +290,8 @@ pub(crate) struct CheckArgs {
     #[arg(long, value_name = "FILE")]
     pub(crate) loads: Option<PathBuf>,
     #[command(flatten)]
+    pub(crate) motion: MotionInputArgs,
+    #[command(flatten)]
     pub(crate) load: RobotArgs,
 }
 
@@ -302,7 +309,7 @@ fn stepper_words() -> impl TypedValueParser<Value = &'static StepperEntry> {
 pub(crate) enum PageName {
     /// robot.toml: tool, payload, links that bend, drives
     Robot,
-    /// Motions: waypoints (.toml) and samples (.csv)
+    /// Motions: waypoints, samples and tables, messages and bags of ROS
     Motion,
     /// What acts on the arm during a run (.toml)
     Loads,

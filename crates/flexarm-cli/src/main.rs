@@ -8,6 +8,7 @@ mod exchange_args;
 mod failure;
 mod flags;
 mod formats;
+mod motion;
 mod posed;
 mod posed_args;
 mod print;
@@ -74,6 +75,7 @@ fn run(cli: &Cli) -> Result<ExitCode, Failure> {
         Command::Run(args) => simulate(cli, args, false),
         Command::Inspect(args) => inspect(cli, args),
         Command::Check(args) => check(cli, args),
+        Command::Motion(args) => motion::run(cli, args),
         Command::Statics(args) => posed::statics(cli, args),
         Command::Modes(args) => posed::modes(cli, args),
         Command::Response(args) => posed::response(cli, args),
@@ -175,13 +177,14 @@ fn variant(label: String, args: &RunArgs, with_twin: bool) -> Result<Variant, Fa
             return Err(Failure::Usage(text.into()));
         }
     };
-    let motion = flexarm::Motion::load(&trajectory, &robot).map_err(|error| match error {
-        flexarm::Error::File { path, what } if args.trajectory.is_none() => {
-            let what = format!("{what} (it is the default_trajectory of {})", robot.path.display());
-            flexarm::Error::File { path, what }
-        }
-        other => other,
-    })?;
+    let motion =
+        flexarm::Motion::load_with(&trajectory, &robot, &args.motion.options()).map_err(|error| match error {
+            flexarm::Error::File { path, what } if args.trajectory.is_none() => {
+                let what = format!("{what} (it is the default_trajectory of {})", robot.path.display());
+                flexarm::Error::File { path, what }
+            }
+            other => other,
+        })?;
     let motion = match args.round_corners {
         Some(seconds) => motion.with_rounded_corners(seconds, &*robot.rigid_model()?)?,
         None => motion,
@@ -249,8 +252,9 @@ fn inspect(cli: &Cli, args: &InspectArgs) -> Result<ExitCode, Failure> {
 fn check(cli: &Cli, args: &CheckArgs) -> Result<ExitCode, Failure> {
     let trajectory = args.trajectory.as_deref().map(shipped::trajectory);
     let robot = shipped::robot(Some(&args.robot))?;
-    let findings =
-        flexarm::check_with_loads(&robot, trajectory.as_deref(), args.loads.as_deref(), &load_options(&args.load)?);
+    let (motion, options) = (args.motion.options(), load_options(&args.load)?);
+    let loads = args.loads.as_deref();
+    let findings = flexarm::check_with_motion(&robot, trajectory.as_deref(), &motion, loads, &options);
     let json = || serde_json::json!({ "findings": findings }).to_string();
     answer(cli, json, || print::findings(&findings));
     let wrong = findings.iter().any(|f| f.severity == "error");

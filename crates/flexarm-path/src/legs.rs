@@ -333,7 +333,11 @@ fn natural_second_derivatives(p: &[Vector3<f64>], h: &[f64]) -> Vec<Vector3<f64>
 fn check(of: &Move) -> Result<(), PathError> {
     let speed = &of.speed;
     let blend = match of.blend {
-        Blend::Distance(value) | Blend::Fraction(value) | Blend::Velocity(value) if value != 0.0 => Some(value),
+        Blend::Distance(value) | Blend::Fraction(value) | Blend::Velocity(value) | Blend::Orientation(value)
+            if value != 0.0 =>
+        {
+            Some(value)
+        }
         _ => None,
     };
     let values = [

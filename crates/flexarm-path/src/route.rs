@@ -1,6 +1,6 @@
 //! From one stop to the next: legs joined by blends, and the joints at points along all of it.
 
-use flexarm_spatial::rotation_vector;
+use flexarm_spatial::{Pose, rotation_vector};
 use nalgebra::{DVector, Vector3};
 
 use crate::curve::{TURN_LENGTH, ToolCurve, ToolJet};
@@ -192,6 +192,9 @@ fn blend_reach(owner: &mut Legs<'_>, a: &Leg, b: &Leg) -> [f64; 2] {
         Blend::Distance(distance) => {
             [leave(owner, a, distance, true).min(most[0]), leave(owner, b, distance, false).min(most[1])]
         }
+        Blend::Orientation(angle) => {
+            [turned(owner, a, angle, true).min(most[0]), turned(owner, b, angle, false).min(most[1])]
+        }
         Blend::Velocity(part) => {
             let speed = a.of.speed.linear_m_s.unwrap_or(1.0);
             let braking = a.of.speed.linear_m_s2.unwrap_or(BRAKING);
@@ -203,27 +206,36 @@ fn blend_reach(owner: &mut Legs<'_>, a: &Leg, b: &Leg) -> [f64; 2] {
 
 /// Parameter from the end (or from the start) of a leg at which the tool is `distance` from the corner.
 fn leave(owner: &mut Legs<'_>, leg: &Leg, distance: f64, at_end: bool) -> f64 {
+    // A tool that only turns leaves its pose by an angle that counts as a length.
+    let travels = match &leg.way {
+        Way::Tool { curve, .. } => curve.at(0.0).V.fixed_rows::<3>(0).norm() > 0.0,
+        _ => true,
+    };
+    from_corner(owner, leg, distance, at_end, |X, corner| match travels {
+        true => (X.translation.vector - corner.translation.vector).norm(),
+        false => angle_between(X, corner) * TURN_LENGTH,
+    })
+}
+
+/// The same for an angle by which the tool is turned from the corner.
+fn turned(owner: &mut Legs<'_>, leg: &Leg, angle: f64, at_end: bool) -> f64 {
+    from_corner(owner, leg, angle, at_end, angle_between)
+}
+
+fn angle_between(a: &Pose, b: &Pose) -> f64 {
+    rotation_vector((a.rotation * b.rotation.inverse()).matrix()).norm()
+}
+
+/// Parameter from the corner at which `away` reaches `most`.
+fn from_corner(owner: &mut Legs<'_>, leg: &Leg, most: f64, at_end: bool, away: impl Fn(&Pose, &Pose) -> f64) -> f64 {
     let place = |s: f64| if at_end { leg.length - s } else { s };
-    match &leg.way {
-        Way::Tool { curve, .. } => {
-            let corner = curve.at(place(0.0)).X;
-            // A tool that only turns leaves its pose by an angle that counts as a length.
-            let away = |s: f64| {
-                let X = curve.at(place(s)).X;
-                let way = (X.translation.vector - corner.translation.vector).norm();
-                let turn = rotation_vector((X.rotation * corner.rotation.inverse()).matrix()).norm() * TURN_LENGTH;
-                if curve.at(0.0).V.fixed_rows::<3>(0).norm() > 0.0 { way } else { turn }
-            };
-            first_beyond(leg.length, distance, away)
-        }
-        Way::Joints { q0, d } => {
-            let frame = owner.tool_frame(&leg.of);
-            let corner = owner.pose(&frame, &(q0 + d * place(0.0))).translation.vector;
-            let away = |s: f64| (owner.pose(&frame, &(q0 + d * place(s))).translation.vector - corner).norm();
-            first_beyond(leg.length, distance, away)
-        }
-        Way::Bridge { .. } => 0.0,
-    }
+    let frame = owner.tool_frame(&leg.of);
+    let mut pose = |s: f64| match &leg.way {
+        Way::Tool { curve, .. } => curve.at(place(s)).X,
+        way => owner.pose(&frame, &joint_jet(way, leg.length, place(s)).q),
+    };
+    let corner = pose(0.0);
+    first_beyond(leg.length, most, |s| away(&pose(s), &corner))
 }
 
 /// The first parameter at which `away` reaches `distance`, or `length`: a coarse search, then bisection.

@@ -63,6 +63,14 @@ pub enum Setting {
     /// Format of a recording that is written.
     WrittenFormat,
 
+    // Motions.
+    /// The topic of a bag that holds the motion.
+    Topic,
+    /// Which columns of a table are time and joints.
+    Columns,
+    /// Rows per second of a motion that is written.
+    Rate,
+
     // Robots.
     /// The frame whose motion is looked at.
     Tcp,
@@ -140,7 +148,7 @@ pub enum Setting {
 
 impl Setting {
     /// Every setting.
-    pub const ALL: [Self; 48] = [
+    pub const ALL: [Self; 51] = [
         Self::Step,
         Self::LogRate,
         Self::Stepper,
@@ -156,6 +164,9 @@ impl Setting {
         Self::Overwrite,
         Self::ReadFormat,
         Self::WrittenFormat,
+        Self::Topic,
+        Self::Columns,
+        Self::Rate,
         Self::Tcp,
         Self::Package,
         Self::Argument,
@@ -209,6 +220,9 @@ impl Setting {
             Self::Overwrite => "overwrite",
             Self::ReadFormat => "from",
             Self::WrittenFormat => "to",
+            Self::Topic => "topic",
+            Self::Columns => "columns",
+            Self::Rate => "rate_hz",
             Self::Tcp => "tcp",
             Self::Package => "packages",
             Self::Argument => "arguments",

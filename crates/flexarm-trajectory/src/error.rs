@@ -87,6 +87,19 @@ pub enum TrajectoryError {
         /// Duration of the trajectory, s.
         duration_s: f64,
     },
+    /// A motion that is not made of quintic moves from rest to rest.
+    #[error(
+        "the motion is not made of quintic moves from rest to rest: as waypoints, joint {joint:?} would be off by {difference:.2e} \
+         rad (or m) at t = {time_s:.3} s; write it as samples (.csv)"
+    )]
+    NotWaypoints {
+        /// Joint that differs most.
+        joint: String,
+        /// Where, s.
+        time_s: f64,
+        /// By how much, rad or m.
+        difference: f64,
+    },
     /// The output cannot be written.
     #[error("cannot write the trajectory: {source}")]
     Write {

@@ -52,6 +52,42 @@ fn read(path: &Path) -> std::io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
+/// The bytes of a motion file.
+///
+/// # Errors
+/// [`TrajectoryError::Read`], also for what is no file and for more than 1 GiB.
+pub fn bytes_of_file(path: &Path) -> Result<Vec<u8>, TrajectoryError> {
+    read(path).map_err(|source| TrajectoryError::Read { path: path.to_owned(), source })
+}
+
+/// The text of a motion file.
+///
+/// # Errors
+/// As [`bytes_of_file`] and [`text_of_bytes`].
+pub fn text_of_file(path: &Path) -> Result<String, TrajectoryError> {
+    text_of_bytes(bytes_of_file(path)?, &path.display().to_string())
+}
+
+/// The text of a file: UTF-8, or UTF-16 where the file begins with its mark, as spreadsheets write it.
+///
+/// * `origin`: file name for messages.
+///
+/// # Errors
+/// [`TrajectoryError::File`] with the line of what is neither.
+pub fn text_of_bytes(bytes: Vec<u8>, origin: &str) -> Result<String, TrajectoryError> {
+    let word: fn([u8; 2]) -> u16 = match bytes.get(..2) {
+        Some([0xFF, 0xFE]) => u16::from_le_bytes,
+        Some([0xFE, 0xFF]) => u16::from_be_bytes,
+        _ => return Ok(text_of(bytes, origin)?),
+    };
+    let words = bytes[2..].chunks_exact(2).map(|pair| word([pair[0], pair[1]]));
+    let text: Result<String, _> = char::decode_utf16(words).collect();
+    text.map_err(|_| {
+        let origin = origin.to_owned();
+        Box::new(FileError { origin, line: None, column: None, problem: Problem::NotUtf8 }).into()
+    })
+}
+
 fn text_of(bytes: Vec<u8>, origin: &str) -> Result<String, Box<FileError>> {
     String::from_utf8(bytes).map_err(|error| {
         let good = &error.as_bytes()[..error.utf8_error().valid_up_to()];

@@ -41,12 +41,14 @@
 //!   S-curve moves, points passed on the way), [`Samples`] (splines through sampled joint values),
 //!   [`JointPeak`], [`LimitViolation`];
 //! * files: [`Trajectory::from_path`], [`Trajectory::parse_csv`], [`Trajectory::parse_toml`],
-//!   [`Trajectory::to_csv`]. The module pages [`csv_file`] and [`waypoints`] describe the two formats.
+//!   [`Trajectory::to_csv`], [`Trajectory::to_waypoints_toml`], [`Trajectory::parse_table`] for tables of other programs. The module pages [`csv_file`],
+//!   [`waypoints`] and [`table`] describe the formats.
 //!
 //! Units: s, rad, rad/s, rad/s² (m, m/s, m/s² for a prismatic joint) everywhere except inside the files.
 //! Not here: robots, links and inverse kinematics; a trajectory knows its joints by name only.
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test"))]
 
+mod column_map;
 mod corner;
 pub mod csv_file;
 mod csv_write;
@@ -61,18 +63,23 @@ mod problem;
 mod rounding;
 mod shape;
 mod spline;
+pub mod table;
 mod trajectory;
 mod via;
 mod warning;
 pub mod waypoints;
 mod waypoints_check;
 mod waypoints_toml;
+mod waypoints_write;
 
+pub use column_map::{ColumnMap, ColumnMapError};
 pub use error::{FileError, TrajectoryError};
+pub use file::{bytes_of_file, text_of_bytes, text_of_file};
 pub use limits::{JointLimits, LimitKind, LimitViolation};
 pub use peak::{Extreme, JointPeak};
 pub use plan::{MotionLimits, Plan, PlannedMove, Profile};
 pub use problem::{PlanError, Problem, SampleError};
 pub use spline::{JointKnots, JointSamples, Samples};
+pub use table::{KnownJoint, TableInfo, TableRequest};
 pub use trajectory::{Move, Trajectory, VelocityJump};
 pub use warning::Warning;

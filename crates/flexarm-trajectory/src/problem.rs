@@ -2,6 +2,8 @@
 //!
 //! The place of a problem is in [`crate::FileError`].
 
+use flexarm_settings::Setting;
+
 /// What is wrong in a file, and how to mend it.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -135,6 +137,113 @@ pub enum Problem {
         found: usize,
         /// Number of joints.
         expected: usize,
+    },
+    /// Commas between columns and in numbers.
+    #[error(
+        "the row has {found} fields, the header {expected}: twice as many, as if numbers had decimal commas between commas, \
+         which nobody can tell apart; export the table with semicolons, or with points in numbers"
+    )]
+    DecimalCommas {
+        /// Fields of the row.
+        found: usize,
+        /// Fields of the header.
+        expected: usize,
+    },
+    /// Decimal points and decimal commas in one table.
+    #[error(
+        "numbers have decimal points (line {point}) and decimal commas (line {comma}); write all in one way, without \
+         separators of thousands"
+    )]
+    MixedDecimals {
+        /// First line with a point.
+        point: usize,
+        /// First line with a comma.
+        comma: usize,
+    },
+    /// Numbers without names of columns.
+    #[error(
+        "the table has {fields} columns of numbers and no header; put one above (`time,<joint>,...`), or tell the columns by \
+         number: {} t=#1[s],<joint>=#2[rad]",
+        Setting::Columns
+    )]
+    NoHeader {
+        /// Columns.
+        fields: usize,
+    },
+    /// No column looks like a time.
+    #[error(
+        "no column of the header {} is a time (`time`, `t`, `Time[s]`, `timestamp`); rename one, or tell which it is: {} \
+         t=<column>",
+        list(found),
+        Setting::Columns
+    )]
+    NoTimeColumnFound {
+        /// Columns of the header.
+        found: Vec<String>,
+    },
+    /// Several columns look like times.
+    #[error(
+        "the columns {} are all times; tell which one counts: {} t=<column>,<joint>=<column>",
+        list(columns),
+        Setting::Columns
+    )]
+    SeveralTimes {
+        /// They.
+        columns: Vec<String>,
+    },
+    /// No column is one of the joints.
+    #[error(
+        "no column of the header {} is a joint: the joints are {}; rename the columns, or tell which they are: {} \
+         <joint>=<column>",
+        list(found),
+        list(joints),
+        Setting::Columns
+    )]
+    NoJointColumn {
+        /// Columns of the header.
+        found: Vec<String>,
+        /// Joints of the robot.
+        joints: Vec<String>,
+    },
+    /// A column that was asked for and is not there.
+    #[error("there is no column {asked:?}; the header has {}", list(found))]
+    NoSuchColumn {
+        /// The column.
+        asked: String,
+        /// Columns of the header.
+        found: Vec<String>,
+    },
+    /// A name that several columns have.
+    #[error("{asked:?} could be each of the columns {}; give the whole name, or its number as in #2", list(columns))]
+    AmbiguousColumn {
+        /// The name.
+        asked: String,
+        /// The columns.
+        columns: Vec<String>,
+    },
+    /// A unit of something else.
+    #[error("the column {column:?} has the unit of {found}; expected {expected}")]
+    WrongMeasure {
+        /// The column.
+        column: String,
+        /// What its unit measures.
+        found: &'static str,
+        /// What is expected.
+        expected: &'static str,
+    },
+    /// Angles too large for radians, without a unit.
+    #[error(
+        "joint {joint:?} reaches {largest:.4} in a table that does not state its unit, too much for radians to be assumed; \
+         name the unit in the header (`{column}[deg]`), in a line `# unit: deg` above it, or with {} {joint}={column}[deg]",
+        Setting::Columns
+    )]
+    UnitNeeded {
+        /// The joint.
+        joint: String,
+        /// Its column.
+        column: String,
+        /// Largest position as it is written.
+        largest: f64,
     },
     /// Sampled values are wrong.
     #[error(transparent)]

@@ -4,6 +4,7 @@
 
 use crate::error::TrajectoryError;
 use crate::polynomial::Piece;
+use crate::problem::SampleError;
 use crate::warning::{QUIET_SPEED, Warning};
 
 /// A joint that moves less than this within a piece, in rad or m, is at rest there.
@@ -172,6 +173,36 @@ impl Trajectory {
         Self::from_curves(joints, curves, self.duration, self.notes.clone())
     }
 
+    /// One motion of several that move different joints, each beginning at its own time; before and after a joint is held
+    /// where its part begins and ends. What was noted of the parts holds for the whole.
+    ///
+    /// * `parts`: when each begins (s, not negative) and what it is.
+    ///
+    /// # Errors
+    /// [`TrajectoryError::Samples`] for no part at all and for a joint that two parts move, [`TrajectoryError::OutOfRange`]
+    /// for a time that is not finite or negative, or that drowns a part in its rounding.
+    pub fn side_by_side(parts: &[(f64, Self)]) -> Result<Self, TrajectoryError> {
+        let duration = parts.iter().map(|(start, part)| start + part.duration).fold(0.0, f64::max);
+        let (mut joints, mut curves, mut notes): (Vec<String>, Vec<Curve>, Vec<Warning>) = Default::default();
+        for (start, part) in parts {
+            for (joint, curve) in part.joints.iter().zip(&part.curves) {
+                if joints.contains(joint) {
+                    return Err(SampleError::RepeatedJoint { joint: joint.clone() }.into());
+                }
+                if !(*start >= 0.0 && start.is_finite()) {
+                    return Err(TrajectoryError::OutOfRange { joint: joint.clone(), time_s: *start });
+                }
+                joints.push(joint.clone());
+                curves.push(curve.within(*start, duration));
+            }
+            notes.extend(part.notes.iter().cloned());
+        }
+        if joints.is_empty() {
+            return Err(SampleError::NoJoint.into());
+        }
+        Self::from_curves(joints, curves, duration, notes)
+    }
+
     /// The same path run through in `factor` times the time: 2 halves every velocity.
     ///
     /// # Errors
@@ -284,6 +315,27 @@ impl Curve {
         let i = self.knots[1..=last].partition_point(|&knot| knot <= t);
         let piece = &self.pieces[i];
         piece.at((t - self.knots[i]).clamp(0.0, piece.width))
+    }
+
+    /// The curve begun at `start`, held before it and after its end up to `duration`.
+    fn within(&self, start: f64, duration: f64) -> Self {
+        let mut knots: Vec<f64> = self.knots.iter().map(|knot| start + knot).collect();
+        let mut pieces = self.pieces.clone();
+        if start > 0.0 {
+            knots.insert(0, 0.0);
+            pieces.insert(0, Piece::hold(start, self.start()[0]));
+        }
+        let end = knots[knots.len() - 1];
+        // An end that differs by rounding alone is the same end.
+        if duration - end > 1e-9 * duration {
+            knots.push(duration);
+            pieces.push(Piece::hold(duration - end, self.end()[0]));
+        } else if let (Some(last), Some(piece)) = (knots.last_mut(), pieces.last()) {
+            if (duration - *last).abs() <= 1e-9 * piece.width {
+                *last = duration;
+            }
+        }
+        Self { knots, pieces }
     }
 
     /// As [`Trajectory::still_until`], of one joint.

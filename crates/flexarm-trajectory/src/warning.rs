@@ -58,6 +58,35 @@ pub enum Warning {
         /// Largest absolute position as it was read, rad.
         largest: f64,
     },
+    /// A table does not state the unit of these joints.
+    AssumedRadians {
+        /// Names of the joints.
+        joints: Vec<String>,
+    },
+    /// A table does not state the unit of its times.
+    AssumedTime {
+        /// Name of the column.
+        column: String,
+        /// What was assumed.
+        unit: &'static str,
+    },
+    /// Columns of a table that are not of the motion.
+    DroppedColumns {
+        /// Their names.
+        columns: Vec<String>,
+    },
+    /// Rows of a table that repeat the one before, time and all.
+    RepeatedRows {
+        /// How many.
+        count: usize,
+    },
+    /// The last row of a table is not whole.
+    CutRow {
+        /// Its line.
+        line: usize,
+    },
+    /// The positions are those of a run.
+    PositionsOfRun,
     /// The duration asked for makes a joint pass an acceleration or jerk limit.
     ShorterThanLimitsAllow {
         /// Number of the move, counted from 1.
@@ -104,6 +133,32 @@ impl fmt::Display for Warning {
                 "joint {joint:?} reaches {largest:.4} rad in a file that does not state its unit: \
                  add the line `# unit: deg` or `# unit: rad` at its top"
             ),
+            Self::AssumedRadians { joints } => write!(
+                f,
+                "the table does not state the unit of {}: taken as rad; name it in the header, as in joint_1[deg]",
+                some(joints)
+            ),
+            Self::AssumedTime { column, unit } => write!(
+                f,
+                "the table does not state the unit of its column {column:?}: taken as {unit}; name it in the header, as in \
+                 Time[ms]"
+            ),
+            Self::DroppedColumns { columns } => write!(
+                f,
+                "columns that are not of the motion are left out: {}; {} says which column is which joint",
+                some(columns),
+                Setting::Columns
+            ),
+            Self::RepeatedRows { count } => {
+                write!(f, "{count} rows repeat the one before, time and all, and are left out")
+            }
+            Self::CutRow { line } => {
+                write!(f, "the last row (line {line}) is not whole and is left out: the file was cut off")
+            }
+            Self::PositionsOfRun => f.write_str(
+                "the positions are those of the flexible robot of a run: where its drives give way, they hold what the \
+                 gearboxes twist; the motion file of the run has the commanded ones",
+            ),
             Self::ShorterThanLimitsAllow { number, joint, quantity, value, limit } => write!(
                 f,
                 "move {number}: the given duration takes the {quantity} of joint {joint:?} to {value:.4}, over its \
@@ -111,6 +166,16 @@ impl fmt::Display for Warning {
             ),
         }
     }
+}
+
+/// The first few names.
+fn some(names: &[String]) -> String {
+    const MOST: usize = 8;
+    let mut shown: Vec<String> = names.iter().take(MOST).map(|name| format!("{name:?}")).collect();
+    if names.len() > MOST {
+        shown.push(format!("... ({} in all)", names.len()));
+    }
+    shown.join(", ")
 }
 
 impl Warning {

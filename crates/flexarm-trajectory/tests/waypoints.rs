@@ -225,3 +225,39 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn quintic_moves_are_written_as_the_waypoints_that_they_are_and_other_motions_are_not() {
+    let text = r#"
+        format = 1
+        unit = "deg"
+        joints = ["a", "b"]
+        start = [0.0, 10.0]
+        [[move]]
+        to = [0.0, 10.0]
+        duration = 0.25
+        hold = 0.25
+        [[move]]
+        to = [90.0, -45.0]
+        duration = 2.0
+        hold = 0.5
+        [[move]]
+        to = [10.0, -45.0]
+        duration = 1.5
+    "#;
+    let motion = Trajectory::parse_toml(text, "moves.toml", &[]).unwrap();
+    let back = Trajectory::parse_toml(&motion.to_waypoints_toml().unwrap(), "back.toml", &[]).unwrap();
+    assert!((back.duration() - 4.5).abs() < 1e-12);
+    let mut worst = 0.0f64;
+    for i in 0..=900 {
+        let t = 0.005 * f64::from(i);
+        let (mut q, mut p, mut x, mut y) = ([0.0; 2], [0.0; 2], [0.0; 2], [0.0; 2]);
+        motion.sample(t, &mut q, &mut x, &mut y);
+        back.sample(t, &mut p, &mut x, &mut y);
+        worst = worst.max((q[0] - p[0]).abs()).max((q[1] - p[1]).abs());
+    }
+    assert!(worst < 1e-12, "{worst:e}");
+    let sine = "time,a\n0,0\n0.5,0.3\n1,0.5\n1.5,0.3\n2,0\n";
+    let error = Trajectory::parse_csv(sine, "sine.csv").unwrap().to_waypoints_toml().unwrap_err();
+    assert!(matches!(error, TrajectoryError::NotWaypoints { difference, .. } if difference > 0.1), "{error}");
+}

@@ -14,6 +14,7 @@ use crate::caveat::{self, Caveat};
 use crate::drive_entry::DriveKind;
 use crate::error::Error;
 use crate::motion::Motion;
+use crate::motion_formats::{self, MotionFile, MotionOptions};
 use crate::options::{LinkModel, Modelling};
 use crate::posed::Posed;
 use crate::robot::{LoadOptions, Robot};
@@ -97,13 +98,24 @@ pub fn check_with_loads(
     loads: Option<&Path>,
     options: &LoadOptions,
 ) -> Vec<Finding> {
+    check_with_motion(robot, trajectory, &MotionOptions::default(), loads, options)
+}
+
+/// As [`check_with_loads`], with the topic of a bag or the columns of a table told.
+pub fn check_with_motion(
+    robot: &Path,
+    trajectory: Option<&Path>,
+    motion_options: &MotionOptions,
+    loads: Option<&Path>,
+    options: &LoadOptions,
+) -> Vec<Finding> {
     let mut findings = Vec::new();
     let path = robot;
     let robot = match Robot::load_with(path, options) {
         Ok(robot) => robot,
         Err(error) => {
             load_findings(&error, path, &mut findings);
-            findings.extend(trajectory.and_then(motion_without_robot));
+            findings.extend(trajectory.and_then(|path| motion_without_robot(path, motion_options)));
             return findings;
         }
     };
@@ -117,7 +129,7 @@ pub fn check_with_loads(
             findings.push(Finding::error("missing-file", path.display().to_string(), &message));
             None
         }
-        (Some(path), _) => check_motion(&robot, path, &mut findings),
+        (Some(path), _) => check_motion(&robot, path, motion_options, &mut findings),
         // Its own faults are told when it is asked for.
         (None, Some(own)) => robot.rigid_model().ok().and_then(|model| {
             let motion = crate::Motion::load(own, &robot).ok()?;
@@ -156,10 +168,11 @@ fn check_loads(robot: &Robot, motion: Option<&Motion>, path: &Path, findings: &m
 }
 
 /// What is wrong with a motion whose robot cannot be loaded; limits that the robot would give are not missed.
-fn motion_without_robot(path: &Path) -> Option<Finding> {
-    let error = flexarm_trajectory::Trajectory::from_path(path, &[]).err()?;
+fn motion_without_robot(path: &Path, options: &MotionOptions) -> Option<Finding> {
+    let file = MotionFile { path, joints: None, limits: &[], options, cell: None };
+    let error = motion_formats::read(&file).err()?;
     let missed = |file: &FileError| matches!(file.problem, Problem::Plan(PlanError::MissingLimit { .. }));
-    let follows = matches!(&error, TrajectoryError::File(file) if missed(file));
+    let follows = matches!(&error, Error::Trajectory(TrajectoryError::File(file)) if missed(file));
     (!follows).then(|| Finding::error("trajectory", path.display().to_string(), &error))
 }
 
@@ -249,9 +262,9 @@ impl Pose {
 }
 
 /// The motion, if it can be used, with its findings.
-fn check_motion(robot: &Robot, path: &Path, findings: &mut Vec<Finding>) -> Option<Motion> {
+fn check_motion(robot: &Robot, path: &Path, options: &MotionOptions, findings: &mut Vec<Finding>) -> Option<Motion> {
     let file = || path.display().to_string();
-    match crate::Motion::load(path, robot) {
+    match crate::Motion::load_with(path, robot, options) {
         Err(error) => {
             findings.push(Finding::error("trajectory", file(), &error));
             None

@@ -71,6 +71,9 @@ pub enum Error {
     /// Something in the trajectory.
     #[error(transparent)]
     Trajectory(#[from] flexarm_trajectory::TrajectoryError),
+    /// A robot program that cannot be read.
+    #[error(transparent)]
+    Program(#[from] Box<flexarm_programs::ProgramError>),
     /// A path of the tool that the arm cannot follow.
     #[error("{}: {source}", path.display())]
     Path {
@@ -79,6 +82,9 @@ pub enum Error {
         /// Where and why.
         source: Box<flexarm_path::PathError>,
     },
+    /// Something in a motion of another program.
+    #[error(transparent)]
+    Motion(#[from] flexarm_motion_io::MotionError),
     /// The trajectory asks for more than the joints can do.
     #[error(
         "{}: the trajectory passes {} joint limits:\n  {}\nslow it down, change it, or go on anyway with {}",

@@ -61,6 +61,8 @@ mod mode_recording;
 mod modes;
 mod monitor;
 mod motion;
+mod motion_formats;
+mod motion_report;
 mod operating_points;
 mod options;
 mod payload;
@@ -88,7 +90,7 @@ pub use applied_load::AppliedLoad;
 pub use arm::{Arm, Run};
 pub use bends::Bend;
 pub use caveat::{Caveat, Severity};
-pub use check::{Finding, check, check_with_loads};
+pub use check::{Finding, check, check_with_loads, check_with_motion};
 pub use convert::{ConvertOptions, ConvertSummary, convert, convert_until, parse_recording_format, read_run};
 pub use deflections::Variation;
 pub use drive_entry::{Drive, DriveKind};
@@ -103,6 +105,8 @@ pub use mode_recording::{ModeMovie, record_modes};
 pub use modes::{ModeFigures, ModeTable, modes};
 pub use monitor::tool_path::{PathFigures, PathMoveFigures};
 pub use motion::{HeldJoint, Motion};
+pub use motion_formats::MotionOptions;
+pub use motion_report::{MotionCurve, MotionFiles, MotionPeak, MotionReport, MotionViolation, motion_report};
 pub use operating_points::OperatingPoints;
 pub use options::{DriveModel, LinkModel, Modelling, Outputs, RunOptions};
 pub use payload::PayloadChange;
@@ -132,6 +136,7 @@ pub use flexarm_files::FileError;
 pub use flexarm_kinematics::{LinkInertia, Pose, Wrench};
 pub use flexarm_linkmaker::{ImportError, JobError, LinkError, export, import};
 pub use flexarm_log::{Column, Columns, FormatInfo, Holds, RecordingFormat, Sample, Trace};
+pub use flexarm_motion_io::MotionError;
 pub use flexarm_path::{PathError, PlannedMove, Slowed, SlowedBy};
 pub use flexarm_settings::{Names, Setting, name_settings};
 pub use flexarm_stepping::{
@@ -139,5 +144,5 @@ pub use flexarm_stepping::{
     STEPPERS, SpookPreset, SpookSettings, Start, StepError, StepRule, StepperEntry, StepperKind, StepperOptions,
     StepperSetting, TimedWrench, ToolDeflection,
 };
-pub use flexarm_trajectory::{Trajectory, TrajectoryError};
+pub use flexarm_trajectory::{ColumnMap, ColumnMapError, Trajectory, TrajectoryError};
 pub use flexarm_urdf::{InertiaEstimate, ReadOptions, closest, search_paths_from_environment};

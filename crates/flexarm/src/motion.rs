@@ -5,13 +5,13 @@ use std::sync::Arc;
 
 use flexarm_kinematics::{Coordinate, Model};
 use flexarm_stepping::PrescribedMotion;
-use flexarm_trajectory::{JointLimits, JointSamples, LimitViolation, Samples, Trajectory};
-use flexarm_urdf::closest;
+use flexarm_trajectory::{JointLimits, JointSamples, KnownJoint, LimitViolation, Samples, Trajectory};
 
 use crate::caveat::{self, Caveat};
 use crate::error::{Error, PoseError, ValueError};
+use crate::motion_formats::{self, MotionFile, MotionOptions, ReadMotion, unknown_joints};
 use crate::robot::Robot;
-use crate::tool_path::{Cell, ToolPath, is_path_file, read_path_file};
+use crate::tool_path::{Cell, ToolPath};
 
 /// A trajectory whose joints are the model's actuated coordinates.
 #[derive(Clone, Debug)]
@@ -32,6 +32,16 @@ pub struct Motion {
     pub held: Vec<HeldJoint>,
     /// What became of each move, of a motion that is told by the path of the tool.
     pub tool_path: Option<Arc<ToolPath>>,
+    /// What the file is, in words; empty for a motion that was made.
+    pub format: String,
+    /// The topic of a bag.
+    pub topic: Option<String>,
+    /// Rows, messages or points of the file; none for waypoints.
+    pub samples: Option<usize>,
+    /// Joints of messages that the robot does not have; they are left out.
+    pub dropped: Vec<String>,
+    /// What was chosen, assumed and left out when the file was read.
+    pub notes: Vec<Caveat>,
 }
 
 /// A joint that a motion does not name.
@@ -71,13 +81,23 @@ fn limits(model: &Model) -> Vec<JointLimits> {
 }
 
 impl Motion {
-    /// Reads a motion file for a robot. A joint that it does not name stays where the robot file says, else at zero, or at the
-    /// limit nearest to it.
+    /// Reads a motion file for a robot, of any format that `docs/motions.md` has. A joint that it does not name stays where
+    /// the robot file says, else at zero, or at the limit nearest to it.
     ///
     /// # Errors
-    /// [`Error::File`] or [`Error::Trajectory`]: format, units, times, joints that the robot does not have; [`Error::Model`].
+    /// [`Error::File`], [`Error::Trajectory`] or [`Error::Motion`]: format, units, times, joints that the robot does not have;
+    /// [`Error::Model`].
     pub fn load(path: impl AsRef<Path>, robot: &Robot) -> Result<Self, Error> {
-        Self::read(path.as_ref(), &*robot.rigid_model()?, Some(&robot.tcp.0), &robot.hold)
+        Self::load_with(path, robot, &MotionOptions::default())
+    }
+
+    /// As [`Motion::load`], with the topic of a bag or the columns of a table told.
+    ///
+    /// # Errors
+    /// As [`Motion::load`], and for a topic or columns that are not there.
+    pub fn load_with(path: impl AsRef<Path>, robot: &Robot, options: &MotionOptions) -> Result<Self, Error> {
+        let model = robot.rigid_model()?;
+        Self::read(path.as_ref(), &Cell { model: &model, tcp_link: Some(&robot.tcp.0), hold: &robot.hold }, options)
     }
 
     /// As [`Motion::load`], for a model alone.
@@ -85,7 +105,7 @@ impl Motion {
     /// # Errors
     /// As [`Motion::load`].
     pub fn load_for(path: &Path, model: &Model) -> Result<Self, Error> {
-        Self::read(path, model, None, &[])
+        Self::read(path, &Cell { model, tcp_link: None, hold: &[] }, &MotionOptions::default())
     }
 
     /// The motion through sampled positions, by a spline as through the rows of a CSV file.
@@ -124,20 +144,17 @@ impl Motion {
         Self::of(trajectory, Path::new(name), &*robot.rigid_model()?, &robot.hold)
     }
 
-    fn read(path: &Path, model: &Model, tcp_link: Option<&str>, hold: &[(String, f64)]) -> Result<Self, Error> {
-        if !path.is_file() {
-            let what = "there is no such trajectory file; give a .csv or .toml file".into();
-            return Err(Error::File { path: path.to_owned(), what });
-        }
-        if let Some((trajectory, tool_path)) = read_tool_path(path, &Cell { model, tcp_link, hold })? {
-            let mut motion = Self::of(trajectory, path, model, hold)?;
-            motion.warnings.extend(tool_path.notes.iter().map(|note| format!("{}: {note}", path.display())));
-            motion.tool_path = Some(Arc::new(tool_path));
-            return Ok(motion);
-        }
+    fn read(path: &Path, cell: &Cell<'_>, options: &MotionOptions) -> Result<Self, Error> {
+        let Cell { model, hold, .. } = *cell;
         let actuated = &model.coordinates()[..model.n_actuated()];
         let named: Vec<(&str, JointLimits)> = actuated.iter().map(|c| c.joint.as_str()).zip(limits(model)).collect();
-        Self::of(Trajectory::from_path(path, &named)?, path, model, hold)
+        let joints: Vec<KnownJoint<'_>> =
+            actuated.iter().map(|c| KnownJoint { name: &c.joint, is_prismatic: c.kind == "prismatic" }).collect();
+        let file = MotionFile { path, joints: Some(&joints), limits: &named, options, cell: Some(cell) };
+        let read = motion_formats::read(&file)?;
+        let ReadMotion { trajectory, format, topic, samples, dropped, caveats, tool_path } = read;
+        let motion = Self::of(trajectory, path, model, hold)?;
+        Ok(Self { format, topic, samples, dropped, notes: caveats, tool_path: tool_path.map(Arc::new), ..motion })
     }
 
     fn of(trajectory: Trajectory, path: &Path, model: &Model, hold: &[(String, f64)]) -> Result<Self, Error> {
@@ -162,7 +179,23 @@ impl Motion {
         let likely = caveat::motion::degrees(&violations, model);
         let name = path.file_stem().map_or_else(|| "trajectory".into(), |s| s.to_string_lossy().into_owned());
         let (path, trajectory) = (path.to_owned(), Arc::new(trajectory));
-        Ok(Self { name, path, trajectory, violations, likely, warnings, held, tool_path: None })
+        let made = (String::new(), None, None, Vec::new(), Vec::new());
+        let (format, topic, samples, dropped, notes) = made;
+        Ok(Self {
+            name,
+            path,
+            trajectory,
+            violations,
+            likely,
+            warnings,
+            held,
+            format,
+            topic,
+            samples,
+            dropped,
+            notes,
+            tool_path: None,
+        })
     }
 
     /// The same motion with each corner, where a velocity jumps, replaced by a blend that lasts `seconds`.
@@ -183,7 +216,7 @@ impl Motion {
     pub fn caveats(&self) -> Vec<Caveat> {
         let file = self.path.display().to_string();
         let told = self.warnings.iter().map(|text| Caveat::said("trajectory", &file, text, ""));
-        told.chain(self.held_note()).collect()
+        self.notes.iter().cloned().chain(told).chain(self.held_note()).collect()
     }
 
     /// Which joints stay where, if the file does not name all: a note where the robot file says so, else a warning.
@@ -208,36 +241,10 @@ impl Motion {
     }
 }
 
-/// A motion that is told by the path of the tool, if the file is one.
-fn read_tool_path(path: &Path, cell: &Cell<'_>) -> Result<Option<(Trajectory, ToolPath)>, Error> {
-    if path.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("toml")) {
-        return Ok(None);
-    }
-    let text = flexarm_files::read_text(path)?;
-    if !is_path_file(&text) {
-        return Ok(None);
-    }
-    read_path_file(path, &text, cell).map(Some)
-}
-
 /// A motion must move joints that there are, and at least one of them.
 fn check_joints(path: &Path, moved: &[String], joints: &[&str]) -> Result<(), Error> {
-    let unknown: Vec<String> = (moved.iter().filter(|name| !joints.contains(&name.as_str())))
-        .map(|name| match closest(name, joints.iter().copied()) {
-            Some(meant) => format!("{name:?} (did you mean {meant:?}?)"),
-            None => format!("{name:?}"),
-        })
-        .collect();
-    if unknown.is_empty() {
-        return Ok(());
-    }
-    let joints = joints.iter().map(|name| format!("{name:?}")).collect::<Vec<_>>().join(", ");
-    let what = format!(
-        "the motion moves {}, which the robot does not have; its joints are {joints}: rename them in the motion, or remove \
-         them",
-        unknown.join(", ")
-    );
-    Err(Error::File { path: path.to_owned(), what })
+    let unknown: Vec<String> = moved.iter().filter(|name| !joints.contains(&name.as_str())).cloned().collect();
+    if unknown.is_empty() { Ok(()) } else { Err(unknown_joints(path, &unknown, joints)) }
 }
 
 fn warnings(trajectory: &Trajectory, path: &Path) -> Vec<String> {

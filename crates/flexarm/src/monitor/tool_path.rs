@@ -209,7 +209,12 @@ mod tests {
     /// Truth: a tool that goes along x for a second, then along y, with a sag of 2 mm and a swing along x of 1 mm behind the corner.
     #[test]
     fn sag_is_an_offset_and_a_swing_behind_the_corner_an_overshoot() {
-        let path = ToolPath { moves: vec![a_move(3, [0.0, 1.0]), a_move(4, [1.0, 2.0])], notes: Vec::new() };
+        let path = ToolPath {
+            moves: vec![a_move(3, [0.0, 1.0]), a_move(4, [1.0, 2.0])],
+            file: String::new(),
+            warnings: Vec::new(),
+            notes: Vec::new(),
+        };
         let mut monitor = ToolPathMonitor::new(Arc::new(path));
         for k in 0..=200 {
             let t = 0.01 * f64::from(k);

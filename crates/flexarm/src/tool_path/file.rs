@@ -3,17 +3,20 @@
 //! Start at [`read_path_file`]. Docs: `docs/motions.md`.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use flexarm_kinematics::Pose;
 use flexarm_kinematics::{Data, forward_kinematics};
 use flexarm_path::PathOptions;
 use flexarm_path::ProgramArm;
 use flexarm_path::program::{Blend, Configuration, Item, Move, MoveKind, Program, Speed, Target};
+use flexarm_programs::{GCodeOptions, ReadOptions, Rotary};
+use flexarm_trajectory::Trajectory;
 use nalgebra::{DVector, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
 use serde::Deserialize;
 use toml::Spanned;
 
+use super::program::plan_program;
 use super::standard::{Standard, Step};
 use super::{Cell, Overrides, ToolPath};
 use crate::error::Error;
@@ -30,6 +33,36 @@ struct PathFile {
     #[serde(rename = "move", default)]
     moves: Vec<Spanned<MoveTable>>,
     standard: Option<Spanned<StandardTable>>,
+    program: Option<Spanned<ProgramTable>>,
+}
+
+/// `[program]`: a robot program in place of moves, with what it leaves open.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ProgramTable {
+    /// Beside this file.
+    file: Spanned<PathBuf>,
+    /// Routine to start with.
+    entry: Option<String>,
+    /// Joint values at the start.
+    start: Option<Vec<f64>>,
+    /// Names that the program leaves open, with values in its language.
+    #[serde(default)]
+    given: BTreeMap<String, String>,
+    #[serde(default)]
+    waits_are_over: bool,
+    endless_passes: Option<usize>,
+    /// G-code: how the tool stands in the work frame.
+    rpy: Option<[f64; 3]>,
+    quaternion: Option<[f64; 4]>,
+    /// G-code: A, B and C tilt the tool.
+    #[serde(default)]
+    tilt: bool,
+    /// G-code: rapids are lines at this speed.
+    rapid: Option<f64>,
+    /// G-code: the tool centre point is the tip of the tool.
+    #[serde(default)]
+    tip_is_known: bool,
 }
 
 /// `[standard]`: a named motion in place of moves.
@@ -116,6 +149,9 @@ struct MoveTable {
     blend: Option<f64>,
 }
 
+/// Work frames of G-code that stand in the base of the path.
+const WORK_FRAMES: [&str; 6] = ["G54", "G55", "G56", "G57", "G58", "G59"];
+
 /// Is this text a path file and no list of waypoints?
 pub(crate) fn is_path_file(text: &str) -> bool {
     text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("path"))
@@ -173,6 +209,13 @@ pub(crate) fn read_path_file(
         X_FT: frame(&file.path.tool)?,
         arm: &arm,
     };
+    if let Some(table) = &file.program {
+        if file.standard.is_some() || !file.moves.is_empty() {
+            let message = "[program] is a motion of its own: leave out [standard] and the [[move]]s, or it";
+            return Err(source.error(table.span(), message).into());
+        }
+        return reader.program(table, &options(&file, &source)?, notes);
+    }
     let items = match &file.standard {
         None => reader.items(&file.moves)?,
         Some(standard) if file.moves.is_empty() => reader.standard(standard)?,
@@ -182,15 +225,19 @@ pub(crate) fn read_path_file(
         }
     };
     let program = Program { name: path.display().to_string(), items, ..Program::default() };
+    ToolPath::plan(path, &program, &arm, &options(&file, &source)?, notes)
+}
+
+/// How the path is resolved.
+fn options(file: &PathFile, source: &Source) -> Result<PathOptions, RobotFileError> {
     let mut options = PathOptions::default();
     if let Some(rise) = &file.path.rise {
         if !(*rise.get_ref() > 0.0 && rise.get_ref().is_finite()) {
-            return Err(source.error(rise.span(), "rise must be a positive time in s").into());
+            return Err(source.error(rise.span(), "rise must be a positive time in s"));
         }
         options.rise_s = *rise.get_ref();
     }
-    let planned = ToolPath::plan(&program, &arm, &options, notes);
-    planned.map_err(|source| Error::Path { path: path.to_owned(), source: Box::new(source) })
+    Ok(options)
 }
 
 fn units(path: &PathTable, source: &Source) -> Result<Units, RobotFileError> {
@@ -390,6 +437,74 @@ impl Reader<'_> {
             items.push(Item::Move(of));
         }
         Ok(())
+    }
+
+    /// A robot program; what it says of speeds and frames goes before what this file says.
+    fn program(
+        &self,
+        table: &Spanned<ProgramTable>,
+        resolution: &PathOptions,
+        notes: Vec<String>,
+    ) -> Result<(Trajectory, ToolPath), Error> {
+        let entry = table.get_ref();
+        let file = self.source.path.parent().unwrap_or(Path::new("")).join(entry.file.get_ref());
+        if !file.is_file() {
+            let message = format!("there is no program {}", file.display());
+            return Err(self.source.error(entry.file.span(), message).into());
+        }
+        let R = rotation(entry.rpy, entry.quaternion, self.units).map_err(|m| self.source.error(table.span(), m))?;
+        let mut gcode = GCodeOptions {
+            offsets: WORK_FRAMES.iter().map(|code| ((*code).to_owned(), self.X_WB)).collect(),
+            machine: self.X_WB,
+            rotary: if entry.tilt { Rotary::Tilt } else { Rotary::Refused },
+            rapid_m_s: entry.rapid.map(|speed| speed * self.units.length),
+            tip_is_known: entry.tip_is_known,
+            ..GCodeOptions::default()
+        };
+        gcode.R_BT = R.unwrap_or(gcode.R_BT);
+        let start = entry.start.as_ref();
+        let options = ReadOptions {
+            entry: entry.entry.clone(),
+            start: start.map(|q| q.iter().enumerate().map(|(k, value)| value * self.joint_unit(k)).collect()),
+            given: entry.given.clone().into_iter().collect(),
+            waits_are_over: entry.waits_are_over,
+            endless_passes: entry.endless_passes,
+            gcode,
+            ..ReadOptions::default()
+        };
+        let bytes = flexarm_trajectory::bytes_of_file(&file)?;
+        let mut arm = self.arm.clone();
+        if let Some(start) = &options.start {
+            if start.len() != arm.axes.len() {
+                let message =
+                    format!("start has {} values for the {} joints that move the tool", start.len(), arm.axes.len());
+                return Err(self.source.error(table.span(), message).into());
+            }
+            for (value, &k) in start.iter().zip(&self.arm.axes) {
+                arm.rest[k] = *value;
+            }
+            arm.starts_at_rest = true;
+        }
+        arm.X_FT = self.X_FT.unwrap_or(arm.X_FT);
+        let told = |program: &mut Program| self.fill(program);
+        plan_program(&file, &bytes, &arm, &options, resolution, notes, &told)
+    }
+
+    /// Speeds that the program leaves open.
+    fn fill(&self, program: &mut Program) {
+        let common = self.speed(None);
+        for item in &mut program.items {
+            let Item::Move(of) = item else { continue };
+            let speed = &mut of.speed;
+            speed.linear_m_s = speed.linear_m_s.or(common.linear_m_s);
+            speed.linear_m_s2 = speed.linear_m_s2.or(common.linear_m_s2);
+            speed.linear_m_s3 = speed.linear_m_s3.or(common.linear_m_s3);
+            speed.angular_rad_s = speed.angular_rad_s.or(common.angular_rad_s);
+            speed.angular_rad_s2 = speed.angular_rad_s2.or(common.angular_rad_s2);
+            speed.joint_fraction = speed.joint_fraction.or(common.joint_fraction);
+            let part = common.joint_acceleration_fraction;
+            speed.joint_acceleration_fraction = speed.joint_acceleration_fraction.or(part);
+        }
     }
 
     fn standard(&self, table: &Spanned<StandardTable>) -> Result<Vec<Item>, RobotFileError> {

@@ -3,19 +3,23 @@
 //! `file` reads our own path files; robot programs come as a [`Program`] from elsewhere. Both end in [`ToolPath::plan`].
 
 mod file;
+mod program;
 mod standard;
+
+use std::path::Path;
 
 use flexarm_kinematics::{Frame, Model, Pose};
 use flexarm_path::program::Program;
-use flexarm_path::{
-    JointBounds, PathError, PathOptions, PlannedMove, ProgramArm, Slowed, SlowedBy, coordinates_of, plan,
-};
+use flexarm_path::{JointBounds, PathOptions, PlannedMove, ProgramArm, Slowed, SlowedBy, coordinates_of, plan};
 use flexarm_trajectory::Trajectory;
 use nalgebra::DVector;
 
+use crate::caveat::Caveat;
+use crate::error::Error;
 use crate::robot::tcp_frame;
 
 pub(crate) use file::{is_path_file, read_path_file};
+pub(crate) use program::read_robot_program;
 
 /// A joint reaches its top speed in this time where nothing is known of its acceleration, s.
 const TO_TOP_SPEED: f64 = 0.4;
@@ -34,11 +38,16 @@ const BASE: &str = "base";
 pub struct ToolPath {
     /// Move by move.
     pub moves: Vec<PlannedMove>,
+    /// The file.
+    pub(crate) file: String,
     /// Things worth telling.
+    pub(crate) warnings: Vec<String>,
+    /// Things that may be known anyway.
     pub(crate) notes: Vec<String>,
 }
 
 /// What is known of the robot beside its model.
+#[derive(Clone, Copy)]
 pub(crate) struct Cell<'a> {
     pub(crate) model: &'a Model,
     /// Link that carries the tool centre point.
@@ -125,27 +134,27 @@ impl<'a> Cell<'a> {
 }
 
 impl ToolPath {
-    /// Joints over time for a program.
+    /// Joints over time for a program; `warnings` are what was found before.
     pub(crate) fn plan(
+        file: &Path,
         program: &Program,
         arm: &ProgramArm<'_>,
         options: &PathOptions,
-        mut notes: Vec<String>,
-    ) -> Result<(Trajectory, Self), PathError> {
-        let planned = plan(program, arm, options)?;
-        let place = |line: Option<usize>| line.map_or_else(String::new, |line| format!("line {line}: "));
-        notes.extend(program.notes.iter().map(|note| format!("{}{}", place(note.line), note.text)));
+        mut warnings: Vec<String>,
+    ) -> Result<(Trajectory, Self), Error> {
+        let planned = plan(program, arm, options)
+            .map_err(|source| Error::Path { path: file.to_owned(), source: Box::new(source) })?;
         let stops = planned.stops.iter().map(|(line, why)| format!("line {line}: no blend: {why}")).collect();
-        notes.extend(first_of(stops));
+        warnings.extend(first_of(stops));
         let held = planned.held.join(", ");
         if !held.is_empty() {
-            notes.push(format!(
+            warnings.push(format!(
                 "the arm has more joints than the path needs: {held} stay while the tool follows its path"
             ));
         }
-        notes.extend(tool_note(program, arm));
-        let slowed = planned.moves.iter().filter_map(|of| of.slowed.as_ref().map(|slowed| slowed_note(of, slowed)));
-        notes.extend(first_of(slowed.collect()));
+        warnings.extend(tool_warning(program, arm));
+        let slowed = planned.moves.iter().filter_map(|of| of.slowed.as_ref().map(|slowed| slowed_warning(of, slowed)));
+        warnings.extend(first_of(slowed.collect()));
         let near = planned.moves.iter().filter_map(|of| {
             let (sigma, t) = of.least_sigma.filter(|(sigma, _)| *sigma < NEAR_SINGULAR)?;
             Some(format!(
@@ -154,8 +163,17 @@ impl ToolPath {
                 of.line, of.statement
             ))
         });
-        notes.extend(first_of(near.collect()));
-        Ok((planned.trajectory, Self { moves: planned.moves, notes }))
+        warnings.extend(first_of(near.collect()));
+        let place = |line: Option<usize>| line.map_or_else(String::new, |line| format!("line {line}: "));
+        let notes = program.notes.iter().map(|note| format!("{}{}", place(note.line), note.text)).collect();
+        Ok((planned.trajectory, Self { moves: planned.moves, file: file.display().to_string(), warnings, notes }))
+    }
+
+    /// What is worth knowing.
+    pub(crate) fn caveats(&self) -> Vec<Caveat> {
+        let said = |text: &String| Caveat::said("tool-path", &self.file, format!("{}: {text}", self.file), "");
+        let notes = self.notes.iter().map(|text| said(text).as_note());
+        self.warnings.iter().map(said).chain(notes).collect()
     }
 }
 
@@ -170,7 +188,7 @@ fn first_of(mut notes: Vec<String>) -> Vec<String> {
 }
 
 /// A tool of the program that is not the robot's: the error is measured at the robot's.
-fn tool_note(program: &Program, arm: &ProgramArm<'_>) -> Option<String> {
+fn tool_warning(program: &Program, arm: &ProgramArm<'_>) -> Option<String> {
     use flexarm_path::program::Item;
     let other = program.items.iter().find_map(|item| match item {
         Item::Move(of) => {
@@ -188,7 +206,7 @@ fn tool_note(program: &Program, arm: &ProgramArm<'_>) -> Option<String> {
     ))
 }
 
-fn slowed_note(of: &PlannedMove, slowed: &Slowed) -> String {
+fn slowed_warning(of: &PlannedMove, slowed: &Slowed) -> String {
     let by = match &slowed.by {
         SlowedBy::JointSpeed(joint) => format!("the speed of joint {joint:?}"),
         SlowedBy::JointAcceleration(joint) => format!("the acceleration of joint {joint:?}"),

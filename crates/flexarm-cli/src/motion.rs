@@ -1,0 +1,183 @@
+//! `flexarm motion`: what is in a motion, against the limits of a robot.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+use comfy_table::CellAlignment;
+use flexarm::{ColumnMap, MotionCurve, MotionOptions, MotionPeak, MotionReport, Robot};
+
+use crate::args::{Cli, RobotArgs};
+use crate::failure::Failure;
+use crate::print::{lines, table, warning};
+use crate::{answer, load_options, shipped, to_json};
+
+/// Letters of a curve in the terminal.
+const WIDTH: usize = 60;
+const LEVELS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
+
+/// What is said about a motion file beside its path.
+#[derive(Clone, Debug, Default, Args)]
+#[command(next_help_heading = "Motion")]
+pub(crate) struct MotionInputArgs {
+    /// Topic of a bag that holds the motion [default: the one that moves most joints of the robot, and told]
+    #[arg(long, value_name = "TOPIC")]
+    pub(crate) topic: Option<String>,
+    /// Columns of a table: t=Time[s],joint_1=A1[deg]; a column by its name, with another unit, or by number (#2[rad])
+    #[arg(long, value_name = "JOINT=COLUMN,...")]
+    pub(crate) columns: Option<ColumnMap>,
+}
+
+impl MotionInputArgs {
+    pub(crate) fn options(&self) -> MotionOptions {
+        MotionOptions { topic: self.topic.clone(), columns: self.columns.clone() }
+    }
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct MotionArgs {
+    /// Motion file of any format (flexarm format motion), or the name of a shipped one
+    pub(crate) motion: PathBuf,
+    /// robot.toml, a folder with one, a .urdf or .xacro file, or the name of a shipped robot: its limits, its torques, the
+    /// way of its tool [default: the values of the joints alone]
+    pub(crate) robot: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) input: MotionInputArgs,
+    #[command(flatten)]
+    pub(crate) load: RobotArgs,
+    /// Write the motion to this file, by its ending: .csv (samples), .toml (waypoints), .yaml or .json (JointTrajectory of
+    /// ROS), .svg (curves); may be repeated
+    #[arg(short, long, help_heading = "Files", value_name = "FILE")]
+    pub(crate) output: Vec<PathBuf>,
+    /// Draw positions, speeds and torques over time (SVG)
+    #[arg(long, help_heading = "Files", value_name = "FILE")]
+    pub(crate) svg: Option<PathBuf>,
+    /// Rows or points per second of what is written
+    #[arg(long, help_heading = "Files", value_name = "HZ", default_value_t = 500.0, allow_hyphen_values = true)]
+    pub(crate) rate: f64,
+    /// Overwrite files that are there
+    #[arg(long, help_heading = "Files")]
+    pub(crate) force: bool,
+}
+
+pub(crate) fn run(cli: &Cli, args: &MotionArgs) -> Result<ExitCode, Failure> {
+    let mut outputs = args.output.clone();
+    if let Some(svg) = &args.svg {
+        let is_svg = svg.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("svg"));
+        if !is_svg {
+            return Err(Failure::Usage(format!("--svg writes a file .svg, found {}", svg.display())));
+        }
+        outputs.push(svg.clone());
+    }
+    let robot = match &args.robot {
+        Some(given) => Some(Robot::load_with(&shipped::robot(Some(given))?, &load_options(&args.load)?)?),
+        None => None,
+    };
+    let motion = shipped::trajectory(&args.motion);
+    let options = args.input.options();
+    let report = flexarm::motion_report(&motion, robot.as_ref(), &options, &outputs, args.rate, args.force)?;
+    if !cli.quiet {
+        report.warnings.iter().for_each(|text| warning(text));
+    }
+    answer(cli, || to_json(&report), || text(&report));
+    Ok(ExitCode::SUCCESS)
+}
+
+fn text(report: &MotionReport) -> String {
+    let robot = report.robot.as_ref().map_or_else(String::new, |robot| format!(" on {robot}"));
+    let mut out = format!("{}{robot}: {}", report.motion, report.format);
+    out += &report.topic.as_ref().map_or_else(String::new, |topic| format!(", topic {topic}"));
+    out += &format!("\n{} s, {} joints", rounded(report.duration_s), report.joints.len());
+    out += &report.samples.map_or_else(String::new, |samples| format!(", {samples} samples"));
+    if let (Some(length), Some(speed)) = (report.tcp_length_m, report.tcp_speed_m_s) {
+        out += &format!("; way of the tool {length:.4} m, up to {:.1} mm/s", 1e3 * speed);
+    }
+    out += "\n\n";
+    out += &peaks(&report.peaks);
+    out += "\n";
+    out += &curves(&report.curves, &report.peaks);
+    if report.robot.is_some() {
+        match report.violations.len() {
+            0 => out += "\nall limits are kept\n",
+            n => out += &format!("\n{n} limits are passed\n"),
+        }
+    }
+    for violation in &report.violations {
+        out += &format!("  {}\n", violation.message);
+    }
+    for note in &report.notes {
+        out += &format!("note: {note}\n");
+    }
+    for file in &report.files.motions {
+        out += &format!("motion   {file}\n");
+    }
+    for file in &report.files.plots {
+        out += &format!("plot     {file}\n");
+    }
+    out
+}
+
+/// A number with the digits that a person reads.
+fn rounded(value: f64) -> String {
+    let text = format!("{value:.4}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
+/// Angles in degrees, with the part of the limit that is used.
+fn peaks(peaks: &[MotionPeak]) -> String {
+    let with_torque = peaks.iter().any(|peak| peak.torque.is_some());
+    let mut header = vec!["joint", "", "from", "to", "speed", "acceleration", "jerk"];
+    if with_torque {
+        header.push("torque");
+    }
+    let mut t = table(&header);
+    for peak in peaks {
+        let (unit, factor) = if peak.unit == "rad" { ("deg", 1f64.to_degrees()) } else { (peak.unit, 1.0) };
+        let used = |value: f64, limit: Option<f64>| match limit {
+            Some(limit) if limit > 0.0 => format!(" ({:.0} %)", 100.0 * value.abs() / limit),
+            _ => String::new(),
+        };
+        let mut row = vec![
+            peak.joint.clone(),
+            unit.to_owned(),
+            rounded(factor * peak.lower),
+            rounded(factor * peak.upper),
+            format!("{}{}", rounded(factor * peak.speed), used(peak.speed, peak.speed_limit)),
+            rounded(factor * peak.acceleration),
+            rounded(factor * peak.jerk),
+        ];
+        if with_torque {
+            let torque = peak.torque.unwrap_or(0.0);
+            row.push(format!("{torque:.1}{}", used(torque, peak.torque_limit)));
+        }
+        t.add_row(row);
+    }
+    for k in 2..header.len() {
+        if let Some(column) = t.column_mut(k) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    let note = if with_torque {
+        "peaks per s, s², s³; in brackets the part of the limit; torque in N m (forces in N) of the rigid robot with payload\n"
+    } else {
+        "peaks per s, s², s³\n"
+    };
+    lines(&t) + note
+}
+
+/// A line per joint: its position over time, each from its least to its greatest.
+fn curves(curves: &[MotionCurve], peaks: &[MotionPeak]) -> String {
+    let longest = curves.iter().map(|curve| curve.joint.chars().count()).max().unwrap_or(0);
+    let mut out = String::new();
+    for (curve, peak) in curves.iter().zip(peaks) {
+        let (low, range) = (peak.lower, peak.upper - peak.lower);
+        let letter = |i: usize| {
+            let place = i * (curve.position.len() - 1) / (WIDTH - 1);
+            let part = if range > 0.0 { (curve.position[place] - low) / range } else { 0.0 };
+            LEVELS[((part * LEVELS.len() as f64) as usize).min(LEVELS.len() - 1)]
+        };
+        let drawn: String = if curve.position.is_empty() { String::new() } else { (0..WIDTH).map(letter).collect() };
+        out += &format!("{:<longest$}  {drawn}\n", curve.joint);
+    }
+    out
+}

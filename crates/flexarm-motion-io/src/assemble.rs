@@ -1,0 +1,484 @@
+//! From the messages of a topic to curves: which clock counts, what of the samples is left out, which velocities are used.
+
+use flexarm_settings::Caveat;
+use flexarm_trajectory::{JointSamples, SampleError, Samples, Trajectory, TrajectoryError};
+
+use crate::collect::{Received, Series, Topic, names_in_words};
+use crate::error::{Problem, Trouble};
+use crate::message::Point;
+
+/// Stamps that go back by no more than this are put in order (s).
+const DISORDER_S: f64 = 1.0;
+/// A repeated stamp with other positions is a slip if it is rarer than this.
+const FEW: f64 = 0.01;
+/// Trajectories of one message meet within this (rad or m).
+const MEET: f64 = 1e-3;
+/// Velocities belong to positions whose slopes differ from them by less than this part of the slopes, and this (rad/s).
+const BELONGS: [f64; 2] = [0.1, 0.02];
+
+/// A joint's samples, times in s since a time of all joints. Rates that are not told are NaN.
+#[derive(Debug, Default)]
+struct Line {
+    joint: String,
+    t: Vec<f64>,
+    q: Vec<f64>,
+    v: Vec<f64>,
+    a: Vec<f64>,
+}
+
+/// A trajectory with what is to be said of it.
+pub(crate) struct Assembled {
+    pub(crate) trajectory: Trajectory,
+    pub(crate) samples: usize,
+    pub(crate) caveats: Vec<Caveat>,
+}
+
+/// The curves of a topic.
+///
+/// * `file`: for caveats.
+/// * `has_clock`: whether the times of reception are known.
+pub(crate) fn assemble(topic: Topic, file: &str, has_clock: bool) -> Result<Assembled, Trouble> {
+    let mut told = Told { file, caveats: Vec::new() };
+    let lines = if topic.received.is_empty() {
+        states(topic, has_clock, &mut told)?
+    } else {
+        plans(topic, has_clock, &mut told)?
+    };
+    let samples = lines.iter().map(|line| line.t.len()).max().unwrap_or(0);
+    let first = lines.iter().filter_map(|line| line.t.first()).fold(f64::INFINITY, |first, t| first.min(*t));
+    let last = lines.iter().filter_map(|line| line.t.last()).fold(f64::NEG_INFINITY, |last, t| last.max(*t));
+    if !(last > first) {
+        let found = samples.min(1);
+        return Err(Trouble::from(TrajectoryError::Samples(SampleError::TooFew { found })));
+    }
+    tell_ends(&lines, first, last, &mut told);
+    let parts = lines.iter().map(|line| line.curve(first, last)).collect::<Result<Vec<_>, _>>()?;
+    let trajectory = Trajectory::side_by_side(&parts)?;
+    Ok(Assembled { trajectory, samples, caveats: told.caveats })
+}
+
+/// Collects caveats about one file.
+struct Told<'a> {
+    file: &'a str,
+    caveats: Vec<Caveat>,
+}
+
+impl Told<'_> {
+    fn warn(&mut self, code: &str, message: &str, help: &str) {
+        self.caveats.push(Caveat::said(code, self.file, format!("{}: {message}", self.file), help));
+    }
+
+    fn note(&mut self, code: &str, message: &str) {
+        self.caveats.push(Caveat::said(code, self.file, format!("{}: {message}", self.file), "").as_note());
+    }
+}
+
+impl Line {
+    /// Its curve, and when it begins. A joint that was told once stays there.
+    fn curve(&self, first: f64, last: f64) -> Result<(f64, Trajectory), TrajectoryError> {
+        let known = |rates: &Vec<f64>| rates.iter().all(|rate| rate.is_finite()).then(|| rates.clone());
+        let velocity = known(&self.v);
+        let acceleration = velocity.is_some().then(|| known(&self.a)).flatten();
+        let name = self.joint.clone();
+        if let ([_], [q]) = (&self.t[..], &self.q[..]) {
+            let joint = JointSamples { name, position: vec![*q; 2], ..JointSamples::default() };
+            return Ok((0.0, Samples { times: vec![first, last], joints: vec![joint] }.interpolate()?));
+        }
+        let joint = JointSamples { name, position: self.q.clone(), velocity, acceleration };
+        let start = self.t[0] - first;
+        Ok((start, Samples { times: self.t.clone(), joints: vec![joint] }.interpolate()?))
+    }
+
+    fn push(&mut self, t: f64, q: f64, v: f64, a: f64) {
+        self.t.push(t);
+        self.q.push(q);
+        self.v.push(v);
+        self.a.push(a);
+    }
+
+    fn truncate(&mut self, length: usize) {
+        self.t.truncate(length);
+        self.q.truncate(length);
+        self.v.truncate(length);
+        self.a.truncate(length);
+    }
+}
+
+/// Joints that begin later or end earlier than others by more than two of their own steps.
+fn tell_ends(lines: &[Line], first: f64, last: f64, told: &mut Told<'_>) {
+    let mut late = Vec::new();
+    for line in lines.iter().filter(|line| line.t.len() > 1) {
+        let (begin, end) = (line.t[0], line.t[line.t.len() - 1]);
+        let step = (end - begin) / (line.t.len() - 1) as f64;
+        if begin - first > 2.0 * step || last - end > 2.0 * step {
+            late.push(format!("{:?} from {:.3} to {:.3} s", line.joint, begin - first, end - first));
+        }
+    }
+    if !late.is_empty() {
+        let what = format!("joints that are not told all the time are held before and after: {}", late.join(", "));
+        told.warn("motion-ends", &what, "cut the recording to the time that all joints share");
+    }
+    let once: Vec<String> = lines.iter().filter(|line| line.t.len() == 1).map(|line| line.joint.clone()).collect();
+    if !once.is_empty() {
+        told.note("motion-ends", &format!("told only once, and held there: {}", names_in_words(&once)));
+    }
+}
+
+// ------------------------------------------------------------------------------------------------------------------ states
+
+/// Lines of joints from their states.
+fn states(mut topic: Topic, has_clock: bool, told: &mut Told<'_>) -> Result<Vec<Line>, Trouble> {
+    let count: usize = topic.series.iter().map(|series| series.position.len()).sum();
+    if topic.without_position > 0 {
+        let what = format!("{} of {} messages have no positions and are left out", topic.without_position, topic.count);
+        told.warn("motion-positions", &what, "");
+    }
+    let mut not_finite = 0;
+    for series in &mut topic.series {
+        not_finite += series.drop_what_is_not_finite();
+    }
+    topic.series.retain(|series| !series.position.is_empty());
+    if topic.series.is_empty() {
+        return Err(Trouble::new(Problem::NoPositions));
+    }
+    if not_finite > 0 {
+        let what =
+            format!("{not_finite} of {count} positions are no numbers and are left out; the curves pass over them");
+        told.warn("motion-positions", &what, "look at the recording: a robot that is not connected says so");
+    }
+    let use_log = clock(&topic.series, has_clock, told)?;
+    let origin = |series: &Series| series.times(use_log).iter().copied().min().unwrap_or(i64::MAX);
+    let origin = topic.series.iter().map(origin).min().unwrap_or(0);
+
+    let (mut sorted, mut repeated, mut differ) = (0, 0, 0.0f64);
+    let mut lines = Vec::new();
+    for series in topic.series {
+        let (line, counts) = series.line(use_log, origin);
+        sorted += counts.sorted;
+        repeated += counts.repeated;
+        differ = differ.max(counts.differ);
+        lines.push(line);
+    }
+    if sorted > 0 {
+        told.note(
+            "motion-stamps",
+            &format!("{sorted} samples came out of order and were put in order by their stamps"),
+        );
+    }
+    if repeated > 0 {
+        let what = format!(
+            "{repeated} samples have the time of the one before and are left out (their positions differ by up to \
+             {differ:.3e} rad or m)"
+        );
+        if differ > 0.0 {
+            told.warn("motion-stamps", &what, "")
+        } else {
+            told.note("motion-stamps", &what)
+        };
+    }
+    judge_velocities(&mut lines, told);
+    Ok(lines)
+}
+
+/// What was done to the samples of a joint.
+struct Counts {
+    sorted: usize,
+    repeated: usize,
+    /// Largest difference of positions with one time.
+    differ: f64,
+}
+
+impl Series {
+    fn times(&self, use_log: bool) -> &[i64] {
+        if use_log { &self.log_ns } else { &self.stamp_ns }
+    }
+
+    fn drop_what_is_not_finite(&mut self) -> usize {
+        let sound: Vec<bool> = self.position.iter().map(|q| q.is_finite()).collect();
+        let dropped = sound.iter().filter(|sound| !**sound).count();
+        if dropped == 0 {
+            return 0;
+        }
+        fn keep<T: Copy>(values: &mut Vec<T>, sound: &[bool]) {
+            *values = values.iter().zip(sound).filter(|(_, sound)| **sound).map(|(value, _)| *value).collect();
+        }
+        keep(&mut self.stamp_ns, &sound);
+        keep(&mut self.log_ns, &sound);
+        keep(&mut self.position, &sound);
+        keep(&mut self.velocity, &sound);
+        keep(&mut self.acceleration, &sound);
+        dropped
+    }
+
+    /// Samples in the order of their times, each time once.
+    fn line(&self, use_log: bool, origin: i64) -> (Line, Counts) {
+        let times = self.times(use_log);
+        let mut order: Vec<usize> = (0..times.len()).collect();
+        order.sort_by_key(|&i| times[i]);
+        let sorted = times.windows(2).filter(|pair| pair[1] < pair[0]).count();
+        let mut line = Line { joint: self.joint.clone(), ..Line::default() };
+        let (mut repeated, mut differ, mut last) = (0, 0.0f64, None);
+        for i in order {
+            if last == Some(times[i]) {
+                repeated += 1;
+                differ = differ.max(line.q.last().map_or(0.0, |q| (q - self.position[i]).abs()));
+                continue;
+            }
+            last = Some(times[i]);
+            let t = times[i].saturating_sub(origin) as f64 / 1e9;
+            line.push(t, self.position[i], self.velocity[i], self.acceleration[i]);
+        }
+        (line, Counts { sorted, repeated, differ })
+    }
+}
+
+/// Whether the times of reception are taken instead of the stamps; told in any case.
+fn clock(series: &[Series], has_clock: bool, told: &mut Told<'_>) -> Result<bool, Trouble> {
+    let total: usize = series.iter().map(|series| series.stamp_ns.len()).sum();
+    let unset: usize = series.iter().map(|series| series.stamp_ns.iter().filter(|stamp| **stamp == 0).count()).sum();
+    let mut back: Option<(f64, usize, &str)> = None;
+    let mut changed = 0;
+    for series in series {
+        let mut latest = i64::MIN;
+        for (i, &stamp) in series.stamp_ns.iter().enumerate() {
+            let seconds = latest.saturating_sub(stamp) as f64 / 1e9;
+            if i > 0 && seconds > DISORDER_S && back.is_none_or(|(most, ..)| seconds > most) {
+                back = Some((seconds, i + 1, &series.joint));
+            }
+            let repeats = i > 0 && stamp == series.stamp_ns[i - 1];
+            changed += usize::from(repeats && series.position[i] != series.position[i - 1]);
+            latest = latest.max(stamp);
+        }
+    }
+    let why = if unset == total {
+        Some("the header stamps are not set".to_owned())
+    } else if unset > 0 {
+        Some(format!("{unset} of {total} header stamps are not set"))
+    } else if let Some((seconds, ..)) = back {
+        Some(format!("the header stamps jump back by {seconds:.3} s"))
+    } else if changed as f64 > FEW * total as f64 {
+        Some(format!("{changed} of {total} header stamps repeat the one before while the joint moves"))
+    } else {
+        None
+    };
+    match (why, has_clock, back) {
+        (None, ..) => {
+            if has_clock {
+                told.note("motion-clock", "times are those of the header stamps, not those of reception");
+            }
+            Ok(false)
+        }
+        (Some(why), true, _) => {
+            told.warn("motion-clock", &format!("times are those of reception: {why}"), "");
+            Ok(true)
+        }
+        (_, false, _) if unset == total && total > series.len() => Err(Trouble::new(Problem::NoStamps)),
+        (_, false, Some((seconds, number, joint))) => {
+            Err(Trouble::new(Problem::StampsJumpBack { seconds, number, joint: joint.to_owned() }))
+        }
+        (Some(why), false, None) => {
+            told.warn("motion-clock", &format!("{why}; there is no other time to go by"), "");
+            Ok(false)
+        }
+    }
+}
+
+/// Velocities that are not the slopes of the positions are not used: drivers without them send zeros.
+fn judge_velocities(lines: &mut [Line], told: &mut Told<'_>) {
+    let (mut foreign, mut partial) = (Vec::new(), Vec::new());
+    for line in lines.iter_mut().filter(|line| line.t.len() > 1) {
+        let known = line.v.iter().filter(|v| v.is_finite()).count();
+        if known == 0 {
+            continue;
+        }
+        if known < line.v.len() {
+            partial.push(format!("{:?} ({known} of {})", line.joint, line.v.len()));
+            line.v.fill(f64::NAN);
+            continue;
+        }
+        let n = (line.t.len() - 1) as f64;
+        let (mut slopes, mut misses) = (0.0, 0.0);
+        for i in 1..line.t.len() {
+            let slope = (line.q[i] - line.q[i - 1]) / (line.t[i] - line.t[i - 1]);
+            slopes += slope * slope / n;
+            misses += (slope - 0.5 * (line.v[i] + line.v[i - 1])).powi(2) / n;
+        }
+        let (slope, miss) = (f64::sqrt(slopes), f64::sqrt(misses));
+        if miss > BELONGS[0] * slope + BELONGS[1] {
+            foreign.push(format!("{:?} ({miss:.3} of {slope:.3} rad/s)", line.joint));
+            line.v.fill(f64::NAN);
+        }
+    }
+    if !foreign.is_empty() {
+        let what = format!(
+            "velocities that are not those of the positions are not used (mean difference and mean slope): {}",
+            foreign.join(", ")
+        );
+        told.warn("motion-velocities", &what, "");
+    }
+    tell_partial(&partial, told);
+}
+
+fn tell_partial(partial: &[String], told: &mut Told<'_>) {
+    if !partial.is_empty() {
+        let what = format!("rates that are not numbers at every sample are not used: {}", partial.join(", "));
+        told.warn("motion-velocities", &what, "");
+    }
+}
+
+// ------------------------------------------------------------------------------------------------------------------- plans
+
+/// Lines of joints from the points of trajectories. Each message begins at its stamp, else when it was received, else when
+/// the one before is over, and takes the place of what is left of the one before.
+fn plans(topic: Topic, has_clock: bool, told: &mut Told<'_>) -> Result<Vec<Line>, Trouble> {
+    let mut lines: Vec<Line> =
+        topic.series.iter().map(|series| Line { joint: series.joint.clone(), ..Line::default() }).collect();
+    let messages: Vec<&Received> =
+        topic.received.iter().filter(|message| message.trajectories.iter().any(|t| !t.points.is_empty())).collect();
+    let stamp = |message: &Received| message.trajectories.first().map_or(0, |t| t.stamp_ns);
+    let by_stamp = messages.iter().all(|message| stamp(message) != 0);
+    let by_time = by_stamp || has_clock;
+    let time_ns = |message: &Received| if by_stamp { stamp(message) } else { message.log_ns };
+    let origin = messages.first().map_or(0, |message| time_ns(message));
+
+    let (mut end, mut segments) = (0.0f64, 0);
+    for (k, message) in messages.iter().enumerate() {
+        let begin = if by_time { time_ns(message).saturating_sub(origin) as f64 / 1e9 } else { end };
+        if begin < 0.0 {
+            let joint = message.trajectories.first().and_then(|points| points.joints.first());
+            let (seconds, joint) = (-begin, joint.map_or_else(String::new, |joint| joint.to_string()));
+            return Err(Trouble::new(Problem::StampsJumpBack { seconds, number: k + 1, joint }));
+        }
+        if k == 0 {
+            put_start(message, &mut lines, told);
+        }
+        let mut from = begin;
+        for (i, points) in message.trajectories.iter().enumerate() {
+            segments += 1;
+            for line in &mut lines {
+                let Some(column) = points.joints.iter().position(|joint| **joint == *line.joint) else { continue };
+                if k > 0 && i == 0 {
+                    line.cut(from, points.points.first(), column);
+                }
+                line.append(from, &points.points, column, segments)?;
+            }
+            from += points.points.last().map_or(0.0, |point| point.time_s);
+        }
+        end = from;
+    }
+    tell_plan(&messages, by_stamp, has_clock, segments, told);
+    lines.retain(|line| !line.t.is_empty());
+    judge_plan(&mut lines, told);
+    Ok(lines)
+}
+
+/// Where the robot is before the first point, if it is told and the first point comes later.
+fn put_start(message: &Received, lines: &mut [Line], told: &mut Told<'_>) {
+    let Some(points) = message.trajectories.iter().find(|points| !points.points.is_empty()) else { return };
+    let first = points.points.first().map_or(0.0, |point| point.time_s);
+    if first <= 0.0 {
+        return;
+    }
+    let start = message.start.as_ref().filter(|start| start.position.len() == start.joints.len());
+    let place = |line: &Line| {
+        let start = start?;
+        let k = start.joints.iter().position(|joint| **joint == *line.joint)?;
+        start.position.get(k).copied().filter(|q| q.is_finite())
+    };
+    let places: Option<Vec<f64>> = lines.iter().map(place).collect();
+    match places {
+        Some(places) => {
+            for (line, q) in lines.iter_mut().zip(places) {
+                line.push(0.0, q, 0.0, 0.0);
+            }
+            told.note("motion-start", &format!("the robot goes from trajectory_start to the first point in {first} s"));
+        }
+        None => {
+            let what = format!(
+                "the first point is at {first} s, and where the robot is before is not in the file: the motion begins with \
+                 that point"
+            );
+            told.note("motion-start", &what);
+        }
+    }
+}
+
+impl Line {
+    /// Makes room for a message that begins at `from`: what would come later is gone, and before its first point the joint
+    /// stays where it is.
+    fn cut(&mut self, from: f64, first: Option<&Point>, column: usize) {
+        let keep = self.t.partition_point(|t| *t < from);
+        self.truncate(keep);
+        let (Some(&t), Some(&q), Some(first)) = (self.t.last(), self.q.last(), first) else { return };
+        let gap = from - t;
+        if gap <= 0.0 {
+            return;
+        }
+        let joins = first.position.get(column).is_some_and(|next| (next - q).abs() <= MEET);
+        // A hold is two steps without motion; where the message begins elsewhere at once, it goes there within the gap.
+        if first.time_s > 0.0 || joins {
+            self.push(t + 0.5 * gap, q, 0.0, 0.0);
+        }
+        if first.time_s > 0.0 {
+            self.push(from, q, 0.0, 0.0);
+        }
+    }
+
+    fn append(&mut self, from: f64, points: &[Point], column: usize, number: usize) -> Result<(), Trouble> {
+        for point in points {
+            let t = from + point.time_s;
+            let (q, last) = (point.position[column], self.t.last().copied());
+            if last.is_some_and(|last| t <= last) {
+                // The point at which two trajectories meet is in both.
+                let previous = self.q[self.q.len() - 1];
+                if (previous - q).abs() > MEET {
+                    let (joint, this) = (self.joint.clone(), q);
+                    return Err(Trouble::new(Problem::SegmentGap { number, joint, this, previous }));
+                }
+                continue;
+            }
+            let rate = |rates: &[f64]| rates.get(column).copied().unwrap_or(f64::NAN);
+            self.push(t, q, rate(&point.velocity), rate(&point.acceleration));
+        }
+        Ok(())
+    }
+}
+
+fn tell_plan(messages: &[&Received], by_stamp: bool, has_clock: bool, segments: usize, told: &mut Told<'_>) {
+    if messages.len() > 1 {
+        let begin = match (by_stamp, has_clock) {
+            (true, _) => "its header stamp",
+            (false, true) => "its reception (its header stamp is not set)",
+            (false, false) => "the end of the one before (nothing says when they were sent)",
+        };
+        let what = format!(
+            "{} trajectories: each begins at {begin} and takes the place of what is left of the one before",
+            messages.len()
+        );
+        told.warn("motion-messages", &what, "");
+    } else if segments > 1 {
+        told.note("motion-messages", &format!("{segments} trajectories of one message run one after another"));
+    }
+}
+
+/// Which rates of the points are used.
+fn judge_plan(lines: &mut [Line], told: &mut Told<'_>) {
+    let mut partial = Vec::new();
+    let mut without = true;
+    for line in lines {
+        for (what, rates) in [("velocities", &mut line.v), ("accelerations", &mut line.a)] {
+            let known = rates.iter().filter(|rate| rate.is_finite()).count();
+            without &= known == 0;
+            if known > 0 && known < rates.len() {
+                partial.push(format!("{what} of {:?} ({known} of {})", line.joint, rates.len()));
+                rates.fill(f64::NAN);
+            }
+        }
+    }
+    tell_partial(&partial, told);
+    if without {
+        let what = "the points have no velocities: the joints follow a smooth spline through them, where a controller of ROS goes \
+             straight from point to point";
+        told.note("motion-velocities", what);
+    }
+}

@@ -1,0 +1,305 @@
+//! Messages by topic and joint: what of them is kept, and which topic is taken.
+
+use std::collections::HashMap;
+use std::rc::Rc;
+
+use crate::Request;
+use crate::cdr::{Encoding, decode};
+use crate::definition::{Definitions, plain_name};
+use crate::error::{Problem, Trouble, list};
+use crate::message::{Message, Points, State, motion_of};
+use crate::value::Node;
+
+/// Most positions of all topics together: with times, velocities and accelerations half a gigabyte.
+const MOST_POSITIONS: usize = 12_000_000;
+/// Names of joints that nobody asked for, kept for messages.
+const MOST_FOREIGN: usize = 1000;
+
+/// What a joint does on a topic, message by message. What is not told is NaN.
+#[derive(Debug, Default)]
+pub(crate) struct Series {
+    pub(crate) joint: String,
+    /// `header.stamp`, ns; 0 if it is not set.
+    pub(crate) stamp_ns: Vec<i64>,
+    /// Time of reception, ns; 0 in texts.
+    pub(crate) log_ns: Vec<i64>,
+    pub(crate) position: Vec<f64>,
+    pub(crate) velocity: Vec<f64>,
+    pub(crate) acceleration: Vec<f64>,
+}
+
+/// Trajectories of one message, with the time of its reception (ns).
+#[derive(Debug)]
+pub(crate) struct Received {
+    pub(crate) log_ns: i64,
+    pub(crate) trajectories: Vec<Points>,
+    pub(crate) start: Option<State>,
+}
+
+/// A topic, or a text.
+#[derive(Debug, Default)]
+pub(crate) struct Topic {
+    pub(crate) name: String,
+    /// Type of its messages, as the file says it.
+    pub(crate) message: String,
+    /// How its messages are read; `None` if they hold no motion.
+    pub(crate) reader: Option<(Encoding, Rc<Definitions>)>,
+    /// Messages seen.
+    pub(crate) count: usize,
+    pub(crate) series: Vec<Series>,
+    places: HashMap<Rc<str>, Option<usize>>,
+    /// Joints that nobody asked for.
+    pub(crate) foreign: Vec<String>,
+    pub(crate) received: Vec<Received>,
+    /// Which field the positions of states come from.
+    pub(crate) of: &'static str,
+    /// States without a position for each joint that is wanted.
+    pub(crate) without_position: usize,
+    /// Why a message of it could not be read.
+    pub(crate) trouble: Option<Trouble>,
+}
+
+/// All topics of a file.
+#[derive(Debug)]
+pub(crate) struct Collector<'a> {
+    request: Request<'a>,
+    pub(crate) topics: Vec<Topic>,
+    positions: usize,
+}
+
+impl<'a> Collector<'a> {
+    pub(crate) fn new(request: Request<'a>) -> Self {
+        Self { request, topics: Vec::new(), positions: 0 }
+    }
+
+    /// The number of a topic; a new one if there is none of this name and type yet.
+    ///
+    /// * `definition`: of its messages, as the file has it.
+    pub(crate) fn topic(&mut self, name: &str, message: &str, encoding: &str, definition: Option<&str>) -> usize {
+        if let Some(known) = self.topics.iter().position(|topic| topic.name == name && topic.message == message) {
+            return known;
+        }
+        let reader = reader(message, encoding, definition);
+        let (name, message) = (name.to_owned(), message.to_owned());
+        self.topics.push(Topic { name, message, reader, ..Topic::default() });
+        self.topics.len() - 1
+    }
+
+    /// Whether a topic was asked for.
+    pub(crate) fn asked(&self) -> bool {
+        self.request.topic.is_some()
+    }
+
+    /// Whether messages of a topic are worth to be unpacked.
+    pub(crate) fn wants(&self, topic: usize) -> bool {
+        let Some(topic) = self.topics.get(topic) else { return false };
+        let asked = self.request.topic.is_none_or(|asked| same_topic(asked, &topic.name));
+        asked && topic.reader.is_some() && topic.trouble.is_none()
+    }
+
+    /// Counts a message and keeps what it says. What is wrong with it is told only if its topic is the one that is taken.
+    ///
+    /// # Errors
+    /// [`Problem::TooManyNumbers`].
+    pub(crate) fn bytes(&mut self, index: usize, log_ns: i64, bytes: &[u8]) -> Result<(), Trouble> {
+        let Some(topic) = self.topics.get_mut(index) else { return Ok(()) };
+        topic.count += 1;
+        if !self.wants(index) {
+            return Ok(());
+        }
+        let topic = &mut self.topics[index];
+        let Some((encoding, definitions)) = topic.reader.clone() else { return Ok(()) };
+        let taken = match decode(bytes, encoding, &definitions) {
+            Ok(node) => self.node(index, log_ns, &node),
+            Err(what) => {
+                let message = topic.message.clone();
+                Err(Trouble::new(Problem::Message { message, what }))
+            }
+        };
+        let topic = &mut self.topics[index];
+        if let Err(trouble) = taken {
+            topic.trouble = Some(trouble.in_message(&topic.name, topic.count));
+        }
+        if self.positions > MOST_POSITIONS {
+            return Err(Trouble::new(Problem::TooManyNumbers { most: MOST_POSITIONS }));
+        }
+        Ok(())
+    }
+
+    /// Keeps what a tree says.
+    ///
+    /// # Errors
+    /// What is wrong with its motion.
+    pub(crate) fn node(&mut self, index: usize, log_ns: i64, node: &Node) -> Result<(), Trouble> {
+        let topic = &mut self.topics[index];
+        match motion_of(node)? {
+            None => {}
+            Some(Message::State(state)) => self.positions += topic.state(log_ns, &state, self.request.joints)?,
+            Some(Message::Trajectories(trajectories, start)) => {
+                for points in &trajectories {
+                    self.positions += points.points.len() * points.joints.len();
+                    for joint in &points.joints {
+                        topic.place(joint, self.request.joints);
+                    }
+                }
+                topic.received.push(Received { log_ns, trajectories, start });
+            }
+        }
+        Ok(())
+    }
+
+    /// The topic to take, and others that could be.
+    ///
+    /// # Errors
+    /// [`Problem::NoTopic`], [`Problem::Topic`], what is wrong with a message of the topic, [`Problem::NoJoint`].
+    pub(crate) fn choose(mut self) -> Result<(Topic, Vec<String>), Trouble> {
+        let all: Vec<String> = self.topics.iter().map(Topic::described).collect();
+        let readable = |topics: &[Topic]| -> Vec<String> {
+            topics.iter().filter(|topic| topic.has_motion()).map(Topic::described).collect()
+        };
+        if let Some(asked) = self.request.topic {
+            let asked_for = |topic: &&Topic| same_topic(asked, &topic.name);
+            let others: Vec<String> =
+                self.topics.iter().filter(|topic| topic.reader.is_some()).map(Topic::described).collect();
+            let fail = |what: &str| {
+                let (asked, what) = (asked.to_owned(), what.to_owned());
+                Err(Trouble::new(Problem::Topic { asked, what, readable: joined(&others) }))
+            };
+            match self.topics.iter().find(asked_for) {
+                None => return fail("is not in the file"),
+                Some(topic) if topic.reader.is_none() => {
+                    return fail(&format!("has messages of the type {}, which hold no motion", topic.message));
+                }
+                Some(topic) if topic.count == 0 => return fail("has no messages"),
+                Some(_) => {}
+            }
+        }
+        // Of several: the one that moves most joints, then what a robot did before what it was told, then the longest.
+        let rank = |topic: &Topic| {
+            let matched = topic.series.len();
+            let kind = if topic.received.is_empty() { 1 + usize::from(topic.of == "position") } else { 0 };
+            (matched, kind, topic.count)
+        };
+        let others = readable(&self.topics);
+        let usable = |topic: &Topic| topic.has_motion() || topic.trouble.is_some();
+        let best = (0..self.topics.len()).filter(|&i| usable(&self.topics[i])).max_by_key(|&i| {
+            let topic = &self.topics[i];
+            // Of equals the first.
+            (topic.has_motion(), rank(topic), usize::MAX - i)
+        });
+        let Some(best) = best else {
+            return Err(Trouble::new(Problem::NoTopic { found: joined(&all) }));
+        };
+        let mut topic = self.topics.swap_remove(best);
+        if let Some(trouble) = topic.trouble.take() {
+            return Err(trouble);
+        }
+        if topic.series.is_empty() {
+            let mut names = topic.foreign;
+            names.extend(self.topics.into_iter().flat_map(|topic| topic.foreign));
+            names.sort();
+            names.dedup();
+            return Err(Trouble::new(match names.is_empty() {
+                true => Problem::NoPositions,
+                false => Problem::NoJoint { names },
+            }));
+        }
+        let own = topic.described();
+        Ok((topic, others.into_iter().filter(|other| *other != own).collect()))
+    }
+}
+
+impl Topic {
+    /// Name, type and number of messages.
+    pub(crate) fn described(&self) -> String {
+        format!("{} ({}, {} messages)", self.name, self.message, self.count)
+    }
+
+    /// Whether a motion was seen, of whatever joints.
+    pub(crate) fn has_something(&self) -> bool {
+        self.has_motion() || self.without_position > 0
+    }
+
+    fn has_motion(&self) -> bool {
+        !self.series.is_empty() || !self.foreign.is_empty() || !self.received.is_empty()
+    }
+
+    /// Where a joint is kept, if it is wanted.
+    fn place(&mut self, joint: &Rc<str>, wanted: Option<&[&str]>) -> Option<usize> {
+        if let Some(place) = self.places.get(joint) {
+            return *place;
+        }
+        let place = if wanted.is_none_or(|wanted| wanted.contains(&&**joint)) {
+            self.series.push(Series { joint: joint.to_string(), ..Series::default() });
+            Some(self.series.len() - 1)
+        } else {
+            if self.foreign.len() < MOST_FOREIGN {
+                self.foreign.push(joint.to_string());
+            }
+            None
+        };
+        self.places.insert(joint.clone(), place);
+        place
+    }
+
+    /// Keeps the values of the joints that are wanted; how many there are.
+    fn state(&mut self, log_ns: i64, state: &State, wanted: Option<&[&str]>) -> Result<usize, Trouble> {
+        let places: Vec<Option<usize>> = state.joints.iter().map(|joint| self.place(joint, wanted)).collect();
+        // What is wrong with a gripper's state is nobody's matter.
+        if places.iter().all(Option::is_none) {
+            return Ok(0);
+        }
+        state.check()?;
+        if state.position.is_empty() {
+            self.without_position += 1;
+            return Ok(0);
+        }
+        self.of = state.of;
+        let mut kept = 0;
+        for (k, place) in places.into_iter().enumerate() {
+            let Some(series) = place.and_then(|place| self.series.get_mut(place)) else { continue };
+            series.stamp_ns.push(state.stamp_ns);
+            series.log_ns.push(log_ns);
+            series.position.push(state.position[k]);
+            series.velocity.push(state.velocity.get(k).copied().unwrap_or(f64::NAN));
+            series.acceleration.push(state.acceleration.get(k).copied().unwrap_or(f64::NAN));
+            kept += 1;
+        }
+        Ok(kept)
+    }
+}
+
+/// How messages are read that may hold motion.
+fn reader(message: &str, encoding: &str, definition: Option<&str>) -> Option<(Encoding, Rc<Definitions>)> {
+    let encoding = match encoding {
+        "cdr" => Encoding::Cdr,
+        "ros1" => Encoding::Ros1,
+        _ => return None,
+    };
+    let filed = definition.filter(|text| !text.trim().is_empty()).map(|text| Definitions::parse(message, text));
+    let own = filed.filter(|filed| filed.fields(&plain_name(message)).is_some_and(|fields| !fields.is_empty()));
+    let definitions = own.or_else(|| Definitions::known(message).filter(|_| encoding == Encoding::Cdr))?;
+    let fields = definitions.fields(&definitions.root)?;
+    let has = |name: &str| fields.iter().any(|field| &*field.name == name);
+    let tells = (has("name") && has("position")) || definitions.has_field(&["joint_names"]);
+    tells.then(|| (encoding, Rc::new(definitions)))
+}
+
+/// `/joint_states` and `joint_states` are one topic.
+fn same_topic(asked: &str, name: &str) -> bool {
+    asked.trim_start_matches('/') == name.trim_start_matches('/')
+}
+
+fn joined(topics: &[String]) -> String {
+    const MOST: usize = 15;
+    let mut text = topics.iter().take(MOST).cloned().collect::<Vec<_>>().join(", ");
+    if topics.len() > MOST {
+        text += &format!(", ... ({} in all)", topics.len());
+    }
+    if text.is_empty() { "none".to_owned() } else { text }
+}
+
+/// For messages.
+pub(crate) fn names_in_words(names: &[String]) -> String {
+    list(names)
+}

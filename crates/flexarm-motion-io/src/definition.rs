@@ -1,0 +1,205 @@
+//! What a message is made of: definitions of ROS as text (`ros2msg`, `ros1msg`), and those that are known without a file.
+
+use std::collections::HashMap;
+use std::rc::Rc;
+
+/// Kinds of values of a field.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Kind {
+    Bool,
+    U8,
+    I8,
+    U16,
+    I16,
+    U32,
+    I32,
+    U64,
+    I64,
+    F32,
+    F64,
+    Text,
+    /// `time` of ROS 1.
+    Time,
+    /// `duration` of ROS 1.
+    Duration,
+    Struct(String),
+    /// A kind that no motion has, such as `wstring`.
+    Other(String),
+}
+
+/// How many values a field has.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Many {
+    One,
+    Fixed(usize),
+    Sequence,
+}
+
+#[derive(Clone, Debug)]
+pub(crate) struct Field {
+    pub(crate) name: Rc<str>,
+    pub(crate) kind: Kind,
+    pub(crate) many: Many,
+}
+
+/// A message and those that it is made of, by their names without `msg`: `std_msgs/Header`.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Definitions {
+    pub(crate) root: String,
+    structs: HashMap<String, Vec<Field>>,
+}
+
+/// The types that are read where a file has no definitions. Of the state of a controller the fields up to the first point,
+/// which is the set point in all versions of the message (`desired`, later `reference`).
+const KNOWN: [(&str, &str); 7] = [
+    (
+        "sensor_msgs/JointState",
+        "std_msgs/Header header\nstring[] name\nfloat64[] position\nfloat64[] velocity\nfloat64[] effort",
+    ),
+    (
+        "trajectory_msgs/JointTrajectory",
+        "std_msgs/Header header\nstring[] joint_names\ntrajectory_msgs/JointTrajectoryPoint[] points",
+    ),
+    (
+        "trajectory_msgs/JointTrajectoryPoint",
+        "float64[] positions\nfloat64[] velocities\nfloat64[] accelerations\nfloat64[] effort\n\
+         builtin_interfaces/Duration time_from_start",
+    ),
+    (
+        "control_msgs/JointTrajectoryControllerState",
+        "std_msgs/Header header\nstring[] joint_names\ntrajectory_msgs/JointTrajectoryPoint reference",
+    ),
+    ("std_msgs/Header", "builtin_interfaces/Time stamp\nstring frame_id"),
+    ("builtin_interfaces/Time", "int32 sec\nuint32 nanosec"),
+    ("builtin_interfaces/Duration", "int32 sec\nuint32 nanosec"),
+];
+
+/// The name of a type without `msg`: `sensor_msgs/msg/JointState` is `sensor_msgs/JointState`.
+pub(crate) fn plain_name(name: &str) -> String {
+    name.replace("::", "/").replace("/msg/", "/").replace("/dds_/", "/").trim_end_matches('_').to_owned()
+}
+
+impl Definitions {
+    /// The definition of a type that is known without a file.
+    pub(crate) fn known(message: &str) -> Option<Self> {
+        let root = plain_name(message);
+        if !KNOWN[..4].iter().any(|(name, _)| *name == root) {
+            return None;
+        }
+        let structs = KNOWN.iter().map(|(name, text)| ((*name).to_owned(), fields(text, package(name)))).collect();
+        Some(Self { root, structs })
+    }
+
+    /// The definition in a file: that of the message, and after lines of `=` those of its parts, each after `MSG: name`.
+    pub(crate) fn parse(message: &str, text: &str) -> Self {
+        let root = plain_name(message);
+        let mut structs = HashMap::new();
+        let (mut name, mut body) = (root.clone(), String::new());
+        let mut close = |name: &str, body: &mut String| {
+            let found = fields(body, package(name));
+            body.clear();
+            // The first one of a name counts: a file that has the root as its own part is odd, but whole.
+            structs.entry(name.to_owned()).or_insert(found);
+        };
+        for line in text.lines() {
+            let trimmed = line.trim();
+            if trimmed.len() >= 10 && trimmed.bytes().all(|byte| byte == b'=') {
+                close(&name, &mut body);
+                name.clear();
+            } else if let Some(next) = trimmed.strip_prefix("MSG:") {
+                name = plain_name(next.trim());
+            } else {
+                body += line;
+                body.push('\n');
+            }
+        }
+        close(&name, &mut body);
+        Self { root, structs }
+    }
+
+    /// The fields of a part. A name without a package is one of ROS's own where there is no such part.
+    pub(crate) fn fields(&self, name: &str) -> Option<&[Field]> {
+        let found = self.structs.get(name).or_else(|| {
+            let (_, last) = name.rsplit_once('/')?;
+            self.structs.get(&format!("std_msgs/{last}"))
+        });
+        found.map(Vec::as_slice)
+    }
+
+    /// Whether some field of the message or of its parts has one of these names.
+    pub(crate) fn has_field(&self, names: &[&str]) -> bool {
+        self.structs.values().flatten().any(|field| names.contains(&&*field.name))
+    }
+}
+
+fn package(name: &str) -> &str {
+    name.split_once('/').map_or("", |(package, _)| package)
+}
+
+/// The fields of one message; constants and comments are none.
+fn fields(text: &str, package: &str) -> Vec<Field> {
+    let mut fields = Vec::new();
+    for line in text.lines() {
+        let line = line.split('#').next().unwrap_or_default().trim();
+        let Some((kind, rest)) = line.split_once(char::is_whitespace) else { continue };
+        let rest = rest.trim_start();
+        let end = rest.find(|c: char| c.is_whitespace() || c == '=').unwrap_or(rest.len());
+        let (name, behind) = rest.split_at(end);
+        if behind.trim_start().starts_with('=') || name.is_empty() {
+            continue;
+        }
+        let (kind, many) = match kind.strip_suffix(']').and_then(|kind| kind.rsplit_once('[')) {
+            None => (kind, Many::One),
+            Some((kind, count)) => (kind, count.parse().map_or(Many::Sequence, Many::Fixed)),
+        };
+        fields.push(Field { name: name.into(), kind: kind_of(kind, package), many });
+    }
+    fields
+}
+
+fn kind_of(word: &str, package: &str) -> Kind {
+    // `string<=10` is a string.
+    let word = word.split_once("<=").map_or(word, |(word, _)| word);
+    match word {
+        "bool" => Kind::Bool,
+        "byte" | "char" | "uint8" => Kind::U8,
+        "int8" => Kind::I8,
+        "uint16" => Kind::U16,
+        "int16" => Kind::I16,
+        "uint32" => Kind::U32,
+        "int32" => Kind::I32,
+        "uint64" => Kind::U64,
+        "int64" => Kind::I64,
+        "float32" => Kind::F32,
+        "float64" => Kind::F64,
+        "string" => Kind::Text,
+        "time" => Kind::Time,
+        "duration" => Kind::Duration,
+        "wstring" => Kind::Other(word.to_owned()),
+        "Header" => Kind::Struct("std_msgs/Header".to_owned()),
+        name if name.contains('/') => Kind::Struct(plain_name(name)),
+        name => Kind::Struct(format!("{package}/{name}")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn constants_defaults_bounds_and_comments_of_a_definition_are_told_apart() {
+        let text = "# a message\nuint8 ON=1\nstring WORD = a=b # no\nfloat64 gain 0.5\nstring<=8[<=3] names\nfloat32[4] q # four\n\
+                    Header header\nPart[] parts\n================================================================================\n\
+                    MSG: demo/Part\nbool is_on\n";
+        let found = Definitions::parse("demo/msg/Whole", text);
+        let names: Vec<&str> = found.fields("demo/Whole").unwrap().iter().map(|field| &*field.name).collect();
+        assert_eq!(names, ["gain", "names", "q", "header", "parts"]);
+        let kinds: Vec<(Kind, Many)> =
+            found.fields("demo/Whole").unwrap().iter().map(|field| (field.kind.clone(), field.many)).collect();
+        assert_eq!(kinds[1], (Kind::Text, Many::Sequence));
+        assert_eq!(kinds[2], (Kind::F32, Many::Fixed(4)));
+        assert_eq!(kinds[3].0, Kind::Struct("std_msgs/Header".into()));
+        assert_eq!(kinds[4].0, Kind::Struct("demo/Part".into()));
+        assert_eq!(found.fields("demo/Part").unwrap().len(), 1);
+    }
+}

@@ -1,0 +1,177 @@
+//! Bags of one or several files: those that `metadata.yaml` of a folder names, or all in it.
+
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use flexarm_settings::Caveat;
+
+use crate::assemble::assemble;
+use crate::collect::{Collector, names_in_words};
+use crate::error::{MotionError, Problem, Trouble};
+use crate::unpack::{Inside, ZSTD_MAGIC, look_inside};
+use crate::value::{Node, Value};
+use crate::{MessageMotion, Request, mcap, sqlite, yaml};
+
+/// A description of a bag is small.
+const MOST_METADATA: u64 = 16 << 20;
+
+/// Reads a folder of rosbag2.
+///
+/// # Errors
+/// As [`crate::read_mcap`], and [`Problem::NotABag`].
+pub fn read_folder(path: &Path, request: &Request<'_>) -> Result<MessageMotion, MotionError> {
+    let files = files_of(path)?;
+    read_files(&files, path, request)
+}
+
+/// The files of a bag in their order.
+fn files_of(folder: &Path) -> Result<Vec<PathBuf>, MotionError> {
+    let origin = folder.display().to_string();
+    let metadata = folder.join("metadata.yaml");
+    let mut names = Vec::new();
+    if metadata.is_file() {
+        let failed = |source| MotionError::Read { path: metadata.clone(), source };
+        let mut text = String::new();
+        File::open(&metadata).and_then(|file| file.take(MOST_METADATA).read_to_string(&mut text)).map_err(failed)?;
+        yaml::documents(&text, &mut |node| {
+            let listed = node.get("rosbag2_bagfile_information").and_then(|node| node.get("relative_file_paths"));
+            if let Some(Node { value: Value::List(items), .. }) = listed {
+                names.extend(items.iter().filter_map(|item| match &item.value {
+                    Value::Text(name) => Some(name.to_string()),
+                    _ => None,
+                }));
+            }
+            Ok(())
+        })
+        .map_err(|trouble| trouble.of(&metadata.display().to_string()))?;
+    }
+    // Older bags name the folder as well; files elsewhere are not this bag's.
+    let beside = |name: &String| folder.join(Path::new(name).file_name().unwrap_or_default());
+    let files: Vec<PathBuf> = match names.is_empty() {
+        false => names.iter().map(beside).collect(),
+        true => {
+            let failed = |source| MotionError::Read { path: folder.to_owned(), source };
+            let entries = std::fs::read_dir(folder).map_err(failed)?;
+            let mut found: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
+            let is_bag = |path: &PathBuf| {
+                let name = path.file_name().unwrap_or_default().to_string_lossy();
+                let name = name.strip_suffix(".zstd").unwrap_or(&name);
+                (name.ends_with(".mcap") || name.ends_with(".db3")) && path.is_file()
+            };
+            found.retain(is_bag);
+            // `bag_10` follows `bag_9`.
+            found.sort_by_key(|path| (path.as_os_str().len(), path.clone()));
+            found
+        }
+    };
+    let not_a_bag = |what: String| Err(Trouble::new(Problem::NotABag { what }).of(&origin));
+    let first = files.first().map(|file| stem(file));
+    let other = files.iter().find(|file| Some(stem(file)) != first);
+    match files.iter().find(|file| !file.is_file()) {
+        _ if files.is_empty() => not_a_bag("there are no files of a bag in it".to_owned()),
+        None if names.is_empty() && other.is_some() => {
+            not_a_bag("it has no metadata.yaml and files of several bags; give one of the files".to_owned())
+        }
+        Some(missing) => not_a_bag(format!("{}, which metadata.yaml names, is missing", missing.display())),
+        None => Ok(files),
+    }
+}
+
+/// The name of the bag that a file is a part of: `bag_3.mcap` is of `bag`.
+fn stem(file: &Path) -> String {
+    let name = file.file_name().unwrap_or_default().to_string_lossy();
+    let name = name.split('.').next().unwrap_or_default();
+    match name.rsplit_once('_') {
+        Some((stem, number)) if !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit()) => stem.to_owned(),
+        _ => name.to_owned(),
+    }
+}
+
+/// Reads the files of a bag as one.
+///
+/// * `bag`: what is spoken of in messages.
+pub(crate) fn read_files(files: &[PathBuf], bag: &Path, request: &Request<'_>) -> Result<MessageMotion, MotionError> {
+    let shown = bag.display().to_string();
+    let mut collector = Collector::new(*request);
+    let (mut broken, mut format) = (Vec::new(), "MCAP bag");
+    for file in files {
+        let origin = file.display().to_string();
+        let mut head = Vec::new();
+        let opened = File::open(file).and_then(|open| open.take(16).read_to_end(&mut head));
+        opened.map_err(|source| MotionError::Read { path: file.clone(), source })?;
+        let ended = if head.starts_with(mcap::MCAP_MAGIC) {
+            mcap::collect_file(file, &mut collector)?
+        } else if head.starts_with(sqlite::SQLITE_MAGIC) {
+            format = "SQLite bag";
+            sqlite::collect_file(file, &mut collector)?
+        } else if head.starts_with(ZSTD_MAGIC) {
+            match look_inside(file)? {
+                Inside::Mcap(stream) => mcap::collect(stream, &mut collector).map_err(|trouble| trouble.of(&origin))?,
+                Inside::Database(bytes) => {
+                    format = "SQLite bag";
+                    sqlite::collect_bytes(bytes, &mut collector).map_err(|trouble| trouble.of(&origin))?
+                }
+            }
+        } else {
+            let what = "it is neither MCAP nor a database of rosbag2, by its first bytes".to_owned();
+            return Err(Trouble::new(Problem::NotRead { what }).of(&origin));
+        };
+        broken.extend(ended.map(|why| (origin, why)));
+    }
+    finish(collector, &shown, format, &broken)
+}
+
+fn finish(
+    collector: Collector<'_>,
+    shown: &str,
+    format: &'static str,
+    broken: &[(String, String)],
+) -> Result<MessageMotion, MotionError> {
+    let was_asked = collector.asked();
+    let cut = |trouble: Trouble| match (broken.first(), &*trouble.problem) {
+        // Why there is nothing in it is what matters.
+        (Some((_, why)), Problem::NoTopic { .. }) => {
+            Trouble::new(Problem::Container { container: "bag", what: format!("{why}, and there is no motion before") })
+        }
+        _ => trouble,
+    };
+    let (topic, others) = collector.choose().map_err(|trouble| cut(trouble).of(shown))?;
+    let mut caveats: Vec<Caveat> = Vec::new();
+    for (file, why) in broken {
+        let message = format!("{file}: {why}; it is read up to there ({} messages on {})", topic.count, topic.name);
+        caveats.push(Caveat::said("motion-cut", file, message, "recover it, or record it again"));
+    }
+    if !was_asked {
+        caveats.push(chosen(&topic.described(), &others, shown));
+    }
+    let (name, message) = (topic.name.clone(), topic.message.clone());
+    let dropped = topic.foreign.clone();
+    caveats.extend(dropped_note(&dropped, shown));
+    let made = assemble(topic, shown, true).map_err(|trouble| trouble.of(shown))?;
+    caveats.extend(made.caveats);
+    let (trajectory, samples) = (made.trajectory, made.samples);
+    Ok(MessageMotion { trajectory, format, topic: Some(name), message, samples, dropped, caveats })
+}
+
+/// Which topic is taken; a warning where there was a choice.
+fn chosen(taken: &str, others: &[String], shown: &str) -> Caveat {
+    use flexarm_settings::Setting;
+    if others.is_empty() {
+        let message = format!("{shown}: the motion is that of {taken}, the only topic that has one");
+        return Caveat::said("motion-topic", shown, message, "").as_note();
+    }
+    let message = format!(
+        "{shown}: the motion is that of {taken}; others have one too: {}; {} chooses",
+        others.join(", "),
+        Setting::Topic
+    );
+    Caveat::said("motion-topic", shown, message, "").mended_by(&[Setting::Topic])
+}
+
+/// Which joints are left out.
+pub(crate) fn dropped_note(dropped: &[String], shown: &str) -> Option<Caveat> {
+    let message = format!("{shown}: joints that the robot does not move are left out: {}", names_in_words(dropped));
+    let caveat = Caveat::said("motion-dropped-joints", shown, message, "a gripper is one; a joint of the arm is not");
+    (!dropped.is_empty()).then_some(caveat)
+}

@@ -1,0 +1,87 @@
+//! Joint motions that other programs wrote: messages of ROS as text and in bags, ending in a
+//! [`flexarm_trajectory::Trajectory`].
+//!
+//! ```
+//! use flexarm_motion_io::{Request, read_text};
+//!
+//! let text = "\
+//! joint_names: [shoulder, gripper]
+//! points:
+//! - {positions: [0.0, 0.0], velocities: [0.0, 0.0], time_from_start: {sec: 0, nanosec: 0}}
+//! - {positions: [0.8, 0.1], velocities: [0.0, 0.0], time_from_start: {sec: 1, nanosec: 500000000}}
+//! ";
+//! let motion = read_text(text, "plan.yaml", &Request { joints: Some(&["shoulder", "elbow"]), topic: None })?;
+//! assert_eq!(motion.trajectory.joints(), ["shoulder"]);
+//! assert_eq!(motion.trajectory.duration(), 1.5);
+//! assert_eq!(motion.dropped, ["gripper"]); // told in `motion.caveats` as well
+//! # Ok::<(), flexarm_motion_io::MotionError>(())
+//! ```
+//!
+//! | what | read by | messages |
+//! | --- | --- | --- |
+//! | YAML and JSON, also as printed by `ros2 topic echo` and `rostopic echo` | [`read_text`] | those below, wherever they stand in the text |
+//! | MCAP, chunks plain or packed by zstd or lz4 | [`read_mcap`] | `trajectory_msgs/JointTrajectory`, `sensor_msgs/JointState`, `control_msgs/JointTrajectoryControllerState`, and what holds a `JointTrajectory` (CDR of either byte order, ROS 1) |
+//! | SQLite bags (`.db3`) | [`read_db3`] | the same in CDR |
+//! | folders of rosbag2 with `metadata.yaml` | [`read_folder`] | the same; files packed as a whole (`.zstd`) too |
+//!
+//! All ends in one tree of values ([`value`]): [`yaml`] makes it of text, [`cdr`] of bytes by the definition of the message
+//! ([`definition`]); [`message`] finds motions in it, [`collect`] keeps them by topic and joint, [`assemble`] makes curves
+//! of them. Joints go by their names in every single message. [`write_joint_trajectory`] is the way back.
+//!
+//! Units: rad, rad/s, rad/s², m, s, as ROS has them. Not here: robots; which joints a robot has is told ([`Request`]).
+#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test"))]
+#![allow(rustdoc::private_intra_doc_links, reason = "the page tells how the modules work together")]
+
+mod assemble;
+mod cdr;
+mod collect;
+mod definition;
+mod error;
+mod folder;
+mod mcap;
+mod message;
+mod sqlite;
+mod text;
+mod unpack;
+mod value;
+mod write;
+mod yaml;
+
+pub use error::{MotionError, Place, Problem};
+pub use folder::read_folder;
+pub use mcap::{MCAP_MAGIC, read_mcap};
+pub use sqlite::{SQLITE_MAGIC, read_db3};
+pub use text::{looks_like_messages, read_text};
+pub use unpack::{ZSTD_MAGIC, read_packed};
+pub use write::{TextFormat, write_joint_trajectory};
+
+use flexarm_settings::Caveat;
+use flexarm_trajectory::Trajectory;
+
+/// What of a file is wanted.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Request<'a> {
+    /// Joints of the robot; others are left out, and told. Without it all are taken.
+    pub joints: Option<&'a [&'a str]>,
+    /// The topic of a bag; without it one is chosen, and told.
+    pub topic: Option<&'a str>,
+}
+
+/// A motion with what is to be known about where it comes from.
+#[derive(Clone, Debug)]
+pub struct MessageMotion {
+    /// The curves of the joints that are wanted, those of the file's order.
+    pub trajectory: Trajectory,
+    /// What the file is, such as `MCAP bag`.
+    pub format: &'static str,
+    /// Topic of a bag.
+    pub topic: Option<String>,
+    /// Type of the messages, such as `sensor_msgs/msg/JointState`, as far as the file says it or their keys show it.
+    pub message: String,
+    /// Most samples of a joint.
+    pub samples: usize,
+    /// Joints of the messages that were not asked for.
+    pub dropped: Vec<String>,
+    /// What was chosen, assumed and left out.
+    pub caveats: Vec<Caveat>,
+}

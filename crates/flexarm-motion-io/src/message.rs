@@ -1,0 +1,299 @@
+//! Motions in the tree of a message: trajectories of points, states of joints, states of controllers; told by their keys.
+
+use std::rc::Rc;
+
+use crate::error::{Problem, Trouble};
+use crate::value::{Node, Value};
+
+/// How deep motions are looked for in a message.
+const DEEPEST: usize = 6;
+
+/// Values of some joints, by the names of one message.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct State {
+    /// `header.stamp` in ns; 0 if it is not set.
+    pub(crate) stamp_ns: i64,
+    pub(crate) joints: Vec<Rc<str>>,
+    /// One per joint, rad or m; empty if the message has none.
+    pub(crate) position: Vec<f64>,
+    /// One per joint or none.
+    pub(crate) velocity: Vec<f64>,
+    /// One per joint or none.
+    pub(crate) acceleration: Vec<f64>,
+    /// What the values are: `position`, `reference`, ...
+    pub(crate) of: &'static str,
+}
+
+/// A point of a trajectory; values of the joints of its trajectory.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Point {
+    /// Since the start of the trajectory, s.
+    pub(crate) time_s: f64,
+    pub(crate) position: Vec<f64>,
+    /// One per joint or none.
+    pub(crate) velocity: Vec<f64>,
+    /// One per joint or none.
+    pub(crate) acceleration: Vec<f64>,
+}
+
+/// `trajectory_msgs/JointTrajectory`.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Points {
+    pub(crate) stamp_ns: i64,
+    pub(crate) joints: Vec<Rc<str>>,
+    pub(crate) points: Vec<Point>,
+}
+
+/// What a message says about motion.
+#[derive(Clone, Debug)]
+pub(crate) enum Message {
+    State(State),
+    /// Trajectories that run one after another, and where the robot is before the first, as far as it is told.
+    Trajectories(Vec<Points>, Option<State>),
+}
+
+/// Set point and measured value of a controller, in the order in which they are taken.
+const CONTROLLER: [&str; 4] = ["reference", "desired", "feedback", "actual"];
+
+/// The motion of a message, if there is one in it.
+///
+/// # Errors
+/// [`Trouble`] for a motion that is not as it should be.
+pub(crate) fn motion_of(node: &Node) -> Result<Option<Message>, Trouble> {
+    if let (Some(names), Some(_)) = (node.get("name"), node.get("position")) {
+        return state(node, names, node, "position").map(|state| Some(Message::State(state)));
+    }
+    if let Some(names) = node.get("joint_names")
+        && node.get("points").is_none()
+        && let Some(of) = set_point(node)
+    {
+        let point = node.get(of).unwrap_or(node);
+        return state(node, names, point, of).map(|state| Some(Message::State(state)));
+    }
+    let mut found = Vec::new();
+    trajectories(node, 0, &mut found)?;
+    if found.is_empty() {
+        return Ok(None);
+    }
+    let start = node.get("trajectory_start").and_then(|start| start.get("joint_state"));
+    let start = start.and_then(|start| Some((start, start.get("name")?)));
+    // A start without values is none: planners leave it empty.
+    let start = start.map(|(start, names)| state(start, names, start, "trajectory_start")).transpose()?;
+    Ok(Some(Message::Trajectories(found, start.filter(|start| !start.position.is_empty()))))
+}
+
+/// The first of the fields of a controller that has positions.
+fn set_point(node: &Node) -> Option<&'static str> {
+    let filled = |of: &&&str| {
+        let positions = node.get(of).and_then(|point| point.get("positions"));
+        positions.is_some_and(|positions| matches!(&positions.value, Value::Numbers(n) if !n.is_empty()))
+    };
+    let first = || CONTROLLER.iter().find(|of| node.get(of).is_some());
+    CONTROLLER.iter().find(filled).or_else(first).copied()
+}
+
+/// Looks for tables with `joint_names` and `points`.
+fn trajectories(node: &Node, depth: usize, found: &mut Vec<Points>) -> Result<(), Trouble> {
+    if depth > DEEPEST {
+        return Ok(());
+    }
+    match &node.value {
+        Value::Map(pairs) => {
+            if let (Some(names), Some(list)) = (node.get("joint_names"), node.get("points")) {
+                // MoveIt leaves it empty where there is nothing to move.
+                let trajectory = points(node, names, list)?;
+                if !(trajectory.joints.is_empty() && trajectory.points.is_empty()) {
+                    found.push(trajectory);
+                }
+                return Ok(());
+            }
+            let inside = pairs.iter().filter(|(key, _)| &**key != "trajectory_start");
+            inside.into_iter().try_for_each(|(_, inner)| trajectories(inner, depth + 1, found))
+        }
+        Value::List(items) => items.iter().try_for_each(|inner| trajectories(inner, depth + 1, found)),
+        _ => Ok(()),
+    }
+}
+
+fn points(node: &Node, names: &Node, list: &Node) -> Result<Points, Trouble> {
+    let joints = names_of(names, "joint_names")?;
+    let items: &[Node] = match &list.value {
+        Value::List(items) => items,
+        Value::Numbers(none) if none.is_empty() => &[],
+        Value::Null => &[],
+        _ => return Err(wrong("points", list, "a list of points")),
+    };
+    let mut found: Vec<Point> = Vec::with_capacity(items.len());
+    for (i, item) in items.iter().enumerate() {
+        let of = || format!("point {}", i + 1);
+        let missing = |key, expected| Trouble::at(item.line, Problem::MissingKey { of: of(), key, expected });
+        let positions = item.get("positions").or_else(|| item.get("position"));
+        let positions = positions.ok_or_else(|| missing("positions", "expected a position for each joint"))?;
+        let time = item.get("time_from_start");
+        let time = time.ok_or_else(|| missing("time_from_start", "expected sec and nanosec, or seconds"))?;
+        let point = Point {
+            time_s: duration_s(time)?,
+            position: numbers(positions, "positions")?,
+            velocity: rates(item, "velocities")?,
+            acceleration: rates(item, "accelerations")?,
+        };
+        check_lengths(item, joints.len(), &[("positions", &point.position, true)])?;
+        let optional = [("velocities", &point.velocity, false), ("accelerations", &point.acceleration, false)];
+        check_lengths(item, joints.len(), &optional)?;
+        if let Some(k) = point.position.iter().position(|value| !value.is_finite()) {
+            let (joint, value) = (joints[k].to_string(), point.position[k]);
+            return Err(Trouble::at(item.line, Problem::NotFinite { joint, point: i + 1, value }));
+        }
+        let previous = found.last().map_or(f64::NEG_INFINITY, |last| last.time_s);
+        if !(point.time_s > previous && point.time_s.is_finite()) {
+            let this = point.time_s;
+            return Err(Trouble::at(item.line, Problem::PointTimes { point: i + 1, this, previous }));
+        }
+        found.push(point);
+    }
+    Ok(Points { stamp_ns: stamp_ns(node)?, joints, points: found })
+}
+
+/// Values of joints whose names stand in `names`; `values` has position and velocity, or positions and velocities.
+fn state(node: &Node, names: &Node, values: &Node, of: &'static str) -> Result<State, Trouble> {
+    let plural = matches!(of, "reference" | "desired" | "feedback" | "actual");
+    let (position, velocity, acceleration) =
+        if plural { ("positions", "velocities", "accelerations") } else { ("position", "velocity", "acceleration") };
+    let joints = names_of(names, if plural { "joint_names" } else { "name" })?;
+    Ok(State {
+        stamp_ns: stamp_ns(node)?,
+        joints,
+        position: rates(values, position)?,
+        velocity: rates(values, velocity)?,
+        acceleration: rates(values, acceleration)?,
+        of,
+    })
+}
+
+impl State {
+    /// Whether there is one position for each joint, or none at all; velocities and accelerations likewise.
+    ///
+    /// # Errors
+    /// [`Problem::Lengths`].
+    pub(crate) fn check(&self) -> Result<(), Trouble> {
+        let columns =
+            [("position", &self.position), ("velocity", &self.velocity), ("acceleration", &self.acceleration)];
+        for (key, values) in columns {
+            if !values.is_empty() && values.len() != self.joints.len() {
+                let (found, expected) = (values.len(), self.joints.len());
+                let key = key.to_owned();
+                return Err(Trouble::new(Problem::Lengths { key, found, expected, hint: "" }));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn check_lengths(item: &Node, joints: usize, columns: &[(&str, &Vec<f64>, bool)]) -> Result<(), Trouble> {
+    for (key, values, needed) in columns {
+        if values.len() != joints && (*needed || !values.is_empty()) {
+            let hint = if values.is_empty() { ": a trajectory without positions is not read" } else { "" };
+            let problem = Problem::Lengths { key: (*key).to_owned(), found: values.len(), expected: joints, hint };
+            return Err(Trouble::at(item.line, problem));
+        }
+    }
+    Ok(())
+}
+
+fn names_of(node: &Node, key: &str) -> Result<Vec<Rc<str>>, Trouble> {
+    let wrong = || wrong(key, node, "a list of names of joints");
+    let names: Vec<Rc<str>> = match &node.value {
+        Value::List(items) => {
+            let name = |item: &Node| match &item.value {
+                Value::Text(text) if &**text == "..." => Err(Trouble::at(item.line, Problem::ShortenedArray)),
+                Value::Text(text) => Ok(text.clone()),
+                Value::Whole(whole) => Ok(whole.to_string().into()),
+                _ => Err(wrong()),
+            };
+            items.iter().map(name).collect::<Result<_, _>>()?
+        }
+        Value::Numbers(numbers) => numbers.iter().map(|number| number.to_string().into()).collect(),
+        Value::Null => Vec::new(),
+        _ => return Err(wrong()),
+    };
+    let mut sorted: Vec<&str> = names.iter().map(|name| &**name).collect();
+    sorted.sort_unstable();
+    match sorted.windows(2).find(|pair| pair[0] == pair[1]) {
+        Some(pair) => Err(Trouble::at(node.line, Problem::RepeatedJoint { joint: pair[0].to_owned() })),
+        None => Ok(names),
+    }
+}
+
+fn numbers(node: &Node, key: &str) -> Result<Vec<f64>, Trouble> {
+    match &node.value {
+        Value::Numbers(numbers) => Ok(numbers.clone()),
+        Value::Null => Ok(Vec::new()),
+        Value::List(items) => {
+            let number = |item: &Node| match &item.value {
+                Value::Text(text) if &**text == "..." => Err(Trouble::at(item.line, Problem::ShortenedArray)),
+                // JSON has no word for what is not a number.
+                Value::Null => Ok(f64::NAN),
+                _ => item.number().ok_or_else(|| wrong(key, item, "numbers alone")),
+            };
+            items.iter().map(number).collect()
+        }
+        // How Python prints an array of numbers.
+        Value::Text(text) if text.starts_with("array(") => {
+            let inside = text.split_once('[').and_then(|(_, rest)| rest.split_once(']')).map(|(inside, _)| inside);
+            let parts = inside.into_iter().flat_map(|inside| inside.split(',')).map(str::trim);
+            let parsed: Result<Vec<f64>, _> = parts.filter(|part| !part.is_empty()).map(str::parse).collect();
+            parsed.map_err(|_| wrong(key, node, "a list of numbers"))
+        }
+        _ => Err(wrong(key, node, "a list of numbers")),
+    }
+}
+
+/// Numbers that need not be there.
+fn rates(node: &Node, key: &str) -> Result<Vec<f64>, Trouble> {
+    node.get(key).map_or(Ok(Vec::new()), |values| numbers(values, key))
+}
+
+fn wrong(key: &str, node: &Node, expected: &'static str) -> Trouble {
+    Trouble::at(node.line, Problem::Value { key: key.to_owned(), found: node.in_words(), expected })
+}
+
+/// `header.stamp` in ns since 1970; 0 without one.
+fn stamp_ns(node: &Node) -> Result<i64, Trouble> {
+    let Some(stamp) = node.get("header").and_then(|header| header.get("stamp")) else { return Ok(0) };
+    match whole_ns(stamp) {
+        Some(ns) => Ok(ns),
+        // A float is as exact as it was written.
+        None => match stamp.number() {
+            Some(seconds) if seconds.abs() < 9e9 => Ok((seconds * 1e9).round() as i64),
+            _ => Err(wrong("stamp", stamp, "sec and nanosec, or seconds")),
+        },
+    }
+}
+
+/// Seconds, of a whole number of ns or as a number.
+fn duration_s(node: &Node) -> Result<f64, Trouble> {
+    match (whole_ns(node), node.number()) {
+        (Some(ns), _) => Ok(ns as f64 / 1e9),
+        (None, Some(seconds)) => Ok(seconds),
+        _ => Err(wrong("time_from_start", node, "sec and nanosec, secs and nsecs, or seconds")),
+    }
+}
+
+fn whole_ns(node: &Node) -> Option<i64> {
+    let whole = |names: [&str; 3]| {
+        let found = names.iter().find_map(|name| node.get(name))?;
+        match found.value {
+            Value::Whole(whole) => Some(whole),
+            // JSON of some programs writes 1.0 for 1.
+            Value::Number(number) if number.fract() == 0.0 && number.abs() < 9e15 => Some(number as i64),
+            _ => None,
+        }
+    };
+    let sec = whole(["sec", "secs", "seconds"])?;
+    let rest = if matches!(&node.value, Value::Map(pairs) if pairs.len() == 1) {
+        0
+    } else {
+        whole(["nanosec", "nsecs", "nanoseconds"]).or_else(|| whole(["nsec", "nsec", "nsec"]))?
+    };
+    sec.checked_mul(1_000_000_000)?.checked_add(rest)
+}

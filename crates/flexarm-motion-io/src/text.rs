@@ -1,0 +1,113 @@
+//! Messages as text: one, or several documents as printed by `ros2 topic echo`.
+
+use flexarm_settings::Caveat;
+
+use crate::assemble::assemble;
+use crate::collect::Collector;
+use crate::error::{MotionError, Problem, Trouble};
+use crate::folder::dropped_note;
+use crate::value::{Node, Value};
+use crate::{MessageMotion, Request, yaml};
+
+/// Longest text (bytes): its tree takes some ten times as much.
+const LONGEST: usize = 200 << 20;
+/// Lines that are looked at to tell what a text is.
+const LOOKED_AT: usize = 400;
+/// Keys of messages that hold motion, or hold messages that do.
+const KEYS: [&str; 12] = [
+    "joint_names",
+    "points",
+    "header",
+    "name",
+    "position",
+    "trajectory",
+    "joint_trajectory",
+    "trajectory_start",
+    "goal",
+    "positions",
+    "model_id",
+    "feedback",
+];
+
+/// Whether a text looks like messages: JSON, or lines with keys of messages that hold motion.
+pub fn looks_like_messages(text: &str) -> bool {
+    let text = text.trim_start_matches('\u{feff}').trim_start();
+    if text.starts_with('{') || text.strip_prefix('[').is_some_and(|rest| rest.trim_start().starts_with('{')) {
+        return true;
+    }
+    let has_key = |line: &str| {
+        let line = line.trim_start().trim_start_matches("- ").trim_start();
+        let key = line.split_once(':').map(|(key, _)| key.trim().trim_matches(['"', '\'']));
+        key.is_some_and(|key| KEYS.contains(&key))
+    };
+    text.lines().take(LOOKED_AT).any(has_key)
+}
+
+/// Reads messages in YAML or JSON.
+///
+/// * `origin`: file name for messages.
+///
+/// # Errors
+/// [`MotionError::Content`] with the line of what is wrong.
+pub fn read_text(text: &str, origin: &str, request: &Request<'_>) -> Result<MessageMotion, MotionError> {
+    read(text.trim_start_matches('\u{feff}'), origin, request).map_err(|trouble| trouble.of(origin))
+}
+
+fn read(text: &str, origin: &str, request: &Request<'_>) -> Result<MessageMotion, Trouble> {
+    if let Some(asked) = request.topic {
+        return Err(Trouble::new(Problem::TopicOfText { asked: asked.to_owned() }));
+    }
+    if text.len() > LONGEST {
+        let mend = "record a bag instead, or cut it";
+        return Err(Trouble::new(Problem::TooLarge { most: LONGEST as u64, mend }));
+    }
+    let mut collector = Collector::new(*request);
+    let topic = collector.topic("text", "", "", None);
+    let (mut documents, mut keys, mut pending) = (0_usize, String::new(), None);
+    yaml::documents(text, &mut |node| {
+        if let Some(trouble) = pending.take() {
+            return Err(trouble);
+        }
+        if matches!(node.value, Value::Null) {
+            return Ok(());
+        }
+        documents += 1;
+        collector.topics[topic].count += 1;
+        if keys.is_empty() {
+            keys = top(&node);
+        }
+        pending = collector.node(topic, 0, &node).err();
+        Ok(())
+    })?;
+    let mut caveats = Vec::new();
+    if let Some(trouble) = pending {
+        // What a program printed when it was stopped ends somewhere; one document alone must be whole.
+        if documents < 3 {
+            return Err(trouble);
+        }
+        let message =
+            format!("{origin}: the last of {documents} documents is not whole and is left out ({})", trouble.problem);
+        caveats.push(Caveat::said("motion-cut", origin, message, ""));
+    }
+    if !collector.topics[topic].has_something() {
+        return Err(Trouble::new(Problem::NoMessage { found: keys }));
+    }
+    let (topic, _) = collector.choose()?;
+    let dropped = topic.foreign.clone();
+    caveats.extend(dropped_note(&dropped, origin));
+    let message = match (topic.received.is_empty(), topic.of) {
+        (false, _) => "trajectory_msgs/JointTrajectory",
+        (true, "position") => "sensor_msgs/JointState",
+        _ => "control_msgs/JointTrajectoryControllerState",
+    };
+    let made = assemble(topic, origin, false)?;
+    caveats.extend(made.caveats);
+    let format = if text.trim_start().starts_with(['{', '[']) { "JSON message" } else { "YAML message" };
+    let (trajectory, samples) = (made.trajectory, made.samples);
+    Ok(MessageMotion { trajectory, format, topic: None, message: message.to_owned(), samples, dropped, caveats })
+}
+
+/// The keys of a document, for messages.
+fn top(node: &Node) -> String {
+    node.in_words()
+}

@@ -1,0 +1,88 @@
+//! Packed data, unpacked no further than to a limit: what a head says about sizes is not believed.
+
+use std::io::{BufReader, Read};
+use std::path::Path;
+
+use crate::error::{MotionError, Problem, Trouble};
+use crate::{MessageMotion, Request, mcap, sqlite};
+
+/// First bytes of what zstd has packed.
+pub const ZSTD_MAGIC: &[u8] = &[0x28, 0xB5, 0x2F, 0xFD];
+/// Most bytes that a chunk, a message or a packed database unpacks to.
+pub(crate) const MOST_BYTES: u64 = 1 << 30;
+
+/// What is unpacked of some bytes before they end or break, and why they break.
+pub(crate) fn unpacked(packing: Packing, bytes: &[u8]) -> (Vec<u8>, Option<String>) {
+    let mut out = Vec::new();
+    let result = match packing {
+        Packing::Zstd => {
+            zstd::stream::read::Decoder::new(bytes).and_then(|unpack| unpack.take(MOST_BYTES + 1).read_to_end(&mut out))
+        }
+        Packing::Lz4 => lz4_flex::frame::FrameDecoder::new(bytes).take(MOST_BYTES + 1).read_to_end(&mut out),
+    };
+    let broken = match result {
+        Err(error) => Some(format!("what is packed in it is damaged or not whole ({error})")),
+        Ok(_) if out.len() as u64 > MOST_BYTES => Some(format!("it unpacks to more than {MOST_BYTES} bytes")),
+        Ok(_) => None,
+    };
+    (out, broken)
+}
+
+/// How bytes are packed.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Packing {
+    Zstd,
+    Lz4,
+}
+
+/// A bag that is packed as a whole (`.mcap.zstd`, `.db3.zstd`).
+///
+/// # Errors
+/// [`MotionError`] as [`crate::read_mcap`] and [`crate::read_db3`] have it, and for what is no bag inside.
+pub fn read_packed(path: &Path, request: &Request<'_>) -> Result<MessageMotion, MotionError> {
+    crate::folder::read_files(&[path.to_owned()], path, request)
+}
+
+/// A packed file as a stream.
+fn open_packed(path: &Path) -> std::io::Result<Box<dyn Read>> {
+    Ok(Box::new(zstd::stream::read::Decoder::new(std::fs::File::open(path)?)?))
+}
+
+/// What is in a packed file, by its first bytes.
+pub(crate) enum Inside {
+    /// A bag that can be read as it comes.
+    Mcap(Box<dyn Read>),
+    /// A database, all of it.
+    Database(Vec<u8>),
+}
+
+pub(crate) fn look_inside(path: &Path) -> Result<Inside, MotionError> {
+    let failed = |source| MotionError::Read { path: path.to_owned(), source };
+    let mut stream = BufReader::new(open_packed(path).map_err(failed)?);
+    let mut head = [0; 16];
+    let mut filled = 0;
+    while filled < head.len() {
+        match stream.read(&mut head[filled..]).map_err(failed)? {
+            0 => break,
+            read => filled += read,
+        }
+    }
+    let head = head[..filled].to_vec();
+    let whole = std::io::Cursor::new(head.clone()).chain(stream);
+    if head.starts_with(mcap::MCAP_MAGIC) {
+        return Ok(Inside::Mcap(Box::new(whole)));
+    }
+    let origin = path.display().to_string();
+    if !head.starts_with(sqlite::SQLITE_MAGIC) {
+        let what =
+            "what is packed in it is neither MCAP nor a database of rosbag2; unpack it to see what it is".to_owned();
+        return Err(Trouble::new(Problem::NotRead { what }).of(&origin));
+    }
+    let mut bytes = Vec::new();
+    whole.take(MOST_BYTES + 1).read_to_end(&mut bytes).map_err(failed)?;
+    if bytes.len() as u64 > MOST_BYTES {
+        let problem = Problem::TooLarge { most: MOST_BYTES, mend: "unpack it with zstd -d" };
+        return Err(Trouble::new(problem).of(&origin));
+    }
+    Ok(Inside::Database(bytes))
+}

@@ -1,0 +1,97 @@
+//! A motion as `trajectory_msgs/JointTrajectory`, in YAML or JSON.
+
+use std::fmt::Write;
+
+use flexarm_trajectory::{Trajectory, TrajectoryError};
+
+/// Most points of a file.
+const MOST_POINTS: f64 = 5e6;
+
+/// How a message is written as text.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TextFormat {
+    /// YAML, as `ros2 topic pub` takes it.
+    Yaml,
+    /// JSON.
+    Json,
+}
+
+/// A motion as points with positions, velocities and accelerations in SI units: one every `1 / rate_hz` s, at whole
+/// nanoseconds, and one at the end. Numbers are written in full.
+///
+/// # Errors
+/// [`TrajectoryError::BadRate`].
+pub fn write_joint_trajectory(
+    trajectory: &Trajectory,
+    rate_hz: f64,
+    format: TextFormat,
+) -> Result<String, TrajectoryError> {
+    let duration_s = trajectory.duration();
+    let intervals = duration_s * rate_hz;
+    if !(rate_hz > 0.0 && rate_hz.is_finite() && intervals <= MOST_POINTS) {
+        return Err(TrajectoryError::BadRate { rate_hz, duration_s });
+    }
+    let n = trajectory.joints().len();
+    let (mut q, mut qdot, mut qddot) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+    let names: Vec<String> = trajectory.joints().iter().map(|joint| quoted(joint)).collect();
+    let mut text = match format {
+        TextFormat::Yaml => format!(
+            "header:\n  stamp: {{sec: 0, nanosec: 0}}\n  frame_id: \"\"\njoint_names: [{}]\npoints:\n",
+            names.join(", ")
+        ),
+        TextFormat::Json => format!(
+            "{{\"header\": {{\"stamp\": {{\"sec\": 0, \"nanosec\": 0}}, \"frame_id\": \"\"}},\n\"joint_names\": [{}],\n\
+             \"points\": [\n",
+            names.join(", ")
+        ),
+    };
+    let regular = (intervals - 1e-6).ceil().max(1.0) as usize;
+    for k in 0..=regular {
+        let seconds = if k == regular { duration_s } else { k as f64 / rate_hz };
+        let ns = (seconds * 1e9).round() as i64;
+        // Where the point is said to be, not where it was meant to be.
+        trajectory.sample((ns as f64 / 1e9).min(duration_s), &mut q, &mut qdot, &mut qddot);
+        let (sec, nanosec) = (ns / 1_000_000_000, ns % 1_000_000_000);
+        let (q, v, a) = (numbers(&q), numbers(&qdot), numbers(&qddot));
+        // Writing to a text does not fail.
+        let _ = match format {
+            TextFormat::Yaml => writeln!(
+                text,
+                "- positions: [{q}]\n  velocities: [{v}]\n  accelerations: [{a}]\n  \
+                 time_from_start: {{sec: {sec}, nanosec: {nanosec}}}"
+            ),
+            TextFormat::Json => writeln!(
+                text,
+                "{{\"positions\": [{q}], \"velocities\": [{v}], \"accelerations\": [{a}], \
+                 \"time_from_start\": {{\"sec\": {sec}, \"nanosec\": {nanosec}}}}}{}",
+                if k == regular { "" } else { "," }
+            ),
+        };
+    }
+    if format == TextFormat::Json {
+        text += "]}\n";
+    }
+    Ok(text)
+}
+
+fn numbers(values: &[f64]) -> String {
+    // A point makes a number of it for every reader of YAML.
+    values.iter().map(|value| format!("{value:?}")).collect::<Vec<_>>().join(", ")
+}
+
+/// A name between quotes, as both formats have it.
+fn quoted(name: &str) -> String {
+    let mut text = String::from("\"");
+    for letter in name.chars() {
+        match letter {
+            '"' => text += "\\\"",
+            '\\' => text += "\\\\",
+            control if control.is_control() => {
+                let _ = write!(text, "\\u{:04x}", u32::from(control));
+            }
+            other => text.push(other),
+        }
+    }
+    text.push('"');
+    text
+}

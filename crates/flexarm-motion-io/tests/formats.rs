@@ -1,0 +1,457 @@
+//! One motion in every format, as the Python packages of ROS wrote it (`tools/make_motion_fixtures.py`): the same samples as
+//! those of our own CSV.
+#![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+
+use std::path::{Path, PathBuf};
+
+use flexarm_motion_io::{
+    MessageMotion, MotionError, Request, TextFormat, read_db3, read_folder, read_mcap, read_packed, read_text,
+    write_joint_trajectory,
+};
+use flexarm_trajectory::Trajectory;
+
+const JOINTS: [&str; 2] = ["joint_1", "joint_2"];
+const ROBOT: Request<'static> = Request { joints: Some(&JOINTS), topic: None };
+/// Largest difference to the CSV (rad, rad/s, rad/s²).
+const SAME: f64 = 1e-9;
+
+fn data(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name)
+}
+
+fn text(name: &str) -> String {
+    std::fs::read_to_string(data(name)).unwrap()
+}
+
+fn truth(name: &str) -> Trajectory {
+    Trajectory::parse_csv(&text(name), name).unwrap().with_joint_order(&JOINTS).unwrap()
+}
+
+/// Largest difference of positions, velocities and accelerations at 1000 times.
+fn differences(a: &Trajectory, b: &Trajectory) -> [f64; 3] {
+    let b = b.with_joint_order(&a.joints().iter().map(String::as_str).collect::<Vec<_>>()).unwrap();
+    let n = a.joints().len();
+    let mut worst = [0.0f64; 3];
+    for i in 0..=1000 {
+        let t = a.duration() * f64::from(i) / 1000.0;
+        let mut x = vec![vec![0.0; n]; 6];
+        let [q, v, acc, p, w, b_acc] = &mut x[..] else { unreachable!() };
+        a.sample(t, q, v, acc);
+        b.sample(t, p, w, b_acc);
+        for (k, (left, right)) in [(&*q, &*p), (&*v, &*w), (&*acc, &*b_acc)].into_iter().enumerate() {
+            let most = left.iter().zip(right).map(|(l, r)| (l - r).abs()).fold(0.0, f64::max);
+            worst[k] = worst[k].max(most);
+        }
+    }
+    worst
+}
+
+fn assert_same(motion: &MessageMotion, csv: &str, what: &str) {
+    let truth = truth(csv);
+    assert!(
+        (motion.trajectory.duration() - truth.duration()).abs() < 1e-12,
+        "{what}: {}",
+        motion.trajectory.duration()
+    );
+    let [q, v, a] = differences(&motion.trajectory, &truth);
+    println!("{what}: {q:.1e} rad, {v:.1e} rad/s, {a:.1e} rad/s^2");
+    assert!(q <= SAME && v <= SAME && a <= 1e-6, "{what}: {q:e} {v:e} {a:e}");
+    assert_eq!(motion.samples, 26, "{what}");
+}
+
+fn told(motion: &MessageMotion) -> Vec<String> {
+    motion.caveats.iter().map(|c| format!("{} {}: {}", c.severity.word(), c.code, c.message)).collect()
+}
+
+#[test]
+fn a_joint_trajectory_as_text_is_the_motion_of_the_csv() {
+    for name in ["plan.yaml", "plan_ros1.yaml", "plan.json", "plan_floats.json", "display.yaml"] {
+        let motion = read_text(&text(name), name, &ROBOT).unwrap();
+        assert_same(&motion, "plan.csv", name);
+        assert_eq!(motion.dropped, ["gripper_finger_joint"], "{name}");
+        assert_eq!(motion.message, "trajectory_msgs/JointTrajectory");
+        assert_eq!(motion.format, if name.ends_with("json") { "JSON message" } else { "YAML message" });
+    }
+}
+
+#[test]
+fn states_printed_by_ros2_topic_echo_are_the_motion_of_the_csv_whatever_the_order_of_the_joints() {
+    let motion = read_text(&text("echo.yaml"), "echo.yaml", &ROBOT).unwrap();
+    assert_same(&motion, "states.csv", "echo.yaml");
+    assert_eq!(motion.message, "sensor_msgs/JointState");
+}
+
+#[test]
+fn mcap_files_of_every_packing_and_byte_order_are_the_motion_of_the_csv() {
+    for name in
+        ["states_zstd.mcap", "states_lz4.mcap", "states_plain.mcap", "states_big_endian.mcap", "states_ros1.mcap"]
+    {
+        let motion = read_mcap(&data(name), &ROBOT).unwrap();
+        assert_same(&motion, "states.csv", name);
+        assert_eq!((motion.format, motion.topic.as_deref()), ("MCAP bag", Some("/joint_states")), "{name}");
+        assert_eq!(motion.dropped, ["gripper_finger_joint"], "{name}");
+    }
+    for name in ["plan.mcap", "nested_plan.mcap"] {
+        assert_same(&read_mcap(&data(name), &ROBOT).unwrap(), "plan.csv", name);
+    }
+}
+
+#[test]
+fn the_set_point_of_a_controller_is_taken_and_not_what_was_measured() {
+    let motion = read_mcap(&data("controller.mcap"), &ROBOT).unwrap();
+    assert_same(&motion, "states.csv", "controller.mcap");
+}
+
+#[test]
+fn sqlite_bags_and_folders_with_metadata_are_the_motion_of_the_csv() {
+    for name in ["bag_sqlite", "bag_mcap", "bag_messages_packed", "bag_file_packed"] {
+        assert_same(&read_folder(&data(name), &ROBOT).unwrap(), "states.csv", name);
+    }
+    assert_same(&read_db3(&data("old.db3"), &ROBOT).unwrap(), "states.csv", "old.db3");
+    let packed = data("bag_file_packed/bag_file_packed.db3.zstd");
+    let motion = read_packed(&packed, &ROBOT).unwrap();
+    assert_same(&motion, "states.csv", "a packed file alone");
+    assert_eq!(motion.format, "SQLite bag");
+}
+
+#[test]
+fn of_two_topics_the_states_are_taken_and_the_choice_is_told_and_can_be_made() {
+    let path = data("both.mcap");
+    let motion = read_mcap(&path, &ROBOT).unwrap();
+    assert_eq!(motion.topic.as_deref(), Some("/joint_states"));
+    let said = told(&motion);
+    assert!(
+        said.iter()
+            .any(|line| line.starts_with("warning motion-topic") && line.contains("/arm_controller/controller_state")),
+        "{said:#?}"
+    );
+    let asked = Request { topic: Some("arm_controller/controller_state"), ..ROBOT };
+    let motion = read_mcap(&path, &asked).unwrap();
+    assert_eq!(motion.topic.as_deref(), Some("/arm_controller/controller_state"));
+    assert!(!told(&motion).iter().any(|line| line.contains("motion-topic")));
+}
+
+#[test]
+fn without_a_robot_every_joint_is_kept() {
+    let motion = read_mcap(&data("states_zstd.mcap"), &Request::default()).unwrap();
+    assert_eq!(motion.trajectory.joints(), ["joint_1", "joint_2", "gripper_finger_joint"]);
+    assert!(motion.dropped.is_empty());
+}
+
+#[test]
+fn what_is_written_as_a_joint_trajectory_reads_back_as_the_same_motion() {
+    let truth = truth("plan.csv");
+    for format in [TextFormat::Yaml, TextFormat::Json] {
+        // At the rate of the samples the pieces are the same polynomials.
+        let text = write_joint_trajectory(&truth, 50.0, format).unwrap();
+        let back = read_text(&text, "back", &Request::default()).unwrap();
+        let [q, v, a] = differences(&back.trajectory, &truth);
+        assert!(q < 1e-12 && v < 1e-10 && a < 1e-8, "{format:?}: {q:e} {v:e} {a:e}");
+    }
+}
+
+#[test]
+fn a_bag_that_is_cut_off_is_read_up_to_there_and_says_so() {
+    let place = std::env::temp_dir().join(format!("flexarm-motion-cut-{}", std::process::id()));
+    std::fs::create_dir_all(&place).unwrap();
+    for name in ["states_zstd.mcap", "states_lz4.mcap", "states_plain.mcap"] {
+        let whole = std::fs::read(data(name)).unwrap();
+        let path = place.join(name);
+        let mut last = usize::MAX;
+        for part in [0.75, 0.5, 0.4] {
+            std::fs::write(&path, &whole[..(part * whole.len() as f64) as usize]).unwrap();
+            match read_mcap(&path, &ROBOT) {
+                Ok(motion) => {
+                    assert!(motion.samples < 27 && motion.samples <= last, "{name}");
+                    last = motion.samples;
+                    let d = motion.trajectory.duration();
+                    assert!((d - 0.02 * (motion.samples - 1) as f64).abs() < 1e-9, "{name} {d}");
+                    if part < 0.7 {
+                        assert!(
+                            told(&motion).iter().any(|line| line.contains("motion-cut")),
+                            "{name}: {:#?}",
+                            told(&motion)
+                        );
+                    }
+                }
+                Err(error) => assert!(
+                    error.to_string().contains("end is missing") || error.to_string().contains("packed"),
+                    "{error}"
+                ),
+            }
+        }
+    }
+    std::fs::remove_dir_all(&place).unwrap();
+}
+
+// ------------------------------------------------------------------------------------------------------- what is odd, as text
+
+fn state(stamp_ns: i64, joints: &[(&str, f64, Option<f64>)]) -> String {
+    let list = |values: Vec<String>| format!("[{}]", values.join(", "));
+    let velocities: Vec<String> = joints
+        .iter()
+        .filter_map(|(_, _, v)| v.map(|v| if v.is_nan() { ".nan".into() } else { format!("{v:?}") }))
+        .collect();
+    format!(
+        "header: {{stamp: {{sec: {}, nanosec: {}}}, frame_id: ''}}\nname: {}\nposition: {}\nvelocity: {}\neffort: []\n---\n",
+        stamp_ns / 1_000_000_000,
+        stamp_ns % 1_000_000_000,
+        list(joints.iter().map(|(name, ..)| (*name).to_owned()).collect()),
+        list(joints.iter().map(|(_, q, _)| if q.is_nan() { ".nan".into() } else { format!("{q:?}") }).collect()),
+        list(velocities),
+    )
+}
+
+const T0: i64 = 1_700_000_000_000_000_000;
+
+fn at(motion: &MessageMotion, t: f64) -> Vec<f64> {
+    let n = motion.trajectory.joints().len();
+    let mut q = vec![0.0; n];
+    motion.trajectory.sample(t, &mut q, &mut vec![0.0; n], &mut vec![0.0; n]);
+    q
+}
+
+#[test]
+fn publishers_of_different_joints_on_one_topic_keep_their_own_times() {
+    // joint_1 every 10 ms; joint_2 every 25 ms and 4 ms later; a gripper in between.
+    let mut messages: Vec<(i64, String)> = Vec::new();
+    for k in 0..41 {
+        let t = 10_000_000 * k;
+        messages.push((t, state(T0 + t, &[("joint_1", 0.5 * (t as f64 * 1e-9), None)])));
+    }
+    for k in 0..16 {
+        let t = 4_000_000 + 25_000_000 * k;
+        messages.push((t, state(T0 + t, &[("joint_2", 1.0 - 2.0 * (t as f64 * 1e-9), None), ("finger", 0.1, None)])));
+    }
+    messages.sort_by_key(|(t, _)| *t);
+    let text: String = messages.into_iter().map(|(_, text)| text).collect();
+    let motion = read_text(&text, "two publishers", &ROBOT).unwrap();
+    assert!((motion.trajectory.duration() - 0.4).abs() < 1e-12);
+    let q = at(&motion, 0.2);
+    assert!((q[0] - 0.1).abs() < 1e-9 && (q[1] - 0.6).abs() < 1e-9, "{q:?}");
+    // Before its first sample it is held there.
+    assert!((at(&motion, 0.001)[1] - 0.992).abs() < 1e-12);
+    assert_eq!(motion.dropped, ["finger"]);
+}
+
+#[test]
+fn velocities_that_are_no_numbers_or_not_those_of_the_positions_are_not_used_and_told() {
+    let wave = |k: i64| (0.2 * (k as f64) * 0.02 * std::f64::consts::PI).sin();
+    let text = |v: &dyn Fn(i64) -> Option<f64>| -> String {
+        (0..51).map(|k| state(T0 + 20_000_000 * k, &[("joint_1", wave(k), v(k))])).collect()
+    };
+    let plain = read_text(&text(&|_| None), "none", &ROBOT).unwrap();
+    for (what, v) in [("zeros", Some(0.0)), ("nan", Some(f64::NAN))] {
+        let motion = read_text(&text(&|_| v), what, &ROBOT).unwrap();
+        assert_eq!(differences(&motion.trajectory, &plain.trajectory)[0], 0.0, "{what}");
+    }
+    let zeros = told(&read_text(&text(&|_| Some(0.0)), "zeros", &ROBOT).unwrap());
+    assert!(zeros.iter().any(|line| line.contains("not those of the positions")), "{zeros:#?}");
+    let mixed = told(&read_text(&text(&|k| Some(if k == 7 { f64::NAN } else { 0.1 })), "mixed", &ROBOT).unwrap());
+    assert!(
+        mixed.iter().any(|line| line.contains("not numbers at every sample") && line.contains("50 of 51")),
+        "{mixed:#?}"
+    );
+}
+
+#[test]
+fn repeated_stamps_disorder_and_positions_that_are_no_numbers_are_left_out_and_told() {
+    let mut text: String = (0..20).map(|k| state(T0 + 10_000_000 * k, &[("joint_1", 0.01 * k as f64, None)])).collect();
+    text += &state(T0 + 190_000_000, &[("joint_1", 0.19, None)]);
+    text += &state(T0 + 210_000_000, &[("joint_1", 0.21, None)]);
+    text += &state(T0 + 200_000_000, &[("joint_1", 0.20, None)]);
+    text += &state(T0 + 220_000_000, &[("joint_1", f64::NAN, None)]);
+    text += &state(T0 + 230_000_000, &[("joint_1", 0.23, None)]);
+    let motion = read_text(&text, "odd", &ROBOT).unwrap();
+    assert_eq!(motion.samples, 23);
+    assert!((at(&motion, 0.205)[0] - 0.205).abs() < 1e-9);
+    let said = told(&motion).join("\n");
+    assert!(said.contains("1 samples have the time of the one before"), "{said}");
+    assert!(said.contains("1 samples came out of order"), "{said}");
+    assert!(said.contains("1 of 25 positions are no numbers"), "{said}");
+}
+
+#[test]
+fn plans_of_one_message_follow_each_other_and_a_start_that_is_told_is_where_the_motion_begins() {
+    let plan = |from: f64, to: f64, first: f64| {
+        format!(
+            "{{joint_trajectory: {{joint_names: [joint_1], points: [{{positions: [{from}], velocities: [0], time_from_start: {first}}}, \
+             {{positions: [{to}], velocities: [0], time_from_start: 1.0}}]}}}}"
+        )
+    };
+    let text = format!("trajectory: [{}, {}]", plan(0.0, 0.5, 0.0), plan(0.5, 0.2, 0.0));
+    let motion = read_text(&text, "two", &ROBOT).unwrap();
+    assert_eq!(motion.trajectory.duration(), 2.0);
+    assert!((at(&motion, 1.0)[0] - 0.5).abs() < 1e-12 && (at(&motion, 2.0)[0] - 0.2).abs() < 1e-12);
+
+    let gap = format!("trajectory: [{}, {}]", plan(0.0, 0.5, 0.0), plan(0.7, 0.2, 0.0));
+    let error = read_text(&gap, "gap", &ROBOT).unwrap_err().to_string();
+    assert!(
+        error.contains("trajectory 2 has joint \"joint_1\" at 0.7 where the one before ends with it at 0.5"),
+        "{error}"
+    );
+
+    let start = "trajectory_start: {joint_state: {name: [joint_1], position: [-0.1]}}\n";
+    let text = format!("{start}trajectory: [{}]", plan(0.0, 0.5, 0.25));
+    let motion = read_text(&text, "start", &ROBOT).unwrap();
+    assert_eq!(motion.trajectory.duration(), 1.0);
+    assert!((at(&motion, 0.0)[0] + 0.1).abs() < 1e-12 && at(&motion, 0.25)[0].abs() < 1e-12);
+    // Without it the motion begins with the first point, and says so.
+    let motion = read_text(&format!("trajectory: [{}]", plan(0.0, 0.5, 0.25)), "no start", &ROBOT).unwrap();
+    assert_eq!(motion.trajectory.duration(), 0.75);
+    assert!(told(&motion).iter().any(|line| line.contains("the first point is at 0.25 s")));
+}
+
+#[test]
+fn a_later_trajectory_takes_the_place_of_what_is_left_of_the_one_before() {
+    let plan = |sec: i64, from: f64, to: f64| {
+        format!(
+            "header: {{stamp: {{sec: {sec}, nanosec: 0}}}}\njoint_names: [joint_1]\npoints:\n\
+             - {{positions: [{from}], velocities: [0.0], time_from_start: {{sec: 0, nanosec: 0}}}}\n\
+             - {{positions: [{to}], velocities: [0.0], time_from_start: {{sec: 2, nanosec: 0}}}}\n---\n"
+        )
+    };
+    // The second begins five seconds later: the robot waits in between.
+    let motion = read_text(&(plan(100, 0.0, 1.0) + &plan(105, 1.0, 0.0)), "wait", &ROBOT).unwrap();
+    assert_eq!(motion.trajectory.duration(), 7.0);
+    for t in [2.0, 3.0, 4.5, 5.0] {
+        assert!((at(&motion, t)[0] - 1.0).abs() < 1e-12, "{t}: {:?}", at(&motion, t));
+    }
+    assert!((at(&motion, 6.0)[0] - 0.5).abs() < 1e-12);
+    assert!(told(&motion).iter().any(|line| line.contains("2 trajectories: each begins at its header stamp")));
+}
+
+// ------------------------------------------------------------------------------------------------------------------- refused
+
+fn refusal(result: Result<MessageMotion, MotionError>) -> String {
+    result.map(|motion| motion.trajectory.duration()).unwrap_err().to_string()
+}
+
+#[test]
+fn what_is_wrong_with_a_text_is_told_with_its_line() {
+    let points = "joint_names: [joint_1, joint_2]\npoints:\n";
+    let cases = [
+        ("a: [1, 2]\nb: [3, 4", "t, line 3: the text is neither YAML nor JSON:"),
+        ("a: 1\nb: 2\n", "t: there is no motion in the text: expected a JointTrajectory (`joint_names` and `points`)"),
+        (
+            &format!("{points}- positions: [0.0]\n  time_from_start: 0.0\n"),
+            "t, line 3: `positions` has 1 values for 2 joints; expected one for each name",
+        ),
+        (
+            &format!("{points}- positions: []\n  velocities: [1, 1]\n  time_from_start: 0.0\n"),
+            "t, line 3: `positions` has 0 values for 2 joints; expected one for each name: a trajectory without positions",
+        ),
+        (
+            &format!("{points}- positions: [0, 0]\n"),
+            "t, line 3: point 1 has no `time_from_start`; expected sec and nanosec, or seconds",
+        ),
+        (
+            &format!(
+                "{points}- {{positions: [0, 0], time_from_start: 1.0}}\n- {{positions: [1, 1], time_from_start: 1.0}}\n"
+            ),
+            "t, line 4: point 2 is at 1 s, the one before it at 1 s: `time_from_start` must increase",
+        ),
+        (
+            &format!("{points}- {{positions: [0, .nan], time_from_start: 1.0}}\n"),
+            "t, line 3: joint \"joint_2\", point 1: the position is NaN; expected a finite number",
+        ),
+        (
+            &format!("{points}- {{positions: [0, 0, '...'], time_from_start: 1.0}}\n"),
+            "t, line 3: an array ends with \"...\": it was shortened when it was printed",
+        ),
+        (
+            &format!("{points}- {{positions: [0, zero], time_from_start: 1.0}}\n"),
+            "t, line 3: `positions` is the text \"zero\"; expected numbers alone",
+        ),
+        (
+            "joint_names: [joint_1, joint_1]\npoints:\n- {positions: [0, 0], time_from_start: 1.0}\n",
+            "t, line 1: joint \"joint_1\" is named twice in one message",
+        ),
+        (
+            "name: [joint_1]\nposition: [0.0]\n---\nname: [joint_1]\nposition: [0.1]\n",
+            "t: the messages have no time stamps (`header`, `stamp`)",
+        ),
+        (
+            &format!("{points}- {{positions: [0, 0], time_from_start: soon}}\n"),
+            "t, line 3: `time_from_start` is the text \"soon\"; expected sec and nanosec, secs and nsecs, or seconds",
+        ),
+        (
+            &format!("{points}- {{positions: [0, 0], time_from_start: 0}}\n"),
+            "t: 1 rows of samples; expected at least 2",
+        ),
+        (
+            "joint_names: [a, b]\npoints:\n- {positions: [0, 0], time_from_start: 0}\n- {positions: [0, 1], time_from_start: 1}\n",
+            "t: none of the joints \"a\", \"b\" is a joint of the robot",
+        ),
+    ];
+    for (text, expected) in cases {
+        let found = refusal(read_text(text, "t", &ROBOT));
+        assert!(found.starts_with(expected), "{text}\nfound    {found}\nexpected {expected}");
+    }
+    let backwards = state(T0 + 50_000_000_000, &[("joint_1", 0.0, None)]) + &state(T0, &[("joint_1", 1.0, None)]);
+    let found = refusal(read_text(&backwards, "t", &ROBOT));
+    assert!(found.starts_with("t: the time stamps jump back by 50 s at sample 2 of joint \"joint_1\""), "{found}");
+    let found = refusal(read_text("a: 1", "t", &Request { topic: Some("/x"), ..ROBOT }));
+    assert!(found.contains("a text of messages has none"), "{found}");
+}
+
+#[test]
+fn aliases_that_multiply_and_deep_nesting_are_refused() {
+    let mut bomb = "a0: &a0 [1,1,1,1,1,1,1,1,1,1]\n".to_owned();
+    for k in 1..12 {
+        let inner = format!("*a{}, ", k - 1).repeat(10);
+        bomb += &format!("a{k}: &a{k} [{}]\n", inner.trim_end_matches(", "));
+    }
+    let found = refusal(read_text(&bomb, "t", &ROBOT));
+    assert!(found.contains("more than 20000000 numbers"), "{found}");
+    let found = refusal(read_text(&"[".repeat(100_000), "t", &ROBOT));
+    assert!(found.contains("nested more than 40 deep") || found.contains("neither YAML"), "{found}");
+}
+
+#[test]
+fn what_is_wrong_with_a_bag_is_told() {
+    let asked = |topic| Request { topic: Some(topic), ..ROBOT };
+    let found = refusal(read_mcap(&data("both.mcap"), &asked("/nothing")));
+    assert!(found.contains("the topic \"/nothing\" (topic) is not in the file; topics with motions are /arm_controller/controller_state (control_msgs/msg/JointTrajectoryControllerState, 26 messages)"), "{found}");
+    let found = refusal(read_mcap(&data("states_zstd.mcap"), &asked("/chatter")));
+    assert!(found.contains("has messages of the type std_msgs/msg/String, which hold no motion"), "{found}");
+    let other = Request { joints: Some(&["axis_1"]), topic: None };
+    let found = refusal(read_mcap(&data("states_zstd.mcap"), &other));
+    assert!(
+        found.contains("none of the joints \"gripper_finger_joint\", \"joint_1\", \"joint_2\" is a joint of the robot"),
+        "{found}"
+    );
+    let found = refusal(read_folder(&data(""), &ROBOT));
+    assert!(found.contains("it has no metadata.yaml and files of several bags; give one of the files"), "{found}");
+    let found = refusal(read_folder(&data("nothing"), &ROBOT));
+    assert!(found.starts_with("cannot read motion "), "{found}");
+}
+
+#[test]
+fn bytes_changed_anywhere_in_a_bag_end_in_a_motion_or_an_error() {
+    let place = std::env::temp_dir().join(format!("flexarm-motion-bytes-{}", std::process::id()));
+    std::fs::create_dir_all(&place).unwrap();
+    let mut seed = 1_u64;
+    let mut random = |below: usize| {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (seed >> 33) as usize % below
+    };
+    for name in ["states_plain.mcap", "states_lz4.mcap", "states_zstd.mcap", "old.db3"] {
+        let whole = std::fs::read(data(name)).unwrap();
+        for _ in 0..60 {
+            let mut bytes = whole.clone();
+            for _ in 0..1 + random(8) {
+                let at = random(bytes.len());
+                bytes[at] = [0, 0xFF, 0x7F, random(256) as u8][random(4)];
+            }
+            let path = place.join(name);
+            std::fs::write(&path, &bytes).unwrap();
+            let read = if name.ends_with("db3") { read_db3(&path, &ROBOT) } else { read_mcap(&path, &ROBOT) };
+            match read {
+                Ok(motion) => assert!(motion.trajectory.duration() > 0.0),
+                Err(error) => assert!(!error.to_string().is_empty()),
+            }
+        }
+    }
+    std::fs::remove_dir_all(&place).unwrap();
+}

@@ -1,0 +1,174 @@
+//! What the names of columns say: joint or time, position or rate, and the unit.
+
+use std::f64::consts::PI;
+
+/// What a unit measures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Measure {
+    Time,
+    Angle,
+    Length,
+}
+
+/// A unit: what it measures, how often it is divided by s, and its factor to SI.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Unit {
+    pub(super) measure: Measure,
+    pub(super) per_s: usize,
+    pub(super) scale: f64,
+}
+
+const UNITS: [(&[&str], Measure, f64); 10] = [
+    (&["s", "sec", "secs", "second", "seconds"], Measure::Time, 1.0),
+    (&["ms", "msec", "millisecond", "milliseconds"], Measure::Time, 1e-3),
+    (&["us", "µs", "μs", "usec", "microseconds"], Measure::Time, 1e-6),
+    (&["ns", "nsec", "nanoseconds"], Measure::Time, 1e-9),
+    (&["min"], Measure::Time, 60.0),
+    (&["rad", "radian", "radians"], Measure::Angle, 1.0),
+    (&["mrad"], Measure::Angle, 1e-3),
+    (&["deg", "degree", "degrees", "°", "grad_deg"], Measure::Angle, PI / 180.0),
+    (&["m", "meter", "metre", "meters", "metres"], Measure::Length, 1.0),
+    (&["mm", "millimeter", "millimetre"], Measure::Length, 1e-3),
+];
+/// Units that may stand behind an underscore.
+const SUFFIXES: [&str; 9] = ["s", "sec", "ms", "us", "ns", "rad", "deg", "m", "mm"];
+const TIMES: [&str; 9] = ["time", "t", "timestamp", "time_stamp", "%time", "__time", "zeit", "elapsed", "elapsed_time"];
+const RATES: [(&str, usize); 8] = [
+    ("velocity", 1),
+    ("vel", 1),
+    ("speed", 1),
+    ("acceleration", 2),
+    ("accel", 2),
+    ("acc", 2),
+    ("position", 0),
+    ("pos", 0),
+];
+/// Words of columns that are no motion.
+const OTHERS: [&str; 6] = ["effort", "torque", "current", "eff", "temperature", "force"];
+
+/// The unit of a word such as `deg`, `rad/s` or `deg/s^2`.
+pub(super) fn unit(word: &str) -> Option<Unit> {
+    let word = word.trim().trim_matches(['[', ']', '(', ')']).trim();
+    let ends = [
+        ("/s^2", 2),
+        ("/s2", 2),
+        ("/s²", 2),
+        ("/s**2", 2),
+        ("_s2", 2),
+        ("/sec", 1),
+        ("/s", 1),
+        ("_s", 1),
+        (" s^-1", 1),
+    ];
+    let (base, per_s) = ends.iter().find_map(|(end, n)| Some((word.strip_suffix(end)?, *n))).unwrap_or((word, 0));
+    let base = base.trim();
+    let known =
+        |(words, ..): &&(&[&str], Measure, f64)| words.iter().any(|w| *w == base || *w == base.to_ascii_lowercase());
+    let (_, measure, scale) = UNITS.iter().find(known)?;
+    let is_sound = per_s == 0 || *measure != Measure::Time;
+    is_sound.then_some(Unit { measure: *measure, per_s, scale: *scale })
+}
+
+/// Name and unit of a column: `A1[deg]`, `joint_1 (rad)`, `q1_deg`, `t / s`. A bracket that holds no unit belongs to the name,
+/// and is returned as the third: a unit that is not known.
+pub(super) fn name_and_unit(column: &str) -> (String, Option<Unit>, Option<String>) {
+    let column = column.trim();
+    for (open, close) in [('[', ']'), ('(', ')'), ('{', '}'), ('<', '>')] {
+        if let Some(rest) = column.strip_suffix(close)
+            && let Some((name, inside)) = rest.rsplit_once(open)
+        {
+            return match unit(inside) {
+                Some(unit) => (name.trim_end_matches(['_', ' ', '.']).trim().to_owned(), Some(unit), None),
+                None => (column.to_owned(), None, Some(inside.to_owned())),
+            };
+        }
+    }
+    if let Some((name, word)) = column.rsplit_once(" / ").or_else(|| column.rsplit_once(" in "))
+        && let Some(unit) = unit(word)
+    {
+        return (name.trim().to_owned(), Some(unit), None);
+    }
+    // `vel_deg_s` before `_s`.
+    for word in ["rad_s2", "deg_s2", "rad_s", "deg_s", "m_s2", "m_s", "mm_s"] {
+        if let Some(name) = column.strip_suffix(word).and_then(|name| name.strip_suffix('_')) {
+            return (name.to_owned(), unit(word), None);
+        }
+    }
+    for word in SUFFIXES {
+        let ended =
+            column.to_ascii_lowercase().strip_suffix(word).is_some_and(|name| name.ends_with('_') && name.len() > 1);
+        if ended {
+            return (column[..column.len() - word.len() - 1].to_owned(), unit(word), None);
+        }
+    }
+    (column.to_owned(), None, None)
+}
+
+/// What a column is about.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Meaning {
+    Time,
+    /// A value of a joint, differentiated so many times.
+    Joint(String, usize),
+    Other,
+}
+
+/// What the name of a column, without its unit, says.
+pub(super) fn meaning(name: &str, unit: Option<Unit>) -> Meaning {
+    let lower = name.to_ascii_lowercase();
+    if TIMES.contains(&lower.as_str()) || unit.is_some_and(|unit| unit.measure == Measure::Time) {
+        return Meaning::Time;
+    }
+    let ends_with = |word: &str| {
+        let rest = lower.strip_suffix(word)?;
+        let cut = rest.strip_suffix(['.', '_', '/', ' '])?;
+        (!cut.is_empty()).then_some(cut.len())
+    };
+    if OTHERS.iter().any(|word| ends_with(word).is_some() || lower == *word) {
+        return Meaning::Other;
+    }
+    let rate = RATES.iter().find_map(|(word, order)| Some((ends_with(word)?, *order)));
+    let (base, order) = rate.map_or((name, None), |(length, order)| (&name[..length], Some(order)));
+    // The path of a topic ends with the joint: `/joint_states/joint_1/position`.
+    let base = if rate.is_some() { base.rsplit('/').next().unwrap_or(base) } else { base };
+    let order = order.unwrap_or(0).max(unit.map_or(0, |unit| unit.per_s));
+    Meaning::Joint(base.to_owned(), order)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_are_found_in_brackets_behind_slashes_and_underscores() {
+        for (column, name, scale) in [
+            ("A1[deg]", "A1", PI / 180.0),
+            ("joint_1 (rad)", "joint_1", 1.0),
+            ("q1_deg", "q1", PI / 180.0),
+            ("Time[ms]", "Time", 1e-3),
+            ("t / s", "t", 1.0),
+            ("Zeit in ms", "Zeit", 1e-3),
+            ("rail [mm]", "rail", 1e-3),
+            ("A1 [°]", "A1", PI / 180.0),
+            ("vel_A1[deg/s]", "vel_A1", PI / 180.0),
+            ("w1_deg_s", "w1", PI / 180.0),
+        ] {
+            let (found, unit, unknown) = name_and_unit(column);
+            assert_eq!((found.as_str(), unit.map(|u| u.scale), unknown), (name, Some(scale), None), "{column}");
+        }
+        assert_eq!(name_and_unit("joint_1"), ("joint_1".to_owned(), None, None));
+        assert_eq!(name_and_unit("A1[%]").2, Some("%".to_owned()));
+    }
+
+    #[test]
+    fn rates_and_paths_of_topics_lead_to_their_joint() {
+        let joint = |name: &str, order| Meaning::Joint(name.to_owned(), order);
+        assert_eq!(meaning("/joint_states/joint_1/position", None), joint("joint_1", 0));
+        assert_eq!(meaning("/joint_states/joint_1/velocity", None), joint("joint_1", 1));
+        assert_eq!(meaning("/joint_states/joint_1/effort", None), Meaning::Other);
+        assert_eq!(meaning("A1.vel", None), joint("A1", 1));
+        assert_eq!(meaning("A1", unit("deg/s")), joint("A1", 1));
+        assert_eq!(meaning("Timestamp", None), Meaning::Time);
+        assert_eq!(meaning("joint_1", None), joint("joint_1", 0));
+    }
+}

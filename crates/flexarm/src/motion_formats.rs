@@ -1,0 +1,340 @@
+//! Which formats of motions are read: one row each, recognised by content. A format more is a row more.
+
+use std::io::Read;
+use std::path::Path;
+
+use flexarm_motion_io::{
+    MCAP_MAGIC, MessageMotion, MotionError, Problem, Request, SQLITE_MAGIC, ZSTD_MAGIC, looks_like_messages, read_db3,
+    read_folder, read_mcap, read_packed, read_text,
+};
+use flexarm_settings::{Caveat, Setting};
+use flexarm_trajectory::{ColumnMap, JointLimits, KnownJoint, TableRequest, Trajectory, text_of_file};
+use flexarm_urdf::closest;
+
+use crate::error::Error;
+use crate::tool_path::{Cell, ToolPath, is_path_file, read_path_file, read_robot_program};
+use flexarm_programs::recognise;
+
+/// Bytes that a file is recognised by.
+const LOOKED_AT: u64 = 64 << 10;
+
+/// What is said about a motion file beside its path.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MotionOptions {
+    /// The topic of a bag; without it one is chosen, and told.
+    pub topic: Option<String>,
+    /// Which columns of a table are time and joints; without it their names say it.
+    pub columns: Option<ColumnMap>,
+}
+
+/// A motion as it stands in its file.
+pub(crate) struct ReadMotion {
+    pub(crate) trajectory: Trajectory,
+    /// What the file is, in words.
+    pub(crate) format: String,
+    pub(crate) topic: Option<String>,
+    /// Rows, messages or points; none for waypoints.
+    pub(crate) samples: Option<usize>,
+    /// Joints of the file that the robot does not have, where that is no error.
+    pub(crate) dropped: Vec<String>,
+    pub(crate) caveats: Vec<Caveat>,
+    /// What became of each move, of a motion that is told by the path of the tool.
+    pub(crate) tool_path: Option<ToolPath>,
+}
+
+/// The beginning of a file.
+pub(crate) struct Head<'a> {
+    /// Ending of its name in small letters.
+    pub(crate) ending: &'a str,
+    pub(crate) bytes: &'a [u8],
+    /// The same as text, as far as it is UTF-8; empty for bytes.
+    pub(crate) text: &'a str,
+    pub(crate) is_folder: bool,
+}
+
+/// A file that is to be read, for whom, and what was said about it.
+pub(crate) struct MotionFile<'a> {
+    pub(crate) path: &'a Path,
+    /// Joints of the robot; none if it is not known.
+    pub(crate) joints: Option<&'a [KnownJoint<'a>]>,
+    pub(crate) limits: &'a [(&'a str, JointLimits)],
+    pub(crate) options: &'a MotionOptions,
+    /// The robot that follows a path of its tool; none if it is not known.
+    pub(crate) cell: Option<&'a Cell<'a>>,
+}
+
+/// A format of motions.
+pub(crate) struct MotionFormat {
+    /// For the list of what is read.
+    pub(crate) name: &'static str,
+    pub(crate) recognises: fn(&Head<'_>) -> bool,
+    pub(crate) read: fn(&MotionFile<'_>) -> Result<ReadMotion, Error>,
+}
+
+/// Asked one after another: what has a mark of its own first, tables last.
+const FORMATS: [MotionFormat; 10] = [
+    MotionFormat { name: "folders of rosbag2", recognises: |head| head.is_folder, read: |file| bag(file, read_folder) },
+    MotionFormat {
+        name: "bags as MCAP",
+        recognises: |head| head.bytes.starts_with(MCAP_MAGIC),
+        read: |file| bag(file, read_mcap),
+    },
+    MotionFormat {
+        name: "bags as SQLite (.db3)",
+        recognises: |head| head.bytes.starts_with(SQLITE_MAGIC),
+        read: |file| bag(file, read_db3),
+    },
+    MotionFormat {
+        name: "either packed by zstd",
+        recognises: |head| head.bytes.starts_with(ZSTD_MAGIC),
+        read: |file| bag(file, read_packed),
+    },
+    MotionFormat {
+        name: "paths of the tool (TOML with [path])",
+        recognises: |head| is_toml(head) && is_path_file(head.text),
+        read: tool_path,
+    },
+    MotionFormat { name: "waypoints (TOML)", recognises: is_toml, read: waypoints },
+    MotionFormat {
+        name: "robot programs (KUKA KRL, ABB RAPID, URScript, G-code)",
+        recognises: is_program,
+        read: robot_program,
+    },
+    MotionFormat {
+        name: "messages of ROS as YAML or JSON (JointTrajectory, JointState)",
+        recognises: is_message,
+        read: messages,
+    },
+    MotionFormat { name: "samples (CSV) and other tables", recognises: is_table, read: table },
+    // A name that ends so asks for its own messages when nothing in the file can be recognised.
+    MotionFormat { name: "", recognises: |head| head.ending == "csv", read: table },
+];
+
+/// Reads a motion file of any format.
+pub(crate) fn read(file: &MotionFile<'_>) -> Result<ReadMotion, Error> {
+    let path = file.path;
+    if !path.exists() {
+        let what = "there is no such trajectory file; give a .csv or .toml file".into();
+        return Err(Error::File { path: path.to_owned(), what });
+    }
+    let mut bytes = Vec::new();
+    let is_folder = path.is_dir();
+    if !is_folder {
+        if !path.is_file() {
+            return Err(unreadable(path, std::io::Error::other("this is not a file")));
+        }
+        let opened = std::fs::File::open(path).and_then(|open| open.take(LOOKED_AT).read_to_end(&mut bytes));
+        opened.map_err(|source| unreadable(path, source))?;
+    }
+    let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
+    let decoded = start_as_text(&bytes);
+    let head = Head { ending: &ending, bytes: &bytes, text: &decoded, is_folder };
+    match FORMATS.iter().find(|format| (format.recognises)(&head)) {
+        Some(format) => (format.read)(file),
+        None => Err(Error::File { path: path.to_owned(), what: unknown(&head) }),
+    }
+}
+
+fn unreadable(path: &Path, source: std::io::Error) -> Error {
+    flexarm_trajectory::TrajectoryError::Read { path: path.to_owned(), source }.into()
+}
+
+/// The text at the beginning of a file, up to the first byte that is none; a mark of UTF-16 is followed.
+fn start_as_text(bytes: &[u8]) -> String {
+    if bytes.starts_with(&[0xFF, 0xFE]) || bytes.starts_with(&[0xFE, 0xFF]) {
+        let whole = bytes[..bytes.len() - bytes.len() % 2].to_vec();
+        return flexarm_trajectory::text_of_bytes(whole, "").unwrap_or_default();
+    }
+    let text = match std::str::from_utf8(bytes) {
+        Ok(text) => text,
+        Err(error) => std::str::from_utf8(&bytes[..error.valid_up_to()]).unwrap_or_default(),
+    };
+    text.trim_start_matches('\u{feff}').to_owned()
+}
+
+/// What is said of a file that is nothing of the list.
+fn unknown(head: &Head<'_>) -> String {
+    let names: Vec<&str> = FORMATS.iter().map(|format| format.name).filter(|name| !name.is_empty()).collect();
+    let found = match (head.bytes, head.text.lines().find(|line| !line.trim().is_empty())) {
+        ([], _) => "the file is empty".to_owned(),
+        (bytes, _) if bytes.starts_with(b"#ROSBAG") => {
+            return "it is a bag of ROS 1, which is not read; convert it to MCAP or rosbag2 (rosbags-convert, mcap convert)"
+                .to_owned();
+        }
+        (bytes, _) if bytes.contains(&0) && !bytes.starts_with(&[0xFF, 0xFE]) && !bytes.starts_with(&[0xFE, 0xFF]) => {
+            "it is not text and has no mark that is known".to_owned()
+        }
+        (_, Some(line)) => format!("it begins with {:?}", line.chars().take(40).collect::<String>()),
+        (_, None) => "it has no text".to_owned(),
+    };
+    format!("this is no motion that can be read: {found}; read are {}; rename or convert the file", names.join(", "))
+}
+
+// ------------------------------------------------------------------------------------------------------------- recognition
+
+fn is_toml(head: &Head<'_>) -> bool {
+    let is_key = |line: &str| {
+        let key = line.split_once('=').map(|(key, _)| key.trim());
+        line.trim_start().starts_with("[[move]]") || key.is_some_and(|key| ["format", "joints", "start"].contains(&key))
+    };
+    head.ending == "toml" || head.text.lines().any(is_key)
+}
+
+/// A program by its content; a table or text of messages is none, whatever its lines look like.
+fn is_program(head: &Head<'_>) -> bool {
+    let other = ["yaml", "yml", "json", "csv"].contains(&head.ending) || looks_like_messages(head.text);
+    !other && recognise(head.bytes, &format!("x.{}", head.ending)).is_some()
+}
+
+fn is_message(head: &Head<'_>) -> bool {
+    ["yaml", "yml", "json"].contains(&head.ending) || looks_like_messages(head.text)
+}
+
+/// Whether some line is mostly numbers, several of them.
+fn is_table(head: &Head<'_>) -> bool {
+    let of_numbers = |line: &str| {
+        let fields = |separators: &[char]| -> (usize, usize) {
+            let fields =
+                line.split(|c| separators.contains(&c)).map(|f| f.trim().trim_matches('"')).filter(|f| !f.is_empty());
+            let is_number = |field: &str| field.replace(',', ".").parse::<f64>().is_ok();
+            fields.fold((0, 0), |(all, numbers), field| (all + 1, numbers + usize::from(is_number(field))))
+        };
+        [&[';'][..], &['\t'], &[','], &[' ', '\t']].iter().any(|separators| {
+            let (all, numbers) = fields(separators);
+            all >= 2 && 2 * numbers > all
+        })
+    };
+    head.text.lines().take(1000).any(of_numbers)
+}
+
+// ------------------------------------------------------------------------------------------------------------------ readers
+
+fn waypoints(file: &MotionFile<'_>) -> Result<ReadMotion, Error> {
+    no_topic(file, "waypoints")?;
+    no_columns(file, "waypoints")?;
+    let trajectory = Trajectory::parse_toml(&text_of_file(file.path)?, &file.path.display().to_string(), file.limits)?;
+    let format = "waypoints".to_owned();
+    Ok(ReadMotion {
+        trajectory,
+        format,
+        topic: None,
+        samples: None,
+        dropped: Vec::new(),
+        caveats: Vec::new(),
+        tool_path: None,
+    })
+}
+
+fn tool_path(file: &MotionFile<'_>) -> Result<ReadMotion, Error> {
+    no_topic(file, "a path of the tool")?;
+    no_columns(file, "a path of the tool")?;
+    let (text, cell) = (text_of_file(file.path)?, robot_of(file)?);
+    Ok(along(read_path_file(file.path, &text, cell)?, "path of the tool".to_owned()))
+}
+
+fn robot_program(file: &MotionFile<'_>) -> Result<ReadMotion, Error> {
+    no_topic(file, "a robot program")?;
+    no_columns(file, "a robot program")?;
+    let cell = robot_of(file)?;
+    let (planned, language) = read_robot_program(file.path, cell)?;
+    Ok(along(planned, format!("robot program, {language}")))
+}
+
+fn along((trajectory, tool_path): (Trajectory, ToolPath), format: String) -> ReadMotion {
+    let (samples, caveats) = (Some(tool_path.moves.len()), tool_path.caveats());
+    ReadMotion { trajectory, format, topic: None, samples, dropped: Vec::new(), caveats, tool_path: Some(tool_path) }
+}
+
+/// The robot, without which the path of a tool is no motion of joints.
+fn robot_of<'a>(file: &MotionFile<'a>) -> Result<&'a Cell<'a>, Error> {
+    file.cell.ok_or_else(|| {
+        let what = "this is told by what the tool does: tell the robot as well, whose joints follow it".into();
+        Error::File { path: file.path.to_owned(), what }
+    })
+}
+
+fn table(file: &MotionFile<'_>) -> Result<ReadMotion, Error> {
+    no_topic(file, "a table")?;
+    let request = TableRequest { columns: file.options.columns.as_ref(), joints: file.joints };
+    let (text, origin) = (text_of_file(file.path)?, file.path.display().to_string());
+    let (trajectory, info) = Trajectory::parse_table(&text, &origin, &request)?;
+    let (format, samples) = (info.format, Some(info.rows));
+    Ok(ReadMotion {
+        trajectory,
+        format,
+        topic: None,
+        samples,
+        dropped: Vec::new(),
+        caveats: Vec::new(),
+        tool_path: None,
+    })
+}
+
+fn messages(file: &MotionFile<'_>) -> Result<ReadMotion, Error> {
+    no_columns(file, "a text of messages")?;
+    let (text, origin) = (text_of_file(file.path)?, file.path.display().to_string());
+    with_request(file, |request| read_text(&text, &origin, request))
+}
+
+fn bag(
+    file: &MotionFile<'_>,
+    read: fn(&Path, &Request<'_>) -> Result<MessageMotion, MotionError>,
+) -> Result<ReadMotion, Error> {
+    no_columns(file, "a bag")?;
+    with_request(file, |request| read(file.path, request))
+}
+
+fn with_request(
+    file: &MotionFile<'_>,
+    read: impl FnOnce(&Request<'_>) -> Result<MessageMotion, MotionError>,
+) -> Result<ReadMotion, Error> {
+    let names: Option<Vec<&str>> = file.joints.map(|joints| joints.iter().map(|joint| joint.name).collect());
+    let request = Request { joints: names.as_deref(), topic: file.options.topic.as_deref() };
+    let motion = read(&request).map_err(|error| match &error {
+        MotionError::Content { problem, .. } => match &**problem {
+            Problem::NoJoint { names: found } => unknown_joints(file.path, found, names.as_deref().unwrap_or_default()),
+            _ => Error::Motion(error),
+        },
+        _ => Error::Motion(error),
+    })?;
+    let MessageMotion { trajectory, format, topic, message, samples, dropped, caveats } = motion;
+    let format = format!("{format}, {message}");
+    Ok(ReadMotion { trajectory, format, topic, samples: Some(samples), dropped, caveats, tool_path: None })
+}
+
+fn no_topic(file: &MotionFile<'_>, what: &str) -> Result<(), Error> {
+    match &file.options.topic {
+        None => Ok(()),
+        Some(topic) => {
+            let what = format!(
+                "{} {topic:?} was asked for, and the file is {what}, which has no topics; leave it out",
+                Setting::Topic
+            );
+            Err(Error::File { path: file.path.to_owned(), what })
+        }
+    }
+}
+
+fn no_columns(file: &MotionFile<'_>, what: &str) -> Result<(), Error> {
+    if file.options.columns.is_none() {
+        return Ok(());
+    }
+    let what = format!("{} tells the columns of a table, and the file is {what}; leave it out", Setting::Columns);
+    Err(Error::File { path: file.path.to_owned(), what })
+}
+
+/// Joints that the robot does not have, each with the one that may be meant.
+pub(crate) fn unknown_joints(path: &Path, unknown: &[String], joints: &[&str]) -> Error {
+    let meant = |name: &String| match closest(name, joints.iter().copied()) {
+        Some(meant) => format!("{name:?} (did you mean {meant:?}?)"),
+        None => format!("{name:?}"),
+    };
+    let unknown: Vec<String> = unknown.iter().map(meant).collect();
+    let joints = joints.iter().map(|name| format!("{name:?}")).collect::<Vec<_>>().join(", ");
+    let what = format!(
+        "the motion moves {}, which the robot does not have; its joints are {joints}: rename them in the motion, or remove \
+         them",
+        unknown.join(", ")
+    );
+    Error::File { path: path.to_owned(), what }
+}
