@@ -19,6 +19,8 @@ const SHORTEST_BLEND: f64 = 1e-7;
 const BRAKING: f64 = 2.0;
 /// Least number of intervals of a piece.
 const LEAST_INTERVALS: usize = 24;
+/// The same of a piece shorter than the spacing: programs of milling have many.
+const LEAST_OF_SHORT: usize = 6;
 /// Most of them before the path is refined.
 const MOST_INTERVALS: usize = 4000;
 /// Most halvings of an interval.
@@ -339,7 +341,8 @@ fn slower(a: &Speed, b: &Speed) -> Speed {
 }
 
 fn intervals(length: f64, options: &PathOptions) -> usize {
-    ((length / options.spacing_m).ceil() as usize).clamp(LEAST_INTERVALS, MOST_INTERVALS)
+    let least = if length < options.spacing_m { LEAST_OF_SHORT } else { LEAST_INTERVALS };
+    ((length / options.spacing_m).ceil() as usize).clamp(least, MOST_INTERVALS)
 }
 
 /// Points of a way in joint space.

@@ -16,6 +16,10 @@ const ATTEMPTS: usize = 12;
 const AT_LIMIT: f64 = 0.02;
 /// Knots nearer than this are one, s.
 const SAME_TIME: f64 = 1e-6;
+/// Joints over time keep to those along the path within this, rad or m.
+const KEPT: f64 = 1e-10;
+/// Most intervals of the law between two knots.
+const MOST_INTERVALS: usize = 64;
 /// Most halvings between two knots.
 const HALVINGS: usize = 10;
 /// Widest jerk window that is tried, as a multiple of the one asked for.
@@ -126,34 +130,80 @@ impl<'r> Schedule<'r> {
     /// Appends the knots of this route, which begins at `now`, and what became of its moves.
     pub(crate) fn write(&self, now: f64, knots: &mut Vec<Knot>, moves: &mut Vec<PlannedMove>) {
         let stations = &self.route.stations;
-        let ends: Vec<usize> = self.route.pieces.iter().map(|piece| piece.stations[1]).collect();
-        // Places where the second derivative jumps, with their times.
-        let joints: Vec<(f64, usize)> =
-            ends[..ends.len() - 1].iter().map(|&k| (self.time_of(stations[k].s), k)).collect();
-        let mut times: Vec<f64> = self.law.knots().iter().map(|t| t * self.stretch).collect();
-        times.retain(|t| joints.iter().all(|(joint, _)| (t - joint).abs() > SAME_TIME));
-        times.extend(joints.iter().map(|(t, _)| *t));
-        times.sort_unstable_by(f64::total_cmp);
+        let pieces = &self.route.pieces;
+        // Places where the second derivative may jump, with their times.
+        let seams: Vec<(f64, usize)> = pieces[..pieces.len() - 1]
+            .iter()
+            .map(|piece| (self.time_of(stations[piece.stations[1]].s), piece.stations[1]))
+            .collect();
         let end = self.duration();
-        times.retain(|t| *t > SAME_TIME && *t < end - SAME_TIME);
-        times.dedup_by(|b, a| *b - *a < SAME_TIME && !joints.iter().any(|(t, _)| t == b));
+        let mut times = self.knot_times(&seams, end);
+        times.push((end, None));
 
-        let knot = |t: f64| match joints.iter().find(|(joint, _)| *joint == t) {
-            Some((_, k)) => self.knot_at(t, *k),
+        let knot = |&(t, seam): &(f64, Option<usize>)| match seam {
+            Some(station) => self.knot_at(t, station),
+            None if t == end => Knot::rest(end, &stations[stations.len() - 1].q),
             None => self.knot(t),
         };
         let mut last = Knot::rest(0.0, &stations[0].q);
         push(knots, now, last.clone());
-        for t in times {
-            let next = knot(t);
-            self.refine(&last, &next, HALVINGS, now, knots);
+        // As many intervals of the law as one quintic can hold; never across a seam.
+        let (mut k, mut stride) = (0, 1);
+        while k < times.len() {
+            let seam = times[k..].iter().position(|(_, seam)| seam.is_some()).unwrap_or(times.len() - 1 - k);
+            let skip = (stride - 1).min(seam).min(times.len() - 1 - k);
+            let next = knot(&times[k + skip]);
+            if skip > 0 && !self.fits(&last, &next) {
+                stride = skip.div_ceil(2);
+                continue;
+            }
+            if skip == 0 {
+                self.refine(&last, &next, HALVINGS, now, knots);
+            }
             push(knots, now, next.clone());
             last = next;
+            k += skip + 1;
+            stride = (2 * stride).min(MOST_INTERVALS);
         }
-        let stop = Knot::rest(end, &stations[stations.len() - 1].q);
-        self.refine(&last, &stop, HALVINGS, now, knots);
-        push(knots, now, stop);
-        moves.extend((0..self.route.legs.len()).map(|k| self.planned(k, now)));
+        let by_leg = self.pieces_by_leg();
+        moves.extend((0..self.route.legs.len()).map(|leg| self.planned(leg, &by_leg, now)));
+    }
+
+    /// Times of the law's knots between start and end, and of seams with their stations; ascending.
+    fn knot_times(&self, seams: &[(f64, usize)], end: f64) -> Vec<(f64, Option<usize>)> {
+        let mut times: Vec<(f64, Option<usize>)> = self.law.knots().iter().map(|t| (t * self.stretch, None)).collect();
+        times.extend(seams.iter().map(|(t, station)| (*t, Some(*station))));
+        times.sort_by(|a, b| a.0.total_cmp(&b.0));
+        times.retain(|(t, _)| *t > SAME_TIME && *t < end - SAME_TIME);
+        // Of two that are one, the seam stays.
+        times.dedup_by(|b, a| {
+            let same = b.0 - a.0 < SAME_TIME && (a.1.is_none() || b.1.is_none());
+            if same && b.1.is_some() {
+                *a = *b;
+            }
+            same
+        });
+        times
+    }
+
+    /// Does one quintic over time keep to the path between two knots?
+    fn fits(&self, a: &Knot, b: &Knot) -> bool {
+        let from = JointJet { q: a.q.clone(), d: a.v.clone(), dd: a.after.clone() };
+        let to = JointJet { q: b.q.clone(), d: b.v.clone(), dd: b.before.clone() };
+        let h = b.t - a.t;
+        [0.5, 0.25, 0.75, 0.1, 0.9].iter().all(|part| {
+            let guess = between(&from, &to, h, part * h).0;
+            (&guess.q - &self.knot(a.t + part * h).q).amax() <= KEPT
+        })
+    }
+
+    /// The first piece of each leg that is no blend, and the blend at its end.
+    fn pieces_by_leg(&self) -> Vec<[Option<usize>; 2]> {
+        let mut found = vec![[None, None]; self.route.legs.len()];
+        for (k, piece) in self.route.pieces.iter().enumerate() {
+            found[piece.leg][usize::from(piece.is_blend)] = Some(k);
+        }
+        found
     }
 
     /// Knots between two until the quintics over time keep to the path.
@@ -166,7 +216,7 @@ impl<'r> Schedule<'r> {
         let to = JointJet { q: b.q.clone(), d: b.v.clone(), dd: b.before.clone() };
         let guess = between(&from, &to, b.t - a.t, middle - a.t).0;
         let truth = self.knot(middle);
-        if (&guess.q - &truth.q).amax() <= 1e-10 {
+        if (&guess.q - &truth.q).amax() <= KEPT {
             return;
         }
         self.refine(a, &truth, depth - 1, now, knots);
@@ -202,24 +252,22 @@ impl<'r> Schedule<'r> {
     }
 
     /// What became of a leg.
-    fn planned(&self, leg: usize, now: f64) -> PlannedMove {
+    fn planned(&self, leg: usize, by_leg: &[[Option<usize>; 2]], now: f64) -> PlannedMove {
         let route = self.route;
-        let own = |piece: &&Piece| piece.leg == leg && !piece.is_blend;
-        let span = self.span(leg);
+        let span = self.span(leg, by_leg);
         let of = &route.legs[leg].of;
+        // Of a leg that its blends leave nothing of, the blend.
+        let own = by_leg[leg][0].or(by_leg[leg][1]).map(|k| &route.pieces[k]);
         let (mut top, mut slowed): (Option<f64>, Option<Slowed>) = (None, None);
-        let least_sigma = route.pieces.iter().find(own).and_then(|piece| piece.least_sigma);
-        for piece in route.pieces.iter().filter(own) {
-            for (tool, k) in piece.tool.iter().zip(piece.stations[0]..) {
-                let t = self.time_of_station(k);
-                let speed = tool.V.fixed_rows::<3>(0).norm() * self.progress(t)[1];
-                top = Some(top.map_or(speed, |top: f64| top.max(speed)));
-                let part = self.part(k, t);
-                if let Some((part, by)) = part
-                    && slowed.as_ref().is_none_or(|slowed| part < slowed.part)
-                {
-                    slowed = Some(Slowed { time_s: now + t, part, by });
-                }
+        let least_sigma = own.and_then(|piece| piece.least_sigma);
+        for (tool, k) in own.iter().flat_map(|piece| piece.tool.iter().zip(piece.stations[0]..)) {
+            let t = self.time_of_station(k);
+            let speed = tool.V.fixed_rows::<3>(0).norm() * self.progress(t)[1];
+            top = Some(top.map_or(speed, |top: f64| top.max(speed)));
+            if let Some((part, by)) = self.part(k, t)
+                && slowed.as_ref().is_none_or(|slowed| part < slowed.part)
+            {
+                slowed = Some(Slowed { time_s: now + t, part, by });
             }
         }
         PlannedMove {
@@ -235,19 +283,17 @@ impl<'r> Schedule<'r> {
     }
 
     /// First and last moment of a leg, with half of the blends.
-    fn span(&self, leg: usize) -> [f64; 2] {
-        let pieces = &self.route.pieces;
-        let middle = |piece: &Piece| {
-            let [a, b] = piece.stations.map(|k| self.route.stations[k].s);
+    fn span(&self, leg: usize, by_leg: &[[Option<usize>; 2]]) -> [f64; 2] {
+        let ends = |k: usize| self.route.pieces[k].stations.map(|k| self.route.stations[k].s);
+        let middle = |k: usize| {
+            let [a, b] = ends(k);
             self.time_of(0.5 * (a + b))
         };
-        let blend = |of: usize| pieces.iter().find(|piece| piece.is_blend && piece.leg == of);
-        let own = pieces.iter().find(|piece| piece.leg == leg && !piece.is_blend);
-        let ends = own.map(|piece| piece.stations.map(|k| self.time_of(self.route.stations[k].s)));
-        let start = leg.checked_sub(1).and_then(blend).map(middle);
-        let end = blend(leg).map(middle);
-        let fallback = || ends.unwrap_or([0.0, 0.0]);
-        [start.unwrap_or_else(|| fallback()[0]), end.unwrap_or_else(|| fallback()[1])]
+        let own = by_leg[leg][0].map(|k| ends(k).map(|s| self.time_of(s)));
+        let start = leg.checked_sub(1).and_then(|before| by_leg[before][1]).map(middle);
+        let end = by_leg[leg][1].map(middle);
+        let own = own.unwrap_or([start.unwrap_or(0.0), end.unwrap_or(0.0)]);
+        [start.unwrap_or(own[0]), end.unwrap_or(own[1])]
     }
 
     fn time_of_station(&self, k: usize) -> f64 {
@@ -514,8 +560,8 @@ fn path_jerk(law: &Law, route: &Route) -> f64 {
     }
     let ratio = |t: f64| {
         let at = law.at(t);
-        let most = bounded.iter().find(|(a, b, _)| at.s >= *a && at.s <= *b);
-        most.map_or(0.0, |(_, _, most)| at.j.abs() / most)
+        let k = bounded.partition_point(|(_, b, _)| *b < at.s);
+        bounded.get(k).filter(|(a, _, _)| at.s >= *a).map_or(0.0, |(_, _, most)| at.j.abs() / most)
     };
     law.knots().into_iter().map(ratio).fold(0.0, f64::max)
 }

@@ -1,0 +1,192 @@
+//! Motions told by the path of the tool: files, standard motions and robot programs on a shipped arm.
+#![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
+
+use std::path::{Path, PathBuf};
+
+use flexarm::{Motion, Pose, Robot, TCP_FRAME};
+use flexarm_kinematics::{Data, Model, forward_kinematics};
+use nalgebra::{DVector, Rotation3, Vector3};
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+fn kr210() -> Robot {
+    Robot::load(root().join("robots/kr210")).unwrap()
+}
+
+/// A folder of its own for each test.
+fn folder(name: &str) -> PathBuf {
+    let folder = std::env::temp_dir().join(format!("flexarm-tool-path-{}-{name}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+fn load(robot: &Robot, name: &str, text: &str) -> Result<Motion, flexarm::Error> {
+    let folder = folder(&name.replace('.', "-"));
+    std::fs::write(folder.join(name), text).unwrap();
+    let motion = Motion::load(folder.join(name), robot);
+    std::fs::remove_dir_all(folder).unwrap();
+    motion
+}
+
+/// Times and poses of the tool at `n + 1` moments.
+fn poses(model: &Model, motion: &Motion, n: usize) -> Vec<(f64, Pose)> {
+    let (frame, mut data) = (model.frame(TCP_FRAME).unwrap().clone(), Data::new(model));
+    let joints = model.nv();
+    (0..=n)
+        .map(|k| {
+            let t = motion.trajectory.duration() * k as f64 / n as f64;
+            let (mut q, mut v, mut a) = (DVector::zeros(joints), vec![0.0; joints], vec![0.0; joints]);
+            motion.trajectory.sample(t, q.as_mut_slice(), &mut v, &mut a);
+            forward_kinematics(model, &mut data, &q);
+            (t, data.X_WF(&frame))
+        })
+        .collect()
+}
+
+fn from_polyline(p: &Vector3<f64>, corners: &[Vector3<f64>]) -> f64 {
+    let from = |pair: &[Vector3<f64>]| {
+        let d = pair[1] - pair[0];
+        let part = ((p - pair[0]).dot(&d) / d.norm_squared()).clamp(0.0, 1.0);
+        (p - pair[0] - d * part).norm()
+    };
+    corners.windows(2).map(from).fold(f64::INFINITY, f64::min)
+}
+
+/// Truth: the square as it is written, its speed, and the roundings at its corners.
+#[test]
+fn the_milling_square_is_milled_where_the_file_says() {
+    let robot = kr210();
+    let model = robot.rigid_model().unwrap();
+    let motion = Motion::load(root().join("trajectories/milling_square.toml"), &robot).unwrap();
+    assert!(motion.violations.is_empty());
+    let corner = |x: f64, y: f64, z: f64| Vector3::new(1.5 + x, -0.15 + y, 0.9 + z);
+    let way: Vec<Vector3<f64>> =
+        [(0.0, 0.0, 0.05), (0.0, 0.0, 0.0), (0.3, 0.0, 0.0), (0.3, 0.3, 0.0), (0.0, 0.3, 0.0), (0.0, 0.0, 0.0)]
+            .map(|(x, y, z)| corner(x, y, z))
+            .into();
+    let down = Rotation3::from_euler_angles(std::f64::consts::PI, 0.0, 0.0);
+    let (mut off, mut turned, mut top): (f64, f64, f64) = (0.0, 0.0, 0.0);
+    let seen = poses(&model, &motion, 9001);
+    for pair in seen.windows(2) {
+        let (p, q) = (pair[0].1.translation.vector, pair[1].1.translation.vector);
+        if way[2..5].iter().all(|corner| (q - corner).norm() > 8.0e-3 + 1e-9) {
+            off = off.max(from_polyline(&q, &way));
+        }
+        turned = turned.max(down.angle_to(&pair[1].1.rotation));
+        top = top.max((q - p).norm() / (pair[1].0 - pair[0].0));
+    }
+    assert!(off < 1e-9, "{off:.1e}"); // measured below 1e-10
+    assert!(turned < 1e-7, "{turned:.1e}"); // angle_to is an arc cosine
+    assert!((top - 0.25).abs() < 5e-4, "{top}");
+    let moves = &motion.tool_path.as_ref().unwrap().moves;
+    assert_eq!(moves.len(), 6);
+    assert!((moves[1].blend_m - 8e-3).abs() < 1e-9);
+}
+
+/// Truth: the two say the same thing in two languages.
+#[test]
+fn a_program_of_the_controller_moves_as_the_path_file_that_says_the_same() {
+    let robot = kr210();
+    let model = robot.rigid_model().unwrap();
+    let krl = "DEF square()\n\
+        $ACC.CP = 2.0\n\
+        $VEL.CP = 0.2\n\
+        PTP {A1 0, A2 -60, A3 90, A4 0, A5 60, A6 0}\n\
+        LIN {X 1700, Y 0, Z 1300, A 0, B 90, C 0} C_DIS\n\
+        LIN {X 1700, Y 200, Z 1300, A 0, B 90, C 0}\n\
+        CIRC {X 1800, Y 100, Z 1300}, {X 1700, Y 0, Z 1300, A 0, B 90, C 0}\n\
+        WAIT SEC 0.5\n\
+        END\n";
+    let program = load(&robot, "square.src", krl).unwrap();
+    let file = load(
+        &robot,
+        "square.toml",
+        "format = 1\n[path]\nlengths = \"mm\"\nangles = \"deg\"\nspeed = 200.0\nacceleration = 2000.0\n\
+         [[move]]\njoints = [0, -60, 90, 0, 60, 0]\n\
+         [[move]]\nline = [1700, 0, 1300]\nrpy = [0, 90, 0]\n\
+         [[move]]\nline = [1700, 200, 1300]\n\
+         [[move]]\narc = [1700, 0, 1300]\nvia = [1800, 100, 1300]\n\
+         [[move]]\ndwell = 0.5\n",
+    )
+    .unwrap();
+    let (a, b) = (poses(&model, &program, 4000), poses(&model, &file, 4000));
+    assert!(program.format.contains("KRL"), "{}", program.format);
+    assert!((program.trajectory.duration() - file.trajectory.duration()).abs() < 1e-9);
+    let apart = a.iter().zip(&b).map(|(a, b)| (a.1.translation.vector - b.1.translation.vector).norm());
+    assert!(apart.fold(0.0, f64::max) < 1e-9);
+}
+
+#[test]
+fn standard_motions_stay_in_their_cube_and_rest_where_they_should() {
+    let robot = kr210();
+    let model = robot.rigid_model().unwrap();
+    let centre = Vector3::new(1.8, 0.0, 1.2);
+    for (name, reach) in [("iso9283-poses", 0.8), ("iso9283-paths", 0.8), ("circularity", 1.0), ("settle", 1.0)] {
+        let text = format!(
+            "format = 1\n[path]\nlengths = \"mm\"\nangles = \"deg\"\nspeed = 500\nacceleration = 3000\n\
+             [standard]\nmotion = \"{name}\"\ncentre = [1800, 0, 1200]\nside = 400\nrpy = [180, 0, 0]\n\
+             near = [0, -60, 90, 0, 60, 0]\n"
+        );
+        let motion = load(&robot, "standard.toml", &text).unwrap();
+        let far = poses(&model, &motion, 3000)
+            .iter()
+            .map(|(_, X)| (X.translation.vector - centre).amax())
+            .fold(0.0, f64::max);
+        assert!((far - 0.2 * reach).abs() < 1e-6 || name == "iso9283-paths" && far <= 0.16 + 1e-9, "{name}: {far}");
+    }
+}
+
+#[test]
+fn examples_of_the_page_load() {
+    let robot = kr210();
+    let page = std::fs::read_to_string(root().join("docs/paths.md")).unwrap();
+    let examples: Vec<&str> = page.split("```toml\n").skip(1).map(|rest| rest.split("```").next().unwrap()).collect();
+    assert_eq!(examples.len(), 3);
+    let folder = folder("page");
+    std::fs::write(
+        folder.join("part.nc"),
+        "G21 G90\nG0 X0 Y0 Z20\nG1 Z0 F3000\nG1 X100\nG2 X100 Y50 I0 J25\nG1 X0\nM30\n",
+    )
+    .unwrap();
+    for (k, example) in examples.into_iter().enumerate() {
+        let path = folder.join(format!("example_{k}.toml"));
+        std::fs::write(&path, example).unwrap();
+        let motion = Motion::load(&path, &robot).unwrap_or_else(|error| panic!("example {k}: {error}"));
+        assert!(motion.trajectory.duration() > 1.0);
+    }
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn what_is_wrong_is_told_with_its_place_and_the_remedy() {
+    let robot = kr210();
+    let head = "format = 1\n[path]\nlengths = \"mm\"\nangles = \"deg\"\n";
+    let start = "[[move]]\njoints = [0, -60, 90, 0, 60, 0]\n";
+    let cases = [
+        (format!("format = 1\n[path]\nangles = \"deg\"\n{start}"), "lengths"),
+        (format!("format = 1\n[path]\nlengths = \"cm\"\nangles = \"deg\"\n{start}"), "give \"m\" or \"mm\""),
+        (format!("{head}{start}[[move]]\narc = [1, 2, 3]\n"), "via"),
+        (format!("{head}{start}[[move]]\nline = [1, 2, 3]\ndwell = 1.0\n"), "a move is one of line and dwell"),
+        (format!("{head}{start}[[move]]\nblend = 1.0\n"), "a move needs one of"),
+        (format!("{head}{start}[[move]]\nlin = [1, 2, 3]\n"), "unknown field `lin`"),
+        (format!("{head}[[move]]\nline = [1700, 0, 1300]\n"), "how the tool stands is not known"),
+        (format!("{head}[[move]]\nline = [1700, 0, 1300]\nrpy = [0, 90, 0]\n"), "begins with a move of the tool"),
+        (format!("{head}{start}[[move]]\nline = [9000, 0, 1300]\n"), "the arm cannot go on beyond"),
+        (format!("{head}{start}[[move]]\njoint_to = [9000, 0, 1300]\n"), "out of reach by about"),
+        (format!("{head}[[move]]\njoints = [0, -60, 90]\n"), "3 values for the 6 joints"),
+        (format!("{head}speed = -2.0\n{start}[[move]]\nline = [1700, 0, 1300]\n"), "it must be a positive number"),
+        (format!("{head}[limits]\njoint_9 = {{ velocity = 1 }}\n{start}"), "the robot has no joint \"joint_9\""),
+        (format!("{head}{start}[[move]]\nline = [1700, 0, 1300]\nquaternion = [2, 0, 0, 0]\n"), "it must be 1"),
+        (head.to_string(), "no move"),
+    ];
+    for (text, words) in cases {
+        let error = load(&robot, "wrong.toml", &text).unwrap_err().to_string();
+        assert!(error.contains(words) && error.contains("wrong.toml"), "{words:?} in {error:?}");
+    }
+    let error =
+        load(&robot, "wrong.src", "DEF x()\nPTP {A1 0, A2 -60, A3 90, A4 0, A5 60, A6 0}\nWAIT FOR $IN[1]\nEND\n");
+    let error = error.unwrap_err().to_string();
+    assert!(error.contains("wrong.src:3") && error.contains("WAIT FOR"), "{error}");
+}
