@@ -86,7 +86,8 @@ fn joint_values_are_found_again_from_their_pose_and_every_solution_meets_it() {
             }
         }
     }
-    println!("joint values times dexterity {worst_q:.1e}, {worst_m:.1e} m, {worst_rad:.1e} rad");
+    // measured 5.5e-15, 1.3e-13 m, 2.0e-14 rad
+    assert!(worst_q < 3e-13 && worst_m < 1e-12 && worst_rad < 2e-13, "{worst_q:.1e} {worst_m:.1e} {worst_rad:.1e}");
 }
 
 /// Truth: another algorithm, which knows of no geometry. It finds no solution that is missing here; it may miss some itself.
@@ -119,8 +120,9 @@ fn a_search_from_many_starts_finds_the_same_solutions() {
             searched_total += found.map_or(0, |f| f.len());
         }
     }
-    println!("{poses} poses: {analytic_total} solutions, {searched_total} by search");
-    assert!(searched_total <= analytic_total && searched_total as f64 > 0.97 * analytic_total as f64);
+    // measured: 176 poses, 906 solutions, 904 of them by search
+    let counts = (poses, analytic_total, searched_total);
+    assert!(searched_total <= analytic_total && searched_total as f64 > 0.97 * analytic_total as f64, "{counts:?}");
 }
 
 #[test]
@@ -404,7 +406,6 @@ fn an_arm_of_rounded_numbers_is_solved_as_it_is() {
         joint.X_PJ.rotation = Rotation3::from_euler_angles(cut(roll), cut(pitch), cut(yaw));
         joint.X_PJ.translation.vector += draw.vector(5e-6);
     }
-    // The tool is not of the arm's geometry.
     let model = Model::new(&tree).unwrap();
     let (frame, mut data) = (model.frame("tool").unwrap().clone(), Data::new(&model));
     let arm = AnalyticArm::new(&model, &frame).unwrap();
@@ -422,8 +423,7 @@ fn an_arm_of_rounded_numbers_is_solved_as_it_is() {
             assert!(m < 3e-12 && rad < 2e-12, "{m:.1e} {rad:.1e}");
         }
     }
-    assert!(found >= 995, "{found}"); // the others are within the tolerance of a boundary
-    println!("{found} of 1000");
+    assert!(found >= 995, "{found}"); // measured 999: the other is within the tolerance of a boundary
 }
 
 #[test]
@@ -648,4 +648,55 @@ fn bits_are_not_turned_by_rounding() {
         assert!((0..3).all(|k| (chosen[k] - home[k]).abs() < 1e-5), "{shift} {chosen:?}");
         assert!(chosen[4].abs() < 1e-5 && (chosen[3] + chosen[5]).abs() < 1e-5, "{chosen:?}");
     }
+}
+
+/// Where two lines become coplanar two of the equations become one: axis 6 and axis 1 (three parallel axes in the middle), axis 6
+/// and axis 4 (three at the base). At these places and next to them nothing is lost.
+#[test]
+fn positions_where_two_equations_become_one_lose_no_solution() {
+    let mut tried = 0;
+    for arm in (1..=4).flat_map(random_arms) {
+        let (moved, other) = match arm.class {
+            ArmClass::ThreeParallel { first: 2, meeting: false } => (3, 0),
+            ArmClass::ThreeParallel { first: 1, meeting: false } => (4, 3),
+            _ => continue,
+        };
+        let (frame, mut data) = (arm.tool(), Data::new(&arm.model));
+        let analytic = AnalyticArm::new(&arm.model, &frame).unwrap();
+        let bodies: Vec<usize> = arm.model.coordinates().iter().map(|c| c.body).collect();
+        // Moment of axis 6 about the other axis: zero where they are coplanar.
+        let mut moment = |q: &[f64; 6]| {
+            forward_kinematics(&arm.model, &mut data, &DVector::from_column_slice(q));
+            let line = |k: usize| {
+                let JointMotion::Axis(motion) = arm.model.bodies()[bodies[k]].motion else { panic!("an axis") };
+                let X = data.X_WB[bodies[k]];
+                (X.rotation * motion.axis(), X.translation.vector)
+            };
+            let ((h, o), (h6, o6)) = (line(other), line(5));
+            h.dot(&h6.cross(&(o6 - o)))
+        };
+        let mut draw = Draw(53);
+        let mut solutions = Solutions::default();
+        for _ in 0..60 {
+            let mut q = random_q(&mut draw);
+            let at = |q: &[f64; 6], x: f64| std::array::from_fn(|k| if k == moved { x } else { q[k] });
+            let (mut low, mut high) = (q[moved], q[moved] + 1.0);
+            let sign = moment(&at(&q, low)) > 0.0;
+            if (moment(&at(&q, high)) > 0.0) == sign {
+                continue;
+            }
+            for _ in 0..60 {
+                let middle = 0.5 * (low + high);
+                *(if (moment(&at(&q, middle)) > 0.0) == sign { &mut low } else { &mut high }) = middle;
+            }
+            for off in [0.0, 1e-9, 1e-7, 3e-7, 1e-6, 3e-6, 1e-5, 1e-4] {
+                q[moved] = low + off;
+                analytic.solve(&analytic.pose(&q), &mut solutions);
+                let error = solutions.iter().map(|s| apart(&s.q, &q)).fold(f64::INFINITY, f64::min);
+                assert!(error < 1e-8, "{} {off:e}: {q:?} is missed by {error:.1e}", arm.name);
+                tried += 1;
+            }
+        }
+    }
+    assert!(tried > 300, "{tried}");
 }

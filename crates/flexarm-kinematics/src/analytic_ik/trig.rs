@@ -258,11 +258,9 @@ impl TrigPolynomial {
         let mut value = self.at(t);
         for _ in 0..3 {
             let trial = t - value.0 / value.1;
-            if !((trial - start).abs() < 1e-3) {
-                break;
-            }
             let next = self.at(trial);
-            if next.0.abs() >= value.0.abs() {
+            let better = (trial - start).abs() < 1e-3 && next.0.abs() < value.0.abs();
+            if !better {
                 break;
             }
             (t, value) = (trial, next);
