@@ -700,3 +700,57 @@ fn positions_where_two_equations_become_one_lose_no_solution() {
     }
     assert!(tried > 300, "{tried}");
 }
+
+/// Calibrated arms: axes a little off those of the data sheet, but for the wrist, are solved as arms in general position, however
+/// near they are to parallel or to meeting.
+#[test]
+fn arms_just_outside_a_class_are_solved_by_the_general_one() {
+    for (tilt, shift) in [(3e-5, 0.0), (1e-3, 0.0), (1e-4, 1e-3), (0.03, 0.01)] {
+        for mut tree in [kr300(), irb120(), puma()] {
+            tree.joints[1].X_PJ.translation.vector += Vector3::new(shift + 1e-3, shift, 0.0);
+            tree.joints[2].X_PJ.rotation *= Rotation3::from_euler_angles(tilt, 0.7 * tilt, 0.0);
+            let model = Model::new(&tree).unwrap();
+            let arm = AnalyticArm::new(&model, model.frame("tool").unwrap()).unwrap();
+            assert_eq!(arm.class(), ArmClass::SphericalWrist(PositionForm::General), "{} {tilt} {shift}", tree.name);
+            let mut draw = Draw(59);
+            let mut solutions = Solutions::default();
+            let mut worst = 0.0_f64;
+            for _ in 0..1000 {
+                let q = random_q(&mut draw);
+                arm.solve(&arm.pose(&q), &mut solutions);
+                worst = worst.max(solutions.iter().map(|s| apart(&s.q, &q)).fold(f64::INFINITY, f64::min));
+            }
+            assert!(worst < 1e-8, "{} {tilt} {shift}: {worst:.1e}", tree.name);
+        }
+    }
+}
+
+/// Truth: the same arm with its rail fixed where the limit holds it.
+#[test]
+fn a_rail_at_its_limit_leaves_the_rule_to_the_joints_behind_it() {
+    let on_rail = |rail: JointKind, at: f64| {
+        let mut tree = iiwa();
+        tree.links.push(Link { name: "floor".into(), inertia: None });
+        let mut joint = Joint::new("rail", rail, "floor", "base", Pose::translation(0.0, at, 0.0));
+        joint.limits = Limits { lower: -0.1, upper: 0.2, ..Limits::NONE };
+        tree.joints.push(joint);
+        Model::new(&tree).unwrap()
+    };
+    let (model, fixed) = (on_rail(JointKind::Prismatic(Vector3::y_axis()), 0.0), on_rail(JointKind::Fixed, 0.2));
+    let q = DVector::from_vec(vec![0.05, 0.3, 0.6, 0.2, -1.2, 0.4, 0.7, 0.1]);
+    let mut rest = q.clone().add_scalar(0.05);
+    rest[0] = 3.0;
+    let (frame, mut data) = (model.frame("tool").unwrap().clone(), Data::new(&model));
+    forward_kinematics(&model, &mut data, &q);
+    let X_WT = data.X_WF(&frame);
+    let rule = NullSpaceRule::NearestTo(rest.clone());
+    let options = IkOptions::default();
+    let found = inverse_kinematics_with_rule(&model, &mut data, &frame, &X_WT, &q, &options, &rule).unwrap();
+    assert!(found.settled && (found.q[0] - 0.2).abs() < 1e-12, "{found:?}");
+
+    let (frame, mut data) = (fixed.frame("tool").unwrap().clone(), Data::new(&fixed));
+    let rule = NullSpaceRule::NearestTo(rest.rows(1, 7).into_owned());
+    let start = found.q.rows(1, 7).into_owned().add_scalar(0.02);
+    let held = inverse_kinematics_with_rule(&fixed, &mut data, &frame, &X_WT, &start, &options, &rule).unwrap();
+    assert!((held.q - found.q.rows(1, 7)).amax() < 1e-5); // measured below 1e-6
+}
