@@ -167,7 +167,7 @@ fn a_stretched_arm_has_one_elbow_and_a_pose_beyond_it_is_told_by_its_distance() 
     let q = [0.4, 0.7, stretched, 0.3, 0.8, -0.2];
     let X = arm.pose(&q);
     arm.solve(&X, &mut solutions);
-    assert!(solutions.iter().any(|s| apart(&s.q, &q) < 1e-7)); // measured 1e-8: the square root of rounding
+    assert!(solutions.iter().any(|s| apart(&s.q, &q) < 1e-7)); // measured 3.5e-8: the square root of rounding
     let shoulder = Vector3::new(0.0, 0.0, 0.29);
     let wrist = X * nalgebra::Point3::new(0.0, 0.0, -0.072);
     let outward = (wrist.coords - shoulder).normalize();
@@ -176,7 +176,7 @@ fn a_stretched_arm_has_one_elbow_and_a_pose_beyond_it_is_told_by_its_distance() 
         arm.solve(&far, &mut solutions);
         assert!(solutions.is_empty(), "{beyond}: {solutions:?}");
         let miss = solutions.miss().unwrap();
-        assert!((miss.position_m / beyond - 1.0).abs() < 1e-5 + 1e-14 / beyond, "{miss:?}"); // measured 3e-7
+        assert!((miss.position_m / beyond - 1.0).abs() < 1e-12 + 1e-15 / beyond, "{miss:?}"); // measured 3.3e-8 at 1e-9 m
         assert!(miss.rotation_rad < 1e-6, "{miss:?}");
         // Inside by the same: all eight (where the other shoulder reaches too).
         let near = Pose::from_parts((X.translation.vector - outward * beyond.min(0.01)).into(), X.rotation);
@@ -243,7 +243,7 @@ fn a_wrist_centre_on_axis_1_leaves_joint_1_free_and_keeps_it() {
         let q = [1.1, -back, q3, 0.4, -0.7, 0.3];
         arm.solve_near(&arm.pose(&q), &q, &mut solutions);
         let nearest = solutions.nearest(&q).unwrap();
-        assert!(nearest.free && apart(&nearest.q, &q) < 1e-9, "{nearest:?}"); // measured 1e-15
+        assert!(nearest.free && apart(&nearest.q, &q) < 1e-9, "{nearest:?}"); // measured 3.3e-16
     }
 }
 
@@ -286,7 +286,7 @@ fn kuka_status_and_turn_are_those_of_the_manual() {
         let meant = Selection::Kuka { status: Some(status), turn: Some(kuka_turn(&q, &axes)) };
         let chosen = arm.choose(&solutions, &meant, &axes, &[0.0; 6]).unwrap();
         let error = chosen.iter().zip(&q).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-        assert!(error < 1e-8, "{q:?} {chosen:?}"); // measured 4e-12
+        assert!(error < 1e-8, "{q:?} {chosen:?}"); // measured 7.0e-12
         solved += 1;
     }
     assert!(behind > 200 && solved == 2000);
@@ -481,7 +481,7 @@ fn joints_that_are_held_are_part_of_the_geometry() {
         arm.solve(&X_WT, &mut solutions);
         let six = [q[0], q[1], q[3], q[4], q[5], q[6]];
         let error = solutions.iter().map(|s| apart(&s.q, &six)).fold(f64::INFINITY, f64::min);
-        assert!(error < 1e-9, "{q} {error:.1e}"); // measured 2e-13
+        assert!(error < 1e-9, "{q} {error:.1e}"); // measured 3.3e-13
     }
     let error = AnalyticArm::new(&model, &frame).unwrap_err();
     assert!(matches!(error, NoAnalyticIk::JointCount { ref joints, .. } if joints.len() == 7), "{error}");
@@ -551,8 +551,8 @@ fn seven_joints_settle_at_a_minimum_of_the_rule_over_the_family_of_solutions() {
                 least = least.min(measure(&held));
             }
         }
-        // measured 2e-15
-        assert!(least.is_finite() && found.measure <= least + 1e-9, "{case}: {} above {least}", found.measure);
+        // measured 3.8e-10: the tolerance of the pose times what the rule gains by it
+        assert!(least.is_finite() && found.measure <= least + 5e-9, "{case}: {} above {least}", found.measure);
     }
 }
 
@@ -752,5 +752,5 @@ fn a_rail_at_its_limit_leaves_the_rule_to_the_joints_behind_it() {
     let rule = NullSpaceRule::NearestTo(rest.rows(1, 7).into_owned());
     let start = found.q.rows(1, 7).into_owned().add_scalar(0.02);
     let held = inverse_kinematics_with_rule(&fixed, &mut data, &frame, &X_WT, &start, &options, &rule).unwrap();
-    assert!((held.q - found.q.rows(1, 7)).amax() < 1e-5); // measured below 1e-6
+    assert!((held.q - found.q.rows(1, 7)).amax() < 1e-5); // measured 1.2e-8
 }
