@@ -5,6 +5,10 @@
 //! they compute and never allocate. Joints: fixed, revolute, continuous, prismatic, and the six-DoF elastic
 //! joint of a flexible link, at one cost.
 //!
+//! Inverse kinematics: [`AnalyticArm`] gives all solutions of arms whose axes allow a closed form, [`inverse_kinematics`] one from a
+//! start, [`inverse_kinematics_from_many_starts`] those of any arm that a search finds, [`inverse_kinematics_with_rule`] the best of
+//! a redundant arm.
+//!
 //! Notation: `X_AB` pose of B in A; `V` twists, `F` wrenches, **linear part first**; see `docs/references.md`
 //! for the sources. Not here: files, flexible-link stiffness, time.
 //!

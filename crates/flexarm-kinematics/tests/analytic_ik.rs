@@ -86,7 +86,8 @@ fn joint_values_are_found_again_from_their_pose_and_every_solution_meets_it() {
             }
         }
     }
-    println!("joint values times dexterity {worst_q:.1e}, {worst_m:.1e} m, {worst_rad:.1e} rad");
+    // measured 5.5e-15, 1.3e-13 m, 2.0e-14 rad
+    assert!(worst_q < 3e-13 && worst_m < 1e-12 && worst_rad < 2e-13, "{worst_q:.1e} {worst_m:.1e} {worst_rad:.1e}");
 }
 
 /// Truth: another algorithm, which knows of no geometry. It finds no solution that is missing here; it may miss some itself.
@@ -119,8 +120,9 @@ fn a_search_from_many_starts_finds_the_same_solutions() {
             searched_total += found.map_or(0, |f| f.len());
         }
     }
-    println!("{poses} poses: {analytic_total} solutions, {searched_total} by search");
-    assert!(searched_total <= analytic_total && searched_total as f64 > 0.97 * analytic_total as f64);
+    // measured: 176 poses, 906 solutions, 904 of them by search
+    let counts = (poses, analytic_total, searched_total);
+    assert!(searched_total <= analytic_total && searched_total as f64 > 0.97 * analytic_total as f64, "{counts:?}");
 }
 
 #[test]
@@ -165,7 +167,7 @@ fn a_stretched_arm_has_one_elbow_and_a_pose_beyond_it_is_told_by_its_distance() 
     let q = [0.4, 0.7, stretched, 0.3, 0.8, -0.2];
     let X = arm.pose(&q);
     arm.solve(&X, &mut solutions);
-    assert!(solutions.iter().any(|s| apart(&s.q, &q) < 1e-7)); // measured 1e-8: the square root of rounding
+    assert!(solutions.iter().any(|s| apart(&s.q, &q) < 1e-7)); // measured 3.5e-8: the square root of rounding
     let shoulder = Vector3::new(0.0, 0.0, 0.29);
     let wrist = X * nalgebra::Point3::new(0.0, 0.0, -0.072);
     let outward = (wrist.coords - shoulder).normalize();
@@ -174,7 +176,7 @@ fn a_stretched_arm_has_one_elbow_and_a_pose_beyond_it_is_told_by_its_distance() 
         arm.solve(&far, &mut solutions);
         assert!(solutions.is_empty(), "{beyond}: {solutions:?}");
         let miss = solutions.miss().unwrap();
-        assert!((miss.position_m / beyond - 1.0).abs() < 1e-5 + 1e-14 / beyond, "{miss:?}"); // measured 3e-7
+        assert!((miss.position_m / beyond - 1.0).abs() < 1e-12 + 1e-15 / beyond, "{miss:?}"); // measured 3.3e-8 at 1e-9 m
         assert!(miss.rotation_rad < 1e-6, "{miss:?}");
         // Inside by the same: all eight (where the other shoulder reaches too).
         let near = Pose::from_parts((X.translation.vector - outward * beyond.min(0.01)).into(), X.rotation);
@@ -241,7 +243,7 @@ fn a_wrist_centre_on_axis_1_leaves_joint_1_free_and_keeps_it() {
         let q = [1.1, -back, q3, 0.4, -0.7, 0.3];
         arm.solve_near(&arm.pose(&q), &q, &mut solutions);
         let nearest = solutions.nearest(&q).unwrap();
-        assert!(nearest.free && apart(&nearest.q, &q) < 1e-9, "{nearest:?}"); // measured 1e-15
+        assert!(nearest.free && apart(&nearest.q, &q) < 1e-9, "{nearest:?}"); // measured 3.3e-16
     }
 }
 
@@ -284,7 +286,7 @@ fn kuka_status_and_turn_are_those_of_the_manual() {
         let meant = Selection::Kuka { status: Some(status), turn: Some(kuka_turn(&q, &axes)) };
         let chosen = arm.choose(&solutions, &meant, &axes, &[0.0; 6]).unwrap();
         let error = chosen.iter().zip(&q).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-        assert!(error < 1e-8, "{q:?} {chosen:?}"); // measured 4e-12
+        assert!(error < 1e-8, "{q:?} {chosen:?}"); // measured 7.0e-12
         solved += 1;
     }
     assert!(behind > 200 && solved == 2000);
@@ -404,7 +406,6 @@ fn an_arm_of_rounded_numbers_is_solved_as_it_is() {
         joint.X_PJ.rotation = Rotation3::from_euler_angles(cut(roll), cut(pitch), cut(yaw));
         joint.X_PJ.translation.vector += draw.vector(5e-6);
     }
-    // The tool is not of the arm's geometry.
     let model = Model::new(&tree).unwrap();
     let (frame, mut data) = (model.frame("tool").unwrap().clone(), Data::new(&model));
     let arm = AnalyticArm::new(&model, &frame).unwrap();
@@ -422,8 +423,7 @@ fn an_arm_of_rounded_numbers_is_solved_as_it_is() {
             assert!(m < 3e-12 && rad < 2e-12, "{m:.1e} {rad:.1e}");
         }
     }
-    assert!(found >= 995, "{found}"); // the others are within the tolerance of a boundary
-    println!("{found} of 1000");
+    assert!(found >= 995, "{found}"); // measured 999: the other is within the tolerance of a boundary
 }
 
 #[test]
@@ -481,7 +481,7 @@ fn joints_that_are_held_are_part_of_the_geometry() {
         arm.solve(&X_WT, &mut solutions);
         let six = [q[0], q[1], q[3], q[4], q[5], q[6]];
         let error = solutions.iter().map(|s| apart(&s.q, &six)).fold(f64::INFINITY, f64::min);
-        assert!(error < 1e-9, "{q} {error:.1e}"); // measured 2e-13
+        assert!(error < 1e-9, "{q} {error:.1e}"); // measured 3.3e-13
     }
     let error = AnalyticArm::new(&model, &frame).unwrap_err();
     assert!(matches!(error, NoAnalyticIk::JointCount { ref joints, .. } if joints.len() == 7), "{error}");
@@ -551,8 +551,8 @@ fn seven_joints_settle_at_a_minimum_of_the_rule_over_the_family_of_solutions() {
                 least = least.min(measure(&held));
             }
         }
-        // measured 2e-15
-        assert!(least.is_finite() && found.measure <= least + 1e-9, "{case}: {} above {least}", found.measure);
+        // measured 3.8e-10: the tolerance of the pose times what the rule gains by it
+        assert!(least.is_finite() && found.measure <= least + 5e-9, "{case}: {} above {least}", found.measure);
     }
 }
 
@@ -648,4 +648,109 @@ fn bits_are_not_turned_by_rounding() {
         assert!((0..3).all(|k| (chosen[k] - home[k]).abs() < 1e-5), "{shift} {chosen:?}");
         assert!(chosen[4].abs() < 1e-5 && (chosen[3] + chosen[5]).abs() < 1e-5, "{chosen:?}");
     }
+}
+
+/// Where two lines become coplanar two of the equations become one: axis 6 and axis 1 (three parallel axes in the middle), axis 6
+/// and axis 4 (three at the base). At these places and next to them nothing is lost.
+#[test]
+fn positions_where_two_equations_become_one_lose_no_solution() {
+    let mut tried = 0;
+    for arm in (1..=4).flat_map(random_arms) {
+        let (moved, other) = match arm.class {
+            ArmClass::ThreeParallel { first: 2, meeting: false } => (3, 0),
+            ArmClass::ThreeParallel { first: 1, meeting: false } => (4, 3),
+            _ => continue,
+        };
+        let (frame, mut data) = (arm.tool(), Data::new(&arm.model));
+        let analytic = AnalyticArm::new(&arm.model, &frame).unwrap();
+        let bodies: Vec<usize> = arm.model.coordinates().iter().map(|c| c.body).collect();
+        // Moment of axis 6 about the other axis: zero where they are coplanar.
+        let mut moment = |q: &[f64; 6]| {
+            forward_kinematics(&arm.model, &mut data, &DVector::from_column_slice(q));
+            let line = |k: usize| {
+                let JointMotion::Axis(motion) = arm.model.bodies()[bodies[k]].motion else { panic!("an axis") };
+                let X = data.X_WB[bodies[k]];
+                (X.rotation * motion.axis(), X.translation.vector)
+            };
+            let ((h, o), (h6, o6)) = (line(other), line(5));
+            h.dot(&h6.cross(&(o6 - o)))
+        };
+        let mut draw = Draw(53);
+        let mut solutions = Solutions::default();
+        for _ in 0..60 {
+            let mut q = random_q(&mut draw);
+            let at = |q: &[f64; 6], x: f64| std::array::from_fn(|k| if k == moved { x } else { q[k] });
+            let (mut low, mut high) = (q[moved], q[moved] + 1.0);
+            let sign = moment(&at(&q, low)) > 0.0;
+            if (moment(&at(&q, high)) > 0.0) == sign {
+                continue;
+            }
+            for _ in 0..60 {
+                let middle = 0.5 * (low + high);
+                *(if (moment(&at(&q, middle)) > 0.0) == sign { &mut low } else { &mut high }) = middle;
+            }
+            for off in [0.0, 1e-9, 1e-7, 3e-7, 1e-6, 3e-6, 1e-5, 1e-4] {
+                q[moved] = low + off;
+                analytic.solve(&analytic.pose(&q), &mut solutions);
+                let error = solutions.iter().map(|s| apart(&s.q, &q)).fold(f64::INFINITY, f64::min);
+                assert!(error < 1e-8, "{} {off:e}: {q:?} is missed by {error:.1e}", arm.name);
+                tried += 1;
+            }
+        }
+    }
+    assert!(tried > 300, "{tried}");
+}
+
+/// Calibrated arms: axes a little off those of the data sheet, but for the wrist, are solved as arms in general position, however
+/// near they are to parallel or to meeting.
+#[test]
+fn arms_just_outside_a_class_are_solved_by_the_general_one() {
+    for (tilt, shift) in [(3e-5, 0.0), (1e-3, 0.0), (1e-4, 1e-3), (0.03, 0.01)] {
+        for mut tree in [kr300(), irb120(), puma()] {
+            tree.joints[1].X_PJ.translation.vector += Vector3::new(shift + 1e-3, shift, 0.0);
+            tree.joints[2].X_PJ.rotation *= Rotation3::from_euler_angles(tilt, 0.7 * tilt, 0.0);
+            let model = Model::new(&tree).unwrap();
+            let arm = AnalyticArm::new(&model, model.frame("tool").unwrap()).unwrap();
+            assert_eq!(arm.class(), ArmClass::SphericalWrist(PositionForm::General), "{} {tilt} {shift}", tree.name);
+            let mut draw = Draw(59);
+            let mut solutions = Solutions::default();
+            let mut worst = 0.0_f64;
+            for _ in 0..1000 {
+                let q = random_q(&mut draw);
+                arm.solve(&arm.pose(&q), &mut solutions);
+                worst = worst.max(solutions.iter().map(|s| apart(&s.q, &q)).fold(f64::INFINITY, f64::min));
+            }
+            assert!(worst < 1e-8, "{} {tilt} {shift}: {worst:.1e}", tree.name);
+        }
+    }
+}
+
+/// Truth: the same arm with its rail fixed where the limit holds it.
+#[test]
+fn a_rail_at_its_limit_leaves_the_rule_to_the_joints_behind_it() {
+    let on_rail = |rail: JointKind, at: f64| {
+        let mut tree = iiwa();
+        tree.links.push(Link { name: "floor".into(), inertia: None });
+        let mut joint = Joint::new("rail", rail, "floor", "base", Pose::translation(0.0, at, 0.0));
+        joint.limits = Limits { lower: -0.1, upper: 0.2, ..Limits::NONE };
+        tree.joints.push(joint);
+        Model::new(&tree).unwrap()
+    };
+    let (model, fixed) = (on_rail(JointKind::Prismatic(Vector3::y_axis()), 0.0), on_rail(JointKind::Fixed, 0.2));
+    let q = DVector::from_vec(vec![0.05, 0.3, 0.6, 0.2, -1.2, 0.4, 0.7, 0.1]);
+    let mut rest = q.clone().add_scalar(0.05);
+    rest[0] = 3.0;
+    let (frame, mut data) = (model.frame("tool").unwrap().clone(), Data::new(&model));
+    forward_kinematics(&model, &mut data, &q);
+    let X_WT = data.X_WF(&frame);
+    let rule = NullSpaceRule::NearestTo(rest.clone());
+    let options = IkOptions::default();
+    let found = inverse_kinematics_with_rule(&model, &mut data, &frame, &X_WT, &q, &options, &rule).unwrap();
+    assert!(found.settled && (found.q[0] - 0.2).abs() < 1e-12, "{found:?}");
+
+    let (frame, mut data) = (fixed.frame("tool").unwrap().clone(), Data::new(&fixed));
+    let rule = NullSpaceRule::NearestTo(rest.rows(1, 7).into_owned());
+    let start = found.q.rows(1, 7).into_owned().add_scalar(0.02);
+    let held = inverse_kinematics_with_rule(&fixed, &mut data, &frame, &X_WT, &start, &options, &rule).unwrap();
+    assert!((held.q - found.q.rows(1, 7)).amax() < 1e-5); // measured 1.2e-8
 }

@@ -247,7 +247,8 @@ impl AnalyticArm {
 
     /// All joint values that bring the frame to `X_WT`, whatever the limits; a free joint is at zero.
     ///
-    /// Does not allocate. A pose with NaN or infinite entries has no solution.
+    /// Does not allocate. A pose with NaN or infinite entries has no solution, and none has one whose rotation is not orthogonal to
+    /// [`POSE_TOLERANCE`].
     pub fn solve(&self, X_WT: &Pose, solutions: &mut Solutions) {
         self.solve_near(X_WT, &[0.0; 6], solutions);
     }

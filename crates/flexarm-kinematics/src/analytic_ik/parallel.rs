@@ -131,7 +131,7 @@ impl Parallel234 {
 fn pair_of_equations(rows: &[(f64, f64, TrigPolynomial); 2], hint: &[f64; 6], pairs: &mut Pairs) {
     let [(a1, b1, K1), (a2, b2, K2)] = rows;
     let D = a1 * b2 - a2 * b1;
-    if D.abs() > 1e-7 {
+    if D.abs() > 1e-6 {
         let zero = TrigPolynomial::affine(0.0, 0.0, 0.0);
         let cosine = zero.plus(K1, b2 / D).plus(K2, -b1 / D);
         let sine = zero.plus(K2, a1 / D).plus(K1, -a2 / D);

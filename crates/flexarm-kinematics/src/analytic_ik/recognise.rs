@@ -318,14 +318,16 @@ impl Lines {
         Some(self.angle(i, j)).filter(|a| *a <= AXIS_TOLERANCE_RAD)
     }
 
-    /// Middle of the common perpendicular of two lines that meet, and by how much of the reach they do not.
+    /// Middle of the common perpendicular of two lines that meet, and by how much of the reach they do not. Lines that are nearly
+    /// parallel may meet so far away that nothing can be reckoned from there.
     fn meeting(&self, i: usize, j: usize) -> Option<(Vector3<f64>, f64)> {
         if self.parallel(i, j).is_some() {
             return None;
         }
         let (a, b) = feet(&self.axes[i], &self.axes[j]);
         let apart = (a - b).norm() / self.reach;
-        Some((0.5 * (a + b), apart)).filter(|_| apart <= AXIS_TOLERANCE)
+        let near = (a - self.axes[i].o).norm() <= 10.0 * self.reach;
+        Some((0.5 * (a + b), apart)).filter(|_| near && apart <= AXIS_TOLERANCE)
     }
 
     /// The point nearest to the last three lines, and the largest of its distances from them (m).
