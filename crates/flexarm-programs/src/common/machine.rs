@@ -643,7 +643,11 @@ impl<'a, D: Dialect> Machine<'a, D> {
                 return fail(base.span, format!("a list is expected before an index, this is {kind}"));
             }
         };
+        let is_system = matches!(&base.kind, Kind::Name(name) if name.starts_with('$'));
         match found {
+            Some(Value::Nothing) | None if is_system => {
+                Ok(Value::Outside(format!("`{}[{at}]`", self.recorder.excerpt(base.span)).into()))
+            }
             Some(Value::Nothing) | None => fail(
                 span,
                 format!(
@@ -843,6 +847,9 @@ fn combine_whole(operator: Operator, a: i64, b: i64, span: Span) -> Option<Resul
         Multiply => a.checked_mul(b),
         Divide if b == 0 => return Some(fail(span, "a division by 0")),
         Divide => a.checked_div(b),
+        BitAnd => Some(a & b),
+        BitOr => Some(a | b),
+        BitEither => Some(a ^ b),
         _ => return None,
     };
     let too_large = || Fail { span, message: "the whole number is too large".into() };

@@ -41,8 +41,14 @@ pub(super) fn parse(text: &Text, file: usize) -> Result<Unit> {
         match parser.word().as_deref() {
             Some("module") => {
                 parser.advance();
-                let name = parser.expect_name()?;
-                unit.name.get_or_insert(name);
+                let start = parser.span();
+                if matches!(parser.peek(), Token::Number(..)) {
+                    parser.advance(); // some generators begin a name with a digit
+                }
+                if parser.word().is_some_and(|word| !BEGINNINGS.contains(&&*word)) {
+                    parser.advance();
+                }
+                unit.name.get_or_insert_with(|| text.excerpt(start.to(parser.last_span())).into());
                 if parser.is_symbol("(") {
                     parser.arguments()?;
                 }
@@ -133,7 +139,7 @@ fn parameters(parser: &mut Parser) -> Result<Vec<Parameter>> {
         }
         parser.take_symbol(",");
         parser.take_symbol("|");
-        let optional = parser.take_symbol("\\") || parameters.last().is_some_and(|_| false);
+        let optional = parser.take_symbol("\\");
         let returned = ["var", "pers", "inout"].iter().any(|word| parser.take_word(word));
         let kind = parser.expect_name()?;
         let name =
@@ -167,6 +173,9 @@ fn block(parser: &mut Parser, ends: &[&str]) -> Result<Vec<Statement>> {
         body.push(statement(parser)?);
     }
 }
+
+/// Words that begin what stands in a module.
+const BEGINNINGS: [&str; 10] = ["local", "task", "pers", "var", "const", "proc", "func", "trap", "record", "alias"];
 
 /// Words that end every block.
 const OUTER: [&str; 5] = ["endproc", "endfunc", "endtrap", "endmodule", "proc"];
