@@ -1,6 +1,6 @@
 //! Text of RAPID to statements. What is not understood becomes a statement that is an error where it is reached.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 
 use crate::common::expressions::{Parser, Syntax};
@@ -29,13 +29,41 @@ pub(super) struct Unit {
     pub(super) data: Vec<Statement>,
     /// Statements outside of routines.
     pub(super) main: Vec<Statement>,
+    /// All names that stand in it.
+    pub(super) used: HashSet<Rc<str>>,
     /// Fields of declared types, with their types.
     pub(super) records: HashMap<Rc<str>, Vec<(Rc<str>, Rc<str>)>>,
+}
+
+impl Unit {
+    /// Names that it declares.
+    pub(super) fn declared(&self) -> HashSet<Rc<str>> {
+        let data = self.data.iter().filter_map(|statement| match &statement.action {
+            Action::Declare { name, .. } => Some(name.clone()),
+            _ => None,
+        });
+        let routines = self.routines.iter().map(|routine| routine.name.clone());
+        data.chain(routines).chain(self.records.keys().cloned()).collect()
+    }
+
+    /// Takes another module in; what was there goes before.
+    pub(super) fn take_in(&mut self, other: Self) {
+        self.routines.extend(other.routines);
+        self.data.splice(0..0, other.data);
+        self.used.extend(other.used);
+        for (name, fields) in other.records {
+            self.records.entry(name).or_insert(fields);
+        }
+    }
 }
 
 pub(super) fn parse(text: &Text, file: usize) -> Result<Unit> {
     let mut parser = Parser::new(Syntax::Rapid, tokens(&without_header(&text.text), file, &SPELLING)?);
     let mut unit = Unit::default();
+    unit.used.extend(parser.lexemes.iter().filter_map(|lexeme| match &lexeme.token {
+        Token::Name(name) => Some(name.clone()),
+        _ => None,
+    }));
     while !parser.is_over() {
         while ["local", "task"].iter().any(|word| parser.take_word(word)) {}
         match parser.word().as_deref() {
