@@ -64,7 +64,8 @@ fn whole_circles_and_helices_are_arcs_that_stay_on_them() {
         assert!((via - point(u(0.5))).norm() < 1e-11 && (end - point(u(1.0))).norm() < 1e-11);
         // Plane and centre of the circle, by its perpendicular bisectors.
         let normal = (via - start).cross(&(end - start)).normalize();
-        let rows = nalgebra::Matrix3::from_rows(&[(via - start).transpose(), (end - start).transpose(), normal.transpose()]);
+        let rows =
+            nalgebra::Matrix3::from_rows(&[(via - start).transpose(), (end - start).transpose(), normal.transpose()]);
         let right = Vector3::new(
             (via - start).dot(&(via + start)) / 2.0,
             (end - start).dot(&(end + start)) / 2.0,
@@ -77,7 +78,7 @@ fn whole_circles_and_helices_are_arcs_that_stay_on_them() {
             let off_circle = (p - normal * off_plane).norm() - (start - centre).norm();
             worst = worst.max(off_plane.hypot(off_circle));
         }
-        assert_eq!(piece.blend, if k + 1 < count { Blend::Pass } else { Blend::Pass });
+        assert_eq!(piece.blend, Blend::Pass);
         start = end;
     }
     assert!(worst < 1e-3 && worst > 1e-6, "{worst} mm over {count} pieces"); // allowed 1e-3 mm
@@ -94,15 +95,16 @@ fn planes_radii_units_and_times_follow_the_standard() {
     assert_relative_eq!(at(20).speed.linear_m_s.unwrap(), 10.0 * 0.0254 / 60.0, max_relative = 1e-15);
     assert_eq!(at(22).speed.duration_s, Some(30.0)); // G93 F2: half a minute
 
-    // G18: I and K; clockwise seen from +y goes from +z to +x. A negative radius takes the longer way.
-    let text = "G21 G61 G18 F600\nG0 X0 Y5 Z10\nG2 X10 Z0 I0 K-10\nG17\nG3 X0 Y-5 R-10\nG90.1\nG19\nG3 Y5 Z10 J-5 K10\nM2\n";
+    // G18: I and K; from z to x is counterclockwise, seen from y. A negative radius takes the longer way.
+    let text =
+        "G21 G61 G18 F600\nG0 X0 Y5 Z10\nG3 X10 Z0 I0 K-10\nG17\nG3 X0 Y-5 R-10\nG90.1\nG19\nG3 Y5 Z10 J-5 K10\nM2\n";
     let program = read_text("a.nc", text, &ReadOptions::default()).unwrap();
     let moves = moves(&program);
     let side = 10.0 * std::f64::consts::FRAC_1_SQRT_2;
     assert!((via_mm(moves[1]) - Vector3::new(side, 5.0, side)).norm() < 1e-12);
     // From (10, 5) to (0, -5) with radius 10, the longer way counterclockwise: the centre is (0, 5), three quarters.
     assert!((via_mm(moves[2]) - Vector3::new(-side, 5.0 + side, 0.0)).norm() < 1e-12);
-    // Absolute centre (y -5, z 10) of radius 10: half a circle would end at... here a quarter, from (y -5, z 0) to (y 5, z 10).
+    // Absolute centre (y -5, z 10) of radius 10: a quarter, from (y -5, z 0) to (y 5, z 10).
     assert!((via_mm(moves[3]) - Vector3::new(0.0, -5.0 + side, 10.0 - side)).norm() < 1e-12);
 }
 

@@ -67,7 +67,10 @@ fn what_a_target_leaves_out_stays_and_relative_moves_add() {
     }
     let blends: Vec<Blend> = moves[4..8].iter().map(|step| step.blend).collect();
     let angle = 20f64.to_radians();
-    assert_eq!(blends, [Blend::Distance(0.008), Blend::Velocity(0.7), Blend::Distance(0.008), Blend::Orientation(angle)]);
+    assert_eq!(
+        blends,
+        [Blend::Distance(0.008), Blend::Velocity(0.7), Blend::Distance(0.008), Blend::Orientation(angle)]
+    );
     assert_eq!(moves[4].speed.linear_m_s, Some(0.1)); // 0.2 m/s at 50 %
     assert_relative_eq!(moves[4].speed.angular_rad_s.unwrap(), 50f64.to_radians(), max_relative = 1e-15);
     assert_eq!(moves[4].speed.linear_m_s2, Some(1.5)); // the override leaves accelerations alone
@@ -115,7 +118,7 @@ fn after_a_circle_of_540_degrees_the_robot_is_on_its_other_side() {
 fn spline_inline_forms_take_their_settings_from_with() {
     let text = "DEF s()\nDECL E6POS XP1\nDECL FDAT FP1\nDECL LDAT LCPDAT1\nXP1={X 100,Y 0,Z 0,A 0,B 0,C 0,S 6,T 2}\n\
         FP1={TOOL_NO 1,BASE_NO 0,IPO_FRAME #BASE}\nLCPDAT1={VEL 2.0,ACC 100.0,APO_DIST 7.0,ORI_TYP #VAR}\n\
-        TOOL_DATA[1]={X 0,Y 0,Z 99,A 0,B 0,C 0}\n$VEL.CP=0.9\n\
+        TOOL_DATA[1]={X 0,Y 0,Z 99,A 0,B 0,C 0}\n$TOOL=TOOL_DATA[1]\n$VEL.CP=0.9\n\
         SPTP XP1 WITH $VEL_AXIS[1]=SVEL_JOINT(35.0), $TOOL=STOOL2(FP1), $BASE=SBASE(FP1.BASE_NO), $LOAD=SLOAD(FP1.TOOL_NO), \
         $ACC_AXIS[1]=SACC_JOINT(PDEFAULT), $GEAR_JERK[1]=SGEAR_JERK(PDEFAULT)\n\
         SLIN {X 200} WITH $VEL=SVEL_CP(0.3, , LCPDAT1), $APO=SAPO(LCPDAT1), $ORI_TYPE=SORI_TYP(LCPDAT1) C_SPL\n\
@@ -125,14 +128,15 @@ fn spline_inline_forms_take_their_settings_from_with() {
     assert_eq!(moves[0].speed.joint_fraction, Some(0.35));
     assert_pose(&moves[0].X_FT.unwrap(), &at_mm(0.0, 0.0, 99.0, Rotation3::identity()));
     assert_eq!((moves[1].speed.linear_m_s, moves[1].blend), (Some(0.3), Blend::Distance(0.007)));
-    // WITH ends with its move; no tool is set behind it, so the robot's own counts, of which nothing is known here.
+    // WITH ends with its move.
     assert_eq!(moves.len(), 3);
     assert_eq!(moves[2].speed.linear_m_s, Some(0.9));
 }
 
 #[test]
 fn a_relative_move_from_joint_values_uses_the_kinematics_that_are_given() {
-    let text = "DEF r()\n$TOOL={X 0,Y 0,Z 100,A 0,B 0,C 0}\nPTP {A1 90,A2 0,A3 0,A4 0,A5 0,A6 0}\nLIN_REL {X 50}\nEND\n";
+    let text =
+        "DEF r()\n$TOOL={X 0,Y 0,Z 100,A 0,B 0,C 0}\nPTP {A1 90,A2 0,A3 0,A4 0,A5 0,A6 0}\nLIN_REL {X 50}\nEND\n";
     let refused = read_text("r.src", text, &ReadOptions::default()).unwrap_err();
     assert!(refused.starts_with("r.src:4:9: `{X 50}`: what is not told stays"), "{refused}");
     // An arm of one metre that turns about z.
@@ -163,8 +167,14 @@ fn statements_that_cannot_be_run_are_named_with_place_and_remedy() {
         ("LIN {X 1,Y 2,Z 3,A 0,B 0,C 0", "`}` is expected here, found the end of the line"),
         ("$IPO_MODE = #TCP\nLIN {X 1,Y 2,Z 3,A 0,B 0,C 0}", "the robot guides the work piece here"),
         ("$ORI_TYPE = #JOINT\nLIN {X 1,Y 2,Z 3,A 0,B 0,C 0}", "$ORI_TYPE = #JOINT is not read"),
-        ("PTP {X 1,Y 2,Z 3,A 0,B 0,C 0,E1 5}\nPTP {X 1,Y 2,Z 3,A 0,B 0,C 0,E1 6}", "external axis 1 moves, from 5 (line 3) to 6"),
-        ("PTP {X 1,Y 2,Z 3,A 0,B 0,C 0}\nPTP {A1 10}", "axis 1 stays or moves on, but the position before was not told in axis values"),
+        (
+            "PTP {X 1,Y 2,Z 3,A 0,B 0,C 0,E1 5}\nPTP {X 1,Y 2,Z 3,A 0,B 0,C 0,E1 6}",
+            "external axis 1 moves, from 5 (line 3) to 6",
+        ),
+        (
+            "PTP {X 1,Y 2,Z 3,A 0,B 0,C 0}\nPTP {A1 10}",
+            "axis 1 stays or moves on, but the position before was not told in axis values",
+        ),
         ("$VEL_AXIS[2]=50\nPTP {A1 10}", "$VEL_AXIS[] differs between the axes"),
         ("LIN_REL {B 10}", "a relative turn by B or C in the base is understood in two ways"),
         ("PTP_SPLINE\nSPL {X 1}\nENDSPLINE", "splines of joint moves (PTP_SPLINE) are not read"),
@@ -175,16 +185,21 @@ fn statements_that_cannot_be_run_are_named_with_place_and_remedy() {
     ];
     for (statement, message) in cases {
         let text = format!("DEF t()\n{head}{statement}\nEND\n");
-        let error = read_text("t.src", &text, &ReadOptions::default()).unwrap_err();
+        let error = read_text("t.src", &text, &ReadOptions::default()).expect_err(statement);
         assert!(error.contains(message), "{statement}\n  gives {error}\n  not   {message}");
     }
-    let first = read_text("t.src", "DEF t()\nLIN {X 1,Y 2,Z 3,A 0,B 0,C 0}\nEND\n", &ReadOptions::default()).unwrap_err();
-    assert!(first.starts_with("t.src:2:1: `LIN {X 1,Y 2,Z 3,A 0,B 0,C 0}`: the first move must be a joint move"), "{first}");
+    let first =
+        read_text("t.src", "DEF t()\nLIN {X 1,Y 2,Z 3,A 0,B 0,C 0}\nEND\n", &ReadOptions::default()).unwrap_err();
+    assert!(
+        first.starts_with("t.src:2:1: `LIN {X 1,Y 2,Z 3,A 0,B 0,C 0}`: the first move must be a joint move"),
+        "{first}"
+    );
 }
 
 #[test]
 fn options_decide_what_the_file_leaves_open() {
-    let text = "DEF o()\nBAS(#BASE,4)\nPTP {X 1,Y 2,Z 3,A 0,B 0,C 0}\nWAIT FOR $IN[2]\nLOOP\nLIN_REL {X 1}\nENDLOOP\nEND\n";
+    let text =
+        "DEF o()\nBAS(#BASE,4)\nPTP {X 1,Y 2,Z 3,A 0,B 0,C 0}\nWAIT FOR $IN[2]\nLOOP\nLIN_REL {X 1}\nENDLOOP\nEND\n";
     let options = ReadOptions {
         given: vec![("BASE_DATA[4]".into(), "{X 10,Y 0,Z 0,A 0,B 0,C 0}".into())],
         waits_are_over: true,

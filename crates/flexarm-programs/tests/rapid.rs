@@ -30,7 +30,7 @@ fn of_quaternion(q: [f64; 4]) -> Rotation3<f64> {
 fn targets_tools_and_work_objects_are_poses_of_their_quaternions() {
     let program = read("cell.mod", &ReadOptions::default());
     let moves = moves(&program);
-    assert_eq!(program.name, "cell");
+    assert_eq!(program.name, "Cell");
     for (found, expected) in joints_deg(moves[0]).iter().zip([10.0, -20.0, 30.0, 0.0, 45.0, -60.0]) {
         assert_relative_eq!(*found, expected, epsilon = 1e-12);
     }
@@ -85,13 +85,28 @@ fn statements_that_cannot_be_run_are_named_with_place_and_remedy() {
         ("IF di1 = 1 MoveL Offs(CRobT(\\Tool:=tool0),0,0,1), v5, fine, tool0;", "`di1 = 1`: depends on `di1`"),
         ("WHILE TRUE DO\nMoveJ $, v5, fine, tool0;\nENDWHILE", "t.mod:4:1: `WHILE TRUE DO MoveJ"),
         ("MoveL *, v100, fine, tool0;", "the target `*` is kept by the controller"),
-        ("MoveL [[600,0],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]], v100, fine, tool0;", "pos has 3 parts, found 2"),
-        ("MoveL [[600,0,7],[2,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]], v100, fine, tool0;", "the quaternion [2.0, 0.0, 0.0, 0.0] has not the length 1"),
+        (
+            "MoveL [[600,0],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]], v100, fine, tool0;",
+            "pos has 3 parts, found 2",
+        ),
+        (
+            "MoveL [[600,0,7],[2,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]], v100, fine, tool0;",
+            "the quaternion [2.0, 0.0, 0.0, 0.0] has not the length 1",
+        ),
         ("MoveL $, v123, fine, tool0;", "`v123`: depends on `v123`"),
-        ("MoveL $, v100, fine, tool0\\WObj:=[FALSE,FALSE,\"STN1\",[[0,0,0],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];", "this work object is moved by a mechanical unit (ufprog FALSE)"),
-        ("MoveL $, v100, fine, [FALSE,[[0,0,0],[1,0,0,0]],[1,[0,0,1],[1,0,0,0],0,0,0]];", "the robot carries the work piece (robhold FALSE)"),
+        (
+            "MoveL $, v100, fine, tool0\\WObj:=[FALSE,FALSE,\"STN1\",[[0,0,0],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];",
+            "this work object is moved by a mechanical unit (ufprog FALSE)",
+        ),
+        (
+            "MoveL $, v100, fine, [FALSE,[[0,0,0],[1,0,0,0]],[1,[0,0,1],[1,0,0,0],0,0,0]];",
+            "the robot carries the work piece (robhold FALSE)",
+        ),
         ("MoveL $, v100, fine;", "the tool is missing: put `tool0` for the flange"),
-        ("MoveL [[600,0,7],[1,0,0,0],[0,0,0,0],[5,9E9,9E9,9E9,9E9,9E9]], v100, fine, tool0;\nMoveL [[600,0,7],[1,0,0,0],[0,0,0,0],[9,9E9,9E9,9E9,9E9,9E9]], v100, fine, tool0;", "external axis 1 moves, from 5 (line 4) to 9"),
+        (
+            "MoveL [[600,0,7],[1,0,0,0],[0,0,0,0],[5,9E9,9E9,9E9,9E9,9E9]], v100, fine, tool0;\nMoveL [[600,0,7],[1,0,0,0],[0,0,0,0],[9,9E9,9E9,9E9,9E9,9E9]], v100, fine, tool0;",
+            "external axis 1 moves, from 5 (line 4) to 9",
+        ),
         ("SearchL di1, p1, p2, v100, tool0;", "this instruction changes the motion by what is not in the program"),
         ("GOTO there;", "jumps (GOTO) are not read"),
         ("%\"proc\"%;", "calls by a text (%...%) are not read"),

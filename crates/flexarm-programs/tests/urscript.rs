@@ -69,14 +69,21 @@ fn functions_of_poses_follow_the_manual() {
     assert_pose(&pose(moves[3]), &at_mm(0.0, 0.0, 500.0, euler_product(yaw, pitch, roll)));
     assert_relative_eq!(pose(moves[4]).translation.z, 0.7);
     assert_eq!(moves.len(), 7); // two passes of the loop, then break
-    let dwells: Vec<f64> = program.items.iter().filter_map(|item| if let Item::Dwell { seconds, .. } = item { Some(*seconds) } else { None }).collect();
+    let dwells: Vec<f64> = program
+        .items
+        .iter()
+        .filter_map(|item| if let Item::Dwell { seconds, .. } = item { Some(*seconds) } else { None })
+        .collect();
     assert_eq!(dwells, [0.5, 1.0]); // 6 / 3 - 2 + 0.5
 }
 
 #[test]
 fn statements_that_cannot_be_run_are_named_with_place_and_remedy() {
     let cases = [
-        ("movel(get_actual_tcp_pose())", "t.script:3:9: `get_actual_tcp_pose()`: depends on `get_actual_tcp_pose(...)`"),
+        (
+            "movel(get_actual_tcp_pose())",
+            "t.script:3:9: `get_actual_tcp_pose()`: depends on `get_actual_tcp_pose(...)`",
+        ),
         ("servoj([0,0,0,0,0,0])", "`servoj([0,0,0,0,0,0])`: `servoj` moves the robot by what is not in the program"),
         ("while True:\n movej([0,0,0,0,0,1])\nend", "t.script:3:3: `while True:`: this loop does not end"),
         ("if get_digital_in(1):\n movej([0,0,0,0,0,1])\nend", "`get_digital_in(1)`: depends on `get_digital_in(...)`"),
@@ -98,7 +105,10 @@ fn statements_that_cannot_be_run_are_named_with_place_and_remedy() {
     }
     let two = "def a():\n movej([0,0,0,0,0,0])\nend\ndef b():\n movej([0,0,0,0,0,0])\nend\n";
     let error = read_text("t.script", two, &ReadOptions::default()).unwrap_err();
-    assert!(error.contains("the file has the definitions `a`, `b` and calls none: tell with which the program starts"), "{error}");
+    assert!(
+        error.contains("the file has the definitions `a`, `b` and calls none: tell with which the program starts"),
+        "{error}"
+    );
     let options = ReadOptions { entry: Some("b".into()), ..ReadOptions::default() };
     assert_eq!(read_text("t.script", two, &options).unwrap().items.len(), 1);
 }

@@ -686,7 +686,9 @@ impl<'a, D: Dialect> Machine<'a, D> {
         }
         let at = at.count(span)?;
         let index = usize::try_from(at - D::FIRST_INDEX).ok();
+        let is_system = matches!(&base.kind, Kind::Name(name) if name.starts_with('$'));
         let found = match &value {
+            Value::Outside(_) if is_system => None,
             Value::Outside(what) => return Ok(Value::Outside(what.clone())),
             Value::List(values) => index.and_then(|index| values.get(index)).cloned(),
             Value::Pose(pose) => index.and_then(|index| pose.get(index)).map(|number| Value::Number(*number)),
@@ -696,7 +698,6 @@ impl<'a, D: Dialect> Machine<'a, D> {
                 return fail(base.span, format!("a list is expected before an index, this is {kind}"));
             }
         };
-        let is_system = matches!(&base.kind, Kind::Name(name) if name.starts_with('$'));
         match found {
             Some(Value::Nothing) | None if is_system => {
                 Ok(Value::Outside(format!("`{}[{at}]`", self.recorder.excerpt(base.span)).into()))
@@ -775,6 +776,9 @@ fn can_end(body: &[Statement]) -> bool {
 
 /// A part of a value that is about to be set; records and lists grow.
 fn part_of<'v>(value: &'v mut Value, part: &Part, first: i64, span: Span) -> Result<&'v mut Value> {
+    if let Value::Outside(what) = value {
+        return fail(span, depends(what));
+    }
     match part {
         Part::Field(field) => {
             if matches!(value, Value::Nothing) {

@@ -60,6 +60,7 @@ pub(crate) fn read(texts: &mut Vec<Text>, options: &ReadOptions<'_>) -> Result<P
     let mut machine = Machine::new(Recorder::new(options, texts.clone()), Krl::new());
     system::set_up(&mut machine);
     machine.dialect.is_given = true;
+    machine.recorder.note_files();
     machine.run(&given.main)?;
     for further in &data {
         run_data(&mut machine, &further.data);
@@ -125,7 +126,9 @@ fn beside(path: &Path, stem: &str, ending: &str) -> Option<(std::path::PathBuf, 
 /// `$config.dat` of the controller, where a backup has it: in `System` beside a folder that the program is in.
 fn configuration(path: &Path) -> Option<(std::path::PathBuf, Vec<u8>)> {
     let folders = path.ancestors().skip(1).take(LEVELS_OF_A_BACKUP);
-    folders.flat_map(|folder| [folder.join("x"), folder.join("System/x")]).find_map(|place| beside(&place, "$config", "dat"))
+    folders
+        .flat_map(|folder| [folder.join("x"), folder.join("System/x")])
+        .find_map(|place| beside(&place, "$config", "dat"))
 }
 
 /// Routines that are called and are files of their own beside the program.

@@ -109,7 +109,17 @@ pub(super) fn set_up(machine: &mut Krls<'_>) {
         ("ldat_act", parts(&["vel", "acc", "apo_dist", "apo_fac", "ori_typ"])),
         ("fdat_act", parts(&["tool_no", "base_no", "ipo_frame"])),
         ("pdefault", pdat_default()),
-        ("fhome", Value::record("fdat", vec![("tool_no", Value::Whole(0)), ("base_no", Value::Whole(0)), ("ipo_frame", Value::Word("base".into()))])),
+        (
+            "fhome",
+            Value::record(
+                "fdat",
+                vec![
+                    ("tool_no", Value::Whole(0)),
+                    ("base_no", Value::Whole(0)),
+                    ("ipo_frame", Value::Word("base".into())),
+                ],
+            ),
+        ),
     ] {
         machine.set_global(name, value);
     }

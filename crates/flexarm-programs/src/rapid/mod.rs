@@ -11,7 +11,6 @@ mod motion;
 mod parse;
 mod types;
 
-use std::collections::HashMap;
 use std::rc::Rc;
 
 use flexarm_path::program::{Axes, Program};
@@ -29,7 +28,7 @@ use motion::Settings;
 pub(crate) struct Rapid {
     settings: Settings,
     /// Fields of types that the file declares.
-    records: HashMap<Rc<str>, Vec<(Rc<str>, Rc<str>)>>,
+    records: types::Records,
     /// The tool whose data are not in the files.
     unknown_tool: Option<Rc<str>>,
     is_given: bool,
@@ -53,9 +52,11 @@ pub(crate) fn read(texts: &mut Vec<Text>, options: &ReadOptions<'_>) -> Result<P
     texts.push(given_text(options, ":=", ";"));
     let given = parse::parse(&texts[texts.len() - 1], texts.len() - 1)?;
 
-    let rapid = Rapid { settings: Settings::default(), records: HashMap::new(), unknown_tool: None, is_given: true };
+    let rapid =
+        Rapid { settings: Settings::default(), records: types::Records::new(), unknown_tool: None, is_given: true };
     let mut machine = Machine::new(Recorder::new(options, texts.clone()), rapid);
     machine.dialect.records = unit.records;
+    machine.recorder.note_files();
     machine.run(&given.main)?;
     declare(&mut machine, &unit.data);
     machine.run(&given.main)?; // goes before what the files say

@@ -1,8 +1,9 @@
 //! Text of RAPID to statements. What is not understood becomes a statement that is an error where it is reached.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashSet;
 use std::rc::Rc;
 
+use super::types::{Fields, Records};
 use crate::common::expressions::{Parser, Syntax};
 use crate::common::lexer::{Spelling, Token, tokens};
 use crate::common::tree::{Action, Argument, Expr, Kind, Parameter, Routine, Statement};
@@ -32,7 +33,7 @@ pub(super) struct Unit {
     /// All names that stand in it.
     pub(super) used: HashSet<Rc<str>>,
     /// Fields of declared types, with their types.
-    pub(super) records: HashMap<Rc<str>, Vec<(Rc<str>, Rc<str>)>>,
+    pub(super) records: Records,
 }
 
 impl Unit {
@@ -117,11 +118,14 @@ fn without_header(text: &str) -> String {
 /// To behind the next semicolon.
 fn pass_statement(parser: &mut Parser) {
     while !parser.is_over() && !parser.take_symbol(";") {
+        if parser.word().is_some_and(|word| OUTER.contains(&&*word)) {
+            return; // its semicolon is missing
+        }
         parser.advance();
     }
 }
 
-fn record(parser: &mut Parser) -> Result<(Rc<str>, Vec<(Rc<str>, Rc<str>)>)> {
+fn record(parser: &mut Parser) -> Result<(Rc<str>, Fields)> {
     parser.advance();
     let name = parser.expect_name()?;
     let mut fields = Vec::new();
@@ -236,6 +240,9 @@ fn statement(parser: &mut Parser) -> Result<Statement> {
                 message
             };
             pass_statement(parser);
+            if parser.at == start {
+                parser.advance(); // the end of a block that did not begin
+            }
             let end = parser.lexemes[parser.at.saturating_sub(1).max(start)].span;
             Ok(Statement { action: Action::Refused(message), span: span.to(end) })
         }
