@@ -63,6 +63,8 @@ MUST_NOT_KNOW = {  # crate: what its code must not have, and what it is; imports
     "flexarm-fe-io": [(r"\breduction::|\bCondensation\b|\breduce_mesh\b", "reduction"), (r"\b(?:Robot|Mechanism)\b", "robots")],
     "flexarm-linkmaker": [(r"\b(?:Robot|Mechanism|Joint|Trajectory|Motion)\b|\bread_urdf\b", "robots and motion"),
                           (r"\bflexarm_(?!linkmaker\b|draw\b|fe_io\b|fem\b|files\b|settings\b|spatial\b)\w+", "more than links")],
+    "flexarm-programs": [(r"\b(?:Robot|Mechanism|Trajectory|inverse_kinematics)\b", "robots and planned motion"),
+                         (r"\bflexarm_(?!programs\b|path\b|spatial\b|files\b)\w+", "more than programs")],
     "flexarm-draw": [(r"\bflexarm_log\b|\bRecorder\b", "files of recordings"), (r"\bflexarm_(?:stepping|analysis)\b", "what numbers mean")],
     "flexarm-trajectory": [(r"\b(?:Robot|Mechanism|inverse_kinematics)\b", "robots and inverse kinematics")],
     "flexarm-motion-io": [(r"\b(?:Robot|Mechanism|Model)\b", "robots"), (r"\bflexarm_(?!motion_io\b|trajectory\b|settings\b)\w+", "more than trajectories")],

@@ -45,6 +45,7 @@ pub enum Axes {
 
 /// One thing done.
 #[derive(Debug, Clone, PartialEq)]
+#[allow(clippy::large_enum_variant, reason = "nearly every item is a move")]
 pub enum Item {
     /// The tool moves.
     Move(Move),
@@ -94,7 +95,8 @@ pub enum MoveKind {
         /// Angle travelled, rad, positive in the sense start, via, end; `None`: up to the target. Where it is given, the target
         /// is a third point of the circle, and the orientation turns on evenly with the angle.
         angle: Option<f64>,
-        /// Does the orientation turn with the tangent of the circle (KUKA's `#PATH`)?
+        /// Is the orientation told relative to the tangent of the circle (KUKA's `#PATH`, ABB's `\PathFrame`)? Then it goes
+        /// evenly, relative to the tangent, from that of the start to that of the target.
         turns_with_path: bool,
     },
     /// Smoothly through the target without stopping, as a knot of a spline that neighbouring moves of this kind make together

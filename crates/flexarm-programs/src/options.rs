@@ -78,7 +78,7 @@ impl Default for ReadOptions<'_> {
             waits_are_over: false,
             endless_passes: None,
             most_moves: 1_000_000,
-            most_steps: 20_000_000,
+            most_steps: 5_000_000,
             forward: None,
             own_tool: None,
             gcode: GCodeOptions::default(),

@@ -44,6 +44,11 @@ pub(crate) trait Dialect: Sized {
     /// Operators on values of the language's own types; `None`: none of them.
     fn binary(operator: Operator, left: &Value, right: &Value, span: Span) -> Option<Result<Value>>;
 
+    /// Does the instruction wait for a time?
+    fn takes_time(name: &str) -> bool {
+        matches!(name, "waittime" | "wait sec" | "sleep")
+    }
+
     /// Has the instruction no effect on the motion?
     fn is_still(name: &str) -> bool;
 }
@@ -74,6 +79,8 @@ pub(crate) struct Machine<'a, D> {
     pub(crate) globals: Variables,
     locals: Vec<Variables>,
     pub(crate) routines: HashMap<Rc<str>, Rc<Routine>>,
+    /// How often a variable got another value: globals, then by scope.
+    changes: Vec<usize>,
     steps: usize,
     depth: usize,
 }
@@ -92,7 +99,7 @@ enum Part {
 impl<'a, D: Dialect> Machine<'a, D> {
     pub(crate) fn new(recorder: Recorder<'a>, dialect: D) -> Self {
         let (globals, locals, routines) = (HashMap::new(), Vec::new(), HashMap::new());
-        Self { recorder, dialect, globals, locals, routines, steps: 0, depth: 0 }
+        Self { recorder, dialect, globals, locals, routines, changes: vec![0], steps: 0, depth: 0 }
     }
 
     pub(crate) fn set_global(&mut self, name: &str, value: Value) {
@@ -252,7 +259,10 @@ impl<'a, D: Dialect> Machine<'a, D> {
     fn is_still(&self, body: &[Statement]) -> bool {
         body.iter().all(|statement| match &statement.action {
             Action::Still(_) => true,
-            Action::Call { name, .. } => !self.routines.contains_key(name) && D::is_still(name),
+            Action::Call { name, .. } => {
+                let is_over = self.recorder.options.waits_are_over && name.starts_with("wait") && !D::takes_time(name);
+                !self.routines.contains_key(name) && (is_over || D::is_still(name))
+            }
             Action::Assign { place, .. } => match &place.kind {
                 Kind::Name(name) => !name.starts_with('$'),
                 Kind::Index(base, _) => matches!(&base.kind, Kind::Name(name) if D::is_still(name)),
@@ -286,35 +296,50 @@ impl<'a, D: Dialect> Machine<'a, D> {
 
     fn while_loop(&mut self, condition: &Expr, body: &[Statement], span: Span) -> Result<Flow> {
         let is_endless = matches!(condition.kind, Kind::Literal(Value::Flag(true)));
-        let passes = self.recorder.options.endless_passes;
-        if is_endless && passes.is_none() && !can_end(body) {
-            return fail(
-                span,
-                "this loop does not end: tell how often it is to be run (`endless_passes`), or write a loop that counts",
-            );
+        if is_endless && !can_end(body) {
+            self.check_endless(span)?;
         }
-        let mut passed = 0;
-        while !is_endless || passes.is_none_or(|passes| passed < passes) {
+        let (mut passed, mut idle) = (0, false);
+        loop {
             self.step(span)?;
             if !self.value(condition)?.flag(condition.span)? {
-                break;
+                return Ok(Flow::On);
+            }
+            if (is_endless || idle) && self.recorder.options.endless_passes.is_some_and(|passes| passed >= passes) {
+                self.recorder.note("a loop without end was run as often as the option `endless_passes` says", span);
+                return Ok(Flow::On);
             }
             passed += 1;
+            let before = self.visible_changes();
             match self.nested(span, |machine| machine.run(body))? {
                 Flow::Leave => return Ok(Flow::On),
                 Flow::On | Flow::Again => {}
                 out => return Ok(out),
             }
+            // What changed nothing does the same in each pass.
+            idle = before == self.visible_changes();
+            if idle {
+                self.check_endless(span)?;
+            }
         }
-        if is_endless {
-            self.recorder.note("a loop without end was run as often as the option `endless_passes` says", span);
+    }
+
+    fn check_endless(&self, span: Span) -> Result<()> {
+        match self.recorder.options.endless_passes {
+            Some(_) => Ok(()),
+            None => fail(
+                span,
+                "this loop does not end: tell how often it is to be run (`endless_passes`), or write a loop that counts",
+            ),
         }
-        Ok(Flow::On)
     }
 
     fn repeat_loop(&mut self, body: &[Statement], until: &Expr, span: Span) -> Result<Flow> {
+        let mut passed = 0;
         loop {
             self.step(span)?;
+            passed += 1;
+            let before = self.visible_changes();
             match self.nested(span, |machine| machine.run(body))? {
                 Flow::Leave => return Ok(Flow::On),
                 Flow::On | Flow::Again => {}
@@ -322,6 +347,13 @@ impl<'a, D: Dialect> Machine<'a, D> {
             }
             if self.value(until)?.flag(until.span)? {
                 return Ok(Flow::On);
+            }
+            if before == self.visible_changes() {
+                self.check_endless(span)?;
+                if self.recorder.options.endless_passes.is_some_and(|passes| passed >= passes) {
+                    self.recorder.note("a loop without end was run as often as the option `endless_passes` says", span);
+                    return Ok(Flow::On);
+                }
             }
         }
     }
@@ -457,7 +489,24 @@ impl<'a, D: Dialect> Machine<'a, D> {
         self.locals.last().is_some_and(|scope| scope.contains_key(name)) || self.globals.contains_key(name)
     }
 
+    /// Counts a change of a variable, by where it lives.
+    fn changed(&mut self, name: &str) {
+        let is_local = self.locals.last().is_some_and(|scope| scope.contains_key(name));
+        let level = if is_local { self.locals.len() } else { 0 };
+        if self.changes.len() <= level {
+            self.changes.resize(level + 1, 0);
+        }
+        self.changes[level] += 1;
+    }
+
+    /// Changes of the variables that are seen here.
+    fn visible_changes(&self) -> usize {
+        let local = self.changes.get(self.locals.len()).copied().unwrap_or(0);
+        if self.locals.is_empty() { self.changes[0] } else { self.changes[0] + local }
+    }
+
     fn set(&mut self, name: &Rc<str>, value: Value) {
+        self.changed(name);
         match self.variable(name) {
             Some(variable) => variable.value = value,
             None => {
@@ -486,6 +535,7 @@ impl<'a, D: Dialect> Machine<'a, D> {
         let kind = self.variable(&name).map(|variable| variable.kind.clone()).unwrap_or_default();
         if let Some(number) = self.number_of_pose(&name, &parts, place.span)? {
             *number = value.number(place.span)?;
+            self.changed(&name);
             return Ok(());
         }
         let only_indices = parts.iter().all(|part| matches!(part, Part::Index(_)));
@@ -514,7 +564,10 @@ impl<'a, D: Dialect> Machine<'a, D> {
         for part in &parts {
             slot = part_of(slot, part, D::FIRST_INDEX, place.span)?;
         }
-        *slot = value;
+        if *slot != value {
+            *slot = value;
+            self.changed(&name);
+        }
         Ok(())
     }
 
@@ -633,7 +686,9 @@ impl<'a, D: Dialect> Machine<'a, D> {
         }
         let at = at.count(span)?;
         let index = usize::try_from(at - D::FIRST_INDEX).ok();
+        let is_system = matches!(&base.kind, Kind::Name(name) if name.starts_with('$'));
         let found = match &value {
+            Value::Outside(_) if is_system => None,
             Value::Outside(what) => return Ok(Value::Outside(what.clone())),
             Value::List(values) => index.and_then(|index| values.get(index)).cloned(),
             Value::Pose(pose) => index.and_then(|index| pose.get(index)).map(|number| Value::Number(*number)),
@@ -644,6 +699,9 @@ impl<'a, D: Dialect> Machine<'a, D> {
             }
         };
         match found {
+            Some(Value::Nothing) | None if is_system => {
+                Ok(Value::Outside(format!("`{}[{at}]`", self.recorder.excerpt(base.span)).into()))
+            }
             Some(Value::Nothing) | None => fail(
                 span,
                 format!(
@@ -718,6 +776,9 @@ fn can_end(body: &[Statement]) -> bool {
 
 /// A part of a value that is about to be set; records and lists grow.
 fn part_of<'v>(value: &'v mut Value, part: &Part, first: i64, span: Span) -> Result<&'v mut Value> {
+    if let Value::Outside(what) = value {
+        return fail(span, depends(what));
+    }
     match part {
         Part::Field(field) => {
             if matches!(value, Value::Nothing) {
@@ -843,6 +904,9 @@ fn combine_whole(operator: Operator, a: i64, b: i64, span: Span) -> Option<Resul
         Multiply => a.checked_mul(b),
         Divide if b == 0 => return Some(fail(span, "a division by 0")),
         Divide => a.checked_div(b),
+        BitAnd => Some(a & b),
+        BitOr => Some(a | b),
+        BitEither => Some(a ^ b),
         _ => return None,
     };
     let too_large = || Fail { span, message: "the whole number is too large".into() };

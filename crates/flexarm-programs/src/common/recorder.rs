@@ -14,7 +14,7 @@ pub(crate) struct Recorder<'a> {
     notes: Vec<Told>,
     moves: usize,
     /// Values of external axes, and where they were told first.
-    external: Option<([f64; 6], usize)>,
+    external: [Option<(f64, usize)>; 6],
     place: Place,
 }
 
@@ -30,7 +30,7 @@ struct Told {
 const LINES_OF_A_NOTE: usize = 8;
 
 /// Where the robot is by the moves so far.
-#[derive(Clone)]
+#[allow(clippy::large_enum_variant, reason = "there is one of it")]
 enum Place {
     /// A move ended where only kinematics knows, or none was made.
     Unknown,
@@ -45,7 +45,7 @@ enum Place {
 impl<'a> Recorder<'a> {
     pub(crate) fn new(options: &'a ReadOptions<'a>, texts: Vec<Text>) -> Self {
         let place = options.start.as_ref().map_or(Place::Unknown, |start| Place::Joints(start.clone()));
-        Self { options, texts, items: Vec::new(), notes: Vec::new(), moves: 0, external: None, place }
+        Self { options, texts, items: Vec::new(), notes: Vec::new(), moves: 0, external: [None; 6], place }
     }
 
     pub(crate) fn line(&self, span: Span) -> usize {
@@ -76,6 +76,15 @@ impl<'a> Recorder<'a> {
     pub(crate) fn note_all(&mut self, text: &str) {
         if !self.notes.iter().any(|told| told.text == text) {
             self.notes.push(Told { text: text.to_owned(), file: 0, lines: Vec::new(), times: 0 });
+        }
+    }
+
+    /// Tells which files were read beside the program; the last text is what was given.
+    pub(crate) fn note_files(&mut self) {
+        let files = &self.texts[1..self.texts.len().max(2) - 1];
+        if !files.is_empty() {
+            let names: Vec<String> = files.iter().map(|text| text.path.display().to_string()).collect();
+            self.note_all(&format!("read beside the program: {}", names.join(", ")));
         }
     }
 
@@ -143,24 +152,22 @@ impl<'a> Recorder<'a> {
     /// External axes as a target tells them (`None`: not told); they must stay.
     pub(crate) fn external_axes(&mut self, values: [Option<f64>; 6], span: Span) -> Result<()> {
         let line = self.line(span);
-        let (old, since) = self.external.unwrap_or(([f64::NAN; 6], line));
-        let mut now = old;
-        for (k, value) in values.iter().enumerate() {
-            let Some(value) = value else { continue };
-            if old[k].is_finite() && (old[k] - value).abs() > 1e-6 {
-                return fail(
-                    span,
-                    format!(
-                        "external axis {} moves, from {} (line {since}) to {value}; only the axes of the arm are moved here: \
-                         leave it at one value",
-                        k + 1,
-                        old[k]
-                    ),
-                );
+        for (k, (value, before)) in values.iter().zip(&mut self.external).enumerate() {
+            match (value, &before) {
+                (Some(value), Some((old, since))) if (old - value).abs() > 1e-6 => {
+                    return fail(
+                        span,
+                        format!(
+                            "external axis {} moves, from {old} (line {since}) to {value}; only the axes of the arm are moved here: leave \
+                             it at one value",
+                            k + 1
+                        ),
+                    );
+                }
+                (Some(value), None) => *before = Some((*value, line)),
+                _ => {}
             }
-            now[k] = *value;
         }
-        self.external = Some((now, since));
         if values.iter().flatten().any(|value| *value != 0.0) {
             self.note(
                 "external axes stand still at the values that the targets tell; the base frame is not moved by them",

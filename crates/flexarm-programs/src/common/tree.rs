@@ -49,6 +49,9 @@ pub(crate) enum Operator {
     And,
     Or,
     Either,
+    BitAnd,
+    BitOr,
+    BitEither,
     /// KRL's `:`, the frame on the right seen from the frame on the left.
     Frame,
 }

@@ -300,7 +300,7 @@ impl<'a> Gcode<'a> {
     }
 
     fn set_feed(&mut self, feed: f64, span: Span) -> Result<()> {
-        if !(feed > 0.0) {
+        if feed.is_nan() || feed <= 0.0 {
             return fail(span, format!("the feed is {feed}: it must be above 0"));
         }
         self.feed = match self.feed_mode {
@@ -629,13 +629,13 @@ fn refused(code: i32) -> String {
             "drilling cycles are not read: let the CAM program write them as G0 and G1"
         }
         950 => "feed per turn of the spindle is not read: write mm per minute (G94)",
-        50 | 51 | 52 | 53 => "splines (G5) are not read: write lines or arcs",
+        50..=53 => "splines (G5) are not read: write lines or arcs",
         160 => "polar coordinates are not read: write X and Y",
         520 => "the local offset G52 is not read: use G92 or a work frame",
         510 | 511 | 680 => {
             "scaling, mirroring and turning of the program are not read: let the CAM program write the path so"
         }
-        380 | 381 | 382 | 383 | 384 | 385 => "probing depends on what the tool touches: take the line out",
+        380..=385 => "probing depends on what the tool touches: take the line out",
         330 | 331 | 320 => "threads that follow the spindle are not read",
         70 | 80 => "lathe modes (G7, G8) are not read",
         _ => "this code is not known here, so what it does to the motion is not either: take it out",

@@ -65,11 +65,11 @@ impl Reader<'_> {
             match byte {
                 b'(' => {
                     let from = self.at;
-                    let Some(length) = self.text[self.at..].iter().position(|b| *b == b')') else {
+                    let Some(length) = comment_length(&self.text[self.at..]) else {
                         self.at = self.text.len();
                         return fail(self.span(from), "this comment does not end on its line: `)` is missing");
                     };
-                    self.at += length + 1;
+                    self.at += length;
                 }
                 b';' => self.at = self.text.len(),
                 byte if byte.is_ascii_whitespace() || *byte == 0x1a => self.at += 1,
@@ -300,6 +300,20 @@ impl Reader<'_> {
             value = value.powf(self.value()?);
         }
     }
+}
+
+/// Bytes of a comment with its brackets, which may hold others.
+fn comment_length(text: &[u8]) -> Option<usize> {
+    let mut depth = 0;
+    for (at, byte) in text.iter().enumerate() {
+        match byte {
+            b'(' => depth += 1,
+            b')' if depth == 1 => return Some(at + 1),
+            b')' => depth -= 1,
+            _ => {}
+        }
+    }
+    text.iter().position(|byte| *byte == b')').map(|at| at + 1)
 }
 
 /// `O0001` names the program; `O100 sub` and the like are control.

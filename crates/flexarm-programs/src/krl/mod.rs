@@ -28,6 +28,9 @@ use system::Krl;
 /// Files of routines beside the program that are read, at most.
 const MOST_SIBLINGS: usize = 64;
 
+/// Folders above the program in which its controller's data are looked for.
+const LEVELS_OF_A_BACKUP: usize = 4;
+
 pub(crate) fn read(texts: &mut Vec<Text>, options: &ReadOptions<'_>) -> Result<Program> {
     let mut unit = parse::parse(&texts[0], 0)?;
     let mut data = Vec::new();
@@ -39,6 +42,9 @@ pub(crate) fn read(texts: &mut Vec<Text>, options: &ReadOptions<'_>) -> Result<P
         let taken = options.companions.iter().map(|(path, _)| path.clone()).collect::<Vec<_>>();
         if let Some((found, bytes)) = beside(&path, &stem(&path), "dat").filter(|(found, _)| !taken.contains(found)) {
             data.push(add(texts, &found, &bytes)?);
+        }
+        if let Some((found, bytes)) = configuration(&path).filter(|(found, _)| !taken.contains(found)) {
+            data.insert(0, add(texts, &found, &bytes)?);
         }
     }
     let entry = entry(&unit, options)?;
@@ -54,6 +60,7 @@ pub(crate) fn read(texts: &mut Vec<Text>, options: &ReadOptions<'_>) -> Result<P
     let mut machine = Machine::new(Recorder::new(options, texts.clone()), Krl::new());
     system::set_up(&mut machine);
     machine.dialect.is_given = true;
+    machine.recorder.note_files();
     machine.run(&given.main)?;
     for further in &data {
         run_data(&mut machine, &further.data);
@@ -114,6 +121,14 @@ fn beside(path: &Path, stem: &str, ending: &str) -> Option<(std::path::PathBuf, 
     let file = found.into_iter().find(is_wanted)?;
     let bytes = std::fs::read(&file).ok()?;
     Some((file, bytes))
+}
+
+/// `$config.dat` of the controller, where a backup has it: in `System` beside a folder that the program is in.
+fn configuration(path: &Path) -> Option<(std::path::PathBuf, Vec<u8>)> {
+    let folders = path.ancestors().skip(1).take(LEVELS_OF_A_BACKUP);
+    folders
+        .flat_map(|folder| [folder.join("x"), folder.join("System/x")])
+        .find_map(|place| beside(&place, "$config", "dat"))
 }
 
 /// Routines that are called and are files of their own beside the program.

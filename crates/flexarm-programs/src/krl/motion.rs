@@ -14,6 +14,8 @@ use crate::common::{Result, Span, fail};
 type Krls<'a> = Machine<'a, Krl>;
 
 const AXES: [&str; 6] = ["a1", "a2", "a3", "a4", "a5", "a6"];
+/// Axes that a first target tells, at least.
+const FEWEST_AXES: usize = 4;
 const EXTERNAL: [&str; 6] = ["e1", "e2", "e3", "e4", "e5", "e6"];
 
 /// Axis values in rad as KRL's aggregate in degrees.
@@ -210,9 +212,10 @@ fn target(
 fn joints(machine: &mut Krls<'_>, context: &Context, axes: [Option<f64>; 6], span: Span) -> Result<Target> {
     let told = axes.iter().rposition(Option::is_some).map_or(0, |last| last + 1);
     let before = machine.recorder.joints().map(<[f64]>::to_vec);
-    let count = before.as_ref().map_or(told, Vec::len).max(told);
+    // Arms with fewer than six axes are told by as many.
+    let count = before.as_ref().map_or(FEWEST_AXES, Vec::len).max(told);
     let mut joints = Vec::with_capacity(count);
-    for k in 0..count.max(told) {
+    for k in 0..count {
         let old = before.as_ref().and_then(|before| before.get(k)).copied();
         let value = axes.get(k).copied().flatten().map(f64::to_radians);
         joints.push(match (value, old, context.is_relative) {
@@ -458,11 +461,11 @@ fn blend(machine: &mut Krls<'_>, arguments: &[Argument], span: Span) -> Result<B
     let mut result = Blend::Stop;
     for argument in arguments {
         let Some(word) = argument.name.as_deref() else { continue };
-        let (part, scale, make): (&str, f64, fn(f64) -> Blend) = match word {
-            "c_ptp" => ("cptp", 0.005, Blend::Fraction),
-            "c_dis" | "c_spl" => ("cdis", 1e-3, Blend::Distance),
-            "c_vel" => ("cvel", 0.01, Blend::Velocity),
-            "c_ori" => ("cori", std::f64::consts::PI / 180.0, Blend::Orientation),
+        let (part, make): (&str, fn(f64) -> Blend) = match word {
+            "c_ptp" => ("cptp", |percent| Blend::Fraction(percent / 200.0)),
+            "c_dis" | "c_spl" => ("cdis", |mm| Blend::Distance(mm / 1000.0)),
+            "c_vel" => ("cvel", |percent| Blend::Velocity(percent / 100.0)),
+            "c_ori" => ("cori", |degrees| Blend::Orientation(degrees.to_radians())),
             "with" | "ca" | "#base" | "#tool" => continue,
             other => return fail(argument.span, format!("`{}` behind a target is not known", other.to_uppercase())),
         };
@@ -481,7 +484,7 @@ fn blend(machine: &mut Krls<'_>, arguments: &[Argument], span: Span) -> Result<B
                 format!("$APO.{} is {value}, which is outside of its range", part.to_uppercase()),
             );
         }
-        result = if value == 0.0 { Blend::Stop } else { make(value * scale) };
+        result = if value == 0.0 { Blend::Stop } else { make(value) };
     }
     Ok(result)
 }

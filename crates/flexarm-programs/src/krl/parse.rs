@@ -362,7 +362,13 @@ fn refuse(parser: &mut Parser, message: &str) -> Result<Vec<Action>> {
 fn assignment(parser: &mut Parser) -> Result<Vec<Action>> {
     let place = parser.expression()?;
     parser.expect_symbol("=")?;
-    Ok(vec![Action::Assign { place, value: parser.expression()? }])
+    let is_output =
+        matches!(&place.kind, Kind::Index(base, _) if matches!(&base.kind, Kind::Name(name) if &**name == "$out"));
+    let mut actions = vec![Action::Assign { place, value: parser.expression()? }];
+    if is_output {
+        actions.push(Action::Still("inputs and outputs are not simulated"));
+    }
+    Ok(actions)
 }
 
 /// `[GLOBAL] DECL [GLOBAL] [CONST] TYPE name[n]=value, name`.

@@ -27,6 +27,18 @@ impl Krl {
 
 type Krls<'a> = Machine<'a, Krl>;
 
+/// Parts of system variables that `BAS(#INITMOV, 0)` sets from `$config.dat`.
+const DEFAULTS: [(&str, &str, &str); 8] = [
+    ("$vel", "cp", "def_vel_cp"),
+    ("$vel", "ori1", "def_vel_ori1"),
+    ("$vel", "ori2", "def_vel_ori2"),
+    ("$acc", "cp", "def_acc_cp"),
+    ("$acc", "ori1", "def_acc_ori1"),
+    ("$acc", "ori2", "def_acc_ori2"),
+    ("$apo", "cptp", "def_apo_cptp"),
+    ("$apo", "cdis", "def_apo_cdis"),
+];
+
 /// Components of frames and positions, in mm and degrees.
 pub(super) const CARTESIAN: [&str; 6] = ["x", "y", "z", "a", "b", "c"];
 
@@ -97,6 +109,17 @@ pub(super) fn set_up(machine: &mut Krls<'_>) {
         ("ldat_act", parts(&["vel", "acc", "apo_dist", "apo_fac", "ori_typ"])),
         ("fdat_act", parts(&["tool_no", "base_no", "ipo_frame"])),
         ("pdefault", pdat_default()),
+        (
+            "fhome",
+            Value::record(
+                "fdat",
+                vec![
+                    ("tool_no", Value::Whole(0)),
+                    ("base_no", Value::Whole(0)),
+                    ("ipo_frame", Value::Word("base".into())),
+                ],
+            ),
+        ),
     ] {
         machine.set_global(name, value);
     }
@@ -149,6 +172,10 @@ impl Dialect for Krl {
             "tool_data" | "base_data" => {
                 let element = |k: usize| Value::Outside(format!("`{}[{k}]`", name.to_uppercase()).into());
                 return Ok(Value::list((1..=64).map(element).collect()));
+            }
+            _ if name.starts_with("xhome") => {
+                let what = format!("`{}`, in `$config.dat` (`companions`)", name.to_uppercase());
+                return Ok(Value::Outside(what.into()));
             }
             "$pi" => return Ok(Value::Number(std::f64::consts::PI)),
             _ => {}
@@ -458,6 +485,13 @@ fn set_part(machine: &mut Krls<'_>, name: &str, field: &str, value: Value) {
     machine.set_global(name, Value::Record(Rc::new(record)));
 }
 
+/// `$VEL.CP`, not above what `$config.dat` allows.
+fn set_path_speed(machine: &mut Krls<'_>, speed: f64, span: Span) -> Result<()> {
+    let largest = machine.global("def_vel_cp").cloned().map(|value| value.number(span)).transpose()?;
+    set_part(machine, "$vel", "cp", Value::Number(largest.map_or(speed, |largest| speed.min(largest))));
+    Ok(())
+}
+
 /// The same percentage for all axes.
 pub(super) fn set_axes(machine: &mut Krls<'_>, name: &str, percent: f64) {
     machine.set_global(name, Value::list(vec![Value::Number(percent); 12]));
@@ -473,7 +507,7 @@ fn bas(machine: &mut Krls<'_>, arguments: &[Argument], span: Span) -> Result<()>
         "initmov" => {
             set_axes(machine, "$vel_axis", 100.0);
             set_axes(machine, "$acc_axis", 100.0);
-            for (variable, part, default) in [("$vel", "cp", "def_vel_cp"), ("$acc", "cp", "def_acc_cp")] {
+            for (variable, part, default) in DEFAULTS {
                 if let Some(value) = machine.global(default).cloned() {
                     set_part(machine, variable, part, value);
                 }
@@ -488,8 +522,13 @@ fn bas(machine: &mut Krls<'_>, arguments: &[Argument], span: Span) -> Result<()>
             set_axes(machine, if &*command == "vel_ptp" { "$vel_axis" } else { "$acc_axis" }, percent);
         }
         "vel_cp" | "acc_cp" => {
-            let value = Value::Number(machine.number(arguments, 1, span)?);
-            set_part(machine, if &*command == "vel_cp" { "$vel" } else { "$acc" }, "cp", value);
+            let number = machine.number(arguments, 1, span)?;
+            if &*command == "vel_cp" {
+                set_path_speed(machine, number, span)?;
+            } else {
+                let value = path_acceleration(machine, number, span)?;
+                set_part(machine, "$acc", "cp", value);
+            }
         }
         "ov_pro" => {
             let value = Value::Number(machine.number(arguments, 1, span)?);
@@ -559,8 +598,8 @@ fn ptp_data(machine: &mut Krls<'_>, arguments: &[Argument], command: &str, span:
         set_axes(machine, "$acc_axis", percent);
     }
     if let Some(distance) = told("apo_dist") {
-        set_part(machine, "$apo", "cptp", distance.clone());
-        set_part(machine, "$apo", "cdis", distance);
+        let in_mm = matches!(told("apo_mode"), Some(Value::Word(mode)) if &*mode == "cdis");
+        set_part(machine, "$apo", if in_mm { "cdis" } else { "cptp" }, distance);
     }
     Ok(())
 }
@@ -570,7 +609,8 @@ fn cp_data(machine: &mut Krls<'_>, arguments: &[Argument], command: &str, span: 
     let told = |name: &str| ldat.get(name).filter(|value| !matches!(value, Value::Nothing)).cloned();
     let speed = if command == "cp_params" { Some(machine.argument(arguments, 1, span)?.0) } else { told("vel") };
     if let Some(speed) = speed {
-        set_part(machine, "$vel", "cp", speed);
+        let speed = speed.number(span)?;
+        set_path_speed(machine, speed, span)?;
     }
     if let Some(percent) = told("acc") {
         let percent = percent.number(span)?;

@@ -227,7 +227,7 @@ fn def_frame<'v>(machine: &mut Rapids<'_>, at: &impl Fn(usize) -> Result<&'v Val
     }
     let x = points[1] - points[0];
     let z = x.cross(&(points[2] - points[0]));
-    if !(z.norm() > 1e-9 * x.norm()) {
+    if z.norm() <= 1e-9 * x.norm() || z.iter().any(|part| part.is_nan()) {
         return fail(span, "the three points are on a line: they make no frame");
     }
     let (x, z) = (x.normalize(), z.normalize());
@@ -268,7 +268,7 @@ fn mathematics(
             (if name == "round" { scaled.round() } else { scaled.trunc() }) / 10f64.powi(decimals)
         }
         "numtostr" | "valtostr" => {
-            let shown = match &values[..] {
+            let shown = match values {
                 [] => return fail(span, "a value is expected"),
                 [first, ..] => first.number(span).map_or_else(|_| first.kind().to_owned(), |number| number.to_string()),
             };

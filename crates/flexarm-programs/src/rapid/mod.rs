@@ -11,7 +11,6 @@ mod motion;
 mod parse;
 mod types;
 
-use std::collections::HashMap;
 use std::rc::Rc;
 
 use flexarm_path::program::{Axes, Program};
@@ -29,11 +28,14 @@ use motion::Settings;
 pub(crate) struct Rapid {
     settings: Settings,
     /// Fields of types that the file declares.
-    records: HashMap<Rc<str>, Vec<(Rc<str>, Rc<str>)>>,
+    records: types::Records,
     /// The tool whose data are not in the files.
     unknown_tool: Option<Rc<str>>,
     is_given: bool,
 }
+
+/// Modules beside the program that are looked into, at most.
+const MOST_SIBLINGS: usize = 64;
 
 type Rapids<'a> = Machine<'a, Rapid>;
 
@@ -41,22 +43,25 @@ pub(crate) fn read(texts: &mut Vec<Text>, options: &ReadOptions<'_>) -> Result<P
     let mut unit = parse::parse(&texts[0], 0)?;
     for (path, bytes) in &options.companions {
         texts.push(Text::new(path, &decode(bytes)));
-        let further = parse::parse(&texts[texts.len() - 1], texts.len() - 1)?;
-        unit.routines.extend(further.routines);
-        unit.records.extend(further.records);
-        unit.data.splice(0..0, further.data);
+        unit.take_in(parse::parse(&texts[texts.len() - 1], texts.len() - 1)?);
+    }
+    let entries = unit.routines.clone();
+    if options.find_companions {
+        add_siblings(texts, &mut unit)?;
     }
     texts.push(given_text(options, ":=", ";"));
     let given = parse::parse(&texts[texts.len() - 1], texts.len() - 1)?;
 
-    let rapid = Rapid { settings: Settings::default(), records: HashMap::new(), unknown_tool: None, is_given: true };
+    let rapid =
+        Rapid { settings: Settings::default(), records: types::Records::new(), unknown_tool: None, is_given: true };
     let mut machine = Machine::new(Recorder::new(options, texts.clone()), rapid);
     machine.dialect.records = unit.records;
+    machine.recorder.note_files();
     machine.run(&given.main)?;
     declare(&mut machine, &unit.data);
     machine.run(&given.main)?; // goes before what the files say
     machine.dialect.is_given = false;
-    let file_entry = match unit.routines.as_slice() {
+    let file_entry = match entries.as_slice() {
         [only] => only.name.clone(),
         _ => "main".into(),
     };
@@ -87,6 +92,42 @@ pub(crate) fn read(texts: &mut Vec<Text>, options: &ReadOptions<'_>) -> Result<P
         }
     };
     Ok(machine.recorder.finish(&name, Axes::Joints))
+}
+
+/// Modules in the folder of the program that alone declare a name which the program uses and does not declare.
+fn add_siblings(texts: &mut Vec<Text>, unit: &mut parse::Unit) -> Result<()> {
+    let path = texts[0].path.clone();
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(std::path::Path::new("."));
+    let Ok(entries) = std::fs::read_dir(folder) else { return Ok(()) };
+    let is_module = |file: &std::path::PathBuf| {
+        let ending = file.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+        matches!(ending.as_str(), "mod" | "modx" | "sys" | "sysx") && file.file_name() != path.file_name()
+    };
+    let mut files: Vec<_> = entries.flatten().map(|entry| entry.path()).filter(is_module).collect();
+    files.sort();
+    files.truncate(MOST_SIBLINGS);
+    let mut siblings: Vec<(Text, parse::Unit)> = Vec::new();
+    for file in files {
+        let Ok(bytes) = std::fs::read(&file) else { continue };
+        let text = Text::new(&file, &decode(&bytes));
+        // One that cannot be read is missed where it is needed.
+        if let Ok(sibling) = parse::parse(&text, 0) {
+            siblings.push((text, sibling));
+        }
+    }
+    loop {
+        let declared = unit.declared();
+        let names: Vec<_> = siblings.iter().map(|(_, sibling)| sibling.declared()).collect();
+        let missing = unit.used.iter().filter(|name| !declared.contains(*name));
+        let owner = |name: &Rc<str>| {
+            let mut owners = names.iter().enumerate().filter(|(_, names)| names.contains(name));
+            owners.next().filter(|_| owners.next().is_none()).map(|(at, _)| at)
+        };
+        let Some(at) = missing.filter_map(owner).min() else { return Ok(()) };
+        let (text, _) = siblings.remove(at);
+        texts.push(text);
+        unit.take_in(parse::parse(&texts[texts.len() - 1], texts.len() - 1)?);
+    }
 }
 
 /// Declarations of modules, in any order of need; one that cannot be read is an error where its name is used.

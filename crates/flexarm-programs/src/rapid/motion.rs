@@ -409,7 +409,7 @@ fn acceleration_limit(machine: &mut Rapids<'_>, name: &str, arguments: &[Argumen
             }
         }
     }
-    if limit.is_some_and(|limit| !(limit > 0.0)) {
+    if limit.is_some_and(|limit: f64| limit.is_nan() || limit <= 0.0) {
         return fail(span, "a limit of the acceleration is above 0 m/s2");
     }
     machine.dialect.settings.path_acceleration = limit;

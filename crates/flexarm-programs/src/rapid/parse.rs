@@ -1,8 +1,9 @@
 //! Text of RAPID to statements. What is not understood becomes a statement that is an error where it is reached.
 
-use std::collections::HashMap;
+use std::collections::HashSet;
 use std::rc::Rc;
 
+use super::types::{Fields, Records};
 use crate::common::expressions::{Parser, Syntax};
 use crate::common::lexer::{Spelling, Token, tokens};
 use crate::common::tree::{Action, Argument, Expr, Kind, Parameter, Routine, Statement};
@@ -29,20 +30,54 @@ pub(super) struct Unit {
     pub(super) data: Vec<Statement>,
     /// Statements outside of routines.
     pub(super) main: Vec<Statement>,
+    /// All names that stand in it.
+    pub(super) used: HashSet<Rc<str>>,
     /// Fields of declared types, with their types.
-    pub(super) records: HashMap<Rc<str>, Vec<(Rc<str>, Rc<str>)>>,
+    pub(super) records: Records,
+}
+
+impl Unit {
+    /// Names that it declares.
+    pub(super) fn declared(&self) -> HashSet<Rc<str>> {
+        let data = self.data.iter().filter_map(|statement| match &statement.action {
+            Action::Declare { name, .. } => Some(name.clone()),
+            _ => None,
+        });
+        let routines = self.routines.iter().map(|routine| routine.name.clone());
+        data.chain(routines).chain(self.records.keys().cloned()).collect()
+    }
+
+    /// Takes another module in; what was there goes before.
+    pub(super) fn take_in(&mut self, other: Self) {
+        self.routines.extend(other.routines);
+        self.data.splice(0..0, other.data);
+        self.used.extend(other.used);
+        for (name, fields) in other.records {
+            self.records.entry(name).or_insert(fields);
+        }
+    }
 }
 
 pub(super) fn parse(text: &Text, file: usize) -> Result<Unit> {
     let mut parser = Parser::new(Syntax::Rapid, tokens(&without_header(&text.text), file, &SPELLING)?);
     let mut unit = Unit::default();
+    unit.used.extend(parser.lexemes.iter().filter_map(|lexeme| match &lexeme.token {
+        Token::Name(name) => Some(name.clone()),
+        _ => None,
+    }));
     while !parser.is_over() {
         while ["local", "task"].iter().any(|word| parser.take_word(word)) {}
         match parser.word().as_deref() {
             Some("module") => {
                 parser.advance();
-                let name = parser.expect_name()?;
-                unit.name.get_or_insert(name);
+                let start = parser.span();
+                if matches!(parser.peek(), Token::Number(..)) {
+                    parser.advance(); // some generators begin a name with a digit
+                }
+                if parser.word().is_some_and(|word| !BEGINNINGS.contains(&&*word)) {
+                    parser.advance();
+                }
+                unit.name.get_or_insert_with(|| text.excerpt(start.to(parser.last_span())).into());
                 if parser.is_symbol("(") {
                     parser.arguments()?;
                 }
@@ -83,11 +118,14 @@ fn without_header(text: &str) -> String {
 /// To behind the next semicolon.
 fn pass_statement(parser: &mut Parser) {
     while !parser.is_over() && !parser.take_symbol(";") {
+        if parser.word().is_some_and(|word| OUTER.contains(&&*word)) {
+            return; // its semicolon is missing
+        }
         parser.advance();
     }
 }
 
-fn record(parser: &mut Parser) -> Result<(Rc<str>, Vec<(Rc<str>, Rc<str>)>)> {
+fn record(parser: &mut Parser) -> Result<(Rc<str>, Fields)> {
     parser.advance();
     let name = parser.expect_name()?;
     let mut fields = Vec::new();
@@ -133,7 +171,7 @@ fn parameters(parser: &mut Parser) -> Result<Vec<Parameter>> {
         }
         parser.take_symbol(",");
         parser.take_symbol("|");
-        let optional = parser.take_symbol("\\") || parameters.last().is_some_and(|_| false);
+        let optional = parser.take_symbol("\\");
         let returned = ["var", "pers", "inout"].iter().any(|word| parser.take_word(word));
         let kind = parser.expect_name()?;
         let name =
@@ -168,6 +206,9 @@ fn block(parser: &mut Parser, ends: &[&str]) -> Result<Vec<Statement>> {
     }
 }
 
+/// Words that begin what stands in a module.
+const BEGINNINGS: [&str; 10] = ["local", "task", "pers", "var", "const", "proc", "func", "trap", "record", "alias"];
+
 /// Words that end every block.
 const OUTER: [&str; 5] = ["endproc", "endfunc", "endtrap", "endmodule", "proc"];
 
@@ -199,6 +240,9 @@ fn statement(parser: &mut Parser) -> Result<Statement> {
                 message
             };
             pass_statement(parser);
+            if parser.at == start {
+                parser.advance(); // the end of a block that did not begin
+            }
             let end = parser.lexemes[parser.at.saturating_sub(1).max(start)].span;
             Ok(Statement { action: Action::Refused(message), span: span.to(end) })
         }

@@ -6,8 +6,11 @@ use std::rc::Rc;
 use crate::common::value::{Record, Value};
 use crate::common::{Result, Span, fail};
 
+/// Names and types of fields.
+pub(super) type Fields = Vec<(Rc<str>, Rc<str>)>;
+
 /// Fields that a file declares for a type.
-pub(super) type Records = HashMap<Rc<str>, Vec<(Rc<str>, Rc<str>)>>;
+pub(super) type Records = HashMap<Rc<str>, Fields>;
 
 /// Fields of a type of the language, with their types.
 fn fields(kind: &str) -> Option<&'static [(&'static str, &'static str)]> {

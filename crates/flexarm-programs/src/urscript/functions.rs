@@ -120,6 +120,17 @@ pub(super) fn function(machine: &mut UrScripts<'_>, name: &str, arguments: &[Arg
                 None => Value::Outside("`get_forward_kin`, the kinematics of the robot".into()),
             }
         }
+        "get_target_joint_positions" => match machine.recorder.joints() {
+            Some(joints) => Value::list(joints.iter().map(|joint| Value::Number(*joint)).collect()),
+            None => Value::Outside("`get_target_joint_positions()`".into()),
+        },
+        "get_target_tcp_pose" => {
+            let X_FT = machine.dialect.X_FT;
+            match machine.recorder.pose(&Pose::identity(), &X_FT, span) {
+                Ok(X_WT) => as_pose(X_WT),
+                Err(_) => Value::Outside("`get_target_tcp_pose()`".into()),
+            }
+        }
         "length" => match at(0)? {
             Value::List(values) => Value::Number(values.len() as f64),
             Value::Pose(_) => Value::Number(6.0),

@@ -36,6 +36,7 @@ pub(crate) fn read(texts: &mut Vec<Text>, options: &ReadOptions<'_>) -> Result<P
     texts.push(given_text(options, "=", ""));
     let given = parse::parse(&texts[texts.len() - 1], texts.len() - 1)?;
     let mut machine = Machine::new(Recorder::new(options, texts.clone()), UrScript { X_FT: None });
+    machine.recorder.note_files();
     machine.run(&given.main)?;
     let path = texts[0].path.clone();
     let mut name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();

@@ -1,0 +1,162 @@
+//! Whatever stands in a file: its language is recognised, no text makes a reader panic or run for ever.
+#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
+
+mod common;
+
+use std::path::Path;
+
+use common::{fixture, read_text};
+use flexarm_programs::{Language, ProgramError, ReadOptions, read_program, recognise};
+use proptest::prelude::*;
+
+const FIXTURES: [(&str, Language); 5] = [
+    ("pendant.src", Language::Krl),
+    ("shapes.src", Language::Krl),
+    ("cell.mod", Language::Rapid),
+    ("pick.script", Language::UrScript),
+    ("plate.ngc", Language::GCode),
+];
+
+#[test]
+fn programs_are_recognised_by_what_is_in_them_not_by_their_ending() {
+    for (name, language) in FIXTURES {
+        let (_, bytes) = fixture(name);
+        for other in [name, "program", "program.txt", "program.src", "program.nc"] {
+            assert_eq!(recognise(&bytes, other), Some(language), "{name} as {other}");
+        }
+    }
+    for text in ["", "hello world\n", "time,a1,a2\n0,1,2\n", "{\"a\": [1, 2]}\n", "[robot]\nname = \"x\"\n"] {
+        assert_eq!(recognise(text.as_bytes(), "x.txt"), None, "{text:?}");
+    }
+    let error = read_program(Path::new("x.txt"), b"hello", &ReadOptions::default()).unwrap_err();
+    assert!(matches!(error, ProgramError::Unknown { .. }));
+    let error = read_program(Path::new("x.src"), b"DEF x()\nEND\n", &ReadOptions::default()).unwrap_err();
+    assert!(matches!(error, ProgramError::NoMoves { .. }), "{error}");
+}
+
+#[test]
+fn programs_that_grow_without_bound_end_with_a_clear_error() {
+    let options =
+        ReadOptions { most_moves: 100, most_steps: 10_000, endless_passes: Some(1_000_000), ..ReadOptions::default() };
+    let cases = [
+        ("a.src", "DEF a()\nLOOP\nPTP {A1 1,A2 0,A3 0,A4 0,A5 0,A6 0}\nENDLOOP\nEND\n", "more than 100 moves"),
+        ("a.src", "DEF a()\nINT i\ni=0\nWHILE i>=0\ni=i+1\nENDWHILE\nEND\n", "10000 statements were run"),
+        ("a.src", "DEF a()\na()\nEND\n", "does a routine call itself?"),
+        ("a.script", "def a():\nl = [1]\nwhile True:\nl = [l, l]\nend\nend\n", "would hold more than 200000 values"),
+        (
+            "a.script",
+            "def a():\ns = \"x\"\nwhile True:\ns = s + s\nmovej([0,0,0,0,0,0])\nend\nend\n",
+            "more than 100 moves",
+        ),
+        (
+            "a.mod",
+            "MODULE a\nVAR num x{100000,100000};\nPROC main()\nx{1,1} := 1;\nMoveJ x, v5, fine, tool0;\nENDPROC\nENDMODULE\n",
+            "the array would hold more than 200000 values",
+        ),
+        ("a.nc", "G21 F10\nG0 X0 Y0 Z0\nG2 X0 Y0 Z-1 I5 P1000\n", "more than 100 moves"),
+    ];
+    for (name, text, message) in cases {
+        let error = read_text(name, text, &options).unwrap_err();
+        assert!(error.contains(message), "{text}\n  gives {error}");
+    }
+    for (name, open, close) in [("a.src", "(", ")"), ("a.mod", "(", ")"), ("a.script", "[", "]"), ("a.nc", "[", "]")] {
+        let deep = format!("{}1{}", open.repeat(5000), close.repeat(5000));
+        let text = match name {
+            "a.src" => format!("DEF a()\nPTP {{A1 {deep}}}\nEND\n"),
+            "a.mod" => format!("MODULE a\nPROC main()\nMoveJ {deep}, v5, fine, tool0;\nENDPROC\nENDMODULE\n"),
+            "a.script" => format!("def a():\nmovej({deep})\nend\n"),
+            _ => format!("G21 G0 X{deep}\nG1 X5 Y7\n"),
+        };
+        let error = read_text(name, &text, &options).unwrap_err();
+        assert!(error.contains("are inside of each other"), "{error}");
+    }
+    let chain = "1+".repeat(20_000) + "1";
+    let error = read_text("a.src", &format!("DEF a()\nPTP {{A1 {chain}}}\nEND\n"), &options).unwrap_err();
+    assert!(error.contains("operators follow each other"), "{error}");
+}
+
+#[test]
+fn files_of_western_europe_and_of_windows_are_read() {
+    let text = b"DEF a()\r\n; f\xfcr den Gru\xdf\r\nPTP {A1 1,A2 0,A3 0,A4 0,A5 0,A6 0}\r\nEND\r\n";
+    assert_eq!(read_program(Path::new("/nowhere/a.src"), text, &ReadOptions::default()).unwrap().items.len(), 1);
+    let marked = "\u{feff}DEF a()\r\n; für\r\nPTP {A1 1,A2 0,A3 0,A4 0,A5 0,A6 0}\r\nEND\r\n";
+    assert_eq!(read_text("a.src", marked, &ReadOptions::default()).unwrap().items.len(), 1);
+}
+
+/// A change of a text.
+#[derive(Debug, Clone)]
+enum Change {
+    Cut(usize, usize),
+    Double(usize, usize),
+    Byte(usize, u8),
+    Insert(usize, &'static str),
+}
+
+fn change() -> impl Strategy<Value = Change> {
+    const WORDS: [&str; 24] = [
+        "(", ")", "[", "]", "{", "}", "\"", "'", "#", ":", ",", ";", "\\", "\n", "-", "9E9", "1/0", "=", "END",
+        "ENDIF", "end", "while ", "MOVEL ", "\u{fc}",
+    ];
+    prop_oneof![
+        (any::<usize>(), 0..60usize).prop_map(|(at, length)| Change::Cut(at, length)),
+        (any::<usize>(), 0..200usize).prop_map(|(at, length)| Change::Double(at, length)),
+        (any::<usize>(), any::<u8>()).prop_map(|(at, byte)| Change::Byte(at, byte)),
+        (any::<usize>(), 0..WORDS.len()).prop_map(|(at, word)| Change::Insert(at, WORDS[word])),
+    ]
+}
+
+fn changed(mut bytes: Vec<u8>, changes: &[Change]) -> Vec<u8> {
+    for change in changes {
+        let size = bytes.len().max(1);
+        match change {
+            Change::Cut(at, length) => {
+                let at = at % size;
+                let end = (at + length).min(bytes.len());
+                bytes.drain(at.min(end)..end);
+            }
+            Change::Double(at, length) => {
+                let at = (at % size).min(bytes.len());
+                let end = (at + length).min(bytes.len());
+                let piece = bytes[at..end].to_vec();
+                bytes.splice(at..at, piece);
+            }
+            Change::Byte(at, byte) => {
+                let at = at % size;
+                if let Some(old) = bytes.get_mut(at) {
+                    *old = *byte;
+                }
+            }
+            Change::Insert(at, word) => {
+                let at = (at % size).min(bytes.len());
+                bytes.splice(at..at, word.bytes());
+            }
+        }
+    }
+    bytes
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn no_change_of_a_program_makes_a_reader_panic(
+        which in 0..FIXTURES.len(),
+        changes in prop::collection::vec(change(), 1..6),
+        passes in prop::option::of(0..3usize),
+    ) {
+        let (name, language) = FIXTURES[which];
+        let bytes = changed(fixture(name).1, &changes);
+        let options = ReadOptions {
+            language: Some(language),
+            most_moves: 500,
+            most_steps: 5_000,
+            endless_passes: passes,
+            waits_are_over: true,
+            ..ReadOptions::default()
+        };
+        if let Ok(program) = read_program(&Path::new("/nowhere").join(name), &bytes, &options) {
+            prop_assert!(!program.items.is_empty() && program.items.len() <= 500);
+        }
+        recognise(&bytes, name);
+    }
+}
