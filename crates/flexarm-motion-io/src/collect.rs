@@ -176,7 +176,8 @@ impl<'a> Collector<'a> {
         }
         // Of several: the one that moves most joints, then what a robot did before what it was told, then the longest.
         let rank = |topic: &Topic| {
-            let matched = topic.series.len();
+            let filled = topic.series.iter().filter(|series| !series.position.is_empty()).count();
+            let matched = if topic.received.is_empty() { filled } else { topic.series.len() };
             let kind = if topic.received.is_empty() { 1 + usize::from(topic.of == "position") } else { 0 };
             (matched, kind, topic.count)
         };

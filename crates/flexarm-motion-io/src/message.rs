@@ -260,10 +260,12 @@ fn wrong(key: &str, node: &Node, expected: &'static str) -> Trouble {
 /// `header.stamp` in ns since 1970; 0 without one.
 fn stamp_ns(node: &Node) -> Result<i64, Trouble> {
     let Some(stamp) = node.get("header").and_then(|header| header.get("stamp")) else { return Ok(0) };
-    match whole_ns(stamp) {
-        Some(ns) => Ok(ns),
+    match (whole_ns(stamp), &stamp.value) {
+        (Some(ns), _) => Ok(ns),
+        // So many are ns since 1970.
+        (None, Value::Whole(whole)) if *whole > 100_000_000_000_000_000 => Ok(*whole),
         // A float is as exact as it was written.
-        None => match stamp.number() {
+        _ => match stamp.number() {
             Some(seconds) if seconds.abs() < 9e9 => Ok((seconds * 1e9).round() as i64),
             _ => Err(wrong("stamp", stamp, "sec and nanosec, or seconds")),
         },

@@ -207,6 +207,9 @@ fn what_is_assumed_or_left_out_is_told() {
             .all(|l| !l.contains("taken as"))
     );
     assert!(told("timestamp;joint_1[rad]\n1700000000000;0\n1700000001000;0.5\n").contains("taken as ms since 1970"));
+    assert!(
+        told("Robot 7\nt[s];joint_1[rad]\n0;0\n1;0.5\n").contains("the lines 1 to 1 above the header are passed over")
+    );
     assert!(told("t[s];joint_1[rad]\n0;0\n0;0\n1;0.5\n").contains("1 rows repeat the one before"));
 }
 
