@@ -1,5 +1,7 @@
 //! `flexarm motion`, and motions of other programs in the commands that take one.
 
+#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
+
 mod common;
 
 use std::path::{Path, PathBuf};

@@ -51,7 +51,7 @@ pub(crate) fn assemble(topic: Topic, file: &str, has_clock: bool) -> Result<Asse
     let samples = lines.iter().map(|line| line.t.len()).max().unwrap_or(0);
     let first = lines.iter().filter_map(|line| line.t.first()).fold(f64::INFINITY, |first, t| first.min(*t));
     let last = lines.iter().filter_map(|line| line.t.last()).fold(f64::NEG_INFINITY, |last, t| last.max(*t));
-    if !(last > first) {
+    if last <= first || lines.is_empty() {
         let found = samples.min(1);
         return Err(Trouble::from(TrajectoryError::Samples(SampleError::TooFew { found })));
     }
