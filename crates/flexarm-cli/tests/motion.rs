@@ -154,7 +154,7 @@ fn a_planned_trajectory_with_a_gripper_runs_on_a_shipped_arm_and_gives_the_figur
 #[test]
 fn joints_that_no_robot_has_are_refused_with_those_that_may_be_meant() {
     let place = Place::new();
-    place.write("plan.yaml", planned().replace("joint_", "joitn_"));
+    place.write("plan.yaml", planned().replace("joint_1, joint_2, joint_3", "joitn_1, joitn_2, joitn_3"));
     place.refused(&["motion", "plan.yaml", "kr210"], &["joitn_1", "did you mean \"joint_1\"?", "its joints are"]);
     // In our own format one is enough.
     place.write("own.csv", "time,swing,finger\n0,0,0\n1,1,0\n");

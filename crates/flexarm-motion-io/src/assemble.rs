@@ -170,6 +170,11 @@ fn states(mut topic: Topic, has_clock: bool, told: &mut Told<'_>) -> Result<Vec<
         let what = format!("{} of {} messages have no positions and are left out", topic.without_position, topic.count);
         told.warn("motion-positions", &what, "");
     }
+    if topic.odd_rates > 0 {
+        let what =
+            format!("the velocities of {} messages are not one for each joint and are left out", topic.odd_rates);
+        told.warn("motion-velocities", &what, "");
+    }
     let mut not_finite = 0;
     for series in &mut topic.series {
         not_finite += series.drop_what_is_not_finite();

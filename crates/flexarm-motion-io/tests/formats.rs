@@ -75,6 +75,18 @@ fn a_joint_trajectory_as_text_is_the_motion_of_the_csv() {
 }
 
 #[test]
+fn json_with_tabs_and_a_state_with_too_few_velocities_are_read() {
+    let tabs = text("plan.json").replace("\n ", "\n\t").replace("\t ", "\t\t");
+    assert!(tabs.contains("\t\t"));
+    assert_same(&read_text(&tabs, "tabs", &ROBOT).unwrap(), "plan.csv", "JSON with tabs");
+    let one = |k: i64| {
+        format!("header: {{stamp: {}}}\nname: [joint_1, finger]\nposition: [{k}, 0]\nvelocity: [1.0]\n---\n", 100 + k)
+    };
+    let motion = read_text(&(0..4).map(one).collect::<String>(), "few", &ROBOT).unwrap();
+    assert!(told(&motion).iter().any(|line| line.contains("the velocities of 4 messages are not one for each joint")));
+}
+
+#[test]
 fn states_printed_by_ros2_topic_echo_are_the_motion_of_the_csv_whatever_the_order_of_the_joints() {
     let motion = read_text(&text("echo.yaml"), "echo.yaml", &ROBOT).unwrap();
     assert_same(&motion, "states.csv", "echo.yaml");

@@ -119,6 +119,14 @@ fn one_motion_in_every_dialect_is_the_motion_of_our_own_csv() {
             "table, semicolons",
         ),
         (
+            "dates and times of day",
+            table("Date;joint_1[deg];joint_2[deg]\n", |[t, a, b]| {
+                format!("2024-03-01 23:59:59.{:03};{a};{b}", (1000.0 * t).round())
+            })
+            .replace("Date", "Timestamp"),
+            "table, semicolons",
+        ),
+        (
             "unit in a comment",
             table("# unit: deg\nt;joint_1;joint_2\n", |[t, a, b]| format!("{t};{a};{b}")),
             "table, semicolons",

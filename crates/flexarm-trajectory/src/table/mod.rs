@@ -17,7 +17,7 @@ mod header;
 
 use std::collections::BTreeSet;
 
-use self::dialect::{Decimal, Separator, exact, number};
+use self::dialect::{Decimal, Separator, clock_time, exact, number};
 use self::header::{Meaning, Measure, Unit, meaning, name_and_unit, unit};
 use crate::column_map::ColumnMap;
 use crate::error::{FileError, TrajectoryError};
@@ -281,7 +281,7 @@ fn separator_of(header: &str, below: Option<&str>) -> Separator {
 fn below_preamble(lines: &[(usize, &str)]) -> Option<(Separator, usize, Vec<String>)> {
     let are_numbers = |separator: &Separator, line: &str| {
         let fields = separator.split(line);
-        let numbers = fields.iter().filter(|field| number(field).is_some()).count();
+        let numbers = fields.iter().filter(|field| number(field).is_some() || clock_time(field).is_some()).count();
         fields.len() > 1 && 2 * numbers > fields.len()
     };
     let find = |(i, (_, line)): (usize, &(usize, &str))| {
@@ -645,6 +645,8 @@ struct Rows {
     repeated: usize,
     cut: bool,
     comma: bool,
+    /// Times are times of day.
+    clock: bool,
 }
 
 impl Table<'_> {
@@ -687,7 +689,13 @@ impl Table<'_> {
                 }
                 Ok(value)
             };
-            let time = Time { value: value(layout.time)?, exact: exact(&fields[layout.time]) };
+            let time = match clock_time(&fields[layout.time]) {
+                Some(clock) => {
+                    rows.clock = true;
+                    Time { value: clock as f64 / 1e12, exact: Some(clock) }
+                }
+                None => Time { value: value(layout.time)?, exact: exact(&fields[layout.time]) },
+            };
             for (slot, used) in row.iter_mut().zip(&layout.used) {
                 *slot = used.scale * value(used.place)?;
             }
@@ -726,6 +734,9 @@ impl Table<'_> {
 
     /// Factor of the times to s. Without a unit they are seconds, unless only a date since 1970 explains their size.
     fn time_scale(&self, layout: &mut Layout, rows: &Rows) -> f64 {
+        if rows.clock {
+            return 1.0;
+        }
         if let Some(unit) = layout.time_unit {
             return unit.scale;
         }
