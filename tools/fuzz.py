@@ -272,6 +272,17 @@ at = "centroid"
 """
 
 
+TRACE = """# trace of a controller
+Time[ms];swing[deg];elbow (deg);state;A1
+0;0,0;10,0;idle;0,0
+100;1,5;9,5;moving;1,0
+200;4,5;8,0;moving;2,0
+300;8,0;6,0;moving;3,0
+400;9,5;5,5;moving;4,0
+500;9,5;5,5;idle;5,0
+"""
+
+
 def motion_csv():
     rows = [f"{0.01 * k:.2f},{0.3 * (1 - (k / 20 - 1) ** 2):.6f},{-0.2 * k / 40:.6f}" for k in range(41)]
     return "# unit: rad\n# time: s\ntime,swing,elbow\n" + "\n".join(rows) + "\n"
@@ -471,6 +482,7 @@ def own_targets():
         Target("xacro", "arm.xacro", {"arm.xacro": XACRO}, [["check", "arm.xacro", "--json"], ["inspect", "arm.xacro", "--json"]]),
         Target("motion-toml", "motion.toml", base, [check, COMPARE], True),
         Target("motion-csv", "motion.csv", base, [["check", "robot.toml", "motion.csv", "--json"], [w if w != "motion.toml" else "motion.csv" for w in COMPARE]], True),
+        Target("motion-table", "trace.txt", {**base, "trace.txt": TRACE}, [["motion", "trace.txt", "robot.toml", "--json"], ["motion", "trace.txt", "--columns", "t=#1[ms],swing=A1[deg]", "--json"]]),
         Target("loads", "loads.toml", {**base, "loads.toml": LOADS, "force.csv": TABLE}, [COMPARE + ["--loads", "loads.toml"]], True),
         Target("loads-table", "force.csv", {**base, "loads.toml": LOADS, "force.csv": TABLE}, [COMPARE + ["--loads", "loads.toml"]], True),
         Target("matrix-op4-binary", "k.op4", {"k.op4": op4_binary([("K", stiffness), ("M", mass)])}, [importing("k.op4", *by_row)]),
@@ -494,6 +506,11 @@ def own_targets():
     for name, content in (("mesh.stl", stl_binary()), ("text.stl", stl_text()), ("mesh.obj", obj()), ("mesh.dae", collada()), ("mesh.gltf", gltf()), ("mesh.glb", glb())):
         files = {"beam.urdf": with_visual(f'<mesh filename="{name}"/>'), name: content}
         targets.append(Target(f"visual-{name}", name, files, [["check", "beam.urdf", "--json"], ["inspect", "beam.urdf", "--json", "--inertia-from-density", "1000"]]))
+    motions = ROOT / "crates/flexarm-motion-io/tests/data"
+    for name in ("plan.yaml", "display.yaml", "echo.yaml", "plan.json", "states_plain.mcap", "states_lz4.mcap", "states_zstd.mcap", "states_ros1.mcap", "nested_plan.mcap", "old.db3",
+                 "bag_messages_packed/bag_messages_packed.db3", "bag_file_packed/bag_file_packed.db3.zstd"):
+        own = Path(name).name
+        targets.append(Target(f"motion-{own}", own, {own: (motions / name).read_bytes()}, [["motion", own, "--json"], ["motion", own, "--json", "-o", "other.csv", "--force"]]))
     hdf5 = ROOT / "tools/fuzz_seeds/exudyn.hdf5"
     if hdf5.exists():
         words = ["--map", "A=plane(0,0,0;1,0,0),B=plane(0.8,0,0;1,0,0)"]

@@ -120,7 +120,8 @@ fn text(report: &MotionReport) -> String {
 /// A number with the digits that a person reads.
 fn rounded(value: f64) -> String {
     let text = format!("{value:.4}");
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+    let text = text.trim_end_matches('0').trim_end_matches('.');
+    if text == "-0" { "0".to_owned() } else { text.to_owned() }
 }
 
 /// Angles in degrees, with the part of the limit that is used.

@@ -85,7 +85,12 @@ mod missing {
 
     #[test]
     fn trajectory_of_another_kind() {
-        compare_motion("swing.txt", SWING, &["swing.txt", "\"txt\"", ".csv", ".toml"]);
+        let letter = "A letter.\nIt says nothing about motion.\n";
+        compare_motion(
+            "swing.txt",
+            letter,
+            &["swing.txt", "\"A letter.\"", "waypoints (TOML)", "(CSV)", "rename or convert"],
+        );
     }
 
     #[test]
@@ -205,13 +210,17 @@ mod trajectory {
 
     #[test]
     fn no_time_column() {
-        compare_motion("m.csv", "t,swing\n0,0\n1,0.1\n", &["m.csv, line 1", "`time`", "\"swing\""]);
+        compare_motion("m.csv", "x,swing\n0,0\n1,0.1\n", &["m.csv, line 1", "`time`", "\"swing\""]);
     }
 
     #[test]
     fn other_separators() {
-        compare_motion("m.csv", "time;swing\n0;0\n1;0,1\n", &["m.csv, line 1", "';'", "commas"]);
-        compare_motion("m.csv", "time\tswing\n0\t0\n1\t0.1\n", &["m.csv, line 1", "'\\t'", "commas"]);
+        compare_motion("m.csv", "time,swing\n0,0,0,0\n1,0,0,1\n", &["m.csv, line 2", "decimal commas", "semicolons"]);
+        compare_motion(
+            "m.csv",
+            "time;swing\n0;0.5\n1;0,1\n",
+            &["m.csv, line 3", "decimal points (line 2)", "decimal commas (line 3)"],
+        );
     }
 
     #[test]

@@ -13,6 +13,10 @@ const DISORDER_S: f64 = 1.0;
 const FEW: f64 = 0.01;
 /// Trajectories of one message meet within this (rad or m).
 const MEET: f64 = 1e-3;
+/// Points of trajectories that are no farther apart are at one time (s): less than a period of any controller.
+const SAME_TIME_S: f64 = 1e-6;
+/// A joint that is told so many of its steps later or earlier than others goes on at its speed.
+const REACH: f64 = 2.0;
 /// Velocities belong to positions whose slopes differ from them by less than this part of the slopes, and this (rad/s).
 const BELONGS: [f64; 2] = [0.1, 0.02];
 
@@ -39,7 +43,7 @@ pub(crate) struct Assembled {
 /// * `has_clock`: whether the times of reception are known.
 pub(crate) fn assemble(topic: Topic, file: &str, has_clock: bool) -> Result<Assembled, Trouble> {
     let mut told = Told { file, caveats: Vec::new() };
-    let lines = if topic.received.is_empty() {
+    let mut lines = if topic.received.is_empty() {
         states(topic, has_clock, &mut told)?
     } else {
         plans(topic, has_clock, &mut told)?
@@ -47,10 +51,11 @@ pub(crate) fn assemble(topic: Topic, file: &str, has_clock: bool) -> Result<Asse
     let samples = lines.iter().map(|line| line.t.len()).max().unwrap_or(0);
     let first = lines.iter().filter_map(|line| line.t.first()).fold(f64::INFINITY, |first, t| first.min(*t));
     let last = lines.iter().filter_map(|line| line.t.last()).fold(f64::NEG_INFINITY, |last, t| last.max(*t));
-    if !(last > first) {
+    if last <= first || lines.is_empty() {
         let found = samples.min(1);
         return Err(Trouble::from(TrajectoryError::Samples(SampleError::TooFew { found })));
     }
+    lines.iter_mut().for_each(|line| line.reach(first, last));
     tell_ends(&lines, first, last, &mut told);
     let parts = lines.iter().map(|line| line.curve(first, last)).collect::<Result<Vec<_>, _>>()?;
     let trajectory = Trajectory::side_by_side(&parts)?;
@@ -104,13 +109,45 @@ impl Line {
     }
 }
 
+impl Line {
+    /// Mean distance of its samples (s); it has two at least.
+    fn step(&self) -> f64 {
+        (self.t[self.t.len() - 1] - self.t[0]) / (self.t.len() - 1) as f64
+    }
+
+    /// Goes on at its speed to the ends of the others, where these are no farther than two of its steps: publishers of other
+    /// joints on the same topic send at other times, which is no reason to stop and start at once.
+    fn reach(&mut self, first: f64, last: f64) {
+        if self.t.len() < 2 {
+            return;
+        }
+        let (step, n) = (self.step(), self.t.len());
+        let speed = |i: usize, j: usize| match self.v[i].is_finite() {
+            true => self.v[i],
+            false => (self.q[j] - self.q[i]) / (self.t[j] - self.t[i]),
+        };
+        let (begin, end) = (speed(0, 1), speed(n - 1, n - 2));
+        let (early, late) = (self.t[0] - first, last - self.t[n - 1]);
+        if late > SAME_TIME_S && late <= REACH * step {
+            self.push(last, self.q[n - 1] + end * late, self.v[n - 1], self.a[n - 1]);
+        }
+        if early > SAME_TIME_S && early <= REACH * step {
+            let rate = (self.v[0], self.a[0]);
+            self.t.insert(0, first);
+            self.q.insert(0, self.q[0] - begin * early);
+            self.v.insert(0, rate.0);
+            self.a.insert(0, rate.1);
+        }
+    }
+}
+
 /// Joints that begin later or end earlier than others by more than two of their own steps.
 fn tell_ends(lines: &[Line], first: f64, last: f64, told: &mut Told<'_>) {
     let mut late = Vec::new();
     for line in lines.iter().filter(|line| line.t.len() > 1) {
         let (begin, end) = (line.t[0], line.t[line.t.len() - 1]);
-        let step = (end - begin) / (line.t.len() - 1) as f64;
-        if begin - first > 2.0 * step || last - end > 2.0 * step {
+        let far = REACH * line.step();
+        if begin - first > far || last - end > far {
             late.push(format!("{:?} from {:.3} to {:.3} s", line.joint, begin - first, end - first));
         }
     }
@@ -132,6 +169,11 @@ fn states(mut topic: Topic, has_clock: bool, told: &mut Told<'_>) -> Result<Vec<
     if topic.without_position > 0 {
         let what = format!("{} of {} messages have no positions and are left out", topic.without_position, topic.count);
         told.warn("motion-positions", &what, "");
+    }
+    if topic.odd_rates > 0 {
+        let what =
+            format!("the velocities of {} messages are not one for each joint and are left out", topic.odd_rates);
+        told.warn("motion-velocities", &what, "");
     }
     let mut not_finite = 0;
     for series in &mut topic.series {
@@ -404,14 +446,24 @@ fn put_start(message: &Received, lines: &mut [Line], told: &mut Told<'_>) {
 }
 
 impl Line {
-    /// Makes room for a message that begins at `from`: what would come later is gone, and before its first point the joint
-    /// stays where it is.
+    /// Makes room for a message that begins at `from`: what would come later is gone. Up to its first point the joint is where
+    /// it was going: at its end if that was reached, else on the way, between the points before and after.
     fn cut(&mut self, from: f64, first: Option<&Point>, column: usize) {
-        let keep = self.t.partition_point(|t| *t < from);
+        let keep = self.t.partition_point(|t| *t <= from + SAME_TIME_S);
+        let next = self.t.get(keep).map(|&t| (t, self.q[keep], self.v[keep], self.a[keep]));
         self.truncate(keep);
         let (Some(&t), Some(&q), Some(first)) = (self.t.last(), self.q.last(), first) else { return };
         let gap = from - t;
-        if gap <= 0.0 {
+        if gap <= SAME_TIME_S {
+            return;
+        }
+        if let Some((later, q_later, v_later, a_later)) = next {
+            if first.time_s > 0.0 {
+                let part = gap / (later - t);
+                let between = |x: f64, y: f64| x + part * (y - x);
+                let (v, a) = (self.v[keep - 1], self.a[keep - 1]);
+                self.push(from, between(q, q_later), between(v, v_later), between(a, a_later));
+            }
             return;
         }
         let joins = first.position.get(column).is_some_and(|next| (next - q).abs() <= MEET);
@@ -428,7 +480,7 @@ impl Line {
         for point in points {
             let t = from + point.time_s;
             let (q, last) = (point.position[column], self.t.last().copied());
-            if last.is_some_and(|last| t <= last) {
+            if last.is_some_and(|last| t <= last + SAME_TIME_S) {
                 // The point at which two trajectories meet is in both.
                 let previous = self.q[self.q.len() - 1];
                 if (previous - q).abs() > MEET {

@@ -55,6 +55,8 @@ pub(crate) struct Topic {
     pub(crate) of: &'static str,
     /// States without a position for each joint that is wanted.
     pub(crate) without_position: usize,
+    /// States whose velocities are not one for each joint.
+    pub(crate) odd_rates: usize,
     /// Why a message of it could not be read.
     pub(crate) trouble: Option<Trouble>,
 }
@@ -134,7 +136,7 @@ impl<'a> Collector<'a> {
         let topic = &mut self.topics[index];
         match motion_of(node)? {
             None => {}
-            Some(Message::State(state)) => self.positions += topic.state(log_ns, &state, self.request.joints)?,
+            Some(Message::State(state)) => self.positions += topic.state(log_ns, state, self.request.joints)?,
             Some(Message::Trajectories(trajectories, start)) => {
                 for points in &trajectories {
                     self.positions += points.points.len() * points.joints.len();
@@ -176,7 +178,8 @@ impl<'a> Collector<'a> {
         }
         // Of several: the one that moves most joints, then what a robot did before what it was told, then the longest.
         let rank = |topic: &Topic| {
-            let matched = topic.series.len();
+            let filled = topic.series.iter().filter(|series| !series.position.is_empty()).count();
+            let matched = if topic.received.is_empty() { filled } else { topic.series.len() };
             let kind = if topic.received.is_empty() { 1 + usize::from(topic.of == "position") } else { 0 };
             (matched, kind, topic.count)
         };
@@ -243,13 +246,13 @@ impl Topic {
     }
 
     /// Keeps the values of the joints that are wanted; how many there are.
-    fn state(&mut self, log_ns: i64, state: &State, wanted: Option<&[&str]>) -> Result<usize, Trouble> {
+    fn state(&mut self, log_ns: i64, mut state: State, wanted: Option<&[&str]>) -> Result<usize, Trouble> {
         let places: Vec<Option<usize>> = state.joints.iter().map(|joint| self.place(joint, wanted)).collect();
         // What is wrong with a gripper's state is nobody's matter.
         if places.iter().all(Option::is_none) {
             return Ok(0);
         }
-        state.check()?;
+        self.odd_rates += usize::from(state.check()?);
         if state.position.is_empty() {
             self.without_position += 1;
             return Ok(0);

@@ -171,21 +171,24 @@ fn state(node: &Node, names: &Node, values: &Node, of: &'static str) -> Result<S
 }
 
 impl State {
-    /// Whether there is one position for each joint, or none at all; velocities and accelerations likewise.
+    /// Whether there is one position for each joint, or none at all. Velocities and accelerations of another number are
+    /// nobody's; whether there were such.
     ///
     /// # Errors
     /// [`Problem::Lengths`].
-    pub(crate) fn check(&self) -> Result<(), Trouble> {
-        let columns =
-            [("position", &self.position), ("velocity", &self.velocity), ("acceleration", &self.acceleration)];
-        for (key, values) in columns {
-            if !values.is_empty() && values.len() != self.joints.len() {
-                let (found, expected) = (values.len(), self.joints.len());
-                let key = key.to_owned();
-                return Err(Trouble::new(Problem::Lengths { key, found, expected, hint: "" }));
+    pub(crate) fn check(&mut self) -> Result<bool, Trouble> {
+        let (found, expected) = (self.position.len(), self.joints.len());
+        if found != 0 && found != expected {
+            return Err(Trouble::new(Problem::Lengths { key: "position".to_owned(), found, expected, hint: "" }));
+        }
+        let mut is_odd = false;
+        for rates in [&mut self.velocity, &mut self.acceleration] {
+            if !rates.is_empty() && rates.len() != expected {
+                rates.clear();
+                is_odd = true;
             }
         }
-        Ok(())
+        Ok(is_odd)
     }
 }
 
@@ -260,10 +263,12 @@ fn wrong(key: &str, node: &Node, expected: &'static str) -> Trouble {
 /// `header.stamp` in ns since 1970; 0 without one.
 fn stamp_ns(node: &Node) -> Result<i64, Trouble> {
     let Some(stamp) = node.get("header").and_then(|header| header.get("stamp")) else { return Ok(0) };
-    match whole_ns(stamp) {
-        Some(ns) => Ok(ns),
+    match (whole_ns(stamp), &stamp.value) {
+        (Some(ns), _) => Ok(ns),
+        // So many are ns since 1970.
+        (None, Value::Whole(whole)) if *whole > 100_000_000_000_000_000 => Ok(*whole),
         // A float is as exact as it was written.
-        None => match stamp.number() {
+        _ => match stamp.number() {
             Some(seconds) if seconds.abs() < 9e9 => Ok((seconds * 1e9).round() as i64),
             _ => Err(wrong("stamp", stamp, "sec and nanosec, or seconds")),
         },

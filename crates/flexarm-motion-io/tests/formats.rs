@@ -75,6 +75,18 @@ fn a_joint_trajectory_as_text_is_the_motion_of_the_csv() {
 }
 
 #[test]
+fn json_with_tabs_and_a_state_with_too_few_velocities_are_read() {
+    let tabs = text("plan.json").replace("\n ", "\n\t").replace("\t ", "\t\t");
+    assert!(tabs.contains("\t\t"));
+    assert_same(&read_text(&tabs, "tabs", &ROBOT).unwrap(), "plan.csv", "JSON with tabs");
+    let one = |k: i64| {
+        format!("header: {{stamp: {}}}\nname: [joint_1, finger]\nposition: [{k}, 0]\nvelocity: [1.0]\n---\n", 100 + k)
+    };
+    let motion = read_text(&(0..4).map(one).collect::<String>(), "few", &ROBOT).unwrap();
+    assert!(told(&motion).iter().any(|line| line.contains("the velocities of 4 messages are not one for each joint")));
+}
+
+#[test]
 fn states_printed_by_ros2_topic_echo_are_the_motion_of_the_csv_whatever_the_order_of_the_joints() {
     let motion = read_text(&text("echo.yaml"), "echo.yaml", &ROBOT).unwrap();
     assert_same(&motion, "states.csv", "echo.yaml");
@@ -154,6 +166,20 @@ fn what_is_written_as_a_joint_trajectory_reads_back_as_the_same_motion() {
 fn a_bag_that_is_cut_off_is_read_up_to_there_and_says_so() {
     let place = std::env::temp_dir().join(format!("flexarm-motion-cut-{}", std::process::id()));
     std::fs::create_dir_all(&place).unwrap();
+    let folder = data("bag_sqlite/bag_sqlite.db3");
+    let cut = |part: f64| {
+        let whole = std::fs::read(&folder).unwrap();
+        let path = place.join("cut.db3");
+        std::fs::write(&path, &whole[..(part * whole.len() as f64) as usize]).unwrap();
+        read_db3(&path, &ROBOT)
+    };
+    // A database has its pages in any order: what is left of it is a part of the motion, or an error.
+    for part in [0.9, 0.8, 0.6, 0.4] {
+        match cut(part) {
+            Ok(motion) => assert!(motion.samples <= 26 && motion.trajectory.duration() > 0.0),
+            Err(error) => assert!(error.to_string().contains("cannot be read"), "{part}: {error}"),
+        }
+    }
     for name in ["states_zstd.mcap", "states_lz4.mcap", "states_plain.mcap"] {
         let whole = std::fs::read(data(name)).unwrap();
         let path = place.join(name);
@@ -229,8 +255,9 @@ fn publishers_of_different_joints_on_one_topic_keep_their_own_times() {
     assert!((motion.trajectory.duration() - 0.4).abs() < 1e-12);
     let q = at(&motion, 0.2);
     assert!((q[0] - 0.1).abs() < 1e-9 && (q[1] - 0.6).abs() < 1e-9, "{q:?}");
-    // Before its first sample it is held there.
-    assert!((at(&motion, 0.001)[1] - 0.992).abs() < 1e-12);
+    // Before its first sample, by less than two of its steps, it goes as it does then: no blow at the start.
+    assert!((at(&motion, 0.001)[1] - 0.998).abs() < 1e-9, "{:?}", at(&motion, 0.001));
+    assert!(motion.trajectory.velocity_jumps().iter().all(|jump| jump.time_s == 0.0 || jump.time_s == 0.4));
     assert_eq!(motion.dropped, ["finger"]);
 }
 
@@ -319,6 +346,39 @@ fn a_later_trajectory_takes_the_place_of_what_is_left_of_the_one_before() {
     }
     assert!((at(&motion, 6.0)[0] - 0.5).abs() < 1e-12);
     assert!(told(&motion).iter().any(|line| line.contains("2 trajectories: each begins at its header stamp")));
+}
+
+#[test]
+fn a_stream_of_single_points_is_the_way_through_them() {
+    // As servoing sends them: every 10 ms the point to be at 10 ms later.
+    let goal = |t: f64| 0.3 * (2.0 * t).sin();
+    let text: String = (0..100)
+        .map(|k| {
+            let ns = 10_000_000 * k;
+            let q = goal(1e-9 * (ns + 10_000_000) as f64);
+            format!(
+                "header: {{stamp: {{sec: 7, nanosec: {ns}}}}}\njoint_names: [joint_1]\npoints:\n- {{positions: [{q:?}], \
+                 time_from_start: {{sec: 0, nanosec: 10000000}}}}\n---\n"
+            )
+        })
+        .collect();
+    let motion = read_text(&text, "servo", &ROBOT).unwrap();
+    assert_eq!((motion.samples, motion.trajectory.duration()), (100, 0.99));
+    for k in 0..990 {
+        let t = 0.001 * f64::from(k);
+        // Measured 1.5e-6, at the ends of the spline.
+        assert!((at(&motion, t)[0] - goal(t + 0.01)).abs() < 1e-5, "{t}");
+    }
+    // One that comes half-way: the joint is between the points of the one before, and turns round.
+    let plan = |sec: f64, to: f64| {
+        format!(
+            "header: {{stamp: {sec}}}\njoint_names: [joint_1]\npoints:\n- {{positions: [0.0], time_from_start: 0.5}}\n\
+             - {{positions: [{to}], time_from_start: 1.5}}\n---\n"
+        )
+    };
+    let motion = read_text(&(plan(100.0, 1.0) + &plan(101.0, 0.2)), "turn", &ROBOT).unwrap();
+    assert!((at(&motion, 0.5)[0] - 0.5).abs() < 1e-12 && at(&motion, 1.0)[0].abs() < 1e-12);
+    assert!((motion.trajectory.duration() - 2.0).abs() < 1e-12 && (at(&motion, 2.0)[0] - 0.2).abs() < 1e-12);
 }
 
 // ------------------------------------------------------------------------------------------------------------------- refused

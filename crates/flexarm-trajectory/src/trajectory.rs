@@ -330,10 +330,10 @@ impl Curve {
         if duration - end > 1e-9 * duration {
             knots.push(duration);
             pieces.push(Piece::hold(duration - end, self.end()[0]));
-        } else if let (Some(last), Some(piece)) = (knots.last_mut(), pieces.last()) {
-            if (duration - *last).abs() <= 1e-9 * piece.width {
-                *last = duration;
-            }
+        } else if let (Some(last), Some(piece)) = (knots.last_mut(), pieces.last())
+            && (duration - *last).abs() <= 1e-9 * piece.width
+        {
+            *last = duration;
         }
         Self { knots, pieces }
     }

@@ -85,6 +85,13 @@ pub enum Warning {
         /// Its line.
         line: usize,
     },
+    /// Lines above the header of a table that are no comments.
+    Preamble {
+        /// The first.
+        first: usize,
+        /// The last.
+        last: usize,
+    },
     /// The positions are those of a run.
     PositionsOfRun,
     /// The duration asked for makes a joint pass an acceleration or jerk limit.
@@ -154,6 +161,9 @@ impl fmt::Display for Warning {
             }
             Self::CutRow { line } => {
                 write!(f, "the last row (line {line}) is not whole and is left out: the file was cut off")
+            }
+            Self::Preamble { first, last } => {
+                write!(f, "the lines {first} to {last} above the header are passed over; what they say is not used")
             }
             Self::PositionsOfRun => f.write_str(
                 "the positions are those of the flexible robot of a run: where its drives give way, they hold what the \

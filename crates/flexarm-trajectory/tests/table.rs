@@ -119,6 +119,14 @@ fn one_motion_in_every_dialect_is_the_motion_of_our_own_csv() {
             "table, semicolons",
         ),
         (
+            "dates and times of day",
+            table("Date;joint_1[deg];joint_2[deg]\n", |[t, a, b]| {
+                format!("2024-03-01 23:59:59.{:03};{a};{b}", (1000.0 * t).round())
+            })
+            .replace("Date", "Timestamp"),
+            "table, semicolons",
+        ),
+        (
             "unit in a comment",
             table("# unit: deg\nt;joint_1;joint_2\n", |[t, a, b]| format!("{t};{a};{b}")),
             "table, semicolons",
@@ -207,6 +215,9 @@ fn what_is_assumed_or_left_out_is_told() {
             .all(|l| !l.contains("taken as"))
     );
     assert!(told("timestamp;joint_1[rad]\n1700000000000;0\n1700000001000;0.5\n").contains("taken as ms since 1970"));
+    assert!(
+        told("Robot 7\nt[s];joint_1[rad]\n0;0\n1;0.5\n").contains("the lines 1 to 1 above the header are passed over")
+    );
     assert!(told("t[s];joint_1[rad]\n0;0\n0;0\n1;0.5\n").contains("1 rows repeat the one before"));
 }
 

@@ -173,9 +173,11 @@ fn unknown(head: &Head<'_>) -> String {
 // ------------------------------------------------------------------------------------------------------------- recognition
 
 fn is_toml(head: &Head<'_>) -> bool {
-    let is_key = |line: &str| {
-        let key = line.split_once('=').map(|(key, _)| key.trim());
-        line.trim_start().starts_with("[[move]]") || key.is_some_and(|key| ["format", "joints", "start"].contains(&key))
+    // Programs assign to names as well: a list of joints holds texts, a format is a number.
+    let is_key = |line: &str| match line.split_once('=').map(|(key, value)| (key.trim(), value.trim())) {
+        Some(("format", value)) => value.starts_with(|c: char| c.is_ascii_digit()),
+        Some(("joints", value)) => value.trim_start_matches('[').trim_start().starts_with(['"', '\'']),
+        _ => line.trim_start().starts_with("[[move]]"),
     };
     head.ending == "toml" || head.text.lines().any(is_key)
 }

@@ -439,6 +439,17 @@ fn the_page_lists_the_catalogue() {
             "second-order-unknown",
             "euler-chain",
             "held-joints",
+            // Of crates/flexarm-motion-io.
+            "motion-topic",
+            "motion-messages",
+            "motion-dropped-joints",
+            "motion-clock",
+            "motion-stamps",
+            "motion-velocities",
+            "motion-positions",
+            "motion-ends",
+            "motion-start",
+            "motion-cut",
         ]
         .contains(&code);
         assert!(said || codes.contains(&code), "{code} is no code of the program");

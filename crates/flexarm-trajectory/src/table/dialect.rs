@@ -118,9 +118,55 @@ pub(super) fn exact(field: &str) -> Option<i128> {
     Some(sign * digits.parse::<i128>().ok()?)
 }
 
+/// A time of day, with or without a date (`2024-03-01T12:00:00.004Z`, `12:00:00.004`), in units of 1e-12 s since 1970 or since
+/// midnight. Zones are passed over: all rows of a table have the same.
+pub(super) fn clock_time(field: &str) -> Option<i128> {
+    let field = field.trim().trim_end_matches('Z');
+    let (date, clock) = match field.split_once(['T', ' ']) {
+        Some((date, clock)) => (Some(date), clock.trim()),
+        None => (None, field),
+    };
+    // A zone such as +01:00 stands behind.
+    let clock = clock.split_once('+').map_or(clock, |(clock, _)| clock);
+    let mut parts = clock.split(':');
+    let mut whole = |below: i128| parts.next()?.parse::<u8>().ok().map(i128::from).filter(|n| *n < below);
+    let (hours, minutes) = (whole(24)?, whole(60)?);
+    let seconds = exact(parts.next()?).filter(|s| (0..61_000_000_000_000).contains(s))?;
+    if parts.next().is_some() {
+        return None;
+    }
+    let days = date.map_or(Some(0), days_since_1970)?;
+    Some(((days * 24 + hours) * 60 + minutes) * 60_000_000_000_000 + seconds)
+}
+
+/// Days of the Gregorian calendar, `2024-03-01` or `2024/03/01`.
+fn days_since_1970(date: &str) -> Option<i128> {
+    let mut parts = date.trim().split(['-', '/']);
+    let mut part = |digits: usize| parts.next().filter(|p| p.len() == digits)?.parse::<u16>().ok().map(i128::from);
+    let (year, month, day) = (part(4)?, part(2)?, part(2)?);
+    if parts.next().is_some() || !(1..=12).contains(&month) || !(1..=31).contains(&day) {
+        return None;
+    }
+    // Years begin in March, so that the day that some have more is their last.
+    let (y, m) = if month > 2 { (year, month - 3) } else { (year - 1, month + 9) };
+    Some(365 * y + y / 4 - y / 100 + y / 400 + (153 * m + 2) / 5 + day - 719_469)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Truth: Python's `datetime`, `(datetime(2024, 3, 1, 12, 0, 0, 4000) - datetime(1970, 1, 1))`.
+    #[test]
+    fn times_of_day_and_dates_are_those_of_the_calendar() {
+        assert_eq!(clock_time("2024-03-01T12:00:00.004Z"), Some(1_709_294_400_004_000_000_000));
+        assert_eq!(clock_time("2024/02/29 23:59:59"), Some(1_709_251_199_000_000_000_000));
+        assert_eq!(clock_time("1970-01-01 00:00:00"), Some(0));
+        assert_eq!(clock_time("12:00:01,5+01:00"), Some(43_201_500_000_000_000));
+        for wrong in ["25:00:00", "12:00", "2024-13-01 00:00:00", "12", "a:b:c", "1:2:3:4"] {
+            assert_eq!(clock_time(wrong), None, "{wrong}");
+        }
+    }
 
     #[test]
     fn fields_are_split_with_quotes_and_runs_of_spaces_as_one_gap() {

@@ -77,6 +77,10 @@ pub(super) fn name_and_unit(column: &str) -> (String, Option<Unit>, Option<Strin
         if let Some(rest) = column.strip_suffix(close)
             && let Some((name, inside)) = rest.rsplit_once(open)
         {
+            // `q[0]` is the first of several, not a unit.
+            if inside.trim().parse::<u32>().is_ok() {
+                return (column.to_owned(), None, None);
+            }
             return match unit(inside) {
                 Some(unit) => (name.trim_end_matches(['_', ' ', '.']).trim().to_owned(), Some(unit), None),
                 None => (column.to_owned(), None, Some(inside.to_owned())),
@@ -158,6 +162,9 @@ mod tests {
         }
         assert_eq!(name_and_unit("joint_1"), ("joint_1".to_owned(), None, None));
         assert_eq!(name_and_unit("A1[%]").2, Some("%".to_owned()));
+        assert_eq!(name_and_unit("q[0]"), ("q[0]".to_owned(), None, None));
+        let (name, found, _) = name_and_unit("q[0][deg]");
+        assert_eq!((name.as_str(), found.map(|u| u.scale)), ("q[0]", Some(PI / 180.0)));
     }
 
     #[test]

@@ -17,7 +17,7 @@ mod header;
 
 use std::collections::BTreeSet;
 
-use self::dialect::{Decimal, Separator, exact, number};
+use self::dialect::{Decimal, Separator, clock_time, exact, number};
 use self::header::{Meaning, Measure, Unit, meaning, name_and_unit, unit};
 use crate::column_map::ColumnMap;
 use crate::error::{FileError, TrajectoryError};
@@ -137,6 +137,8 @@ struct Table<'t> {
     metres: Vec<String>,
     /// Whether the last line has its end.
     ends_whole: bool,
+    /// First and last line of what stands above the header.
+    preamble: Option<(usize, usize)>,
 }
 
 fn is_comment(line: &str) -> bool {
@@ -174,9 +176,17 @@ impl<'t> Table<'t> {
                 None => return Err(at(first_line, Problem::NoHeader { fields: width })),
             }
         } else {
-            let separator = separator_of(first, second.map(|(_, line)| line));
-            (separator, first_line, separator.split(first), first_line + 1)
+            match below_preamble(
+                &lines().filter(|(_, l)| !l.trim().is_empty() && !is_comment(l)).take(200).collect::<Vec<_>>(),
+            ) {
+                Some((separator, line, names)) => (separator, line, names, line + 1),
+                None => {
+                    let separator = separator_of(first, second.map(|(_, line)| line));
+                    (separator, first_line, separator.split(first), first_line + 1)
+                }
+            }
         };
+        let preamble = if header_line > first_line { Some((first_line, header_line - 1)) } else { None };
         let mut lines: Vec<(usize, &str)> =
             lines().filter(|(n, line)| *n >= from && !line.trim().is_empty() && !is_comment(line)).collect();
         let mut units = vec![None; names.len()];
@@ -184,8 +194,17 @@ impl<'t> Table<'t> {
             units = found;
             lines.remove(0);
         }
-        let mut table =
-            Self { separator, header_line, names, units, lines, degrees: None, metres: Vec::new(), ends_whole };
+        let mut table = Self {
+            separator,
+            header_line,
+            names,
+            units,
+            lines,
+            degrees: None,
+            metres: Vec::new(),
+            ends_whole,
+            preamble,
+        };
         table.read_comments(text)?;
         Ok(table)
     }
@@ -220,10 +239,11 @@ impl<'t> Table<'t> {
         let is_known = |name: &str| request.joints.is_some_and(|joints| joints.iter().any(|joint| joint.name == name));
         let is_plain = |name: &String| is_known(name) || matches!(name_and_unit(name), (_, None, None));
         self.separator == Separator::Comma
+            && self.preamble.is_none()
             && self.names.iter().any(|name| name == "time")
             && self.units.iter().all(Option::is_none)
             && !self.is_run()
-            && self.names.iter().all(is_plain)
+            && self.names.iter().all(|name| !name.is_empty() && is_plain(name))
     }
 
     /// Whether it is the table of a run.
@@ -254,6 +274,26 @@ fn separator_of(header: &str, below: Option<&str>) -> Separator {
     let several = |separator: &&Separator| width(separator) > 1;
     let candidates: Vec<Separator> = Separator::ALL.iter().filter(several).copied().collect();
     candidates.iter().find(fits).or_else(|| candidates.first()).copied().unwrap_or(Separator::Comma)
+}
+
+/// Separator, line and names of a header that stands below lines of another kind: right above the first line of numbers, with
+/// as many fields. None where the first line could be the header.
+fn below_preamble(lines: &[(usize, &str)]) -> Option<(Separator, usize, Vec<String>)> {
+    let are_numbers = |separator: &Separator, line: &str| {
+        let fields = separator.split(line);
+        let numbers = fields.iter().filter(|field| number(field).is_some() || clock_time(field).is_some()).count();
+        fields.len() > 1 && 2 * numbers > fields.len()
+    };
+    let find = |(i, (_, line)): (usize, &(usize, &str))| {
+        Separator::ALL.into_iter().find(|separator| are_numbers(separator, line)).map(|separator| (i, separator))
+    };
+    let (row, separator) = lines.iter().enumerate().find_map(find)?;
+    let width = separator.split(lines[row].1).len();
+    let fits = |i: usize| separator.split(lines[i].1).len() == width;
+    let above = row.checked_sub(1).filter(|above| fits(*above))?;
+    let is_units = units_alone(&separator.split(lines[above].1), width).is_some();
+    let header = above.checked_sub(usize::from(is_units)).filter(|header| fits(*header))?;
+    (header > 0 && !fits(0)).then(|| (separator, lines[header].0, separator.split(lines[header].1)))
 }
 
 /// The units of a line that has nothing else.
@@ -299,6 +339,9 @@ impl Table<'_> {
         let trajectory = samples.interpolate().map_err(|error| self.placed(error, &layout, &rows))?;
         if !layout.assumed.is_empty() {
             layout.notes.push(Warning::AssumedRadians { joints: layout.assumed.clone() });
+        }
+        if let Some((first, last)) = self.preamble {
+            layout.notes.push(Warning::Preamble { first, last });
         }
         if rows.repeated > 0 {
             layout.notes.push(Warning::RepeatedRows { count: rows.repeated });
@@ -362,9 +405,9 @@ impl Table<'_> {
         let mut dropped = Vec::new();
         for (place, column) in self.names.iter().enumerate().filter(|(place, _)| *place != time) {
             if column.is_empty() {
-                // A line that ends with its separator has an empty field more.
+                // A line that ends with its separator has an empty field more; elsewhere it is a count of rows, for instance.
                 if place + 1 < self.names.len() {
-                    return Err(at_field(self.header_line, place, Problem::UnnamedColumn));
+                    dropped.push(format!("#{}", place + 1));
                 }
                 continue;
             }
@@ -602,6 +645,8 @@ struct Rows {
     repeated: usize,
     cut: bool,
     comma: bool,
+    /// Times are times of day.
+    clock: bool,
 }
 
 impl Table<'_> {
@@ -644,7 +689,13 @@ impl Table<'_> {
                 }
                 Ok(value)
             };
-            let time = Time { value: value(layout.time)?, exact: exact(&fields[layout.time]) };
+            let time = match clock_time(&fields[layout.time]) {
+                Some(clock) => {
+                    rows.clock = true;
+                    Time { value: clock as f64 / 1e12, exact: Some(clock) }
+                }
+                None => Time { value: value(layout.time)?, exact: exact(&fields[layout.time]) },
+            };
             for (slot, used) in row.iter_mut().zip(&layout.used) {
                 *slot = used.scale * value(used.place)?;
             }
@@ -683,6 +734,9 @@ impl Table<'_> {
 
     /// Factor of the times to s. Without a unit they are seconds, unless only a date since 1970 explains their size.
     fn time_scale(&self, layout: &mut Layout, rows: &Rows) -> f64 {
+        if rows.clock {
+            return 1.0;
+        }
         if let Some(unit) = layout.time_unit {
             return unit.scale;
         }
