@@ -6,7 +6,8 @@
 //! joint of a flexible link, at one cost.
 //!
 //! Notation: `X_AB` pose of B in A; `V` twists, `F` wrenches, **linear part first**; see `docs/references.md`
-//! for the sources. Not here: files, flexible-link stiffness, time.
+//! for the sources. Balancers ([`Balancer`]) are forces of the tree as
+//! its weight is. Not here: files, flexible-link stiffness, time.
 //!
 //! ```
 //! use flexarm_kinematics::*;
@@ -35,6 +36,7 @@
 
 mod aba;
 mod axis_motion;
+mod balancer;
 mod crba;
 mod data;
 mod energy;
@@ -58,6 +60,10 @@ pub use flexarm_spatial::products;
 
 pub use aba::{Roles, forward_dynamics, hybrid_dynamics};
 pub use axis_motion::AxisMotion;
+pub use balancer::{
+    Balancer, BalancerCurve, BalancerCurveError, BalancerLaw, BalancerLine, BalancerPlace, BalancerSpan, GasLaw,
+    PlacedBalancer,
+};
 pub use crba::{mass_matrix, mass_matrix_at_poses};
 pub use data::{Data, State};
 pub use energy::{
