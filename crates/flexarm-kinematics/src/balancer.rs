@@ -52,7 +52,7 @@ pub enum BalancerSpan {
     },
 }
 
-/// Tension over length: energy, force and stiffness of a balancer.
+/// Tension over length: energy, force and rate of a balancer.
 ///
 /// x is the length of a line (m) or the value of a joint (rad or m), T its tension (N): positive draws the ends together, or the
 /// joint to lower values (N m or N).
@@ -150,7 +150,7 @@ impl BalancerLaw {
     }
 
     /// dT/dx (N/m, N m/rad).
-    pub fn stiffness(&self, x: f64) -> f64 {
+    pub fn rate(&self, x: f64) -> f64 {
         match self {
             Self::Linear { rate, .. } => *rate,
             Self::Gas(gas) => gas.force * gas.exponent * gas.slope * gas.rise(x) / gas.volume_ratio(x),
@@ -355,7 +355,7 @@ impl BalancerLine {
         let p_W = ends.map(|(body, p_B)| X_WB[body].rotation * p_B + X_WB[body].translation.vector);
         let d = p_W[1] - p_W[0];
         let length = d.norm();
-        let (T, k) = (law.tension(length), law.stiffness(length));
+        let (T, k) = (law.tension(length), law.rate(length));
         let bodies = ends.map(|(body, _)| body);
         let p_B = ends.map(|(_, p_B)| p_B);
         // A spring that is free at zero length has a force there too: none, whatever its direction.
@@ -551,14 +551,14 @@ mod tests {
 
     /// T = dU/dx and k = dT/dx by central differences of every law; measured below 5e-9 relative.
     #[test]
-    fn tension_and_stiffness_are_the_derivatives_of_the_energy() {
+    fn tension_and_rate_are_the_derivatives_of_the_energy() {
         let h = 1e-5;
         for (law, places) in laws() {
             for x in places {
                 let T = (law.energy(x + h) - law.energy(x - h)) / (2.0 * h);
                 let k = (law.tension(x + h) - law.tension(x - h)) / (2.0 * h);
                 assert!((T - law.tension(x)).abs() < 1e-7 * (1.0 + T.abs()), "{law:?} at {x}: {T}");
-                assert!((k - law.stiffness(x)).abs() < 1e-6 * (1.0 + k.abs()), "{law:?} at {x}: {k}");
+                assert!((k - law.rate(x)).abs() < 1e-6 * (1.0 + k.abs()), "{law:?} at {x}: {k}");
             }
         }
     }

@@ -346,7 +346,7 @@ impl StaticTangent {
                     }
                 }
                 BalancerPlace::Joint { terms, .. } => {
-                    let k = balancer.law.stiffness(*x);
+                    let k = balancer.law.rate(*x);
                     let own = || terms.iter().filter(|(i, _)| *i >= self.first).map(|(i, c)| (i - self.first, *c));
                     for (i, c_i) in own() {
                         for (j, c_j) in own() {

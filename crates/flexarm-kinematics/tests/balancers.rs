@@ -48,7 +48,7 @@ fn a_spring_without_free_length_balances_the_rod_everywhere() {
 /// Truth: with c D k twice what balances, hanging is unstable and standing stable: about it the rod swings with
 /// omega² = (c D k - m g l)/(m l²). The tangent gives the same; measured 1e-15.
 #[test]
-fn stiffness_of_the_tangent_is_that_of_the_closed_form() {
+fn slope_of_the_tangent_is_that_of_the_closed_form() {
     let (D, k, weight) = (0.5, 0.3, MASS * GRAVITY * LENGTH);
     let model = pendulum(D, k, BalancerLaw::Linear { rate: 2.0 * weight / (D * k), free: 0.0, preload: 0.0 });
     let mut data = Data::new(&model);

@@ -143,7 +143,7 @@ pub(crate) fn at_pose(model: &Model, q: &DVector<f64>) -> Vec<BalancerInfo> {
             kind: if matches!(balancer.place, BalancerPlace::Points(_)) { "line" } else { "joint" },
             length,
             tension: balancer.law.tension(length),
-            stiffness: balancer.law.stiffness(length),
+            stiffness: balancer.law.rate(length),
             torque: torques(model, &data, balancer, length),
         }
     };

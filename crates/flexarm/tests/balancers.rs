@@ -43,7 +43,7 @@ fn the_counterbalance_of_the_kr300_turns_joint_2_as_its_formula_says() {
 /// A spring of 2 MN/m from the column to the far end of the upper arm's casting.
 fn strut() -> RobotBalancer {
     let law = BalancerLaw::Linear { rate: 2e6, free: 1.0, preload: 0.0 };
-    RobotBalancer::between("strut", ("link_1", [-0.5, 0.0, 0.2]), ("link_2", [0.0, 0.0, 1.1]), law)
+    RobotBalancer::between("strut", ("link_1", [-0.5, 0.0, 0.2]), ("link_2", [1.1, 0.0, 0.0]), law)
 }
 
 const AT: [f64; 6] = [0.0, -1.1, 1.2, 0.0, 0.4, 0.0];
@@ -65,7 +65,7 @@ fn a_balancer_at_the_far_end_of_a_link_that_bends_holds_its_far_end() {
         [LinkModel::Lumped, LinkModel::Modal].map(|links| softness(&helped, links) / softness(&robot, links));
     assert!(lumped < 0.97 && (lumped / modal - 1.0).abs() < 0.05, "{lumped} {modal}");
     // On the near part it does nothing to the bending link.
-    let near = RobotBalancer::between("strut", ("link_1", [-0.5, 0.0, 0.2]), ("link_2", [0.0, 0.0, 0.1]), strut().law);
+    let near = RobotBalancer::between("strut", ("link_1", [-0.5, 0.0, 0.2]), ("link_2", [0.1, 0.0, 0.0]), strut().law);
     let near = robot.clone().with_balancer(near).unwrap();
     let near = softness(&near, LinkModel::Lumped) / softness(&robot, LinkModel::Lumped);
     assert!((near - 1.0).abs() < 1e-3, "{near}");
