@@ -49,12 +49,17 @@ fn moving() -> Arc<dyn PrescribedMotion> {
 
 /// Place of the TCP at the end of a run.
 fn end(arm: &FlexibleArm, kind: StepperKind, h: f64, start: Start, duration: f64) -> Vector3<f64> {
+    end_and_energy(arm, kind, h, start, duration).0
+}
+
+/// The same, and the energy of weight and balancers there (J).
+fn end_and_energy(arm: &FlexibleArm, kind: StepperKind, h: f64, start: Start, duration: f64) -> (Vector3<f64>, f64) {
     let tcp = arm.model.frame("tcp").unwrap().clone();
     let mut seen = Observation::new(arm);
     let mut stepper = new_stepper(kind, arm.clone(), h, start).unwrap();
     (0..(duration / h).round() as usize).for_each(|_| stepper.step().unwrap());
     stepper.observe(&mut seen);
-    (seen.X_WB[tcp.body] * tcp.X_BF).translation.vector
+    ((seen.X_WB[tcp.body] * tcp.X_BF).translation.vector, seen.energy[1])
 }
 
 fn of(word: &str) -> StepperKind {
@@ -71,10 +76,13 @@ fn an_arm_with_balancers_rests_where_statics_say_in_every_stepper() {
     let bare = arm_of(&reference_arm(true).mechanism, held, 1e-3);
     let at = |arm: &FlexibleArm| end(arm, StepperKind::default(), 1e-3, Start::Equilibrium, 0.0);
     let (rest, share) = (at(&arm), (at(&arm) - at(&bare)).norm());
+    let stored = end_and_energy(&arm, StepperKind::default(), 1e-3, Start::Equilibrium, 0.0).1;
     assert!(share > 1e-4, "{share}");
     for entry in STEPPERS.into_iter().filter(|entry| entry.steps != StepRule::UpToTheStabilityLimit) {
         for h in [1e-4, 1e-3] {
-            let drift = (end(&arm, of(entry.name), h, Start::Equilibrium, 0.02) - rest).norm() / share;
+            let (end, energy) = end_and_energy(&arm, of(entry.name), h, Start::Equilibrium, 0.02);
+            let drift = (end - rest).norm() / share;
+            assert!((energy - stored).abs() < 1e-6, "{}: {energy} J, {stored} J", entry.name);
             eprintln!("{} h {h:.0e}: {drift:.1e} of the balancers' share", entry.name);
             assert!(drift < 1e-7, "{} {drift:e}", entry.name);
         }

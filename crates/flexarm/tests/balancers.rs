@@ -40,10 +40,14 @@ fn the_counterbalance_of_the_kr300_turns_joint_2_as_its_formula_says() {
     }
 }
 
-/// A spring of 2 MN/m from the column to the far end of the upper arm's casting.
-fn strut() -> RobotBalancer {
-    let law = BalancerLaw::Linear { rate: 2e6, free: 1.0, preload: 0.0 };
-    RobotBalancer::between("strut", ("link_1", [-0.5, 0.0, 0.2]), ("link_2", [1.1, 0.0, 0.0]), law)
+/// A spring of 20 MN/m from the column to a point on the upper arm, without force at [`AT`].
+fn strut(robot: &Robot, to: [f64; 3]) -> Robot {
+    let with = |free: f64| {
+        let law = BalancerLaw::Linear { rate: 2e7, free, preload: 0.0 };
+        let strut = RobotBalancer::between("strut", ("link_1", [-0.5, 0.0, 0.2]), ("link_2", to), law);
+        robot.clone().with_balancer(strut).unwrap()
+    };
+    with(inspect(&with(1.0), Some(&AT), None).unwrap().balancers[0].length)
 }
 
 const AT: [f64; 6] = [0.0, -1.1, 1.2, 0.0, 0.4, 0.0];
@@ -53,7 +57,7 @@ const AT: [f64; 6] = [0.0, -1.1, 1.2, 0.0, 0.4, 0.0];
 #[test]
 fn a_balancer_at_the_far_end_of_a_link_that_bends_holds_its_far_end() {
     let robot = Robot::load_with(&project("robots/kr210/links.toml"), &LoadOptions::default()).unwrap();
-    let helped = robot.clone().with_balancer(strut()).unwrap();
+    let helped = strut(&robot, [1.1, 0.0, 0.0]);
     let softness = |robot: &Robot, links: LinkModel| {
         let modelling = Modelling { links, drives: DriveModel::Rigid, ..Modelling::default() };
         let arm = robot.flexible(modelling).unwrap();
@@ -65,8 +69,7 @@ fn a_balancer_at_the_far_end_of_a_link_that_bends_holds_its_far_end() {
         [LinkModel::Lumped, LinkModel::Modal].map(|links| softness(&helped, links) / softness(&robot, links));
     assert!(lumped < 0.97 && (lumped / modal - 1.0).abs() < 0.05, "{lumped} {modal}");
     // On the near part it does nothing to the bending link.
-    let near = RobotBalancer::between("strut", ("link_1", [-0.5, 0.0, 0.2]), ("link_2", [0.1, 0.0, 0.0]), strut().law);
-    let near = robot.clone().with_balancer(near).unwrap();
+    let near = strut(&robot, [0.1, 0.0, 0.0]);
     let near = softness(&near, LinkModel::Lumped) / softness(&robot, LinkModel::Lumped);
     assert!((near - 1.0).abs() < 1e-3, "{near}");
 }
