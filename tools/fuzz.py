@@ -155,6 +155,32 @@ torque_limit = 100.0
 servo = { position_gain = 15.0, sample_s = 0.002 }
 """
 
+BALANCERS = """
+[[balancer]]
+name = "strut"
+from = { link = "base", xyz = [0.0, -0.3, 0.4] }
+to = { link = "bar", xyz = [0.7, 0.0, 0.0] }
+spring = { rate = 50.0, free_length = 0.4, preload = 3.0 }
+
+[[balancer]]
+from = { link = "base", xyz = [-0.2, 0.1, 0.1] }
+to = { link = "bar", xyz = [0.2, 0.0, 0.05] }
+gas = { acts = "pull", pressure = 2e5, volume = 1e-3, piston_diameter = 0.03, rod_diameter = 0.01, length = 0.4, exponent = 1.3, ambient_pressure = 1e5 }
+
+[[balancer]]
+from = { link = "bar", xyz = [0.5, 0.0, 0.2] }
+to = { link = "ball", xyz = [0.1, 0.0, 0.0] }
+gas_spring = { force = 20.0, length = 0.6, stroke = 0.5, progression = 1.4 }
+
+[[balancer]]
+joint = "elbow"
+sine = { torque = 2.0, zero = 0.1 }
+
+[[balancer]]
+joint = "finger"
+curve = [[-0.1, 4.0], [0.0, 0.0], [0.1, -4.0]]
+"""
+
 ROBOT_FLEX = """format = 1
 name = "beam"
 urdf = "beam.urdf"
@@ -478,6 +504,7 @@ def own_targets():
     seats = ["--interface", "SEAT_A", "--interface", "SEAT_B", "--at", "A=0,0,0", "--at", "B=800,0,0", "--material", "aluminium"]
     targets = [
         Target("robot", "robot.toml", base, [check, COMPARE, ["statics", "robot.toml", "--json"], ["modes", "robot.toml", "--json"]], True),
+        Target("robot-balancers", "robot.toml", {**base, "robot.toml": ROBOT + BALANCERS}, [check, COMPARE, ["statics", "robot.toml", "--json"], ["inspect", "robot.toml", "--json"]], True),
         Target("urdf", "beam.urdf", base, [["check", "beam.urdf", "--json"], ["inspect", "beam.urdf", "--json"], check, COMPARE], True),
         Target("xacro", "arm.xacro", {"arm.xacro": XACRO}, [["check", "arm.xacro", "--json"], ["inspect", "arm.xacro", "--json"]]),
         Target("motion-toml", "motion.toml", base, [check, COMPARE], True),

@@ -50,6 +50,21 @@ pub(crate) fn inspection(i: &Inspection) -> String {
         t.add_row([l.name.clone(), format!("{:.3}", l.mass_kg), format!("{:.4?}", l.com_m)]);
     }
     out += &lines(&t);
+    for b in &i.balancers {
+        let torque: Vec<String> = b.torque.iter().map(|torque| format!("{torque:.1}")).collect();
+        let (length, pull) = match b.kind {
+            "line" => ("length", "pull"),
+            _ => ("joint at", "torque against it"),
+        };
+        out += &format!(
+            "balancer: {}, {length} {:.4}, {pull} {:.1}, stiffness {:.4e}, on the joints {}\n",
+            b.name,
+            b.length,
+            b.tension,
+            b.stiffness,
+            torque.join(" ")
+        );
+    }
     for f in &i.flexible_links {
         out += &format!(
             "flexible: {} ({}), {:.4} m, parts {} kg; {}, {} coordinates\n",

@@ -51,6 +51,14 @@ pub(crate) fn unpacked(packed: &[u8], largest: u64) -> Result<Vec<u8>, NotUnpack
     Ok(bytes)
 }
 
+/// What bytes packed with gzip hold; no more than a sound file of this size does.
+///
+/// # Errors
+/// A sentence about what was found and expected: bytes that are not packed, cut off, or that unpack to far more than real files.
+pub fn unpack_gzip(packed: &[u8]) -> Result<Vec<u8>, String> {
+    unpacked(packed, u64::MAX).map_err(|why| format!("{}, expected {}: {}", why.found, why.expected, why.help))
+}
+
 #[cfg(test)]
 mod tests {
     use std::io::Write;

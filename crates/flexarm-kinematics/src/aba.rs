@@ -16,6 +16,7 @@ use flexarm_spatial::products::{mul, mul3, tr_mul, tr_mul3};
 use flexarm_spatial::{ArticulatedInertia, SpatialInertia, Twist, Wrench};
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Vector3};
 
+use crate::balancer::{add_joint_torques, with_lines};
 use crate::data::{Data, State, add_projection, begin, joint_motion, subspace_times};
 use crate::model::{Body, JointMotion, Model};
 use crate::rnea::nonlinear_effects;
@@ -89,7 +90,7 @@ pub fn forward_dynamics<'d>(
 /// Free accelerations and prescribed forces.
 ///
 /// On entry `qddot` holds the accelerations of the prescribed coordinates and `tau` the forces of the free
-/// ones; on return both are complete. External wrenches in `data.F_ext` act. Fills `data.{X_PB, V, A}`.
+/// ones; on return both are complete. External wrenches in `data.F_ext` and balancers act. Fills `data.{X_PB, V, A}`.
 /// O(n), no allocation (dense where a free coordinate is mimicked).
 pub fn hybrid_dynamics(
     model: &Model,
@@ -110,7 +111,16 @@ fn solve(model: &Model, data: &mut Data, state: &State, roles: &Roles) {
     if roles.dense {
         solve_dense(model, data, state, roles);
     } else {
-        solve_articulated(model, data, state.q.as_slice(), state.qdot.as_slice(), roles);
+        let (q, qdot) = (state.q.as_slice(), state.qdot.as_slice());
+        if model.balancers.is_empty() {
+            return solve_articulated(model, data, q, qdot, roles);
+        }
+        // What a balancer puts on its joint comes to the given forces, and off those that are asked for.
+        with_lines(model, data, q, |data| {
+            add_joint_torques(model, data, -1.0);
+            solve_articulated(model, data, q, qdot, roles);
+            add_joint_torques(model, data, 1.0);
+        });
     }
 }
 

@@ -68,6 +68,10 @@ pub struct Data<T: Scalar = f64> {
     pub(crate) inverse_d: Vec<f64>,
     pub(crate) u: Vec<f64>,
     pub(crate) scratch: Vec<T>,
+    /// The caller's external wrenches while those of the balancers are added; none without balancers.
+    pub(crate) F_held: Vec<Wrench<T>>,
+    /// Length or joint value of each balancer at the last poses.
+    pub(crate) balanced: Vec<f64>,
     /// One per modal body.
     pub(crate) modal: Vec<ModalData<T>>,
     /// Angles of the joints that turn (rad), their sines and cosines.
@@ -102,6 +106,8 @@ impl<T: Real> Data<T> {
             inverse_d: vec![0.0; n],
             u: vec![0.0; n],
             scratch: vec![T::zero(); model.nv()],
+            F_held: vec![Wrench::zeros(); if model.balancers.is_empty() { 0 } else { n }],
+            balanced: vec![0.0; model.balancers.len()],
             modal: model.modal.iter().map(|m| ModalData::new(&m.tables)).collect(),
             angles: vec![T::zero(); model.turning.len()],
             sines: vec![T::zero(); model.turning.len()],

@@ -3,6 +3,7 @@
 use flexarm_spatial::{Pose, SpatialInertia, Wrench};
 use nalgebra::Vector3;
 
+use crate::balancer;
 use crate::data::{Data, State};
 use crate::kinematics::{forward_kinematics, forward_kinematics_velocity};
 use crate::model::Model;
@@ -34,15 +35,16 @@ pub fn momentum_of(model: &Model, data: &Data) -> Wrench {
     rigid.chain(modal).fold(Wrench::zeros(), |sum, p| sum + p)
 }
 
-/// Potential energy of gravity (J), zero at the world origin; fills `data.{X_PB, X_WB}`.
+/// Potential energy of gravity (J), zero at the world origin, and of the balancers; fills `data.{X_PB, X_WB}`.
 pub fn potential_energy(model: &Model, data: &mut Data, q: &nalgebra::DVector<f64>) -> f64 {
     forward_kinematics(model, data, q);
     potential_energy_of(model, data)
 }
 
-/// Potential energy of gravity (J) for the poses in `data.X_WB`.
+/// Potential energy of gravity and of the balancers (J) for the poses in `data.X_WB`, the balancers' where the last of
+/// [`crate::forward_kinematics`], [`crate::inverse_dynamics`] and [`crate::hybrid_dynamics`] found them.
 pub fn potential_energy_of(model: &Model, data: &Data) -> f64 {
-    -model.gravity.dot(&first_moment(model, data))
+    balancer::energy(model, data) - model.gravity.dot(&first_moment(model, data))
 }
 
 /// Centre of mass of all moving bodies in the world (m), for the poses in `data.X_WB`.

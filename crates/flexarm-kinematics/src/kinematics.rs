@@ -8,12 +8,14 @@ use flexarm_spatial::{ElasticAngles, Real, Twist};
 use nalgebra::{Matrix3, Matrix6xX, Vector3};
 
 use crate::axis_motion::AxisMotion;
+use crate::balancer::measure;
 use crate::data::{Data, State, begin, identity, joint_motion, joint_position, rotor_energy};
 use crate::model::{Frame, JointMotion, Model};
 
 /// Poses of all bodies: fills `data.{X_PB, X_WB}`.
 pub fn forward_kinematics(model: &Model, data: &mut Data, q: &nalgebra::DVector<f64>) {
     place_bodies(model, data, q.as_slice());
+    measure(model, data, q.as_slice());
 }
 
 /// [`forward_kinematics`] over any scalar.
@@ -40,6 +42,7 @@ pub fn forward_kinematics_velocity(model: &Model, data: &mut Data, state: &State
         data.V[i] = data.V[model.bodies[i].parent].at_child(&data.X_PB[i]) + V_PB;
     }
     world_poses(model, data);
+    measure(model, data, state.q.as_slice());
 }
 
 /// World poses from the joint poses that the last algorithm left in `data`.

@@ -88,7 +88,7 @@ impl<T: Real> Tree<T> for LaneTree<T> {
     }
 }
 
-/// [`crate::inverse_dynamics`]: `data.tau` has the generalised forces.
+/// [`crate::inverse_dynamics`] without balancers: `data.tau` has the generalised forces.
 #[inline(always)]
 pub fn inverse_dynamics<T: Real>(tree: &LaneTree<T>, data: &mut Data<T>, state: &State<T>, qddot: &[T]) {
     newton_euler(tree, data, state.q.as_slice(), state.qdot.as_slice(), Some(qddot));

@@ -10,7 +10,8 @@
 //! a redundant arm.
 //!
 //! Notation: `X_AB` pose of B in A; `V` twists, `F` wrenches, **linear part first**; see `docs/references.md`
-//! for the sources. Not here: files, flexible-link stiffness, time.
+//! for the sources. Balancers ([`Balancer`]) are forces of the tree as
+//! its weight is. Not here: files, flexible-link stiffness, time.
 //!
 //! ```
 //! use flexarm_kinematics::*;
@@ -40,6 +41,7 @@
 mod aba;
 mod analytic_ik;
 mod axis_motion;
+mod balancer;
 mod crba;
 mod data;
 mod energy;
@@ -69,6 +71,10 @@ pub use analytic_ik::{
     POSE_TOLERANCE, PositionForm, Selection, Solution, Solutions, abb_quadrant, kuka_turn,
 };
 pub use axis_motion::AxisMotion;
+pub use balancer::{
+    Balancer, BalancerCurve, BalancerCurveError, BalancerLaw, BalancerLine, BalancerPlace, BalancerSpan, GasLaw,
+    PlacedBalancer,
+};
 pub use crba::{mass_matrix, mass_matrix_at_poses};
 pub use data::{Data, State};
 pub use energy::{

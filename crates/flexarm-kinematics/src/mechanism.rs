@@ -10,6 +10,7 @@ use flexarm_spatial::{ElasticAngles, Pose, SpatialInertia};
 use nalgebra::{Matrix3, Unit, Vector3};
 
 use crate::axis_motion::AxisMotion;
+use crate::balancer::Balancer;
 use crate::modal::ModalBody;
 
 /// Links joined by joints into one tree. SI units.
@@ -23,6 +24,8 @@ pub struct Mechanism {
     pub joints: Vec<Joint>,
     /// Links that bend in modes, by name; their mass is in the modal body, beside the link's own inertia.
     pub modal: Vec<(String, Arc<ModalBody>)>,
+    /// Springs, gas springs and counterbalances between points of the arm or over joints.
+    pub balancers: Vec<Balancer>,
     /// Acceleration of gravity in world (= base link) axes (m/s²).
     pub gravity: Vector3<f64>,
 }
@@ -223,6 +226,7 @@ impl Mechanism {
             links: Vec::new(),
             joints: Vec::new(),
             modal: Vec::new(),
+            balancers: Vec::new(),
             gravity: Vector3::new(0.0, 0.0, -9.81),
         }
     }

@@ -13,6 +13,7 @@ use flexarm_spatial::{ElasticAngles, Pose, SpatialInertia};
 use nalgebra::Vector3;
 
 use crate::axis_motion::{AxisMotion, RevoluteTable};
+use crate::balancer::{PlacedBalancer, place_balancers};
 use crate::mechanism::{Joint, JointKind, Limits, Mechanism};
 use crate::modal::ModalTables;
 
@@ -28,6 +29,7 @@ pub struct Model {
     n_actuated: usize,
     elastic: Vec<ElasticGroup>,
     pub(crate) modal: Vec<Modal>,
+    pub(crate) balancers: Vec<PlacedBalancer>,
     /// Coordinates with rotors, and the inertia of these seen from there.
     pub(crate) rotors: Vec<(usize, f64)>,
     pub(crate) has_mimic: bool,
@@ -218,6 +220,14 @@ pub enum ModelError {
         /// What.
         what: &'static str,
     },
+    /// A balancer acts on what is not there.
+    #[error("balancer {balancer:?}: {what} is not in the robot")]
+    BadBalancer {
+        /// The balancer.
+        balancer: String,
+        /// What.
+        what: &'static str,
+    },
     /// Something is NaN or infinite.
     #[error("{what} of {name:?} has a NaN or infinite entry")]
     NotFinite {
@@ -328,6 +338,11 @@ impl Model {
         &self.coordinates
     }
 
+    /// Balancers, in the order of the mechanism.
+    pub fn balancers(&self) -> &[PlacedBalancer] {
+        &self.balancers
+    }
+
     /// Whether some joint follows another one.
     pub fn has_mimic(&self) -> bool {
         self.has_mimic
@@ -346,11 +361,13 @@ impl Model {
         model
     }
 
-    /// Whether the other model has the same joints, frames, modal bodies and gravity, to the last bit; inertias may differ.
+    /// Whether the other model has the same joints, frames, modal bodies, balancers and gravity, to the last bit; inertias may
+    /// differ.
     pub fn is_same_tree(&self, other: &Self) -> bool {
         let body =
             |b: &Body| (b.parent, b.X_PJ, b.motion, b.coordinate, b.ratio, b.offset, b.armature, b.elastic, b.modal);
         self.gravity == other.gravity
+            && self.balancers == other.balancers
             && self.bodies.len() == other.bodies.len()
             && self.bodies.iter().zip(&other.bodies).all(|(a, b)| body(a) == body(b))
             && self
@@ -574,6 +591,7 @@ impl<'a> Builder<'a> {
         }
         let with_rotor = self.bodies[1..].iter().filter(|b| b.armature != 0.0);
         let rotors = with_rotor.map(|b| (b.coordinate, b.ratio * b.ratio * b.armature)).collect();
+        let balancers = place_balancers(self.mechanism, &self.frames, &self.bodies)?;
         let frame_by_name = self.frames.iter().enumerate().map(|(i, f)| (f.name.clone(), i)).collect();
         Ok(Model {
             name: self.mechanism.name.clone(),
@@ -586,6 +604,7 @@ impl<'a> Builder<'a> {
             n_actuated,
             elastic,
             modal: self.modal,
+            balancers,
             rotors,
             gravity: self.mechanism.gravity,
         })

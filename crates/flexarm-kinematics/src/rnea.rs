@@ -15,6 +15,7 @@ use flexarm_spatial::products::lift;
 use flexarm_spatial::{Real, Twist, Wrench};
 use nalgebra::{DVector, Vector3};
 
+use crate::balancer::{add_joint_torques, with_lines};
 use crate::data::{Data, State, add_projection, begin, joint_motion, rotor_energy, subspace_times};
 use crate::lanes::Tree;
 use crate::model::Model;
@@ -22,7 +23,7 @@ use crate::model::Model;
 /// Generalised forces `τ = M(q) q̈ + bias(q, q̇)` (N m or N) for the accelerations `qddot`.
 ///
 /// Elastic coordinates are treated like any other: their entries of τ are what the elastic joint must
-/// supply. External wrenches in `data.F_ext` are subtracted. Fills `data.{X_PB, V, A, F, tau}`; `A` has
+/// supply. External wrenches in `data.F_ext` and balancers are subtracted. Fills `data.{X_PB, V, A, F, tau}`; `A` has
 /// gravity subtracted. O(n), no allocation.
 ///
 /// # Source
@@ -33,26 +34,36 @@ pub fn inverse_dynamics<'d>(
     state: &State,
     qddot: &DVector<f64>,
 ) -> &'d DVector<f64> {
-    newton_euler(model, data, state.q.as_slice(), state.qdot.as_slice(), Some(qddot.as_slice()));
+    balanced(model, data, state.q.as_slice(), state.qdot.as_slice(), Some(qddot.as_slice()));
     &data.tau
 }
 
-/// Generalised forces at zero acceleration: Coriolis, centrifugal, gravity and external loads.
+/// Generalised forces at zero acceleration: Coriolis, centrifugal, gravity, balancers and external loads.
 pub fn nonlinear_effects<'d>(model: &Model, data: &'d mut Data, state: &State) -> &'d DVector<f64> {
-    newton_euler(model, data, state.q.as_slice(), state.qdot.as_slice(), None);
+    balanced(model, data, state.q.as_slice(), state.qdot.as_slice(), None);
     &data.tau
 }
 
-/// Generalised forces that hold the mechanism still at `q`, against gravity and external loads.
+/// Generalised forces that hold the mechanism still at `q`, against gravity, balancers and external loads.
 pub fn gravity_forces<'d>(model: &Model, data: &'d mut Data, q: &DVector<f64>) -> &'d DVector<f64> {
     let mut at_rest = std::mem::take(&mut data.scratch);
     at_rest.fill(0.0);
-    newton_euler(model, data, q.as_slice(), &at_rest, None);
+    balanced(model, data, q.as_slice(), &at_rest, None);
     data.scratch = at_rest;
     &data.tau
 }
 
-/// Over any scalar; `data.tau` has the result.
+/// [`newton_euler`] with the balancers of the model.
+#[inline(always)]
+fn balanced(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], qddot: Option<&[f64]>) {
+    if model.balancers.is_empty() {
+        return newton_euler(model, data, q, qdot, qddot);
+    }
+    with_lines(model, data, q, |data| newton_euler(model, data, q, qdot, qddot));
+    add_joint_torques(model, data, 1.0);
+}
+
+/// Over any scalar, without balancers; `data.tau` has the result.
 #[inline(always)]
 pub(crate) fn newton_euler<T: Real>(tree: &impl Tree<T>, data: &mut Data<T>, q: &[T], qdot: &[T], qddot: Option<&[T]>) {
     let model = tree.model();

@@ -18,6 +18,12 @@
 //! ```text
 //! τ_k = -(R C_t,k) · g,    ∂τ_k/∂q_j = ∂τ_j/∂η_k = -w_j · (R C_t,k × g)       j inward of the body      (6)
 //! ```
+//! Balancers (`balancer.rs`) act as a pair of loads that keep their direction in (2); that they turn and stretch is, with the
+//! velocity `d_i` of their one end against the other per rate of coordinate i,
+//!
+//! ```text
+//! line:  ∂τ_i/∂q_j += d_i · K d_j        joint:  ∂τ_i/∂q_j += c_i k c_j                    (7)
+//! ```
 //! One pass over the bodies and one over the pairs of coordinates; central differences of [`crate::gravity_forces`] take 2 n
 //! passes over the bodies.
 
@@ -25,6 +31,7 @@ use flexarm_spatial::products::{mul, tr_mul};
 use flexarm_spatial::{ElasticAngles, Twist, Wrench};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
+use crate::balancer::{BalancerLine, BalancerPlace};
 use crate::data::Data;
 use crate::model::{JointMotion, Model};
 
@@ -68,6 +75,8 @@ struct Column {
     moment: Vector3<f64>,
     /// The bracket of (4).
     row: Vector3<f64>,
+    /// d of (7) for the balancer at hand.
+    d: Vector3<f64>,
 }
 
 /// W and T of (2).
@@ -141,6 +150,7 @@ impl StaticTangent {
             force: zero,
             moment: zero,
             row: zero,
+            d: zero,
         };
         for (i, body) in model.bodies.iter().enumerate().skip(1) {
             let k = body.coordinate;
@@ -182,6 +192,7 @@ impl StaticTangent {
         self.add_pairs(model, G);
         self.add_own_joints(model, data, q, G);
         self.add_modal_weights(model, data, G);
+        self.add_balancers(model, data, G);
     }
 
     /// W and T of (2) of everything outward of each body.
@@ -199,6 +210,11 @@ impl StaticTangent {
         }
         for load in loads {
             self.carried[load.body].add(&load.carried(data));
+        }
+        for line in model.balancers.iter().filter_map(|balancer| balancer.line(&data.X_WB)) {
+            for (end, F_W) in [line.F_W, -line.F_W].into_iter().enumerate() {
+                self.carried[line.bodies[end]].add(&Carried::weight(F_W, &line.p_W[end]));
+            }
         }
         for i in (1..model.bodies.len()).rev() {
             let parent = model.bodies[i].parent;
@@ -316,6 +332,46 @@ impl StaticTangent {
                     G[(column.k, k)] -= slope;
                     G[(k, column.k)] -= slope;
                 }
+            }
+        }
+    }
+
+    /// (7).
+    fn add_balancers(&mut self, model: &Model, data: &Data, G: &mut DMatrix<f64>) {
+        for (balancer, x) in model.balancers.iter().zip(&data.balanced) {
+            match &balancer.place {
+                BalancerPlace::Points(_) => {
+                    if let Some(line) = balancer.line(&data.X_WB) {
+                        self.add_line(model, &line, G);
+                    }
+                }
+                BalancerPlace::Joint { terms, .. } => {
+                    let k = balancer.law.rate(*x);
+                    let own = || terms.iter().filter(|(i, _)| *i >= self.first).map(|(i, c)| (i - self.first, *c));
+                    for (i, c_i) in own() {
+                        for (j, c_j) in own() {
+                            G[(i, j)] += c_i * k * c_j;
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    fn add_line(&mut self, model: &Model, line: &BalancerLine, G: &mut DMatrix<f64>) {
+        for column in &mut self.columns {
+            let moves = |body: usize| column.body <= body && body < model.bodies[column.body].subtree_end;
+            column.d = Vector3::zeros();
+            for (end, sign) in [-1.0, 1.0].into_iter().enumerate() {
+                if moves(line.bodies[end]) {
+                    column.d += (column.v + column.w.cross(&line.p_W[end])) * sign;
+                }
+            }
+        }
+        for row in &self.columns {
+            let Kd = mul(&line.K_W, &row.d);
+            for column in &self.columns {
+                G[(row.k, column.k)] += Kd.dot(&column.d);
             }
         }
     }

@@ -24,7 +24,11 @@ struct Case {
 }
 
 fn case(seed: u64, n_joints: usize) -> Case {
-    let tree = if seed.is_multiple_of(2) { random_tree(seed, n_joints) } else { random_flexible_tree(seed, n_joints) };
+    let mut tree =
+        if seed.is_multiple_of(2) { random_tree(seed, n_joints) } else { random_flexible_tree(seed, n_joints) };
+    if (seed / 2).is_multiple_of(2) {
+        add_balancers(&mut tree, &mut Draw(seed ^ 0x5EED));
+    }
     let model = Model::new(&tree).expect("random trees are valid");
     let mut draw = Draw(seed ^ 0xABCD);
     let state = random_state(&model, &mut draw);
@@ -34,6 +38,49 @@ fn case(seed: u64, n_joints: usize) -> Case {
         *F = Wrench::new(draw.vector(20.0), draw.vector(5.0));
     }
     Case { model, data, state, qddot, draw }
+}
+
+/// Balancers of every law: from anchors that no link reaches to links, and over joints of one coordinate.
+fn add_balancers(tree: &mut Mechanism, draw: &mut Draw) {
+    let links: Vec<String> = tree.links.iter().map(|link| link.name.clone()).collect();
+    let single: Vec<Joint> = tree.joints.iter().filter(|j| j.kind.axis_motion().is_some()).cloned().collect();
+    let points = [[-2.0, -4.0], [-0.3, 6.0], [0.4, 5.0], [2.0, -3.0]];
+    for k in 0..6 {
+        let law = match draw.index(5) {
+            0 => BalancerLaw::Linear { rate: 20.0 * draw.signed(), free: draw.signed(), preload: 30.0 * draw.signed() },
+            1 => BalancerLaw::Gas(GasLaw {
+                force: 40.0,
+                opposing: 3.0,
+                at: 4.0,
+                slope: 0.01,
+                exponent: draw.between(1.0, 1.6),
+                pulls: draw.signed() > 0.0,
+            }),
+            2 => BalancerLaw::Gas(GasLaw {
+                force: 40.0,
+                opposing: 0.0,
+                at: 4.0,
+                slope: 0.01,
+                exponent: 1.0,
+                pulls: true,
+            }),
+            3 => BalancerLaw::Sine { amplitude: 10.0, zero: draw.signed() },
+            _ => BalancerLaw::Curve(BalancerCurve::new(&points).expect("points rise")),
+        };
+        let span = match draw.index(single.len() + 2) {
+            i if i < single.len() => {
+                BalancerSpan::Joint { joint: single[i].name.clone(), child: single[i].child.clone() }
+            }
+            _ => {
+                let (anchor, from) = (format!("anchor_{k}"), links[draw.index(links.len())].clone());
+                let X = Pose::translation(6.0, 5.0, 4.0) * draw.pose(1.0);
+                tree.joints.push(Joint::new(format!("fix_{k}"), JointKind::Fixed, from, &anchor, X));
+                tree.links.push(Link { name: anchor.clone(), inertia: None });
+                BalancerSpan::Points { from: anchor, to: links[draw.index(links.len())].clone() }
+            }
+        };
+        tree.balancers.push(Balancer { name: format!("balancer_{k}"), span, law });
+    }
 }
 
 /// At Bo in B axes.

@@ -26,6 +26,7 @@ mod error;
 mod files;
 mod lower_arm;
 mod manipulator;
+mod measured;
 mod meshed;
 mod one_beam;
 pub mod page;
@@ -45,12 +46,13 @@ pub use files::{PAGE, VerificationFiles, differences_from};
 type Entry = (&'static str, f64, fn(&Bench, &mut Pace<'_>) -> Result<Case, Error>);
 
 /// The cases, in the order of the page.
-const CASES: [Entry; 5] = [
+const CASES: [Entry; 6] = [
     ("one-beam", 1.0, one_beam::case),
     ("three-beams", 5.0, three_beams::case),
     ("lower-arm", 5.0, lower_arm::case),
     ("manipulator", 45.0, manipulator::case),
     ("programs", 3.0, programs::case),
+    ("measured", 3.0, measured::case),
 ];
 
 /// Names of the cases.

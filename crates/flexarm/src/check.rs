@@ -8,6 +8,7 @@ use flexarm_urdf::{Finding as UrdfFinding, Severity};
 use nalgebra::Vector6;
 use serde::Serialize;
 
+use crate::balancer;
 use crate::caveat::motion::of_motion;
 use crate::caveat::size::{Size, middle};
 use crate::caveat::{self, Caveat};
@@ -275,6 +276,8 @@ fn check_motion(robot: &Robot, path: &Path, options: &MotionOptions, findings: &
             let passed =
                 |v| Finding { help: help.into(), likely: likely(), ..Finding::error("joint-limit", file(), v) };
             findings.extend(motion.violations.iter().map(|v| passed(v)));
+            let room = robot.rigid_model().map(|model| balancer::check_motion(&model, &motion.trajectory));
+            findings.extend(room.ok().and_then(Result::err).map(|e| Finding::error("balancer", file(), &e)));
             let along = robot.rigid_model().map(|model| of_motion(&motion.name, &motion.trajectory, &model));
             let told = motion.caveats().into_iter().chain(along.unwrap_or_default());
             findings.extend(told.map(|caveat| Finding::caveat(path, caveat)));

@@ -16,7 +16,7 @@ use flexarm_settings::Setting;
 use crate::robot_file::RobotFileError;
 
 pub use flexarm_settings::Fault;
-pub use model::{ChannelError, LoadError, ModellingError, PayloadError, PoseError};
+pub use model::{BalancerError, ChannelError, LoadError, ModellingError, PayloadError, PoseError};
 pub use recording::{RecordingError, StudyError};
 pub use value::ValueError;
 
@@ -115,6 +115,9 @@ pub enum Error {
     /// Joint values that do not fit the robot, and poses without an answer.
     #[error(transparent)]
     Pose(#[from] PoseError),
+    /// A balancer that does not fit the robot, or a pose of it.
+    #[error(transparent)]
+    Balancer(#[from] BalancerError),
     /// Inputs and outputs of a frequency response.
     #[error(transparent)]
     Channel(#[from] ChannelError),

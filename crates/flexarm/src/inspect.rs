@@ -7,6 +7,7 @@ use flexarm_kinematics::{
 use nalgebra::{DMatrix, Matrix6xX, UnitQuaternion};
 use serde::Serialize;
 
+use crate::balancer::{self, BalancerInfo};
 use crate::error::{Error, PoseError};
 use crate::options::Modelling;
 use crate::posed::all_finite;
@@ -33,12 +34,15 @@ pub struct Inspection {
     pub jacobian: Vec<Vec<f64>>,
     /// Of the rigid robot with its payload.
     pub mass_matrix: Vec<Vec<f64>>,
-    /// Forces that hold the pose.
+    /// Forces that hold the pose, against gravity and balancers.
     pub gravity_torque: Vec<f64>,
     /// `τ = M q̈ + bias`: gravity with centrifugal and Coriolis forces.
     pub bias: Vec<f64>,
     /// `bias - gravity_torque`.
     pub coriolis: Vec<f64>,
+    /// Balancers at the pose; `gravity_torque` and `bias` have them in.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub balancers: Vec<BalancerInfo>,
     /// Total mass (kg), payload and base included.
     pub mass_kg: f64,
     /// Things worth telling.
@@ -153,6 +157,7 @@ pub fn inspect(robot: &Robot, at: Option<&[f64]>, velocity: Option<&[f64]>) -> R
     state.qdot.copy_from_slice(&v);
 
     let mut data = Data::new(&model);
+    balancer::check_pose(&model, &mut data, &state.q)?;
     let M = mass_matrix(&model, &mut data, &state.q).clone();
     let gravity = gravity_forces(&model, &mut data, &state.q).clone();
     let bias = nonlinear_effects(&model, &mut data, &state).clone();
@@ -220,6 +225,7 @@ pub fn inspect(robot: &Robot, at: Option<&[f64]>, velocity: Option<&[f64]>) -> R
         coriolis: (&bias - &gravity).as_slice().to_vec(),
         gravity_torque: gravity.as_slice().to_vec(),
         bias: bias.as_slice().to_vec(),
+        balancers: balancer::at_pose(&model, &state.q),
         mass_kg: robot.rigid.links.iter().filter_map(|l| l.inertia).map(|i| i.mass).fold(0.0, |sum, mass| sum + mass),
         warnings,
     })

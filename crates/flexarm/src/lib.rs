@@ -42,6 +42,8 @@
 
 mod applied_load;
 mod arm;
+mod balancer;
+mod balancer_entry;
 mod beam_entry;
 mod bends;
 mod caveat;
@@ -88,6 +90,7 @@ mod twin;
 
 pub use applied_load::AppliedLoad;
 pub use arm::{Arm, Run};
+pub use balancer::{BalancerEnds, BalancerInfo, RobotBalancer};
 pub use bends::Bend;
 pub use caveat::{Caveat, Severity};
 pub use check::{Finding, check, check_with_loads, check_with_motion};
@@ -95,8 +98,8 @@ pub use convert::{ConvertOptions, ConvertSummary, convert, convert_until, parse_
 pub use deflections::Variation;
 pub use drive_entry::{Drive, DriveKind};
 pub use error::{
-    ChannelError, Error, Fault, LoadError, ModellingError, PayloadError, PoseError, RecordingError, StudyError,
-    ValueError,
+    BalancerError, ChannelError, Error, Fault, LoadError, ModellingError, PayloadError, PoseError, RecordingError,
+    StudyError, ValueError,
 };
 pub use flexible::{FlexibleRobot, LinkChoices, Owner, RobotLink};
 pub use headline::{Bending, ShareFigures};
@@ -133,7 +136,7 @@ pub use tool_path::ToolPath;
 
 pub use flexarm_analysis::{Quantity, Spacing};
 pub use flexarm_files::FileError;
-pub use flexarm_kinematics::{LinkInertia, Pose, Wrench};
+pub use flexarm_kinematics::{BalancerCurve, BalancerCurveError, BalancerLaw, GasLaw, LinkInertia, Pose, Wrench};
 pub use flexarm_linkmaker::{ImportError, JobError, LinkError, export, import};
 pub use flexarm_log::{Column, Columns, FormatInfo, Holds, RecordingFormat, Sample, Trace};
 pub use flexarm_motion_io::MotionError;

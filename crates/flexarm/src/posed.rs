@@ -6,6 +6,7 @@ use flexarm_kinematics::{Data, Frame, Pose, State, Wrench, forward_kinematics, r
 use flexarm_stepping::{FlexibleArm, Held, Linear, StepError, linearise};
 use nalgebra::{DVector, Vector6};
 
+use crate::balancer;
 use crate::caveat::pose::Standing;
 use crate::caveat::{Caveat, kinds, validity};
 use crate::error::{Error, PoseError};
@@ -45,6 +46,7 @@ impl Posed {
     /// `at` in coordinate order (rad or m).
     pub(crate) fn held(robot: &Robot, modelling: &Modelling, at: Vec<f64>) -> Result<Self, Error> {
         let flexible = robot.modelled(modelling)?;
+        balancer::check_pose(&flexible.rigid, &mut Data::new(&flexible.rigid), &DVector::from_column_slice(&at))?;
         let model = flexible.model.clone();
         let actuated = &model.coordinates()[..model.n_actuated()];
         let joints: Vec<String> = actuated.iter().map(|c| c.joint.clone()).collect();

@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use flexarm_settings::Setting;
 use flexarm_stepping::{FlexibleArm, Load, PrescribedMotion, StepError, StepRule, Stepper, new_stepper};
 
+use crate::balancer;
 use crate::caveat::size::Size;
 use crate::caveat::{self, Caveat, kinds};
 use crate::error::{Error, ValueError};
@@ -71,6 +72,7 @@ pub(crate) fn checked(
         Some(prepared) => prepared.flexible.clone(),
         None => Arc::new(robot.modelled(&options.modelling)?),
     };
+    balancer::check_motion(&flexible.rigid, &motion.trajectory)?;
     let arm = match prepared {
         Some(prepared) => prepared.arm(motion.prescribed()),
         None => flexible.arm(motion.prescribed()),

@@ -8,6 +8,7 @@ use flexarm_urdf::{InertiaEstimate, ReadOptions, UrdfRobot, closest, default_tcp
 use nalgebra::{Matrix3, Rotation3, Translation3, Vector3};
 use toml::Spanned;
 
+use crate::balancer_entry::add_balancers;
 use crate::caveat::{self, Caveat};
 use crate::drive_entry::{Drive, drives};
 use crate::error::Error;
@@ -178,6 +179,7 @@ impl Robot {
                 joint.armature = drive.armature;
             }
         }
+        add_balancers(&mut robot, &file.balancer, &source, &mut faults);
         for entry in &file.flexible_link {
             let urdf = &robot.urdf.mechanism;
             let flexible = flexible_link(entry, urdf, &source, folder, &mut robot.warnings, &mut faults);
@@ -269,6 +271,7 @@ impl Robot {
         caveats.extend(self.flexible.iter().flat_map(caveat::links::of_link));
         if let Ok(rigid) = self.rigid_model() {
             caveats.extend(caveat::drives::of_drives(&self.drives, &self.rigid, &rigid));
+            caveats.extend(caveat::balancers::of_balancers(&self.rigid, &rigid));
         }
         caveats
     }

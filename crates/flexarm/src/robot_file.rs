@@ -11,6 +11,7 @@ pub(crate) use flexarm_files::Source;
 pub use flexarm_files::TextFileError as RobotFileError;
 pub(crate) use flexarm_linkmaker::MaterialEntry;
 
+use crate::balancer_entry::BalancerEntry;
 pub(crate) use crate::beam_entry::BeamEntry;
 use crate::drive_entry::DriveEntry;
 
@@ -57,6 +58,9 @@ pub(crate) struct RobotFile {
     /// How joints are driven.
     #[serde(default)]
     pub drive: Vec<DriveEntry>,
+    /// Springs, gas springs and counterbalances.
+    #[serde(default)]
+    pub balancer: Vec<Spanned<BalancerEntry>>,
 }
 
 /// Pose of the tool centre point in a link.

@@ -229,6 +229,21 @@ fn torque(has: bool, change: Change) -> Change {
     })
 }
 
+/// A counterbalance whose gas has room for a part of the way only, and a gas spring that has enough.
+const CRAMPED: &str = "[{ from = { link = \"link_1\", xyz = [-0.6, 0.0, 0.0] }, to = { link = \"link_2\", xyz = [0.0, 0.0, 0.3] }, \
+                       gas = { acts = \"pull\", pressure = 2e6, volume = 1e-4, area = 1e-3, length = 0.6 } }]";
+const GAS_SPRING: &str = "[{ from = { link = \"link_1\", xyz = [-0.6, 0.0, 0.0] }, to = { link = \"link_2\", xyz = [0.0, 0.0, 0.3] }, \
+                          gas_spring = { force = 900.0, length = 1.6, stroke = 1.4, progression = 1.3 } }]";
+
+/// Balancers on the arms that have their joints and links.
+fn balanced(text: &'static str) -> Change {
+    let new = set("balancer", text);
+    Box::new(move |texts| {
+        let arm = ["link_1", "link_2", "joint_2"].iter().all(|name| texts.urdf.contains(&format!("name=\"{name}\"")));
+        arm && texts.robot.contains_key("payload") && new(texts)
+    })
+}
+
 fn inertia(factor: f64) -> Change {
     Box::new(move |texts| {
         for name in ["ixx", "iyy", "izz", "ixy", "ixz", "iyz"] {
@@ -314,6 +329,12 @@ fn slips() -> Vec<(&'static str, Change, &'static [&'static str])> {
         ),
         ("friction in N mm", set("drive.*.friction", "{ coulomb = 1e6 }"), &["friction"]),
         ("servo sampled every second", torque(true, set("drive.0.servo", "{ sample_s = 1.0 }")), &["sampling"]),
+        (
+            "balancer in N mm/rad",
+            balanced("[{ joint = \"joint_2\", spring = { rate = 2e6, free_angle = 0.0 } }]"),
+            &["balancer-strong"],
+        ),
+        ("a counterbalance with a tenth of its volume", balanced(CRAMPED), &["balancer-room"]),
         ("servo far too stiff", torque(true, set("drive.0.servo", "{ velocity_gain = 1e4 }")), &["velocity-gain"]),
     ]
 }
@@ -354,6 +375,8 @@ fn harmless() -> Vec<(&'static str, Change)> {
         ("in orbit", set("gravity", "[0.0, 0.0, 0.0]")),
         ("another tool", set("tcp.xyz", "[0.0, 0.1, 0.6]")),
         ("tool turned by a right angle", set("tcp.rpy", "[0.0, 1.5707963, 0.0]")),
+        ("a torsion spring", balanced("[{ joint = \"joint_2\", spring = { rate = 900.0, free_angle = -1.0 } }]")),
+        ("a gas spring", balanced(GAS_SPRING)),
         ("rotors twice", key("drive.*.motor_inertia", 2.0)),
         ("effort limits 1.5 times", urdf("limit", "effort", 1.5)),
         ("effort limits twice", urdf("limit", "effort", 2.0)),

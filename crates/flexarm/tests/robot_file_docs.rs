@@ -54,6 +54,7 @@ fn every_example_of_a_robot_file_loads() {
         let robot = place.robot(&format!("{head}{block}"));
         assert_eq!(robot.flexible.len(), block.matches("[[flexible_link]]").count());
         assert_eq!(robot.drives.len(), block.matches("[[drive]]").count());
+        assert_eq!(robot.rigid.balancers.len(), block.matches("[[balancer]]").count());
         robot.flexible_robot().unwrap();
         modal += robot.flexible.iter().filter(|link| link.choices.model == LinkModel::Modal).count();
         torque += robot.drives.iter().filter(|drive| drive.kind == DriveKind::Torque).count();
@@ -156,8 +157,9 @@ fn keys(sources: &[&str]) -> BTreeMap<String, BTreeSet<String>> {
     found
 }
 
-const ROBOT: [&str; 4] = [
+const ROBOT: [&str; 5] = [
     "crates/flexarm/src/robot_file.rs",
+    "crates/flexarm/src/balancer_entry.rs",
     "crates/flexarm/src/beam_entry.rs",
     "crates/flexarm/src/drive_entry.rs",
     "crates/flexarm-linkmaker/src/material_entry.rs",
@@ -214,6 +216,12 @@ fn the_schemas_have_the_same_keys() {
         ("gearbox", "GearboxEntry"),
         ("friction", "FrictionEntry"),
         ("servo", "ServoEntry"),
+        ("balancer", "BalancerEntry"),
+        ("balancer_end", "EndEntry"),
+        ("balancer_spring", "SpringEntry"),
+        ("balancer_gas", "GasEntry"),
+        ("balancer_gas_spring", "GasSpringEntry"),
+        ("balancer_sine", "SineEntry"),
     ];
     same_keys("docs/robot.schema.json", &ROBOT, "RobotFile", &robot);
     same_keys("docs/loads.schema.json", &LOADS, "LoadsFile", &[("load", "LoadEntry"), ("payload", "PayloadEntry")]);

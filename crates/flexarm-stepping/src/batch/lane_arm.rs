@@ -57,6 +57,7 @@ impl<T: Real> LaneArm<T> {
                 && ElasticTree::that_pays(arm).is_none()
                 && arm.torque_driven.is_empty()
                 && arm.loads.is_empty()
+                && arm.model.balancers().is_empty()
                 && arm.inertia_changes.is_empty()
                 && arm.proportional == first.proportional
                 && arm.motion.velocity_jumps().is_empty()

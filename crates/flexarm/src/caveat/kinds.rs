@@ -386,6 +386,34 @@ pub(crate) const MOTION_EFFORT: CaveatKind = CaveatKind::warning(
     "N m",
     "slow the motion down; check masses, payload, unit and time of the motion",
 );
+/// A balancer that carries far more than the arm weighs.
+pub(crate) const BALANCER_STRONG: CaveatKind = CaveatKind::warning(
+    "balancer-strong",
+    "{where} puts up to {value} N m (or N) on a joint, told above three times what the weight of the arm does ({yardstick})",
+    "N m",
+    "a balancer carries about what the arm weighs: check rate, pressure, area and ends (N/m, Pa, m2, m)",
+);
+/// A balancer that carries nothing.
+pub(crate) const BALANCER_WEAK: CaveatKind = CaveatKind::note(
+    "balancer-weak",
+    "{where} puts at most {value} N m (or N) on a joint, told below a thousandth of what the weight of the arm does ({yardstick})",
+    "N m",
+    "check its ends and its force: units are m, N/m and Pa",
+);
+/// A gas that has no room in a part of the joint ranges.
+pub(crate) const BALANCER_ROOM: CaveatKind = CaveatKind::warning(
+    "balancer-room",
+    "{where} gets {value} m long within the joint ranges, its gas has room up to {yardstick} m: poses beyond are refused",
+    "m",
+    "check ends, volume, area and the length to which they belong, or the joint ranges",
+);
+/// A curve that does not cover what is asked of it.
+pub(crate) const BALANCER_CURVE: CaveatKind = CaveatKind::note(
+    "balancer-curve",
+    "{where} is at {value} within the joint ranges, its curve ends at {yardstick}: it goes straight on from there",
+    "",
+    "add points, in m or rad",
+);
 /// A motion much slower than the robot.
 pub(crate) const SLOW_MOTION: CaveatKind = CaveatKind::note(
     "slow-motion",

@@ -6,6 +6,7 @@
 //!
 //! Not here: what makes a model impossible. That is an [`crate::Error`].
 
+pub(crate) mod balancers;
 pub(crate) mod drives;
 pub(crate) mod kinds;
 pub(crate) mod links;

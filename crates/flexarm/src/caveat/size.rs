@@ -68,7 +68,7 @@ pub(crate) fn least_density(inertia: &LinkInertia) -> f64 {
 
 /// What the joints of the rigid robot carry and move.
 pub(crate) struct Loads {
-    /// Largest torque of weight in poses spread over the joint ranges (N m or N).
+    /// Largest torque of weight and balancers in poses spread over the joint ranges (N m or N).
     pub(crate) weight: Vec<f64>,
     /// Inertia in the middle of the ranges, rotors included (kg m² or kg).
     pub(crate) inertia: Vec<f64>,
@@ -79,14 +79,12 @@ impl Loads {
         let n = model.nv();
         let (mut data, mut state) = (Data::new(model), State::zeros(model));
         let mut weight = DVector::zeros(n);
-        for pose in 1..=POSES {
-            for (k, c) in model.coordinates().iter().enumerate() {
-                let range = |limit: f64, other: f64| if limit.is_finite() { limit } else { other };
-                let (low, high) = (range(c.limits.lower, -3.0), range(c.limits.upper, 3.0));
-                state.q[k] = low + (high - low) * halton(pose, k);
+        for q in spread_poses(model) {
+            let torques = gravity_forces(model, &mut data, &q).abs();
+            // A balancer may have no room there, which has a caveat of its own.
+            if torques.iter().all(|torque| torque.is_finite()) {
+                weight = weight.sup(&torques);
             }
-            let torques = gravity_forces(model, &mut data, &state.q).abs();
-            weight = weight.sup(&torques);
         }
         for (q, c) in state.q.iter_mut().zip(model.coordinates()) {
             *q = middle(c.limits.lower, c.limits.upper);
@@ -94,6 +92,17 @@ impl Loads {
         let M = mass_matrix(model, &mut data, &state.q);
         Self { weight: weight.as_slice().to_vec(), inertia: M.diagonal().as_slice().to_vec() }
     }
+}
+
+/// Poses spread over the joint ranges (rad or m); open ranges count from -3 to 3.
+pub(crate) fn spread_poses(model: &Model) -> impl Iterator<Item = DVector<f64>> + '_ {
+    let place = |pose: u32, k: usize| {
+        let limits = &model.coordinates()[k].limits;
+        let range = |limit: f64, other: f64| if limit.is_finite() { limit } else { other };
+        let (low, high) = (range(limits.lower, -3.0), range(limits.upper, 3.0));
+        low + (high - low) * halton(pose, k)
+    };
+    (1..=POSES).map(move |pose| DVector::from_fn(model.nv(), |k, _| place(pose, k)))
 }
 
 /// Middle of a joint range; of an open one what is nearest to zero.

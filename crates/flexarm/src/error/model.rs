@@ -56,6 +56,101 @@ fn lumped_remedy(modal_instead: &[String]) -> String {
     if modal_instead.is_empty() { format!("add {} lumped", Setting::Links) } else { modal_instead.join("; ") }
 }
 
+/// Balancers that do not fit the robot, and poses in which they cannot be.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BalancerError {
+    /// Two of one name.
+    #[error("balancer {name:?} is there twice: give each a name of its own")]
+    Twice {
+        /// The name.
+        name: String,
+    },
+    /// No such link.
+    #[error("balancer {name:?}: {link:?} is not a link of the robot; its links are {known:?}")]
+    UnknownLink {
+        /// The balancer.
+        name: String,
+        /// The link asked for.
+        link: String,
+        /// The links there are.
+        known: Vec<String>,
+    },
+    /// A point that is no place.
+    #[error("balancer {name:?}: its point on link {link:?} has the entry {value}, expected finite numbers in m")]
+    NotFinite {
+        /// The balancer.
+        name: String,
+        /// The link.
+        link: String,
+        /// The entry.
+        value: f64,
+    },
+    /// Both ends on one rigid body.
+    #[error(
+        "balancer {name:?}: no joint moves link {second:?} against link {first:?}, so it does nothing: put its ends on links with a joint \
+         between them"
+    )]
+    SameBody {
+        /// The balancer.
+        name: String,
+        /// One link.
+        first: String,
+        /// The other one.
+        second: String,
+    },
+    /// No such joint.
+    #[error("balancer {name:?}: the robot has no movable joint {joint:?}; it has {known:?}")]
+    UnknownJoint {
+        /// The balancer.
+        name: String,
+        /// The joint asked for.
+        joint: String,
+        /// The joints that move.
+        known: Vec<String>,
+    },
+    /// A sine over a slide.
+    #[error("balancer {name:?}: a sine is a torque over an angle, but joint {joint:?} slides: use spring or curve")]
+    Slides {
+        /// The balancer.
+        name: String,
+        /// The joint.
+        joint: String,
+    },
+    /// The piston is beyond the end of its cylinder.
+    #[error(
+        "balancer {name:?} is {length:.4} m long there, its gas has no room left {beyond} {end:.4} m: check its ends (m), volume (m³), area (m²) \
+         and the length to which these belong"
+    )]
+    NoRoom {
+        /// The balancer.
+        name: String,
+        /// Its length (m).
+        length: f64,
+        /// `above` or `below`.
+        beyond: &'static str,
+        /// Where the room ends (m).
+        end: f64,
+    },
+    /// Both ends at one place.
+    #[error(
+        "both ends of balancer {name:?} are at the same place there, so that its force has no direction: move an end"
+    )]
+    NoLength {
+        /// The balancer.
+        name: String,
+    },
+    /// One of these during a motion.
+    #[error("at t = {t:.3} s: {source}")]
+    AlongMotion {
+        /// When (s).
+        t: f64,
+        /// Why.
+        #[source]
+        source: Box<BalancerError>,
+    },
+}
+
 /// Joint values that do not fit the robot, and poses without an answer.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]

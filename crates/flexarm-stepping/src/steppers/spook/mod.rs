@@ -22,7 +22,8 @@ mod constraint;
 mod solve;
 
 use flexarm_kinematics::{
-    Data, ElasticAngles, JointMotion, Model, Pose, State, Twist, Wrench, forward_kinematics_velocity,
+    BalancerPlace, Data, ElasticAngles, JointMotion, Model, PlacedBalancer, Pose, State, Twist, Wrench,
+    forward_kinematics_velocity,
 };
 use flexarm_spatial::products::{mul, turn_symmetric};
 use nalgebra::{DVector, Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
@@ -348,10 +349,13 @@ impl Stepper for Spook {
         out.model.clone_from(&self.arm.model);
         out.q.rows_mut(0, n).copy_from(&self.now.q);
         out.qdot.rows_mut(0, n).copy_from(&self.now.qdot);
-        let (mut kinetic, potential) = self.observe_bodies(out);
+        let (mut kinetic, mut potential) = self.observe_bodies(out);
         for i in 1..self.bodies.len() {
             // Mean force over the last step (before the first one: over that).
             self.observe_joint(i, self.lambda[i] / h, out);
+        }
+        for balancer in self.arm.model.balancers() {
+            potential += balancer.law.energy(balancer.length(&out.X_WB, out.q.as_slice()));
         }
         // Drives: friction and rotors are no rows of the constraints.
         for (k, rate) in self.now.qdot.iter().enumerate() {
@@ -522,7 +526,7 @@ impl Spook {
         Ok(())
     }
 
-    /// External loads on each body at Bo in world axes.
+    /// External loads and balancers on each body at Bo in world axes.
     fn update_loads(&mut self) {
         self.loads.iter_mut().for_each(|load| *load = Vector6::zeros());
         for load in &self.arm.loads {
@@ -530,6 +534,28 @@ impl Spook {
             let F = load.on_body(self.events.side(self.t), &X_WB);
             self.loads[load.body] += Wrench::new(X_WB.rotation * F.force, X_WB.rotation * F.torque).to_vector();
         }
+        let model = self.arm.model.clone();
+        for balancer in model.balancers() {
+            for (body, F_W) in balancer.wrenches(&self.poses, self.joint_value(balancer)) {
+                self.loads[body] += F_W.to_vector();
+            }
+        }
+    }
+
+    /// Value of the joint of a balancer at the current time: prescribed coordinates and deflections of springs.
+    fn joint_value(&self, balancer: &PlacedBalancer) -> f64 {
+        let BalancerPlace::Joint { terms, offset, .. } = &balancer.place else { return 0.0 };
+        let model = &self.arm.model;
+        let coordinate = |k: usize| {
+            let of = &model.coordinates()[k];
+            match model.bodies()[of.body].motion {
+                _ if k < model.n_actuated() => self.now.q[k],
+                JointMotion::Axis(motion) => motion.coordinate_of(&self.deflection_now(of.body, Default::default()).0),
+                JointMotion::Elastic(angles) => self.deflection_now(of.body, angles).0[of.component],
+                JointMotion::Interface { .. } | JointMotion::Welded => 0.0,
+            }
+        };
+        terms.iter().fold(*offset, |x, (k, c)| x + c * coordinate(*k))
     }
 
     /// Body blocks: mass, momentum, impulse of gravity, gyroscopic moment and loads, about the centre of mass in world axes.

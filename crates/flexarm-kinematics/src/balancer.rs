@@ -1,0 +1,595 @@
+//! Balancers: forces that depend on where the arm is and on nothing else, as gravity does.
+//!
+//! A balancer acts along the line between two points of the arm, or over one joint. It has one length x and the energy U(x)
+//! of its law:
+//!
+//! ```text
+//! line:   x = |d|,  d = p_WTo - p_WFrom,  u = d/x      force on From  +T u,  on To  -T u      T = dU/dx: tension     (1)
+//!         ∂(T u)/∂d = k u uᵀ + (T/x) (1 - u uᵀ)                                               k = dT/dx              (2)
+//! joint:  x = Σ c_i q_i + x_0                           generalised force  -c_i T                                    (3)
+//! ```
+//! Laws: [`BalancerLaw`]. As part of the mechanism: [`Balancer`]. All recursions over one number know them, those of
+//! [`crate::lanes`] do not. Not here: files, friction in a cylinder, heat.
+
+use std::collections::HashSet;
+
+use flexarm_spatial::{Pose, Twist, Wrench};
+use nalgebra::{Matrix3, Vector3};
+
+use crate::data::Data;
+use crate::kinematics::place_bodies;
+use crate::mechanism::Mechanism;
+use crate::model::{Body, Frame, JointMotion, Model, ModelError};
+
+/// A balancer of a mechanism, by the names of what it acts on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Balancer {
+    /// Unique name.
+    pub name: String,
+    /// Where it acts.
+    pub span: BalancerSpan,
+    /// How strong it is.
+    pub law: BalancerLaw,
+}
+
+/// Between what a balancer acts.
+#[derive(Clone, Debug, PartialEq)]
+pub enum BalancerSpan {
+    /// Along the line between the origins of two links; frames on fixed joints follow the part of a flexible link that
+    /// carries them.
+    Points {
+        /// Name of a link.
+        from: String,
+        /// Name of another one.
+        to: String,
+    },
+    /// Over a joint of one coordinate, between its two links: springs of the drive within the joint count.
+    Joint {
+        /// Name of the joint.
+        joint: String,
+        /// Name of the link that it moves.
+        child: String,
+    },
+}
+
+/// Tension over length: energy, force and rate of a balancer.
+///
+/// x is the length of a line (m) or the value of a joint (rad or m), T its tension (N): positive draws the ends together, or the
+/// joint to lower values (N m or N).
+#[derive(Clone, Debug, PartialEq)]
+pub enum BalancerLaw {
+    /// `T = preload + rate (x - free)`.
+    Linear {
+        /// (N/m, N m/rad or N/m).
+        rate: f64,
+        /// Length, angle or place at which it has its preload (m, rad or m).
+        free: f64,
+        /// (N or N m).
+        preload: f64,
+    },
+    /// A gas that is pressed together.
+    Gas(GasLaw),
+    /// `T = -amplitude sin(x - zero)`: what balances a weight on one joint.
+    Sine {
+        /// Largest torque (N m).
+        amplitude: f64,
+        /// Where there is none (rad).
+        zero: f64,
+    },
+    /// Through points.
+    Curve(BalancerCurve),
+}
+
+/// Gas under a piston, `p V^n` constant.
+///
+/// ```text
+/// pulls:   T =   force v^-n - opposing,     v = 1 - slope (x - at)      longer: less room for the gas
+/// pushes:  T = -(force v^-n - opposing),    v = 1 + slope (x - at)      longer: more room
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GasLaw {
+    /// Pressure times area of the piston at the length `at` (N).
+    pub force: f64,
+    /// What acts on the other side of the piston, as ambient pressure does (N).
+    pub opposing: f64,
+    /// Length at which the gas has that force (m).
+    pub at: f64,
+    /// Area of the piston over the volume of the gas at that length (1/m).
+    pub slope: f64,
+    /// n: 1 isothermal, 1.4 adiabatic for nitrogen.
+    pub exponent: f64,
+    /// Whether it pulls.
+    pub pulls: bool,
+}
+
+impl GasLaw {
+    /// Volume over that at `at`.
+    pub fn volume_ratio(&self, x: f64) -> f64 {
+        let stretch = self.slope * (x - self.at);
+        if self.pulls { 1.0 - stretch } else { 1.0 + stretch }
+    }
+
+    /// Length at which the gas has no room left (m); infinite (either sign) where its volume is without bounds.
+    pub fn end(&self) -> f64 {
+        let reach = if self.slope > 0.0 { 1.0 / self.slope } else { f64::INFINITY };
+        if self.pulls { self.at + reach } else { self.at - reach }
+    }
+
+    fn sign(&self) -> f64 {
+        if self.pulls { 1.0 } else { -1.0 }
+    }
+
+    /// `v^-n`, NaN where there is no room.
+    fn rise(&self, x: f64) -> f64 {
+        let v = self.volume_ratio(x);
+        if v > 0.0 { v.powf(-self.exponent) } else { f64::NAN }
+    }
+
+    fn energy(&self, x: f64) -> f64 {
+        let (way, n) = (self.sign() * (x - self.at), self.exponent);
+        if self.slope == 0.0 {
+            return (self.force - self.opposing) * way;
+        }
+        let v = self.volume_ratio(x);
+        let log = if v > 0.0 { v.ln() } else { f64::NAN };
+        // ∫ v^-n, without a pole at n = 1.
+        let work = if n == 1.0 { -log } else { ((1.0 - n) * log).exp_m1() / (n - 1.0) };
+        self.force / self.slope * work - self.opposing * way
+    }
+}
+
+impl BalancerLaw {
+    /// T at x (N, N m); NaN beyond the end of a gas.
+    pub fn tension(&self, x: f64) -> f64 {
+        match self {
+            Self::Linear { rate, free, preload } => preload + rate * (x - free),
+            Self::Gas(gas) => gas.sign() * (gas.force * gas.rise(x) - gas.opposing),
+            Self::Sine { amplitude, zero } => -amplitude * (x - zero).sin(),
+            Self::Curve(curve) => curve.at(x)[0],
+        }
+    }
+
+    /// dT/dx (N/m, N m/rad).
+    pub fn rate(&self, x: f64) -> f64 {
+        match self {
+            Self::Linear { rate, .. } => *rate,
+            Self::Gas(gas) => gas.force * gas.exponent * gas.slope * gas.rise(x) / gas.volume_ratio(x),
+            Self::Sine { amplitude, zero } => -amplitude * (x - zero).cos(),
+            Self::Curve(curve) => curve.at(x)[1],
+        }
+    }
+
+    /// U (J), the integral of T from a fixed place of the law.
+    pub fn energy(&self, x: f64) -> f64 {
+        match self {
+            Self::Linear { rate, free, preload } => (preload + 0.5 * rate * (x - free)) * (x - free),
+            Self::Gas(gas) => gas.energy(x),
+            // From the place where it balances: amplitude (cos - 1) without loss of digits.
+            Self::Sine { amplitude, zero } => -2.0 * amplitude * (0.5 * (x - zero)).sin().powi(2),
+            Self::Curve(curve) => curve.at(x)[2],
+        }
+    }
+
+    fn is_finite(&self) -> bool {
+        match self {
+            Self::Linear { rate, free, preload } => [rate, free, preload].iter().all(|x| x.is_finite()),
+            Self::Gas(gas) => {
+                [gas.force, gas.opposing, gas.at, gas.slope, gas.exponent].iter().all(|x| x.is_finite())
+                    && gas.slope >= 0.0
+            }
+            Self::Sine { amplitude, zero } => amplitude.is_finite() && zero.is_finite(),
+            Self::Curve(_) => true,
+        }
+    }
+}
+
+/// Tension through points: piecewise cubics with a continuous slope that never leave the range of their two points
+/// [Fritsch & Butland 1984]; beyond the first and the last point straight on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BalancerCurve {
+    x: Vec<f64>,
+    T: Vec<f64>,
+    slope: Vec<f64>,
+    /// Energy at the points from the first one on.
+    U: Vec<f64>,
+}
+
+/// Why points make no curve.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum BalancerCurveError {
+    /// Nothing to go through.
+    #[error("a curve needs at least two points, found {found}")]
+    TooFew {
+        /// How many there are.
+        found: usize,
+    },
+    /// NaN or infinite.
+    #[error("point {number} of the curve has the entry {value}, expected finite numbers")]
+    NotFinite {
+        /// Which, from 1.
+        number: usize,
+        /// The entry.
+        value: f64,
+    },
+    /// Not ascending.
+    #[error("after {before} comes {after}: the first numbers of the points must rise")]
+    Order {
+        /// First number of a point.
+        before: f64,
+        /// That of the next one.
+        after: f64,
+    },
+}
+
+impl BalancerCurve {
+    /// Through points (x, T).
+    ///
+    /// # Errors
+    /// [`BalancerCurveError`] for fewer than two points, entries that are no numbers, and x that do not rise.
+    pub fn new(points: &[[f64; 2]]) -> Result<Self, BalancerCurveError> {
+        if points.len() < 2 {
+            return Err(BalancerCurveError::TooFew { found: points.len() });
+        }
+        for (k, point) in points.iter().enumerate() {
+            if let Some(value) = point.iter().find(|x| !x.is_finite()) {
+                return Err(BalancerCurveError::NotFinite { number: k + 1, value: *value });
+            }
+        }
+        if let Some(pair) = points.windows(2).find(|pair| pair[1][0] <= pair[0][0]) {
+            return Err(BalancerCurveError::Order { before: pair[0][0], after: pair[1][0] });
+        }
+        let (x, T): (Vec<f64>, Vec<f64>) = points.iter().map(|p| (p[0], p[1])).unzip();
+        let slope = monotone_slopes(&x, &T);
+        let mut U = vec![0.0];
+        for k in 1..x.len() {
+            let h = x[k] - x[k - 1];
+            U.push(U[k - 1] + 0.5 * h * (T[k - 1] + T[k]) + h * h * (slope[k - 1] - slope[k]) / 12.0);
+        }
+        Ok(Self { x, T, slope, U })
+    }
+
+    /// First and last x.
+    pub fn range(&self) -> [f64; 2] {
+        [self.x[0], self.x[self.x.len() - 1]]
+    }
+
+    /// Tension, its slope and the energy from the first point on.
+    fn at(&self, x: f64) -> [f64; 3] {
+        let last = self.x.len() - 1;
+        let straight = |k: usize| {
+            let d = x - self.x[k];
+            [self.T[k] + self.slope[k] * d, self.slope[k], self.U[k] + (self.T[k] + 0.5 * self.slope[k] * d) * d]
+        };
+        let k = match self.x.partition_point(|p| *p <= x) {
+            0 => return straight(0),
+            k if k > last => return straight(last),
+            k => k - 1,
+        };
+        // T = T0 + m0 s + a s² + b s³
+        let (h, s) = (self.x[k + 1] - self.x[k], x - self.x[k]);
+        let (m0, m1, secant) = (self.slope[k], self.slope[k + 1], (self.T[k + 1] - self.T[k]) / h);
+        let a = (3.0 * secant - 2.0 * m0 - m1) / h;
+        let b = (m0 + m1 - 2.0 * secant) / (h * h);
+        [
+            self.T[k] + s * (m0 + s * (a + s * b)),
+            m0 + s * (2.0 * a + s * 3.0 * b),
+            self.U[k] + s * (self.T[k] + s * (0.5 * m0 + s * (a / 3.0 + s * 0.25 * b))),
+        ]
+    }
+}
+
+/// Slopes at the points: weighted harmonic means of the secants, zero at turning points [Fritsch & Butland 1984].
+fn monotone_slopes(x: &[f64], T: &[f64]) -> Vec<f64> {
+    let secants: Vec<f64> = (1..x.len()).map(|k| (T[k] - T[k - 1]) / (x[k] - x[k - 1])).collect();
+    let inner = |k: usize| {
+        let (a, b) = (secants[k - 1], secants[k]);
+        let (before, after) = (x[k] - x[k - 1], x[k + 1] - x[k]);
+        if a * b <= 0.0 {
+            return 0.0;
+        }
+        3.0 * (before + after) / ((2.0 * after + before) / a + (after + 2.0 * before) / b)
+    };
+    let last = x.len() - 1;
+    (0..=last)
+        .map(|k| match k {
+            0 => secants[0],
+            k if k == last => secants[last - 1],
+            k => inner(k),
+        })
+        .collect()
+}
+
+/// A balancer in its place on the tree.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlacedBalancer {
+    /// Its name.
+    pub name: String,
+    /// Its law.
+    pub law: BalancerLaw,
+    /// Where it acts.
+    pub place: BalancerPlace,
+}
+
+/// Where a balancer acts on the tree.
+#[derive(Clone, Debug, PartialEq)]
+pub enum BalancerPlace {
+    /// Between two points: body and point in body axes from Bo (m).
+    Points([(usize, Vector3<f64>); 2]),
+    /// Over a joint.
+    Joint {
+        /// c: coordinates and factors.
+        terms: Vec<(usize, f64)>,
+        /// `x_0` (rad or m).
+        offset: f64,
+        /// Body that carries the joint.
+        parent: usize,
+        /// First body behind the joint, in whose axes the axis is constant.
+        body: usize,
+        /// Last body behind the springs of its drive.
+        child: usize,
+        /// Twist per unit of x, in axes of `body`.
+        axis: Twist,
+    },
+}
+
+/// A line at a pose: (1) and (2).
+#[derive(Clone, Copy, Debug)]
+pub struct BalancerLine {
+    /// The two bodies.
+    pub bodies: [usize; 2],
+    /// The two points in their bodies (m).
+    pub p_B: [Vector3<f64>; 2],
+    /// The same in the world (m).
+    pub p_W: [Vector3<f64>; 2],
+    /// Distance (m).
+    pub length: f64,
+    /// Force on the first, world axes (N); the second has the opposite.
+    pub F_W: Vector3<f64>,
+    /// (2), N/m.
+    pub K_W: Matrix3<f64>,
+}
+
+impl BalancerLine {
+    fn new(law: &BalancerLaw, ends: &[(usize, Vector3<f64>); 2], X_WB: &[Pose]) -> Self {
+        let p_W = ends.map(|(body, p_B)| X_WB[body].rotation * p_B + X_WB[body].translation.vector);
+        let d = p_W[1] - p_W[0];
+        let length = d.norm();
+        let (T, k) = (law.tension(length), law.rate(length));
+        let bodies = ends.map(|(body, _)| body);
+        let p_B = ends.map(|(_, p_B)| p_B);
+        // A spring that is free at zero length has a force there too: none, whatever its direction.
+        if length == 0.0 && T == 0.0 {
+            return Self { bodies, p_B, p_W, length, F_W: Vector3::zeros(), K_W: Matrix3::from_diagonal_element(k) };
+        }
+        let (u, across) = (d / length, T / length);
+        let K_W = Matrix3::from_diagonal_element(across) + u * u.transpose() * (k - across);
+        Self { bodies, p_B, p_W, length, F_W: u * T, K_W }
+    }
+}
+
+impl PlacedBalancer {
+    /// The line at these poses of the bodies, of a balancer between points.
+    pub fn line(&self, X_WB: &[Pose]) -> Option<BalancerLine> {
+        match &self.place {
+            BalancerPlace::Points(ends) => Some(BalancerLine::new(&self.law, ends, X_WB)),
+            BalancerPlace::Joint { .. } => None,
+        }
+    }
+
+    /// Its length (m), or the value of its joint (rad or m), at these poses and coordinates.
+    pub fn length(&self, X_WB: &[Pose], q: &[f64]) -> f64 {
+        match &self.place {
+            BalancerPlace::Points(ends) => BalancerLine::new(&self.law, ends, X_WB).length,
+            BalancerPlace::Joint { terms, offset, .. } => terms.iter().fold(*offset, |x, (k, c)| x + c * q[*k]),
+        }
+    }
+
+    /// The wrenches that it puts on two bodies at their origins, in world axes, for a joint value or length `x`; over a joint whose
+    /// spring yields in six directions to first order in its deflection.
+    pub fn wrenches(&self, X_WB: &[Pose], x: f64) -> [(usize, Wrench); 2] {
+        let at_origin = |body: usize, p_W: &Vector3<f64>, F: Vector3<f64>| {
+            let arm = p_W - X_WB[body].translation.vector;
+            (body, Wrench::new(F, arm.cross(&F)))
+        };
+        match &self.place {
+            BalancerPlace::Points(ends) => {
+                let line = BalancerLine::new(&self.law, ends, X_WB);
+                [at_origin(line.bodies[0], &line.p_W[0], line.F_W), at_origin(line.bodies[1], &line.p_W[1], -line.F_W)]
+            }
+            BalancerPlace::Joint { parent, body, child, axis, .. } => {
+                let R = X_WB[*body].rotation;
+                let T = self.law.tension(x);
+                if axis.angular.norm_squared() > 0.0 {
+                    let moment = R * axis.angular * T;
+                    let of = |moment: Vector3<f64>| Wrench::new(Vector3::zeros(), moment);
+                    return [(*parent, of(moment)), (*child, of(-moment))];
+                }
+                let (force, p_W) = (R * axis.linear * T, X_WB[*child].translation.vector);
+                [at_origin(*parent, &p_W, force), at_origin(*child, &p_W, -force)]
+            }
+        }
+    }
+}
+
+/// Balancers of a mechanism on its bodies.
+///
+/// # Errors
+/// [`ModelError::Duplicate`], [`ModelError::UnknownLink`] and [`ModelError::BadBalancer`].
+pub(crate) fn place_balancers(
+    mechanism: &Mechanism,
+    frames: &[Frame],
+    bodies: &[Body],
+) -> Result<Vec<PlacedBalancer>, ModelError> {
+    let mut names = HashSet::new();
+    let mut placed = Vec::new();
+    for Balancer { name, span, law } in &mechanism.balancers {
+        if !names.insert(name) {
+            return Err(ModelError::Duplicate { what: "balancer", name: name.clone() });
+        }
+        if !law.is_finite() {
+            return Err(ModelError::NotFinite { what: "law of balancer", name: name.clone() });
+        }
+        let fail = |what: &'static str| ModelError::BadBalancer { balancer: name.clone(), what };
+        let frame =
+            |link: &String, what: &'static str| frames.iter().find(|f| f.name == *link).ok_or_else(|| fail(what));
+        let place = match span {
+            BalancerSpan::Points { from, to } => {
+                let ends = [frame(from, "the link at its first end")?, frame(to, "the link at its second end")?];
+                BalancerPlace::Points(ends.map(|f| (f.body, f.X_BF.translation.vector)))
+            }
+            BalancerSpan::Joint { joint, child } => {
+                let last = frame(child, "the link behind its joint")?.body;
+                over_joint(bodies, joint, last).ok_or_else(|| fail("its joint"))?
+            }
+        };
+        placed.push(PlacedBalancer { name: name.clone(), law: law.clone(), place });
+    }
+    Ok(placed)
+}
+
+/// The bodies from that of the child inward to that of the joint: each turns (or slides) by its share about the joint's axis.
+fn over_joint(bodies: &[Body], joint: &str, child: usize) -> Option<BalancerPlace> {
+    let first = bodies.iter().skip(1).position(|b| b.joint == joint)? + 1;
+    let JointMotion::Axis(motion) = bodies[first].motion else { return None };
+    let (axis, slides) = (motion.axis(), motion.slides());
+    let (mut terms, mut offset) = (Vec::new(), 0.0);
+    let mut i = child;
+    loop {
+        let body = &bodies[i];
+        match body.motion {
+            JointMotion::Axis(motion) => {
+                let share = motion.axis().dot(&axis);
+                terms.push((body.coordinate, share * body.ratio));
+                offset += share * body.offset;
+            }
+            JointMotion::Elastic(_) => {
+                let k = body.coordinate + if slides { 0 } else { 3 };
+                terms.extend(axis.iter().enumerate().map(|(c, share)| (k + c, *share)));
+            }
+            JointMotion::Welded | JointMotion::Interface { .. } => return None,
+        }
+        if i == first {
+            break;
+        }
+        i = body.parent;
+        if i < first {
+            return None;
+        }
+    }
+    terms.retain(|(_, c)| *c != 0.0);
+    Some(BalancerPlace::Joint {
+        terms,
+        offset,
+        parent: bodies[first].parent,
+        body: first,
+        child,
+        axis: motion.twist(1.0),
+    })
+}
+
+/// Lengths and joint values at the poses in `data.X_WB`, for the energy.
+pub(crate) fn measure(model: &Model, data: &mut Data, q: &[f64]) {
+    for (x, balancer) in data.balanced.iter_mut().zip(&model.balancers) {
+        *x = balancer.length(&data.X_WB, q);
+    }
+}
+
+/// Energy of all balancers (J) where they were measured.
+pub(crate) fn energy(model: &Model, data: &Data) -> f64 {
+    model.balancers.iter().zip(&data.balanced).map(|(balancer, x)| balancer.law.energy(*x)).sum()
+}
+
+/// A recursion with the balancers' lines among the external wrenches, which are the caller's again afterwards.
+pub(crate) fn with_lines(model: &Model, data: &mut Data, q: &[f64], run: impl FnOnce(&mut Data)) {
+    place_bodies(model, data, q);
+    measure(model, data, q);
+    data.F_held.copy_from_slice(&data.F_ext);
+    for balancer in &model.balancers {
+        let Some(line) = balancer.line(&data.X_WB) else { continue };
+        for (end, F_W) in [line.F_W, -line.F_W].into_iter().enumerate() {
+            let body = line.bodies[end];
+            let F_B = data.X_WB[body].rotation.inverse() * F_W;
+            data.F_ext[body] += Wrench::new(F_B, line.p_B[end].cross(&F_B));
+        }
+    }
+    run(data);
+    data.F_ext.copy_from_slice(&data.F_held);
+}
+
+/// `τ += factor c T`, (3): with 1 what holds the joints against their balancers.
+pub(crate) fn add_joint_torques(model: &Model, data: &mut Data, factor: f64) {
+    for (balancer, x) in model.balancers.iter().zip(&data.balanced) {
+        if let BalancerPlace::Joint { terms, .. } = &balancer.place {
+            let T = factor * balancer.law.tension(*x);
+            for (k, c) in terms {
+                data.tau[*k] += c * T;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn laws() -> Vec<(BalancerLaw, Vec<f64>)> {
+        let gas = |pulls, exponent, slope| {
+            BalancerLaw::Gas(GasLaw { force: 27e3, opposing: 170.0, at: 0.6, slope, exponent, pulls })
+        };
+        let points = [[-1.0, 30.0], [-0.2, 80.0], [0.1, 80.0], [0.5, -20.0], [1.5, -60.0]];
+        vec![
+            (BalancerLaw::Linear { rate: 4e4, free: 0.5, preload: 700.0 }, vec![0.2, 0.5, 0.9]),
+            (gas(true, 1.0, 1.7), vec![0.5, 0.6, 0.9]),
+            (gas(true, 1.4, 1.7), vec![0.5, 0.6, 0.9]),
+            (gas(false, 1.3, 1.7), vec![0.3, 0.6, 0.9]),
+            (gas(false, 1.0, 0.0), vec![0.3, 0.6, 0.9]),
+            (BalancerLaw::Sine { amplitude: 9e3, zero: -1.4 }, vec![-2.0, -1.4, 0.3]),
+            (BalancerLaw::Curve(BalancerCurve::new(&points).unwrap()), vec![-1.5, -0.6, 0.0, 0.3, 1.1, 2.0]),
+        ]
+    }
+
+    /// T = dU/dx and k = dT/dx by central differences of every law; measured below 5e-9 relative.
+    #[test]
+    fn tension_and_rate_are_the_derivatives_of_the_energy() {
+        let h = 1e-5;
+        for (law, places) in laws() {
+            for x in places {
+                let T = (law.energy(x + h) - law.energy(x - h)) / (2.0 * h);
+                let k = (law.tension(x + h) - law.tension(x - h)) / (2.0 * h);
+                assert!((T - law.tension(x)).abs() < 1e-7 * (1.0 + T.abs()), "{law:?} at {x}: {T}");
+                assert!((k - law.rate(x)).abs() < 1e-6 * (1.0 + k.abs()), "{law:?} at {x}: {k}");
+            }
+        }
+    }
+
+    /// Truth: Boyle's law, p V constant, and Poisson's, p V^n constant.
+    #[test]
+    fn a_gas_at_half_its_volume_presses_twice_as_hard_and_more_if_it_cannot_cool() {
+        let at_half = |exponent| {
+            let gas = GasLaw { force: 1000.0, opposing: 0.0, at: 0.5, slope: 2.0, exponent, pulls: false };
+            BalancerLaw::Gas(gas).tension(0.25)
+        };
+        assert!((at_half(1.0) + 2000.0).abs() < 1e-9);
+        assert!((at_half(1.4) + 1000.0 * 2f64.powf(1.4)).abs() < 1e-9);
+        let gas = GasLaw { force: 1.0, opposing: 0.0, at: 0.5, slope: 2.0, exponent: 1.0, pulls: true };
+        assert_eq!(gas.end(), 1.0);
+        assert!(BalancerLaw::Gas(gas).tension(1.01).is_nan());
+    }
+
+    #[test]
+    fn a_curve_goes_through_its_points_and_does_not_overshoot_them() {
+        let points = [[0.0, 0.0], [1.0, 0.0], [2.0, 10.0], [3.0, 10.0]];
+        let curve = BalancerCurve::new(&points).unwrap();
+        for [x, T] in points {
+            assert!((curve.at(x)[0] - T).abs() < 1e-12);
+        }
+        assert!((0..=300).all(|k| (-1e-12..=10.0 + 1e-12).contains(&curve.at(f64::from(k) * 0.01)[0])));
+        assert!(matches!(BalancerCurve::new(&points[..1]), Err(BalancerCurveError::TooFew { found: 1 })));
+        assert!(matches!(BalancerCurve::new(&[[1.0, 0.0], [1.0, 2.0]]), Err(BalancerCurveError::Order { .. })));
+        assert!(matches!(
+            BalancerCurve::new(&[[1.0, f64::NAN], [2.0, 2.0]]),
+            Err(BalancerCurveError::NotFinite { .. })
+        ));
+    }
+}

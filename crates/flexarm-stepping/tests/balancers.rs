@@ -1,0 +1,211 @@
+//! Balancers in motion: every stepper against the others, statics, modes and lanes, the energy that they store.
+#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
+#![allow(non_snake_case, reason = "monogram notation")]
+#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
+
+use std::sync::Arc;
+
+use flexarm_kinematics::{
+    Balancer, BalancerLaw, BalancerSpan, GasLaw, Joint, JointKind, Link, LinkInertia, Mechanism, Model, Pose, Wrench,
+};
+use flexarm_stepping::*;
+use flexarm_testkit::{reference_arm, reference_motion};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+
+const POSE: [f64; 6] = [0.4, 0.5, -0.3, 0.7, 0.6, -1.2];
+
+/// The reference arm with a gas cylinder from the column to the far part of its lower arm, and torques over two joints.
+fn balanced() -> Mechanism {
+    let mut tree = reference_arm(true).mechanism;
+    for (link, frame, place) in
+        [("link1", "anchor", Pose::translation(-0.3, 0.1, 0.2)), ("link2b", "eye", Pose::translation(-0.1, 0.05, 0.2))]
+    {
+        tree.joints.push(Joint::new(format!("fix_{frame}"), JointKind::Fixed, link, frame, place));
+        tree.links.push(Link { name: frame.into(), inertia: None });
+    }
+    let cylinder = GasLaw { force: 9e3, opposing: 50.0, at: 1.0, slope: 0.8, exponent: 1.3, pulls: true };
+    let mut add = |name: &str, span, law| tree.balancers.push(Balancer { name: name.into(), span, law });
+    add("cylinder", BalancerSpan::Points { from: "anchor".into(), to: "eye".into() }, BalancerLaw::Gas(cylinder));
+    let over = |joint: &str, child: &str| BalancerSpan::Joint { joint: joint.into(), child: child.into() };
+    let torsion = BalancerLaw::Linear { rate: 900.0, free: 0.2, preload: 150.0 };
+    add("torsion", over("joint3", "link3"), torsion);
+    add("sine", over("joint2", "link2"), BalancerLaw::Sine { amplitude: 700.0, zero: -0.3 });
+    tree
+}
+
+fn arm_of(tree: &Mechanism, motion: Arc<dyn PrescribedMotion>, beta: f64) -> FlexibleArm {
+    let springs = reference_arm(true).K_S.map(|K| ("spring".to_owned(), K, Damping::StiffnessProportional(beta)));
+    FlexibleArm::new(Arc::new(Model::new(tree).unwrap()), springs.to_vec(), motion).unwrap()
+}
+
+fn moving() -> Arc<dyn PrescribedMotion> {
+    Arc::new(MotionFn(|t: f64, q: &mut [f64], v: &mut [f64], a: &mut [f64]| {
+        let (x, y, z) = reference_motion(t);
+        q.copy_from_slice(&x);
+        v.copy_from_slice(&y);
+        a.copy_from_slice(&z);
+    }))
+}
+
+/// Place of the TCP at the end of a run.
+fn end(arm: &FlexibleArm, kind: StepperKind, h: f64, start: Start, duration: f64) -> Vector3<f64> {
+    end_of(arm, kind, h, start, duration).0
+}
+
+/// The same, the energy of weight and balancers there (J), and what the drives hold (N m).
+fn end_of(
+    arm: &FlexibleArm,
+    kind: StepperKind,
+    h: f64,
+    start: Start,
+    duration: f64,
+) -> (Vector3<f64>, f64, DVector<f64>) {
+    let tcp = arm.model.frame("tcp").unwrap().clone();
+    let mut seen = Observation::new(arm);
+    let mut stepper = new_stepper(kind, arm.clone(), h, start).unwrap();
+    (0..(duration / h).round() as usize).for_each(|_| stepper.step().unwrap());
+    stepper.observe(&mut seen);
+    ((seen.X_WB[tcp.body] * tcp.X_BF).translation.vector, seen.energy[1], seen.drive)
+}
+
+fn of(word: &str) -> StepperKind {
+    let entry = STEPPERS.into_iter().find(|entry| entry.name == word).unwrap();
+    (entry.with)(&StepperOptions::default())
+}
+
+/// Truth: Newton's statics with the balancers in forces and tangent. Maximal coordinates know bodies and wrenches only, so SPOOK finds the same
+/// rest by another way; drift measured 9e-11 of what the balancers do to the sag.
+#[test]
+fn an_arm_with_balancers_rests_where_statics_say_in_every_stepper() {
+    let held: Arc<dyn PrescribedMotion> = Arc::new(Held(POSE.to_vec()));
+    let arm = arm_of(&balanced(), held.clone(), 1e-3);
+    let bare = arm_of(&reference_arm(true).mechanism, held, 1e-3);
+    let at = |arm: &FlexibleArm| end(arm, StepperKind::default(), 1e-3, Start::Equilibrium, 0.0);
+    let (rest, share) = (at(&arm), (at(&arm) - at(&bare)).norm());
+    let (_, stored, held) = end_of(&arm, StepperKind::default(), 1e-3, Start::Equilibrium, 0.0);
+    assert!(share > 1e-4, "{share}");
+    for entry in STEPPERS.into_iter().filter(|entry| entry.steps != StepRule::UpToTheStabilityLimit) {
+        for h in [1e-4, 1e-3] {
+            let (end, energy, drives) = end_of(&arm, of(entry.name), h, Start::Equilibrium, 0.02);
+            let drift = (end - rest).norm() / share;
+            assert!((energy - stored).abs() < 1e-6, "{}: {energy} J, {stored} J", entry.name);
+            // measured 1e-8 N m of 3 kN m
+            assert!((&drives - &held).amax() < 1e-5 * held.amax(), "{}: {drives} {held}", entry.name);
+            eprintln!("{} h {h:.0e}: {drift:.1e} of the balancers' share", entry.name);
+            assert!(drift < 1e-7, "{} {drift:e}", entry.name);
+        }
+    }
+}
+
+/// Truth: the reference stepper on the same equations, and for SPOOK its first order. Differences over what the balancers change (2.8 mm):
+/// measured generalised-alpha and SDIRK3 below 1e-6, RK4 1.0e-7, SPOOK 2.9e-4 at 0.2 ms and 1.1e-4 at 0.1 ms.
+#[test]
+fn steppers_agree_on_an_arm_that_moves_with_balancers() {
+    let arm = arm_of(&balanced(), moving(), 1e-3);
+    let bare = arm_of(&reference_arm(true).mechanism, moving(), 1e-3);
+    let run = |arm: &FlexibleArm, word: &str, h: f64| end(arm, of(word), h, Start::Equilibrium, 0.8);
+    let truth = run(&arm, "reference", 1e-3);
+    let share = (truth - run(&bare, "reference", 1e-3)).norm();
+    assert!(share > 1e-4, "{share}");
+    let off = |word: &str, h: f64| {
+        let off = (run(&arm, word, h) - truth).norm() / share;
+        eprintln!("{word} h {h:.0e}: {off:.1e} of what the balancers change ({share:.1e} m)");
+        off
+    };
+    assert!(off("generalized-alpha", 5e-4) < 1e-5);
+    assert!(off("sdirk3", 5e-4) < 1e-5);
+    assert!(off("rk4", 1.25e-4) < 1e-5);
+    let spook = [2e-4, 1e-4].map(|h| off("spook", h));
+    assert!(spook[0] < 5e-3 && spook[1] < 0.6 * spook[0], "{spook:?}");
+}
+
+/// Truth: without damping and with drives that stand still the energy of springs, weight and balancers stays; RK4 at 25 us, measured 5e-7 of
+/// what swings between them.
+#[test]
+fn a_ringing_arm_keeps_its_energy_with_balancers_in_it() {
+    let arm = arm_of(&balanced(), Arc::new(Held(POSE.to_vec())), 1e-12);
+    let mut stepper = new_stepper(of("rk4"), arm.clone(), 2.5e-5, Start::Undeformed).unwrap();
+    let mut seen = Observation::new(&arm);
+    let (mut totals, mut kinetic) = (Vec::new(), 0.0f64);
+    for _ in 0..8000 {
+        stepper.observe(&mut seen);
+        totals.push(seen.energy.iter().sum::<f64>());
+        kinetic = kinetic.max(seen.energy[0]);
+        stepper.step().unwrap();
+    }
+    let gap = totals.iter().map(|e| (e - totals[0]).abs()).fold(0.0, f64::max);
+    eprintln!("energy open by {gap:.1e} J of {kinetic:.2e} J");
+    assert!(gap < 1e-5 * kinetic, "{gap} {kinetic}");
+}
+
+/// Truth: omega² = (k_s + c D k - m g l)/(m l²) of a rod that stands on a soft spring, held by a spring without free length above it.
+#[test]
+fn a_balancer_raises_the_frequency_as_the_closed_form_says() {
+    let (m, l, soft, D, k, rate) = (5.0, 0.6, 40.0, 0.9, 0.4, 300.0);
+    let mut tree = Mechanism::new("rod");
+    for name in ["base", "rod", "anchor", "eye"] {
+        tree.links.push(Link { name: name.into(), inertia: None });
+    }
+    let com = Vector3::new(0.0, 0.0, l);
+    tree.links[1].inertia = Some(LinkInertia { mass: m, com, inertia_com: Matrix3::zeros() });
+    let hinge = JointKind::ElasticRevolute(Vector3::y_axis());
+    tree.joints.push(Joint::new("hinge", hinge, "base", "rod", Pose::identity()));
+    tree.joints.push(Joint::new("a", JointKind::Fixed, "base", "anchor", Pose::translation(0.0, 0.0, D)));
+    tree.joints.push(Joint::new("b", JointKind::Fixed, "rod", "eye", Pose::translation(0.0, 0.0, k)));
+    let span = BalancerSpan::Points { from: "anchor".into(), to: "eye".into() };
+    let law = BalancerLaw::Linear { rate, free: 0.0, preload: 0.0 };
+    tree.balancers.push(Balancer { name: "spring".into(), span, law });
+    let K = DMatrix::from_element(1, 1, soft);
+    let damping = Damping::StiffnessProportional(0.0);
+    let spring = Spring { name: "hinge".into(), K, damping, curve: None, geometric: None };
+    let arm = FlexibleArm::new(Arc::new(Model::new(&tree).unwrap()), vec![spring], Arc::new(Held(vec![]))).unwrap();
+    let truth = ((soft + rate * D * k - m * 9.81 * l) / (m * l * l)).sqrt();
+    // measured 1e-16
+    assert!((arm.modes.omega[0] / truth - 1.0).abs() < 1e-12, "{} {truth}", arm.modes.omega[0]);
+}
+
+/// Truth: central differences of the equilibria under small forces at the tool; measured 3e-8.
+#[test]
+fn compliance_has_the_stiffness_of_the_balancers_in_it() {
+    let arm = arm_of(&balanced(), Arc::new(Held(POSE.to_vec())), 1e-3);
+    let tool = arm.model.frame("tcp").unwrap().clone();
+    let mut at = OperatingPoint::new(arm, tool);
+    at.solve(&POSE, &Wrench::zeros()).unwrap();
+    let C = at.compliance();
+    for c in 0..3 {
+        let mut moved = |sign: f64| {
+            let F = Wrench::new(Vector3::ith(c, sign * 50.0), Vector3::zeros());
+            at.solve(&POSE, &F).unwrap();
+            at.tcp_pose().translation.vector
+        };
+        let slope = (moved(1.0) - moved(-1.0)) / 100.0;
+        let column: Vector3<f64> = C.fixed_view::<3, 1>(0, c).into();
+        assert!((slope - column).norm() < 1e-6 * column.norm(), "{:e}", (slope - column).norm() / column.norm());
+    }
+}
+
+/// Lanes do not know balancers: such runs are taken one by one, to the bit as alone.
+#[test]
+fn runs_with_balancers_side_by_side_are_those_alone() {
+    let runs: Vec<BatchRun> = [1e-3, 2e-3]
+        .map(|beta| BatchRun { arm: arm_of(&balanced(), moving(), beta), duration_s: 0.1 })
+        .into_iter()
+        .collect();
+    let batch = Batch {
+        step_s: 1e-3,
+        stepper: StepperKind::default(),
+        start: Start::Equilibrium,
+        tool: runs[0].arm.model.frame("tcp").unwrap().clone(),
+        keep_samples: true,
+    };
+    let bare = BatchRun { arm: arm_of(&reference_arm(true).mechanism, moving(), 1e-3), duration_s: 0.1 };
+    let together: Vec<ToolDeflection> = batch.run(&runs).into_iter().map(Result::unwrap).collect();
+    for (run, together) in runs.iter().zip(&together) {
+        let alone = batch.run_alone(run).unwrap();
+        assert_eq!(alone.samples_m, together.samples_m);
+        assert!(alone.samples_m.len() > 50);
+    }
+    let without = batch.run_alone(&bare).unwrap();
+    let share = (Vector3::from(without.samples_m[0]) - Vector3::from(together[0].samples_m[0])).norm();
+    assert!(share > 1e-4, "{share}");
+}

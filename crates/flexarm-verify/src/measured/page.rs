@@ -1,0 +1,225 @@
+//! The page of the case.
+
+use flexarm_draw::{CurveLook, Panel, PlotCurve};
+
+use super::frequencies::{Frequencies, SEEN_HZ, WRIST};
+use super::gears::{COMPARED_HZ, Gears, LATE_S, SHOWN};
+use super::recording::{AXES, EDGE_S, RUNS, SMOOTH_HZ, STEP_S, WITH_ENCODER};
+use super::servo::Servos;
+use super::torques::{Torques, VARIANTS};
+use super::{Findings, ROBOT};
+use crate::bench::Worst;
+use crate::page::{Bound, Case, Figure, Table, digits, fixed, listed, percent, plain, word};
+
+/// What a good rigid model leaves of the torques of axes 1 to 3 on the two runs that it was not fitted to.
+const TORQUE_BOUNDS: [f64; WITH_ENCODER] = [0.11, 0.045, 0.031];
+/// What a spring of constant stiffness leaves of the deflection of axes 2 and 3 (rad).
+const DEFLECTION_BOUND: f64 = 40e-6;
+/// What a rigid gear leaves of them at least (rad).
+const RIGID_GEAR: [f64; 2] = [80e-6, 100e-6];
+/// Frequencies are rounded to 0.01 Hz in the truth.
+const FREQUENCY_BOUND: f64 = 2e-3;
+
+pub(super) fn page(found: &Findings) -> Case {
+    let mut case = Case::new("measured", "6. A measured robot");
+    case.text(format!(
+        "A KUKA KR 300 R2500 ultra SE with a load of 151 kg, recorded at TU Kaiserslautern in October 2020 (Weigand, Ulmen, Janot, Ruskowski; \
+         github.com/JonasWeigand/Robot_Identification, MIT licence): {RUNS} runs of 10 s with motor positions, link encoders behind the gears of axes 1 to {WITH_ENCODER}, and motor torques, every {} ms \
+         (`tests/verification/kr300`). Parameters are the authors', none fitted here but friction; stiffness of two gears was fitted to the link encoders of the same runs: `{ROBOT}` and the README beside it.",
+        plain(1e3 * STEP_S)
+    ));
+    torques(&mut case, &found.torques);
+    gears(&mut case, &found.gears);
+    servos(&mut case, &found.servos);
+    frequencies(&mut case, &found.frequencies);
+    case
+}
+
+fn torques(case: &mut Case, found: &Torques) {
+    case.heading("Torques of the motors");
+    case.text(format!(
+        "Inverse dynamics of the rigid arm (links, load, rotors times ratio squared, hydraulic counterbalance) along the recorded motor positions against the recorded torques, both smoothed at {} Hz without phase, {} s left out at both ends, \
+         samples in which the axis is faster than 1 deg/s. Friction (offset, viscous, Coulomb) is fitted to run 1 alone; runs 2 and 3 are unseen.",
+        plain(SMOOTH_HZ),
+        plain(EDGE_S)
+    ));
+    let mut table = Table::new("RMS of measured minus computed over RMS of the torque [%].", &["model", "run"]);
+    table.columns.extend((1..=AXES).map(|k| format!("A{k}")));
+    for ((what, _), runs) in VARIANTS.iter().zip(&found.errors) {
+        for (run, errors) in runs.iter().enumerate() {
+            let cells = [word(*what), word((run + 1).to_string())].into_iter();
+            table.rows.push(cells.chain(errors.iter().map(|e| fixed(100.0 * e, 1))).collect());
+        }
+    }
+    case.table(table);
+    let worst_unseen = |variant: usize, axis: usize| found.errors[variant].iter().skip(1).map(|run| run[axis]).worst();
+    for (axis, bound) in TORQUE_BOUNDS.into_iter().enumerate() {
+        let text = format!("torque of axis {} in the unseen runs", axis + 1);
+        case.claim(text, "recorded motor torques", worst_unseen(0, axis), Bound::AtMost(bound));
+    }
+    let seen =
+        |variant: usize, axis: usize| found.errors[variant].iter().map(|run| run[axis]).fold(f64::INFINITY, f64::min);
+    case.claim(
+        "the same of axis 2 without the counterbalance",
+        "recorded motor torques",
+        seen(1, 1),
+        Bound::AtLeast(0.3),
+    );
+    case.claim("the same of axis 1 without the rotors", "recorded motor torques", seen(2, 0), Bound::AtLeast(0.2));
+    let mut table = Table::new(
+        "Friction of run 1, on the joint's side.",
+        &["axis", "offset [N m]", "viscous [N m s/rad]", "Coulomb [N m]"],
+    );
+    for (axis, friction) in found.friction.iter().enumerate() {
+        let cells = friction.iter().map(|x| fixed(*x, 0));
+        table.rows.push([word(format!("A{}", axis + 1))].into_iter().chain(cells).collect());
+    }
+    case.table(table);
+    case.text("What is left of axis 1 looks like inertia that is missing: the source gives the load none of its own. The wrist's axes have friction that no run tells from another.");
+    case.figure(torque_figure(found));
+}
+
+fn torque_figure(found: &Torques) -> Figure {
+    let shown = &found.shown;
+    let panels = shown.measured.iter().zip(&shown.computed).enumerate().map(|(axis, (measured, computed))| {
+        let curve = |name: &str, look, y: &[f64]| PlotCurve {
+            name: name.into(),
+            look,
+            x: thinned(&shown.time_s),
+            y: thinned(y).iter().map(|tau| 1e-3 * tau).collect(),
+        };
+        let curves = vec![curve("measured", CurveLook::Total, measured), curve("computed", CurveLook::Plain, computed)];
+        Panel { label: format!("torque on joint {} [kN m]", axis + 1), logarithmic: false, legend: true, curves }
+    });
+    Figure {
+        name: "measured-torques".into(),
+        caption: "Run 3, unseen: torques on joints 1 to 3, measured and computed".into(),
+        x_label: "time [s]".into(),
+        logarithmic_x: false,
+        panels: panels.collect(),
+    }
+}
+
+/// Every third sample: curves of some hundred points.
+fn thinned(x: &[f64]) -> Vec<f64> {
+    x.iter().step_by(3).copied().collect()
+}
+
+fn gears(case: &mut Case, found: &Gears) {
+    case.heading("Deflection of the gears");
+    let stiffness = |axis: usize| digits(1e-6 * found.stiffness[axis], 3).print();
+    case.text(format!(
+        "A run with elastic gears, motors along the recorded positions, against motor minus link encoder (the encoder is {} ms late, which is taken off), up to {} Hz, all runs. Springs of {} MN m/rad (axis 2) and {} MN m/rad (axis 3). \
+         Free are the zero of each run and, in the last two columns, what the encoder does by itself: its ripple and one term of eccentricity per turn. Axis 1 carries no weight: its gear gives way less than its encoder errs, \
+         which is why its stiffness cannot be found here.",
+        plain(1e3 * LATE_S),
+        plain(COMPARED_HZ),
+        stiffness(1),
+        stiffness(2)
+    ));
+    let mut table = Table::new(
+        "RMS of what is left of the measured deflection [µrad].",
+        &["axis", "rigid gear", "elastic gear", "and ripple", "and eccentricity"],
+    );
+    for (axis, rest) in found.rests.iter().enumerate() {
+        let cells = [rest.rigid, rest.spring, rest.ripple, rest.eccentricity].map(|x| fixed(1e6 * x, 0));
+        table.rows.push([word(format!("A{}", axis + 1))].into_iter().chain(cells).collect());
+    }
+    case.table(table);
+    for (axis, rigid) in [1, 2].into_iter().zip(RIGID_GEAR) {
+        let rest = found.rests[axis];
+        let name = axis + 1;
+        let truth = "motor minus link encoder";
+        case.claim(
+            format!("deflection of gear {name}, RMS of the rest [rad]"),
+            truth,
+            rest.eccentricity,
+            Bound::AtMost(DEFLECTION_BOUND),
+        );
+        case.claim(format!("the same with a rigid gear {name} [rad]"), truth, rest.rigid, Bound::AtLeast(rigid));
+    }
+    case.figure(gear_figure(found));
+}
+
+fn gear_figure(found: &Gears) -> Figure {
+    let panels = [1, 2].map(|axis| {
+        let curve = |name: &str, look, y: &[f64]| PlotCurve {
+            name: name.into(),
+            look,
+            x: thinned(&found.time_s),
+            y: thinned(y).iter().map(|e| 1e6 * e).collect(),
+        };
+        let curves = vec![
+            curve("measured, encoder errors taken off", CurveLook::Total, &found.measured[axis]),
+            curve("simulated", CurveLook::Plain, &found.simulated[axis]),
+        ];
+        Panel { label: format!("gear {} [µrad]", axis + 1), logarithmic: false, legend: true, curves }
+    });
+    Figure {
+        name: "measured-gears".into(),
+        caption: format!("Run {SHOWN}: motor minus link of axes 2 and 3, measured and simulated, without their means"),
+        x_label: "time [s]".into(),
+        logarithmic_x: false,
+        panels: panels.into(),
+    }
+}
+
+fn servos(case: &mut Case, found: &Servos) {
+    case.heading("Servos");
+    case.text(
+        "All axes by torque under servos along the reference of run 1, with the default gains of robot files: what the source says of its gains has no documented units, and its controller closes axes 1 to 3 on the link encoder. \
+         Orders of magnitude, no more.",
+    );
+    let mut table =
+        Table::new("RMS of reference minus position (links of axes 1 to 3, motors of 4 to 6) [deg].", &["what"]);
+    table.columns.extend((1..=AXES).map(|k| format!("A{k}")));
+    let rows = [
+        ("measured", &found.measured),
+        ("simulated, torques of the rigid robot fed forward", &found.fed_forward),
+        ("simulated, nothing fed forward", &found.alone),
+    ];
+    for (what, tracking) in rows {
+        let cells = tracking.iter().map(|x| digits(x.to_degrees(), 2));
+        table.rows.push([word(what)].into_iter().chain(cells).collect());
+    }
+    case.table(table);
+    let worst = (0..WITH_ENCODER).map(|axis| found.alone[axis] / found.measured[axis]).worst();
+    case.claim(
+        "tracking error of axes 1 to 3 under servos over the measured one",
+        "recorded link encoders, run 1",
+        worst,
+        Bound::AtMost(1.0),
+    );
+    case.text(
+        "Simulated axes follow more closely than the real ones: no delay of communication, no current loop and no stiction are in the model. The recorded wrist runs ahead of its reference: the friction that the controller fed forward \
+         there (454, 1000 and 459 N m s/rad in the source) is more than axes 4 to 6 have (table above).",
+    );
+}
+
+fn frequencies(case: &mut Case, found: &Frequencies) {
+    case.heading("What the gears do not explain");
+    let mut table = Table::new("First frequencies with held motors [Hz].", &["springs", "home pose", "5 s into run 1"]);
+    for set in &found.sets {
+        let hz = |k: usize| listed(&set.hz[k].iter().map(|hz| digits(*hz, 3).print()).collect::<Vec<_>>());
+        table.rows.push(vec![word(&set.what), word(hz(0)), word(hz(1))]);
+    }
+    case.table(table);
+    case.claim(
+        "frequencies of the gears of the source",
+        "mass matrix of Pinocchio, rounded to 0.01 Hz",
+        found.error,
+        Bound::AtMost(FREQUENCY_BOUND),
+    );
+    let with_wrist = found.sets.last().map_or(f64::NAN, |set| set.hz[1][0]);
+    let gears = found.sets.get(1).map_or(f64::NAN, |set| set.hz[1][0]);
+    let [low, high] = SEEN_HZ;
+    case.text(format!(
+        "While axis 1 moves, the recordings show a vibration of {} to {} Hz in which the link encoder moves five times as far as the motor, in phase. The gears alone have {} Hz at that pose; wrist gears of the class (`{WRIST}`) take \
+         it down to {} Hz, {} % of the way. What else gives way (links, bearings, pedestal, mounting of the load) is not in this model, and nothing in the recordings tells one from another.",
+        plain(low),
+        plain(high),
+        digits(gears, 3).print(),
+        digits(with_wrist, 3).print(),
+        percent((gears - with_wrist) / (gears - 0.5 * (low + high)), 0)
+    ));
+}

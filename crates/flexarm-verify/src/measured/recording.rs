@@ -1,0 +1,139 @@
+//! The three recorded runs, smoothed as they are compared.
+
+use flexarm::Robot;
+use flexarm_fe_io::unpack_gzip;
+
+use super::signal::{LowPass, derivative};
+use crate::Error;
+use crate::bench::Bench;
+
+/// Axes of the robot, and those with an encoder behind the gear.
+pub(super) const AXES: usize = 6;
+pub(super) const WITH_ENCODER: usize = 3;
+/// Runs.
+pub(super) const RUNS: usize = 3;
+/// Time between samples (s).
+pub(super) const STEP_S: f64 = 0.004;
+/// Positions and torques are smoothed from here on (Hz).
+pub(super) const SMOOTH_HZ: f64 = 10.0;
+/// What is left out at the start and the end (s): what smoothing does to the ends.
+pub(super) const EDGE_S: f64 = 0.4;
+/// Axes that are slower count as at rest (rad/s): a degree a second.
+pub(super) const MOVING: f64 = std::f64::consts::PI / 180.0;
+
+/// One run. One vector per axis, one entry per sample.
+pub(super) struct Recording {
+    pub(super) time_s: Vec<f64>,
+    pub(super) reference: Vec<Vec<f64>>,
+    /// Motor over its ratio (rad).
+    pub(super) motor: Vec<Vec<f64>>,
+    /// Behind the gear, axes 1 to 3 (rad).
+    pub(super) link: Vec<Vec<f64>>,
+    /// Motor positions without what is faster than [`SMOOTH_HZ`], their speed and acceleration (rad, s).
+    pub(super) q: Vec<Vec<f64>>,
+    pub(super) v: Vec<Vec<f64>>,
+    pub(super) a: Vec<Vec<f64>>,
+    /// Torques on the joint's side likewise (N m).
+    pub(super) smooth_torque: Vec<Vec<f64>>,
+}
+
+/// Where a recording is, from the root.
+pub(super) fn path(number: usize) -> String {
+    format!("tests/verification/kr300/kr300_run_{number}.csv.gz")
+}
+
+impl Recording {
+    pub(super) fn new(bench: &Bench, robot: &Robot, number: usize) -> Result<Self, Error> {
+        let path = bench.file(&path(number));
+        let fail = |what: String| Error::from(flexarm::Error::File { path: path.clone(), what });
+        let packed = std::fs::read(&path).map_err(|e| fail(format!("the recording cannot be read: {e}")))?;
+        let bytes = unpack_gzip(&packed).map_err(fail)?;
+        let text = String::from_utf8(bytes).map_err(|e| fail(format!("is no text: {e}")))?;
+        let table = Table::new(&text).map_err(fail)?;
+        let all = |name: fn(usize) -> String, count: usize| -> Result<Vec<Vec<f64>>, Error> {
+            (1..=count).map(|axis| table.column(&name(axis)).map_err(fail)).collect()
+        };
+        let motor = all(|k| format!("q_motor_{k}_rad"), AXES)?;
+        let low = LowPass::new(SMOOTH_HZ, 1.0 / STEP_S);
+        let ratio = |axis: usize| robot.drives.get(axis).map_or(f64::NAN, |drive| drive.ratio);
+        let mut torque = all(|k| format!("tau_motor_{k}_N_m"), AXES)?;
+        for (axis, torque) in torque.iter_mut().enumerate() {
+            torque.iter_mut().for_each(|torque| *torque *= ratio(axis));
+        }
+        let smooth = |all: &[Vec<f64>]| all.iter().map(|x| low.of(x)).collect::<Vec<_>>();
+        let slopes = |all: &[Vec<f64>]| all.iter().map(|x| derivative(x, STEP_S)).collect::<Vec<_>>();
+        let q = smooth(&motor);
+        let v = slopes(&q);
+        Ok(Self {
+            time_s: table.column("time_s").map_err(fail)?,
+            reference: all(|k| format!("q_ref_{k}_rad"), AXES)?,
+            link: all(|k| format!("q_link_{k}_rad"), WITH_ENCODER)?,
+            smooth_torque: smooth(&torque),
+            a: slopes(&v),
+            v,
+            q,
+            motor,
+        })
+    }
+
+    /// Samples that are compared.
+    pub(super) fn seen(&self) -> std::ops::Range<usize> {
+        let edge = (EDGE_S / STEP_S).round() as usize;
+        edge..self.time_s.len().saturating_sub(edge + 1)
+    }
+
+    /// Those of them in which an axis moves.
+    pub(super) fn moving(&self, axis: usize) -> impl Iterator<Item = usize> + '_ {
+        self.seen().filter(move |i| self.v[axis][*i].abs() > MOVING)
+    }
+
+    /// All joints at one sample.
+    pub(super) fn at(&self, of: &[Vec<f64>], sample: usize) -> Vec<f64> {
+        of.iter().map(|axis| axis[sample]).collect()
+    }
+}
+
+/// Columns of numbers under their names.
+struct Table<'a> {
+    names: Vec<&'a str>,
+    rows: Vec<Vec<f64>>,
+}
+
+impl<'a> Table<'a> {
+    fn new(text: &'a str) -> Result<Self, String> {
+        let mut lines = text.lines();
+        let names: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
+        let row = |(number, line): (usize, &str)| {
+            let row: Vec<f64> = line
+                .split(',')
+                .map(|cell| cell.parse().map_err(|_| format!("line {}: {cell:?} is no number", number + 2)))
+                .collect::<Result<_, String>>()?;
+            match row.len() == names.len() {
+                true => Ok(row),
+                false => Err(format!("line {} has {} cells, expected {}", number + 2, row.len(), names.len())),
+            }
+        };
+        let rows = lines.enumerate().map(row).collect::<Result<_, String>>()?;
+        Ok(Self { names, rows })
+    }
+
+    fn column(&self, name: &str) -> Result<Vec<f64>, String> {
+        let place = self.names.iter().position(|other| *other == name);
+        let place = place.ok_or_else(|| format!("has no column {name:?}"))?;
+        Ok(self.rows.iter().map(|row| row[place]).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_table_is_read_by_names_and_its_faults_have_lines() {
+        let table = Table::new("t,q\n0,1.5\n1,2.5\n").unwrap();
+        assert_eq!(table.column("q").unwrap(), [1.5, 2.5]);
+        assert!(table.column("x").is_err());
+        assert!(Table::new("t,q\n0,x\n").err().unwrap().contains("line 2"));
+        assert!(Table::new("t,q\n0,1\n2\n").err().unwrap().contains("line 3"));
+    }
+}

@@ -1,0 +1,67 @@
+//! Runs under servos along the recorded references: how far motors and links stay behind, as orders of magnitude.
+
+use std::sync::Arc;
+
+use flexarm::{DriveModel, Modelling, Motion, Robot};
+use flexarm_stepping::{Observation, Servo, ServoAxis, Start, new_stepper};
+
+use super::recording::{AXES, Recording, STEP_S, WITH_ENCODER};
+use super::signal::rms;
+use crate::Error;
+use crate::bench::{ALPHA, step_error};
+
+/// Steps of the simulation per sample.
+const STEPS: usize = 4;
+
+/// RMS of reference minus position per axis (rad): behind the gear where an encoder is, of the motor elsewhere.
+pub(super) type Tracking = [f64; AXES];
+
+pub(super) struct Servos {
+    pub(super) measured: Tracking,
+    /// With the torques of the rigid robot on the reference, and without.
+    pub(super) fed_forward: Tracking,
+    pub(super) alone: Tracking,
+}
+
+impl Servos {
+    pub(super) fn new(robot: &Robot, run: &Recording) -> Result<Self, Error> {
+        Ok(Self {
+            measured: tracking(run, |axis, i| if axis < WITH_ENCODER { run.link[axis][i] } else { run.motor[axis][i] }),
+            fed_forward: simulated(robot, run, true)?,
+            alone: simulated(robot, run, false)?,
+        })
+    }
+}
+
+fn tracking(run: &Recording, position: impl Fn(usize, usize) -> f64) -> Tracking {
+    std::array::from_fn(|axis| rms(run.seen().map(|i| run.reference[axis][i] - position(axis, i))))
+}
+
+/// All axes by torque under the gains that robot files have by default.
+fn simulated(robot: &Robot, run: &Recording, feed_forward: bool) -> Result<Tracking, Error> {
+    let rows: Vec<f64> = (0..run.time_s.len()).flat_map(|i| run.at(&run.reference, i)).collect();
+    let motion = Motion::from_samples(&run.time_s, &rows, robot)?;
+    let modelling = Modelling { drives: DriveModel::Servo, ..Modelling::default() };
+    let mut arm = robot.modelled(&modelling)?.arm(motion.prescribed()).map_err(step_error)?;
+    if let Some(servo) = &arm.servo {
+        let axes = servo.axes.iter().map(|axis| ServoAxis { feed_forward, ..*axis }).collect();
+        arm.servo = Some(Arc::new(Servo { axes, ..(**servo).clone() }));
+    }
+    let first = arm.model.n_actuated();
+    let mut seen = Observation::new(&arm);
+    let mut stepper = new_stepper(ALPHA, arm, STEP_S / STEPS as f64, Start::Equilibrium).map_err(step_error)?;
+    let mut positions = vec![Vec::new(); AXES];
+    for sample in 0..run.time_s.len() {
+        if sample > 0 {
+            for _ in 0..STEPS {
+                stepper.step().map_err(step_error)?;
+            }
+        }
+        stepper.observe(&mut seen);
+        for (axis, to) in positions.iter_mut().enumerate() {
+            let spring = if axis < WITH_ENCODER { seen.q[first + axis] } else { 0.0 };
+            to.push(seen.q[axis] + spring);
+        }
+    }
+    Ok(tracking(run, |axis, i| positions[axis][i]))
+}

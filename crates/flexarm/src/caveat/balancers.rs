@@ -1,0 +1,77 @@
+//! Balancers against the weight that they are to carry, and against the room that they have over the joint ranges.
+
+use flexarm_kinematics::{BalancerLaw, Data, Mechanism, Model, forward_kinematics, gravity_forces};
+use nalgebra::DVector;
+
+use super::size::spread_poses;
+use super::slip::{EFFORT, slip};
+use super::{Caveat, kinds};
+
+/// Largest torque of a balancer over the largest torque of weight: note, warning.
+const STRONG: [f64; 2] = [3.0, 10.0];
+/// The same of one that carries nothing.
+const WEAK: f64 = 1e-3;
+
+/// All of them over poses spread over the joint ranges.
+pub(crate) fn of_balancers(mechanism: &Mechanism, rigid: &Model) -> Vec<Caveat> {
+    if rigid.balancers().is_empty() {
+        return Vec::new();
+    }
+    let Ok(bare) = Model::new(&Mechanism { balancers: Vec::new(), ..mechanism.clone() }) else { return Vec::new() };
+    let weights = spread_poses(&bare).map(|q| gravity_forces(&bare, &mut Data::new(&bare), &q).amax());
+    let weight = weights.fold(0.0, f64::max);
+    let mut caveats = Vec::new();
+    for (k, balancer) in rigid.balancers().iter().enumerate() {
+        let name = format!("balancer {:?}", balancer.name);
+        let Lengths { least, most } = lengths(rigid, k);
+        match &balancer.law {
+            BalancerLaw::Gas(gas) => {
+                let (reached, passes) = if gas.pulls { (most, most >= gas.end()) } else { (least, least <= gas.end()) };
+                caveats.extend(passes.then(|| kinds::BALANCER_ROOM.found(&name, reached, gas.end())));
+            }
+            BalancerLaw::Curve(curve) => {
+                let [first, last] = curve.range();
+                let outside = if least < first { Some((least, first)) } else { (most > last).then_some((most, last)) };
+                caveats.extend(outside.map(|(x, end)| kinds::BALANCER_CURVE.found(&name, x, end)));
+            }
+            _ => {}
+        }
+        let torque = own_torque(mechanism, &bare, k);
+        if weight > 0.0 && torque > STRONG[0] * weight {
+            let caveat = kinds::BALANCER_STRONG.found(&name, torque, STRONG[0] * weight);
+            let likely = slip(torque, &(0.01 * weight..=STRONG[0] * weight), EFFORT, 1.0);
+            caveats.push(if torque > STRONG[1] * weight { caveat.likely(likely) } else { caveat.as_note() });
+        } else if torque < WEAK * weight {
+            caveats.push(kinds::BALANCER_WEAK.found(&name, torque, WEAK * weight));
+        }
+    }
+    caveats
+}
+
+/// Shortest and longest that a balancer gets.
+struct Lengths {
+    least: f64,
+    most: f64,
+}
+
+fn lengths(model: &Model, number: usize) -> Lengths {
+    let mut data = Data::new(model);
+    let start = Lengths { least: f64::INFINITY, most: f64::NEG_INFINITY };
+    spread_poses(model).fold(start, |Lengths { least, most }, q| {
+        forward_kinematics(model, &mut data, &q);
+        let x = model.balancers()[number].length(&data.X_WB, q.as_slice());
+        Lengths { least: least.min(x), most: most.max(x) }
+    })
+}
+
+/// Largest torque that one balancer alone puts on a joint where it has room (N m or N).
+fn own_torque(mechanism: &Mechanism, bare: &Model, number: usize) -> f64 {
+    let alone = Mechanism { balancers: vec![mechanism.balancers[number].clone()], ..mechanism.clone() };
+    let Ok(alone) = Model::new(&alone) else { return 0.0 };
+    let (mut with, mut without) = (Data::new(&alone), Data::new(bare));
+    let torque = |q: DVector<f64>| {
+        let torque = (gravity_forces(&alone, &mut with, &q) - gravity_forces(bare, &mut without, &q)).amax();
+        if torque.is_finite() { torque } else { 0.0 }
+    };
+    spread_poses(bare).map(torque).fold(0.0, f64::max)
+}
