@@ -101,7 +101,7 @@ pub use inspect::{FlexibleInfo, Inspection, JointInfo, LinkInfo, TcpInfo, inspec
 pub use mode_recording::{ModeMovie, record_modes};
 pub use modes::{ModeFigures, ModeTable, modes};
 pub use motion::{HeldJoint, Motion};
-pub use operating_points::OperatingPoints;
+pub use operating_points::{Frequencies, OperatingPoints};
 pub use options::{DriveModel, LinkModel, Modelling, Outputs, RunOptions};
 pub use payload::PayloadChange;
 pub use report::{
