@@ -93,7 +93,9 @@ pub fn arm_picture(
     Stage::new(header, sample)?.picture(side, size)
 }
 
-/// As [`arm_picture`], from several sides at once, each on a thread of its own.
+/// As [`arm_picture`], from several sides.
+///
+/// * `at_once`: each on a thread of its own, which takes so many times the memory; otherwise one after another.
 ///
 /// # Errors
 /// [`ArmPictureError`].
@@ -102,12 +104,17 @@ pub fn arm_pictures<const N: usize>(
     sample: &Sample,
     sides: [ArmSide; N],
     size: [usize; 2],
+    at_once: bool,
 ) -> Result<[ArmPicture; N], ArmPictureError> {
     let stage = &Stage::new(header, sample)?;
-    let drawn = std::thread::scope(|scope| {
-        let threads = sides.map(|side| scope.spawn(move || stage.picture(side, size)));
-        threads.map(|thread| thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
-    });
+    let one_by_one = || sides.map(|side| stage.picture(side, size));
+    let on_threads = || {
+        std::thread::scope(|scope| {
+            let threads = sides.map(|side| scope.spawn(move || stage.picture(side, size)));
+            threads.map(|thread| thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+        })
+    };
+    let drawn = if at_once { on_threads() } else { one_by_one() };
     let mut pictures = Vec::with_capacity(N);
     for picture in drawn {
         pictures.push(picture?);
@@ -642,7 +649,9 @@ mod tests {
         for side in [ArmSide::Side, ArmSide::Oblique] {
             let png = arm_png(&header, &sample, side, size).unwrap();
             assert_eq!(png, arm_png(&header, &sample, side, size).unwrap(), "the same bytes");
-            let [beside_another, _] = arm_pictures(&header, &sample, [side, ArmSide::Side], size).unwrap();
+            let [beside_another, _] = arm_pictures(&header, &sample, [side, ArmSide::Side], size, true).unwrap();
+            let [one_by_one, _] = arm_pictures(&header, &sample, [side, ArmSide::Side], size, false).unwrap();
+            assert_eq!(one_by_one.png, beside_another.png);
             assert_eq!(beside_another, arm_picture(&header, &sample, side, size).unwrap());
             let pixels = decoded(&png);
             let count = |near: Rgb, within: i32| {

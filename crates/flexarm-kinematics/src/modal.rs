@@ -87,6 +87,19 @@ impl ModalBody {
         M
     }
 
+    /// Coordinates that move no interface, if all of them are orthogonal to each other in mass.
+    pub(crate) fn held(&self) -> Vec<usize> {
+        /// Numbers so much smaller than others like them are rounding.
+        const ROUNDING: f64 = 1e-12;
+        let largest = self.interfaces.iter().map(|shape| shape.Phi.amax()).fold(0.0, f64::max);
+        let still = |k: &usize| self.interfaces.iter().all(|shape| shape.Phi.column(*k).amax() <= ROUNDING * largest);
+        let held: Vec<usize> = (0..self.n()).filter(still).collect();
+        let M = &self.M;
+        let meet = |k: usize, l: usize| M[(k, l)].abs() > ROUNDING * (M[(k, k)] * M[(l, l)]).abs().sqrt();
+        let orthogonal = held.iter().all(|&k| M[(k, k)] > 0.0 && held.iter().all(|&l| k == l || !meet(k, l)));
+        if orthogonal { held } else { Vec::new() }
+    }
+
     /// What is wrong with its sizes, if anything.
     pub(crate) fn fault(&self) -> Option<&'static str> {
         let n = self.n();
@@ -108,13 +121,68 @@ impl ModalBody {
 pub(crate) struct ModalTables {
     pub(crate) shapes: ModalBody,
     /// (2): column l holds `N_kl` of all k, each column-major.
-    N: DMatrix<f64>,
+    N: Integrals,
     /// Column l holds `g_lk` of all k.
-    g: DMatrix<f64>,
+    g: Integrals,
     /// `P_kᵀ` of all k, column-major.
     Pt: Vec<f64>,
     /// `C_r0,k - axial(P_kᵀ)`: what the rotary inertia of sections adds.
     C_rotary: Vec<Vector3<f64>>,
+}
+
+/// Second-order integrals of pairs of coordinates, a column for each coordinate.
+#[derive(Clone, Debug)]
+enum Integrals {
+    /// Those of a mesh.
+    All(DMatrix<f64>),
+    /// Those of a beam, of whose modes each moves along one axis: row and value of what is not zero, and where each column
+    /// ends.
+    Few { entries: Vec<(u32, f64)>, ends: Vec<usize> },
+}
+
+impl Integrals {
+    /// Entries below that part of the largest that two coordinates could have are rounding.
+    const ROUNDING: f64 = 1e-14;
+    /// One of so many entries, or fewer, is not zero where lists are faster than the whole matrix.
+    const SPARSE: usize = 4;
+
+    fn new(all: DMatrix<f64>, shapes: &ModalBody) -> Self {
+        let n = shapes.n();
+        let per_coordinate = all.nrows() / n.max(1);
+        if all.is_empty() {
+            return Self::All(all);
+        }
+        let size: Vec<f64> = (0..n).map(|k| shapes.N[k * n + k].trace().abs().sqrt()).collect();
+        let (mut entries, mut ends) = (Vec::new(), Vec::new());
+        for (l, column) in all.column_iter().enumerate() {
+            let counts = |row: usize, x: f64| x.abs() > Self::ROUNDING * size[row / per_coordinate] * size[l];
+            entries.extend(
+                (0..).zip(column.iter()).filter(|(row, x)| counts(*row as usize, **x)).map(|(row, x)| (row, *x)),
+            );
+            ends.push(entries.len());
+        }
+        match Self::SPARSE * entries.len() <= all.len() {
+            true => Self::Few { entries, ends },
+            false => Self::All(all),
+        }
+    }
+
+    /// `y += A x`.
+    #[inline(always)]
+    fn add_product<T: Real>(&self, x: &[T], y: &mut [T]) {
+        let (entries, ends) = match self {
+            Self::All(all) if all.is_empty() => return,
+            Self::All(all) => return add_product(all, x, y),
+            Self::Few { entries, ends } => (entries, ends),
+        };
+        let mut begin = 0;
+        for (&end, &x) in ends.iter().zip(x) {
+            for (row, a) in &entries[begin..end] {
+                y[*row as usize] += T::splat(*a) * x;
+            }
+            begin = end;
+        }
+    }
 }
 
 /// `∫ r × φ` from `Q = ∫ φ rᵀ`.
@@ -139,6 +207,7 @@ impl ModalTables {
                 }
             }
         }
+        let (N, g) = (Integrals::new(N, shapes), Integrals::new(g, shapes));
         let Pt: Vec<f64> = shapes.P.iter().flat_map(|P| P.transpose().as_slice().to_vec()).collect();
         let C_rotary = shapes.C_r.iter().zip(&shapes.P).map(|(c, P)| c - axial(&P.transpose())).collect();
         Self { shapes: shapes.clone(), N, g, Pt, C_rotary }
@@ -215,9 +284,7 @@ impl<T: Real> ModalData<T> {
         for (q, p) in self.Q.iter_mut().zip(&tables.Pt) {
             *q = T::splat(*p);
         }
-        if !tables.N.is_empty() {
-            add_product(&tables.N, eta, &mut self.Q);
-        }
+        tables.N.add_product(eta, &mut self.Q);
         // Only the symmetric part of E counts, and P and Pᵀ have the same.
         let (mut h, mut E) = (lift::<T>(&shapes.first_moment), [T::zero(); 9]);
         let matrices = self.Q.chunks_exact(9).zip(tables.Pt.chunks_exact(9));
@@ -240,10 +307,10 @@ impl<T: Real> ModalData<T> {
     pub(crate) fn bias(&mut self, tables: &ModalTables, V: &Twist<T>, rates: &[T]) -> Wrench<T> {
         let (w, v) = (V.angular, V.linear);
         self.rates.copy_from_slice(rates);
-        let second = !tables.N.is_empty();
+        let second = !tables.shapes.N.is_empty();
         if second {
             self.g_rate.fill(T::zero());
-            add_product(&tables.g, rates, &mut self.g_rate);
+            tables.g.add_product(rates, &mut self.g_rate);
         }
         let shapes = &tables.shapes;
         let (mut Wt, mut c, mut rotary) = ([T::zero(); 9], Vector3::zeros(), Vector3::zeros());

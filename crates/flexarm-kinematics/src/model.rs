@@ -318,6 +318,15 @@ impl Model {
         !self.modal.is_empty()
     }
 
+    /// Modal coordinates that move no interface and are orthogonal to each other in the body's mass, as fixed-interface modes
+    /// are: the mass matrix has a constant on their diagonal and nothing between them.
+    pub fn held_modes(&self) -> Vec<usize> {
+        self.modal
+            .iter()
+            .flat_map(|modal| modal.tables.shapes.held().into_iter().map(|k| modal.coordinate + k))
+            .collect()
+    }
+
     /// Bodies, parents before children; body 0 is the world.
     pub fn bodies(&self) -> &[Body] {
         &self.bodies

@@ -74,6 +74,7 @@ mod table;
 mod tail_file;
 mod threads;
 mod trace;
+mod trace_blocks;
 #[cfg(feature = "described-tables")]
 mod whole_file;
 
@@ -94,3 +95,4 @@ pub use record::*;
 #[cfg(feature = "rerun")]
 pub use rrd_file::{RrdRecorder, RrdStudy, StudySeat};
 pub use trace::{RunSource, Trace, TraceRow};
+pub use trace_blocks::Quantity;

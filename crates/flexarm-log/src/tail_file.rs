@@ -11,9 +11,8 @@
 use std::fs::File;
 use std::io::{self, Seek, SeekFrom, Write};
 
-/// Committed bytes beyond which a recorder should set a new tail even before its time: what is held in memory. Tails of long
-/// files are long themselves, so this is more than comes between two tails that are due.
-const PENDING_LIMIT: usize = 16 << 20;
+/// Committed bytes beyond which a recorder should write them out even before its time: what is held in memory.
+const PENDING_LIMIT: usize = 3 << 20;
 
 /// See the module.
 #[derive(Debug)]
@@ -57,6 +56,8 @@ impl TailFile {
         }
         self.written += self.pending.len() as u64;
         self.pending.clear();
+        // What the beginning took, surfaces and files, is not needed again.
+        self.pending.shrink_to(2 * PENDING_LIMIT);
         self.tail.clear();
         self.tail.extend_from_slice(tail);
         Ok(())

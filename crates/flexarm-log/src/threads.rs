@@ -71,7 +71,10 @@ impl Threads {
             let (queue, received) = sync_channel(QUEUE);
             let failed = Arc::new(Mutex::new(None));
             let slot = failed.clone();
-            let thread = std::thread::spawn(move || write(recorder, &received, &slot));
+            // Profilers tell threads by their names.
+            let name = recorder.path().extension().map_or_else(Default::default, |e| e.to_string_lossy().into_owned());
+            let begin = move || write(recorder, &received, &slot);
+            let thread = std::thread::Builder::new().name(name).spawn(begin).expect("the system starts a few threads");
             Worker { queue, thread, failed }
         };
         let batches = (0..BATCHES).map(|_| Arc::default()).collect();

@@ -1,14 +1,21 @@
 //! A run in memory: what reports, overlays and conversions draw from.
 
+use crate::trace_blocks::{Blocks, Quantity};
 use crate::{Event, LogError, RunHeader, RunResult, Sample};
 
 /// A run as columns of scalars, with the sample of the largest error.
 ///
 /// For pictures of a run, not for its numbers: [`crate::Columns`] hold every sample.
 ///
-/// Filled like a recorder, by [`Trace::push`] and [`Trace::finish`]. **Long runs are thinned**: at [`Trace::LIMIT`] rows every
-/// second one is dropped and only every second sample is taken from then on, so rows stay evenly spaced.
-/// [`Trace::stride`] tells; the sample of the largest error ([`Trace::peak`]) is always kept.
+/// Filled like a recorder, by [`Trace::push`] and [`Trace::finish`]. Memory is bounded, however long the run:
+///
+/// * **Curves** ([`Trace::curve`]) of more than [`Trace::WHOLE`] samples are the smallest and the largest value of each of
+///   equal stretches; [`Trace::samples_per_block`] tells. No peak is lost.
+/// * **Rows** of such a run have the figures of the tool alone (their lists are empty). At [`Trace::LIMIT`] rows every second
+///   one is dropped and only every second sample is taken from then on, so that they stay evenly spaced; [`Trace::stride`]
+///   tells.
+/// * The sample of the largest error ([`Trace::peak`]), and the error of the first [`Trace::LIMIT`] samples
+///   ([`Trace::beginning`]), are always kept.
 #[derive(Clone, Debug, Default)]
 pub struct Trace {
     /// What stays the same.
@@ -23,9 +30,16 @@ pub struct Trace {
     seen: u64,
     without_curves: bool,
     peak_error: f64,
+    /// Curves of a long run, and the row that fills them.
+    blocks: Blocks,
+    row: TraceRow,
+    /// The first samples of a long run.
+    beginning: Vec<(f64, [f64; 3])>,
 }
 
 /// Scalars of one instant; the same numbers as in the [`Sample`].
+///
+/// The lists of a run of more than [`Trace::WHOLE`] samples are empty.
 #[derive(Clone, Debug, Default)]
 pub struct TraceRow {
     /// Time (s).
@@ -64,13 +78,44 @@ impl TraceRow {
     }
 }
 
+impl TraceRow {
+    /// Takes the numbers of a sample; its lists are used again.
+    fn fill(&mut self, sample: &Sample) {
+        self.time_s = sample.time_s;
+        self.error_world = sample.error_world;
+        self.error_path = sample.error_path;
+        self.static_m = sample.static_m;
+        self.rigid_m = sample.rigid.X_WT.translation.vector.into();
+        self.flexible_m = sample.flexible.X_WT.translation.vector.into();
+        self.contributions.clone_from(&sample.contributions);
+        self.q.clone_from(&sample.flexible.q);
+        self.qdot.clone_from(&sample.flexible.qdot);
+        self.effort.clone_from(&sample.flexible.effort);
+        self.rigid_effort.clone_from(&sample.rigid.effort);
+        self.elastic.clone_from(&sample.elastic);
+        self.energy = sample.energy;
+    }
+
+    fn without_lists(&self) -> Self {
+        let Self { time_s, error_world, error_path, static_m, rigid_m, flexible_m, energy, .. } = *self;
+        Self { time_s, error_world, error_path, static_m, rigid_m, flexible_m, energy, ..Self::default() }
+    }
+}
+
+/// Time and translation of the error.
+fn translation(row: &TraceRow) -> (f64, [f64; 3]) {
+    (row.time_s, [0, 1, 2].map(|c| row.error_world[c]))
+}
+
 fn size(error: &[f64; 6]) -> f64 {
     error[..3].iter().map(|part| part * part).sum::<f64>().sqrt()
 }
 
 impl Trace {
+    /// Most samples of a run whose rows and curves are kept as they are.
+    pub const WHOLE: usize = 1 << 13;
     /// Rows at which a run is thinned.
-    pub const LIMIT: usize = 100_000;
+    pub const LIMIT: usize = 1 << 15;
 
     /// An empty trace of a run.
     #[must_use]
@@ -91,10 +136,25 @@ impl Trace {
             self.peak_error = error;
             self.peak.clone_from(sample);
         }
-        if !self.without_curves && self.seen.is_multiple_of(self.stride.max(1)) {
-            self.rows.push(TraceRow::from(sample));
-        }
         self.seen += 1;
+        if self.without_curves {
+            return;
+        }
+        if self.blocks.is_empty() && self.rows.len() < Self::WHOLE {
+            self.rows.push(TraceRow::from(sample));
+            return;
+        }
+        if self.blocks.is_empty() {
+            self.shorten();
+        }
+        self.row.fill(sample);
+        self.blocks.push(&self.row);
+        if self.beginning.len() < Self::LIMIT {
+            self.beginning.push(translation(&self.row));
+        }
+        if (self.seen - 1).is_multiple_of(self.stride.max(1)) {
+            self.rows.push(self.row.without_lists());
+        }
         if self.rows.len() >= Self::LIMIT {
             let mut keep = false;
             self.rows.retain(|_| {
@@ -102,6 +162,68 @@ impl Trace {
                 keep
             });
             self.stride = self.stride.max(1) * 2;
+        }
+    }
+
+    /// From now on the run is a long one.
+    fn shorten(&mut self) {
+        self.rows.iter().for_each(|row| self.blocks.push(row));
+        self.beginning = self.rows.iter().map(translation).collect();
+        self.beginning.reserve_exact(Self::LIMIT - self.beginning.len());
+        let mut rows = Vec::with_capacity(Self::LIMIT);
+        rows.extend(self.rows.iter().map(TraceRow::without_lists));
+        self.rows = rows;
+    }
+
+    /// A curve: a value for each row or, in a long run, smallest and largest value of each block. What a run does not have is
+    /// not a number.
+    #[must_use]
+    pub fn curve(&self, quantity: Quantity) -> Vec<f64> {
+        match self.blocks.is_empty() {
+            true => self.rows.iter().map(|row| quantity.of(row)).collect(),
+            false => self.blocks.values(quantity),
+        }
+    }
+
+    /// The times of [`Trace::curve`] (s).
+    #[must_use]
+    pub fn curve_times(&self) -> Vec<f64> {
+        match self.blocks.is_empty() {
+            true => self.rows.iter().map(|row| row.time_s).collect(),
+            false => self.blocks.times(),
+        }
+    }
+
+    /// How far the rigid tool has gone at the times of [`Trace::curve`] (m).
+    #[must_use]
+    pub fn curve_ways(&self) -> Vec<f64> {
+        if !self.blocks.is_empty() {
+            return self.blocks.ways();
+        }
+        let mut length = 0.0;
+        let mut last = self.rows.first().map_or([0.0; 3], |row| row.rigid_m);
+        let step = |row: &TraceRow| {
+            let way: [f64; 3] = std::array::from_fn(|k| row.rigid_m[k] - last[k]);
+            last = row.rigid_m;
+            length += way.iter().map(|part| part * part).sum::<f64>().sqrt();
+            length
+        };
+        self.rows.iter().map(step).collect()
+    }
+
+    /// Samples of which a curve has the smallest and the largest value: 1 for a curve that has all.
+    #[must_use]
+    pub fn samples_per_block(&self) -> u64 {
+        self.blocks.size().max(1)
+    }
+
+    /// Time (s) and translation of the error (m, world axes) of every sample, of the first [`Trace::LIMIT`] samples in a long
+    /// run.
+    #[must_use]
+    pub fn beginning(&self) -> Vec<(f64, [f64; 3])> {
+        match self.blocks.is_empty() {
+            true => self.rows.iter().map(translation).collect(),
+            false => self.beginning.clone(),
         }
     }
 
@@ -131,21 +253,9 @@ impl Trace {
 
 impl From<&Sample> for TraceRow {
     fn from(sample: &Sample) -> Self {
-        Self {
-            time_s: sample.time_s,
-            error_world: sample.error_world,
-            error_path: sample.error_path,
-            static_m: sample.static_m,
-            rigid_m: sample.rigid.X_WT.translation.vector.into(),
-            flexible_m: sample.flexible.X_WT.translation.vector.into(),
-            contributions: sample.contributions.clone(),
-            q: sample.flexible.q.clone(),
-            qdot: sample.flexible.qdot.clone(),
-            effort: sample.flexible.effort.clone(),
-            rigid_effort: sample.rigid.effort.clone(),
-            elastic: sample.elastic.clone(),
-            energy: sample.energy,
-        }
+        let mut row = Self::default();
+        row.fill(sample);
+        row
     }
 }
 

@@ -1,23 +1,24 @@
 //! What a run in memory keeps of its samples.
 
-use flexarm_log::{RunHeader, Sample, Trace};
+use flexarm_log::{ElasticSample, Quantity, RunHeader, Sample, Trace};
 
-/// Truth: counting. A quarter of a million samples are halved twice: one of four is kept, evenly, and the largest error
-/// is kept although its sample is not.
+/// Truth: counting. Two and a half times as many samples as are kept are halved twice: one of four is kept, evenly, and the
+/// largest error is kept although its sample is not.
 #[test]
 fn a_long_run_is_thinned_evenly_and_says_so() {
+    const PEAK: u64 = Trace::LIMIT as u64 + 1;
     let mut trace = Trace::new(RunHeader::default());
     let all = 5 * Trace::LIMIT as u64 / 2;
     let mut sample = Sample::default();
     for k in 0..all {
         sample.time_s = k as f64;
-        sample.error_world[0] = if k == 150_001 { 2.0 } else { 1.0 };
+        sample.error_world[0] = if k == PEAK { 2.0 } else { 1.0 };
         trace.push(&sample);
     }
     assert_eq!((trace.samples(), trace.stride()), (all, 4));
     assert_eq!(trace.rows.len() as u64, all / 4);
     assert!(trace.rows.iter().enumerate().all(|(row, kept)| kept.time_s == 4.0 * row as f64));
-    assert_eq!(trace.peak.time_s, 150_001.0);
+    assert_eq!(trace.peak.time_s, PEAK as f64);
 }
 
 #[test]
@@ -25,4 +26,66 @@ fn a_short_run_has_every_sample() {
     let mut trace = Trace::new(RunHeader::default());
     (0..1000).for_each(|_| trace.push(&Sample::default()));
     assert_eq!((trace.rows.len(), trace.samples(), trace.stride()), (1000, 1000, 1));
+}
+
+/// A wave with a spike of one sample, in everything that has curves.
+fn wave(k: u64) -> Sample {
+    let value = (0.01 * k as f64).sin() + if k == 123_457 { 50.0 } else { 0.0 };
+    let mut sample = Sample { time_s: k as f64 * 1e-3, ..Sample::default() };
+    sample.error_world[1] = value;
+    sample.static_m[0] = 0.5;
+    sample.contributions = vec![[0.0, 3.0 * value, 4.0 * value]];
+    sample.elastic = vec![ElasticSample { deflection: [value; 6], load: [-value; 6] }];
+    sample.flexible.q = vec![value, f64::NAN];
+    sample.rigid.X_WT.translation.vector.x = 0.1 * (k % 100) as f64;
+    sample
+}
+
+/// Truth: the samples themselves. Every range of a block holds its samples, and the extremes are those of the run.
+#[test]
+fn curves_of_a_long_run_lose_no_peak() {
+    const ALL: u64 = 300_000;
+    let mut trace = Trace::new(RunHeader::default());
+    (0..ALL).for_each(|k| trace.push(&wave(k)));
+    let size = trace.samples_per_block();
+    assert!(size >= ALL / 4096 && size.is_power_of_two(), "{size}");
+    let quantities: [(Quantity, fn(&Sample) -> f64); 6] = [
+        (Quantity::ErrorSize, |s| s.error_world[1].abs()),
+        (Quantity::MovingSize, |s| s.error_world[1].hypot(s.static_m[0])),
+        (Quantity::ContributionSize(0), |s| 5.0 * s.error_world[1].abs()),
+        (Quantity::Load(0, 4), |s| -s.error_world[1]),
+        (Quantity::DeflectionSize(0, 1), |s| 3f64.sqrt() * s.error_world[1].abs()),
+        (Quantity::Joint(0), |s| s.flexible.q[0]),
+    ];
+    let times = trace.curve_times();
+    for (quantity, truth) in quantities {
+        let curve = trace.curve(quantity);
+        assert_eq!(curve.len(), times.len());
+        for (block, range) in curve.chunks_exact(2).enumerate() {
+            let samples = block as u64 * size..((block as u64 + 1) * size).min(ALL);
+            let values = samples.clone().map(|k| truth(&wave(k)));
+            let [low, high] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], x| [l.min(x), h.max(x)]);
+            // measured 2e-16
+            assert!((range[0] - low).abs() < 1e-14 * (1.0 + low.abs()), "{quantity:?} {block}");
+            assert!((range[1] - high).abs() < 1e-14 * (1.0 + high.abs()), "{quantity:?} {block}");
+            let ends = [samples.start, samples.end - 1].map(|k| k as f64 * 1e-3);
+            assert_eq!(times[2 * block..2 * block + 2], ends);
+        }
+    }
+    assert!(trace.curve(Quantity::Joint(1)).iter().chain(&trace.curve(Quantity::Effort(0))).all(|x| x.is_nan()));
+    // There and back: 9.9 m in a hundred samples forth, 9.9 m back.
+    let ways = trace.curve_ways();
+    let way = (1..ALL).map(|k| if k % 100 == 0 { 9.9 } else { 0.1 }).sum::<f64>();
+    assert!((ways[ways.len() - 1] - way).abs() < 1e-9 * way && ways.is_sorted());
+    let beginning = trace.beginning();
+    assert_eq!((beginning.len(), beginning[7].0), (Trace::LIMIT, 7e-3));
+}
+
+#[test]
+fn curves_of_a_short_run_are_its_samples() {
+    let mut trace = Trace::new(RunHeader::default());
+    (0..1000).for_each(|k| trace.push(&wave(k)));
+    let truth: Vec<f64> = (0..1000).map(|k| wave(k).flexible.q[0]).collect();
+    assert_eq!((trace.curve(Quantity::Joint(0)), trace.samples_per_block()), (truth, 1));
+    assert_eq!(trace.beginning().len(), 1000);
 }

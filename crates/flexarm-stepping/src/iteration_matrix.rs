@@ -1,6 +1,7 @@
-//! The matrix of Newton's method in an implicit step, `J = M + c_D D + c_K K`, in one of two ways: as its inverse, which is used
+//! The matrix of Newton's method in an implicit step, `J = M + c_D D + c_K K`, in one of three ways: as its inverse, which is used
 //! dozens of times before it is renewed, and a product costs a third of two triangular solutions; or, where the coordinates
-//! sit on a tree and are many, eliminated along it ([`crate::tree_matrix`]).
+//! sit on a tree and are many, eliminated along it ([`crate::tree_matrix`]); or, where many are modes, these first
+//! ([`crate::mode_matrix`]).
 //!
 //! Between [`IterationMatrix::read`] and [`IterationMatrix::invert`] a method may change a dense J ([`DenseInverse`]'s fields).
 //! Nothing here allocates after the first time.
@@ -8,6 +9,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use crate::error::StepError;
+use crate::mode_matrix::ModeInverse;
 use crate::system::SecondOrderSystem;
 use crate::tree_matrix::TreeInverse;
 
@@ -26,6 +28,8 @@ pub(crate) enum Way {
     Dense(DenseInverse),
     /// Along the tree, with s.
     Tree(TreeInverse),
+    /// Modes first, with s.
+    Modes(ModeInverse),
 }
 
 /// `(S + C)^-1 B`; as read, `S = M`, `C = c_D D + c_K K` and `B = 1`. All are n × n and symmetric but B.
@@ -91,6 +95,12 @@ impl IterationMatrix {
             if system.along_tree(c_D, c_K, &mut tree.matrices) {
                 return;
             }
+            self.way = Way::Modes(ModeInverse::default());
+        }
+        if let Way::Modes(modes) = &mut self.way {
+            if system.with_modes(c_D, c_K, &mut modes.matrices) {
+                return;
+            }
             self.way = Way::Dense(DenseInverse::new(system.dimension()));
         }
         if let Way::Dense(dense) = &mut self.way {
@@ -106,6 +116,7 @@ impl IterationMatrix {
         match &mut self.way {
             Way::Dense(dense) => dense.invert(t),
             Way::Tree(tree) => tree.factor(self.s, t),
+            Way::Modes(modes) => modes.factor(self.s, t),
         }
     }
 
@@ -114,6 +125,7 @@ impl IterationMatrix {
         match &mut self.way {
             Way::Dense(dense) => dense.solve(r),
             Way::Tree(tree) => tree.solve(r),
+            Way::Modes(modes) => modes.solve(r),
         }
         r.norm()
     }

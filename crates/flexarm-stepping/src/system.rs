@@ -10,6 +10,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::error::StepError;
+use crate::mode_matrix::ModeMatrices;
 use crate::tree_matrix::TreeMatrices;
 
 /// A mechanical system in n coordinates x of a vector space.
@@ -45,6 +46,12 @@ pub trait SecondOrderSystem {
     /// The same three matrices where they sit on a tree, into `to`, from which they are solved in O(n) instead of O(n²). False
     /// where they do not, or where n is so small that dense ones are faster: `to` then holds anything.
     fn along_tree(&mut self, _c_D: f64, _c_K: f64, _to: &mut TreeMatrices) -> bool {
+        false
+    }
+
+    /// The same three matrices where many of the coordinates are modes that meet the others in mass alone, and each other not at
+    /// all. False where they are not, as above.
+    fn with_modes(&mut self, _c_D: f64, _c_K: f64, _to: &mut ModeMatrices) -> bool {
         false
     }
 }

@@ -153,7 +153,7 @@ pub fn read_run(path: &Path) -> Result<(Option<serde_json::Value>, Trace, Vec<St
     let mut told = [source.missing(), source.warnings()].concat();
     if trace.stride() > 1 {
         told.push(format!(
-            "of its {} samples one of every {} is kept for curves, and for figures that the recording does not hold",
+            "of its {} samples one of every {} is kept for figures that the recording does not hold",
             trace.samples(),
             trace.stride()
         ));

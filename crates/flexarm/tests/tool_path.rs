@@ -132,7 +132,7 @@ fn standard_motions_stay_in_their_cube_and_rest_where_they_should() {
         let motion = load(&robot, "standard.toml", &text).unwrap();
         let far = poses(&model, &motion, 3000)
             .iter()
-            .map(|(_, X)| (X.translation.vector - centre).amax())
+            .map(|(_, tool)| (tool.translation.vector - centre).amax())
             .fold(0.0, f64::max);
         assert!((far - 0.2 * reach).abs() < 1e-6 || name == "iso9283-paths" && far <= 0.16 + 1e-9, "{name}: {far}");
     }

@@ -13,6 +13,9 @@ use crate::tail_file::SharedTail;
 /// Uncompressed size at which a chunk is closed.
 const CHUNK_BYTES: usize = 1 << 20;
 
+/// Level of zstd. On chunks of runs level 1 takes half the time of level 3, which is zstd's own choice, and 2 % more room.
+const COMPRESSION: u32 = 1;
+
 /// An MCAP file in the making. Keeps the open chunk in memory and writes it whole.
 pub(crate) struct Output {
     writer: Writer<SharedTail>,
@@ -33,6 +36,7 @@ impl Output {
             .library(concat!("flexarm ", env!("CARGO_PKG_VERSION")))
             .chunk_size(None) // closed by `send`, which knows what is in it
             .disable_seeking(true)
+            .compression_level(COMPRESSION)
             .compression_threads(0); // same bytes on every machine
         let writer = options.create(file.clone())?;
         Ok(Self { writer, file, chunk: Vec::new(), shown: 0, index: Index::new(), cdr: Cdr::default() })

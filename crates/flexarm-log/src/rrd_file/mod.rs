@@ -41,6 +41,10 @@ pub(crate) const RESULT_ENTITY: [&str; 2] = ["recording", "result.json"];
 
 /// Samples of a chunk: enough for compression, few enough for quick reading.
 const CHUNK_ROWS: usize = 1024;
+/// So many times rows are committed before the run is a long one, and samples of its chunks from then on. The list of all
+/// chunks is in memory until the file ends; rows that wait are, too.
+const SHORT_COMMITS: usize = 64;
+const LONG_CHUNK_ROWS: usize = 8 * CHUNK_ROWS;
 
 /// Writes a run as a Rerun recording.
 ///
@@ -202,6 +206,7 @@ pub(crate) struct RunWriter {
     header: RunHeader,
     shape: Shape,
     tracks: RunTracks,
+    commits: usize,
     /// The layout, until it is written: with the first sample, which shows where the robot is.
     layout: Option<Part>,
     tools_due: bool,
@@ -217,7 +222,7 @@ impl RunWriter {
         let layout = has_layout.then(|| window::window(header, &seat, labels));
         // Surfaces and files are in the recording now.
         let header = RunHeader { meshes: Vec::new(), attachments: Vec::new(), urdf: String::new(), ..header.clone() };
-        Ok(Self { shape: Shape::of(&header), header, tracks, layout, tools_due: true })
+        Ok(Self { shape: Shape::of(&header), header, tracks, commits: 0, layout, tools_due: true })
     }
 
     fn record(&mut self, store: &mut Store, file: &Path, sample: &Sample) -> Result<(), LogError> {
@@ -238,10 +243,17 @@ impl RunWriter {
             store.append_all(ids, &tools)?;
         }
         self.tracks.push((time_ns, i64::try_from(sample.step).unwrap_or(i64::MAX)), sample);
-        if self.tracks.waiting() >= CHUNK_ROWS {
+        let is_long = self.commits >= SHORT_COMMITS;
+        if self.tracks.waiting() >= if is_long { LONG_CHUNK_ROWS } else { CHUNK_ROWS } {
             self.commit(store)?;
+        } else if is_long {
+            let mut ids = *store.stream.ids();
+            let chunks = self.tracks.take_large(&mut ids)?;
+            store.append_all(ids, &chunks)?;
         }
-        if store.flush.due() || store.stream.is_full() {
+        if !store.flush.due() {
+            store.stream.relieve()?;
+        } else {
             // The rows that wait, and the ways so far, as a provisional end.
             let mut ids = *store.stream.ids();
             let mut chunks = self.tracks.rows(&mut ids)?;
@@ -257,6 +269,7 @@ impl RunWriter {
         let chunks = self.tracks.rows(&mut ids)?;
         store.append_all(ids, &chunks)?;
         self.tracks.clear();
+        self.commits += 1;
         Ok(())
     }
 

@@ -263,6 +263,15 @@ impl RobotTracks {
         Ok(())
     }
 
+    /// Chunks of bent surfaces whose rows that wait take much room; forgets these rows.
+    pub(crate) fn take_large(&mut self, ids: &mut Ids, chunks: &mut Vec<Chunk>) -> Result<(), StreamError> {
+        for bent in self.bent.iter_mut().filter(|bent| bent.shape.is_large()) {
+            chunks.extend(bent.shape.chunk(ids)?);
+            bent.shape.clear();
+        }
+        Ok(())
+    }
+
     pub(crate) fn clear(&mut self) {
         self.links.iter_mut().map(|(_, track)| track).chain([&mut self.tcp]).for_each(Track::clear);
         self.tints.iter_mut().for_each(|(_, _, track)| track.clear());

@@ -322,6 +322,17 @@ impl RunTracks {
         Ok(chunks)
     }
 
+    /// Chunks of surfaces whose rows that wait take much room; forgets these rows.
+    pub(crate) fn take_large(&mut self, ids: &mut Ids) -> Result<Vec<Chunk>, StreamError> {
+        let mut chunks = Vec::new();
+        for drawn in std::iter::once(&mut self.flexible).chain(&mut self.rigid).chain(&mut self.magnified) {
+            if let Some(robot) = &mut drawn.robot {
+                robot.take_large(ids, &mut chunks)?;
+            }
+        }
+        Ok(chunks)
+    }
+
     /// Forgets the rows that wait; they have been written.
     pub(crate) fn clear(&mut self) {
         self.times.clear();

@@ -89,14 +89,29 @@ struct Manifest {
     before: Option<RawRrdManifest>,
     since: RrdManifestBuilder,
     new: usize,
+    /// Chunks in all.
+    chunks: usize,
 }
+
+/// Chunks beyond which provisional ends have no list of them: it would be copied for each, and a file without one is read
+/// from its beginning to its end.
+const MOST_LISTED: usize = 10_000;
 
 impl Manifest {
     fn append(&mut self, chunk: &Chunk, span: Span<u64>, uncompressed: u64) -> Result<()> {
         let batch = chunk.to_chunk_batch()?;
-        self.since.append(&batch, span, uncompressed)?;
-        self.new += 1;
+        self.chunks += 1;
+        if self.is_listed() {
+            self.since.append(&batch, span, uncompressed)?;
+            self.new += 1;
+        } else {
+            (self.before, self.since, self.new) = Default::default();
+        }
         Ok(self.all.append(&batch, span, uncompressed)?)
+    }
+
+    fn is_listed(&self) -> bool {
+        self.chunks <= MOST_LISTED
     }
 
     /// The list so far and, behind it, the chunks of a provisional end; `None` while there is none.
@@ -128,9 +143,13 @@ impl RrdStream {
         Ok(Self { file, ids: Ids::default(), manifests: Vec::new() })
     }
 
-    /// Whether so much waits that [`RrdStream::set_tail`] should be called even before its time.
-    pub(crate) fn is_full(&self) -> bool {
-        self.file.is_full()
+    /// Writes out what is committed if that is much. The end of the file is missing then until the next tail is set: that can
+    /// be long, and it comes soon.
+    pub(crate) fn relieve(&mut self) -> Result<()> {
+        if self.file.is_full() {
+            self.file.flush()?;
+        }
+        Ok(())
     }
 
     /// Identifiers for the next chunks. Chunks of a provisional end take a copy, so that they leave no gap.
@@ -169,7 +188,7 @@ impl RrdStream {
     }
 
     /// Writes out everything, with these chunks as the provisional end, and a footer: what a killed run leaves is a whole
-    /// file.
+    /// file. Beyond [`MOST_LISTED`] chunks the footer is left out, which the format allows.
     pub(crate) fn set_tail(&mut self, store: &StoreId, chunks: &[Chunk]) -> Result<()> {
         let position = self.file.position();
         let (mut tail, mut builder) = (Vec::new(), RrdManifestBuilder::default());
@@ -179,6 +198,9 @@ impl RrdStream {
             tail.extend(bytes);
             let span = Span::from_start_end(start, position + tail.len() as u64);
             builder.append(&chunk.to_chunk_batch()?, span, uncompressed)?;
+        }
+        if self.manifests.iter().any(|(_, manifest)| !manifest.is_listed()) {
+            return Ok(self.file.set_tail(&tail)?);
         }
         let mut manifests = Vec::new();
         for (known, manifest) in &mut self.manifests {

@@ -168,6 +168,12 @@ impl ShapeTrack {
         self.times.push(when);
         self.positions.extend(positions);
     }
+
+    /// Whether the rows that wait are worth a chunk by their size.
+    pub(crate) fn is_large(&self) -> bool {
+        const LARGE: usize = 1 << 20;
+        size_of_val(self.positions.as_slice()) > LARGE
+    }
 }
 
 impl Track for ShapeTrack {

@@ -13,6 +13,7 @@ use nalgebra::Vector3;
 use crate::arm::FlexibleArm;
 use crate::batch::dense::add_product;
 use crate::elastic_tree::ElasticTree;
+use crate::reduced::HeldModes;
 
 /// A spring in its place.
 struct Element<T> {
@@ -55,6 +56,7 @@ impl<T: Real> LaneArm<T> {
         let plain = |arm: &&FlexibleArm| {
             arm.n_elastic_coordinates() > 0
                 && ElasticTree::that_pays(arm).is_none()
+                && HeldModes::that_pay(arm).is_none()
                 && arm.torque_driven.is_empty()
                 && arm.loads.is_empty()
                 && arm.model.balancers().is_empty()

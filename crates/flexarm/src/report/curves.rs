@@ -1,7 +1,7 @@
 //! The data of the plots: curves of a run, in readable units, thinned so that peaks stay.
 
 use flexarm_analysis::amplitude_spectrum;
-use flexarm_log::{ElasticSample, Trace, TraceRow};
+use flexarm_log::{Quantity, Trace};
 
 use crate::summary::Summary;
 
@@ -113,30 +113,21 @@ pub(super) fn thinned(curves: &[&[f64]], length: usize, most: usize) -> Vec<usiz
     keep
 }
 
-/// A curve from every row of a run.
-fn curve(trace: &Trace, name: impl Into<String>, kind: Kind, of: impl Fn(&TraceRow) -> f64) -> Curve {
-    Curve { name: name.into(), kind, y: trace.rows.iter().map(of).collect() }
+/// A curve of a run, in the unit that is `scale` times smaller.
+fn curve(trace: &Trace, name: impl Into<String>, kind: Kind, scale: f64, of: Quantity) -> Curve {
+    let mut y = trace.curve(of);
+    y.iter_mut().for_each(|y| *y *= scale);
+    Curve { name: name.into(), kind, y }
+}
+
+/// Curves along the axes x, y and z.
+fn axes(trace: &Trace, scale: f64, of: impl Fn(usize) -> Quantity) -> Vec<Curve> {
+    let names = ["x", "y", "z"].iter().enumerate();
+    names.map(|(k, name)| curve(trace, *name, Kind::Axis(k), scale, of(k))).collect()
 }
 
 fn norm(v: &[f64]) -> f64 {
     v.iter().map(|x| x * x).sum::<f64>().sqrt()
-}
-
-fn times(trace: &Trace) -> Vec<f64> {
-    trace.rows.iter().map(|row| row.time_s).collect()
-}
-
-/// Length of the rigid tool's path up to each row (m).
-fn path_lengths(trace: &Trace) -> Vec<f64> {
-    let mut length = 0.0;
-    let mut last = trace.rows.first().map_or([0.0; 3], |row| row.rigid_m);
-    let step = |row: &TraceRow| {
-        let way: [f64; 3] = std::array::from_fn(|k| row.rigid_m[k] - last[k]);
-        last = row.rigid_m;
-        length += norm(&way);
-        length
-    };
-    trace.rows.iter().map(step).collect()
 }
 
 /// All plots of a run. Empty lists (a robot without elements, a run without a twin) give no plot.
@@ -171,14 +162,9 @@ const PARTS: &str = "Links and elastic elements";
 const DRIVES: &str = "Joints and energy";
 
 fn error(trace: &Trace) -> Plot {
-    let mut curves = vec![curve(trace, "size", Kind::Total, |row| 1e3 * row.error_m())];
-    curves.extend(
-        ["x", "y", "z"]
-            .iter()
-            .enumerate()
-            .map(|(k, name)| curve(trace, *name, Kind::Axis(k), move |row| 1e3 * row.error_world[k])),
-    );
-    let mut views = one_view(Table::new(times(trace), curves, MOST_POINTS));
+    let mut curves = vec![curve(trace, "size", Kind::Total, 1e3, Quantity::ErrorSize)];
+    curves.extend(axes(trace, 1e3, Quantity::Error));
+    let mut views = one_view(Table::new(trace.curve_times(), curves, MOST_POINTS));
     let mut note = "Flexible minus rigid tool centre point, world axes.".to_owned();
     if trace.header.has_static {
         views[0].name = "error".into();
@@ -197,40 +183,32 @@ fn error(trace: &Trace) -> Plot {
 
 /// Sizes of the error and of its two parts.
 fn static_and_dynamic(trace: &Trace) -> PlotView {
-    let moving = |row: &TraceRow| -> [f64; 3] { std::array::from_fn(|c| row.error_world[c] - row.static_m[c]) };
     let curves = vec![
-        curve(trace, "size", Kind::Total, |row| 1e3 * row.error_m()),
-        curve(trace, "static", Kind::Plain, |row| 1e3 * norm(&row.static_m)),
-        curve(trace, "in motion", Kind::Plain, |row| 1e3 * norm(&moving(row))),
+        curve(trace, "size", Kind::Total, 1e3, Quantity::ErrorSize),
+        curve(trace, "static", Kind::Plain, 1e3, Quantity::StaticSize),
+        curve(trace, "in motion", Kind::Plain, 1e3, Quantity::MovingSize),
     ];
-    let table = Table::new(times(trace), curves, MOST_POINTS);
+    let table = Table::new(trace.curve_times(), curves, MOST_POINTS);
     PlotView { name: "static and in motion".into(), tables: vec![table], ..PlotView::default() }
 }
 
 fn rotation(trace: &Trace) -> Plot {
-    let mut curves = vec![curve(trace, "size", Kind::Total, |row| 1e3 * norm(&row.error_world[3..]))];
-    curves.extend(
-        ["x", "y", "z"]
-            .iter()
-            .enumerate()
-            .map(|(k, name)| curve(trace, *name, Kind::Axis(k), move |row| 1e3 * row.error_world[3 + k])),
-    );
+    let mut curves = vec![curve(trace, "size", Kind::Total, 1e3, Quantity::TurnSize)];
+    curves.extend(axes(trace, 1e3, |k| Quantity::Error(3 + k)));
     Plot {
         y_label: "rotation error",
         y_unit: "mrad",
         note: "Rotation vector from the rigid to the flexible tool, world axes.".into(),
-        views: one_view(Table::new(times(trace), curves, MOST_POINTS)),
+        views: one_view(Table::new(trace.curve_times(), curves, MOST_POINTS)),
         ..over_time("tcp_rotation", TOOL, "Rotation of the tool over time")
     }
 }
 
 fn path_curves(trace: &Trace) -> Vec<Curve> {
-    let lateral = |row: &TraceRow| 1e3 * row.error_path[1].hypot(row.error_path[2]);
-    let mut curves = vec![curve(trace, "distance from the path", Kind::Total, lateral)];
+    let mut curves = vec![curve(trace, "distance from the path", Kind::Total, 1e3, Quantity::AcrossPath)];
     let names = ["along", "normal", "binormal"];
-    curves.extend(
-        names.iter().enumerate().map(|(k, name)| curve(trace, *name, Kind::Plain, move |row| 1e3 * row.error_path[k])),
-    );
+    let parts = names.iter().enumerate();
+    curves.extend(parts.map(|(k, name)| curve(trace, *name, Kind::Plain, 1e3, Quantity::AlongPath(k))));
     curves
 }
 
@@ -239,7 +217,7 @@ fn path_over_time(trace: &Trace) -> Plot {
         y_label: "deviation",
         y_unit: "mm",
         note: "Axes of the rigid tool's path: along it, and two across that turn no more than the path makes them (the normal begins on the inside of the first bend).".into(),
-        views: one_view(Table::new(times(trace), path_curves(trace), MOST_POINTS)),
+        views: one_view(Table::new(trace.curve_times(), path_curves(trace), MOST_POINTS)),
         ..over_time("path_time", TOOL, "Deviation in path axes over time")
     }
 }
@@ -254,15 +232,15 @@ fn path_over_length(trace: &Trace) -> Plot {
         x_unit: "m",
         y_label: "deviation",
         y_unit: "mm",
-        views: one_view(Table::new(path_lengths(trace), path_curves(trace), MOST_POINTS)),
+        views: one_view(Table::new(trace.curve_ways(), path_curves(trace), MOST_POINTS)),
         ..Plot::default()
     }
 }
 
 /// Amplitudes over frequency of a stretch of the run: all axes together, then each.
-fn amplitudes(rows: &[TraceRow]) -> Option<(Vec<f64>, Vec<Curve>)> {
-    let times: Vec<f64> = rows.iter().map(|row| row.time_s).collect();
-    let signal: Vec<[f64; 3]> = rows.iter().map(|row| std::array::from_fn(|k| 1e3 * row.error_world[k])).collect();
+fn amplitudes(errors: &[(f64, [f64; 3])]) -> Option<(Vec<f64>, Vec<Curve>)> {
+    let times: Vec<f64> = errors.iter().map(|(time_s, _)| *time_s).collect();
+    let signal: Vec<[f64; 3]> = errors.iter().map(|(_, error)| error.map(|part| 1e3 * part)).collect();
     if signal.iter().flatten().any(|x| !x.is_finite()) {
         return None;
     }
@@ -285,7 +263,8 @@ fn amplitudes(rows: &[TraceRow]) -> Option<(Vec<f64>, Vec<Curve>)> {
 }
 
 fn spectrum(summary: &Summary, trace: &Trace) -> Option<Plot> {
-    let (hz, curves) = amplitudes(&trace.rows)?;
+    let errors = trace.beginning();
+    let (hz, curves) = amplitudes(&errors)?;
     // Up to where it is quiet, with the first natural frequencies in any case.
     let total = &curves[0].y;
     let largest = total.iter().copied().fold(0.0, f64::max);
@@ -297,12 +276,17 @@ fn spectrum(summary: &Summary, trace: &Trace) -> Option<Plot> {
         let curves = curves.into_iter().map(|c| Curve { y: c.y[range.clone()].to_vec(), ..c });
         Table::new(hz[range.clone()].to_vec(), curves.collect(), MOST_POINTS)
     };
-    let mut views = vec![PlotView { name: WHOLE_RUN.into(), tables: vec![shown(&hz, curves)], ..PlotView::default() }];
+    // A long run has every sample of its beginning alone.
+    let end_s = errors.last().map_or(0.0, |(time_s, _)| *time_s);
+    let is_whole = errors.len() as u64 == trace.samples();
+    let name = if is_whole { WHOLE_RUN.to_owned() } else { format!("first {end_s:.4} s") };
+    let mut views = vec![PlotView { name, tables: vec![shown(&hz, curves)], ..PlotView::default() }];
     // Without the motion in it the ringing stands alone.
     let holds = summary.tcp.iter().flat_map(|tcp| &tcp.holds).take(MOST_STOPS).enumerate();
+    let holds = holds.filter(|(_, hold)| is_whole || hold.end_s <= end_s);
     let stops = holds.filter_map(|(k, hold)| {
-        let place = |t: f64| trace.rows.partition_point(|row| row.time_s < t - 1e-9);
-        let (hz, mut curves) = amplitudes(&trace.rows[place(hold.start_s)..place(hold.end_s)])?;
+        let place = |t: f64| errors.partition_point(|(time_s, _)| *time_s < t - 1e-9);
+        let (hz, mut curves) = amplitudes(&errors[place(hold.start_s)..place(hold.end_s)])?;
         curves.truncate(1);
         (curves[0].name, curves[0].kind) = (format!("stop {}", k + 1), Kind::Plain);
         Some(shown(&hz, curves))
@@ -333,19 +317,19 @@ fn contributions(trace: &Trace) -> Option<Plot> {
     if names.is_empty() {
         return None;
     }
-    let view = |name: &str, of: fn(&[f64; 3]) -> f64| {
-        let curves = names.iter().enumerate().map(|(k, name)| {
-            curve(trace, name.clone(), Kind::Plain, |row| row.contributions.get(k).map_or(f64::NAN, |c| 1e3 * of(c)))
-        });
-        let table = Table::new(times(trace), curves.collect(), MOST_POINTS);
+    let view = |name: &str, of: &dyn Fn(usize) -> Quantity| {
+        let curves = names.iter().enumerate().map(|(k, name)| curve(trace, name.clone(), Kind::Plain, 1e3, of(k)));
+        let table = Table::new(trace.curve_times(), curves.collect(), MOST_POINTS);
         PlotView { name: name.into(), tables: vec![table], ..PlotView::default() }
     };
+    let mut views = vec![view("size", &Quantity::ContributionSize)];
+    views.extend(["x", "y", "z"].iter().enumerate().map(|(c, axis)| view(axis, &|k| Quantity::Contribution(k, c))));
     Some(Plot {
         y_label: "TCP displacement",
         y_unit: "mm",
         wide: true,
         note: "TCP displacement that the deflection of one link or drive alone causes (first order).".into(),
-        views: vec![view("size", |c| norm(c)), view("x", |c| c[0]), view("y", |c| c[1]), view("z", |c| c[2])],
+        views,
         ..over_time("contributions", PARTS, "Who moves the tool")
     })
 }
@@ -356,22 +340,13 @@ fn elements(summary: &Summary, trace: &Trace) -> Vec<Plot> {
     if names.is_empty() {
         return Vec::new();
     }
-    let make = |plot: Plot, scale: f64, of: fn(&ElasticSample) -> &[f64]| {
-        let value = |row: &TraceRow, k: usize, f: &dyn Fn(&[f64]) -> f64| {
-            row.elastic.get(k).map_or(f64::NAN, |element| scale * f(of(element)))
-        };
-        let sizes = names
-            .iter()
-            .enumerate()
-            .map(|(k, name)| curve(trace, name.clone(), Kind::Plain, |row| value(row, k, &|v| norm(v))));
-        let table = Table::new(times(trace), sizes.collect(), MOST_POINTS);
+    let make = |plot: Plot, scale: f64, size: fn(usize) -> Quantity, part: fn(usize, usize) -> Quantity| {
+        let sizes = names.iter().enumerate().map(|(k, name)| curve(trace, name.clone(), Kind::Plain, scale, size(k)));
+        let table = Table::new(trace.curve_times(), sizes.collect(), MOST_POINTS);
         let mut views = vec![PlotView { name: "all, size".into(), tables: vec![table], ..PlotView::default() }];
         for (k, name) in names.iter().enumerate() {
-            let axes = ["x", "y", "z"]
-                .iter()
-                .enumerate()
-                .map(|(c, axis)| curve(trace, *axis, Kind::Axis(c), |row| value(row, k, &|v| v[c])));
-            let table = Table::new(times(trace), axes.collect(), MOST_DETAIL);
+            let axes = axes(trace, scale, |c| part(k, c));
+            let table = Table::new(trace.curve_times(), axes, MOST_DETAIL);
             views.push(PlotView { name: name.clone(), tables: vec![table], ..PlotView::default() });
         }
         Plot { views, ..plot }
@@ -385,10 +360,25 @@ fn elements(summary: &Summary, trace: &Trace) -> Vec<Plot> {
     };
     let plot = |id, title, y_label, y_unit| Plot { y_label, y_unit, note: note.into(), ..over_time(id, PARTS, title) };
     let plots = vec![
-        make(plot("element_force", "Elastic forces", "force", "N"), 1.0, |e| &e.load[..3]),
-        make(plot("element_moment", "Elastic moments", "moment", "N m"), 1.0, |e| &e.load[3..]),
-        make(plot("element_shift", "Elastic displacements", "displacement", "mm"), 1e3, |e| &e.deflection[..3]),
-        make(plot("element_turn", "Elastic rotations", "rotation", "mrad"), 1e3, |e| &e.deflection[3..]),
+        make(plot("element_force", "Elastic forces", "force", "N"), 1.0, |k| Quantity::LoadSize(k, 0), Quantity::Load),
+        make(
+            plot("element_moment", "Elastic moments", "moment", "N m"),
+            1.0,
+            |k| Quantity::LoadSize(k, 1),
+            |k, c| Quantity::Load(k, 3 + c),
+        ),
+        make(
+            plot("element_shift", "Elastic displacements", "displacement", "mm"),
+            1e3,
+            |k| Quantity::DeflectionSize(k, 0),
+            Quantity::Deflection,
+        ),
+        make(
+            plot("element_turn", "Elastic rotations", "rotation", "mrad"),
+            1e3,
+            |k| Quantity::DeflectionSize(k, 1),
+            |k, c| Quantity::Deflection(k, 3 + c),
+        ),
     ];
     plots.into_iter().filter(|plot| !is_zero(plot)).collect()
 }
@@ -405,20 +395,17 @@ fn slides(trace: &Trace, joint: usize) -> bool {
 
 fn torques(trace: &Trace) -> Plot {
     let names = &trace.header.joints;
-    let value = |row: &[f64], k: usize| row.get(k).copied().unwrap_or(f64::NAN);
-    let all = names
-        .iter()
-        .enumerate()
-        .map(|(k, name)| curve(trace, name.clone(), Kind::Plain, move |row| value(&row.effort, k)));
-    let table = Table::new(times(trace), all.collect(), MOST_POINTS);
+    let all = names.iter().enumerate();
+    let all = all.map(|(k, name)| curve(trace, name.clone(), Kind::Plain, 1.0, Quantity::Effort(k)));
+    let table = Table::new(trace.curve_times(), all.collect(), MOST_POINTS);
     let mut views = vec![PlotView { name: "all, flexible".into(), tables: vec![table], ..PlotView::default() }];
     for (k, name) in names.iter().enumerate() {
-        let mut curves = vec![curve(trace, "flexible", Kind::Plain, |row| value(&row.effort, k))];
+        let mut curves = vec![curve(trace, "flexible", Kind::Plain, 1.0, Quantity::Effort(k))];
         if trace.header.has_rigid {
-            curves.push(curve(trace, "rigid", Kind::Dashed, |row| value(&row.rigid_effort, k)));
+            curves.push(curve(trace, "rigid", Kind::Dashed, 1.0, Quantity::RigidEffort(k)));
         }
         let y_unit = if slides(trace, k) { "N" } else { "N m" };
-        let table = Table::new(times(trace), curves, MOST_DETAIL);
+        let table = Table::new(trace.curve_times(), curves, MOST_DETAIL);
         views.push(PlotView { name: name.clone(), y_unit, tables: vec![table] });
     }
     let all_slide = !names.is_empty() && (0..names.len()).all(|k| slides(trace, k));
@@ -439,18 +426,15 @@ fn joints(trace: &Trace) -> Vec<Plot> {
     let make = |sliding: bool| {
         let names = trace.header.joints.iter().enumerate().filter(|(k, _)| slides(trace, *k) == sliding);
         let scale = if sliding { 1e3 } else { 1f64.to_degrees() };
-        let curves: Vec<Curve> = names
-            .map(|(k, name)| {
-                curve(trace, name.clone(), Kind::Plain, |row| row.q.get(k).map_or(f64::NAN, |q| scale * q))
-            })
-            .collect();
+        let curves: Vec<Curve> =
+            names.map(|(k, name)| curve(trace, name.clone(), Kind::Plain, scale, Quantity::Joint(k))).collect();
         let (id, title) =
             if sliding { ("slides", "Positions of sliding joints") } else { ("joints", "Joint positions") };
         (!curves.is_empty()).then(|| Plot {
             y_label: "position",
             y_unit: if sliding { "mm" } else { "°" },
             note: "Of the flexible robot, at the link.".into(),
-            views: one_view(Table::new(times(trace), curves, MOST_POINTS)),
+            views: one_view(Table::new(trace.curve_times(), curves, MOST_POINTS)),
             ..over_time(id, DRIVES, title)
         })
     };
@@ -459,16 +443,15 @@ fn joints(trace: &Trace) -> Vec<Plot> {
 
 fn energy(trace: &Trace) -> Plot {
     let start = trace.rows.first().map_or(0.0, |row| row.energy.potential);
-    let curves = vec![
-        curve(trace, "kinetic", Kind::Plain, |row| row.energy.kinetic),
-        curve(trace, "gravity", Kind::Plain, |row| row.energy.potential - start),
-        curve(trace, "elastic", Kind::Plain, |row| row.energy.elastic),
-    ];
+    let names = ["kinetic", "gravity", "elastic"].iter().enumerate();
+    let mut curves: Vec<Curve> =
+        names.map(|(k, name)| curve(trace, *name, Kind::Plain, 1.0, Quantity::Energy(k))).collect();
+    curves[1].y.iter_mut().for_each(|y| *y -= start);
     Plot {
         y_label: "energy",
         y_unit: "J",
         note: "Of the flexible robot; gravity from its value at the start.".into(),
-        views: one_view(Table::new(times(trace), curves, MOST_POINTS)),
+        views: one_view(Table::new(trace.curve_times(), curves, MOST_POINTS)),
         ..over_time("energy", DRIVES, "Energy")
     }
 }
@@ -518,6 +501,7 @@ pub(super) fn overlays(runs: &[(&str, &Summary, &Trace)]) -> Vec<Plot> {
 
 #[cfg(test)]
 mod tests {
+    use flexarm_log::{ElasticSample, TraceRow};
     use proptest::prelude::*;
 
     use super::*;

@@ -772,10 +772,12 @@ fn thinning(runs: &[ReportRun<'_>], drawn: &[Vec<Plot>]) -> String {
                 .to_owned(),
         );
     }
-    for run in runs.iter().filter(|run| run.trace.stride() > 1) {
-        let (stride, all) = (run.trace.stride(), run.trace.samples());
+    for run in runs.iter().filter(|run| run.trace.samples_per_block() > 1) {
+        let (size, all) = (run.trace.samples_per_block(), run.trace.samples());
         let label = escaped(run.label);
-        sentences.push(format!("{label}: plots are made of one of every {stride} of the run's {all} samples."));
+        sentences.push(format!(
+            "{label}: curves are the smallest and the largest value of each {size} of the run's {all} samples."
+        ));
     }
     match sentences.is_empty() {
         true => String::new(),

@@ -21,7 +21,10 @@ const fn height(width: usize) -> usize {
 pub(super) fn pictures(trace: &Trace, width: usize) -> Vec<Picture> {
     use flexarm_draw::{ArmSide, arm_pictures};
     let titles = ["From the side", "From the front and above"];
-    match arm_pictures(&trace.header, &trace.peak, [ArmSide::Side, ArmSide::Oblique], [width, height(width)]) {
+    let (sides, size) = ([ArmSide::Side, ArmSide::Oblique], [width, height(width)]);
+    // A long run has taken its memory; what a second thread would save is nothing to it.
+    let at_once = trace.samples_per_block() == 1;
+    match arm_pictures(&trace.header, &trace.peak, sides, size, at_once) {
         Ok(drawn) => {
             let pictures = titles.into_iter().zip(drawn);
             pictures.map(|(title, p)| Picture { title, drawn: Ok((p.png, p.axes)) }).collect()

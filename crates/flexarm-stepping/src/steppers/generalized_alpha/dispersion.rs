@@ -6,7 +6,7 @@
 //! J = M + C Sᵀ,   C = h γ' D + h² β' K                              (7)  derivative of (1) with respect to ẍ⁺
 //! S J = M + c h² K + S C Sᵀ,   J^-1 = (S J)^-1 S                    (8)  symmetric for every damping, unlike J
 //! ```
-//! Along a tree the matrix has all of it in itself: [`crate::tree_matrix`].
+//! Along a tree, and with modes, the matrix has all of it in itself: [`crate::tree_matrix`], [`crate::mode_matrix`].
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -105,8 +105,10 @@ impl DispersionCorrection {
         acceleration: &DVector<f64>,
         x_tilde: &mut DVector<f64>,
     ) {
-        if let Way::Tree(tree) = &mut matrix.way {
-            return tree.correct(acceleration, x_tilde);
+        match &mut matrix.way {
+            Way::Tree(tree) => return tree.correct(acceleration, x_tilde),
+            Way::Modes(modes) => return modes.correct(acceleration, x_tilde),
+            Way::Dense(_) => {}
         }
         self.shift.gemv(1.0, &self.M_inverse_K, acceleration, 0.0);
         x_tilde.copy_from(acceleration);
@@ -116,8 +118,10 @@ impl DispersionCorrection {
     /// What a change d of ẍ, the last solution with the matrix, adds to the change of x̃, coordinate by coordinate: a factor and
     /// numbers, together `c h² M^-1 K d`.
     pub(super) fn shift<'a>(&'a mut self, matrix: &'a IterationMatrix, d: &DVector<f64>) -> (f64, &'a DVector<f64>) {
-        if let Way::Tree(tree) = &matrix.way {
-            return (1.0, tree.shift());
+        match &matrix.way {
+            Way::Tree(tree) => return (1.0, tree.shift()),
+            Way::Modes(modes) => return (1.0, modes.shift()),
+            Way::Dense(_) => {}
         }
         self.shift.gemv(1.0, &self.M_inverse_K, d, 0.0);
         (self.c_h2, &self.shift)

@@ -1,0 +1,196 @@
+//! Curves of a long run: of each stretch of samples the smallest and the largest value.
+//!
+//! Start at [`Blocks::push`]. Memory does not grow with the run: when there are too many blocks, pairs become one.
+
+use crate::TraceRow;
+
+/// Most blocks that are kept, more than a page has points for.
+const MOST_BLOCKS: usize = 4096;
+
+/// A scalar of a run over time, as curves show it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// Component of [`TraceRow::error_world`], 0 to 5 (m, rad).
+    Error(usize),
+    /// Size of its translation (m).
+    ErrorSize,
+    /// Size of its rotation (rad).
+    TurnSize,
+    /// Component of [`TraceRow::error_path`], 0 to 2 (m).
+    AlongPath(usize),
+    /// Size of its part across the path (m).
+    AcrossPath,
+    /// Size of [`TraceRow::static_m`] (m).
+    StaticSize,
+    /// Size of the error without its static part (m).
+    MovingSize,
+    /// Component, 0 to 2, of what a contributor does to the tool (m).
+    Contribution(usize, usize),
+    /// Its size (m).
+    ContributionSize(usize),
+    /// Joint position (rad or m).
+    Joint(usize),
+    /// Joint velocity (rad/s or m/s).
+    JointRate(usize),
+    /// Force of a drive (N m or N).
+    Effort(usize),
+    /// Force of a drive of the rigid twin (N m or N).
+    RigidEffort(usize),
+    /// Component, 0 to 5, of the deflection of an element (m, rad).
+    Deflection(usize, usize),
+    /// Component, 0 to 5, of the load of an element (N, N m).
+    Load(usize, usize),
+    /// Sizes of an element's displacement (0) and rotation (1) (m, rad).
+    DeflectionSize(usize, usize),
+    /// Sizes of an element's force (0) and moment (1) (N, N m).
+    LoadSize(usize, usize),
+    /// Kinetic, gravitational, elastic energy (J).
+    Energy(usize),
+}
+
+impl Quantity {
+    /// Its value in a row; not a number if the run has no such joint, contributor or element.
+    #[must_use]
+    pub fn of(self, row: &TraceRow) -> f64 {
+        let element = |k: usize| row.elastic.get(k);
+        let number = |values: &[f64], k: usize| values.get(k).copied().unwrap_or(f64::NAN);
+        match self {
+            Self::Error(c) => row.error_world[c],
+            Self::ErrorSize => row.error_m(),
+            Self::TurnSize => norm(&row.error_world[3..]),
+            Self::AlongPath(c) => row.error_path[c],
+            Self::AcrossPath => row.error_path[1].hypot(row.error_path[2]),
+            Self::StaticSize => norm(&row.static_m),
+            Self::MovingSize => norm(&[0, 1, 2].map(|c| row.error_world[c] - row.static_m[c])),
+            Self::Contribution(k, c) => row.contributions.get(k).map_or(f64::NAN, |moved| moved[c]),
+            Self::ContributionSize(k) => row.contributions.get(k).map_or(f64::NAN, |moved| norm(moved)),
+            Self::Joint(k) => number(&row.q, k),
+            Self::JointRate(k) => number(&row.qdot, k),
+            Self::Effort(k) => number(&row.effort, k),
+            Self::RigidEffort(k) => number(&row.rigid_effort, k),
+            Self::Deflection(k, c) => element(k).map_or(f64::NAN, |element| element.deflection[c]),
+            Self::Load(k, c) => element(k).map_or(f64::NAN, |element| element.load[c]),
+            Self::DeflectionSize(k, half) => element(k).map_or(f64::NAN, |e| norm(&e.deflection[3 * half..][..3])),
+            Self::LoadSize(k, half) => element(k).map_or(f64::NAN, |e| norm(&e.load[3 * half..][..3])),
+            Self::Energy(kind) => [row.energy.kinetic, row.energy.potential, row.energy.elastic][kind],
+        }
+    }
+
+    /// All of a run with as many contributors, joints and elements as this row.
+    fn all(row: &TraceRow) -> Vec<Self> {
+        let mut all: Vec<Self> = (0..6).map(Self::Error).collect();
+        all.extend([Self::ErrorSize, Self::TurnSize, Self::AcrossPath, Self::StaticSize, Self::MovingSize]);
+        all.extend((0..3).flat_map(|c| [Self::AlongPath(c), Self::Energy(c)]));
+        for k in 0..row.contributions.len() {
+            all.extend((0..3).map(|c| Self::Contribution(k, c)).chain([Self::ContributionSize(k)]));
+        }
+        all.extend((0..row.q.len()).map(Self::Joint));
+        all.extend((0..row.qdot.len()).map(Self::JointRate));
+        all.extend((0..row.effort.len()).map(Self::Effort));
+        all.extend((0..row.rigid_effort.len()).map(Self::RigidEffort));
+        for k in 0..row.elastic.len() {
+            all.extend((0..6).flat_map(|c| [Self::Deflection(k, c), Self::Load(k, c)]));
+            all.extend((0..2).flat_map(|half| [Self::DeflectionSize(k, half), Self::LoadSize(k, half)]));
+        }
+        all
+    }
+}
+
+fn norm(v: &[f64]) -> f64 {
+    v.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+/// Smallest and largest values of all quantities in stretches of equally many samples.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Blocks {
+    quantities: Vec<Quantity>,
+    /// First and last time of each block (s).
+    times: Vec<[f64; 2]>,
+    /// Way of the rigid tool at the same times (m).
+    ways: Vec<[f64; 2]>,
+    /// Smallest and largest value of each quantity, block after block; not a number where there is none.
+    ranges: Vec<[f64; 2]>,
+    /// Samples of a full block, and of the last one.
+    size: u64,
+    filled: u64,
+    way: f64,
+    last_m: [f64; 3],
+}
+
+impl Blocks {
+    /// Whether nothing has been added.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.times.is_empty()
+    }
+
+    /// Adds a sample.
+    pub(crate) fn push(&mut self, row: &TraceRow) {
+        if self.is_empty() {
+            (self.quantities, self.size, self.last_m) = (Quantity::all(row), 1, row.rigid_m);
+        }
+        self.way += norm(&[0, 1, 2].map(|c| row.rigid_m[c] - self.last_m[c]));
+        self.last_m = row.rigid_m;
+        if self.is_empty() || self.filled == self.size {
+            if self.times.len() == MOST_BLOCKS {
+                self.halve();
+            }
+            self.times.push([row.time_s; 2]);
+            self.ways.push([self.way; 2]);
+            self.ranges.extend(self.quantities.iter().map(|_| [f64::NAN; 2]));
+            self.filled = 0;
+        }
+        self.filled += 1;
+        let last = self.times.len() - 1;
+        (self.times[last][1], self.ways[last][1]) = (row.time_s, self.way);
+        let ranges = &mut self.ranges[last * self.quantities.len()..];
+        for (range, quantity) in ranges.iter_mut().zip(&self.quantities) {
+            let value = quantity.of(row);
+            *range = wider(*range, [value; 2]);
+        }
+    }
+
+    /// Makes one block of every two.
+    fn halve(&mut self) {
+        let width = self.quantities.len();
+        for k in 0..MOST_BLOCKS / 2 {
+            self.times[k] = [self.times[2 * k][0], self.times[2 * k + 1][1]];
+            self.ways[k] = [self.ways[2 * k][0], self.ways[2 * k + 1][1]];
+            for quantity in 0..width {
+                let of = |block: usize| self.ranges[block * width + quantity];
+                self.ranges[k * width + quantity] = wider(of(2 * k), of(2 * k + 1));
+            }
+        }
+        self.times.truncate(MOST_BLOCKS / 2);
+        self.ways.truncate(MOST_BLOCKS / 2);
+        self.ranges.truncate(MOST_BLOCKS / 2 * width);
+        self.size *= 2;
+    }
+
+    /// Two values for each block: the smallest and the largest; not a number for what the run does not have.
+    pub(crate) fn values(&self, quantity: Quantity) -> Vec<f64> {
+        let Some(at) = self.quantities.iter().position(|known| *known == quantity) else {
+            return vec![f64::NAN; 2 * self.times.len()];
+        };
+        self.ranges.iter().skip(at).step_by(self.quantities.len()).flatten().copied().collect()
+    }
+
+    /// The times that belong to [`Blocks::values`] (s).
+    pub(crate) fn times(&self) -> Vec<f64> {
+        self.times.as_flattened().to_vec()
+    }
+
+    /// Way of the rigid tool at these times (m).
+    pub(crate) fn ways(&self) -> Vec<f64> {
+        self.ways.as_flattened().to_vec()
+    }
+
+    /// Samples of a block.
+    pub(crate) fn size(&self) -> u64 {
+        self.size
+    }
+}
+
+/// A range around two; what is not a number does not count.
+fn wider(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [a[0].min(b[0]), a[1].max(b[1])]
+}
