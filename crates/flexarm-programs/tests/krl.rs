@@ -173,13 +173,16 @@ fn statements_that_cannot_be_run_are_named_with_place_and_remedy() {
         ),
         (
             "PTP {X 1,Y 2,Z 3,A 0,B 0,C 0}\nPTP {A1 10}",
-            "axis 1 stays or moves on, but the position before was not told in axis values",
+            "axis 2 stays or moves on, but the position before was not told in axis values",
         ),
         ("$VEL_AXIS[2]=50\nPTP {A1 10}", "$VEL_AXIS[] differs between the axes"),
-        ("LIN_REL {B 10}", "a relative turn by B or C in the base is understood in two ways"),
+        (
+            "PTP {X 1,Y 2,Z 3,A 0,B 0,C 0}\nLIN_REL {B 10}",
+            "a relative turn by B or C in the base is understood in two ways",
+        ),
         ("PTP_SPLINE\nSPL {X 1}\nENDSPLINE", "splines of joint moves (PTP_SPLINE) are not read"),
         ("SPL {X 1,Y 2,Z 3,A 0,B 0,C 0}", "SPL stands in a SPLINE block only"),
-        ("PTP XHOME9", "`XHOME9` in `$config.dat` (`companions`)"),
+        ("PTP XHOME9", "depends on `XHOME9`, in `$config.dat` (`companions`), which only the controller knows"),
         ("IF TRUE THEN\nPTP {A1 5}", "t.src:3:1: `IF`: this block does not end: `ENDIF` is missing"),
         ("x = 1 / 0", "`1 / 0`: a division by 0"),
     ];

@@ -154,8 +154,11 @@ impl<'a, D: Dialect> Machine<'a, D> {
         self.step(span)?;
         match &statement.action {
             Action::Declare { kind, name, sizes, value } => self.declare(kind, name, sizes, value.as_ref(), span)?,
-            Action::Assign { place, value } => {
-                let value = self.value(value)?;
+            Action::Assign { place, value: expression } => {
+                let value = self.value(expression)?;
+                if value == Value::Nothing {
+                    value.clone().known(expression.span)?;
+                }
                 self.assign(place, value)?;
             }
             Action::If { branches, otherwise } => return self.branch(branches, otherwise, span),

@@ -27,7 +27,7 @@ pub(super) fn axes_value(joints: &[f64]) -> Value {
 /// A move of one line.
 pub(super) fn motion(machine: &mut Krls<'_>, word: &str, arguments: &[Argument], span: Span) -> Result<()> {
     let to_itself = ["$axis_act", "$pos_act", "$axis_for", "$pos_for", "xact"];
-    if word == "ptp" && is_name(arguments, 0, &to_itself) {
+    if matches!(word, "ptp" | "sptp") && is_name(arguments, 0, &to_itself) {
         machine.recorder.note("a move to where the robot already is (block coincidence) is passed", span);
         return Ok(());
     }

@@ -262,7 +262,7 @@ fn number(machine: &mut UrScripts<'_>, arguments: &[Argument], position: usize, 
 }
 
 /// Where a move goes: joint values, a pose, or joint values of a pose.
-fn target(machine: &mut UrScripts<'_>, value: Value, span: Span) -> Result<Target> {
+fn target(value: Value, span: Span) -> Result<Target> {
     match value.known(span)? {
         Value::Pose(pose) => {
             Ok(Target::Pose { X_BT: pose_rotation_vector(pose), configuration: Configuration::Nearest })
@@ -277,7 +277,6 @@ fn target(machine: &mut UrScripts<'_>, value: Value, span: Span) -> Result<Targe
             if joints.len() != 6 {
                 return fail(span, format!("a list of 6 joint values in rad is expected, found {}", joints.len()));
             }
-            let _ = &machine.recorder;
             Ok(Target::Joints(joints))
         }
         other => fail(
@@ -315,7 +314,7 @@ fn motion(machine: &mut UrScripts<'_>, name: &str, arguments: &[Argument], span:
     }
     let last = usize::from(name == "movec");
     let (value, at) = required(machine, arguments, last, if last == 1 { &["pose_to"] } else { &["q", "pose"] }, span)?;
-    let mut to = target(machine, value, at)?;
+    let mut to = target(value, at)?;
     let kind = match name {
         "movej" => MoveKind::Joint,
         "movec" => arc(machine, arguments, &mut to, span)?,
@@ -356,7 +355,7 @@ fn motion(machine: &mut UrScripts<'_>, name: &str, arguments: &[Argument], span:
 /// `movec(via, to, a, v, r, mode)`: mode 0 turns the tool evenly, mode 1 keeps it relative to the circle.
 fn arc(machine: &mut UrScripts<'_>, arguments: &[Argument], to: &mut Target, span: Span) -> Result<MoveKind> {
     let (value, at) = required(machine, arguments, 0, &["pose_via"], span)?;
-    let via = match target(machine, value, at)? {
+    let via = match target(value, at)? {
         Target::Pose { X_BT, .. } => X_BT,
         Target::Joints(joints) => forward(machine, &joints, at)?,
     };
