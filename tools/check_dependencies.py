@@ -69,6 +69,7 @@ MUST_NOT_KNOW = {  # crate: what its code must not have, and what it is; imports
     "flexarm-trajectory": [(r"\b(?:Robot|Mechanism|inverse_kinematics)\b", "robots and inverse kinematics")],
     "flexarm-motion-io": [(r"\b(?:Robot|Mechanism|Model)\b", "robots"), (r"\bflexarm_(?!motion_io\b|trajectory\b|settings\b)\w+", "more than trajectories")],
     "flexarm-flexlink": [FILES],
+    "flexarm-path": [FILES, (r"\b[Ss]tiffness\b", "stiffness"), (r"\bflexarm_(?!path\b|kinematics\b|spatial\b|trajectory\b|testkit\b)\w+", "more than motions")],
     "flexarm-stepping": [FILES, (r"\b(?:TcpMetrics|substitute)\b", "metrics and substitution")],
     "flexarm-analysis": [FILES, (r"\bflexarm_(?!analysis\b|kinematics\b)\w+", "other crates than the one of poses")],
     "flexarm-urdf": [(r"\b(?:inverse_dynamics|mass_matrix|forward_dynamics)\b", "dynamics")],

@@ -180,6 +180,13 @@ impl<'m> Follower<'m> {
         Some(JointJet { q, d, dd })
     }
 
+    /// Speed of the frame's origin for rates `d` of the joints, m for each unit of the parameter.
+    pub fn speed(&mut self, jet: &JointJet) -> f64 {
+        forward_kinematics(self.model, &mut self.data, &jet.q);
+        frame_jacobian(self.model, &self.data, &self.frame, &mut self.J);
+        (&self.J * &jet.d).fixed_rows::<3>(0).norm()
+    }
+
     /// How far the frame is from a curve's pose at `s`, m and rad, whichever is more.
     pub fn distance(&mut self, curve: &ToolCurve, s: f64, q: &DVector<f64>) -> f64 {
         forward_kinematics(self.model, &mut self.data, q);

@@ -157,7 +157,7 @@ pub enum Configuration {
 /// How fast a move is run. What is `None` has no bound of its own: the robot's limits and the options of the time law rule.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Speed {
-    /// Tool centre point along its path, m/s.
+    /// Tool centre point along its path, m/s; of joint moves as well.
     pub linear_m_s: Option<f64>,
     /// Tool centre point along its path, m/s².
     pub linear_m_s2: Option<f64>,
@@ -169,7 +169,7 @@ pub struct Speed {
     pub angular_rad_s2: Option<f64>,
     /// Joint moves: part of each joint's speed limit, 0 to 1.
     pub joint_fraction: Option<f64>,
-    /// Joint moves: part of each joint's acceleration limit, 0 to 1.
+    /// Part of each joint's acceleration limit, 0 to 1.
     pub joint_acceleration_fraction: Option<f64>,
     /// Joint moves: speed of the fastest joint, rad/s (`movej`'s v).
     pub joint_rad_s: Option<f64>,

@@ -48,6 +48,8 @@ pub(crate) struct Piece {
     pub(crate) stations: [usize; 2],
     /// The tool's derivatives at the stations; empty for joint moves.
     pub(crate) tool: Vec<ToolJet>,
+    /// Way of the tool for each unit of the parameter (m/m) at the stations of a joint move whose tool has a programmed speed.
+    pub(crate) travel: Vec<f64>,
     /// Least singular value and its parameter from the start of the route.
     pub(crate) least_sigma: Option<(f64, f64)>,
     pub(crate) speed: Speed,
@@ -139,6 +141,10 @@ impl Route {
             }
             _ => (straight(&stretch.way, stretch.range, &options), Vec::new(), None),
         };
+        let travel = match (&stretch.way, stretch.speed.linear_m_s) {
+            (Way::Tool { .. }, _) | (_, None) => Vec::new(),
+            (_, Some(_)) => travel(owner, &self.legs[stretch.leg], &points),
+        };
         let origin = self.stations.last().map_or(0.0, |last| last.s) - stretch.range[0];
         let first = self.stations.len().saturating_sub(1);
         for (k, (s, jet)) in points.into_iter().enumerate() {
@@ -153,9 +159,17 @@ impl Route {
         let stations = [first, self.stations.len() - 1];
         let least_sigma = sigma.map(|(value, s)| (value, origin + s));
         let Stretch { leg, is_blend, speed, .. } = stretch;
-        self.pieces.push(Piece { leg, is_blend, stations, tool, least_sigma, speed });
+        self.pieces.push(Piece { leg, is_blend, stations, tool, travel, least_sigma, speed });
         Ok(())
     }
+}
+
+/// Speed of the tool centre point for each unit of the parameter, of joints that move.
+fn travel(owner: &mut Legs<'_>, leg: &Leg, points: &[(f64, JointJet)]) -> Vec<f64> {
+    let frame = owner.tool_frame(&leg.of);
+    let near = &leg.q0;
+    let follower = owner.follower(&frame, near);
+    points.iter().map(|(_, jet)| follower.speed(jet)).collect()
 }
 
 /// What two legs that follow each other have between them.

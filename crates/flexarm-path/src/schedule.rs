@@ -347,6 +347,9 @@ fn limited(route: &Route, arm: &ProgramArm<'_>) -> Limited {
             if let Some(tool) = piece.tool.get(k - first) {
                 at.tool(&tool.V, &tool.A, piece);
             }
+            if let (Some(travel), Some(most)) = (piece.travel.get(k - first), piece.speed.linear_m_s) {
+                at.program((most / travel.max(1e-12)).powi(2));
+            }
             if let Some(torques) = &mut torques {
                 torques.add(arm, station, dd, &mut at);
             }
@@ -385,7 +388,7 @@ impl AtStation<'_> {
         let is_joint_move = piece.tool.is_empty();
         let part = |fraction: Option<f64>| if is_joint_move { fraction.unwrap_or(1.0).min(1.0) } else { 1.0 };
         let mut velocity = bounds.velocity * part(speed.joint_fraction);
-        let mut acceleration = bounds.acceleration * part(speed.joint_acceleration_fraction);
+        let mut acceleration = bounds.acceleration * speed.joint_acceleration_fraction.unwrap_or(1.0).min(1.0);
         if is_joint_move {
             velocity = velocity.min(speed.joint_rad_s.unwrap_or(f64::INFINITY));
             acceleration = acceleration.min(speed.joint_rad_s2.unwrap_or(f64::INFINITY));

@@ -240,6 +240,19 @@ fn joint_moves_lines_and_splines_blend_into_each_other_with_continuous_accelerat
     assert!(near < 1e-4, "{near}");
 }
 
+/// Truth: the tool's own path in a joint move, by differences.
+#[test]
+fn a_joint_move_with_a_speed_of_the_tool_keeps_it() {
+    let cell = Cell::new();
+    let other = [0.9, 0.3, 0.9, 0.1, 0.9, 0.0];
+    let items = vec![joints(&START), to(MoveKind::Joint, Target::Joints(other.to_vec()), feed(0.3), Blend::Stop)];
+    let planned = plan(&program(items), &cell.arm(), &PathOptions::default()).unwrap();
+    let samples = cell.sampled(&planned, 4000);
+    let speed = |p: &[Sampled]| (p[1].X.translation.vector - p[0].X.translation.vector).norm() / (p[1].t - p[0].t);
+    let top = samples.windows(2).map(speed).fold(0.0, f64::max);
+    assert!((top - 0.3).abs() < 1e-3, "{top}");
+}
+
 #[test]
 fn torque_limits_are_kept_by_inverse_dynamics() {
     let cell = Cell::new();
