@@ -115,8 +115,7 @@ fn the_tool_keeps_to_a_square_with_stops_at_every_moment_and_not_at_knots_alone(
         let step = pair[1].X.translation.vector - pair[0].X.translation.vector;
         top = top.max(step.norm() / (pair[1].t - pair[0].t));
     }
-    println!("off {off:.1e} m, turned {turned:.1e} rad, top {top}");
-    assert!(off < 1e-9 && turned < 1e-9, "off {off:.1e}, turned {turned:.1e}");
+    assert!(off < 1e-9 && turned < 1e-9, "off {off:.1e}, turned {turned:.1e}"); // measured 7.9e-11 m, 4.0e-11 rad
     assert!((top - 0.25).abs() < 2.5e-4, "{top}");
     // Truth: four sides of 0.2 m: v/a + L/v each, and a rise of 0.05 s.
     let truth = 4.0 * (0.25 / 2.0 + 0.2 / 0.25 + 0.05);
@@ -145,10 +144,9 @@ fn a_blend_leaves_the_corner_within_its_distance_and_the_path_without_a_stop() {
             off = off.max(distance);
         }
     }
-    // The quintic passes a right angle at 0.2652 of its reach: 3/8 of the diagonal of the cut corner.
-    println!("passes the corner at {:.3} mm, off {off:.1e}", near_corner * 1e3);
+    // By hand: the quintic passes a right angle at 0.265 of its reach.
     assert!(off < 1e-9, "{off:.1e}");
-    assert!(near_corner > 0.003 && near_corner < 0.01);
+    assert!(near_corner > 0.003 && near_corner < 0.01); // measured 5.3 mm
     let inner = &samples[samples.len() / 10..samples.len() * 9 / 10];
     let slowest =
         inner.windows(2).map(|p| (p[1].X.translation.vector - p[0].X.translation.vector).norm() / (p[1].t - p[0].t));
@@ -166,7 +164,6 @@ fn joint_limits_slow_a_line_and_say_which_joint_it_is() {
     let planned = plan(&program(items), &arm, &PathOptions::default()).unwrap();
     let samples = cell.sampled(&planned, 4001);
     let fastest = samples.iter().map(|s| s.v[0].abs()).fold(0.0, f64::max);
-    println!("fastest {fastest}");
     assert!(fastest < 0.2 * 1.002 && fastest > 0.2 * 0.99, "{fastest}");
     let slowed = planned.moves[0].slowed.as_ref().unwrap();
     assert!(
@@ -229,8 +226,7 @@ fn joint_moves_lines_and_splines_blend_into_each_other_with_continuous_accelerat
     // Two samples 0.2 ms apart differ by the jerk alone.
     let jump = samples.windows(2).flat_map(|p| (0..6).map(move |k| (p[1].a[k] - p[0].a[k]).abs())).fold(0.0, f64::max);
     let dt = samples[1].t;
-    println!("largest step of acceleration {jump:.2} rad/s² in {dt:.1e} s");
-    assert!(jump < 1.0, "{jump}");
+    assert!(jump < 1.0, "{jump}"); // measured 0.22 rad/s²
     assert!(planned.trajectory.velocity_jumps().is_empty());
     let speed = samples.iter().rev().take(1000).flat_map(|s| s.v).map(f64::abs).fold(0.0, f64::max);
     assert!(speed <= 1.5 * 1.002);
@@ -289,7 +285,6 @@ fn torque_limits_are_kept_by_inverse_dynamics() {
     // Four fifths of what the free run asks of joint 1, on which gravity does not act.
     arm.bounds[0].torque = Some(0.8 * free[0]);
     let bound = torque(&line(&arm).unwrap());
-    println!("free {:.1}, bound {:.1} N m", free[0], bound[0]);
     assert!(bound[0] < 0.8 * free[0] * 1.003 && bound[0] > 0.8 * free[0] * 0.95);
 }
 
@@ -301,7 +296,6 @@ fn a_program_that_begins_with_a_line_or_leaves_the_reach_is_refused_with_its_lin
     let run = |items| plan(&program(items), &cell.arm(), &PathOptions::default()).unwrap_err();
     assert!(matches!(run(vec![line([0.0, 0.1, 0.0])]), PathError::NoStart { line: 1, .. }));
     let far = run(vec![joints(&START), line([0.0, 0.0, 9.0])]);
-    println!("{far}");
     assert!(matches!(far, PathError::Blocked { .. }));
     assert!(matches!(run(vec![joints(&[0.0; 7])]), PathError::Axes { found: 7, axes: 6, .. }));
     assert!(matches!(run(vec![]), PathError::NoMove));
