@@ -193,6 +193,31 @@ reduced = "bar.flex"
 model = "MODEL"
 """
 
+PATH_FILE = """format = 1
+[path]
+lengths = "mm"
+angles = "deg"
+base = { xyz = [0.0, 0.0, 100.0], rpy = [0.0, 0.0, 0.0] }
+speed = 250.0
+acceleration = 2000.0
+jerk = 40000.0
+blend = 8.0
+[limits]
+joint_1 = { acceleration = 200.0 }
+[[move]]
+joints = [0, -60, 90, 0, 60, 0]
+[[move]]
+line = [1700, 0, 1300]
+rpy = [0, 90, 0]
+[[move]]
+arc = [1700, 100, 1300]
+via = [1750, 50, 1300]
+[[move]]
+spline = [[1650, 100, 1350], [1650, 0, 1350]]
+[[move]]
+dwell = 0.1
+"""
+
 MOTION = """format = 1
 unit = "deg"
 metres = []
@@ -538,6 +563,13 @@ def own_targets():
                  "bag_messages_packed/bag_messages_packed.db3", "bag_file_packed/bag_file_packed.db3.zstd"):
         own = Path(name).name
         targets.append(Target(f"motion-{own}", own, {own: (motions / name).read_bytes()}, [["motion", own, "--json"], ["motion", own, "--json", "-o", "other.csv", "--force"]]))
+    arm = str(ROOT / "robots/kr210_identified")
+    targets.append(Target("path-toml", "path.toml", {"path.toml": PATH_FILE}, [["motion", "path.toml", arm, "--json"]], True))
+    programs = ROOT / "crates/flexarm-programs/tests/data"
+    for name in ("shapes.src", "pendant.src", "pendant.dat", "cell.mod", "pick.script", "plate.ngc"):
+        beside = {"pendant.src": "pendant.dat", "pendant.dat": "pendant.src"}.get(name)
+        files = {own: (programs / own).read_bytes() for own in (name, beside) if own}
+        targets.append(Target(f"program-{name}", name, files, [["motion", name.replace(".dat", ".src"), arm, "--json"]]))
     hdf5 = ROOT / "tools/fuzz_seeds/exudyn.hdf5"
     if hdf5.exists():
         words = ["--map", "A=plane(0,0,0;1,0,0),B=plane(0.8,0,0;1,0,0)"]

@@ -311,6 +311,10 @@ pub(crate) enum PageName {
     Robot,
     /// Motions: waypoints, samples and tables, messages and bags of ROS
     Motion,
+    /// Motions told by the path of the tool, standard motions (.toml)
+    Path,
+    /// Robot programs: KUKA KRL, ABB RAPID, URScript, G-code
+    Program,
     /// What acts on the arm during a run (.toml)
     Loads,
     #[value(help = formats::help_page())]
@@ -324,6 +328,8 @@ impl PageName {
         match self {
             Self::Robot => include_str!("../../../docs/robot-file.md"),
             Self::Motion => include_str!("../../../docs/motions.md"),
+            Self::Path => include_str!("../../../docs/paths.md"),
+            Self::Program => include_str!("../../../docs/programs.md"),
             Self::Loads => include_str!("../../../docs/loads.md"),
             Self::Recordings => include_str!("../../../docs/recordings.md"),
             Self::Flex => include_str!("../../flexarm-fem/src/flex_file/format.md"),
