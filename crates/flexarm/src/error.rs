@@ -75,12 +75,14 @@ pub enum Error {
     #[error(transparent)]
     Program(#[from] Box<flexarm_programs::ProgramError>),
     /// A path of the tool that the arm cannot follow.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {source}{}", path.display(), assumed(notes))]
     Path {
         /// The motion.
         path: PathBuf,
         /// Where and why.
         source: Box<flexarm_path::PathError>,
+        /// What was assumed before.
+        notes: Vec<String>,
     },
     /// Something in a motion of another program.
     #[error(transparent)]
@@ -191,6 +193,16 @@ impl Error {
             Self::Log(_) => Fault::Run,
             _ => Fault::Input,
         }
+    }
+}
+
+/// Assumptions that may be the reason, below the reason itself.
+fn assumed(notes: &[String]) -> String {
+    let lines: String = notes.iter().map(|note| format!("\n  {note}")).collect();
+    if lines.is_empty() {
+        lines
+    } else {
+        format!("\nwhat was assumed of the program (a path file with [program] tells more):{lines}")
     }
 }
 

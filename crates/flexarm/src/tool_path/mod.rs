@@ -9,7 +9,7 @@ mod standard;
 use std::path::Path;
 
 use flexarm_kinematics::{Frame, Model, Pose};
-use flexarm_path::program::Program;
+use flexarm_path::program::{Note, Program};
 use flexarm_path::{JointBounds, PathOptions, PlannedMove, ProgramArm, Slowed, SlowedBy, coordinates_of, plan};
 use flexarm_trajectory::Trajectory;
 use nalgebra::DVector;
@@ -142,8 +142,10 @@ impl ToolPath {
         options: &PathOptions,
         mut warnings: Vec<String>,
     ) -> Result<(Trajectory, Self), Error> {
-        let planned = plan(program, arm, options)
-            .map_err(|source| Error::Path { path: file.to_owned(), source: Box::new(source) })?;
+        let planned = plan(program, arm, options).map_err(|source| {
+            let notes = program.notes.iter().take(TOLD).map(noted).collect();
+            Error::Path { path: file.to_owned(), source: Box::new(source), notes }
+        })?;
         let stops = planned.stops.iter().map(|(line, why)| format!("line {line}: no blend: {why}")).collect();
         warnings.extend(first_of(stops));
         let held = planned.held.join(", ");
@@ -164,8 +166,7 @@ impl ToolPath {
             ))
         });
         warnings.extend(first_of(near.collect()));
-        let place = |line: Option<usize>| line.map_or_else(String::new, |line| format!("line {line}: "));
-        let notes = program.notes.iter().map(|note| format!("{}{}", place(note.line), note.text)).collect();
+        let notes = program.notes.iter().map(noted).collect();
         Ok((planned.trajectory, Self { moves: planned.moves, file: file.display().to_string(), warnings, notes }))
     }
 
@@ -175,6 +176,11 @@ impl ToolPath {
         let notes = self.notes.iter().map(|text| said(text).as_note());
         self.warnings.iter().map(said).chain(notes).collect()
     }
+}
+
+fn noted(note: &Note) -> String {
+    let place = note.line.map_or_else(String::new, |line| format!("line {line}: "));
+    format!("{place}{}", note.text)
 }
 
 /// The first few of a list, and how many are left out.
