@@ -90,7 +90,7 @@ fn text(report: &MotionReport) -> String {
     out += &format!("\n{} s, {} joints", rounded(report.duration_s), report.joints.len());
     out += &report.samples.map_or_else(String::new, |samples| format!(", {samples} samples"));
     if let (Some(length), Some(speed)) = (report.tcp_length_m, report.tcp_speed_m_s) {
-        out += &format!("; way of the tool {length:.4} m, up to {:.1} mm/s", 1e3 * speed);
+        out += &format!("; path of the tool {length:.4} m, up to {:.1} mm/s", 1e3 * speed);
     }
     out += "\n\n";
     out += &peaks(&report.peaks);

@@ -541,7 +541,7 @@ fn directions(side: ArmSide, rigid: &TwinSample) -> (Vector3<f64>, Vector3<f64>)
     }
 }
 
-/// The way of the tool.
+/// The path of the tool.
 fn arrow(image: &mut Image, view: &View, unit: f64, from: &Vector3<f64>, to: &Vector3<f64>) {
     let [a, b] = [view.project(from), view.project(to)].map(|[x, y, _]| [x, y]);
     if (b[0] - a[0]).hypot(b[1] - a[1]) > 2.0 * unit {
@@ -594,7 +594,7 @@ fn legend(image: &mut Image, view: &View, unit: f64, header: &RunHeader, factor:
     image.text("rigid arm", [x + 1.5 * swatch, y], Align::Left, text(13.0));
     let next = x + 1.5 * swatch + text_width("rigid arm", text(13.0)) + 1.6 * swatch;
     image.arrow([next, y - 4.0 * unit], [next + 24.0 * unit, y - 4.0 * unit], 3.0 * unit, ARROW);
-    image.text("way of the tool", [next + 32.0 * unit, y], Align::Left, text(13.0));
+    image.text("path of the tool", [next + 32.0 * unit, y], Align::Left, text(13.0));
 }
 
 /// A number without needless digits.

@@ -1,4 +1,4 @@
-//! What is in a motion: peaks against limits, torques of the rigid robot, the way of the tool, curves; and the motion in
+//! What is in a motion: peaks against limits, torques of the rigid robot, the path of the tool, curves; and the motion in
 //! another format.
 
 use std::path::{Path, PathBuf};
@@ -50,7 +50,7 @@ pub struct MotionReport {
     pub peaks: Vec<MotionPeak>,
     /// Limits that are passed, with a robot.
     pub violations: Vec<MotionViolation>,
-    /// Length of the way of the tool (m), with a robot.
+    /// Length of the path of the tool (m), with a robot.
     pub tcp_length_m: Option<f64>,
     /// Largest speed of the tool (m/s), with a robot.
     pub tcp_speed_m_s: Option<f64>,
@@ -359,7 +359,7 @@ impl Torques {
     }
 }
 
-/// Length of the way of the tool (m) and its largest speed (m/s), from chords; what they leave out of the length is taken from
+/// Length of the path of the tool (m) and its largest speed (m/s), from chords; what they leave out of the length is taken from
 /// chords of twice the step (error of the fourth order in the step).
 fn way_of_tool(trajectory: &Trajectory, model: &Model) -> (f64, f64) {
     let (mut data, tcp) = (Data::new(model), tcp_frame(model));
@@ -492,7 +492,7 @@ fn plot(report: &MotionReport, trajectory: &Trajectory, torques: &Torques) -> Re
         None => report.motion.clone(),
     };
     let mut notes = vec![format!("{}, {:.4} s", report.format, report.duration_s)];
-    notes.extend(report.tcp_length_m.map(|length| format!("way of the tool {length:.4} m")));
+    notes.extend(report.tcp_length_m.map(|length| format!("path of the tool {length:.4} m")));
     let plot = LinePlot { title: &title, notes: &notes, x_label: "time [s]", panels: &panels, ..LinePlot::default() };
     plot.svg().map_err(|error| Error::File { path: report.motion.clone().into(), what: error.to_string() })
 }

@@ -105,9 +105,9 @@ fn body(main: &ReportRun<'_>, runs: &[ReportRun<'_>], thinning: &str) -> String 
         body += &comparison(runs);
     }
     body += &arm_pictures(runs);
+    body += &tool_path(main);
     body += "<section id=\"plots\"><noscript><p>The plots need JavaScript.</p></noscript></section>\n";
     body += thinning;
-    body += &tool_path(main);
     body += &iso_table(runs);
     let of = if runs.len() > 1 { format!(" of {}", escaped(main.label)) } else { String::new() };
     body += &stops_table(main.summary, &of);
@@ -516,7 +516,7 @@ fn picture_key(header: &RunHeader) -> String {
         _ => format!("Deflections magnified {} times", number(factor, 3)),
     };
     let mut out = format!(
-        "<div class=\"key-of-arm\"><p>{how}. <i class=\"ghost\"></i>rigid arm, <i class=\"way\"></i>way of the tool.</p>"
+        "<div class=\"key-of-arm\"><p>{how}. <i class=\"ghost\"></i>rigid arm, <i class=\"way\"></i>path of the tool.</p>"
     );
     let colors: Vec<String> = scale_colors().into_iter().map(hex).collect();
     if header.color_scale_m > 0.0 && !colors.is_empty() {
