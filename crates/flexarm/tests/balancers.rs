@@ -29,7 +29,7 @@ fn the_counterbalance_of_the_kr300_turns_joint_2_as_its_formula_says() {
         let pressure = 1.01 * 296.8 * 328.0 * 0.159 / (0.00096 - (L - 0.6) * area);
         let torque = D * k * delta.sin() / L * pressure * area;
         let found = with.gravity_torque[1] - without.gravity_torque[1];
-        // measured 6e-8 N m: the digits of the robot file
+        // measured 2.1e-8 N m: the digits of the robot file
         assert!((found - torque).abs() < 1e-5, "{found} {torque}");
         let info = &with.balancers[0];
         assert!((info.length - L).abs() < 1e-10 && (info.torque[1] + torque).abs() < 1e-5);
@@ -85,11 +85,9 @@ fn a_run_of_the_kr300_keeps_the_books_with_its_counterbalance() {
     let alpha = arm.simulate(&motion, &options(StepperKind::default())).unwrap();
     assert!(alpha.summary.caveats.iter().all(|c| c.code != "energy-open"), "{:?}", alpha.summary.caveats);
     let spook = arm.simulate(&motion, &options(spook)).unwrap();
-    let worst = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-    let (a, b) = (alpha.error_world_m(), spook.error_world_m());
-    let peak = a.iter().fold(0.0f64, |m, x| m.max(x.abs()));
-    // measured 1e-4 m of 1e-3 m
-    assert!(peak > 3e-4 && worst(a, b) < 0.2 * peak, "{peak} {}", worst(a, b));
+    let [a, b] = [&alpha, &spook].map(|run| run.summary.tcp.as_ref().unwrap().peak_m);
+    // measured 1.1983 and 1.1980 mm
+    assert!(a > 3e-4 && (a / b - 1.0).abs() < 5e-3, "{a} {b}");
 }
 
 /// The robot of the examples with an entry more; the message.
