@@ -368,13 +368,13 @@ fn a_stream_of_single_points_is_the_way_through_them() {
     let mut worst = 0.0f64;
     for k in 0..990 {
         let t = 0.001 * f64::from(k);
-        // Where one comes early, the way to the point before is left a little before it.
+        // Where one comes early, the way to the point before is left a little before it; measured 5.5e-6.
         worst = worst.max((at(&motion, t)[0] - goal(t + 0.01)).abs());
     }
     println!("stream of points: {worst:.1e} rad");
-    assert!(worst < 1e-4, "{worst:e}");
+    assert!(worst < 2e-5, "{worst:e}");
     let fastest = motion.trajectory.peak()[0].velocity.value;
-    // Of 0.6 rad/s; with a stop before every late point it would be 0.9.
+    // The goal has 0.6 rad/s; stops before late points would have to be made up for.
     assert!(fastest < 0.65, "{fastest}");
     // One that comes half-way: the joint is between the points of the one before, and turns round.
     let plan = |sec: f64, to: f64| {
