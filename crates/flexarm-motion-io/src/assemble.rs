@@ -466,6 +466,11 @@ impl Line {
             }
             return;
         }
+        // A stream of points comes now and then a little late, and goes on.
+        let step = keep.checked_sub(2).map_or(first.time_s, |before| t - self.t[before]);
+        if first.time_s > 0.0 && gap < 0.5 * step {
+            return;
+        }
         let joins = first.position.get(column).is_some_and(|next| (next - q).abs() <= MEET);
         // A hold is two steps without motion; where the message begins elsewhere at once, it goes there within the gap.
         if first.time_s > 0.0 || joins {

@@ -1,6 +1,7 @@
 //! One motion in every format, as the Python packages of ROS wrote it (`tools/make_motion_fixtures.py`): the same samples as
 //! those of our own CSV.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+#![allow(clippy::print_stdout, reason = "measured errors, with --nocapture")]
 
 use std::path::{Path, PathBuf};
 
@@ -354,7 +355,8 @@ fn a_stream_of_single_points_is_the_way_through_them() {
     let goal = |t: f64| 0.3 * (2.0 * t).sin();
     let text: String = (0..100)
         .map(|k| {
-            let ns = 10_000_000 * k;
+            // Now and then a little late, as messages are; the goal is that of the time.
+            let ns = 10_000_000 * k + [0, 200_000, 0, 350_000][k as usize % 4];
             let q = goal(1e-9 * (ns + 10_000_000) as f64);
             format!(
                 "header: {{stamp: {{sec: 7, nanosec: {ns}}}}}\njoint_names: [joint_1]\npoints:\n- {{positions: [{q:?}], \
@@ -363,12 +365,17 @@ fn a_stream_of_single_points_is_the_way_through_them() {
         })
         .collect();
     let motion = read_text(&text, "servo", &ROBOT).unwrap();
-    assert_eq!((motion.samples, motion.trajectory.duration()), (100, 0.99));
+    let mut worst = 0.0f64;
     for k in 0..990 {
         let t = 0.001 * f64::from(k);
-        // Measured 1.5e-6, at the ends of the spline.
-        assert!((at(&motion, t)[0] - goal(t + 0.01)).abs() < 1e-5, "{t}");
+        // Where one comes early, the way to the point before is left a little before it; measured 5.5e-6.
+        worst = worst.max((at(&motion, t)[0] - goal(t + 0.01)).abs());
     }
+    println!("stream of points: {worst:.1e} rad");
+    assert!(worst < 2e-5, "{worst:e}");
+    let fastest = motion.trajectory.peak()[0].velocity.value;
+    // The goal has 0.6 rad/s; stops before late points would have to be made up for.
+    assert!(fastest < 0.65, "{fastest}");
     // One that comes half-way: the joint is between the points of the one before, and turns round.
     let plan = |sec: f64, to: f64| {
         format!(

@@ -1,5 +1,6 @@
 //! Tables of other programs: the same motion in every dialect, and what a table may not leave open.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap is a failed test")]
+#![allow(clippy::print_stdout, reason = "measured errors, with --nocapture")]
 
 use std::f64::consts::PI;
 
