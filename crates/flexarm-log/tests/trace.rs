@@ -41,6 +41,9 @@ fn wave(k: u64) -> Sample {
     sample
 }
 
+/// A quantity, and what it is of a sample.
+type Truth = (Quantity, fn(&Sample) -> f64);
+
 /// Truth: the samples themselves. Every range of a block holds its samples, and the extremes are those of the run.
 #[test]
 fn curves_of_a_long_run_lose_no_peak() {
@@ -49,7 +52,7 @@ fn curves_of_a_long_run_lose_no_peak() {
     (0..ALL).for_each(|k| trace.push(&wave(k)));
     let size = trace.samples_per_block();
     assert!(size >= ALL / 4096 && size.is_power_of_two(), "{size}");
-    let quantities: [(Quantity, fn(&Sample) -> f64); 6] = [
+    let quantities: [Truth; 6] = [
         (Quantity::ErrorSize, |s| s.error_world[1].abs()),
         (Quantity::MovingSize, |s| s.error_world[1].hypot(s.static_m[0])),
         (Quantity::ContributionSize(0), |s| 5.0 * s.error_world[1].abs()),
