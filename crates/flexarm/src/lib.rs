@@ -128,7 +128,7 @@ pub use flexarm_analysis::{Quantity, Spacing};
 pub use flexarm_files::FileError;
 pub use flexarm_kinematics::{LinkInertia, Pose, Wrench};
 pub use flexarm_linkmaker::{ImportError, JobError, LinkError, export, import};
-pub use flexarm_log::{Column, Columns, FormatInfo, Holds, RecordingFormat, Sample, Trace};
+pub use flexarm_log::{Column, Columns, CurveQuantity, FormatInfo, Holds, RecordingFormat, Sample, Trace};
 pub use flexarm_settings::{Names, Setting, name_settings};
 pub use flexarm_stepping::{
     AlphaSettings, ConstraintForm, InertiaChange, Load, LoadAxes, OperatingPoint, ReferenceMethod, ReferenceSettings,
