@@ -95,4 +95,4 @@ pub use record::*;
 #[cfg(feature = "rerun")]
 pub use rrd_file::{RrdRecorder, RrdStudy, StudySeat};
 pub use trace::{RunSource, Trace, TraceRow};
-pub use trace_blocks::Quantity;
+pub use trace_blocks::CurveQuantity;

@@ -1,6 +1,6 @@
 //! A run in memory: what reports, overlays and conversions draw from.
 
-use crate::trace_blocks::{Blocks, Quantity};
+use crate::trace_blocks::{Blocks, CurveQuantity};
 use crate::{Event, LogError, RunHeader, RunResult, Sample};
 
 /// A run as columns of scalars, with the sample of the largest error.
@@ -178,7 +178,7 @@ impl Trace {
     /// A curve: a value for each row or, in a long run, smallest and largest value of each block. What a run does not have is
     /// not a number.
     #[must_use]
-    pub fn curve(&self, quantity: Quantity) -> Vec<f64> {
+    pub fn curve(&self, quantity: CurveQuantity) -> Vec<f64> {
         match self.blocks.is_empty() {
             true => self.rows.iter().map(|row| quantity.of(row)).collect(),
             false => self.blocks.values(quantity),

@@ -9,7 +9,7 @@ const MOST_BLOCKS: usize = 4096;
 
 /// A scalar of a run over time, as curves show it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Quantity {
+pub enum CurveQuantity {
     /// Component of [`TraceRow::error_world`], 0 to 5 (m, rad).
     Error(usize),
     /// Size of its translation (m).
@@ -48,7 +48,7 @@ pub enum Quantity {
     Energy(usize),
 }
 
-impl Quantity {
+impl CurveQuantity {
     /// Its value in a row; not a number if the run has no such joint, contributor or element.
     #[must_use]
     pub fn of(self, row: &TraceRow) -> f64 {
@@ -103,7 +103,7 @@ fn norm(v: &[f64]) -> f64 {
 /// Smallest and largest values of all quantities in stretches of equally many samples.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Blocks {
-    quantities: Vec<Quantity>,
+    quantities: Vec<CurveQuantity>,
     /// First and last time of each block (s).
     times: Vec<[f64; 2]>,
     /// Way of the rigid tool at the same times (m).
@@ -126,7 +126,7 @@ impl Blocks {
     /// Adds a sample.
     pub(crate) fn push(&mut self, row: &TraceRow) {
         if self.is_empty() {
-            (self.quantities, self.size, self.last_m) = (Quantity::all(row), 1, row.rigid_m);
+            (self.quantities, self.size, self.last_m) = (CurveQuantity::all(row), 1, row.rigid_m);
         }
         self.way += norm(&[0, 1, 2].map(|c| row.rigid_m[c] - self.last_m[c]));
         self.last_m = row.rigid_m;
@@ -167,7 +167,7 @@ impl Blocks {
     }
 
     /// Two values for each block: the smallest and the largest; not a number for what the run does not have.
-    pub(crate) fn values(&self, quantity: Quantity) -> Vec<f64> {
+    pub(crate) fn values(&self, quantity: CurveQuantity) -> Vec<f64> {
         let Some(at) = self.quantities.iter().position(|known| *known == quantity) else {
             return vec![f64::NAN; 2 * self.times.len()];
         };

@@ -1,6 +1,6 @@
 //! What a run in memory keeps of its samples.
 
-use flexarm_log::{ElasticSample, Quantity, RunHeader, Sample, Trace};
+use flexarm_log::{CurveQuantity, ElasticSample, RunHeader, Sample, Trace};
 
 /// Truth: counting. Two and a half times as many samples as are kept are halved twice: one of four is kept, evenly, and the
 /// largest error is kept although its sample is not.
@@ -41,6 +41,9 @@ fn wave(k: u64) -> Sample {
     sample
 }
 
+/// A quantity, and what it is of a sample.
+type Truth = (CurveQuantity, fn(&Sample) -> f64);
+
 /// Truth: the samples themselves. Every range of a block holds its samples, and the extremes are those of the run.
 #[test]
 fn curves_of_a_long_run_lose_no_peak() {
@@ -49,13 +52,13 @@ fn curves_of_a_long_run_lose_no_peak() {
     (0..ALL).for_each(|k| trace.push(&wave(k)));
     let size = trace.samples_per_block();
     assert!(size >= ALL / 4096 && size.is_power_of_two(), "{size}");
-    let quantities: [(Quantity, fn(&Sample) -> f64); 6] = [
-        (Quantity::ErrorSize, |s| s.error_world[1].abs()),
-        (Quantity::MovingSize, |s| s.error_world[1].hypot(s.static_m[0])),
-        (Quantity::ContributionSize(0), |s| 5.0 * s.error_world[1].abs()),
-        (Quantity::Load(0, 4), |s| -s.error_world[1]),
-        (Quantity::DeflectionSize(0, 1), |s| 3f64.sqrt() * s.error_world[1].abs()),
-        (Quantity::Joint(0), |s| s.flexible.q[0]),
+    let quantities: [Truth; 6] = [
+        (CurveQuantity::ErrorSize, |s| s.error_world[1].abs()),
+        (CurveQuantity::MovingSize, |s| s.error_world[1].hypot(s.static_m[0])),
+        (CurveQuantity::ContributionSize(0), |s| 5.0 * s.error_world[1].abs()),
+        (CurveQuantity::Load(0, 4), |s| -s.error_world[1]),
+        (CurveQuantity::DeflectionSize(0, 1), |s| 3f64.sqrt() * s.error_world[1].abs()),
+        (CurveQuantity::Joint(0), |s| s.flexible.q[0]),
     ];
     let times = trace.curve_times();
     for (quantity, truth) in quantities {
@@ -72,7 +75,9 @@ fn curves_of_a_long_run_lose_no_peak() {
             assert_eq!(times[2 * block..2 * block + 2], ends);
         }
     }
-    assert!(trace.curve(Quantity::Joint(1)).iter().chain(&trace.curve(Quantity::Effort(0))).all(|x| x.is_nan()));
+    assert!(
+        trace.curve(CurveQuantity::Joint(1)).iter().chain(&trace.curve(CurveQuantity::Effort(0))).all(|x| x.is_nan())
+    );
     // There and back: 9.9 m in a hundred samples forth, 9.9 m back.
     let ways = trace.curve_ways();
     let way = (1..ALL).map(|k| if k % 100 == 0 { 9.9 } else { 0.1 }).sum::<f64>();
@@ -86,6 +91,6 @@ fn curves_of_a_short_run_are_its_samples() {
     let mut trace = Trace::new(RunHeader::default());
     (0..1000).for_each(|k| trace.push(&wave(k)));
     let truth: Vec<f64> = (0..1000).map(|k| wave(k).flexible.q[0]).collect();
-    assert_eq!((trace.curve(Quantity::Joint(0)), trace.samples_per_block()), (truth, 1));
+    assert_eq!((trace.curve(CurveQuantity::Joint(0)), trace.samples_per_block()), (truth, 1));
     assert_eq!(trace.beginning().len(), 1000);
 }

@@ -29,7 +29,7 @@ pub(crate) enum Way {
     /// Along the tree, with s.
     Tree(TreeInverse),
     /// Modes first, with s.
-    Modes(ModeInverse),
+    Modes(Box<ModeInverse>),
 }
 
 /// `(S + C)^-1 B`; as read, `S = M`, `C = c_D D + c_K K` and `B = 1`. All are n × n and symmetric but B.
@@ -95,7 +95,7 @@ impl IterationMatrix {
             if system.along_tree(c_D, c_K, &mut tree.matrices) {
                 return;
             }
-            self.way = Way::Modes(ModeInverse::default());
+            self.way = Way::Modes(Box::default());
         }
         if let Way::Modes(modes) = &mut self.way {
             if system.with_modes(c_D, c_K, &mut modes.matrices) {

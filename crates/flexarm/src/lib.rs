@@ -138,7 +138,7 @@ pub use flexarm_analysis::{Quantity, Spacing};
 pub use flexarm_files::FileError;
 pub use flexarm_kinematics::{BalancerCurve, BalancerCurveError, BalancerLaw, GasLaw, LinkInertia, Pose, Wrench};
 pub use flexarm_linkmaker::{ImportError, JobError, LinkError, export, import};
-pub use flexarm_log::{Column, Columns, FormatInfo, Holds, RecordingFormat, Sample, Trace};
+pub use flexarm_log::{Column, Columns, CurveQuantity, FormatInfo, Holds, RecordingFormat, Sample, Trace};
 pub use flexarm_motion_io::MotionError;
 pub use flexarm_path::{PathError, PlannedMove, Slowed, SlowedBy};
 pub use flexarm_settings::{Names, Setting, name_settings};

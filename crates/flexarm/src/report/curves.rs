@@ -1,7 +1,7 @@
 //! The data of the plots: curves of a run, in readable units, thinned so that peaks stay.
 
 use flexarm_analysis::amplitude_spectrum;
-use flexarm_log::{Quantity, Trace};
+use flexarm_log::{CurveQuantity, Trace};
 
 use crate::summary::Summary;
 
@@ -114,14 +114,14 @@ pub(super) fn thinned(curves: &[&[f64]], length: usize, most: usize) -> Vec<usiz
 }
 
 /// A curve of a run, in the unit that is `scale` times smaller.
-fn curve(trace: &Trace, name: impl Into<String>, kind: Kind, scale: f64, of: Quantity) -> Curve {
+fn curve(trace: &Trace, name: impl Into<String>, kind: Kind, scale: f64, of: CurveQuantity) -> Curve {
     let mut y = trace.curve(of);
     y.iter_mut().for_each(|y| *y *= scale);
     Curve { name: name.into(), kind, y }
 }
 
 /// Curves along the axes x, y and z.
-fn axes(trace: &Trace, scale: f64, of: impl Fn(usize) -> Quantity) -> Vec<Curve> {
+fn axes(trace: &Trace, scale: f64, of: impl Fn(usize) -> CurveQuantity) -> Vec<Curve> {
     let names = ["x", "y", "z"].iter().enumerate();
     names.map(|(k, name)| curve(trace, *name, Kind::Axis(k), scale, of(k))).collect()
 }
@@ -162,8 +162,8 @@ const PARTS: &str = "Links and elastic elements";
 const DRIVES: &str = "Joints and energy";
 
 fn error(trace: &Trace) -> Plot {
-    let mut curves = vec![curve(trace, "size", Kind::Total, 1e3, Quantity::ErrorSize)];
-    curves.extend(axes(trace, 1e3, Quantity::Error));
+    let mut curves = vec![curve(trace, "size", Kind::Total, 1e3, CurveQuantity::ErrorSize)];
+    curves.extend(axes(trace, 1e3, CurveQuantity::Error));
     let mut views = one_view(Table::new(trace.curve_times(), curves, MOST_POINTS));
     let mut note = "Flexible minus rigid tool centre point, world axes.".to_owned();
     if trace.header.has_static {
@@ -184,17 +184,17 @@ fn error(trace: &Trace) -> Plot {
 /// Sizes of the error and of its two parts.
 fn static_and_dynamic(trace: &Trace) -> PlotView {
     let curves = vec![
-        curve(trace, "size", Kind::Total, 1e3, Quantity::ErrorSize),
-        curve(trace, "static", Kind::Plain, 1e3, Quantity::StaticSize),
-        curve(trace, "in motion", Kind::Plain, 1e3, Quantity::MovingSize),
+        curve(trace, "size", Kind::Total, 1e3, CurveQuantity::ErrorSize),
+        curve(trace, "static", Kind::Plain, 1e3, CurveQuantity::StaticSize),
+        curve(trace, "in motion", Kind::Plain, 1e3, CurveQuantity::MovingSize),
     ];
     let table = Table::new(trace.curve_times(), curves, MOST_POINTS);
     PlotView { name: "static and in motion".into(), tables: vec![table], ..PlotView::default() }
 }
 
 fn rotation(trace: &Trace) -> Plot {
-    let mut curves = vec![curve(trace, "size", Kind::Total, 1e3, Quantity::TurnSize)];
-    curves.extend(axes(trace, 1e3, |k| Quantity::Error(3 + k)));
+    let mut curves = vec![curve(trace, "size", Kind::Total, 1e3, CurveQuantity::TurnSize)];
+    curves.extend(axes(trace, 1e3, |k| CurveQuantity::Error(3 + k)));
     Plot {
         y_label: "rotation error",
         y_unit: "mrad",
@@ -205,10 +205,10 @@ fn rotation(trace: &Trace) -> Plot {
 }
 
 fn path_curves(trace: &Trace) -> Vec<Curve> {
-    let mut curves = vec![curve(trace, "distance from the path", Kind::Total, 1e3, Quantity::AcrossPath)];
+    let mut curves = vec![curve(trace, "distance from the path", Kind::Total, 1e3, CurveQuantity::AcrossPath)];
     let names = ["along", "normal", "binormal"];
     let parts = names.iter().enumerate();
-    curves.extend(parts.map(|(k, name)| curve(trace, *name, Kind::Plain, 1e3, Quantity::AlongPath(k))));
+    curves.extend(parts.map(|(k, name)| curve(trace, *name, Kind::Plain, 1e3, CurveQuantity::AlongPath(k))));
     curves
 }
 
@@ -317,13 +317,14 @@ fn contributions(trace: &Trace) -> Option<Plot> {
     if names.is_empty() {
         return None;
     }
-    let view = |name: &str, of: &dyn Fn(usize) -> Quantity| {
+    let view = |name: &str, of: &dyn Fn(usize) -> CurveQuantity| {
         let curves = names.iter().enumerate().map(|(k, name)| curve(trace, name.clone(), Kind::Plain, 1e3, of(k)));
         let table = Table::new(trace.curve_times(), curves.collect(), MOST_POINTS);
         PlotView { name: name.into(), tables: vec![table], ..PlotView::default() }
     };
-    let mut views = vec![view("size", &Quantity::ContributionSize)];
-    views.extend(["x", "y", "z"].iter().enumerate().map(|(c, axis)| view(axis, &|k| Quantity::Contribution(k, c))));
+    let mut views = vec![view("size", &CurveQuantity::ContributionSize)];
+    views
+        .extend(["x", "y", "z"].iter().enumerate().map(|(c, axis)| view(axis, &|k| CurveQuantity::Contribution(k, c))));
     Some(Plot {
         y_label: "TCP displacement",
         y_unit: "mm",
@@ -340,7 +341,7 @@ fn elements(summary: &Summary, trace: &Trace) -> Vec<Plot> {
     if names.is_empty() {
         return Vec::new();
     }
-    let make = |plot: Plot, scale: f64, size: fn(usize) -> Quantity, part: fn(usize, usize) -> Quantity| {
+    let make = |plot: Plot, scale: f64, size: fn(usize) -> CurveQuantity, part: fn(usize, usize) -> CurveQuantity| {
         let sizes = names.iter().enumerate().map(|(k, name)| curve(trace, name.clone(), Kind::Plain, scale, size(k)));
         let table = Table::new(trace.curve_times(), sizes.collect(), MOST_POINTS);
         let mut views = vec![PlotView { name: "all, size".into(), tables: vec![table], ..PlotView::default() }];
@@ -360,24 +361,29 @@ fn elements(summary: &Summary, trace: &Trace) -> Vec<Plot> {
     };
     let plot = |id, title, y_label, y_unit| Plot { y_label, y_unit, note: note.into(), ..over_time(id, PARTS, title) };
     let plots = vec![
-        make(plot("element_force", "Elastic forces", "force", "N"), 1.0, |k| Quantity::LoadSize(k, 0), Quantity::Load),
+        make(
+            plot("element_force", "Elastic forces", "force", "N"),
+            1.0,
+            |k| CurveQuantity::LoadSize(k, 0),
+            CurveQuantity::Load,
+        ),
         make(
             plot("element_moment", "Elastic moments", "moment", "N m"),
             1.0,
-            |k| Quantity::LoadSize(k, 1),
-            |k, c| Quantity::Load(k, 3 + c),
+            |k| CurveQuantity::LoadSize(k, 1),
+            |k, c| CurveQuantity::Load(k, 3 + c),
         ),
         make(
             plot("element_shift", "Elastic displacements", "displacement", "mm"),
             1e3,
-            |k| Quantity::DeflectionSize(k, 0),
-            Quantity::Deflection,
+            |k| CurveQuantity::DeflectionSize(k, 0),
+            CurveQuantity::Deflection,
         ),
         make(
             plot("element_turn", "Elastic rotations", "rotation", "mrad"),
             1e3,
-            |k| Quantity::DeflectionSize(k, 1),
-            |k, c| Quantity::Deflection(k, 3 + c),
+            |k| CurveQuantity::DeflectionSize(k, 1),
+            |k, c| CurveQuantity::Deflection(k, 3 + c),
         ),
     ];
     plots.into_iter().filter(|plot| !is_zero(plot)).collect()
@@ -396,13 +402,13 @@ fn slides(trace: &Trace, joint: usize) -> bool {
 fn torques(trace: &Trace) -> Plot {
     let names = &trace.header.joints;
     let all = names.iter().enumerate();
-    let all = all.map(|(k, name)| curve(trace, name.clone(), Kind::Plain, 1.0, Quantity::Effort(k)));
+    let all = all.map(|(k, name)| curve(trace, name.clone(), Kind::Plain, 1.0, CurveQuantity::Effort(k)));
     let table = Table::new(trace.curve_times(), all.collect(), MOST_POINTS);
     let mut views = vec![PlotView { name: "all, flexible".into(), tables: vec![table], ..PlotView::default() }];
     for (k, name) in names.iter().enumerate() {
-        let mut curves = vec![curve(trace, "flexible", Kind::Plain, 1.0, Quantity::Effort(k))];
+        let mut curves = vec![curve(trace, "flexible", Kind::Plain, 1.0, CurveQuantity::Effort(k))];
         if trace.header.has_rigid {
-            curves.push(curve(trace, "rigid", Kind::Dashed, 1.0, Quantity::RigidEffort(k)));
+            curves.push(curve(trace, "rigid", Kind::Dashed, 1.0, CurveQuantity::RigidEffort(k)));
         }
         let y_unit = if slides(trace, k) { "N" } else { "N m" };
         let table = Table::new(trace.curve_times(), curves, MOST_DETAIL);
@@ -427,7 +433,7 @@ fn joints(trace: &Trace) -> Vec<Plot> {
         let names = trace.header.joints.iter().enumerate().filter(|(k, _)| slides(trace, *k) == sliding);
         let scale = if sliding { 1e3 } else { 1f64.to_degrees() };
         let curves: Vec<Curve> =
-            names.map(|(k, name)| curve(trace, name.clone(), Kind::Plain, scale, Quantity::Joint(k))).collect();
+            names.map(|(k, name)| curve(trace, name.clone(), Kind::Plain, scale, CurveQuantity::Joint(k))).collect();
         let (id, title) =
             if sliding { ("slides", "Positions of sliding joints") } else { ("joints", "Joint positions") };
         (!curves.is_empty()).then(|| Plot {
@@ -445,7 +451,7 @@ fn energy(trace: &Trace) -> Plot {
     let start = trace.rows.first().map_or(0.0, |row| row.energy.potential);
     let names = ["kinetic", "gravity", "elastic"].iter().enumerate();
     let mut curves: Vec<Curve> =
-        names.map(|(k, name)| curve(trace, *name, Kind::Plain, 1.0, Quantity::Energy(k))).collect();
+        names.map(|(k, name)| curve(trace, *name, Kind::Plain, 1.0, CurveQuantity::Energy(k))).collect();
     curves[1].y.iter_mut().for_each(|y| *y -= start);
     Plot {
         y_label: "energy",
