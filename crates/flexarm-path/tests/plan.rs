@@ -225,7 +225,6 @@ fn joint_moves_lines_and_splines_blend_into_each_other_with_continuous_accelerat
     let samples = cell.sampled(&planned, 20011);
     // Two samples 0.2 ms apart differ by the jerk alone.
     let jump = samples.windows(2).flat_map(|p| (0..6).map(move |k| (p[1].a[k] - p[0].a[k]).abs())).fold(0.0, f64::max);
-    let dt = samples[1].t;
     assert!(jump < 1.0, "{jump}"); // measured 0.22 rad/s²
     assert!(planned.trajectory.velocity_jumps().is_empty());
     let speed = samples.iter().rev().take(1000).flat_map(|s| s.v).map(f64::abs).fold(0.0, f64::max);
