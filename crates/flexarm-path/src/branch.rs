@@ -60,7 +60,7 @@ impl<'m> Branches<'m> {
                 self.arms[slot].1 = Some(arm);
                 chosen
             }
-            None => self.from_many_starts(frame, X, configuration, &near),
+            None => self.search(frame, X, configuration, &near),
         }
     }
 
@@ -97,7 +97,7 @@ impl<'m> Branches<'m> {
         answer
     }
 
-    fn from_many_starts(
+    fn search(
         &mut self,
         frame: &Frame,
         X: &Pose,

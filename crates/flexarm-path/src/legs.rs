@@ -19,7 +19,7 @@ const JOINT_LENGTH: f64 = 0.5;
 #[derive(Debug, Clone)]
 pub(crate) enum Way {
     /// A frame of the arm along a curve.
-    Tool { curve: ToolCurve, frame: Frame },
+    Tool { curve: Box<ToolCurve>, frame: Frame },
     /// All joints straight: `q0 + d s`.
     Joints { q0: DVector<f64>, d: DVector<f64> },
     /// The quintic between two joint jets.
@@ -186,7 +186,14 @@ impl<'m> Legs<'m> {
         let ended = begun.and_then(|jet| follower.advance(&curve, 0.0, &jet, length));
         let q1 = ended.map_err(|blocked| blocked_error(of, &curve, blocked))?.q;
         start.q.copy_from(&q1);
-        Ok(Some(Leg { of: of.clone(), way: Way::Tool { curve, frame }, length, q0, q1, smooth: false }))
+        Ok(Some(Leg {
+            of: of.clone(),
+            way: Way::Tool { curve: Box::new(curve), frame },
+            length,
+            q0,
+            q1,
+            smooth: false,
+        }))
     }
 
     /// Values of the controller's axes put into all coordinates.

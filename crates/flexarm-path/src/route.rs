@@ -285,7 +285,7 @@ fn stretches(owner: &mut Legs<'_>, legs: &[Leg], taken: &[[f64; 2]]) -> Result<V
                 if frame.X_BF == next_frame.X_BF =>
             {
                 let (a, b) = (curve.at(leg.length - out), other.at(into));
-                Way::Tool { curve: ToolCurve::between(&a, &b, length), frame: frame.clone() }
+                Way::Tool { curve: Box::new(ToolCurve::between(&a, &b, length)), frame: frame.clone() }
             }
             _ => {
                 let from = joints_at(owner, leg, leg.length - out, true)?;

@@ -304,7 +304,7 @@ impl<'r> Schedule<'r> {
     fn part(&self, k: usize, t: f64) -> Option<(f64, SlowedBy)> {
         let cap = self.caps[k].as_ref()?;
         let programmed = self.programmed[k];
-        if !(cap.x < programmed * (1.0 - AT_LIMIT)) || programmed == f64::INFINITY {
+        if cap.x >= programmed * (1.0 - AT_LIMIT) || programmed == f64::INFINITY {
             return None;
         }
         let v = self.progress(t)[1];

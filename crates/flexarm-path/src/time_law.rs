@@ -151,7 +151,7 @@ pub fn least_time(points: &[PathPoint]) -> Result<Vec<f64>, LawError> {
     if n < 2 {
         return Err(LawError::Points(n));
     }
-    if let Some(k) = (1..n).find(|&k| !(points[k].s > points[k - 1].s)) {
+    if let Some(k) = (1..n).find(|&k| points[k].s.partial_cmp(&points[k - 1].s) != Some(std::cmp::Ordering::Greater)) {
         return Err(LawError::Points(k));
     }
     // Backwards: from these the end can be reached.

@@ -34,6 +34,7 @@ pub(super) enum Standard {
 }
 
 /// One step of a standard motion.
+#[allow(clippy::large_enum_variant, reason = "a few dozen of them, made once")]
 pub(super) enum Step {
     /// To a pose of the tool in the base.
     To(MoveKind, Pose),
