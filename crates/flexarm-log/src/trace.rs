@@ -115,7 +115,7 @@ impl Trace {
     /// Most samples of a run whose rows and curves are kept as they are.
     pub const WHOLE: usize = 1 << 13;
     /// Rows at which a run is thinned.
-    pub const LIMIT: usize = 1 << 15;
+    pub const LIMIT: usize = 100_000;
 
     /// An empty trace of a run.
     #[must_use]
