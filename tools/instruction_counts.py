@@ -1,6 +1,6 @@
 """Instructions of the numeric kernels, as a snapshot: a loss shows without timing, on a machine that others use.
 
-    python3 tools/instruction_counts.py            count and compare with docs/performance/instructions.json; status 1 beyond 2 %
+    python3 tools/instruction_counts.py            count and compare with docs/performance/instructions.json; status 1 beyond 5 %
     python3 tools/instruction_counts.py --write    store the counts of today
 
 Each kernel of the example `kernels` runs twice under valgrind, with more calls the second time; the difference is what a call takes.
@@ -20,8 +20,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 STORE = ROOT / "docs" / "performance" / "instructions.json"
 TARGET = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
-# Part by which a count may differ from the stored one.
-ALLOWED = 0.02
+# Part by which a count may differ from the stored one; builds of other sets of crates differ by up to 2 %.
+ALLOWED = 0.05
 # Calls of the first and the second run.
 CALLS = {"step_spook": (100, 600), "step_rk4": (100, 600)}
 USUAL = (200, 1200)
