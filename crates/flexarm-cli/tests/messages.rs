@@ -376,7 +376,7 @@ fn the_case_studies_name_their_flags() {
         &[
             (
                 &["nocase", "--no-files"],
-                "there is no case \"nocase\"; the cases are one-beam, three-beams, lower-arm, manipulator, programs",
+                "there is no case \"nocase\"; the cases are one-beam, three-beams, lower-arm, manipulator, programs, measured",
             ),
             (
                 &["one-beam", "--no-files", "--data", "."],

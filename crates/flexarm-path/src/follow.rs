@@ -81,7 +81,8 @@ impl<'m> Follower<'m> {
     /// those without which the rest moves the tool best.
     ///
     /// * `q`: all independent coordinates.
-    pub fn new(model: &'m Model, frame: &Frame, q: &DVector<f64>) -> Self {
+    /// * `hold`: a joint that stays in any case, of an arm with more than six.
+    pub fn new(model: &'m Model, frame: &Frame, q: &DVector<f64>, hold: Option<usize>) -> Self {
         let mut follower = Self {
             model,
             frame: frame.clone(),
@@ -91,6 +92,9 @@ impl<'m> Follower<'m> {
             Jdot: Matrix6xX::zeros(model.nv()),
             active: coordinates_of(model, frame),
         };
+        if follower.active.len() > 6 {
+            follower.active.retain(|&k| Some(k) != hold);
+        }
         while follower.active.len() > 6 {
             follower.hold_one(q);
         }
@@ -268,7 +272,7 @@ mod tests {
         let turned = Rotation3::new(Vector3::new(0.2, -0.3, 0.1)) * X0.rotation;
         let X1 = Pose::from_parts(Translation3::from(X0.translation.vector + Vector3::new(0.1, -0.2, 0.1)), turned);
         let line = ToolCurve::line(&X0, &X1);
-        let mut follower = Follower::new(&model, &frame, &q);
+        let mut follower = Follower::new(&model, &frame, &q, None);
         let start = follower.start(&line, 0.0, &q).unwrap();
         let end = follower.advance(&line, 0.0, &start, line.length()).unwrap();
         let X = pose_at(&model, &frame, &end.q);
@@ -287,7 +291,7 @@ mod tests {
         let X0 = pose_at(&model, &frame, &q);
         let far = X0.translation.vector + X0.translation.vector.normalize() * 20.0;
         let line = ToolCurve::line(&X0, &Pose::from_parts(Translation3::from(far), X0.rotation));
-        let mut follower = Follower::new(&model, &frame, &q);
+        let mut follower = Follower::new(&model, &frame, &q, None);
         let start = follower.start(&line, 0.0, &q).unwrap();
         let blocked = follower.advance(&line, 0.0, &start, line.length()).unwrap_err();
         assert!(blocked.s > 0.0 && blocked.s < 20.0 && blocked.sigma < 0.05, "{blocked:?}");

@@ -69,12 +69,14 @@ pub(crate) struct Legs<'m> {
     pub(crate) options: PathOptions,
     branches: Branches<'m>,
     followers: Vec<(Pose, Follower<'m>)>,
+    /// Joint that stays on paths of the tool.
+    hold: Option<usize>,
 }
 
 impl<'m> Legs<'m> {
-    pub(crate) fn new(arm: &ProgramArm<'m>, options: &PathOptions) -> Self {
+    pub(crate) fn new(arm: &ProgramArm<'m>, options: &PathOptions, hold: Option<usize>) -> Self {
         let branches = Branches::new(arm.model);
-        Self { arm: arm.clone(), options: *options, branches, followers: Vec::new() }
+        Self { arm: arm.clone(), options: *options, branches, followers: Vec::new(), hold }
     }
 
     /// The flange with the tool of a move.
@@ -87,7 +89,7 @@ impl<'m> Legs<'m> {
     pub(crate) fn follower(&mut self, frame: &Frame, q: &DVector<f64>) -> &mut Follower<'m> {
         let found = self.followers.iter().position(|(X, _)| *X == frame.X_BF);
         let k = found.unwrap_or_else(|| {
-            self.followers.push((frame.X_BF, Follower::new(self.arm.model, frame, q)));
+            self.followers.push((frame.X_BF, Follower::new(self.arm.model, frame, q, self.hold)));
             self.followers.len() - 1
         });
         &mut self.followers[k].1

@@ -6,11 +6,14 @@ use flexarm_trajectory::{JointKnots, Trajectory, TrajectoryError};
 use nalgebra::DVector;
 
 use crate::curve::ArcError;
-use crate::follow::Blocked;
+use crate::follow::{Blocked, coordinates_of};
 use crate::legs::{Legs, Start};
 use crate::program::{Item, Program};
 use crate::route::Route;
 use crate::schedule::{Knot, Schedule};
+
+/// A joint that moves less in all of a motion stays, rad or m.
+const STILL: f64 = 1e-12;
 
 /// What a joint may do while it follows a program.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -215,8 +218,30 @@ pub enum PathError {
 /// # Errors
 /// [`PathError`]: targets out of reach, paths through singular poses, statements that contradict each other.
 pub fn plan(program: &Program, arm: &ProgramArm<'_>, options: &PathOptions) -> Result<Planned, PathError> {
-    let mut legs = Legs::new(arm, options);
+    let moving = coordinates_of(arm.model, &arm.flange);
+    if moving.len() != 7 {
+        return plan_holding(program, arm, options, None);
+    }
+    // Of seven joints one stays while the tool follows its path: the best at the start, or the first with which the path can be run.
+    let first = plan_holding(program, arm, options, None);
+    if !matches!(first, Err(PathError::Blocked { .. })) {
+        return first;
+    }
+    let others = moving.into_iter().map(|held| plan_holding(program, arm, options, Some(held)));
+    others.into_iter().find(Result::is_ok).unwrap_or(first)
+}
+
+/// The same with a joint that stays on paths of the tool; `None`: the one without which the rest moves the tool best.
+fn plan_holding(
+    program: &Program,
+    arm: &ProgramArm<'_>,
+    options: &PathOptions,
+    held: Option<usize>,
+) -> Result<Planned, PathError> {
+    let mut legs = Legs::new(arm, options, held);
     let mut knots: Vec<Knot> = Vec::new();
+    // A dwell before the first target is known is one at that target.
+    let mut waiting = 0.0;
     let (mut moves, mut stops, mut now) = (Vec::new(), Vec::new(), 0.0);
     let items = &program.items;
     let mut start = Start::of(items, arm)?;
@@ -227,7 +252,9 @@ pub fn plan(program: &Program, arm: &ProgramArm<'_>, options: &PathOptions) -> R
                 let (line, what) = (*line, "a dwell");
                 return Err(PathError::Value { line, statement: String::new(), what, value: *seconds });
             }
-            if *seconds > 0.0 {
+            if !start.known {
+                waiting += seconds;
+            } else if *seconds > 0.0 {
                 knots.push(Knot::rest(now, &start.q));
                 now += seconds;
                 knots.push(Knot::rest(now, &start.q));
@@ -236,6 +263,12 @@ pub fn plan(program: &Program, arm: &ProgramArm<'_>, options: &PathOptions) -> R
             continue;
         }
         let legs_here = legs.up_to_stop(items, &mut k, &mut start, &mut stops)?;
+        if waiting > 0.0 {
+            let q = legs_here.first().map_or(&start.q, |leg| &leg.q0);
+            knots.push(Knot::rest(now, q));
+            now += std::mem::take(&mut waiting);
+            knots.push(Knot::rest(now, q));
+        }
         for route in Route::all(&mut legs, legs_here, &mut stops)? {
             let schedule = Schedule::new(&route, arm, options)?;
             schedule.write(now, &mut knots, &mut moves);
@@ -258,6 +291,12 @@ fn trajectory(model: &Model, mut knots: Vec<Knot>) -> Result<Trajectory, Traject
         }
         same
     });
+    for k in (0..model.n_actuated()).filter(|&k| stays(&knots, k)) {
+        let q = knots[0].q[k];
+        for knot in &mut knots {
+            (knot.q[k], knot.v[k], knot.before[k], knot.after[k]) = (q, 0.0, 0.0, 0.0);
+        }
+    }
     let times: Vec<f64> = knots.iter().map(|knot| knot.t).collect();
     let joint = |k: usize| JointKnots {
         name: model.coordinates()[k].joint.clone(),
@@ -267,4 +306,13 @@ fn trajectory(model: &Model, mut knots: Vec<Knot>) -> Result<Trajectory, Traject
     };
     let joints: Vec<JointKnots> = (0..model.n_actuated()).map(joint).collect();
     Trajectory::through_knots(&times, &joints)
+}
+
+/// Does a joint move by no more than the rounding of Newton's method?
+fn stays(knots: &[Knot], joint: usize) -> bool {
+    let range = knots
+        .iter()
+        .map(|knot| knot.q[joint])
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), q| (low.min(q), high.max(q)));
+    range.1 - range.0 <= STILL
 }

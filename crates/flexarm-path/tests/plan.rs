@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 #![allow(non_snake_case, reason = "monogram notation")]
 
-use flexarm_kinematics::{Data, Model, forward_kinematics};
+use flexarm_kinematics::{Data, Joint, JointKind, Link, Mechanism, Model, forward_kinematics};
 use flexarm_path::program::{Blend, Configuration, Item, Move, MoveKind, Program, Speed, Target};
 use flexarm_path::{JointBounds, PathError, PathOptions, Planned, ProgramArm, SlowedBy, plan};
 use flexarm_spatial::{Pose, rotation_vector};
@@ -303,4 +303,73 @@ fn a_program_that_begins_with_a_line_or_leaves_the_reach_is_refused_with_its_lin
         run(vec![joints(&START), to(MoveKind::Line, pose(X), bad, Blend::Stop)]),
         PathError::Value { .. }
     ));
+}
+
+#[test]
+fn a_dwell_before_the_first_target_is_one_at_that_target() {
+    let cell = Cell::new();
+    let target = shifted(&cell.pose(&START), [0.0, 0.1, 0.0]);
+    let items = vec![
+        Item::Dwell { line: 1, seconds: 0.7 },
+        joints(&START),
+        to(MoveKind::Line, pose(target), feed(0.2), Blend::Stop),
+    ];
+    let mut arm = cell.arm();
+    arm.rest.fill(0.1);
+    let planned = plan(&program(items), &arm, &PathOptions::default()).unwrap();
+    let samples = cell.sampled(&planned, 4000);
+    assert!((planned.moves[0].span_s[0] - 0.7).abs() < 1e-9);
+    assert!(planned.trajectory.velocity_jumps().is_empty());
+    let at_rest = samples.iter().filter(|s| s.t < 0.69);
+    let start = cell.pose(&START).translation.vector;
+    assert!(at_rest.map(|s| (s.X.translation.vector - start).norm()).fold(0.0, f64::max) < 1e-12);
+}
+
+/// An upright arm of seven joints, roll and pitch in turn.
+fn seven_joints() -> Model {
+    let mut arm = Mechanism::new("seven");
+    arm.links.push(Link { name: "base".into(), inertia: None });
+    for k in 0..7 {
+        let (parent, child) = (arm.links[k].name.clone(), format!("link_{k}"));
+        arm.links.push(Link { name: child.clone(), inertia: None });
+        let axis = if k % 2 == 0 { Vector3::z_axis() } else { Vector3::y_axis() };
+        let up = Pose::translation(0.0, 0.0, if k % 2 == 0 { 0.2 } else { 0.15 });
+        arm.joints.push(Joint::new(format!("joint_{k}"), JointKind::Continuous(axis), parent, child, up));
+    }
+    Model::new(&arm).unwrap()
+}
+
+#[test]
+fn a_redundant_arm_follows_its_line_with_one_joint_at_rest() {
+    let model = seven_joints();
+    let frame = model.frame("link_6").unwrap().clone();
+    let q = [0.3, 0.5, 0.2, 0.9, -0.3, 0.7, 0.1];
+    let mut data = Data::new(&model);
+    forward_kinematics(&model, &mut data, &DVector::from_row_slice(&q));
+    let X0 = data.X_WF(&frame);
+    let bounds = JointBounds { velocity: 3.0, acceleration: 20.0, torque: None };
+    let arm = ProgramArm {
+        model: &model,
+        flange: frame.clone(),
+        X_FT: Pose::identity(),
+        X_MW: Pose::identity(),
+        axes: (0..7).collect(),
+        bounds: vec![bounds; 7],
+        rest: DVector::zeros(7),
+        starts_at_rest: false,
+    };
+    let X1 = shifted(&X0, [0.05, -0.1, 0.05]);
+    let items = vec![joints(&q), to(MoveKind::Line, pose(X1), feed(0.1), Blend::Stop)];
+    let planned = plan(&program(items), &arm, &PathOptions::default()).unwrap();
+    assert_eq!(planned.held.len(), 1);
+    let way = [X0.translation.vector, X1.translation.vector];
+    let mut off: f64 = 0.0;
+    for k in 0..=1500 {
+        let t = planned.trajectory.duration() * f64::from(k) / 1500.0;
+        let (mut q, mut v, mut a) = (DVector::zeros(7), [0.0; 7], [0.0; 7]);
+        planned.trajectory.sample(t, q.as_mut_slice(), &mut v, &mut a);
+        forward_kinematics(&model, &mut data, &q);
+        off = off.max(from_polyline(&data.X_WF(&frame).translation.vector, &way));
+    }
+    assert!(off < 1e-9, "{off:.1e}");
 }

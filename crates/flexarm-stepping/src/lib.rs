@@ -45,7 +45,6 @@ mod integrator;
 mod iteration_matrix;
 mod linear;
 mod load;
-mod lowest_mode;
 mod mode_matrix;
 mod modes;
 mod motion;

@@ -15,7 +15,6 @@ use crate::arm::FlexibleArm;
 use crate::eigenvalues::symmetric_eigenvalues;
 use crate::error::StepError;
 use crate::iteration_matrix::solve_lower_transposed;
-use crate::lowest_mode::LowestMode;
 use crate::motion::Held;
 use crate::statics::{StaticSlopes, add_spring_forces, static_equilibrium, static_forces};
 
@@ -63,10 +62,8 @@ pub struct OperatingPoint {
     Y: DMatrix<f64>,
     R: DMatrix<f64>,
     A: DMatrix<f64>,
-    S: DMatrix<f64>,
     d: Vec<f64>,
     e: Vec<f64>,
-    lowest: LowestMode,
 }
 
 /// The arm does not stay at an equilibrium whose tangent is not positive definite.
@@ -101,10 +98,8 @@ impl OperatingPoint {
             Y: DMatrix::zeros(n, 6),
             R: DMatrix::zeros(n, 6),
             A: DMatrix::zeros(n, n),
-            S: DMatrix::zeros(n, n),
             d: vec![0.0; n],
             e: vec![0.0; n],
-            lowest: LowestMode::new(n),
             arm,
             tool,
         }
@@ -159,7 +154,6 @@ impl OperatingPoint {
     /// Drops what is known from the poses before: the next answer is that of a new workspace, to the last bit.
     pub fn forget(&mut self) {
         self.factor = None;
-        self.lowest.forget();
         self.residual = f64::NAN;
     }
 
@@ -334,25 +328,5 @@ impl OperatingPoint {
         self.d.sort_unstable_by(|a, b| b.total_cmp(a));
         self.d.iter_mut().for_each(|x| *x = 1.0 / (x.sqrt() * std::f64::consts::TAU));
         &self.d
-    }
-
-    /// The lowest of [`OperatingPoint::frequencies_hz`] alone, to 1e-9 of it; not a number without elastic coordinates.
-    ///
-    /// Cost: a mass matrix, about six solutions and two factors, where the frequencies are asked for at one pose after another: a
-    /// third of what all of them cost. That it is the lowest is proved for each pose by the signs of pivots; where that fails, as with
-    /// two equal frequencies, all are computed.
-    pub fn first_frequency_hz(&mut self) -> f64 {
-        let (m, n) = (self.arm.model.n_actuated(), self.r.len());
-        let Some(factor) = &self.factor else { return f64::NAN };
-        let M = mass_matrix(&self.arm.model, &mut self.data, &self.q);
-        self.A.copy_from(&M.view((m, m), (n, n)));
-        // The symmetric part, as its factor has it.
-        for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
-            self.S[(i, j)] = 0.5 * (self.tangent[(i, j)] + self.tangent[(j, i)]);
-        }
-        match self.lowest.eigenvalue(&self.S, factor, &self.A) {
-            Some(square) => square.sqrt() / std::f64::consts::TAU,
-            None => self.frequencies_hz().first().copied().unwrap_or(f64::NAN),
-        }
     }
 }

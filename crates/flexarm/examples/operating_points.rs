@@ -39,7 +39,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                     for k in (first..poses).step_by(threads) {
                         pose(k, ranges, &mut q);
                         at.solve(&q, &Wrench::zeros()).map_err(|e| e.to_string())?;
-                        let (down, hz) = (at.compliance()[(2, 2)], at.first_frequency_hz());
+                        let (down, hz) = (at.compliance()[(2, 2)], at.frequencies_hz()[0]);
                         let [c_min, c_max, f_min, f_max] = extremes;
                         extremes = [c_min.min(down), c_max.max(down), f_min.min(hz), f_max.max(hz)];
                     }

@@ -110,7 +110,7 @@ pub use monitor::tool_path::{PathFigures, PathMoveFigures};
 pub use motion::{HeldJoint, Motion};
 pub use motion_formats::MotionOptions;
 pub use motion_report::{MotionCurve, MotionFiles, MotionPeak, MotionReport, MotionViolation, motion_report};
-pub use operating_points::{Frequencies, OperatingPoints};
+pub use operating_points::OperatingPoints;
 pub use options::{DriveModel, LinkModel, Modelling, Outputs, RunOptions};
 pub use payload::PayloadChange;
 pub use report::{

@@ -21,22 +21,12 @@ pub struct OperatingPoints {
     pub deflection_m: Vec<f64>,
     /// Displacement of the tool per wrench on it, drives locked, m×6×6 (m/N, rad/N; m/(N m), rad/(N m)).
     pub compliance: Vec<f64>,
-    /// Natural frequencies, ascending, m×n with the n elastic coordinates of the arm, or m×1 with [`Frequencies::First`] (Hz).
+    /// Natural frequencies, ascending, m×n with the n elastic coordinates of the arm (Hz).
     pub frequencies_hz: Vec<f64>,
     /// Poses without an answer, and why.
     pub failures: Vec<(usize, StepError)>,
-    /// Frequencies of a pose.
+    /// n.
     elastic: usize,
-}
-
-/// Which natural frequencies are computed at each pose.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Frequencies {
-    /// All of them.
-    #[default]
-    All,
-    /// The lowest one, for a third of the time; see [`OperatingPoint::first_frequency_hz`].
-    First,
 }
 
 impl OperatingPoints {
@@ -90,29 +80,13 @@ impl Arm {
     /// [`Error::Step`] with [`StepError::Setup`] if the number of values is no multiple of that of the joints, and as
     /// [`Arm::operating_point`]. A pose without equilibrium is no error, see [`OperatingPoints::failures`].
     pub fn operating_points(&self, poses: &[f64], wrench: &Wrench) -> Result<OperatingPoints, Error> {
-        self.operating_points_with(poses, wrench, Frequencies::All)
-    }
-
-    /// As [`Arm::operating_points`], with all natural frequencies or the first alone.
-    ///
-    /// # Errors
-    /// As [`Arm::operating_points`].
-    pub fn operating_points_with(
-        &self,
-        poses: &[f64],
-        wrench: &Wrench,
-        frequencies: Frequencies,
-    ) -> Result<OperatingPoints, Error> {
         let joints = self.joints().count();
         if joints == 0 || !poses.len().is_multiple_of(joints) {
             let text = format!("{} joint values are given, expected a multiple of the {joints} joints", poses.len());
             return Err(Error::Step { source: StepError::Setup(text), partial: false });
         }
         let start = self.operating_point()?;
-        let elastic = match frequencies {
-            Frequencies::All => self.flexible().model.n_elastic(),
-            Frequencies::First => self.flexible().model.n_elastic().min(1),
-        };
+        let elastic = self.flexible().model.n_elastic();
         // Chunks of nothing are none: a rigid arm gets a column that is dropped again.
         let mut found = OperatingPoints::with_room(poses.len() / joints, elastic.max(1));
         let rows = found
@@ -131,8 +105,7 @@ impl Arm {
             compliance,
             frequencies_hz,
         });
-        let failures: Vec<_> =
-            rows.map_with(start, |at, rows| answer(at, rows, joints, (elastic, frequencies), wrench)).collect();
+        let failures: Vec<_> = rows.map_with(start, |at, rows| answer(at, rows, joints, elastic, wrench)).collect();
         found.failures = failures.into_iter().flatten().collect();
         found.elastic = elastic;
         found.frequencies_hz.truncate(found.len() * elastic);
@@ -145,7 +118,7 @@ fn answer(
     at: &mut OperatingPoint,
     rows: Rows<'_>,
     joints: usize,
-    (elastic, frequencies): (usize, Frequencies),
+    elastic: usize,
     wrench: &Wrench,
 ) -> Vec<(usize, StepError)> {
     let mut failures = Vec::new();
@@ -163,11 +136,7 @@ fn answer(
         // Symmetric but for constant moments; rows first.
         let C = at.compliance().transpose();
         rows.compliance[36 * k..][..36].copy_from_slice(C.as_slice());
-        let found = &mut rows.frequencies_hz[elastic * k..][..elastic];
-        match frequencies {
-            Frequencies::All => found.copy_from_slice(at.frequencies_hz()),
-            Frequencies::First => found.iter_mut().for_each(|hz| *hz = at.first_frequency_hz()),
-        }
+        rows.frequencies_hz[elastic * k..][..elastic].copy_from_slice(at.frequencies_hz());
     }
     failures
 }

@@ -6,8 +6,8 @@
 use std::path::{Path, PathBuf};
 
 use flexarm::{
-    Arm, Frequencies, Modelling, Motion, OperatingPoints, PayloadChange, Robot, RunOptions, Scenario, StepperKind,
-    TCP_FRAME, ToolDeflection, Variation, Wrench,
+    Arm, Modelling, Motion, OperatingPoints, PayloadChange, Robot, RunOptions, Scenario, StepperKind, TCP_FRAME,
+    ToolDeflection, Variation, Wrench,
 };
 use nalgebra::Vector3;
 
@@ -194,24 +194,4 @@ fn a_bad_run_is_refused_in_its_place() {
         Modelling { links: flexarm::LinkModel::Rigid, drives: flexarm::DriveModel::Rigid, ..Modelling::default() };
     let rigid = robot.flexible(rigid).unwrap().deflections(&runs[..1], &options, false);
     assert_eq!(rigid[0].as_ref().unwrap().peak_m, 0.0);
-}
-
-/// Truth: all frequencies of the same poses. Measured: 1e-12.
-#[test]
-fn the_first_frequency_alone_is_the_lowest_of_all() {
-    for name in ["kr210", "reference_arm"] {
-        let arm = Robot::load(root().join("robots").join(name)).unwrap().flexible(Modelling::default()).unwrap();
-        let joints = arm.joints().count();
-        // Far from each other, so that no pose helps the next one.
-        let poses: Vec<f64> =
-            (0..3000 * joints).map(|k| 2.4 * (1.7 * k as f64 + 0.3 * (k % joints) as f64).sin()).collect();
-        let push = Wrench::new(Vector3::new(200.0, -100.0, 300.0), Vector3::zeros());
-        let all = arm.operating_points(&poses, &push).unwrap();
-        let first = arm.operating_points_with(&poses, &push, Frequencies::First).unwrap();
-        assert_eq!((first.frequencies(), first.len(), &first.compliance), (1, all.len(), &all.compliance));
-        let lowest = all.frequencies_hz.chunks_exact(all.frequencies()).map(|hz| hz[0]);
-        let far = lowest.zip(&first.frequencies_hz).map(|(a, b)| ((a - b) / a).abs()).fold(0.0, f64::max);
-        eprintln!("{name}: {far:.1e}");
-        assert!(far < 1e-9, "{name}: {far:e}");
-    }
 }
