@@ -291,7 +291,8 @@ fn trajectory(model: &Model, mut knots: Vec<Knot>) -> Result<Trajectory, Traject
         }
         same
     });
-    for k in (0..model.n_actuated()).filter(|&k| stays(&knots, k)) {
+    let still: Vec<usize> = (0..model.n_actuated()).filter(|&k| stays(&knots, k)).collect();
+    for k in still {
         let q = knots[0].q[k];
         for knot in &mut knots {
             (knot.q[k], knot.v[k], knot.before[k], knot.after[k]) = (q, 0.0, 0.0, 0.0);

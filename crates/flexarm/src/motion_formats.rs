@@ -243,7 +243,7 @@ fn robot_program(file: &MotionFile<'_>) -> Result<ReadMotion, Error> {
 }
 
 fn along((trajectory, tool_path): (Trajectory, ToolPath), format: String) -> ReadMotion {
-    let (samples, caveats) = (Some(tool_path.moves.len()), tool_path.caveats());
+    let (samples, caveats) = (None, tool_path.caveats());
     ReadMotion { trajectory, format, topic: None, samples, dropped: Vec::new(), caveats, tool_path: Some(tool_path) }
 }
 
