@@ -193,6 +193,77 @@ reduced = "bar.flex"
 model = "MODEL"
 """
 
+PROGRAMS = {
+    "part.src": """DEF part()
+DECL INT k
+BAS(#INITMOV, 0)
+$VEL.CP = 0.25
+$ACC.CP = 2.0
+$APO.CDIS = 5.0
+PTP {A1 0, A2 -60, A3 90, A4 0, A5 60, A6 0}
+FOR k = 1 TO 2
+  LIN {X 1700, Y 0, Z 1400, A 0, B 90, C 0} C_DIS
+  LIN {X 1700, Y 100, Z 1400, A 0, B 90, C 0} C_DIS
+ENDFOR
+CIRC {X 1750, Y 50, Z 1400}, {X 1700, Y 0, Z 1400, A 0, B 90, C 0}
+$OUT[3] = TRUE
+WAIT SEC 0.1
+END
+""",
+    "part.mod": """MODULE part
+  CONST jointtarget home := [[0, -60, 90, 0, 60, 0], [9E9, 9E9, 9E9, 9E9, 9E9, 9E9]];
+  CONST robtarget p1 := [[1700, 0, 1400], [0.70710678, 0, 0.70710678, 0], [0, 0, 0, 0], [9E9, 9E9, 9E9, 9E9, 9E9, 9E9]];
+  PROC main()
+    VAR num i;
+    MoveAbsJ home, v500, fine, tool0;
+    FOR i FROM 1 TO 2 DO
+      MoveL p1, v200, z10, tool0;
+      MoveL Offs(p1, 0, 100, 0), v200, fine, tool0;
+    ENDFOR
+    SetDO do1, 1;
+    WaitTime 0.1;
+  ENDPROC
+ENDMODULE
+""",
+    "part.script": """def part():
+  a = 1.2
+  movej([0, -1.0472, 1.5708, 0, 1.0472, 0], a=a, v=0.8)
+  movel(p[1.7, 0, 1.4, 0, d2r(90), 0], a=a, v=0.25, r=0.01)
+  movel(p[1.7, 0.1, 1.4, 0, d2r(90), 0], a=a, v=0.25)
+  i = 0
+  while i < 2:
+    movel(p[1.7, 0.1 * i, 1.4, 0, d2r(90), 0], a=a, v=0.25)
+    i = i + 1
+  end
+  sleep(0.1)
+end
+part()
+""",
+}
+GCODE = """%
+G21 G90 G17
+G0 X0 Y0 Z20
+G1 Z0 F3000
+G64 P0.5
+G1 X50 Y0
+G2 X50 Y50 I0 J25
+G1 X0 (back) Y50
+G91 G1 X0 Y-50
+M30
+%
+"""
+PART = """format = 1
+[path]
+lengths = "mm"
+angles = "deg"
+base = { xyz = [1650.0, 0.0, 1300.0], rpy = [0.0, 90.0, 0.0] }
+acceleration = 2000.0
+[program]
+file = "part.nc"
+start = [0, -60, 90, 0, 60, 0]
+rpy = [0.0, 0.0, 0.0]
+"""
+
 PATH_FILE = """format = 1
 [path]
 lengths = "mm"
@@ -565,11 +636,10 @@ def own_targets():
         targets.append(Target(f"motion-{own}", own, {own: (motions / name).read_bytes()}, [["motion", own, "--json"], ["motion", own, "--json", "-o", "other.csv", "--force"]]))
     arm = str(ROOT / "robots/kr210_identified")
     targets.append(Target("path-toml", "path.toml", {"path.toml": PATH_FILE}, [["motion", "path.toml", arm, "--json"]], True))
-    programs = ROOT / "crates/flexarm-programs/tests/data"
-    for name in ("shapes.src", "pendant.src", "pendant.dat", "cell.mod", "pick.script", "plate.ngc"):
-        beside = {"pendant.src": "pendant.dat", "pendant.dat": "pendant.src"}.get(name)
-        files = {own: (programs / own).read_bytes() for own in (name, beside) if own}
-        targets.append(Target(f"program-{name}", name, files, [["motion", name.replace(".dat", ".src"), arm, "--json"]]))
+    for name, content in PROGRAMS.items():
+        targets.append(Target(f"program-{name}", name, {name: content}, [["motion", name, arm, "--json"]]))
+    beside = {"part.nc": GCODE, "part.toml": PART}
+    targets.append(Target("program-part.nc", "part.nc", beside, [["motion", "part.toml", arm, "--json"]]))
     hdf5 = ROOT / "tools/fuzz_seeds/exudyn.hdf5"
     if hdf5.exists():
         words = ["--map", "A=plane(0,0,0;1,0,0),B=plane(0.8,0,0;1,0,0)"]

@@ -77,7 +77,7 @@ impl Default for ReadOptions<'_> {
             find_companions: true,
             waits_are_over: false,
             endless_passes: None,
-            most_moves: 1_000_000,
+            most_moves: 500_000,
             most_steps: 5_000_000,
             forward: None,
             own_tool: None,
