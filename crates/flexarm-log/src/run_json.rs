@@ -12,8 +12,10 @@ use crate::{Attachment, BendInfo, Event, EventKind, LinkInfo, RunHeader, RunResu
 /// Name of the header in a recording.
 pub(crate) const RUN_JSON: &str = "run.json";
 /// Name of the result in a recording.
+#[allow(dead_code, reason = "not every format has it")]
 pub(crate) const RESULT_JSON: &str = "result.json";
 /// Media type of both.
+#[allow(dead_code, reason = "not every format has it")]
 pub(crate) const JSON: &str = "application/json";
 
 /// Version of the format; a reader refuses higher ones.
