@@ -102,12 +102,11 @@ fn a_recording_that_may_not_grow_ends_the_run_with_its_name_and_reads_up_to_ther
     // Closing the files fails as well; what counts is what came first.
     assert!(!answer.err.contains("index") && !answer.err.contains("last samples"), "{}", answer.err);
     let last = last_time(&place.read("result/run.mcap")).unwrap();
-    // The recorders write on threads of their own: one may not have begun when another meets the limit.
-    assert!((0.0..59.0).contains(&last), "{last} s are left");
+    assert!((0.1..59.0).contains(&last), "{last} s are left");
     if cfg!(feature = "rerun") {
         place.json(&["convert", "result/run.rrd", "left.csv"]);
         let reached = *Table::parse(&place.text("left.csv")).column("time").last().unwrap();
-        assert!((0.0..59.0).contains(&reached), "{reached} s are left in the .rrd");
+        assert!((0.1..59.0).contains(&reached), "{reached} s are left in the .rrd");
     }
 }
 

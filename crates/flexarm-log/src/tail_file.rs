@@ -11,8 +11,10 @@
 use std::fs::File;
 use std::io::{self, Seek, SeekFrom, Write};
 
-/// Committed bytes beyond which a recorder should write them out even before its time: what is held in memory.
+/// Committed bytes beyond which a recorder should write them out even before its time: what is held in memory, and what is
+/// lost where the file may not grow further. A quarter of what is in the file, within these.
 const PENDING_LIMIT: usize = 3 << 20;
+const LEAST_PENDING: usize = 256 << 10;
 
 /// See the module.
 #[derive(Debug)]
@@ -39,7 +41,7 @@ impl TailFile {
 
     /// Whether so much is held back that a new tail should be set even before its time.
     pub(crate) fn is_full(&self) -> bool {
-        self.pending.len() > PENDING_LIMIT
+        self.pending.len() > ((self.written / 4) as usize).clamp(LEAST_PENDING, PENDING_LIMIT)
     }
 
     /// Writes out what is committed, then `tail` behind it, in place of any earlier tail.
