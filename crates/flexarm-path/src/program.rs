@@ -18,8 +18,6 @@ pub struct Program {
     pub name: String,
     /// What is done, in order; loops are unrolled.
     pub items: Vec<Item>,
-    /// Joints are KUKA's, ABB's and so on: what the program says of axes has this unit and sense.
-    pub axes: Axes,
     /// What a user should know: defaults that were assumed, statements that have no effect on the motion.
     pub notes: Vec<Note>,
 }
@@ -31,16 +29,6 @@ pub struct Note {
     pub line: Option<usize>,
     /// One sentence.
     pub text: String,
-}
-
-/// How the axes of a program are to be understood.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Axes {
-    /// Values are joint values of the robot, in its order.
-    #[default]
-    Joints,
-    /// Axis 3 is told against the horizontal, not against axis 2 (older ABB and Fanuc); reserved for such readers.
-    Coupled23,
 }
 
 /// One thing done.

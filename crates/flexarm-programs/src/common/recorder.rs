@@ -1,6 +1,6 @@
 //! What a program did so far: its moves, its notes, and where the robot is by them.
 
-use flexarm_path::program::{Axes, Blend, Item, Move, MoveKind, Note, Program, Target};
+use flexarm_path::program::{Blend, Item, Move, MoveKind, Note, Program, Target};
 use flexarm_spatial::Pose;
 
 use super::{Fail, Result, Span, Text, fail};
@@ -231,11 +231,11 @@ impl<'a> Recorder<'a> {
     }
 
     /// The program.
-    pub(crate) fn finish(mut self, name: &str, axes: Axes) -> Program {
+    pub(crate) fn finish(mut self, name: &str) -> Program {
         self.notes.sort_by_key(|told| (told.file, told.lines.first().copied().unwrap_or(0)));
         let texts = &self.texts;
         let notes = self.notes.iter().map(|told| told.as_note(texts)).collect();
-        Program { name: name.to_owned(), items: self.items, axes, notes }
+        Program { name: name.to_owned(), items: self.items, notes }
     }
 }
 

@@ -11,7 +11,7 @@ mod words;
 
 use std::collections::HashMap;
 
-use flexarm_path::program::{Axes, Blend, Configuration, Move, MoveKind, Program, Speed, Target};
+use flexarm_path::program::{Blend, Configuration, Move, MoveKind, Program, Speed, Target};
 use flexarm_spatial::Pose;
 use nalgebra::{Rotation3, Translation3, Vector3};
 
@@ -112,7 +112,7 @@ pub(crate) fn read(texts: &mut [Text], options: &ReadOptions<'_>) -> Result<Prog
     }
     program.last_notes();
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    Ok(program.recorder.finish(&name, Axes::Joints))
+    Ok(program.recorder.finish(&name))
 }
 
 impl<'a> Gcode<'a> {

@@ -13,7 +13,7 @@ use std::collections::HashSet;
 use std::path::Path;
 use std::rc::Rc;
 
-use flexarm_path::program::{Axes, Program};
+use flexarm_path::program::Program;
 
 use crate::common::machine::{Flow, Machine};
 use crate::common::recorder::Recorder;
@@ -96,7 +96,7 @@ pub(crate) fn read(texts: &mut Vec<Text>, options: &ReadOptions<'_>) -> Result<P
             stem(&path)
         }
     };
-    Ok(machine.recorder.finish(&name, Axes::Joints))
+    Ok(machine.recorder.finish(&name))
 }
 
 fn stem(path: &Path) -> String {

@@ -13,7 +13,7 @@ mod types;
 
 use std::rc::Rc;
 
-use flexarm_path::program::{Axes, Program};
+use flexarm_path::program::Program;
 
 use crate::common::machine::{Dialect, Flow, Machine};
 use crate::common::recorder::Recorder;
@@ -91,7 +91,7 @@ pub(crate) fn read(texts: &mut Vec<Text>, options: &ReadOptions<'_>) -> Result<P
             );
         }
     };
-    Ok(machine.recorder.finish(&name, Axes::Joints))
+    Ok(machine.recorder.finish(&name))
 }
 
 /// Modules in the folder of the program that alone declare a name which the program uses and does not declare.

@@ -9,7 +9,7 @@ mod parse;
 
 use std::rc::Rc;
 
-use flexarm_path::program::{Axes, Blend, Configuration, Item, Move, MoveKind, Program, Speed, Target};
+use flexarm_path::program::{Blend, Configuration, Item, Move, MoveKind, Program, Speed, Target};
 use flexarm_spatial::Pose;
 
 use crate::common::frames::{Circle, pose_rotation_vector, rotation_vector_of};
@@ -71,7 +71,7 @@ pub(crate) fn read(texts: &mut Vec<Text>, options: &ReadOptions<'_>) -> Result<P
             ),
         );
     }
-    Ok(machine.recorder.finish(&name, Axes::Joints))
+    Ok(machine.recorder.finish(&name))
 }
 
 impl Dialect for UrScript {

@@ -193,11 +193,11 @@ pub(crate) fn read_path_file(
     }
     let units = units(&file.path, &source)?;
     let overrides = overrides(&file, &source, cell, units)?;
-    let (arm, mut notes) = cell.arm(&overrides);
-    if file.path.tool.is_none() {
-        // Nothing stands on the flange that the file would have to tell.
-        notes.retain(|note| !note.starts_with("tools of the program"));
+    let (arm, mut assumed) = cell.arm(&overrides);
+    if file.path.tool.is_none() && file.program.is_none() {
+        assumed.flange = None;
     }
+    let notes = assumed.warnings();
     let frame = |table: &Option<Spanned<FrameTable>>| {
         table.as_ref().map(|table| frame_of(table.get_ref(), units, &source, table.span())).transpose()
     };

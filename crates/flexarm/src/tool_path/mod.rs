@@ -56,6 +56,20 @@ pub(crate) struct Cell<'a> {
     pub(crate) hold: &'a [(String, f64)],
 }
 
+/// What was taken of the robot for want of better knowledge, as sentences.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Assumed {
+    /// Where tools stand; of no account where a path has none of its own.
+    pub(crate) flange: Option<String>,
+    pub(crate) accelerations: Option<String>,
+}
+
+impl Assumed {
+    pub(crate) fn warnings(self) -> Vec<String> {
+        self.flange.into_iter().chain(self.accelerations).collect()
+    }
+}
+
 /// Changes to what the robot's description says of its joints.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Overrides {
@@ -104,9 +118,8 @@ impl<'a> Cell<'a> {
     }
 
     /// The arm as the program's controller sees it.
-    pub(crate) fn arm(&self, overrides: &Overrides) -> (ProgramArm<'a>, Vec<String>) {
-        let (flange, X_FT, note) = self.flange();
-        let mut notes: Vec<String> = note.into_iter().collect();
+    pub(crate) fn arm(&self, overrides: &Overrides) -> (ProgramArm<'a>, Assumed) {
+        let (flange, X_FT, flange_note) = self.flange();
         let mut assumed = false;
         let of = |list: &[Option<f64>], k: usize| list.get(k).copied().flatten();
         let bounds = (0..self.model.nv())
@@ -120,16 +133,16 @@ impl<'a> Cell<'a> {
                 JointBounds { velocity, acceleration, torque: of(&overrides.torques, k) }
             })
             .collect();
-        if assumed {
-            notes.push(format!(
+        let accelerations = assumed.then(|| {
+            format!(
                 "accelerations of the joints are not known: each is taken to reach its top speed in {TO_TOP_SPEED} s ([limits] of a \
                  path file tells them)"
-            ));
-        }
+            )
+        });
         let axes = coordinates_of(self.model, &tcp_frame(self.model));
         let (X_MW, rest) = (self.world(), self.rest());
         let arm = ProgramArm { model: self.model, flange, X_FT, X_MW, axes, bounds, rest, starts_at_rest: false };
-        (arm, notes)
+        (arm, Assumed { flange: flange_note, accelerations })
     }
 }
 

@@ -20,9 +20,16 @@ pub(crate) fn read_robot_program(
     cell: &Cell<'_>,
 ) -> Result<((Trajectory, ToolPath), &'static str), Error> {
     let bytes = flexarm_trajectory::bytes_of_file(path)?;
-    let (arm, warnings) = cell.arm(&Overrides::default());
-    let planned =
-        plan_program(path, &bytes, &arm, &ReadOptions::default(), &PathOptions::default(), warnings, &|_| {})?;
+    let (arm, assumed) = cell.arm(&Overrides::default());
+    let planned = plan_program(
+        path,
+        &bytes,
+        &arm,
+        &ReadOptions::default(),
+        &PathOptions::default(),
+        assumed.warnings(),
+        &|_| {},
+    )?;
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     Ok((planned, recognise(&bytes, &name).map_or("", |language| language.name())))
 }
