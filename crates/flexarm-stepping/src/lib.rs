@@ -64,7 +64,7 @@ pub use batch::{Batch, BatchRun, ToolDeflection};
 pub use drive::{CurveError, Friction, ServoAxis, TorqueCurve};
 pub use error::StepError;
 pub use integrator::{Current, Integrator, TimeGrid};
-pub use linear::{Linear, linearise};
+pub use linear::{Linear, Tangents, linearise};
 pub use load::{Load, LoadAxes, TimedWrench};
 pub use mode_matrix::ModeMatrices;
 pub use modes::{Modes, modes_at};

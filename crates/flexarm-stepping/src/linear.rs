@@ -203,6 +203,36 @@ impl FeedForward {
     }
 }
 
+/// Mass, tangent stiffness and Jacobian of an arm at given coordinates, drives locked: what [`linearise`] finds at the
+/// equilibrium, anywhere.
+#[derive(Clone, Debug)]
+pub struct Tangents {
+    /// Mass matrix of the elastic coordinates, n×n.
+    pub M: DMatrix<f64>,
+    /// Springs, change of weight and of the wrench, n×n.
+    pub K: DMatrix<f64>,
+    /// Twist of the tool per rate of the elastic coordinates, 6×n.
+    pub J: Matrix6xX<f64>,
+}
+
+impl Tangents {
+    /// At all coordinates `q` (joints, then elastic ones), under weight, the loads of time 0 and a wrench at the tool's origin
+    /// (world axes).
+    pub fn at(arm: &FlexibleArm, tool: &Frame, F_T_W: &Wrench, q: &DVector<f64>) -> Self {
+        let model = &arm.model;
+        let (m, n) = (model.n_actuated(), arm.n_elastic_coordinates());
+        let mut data = Data::new(model);
+        let statics = Statics { arm, tool, F_T_W: *F_T_W, t: 0.0 };
+        let e = q.rows(m, n).into_owned();
+        let K = with_curves(arm, &arm.stiffness(), &e) + statics.slopes(&mut data, q).view((m, m), (n, n));
+        let M = mass_matrix(model, &mut data, q).view((m, m), (n, n)).into_owned();
+        forward_kinematics(model, &mut data, q);
+        let mut J = Matrix6xX::zeros(model.nv());
+        frame_jacobian(model, &data, tool, &mut J);
+        Self { M, K, J: J.columns(m, n).into_owned() }
+    }
+}
+
 /// Joints on their reference at `t` with elastic coordinates.
 fn all_coordinates(arm: &FlexibleArm, t: f64, e: &DVector<f64>) -> DVector<f64> {
     let model = &arm.model;

@@ -261,6 +261,16 @@ impl OperatingPoint {
         self.X_WT_rigid
     }
 
+    /// All coordinates at the equilibrium: joints, then elastic ones.
+    pub fn coordinates(&self) -> &DVector<f64> {
+        &self.q
+    }
+
+    /// The frame whose pose is asked for.
+    pub fn tool(&self) -> &Frame {
+        &self.tool
+    }
+
     /// Elastic coordinates (m, rad) in the order of the elements.
     pub fn deflections(&self) -> &[f64] {
         &self.q.as_slice()[self.arm.model.n_actuated()..]
@@ -269,6 +279,14 @@ impl OperatingPoint {
     /// Forces with which the drives hold the pose (N m or N), in coordinate order.
     pub fn holding_efforts(&self) -> &[f64] {
         &self.p.as_slice()[..self.arm.model.n_actuated()]
+    }
+
+    /// Forces on the elastic coordinates that weight, loads and the wrench would need at this equilibrium in another arm of the
+    /// same tree, without springs, into `p` (n): with other masses, the slope of a mass.
+    pub fn forces_of(&mut self, other: &FlexibleArm, p: &mut DVector<f64>) {
+        let mut all = DVector::zeros(self.q.len());
+        static_forces(other, Some((&self.tool, &self.F_T_W)), 0.0, &mut self.data, &self.q, &mut all);
+        p.copy_from(&all.rows(self.arm.model.n_actuated(), self.r.len()));
     }
 
     /// Twist of the tool per rate of the coordinates, joints first, 6×(m + n).
@@ -290,24 +308,49 @@ impl OperatingPoint {
     ///
     /// Cost: six solutions with the factor that is there.
     pub fn compliance(&mut self) -> Matrix6<f64> {
+        if self.factor.is_none() {
+            return Matrix6::zeros();
+        }
+        self.solve_for_jacobian(false);
+        Matrix6::from_fn(|i, j| self.Jt.column(i).dot(&self.Y.column(j)))
+    }
+
+    /// Twist of the tool per generalised force on each elastic coordinate, `J (K + dp/de)^-1`, transposed: n×6.
+    ///
+    /// What the tool does when a parameter changes the forces on the elastic coordinates by `dr` is `-yieldingᵀ dr`: one matrix
+    /// for any number of parameters. Empty before the first pose.
+    ///
+    /// Cost: as [`OperatingPoint::compliance`].
+    pub fn yielding(&mut self) -> &DMatrix<f64> {
+        if self.factor.is_some() {
+            self.solve_for_jacobian(true);
+        }
+        &self.Y
+    }
+
+    /// `Y = T^-1 Jᵀ` with the tangent T, or its transpose.
+    fn solve_for_jacobian(&mut self, transposed: bool) {
         let (m, n) = (self.arm.model.n_actuated(), self.r.len());
-        let Some(factor) = &self.factor else { return Matrix6::zeros() };
+        let Some(factor) = &self.factor else { return };
         let J = self.J.columns(m, n);
         self.Jt.iter_mut().zip(J.row_iter().flat_map(|row| row.into_iter())).for_each(|(t, x)| *t = *x);
         self.Y.copy_from(&self.Jt);
         factor.solve_mut(&mut self.Y);
-        if !self.symmetric {
-            for _ in 0..REFINEMENTS {
-                // Y += S^-1 (Jᵀ - K Y)
-                self.R.copy_from(&self.Jt);
-                for (mut r, y) in self.R.column_iter_mut().zip(self.Y.column_iter()) {
-                    r.gemv(-1.0, &self.tangent, &y, 1.0);
-                }
-                factor.solve_mut(&mut self.R);
-                self.Y += &self.R;
-            }
+        if self.symmetric {
+            return;
         }
-        Matrix6::from_fn(|i, j| self.Jt.column(i).dot(&self.Y.column(j)))
+        for _ in 0..REFINEMENTS {
+            // Y += S^-1 (Jᵀ - T Y)
+            self.R.copy_from(&self.Jt);
+            for (mut r, y) in self.R.column_iter_mut().zip(self.Y.column_iter()) {
+                match transposed {
+                    true => r.gemv_tr(-1.0, &self.tangent, &y, 1.0),
+                    false => r.gemv(-1.0, &self.tangent, &y, 1.0),
+                }
+            }
+            factor.solve_mut(&mut self.R);
+            self.Y += &self.R;
+        }
     }
 
     /// Natural frequencies (Hz), ascending, undamped, drives locked; of the symmetric part of the stiffness.

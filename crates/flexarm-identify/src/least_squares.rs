@@ -1,0 +1,418 @@
+//! Nonlinear least squares with what the data cannot say kept at its prior, and the uncertainty of the rest.
+//!
+//! ```text
+//! minimise Σ ρ(r_i(x, b))        x parameters with priors N(0, σ_p²), b unknowns of the measurement without priors
+//! ```
+//! First Levenberg and Marquardt's method with the prior as rows of its own. Then the singular values of the Jacobian (columns
+//! times σ_p, nuisance unknowns projected out) say which directions of x the data know better than the prior; within these the
+//! prior is dropped, so that estimates are free of it, and across them x stays where the prior has it. Residuals are in units of
+//! their standard deviations. Not here: what is measured and what the parameters are.
+
+use nalgebra::{DMatrix, DVector};
+
+/// A model of measurements.
+pub trait Residuals {
+    /// What can go wrong.
+    type Error;
+
+    /// Residuals over their standard deviations at all unknowns, parameters first; their derivatives into `J` if it is there
+    /// (resized as needed).
+    ///
+    /// # Errors
+    /// Where the model has no answer at these unknowns.
+    fn evaluate(&self, unknowns: &DVector<f64>, J: Option<&mut DMatrix<f64>>) -> Result<DVector<f64>, Self::Error>;
+}
+
+/// How a residual counts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Loss {
+    /// Its square.
+    Square,
+    /// Huber's: beyond so many standard deviations in proportion to its size.
+    Huber(f64),
+    /// Cauchy's: outliers lose their influence altogether; more than one minimum is possible.
+    Cauchy(f64),
+}
+
+impl Loss {
+    /// Weight of a residual in the equivalent weighted problem.
+    fn weight(self, r: f64) -> f64 {
+        match self {
+            Self::Square => 1.0,
+            Self::Huber(k) if r.abs() <= k => 1.0,
+            Self::Huber(k) => k / r.abs(),
+            Self::Cauchy(c) => 1.0 / (1.0 + (r / c).powi(2)),
+        }
+    }
+
+    /// Twice its cost: the square of small residuals.
+    fn cost(self, r: f64) -> f64 {
+        match self {
+            Self::Square => r * r,
+            Self::Huber(k) if r.abs() <= k => r * r,
+            Self::Huber(k) => 2.0 * k * r.abs() - k * k,
+            Self::Cauchy(c) => c * c * (r / c).powi(2).ln_1p(),
+        }
+    }
+}
+
+/// How the search goes.
+#[derive(Clone, Copy, Debug)]
+pub struct Search {
+    /// How residuals count.
+    pub loss: Loss,
+    /// Most iterations of each phase.
+    pub most_iterations: usize,
+    /// A step that moves no unknown by more than this part of its standard deviation ends it.
+    pub tolerance: f64,
+}
+
+impl Default for Search {
+    fn default() -> Self {
+        Self { loss: Loss::Huber(2.5), most_iterations: 100, tolerance: 1e-6 }
+    }
+}
+
+/// What was found.
+#[derive(Clone, Debug)]
+pub struct Solution {
+    /// All unknowns, parameters first.
+    pub unknowns: DVector<f64>,
+    /// Residuals over their standard deviations.
+    pub residuals: DVector<f64>,
+    /// Their weights under the loss, 1 where it is the square.
+    pub weights: DVector<f64>,
+    /// Of each residual the part that its own measurement decides, 0 to 1.
+    pub leverages: DVector<f64>,
+    /// Covariance of the parameters, with the prior's across what is not identified.
+    pub covariance: DMatrix<f64>,
+    /// Directions in the parameters over their prior deviations: one unit column each, the best known first.
+    pub directions: DMatrix<f64>,
+    /// How many times better than the prior each direction is known.
+    pub gains: Vec<f64>,
+    /// How many of the directions are identified.
+    pub identified: usize,
+    /// Sum of the weighted squares over the degrees of freedom, `Σ w r² / (m - n)`.
+    pub scale: f64,
+    /// m - n.
+    pub freedom: usize,
+    /// Iterations of both phases.
+    pub iterations: usize,
+    /// Whether the last step was below the tolerance.
+    pub converged: bool,
+}
+
+/// Why there is no solution.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SolveError<E> {
+    /// The model has no answer at the start.
+    #[error(transparent)]
+    Model(E),
+    /// Unknowns of the measurement that no residual tells.
+    #[error("the measurements do not tell the unknown {0} that belongs to them alone")]
+    Nuisance(usize),
+    /// Residuals or derivatives that are no numbers.
+    #[error("a residual or a derivative is not a number")]
+    NotFinite,
+}
+
+/// Smallest gain of a direction that counts as identified: the data know it as well as the prior does.
+const IDENTIFIED: f64 = 1.0;
+/// Relative size below which a column depends on the others.
+const DEPENDENT: f64 = 1e-10;
+
+/// Solves the problem from a start.
+///
+/// * `start`: all unknowns; those of the measurements may be guesses.
+/// * `prior`: standard deviation of each parameter about 0, positive; the unknowns after them have none.
+///
+/// # Errors
+/// [`SolveError`].
+pub fn solve<P: Residuals>(
+    problem: &P,
+    start: &DVector<f64>,
+    prior: &[f64],
+    search: &Search,
+) -> Result<Solution, SolveError<P::Error>> {
+    let prior = DVector::from_column_slice(prior);
+    let n = start.len();
+    // With the prior: every direction is held.
+    let held = descend(problem, &DMatrix::identity(n, n), start.clone(), Some(&prior), search)?;
+    // What the data know, and again without the prior.
+    let known = Known::of(&held, &prior)?;
+    let begin = known.projected(&held.unknowns, &prior);
+    let basis = known.basis(&prior, n);
+    let mut found = descend(problem, &basis, begin, None, search)?;
+    found.iterations += held.iterations;
+    Ok(finish(found, known, &basis, &prior))
+}
+
+/// Where a descent ended.
+struct Descent {
+    unknowns: DVector<f64>,
+    residuals: DVector<f64>,
+    weights: DVector<f64>,
+    J: DMatrix<f64>,
+    iterations: usize,
+    converged: bool,
+}
+
+/// Levenberg and Marquardt's method along the columns of `basis`; weights of the loss renewed at every point.
+fn descend<P: Residuals>(
+    problem: &P,
+    basis: &DMatrix<f64>,
+    start: DVector<f64>,
+    prior: Option<&DVector<f64>>,
+    search: &Search,
+) -> Result<Descent, SolveError<P::Error>> {
+    let weights_of = |r: &DVector<f64>| r.map(|r| search.loss.weight(r));
+    let held = |x: &DVector<f64>| prior.map_or(0.0, |p| p.iter().zip(x.iter()).map(|(p, x)| (x / p).powi(2)).sum());
+    let cost_of =
+        |r: &DVector<f64>, x: &DVector<f64>| -> f64 { r.iter().map(|r| search.loss.cost(*r)).sum::<f64>() + held(x) };
+    let mut J = DMatrix::zeros(0, 0);
+    let mut x = start;
+    let mut r = problem.evaluate(&x, Some(&mut J)).map_err(SolveError::Model)?;
+    let mut cost = cost_of(&r, &x);
+    if !cost.is_finite() || J.iter().any(|x| !x.is_finite()) {
+        return Err(SolveError::NotFinite);
+    }
+    let (mut damping, mut iterations, mut converged) = (1e-4, 0, basis.ncols() == 0);
+    while iterations < search.most_iterations && !converged {
+        iterations += 1;
+        let w = weights_of(&r);
+        let B = &J * basis;
+        let weighted = DMatrix::from_fn(B.nrows(), B.ncols(), |i, j| w[i] * B[(i, j)]);
+        let mut normal = B.tr_mul(&weighted);
+        let mut gradient = weighted.tr_mul(&r);
+        if let Some(prior) = prior {
+            for (k, p) in prior.iter().enumerate() {
+                normal[(k, k)] += 1.0 / (p * p);
+                gradient[k] += x[k] / (p * p);
+            }
+        }
+        let diagonal = normal.diagonal();
+        let mut better = false;
+        for _ in 0..12 {
+            let mut damped = normal.clone();
+            for (k, d) in diagonal.iter().enumerate() {
+                damped[(k, k)] += damping * d.max(f64::MIN_POSITIVE);
+            }
+            let Some(factor) = damped.cholesky() else {
+                damping = (damping * 10.0).max(1e-10);
+                continue;
+            };
+            let step = factor.solve(&gradient);
+            let moved = &x - basis * &step;
+            let tried = problem.evaluate(&moved, None);
+            let size = step.iter().zip(diagonal.iter()).map(|(s, d)| s.abs() * d.sqrt()).fold(0.0, f64::max);
+            match tried {
+                Ok(found) if cost_of(&found, &moved) <= cost * (1.0 + 1e-14) => {
+                    converged = size <= search.tolerance;
+                    (x, better) = (moved, true);
+                    damping = (damping * 0.1).max(1e-12);
+                    break;
+                }
+                // As good as rounding allows.
+                _ if size <= search.tolerance => {
+                    converged = true;
+                    break;
+                }
+                _ => damping = (damping * 10.0).max(1e-10),
+            }
+        }
+        if better {
+            r = problem.evaluate(&x, Some(&mut J)).map_err(SolveError::Model)?;
+            cost = cost_of(&r, &x);
+            if J.iter().any(|x| !x.is_finite()) {
+                return Err(SolveError::NotFinite);
+            }
+        } else if !converged {
+            break;
+        }
+    }
+    let weights = weights_of(&r);
+    Ok(Descent { unknowns: x, residuals: r, weights, J, iterations, converged })
+}
+
+/// Directions of the parameters by how well the data know them.
+struct Known {
+    directions: DMatrix<f64>,
+    gains: Vec<f64>,
+    identified: usize,
+}
+
+impl Known {
+    fn of<E>(descent: &Descent, prior: &DVector<f64>) -> Result<Self, SolveError<E>> {
+        let p = prior.len();
+        if p == 0 {
+            return Ok(Self { directions: DMatrix::zeros(0, 0), gains: Vec::new(), identified: 0 });
+        }
+        let root = descent.weights.map(f64::sqrt);
+        let weighted = DMatrix::from_fn(descent.J.nrows(), descent.J.ncols(), |i, j| root[i] * descent.J[(i, j)]);
+        let mut A = weighted.columns(0, p).into_owned();
+        for (k, sigma) in prior.iter().enumerate() {
+            A.column_mut(k).scale_mut(*sigma);
+        }
+        let b = weighted.ncols() - p;
+        if b > 0 {
+            let own = weighted.columns(p, b).into_owned();
+            let Q = orthonormal(&own).map_err(SolveError::Nuisance)?;
+            A -= &Q * Q.tr_mul(&A);
+        }
+        // Rows of zeros leave the singular values and make all directions come out.
+        let rows = A.nrows().max(p);
+        let A = A.resize(rows, p, 0.0);
+        let svd = A.svd(false, true);
+        let mut order: Vec<usize> = (0..p).collect();
+        order.sort_by(|a, b| svd.singular_values[*b].total_cmp(&svd.singular_values[*a]));
+        let gains: Vec<f64> = order.iter().map(|k| svd.singular_values[*k]).collect();
+        let rows = svd.v_t.unwrap_or_else(|| DMatrix::identity(p, p));
+        let directions = DMatrix::from_fn(p, p, |i, j| rows[(order[j], i)]);
+        let identified = gains.iter().take_while(|gain| **gain > IDENTIFIED).count();
+        Ok(Self { directions, gains, identified })
+    }
+
+    /// Columns along which the unknowns may move: identified directions of the parameters, then all unknowns without a prior.
+    fn basis(&self, prior: &DVector<f64>, unknowns: usize) -> DMatrix<f64> {
+        let (p, k) = (prior.len(), self.identified);
+        let own = unknowns - p;
+        let mut basis = DMatrix::zeros(unknowns, k + own);
+        for (i, j) in (0..p).flat_map(|i| (0..k).map(move |j| (i, j))) {
+            basis[(i, j)] = prior[i] * self.directions[(i, j)];
+        }
+        for j in 0..own {
+            basis[(p + j, k + j)] = 1.0;
+        }
+        basis
+    }
+
+    /// The unknowns with what is not identified back at the prior.
+    fn projected(&self, unknowns: &DVector<f64>, prior: &DVector<f64>) -> DVector<f64> {
+        let p = prior.len();
+        let over = DVector::from_fn(p, |i, _| unknowns[i] / prior[i]);
+        let V = self.directions.columns(0, self.identified);
+        let kept = V * V.tr_mul(&over);
+        let mut projected = unknowns.clone();
+        for i in 0..p {
+            projected[i] = prior[i] * kept[i];
+        }
+        projected
+    }
+}
+
+/// Orthonormal columns that span those of a matrix; the number of a column that depends on those before.
+fn orthonormal(A: &DMatrix<f64>) -> Result<DMatrix<f64>, usize> {
+    let mut Q = A.clone();
+    for k in 0..A.ncols() {
+        let size = A.column(k).norm();
+        for _ in 0..2 {
+            for j in 0..k {
+                let along = Q.column(j).dot(&Q.column(k));
+                let other = Q.column(j).into_owned();
+                Q.column_mut(k).axpy(-along, &other, 1.0);
+            }
+        }
+        let left = Q.column(k).norm();
+        if left.is_nan() || left <= DEPENDENT * size || size == 0.0 {
+            return Err(k);
+        }
+        Q.column_mut(k).scale_mut(1.0 / left);
+    }
+    Ok(Q)
+}
+
+fn finish(found: Descent, known: Known, basis: &DMatrix<f64>, prior: &DVector<f64>) -> Solution {
+    let (m, p) = (found.residuals.len(), prior.len());
+    let columns = basis.ncols();
+    let root = found.weights.map(f64::sqrt);
+    let B = &found.J * basis;
+    let weighted = DMatrix::from_fn(m, columns, |i, j| root[i] * B[(i, j)]);
+    // Independent columns, scaled so that their units do not matter.
+    let normal = weighted.tr_mul(&weighted);
+    let scales = normal.diagonal().map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 1.0 });
+    let scaled = DMatrix::from_fn(columns, columns, |i, j| scales[i] * normal[(i, j)] * scales[j]);
+    let inverse = scaled.cholesky().map_or_else(|| DMatrix::zeros(columns, columns), |factor| factor.inverse());
+    let inverse = DMatrix::from_fn(columns, columns, |i, j| scales[i] * inverse[(i, j)] * scales[j]);
+    let spread = basis * &inverse * basis.transpose();
+    let mut covariance = spread.view((0, 0), (p, p)).into_owned();
+    // Across what was left at the prior.
+    let S = DMatrix::from_diagonal(prior);
+    let kept = known.directions.columns(0, known.identified);
+    let across = DMatrix::identity(p, p) - kept * kept.transpose();
+    covariance += &S * across * &S;
+    let leverages = DVector::from_fn(m, |i, _| {
+        let row = weighted.row(i);
+        (row * &inverse * row.transpose())[(0, 0)].clamp(0.0, 1.0)
+    });
+    let freedom = m.saturating_sub(columns);
+    let sum: f64 = found.residuals.iter().zip(found.weights.iter()).map(|(r, w)| w * r * r).sum();
+    Solution {
+        unknowns: found.unknowns,
+        residuals: found.residuals,
+        weights: found.weights,
+        leverages,
+        covariance,
+        directions: known.directions,
+        gains: known.gains,
+        identified: known.identified,
+        scale: if freedom > 0 { sum / freedom as f64 } else { f64::NAN },
+        freedom,
+        iterations: found.iterations,
+        converged: found.converged,
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
+mod tests {
+    use super::*;
+
+    /// `y = a exp(-b t) + offset`, with the offset an unknown of the measurement.
+    struct Decay {
+        t: Vec<f64>,
+        y: Vec<f64>,
+    }
+
+    impl Residuals for Decay {
+        type Error = ();
+        fn evaluate(&self, x: &DVector<f64>, J: Option<&mut DMatrix<f64>>) -> Result<DVector<f64>, ()> {
+            let (a, b, c) = (x[0].exp(), x[1].exp(), x[3]);
+            if let Some(J) = J {
+                *J = DMatrix::from_fn(self.t.len(), 4, |i, j| {
+                    let e = a * (-b * self.t[i]).exp();
+                    [e, -b * self.t[i] * e, 0.0, 1.0][j]
+                });
+            }
+            Ok(DVector::from_fn(self.t.len(), |i, _| a * (-b * self.t[i]).exp() + c - self.y[i]))
+        }
+    }
+
+    #[test]
+    fn a_decay_is_found_again_and_a_parameter_that_nothing_tells_stays_at_its_prior() {
+        let t: Vec<f64> = (0..40).map(|k| 0.1 * f64::from(k)).collect();
+        let y = t.iter().map(|t| 30.0 * (-1.7 * t).exp() + 4.0).collect();
+        let problem = Decay { t, y };
+        let found = solve(&problem, &DVector::zeros(4), &[2.0, 2.0, 0.7], &Search::default()).unwrap();
+        let error = (found.unknowns[0] - 30f64.ln()).abs().max((found.unknowns[1] - 1.7f64.ln()).abs());
+        assert!(error < 1e-9 && found.converged, "{error:e}"); // measured: below 1e-12
+        assert!((found.unknowns[3] - 4.0).abs() < 1e-8, "{}", found.unknowns[3]);
+        assert_eq!((found.identified, found.unknowns[2]), (2, 0.0));
+        assert!((found.covariance[(2, 2)].sqrt() - 0.7).abs() < 1e-12, "its deviation is the prior's");
+    }
+
+    #[test]
+    fn one_wild_residual_in_forty_does_not_carry_huber_and_cauchy_away() {
+        let t: Vec<f64> = (0..40).map(|k| 0.1 * f64::from(k)).collect();
+        let mut y: Vec<f64> = t.iter().map(|t| 30.0 * (-1.7 * t).exp() + 4.0).collect();
+        y[7] += 500.0;
+        let problem = Decay { t, y };
+        let start = DVector::from_vec(vec![3.0, 0.3, 0.0, 3.0]);
+        let error = |loss| {
+            let found = solve(&problem, &start, &[2.0, 2.0, 0.7], &Search { loss, ..Search::default() }).unwrap();
+            (found.unknowns[0] - 30f64.ln()).abs()
+        };
+        let (square, huber, cauchy) = (error(Loss::Square), error(Loss::Huber(2.5)), error(Loss::Cauchy(2.0)));
+        assert!(square > 0.5 && huber < 0.1 * square && cauchy < 1e-3, "{square} {huber} {cauchy:e}");
+    }
+}

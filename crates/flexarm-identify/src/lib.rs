@@ -1,0 +1,26 @@
+//! Parameters of flexible arms from measurements, with their uncertainties.
+//!
+//! A [`Plant`] is an arm as it is known, [`Parameter`]s say what of it is unknown, [`Measurements`] what was read at the robot.
+//! [`MeasuredArm`] puts them together; [`identify`] finds the parameters, says which of them the readings tell and how well, and
+//! which readings argue against the model. [`plan`] chooses poses and loads that are worth measuring. Derivatives are in closed
+//! form ([`tool_slopes`], [`frequency_slopes`]).
+//!
+//! Not here: files, units, robots by name (the facade).
+#![allow(non_snake_case, reason = "monogram notation: X_WT, J; see docs/references.md")]
+#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
+
+mod identify;
+mod least_squares;
+mod measurement;
+mod parameter;
+mod plan;
+mod sensitivity;
+
+pub use identify::{Found, HeldOut, Identified, IdentifyError, IdentifyOptions, identify};
+pub use least_squares::{Loss, Residuals, Search, Solution, SolveError, solve};
+pub use measurement::{
+    Component, Instrument, LoadCase, MeasuredArm, Measurements, NoAnswer, Reading, ReadingKind, Row, Target,
+};
+pub use parameter::{Effect, Parameter, Place, Plant};
+pub use plan::{Candidate, Plan, PlanOptions, plan};
+pub use sensitivity::{FrequencySlopes, frequency_slopes, tool_slopes};

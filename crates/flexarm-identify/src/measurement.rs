@@ -1,0 +1,469 @@
+//! What was measured, and what an arm with given parameters would have shown.
+//!
+//! A reading is one thing done at the robot: a displacement between two loads at a pose, a place in the axes of an instrument, the
+//! natural frequencies of a hammer test. Each becomes rows: residual over standard deviation, and its derivatives by the
+//! parameters and by the unknowns that belong to the measurement (where the instrument stands, where the target is on the tool).
+
+use flexarm_kinematics::{Frame, Pose, SpatialInertia, Wrench, rotation_vector};
+use flexarm_stepping::{OperatingPoint, StepError};
+use nalgebra::{DMatrix, DVector, Matrix3xX, Rotation3, Translation3, Vector3};
+
+use crate::least_squares::Residuals;
+use crate::parameter::{Parameter, Plant};
+use crate::sensitivity::{frequency_slopes, tool_slopes};
+
+/// What the tool carries and what pulls at it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LoadCase {
+    /// Force and moment at the point, world axes (N, N m).
+    pub wrench: Wrench,
+    /// Where they act, in tool axes (m).
+    pub at: Vector3<f64>,
+    /// What is fixed to the tool besides what the robot carries: inertia about the tool's origin, tool axes.
+    pub carried: SpatialInertia,
+}
+
+impl LoadCase {
+    /// Nothing besides what the robot carries anyway.
+    pub fn none() -> Self {
+        Self { wrench: Wrench::zeros(), at: Vector3::zeros(), carried: SpatialInertia::zeros() }
+    }
+}
+
+impl Default for LoadCase {
+    fn default() -> Self {
+        Self::none()
+    }
+}
+
+/// One number: what it is of, what was read, how sure it is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row<T> {
+    /// What of the reading.
+    pub of: T,
+    /// The number (m, rad or Hz).
+    pub value: f64,
+    /// Its standard deviation.
+    pub std: f64,
+}
+
+/// A component of a displacement.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Component {
+    /// Along a direction, world axes, of unit length.
+    Along(Vector3<f64>),
+    /// Rotation about a direction, world axes.
+    About(Vector3<f64>),
+}
+
+/// One thing measured at a pose.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reading {
+    /// Name for people: file and row.
+    pub name: String,
+    /// Actuated joints (rad or m).
+    pub q: Vec<f64>,
+    /// What.
+    pub kind: ReadingKind,
+}
+
+/// Kinds of readings.
+#[derive(Clone, Debug, PartialEq)]
+pub enum ReadingKind {
+    /// How far a point of the tool moves from one load to another.
+    Displacement {
+        /// Before.
+        before: LoadCase,
+        /// After.
+        after: LoadCase,
+        /// The point, tool axes (m).
+        point: Vector3<f64>,
+        /// What was read.
+        rows: Vec<Row<Component>>,
+    },
+    /// Where a target on the tool is, in the axes of an instrument.
+    Place {
+        /// Load at that time.
+        load: LoadCase,
+        /// Number of the target.
+        target: usize,
+        /// Number of the instrument.
+        instrument: usize,
+        /// Place (m).
+        value: Vector3<f64>,
+        /// Standard deviation of each component (m).
+        std: Vector3<f64>,
+    },
+    /// Natural frequencies, drives locked.
+    Frequencies {
+        /// What the tool carries; a wrench does not count.
+        load: LoadCase,
+        /// Number of the mode, from 0 with the lowest; Hz.
+        rows: Vec<Row<usize>>,
+    },
+}
+
+impl Reading {
+    /// How many numbers.
+    pub fn rows(&self) -> usize {
+        match &self.kind {
+            ReadingKind::Displacement { rows, .. } => rows.len(),
+            ReadingKind::Place { .. } => 3,
+            ReadingKind::Frequencies { rows, .. } => rows.len(),
+        }
+    }
+
+    /// Standard deviation of each number.
+    pub fn deviations(&self) -> Vec<f64> {
+        match &self.kind {
+            ReadingKind::Displacement { rows, .. } => rows.iter().map(|row| row.std).collect(),
+            ReadingKind::Place { std, .. } => std.iter().copied().collect(),
+            ReadingKind::Frequencies { rows, .. } => rows.iter().map(|row| row.std).collect(),
+        }
+    }
+}
+
+/// A point on the tool whose place is measured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Target {
+    /// Known, tool axes (m).
+    Known(Vector3<f64>),
+    /// Unknown; a guess.
+    Unknown(Vector3<f64>),
+}
+
+/// Where an instrument stands: the world in its axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Instrument {
+    /// Known.
+    Known(Pose),
+    /// Unknown; a guess.
+    Unknown(Pose),
+}
+
+/// Readings, and what belongs to them.
+#[derive(Clone, Debug, Default)]
+pub struct Measurements {
+    /// What was read.
+    pub readings: Vec<Reading>,
+    /// Points that places are of.
+    pub targets: Vec<Target>,
+    /// Instruments that places are seen from.
+    pub instruments: Vec<Instrument>,
+}
+
+impl Measurements {
+    /// How many unknowns belong to the measurements: six per unknown instrument, then three per unknown target.
+    pub fn own_unknowns(&self) -> usize {
+        let instruments = self.instruments.iter().filter(|i| matches!(i, Instrument::Unknown(_))).count();
+        let targets = self.targets.iter().filter(|t| matches!(t, Target::Unknown(_))).count();
+        6 * instruments + 3 * targets
+    }
+
+    /// How many numbers were read.
+    pub fn rows(&self) -> usize {
+        self.readings.iter().map(Reading::rows).sum()
+    }
+
+    /// The same with some of the readings.
+    #[must_use]
+    pub fn of_readings(&self, keep: impl Fn(usize) -> bool) -> Self {
+        let readings = self.readings.iter().enumerate().filter(|(k, _)| keep(*k)).map(|(_, r)| r.clone()).collect();
+        Self { readings, ..self.clone() }
+    }
+
+    /// The world in the axes of an instrument, and where in `own` its six unknowns begin.
+    pub(crate) fn instrument(&self, number: usize, own: &[f64]) -> (Pose, Option<usize>) {
+        let before = self.instruments[..number].iter().filter(|i| matches!(i, Instrument::Unknown(_))).count();
+        match self.instruments[number] {
+            Instrument::Known(X) => (X, None),
+            Instrument::Unknown(X) => {
+                let at = 6 * before;
+                let v = |k: usize| Vector3::new(own[at + k], own[at + k + 1], own[at + k + 2]);
+                let moved = Pose {
+                    rotation: Rotation3::new(v(3)) * X.rotation,
+                    translation: Translation3::from(X.translation.vector + v(0)),
+                };
+                (moved, Some(at))
+            }
+        }
+    }
+
+    /// A target on the tool, and where in `own` its three unknowns begin.
+    pub(crate) fn target(&self, number: usize, own: &[f64]) -> (Vector3<f64>, Option<usize>) {
+        let instruments = self.instruments.iter().filter(|i| matches!(i, Instrument::Unknown(_))).count();
+        let before = self.targets[..number].iter().filter(|t| matches!(t, Target::Unknown(_))).count();
+        match self.targets[number] {
+            Target::Known(p) => (p, None),
+            Target::Unknown(p) => {
+                let at = 6 * instruments + 3 * before;
+                (p + Vector3::new(own[at], own[at + 1], own[at + 2]), Some(at))
+            }
+        }
+    }
+}
+
+/// An arm with unknown parameters under measurements.
+pub struct MeasuredArm<'a> {
+    /// The arm as it is known.
+    pub plant: &'a Plant,
+    /// What is unknown of it.
+    pub parameters: &'a [Parameter],
+    /// What was read.
+    pub measurements: &'a Measurements,
+}
+
+/// A reading for which the arm has no answer.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{reading}: {source}")]
+pub struct NoAnswer {
+    /// Name of the reading.
+    pub reading: String,
+    /// Why.
+    pub source: StepError,
+}
+
+/// Derivatives of three numbers or less: rows by unknowns.
+struct Block {
+    values: Vec<f64>,
+    slopes: DMatrix<f64>,
+}
+
+/// Tool at rest at a pose: where a point of it is, and how it moves with the parameters.
+struct AtRest {
+    X_WT: Pose,
+    /// At the tool's origin.
+    slopes: Option<Matrix3xX<f64>>,
+    turns: Option<Matrix3xX<f64>>,
+}
+
+impl AtRest {
+    fn point(&self, p_T: &Vector3<f64>) -> Vector3<f64> {
+        self.X_WT.translation.vector + self.X_WT.rotation * p_T
+    }
+
+    fn point_slopes(&self, p_T: &Vector3<f64>) -> Option<Matrix3xX<f64>> {
+        let arm = self.X_WT.rotation * p_T;
+        let (slopes, turns) = (self.slopes.as_ref()?, self.turns.as_ref()?);
+        let mut moved = slopes.clone();
+        for (mut to, w) in moved.column_iter_mut().zip(turns.column_iter()) {
+            to += w.cross(&arm);
+        }
+        Some(moved)
+    }
+}
+
+/// Workspaces of the loads met so far.
+struct Workspaces<'a> {
+    plant: Plant,
+    parameters: &'a [Parameter],
+    known: Vec<(Vector3<f64>, SpatialInertia, OperatingPoint)>,
+}
+
+impl Workspaces<'_> {
+    /// The tool at rest at a pose under a load.
+    fn at_rest(&mut self, q: &[f64], load: &LoadCase, slopes: bool) -> Result<AtRest, StepError> {
+        let known = self.known.iter().position(|(at, carried, _)| *at == load.at && *carried == load.carried);
+        let number = match known {
+            Some(number) => number,
+            None => {
+                let tool = &self.plant.tool;
+                let X = Pose::from_parts(Translation3::from(load.at), Rotation3::identity());
+                let frame = Frame { name: tool.name.clone(), body: tool.body, X_BF: tool.X_BF * X };
+                let arm = self.loaded(&load.carried).held(q)?;
+                self.known.push((load.at, load.carried, OperatingPoint::new(arm, frame)));
+                self.known.len() - 1
+            }
+        };
+        let at = &mut self.known[number].2;
+        at.solve(q, &load.wrench)?;
+        let X = Pose::from_parts(Translation3::from(-load.at), Rotation3::identity());
+        let X_WT = at.tcp_pose() * X;
+        if !slopes {
+            return Ok(AtRest { X_WT, slopes: None, turns: None });
+        }
+        let V = tool_slopes(at, self.parameters)?;
+        let turns = V.fixed_rows::<3>(3).into_owned();
+        let mut moved = V.fixed_rows::<3>(0).into_owned();
+        let arm = X_WT.rotation * load.at;
+        for (mut to, w) in moved.column_iter_mut().zip(turns.column_iter()) {
+            // From where the load acts to the tool's origin.
+            to -= w.cross(&arm);
+        }
+        Ok(AtRest { X_WT, slopes: Some(moved), turns: Some(turns) })
+    }
+
+    fn loaded(&self, carried: &SpatialInertia) -> Plant {
+        let tool = &self.plant.tool;
+        self.plant.carrying(tool.body, &carried.at_parent(&tool.X_BF))
+    }
+}
+
+impl MeasuredArm<'_> {
+    /// What each reading would have shown, in its own units, reading after reading.
+    ///
+    /// # Errors
+    /// [`NoAnswer`].
+    pub fn predicted(&self, unknowns: &DVector<f64>) -> Result<Vec<f64>, NoAnswer> {
+        let mut rooms = self.rooms(unknowns);
+        let own = &unknowns.as_slice()[self.parameters.len()..];
+        let mut values = Vec::new();
+        for reading in &self.measurements.readings {
+            values.extend(self.block(&mut rooms, reading, own, false)?.values);
+        }
+        Ok(values)
+    }
+
+    /// What was read, in the same order.
+    pub fn observed(&self) -> Vec<f64> {
+        let of = |reading: &Reading| -> Vec<f64> {
+            match &reading.kind {
+                ReadingKind::Displacement { rows, .. } => rows.iter().map(|row| row.value).collect(),
+                ReadingKind::Place { value, .. } => value.iter().copied().collect(),
+                ReadingKind::Frequencies { rows, .. } => rows.iter().map(|row| row.value).collect(),
+            }
+        };
+        self.measurements.readings.iter().flat_map(of).collect()
+    }
+
+    fn rooms(&self, unknowns: &DVector<f64>) -> Workspaces<'_> {
+        let plant = self.plant.with(self.parameters, &unknowns.as_slice()[..self.parameters.len()]);
+        Workspaces { plant, parameters: self.parameters, known: Vec::new() }
+    }
+
+    /// Numbers of a reading, with their derivatives by all unknowns if asked for.
+    fn block(
+        &self,
+        rooms: &mut Workspaces<'_>,
+        reading: &Reading,
+        own: &[f64],
+        slopes: bool,
+    ) -> Result<Block, NoAnswer> {
+        let named = |source| NoAnswer { reading: reading.name.clone(), source };
+        match &reading.kind {
+            ReadingKind::Displacement { before, after, point, rows } => {
+                displacement(rooms, &reading.q, [before, after], point, rows, slopes, own.len()).map_err(named)
+            }
+            ReadingKind::Place { load, target, instrument, .. } => {
+                let at = rooms.at_rest(&reading.q, load, slopes).map_err(named)?;
+                Ok(self.place(&at, *target, *instrument, own))
+            }
+            ReadingKind::Frequencies { load, rows } => {
+                let plant = rooms.loaded(&load.carried);
+                let parameters = if slopes { self.parameters } else { &[] };
+                let found = frequency_slopes(&plant, parameters, &reading.q).map_err(named)?;
+                let values = rows.iter().map(|row| found.hz.get(row.of).copied().unwrap_or(f64::NAN)).collect();
+                let columns = if slopes { self.parameters.len() + own.len() } else { 0 };
+                let slopes = DMatrix::from_fn(rows.len(), columns, |i, j| match j < parameters.len() {
+                    true => found.slopes[(rows[i].of, j)],
+                    false => 0.0,
+                });
+                Ok(Block { values, slopes })
+            }
+        }
+    }
+
+    /// A target seen from an instrument.
+    fn place(&self, at: &AtRest, target: usize, instrument: usize, own: &[f64]) -> Block {
+        let p = self.parameters.len();
+        let (X_IW, six) = self.measurements.instrument(instrument, own);
+        let (p_T, three) = self.measurements.target(target, own);
+        let seen = X_IW.rotation * at.point(&p_T);
+        let values = (seen + X_IW.translation.vector).iter().copied().collect();
+        let Some(moved) = at.point_slopes(&p_T) else { return Block { values, slopes: DMatrix::zeros(3, 0) } };
+        let mut slopes = DMatrix::zeros(3, p + own.len());
+        slopes.columns_mut(0, p).copy_from(&(X_IW.rotation * moved));
+        if let Some(first) = six {
+            slopes.view_mut((0, p + first), (3, 3)).fill_with_identity();
+            // The increments are of a rotation vector: its rate map to the angular velocity on the left.
+            let v = Vector3::new(own[first + 3], own[first + 4], own[first + 5]);
+            for k in 0..3 {
+                let w = left_jacobian(&v).column(k).into_owned();
+                slopes.view_mut((0, p + first + 3 + k), (3, 1)).copy_from(&w.cross(&seen));
+            }
+        }
+        if let Some(first) = three {
+            slopes.view_mut((0, p + first), (3, 3)).copy_from(&(X_IW.rotation * at.X_WT.rotation).into_inner());
+        }
+        Block { values, slopes }
+    }
+}
+
+/// Angular velocity (fixed axes) per rate of a rotation vector.
+fn left_jacobian(v: &Vector3<f64>) -> nalgebra::Matrix3<f64> {
+    let angle = v.norm();
+    let K = v.cross_matrix();
+    let (a, b) = match angle < 1e-4 {
+        true => (0.5 - angle * angle / 24.0, 1.0 / 6.0 - angle * angle / 120.0),
+        false => ((1.0 - angle.cos()) / (angle * angle), (angle - angle.sin()) / angle.powi(3)),
+    };
+    nalgebra::Matrix3::identity() + K * a + K * K * b
+}
+
+fn displacement(
+    rooms: &mut Workspaces<'_>,
+    q: &[f64],
+    loads: [&LoadCase; 2],
+    point: &Vector3<f64>,
+    rows: &[Row<Component>],
+    slopes: bool,
+    own: usize,
+) -> Result<Block, StepError> {
+    let before = rooms.at_rest(q, loads[0], slopes)?;
+    let after = rooms.at_rest(q, loads[1], slopes)?;
+    let moved = after.point(point) - before.point(point);
+    let turn = after.X_WT.rotation * before.X_WT.rotation.inverse();
+    let turned = rotation_vector(turn.matrix());
+    let value = |row: &Row<Component>| match row.of {
+        Component::Along(d) => d.dot(&moved),
+        Component::About(d) => d.dot(&turned),
+    };
+    let values = rows.iter().map(value).collect();
+    let (Some(a), Some(b)) = (after.point_slopes(point), before.point_slopes(point)) else {
+        return Ok(Block { values, slopes: DMatrix::zeros(rows.len(), 0) });
+    };
+    let (Some(wa), Some(wb)) = (&after.turns, &before.turns) else {
+        return Ok(Block { values, slopes: DMatrix::zeros(rows.len(), 0) });
+    };
+    // Rotation from before to after: its angular velocity is wa - R wb, its vector's rate the inverse of the rate map.
+    let rate = left_jacobian(&turned).try_inverse().unwrap_or_else(nalgebra::Matrix3::identity);
+    let mut all = DMatrix::zeros(rows.len(), a.ncols() + own);
+    for (i, row) in rows.iter().enumerate() {
+        for k in 0..a.ncols() {
+            all[(i, k)] = match row.of {
+                Component::Along(d) => d.dot(&(a.column(k) - b.column(k))),
+                Component::About(d) => d.dot(&(rate * (wa.column(k) - turn * wb.column(k)))),
+            };
+        }
+    }
+    Ok(Block { values, slopes: all })
+}
+
+impl Residuals for MeasuredArm<'_> {
+    type Error = NoAnswer;
+
+    fn evaluate(&self, unknowns: &DVector<f64>, J: Option<&mut DMatrix<f64>>) -> Result<DVector<f64>, NoAnswer> {
+        let own = &unknowns.as_slice()[self.parameters.len()..];
+        let mut rooms = self.rooms(unknowns);
+        let m = self.measurements.rows();
+        let mut residuals = DVector::zeros(m);
+        let observed = self.observed();
+        let slopes = J.is_some();
+        let mut all = DMatrix::zeros(if slopes { m } else { 0 }, unknowns.len());
+        let mut first = 0;
+        for reading in &self.measurements.readings {
+            let block = self.block(&mut rooms, reading, own, slopes)?;
+            for (i, (value, std)) in block.values.iter().zip(reading.deviations()).enumerate() {
+                residuals[first + i] = (value - observed[first + i]) / std;
+                if slopes {
+                    all.row_mut(first + i).copy_from(&(block.slopes.row(i) / std));
+                }
+            }
+            first += block.values.len();
+        }
+        if let Some(J) = J {
+            *J = all;
+        }
+        Ok(residuals)
+    }
+}

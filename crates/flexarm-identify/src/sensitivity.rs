@@ -1,0 +1,186 @@
+//! How an arm at rest answers to its parameters: the tool's place and the natural frequencies.
+//!
+//! ```text
+//! K e + p(e) = 0:     V_T = -J (K + dp/de)^-1 dr/dx          dω²/dx = φᵀ (dK/dx - ω² dM/dx) φ
+//! ```
+//! with r the unbalanced forces. One matrix of an operating point serves all parameters. In dK/dx and dM/dx the explicit part is
+//! exact; the part by the moving equilibrium is a central difference of fourth order of the closed tangents along de/dx.
+
+use flexarm_kinematics::{Frame, Wrench};
+use flexarm_stepping::{FlexibleArm, OperatingPoint, StepError, Tangents};
+use nalgebra::{DMatrix, DVector, Matrix6xX, SymmetricEigen};
+
+use crate::parameter::{Effect, Parameter, Plant, scaled, slope_of};
+
+/// Length of the differences along the equilibrium's path, over the size of the elastic coordinates.
+const DIFFERENCE: f64 = 1e-3;
+
+/// `dr/dx`: change of the unbalanced forces on the elastic coordinates per parameter, n×p.
+fn force_slopes(at: &mut OperatingPoint, parameters: &[Parameter]) -> Result<DMatrix<f64>, StepError> {
+    let n = at.deflections().len();
+    let mut slopes = DMatrix::zeros(n, parameters.len());
+    for (k, parameter) in parameters.iter().enumerate() {
+        match &parameter.effect {
+            Effect::Stiffness(places) => {
+                for place in places {
+                    let (arm, e) = (at.arm(), at.deflections());
+                    let element = &arm.elements[place.spring];
+                    let first = arm.offset(element);
+                    let e = &e[first..first + element.size];
+                    let f = match &element.curve {
+                        Some(_) => element.spring_force(e),
+                        None => slope_of(&element.K, place.coordinate) * DVector::from_column_slice(e),
+                    };
+                    for (i, f) in f.iter().enumerate() {
+                        slopes[(first + i, k)] += f;
+                    }
+                }
+            }
+            Effect::Mass { body, per_kg } => {
+                // Forces are linear in a mass: a difference of any size is exact.
+                let (mut with, mut without) = (DVector::zeros(n), DVector::zeros(n));
+                let arm = at.arm().clone();
+                let heavier = carrying(&arm, *body, per_kg);
+                at.forces_of(&heavier, &mut with);
+                at.forces_of(&arm, &mut without);
+                slopes.set_column(k, &(with - without));
+            }
+        }
+    }
+    Ok(slopes)
+}
+
+/// The arm with a kilogram more.
+fn carrying(arm: &FlexibleArm, body: usize, per_kg: &flexarm_kinematics::SpatialInertia) -> FlexibleArm {
+    let mut inertia = arm.model.bodies()[body].inertia;
+    inertia += scaled(per_kg, 1.0);
+    FlexibleArm { model: std::sync::Arc::new(arm.model.with_inertia(body, inertia)), ..arm.clone() }
+}
+
+/// Twist of the tool (world axes, at its point; m, rad) per unit of each parameter's coordinate, 6×p, at a pose that is solved.
+///
+/// # Errors
+/// As [`OperatingPoint::solve`].
+pub fn tool_slopes(at: &mut OperatingPoint, parameters: &[Parameter]) -> Result<Matrix6xX<f64>, StepError> {
+    let forces = force_slopes(at, parameters)?;
+    let moved = at.yielding().tr_mul(&forces);
+    Ok(Matrix6xX::from_fn(parameters.len(), |i, j| -moved[(i, j)]))
+}
+
+/// Natural frequencies of a held arm with their slopes.
+#[derive(Clone, Debug)]
+pub struct FrequencySlopes {
+    /// Frequencies, ascending (Hz).
+    pub hz: Vec<f64>,
+    /// Per unit of each parameter's coordinate: a row per frequency, a column per parameter (Hz).
+    pub slopes: DMatrix<f64>,
+}
+
+/// Natural frequencies at a pose without a wrench, and their derivatives by parameters.
+///
+/// * `plant`: with the parameters as they are now; `q`: actuated joints (rad or m).
+///
+/// Where two frequencies coincide their shapes are not determined, and neither is the derivative of each.
+///
+/// # Errors
+/// As [`OperatingPoint::solve`]; [`StepError::Singular`] where a coordinate moves no mass.
+pub fn frequency_slopes(plant: &Plant, parameters: &[Parameter], q: &[f64]) -> Result<FrequencySlopes, StepError> {
+    let arm = plant.held(q)?;
+    let none = Wrench::zeros();
+    let mut at = OperatingPoint::new(arm.clone(), plant.tool.clone());
+    at.solve(q, &none)?;
+    let forces = force_slopes(&mut at, parameters)?;
+    let here = Tangents::at(&arm, &plant.tool, &none, at.coordinates());
+    let (omega2, shapes) = eigen(&here)?;
+    let symmetric = (&here.K + here.K.transpose()) * 0.5;
+    let singular = || StepError::Singular { matrix: "static stiffness (with the effect of weight)", t: 0.0 };
+    let factor = symmetric.cholesky().ok_or_else(singular)?;
+    let mut slopes = DMatrix::zeros(omega2.len(), parameters.len());
+    for (k, parameter) in parameters.iter().enumerate() {
+        let moved = -factor.solve(&forces.column(k));
+        let (dK, dM) = along(&arm, &plant.tool, at.coordinates(), &moved);
+        let (eK, eM) = explicit(&arm, &plant.tool, parameter, at.coordinates(), &here);
+        let (dK, dM) = (dK + eK, dM + eM);
+        for (i, w2) in omega2.iter().enumerate() {
+            let phi = shapes.column(i);
+            let slope = phi.dot(&(&dK * phi)) - w2 * phi.dot(&(&dM * phi));
+            slopes[(i, k)] = slope / (2.0 * w2.sqrt() * std::f64::consts::TAU);
+        }
+    }
+    Ok(FrequencySlopes { hz: omega2.iter().map(|w2| w2.sqrt() / std::f64::consts::TAU).collect(), slopes })
+}
+
+/// Squares of the natural frequencies, ascending, and shapes with `φᵀ M φ = 1`.
+fn eigen(at: &Tangents) -> Result<(Vec<f64>, DMatrix<f64>), StepError> {
+    let singular = |matrix| StepError::Singular { matrix, t: 0.0 };
+    let K = (&at.K + at.K.transpose()) * 0.5;
+    let L = K.cholesky().ok_or_else(|| singular("static stiffness (with the effect of weight)"))?.unpack();
+    let lower = |B: &DMatrix<f64>| L.solve_lower_triangular(B).ok_or_else(|| singular("stiffness factor"));
+    let A = lower(&lower(&at.M)?.transpose())?;
+    let eigen = SymmetricEigen::new((&A + A.transpose()) * 0.5);
+    let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
+    order.sort_by(|i, j| eigen.eigenvalues[*j].total_cmp(&eigen.eigenvalues[*i]));
+    let mut shapes = DMatrix::zeros(order.len(), order.len());
+    let mut omega2 = Vec::with_capacity(order.len());
+    for (column, k) in order.into_iter().enumerate() {
+        let value = eigen.eigenvalues[k];
+        if value.is_nan() || value <= 0.0 {
+            return Err(singular("mass matrix of the elastic coordinates"));
+        }
+        // K φ = ω² M φ with φ = L^-T y, and φᵀ M φ = yᵀ A y = value.
+        let y = eigen.eigenvectors.column(k).into_owned();
+        let phi = L.tr_solve_lower_triangular(&y).ok_or_else(|| singular("stiffness factor"))? / value.sqrt();
+        shapes.set_column(column, &phi);
+        omega2.push(1.0 / value);
+    }
+    Ok((omega2, shapes))
+}
+
+/// Change of stiffness and mass as the equilibrium moves by `de` per unit.
+fn along(arm: &FlexibleArm, tool: &Frame, q: &DVector<f64>, de: &DVector<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
+    let (m, n) = (arm.model.n_actuated(), de.len());
+    let size = de.amax();
+    if size == 0.0 {
+        return (DMatrix::zeros(n, n), DMatrix::zeros(n, n));
+    }
+    let h = DIFFERENCE / size;
+    let shifted = |steps: f64| {
+        let mut moved = q.clone();
+        moved.rows_mut(m, n).axpy(steps * h, de, 1.0);
+        Tangents::at(arm, tool, &Wrench::zeros(), &moved)
+    };
+    let [a, b, c, d] = [-2.0, -1.0, 1.0, 2.0].map(shifted);
+    let slope =
+        |a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>, d: &DMatrix<f64>| ((c - b) * 8.0 - (d - a)) / (12.0 * h);
+    (slope(&a.K, &b.K, &c.K, &d.K), slope(&a.M, &b.M, &c.M, &d.M))
+}
+
+/// Change of stiffness and mass by the parameter itself.
+fn explicit(
+    arm: &FlexibleArm,
+    tool: &Frame,
+    parameter: &Parameter,
+    q: &DVector<f64>,
+    here: &Tangents,
+) -> (DMatrix<f64>, DMatrix<f64>) {
+    let (m, n) = (arm.model.n_actuated(), here.K.nrows());
+    match &parameter.effect {
+        Effect::Stiffness(places) => {
+            let mut dK = DMatrix::zeros(n, n);
+            for place in places {
+                let element = &arm.elements[place.spring];
+                let (first, size) = (arm.offset(element), element.size);
+                let mut block = dK.view_mut((first, first), (size, size));
+                match &element.curve {
+                    Some(curve) => block[(0, 0)] += curve.slope(q[m + first]),
+                    None => block += slope_of(&element.K, place.coordinate),
+                }
+            }
+            (dK, DMatrix::zeros(n, n))
+        }
+        Effect::Mass { body, per_kg } => {
+            let heavier = Tangents::at(&carrying(arm, *body, per_kg), tool, &Wrench::zeros(), q);
+            (heavier.K - &here.K, heavier.M - &here.M)
+        }
+    }
+}

@@ -1,0 +1,251 @@
+//! Parameters found again from made-up measurements: unbiased, with honest uncertainties, and silent where nothing is told.
+#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
+#![allow(clippy::expect_used, clippy::unwrap_used, reason = "a failed unwrap fails the test")]
+#![allow(non_snake_case, reason = "monogram notation")]
+
+use std::sync::Arc;
+
+use flexarm_identify::*;
+use flexarm_kinematics::{Model, Pose, Wrench};
+use flexarm_stepping::{Damping, Spring};
+use flexarm_testkit::{Draw, reference_arm};
+use nalgebra::{DVector, Rotation3, Translation3, Vector3};
+
+/// Noise of a laser tracker (m).
+const NOISE: f64 = 3e-5;
+
+fn plant() -> Plant {
+    let reference = reference_arm(true);
+    let model = Arc::new(Model::new(&reference.mechanism).expect("valid"));
+    let spring = |name: &str, k: usize| Spring::from((name.to_owned(), reference.K_S[k], Damping::Modal(0.03)));
+    let tool = model.frame("tcp").expect("there").clone();
+    Plant { model, springs: vec![spring("lower", 0), spring("upper", 1)], tool }
+}
+
+fn stiffness(name: &str, spring: usize, coordinate: Option<usize>) -> Parameter {
+    let effect = Effect::Stiffness(vec![Place { spring, coordinate }]);
+    Parameter { name: name.into(), unit: "1".into(), initial: 1.0, prior: 2f64.ln(), effect }
+}
+
+/// Bending and twist of both links, each a parameter of its own.
+fn parameters() -> Vec<Parameter> {
+    vec![
+        stiffness("lower about x", 0, Some(3)),
+        stiffness("lower about y", 0, Some(4)),
+        stiffness("lower about z", 0, Some(5)),
+        stiffness("upper about x", 1, Some(3)),
+        stiffness("upper about y", 1, Some(4)),
+        stiffness("upper about z", 1, Some(5)),
+    ]
+}
+
+const TRUTH: [f64; 6] = [0.3, -0.25, 0.4, -0.5, 0.2, -0.15];
+
+fn normal(draw: &mut Draw) -> f64 {
+    let (u, v) = (draw.between(1e-12, 1.0), draw.between(0.0, std::f64::consts::TAU));
+    (-2.0 * u.ln()).sqrt() * v.cos()
+}
+
+fn pose(draw: &mut Draw) -> Vec<f64> {
+    [2.5, 0.8, 0.9, 2.5, 1.5, 2.5].iter().map(|range| range * draw.signed()).collect()
+}
+
+/// Displacements under a weight of 100 kg and pulls of 500 N to the side, on an arm of 0.4 m, along three axes.
+fn pulled(draw: &mut Draw, count: usize) -> Measurements {
+    let readings = (0..count).map(|k| {
+        let mut force = Vector3::new(0.0, 0.0, -981.0);
+        if k % 2 == 1 {
+            force = Vector3::new(500.0 * draw.signed(), 500.0 * draw.signed(), 0.0);
+        }
+        let wrench = Wrench::new(force, Vector3::zeros());
+        let rows = [Vector3::x(), Vector3::y(), Vector3::z()];
+        let rows = rows.map(|d| Row { of: Component::Along(d), value: 0.0, std: NOISE }).to_vec();
+        let kind = ReadingKind::Displacement {
+            before: LoadCase::none(),
+            after: LoadCase { wrench, at: Vector3::new(0.1, 0.4, 0.0), ..LoadCase::none() },
+            point: Vector3::new(0.05, 0.1, 0.0),
+            rows,
+        };
+        Reading { name: format!("pose {k}"), q: pose(draw), kind }
+    });
+    Measurements { readings: readings.collect(), ..Measurements::default() }
+}
+
+/// The readings that an arm would have shown, with noise.
+fn read(plant: &Plant, parameters: &[Parameter], truth: &[f64], from: &Measurements, draw: &mut Draw) -> Measurements {
+    let arm = MeasuredArm { plant, parameters, measurements: from };
+    let mut unknowns = DVector::zeros(parameters.len() + from.own_unknowns());
+    unknowns.as_mut_slice()[..truth.len()].copy_from_slice(truth);
+    let mut values = arm.predicted(&unknowns).unwrap().into_iter();
+    let mut noisy = from.clone();
+    for reading in &mut noisy.readings {
+        let mut next = |std: f64, draw: &mut Draw| values.next().unwrap() + std * normal(draw);
+        match &mut reading.kind {
+            ReadingKind::Displacement { rows, .. } => rows.iter_mut().for_each(|row| row.value = next(row.std, draw)),
+            ReadingKind::Place { value, std, .. } => {
+                for k in 0..3 {
+                    value[k] = next(std[k], draw);
+                }
+            }
+            ReadingKind::Frequencies { rows, .. } => rows.iter_mut().for_each(|row| row.value = next(row.std, draw)),
+        }
+    }
+    noisy
+}
+
+/// Truth: the made-up arm. Over 200 seeds each error over its stated deviation is standard normal. Over 1000 seeds: 94.7 % within
+/// their intervals, spread 0.998.
+#[test]
+fn of_two_hundred_fits_the_stated_deviations_are_those_of_the_errors() {
+    let (plant, parameters) = (plant(), parameters());
+    let mut draw = Draw(12345);
+    let poses = pulled(&mut draw, 16);
+    let options = IdentifyOptions { folds: 0, ..IdentifyOptions::default() };
+    let (mut inside, mut sum, mut squares, mut misfits) = (0, 0.0, 0.0, 0);
+    let seeds = 200;
+    for _ in 0..seeds {
+        let noisy = read(&plant, &parameters, &TRUTH, &poses, &mut draw);
+        let found = identify(&plant, &parameters, &noisy, &options).unwrap();
+        misfits += usize::from(found.misfit.is_some());
+        for (k, parameter) in found.parameters.iter().enumerate() {
+            assert!(parameter.identifiable, "{}", parameter.name);
+            let truth = TRUTH[k].exp();
+            let z = (parameter.value.ln() - TRUTH[k]) / (parameter.std / parameter.value);
+            inside += usize::from(parameter.interval[0] < truth && truth < parameter.interval[1]);
+            sum += z;
+            squares += z * z;
+        }
+    }
+    let n = f64::from(seeds * 6);
+    let (coverage, mean, spread) = (inside as f64 / n, sum / n, (squares / n).sqrt());
+    eprintln!("coverage {coverage:.3}, mean {mean:.3}, spread {spread:.3}, misfits {misfits}");
+    assert!((0.92..0.98).contains(&coverage), "{coverage}");
+    assert!(mean.abs() < 0.12 && (0.92..1.08).contains(&spread), "{mean} {spread}");
+    // One in a thousand is told a misfit by chance.
+    assert!(misfits <= 2, "{misfits}");
+}
+
+#[test]
+fn a_dial_gauge_under_one_weight_tells_one_combination_and_the_rest_stays_where_it_was() {
+    let (plant, parameters) = (plant(), parameters());
+    let mut draw = Draw(7);
+    let mut one = pulled(&mut draw, 1);
+    one.readings[0].q = vec![0.0, 0.3, 0.2, 0.0, 0.5, 0.0];
+    if let ReadingKind::Displacement { rows, after, .. } = &mut one.readings[0].kind {
+        rows.drain(..2);
+        after.at = Vector3::zeros();
+    }
+    let noisy = read(&plant, &parameters, &TRUTH, &one, &mut draw);
+    let found = identify(&plant, &parameters, &noisy, &IdentifyOptions::default()).unwrap();
+    // In the plane of the arm only bending about y counts, of both links together.
+    assert_eq!(found.solution.identified, 1, "{:?}", found.solution.gains);
+    for k in [0, 2, 3, 4, 5] {
+        assert!(!found.parameters[k].identifiable, "{}", found.parameters[k].name);
+    }
+    for k in [0, 2, 3, 5] {
+        let moved = (found.parameters[k].value - 1.0).abs();
+        assert!(moved < 1e-2, "{}: {moved:e}", found.parameters[k].name);
+    }
+    let [lower, upper] = [found.parameters[1].value, found.parameters[4].value].map(f64::ln);
+    assert!(lower < 0.0 && upper.abs() < lower.abs(), "{lower} {upper}");
+}
+
+#[test]
+fn a_tracker_that_stands_anywhere_and_a_target_that_is_not_known_come_out_with_the_stiffness() {
+    let (plant, parameters) = (plant(), parameters());
+    let mut draw = Draw(3);
+    let target = Vector3::new(0.1, 0.07, -0.03);
+    let X = Pose::from_parts(Translation3::new(3.1, -2.0, 0.7), Rotation3::from_euler_angles(0.1, 0.3, 2.5));
+    let loads = [0.0, -981.0]
+        .map(|f| LoadCase { wrench: Wrench::new(Vector3::new(0.0, 0.0, f), Vector3::zeros()), ..LoadCase::none() });
+    let mut readings = Vec::new();
+    for k in 0..30 {
+        let q = pose(&mut draw);
+        for load in &loads {
+            let kind = ReadingKind::Place {
+                load: load.clone(),
+                target: 0,
+                instrument: 0,
+                value: Vector3::zeros(),
+                std: Vector3::repeat(NOISE),
+            };
+            readings.push(Reading { name: format!("pose {k}"), q: q.clone(), kind });
+        }
+    }
+    let known =
+        Measurements { readings, targets: vec![Target::Known(target)], instruments: vec![Instrument::Known(X)] };
+    let mut noisy = read(&plant, &parameters, &TRUTH, &known, &mut draw);
+    noisy.instruments = vec![Instrument::Unknown(Pose::identity())];
+    noisy.targets = vec![Target::Unknown(Vector3::zeros())];
+    let found = identify(&plant, &parameters, &noisy, &IdentifyOptions::default()).unwrap();
+    let off = (found.targets[0] - target).norm();
+    let turned = (found.instruments[0].rotation.inverse() * X.rotation).angle();
+    eprintln!("target {off:.1e} m, instrument {turned:.1e} rad, {} iterations", found.solution.iterations);
+    assert!(off < 3e-5 && turned < 3e-5, "{off:e} {turned:e}");
+    for (k, parameter) in found.parameters.iter().enumerate() {
+        let z = (parameter.value.ln() - TRUTH[k]) / (parameter.std / parameter.value);
+        assert!(parameter.identifiable && z.abs() < 4.0, "{}: {z}", parameter.name);
+    }
+}
+
+#[test]
+fn a_model_without_the_link_that_bends_is_known_by_its_residuals() {
+    let (plant, parameters) = (plant(), parameters());
+    let mut draw = Draw(5);
+    let noisy = read(&plant, &parameters, &TRUTH, &pulled(&mut draw, 16), &mut draw);
+    let lower_only = &parameters[..3];
+    let wrong = identify(&plant, lower_only, &noisy, &IdentifyOptions::default()).unwrap();
+    let right = identify(&plant, &parameters, &noisy, &IdentifyOptions::default()).unwrap();
+    let [w, r] = [&wrong, &right].map(|found| found.held_out.as_ref().unwrap().rms);
+    eprintln!("held out: {w:.1} with the wrong model, {r:.2} with the right one; scatter {:?}", wrong.misfit);
+    assert!(wrong.misfit.is_some_and(|factor| factor > 1.5) && right.misfit.is_none());
+    assert!(r < 1.5 && w > 2.0 * r);
+}
+
+#[test]
+fn one_reading_of_a_slipped_target_is_named_and_does_not_carry_the_estimate_away() {
+    let (plant, parameters) = (plant(), parameters());
+    let mut draw = Draw(11);
+    let mut noisy = read(&plant, &parameters, &TRUTH, &pulled(&mut draw, 16), &mut draw);
+    if let ReadingKind::Displacement { rows, .. } = &mut noisy.readings[9].kind {
+        rows[2].value += 2e-3;
+    }
+    let found = identify(&plant, &parameters, &noisy, &IdentifyOptions::default()).unwrap();
+    assert_eq!(found.suspicious.first(), Some(&(9 * 3 + 2)), "{:?}", found.suspicious);
+    for (k, parameter) in found.parameters.iter().enumerate() {
+        let z = (parameter.value.ln() - TRUTH[k]) / (parameter.std / parameter.value);
+        assert!(z.abs() < 4.0, "{}: {z}", parameter.name);
+    }
+}
+
+#[test]
+fn planned_poses_tell_more_than_random_ones_and_the_deviations_promised_are_those_found() {
+    let (plant, parameters) = (plant(), parameters());
+    for seed in 0..10 {
+        let mut draw = Draw(100 + seed);
+        let candidates: Vec<Candidate> = pulled(&mut draw, 60).readings.into_iter().map(Candidate).collect();
+        let options = PlanOptions { count: 6, ..PlanOptions::default() };
+        let planned = plan(&plant, &parameters, &candidates, &options).unwrap();
+        let random: Vec<Candidate> = candidates[..6].to_vec();
+        let others = plan(&plant, &parameters, &random, &options).unwrap();
+        assert!(planned.gain > others.gain + 0.5, "{} {}", planned.gain, others.gain);
+        let readings = planned.chosen.iter().map(|k| candidates[*k].0.clone()).collect();
+        let poses = Measurements { readings, ..Measurements::default() };
+        // Readings without noise: the deviations are those of the plan but for its prior.
+        let mut exact = poses.clone();
+        let arm = MeasuredArm { plant: &plant, parameters: &parameters, measurements: &poses };
+        let mut values = arm.predicted(&DVector::zeros(6)).unwrap().into_iter();
+        for reading in &mut exact.readings {
+            if let ReadingKind::Displacement { rows, .. } = &mut reading.kind {
+                rows.iter_mut().for_each(|row| row.value = values.next().unwrap());
+            }
+        }
+        let options = IdentifyOptions { folds: 0, ..IdentifyOptions::default() };
+        let found = identify(&plant, &parameters, &exact, &options).unwrap();
+        for (k, parameter) in found.parameters.iter().enumerate() {
+            let ratio = parameter.std / parameter.value / planned.deviations[k];
+            let prior = 1.0 / (1.0 - (planned.deviations[k] / parameters[k].prior).powi(2));
+            assert!(ratio >= 1.0 - 1e-9 && ratio * ratio <= prior * 1.05, "{}: {ratio} {prior}", parameter.name);
+        }
+    }
+}

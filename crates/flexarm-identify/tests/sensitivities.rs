@@ -1,0 +1,164 @@
+//! Derivatives by parameters against Richardson differences of the nonlinear answers, on a soft arm whose equilibrium moves.
+#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
+#![allow(clippy::expect_used, clippy::unwrap_used, reason = "a failed unwrap fails the test")]
+#![allow(non_snake_case, reason = "monogram notation")]
+
+use std::sync::Arc;
+
+use flexarm_identify::*;
+use flexarm_kinematics::{Model, Pose, SpatialInertia, Wrench, rotation_vector};
+use flexarm_stepping::{Damping, OperatingPoint, Spring};
+use flexarm_testkit::reference_arm;
+use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, Translation3, Vector3};
+
+const POSE: [f64; 6] = [0.4, 0.5, -0.3, 0.7, 0.6, -1.2];
+
+/// The reference arm twenty times as soft: its tool hangs down by 4 cm.
+fn plant() -> Plant {
+    let reference = reference_arm(true);
+    let model = Arc::new(Model::new(&reference.mechanism).expect("valid"));
+    let spring = |name: &str, k: usize| Spring::from((name.to_owned(), reference.K_S[k] / 20.0, Damping::Modal(0.03)));
+    let tool = model.frame("tcp").expect("there").clone();
+    Plant { model, springs: vec![spring("lower", 0), spring("upper", 1)], tool }
+}
+
+fn stiffness(name: &str, spring: usize, coordinate: Option<usize>) -> Parameter {
+    let effect = Effect::Stiffness(vec![Place { spring, coordinate }]);
+    Parameter { name: name.into(), unit: "1".into(), initial: 1.0, prior: 0.7, effect }
+}
+
+fn parameters(plant: &Plant) -> Vec<Parameter> {
+    let per_kg = SpatialInertia::from_com(1.0, &Vector3::new(0.1, -0.05, 0.2), &(Matrix3::identity() * 0.02));
+    let mass = Effect::Mass { body: plant.tool.body, per_kg };
+    vec![
+        stiffness("lower", 0, None),
+        stiffness("upper", 1, None),
+        stiffness("lower about x", 0, Some(3)),
+        stiffness("upper about y", 1, Some(4)),
+        Parameter { name: "payload".into(), unit: "kg".into(), initial: 0.0, prior: 20.0, effect: mass },
+    ]
+}
+
+/// Derivative by differences of sixth order.
+fn richardson(h: f64, f: impl Fn(f64) -> DVector<f64>) -> DVector<f64> {
+    let d = |h: f64| (f(h) - f(-h)) / (2.0 * h);
+    let (a, b, c) = (d(h), d(0.5 * h), d(0.25 * h));
+    let (ab, bc) = ((&b * 4.0 - &a) / 3.0, (&c * 4.0 - &b) / 3.0);
+    (bc * 16.0 - ab) / 15.0
+}
+
+fn step_of(parameter: &Parameter) -> f64 {
+    if parameter.is_logarithmic() { 0.02 } else { 1.0 }
+}
+
+#[test]
+fn the_tool_moves_with_each_parameter_as_the_nonlinear_equilibrium_does() {
+    let plant = plant();
+    let parameters = parameters(&plant);
+    for moment in [0.0, 60.0] {
+        // With a constant moment the tangent is not symmetric.
+        let load = Wrench::new(Vector3::new(90.0, 50.0, -200.0), Vector3::new(moment, -moment, 0.5 * moment));
+        let solved = |plant: &Plant| {
+            let mut at = OperatingPoint::new(plant.held(&POSE).unwrap(), plant.tool.clone());
+            at.solve(&POSE, &load).unwrap();
+            at
+        };
+        let mut at = solved(&plant);
+        let slopes = tool_slopes(&mut at, &parameters).unwrap();
+        let here = at.tcp_pose();
+        for (k, parameter) in parameters.iter().enumerate() {
+            let place = |x: f64| {
+                let X = solved(&plant.with(std::slice::from_ref(parameter), &[x])).tcp_pose();
+                let turned = rotation_vector((X.rotation * here.rotation.inverse()).matrix());
+                let p = X.translation.vector;
+                DVector::from_vec(vec![p.x, p.y, p.z, turned.x, turned.y, turned.z])
+            };
+            let truth = richardson(step_of(parameter), place);
+            let error = (slopes.column(k) - &truth).amax() / truth.amax();
+            eprintln!("{}: {error:.1e} of {:.2e}", parameter.name, truth.amax());
+            // Measured: 5e-11 and less; the truth is a difference itself.
+            assert!(error < 1e-8, "{}: {error:e}", parameter.name);
+        }
+    }
+}
+
+#[test]
+fn frequencies_change_with_each_parameter_and_with_the_equilibrium_that_it_moves() {
+    let plant = plant();
+    let parameters = parameters(&plant);
+    let found = frequency_slopes(&plant, &parameters, &POSE).unwrap();
+    for (k, parameter) in parameters.iter().enumerate() {
+        let hz = |x: f64| {
+            let plant = plant.with(std::slice::from_ref(parameter), &[x]);
+            DVector::from_vec(frequency_slopes(&plant, &[], &POSE).unwrap().hz)
+        };
+        let truth = richardson(step_of(parameter), hz);
+        let error = (0..6).map(|i| (found.slopes[(i, k)] - truth[i]).abs() / truth.amax()).fold(0.0, f64::max);
+        eprintln!("{}: {error:.1e}, first {:.4} Hz", parameter.name, truth[0]);
+        assert!(error < 1e-8, "{}: {error:e}", parameter.name);
+    }
+}
+
+#[test]
+fn every_row_of_every_kind_of_reading_has_the_derivatives_of_its_residual() {
+    let plant = plant();
+    let parameters = parameters(&plant);
+    let carried = SpatialInertia::from_com(12.0, &Vector3::new(0.0, 0.1, 0.2), &(Matrix3::identity() * 0.1));
+    let at = Vector3::new(0.1, 0.02, -0.05);
+    let pull =
+        LoadCase { wrench: Wrench::new(Vector3::new(50.0, 20.0, -300.0), Vector3::zeros()), at, ..LoadCase::none() };
+    let heavy = LoadCase { carried, ..LoadCase::none() };
+    let axes = [Vector3::x(), Vector3::y(), Vector3::z(), Vector3::new(0.6, 0.0, 0.8)];
+    let mut rows: Vec<Row<Component>> =
+        axes.iter().map(|d| Row { of: Component::Along(*d), value: 1e-3, std: 1e-4 }).collect();
+    rows.extend(axes.iter().map(|d| Row { of: Component::About(*d), value: 1e-3, std: 1e-4 }));
+    let point = Vector3::new(-0.1, 0.2, 0.3);
+    let moved = |before: &LoadCase, after: &LoadCase| ReadingKind::Displacement {
+        before: before.clone(),
+        after: after.clone(),
+        point,
+        rows: rows.clone(),
+    };
+    let place = |target| ReadingKind::Place {
+        load: heavy.clone(),
+        target,
+        instrument: 0,
+        value: Vector3::new(0.3, 0.1, 2.0),
+        std: Vector3::new(1e-4, 2e-4, 3e-4),
+    };
+    let hz = vec![Row { of: 0, value: 2.0, std: 0.1 }, Row { of: 2, value: 5.0, std: 0.1 }];
+    let kinds = [
+        moved(&LoadCase::none(), &pull),
+        moved(&heavy, &pull),
+        place(0),
+        place(1),
+        ReadingKind::Frequencies { load: heavy.clone(), rows: hz },
+    ];
+    let readings = kinds.map(|kind| Reading { name: "a".into(), q: POSE.to_vec(), kind }).to_vec();
+    let X = Pose::from_parts(Translation3::new(3.0, 1.0, -0.5), Rotation3::from_euler_angles(0.4, -0.2, 2.2));
+    let measurements = Measurements {
+        readings,
+        targets: vec![Target::Known(point), Target::Unknown(Vector3::new(0.0, 0.1, 0.1))],
+        instruments: vec![Instrument::Unknown(X)],
+    };
+    let arm = MeasuredArm { plant: &plant, parameters: &parameters, measurements: &measurements };
+    let mut at = DVector::zeros(parameters.len() + measurements.own_unknowns());
+    assert_eq!(at.len(), 5 + 6 + 3);
+    for (k, x) in at.iter_mut().enumerate() {
+        *x = 0.05 * (k as f64 + 1.0).sin();
+    }
+    let mut J = DMatrix::zeros(0, 0);
+    arm.evaluate(&at, Some(&mut J)).unwrap();
+    for k in 0..at.len() {
+        let size = parameters.get(k).map_or(0.02, step_of);
+        let residuals = |x: f64| {
+            let mut moved = at.clone();
+            moved[k] += x;
+            arm.evaluate(&moved, None).unwrap()
+        };
+        let truth = richardson(size, residuals);
+        let error = (J.column(k) - &truth).amax() / truth.amax();
+        eprintln!("unknown {k}: {error:.1e}");
+        assert!(error < 1e-8, "unknown {k}: {error:e}");
+    }
+}
