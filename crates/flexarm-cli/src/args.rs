@@ -9,6 +9,7 @@ use flexarm::{DriveModel, LinkModel, Modelling, RecordingFormat, STEPPERS, Stepp
 use crate::convert::ConvertArgs;
 use crate::exchange_args::{ExportArgs, ImportArgs};
 use crate::formats;
+use crate::identify::IdentifyArgs;
 use crate::motion::{MotionArgs, MotionInputArgs};
 use crate::posed_args::{ModesArgs, ResponseArgs, StaticsArgs};
 use crate::reduce_args::ReduceArgs;
@@ -44,6 +45,8 @@ pub(crate) enum Command {
     Check(CheckArgs),
     /// Show what is in a motion, against the limits of a robot, and write it in other formats
     Motion(MotionArgs),
+    /// Find a robot's stiffness from measurements, and the poses that are worth measuring
+    Identify(Box<IdentifyArgs>),
     /// Equilibrium under weight and load at a pose, and the compliance of the TCP
     Statics(StaticsArgs),
     /// Natural frequencies, damping and shapes at a pose, drives locked
@@ -317,6 +320,8 @@ pub(crate) enum PageName {
     Program,
     /// What acts on the arm during a run (.toml)
     Loads,
+    /// What was measured at a robot, for flexarm identify (.toml)
+    Measurements,
     #[value(help = formats::help_page())]
     Recordings,
     /// Reduced links (.flex)
@@ -331,6 +336,7 @@ impl PageName {
             Self::Path => include_str!("../../../docs/paths.md"),
             Self::Program => include_str!("../../../docs/programs.md"),
             Self::Loads => include_str!("../../../docs/loads.md"),
+            Self::Measurements => include_str!("../../../docs/identify.md"),
             Self::Recordings => include_str!("../../../docs/recordings.md"),
             Self::Flex => include_str!("../../flexarm-fem/src/flex_file/format.md"),
         }

@@ -8,6 +8,7 @@ mod exchange_args;
 mod failure;
 mod flags;
 mod formats;
+mod identify;
 mod motion;
 mod posed;
 mod posed_args;
@@ -76,6 +77,7 @@ fn run(cli: &Cli) -> Result<ExitCode, Failure> {
         Command::Inspect(args) => inspect(cli, args),
         Command::Check(args) => check(cli, args),
         Command::Motion(args) => motion::run(cli, args),
+        Command::Identify(args) => identify::run(cli, args),
         Command::Statics(args) => posed::statics(cli, args),
         Command::Modes(args) => posed::modes(cli, args),
         Command::Response(args) => posed::response(cli, args),

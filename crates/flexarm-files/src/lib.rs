@@ -23,9 +23,11 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
 mod error;
+mod number_table;
 mod results;
 mod text;
 
 pub use error::{FileError, taken};
+pub use number_table::NumberTable;
 pub use results::{Undo, check_free, file_stem, write_all};
 pub use text::{Source, TextFileError, read_text};

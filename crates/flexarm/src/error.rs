@@ -126,6 +126,9 @@ pub enum Error {
     /// A load as values.
     #[error(transparent)]
     Load(#[from] LoadError),
+    /// Measurements that tell nothing of the robot, or cannot be of it.
+    #[error(transparent)]
+    Identify(#[from] crate::identify::IdentifyFileError),
     /// The runs of a study.
     #[error(transparent)]
     Study(#[from] StudyError),

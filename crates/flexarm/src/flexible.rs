@@ -45,6 +45,8 @@ pub struct RobotLink {
     pub flexible: FlexibleLink,
     /// Its damping.
     pub damping: Damping,
+    /// Factor on the stiffness of all its models.
+    pub stiffness_factor: f64,
     /// The beam that it is, if it is one.
     pub beam: Option<BeamLink>,
     /// What the robot file asks for.
@@ -449,7 +451,7 @@ impl Robot {
                 let (group, damping) = (spring.joint.clone(), self.flexible[k].damping);
                 owned.push(OwnedSpring {
                     group,
-                    spring: Spring::from((name, spring.K_S, damping)),
+                    spring: Spring::from((name, spring.K_S * self.flexible[k].stiffness_factor, damping)),
                     owner: Owner::Link(k),
                 });
             }
@@ -466,7 +468,7 @@ impl Robot {
             let source = &self.flexible[k];
             let geometric = modal.geometric.as_ref().filter(|_| source.choices.geometric);
             let geometric = geometric.map(|g| Arc::new(stiffening(g)));
-            let (name, K, damping) = (link.link.clone(), modal.K.clone(), source.damping);
+            let (name, K, damping) = (link.link.clone(), &modal.K * source.stiffness_factor, source.damping);
             let spring = Spring { name, K, damping, curve: None, geometric };
             owned.push(OwnedSpring { group: link.link.clone(), spring, owner: Owner::Link(k) });
         }

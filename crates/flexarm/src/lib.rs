@@ -54,6 +54,7 @@ mod drive_entry;
 mod error;
 mod flexible;
 mod headline;
+pub mod identify;
 mod inspect;
 mod link_entry;
 mod load_jumps;

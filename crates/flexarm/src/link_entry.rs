@@ -93,7 +93,15 @@ pub(crate) fn flexible_link(
     let geometric = entry.geometric_stiffening.as_ref().is_some_and(|asked| *asked.get_ref());
     let parts_asked = entry.beam.as_ref().is_none_or(|beam| beam.get_ref().parts.is_some());
     let choices = LinkChoices { model, segments, modes, eigenmodes, geometric, parts_asked };
-    let link = RobotLink { flexible, damping, beam, choices };
+    let stiffness_factor = match &entry.stiffness_factor {
+        None => 1.0,
+        Some(factor) if factor.get_ref().is_finite() && *factor.get_ref() > 0.0 => *factor.get_ref(),
+        Some(factor) => {
+            let message = format!("stiffness_factor = {}: expected a positive number", factor.get_ref());
+            return Err(at(factor.span(), message).into());
+        }
+    };
+    let link = RobotLink { flexible, damping, stiffness_factor, beam, choices };
     // What the file asks for must be there; overrides are looked at when they are used.
     link.form_or_key(&Modelling::default()).map_err(|(asked, message)| {
         let key = match asked {

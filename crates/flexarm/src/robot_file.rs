@@ -114,6 +114,8 @@ pub(crate) struct FlexibleLinkEntry {
     pub eigenmodes: Option<Spanned<i64>>,
     /// Modal: let loads change the stiffness; false if not given.
     pub geometric_stiffening: Option<Spanned<bool>>,
+    /// Factor on its stiffness, as measurements told; 1 if not given.
+    pub stiffness_factor: Option<Spanned<f64>>,
     /// Damping; 3 % modal if not given.
     pub damping: Option<Spanned<DampingEntry>>,
     /// `rotation-vector` or `euler-zyx`.

@@ -1,0 +1,236 @@
+//! `flexarm identify`: parameters from measurements, and poses worth measuring.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+use comfy_table::CellAlignment;
+use flexarm::Robot;
+use flexarm::identify::{
+    Identification, IdentifyRequest, MeasurementPlan, PlanRequest, identify_robot, plan_measurements,
+};
+
+use crate::args::{Cli, ModellingArgs, RobotArgs};
+use crate::failure::Failure;
+use crate::print::{lines, table, warning};
+use crate::shipped::OutputFolder;
+use crate::{answer, load_options, shipped, to_json, values};
+
+const EXAMPLES: &str = "\
+Examples:
+  Twelve poses that tell the gearboxes best, with a table to fill in, in a new folder of out/:
+      flexarm identify kr210_identified --plan 12 --std 0.00003
+  The stiffness that the filled table tells, a new robot file and a page:
+      flexarm identify kr210_identified out/kr210_identified_plan-001/measurements.toml
+  Only two of the parameters, figures alone:
+      flexarm identify kr210_identified measurements.toml --fit 'drive.joint_2.*' --fit 'drive.joint_3.*' --no-files
+The file of measurements: flexarm format measurements";
+
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct IdentifyArgs {
+    /// robot.toml, a folder with one, or the name of a shipped robot; its stiffnesses are the first guess
+    pub(crate) robot: PathBuf,
+    /// What was measured (.toml)
+    #[arg(required_unless_present = "plan")]
+    pub(crate) measurements: Option<PathBuf>,
+    /// Find these parameters, * for anything (may be repeated) [default: those of the file, else all stiffnesses]
+    #[arg(long, value_name = "NAME")]
+    pub(crate) fit: Vec<String>,
+    #[command(flatten)]
+    pub(crate) modelling: ModellingArgs,
+    #[command(flatten)]
+    pub(crate) load: RobotArgs,
+    /// Choose N poses that tell the parameters best, instead of reading measurements
+    #[arg(long, help_heading = "Plan", value_name = "N", conflicts_with = "measurements")]
+    pub(crate) plan: Option<usize>,
+    /// Forces among which the plan chooses, world axes (N; may be repeated) [default: 500 N down, along x and along y]
+    #[arg(
+        long = "pull",
+        help_heading = "Plan",
+        value_name = "FX,FY,FZ",
+        requires = "plan",
+        allow_hyphen_values = true
+    )]
+    pub(crate) forces: Vec<String>,
+    /// Standard deviation of a measured displacement (m)
+    #[arg(long, help_heading = "Plan", value_name = "M", requires = "plan", default_value_t = 3e-5)]
+    pub(crate) std: f64,
+    /// Poses among which the plan chooses (.csv, a column per joint, rad or m) [default: spread over the joint ranges]
+    #[arg(long, help_heading = "Plan", value_name = "FILE", requires = "plan")]
+    pub(crate) poses: Option<PathBuf>,
+    /// Poses where the work will be done (.csv): the plan makes the tool's error there sure
+    #[arg(long, help_heading = "Plan", value_name = "FILE", requires = "plan")]
+    pub(crate) work: Option<PathBuf>,
+    /// Folder of the new robot file and the page, or of the plan [default: a new one in out/]
+    #[arg(short, long, help_heading = "Files", value_name = "FOLDER")]
+    pub(crate) output: Option<PathBuf>,
+    /// Write no files
+    #[arg(long, help_heading = "Files", conflicts_with = "output")]
+    pub(crate) no_files: bool,
+    /// Overwrite what is in the output folder
+    #[arg(long, help_heading = "Files", requires = "output")]
+    pub(crate) force: bool,
+}
+
+pub(crate) fn run(cli: &Cli, args: &IdentifyArgs) -> Result<ExitCode, Failure> {
+    let robot = Robot::load_with(&shipped::robot(Some(&args.robot))?, &load_options(&args.load)?)?;
+    match (args.plan, &args.measurements) {
+        (Some(count), _) => plan(cli, args, &robot, count),
+        (None, Some(measurements)) => {
+            let folder =
+                OutputFolder::of(args.output.as_deref(), &format!("{}_identified", robot.name), !args.no_files)?;
+            let request = IdentifyRequest {
+                modelling: args.modelling.modelling(),
+                fit: args.fit.clone(),
+                output: folder.path(),
+                overwrite: args.force,
+            };
+            let found = identify_robot(&robot, measurements, &request)?;
+            if !cli.quiet {
+                found.caveats.iter().for_each(|caveat| warning(&caveat.message));
+            }
+            answer(cli, || to_json(&found), || text(&found));
+            Ok(ExitCode::SUCCESS)
+        }
+        (None, None) => Err(Failure::Usage("give a file of measurements, or --plan N".into())),
+    }
+}
+
+fn plan(cli: &Cli, args: &IdentifyArgs, robot: &Robot, count: usize) -> Result<ExitCode, Failure> {
+    let folder = OutputFolder::of(args.output.as_deref(), &format!("{}_plan", robot.name), !args.no_files)?;
+    let forces = args.forces.iter().map(|text| values::wrench(text)).collect::<Result<Vec<_>, _>>()?;
+    if forces.iter().any(|[.., x, y, z]| [x, y, z].iter().any(|m| **m != 0.0)) {
+        return Err(Failure::Usage("--pull takes a force of three numbers".into()));
+    }
+    let mut request = PlanRequest {
+        modelling: args.modelling.modelling(),
+        fit: args.fit.clone(),
+        std_m: args.std,
+        poses: args.poses.clone(),
+        work: args.work.clone(),
+        output: folder.path(),
+        overwrite: args.force,
+        ..PlanRequest::new(count)
+    };
+    if !forces.is_empty() {
+        request.forces = forces.iter().map(|[x, y, z, ..]| [*x, *y, *z]).collect();
+    }
+    let found = plan_measurements(robot, &request)?;
+    answer(cli, || to_json(&found), || plan_text(&found));
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Unit for people, and its factor.
+fn readable(unit: &str) -> (&str, f64) {
+    match unit {
+        "m" => ("mm", 1e3),
+        "rad" => ("mrad", 1e3),
+        "std" => ("deviations", 1.0),
+        other => (other, 1.0),
+    }
+}
+
+fn text(found: &Identification) -> String {
+    let Identification { robot, measurements, readings, numbers, .. } = found;
+    let mut out = format!("{robot}: {readings} readings with {numbers} numbers of {measurements}\n\n");
+    let mut t = table(&["parameter", "before", "value", "std", "", "unit"]);
+    for p in &found.parameters {
+        let (value, part) = match p.identifiable {
+            true => (number(p.value), format!("{:.1} %", 100.0 * p.std / p.value.abs())),
+            false => ("not told".to_owned(), String::new()),
+        };
+        t.add_row(vec![p.name.clone(), number(p.initial), value, number(p.std), part, p.unit.clone()]);
+    }
+    for k in 1..5 {
+        if let Some(column) = t.column_mut(k) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    out += &lines(&t);
+    let (unit, factor) = readable(found.residual.unit);
+    out += &format!(
+        "\nresidual (RMS): {} {unit} before, {} {unit} after\n",
+        number(factor * found.residual.before),
+        number(factor * found.residual.after)
+    );
+    if let Some(held) = &found.held_out {
+        out += &format!(
+            "readings that the fit had not seen: {} {unit} (before {})\n",
+            number(factor * held.rms),
+            number(factor * held.rms_before)
+        );
+    }
+    for combination in &found.untold {
+        let parts: Vec<String> = combination.iter().map(|w| format!("{:+.2} {}", w.weight, w.name)).collect();
+        out += &format!("not told: {}\n", parts.join(" "));
+    }
+    for s in &found.suspicious {
+        out += &format!(
+            "argues against the rest: {}, measured {}, expected {} ({:.1} deviations)\n",
+            s.reading,
+            number(s.measured),
+            number(s.expected),
+            s.normalised
+        );
+    }
+    for frame in &found.instruments {
+        let [x, y, z] = frame.xyz;
+        out += &format!("instrument {} stands at {x:.5}, {y:.5}, {z:.5} m\n", frame.name);
+    }
+    for point in &found.targets {
+        let [x, y, z] = point.xyz;
+        out += &format!("target {} is at {x:.5}, {y:.5}, {z:.5} m on the tool\n", point.name);
+    }
+    for (what, file) in [("robot", &found.file), ("page", &found.page)] {
+        if let Some(file) = file {
+            out += &format!("{what:<8} {file}\n");
+        }
+    }
+    out
+}
+
+fn plan_text(found: &MeasurementPlan) -> String {
+    let mut out =
+        format!("{}: {} readings of {} candidate poses\n\n", found.robot, found.poses.len(), found.candidates);
+    let mut header = vec!["pose"];
+    header.extend(found.joints.iter().map(String::as_str));
+    header.extend(["force (N)", "expected (mm)"]);
+    let mut t = table(&header);
+    let three = |v: [f64; 3], digits: usize| v.map(|x| format!("{x:.digits$}")).join(" ");
+    for (k, pose) in found.poses.iter().enumerate() {
+        let mut row = vec![(k + 1).to_string()];
+        row.extend(pose.joints.iter().map(|q| format!("{:.1}", q.to_degrees())));
+        row.extend([three(pose.force, 0), three(pose.expected_m.map(|x| 1e3 * x), 3)]);
+        t.add_row(row);
+    }
+    out += &lines(&t);
+    out += "\n";
+    let mut t = table(&["parameter", "now", "expected std", "", "unit"]);
+    for p in &found.parameters {
+        let part = format!("{:.1} %", 100.0 * p.std / p.initial.abs());
+        t.add_row(vec![p.name.clone(), number(p.initial), number(p.std), part, p.unit.clone()]);
+    }
+    out += &lines(&t);
+    if let Some(std) = found.work_std_m {
+        out += &format!("\nthe tool's displacement where the work is done will be known to {:.4} mm\n", 1e3 * std);
+    }
+    for (what, file) in [("file", &found.file), ("table", &found.table)] {
+        if let Some(file) = file {
+            out += &format!("{what:<8} {file}\n");
+        }
+    }
+    out
+}
+
+/// A number with the digits that a person reads.
+fn number(x: f64) -> String {
+    match x.abs() {
+        0.0 => "0".into(),
+        a if (1e-3..1e5).contains(&a) => {
+            let digits = (3 - a.log10().floor() as i32).clamp(0, 6) as usize;
+            format!("{x:.digits$}")
+        }
+        _ => format!("{x:.3e}"),
+    }
+}

@@ -1,0 +1,119 @@
+//! Tables of numbers with a header: one row of names, then a number in every cell.
+//!
+//! Separated by semicolons, tabs or commas, whichever the header has; with semicolons and tabs a number may have a decimal comma.
+//! Lines that begin with # and empty ones are passed over. Not here: what the columns mean.
+
+use std::path::Path;
+
+use crate::{FileError, read_text};
+
+/// A table of numbers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NumberTable {
+    /// Names of the columns, without spaces around and without quotes.
+    pub names: Vec<String>,
+    /// Rows; NaN where a cell is empty.
+    pub rows: Vec<Vec<f64>>,
+    /// Line of each row in the file, from 1.
+    pub lines: Vec<usize>,
+}
+
+impl NumberTable {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// [`FileError::Unusable`] if it cannot be read, has no header, names a column twice, or has a row with another number of cells or
+    /// a cell that is no number: with the line, the column and what was found.
+    pub fn read(path: &Path) -> Result<Self, FileError> {
+        Self::parse(&read_text(path)?).map_err(|what| FileError::Unusable { path: path.to_owned(), what })
+    }
+
+    /// From the text of a file; what is wrong, as a sentence.
+    fn parse(text: &str) -> Result<Self, String> {
+        let mut lines = text.trim_start_matches('\u{feff}').lines().enumerate();
+        let counts = |line: &str| !line.trim().is_empty() && !line.trim_start().starts_with('#');
+        let (_, header) =
+            lines.by_ref().find(|(_, line)| counts(line)).ok_or("the table is empty: expected a header")?;
+        let separator = [';', '\t'].into_iter().find(|c| header.contains(*c)).unwrap_or(',');
+        let cells = |line: &str| -> Vec<String> {
+            line.split(separator).map(|cell| cell.trim().trim_matches('"').trim().to_owned()).collect()
+        };
+        let names = cells(header);
+        for (k, name) in names.iter().enumerate() {
+            if name.is_empty() {
+                return Err(format!("column {} of the header has no name", k + 1));
+            }
+            if names[..k].contains(name) {
+                return Err(format!("the header names {name:?} twice: rename or remove one of the columns"));
+            }
+            if name.parse::<f64>().is_ok() {
+                return Err(format!("the first row has the number {name} where a name was expected: add a header"));
+            }
+        }
+        let mut table = Self { names, rows: Vec::new(), lines: Vec::new() };
+        for (number, line) in lines.filter(|(_, line)| counts(line)) {
+            let found = cells(line);
+            if found.len() != table.names.len() {
+                let (found, expected) = (found.len(), table.names.len());
+                return Err(format!("line {}: expected {expected} cells as in the header, found {found}", number + 1));
+            }
+            let value = |(k, cell): (usize, &String)| {
+                number_of(cell, separator != ',').ok_or_else(|| {
+                    let name = &table.names[k];
+                    format!("line {}, column {name:?}: expected a number, found {cell:?}", number + 1)
+                })
+            };
+            let row = found.iter().enumerate().map(value).collect::<Result<Vec<f64>, String>>()?;
+            table.rows.push(row);
+            table.lines.push(number + 1);
+        }
+        Ok(table)
+    }
+
+    /// Number of a column.
+    pub fn column(&self, name: &str) -> Option<usize> {
+        self.names.iter().position(|known| known == name)
+    }
+}
+
+/// A finite number; NaN for an empty cell.
+fn number_of(cell: &str, decimal_comma: bool) -> Option<f64> {
+    if cell.is_empty() {
+        return Some(f64::NAN);
+    }
+    let plain = cell.parse::<f64>().ok();
+    let value = plain.or_else(|| decimal_comma.then(|| cell.replacen(',', ".", 1).parse().ok()).flatten())?;
+    value.is_finite().then_some(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn commas_semicolons_and_tabs_say_the_same_and_decimal_commas_are_numbers() {
+        let comma = NumberTable::parse("# tracker\na, b\n1.5,-2e3\n\n,4\n").unwrap();
+        let semicolon = NumberTable::parse("\u{feff}a;b\r\n1,5;-2e3\r\n;4\r\n").unwrap();
+        let tab = NumberTable::parse("\"a\"\t\"b\"\n1,5\t-2000\n\t4\n").unwrap();
+        assert_eq!(comma.names, ["a", "b"]);
+        assert_eq!((comma.rows[0].clone(), comma.rows[1][1]), (vec![1.5, -2000.0], 4.0));
+        assert!(comma.rows[1][0].is_nan());
+        assert_eq!((comma.lines.clone(), semicolon.lines), (vec![3, 5], vec![2, 3]));
+        assert_eq!((&comma.rows[0], &comma.rows[0]), (&semicolon.rows[0], &tab.rows[0]));
+    }
+
+    #[test]
+    fn what_is_no_table_of_numbers_is_said_with_line_and_column() {
+        let fails = |text: &str, part: &str| {
+            let error = NumberTable::parse(text).unwrap_err();
+            assert!(error.contains(part), "{error}");
+        };
+        fails("", "empty");
+        fails("a,a\n1,2\n", "twice");
+        fails("1,2\n3,4\n", "add a header");
+        fails("a,b\n1\n", "line 2: expected 2 cells");
+        fails("a,b\n1,x\n", "line 2, column \"b\": expected a number, found \"x\"");
+        fails("a,b\n1,inf\n", "found \"inf\"");
+        fails("a,b\n1,2,5\n", "expected 2 cells");
+    }
+}

@@ -1,0 +1,140 @@
+//! What of a robot file can be identified: its numbers by name, what each does to the arm, and where it is written.
+//!
+//! | name | what |
+//! | --- | --- |
+//! | `drive.JOINT.gearbox.stiffness` | a gearbox with one stiffness (N m/rad, N/m of a joint that slides) |
+//! | `drive.JOINT.gearbox.stiffness[k]` | one of three or six, from 0 |
+//! | `link.LINK.stiffness_factor` | all of a flexible link's stiffness, as a factor |
+//! | `payload.mass` | kg, at its centre of mass |
+
+use flexarm_flexlink::GearStiffness;
+use flexarm_identify::{Effect, Parameter, Place, Plant};
+use flexarm_kinematics::SpatialInertia;
+use nalgebra::{Matrix3, Vector3};
+
+use crate::flexible::{FlexibleRobot, Owner};
+use crate::robot::{PAYLOAD_LINK, Robot};
+
+/// Standard deviation of a stiffness before anything is measured: a factor.
+pub(crate) const UNCERTAINTY: f64 = 2.0;
+/// Of a payload's mass: this part of it, and kg at least.
+const PAYLOAD_UNCERTAINTY: (f64, f64) = (0.5, 1.0);
+
+/// Where a parameter is written in the robot file.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Written {
+    /// `[[drive]]` of the joint: the stiffness of its gearbox, or one of its entries.
+    Gearbox { joint: String, entry: Option<usize> },
+    /// `[[flexible_link]]` of the link: its `stiffness_factor`.
+    Link { link: String },
+    /// `payload.mass`.
+    Payload,
+}
+
+/// A parameter and where it stands.
+#[derive(Clone, Debug)]
+pub(crate) struct Candidate {
+    pub(crate) parameter: Parameter,
+    pub(crate) written: Written,
+}
+
+/// All parameters of an arm, in the order of drives, links, payload.
+pub(crate) fn candidates(robot: &Robot, flexible: &FlexibleRobot) -> Vec<Candidate> {
+    let of = |owner: Owner| -> Vec<usize> {
+        flexible.owners.iter().enumerate().filter(|(_, o)| **o == owner).map(|(k, _)| k).collect()
+    };
+    let mut found = Vec::new();
+    for (number, drive) in robot.drives.iter().enumerate() {
+        let springs = of(Owner::Drive(number));
+        let Some((gearbox, damping)) = drive.gearbox.as_ref().filter(|_| !springs.is_empty()) else { continue };
+        // A curve of points has no one stiffness; a play has.
+        if damping.curve.is_some() && drive.backlash == 0.0 {
+            continue;
+        }
+        let slides = flexible.model.coordinates().iter().any(|c| c.joint == drive.joint && c.kind == "prismatic");
+        found.extend(gearbox_parameters(&drive.joint, &gearbox.stiffness, &springs, slides));
+    }
+    for (number, span) in flexible.spans.iter().enumerate() {
+        let places = of(Owner::Link(number)).into_iter().map(|spring| Place { spring, coordinate: None }).collect();
+        let factor = robot.flexible[number].stiffness_factor;
+        let name = format!("link.{}.stiffness_factor", span.link);
+        let written = Written::Link { link: span.link.clone() };
+        found.push(stiffness(name, "1", factor, places, written));
+    }
+    if let Some(frame) = flexible.model.frame(PAYLOAD_LINK) {
+        let mass = robot.rigid.link(PAYLOAD_LINK).and_then(|link| link.inertia).map_or(0.0, |inertia| inertia.mass);
+        let per_kg = SpatialInertia::from_com(1.0, &Vector3::zeros(), &Matrix3::zeros()).at_parent(&frame.X_BF);
+        let prior = (PAYLOAD_UNCERTAINTY.0 * mass).max(PAYLOAD_UNCERTAINTY.1);
+        let effect = Effect::Mass { body: frame.body, per_kg };
+        let parameter = Parameter { name: "payload.mass".into(), unit: "kg".into(), initial: mass, prior, effect };
+        found.push(Candidate { parameter, written: Written::Payload });
+    }
+    found
+}
+
+fn stiffness(name: String, unit: &str, initial: f64, places: Vec<Place>, written: Written) -> Candidate {
+    let effect = Effect::Stiffness(places);
+    let parameter = Parameter { name, unit: unit.into(), initial, prior: UNCERTAINTY.ln(), effect };
+    Candidate { parameter, written }
+}
+
+fn gearbox_parameters(joint: &str, K: &GearStiffness, springs: &[usize], slides: bool) -> Vec<Candidate> {
+    let name = format!("drive.{joint}.gearbox.stiffness");
+    let about = if slides { "N/m" } else { "N m/rad" };
+    let written = |entry| Written::Gearbox { joint: joint.to_owned(), entry };
+    let whole = |spring| vec![Place { spring, coordinate: None }];
+    match (K, springs) {
+        (GearStiffness::Axis(k), [spring]) => vec![stiffness(name, about, *k, whole(*spring), written(None))],
+        (GearStiffness::Tilting(k), [_, _, _]) => {
+            let each = springs.iter().zip(k).enumerate();
+            each.map(|(i, (s, k))| stiffness(format!("{name}[{i}]"), "N m/rad", *k, whole(*s), written(Some(i))))
+                .collect()
+        }
+        (GearStiffness::Full(K), [spring]) if is_diagonal(K) => {
+            let entry = |i: usize| {
+                let unit = if i < 3 { "N/m" } else { "N m/rad" };
+                let place = vec![Place { spring: *spring, coordinate: Some(i) }];
+                stiffness(format!("{name}[{i}]"), unit, K[(i, i)], place, written(Some(i)))
+            };
+            (0..6).map(entry).collect()
+        }
+        // A full matrix: all of it by a factor.
+        _ => {
+            let places = springs.iter().map(|spring| Place { spring: *spring, coordinate: None }).collect();
+            vec![stiffness(name, "1", 1.0, places, written(None))]
+        }
+    }
+}
+
+fn is_diagonal(K: &nalgebra::Matrix6<f64>) -> bool {
+    (0..6).all(|i| (0..6).all(|j| i == j || K[(i, j)] == 0.0))
+}
+
+/// The arm as the identification takes it.
+pub(crate) fn plant(flexible: &FlexibleRobot) -> Plant {
+    Plant { model: flexible.model.clone(), springs: flexible.springs.clone(), tool: flexible.tcp.clone() }
+}
+
+/// Whether a name fits a pattern in which * stands for anything.
+pub(crate) fn fits(pattern: &str, name: &str) -> bool {
+    match pattern.split_once('*') {
+        None => pattern == name,
+        Some((before, after)) => {
+            let Some(rest) = name.strip_prefix(before) else { return false };
+            rest.char_indices().map(|(k, _)| &rest[k..]).chain([""]).any(|rest| fits(after, rest))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::fits;
+
+    #[test]
+    fn a_star_stands_for_anything_in_a_name() {
+        assert!(fits("drive.*.gearbox.stiffness", "drive.joint_2.gearbox.stiffness"));
+        assert!(fits("*", "payload.mass") && fits("link.*", "link.a.stiffness_factor"));
+        assert!(!fits("drive.*", "payload.mass") && !fits("payload", "payload.mass"));
+        assert!(fits("*stiffness*", "drive.a.gearbox.stiffness[2]"));
+    }
+}
