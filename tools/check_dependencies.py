@@ -28,7 +28,7 @@ INNER = ["results", "motion", "links", "base", "words", "algebra"]
 OWNERS = {  # outside crate: crates or lines that may name it
     "rerun": ["flexarm-log"], "re_chunk": ["flexarm-log"], "re_log_encoding": ["flexarm-log"], "re_log_types": ["flexarm-log"],
     "re_sdk_types": ["flexarm-log"], "re_tuid": ["flexarm-log"], "mcap": ["flexarm-log"], "parquet": ["flexarm-log"], "zstd": ["flexarm-log", "flexarm-motion-io"],
-    "rusqlite": ["flexarm-motion-io"], "lz4_flex": ["flexarm-motion-io"],
+    "rusqlite": ["flexarm-motion-io"], "toml_edit": ["facade"], "lz4_flex": ["flexarm-motion-io"],
     "arrow-array": ["flexarm-log"], "arrow-ipc": ["flexarm-log"], "arrow-schema": ["flexarm-log"],
     "png": ["flexarm-draw"], "plotters": ["flexarm-draw"], "hdf5-pure": ["flexarm-fe-io"],
     "faer": ["flexarm-fem"], "diffsol": ["flexarm-stepping"], "metis-sys": ["flexarm-fem"], "urdf-rs": ["flexarm-urdf"], "saphyr-parser": ["flexarm-urdf", "flexarm-motion-io"],
@@ -69,6 +69,8 @@ MUST_NOT_KNOW = {  # crate: what its code must not have, and what it is; imports
     "flexarm-trajectory": [(r"\b(?:Robot|Mechanism|inverse_kinematics)\b", "robots and inverse kinematics")],
     "flexarm-motion-io": [(r"\b(?:Robot|Mechanism|Model)\b", "robots"), (r"\bflexarm_(?!motion_io\b|trajectory\b|settings\b)\w+", "more than trajectories")],
     "flexarm-flexlink": [FILES],
+    "flexarm-identify": [FILES, (r"\b(?:Robot|Trajectory)\b", "robots by name and motion"),
+                         (r"\bflexarm_(?!identify\b|stepping\b|kinematics\b|testkit\b)\w+", "more than arms at rest")],
     "flexarm-path": [FILES, (r"\b[Ss]tiffness\b", "stiffness"), (r"\bflexarm_(?!path\b|kinematics\b|spatial\b|trajectory\b|testkit\b)\w+", "more than motions")],
     "flexarm-stepping": [FILES, (r"\b(?:TcpMetrics|substitute)\b", "metrics and substitution")],
     "flexarm-analysis": [FILES, (r"\bflexarm_(?!analysis\b|kinematics\b)\w+", "other crates than the one of poses")],

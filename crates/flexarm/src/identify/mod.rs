@@ -565,7 +565,7 @@ fn caveats(found: &Identified) -> Vec<Caveat> {
     }
     for parameter in found.parameters.iter().filter(|p| !p.identifiable) {
         let text = format!("{} does not follow from these readings: it stays where it was", parameter.name);
-        caveats.push(Caveat::said("not-identifiable", "measurements", text, "measure where it counts: --plan"));
+        caveats.push(Caveat::said("not-identifiable", "measurements", text, "measure where it counts: a plan says where"));
     }
     if let Some(held) = found.held_out.as_ref().filter(|held| held.rms > held.rms_initial) {
         let text = format!(
@@ -600,7 +600,7 @@ fn frame_caveat(input: &MeasurementInput, answer: &Identification) -> Option<Cav
              units, or the targets are not those of this robot",
             1e3 * left
         );
-        Caveat::said("frames", "measurements", text, "compare one pose by hand: flexarm inspect ROBOT --at ...")
+        Caveat::said("frames", "measurements", text, "compare one pose by hand with what the robot model says (inspect)")
     })
 }
 

@@ -286,7 +286,7 @@ fn job(answer: &MeasurementPlan, request: &PlanRequest) -> String {
         false => format!("fit = {:?}\n", request.fit),
     };
     format!(
-        "# Measurements of {}: {} readings, planned by flexarm identify --plan.\n\
+        "# Measurements of {}: {} readings, planned by flexarm identify.\n\
          # Fill in dx, dy, dz of displacements.csv (mm, world axes): how far the tool moves from no load to the force.\n\
          # Then: flexarm identify ROBOT measurements.toml\n\
          format = 1\nlength = \"mm\"\nangle = \"deg\"\n{fit}\n[[displacement]]\nfile = \"displacements.csv\"\nstd = {}\n",

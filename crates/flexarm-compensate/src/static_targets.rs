@@ -1,0 +1,108 @@
+//! Joint targets at which a flexible arm at rest has its tool where the rigid arm would.
+
+use std::sync::Arc;
+
+use flexarm_kinematics::{Data, Frame, Pose, Wrench, forward_kinematics, rotation_vector};
+use flexarm_stepping::{FlexibleArm, Held, StepError, linearise};
+use nalgebra::{DMatrix, DVector, Vector6};
+
+/// Accepted distance of the tool (m, rad).
+const TOLERANCE: f64 = 1e-12;
+/// Most Newton iterations.
+const MOST_ITERATIONS: usize = 30;
+/// Singular values below this part of the largest are directions in which the joints cannot move the tool.
+const RANK: f64 = 1e-6;
+
+/// Targets at a pose.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StaticTargets {
+    /// Joint targets (rad or m).
+    pub q: Vec<f64>,
+    /// Displacement of the tool from where it should be with the targets as they were: position, then rotation vector, world axes.
+    pub before: Vector6<f64>,
+    /// The same with the new ones, in the components asked for.
+    pub after: Vector6<f64>,
+    /// Newton iterations.
+    pub iterations: usize,
+}
+
+/// Why there are no targets.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum TargetError {
+    /// No equilibrium.
+    #[error(transparent)]
+    Step(#[from] StepError),
+    /// The joints cannot move the tool so, or the iteration does not settle.
+    #[error("after {iterations} iterations the tool is still {left_m:.1e} m and {left_rad:.1e} rad from its place: the arm cannot move it there (singular pose, too few joints)")]
+    NotReached {
+        /// How many.
+        iterations: usize,
+        /// What is left.
+        left_m: f64,
+        /// What is left.
+        left_rad: f64,
+    },
+}
+
+/// Finds joint targets with which the tool at rest is where the rigid arm has it at `q`.
+///
+/// * `arm`: its own motion does not count; loads and payloads of time 0 act.
+/// * `F_T_W`: constant wrench on the tool, world axes, as in [`linearise`].
+/// * `components`: which of position and rotation (world axes) count.
+///
+/// With fewer components than joints the joints move as little as possible.
+///
+/// # Errors
+/// [`TargetError`].
+pub fn static_targets(
+    arm: &FlexibleArm,
+    tool: &Frame,
+    q: &[f64],
+    F_T_W: &Wrench,
+    components: &[bool; 6],
+) -> Result<StaticTargets, TargetError> {
+    let wanted = rigid_pose(arm, tool, q);
+    let rows: Vec<usize> = (0..6).filter(|k| components[*k]).collect();
+    let mut targets = DVector::from_column_slice(q);
+    let mut before = None;
+    for iterations in 0..=MOST_ITERATIONS {
+        let held = FlexibleArm { motion: Arc::new(Held(targets.as_slice().to_vec())), ..arm.clone() };
+        let at = linearise(&held, tool, F_T_W, 0.0)?;
+        let off = displacement(&wanted, &at.X_WT);
+        let before = *before.get_or_insert(off);
+        let left = DVector::from_iterator(rows.len(), rows.iter().map(|k| off[*k]));
+        if left.amax() <= TOLERANCE {
+            let after = Vector6::from_fn(|k, _| if components[k] { off[k] } else { 0.0 });
+            return Ok(StaticTargets { q: targets.as_slice().to_vec(), before, after, iterations });
+        }
+        if iterations == MOST_ITERATIONS {
+            let norm = |range: std::ops::Range<usize>| range.filter(|k| components[*k]).map(|k| off[k].abs()).fold(0.0, f64::max);
+            return Err(TargetError::NotReached { iterations, left_m: norm(0..3), left_rad: norm(3..6) });
+        }
+        // Commands move the tool and the equilibrium.
+        let yielding = at.K.clone().lu().solve(&at.K_a).unwrap_or_else(|| DMatrix::zeros(at.K.nrows(), at.K_a.ncols()));
+        let G = DMatrix::from_fn(6, targets.len(), |i, j| at.J_a[(i, j)]) - &at.J * yielding;
+        let svd = G.select_rows(&rows).svd(true, true);
+        let rank = RANK * svd.singular_values.amax();
+        let step = svd.solve(&left, rank).unwrap_or_else(|_| DVector::zeros(targets.len()));
+        targets -= step;
+    }
+    unreachable!("the loop returns at its last iteration")
+}
+
+/// The tool of the rigid arm: every elastic coordinate at zero.
+pub(crate) fn rigid_pose(arm: &FlexibleArm, tool: &Frame, q: &[f64]) -> Pose {
+    let mut all = DVector::zeros(arm.model.nv());
+    all.rows_mut(0, q.len()).copy_from_slice(q);
+    let mut data = Data::new(&arm.model);
+    forward_kinematics(&arm.model, &mut data, &all);
+    data.X_WF(tool)
+}
+
+/// From a pose to another: position, then rotation vector, world axes.
+pub(crate) fn displacement(from: &Pose, to: &Pose) -> Vector6<f64> {
+    let p = to.translation.vector - from.translation.vector;
+    let r = rotation_vector((to.rotation * from.rotation.inverse()).matrix());
+    Vector6::new(p.x, p.y, p.z, r.x, r.y, r.z)
+}

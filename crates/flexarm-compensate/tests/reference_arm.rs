@@ -1,0 +1,122 @@
+//! Commands for the reference arm: at rest against the equilibrium found by another way, in motion against the equations of motion
+//! integrated forwards.
+#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
+#![allow(clippy::expect_used, clippy::unwrap_used, reason = "a failed unwrap fails the test")]
+#![allow(non_snake_case, reason = "monogram notation")]
+
+use std::sync::Arc;
+
+use flexarm_compensate::*;
+use flexarm_kinematics::{Frame, Model, Wrench};
+use flexarm_stepping::{Damping, FlexibleArm, Held, OperatingPoint, linearise};
+use flexarm_testkit::reference_arm;
+use nalgebra::{DMatrix, DVector, Vector3};
+
+const POSE: [f64; 6] = [0.4, 0.5, -0.3, 0.7, 0.6, -1.2];
+
+fn arm(softer: f64) -> (FlexibleArm, Frame) {
+    let reference = reference_arm(true);
+    let model = Arc::new(Model::new(&reference.mechanism).expect("valid"));
+    let spring = |name: &str, k: usize| (name.to_owned(), reference.K_S[k] / softer, Damping::StiffnessProportional(2e-3));
+    let tool = model.frame("tcp").expect("there").clone();
+    let springs = vec![spring("lower", 0), spring("upper", 1)];
+    (FlexibleArm::new(model, springs, Arc::new(Held(POSE.to_vec()))).expect("valid"), tool)
+}
+
+/// Truth: the equilibrium of [`OperatingPoint`], on an arm that sags by 4 cm, under a load besides.
+#[test]
+fn at_rest_the_tool_of_a_soft_arm_is_where_the_rigid_arm_has_it() {
+    let (arm, tool) = arm(20.0);
+    let load = Wrench::new(Vector3::new(90.0, 50.0, -200.0), Vector3::new(10.0, 0.0, 20.0));
+    let found = static_targets(&arm, &tool, &POSE, &load, &[true; 6]).unwrap();
+    let mut at = OperatingPoint::new(arm.clone(), tool.clone());
+    at.solve(&POSE, &Wrench::zeros()).unwrap();
+    let wanted = at.rigid_tcp_pose();
+    at.solve(&found.q, &load).unwrap();
+    let off = (at.tcp_pose().translation.vector - wanted.translation.vector).norm();
+    let turned = (at.tcp_pose().rotation.matrix() - wanted.rotation.matrix()).norm();
+    eprintln!("before {:.1} mm, after {off:.1e} m and {turned:.1e} rad in {} iterations", 1e3 * found.before.rows(0, 3).norm(), found.iterations);
+    assert!(found.before.rows(0, 3).norm() > 0.03);
+    assert!(off < 1e-11 && turned < 1e-11, "{off:e} {turned:e}");
+}
+
+#[test]
+fn with_the_position_alone_the_joints_move_as_little_as_they_can() {
+    let (arm, tool) = arm(20.0);
+    let position = [true, true, true, false, false, false];
+    let all = static_targets(&arm, &tool, &POSE, &Wrench::zeros(), &[true; 6]).unwrap();
+    let some = static_targets(&arm, &tool, &POSE, &Wrench::zeros(), &position).unwrap();
+    let way = |found: &StaticTargets| found.q.iter().zip(POSE).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
+    assert!(some.after.amax() < 1e-12 && way(&some) < way(&all), "{} {}", way(&some), way(&all));
+}
+
+/// Truth: forward integration of the linear equations by the trapezoidal rule .
+#[test]
+fn commands_by_the_series_of_the_inverse_move_the_tool_as_asked_at_a_third_of_the_first_frequency() {
+    let (arm, tool) = arm(1.0);
+    let at = linearise(&arm, &tool, &Wrench::zeros(), 0.0).unwrap();
+    let six = |M: &nalgebra::Matrix6xX<f64>| DMatrix::from_fn(6, M.ncols(), |i, j| M[(i, j)]);
+    let node = Node {
+        M: at.M.clone(),
+        D: at.D.clone(),
+        K: at.K.clone(),
+        M_a: at.M_a.clone(),
+        D_a: at.D_a.clone(),
+        K_a: at.K_a.clone(),
+        J: six(&at.J),
+        J_a: six(&at.J_a),
+    };
+    let hz = arm.modes.frequencies_hz()[0];
+    let (length, h) = (3.0, 2.5e-4);
+    let N = (length / h) as usize + 1;
+    // A smooth bump with vibration in it, at rest at both ends.
+    let wave = |t: f64| {
+        let s: f64 = (t / length * std::f64::consts::PI).sin();
+        s.powi(8) * (std::f64::consts::TAU * hz / 3.0 * t).cos()
+    };
+    let size = [2e-3, -1e-3, 1.5e-3, 1e-3, 2e-3, -1e-3];
+    let y = DMatrix::from_fn(6, N, |i, k| size[i] * wave(h * k as f64));
+    let inversion = Inversion::new(&[node.clone(), node.clone()], length).unwrap();
+    let u = inversion.commands(&y, h);
+    let shown = forwards(&node, &u, h);
+    let error = (&shown - &y).amax() / y.amax();
+    // What one use leaves is asked for again.
+    let more = inversion.commands(&(&y - &shown), h);
+    let twice = &u + more;
+    let twice = (forwards(&node, &twice, h) - &y).amax() / y.amax();
+    // At rest the same commands would leave out the inertia.
+    let G = &node.J_a - &node.J * node.K.clone().lu().solve(&node.K_a).unwrap();
+    let rest = G.try_inverse().unwrap() * &y;
+    let as_at_rest = (forwards(&node, &rest, h) - &y).amax() / y.amax();
+    let cutoff = inversion.cutoff_hz();
+    eprintln!("first frequency {hz:.2} Hz, cutoff {cutoff:.1}; left {error:.1e}, {twice:.1e}, with commands as at rest {as_at_rest:.1e}");
+    // The arm with its tool held has its first frequency at 25 Hz.
+    assert!((1.2 * hz..25.0).contains(&cutoff), "{cutoff}");
+    assert!(error < 1e-2 && twice < 0.1 * error, "{error:e} {twice:e}");
+    assert!(as_at_rest > 10.0 * error);
+}
+
+/// The tool under commands: the trapezoidal rule, rates by central differences.
+fn forwards(node: &Node, u: &DMatrix<f64>, h: f64) -> DMatrix<f64> {
+    let (n, N) = (node.M.nrows(), u.ncols());
+    let at = |k: i64| u.column(k.clamp(0, N as i64 - 1) as usize);
+    let force = |k: i64| {
+        let rate = (at(k + 1) - at(k - 1)) / (2.0 * h);
+        let acceleration = (at(k + 1) + at(k - 1) - at(k) * 2.0) / (h * h);
+        -(&node.M_a * acceleration + &node.D_a * rate + &node.K_a * at(k))
+    };
+    let mut x = node.K.clone().lu().solve(&force(0)).unwrap();
+    let (mut v, mut a) = (DVector::zeros(n), DVector::zeros(n));
+    let (g, b) = (0.5, 0.25);
+    let lu = (&node.M + &node.D * (g * h) + &node.K * (b * h * h)).lu();
+    let mut shown = DMatrix::zeros(node.J.nrows(), N);
+    for k in 0..N {
+        shown.column_mut(k).copy_from(&(&node.J * &x + &node.J_a * u.column(k)));
+        let xp = &x + &v * h + &a * ((0.5 - b) * h * h);
+        let vp = &v + &a * ((1.0 - g) * h);
+        a = lu.solve(&(force(k as i64 + 1) - &node.D * &vp - &node.K * &xp)).unwrap();
+        x = xp + &a * (b * h * h);
+        v = vp + &a * (g * h);
+    }
+    shown
+}
