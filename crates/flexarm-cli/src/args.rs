@@ -6,6 +6,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use flexarm::{DriveModel, LinkModel, Modelling, RecordingFormat, STEPPERS, StepperEntry};
 
+use crate::compensate::CompensateArgs;
 use crate::convert::ConvertArgs;
 use crate::exchange_args::{ExportArgs, ImportArgs};
 use crate::formats;
@@ -47,6 +48,8 @@ pub(crate) enum Command {
     Motion(MotionArgs),
     /// Find a robot's stiffness from measurements, and the poses that are worth measuring
     Identify(Box<IdentifyArgs>),
+    /// Find the motion with which the flexible arm's tool follows the rigid one's, and judge it on other plants
+    Compensate(Box<CompensateArgs>),
     /// Equilibrium under weight and load at a pose, and the compliance of the TCP
     Statics(StaticsArgs),
     /// Natural frequencies, damping and shapes at a pose, drives locked

@@ -2,6 +2,7 @@
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "printing is what this face is for")]
 
 mod args;
+mod compensate;
 mod convert;
 mod exchange;
 mod exchange_args;
@@ -78,6 +79,7 @@ fn run(cli: &Cli) -> Result<ExitCode, Failure> {
         Command::Check(args) => check(cli, args),
         Command::Motion(args) => motion::run(cli, args),
         Command::Identify(args) => identify::run(cli, args),
+        Command::Compensate(args) => compensate::run(cli, args),
         Command::Statics(args) => posed::statics(cli, args),
         Command::Modes(args) => posed::modes(cli, args),
         Command::Response(args) => posed::response(cli, args),

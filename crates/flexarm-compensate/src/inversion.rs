@@ -99,6 +99,12 @@ impl Inversion {
         Ok(Self { series, spacing_s, cutoff_hz })
     }
 
+    /// The same with the commands corrected up to this frequency at most (Hz).
+    #[must_use]
+    pub fn below(self, hz: f64) -> Self {
+        Self { cutoff_hz: self.cutoff_hz.min(hz), ..self }
+    }
+
     /// Up to which frequency the commands are corrected (Hz).
     pub fn cutoff_hz(&self) -> f64 {
         self.cutoff_hz
@@ -200,11 +206,13 @@ impl Series {
     fn leaves(&self, node: &Node, hz: f64) -> Option<f64> {
         let s = Complex::new(0.0, std::f64::consts::TAU * hz);
         let complex = |A: &DMatrix<f64>| A.map(|x| Complex::new(x, 0.0));
-        let poly = |a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>| complex(a) + complex(b) * s + complex(c) * (s * s);
+        let poly =
+            |a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>| complex(a) + complex(b) * s + complex(c) * (s * s);
         let x = poly(&node.K, &node.D, &node.M).lu().solve(&poly(&node.K_a, &node.D_a, &node.M_a))?;
         let H = complex(&node.J_a) - complex(&node.J) * x;
         let zero = DMatrix::from_element(self.A[0].nrows(), self.A[0].ncols(), Complex::new(0.0, 0.0));
-        let (A, _) = self.A.iter().fold((zero, Complex::new(1.0, 0.0)), |(sum, power), A| (sum + complex(A) * power, power * s));
+        let (A, _) =
+            self.A.iter().fold((zero, Complex::new(1.0, 0.0)), |(sum, power), A| (sum + complex(A) * power, power * s));
         let mut left = -(H * A);
         for k in 0..left.nrows() {
             left[(k, k)] += Complex::new(1.0, 0.0);
@@ -285,7 +293,12 @@ mod tests {
     #[test]
     fn the_filter_keeps_what_is_slow_without_delay_and_takes_away_what_is_fast() {
         let (h, N) = (1e-3, 4001);
-        let wave = |hz: f64| move |k: usize| (std::f64::consts::TAU * hz * h * k as f64).sin() * (std::f64::consts::PI * k as f64 / 4000.0).sin().powi(4);
+        let wave = |hz: f64| {
+            move |k: usize| {
+                (std::f64::consts::TAU * hz * h * k as f64).sin()
+                    * (std::f64::consts::PI * k as f64 / 4000.0).sin().powi(4)
+            }
+        };
         let slow = DMatrix::from_fn(1, N, |_, k| wave(3.0)(k));
         let both = DMatrix::from_fn(1, N, |_, k| wave(3.0)(k) + wave(90.0)(k));
         let (found, pad) = filtered(&both, h, 20.0);

@@ -34,7 +34,9 @@ pub enum TargetError {
     #[error(transparent)]
     Step(#[from] StepError),
     /// The joints cannot move the tool so, or the iteration does not settle.
-    #[error("after {iterations} iterations the tool is still {left_m:.1e} m and {left_rad:.1e} rad from its place: the arm cannot move it there (singular pose, too few joints)")]
+    #[error(
+        "after {iterations} iterations the tool is still {left_m:.1e} m and {left_rad:.1e} rad from its place: the arm cannot move it there (singular pose, too few joints)"
+    )]
     NotReached {
         /// How many.
         iterations: usize,
@@ -77,7 +79,9 @@ pub fn static_targets(
             return Ok(StaticTargets { q: targets.as_slice().to_vec(), before, after, iterations });
         }
         if iterations == MOST_ITERATIONS {
-            let norm = |range: std::ops::Range<usize>| range.filter(|k| components[*k]).map(|k| off[k].abs()).fold(0.0, f64::max);
+            let norm = |range: std::ops::Range<usize>| {
+                range.filter(|k| components[*k]).map(|k| off[k].abs()).fold(0.0, f64::max)
+            };
             return Err(TargetError::NotReached { iterations, left_m: norm(0..3), left_rad: norm(3..6) });
         }
         // Commands move the tool and the equilibrium.

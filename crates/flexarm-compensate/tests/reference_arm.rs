@@ -17,7 +17,8 @@ const POSE: [f64; 6] = [0.4, 0.5, -0.3, 0.7, 0.6, -1.2];
 fn arm(softer: f64) -> (FlexibleArm, Frame) {
     let reference = reference_arm(true);
     let model = Arc::new(Model::new(&reference.mechanism).expect("valid"));
-    let spring = |name: &str, k: usize| (name.to_owned(), reference.K_S[k] / softer, Damping::StiffnessProportional(2e-3));
+    let spring =
+        |name: &str, k: usize| (name.to_owned(), reference.K_S[k] / softer, Damping::StiffnessProportional(2e-3));
     let tool = model.frame("tcp").expect("there").clone();
     let springs = vec![spring("lower", 0), spring("upper", 1)];
     (FlexibleArm::new(model, springs, Arc::new(Held(POSE.to_vec()))).expect("valid"), tool)
@@ -35,7 +36,11 @@ fn at_rest_the_tool_of_a_soft_arm_is_where_the_rigid_arm_has_it() {
     at.solve(&found.q, &load).unwrap();
     let off = (at.tcp_pose().translation.vector - wanted.translation.vector).norm();
     let turned = (at.tcp_pose().rotation.matrix() - wanted.rotation.matrix()).norm();
-    eprintln!("before {:.1} mm, after {off:.1e} m and {turned:.1e} rad in {} iterations", 1e3 * found.before.rows(0, 3).norm(), found.iterations);
+    eprintln!(
+        "before {:.1} mm, after {off:.1e} m and {turned:.1e} rad in {} iterations",
+        1e3 * found.before.rows(0, 3).norm(),
+        found.iterations
+    );
     assert!(found.before.rows(0, 3).norm() > 0.03);
     assert!(off < 1e-11 && turned < 1e-11, "{off:e} {turned:e}");
 }
@@ -89,7 +94,9 @@ fn commands_by_the_series_of_the_inverse_move_the_tool_as_asked_at_a_third_of_th
     let rest = G.try_inverse().unwrap() * &y;
     let as_at_rest = (forwards(&node, &rest, h) - &y).amax() / y.amax();
     let cutoff = inversion.cutoff_hz();
-    eprintln!("first frequency {hz:.2} Hz, cutoff {cutoff:.1}; left {error:.1e}, {twice:.1e}, with commands as at rest {as_at_rest:.1e}");
+    eprintln!(
+        "first frequency {hz:.2} Hz, cutoff {cutoff:.1}; left {error:.1e}, {twice:.1e}, with commands as at rest {as_at_rest:.1e}"
+    );
     // The arm with its tool held has its first frequency at 25 Hz.
     assert!((1.2 * hz..25.0).contains(&cutoff), "{cutoff}");
     assert!(error < 1e-2 && twice < 0.1 * error, "{error:e} {twice:e}");

@@ -129,6 +129,9 @@ pub enum Error {
     /// Measurements that tell nothing of the robot, or cannot be of it.
     #[error(transparent)]
     Identify(#[from] crate::identify::IdentifyFileError),
+    /// A motion that cannot be compensated.
+    #[error(transparent)]
+    Compensate(#[from] crate::compensate::CompensateError),
     /// The runs of a study.
     #[error(transparent)]
     Study(#[from] StudyError),

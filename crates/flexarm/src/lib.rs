@@ -48,6 +48,7 @@ mod beam_entry;
 mod bends;
 mod caveat;
 mod check;
+pub mod compensate;
 mod convert;
 mod deflections;
 mod drive_entry;

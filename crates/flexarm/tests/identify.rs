@@ -105,9 +105,7 @@ fn six_gearboxes_come_out_with_the_deviations_that_they_have() {
 
 #[test]
 fn two_links_and_six_gearboxes_of_one_arm_come_out_with_the_deviations_that_they_have() {
-    let (inside, spread) = coverage("kr210", |all| {
-        all.iter().filter(|p| p.name != "payload.mass").cloned().collect()
-    });
+    let (inside, spread) = coverage("kr210", |all| all.iter().filter(|p| p.name != "payload.mass").cloned().collect());
     eprintln!("links and gearboxes: {inside:.3} inside, spread {spread:.3}");
     assert!((0.92..0.98).contains(&inside) && (0.93..1.07).contains(&spread), "{inside} {spread}");
 }
@@ -156,7 +154,10 @@ fn a_table_in_millimetres_gives_a_robot_file_that_shows_what_was_measured() {
     assert!(found.residual.before > 1e-5 && found.residual.after < 1e-12, "{:?}", found.residual);
     // The new file has these stiffnesses to a hundredth of their deviations, and everything else of the old one.
     let new = Robot::load(&output).unwrap();
-    assert_eq!((new.urdf_path.canonicalize().unwrap(), &new.name), (robot.urdf_path.canonicalize().unwrap(), &robot.name));
+    assert_eq!(
+        (new.urdf_path.canonicalize().unwrap(), &new.name),
+        (robot.urdf_path.canonicalize().unwrap(), &robot.name)
+    );
     let arm = new.flexible(Modelling::default()).unwrap();
     for (p, found) in arm.parameters().iter().zip(&found.parameters) {
         let off = (p.initial - found.value).abs();
@@ -200,8 +201,10 @@ fn gearboxes_alone_do_not_pass_for_an_arm_whose_links_bend() {
     };
     let (right, wrong) = (of(flexarm::LinkModel::AsFiled), of(flexarm::LinkModel::Rigid));
     let [r, w] = [&right, &wrong].map(|found| found.held_out.as_ref().unwrap().rms);
-    eprintln!("links and drives: residual {:.1e} m, held out {r:.1e}; drives alone: {:.1e}, {w:.1e}, scatter {:?}",
-        right.residual.after, wrong.residual.after, wrong.misfit);
+    eprintln!(
+        "links and drives: residual {:.1e} m, held out {r:.1e}; drives alone: {:.1e}, {w:.1e}, scatter {:?}",
+        right.residual.after, wrong.residual.after, wrong.misfit
+    );
     assert!(right.misfit.is_none() && wrong.misfit.is_some_and(|factor| factor > 2.0));
     assert!(wrong.caveats.iter().any(|caveat| caveat.message.contains("lacks something that gives way")));
     assert!(w > 2.0 * r, "{w} {r}");
@@ -258,8 +261,13 @@ fn what_is_wrong_in_a_file_of_measurements_is_said_with_its_place() {
     fails("format = 1\n[[displacement]]\njoints = [0, -90, 90, 0, 0, 0]\n", "is angle = \"deg\" missing?");
     fails(&format!("format = 1\n[[place]]\n{q}\nvalue = [1, 2, 3]\n"), "add [instrument.NAME]");
     fails(&format!("format = 1\n[[frequency]]\n{q}\nhz = [5.0]\nmodes = [9]\nstd = 0.1\n"), "the model has 6 modes");
-    fails(&format!("format = 1\nfit = [\"payload.mass\"]\n[[frequency]]\n{q}\nhz = [5.0]\nstd = 0.1\n"), "no parameter of this robot is called");
-    let two = format!("format = 1\n[[frequency]]\n{q}\nhz = [5.0]\nstd = 0.1\n[[displacement]]\n{q}\nvalue = [0, 0, -1e-4]\nload = {{ mass = 10 }}\n");
+    fails(
+        &format!("format = 1\nfit = [\"payload.mass\"]\n[[frequency]]\n{q}\nhz = [5.0]\nstd = 0.1\n"),
+        "no parameter of this robot is called",
+    );
+    let two = format!(
+        "format = 1\n[[frequency]]\n{q}\nhz = [5.0]\nstd = 0.1\n[[displacement]]\n{q}\nvalue = [0, 0, -1e-4]\nload = {{ mass = 10 }}\n"
+    );
     fails(&two, "std is missing");
     let robot = Robot::load(root().join("robots/kr210/kr210.urdf")).unwrap();
     let error = identify_robot(&robot, &job, &IdentifyRequest::default()).unwrap_err();

@@ -565,7 +565,12 @@ fn caveats(found: &Identified) -> Vec<Caveat> {
     }
     for parameter in found.parameters.iter().filter(|p| !p.identifiable) {
         let text = format!("{} does not follow from these readings: it stays where it was", parameter.name);
-        caveats.push(Caveat::said("not-identifiable", "measurements", text, "measure where it counts: a plan says where"));
+        caveats.push(Caveat::said(
+            "not-identifiable",
+            "measurements",
+            text,
+            "measure where it counts: a plan says where",
+        ));
     }
     if let Some(held) = found.held_out.as_ref().filter(|held| held.rms > held.rms_initial) {
         let text = format!(

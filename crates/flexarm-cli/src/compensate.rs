@@ -1,0 +1,193 @@
+//! `flexarm compensate`: a motion with which the flexible arm's tool follows the rigid one's.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args, ValueEnum};
+use comfy_table::CellAlignment;
+use flexarm::compensate::{CompensateRequest, Compensation, ErrorFigures, Method, ShaperKind, compensate_motion};
+use flexarm::{Motion, Robot, RunOptions};
+
+use crate::args::{Cli, ModellingArgs, RobotArgs};
+use crate::failure::Failure;
+use crate::motion::MotionInputArgs;
+use crate::print::{lines, table, warning};
+use crate::shipped::OutputFolder;
+use crate::{answer, load_options, shipped, to_json};
+
+const EXAMPLES: &str = "\
+Examples:
+  The motion with which the tool of kr210 follows the rigid arm, in a new folder of out/:
+      flexarm compensate kr210 pick_and_place
+  Sag alone, and the position of the tool alone:
+      flexarm compensate kr210 pick_and_place --method static --components x,y,z
+  Found with one model, judged with another:
+      flexarm compensate my_robot motion.csv --plant my_other_robot
+Use it as any motion: flexarm compare kr210 out/kr210_compensated-001/compensated.csv; other formats: flexarm motion FILE ROBOT -o FILE";
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum MethodName {
+    /// Inertia, damping and weight, iterated on the simulation
+    Dynamic,
+    /// Weight and constant loads alone, point by point
+    Static,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum ShaperName {
+    /// Two copies half a period apart
+    Zv,
+    /// Three copies: forgives a frequency that is off, takes twice as long
+    Zvd,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct CompensateArgs {
+    /// robot.toml, a folder with one, or the name of a shipped robot
+    pub(crate) robot: PathBuf,
+    /// Motion of any format (flexarm format motion), or the name of a shipped one [default: the robot's own]
+    pub(crate) motion: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) input: MotionInputArgs,
+    /// How the new motion is found
+    #[arg(long, value_enum, default_value = "dynamic")]
+    pub(crate) method: MethodName,
+    /// Which of x, y, z, rx, ry, rz of the tool count (world axes) [default: all]
+    #[arg(long, value_name = "X,Y,...", value_delimiter = ',')]
+    pub(crate) components: Vec<String>,
+    /// Most iterations
+    #[arg(long, value_name = "N", default_value_t = 5)]
+    pub(crate) iterations: usize,
+    /// Highest frequency that is corrected (Hz) [default: as far as the arm can be inverted]
+    #[arg(long, value_name = "HZ")]
+    pub(crate) cutoff: Option<f64>,
+    /// Run the motion through a shaper of the arm's first mode before
+    #[arg(long, value_enum)]
+    pub(crate) shape: Option<ShaperName>,
+    /// Another robot that judges: stiffness, links or drives that the first does not know
+    #[arg(long, value_name = "ROBOT")]
+    pub(crate) plant: Option<PathBuf>,
+    /// Do not judge on plants whose stiffness, damping and drives are off
+    #[arg(long)]
+    pub(crate) no_sweep: bool,
+    /// Step of the simulation (s)
+    #[arg(long, value_name = "S", default_value_t = 1e-3)]
+    pub(crate) step: f64,
+    #[command(flatten)]
+    pub(crate) modelling: ModellingArgs,
+    #[command(flatten)]
+    pub(crate) load: RobotArgs,
+    /// Folder of the new motion and the page [default: a new one in out/]
+    #[arg(short, long, help_heading = "Files", value_name = "FOLDER")]
+    pub(crate) output: Option<PathBuf>,
+    /// Write no files
+    #[arg(long, help_heading = "Files", conflicts_with = "output")]
+    pub(crate) no_files: bool,
+    /// Overwrite what is in the output folder
+    #[arg(long, help_heading = "Files", requires = "output")]
+    pub(crate) force: bool,
+}
+
+const COMPONENTS: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
+
+fn components(words: &[String]) -> Result<[bool; 6], Failure> {
+    if words.is_empty() {
+        return Ok([true; 6]);
+    }
+    let mut chosen = [false; 6];
+    for word in words {
+        let k = COMPONENTS.iter().position(|name| name == word);
+        let k = k.ok_or_else(|| Failure::Usage(format!("--components {word:?}: expected some of {COMPONENTS:?}")))?;
+        chosen[k] = true;
+    }
+    Ok(chosen)
+}
+
+pub(crate) fn run(cli: &Cli, args: &CompensateArgs) -> Result<ExitCode, Failure> {
+    let robot = Robot::load_with(&shipped::robot(Some(&args.robot))?, &load_options(&args.load)?)?;
+    let motion = match (&args.motion, &robot.default_trajectory) {
+        (Some(given), _) => shipped::trajectory(given),
+        (None, Some(own)) => own.clone(),
+        (None, None) => return Err(Failure::Usage("the robot has no motion of its own: give one".into())),
+    };
+    let motion = Motion::load_with(&motion, &robot, &args.input.options())?;
+    let plant = match &args.plant {
+        Some(given) => {
+            let plant = Robot::load_with(&shipped::robot(Some(given))?, &load_options(&args.load)?)?;
+            Some((plant.name.clone(), plant))
+        }
+        None => None,
+    };
+    let folder = OutputFolder::of(args.output.as_deref(), &format!("{}_compensated", robot.name), !args.no_files)?;
+    let request = CompensateRequest {
+        run: RunOptions { step_s: args.step, modelling: args.modelling.modelling(), ..RunOptions::default() },
+        method: match args.method {
+            MethodName::Dynamic => Method::Dynamic,
+            MethodName::Static => Method::Static,
+        },
+        components: components(&args.components)?,
+        iterations: args.iterations,
+        cutoff_hz: args.cutoff,
+        shaper: args.shape.map(|shape| match shape {
+            ShaperName::Zv => ShaperKind::Zv,
+            ShaperName::Zvd => ShaperKind::Zvd,
+        }),
+        plant,
+        sweep: !args.no_sweep,
+        output: folder.path(),
+        overwrite: args.force,
+    };
+    let found = compensate_motion(&robot, &motion, &request)?;
+    if !cli.quiet {
+        found.caveats.iter().for_each(|caveat| warning(&caveat.message));
+    }
+    answer(cli, || to_json(&found), || text(&found));
+    Ok(ExitCode::SUCCESS)
+}
+
+fn text(found: &Compensation) -> String {
+    let mut out =
+        format!("{} on {}: {} method, {} iterations", found.motion, found.robot, found.method, found.iterations);
+    if let Some(hz) = found.cutoff_hz {
+        out += &format!(", up to {hz:.1} Hz");
+    }
+    if found.shaper_delay_s > 0.0 {
+        out += &format!("; the shaper takes {:.3} s", found.shaper_delay_s);
+    }
+    out += "\n\n";
+    let mut t = table(&["mm", "peak before", "after", "RMS before", "after", "taken away", "end before", "after"]);
+    let mut row = |name: &str, before: &ErrorFigures, after: &ErrorFigures| {
+        let mm = |x: f64| format!("{:.4}", 1e3 * x);
+        let part = format!("{:.2} %", 100.0 * (1.0 - after.rms_m / before.rms_m.max(f64::MIN_POSITIVE)));
+        t.add_row(vec![
+            name.to_owned(),
+            mm(before.peak_m),
+            mm(after.peak_m),
+            mm(before.rms_m),
+            mm(after.rms_m),
+            part,
+            mm(before.end_m),
+            mm(after.end_m),
+        ]);
+    };
+    row("as given", &found.before, &found.after);
+    found.plants.iter().for_each(|plant| row(&plant.plant, &plant.before, &plant.after));
+    for k in 1..8 {
+        if let Some(column) = t.column_mut(k) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    out += &lines(&t);
+    let peaks: Vec<String> = found.model_peaks_m.iter().map(|peak| format!("{:.4}", 1e3 * peak)).collect();
+    out += &format!("\npeak on the model after each iteration (mm): {}\n", peaks.join(", "));
+    for limit in &found.limits {
+        out += &format!("limit passed: {limit}\n");
+    }
+    for (what, file) in [("motion", &found.file), ("page", &found.page)] {
+        if let Some(file) = file {
+            out += &format!("{what:<8} {file}\n");
+        }
+    }
+    out
+}
