@@ -33,6 +33,8 @@
 //! Linear structures are a part of their own: [`damped_modes`] with what each mode does ([`compliance_parts`],
 //! [`strain_energy_shares`]), and the response to harmonic excitation ([`LinearSystem::response`], [`response_peaks`]).
 //!
+//! The way back is [`Inversion`]: the joint commands that take an error of the tool away; [`Shaper`] leaves no vibration behind a motion.
+//!
 //! Names of ISO 9283:1998 are used where they fit. A simulation is deterministic and has one cycle, so these are
 //! "ISO 9283-style" figures, not a test after the standard: path accuracy AT ([`TcpMetrics::path_accuracy_m`]),
 //! position overshoot OV ([`TcpMetrics::overshoot_m`]), position stabilisation time ([`TcpMetrics::settling_s`], which
@@ -48,6 +50,7 @@ mod contributions;
 mod damped_modes;
 mod error_parts;
 mod hold;
+mod inversion;
 mod linear_system;
 mod long_record;
 mod metrics;
@@ -55,6 +58,8 @@ mod participation;
 mod path_frame;
 mod pose_error;
 mod record;
+mod shaping;
+pub mod signal;
 mod spectrum;
 
 pub use contributions::{ContributionPeak, ContributionPeaks, engineering_strain, tcp_displacement};
@@ -62,6 +67,7 @@ pub use damped_modes::{DampedMode, damped_modes};
 pub use error_parts::{ErrorParts, error_parts};
 pub use flexarm_kinematics::{Pose, rotation_vector};
 pub use hold::HoldMetrics;
+pub use inversion::{Inversion, InversionError, Node};
 pub use linear_system::{
     LinearError, LinearSystem, Quantity, ResponsePeak, Spacing, frequency_grid, resolved_response, response_peaks,
     with_resonances,
@@ -72,4 +78,5 @@ pub use participation::{compliance_parts, effective_mass, mode_outputs, strain_e
 pub use path_frame::{PathFrame, path_frames};
 pub use pose_error::tcp_error;
 pub use record::{ErrorRecord, RecordError};
+pub use shaping::{Shaper, ShaperKind};
 pub use spectrum::{AmplitudeSpectrum, SpectralLine, Taper, amplitude_spectrum, strongest_line};

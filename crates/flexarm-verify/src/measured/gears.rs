@@ -6,9 +6,9 @@ use flexarm::{DriveModel, LinkModel, Modelling, Motion, Robot};
 use flexarm_stepping::{FlexibleArm, Held, Observation, Start, new_stepper};
 
 use super::recording::{AXES, Recording, STEP_S, WITH_ENCODER};
-use super::signal::{LowPass, delayed, least_squares, rest, rms};
 use crate::Error;
 use crate::bench::{ALPHA, step_error};
+use flexarm_analysis::signal::{LowPass, delayed, least_squares, rest, rms};
 
 /// How much later than the motor's the link encoder's positions are recorded (s).
 pub(super) const LATE_S: f64 = 3.0e-3;

@@ -7,7 +7,6 @@ mod gears;
 mod page;
 mod recording;
 mod servo;
-mod signal;
 mod torques;
 
 use crate::Error;

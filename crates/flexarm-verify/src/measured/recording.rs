@@ -3,9 +3,9 @@
 use flexarm::Robot;
 use flexarm_fe_io::unpack_gzip;
 
-use super::signal::{LowPass, derivative};
 use crate::Error;
 use crate::bench::Bench;
+use flexarm_analysis::signal::{LowPass, derivative};
 
 /// Axes of the robot, and those with an encoder behind the gear.
 pub(super) const AXES: usize = 6;

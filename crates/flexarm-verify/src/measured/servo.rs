@@ -6,9 +6,9 @@ use flexarm::{DriveModel, Modelling, Motion, Robot};
 use flexarm_stepping::{Observation, Servo, ServoAxis, Start, new_stepper};
 
 use super::recording::{AXES, Recording, STEP_S, WITH_ENCODER};
-use super::signal::rms;
 use crate::Error;
 use crate::bench::{ALPHA, step_error};
+use flexarm_analysis::signal::rms;
 
 /// Steps of the simulation per sample.
 const STEPS: usize = 4;

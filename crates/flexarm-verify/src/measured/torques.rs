@@ -5,8 +5,8 @@ use flexarm_kinematics::{Data, Model, State, inverse_dynamics};
 use nalgebra::DVector;
 
 use super::recording::{AXES, Recording, SMOOTH_HZ, STEP_S};
-use super::signal::{LowPass, least_squares, rms};
 use crate::Error;
+use flexarm_analysis::signal::{LowPass, least_squares, rms};
 
 /// Speed over which the sign of friction changes (rad/s).
 pub(super) const SIGN_WIDTH: f64 = 0.004;

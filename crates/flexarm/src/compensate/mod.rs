@@ -9,13 +9,12 @@ mod page;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-pub use flexarm_compensate::{
-    Inversion, InversionError, Node, Shaper, ShaperKind, StaticTargets, TargetError, static_targets,
-};
+pub use flexarm_analysis::{Inversion, InversionError, Node, Shaper, ShaperKind};
 use flexarm_files::{check_free, write_all};
 use flexarm_flexlink::GearStiffness;
 use flexarm_kinematics::{Data, Pose, Wrench, forward_kinematics, rotation_vector};
 use flexarm_stepping::{Held, linearise};
+pub use flexarm_stepping::{StaticTargets, TargetError, static_targets};
 use flexarm_trajectory::{JointKnots, Trajectory};
 use nalgebra::{DMatrix, DVector, Quaternion, Rotation3, Translation3, UnitQuaternion};
 use rayon::prelude::*;

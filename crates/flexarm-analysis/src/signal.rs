@@ -1,4 +1,4 @@
-//! Signals of recordings: a low-pass without phase, derivatives, least squares. Uniform samples.
+//! Signals: a low-pass without phase, derivatives, delays, linear least squares. Uniform samples.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -11,15 +11,17 @@ struct Section {
 
 /// Butterworth's low-pass of fourth order, run forwards and backwards: no phase, the gain of one pass squared.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct LowPass {
+pub struct LowPass {
     sections: [Section; 2],
     /// Samples by which a signal is continued at both ends, turned about its last value.
     reach: usize,
 }
 
 impl LowPass {
+    /// The filter for a rate of samples.
+    ///
     /// * `cut_hz`: where one pass has 3 dB less. * `rate_hz`: samples a second.
-    pub(super) fn new(cut_hz: f64, rate_hz: f64) -> Self {
+    pub fn new(cut_hz: f64, rate_hz: f64) -> Self {
         let k = (std::f64::consts::PI * cut_hz / rate_hz).tan();
         let section = |angle: f64| {
             let inverse_q = 2.0 * angle.cos();
@@ -32,7 +34,7 @@ impl LowPass {
     }
 
     /// The signal without what is faster.
-    pub(super) fn of(&self, x: &[f64]) -> Vec<f64> {
+    pub fn of(&self, x: &[f64]) -> Vec<f64> {
         let (n, reach) = (x.len(), self.reach.min(x.len().saturating_sub(1)));
         if n == 0 {
             return Vec::new();
@@ -64,7 +66,7 @@ impl Section {
 }
 
 /// Central differences, one-sided at the ends.
-pub(super) fn derivative(x: &[f64], step_s: f64) -> Vec<f64> {
+pub fn derivative(x: &[f64], step_s: f64) -> Vec<f64> {
     let n = x.len();
     let at = |i: usize| {
         let (low, high) = (i.saturating_sub(1), (i + 1).min(n - 1));
@@ -74,7 +76,7 @@ pub(super) fn derivative(x: &[f64], step_s: f64) -> Vec<f64> {
 }
 
 /// The signal so much later (s), straight between samples and constant before the first.
-pub(super) fn delayed(x: &[f64], by_s: f64, step_s: f64) -> Vec<f64> {
+pub fn delayed(x: &[f64], by_s: f64, step_s: f64) -> Vec<f64> {
     let at = |i: usize| {
         let place = (i as f64 - by_s / step_s).clamp(0.0, (x.len() - 1) as f64);
         let (k, part) = (place.floor() as usize, place.fract());
@@ -84,7 +86,7 @@ pub(super) fn delayed(x: &[f64], by_s: f64, step_s: f64) -> Vec<f64> {
 }
 
 /// Root of the mean square; no number of nothing.
-pub(super) fn rms(x: impl Iterator<Item = f64>) -> f64 {
+pub fn rms(x: impl Iterator<Item = f64>) -> f64 {
     let (mut sum, mut n) = (0.0, 0usize);
     for x in x {
         sum += x * x;
@@ -94,7 +96,7 @@ pub(super) fn rms(x: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// Factors of the columns whose sum is nearest to `y`; columns are scaled to one size first.
-pub(super) fn least_squares(columns: &[Vec<f64>], y: &[f64]) -> Option<Vec<f64>> {
+pub fn least_squares(columns: &[Vec<f64>], y: &[f64]) -> Option<Vec<f64>> {
     let size = |column: &Vec<f64>| column.iter().map(|x| x * x).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
     let sizes: Vec<f64> = columns.iter().map(size).collect();
     let X = DMatrix::from_fn(y.len(), columns.len(), |i, j| columns[j][i] / sizes[j]);
@@ -103,7 +105,7 @@ pub(super) fn least_squares(columns: &[Vec<f64>], y: &[f64]) -> Option<Vec<f64>>
 }
 
 /// `y` less the sum of the columns with their factors.
-pub(super) fn rest(columns: &[Vec<f64>], factors: &[f64], y: &[f64]) -> Vec<f64> {
+pub fn rest(columns: &[Vec<f64>], factors: &[f64], y: &[f64]) -> Vec<f64> {
     let sum = |i: usize| columns.iter().zip(factors).map(|(column, factor)| factor * column[i]).sum::<f64>();
     y.iter().enumerate().map(|(i, y)| y - sum(i)).collect()
 }

@@ -3,8 +3,12 @@
 use std::sync::Arc;
 
 use flexarm_kinematics::{Data, Frame, Pose, Wrench, forward_kinematics, rotation_vector};
-use flexarm_stepping::{FlexibleArm, Held, StepError, linearise};
 use nalgebra::{DMatrix, DVector, Vector6};
+
+use crate::arm::FlexibleArm;
+use crate::error::StepError;
+use crate::linear::linearise;
+use crate::motion::Held;
 
 /// Accepted distance of the tool (m, rad).
 const TOLERANCE: f64 = 1e-12;
@@ -96,7 +100,7 @@ pub fn static_targets(
 }
 
 /// The tool of the rigid arm: every elastic coordinate at zero.
-pub(crate) fn rigid_pose(arm: &FlexibleArm, tool: &Frame, q: &[f64]) -> Pose {
+fn rigid_pose(arm: &FlexibleArm, tool: &Frame, q: &[f64]) -> Pose {
     let mut all = DVector::zeros(arm.model.nv());
     all.rows_mut(0, q.len()).copy_from_slice(q);
     let mut data = Data::new(&arm.model);
@@ -105,7 +109,7 @@ pub(crate) fn rigid_pose(arm: &FlexibleArm, tool: &Frame, q: &[f64]) -> Pose {
 }
 
 /// From a pose to another: position, then rotation vector, world axes.
-pub(crate) fn displacement(from: &Pose, to: &Pose) -> Vector6<f64> {
+fn displacement(from: &Pose, to: &Pose) -> Vector6<f64> {
     let p = to.translation.vector - from.translation.vector;
     let r = rotation_vector((to.rotation * from.rotation.inverse()).matrix());
     Vector6::new(p.x, p.y, p.z, r.x, r.y, r.z)

@@ -14,6 +14,8 @@
 
 use nalgebra::{Complex, DMatrix};
 
+use crate::signal::LowPass;
+
 /// The arm linearised at a time of its motion; world axes at the tool, components that count only.
 ///
 /// As `Linear` of `flexarm-stepping`: n free coordinates, m commands, k components of the tool.
@@ -241,49 +243,12 @@ fn filtered(y: &DMatrix<f64>, step_s: f64, cutoff_hz: f64) -> (DMatrix<f64>, usi
     if cutoff_hz >= 0.45 * 0.5 / step_s {
         return (out, pad);
     }
-    let sections =
-        [0.541_196_100_146_197, 1.306_562_964_876_377].map(|quality| Biquad::low_pass(cutoff_hz * step_s, quality));
+    let low = LowPass::new(cutoff_hz, 1.0 / step_s);
     for mut row in out.row_iter_mut() {
-        let mut curve: Vec<f64> = row.iter().copied().collect();
-        for _ in 0..2 {
-            for section in &sections {
-                section.run(&mut curve);
-            }
-            curve.reverse();
-        }
-        row.iter_mut().zip(&curve).for_each(|(to, x)| *to = *x);
+        let curve: Vec<f64> = row.iter().copied().collect();
+        row.iter_mut().zip(low.of(&curve)).for_each(|(to, x)| *to = x);
     }
     (out, pad)
-}
-
-/// A section of second order.
-#[derive(Clone, Copy, Debug)]
-struct Biquad {
-    b: [f64; 3],
-    a: [f64; 2],
-}
-
-impl Biquad {
-    /// Low pass by the bilinear rule; `cutoff` over the sampling frequency.
-    fn low_pass(cutoff: f64, quality: f64) -> Self {
-        let w = (std::f64::consts::PI * cutoff).tan();
-        let norm = 1.0 / (1.0 + w / quality + w * w);
-        let b = w * w * norm;
-        Self { b: [b, 2.0 * b, b], a: [2.0 * (w * w - 1.0) * norm, (1.0 - w / quality + w * w) * norm] }
-    }
-
-    /// Begins as if the first value had been there for ever.
-    fn run(&self, curve: &mut [f64]) {
-        let Some(&first) = curve.first() else { return };
-        let ([b0, b1, b2], [a1, a2]) = (self.b, self.a);
-        let (mut x1, mut x2, mut y1, mut y2) = (first, first, first, first);
-        for value in curve {
-            let x = *value;
-            let y = b0 * x + b1 * x1 + b2 * x2 - a1 * y1 - a2 * y2;
-            (x2, x1, y2, y1) = (x1, x, y1, y);
-            *value = y;
-        }
-    }
 }
 
 #[cfg(test)]
