@@ -10,6 +10,7 @@ use crate::convert::ConvertArgs;
 use crate::exchange_args::{ExportArgs, ImportArgs};
 use crate::formats;
 use crate::motion::{MotionArgs, MotionInputArgs};
+use crate::new::NewArgs;
 use crate::posed_args::{ModesArgs, ResponseArgs, StaticsArgs};
 use crate::reduce_args::ReduceArgs;
 use crate::report::ReportArgs;
@@ -42,6 +43,8 @@ pub(crate) enum Command {
     Inspect(InspectArgs),
     /// Look for everything that is wrong with a robot and a trajectory
     Check(CheckArgs),
+    /// Make a robot file, a sample motion and the first run of a URDF or xacro file
+    New(Box<NewArgs>),
     /// Show what is in a motion, against the limits of a robot, and write it in other formats
     Motion(MotionArgs),
     /// Equilibrium under weight and load at a pose, and the compliance of the TCP

@@ -9,6 +9,7 @@ mod failure;
 mod flags;
 mod formats;
 mod motion;
+mod new;
 mod posed;
 mod posed_args;
 mod print;
@@ -76,6 +77,7 @@ fn run(cli: &Cli) -> Result<ExitCode, Failure> {
         Command::Inspect(args) => inspect(cli, args),
         Command::Check(args) => check(cli, args),
         Command::Motion(args) => motion::run(cli, args),
+        Command::New(args) => new::run(cli, args),
         Command::Statics(args) => posed::statics(cli, args),
         Command::Modes(args) => posed::modes(cli, args),
         Command::Response(args) => posed::response(cli, args),
