@@ -118,12 +118,7 @@ pub(crate) fn run(cli: &Cli, args: &NewArgs) -> Result<ExitCode, Failure> {
 fn first_run(cli: &Cli, made: &NewRobot, folder: &Path, overwrite: bool) -> Result<Summary, Failure> {
     let robot = Robot::load(&made.robot)?;
     let motion = Motion::load(&made.motion, &robot)?;
-    let options = RunOptions {
-        // Limits of effort that no motion keeps are told beforehand.
-        ignore_limits: !made.violations.is_empty(),
-        with_twin: true,
-        ..RunOptions::default()
-    };
+    let options = RunOptions::default();
     let outputs = Outputs { overwrite, ..Outputs::everything(folder.join("first_run")) };
     let mut stop = signals::stop_when_asked();
     let mut bar = Bar::new(cli);

@@ -11,10 +11,14 @@ use serde::Serialize;
 const CUTS: usize = 48;
 /// Places along the beam at which bending is looked at.
 const STATIONS: usize = 40;
-/// Part of the line between the joints that the mesh must surround.
-const SURROUNDED: f64 = 0.7;
-/// Part of the cuts' area that the line passes at least within, counted in widths of the section.
-const BESIDE: f64 = 0.75;
+/// Part of the way between the joints along which there must be a shape, around the line or beside it.
+const ALONG: f64 = 0.75;
+/// The shape lies beside the line between the joints by this part of its length at most.
+const BESIDE: f64 = 0.45;
+/// Outlines of a beam vary by this factor at most.
+const TAPER: f64 = 3.5;
+/// Part of a link's mass that its beam has at least: the rest is housings at its ends.
+const OWN: f64 = 0.2;
 /// A beam is longer than its section is thick, by this factor.
 const SLENDER: f64 = 1.2;
 /// A beam is at least this part of the arm's length.
@@ -73,12 +77,16 @@ pub(crate) fn propose(link: &Candidate<'_>) -> Result<BeamSection, String> {
         return Err("it has no shape that can be read".into());
     }
     let cuts = Cuts::of(link.meshes, &axis)?;
-    let inside = cuts.surrounded(length);
-    if inside < SURROUNDED {
+    let along = cuts.along(length);
+    let aside = cuts.centroid(length).norm();
+    if along < ALONG || aside > BESIDE * length {
+        let where_is_it = if along < ALONG {
+            format!("is there along {:.0} % of the way only", 100.0 * along)
+        } else {
+            format!("lies {:.0} mm beside it", 1e3 * aside)
+        };
         return Err(format!(
-            "its shape surrounds only {:.0} % of the line from its frame to joint {:?}: the frames of the file do not run along \
-             the link",
-            100.0 * inside,
+            "from its frame to joint {:?} its shape {where_is_it}: the frames of the file do not run along the link",
             link.distal.name
         ));
     }
@@ -92,7 +100,15 @@ pub(crate) fn propose(link: &Candidate<'_>) -> Result<BeamSection, String> {
     let (material, wall) = wall(&outlines, shape, inertia.mass)?;
     let mut section = equivalent(&outlines, shape, length, wall);
     section.material = material;
+    if section.taper > TAPER {
+        return Err(format!("its width varies by a factor of {:.1} between the joints: no beam", section.taper));
+    }
     let density = MATERIALS.iter().find(|m| m.0 == material).map_or(2700.0, |m| m.1);
+    let whole = shell(&outlines, shape, wall);
+    let own = shell_between(&outlines, shape, length, wall);
+    if own < OWN * whole {
+        return Err(format!("only {:.0} % of its mass lies between the joints", 100.0 * own / whole));
+    }
     section.wall_of_half = section.wall.and_then(|_| wall_for(&outlines, shape, 0.5 * inertia.mass / density));
     let R_LS = cuts.X_LS.rotation * Rotation3::from_axis_angle(&Vector3::x_axis(), turn);
     section.y_axis = (R_LS * Vector3::y()).into();
@@ -159,14 +175,10 @@ impl Cuts {
         self.found().filter(move |(x, _)| (0.0..=length).contains(x))
     }
 
-    /// Part of the line between the joints with an outline around it, or close beside it.
-    fn surrounded(&self, length: f64) -> f64 {
+    /// Part of the way between the joints with an outline.
+    fn along(&self, length: f64) -> f64 {
         let step = self.sections[1].0 - self.sections[0].0;
-        let near = |s: &CrossSection| {
-            let size = (s.second_moments.trace() / s.area).sqrt();
-            s.centroid.norm() * BESIDE < 2.0 * size
-        };
-        self.within(length).filter(|(_, s)| near(s)).count() as f64 * step / length
+        (self.within(length).count() as f64 * step / length).min(1.0)
     }
 
     fn open(&self) -> f64 {
@@ -276,6 +288,15 @@ fn shell(outlines: &[Outline], shape: Shape, wall: f64) -> f64 {
         filled * (o.width * o.height - inner)
     };
     outlines.iter().map(|o| area(o) * o.step).sum()
+}
+
+/// The same between the joints only.
+fn shell_between(outlines: &[Outline], shape: Shape, length: f64, wall: f64) -> f64 {
+    let piece = |(x, _): (f64, f64)| {
+        let [width, height] = outline_at(outlines, x);
+        shell(&[Outline { x, step: length / STATIONS as f64, width, height }], shape, wall)
+    };
+    stations(length).map(piece).sum()
 }
 
 /// Thickness of the shell that has this volume; `None` if a solid body has less.

@@ -22,8 +22,10 @@ const TOOLS: [&str; 12] = [
     "ee",
     "gripper_frame_link",
 ];
-/// Words in the names of joints or links that belong to a hand.
-const HAND: [&str; 9] = ["finger", "thumb", "gripper", "jaw", "knuckle", "claw", "grasp", "hand_", "palm"];
+/// Words in the names of joints that belong to a hand.
+const HAND: [&str; 8] = ["finger", "thumb", "gripper", "jaw", "knuckle", "claw", "grasp", "palm"];
+/// Words in the names of links that are fingers.
+const FINGER: [&str; 5] = ["finger", "thumb", "jaw", "knuckle", "claw"];
 /// Words of chains that are no arms.
 const NO_ARM: [&str; 12] =
     ["leg", "ankle", "foot", "toe", "wheel", "knee", "hip", "head", "neck", "camera", "caster", "sole"];
@@ -177,10 +179,10 @@ fn named_joints(mechanism: &Mechanism, names: &[String]) -> Result<Vec<usize>, N
     Ok(joints)
 }
 
-/// Whether a joint is one of a hand: by its name, its link's name.
+/// Whether a joint is one of a hand: by its name, or because it moves a finger. The body of a gripper may turn with the arm.
 fn is_of_hand(joint: &Joint) -> bool {
-    let names = [joint.name.to_lowercase(), joint.child.to_lowercase()];
-    HAND.iter().any(|word| names.iter().any(|name| name.contains(word)))
+    let (name, child) = (joint.name.to_lowercase(), joint.child.to_lowercase());
+    HAND.iter().any(|word| name.contains(word)) || FINGER.iter().any(|word| child.contains(word))
 }
 
 /// A chain that may be the arm.

@@ -56,6 +56,8 @@ pub(crate) struct Draft {
     pub(crate) chain: Chain,
     pub(crate) waived: Vec<String>,
     pub(crate) estimate: Option<flexarm_urdf::InertiaEstimate>,
+    /// Masses were to be estimated, but no link lacks one.
+    pub(crate) idle_estimate: bool,
     pub(crate) moving_mass: f64,
     /// Largest distance of the tool from the base in the poses looked at (m).
     pub(crate) reach: f64,
@@ -107,15 +109,18 @@ impl Draft {
         let model = model((payload.mass > 0.0).then_some(payload))?;
         let workspace = Workspace::of(&model, &ranges);
         let reach = reach(&model, &workspace, mechanism, &chain);
-        let joints = joints(&model, mechanism, &chain, &workspace);
+        let floor = loads::wrist_torque(payload.mass, moving_mass, reach);
+        let joints = joints(&model, mechanism, &chain, &workspace, floor);
         let axes: Vec<Axis> = joints.iter().filter_map(|j| axis(j, &model, &ranges)).collect();
         let motion = sample::sample_motion(&model, &workspace, &axes);
         let links = links(&urdf, &chain);
+        let estimated = urdf.warnings.iter().any(|w| w.code == "estimated-inertia");
         let mut draft = Self {
             name,
             chain,
             waived,
-            estimate: options.urdf.inertia_from_mesh,
+            estimate: options.urdf.inertia_from_mesh.filter(|_| estimated),
+            idle_estimate: options.urdf.inertia_from_mesh.is_some() && !estimated,
             moving_mass,
             reach,
             payload,
@@ -234,31 +239,50 @@ fn reach(model: &Model, workspace: &Workspace, mechanism: &Mechanism, chain: &Ch
     workspace.poses.iter().map(|pose| distance(&pose.q, &pose.tool, &mut data)).fold(0.0, f64::max)
 }
 
-fn joints(model: &Model, mechanism: &Mechanism, chain: &Chain, workspace: &Workspace) -> Vec<DraftJoint> {
+/// * `floor`: torque that a joint of this arm has at least (N m).
+fn joints(model: &Model, mechanism: &Mechanism, chain: &Chain, workspace: &Workspace, floor: f64) -> Vec<DraftJoint> {
     let of = |&place: &usize| {
         let joint = &mechanism.joints[place];
         let k = model.coordinates().iter().position(|c| c.joint == joint.name)?;
         let (speed, speed_assumed) = sample::speed_of(joint);
         let weight = workspace.weight[k];
         let needed = workspace.needed(k, speed.min(4.0));
-        let effort_fault = loads::effort_fault(joint.limits.effort, weight, needed);
-        let peak = if effort_fault.is_none() { joint.limits.effort } else { needed };
-        let rated = (peak / gears::PEAK_OVER_RATED).max(if effort_fault.is_none() { 0.0 } else { weight / 1.5 });
-        let gear = (!joint.kind.slides() && rated > 1e-3).then(|| gears::class(rated));
-        Some(DraftJoint { joint: joint.clone(), speed, speed_assumed, effort_fault, weight, needed, rated, gear })
+        let effort_fault = loads::effort_fault(joint.limits.effort, weight, needed, floor);
+        let joint = joint.clone();
+        Some(DraftJoint { joint, speed, speed_assumed, effort_fault, weight, needed, rated: 0.0, gear: None })
     };
-    chain.joints.iter().filter_map(of).collect()
+    let mut joints: Vec<DraftJoint> = chain.joints.iter().filter_map(of).collect();
+    // One number for all that is too weak for some was never meant.
+    let same = |j: &DraftJoint| j.joint.limits.effort == joints[0].joint.limits.effort;
+    let weak = |j: &DraftJoint| j.joint.limits.effort < j.weight;
+    if joints.len() > 2 && joints.iter().all(same) && joints.iter().any(weak) {
+        let fault = "is the same for all joints and below what the arm needs to hold itself";
+        joints.iter_mut().for_each(|j| j.effort_fault = Some(fault));
+    }
+    for joint in &mut joints {
+        joint.rated = match joint.effort_fault {
+            None => joint.joint.limits.effort / gears::PEAK_OVER_RATED,
+            // Weight may last, speeding up does not.
+            Some(_) => (joint.needed / gears::PEAK_OVER_RATED).max(joint.weight.max(floor) / 1.5),
+        };
+        joint.gear = (!joint.joint.kind.slides() && joint.rated > 1e-6).then(|| gears::class(joint.rated));
+    }
+    joints
 }
 
 fn axis(joint: &DraftJoint, model: &Model, ranges: &[[f64; 2]]) -> Option<Axis> {
     let k = model.coordinates().iter().position(|c| c.joint == joint.joint.name)?;
-    let limit = joint.joint.limits.effort;
+    let full = ranges[k];
+    // What is not crossed within some seconds is not crossed.
+    let (middle, half) =
+        (0.5 * (full[0] + full[1]), (0.5 * (full[1] - full[0])).min(sample::LONGEST_WAY * joint.speed));
     Some(Axis {
         k,
         slides: joint.joint.kind.slides(),
-        range: ranges[k],
+        full,
+        range: [middle - half, middle + half],
         speed: joint.speed,
-        effort: if limit < joint.weight { f64::INFINITY } else { limit },
+        effort: if joint.effort_fault.is_some() { f64::INFINITY } else { joint.joint.limits.effort },
     })
 }
 
@@ -324,9 +348,13 @@ fn assumptions(draft: &Draft) -> Vec<Assumption> {
         list.push(assumption(&format!("link {link:?}"), text.into(), "correct them in the description"));
     }
     masses(draft, &mut list);
+    if !draft.payload_known && draft.payload.mass == 0.0 {
+        let text = "none: the effort limits leave no room for one".to_owned();
+        list.push(assumption("payload", text, "--payload KG, or payload in robot.toml"));
+    }
     if !draft.payload_known && draft.payload.mass > 0.0 {
         let text = format!(
-            "{} kg, about 15 % of what moves ({:.1} kg), a cube of aluminium at the tool",
+            "{} kg, at most 15 % of what moves ({:.1} kg) and what the effort limits carry, a cube of aluminium at the tool",
             draft.payload.mass, draft.moving_mass
         );
         list.push(assumption("payload", text, "--payload KG, or payload in robot.toml"));
@@ -372,10 +400,12 @@ fn assumptions(draft: &Draft) -> Vec<Assumption> {
 
 /// Masses that look like no masses of this arm.
 fn masses(draft: &Draft, list: &mut Vec<Assumption>) {
+    let own: f64 = draft.urdf.mechanism.links.iter().filter_map(|l| l.inertia).map(|i| i.mass).sum();
     match draft.estimate {
         Some(flexarm_urdf::InertiaEstimate::TotalMass(mass)) => {
-            let text =
-                format!("links without <inertial> have {mass} kg together, spread by the volume of their meshes");
+            let text = format!(
+                "links without <inertial> have {mass} kg together, spread by the volume of their meshes; all links together {own:.1} kg"
+            );
             list.push(assumption("masses", text, "replace by those of the maker"));
         }
         Some(flexarm_urdf::InertiaEstimate::Density(density)) => {
@@ -383,6 +413,16 @@ fn masses(draft: &Draft, list: &mut Vec<Assumption>) {
             list.push(assumption("masses", text, "replace by those of the maker"));
         }
         None => {}
+    }
+    if draft.idle_estimate {
+        let text = format!(
+            "no link lacks a mass, so none was estimated: those of the description count, {own:.1} kg together"
+        );
+        list.push(assumption(
+            "masses",
+            text,
+            "take <inertial> out of the description if its masses are not to be trusted",
+        ));
     }
     let with: Vec<f64> =
         draft.urdf.mechanism.links.iter().filter_map(|l| l.inertia).map(|i| i.mass).filter(|m| *m > 0.0).collect();

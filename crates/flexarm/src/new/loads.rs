@@ -136,17 +136,25 @@ impl Workspace {
     }
 }
 
-/// Whether an effort limit says something of the drive; what it lacks in words.
-pub(crate) fn effort_fault(effort: f64, weight: f64, needed: f64) -> Option<&'static str> {
+/// What is wrong with an effort limit, in words.
+///
+/// * `floor`: what a joint of this arm has at least.
+pub(crate) fn effort_fault(effort: f64, weight: f64, needed: f64, floor: f64) -> Option<&'static str> {
     if !effort.is_finite() {
         Some("has none")
     } else if effort < weight {
         Some("is below what the arm needs to hold itself")
-    } else if effort > SENSELESS * needed.max(1e-3) {
+    } else if effort > SENSELESS * needed.max(floor) {
         Some("is far above what the arm can need")
     } else {
         None
     }
+}
+
+/// Torque of a payload that sits a fifth of the reach beside an axis (N m): wrists are made for so much. Where nothing is
+/// carried, for a twentieth of the mass that moves.
+pub(crate) fn wrist_torque(payload: f64, moving_mass: f64, reach: f64) -> f64 {
+    9.81 * payload.max(0.05 * moving_mass) * 0.2 * reach
 }
 
 /// A payload from the arm's own mass, rounded to a number that data sheets have, and no more than the effort limits carry.

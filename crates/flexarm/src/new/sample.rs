@@ -15,6 +15,8 @@ const WEIGHT: f64 = 0.7;
 const FASTEST: f64 = 2.5;
 /// Peaks of a quintic over the mean: speed 15/8 D/T, acceleration 10/√3 D/T².
 const PEAKS: [f64; 2] = [1.875, 5.773_502_691_896_258];
+/// Half of the way that a joint takes at most, over its speed limit (s): 8 s at 60 % of it.
+pub(crate) const LONGEST_WAY: f64 = 1.28;
 /// Goals beside the start.
 const GOALS: usize = 4;
 
@@ -24,7 +26,9 @@ pub(crate) struct Axis {
     /// Its coordinate.
     pub(crate) k: usize,
     pub(crate) slides: bool,
-    /// Position limits, as `loads::range` narrows them.
+    /// Range in which the workspace was looked at.
+    pub(crate) full: [f64; 2],
+    /// What of it the motion uses: the same middle, less where the joint is slow.
     pub(crate) range: [f64; 2],
     /// Speed limit, or what is assumed (rad/s, m/s).
     pub(crate) speed: f64,
@@ -77,9 +81,9 @@ pub(crate) fn sample_motion(model: &Model, workspace: &Workspace, axes: &[Axis])
     let inner = |pose: &Posed| {
         let mut q = pose.q.clone();
         for axis in axes {
+            let part = (q[axis.k] - axis.full[0]) / (axis.full[1] - axis.full[0]);
             let [low, high] = axis.range;
-            let middle = 0.5 * (low + high);
-            q[axis.k] = rounded(axis, middle + 0.8 * (q[axis.k] - middle));
+            q[axis.k] = rounded(axis, 0.5 * (low + high) + 0.8 * (part - 0.5) * (high - low));
         }
         q
     };

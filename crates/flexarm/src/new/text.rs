@@ -17,13 +17,9 @@ fn inline(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
 }
 
-/// A number with three digits that count.
+/// A number with three digits that count, as the decimal nearest to them.
 pub(crate) fn three_digits(value: f64) -> f64 {
-    if value == 0.0 || !value.is_finite() {
-        return value;
-    }
-    let scale = 10f64.powf(2.0 - value.abs().log10().floor());
-    (value * scale).round() / scale
+    format!("{value:.2e}").parse().unwrap_or(value)
 }
 
 /// A length to a hundredth of a millimetre, a direction to six digits, as TOML writes floats.
