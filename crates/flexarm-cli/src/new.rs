@@ -126,7 +126,7 @@ fn first_run(cli: &Cli, made: &NewRobot, folder: &Path, overwrite: bool) -> Resu
         bar.show(t, total);
         stop()
     };
-    let result = flexarm::simulate(&robot, &Scenario::from(&motion), &options, Some(&outputs), &mut progress);
+    let result = flexarm::simulate(&robot, Scenario::from(&motion), &options, Some(&outputs), &mut progress);
     bar.clear();
     Ok(result?)
 }

@@ -269,7 +269,6 @@ mod tests {
             section.perimeter / (2.0 * (b + h)) - 1.0,
             section.centroid.norm(),
         ];
-        println!("box: errors {errors:?}, bound 3e-6");
         assert!(errors.iter().all(|e| e.abs() < 3e-6), "{errors:?}");
         assert!(section.is_closed);
     }

@@ -172,7 +172,7 @@ pub(crate) fn guessed_payload(mass: f64, joints: &[(f64, f64, f64)]) -> f64 {
 
 /// 1, 1.5, 2, 3, 5, 7 and powers of ten.
 fn rounded_down(value: f64) -> f64 {
-    if !(value > 1e-3) {
+    if value < 1e-3 {
         return 0.0;
     }
     let power = 10f64.powf(value.log10().floor());
