@@ -48,6 +48,7 @@ mod beam_entry;
 mod bends;
 mod caveat;
 mod check;
+mod controller_entry;
 mod convert;
 mod deflections;
 mod drive_entry;

@@ -10,6 +10,7 @@ use toml::Spanned;
 
 use crate::balancer_entry::add_balancers;
 use crate::caveat::{self, Caveat};
+use crate::controller_entry::{RobotAxis, controller_axes};
 use crate::drive_entry::{Drive, drives};
 use crate::error::Error;
 use crate::flexible::RobotLink;
@@ -55,6 +56,8 @@ pub struct Robot {
     pub hold: Vec<(String, f64)>,
     /// Things worth telling.
     pub warnings: Vec<String>,
+    /// Axes that its controller counts otherwise than the joints.
+    pub(crate) controller: Vec<RobotAxis>,
     /// What only the text of the file shows.
     written: Vec<Caveat>,
 }
@@ -105,6 +108,7 @@ impl Robot {
             default_trajectory: None,
             hold: Vec::new(),
             warnings: Vec::new(),
+            controller: Vec::new(),
             written: Vec::new(),
         };
         robot.finish(None)?;
@@ -174,6 +178,7 @@ impl Robot {
             default_trajectory: file.default_trajectory.as_ref().map(|t| folder.join(t.get_ref())),
             hold: Vec::new(),
             warnings: Vec::new(),
+            controller: Vec::new(),
             written: written_caveats(file),
         };
         for (joint, value) in &file.hold {
@@ -191,6 +196,7 @@ impl Robot {
                 joint.armature = drive.armature;
             }
         }
+        robot.controller = controller_axes(&file.controller_axis, &robot.rigid, source, &mut faults);
         add_balancers(&mut robot, &file.balancer, source, &mut faults);
         for entry in &file.flexible_link {
             let urdf = &robot.urdf.mechanism;
