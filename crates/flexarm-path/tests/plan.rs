@@ -468,7 +468,6 @@ fn an_arm_with_other_zeros_and_senses_runs_a_program_as_the_arm_whose_joints_are
         off = off.max((X[0].translation.vector - X[1].translation.vector).norm());
         off = off.max((X[0].rotation.inverse() * X[1].rotation).scaled_axis().norm());
     }
-    println!("largest distance of both tools {off:.1e} m or rad, bound 1e-6");
     assert!(off < 1e-6, "{off:.1e}");
     // The end, by its turns, is the one that was meant.
     let mut end = [0.0; 6];

@@ -1,5 +1,6 @@
 //! `new_robot`: what it makes of descriptions can be loaded, moved along and checked, whatever the description lacks.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
+#![allow(clippy::print_stdout, reason = "the measured error stands beside its bound")]
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};

@@ -157,7 +157,7 @@ fn keys(sources: &[&str]) -> BTreeMap<String, BTreeSet<String>> {
     found
 }
 
-const ROBOT: [&str; 5] = [
+const ROBOT: [&str; 6] = [
     "crates/flexarm/src/robot_file.rs",
     "crates/flexarm/src/balancer_entry.rs",
     "crates/flexarm/src/controller_entry.rs",
