@@ -571,6 +571,38 @@ def coordinate(rows):
 
 # ------------------------------------------------------------------------------------------------------------------- targets
 
+NEW_ARM = """<?xml version="1.0"?>
+<robot name="arm">
+  <link name="base"/>
+  <link name="upper">
+    <inertial><origin xyz="0.3 0 0"/><mass value="9.0"/><inertia ixx="0.03" iyy="0.3" izz="0.3" ixy="0" ixz="0" iyz="0"/></inertial>
+    <visual><geometry><mesh filename="link.stl"/></geometry></visual>
+  </link>
+  <link name="fore">
+    <inertial><origin xyz="0.2 0 0"/><mass value="4.0"/><inertia ixx="0.01" iyy="0.08" izz="0.08" ixy="0" ixz="0" iyz="0"/></inertial>
+    <collision><origin xyz="0.25 0 0" rpy="0 1.5708 0"/><geometry><cylinder radius="0.05" length="0.5"/></geometry></collision>
+  </link>
+  <link name="tool0"/>
+  <link name="finger"/>
+  <joint name="a1" type="revolute"><parent link="base"/><child link="upper"/><origin xyz="0 0 0.4"/><axis xyz="0 1 0"/>
+    <limit lower="-2.5" upper="1.5" effort="300" velocity="2"/></joint>
+  <joint name="a2" type="continuous"><parent link="upper"/><child link="fore"/><origin xyz="0.6 0 0"/><axis xyz="0 1 0"/></joint>
+  <joint name="flange" type="fixed"><parent link="fore"/><child link="tool0"/><origin xyz="0.5 0 0"/></joint>
+  <joint name="grip" type="prismatic"><parent link="tool0"/><child link="finger"/><axis xyz="0 1 0"/>
+    <limit lower="0.01" upper="0.04" effort="20" velocity="0.1"/></joint>
+</robot>
+"""
+
+
+def box_stl(length, width, height):
+    """A box from x = 0 on, as binary STL."""
+    corner = lambda k: (length * (k & 1), width * ((k >> 1 & 1) - 0.5), height * ((k >> 2 & 1) - 0.5))
+    faces = [(0, 4, 6, 2), (1, 3, 7, 5), (0, 1, 5, 4), (2, 6, 7, 3), (0, 2, 3, 1), (4, 5, 7, 6)]
+    triangles = [t for a, b, c, d in faces for t in ((a, b, c), (a, c, d))]
+    pack = lambda t: struct.pack("<12fH", 0.0, 0.0, 0.0, *(x for k in t for x in corner(k)), 0)
+    return b"box".ljust(80) + struct.pack("<I", len(triangles)) + b"".join(map(pack, triangles))
+
+
 class Target:
     """A sound file to change, the files beside it, and the commands that read it."""
 
@@ -603,6 +635,9 @@ def own_targets():
         Target("robot-balancers", "robot.toml", {**base, "robot.toml": ROBOT + BALANCERS}, [check, COMPARE, ["statics", "robot.toml", "--json"], ["inspect", "robot.toml", "--json"]], True),
         Target("urdf", "beam.urdf", base, [["check", "beam.urdf", "--json"], ["inspect", "beam.urdf", "--json"], check, COMPARE], True),
         Target("xacro", "arm.xacro", {"arm.xacro": XACRO}, [["check", "arm.xacro", "--json"], ["inspect", "arm.xacro", "--json"]]),
+        Target("new-urdf", "arm.urdf", {"arm.urdf": NEW_ARM, "link.stl": box_stl(0.6, 0.12, 0.1)}, [["new", "arm.urdf", "-o", "made", "--force", "--no-run", "--json"], ["new", "arm.urdf", "-o", "made", "--force", "--no-run", "--mass", "60", "--payload", "5", "--json"]]),
+        Target("new-mesh", "link.stl", {"arm.urdf": NEW_ARM, "link.stl": box_stl(0.6, 0.12, 0.1)}, [["new", "arm.urdf", "-o", "made", "--force", "--no-run", "--json"]]),
+        Target("new-xacro", "arm.xacro", {"arm.xacro": XACRO}, [["new", "arm.xacro", "-o", "made", "--force", "--no-run", "--mass", "20", "--json"]]),
         Target("motion-toml", "motion.toml", base, [check, COMPARE], True),
         Target("motion-csv", "motion.csv", base, [["check", "robot.toml", "motion.csv", "--json"], [w if w != "motion.toml" else "motion.csv" for w in COMPARE]], True),
         Target("motion-table", "trace.txt", {**base, "trace.txt": TRACE}, [["motion", "trace.txt", "robot.toml", "--json"], ["motion", "trace.txt", "--columns", "t=#1[ms],swing=A1[deg]", "--json"]]),

@@ -12,6 +12,7 @@ use crate::exchange_args::{ExportArgs, ImportArgs};
 use crate::formats;
 use crate::identify::IdentifyArgs;
 use crate::motion::{MotionArgs, MotionInputArgs};
+use crate::new::NewArgs;
 use crate::posed_args::{ModesArgs, ResponseArgs, StaticsArgs};
 use crate::reduce_args::ReduceArgs;
 use crate::report::ReportArgs;
@@ -44,6 +45,8 @@ pub(crate) enum Command {
     Inspect(InspectArgs),
     /// Look for everything that is wrong with a robot and a trajectory
     Check(CheckArgs),
+    /// Make a robot file, a sample motion and the first run of a URDF or xacro file
+    New(Box<NewArgs>),
     /// Show what is in a motion, against the limits of a robot, and write it in other formats
     Motion(MotionArgs),
     /// Find a robot's stiffness from measurements, and the poses that are worth measuring

@@ -11,6 +11,7 @@ mod flags;
 mod formats;
 mod identify;
 mod motion;
+mod new;
 mod posed;
 mod posed_args;
 mod print;
@@ -80,6 +81,7 @@ fn run(cli: &Cli) -> Result<ExitCode, Failure> {
         Command::Motion(args) => motion::run(cli, args),
         Command::Identify(args) => identify::run(cli, args),
         Command::Compensate(args) => compensate::run(cli, args),
+        Command::New(args) => new::run(cli, args),
         Command::Statics(args) => posed::statics(cli, args),
         Command::Modes(args) => posed::modes(cli, args),
         Command::Response(args) => posed::response(cli, args),

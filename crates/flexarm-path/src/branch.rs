@@ -10,6 +10,7 @@ use flexarm_kinematics::{
 use flexarm_spatial::Pose;
 use nalgebra::DVector;
 
+use crate::plan::ProgramArm;
 use crate::program::Configuration;
 
 /// Starts of the numerical search.
@@ -45,18 +46,19 @@ impl<'m> Branches<'m> {
         X: &Pose,
         configuration: &Configuration,
         q: &DVector<f64>,
-        axes: &[usize],
+        program_arm: &ProgramArm<'_>,
     ) -> Result<DVector<f64>, NoBranch> {
         let mut near = q.clone();
         if let Configuration::Near(values) = configuration {
-            for (value, &k) in values.iter().zip(axes) {
-                near[k] = *value;
-            }
+            program_arm.set_axes(values, &mut near);
         }
         let slot = self.arm_of(frame);
         match self.arms[slot].1.take() {
             Some(arm) => {
-                let chosen = self.in_closed_form(&arm, X, configuration, &near);
+                let chosen = {
+                    let counted = program_arm.controller_axes(*arm.joints());
+                    self.in_closed_form(&arm, &counted, X, configuration, &near)
+                };
                 self.arms[slot].1 = Some(arm);
                 chosen
             }
@@ -75,6 +77,7 @@ impl<'m> Branches<'m> {
     fn in_closed_form(
         &mut self,
         arm: &AnalyticArm,
+        counted: &ControllerAxes,
         X: &Pose,
         configuration: &Configuration,
         near: &DVector<f64>,
@@ -84,7 +87,7 @@ impl<'m> Branches<'m> {
         let mut solutions = std::mem::take(&mut self.solutions);
         arm.solve_near(X, &six, &mut solutions);
         let selection = selection(configuration);
-        let chosen = arm.choose(&solutions, &selection, &ControllerAxes::SAME, &six);
+        let chosen = arm.choose(&solutions, &selection, counted, &six);
         let answer = chosen.map(|chosen| {
             let mut q = near.clone();
             for (value, &k) in chosen.iter().zip(joints) {
@@ -92,7 +95,7 @@ impl<'m> Branches<'m> {
             }
             q
         });
-        let answer = answer.ok_or_else(|| NoBranch(why_none(arm, &solutions, &selection)));
+        let answer = answer.ok_or_else(|| NoBranch(why_none(arm, counted, &solutions, &selection)));
         self.solutions = solutions;
         answer
     }
@@ -128,7 +131,7 @@ fn selection(configuration: &Configuration) -> Selection {
 }
 
 /// Why no solution was chosen: out of reach, beyond the limits, or on another branch.
-fn why_none(arm: &AnalyticArm, solutions: &Solutions, selection: &Selection) -> String {
+fn why_none(arm: &AnalyticArm, counted: &ControllerAxes, solutions: &Solutions, selection: &Selection) -> String {
     if solutions.is_empty() {
         return match solutions.miss() {
             Some(miss) => format!(
@@ -149,11 +152,11 @@ fn why_none(arm: &AnalyticArm, solutions: &Solutions, selection: &Selection) -> 
     }
     let said = |q: &[f64; 6]| match selection {
         Selection::Kuka { .. } => {
-            let status = arm.kuka_status(q, &ControllerAxes::SAME)?;
-            Some(format!("S {status}, T {}", kuka_turn(q, &ControllerAxes::SAME)))
+            let status = arm.kuka_status(q, counted)?;
+            Some(format!("S {status}, T {}", kuka_turn(q, counted)))
         }
         Selection::Abb { .. } => {
-            let ([a, b, c], cfx) = arm.abb_configuration(q, &ControllerAxes::SAME)?;
+            let ([a, b, c], cfx) = arm.abb_configuration(q, counted)?;
             Some(format!("[{a}, {b}, {c}, {cfx}]"))
         }
         _ => None,

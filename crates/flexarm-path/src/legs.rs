@@ -205,9 +205,7 @@ impl<'m> Legs<'m> {
             return Err(PathError::Axes { line: of.line, statement: of.statement.clone(), found, axes });
         }
         let mut q = q.clone();
-        for (value, &k) in values.iter().zip(&self.arm.axes) {
-            q[k] = *value;
-        }
+        self.arm.set_axes(values, &mut q);
         Ok(q)
     }
 
@@ -217,7 +215,7 @@ impl<'m> Legs<'m> {
             Target::Joints(values) => self.with_axes(of, values, &start.q)?,
             Target::Pose { X_BT, configuration } => {
                 let X = self.arm.X_MW * of.X_WB * X_BT;
-                let choice = self.branches.choose(&frame, &X, configuration, &start.q, &self.arm.axes);
+                let choice = self.branches.choose(&frame, &X, configuration, &start.q, &self.arm);
                 choice.map_err(|NoBranch(why)| PathError::Unreachable {
                     line: of.line,
                     statement: of.statement.clone(),

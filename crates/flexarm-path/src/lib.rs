@@ -19,4 +19,6 @@ pub mod time_law;
 
 pub use curve::{ArcError, TURN_LENGTH, ToolCurve, ToolJet};
 pub use follow::{Blocked, Follower, JointJet, coordinates_of};
-pub use plan::{JointBounds, PathError, PathOptions, Planned, PlannedMove, ProgramArm, Slowed, SlowedBy, plan};
+pub use plan::{
+    ControllerAxis, JointBounds, PathError, PathOptions, Planned, PlannedMove, ProgramArm, Slowed, SlowedBy, plan,
+};

@@ -1,6 +1,6 @@
 //! From a program to joints over time: the public face of the planner, what it is told and what it tells.
 
-use flexarm_kinematics::{Frame, Model};
+use flexarm_kinematics::{ControllerAxes, Frame, Model};
 use flexarm_spatial::Pose;
 use flexarm_trajectory::{JointKnots, Trajectory, TrajectoryError};
 use nalgebra::DVector;
@@ -56,12 +56,58 @@ pub struct ProgramArm<'m> {
     pub X_MW: Pose,
     /// Coordinates in the order in which the controller counts its axes.
     pub axes: Vec<usize>,
+    /// How it counts each of them; empty where its axes are the joints.
+    pub controller: Vec<ControllerAxis>,
     /// One for each independent coordinate.
     pub bounds: Vec<JointBounds>,
     /// All independent coordinates before the program; joints that it does not move stay there.
     pub rest: DVector<f64>,
     /// Whether the program begins there; otherwise it begins where its first move ends.
     pub starts_at_rest: bool,
+}
+
+/// How a controller counts an axis. The joint is at
+///
+/// ```text
+/// q = zero + sense a + factor a_other
+/// ```
+/// where `a` is the value of the axis and `a_other` that of an axis before it: arms whose third axis is driven by a rod count
+/// it against the horizontal and not against the link that carries it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ControllerAxis {
+    /// 1 or -1.
+    pub sense: f64,
+    /// Value of the joint where the axis is at zero (rad or m).
+    pub zero: f64,
+    /// Number of the other axis, from 0, and its factor.
+    pub relative: Option<(usize, f64)>,
+}
+
+impl ControllerAxis {
+    /// The joint itself.
+    pub const SAME: Self = Self { sense: 1.0, zero: 0.0, relative: None };
+}
+
+impl ProgramArm<'_> {
+    /// Puts values of the controller's first axes into all coordinates.
+    pub fn set_axes(&self, values: &[f64], q: &mut DVector<f64>) {
+        for (n, (value, &k)) in values.iter().zip(&self.axes).enumerate() {
+            let axis = self.controller.get(n).unwrap_or(&ControllerAxis::SAME);
+            let other = axis.relative.and_then(|(other, factor)| Some(factor * values.get(other)?));
+            q[k] = axis.zero + axis.sense * value + other.unwrap_or(0.0);
+        }
+    }
+
+    /// Zeros and senses of six joints, for words that speak of the controller's axes. What is measured against another axis
+    /// decides none of them.
+    pub(crate) fn controller_axes(&self, joints: [usize; 6]) -> ControllerAxes {
+        let of = |k: usize| {
+            let n = self.axes.iter().position(|&axis| axis == k);
+            *n.and_then(|n| self.controller.get(n)).unwrap_or(&ControllerAxis::SAME)
+        };
+        let axes = joints.map(of);
+        ControllerAxes { sign: axes.map(|axis| axis.sense), offset: axes.map(|axis| -axis.sense * axis.zero) }
+    }
 }
 
 /// What became of a move.

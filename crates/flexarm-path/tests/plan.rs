@@ -2,9 +2,11 @@
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 #![allow(non_snake_case, reason = "monogram notation")]
 
-use flexarm_kinematics::{Data, Joint, JointKind, Link, Mechanism, Model, forward_kinematics};
+use flexarm_kinematics::{
+    AnalyticArm, ControllerAxes, Data, Joint, JointKind, Link, Mechanism, Model, forward_kinematics, kuka_turn,
+};
 use flexarm_path::program::{Blend, Configuration, Item, Move, MoveKind, Program, Speed, Target};
-use flexarm_path::{JointBounds, PathError, PathOptions, Planned, ProgramArm, SlowedBy, plan};
+use flexarm_path::{ControllerAxis, JointBounds, PathError, PathOptions, Planned, ProgramArm, SlowedBy, plan};
 use flexarm_spatial::{Pose, rotation_vector};
 use flexarm_testkit::reference_arm;
 use nalgebra::{DVector, Rotation3, Translation3, Vector3};
@@ -28,6 +30,7 @@ impl Cell {
             X_FT: Pose::identity(),
             X_MW: Pose::identity(),
             axes: (0..6).collect(),
+            controller: Vec::new(),
             bounds: vec![bounds; 6],
             rest: DVector::from_row_slice(&START),
             starts_at_rest: false,
@@ -354,6 +357,7 @@ fn a_redundant_arm_follows_its_line_with_one_joint_at_rest() {
         X_FT: Pose::identity(),
         X_MW: Pose::identity(),
         axes: (0..7).collect(),
+        controller: Vec::new(),
         bounds: vec![bounds; 7],
         rest: DVector::zeros(7),
         starts_at_rest: false,
@@ -372,4 +376,121 @@ fn a_redundant_arm_follows_its_line_with_one_joint_at_rest() {
         off = off.max(from_polyline(&data.X_WF(&frame).translation.vector, &way));
     }
     assert!(off < 1e-9, "{off:.1e}");
+}
+
+/// An arm of the usual kind: upright, two parallel axes, a spherical wrist. Joint k turns about `senses[k]` times its axis and
+/// is at `zeros[k]` where that of the arm with senses 1 and zeros 0 is at zero.
+fn industrial_arm(senses: [f64; 6], zeros: [f64; 6]) -> Model {
+    let mut arm = Mechanism::new("six");
+    arm.links.push(Link { name: "base".into(), inertia: None });
+    let (z, y, x) = (Vector3::z(), Vector3::y(), Vector3::x());
+    let places = [
+        (Vector3::zeros(), -z),
+        (Vector3::new(0.3, 0.0, 0.6), y),
+        (Vector3::new(1.1, 0.0, 0.0), y),
+        (Vector3::new(0.5, 0.0, 0.1), -x),
+        (Vector3::new(0.7, 0.0, 0.0), y),
+        (Vector3::zeros(), -x),
+    ];
+    for (k, (offset, axis)) in places.into_iter().enumerate() {
+        let (parent, child) = (arm.links[k].name.clone(), format!("link_{k}"));
+        arm.links.push(Link { name: child.clone(), inertia: None });
+        let axis = nalgebra::Unit::new_normalize(axis * senses[k]);
+        // R(s a, z + s q) = R(a, s z) R(a, q)
+        let back = Rotation3::from_axis_angle(&axis, -zeros[k]);
+        let X = Pose::from_parts(Translation3::from(offset), back);
+        arm.joints.push(Joint::new(format!("joint_{k}"), JointKind::Continuous(axis), parent, child, X));
+    }
+    let flange = Pose::translation(0.2, 0.0, 0.0);
+    arm.links.push(Link { name: "flange".into(), inertia: None });
+    arm.joints.push(Joint::new("to_flange", JointKind::Fixed, "link_5", "flange", flange));
+    Model::new(&arm).unwrap()
+}
+
+fn arm_of<'m>(model: &'m Model, controller: Vec<ControllerAxis>) -> ProgramArm<'m> {
+    ProgramArm {
+        model,
+        flange: model.frame("flange").unwrap().clone(),
+        X_FT: Pose::identity(),
+        X_MW: Pose::identity(),
+        axes: (0..6).collect(),
+        controller,
+        bounds: vec![JointBounds { velocity: 3.0, acceleration: 20.0, torque: None }; 6],
+        rest: DVector::zeros(6),
+        starts_at_rest: false,
+    }
+}
+
+/// Truth: the same program on the arm whose joints are the axes. Off by 3.7e-8 m or rad along the whole motion, as far as the
+/// iterations of the time law go; bound 1e-6.
+#[test]
+fn an_arm_with_other_zeros_and_senses_runs_a_program_as_the_arm_whose_joints_are_the_axes() {
+    let (senses, zeros) = ([-1.0, 1.0, -1.0, -1.0, 1.0, -1.0], [0.4, -1.2, 1.5, 0.3, -0.2, 2.0]);
+    let own = industrial_arm([1.0; 6], [0.0; 6]);
+    let other = industrial_arm(senses, zeros);
+    let controller: Vec<ControllerAxis> =
+        senses.into_iter().zip(zeros).map(|(sense, zero)| ControllerAxis { sense, zero, relative: None }).collect();
+    let arms = [arm_of(&own, Vec::new()), arm_of(&other, controller)];
+    let axes = [0.3, -1.3, 1.6, 0.2, 0.6, -0.4];
+    let target = [-0.5, -1.0, 1.2, 0.9, -0.7, 2.6];
+    let pose_at = |q: &[f64; 6]| {
+        let mut data = Data::new(&own);
+        forward_kinematics(&own, &mut data, &DVector::from_row_slice(q));
+        data.X_WF(own.frame("flange").unwrap())
+    };
+    let analytic = AnalyticArm::new(&own, own.frame("flange").unwrap()).unwrap();
+    let status = analytic.kuka_status(&target, &ControllerAxes::SAME);
+    assert!(status.is_some());
+    let turn = Some(kuka_turn(&target, &ControllerAxes::SAME));
+    let by_words = Target::Pose { X_BT: pose_at(&target), configuration: Configuration::Kuka { status, turn } };
+    let beside = shifted(&pose_at(&axes), [0.0, 0.2, -0.1]);
+    let near = Target::Pose { X_BT: pose_at(&target), configuration: Configuration::Near(target.to_vec()) };
+    let items = vec![
+        joints(&axes),
+        to(MoveKind::Line, pose(beside), feed(0.2), Blend::Stop),
+        to(MoveKind::Joint, by_words, Speed::default(), Blend::Stop),
+        joints(&axes),
+        to(MoveKind::Joint, near, Speed::default(), Blend::Stop),
+    ];
+    let planned = arms.each_ref().map(|arm| plan(&program(items.clone()), arm, &PathOptions::default()).unwrap());
+    let duration = planned[0].trajectory.duration();
+    assert!((planned[1].trajectory.duration() / duration - 1.0).abs() < 1e-9);
+    let mut off: f64 = 0.0;
+    for step in 0..=400 {
+        let t = duration * f64::from(step) / 400.0;
+        let X = [0, 1].map(|k| {
+            let (mut q, mut v, mut a) = (DVector::zeros(6), [0.0; 6], [0.0; 6]);
+            planned[k].trajectory.sample(t, q.as_mut_slice(), &mut v, &mut a);
+            let mut data = Data::new(arms[k].model);
+            forward_kinematics(arms[k].model, &mut data, &q);
+            data.X_WF(&arms[k].flange)
+        });
+        off = off.max((X[0].translation.vector - X[1].translation.vector).norm());
+        off = off.max((X[0].rotation.inverse() * X[1].rotation).scaled_axis().norm());
+    }
+    assert!(off < 1e-6, "{off:.1e}");
+    // The end, by its turns, is the one that was meant.
+    let mut end = [0.0; 6];
+    planned[1].trajectory.sample(duration, &mut end, &mut [0.0; 6], &mut [0.0; 6]);
+    for k in 0..6 {
+        assert!((end[k] - (zeros[k] + senses[k] * target[k])).abs() < 1e-9, "axis {k}: {end:?}");
+    }
+}
+
+/// Truth: the direction of the forearm. Where axis 3 is counted against the horizontal, axis 2 alone does not tilt it.
+#[test]
+fn an_axis_that_is_counted_against_the_horizontal_keeps_the_forearm_level_while_the_one_before_moves() {
+    let model = industrial_arm([1.0; 6], [0.0; 6]);
+    let mut controller = vec![ControllerAxis::SAME; 6];
+    controller[2].relative = Some((1, -1.0));
+    let arm = arm_of(&model, controller);
+    let forearm = |a2: f64| {
+        let mut q = DVector::zeros(6);
+        arm.set_axes(&[0.4, a2, 0.3, 0.0, 0.0, 0.0], &mut q);
+        let mut data = Data::new(&model);
+        forward_kinematics(&model, &mut data, &q);
+        data.X_WF(model.frame("link_2").unwrap()).rotation
+    };
+    let tilted = (forearm(-1.2).inverse() * forearm(-0.3)).scaled_axis().norm();
+    assert!(tilted < 1e-12, "{tilted:.1e}");
 }

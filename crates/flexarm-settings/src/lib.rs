@@ -85,6 +85,16 @@ pub enum Setting {
     /// Links whose inertia is not checked.
     WaiveInertia,
 
+    // Robot files that are made of a description.
+    /// The link at which an arm begins.
+    Base,
+    /// The link that is an arm's tool.
+    Tool,
+    /// The joints of an arm.
+    Joints,
+    /// Mass of the payload (kg).
+    Payload,
+
     // Modes and frequency responses.
     /// How long each mode swings in a recording (s).
     Seconds,
@@ -148,7 +158,7 @@ pub enum Setting {
 
 impl Setting {
     /// Every setting.
-    pub const ALL: [Self; 51] = [
+    pub const ALL: [Self; 55] = [
         Self::Step,
         Self::LogRate,
         Self::Stepper,
@@ -173,6 +183,10 @@ impl Setting {
         Self::InertiaFromDensity,
         Self::InertiaFromTotalMass,
         Self::WaiveInertia,
+        Self::Base,
+        Self::Tool,
+        Self::Joints,
+        Self::Payload,
         Self::Seconds,
         Self::ToolMotion,
         Self::LowestFrequency,
@@ -229,6 +243,10 @@ impl Setting {
             Self::InertiaFromDensity => "inertia_from_density",
             Self::InertiaFromTotalMass => "inertia_from_total_mass",
             Self::WaiveInertia => "waive",
+            Self::Base => "base",
+            Self::Tool => "tool",
+            Self::Joints => "joints",
+            Self::Payload => "payload_kg",
             Self::Seconds => "seconds",
             Self::ToolMotion => "tool_motion_m",
             Self::LowestFrequency => "from_hz",

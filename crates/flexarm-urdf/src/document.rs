@@ -132,7 +132,7 @@ impl Reader<'_, '_> {
         let name = self.required(node, "<link>", "name")?.to_owned();
         let owner = format!("link {name:?}");
         let mut inertial = None;
-        let mut visuals = Vec::new();
+        let (mut visuals, mut collisions) = (Vec::new(), Vec::new());
         for child in elements(node) {
             match child.tag_name().name() {
                 "inertial" if inertial.is_some() => {
@@ -142,10 +142,16 @@ impl Reader<'_, '_> {
                 }
                 "inertial" => inertial = Some(self.inertial(child, &owner)),
                 "visual" => visuals.extend(self.visual(child, &owner)),
+                "collision" => {
+                    let mut unheard = Report::default();
+                    let mut reader = Reader { lines: self.lines, report: &mut unheard, quaternions: self.quaternions };
+                    let shape = reader.visual(child, &owner);
+                    collisions.extend(shape.filter(|_| unheard.issues.is_empty()));
+                }
                 name => self.unknown_element(child, name, &owner, &LINK_CHILDREN),
             }
         }
-        Some(RawLink { name, place, inertial, visuals })
+        Some(RawLink { name, place, inertial, visuals, collisions })
     }
 
     fn inertial(&mut self, node: Node<'_, '_>, link: &str) -> RawInertial {

@@ -276,11 +276,12 @@ fn fill_from_shapes(
 
     // The base is filled too, so that a total mass can be the one of the data sheet.
     let empty = bodies.iter().filter(|b| b.members.iter().all(|&(i, _)| robot.links[i].inertial.is_none()));
-    let mut filled: Vec<(usize, SpatialInertia)> = Vec::new();
+    let (mut filled, mut shapeless): (Vec<(usize, SpatialInertia)>, Vec<usize>) = (Vec::new(), Vec::new());
     for i in empty.flat_map(|b| b.members.iter().map(|m| m.0)) {
         let link = &robot.links[i];
         match &shapes[i].solids {
-            Ok(solids) if solids.is_empty() => failures[i] = Some("there is no shape".to_owned()),
+            // A mere frame between others may stay without mass, as long as there is something to estimate.
+            Ok(solids) if solids.is_empty() => shapeless.push(i),
             Ok(solids) => {
                 let open: usize = solids.iter().map(|(_, p)| p.open_edges).sum();
                 if open > 0 {
@@ -304,6 +305,9 @@ fn fill_from_shapes(
         }
     }
 
+    if filled.is_empty() {
+        shapeless.iter().for_each(|&i| failures[i] = Some("there is no shape".to_owned()));
+    }
     let volume: f64 = filled.iter().map(|(_, M)| M.mass).sum();
     let density = match estimate {
         InertiaEstimate::Density(density) => density,

@@ -67,7 +67,9 @@ mod xml;
 pub use error::{Issue, Problem, UrdfError, XacroError};
 pub use finding::{Finding, Place, Severity};
 pub use geometry::{Geometry, Visual};
-pub use mesh::{MassProperties, MeshError, TriangleMesh, UpAxis, load_mesh, load_mesh_with};
+pub use mesh::{
+    CrossSection, MassProperties, MeshError, TriangleMesh, UpAxis, cross_section, load_mesh, load_mesh_with,
+};
 pub use read::{
     InertiaEstimate, JointDynamics, ReadOptions, Transmission, UrdfRobot, check_urdf, check_urdf_text, expand_xacro,
     parse_urdf, read_urdf,

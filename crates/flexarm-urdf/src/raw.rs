@@ -27,6 +27,8 @@ pub(crate) struct RawLink {
     pub(crate) place: Place,
     pub(crate) inertial: Option<RawInertial>,
     pub(crate) visuals: Vec<RawVisual>,
+    /// Shapes of `<collision>` that can be read; what is wrong with others is not looked at.
+    pub(crate) collisions: Vec<RawVisual>,
 }
 
 /// Mass and inertia about the centre of mass, in axes I; `X_LI` as written.

@@ -70,6 +70,8 @@ pub struct UrdfRobot {
     pub text: String,
     /// What the links look like, in the order of the file.
     pub visuals: Vec<Visual>,
+    /// Shapes for collisions that can be read, in the order of the file. Nothing is checked of them.
+    pub collisions: Vec<Visual>,
     /// Mesh references as they stand in the file, those of collision shapes too, with the files that were found.
     pub mesh_files: Vec<(String, PathBuf)>,
     /// Links that may be the tool centre point, the default first.
@@ -279,6 +281,7 @@ fn assemble(
     UrdfRobot {
         text: text.to_owned(),
         mesh_files: resolver.mesh_files(text),
+        collisions: shapes::find_collisions(raw, resolver, options.up_axis),
         visuals,
         tcp_candidates,
         warnings: Vec::new(),

@@ -49,6 +49,20 @@ pub(crate) fn find_visuals(
     visuals
 }
 
+/// All shapes for collisions, with mesh files where there are some.
+pub(crate) fn find_collisions(robot: &RawRobot, resolver: &Resolver<'_>, up_axis: UpAxis) -> Vec<Visual> {
+    let mut unheard = Report::default();
+    let of_link = robot.links.iter().flat_map(|link| link.collisions.iter().map(move |raw| (link, raw)));
+    let shape = |(link, raw): (&crate::raw::RawLink, &RawVisual)| Visual {
+        link: link.name.clone(),
+        X_LV: raw.X_LV,
+        geometry: geometry(raw, &link.name, resolver, up_axis, &mut unheard),
+        color: None,
+        name: raw.name.clone(),
+    };
+    of_link.map(shape).collect()
+}
+
 fn geometry(raw: &RawVisual, link: &str, resolver: &Resolver<'_>, up_axis: UpAxis, report: &mut Report) -> Geometry {
     match &raw.geometry {
         RawGeometry::Box { size } => Geometry::Box { size: *size },

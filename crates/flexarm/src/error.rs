@@ -138,6 +138,9 @@ pub enum Error {
     /// A recording that cannot be read, written or reported as asked for.
     #[error(transparent)]
     Recording(#[from] RecordingError),
+    /// A description that no robot file can be made of.
+    #[error(transparent)]
+    New(#[from] crate::new::NewError),
     /// A robot none of whose links could be the tool.
     #[error(
         "the robot has no link that could be the TCP: {}",

@@ -97,7 +97,11 @@ impl Motion {
     /// As [`Motion::load`], and for a topic or columns that are not there.
     pub fn load_with(path: impl AsRef<Path>, robot: &Robot, options: &MotionOptions) -> Result<Self, Error> {
         let model = robot.rigid_model()?;
-        Self::read(path.as_ref(), &Cell { model: &model, tcp_link: Some(&robot.tcp.0), hold: &robot.hold }, options)
+        Self::read(
+            path.as_ref(),
+            &Cell { model: &model, tcp_link: Some(&robot.tcp.0), hold: &robot.hold, controller: &robot.controller },
+            options,
+        )
     }
 
     /// As [`Motion::load`], for a model alone.
@@ -105,7 +109,7 @@ impl Motion {
     /// # Errors
     /// As [`Motion::load`].
     pub fn load_for(path: &Path, model: &Model) -> Result<Self, Error> {
-        Self::read(path, &Cell { model, tcp_link: None, hold: &[] }, &MotionOptions::default())
+        Self::read(path, &Cell { model, tcp_link: None, hold: &[], controller: &[] }, &MotionOptions::default())
     }
 
     /// The motion through sampled positions, by a spline as through the rows of a CSV file.

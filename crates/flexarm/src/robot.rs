@@ -10,6 +10,7 @@ use toml::Spanned;
 
 use crate::balancer_entry::add_balancers;
 use crate::caveat::{self, Caveat};
+use crate::controller_entry::{RobotAxis, controller_axes};
 use crate::drive_entry::{Drive, drives};
 use crate::error::Error;
 use crate::flexible::RobotLink;
@@ -55,6 +56,8 @@ pub struct Robot {
     pub hold: Vec<(String, f64)>,
     /// Things worth telling.
     pub warnings: Vec<String>,
+    /// Axes that its controller counts otherwise than the joints.
+    pub(crate) controller: Vec<RobotAxis>,
     /// What only the text of the file shows.
     written: Vec<Caveat>,
 }
@@ -105,6 +108,7 @@ impl Robot {
             default_trajectory: None,
             hold: Vec::new(),
             warnings: Vec::new(),
+            controller: Vec::new(),
             written: Vec::new(),
         };
         robot.finish(None)?;
@@ -134,17 +138,29 @@ impl Robot {
             urdf_options.inertia_from_mesh.get_or_insert(estimate);
         }
         let urdf = read_urdf(&urdf_path, &urdf_options)?;
+        Self::of_file(path, urdf_path, urdf, &file, &source, options)
+    }
 
+    /// What a robot file makes of a description that was read for it.
+    pub(crate) fn of_file(
+        path: &Path,
+        urdf_path: PathBuf,
+        urdf: UrdfRobot,
+        file: &RobotFile,
+        source: &Source,
+        options: &LoadOptions,
+    ) -> Result<Self, Error> {
+        let folder = path.parent().unwrap_or(Path::new("."));
         let mut faults: Vec<Error> = Vec::new();
         let mut rigid = urdf.mechanism.clone();
         if let Some(gravity) = &file.gravity {
             rigid.gravity = (*gravity.get_ref()).into();
-            keep(check_finite("gravity", gravity.get_ref(), gravity.span(), &source).map_err(Error::from), &mut faults);
+            keep(check_finite("gravity", gravity.get_ref(), gravity.span(), source).map_err(Error::from), &mut faults);
         }
         for (joint, lead) in &file.lead {
-            keep(make_helical(&mut rigid, joint, lead, &source).map_err(Error::from), &mut faults);
+            keep(make_helical(&mut rigid, joint, lead, source).map_err(Error::from), &mut faults);
         }
-        let tcp = keep(tcp_of(&file, &source, &urdf, options), &mut faults);
+        let tcp = keep(tcp_of(file, source, &urdf, options), &mut faults);
         // `robot.toml`, `.` and links to folders have no name to be read off the path.
         let real_folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
         let real_folder = real_folder.canonicalize().unwrap_or_else(|_| real_folder.to_owned());
@@ -162,27 +178,29 @@ impl Robot {
             default_trajectory: file.default_trajectory.as_ref().map(|t| folder.join(t.get_ref())),
             hold: Vec::new(),
             warnings: Vec::new(),
-            written: written_caveats(&file),
+            controller: Vec::new(),
+            written: written_caveats(file),
         };
         for (joint, value) in &file.hold {
-            let held = held_joint(joint, value, &robot.rigid, &source).map_err(Error::from);
+            let held = held_joint(joint, value, &robot.rigid, source).map_err(Error::from);
             robot.hold.extend(keep(held, &mut faults));
         }
         if let Some(payload) = &file.payload {
             let link = file.tcp.as_ref().map(|t| t.get_ref().link.get_ref().as_str());
             let link = link.or_else(|| default_tcp(&robot.urdf.mechanism)).unwrap_or_default().to_owned();
-            keep(robot.add_payload(payload, &link, &source), &mut faults);
+            keep(robot.add_payload(payload, &link, source), &mut faults);
         }
-        robot.drives = drives(&file.drive, &robot.rigid, &source, &mut robot.warnings, &mut faults);
+        robot.drives = drives(&file.drive, &robot.rigid, source, &mut robot.warnings, &mut faults);
         for drive in &robot.drives {
             for joint in robot.rigid.joints.iter_mut().filter(|j| j.name == drive.joint) {
                 joint.armature = drive.armature;
             }
         }
-        add_balancers(&mut robot, &file.balancer, &source, &mut faults);
+        robot.controller = controller_axes(&file.controller_axis, &robot.rigid, source, &mut faults);
+        add_balancers(&mut robot, &file.balancer, source, &mut faults);
         for entry in &file.flexible_link {
             let urdf = &robot.urdf.mechanism;
-            let flexible = flexible_link(entry, urdf, &source, folder, &mut robot.warnings, &mut faults);
+            let flexible = flexible_link(entry, urdf, source, folder, &mut robot.warnings, &mut faults);
             robot.flexible.extend(keep(flexible, &mut faults));
         }
         match faults.len() {
@@ -190,7 +208,7 @@ impl Robot {
             1 => return Err(faults.remove(0)),
             _ => return Err(Error::Several(faults)),
         }
-        robot.finish(Some((&file, &source)))?;
+        robot.finish(Some((file, source)))?;
         Ok(robot)
     }
 

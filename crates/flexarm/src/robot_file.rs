@@ -13,6 +13,7 @@ pub(crate) use flexarm_linkmaker::MaterialEntry;
 
 use crate::balancer_entry::BalancerEntry;
 pub(crate) use crate::beam_entry::BeamEntry;
+use crate::controller_entry::ControllerAxisEntry;
 use crate::drive_entry::DriveEntry;
 
 /// The file as written.
@@ -61,6 +62,9 @@ pub(crate) struct RobotFile {
     /// Springs, gas springs and counterbalances.
     #[serde(default)]
     pub balancer: Vec<Spanned<BalancerEntry>>,
+    /// How the controller counts its axes.
+    #[serde(default)]
+    pub controller_axis: Vec<ControllerAxisEntry>,
 }
 
 /// Pose of the tool centre point in a link.

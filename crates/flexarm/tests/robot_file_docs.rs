@@ -157,9 +157,10 @@ fn keys(sources: &[&str]) -> BTreeMap<String, BTreeSet<String>> {
     found
 }
 
-const ROBOT: [&str; 5] = [
+const ROBOT: [&str; 6] = [
     "crates/flexarm/src/robot_file.rs",
     "crates/flexarm/src/balancer_entry.rs",
+    "crates/flexarm/src/controller_entry.rs",
     "crates/flexarm/src/beam_entry.rs",
     "crates/flexarm/src/drive_entry.rs",
     "crates/flexarm-linkmaker/src/material_entry.rs",
@@ -216,6 +217,7 @@ fn the_schemas_have_the_same_keys() {
         ("gearbox", "GearboxEntry"),
         ("friction", "FrictionEntry"),
         ("servo", "ServoEntry"),
+        ("controller_axis", "ControllerAxisEntry"),
         ("balancer", "BalancerEntry"),
         ("balancer_end", "EndEntry"),
         ("balancer_spring", "SpringEntry"),

@@ -70,19 +70,28 @@ impl TriangleMesh {
         }
     }
 
-    /// Edges that are not passed equally often in both directions.
-    fn open_edges(&self, size: f64) -> usize {
-        // Formats without shared vertices repeat them, some with rounding: weld to a millionth of the size.
+    /// One number for all vertices at one place.
+    pub(crate) fn welded(&self) -> Vec<u32> {
+        let (low, high) = self.bounds().unwrap_or_default();
+        self.welded_by((high - low).norm())
+    }
+
+    /// Formats without shared vertices repeat them, some with rounding: weld to a millionth of the size.
+    fn welded_by(&self, size: f64) -> Vec<u32> {
         let cell = (size * 1e-6).max(f64::MIN_POSITIVE);
         let mut cells: HashMap<[i64; 3], u32> = HashMap::new();
-        let welded: Vec<u32> = self
-            .positions
+        self.positions
             .iter()
             .map(|p| {
                 let next = cells.len() as u32;
                 *cells.entry(p.map(|x| (f64::from(x) / cell).round() as i64)).or_insert(next)
             })
-            .collect();
+            .collect()
+    }
+
+    /// Edges that are not passed equally often in both directions.
+    fn open_edges(&self, size: f64) -> usize {
+        let welded = self.welded_by(size);
         let mut balance: HashMap<(u32, u32), i64> = HashMap::new();
         for triangle in &self.triangles {
             for side in 0..3 {

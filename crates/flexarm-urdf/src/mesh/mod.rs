@@ -20,6 +20,7 @@ mod collada;
 mod gltf_file;
 mod mass;
 mod obj;
+mod section;
 mod stl;
 #[cfg(test)]
 mod tests;
@@ -30,6 +31,7 @@ use flexarm_kinematics::Pose;
 use nalgebra::Vector3;
 
 pub use mass::MassProperties;
+pub use section::{CrossSection, cross_section};
 
 /// A file that places its meshes so often that it has more than this is taken for a trap.
 const MAX_TRIANGLES: usize = 50_000_000;

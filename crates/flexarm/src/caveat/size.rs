@@ -111,7 +111,7 @@ pub(crate) fn middle(lower: f64, upper: f64) -> f64 {
 }
 
 /// Entry of Halton's sequence in the base that belongs to a coordinate, between 0 and 1.
-fn halton(mut index: u32, coordinate: usize) -> f64 {
+pub(crate) fn halton(mut index: u32, coordinate: usize) -> f64 {
     const PRIMES: [u32; 8] = [2, 3, 5, 7, 11, 13, 17, 19];
     let base = PRIMES[coordinate % PRIMES.len()];
     let (mut value, mut fraction) = (0.0, 1.0);

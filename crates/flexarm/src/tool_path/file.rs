@@ -7,9 +7,8 @@ use std::path::{Path, PathBuf};
 
 use flexarm_kinematics::Pose;
 use flexarm_kinematics::{Data, forward_kinematics};
-use flexarm_path::PathOptions;
-use flexarm_path::ProgramArm;
 use flexarm_path::program::{Blend, Configuration, Item, Move, MoveKind, Program, Speed, Target};
+use flexarm_path::{ControllerAxis, PathOptions, ProgramArm};
 use flexarm_programs::{GCodeOptions, ReadOptions, Rotary};
 use flexarm_trajectory::Trajectory;
 use nalgebra::{DVector, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
@@ -172,6 +171,8 @@ struct Reader<'a> {
     X_WB: Pose,
     X_FT: Option<Pose>,
     arm: &'a ProgramArm<'a>,
+    /// How the controller counts the axes of programs; the path file itself speaks of joints.
+    controller: Vec<ControllerAxis>,
 }
 
 /// Reads a path file and plans its motion.
@@ -208,6 +209,7 @@ pub(crate) fn read_path_file(
         X_WB: frame(&file.path.base)?.unwrap_or_else(Pose::identity),
         X_FT: frame(&file.path.tool)?,
         arm: &arm,
+        controller: cell.controller_axes(&arm.axes),
     };
     if let Some(table) = &file.program {
         if file.standard.is_some() || !file.moves.is_empty() {
@@ -474,15 +476,16 @@ impl Reader<'_> {
         };
         let bytes = flexarm_trajectory::bytes_of_file(&file)?;
         let mut arm = self.arm.clone();
+        arm.controller.clone_from(&self.controller);
         if let Some(start) = &options.start {
             if start.len() != arm.axes.len() {
                 let message =
                     format!("start has {} values for the {} joints that move the tool", start.len(), arm.axes.len());
                 return Err(self.source.error(table.span(), message).into());
             }
-            for (value, &k) in start.iter().zip(&self.arm.axes) {
-                arm.rest[k] = *value;
-            }
+            let mut rest = arm.rest.clone();
+            arm.set_axes(start, &mut rest);
+            arm.rest = rest;
             arm.starts_at_rest = true;
         }
         arm.X_FT = self.X_FT.unwrap_or(arm.X_FT);

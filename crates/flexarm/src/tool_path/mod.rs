@@ -10,11 +10,14 @@ use std::path::Path;
 
 use flexarm_kinematics::{Frame, Model, Pose};
 use flexarm_path::program::{Note, Program};
-use flexarm_path::{JointBounds, PathOptions, PlannedMove, ProgramArm, Slowed, SlowedBy, coordinates_of, plan};
+use flexarm_path::{
+    ControllerAxis, JointBounds, PathOptions, PlannedMove, ProgramArm, Slowed, SlowedBy, coordinates_of, plan,
+};
 use flexarm_trajectory::Trajectory;
 use nalgebra::DVector;
 
 use crate::caveat::Caveat;
+use crate::controller_entry::RobotAxis;
 use crate::error::Error;
 use crate::robot::tcp_frame;
 
@@ -54,6 +57,8 @@ pub(crate) struct Cell<'a> {
     pub(crate) tcp_link: Option<&'a str>,
     /// Joints that stay, and where.
     pub(crate) hold: &'a [(String, f64)],
+    /// Axes that the controller counts otherwise than the joints.
+    pub(crate) controller: &'a [RobotAxis],
 }
 
 /// What was taken of the robot for want of better knowledge, as sentences.
@@ -117,6 +122,20 @@ impl<'a> Cell<'a> {
         })
     }
 
+    /// How the controller counts these axes; empty where it counts the joints.
+    pub(crate) fn controller_axes(&self, axes: &[usize]) -> Vec<ControllerAxis> {
+        let place = |joint: &str| axes.iter().position(|&k| self.model.coordinates()[k].joint == joint);
+        let axis = |&k: &usize| {
+            let told = self.controller.iter().find(|axis| axis.joint == self.model.coordinates()[k].joint);
+            told.map_or(ControllerAxis::SAME, |told| {
+                let relative = told.relative.as_ref();
+                let relative = relative.and_then(|(joint, factor)| Some((place(joint)?, *factor)));
+                ControllerAxis { sense: told.sense, zero: told.zero, relative }
+            })
+        };
+        if self.controller.is_empty() { Vec::new() } else { axes.iter().map(axis).collect() }
+    }
+
     /// The arm as the program's controller sees it.
     pub(crate) fn arm(&self, overrides: &Overrides) -> (ProgramArm<'a>, Assumed) {
         let (flange, X_FT, flange_note) = self.flange();
@@ -141,7 +160,9 @@ impl<'a> Cell<'a> {
         });
         let axes = coordinates_of(self.model, &tcp_frame(self.model));
         let (X_MW, rest) = (self.world(), self.rest());
-        let arm = ProgramArm { model: self.model, flange, X_FT, X_MW, axes, bounds, rest, starts_at_rest: false };
+        let controller = Vec::new();
+        let arm =
+            ProgramArm { model: self.model, flange, X_FT, X_MW, axes, controller, bounds, rest, starts_at_rest: false };
         (arm, Assumed { flange: flange_note, accelerations })
     }
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use flexarm_kinematics::{Data, Pose, forward_kinematics};
 use flexarm_path::program::Program;
-use flexarm_path::{PathOptions, ProgramArm};
+use flexarm_path::{ControllerAxis, PathOptions, ProgramArm};
 use flexarm_programs::{ReadOptions, read_program, recognise};
 use flexarm_trajectory::Trajectory;
 
@@ -20,7 +20,8 @@ pub(crate) fn read_robot_program(
     cell: &Cell<'_>,
 ) -> Result<((Trajectory, ToolPath), &'static str), Error> {
     let bytes = flexarm_trajectory::bytes_of_file(path)?;
-    let (arm, assumed) = cell.arm(&Overrides::default());
+    let (mut arm, assumed) = cell.arm(&Overrides::default());
+    arm.controller = cell.controller_axes(&arm.axes);
     let planned = plan_program(
         path,
         &bytes,
@@ -48,12 +49,33 @@ pub(super) fn plan_program(
     let options = ReadOptions { forward: Some(&forward), own_tool: Some(arm.X_FT), ..options.clone() };
     let mut program = read_program(path, bytes, &options).map_err(Box::new)?;
     fill(&mut program);
-    let joints: Vec<&str> = arm.axes.iter().map(|&k| arm.model.coordinates()[k].joint.as_str()).collect();
-    warnings.push(format!(
-        "axes of the program are taken as the joints {}, with their zeros and senses",
-        joints.join(", ")
-    ));
+    warnings.push(taken_as(arm));
     ToolPath::plan(path, &program, arm, resolution, warnings)
+}
+
+/// What the axes of the program are, in words.
+fn taken_as(arm: &ProgramArm<'_>) -> String {
+    let joint = |&k: &usize| arm.model.coordinates()[k].joint.as_str();
+    let joints: Vec<&str> = arm.axes.iter().map(joint).collect();
+    if arm.controller.is_empty() {
+        return format!(
+            "axes of the program are taken as the joints {}, with their zeros and senses",
+            joints.join(", ")
+        );
+    }
+    let axis = |(n, axis): (usize, &ControllerAxis)| {
+        let unit = if arm.model.coordinates()[arm.axes[n]].kind == "prismatic" { 1.0 } else { 1f64.to_degrees() };
+        let mut words = format!("{} = {}A{}", joints[n], if axis.sense < 0.0 { "-" } else { "" }, n + 1);
+        if axis.zero != 0.0 {
+            words += &format!(" {} {:.4}", if axis.zero < 0.0 { "-" } else { "+" }, (unit * axis.zero).abs());
+        }
+        if let Some((other, factor)) = axis.relative {
+            words += &format!(" {} {} A{}", if factor < 0.0 { "-" } else { "+" }, factor.abs(), other + 1);
+        }
+        words
+    };
+    let axes: Vec<String> = arm.controller.iter().enumerate().map(axis).collect();
+    format!("axes of the program become joints as the robot file says, in degrees: {}", axes.join(", "))
 }
 
 /// The flange in the controller's world at axis values.
@@ -62,9 +84,7 @@ fn flange_at(arm: &ProgramArm<'_>, values: &[f64]) -> Option<Pose> {
         return None;
     }
     let mut q = arm.rest.clone();
-    for (value, &k) in values.iter().zip(&arm.axes) {
-        q[k] = *value;
-    }
+    arm.set_axes(values, &mut q);
     let mut data = Data::new(arm.model);
     forward_kinematics(arm.model, &mut data, &q);
     Some(arm.X_MW.inverse() * data.X_WF(&arm.flange))

@@ -1,0 +1,134 @@
+//! `[[controller_axis]]` of a robot file: how the robot's controller counts its axes, where it does otherwise than the description.
+
+use flexarm_kinematics::{JointKind, Mechanism};
+use flexarm_urdf::closest;
+use serde::Deserialize;
+use toml::Spanned;
+
+use crate::error::Error;
+use crate::robot_file::{RobotFileError, Source};
+
+/// An entry as written.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct ControllerAxisEntry {
+    /// Joint of the URDF.
+    pub joint: Spanned<String>,
+    /// 1 or -1.
+    pub sense: Option<Spanned<i64>>,
+    /// Value of the joint where the axis is at zero (rad or m).
+    pub zero: Option<Spanned<f64>>,
+    /// The same in degrees.
+    pub zero_deg: Option<Spanned<f64>>,
+    /// Joint of an axis before, which this one is measured against.
+    pub relative_to: Option<Spanned<String>>,
+    /// What of that axis adds to the joint: -1 if not given.
+    pub factor: Option<Spanned<f64>>,
+}
+
+/// An axis of the controller: `joint = zero + sense axis + factor axis_other`.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct RobotAxis {
+    pub(crate) joint: String,
+    pub(crate) sense: f64,
+    pub(crate) zero: f64,
+    /// Joint of the other axis, and its factor.
+    pub(crate) relative: Option<(String, f64)>,
+}
+
+/// All entries; what is wrong with some goes to the faults.
+pub(crate) fn controller_axes(
+    entries: &[ControllerAxisEntry],
+    mechanism: &Mechanism,
+    source: &Source,
+    faults: &mut Vec<Error>,
+) -> Vec<RobotAxis> {
+    let mut axes: Vec<RobotAxis> = Vec::new();
+    for entry in entries {
+        match axis(entry, &axes, mechanism, source) {
+            Ok(axis) => axes.push(axis),
+            Err(error) => faults.push(error.into()),
+        }
+    }
+    axes
+}
+
+fn axis(
+    entry: &ControllerAxisEntry,
+    before: &[RobotAxis],
+    mechanism: &Mechanism,
+    source: &Source,
+) -> Result<RobotAxis, RobotFileError> {
+    let name = entry.joint.get_ref();
+    let fail = |span, message: String| source.error(span, format!("controller axis of joint {name:?}: {message}"));
+    let free = |name: &str| {
+        let joint = mechanism.joints.iter().find(|j| j.name == name);
+        joint.is_some_and(|j| j.kind != JointKind::Fixed && j.mimic.is_none())
+    };
+    let unknown = |name: &String, span| {
+        let names = || mechanism.joints.iter().map(|j| j.name.as_str()).filter(|name| free(name));
+        let meant = match closest(name, names()) {
+            Some(meant) => format!("did you mean {meant:?}?"),
+            None => format!("it has {:?}", names().collect::<Vec<_>>()),
+        };
+        fail(span, format!("the robot has no joint {name:?} that moves by itself; {meant}"))
+    };
+    if !free(name) {
+        return Err(unknown(name, entry.joint.span()));
+    }
+    if before.iter().any(|axis| axis.joint == *name) {
+        return Err(fail(entry.joint.span(), "it has a second entry: keep one of them".into()));
+    }
+    let sense = match &entry.sense {
+        None => 1.0,
+        Some(sense) if matches!(*sense.get_ref(), 1 | -1) => *sense.get_ref() as f64,
+        Some(sense) => return Err(fail(sense.span(), format!("sense is {}, expected 1 or -1", sense.get_ref()))),
+    };
+    let finite = |value: &Spanned<f64>, what: &str| match *value.get_ref() {
+        x if x.is_finite() => Ok(x),
+        x => Err(fail(value.span(), format!("{what} is {x}, expected a finite number"))),
+    };
+    let zero = match (&entry.zero, &entry.zero_deg) {
+        (None, None) => 0.0,
+        (Some(zero), None) => finite(zero, "zero")?,
+        (None, Some(degrees)) => finite(degrees, "zero_deg")?.to_radians(),
+        (Some(_), Some(degrees)) => {
+            return Err(fail(degrees.span(), "zero (rad) and zero_deg are both given: keep one of them".into()));
+        }
+    };
+    let relative = match (&entry.relative_to, &entry.factor) {
+        (None, None) => None,
+        (None, Some(factor)) => {
+            return Err(fail(factor.span(), "factor belongs to relative_to = \"joint\", which is missing".into()));
+        }
+        (Some(other), _) if !free(other.get_ref()) || other.get_ref() == name => {
+            return Err(unknown(other.get_ref(), other.span()));
+        }
+        (Some(other), _) if !is_above(mechanism, other.get_ref(), name) => {
+            let message = format!(
+                "relative_to = {:?}: that joint does not carry it; an axis before it is needed",
+                other.get_ref()
+            );
+            return Err(fail(other.span(), message));
+        }
+        (Some(other), factor) => {
+            let factor = factor.as_ref().map(|factor| finite(factor, "factor")).transpose()?.unwrap_or(-1.0);
+            Some((other.get_ref().clone(), factor))
+        }
+    };
+    Ok(RobotAxis { joint: name.clone(), sense, zero, relative })
+}
+
+/// Whether one joint carries another.
+fn is_above(mechanism: &Mechanism, above: &str, joint: &str) -> bool {
+    let joint_above = |link: &str| mechanism.joints.iter().find(|j| j.child == link);
+    let mut at = mechanism.joints.iter().find(|j| j.name == joint).and_then(|j| joint_above(&j.parent));
+    for _ in 0..mechanism.joints.len() {
+        match at {
+            Some(found) if found.name == above => return true,
+            Some(found) => at = joint_above(&found.parent),
+            None => return false,
+        }
+    }
+    false
+}

@@ -1,0 +1,527 @@
+//! Links that look like beams: a hollow section from the outlines of the mesh and the mass of the link.
+//!
+//! Frames: L link; S section, x from the link's origin to the distal joint, y and z across.
+
+use flexarm_kinematics::{Joint, LinkInertia, Pose};
+use flexarm_urdf::{CrossSection, TriangleMesh, cross_section};
+use nalgebra::{Matrix2, Matrix3, Rotation2, Rotation3, Translation3, Vector2, Vector3};
+use serde::Serialize;
+
+/// Cuts along the whole mesh.
+const CUTS: usize = 48;
+/// Places along the beam at which bending is looked at.
+const STATIONS: usize = 40;
+/// Part of the way between the joints along which there must be a shape, around the line or beside it.
+const ALONG: f64 = 0.75;
+/// The shape lies beside the line between the joints by this part of its length at most.
+const BESIDE: f64 = 0.45;
+/// Outlines of a beam vary by this factor at most.
+const TAPER: f64 = 3.5;
+/// Part of a link's mass that its beam has at least: the rest is housings at its ends.
+const OWN: f64 = 0.2;
+/// A beam is longer than its section is thick, by this factor.
+const SLENDER: f64 = 1.2;
+/// A beam is at least this part of the arm's length.
+const SHARE: f64 = 0.08;
+/// Walls thinner than this are not cast, bent or printed (m).
+const THINNEST: f64 = 5e-4;
+/// Round: bending the same about all axes to this, and the outline that of a circle to this.
+const ROUND: [f64; 2] = [0.12, 0.06];
+/// Materials that are tried, lightest first: name, density (kg/m³), and what is said of it.
+const MATERIALS: [(&str, f64, &str); 3] =
+    [("aluminium", 2700.0, "aluminium casting"), ("ductile_iron", 7100.0, "cast iron"), ("steel", 7850.0, "steel")];
+
+/// A uniform section that bends as the link's outline would, hollow so that the link has its mass.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct BeamSection {
+    /// `box`, `tube`, `rectangle` or `circle`, as the robot file calls it.
+    pub(crate) section: &'static str,
+    /// Along y and z of the section; diameters of round ones (m).
+    pub(crate) width: f64,
+    pub(crate) height: f64,
+    /// Thickness (m); none of solid ones.
+    pub(crate) wall: Option<f64>,
+    /// The same if only half of the mass is wall (m).
+    pub(crate) wall_of_half: Option<f64>,
+    pub(crate) material: &'static str,
+    /// Direction of the section's y in link axes.
+    pub(crate) y_axis: [f64; 3],
+    /// From the line between the joints to the centroid, in link axes (m).
+    pub(crate) offset: [f64; 3],
+    /// Largest over smallest outer width along the beam.
+    pub(crate) taper: f64,
+    /// Part of the cuts whose outline was not closed.
+    pub(crate) open: f64,
+}
+
+/// What is known of a link that may be a beam.
+pub(crate) struct Candidate<'a> {
+    /// The joint at its far end.
+    pub(crate) distal: &'a Joint,
+    pub(crate) inertia: Option<LinkInertia>,
+    /// Its shapes, in link axes.
+    pub(crate) meshes: &'a [TriangleMesh],
+    /// Length of the whole arm (m).
+    pub(crate) arm: f64,
+}
+
+/// A section for the link, or in words why there is none.
+pub(crate) fn propose(link: &Candidate<'_>) -> Result<BeamSection, String> {
+    let axis = link.distal.X_PJ.translation.vector;
+    let length = axis.norm();
+    if length < SHARE * link.arm || length < 1e-3 {
+        return Err(format!("short: {:.0} mm of the arm's {:.0} mm", 1e3 * length, 1e3 * link.arm));
+    }
+    let Some(inertia) = link.inertia.filter(|i| i.mass > 0.0) else { return Err("its mass is not known".into()) };
+    if link.meshes.is_empty() {
+        return Err("it has no shape that can be read".into());
+    }
+    let cuts = Cuts::of(link.meshes, &axis)?;
+    let along = cuts.along(length);
+    let aside = cuts.centroid(length).norm();
+    if along < ALONG || aside > BESIDE * length {
+        let where_is_it = if along < ALONG {
+            format!("is there along {:.0} % of the way only", 100.0 * along)
+        } else {
+            format!("lies {:.0} mm beside it", 1e3 * aside)
+        };
+        return Err(format!(
+            "from its frame to joint {:?} its shape {where_is_it}: the frames of the file do not run along the link",
+            link.distal.name
+        ));
+    }
+    let shape = if cuts.is_round(length) { Shape::Tube } else { Shape::Box };
+    let turn = if shape == Shape::Box { cuts.principal_turn(length) } else { 0.0 };
+    let outlines = cuts.outlines(turn, shape);
+    let thick = weighted(&outlines, length, |o| o.width.max(o.height));
+    if length < SLENDER * thick {
+        return Err(format!("stout: {:.0} mm long, {:.0} mm thick", 1e3 * length, 1e3 * thick));
+    }
+    let (material, wall) = wall(&outlines, shape, inertia.mass)?;
+    let mut section = equivalent(&outlines, shape, length, wall);
+    section.material = material;
+    if section.taper > TAPER {
+        return Err(format!("its width varies by a factor of {:.1} between the joints: no beam", section.taper));
+    }
+    let density = MATERIALS.iter().find(|m| m.0 == material).map_or(2700.0, |m| m.1);
+    let whole = shell(&outlines, shape, wall);
+    let own = shell_between(&outlines, shape, length, wall);
+    if own < OWN * whole {
+        return Err(format!("only {:.0} % of its mass lies between the joints", 100.0 * own / whole));
+    }
+    section.wall_of_half = section.wall.and_then(|_| wall_for(&outlines, shape, 0.5 * inertia.mass / density));
+    let R_LS = cuts.X_LS.rotation * Rotation3::from_axis_angle(&Vector3::x_axis(), turn);
+    section.y_axis = (R_LS * Vector3::y()).into();
+    let c = cuts.centroid(length);
+    let offset = cuts.X_LS.rotation * Vector3::new(0.0, c.x, c.y);
+    let matters = offset.norm() > 0.03 * section.width.min(section.height);
+    section.offset = if matters { offset.into() } else { [0.0; 3] };
+    section.open = cuts.open();
+    Ok(section)
+}
+
+/// The outlines of a link across the line to its distal joint.
+struct Cuts {
+    /// Section frame at the link's origin.
+    X_LS: Pose,
+    /// Where along x (m), and what is there; at equal distances over the whole mesh.
+    sections: Vec<(f64, Option<CrossSection>)>,
+}
+
+/// What outlines are taken for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Shape {
+    Box,
+    Tube,
+}
+
+/// Outer size of a box or circle with the outline's second moments, about principal axes.
+#[derive(Clone, Copy, Debug)]
+struct Outline {
+    x: f64,
+    /// Thickness of the slice (m).
+    step: f64,
+    width: f64,
+    height: f64,
+}
+
+impl Cuts {
+    fn of(meshes: &[TriangleMesh], axis: &Vector3<f64>) -> Result<Self, String> {
+        let x = axis.normalize();
+        let across = Vector3::ith(axis.abs().imin(), 1.0);
+        let y = (across - x * x.dot(&across)).normalize();
+        let R_LS = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[x, y, x.cross(&y)]));
+        let X_LS = Pose::from_parts(Translation3::identity(), R_LS);
+        let along = |p: &[f32; 3]| Vector3::from(p.map(f64::from)).dot(&x);
+        let places = || meshes.iter().flat_map(|m| &m.positions).map(along);
+        let (low, high) = (places().fold(f64::INFINITY, f64::min), places().fold(f64::NEG_INFINITY, f64::max));
+        if high - low < 1e-4 {
+            return Err("its shape is flat".into());
+        }
+        let step = (high - low) / CUTS as f64;
+        let cut = |k: usize| {
+            let at = low + (k as f64 + 0.5) * step;
+            let X_LC = X_LS * Pose::from_parts(Translation3::new(at, 0.0, 0.0), Rotation3::identity());
+            (at, cross_section(meshes, &X_LC))
+        };
+        Ok(Self { X_LS, sections: (0..CUTS).map(cut).collect() })
+    }
+
+    fn found(&self) -> impl Iterator<Item = (f64, &CrossSection)> {
+        self.sections.iter().filter_map(|(x, section)| Some((*x, section.as_ref()?)))
+    }
+
+    fn within(&self, length: f64) -> impl Iterator<Item = (f64, &CrossSection)> {
+        self.found().filter(move |(x, _)| (0.0..=length).contains(x))
+    }
+
+    /// Part of the way between the joints with an outline.
+    fn along(&self, length: f64) -> f64 {
+        let step = self.sections[1].0 - self.sections[0].0;
+        (self.within(length).count() as f64 * step / length).min(1.0)
+    }
+
+    fn open(&self) -> f64 {
+        let (all, open) =
+            self.found().fold((0.0, 0.0), |(n, k), (_, s)| (n + 1.0, k + f64::from(u8::from(!s.is_closed))));
+        open / f64::max(all, 1.0)
+    }
+
+    fn nearest(&self, x: f64) -> Option<&CrossSection> {
+        self.found().min_by(|a, b| (a.0 - x).abs().total_cmp(&(b.0 - x).abs())).map(|(_, section)| section)
+    }
+
+    /// Mean over the beam as a force at its tip sees it.
+    fn mean(&self, length: f64) -> (Matrix2<f64>, Vector2<f64>) {
+        stations(length).fold((Matrix2::zeros(), Vector2::zeros()), |(I, c), (x, weight)| {
+            self.nearest(x).map_or((I, c), |s| (I + s.second_moments * weight, c + s.centroid * weight))
+        })
+    }
+
+    fn centroid(&self, length: f64) -> Vector2<f64> {
+        self.mean(length).1
+    }
+
+    /// Angle from y to the axis of the largest `∫ y²` (rad); zero where the axes of S do.
+    fn principal_turn(&self, length: f64) -> f64 {
+        let (I, _) = self.mean(length);
+        let (a, b, c) = (I[(0, 0)], I[(1, 1)], I[(0, 1)]);
+        if c.abs() < 0.02 * (a + b) { 0.0 } else { 0.5 * (2.0 * c).atan2(a - b) }
+    }
+
+    fn outlines(&self, turn: f64, shape: Shape) -> Vec<Outline> {
+        let R = Rotation2::new(turn);
+        let step = self.sections[1].0 - self.sections[0].0;
+        let outline = |(x, s): (f64, &CrossSection)| {
+            // I_y = w h³/12, I_z = h w³/12
+            let turned = R.matrix().transpose() * s.second_moments * R.matrix();
+            let (I_z, I_y) = (turned[(0, 0)], turned[(1, 1)]);
+            if shape == Shape::Tube {
+                // I_y + I_z = π D⁴/32
+                let diameter = (32.0 * (I_y + I_z) / std::f64::consts::PI).powf(0.25);
+                return Outline { x, step, width: diameter, height: diameter };
+            }
+            let ratio = (I_z / I_y).sqrt();
+            let height = (12.0 * I_y / ratio).powf(0.25);
+            Outline { x, step, width: ratio * height, height }
+        };
+        self.found().map(outline).filter(|o| o.width.is_normal() && o.height.is_normal()).collect()
+    }
+
+    /// Whether outlines are circles, most of them.
+    fn is_round(&self, length: f64) -> bool {
+        let round = |s: &CrossSection| {
+            let [low, high] = {
+                let moments = s.second_moments.symmetric_eigenvalues();
+                [moments.min(), moments.max()]
+            };
+            let radius_of_gyration = (s.second_moments.trace() / s.area).sqrt();
+            let of_area = (s.area / (2.0 * std::f64::consts::PI)).sqrt();
+            high / low - 1.0 < ROUND[0] && (radius_of_gyration / of_area - 1.0) < 0.5 * ROUND[1] && {
+                let circle = 2.0 * (std::f64::consts::PI * s.area).sqrt();
+                s.perimeter / circle - 1.0 < ROUND[1]
+            }
+        };
+        let (all, of_circles) = self.within(length).fold((0, 0), |(n, k), (_, s)| (n + 1, k + usize::from(round(s))));
+        2 * of_circles > all
+    }
+}
+
+/// Places along the beam with weights that a force at the tip gives their compliance: `3 (1 - x/l)²`, together 1.
+fn stations(length: f64) -> impl Iterator<Item = (f64, f64)> {
+    let weight = move |k: usize| {
+        let s = (k as f64 + 0.5) / STATIONS as f64;
+        (s * length, 3.0 * (1.0 - s).powi(2) / STATIONS as f64)
+    };
+    let sum: f64 = (0..STATIONS).map(|k| weight(k).1).sum();
+    (0..STATIONS).map(move |k| (weight(k).0, weight(k).1 / sum))
+}
+
+/// Between the cuts straight on, beyond them as at the nearest.
+fn outline_at(outlines: &[Outline], x: f64) -> [f64; 2] {
+    let above = outlines.iter().position(|o| o.x >= x);
+    let size = |o: &Outline| [o.width, o.height];
+    match above {
+        Some(0) => size(&outlines[0]),
+        None => outlines.last().map_or([0.0; 2], size),
+        Some(k) => {
+            let (a, b) = (&outlines[k - 1], &outlines[k]);
+            let part = (x - a.x) / (b.x - a.x);
+            [a.width + part * (b.width - a.width), a.height + part * (b.height - a.height)]
+        }
+    }
+}
+
+fn weighted(outlines: &[Outline], length: f64, of: impl Fn(&Outline) -> f64) -> f64 {
+    let value = |x: f64| {
+        let [width, height] = outline_at(outlines, x);
+        of(&Outline { x, step: 0.0, width, height })
+    };
+    stations(length).map(|(x, weight)| weight * value(x)).sum()
+}
+
+/// Volume of a shell of this thickness over all cuts, solid where it has no room (m³).
+fn shell(outlines: &[Outline], shape: Shape, wall: f64) -> f64 {
+    let filled = if shape == Shape::Tube { std::f64::consts::FRAC_PI_4 } else { 1.0 };
+    let area = |o: &Outline| {
+        let inner = (o.width - 2.0 * wall).max(0.0) * (o.height - 2.0 * wall).max(0.0);
+        filled * (o.width * o.height - inner)
+    };
+    outlines.iter().map(|o| area(o) * o.step).sum()
+}
+
+/// The same between the joints only.
+fn shell_between(outlines: &[Outline], shape: Shape, length: f64, wall: f64) -> f64 {
+    let piece = |(x, _): (f64, f64)| {
+        let [width, height] = outline_at(outlines, x);
+        shell(&[Outline { x, step: length / STATIONS as f64, width, height }], shape, wall)
+    };
+    stations(length).map(piece).sum()
+}
+
+/// Thickness of the shell that has this volume; `None` if a solid body has less.
+fn wall_for(outlines: &[Outline], shape: Shape, volume: f64) -> Option<f64> {
+    let most = outlines.iter().map(|o| 0.5 * o.width.min(o.height)).fold(0.0, f64::max);
+    if shell(outlines, shape, most) < volume * (1.0 - 1e-3) {
+        return None;
+    }
+    let (mut low, mut high) = (0.0, most);
+    for _ in 0..80 {
+        let middle = 0.5 * (low + high);
+        if shell(outlines, shape, middle) < volume { low = middle } else { high = middle }
+    }
+    Some(0.5 * (low + high))
+}
+
+/// The lightest material of which the shape can have the mass, and the thickness of its wall.
+fn wall(outlines: &[Outline], shape: Shape, mass: f64) -> Result<(&'static str, f64), String> {
+    for (name, density, words) in MATERIALS {
+        let Some(wall) = wall_for(outlines, shape, mass / density) else { continue };
+        if wall < THINNEST {
+            return Err(format!(
+                "its {mass:.3} kg would be a wall of {:.2} mm of {words} around its shape: the mass does not fit the mesh",
+                1e3 * wall
+            ));
+        }
+        return Ok((name, wall));
+    }
+    let solid = shell(outlines, shape, f64::INFINITY);
+    Err(format!(
+        "its mass contradicts its mesh: {mass:.2} kg within {:.2} litres, a solid of steel would have {:.2} kg",
+        1e3 * solid,
+        7850.0 * solid
+    ))
+}
+
+/// Second moments of a hollow section about y and z (m⁴).
+fn hollow(shape: Shape, [width, height]: [f64; 2], wall: f64) -> [f64; 2] {
+    let (w, h) = ((width - 2.0 * wall).max(0.0), (height - 2.0 * wall).max(0.0));
+    if shape == Shape::Tube {
+        return [std::f64::consts::PI / 64.0 * (width.powi(4) - w.powi(4)); 2];
+    }
+    [(width * height.powi(3) - w * h.powi(3)) / 12.0, (height * width.powi(3) - h * w.powi(3)) / 12.0]
+}
+
+/// The uniform section whose tip goes as far under a force as that of the link: `1/I = ∑ weight / I(x)` about both axes.
+fn equivalent(outlines: &[Outline], shape: Shape, length: f64, wall: f64) -> BeamSection {
+    let compliance = stations(length).fold([0.0; 2], |[a, b], (x, weight)| {
+        let [I_y, I_z] = hollow(shape, outline_at(outlines, x), wall);
+        [a + weight / I_y, b + weight / I_z]
+    });
+    let [I_y, I_z] = compliance.map(|c| 1.0 / c);
+    let [mut width, mut height] = [weighted(outlines, length, |o| o.width), weighted(outlines, length, |o| o.height)];
+    let largest = |x: f64| outline_at(outlines, x).into_iter().fold(0.0, f64::max);
+    let sizes = || stations(length).map(|(x, _)| largest(x));
+    let taper = sizes().fold(0.0, f64::max) / sizes().fold(f64::INFINITY, f64::min);
+    // Moments go with the sizes as powers of the fourth order about; this halves the error each time.
+    for _ in 0..60 {
+        let [now_y, now_z] = hollow(shape, [width, height], wall);
+        height *= (I_y / now_y).powf(0.25);
+        width *= (I_z / now_z).powf(0.25);
+    }
+    let solid = 2.0 * wall > 0.98 * width.min(height);
+    let section = match (shape, solid) {
+        (Shape::Box, false) => "box",
+        (Shape::Box, true) => "rectangle",
+        (Shape::Tube, false) => "tube",
+        (Shape::Tube, true) => "circle",
+    };
+    BeamSection {
+        section,
+        width,
+        height,
+        wall: (!solid).then_some(wall),
+        wall_of_half: None,
+        material: "aluminium",
+        y_axis: [0.0, 1.0, 0.0],
+        offset: [0.0; 3],
+        taper,
+        open: 0.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use flexarm_kinematics::JointKind;
+    use flexarm_urdf::Geometry;
+
+    use super::*;
+
+    fn candidate(mass: f64, meshes: &[TriangleMesh], X_LB: Pose) -> Result<BeamSection, String> {
+        let distal = Joint::new("elbow", JointKind::Fixed, "arm", "next", X_LB);
+        let inertia = LinkInertia { mass, com: Vector3::zeros(), inertia_com: Matrix3::identity() };
+        propose(&Candidate {
+            distal: &distal,
+            inertia: Some(inertia),
+            meshes,
+            arm: 2.0 * X_LB.translation.vector.norm(),
+        })
+    }
+
+    /// A body along x of M whose outline at each place is a polygon of these corners.
+    fn lofted(length: f64, outline: impl Fn(f64) -> Vec<[f64; 2]>) -> TriangleMesh {
+        let rings = 40;
+        let mut mesh = TriangleMesh::default();
+        for ring in 0..=rings {
+            let x = length * f64::from(ring) / f64::from(rings);
+            mesh.positions.extend(outline(x).iter().map(|[y, z]| [x as f32, *y as f32, *z as f32]));
+        }
+        let n = outline(0.0).len() as u32;
+        for ring in 0..rings as u32 {
+            for k in 0..n {
+                let (a, b) = (ring * n + k, ring * n + (k + 1) % n);
+                mesh.triangles.extend([[a, b, b + n], [a, b + n, a + n]]);
+            }
+        }
+        for k in 1..n - 1 {
+            let last = rings as u32 * n;
+            mesh.triangles.extend([[0, k + 1, k], [last, last + k, last + k + 1]]);
+        }
+        mesh
+    }
+
+    fn rectangle(w: f64, h: f64) -> Vec<[f64; 2]> {
+        vec![[-w / 2.0, -h / 2.0], [w / 2.0, -h / 2.0], [w / 2.0, h / 2.0], [-w / 2.0, h / 2.0]]
+    }
+
+    /// Truth: the box that the mesh and the mass were made of. Bound 1e-4: positions have seven digits, and the wall is a
+    /// small difference.
+    #[test]
+    fn a_box_of_known_wall_is_found_again_however_its_frame_is_turned() {
+        let (length, w, h, wall) = (0.9, 0.18, 0.12, 0.008);
+        let mass = 2700.0 * length * (w * h - (w - 2.0 * wall) * (h - 2.0 * wall));
+        let mesh = lofted(length, |_| rectangle(w, h));
+        for angles in [[0.0, 0.0, 0.0], [0.3, -0.5, 0.9], [1.2, 0.4, -2.0]] {
+            let R = Rotation3::from_euler_angles(angles[0], angles[1], angles[2]);
+            let X = Pose::from_parts(Translation3::identity(), R);
+            let X_LB = Pose::from_parts(Translation3::from(R * Vector3::x() * length), Rotation3::identity());
+            let found = candidate(mass, &[mesh.clone().transformed(&X)], X_LB).unwrap();
+            // Which of both sides is called the width follows from the frame.
+            let y = R.inverse() * Vector3::from(found.y_axis);
+            let (width, height) =
+                if y.y.abs() > 0.5 { (found.width, found.height) } else { (found.height, found.width) };
+            let errors = [width / w - 1.0, height / h - 1.0, found.wall.unwrap() / wall - 1.0];
+            assert!(errors.iter().all(|e| e.abs() < 1e-4), "{errors:?} {found:?}");
+            assert!(y.x.abs() < 1e-6 && y.y.abs().max(y.z.abs()) > 1.0 - 1e-6, "{y}");
+            assert_eq!((found.section, found.material), ("box", "aluminium"));
+            assert!((found.taper - 1.0).abs() < 1e-5 && found.open == 0.0);
+        }
+    }
+
+    /// Truth: tube of diameter 0.2 and wall 0.006. The mesh has 64 corners, so its second moments are 0.3 % below a circle's.
+    #[test]
+    fn a_tube_of_known_wall_is_found_again() {
+        let (length, diameter, wall) = (0.8, 0.2, 0.006);
+        let mass = 2700.0 * length * std::f64::consts::PI * (diameter - wall) * wall;
+        let circle = |_: f64| {
+            let corner = |k: i32| (f64::from(k) * std::f64::consts::TAU / 64.0).sin_cos();
+            (0..64).map(corner).map(|(s, c)| [0.5 * diameter * c, 0.5 * diameter * s]).collect()
+        };
+        let X_LB = Pose::from_parts(Translation3::new(length, 0.0, 0.0), Rotation3::identity());
+        let found = candidate(mass, &[lofted(length, circle)], X_LB).unwrap();
+        let stiffness = |d: f64, t: f64| d.powi(4) - (d - 2.0 * t).powi(4);
+        let errors = [
+            found.width / diameter - 1.0,
+            found.wall.unwrap() / wall - 1.0,
+            stiffness(found.width, found.wall.unwrap()) / stiffness(diameter, wall) - 1.0,
+        ];
+        assert_eq!(found.section, "tube");
+        assert!(errors[0].abs() < 2e-3 && errors[1].abs() < 3e-3 && errors[2].abs() < 5e-3, "{errors:?}");
+    }
+
+    /// Truth: tip of a cantilever under a force, `∫ (l - x)²/(E I(x)) dx`, by Simpson's rule in 2000 steps over the closed
+    /// form of I(x) of a tapered box.
+    #[test]
+    fn the_tip_of_a_tapered_link_goes_as_far_as_that_of_its_uniform_beam() {
+        let (length, wall) = (1.0, 0.01);
+        let size = |x: f64| [0.30 - 0.18 * x / length, 0.24 - 0.12 * x / length];
+        let area = |x: f64| {
+            let [w, h] = size(x);
+            w * h - (w - 2.0 * wall) * (h - 2.0 * wall)
+        };
+        let steps = 2000;
+        let simpson = |f: &dyn Fn(f64) -> f64| -> f64 {
+            let x = |k: i32| length * f64::from(k) / f64::from(steps);
+            let weight = |k: i32| {
+                if k == 0 || k == steps {
+                    1.0
+                } else if k % 2 == 1 {
+                    4.0
+                } else {
+                    2.0
+                }
+            };
+            (0..=steps).map(|k| weight(k) * f(x(k))).sum::<f64>() * length / (3.0 * f64::from(steps))
+        };
+        let mass = 2700.0 * simpson(&area);
+        let mesh = lofted(length, |x| rectangle(size(x)[0], size(x)[1]));
+        let X_LB = Pose::from_parts(Translation3::new(length, 0.0, 0.0), Rotation3::identity());
+        let found = candidate(mass, &[mesh], X_LB).unwrap();
+        let moments = hollow(Shape::Box, [found.width, found.height], found.wall.unwrap());
+        for (axis, moment) in moments.into_iter().enumerate() {
+            let truth = simpson(&|x| (length - x).powi(2) / hollow(Shape::Box, size(x), wall)[axis]);
+            let error = length.powi(3) / (3.0 * moment) / truth - 1.0;
+            assert!(error.abs() < 2e-3, "axis {axis}: {error:.2e}");
+        }
+        assert!(found.taper > 2.0, "{found:?}");
+    }
+
+    #[test]
+    fn a_mass_that_contradicts_the_mesh_gives_no_section_and_says_so() {
+        let mesh = lofted(0.9, |_| rectangle(0.18, 0.12));
+        let X_LB = Pose::from_parts(Translation3::new(0.9, 0.0, 0.0), Rotation3::identity());
+        let of = |mass: f64| candidate(mass, std::slice::from_ref(&mesh), X_LB);
+        let solid = 0.9 * 0.18 * 0.12;
+        assert!(of(7900.0 * solid).unwrap_err().contains("contradicts"));
+        assert_eq!(of(7000.0 * solid).unwrap().material, "ductile_iron");
+        assert_eq!(of(2600.0 * solid).unwrap().material, "aluminium");
+        assert!(of(0.1).unwrap_err().contains("wall of"));
+        let aside = Pose::from_parts(Translation3::new(0.0, 0.0, 0.9), Rotation3::identity());
+        let frames = candidate(20.0, std::slice::from_ref(&mesh), aside).unwrap_err();
+        assert!(frames.contains("do not run along"), "{frames}");
+        let short = Pose::from_parts(Translation3::new(0.1, 0.0, 0.0), Rotation3::identity());
+        assert!(candidate(20.0, &[mesh], short).unwrap_err().contains("stout"));
+        let wide = Geometry::Sphere { radius: 0.2 }.triangles().unwrap();
+        assert!(candidate(2.0, &[wide], short).is_err());
+    }
+}

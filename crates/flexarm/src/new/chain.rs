@@ -1,0 +1,390 @@
+//! Which joints are the arm: from the base to the tool, what moves on the way, and what is held.
+
+use std::collections::HashMap;
+
+use flexarm_kinematics::{Joint, JointKind, Mechanism};
+use flexarm_urdf::closest;
+
+use super::{NewError, NewOptions};
+
+/// Names of tool frames, best first, as they are and with a prefix (`arm_tool0`).
+const TOOLS: [&str; 12] = [
+    "tool0",
+    "tcp",
+    "hand_tcp",
+    "tool_frame",
+    "flange",
+    "ee_link",
+    "link_ee",
+    "end_effector",
+    "end_effector_link",
+    "tool_link",
+    "ee",
+    "gripper_frame_link",
+];
+/// Words in the names of joints that belong to a hand.
+const HAND: [&str; 8] = ["finger", "thumb", "gripper", "jaw", "knuckle", "claw", "grasp", "palm"];
+/// Words in the names of links that are fingers.
+const FINGER: [&str; 5] = ["finger", "thumb", "jaw", "knuckle", "claw"];
+/// Words of chains that are no arms.
+const NO_ARM: [&str; 12] =
+    ["leg", "ankle", "foot", "toe", "wheel", "knee", "hip", "head", "neck", "camera", "caster", "sole"];
+
+/// The arm in the mechanism; numbers are places in its list of joints.
+#[derive(Clone, Debug)]
+pub(crate) struct Chain {
+    pub(crate) base: String,
+    pub(crate) tool: String,
+    /// All joints from the base to the tool, fixed ones too.
+    pub(crate) path: Vec<usize>,
+    /// Those that the motion moves.
+    pub(crate) joints: Vec<usize>,
+    /// Joints that move by themselves and are held, with the reason.
+    pub(crate) held: Vec<(usize, &'static str)>,
+    /// What was chosen among several, in words.
+    pub(crate) choices: Vec<String>,
+}
+
+/// A joint with a coordinate of its own and room to move.
+fn is_free(joint: &Joint) -> bool {
+    joint.kind.degrees_of_freedom() == 1 && joint.mimic.is_none() && joint.limits.lower < joint.limits.upper
+}
+
+/// A joint that moves, by itself or after another one.
+fn moves(joint: &Joint) -> bool {
+    joint.kind != JointKind::Fixed
+}
+
+struct Tree<'a> {
+    mechanism: &'a Mechanism,
+    /// Joint above each link.
+    above: HashMap<&'a str, usize>,
+}
+
+impl<'a> Tree<'a> {
+    fn new(mechanism: &'a Mechanism) -> Self {
+        let above = mechanism.joints.iter().enumerate().map(|(k, j)| (j.child.as_str(), k)).collect();
+        Self { mechanism, above }
+    }
+
+    fn joint(&self, k: usize) -> &'a Joint {
+        &self.mechanism.joints[k]
+    }
+
+    fn root(&self) -> Option<&'a str> {
+        self.mechanism.links.iter().map(|l| l.name.as_str()).find(|link| !self.above.contains_key(link))
+    }
+
+    /// Joints from the root to a link.
+    fn path(&self, link: &str) -> Vec<usize> {
+        let mut path = Vec::new();
+        let mut at = link;
+        while let (Some(&k), true) = (self.above.get(at), path.len() <= self.mechanism.joints.len()) {
+            path.push(k);
+            at = &self.joint(k).parent;
+        }
+        path.reverse();
+        path
+    }
+
+    fn below(&self, link: &'a str) -> impl Iterator<Item = usize> + 'a {
+        let joints = &self.mechanism.joints;
+        (0..joints.len()).filter(move |&k| joints[k].parent == link)
+    }
+
+    /// Links fixed to this one, itself first, nearer ones before farther ones.
+    fn body(&self, link: &'a str) -> Vec<&'a str> {
+        let mut body = vec![link];
+        let mut at = 0;
+        while at < body.len() {
+            body.extend(self.below(body[at]).filter(|&k| !moves(self.joint(k))).map(|k| self.joint(k).child.as_str()));
+            at += 1;
+        }
+        body
+    }
+
+    /// Moving joints that start at a link or at one that is fixed to it.
+    fn branches(&self, link: &'a str) -> Vec<usize> {
+        let body = self.body(link);
+        body.into_iter().flat_map(|link| self.below(link)).filter(|&k| moves(self.joint(k))).collect()
+    }
+}
+
+/// The chain that was asked for, else the longest one that is an arm.
+pub(crate) fn find(mechanism: &Mechanism, options: &NewOptions) -> Result<Chain, NewError> {
+    let tree = Tree::new(mechanism);
+    if !mechanism.joints.iter().any(is_free) {
+        return Err(NewError::NoMovableJoint { robot: mechanism.name.clone(), fixed: mechanism.joints.len() });
+    }
+    let root = tree.root().unwrap_or_default().to_owned();
+    let known = |link: &String| {
+        let links = || mechanism.links.iter().map(|l| l.name.as_str());
+        match mechanism.link(link) {
+            Some(_) => Ok(link.clone()),
+            None => Err(NewError::NoLink {
+                link: link.clone(),
+                closest: closest(link, links()),
+                known: links().map(str::to_owned).collect(),
+            }),
+        }
+    };
+    let base = options.base.as_ref().map(known).transpose()?.unwrap_or(root);
+    let mut choices = Vec::new();
+    let tool = match &options.tool {
+        Some(tool) => known(tool)?,
+        None => choose_tool(&tree, &base, &mut choices)?,
+    };
+    let whole = tree.path(&tool);
+    let path: Vec<usize> = match whole.iter().position(|&k| tree.joint(k).parent == base) {
+        Some(first) => whole[first..].to_vec(),
+        None if tool == base => Vec::new(),
+        None => return Err(NewError::NotBelow { base, tool }),
+    };
+    let on_path: Vec<usize> = path.iter().copied().filter(|&k| is_free(tree.joint(k))).collect();
+    let joints = match &options.joints {
+        Some(names) => named_joints(mechanism, names)?,
+        None => on_path,
+    };
+    if joints.is_empty() {
+        return Err(NewError::NothingMoves { base, tool });
+    }
+    let reason = |k: usize| {
+        if path.contains(&k) {
+            "not asked for"
+        } else if whole.contains(&k) {
+            "before the base of the arm"
+        } else if is_of_hand(tree.joint(k)) {
+            "part of a gripper or hand"
+        } else {
+            "not on the way from base to tool"
+        }
+    };
+    let others = (0..mechanism.joints.len()).filter(|k| is_free(tree.joint(*k)) && !joints.contains(k));
+    Ok(Chain { held: others.map(|k| (k, reason(k))).collect(), base, tool, path, joints, choices })
+}
+
+fn named_joints(mechanism: &Mechanism, names: &[String]) -> Result<Vec<usize>, NewError> {
+    let free = || mechanism.joints.iter().filter(|j| is_free(j)).map(|j| j.name.as_str());
+    let place = |name: &String| {
+        let found = mechanism.joints.iter().position(|j| j.name == *name && is_free(j));
+        found.ok_or_else(|| NewError::NoJoint {
+            joint: name.clone(),
+            closest: closest(name, free()),
+            known: free().map(str::to_owned).collect(),
+        })
+    };
+    let mut joints = names.iter().map(place).collect::<Result<Vec<_>, _>>()?;
+    joints.sort_unstable();
+    joints.dedup();
+    Ok(joints)
+}
+
+/// Whether a joint is one of a hand: by its name, or because it moves a finger. The body of a gripper may turn with the arm.
+fn is_of_hand(joint: &Joint) -> bool {
+    let (name, child) = (joint.name.to_lowercase(), joint.child.to_lowercase());
+    HAND.iter().any(|word| name.contains(word)) || FINGER.iter().any(|word| child.contains(word))
+}
+
+/// A chain that may be the arm.
+struct Candidate<'a> {
+    /// Last link that moves.
+    end: &'a str,
+    /// Number of joints that move by themselves.
+    joints: usize,
+    /// Length of all offsets (m).
+    length: f64,
+    is_arm: bool,
+    tool: &'a str,
+    named: bool,
+}
+
+fn choose_tool(tree: &Tree<'_>, base: &str, choices: &mut Vec<String>) -> Result<String, NewError> {
+    let mechanism = tree.mechanism;
+    let is_leaf = |link: &&str| tree.below(link).next().is_none();
+    let mut candidates: Vec<Candidate<'_>> = Vec::new();
+    for leaf in mechanism.links.iter().map(|l| l.name.as_str()).filter(is_leaf) {
+        let path = tree.path(leaf);
+        let Some(first) = path.iter().position(|&k| tree.joint(k).parent == base) else { continue };
+        let path = without_hand(tree, &path[first..]);
+        let Some(last) = path.iter().rposition(|&k| is_free(tree.joint(k))) else { continue };
+        let end = tree.joint(path[last]).child.as_str();
+        if candidates.iter().any(|c| c.end == end) {
+            continue;
+        }
+        let path = &path[..=last];
+        let free = path.iter().filter(|&&k| is_free(tree.joint(k)));
+        let word = |joint: &Joint| {
+            let names = [joint.name.to_lowercase(), joint.child.to_lowercase()];
+            NO_ARM.iter().any(|word| names.iter().any(|n| n.split(['_', '-', '/']).any(|part| part.starts_with(word))))
+        };
+        let (tool, named) = tool_of(tree, end);
+        candidates.push(Candidate {
+            end,
+            joints: free.count(),
+            length: path.iter().map(|&k| tree.joint(k).X_PJ.translation.vector.norm()).sum(),
+            is_arm: !path.iter().any(|&k| is_free(tree.joint(k)) && word(tree.joint(k))),
+            tool,
+            named,
+        });
+    }
+    // The order of the file among equals.
+    let best = candidates.iter().rev().max_by(|a, b| {
+        let rank = |c: &Candidate<'_>| (c.is_arm, c.joints, c.named);
+        rank(a).cmp(&rank(b)).then((1e3 * a.length).round().total_cmp(&(1e3 * b.length).round()))
+    });
+    let Some(best) = best else { return Err(NewError::NothingBelow { base: base.to_owned() }) };
+    let equals: Vec<String> = candidates
+        .iter()
+        .filter(|c| c.end != best.end && c.is_arm && c.joints == best.joints && c.joints > 1)
+        .map(|c| format!("{:?}", c.tool))
+        .collect();
+    if !equals.is_empty() {
+        choices.push(format!(
+            "the arm that ends at {:?} was taken; {} others have as many joints, with the tools {}",
+            best.tool,
+            equals.len(),
+            equals.join(", ")
+        ));
+    }
+    Ok(best.tool.to_owned())
+}
+
+/// The path up to where a hand begins: a finger by its name, or several short chains from one body after at least three joints.
+fn without_hand(tree: &Tree<'_>, path: &[usize]) -> Vec<usize> {
+    let mut free = 0;
+    let mut length = 0.0;
+    for (place, &k) in path.iter().enumerate() {
+        let joint = tree.joint(k);
+        if moves(joint) {
+            let fans_out = free >= 3 && {
+                let body_root = path[..place].iter().rev().find(|&&k| moves(tree.joint(k)));
+                let body = body_root.map_or(joint.parent.as_str(), |&k| tree.joint(k).child.as_str());
+                let branches = tree.branches(body);
+                branches.len() > 1 && branches.iter().all(|&k| reach(tree, k) < 0.35 * length)
+            };
+            if free >= 1 && (is_of_hand(joint) || fans_out) {
+                return path[..place].to_vec();
+            }
+            free += usize::from(is_free(joint));
+        }
+        length += joint.X_PJ.translation.vector.norm();
+    }
+    path.to_vec()
+}
+
+/// Longest way along joint offsets below a joint, its own not counted (m).
+fn reach(tree: &Tree<'_>, joint: usize) -> f64 {
+    let mut longest = 0.0f64;
+    let mut open = vec![(tree.joint(joint).child.as_str(), 0.0, 0usize)];
+    while let Some((link, so_far, depth)) = open.pop() {
+        longest = longest.max(so_far);
+        if depth > tree.mechanism.joints.len() {
+            break;
+        }
+        for k in tree.below(link) {
+            let joint = tree.joint(k);
+            open.push((&joint.child, so_far + joint.X_PJ.translation.vector.norm(), depth + 1));
+        }
+    }
+    longest
+}
+
+/// The tool frame on the body of a link: by name, else the end of its chain of frames without shape; and whether by name.
+fn tool_of<'a>(tree: &Tree<'a>, end: &'a str) -> (&'a str, bool) {
+    let body = tree.body(end);
+    let is_named = |link: &str, tool: &str| {
+        let link = link.to_lowercase();
+        link == tool || link.strip_suffix(tool).is_some_and(|prefix| prefix.ends_with(['_', '-', '/', ':', '.']))
+    };
+    for tool in TOOLS {
+        if let Some(link) = body.iter().copied().find(|link| is_named(link, tool)) {
+            return (link, true);
+        }
+    }
+    // Cameras and sensors hang beside; what follows the last joint without a fork leads to the tool.
+    let mut at = end;
+    loop {
+        let mut children = tree.below(at).filter(|&k| !moves(tree.joint(k)));
+        match (children.next(), children.next()) {
+            (Some(k), None) => at = &tree.joint(k).child,
+            _ => return (at, false),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use flexarm_kinematics::{Link, Mimic, Pose};
+    use nalgebra::{Translation3, Vector3};
+
+    use super::*;
+
+    /// (parent, child, moves, offset along x)
+    fn mechanism(joints: &[(&str, &str, bool, f64)]) -> Mechanism {
+        let mut m = Mechanism::new("m");
+        m.links.push(Link { name: "base".into(), inertia: None });
+        for (parent, child, moves, x) in joints {
+            m.links.push(Link { name: (*child).into(), inertia: None });
+            let kind = if *moves { JointKind::Revolute(Vector3::z_axis()) } else { JointKind::Fixed };
+            let X = Pose::from_parts(Translation3::new(*x, 0.0, 0.0), nalgebra::Rotation3::identity());
+            m.joints.push(Joint::new(format!("to_{child}"), kind, *parent, *child, X));
+        }
+        m
+    }
+
+    fn names(mechanism: &Mechanism, chain: &Chain) -> Vec<String> {
+        chain.joints.iter().map(|&k| mechanism.joints[k].child.clone()).collect()
+    }
+
+    #[test]
+    fn fingers_are_no_part_of_the_arm_whether_by_name_or_because_a_hand_fans_out() {
+        let arm = [("base", "a", true, 0.3), ("a", "b", true, 0.5), ("b", "c", true, 0.4), ("c", "tool", false, 0.1)];
+        let by_name = [&arm[..], &[("tool", "left_finger", true, 0.02), ("left_finger", "tip", true, 0.05)]].concat();
+        let by_shape =
+            [&arm[..], &[("tool", "x1", true, 0.02), ("x1", "x2", true, 0.05), ("tool", "y1", true, 0.02)]].concat();
+        for joints in [by_name, by_shape] {
+            let mechanism = mechanism(&joints);
+            let chain = find(&mechanism, &NewOptions::default()).unwrap();
+            assert_eq!(names(&mechanism, &chain), ["a", "b", "c"]);
+            assert_eq!(chain.tool, "tool");
+            assert_eq!(chain.held.len(), joints.len() - 4);
+        }
+    }
+
+    #[test]
+    fn of_two_arms_the_first_is_taken_and_the_other_told_and_legs_are_no_arms() {
+        let joints = [
+            ("base", "leg_1", true, 0.3),
+            ("leg_1", "leg_2", true, 0.5),
+            ("leg_2", "leg_3", true, 0.5),
+            ("base", "l1", true, 0.3),
+            ("l1", "l2", true, 0.4),
+            ("l2", "left_tool0", false, 0.1),
+            ("base", "r1", true, 0.3),
+            ("r1", "r2", true, 0.4),
+            ("r2", "right_tool0", false, 0.1),
+        ];
+        let mechanism = mechanism(&joints);
+        let chain = find(&mechanism, &NewOptions::default()).unwrap();
+        assert_eq!(chain.tool, "left_tool0");
+        assert!(chain.choices[0].contains("right_tool0"), "{:?}", chain.choices);
+        assert_eq!(chain.held.len(), 5);
+        let right = NewOptions { tool: Some("right_tool0".into()), ..NewOptions::default() };
+        assert_eq!(names(&mechanism, &find(&mechanism, &right).unwrap()), ["r1", "r2"]);
+        let from = NewOptions { base: Some("r1".into()), ..right.clone() };
+        assert_eq!(names(&mechanism, &find(&mechanism, &from).unwrap()), ["r2"]);
+        let wrong = NewOptions { base: Some("l1".into()), ..right };
+        assert!(matches!(find(&mechanism, &wrong), Err(NewError::NotBelow { .. })));
+    }
+
+    #[test]
+    fn followers_and_joints_without_room_move_nothing_by_themselves() {
+        let mut mechanism = mechanism(&[("base", "a", true, 0.3), ("a", "b", true, 0.5), ("b", "c", true, 0.5)]);
+        mechanism.joints[1].mimic = Some(Mimic { joint: "to_a".into(), ratio: 1.0, offset: 0.0 });
+        (mechanism.joints[2].limits.lower, mechanism.joints[2].limits.upper) = (0.1, 0.1);
+        let chain = find(&mechanism, &NewOptions::default()).unwrap();
+        assert_eq!(names(&mechanism, &chain), ["a"]);
+        mechanism.joints.iter_mut().for_each(|j| j.kind = JointKind::Fixed);
+        assert!(matches!(find(&mechanism, &NewOptions::default()), Err(NewError::NoMovableJoint { .. })));
+    }
+}

@@ -1,0 +1,139 @@
+//! Torsional stiffness of reducers by their rated torque: two families of catalogues.
+//!
+//! Stiffness grows almost as the rated torque does: both families turn by about 1e-3 rad under it.
+
+use serde::Serialize;
+
+/// N m per minute of arc in N m/rad.
+const ARC_MINUTE: f64 = 60.0 * 180.0 / std::f64::consts::PI;
+
+/// Cycloidal reducers, series RV-E of Nabtesco: size, rated torque (N m), torsional rigidity (N m per minute of arc).
+const CYCLOIDAL: [(f64, f64, f64); 8] = [
+    (6.0, 58.0, 20.0),
+    (20.0, 167.0, 49.0),
+    (40.0, 412.0, 108.0),
+    (80.0, 784.0, 196.0),
+    (110.0, 1078.0, 294.0),
+    (160.0, 1568.0, 392.0),
+    (320.0, 3136.0, 980.0),
+    (450.0, 4410.0, 1176.0),
+];
+
+/// Strain-wave gears, series CSG of Harmonic Drive at ratios from 80: size, rated torque (N m), stiffness at small torque (K1)
+/// and at large torque (K3) (N m/rad).
+const STRAIN_WAVE: [(f64, f64, f64, f64); 8] = [
+    (14.0, 10.0, 4.7e3, 7.1e3),
+    (17.0, 31.0, 1.0e4, 1.6e4),
+    (20.0, 52.0, 1.6e4, 2.9e4),
+    (25.0, 87.0, 3.1e4, 5.7e4),
+    (32.0, 178.0, 6.7e4, 1.2e5),
+    (40.0, 345.0, 1.3e5, 2.3e5),
+    (50.0, 611.0, 2.5e5, 4.4e5),
+    (65.0, 1236.0, 5.4e5, 9.8e5),
+];
+
+/// From this rated torque on, arms have cycloidal reducers (N m).
+pub(crate) const CYCLOIDAL_FROM: f64 = 200.0;
+/// Torque for starting and stopping over rated torque, of both families about.
+pub(crate) const PEAK_OVER_RATED: f64 = 2.5;
+/// What gears of arms were identified at over the catalogue's value: the main axes of the shipped KR 210, KR 300 and KR 500.
+pub(crate) const IDENTIFIED: [f64; 2] = [0.45, 1.9];
+
+/// Stiffness of a reducer for a rated torque.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct GearClass {
+    /// What a reducer of this class has (N m/rad).
+    pub(crate) stiffness: f64,
+    /// Lowest and highest that the class shows (N m/rad).
+    pub(crate) low: f64,
+    pub(crate) high: f64,
+    /// Family, sizes and where the range comes from.
+    pub(crate) source: String,
+    /// Whether the torque is outside of the table.
+    pub(crate) is_beyond: bool,
+}
+
+/// The class of a rated torque (N m, above 0): by powers between two sizes, in proportion beyond the table.
+pub(crate) fn class(rated: f64) -> GearClass {
+    if rated >= CYCLOIDAL_FROM {
+        let rows: Vec<_> =
+            CYCLOIDAL.iter().map(|&(size, torque, rigidity)| (size, torque, rigidity * ARC_MINUTE)).collect();
+        let (stiffness, sizes, is_beyond) = between(&rows, rated, "RV-", "E");
+        let [low, high] = IDENTIFIED.map(|factor| factor * stiffness);
+        let source = format!(
+            "cycloidal reducers, Nabtesco's catalogue RV-E, {sizes}; low and high: what main axes were identified at over this \
+             (KR 210, KR 300 and KR 500 in robots/)"
+        );
+        return GearClass { stiffness, low, high, source, is_beyond };
+    }
+    let rows = |which: fn(&(f64, f64, f64, f64)) -> f64| -> Vec<_> {
+        STRAIN_WAVE.iter().map(|row| (row.0, row.1, which(row))).collect()
+    };
+    let (low, sizes, is_beyond) = between(&rows(|row| row.2), rated, "CSG-", "");
+    let (high, ..) = between(&rows(|row| row.3), rated, "CSG-", "");
+    let source = format!(
+        "strain-wave gears, Harmonic Drive's catalogue CSG, ratio 80 and above, {sizes}; low: K1 at small torque, high: K3 at \
+         large torque"
+    );
+    GearClass { stiffness: (low * high).sqrt(), low, high, source, is_beyond }
+}
+
+/// Interpolation by powers; the sizes on both sides in words, and whether there is one side only.
+fn between(rows: &[(f64, f64, f64)], rated: f64, before: &str, after: &str) -> (f64, String, bool) {
+    let name = |row: &(f64, f64, f64)| format!("{before}{:.0}{after}", row.0);
+    let above = rows.iter().position(|row| row.1 >= rated);
+    match above {
+        Some(0) => {
+            (rows[0].2 * rated / rows[0].1, format!("in proportion below {}", name(&rows[0])), rated < rows[0].1)
+        }
+        None => {
+            let last = rows[rows.len() - 1];
+            (last.2 * rated / last.1, format!("in proportion above {}", name(&last)), true)
+        }
+        Some(k) => {
+            let (a, b) = (rows[k - 1], rows[k]);
+            let exponent = (b.2 / a.2).ln() / (b.1 / a.1).ln();
+            (a.2 * (rated / a.1).powf(exponent), format!("between {} and {}", name(&a), name(&b)), false)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Truth: the rows of the catalogues themselves; a turn under rated torque of about 1e-3 rad between them.
+    #[test]
+    fn the_stiffness_at_the_rated_torque_of_a_size_is_that_of_the_catalogue_and_rises_between() {
+        let exact = class(412.0).stiffness / (108.0 * ARC_MINUTE) - 1.0;
+        assert!(exact.abs() < 1e-12, "{exact:.1e}");
+        let found = class(87.0);
+        assert!((found.low / 3.1e4 - 1.0).abs() < 1e-12 && (found.high / 5.7e4 - 1.0).abs() < 1e-12, "{found:?}");
+        let mut before = 0.0;
+        for k in 0..400 {
+            let rated = 0.5 * 1.03f64.powi(k);
+            let found = class(rated);
+            let turned = rated / found.stiffness;
+            assert!(found.stiffness > before, "{rated} {found:?}");
+            assert!((6e-4..=2.5e-3).contains(&turned), "{rated} N m: {turned:.2e} rad");
+            assert!(found.low < found.stiffness && found.stiffness < found.high);
+            before = found.stiffness;
+        }
+    }
+
+    /// Truth: what was identified on arms (robots/README of each), at their largest torque over 2.5.
+    #[test]
+    fn main_axes_of_identified_arms_lie_within_the_range_of_their_class() {
+        let arms = [
+            ("KR 210", [(7290.0, 2_207_197.5), (8910.0, 3_376_721.9), (6988.8, 2_775_692.4)]),
+            ("KR 300", [(12842.9, 4.5778e6), (13371.4, 8.7e6), (12616.7, 4.7e6)]),
+            ("KR 500", [(13440.0, 2.3e6), (18360.0, 8.6e6), (11027.0, 2.8e6)]),
+        ];
+        for (arm, axes) in arms {
+            for (axis, (effort, identified)) in axes.into_iter().enumerate() {
+                let class = class(effort / PEAK_OVER_RATED);
+                assert!((class.low..=class.high).contains(&identified), "{arm} {axis}: {class:?}");
+            }
+        }
+    }
+}

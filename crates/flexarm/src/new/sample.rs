@@ -1,0 +1,219 @@
+//! A sample motion: from point to point through the workspace, within the limits of the joints.
+
+use flexarm_kinematics::{Data, Joint, Model, State, inverse_dynamics};
+use nalgebra::DVector;
+
+use super::loads::{Posed, SPEED_UP, Workspace, posed};
+
+/// Part of the speed limits that the motion uses.
+const SPEED: f64 = 0.6;
+/// Part of the effort limits that it may need.
+const EFFORT: f64 = 0.85;
+/// Part of the effort limits that the weight may need where it rests.
+const WEIGHT: f64 = 0.7;
+/// Fastest joint of the motion (rad/s, m/s), whatever its limit.
+const FASTEST: f64 = 2.5;
+/// Peaks of a quintic over the mean: speed 15/8 D/T, acceleration 10/√3 D/T².
+const PEAKS: [f64; 2] = [1.875, 5.773_502_691_896_258];
+/// Half of the way that a joint takes at most, over its speed limit (s): 8 s at 60 % of it.
+pub(crate) const LONGEST_WAY: f64 = 1.28;
+/// Goals beside the start.
+const GOALS: usize = 4;
+
+/// A joint of the motion.
+#[derive(Clone, Debug)]
+pub(crate) struct Axis {
+    /// Its coordinate.
+    pub(crate) k: usize,
+    pub(crate) slides: bool,
+    /// Range in which the workspace was looked at.
+    pub(crate) full: [f64; 2],
+    /// What of it the motion uses: the same middle, less where the joint is slow.
+    pub(crate) range: [f64; 2],
+    /// Speed limit, or what is assumed (rad/s, m/s).
+    pub(crate) speed: f64,
+    /// Effort limit, where it can be kept (N m, N).
+    pub(crate) effort: f64,
+}
+
+/// A rest of the motion and the time to it (s), values in the order of the axes.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Rest {
+    pub(crate) at: Vec<f64>,
+    pub(crate) duration: f64,
+}
+
+/// Rests, the start first (with no duration) and last; and what could not be kept, in words.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct SampleMotion {
+    pub(crate) rests: Vec<Rest>,
+    pub(crate) notes: Vec<String>,
+}
+
+/// Values as they are written: tenths of a degree, tenths of a millimetre, within the range.
+fn rounded(axis: &Axis, value: f64) -> f64 {
+    let unit = if axis.slides { 1e-4 } else { 0.1f64.to_radians() };
+    let steps = (value / unit).round();
+    let steps = if steps * unit > axis.range[1] { steps - 1.0 } else { steps };
+    let steps = if steps * unit < axis.range[0] { steps + 1.0 } else { steps };
+    steps * unit
+}
+
+/// What a rest must have.
+struct Wish {
+    /// Lowest height of a frame (m).
+    floor: f64,
+    /// Least distance of the tool from the axis through the base (m).
+    radius: f64,
+    torque: bool,
+}
+
+impl Wish {
+    fn holds(&self, pose: &Posed, axes: &[Axis]) -> bool {
+        let strong = |axis: &Axis| !axis.effort.is_finite() || pose.weight[axis.k] <= WEIGHT * axis.effort;
+        pose.lowest >= self.floor && pose.tool.xy().norm() >= self.radius && (!self.torque || axes.iter().all(strong))
+    }
+}
+
+/// Rests far from each other, by the place of the tool, with ways between them that keep above the floor.
+pub(crate) fn sample_motion(model: &Model, workspace: &Workspace, axes: &[Axis]) -> SampleMotion {
+    let mut data = Data::new(model);
+    let inner = |pose: &Posed| {
+        let mut q = pose.q.clone();
+        for axis in axes {
+            let part = (q[axis.k] - axis.full[0]) / (axis.full[1] - axis.full[0]);
+            let [low, high] = axis.range;
+            q[axis.k] = rounded(axis, 0.5 * (low + high) + 0.8 * (part - 0.5) * (high - low));
+        }
+        q
+    };
+    let poses: Vec<Posed> = workspace.poses.iter().map(|p| posed(model, &mut data, inner(p))).collect();
+    let reach = poses.iter().map(|p| p.tool.xy().norm()).fold(0.0, f64::max);
+    let all_low = poses.iter().map(|p| p.lowest).fold(f64::INFINITY, f64::min);
+    let still = still_height(model, &mut data, workspace);
+    let wishes = [
+        Wish { floor: still - 0.02 * reach, radius: 0.3 * reach, torque: true },
+        Wish { floor: still - 0.3 * reach, radius: 0.2 * reach, torque: true },
+        Wish { floor: all_low - 1.0, radius: 0.0, torque: true },
+        Wish { floor: all_low - 1.0, radius: 0.0, torque: false },
+    ];
+    let mut motion = SampleMotion::default();
+    let (mut rests, mut wish) = (Vec::new(), 0);
+    for (k, one) in wishes.iter().enumerate() {
+        wish = k;
+        rests = choose(model, &mut data, &poses, axes, one);
+        if rests.len() > 2 {
+            break;
+        }
+    }
+    if wish == 3 {
+        motion.notes.push("the effort limits do not hold the arm in the poses of the motion".into());
+    }
+    if rests.is_empty() {
+        rests.extend(poses.first().cloned());
+    }
+    let start: Vec<f64> = axes.iter().map(|axis| rests[0].q[axis.k]).collect();
+    motion.rests.push(Rest { at: start.clone(), duration: 0.0 });
+    for pose in rests[1..].iter().chain(std::iter::once(&rests[0])) {
+        let at: Vec<f64> = axes.iter().map(|axis| pose.q[axis.k]).collect();
+        let from = motion.rests[motion.rests.len() - 1].at.clone();
+        let (duration, kept) = duration(model, &mut data, &rests[0].q, axes, [&from, &at]);
+        if !kept {
+            motion.notes.push(format!("the effort limits are passed on the way to rest {}", motion.rests.len()));
+        }
+        motion.rests.push(Rest { at, duration });
+    }
+    motion
+}
+
+/// Height of the lowest frame of all that do not move, or of the base.
+fn still_height(model: &Model, data: &mut Data, workspace: &Workspace) -> f64 {
+    // Frames that have the same height in all poses.
+    let heights = |data: &mut Data, q: &DVector<f64>| -> Vec<f64> {
+        flexarm_kinematics::forward_kinematics(model, data, q);
+        model.frames().iter().map(|frame| data.X_WF(frame).translation.vector.z).collect()
+    };
+    let some = workspace.poses.iter().take(3).map(|pose| heights(data, &pose.q)).collect::<Vec<_>>();
+    let Some(first) = some.first() else { return 0.0 };
+    let still = (0..first.len()).filter(|&k| some.iter().all(|h| (h[k] - first[k]).abs() < 1e-6));
+    still.map(|k| first[k]).fold(f64::INFINITY, f64::min).min(0.0)
+}
+
+/// The pose nearest to the middle of the ranges, then always the one whose tool is farthest from all before.
+fn choose(model: &Model, data: &mut Data, poses: &[Posed], axes: &[Axis], wish: &Wish) -> Vec<Posed> {
+    let away = |pose: &Posed| -> f64 {
+        let part =
+            |axis: &Axis| (pose.q[axis.k] - 0.5 * (axis.range[0] + axis.range[1])) / (axis.range[1] - axis.range[0]);
+        axes.iter().map(|axis| part(axis).powi(2)).sum()
+    };
+    let sound: Vec<&Posed> = poses.iter().filter(|pose| wish.holds(pose, axes)).collect();
+    let Some(&start) = sound.iter().min_by(|a, b| away(a).total_cmp(&away(b))) else { return Vec::new() };
+    let mut rests = vec![start.clone()];
+    let mut way = |a: &Posed, b: &Posed| {
+        (1..8).all(|i| wish.holds(&posed(model, data, a.q.lerp(&b.q, f64::from(i) / 8.0)), axes))
+    };
+    while rests.len() <= GOALS {
+        let distance = |pose: &Posed| rests.iter().map(|r| (r.tool - pose.tool).norm()).fold(f64::INFINITY, f64::min);
+        let mut order: Vec<(&Posed, f64)> =
+            sound.iter().map(|p| (*p, distance(p))).filter(|(_, d)| *d > 1e-6).collect();
+        order.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let last = &rests[rests.len() - 1];
+        let next = order.iter().map(|(p, _)| *p).find(|pose| way(last, pose) && way(pose, start));
+        let Some(next) = next else { break };
+        let next = next.clone();
+        rests.push(next);
+    }
+    rests
+}
+
+/// How long a move takes (s), in tenths; and whether the effort limits are kept.
+fn duration(model: &Model, data: &mut Data, at: &DVector<f64>, axes: &[Axis], [from, to]: [&[f64]; 2]) -> (f64, bool) {
+    let mut time = 0.2f64;
+    for (axis, way) in axes.iter().zip(from.iter().zip(to).map(|(a, b)| (b - a).abs())) {
+        let speed = (SPEED * axis.speed).min(FASTEST);
+        let acceleration = speed / SPEED_UP;
+        time = time.max(PEAKS[0] * way / speed).max((PEAKS[1] * way / acceleration).sqrt());
+    }
+    let tenths = |time: f64| (10.0 * time - 1e-9).ceil() / 10.0;
+    time = tenths(time);
+    for _ in 0..25 {
+        if strong_enough(model, data, at, axes, [from, to], time) {
+            return (time, true);
+        }
+        time = tenths(1.15 * time);
+    }
+    (time, false)
+}
+
+/// Torques of the rigid robot along a quintic against the effort limits.
+fn strong_enough(
+    model: &Model,
+    data: &mut Data,
+    at: &DVector<f64>,
+    axes: &[Axis],
+    [from, to]: [&[f64]; 2],
+    time: f64,
+) -> bool {
+    let mut state = State::zeros(model);
+    let mut a = DVector::zeros(model.nv());
+    state.q.copy_from(at);
+    (0..=40).all(|i| {
+        let u = f64::from(i) / 40.0;
+        let s = u.powi(3) * (10.0 - 15.0 * u + 6.0 * u * u);
+        let ds = 30.0 * (u * (1.0 - u)).powi(2) / time;
+        let dds = 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u) / (time * time);
+        for (axis, (from, to)) in axes.iter().zip(from.iter().zip(to)) {
+            let way = to - from;
+            (state.q[axis.k], state.qdot[axis.k], a[axis.k]) = (from + way * s, way * ds, way * dds);
+        }
+        let torques = inverse_dynamics(model, data, &state, &a);
+        axes.iter().all(|axis| !axis.effort.is_finite() || torques[axis.k].abs() <= EFFORT * axis.effort)
+    })
+}
+
+/// Speed limit of a joint, or what is assumed where there is none.
+pub(crate) fn speed_of(joint: &Joint) -> (f64, bool) {
+    let limit = joint.limits.velocity;
+    let assumed = if joint.kind.slides() { 0.25 } else { 1.0 };
+    if limit.is_finite() && limit > 1e-6 { (limit, false) } else { (assumed, true) }
+}

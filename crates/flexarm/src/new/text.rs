@@ -1,0 +1,375 @@
+//! The files as text: `robot.toml`, `motion.toml`, `README.md`.
+
+use std::fmt::Write;
+
+use super::beams::BeamSection;
+use super::draft::{Draft, DraftLink};
+use super::place::Placed;
+
+/// A text as TOML writes it, also as a key.
+fn quoted(text: &str) -> String {
+    // JSON escapes are TOML's, but for one character.
+    serde_json::to_string(text).unwrap_or_default().replace('\u{7f}', "\\u007F")
+}
+
+/// A name within a comment: on one line.
+fn inline(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
+}
+
+/// A number with three digits that count, as the decimal nearest to them.
+pub(crate) fn three_digits(value: f64) -> f64 {
+    format!("{value:.2e}").parse().unwrap_or(value)
+}
+
+/// A length to a hundredth of a millimetre, a direction to six digits, as TOML writes floats.
+fn float(value: f64, digits: i32) -> String {
+    let scale = 10f64.powi(digits);
+    let value = (value * scale).round() / scale;
+    format!("{:?}", if value == 0.0 { 0.0 } else { value })
+}
+
+fn vector(values: &[f64; 3], digits: i32) -> String {
+    format!("[{}]", values.map(|x| float(x, digits)).join(", "))
+}
+
+/// `box of 120 x 180 mm with a wall of 8.0 mm`.
+pub(crate) fn section_words(s: &BeamSection) -> String {
+    let mm = |x: f64| format!("{:.0}", 1e3 * x);
+    let size = match s.section {
+        "tube" | "circle" => format!("{} of {} mm", s.section, mm(s.width)),
+        _ => format!("{} of {} x {} mm", s.section, mm(s.width), mm(s.height)),
+    };
+    s.wall.map_or(size.clone(), |wall| format!("{size} with a wall of {:.1} mm", 1e3 * wall))
+}
+
+fn beam_keys(s: &BeamSection, wall: Option<f64>) -> String {
+    match (s.section, wall) {
+        ("tube", Some(wall)) => format!("outer_diameter = {}, wall = {}", float(s.width, 5), float(wall, 5)),
+        ("circle", _) => format!("diameter = {}", float(s.width, 5)),
+        (_, Some(wall)) => {
+            format!("width = {}, height = {}, wall = {}", float(s.width, 5), float(s.height, 5), float(wall, 5))
+        }
+        _ => format!("width = {}, height = {}", float(s.width, 5), float(s.height, 5)),
+    }
+}
+
+/// The robot file with these links bending.
+pub(crate) fn robot_file(draft: &Draft, placed: &Placed, beams: &[&DraftLink]) -> String {
+    let mut t = String::new();
+    // Writing to a String cannot fail.
+    let _ = head(&mut t, draft, placed);
+    let _ = links(&mut t, draft, beams);
+    let _ = drives(&mut t, draft);
+    t
+}
+
+fn head(t: &mut String, draft: &Draft, placed: &Placed) -> std::fmt::Result {
+    writeln!(
+        t,
+        "# {}: made by flexarm new. What is marked ASSUMED was not in the description: put better numbers in its place.",
+        inline(&draft.name)
+    )?;
+    writeln!(
+        t,
+        "# Every key: flexarm format robot. The motion: motion.toml. What was found, and what to ask: README.md."
+    )?;
+    writeln!(t, "format = 1\nname = {}", quoted(&draft.name))?;
+    writeln!(t, "urdf = {}", quoted(&placed.reference))?;
+    writeln!(t, "default_trajectory = \"motion.toml\"")?;
+    let table = |pairs: &[(String, String)]| {
+        let pairs: Vec<String> = pairs.iter().map(|(k, v)| format!("{} = {}", quoted(k), quoted(v))).collect();
+        pairs.join(", ")
+    };
+    if !placed.packages.is_empty() {
+        writeln!(t, "packages = {{ {} }}", table(&placed.packages))?;
+    }
+    if !placed.arguments.is_empty() {
+        writeln!(t, "args = {{ {} }}", table(&placed.arguments))?;
+    }
+    if !draft.waived.is_empty() {
+        let names: Vec<String> = draft.waived.iter().map(|n| quoted(n)).collect();
+        writeln!(t, "\n# Moments of inertia such as no body has, taken as they are: correct them in the description.")?;
+        writeln!(t, "waive_inertia = [{}]", names.join(", "))?;
+    }
+    match draft.estimate {
+        Some(flexarm_urdf::InertiaEstimate::TotalMass(mass)) => {
+            writeln!(
+                t,
+                "\n# ASSUMED: links without <inertial> have this mass together (kg), spread by the volume of their meshes."
+            )?;
+            writeln!(t, "inertia_from_total_mass = {mass:?}")?;
+        }
+        Some(flexarm_urdf::InertiaEstimate::Density(density)) => {
+            writeln!(t, "\n# ASSUMED: links without <inertial> are solid bodies of this density (kg/m³).")?;
+            writeln!(t, "inertia_from_density = {density:?}")?;
+        }
+        None => {
+            if draft.urdf.warnings.iter().any(|w| matches!(w.code, "missing-inertial" | "zero-mass")) {
+                writeln!(t, "\n# Some moving links have no mass in the description. If they weigh something:")?;
+                writeln!(t, "# inertia_from_total_mass =     # kg, all of them together")?;
+            }
+        }
+    }
+    writeln!(
+        t,
+        "\n# The tool: {} from the last moving link. Move it to the point that works with xyz (m) and rpy (rad).",
+        inline(&draft.chain.tool)
+    )?;
+    writeln!(t, "tcp = {{ link = {}, xyz = [0.0, 0.0, 0.0], rpy = [0.0, 0.0, 0.0] }}", quoted(&draft.chain.tool))?;
+    let p = &draft.payload;
+    if p.mass > 0.0 {
+        let origin = if draft.payload_known {
+            "mass as given, shape ASSUMED"
+        } else {
+            "ASSUMED: about 15 % of the mass that moves"
+        };
+        writeln!(
+            t,
+            "\n# {origin}: a cube of aluminium with its centre in the tool's frame. com in m, inertia ixx iyy izz ixy ixz iyz in kg m²."
+        )?;
+        let moment = format!("{:?}", three_digits(p.moment()));
+        writeln!(
+            t,
+            "payload = {{ link = {}, mass = {:?}, com = [0.0, 0.0, 0.0], inertia = [{moment}, {moment}, {moment}, 0.0, 0.0, 0.0] }}",
+            quoted(&draft.chain.tool),
+            p.mass
+        )?;
+    } else {
+        writeln!(
+            t,
+            "\n# Nothing is carried. payload = {{ link = {}, mass = 5.0, com = [0.0, 0.0, 0.05] }}",
+            inline(&quoted(&draft.chain.tool))
+        )?;
+    }
+    if !draft.held.is_empty() {
+        writeln!(t, "\n# Joints that are no part of the arm stay here (rad, m).\n[hold]")?;
+        for (joint, at, why) in &draft.held {
+            writeln!(t, "{} = {at:?}   # {why}", quoted(joint))?;
+        }
+    }
+    Ok(())
+}
+
+fn links(t: &mut String, draft: &Draft, beams: &[&DraftLink]) -> std::fmt::Result {
+    writeln!(
+        t,
+        "\n# Links that bend. Sections: the outline of the mesh across the line between the joints, hollow so that the link has its"
+    )?;
+    writeln!(t, "# mass. ASSUMED: material, and that all of the mass is wall: an upper estimate of the stiffness.")?;
+    for link in beams {
+        let Ok(s) = &link.section else { continue };
+        writeln!(
+            t,
+            "\n# {:.0} mm long, {:.2} kg: a {}.",
+            1e3 * link.length,
+            link.mass.unwrap_or(0.0),
+            section_words(s)
+        )?;
+        if link.of_collisions {
+            writeln!(t, "# The outline is that of the shapes for collisions, which are often larger.")?;
+        }
+        if s.taper > 1.25 {
+            writeln!(
+                t,
+                "# Its width varies by a factor of {:.1}: this is the uniform beam whose tip goes as far under a force.",
+                s.taper
+            )?;
+        }
+        if s.open > 0.0 {
+            writeln!(
+                t,
+                "# {:.0} % of the cuts through the mesh do not close: there the convex hull counts.",
+                100.0 * s.open
+            )?;
+        }
+        if let Some(half) = s.wall_of_half {
+            writeln!(
+                t,
+                "# If only half of the mass is wall (motors and gears are the rest): wall = {}",
+                float(half, 5)
+            )?;
+        }
+        writeln!(t, "[[flexible_link]]\nlink = {}\ndistal = {}", quoted(&link.link), quoted(&link.distal))?;
+        writeln!(t, "damping = {{ modal = 0.03 }}   # ASSUMED: 3 % of critical, as joined structures have")?;
+        let mut beam = format!("section = {:?}, {}, material = {:?}", s.section, beam_keys(s, s.wall), s.material);
+        let _ = write!(beam, ", y_axis = {}", vector(&s.y_axis, 6));
+        if s.offset != [0.0; 3] {
+            let _ = write!(beam, ", offset = {}", vector(&s.offset, 5));
+        }
+        let parts = if link.uniform { "uniform" } else { "from-link" };
+        writeln!(t, "beam = {{ {beam}, parts = {parts:?} }}")?;
+    }
+    let others: Vec<&DraftLink> = draft.links.iter().filter(|l| l.section.is_err()).collect();
+    if !others.is_empty() {
+        writeln!(t, "\n# Stiff, for no section could be proposed:")?;
+        for link in others {
+            let reason = link.section.as_ref().err().map(|r| inline(r)).unwrap_or_default();
+            writeln!(t, "#   {}: {reason}", inline(&link.link))?;
+        }
+    }
+    Ok(())
+}
+
+fn drives(t: &mut String, draft: &Draft) -> std::fmt::Result {
+    writeln!(
+        t,
+        "\n# Reducers. ASSUMED, all of them: stiffness (N m/rad at the joint) of a class of reducers by rated torque, with the range"
+    )?;
+    writeln!(t, "# that the class shows. Damping is left out: 3 % of critical.")?;
+    for joint in &draft.joints {
+        let name = &joint.joint.name;
+        let Some(gear) = &joint.gear else {
+            let why = if joint.joint.kind.slides() {
+                "it slides: no class of reducers says how it gives way"
+            } else {
+                "it carries nothing"
+            };
+            writeln!(t, "\n# {} follows the motion exactly; {why}.", inline(name))?;
+            continue;
+        };
+        let of = match joint.effort_fault {
+            None => format!("effort limit {:.4} N m over 2.5", joint.joint.limits.effort),
+            Some(why) => format!(
+                "its effort limit {why}, so from what the arm needs: {:.1} N m of weight, {:.1} N m in motion",
+                joint.weight, joint.needed
+            ),
+        };
+        writeln!(t, "\n# Rated torque {:.1} N m: {of}.", joint.rated)?;
+        writeln!(t, "# Source: {}.", gear.source)?;
+        writeln!(t, "# Range: {:.2e} to {:.2e} N m/rad.", gear.low, gear.high)?;
+        writeln!(t, "[[drive]]\njoint = {}\nkind = \"gearbox\"", quoted(name))?;
+        writeln!(t, "gearbox = {{ stiffness = {:?} }}", three_digits(gear.stiffness))?;
+    }
+    Ok(())
+}
+
+/// The sample motion.
+pub(crate) fn motion_file(draft: &Draft) -> String {
+    let mut t = String::new();
+    let _ = write_motion(&mut t, draft);
+    t
+}
+
+fn write_motion(t: &mut String, draft: &Draft) -> std::fmt::Result {
+    let names: Vec<String> = draft.joints.iter().map(|j| quoted(&j.joint.name)).collect();
+    let sliding: Vec<String> =
+        draft.joints.iter().filter(|j| j.joint.kind.slides()).map(|j| quoted(&j.joint.name)).collect();
+    let values = |at: &[f64]| {
+        let value = |(x, joint): (&f64, &super::draft::DraftJoint)| {
+            if joint.joint.kind.slides() { float(*x, 4) } else { float(x.to_degrees(), 1) }
+        };
+        let list: Vec<String> = at.iter().zip(&draft.joints).map(value).collect();
+        format!("[{}]", list.join(", "))
+    };
+    writeln!(
+        t,
+        "# A sample motion of {}, from rest to rest through its workspace, made by flexarm new.",
+        inline(&draft.name)
+    )?;
+    writeln!(
+        t,
+        "# Within the limits of position and speed (60 % of it at most), and of effort where there are sensible ones."
+    )?;
+    writeln!(
+        t,
+        "# Nothing is known of the surroundings, and links are not kept from each other: look at it before a real arm moves so."
+    )?;
+    writeln!(t, "# Every key: flexarm format motion. Against the limits: flexarm motion motion.toml robot.toml")?;
+    writeln!(t, "format = 1\nunit = \"deg\"")?;
+    if !sliding.is_empty() {
+        writeln!(t, "metres = [{}]", sliding.join(", "))?;
+    }
+    writeln!(t, "joints = [{}]", names.join(", "))?;
+    let rests = &draft.motion.rests;
+    writeln!(t, "start = {}", values(&rests[0].at))?;
+    writeln!(t, "profile = \"quintic\"          # speed and acceleration without jumps")?;
+    let assumed: Vec<_> = draft.joints.iter().filter(|j| j.speed_assumed).collect();
+    if !assumed.is_empty() {
+        writeln!(t, "\n# ASSUMED: the description has no speed limits for these.\n[limits]")?;
+        for joint in assumed {
+            let value =
+                if joint.joint.kind.slides() { float(joint.speed, 4) } else { float(joint.speed.to_degrees(), 1) };
+            writeln!(t, "{} = {{ velocity = {value} }}", quoted(&joint.joint.name))?;
+        }
+    }
+    let last = rests.len() - 1;
+    for (k, rest) in rests.iter().enumerate().skip(1) {
+        let to = if k == last { "back to the start".to_owned() } else { format!("place {k}") };
+        writeln!(
+            t,
+            "\n[[move]]                      # {to}\nto = {}\nduration = {}",
+            values(&rest.at),
+            float(rest.duration, 1)
+        )?;
+        writeln!(t, "hold = {}", if k == last { "1.0                    # to see it settle" } else { "0.5" })?;
+    }
+    Ok(())
+}
+
+/// What was found, what was assumed, what to measure next.
+pub(crate) fn readme(draft: &Draft, placed: &Placed) -> String {
+    let mut t = String::new();
+    let _ = write_readme(&mut t, draft, placed);
+    t
+}
+
+fn write_readme(t: &mut String, draft: &Draft, placed: &Placed) -> std::fmt::Result {
+    let joint = |k: &usize| &draft.urdf.mechanism.joints[*k];
+    writeln!(t, "# {}\n\nMade by `flexarm new`; {}.\n", inline(&draft.name), inline(&placed.words))?;
+    writeln!(
+        t,
+        "```sh\nflexarm compare .            # the arm beside its rigid twin on motion.toml\nflexarm check .              # what is wrong or doubtful"
+    )?;
+    writeln!(t, "flexarm motion motion.toml . # the motion against the limits\n```\n\n## Found\n")?;
+    writeln!(
+        t,
+        "* The arm begins at `{}` and ends at the tool `{}`, {:.2} m from its first joint at most in the poses that were looked at.",
+        inline(&draft.chain.base),
+        inline(&draft.chain.tool),
+        draft.reach
+    )?;
+    let names: Vec<String> = draft.joints.iter().map(|j| format!("`{}`", inline(&j.joint.name))).collect();
+    writeln!(t, "* Its joints: {}.", names.join(", "))?;
+    let links: Vec<String> = draft.chain.path.iter().map(|k| format!("`{}`", inline(&joint(k).child))).collect();
+    writeln!(t, "* Its links after the base: {}.", links.join(", "))?;
+    writeln!(t, "* They weigh {:.2} kg together, without payload.", draft.moving_mass)?;
+    for (joint, at, why) in &draft.held {
+        writeln!(t, "* `{}` is held at {at}: {why}.", inline(joint))?;
+    }
+    writeln!(
+        t,
+        "\n| joint | effort limit | torque of weight | with speeding up | reducer, N m/rad | range |\n| --- | --- | --- | --- | --- | --- |"
+    )?;
+    for j in &draft.joints {
+        let effort = j.joint.limits.effort;
+        let effort = if effort.is_finite() { format!("{effort:.1}") } else { "none".into() };
+        let effort =
+            j.effort_fault.filter(|_| effort != "none").map_or(effort.clone(), |why| format!("{effort} ({why})"));
+        let (k, range) = j.gear.as_ref().map_or(("none".into(), "".into()), |g| {
+            (format!("{:.3e}", g.stiffness), format!("{:.1e} to {:.1e}", g.low, g.high))
+        });
+        writeln!(t, "| `{}` | {effort} | {:.1} | {:.1} | {k} | {range} |", inline(&j.joint.name), j.weight, j.needed)?;
+    }
+    writeln!(
+        t,
+        "\nTorques in N m (forces in N), with payload, the largest over the workspace.\n\n| link | length, mm | mass, kg | section |\n| --- | --- | --- | --- |"
+    )?;
+    for link in &draft.links {
+        let section = match &link.section {
+            Ok(section) => section_words(section),
+            Err(reason) => format!("none: {}", inline(reason)),
+        };
+        let mass = link.mass.map_or("not known".into(), |m| format!("{m:.2}"));
+        writeln!(t, "| `{}` | {:.0} | {mass} | {section} |", inline(&link.link), 1e3 * link.length)?;
+    }
+    writeln!(t, "\n## Assumed\n")?;
+    for a in &draft.assumptions {
+        writeln!(t, "* {}: {}. Better: {}.", inline(&a.about), inline(&a.text), inline(&a.mend))?;
+    }
+    writeln!(t, "\n## What to ask of the maker, or to measure\n")?;
+    for question in &draft.questions {
+        writeln!(t, "* {}.", inline(question))?;
+    }
+    Ok(())
+}

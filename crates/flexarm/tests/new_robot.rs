@@ -1,0 +1,391 @@
+//! `new_robot`: what it makes of descriptions can be loaded, moved along and checked, whatever the description lacks.
+#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
+#![allow(clippy::print_stdout, reason = "the measured error stands beside its bound")]
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+use flexarm::{Error, InertiaEstimate, Motion, NewError, NewOptions, NewRobot, Robot, check, new_robot};
+
+/// A folder that goes away with the test.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("flexarm-new-{name}-{}", std::process::id()));
+        let _ = std::fs::remove_dir_all(&path);
+        std::fs::create_dir_all(&path).unwrap();
+        Self(path)
+    }
+
+    fn write(&self, name: &str, text: impl AsRef<[u8]>) -> PathBuf {
+        let path = self.0.join(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(&path, text).unwrap();
+        path
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+/// What a generated arm has and lacks.
+#[derive(Clone)]
+struct Arm {
+    /// Before the names of all links and joints.
+    prefix: &'static str,
+    masses: bool,
+    /// Attributes of `<limit>`; none makes the joints continuous.
+    limit: Option<&'static str>,
+    /// Element with the shapes: visual or collision.
+    shapes: &'static str,
+    /// Instead of the box of the upper arm.
+    upper_shape: Option<String>,
+    /// Factor on the moments of inertia about x.
+    odd: f64,
+}
+
+const ARM: Arm = Arm {
+    prefix: "",
+    masses: true,
+    limit: Some(r#"lower="-2.5" upper="2.5" effort="900" velocity="2""#),
+    shapes: "visual",
+    upper_shape: None,
+    odd: 1.0,
+};
+
+/// Wall, width (y) and height (z) of the upper arm, its length and density.
+const UPPER: (f64, f64, f64, f64, f64) = (0.006, 0.14, 0.18, 0.8, 2700.0);
+
+fn upper_mass() -> f64 {
+    let (wall, w, h, length, rho) = UPPER;
+    rho * length * (w * h - (w - 2.0 * wall) * (h - 2.0 * wall))
+}
+
+impl Arm {
+    /// Three joints: turn about z, then two about y; links along x.
+    fn elements(&self, parent: &str) -> String {
+        let p = self.prefix;
+        let mut t = String::new();
+        let (_, w, h, length, _) = UPPER;
+        let upper = self.upper_shape.clone().unwrap_or(format!(r#"<box size="{length} {w} {h}"/>"#));
+        let at_origin = self.upper_shape.is_some();
+        let links = [
+            ("turret", 30.0, [0.0, 0.0, 0.2], r#"<cylinder radius="0.15" length="0.4"/>"#.to_owned(), [0.0, 0.0, 0.2]),
+            (
+                "upper",
+                upper_mass(),
+                [length / 2.0, 0.0, 0.0],
+                upper,
+                [if at_origin { 0.0 } else { length / 2.0 }, 0.0, 0.0],
+            ),
+            ("fore", 6.0, [0.3, 0.0, 0.0], r#"<box size="0.6 0.1 0.1"/>"#.to_owned(), [0.3, 0.0, 0.0]),
+        ];
+        for (name, mass, com, shape, place) in links {
+            write!(t, r#"<link name="{p}{name}">"#).unwrap();
+            if self.masses {
+                // As of a box of 0.3 m.
+                let i = mass * 0.09 / 6.0;
+                write!(
+                    t,
+                    r#"<inertial><origin xyz="{} {} {}"/><mass value="{mass}"/><inertia ixx="{}" iyy="{i}" izz="{i}" ixy="0" ixz="0" iyz="0"/></inertial>"#,
+                    com[0], com[1], com[2], i * self.odd
+                )
+                .unwrap();
+            }
+            let [x, y, z] = place;
+            let kind = self.shapes;
+            write!(t, r#"<{kind}><origin xyz="{x} {y} {z}"/><geometry>{shape}</geometry></{kind}></link>"#).unwrap();
+        }
+        let joints = [
+            ("a1", parent.to_owned(), "turret", "0 0 0.1", "0 0 1"),
+            ("a2", format!("{p}turret"), "upper", "0 0 0.4", "0 1 0"),
+            ("a3", format!("{p}upper"), "fore", "0.8 0 0", "0 1 0"),
+        ];
+        for (name, parent, child, xyz, axis) in joints {
+            let kind = if self.limit.is_some() { "revolute" } else { "continuous" };
+            let limit = self.limit.map_or_else(String::new, |limit| format!("<limit {limit}/>"));
+            write!(
+                t,
+                r#"<joint name="{p}{name}" type="{kind}"><parent link="{parent}"/><child link="{p}{child}"/><origin xyz="{xyz}"/><axis xyz="{axis}"/>{limit}</joint>"#
+            )
+            .unwrap();
+        }
+        write!(
+            t,
+            r#"<link name="{p}tool0"/><joint name="{p}weld" type="fixed"><parent link="{p}fore"/><child link="{p}tool0"/><origin xyz="0.6 0 0"/></joint>"#
+        )
+        .unwrap();
+        t
+    }
+
+    fn urdf(&self, more: &str) -> String {
+        format!(r#"<robot name="arm"><link name="base"/>{}{more}</robot>"#, self.elements("base"))
+    }
+}
+
+fn made(folder: &Folder, urdf: &str, options: &NewOptions) -> NewRobot {
+    let path = folder.write("urdf/arm.urdf", urdf);
+    new_robot(&path, &folder.0.join("far/away/made"), false, options).unwrap()
+}
+
+/// Codes of findings that are no notes, and what must hold of all robots that are made.
+fn codes(made: &NewRobot) -> Vec<String> {
+    let robot = Robot::load(&made.robot).unwrap();
+    let motion = Motion::load(&made.motion, &robot).unwrap();
+    assert!(motion.violations.is_empty(), "{:?}", motion.violations);
+    assert!(made.joints.iter().all(|joint| motion.trajectory.joints().contains(&joint.name)));
+    let findings = check(Path::new(&made.robot), None, &flexarm::LoadOptions::default());
+    let bad: Vec<_> = findings.into_iter().filter(|f| f.severity != "note").collect();
+    assert!(bad.iter().all(|f| f.severity != "error"), "{bad:?}");
+    bad.into_iter().map(|f| f.code).collect()
+}
+
+/// Truth: the box, its wall and its density, of which the description was made. Bound 1e-3, as written into the file.
+#[test]
+fn an_arm_of_known_sections_is_found_with_its_sections_and_is_clean() {
+    let folder = Folder::new("known");
+    let made = made(&folder, &ARM.urdf(""), &NewOptions::default());
+    assert_eq!(codes(&made), [""; 0]);
+    assert_eq!((made.base.as_str(), made.tool.as_str()), ("base", "tool0"));
+    assert_eq!(made.joints.iter().map(|j| j.name.as_str()).collect::<Vec<_>>(), ["a1", "a2", "a3"]);
+    let upper = made.links.iter().find(|l| l.name == "upper").unwrap();
+    let (wall, w, h, ..) = UPPER;
+    let mut sizes = [upper.width.unwrap(), upper.height.unwrap()];
+    sizes.sort_by(f64::total_cmp);
+    let errors = [sizes[0] / w - 1.0, sizes[1] / h - 1.0, upper.wall.unwrap() / wall - 1.0];
+    println!("upper arm: width, height, wall off by {errors:?}, bound 1e-3");
+    assert!(errors.iter().all(|e| e.abs() < 1e-3), "{errors:?}");
+    assert!(upper.assumed && upper.material == Some("aluminium"));
+    let robot = Robot::load(&made.robot).unwrap();
+    assert!(robot.flexible.iter().any(|link| link.flexible.link == "upper"));
+    assert_eq!(robot.drives.len(), 3);
+    assert!(made.assumptions.iter().any(|a| a.about == "payload"));
+    // The motion goes through a good part of the ranges.
+    for peak in &made.peaks {
+        assert!(peak.upper - peak.lower > 0.5, "{}: {} to {}", peak.joint, peak.lower, peak.upper);
+        assert!(peak.speed.abs() <= 0.61 * 2.0 && peak.torque.unwrap().abs() <= 900.0);
+    }
+}
+
+/// Truth: weight times lever of the stretched arm, by hand: 9.81 (m2 0.4 + m3 1.1 + p 1.4).
+#[test]
+fn the_torque_of_weight_is_that_of_the_stretched_arm() {
+    let folder = Folder::new("torque");
+    let options = NewOptions { payload_kg: Some(10.0), ..NewOptions::default() };
+    let made = made(&folder, &ARM.urdf(""), &options);
+    let truth = 9.81 * (upper_mass() * 0.4 + 6.0 * 1.1 + 10.0 * 1.4);
+    let found = made.joints[1].weight_torque;
+    println!("a2: {found:.2} N m over the poses, {truth:.2} N m stretched");
+    assert!(found <= truth * (1.0 + 1e-9) && found > 0.97 * truth);
+    assert!(!made.payload.assumed && made.payload.mass == 10.0);
+    assert!(made.joints[1].effort_fault.is_none());
+}
+
+#[test]
+fn a_copied_folder_has_its_meshes_and_can_be_moved() {
+    let folder = Folder::new("copied");
+    // A box as ASCII STL, of which two links share the file name in different folders.
+    let stl = |[x, y, z]: [f64; 3]| {
+        let corner = |k: usize| {
+            let side = |bit: usize, size: f64| if k >> bit & 1 == 1 { size } else { -size };
+            [if k & 1 == 1 { x } else { 0.0 }, side(1, y / 2.0), side(2, z / 2.0)]
+        };
+        let faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+        let mut text = "solid box\n".to_owned();
+        for [a, b, c, d] in faces {
+            for triangle in [[a, b, c], [a, c, d]] {
+                text += "facet normal 0 0 0\nouter loop\n";
+                for [x, y, z] in triangle.map(corner) {
+                    text += &format!("vertex {x} {y} {z}\n");
+                }
+                text += "endloop\nendfacet\n";
+            }
+        }
+        text + "endsolid box\n"
+    };
+    let (_, w, h, length, _) = UPPER;
+    folder.write("meshes/visual/link.stl", stl([length, w, h]));
+    folder.write("meshes/other/link.stl", stl([0.1, 0.1, 0.1]));
+    let upper = Some(r#"<mesh filename="../meshes/visual/link.stl"/>"#.to_owned());
+    let hand = r#"<link name="cam"><visual><geometry><mesh filename='../meshes/other/link.stl'/></geometry></visual></link>
+        <joint name="cam_weld" type="fixed"><parent link="turret"/><child link="cam"/></joint>"#;
+    let made = made(&folder, &Arm { upper_shape: upper, ..ARM }.urdf(hand), &NewOptions::default());
+    assert_eq!(codes(&made), [""; 0]);
+    assert!(made.placed.contains("copied"), "{}", made.placed);
+    assert!(made.links.iter().any(|l| l.name == "upper" && l.section == Some("box")), "{:?}", made.links);
+    std::fs::remove_dir_all(folder.0.join("urdf")).unwrap();
+    std::fs::remove_dir_all(folder.0.join("meshes")).unwrap();
+    let moved = folder.0.join("moved");
+    std::fs::rename(folder.0.join("far/away/made"), &moved).unwrap();
+    let robot = Robot::load(&moved).unwrap();
+    assert!(robot.urdf.warnings_only().next().is_none(), "{:?}", robot.urdf.warnings);
+    assert!(Motion::load(moved.join("motion.toml"), &robot).is_ok());
+}
+
+#[test]
+fn a_description_beside_the_new_folder_is_referred_to_with_its_arguments() {
+    let folder = Folder::new("beside");
+    let arm = Arm { limit: Some(r#"lower="-2" upper="2" effort="900" velocity="${speed}""#), ..ARM };
+    let text = arm.urdf("").replacen(
+        r#"<robot name="arm">"#,
+        r#"<robot name="arm" xmlns:xacro="http://ros.org/wiki/xacro"><xacro:arg name="size" default=""/><xacro:property name="speed" value="$(arg size)"/>"#,
+        1,
+    );
+    let path = folder.write("urdf/arm.urdf.xacro", text);
+    let mut options = NewOptions::default();
+    options.urdf.arguments = vec![("size".into(), "1.5".into())];
+    let made = new_robot(&path, &folder.0.join("made"), false, &options).unwrap();
+    assert_eq!(codes(&made), [""; 0]);
+    assert!(made.urdf.ends_with("made/../urdf/arm.urdf.xacro"), "{}", made.urdf);
+    assert!(made.joints.iter().all(|j| j.velocity == Some(1.5)));
+    let again = new_robot(&path, &folder.0.join("made"), false, &options).unwrap_err();
+    assert!(matches!(again, Error::Taken { .. }), "{again}");
+    assert!(new_robot(&path, &folder.0.join("made"), true, &options).is_ok());
+}
+
+#[test]
+fn an_arm_without_any_mass_is_refused_until_its_mass_is_given() {
+    let folder = Folder::new("massless");
+    let urdf = Arm { masses: false, ..ARM }.urdf("");
+    let path = folder.write("urdf/arm.urdf", &urdf);
+    let error = new_robot(&path, &folder.0.join("made"), false, &NewOptions::default()).unwrap_err();
+    assert!(matches!(error, Error::New(NewError::NoMass { .. })), "{error}");
+    assert!(!folder.0.join("made").exists());
+    let mut options = NewOptions::default();
+    options.urdf.inertia_from_mesh = Some(InertiaEstimate::TotalMass(60.0));
+    let made = made(&folder, &urdf, &options);
+    let found = codes(&made);
+    assert!(found.iter().all(|code| code == "estimated-inertia"), "{found:?}");
+    assert!((made.moving_mass_kg / 60.0 - 1.0).abs() < 1e-9, "{}", made.moving_mass_kg);
+    assert!(made.assumptions.iter().any(|a| a.about == "masses" && a.text.contains("60 kg together")));
+}
+
+#[test]
+fn fingers_are_held_and_of_two_arms_one_moves() {
+    let folder = Folder::new("hands");
+    let fingers = r#"
+        <link name="left_finger"/><link name="right_finger"/>
+        <joint name="left" type="prismatic"><parent link="tool0"/><child link="left_finger"/><axis xyz="0 1 0"/>
+          <limit lower="0.01" upper="0.04" effort="20" velocity="0.2"/></joint>
+        <joint name="right" type="prismatic"><parent link="tool0"/><child link="right_finger"/><axis xyz="0 -1 0"/>
+          <limit lower="0.01" upper="0.04" effort="20" velocity="0.2"/><mimic joint="left"/></joint>"#;
+    let with_hand = made(&folder, &ARM.urdf(fingers), &NewOptions::default());
+    let found = codes(&with_hand);
+    assert!(found.iter().all(|code| code == "missing-inertial"), "{found:?}");
+    assert_eq!(with_hand.joints.len(), 3);
+    let held: Vec<_> = with_hand.held.iter().map(|h| (h.joint.as_str(), h.at)).collect();
+    assert_eq!(held, [("left", 0.01)]);
+    let folder = Folder::new("two-arms");
+    let other = Arm { prefix: "right_", ..ARM }.elements("base");
+    let two = made(&folder, &Arm { prefix: "left_", ..ARM }.urdf(&other), &NewOptions::default());
+    assert_eq!(codes(&two), [""; 0]);
+    assert_eq!((two.tool.as_str(), two.held.len()), ("left_tool0", 3));
+    assert!(two.assumptions[0].text.contains("right_tool0"), "{:?}", two.assumptions[0]);
+    // The other arm's mass is not moved.
+    assert!((two.moving_mass_kg / (36.0 + upper_mass()) - 1.0).abs() < 1e-9);
+}
+
+#[test]
+fn missing_and_senseless_limits_are_told_and_the_motion_keeps_what_it_can() {
+    let limits: [(&str, Option<&'static str>, &str); 4] = [
+        ("none", None, "has none"),
+        ("zeros", Some(r#"lower="-3" upper="3" effort="0" velocity="0""#), "has none"),
+        ("huge", Some(r#"lower="-3" upper="3" effort="1000000" velocity="2""#), "is far above"),
+        ("weak", Some(r#"lower="-3" upper="3" effort="20" velocity="2""#), "is below what"),
+    ];
+    for (name, limit, fault) in limits {
+        let folder = Folder::new(&format!("limits-{name}"));
+        let made = made(&folder, &Arm { limit, ..ARM }.urdf(""), &NewOptions::default());
+        let found = codes(&made);
+        let told = |code: &String| code == "effort-limit" || code == "gear-soft" || code == "effort";
+        assert!(found.iter().all(|code| matches!(name, "huge" | "weak") && told(code)), "{name}: {found:?}");
+        assert!(made.joints[1].effort_fault.unwrap().starts_with(fault), "{name}: {:?}", made.joints[1]);
+        let speeds = made.assumptions.iter().filter(|a| a.text.contains("speed limit")).count();
+        assert_eq!(speeds, if matches!(name, "none" | "zeros") { 3 } else { 0 }, "{name}");
+        // The class of the reducers comes from the weight, not from the limit.
+        let drive = &made.drives[1];
+        assert!((1e4..1e7).contains(&drive.stiffness) && drive.low < drive.stiffness && drive.stiffness < drive.high);
+    }
+}
+
+#[test]
+fn shapes_for_collisions_serve_where_there_are_no_others() {
+    let folder = Folder::new("collisions");
+    let made = made(&folder, &Arm { shapes: "collision", ..ARM }.urdf(""), &NewOptions::default());
+    assert_eq!(codes(&made), [""; 0]);
+    assert!(made.links.iter().any(|l| l.name == "upper" && l.section == Some("box")), "{:?}", made.links);
+    let text = std::fs::read_to_string(&made.robot).unwrap();
+    assert!(text.contains("shapes for collisions"));
+    let folder = Folder::new("no-shapes");
+    let bare = ARM.urdf("").replace("visual", "sensor");
+    let bare = self::made(&folder, &bare, &NewOptions::default());
+    assert_eq!(codes(&bare), [""; 0]);
+    assert!(
+        bare.links.iter().all(|l| l.reason.as_ref().is_some_and(|r| r.contains("no shape") || r.contains("short")))
+    );
+}
+
+#[test]
+fn inertias_that_no_body_has_are_taken_as_they_are_and_told() {
+    let folder = Folder::new("odd");
+    let made = made(&folder, &Arm { odd: 2.5, ..ARM }.urdf(""), &NewOptions::default());
+    codes(&made);
+    assert!(made.assumptions.iter().any(|a| a.text.contains("such as no body has")), "{:?}", made.assumptions);
+    assert!(std::fs::read_to_string(&made.robot).unwrap().contains("waive_inertia = ["));
+}
+
+#[test]
+fn names_with_any_letters_come_through_every_file() {
+    let folder = Folder::new("names");
+    let odd = "a\\ &quot;1&apos; #]= ü\u{7f}";
+    let urdf = ARM
+        .urdf("")
+        .replace("\"a2\"", &format!("\"{odd}\""))
+        .replace("upper", "up [x]\"".replace('"', "&quot;").as_str());
+    let urdf = urdf.replace("robot name=\"arm\"", "robot name=\"= #1 &quot;arm&quot;\"");
+    // The attribute of <limit> has a word in it that was replaced.
+    let urdf = urdf.replace("up [x]&quot;=", "upper=");
+    let made = made(&folder, &urdf, &NewOptions::default());
+    assert_eq!(codes(&made), [""; 0]);
+    assert_eq!(made.joints[1].name, "a\\ \"1' #]= ü\u{7f}");
+    assert!(made.links.iter().any(|l| l.name == "up [x]\""));
+}
+
+#[test]
+fn what_is_no_robot_description_is_named_with_what_to_do() {
+    let folder = Folder::new("others");
+    let cases = [
+        ("a.sdf", "<?xml version=\"1.0\"?><sdf version=\"1.7\"><model name=\"m\"/></sdf>", "an SDF file"),
+        ("a.xml", "<mujoco model=\"m\"><worldbody/></mujoco>", "an MJCF file"),
+        ("a.usda", "#usda 1.0\ndef Xform \"robot\" {}", "a USD file"),
+        ("a.usd", "PXR-USDC\0\0\0", "a USD file"),
+        ("robot.toml", "format = 1", "a robot file already"),
+        ("a.stl", "solid x\nendsolid x", "a mesh"),
+    ];
+    for (name, text, what) in cases {
+        let path = folder.write(name, text);
+        let error = new_robot(&path, &folder.0.join("made"), false, &NewOptions::default()).unwrap_err();
+        assert!(matches!(error, Error::New(NewError::OtherFormat { .. })), "{name}: {error}");
+        assert!(error.to_string().contains(what), "{name}: {error}");
+    }
+    let of = |text: &str, options: NewOptions| {
+        let path = folder.write("x.urdf", text);
+        new_robot(&path, &folder.0.join("made"), false, &options).unwrap_err()
+    };
+    let still = ARM.urdf("").replace("revolute", "fixed");
+    let error = of(&still, NewOptions::default());
+    assert!(matches!(error, Error::New(NewError::NoMovableJoint { .. })), "{error}");
+    let error = of(&ARM.urdf(""), NewOptions { tool: Some("tool1".into()), ..NewOptions::default() });
+    assert!(error.to_string().contains("did you mean \"tool0\"?"), "{error}");
+    let error = of(&ARM.urdf(""), NewOptions { joints: Some(vec!["a2".into(), "a9".into()]), ..NewOptions::default() });
+    assert!(matches!(error, Error::New(NewError::NoJoint { .. })), "{error}");
+    let error = of(&ARM.urdf(""), NewOptions { payload_kg: Some(-1.0), ..NewOptions::default() });
+    assert!(matches!(error, Error::New(NewError::Payload { .. })), "{error}");
+    let error = new_robot(&folder.0, &folder.0.join("made"), false, &NewOptions::default()).unwrap_err();
+    assert!(error.to_string().contains("a folder"), "{error}");
+    assert!(!folder.0.join("made").exists());
+}
