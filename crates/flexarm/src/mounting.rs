@@ -53,6 +53,7 @@ pub(crate) struct MountingEntry {
 
 /// What a robot stands on.
 #[derive(Clone, Debug)]
+#[allow(clippy::large_enum_variant, reason = "one per robot, made once")]
 pub enum RobotMounting {
     /// Six springs, coupled or not.
     Springs {
