@@ -215,7 +215,9 @@ pub enum ModelError {
         value: f64,
     },
     /// A rotor that couples what are not two joints.
-    #[error("the rotor between joint {joint:?} and another one: it needs two joints of one coordinate each, and a finite inertia")]
+    #[error(
+        "the rotor between joint {joint:?} and another one: it needs two joints of one coordinate each, and a finite inertia"
+    )]
     BadRotor {
         /// The joint.
         joint: String,
@@ -376,6 +378,11 @@ impl Model {
         let mut model = self.clone();
         model.bodies[body].inertia = inertia;
         model
+    }
+
+    /// Inertia of the rotors of a coordinate, seen from it (kg m² or kg).
+    pub fn rotor_inertia(&self, coordinate: usize) -> f64 {
+        self.rotors.iter().filter(|(k, _)| *k == coordinate).map(|(_, inertia)| inertia).sum()
     }
 
     /// Whether the other model has the same joints, frames, modal bodies, balancers and gravity, to the last bit; inertias may
