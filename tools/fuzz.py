@@ -181,6 +181,26 @@ joint = "finger"
 curve = [[-0.1, 4.0], [0.0, 0.0], [0.1, -4.0]]
 """
 
+MOUNTING = """
+[mounting]
+name = "foot"
+stiffness = [2e7, 2e7, 4e7, 1e6, 1e6, 2e6]
+xyz = [0.0, 0.0, -0.3]
+rpy = [0.0, 0.1, 0.2]
+mass = 12.0
+com = [0.0, 0.0, 0.1]
+inertia = [0.2, 0.2, 0.1, 0.0, 0.0, 0.0]
+damping = { rayleigh = [0.5, 1e-4] }
+"""
+
+COLUMN = """
+[mounting]
+xyz = [0.0, 0.1, -0.5]
+model = "lumped"
+segments = 2
+beam = { section = "tube", outer_diameter = 0.1, wall = 0.005, material = "steel" }
+"""
+
 ROBOT_FLEX = """format = 1
 name = "beam"
 urdf = "beam.urdf"
@@ -633,6 +653,8 @@ def own_targets():
     targets = [
         Target("robot", "robot.toml", base, [check, COMPARE, ["statics", "robot.toml", "--json"], ["modes", "robot.toml", "--json"]], True),
         Target("robot-balancers", "robot.toml", {**base, "robot.toml": ROBOT + BALANCERS}, [check, COMPARE, ["statics", "robot.toml", "--json"], ["inspect", "robot.toml", "--json"]], True),
+        Target("robot-mounting", "robot.toml", {**base, "robot.toml": ROBOT + MOUNTING}, [check, COMPARE, ["statics", "robot.toml", "--json"], ["inspect", "robot.toml", "--json"]], True),
+        Target("robot-column", "robot.toml", {**base, "robot.toml": ROBOT + COLUMN}, [check, ["statics", "robot.toml", "--json"], ["modes", "robot.toml", "--json"]], True),
         Target("urdf", "beam.urdf", base, [["check", "beam.urdf", "--json"], ["inspect", "beam.urdf", "--json"], check, COMPARE], True),
         Target("xacro", "arm.xacro", {"arm.xacro": XACRO}, [["check", "arm.xacro", "--json"], ["inspect", "arm.xacro", "--json"]]),
         Target("new-urdf", "arm.urdf", {"arm.urdf": NEW_ARM, "link.stl": box_stl(0.6, 0.12, 0.1)}, [["new", "arm.urdf", "-o", "made", "--force", "--no-run", "--json"], ["new", "arm.urdf", "-o", "made", "--force", "--no-run", "--mass", "60", "--payload", "5", "--json"]]),

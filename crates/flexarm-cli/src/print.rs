@@ -81,6 +81,16 @@ pub(crate) fn inspection(i: &Inspection) -> String {
             out += &format!("  near joint held: {}{} Hz\n", first.join(", "), more.unwrap_or_default());
         }
     }
+    if let Some(m) = &i.mounting {
+        let k: Vec<String> = (0..6).map(|c| format!("{:.3e}", m.stiffness[c][c])).collect();
+        let at = m.position_m;
+        out += &format!(
+            "mounting: {:?} on springs at {at:?} m of the base link, {} (N/m, N m/rad) on their diagonal; {:.2} kg ride on them\n",
+            m.name,
+            k.join(", "),
+            m.mass_kg
+        );
+    }
     out += &format!(
         "TCP on {}: position {:.6?} m, quaternion wxyz {:.6?}\n",
         i.tcp.link, i.tcp.position_m, i.tcp.quaternion_wxyz

@@ -91,7 +91,7 @@ pub enum GearboxError {
 }
 
 /// Largest relative asymmetry of a full stiffness.
-const ASYMMETRY: f64 = 1e-9;
+pub(crate) const ASYMMETRY: f64 = 1e-9;
 
 fn check_stiffness(joint: &str, stiffness: &GearStiffness) -> Result<(), GearboxError> {
     let smallest = match stiffness {

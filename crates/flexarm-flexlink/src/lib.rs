@@ -2,8 +2,8 @@
 //!
 //! A link with a [`ReducedLink`] becomes two or more links, proximal to distal, joined by six-DoF elastic joints, or one
 //! that bends in modes ([`LinkForm`]). Everything that hangs on the link beyond the split follows the distal part. A
-//! joint with an elastic gearbox becomes two, the motor's and the spring's ([`insert_gearboxes`]). The result is again
-//! a [`flexarm_kinematics::Mechanism`]: the tree model and every algorithm on it stay the same. Start at [`substitute`].
+//! joint with an elastic gearbox becomes two, the motor's and the spring's ([`insert_gearboxes`]); a base may stand on
+//! springs ([`insert_mounting`]). The result is again a [`flexarm_kinematics::Mechanism`]: the tree model and every algorithm on it stay the same. Start at [`substitute`].
 //!
 //! Frames: L link, A proximal and B distal interface, S split. Not here: where the stiffness comes from
 //! (`flexarm-fem`), damping and time (`flexarm-stepping`).
@@ -36,6 +36,7 @@ mod cut;
 mod gearbox;
 mod interfaces;
 mod modal;
+mod mounting;
 mod substitute;
 
 pub use cut::{CutError, cut_chain, cut_inertia};
@@ -43,6 +44,7 @@ pub use flexarm_fem::ReducedLink;
 pub use gearbox::{GearSpring, GearStiffness, Gearbox, GearboxError, insert_gearboxes};
 pub use interfaces::{BranchJoint, branch_joints};
 pub use modal::modal_body;
+pub use mounting::{Mounting, MountingError, base_link, insert_mounting};
 pub use substitute::{
     FlexibleLink, FlexibleSpan, LinkForm, Parts, Spring, Substituted, SubstitutionError, distal_joint, substitute,
 };

@@ -61,6 +61,8 @@ impl Roles {
                 roles.free_coordinates.extend(first..first + size);
                 let moves = |b: &&Body| b.coordinate == first && !matches!(b.motion, JointMotion::Interface { .. });
                 roles.dense |= model.bodies[1..].iter().filter(moves).count() > 1;
+                // A rotor that turns with two joints is on no branch of the tree.
+                roles.dense |= model.rotor_couplings.iter().any(|(a, b, _)| *a == first || *b == first);
             }
         }
         roles
@@ -115,6 +117,11 @@ fn solve(model: &Model, data: &mut Data, state: &State, roles: &Roles) {
         match model.balancers.is_empty() {
             true => solve_articulated(model, data, q, qdot, roles),
             false => solve_with_balancers(model, data, q, qdot, roles),
+        }
+        // Here both joints of a coupling are prescribed.
+        for &(a, b, inertia) in &model.rotor_couplings {
+            data.tau[a] += inertia * data.qddot[b];
+            data.tau[b] += inertia * data.qddot[a];
         }
     }
 }

@@ -83,6 +83,9 @@ pub(crate) fn composite_bodies<T: Real>(tree: &impl Tree<T>, data: &mut Data<T>)
             carry_columns(model, data, i);
         }
     }
+    for &(a, b, inertia) in &model.rotor_couplings {
+        add_pair(data.M.as_mut_slice(), nv, a, b, T::splat(inertia));
+    }
 }
 
 /// `I_c S` of a joint of one coordinate: the wrench that moves all that is outward of it, at Bo in B axes.

@@ -233,10 +233,11 @@ fn place_axis<T: Real>(body: &Body, motion: AxisMotion, data: &mut Data<T>, i: u
     motion.place(&body.X_PJ, &body.turn, joint_value(body, q), (sine, cosine), &mut data.X_PB[i]);
 }
 
-/// `Σ ½ a q̇²` of the rotors.
+/// `Σ ½ a q̇² + Σ a_12 q̇_1 q̇_2` of the rotors.
 #[inline(always)]
 pub(crate) fn rotor_energy<T: Real>(model: &Model, qdot: &[T]) -> T {
-    model.rotors.iter().fold(T::zero(), |sum, &(k, a)| sum + T::splat(0.5 * a) * qdot[k] * qdot[k])
+    let own = model.rotors.iter().fold(T::zero(), |sum, &(k, a)| sum + T::splat(0.5 * a) * qdot[k] * qdot[k]);
+    model.rotor_couplings.iter().fold(own, |sum, &(j, k, a)| sum + T::splat(a) * qdot[j] * qdot[k])
 }
 
 /// What an algorithm begins with at new coordinates: mass integrals of all modal bodies and, in one go, sines and cosines of

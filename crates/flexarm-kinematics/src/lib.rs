@@ -86,7 +86,7 @@ pub use kinematics::{
     world_poses,
 };
 pub use many_starts::{FoundSolution, inverse_kinematics_from_many_starts};
-pub use mechanism::{Joint, JointKind, Limits, Link, LinkInertia, Mechanism, Mimic};
+pub use mechanism::{Joint, JointKind, Limits, Link, LinkInertia, Mechanism, Mimic, RotorCoupling};
 pub use modal::{InterfaceShape, ModalBody};
 pub use model::{
     Body, Coordinate, ElasticGroup, Frame, JointMotion, MOST_COORDINATES, Model, ModelError, moment_floor,

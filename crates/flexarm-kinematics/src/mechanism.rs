@@ -26,8 +26,19 @@ pub struct Mechanism {
     pub modal: Vec<(String, Arc<ModalBody>)>,
     /// Springs, gas springs and counterbalances between points of the arm or over joints.
     pub balancers: Vec<Balancer>,
+    /// Rotors that turn with several joints: what their inertias couple.
+    pub rotor_couplings: Vec<RotorCoupling>,
     /// Acceleration of gravity in world (= base link) axes (m/s²).
     pub gravity: Vector3<f64>,
+}
+
+/// Inertia between two joints, of rotors that turn with both: `q̇_1 q̇_2` times this in the kinetic energy.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RotorCoupling {
+    /// Two joints of one coordinate each.
+    pub joints: [String; 2],
+    /// Entry of the mass matrix in the row of one and the column of the other (kg m², kg m or kg).
+    pub inertia: f64,
 }
 
 /// A rigid body with its frame.
@@ -227,6 +238,7 @@ impl Mechanism {
             joints: Vec::new(),
             modal: Vec::new(),
             balancers: Vec::new(),
+            rotor_couplings: Vec::new(),
             gravity: Vector3::new(0.0, 0.0, -9.81),
         }
     }

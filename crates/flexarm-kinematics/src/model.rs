@@ -14,7 +14,7 @@ use nalgebra::Vector3;
 
 use crate::axis_motion::{AxisMotion, RevoluteTable};
 use crate::balancer::{PlacedBalancer, place_balancers};
-use crate::mechanism::{Joint, JointKind, Limits, Mechanism};
+use crate::mechanism::{Joint, JointKind, Limits, Mechanism, RotorCoupling};
 use crate::modal::ModalTables;
 
 /// A checked tree of bodies; built once, then only read and shared between threads.
@@ -32,6 +32,8 @@ pub struct Model {
     pub(crate) balancers: Vec<PlacedBalancer>,
     /// Coordinates with rotors, and the inertia of these seen from there.
     pub(crate) rotors: Vec<(usize, f64)>,
+    /// Two coordinates and the entry that rotors add to their rows and columns in the mass matrix.
+    pub(crate) rotor_couplings: Vec<(usize, usize, f64)>,
     pub(crate) has_mimic: bool,
     /// Bodies on joints of one coordinate that turn.
     pub(crate) turning: Vec<usize>,
@@ -212,6 +214,14 @@ pub enum ModelError {
         /// Its value.
         value: f64,
     },
+    /// A rotor that couples what are not two joints.
+    #[error(
+        "the rotor between joint {joint:?} and another one: it needs two joints of one coordinate each, and a finite inertia"
+    )]
+    BadRotor {
+        /// The joint.
+        joint: String,
+    },
     /// A link that bends in modes does not fit.
     #[error("link {link:?} bends in modes, but {what} is wrong")]
     BadModal {
@@ -370,6 +380,11 @@ impl Model {
         model
     }
 
+    /// Inertia of the rotors of a coordinate, seen from it (kg m² or kg).
+    pub fn rotor_inertia(&self, coordinate: usize) -> f64 {
+        self.rotors.iter().filter(|(k, _)| *k == coordinate).map(|(_, inertia)| inertia).sum()
+    }
+
     /// Whether the other model has the same joints, frames, modal bodies, balancers and gravity, to the last bit; inertias may
     /// differ.
     pub fn is_same_tree(&self, other: &Self) -> bool {
@@ -377,6 +392,7 @@ impl Model {
             |b: &Body| (b.parent, b.X_PJ, b.motion, b.coordinate, b.ratio, b.offset, b.armature, b.elastic, b.modal);
         self.gravity == other.gravity
             && self.balancers == other.balancers
+            && self.rotor_couplings == other.rotor_couplings
             && self.bodies.len() == other.bodies.len()
             && self.bodies.iter().zip(&other.bodies).all(|(a, b)| body(a) == body(b))
             && self
@@ -600,6 +616,7 @@ impl<'a> Builder<'a> {
         }
         let with_rotor = self.bodies[1..].iter().filter(|b| b.armature != 0.0);
         let rotors = with_rotor.map(|b| (b.coordinate, b.ratio * b.ratio * b.armature)).collect();
+        let rotor_couplings = self.rotor_couplings()?;
         let balancers = place_balancers(self.mechanism, &self.frames, &self.bodies)?;
         let frame_by_name = self.frames.iter().enumerate().map(|(i, f)| (f.name.clone(), i)).collect();
         Ok(Model {
@@ -615,8 +632,27 @@ impl<'a> Builder<'a> {
             modal: self.modal,
             balancers,
             rotors,
+            rotor_couplings,
             gravity: self.mechanism.gravity,
         })
+    }
+
+    /// Coordinates of the joints that rotors couple.
+    fn rotor_couplings(&self) -> Result<Vec<(usize, usize, f64)>, ModelError> {
+        let coordinate = |joint: &String| {
+            let own = |b: &&Body| b.joint == *joint && matches!(b.motion, JointMotion::Axis(_)) && b.ratio == 1.0;
+            let body = self.bodies[1..].iter().find(own);
+            body.map(|b| b.coordinate).ok_or_else(|| ModelError::BadRotor { joint: joint.clone() })
+        };
+        let placed = |coupling: &RotorCoupling| {
+            let [first, second] = &coupling.joints;
+            let (a, b) = (coordinate(first)?, coordinate(second)?);
+            if a == b || !coupling.inertia.is_finite() {
+                return Err(ModelError::BadRotor { joint: second.clone() });
+            }
+            Ok((a, b, coupling.inertia))
+        };
+        self.mechanism.rotor_couplings.iter().map(placed).collect()
     }
 
     /// Coordinates of the joints that have some of their own, and of the modal bodies: actuated ones first.

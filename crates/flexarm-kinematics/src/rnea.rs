@@ -119,6 +119,10 @@ pub(crate) fn newton_euler<T: Real>(tree: &impl Tree<T>, data: &mut Data<T>, q: 
         for &(k, armature) in &model.rotors {
             data.tau[k] += T::splat(armature) * qddot[k];
         }
+        for &(a, b, inertia) in &model.rotor_couplings {
+            data.tau[a] += T::splat(inertia) * qddot[b];
+            data.tau[b] += T::splat(inertia) * qddot[a];
+        }
     }
 }
 

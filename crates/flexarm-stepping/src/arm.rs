@@ -13,6 +13,7 @@ use nalgebra::{DMatrix, DVector, Matrix6};
 use crate::drive::{Friction, ServoAxis, TorqueCurve};
 use crate::error::StepError;
 use crate::events::SAME_TIME;
+use crate::gear::{Entry, GearCoupling, Hysteresis, LoadFriction, TransmissionError};
 use crate::load::Load;
 use crate::modes::{Modes, modes_at};
 use crate::motion::PrescribedMotion;
@@ -182,6 +183,17 @@ pub struct FlexibleArm {
     pub loads: Vec<Load>,
     /// Changes of inertia, by time.
     pub inertia_changes: Vec<InertiaChange>,
+    /// Errors of transmissions; see [`FlexibleArm::with_transmission_errors`].
+    pub transmission: Vec<TransmissionError>,
+    /// Gears whose torque has a history; see [`FlexibleArm::with_hysteresis`].
+    pub hysteresis: Vec<Hysteresis>,
+    /// Friction that grows with the transmitted torque.
+    pub load_friction: Vec<LoadFriction>,
+    /// Gears that move several joints; see [`FlexibleArm::with_coupling`].
+    pub coupling: Option<GearCoupling>,
+    /// Stiffness and damping between elastic coordinates of different elements.
+    pub(crate) cross_stiffness: Vec<Entry>,
+    pub(crate) cross_damping: Vec<Entry>,
     /// Natural modes at the start pose, drives locked.
     pub modes: Modes,
 }
@@ -246,6 +258,12 @@ impl FlexibleArm {
             servo: None,
             loads: Vec::new(),
             inertia_changes: Vec::new(),
+            transmission: Vec::new(),
+            hysteresis: Vec::new(),
+            load_friction: Vec::new(),
+            coupling: None,
+            cross_stiffness: Vec::new(),
+            cross_damping: Vec::new(),
             modes: Modes::default(),
         };
         arm.update_modes_and_damping()?;
@@ -311,6 +329,14 @@ impl FlexibleArm {
             let mut bodies = self.model.bodies().iter().enumerate().skip(1);
             let body = bodies.find(|(_, b)| b.coordinate == k && !b.elastic);
             let bends = |i: usize| self.model.elastic().iter().any(|g| g.modal && g.body == i);
+            let friction = self.load_friction.iter().find(|law| law.coordinate == k && law.element.is_none());
+            if friction.is_some() {
+                let joint = &self.model.coordinates()[k].joint;
+                let text = format!(
+                    "joint {joint:?} is driven by torque and has friction that grows with its load: give it a gearbox, whose torque is the load"
+                );
+                return Err(StepError::Setup(text));
+            }
             if let Some((i, body)) = body
                 && body.inertia.mass == 0.0
                 && !bends(i)
@@ -345,6 +371,9 @@ impl FlexibleArm {
             let k = self.offset(element);
             K.view_mut((k, k), (element.size, element.size)).copy_from(&element.K);
         }
+        for &(i, j, k) in &self.cross_stiffness {
+            (K[(i, j)], K[(j, i)]) = (k, k);
+        }
         K
     }
 
@@ -353,9 +382,11 @@ impl FlexibleArm {
         element.coordinate - self.model.n_actuated()
     }
 
-    /// Elastic energy (J) at elastic coordinates `e`.
+    /// Elastic energy (J) at elastic coordinates `e`, transmission errors and what sliders lost left out.
     pub fn elastic_energy(&self, e: &[f64]) -> f64 {
-        self.elements.iter().map(|element| element.energy(&e[self.offset(element)..][..element.size])).sum()
+        let own: f64 =
+            self.elements.iter().map(|element| element.energy(&e[self.offset(element)..][..element.size])).sum();
+        self.cross_stiffness.iter().fold(own, |sum, &(i, j, k)| sum + k * e[i] * e[j])
     }
 
     /// Full state at time `t` with elastic coordinates zero; the accelerations go into `qddot`.
@@ -398,7 +429,8 @@ impl FlexibleArm {
             return Ok(());
         }
         self.modes = modes_at(self, 0.0)?;
-        self.proportional = self.elements.iter().all(|e| matches!(e.damping, Damping::StiffnessProportional(_)));
+        self.proportional = self.cross_stiffness.is_empty()
+            && self.elements.iter().all(|e| matches!(e.damping, Damping::StiffnessProportional(_)));
         let first = self.modes.omega[0];
         self.tau = self
             .elements
@@ -432,6 +464,12 @@ impl FlexibleArm {
                 }
             }
         }
+        for &(i, j, d) in &self.cross_damping {
+            self.D[(i, j)] += d;
+            if i != j {
+                self.D[(j, i)] += d;
+            }
+        }
         Ok(())
     }
 
@@ -446,6 +484,12 @@ impl FlexibleArm {
         M.view((model.n_actuated(), model.n_actuated()), (n, n)).clone_owned()
     }
 
+    /// Ratio with which the element of an elastic coordinate is damped.
+    fn modal_ratio(&self, offset: usize) -> f64 {
+        let own = self.elements.iter().find(|e| (self.offset(e)..self.offset(e) + e.size).contains(&offset));
+        own.map_or(0.0, |e| if let Damping::Modal(ratio) = e.damping { ratio } else { 0.0 })
+    }
+
     fn add_modal_damping(&mut self, M: &DMatrix<f64>) {
         for (j, omega) in self.modes.omega.iter().enumerate() {
             let phi = self.modes.shapes.column(j);
@@ -457,6 +501,11 @@ impl FlexibleArm {
                 if let Damping::Modal(z) = element.damping {
                     zeta += z * energy;
                 }
+            }
+            for &(i, j, k) in &self.cross_stiffness {
+                let energy = k * phi[i] * phi[j];
+                total += 2.0 * energy;
+                zeta += energy * (self.modal_ratio(i) + self.modal_ratio(j));
             }
             let Mphi = M * phi;
             self.D.ger(2.0 * zeta / total * omega, &Mphi, &Mphi, 1.0);

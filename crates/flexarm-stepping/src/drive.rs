@@ -53,6 +53,25 @@ impl TorqueCurve {
         Self { x: vec![-reach, -half, half, reach], y: vec![-stiffness, 0.0, 0.0, stiffness] }
     }
 
+    /// A straight spring.
+    pub fn straight(stiffness: f64) -> Self {
+        Self { x: vec![-1.0, 0.0, 1.0], y: vec![-stiffness, 0.0, stiffness] }
+    }
+
+    /// The sum with a spring of that stiffness whose torque no longer grows beyond `± reach`.
+    #[must_use]
+    pub fn with_slider(&self, stiffness: f64, reach: f64) -> Self {
+        let mut x = self.x.clone();
+        x.extend([-reach, reach]);
+        // The end pieces go on without the slider.
+        let end = self.x.iter().fold(reach, |end, x| end.max(x.abs())) + 1.0;
+        x.extend([-end, end]);
+        x.sort_by(f64::total_cmp);
+        x.dedup();
+        let y = x.iter().map(|x| self.torque(*x) + stiffness * x.clamp(-reach, reach)).collect();
+        Self { x, y }
+    }
+
     /// The same deflections with so many times the torque.
     #[must_use]
     pub fn scaled(&self, factor: f64) -> Self {

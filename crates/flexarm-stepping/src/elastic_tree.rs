@@ -47,7 +47,7 @@ impl ElasticTree {
     pub(crate) fn of(arm: &FlexibleArm) -> Option<Self> {
         let model = &arm.model;
         let straight = arm.elements.iter().all(|e| e.size == 6 && !e.modal && e.curve.is_none());
-        if model.has_modal() || !straight || !arm.torque_driven.is_empty() {
+        if model.has_modal() || !straight || arm.has_gear_laws() || !arm.torque_driven.is_empty() {
             return None;
         }
         let mut joints = Vec::with_capacity(arm.elements.len());
@@ -129,7 +129,8 @@ impl ElasticJoint {
 impl FlexibleArm {
     /// Whether the damping matrix has blocks on its diagonal alone, one per element.
     pub(crate) fn damps_by_element(&self) -> bool {
-        !self.elements.iter().any(|e| matches!(e.damping, Damping::Modal(zeta) if zeta != 0.0))
+        self.cross_damping.is_empty()
+            && !self.elements.iter().any(|e| matches!(e.damping, Damping::Modal(zeta) if zeta != 0.0))
     }
 
     /// `f += D v` over the elastic coordinates: O(n) where the damping has a block per element.

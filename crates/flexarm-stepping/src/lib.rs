@@ -40,6 +40,7 @@ mod eigenvalues;
 mod elastic_tree;
 mod error;
 mod events;
+mod gear;
 mod implicit;
 mod integrator;
 mod iteration_matrix;
@@ -64,6 +65,7 @@ pub use arm::{Damping, ElasticElement, FlexibleArm, GeometricStiffness, InertiaC
 pub use batch::{Batch, BatchRun, ToolDeflection};
 pub use drive::{CurveError, Friction, ServoAxis, TorqueCurve};
 pub use error::StepError;
+pub use gear::{GearCoupling, Harmonic, Hysteresis, LoadFriction, Slider, TransmissionError};
 pub use integrator::{Current, Integrator, TimeGrid};
 pub use linear::{Linear, Tangents, linearise};
 pub use load::{Load, LoadAxes, TimedWrench};

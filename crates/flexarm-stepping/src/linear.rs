@@ -18,7 +18,7 @@ use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX};
 
 use crate::arm::{ElasticElement, FlexibleArm, Servo};
 use crate::error::StepError;
-use crate::statics::{StaticSlopes, spring_forces, static_equilibrium, static_forces, with_curves};
+use crate::statics::{StaticSlopes, for_vibration, spring_forces, static_equilibrium, static_forces, with_curves};
 
 /// Accepted unbalanced force over the largest force, as in [`static_equilibrium`].
 const TOLERANCE: f64 = 1e-13;
@@ -121,7 +121,12 @@ pub fn linearise(arm: &FlexibleArm, tool: &Frame, F_T_W: &Wrench, t: f64) -> Res
 
     let slopes = statics.slopes(&mut data, &q);
     let mut springs = DMatrix::zeros(n, n);
-    springs.view_mut((driven, driven), (e.len(), e.len())).copy_from(&with_curves(arm, &arm.stiffness(), &e));
+    springs.view_mut((driven, driven), (e.len(), e.len())).copy_from(&for_vibration(
+        arm,
+        &arm.stiffness(),
+        q.as_slice(),
+        &e,
+    ));
     let K = statics.tangent(&springs, &slopes, &free)?;
     let mut D = DMatrix::zeros(n, n);
     D.view_mut((driven, driven), (e.len(), e.len())).copy_from(&arm.D);
@@ -153,7 +158,7 @@ pub fn linearise(arm: &FlexibleArm, tool: &Frame, F_T_W: &Wrench, t: f64) -> Res
         J: Matrix6xX::from_fn(n, |i, j| J[(i, free[j])]),
         J_a,
         X_WT: data.X_WF(tool),
-        holding: p.rows(0, m).into_owned(),
+        holding: holding(arm, &q, &e, &p),
         q,
         residual,
         iterations,
@@ -162,6 +167,14 @@ pub fn linearise(arm: &FlexibleArm, tool: &Frame, F_T_W: &Wrench, t: f64) -> Res
         linear.close_loops(arm, servo);
     }
     Ok(linear)
+}
+
+/// Forces of the joints that hold the pose: weight and loads, and what ripple asks of the motors.
+fn holding(arm: &FlexibleArm, q: &DVector<f64>, e: &DVector<f64>, p: &DVector<f64>) -> DVector<f64> {
+    let mut holding = p.rows(0, arm.model.n_actuated()).into_owned();
+    let F = spring_forces(arm, q.as_slice(), e);
+    arm.add_motor_forces(q.as_slice(), F.as_slice(), holding.as_mut_slice());
+    holding
 }
 
 impl Linear {
@@ -277,7 +290,7 @@ impl Statics<'_> {
         loop {
             let q = all_coordinates(arm, t, &e);
             let p = self.forces(data, &q);
-            let spring = spring_forces(arm, &e);
+            let spring = spring_forces(arm, q.as_slice(), &e);
             let elastic_p = p.rows(m, ne);
             let scale = elastic_p.amax().max(spring.amax()).max(f64::MIN_POSITIVE);
             let r = &spring + elastic_p;
@@ -290,7 +303,7 @@ impl Statics<'_> {
                 let lost = StepError::NoEquilibrium { t, iterations, residual };
                 return Err(if buckled { self.singular() } else { lost });
             }
-            let springs = with_curves(arm, &at_rest, &e);
+            let springs = with_curves(arm, &at_rest, q.as_slice(), &e);
             let tangent = &springs + self.slopes(data, &q).view((m, m), (ne, ne));
             // Where the tangent is not positive definite its step leads uphill, to a saddle: the springs alone lead down.
             let stable = ((&tangent + tangent.transpose()) * 0.5).cholesky().is_some();

@@ -5,7 +5,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
 
 use crate::arm::FlexibleArm;
 use crate::error::StepError;
-use crate::statics::{static_equilibrium, tangent_stiffness, with_curves};
+use crate::statics::{for_vibration, static_equilibrium, tangent_stiffness};
 
 /// Modes of `K_t φ = ω² M φ`, mass-normalised, ascending.
 #[derive(Clone, Debug, Default)]
@@ -39,10 +39,10 @@ pub fn modes_at(arm: &FlexibleArm, t: f64) -> Result<Modes, StepError> {
     let model = &arm.model;
     let equilibrium = static_equilibrium(arm, t)?;
     let mut data = Data::new(model);
-    let K = with_curves(arm, &arm.stiffness(), &equilibrium);
-    let Kt = tangent_stiffness(arm, &mut data, t, &equilibrium, &K);
     let (mut state, mut qddot) = (State::zeros(model), DVector::zeros(model.nv()));
     arm.prescribed_state(t, &mut state, &mut qddot);
+    let K = for_vibration(arm, &arm.stiffness(), state.q.as_slice(), &equilibrium);
+    let Kt = tangent_stiffness(arm, &mut data, t, &equilibrium, &K);
     let na = model.n_actuated();
     state.q.rows_mut(na, n).copy_from(&equilibrium);
     let M = mass_matrix(model, &mut data, &state.q).view((na, na), (n, n)).clone_owned();

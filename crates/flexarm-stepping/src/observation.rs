@@ -32,6 +32,8 @@ pub struct Observation {
     pub power: [f64; 3],
     /// Work of the drives so far where velocities of the motion jumped (J); not in their power, which has no impulses.
     pub impulse_work: f64,
+    /// What the hysteresis of gears has taken so far (J); not in the power, for it does not depend on speed.
+    pub hysteresis_work: f64,
 }
 
 impl Observation {
@@ -49,6 +51,7 @@ impl Observation {
             energy: [0.0; 3],
             power: [0.0; 3],
             impulse_work: 0.0,
+            hysteresis_work: 0.0,
         }
     }
 }
@@ -79,11 +82,16 @@ pub(crate) fn observe_reduced(
     }
 
     // Springs, and what dampers and friction take away.
-    let mut damping = element_loads(arm, e, rates, system.shifted.as_mut_slice(), &mut out.load);
+    let gears = system.gears.as_ref();
+    let mut damping = match gears {
+        Some(gears) => gears.loads(arm, &mut out.load),
+        None => element_loads(arm, e, rates, system.shifted.as_mut_slice(), &mut out.load),
+    };
     for k in 0..n {
         let rate = state.qdot[k];
-        damping += arm.friction_torque(k, rate) * rate;
+        damping += gears.map_or_else(|| arm.friction_torque(k, rate), |gears| gears.friction[k]) * rate;
     }
+    out.hysteresis_work = gears.map_or(0.0, |gears| gears.lost);
 
     // Powers and energies.
     let loads = arm.loads.iter().map(|load| {
@@ -92,7 +100,8 @@ pub(crate) fn observe_reduced(
     });
     out.power = [out.drive.dot(&out.qdot.rows(0, n)), loads.sum(), damping];
     out.impulse_work = system.struck;
-    out.energy = [kinetic_energy_of(&arm.model, data), potential_energy_of(&arm.model, data), arm.elastic_energy(e)];
+    let elastic = gears.map_or_else(|| arm.elastic_energy(e), |gears| gears.energy(arm));
+    out.energy = [kinetic_energy_of(&arm.model, data), potential_energy_of(&arm.model, data), elastic];
 }
 
 /// Loads `-(K e + D ė)` of the elements, their first six components; the power that the dampers take, `ėᵀ D ė` (W).

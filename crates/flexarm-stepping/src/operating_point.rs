@@ -143,7 +143,7 @@ impl OperatingPoint {
         }
         let residual = self.newton()?;
         // What is asked for next belongs to the equilibrium itself.
-        self.refactor()?;
+        self.refactor(true)?;
         forward_kinematics(&self.arm.model, &mut self.data, &self.q);
         self.X_WT = self.data.X_WF(&self.tool);
         frame_jacobian(&self.arm.model, &self.data, &self.tool, &mut self.J);
@@ -174,7 +174,7 @@ impl OperatingPoint {
                 break;
             }
             if self.factor.is_none() || residual > SLOW * previous {
-                if self.refactor().is_err() {
+                if self.refactor(false).is_err() {
                     buckled = true;
                     // Its step would lead uphill, to a saddle: the springs alone lead down.
                     self.factor = Cholesky::new(self.K.clone());
@@ -204,7 +204,7 @@ impl OperatingPoint {
         let m = self.arm.model.n_actuated();
         let (e, p) = (&self.q.as_slice()[m..], &self.p.as_slice()[m..]);
         self.r.fill(0.0);
-        add_spring_forces(&self.arm, e, self.r.as_mut_slice());
+        add_spring_forces(&self.arm, self.q.as_slice(), e, self.r.as_mut_slice());
         let springs = self.r.amax();
         let mut carried = 0.0_f64;
         for (r, p) in self.r.iter_mut().zip(p) {
@@ -214,16 +214,18 @@ impl OperatingPoint {
         springs.max(carried).max(f64::MIN_POSITIVE)
     }
 
-    /// The tangent at `q` and the factor of its symmetric part.
-    fn refactor(&mut self) -> Result<(), StepError> {
+    /// The tangent at `q` and the factor of its symmetric part; `small`: for small motions, in which no friction slips.
+    fn refactor(&mut self, small: bool) -> Result<(), StepError> {
         let (m, n) = (self.arm.model.n_actuated(), self.r.len());
         let tool = Some((&self.tool, &self.F_T_W));
         self.slopes.compute(&self.arm, tool, 0.0, &mut self.data, &self.q, &mut self.tangent);
         self.tangent += &self.K;
-        for element in &self.arm.elements {
+        for (number, element) in self.arm.elements.iter().enumerate() {
             if let Some(curve) = &element.curve {
                 let k = self.arm.offset(element);
-                let slope = curve.slope(self.q[m + k]);
+                let delta = self.arm.deflection(number, self.q[m + k], self.q.as_slice());
+                let stuck = self.arm.hysteresis.iter().find(|law| small && law.element == number);
+                let slope = stuck.map_or_else(|| curve.slope(delta), |law| law.stuck_slope(delta));
                 self.tangent[(k, k)] += if slope > 0.0 { slope } else { curve.stiffest() } - self.K[(k, k)];
             }
         }

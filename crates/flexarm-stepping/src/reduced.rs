@@ -16,6 +16,7 @@ use crate::arm::{ElasticElement, FlexibleArm, GeometricStiffness, add_product};
 use crate::elastic_tree::ElasticTree;
 use crate::error::StepError;
 use crate::events::{ArmDamping, EventQueue, StepStart, damping_after_changes};
+use crate::gear::{GearState, LoadFriction};
 use crate::mode_matrix::ModeMatrices;
 use crate::servo::ServoState;
 use crate::system::SecondOrderSystem;
@@ -47,6 +48,8 @@ pub struct ReducedArm {
     pub(crate) mass_factor: Option<Cholesky<f64, Dyn>>,
     pub(crate) shifted: DVector<f64>,
     geometric_force: DVector<f64>,
+    /// What gears do beside giving way.
+    pub(crate) gears: Option<Box<GearState>>,
     /// The elastic joints as a tree, where they are enough and damped by element.
     tree: Option<ElasticTree>,
     /// The modes that are eliminated first, where they are enough.
@@ -122,6 +125,7 @@ impl ReducedArm {
             mass_factor: Cholesky::new(DMatrix::identity(n, n)),
             shifted: DVector::zeros(n),
             geometric_force: DVector::zeros(n),
+            gears: GearState::of(&arm),
             tree: ElasticTree::that_pays(&arm),
             modes: HeldModes::that_pay(&arm),
             arm,
@@ -144,6 +148,9 @@ impl ReducedArm {
             v[i] = self.state.qdot[k];
         }
         x.rows_mut(driven, e.len()).copy_from(e);
+        if let Some(gears) = &mut self.gears {
+            gears.begin(&self.arm, self.state.q.as_slice(), e.as_slice());
+        }
         if self.servo.is_some() {
             // The integrators carry what holds the arm on its motion with the springs as they are.
             let mut at_rest = DVector::zeros(n);
@@ -189,6 +196,9 @@ impl ReducedArm {
     /// `f += K x + D v + friction - τ`.
     fn add_forces(&mut self, x: &DVector<f64>, v: &DVector<f64>, f: &mut DVector<f64>) {
         let driven = self.arm.torque_driven.len();
+        if self.gears.is_some() {
+            return self.add_gear_forces(x, v, f);
+        }
         for (i, &k) in self.arm.torque_driven.iter().enumerate() {
             f[i] += self.arm.friction_torque(k, v[i]);
             f[i] -= self.servo.as_ref().map_or(0.0, |s| s.torque[i]);
@@ -215,6 +225,49 @@ impl ReducedArm {
         }
     }
 
+    /// As [`ReducedArm::add_forces`], where gears do more than give way; in the state that was set.
+    #[cold]
+    fn add_gear_forces(&mut self, x: &DVector<f64>, v: &DVector<f64>, f: &mut DVector<f64>) {
+        let Self { arm, gears: Some(gears), state, servo, tau, .. } = self else { return };
+        let driven = arm.torque_driven.len();
+        let (q, qdot) = (state.q.as_slice(), state.qdot.as_slice());
+        gears.update(arm, q, qdot, &x.as_slice()[driven..], &v.as_slice()[driven..]);
+        f.rows_mut(driven, gears.F.len()).axpy(1.0, &gears.F, 1.0);
+        if driven == 0 {
+            return;
+        }
+        // Motors: what ripple and friction put on them, what the controller gives.
+        let GearState { F, friction, .. } = &mut **gears;
+        let load = |k: Option<usize>| k.map_or(0.0, |k| F[arm.offset(&arm.elements[k])]);
+        arm.friction_torques(qdot, |law| load(law.element), friction);
+        let motors = &mut tau.as_mut_slice()[..friction.len()];
+        motors.copy_from_slice(friction);
+        arm.add_motor_forces(q, F.as_slice(), motors);
+        for (i, &k) in arm.torque_driven.iter().enumerate() {
+            f[i] += motors[k] - servo.as_ref().map_or(0.0, |s| s.torque[i]);
+        }
+    }
+
+    /// What ripple and friction add to the forces of the actuated joints in `data.tau`, in the state that was set.
+    #[cold]
+    fn add_gear_torques(&mut self, x: &DVector<f64>, v: &DVector<f64>) {
+        let Self { arm, gears: Some(gears), state, data, qddot, .. } = self else { return };
+        let (n, driven) = (arm.model.n_actuated(), arm.torque_driven.len());
+        let (q, qdot) = (state.q.as_slice(), state.qdot.as_slice());
+        gears.update(arm, q, qdot, &x.as_slice()[driven..], &v.as_slice()[driven..]);
+        let GearState { F, friction, .. } = &mut **gears;
+        let tau = &mut data.tau.as_mut_slice()[..n];
+        let rotor = |k: usize| arm.model.rotor_inertia(k) * qddot[k];
+        let load = |law: &LoadFriction| match law.element {
+            Some(k) => F[arm.offset(&arm.elements[k])],
+            // A rigid gear passes on what the joint needs without its own rotor.
+            None => tau[law.coordinate] - rotor(law.coordinate),
+        };
+        arm.friction_torques(qdot, load, friction);
+        arm.add_motor_forces(q, F.as_slice(), tau);
+        tau.iter_mut().zip(friction).for_each(|(tau, friction)| *tau += *friction);
+    }
+
     fn add_geometric_forces(&self, x: &DVector<f64>, f: &mut DVector<f64>) {
         let driven = self.arm.torque_driven.len();
         add_geometric_forces(&self.arm, &self.data, &x.as_slice()[driven..], &mut f.as_mut_slice()[driven..]);
@@ -226,8 +279,13 @@ impl ReducedArm {
         self.set(t, x, v);
         self.set_accelerations(a);
         inverse_dynamics(&self.arm.model, &mut self.data, &self.state, &self.qddot);
-        for k in 0..self.arm.model.n_actuated() {
-            self.data.tau[k] += self.arm.friction_torque(k, self.state.qdot[k]);
+        match &self.gears {
+            Some(_) => self.add_gear_torques(x, v),
+            None => {
+                for k in 0..self.arm.model.n_actuated() {
+                    self.data.tau[k] += self.arm.friction_torque(k, self.state.qdot[k]);
+                }
+            }
         }
         world_poses(&self.arm.model, &mut self.data);
     }
@@ -370,17 +428,32 @@ impl SecondOrderSystem for ReducedArm {
             // A falling friction would take away from what must stay positive.
             C[(i, i)] = c_D * self.arm.friction.get(k).map_or(0.0, |f| f.slope(self.state.qdot[k]).max(0.0));
         }
+        if let Some(gears) = &self.gears {
+            let rates = self.state.qdot.as_slice();
+            for (i, &row) in self.arm.torque_driven.iter().enumerate() {
+                for (j, &column) in self.arm.torque_driven.iter().enumerate() {
+                    C[(i, j)] = c_D * self.arm.friction_slope(row, column, rates, gears);
+                }
+            }
+        }
         // Springs, with their dampers where these are in proportion.
         for (k, element) in self.arm.elements.iter().enumerate() {
             let (first, size) = (driven + self.arm.offset(element), element.size);
             let damping = if self.arm.proportional { c_D * self.arm.tau[k] } else { 0.0 };
             if let Some(curve) = &element.curve {
-                let slope = curve.slope(self.state.q[element.coordinate]);
+                let slope = match &self.gears {
+                    Some(gears) => gears.slope(&self.arm, k, element, curve),
+                    None => curve.slope(self.state.q[element.coordinate]),
+                };
                 C[(first, first)] += c_K * slope + damping * element.K[(0, 0)];
             } else {
                 let mut block = C.view_mut((first, first), (size, size));
                 block.zip_apply(&element.K, |c, k| *c += (c_K + damping) * k);
             }
+        }
+        for &(i, j, k) in &self.arm.cross_stiffness {
+            C[(driven + i, driven + j)] += c_K * k;
+            C[(driven + j, driven + i)] += c_K * k;
         }
         // Else the damping couples the elements.
         if !self.arm.proportional {
@@ -395,6 +468,22 @@ impl SecondOrderSystem for ReducedArm {
         for element in &self.arm.elements {
             let (first, size) = (driven + self.arm.offset(element), element.size);
             K.view_mut((first, first), (size, size)).copy_from(&element.K);
+        }
+        for &(i, j, k) in &self.arm.cross_stiffness {
+            (K[(driven + i, driven + j)], K[(driven + j, driven + i)]) = (k, k);
+        }
+    }
+
+    fn settle(&mut self, t: f64, x: &DVector<f64>) {
+        if self.arm.hysteresis.is_empty() {
+            return;
+        }
+        self.sample_joints(t);
+        for (i, &k) in self.arm.torque_driven.iter().enumerate() {
+            self.state.q[k] = x[i];
+        }
+        if let Some(gears) = &mut self.gears {
+            gears.settle(&self.arm, self.state.q.as_slice(), &x.as_slice()[self.arm.torque_driven.len()..]);
         }
     }
 

@@ -8,11 +8,13 @@ use nalgebra::DVector;
 
 use crate::arm::{FlexibleArm, Servo};
 use crate::drive::Friction;
+use crate::gear::LoadFriction;
 
 /// State of a [`Servo`] in a run.
 pub(crate) struct ServoState {
     servo: Arc<Servo>,
     friction: Vec<Friction>,
+    load_friction: Vec<LoadFriction>,
     /// Torque held until the next sample, one per axis.
     pub(crate) torque: Vec<f64>,
     /// Integral part of the torque.
@@ -29,6 +31,7 @@ impl ServoState {
         let n = servo.axes.len();
         Self {
             friction: arm.friction.clone(),
+            load_friction: arm.load_friction.clone(),
             torque: vec![0.0; n],
             integral: vec![0.0; n],
             fresh: false,
@@ -50,6 +53,10 @@ impl ServoState {
     fn feed_forward(&self, axis: usize) -> f64 {
         let k = self.servo.axes[axis].coordinate;
         let friction = self.friction.get(k).map_or(0.0, |f| f.torque(self.reference.qdot[k]));
+        let rotor = self.servo.rigid.rotor_inertia(k) * self.qddot[k];
+        let laws = self.load_friction.iter().filter(|law| law.coordinate == k);
+        let loaded = laws.map(|law| law.torque(self.data.tau[k] - rotor, self.reference.qdot[k]));
+        let friction = loaded.fold(friction, |sum, torque| sum + torque);
         if self.servo.axes[axis].feed_forward { self.data.tau[k] + friction } else { 0.0 }
     }
 

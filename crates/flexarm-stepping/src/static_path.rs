@@ -9,7 +9,7 @@ use crate::arm::FlexibleArm;
 use crate::error::StepError;
 use crate::events::EventQueue;
 use crate::reduced::add_geometric_forces;
-use crate::statics::{static_equilibrium, tangent_stiffness, with_curves};
+use crate::statics::{add_spring_forces, static_equilibrium, tangent_stiffness, with_curves};
 
 /// A correction below this part of the deflection ends the search: the next one would be ten times smaller at least.
 const SMALL: f64 = 1e-7;
@@ -77,7 +77,8 @@ impl StaticPath {
             return Ok(&self.state.q);
         }
         self.e = static_equilibrium(&self.arm, t)?;
-        let K = with_curves(&self.arm, &self.arm.stiffness(), &self.e);
+        self.place(t);
+        let K = with_curves(&self.arm, &self.arm.stiffness(), self.state.q.as_slice(), &self.e);
         self.factor = tangent_stiffness(&self.arm, &mut self.data, t, &self.e, &K).cholesky();
         self.place(t);
         Ok(&self.state.q)
@@ -141,9 +142,6 @@ impl StaticPath {
         }
         unbalanced.copy_from(&gravity_forces(&arm.model, data, &state.q).rows(arm.model.n_actuated(), e.len()));
         add_geometric_forces(arm, data, e.as_slice(), unbalanced.as_mut_slice());
-        for element in &arm.elements {
-            let range = arm.offset(element)..arm.offset(element) + element.size;
-            element.add_spring_force(&e.as_slice()[range.clone()], &mut unbalanced.as_mut_slice()[range]);
-        }
+        add_spring_forces(arm, state.q.as_slice(), e.as_slice(), unbalanced.as_mut_slice());
     }
 }

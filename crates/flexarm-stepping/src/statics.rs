@@ -39,9 +39,10 @@ pub fn static_equilibrium(arm: &FlexibleArm, t: f64) -> Result<DVector<f64>, Ste
         if !residual.is_finite() {
             break;
         }
-        let steep = with_curves(arm, &K, &e);
+        let q = joints_at(arm, t);
+        let steep = with_curves(arm, &K, &q, &e);
         let mut tangent = |K: &DMatrix<f64>| tangent_stiffness(arm, &mut data, t, &e, K).cholesky();
-        let Some(factor) = tangent(&leave_play(arm, &e, &g, &steep)).or_else(|| tangent(&steep)) else {
+        let Some(factor) = tangent(&leave_play(arm, &q, &e, &g, &steep)).or_else(|| tangent(&steep)) else {
             return Err(StepError::Singular { matrix: "static stiffness (with the effect of weight)", t });
         };
         let step = factor.solve(&g);
@@ -59,23 +60,37 @@ pub fn static_equilibrium(arm: &FlexibleArm, t: f64) -> Result<DVector<f64>, Ste
 /// Generalised forces out of balance, and the size of what should balance.
 fn unbalanced(arm: &FlexibleArm, data: &mut Data, t: f64, e: &DVector<f64>) -> (DVector<f64>, f64) {
     let g = gravity_part(arm, data, t, e);
-    let spring = spring_forces(arm, e);
+    let spring = spring_forces(arm, &joints_at(arm, t), e);
     let scale = g.amax().max(spring.amax());
     (spring + g, scale)
 }
 
-pub(crate) fn spring_forces(arm: &FlexibleArm, e: &DVector<f64>) -> DVector<f64> {
+pub(crate) fn spring_forces(arm: &FlexibleArm, q: &[f64], e: &DVector<f64>) -> DVector<f64> {
     let mut f = DVector::zeros(e.len());
-    add_spring_forces(arm, e.as_slice(), f.as_mut_slice());
+    add_spring_forces(arm, q, e.as_slice(), f.as_mut_slice());
     f
 }
 
-/// `f += K e`, or the curves; over the elastic coordinates.
-pub(crate) fn add_spring_forces(arm: &FlexibleArm, e: &[f64], f: &mut [f64]) {
-    for element in &arm.elements {
-        let range = arm.offset(element)..arm.offset(element) + element.size;
-        element.add_spring_force(&e[range.clone()], &mut f[range]);
+/// Where the joints are at time t; nothing where no spring asks for it.
+fn joints_at(arm: &FlexibleArm, t: f64) -> Vec<f64> {
+    if arm.transmission.is_empty() {
+        return Vec::new();
     }
+    let (mut state, mut qddot) = (State::zeros(&arm.model), DVector::zeros(arm.model.nv()));
+    arm.prescribed_state(t, &mut state, &mut qddot);
+    state.q.as_slice().to_vec()
+}
+
+/// `f += K e`, or the curves; over the elastic coordinates, with the joints at `q`.
+pub(crate) fn add_spring_forces(arm: &FlexibleArm, q: &[f64], e: &[f64], f: &mut [f64]) {
+    for (k, element) in arm.elements.iter().enumerate() {
+        let range = arm.offset(element)..arm.offset(element) + element.size;
+        match element.size {
+            1 => element.add_spring_force(&[arm.deflection(k, e[range.start], q)], &mut f[range]),
+            _ => element.add_spring_force(&e[range.clone()], &mut f[range]),
+        }
+    }
+    arm.add_cross_forces(e, f);
 }
 
 /// What holds the arm still at `q` without its springs: weight, the loads of time t, a wrench at the tool's origin (world axes),
@@ -116,26 +131,36 @@ fn gravity_part(arm: &FlexibleArm, data: &mut Data, t: f64, e: &DVector<f64>) ->
 }
 
 /// The stiffness with curved springs at their slope; where play leaves none, the steepest slope finds the way out.
-pub(crate) fn with_curves(arm: &FlexibleArm, K: &DMatrix<f64>, e: &DVector<f64>) -> DMatrix<f64> {
+pub(crate) fn with_curves(arm: &FlexibleArm, K: &DMatrix<f64>, q: &[f64], e: &DVector<f64>) -> DMatrix<f64> {
     let mut tangent = K.clone();
-    for element in &arm.elements {
+    for (number, element) in arm.elements.iter().enumerate() {
         if let Some(curve) = &element.curve {
             let k = arm.offset(element);
-            let slope = curve.slope(e[k]);
+            let slope = curve.slope(arm.deflection(number, e[k], q));
             tangent[(k, k)] = if slope > 0.0 { slope } else { curve.stiffest() };
         }
     }
     tangent
 }
 
+/// As [`with_curves`], for small motions about a place: there no friction slips, and sliders are springs.
+pub(crate) fn for_vibration(arm: &FlexibleArm, K: &DMatrix<f64>, q: &[f64], e: &DVector<f64>) -> DMatrix<f64> {
+    let mut tangent = with_curves(arm, K, q, e);
+    for law in &arm.hysteresis {
+        let k = arm.offset(&arm.elements[law.element]);
+        tangent[(k, k)] = law.stuck_slope(arm.deflection(law.element, e[k], q));
+    }
+    tangent
+}
+
 /// Stiffness with which Newton's step out of a play ends just beyond its edge, however small the force.
-fn leave_play(arm: &FlexibleArm, e: &DVector<f64>, g: &DVector<f64>, K: &DMatrix<f64>) -> DMatrix<f64> {
+fn leave_play(arm: &FlexibleArm, q: &[f64], e: &DVector<f64>, g: &DVector<f64>, K: &DMatrix<f64>) -> DMatrix<f64> {
     let mut K = K.clone();
-    for element in &arm.elements {
+    for (number, element) in arm.elements.iter().enumerate() {
         let k = arm.offset(element);
         if let Some(curve) = &element.curve
             && g[k] != 0.0
-            && let Some(way) = curve.way_out(e[k], -g[k])
+            && let Some(way) = curve.way_out(arm.deflection(number, e[k], q), -g[k])
         {
             K[(k, k)] = K[(k, k)].min(g[k].abs() / (1.001 * way));
         }

@@ -43,6 +43,9 @@ pub trait SecondOrderSystem {
     /// K of the springs about their relaxed places, constant and symmetric, n × n, written over all of `K`.
     fn stiffness(&mut self, K: &mut DMatrix<f64>);
 
+    /// A step has ended at t (s) with x: what the system remembers of its way belongs to that time from here on.
+    fn settle(&mut self, _t: f64, _x: &DVector<f64>) {}
+
     /// The same three matrices where they sit on a tree, into `to`, from which they are solved in O(n) instead of O(n²). False
     /// where they do not, or where n is so small that dense ones are faster: `to` then holds anything.
     fn along_tree(&mut self, _c_D: f64, _c_K: f64, _to: &mut TreeMatrices) -> bool {

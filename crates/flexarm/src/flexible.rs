@@ -8,7 +8,7 @@ use crate::bends::Bend;
 use flexarm_fem::{BeamLink, ModalLink, ModalOptions};
 use flexarm_flexlink::{
     BranchJoint, FlexibleLink, FlexibleSpan, GearSpring, Gearbox, LinkForm, Parts, Substituted, SubstitutionError,
-    branch_joints, insert_gearboxes, substitute,
+    branch_joints, insert_gearboxes, insert_mounting, substitute,
 };
 use flexarm_kinematics::{Coordinate, Data, ElasticAngles, ElasticGroup, Frame, MOST_COORDINATES, Model, mass_matrix};
 use flexarm_settings::Setting;
@@ -21,6 +21,7 @@ use crate::caveat::Caveat;
 use crate::drive_entry::{DriveKind, ServoEntry};
 use crate::error::{Error, ModellingError, PoseError};
 use crate::import::SECOND_ORDER_UNKNOWN;
+use crate::mounting::RobotMounting;
 use crate::options::{DriveModel, LinkModel, Modelling};
 use crate::robot::{Robot, tcp_frame};
 
@@ -219,6 +220,8 @@ pub struct FlexibleRobot {
     torque: Vec<(usize, ServoEntry, f64)>,
     /// Doubts about the models of the links.
     pub doubts: Vec<Caveat>,
+    /// The springs under the base, as the last of the spans.
+    pub(crate) mounting: Option<usize>,
     /// Links that bend in modes though rigid parts are asked for, and why: sentences.
     pub modal_instead: Vec<String>,
 }
@@ -226,7 +229,7 @@ pub struct FlexibleRobot {
 /// What a spring belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Owner {
-    /// Flexible link of that number, in [`FlexibleRobot::spans`].
+    /// Flexible link, or mounting, of that number in [`FlexibleRobot::spans`].
     Link(usize),
     /// Drive of that number, in [`Robot::drives`].
     Drive(usize),
@@ -352,7 +355,7 @@ impl FlexibleRobot {
     /// A word for the models of the links.
     pub fn links_model(&self) -> &'static str {
         let modal = self.model.elastic().iter().filter(|g| g.modal).count();
-        match (self.spans.len(), modal) {
+        match (self.spans.len() - usize::from(self.mounting.is_some()), modal) {
             (0, _) => "rigid",
             (_, 0) => "lumped",
             (n, m) if n == m => "modal",
@@ -389,12 +392,15 @@ impl Robot {
         let gearboxes: Vec<Gearbox> =
             self.drives.iter().filter_map(|drive| drive.gearbox_as(modelling.drives)).collect();
         let gears = insert_gearboxes(&mut substituted.mechanism, &gearboxes).map_err(ModellingError::from)?;
+        let mounted = self.insert_springs(&mut substituted, modelling)?;
         let model = Model::new(&substituted.mechanism)
             .map_err(|source| Error::Model { path: self.urdf_path.clone(), source })?;
 
         let mut owned = self.lumped_springs(&substituted);
         owned.extend(self.modal_springs(&links, &substituted));
         owned.extend(self.gear_springs(&gears));
+        let mounting = mounted.as_ref().map(|_| substituted.spans.len() - 1);
+        owned.extend(mounted);
         let (springs, owners) = in_coordinate_order(&model, owned)?;
         let (friction, torque) = self.actuation(&model, modelling.drives);
         Ok(FlexibleRobot {
@@ -409,6 +415,7 @@ impl Robot {
             friction,
             torque,
             doubts,
+            mounting,
             modal_instead,
         })
     }
@@ -435,6 +442,23 @@ impl Robot {
             return Err(ModellingError::NoModalLink { modes: n }.into());
         }
         Ok(chosen)
+    }
+
+    /// Puts the springs of the mounting under the base; links that are rigid stand on rigid ground.
+    fn insert_springs(
+        &self,
+        substituted: &mut Substituted,
+        modelling: &Modelling,
+    ) -> Result<Option<OwnedSpring>, Error> {
+        let Some(RobotMounting::Springs { springs, damping }) = &self.mounting else { return Ok(None) };
+        if modelling.links == LinkModel::Rigid {
+            return Ok(None);
+        }
+        let (spring, span) = insert_mounting(&mut substituted.mechanism, springs).map_err(ModellingError::from)?;
+        let owner = Owner::Link(substituted.spans.len());
+        substituted.spans.push(span);
+        let (group, name) = (spring.joint, spring.link);
+        Ok(Some(OwnedSpring { group, spring: Spring::from((name, spring.K_S, *damping)), owner }))
     }
 
     /// Springs of the lumped links.

@@ -16,12 +16,15 @@ pub struct Bending {
     pub links: Vec<String>,
     /// Names of the joints whose gearboxes yield.
     pub gearboxes: Vec<String>,
+    /// What the base stands on, if it yields.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mounting: Option<String>,
 }
 
 impl Bending {
     /// Whether nothing does.
     pub fn is_nothing(&self) -> bool {
-        self.links.is_empty() && self.gearboxes.is_empty()
+        self.links.is_empty() && self.gearboxes.is_empty() && self.mounting.is_none()
     }
 }
 
@@ -31,7 +34,7 @@ impl Bending {
 pub struct ShareFigures {
     /// Name of the link or joint.
     pub name: String,
-    /// link, gearbox or servo.
+    /// link, gearbox, servo or mounting.
     pub kind: String,
     /// Part of the error along its direction, first order (m): all shares together make the error.
     pub along_m: f64,
@@ -41,6 +44,8 @@ pub struct ShareFigures {
 pub(crate) const LINK: &str = "link";
 /// Kind of an elastic gearbox.
 pub(crate) const GEARBOX: &str = "gearbox";
+/// Kind of what the base stands on.
+pub(crate) const MOUNTING: &str = "mounting";
 /// Kind of what servos leave of the way to go.
 pub(crate) const SERVO: &str = "servo";
 
@@ -79,7 +84,11 @@ fn what_bends(bends: &Bending) -> String {
         [name] => Some(format!("{one} {name}")),
         _ => Some(format!("{several} {}", names.join(", "))),
     };
-    let kinds = [list("link", "links", &bends.links), list("the gearbox of", "the gearboxes of", &bends.gearboxes)];
+    let kinds = [
+        list("link", "links", &bends.links),
+        list("the gearbox of", "the gearboxes of", &bends.gearboxes),
+        list("what it stands on,", "", bends.mounting.as_slice()),
+    ];
     let kinds: Vec<String> = kinds.into_iter().flatten().collect();
     format!("what bends: {}", kinds.join("; "))
 }
@@ -116,7 +125,7 @@ fn shares(tcp: &TcpFigures) -> String {
     let group = |kind: &str, word: &str| {
         let of_kind: Vec<&ShareFigures> = tcp.shares_at_peak.iter().filter(|share| share.kind == kind).collect();
         let sum: f64 = of_kind.iter().map(|share| share.along_m).sum();
-        let most = match (of_kind.len(), most.filter(|most| most.kind == kind && kind != SERVO)) {
+        let most = match (of_kind.len(), most.filter(|most| most.kind == kind && kind != SERVO && kind != MOUNTING)) {
             (0, _) => return None,
             (1, Some(most)) => format!(" ({})", most.name),
             (_, Some(most)) => format!(" ({} most)", most.name),
@@ -126,6 +135,11 @@ fn shares(tcp: &TcpFigures) -> String {
         let sum = format!("{:.digits$}", 1e3 * sum + 0.0);
         Some(format!("{word} {sum}{most}"))
     };
-    let groups = [group(LINK, "links"), group(GEARBOX, "gearboxes"), group(SERVO, "following error of the servos")];
+    let groups = [
+        group(LINK, "links"),
+        group(GEARBOX, "gearboxes"),
+        group(MOUNTING, "mounting"),
+        group(SERVO, "following error of the servos"),
+    ];
     groups.into_iter().flatten().collect::<Vec<_>>().join(", ")
 }

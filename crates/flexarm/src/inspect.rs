@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use crate::balancer::{self, BalancerInfo};
 use crate::error::{Error, PoseError};
+use crate::mounting::RobotMounting;
 use crate::options::Modelling;
 use crate::posed::all_finite;
 use crate::robot::{Robot, tcp_frame};
@@ -24,6 +25,9 @@ pub struct Inspection {
     pub links: Vec<LinkInfo>,
     /// Flexible links.
     pub flexible_links: Vec<FlexibleInfo>,
+    /// Springs under the base; a beam or a mesh there is one of the flexible links.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mounting: Option<MountingInfo>,
     /// Tool centre point at the pose.
     pub tcp: TcpInfo,
     /// Pose asked for, in the order of `joints`.
@@ -100,6 +104,35 @@ pub struct FlexibleInfo {
     /// Of a modal link: natural frequencies with A held, all of them (Hz).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub modal_frequencies_hz: Option<Vec<f64>>,
+}
+
+/// Springs under the base.
+#[derive(Clone, Debug, Serialize)]
+pub struct MountingInfo {
+    /// Name.
+    pub name: String,
+    /// Where they are, in the base link (m).
+    pub position_m: [f64; 3],
+    /// Their axes in the base link, w first.
+    pub quaternion_wxyz: [f64; 4],
+    /// Stiffness in their axes, 6×6, linear first.
+    pub stiffness: Vec<Vec<f64>>,
+    /// What rides on them beside the base (kg).
+    pub mass_kg: f64,
+}
+
+impl MountingInfo {
+    fn of(mounting: &RobotMounting) -> Option<Self> {
+        let RobotMounting::Springs { springs, .. } = mounting else { return None };
+        let attitude = UnitQuaternion::from_rotation_matrix(&springs.X_BS.rotation);
+        Some(Self {
+            name: springs.name.clone(),
+            position_m: springs.X_BS.translation.vector.into(),
+            quaternion_wxyz: [attitude.w, attitude.i, attitude.j, attitude.k],
+            stiffness: springs.K_S.row_iter().map(|row| row.iter().copied().collect()).collect(),
+            mass_kg: springs.inertia.map_or(0.0, |inertia| inertia.mass),
+        })
+    }
 }
 
 /// Pose of the tool centre point in the world.
@@ -213,6 +246,7 @@ pub fn inspect(robot: &Robot, at: Option<&[f64]>, velocity: Option<&[f64]>) -> R
         joints: joints.collect(),
         links: links.collect(),
         flexible_links: flexible_links.collect(),
+        mounting: robot.mounting.as_ref().and_then(MountingInfo::of),
         tcp: TcpInfo {
             link: robot.tcp.0.clone(),
             position_m: X.translation.vector.into(),

@@ -116,7 +116,7 @@ pub(crate) fn flexible_link(
     Ok(link)
 }
 
-fn damping_of(entry: Option<&Spanned<DampingEntry>>, source: &Source) -> Result<Damping, RobotFileError> {
+pub(crate) fn damping_of(entry: Option<&Spanned<DampingEntry>>, source: &Source) -> Result<Damping, RobotFileError> {
     let Some(entry) = entry else { return Ok(Damping::Modal(0.03)) };
     let (value, damping) = match entry.get_ref() {
         DampingEntry { modal: Some(zeta), stiffness_beta: None, rayleigh: None } => (*zeta, Damping::Modal(*zeta)),

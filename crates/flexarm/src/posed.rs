@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use flexarm_analysis::engineering_strain;
 use flexarm_kinematics::{Data, Frame, Pose, State, Wrench, forward_kinematics, rotation_vector};
 use flexarm_stepping::{FlexibleArm, Held, Linear, StepError, linearise};
 use nalgebra::{DVector, Vector6};
@@ -94,7 +95,8 @@ impl Posed {
         let pairs = self.flexible.spans.iter().zip(bent.iter().zip(&straight));
         pairs
             .map(|(span, (bent, straight))| {
-                let strain = (bent.translation.vector.norm() - span.length).abs() / span.length;
+                let change = bent.translation.vector.norm() - span.length;
+                let strain = engineering_strain(change, span.length).map_or(0.0, f64::abs);
                 (strain, rotation_vector((straight.rotation.inverse() * bent.rotation).matrix()).norm())
             })
             .collect()

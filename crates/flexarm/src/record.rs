@@ -148,7 +148,7 @@ pub(crate) fn ordered_links(robot: &Robot) -> Vec<LinkInfo> {
     let mechanism = &robot.urdf.mechanism;
     let base = mechanism.links.iter().find(|l| mechanism.joints.iter().all(|j| j.child != l.name));
     let mut links: Vec<LinkInfo> =
-        base.iter().map(|l| LinkInfo { name: l.name.clone(), parent: None, fixed: true }).collect();
+        base.iter().map(|l| LinkInfo { name: l.name.clone(), parent: None, fixed: !robot.is_mounted() }).collect();
     let mut next = 0;
     while next < links.len() {
         let name = links[next].name.clone();
@@ -156,7 +156,9 @@ pub(crate) fn ordered_links(robot: &Robot) -> Vec<LinkInfo> {
             name: j.child.clone(),
             parent: Some(next),
             // A fixed joint at the far end of a flexible link moves against the link's frame.
-            fixed: j.kind == JointKind::Fixed && robot.flexible.iter().all(|f| f.flexible.link != name),
+            fixed: j.kind == JointKind::Fixed
+                && robot.flexible.iter().all(|f| f.flexible.link != name)
+                && !(next == 0 && robot.is_mounted()),
         }));
         next += 1;
     }

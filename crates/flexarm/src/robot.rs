@@ -15,6 +15,7 @@ use crate::drive_entry::{Drive, drives};
 use crate::error::Error;
 use crate::flexible::RobotLink;
 use crate::link_entry::flexible_link;
+use crate::mounting::{RobotMounting, add_mounting};
 use crate::robot_file::{PayloadEntry, RobotFile, RobotFileError, Source, parse_robot_file};
 
 /// Name of the frame that is added for the tool centre point.
@@ -46,6 +47,8 @@ pub struct Robot {
     pub rigid: Mechanism,
     /// Flexible links.
     pub flexible: Vec<RobotLink>,
+    /// What the base stands on, if it yields.
+    pub mounting: Option<RobotMounting>,
     /// Drives that the file tells about; all other joints are prescribed.
     pub drives: Vec<Drive>,
     /// Link that carries the TCP and pose of the TCP in it.
@@ -103,6 +106,7 @@ impl Robot {
             rigid: urdf.mechanism.clone(),
             urdf,
             flexible: Vec::new(),
+            mounting: None,
             drives: Vec::new(),
             tcp: (link, Pose::identity()),
             default_trajectory: None,
@@ -173,6 +177,7 @@ impl Robot {
             rigid,
             urdf,
             flexible: Vec::new(),
+            mounting: None,
             drives: Vec::new(),
             tcp: tcp.unwrap_or_default(),
             default_trajectory: file.default_trajectory.as_ref().map(|t| folder.join(t.get_ref())),
@@ -203,6 +208,9 @@ impl Robot {
             let flexible = flexible_link(entry, urdf, source, folder, &mut robot.warnings, &mut faults);
             robot.flexible.extend(keep(flexible, &mut faults));
         }
+        if let Some(mounting) = &file.mounting {
+            add_mounting(&mut robot, mounting, &source, folder, &mut faults);
+        }
         match faults.len() {
             0 => {}
             1 => return Err(faults.remove(0)),
@@ -223,7 +231,10 @@ impl Robot {
         self.rigid.links.push(Link { name: TCP_FRAME.into(), inertia: None });
         self.warnings.extend(self.urdf.warnings_only().map(told));
         // Faults that only show in the whole are put to the last flexible link: that is where a second entry stands.
-        let last_flexible = file.and_then(|(f, s)| f.flexible_link.last().map(|e| (s, e.link.span())));
+        let last_flexible = file.and_then(|(f, s)| {
+            let mounting = f.mounting.as_ref().map(Spanned::span);
+            f.flexible_link.last().map(|e| e.link.span()).or(mounting).map(|span| (s, span))
+        });
         match (self.flexible_robot(), last_flexible) {
             (Ok(flexible), _) => {
                 for span in &flexible.spans {
@@ -287,6 +298,7 @@ impl Robot {
         let mut caveats: Vec<Caveat> = own.chain(urdf).chain(self.written.iter().cloned()).collect();
         caveats.extend(caveat::parts::of_robot(self));
         caveats.extend(self.flexible.iter().flat_map(caveat::links::of_link));
+        caveats.extend(caveat::links::of_mounting(self));
         if let Ok(rigid) = self.rigid_model() {
             caveats.extend(caveat::drives::of_drives(&self.drives, &self.rigid, &rigid));
             caveats.extend(caveat::balancers::of_balancers(&self.rigid, &rigid));
@@ -413,7 +425,7 @@ fn unknown_link(what: &str, link: &str, mechanism: &Mechanism) -> String {
     format!("{what} link {link:?} is not a link of the URDF; its links are {known:?}")
 }
 
-fn pose(xyz: [f64; 3], rpy: [f64; 3]) -> Pose {
+pub(crate) fn pose(xyz: [f64; 3], rpy: [f64; 3]) -> Pose {
     Pose::from_parts(Translation3::from(Vector3::from(xyz)), Rotation3::from_euler_angles(rpy[0], rpy[1], rpy[2]))
 }
 

@@ -15,6 +15,7 @@ use crate::balancer_entry::BalancerEntry;
 pub(crate) use crate::beam_entry::BeamEntry;
 use crate::controller_entry::ControllerAxisEntry;
 use crate::drive_entry::DriveEntry;
+use crate::mounting::MountingEntry;
 
 /// The file as written.
 #[derive(Clone, Debug, Deserialize)]
@@ -53,6 +54,8 @@ pub(crate) struct RobotFile {
     /// Joints that slide as they turn: how far in a turn (m), right-handed threads positive.
     #[serde(default)]
     pub lead: std::collections::BTreeMap<String, Spanned<f64>>,
+    /// What the base stands on, if it yields.
+    pub mounting: Option<Spanned<MountingEntry>>,
     /// Links that bend.
     #[serde(default)]
     pub flexible_link: Vec<FlexibleLinkEntry>,

@@ -47,12 +47,15 @@ impl Drop for Place {
 
 #[test]
 fn every_example_of_a_robot_file_loads() {
-    let (page, place) = (read("docs/robot-file.md"), Place::new("robots"));
+    let (page, place) = (read("docs/robot-file.md") + &read("docs/mounting.md"), Place::new("robots"));
     let (mut modal, mut torque) = (0, 0);
     for block in blocks(&page, "toml") {
         let head = if block.starts_with("format") { "" } else { "format = 1\nurdf = \"kr210.urdf\"\n" };
         let robot = place.robot(&format!("{head}{block}"));
-        assert_eq!(robot.flexible.len(), block.matches("[[flexible_link]]").count());
+        let mounted = block.contains("[mounting]");
+        let under = usize::from(mounted && !block.contains("[mounting]\nstiffness"));
+        assert_eq!(robot.is_mounted(), mounted);
+        assert_eq!(robot.flexible.len(), block.matches("[[flexible_link]]").count() + under);
         assert_eq!(robot.drives.len(), block.matches("[[drive]]").count());
         assert_eq!(robot.rigid.balancers.len(), block.matches("[[balancer]]").count());
         robot.flexible_robot().unwrap();
@@ -163,6 +166,7 @@ const ROBOT: [&str; 6] = [
     "crates/flexarm/src/controller_entry.rs",
     "crates/flexarm/src/beam_entry.rs",
     "crates/flexarm/src/drive_entry.rs",
+    "crates/flexarm/src/mounting.rs",
     "crates/flexarm-linkmaker/src/material_entry.rs",
 ];
 
@@ -209,6 +213,7 @@ fn the_schemas_have_the_same_keys() {
     let robot = [
         ("tcp", "TcpEntry"),
         ("payload", "PayloadEntry"),
+        ("mounting", "MountingEntry"),
         ("flexible_link", "FlexibleLinkEntry"),
         ("damping", "DampingEntry"),
         ("beam", "BeamEntry"),

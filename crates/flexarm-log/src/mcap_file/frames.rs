@@ -78,7 +78,7 @@ impl Frames {
         let all = [Tree::Flexible, Tree::Rigid, Tree::Magnified];
         let frame = |link: &LinkInfo| LinkFrame {
             parent: link.parent,
-            moving: if link.fixed || link.parent.is_none() { Moving::No } else { Moving::Yes },
+            moving: if link.fixed { Moving::No } else { Moving::Yes },
             names: all.map(|tree| tree.frame(&link.name)),
         };
         let tcp = header.links.iter().position(|link| link.name == header.tcp);
@@ -150,8 +150,9 @@ impl Frames {
         let name = |link: &'a LinkFrame| link.names[tree as usize].as_str();
         for (index, link) in self.links.iter().enumerate() {
             let (parent, X_WP) = match link.parent {
-                Some(parent) => (name(&self.links[parent]), twin.X_WL[parent]),
-                None => (WORLD, Pose::identity()),
+                // What hangs on a base that is called `world` and moves is seen from the root.
+                Some(parent) if name(&self.links[parent]) != WORLD => (name(&self.links[parent]), twin.X_WL[parent]),
+                _ => (WORLD, Pose::identity()),
             };
             let child = name(link);
             // A base link that is called `world` is the root itself.

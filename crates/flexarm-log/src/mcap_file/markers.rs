@@ -66,7 +66,9 @@ fn deviating(header: &RunHeader) -> Vec<bool> {
     let drives_give_way = !header.contributors.iter().all(bends);
     let mut deviates: Vec<bool> = Vec::with_capacity(header.links.len());
     for (index, link) in header.links.iter().enumerate() {
-        let own = header.bends.iter().any(|bend| bend.link == index);
+        // A base that is not fixed stands on something that yields.
+        let stands_free = link.parent.is_none() && !link.fixed;
+        let own = stands_free || header.bends.iter().any(|bend| bend.link == index);
         deviates.push(own || link.parent.is_some_and(|parent| deviates[parent] || drives_give_way));
     }
     deviates

@@ -58,6 +58,7 @@ impl<T: Real> LaneArm<T> {
                 && ElasticTree::that_pays(arm).is_none()
                 && HeldModes::that_pay(arm).is_none()
                 && arm.torque_driven.is_empty()
+                && !arm.has_gear_laws()
                 && arm.loads.is_empty()
                 && arm.model.balancers().is_empty()
                 && arm.inertia_changes.is_empty()

@@ -136,6 +136,11 @@ impl Method for ReferenceSettings {
     }
 
     fn start(&self, arm: FlexibleArm, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
+        if !arm.hysteresis.is_empty() {
+            let text = "the reference stepper has continuous equations and does not know the hysteresis of gears: use \
+                        sdirk3 or rk4 with a small step";
+            return Err(StepError::Setup(text.into()));
+        }
         ReducedStepper::start(arm, e, |system, x, v| {
             let mut integrator = Reference::new(system, 0.0, h, *self, x, v)?;
             // Else a solver that takes long steps may not see a short load at all.

@@ -140,6 +140,7 @@ impl Integrator for Rk4 {
         std::mem::swap(&mut self.now.v, &mut self.v_stage);
         std::mem::swap(&mut self.now.acceleration, &mut self.a_stage);
         self.now.grid.reach(t_new);
+        system.settle(t_new, &self.now.x);
         Ok(())
     }
 }

@@ -223,6 +223,7 @@ impl ImplicitStep for Sdirk3 {
         std::mem::swap(&mut self.now.acceleration, &mut self.A[2]);
         std::mem::swap(&mut self.before, &mut self.A[1]);
         self.newton.fresh = false;
+        system.settle(t, &self.now.x);
         self.now.grid.reach(t);
         Ok(())
     }

@@ -120,6 +120,20 @@ pub(crate) const DENSITY: CaveatKind = CaveatKind::warning(
     "kg/m3",
     "check mass (kg) and inertia (kg m2)",
 );
+/// Springs under the base, along.
+pub(crate) const MOUNTING_SINK: CaveatKind = CaveatKind::warning(
+    "mounting-soft",
+    "{where} gives way by {value} m under the weight of the robot, a pedestal by less than {yardstick} m",
+    "m",
+    "stiffness is in N/m along and N m/rad about the axes",
+);
+/// Springs under the base, about.
+pub(crate) const MOUNTING_TILT: CaveatKind = CaveatKind::warning(
+    "mounting-soft",
+    "{where} tilts by {value} rad under the weight of the robot at a lever of 1 m, a pedestal by less than {yardstick} rad",
+    "rad",
+    "stiffness is in N/m along and N m/rad about the axes",
+);
 /// Size of gravity.
 pub(crate) const GRAVITY: CaveatKind = CaveatKind::warning(
     "gravity",

@@ -8,6 +8,8 @@ use flexarm_stepping::Damping;
 use super::slip::{self, slip};
 use super::{Caveat, CaveatKind, kinds};
 use crate::flexible::RobotLink;
+use crate::mounting::RobotMounting;
+use crate::robot::Robot;
 
 /// Young's modulus from polymers to diamond (Pa).
 const YOUNG: RangeInclusive<f64> = 1e8..=1.3e12;
@@ -39,6 +41,35 @@ pub(crate) fn of_link(link: &RobotLink) -> Vec<Caveat> {
             caveats.extend(material(&name, &beam.material));
         }
         caveats.extend(section(&name, beam));
+    }
+    caveats
+}
+
+/// Sink (m) of a base under the weight of the whole robot, and tilt (rad) under that weight at a lever of 1 m: cast pedestals
+/// and anchored plates stay below a tenth of it.
+const SINKS: [f64; 2] = [1e-3, 5e-3];
+
+/// Springs under the base.
+pub(crate) fn of_mounting(robot: &Robot) -> Vec<Caveat> {
+    let Some(RobotMounting::Springs { springs, damping: damped }) = &robot.mounting else { return Vec::new() };
+    let name = format!("mounting {:?}", springs.name);
+    let mut caveats: Vec<Caveat> = damping(&name, damped).into_iter().collect();
+    let links = robot.rigid.links.iter().filter_map(|link| link.inertia).map(|inertia| inertia.mass);
+    let weight = 9.81 * (links.sum::<f64>() + springs.inertia.map_or(0.0, |inertia| inertia.mass));
+    let K = &springs.K_S;
+    let least = |first: usize| (first..first + 3).map(|i| K[(i, i)]).fold(f64::INFINITY, f64::min);
+    let sink = weight / least(0);
+    if sink > SINKS[0] {
+        let likely =
+            slip(sink, &(1e-7..=SINKS[0]), &[(1e3, "stiffness in kN/m or N/mm"), (1e6, "stiffness in kN/mm")], 1.0);
+        caveats.push(kinds::MOUNTING_SINK.found(&name, sink, SINKS[0]).likely(likely));
+    }
+    // At a lever of 1 m.
+    let tilt = weight / least(3);
+    if tilt > SINKS[1] {
+        let likely =
+            slip(tilt, &(1e-7..=SINKS[1]), &[(57.3, "stiffness in N m/deg"), (1e3, "stiffness in kN m/rad")], 1.0);
+        caveats.push(kinds::MOUNTING_TILT.found(&name, tilt, SINKS[1]).likely(likely));
     }
     caveats
 }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use flexarm_analysis::LinearError;
-use flexarm_flexlink::{GearboxError, SubstitutionError};
+use flexarm_flexlink::{GearboxError, MountingError, SubstitutionError};
 use flexarm_settings::Setting;
 use flexarm_stepping::StepError;
 
@@ -44,6 +44,9 @@ pub enum ModellingError {
     /// The springs of the gearboxes.
     #[error(transparent)]
     Gearbox(#[from] GearboxError),
+    /// The springs under the base.
+    #[error(transparent)]
+    Mounting(#[from] MountingError),
     /// An elastic joint that the substitution made and that no link owns.
     #[error("elastic joint {joint:?} has no stiffness")]
     NoStiffness {

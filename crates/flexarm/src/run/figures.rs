@@ -23,13 +23,16 @@ impl Run<'_> {
         let (links, elastic_drives) = (self.link_figures(), self.drive_figures());
         let sag_m = self.static_sag();
         let robot = self.robot;
-        let by_choice = !robot.flexible.is_empty() || robot.drives.iter().any(|drive| drive.gearbox.is_some());
+        let by_choice = !robot.flexible.is_empty()
+            || robot.is_mounted()
+            || robot.drives.iter().any(|drive| drive.gearbox.is_some());
         let coordinates = self.arm.model.coordinates().iter();
         let peaks = coordinates.zip(self.monitors.drive_loads.result());
         let mut summary = Summary {
             bends: Bending {
-                links: links.iter().map(|link| link.name.clone()).collect(),
+                links: links.iter().map(|link| link.name.clone()).filter(|name| !robot.stands_on(name)).collect(),
                 gearboxes: elastic_drives.iter().map(|drive| drive.joint.clone()).collect(),
+                mounting: links.iter().map(|link| link.name.clone()).find(|name| robot.stands_on(name)),
             },
             robot: robot.name.clone(),
             trajectory: self.motion.name.clone(),

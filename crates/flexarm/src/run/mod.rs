@@ -224,7 +224,8 @@ struct Contributor {
 fn contributors(robot: &Robot, flexible: &FlexibleRobot, arm: &FlexibleArm) -> Vec<Contributor> {
     let (n_links, n_drives) = (flexible.spans.len(), robot.drives.len());
     let drives = robot.drives.iter().enumerate().filter(|(k, _)| flexible.owners.contains(&Owner::Drive(*k)));
-    let links = flexible.spans.iter().enumerate().map(|(k, span)| (k, span.link.clone(), headline::LINK));
+    let kind = |name: &str| if robot.stands_on(name) { headline::MOUNTING } else { headline::LINK };
+    let links = flexible.spans.iter().enumerate().map(|(k, span)| (k, span.link.clone(), kind(&span.link)));
     let drives = drives.map(|(k, drive)| (n_links + k, drive.joint.clone(), headline::GEARBOX));
     let follows = !arm.torque_driven.is_empty();
     let following = follows.then(|| (n_links + n_drives, FOLLOWING_ERROR.to_owned(), headline::SERVO));

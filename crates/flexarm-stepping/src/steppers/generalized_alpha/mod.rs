@@ -135,7 +135,7 @@ fn forgets_errors(arm: &FlexibleArm) -> bool {
         let twice = shape.dot(&force);
         twice >= 2.0 * DAMPED * omega
     });
-    arm.torque_driven.is_empty() && straight && damped
+    arm.torque_driven.is_empty() && !arm.has_gear_laws() && straight && damped
 }
 
 /// The integrator with its state; see the module page.
@@ -384,6 +384,7 @@ impl ImplicitStep for GeneralizedAlpha {
         }
         self.newton.found(search.iterations, search.iterations);
         self.accept(t);
+        system.settle(t, &self.now.x);
         if !self.newton.factored {
             // The last residual was as good as here, and (6) is the same for all that a step places.
             let _singular_is_found_again_in_the_next_step = self.factor(system, t);

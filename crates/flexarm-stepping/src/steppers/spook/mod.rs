@@ -260,7 +260,11 @@ fn check_known(arm: &FlexibleArm) -> Result<(), StepError> {
     let unknown = [
         (!arm.torque_driven.is_empty(), "joints driven by torque"),
         (!arm.inertia_changes.is_empty(), "payloads that change"),
+        (!arm.hysteresis.is_empty(), "gears with hysteresis"),
         (arm.elements.iter().any(|e| e.curve.is_some()), "springs with play or curves"),
+        (!arm.transmission.is_empty(), "transmission errors"),
+        (!arm.load_friction.is_empty(), "friction that grows with the load"),
+        (arm.coupling.as_ref().is_some_and(|coupling| !coupling.is_none()), "gears that move several joints"),
         (arm.model.has_mimic(), "mimic joints"),
     ];
     match unknown.iter().find(|(there, _)| *there) {

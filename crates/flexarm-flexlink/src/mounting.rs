@@ -1,0 +1,134 @@
+//! An elastic mounting: six springs between the ground and the base of a robot.
+//!
+//! ```text
+//! ground --springs at S--> <name>__top (mass that rides on them) --fixed--> base
+//! ```
+//! The ground becomes the root of the tree; at zero deflection the base is where it was, so that the axes of the world stay
+//! those of the base. Not here: a base that stands on a beam or a mesh, which is a flexible link ([`crate::substitute`]).
+
+use flexarm_kinematics::{ElasticAngles, Joint, JointKind, Link, LinkInertia, Mechanism, Pose};
+use nalgebra::Matrix6;
+
+use crate::gearbox::ASYMMETRY;
+use crate::substitute::{FlexibleSpan, Spring};
+
+/// Springs under the base.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mounting {
+    /// Name for people, and of the ground link.
+    pub name: String,
+    /// Pose of S, where the springs are, in the base link.
+    pub X_BS: Pose,
+    /// Stiffness at So in S axes (N/m, N/rad; N m/m, N m/rad).
+    pub K_S: Matrix6<f64>,
+    /// What rides on the springs beside the base, in S axes.
+    pub inertia: Option<LinkInertia>,
+}
+
+/// Why springs do not fit under a base.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum MountingError {
+    /// Another link has the name.
+    #[error("mounting {name:?}: the robot has a link of that name; call the mounting otherwise with name = \"...\"")]
+    NameTaken {
+        /// The name.
+        name: String,
+    },
+    /// The tree has no root.
+    #[error("mounting {name:?}: the robot has no single base link to stand on it, found {roots:?}")]
+    NoBase {
+        /// The mounting.
+        name: String,
+        /// Links that no joint carries.
+        roots: Vec<String>,
+    },
+    /// A stiffness that holds nothing.
+    #[error(
+        "mounting {name:?}: its stiffness must be finite and positive definite, found {found:e} as its smallest value"
+    )]
+    NotPositive {
+        /// The mounting.
+        name: String,
+        /// Smallest eigenvalue, or the entry that is no number.
+        found: f64,
+    },
+    /// A matrix that no spring has.
+    #[error("mounting {name:?}: its 6x6 stiffness must be symmetric, found a relative asymmetry of {found:.1e}")]
+    NotSymmetric {
+        /// The mounting.
+        name: String,
+        /// Largest difference to the transpose over the largest entry.
+        found: f64,
+    },
+}
+
+/// The link that no joint carries.
+///
+/// # Errors
+/// [`MountingError::NoBase`] if it is not exactly one.
+pub fn base_link<'m>(mechanism: &'m Mechanism, mounting: &str) -> Result<&'m Link, MountingError> {
+    let carried = |link: &Link| mechanism.joints.iter().any(|joint| joint.child == link.name);
+    let roots: Vec<&Link> = mechanism.links.iter().filter(|link| !carried(link)).collect();
+    match roots[..] {
+        [one] => Ok(one),
+        _ => {
+            let roots = roots.iter().map(|link| link.name.clone()).collect();
+            Err(MountingError::NoBase { name: mounting.to_owned(), roots })
+        }
+    }
+}
+
+fn check_stiffness(name: &str, K: &Matrix6<f64>) -> Result<(), MountingError> {
+    let not_positive = |found: f64| Err(MountingError::NotPositive { name: name.to_owned(), found });
+    if let Some(hole) = K.iter().find(|k| !k.is_finite()) {
+        return not_positive(*hole);
+    }
+    let asymmetry = (K - K.transpose()).amax() / K.amax();
+    if asymmetry > ASYMMETRY {
+        return Err(MountingError::NotSymmetric { name: name.to_owned(), found: asymmetry });
+    }
+    // Forces and moments have different units: what counts is the matrix scaled to ones on its diagonal.
+    let diagonal = K.diagonal();
+    if diagonal.min() <= 0.0 {
+        return not_positive(diagonal.min());
+    }
+    let scaled = Matrix6::from_fn(|i, j| K[(i, j)] / (diagonal[i] * diagonal[j]).sqrt());
+    match scaled.symmetric_eigenvalues().min() {
+        least if least > 1e-12 => Ok(()),
+        least => not_positive(least),
+    }
+}
+
+/// Puts the springs between a new ground link and the base. Returns the elastic joint and where to look for its ends.
+///
+/// # Errors
+/// [`MountingError`]; the mechanism is as it was then.
+pub fn insert_mounting(
+    mechanism: &mut Mechanism,
+    mounting: &Mounting,
+) -> Result<(Spring, FlexibleSpan), MountingError> {
+    let Mounting { name, X_BS, K_S, inertia } = mounting;
+    let (top, joint) = (format!("{name}__top"), format!("{name}__elastic"));
+    if let Some(taken) = [name, &top].into_iter().find(|name| mechanism.link(name).is_some()) {
+        return Err(MountingError::NameTaken { name: taken.clone() });
+    }
+    let base = base_link(mechanism, name)?.name.clone();
+    check_stiffness(name, K_S)?;
+    mechanism.links.push(Link { name: name.clone(), inertia: None });
+    mechanism.links.push(Link { name: top.clone(), inertia: *inertia });
+    let elastic = JointKind::Elastic(ElasticAngles::RotationVector);
+    mechanism.joints.push(Joint::new(&joint, elastic, name, &top, *X_BS));
+    mechanism.joints.push(Joint::new(format!("{name}__base"), JointKind::Fixed, &top, base, X_BS.inverse()));
+    let mass = inertia.map_or(0.0, |inertia| inertia.mass);
+    let span = FlexibleSpan {
+        link: name.clone(),
+        distal_link: top.clone(),
+        X_LA: *X_BS,
+        X_DB: Pose::identity(),
+        length: 0.0,
+        own_mass: mass,
+        part_masses: vec![mass],
+    };
+    Ok((Spring { link: name.clone(), joint, distal_link: top, K_S: *K_S, X_LS: *X_BS }, span))
+}

@@ -1,0 +1,558 @@
+//! What a gearbox does beside giving way: errors of its transmission, hysteresis, friction under load, and gears that move
+//! several joints.
+//!
+//! ```text
+//! δ = e - ε(q_m)             ε: transmission error at the motor's coordinate; δ deflects the spring          (1)
+//! F = elastic(δ) + Σ k_i s_i       s_i: deflection of the slider i, |s_i| <= r_i                              (2)
+//! s_i ← clamp(s_i + Δδ, -r_i, r_i)                            the play operator, state at the ends of steps   (3)
+//! on e: F;   on q_m: -ε'(q_m) F                               so that F does the work F δ̇                     (4)
+//! θ = C^-1 q,  K = C^-T K_m C^-1,  τ_m = Cᵀ τ                 gears between motors θ and joints q = C θ       (5)
+//! ```
+//! Sliders in parallel follow Masing's rules: a branch after a reversal is the first loading curve twice as large, and the
+//! loss of a closed cycle does not depend on its speed. Start at [`TransmissionError`], [`Hysteresis`], [`GearCoupling`]
+//! and [`LoadFriction`]; [`GearState`] is what a run remembers. Not here: springs themselves (`arm`), rotors (in the tree).
+//!
+//! Sources: [Iwan 1966] for sliders in parallel; [Tuttle & Seering 1996] for (1) with harmonics of the motor.
+
+use std::f64::consts::FRAC_PI_2;
+
+use nalgebra::{DMatrix, DVector, Vector6};
+
+use crate::arm::{Damping, ElasticElement, FlexibleArm, add_product};
+use crate::drive::TorqueCurve;
+use crate::error::StepError;
+
+/// One harmonic of a transmission error: `amplitude sin(cycles q + phase)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Harmonic {
+    /// On the joint's side (rad or m).
+    pub amplitude: f64,
+    /// Cycles in a turn of the joint, or radians of phase per radian of it; for a slide radians per metre.
+    pub cycles: f64,
+    /// At joint value zero (rad).
+    pub phase: f64,
+}
+
+/// Error of a transmission over the coordinate of its motor, see (1) of the module page.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TransmissionError {
+    /// Element of the gearbox's spring, of one coordinate.
+    pub element: usize,
+    /// Coordinate of the joint, where the motor is.
+    pub motor: usize,
+    /// Its harmonics.
+    pub harmonics: Vec<Harmonic>,
+}
+
+impl TransmissionError {
+    /// ε (rad or m) with the motor at `q`, seen from the joint.
+    pub fn at(&self, q: f64) -> f64 {
+        self.harmonics.iter().map(|h| h.amplitude * (h.cycles * q + h.phase).sin()).sum()
+    }
+
+    /// dε/dq.
+    pub fn slope(&self, q: f64) -> f64 {
+        let cosine = |h: &Harmonic| h.amplitude * h.cycles * (h.cycles * q + h.phase + FRAC_PI_2).sin();
+        self.harmonics.iter().map(cosine).sum()
+    }
+}
+
+/// A spring with dry friction behind it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Slider {
+    /// Of the spring (N m/rad or N/m).
+    pub stiffness: f64,
+    /// Deflection of the spring at which the friction slips (rad or m).
+    pub reach: f64,
+}
+
+/// A gearbox whose torque depends on how its deflection came about, whatever its speed: (2) and (3) of the module page.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Hysteresis {
+    /// Element of the gearbox's spring, of one coordinate.
+    pub element: usize,
+    /// What is left without the friction.
+    pub elastic: TorqueCurve,
+    /// Sliders in parallel with it.
+    pub sliders: Vec<Slider>,
+}
+
+impl Hysteresis {
+    /// Sliders that slip one after the other, evenly up to the deflection `reach`, with the torque `friction` together.
+    ///
+    /// First loading along them is a polygon with corners on the parabola `friction (2 x - x²)`, `x = δ / reach`, of Rayleigh's
+    /// law. All arguments are positive.
+    pub fn even_sliders(friction: f64, reach: f64, count: usize) -> Vec<Slider> {
+        let n = count as f64;
+        // Slopes of the polygon between its corners fall by equal steps of 2 friction / (reach n).
+        let slip = |i: usize| reach * (i as f64 + 1.0) / n;
+        let each = 2.0 * friction / (reach * n);
+        let slope = |i: usize| if i < count { each * (n - i as f64 - 0.5) } else { 0.0 };
+        (0..count).map(|i| Slider { stiffness: slope(i) - slope(i + 1), reach: slip(i) }).collect()
+    }
+
+    /// The curve of first loading from rest.
+    pub fn first_loading(&self) -> TorqueCurve {
+        self.sliders
+            .iter()
+            .fold(self.elastic.clone(), |curve, slider| curve.with_slider(slider.stiffness, slider.reach))
+    }
+
+    /// Slope of small motions about a deflection: no slider slips.
+    pub fn stuck_slope(&self, delta: f64) -> f64 {
+        self.elastic.slope(delta) + self.sliders.iter().map(|slider| slider.stiffness).sum::<f64>()
+    }
+
+    /// Loss of a closed cycle between `-amplitude` and `amplitude` (J): `4 Σ k r (amplitude - r)` over the sliders that slip.
+    pub fn loss(&self, amplitude: f64) -> f64 {
+        self.sliders.iter().map(|s| 4.0 * s.stiffness * s.reach * (amplitude - s.reach).max(0.0)).sum()
+    }
+}
+
+/// Friction that grows with the torque that a gear transmits: `coefficient |τ| tanh(q̇ / v_0)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LoadFriction {
+    /// Coordinate of the joint.
+    pub coordinate: usize,
+    /// Element of the gearbox's spring, of one coordinate, whose torque is transmitted; without one what moves the joint.
+    pub element: Option<usize>,
+    /// Friction over transmitted torque.
+    pub coefficient: f64,
+    /// Speed `v_0` over which the sign changes (rad/s).
+    pub regularisation: f64,
+}
+
+impl LoadFriction {
+    pub(crate) fn torque(&self, transmitted: f64, rate: f64) -> f64 {
+        self.coefficient * transmitted.abs() * (rate / self.regularisation).tanh()
+    }
+
+    fn slope(&self, transmitted: f64, rate: f64) -> f64 {
+        let t = (rate / self.regularisation).tanh();
+        self.coefficient * transmitted.abs() * (1.0 - t * t) / self.regularisation
+    }
+}
+
+/// Gears by which motors move several joints, see (5) of the module page.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GearCoupling {
+    /// Elements of the gearboxes' springs in the order of the motors; none if the gears are rigid.
+    pub elements: Vec<usize>,
+    /// Coordinates of the joints, in the same order.
+    pub coordinates: Vec<usize>,
+    /// C, joints per motors behind their gears.
+    pub C: DMatrix<f64>,
+    /// Its inverse.
+    pub C_inverse: DMatrix<f64>,
+}
+
+impl GearCoupling {
+    /// `C^-T diag(values) C^-1`: stiffness, damping or inertia of the motors on the joints.
+    pub fn on_joints(C_inverse: &DMatrix<f64>, values: &[f64]) -> DMatrix<f64> {
+        C_inverse.transpose() * DMatrix::from_diagonal(&DVector::from_column_slice(values)) * C_inverse
+    }
+
+    /// Torques of the motors behind their gears, `Cᵀ τ`, for those of the joints in all coordinates.
+    pub fn motor_torques(&self, tau: &[f64]) -> Vec<f64> {
+        let joints = DVector::from_iterator(self.coordinates.len(), self.coordinates.iter().map(|k| tau[*k]));
+        self.C.tr_mul(&joints).as_slice().to_vec()
+    }
+
+    /// Whether each motor moves its own joint alone.
+    pub(crate) fn is_none(&self) -> bool {
+        self.C.is_identity(0.0)
+    }
+
+    /// Place of a coordinate among the coupled ones.
+    fn place(&self, coordinate: usize) -> Option<usize> {
+        self.coordinates.iter().position(|k| *k == coordinate)
+    }
+
+    /// Rate of the motor of that number behind its gear.
+    fn motor_rate(&self, number: usize, rates: &[f64]) -> f64 {
+        self.coordinates.iter().enumerate().map(|(j, k)| self.C_inverse[(number, j)] * rates[*k]).sum()
+    }
+}
+
+/// Entry of a symmetric matrix on the elastic coordinates, in both its places.
+pub(crate) type Entry = (usize, usize, f64);
+
+impl FlexibleArm {
+    /// The same arm with gears that move several joints: its springs, dampers and friction so far are those of the motors
+    /// behind their gears, and become those of the joints.
+    ///
+    /// # Errors
+    /// [`StepError::Setup`] if sizes differ, springs have more than one coordinate, are curved or are missing for some of the motors, and
+    /// as [`FlexibleArm::new`].
+    pub fn with_coupling(mut self, coupling: GearCoupling) -> Result<Self, StepError> {
+        let n = coupling.coordinates.len();
+        let single = |k: &usize| self.elements.get(*k).is_some_and(|e| e.size == 1 && e.curve.is_none());
+        let fits = coupling.C.shape() == (n, n) && coupling.C_inverse.shape() == (n, n);
+        if !(fits
+            && (coupling.elements.is_empty() || coupling.elements.len() == n)
+            && coupling.elements.iter().all(single))
+        {
+            return Err(StepError::Setup(format!(
+                "a coupling of {n} joints needs {n} straight springs of one coordinate, or none, and a {n}x{n} matrix"
+            )));
+        }
+        let (mut stiffness, mut damping) = (Vec::new(), Vec::new());
+        for &k in &coupling.elements {
+            let element = &self.elements[k];
+            stiffness.push(element.K[(0, 0)]);
+            damping.push(if let Damping::Dampers(d) = element.damping { d[0] } else { 0.0 });
+        }
+        let K = GearCoupling::on_joints(&coupling.C_inverse, &stiffness_of(n, &stiffness));
+        let D = GearCoupling::on_joints(&coupling.C_inverse, &stiffness_of(n, &damping));
+        for (i, &k) in coupling.elements.iter().enumerate() {
+            let row = self.offset(&self.elements[k]);
+            for (j, &l) in coupling.elements.iter().enumerate().skip(i + 1) {
+                let column = self.offset(&self.elements[l]);
+                self.cross_stiffness.extend((K[(i, j)] != 0.0).then_some((row, column, K[(i, j)])));
+                self.cross_damping.extend((D[(i, j)] != 0.0).then_some((row, column, D[(i, j)])));
+            }
+            let element = &mut self.elements[k];
+            element.K[(0, 0)] = K[(i, i)];
+            element.C[(0, 0)] = 1.0 / K[(i, i)];
+            match &mut element.damping {
+                Damping::Dampers(d) => d[0] = D[(i, i)],
+                _ if D[(i, i)] != 0.0 => self.cross_damping.push((row, row, D[(i, i)])),
+                _ => {}
+            }
+        }
+        self.coupling = Some(coupling);
+        self.update_modes_and_damping()?;
+        Ok(self)
+    }
+
+    /// The same arm with gears whose torque has a history; their elements have the curve of first loading from here on.
+    ///
+    /// # Errors
+    /// [`StepError::Setup`] if an element has more than one coordinate or none is there, and as [`FlexibleArm::new`].
+    pub fn with_hysteresis(mut self, laws: Vec<Hysteresis>) -> Result<Self, StepError> {
+        for law in &laws {
+            let Some(element) = self.elements.get_mut(law.element).filter(|e| e.size == 1) else {
+                return Err(StepError::Setup(format!(
+                    "hysteresis of element {}: it needs a spring of one coordinate",
+                    law.element
+                )));
+            };
+            let curve = law.first_loading();
+            element.K[(0, 0)] = curve.stiffest();
+            element.C[(0, 0)] = 1.0 / curve.stiffest();
+            element.curve = Some(curve);
+        }
+        self.hysteresis = laws;
+        self.update_modes_and_damping()?;
+        Ok(self)
+    }
+
+    /// The same arm with transmission errors.
+    ///
+    /// # Errors
+    /// As [`FlexibleArm::with_hysteresis`].
+    pub fn with_transmission_errors(mut self, errors: Vec<TransmissionError>) -> Result<Self, StepError> {
+        for error in &errors {
+            let single = self.elements.get(error.element).is_some_and(|e| e.size == 1);
+            if !single || error.motor >= self.model.n_actuated() {
+                let text =
+                    format!("transmission error of element {}: it needs a spring of one coordinate", error.element);
+                return Err(StepError::Setup(text));
+            }
+        }
+        self.transmission = errors;
+        self.update_modes_and_damping()?;
+        Ok(self)
+    }
+
+    /// Whether a gearbox does more than give way along a line or a curve.
+    pub(crate) fn has_gear_laws(&self) -> bool {
+        !(self.transmission.is_empty() && self.hysteresis.is_empty() && self.load_friction.is_empty())
+            || self.coupling.as_ref().is_some_and(|coupling| !coupling.is_none())
+    }
+
+    /// Deflection δ of a spring of one coordinate e, with the joints at `q`.
+    pub(crate) fn deflection(&self, element: usize, e: f64, q: &[f64]) -> f64 {
+        let errors = self.transmission.iter().filter(|error| error.element == element);
+        errors.fold(e, |delta, error| delta - error.at(q[error.motor]))
+    }
+
+    /// `f += K x` of what couples springs.
+    pub(crate) fn add_cross_forces(&self, x: &[f64], f: &mut [f64]) {
+        for &(i, j, k) in &self.cross_stiffness {
+            f[i] += k * x[j];
+            f[j] += k * x[i];
+        }
+    }
+
+    /// What transmission errors put on the motors for the forces F of the springs: adds to `tau` over all joints.
+    pub(crate) fn add_motor_forces(&self, q: &[f64], F: &[f64], tau: &mut [f64]) {
+        for error in &self.transmission {
+            tau[error.motor] -= error.slope(q[error.motor]) * F[self.offset(&self.elements[error.element])];
+        }
+    }
+
+    /// Friction of all actuated coordinates at these rates and transmitted torques, into `friction`.
+    pub(crate) fn friction_torques(
+        &self,
+        rates: &[f64],
+        transmitted: impl Fn(&LoadFriction) -> f64,
+        friction: &mut [f64],
+    ) {
+        for (k, friction) in friction.iter_mut().enumerate() {
+            *friction = match self.coupling.as_ref().and_then(|coupling| Some((coupling, coupling.place(k)?))) {
+                None => self.friction_torque(k, rates[k]),
+                // C^-T of the torques on the motors.
+                Some((coupling, j)) => {
+                    let motors = coupling.coordinates.iter().enumerate();
+                    motors
+                        .map(|(i, m)| {
+                            coupling.C_inverse[(i, j)] * self.friction_torque(*m, coupling.motor_rate(i, rates))
+                        })
+                        .sum()
+                }
+            };
+        }
+        for law in &self.load_friction {
+            friction[law.coordinate] += law.torque(transmitted(law), rates[law.coordinate]);
+        }
+    }
+
+    /// Slope of the friction of a coordinate by the rate of another one; never falling.
+    pub(crate) fn friction_slope(&self, row: usize, column: usize, rates: &[f64], gears: &GearState) -> f64 {
+        let own = |k: usize, rate: f64| self.friction.get(k).map_or(0.0, |f| f.slope(rate).max(0.0));
+        let places = self.coupling.as_ref().and_then(|c| Some((c, c.place(row)?, c.place(column)?)));
+        if let Some((coupling, i, j)) = places {
+            let C = &coupling.C_inverse;
+            let motors = coupling.coordinates.iter().enumerate();
+            return motors.map(|(m, k)| C[(m, i)] * own(*k, coupling.motor_rate(m, rates)) * C[(m, j)]).sum();
+        }
+        if row != column {
+            return 0.0;
+        }
+        let loaded = self.load_friction.iter().filter(|law| law.coordinate == row);
+        let loaded = loaded
+            .map(|law| law.slope(law.element.map_or(0.0, |k| gears.F[self.offset(&self.elements[k])]), rates[row]));
+        own(row, rates[row]) + loaded.sum::<f64>()
+    }
+}
+
+/// Numbers of the motors, zeros where the gears are rigid.
+fn stiffness_of(n: usize, values: &[f64]) -> Vec<f64> {
+    if values.is_empty() { vec![0.0; n] } else { values.to_vec() }
+}
+
+/// Sliders of one gear at the end of the last step.
+#[derive(Clone, Debug)]
+struct Slipped {
+    delta: f64,
+    s: Vec<f64>,
+}
+
+/// What a run knows of its gears: where their sliders are, and the forces of the last evaluation.
+#[derive(Clone, Debug)]
+pub(crate) struct GearState {
+    /// Deflections and their rates, per elastic coordinate.
+    delta: DVector<f64>,
+    rate: DVector<f64>,
+    /// Forces of springs and dampers on them.
+    pub(crate) F: DVector<f64>,
+    /// The part of the dampers.
+    damper: DVector<f64>,
+    /// Friction per actuated coordinate.
+    pub(crate) friction: Vec<f64>,
+    slipped: Vec<Slipped>,
+    /// Lost to hysteresis so far (J).
+    pub(crate) lost: f64,
+}
+
+impl GearState {
+    /// Of an arm that needs one.
+    pub(crate) fn of(arm: &FlexibleArm) -> Option<Box<Self>> {
+        let zeros = DVector::zeros(arm.n_elastic_coordinates());
+        let slipped = |law: &Hysteresis| Slipped { delta: 0.0, s: vec![0.0; law.sliders.len()] };
+        arm.has_gear_laws().then(|| {
+            Box::new(Self {
+                delta: zeros.clone(),
+                rate: zeros.clone(),
+                F: zeros.clone(),
+                damper: zeros,
+                friction: vec![0.0; arm.model.n_actuated()],
+                slipped: arm.hysteresis.iter().map(slipped).collect(),
+                lost: 0.0,
+            })
+        })
+    }
+
+    /// Springs and dampers at the elastic coordinates and rates, joints at `q` and `qdot`.
+    pub(crate) fn update(&mut self, arm: &FlexibleArm, q: &[f64], qdot: &[f64], e: &[f64], v: &[f64]) {
+        let Self { delta, rate, F, damper, slipped, .. } = self;
+        // (1)
+        delta.as_mut_slice().copy_from_slice(e);
+        rate.as_mut_slice().copy_from_slice(v);
+        for error in &arm.transmission {
+            let k = arm.offset(&arm.elements[error.element]);
+            delta[k] -= error.at(q[error.motor]);
+            rate[k] -= error.slope(q[error.motor]) * qdot[error.motor];
+        }
+        // Dampers.
+        damper.fill(0.0);
+        if arm.proportional {
+            for (element, tau) in arm.elements.iter().zip(&arm.tau) {
+                let range = arm.offset(element)..arm.offset(element) + element.size;
+                add_product(&element.K, &rate.as_slice()[range.clone()], &mut damper.as_mut_slice()[range.clone()]);
+                damper.as_mut_slice()[range].iter_mut().for_each(|d| *d *= tau);
+            }
+        } else {
+            arm.add_damping(rate.as_slice(), damper.as_mut_slice());
+        }
+        // Springs, (2)
+        F.copy_from(damper);
+        for (k, element) in arm.elements.iter().enumerate() {
+            let range = arm.offset(element)..arm.offset(element) + element.size;
+            match arm.hysteresis.iter().zip(&*slipped).find(|(law, _)| law.element == k) {
+                Some((law, slipped)) => {
+                    let delta = delta[range.start];
+                    F[range.start] += law.elastic.torque(delta) + slipped.torque(law, delta);
+                }
+                None => {
+                    element.add_spring_force(&delta.as_slice()[range.clone()], &mut F.as_mut_slice()[range]);
+                }
+            }
+        }
+        arm.add_cross_forces(delta.as_slice(), F.as_mut_slice());
+    }
+
+    /// Slope of a curved spring of one coordinate at its last deflection.
+    pub(crate) fn slope(&self, arm: &FlexibleArm, k: usize, element: &ElasticElement, curve: &TorqueCurve) -> f64 {
+        let delta = self.delta[arm.offset(element)];
+        match arm.hysteresis.iter().zip(&self.slipped).find(|(law, _)| law.element == k) {
+            Some((law, slipped)) => law.elastic.slope(delta) + slipped.slope(law, delta),
+            None => curve.slope(delta),
+        }
+    }
+
+    /// Loads `-(F)` of the elements; the power that the dampers take (W).
+    pub(crate) fn loads(&self, arm: &FlexibleArm, loads: &mut [Vector6<f64>]) -> f64 {
+        for (load, element) in loads.iter_mut().zip(&arm.elements) {
+            let first = arm.offset(element);
+            *load = Vector6::from_fn(|c, _| if c < element.size { -self.F[first + c] } else { 0.0 });
+        }
+        self.damper.dot(&self.rate)
+    }
+
+    /// Energy in the springs at the last deflections (J).
+    pub(crate) fn energy(&self, arm: &FlexibleArm) -> f64 {
+        let mut energy = 0.0;
+        for (k, element) in arm.elements.iter().enumerate() {
+            let delta = &self.delta.as_slice()[arm.offset(element)..][..element.size];
+            energy += match arm.hysteresis.iter().zip(&self.slipped).find(|(law, _)| law.element == k) {
+                Some((law, slipped)) => law.elastic.energy(delta[0]) + slipped.energy(law, delta[0]),
+                None => element.energy(delta),
+            };
+        }
+        energy + arm.cross_stiffness.iter().map(|&(i, j, k)| k * self.delta[i] * self.delta[j]).sum::<f64>()
+    }
+
+    /// A step has ended with the joints at `q` and the elastic coordinates `e`: (3), and what the sliders lost. At the start
+    /// of a run they have followed the first loading.
+    pub(crate) fn settle(&mut self, arm: &FlexibleArm, q: &[f64], e: &[f64]) {
+        for (law, slipped) in arm.hysteresis.iter().zip(&mut self.slipped) {
+            let delta = arm.deflection(law.element, e[arm.offset(&arm.elements[law.element])], q);
+            self.lost += slipped.advance(law, delta);
+        }
+    }
+
+    /// As [`GearState::settle`], of what happened before the run.
+    pub(crate) fn begin(&mut self, arm: &FlexibleArm, q: &[f64], e: &[f64]) {
+        self.settle(arm, q, e);
+        self.lost = 0.0;
+    }
+}
+
+impl Slipped {
+    /// Deflections of the sliders with the gear at `delta`.
+    fn at<'a>(&'a self, law: &'a Hysteresis, delta: f64) -> impl Iterator<Item = (f64, &'a Slider)> + 'a {
+        let way = delta - self.delta;
+        self.s.iter().zip(&law.sliders).map(move |(s, slider)| ((s + way).clamp(-slider.reach, slider.reach), slider))
+    }
+
+    fn torque(&self, law: &Hysteresis, delta: f64) -> f64 {
+        self.at(law, delta).map(|(s, slider)| slider.stiffness * s).sum()
+    }
+
+    fn slope(&self, law: &Hysteresis, delta: f64) -> f64 {
+        self.at(law, delta).map(|(s, slider)| if s.abs() < slider.reach { slider.stiffness } else { 0.0 }).sum()
+    }
+
+    fn energy(&self, law: &Hysteresis, delta: f64) -> f64 {
+        self.at(law, delta).map(|(s, slider)| 0.5 * slider.stiffness * s * s).sum()
+    }
+
+    /// Goes on to `delta`; what the friction of the sliders took (J).
+    fn advance(&mut self, law: &Hysteresis, delta: f64) -> f64 {
+        let way = delta - self.delta;
+        let mut lost = 0.0;
+        for (s, slider) in self.s.iter_mut().zip(&law.sliders) {
+            let stuck = *s + way;
+            let held = stuck.clamp(-slider.reach, slider.reach);
+            lost += slider.stiffness * slider.reach * (stuck - held).abs();
+            *s = held;
+        }
+        self.delta = delta;
+        lost
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Truth: Rayleigh's parabola at the corners, and the area of Masing's loop `8 ∫ f - 4 A f(A)` of first loading f by closed
+    /// forms of straight pieces.
+    #[test]
+    fn sliders_follow_rayleighs_law_and_lose_the_area_of_masings_loop() {
+        let (friction, reach) = (30.0, 2e-4);
+        let law = |count: usize| Hysteresis {
+            element: 0,
+            elastic: TorqueCurve::straight(4e5),
+            sliders: Hysteresis::even_sliders(friction, reach, count),
+        };
+        let eight = law(8);
+        let curve = eight.first_loading();
+        for k in 0..=8 {
+            let x = f64::from(k) / 8.0;
+            let truth = 4e5 * x * reach + friction * (2.0 * x - x * x);
+            assert!((curve.torque(x * reach) - truth).abs() < 1e-11, "{k} {} {truth}", curve.torque(x * reach));
+            assert!((curve.torque(-x * reach) + truth).abs() < 1e-11);
+        }
+        assert!((curve.stiffest() - (4e5 + 8.0 * 2.0 * friction / (reach * 8.0) * (7.5 / 8.0))).abs() < 1e-6);
+        for amplitude in [0.3 * reach, 0.77 * reach, 2.5 * reach] {
+            let masing = 8.0 * curve.energy(amplitude) - 4.0 * amplitude * curve.torque(amplitude);
+            assert!((eight.loss(amplitude) - masing).abs() < 1e-12, "{amplitude} {masing}");
+            // The state that follows a closed cycle loses as much, once it has been there before.
+            let mut slipped = Slipped { delta: 0.0, s: vec![0.0; 8] };
+            slipped.advance(&eight, amplitude);
+            let lost: f64 = [-amplitude, amplitude].iter().map(|d| slipped.advance(&eight, *d)).sum();
+            assert!((lost - masing).abs() < 1e-12, "{lost} {masing}");
+        }
+        // Many sliders: 2/3 κ A³ / reach with κ = 2 friction / reach, Rayleigh's loss below the reach.
+        let (many, A) = (law(2000), 0.5 * reach);
+        let rayleigh = 2.0 / 3.0 * (2.0 * friction / reach) * A.powi(3) / reach;
+        assert!((many.loss(A) / rayleigh - 1.0).abs() < 1e-5, "{}", many.loss(A) / rayleigh);
+    }
+
+    #[test]
+    fn the_slope_of_a_transmission_error_is_its_derivative() {
+        let harmonics = vec![
+            Harmonic { amplitude: 3e-5, cycles: 100.0, phase: 0.3 },
+            Harmonic { amplitude: -1e-5, cycles: 200.0, phase: 1.1 },
+        ];
+        let error = TransmissionError { element: 0, motor: 0, harmonics };
+        for q in [-1.0, 0.0, 0.37] {
+            let slope = (error.at(q + 1e-6) - error.at(q - 1e-6)) / 2e-6;
+            // measured 1.3e-11
+            assert!((slope - error.slope(q)).abs() < 1e-9, "{slope} {}", error.slope(q));
+        }
+    }
+}
