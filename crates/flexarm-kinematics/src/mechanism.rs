@@ -11,6 +11,7 @@ use nalgebra::{Matrix3, Unit, Vector3};
 
 use crate::axis_motion::AxisMotion;
 use crate::balancer::Balancer;
+use crate::closure::LoopClosure;
 use crate::modal::ModalBody;
 
 /// Links joined by joints into one tree. SI units.
@@ -26,6 +27,8 @@ pub struct Mechanism {
     pub modal: Vec<(String, Arc<ModalBody>)>,
     /// Springs, gas springs and counterbalances between points of the arm or over joints.
     pub balancers: Vec<Balancer>,
+    /// Pins that close chains of links in a plane.
+    pub loops: Vec<LoopClosure>,
     /// Acceleration of gravity in world (= base link) axes (m/s²).
     pub gravity: Vector3<f64>,
 }
@@ -227,6 +230,7 @@ impl Mechanism {
             joints: Vec::new(),
             modal: Vec::new(),
             balancers: Vec::new(),
+            loops: Vec::new(),
             gravity: Vector3::new(0.0, 0.0, -9.81),
         }
     }
