@@ -14,6 +14,7 @@ pub(crate) use flexarm_linkmaker::MaterialEntry;
 use crate::balancer_entry::BalancerEntry;
 pub(crate) use crate::beam_entry::BeamEntry;
 use crate::drive_entry::DriveEntry;
+use crate::loop_entry::LoopEntry;
 
 /// The file as written.
 #[derive(Clone, Debug, Deserialize)]
@@ -61,6 +62,9 @@ pub(crate) struct RobotFile {
     /// Springs, gas springs and counterbalances.
     #[serde(default)]
     pub balancer: Vec<Spanned<BalancerEntry>>,
+    /// Pins that close loops of links.
+    #[serde(default, rename = "loop")]
+    pub loops: Vec<Spanned<LoopEntry>>,
 }
 
 /// Pose of the tool centre point in a link.

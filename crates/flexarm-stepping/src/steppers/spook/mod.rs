@@ -262,6 +262,7 @@ fn check_known(arm: &FlexibleArm) -> Result<(), StepError> {
         (!arm.inertia_changes.is_empty(), "payloads that change"),
         (arm.elements.iter().any(|e| e.curve.is_some()), "springs with play or curves"),
         (arm.model.has_mimic(), "mimic joints"),
+        (!arm.model.loops().is_empty(), "closed loops of links"),
     ];
     match unknown.iter().find(|(there, _)| *there) {
         _ if arm.model.has_modal() => Err(StepError::ModalLinks),
