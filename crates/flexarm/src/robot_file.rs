@@ -63,7 +63,8 @@ pub(crate) struct RobotFile {
     #[serde(default)]
     pub balancer: Vec<Spanned<BalancerEntry>>,
     /// Pins that close loops of links.
-    #[serde(default, rename = "loop")]
+    #[serde(default)]
+    #[serde(rename = "loop")]
     pub loops: Vec<Spanned<LoopEntry>>,
 }
 

@@ -113,7 +113,7 @@ fn a_motion_over_a_dead_point_or_out_of_reach_is_refused_with_time_and_loop() {
     let arm = robot.flexible(Modelling::default()).unwrap();
     let run = |q: &[[f64; 4]]| {
         let options = RunOptions { ignore_limits: true, ..RunOptions::default() };
-        arm.simulate(&motion_of(&robot, q), &options).map(|_| ()).unwrap_err().to_string()
+        arm.simulate(motion_of(&robot, q), &options).map(|_| ()).unwrap_err().to_string()
     };
     // The lever comes parallel to the lower arm with the elbow at 125 degrees.
     let error = run(&[[0.0, 0.0, 0.3, 0.0], [0.0, -0.4, 2.5, 0.0]]);
