@@ -201,6 +201,48 @@ segments = 2
 beam = { section = "tube", outer_diameter = 0.1, wall = 0.005, material = "steel" }
 """
 
+FOUR_BAR = """<?xml version="1.0"?>
+<robot name="four_bar">
+  <link name="base"/>
+  <joint name="crank" type="revolute"><parent link="base"/><child link="crank_bar"/><axis xyz="0 1 0"/>
+    <limit lower="-0.6" upper="0.6" effort="500" velocity="4"/></joint>
+  <link name="crank_bar"><inertial><origin xyz="0 0 0.2"/><mass value="2"/><inertia ixx="0.03" ixy="0" ixz="0" iyy="0.03" iyz="0" izz="0.01"/></inertial></link>
+  <joint name="rod" type="continuous"><parent link="crank_bar"/><child link="rod_bar"/><origin xyz="0 0 0.4"/><axis xyz="0 1 0"/></joint>
+  <link name="rod_bar"><inertial><origin xyz="0.35 0 0"/><mass value="1"/><inertia ixx="0.01" ixy="0" ixz="0" iyy="0.04" iyz="0" izz="0.04"/></inertial></link>
+  <joint name="rocker" type="continuous"><parent link="base"/><child link="rocker_bar"/><origin xyz="0.7 0 0"/><axis xyz="0 1 0"/></joint>
+  <link name="rocker_bar"><inertial><origin xyz="0 0 0.3"/><mass value="3"/><inertia ixx="0.06" ixy="0" ixz="0" iyy="0.06" iyz="0" izz="0.01"/></inertial></link>
+</robot>
+"""
+
+LOOPS = """format = 1
+name = "four_bar"
+urdf = "beam.urdf"
+tcp = { link = "rocker_bar", xyz = [0.0, 0.0, 0.6] }
+
+[[loop]]
+name = "four bars"
+pin = { link = "rocker_bar", xyz = [0.0, 0.0, 0.5] }
+axis = [0.0, 1.0, 0.0]
+eye = { link = "rod_bar", xyz = [0.71, 0.0, 0.0] }
+dependent = ["rod", "rocker"]
+at = { rod = -0.14, rocker = 0.02, crank = 0.01 }
+
+[[drive]]
+joint = "crank"
+kind = "gearbox"
+gearbox = { stiffness = 2e4, damping = 30.0 }
+"""
+
+FOUR_BAR_MOTION = """format = 1
+unit = "deg"
+joints = ["crank"]
+start = [0.0]
+
+[[move]]
+to = [20.0]
+duration = 0.4
+"""
+
 ROBOT_FLEX = """format = 1
 name = "beam"
 urdf = "beam.urdf"
@@ -652,6 +694,7 @@ def own_targets():
     seats = ["--interface", "SEAT_A", "--interface", "SEAT_B", "--at", "A=0,0,0", "--at", "B=800,0,0", "--material", "aluminium"]
     targets = [
         Target("robot", "robot.toml", base, [check, COMPARE, ["statics", "robot.toml", "--json"], ["modes", "robot.toml", "--json"]], True),
+        Target("robot-loops", "robot.toml", {"beam.urdf": FOUR_BAR, "robot.toml": LOOPS, "motion.toml": FOUR_BAR_MOTION}, [check, COMPARE, ["statics", "robot.toml", "--json"], ["inspect", "robot.toml", "--json"]], True),
         Target("robot-balancers", "robot.toml", {**base, "robot.toml": ROBOT + BALANCERS}, [check, COMPARE, ["statics", "robot.toml", "--json"], ["inspect", "robot.toml", "--json"]], True),
         Target("robot-mounting", "robot.toml", {**base, "robot.toml": ROBOT + MOUNTING}, [check, COMPARE, ["statics", "robot.toml", "--json"], ["inspect", "robot.toml", "--json"]], True),
         Target("robot-column", "robot.toml", {**base, "robot.toml": ROBOT + COLUMN}, [check, ["statics", "robot.toml", "--json"], ["modes", "robot.toml", "--json"]], True),

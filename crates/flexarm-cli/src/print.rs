@@ -22,6 +22,21 @@ fn limit(x: Option<f64>) -> String {
     x.map_or_else(|| "-".into(), |x| format!("{x:.4}"))
 }
 
+/// A closed loop: what follows from it, and how well it hands on force.
+fn loop_line(own: &flexarm::LoopInfo) -> String {
+    let joints: Vec<String> = own.dependent.iter().map(|joint| format!("{} at {:.4}", joint.name, joint.q)).collect();
+    let least = own
+        .smallest_transmission_angle
+        .map(|angle| format!(", at least {:.1} deg over the joint ranges", angle.to_degrees()));
+    format!(
+        "loop: {}, dependent {}, transmission angle {:.1} deg{}\n",
+        own.name,
+        joints.join(" and "),
+        own.transmission_angle.to_degrees(),
+        least.unwrap_or_default()
+    )
+}
+
 /// What was loaded.
 pub(crate) fn inspection(i: &Inspection) -> String {
     let mut out = format!("{}, {:.2} kg\n", i.robot, i.mass_kg);
@@ -64,6 +79,9 @@ pub(crate) fn inspection(i: &Inspection) -> String {
             b.stiffness,
             torque.join(" ")
         );
+    }
+    for l in &i.loops {
+        out += &loop_line(l);
     }
     for f in &i.flexible_links {
         out += &format!(

@@ -62,6 +62,14 @@ pub enum GearboxError {
         /// The joint.
         joint: String,
     },
+    /// A joint that a closed loop moves has no motor.
+    #[error("gearbox of joint {joint:?}: the joint follows from loop {name:?}, so nothing drives it")]
+    Dependent {
+        /// The joint.
+        joint: String,
+        /// The loop.
+        name: String,
+    },
     /// A stiffness that holds nothing.
     #[error(
         "gearbox of joint {joint:?}: its stiffness must be positive (definite), found {found:e} as its smallest value"
@@ -126,6 +134,9 @@ pub fn insert_gearboxes(mechanism: &mut Mechanism, gearboxes: &[Gearbox]) -> Res
     for gearbox in gearboxes {
         let name = &gearbox.joint;
         let missing = || GearboxError::NoJoint { joint: name.clone() };
+        if let Some(closure) = mechanism.loops.iter().find(|closure| closure.dependent.contains(name)) {
+            return Err(GearboxError::Dependent { joint: name.clone(), name: closure.name.clone() });
+        }
         let joint = mechanism.joints.iter_mut().find(|j| j.name == *name).ok_or_else(missing)?;
         if joint.mimic.is_some() {
             return Err(GearboxError::Mimic { joint: name.clone() });

@@ -17,6 +17,7 @@ use flexarm_spatial::{ArticulatedInertia, SpatialInertia, Twist, Wrench};
 use nalgebra::{Cholesky, DMatrix, DVector, Matrix3, Vector3};
 
 use crate::balancer::{add_joint_torques, with_lines};
+use crate::closure;
 use crate::data::{Data, State, add_projection, begin, joint_motion, subspace_times};
 use crate::model::{Body, JointMotion, Model};
 use crate::rnea::nonlinear_effects;
@@ -27,7 +28,7 @@ pub struct Roles {
     prescribed_body: Vec<bool>,
     prescribed_modal: Vec<bool>,
     free_coordinates: Vec<usize>,
-    /// A free coordinate moves several joints: the recursion does not apply, the mass matrix does.
+    /// A free coordinate moves several joints, by mimicry or over closed loops: the recursion does not apply, the mass matrix does.
     dense: bool,
 }
 
@@ -65,6 +66,7 @@ impl Roles {
                 roles.dense |= model.rotor_couplings.iter().any(|(a, b, _)| *a == first || *b == first);
             }
         }
+        roles.dense |= !model.loops.is_empty();
         roles
     }
 
@@ -110,7 +112,9 @@ pub fn hybrid_dynamics(
 }
 
 fn solve(model: &Model, data: &mut Data, state: &State, roles: &Roles) {
-    if roles.dense {
+    if !model.loops.is_empty() {
+        closure::solve(model, data, state, &roles.free_coordinates);
+    } else if roles.dense {
         solve_dense(model, data, state, roles);
     } else {
         let (q, qdot) = (state.q.as_slice(), state.qdot.as_slice());

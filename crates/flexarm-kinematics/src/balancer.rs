@@ -420,6 +420,7 @@ pub(crate) fn place_balancers(
     mechanism: &Mechanism,
     frames: &[Frame],
     bodies: &[Body],
+    nv: usize,
 ) -> Result<Vec<PlacedBalancer>, ModelError> {
     let mut names = HashSet::new();
     let mut placed = Vec::new();
@@ -440,7 +441,16 @@ pub(crate) fn place_balancers(
             }
             BalancerSpan::Joint { joint, child } => {
                 let last = frame(child, "the link behind its joint")?.body;
-                over_joint(bodies, joint, last).ok_or_else(|| fail("its joint"))?
+                let place = over_joint(bodies, joint, last).ok_or_else(|| fail("its joint"))?;
+                if matches!(&place, BalancerPlace::Joint { terms, .. } if terms.iter().any(|(k, _)| *k >= nv)) {
+                    return Err(ModelError::BadLoop {
+                        name: name.clone(),
+                        what: format!(
+                            "balancer {name:?} acts over joint {joint:?}, which follows from a loop: give its two ends (from, to) instead"
+                        ),
+                    });
+                }
+                place
             }
         };
         placed.push(PlacedBalancer { name: name.clone(), law: law.clone(), place });

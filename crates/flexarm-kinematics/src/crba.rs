@@ -12,12 +12,18 @@ use flexarm_spatial::{Pose, Real, SpatialInertia, Wrench};
 use nalgebra::{DMatrix, DVector, Matrix3, Scalar, Vector3};
 
 use crate::axis_motion::AxisMotion;
+use crate::closure;
 use crate::data::{Data, ElasticSubspace, begin, joint_position};
 use crate::lanes::Tree;
 use crate::model::{Body, JointMotion, Model};
 
 /// Mass matrix `M(q)`, nv×nv, both triangles (kg, kg m, kg m²). Fills `data.{X_PB, M}`. No allocation.
 pub fn mass_matrix<'d>(model: &Model, data: &'d mut Data, q: &DVector<f64>) -> &'d DMatrix<f64> {
+    if !model.loops.is_empty() {
+        closure::place(model, data, q.as_slice());
+        mass_matrix_at_poses(model, data);
+        return &data.M;
+    }
     begin(model, data, q.as_slice());
     for i in 1..model.bodies.len() {
         joint_position(model, data, i, q.as_slice());
@@ -28,7 +34,10 @@ pub fn mass_matrix<'d>(model: &Model, data: &'d mut Data, q: &DVector<f64>) -> &
 
 /// As [`mass_matrix`], for the joint poses that the last pass of another algorithm left in `data`.
 pub fn mass_matrix_at_poses(model: &Model, data: &mut Data) {
-    composite_bodies(model, data);
+    match model.loops.is_empty() {
+        true => composite_bodies(model, data),
+        false => closure::mass_matrix_at_poses(model, data),
+    }
 }
 
 /// [`mass_matrix_at_poses`] over any scalar.

@@ -8,6 +8,7 @@ use flexarm_spatial::{ArticulatedInertia, ElasticAngles, Pose, Real, SpatialIner
 use nalgebra::{DMatrix, DVector, Isometry, Matrix3, Rotation3, Scalar, Translation3, Vector3};
 
 use crate::axis_motion::AxisMotion;
+use crate::closure::LoopData;
 use crate::modal::ModalData;
 use crate::model::{Body, JointMotion, Model};
 
@@ -80,6 +81,8 @@ pub struct Data<T: Scalar = f64> {
     pub(crate) cosines: Vec<T>,
     /// Kinetic energy of the rotors in the last velocity pass.
     pub(crate) rotor_energy: T,
+    /// Of models with closed loops.
+    pub(crate) loops: Option<Box<LoopData>>,
 }
 
 impl<T: Real> Data<T> {
@@ -113,6 +116,7 @@ impl<T: Real> Data<T> {
             sines: vec![T::zero(); model.turning.len()],
             cosines: vec![T::zero(); model.turning.len()],
             rotor_energy: T::zero(),
+            loops: (!model.loops.is_empty()).then(|| Box::new(LoopData::new(model))),
         }
     }
 

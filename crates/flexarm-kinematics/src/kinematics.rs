@@ -9,13 +9,23 @@ use nalgebra::{Matrix3, Matrix6xX, Vector3};
 
 use crate::axis_motion::AxisMotion;
 use crate::balancer::measure;
+use crate::closure;
 use crate::data::{Data, State, begin, identity, joint_motion, joint_position, rotor_energy};
 use crate::model::{Frame, JointMotion, Model};
 
 /// Poses of all bodies: fills `data.{X_PB, X_WB}`.
 pub fn forward_kinematics(model: &Model, data: &mut Data, q: &nalgebra::DVector<f64>) {
-    place_bodies(model, data, q.as_slice());
-    measure(model, data, q.as_slice());
+    match model.loops.is_empty() {
+        true => place_and_measure(model, data, q.as_slice()),
+        false => closure::place(model, data, q.as_slice()),
+    }
+}
+
+/// [`forward_kinematics`] of the tree.
+#[inline(always)]
+pub(crate) fn place_and_measure(model: &Model, data: &mut Data, q: &[f64]) {
+    place_bodies(model, data, q);
+    measure(model, data, q);
 }
 
 /// [`forward_kinematics`] over any scalar.
@@ -30,19 +40,28 @@ pub(crate) fn place_bodies<T: Real>(model: &Model, data: &mut Data<T>, q: &[T]) 
 
 /// Poses and twists of all bodies: fills `data.{X_PB, X_WB, V}`.
 pub fn forward_kinematics_velocity(model: &Model, data: &mut Data, state: &State) {
+    match model.loops.is_empty() {
+        true => move_bodies(model, data, state.q.as_slice(), state.qdot.as_slice()),
+        false => closure::move_bodies(model, data, state),
+    }
+}
+
+/// [`forward_kinematics_velocity`] of the tree.
+#[inline(always)]
+pub(crate) fn move_bodies(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64]) {
     data.V[0] = Twist::zeros();
-    data.rotor_energy = rotor_energy(model, state.qdot.as_slice());
-    begin(model, data, state.q.as_slice());
+    data.rotor_energy = rotor_energy(model, qdot);
+    begin(model, data, q);
     for (modal, entry) in data.modal.iter_mut().zip(&model.modal) {
-        modal.rates.copy_from_slice(&state.qdot.as_slice()[entry.coordinate..entry.coordinate + entry.n]);
+        modal.rates.copy_from_slice(&qdot[entry.coordinate..entry.coordinate + entry.n]);
     }
     for i in 1..model.bodies.len() {
-        let (V_PB, bias) = joint_motion(model, data, i, state.q.as_slice(), state.qdot.as_slice());
+        let (V_PB, bias) = joint_motion(model, data, i, q, qdot);
         data.bias[i] = bias;
         data.V[i] = data.V[model.bodies[i].parent].at_child(&data.X_PB[i]) + V_PB;
     }
     world_poses(model, data);
-    measure(model, data, state.q.as_slice());
+    measure(model, data, q);
 }
 
 /// World poses from the joint poses that the last algorithm left in `data`.
@@ -80,39 +99,57 @@ pub fn frame_jacobian(model: &Model, data: &Data, frame: &Frame, J: &mut Matrix6
     let p_T = (data.X_WB[frame.body] * frame.X_BF).translation.vector;
     let mut i = frame.body;
     while i > 0 {
-        let body = &model.bodies[i];
         let R = data.X_WB[i].rotation.matrix();
         let r = p_T - data.X_WB[i].translation.vector;
-        let mut add = |k: usize, linear: Vector3<f64>, angular: Vector3<f64>| {
+        joint_columns(model, data, i, R, |k, linear, angular| {
             let column = linear + angular.cross(&r);
-            for c in 0..3 {
-                J[(c, k)] += column[c];
-                J[(3 + c, k)] += angular[c];
-            }
-        };
-        match body.motion {
-            JointMotion::Axis(motion) => {
-                let column = turned(motion, R, body.ratio);
-                add(body.coordinate, column.linear, column.angular);
-            }
-            JointMotion::Welded => {}
-            JointMotion::Elastic(_) => {
-                let S = &data.elastic[i];
-                let (L, B) = (R * S.L, R * S.B);
+            let mut add = |k: usize, factor: f64| {
                 for c in 0..3 {
-                    add(body.coordinate + c, L.column(c).into(), Vector3::zeros());
-                    add(body.coordinate + 3 + c, Vector3::zeros(), B.column(c).into());
+                    J[(c, k)] += factor * column[c];
+                    J[(3 + c, k)] += factor * angular[c];
                 }
+            };
+            match k < model.nv() {
+                true => add(k, 1.0),
+                false => data.loops.iter().for_each(|loops| loops.each_leader(k, &mut add)),
             }
-            JointMotion::Interface { modal, interface } => {
-                let (S, modal) = (&data.elastic[i], &model.modal[modal]);
-                for c in 0..modal.n {
-                    let column = modal.tables.shapes.interfaces[interface].twist(c, &S.L, &S.B);
-                    add(body.coordinate + c, R * column.linear, R * column.angular);
-                }
+        });
+        i = model.bodies[i].parent;
+    }
+}
+
+/// Columns by which the joint of body i moves it, at Bo, in the axes to which R turns those of B: coordinate of the tree, linear
+/// and angular part.
+#[inline(always)]
+pub(crate) fn joint_columns(
+    model: &Model,
+    data: &Data,
+    i: usize,
+    R: &Matrix3<f64>,
+    mut add: impl FnMut(usize, Vector3<f64>, Vector3<f64>),
+) {
+    let body = &model.bodies[i];
+    match body.motion {
+        JointMotion::Axis(motion) => {
+            let column = turned(motion, R, body.ratio);
+            add(body.coordinate, column.linear, column.angular);
+        }
+        JointMotion::Welded => {}
+        JointMotion::Elastic(_) => {
+            let S = &data.elastic[i];
+            let (L, B) = (R * S.L, R * S.B);
+            for c in 0..3 {
+                add(body.coordinate + c, L.column(c).into(), Vector3::zeros());
+                add(body.coordinate + 3 + c, Vector3::zeros(), B.column(c).into());
             }
         }
-        i = body.parent;
+        JointMotion::Interface { modal, interface } => {
+            let (S, modal) = (&data.elastic[i], &model.modal[modal]);
+            for c in 0..modal.n {
+                let column = modal.tables.shapes.interfaces[interface].twist(c, &S.L, &S.B);
+                add(body.coordinate + c, R * column.linear, R * column.angular);
+            }
+        }
     }
 }
 
@@ -138,59 +175,86 @@ pub fn frame_jacobian_derivative(model: &Model, data: &Data, state: &State, fram
     let v_T = frame_twist(data, frame).linear;
     let mut i = frame.body;
     while i > 0 {
-        let body = &model.bodies[i];
         let R = data.X_WB[i].rotation.matrix();
         let (v_B, w_B) = (R * data.V[i].linear, R * data.V[i].angular);
         let (r, rdot) = (p_T - data.X_WB[i].translation.vector, v_T - v_B);
-        // A column fixed in B axes turns with B; `l`, `a` are the column and `ldot`, `adot` its rate in W.
-        let mut add = |k: usize, ldot: Vector3<f64>, a: Vector3<f64>, adot: Vector3<f64>| {
-            let column = ldot + adot.cross(&r) + a.cross(&rdot);
-            for c in 0..3 {
-                Jdot[(c, k)] += column[c];
-                Jdot[(3 + c, k)] += adot[c];
-            }
-        };
-        match body.motion {
-            JointMotion::Axis(motion) => {
-                let Twist { linear: l, angular: a } = turned(motion, R, body.ratio);
-                add(body.coordinate, w_B.cross(&l), a, w_B.cross(&a));
-            }
-            JointMotion::Welded => {}
-            JointMotion::Elastic(angles) => {
-                let k = body.coordinate;
-                let S = &data.elastic[i];
-                let q = Vector3::new(state.q[k + 3], state.q[k + 4], state.q[k + 5]);
-                let rates = Vector3::new(state.qdot[k + 3], state.qdot[k + 4], state.qdot[k + 5]);
-                let Bdot = angles.rate_map_derivative(&q, &rates);
-                // Translation columns are fixed in P: they turn with P, w_P = w_B - R B rates.
-                let w_P = w_B - R * (S.B * rates);
-                let (L, B) = (R * S.L, R * S.B);
-                let Bdot_W = R * Bdot;
+        let (q, qdot) = (state.q.as_slice(), state.qdot.as_slice());
+        joint_column_rates(model, data, i, R, &w_B, q, qdot, |k, [l, a, ldot, adot]| {
+            let rate = ldot + adot.cross(&r) + a.cross(&rdot);
+            if k < model.nv() {
                 for c in 0..3 {
-                    let l: Vector3<f64> = L.column(c).into();
-                    add(k + c, w_P.cross(&l), Vector3::zeros(), Vector3::zeros());
-                    let a: Vector3<f64> = B.column(c).into();
-                    add(k + 3 + c, Vector3::zeros(), a, w_B.cross(&a) + Bdot_W.column(c));
+                    Jdot[(c, k)] += rate[c];
+                    Jdot[(3 + c, k)] += adot[c];
                 }
+            } else if let Some(loops) = &data.loops {
+                // (J_k T)' = J_k' T + J_k T'
+                let column = l + a.cross(&r);
+                loops.each_leader_rate(k, |k, factor, its_rate| {
+                    for c in 0..3 {
+                        Jdot[(c, k)] += factor * rate[c] + its_rate * column[c];
+                        Jdot[(3 + c, k)] += factor * adot[c] + its_rate * a[c];
+                    }
+                });
             }
-            JointMotion::Interface { modal, interface } => {
-                let (S, modal) = (&data.elastic[i], &model.modal[modal]);
-                let shape = &modal.tables.shapes.interfaces[interface];
-                let range = body.coordinate..body.coordinate + modal.n;
-                let (_, phi) = shape.times(&state.q.as_slice()[range.clone()]);
-                let (_, rates) = shape.times(&state.qdot.as_slice()[range]);
-                let Bdot = ElasticAngles::RotationVector.rate_map_derivative(&phi, &rates);
-                let w_P = w_B - R * (S.B * rates);
-                for c in 0..modal.n {
-                    let column = shape.twist(c, &S.L, &S.B);
-                    let (l, a) = (R * column.linear, R * column.angular);
-                    let turned = R * shape.twist(c, &S.L, &Bdot).angular;
-                    // Both parts of the column belong to one coordinate.
-                    let linear = w_P.cross(&l);
-                    add(body.coordinate + c, linear, a, w_B.cross(&a) + turned);
-                }
+        });
+        i = model.bodies[i].parent;
+    }
+}
+
+/// As [`joint_columns`] with the rates of the columns `[l, a, l', a']`, for a body that turns with `w_B` in the axes of the columns; `q` and `qdot` of
+/// the elastic coordinates.
+#[inline(always)]
+#[allow(clippy::too_many_arguments, reason = "of two callers, each with other axes")]
+pub(crate) fn joint_column_rates(
+    model: &Model,
+    data: &Data,
+    i: usize,
+    R: &Matrix3<f64>,
+    w_B: &Vector3<f64>,
+    q: &[f64],
+    qdot: &[f64],
+    mut add: impl FnMut(usize, [Vector3<f64>; 4]),
+) {
+    let (body, zero) = (&model.bodies[i], Vector3::zeros());
+    match body.motion {
+        // A column fixed in B axes turns with B.
+        JointMotion::Axis(motion) => {
+            let Twist { linear: l, angular: a } = turned(motion, R, body.ratio);
+            add(body.coordinate, [l, a, w_B.cross(&l), w_B.cross(&a)]);
+        }
+        JointMotion::Welded => {}
+        JointMotion::Elastic(angles) => {
+            let k = body.coordinate;
+            let S = &data.elastic[i];
+            let phi = Vector3::new(q[k + 3], q[k + 4], q[k + 5]);
+            let rates = Vector3::new(qdot[k + 3], qdot[k + 4], qdot[k + 5]);
+            let Bdot = angles.rate_map_derivative(&phi, &rates);
+            // Translation columns are fixed in P: they turn with P, w_P = w_B - R B rates.
+            let w_P = w_B - R * (S.B * rates);
+            let (L, B) = (R * S.L, R * S.B);
+            let Bdot_W = R * Bdot;
+            for c in 0..3 {
+                let l: Vector3<f64> = L.column(c).into();
+                add(k + c, [l, zero, w_P.cross(&l), zero]);
+                let a: Vector3<f64> = B.column(c).into();
+                add(k + 3 + c, [zero, a, zero, w_B.cross(&a) + Bdot_W.column(c)]);
             }
         }
-        i = body.parent;
+        JointMotion::Interface { modal, interface } => {
+            let (S, modal) = (&data.elastic[i], &model.modal[modal]);
+            let shape = &modal.tables.shapes.interfaces[interface];
+            let range = body.coordinate..body.coordinate + modal.n;
+            let (_, phi) = shape.times(&q[range.clone()]);
+            let (_, rates) = shape.times(&qdot[range]);
+            let Bdot = ElasticAngles::RotationVector.rate_map_derivative(&phi, &rates);
+            let w_P = w_B - R * (S.B * rates);
+            for c in 0..modal.n {
+                let column = shape.twist(c, &S.L, &S.B);
+                let (l, a) = (R * column.linear, R * column.angular);
+                let turned = R * shape.twist(c, &S.L, &Bdot).angular;
+                // Both parts of the column belong to one coordinate.
+                add(body.coordinate + c, [l, a, w_P.cross(&l), w_B.cross(&a) + turned]);
+            }
+        }
     }
 }

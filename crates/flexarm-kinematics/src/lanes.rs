@@ -47,9 +47,13 @@ pub struct LaneTree<T: Real> {
 }
 
 impl<T: Real> LaneTree<T> {
-    /// A tree for each lane; `None` where they differ in more than their inertias, or are not as many as lanes.
+    /// A tree for each lane; `None` where they differ in more than their inertias, are not as many as lanes, or have closed loops.
     pub fn new(models: &[Arc<Model>]) -> Option<Self> {
         let first = models.first().filter(|_| models.len() == T::LANES)?;
+        // Loops are closed by an iteration whose length depends on where the arm is.
+        if !first.loops.is_empty() {
+            return None;
+        }
         if !models.iter().all(|model| Arc::ptr_eq(model, first) || model.is_same_tree(first)) {
             return None;
         }

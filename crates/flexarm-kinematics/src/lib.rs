@@ -11,7 +11,7 @@
 //!
 //! Notation: `X_AB` pose of B in A; `V` twists, `F` wrenches, **linear part first**; see `docs/references.md`
 //! for the sources. Balancers ([`Balancer`]) are forces of the tree as
-//! its weight is. Not here: files, flexible-link stiffness, time.
+//! its weight is; closed planar chains ([`LoopClosure`]) make joints follow from others. Not here: files, flexible-link stiffness, time.
 //!
 //! ```
 //! use flexarm_kinematics::*;
@@ -42,6 +42,7 @@ mod aba;
 mod analytic_ik;
 mod axis_motion;
 mod balancer;
+mod closure;
 mod crba;
 mod data;
 mod energy;
@@ -75,6 +76,7 @@ pub use balancer::{
     Balancer, BalancerCurve, BalancerCurveError, BalancerLaw, BalancerLine, BalancerPlace, BalancerSpan, GasLaw,
     PlacedBalancer,
 };
+pub use closure::{LOOP_AXIS_TOLERANCE_RAD, LoopClosure, PlacedLoop};
 pub use crba::{mass_matrix, mass_matrix_at_poses};
 pub use data::{Data, State};
 pub use energy::{

@@ -73,6 +73,16 @@ pub(crate) fn coordinates_of(model: &Model, frame: &Frame) -> Vec<(usize, bool)>
     let mut body = frame.body;
     while body > 0 {
         let b = &model.bodies[body];
+        if b.coordinate != usize::MAX && b.coordinate >= model.nv() {
+            // Over a closed loop others move it; whole turns of these are not looked for.
+            for k in model.leaders(b.coordinate).into_iter().rev() {
+                if !chain.iter().any(|(known, _)| *known == k) {
+                    chain.push((k, false));
+                }
+            }
+            body = b.parent;
+            continue;
+        }
         if let JointMotion::Axis(motion) = b.motion
             && !b.elastic
             && !chain.iter().any(|(k, _)| *k == b.coordinate)

@@ -11,6 +11,7 @@ use nalgebra::{Matrix3, Unit, Vector3};
 
 use crate::axis_motion::AxisMotion;
 use crate::balancer::Balancer;
+use crate::closure::LoopClosure;
 use crate::modal::ModalBody;
 
 /// Links joined by joints into one tree. SI units.
@@ -28,6 +29,8 @@ pub struct Mechanism {
     pub balancers: Vec<Balancer>,
     /// Rotors that turn with several joints: what their inertias couple.
     pub rotor_couplings: Vec<RotorCoupling>,
+    /// Pins that close chains of links in a plane.
+    pub loops: Vec<LoopClosure>,
     /// Acceleration of gravity in world (= base link) axes (m/s²).
     pub gravity: Vector3<f64>,
 }
@@ -239,6 +242,7 @@ impl Mechanism {
             modal: Vec::new(),
             balancers: Vec::new(),
             rotor_couplings: Vec::new(),
+            loops: Vec::new(),
             gravity: Vector3::new(0.0, 0.0, -9.81),
         }
     }

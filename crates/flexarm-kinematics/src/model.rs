@@ -14,6 +14,7 @@ use nalgebra::Vector3;
 
 use crate::axis_motion::{AxisMotion, RevoluteTable};
 use crate::balancer::{PlacedBalancer, place_balancers};
+use crate::closure::{LoopDraft, PlacedLoop, assemble, draft_loops};
 use crate::mechanism::{Joint, JointKind, Limits, Mechanism, RotorCoupling};
 use crate::modal::ModalTables;
 
@@ -35,6 +36,10 @@ pub struct Model {
     /// Two coordinates and the entry that rotors add to their rows and columns in the mass matrix.
     pub(crate) rotor_couplings: Vec<(usize, usize, f64)>,
     pub(crate) has_mimic: bool,
+    /// Closed loops, each after those that it rests on.
+    pub(crate) loops: Vec<PlacedLoop>,
+    /// Coordinates that follow from the loops; in the tree they come after all others.
+    dependent: Vec<Coordinate>,
     /// Bodies on joints of one coordinate that turn.
     pub(crate) turning: Vec<usize>,
     /// Acceleration of gravity in world axes (m/s²).
@@ -56,7 +61,7 @@ pub struct Body {
     pub inertia: SpatialInertia,
     /// What the joint lets move.
     pub motion: JointMotion,
-    /// Index of the (first) independent coordinate.
+    /// Index of the (first) independent coordinate; from [`Model::nv`] on those that closed loops determine.
     pub coordinate: usize,
     /// Joint value = ratio × coordinate + offset; (1, 0) except for mimic joints.
     pub ratio: f64,
@@ -238,6 +243,14 @@ pub enum ModelError {
         /// What.
         what: &'static str,
     },
+    /// A loop that is none.
+    #[error("loop {name:?}: {what}")]
+    BadLoop {
+        /// The loop.
+        name: String,
+        /// What is wrong with it.
+        what: String,
+    },
     /// Something is NaN or infinite.
     #[error("{what} of {name:?} has a NaN or infinite entry")]
     NotFinite {
@@ -362,6 +375,17 @@ impl Model {
         &self.balancers
     }
 
+    /// Closed loops, each after those that it rests on.
+    pub fn loops(&self) -> &[PlacedLoop] {
+        &self.loops
+    }
+
+    /// The coordinates that follow from the closed loops, two per loop in the order of [`Model::loops`]; they are none of
+    /// [`Model::coordinates`].
+    pub fn dependent(&self) -> &[Coordinate] {
+        &self.dependent
+    }
+
     /// Whether some joint follows another one.
     pub fn has_mimic(&self) -> bool {
         self.has_mimic
@@ -385,7 +409,7 @@ impl Model {
         self.rotors.iter().filter(|(k, _)| *k == coordinate).map(|(_, inertia)| inertia).sum()
     }
 
-    /// Whether the other model has the same joints, frames, modal bodies, balancers and gravity, to the last bit; inertias may
+    /// Whether the other model has the same joints, frames, modal bodies, balancers, loops and gravity, to the last bit; inertias may
     /// differ.
     pub fn is_same_tree(&self, other: &Self) -> bool {
         let body =
@@ -393,6 +417,7 @@ impl Model {
         self.gravity == other.gravity
             && self.balancers == other.balancers
             && self.rotor_couplings == other.rotor_couplings
+            && self.loops == other.loops
             && self.bodies.len() == other.bodies.len()
             && self.bodies.iter().zip(&other.bodies).all(|(a, b)| body(a) == body(b))
             && self
@@ -603,11 +628,16 @@ impl<'a> Builder<'a> {
 
     /// Numbers the coordinates, ties the joints that share them, and makes the model.
     fn finish(mut self) -> Result<Model, ModelError> {
-        let Numbering { coordinates, elastic, n_actuated } = self.number();
+        let drafts = draft_loops(self.mechanism, &self.frames, &self.bodies)?;
+        let followers: Vec<usize> = drafts.iter().flat_map(LoopDraft::dependent).collect();
+        let Numbering { coordinates, elastic, n_actuated } = self.number(&followers);
         if coordinates.len() > MOST_COORDINATES {
             return Err(ModelError::TooManyCoordinates { found: coordinates.len() });
         }
         self.share(&coordinates[..n_actuated])?;
+        let dependent = self.number_dependent(&followers, coordinates.len());
+        let nv = coordinates.len();
+        let loops = drafts.iter().map(|d| d.placed(&self.bodies, nv, |modal| self.modal[modal].n)).collect();
         self.close_subtrees();
         let turns = |b: &Body| matches!(b.motion, JointMotion::Axis(motion) if !motion.slides());
         let turning: Vec<usize> = (1..self.bodies.len()).filter(|i| turns(&self.bodies[*i])).collect();
@@ -617,11 +647,13 @@ impl<'a> Builder<'a> {
         let with_rotor = self.bodies[1..].iter().filter(|b| b.armature != 0.0);
         let rotors = with_rotor.map(|b| (b.coordinate, b.ratio * b.ratio * b.armature)).collect();
         let rotor_couplings = self.rotor_couplings()?;
-        let balancers = place_balancers(self.mechanism, &self.frames, &self.bodies)?;
+        let balancers = place_balancers(self.mechanism, &self.frames, &self.bodies, nv)?;
         let frame_by_name = self.frames.iter().enumerate().map(|(i, f)| (f.name.clone(), i)).collect();
-        Ok(Model {
+        let mut model = Model {
             name: self.mechanism.name.clone(),
             has_mimic: !self.followers.is_empty(),
+            loops,
+            dependent,
             turning,
             bodies: self.bodies,
             frames: self.frames,
@@ -634,7 +666,9 @@ impl<'a> Builder<'a> {
             rotors,
             rotor_couplings,
             gravity: self.mechanism.gravity,
-        })
+        };
+        assemble(&mut model, self.mechanism)?;
+        Ok(model)
     }
 
     /// Coordinates of the joints that rotors couple.
@@ -655,15 +689,30 @@ impl<'a> Builder<'a> {
         self.mechanism.rotor_couplings.iter().map(placed).collect()
     }
 
-    /// Coordinates of the joints that have some of their own, and of the modal bodies: actuated ones first.
-    fn number(&mut self) -> Numbering {
+    /// Coordinates of the joints that closed loops determine: after all others.
+    fn number_dependent(&mut self, followers: &[usize], nv: usize) -> Vec<Coordinate> {
+        let joints: HashMap<&str, &Joint> = self.children.values().flatten().map(|j| (j.name.as_str(), *j)).collect();
+        let mut dependent = Vec::new();
+        for &body in followers {
+            let own = &mut self.bodies[body];
+            own.coordinate = nv + dependent.len();
+            let (limits, kind) =
+                joints.get(own.joint.as_str()).map_or((Limits::NONE, "revolute"), |j| (j.limits, j.kind.name()));
+            dependent.push(Coordinate { joint: own.joint.clone(), component: 0, body, limits, kind });
+        }
+        dependent
+    }
+
+    /// Coordinates of the joints that have some of their own, and of the modal bodies: actuated ones first. Bodies that
+    /// follow from closed loops get none.
+    fn number(&mut self, dependent: &[usize]) -> Numbering {
         let mut to = Numbering { coordinates: Vec::new(), elastic: Vec::new(), n_actuated: 0 };
         let joints: HashMap<&str, &Joint> = self.children.values().flatten().map(|j| (j.name.as_str(), *j)).collect();
         for elastic_pass in [false, true] {
             for i in 0..self.bodies.len() {
                 let body = &self.bodies[i];
                 let none = matches!(body.motion, JointMotion::Interface { .. } | JointMotion::Welded);
-                let follows = self.followers.iter().any(|f| f.body == i);
+                let follows = dependent.contains(&i) || self.followers.iter().any(|f| f.body == i);
                 let own = body.elastic == elastic_pass && !none && !follows;
                 if let Some(joint) = joints.get(body.joint.as_str()).filter(|_| own) {
                     self.bodies[i].coordinate = to.joint(joint, i, elastic_pass);

@@ -16,6 +16,7 @@ use flexarm_spatial::{Real, Twist, Wrench};
 use nalgebra::{DVector, Vector3};
 
 use crate::balancer::{add_joint_torques, with_lines};
+use crate::closure;
 use crate::data::{Data, State, add_projection, begin, joint_motion, rotor_energy, subspace_times};
 use crate::lanes::Tree;
 use crate::model::Model;
@@ -34,18 +35,30 @@ pub fn inverse_dynamics<'d>(
     state: &State,
     qddot: &DVector<f64>,
 ) -> &'d DVector<f64> {
-    balanced(model, data, state.q.as_slice(), state.qdot.as_slice(), Some(qddot.as_slice()));
+    let (q, qdot, qddot) = (state.q.as_slice(), state.qdot.as_slice(), qddot.as_slice());
+    match model.loops.is_empty() {
+        true => balanced(model, data, q, qdot, Some(qddot)),
+        false => closure::inverse_dynamics(model, data, q, Some(qdot), Some(qddot)),
+    }
     &data.tau
 }
 
 /// Generalised forces at zero acceleration: Coriolis, centrifugal, gravity, balancers and external loads.
 pub fn nonlinear_effects<'d>(model: &Model, data: &'d mut Data, state: &State) -> &'d DVector<f64> {
-    balanced(model, data, state.q.as_slice(), state.qdot.as_slice(), None);
+    let (q, qdot) = (state.q.as_slice(), state.qdot.as_slice());
+    match model.loops.is_empty() {
+        true => balanced(model, data, q, qdot, None),
+        false => closure::inverse_dynamics(model, data, q, Some(qdot), None),
+    }
     &data.tau
 }
 
 /// Generalised forces that hold the mechanism still at `q`, against gravity, balancers and external loads.
 pub fn gravity_forces<'d>(model: &Model, data: &'d mut Data, q: &DVector<f64>) -> &'d DVector<f64> {
+    if !model.loops.is_empty() {
+        closure::inverse_dynamics(model, data, q.as_slice(), None, None);
+        return &data.tau;
+    }
     let mut at_rest = std::mem::take(&mut data.scratch);
     at_rest.fill(0.0);
     balanced(model, data, q.as_slice(), &at_rest, None);
@@ -53,9 +66,9 @@ pub fn gravity_forces<'d>(model: &Model, data: &'d mut Data, q: &DVector<f64>) -
     &data.tau
 }
 
-/// [`newton_euler`] with the balancers of the model.
+/// [`newton_euler`] with the balancers of the model, of the tree: closed loops come around it (`closure.rs`).
 #[inline(always)]
-fn balanced(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], qddot: Option<&[f64]>) {
+pub(crate) fn balanced(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], qddot: Option<&[f64]>) {
     match model.balancers.is_empty() {
         true => newton_euler(model, data, q, qdot, qddot),
         false => with_balancers(model, data, q, qdot, qddot),

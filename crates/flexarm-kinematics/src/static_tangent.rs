@@ -32,6 +32,7 @@ use flexarm_spatial::{ElasticAngles, Twist, Wrench};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 use crate::balancer::{BalancerLine, BalancerPlace};
+use crate::closure::LoopTangent;
 use crate::data::Data;
 use crate::model::{JointMotion, Model};
 
@@ -57,6 +58,9 @@ pub struct StaticTangent {
     /// One per body: weight and loads on all outward of it, and how they change.
     carried: Vec<Carried>,
     g: Vec<Vector3<f64>>,
+    /// Of closed loops: slopes of the tree, and forces on the dependent coordinates.
+    loops: Option<Box<LoopTangent>>,
+    tau_d: Vec<f64>,
 }
 
 /// A twist by which a coordinate moves what is outward of a body.
@@ -173,7 +177,9 @@ impl StaticTangent {
             }
         }
         let widest = model.modal.iter().map(|modal| modal.n).max().unwrap_or(0);
-        Self { first, columns, carried: vec![Carried::ZERO; model.bodies.len()], g: vec![zero; widest] }
+        let loops = (!model.loops.is_empty()).then(|| Box::new(LoopTangent::new(model, first)));
+        let tau_d = vec![0.0; model.dependent().len()];
+        Self { first, columns, carried: vec![Carried::ZERO; model.bodies.len()], g: vec![zero; widest], loops, tau_d }
     }
 
     /// `∂τ/∂q` of the forces that hold the mechanism still under weight and `loads`, without springs; (n - first)×(n - first),
@@ -186,6 +192,19 @@ impl StaticTangent {
     pub fn compute(&mut self, model: &Model, data: &Data, q: &DVector<f64>, loads: &[PointLoad], G: &mut DMatrix<f64>) {
         let n = model.nv() - self.first;
         assert_eq!(G.shape(), (n, n), "a row and a column per coordinate");
+        let Some(mut tangent) = self.loops.take() else { return self.of_tree(model, data, q, loads, G) };
+        self.of_tree(model, data, q, loads, &mut tangent.G);
+        self.tau_d.fill(0.0);
+        for column in self.columns.iter().filter(|column| column.k >= n) {
+            let Carried { f, n: moment, .. } = &self.carried[column.body];
+            self.tau_d[column.k - n] = -column.v.dot(f) - column.w.dot(moment); // (1)
+        }
+        tangent.reduce(model, data, self.first, &self.tau_d, G);
+        self.loops = Some(tangent);
+    }
+
+    /// [`StaticTangent::compute`] with all coordinates of the opened tree.
+    fn of_tree(&mut self, model: &Model, data: &Data, q: &DVector<f64>, loads: &[PointLoad], G: &mut DMatrix<f64>) {
         G.as_mut_slice().fill(0.0);
         self.carry(model, data, loads);
         self.place_columns(model, data);

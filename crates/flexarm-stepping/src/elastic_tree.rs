@@ -43,11 +43,12 @@ impl ElasticTree {
         Self::of(arm).filter(|tree| tree.len() >= FEWEST_NODES && arm.damps_by_element())
     }
 
-    /// None where a free coordinate is no elastic joint of six, or where a spring is not straight.
+    /// None where a free coordinate is no elastic joint of six, where a spring is not straight, or where closed loops tie branches
+    /// of the tree together.
     pub(crate) fn of(arm: &FlexibleArm) -> Option<Self> {
         let model = &arm.model;
         let straight = arm.elements.iter().all(|e| e.size == 6 && !e.modal && e.curve.is_none());
-        if model.has_modal() || !straight || arm.has_gear_laws() || !arm.torque_driven.is_empty() {
+        if model.has_modal() || !model.loops().is_empty() || !straight || arm.has_gear_laws() || !arm.torque_driven.is_empty() {
             return None;
         }
         let mut joints = Vec::with_capacity(arm.elements.len());

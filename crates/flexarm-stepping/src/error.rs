@@ -1,6 +1,11 @@
 //! Why a simulation stops.
 
+use flexarm_kinematics::{Data, Model};
 use flexarm_settings::Setting;
+
+/// A step that fails with a transmission angle below this failed because of it: the dependent joints turn a hundred times as fast as those
+/// that drive (rad).
+const DEAD_POINT_RAD: f64 = 0.01;
 
 /// A step, a start or a set-up that failed; carries what is needed to understand it.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -55,6 +60,17 @@ pub enum StepError {
         /// Unbalanced force over applied force.
         residual: f64,
     },
+    /// A loop of links at its dead point, or whose links do not reach each other.
+    #[error(
+        "loop {name:?} does not close beyond t = {t:.6} s: its links lie in a line there, or do not reach each other; keep the driving joints \
+         away from this dead point, or check the lengths of its links"
+    )]
+    OpenLoop {
+        /// Time (s).
+        t: f64,
+        /// The loop.
+        name: String,
+    },
     /// The solver with error control found no step that keeps the tolerance.
     #[error(
         "the reference stepper gave up at t = {t:.6} s (step {h:e} s): {what}; try a larger {} or another {}",
@@ -97,6 +113,18 @@ pub enum StepError {
 }
 
 impl StepError {
+    /// Of the loop that was at its dead point when a step failed.
+    pub(crate) fn dead_point(model: &Model, data: &Data, t: f64) -> Option<Self> {
+        let dead = data.transmission_angles().iter().position(|angle| angle.is_nan() || *angle < DEAD_POINT_RAD);
+        let k = data.open_loop().or(dead)?;
+        Some(Self::OpenLoop { t, name: model.loops()[k].name.clone() })
+    }
+
+    /// Of the first loop that the last coordinates in `data` do not let close.
+    pub(crate) fn open_loop(model: &Model, data: &Data, t: f64) -> Option<Self> {
+        data.open_loop().map(|k| Self::OpenLoop { t, name: model.loops()[k].name.clone() })
+    }
+
     /// The settings whose change may mend it; empty where it is the model or the motion.
     pub fn settings(&self) -> &'static [Setting] {
         match self {
@@ -105,7 +133,7 @@ impl StepError {
             Self::SolverGaveUp { .. } => &[Setting::Tolerance, Setting::ReferenceMethod],
             Self::UnstableStep { .. } => &[Setting::Step, Setting::Stepper],
             Self::ModalLinks => &[Setting::Links, Setting::Stepper],
-            Self::Singular { .. } | Self::Setup(_) => &[],
+            Self::Singular { .. } | Self::Setup(_) | Self::OpenLoop { .. } => &[],
         }
     }
 }

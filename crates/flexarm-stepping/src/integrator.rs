@@ -205,6 +205,7 @@ impl<I: Integrator + 'static> ReducedStepper<I> {
     ) -> Result<Box<dyn Stepper>, StepError> {
         let mut system = ReducedArm::new(arm);
         let (x, v) = system.start(e)?;
+        system.check_loops(&x, &v)?;
         let integrator = make(&mut system, x, v)?;
         Ok(Box::new(Self { system, integrator }))
     }
@@ -226,7 +227,10 @@ impl<I: Integrator> Stepper for ReducedStepper<I> {
             if let Some(event) = event {
                 integrator.expect_event(event);
             }
-            integrator.advance_to(system, stop)?;
+            if let Err(error) = integrator.advance_to(system, stop) {
+                // Where a loop does not close nothing is a number, and that is the cause.
+                return Err(StepError::dead_point(&system.arm.model, &system.data, stop).unwrap_or(error));
+            }
             // What happens there.
             let h = integrator.step_size();
             let now = integrator.current_mut();

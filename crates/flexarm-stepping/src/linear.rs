@@ -108,7 +108,7 @@ impl Linear {
 ///   same and follows the point when the arm yields. The arm's own loads act as well.
 ///
 /// # Errors
-/// [`StepError::NoEquilibrium`], [`StepError::Singular`].
+/// [`StepError::NoEquilibrium`], [`StepError::Singular`], [`StepError::OpenLoop`].
 pub fn linearise(arm: &FlexibleArm, tool: &Frame, F_T_W: &Wrench, t: f64) -> Result<Linear, StepError> {
     let model = &arm.model;
     let (m, nv, driven) = (model.n_actuated(), model.nv(), arm.torque_driven.len());
@@ -132,6 +132,9 @@ pub fn linearise(arm: &FlexibleArm, tool: &Frame, F_T_W: &Wrench, t: f64) -> Res
     D.view_mut((driven, driven), (e.len(), e.len())).copy_from(&arm.D);
     let M = mass_matrix(model, &mut data, &q).clone();
     forward_kinematics(model, &mut data, &q);
+    if let Some(open) = StepError::open_loop(model, &data, t) {
+        return Err(open);
+    }
     let mut J = Matrix6xX::zeros(nv);
     frame_jacobian(model, &data, tool, &mut J);
 

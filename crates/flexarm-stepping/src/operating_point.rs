@@ -114,8 +114,8 @@ impl OperatingPoint {
     /// a load turns the arm so far that the tangent is not positive definite on the way.
     ///
     /// # Errors
-    /// [`StepError::Setup`] for another number of joints or values that are no numbers, [`StepError::NoEquilibrium`], and
-    /// [`StepError::Singular`] beyond a buckling load.
+    /// [`StepError::Setup`] for another number of joints or values that are no numbers, [`StepError::NoEquilibrium`],
+    /// [`StepError::OpenLoop`], and [`StepError::Singular`] beyond a buckling load.
     pub fn solve(&mut self, q: &[f64], F_T_W: &Wrench) -> Result<(), StepError> {
         let m = self.arm.model.n_actuated();
         self.residual = f64::NAN;
@@ -133,6 +133,9 @@ impl OperatingPoint {
         self.q.fill(0.0);
         self.q.rows_mut(0, m).copy_from_slice(q);
         forward_kinematics(&self.arm.model, &mut self.data, &self.q);
+        if let Some(open) = StepError::open_loop(&self.arm.model, &self.data, 0.0) {
+            return Err(open);
+        }
         self.X_WT_rigid = self.data.X_WF(&self.tool);
         if self.curved {
             // Out of a play by a way of its own.

@@ -185,6 +185,19 @@ impl ReducedArm {
         }
     }
 
+    /// Whether the arm's loops close where it starts.
+    ///
+    /// # Errors
+    /// [`StepError::OpenLoop`].
+    pub(crate) fn check_loops(&mut self, x: &DVector<f64>, v: &DVector<f64>) -> Result<(), StepError> {
+        if self.arm.model.loops().is_empty() {
+            return Ok(());
+        }
+        self.set(0.0, x, v);
+        flexarm_kinematics::forward_kinematics(&self.arm.model, &mut self.data, &self.state.q);
+        StepError::open_loop(&self.arm.model, &self.data, 0.0).map_or(Ok(()), Err)
+    }
+
     fn set_accelerations(&mut self, a: &DVector<f64>) {
         let (n, driven) = (self.arm.model.n_actuated(), self.arm.torque_driven.len());
         for (i, &k) in self.arm.torque_driven.iter().enumerate() {

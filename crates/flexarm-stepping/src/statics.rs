@@ -15,7 +15,7 @@ const TOLERANCE: f64 = 1e-13;
 /// Inertia forces are left out: the drives are held where the motion is at `t`.
 ///
 /// # Errors
-/// [`StepError::NoEquilibrium`] or [`StepError::Singular`].
+/// [`StepError::NoEquilibrium`], [`StepError::Singular`] or [`StepError::OpenLoop`].
 pub fn static_equilibrium(arm: &FlexibleArm, t: f64) -> Result<DVector<f64>, StepError> {
     let n = arm.n_elastic_coordinates();
     // What was found with the modes is found again at once if nothing has changed since; a play is left from its middle.
@@ -30,6 +30,9 @@ pub fn static_equilibrium(arm: &FlexibleArm, t: f64) -> Result<DVector<f64>, Ste
     let mut residual = f64::INFINITY;
     for iteration in 0..30 {
         let (g, scale) = unbalanced(arm, &mut data, t, &e);
+        if let Some(open) = StepError::open_loop(&arm.model, &data, t) {
+            return Err(open);
+        }
         let previous = residual;
         residual = g.amax() / scale.max(f64::MIN_POSITIVE);
         // Done, or as good as rounding allows.

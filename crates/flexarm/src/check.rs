@@ -14,6 +14,7 @@ use crate::caveat::size::{Size, middle};
 use crate::caveat::{self, Caveat};
 use crate::drive_entry::DriveKind;
 use crate::error::Error;
+use crate::loops;
 use crate::motion::Motion;
 use crate::motion_formats::{self, MotionFile, MotionOptions};
 use crate::options::{LinkModel, Modelling};
@@ -276,6 +277,8 @@ fn check_motion(robot: &Robot, path: &Path, options: &MotionOptions, findings: &
             let passed =
                 |v| Finding { help: help.into(), likely: likely(), ..Finding::error("joint-limit", file(), v) };
             findings.extend(motion.violations.iter().map(|v| passed(v)));
+            let closed = robot.rigid_model().map(|model| loops::along_motion(&model, &motion.trajectory).err());
+            findings.extend(closed.ok().flatten().map(|e| Finding::error("loop", file(), &e)));
             let room = robot.rigid_model().map(|model| balancer::check_motion(&model, &motion.trajectory));
             findings.extend(room.ok().and_then(Result::err).map(|e| Finding::error("balancer", file(), &e)));
             let along = robot.rigid_model().map(|model| of_motion(&motion.name, &motion.trajectory, &model));

@@ -247,6 +247,12 @@ fn drive(
         return Err(fail(entry.joint.span(), format!("the robot has no such movable joint; it has {known:?}")));
     };
     let kind = kind_of(entry, source)?;
+    if let Some(own) = crate::loops::owner(mechanism, name) {
+        let text = format!(
+            "the joint follows from loop {own:?}: nothing drives it, drives belong to the other joints of the loop"
+        );
+        return Err(fail(entry.joint.span(), text));
+    }
     if joint.mimic.is_some() && (kind == DriveKind::Torque || entry.friction.is_some()) {
         let text = "the joint mimics another one: servo and friction belong to that one's drive";
         return Err(fail(entry.joint.span(), text.into()));

@@ -16,7 +16,7 @@ use flexarm_settings::Setting;
 use crate::robot_file::RobotFileError;
 
 pub use flexarm_settings::Fault;
-pub use model::{BalancerError, ChannelError, LoadError, ModellingError, PayloadError, PoseError};
+pub use model::{BalancerError, ChannelError, LoadError, LoopError, ModellingError, PayloadError, PoseError};
 pub use recording::{RecordingError, StudyError};
 pub use value::ValueError;
 
@@ -120,6 +120,9 @@ pub enum Error {
     /// A balancer that does not fit the robot, or a pose of it.
     #[error(transparent)]
     Balancer(#[from] BalancerError),
+    /// A closed loop that does not fit the robot, or a pose in which it does not close.
+    #[error(transparent)]
+    Loop(#[from] LoopError),
     /// Inputs and outputs of a frequency response.
     #[error(transparent)]
     Channel(#[from] ChannelError),

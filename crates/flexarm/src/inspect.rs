@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use crate::balancer::{self, BalancerInfo};
 use crate::error::{Error, PoseError};
+use crate::loops::{self, LoopInfo};
 use crate::mounting::RobotMounting;
 use crate::options::Modelling;
 use crate::posed::all_finite;
@@ -47,6 +48,9 @@ pub struct Inspection {
     /// Balancers at the pose; `gravity_torque` and `bias` have them in.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub balancers: Vec<BalancerInfo>,
+    /// Closed loops at the pose; their dependent joints are none of `joints`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub loops: Vec<LoopInfo>,
     /// Total mass (kg), payload and base included.
     pub mass_kg: f64,
     /// Things worth telling.
@@ -190,6 +194,7 @@ pub fn inspect(robot: &Robot, at: Option<&[f64]>, velocity: Option<&[f64]>) -> R
     state.qdot.copy_from_slice(&v);
 
     let mut data = Data::new(&model);
+    loops::check_pose(&model, &mut data, &state.q)?;
     balancer::check_pose(&model, &mut data, &state.q)?;
     let M = mass_matrix(&model, &mut data, &state.q).clone();
     let gravity = gravity_forces(&model, &mut data, &state.q).clone();
@@ -260,6 +265,7 @@ pub fn inspect(robot: &Robot, at: Option<&[f64]>, velocity: Option<&[f64]>) -> R
         gravity_torque: gravity.as_slice().to_vec(),
         bias: bias.as_slice().to_vec(),
         balancers: balancer::at_pose(&model, &state.q),
+        loops: loops::at_pose(&model, &state.q),
         mass_kg: robot.rigid.links.iter().filter_map(|l| l.inertia).map(|i| i.mass).fold(0.0, |sum, mass| sum + mass),
         warnings,
     })

@@ -61,6 +61,8 @@ mod inspect;
 mod link_entry;
 mod load_jumps;
 mod loads_file;
+mod loop_entry;
+mod loops;
 mod magnification;
 mod mode_recording;
 mod modes;
@@ -103,12 +105,13 @@ pub use convert::{ConvertOptions, ConvertSummary, convert, convert_until, parse_
 pub use deflections::Variation;
 pub use drive_entry::{Drive, DriveKind};
 pub use error::{
-    BalancerError, ChannelError, Error, Fault, LoadError, ModellingError, PayloadError, PoseError, RecordingError,
-    StudyError, ValueError,
+    BalancerError, ChannelError, Error, Fault, LoadError, LoopError, ModellingError, PayloadError, PoseError,
+    RecordingError, StudyError, ValueError,
 };
 pub use flexible::{FlexibleRobot, LinkChoices, Owner, RobotLink};
 pub use headline::{Bending, ShareFigures};
 pub use inspect::{FlexibleInfo, Inspection, JointInfo, LinkInfo, MountingInfo, TcpInfo, inspect};
+pub use loops::{DependentInfo, LoopInfo, RobotLoop};
 pub use mode_recording::{ModeMovie, record_modes};
 pub use modes::{ModeFigures, ModeTable, modes};
 pub use monitor::tool_path::{PathFigures, PathMoveFigures};

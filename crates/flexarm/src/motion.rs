@@ -9,7 +9,7 @@ use flexarm_trajectory::{JointLimits, JointSamples, KnownJoint, LimitViolation, 
 
 use crate::caveat::{self, Caveat};
 use crate::error::{Error, PoseError, ValueError};
-use crate::motion_formats::{self, MotionFile, MotionOptions, ReadMotion, unknown_joints};
+use crate::motion_formats::{self, MotionFile, MotionOptions, ReadMotion, refuse_dependent, unknown_joints};
 use crate::robot::Robot;
 use crate::tool_path::{Cell, ToolPath};
 
@@ -166,7 +166,8 @@ impl Motion {
         let limits = limits(model);
         let names: Vec<&str> = actuated.iter().map(|c| c.joint.as_str()).collect();
         let warnings = warnings(&trajectory, path);
-        check_joints(path, trajectory.joints(), &names)?;
+        let dependent: Vec<&str> = model.dependent().iter().map(|c| c.joint.as_str()).collect();
+        check_joints(path, trajectory.joints(), &names, &dependent)?;
         let still = actuated.iter().filter(|c| !trajectory.joints().contains(&c.joint));
         let place = |c: &Coordinate| {
             let told = hold.iter().find(|(joint, _)| *joint == c.joint).map(|(_, value)| *value);
@@ -246,7 +247,8 @@ impl Motion {
 }
 
 /// A motion must move joints that there are, and at least one of them.
-fn check_joints(path: &Path, moved: &[String], joints: &[&str]) -> Result<(), Error> {
+fn check_joints(path: &Path, moved: &[String], joints: &[&str], dependent: &[&str]) -> Result<(), Error> {
+    refuse_dependent(path, moved, joints, dependent)?;
     let unknown: Vec<String> = moved.iter().filter(|name| !joints.contains(&name.as_str())).cloned().collect();
     if unknown.is_empty() { Ok(()) } else { Err(unknown_joints(path, &unknown, joints)) }
 }

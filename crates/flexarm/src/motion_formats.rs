@@ -326,6 +326,24 @@ fn no_columns(file: &MotionFile<'_>, what: &str) -> Result<(), Error> {
 }
 
 /// Joints that the robot does not have, each with the one that may be meant.
+/// Refuses joints that follow from closed loops.
+pub(crate) fn refuse_dependent(
+    path: &Path,
+    moved: &[String],
+    joints: &[&str],
+    dependent: &[&str],
+) -> Result<(), Error> {
+    let follows: Vec<&String> = moved.iter().filter(|name| dependent.contains(&name.as_str())).collect();
+    if follows.is_empty() {
+        return Ok(());
+    }
+    let what = format!(
+        "the motion moves {follows:?}, which follow from closed loops of the robot: a motion names the joints that drive, {joints:?}; leave \
+         the others out"
+    );
+    Err(Error::File { path: path.to_owned(), what })
+}
+
 pub(crate) fn unknown_joints(path: &Path, unknown: &[String], joints: &[&str]) -> Error {
     let meant = |name: &String| match closest(name, joints.iter().copied()) {
         Some(meant) => format!("{name:?} (did you mean {meant:?}?)"),

@@ -225,6 +225,7 @@ fn on_robot(path: &Path, robot: &Robot, options: &MotionOptions) -> Result<(Moti
     let model = robot.rigid_model()?;
     let trajectory = (*motion.trajectory).clone();
     let actuated = &model.coordinates()[..model.n_actuated()];
+    crate::loops::along_motion(&model, &trajectory)?;
     let torques = torques(&trajectory, &model);
     let along = caveat::motion::of_motion(&motion.name, &trajectory, &model);
     let caveats: Vec<caveat::Caveat> = motion.caveats().into_iter().chain(along).collect();

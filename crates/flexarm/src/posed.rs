@@ -13,6 +13,7 @@ use crate::caveat::{Caveat, kinds, validity};
 use crate::error::{Error, PoseError};
 use crate::flexible::FlexibleRobot;
 use crate::inspect::joint_values;
+use crate::loops;
 use crate::options::Modelling;
 use crate::robot::Robot;
 
@@ -47,6 +48,7 @@ impl Posed {
     /// `at` in coordinate order (rad or m).
     pub(crate) fn held(robot: &Robot, modelling: &Modelling, at: Vec<f64>) -> Result<Self, Error> {
         let flexible = robot.modelled(modelling)?;
+        loops::check_pose(&flexible.rigid, &mut Data::new(&flexible.rigid), &DVector::from_column_slice(&at))?;
         balancer::check_pose(&flexible.rigid, &mut Data::new(&flexible.rigid), &DVector::from_column_slice(&at))?;
         let model = flexible.model.clone();
         let actuated = &model.coordinates()[..model.n_actuated()];

@@ -11,6 +11,7 @@ use crate::caveat::{self, Caveat, kinds};
 use crate::error::{Error, ValueError};
 use crate::flexible::FlexibleRobot;
 use crate::loads_file::EXPRESSION_PERIOD;
+use crate::loops;
 use crate::magnification::Expected;
 use crate::motion::Motion;
 use crate::options::RunOptions;
@@ -72,6 +73,7 @@ pub(crate) fn checked(
         Some(prepared) => prepared.flexible.clone(),
         None => Arc::new(robot.modelled(&options.modelling)?),
     };
+    loops::along_motion(&flexible.rigid, &motion.trajectory)?;
     balancer::check_motion(&flexible.rigid, &motion.trajectory)?;
     let arm = match prepared {
         Some(prepared) => prepared.arm(motion.prescribed()),

@@ -15,6 +15,8 @@ use crate::drive_entry::{Drive, drives};
 use crate::error::Error;
 use crate::flexible::RobotLink;
 use crate::link_entry::flexible_link;
+use crate::loop_entry::add_loops;
+use crate::loops;
 use crate::mounting::{RobotMounting, add_mounting};
 use crate::robot_file::{PayloadEntry, RobotFile, RobotFileError, Source, parse_robot_file};
 
@@ -186,14 +188,15 @@ impl Robot {
             controller: Vec::new(),
             written: written_caveats(file),
         };
-        for (joint, value) in &file.hold {
-            let held = held_joint(joint, value, &robot.rigid, source).map_err(Error::from);
-            robot.hold.extend(keep(held, &mut faults));
-        }
         if let Some(payload) = &file.payload {
             let link = file.tcp.as_ref().map(|t| t.get_ref().link.get_ref().as_str());
             let link = link.or_else(|| default_tcp(&robot.urdf.mechanism)).unwrap_or_default().to_owned();
             keep(robot.add_payload(payload, &link, source), &mut faults);
+        }
+        add_loops(&mut robot, &file.loops, source, &mut faults);
+        for (joint, value) in &file.hold {
+            let held = held_joint(joint, value, &robot.rigid, source).map_err(Error::from);
+            robot.hold.extend(keep(held, &mut faults));
         }
         robot.drives = drives(&file.drive, &robot.rigid, source, &mut robot.warnings, &mut faults);
         for drive in &robot.drives {
@@ -302,6 +305,7 @@ impl Robot {
         if let Ok(rigid) = self.rigid_model() {
             caveats.extend(caveat::drives::of_drives(&self.drives, &self.rigid, &rigid));
             caveats.extend(caveat::balancers::of_balancers(&self.rigid, &rigid));
+            caveats.extend(caveat::loops::of_loops(&rigid));
         }
         caveats
     }
@@ -390,6 +394,10 @@ fn held_joint(
 ) -> Result<(String, f64), RobotFileError> {
     let free = |joint: &&Joint| joint.kind.degrees_of_freedom() == 1 && joint.mimic.is_none();
     let at = *value.get_ref();
+    if let Some(own) = loops::owner(mechanism, name) {
+        let message = format!("hold: {name:?} follows from loop {own:?}: hold the joints that drive the loop");
+        return Err(source.error(value.span(), message));
+    }
     let Some(joint) = mechanism.joints.iter().filter(free).find(|joint| joint.name == name) else {
         let names: Vec<&str> = mechanism.joints.iter().filter(free).map(|joint| joint.name.as_str()).collect();
         let meant = closest(name, names.iter().copied());

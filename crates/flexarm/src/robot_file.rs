@@ -15,6 +15,7 @@ use crate::balancer_entry::BalancerEntry;
 pub(crate) use crate::beam_entry::BeamEntry;
 use crate::controller_entry::ControllerAxisEntry;
 use crate::drive_entry::DriveEntry;
+use crate::loop_entry::LoopEntry;
 use crate::mounting::MountingEntry;
 
 /// The file as written.
@@ -68,6 +69,10 @@ pub(crate) struct RobotFile {
     /// How the controller counts its axes.
     #[serde(default)]
     pub controller_axis: Vec<ControllerAxisEntry>,
+    /// Pins that close loops of links.
+    #[serde(default)]
+    #[serde(rename = "loop")]
+    pub loops: Vec<Spanned<LoopEntry>>,
 }
 
 /// Pose of the tool centre point in a link.

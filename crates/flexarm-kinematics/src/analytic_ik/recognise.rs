@@ -142,6 +142,7 @@ impl AnalyticArm {
     /// # Errors
     /// [`NoAnalyticIk`], which says what the geometry lacks.
     pub fn new(model: &Model, frame: &Frame) -> Result<Self, NoAnalyticIk> {
+        check_open(model, frame)?;
         let joints = moving_joints(model, frame);
         let held = DVector::zeros(model.nv());
         match joints.as_slice().try_into() {
@@ -169,6 +170,7 @@ impl AnalyticArm {
         if q_held.len() != model.nv() || !q_held.iter().all(|x| x.is_finite()) {
             return Err(NoAnalyticIk::Held { found: q_held.len(), needed: model.nv() });
         }
+        check_open(model, frame)?;
         let chain = chain_of(model, frame, joints, q_held)?;
         let smallest = dexterity(&chain);
         if smallest < 1e-7 {
@@ -179,6 +181,19 @@ impl AnalyticArm {
         let sides = Sides::new(&kernel, reversed, -model.gravity);
         Ok(Self { chain, kernel, class, reversed, deviation, joints: *joints, limits, sides })
     }
+}
+
+/// A joint that follows from a closed loop turns with others: its axis is where these put it.
+fn check_open(model: &Model, frame: &Frame) -> Result<(), NoAnalyticIk> {
+    let mut body = frame.body;
+    while body > 0 {
+        let own = &model.bodies()[body];
+        if own.coordinate != usize::MAX && own.coordinate >= model.nv() {
+            return Err(NoAnalyticIk::Joint { joint: own.joint.clone(), what: "follows from a closed loop" });
+        }
+        body = own.parent;
+    }
+    Ok(())
 }
 
 /// Actuated coordinates that move the frame, from the base on.

@@ -428,6 +428,41 @@ pub(crate) const BALANCER_CURVE: CaveatKind = CaveatKind::note(
     "",
     "add points, in m or rad",
 );
+/// A loop that was assembled elsewhere than told.
+pub(crate) const LOOP_ASSEMBLED: CaveatKind = CaveatKind::warning(
+    "loop-assembled",
+    "{where} closes with its dependent joints {value} rad or m from where it is told to be assembled (told above {yardstick})",
+    "rad or m",
+    "check the points of pin and eye and the lengths of the bars, or give the values in at",
+);
+/// Poses within the joint ranges in which a loop does not close.
+pub(crate) const LOOP_RANGE: CaveatKind = CaveatKind::warning(
+    "loop-range",
+    "{where} does not close in {value} % of the poses within the ranges of the driving joints (told above {yardstick} %): such poses are refused",
+    "%",
+    "limits of the driving joints say where they may be each for itself; check the lengths of the bars",
+);
+/// A small transmission angle within the joint ranges.
+pub(crate) const LOOP_REACH: CaveatKind = CaveatKind::warning(
+    "loop-transmission",
+    "{where} has transmission angles down to {value} deg within the joint ranges (told below {yardstick})",
+    "deg",
+    "limits of the dependent joints keep poses out that the machine does not reach",
+);
+/// A small transmission angle along a motion.
+pub(crate) const LOOP_TRANSMISSION: CaveatKind = CaveatKind::warning(
+    "loop-transmission",
+    "{where} comes to a transmission angle of {value} deg along the motion (told below {yardstick}): forces in its bars grow as 1/sin of it",
+    "deg",
+    "keep the motion away from the dead point, where the bars lie in a line",
+);
+/// A dependent joint beyond its limit.
+pub(crate) const LOOP_LIMIT: CaveatKind = CaveatKind::warning(
+    "loop-limit",
+    "{where}, which follows from a loop, comes to {value} along the motion, its limit is {yardstick}",
+    "",
+    "keep the driving joints nearer to each other, or correct the limit of the URDF",
+);
 /// A motion much slower than the robot.
 pub(crate) const SLOW_MOTION: CaveatKind = CaveatKind::note(
     "slow-motion",

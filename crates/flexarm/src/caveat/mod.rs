@@ -10,6 +10,7 @@ pub(crate) mod balancers;
 pub(crate) mod drives;
 pub(crate) mod kinds;
 pub(crate) mod links;
+pub(crate) mod loops;
 pub(crate) mod motion;
 pub(crate) mod parts;
 pub(crate) mod pose;

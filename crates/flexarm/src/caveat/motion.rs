@@ -38,7 +38,7 @@ pub(crate) fn of_motion(name: &str, trajectory: &Trajectory, model: &Model) -> V
             range[k] = [range[k][0].min(state.q[k]), range[k][1].max(state.q[k])];
         }
     }
-    let mut caveats = Vec::new();
+    let mut caveats = super::loops::of_motion(trajectory, model);
     for (c, torque) in model.coordinates().iter().zip(&torque) {
         if *torque > c.limits.effort {
             let caveat = kinds::MOTION_EFFORT.found(format!("joint {:?}", c.joint), *torque, c.limits.effort);

@@ -154,6 +154,114 @@ pub enum BalancerError {
     },
 }
 
+/// Closed loops that do not fit the robot, and poses in which they do not close.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum LoopError {
+    /// Two of one name.
+    #[error("loop {name:?} is there twice: give each a name of its own")]
+    Twice {
+        /// The name.
+        name: String,
+    },
+    /// No such link.
+    #[error("loop {name:?}: {link:?} is not a link of the robot; its links are {known:?}")]
+    UnknownLink {
+        /// The loop.
+        name: String,
+        /// The link asked for.
+        link: String,
+        /// The links there are.
+        known: Vec<String>,
+    },
+    /// A number that is none.
+    #[error("loop {name:?}: {what} has the entry {value}, expected finite numbers")]
+    NotFinite {
+        /// The loop.
+        name: String,
+        /// Of what.
+        what: String,
+        /// The entry.
+        value: f64,
+    },
+    /// An axis without direction.
+    #[error("loop {name:?}: axis is {axis:?}, expected the direction of the pin in axes of its link")]
+    BadAxis {
+        /// The loop.
+        name: String,
+        /// What was given.
+        axis: [f64; 3],
+    },
+    /// None to take the axis from.
+    #[error(
+        "loop {name:?}: none of its dependent joints turns, so that its pin needs an axis: give axis = [x, y, z] in axes of the pin's link"
+    )]
+    NoAxis {
+        /// The loop.
+        name: String,
+    },
+    /// What the tree says of it.
+    #[error("loop {name:?}: {what}")]
+    Unfit {
+        /// The loop.
+        name: String,
+        /// What is wrong.
+        what: String,
+    },
+    /// A joint with a motor.
+    #[error("loop {name:?}: joint {joint:?} has a drive and follows from the loop: only one of both moves it")]
+    Driven {
+        /// The loop.
+        name: String,
+        /// The joint.
+        joint: String,
+    },
+    /// The bars do not reach each other.
+    #[error(
+        "loop {name:?} does not close there: its links do not reach each other; keep the driving joints within what its bars allow, or check \
+         their lengths"
+    )]
+    Open {
+        /// The loop.
+        name: String,
+    },
+    /// Bars in a line.
+    #[error(
+        "loop {name:?} passes its dead point there: its links lie in a line, and they could go on in two ways; keep the motion away from it"
+    )]
+    DeadPoint {
+        /// The loop.
+        name: String,
+    },
+    /// One of these during a motion.
+    #[error("at t = {t:.3} s: {source}")]
+    AlongMotion {
+        /// When (s).
+        t: f64,
+        /// Why.
+        #[source]
+        source: Box<LoopError>,
+    },
+}
+
+impl LoopError {
+    /// The loop.
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Twice { name }
+            | Self::UnknownLink { name, .. }
+            | Self::NotFinite { name, .. }
+            | Self::BadAxis { name, .. }
+            | Self::NoAxis { name }
+            | Self::Unfit { name, .. }
+            | Self::Driven { name, .. }
+            | Self::Open { name }
+            | Self::DeadPoint { name } => name,
+            Self::AlongMotion { source, .. } => source.name(),
+        }
+    }
+}
+
 /// Joint values that do not fit the robot, and poses without an answer.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]

@@ -122,6 +122,7 @@ impl Run<'_> {
     fn caveats(&self, links: &[LinkFigures], sag_m: f64, mut caveats: Vec<Caveat>) -> Vec<Caveat> {
         caveats.extend(self.flexible.caveats());
         caveats.extend(self.motion.caveats());
+        caveats.extend(crate::caveat::loops::of_motion(&self.motion.trajectory, &self.flexible.rigid));
         let passed = |v: &LimitViolation| Caveat::said("joint-limit", &v.joint, format!("joint limit: {v}"), "");
         caveats.extend(self.motion.violations.iter().map(passed));
         let (arm, flexible, robot) = (&self.arm, self.flexible, self.robot);

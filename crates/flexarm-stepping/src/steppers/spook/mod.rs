@@ -266,6 +266,7 @@ fn check_known(arm: &FlexibleArm) -> Result<(), StepError> {
         (!arm.load_friction.is_empty(), "friction that grows with the load"),
         (arm.coupling.as_ref().is_some_and(|coupling| !coupling.is_none()), "gears that move several joints"),
         (arm.model.has_mimic(), "mimic joints"),
+        (!arm.model.loops().is_empty(), "closed loops of links"),
     ];
     match unknown.iter().find(|(there, _)| *there) {
         _ if arm.model.has_modal() => Err(StepError::ModalLinks),

@@ -1,0 +1,72 @@
+//! Closed loops of a robot file: from the text to a checked tree.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use serde::Deserialize;
+use toml::Spanned;
+
+use crate::balancer_entry::EndEntry;
+use crate::error::Error;
+use crate::loops::RobotLoop;
+use crate::robot::Robot;
+use crate::robot_file::Source;
+
+/// A pin that closes a chain of links.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct LoopEntry {
+    /// For messages; numbered if not given.
+    pub name: Option<Spanned<String>>,
+    /// Where the pin is.
+    pub pin: Spanned<EndEntry>,
+    /// Its axis in axes of that link; that of the first dependent joint that turns if not given.
+    pub axis: Option<Spanned<[f64; 3]>>,
+    /// Where the eye is that the pin goes through.
+    pub eye: Spanned<EndEntry>,
+    /// The joints that follow from the loop.
+    pub dependent: Spanned<Vec<String>>,
+    /// Joint values near which it is assembled (rad or m).
+    #[serde(default)]
+    pub at: BTreeMap<String, Spanned<f64>>,
+}
+
+/// Puts the loops of a file on a robot; faults are put aside so that all are found.
+pub(crate) fn add_loops(robot: &mut Robot, entries: &[Spanned<LoopEntry>], source: &Source, faults: &mut Vec<Error>) {
+    let before = faults.len();
+    let mut places: Vec<(String, Range<usize>)> = Vec::new();
+    for (number, entry) in entries.iter().enumerate() {
+        let LoopEntry { name, pin, axis, eye, dependent, at } = entry.get_ref();
+        let place = name.as_ref().map_or(dependent.span(), Spanned::span);
+        let name = name.as_ref().map_or_else(|| format!("loop_{}", number + 1), |name| name.get_ref().clone());
+        let Ok(joints) = <[String; 2]>::try_from(dependent.get_ref().clone()) else {
+            let message = format!(
+                "loop {name:?}: dependent names {} joints, expected two: pin and eye are two equations in their plane, so two joints of \
+                 the loop follow from the others",
+                dependent.get_ref().len()
+            );
+            faults.push(source.error(dependent.span(), message).into());
+            continue;
+        };
+        let end = |end: &Spanned<EndEntry>| (end.get_ref().link.get_ref().clone(), end.get_ref().xyz);
+        let own = RobotLoop {
+            name: name.clone(),
+            pin: end(pin),
+            axis: axis.as_ref().map(|axis| *axis.get_ref()),
+            eye: end(eye),
+            dependent: joints,
+            at: at.iter().map(|(joint, value)| (joint.clone(), *value.get_ref())).collect(),
+        };
+        match robot.add_loop(own) {
+            Err(fault) => faults.push(source.error(place, fault.to_string()).into()),
+            Ok(()) => places.push((name, place)),
+        }
+    }
+    // Loops may rest on each other: they are checked together.
+    if faults.len() == before
+        && let Err(fault) = robot.check_loops()
+    {
+        let place = places.iter().find(|(name, _)| fault.name() == name).map_or(0..0, |(_, place)| place.clone());
+        faults.push(source.error(place, fault.to_string()).into());
+    }
+}
