@@ -54,7 +54,7 @@ fn force_slopes(at: &mut OperatingPoint, parameters: &[Parameter]) -> Result<DMa
 fn carrying(arm: &FlexibleArm, body: usize, per_kg: &flexarm_kinematics::SpatialInertia) -> FlexibleArm {
     let mut inertia = arm.model.bodies()[body].inertia;
     inertia += scaled(per_kg, 1.0);
-    FlexibleArm { model: std::sync::Arc::new(arm.model.with_inertia(body, inertia)), ..arm.clone() }
+    arm.with_inertia(body, inertia)
 }
 
 /// Twist of the tool (world axes, at its point; m, rad) per unit of each parameter's coordinate, 6×p, at a pose that is solved.

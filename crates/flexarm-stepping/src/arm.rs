@@ -353,6 +353,18 @@ impl FlexibleArm {
         Ok(self)
     }
 
+    /// The same arm with the inertia of one body replaced (about Bo, B axes); modes and damping stay as they are.
+    #[must_use]
+    pub fn with_inertia(&self, body: usize, inertia: SpatialInertia) -> Self {
+        Self { model: Arc::new(self.model.with_inertia(body, inertia)), ..self.clone() }
+    }
+
+    /// The same arm along another motion; modes and damping stay as they are.
+    #[must_use]
+    pub fn along(&self, motion: Arc<dyn PrescribedMotion>) -> Self {
+        Self { motion, ..self.clone() }
+    }
+
     /// Number of elastic coordinates.
     pub fn n_elastic_coordinates(&self) -> usize {
         self.model.n_elastic()

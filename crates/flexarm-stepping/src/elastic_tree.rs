@@ -48,7 +48,12 @@ impl ElasticTree {
     pub(crate) fn of(arm: &FlexibleArm) -> Option<Self> {
         let model = &arm.model;
         let straight = arm.elements.iter().all(|e| e.size == 6 && !e.modal && e.curve.is_none());
-        if model.has_modal() || !model.loops().is_empty() || !straight || arm.has_gear_laws() || !arm.torque_driven.is_empty() {
+        if model.has_modal()
+            || !model.loops().is_empty()
+            || !straight
+            || arm.has_gear_laws()
+            || !arm.torque_driven.is_empty()
+        {
             return None;
         }
         let mut joints = Vec::with_capacity(arm.elements.len());

@@ -240,7 +240,8 @@ impl Tangents {
         let mut data = Data::new(model);
         let statics = Statics { arm, tool, F_T_W: *F_T_W, t: 0.0 };
         let e = q.rows(m, n).into_owned();
-        let K = with_curves(arm, &arm.stiffness(), &e) + statics.slopes(&mut data, q).view((m, m), (n, n));
+        let K =
+            for_vibration(arm, &arm.stiffness(), q.as_slice(), &e) + statics.slopes(&mut data, q).view((m, m), (n, n));
         let M = mass_matrix(model, &mut data, q).view((m, m), (n, n)).into_owned();
         forward_kinematics(model, &mut data, q);
         let mut J = Matrix6xX::zeros(model.nv());

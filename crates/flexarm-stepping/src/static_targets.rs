@@ -73,7 +73,7 @@ pub fn static_targets(
     let mut targets = DVector::from_column_slice(q);
     let mut before = None;
     for iterations in 0..=MOST_ITERATIONS {
-        let held = FlexibleArm { motion: Arc::new(Held(targets.as_slice().to_vec())), ..arm.clone() };
+        let held = arm.along(Arc::new(Held(targets.as_slice().to_vec())));
         let at = linearise(&held, tool, F_T_W, 0.0)?;
         let off = displacement(&wanted, &at.X_WT);
         let before = *before.get_or_insert(off);

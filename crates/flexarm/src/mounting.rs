@@ -315,6 +315,7 @@ fn flexible_mounting(
         modes: given.modes.clone(),
         eigenmodes: None,
         geometric_stiffening: None,
+        stiffness_factor: None,
         damping: given.damping.clone(),
         angles: None,
         coupling: true,

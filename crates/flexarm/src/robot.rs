@@ -212,7 +212,7 @@ impl Robot {
             robot.flexible.extend(keep(flexible, &mut faults));
         }
         if let Some(mounting) = &file.mounting {
-            add_mounting(&mut robot, mounting, &source, folder, &mut faults);
+            add_mounting(&mut robot, mounting, source, folder, &mut faults);
         }
         match faults.len() {
             0 => {}

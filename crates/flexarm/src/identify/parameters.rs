@@ -5,6 +5,7 @@
 //! | `drive.JOINT.gearbox.stiffness` | a gearbox with one stiffness (N m/rad, N/m of a joint that slides) |
 //! | `drive.JOINT.gearbox.stiffness[k]` | one of three or six, from 0 |
 //! | `link.LINK.stiffness_factor` | all of a flexible link's stiffness, as a factor |
+//! | `mounting.stiffness[k]` | one of six springs under the base, from 0 |
 //! | `payload.mass` | kg, at its centre of mass |
 
 use flexarm_flexlink::GearStiffness;
@@ -13,6 +14,7 @@ use flexarm_kinematics::SpatialInertia;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::flexible::{FlexibleRobot, Owner};
+use crate::mounting::RobotMounting;
 use crate::robot::{PAYLOAD_LINK, Robot};
 
 /// Standard deviation of a stiffness before anything is measured: a factor.
@@ -27,6 +29,8 @@ pub(crate) enum Written {
     Gearbox { joint: String, entry: Option<usize> },
     /// `[[flexible_link]]` of the link: its `stiffness_factor`.
     Link { link: String },
+    /// `mounting.stiffness`, one of six.
+    Mounting { entry: usize },
     /// `payload.mass`.
     Payload,
 }
@@ -55,11 +59,16 @@ pub(crate) fn candidates(robot: &Robot, flexible: &FlexibleRobot) -> Vec<Candida
         found.extend(gearbox_parameters(&drive.joint, &gearbox.stiffness, &springs, slides));
     }
     for (number, span) in flexible.spans.iter().enumerate() {
-        let places = of(Owner::Link(number)).into_iter().map(|spring| Place { spring, coordinate: None }).collect();
-        let factor = robot.flexible[number].stiffness_factor;
+        let springs = of(Owner::Link(number));
+        if robot.stands_on(&span.link) {
+            found.extend(mounting_parameters(robot, &springs));
+            continue;
+        }
+        let Some(link) = robot.flexible.iter().find(|link| link.flexible.link == span.link) else { continue };
+        let places = springs.into_iter().map(|spring| Place { spring, coordinate: None }).collect();
         let name = format!("link.{}.stiffness_factor", span.link);
         let written = Written::Link { link: span.link.clone() };
-        found.push(stiffness(name, "1", factor, places, written));
+        found.push(stiffness(name, "1", link.stiffness_factor, places, written));
     }
     if let Some(frame) = flexible.model.frame(PAYLOAD_LINK) {
         let mass = robot.rigid.link(PAYLOAD_LINK).and_then(|link| link.inertia).map_or(0.0, |inertia| inertia.mass);
@@ -104,6 +113,22 @@ fn gearbox_parameters(joint: &str, K: &GearStiffness, springs: &[usize], slides:
             vec![stiffness(name, "1", 1.0, places, written(None))]
         }
     }
+}
+
+/// Six springs under the base that are not coupled, one by one; a beam or a mesh there has no numbers of its own in the robot file.
+fn mounting_parameters(robot: &Robot, springs: &[usize]) -> Vec<Candidate> {
+    let (Some(RobotMounting::Springs { springs: mounting, .. }), [spring]) = (&robot.mounting, springs) else {
+        return Vec::new();
+    };
+    if !is_diagonal(&mounting.K_S) {
+        return Vec::new();
+    }
+    let entry = |i: usize| {
+        let unit = if i < 3 { "N/m" } else { "N m/rad" };
+        let place = vec![Place { spring: *spring, coordinate: Some(i) }];
+        stiffness(format!("mounting.stiffness[{i}]"), unit, mounting.K_S[(i, i)], place, Written::Mounting { entry: i })
+    };
+    (0..6).map(entry).collect()
 }
 
 fn is_diagonal(K: &nalgebra::Matrix6<f64>) -> bool {

@@ -32,6 +32,12 @@ pub(super) fn rewritten(text: &str, found: &[(Found, Written)], home: &Path, to:
                 entry.insert("stiffness_factor", toml_edit::value(rounded(parameter.value, parameter.std)));
                 told.push((format!("link {link}"), parameter));
             }
+            Written::Mounting { entry } => {
+                let mounting = file.get_mut("mounting").and_then(Item::as_table_like_mut);
+                let stiffness = mounting.and_then(|mounting| mounting.get_mut("stiffness"));
+                put_stiffness(stiffness.ok_or("there is no mounting.stiffness")?, Some(*entry), parameter)?;
+                told.push(("mounting".into(), parameter));
+            }
             Written::Payload => {
                 let payload = file.get_mut("payload").and_then(Item::as_table_like_mut).ok_or("there is no payload")?;
                 payload.insert("mass", toml_edit::value(rounded(parameter.value, parameter.std)));
