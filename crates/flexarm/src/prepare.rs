@@ -37,7 +37,7 @@ impl Prepared {
         motion.sample(0.0, &mut q, &mut v, &mut a);
         let known = self.start.lock().unwrap_or_else(PoisonError::into_inner).clone();
         if let Some((_, arm)) = known.filter(|(start, _)| *start == q) {
-            return Ok(FlexibleArm { motion, ..(*arm).clone() });
+            return Ok(arm.along(motion));
         }
         let arm = self.flexible.arm(motion)?;
         *self.start.lock().unwrap_or_else(PoisonError::into_inner) = Some((q, Arc::new(arm.clone())));
