@@ -161,6 +161,20 @@ fn text(found: &Identification) -> String {
             number(factor * held.rms_before)
         );
     }
+    for gear in &found.encoders {
+        let unseen: Vec<String> = gear.unseen_r2.iter().map(|r2| format!("{r2:.2}")).collect();
+        out += &format!(
+            "encoders of {}: {} +- {}, late by {:.1} ms, rest {:.1} of {:.1} urad, R2 of unseen runs {}{}\n",
+            gear.joint,
+            number(gear.stiffness),
+            number(gear.std),
+            1e3 * gear.delay_s,
+            1e6 * gear.rest_rms,
+            1e6 * gear.deflection_rms,
+            unseen.join(", "),
+            if gear.told { "" } else { ": not told" }
+        );
+    }
     for combination in &found.untold {
         let parts: Vec<String> = combination.iter().map(|w| format!("{:+.2} {}", w.weight, w.name)).collect();
         out += &format!("not told: {}\n", parts.join(" "));

@@ -94,6 +94,15 @@ pub enum ReadingKind {
         /// Standard deviation of each component (m).
         std: Vector3<f64>,
     },
+    /// A parameter by itself, told by a measurement of another kind ([`crate::gear_stiffness`]).
+    Known {
+        /// Name of the parameter.
+        parameter: String,
+        /// Its coordinate: of stiffnesses the logarithm of the value over the initial one, else the difference.
+        value: f64,
+        /// Standard deviation of that.
+        std: f64,
+    },
     /// Natural frequencies, drives locked.
     Frequencies {
         /// What the tool carries; a wrench does not count.
@@ -109,6 +118,7 @@ impl Reading {
         match &self.kind {
             ReadingKind::Displacement { rows, .. } => rows.len(),
             ReadingKind::Place { .. } => 3,
+            ReadingKind::Known { .. } => 1,
             ReadingKind::Frequencies { rows, .. } => rows.len(),
         }
     }
@@ -118,6 +128,7 @@ impl Reading {
         match &self.kind {
             ReadingKind::Displacement { rows, .. } => rows.iter().map(|row| row.std).collect(),
             ReadingKind::Place { std, .. } => std.iter().copied().collect(),
+            ReadingKind::Known { std, .. } => vec![*std],
             ReadingKind::Frequencies { rows, .. } => rows.iter().map(|row| row.std).collect(),
         }
     }
@@ -257,6 +268,8 @@ impl AtRest {
 struct Workspaces<'a> {
     plant: Plant,
     parameters: &'a [Parameter],
+    /// Coordinates of the parameters.
+    x: Vec<f64>,
     known: Vec<(Vector3<f64>, SpatialInertia, OperatingPoint)>,
 }
 
@@ -320,6 +333,7 @@ impl MeasuredArm<'_> {
             match &reading.kind {
                 ReadingKind::Displacement { rows, .. } => rows.iter().map(|row| row.value).collect(),
                 ReadingKind::Place { value, .. } => value.iter().copied().collect(),
+                ReadingKind::Known { value, .. } => vec![*value],
                 ReadingKind::Frequencies { rows, .. } => rows.iter().map(|row| row.value).collect(),
             }
         };
@@ -327,8 +341,8 @@ impl MeasuredArm<'_> {
     }
 
     fn rooms(&self, unknowns: &DVector<f64>) -> Workspaces<'_> {
-        let plant = self.plant.with(self.parameters, &unknowns.as_slice()[..self.parameters.len()]);
-        Workspaces { plant, parameters: self.parameters, known: Vec::new() }
+        let x = unknowns.as_slice()[..self.parameters.len()].to_vec();
+        Workspaces { plant: self.plant.with(self.parameters, &x), parameters: self.parameters, x, known: Vec::new() }
     }
 
     /// Numbers of a reading, with their derivatives by all unknowns if asked for.
@@ -347,6 +361,14 @@ impl MeasuredArm<'_> {
             ReadingKind::Place { load, target, instrument, .. } => {
                 let at = rooms.at_rest(&reading.q, load, slopes).map_err(named)?;
                 Ok(self.place(&at, *target, *instrument, own))
+            }
+            ReadingKind::Known { parameter, .. } => {
+                // One that is not fitted stays at zero.
+                let number = self.parameters.iter().position(|p| p.name == *parameter);
+                let value = number.map_or(0.0, |k| rooms.x[k]);
+                let columns = if slopes { self.parameters.len() + own.len() } else { 0 };
+                let slope = |_, j: usize| f64::from(u8::from(Some(j) == number));
+                Ok(Block { values: vec![value], slopes: DMatrix::from_fn(1, columns, slope) })
             }
             ReadingKind::Frequencies { load, rows } => {
                 let plant = rooms.loaded(&load.carried);

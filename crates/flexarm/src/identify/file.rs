@@ -40,7 +40,46 @@ struct MeasurementFile {
     place: Vec<Spanned<PlaceEntry>>,
     #[serde(default)]
     frequency: Vec<Spanned<FrequencyEntry>>,
+    #[serde(default)]
+    encoders: Vec<Spanned<EncodersEntry>>,
 }
+
+/// Positions of motors and links over time.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct EncodersEntry {
+    file: Spanned<PathBuf>,
+    /// Column of the time (s).
+    time: Spanned<String>,
+    /// Columns of the motors, over their ratios, of all joints.
+    motor: Spanned<BTreeMap<String, String>>,
+    /// Columns of the encoders behind the gears, of some joints.
+    link: Spanned<BTreeMap<String, String>>,
+    below: Option<Spanned<f64>>,
+    edge: Option<Spanned<f64>>,
+}
+
+/// A recording of motors and links, in SI units and the robot's order.
+#[derive(Debug)]
+pub(super) struct EncoderRecording {
+    pub(super) place: RobotFileError,
+    pub(super) step_s: f64,
+    /// One list per joint (rad or m).
+    pub(super) motor: Vec<Vec<f64>>,
+    /// Of the joints that have one.
+    pub(super) link: Vec<Option<Vec<f64>>>,
+    /// Both are compared up to here (Hz).
+    pub(super) below_hz: f64,
+    /// Left out at both ends (s).
+    pub(super) edge_s: f64,
+}
+
+/// What is faster than this is left out of recordings unless they say otherwise (Hz).
+const BELOW_HZ: f64 = 12.0;
+/// So much is left out at both ends of a recording (s).
+const EDGE_S: f64 = 0.4;
+/// Times may be off an even step by this part of it.
+const UNEVEN: f64 = 0.01;
 
 /// What is known of one parameter before.
 #[derive(Debug, Deserialize)]
@@ -158,6 +197,7 @@ struct FrequencyEntry {
 #[derive(Debug)]
 pub(super) struct MeasurementInput {
     pub(super) measurements: Measurements,
+    pub(super) recordings: Vec<EncoderRecording>,
     pub(super) instruments: Vec<String>,
     pub(super) targets: Vec<String>,
     /// Patterns of names of what is unknown, with their places; empty: all stiffnesses.
@@ -237,7 +277,8 @@ pub(super) fn read(path: &Path, cell: &Cell<'_>) -> Result<MeasurementInput, Err
     for (k, entry) in file.frequency.iter().enumerate() {
         reader.frequency(k, entry)?;
     }
-    let deviations_known = reader.deviations()?;
+    let recordings = file.encoders.iter().map(|entry| reader.encoders(entry)).collect::<Result<Vec<_>, Error>>()?;
+    let deviations_known = reader.deviations(!recordings.is_empty())?;
     let told =
         |list: &[Spanned<String>]| list.iter().map(|p| (p.get_ref().clone(), source.error(p.span(), ""))).collect();
     let positive = |value: &Spanned<f64>, least: f64| match *value.get_ref() {
@@ -252,6 +293,7 @@ pub(super) fn read(path: &Path, cell: &Cell<'_>) -> Result<MeasurementInput, Err
         instruments: reader.instruments,
         targets: reader.targets,
         measurements: reader.measurements,
+        recordings,
         fit: told(&file.fit),
         keep: told(&file.keep),
         uncertainty: file.uncertainty.as_ref().map(|value| positive(value, 1.0)).transpose()?,
@@ -667,6 +709,72 @@ impl Reader<'_> {
         }
     }
 
+    fn encoders(&self, entry: &Spanned<EncodersEntry>) -> Result<EncoderRecording, Error> {
+        let e = entry.get_ref();
+        let path = self.folder.join(e.file.get_ref());
+        if !path.is_file() {
+            let message = format!("file = {:?}: there is no file {}", e.file.get_ref(), path.display());
+            return Err(self.error(e.file.span(), message));
+        }
+        let table = NumberTable::read(&path)?;
+        let column = |name: &str, span: Range<usize>| -> Result<Vec<f64>, Error> {
+            let k = table.column(name).ok_or_else(|| {
+                self.error(span.clone(), format!("{} has no column {name:?}; it has {:?}", path.display(), table.names))
+            })?;
+            let values: Vec<f64> = table.rows.iter().map(|row| row[k]).collect();
+            match values.iter().position(|x| !x.is_finite()) {
+                Some(row) => {
+                    let line = table.lines[row];
+                    Err(self.error(span, format!("{} line {line}: column {name:?} is empty", path.display())))
+                }
+                None => Ok(values),
+            }
+        };
+        let time = column(e.time.get_ref(), e.time.span())?;
+        let step_s = even_step(&time).ok_or_else(|| {
+            self.error(
+                e.time.span(),
+                format!("the times of {} are not evenly spaced, or fewer than three", path.display()),
+            )
+        })?;
+        let of = |map: &Spanned<BTreeMap<String, String>>, needed: bool| -> Result<Vec<Option<Vec<f64>>>, Error> {
+            let names: Vec<&str> = self.cell.joints.iter().map(|(name, _)| name.as_str()).collect();
+            if let Some(stray) = map.get_ref().keys().find(|name| !names.contains(&name.as_str())) {
+                return Err(
+                    self.error(map.span(), format!("the robot has no joint {stray:?}; its joints are {names:?}"))
+                );
+            }
+            let one = |(name, slides): &(String, bool)| match map.get_ref().get(name) {
+                Some(own) => {
+                    let factor = if *slides { self.units.length } else { self.units.angle };
+                    Ok(Some(column(own, map.span())?.into_iter().map(|x| x * factor).collect()))
+                }
+                None if needed => {
+                    Err(self.error(map.span(), format!("joint {name:?} has no column: the torques need all joints")))
+                }
+                None => Ok(None),
+            };
+            self.cell.joints.iter().map(one).collect()
+        };
+        let positive = |value: &Option<Spanned<f64>>, what: &str, default: f64| match value {
+            None => Ok(default),
+            Some(x) if x.get_ref().is_finite() && *x.get_ref() >= 0.0 => Ok(*x.get_ref()),
+            Some(x) => Err(self.error(x.span(), format!("{what} is {}, expected a number of 0 or above", x.get_ref()))),
+        };
+        let link = of(&e.link, false)?;
+        if link.iter().all(Option::is_none) {
+            return Err(self.error(e.link.span(), "no joint has an encoder behind its gear"));
+        }
+        Ok(EncoderRecording {
+            place: self.source.error(entry.span(), ""),
+            step_s,
+            motor: of(&e.motor, true)?.into_iter().flatten().collect(),
+            link,
+            below_hz: positive(&e.below, "below", BELOW_HZ)?,
+            edge_s: positive(&e.edge, "edge", EDGE_S)?,
+        })
+    }
+
     fn frequency(&mut self, number: usize, entry: &Spanned<FrequencyEntry>) -> Result<(), Error> {
         let (e, span) = (entry.get_ref(), entry.span());
         let hz = e.hz.get_ref();
@@ -689,9 +797,12 @@ impl Reader<'_> {
     }
 
     /// Whether deviations are given: by all readings or by none, and by all where kinds are mixed.
-    fn deviations(&self) -> Result<bool, Error> {
+    fn deviations(&self, recordings: bool) -> Result<bool, Error> {
         let Some(first) = self.given.first() else {
-            let text = "there is no reading: add [[displacement]], [[place]] or [[frequency]]";
+            if recordings {
+                return Ok(true);
+            }
+            let text = "there is no reading: add [[displacement]], [[place]], [[frequency]] or [[encoders]]";
             return Err(self.error(0..0, text));
         };
         if self.given.iter().all(|(_, given, _)| *given) {
@@ -699,6 +810,10 @@ impl Reader<'_> {
         }
         let mixed = self.given.iter().find(|(kind, given, _)| *kind != first.0 || *given != first.1);
         match mixed {
+            // Beside recordings, which have deviations of their own.
+            None if recordings => {
+                Err(self.error(first.2.clone(), "std is missing: readings beside [[encoders]] need one"))
+            }
             None if first.0 == "displacement and rotation" => {
                 Err(self.error(first.2.clone(), "displacements and rotations together need std and std_rotation"))
             }
@@ -709,6 +824,17 @@ impl Reader<'_> {
             }
         }
     }
+}
+
+/// The step of evenly spaced times (s).
+fn even_step(time: &[f64]) -> Option<f64> {
+    let n = time.len();
+    if n < 3 {
+        return None;
+    }
+    let step = (time[n - 1] - time[0]) / (n - 1) as f64;
+    let even = time.windows(2).all(|pair| (pair[1] - pair[0] - step).abs() <= UNEVEN * step);
+    (step > 0.0 && even).then_some(step)
 }
 
 /// A displacement before its units.

@@ -4,6 +4,7 @@
 //! how well; [`plan_measurements`] chooses poses. What they are made of takes and gives values and is passed on here:
 //! [`identify`], [`plan`], [`MeasuredArm`].
 
+mod encoders;
 mod file;
 mod page;
 mod parameters;
@@ -14,9 +15,9 @@ use std::path::{Path, PathBuf};
 
 use flexarm_files::{check_free, write_all};
 pub use flexarm_identify::{
-    Candidate, Component, Effect, Found, HeldOut, Identified, IdentifyError, IdentifyOptions, Instrument, LoadCase,
-    Loss, MeasuredArm, Measurements, NoAnswer, Parameter, Place, Plan, PlanOptions, Plant, Reading, ReadingKind, Row,
-    Search, Target, frequency_slopes, identify, plan, tool_slopes,
+    Candidate, Component, Effect, Found, GearEstimate, GearRun, HeldOut, Identified, IdentifyError, IdentifyOptions,
+    Instrument, LoadCase, Loss, MeasuredArm, Measurements, NoAnswer, Parameter, Place, Plan, PlanOptions, Plant,
+    Reading, ReadingKind, Row, Search, Target, frequency_slopes, gear_stiffness, identify, plan, tool_slopes,
 };
 use flexarm_kinematics::Pose;
 use nalgebra::{DVector, Vector3};
@@ -31,6 +32,7 @@ use crate::options::Modelling;
 use crate::robot::Robot;
 use crate::robot_file::RobotFileError;
 
+pub use self::encoders::EncoderFigures;
 pub use self::plan_file::{MeasurementPlan, PlanRequest, PlannedReading, plan_measurements};
 
 /// Beyond this ratio of measured to expected size the units are wrong, not the robot.
@@ -90,6 +92,8 @@ pub struct Identification {
     pub misfit: Option<f64>,
     /// Whether the deviations of the readings were given; if not, the scatter tells them.
     pub deviations_known: bool,
+    /// Gears of which motor and link were recorded.
+    pub encoders: Vec<EncoderFigures>,
     /// Readings that argue against the rest, the worst first.
     pub suspicious: Vec<Suspicious>,
     /// Unknown instruments as found, in the world.
@@ -221,8 +225,15 @@ pub struct Compared {
 pub fn identify_robot(robot: &Robot, measurements: &Path, request: &IdentifyRequest) -> Result<Identification, Error> {
     let arm = robot.flexible(request.modelling)?;
     let joints = joints_of(&arm);
-    let input = file::read(measurements, &Cell { joints: &joints })?;
+    let mut input = file::read(measurements, &Cell { joints: &joints })?;
     let chosen = chosen(&arm, &input, &request.fit)?;
+    let encoders = encoders::told(&arm, &input, &chosen)?;
+    input.measurements.readings.extend(encoders.iter().filter_map(EncoderFigures::reading));
+    if input.measurements.readings.is_empty() {
+        return Err(
+            IdentifyFileError::NoGear { joints: encoders.iter().map(|gear| gear.joint.clone()).collect() }.into()
+        );
+    }
     let targets = match &request.output {
         Some(folder) => Some(Targets::in_folder(folder, request.overwrite)?),
         None => None,
@@ -239,6 +250,7 @@ pub fn identify_robot(robot: &Robot, measurements: &Path, request: &IdentifyRequ
     let found = identify(&plant, &parameters, &input.measurements, &options).map_err(of_names(&input))?;
     let mut answer = answer(robot, measurements, &plant, &parameters, &input, &found)?;
     answer.caveats.extend(frame_caveat(&input, &answer));
+    answer.encoders = encoders;
     if let Some(targets) = targets {
         targets.write(robot, &chosen, &found, &mut answer)?;
     }
@@ -348,6 +360,12 @@ pub enum IdentifyFileError {
         /// How many there are.
         modes: usize,
     },
+    /// Recordings that tell no gear.
+    #[error("the recordings of {joints:?} tell no stiffness: deflection and torque do not go together")]
+    NoGear {
+        /// Joints.
+        joints: Vec<String>,
+    },
     /// No fit.
     #[error("{0}")]
     Fit(String),
@@ -444,6 +462,7 @@ fn numbers(measurements: &Measurements) -> Vec<(String, &'static str)> {
             ReadingKind::Place { .. } => {
                 all.extend(["x", "y", "z"].map(|axis| (format!("{}, {axis}", reading.name), "m")));
             }
+            ReadingKind::Known { .. } => all.push((reading.name.clone(), "ln")),
             ReadingKind::Frequencies { rows, .. } => {
                 all.extend(rows.iter().map(|row| (format!("{}, mode {}", reading.name, row.of + 1), "Hz")));
             }
@@ -520,6 +539,7 @@ fn answer(
         held_out,
         misfit: found.misfit,
         deviations_known: input.deviations_known,
+        encoders: Vec::new(),
         suspicious: suspicious.collect(),
         instruments: frames(input, found),
         targets: points(input, found),

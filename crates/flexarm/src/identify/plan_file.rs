@@ -184,6 +184,7 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
 fn nothing_measured() -> super::MeasurementInput {
     super::MeasurementInput {
         measurements: flexarm_identify::Measurements::default(),
+        recordings: Vec::new(),
         instruments: Vec::new(),
         targets: Vec::new(),
         fit: Vec::new(),
