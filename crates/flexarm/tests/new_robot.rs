@@ -301,7 +301,7 @@ fn missing_and_senseless_limits_are_told_and_the_motion_keeps_what_it_can() {
         let folder = Folder::new(&format!("limits-{name}"));
         let made = made(&folder, &Arm { limit, ..ARM }.urdf(""), &NewOptions::default());
         let found = codes(&made);
-        let told = |code: &String| code == "effort-limit" || code == "gear-soft" || code == "effort";
+        let told = |code: &String| code == "effort-limit" || code == "gear-stiffness" || code == "effort";
         assert!(found.iter().all(|code| matches!(name, "huge" | "weak") && told(code)), "{name}: {found:?}");
         assert!(made.joints[1].effort_fault.unwrap().starts_with(fault), "{name}: {:?}", made.joints[1]);
         let speeds = made.assumptions.iter().filter(|a| a.text.contains("speed limit")).count();

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use flexarm_kinematics::{Data, Joint, Mechanism, Model, forward_kinematics};
+use flexarm_settings::Setting;
 use flexarm_urdf::{Geometry, ReadOptions, TriangleMesh, UrdfError, UrdfRobot, Visual, read_urdf};
 use nalgebra::{DVector, Vector3};
 
@@ -341,7 +342,7 @@ fn shapes(urdf: &UrdfRobot, link: &str) -> (Vec<TriangleMesh>, bool) {
 fn assumptions(draft: &Draft) -> Vec<Assumption> {
     let mut list = Vec::new();
     for choice in &draft.chain.choices {
-        list.push(assumption("the arm", choice.clone(), "--tool LINK chooses another one"));
+        list.push(assumption("the arm", choice.clone(), &format!("{} LINK chooses another one", Setting::Tool)));
     }
     for link in &draft.waived {
         let text = "its moments of inertia are such as no body has (the largest is above the sum of the others); taken as they are";
@@ -350,14 +351,14 @@ fn assumptions(draft: &Draft) -> Vec<Assumption> {
     masses(draft, &mut list);
     if !draft.payload_known && draft.payload.mass == 0.0 {
         let text = "none: the effort limits leave no room for one".to_owned();
-        list.push(assumption("payload", text, "--payload KG, or payload in robot.toml"));
+        list.push(assumption("payload", text, &format!("{} KG, or payload in robot.toml", Setting::Payload)));
     }
     if !draft.payload_known && draft.payload.mass > 0.0 {
         let text = format!(
             "{} kg, at most 15 % of what moves ({:.1} kg) and what the effort limits carry, a cube of aluminium at the tool",
             draft.payload.mass, draft.moving_mass
         );
-        list.push(assumption("payload", text, "--payload KG, or payload in robot.toml"));
+        list.push(assumption("payload", text, &format!("{} KG, or payload in robot.toml", Setting::Payload)));
     }
     for joint in &draft.joints {
         let name = format!("joint {:?}", joint.joint.name);
@@ -436,7 +437,11 @@ fn masses(draft: &Draft, list: &mut Vec<Assumption>) {
     }
     let missing = draft.urdf.warnings.iter().filter(|w| matches!(w.code, "missing-inertial" | "zero-mass"));
     for finding in missing {
-        list.push(assumption("masses", finding.message.clone(), "--mass KG or --density KG_PER_M3 estimate them"));
+        list.push(assumption(
+            "masses",
+            finding.message.clone(),
+            &format!("{} KG or {} KG_PER_M3 estimate them", Setting::InertiaFromTotalMass, Setting::InertiaFromDensity),
+        ));
     }
 }
 
