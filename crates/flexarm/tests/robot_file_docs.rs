@@ -55,7 +55,10 @@ fn every_example_of_a_robot_file_loads() {
             let shipped = read("robots/palletiser/robot.toml");
             let keys = |text: &str| -> Vec<String> {
                 let lines = text.lines().filter_map(|line| line.split_once(" = "));
-                lines.map(|(key, _)| key.to_owned()).filter(|key| ["pin", "eye", "dependent"].contains(&key.as_str())).collect()
+                lines
+                    .map(|(key, _)| key.to_owned())
+                    .filter(|key| ["pin", "eye", "dependent"].contains(&key.as_str()))
+                    .collect()
             };
             assert_eq!(keys(&block), keys(shipped.split("[[loop]]").nth(1).unwrap()));
             assert!(shipped.contains(block.lines().nth(1).unwrap()), "{block}");
