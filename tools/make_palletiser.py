@@ -144,6 +144,8 @@ def urdf():
     out += link("crank", 35, [bar(o, lever, 0.14, DRIVE_Y - 0.06, 0.05), hub(o, 0.15, 0.05, DRIVE_Y - 0.06)], "rods")
     out += joint("drive_rod", "revolute", "crank", "drive_rod_bar", (lever[0], 0, lever[1]), limit=passive(-90, 20))
     out += link("drive_rod_bar", 22, [bar(o, (0, LOWER), 0.07, DRIVE_Y, 0.05)], "rods")
+    # A frame where the pin goes through, so that the rod can be a link that bends.
+    out += joint("drive_rod_end_joint", "fixed", "drive_rod_bar", "drive_rod_end", (0, 0, LOWER)) + ['  <link name="drive_rod_end"/>']
     # What keeps the hand level.
     out += joint("level_rod", "revolute", "column", "level_rod_bar", (s[0] + bracket[0], 0, s[1] + bracket[1]), limit=passive(-42, 85))
     out += link("level_rod_bar", 14, [bar(o, (0, LOWER), 0.05, LEVEL_Y - 0.07, 0.04)], "rods")

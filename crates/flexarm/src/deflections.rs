@@ -121,6 +121,7 @@ impl Arm {
         }
         runnable(&scenario.motion, options)?;
         let flexible = self.flexible();
+        crate::loops::along_motion(&flexible.rigid, &scenario.motion.trajectory)?;
         let springs = flexible.springs.iter().map(|spring| scaled(spring, *stiffness, *damping)).collect();
         let arm =
             flexible.arm_with(springs, scenario.motion.prescribed()).map_err(|error| flexible.explained(error))?;

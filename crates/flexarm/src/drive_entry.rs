@@ -241,7 +241,9 @@ fn drive(
 ) -> Result<Drive, RobotFileError> {
     let name = entry.joint.get_ref();
     let fail = |span: Range<usize>, message: String| source.error(span, format!("drive of joint {name:?}: {message}"));
-    let movable = |j: &&flexarm_kinematics::Joint| j.kind != JointKind::Fixed;
+    let movable = |j: &&flexarm_kinematics::Joint| {
+        j.kind != JointKind::Fixed && crate::loops::owner(mechanism, &j.name).is_none()
+    };
     let Some(joint) = mechanism.joints.iter().find(|j| j.name == *name && j.kind != JointKind::Fixed) else {
         let known: Vec<_> = mechanism.joints.iter().filter(movable).map(|j| j.name.as_str()).collect();
         return Err(fail(entry.joint.span(), format!("the robot has no such movable joint; it has {known:?}")));

@@ -392,7 +392,9 @@ fn held_joint(
     mechanism: &Mechanism,
     source: &Source,
 ) -> Result<(String, f64), RobotFileError> {
-    let free = |joint: &&Joint| joint.kind.degrees_of_freedom() == 1 && joint.mimic.is_none();
+    let free = |joint: &&Joint| {
+        joint.kind.degrees_of_freedom() == 1 && joint.mimic.is_none() && loops::owner(mechanism, &joint.name).is_none()
+    };
     let at = *value.get_ref();
     if let Some(own) = loops::owner(mechanism, name) {
         let message = format!("hold: {name:?} follows from loop {own:?}: hold the joints that drive the loop");
