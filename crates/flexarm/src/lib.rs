@@ -53,6 +53,7 @@ mod deflections;
 mod drive_entry;
 mod error;
 mod flexible;
+mod gear_entry;
 mod headline;
 mod inspect;
 mod link_entry;
@@ -103,8 +104,9 @@ pub use error::{
     StudyError, ValueError,
 };
 pub use flexible::{FlexibleRobot, LinkChoices, Owner, RobotLink};
+pub use gear_entry::{GearHysteresis, RobotCoupling};
 pub use headline::{Bending, ShareFigures};
-pub use inspect::{FlexibleInfo, Inspection, JointInfo, LinkInfo, MountingInfo, TcpInfo, inspect};
+pub use inspect::{CouplingInfo, FlexibleInfo, Inspection, JointInfo, LinkInfo, MountingInfo, TcpInfo, inspect};
 pub use mode_recording::{ModeMovie, record_modes};
 pub use modes::{ModeFigures, ModeTable, modes};
 pub use monitor::tool_path::{PathFigures, PathMoveFigures};

@@ -13,6 +13,7 @@ use crate::caveat::{self, Caveat};
 use crate::drive_entry::{Drive, drives};
 use crate::error::Error;
 use crate::flexible::RobotLink;
+use crate::gear_entry::{RobotCoupling, coupling};
 use crate::link_entry::flexible_link;
 use crate::mounting::{RobotMounting, add_mounting};
 use crate::robot_file::{PayloadEntry, RobotFile, RobotFileError, Source, parse_robot_file};
@@ -50,6 +51,8 @@ pub struct Robot {
     pub mounting: Option<RobotMounting>,
     /// Drives that the file tells about; all other joints are prescribed.
     pub drives: Vec<Drive>,
+    /// Motors that move several joints.
+    pub coupling: Option<RobotCoupling>,
     /// Link that carries the TCP and pose of the TCP in it.
     pub tcp: (String, Pose),
     /// Trajectory for runs without one.
@@ -105,6 +108,7 @@ impl Robot {
             flexible: Vec::new(),
             mounting: None,
             drives: Vec::new(),
+            coupling: None,
             tcp: (link, Pose::identity()),
             default_trajectory: None,
             hold: Vec::new(),
@@ -163,6 +167,7 @@ impl Robot {
             flexible: Vec::new(),
             mounting: None,
             drives: Vec::new(),
+            coupling: None,
             tcp: tcp.unwrap_or_default(),
             default_trajectory: file.default_trajectory.as_ref().map(|t| folder.join(t.get_ref())),
             hold: Vec::new(),
@@ -183,6 +188,10 @@ impl Robot {
             for joint in robot.rigid.joints.iter_mut().filter(|j| j.name == drive.joint) {
                 joint.armature = drive.armature;
             }
+        }
+        if let Some(entry) = &file.coupling {
+            let found = coupling(&mut robot, entry, &source).map_err(Error::from);
+            robot.coupling = keep(found, &mut faults);
         }
         add_balancers(&mut robot, &file.balancer, &source, &mut faults);
         for entry in &file.flexible_link {

@@ -14,6 +14,7 @@ pub(crate) use flexarm_linkmaker::MaterialEntry;
 use crate::balancer_entry::BalancerEntry;
 pub(crate) use crate::beam_entry::BeamEntry;
 use crate::drive_entry::DriveEntry;
+use crate::gear_entry::CouplingEntry;
 use crate::mounting::MountingEntry;
 
 /// The file as written.
@@ -61,6 +62,8 @@ pub(crate) struct RobotFile {
     /// How joints are driven.
     #[serde(default)]
     pub drive: Vec<DriveEntry>,
+    /// Motors that move several joints.
+    pub coupling: Option<CouplingEntry>,
     /// Springs, gas springs and counterbalances.
     #[serde(default)]
     pub balancer: Vec<Spanned<BalancerEntry>>,
