@@ -193,6 +193,8 @@ inertia = [0.2, 0.2, 0.1, 0.0, 0.0, 0.0]
 damping = { rayleigh = [0.5, 1e-4] }
 """
 
+GEAR_KEYS = "transmission_error = [{ amplitude_arcsec = 20.0, per_motor_turn = 2, phase = 0.3 }, { amplitude = 1e-5, per_joint_turn = 39 }], hysteresis = { loss_arcmin = 2.0, lost_motion_arcmin = 3.0, rated_torque = 40.0, reach = 1e-4, sliders = 5 }"
+
 COLUMN = """
 [mounting]
 xyz = [0.0, 0.1, -0.5]
@@ -697,6 +699,7 @@ def own_targets():
         Target("robot-loops", "robot.toml", {"beam.urdf": FOUR_BAR, "robot.toml": LOOPS, "motion.toml": FOUR_BAR_MOTION}, [check, COMPARE, ["statics", "robot.toml", "--json"], ["inspect", "robot.toml", "--json"]], True),
         Target("robot-balancers", "robot.toml", {**base, "robot.toml": ROBOT + BALANCERS}, [check, COMPARE, ["statics", "robot.toml", "--json"], ["inspect", "robot.toml", "--json"]], True),
         Target("robot-mounting", "robot.toml", {**base, "robot.toml": ROBOT + MOUNTING}, [check, COMPARE, ["statics", "robot.toml", "--json"], ["inspect", "robot.toml", "--json"]], True),
+        Target("robot-gears", "robot.toml", {**base, "robot.toml": ROBOT.replace("backlash = 1e-4", GEAR_KEYS).replace("viscous = 0.5,", "viscous = 0.5, load = 0.05,")}, [check, COMPARE, ["statics", "robot.toml", "--json"], ["modes", "robot.toml", "--json"]], True),
         Target("robot-column", "robot.toml", {**base, "robot.toml": ROBOT + COLUMN}, [check, ["statics", "robot.toml", "--json"], ["modes", "robot.toml", "--json"]], True),
         Target("urdf", "beam.urdf", base, [["check", "beam.urdf", "--json"], ["inspect", "beam.urdf", "--json"], check, COMPARE], True),
         Target("xacro", "arm.xacro", {"arm.xacro": XACRO}, [["check", "arm.xacro", "--json"], ["inspect", "arm.xacro", "--json"]]),

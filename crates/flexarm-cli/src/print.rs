@@ -99,6 +99,14 @@ pub(crate) fn inspection(i: &Inspection) -> String {
             out += &format!("  near joint held: {}{} Hz\n", first.join(", "), more.unwrap_or_default());
         }
     }
+    if let Some(c) = &i.coupling {
+        let rows: Vec<String> = c.matrix.iter().map(|row| format!("{row:?}")).collect();
+        out += &format!(
+            "coupling: ({}) = [{}] times their motors behind the gears\n",
+            c.joints.join(", "),
+            rows.join(", ")
+        );
+    }
     if let Some(m) = &i.mounting {
         let k: Vec<String> = (0..6).map(|c| format!("{:.3e}", m.stiffness[c][c])).collect();
         let at = m.position_m;

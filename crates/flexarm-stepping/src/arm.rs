@@ -13,7 +13,7 @@ use nalgebra::{DMatrix, DVector, Matrix6};
 use crate::drive::{Friction, ServoAxis, TorqueCurve};
 use crate::error::StepError;
 use crate::events::SAME_TIME;
-use crate::gear::{Entry, GearCoupling, Hysteresis, LoadFriction, TransmissionError};
+use crate::gear::{GearCoupling, Hysteresis, LoadFriction, TransmissionError};
 use crate::load::Load;
 use crate::modes::{Modes, modes_at};
 use crate::motion::PrescribedMotion;
@@ -191,9 +191,10 @@ pub struct FlexibleArm {
     pub load_friction: Vec<LoadFriction>,
     /// Gears that move several joints; see [`FlexibleArm::with_coupling`].
     pub coupling: Option<GearCoupling>,
-    /// Stiffness and damping between elastic coordinates of different elements.
-    pub(crate) cross_stiffness: Vec<Entry>,
-    pub(crate) cross_damping: Vec<Entry>,
+    /// Stiffness between elastic coordinates of coupled gears: row, column, entry, which stands in the mirrored place too.
+    pub cross_stiffness: Vec<(usize, usize, f64)>,
+    /// The same of their dampers.
+    pub cross_damping: Vec<(usize, usize, f64)>,
     /// Natural modes at the start pose, drives locked.
     pub modes: Modes,
 }

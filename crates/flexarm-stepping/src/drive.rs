@@ -62,7 +62,8 @@ impl TorqueCurve {
     #[must_use]
     pub fn with_slider(&self, stiffness: f64, reach: f64) -> Self {
         let mut x = self.x.clone();
-        x.extend([-reach, reach]);
+        // Exactly nothing at no deflection.
+        x.extend([-reach, 0.0, reach]);
         // The end pieces go on without the slider.
         let end = self.x.iter().fold(reach, |end, x| end.max(x.abs())) + 1.0;
         x.extend([-end, end]);

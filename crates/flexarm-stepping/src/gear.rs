@@ -21,6 +21,7 @@ use nalgebra::{DMatrix, DVector, Vector6};
 use crate::arm::{Damping, ElasticElement, FlexibleArm, add_product};
 use crate::drive::TorqueCurve;
 use crate::error::StepError;
+use crate::statics::spring_forces;
 
 /// One harmonic of a transmission error: `amplitude sin(cycles q + phase)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -174,9 +175,6 @@ impl GearCoupling {
     }
 }
 
-/// Entry of a symmetric matrix on the elastic coordinates, in both its places.
-pub(crate) type Entry = (usize, usize, f64);
-
 impl FlexibleArm {
     /// The same arm with gears that move several joints: its springs, dampers and friction so far are those of the motors
     /// behind their gears, and become those of the joints.
@@ -271,10 +269,35 @@ impl FlexibleArm {
             || self.coupling.as_ref().is_some_and(|coupling| !coupling.is_none())
     }
 
+    /// Largest torque that the friction in a gear holds (N m or N): beside it nothing smaller is out of balance.
+    pub(crate) fn friction_of_gears(&self) -> f64 {
+        let of_law = |law: &Hysteresis| law.sliders.iter().map(|s| s.stiffness * s.reach).sum::<f64>();
+        self.hysteresis.iter().map(of_law).fold(0.0, f64::max)
+    }
+
     /// Deflection δ of a spring of one coordinate e, with the joints at `q`.
     pub(crate) fn deflection(&self, element: usize, e: f64, q: &[f64]) -> f64 {
         let errors = self.transmission.iter().filter(|error| error.element == element);
         errors.fold(e, |delta, error| delta - error.at(q[error.motor]))
+    }
+
+    /// What the springs pull with, and the energy in each element, at rest with all coordinates at `q`.
+    ///
+    /// Forces over the elastic coordinates (N, N m); of coupled gears the energy is that of the joint's part, `F e / 2`.
+    pub fn springs_at_rest(&self, q: &DVector<f64>) -> (DVector<f64>, Vec<f64>) {
+        let e = q.rows(self.model.n_actuated(), self.n_elastic_coordinates()).into_owned();
+        let F = spring_forces(self, q.as_slice(), &e);
+        let energy = |(k, element): (usize, &ElasticElement)| {
+            let first = self.offset(element);
+            let own = &e.as_slice()[first..first + element.size];
+            match element.size {
+                1 if self.cross_stiffness.iter().any(|(i, j, _)| *i == first || *j == first) => 0.5 * F[first] * own[0],
+                1 => element.energy(&[self.deflection(k, own[0], q.as_slice())]),
+                _ => element.energy(own),
+            }
+        };
+        let energies = self.elements.iter().enumerate().map(energy).collect();
+        (F, energies)
     }
 
     /// `f += K x` of what couples springs.

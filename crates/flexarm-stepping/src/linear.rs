@@ -18,7 +18,9 @@ use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX};
 
 use crate::arm::{ElasticElement, FlexibleArm, Servo};
 use crate::error::StepError;
-use crate::statics::{StaticSlopes, for_vibration, spring_forces, static_equilibrium, static_forces, with_curves};
+use crate::statics::{
+    MOST_HALVINGS, StaticSlopes, for_vibration, spring_forces, static_equilibrium, static_forces, with_curves,
+};
 
 /// Accepted unbalanced force over the largest force, as in [`static_equilibrium`].
 const TOLERANCE: f64 = 1e-13;
@@ -296,14 +298,15 @@ impl Statics<'_> {
             let p = self.forces(data, &q);
             let spring = spring_forces(arm, q.as_slice(), &e);
             let elastic_p = p.rows(m, ne);
-            let scale = elastic_p.amax().max(spring.amax()).max(f64::MIN_POSITIVE);
+            let scale = elastic_p.amax().max(spring.amax()).max(arm.friction_of_gears()).max(f64::MIN_POSITIVE);
             let r = &spring + elastic_p;
             let previous = residual;
             residual = if ne == 0 { 0.0 } else { r.amax() / scale };
             if residual <= TOLERANCE || (iterations > 2 && residual < 1e-9 && residual >= 0.5 * previous) {
                 return Ok(Equilibrium { q, e, p, residual, iterations });
             }
-            if !residual.is_finite() || iterations == MOST_ITERATIONS {
+            let most = if arm.hysteresis.is_empty() { MOST_ITERATIONS } else { 200 };
+            if !residual.is_finite() || iterations == most {
                 let lost = StepError::NoEquilibrium { t, iterations, residual };
                 return Err(if buckled { self.singular() } else { lost });
             }
@@ -314,7 +317,19 @@ impl Statics<'_> {
             buckled |= !stable;
             let step = if stable { tangent } else { springs }.lu().solve(&r).ok_or_else(|| self.singular())?;
             // Far from small deflections the full step may overshoot: no coordinate moves by more than 0.5.
-            e -= &step * (0.5 / step.amax()).min(1.0);
+            let mut part = (0.5 / step.amax()).min(1.0);
+            let mut closer = arm.hysteresis.is_empty();
+            for _ in 0..MOST_HALVINGS {
+                if closer {
+                    break;
+                }
+                let trial = &e - &step * part;
+                let q = all_coordinates(arm, t, &trial);
+                let left = spring_forces(arm, q.as_slice(), &trial) + self.forces(data, &q).rows(m, ne);
+                closer = left.norm() < r.norm();
+                part *= if closer { 1.0 } else { 0.5 };
+            }
+            e -= &step * part;
             iterations += 1;
         }
     }

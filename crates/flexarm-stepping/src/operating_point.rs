@@ -16,7 +16,7 @@ use crate::eigenvalues::symmetric_eigenvalues;
 use crate::error::StepError;
 use crate::iteration_matrix::solve_lower_transposed;
 use crate::motion::Held;
-use crate::statics::{StaticSlopes, add_spring_forces, static_equilibrium, static_forces};
+use crate::statics::{MOST_HALVINGS, StaticSlopes, add_spring_forces, static_equilibrium, static_forces};
 
 /// Accepted unbalanced force over the largest force.
 const TOLERANCE: f64 = 1e-13;
@@ -185,15 +185,35 @@ impl OperatingPoint {
                 self.forces();
                 self.unbalance();
             }
+            let unbalanced = self.r.norm();
             let Some(factor) = &self.factor else { break };
             factor.solve_mut(&mut self.r);
             // Far from small deflections the full step may overshoot: no coordinate moves by more than 0.5.
             let shorten = (0.5 / self.r.amax()).min(1.0);
             self.q.rows_mut(m, n).axpy(-shorten, &self.r, 1.0);
+            if !self.arm.hysteresis.is_empty() {
+                self.come_closer(shorten, unbalanced);
+            }
         }
         match buckled {
             true => Err(beyond_buckling()),
             false => Err(StepError::NoEquilibrium { t: 0.0, iterations: MOST_ITERATIONS, residual }),
+        }
+    }
+
+    /// Takes halves of a step back until the forces are less out of balance than they were: the first loading of a gear may be soft,
+    /// then stiff. The step is in `r`.
+    fn come_closer(&mut self, mut part: f64, unbalanced: f64) {
+        let (m, n) = (self.arm.model.n_actuated(), self.r.len());
+        let step = self.r.clone();
+        for _ in 0..MOST_HALVINGS {
+            self.forces();
+            self.unbalance();
+            if self.r.norm() < unbalanced {
+                break;
+            }
+            part *= 0.5;
+            self.q.rows_mut(m, n).axpy(part, &step, 1.0);
         }
     }
 
@@ -214,7 +234,7 @@ impl OperatingPoint {
             carried = carried.max(p.abs());
             *r += p;
         }
-        springs.max(carried).max(f64::MIN_POSITIVE)
+        springs.max(carried).max(self.arm.friction_of_gears()).max(f64::MIN_POSITIVE)
     }
 
     /// The tangent at `q` and the factor of its symmetric part; `small`: for small motions, in which no friction slips.

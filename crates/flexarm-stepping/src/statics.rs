@@ -10,6 +10,9 @@ use crate::reduced::add_geometric_forces;
 /// Accepted unbalanced force over the largest spring or gravity force.
 const TOLERANCE: f64 = 1e-13;
 
+/// Halvings of a step that leads farther from the equilibrium of a gear with hysteresis.
+pub(crate) const MOST_HALVINGS: usize = 12;
+
 /// Elastic coordinates at which springs carry gravity and the loads of time `t`.
 ///
 /// Inertia forces are left out: the drives are held where the motion is at `t`.
@@ -28,7 +31,9 @@ pub fn static_equilibrium(arm: &FlexibleArm, t: f64) -> Result<DVector<f64>, Ste
     let mut data = Data::new(&arm.model);
     let K = arm.stiffness();
     let mut residual = f64::INFINITY;
-    for iteration in 0..30 {
+    // A loop's first loading may be soft, then stiff: full steps may go to and fro between its pieces.
+    let most = if arm.hysteresis.is_empty() { 30 } else { 200 };
+    for iteration in 0..most {
         let (g, scale) = unbalanced(arm, &mut data, t, &e);
         if let Some(open) = StepError::open_loop(&arm.model, &data, t) {
             return Err(open);
@@ -54,17 +59,25 @@ pub fn static_equilibrium(arm: &FlexibleArm, t: f64) -> Result<DVector<f64>, Ste
             return Ok(e);
         }
         // Far from small deflections the full step may overshoot: no coordinate moves by more than 0.5.
-        let shorten = (0.5 / step.amax()).min(1.0);
+        let mut shorten = (0.5 / step.amax()).min(1.0);
+        let mut closer = arm.hysteresis.is_empty();
+        for _ in 0..MOST_HALVINGS {
+            if closer {
+                break;
+            }
+            closer = unbalanced(arm, &mut data, t, &(&e - &step * shorten)).0.norm() < g.norm();
+            shorten *= if closer { 1.0 } else { 0.5 };
+        }
         e -= step * shorten;
     }
-    Err(StepError::NoEquilibrium { t, iterations: 30, residual })
+    Err(StepError::NoEquilibrium { t, iterations: most, residual })
 }
 
 /// Generalised forces out of balance, and the size of what should balance.
 fn unbalanced(arm: &FlexibleArm, data: &mut Data, t: f64, e: &DVector<f64>) -> (DVector<f64>, f64) {
     let g = gravity_part(arm, data, t, e);
     let spring = spring_forces(arm, &joints_at(arm, t), e);
-    let scale = g.amax().max(spring.amax());
+    let scale = g.amax().max(spring.amax()).max(arm.friction_of_gears());
     (spring + g, scale)
 }
 

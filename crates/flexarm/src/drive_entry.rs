@@ -4,12 +4,13 @@ use std::ops::Range;
 
 use flexarm_flexlink::{GearStiffness, Gearbox};
 use flexarm_kinematics::{JointKind, Mechanism};
-use flexarm_stepping::{Damping, Friction, TorqueCurve};
+use flexarm_stepping::{Damping, Friction, Harmonic, TorqueCurve};
 use nalgebra::Matrix6;
 use serde::Deserialize;
 use toml::Spanned;
 
 use crate::error::Error;
+use crate::gear_entry::{GearHysteresis, HarmonicEntry, HysteresisEntry, harmonics, hysteresis};
 use crate::options::DriveModel;
 use crate::robot_file::{RobotFileError, Source};
 
@@ -62,6 +63,11 @@ pub(crate) struct GearboxEntry {
     pub backlash: Option<f64>,
     /// Instead of a stiffness: points (deflection, torque).
     pub curve: Option<Vec<[f64; 2]>>,
+    /// Errors of the transmission, harmonic by harmonic.
+    #[serde(default)]
+    pub transmission_error: Vec<HarmonicEntry>,
+    /// Friction within, as catalogues tell it.
+    pub hysteresis: Option<HysteresisEntry>,
 }
 
 /// Friction of a drive.
@@ -83,6 +89,9 @@ pub(crate) struct FrictionEntry {
     /// Speed over which the sign changes (rad/s).
     #[serde(default = "regularisation")]
     pub regularisation: f64,
+    /// Friction over transmitted torque.
+    #[serde(default)]
+    pub load: f64,
 }
 
 fn stribeck_velocity() -> f64 {
@@ -137,6 +146,8 @@ pub struct Drive {
     pub backlash: f64,
     /// Friction.
     pub friction: Friction,
+    /// Its part of the transmitted torque.
+    pub load_friction: f64,
     /// Largest torque (N m).
     pub torque_limit: f64,
     /// Servo as written.
@@ -150,6 +161,10 @@ pub struct GearDamping {
     pub dampers: Option<Vec<f64>>,
     /// Torque curve of the axis.
     pub curve: Option<TorqueCurve>,
+    /// Errors of the transmission.
+    pub transmission: Vec<Harmonic>,
+    /// Friction within.
+    pub hysteresis: Option<GearHysteresis>,
 }
 
 impl Drive {
@@ -271,7 +286,7 @@ fn drive(
     }
     let armature = ratio * ratio * number(&entry.motor_inertia, "motor_inertia", 0.0, 0.0)?;
     let gearbox = match &entry.gearbox {
-        Some(gearbox) => Some(gear(name, gearbox, &fail)?),
+        Some(gearbox) => Some(gear(name, gearbox, entry.ratio.as_ref().map(|_| ratio), &fail)?),
         None => None,
     };
     match (kind, &gearbox) {
@@ -289,19 +304,28 @@ fn drive(
         }
         _ => {}
     }
-    let friction = match &entry.friction {
-        None => Friction::NONE,
+    let (friction, load_friction) = match &entry.friction {
+        None => (Friction::NONE, 0.0),
         Some(f) => {
-            let FrictionEntry { viscous, coulomb, stribeck, stribeck_velocity, regularisation } = *f.get_ref();
-            let values = [viscous, coulomb, stribeck];
+            let FrictionEntry { viscous, coulomb, stribeck, stribeck_velocity, regularisation, load } = *f.get_ref();
+            let values = [viscous, coulomb, stribeck, load];
             let speeds = [stribeck_velocity, regularisation];
             if values.iter().any(|x| !(x.is_finite() && *x >= 0.0))
                 || speeds.iter().any(|x| !(x.is_finite() && *x > 0.0))
             {
-                let text = "friction takes viscous, coulomb and stribeck of at least 0, and speeds above 0";
+                let text = "friction takes viscous, coulomb, stribeck and load of at least 0, and speeds above 0";
                 return Err(fail(f.span(), text.into()));
             }
-            Friction { viscous, coulomb, stribeck, stribeck_velocity, regularisation }
+            let several = |g: &Gearbox| !matches!(g.stiffness, GearStiffness::Axis(_));
+            if load > 0.0 && gearbox.as_ref().is_some_and(|(gearbox, _)| several(gearbox)) {
+                let text = "friction with load needs a gearbox with one stiffness, about the axis";
+                return Err(fail(f.span(), text.into()));
+            }
+            if load > 0.0 && kind == DriveKind::Torque && gearbox.is_none() {
+                let text = "friction with load on a joint driven by torque needs a gearbox, whose torque is the load";
+                return Err(fail(f.span(), text.into()));
+            }
+            (Friction { viscous, coulomb, stribeck, stribeck_velocity, regularisation }, load)
         }
     };
     let servo = match &entry.servo {
@@ -325,12 +349,14 @@ fn drive(
     };
     let torque_limit = number(&entry.torque_limit, "torque_limit", joint.limits.effort, 0.0)?;
     let backlash = entry.gearbox.as_ref().and_then(|g| g.get_ref().backlash).unwrap_or(0.0);
-    Ok(Drive { joint: name.clone(), kind, ratio, armature, gearbox, backlash, friction, torque_limit, servo })
+    let joint = name.clone();
+    Ok(Drive { joint, kind, ratio, armature, gearbox, backlash, friction, load_friction, torque_limit, servo })
 }
 
 fn gear(
     joint: &str,
     entry: &Spanned<GearboxEntry>,
+    ratio: Option<f64>,
     fail: &impl Fn(Range<usize>, String) -> RobotFileError,
 ) -> Result<(Gearbox, GearDamping), RobotFileError> {
     let gear = entry.get_ref();
@@ -389,5 +415,12 @@ fn gear(
     if dampers.iter().flatten().any(|d| !(d.is_finite() && *d >= 0.0)) {
         return Err(at("damping must be 0 or above".into()));
     }
-    Ok((Gearbox { joint: joint.to_owned(), stiffness }, GearDamping { dampers, curve }))
+    if size > 1 && (gear.hysteresis.is_some() || !gear.transmission_error.is_empty()) {
+        return Err(at("transmission_error and hysteresis need one stiffness, about the axis".into()));
+    }
+    let transmission = harmonics(&gear.transmission_error, ratio).map_err(at)?;
+    let about = if let GearStiffness::Axis(k) = stiffness { k } else { f64::NAN };
+    let law = gear.hysteresis.as_ref().map(|entry| hysteresis(entry, about, curve.as_ref()));
+    let damping = GearDamping { dampers, curve, transmission, hysteresis: law.transpose().map_err(at)? };
+    Ok((Gearbox { joint: joint.to_owned(), stiffness }, damping))
 }

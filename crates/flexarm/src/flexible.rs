@@ -13,13 +13,15 @@ use flexarm_flexlink::{
 use flexarm_kinematics::{Coordinate, Data, ElasticAngles, ElasticGroup, Frame, MOST_COORDINATES, Model, mass_matrix};
 use flexarm_settings::Setting;
 use flexarm_stepping::{
-    Damping, FlexibleArm, Friction, GeometricStiffness, PrescribedMotion, Servo, ServoAxis, Spring, StepError,
+    Damping, FlexibleArm, Friction, GearCoupling, GeometricStiffness, PrescribedMotion, Servo, ServoAxis, Spring,
+    StepError,
 };
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::caveat::Caveat;
 use crate::drive_entry::{DriveKind, ServoEntry};
 use crate::error::{Error, ModellingError, PoseError};
+use crate::gear_entry::{GearLaws, RobotCoupling};
 use crate::import::SECOND_ORDER_UNKNOWN;
 use crate::mounting::RobotMounting;
 use crate::options::{DriveModel, LinkModel, Modelling};
@@ -216,6 +218,8 @@ pub struct FlexibleRobot {
     pub rigid: Arc<Model>,
     /// Friction per actuated coordinate.
     friction: Vec<Friction>,
+    /// What gears do beside giving way.
+    pub(crate) gears: GearLaws,
     /// Joints driven by torque: coordinate, servo, limit.
     torque: Vec<(usize, ServoEntry, f64)>,
     /// Doubts about the models of the links.
@@ -254,6 +258,8 @@ impl FlexibleRobot {
         if self.friction.iter().any(|f| *f != Friction::NONE) {
             arm.friction.clone_from(&self.friction);
         }
+        let stiffness: Vec<f64> = arm.elements.iter().map(|element| element.K[(0, 0)]).collect();
+        let arm = self.gears.put_into(arm, |k| stiffness[k] / self.springs[k].K[(0, 0)])?;
         if self.torque.is_empty() {
             return Ok(arm);
         }
@@ -403,6 +409,7 @@ impl Robot {
         owned.extend(mounted);
         let (springs, owners) = in_coordinate_order(&model, owned)?;
         let (friction, torque) = self.actuation(&model, modelling.drives);
+        let gears = self.gear_laws(&model, &owners);
         Ok(FlexibleRobot {
             path: self.urdf_path.clone(),
             tcp: tcp_frame(&model),
@@ -413,6 +420,7 @@ impl Robot {
             bends,
             rigid: self.rigid_model()?,
             friction,
+            gears,
             torque,
             doubts,
             mounting,
@@ -515,6 +523,31 @@ impl Robot {
             owned.push(OwnedSpring { group: gear.joint.clone(), spring, owner: Owner::Drive(number) });
         }
         owned
+    }
+
+    /// What the gears of the drives do beside giving way, for springs of these owners.
+    fn gear_laws(&self, model: &Model, owners: &[Owner]) -> GearLaws {
+        let mut laws = GearLaws::default();
+        let place = |joint: &str| model.coordinates()[..model.n_actuated()].iter().position(|c| c.joint == joint);
+        let spring = |number: usize| {
+            let element = owners.iter().position(|owner| *owner == Owner::Drive(number))?;
+            (model.elastic()[element].size == 1).then_some(element)
+        };
+        for (number, drive) in self.drives.iter().enumerate() {
+            if let Some(coordinate) = place(&drive.joint) {
+                laws.add(drive, coordinate, spring(number));
+            }
+        }
+        if let Some(RobotCoupling { joints, C, C_inverse }) = &self.coupling {
+            let number = |joint: &String| self.drives.iter().position(|drive| drive.joint == *joint);
+            laws.coupling = Some(GearCoupling {
+                elements: joints.iter().filter_map(|joint| spring(number(joint)?)).collect(),
+                coordinates: joints.iter().filter_map(|joint| place(joint)).collect(),
+                C: C.clone(),
+                C_inverse: C_inverse.clone(),
+            });
+        }
+        laws
     }
 
     /// Friction of each actuated coordinate, and the joints that are driven by torque: coordinate, servo, limit.

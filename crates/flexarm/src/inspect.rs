@@ -29,6 +29,9 @@ pub struct Inspection {
     /// Springs under the base; a beam or a mesh there is one of the flexible links.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mounting: Option<MountingInfo>,
+    /// Motors that move several joints.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coupling: Option<CouplingInfo>,
     /// Tool centre point at the pose.
     pub tcp: TcpInfo,
     /// Pose asked for, in the order of `joints`.
@@ -108,6 +111,15 @@ pub struct FlexibleInfo {
     /// Of a modal link: natural frequencies with A held, all of them (Hz).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub modal_frequencies_hz: Option<Vec<f64>>,
+}
+
+/// Motors that move several joints.
+#[derive(Clone, Debug, Serialize)]
+pub struct CouplingInfo {
+    /// The joints.
+    pub joints: Vec<String>,
+    /// C of `q_joints = C q_motors`, motors behind their gears.
+    pub matrix: Vec<Vec<f64>>,
 }
 
 /// Springs under the base.
@@ -251,6 +263,7 @@ pub fn inspect(robot: &Robot, at: Option<&[f64]>, velocity: Option<&[f64]>) -> R
         joints: joints.collect(),
         links: links.collect(),
         flexible_links: flexible_links.collect(),
+        coupling: robot.coupling.as_ref().map(|c| CouplingInfo { joints: c.joints.clone(), matrix: rows(&c.C) }),
         mounting: robot.mounting.as_ref().and_then(MountingInfo::of),
         tcp: TcpInfo {
             link: robot.tcp.0.clone(),

@@ -55,6 +55,7 @@ mod deflections;
 mod drive_entry;
 mod error;
 mod flexible;
+mod gear_entry;
 mod headline;
 pub mod identify;
 mod inspect;
@@ -109,8 +110,9 @@ pub use error::{
     RecordingError, StudyError, ValueError,
 };
 pub use flexible::{FlexibleRobot, LinkChoices, Owner, RobotLink};
+pub use gear_entry::{GearHysteresis, RobotCoupling};
 pub use headline::{Bending, ShareFigures};
-pub use inspect::{FlexibleInfo, Inspection, JointInfo, LinkInfo, MountingInfo, TcpInfo, inspect};
+pub use inspect::{CouplingInfo, FlexibleInfo, Inspection, JointInfo, LinkInfo, MountingInfo, TcpInfo, inspect};
 pub use loops::{DependentInfo, LoopInfo, RobotLoop};
 pub use mode_recording::{ModeMovie, record_modes};
 pub use modes::{ModeFigures, ModeTable, modes};

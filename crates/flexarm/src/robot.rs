@@ -14,6 +14,7 @@ use crate::controller_entry::{RobotAxis, controller_axes};
 use crate::drive_entry::{Drive, drives};
 use crate::error::Error;
 use crate::flexible::RobotLink;
+use crate::gear_entry::{RobotCoupling, coupling};
 use crate::link_entry::flexible_link;
 use crate::loop_entry::add_loops;
 use crate::loops;
@@ -53,6 +54,8 @@ pub struct Robot {
     pub mounting: Option<RobotMounting>,
     /// Drives that the file tells about; all other joints are prescribed.
     pub drives: Vec<Drive>,
+    /// Motors that move several joints.
+    pub coupling: Option<RobotCoupling>,
     /// Link that carries the TCP and pose of the TCP in it.
     pub tcp: (String, Pose),
     /// Trajectory for runs without one.
@@ -110,6 +113,7 @@ impl Robot {
             flexible: Vec::new(),
             mounting: None,
             drives: Vec::new(),
+            coupling: None,
             tcp: (link, Pose::identity()),
             default_trajectory: None,
             hold: Vec::new(),
@@ -181,6 +185,7 @@ impl Robot {
             flexible: Vec::new(),
             mounting: None,
             drives: Vec::new(),
+            coupling: None,
             tcp: tcp.unwrap_or_default(),
             default_trajectory: file.default_trajectory.as_ref().map(|t| folder.join(t.get_ref())),
             hold: Vec::new(),
@@ -205,6 +210,10 @@ impl Robot {
             }
         }
         robot.controller = controller_axes(&file.controller_axis, &robot.rigid, source, &mut faults);
+        if let Some(entry) = &file.coupling {
+            let found = coupling(&mut robot, entry, source).map_err(Error::from);
+            robot.coupling = keep(found, &mut faults);
+        }
         add_balancers(&mut robot, &file.balancer, source, &mut faults);
         for entry in &file.flexible_link {
             let urdf = &robot.urdf.mechanism;

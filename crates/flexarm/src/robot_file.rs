@@ -15,6 +15,7 @@ use crate::balancer_entry::BalancerEntry;
 pub(crate) use crate::beam_entry::BeamEntry;
 use crate::controller_entry::ControllerAxisEntry;
 use crate::drive_entry::DriveEntry;
+use crate::gear_entry::CouplingEntry;
 use crate::loop_entry::LoopEntry;
 use crate::mounting::MountingEntry;
 
@@ -63,6 +64,8 @@ pub(crate) struct RobotFile {
     /// How joints are driven.
     #[serde(default)]
     pub drive: Vec<DriveEntry>,
+    /// Motors that move several joints.
+    pub coupling: Option<CouplingEntry>,
     /// Springs, gas springs and counterbalances.
     #[serde(default)]
     pub balancer: Vec<Spanned<BalancerEntry>>,

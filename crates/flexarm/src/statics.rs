@@ -1,5 +1,7 @@
 //! Statics at a pose: where weight and a wrench at the tool take it, and how it yields to more.
 
+use std::collections::BTreeMap;
+
 use flexarm_analysis::tcp_error;
 use flexarm_kinematics::{forward_kinematics, frame_jacobian};
 use nalgebra::{DVector, Matrix6xX, Vector6};
@@ -39,6 +41,9 @@ pub struct Statics {
     pub compliance: Vec<Vec<f64>>,
     /// Forces with which the drives hold the pose (N m or N).
     pub holding_torque: Vec<f64>,
+    /// Of motors that move several joints, behind their gears: `Cᵀ` times the holding torques of these (N m or N).
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub motor_torque: BTreeMap<String, f64>,
     /// Flexible elements.
     pub elements: Vec<ElementStatics>,
     /// Unbalanced force over the largest force.
@@ -121,19 +126,20 @@ fn statics_of(
     let ne = model.n_elastic();
     let J = J.columns(model.nv() - ne, ne);
     let mut caveats = posed.caveats.clone();
+    let (springs, energies) = posed.arm.springs_at_rest(&loaded.q);
     let mut elements = Vec::new();
-    for ((name, range), element) in loaded.elements.iter().zip(&posed.arm.elements) {
+    for ((name, range), energy_j) in loaded.elements.iter().zip(energies) {
         let (first, n) = (range.start, range.len());
         let deflection: DVector<f64> = loaded.equilibrium.rows(first, n).into_owned();
         // Of a curved spring the tangent alone would not do.
-        let load = element.spring_force(deflection.as_slice());
+        let load = springs.rows(first - loaded.driven, n);
         let moved = J.columns(first - loaded.driven, n) * &deflection;
         elements.push(ElementStatics {
             name: name.clone(),
-            energy_j: element.energy(deflection.as_slice()),
+            energy_j,
             tcp_displacement_m: [moved[0], moved[1], moved[2]],
             tcp_rotation_rad: [moved[3], moved[4], moved[5]],
-            load: load.as_slice().to_vec(),
+            load: load.iter().copied().collect(),
             deflection: deflection.as_slice().to_vec(),
         });
     }
@@ -150,6 +156,7 @@ fn statics_of(
         sag_m: [sx, sy, sz],
         sag_rad: [srx, sry, srz],
         compliance: C.row_iter().map(|row| row.iter().copied().collect()).collect(),
+        motor_torque: robot.motor_torques(&posed.arm, loaded.holding.as_slice()),
         holding_torque: loaded.holding.as_slice().to_vec(),
         elements,
         residual: loaded.residual,

@@ -60,6 +60,9 @@ pub struct Summary {
     pub energy: EnergyFigures,
     /// Largest force per drive (N m or N).
     pub drives: BTreeMap<String, f64>,
+    /// Largest torque per motor that moves several joints, behind its gear (N m or N), by the joint of its drive.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub motors: BTreeMap<String, f64>,
     /// What [`Summary::caveats`] warn of, as sentences.
     pub warnings: Vec<String>,
     /// What is probably wrong with the input, or limits the worth of the result.
@@ -220,12 +223,19 @@ pub struct EnergyFigures {
     pub loads_j: f64,
     /// Taken away by dampers and friction (J).
     pub dissipated_j: f64,
+    /// The part of it that the hysteresis of gears took (J).
+    #[serde(skip_serializing_if = "is_zero")]
+    pub hysteresis_j: f64,
     /// Came with payloads that were picked, went with those that were dropped (J).
     pub payload_j: f64,
     /// Gain of kinetic, gravitational and elastic energy (J).
     pub stored_j: f64,
     /// Largest gap in the balance over the largest energy in it.
     pub imbalance: f64,
+}
+
+fn is_zero(x: &f64) -> bool {
+    *x == 0.0
 }
 
 /// One run's flexible tool centre point against another's.

@@ -47,7 +47,8 @@ impl Drop for Place {
 
 #[test]
 fn every_example_of_a_robot_file_loads() {
-    let (page, place) = (read("docs/robot-file.md") + &read("docs/mounting.md"), Place::new("robots"));
+    let (page, place) =
+        (read("docs/robot-file.md") + &read("docs/mounting.md") + &read("docs/gears.md"), Place::new("robots"));
     let (mut modal, mut torque) = (0, 0);
     for block in blocks(&page, "toml") {
         // Loops are of another robot: the shipped palletiser has the same entries.
@@ -174,12 +175,13 @@ fn keys(sources: &[&str]) -> BTreeMap<String, BTreeSet<String>> {
     found
 }
 
-const ROBOT: [&str; 6] = [
+const ROBOT: [&str; 7] = [
     "crates/flexarm/src/robot_file.rs",
     "crates/flexarm/src/balancer_entry.rs",
     "crates/flexarm/src/controller_entry.rs",
     "crates/flexarm/src/beam_entry.rs",
     "crates/flexarm/src/drive_entry.rs",
+    "crates/flexarm/src/gear_entry.rs",
     "crates/flexarm/src/mounting.rs",
     "crates/flexarm/src/loop_entry.rs",
     "crates/flexarm-linkmaker/src/material_entry.rs",
@@ -236,6 +238,9 @@ fn the_schemas_have_the_same_keys() {
         ("drive", "DriveEntry"),
         ("gearbox", "GearboxEntry"),
         ("friction", "FrictionEntry"),
+        ("transmission_error", "HarmonicEntry"),
+        ("hysteresis", "HysteresisEntry"),
+        ("coupling", "CouplingEntry"),
         ("servo", "ServoEntry"),
         ("controller_axis", "ControllerAxisEntry"),
         ("balancer", "BalancerEntry"),

@@ -29,6 +29,12 @@ const BEARING: f64 = 5e-3;
 const LEVER: RangeInclusive<f64> = 1e-3..=1.0;
 /// Play to each side: note, warning (rad).
 const PLAY: [f64; 2] = [0.01, 0.05];
+/// Transmission error: small strain wave gears have 2 arcmin (rad).
+const TRANSMISSION_ERROR: f64 = 1e-3;
+/// Loss by hysteresis: small strain wave gears have 3 arcmin, belts more (rad).
+const HYSTERESIS_LOSS: f64 = 3e-3;
+/// Friction over transmitted torque: even small strain wave gears pass on two thirds.
+const LOAD_FRICTION: f64 = 0.5;
 /// Turns of the motor per turn of the joint.
 const RATIO: RangeInclusive<f64> = 1.0..=5000.0;
 /// Inertia of a rotor over the largest inertia that a joint moves.
@@ -53,9 +59,19 @@ pub(crate) fn of_drives(drives: &[Drive], mechanism: &Mechanism, rigid: &Model) 
         let speed = joint.map_or(f64::INFINITY, |j| j.limits.velocity);
         caveats.extend(motor(drive, heaviest));
         caveats.extend(friction(drive, effort, speed));
+        if drive.load_friction > LOAD_FRICTION {
+            let caveat = kinds::LOAD_FRICTION.found(name(drive), drive.load_friction, LOAD_FRICTION);
+            caveats.push(caveat.likely(slip(
+                drive.load_friction,
+                &(1e-3..=LOAD_FRICTION),
+                &[(100.0, "per cent")],
+                1.0,
+            )));
+        }
         caveats.extend(servo(drive));
         if !slides && drive.kind != DriveKind::Prescribed {
             caveats.extend(gear(drive, effort));
+            caveats.extend(errors(drive));
         }
     }
     caveats
@@ -110,6 +126,26 @@ fn gear(drive: &Drive, effort: f64) -> Vec<Caveat> {
         let likely = slip(drive.backlash, &(0.0..=PLAY[0]), slip::ANGLE, 1.0);
         let caveat = kinds::BACKLASH.found(name(drive), drive.backlash, PLAY[0]).likely(likely);
         caveats.push(if drive.backlash > PLAY[1] { caveat } else { caveat.as_note() });
+    }
+    caveats
+}
+
+/// Transmission error and hysteresis.
+fn errors(drive: &Drive) -> Vec<Caveat> {
+    let Some((_, gear)) = &drive.gearbox else { return Vec::new() };
+    let mut caveats = Vec::new();
+    let ripple = gear.transmission.iter().map(|harmonic| harmonic.amplitude).sum::<f64>();
+    let words = &[(206_265.0, "arc seconds"), (3438.0, "arc minutes"), (slip::DEGREES, "degrees")];
+    if ripple > TRANSMISSION_ERROR {
+        let caveat = kinds::TRANSMISSION_ERROR.found(name(drive), ripple, TRANSMISSION_ERROR);
+        caveats.push(caveat.likely(slip(ripple, &(1e-7..=TRANSMISSION_ERROR), words, 1.0)));
+    }
+    if let Some(law) = &gear.hysteresis {
+        caveats.push(kinds::HYSTERESIS_LINEAR.found(name(drive), law.loss, law.loss));
+        if law.loss > HYSTERESIS_LOSS {
+            let caveat = kinds::HYSTERESIS_LOSS.found(name(drive), law.loss, HYSTERESIS_LOSS);
+            caveats.push(caveat.likely(slip(law.loss, &(1e-6..=HYSTERESIS_LOSS), &words[1..], 1.0)));
+        }
     }
     caveats
 }

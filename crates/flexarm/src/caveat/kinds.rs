@@ -134,6 +134,42 @@ pub(crate) const MOUNTING_TILT: CaveatKind = CaveatKind::warning(
     "rad",
     "stiffness is in N/m along and N m/rad about the axes",
 );
+/// Hysteresis where linear figures are asked for.
+pub(crate) const HYSTERESIS_LINEAR: CaveatKind = CaveatKind::note(
+    "hysteresis-linear",
+    "{where} has hysteresis of {value} rad: at rest it stands on the curve of first loading, which after a motion it may miss by half of that; \
+     frequencies, responses and compliance are those of motions so small that nothing slips",
+    "rad",
+    "run a motion that comes to the pose as the robot does",
+);
+/// Hysteresis as written.
+pub(crate) const HYSTERESIS_LOSS: CaveatKind = CaveatKind::warning(
+    "hysteresis-loss",
+    "{where} has a hysteresis loss of {value} rad, gears of robots less than {yardstick} rad",
+    "rad",
+    "catalogues tell 1 arcmin, which is 2.9e-4 rad: write loss_arcmin",
+);
+/// Transmission error as written.
+pub(crate) const TRANSMISSION_ERROR: CaveatKind = CaveatKind::warning(
+    "transmission-error",
+    "{where} has a transmission error of {value} rad, gears of robots less than {yardstick} rad",
+    "rad",
+    "catalogues tell arc seconds, of which one is 4.8e-6 rad: write amplitude_arcsec",
+);
+/// Ripple against the step.
+pub(crate) const RIPPLE_STEP: CaveatKind = CaveatKind::warning(
+    "ripple-step",
+    "the ripple of the gear of {where} has {value} steps a period at the largest speed, less than {yardstick}: lower {step_s}",
+    "",
+    "a step of second order needs a dozen steps in a period to meet its amplitude",
+);
+/// Friction under load as written.
+pub(crate) const LOAD_FRICTION: CaveatKind = CaveatKind::warning(
+    "load-friction",
+    "{where} loses {value} of the transmitted torque to friction, gears of robots less than {yardstick}",
+    "",
+    "load is a ratio: 5 per cent is 0.05",
+);
 /// Size of gravity.
 pub(crate) const GRAVITY: CaveatKind = CaveatKind::warning(
     "gravity",

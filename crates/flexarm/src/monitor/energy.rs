@@ -29,6 +29,7 @@ impl Energy {
             self.model.clone_from(&seen.model);
         }
         let drives = seen.drive.iter().zip(seen.qdot.iter()).map(|(force, rate)| force * rate);
+        self.book.lose(seen.hysteresis_work);
         self.book.add(seen.t, seen.energy, seen.power, seen.impulse_work, drives);
     }
 
@@ -60,11 +61,23 @@ struct EnergyBook {
     gap: f64,
     swing: f64,
     struck: f64,
+    /// Taken by the hysteresis of gears up to the last sample, and before the first one (J).
+    hysteresis: [f64; 2],
     /// Energy that came or went with a payload (J).
     exchanged: f64,
 }
 
 impl EnergyBook {
+    /// What the hysteresis of gears has taken so far (J), before the sample is added.
+    fn lose(&mut self, work: f64) {
+        let [last, before] = &mut self.hysteresis;
+        match self.first {
+            None => *before = work,
+            Some(_) => self.work[2] += work - *last,
+        }
+        *last = work;
+    }
+
     /// Adds a sample. `power`: of drives, loads, dissipation; `impulse_work`: work of the drives so far that is in no power, where
     /// velocities jumped (J); `drives`: power of each drive (W).
     fn add(&mut self, t: f64, energy: [f64; 3], power: [f64; 3], impulse_work: f64, drives: impl Iterator<Item = f64>) {
@@ -102,6 +115,7 @@ impl EnergyBook {
             drives_negative_j: self.gross[1],
             loads_j: self.work[1],
             dissipated_j: self.work[2],
+            hysteresis_j: self.hysteresis[0] - self.hysteresis[1],
             payload_j: self.exchanged,
             stored_j: self.last - self.first.unwrap_or(self.last),
             imbalance: if self.swing > 0.0 { self.gap / self.swing } else { 0.0 },

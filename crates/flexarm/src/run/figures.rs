@@ -3,7 +3,7 @@
 use flexarm_analysis::TcpMetrics;
 use flexarm_kinematics::{Data, State, forward_kinematics};
 use flexarm_log::Event;
-use flexarm_stepping::StepperKind;
+use flexarm_stepping::{StepRule, StepperKind};
 use flexarm_trajectory::LimitViolation;
 use nalgebra::Vector3;
 
@@ -13,6 +13,9 @@ use crate::caveat::{Caveat, drives, kinds, validity};
 use crate::flexible::Owner;
 use crate::headline::{self, Bending, ShareFigures};
 use crate::summary::{CURVE_PIECES, DriveFigures, LinkFigures, StepperFigures, Summary, TcpFigures};
+
+/// Steps in a period of a gear's ripple with which a step of second order meets its amplitude within a few per cent.
+const RIPPLE_STEPS: f64 = 12.0;
 
 impl Run<'_> {
     /// Figures of what was seen so far; `robot_caveats` stand before those of the run.
@@ -44,6 +47,7 @@ impl Run<'_> {
             frequencies_hz: self.arm.modes.frequencies_hz(),
             energy: self.monitors.energy.result(),
             drives: peaks.map(|(c, load)| (c.joint.clone(), load.peak)).collect(),
+            motors: self.motors.clone(),
             moves_s: moves(self.motion).iter().map(|&(start, end)| [start, end]).collect(),
             error_curve: self.monitors.tool.result().largest_errors(CURVE_PIECES),
             caveats: self.caveats(&links, sag_m, robot_caveats),
@@ -169,6 +173,33 @@ impl Run<'_> {
         caveats
     }
 
+    /// Ripple of a gear that is faster than the steps follow, at the largest speed of a thousand instants of the motion.
+    fn ripple_caveat(&self) -> Option<Caveat> {
+        let (model, duration) = (&self.arm.model, self.motion.trajectory.duration());
+        if self.arm.transmission.is_empty() || self.options.stepper.entry().steps == StepRule::ByErrorControl {
+            return None;
+        }
+        let mut state = State::zeros(model);
+        let mut fastest = vec![0.0f64; model.n_actuated()];
+        for k in 0..=1000 {
+            self.arm.prescribed_state(
+                duration * f64::from(k) * 1e-3,
+                &mut state,
+                &mut nalgebra::DVector::zeros(model.nv()),
+            );
+            fastest.iter_mut().zip(state.qdot.iter()).for_each(|(most, rate)| *most = most.max(rate.abs()));
+        }
+        let rates = self
+            .arm
+            .transmission
+            .iter()
+            .flat_map(|error| error.harmonics.iter().map(|h| (error.motor, h.cycles * fastest[error.motor])));
+        let (motor, rate) = rates.max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let steps = std::f64::consts::TAU / (rate * self.options.step_s);
+        let joint = format!("joint {:?}", model.coordinates()[motor].joint);
+        (steps < RIPPLE_STEPS).then(|| kinds::RIPPLE_STEP.found(joint, steps, RIPPLE_STEPS))
+    }
+
     /// What stepper and start make of the run.
     fn method_caveats(&self) -> Vec<Caveat> {
         let mut caveats = Vec::new();
@@ -181,6 +212,7 @@ impl Run<'_> {
             );
             caveats.push(Caveat::said("spook-damping", "run", message, ""));
         }
+        caveats.extend(self.ripple_caveat());
         if self.motion.trajectory.initial_speed() > 1e-6 {
             let message = "the motion starts at speed: the first ringing is an artefact of the sudden start";
             caveats.push(Caveat::said("starts-moving", "run", message, ""));

@@ -252,6 +252,8 @@ struct Run<'a> {
     trace: Trace,
     bends: Vec<BendInfo>,
     contributors: Vec<Contributor>,
+    /// Largest torque per motor that moves several joints.
+    motors: std::collections::BTreeMap<String, f64>,
     wanted: Wanted,
     /// Steps between two samples, and all.
     every: u64,
@@ -293,6 +295,7 @@ impl<'a> Run<'a> {
             trace: Trace::default(),
             bends,
             contributors: contributors(robot, flexible, &arm),
+            motors: Default::default(),
             wanted,
             every,
             last,
@@ -343,6 +346,12 @@ impl<'a> Run<'a> {
         match self.wanted {
             Wanted::Figures => self.twin.place(&self.arm, &self.tcp, self.seen.t),
             _ => self.twin.update(&self.arm, &self.tcp, self.seen.t),
+        }
+        if self.arm.coupling.is_some() {
+            for (motor, torque) in self.robot.motor_torques(&self.arm, self.seen.drive.as_slice()) {
+                let peak = self.motors.entry(motor).or_default();
+                *peak = peak.max(torque.abs());
+            }
         }
         let tool = self.monitors.update(&self.seen, &self.twin, &self.arm, &self.tcp);
         let sample = &mut self.sample;
