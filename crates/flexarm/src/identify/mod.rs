@@ -250,6 +250,7 @@ pub fn identify_robot(robot: &Robot, measurements: &Path, request: &IdentifyRequ
     let found = identify(&plant, &parameters, &input.measurements, &options).map_err(of_names(&input))?;
     let mut answer = answer(robot, measurements, &plant, &parameters, &input, &found)?;
     answer.caveats.extend(frame_caveat(&input, &answer));
+    answer.caveats.extend(gear_caveat(robot));
     answer.encoders = encoders;
     if let Some(targets) = targets {
         targets.write(robot, &chosen, &found, &mut answer)?;
@@ -264,8 +265,16 @@ fn joints_of(arm: &Arm) -> Vec<(String, bool)> {
     actuated.iter().map(|c| (c.joint.clone(), c.kind == "prismatic")).collect()
 }
 
+/// Whether any drive has a spring in this modelling.
+fn gives_way(arm: &Arm) -> bool {
+    arm.flexible().owners.iter().any(|owner| matches!(owner, crate::flexible::Owner::Drive(_)))
+}
+
 /// What the file or the request asks for, in the robot's order.
 fn chosen(arm: &Arm, input: &MeasurementInput, fit: &[String]) -> Result<Vec<parameters::Candidate>, Error> {
+    if let Some(coupling) = arm.robot().coupling.as_ref().filter(|_| gives_way(arm)) {
+        return Err(IdentifyFileError::Coupled { joints: coupling.joints.clone() }.into());
+    }
     let all = parameters::candidates(arm.robot(), arm.flexible());
     let names = || all.iter().map(|c| c.parameter.name.clone()).collect::<Vec<_>>();
     if all.is_empty() {
@@ -323,6 +332,15 @@ pub enum IdentifyFileError {
          entries with a first guess"
     )]
     NothingGives,
+    /// Gears that move several joints.
+    #[error(
+        "the gears of {joints:?} are coupled: which of their springs a displacement tells is not worked out; identify without the \
+         [coupling] table, joint by joint, or keep these drives rigid"
+    )]
+    Coupled {
+        /// Joints.
+        joints: Vec<String>,
+    },
     /// A name that is not there.
     #[error("{text}")]
     UnknownParameter {
@@ -605,6 +623,18 @@ fn caveats(found: &Identified) -> Vec<Caveat> {
         caveats.push(Caveat::said("not-converged", "measurements", text, "a better first guess helps"));
     }
     caveats
+}
+
+/// Laws of gears that the readings are met without.
+fn gear_caveat(robot: &Robot) -> Option<Caveat> {
+    let has = |drive: &&crate::Drive| {
+        drive.gearbox.as_ref().is_some_and(|(_, gear)| gear.hysteresis.is_some() || !gear.transmission.is_empty())
+    };
+    let joints: Vec<&str> = robot.drives.iter().filter(has).map(|drive| drive.joint.as_str()).collect();
+    (!joints.is_empty()).then(|| {
+        let text = format!("hysteresis and transmission errors of {} are not in the fit: gears are springs there", joints.join(", "));
+        Caveat::said("gear-laws", "measurements", text, "load from the same side every time").as_note()
+    })
 }
 
 /// Places that no placement of the instrument brings near those of the robot.
