@@ -43,7 +43,7 @@ fn closed(golden: &Value, root: &Path) -> Model {
 }
 
 /// Truth: Pinocchio's constraintDynamics with point contacts, three loops of which two rest on one another and none is a parallelogram.
-/// Measured: accelerations MEASURED_A of the largest, torques MEASURED_TAU, dependent joints MEASURED_Q rad, tool MEASURED_P m, energies MEASURED_E.
+/// Measured: accelerations 2.8e-15 of the largest, torques 1.3e-14, dependent joints 4e-15 rad, tool 3e-15 m, energies 1.2e-15.
 #[test]
 fn dynamics_over_three_loops_are_those_of_pinocchio() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("inside the workspace");
@@ -87,5 +87,5 @@ fn dynamics_over_three_loops_are_those_of_pinocchio() {
     eprintln!(
         "accelerations {a:.1e}, torques {tau:.1e}, dependent {q:.1e} rad {qd:.1e} rad/s, energy {e:.1e}, tool {p:.1e} m"
     );
-    assert!(a < 1e-11 && tau < 1e-11 && q < 1e-12 && qd < 1e-11 && e < 1e-12 && p < 1e-12, "{worst:?}");
+    assert!(a < 1e-12 && tau < 1e-12 && q < 1e-13 && qd < 1e-12 && e < 1e-13 && p < 1e-13, "{worst:?}");
 }

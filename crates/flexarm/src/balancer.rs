@@ -85,6 +85,9 @@ impl Robot {
                     let known = self.rigid.joints.iter().filter(moves).map(|j| j.name.clone()).collect();
                     return Err(BalancerError::UnknownJoint { name, joint, known });
                 };
+                if let Some(own) = crate::loops::owner(&self.rigid, &joint) {
+                    return Err(BalancerError::Dependent { name, joint, own: own.to_owned() });
+                }
                 if matches!(law, BalancerLaw::Sine { .. }) && found.kind.slides() {
                     return Err(BalancerError::Slides { name, joint });
                 }

@@ -26,7 +26,7 @@ fn order([turn, lower, crank, tool]: [f64; 4]) -> [f64; 4] {
 }
 
 /// Truth: opposite sides stay parallel. The tool is where lower arm and upper arm bring it, each by its own driving joint, the hand stays level,
-/// and a weight at the tool is carried by virtual work. Measured 2e-9 m (digits of the robot file), 1e-9 rad and 1e-8 of the torque.
+/// and a weight at the tool is carried by virtual work. Measured 1.3e-15 m, 4e-16 and 1.9e-15 of the weight.
 #[test]
 fn the_palletiser_stands_and_holds_as_its_parallelograms_say() {
     let robot = palletiser();
@@ -49,7 +49,7 @@ fn the_palletiser_stands_and_holds_as_its_parallelograms_say() {
         let miss =
             (0..4).map(|k| (seen.gravity_torque[k] - bare.gravity_torque[k] - held[k]).abs()).fold(0.0, f64::max);
         eprintln!("tool {off:.1e} m, tilt {:.1e}, torque {:.1e}", x.hypot(y), miss / weight);
-        assert!(off < 1e-8 && x.hypot(y) < 1e-8 && miss < 1e-7 * weight, "{off:e} {x} {y} {miss:e}");
+        assert!(off < 1e-13 && x.hypot(y) < 1e-13 && miss < 1e-12 * weight, "{off:e} {x} {y} {miss:e}");
         // The elbow turns by the difference of the two drives, the wrist takes back what the upper arm turned.
         let joint = |name: &str| seen.loops.iter().flat_map(|l| &l.dependent).find(|j| j.name == name).unwrap().q;
         assert!((joint("elbow") - (at[2] - at[1])).abs() < 1e-8, "{}", joint("elbow"));
@@ -68,7 +68,7 @@ fn the_palletiser_as_shipped_has_no_warnings() {
     assert!(loud.is_empty(), "{loud:#?}");
 }
 
-/// Truth: the energy books close, and steppers that share nothing but the equations agree. Measured peak 2.9 mm, 1e-4 between them.
+/// Truth: the energy books close, and steppers that share nothing but the equations agree. Measured peak 3.94 mm, 2.4e-7 between them.
 #[test]
 fn a_run_of_the_palletiser_keeps_the_books_in_every_stepper() {
     let robot = palletiser();
@@ -83,7 +83,7 @@ fn a_run_of_the_palletiser_keeps_the_books_in_every_stepper() {
         run.summary.tcp.as_ref().unwrap().peak_m
     });
     eprintln!("peaks {peaks:?}");
-    assert!(peaks[0] > 3e-4 && (peaks[0] / peaks[1] - 1.0).abs() < 2e-3, "{peaks:?}");
+    assert!(peaks[0] > 3e-4 && (peaks[0] / peaks[1] - 1.0).abs() < 1e-5, "{peaks:?}");
     let spook = StepperKind::Spook(flexarm::SpookSettings::default());
     let error = arm.simulate(&motion, &options(spook)).unwrap_err().to_string();
     assert!(error.contains("closed loops of links"), "{error}");
@@ -99,7 +99,7 @@ fn compliance_of_the_crank_reaches_the_tool_through_the_rod() {
     for at in PLACES {
         point.solve(&order(at), &Wrench::zeros()).unwrap();
         let found = point.compliance()[(2, 2)];
-        // The weight on the lever softens or stiffens it by m g r / k, 2e-3.
+        // The weight on the lever softens or stiffens it by m g r / k, measured 3.5e-3.
         let truth = (1.35 * at[2].cos()).powi(2) / 2.8e6;
         assert!((found / truth - 1.0).abs() < 5e-3, "{found:e} {truth:e}");
         let table =
@@ -109,14 +109,14 @@ fn compliance_of_the_crank_reaches_the_tool_through_the_rod() {
 }
 
 /// Truth: virtual work. A rod of stiffness EA/L that alone gives way lets the tool sink by (dS/dF)² L/EA, S = F 1.35 cos q3/(0.4 sin μ) the force in it, μ the
-/// transmission angle. Measured MEASURED_ROD.
+/// transmission angle. Measured 3e-4, 2e-4 and 1e-3 (the weight on the lever).
 #[test]
 fn a_rod_that_stretches_lets_the_tool_sink_by_the_square_of_its_lever() {
     let shipped = std::fs::read_to_string(project("robots/palletiser/robot.toml")).unwrap();
     let (head, loops) = shipped.split_once("[[loop]]").unwrap();
     let (loops, _) = loops.split_once("# The upper arm bends").unwrap();
     let rod = "[[flexible_link]]\nlink = \"drive_rod_bar\"\ndistal = \"drive_rod_end_joint\"\nbeam = { section = \"given\", EA = 3.3e8, EI_y = 2.0e5, \
-               EI_z = 2.0e5, GJ = 1.6e5, mass_per_length = 17.0, theory = \"euler-bernoulli\", y_axis = [0.0, 1.0, 0.0], split = 0.5 }\n";
+               EI_z = 2.0e5, GJ = 1.6e5, mass_per_length = 17.0, rotary_y = 0.01, rotary_z = 0.01, theory = \"euler-bernoulli\", y_axis = [0.0, 1.0, 0.0], split = 0.5 }\n";
     let folder = std::env::temp_dir().join(format!("flexarm-loop-rod-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
     std::fs::copy(project("robots/palletiser/palletiser.urdf"), folder.join("palletiser.urdf")).unwrap();
@@ -158,7 +158,7 @@ fn a_motion_over_a_dead_point_or_out_of_reach_is_refused_with_time_and_loop() {
     let mut short = palletiser();
     let mut own = short.rigid.loops.remove(0);
     own.name = "short".into();
-    short.rigid.joints.iter_mut().filter(|j| j.child == own.eye).for_each(|j| j.X_PJ.translation.vector.z = 1.0);
+    short.rigid.joints.iter_mut().filter(|j| j.child == own.eye).for_each(|j| j.X_PJ.translation.vector.z = 1.2);
     short.rigid.loops.push(own);
     let far = [0.0, 0.6, -0.6, 0.0];
     let error = inspect(&short, Some(&order(far)), None).unwrap_err().to_string();
@@ -173,7 +173,7 @@ fn a_motion_names_the_joints_that_drive() {
     std::fs::create_dir_all(&folder).unwrap();
     for (file, text) in [
         ("m.csv", "time,joint_2,elbow\n0,0,0\n1,0.1,0.1\n"),
-        ("m.toml", "format = 1\njoints = [\"elbow\"]\nstart = [0.0]\n[[move]]\nto = [0.2]\nduration = 1.0\n"),
+        ("m.toml", "format = 1\nunit = \"rad\"\njoints = [\"elbow\"]\nstart = [0.0]\n[[move]]\nto = [0.2]\nduration = 1.0\n"),
     ] {
         std::fs::write(folder.join(file), text).unwrap();
         let error = Motion::load(folder.join(file), &robot).unwrap_err().to_string();

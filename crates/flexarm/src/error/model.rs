@@ -112,6 +112,16 @@ pub enum BalancerError {
         /// The joints that move.
         known: Vec<String>,
     },
+    /// A joint that a closed loop moves.
+    #[error("balancer {name:?}: joint {joint:?} follows from a loop, {own:?}: give its two ends, from and to, instead")]
+    Dependent {
+        /// The balancer.
+        name: String,
+        /// The joint.
+        joint: String,
+        /// The loop.
+        own: String,
+    },
     /// A sine over a slide.
     #[error("balancer {name:?}: a sine is a torque over an angle, but joint {joint:?} slides: use spring or curve")]
     Slides {
