@@ -1,5 +1,7 @@
 //! Identities between the recursions on random trees: each algorithm is the other's truth.
 #![allow(non_snake_case, reason = "monogram notation")]
+#![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
+#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 use flexarm_kinematics::*;
 use flexarm_testkit::allocations::{CountingAllocator, count_allocations};

@@ -1,6 +1,7 @@
 //! Transmission errors, hysteresis, friction under load and gears that move several joints, against closed forms.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 #![allow(non_snake_case, reason = "monogram notation")]
+#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
