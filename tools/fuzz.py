@@ -635,7 +635,7 @@ def own_targets():
         Target("robot-balancers", "robot.toml", {**base, "robot.toml": ROBOT + BALANCERS}, [check, COMPARE, ["statics", "robot.toml", "--json"], ["inspect", "robot.toml", "--json"]], True),
         Target("urdf", "beam.urdf", base, [["check", "beam.urdf", "--json"], ["inspect", "beam.urdf", "--json"], check, COMPARE], True),
         Target("xacro", "arm.xacro", {"arm.xacro": XACRO}, [["check", "arm.xacro", "--json"], ["inspect", "arm.xacro", "--json"]]),
-        Target("new-urdf", "arm.urdf", {"arm.urdf": NEW_ARM, "link.stl": box_stl(0.6, 0.12, 0.1)}, [["new", "arm.urdf", "-o", "made", "--force", "--no-run", "--json"], ["new", "arm.urdf", "-o", "made", "--force", "--no-run", "--mass", "60", "--payload", "5", "--json"]]),
+        Target("new-urdf", "arm.urdf", {"arm.urdf": NEW_ARM, "link.stl": box_stl(0.6, 0.12, 0.1)}, [["new", "arm.urdf", "-o", "made", "--force", "--no-run", "--json"], ["new", "arm.urdf", "-o", "made", "--force", "--no-run", "--payload", "5", "--json"]]),
         Target("new-mesh", "link.stl", {"arm.urdf": NEW_ARM, "link.stl": box_stl(0.6, 0.12, 0.1)}, [["new", "arm.urdf", "-o", "made", "--force", "--no-run", "--json"]]),
         Target("new-xacro", "arm.xacro", {"arm.xacro": XACRO}, [["new", "arm.xacro", "-o", "made", "--force", "--no-run", "--mass", "20", "--json"]]),
         Target("motion-toml", "motion.toml", base, [check, COMPARE], True),
