@@ -53,7 +53,7 @@ fn new_writes_a_robot_that_runs_and_answers_with_its_keys() {
     assert!(place.path("made/first_run/report.html").is_file());
     assert_eq!(place.flexarm(&["check", "made"]).code, 0);
     // What is there stays.
-    place.refused(&["new", "two.urdf", "-o", "made", "--no-run"], &["--force", "robot.toml"]);
+    place.refused(&["new", "two.urdf", "-o", "made", "--no-run"], &["--force", "exists already"]);
     let forced = place.flexarm(&["new", "two.urdf", "-o", "made", "--no-run", "--force"]);
     assert_eq!(forced.code, 0, "{}", forced.err);
     assert!(forced.out.contains("box 100 x 100 mm") && forced.out.contains("assumed"), "{}", forced.out);

@@ -295,7 +295,7 @@ fn missing_and_senseless_limits_are_told_and_the_motion_keeps_what_it_can() {
         ("none", None, "has none"),
         ("zeros", Some(r#"lower="-3" upper="3" effort="0" velocity="0""#), "has none"),
         ("huge", Some(r#"lower="-3" upper="3" effort="1000000" velocity="2""#), "is far above"),
-        ("weak", Some(r#"lower="-3" upper="3" effort="20" velocity="2""#), "is below what"),
+        ("weak", Some(r#"lower="-3" upper="3" effort="20" velocity="2""#), "is the same for all joints and below"),
     ];
     for (name, limit, fault) in limits {
         let folder = Folder::new(&format!("limits-{name}"));
