@@ -391,7 +391,7 @@ mod tests {
     }
 
     /// Truth: what the catalogue's words mean. A gear of 1.1 N m/arcsec class (typical figures of a cycloidal gear: 1 arcmin of hysteresis, 1 arcmin of lost
-    /// motion at 3 % of 1570 N m) shows them on its own loop, cycled to the rated torque. Measured 1e-19 rad and 2e-9 of the lost motion.
+    /// motion at 3 % of 1570 N m) shows them on its own loop, cycled to the rated torque.
     #[test]
     fn the_loop_of_a_gear_has_the_width_and_the_lost_motion_of_its_catalogue() {
         let stiffness = 1.0e6;
