@@ -173,7 +173,10 @@ fn a_motion_names_the_joints_that_drive() {
     std::fs::create_dir_all(&folder).unwrap();
     for (file, text) in [
         ("m.csv", "time,joint_2,elbow\n0,0,0\n1,0.1,0.1\n"),
-        ("m.toml", "format = 1\nunit = \"rad\"\njoints = [\"elbow\"]\nstart = [0.0]\n[[move]]\nto = [0.2]\nduration = 1.0\n"),
+        (
+            "m.toml",
+            "format = 1\nunit = \"rad\"\njoints = [\"elbow\"]\nstart = [0.0]\n[[move]]\nto = [0.2]\nduration = 1.0\n",
+        ),
     ] {
         std::fs::write(folder.join(file), text).unwrap();
         let error = Motion::load(folder.join(file), &robot).unwrap_err().to_string();
