@@ -1,4 +1,4 @@
-//! Torsional stiffness of reducers by their rated torque: two families of catalogues.
+//! Torsional stiffness of reducers by their rated torque: figures of two families, for a first guess. The maker's sheet of the gear itself goes before them.
 //!
 //! Stiffness grows almost as the rated torque does: both families turn by about 1e-3 rad under it.
 
@@ -36,7 +36,7 @@ const STRAIN_WAVE: [(f64, f64, f64, f64); 8] = [
 pub(crate) const CYCLOIDAL_FROM: f64 = 200.0;
 /// Torque for starting and stopping over rated torque, of both families about.
 pub(crate) const PEAK_OVER_RATED: f64 = 2.5;
-/// What gears of arms were identified at over the catalogue's value: the main axes of the shipped KR 210, KR 300 and KR 500.
+/// What gears of arms were identified at over the table's value: the main axes of the shipped KR 210, KR 300 and KR 500.
 pub(crate) const IDENTIFIED: [f64; 2] = [0.45, 1.9];
 
 /// Stiffness of a reducer for a rated torque.
@@ -61,7 +61,7 @@ pub(crate) fn class(rated: f64) -> GearClass {
         let (stiffness, sizes, is_beyond) = between(&rows, rated, "RV-", "E");
         let [low, high] = IDENTIFIED.map(|factor| factor * stiffness);
         let source = format!(
-            "cycloidal reducers, Nabtesco's catalogue RV-E, {sizes}; low and high: what main axes were identified at over this \
+            "cycloidal reducers, figures of Nabtesco's series RV-E, {sizes} (compare with the maker's sheet); low and high: what main axes were identified at over this \
              (KR 210, KR 300 and KR 500 in robots/)"
         );
         return GearClass { stiffness, low, high, source, is_beyond };
@@ -72,7 +72,7 @@ pub(crate) fn class(rated: f64) -> GearClass {
     let (low, sizes, is_beyond) = between(&rows(|row| row.2), rated, "CSG-", "");
     let (high, ..) = between(&rows(|row| row.3), rated, "CSG-", "");
     let source = format!(
-        "strain-wave gears, Harmonic Drive's catalogue CSG, ratio 80 and above, {sizes}; low: K1 at small torque, high: K3 at \
+        "strain-wave gears, figures of Harmonic Drive's series CSG, ratio 80 and above, {sizes} (compare with the maker's sheet); low: K1 at small torque, high: K3 at \
          large torque"
     );
     GearClass { stiffness: (low * high).sqrt(), low, high, source, is_beyond }
@@ -102,9 +102,9 @@ fn between(rows: &[(f64, f64, f64)], rated: f64, before: &str, after: &str) -> (
 mod tests {
     use super::*;
 
-    /// Truth: the rows of the catalogues themselves; a turn under rated torque of about 1e-3 rad between them.
+    /// Truth: the rows of the tables themselves; a turn under rated torque of about 1e-3 rad between them.
     #[test]
-    fn the_stiffness_at_the_rated_torque_of_a_size_is_that_of_the_catalogue_and_rises_between() {
+    fn the_stiffness_at_the_rated_torque_of_a_size_is_that_of_the_table_and_rises_between() {
         let exact = class(412.0).stiffness / (108.0 * ARC_MINUTE) - 1.0;
         assert!(exact.abs() < 1e-12, "{exact:.1e}");
         let found = class(87.0);
