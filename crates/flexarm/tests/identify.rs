@@ -304,7 +304,7 @@ fn a_measured_robot_tells_two_of_its_gears_and_is_silent_about_the_third() {
     let found = identify_robot(&robot, &folder.join("job.toml"), &request).unwrap();
     for gear in &found.encoders {
         eprintln!(
-            "{}: {:.3e} +- {:.1e}, late {:.2} ms, R2 {:.2}, unseen {:.2?}, without each {:.2e?}, rest {:.0} of {:.0} urad",
+            "{}: {:.3e} +- {:.1e}, late {:.2} ms, R2 {:.2}, unseen {:.2?}, without each {:.0?}, rest {:.0} of {:.0} urad",
             gear.joint,
             gear.stiffness,
             gear.std,

@@ -175,7 +175,7 @@ fn keys(sources: &[&str]) -> BTreeMap<String, BTreeSet<String>> {
     found
 }
 
-const ROBOT: [&str; 7] = [
+const ROBOT: [&str; 9] = [
     "crates/flexarm/src/robot_file.rs",
     "crates/flexarm/src/balancer_entry.rs",
     "crates/flexarm/src/controller_entry.rs",

@@ -632,7 +632,10 @@ fn gear_caveat(robot: &Robot) -> Option<Caveat> {
     };
     let joints: Vec<&str> = robot.drives.iter().filter(has).map(|drive| drive.joint.as_str()).collect();
     (!joints.is_empty()).then(|| {
-        let text = format!("hysteresis and transmission errors of {} are not in the fit: gears are springs there", joints.join(", "));
+        let text = format!(
+            "hysteresis and transmission errors of {} are not in the fit: gears are springs there",
+            joints.join(", ")
+        );
         Caveat::said("gear-laws", "measurements", text, "load from the same side every time").as_note()
     })
 }
