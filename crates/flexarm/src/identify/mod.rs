@@ -224,6 +224,9 @@ pub struct Compared {
 /// where the measurements cannot be met: units, frames, rank; [`Error::Taken`], [`Error::Write`].
 pub fn identify_robot(robot: &Robot, measurements: &Path, request: &IdentifyRequest) -> Result<Identification, Error> {
     let arm = robot.flexible(request.modelling)?;
+    if parameters::candidates(robot, arm.flexible()).is_empty() {
+        return Err(IdentifyFileError::NothingGives.into());
+    }
     let joints = joints_of(&arm);
     let mut input = file::read(measurements, &Cell { joints: &joints })?;
     let chosen = chosen(&arm, &input, &request.fit)?;
