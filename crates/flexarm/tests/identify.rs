@@ -117,8 +117,8 @@ fn table(joints: &[String], poses: &Measurements, values: &[f64], factor: f64) -
     for (k, reading) in poses.readings.iter().enumerate() {
         let ReadingKind::Displacement { after, .. } = &reading.kind else { continue };
         reading.q.iter().for_each(|q| write!(text, "{},", q.to_degrees()).unwrap());
-        let F = after.wrench.force;
-        write!(text, "{},{},{}", F.x, F.y, F.z).unwrap();
+        let force = after.wrench.force;
+        write!(text, "{},{},{}", force.x, force.y, force.z).unwrap();
         values[3 * k..3 * k + 3].iter().for_each(|d| write!(text, ",{}", factor * d).unwrap());
         text += "\n";
     }
