@@ -245,6 +245,52 @@ to = [20.0]
 duration = 0.4
 """
 
+MEASUREMENTS = """format = 1
+length = "mm"
+angle = "deg"
+force = "N"
+loss = "huber"
+fit = ["drive.*", "link.bar.stiffness_factor", "payload.mass"]
+uncertainty = 2.0
+
+[[parameter]]
+name = "payload.mass"
+uncertainty = 0.5
+
+[instrument.tracker]
+
+[target.ball]
+xyz = [0.0, 5.0, 3.0]
+unknown = true
+
+[[displacement]]
+joints = [0.0, 0.0]
+load = { force = [0.0, 0.0, -100.0], torque = [0.0, 10.0, 0.0], at = [10.0, 0.0, 0.0], mass = 1.0, com = [0.0, 0.0, 1.0] }
+before = { mass = 0.5 }
+point = [10.0, 0.0, 0.0]
+value = [0.1, 0.0, -4.0]
+rotation = [0.0, 0.1, 0.0]
+std = 0.03
+std_rotation = 0.01
+
+[[displacement]]
+file = "pulls.csv"
+direction = [0.0, 0.0, 1.0]
+std = 0.03
+
+[[frequency]]
+joints = { swing = 10.0, elbow = 20.0 }
+hz = [4.0, 9.0]
+modes = [1, 2]
+std = 0.1
+"""
+
+PULLS = """swing,elbow,fx,fy,fz,mass,d
+0,10,0,0,-100,0,-4.1
+20,-10,0,0,-50,1.0,-2.5
+-20,30,0,20,-50,1.0,-2.2
+"""
+
 ROBOT_FLEX = """format = 1
 name = "beam"
 urdf = "beam.urdf"
@@ -706,6 +752,10 @@ def own_targets():
         Target("new-urdf", "arm.urdf", {"arm.urdf": NEW_ARM, "link.stl": box_stl(0.6, 0.12, 0.1)}, [["new", "arm.urdf", "-o", "made", "--force", "--no-run", "--json"], ["new", "arm.urdf", "-o", "made", "--force", "--no-run", "--payload", "5", "--json"]]),
         Target("new-mesh", "link.stl", {"arm.urdf": NEW_ARM, "link.stl": box_stl(0.6, 0.12, 0.1)}, [["new", "arm.urdf", "-o", "made", "--force", "--no-run", "--json"]]),
         Target("new-xacro", "arm.xacro", {"arm.xacro": XACRO}, [["new", "arm.xacro", "-o", "made", "--force", "--no-run", "--mass", "20", "--json"]]),
+        Target("measurements", "job.toml", {**base, "job.toml": MEASUREMENTS, "pulls.csv": PULLS}, [["identify", "robot.toml", "job.toml", "--no-files", "--json"]]),
+        Target("measurement-table", "pulls.csv", {**base, "job.toml": MEASUREMENTS, "pulls.csv": PULLS}, [["identify", "robot.toml", "job.toml", "-o", "made", "--force", "--json"]]),
+        Target("plan-poses", "poses.csv", {**base, "poses.csv": "swing,elbow,finger\n0.1,0.2,0.01\n-0.3,0.5,0.0\n0.4,-0.2,0.02\n"}, [["identify", "robot.toml", "--plan", "2", "--poses", "poses.csv", "--no-files", "--json"]]),
+        Target("compensate", "motion.toml", base, [["compensate", "robot.toml", "motion.toml", "--no-files", "--no-sweep", "--iterations", "1", "--components", "z", "--json"]], True),
         Target("motion-toml", "motion.toml", base, [check, COMPARE], True),
         Target("motion-csv", "motion.csv", base, [["check", "robot.toml", "motion.csv", "--json"], [w if w != "motion.toml" else "motion.csv" for w in COMPARE]], True),
         Target("motion-table", "trace.txt", {**base, "trace.txt": TRACE}, [["motion", "trace.txt", "robot.toml", "--json"], ["motion", "trace.txt", "--columns", "t=#1[ms],swing=A1[deg]", "--json"]]),

@@ -32,6 +32,10 @@ use crate::scenario::Scenario;
 const NODE_S: f64 = 0.02;
 /// Time between two samples of the error and two knots of the commands (s).
 const SAMPLE_S: f64 = 1e-3;
+/// Most iterations that may be asked for.
+const MOST_ITERATIONS: usize = 100;
+/// Longest motion that is taken (s): all of it is held in memory, a sample a millisecond.
+const LONGEST_S: f64 = 600.0;
 /// An iteration that leaves more than this part of the one before is the last.
 const SETTLED: f64 = 0.9;
 /// Least part of the peak below which nothing more is asked for.
@@ -280,6 +284,14 @@ fn check(motion: &Motion, request: &CompensateRequest) -> Result<(), CompensateE
     }
     if let Some(hz) = request.cutoff_hz.filter(|hz| !(hz.is_finite() && *hz > 0.0)) {
         return Err(CompensateError::Value { what: "the cutoff", found: hz, expected: "a positive frequency (Hz)" });
+    }
+    let found = motion.trajectory.duration();
+    if found > LONGEST_S {
+        return Err(CompensateError::Value { what: "the duration of the motion", found, expected: "at most 600 s" });
+    }
+    if request.iterations > MOST_ITERATIONS {
+        let found = request.iterations as f64;
+        return Err(CompensateError::Value { what: "the number of iterations", found, expected: "at most 100" });
     }
     match motion.trajectory.velocity_jumps().first() {
         Some(jump) => Err(CompensateError::Corner { t_s: jump.time_s }),

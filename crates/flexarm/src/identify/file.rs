@@ -277,6 +277,7 @@ pub(super) fn read(path: &Path, cell: &Cell<'_>) -> Result<MeasurementInput, Err
     for (k, entry) in file.frequency.iter().enumerate() {
         reader.frequency(k, entry)?;
     }
+    reader.drop_unused();
     let recordings = file.encoders.iter().map(|entry| reader.encoders(entry)).collect::<Result<Vec<_>, Error>>()?;
     let deviations_known = reader.deviations(!recordings.is_empty())?;
     let told =
@@ -794,6 +795,27 @@ impl Reader<'_> {
         self.given.push(("frequency", e.std.is_some(), span));
         self.measurements.readings.push(Reading { name: format!("frequency {}", number + 1), q, kind });
         Ok(())
+    }
+
+    /// Instruments and targets that no place names are no unknowns.
+    fn drop_unused(&mut self) {
+        let (mut seen, mut hit) = (Vec::new(), Vec::new());
+        for reading in &self.measurements.readings {
+            if let ReadingKind::Place { instrument, target, .. } = &reading.kind {
+                seen.push(*instrument);
+                hit.push(*target);
+            }
+        }
+        for (k, instrument) in self.measurements.instruments.iter_mut().enumerate() {
+            if !seen.contains(&k) {
+                *instrument = Instrument::Known(Pose::identity());
+            }
+        }
+        for (k, target) in self.measurements.targets.iter_mut().enumerate() {
+            if let (false, Target::Unknown(p)) = (hit.contains(&k), *target) {
+                *target = Target::Known(p);
+            }
+        }
     }
 
     /// Whether deviations are given: by all readings or by none, and by all where kinds are mixed.
