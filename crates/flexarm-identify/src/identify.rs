@@ -121,6 +121,14 @@ pub enum IdentifyError {
         /// Which.
         what: String,
     },
+    /// Deviations that nothing tells.
+    #[error(
+        "the {rows} numbers have no standard deviation and there are as many unknowns: nothing scatters; give a deviation or measure more"
+    )]
+    NoScatter {
+        /// How many numbers.
+        rows: usize,
+    },
     /// Overflow.
     #[error(
         "a residual or a derivative is not a number: a value or a deviation of the measurements is out of all proportion"
@@ -146,7 +154,15 @@ pub fn identify(
     let before = initial_residuals(plant, measurements, options)?;
     let solution = fitted(plant, parameters, measurements, options, None)?;
     let held_out = held_out(plant, parameters, measurements, options, &solution, &before)?;
-    Ok(told(parameters, measurements, options, solution, before, held_out))
+    if !options.deviations_known && solution.freedom == 0 {
+        return Err(IdentifyError::NoScatter { rows });
+    }
+    let found = told(parameters, measurements, options, solution, before, held_out);
+    let numbers = |p: &Found| [p.value, p.std, p.interval[0], p.interval[1]];
+    match found.parameters.iter().flat_map(numbers).all(f64::is_finite) {
+        true => Ok(found),
+        false => Err(IdentifyError::NotFinite),
+    }
 }
 
 fn priors(parameters: &[Parameter]) -> Vec<f64> {
