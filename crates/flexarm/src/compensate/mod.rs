@@ -32,6 +32,10 @@ use crate::scenario::Scenario;
 const NODE_S: f64 = 0.02;
 /// Time between two samples of the error and two knots of the commands (s).
 const SAMPLE_S: f64 = 1e-3;
+/// Part of a sample by which logged times may differ from those that are asked for.
+const LOGGED_WITHIN: f64 = 1e-3;
+/// Longest step (s): the error is sampled with it.
+const LONGEST_STEP_S: f64 = 4e-3;
 /// Most iterations that may be asked for.
 const MOST_ITERATIONS: usize = 100;
 /// Longest motion that is taken (s): all of it is held in memory, a sample a millisecond.
@@ -193,6 +197,14 @@ pub enum CompensateError {
         /// Expected.
         expected: &'static str,
     },
+    /// The run is not logged at the times at which the rigid arm is looked at.
+    #[error("the run has no sample at {t_s} s (off by {off_s:.1e} s): choose a step that divides 0.001 s")]
+    Logged {
+        /// When (s).
+        t_s: f64,
+        /// By how much (s).
+        off_s: f64,
+    },
     /// The other robot does not have the same joints.
     #[error("the plant has the joints {found:?}, the robot {expected:?}: they must be the same")]
     OtherJoints {
@@ -242,7 +254,8 @@ pub fn compensate_motion(robot: &Robot, motion: &Motion, request: &CompensateReq
         Some((_, plant)) => Judge::of(plant, request, &arm)?,
         None => Judge { arm: arm.clone(), run: request.run.clone() },
     };
-    let (before, wander) = judge.figures(&job, &motion)?;
+    let as_it_is = job.as_it_is()?;
+    let (before, wander) = judge.figures(&job, &as_it_is)?;
     let (after, left) = judge.figures(&job, &found.motion)?;
     let plants = if request.sweep { sweep(robot, request, &job, &arm, &found.motion)? } else { Vec::new() };
     let names: Vec<String> = arm.joints().map(str::to_owned).collect();
@@ -285,6 +298,10 @@ fn check(motion: &Motion, request: &CompensateRequest) -> Result<(), CompensateE
     if let Some(hz) = request.cutoff_hz.filter(|hz| !(hz.is_finite() && *hz > 0.0)) {
         return Err(CompensateError::Value { what: "the cutoff", found: hz, expected: "a positive frequency (Hz)" });
     }
+    let found = request.run.step_s;
+    if !(found > 0.0 && found <= LONGEST_STEP_S) {
+        return Err(CompensateError::Value { what: "the step", found, expected: "a time of at most 0.004 s" });
+    }
     let found = motion.trajectory.duration();
     if found > LONGEST_S {
         return Err(CompensateError::Value { what: "the duration of the motion", found, expected: "at most 600 s" });
@@ -326,9 +343,12 @@ struct Commands {
 impl<'a> Job<'a> {
     fn new(arm: &'a Arm, motion: &'a Motion, request: &'a CompensateRequest) -> Result<Self, Error> {
         let model = arm.robot().rigid_model()?;
-        let duration = motion.trajectory.duration();
-        let n = ((duration / SAMPLE_S).round() as usize).max(8);
-        let times: Vec<f64> = (0..=n).map(|k| duration * k as f64 / n as f64).collect();
+        // Whole numbers of steps, so that the run is logged at just these times; the last lies at the end or a little beyond, where
+        // the joints are held.
+        let step = request.run.step_s;
+        let spacing = step * (SAMPLE_S / step).round().max(1.0);
+        let n = ((motion.trajectory.duration() / spacing - 1e-6).ceil() as usize).max(8);
+        let times: Vec<f64> = (0..=n).map(|k| spacing * k as f64).collect();
         let m = model.n_actuated();
         let (frame, mut data) = (tcp_frame(&model), Data::new(&model));
         let mut q = DMatrix::zeros(m, times.len());
@@ -380,6 +400,11 @@ impl<'a> Job<'a> {
         Motion::along(trajectory, &format!("{}_compensated", self.motion.name), self.arm.robot())
     }
 
+    /// The motion as it is, at the times of this job.
+    fn as_it_is(&self) -> Result<Motion, Error> {
+        self.moved(&DMatrix::zeros(self.q.nrows(), self.q.ncols()))
+    }
+
     /// Run of a motion on an arm: displacement of the tool from where it should be, 6×N, world axes.
     fn error(&self, arm: &Arm, run: &RunOptions, motion: &Motion) -> Result<DMatrix<f64>, Error> {
         let options =
@@ -388,8 +413,11 @@ impl<'a> Job<'a> {
         let (t, p, r) = (run.time_s(), run.values("tcp_position"), run.values("tcp_quaternion_wxyz"));
         let mut error = DMatrix::zeros(6, self.times.len());
         for (k, time) in self.times.iter().enumerate() {
-            // Logged at the nearest whole number of steps.
             let row = t.partition_point(|x| *x < time - 0.5 * self.step_s()).min(t.len() - 1);
+            let off = (t[row] - time).abs();
+            if off > LOGGED_WITHIN * self.step_s() {
+                return Err(CompensateError::Logged { t_s: *time, off_s: off }.into());
+            }
             let place = Translation3::new(p[3 * row], p[3 * row + 1], p[3 * row + 2]);
             let turn = Quaternion::new(r[4 * row], r[4 * row + 1], r[4 * row + 2], r[4 * row + 3]);
             let turn: Rotation3<f64> = UnitQuaternion::from_quaternion(turn).to_rotation_matrix();
@@ -443,7 +471,7 @@ impl<'a> Job<'a> {
             kept: 0,
             cutoff_hz: Some(cutoff),
         };
-        let mut error = self.error(self.arm, run, self.motion)?;
+        let mut error = self.error(self.arm, run, &self.as_it_is()?)?;
         let size = |error: &DMatrix<f64>| error.select_rows(&self.rows).norm();
         let (first, mut least) = (size(&error), size(&error));
         best.peaks.push(peak(&error));
@@ -503,7 +531,8 @@ impl<'a> Job<'a> {
         }
         let motion = self.moved(&change)?;
         let run = &self.request.run;
-        let peaks = vec![peak(&self.error(self.arm, run, self.motion)?), peak(&self.error(self.arm, run, &motion)?)];
+        let peaks =
+            vec![peak(&self.error(self.arm, run, &self.as_it_is()?)?), peak(&self.error(self.arm, run, &motion)?)];
         Ok(Commands { motion, change, peaks, kept: 1, cutoff_hz: None })
     }
 }
@@ -596,9 +625,10 @@ fn sweep(
             Modelling { drives: DriveModel::Rigid, ..modelling },
         ));
     }
+    let as_it_is = job.as_it_is()?;
     let judged = plants.into_par_iter().map(|(plant, robot, modelling)| {
         let judge = Judge { arm: robot.flexible(modelling)?, run: RunOptions { modelling, ..request.run.clone() } };
-        let (before, after) = (judge.figures(job, job.motion)?.0, judge.figures(job, found)?.0);
+        let (before, after) = (judge.figures(job, &as_it_is)?.0, judge.figures(job, found)?.0);
         Ok(PlantFigures { plant, before, after })
     });
     judged.collect()
