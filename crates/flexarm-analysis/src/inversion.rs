@@ -10,7 +10,7 @@
 //! the arm with its tool held would vibrate, which lies well above the first of the arm itself, needs no solution over time and
 //! looks ahead by derivatives alone. Each use leaves `1 - H A` of the error: where that is more than half the commands are filtered
 //! off, without phase, so that iteration settles and noise does not grow. With other numbers of joints than of components A_0 is
-//! the pseudo-inverse.
+//! the pseudo-inverse; near singular poses it is damped.
 
 use nalgebra::{Complex, DMatrix};
 
@@ -43,16 +43,11 @@ pub struct Node {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum InversionError {
-    /// At some time the joints cannot move the tool in all directions asked for.
-    #[error(
-        "at {t_s:.3} s the joints cannot move the tool in every direction asked for (smallest over largest influence {ratio:.1e}): \
-         a singular pose, or more components than joints"
-    )]
+    /// At some time the joints cannot move the tool at all in the directions asked for.
+    #[error("at {t_s:.3} s the joints cannot move the tool in any direction asked for")]
     Singular {
         /// When (s).
         t_s: f64,
-        /// Of the singular values.
-        ratio: f64,
     },
     /// The arm has no stiffness in some direction.
     #[error("at {t_s:.3} s the arm has no stiffness in some direction")]
@@ -62,8 +57,8 @@ pub enum InversionError {
     },
 }
 
-/// Below this ratio of singular values the joints cannot move the tool in some direction.
-const SINGULAR: f64 = 1e-4;
+/// Below this part of the largest singular value the joints move the tool too little in a direction to correct it at once.
+const WEAK: f64 = 0.02;
 /// Part of the error that one use may leave at the highest frequency that is corrected.
 const LEFT: f64 = 0.5;
 /// Terms of the series.
@@ -75,6 +70,8 @@ const SEARCH: (f64, f64, f64) = (0.5, 200.0, 1.1);
 #[derive(Clone, Debug)]
 struct Series {
     A: [DMatrix<f64>; ORDER],
+    /// Directions of the tool that the joints move well, k×r, orthonormal.
+    moved: DMatrix<f64>,
 }
 
 /// The arm along its motion.
@@ -105,6 +102,12 @@ impl Inversion {
     #[must_use]
     pub fn below(self, hz: f64) -> Self {
         Self { cutoff_hz: self.cutoff_hz.min(hz), ..self }
+    }
+
+    /// When the joints move the tool in fewest directions (s), and in how many of those asked for; the rest is not corrected there.
+    pub fn fewest_directions(&self) -> Option<(f64, usize)> {
+        let each = self.series.iter().enumerate().map(|(k, series)| (k as f64 * self.spacing_s, series.moved.ncols()));
+        each.min_by_key(|(_, directions)| *directions)
     }
 
     /// Up to which frequency the commands are corrected (Hz).
@@ -175,12 +178,7 @@ impl Series {
         }
         let H: Vec<DMatrix<f64>> = X.iter().map(|X| &node.J * X).collect();
         let H_0 = &node.J_a + &H[0];
-        let values = H_0.singular_values();
-        let ratio = if values.is_empty() { 0.0 } else { values.amin() / values.amax().max(f64::MIN_POSITIVE) };
-        if H_0.nrows() > H_0.ncols() || ratio.is_nan() || ratio <= SINGULAR {
-            return Err(InversionError::Singular { t_s, ratio: if H_0.nrows() > H_0.ncols() { 0.0 } else { ratio } });
-        }
-        let A_0 = H_0.clone().pseudo_inverse(0.0).map_err(|_| InversionError::Singular { t_s, ratio })?;
+        let (A_0, moved) = damped_inverse(&H_0).ok_or(InversionError::Singular { t_s })?;
         // H(s) A(s) = 1, power by power.
         let mut A = vec![A_0];
         for order in 1..ORDER {
@@ -188,7 +186,7 @@ impl Series {
             A.push(-(&A[0] * sum));
         }
         let A = A.try_into().unwrap_or_else(|_| unreachable!("as many terms as the order"));
-        Ok(Self { A })
+        Ok(Self { A, moved })
     }
 
     /// The highest frequency below `most` up to which one use leaves less than [`LEFT`] (Hz).
@@ -219,9 +217,32 @@ impl Series {
         for k in 0..left.nrows() {
             left[(k, k)] += Complex::new(1.0, 0.0);
         }
-        // Metres and radians: a radian counts as a metre at arm's length.
+        // In the directions that the joints can move the tool in; a radian counts as a metre.
+        let moved = complex(&self.moved);
+        let left = moved.tr_mul(&left) * moved;
         Some(left.map(|z| z.norm()).singular_values().amax())
     }
+}
+
+/// The damped pseudo-inverse, and an orthonormal basis of the directions that it does not damp; none of a matrix without any.
+///
+/// Near a singular pose joints would have to move far for little: singular values below [`WEAK`] of the largest are damped, the more
+/// the smaller they are (Nakamura and Hanafusa 1986), and what they would do is left to further iterations, or undone.
+fn damped_inverse(H: &DMatrix<f64>) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
+    let svd = H.clone().svd(true, true);
+    let (U, Vt) = (svd.u?, svd.v_t?);
+    let values = svd.singular_values;
+    let largest = values.amax();
+    if largest.is_nan() || largest <= 0.0 {
+        return None;
+    }
+    let weak = WEAK * largest;
+    let smallest = values.amin();
+    let damping = if smallest < weak { weak * weak * (1.0 - (smallest / weak).powi(2)) } else { 0.0 };
+    let gains = values.map(|s| if s < weak { s / (s * s + damping) } else { 1.0 / s });
+    let inverse = Vt.transpose() * DMatrix::from_diagonal(&gains) * U.transpose();
+    let strong: Vec<usize> = (0..values.len()).filter(|k| values[*k] >= weak).collect();
+    Some((inverse, U.select_columns(&strong)))
 }
 
 /// Rates by central differences of fourth order, the ends held.

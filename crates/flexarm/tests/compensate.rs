@@ -120,6 +120,29 @@ fn a_shaped_motion_ends_with_less_vibration() {
     assert!(shaped.shaper_delay_s > 0.02 && swing(&shaped) < 0.5 * swing(&plain));
 }
 
+/// The home pose of most wrists is singular: axis 5 at zero.
+#[test]
+fn a_motion_that_begins_at_a_singular_wrist_is_compensated_and_that_is_said() {
+    let (robot, motion) = shipped("kr300", "kr300.toml");
+    let found = compensate_motion(&robot, &motion, &request()).unwrap();
+    told("kr300", &found);
+    assert!(found.caveats.iter().any(|caveat| caveat.code == "singular"));
+    assert!(found.after.peak_m <= 0.01 * found.before.peak_m, "{:e}", found.after.peak_m);
+}
+
+/// The run is logged at whole numbers of steps; the motion does not end at one.
+#[test]
+fn the_error_does_not_depend_on_the_step_at_which_it_is_sampled() {
+    let (robot, motion) = shipped("kr210", "milling_square.toml");
+    let peak = |step_s: f64| {
+        let run = RunOptions { step_s, ..RunOptions::default() };
+        let found = compensate_motion(&robot, &motion, &CompensateRequest { run, iterations: 0, ..request() }).unwrap();
+        found.before.rms_m
+    };
+    let (fine, odd) = (peak(1e-3), peak(0.7e-3));
+    assert!((odd / fine - 1.0).abs() < 1e-4, "{fine:e} {odd:e}"); // measured: below 1e-5
+}
+
 #[test]
 fn what_cannot_be_compensated_is_said() {
     let (robot, motion) = shipped("kr210", "pick_and_place.toml");
@@ -128,6 +151,8 @@ fn what_cannot_be_compensated_is_said() {
         assert!(error.contains(part), "{error}");
     };
     fails(&robot, CompensateRequest { components: [false; 6], ..request() }, "no component");
+    let coarse = RunOptions { step_s: 0.05, ..RunOptions::default() };
+    fails(&robot, CompensateRequest { run: coarse, ..request() }, "at most 0.004 s");
     fails(&robot, CompensateRequest { cutoff_hz: Some(-1.0), ..request() }, "expected a positive frequency");
     let rigid = Robot::load(root().join("robots/kr210/kr210.urdf")).unwrap();
     fails(&rigid, request(), "no flexible link and no elastic drive");

@@ -281,6 +281,7 @@ pub fn compensate_motion(robot: &Robot, motion: &Motion, request: &CompensateReq
         curves: job.times.iter().zip(wander.iter().zip(&left)).map(|(t, (a, b))| [*t, *a, *b]).collect(),
     };
     answer.caveats = caveats(&answer, &motion, robot);
+    answer.caveats.extend(found.fewest.and_then(|fewest| singular_caveat(fewest, job.rows.len())));
     if let Some([file, page]) = targets {
         let mut csv = Vec::new();
         found.motion.trajectory.to_csv(1.0 / SAMPLE_S, &mut csv)?;
@@ -338,6 +339,8 @@ struct Commands {
     peaks: Vec<f64>,
     kept: usize,
     cutoff_hz: Option<f64>,
+    /// When the joints move the tool in fewest directions (s), and in how many.
+    fewest: Option<(f64, usize)>,
 }
 
 impl<'a> Job<'a> {
@@ -470,6 +473,7 @@ impl<'a> Job<'a> {
             peaks: Vec::new(),
             kept: 0,
             cutoff_hz: Some(cutoff),
+            fewest: inversion.fewest_directions(),
         };
         let mut error = self.error(self.arm, run, &self.as_it_is()?)?;
         let size = |error: &DMatrix<f64>| error.select_rows(&self.rows).norm();
@@ -533,7 +537,7 @@ impl<'a> Job<'a> {
         let run = &self.request.run;
         let peaks =
             vec![peak(&self.error(self.arm, run, &self.as_it_is()?)?), peak(&self.error(self.arm, run, &motion)?)];
-        Ok(Commands { motion, change, peaks, kept: 1, cutoff_hz: None })
+        Ok(Commands { motion, change, peaks, kept: 1, cutoff_hz: None, fewest: None })
     }
 }
 
@@ -676,6 +680,17 @@ fn shaped(arm: &Arm, motion: &Motion, kind: ShaperKind) -> Result<(Motion, f64),
     let trajectory = Trajectory::through_knots(&times, &joints)?;
     let shaped = Motion::along(trajectory, &format!("{}_shaped", motion.name), arm.robot())?;
     Ok((shaped, shaper.delay_s()))
+}
+
+/// Where the joints cannot correct everything that is asked for.
+fn singular_caveat((t_s, directions): (f64, usize), asked: usize) -> Option<Caveat> {
+    (directions < asked).then(|| {
+        let text = format!(
+            "at {t_s:.2} s the joints move the tool in {directions} of the {asked} directions asked for (a singular pose, or too few joints): \
+             the others are corrected little or not at all there"
+        );
+        Caveat::said("singular", "compensation", text, "ask for fewer components, or begin and pass elsewhere")
+    })
 }
 
 fn caveats(answer: &Compensation, motion: &Motion, robot: &Robot) -> Vec<Caveat> {
