@@ -140,7 +140,7 @@ fn the_error_does_not_depend_on_the_step_at_which_it_is_sampled() {
         found.before.rms_m
     };
     let (fine, odd) = (peak(1e-3), peak(0.7e-3));
-    assert!((odd / fine - 1.0).abs() < 1e-4, "{fine:e} {odd:e}"); // measured: below 1e-5
+    assert!((odd / fine - 1.0).abs() < 1e-4, "{fine:e} {odd:e}");
 }
 
 #[test]
