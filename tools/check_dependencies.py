@@ -23,16 +23,18 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = "ARCHITECTURE.md"
-LINES = ["faces", "proof", "facade", "edges", "results", "motion", "links", "base", "words", "algebra"]  # top to bottom
+LINES = ["packages", "faces", "proof", "facade", "edges", "results", "motion", "links", "base", "words", "algebra"]  # top to bottom
+FACES = ("packages", "faces")  # what people hold: words, signals, the end of the process
 INNER = ["results", "motion", "links", "base", "words", "algebra"]
 OWNERS = {  # outside crate: crates or lines that may name it
     "rerun": ["flexarm-log"], "re_chunk": ["flexarm-log"], "re_log_encoding": ["flexarm-log"], "re_log_types": ["flexarm-log"],
     "re_sdk_types": ["flexarm-log"], "re_tuid": ["flexarm-log"], "mcap": ["flexarm-log"], "parquet": ["flexarm-log"], "zstd": ["flexarm-log", "flexarm-motion-io"],
-    "rusqlite": ["flexarm-motion-io"], "toml_edit": ["facade"], "lz4_flex": ["flexarm-motion-io"],
+    "rusqlite": ["flexarm-motion-io"], "toml_edit": ["facade"], "lz4_flex": ["flexarm-motion-io"], "bzip2": ["flexarm-motion-io"],
     "arrow-array": ["flexarm-log"], "arrow-ipc": ["flexarm-log"], "arrow-schema": ["flexarm-log"],
     "png": ["flexarm-draw"], "plotters": ["flexarm-draw"], "hdf5-pure": ["flexarm-fe-io"],
     "faer": ["flexarm-fem"], "diffsol": ["flexarm-stepping"], "metis-sys": ["flexarm-fem"], "urdf-rs": ["flexarm-urdf"], "saphyr-parser": ["flexarm-urdf", "flexarm-motion-io"],
     "rustix": ["flexarm-log"], "signal-hook": ["faces"],
+    "pyo3": ["flexarm-python"], "pyo3-build-config": ["flexarm-python"], "numpy": ["flexarm-python"],
     "clap": ["faces"], "clap_complete": ["faces"], "clap_mangen": ["faces"], "indicatif": ["faces"],
 }
 PRINTS = re.compile(r"\b(?:e?print(?:ln)?|dbg)!\s*[(\[{]|\bstd::io::(?:stdout|stderr)\b")
@@ -71,14 +73,17 @@ MUST_NOT_KNOW = {  # crate: what its code must not have, and what it is; imports
     "flexarm-flexlink": [FILES],
     "flexarm-identify": [FILES, (r"\b(?:Robot|Trajectory)\b", "robots by name and motion"),
                          (r"\bflexarm_(?!identify\b|stepping\b|kinematics\b|testkit\b)\w+", "more than arms at rest")],
+    "flexarm-study": [FILES, (r"\bflexarm_(?!study\b)\w+", "other crates of the workspace")],
     "flexarm-path": [FILES, (r"\b[Ss]tiffness\b", "stiffness"), (r"\bflexarm_(?!path\b|kinematics\b|spatial\b|trajectory\b|testkit\b)\w+", "more than motions")],
     "flexarm-stepping": [FILES, (r"\b(?:TcpMetrics|substitute)\b", "metrics and substitution")],
+    "flexarm-chatter": [FILES, (r"\b(?:Robot|Pose)\b", "robots and poses"), (r"\bflexarm_(?!chatter\b)\w+", "other crates of the workspace")],
     "flexarm-analysis": [FILES, (r"\bflexarm_(?!analysis\b|kinematics\b)\w+", "other crates than the one of poses")],
     "flexarm-urdf": [(r"\b(?:inverse_dynamics|mass_matrix|forward_dynamics)\b", "dynamics")],
     "flexarm-log": [(r"\bflexarm_stepping\b|\bStepper\b", "how a simulation runs"), (r"\bflexarm_fem\b", "finite elements")],
     "flexarm": [(r"\bclap\b|\bindicatif\b", "arguments and terminals")],
     "flexarm-verify": [(r"\bclap\b|\bindicatif\b", "arguments and terminals")],
-    "flexarm-cli": [(r"\bflexarm_(?!verify\b)\w+", "other crates than the facade and the case studies")],
+    "flexarm-cli": [(r"\bflexarm_(?!verify\b|cli\b)\w+", "other crates than the facade and the case studies")],
+    "flexarm-python": [(r"\bflexarm_(?!cli\b)\w+", "other crates than the facade and the command line")],
     "flexarm-testkit": [], "flexarm-tests": [],      # truths and privacy show in no word
 }
 CRATE_NAME = re.compile(r"(?<![\w/-])flexarm(?:-[a-z0-9]+)+(?![\w-])")
@@ -215,7 +220,7 @@ def check_source(crate, line, path, text):
         return problems
     pattern, _ = ALLOWED.get(str(path), (r"(?!)", ""))
     may = lambda hit: re.fullmatch(pattern, hit.group())
-    is_library = line not in ("faces", "tests")
+    is_library = line not in (*FACES, "tests")
     before_tests = text.split("\n#[cfg(test)]\nmod ", 1)[0]
     for number, literal in literals(before_tests) if is_library else []:
         for hit in [h for h in FLAG.finditer(literal) if not may(h)][:1]:
@@ -229,7 +234,7 @@ def check_source(crate, line, path, text):
             if re.search(word, code):
                 problems.append(f"{path}:{number}: {crate} knows {what}, which {PAGE} says it must not")
     for number, code in enumerate(code_of(text).splitlines(), 1):
-        if line not in ("faces", "tests") and PRINTS.search(code):
+        if line not in (*FACES, "tests") and PRINTS.search(code):
             problems.append(f"{path}:{number}: {crate} prints; only the faces do: return what is to be said")
         if line in INNER and CLOCK.search(code):
             problems.append(f"{path}:{number}: {crate} ({line}) reads a clock: pass the value in")
@@ -296,6 +301,9 @@ def self_test():
         ("on the tests", found({"flexarm": ["dev:flexarm-tests"]}), "nothing depends on the tests"),
         ("testkit too high", found({"flexarm-testkit": ["flexarm-stepping"]}), "base line and below only"),
         ("mcap below", found({"flexarm-stepping": ["mcap"]}), "dependency on mcap: only flexarm-log may name it"),
+        ("a package on a face", found({"flexarm-python": ["flexarm", "flexarm-cli", "pyo3"]}, {**lines, "packages": ["flexarm-python"]}), None),
+        ("a face on a package", found({"flexarm-python": [], "flexarm-cli": ["flexarm-python"]}, {**lines, "packages": ["flexarm-python"]}), "flexarm-cli (faces): dependency on flexarm-python (packages)"),
+        ("pyo3 in a face", found({"flexarm-cli": ["flexarm", "pyo3"]}), "only flexarm-python may name it"),
         ("rerun in a face", found({"flexarm-cli": ["flexarm", "rerun"]}), "dependency on rerun: only flexarm-log"),
         ("faer elsewhere", found({"flexarm-stepping": ["dev:faer"]}), "dev-dependency on faer: only flexarm-fem"),
         ("diffsol elsewhere", found({"flexarm": ["diffsol"]}), "only flexarm-stepping may name it"),
@@ -340,6 +348,7 @@ def self_test():
         ("stiffness in a text of the kinematics", check_source("flexarm-kinematics", "base", "c.rs", 'f("stiffness"); // stiffness'), None),
         ("stiffness in the kinematics", check_source("flexarm-kinematics", "base", "c.rs", "let stiffness = 1.0;"), "knows stiffness"),
         ("a face below the facade", check_source("flexarm-cli", "faces", "c.rs", "use flexarm_log::Sample;"), "other crates than the facade"),
+        ("a package below the facade", check_source("flexarm-python", "packages", "c.rs", "use flexarm_log::Sample;"), "other crates than the facade"),
         ("a face and the facade", check_source("flexarm-cli", "faces", "c.rs", "use flexarm::Error;\nuse flexarm_verify::verify;"), None),
         ("no lints", check_manifest("c", "c/Cargo.toml", "[package]\n"), "lints"),
         ("lints", check_manifest("c", "c/Cargo.toml", "[lints]\nworkspace = true\n"), None),

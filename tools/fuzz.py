@@ -94,6 +94,54 @@ URDF = """<?xml version="1.0"?>
 </robot>
 """
 
+SWEEP = """format = 1
+name = "fuzzed"
+robot = "robot.toml"
+motion = "motion.toml"
+metrics = ["peak_mm = 1e3 * tcp.peak_m", "links.bar.peak_contribution_m", "mass = robot.mass_kg"]
+best = "peak_mm"
+pareto = ["mass", "peak_mm"]
+
+[options]
+step = 0.01
+links = "lumped"
+
+[[parameter]]
+path = "payload.mass"
+from = 1.0
+to = 2.0
+count = 2
+
+[[parameter]]
+name = "height"
+path = "link.bar.beam.height"
+distribution = "uniform"
+low = 0.03
+high = 0.05
+
+[[parameter]]
+paths = ["link.bar.damping.modal"]
+expression = "0.5 * height + 0.001 * payload.mass"
+
+[sample]
+method = "saltelli"
+count = 2
+seed = 3
+
+[minimise]
+metric = "mass"
+constraints = ["peak_mm <= 40"]
+runs = 16
+"""
+
+SWEEP_TABLE = """format = 1
+robot = "robot.toml"
+motion = "motion.toml"
+runs = "table.csv"
+[options]
+step = 0.01
+"""
+
 XACRO = """<?xml version="1.0"?>
 <robot name="beam" xmlns:xacro="http://www.ros.org/wiki/xacro">
   <xacro:property name="length" value="0.8"/>
@@ -713,6 +761,37 @@ def box_stl(length, width, height):
     return b"box".ljust(80) + struct.pack("<I", len(triangles)) + b"".join(map(pack, triangles))
 
 
+CUTTING_TOOL = """format = 1
+lengths = "mm"
+angles = "deg"
+pressures = "N/mm2"
+deepest = 5.0
+[cutter]
+teeth = 2
+diameter = 10.0
+helix = 30.0
+lead = 90.0
+coefficients = { tangential = 800.0, radial = 250.0, axial = 100.0 }
+[engagement]
+kind = "down"
+ae = 3.0
+[spindle]
+rpm = [3000.0, 6000.0]
+[tool]
+axis = [0.0, 0.0, 1.0]
+feed = [1.0, 0.0, 0.0]
+tip = [0.0, 0.0, 50.0]
+feed_per_tooth = 0.1
+[[mode]]
+direction = "radial"
+frequency = 700.0
+damping = 0.03
+stiffness = 1e7
+"""
+MEASURED_TOOL = CUTTING_TOOL[:CUTTING_TOOL.index("[[mode]]")] + '[measured]\nfile = "frf.csv"\n'
+TOOL_RESPONSE = "frequency_hz,xx_re,xx_im,yy_re,yy_im\n" + "".join(f"{hz},1e-7,{-1e-9 * hz},1e-7,{-2e-9 * hz}\n" for hz in range(10, 200, 10))
+
+
 class Target:
     """A sound file to change, the files beside it, and the commands that read it."""
 
@@ -755,7 +834,12 @@ def own_targets():
         Target("measurements", "job.toml", {**base, "job.toml": MEASUREMENTS, "pulls.csv": PULLS}, [["identify", "robot.toml", "job.toml", "--no-files", "--json"]]),
         Target("measurement-table", "pulls.csv", {**base, "job.toml": MEASUREMENTS, "pulls.csv": PULLS}, [["identify", "robot.toml", "job.toml", "-o", "made", "--force", "--json"]]),
         Target("plan-poses", "poses.csv", {**base, "poses.csv": "swing,elbow,finger\n0.1,0.2,0.01\n-0.3,0.5,0.0\n0.4,-0.2,0.02\n"}, [["identify", "robot.toml", "--plan", "2", "--poses", "poses.csv", "--no-files", "--json"]]),
+        Target("sweep", "study.toml", {**base, "study.toml": SWEEP, "table.csv": "payload.mass,motion.speed\n1.0,1.0\n1.5,0.9\n"}, [["sweep", "study.toml", "-o", "made", "--force", "--threads", "1", "--json"], ["sweep", "study.toml", "--minimise", "--most-runs", "16", "-o", "made", "--force", "--threads", "1", "--json"]], True),
+        Target("sweep-table", "table.csv", {**base, "study.toml": SWEEP_TABLE, "table.csv": "payload.mass,motion.speed\n1.0,1.0\n1.5,0.9\n"}, [["sweep", "study.toml", "-o", "made", "--force", "--threads", "1", "--json"]], True),
         Target("compensate", "motion.toml", base, [["compensate", "robot.toml", "motion.toml", "--no-files", "--no-sweep", "--iterations", "1", "--components", "z", "--json"]], True),
+        Target("map", "robot.toml", base, [["map", "robot.toml", "--over", "swing=-0.5:0.5:5", "--wrench", "1,2,3", "--no-files", "--json"]]),
+        Target("cutting-tool", "tool.toml", {**base, "tool.toml": CUTTING_TOOL}, [["lobes", "robot.toml", "--tool", "tool.toml", "--no-files", "--json"], ["lobes", "robot.toml", "--tool", "tool.toml", "--deepest", "1e-6", "--no-files", "--json"], ["lobes", "robot.toml", "--tool", "tool.toml", "--cut", "3000,0.001", "--seconds", "0.05", "--no-files", "--json"]], True),
+        Target("tool-response", "frf.csv", {**base, "tool.toml": MEASURED_TOOL, "frf.csv": TOOL_RESPONSE}, [["lobes", "robot.toml", "--tool", "tool.toml", "--no-files", "--json"], ["lobes", "robot.toml", "--tool", "tool.toml", "--deepest", "1e-6", "--no-files", "--json"]], True),
         Target("motion-toml", "motion.toml", base, [check, COMPARE], True),
         Target("motion-csv", "motion.csv", base, [["check", "robot.toml", "motion.csv", "--json"], [w if w != "motion.toml" else "motion.csv" for w in COMPARE]], True),
         Target("motion-table", "trace.txt", {**base, "trace.txt": TRACE}, [["motion", "trace.txt", "robot.toml", "--json"], ["motion", "trace.txt", "--columns", "t=#1[ms],swing=A1[deg]", "--json"]]),
@@ -783,7 +867,7 @@ def own_targets():
         files = {"beam.urdf": with_visual(f'<mesh filename="{name}"/>'), name: content}
         targets.append(Target(f"visual-{name}", name, files, [["check", "beam.urdf", "--json"], ["inspect", "beam.urdf", "--json", "--inertia-from-density", "1000"]]))
     motions = ROOT / "crates/flexarm-motion-io/tests/data"
-    for name in ("plan.yaml", "display.yaml", "echo.yaml", "plan.json", "states_plain.mcap", "states_lz4.mcap", "states_zstd.mcap", "states_ros1.mcap", "nested_plan.mcap", "old.db3",
+    for name in ("plan.yaml", "display.yaml", "echo.yaml", "plan.json", "states_plain.mcap", "states_lz4.mcap", "states_zstd.mcap", "states_ros1.mcap", "states.bag", "states_bz2.bag", "states_lz4.bag", "nested_plan.mcap", "old.db3",
                  "bag_messages_packed/bag_messages_packed.db3", "bag_file_packed/bag_file_packed.db3.zstd"):
         own = Path(name).name
         targets.append(Target(f"motion-{own}", own, {own: (motions / name).read_bytes()}, [["motion", own, "--json"], ["motion", own, "--json", "-o", "other.csv", "--force"]]))
@@ -1016,6 +1100,8 @@ LINES = [
     COMPARE, ["check", "robot.toml", "motion.toml", "--json"], ["inspect", "robot.toml", "--at", "0.1,0.2", "--velocity", "1,2", "--json"],
     ["statics", "robot.toml", "--at", "0,0", "--wrench", "0,0,-10", "--json"], ["modes", "robot.toml", "--count", "3", "--json"],
     ["modes", "robot.toml", "--count", "2", "-o", "movie", "--force", "--seconds", "0.5", "--tool-motion", "0.1", "--json"],
+    ["map", "robot.toml", "--over", "swing=-0.5:0.5:7", "--at", "0.1,0.2", "--wrench", "0,0,-10", "--no-files", "--json"],
+    ["map", "robot.toml", "--along", "motion.toml", "--points", "20", "--keep", "all", "-o", "map", "--force", "--json"],
     ["response", "robot.toml", "--input", "force-x,swing", "--output", "x,rz", "--points", "20", "--from", "1", "--to", "100", "--no-files", "--json"],
     COMPARE + ["--stepper", "rk4", "--links", "rigid", "--drives", "rigid"], COMPARE + ["--stepper", "reference", "--rtol", "1e-6", "--drives", "rigid"],
     COMPARE + ["--links", "modal", "--modes", "3", "--log-rate", "100", "--settling-band", "1e-4", "--magnify", "10"], COMPARE + ["--segments", "4", "--rho-inf", "0.5"],
@@ -1102,6 +1188,18 @@ MAY_BE_NULL = {"settling_s", "frequency_hz", "at_rest", "compliance_share[]", "o
 NEW_MAY_BE_NULL = {"section", "width", "height", "wall", "wall_of_half_mass", "material", "y_axis", "offset", "taper", "open_cuts", "reason", "mass", "lower", "upper", "velocity", "effort", "effort_fault", "summary", "lower_limit", "upper_limit", "speed_limit", "torque_limit"}
 
 
+# Of sweep: what no run gave, and what was not asked for (docs/sweep.md).
+SWEEP_MAY_BE_NULL = {"min", "max", "mean", "std", "quantiles", "best", "pareto", "minimise", "shard", "page", "motion", "loads", "files", "command", "start", "range", "progress", "value"}
+
+
+def without_shares(answer):
+    """The answer of sweep without what is null under the names of parameters and metrics."""
+    for metric in answer.get("metrics", []):
+        metric.pop("shares", None)
+    (answer.get("best") or {}).pop("metrics", None)
+    return answer
+
+
 def judge(line, result, steps, known_nulls):
     """What the run was: a word, and whether it was wrong."""
     text = result.err.decode("utf-8", "replace")
@@ -1138,6 +1236,8 @@ def judge(line, result, steps, known_nulls):
                 return "done", False
             return "not JSON", True
         known_nulls = known_nulls | NEW_MAY_BE_NULL if "new" in line[:2] else known_nulls
+        if "sweep" in line[:2] and isinstance(answer, dict):
+            answer, known_nulls = without_shares(answer), known_nulls | SWEEP_MAY_BE_NULL
         wrong = [key for key in nulls(answer) if key.rstrip("[]") not in known_nulls and key not in known_nulls]
         if wrong:
             return f"no number in {wrong[0]}", True

@@ -5,7 +5,7 @@
     python3 tools/make_motion_fixtures.py
 
 One motion of two joints, sampled from closed forms, as our own CSV (the truth of the tests) and as messages and bags that
-the Python readers and writers of ROS write: rosbags for SQLite bags, MCAP bags and the bytes of messages (CDR of both byte
+the Python readers and writers of ROS write: rosbags for SQLite bags, MCAP bags, bags of ROS 1 and the bytes of messages (CDR of both byte
 orders, ROS 1), the MCAP library of Foxglove for chunks packed by lz4 and zstd, PyYAML and json for texts. A gripper is in
 the messages and not in the CSV. Times of reception differ from the stamps by design.
 """
@@ -18,6 +18,7 @@ from pathlib import Path
 import yaml
 from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
+from rosbags.rosbag1 import Writer as Rosbag1Writer
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
@@ -194,6 +195,22 @@ def mcap(name, types, topics, compression, little=True, ros1=False):
         writer.finish()
 
 
+def rosbag1(name, types, topics, compression=None):
+    """A bag of ROS 1; its chunks are closed at 1 KiB, so that there are several."""
+    path = FOLDER / name
+    path.unlink(missing_ok=True)
+    writer = Rosbag1Writer(path)
+    if compression:
+        writer.set_compression(compression)
+    writer.chunk_threshold = 1024
+    with writer:
+        for topic, messages in topics:
+            connection = None
+            for k, (ns, kind, message) in enumerate(messages):
+                connection = connection or writer.add_connection(topic, kind, typestore=types.store)
+                writer.write(connection, received(ns, k), bytes(types.store.serialize_ros1(message, kind)))
+
+
 def old_database(new, old):
     """As recorders before ROS 2 Iron wrote it: without definitions of messages."""
     shutil.copy(new, old)
@@ -216,6 +233,10 @@ def main():
     mcap("states_plain.mcap", ros2, both(ros2), CompressionType.NONE)
     mcap("states_big_endian.mcap", ros2, both(ros2), CompressionType.ZSTD, little=False)
     mcap("states_ros1.mcap", ros1, both(ros1), CompressionType.ZSTD, ros1=True)
+    rosbag1("states.bag", ros1, both(ros1))
+    rosbag1("states_bz2.bag", ros1, both(ros1), Rosbag1Writer.CompressionFormat.BZ2)
+    rosbag1("states_lz4.bag", ros1, both(ros1), Rosbag1Writer.CompressionFormat.LZ4)
+    rosbag1("plan.bag", ros1, [("/arm_controller/command", ros1.plan())])
     mcap("controller.mcap", ros2, [("/arm_controller/controller_state", ros2.controller_states())], CompressionType.ZSTD)
     mcap("plan.mcap", ros2, [("/arm_controller/joint_trajectory", ros2.plan())], CompressionType.ZSTD)
     mcap("nested_plan.mcap", ros2, [("/planned_path", ros2.nested_plan())], CompressionType.ZSTD)

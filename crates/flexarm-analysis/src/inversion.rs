@@ -229,6 +229,9 @@ impl Series {
 /// Near a singular pose joints would have to move far for little: singular values below [`WEAK`] of the largest are damped, the more
 /// the smaller they are (Nakamura and Hanafusa 1986), and what they would do is left to further iterations, or undone.
 fn damped_inverse(H: &DMatrix<f64>) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
+    if !H.norm_squared().is_finite() {
+        return None;
+    }
     let svd = H.clone().svd(true, true);
     let (U, Vt) = (svd.u?, svd.v_t?);
     let values = svd.singular_values;

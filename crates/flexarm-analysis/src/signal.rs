@@ -100,6 +100,9 @@ pub fn least_squares(columns: &[Vec<f64>], y: &[f64]) -> Option<Vec<f64>> {
     let size = |column: &Vec<f64>| column.iter().map(|x| x * x).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
     let sizes: Vec<f64> = columns.iter().map(size).collect();
     let X = DMatrix::from_fn(y.len(), columns.len(), |i, j| columns[j][i] / sizes[j]);
+    if !X.norm_squared().is_finite() {
+        return None;
+    }
     let solved = X.svd(true, true).solve(&DVector::from_column_slice(y), 1e-10).ok()?;
     Some(solved.iter().zip(&sizes).map(|(x, size)| x / size).collect())
 }

@@ -11,11 +11,14 @@ use crate::convert::ConvertArgs;
 use crate::exchange_args::{ExportArgs, ImportArgs};
 use crate::formats;
 use crate::identify::IdentifyArgs;
+use crate::lobes::LobesArgs;
+use crate::map::MapArgs;
 use crate::motion::{MotionArgs, MotionInputArgs};
 use crate::new::NewArgs;
 use crate::posed_args::{ModesArgs, ResponseArgs, StaticsArgs};
 use crate::reduce_args::ReduceArgs;
 use crate::report::ReportArgs;
+use crate::sweep::SweepArgs;
 use crate::verify::VerifyArgs;
 use crate::view::ViewArgs;
 
@@ -53,12 +56,18 @@ pub(crate) enum Command {
     Identify(Box<IdentifyArgs>),
     /// Find the motion with which the flexible arm's tool follows the rigid one's, and judge it on other plants
     Compensate(Box<CompensateArgs>),
+    /// Sag, stiffness and frequencies over the workspace, over joints or along a motion, and where to put a workpiece
+    Map(Box<MapArgs>),
+    /// Run a study: many runs with other payloads, stiffness, speeds, options; tables, sensitivities, shards
+    Sweep(Box<SweepArgs>),
     /// Equilibrium under weight and load at a pose, and the compliance of the TCP
     Statics(StaticsArgs),
     /// Natural frequencies, damping and shapes at a pose, drives locked
     Modes(ModesArgs),
     /// Frequency response of the TCP to forces on it and to motions of joints
     Response(ResponseArgs),
+    /// Limits of depth beyond which a cutting tool on the arm chatters, over the spindle speed
+    Lobes(Box<LobesArgs>),
     /// Make the HTML report of recorded runs
     Report(ReportArgs),
     #[command(about = formats::about_convert())]
@@ -328,6 +337,10 @@ pub(crate) enum PageName {
     Loads,
     /// What was measured at a robot, for flexarm identify (.toml)
     Measurements,
+    /// Cutting tools, for flexarm lobes (.toml)
+    Tool,
+    /// Studies of many runs, for flexarm sweep (.toml)
+    Study,
     #[value(help = formats::help_page())]
     Recordings,
     /// Reduced links (.flex)
@@ -343,6 +356,8 @@ impl PageName {
             Self::Program => include_str!("../../../docs/programs.md"),
             Self::Loads => include_str!("../../../docs/loads.md"),
             Self::Measurements => include_str!("../../../docs/identify.md"),
+            Self::Tool => include_str!("../../../docs/lobes.md"),
+            Self::Study => include_str!("../../../docs/sweep.md"),
             Self::Recordings => include_str!("../../../docs/recordings.md"),
             Self::Flex => include_str!("../../flexarm-fem/src/flex_file/format.md"),
         }

@@ -99,7 +99,7 @@ pub(crate) fn run(cli: &Cli, args: &IdentifyArgs) -> Result<ExitCode, Failure> {
 
 fn plan(cli: &Cli, args: &IdentifyArgs, robot: &Robot, count: usize) -> Result<ExitCode, Failure> {
     let folder = OutputFolder::of(args.output.as_deref(), &format!("{}_plan", robot.name), !args.no_files)?;
-    let forces = args.forces.iter().map(|text| values::wrench(text)).collect::<Result<Vec<_>, _>>()?;
+    let forces = args.forces.iter().map(|text| values::wrench("--pull", text)).collect::<Result<Vec<_>, _>>()?;
     if forces.iter().any(|[.., x, y, z]| [x, y, z].iter().any(|m| **m != 0.0)) {
         return Err(Failure::Usage("--pull takes a force of three numbers".into()));
     }

@@ -31,7 +31,7 @@ fn warn(cli: &Cli, warnings: &[String]) {
 }
 
 pub(crate) fn statics(cli: &Cli, args: &StaticsArgs) -> Result<ExitCode, Failure> {
-    let wrench = args.wrench.as_deref().map_or(Ok([0.0; 6]), values::wrench)?;
+    let wrench = args.wrench.as_deref().map_or(Ok([0.0; 6]), |text| values::wrench("--wrench", text))?;
     let (robot, modelling) = (load(&args.pose)?, args.pose.modelling.modelling());
     let at = values::joint_values(args.pose.at.as_deref(), &robot)?;
     let at = at.as_deref();

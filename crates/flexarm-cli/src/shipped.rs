@@ -2,14 +2,25 @@
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 use flexarm::{Error, closest};
 
 use crate::failure::Failure;
 
-/// Folders that may hold `robots/` and `trajectories/`: here, beside the program, and where it was built.
+/// A folder that the process brought along.
+static BROUGHT: OnceLock<PathBuf> = OnceLock::new();
+
+/// Names it; the first call counts.
+pub(crate) fn ship_from(folder: PathBuf) {
+    let _ = BROUGHT.set(folder);
+}
+
+/// Folders that may hold `robots/` and `trajectories/`: here, what the process brought, beside the program, and where it was
+/// built.
 fn roots() -> Vec<PathBuf> {
     let mut roots = vec![PathBuf::from(".")];
+    roots.extend(BROUGHT.get().cloned());
     if let Some(folder) = std::env::current_exe().ok().as_deref().and_then(Path::parent) {
         roots.push(folder.join("../share/flexarm"));
     }
@@ -31,11 +42,20 @@ pub(crate) fn find(given: &Path, folder: &str, endings: &[&str]) -> PathBuf {
         .unwrap_or_else(|| given.to_owned())
 }
 
+/// A robot by path, name, or place below the folder of the shipped ones (`kr210/beams.toml`), for files that name robots.
+pub(crate) fn robot_file(given: &Path) -> PathBuf {
+    let found = robot(Some(given)).unwrap_or_else(|_| given.to_owned());
+    if found.exists() {
+        return found;
+    }
+    roots().iter().map(|root| root.join("robots").join(given)).find(|path| path.exists()).unwrap_or(found)
+}
+
 /// A robot by path or name.
 ///
 /// # Errors
 /// A name that no robot has, with the ones that there are.
-pub(crate) fn robot(given: Option<&Path>) -> Result<PathBuf, Failure> {
+pub(crate) fn robot(given: Option<&Path>) -> Result<PathBuf, Error> {
     let given = given.unwrap_or(Path::new("kr210"));
     let path = find(given, "robots", &["/robot.toml"]);
     if path.exists() || given.components().count() != 1 || given.extension().is_some() {
@@ -54,12 +74,31 @@ pub(crate) fn robot(given: Option<&Path>) -> Result<PathBuf, Failure> {
          with one, or a .urdf or .xacro file",
         names.join(", ")
     );
-    Err(Error::File { path, what }.into())
+    Err(Error::File { path, what })
 }
 
 /// A trajectory by path or name.
 pub(crate) fn trajectory(given: &Path) -> PathBuf {
     find(given, "trajectories", &["", ".toml", ".csv"])
+}
+
+/// A cutting tool by path or name.
+///
+/// # Errors
+/// A name that no tool has, with the ones that there are.
+pub(crate) fn tool(given: &Path) -> Result<PathBuf, Failure> {
+    let path = find(given, "robots/tools", &[".toml"]);
+    if path.exists() || given.components().count() != 1 || given.extension().is_some() {
+        return Ok(path);
+    }
+    let files = |root: PathBuf| std::fs::read_dir(root.join("robots/tools")).into_iter().flatten().flatten();
+    let tools = roots().into_iter().flat_map(files).map(|entry| entry.path());
+    let tools = tools.filter(|path| path.extension().is_some_and(|ending| ending == "toml"));
+    let mut names: Vec<String> = tools.filter_map(|p| Some(p.file_stem()?.to_string_lossy().into_owned())).collect();
+    names.sort();
+    names.dedup();
+    let what = format!("there is no such file and no shipped tool of this name; shipped are {}", names.join(", "));
+    Err(Error::File { path, what }.into())
 }
 
 /// Where a command puts its files: the folder that was asked for, else a new one that no other run can have.

@@ -65,15 +65,17 @@ pub(crate) fn joint_values(text: Option<&str>, robot: &Robot) -> Result<Option<V
 
 /// Reads a wrench: `fx,fy,fz` or `fx,fy,fz,tx,ty,tz` (N, N m).
 ///
+/// * `flag`: what messages call it.
+///
 /// # Errors
 /// [`Failure::Usage`].
-pub(crate) fn wrench(text: &str) -> Result<[f64; 6], Failure> {
-    let values = numbers(text).map_err(|what| Failure::Usage(format!("--wrench: {what} (N, N m)")))?;
+pub(crate) fn wrench(flag: &str, text: &str) -> Result<[f64; 6], Failure> {
+    let values = numbers(text).map_err(|what| Failure::Usage(format!("{flag}: {what} (N, N m)")))?;
     match values.as_slice() {
         [fx, fy, fz] => Ok([*fx, *fy, *fz, 0.0, 0.0, 0.0]),
         [fx, fy, fz, tx, ty, tz] => Ok([*fx, *fy, *fz, *tx, *ty, *tz]),
         other => Err(Failure::Usage(format!(
-            "--wrench has {} numbers; expected fx,fy,fz or fx,fy,fz,tx,ty,tz in world axes",
+            "{flag} has {} numbers; expected fx,fy,fz or fx,fy,fz,tx,ty,tz in world axes",
             other.len()
         ))),
     }

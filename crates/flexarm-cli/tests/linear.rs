@@ -1,4 +1,4 @@
-//! `statics`, `modes`, `response`: keys, numbers that hold each other up, files, and bad input.
+//! `statics`, `modes`, `response`, `map`: keys, numbers that hold each other up, files, and bad input.
 #![allow(clippy::unwrap_used, reason = "a panic is how a test fails")]
 #![allow(non_snake_case, reason = "C for compliance")]
 
@@ -326,5 +326,56 @@ mod response {
         assert!(seen["warnings"].to_string().contains("no damping"), "{}", seen["warnings"]);
         let rigid = place.json(&["response", "beam.urdf", "--input", "swing", "--from", "1", "--to", "9", "-o", "r"]);
         assert!((rigid["curves"][1]["at_rest"].as_f64().unwrap() - LENGTH).abs() < 1e-12);
+    }
+}
+
+mod map {
+    use super::*;
+
+    #[test]
+    fn keys_files_and_numbers_that_statics_gives() {
+        let place = Place::new();
+        let robot = shipped_robot("kr210");
+        let line =
+            ["map", &robot, "--box", "1.4:2.2,-0.4:0.4,0.6:1.4", "--grid", "0.4", "--wrench", "500,0,0", "-o", "out"];
+        let seen = place.json(&[&line[..], &["--workpiece", "0.4,0.4,0"]].concat());
+        assert_eq!((seen["points"].as_u64(), seen["reachable"].as_u64()), (Some(27), Some(27)));
+        for key in ["sag_m", "error_m", "compliance_worst_m_per_n", "frequency_1_hz", "share_link_2"] {
+            let spread = &seen["quantities"][key];
+            let [min, median, max] =
+                [&spread["min"], &spread["quantiles"]["0.5"], &spread["max"]].map(|x| x.as_f64().unwrap());
+            assert!(min <= median && median <= max, "{key}");
+        }
+        for file in ["map.parquet", "map.html", "map.rrd", "map.json"] {
+            assert!(place.path(&format!("out/{file}")).metadata().unwrap().len() > 1000, "{file}");
+        }
+        let at: Vec<String> = numbers(&seen["worst"]["q"]).iter().map(f64::to_string).collect();
+        let alone = place.json(&["statics", &robot, "--at", &at.join(","), "--wrench", "500,0,0"]);
+        let size = numbers(&alone["tcp_displacement_m"]).iter().map(|x| x * x).sum::<f64>().sqrt();
+        assert_eq!(seen["worst"]["value"].as_f64(), Some(size));
+        assert_eq!(seen["by"], "error_m");
+        assert_eq!(seen["placement"]["points"], 4);
+        // A second one does not replace the first.
+        place.refused(&line, &["map.parquet", "--force"]);
+    }
+
+    #[test]
+    fn bad_input_is_told_in_words_of_the_command_line() {
+        let place = Place::new();
+        let robot = shipped_robot("kr210");
+        for (flags, words) in [
+            (&["--box", "1,2,3"][..], "X0:X1"),
+            (&["--over", "joint_2"], "JOINT=FROM:TO:N"),
+            (&["--over", "elbow=0:1:3"], "joint_2"),
+            (&["--grid", "0"], "--grid"),
+            (&["--grid", "1e-9"], "--grid"),
+            (&["--tool-axis", "0,0,0"], "--tool-axis"),
+            (&["--by", "stiffness"], "compliance_worst_m_per_n"),
+            (&["--along", "pick_and_place", "--points", "0"], "instants"),
+            (&["--box", "8:9,8:9,8:9"], "within reach"),
+            (&["--workpiece", "-1,0,0"], "workpiece"),
+        ] {
+            place.refused(&[&["map", &robot, "--no-files"], flags].concat(), &[words]);
+        }
     }
 }

@@ -30,6 +30,8 @@
 #[cfg(feature = "png")]
 mod arm_picture;
 mod bend;
+pub mod charts;
+mod field_plot;
 mod magnify;
 #[cfg(feature = "png")]
 pub mod mesh_picture;
@@ -39,5 +41,6 @@ mod plot;
 #[cfg(feature = "png")]
 pub use arm_picture::{ArmPicture, ArmPictureError, ArmSide, arm_color, arm_picture, arm_pictures, arm_png, arm_sheet};
 pub use bend::{BendLine, BentMesh, BentPieces};
+pub use field_plot::FieldPlot;
 pub use magnify::{Magnifier, stations_in_link};
 pub use plot::{CurveLook, LinePlot, Panel, PlotCurve, PlotError, page_plot, paper_plot, plan_plot};

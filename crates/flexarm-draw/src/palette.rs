@@ -6,8 +6,8 @@
 //! * [`series`]: whatever is counted (runs, links, drives, joints), in one order.
 //! * [`rigid`]: the rigid twin, a grey that no run has.
 //!
-//! Each colour has a shade for paper and one for a dark ground. Not here: the scales for magnitudes, which belong to the
-//! pictures that use them.
+//! Each colour has a shade for paper and one for a dark ground.
+//! * [`magnitude`]: how large something is.
 
 /// Red, green, blue.
 pub type Rgb = [u8; 3];
@@ -57,6 +57,22 @@ const SERIES: [[Rgb; 12]; 2] = [
     ],
 ];
 
+/// Viridis (van der Walt and Smith, public domain) at nine places; between them linear.
+const SCALE: [Rgb; 9] = [
+    [68, 1, 84],
+    [71, 44, 122],
+    [59, 81, 139],
+    [44, 113, 142],
+    [33, 144, 141],
+    [39, 173, 129],
+    [92, 200, 99],
+    [170, 220, 50],
+    [253, 231, 37],
+];
+
+/// Where on that scale zero lies.
+const DARKEST: f64 = 0.08;
+
 /// So many colours of [`series`] are different; then they begin again.
 pub const SERIES_LENGTH: usize = 24;
 
@@ -101,6 +117,16 @@ pub fn total(ground: Ground) -> Rgb {
 #[must_use]
 pub fn hex([red, green, blue]: Rgb) -> String {
     format!("#{red:02x}{green:02x}{blue:02x}")
+}
+
+/// Colour of a magnitude from 0 to 1; perceptually even, dark to light.
+///
+/// The first part of the scale is left out: shade and edges are not seen on it.
+#[must_use]
+pub fn magnitude(value: f64) -> Rgb {
+    let place = (DARKEST + (1.0 - DARKEST) * value.clamp(0.0, 1.0)) * (SCALE.len() - 1) as f64;
+    let lower = (place.floor() as usize).min(SCALE.len() - 2);
+    mix(SCALE[lower], SCALE[lower + 1], place - lower as f64)
 }
 
 /// `a` at 0, `b` at 1.
@@ -194,5 +220,15 @@ mod tests {
             let [low, high] = [rigid(ground).into_iter().min(), rigid(ground).into_iter().max()];
             assert!(high.zip(low).is_some_and(|(high, low)| high - low < 20), "the twin is grey");
         }
+    }
+
+    #[test]
+    fn the_colour_scale_grows_lighter_all_the_way() {
+        let light = |k: u32| {
+            let [r, g, b] = magnitude(f64::from(k) / 64.0).map(f64::from);
+            0.2126 * r + 0.7152 * g + 0.0722 * b
+        };
+        assert!((1..=64).all(|k| light(k) > light(k - 1)));
+        assert_eq!([magnitude(-1.0), magnitude(2.0)], [magnitude(0.0), SCALE[8]]);
     }
 }

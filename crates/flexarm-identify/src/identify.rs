@@ -131,7 +131,7 @@ pub enum IdentifyError {
     },
     /// Overflow.
     #[error(
-        "a residual or a derivative is not a number: a value or a deviation of the measurements is out of all proportion"
+        "a residual or a derivative is not a number: a value, a deviation or an uncertainty is out of all proportion"
     )]
     NotFinite,
 }
@@ -236,6 +236,9 @@ fn rigid_fit(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Option<Pose> {
     let middle = |points: &[Vector3<f64>]| points.iter().sum::<Vector3<f64>>() / n as f64;
     let (a, b) = (middle(from), middle(to));
     let H: Matrix3<f64> = from.iter().zip(to).map(|(p, q)| (p - a) * (q - b).transpose()).sum();
+    if !H.norm_squared().is_finite() {
+        return None;
+    }
     let svd = H.svd(true, true);
     let (U, Vt) = (svd.u?, svd.v_t?);
     let mut sizes: Vec<f64> = svd.singular_values.iter().copied().collect();

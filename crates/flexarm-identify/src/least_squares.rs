@@ -263,6 +263,10 @@ impl Known {
         // Rows of zeros leave the singular values and make all directions come out.
         let rows = A.nrows().max(p);
         let A = A.resize(rows, p, 0.0);
+        // A prior of 1e308 times a derivative, or its square in the sizes of columns.
+        if !A.norm_squared().is_finite() {
+            return Err(SolveError::NotFinite);
+        }
         let svd = A.svd(false, true);
         let mut order: Vec<usize> = (0..p).collect();
         order.sort_by(|a, b| svd.singular_values[*b].total_cmp(&svd.singular_values[*a]));
@@ -386,6 +390,15 @@ mod tests {
             }
             Ok(DVector::from_fn(self.t.len(), |i, _| a * (-b * self.t[i]).exp() + c - self.y[i]))
         }
+    }
+
+    /// Its square is beyond the largest number.
+    #[test]
+    fn a_prior_out_of_all_proportion_is_refused() {
+        let t: Vec<f64> = (0..40).map(|k| 0.1 * f64::from(k)).collect();
+        let y = t.iter().map(|t| 30.0 * (-1.7 * t).exp() + 4.0).collect();
+        let refused = solve(&Decay { t, y }, &DVector::zeros(4), &[2.0, 1e308, 0.7], &Search::default());
+        assert!(matches!(refused, Err(SolveError::NotFinite)));
     }
 
     #[test]

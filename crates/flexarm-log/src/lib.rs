@@ -47,10 +47,12 @@
 
 mod create;
 mod csv_file;
+mod data_table;
 #[cfg(feature = "described-tables")]
 mod described_table;
 mod error;
 mod file_recorder;
+mod flat;
 mod formats;
 #[cfg(feature = "mcap")]
 mod mcap_file;
@@ -80,8 +82,12 @@ mod whole_file;
 
 pub use create::CreateOptions;
 pub use csv_file::CsvRecorder;
+pub use data_table::{DataColumn, DataTable, DataValues};
 pub use error::LogError;
 pub use file_recorder::{FileRecorder, OpenFile};
+#[cfg(feature = "arrow")]
+pub use flat::arrow_stream;
+pub use flat::flat_columns;
 pub use flexarm_sample::*;
 pub use formats::*;
 #[cfg(feature = "mcap")]

@@ -114,7 +114,7 @@ fn writer(file: File, header: &RunHeader) -> Result<SerializedFileWriter<File>, 
     Ok(writer)
 }
 
-fn parquet_error(path: &Path, action: &'static str) -> impl FnOnce(ParquetError) -> LogError {
+pub(crate) fn parquet_error(path: &Path, action: &'static str) -> impl FnOnce(ParquetError) -> LogError {
     move |error| match error {
         ParquetError::External(cause) => match cause.downcast::<io::Error>() {
             Ok(source) => LogError::io(path, action)(*source),

@@ -11,7 +11,7 @@ use crate::collect::{Collector, names_in_words};
 use crate::error::{MotionError, Problem, Trouble};
 use crate::unpack::{Inside, ZSTD_MAGIC, look_inside};
 use crate::value::{Node, Value};
-use crate::{MessageMotion, Request, mcap, sqlite, yaml};
+use crate::{MessageMotion, Request, mcap, rosbag, sqlite, yaml};
 
 /// A description of a bag is small.
 const MOST_METADATA: u64 = 16 << 20;
@@ -105,6 +105,9 @@ pub(crate) fn read_files(files: &[PathBuf], bag: &Path, request: &Request<'_>) -
         } else if head.starts_with(sqlite::SQLITE_MAGIC) {
             format = "SQLite bag";
             sqlite::collect_file(file, &mut collector)?
+        } else if head.starts_with(rosbag::ROSBAG_MAGIC) {
+            format = "bag of ROS 1";
+            rosbag::collect_file(file, &mut collector)?
         } else if head.starts_with(ZSTD_MAGIC) {
             match look_inside(file)? {
                 Inside::Mcap(stream) => mcap::collect(stream, &mut collector).map_err(|trouble| trouble.of(&origin))?,

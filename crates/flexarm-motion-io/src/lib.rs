@@ -22,6 +22,7 @@
 //! | YAML and JSON, also as printed by `ros2 topic echo` and `rostopic echo` | [`read_text`] | those below, wherever they stand in the text |
 //! | MCAP, chunks plain or packed by zstd or lz4 | [`read_mcap`] | `trajectory_msgs/JointTrajectory`, `sensor_msgs/JointState`, `control_msgs/JointTrajectoryControllerState`, and what holds a `JointTrajectory` (CDR of either byte order, ROS 1) |
 //! | SQLite bags (`.db3`) | [`read_db3`] | the same in CDR |
+//! | bags of ROS 1 (`.bag`), chunks plain or packed by bzip2 or lz4 | [`read_rosbag`] | the same in the bytes of ROS 1 |
 //! | folders of rosbag2 with `metadata.yaml` | [`read_folder`] | the same; files packed as a whole (`.zstd`) too |
 //!
 //! All ends in one tree of values ([`value`]): [`yaml`] makes it of text, [`cdr`] of bytes by the definition of the message
@@ -40,6 +41,7 @@ mod error;
 mod folder;
 mod mcap;
 mod message;
+mod rosbag;
 mod sqlite;
 mod text;
 mod unpack;
@@ -50,6 +52,7 @@ mod yaml;
 pub use error::{MotionError, Place, Problem};
 pub use folder::read_folder;
 pub use mcap::{MCAP_MAGIC, read_mcap};
+pub use rosbag::{ROSBAG_MAGIC, read_rosbag};
 pub use sqlite::{SQLITE_MAGIC, read_db3};
 pub use text::{looks_like_messages, read_text};
 pub use unpack::{ZSTD_MAGIC, read_packed};

@@ -18,6 +18,7 @@ pub(crate) fn unpacked(packing: Packing, bytes: &[u8]) -> (Vec<u8>, Option<Strin
         Packing::Zstd => {
             zstd::stream::read::Decoder::new(bytes).and_then(|unpack| unpack.take(MOST_BYTES + 1).read_to_end(&mut out))
         }
+        Packing::Bzip2 => bzip2::read::MultiBzDecoder::new(bytes).take(MOST_BYTES + 1).read_to_end(&mut out),
         Packing::Lz4 => lz4_flex::frame::FrameDecoder::new(bytes).take(MOST_BYTES + 1).read_to_end(&mut out),
     };
     let broken = match result {
@@ -31,6 +32,7 @@ pub(crate) fn unpacked(packing: Packing, bytes: &[u8]) -> (Vec<u8>, Option<Strin
 /// How bytes are packed.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Packing {
+    Bzip2,
     Zstd,
     Lz4,
 }

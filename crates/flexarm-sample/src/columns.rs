@@ -77,6 +77,8 @@ fn wxyz(twin: &crate::TwinSample) -> [f64; 4] {
 pub struct Columns {
     /// Joints, in the order of `position`, `velocity` and `effort`.
     pub joints: Vec<String>,
+    /// Which of them slide.
+    pub prismatic: Vec<bool>,
     /// Elastic elements, in the order of `deflection` and `load`: six numbers each.
     pub elements: Vec<String>,
     /// Who moves the tool, in the order of `contribution`: three numbers each.
@@ -100,6 +102,7 @@ impl Columns {
             |s: &Signal| Column { name: s.name.into(), unit: s.unit, width: width(s.width), values: Vec::new() };
         Self {
             joints: header.joints.clone(),
+            prismatic: header.prismatic.clone(),
             elements: header.elements.clone(),
             contributors: header.contributors.clone(),
             columns: signals.iter().map(column).collect(),

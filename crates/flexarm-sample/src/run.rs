@@ -55,6 +55,8 @@ pub struct RunHeader {
     /// What is shown from which instant on, in a recording of shapes that have no size of their own, such as modes: errors and
     /// deflections in it are drawn ones and are not told. Empty for a run.
     pub captions: Vec<Caption>,
+    /// What stands still around the robot, such as the points of a map.
+    pub scenery: Vec<Scenery>,
     /// Factor by which pictures show deflections; 0 for recordings without a magnified arm.
     pub magnification: f64,
     /// Deviation from the rigid twin that gets the last colour of the scale (m).
@@ -70,6 +72,60 @@ pub struct Caption {
     pub from_s: f64,
     /// In a few words.
     pub text: String,
+}
+
+/// Something that stands in the world and does not move.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scenery {
+    /// Title of the view that shows it; those of one title are shown together, those without one in all views.
+    pub view: String,
+    /// Name, unique within the view.
+    pub name: String,
+    /// What it is.
+    pub form: SceneryForm,
+}
+
+/// Shape and colours of what stands still (m, world; red, green, blue, alpha).
+#[derive(Clone, Debug, PartialEq)]
+pub enum SceneryForm {
+    /// Balls.
+    Points {
+        /// Centres.
+        places: Vec<[f32; 3]>,
+        /// One per ball, or one for all.
+        colors: Vec<[u8; 4]>,
+        /// Of every ball.
+        radius_m: f32,
+        /// One per ball, or none.
+        labels: Vec<String>,
+    },
+    /// A surface of triangles.
+    Surface {
+        /// Corners.
+        places: Vec<[f32; 3]>,
+        /// Corner indices.
+        triangles: Vec<[u32; 3]>,
+        /// Of all of it.
+        color: [u8; 4],
+    },
+    /// Ellipsoids.
+    Ellipsoids {
+        /// Centres.
+        places: Vec<[f32; 3]>,
+        /// Half axes.
+        half_axes_m: Vec<[f32; 3]>,
+        /// Rotations, x, y, z, w.
+        quaternions: Vec<[f32; 4]>,
+        /// One per ellipsoid.
+        colors: Vec<[u8; 4]>,
+    },
+    /// The edges of a box.
+    Box {
+        /// Lowest and highest corner.
+        corners: [[f32; 3]; 2],
+        /// Of all edges.
+        color: [u8; 4],
+    },
 }
 
 /// How a link bends: stations along the line from its near interface to its far one.

@@ -109,6 +109,16 @@ pub enum Setting {
     /// How the frequencies of a response are spread.
     Spacing,
 
+    // Maps.
+    /// Box of places (m).
+    Bounds,
+    /// Distance of places (m).
+    GridSpacing,
+    /// Where the tool points.
+    ToolAxis,
+    /// Joints that a map goes through.
+    MapJoints,
+
     // Links from meshes and matrices.
     /// Units of a mesh or of matrices.
     Units,
@@ -158,7 +168,7 @@ pub enum Setting {
 
 impl Setting {
     /// Every setting.
-    pub const ALL: [Self; 55] = [
+    pub const ALL: [Self; 59] = [
         Self::Step,
         Self::LogRate,
         Self::Stepper,
@@ -193,6 +203,10 @@ impl Setting {
         Self::HighestFrequency,
         Self::Points,
         Self::Spacing,
+        Self::Bounds,
+        Self::GridSpacing,
+        Self::ToolAxis,
+        Self::MapJoints,
         Self::Units,
         Self::Name,
         Self::Interface,
@@ -253,6 +267,10 @@ impl Setting {
             Self::HighestFrequency => "to_hz",
             Self::Points => "points",
             Self::Spacing => "spacing",
+            Self::Bounds => "bounds",
+            Self::GridSpacing => "spacing_m",
+            Self::ToolAxis => "axis",
+            Self::MapJoints => "joints_region",
             Self::Units => "units",
             Self::Name => "name",
             Self::Interface => "interface",

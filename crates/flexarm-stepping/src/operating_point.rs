@@ -3,8 +3,9 @@
 //! ```text
 //! K e + p(q_a, e) = 0          C = J (K + dp/de)^-1 Jᵀ          (K + dp/de) φ = ω² M φ
 //! ```
-//! with the elastic coordinates e, the springs K, and p the forces that hold weight and loads. Drives are locked. Newton goes on
-//! with the factor of the pose before, so a pose costs one tangent, in closed form ([`flexarm_kinematics::StaticTangent`]).
+//! with the elastic coordinates e, the springs K, and p the forces that hold weight and loads. Drives are locked. Newton begins
+//! with the factor of the springs, which weight changes little, so a pose costs one tangent, in closed form
+//! ([`flexarm_kinematics::StaticTangent`]), and its answer depends on nothing that was asked before.
 //!
 //! Start at [`OperatingPoint::new`]. For damping, servos and inputs about one pose: [`crate::linearise`].
 
@@ -37,8 +38,9 @@ pub struct OperatingPoint {
     data: Data,
     /// Any joint with play or a curved spring.
     curved: bool,
-    /// Springs at rest, n×n.
+    /// Springs at rest, n×n, and their factor, if they have one.
     K: DMatrix<f64>,
+    rest: Option<Cholesky<f64, Dyn>>,
     /// All coordinates: joints, then elastic ones.
     q: DVector<f64>,
     F_T_W: Wrench,
@@ -77,10 +79,12 @@ impl OperatingPoint {
     /// * `tool`: a frame of the arm's model.
     pub fn new(arm: FlexibleArm, tool: Frame) -> Self {
         let (n, nv) = (arm.n_elastic_coordinates(), arm.model.nv());
+        let K = arm.stiffness();
         Self {
+            rest: Cholesky::new(K.clone()).filter(|_| n > 0),
             data: Data::new(&arm.model),
             curved: arm.elements.iter().any(|element| element.curve.is_some()),
-            K: arm.stiffness(),
+            K,
             q: DVector::zeros(nv),
             F_T_W: Wrench::zeros(),
             p: DVector::zeros(nv),
@@ -130,6 +134,7 @@ impl OperatingPoint {
             return Err(StepError::Setup(format!("force and moment must be finite numbers, found {F_T_W:?}")));
         }
         self.F_T_W = *F_T_W;
+        self.start_from_springs();
         self.q.fill(0.0);
         self.q.rows_mut(0, m).copy_from_slice(q);
         forward_kinematics(&self.arm.model, &mut self.data, &self.q);
@@ -142,6 +147,7 @@ impl OperatingPoint {
             let held = FlexibleArm { motion: std::sync::Arc::new(Held(q.to_vec())), ..self.arm.clone() };
             let e = static_equilibrium(&held, 0.0)?;
             self.q.rows_mut(m, e.len()).copy_from(&e);
+            // The springs at rest are not those beyond the play.
             self.factor = None;
         }
         let residual = self.newton()?;
@@ -154,10 +160,18 @@ impl OperatingPoint {
         Ok(())
     }
 
-    /// Drops what is known from the poses before: the next answer is that of a new workspace, to the last bit.
-    pub fn forget(&mut self) {
-        self.factor = None;
-        self.residual = f64::NAN;
+    /// The factor of the springs at rest, in the room of the last one.
+    fn start_from_springs(&mut self) {
+        let Some(rest) = &self.rest else {
+            self.factor = None;
+            return;
+        };
+        let mut room = match self.factor.take() {
+            Some(factor) => factor.unpack_dirty(),
+            None => self.K.clone(),
+        };
+        room.copy_from(rest.l_dirty());
+        self.factor = Some(Cholesky::pack_dirty(room));
     }
 
     /// Newton's iteration from the elastic coordinates in `q`; returns the residual.
@@ -180,7 +194,7 @@ impl OperatingPoint {
                 if self.refactor(false).is_err() {
                     buckled = true;
                     // Its step would lead uphill, to a saddle: the springs alone lead down.
-                    self.factor = Cholesky::new(self.K.clone());
+                    self.factor.clone_from(&self.rest);
                 }
                 self.forces();
                 self.unbalance();

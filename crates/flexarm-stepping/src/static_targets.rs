@@ -82,16 +82,17 @@ pub fn static_targets(
             let after = Vector6::from_fn(|k, _| if components[k] { off[k] } else { 0.0 });
             return Ok(StaticTargets { q: targets.as_slice().to_vec(), before, after, iterations });
         }
-        if iterations == MOST_ITERATIONS {
+        // Commands move the tool and the equilibrium.
+        let yielding = at.K.clone().lu().solve(&at.K_a).unwrap_or_else(|| DMatrix::zeros(at.K.nrows(), at.K_a.ncols()));
+        let G = DMatrix::from_fn(6, targets.len(), |i, j| at.J_a[(i, j)]) - &at.J * yielding;
+        let G = G.select_rows(&rows);
+        if iterations == MOST_ITERATIONS || !G.norm_squared().is_finite() {
             let norm = |range: std::ops::Range<usize>| {
                 range.filter(|k| components[*k]).map(|k| off[k].abs()).fold(0.0, f64::max)
             };
             return Err(TargetError::NotReached { iterations, left_m: norm(0..3), left_rad: norm(3..6) });
         }
-        // Commands move the tool and the equilibrium.
-        let yielding = at.K.clone().lu().solve(&at.K_a).unwrap_or_else(|| DMatrix::zeros(at.K.nrows(), at.K_a.ncols()));
-        let G = DMatrix::from_fn(6, targets.len(), |i, j| at.J_a[(i, j)]) - &at.J * yielding;
-        let svd = G.select_rows(&rows).svd(true, true);
+        let svd = G.svd(true, true);
         let rank = RANK * svd.singular_values.amax();
         let step = svd.solve(&left, rank).unwrap_or_else(|_| DVector::zeros(targets.len()));
         targets -= step;

@@ -84,6 +84,6 @@ pub(crate) fn moving_links(model: &Model) -> Vec<&str> {
 }
 
 /// The frame of this name; `tcp` is that of the tool.
-fn frame_of<'m>(name: &str, model: &'m Model) -> Option<&'m Frame> {
+pub(crate) fn frame_of<'m>(name: &str, model: &'m Model) -> Option<&'m Frame> {
     model.frame(if name == "tcp" { TCP_FRAME } else { name })
 }

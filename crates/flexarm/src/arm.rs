@@ -16,7 +16,7 @@ use crate::flexible::FlexibleRobot;
 use crate::options::{Modelling, Outputs, RunOptions};
 use crate::prepare::Prepared;
 use crate::robot::Robot;
-use crate::run::{Observer, Together, Wanted, run_traced};
+use crate::run::{Observer, Progress, Together, Wanted, run_traced};
 use crate::scenario::Scenario;
 use crate::summary::Summary;
 
@@ -37,6 +37,14 @@ pub struct Run {
     pub summary: Summary,
     /// The signals.
     pub columns: Columns,
+}
+
+/// Called with each logged sample; breaking off stops the run.
+pub type SampleObserver<'a> = dyn FnMut(&Sample) -> ControlFlow<()> + 'a;
+
+/// Nobody breaks off.
+fn to_the_end(_t: f64, _total: f64) -> ControlFlow<()> {
+    ControlFlow::Continue(())
 }
 
 impl Run {
@@ -80,6 +88,21 @@ impl Arm {
         &self.prepared.flexible
     }
 
+    /// As [`Arm::flexible`], shared.
+    pub(crate) fn shared(&self) -> Arc<FlexibleRobot> {
+        self.prepared.flexible.clone()
+    }
+
+    /// [`Robot::caveats`], found once.
+    pub(crate) fn robot_caveats(&self) -> &[Caveat] {
+        &self.caveats
+    }
+
+    /// How its links and drives are modelled.
+    pub fn modelling(&self) -> &Modelling {
+        &self.modelling
+    }
+
     /// Actuated joints, in the order in which poses and motions have them.
     pub fn joints(&self) -> impl Iterator<Item = &str> {
         let model = &self.flexible().model;
@@ -93,7 +116,7 @@ impl Arm {
     /// As [`crate::simulate`].
     pub fn simulate(&self, scenario: impl Into<Scenario>, options: &RunOptions) -> Result<Run, Error> {
         let mut go_on = |_: &Sample| ControlFlow::Continue(());
-        self.run(&scenario.into(), options, None, Wanted::Columns, &mut go_on)
+        self.run(&scenario.into(), options, None, Wanted::Columns, &mut go_on, &mut to_the_end)
     }
 
     /// As [`Arm::simulate`], the figures alone: for studies of many runs of which nobody looks at the signals.
@@ -102,7 +125,7 @@ impl Arm {
     /// As [`crate::simulate`].
     pub fn simulate_summary(&self, scenario: impl Into<Scenario>, options: &RunOptions) -> Result<Summary, Error> {
         let options = RunOptions { modelling: self.modelling, ..options.clone() };
-        self.traced(&scenario.into(), &options, None, Wanted::Figures, None)
+        self.traced(&scenario.into(), &options, None, Wanted::Figures, None, &mut to_the_end)
     }
 
     /// As [`Arm::simulate`], writes recordings if asked to, and shows each logged sample to `observer`, which may break off.
@@ -116,9 +139,30 @@ impl Arm {
         outputs: Option<&Outputs>,
         observer: &mut dyn FnMut(&Sample) -> ControlFlow<()>,
     ) -> Result<Run, Error> {
+        self.simulate_watched(scenario, options, outputs, Some(observer), &mut to_the_end)
+    }
+
+    /// As [`Arm::simulate_with`], and tells `progress` how far it is, which may break off too; without an observer, samples
+    /// are made as far as columns and recordings need them.
+    ///
+    /// # Errors
+    /// As [`Arm::simulate_with`].
+    pub fn simulate_watched(
+        &self,
+        scenario: impl Into<Scenario>,
+        options: &RunOptions,
+        outputs: Option<&Outputs>,
+        observer: Option<&mut SampleObserver<'_>>,
+        progress: &mut Progress<'_>,
+    ) -> Result<Run, Error> {
         // What things look like is asked by nobody but recordings.
-        let wanted = if outputs.is_some() { Wanted::Curves } else { Wanted::Samples };
-        self.run(&scenario.into(), options, outputs, wanted, observer)
+        let wanted = match (outputs.is_some(), observer.is_some()) {
+            (true, _) => Wanted::Curves,
+            (false, true) => Wanted::Samples,
+            (false, false) => Wanted::Columns,
+        };
+        let mut go_on = |_: &Sample| ControlFlow::Continue(());
+        self.run(&scenario.into(), options, outputs, wanted, observer.unwrap_or(&mut go_on), progress)
     }
 
     /// A run with its columns.
@@ -129,6 +173,7 @@ impl Arm {
         outputs: Option<&Outputs>,
         wanted: Wanted,
         observer: &mut dyn FnMut(&Sample) -> ControlFlow<()>,
+        progress: &mut Progress<'_>,
     ) -> Result<Run, Error> {
         let options = RunOptions { modelling: self.modelling, ..options.clone() };
         let mut columns = Columns::default();
@@ -139,7 +184,7 @@ impl Arm {
             columns.push(sample);
             observer(sample)
         };
-        let summary = self.traced(scenario, &options, outputs, wanted, Some(&mut watch))?;
+        let summary = self.traced(scenario, &options, outputs, wanted, Some(&mut watch), progress)?;
         Ok(Run { summary, columns })
     }
 
@@ -151,6 +196,7 @@ impl Arm {
         outputs: Option<&Outputs>,
         wanted: Wanted,
         observer: Option<&'a mut Observer<'a>>,
+        progress: &mut Progress<'_>,
     ) -> Result<Summary, Error> {
         let together = Together {
             observer,
@@ -159,15 +205,28 @@ impl Arm {
             robot_caveats: Some(self.caveats.clone()),
             ..Together::default()
         };
-        let go_on = &mut |_, _| ControlFlow::Continue(());
-        run_traced(&self.robot, scenario, options, outputs, together, go_on).map(|(summary, _)| summary)
+        run_traced(&self.robot, scenario, options, outputs, together, progress).map(|(summary, _)| summary)
     }
 
     /// Runs all scenarios, on all cores; each is the same to the last bit as by [`Arm::simulate`], for every number of threads.
     ///
     /// Threads are those of `rayon`'s pool. A run that fails does not stop the others.
     pub fn simulate_batch(&self, scenarios: &[Scenario], options: &RunOptions) -> Vec<Result<Run, Error>> {
-        scenarios.par_iter().map(|scenario| self.simulate(scenario, options)).collect()
+        self.simulate_batch_until(scenarios, options, &|| false)
+    }
+
+    /// As [`Arm::simulate_batch`]; as soon as `stop` says so, runs that are not done end with [`Error::Interrupted`].
+    pub fn simulate_batch_until(
+        &self,
+        scenarios: &[Scenario],
+        options: &RunOptions,
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Vec<Result<Run, Error>> {
+        let one = |scenario| {
+            let progress = &mut |_, _| if stop() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
+            self.simulate_watched(scenario, options, None, None, progress)
+        };
+        scenarios.par_iter().map(one).collect()
     }
 
     /// A workspace for equilibria, compliances and frequencies at any number of poses.

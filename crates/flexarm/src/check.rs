@@ -171,7 +171,7 @@ fn check_loads(robot: &Robot, motion: Option<&Motion>, path: &Path, findings: &m
 
 /// What is wrong with a motion whose robot cannot be loaded; limits that the robot would give are not missed.
 fn motion_without_robot(path: &Path, options: &MotionOptions) -> Option<Finding> {
-    let file = MotionFile { path, joints: None, limits: &[], options, cell: None };
+    let file = MotionFile { path, joints: None, limits: &[], options, cell: None, text: None };
     let error = motion_formats::read(&file).err()?;
     let missed = |file: &FileError| matches!(file.problem, Problem::Plan(PlanError::MissingLimit { .. }));
     let follows = matches!(&error, Error::Trajectory(TrajectoryError::File(file)) if missed(file));

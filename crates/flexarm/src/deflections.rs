@@ -62,10 +62,25 @@ impl Arm {
         options: &RunOptions,
         keep_samples: bool,
     ) -> Vec<Result<ToolDeflection, Error>> {
+        self.deflections_until(runs, options, keep_samples, &|| false)
+    }
+
+    /// As [`Arm::deflections`]; as soon as `stop` says so, runs that have not begun end with [`Error::Interrupted`].
+    pub fn deflections_until(
+        &self,
+        runs: &[Variation],
+        options: &RunOptions,
+        keep_samples: bool,
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Vec<Result<ToolDeflection, Error>> {
         // Side by side go runs that last about equally long.
         let mut order: Vec<usize> = (0..runs.len()).collect();
         order.sort_by(|a, b| runs[*a].scenario.duration_s().total_cmp(&runs[*b].scenario.duration_s()));
         let found = order.par_chunks(CHUNK).flat_map_iter(|numbers| {
+            if stop() {
+                let stopped = || Err(Error::Interrupted { t: 0.0, partial: false });
+                return numbers.iter().map(|number| (*number, stopped())).collect::<Vec<_>>();
+            }
             let group: Vec<&Variation> = numbers.iter().map(|k| &runs[*k]).collect();
             numbers.iter().copied().zip(self.deflections_of(&group, options, keep_samples)).collect::<Vec<_>>()
         });

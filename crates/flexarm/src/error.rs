@@ -135,9 +135,18 @@ pub enum Error {
     /// A motion that cannot be compensated.
     #[error(transparent)]
     Compensate(#[from] crate::compensate::CompensateError),
+    /// A map that cannot be taken.
+    #[error(transparent)]
+    Map(#[from] crate::map::MapError),
+    /// A cut without limits of depth.
+    #[error(transparent)]
+    Lobes(#[from] crate::lobes::LobesError),
     /// The runs of a study.
     #[error(transparent)]
     Study(#[from] StudyError),
+    /// A study of many runs.
+    #[error(transparent)]
+    Sweep(#[from] crate::sweep::SweepError),
     /// A recording that cannot be read, written or reported as asked for.
     #[error(transparent)]
     Recording(#[from] RecordingError),
@@ -200,7 +209,9 @@ impl Error {
             },
             Self::InStudy { source, .. } => source.fault(),
             Self::Interrupted { .. } | Self::Write { .. } => Fault::Run,
+            Self::Sweep(error) => error.fault(),
             Self::Link(error) => error.fault(),
+            Self::Map(error) => error.fault(),
             Self::Log(LogError::Exists { .. } | LogError::NotARecording { .. }) => Fault::Input,
             Self::Log(_) => Fault::Run,
             _ => Fault::Input,

@@ -54,17 +54,22 @@ mod convert;
 mod deflections;
 mod drive_entry;
 mod error;
+mod file_cache;
 mod flexible;
 mod gear_entry;
 mod headline;
+mod html_page;
 pub mod identify;
 mod inspect;
 mod link_entry;
+mod live;
 mod load_jumps;
 mod loads_file;
+pub mod lobes;
 mod loop_entry;
 mod loops;
 mod magnification;
+pub mod map;
 mod mode_recording;
 mod modes;
 mod monitor;
@@ -79,6 +84,7 @@ mod payload;
 mod posed;
 mod prepare;
 mod record;
+mod recursions;
 pub mod reduce;
 mod report;
 mod response;
@@ -93,11 +99,12 @@ mod statics_picture;
 mod stepper_settings;
 mod study;
 mod summary;
+pub mod sweep;
 mod tool_path;
 mod twin;
 
 pub use applied_load::AppliedLoad;
-pub use arm::{Arm, Run};
+pub use arm::{Arm, Run, SampleObserver};
 pub use balancer::{BalancerEnds, BalancerInfo, RobotBalancer};
 pub use bends::Bend;
 pub use caveat::{Caveat, Severity};
@@ -113,6 +120,7 @@ pub use flexible::{FlexibleRobot, LinkChoices, Owner, RobotLink};
 pub use gear_entry::{GearHysteresis, RobotCoupling};
 pub use headline::{Bending, ShareFigures};
 pub use inspect::{CouplingInfo, FlexibleInfo, Inspection, JointInfo, LinkInfo, MountingInfo, TcpInfo, inspect};
+pub use live::Live;
 pub use loops::{DependentInfo, LoopInfo, RobotLoop};
 pub use mode_recording::{ModeMovie, record_modes};
 pub use modes::{ModeFigures, ModeTable, modes};
@@ -125,6 +133,7 @@ pub use new::{NewError, NewOptions, NewRobot, new_robot};
 pub use operating_points::OperatingPoints;
 pub use options::{DriveModel, LinkModel, Modelling, Outputs, RunOptions};
 pub use payload::PayloadChange;
+pub use recursions::Recursions;
 pub use report::{
     Figure, FigureGroup, ReportFiles, ReportOptions, ReportRun, Weight, figure_groups, html, markdown, report, rows,
 };
@@ -149,16 +158,23 @@ pub use tool_path::ToolPath;
 pub use flexarm_analysis::{Quantity, Spacing};
 pub use flexarm_files::FileError;
 pub use flexarm_flexlink::Mounting;
-pub use flexarm_kinematics::{BalancerCurve, BalancerCurveError, BalancerLaw, GasLaw, LinkInertia, Pose, Wrench};
+pub use flexarm_kinematics::{
+    BalancerCurve, BalancerCurveError, BalancerLaw, Coordinate, GasLaw, LinkInertia, Model, Pose, Wrench,
+};
 pub use flexarm_linkmaker::{ImportError, JobError, LinkError, export, import};
-pub use flexarm_log::{Column, Columns, CurveQuantity, FormatInfo, Holds, RecordingFormat, Sample, Trace};
+#[cfg(feature = "arrow")]
+pub use flexarm_log::arrow_stream;
+pub use flexarm_log::{
+    Column, Columns, CurveQuantity, DataColumn, DataTable, DataValues, FormatInfo, Holds, RecordingFormat, Sample,
+    Trace, flat_columns,
+};
 pub use flexarm_motion_io::MotionError;
 pub use flexarm_path::{PathError, PlannedMove, Slowed, SlowedBy};
 pub use flexarm_settings::{Names, Setting, name_settings};
 pub use flexarm_stepping::{
-    AlphaSettings, ConstraintForm, InertiaChange, Load, LoadAxes, OperatingPoint, ReferenceMethod, ReferenceSettings,
-    STEPPERS, SpookPreset, SpookSettings, Start, StepError, StepRule, StepperEntry, StepperKind, StepperOptions,
-    StepperSetting, TimedWrench, ToolDeflection,
+    AlphaSettings, ConstraintForm, InertiaChange, Linear, Load, LoadAxes, OperatingPoint, ReferenceMethod,
+    ReferenceSettings, STEPPERS, SpookPreset, SpookSettings, Start, StepError, StepRule, StepperEntry, StepperKind,
+    StepperOptions, StepperSetting, TimedWrench, ToolDeflection,
 };
 pub use flexarm_trajectory::{ColumnMap, ColumnMapError, Trajectory, TrajectoryError};
 pub use flexarm_urdf::{InertiaEstimate, ReadOptions, closest, search_paths_from_environment};

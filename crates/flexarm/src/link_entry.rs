@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use flexarm_fem::{BeamLink, BeamTheory, Material, ReducedLink, Section, UnitSystem, read_flex};
+use flexarm_fem::{BeamLink, BeamTheory, Material, ReducedLink, Section, UnitSystem};
 use flexarm_flexlink::{FlexibleLink, LinkForm, Parts, SubstitutionError, distal_joint};
 use flexarm_kinematics::{ElasticAngles, Mechanism, Pose};
 use flexarm_stepping::Damping;
@@ -11,16 +11,23 @@ use toml::Spanned;
 
 use crate::beam_entry::beam_section;
 use crate::error::Error;
+use crate::file_cache::FileCache;
 use crate::flexible::{Asked, LinkChoices, RobotLink};
 use crate::options::{LinkModel, Modelling};
 use crate::robot::keep;
 use crate::robot_file::{BeamEntry, DampingEntry, FlexibleLinkEntry, RobotFileError, Source};
 
+/// Where the files of links are looked for, and who reads them.
+pub(crate) struct LinkHome<'a> {
+    pub(crate) folder: &'a Path,
+    pub(crate) files: &'a FileCache,
+}
+
 pub(crate) fn flexible_link(
     entry: &FlexibleLinkEntry,
     mechanism: &Mechanism,
     source: &Source,
-    folder: &Path,
+    home: &LinkHome<'_>,
     warnings: &mut Vec<String>,
     faults: &mut Vec<Error>,
 ) -> Result<RobotLink, Error> {
@@ -62,12 +69,12 @@ pub(crate) fn flexible_link(
 
     let (reduced, parts, beam) = match (&entry.reduced, &entry.beam) {
         (Some(file), None) => {
-            let path = folder.join(file.get_ref());
+            let path = home.folder.join(file.get_ref());
             if !path.is_file() {
                 let message = format!("reduced = {:?}: there is no file {}", file.get_ref(), path.display());
                 return Err(at(file.span(), message).into());
             }
-            let reduced = read_flex(&path).map_err(Box::new)?;
+            let reduced = home.files.flex(&path)?;
             if reduced.name != *name {
                 warnings.push(format!(
                     "link {name:?} takes the reduced link of {:?} ({})",

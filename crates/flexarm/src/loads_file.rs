@@ -142,9 +142,17 @@ impl Written {
 /// # Errors
 /// [`Error`] with file, place, what was found and what was expected.
 pub(crate) fn read_loads(path: &Path, duration: f64) -> Result<(Vec<AppliedLoad>, Vec<PayloadChange>), Error> {
-    let text = read_text(path)?;
-    let source = Source::new(path, &text);
-    let file: LoadsFile = toml::from_str(&text).map_err(|error| {
+    parse_loads(&read_text(path)?, path, duration)
+}
+
+/// As [`read_loads`], of the text of the file.
+pub(crate) fn parse_loads(
+    text: &str,
+    path: &Path,
+    duration: f64,
+) -> Result<(Vec<AppliedLoad>, Vec<PayloadChange>), Error> {
+    let source = Source::new(path, text);
+    let file: LoadsFile = toml::from_str(text).map_err(|error| {
         let message = error.message().trim().replace('\n', " ");
         source.error(error.span().unwrap_or(0..0), message)
     })?;

@@ -7,6 +7,7 @@ use flexarm_stepping::Linear;
 use nalgebra::{DMatrix, Vector6};
 use serde::Serialize;
 
+use crate::arm::Arm;
 use crate::caveat::{self, Caveat};
 use crate::error::{Error, PoseError};
 use crate::options::Modelling;
@@ -127,10 +128,33 @@ pub(crate) fn linear_error(error: LinearError) -> Error {
 /// # Errors
 /// [`Error::Pose`] for joint values that do not fit, [`Error::Step`] where there is no equilibrium.
 pub fn modes(robot: &Robot, modelling: &Modelling, at: Option<&[f64]>, count: usize) -> Result<ModeTable, Error> {
-    let posed = Posed::new(robot, modelling, at)?;
+    lowest(robot, Posed::new(robot, modelling, at)?, count)
+}
+
+impl Arm {
+    /// As [`modes()`], of an arm whose links and drives are in place.
+    ///
+    /// # Errors
+    /// As [`modes()`].
+    pub fn modes(&self, at: Option<&[f64]>, count: usize) -> Result<ModeTable, Error> {
+        lowest(self.robot(), Posed::on(self, at)?, count)
+    }
+}
+
+fn lowest(robot: &Robot, posed: Posed, count: usize) -> Result<ModeTable, Error> {
     let linear = posed.linear(&Vector6::zeros())?;
     let all = modes_of(&linear)?;
     table(robot, posed, &linear, &all, count)
+}
+
+/// Frequencies without the dampers (Hz): those that are not in proportion move the others. With locked drives the figures of a
+/// map at this pose, to the last bit.
+fn undamped_frequencies(posed: &Posed, linear: &Linear) -> Result<Vec<f64>, Error> {
+    if linear.driven == 0 {
+        return Ok(posed.operating_point(&[0.0; 6])?.frequencies_hz().to_vec());
+    }
+    let undamped = damped_modes(&linear.M, &(&linear.D * 0.0), &((&linear.K + linear.K.transpose()) * 0.5));
+    Ok(undamped.map_err(linear_error)?.iter().map(DampedMode::frequency_hz).collect())
 }
 
 /// Figures of the modes.
@@ -161,11 +185,10 @@ pub(crate) fn table(
         all.iter().take(count).map(|mode| ModeFigures::new(mode, linear, &compliance)).collect();
     let covered =
         |i: usize| modes.iter().map(|mode| mode.compliance_share[i]).sum::<Option<f64>>().filter(|_| !modes.is_empty());
-    // Dampers that are not in proportion also move the frequencies.
-    let undamped = damped_modes(&linear.M, &(&linear.D * 0.0), &((&linear.K + linear.K.transpose()) * 0.5));
-    let undamped = undamped.map_err(linear_error)?;
+    let mut undamped = undamped_frequencies(&posed, linear)?;
+    undamped.truncate(count);
     Ok(ModeTable {
-        undamped_frequencies_hz: undamped.iter().take(count).map(DampedMode::frequency_hz).collect(),
+        undamped_frequencies_hz: undamped,
         robot: robot.name.clone(),
         tcp: robot.tcp.0.clone(),
         frequencies_hz: modes.iter().map(|mode| mode.frequency_hz).collect(),

@@ -96,12 +96,19 @@ impl Motion {
     /// # Errors
     /// As [`Motion::load`], and for a topic or columns that are not there.
     pub fn load_with(path: impl AsRef<Path>, robot: &Robot, options: &MotionOptions) -> Result<Self, Error> {
+        Self::load_text(path.as_ref(), None, robot, options)
+    }
+
+    /// As [`Motion::load_with`], with a text in the place of the one that the file has, if it is waypoints or a path of the tool.
+    pub(crate) fn load_text(
+        path: &Path,
+        text: Option<&str>,
+        robot: &Robot,
+        options: &MotionOptions,
+    ) -> Result<Self, Error> {
         let model = robot.rigid_model()?;
-        Self::read(
-            path.as_ref(),
-            &Cell { model: &model, tcp_link: Some(&robot.tcp.0), hold: &robot.hold, controller: &robot.controller },
-            options,
-        )
+        let Robot { hold, controller, .. } = robot;
+        Self::read(path, &Cell { model: &model, tcp_link: Some(&robot.tcp.0), hold, controller }, options, text)
     }
 
     /// As [`Motion::load`], for a model alone.
@@ -109,7 +116,7 @@ impl Motion {
     /// # Errors
     /// As [`Motion::load`].
     pub fn load_for(path: &Path, model: &Model) -> Result<Self, Error> {
-        Self::read(path, &Cell { model, tcp_link: None, hold: &[], controller: &[] }, &MotionOptions::default())
+        Self::read(path, &Cell { model, tcp_link: None, hold: &[], controller: &[] }, &MotionOptions::default(), None)
     }
 
     /// The motion through sampled positions, by a spline as through the rows of a CSV file.
@@ -148,13 +155,13 @@ impl Motion {
         Self::of(trajectory, Path::new(name), &*robot.rigid_model()?, &robot.hold)
     }
 
-    fn read(path: &Path, cell: &Cell<'_>, options: &MotionOptions) -> Result<Self, Error> {
+    fn read(path: &Path, cell: &Cell<'_>, options: &MotionOptions, text: Option<&str>) -> Result<Self, Error> {
         let Cell { model, hold, .. } = *cell;
         let actuated = &model.coordinates()[..model.n_actuated()];
         let named: Vec<(&str, JointLimits)> = actuated.iter().map(|c| c.joint.as_str()).zip(limits(model)).collect();
         let joints: Vec<KnownJoint<'_>> =
             actuated.iter().map(|c| KnownJoint { name: &c.joint, is_prismatic: c.kind == "prismatic" }).collect();
-        let file = MotionFile { path, joints: Some(&joints), limits: &named, options, cell: Some(cell) };
+        let file = MotionFile { path, joints: Some(&joints), limits: &named, options, cell: Some(cell), text };
         let read = motion_formats::read(&file)?;
         let ReadMotion { trajectory, format, topic, samples, dropped, caveats, tool_path } = read;
         let motion = Self::of(trajectory, path, model, hold)?;
@@ -201,6 +208,20 @@ impl Motion {
             notes,
             tool_path: None,
         })
+    }
+
+    /// The same motion in `factor` times the time, rests too.
+    ///
+    /// # Errors
+    /// [`Error::Trajectory`] unless `factor` is positive, and if numbers become too extreme.
+    pub fn scaled(self, factor: f64, model: &Model) -> Result<Self, Error> {
+        let trajectory = self.trajectory.scaled(factor)?;
+        let warnings = warnings(&trajectory, &self.path);
+        let limits = limits(model);
+        let violations = trajectory.check_limits(&limits);
+        let likely = caveat::motion::degrees(&violations, model);
+        // What was planned of each move holds at its own speed.
+        Ok(Self { trajectory: Arc::new(trajectory), violations, likely, warnings, tool_path: None, ..self })
     }
 
     /// The same motion with each corner, where a velocity jumps, replaced by a blend that lasts `seconds`.

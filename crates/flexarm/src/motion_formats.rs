@@ -4,8 +4,8 @@ use std::io::Read;
 use std::path::Path;
 
 use flexarm_motion_io::{
-    MCAP_MAGIC, MessageMotion, MotionError, Problem, Request, SQLITE_MAGIC, ZSTD_MAGIC, looks_like_messages, read_db3,
-    read_folder, read_mcap, read_packed, read_text,
+    MCAP_MAGIC, MessageMotion, MotionError, Problem, ROSBAG_MAGIC, Request, SQLITE_MAGIC, ZSTD_MAGIC,
+    looks_like_messages, read_db3, read_folder, read_mcap, read_packed, read_rosbag, read_text,
 };
 use flexarm_settings::{Caveat, Setting};
 use flexarm_trajectory::{ColumnMap, JointLimits, KnownJoint, TableRequest, Trajectory, text_of_file};
@@ -61,6 +61,15 @@ pub(crate) struct MotionFile<'a> {
     pub(crate) options: &'a MotionOptions,
     /// The robot that follows a path of its tool; none if it is not known.
     pub(crate) cell: Option<&'a Cell<'a>>,
+    /// A text in the place of the one that the file has.
+    pub(crate) text: Option<&'a str>,
+}
+
+impl MotionFile<'_> {
+    /// The text of a file of text.
+    fn text(&self) -> Result<String, Error> {
+        self.text.map_or_else(|| Ok(text_of_file(self.path)?), |text| Ok(text.to_owned()))
+    }
 }
 
 /// A format of motions.
@@ -72,7 +81,7 @@ pub(crate) struct MotionFormat {
 }
 
 /// Asked one after another: what has a mark of its own first, tables last.
-const FORMATS: [MotionFormat; 10] = [
+const FORMATS: [MotionFormat; 11] = [
     MotionFormat { name: "folders of rosbag2", recognises: |head| head.is_folder, read: |file| bag(file, read_folder) },
     MotionFormat {
         name: "bags as MCAP",
@@ -85,7 +94,12 @@ const FORMATS: [MotionFormat; 10] = [
         read: |file| bag(file, read_db3),
     },
     MotionFormat {
-        name: "either packed by zstd",
+        name: "bags of ROS 1 (.bag)",
+        recognises: |head| head.bytes.starts_with(ROSBAG_MAGIC),
+        read: |file| bag(file, read_rosbag),
+    },
+    MotionFormat {
+        name: "MCAP and SQLite bags packed by zstd",
         recognises: |head| head.bytes.starts_with(ZSTD_MAGIC),
         read: |file| bag(file, read_packed),
     },
@@ -157,10 +171,6 @@ fn unknown(head: &Head<'_>) -> String {
     let names: Vec<&str> = FORMATS.iter().map(|format| format.name).filter(|name| !name.is_empty()).collect();
     let found = match (head.bytes, head.text.lines().find(|line| !line.trim().is_empty())) {
         ([], _) => "the file is empty".to_owned(),
-        (bytes, _) if bytes.starts_with(b"#ROSBAG") => {
-            return "it is a bag of ROS 1, which is not read; convert it to MCAP or rosbag2 (rosbags-convert, mcap convert)"
-                .to_owned();
-        }
         (bytes, _) if bytes.contains(&0) && !bytes.starts_with(&[0xFF, 0xFE]) && !bytes.starts_with(&[0xFE, 0xFF]) => {
             "it is not text and has no mark that is known".to_owned()
         }
@@ -214,7 +224,7 @@ fn is_table(head: &Head<'_>) -> bool {
 fn waypoints(file: &MotionFile<'_>) -> Result<ReadMotion, Error> {
     no_topic(file, "waypoints")?;
     no_columns(file, "waypoints")?;
-    let trajectory = Trajectory::parse_toml(&text_of_file(file.path)?, &file.path.display().to_string(), file.limits)?;
+    let trajectory = Trajectory::parse_toml(&file.text()?, &file.path.display().to_string(), file.limits)?;
     let format = "waypoints".to_owned();
     Ok(ReadMotion {
         trajectory,
@@ -230,7 +240,7 @@ fn waypoints(file: &MotionFile<'_>) -> Result<ReadMotion, Error> {
 fn tool_path(file: &MotionFile<'_>) -> Result<ReadMotion, Error> {
     no_topic(file, "a path of the tool")?;
     no_columns(file, "a path of the tool")?;
-    let (text, cell) = (text_of_file(file.path)?, robot_of(file)?);
+    let (text, cell) = (file.text()?, robot_of(file)?);
     Ok(along(read_path_file(file.path, &text, cell)?, "path of the tool".to_owned()))
 }
 

@@ -183,7 +183,7 @@ pub fn motion_report(
 
 /// A motion without a robot.
 fn alone(path: &Path, options: &MotionOptions) -> Result<(MotionReport, Trajectory, Torques), Error> {
-    let file = MotionFile { path, joints: None, limits: &[], options, cell: None };
+    let file = MotionFile { path, joints: None, limits: &[], options, cell: None, text: None };
     let ReadMotion { trajectory, format, topic, samples, dropped, caveats, .. } = motion_formats::read(&file)?;
     let own = trajectory.warnings().iter().map(|warning| format!("{}: {warning}", path.display())).collect();
     let (warnings, notes) = told(&caveats, own);

@@ -3,9 +3,8 @@
 //! Springs are kept beside the rigid robot and put under the base when it is modelled ([`RobotMounting::Springs`]). A beam or
 //! a mesh becomes a flexible link between the ground and the base like any other ([`RobotMounting::Link`]).
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use flexarm_fem::read_flex;
 use flexarm_flexlink::{Mounting, base_link};
 use flexarm_kinematics::{Joint, JointKind, Link, LinkInertia};
 use flexarm_stepping::Damping;
@@ -15,7 +14,7 @@ use toml::Spanned;
 
 use crate::drive_entry::Numbers;
 use crate::error::Error;
-use crate::link_entry::{damping_of, flexible_link};
+use crate::link_entry::{LinkHome, damping_of, flexible_link};
 use crate::robot::{Robot, check_finite, keep, pose};
 use crate::robot_file::{BeamEntry, DampingEntry, FlexibleLinkEntry, RobotFileError, Source};
 
@@ -84,10 +83,10 @@ pub(crate) fn add_mounting(
     robot: &mut Robot,
     entry: &Spanned<MountingEntry>,
     source: &Source,
-    folder: &Path,
+    home: &LinkHome<'_>,
     faults: &mut Vec<Error>,
 ) {
-    let found = mounting(robot, entry, source, folder, faults);
+    let found = mounting(robot, entry, source, home, faults);
     robot.mounting = keep(found, faults);
 }
 
@@ -95,7 +94,7 @@ fn mounting(
     robot: &mut Robot,
     entry: &Spanned<MountingEntry>,
     source: &Source,
-    folder: &Path,
+    home: &LinkHome<'_>,
     faults: &mut Vec<Error>,
 ) -> Result<RobotMounting, Error> {
     let given = entry.get_ref();
@@ -129,7 +128,7 @@ fn mounting(
             Ok(RobotMounting::Springs { springs, damping })
         }
         (None, Some(_), None) | (None, None, Some(_)) => {
-            flexible_mounting(robot, entry, name, &xyz, source, folder, faults)
+            flexible_mounting(robot, entry, name, &xyz, source, home, faults)
         }
         _ => {
             let message =
@@ -251,7 +250,7 @@ fn flexible_mounting(
     name: String,
     xyz: &[f64; 3],
     source: &Source,
-    folder: &Path,
+    home: &LinkHome<'_>,
     faults: &mut Vec<Error>,
 ) -> Result<RobotMounting, Error> {
     let given = entry.get_ref();
@@ -278,12 +277,12 @@ fn flexible_mounting(
             ));
         }
         (Some(file), None) => {
-            let path = folder.join(file.get_ref());
+            let path = home.folder.join(file.get_ref());
             if !path.is_file() {
                 let message = format!("reduced = {:?}: there is no file {}", file.get_ref(), path.display());
                 return Err(fail(file.span(), &message));
             }
-            read_flex(&path).map_err(Box::new)?.X_LB
+            home.files.flex(&path)?.X_LB
         }
         (None, Some(foot)) if foot.get_ref().iter().all(|x| *x == 0.0) => {
             return Err(fail(foot.span(), "the foot of the beam is at the origin of the base: a beam needs a length"));
@@ -315,12 +314,13 @@ fn flexible_mounting(
         modes: given.modes.clone(),
         eigenmodes: None,
         geometric_stiffening: None,
+        mass: None,
         stiffness_factor: None,
         damping: given.damping.clone(),
         angles: None,
         coupling: true,
     };
-    let flexible = flexible_link(&link, &robot.rigid, source, folder, &mut robot.warnings, faults)?;
+    let flexible = flexible_link(&link, &robot.rigid, source, home, &mut robot.warnings, faults)?;
     robot.flexible.push(flexible);
     Ok(RobotMounting::Link { name })
 }

@@ -7,8 +7,7 @@ use rayon::prelude::*;
 use crate::arm::Arm;
 use crate::error::Error;
 
-/// Poses that one workspace answers one after another. The answers depend on nothing else, so they are the same bytes for
-/// every number of threads.
+/// Poses that one workspace answers one after another.
 const CHUNK: usize = 256;
 
 /// Answers at m poses, each a contiguous array, pose after pose; world axes at the tool point, linear first. Poses without an
@@ -80,6 +79,19 @@ impl Arm {
     /// [`Error::Step`] with [`StepError::Setup`] if the number of values is no multiple of that of the joints, and as
     /// [`Arm::operating_point`]. A pose without equilibrium is no error, see [`OperatingPoints::failures`].
     pub fn operating_points(&self, poses: &[f64], wrench: &Wrench) -> Result<OperatingPoints, Error> {
+        self.operating_points_until(poses, wrench, &|| false)
+    }
+
+    /// As [`Arm::operating_points`]; nothing is begun any more as soon as `stop` says so.
+    ///
+    /// # Errors
+    /// As [`Arm::operating_points`]; [`Error::Interrupted`].
+    pub fn operating_points_until(
+        &self,
+        poses: &[f64],
+        wrench: &Wrench,
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Result<OperatingPoints, Error> {
         let joints = self.joints().count();
         if joints == 0 || !poses.len().is_multiple_of(joints) {
             let text = format!("{} joint values are given, expected a multiple of the {joints} joints", poses.len());
@@ -105,7 +117,11 @@ impl Arm {
             compliance,
             frequencies_hz,
         });
-        let failures: Vec<_> = rows.map_with(start, |at, rows| answer(at, rows, joints, elastic, wrench)).collect();
+        let answered = rows.map_with(start, |at, rows| match stop() {
+            true => Err(Error::Interrupted { t: 0.0, partial: false }),
+            false => Ok(answer(at, rows, joints, elastic, wrench)),
+        });
+        let failures = answered.collect::<Result<Vec<_>, Error>>()?;
         found.failures = failures.into_iter().flatten().collect();
         found.elastic = elastic;
         found.frequencies_hz.truncate(found.len() * elastic);
@@ -122,11 +138,9 @@ fn answer(
     wrench: &Wrench,
 ) -> Vec<(usize, StepError)> {
     let mut failures = Vec::new();
-    at.forget();
     for (k, q) in rows.poses.chunks_exact(joints).enumerate() {
         if let Err(error) = at.solve(q, wrench) {
             failures.push((rows.first + k, error));
-            at.forget();
             continue;
         }
         let tool = at.tcp_pose().translation.vector;

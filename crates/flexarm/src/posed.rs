@@ -4,9 +4,10 @@ use std::sync::Arc;
 
 use flexarm_analysis::engineering_strain;
 use flexarm_kinematics::{Data, Frame, Pose, State, Wrench, forward_kinematics, rotation_vector};
-use flexarm_stepping::{FlexibleArm, Held, Linear, StepError, linearise};
+use flexarm_stepping::{FlexibleArm, Held, Linear, OperatingPoint, StepError, linearise};
 use nalgebra::{DVector, Vector6};
 
+use crate::arm::Arm;
 use crate::balancer;
 use crate::caveat::pose::Standing;
 use crate::caveat::{Caveat, kinds, validity};
@@ -19,7 +20,7 @@ use crate::robot::Robot;
 
 /// Flexible arm with its drives locked at a pose.
 pub(crate) struct Posed {
-    pub(crate) flexible: FlexibleRobot,
+    pub(crate) flexible: Arc<FlexibleRobot>,
     pub(crate) arm: FlexibleArm,
     pub(crate) tool: Frame,
     /// Actuated joints, in coordinate order.
@@ -47,13 +48,24 @@ impl Posed {
 
     /// `at` in coordinate order (rad or m).
     pub(crate) fn held(robot: &Robot, modelling: &Modelling, at: Vec<f64>) -> Result<Self, Error> {
-        let flexible = robot.modelled(modelling)?;
+        Self::of(Arc::new(robot.modelled(modelling)?), robot.caveats(), at)
+    }
+
+    /// An arm, its links and drives in place already; `at`: all actuated joints (rad or m), zero without it.
+    pub(crate) fn on(arm: &Arm, at: Option<&[f64]>) -> Result<Self, Error> {
+        let flexible = arm.shared();
+        let names: Vec<&str> = flexible.rigid.coordinates().iter().map(|c| c.joint.as_str()).collect();
+        let at = joint_values(at, &names)?;
+        Self::of(flexible, arm.robot_caveats().to_vec(), at)
+    }
+
+    /// `caveats`: those of the robot.
+    fn of(flexible: Arc<FlexibleRobot>, mut caveats: Vec<Caveat>, at: Vec<f64>) -> Result<Self, Error> {
         loops::check_pose(&flexible.rigid, &mut Data::new(&flexible.rigid), &DVector::from_column_slice(&at))?;
         balancer::check_pose(&flexible.rigid, &mut Data::new(&flexible.rigid), &DVector::from_column_slice(&at))?;
         let model = flexible.model.clone();
         let actuated = &model.coordinates()[..model.n_actuated()];
         let joints: Vec<String> = actuated.iter().map(|c| c.joint.clone()).collect();
-        let mut caveats = robot.caveats();
         caveats.extend(validity::outside_limits(actuated, &at));
         caveats.extend(flexible.caveats());
         if flexible.springs.is_empty() {
@@ -74,6 +86,15 @@ impl Posed {
     pub(crate) fn linear(&self, wrench: &Vector6<f64>) -> Result<Linear, Error> {
         let F = Wrench::new(wrench.fixed_rows::<3>(0).into(), wrench.fixed_rows::<3>(3).into());
         linearise(&self.arm, &self.tool, &F, 0.0).map_err(|error| self.flexible.explained(error))
+    }
+
+    /// The equilibrium under weight and a wrench at the TCP (world axes), as maps take it.
+    pub(crate) fn operating_point(&self, wrench: &[f64; 6]) -> Result<OperatingPoint, Error> {
+        let [fx, fy, fz, tx, ty, tz] = *wrench;
+        let mut at = OperatingPoint::new(self.arm.clone(), self.tool.clone());
+        let F = Wrench::new([fx, fy, fz].into(), [tx, ty, tz].into());
+        at.solve(&self.at, &F).map_err(|error| self.flexible.explained(error))?;
+        Ok(at)
     }
 
     /// The tool with every elastic coordinate at zero.
@@ -127,6 +148,20 @@ impl Posed {
         let mut state = State::zeros(model);
         self.arm.prescribed_state(0.0, &mut state, &mut DVector::zeros(model.nv()));
         (Data::new(model), state)
+    }
+}
+
+impl Arm {
+    /// Mass, damping and stiffness about the equilibrium at a pose under weight and a wrench at the tool, and how the tool
+    /// follows the free coordinates.
+    ///
+    /// * `at`: all actuated joints (rad or m), zero without it.
+    /// * `wrench`: force and moment on the tool at its origin, world axes (N, N m).
+    ///
+    /// # Errors
+    /// [`Error::Pose`] for joint values that do not fit, [`Error::Step`] where there is no equilibrium.
+    pub fn linearise(&self, at: Option<&[f64]>, wrench: [f64; 6]) -> Result<Linear, Error> {
+        Posed::on(self, at)?.linear(&wrench.into())
     }
 }
 

@@ -11,6 +11,7 @@ use flexarm_stepping::Linear;
 use nalgebra::{Complex, DMatrix, Vector6};
 use serde::Serialize;
 
+use crate::arm::Arm;
 use crate::caveat::{self, Caveat, kinds};
 use crate::error::{ChannelError, Error, ValueError};
 use crate::modes::{linear_error, modes_of, tool_map};
@@ -175,7 +176,25 @@ pub fn response(
     request: &ResponseRequest,
     outputs: Option<&ResponseOutputs>,
 ) -> Result<Response, Error> {
-    let posed = Posed::new(robot, modelling, at)?;
+    response_at(robot, Posed::new(robot, modelling, at)?, request, outputs)
+}
+
+impl Arm {
+    /// As [`response()`], of an arm whose links and drives are in place; nothing is written.
+    ///
+    /// # Errors
+    /// As [`response()`].
+    pub fn response(&self, at: Option<&[f64]>, request: &ResponseRequest) -> Result<Response, Error> {
+        response_at(self.robot(), Posed::on(self, at)?, request, None)
+    }
+}
+
+fn response_at(
+    robot: &Robot,
+    posed: Posed,
+    request: &ResponseRequest,
+    outputs: Option<&ResponseOutputs>,
+) -> Result<Response, Error> {
     let inputs = input_channels(&request.inputs, &posed)?;
     let channels = output_channels(&request.outputs)?;
     if !POINTS.contains(&request.points) {

@@ -13,13 +13,14 @@ use crate::caveat::{self, Caveat};
 use crate::controller_entry::{RobotAxis, controller_axes};
 use crate::drive_entry::{Drive, drives};
 use crate::error::Error;
+use crate::file_cache::FileCache;
 use crate::flexible::RobotLink;
 use crate::gear_entry::{RobotCoupling, coupling};
-use crate::link_entry::flexible_link;
+use crate::link_entry::{LinkHome, flexible_link};
 use crate::loop_entry::add_loops;
 use crate::loops;
 use crate::mounting::{RobotMounting, add_mounting};
-use crate::robot_file::{PayloadEntry, RobotFile, RobotFileError, Source, parse_robot_file};
+use crate::robot_file::{FlexibleLinkEntry, PayloadEntry, RobotFile, RobotFileError, Source, parse_robot_file};
 
 /// Name of the frame that is added for the tool centre point.
 pub const TCP_FRAME: &str = "__tcp";
@@ -90,7 +91,7 @@ impl Robot {
             return Err(Error::File { path, what });
         }
         match path.extension().and_then(|e| e.to_str()) {
-            Some("toml") => Self::from_robot_file(&path, options),
+            Some("toml") => Self::from_toml(&flexarm_files::read_text(&path)?, &path, options),
             Some("urdf" | "xacro") => Self::from_urdf(&path, options),
             _ => {
                 let what = "expected a robot.toml, a folder with one, or a file ending in .urdf or .xacro".into();
@@ -125,9 +126,19 @@ impl Robot {
         Ok(robot)
     }
 
-    fn from_robot_file(path: &Path, options: &LoadOptions) -> Result<Self, Error> {
-        let text = flexarm_files::read_text(path)?;
-        let (file, source) = parse_robot_file(&text, path)?;
+    /// A robot of the text of a robot file, which may never have been one.
+    ///
+    /// * `path`: where it would be: paths in it are relative to its folder, messages name it.
+    ///
+    /// # Errors
+    /// As [`Robot::load`].
+    pub fn from_toml(text: &str, path: &Path, options: &LoadOptions) -> Result<Self, Error> {
+        Self::of_text(path, text, options, &FileCache::default())
+    }
+
+    /// As [`Robot::from_toml`]; what the file names is read through the cache.
+    pub(crate) fn of_text(path: &Path, text: &str, options: &LoadOptions, files: &FileCache) -> Result<Self, Error> {
+        let (file, source) = parse_robot_file(text, path)?;
         let folder = path.parent().unwrap_or(Path::new("."));
         let urdf_path = folder.join(file.urdf.get_ref());
         if !urdf_path.is_file() {
@@ -147,8 +158,8 @@ impl Robot {
         if let Some(estimate) = inertia_estimate(&file, &source)? {
             urdf_options.inertia_from_mesh.get_or_insert(estimate);
         }
-        let urdf = read_urdf(&urdf_path, &urdf_options)?;
-        Self::of_file(path, urdf_path, urdf, &file, &source, options)
+        let urdf = files.urdf(&urdf_path, &urdf_options)?;
+        Self::of_file(path, urdf_path, urdf, &file, &source, options, files)
     }
 
     /// What a robot file makes of a description that was read for it.
@@ -159,6 +170,7 @@ impl Robot {
         file: &RobotFile,
         source: &Source,
         options: &LoadOptions,
+        files: &FileCache,
     ) -> Result<Self, Error> {
         let folder = path.parent().unwrap_or(Path::new("."));
         let mut faults: Vec<Error> = Vec::new();
@@ -215,13 +227,15 @@ impl Robot {
             robot.coupling = keep(found, &mut faults);
         }
         add_balancers(&mut robot, &file.balancer, source, &mut faults);
+        let home = LinkHome { folder, files };
         for entry in &file.flexible_link {
+            keep(robot.reweigh(entry, source).map_err(Error::from), &mut faults);
             let urdf = &robot.urdf.mechanism;
-            let flexible = flexible_link(entry, urdf, source, folder, &mut robot.warnings, &mut faults);
+            let flexible = flexible_link(entry, urdf, source, &home, &mut robot.warnings, &mut faults);
             robot.flexible.extend(keep(flexible, &mut faults));
         }
         if let Some(mounting) = &file.mounting {
-            add_mounting(&mut robot, mounting, source, folder, &mut faults);
+            add_mounting(&mut robot, mounting, source, &home, &mut faults);
         }
         match faults.len() {
             0 => {}
@@ -262,6 +276,32 @@ impl Robot {
             }
             (Err(Error::Modelling(fault)), Some((source, span))) => Err(source.error(span, fault.to_string()).into()),
             (Err(error), _) => Err(error),
+        }
+    }
+
+    /// Gives a link that is a beam the mass that its entry says, with the centre and the radii of gyration that it has.
+    fn reweigh(&mut self, entry: &FlexibleLinkEntry, source: &Source) -> Result<(), RobotFileError> {
+        let (Some(mass), name) = (&entry.mass, entry.link.get_ref()) else { return Ok(()) };
+        let fail = |message: String| source.error(mass.span(), format!("link {name:?}: {message}"));
+        let wanted = *mass.get_ref();
+        if !(wanted > 0.0 && wanted.is_finite()) {
+            return Err(fail(format!("mass = {wanted}: expected a positive number of kg")));
+        }
+        if entry.beam.is_none() {
+            return Err(fail("mass belongs to beams; the parts of a .flex file have their own masses".into()));
+        }
+        let mut found = false;
+        for mechanism in [&mut self.rigid, &mut self.urdf.mechanism] {
+            let link = mechanism.links.iter_mut().find(|link| link.name == *name);
+            if let Some(inertia) = link.and_then(|link| link.inertia.as_mut()).filter(|inertia| inertia.mass > 0.0) {
+                inertia.inertia_com *= wanted / inertia.mass;
+                inertia.mass = wanted;
+                found = true;
+            }
+        }
+        match found {
+            true => Ok(()),
+            false => Err(fail("the URDF gives it no mass that could be changed: leave mass out".into())),
         }
     }
 

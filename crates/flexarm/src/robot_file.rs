@@ -129,6 +129,8 @@ pub(crate) struct FlexibleLinkEntry {
     pub eigenmodes: Option<Spanned<i64>>,
     /// Modal: let loads change the stiffness; false if not given.
     pub geometric_stiffening: Option<Spanned<bool>>,
+    /// Mass of a link that is a beam instead of the URDF's, its inertia in proportion (kg).
+    pub mass: Option<Spanned<f64>>,
     /// Factor on its stiffness, as measurements told; 1 if not given.
     pub stiffness_factor: Option<Spanned<f64>>,
     /// Damping; 3 % modal if not given.

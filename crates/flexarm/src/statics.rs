@@ -4,13 +4,14 @@ use std::collections::BTreeMap;
 
 use flexarm_analysis::tcp_error;
 use flexarm_kinematics::{forward_kinematics, frame_jacobian};
-use nalgebra::{DVector, Matrix6xX, Vector6};
+use nalgebra::{DVector, Matrix6xX};
 use serde::Serialize;
 
+use crate::arm::Arm;
 use crate::caveat::{self, Caveat};
 use crate::error::Error;
 use crate::options::Modelling;
-use crate::posed::{Posed, all_finite, step_error};
+use crate::posed::{Posed, all_finite};
 use crate::robot::Robot;
 use crate::statics_picture::{self, StaticsFiles, StaticsOutputs};
 
@@ -105,13 +106,32 @@ fn statics_of(
     outputs: Option<&StaticsOutputs>,
 ) -> Result<Statics, Error> {
     let paths = outputs.map(statics_picture::places).transpose()?;
-    let posed = Posed::new(robot, modelling, at)?;
+    statics_at(robot, Posed::new(robot, modelling, at)?, wrench, paths)
+}
+
+impl Arm {
+    /// As [`statics()`], of an arm whose links and drives are in place.
+    ///
+    /// # Errors
+    /// As [`statics()`].
+    pub fn statics(&self, at: Option<&[f64]>, wrench: [f64; 6]) -> Result<Statics, Error> {
+        statics_at(self.robot(), Posed::on(self, at)?, wrench, None)
+    }
+}
+
+fn statics_at(
+    robot: &Robot,
+    posed: Posed,
+    wrench: [f64; 6],
+    paths: Option<[std::path::PathBuf; 2]>,
+) -> Result<Statics, Error> {
     let X_rigid = posed.rigid_tool();
-    let weight = posed.linear(&Vector6::zeros())?;
-    let loaded = if wrench == [0.0; 6] { weight.clone() } else { posed.linear(&wrench.into())? };
-    let displacement = tcp_error(&X_rigid, &loaded.X_WT);
-    let sag = tcp_error(&X_rigid, &weight.X_WT);
-    let C = loaded.compliance().map_err(step_error)?;
+    let loaded = posed.linear(&wrench.into())?;
+    // The figures of a map at this pose, to the last bit.
+    let sag = tcp_error(&X_rigid, &posed.operating_point(&[0.0; 6])?.tcp_pose());
+    let mut at = posed.operating_point(&wrench)?;
+    let displacement = tcp_error(&X_rigid, &at.tcp_pose());
+    let C = at.compliance();
 
     all_finite("the displacements", displacement.iter().chain(&sag))?;
     all_finite("the compliances", &C)?;

@@ -188,6 +188,16 @@ impl ReduceJob {
         }
     }
 
+    /// A job from the text of a job file.
+    ///
+    /// * `path`: where the file is, or would be: its paths count from there.
+    ///
+    /// # Errors
+    /// [`LinkError::JobFile`] with line and column.
+    pub fn parse(text: &str, path: &Path) -> Result<Self, LinkError> {
+        parse_job(text, path)
+    }
+
     /// Name of the link: the one given, that of the URDF's link, or that of the mesh file.
     pub fn link_name(&self) -> String {
         let given = self.link.clone().or_else(|| self.urdf.as_ref().map(|urdf| urdf.link.clone()));

@@ -11,7 +11,7 @@ mod csv_table;
 #[cfg(feature = "mcap")]
 mod mcap_run;
 #[cfg(feature = "parquet")]
-mod parquet_table;
+pub(crate) mod parquet_table;
 #[cfg(feature = "rerun")]
 mod rrd_messages;
 #[cfg(feature = "rerun")]

@@ -97,7 +97,7 @@ impl Blocks for RowGroups {
 }
 
 /// Calls the library, which may panic on a damaged file.
-fn read<T>(path: &Path, read: impl FnOnce() -> Result<T, ParquetError>) -> Result<T, LogError> {
+pub(crate) fn read<T>(path: &Path, read: impl FnOnce() -> Result<T, ParquetError>) -> Result<T, LogError> {
     match caught(read) {
         Ok(result) => result.map_err(|error| broken(path, error)),
         Err(cause) => Err(not_a_recording(path, format!("a damaged file ({cause})"), "a whole Parquet file")),

@@ -11,6 +11,7 @@ mod eye;
 mod layout;
 mod robot;
 mod run;
+mod scenery;
 mod stream;
 mod study;
 pub(crate) mod tracks;
@@ -64,6 +65,7 @@ const LONG_CHUNK_ROWS: usize = 8 * CHUNK_ROWS;
 /// | `/plots/elastic/<element>`, `/plots/elastic_load/<element>` | deflection, in **mm** and **mrad**; load, in N and N m |
 /// | `/plots/energy`, `/plots/solver` | in J; iterations and residual |
 /// | `/caption`, `/<robot>/caption` | in a recording of modes: name and frequency of the one that swings; such a recording has no curves |
+/// | `/scenery/<view>/<name>` | what stands still around the robot, such as the points of a map |
 /// | `/events` | moves, largest error, settling, limits |
 /// | `/recording/run.json`, `/recording/result.json` | header and result for readers of flexarm |
 /// | `/summary`, `/urdf` | result and set-up, and the robot's description, as text |
@@ -217,6 +219,9 @@ impl RunWriter {
         let mut ids = *store.stream.ids();
         let (tracks, fixed) = RunTracks::new(header, &seat, &mut ids)?;
         store.append_all(ids, &fixed)?;
+        for scenery in &header.scenery {
+            scenery::write(store, scenery)?;
+        }
         store.stream.set_tail(&store.recording, &[])?;
         let has_layout = matches!(seat, Seat::Alone | Seat::InStudy(0, _));
         let layout = has_layout.then(|| window::window(header, &seat, labels));

@@ -216,7 +216,10 @@ impl RunTracks {
                 .with_colors([colors::total()])
                 .with_labels([caption.text.as_str()])
                 .with_show_labels(true);
-            chunks.push(ids.single(&self.root.join(&path(["caption"])), &when, &label)?);
+            // Where poses change with the captions, the scenery names the places.
+            if header.scenery.is_empty() {
+                chunks.push(ids.single(&self.root.join(&path(["caption"])), &when, &label)?);
+            }
             let text = TextDocument::from_markdown(format!("# {}", caption.text));
             chunks.push(ids.single(&path(["caption"]), &when, &text)?);
         }

@@ -3,12 +3,15 @@
 use crate::rerun::EntityPath;
 
 use super::layout::Part;
-use super::path;
 use super::run::Seat;
+use super::{path, scenery};
 use crate::RunHeader;
 
 /// The robots, below them the result; beside them the error and its causes.
 pub(crate) fn window(header: &RunHeader, seat: &Seat, labels: &[String]) -> Part {
+    if !header.scenery.is_empty() {
+        return scenery::window(header, &seat.root(header));
+    }
     if !header.captions.is_empty() {
         return shapes(&seat.root(header));
     }

@@ -55,6 +55,7 @@ pub(crate) fn header() -> RunHeader {
         elements: vec!["upper_arm".into()],
         meshes,
         tcp: "tool0".into(),
+        scenery: Vec::new(),
         metadata: vec![("flexarm.run".into(), vec![("stepper".into(), "none".into()), ("seed".into(), "0".into())])],
         attachments: vec![Attachment {
             name: "notes.json".into(),

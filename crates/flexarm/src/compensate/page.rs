@@ -5,21 +5,11 @@ use std::fmt::Write as _;
 use flexarm_draw::{CurveLook, LinePlot, Panel, PlotCurve};
 
 use super::{Compensation, ErrorFigures};
-
-const STYLE: &str = "\
-body { font: 15px/1.5 system-ui, sans-serif; max-width: 62rem; margin: 2rem auto; padding: 0 1rem; color: #1c2530; background: #fff }
-table { border-collapse: collapse; margin: 1rem 0 } td, th { padding: .25rem .7rem; text-align: right; border-bottom: 1px solid #d8dee6 }
-td:first-child, th:first-child { text-align: left } .no { color: #9a5b00 } svg { max-width: 100%; height: auto }
-";
+use crate::html_page::{escaped, opening};
 
 /// The page.
 pub(super) fn html(answer: &Compensation) -> String {
-    let title = format!("Compensation of {} on {}", escaped(&answer.motion), escaped(&answer.robot));
-    let mut page = format!(
-        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n\
-         <meta name=\"generator\" content=\"flexarm {}\">\n<title>{title}</title>\n<style>{STYLE}</style></head>\n<body>\n<h1>{title}</h1>\n",
-        env!("CARGO_PKG_VERSION")
-    );
+    let mut page = opening(&format!("Compensation of {} on {}", answer.motion, answer.robot), "");
     let _ = writeln!(
         page,
         "<p>Largest distance of the tool from the rigid arm's: {:.4} mm before, <b>{:.4} mm</b> after ({}, {} iterations).</p>",
@@ -89,8 +79,4 @@ fn curves(answer: &Compensation) -> String {
         ..LinePlot::default()
     };
     plot.svg().unwrap_or_default()
-}
-
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

@@ -47,6 +47,14 @@ pub enum ValueError {
         /// Duration of the motion (s).
         duration_s: f64,
     },
+    /// A control period that is no whole number of steps.
+    #[error("a control period of {period_s} s is not a whole number of steps ({} {step_s} s)", Setting::Step)]
+    Period {
+        /// Period (s).
+        period_s: f64,
+        /// Step (s).
+        step_s: f64,
+    },
     /// A run that would not come to an end.
     #[error(
         "{duration_s} s in steps of {step_s:e} s make {:.1e} steps, at most {most:.0e} are taken: raise {} or cut the \

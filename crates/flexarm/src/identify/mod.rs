@@ -9,7 +9,7 @@ mod file;
 mod page;
 mod parameters;
 mod plan_file;
-mod rewrite;
+pub(crate) mod rewrite;
 
 use std::path::{Path, PathBuf};
 

@@ -5,24 +5,12 @@ use std::fmt::Write as _;
 use flexarm_draw::{CurveLook, LinePlot, Panel, PlotCurve};
 
 use super::{Compared, Identification};
-
-const STYLE: &str = "\
-body { font: 15px/1.5 system-ui, sans-serif; max-width: 62rem; margin: 2rem auto; padding: 0 1rem; color: #1c2530; background: #fff }
-table { border-collapse: collapse; margin: 1rem 0 } td, th { padding: .25rem .7rem; text-align: right; border-bottom: 1px solid #d8dee6 }
-td:first-child, th:first-child { text-align: left } .no { color: #9a5b00 } .note { color: #5a6674 } svg { max-width: 100%; height: auto }
-.correlation td { text-align: center; font-size: 12px; min-width: 2.6rem }
-";
+use crate::html_page::{escaped, opening};
 
 /// The page.
 pub(super) fn html(answer: &Identification) -> String {
-    let mut page = String::new();
-    let title = format!("Identification of {}", escaped(&answer.robot));
-    let _ = write!(
-        page,
-        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\n\
-         <meta name=\"generator\" content=\"flexarm {}\">\n<title>{title}</title>\n<style>{STYLE}</style></head>\n<body>\n<h1>{title}</h1>\n",
-        env!("CARGO_PKG_VERSION")
-    );
+    let correlation_style = ".correlation td { text-align: center; font-size: 12px; min-width: 2.6rem }\n";
+    let mut page = opening(&format!("Identification of {}", answer.robot), correlation_style);
     let _ = writeln!(
         page,
         "<p>{} readings with {} numbers from {}.</p>",
@@ -169,8 +157,4 @@ fn number(x: f64) -> String {
         }
         _ => format!("{x:.3e}"),
     }
-}
-
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

@@ -17,6 +17,7 @@ use super::report::{Assumption, assumption};
 use super::sample::{self, Axis, SampleMotion};
 use super::{NewError, NewOptions, text};
 use crate::error::Error;
+use crate::file_cache::FileCache;
 use crate::robot::{LoadOptions, Robot};
 use crate::robot_file::parse_robot_file;
 
@@ -152,7 +153,15 @@ impl Draft {
             let (file, source) = parse_robot_file(&text, &placed.robot_path)?;
             let options = LoadOptions::default();
             let urdf_path = placed.robot_path.with_file_name(&placed.reference);
-            Robot::of_file(&placed.robot_path, urdf_path, draft.urdf.clone(), &file, &source, &options)
+            Robot::of_file(
+                &placed.robot_path,
+                urdf_path,
+                draft.urdf.clone(),
+                &file,
+                &source,
+                &options,
+                &FileCache::default(),
+            )
         };
         loads(self, &[])?;
         for k in 0..self.links.len() {

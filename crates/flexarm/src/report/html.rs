@@ -12,6 +12,7 @@ use flexarm_log::{EventKind, RunHeader, Trace};
 use super::curves::{Kind, Plot, overlays, plots};
 use super::path_plan::path_plan;
 use super::picture::{pictures, scale_colors};
+use crate::html_page::escaped;
 use crate::monitor::tool_path::PathMoveFigures;
 use crate::stepper_settings::SettingValue;
 use crate::summary::{EnergyFigures, Summary, TcpFigures};
@@ -117,22 +118,6 @@ fn body(main: &ReportRun<'_>, runs: &[ReportRun<'_>], thinning: &str) -> String 
         let _ = write!(body, "<div id=\"inputs\">\n{inputs}</div>\n");
     }
     body + &timings(runs)
-}
-
-/// Text as it may stand in an element or between the quotes of an attribute.
-fn escaped(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => out += "&amp;",
-            '<' => out += "&lt;",
-            '>' => out += "&gt;",
-            '"' => out += "&quot;",
-            '\'' => out += "&#39;",
-            c => out.push(c),
-        }
-    }
-    out
 }
 
 /// Parts of the page that can be gone to: name of the link, place.

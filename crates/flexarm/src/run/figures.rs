@@ -1,9 +1,9 @@
 //! The figures of a run, from what its monitors have seen, and whether its models held.
 
 use flexarm_analysis::TcpMetrics;
-use flexarm_kinematics::{Data, State, forward_kinematics};
+use flexarm_kinematics::{Data, Frame, State, forward_kinematics};
 use flexarm_log::Event;
-use flexarm_stepping::{StepRule, StepperKind};
+use flexarm_stepping::{FlexibleArm, StepRule, StepperKind};
 use flexarm_trajectory::LimitViolation;
 use nalgebra::Vector3;
 
@@ -24,7 +24,7 @@ impl Run<'_> {
         let metrics = self.monitors.tool.result().metrics().ok();
         let metrics = metrics.as_ref().filter(|_| self.options.with_twin);
         let (links, elastic_drives) = (self.link_figures(), self.drive_figures());
-        let sag_m = self.static_sag();
+        let sag_m = static_sag(&self.arm, &self.tcp);
         let robot = self.robot;
         let by_choice = !robot.flexible.is_empty()
             || robot.is_mounted()
@@ -107,19 +107,6 @@ impl Run<'_> {
             along_m: along.dot(&Vector3::from(*moved)),
         });
         shares.collect()
-    }
-
-    /// TCP error with the drives at rest in their first position, also for runs that start undeformed (m).
-    fn static_sag(&self) -> f64 {
-        let model = &self.arm.model;
-        let (mut data, mut state) = (Data::new(model), State::zeros(model));
-        self.arm.prescribed_state(0.0, &mut state, &mut nalgebra::DVector::zeros(model.nv()));
-        forward_kinematics(model, &mut data, &state.q);
-        let rigid = data.X_WF(&self.tcp).translation.vector;
-        let n = model.n_actuated();
-        state.q.rows_mut(n, model.nv() - n).copy_from(&self.arm.modes.equilibrium);
-        forward_kinematics(model, &mut data, &state.q);
-        (data.X_WF(&self.tcp).translation.vector - rigid).norm()
     }
 
     /// What is probably wrong with the input, and whether the models held in what was seen so far.
@@ -219,4 +206,17 @@ impl Run<'_> {
         }
         caveats
     }
+}
+
+/// TCP error with the drives at rest in their first position, also for runs that start undeformed (m).
+pub(crate) fn static_sag(arm: &FlexibleArm, tcp: &Frame) -> f64 {
+    let model = &arm.model;
+    let (mut data, mut state) = (Data::new(model), State::zeros(model));
+    arm.prescribed_state(0.0, &mut state, &mut nalgebra::DVector::zeros(model.nv()));
+    forward_kinematics(model, &mut data, &state.q);
+    let rigid = data.X_WF(tcp).translation.vector;
+    let n = model.n_actuated();
+    state.q.rows_mut(n, model.nv() - n).copy_from(&arm.modes.equilibrium);
+    forward_kinematics(model, &mut data, &state.q);
+    (data.X_WF(tcp).translation.vector - rigid).norm()
 }

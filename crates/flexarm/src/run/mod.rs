@@ -35,6 +35,8 @@ use crate::static_part::StaticPart;
 use crate::summary::{Files, Summary};
 use crate::twin::RigidTwin;
 
+pub(crate) use figures::static_sag;
+
 /// What servos leave of the way to go, among the contributors to the TCP error.
 const FOLLOWING_ERROR: &str = "following error";
 
@@ -273,7 +275,7 @@ impl<'a> Run<'a> {
         let tcp = flexible.tcp.clone();
         let duration = motion.trajectory.duration();
         let last = (duration / options.step_s - 1e-9).ceil().max(0.0) as u64;
-        let every = ((1.0 / (options.log_rate_hz * options.step_s)).round() as u64).max(1);
+        let every = steps_per_sample(options);
         let mut twin = RigidTwin::new(&arm);
         let tool = tool_monitor(&arm, &tcp, &mut twin, motion, options, every as f64 * options.step_s);
         let (mut bends, mut places, mut frames) = Default::default();
@@ -367,6 +369,11 @@ impl<'a> Run<'a> {
         let (iterations, correction) = self.stepper.last_iteration();
         sample.solver = [iterations as f64, correction];
     }
+}
+
+/// Steps from one logged sample to the next.
+pub(crate) fn steps_per_sample(options: &RunOptions) -> u64 {
+    ((1.0 / (options.log_rate_hz * options.step_s)).round() as u64).max(1)
 }
 
 /// For a run whose samples are `sample_s` apart (s).

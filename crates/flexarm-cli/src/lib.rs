@@ -1,4 +1,7 @@
 //! The `flexarm` command line: arguments, progress, tables, exit codes. The work is done by the crate `flexarm`.
+//!
+//! Start at [`run`], which the program `flexarm` and the command of the Python package call. [`shipped_robot`] and
+//! [`shipped_motion`] find by name what comes with the program.
 #![allow(clippy::print_stdout, clippy::print_stderr, reason = "printing is what this face is for")]
 
 mod args;
@@ -10,6 +13,8 @@ mod failure;
 mod flags;
 mod formats;
 mod identify;
+mod lobes;
+mod map;
 mod motion;
 mod new;
 mod posed;
@@ -22,11 +27,14 @@ mod shipped;
 mod signals;
 mod study;
 mod summary_table;
+mod sweep;
 mod values;
 mod verify;
 mod view;
 
+use std::ffi::OsString;
 use std::io::{IsTerminal, Write};
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
@@ -40,17 +48,52 @@ use flexarm::{
 use indicatif::{ProgressBar, ProgressStyle};
 use shipped::OutputFolder;
 
-fn main() -> ExitCode {
+/// Runs a command line, the name of the program first, and says what the process should end with: 0 done, 1 the run failed,
+/// 2 bad input.
+///
+/// It takes the process for its own: settings get the names of its flags in all messages, and signals end what it does.
+pub fn run(line: Vec<OsString>) -> u8 {
     signals::turn_into_errors();
     flexarm::name_settings(flags::NAMES);
-    let cli = Cli::parse();
-    match run(&cli) {
-        Ok(code) => code,
-        Err(failure) => {
+    let code = match Cli::try_parse_from(&line) {
+        Ok(cli) => command(&cli, &line).unwrap_or_else(|failure| {
             failure.print();
             failure.exit_code()
+        }),
+        Err(usage) => {
+            let _ = usage.print(); // a closed pipe
+            return usage.exit_code().try_into().unwrap_or(2);
         }
-    }
+    };
+    [0, 1].into_iter().find(|number| ExitCode::from(*number) == code).unwrap_or(2)
+}
+
+/// Where robots and trajectories are besides: a folder with `robots/` and `trajectories/` in it. The first call counts.
+pub fn ship_from(folder: PathBuf) {
+    shipped::ship_from(folder);
+}
+
+/// The robot of a path, or of a name that is shipped.
+///
+/// # Errors
+/// [`flexarm::Error::File`] for a name that no robot has, with the ones that there are.
+pub fn shipped_robot(given: &Path) -> Result<PathBuf, flexarm::Error> {
+    shipped::robot(Some(given))
+}
+
+/// The motion of a path, or of a name that is shipped; the path itself if there is none.
+pub fn shipped_motion(given: &Path) -> PathBuf {
+    shipped::trajectory(given)
+}
+
+/// The robot file of a path, or of a name that is shipped; the path itself if there is none.
+pub fn shipped_robot_file(given: &Path) -> PathBuf {
+    shipped::robot_file(given)
+}
+
+/// The file of a cutting tool of a path, or of a name that is shipped; the path itself if there is none.
+pub fn shipped_tool(given: &Path) -> PathBuf {
+    shipped::find(given, "robots/tools", &["", ".toml"])
 }
 
 /// Text for people or JSON for programs; a closed pipe is not an error.
@@ -72,19 +115,22 @@ fn to_json(value: &impl serde::Serialize) -> String {
     serde_json::to_string(value).expect("plain numbers and strings")
 }
 
-fn run(cli: &Cli) -> Result<ExitCode, Failure> {
+fn command(cli: &Cli, line: &[OsString]) -> Result<ExitCode, Failure> {
     match &cli.command {
-        Command::Compare(args) => simulate(cli, args, true),
-        Command::Run(args) => simulate(cli, args, false),
+        Command::Compare(args) => simulate(cli, args, true, line),
+        Command::Run(args) => simulate(cli, args, false, line),
         Command::Inspect(args) => inspect(cli, args),
         Command::Check(args) => check(cli, args),
         Command::Motion(args) => motion::run(cli, args),
         Command::Identify(args) => identify::run(cli, args),
         Command::Compensate(args) => compensate::run(cli, args),
+        Command::Map(args) => map::run(cli, args),
+        Command::Sweep(args) => sweep::run(cli, args),
         Command::New(args) => new::run(cli, args),
         Command::Statics(args) => posed::statics(cli, args),
         Command::Modes(args) => posed::modes(cli, args),
         Command::Response(args) => posed::response(cli, args),
+        Command::Lobes(args) => lobes::run(cli, args),
         Command::Report(args) => report::run(cli, args),
         Command::Convert(args) => convert::run(cli, args),
         Command::Reduce(args) => reduce::run(cli, args),
@@ -201,12 +247,12 @@ fn variant(label: String, args: &RunArgs, with_twin: bool) -> Result<Variant, Fa
     Ok(Variant { label, robot, scenario, options: run_options(args, with_twin) })
 }
 
-fn simulate(cli: &Cli, args: &RunArgs, with_twin: bool) -> Result<ExitCode, Failure> {
-    let line: Vec<std::ffi::OsString> = std::env::args_os().collect();
+/// `line`: the command line as given.
+fn simulate(cli: &Cli, args: &RunArgs, with_twin: bool, line: &[OsString]) -> Result<ExitCode, Failure> {
     if !with_twin && !args.with.is_empty() {
         return Err(Failure::Usage("--with belongs to compare: run has one run only".into()));
     }
-    let parts = study::parts(args, &line)?;
+    let parts = study::parts(args, line)?;
     let variants = parts.iter().map(|part| {
         variant(part.label.clone(), &part.args, with_twin).map_err(|error| match parts.len() {
             1 => error,

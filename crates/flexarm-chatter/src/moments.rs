@@ -1,0 +1,196 @@
+//! What a force between nodes does to a pole, in closed form or by quadrature to rounding.
+//!
+//! ```text
+//! I_j(c) = ∫_0^c e^{z (c - σ)} ℓ_j(σ) dσ
+//! ```
+//! with the Lagrange polynomials ℓ_j of the Gauss nodes of (0, 1). Small `z` by Gauss quadrature; for large ones by parts, which is a
+//! finite sum as ℓ_j is a polynomial.
+
+use std::sync::LazyLock;
+
+use nalgebra::{Complex, SMatrix, SVector};
+
+/// Nodes of an element.
+pub(crate) const NODES: usize = 6;
+/// Points of the quadrature.
+const POINTS: usize = 14;
+/// Up to here the quadrature is exact to rounding, beyond the sum by parts is.
+const SMALL: f64 = 7.0;
+
+/// The nodes and what depends on them alone. Targets are the nodes and, last, the end of the element.
+pub(crate) struct Rule {
+    /// Gauss nodes within (0, 1).
+    pub(crate) nodes: [f64; NODES],
+    /// Their weights.
+    pub(crate) weights: [f64; NODES],
+    /// `1 - x_q` of the quadrature on (0, 1).
+    backward: [f64; POINTS],
+    /// Weight times ℓ_j at a point of the quadrature on (0, c): by target, point and node.
+    table: Vec<[[f64; NODES]; POINTS]>,
+    /// Derivatives of ℓ_j at 0: by order and node; and at the targets.
+    at_start: [[f64; NODES]; NODES],
+    at_target: Vec<[[f64; NODES]; NODES]>,
+}
+
+/// Moments of one pole over one element.
+#[derive(Clone, Debug)]
+pub(crate) struct Moments {
+    /// `e^{z c}`, by target.
+    pub(crate) decay: [Complex<f64>; NODES + 1],
+    /// `I_j(c)`, by target and node.
+    pub(crate) integrals: [[Complex<f64>; NODES]; NODES + 1],
+}
+
+pub(crate) static RULE: LazyLock<Rule> = LazyLock::new(Rule::new);
+
+impl Rule {
+    fn new() -> Self {
+        let (nodes, weights) = gauss::<NODES>();
+        let (points, point_weights) = gauss::<POINTS>();
+        let coefficients = lagrange_coefficients(&nodes);
+        let targets: Vec<f64> = nodes.iter().copied().chain([1.0]).collect();
+        let value = |j: usize, order: usize, x: f64| derivative(&coefficients, j, order, x);
+        let row = |c: f64, q: usize| std::array::from_fn(|j| c * point_weights[q] * value(j, 0, c * points[q]));
+        let derivatives = |x: f64| std::array::from_fn(|order| std::array::from_fn(|j| value(j, order, x)));
+        Self {
+            nodes,
+            weights,
+            backward: points.map(|x| 1.0 - x),
+            table: targets.iter().map(|c| std::array::from_fn(|q| row(*c, q))).collect(),
+            at_start: derivatives(0.0),
+            at_target: targets.iter().map(|c| derivatives(*c)).collect(),
+        }
+    }
+
+    /// All moments for `z`, the pole times the length of the element, with lengths in units of the element.
+    pub(crate) fn moments(&self, z: Complex<f64>) -> Moments {
+        let targets: [f64; NODES + 1] = std::array::from_fn(|i| *self.nodes.get(i).unwrap_or(&1.0));
+        let decay = targets.map(|c| (z * c).exp());
+        let zero = [Complex::new(0.0, 0.0); NODES];
+        let mut integrals = [zero; NODES + 1];
+        for (i, c) in targets.iter().enumerate() {
+            integrals[i] = if z.norm() <= SMALL { self.by_quadrature(z, *c, i) } else { self.by_parts(z, decay[i], i) };
+        }
+        Moments { decay, integrals }
+    }
+
+    fn by_quadrature(&self, z: Complex<f64>, c: f64, target: usize) -> [Complex<f64>; NODES] {
+        let mut sum = [Complex::new(0.0, 0.0); NODES];
+        for (back, row) in self.backward.iter().zip(&self.table[target]) {
+            let e = (z * (c * back)).exp();
+            for (s, weight) in sum.iter_mut().zip(row) {
+                *s += e * *weight;
+            }
+        }
+        sum
+    }
+
+    fn by_parts(&self, z: Complex<f64>, decay: Complex<f64>, target: usize) -> [Complex<f64>; NODES] {
+        let mut sum = [Complex::new(0.0, 0.0); NODES];
+        let mut factor = z.inv();
+        for order in 0..NODES {
+            for (j, s) in sum.iter_mut().enumerate() {
+                *s += factor * (decay * self.at_start[order][j] - self.at_target[target][order][j]);
+            }
+            factor /= z;
+        }
+        sum
+    }
+}
+
+/// Gauss-Legendre nodes and weights on (0, 1).
+fn gauss<const N: usize>() -> ([f64; N], [f64; N]) {
+    let (mut nodes, mut weights) = ([0.0; N], [0.0; N]);
+    for k in 0..N {
+        let mut x = -(std::f64::consts::PI * (k as f64 + 0.75) / (N as f64 + 0.5)).cos();
+        let mut slope = 1.0;
+        for _ in 0..50 {
+            // P_N and its derivative by the recurrence of three terms.
+            let (mut before, mut value) = (1.0, x);
+            for n in 2..=N {
+                let n = n as f64;
+                (before, value) = (value, ((2.0 * n - 1.0) * x * value - (n - 1.0) * before) / n);
+            }
+            slope = N as f64 * (x * value - before) / (x * x - 1.0);
+            x -= value / slope;
+            if (value / slope).abs() < 1e-16 {
+                break;
+            }
+        }
+        nodes[k] = 0.5 + 0.5 * x;
+        weights[k] = 1.0 / ((1.0 - x * x) * slope * slope);
+    }
+    (nodes, weights)
+}
+
+/// Monomial coefficients of ℓ_j in column j.
+fn lagrange_coefficients(nodes: &[f64; NODES]) -> SMatrix<f64, NODES, NODES> {
+    let mut coefficients = SMatrix::<f64, NODES, NODES>::zeros();
+    for j in 0..NODES {
+        // Multiply out Π (x - x_k) / (x_j - x_k).
+        let mut polynomial = SVector::<f64, NODES>::zeros();
+        polynomial[0] = 1.0;
+        for k in (0..NODES).filter(|k| *k != j) {
+            let mut shifted = SVector::<f64, NODES>::zeros();
+            for n in 1..NODES {
+                shifted[n] = polynomial[n - 1];
+            }
+            polynomial = (shifted - polynomial * nodes[k]) / (nodes[j] - nodes[k]);
+        }
+        coefficients.set_column(j, &polynomial);
+    }
+    coefficients
+}
+
+/// Derivative of ℓ_j at x.
+fn derivative(coefficients: &SMatrix<f64, NODES, NODES>, j: usize, order: usize, x: f64) -> f64 {
+    let mut sum = 0.0;
+    for n in (order..NODES).rev() {
+        let falling: f64 = (0..order).map(|k| (n - k) as f64).product();
+        sum = sum * x + falling * coefficients[(n, j)];
+    }
+    sum
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Truth: for ℓ summed over all nodes (which is 1) the integral is (e^{z c} - 1) / z; weighted with x_j, ∫ e^{z(c-σ)} σ dσ.
+    #[test]
+    fn moments_of_one_and_of_the_first_power_are_those_of_the_closed_form() {
+        let mut worst: f64 = 0.0;
+        for z in [
+            Complex::new(-0.01, 0.3),
+            Complex::new(-0.2, 4.0),
+            Complex::new(-6.9, 0.0),
+            Complex::new(-7.1, 1.0),
+            Complex::new(-0.3, 40.0),
+            Complex::new(-3e4, 0.0),
+        ] {
+            let moments = RULE.moments(z);
+            for (i, c) in RULE.nodes.iter().copied().chain([1.0]).enumerate() {
+                let e = (z * c).exp();
+                let one: Complex<f64> = moments.integrals[i].iter().sum();
+                let first: Complex<f64> = moments.integrals[i].iter().zip(&RULE.nodes).map(|(m, x)| m * *x).sum();
+                worst = worst.max((one - (e - 1.0) / z).norm() / c);
+                worst = worst.max((first - (e - 1.0 - z * c) / (z * z)).norm() / c);
+            }
+        }
+        println!("worst {worst:e}");
+        assert!(worst < 1e-11, "{worst:e}");
+    }
+
+    /// Truth: the two ways to the same integral, where both are good.
+    #[test]
+    fn quadrature_and_parts_meet() {
+        let z = Complex::from_polar(SMALL, 1.8);
+        let mut worst: f64 = 0.0;
+        for (i, c) in RULE.nodes.iter().copied().chain([1.0]).enumerate() {
+            let (a, b) = (RULE.by_quadrature(z, c, i), RULE.by_parts(z, (z * c).exp(), i));
+            worst = a.iter().zip(&b).fold(worst, |w, (a, b)| w.max((a - b).norm()));
+        }
+        println!("worst {worst:e}");
+        assert!(worst < 1e-9, "{worst:e}");
+    }
+}

@@ -1,0 +1,296 @@
+//! `flexarm lobes`: flags to a request, a table for people.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+use comfy_table::CellAlignment;
+use flexarm::lobes::{CutRequest, CutRun, CuttingPlace, CuttingTool, LobePoint, Lobes, LobesRequest, cut, lobes};
+use flexarm::{Motion, Robot};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use crate::args::Cli;
+use crate::failure::Failure;
+use crate::posed_args::PoseArgs;
+use crate::print::{lines, table, warning};
+use crate::shipped::OutputFolder;
+use crate::{answer, load_options, shipped, to_json, values};
+
+const EXAMPLES: &str = "\
+Examples:
+  Limits of depth of a shipped end mill on kr210, diagram and table in a new folder of out/:
+      flexarm lobes kr210 --at 0,-60deg,90deg,0,60deg,0 --tool endmill_20mm
+  The same over other speeds, with all unstable depths, figures alone:
+      flexarm lobes kr210 --at 0,-60deg,90deg,0,60deg,0 --tool endmill_20mm --rpm 2000,2500,3000 --ranges --no-files
+  One cut over time, on the arm as it moves: 2 mm deep at 8000 1/min:
+      flexarm lobes kr210 --at 0,-60deg,90deg,0,60deg,0 --tool endmill_20mm --cut 8000,0.002
+  Along a path: the lowest limit over 12 places of it:
+      flexarm lobes kr210 --along milling_square --places 12 --tool endmill_20mm
+The file of a tool: flexarm format tool";
+
+/// Speeds that a terminal has room for.
+const SHOWN: usize = 25;
+
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct LobesArgs {
+    #[command(flatten)]
+    pub(crate) pose: PoseArgs,
+    /// Tool: a .toml file, or the name of a shipped one
+    #[arg(long, help_heading = "Cut", value_name = "TOOL")]
+    pub(crate) tool: PathBuf,
+    /// Along this motion instead of at one pose: the lowest limit over its places
+    #[arg(long, help_heading = "Cut", value_name = "MOTION", conflicts_with = "at")]
+    pub(crate) along: Option<PathBuf>,
+    /// How many places along the motion
+    #[arg(long, help_heading = "Cut", value_name = "N", default_value_t = 12, requires = "along")]
+    pub(crate) places: usize,
+    /// Spindle speeds (1/min) [default: those of the tool's file]
+    #[arg(long, help_heading = "Cut", value_name = "RPM,...", value_delimiter = ',', allow_hyphen_values = true)]
+    pub(crate) rpm: Vec<f64>,
+    /// Deepest cut that is looked at (m) [default: that of the tool's file]
+    #[arg(long, help_heading = "Cut", value_name = "METRES", allow_hyphen_values = true)]
+    pub(crate) deepest: Option<f64>,
+    /// From the mean cutting force alone (zero-order solution): quick, blind to period doubling
+    #[arg(long, help_heading = "Cut")]
+    pub(crate) zero_order: bool,
+    /// All unstable ranges of depth, not the lowest limit alone
+    #[arg(long, help_heading = "Cut", conflicts_with_all = ["zero_order", "along"])]
+    pub(crate) ranges: bool,
+    /// Follow one cut over time instead: spindle speed (1/min) and depth (m)
+    #[arg(long, help_heading = "Cut over time", value_name = "RPM,DEPTH", allow_hyphen_values = true,
+        conflicts_with_all = ["along", "rpm", "zero_order", "ranges", "deepest"])]
+    pub(crate) cut: Option<String>,
+    /// How long (s) [default: until it is seen whether it chatters]
+    #[arg(long, help_heading = "Cut over time", value_name = "SECONDS", requires = "cut", allow_hyphen_values = true)]
+    pub(crate) seconds: Option<f64>,
+    /// Steps from tooth to tooth
+    #[arg(long, help_heading = "Cut over time", value_name = "N", requires = "cut", default_value_t = 60)]
+    pub(crate) steps: usize,
+    /// Output folder [default: a new one in out/]
+    #[arg(short, long, help_heading = "Files", value_name = "FOLDER")]
+    pub(crate) output: Option<PathBuf>,
+    /// Overwrite what is in the output folder
+    #[arg(long, help_heading = "Files")]
+    pub(crate) force: bool,
+    /// Write nothing, only print the figures
+    #[arg(long, help_heading = "Files", conflicts_with_all = ["output", "force"])]
+    pub(crate) no_files: bool,
+}
+
+pub(crate) fn run(cli: &Cli, args: &LobesArgs) -> Result<ExitCode, Failure> {
+    let robot = Robot::load_with(&shipped::robot(Some(&args.pose.robot))?, &load_options(&args.pose.load)?)?;
+    let mut tool = CuttingTool::load(shipped::tool(&args.tool)?)?;
+    if !args.rpm.is_empty() {
+        let mut rpm = args.rpm.clone();
+        rpm.sort_by(f64::total_cmp);
+        rpm.dedup();
+        tool = tool.at_speeds(rpm);
+    }
+    let at = values::joint_values(args.pose.at.as_deref(), &robot)?;
+    if let Some(words) = &args.cut {
+        return follow(cli, args, words, &robot, &tool, at.as_deref());
+    }
+    let motion = args.along.as_ref().map(|given| Motion::load(shipped::trajectory(given), &robot)).transpose()?;
+    let place = match &motion {
+        Some(motion) => CuttingPlace::Along(motion, args.places),
+        None => CuttingPlace::At(at.as_deref()),
+    };
+    let folder = OutputFolder::of(args.output.as_deref(), &format!("{}-lobes", robot.name), !args.no_files)?;
+    let request = LobesRequest {
+        modelling: args.pose.modelling.modelling(),
+        deepest_m: args.deepest,
+        zero_order: args.zero_order,
+        ranges: args.ranges,
+        output: folder.path(),
+        overwrite: args.force,
+    };
+    let bar = progress(cli);
+    let found = lobes(&robot, &tool, &place, &request, &|done, all| {
+        bar.set_length(all as u64);
+        bar.set_position(done as u64);
+        true
+    });
+    bar.finish_and_clear();
+    let found = found?;
+    if !cli.quiet {
+        found.warnings.iter().for_each(|text| warning(text));
+    }
+    answer(cli, || to_json(&found), || text(&found));
+    Ok(ExitCode::SUCCESS)
+}
+
+/// One cut over time.
+fn follow(
+    cli: &Cli,
+    args: &LobesArgs,
+    words: &str,
+    robot: &Robot,
+    tool: &CuttingTool,
+    at: Option<&[f64]>,
+) -> Result<ExitCode, Failure> {
+    let numbers: Option<Vec<f64>> = words.split(',').map(|word| word.trim().parse().ok()).collect();
+    let Some([spindle_rpm, depth_m]) = numbers.as_deref() else {
+        return Err(Failure::Usage(format!("--cut {words:?}: expected RPM,DEPTH, in 1/min and m, as in 8000,0.002")));
+    };
+    let folder = OutputFolder::of(args.output.as_deref(), &format!("{}-cut", robot.name), !args.no_files)?;
+    let request = CutRequest {
+        modelling: args.pose.modelling.modelling(),
+        spindle_rpm: *spindle_rpm,
+        depth_m: *depth_m,
+        seconds: args.seconds,
+        steps: args.steps,
+        output: folder.path(),
+        overwrite: args.force,
+    };
+    let found = cut(robot, tool, at, &request)?;
+    if !cli.quiet {
+        found.warnings.iter().for_each(|text| warning(text));
+    }
+    answer(cli, || to_json(&found), || cut_text(&found));
+    Ok(ExitCode::SUCCESS)
+}
+
+fn cut_text(c: &CutRun) -> String {
+    let verdict = if c.chatters { "chatters" } else { "does not chatter" };
+    let mut out = format!(
+        "{} on {}, {:.0} 1/min, {:.3} mm deep, {:.2} s: {verdict}\n",
+        c.tool,
+        c.robot,
+        c.spindle_rpm,
+        1e3 * c.depth_m,
+        c.seconds
+    );
+    let limit = match (c.limit_m, c.limit_hz) {
+        (Some(limit), Some(hz)) => format!("{:.3} mm, then at {hz:.1} Hz", 1e3 * limit),
+        _ => "none".to_owned(),
+    };
+    out += &format!("limit of depth at this speed: {limit}; largest multiplier {:.5}\n", c.multiplier);
+    out += &format!(
+        "from tooth to tooth the tip differs by {:.3e} mm ({:.4} feeds per tooth)\n",
+        1e3 * c.scatter_m,
+        c.scatter_per_feed
+    );
+    if let Some(hz) = c.swing_hz {
+        out += &format!("it swings most at {hz:.1} Hz\n");
+    }
+    out += &format!("largest displacement {:.4} mm, largest force {:.0} N\n", 1e3 * c.peak_m, c.peak_n);
+    for (what, path) in [("CSV", &c.file), ("plot", &c.plot)] {
+        if let Some(path) = path {
+            out += &format!("{what:<7} {path}\n");
+        }
+    }
+    out
+}
+
+/// Of limits that are found; on a terminal alone.
+fn progress(cli: &Cli) -> ProgressBar {
+    let target = if cli.quiet || cli.json { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
+    let style = ProgressStyle::with_template("{bar:40} {pos} of {len} limits, {eta} left");
+    let bar = ProgressBar::with_draw_target(Some(1), target);
+    bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
+}
+
+fn mm(x: Option<f64>) -> String {
+    x.map_or_else(|| "-".into(), |x| format!("{:.3}", 1e3 * x))
+}
+
+fn text(found: &Lobes) -> String {
+    let mut out = format!(
+        "{} on {}: {} limits of depth, up to {} mm\n",
+        found.tool,
+        found.robot,
+        found.method,
+        1e3 * found.deepest_m
+    );
+    out += &match (found.stable_below_m, found.stable_below_at_rpm) {
+        (Some(depth), Some(rpm)) => format!(
+            "stable at every speed below {:.3} mm (at {rpm:.0} 1/min); deepest at {:.0} 1/min: {:.3} mm\n\n",
+            1e3 * depth,
+            found.best_rpm,
+            1e3 * found.best_depth_m
+        ),
+        _ => "no chatter at any of the speeds\n\n".to_owned(),
+    };
+    let ranges = found.points.iter().any(|p| !p.unstable_m.is_empty());
+    let along = found.poses.len() > 1;
+    let mut head = vec!["spindle [1/min]", "limit [mm]", "chatter [Hz]", "kind", "zero order [mm]"];
+    head.extend(along.then_some("at [s]"));
+    head.extend(ranges.then_some("unstable [mm]"));
+    let mut t = table(&head);
+    // Evenly, where there are too many.
+    let every = found.points.len().div_ceil(SHOWN).max(1);
+    for point in found.points.iter().step_by(every) {
+        t.add_row(row(found, point, along, ranges));
+    }
+    right(&mut t);
+    out += &lines(&t);
+    if every > 1 {
+        out +=
+            &format!("every {every}th of {} speeds; the others are in the files and in --json\n", found.points.len());
+    }
+    if along {
+        out += &poses(found);
+    }
+    let files = [
+        ("CSV", &found.files.csv),
+        ("plot", &found.files.plot),
+        ("page", &found.files.page),
+        ("figures", &found.files.json),
+    ];
+    for (what, path) in files {
+        if let Some(path) = path {
+            out += &format!("{what:<7} {path}\n");
+        }
+    }
+    out
+}
+
+fn row(found: &Lobes, point: &LobePoint, along: bool, ranges: bool) -> Vec<String> {
+    let mut row = vec![
+        format!("{:.0}", point.spindle_rpm),
+        mm(point.depth_m),
+        point.chatter_hz.map_or_else(|| "-".into(), |hz| format!("{hz:.1}")),
+        point.kind.unwrap_or("-").to_owned(),
+        mm(point.zero_order_depth_m),
+    ];
+    if along {
+        row.push(found.poses[point.pose].time_s.map_or_else(|| "-".into(), |t| format!("{t:.2}")));
+    }
+    if ranges {
+        let all: Vec<String> =
+            point.unstable_m.iter().map(|[a, b]| format!("{:.3} to {:.3}", 1e3 * a, 1e3 * b)).collect();
+        row.push(if all.is_empty() { "-".into() } else { all.join(", ") });
+    }
+    row
+}
+
+/// Lowest limit and compliance place by place.
+fn poses(found: &Lobes) -> String {
+    let mut t =
+        table(&["time [s]", "lowest limit [mm]", "at [1/min]", "feed [um/N]", "across", "along the tool", "f1 [Hz]"]);
+    for pose in &found.poses {
+        let mut row = vec![
+            pose.time_s.map_or_else(|| "-".into(), |t| format!("{t:.2}")),
+            mm(pose.stable_below_m),
+            pose.stable_below_at_rpm.map_or_else(|| "-".into(), |rpm| format!("{rpm:.0}")),
+        ];
+        row.extend(pose.compliance.iter().map(|c| format!("{:.3}", 1e6 * c)));
+        row.push(pose.frequencies_hz.first().map_or_else(|| "-".into(), |hz| format!("{hz:.2}")));
+        t.add_row(row);
+    }
+    right(&mut t);
+    let left_out = match found.left_out {
+        0 => String::new(),
+        n => format!("{n} places are left out: the tool stands still there, or moves along its axis\n"),
+    };
+    format!("\n{}{left_out}", lines(&t))
+}
+
+fn right(t: &mut comfy_table::Table) {
+    for k in 0..t.column_count() {
+        if let Some(column) = t.column_mut(k) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+}

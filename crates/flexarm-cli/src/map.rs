@@ -1,0 +1,269 @@
+//! `flexarm map`: flags to a request, a table for people.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::{Args, ValueEnum};
+use comfy_table::CellAlignment;
+use flexarm::map::{
+    JointRange, KeptPoses, Map, MapPose, MapRegion, MapRequest, ToolDirections, WorkspaceGrid, map, readable_quantity,
+};
+use flexarm::reduce::numbers;
+use flexarm::{Motion, Robot};
+
+use crate::args::{Cli, ModellingArgs, RobotArgs};
+use crate::failure::Failure;
+use crate::motion::MotionInputArgs;
+use crate::print::{lines, table, warning};
+use crate::shipped::OutputFolder;
+use crate::{Bar, answer, load_options, shipped, signals, to_json, values};
+
+const EXAMPLES: &str = "\
+Examples:
+  Where kr210 is stiff with its tool pointing down, all that it can reach, in a new folder of out/:
+      flexarm map kr210
+  Where to put a workpiece of 0.8 x 0.6 x 0.4 m for milling with 500 N sideways, on a finer grid of a box:
+      flexarm map kr210 --box 1:2.6,-1.2:1.2,0:1.6 --grid 0.05 --wrench 500,0,0 --workpiece 0.8,0.6,0.4
+  The tool may tilt by 20 degrees and turn about its axis:
+      flexarm map kr210 --cone 20 --tilts 9 --rolls 6
+  In joints 2 and 3, the others at zero:
+      flexarm map kr210 --over joint_2=-120deg:0deg:61 --over joint_3=0deg:120deg:61
+  Along a motion:
+      flexarm map kr210 --along pick_and_place --points 500";
+
+#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+pub(crate) enum KeepName {
+    /// The best pose of each place
+    #[default]
+    Best,
+    /// The worst pose of each place
+    Worst,
+    /// All poses
+    All,
+}
+
+#[derive(Debug, Args)]
+#[command(after_long_help = EXAMPLES, after_help = "More, with examples: flexarm map --help")]
+pub(crate) struct MapArgs {
+    /// robot.toml, a folder with one, a .urdf or .xacro file, or the name of a shipped robot
+    pub(crate) robot: PathBuf,
+    /// Box of places of the tool (m, world) [default: all that the arm can reach]
+    #[arg(long = "box", help_heading = "Where", value_name = "X0:X1,Y0:Y1,Z0:Z1", allow_hyphen_values = true)]
+    pub(crate) bounds: Option<String>,
+    /// Distance of the places (m) [default: about 32 along the longest edge]
+    #[arg(long, help_heading = "Where", value_name = "M", allow_hyphen_values = true)]
+    pub(crate) grid: Option<f64>,
+    /// Leave out places nearer than this to the upright line through the first joint (m): the arm itself is there
+    #[arg(long, help_heading = "Where", value_name = "M", default_value_t = 0.0, allow_hyphen_values = true)]
+    pub(crate) keep_out: f64,
+    /// Where the z axis of the tool points in the world
+    #[arg(long, help_heading = "Where", value_name = "X,Y,Z", default_value = "0,0,-1", allow_hyphen_values = true)]
+    pub(crate) tool_axis: String,
+    /// Rotation of the tool about that axis (degrees); at 0 its x axis points along world x
+    #[arg(long, help_heading = "Where", value_name = "DEG", default_value_t = 0.0, allow_hyphen_values = true)]
+    pub(crate) roll: f64,
+    /// Half angle of a cone within which the tool may tilt (degrees)
+    #[arg(long, help_heading = "Where", value_name = "DEG", default_value_t = 0.0, allow_hyphen_values = true)]
+    pub(crate) cone: f64,
+    /// Directions of the tool in the cone [default: 9 with a cone, else 1]
+    #[arg(long, help_heading = "Where", value_name = "N")]
+    pub(crate) tilts: Option<usize>,
+    /// Rotations of the tool about its axis that count, evenly over a turn
+    #[arg(long, help_heading = "Where", value_name = "N", default_value_t = 1)]
+    pub(crate) rolls: usize,
+    /// Go through values of a joint instead of places (may be repeated; rad or m, 30deg for degrees)
+    #[arg(long, help_heading = "Where", value_name = "JOINT=FROM:TO:N", allow_hyphen_values = true, conflicts_with_all = ["bounds", "grid", "along"])]
+    pub(crate) over: Vec<String>,
+    /// Go along a motion instead of places
+    #[arg(long, help_heading = "Where", value_name = "MOTION", conflicts_with_all = ["bounds", "grid"])]
+    pub(crate) along: Option<PathBuf>,
+    /// Instants of that motion
+    #[arg(long, help_heading = "Where", value_name = "N", default_value_t = 1000, requires = "along")]
+    pub(crate) points: usize,
+    /// Joints that the map does not move, and near which branches are taken [default: zero]
+    #[arg(long, help_heading = "Where", value_name = "Q1,Q2,...", allow_hyphen_values = true)]
+    pub(crate) at: Option<String>,
+    /// Force and moment on the TCP besides weight, world axes (N, N m)
+    #[arg(long, help_heading = "What", value_name = "FX,FY,FZ[,TX,TY,TZ]", allow_hyphen_values = true)]
+    pub(crate) wrench: Option<String>,
+    /// Quantity by which poses are compared [default: error_m with a wrench, else compliance_worst_m_per_n]
+    #[arg(long, help_heading = "What", value_name = "NAME")]
+    pub(crate) by: Option<String>,
+    /// Which of a place's poses are kept, of all directions and branches
+    #[arg(long, help_heading = "What", value_enum, default_value = "best")]
+    pub(crate) keep: KeepName,
+    /// Natural frequencies
+    #[arg(long, help_heading = "What", value_name = "N", default_value_t = 3)]
+    pub(crate) frequencies: usize,
+    /// Find the best place for a box with these edges (m, along world axes)
+    #[arg(long, help_heading = "What", value_name = "DX,DY,DZ", allow_hyphen_values = true, conflicts_with_all = ["over", "along"])]
+    pub(crate) workpiece: Option<String>,
+    #[command(flatten)]
+    pub(crate) input: MotionInputArgs,
+    #[command(flatten)]
+    pub(crate) modelling: ModellingArgs,
+    #[command(flatten)]
+    pub(crate) load: RobotArgs,
+    /// Folder of table, page and recording [default: a new one in out/]
+    #[arg(short, long, help_heading = "Files", value_name = "FOLDER")]
+    pub(crate) output: Option<PathBuf>,
+    /// Write no files
+    #[arg(long, help_heading = "Files", conflicts_with = "output")]
+    pub(crate) no_files: bool,
+    /// Overwrite what is in the output folder
+    #[arg(long, help_heading = "Files", requires = "output")]
+    pub(crate) force: bool,
+}
+
+/// Three numbers of a flag.
+fn three(flag: &str, text: &str, unit: &str) -> Result<[f64; 3], Failure> {
+    let found = numbers(text).map_err(|what| Failure::Usage(format!("{flag}: {what}{unit}")))?;
+    <[f64; 3]>::try_from(found.as_slice())
+        .map_err(|_| Failure::Usage(format!("{flag} has {} numbers; expected three{unit}", found.len())))
+}
+
+/// Reads `x0:x1,y0:y1,z0:z1`.
+fn bounds(text: &str) -> Result<[[f64; 3]; 2], Failure> {
+    let wrong =
+        || Failure::Usage(format!("--box {text:?}: expected X0:X1,Y0:Y1,Z0:Z1 in m, world, such as 1:2,-0.5:0.5,0:1"));
+    let parts: Vec<[f64; 2]> = text
+        .split(',')
+        .map(|part| {
+            let (low, high) = part.split_once(':')?;
+            Some([low.trim().parse().ok()?, high.trim().parse().ok()?])
+        })
+        .collect::<Option<_>>()
+        .ok_or_else(wrong)?;
+    let [x, y, z] = <[[f64; 2]; 3]>::try_from(parts).map_err(|_| wrong())?;
+    Ok([[x[0], y[0], z[0]], [x[1], y[1], z[1]]])
+}
+
+/// Reads `joint=from:to:n`.
+fn joint_range(text: &str) -> Result<JointRange, Failure> {
+    let wrong = || {
+        Failure::Usage(format!(
+            "--over {text:?}: expected JOINT=FROM:TO:N, rad or m, or degrees as in joint_2=-90deg:0deg:46"
+        ))
+    };
+    let (joint, rest) = text.rsplit_once('=').ok_or_else(wrong)?;
+    let parts: Vec<&str> = rest.split(':').map(str::trim).collect();
+    let [from, to, points] = parts[..] else { return Err(wrong()) };
+    let number = |text: &str| -> Option<f64> {
+        match text.strip_suffix("deg") {
+            Some(digits) => digits.trim().parse::<f64>().ok().map(f64::to_radians),
+            None => text.parse().ok(),
+        }
+    };
+    let (from, to) = (number(from).ok_or_else(wrong)?, number(to).ok_or_else(wrong)?);
+    let points = points.parse().map_err(|_| wrong())?;
+    Ok(JointRange { joint: joint.trim().to_owned(), range: [from, to], points })
+}
+
+fn region(args: &MapArgs, robot: &Robot) -> Result<MapRegion, Failure> {
+    if let Some(motion) = &args.along {
+        let motion = Motion::load_with(shipped::trajectory(motion), robot, &args.input.options())?;
+        return Ok(MapRegion::Along { motion: Box::new(motion), points: args.points });
+    }
+    if !args.over.is_empty() {
+        return Ok(MapRegion::Joints(args.over.iter().map(|text| joint_range(text)).collect::<Result<_, _>>()?));
+    }
+    let tool = ToolDirections {
+        axis: three("--tool-axis", &args.tool_axis, " (world)")?,
+        roll_rad: args.roll.to_radians(),
+        cone_rad: args.cone.to_radians(),
+        tilts: args.tilts.unwrap_or(if args.cone > 0.0 { 9 } else { 1 }),
+        rolls: args.rolls,
+    };
+    let bounds = args.bounds.as_deref().map(bounds).transpose()?;
+    Ok(MapRegion::Workspace(WorkspaceGrid { bounds, spacing_m: args.grid, keep_out_m: args.keep_out, tool }))
+}
+
+pub(crate) fn run(cli: &Cli, args: &MapArgs) -> Result<ExitCode, Failure> {
+    let robot = Robot::load_with(&shipped::robot(Some(&args.robot))?, &load_options(&args.load)?)?;
+    let region = region(args, &robot)?;
+    let workpiece_m = args.workpiece.as_deref().map(|text| three("--workpiece", text, " (m)")).transpose()?;
+    let wrench = args.wrench.as_deref().map_or(Ok([0.0; 6]), |text| values::wrench("--wrench", text))?;
+    let at = values::joint_values(args.at.as_deref(), &robot)?;
+    let folder = OutputFolder::of(args.output.as_deref(), &format!("{}-map", robot.name), !args.no_files)?;
+    let request = MapRequest {
+        modelling: args.modelling.modelling(),
+        region,
+        at,
+        wrench,
+        frequencies: Some(args.frequencies),
+        keep: match args.keep {
+            KeepName::Best => KeptPoses::Best,
+            KeepName::Worst => KeptPoses::Worst,
+            KeepName::All => KeptPoses::All,
+        },
+        by: args.by.clone(),
+        workpiece_m,
+        output: folder.path(),
+        overwrite: args.force,
+    };
+    let (mut stop, mut bar) = (signals::stop_when_asked(), Bar::new(cli));
+    let found = map(&robot, &request, &mut |done, all| {
+        bar.show_as(done, all, || format!("{done:.0} of {all:.0} places"));
+        stop()
+    });
+    bar.clear();
+    let found = found?;
+    if !cli.quiet {
+        found.warnings.iter().for_each(|text| warning(text));
+    }
+    answer(cli, || to_json(&found), || text(&found));
+    Ok(ExitCode::SUCCESS)
+}
+
+fn text(map: &Map) -> String {
+    let mut out = match &map.grid {
+        Some(grid) => format!(
+            "{}: {} of {} places within reach, {} m apart, {} directions of the tool; {} poses in {:.2} s\n",
+            map.robot, map.reachable, map.points, grid.spacing_m, grid.directions, map.poses, map.wall_s
+        ),
+        None => format!("{}: {} poses in {:.2} s\n", map.robot, map.poses, map.wall_s),
+    };
+    let mut t = table(&["", "unit", "least", "5 %", "median", "95 %", "most", "best pose", "worst pose"]);
+    for column in map.table.columns.iter().filter(|column| column.quantity) {
+        let Some(spread) = map.quantities.get(&column.name) else { continue };
+        let (factor, unit) = readable_quantity(&column.name);
+        let at = |part: &str| spread.quantiles.get(part).copied().unwrap_or(f64::NAN);
+        let pose = |pose: &MapPose| pose.quantities.get(&column.name).copied().unwrap_or(f64::NAN);
+        let numbers = [spread.min, at("0.05"), at("0.5"), at("0.95"), spread.max, pose(&map.best), pose(&map.worst)];
+        let mut row = vec![column.name.clone(), unit.to_owned()];
+        row.extend(numbers.map(|x| format!("{:.4}", factor * x)));
+        t.add_row(row);
+    }
+    for k in 2..t.column_count() {
+        if let Some(column) = t.column_mut(k) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    out += &lines(&t);
+    out += &format!("\nbest and worst by {}:\n", map.by);
+    for (name, pose) in [("best", &map.best), ("worst", &map.worst)] {
+        let place = pose.place_m.map(|x| format!("{x:.3}")).join(", ");
+        let joints: Vec<String> = pose.q.iter().map(|q| format!("{q:.4}")).collect();
+        out += &format!("  {name:<5} at {place} m, joints {}\n", joints.join(", "));
+    }
+    if let Some(placement) = &map.placement {
+        let (factor, unit) = readable_quantity(&map.by);
+        let centre = placement.centre_m.map(|x| format!("{x:.3}")).join(", ");
+        out += &format!(
+            "workpiece: centre best at {centre} m, worst in it {:.4} {unit} ({} places)\n",
+            factor * placement.worst,
+            placement.points
+        );
+    }
+    for (what, path) in [
+        ("table", &map.files.table),
+        ("page", &map.files.page),
+        ("Rerun", &map.files.rrd),
+        ("figures", &map.files.json),
+    ] {
+        if let Some(path) = path {
+            out += &format!("{what:<7} {path}\n");
+        }
+    }
+    out
+}

@@ -1,0 +1,268 @@
+//! `flexarm sweep`: studies of many runs, their shards, and what they tell.
+
+mod plan;
+
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{Args, Subcommand};
+use comfy_table::CellAlignment;
+use flexarm::sweep::{
+    Finders, MetricFigures, MinimiseRequest, ParameterValue, Replay, Shard, Sweep, SweepRequest, SweepSummary, merge,
+};
+
+use self::plan::PlanArgs;
+use crate::args::Cli;
+use crate::failure::Failure;
+use crate::print::{lines, table};
+use crate::{Bar, answer, shipped, signals, to_json};
+
+const EXAMPLES: &str = "\
+Examples:
+  The least mass with the peak error kept, as the study's [minimise] says it:
+      flexarm sweep sections.toml --minimise
+  All runs of a study on all cores, into out/payload_speed; the same command goes on after a stop:
+      flexarm sweep payload_speed.toml
+  A quarter of them here, the others elsewhere, and all of them joined:
+      flexarm sweep payload_speed.toml --shard 1/4 -o shard1
+      flexarm sweep merge payload_speed.toml shard1 shard2 shard3 shard4 -o all
+  Eight shards for HyperQueue, as scripts:
+      flexarm sweep plan payload_speed.toml -n 8 --engine hyperqueue
+The file of a study: flexarm format study";
+
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES, args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+pub(crate) struct SweepArgs {
+    #[command(subcommand)]
+    pub(crate) command: Option<SweepCommand>,
+    #[command(flatten)]
+    pub(crate) run: SweepRunArgs,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct SweepRunArgs {
+    /// What is varied and asked (.toml)
+    #[arg(required = true)]
+    pub(crate) study: Option<PathBuf>,
+    /// Run only this part of the runs, number/of
+    #[arg(long, value_name = "I/N", value_parser = parse_shard)]
+    pub(crate) shard: Option<Shard>,
+    /// Runs at the same time [default: one per core]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub(crate) threads: Option<u16>,
+    /// Look for the least of this metric within the bounds of the parameters; without a name that of the study's [minimise]
+    #[arg(long, value_name = "METRIC", num_args = 0..=1, default_missing_value = "", conflicts_with = "shard")]
+    pub(crate) minimise: Option<String>,
+    /// What must hold for the least one, such as 'peak_mm <= 6' (may be repeated)
+    #[arg(long, value_name = "CONDITION", requires = "minimise")]
+    pub(crate) constraint: Vec<String>,
+    /// Most runs of the search [default: 400]
+    #[arg(long, value_name = "N", requires = "minimise", value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) most_runs: Option<u32>,
+    /// Folder of the results; what is there of the same study is not run again [default: out/ and the name of the study]
+    #[arg(short, long, help_heading = "Files", value_name = "FOLDER")]
+    pub(crate) output: Option<PathBuf>,
+    /// Replace results of another study in the folder
+    #[arg(long, help_heading = "Files")]
+    pub(crate) force: bool,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum SweepCommand {
+    /// Write what an engine needs to run the shards of a study: scripts for Slurm, HyperQueue, a shell, jobs of Kubernetes
+    Plan(PlanArgs),
+    /// Join the results of shards in one table
+    Merge(MergeArgs),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct MergeArgs {
+    /// The study (.toml)
+    pub(crate) study: PathBuf,
+    /// Folders that its shards wrote into
+    #[arg(required = true)]
+    pub(crate) folders: Vec<PathBuf>,
+    /// Folder of the table [default: the first one]
+    #[arg(short, long, help_heading = "Files", value_name = "FOLDER")]
+    pub(crate) output: Option<PathBuf>,
+    /// Replace a table that is there
+    #[arg(long, help_heading = "Files")]
+    pub(crate) force: bool,
+}
+
+fn parse_shard(text: &str) -> Result<Shard, String> {
+    let pair = text.split_once('/').and_then(|(number, of)| Some((number.parse().ok()?, of.parse().ok()?)));
+    match pair {
+        Some((number, of)) if (1..=of).contains(&number) => Ok(Shard { number, of }),
+        _ => Err(format!("expected a shard and their number, such as 1/4, found {text:?}")),
+    }
+}
+
+/// Shipped robots and motions by their names.
+const FINDERS: Finders = Finders { robot: shipped::robot_file, motion: shipped::trajectory };
+
+pub(crate) fn run(cli: &Cli, args: &SweepArgs) -> Result<ExitCode, Failure> {
+    match (&args.command, &args.run.study) {
+        (Some(SweepCommand::Plan(args)), _) => plan::run(cli, args),
+        (Some(SweepCommand::Merge(args)), _) => {
+            let sweep = Sweep::load(&args.study, &FINDERS)?;
+            let output = args.output.clone().unwrap_or_else(|| args.folders[0].clone());
+            let summary = merge(&sweep, &args.folders, &output, args.force, Some(command))?;
+            answer(cli, || to_json(&summary), || text(&summary));
+            Ok(ExitCode::SUCCESS)
+        }
+        (None, Some(study)) => sweep(cli, &args.run, study),
+        (None, None) => Err(Failure::Usage("give the file of a study".into())),
+    }
+}
+
+fn sweep(cli: &Cli, args: &SweepRunArgs, study: &Path) -> Result<ExitCode, Failure> {
+    let mut sweep = Sweep::load(study, &FINDERS)?;
+    let ending = if args.minimise.is_some() { "_least" } else { "" };
+    let request = SweepRequest {
+        output: args.output.clone().unwrap_or_else(|| Path::new("out").join(clean(sweep.name()) + ending)),
+        overwrite: args.force,
+        shard: args.shard.unwrap_or(Shard::ALL),
+        threads: args.threads.map(usize::from),
+        command: Some(command),
+    };
+    let mut stop = signals::stop_when_asked();
+    let mut bar = Bar::new(cli);
+    let mut progress = |done: usize, all: usize| -> ControlFlow<()> {
+        bar.show_as(done as f64, all as f64, || format!("{done} of {all} runs"));
+        stop()
+    };
+    let result = match &args.minimise {
+        None => sweep.run(&request, &mut progress),
+        Some(metric) => {
+            let search = MinimiseRequest {
+                metric: Some(metric.clone()).filter(|metric| !metric.is_empty()),
+                constraints: args.constraint.clone(),
+                runs: args.most_runs.map(|n| n as usize),
+            };
+            sweep.minimise(&request, &search, &mut progress)
+        }
+    };
+    bar.clear();
+    let summary = result?;
+    answer(cli, || to_json(&summary), || text(&summary));
+    Ok(ExitCode::SUCCESS)
+}
+
+/// The command that runs the files of a run.
+fn command(replay: &Replay) -> String {
+    let mut words = vec!["flexarm compare".to_owned(), plan::quoted(&replay.robot)];
+    words.extend(replay.motion.as_deref().map(plan::quoted));
+    if let Some(loads) = &replay.loads {
+        words.push(format!("--loads {}", plan::quoted(loads)));
+    }
+    for (key, value) in &replay.options {
+        let flag = key.replace('_', "-");
+        match value {
+            ParameterValue::Truth(true) if key == "dispersion_correction" => {}
+            ParameterValue::Truth(false) if key == "dispersion_correction" => {
+                words.push("--no-dispersion-correction".into())
+            }
+            ParameterValue::Truth(true) => words.push(format!("--{flag}")),
+            ParameterValue::Truth(false) => {}
+            other => words.push(format!("--{flag} {other}")),
+        }
+    }
+    words.join(" ")
+}
+
+/// A name as a folder.
+fn clean(name: &str) -> String {
+    name.chars().map(|c| if c.is_alphanumeric() || c == '-' || c == '_' { c } else { '_' }).collect()
+}
+
+fn text(found: &SweepSummary) -> String {
+    let shard = found.shard.as_ref().map_or_else(String::new, |shard| format!(" (shard {shard})"));
+    let mut out = format!(
+        "{}{shard}: {} of {} runs done, {} failed; {:.1} s, {:.1} s of processor time\n\n",
+        found.study, found.done, found.runs, found.failed, found.wall_s, found.cpu_s
+    );
+    let mut t =
+        table(&["metric", "runs", "least", "5 %", "median", "95 %", "largest", "mean", "std", "varies most with"]);
+    for metric in &found.metrics {
+        let quantile = |k: usize| number(metric.quantiles.map(|q| q[k]));
+        t.add_row(vec![
+            metric.name.clone(),
+            metric.count.to_string(),
+            number(metric.min),
+            quantile(0),
+            quantile(1),
+            quantile(2),
+            number(metric.max),
+            number(metric.mean),
+            number(metric.std),
+            strongest(metric),
+        ]);
+    }
+    for k in 1..9 {
+        if let Some(column) = t.column_mut(k) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    out += &lines(&t);
+    if let Some(search) = &found.minimise {
+        let constraints = if search.constraints.is_empty() {
+            String::new()
+        } else {
+            format!(" under {}", search.constraints.join(", "))
+        };
+        let end = match (search.kept, search.settled) {
+            (false, _) => "no run keeps that",
+            (true, true) => "settled",
+            (true, false) => "ended with its runs, more might find less",
+        };
+        out += &format!(
+            "\nleast {}{constraints}: {} generations, {end}; as filed {}{}\n",
+            search.metric,
+            search.generations,
+            number(search.start),
+            if search.start_kept { "" } else { " (which does not keep it)" }
+        );
+    }
+    if let Some(best) = &found.best {
+        out += &format!("\nbest: run {}, {} {}\n", best.run, best.metric, number(Some(best.value)));
+        for (name, value) in &best.parameters {
+            out += &format!("    {name} = {value}\n");
+        }
+    }
+    for failure in &found.failures {
+        out += &format!("\nfailed: {} runs, first {}: {}\n", failure.runs, failure.first, failure.reason);
+    }
+    if found.doubles > 0 {
+        out += &format!("\n{} runs were there twice, with the same result: they count once\n", found.doubles);
+    }
+    out += "\n";
+    let again = found.best.as_ref().and_then(|best| best.command.as_ref());
+    for (what, file) in [("runs", Some(&found.file)), ("page", found.page.as_ref()), ("again", again)] {
+        if let Some(file) = file {
+            out += &format!("{what:<8} {file}\n");
+        }
+    }
+    out
+}
+
+/// The parameter that makes most of a metric's variance.
+fn strongest(metric: &MetricFigures) -> String {
+    let shares = metric.shares.iter().filter_map(|(name, share)| Some((name, (*share)?)));
+    let most = shares.max_by(|a, b| a.1.total_cmp(&b.1));
+    most.map_or_else(String::new, |(name, share)| format!("{name} ({:.0} %)", 100.0 * share))
+}
+
+/// A number with the digits that a person reads.
+fn number(x: Option<f64>) -> String {
+    match x {
+        None => "-".into(),
+        Some(0.0) => "0".into(),
+        Some(x) if (1e-3..1e5).contains(&x.abs()) => {
+            let digits = (4 - x.abs().log10().floor() as i32).clamp(0, 7) as usize;
+            format!("{x:.digits$}")
+        }
+        Some(x) => format!("{x:.4e}"),
+    }
+}

@@ -1,0 +1,280 @@
+//! `flexarm sweep plan`: what an engine that is there already needs to run the shards of a study and to join them.
+//!
+//! An engine is a function from a [`Plan`] to files. All of them run the same command with the number of a shard; results go into
+//! one folder, in which no two shards write the same file, and a shard that was killed goes on when it is started again.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::{Args, ValueEnum};
+use flexarm::sweep::{Sweep, SweepError, write_files};
+use serde::Serialize;
+
+use super::{FINDERS, clean};
+use crate::args::Cli;
+use crate::failure::Failure;
+use crate::{answer, to_json};
+
+#[derive(Debug, Args)]
+pub(crate) struct PlanArgs {
+    /// The study (.toml)
+    pub(crate) study: PathBuf,
+    /// Into how many shards the runs are cut
+    #[arg(short = 'n', long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub(crate) shards: u32,
+    /// Who runs them
+    #[arg(long, value_enum, default_value_t = Engine::None)]
+    pub(crate) engine: Engine,
+    /// The program where the shards run [default: this one; of kubernetes flexarm]
+    #[arg(long, value_name = "PATH")]
+    pub(crate) program: Option<PathBuf>,
+    /// Cores of a shard
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..))]
+    pub(crate) cores: u16,
+    /// Image of a container with the program (kubernetes)
+    #[arg(long, value_name = "IMAGE", default_value = "flexarm:latest")]
+    pub(crate) image: String,
+    /// Volume claim with the study and its files, where the results go too (kubernetes)
+    #[arg(long, value_name = "NAME", default_value = "flexarm")]
+    pub(crate) claim: String,
+    /// Folder of the results [default: out/ and the name of the study]
+    #[arg(long, value_name = "FOLDER")]
+    pub(crate) results: Option<PathBuf>,
+    /// Folder of the plan [default: the name of the study and _plan]
+    #[arg(short, long, help_heading = "Files", value_name = "FOLDER")]
+    pub(crate) output: Option<PathBuf>,
+    /// Overwrite what is in the folder of the plan
+    #[arg(long, help_heading = "Files")]
+    pub(crate) force: bool,
+}
+
+/// Who runs shards.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum Engine {
+    /// A shell script: one after the other, or by GNU parallel
+    None,
+    /// A job array of Slurm, and a job that joins
+    Slurm,
+    /// An indexed job of Kubernetes
+    Kubernetes,
+    /// Tasks of HyperQueue
+    Hyperqueue,
+}
+
+/// What all engines are told.
+struct Plan<'a> {
+    args: &'a PlanArgs,
+    name: String,
+    program: String,
+    study: String,
+    results: String,
+    folder: &'a Path,
+}
+
+/// Answer of `flexarm sweep plan`.
+#[derive(Debug, Serialize)]
+struct PlanSummary {
+    study: String,
+    runs: usize,
+    shards: u32,
+    engine: Engine,
+    /// What is to be typed.
+    start: String,
+    /// What joins the results, where the engine does not.
+    merge: String,
+    files: Vec<String>,
+}
+
+pub(crate) fn run(cli: &Cli, args: &PlanArgs) -> Result<ExitCode, Failure> {
+    let sweep = Sweep::load(&args.study, &FINDERS)?;
+    let runs = sweep.runs();
+    if args.shards as usize > runs {
+        let error = SweepError::Shard { number: 1, of: args.shards as usize, runs };
+        return Err(flexarm::Error::from(error).into());
+    }
+    let name = clean(sweep.name());
+    let folder = args.output.clone().unwrap_or_else(|| PathBuf::from(format!("{name}_plan")));
+    let whole =
+        |path: &Path| quoted(&std::path::absolute(path).unwrap_or_else(|_| path.to_owned()).display().to_string());
+    let inside = args.engine == Engine::Kubernetes;
+    let own = std::env::current_exe().ok().filter(|_| !inside);
+    let program = args.program.clone().or(own).unwrap_or_else(|| PathBuf::from("flexarm"));
+    let results = args.results.clone().unwrap_or_else(|| Path::new("out").join(&name));
+    // A container has a file system of its own: paths count from its volume.
+    let shown = |path: &Path| if inside { quoted(&path.display().to_string()) } else { whole(path) };
+    let plan = Plan {
+        args,
+        name,
+        program: quoted(&program.display().to_string()),
+        study: shown(&args.study),
+        results: shown(&results),
+        folder: &folder,
+    };
+    let (files, start, joins) = match args.engine {
+        Engine::None => plan.none(),
+        Engine::Slurm => plan.slurm(),
+        Engine::Kubernetes => plan.kubernetes(),
+        Engine::Hyperqueue => plan.hyperqueue(),
+    };
+    write_files(&files, args.force)?;
+    let summary = PlanSummary {
+        study: plan.name.clone(),
+        runs,
+        shards: args.shards,
+        engine: args.engine,
+        start,
+        merge: if joins { String::new() } else { plan.merge() },
+        files: files.iter().map(|(path, _)| path.display().to_string()).collect(),
+    };
+    answer(cli, || to_json(&summary), || text(&summary));
+    Ok(ExitCode::SUCCESS)
+}
+
+type Planned = (Vec<(PathBuf, String)>, String, bool);
+
+impl Plan<'_> {
+    /// The command of a shard whose number is in a variable of the shell.
+    fn shard(&self, number: &str) -> String {
+        let Self { program, study, results, args, .. } = self;
+        format!(
+            "{program} sweep {study} --shard {number}/{} --threads {} -o {results} --quiet --json",
+            args.shards, args.cores
+        )
+    }
+
+    fn merge(&self) -> String {
+        let Self { program, study, results, .. } = self;
+        format!("{program} sweep merge {study} {results} --force")
+    }
+
+    fn none(&self) -> Planned {
+        let n = self.args.shards;
+        let list: String = (1..=n).map(|k| self.shard(&k.to_string()) + "\n").collect();
+        let script = format!(
+            "#!/bin/sh\n# All shards of {}, one after the other, and their merge. In parallel: parallel < shards.txt\nset -e\n\
+             for i in $(seq 1 {n}); do\n    {}\ndone\n{}\n",
+            self.name,
+            self.shard("\"$i\""),
+            self.merge()
+        );
+        let (run, shards) = (self.folder.join("run.sh"), self.folder.join("shards.txt"));
+        let start = format!("sh {}", run.display());
+        (vec![(run, script), (shards, list)], start, true)
+    }
+
+    fn slurm(&self) -> Planned {
+        let Self { name, args, folder, .. } = self;
+        let (n, cores) = (args.shards, args.cores);
+        let job = format!(
+            "#!/bin/bash\n#SBATCH --job-name={name}\n#SBATCH --array=1-{n}\n#SBATCH --cpus-per-task={cores}\n#SBATCH --requeue\n\
+             #SBATCH --open-mode=append\n#SBATCH --output={name}-%a.log\n# A task that is requeued goes on where it was. Set time, memory \
+             and partition as your cluster asks for.\nexec {}\n",
+            self.shard("\"$SLURM_ARRAY_TASK_ID\"")
+        );
+        let merge = format!(
+            "#!/bin/bash\n#SBATCH --job-name={name}-merge\n#SBATCH --cpus-per-task=1\n#SBATCH --output={name}-merge.log\nexec {}\n",
+            self.merge()
+        );
+        let submit = "#!/bin/sh\n# Submits the shards, and their merge for when all of them are over.\nset -e\ncd \"$(dirname \"$0\")\"\n\
+                      job=$(sbatch --parsable shards.sbatch)\nsbatch --dependency=afterok:\"$job\" merge.sbatch\n";
+        let files = vec![
+            (folder.join("shards.sbatch"), job),
+            (folder.join("merge.sbatch"), merge),
+            (folder.join("submit.sh"), submit.to_owned()),
+        ];
+        (files, format!("sh {}", folder.join("submit.sh").display()), true)
+    }
+
+    fn hyperqueue(&self) -> Planned {
+        let Self { name, args, folder, program, study, results } = self;
+        let (n, cores) = (args.shards, args.cores);
+        // A task whose worker is lost is started again elsewhere.
+        let submit = format!(
+            "#!/bin/sh\n# Submits the shards to the HyperQueue server of this user (hq), waits for them, and joins the results.\nset -e\n\
+             cd \"$(dirname \"$0\")\"\n\
+             hq submit --name {name} --array 1-{n} --cpus {cores} --crash-limit 20 --wait --stdout 'shard-%{{TASK_ID}}.log' \
+             --stderr 'shard-%{{TASK_ID}}.err' -- sh ./shard.sh\n{}\n",
+            self.merge()
+        );
+        let shard = format!("#!/bin/sh\n# One shard; HyperQueue says which.\nexec {}\n", self.shard("\"$HQ_TASK_ID\""));
+        let python = include_str!("hyperqueue.py.in")
+            .replace("@PROGRAM@", &literal(program))
+            .replace("@STUDY@", &literal(study))
+            .replace("@RESULTS@", &literal(results))
+            .replace("@SHARDS@", &n.to_string())
+            .replace("@CORES@", &cores.to_string());
+        let files = vec![
+            (folder.join("submit.sh"), submit),
+            (folder.join("shard.sh"), shard),
+            (folder.join("submit.py"), python),
+        ];
+        (files, format!("sh {}", folder.join("submit.sh").display()), true)
+    }
+
+    fn kubernetes(&self) -> Planned {
+        let Self { args, folder, .. } = self;
+        let PlanArgs { shards: n, cores, image, claim, .. } = args;
+        let name = self.name.to_lowercase().replace('_', "-");
+        let job = |name: &str, indexed: &str, command: &str| {
+            format!(
+                "apiVersion: batch/v1\nkind: Job\nmetadata:\n  name: {name}\nspec:\n{indexed}  backoffLimit: 20\n  template:\n    spec:\n      \
+                 restartPolicy: OnFailure\n      containers:\n        - name: flexarm\n          image: {image:?}\n          workingDir: /study\n          \
+                 command: [\"sh\", \"-c\"]\n          args:\n            - |\n              exec {command}\n          resources:\n            requests: \
+                 {{ cpu: \"{cores}\" }}\n          volumeMounts:\n            - {{ name: study, mountPath: /study }}\n      volumes:\n        - name: study\n          \
+                 persistentVolumeClaim: {{ claimName: {claim:?} }}\n"
+            )
+        };
+        let indexed = format!("  completions: {n}\n  parallelism: {n}\n  completionMode: Indexed\n");
+        let shards = "# Shards of the study; paths count from the volume, which is /study in the containers.\n"
+            .to_owned()
+            + &job(&name, &indexed, &self.shard("$((JOB_COMPLETION_INDEX + 1))"));
+        let merge = "# To be created when the shards are over.\n".to_owned()
+            + &job(&format!("{name}-merge"), "", &self.merge());
+        let (job, join) = (folder.join("shards.yaml"), folder.join("merge.yaml"));
+        let start = format!(
+            "kubectl apply -f {} && kubectl wait --for=condition=complete --timeout=-1s job/{name} && kubectl apply -f {}",
+            job.display(),
+            join.display()
+        );
+        (vec![(job, shards), (join, merge)], start, true)
+    }
+}
+
+/// A word of a shell as a text of Python.
+fn literal(word: &str) -> String {
+    let plain = word.strip_prefix('\'').and_then(|word| word.strip_suffix('\'')).map(|word| word.replace("'\\''", "'"));
+    format!("{:?}", plain.unwrap_or_else(|| word.to_owned()))
+}
+
+/// A word of a shell.
+pub(super) fn quoted(word: &str) -> String {
+    match word.chars().all(|c| c.is_alphanumeric() || "/._-+=:,@".contains(c)) {
+        true => word.to_owned(),
+        false => format!("'{}'", word.replace('\'', "'\\''")),
+    }
+}
+
+fn text(found: &PlanSummary) -> String {
+    let mut out = format!("{}: {} runs in {} shards\n", found.study, found.runs, found.shards);
+    for file in &found.files {
+        out += &format!("file     {file}\n");
+    }
+    out += &format!("start    {}\n", found.start);
+    if !found.merge.is_empty() {
+        out += &format!("merge    {}\n", found.merge);
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::quoted;
+
+    #[test]
+    fn words_with_blanks_and_quotes_stay_one_word_of_the_shell() {
+        assert_eq!(quoted("/a/b-c.toml"), "/a/b-c.toml");
+        assert_eq!(quoted("a b"), "'a b'");
+        assert_eq!(quoted("it's $x"), "'it'\\''s $x'");
+    }
+}

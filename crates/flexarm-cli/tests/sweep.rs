@@ -1,0 +1,182 @@
+//! `flexarm sweep`: studies, what stops them, plans for engines, the least of a metric.
+#![cfg(feature = "parquet")]
+#![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
+
+mod common;
+
+use std::time::{Duration, Instant};
+
+use common::Place;
+
+/// Speed of the swing and width of the beam, 8 x 25 runs.
+const STUDY: &str = r#"format = 1
+robot = "robot.toml"
+motion = "swing.toml"
+metrics = ["peak_mm = 1e3 * tcp.peak_m", "f1_hz = frequencies_hz.0"]
+
+[options]
+step = 0.002
+
+[[parameter]]
+path = "motion.speed"
+from = 0.5
+to = 1.0
+count = 8
+
+[[parameter]]
+path = "link.bar.beam.width"
+distribution = "uniform"
+low = 0.015
+high = 0.025
+
+[sample]
+count = 25
+"#;
+
+fn place() -> Place {
+    let place = Place::new();
+    place.write("study.toml", STUDY);
+    place
+}
+
+#[test]
+fn a_study_answers_with_its_figures_a_table_a_page_and_the_best_run() {
+    let place = place();
+    let found = place.json(&["sweep", "study.toml", "-o", "out"]);
+    for (key, value) in [("runs", 200), ("done", 200), ("failed", 0)] {
+        assert_eq!(found[key], value);
+    }
+    assert!(found["wall_s"].as_f64().unwrap() > 0.0 && found["cpu_s"].as_f64().unwrap() > 0.0);
+    assert_eq!(found["file"], "out/runs.parquet");
+    assert_eq!(found["metrics"][1]["name"], "f1_hz");
+    assert!(found["metrics"][1]["shares"]["link.bar.beam.width"].as_f64().unwrap() > 0.9);
+    let page = place.text("out/report.html");
+    for part in ["<h1>Study study</h1>", "Heat maps", "Main effects", "Pareto front", "Scatter matrix", "Best run"] {
+        assert!(page.contains(part), "{part}");
+    }
+    // The best run again, by its command, has the number of the study.
+    let command = found["best"]["command"].as_str().unwrap();
+    let words: Vec<&str> = command.split(' ').skip(1).chain(["--no-files"]).collect();
+    let again = place.json(&words);
+    let (peak, expected) = (again["tcp"]["peak_m"].as_f64().unwrap(), found["best"]["value"].as_f64().unwrap());
+    assert!((1e3 * peak / expected - 1.0).abs() < 1e-9, "{peak} {expected}"); // measured 1e-13
+    let told = place.flexarm(&["sweep", "study.toml", "-o", "out"]);
+    assert!(told.out.contains("200 of 200 runs done") && told.out.contains("peak_mm"), "{}", told.out);
+}
+
+/// A study that takes a while, for what stops it.
+fn long() -> String {
+    common::with(STUDY, "step = 0.002", "step = 0.00005")
+}
+
+#[cfg(unix)]
+#[test]
+fn a_study_that_is_stopped_or_killed_goes_on_and_makes_the_same_bytes() {
+    let place = place();
+    place.write("study.toml", long());
+    let started = |signal: &str, wanted: usize| {
+        let mut child = place.command(&["sweep", "study.toml", "-o", "out", "--quiet"]).spawn().unwrap();
+        let journal = place.path("out/parts/1-of-1.journal");
+        let lines = || std::fs::read(&journal).map_or(0, |text| text.iter().filter(|byte| **byte == b'\n').count());
+        let begun = Instant::now();
+        while lines() < wanted && child.try_wait().unwrap().is_none() {
+            assert!(begun.elapsed() < Duration::from_secs(120), "no run is over");
+            std::thread::sleep(Duration::from_millis(2));
+        }
+        assert!(std::process::Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
+        child.wait().unwrap().code()
+    };
+    assert_eq!(started("-KILL", 5), None);
+    assert_eq!(started("-TERM", 12), Some(1));
+    assert!(place.path("out/parts").exists() && !place.path("out/runs.parquet").exists());
+    let found = place.json(&["sweep", "study.toml", "-o", "out"]);
+    assert_eq!((found["done"].as_u64(), found["doubles"].as_u64()), (Some(200), Some(0)));
+    place.json(&["sweep", "study.toml", "-o", "whole"]);
+    assert_eq!(place.read("out/runs.parquet"), place.read("whole/runs.parquet"));
+}
+
+#[cfg(unix)]
+#[test]
+fn a_disk_that_is_full_stops_the_study_with_a_word_and_loses_no_run() {
+    let place = place();
+    let program = env!("CARGO_BIN_EXE_flexarm");
+    let limited = format!("ulimit -f 8; exec {program} sweep study.toml -o out --quiet"); // 4 kB, or 8 in some shells
+    let output = std::process::Command::new("sh").args(["-c", &limited]).current_dir(place.path("")).output().unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("1-of-1.journal") && said.contains("cannot be written"), "{said}");
+    // What was over before the disk was full is there, as a part.
+    assert!(!place.read("out/parts/1-of-1-0.parquet").is_empty());
+    let found = place.json(&["sweep", "study.toml", "-o", "out"]);
+    assert_eq!(found["done"], 200);
+    place.json(&["sweep", "study.toml", "-o", "whole"]);
+    assert_eq!(place.read("out/runs.parquet"), place.read("whole/runs.parquet"));
+}
+
+#[test]
+fn shards_are_planned_run_and_joined_by_a_shell() {
+    let place = place();
+    place.json(&["sweep", "study.toml", "-o", "whole"]);
+    let plan = place.json(&["sweep", "plan", "study.toml", "-n", "3", "--results", "results", "-o", "plan"]);
+    assert_eq!(
+        (plan["runs"].as_u64(), plan["shards"].as_u64(), plan["engine"].as_str()),
+        (Some(200), Some(3), Some("none"))
+    );
+    let run = std::process::Command::new("sh").arg("plan/run.sh").current_dir(place.path("")).output().unwrap();
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    assert_eq!(place.read("results/runs.parquet"), place.read("whole/runs.parquet"));
+    assert_eq!(place.text("plan/shards.txt").lines().count(), 3);
+    for (engine, file, part) in [
+        ("slurm", "shards.sbatch", "#SBATCH --array=1-3"),
+        ("kubernetes", "shards.yaml", "completionMode: Indexed"),
+        ("hyperqueue", "submit.py", "SHARDS, CORES"),
+    ] {
+        place.json(&["sweep", "plan", "study.toml", "-n", "3", "--engine", engine, "-o", engine]);
+        assert!(place.text(&format!("{engine}/{file}")).contains(part));
+    }
+    place.refused(&["sweep", "plan", "study.toml", "-n", "3", "-o", "plan"], &["exists already", "--force"]);
+    place.refused(&["sweep", "plan", "study.toml", "-n", "300", "-o", "p"], &["200 shards"]);
+    place.refused(&["sweep", "study.toml", "--shard", "4/3"], &["4/3"]);
+    // A shard is told which it is, and what it lacks.
+    let one = place.json(&["sweep", "study.toml", "--shard", "2/3", "-o", "part"]);
+    assert_eq!((one["shard"].as_str(), one["done"].as_u64()), (Some("2/3"), Some(67)));
+    let lacking = place.flexarm(&["sweep", "merge", "study.toml", "part", "-o", "joined"]);
+    assert_eq!(lacking.code, 1);
+    lacking.says(&["133 of 200 runs are missing", "shard 1/3 (all 67)", "shard 3/3 (all 66)"]);
+    place.refused(&["sweep", "merge", "study.toml", "nothing"], &["nothing holds no study"]);
+    place.write("study.toml", common::with(STUDY, "count = 25", "count = 26"));
+    place.refused(&["sweep", "study.toml", "-o", "whole"], &["another study", "200 runs and 208", "--force"]);
+}
+
+/// Truth: the beam that is as heavy as it must be for its first frequency has exactly that.
+#[test]
+fn the_least_width_of_a_beam_has_the_frequency_that_must_hold() {
+    let place = place();
+    let search =
+        common::with(STUDY, "distribution = \"uniform\"\nlow = 0.015\nhigh = 0.025", "from = 0.01\nto = 0.038");
+    let search = common::with(&search, "from = 0.5\nto = 1.0\ncount = 8", "from = 0.99\nto = 1.0");
+    let search = common::with(&search, "\n[sample]\ncount = 25\n", "");
+    let search = common::with(&search, "\"f1_hz", "\"width = link.bar.beam.width\", \"f1_hz");
+    place.write("study.toml", search);
+    let words = [
+        "sweep",
+        "study.toml",
+        "--minimise",
+        "width",
+        "--constraint",
+        "f1_hz >= 20",
+        "--most-runs",
+        "240",
+        "-o",
+        "least",
+    ];
+    let found = place.json(&words);
+    assert_eq!((found["minimise"]["kept"].as_bool(), found["best"]["metric"].as_str()), (Some(true), Some("width")));
+    let f1 = found["best"]["metrics"]["f1_hz"].as_f64().unwrap();
+    assert!((20.0..20.02).contains(&f1), "{f1}"); // measured 20.002
+    // Once more: nothing is run again, and the answer is the same.
+    let again = place.json(&words);
+    assert_eq!(again["best"], found["best"]);
+    place.refused(&["sweep", "study.toml", "--minimise", "-o", "x"], &["[minimise]"]);
+    place.refused(&["sweep", "study.toml", "--minimise", "weight", "-o", "x"], &["\"weight\" is no metric"]);
+}

@@ -1,0 +1,244 @@
+//! Tables of results as Parquet files.
+//!
+//! A number or text that is missing is null in the file; a NaN is missing. The same table gives the same bytes on any machine: rows
+//! go into groups of [`GROUP`], nothing depends on the clock.
+
+use std::fs::File;
+use std::path::Path;
+use std::sync::Arc;
+
+use parquet::basic::{Compression, Encoding, LogicalType, Repetition, Type as PhysicalType, ZstdLevel};
+use parquet::column::reader::get_typed_column_reader;
+use parquet::data_type::{ByteArray, ByteArrayType, DataType, DoubleType, Int64Type};
+use parquet::errors::ParquetError;
+use parquet::file::metadata::KeyValue;
+use parquet::file::properties::{EnabledStatistics, WriterProperties};
+use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
+use parquet::schema::types::Type;
+
+use crate::parquet_file::parquet_error;
+use crate::read::{not_a_recording, parquet_table};
+use crate::whole_file::WholeFile;
+use crate::{CreateOptions, LogError};
+
+use super::{DataColumn, DataTable, DataValues};
+/// Rows of a group.
+const GROUP: usize = 65_536;
+
+impl DataValues {
+    fn kind(&self, name: &str) -> Result<Type, ParquetError> {
+        match self {
+            Self::Whole(_) => {
+                Type::primitive_type_builder(name, PhysicalType::INT64).with_repetition(Repetition::REQUIRED).build()
+            }
+            Self::Number(_) => {
+                Type::primitive_type_builder(name, PhysicalType::DOUBLE).with_repetition(Repetition::OPTIONAL).build()
+            }
+            Self::Text(_) => Type::primitive_type_builder(name, PhysicalType::BYTE_ARRAY)
+                .with_logical_type(Some(LogicalType::String))
+                .with_repetition(Repetition::OPTIONAL)
+                .build(),
+        }
+    }
+
+    /// Writes some rows as the next column of a group.
+    fn write(
+        &self,
+        group: &mut SerializedRowGroupWriter<'_, File>,
+        rows: std::ops::Range<usize>,
+    ) -> Result<(), ParquetError> {
+        let Some(mut writer) = group.next_column()? else { return Ok(()) };
+        let levels = |present: &mut dyn Iterator<Item = bool>| present.map(i16::from).collect::<Vec<i16>>();
+        match self {
+            Self::Whole(values) => {
+                writer.typed::<Int64Type>().write_batch(&values[rows], None, None)?;
+            }
+            Self::Number(values) => {
+                let values = &values[rows];
+                let levels = levels(&mut values.iter().map(|x| !x.is_nan()));
+                let there: Vec<f64> = values.iter().copied().filter(|x| !x.is_nan()).collect();
+                writer.typed::<DoubleType>().write_batch(&there, Some(&levels), None)?;
+            }
+            Self::Text(values) => {
+                let values = &values[rows];
+                let levels = levels(&mut values.iter().map(Option::is_some));
+                let there: Vec<ByteArray> = values.iter().flatten().map(|text| text.as_str().into()).collect();
+                writer.typed::<ByteArrayType>().write_batch(&there, Some(&levels), None)?;
+            }
+        }
+        writer.close()
+    }
+}
+
+impl DataTable {
+    /// Writes it as a Parquet file that is there whole, on the disk, or not at all.
+    ///
+    /// # Errors
+    /// [`LogError`]: the file is there already and may not be replaced; what the system says.
+    pub fn write(&self, path: &Path, options: CreateOptions) -> Result<(), LogError> {
+        const ACTION: &str = "write the table";
+        let (file, mut whole) = WholeFile::create(path, options)?;
+        let file = self.to_file(file).map_err(parquet_error(path, ACTION))?;
+        whole.finish(file, path, ACTION)
+    }
+
+    fn to_file(&self, file: File) -> Result<File, ParquetError> {
+        let column = |column: &DataColumn| Ok(Arc::new(column.values.kind(&column.name)?));
+        let columns = self.columns.iter().map(column).collect::<Result<Vec<_>, ParquetError>>()?;
+        let schema = Type::group_type_builder("table").with_fields(columns).build()?;
+        let mut properties = WriterProperties::builder()
+            .set_created_by(concat!("flexarm ", env!("CARGO_PKG_VERSION")).to_owned())
+            .set_dictionary_enabled(true)
+            .set_compression(Compression::ZSTD(ZstdLevel::try_new(3)?))
+            .set_statistics_enabled(EnabledStatistics::Chunk)
+            .set_max_row_group_row_count(None);
+        for column in self.columns.iter().filter(|column| matches!(column.values, DataValues::Number(_))) {
+            let place = parquet::schema::types::ColumnPath::from(column.name.as_str());
+            // Hardly a number comes twice: sorted by significance they become small.
+            properties = properties
+                .set_column_dictionary_enabled(place.clone(), false)
+                .set_column_encoding(place, Encoding::BYTE_STREAM_SPLIT);
+        }
+        let mut writer = SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties.build()))?;
+        let rows = self.rows();
+        for start in (0..rows).step_by(GROUP) {
+            let mut group = writer.next_row_group()?;
+            for column in &self.columns {
+                column.values.write(&mut group, start..(start + GROUP).min(rows))?;
+            }
+            group.close()?;
+        }
+        for (key, value) in &self.texts {
+            writer.append_key_value_metadata(KeyValue::new(key.clone(), value.clone()));
+        }
+        writer.into_inner()
+    }
+
+    /// Reads a table that [`DataTable::write`] wrote.
+    ///
+    /// # Errors
+    /// [`LogError::Io`]; [`LogError::NotARecording`] for what is no such table.
+    pub fn read(path: &Path) -> Result<Self, LogError> {
+        let file = File::open(path).map_err(LogError::io(path, "open the table"))?;
+        parquet_table::read(path, || {
+            let reader = SerializedFileReader::new(file)?;
+            let metadata = reader.metadata().file_metadata();
+            let pairs = metadata.key_value_metadata().into_iter().flatten();
+            let texts = pairs.filter_map(|pair| Some((pair.key.clone(), pair.value.clone()?))).collect();
+            let schema = metadata.schema_descr();
+            let columns = schema.columns().iter().enumerate().map(|(place, column)| {
+                let values = match column.physical_type() {
+                    PhysicalType::INT64 => {
+                        DataValues::Whole(values::<Int64Type>(&reader, place)?.into_iter().flatten().collect())
+                    }
+                    PhysicalType::DOUBLE => {
+                        let numbers = values::<DoubleType>(&reader, place)?;
+                        DataValues::Number(numbers.into_iter().map(|x| x.unwrap_or(f64::NAN)).collect())
+                    }
+                    PhysicalType::BYTE_ARRAY => {
+                        let text = |bytes: ByteArray| bytes.as_utf8().map(str::to_owned);
+                        let texts = values::<ByteArrayType>(&reader, place)?;
+                        DataValues::Text(texts.into_iter().map(|x| x.map(text).transpose()).collect::<Result<_, _>>()?)
+                    }
+                    other => return Err(ParquetError::General(format!("column {} of type {other}", column.name()))),
+                };
+                Ok(DataColumn::new(column.name(), values))
+            });
+            Ok(Self { columns: columns.collect::<Result<_, ParquetError>>()?, texts })
+        })
+        .and_then(|table| {
+            let rows = table.rows();
+            match table.columns.iter().find(|column| column.values.len() != rows) {
+                None => Ok(table),
+                Some(column) => {
+                    let found = format!("{} values in column {}", column.values.len(), column.name);
+                    Err(not_a_recording(path, found, format!("as many values in each column, {rows}")))
+                }
+            }
+        })
+    }
+}
+
+/// The values of a column in all groups.
+fn values<T: DataType>(reader: &SerializedFileReader<File>, place: usize) -> Result<Vec<Option<T::T>>, ParquetError> {
+    let mut all = Vec::new();
+    for number in 0..reader.num_row_groups() {
+        let group = reader.get_row_group(number)?;
+        let rows = usize::try_from(group.metadata().num_rows()).unwrap_or(0);
+        let mut column = get_typed_column_reader::<T>(group.get_column_reader(place)?);
+        let (mut present, mut levels) = (Vec::new(), Vec::new());
+        while levels.len().max(present.len()) < rows {
+            let (records, ..) = column.read_records(rows, Some(&mut levels), None, &mut present)?;
+            if records == 0 {
+                break;
+            }
+        }
+        if levels.is_empty() {
+            all.extend(present.into_iter().map(Some));
+        } else {
+            let mut present = present.into_iter();
+            all.extend(levels.iter().map(|level| if *level > 0 { present.next() } else { None }));
+        }
+    }
+    Ok(all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn table(rows: usize) -> DataTable {
+        DataTable {
+            columns: vec![
+                DataColumn::new("run", DataValues::Whole((0..rows as i64).collect())),
+                DataColumn::new(
+                    "payload.mass",
+                    DataValues::Number((0..rows).map(|k| if k % 5 == 2 { f64::NAN } else { 0.1 * k as f64 }).collect()),
+                ),
+                DataColumn::new(
+                    "reason",
+                    DataValues::Text((0..rows).map(|k| (k % 3 == 0).then(|| format!("größer {k}"))).collect()),
+                ),
+            ],
+            texts: vec![("flexarm.study".into(), "{}".into())],
+        }
+    }
+
+    #[test]
+    fn a_table_comes_back_as_it_was_written_and_twice_the_same_bytes() {
+        let folder = std::env::temp_dir().join(format!("flexarm-table-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        for rows in [0, 1, 7, GROUP + 3] {
+            let (a, b) = (folder.join(format!("{rows}.parquet")), folder.join(format!("{rows}b.parquet")));
+            let table = table(rows);
+            table.write(&a, CreateOptions::default()).unwrap();
+            table.write(&b, CreateOptions::default()).unwrap();
+            assert_eq!(std::fs::read(&a).unwrap(), std::fs::read(&b).unwrap());
+            let back = DataTable::read(&a).unwrap();
+            assert_eq!((back.rows(), &back.texts, back.columns.len()), (rows, &table.texts, 3));
+            assert_eq!(back.columns[0], table.columns[0]);
+            assert_eq!(back.columns[2], table.columns[2]);
+            let (DataValues::Number(x), DataValues::Number(y)) = (&back.columns[1].values, &table.columns[1].values)
+            else {
+                panic!("numbers")
+            };
+            assert!(x.iter().zip(y).all(|(x, y)| x.to_bits() == y.to_bits() || x.is_nan() && y.is_nan()));
+        }
+        let again = table(1).write(&folder.join("1.parquet"), CreateOptions::default());
+        assert!(matches!(again, Err(LogError::Exists { .. })));
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn a_table_that_was_cut_or_changed_is_told_as_no_table() {
+        let path = std::env::temp_dir().join(format!("flexarm-table-cut-{}.parquet", std::process::id()));
+        table(100).write(&path, CreateOptions::default().with_overwrite(true)).unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        for length in [0, 3, bytes.len() / 2, bytes.len() - 1] {
+            std::fs::write(&path, &bytes[..length]).unwrap();
+            assert!(matches!(DataTable::read(&path), Err(LogError::NotARecording { .. })), "{length}");
+        }
+        std::fs::remove_file(&path).unwrap();
+    }
+}

@@ -1,0 +1,92 @@
+//! The columns of a run in memory as the table that its CSV has: each column one number wide, under the same name.
+
+use flexarm_sample::{Columns, RunHeader};
+
+use crate::table;
+
+/// Names and numbers of the table's columns, in the order of [`crate::CsvRecorder`]'s.
+pub fn flat_columns(columns: &Columns) -> Vec<(String, Vec<f64>)> {
+    let has_rigid = columns.column("error_world").is_some();
+    let header = RunHeader {
+        joints: columns.joints.clone(),
+        prismatic: columns.prismatic.clone(),
+        elements: columns.elements.clone(),
+        contributors: columns.contributors.clone(),
+        has_rigid,
+        has_static: has_rigid,
+        ..RunHeader::default()
+    };
+    table::columns(&header)
+        .into_iter()
+        .zip(places(columns, has_rigid))
+        .map(|(name, of)| (name, of.numbers(columns)))
+        .collect()
+}
+
+/// Which numbers of which signal a column is.
+struct Place {
+    signal: &'static str,
+    number: usize,
+}
+
+impl Place {
+    fn numbers(&self, columns: &Columns) -> Vec<f64> {
+        let Some(column) = columns.column(self.signal) else { return Vec::new() };
+        column.values.iter().skip(self.number).step_by(column.width.max(1)).copied().collect()
+    }
+}
+
+/// In the order of [`table::columns`].
+fn places(columns: &Columns, has_rigid: bool) -> Vec<Place> {
+    let mut places = Vec::new();
+    let mut take = |signal, numbers: std::ops::Range<usize>| {
+        places.extend(numbers.map(|number| Place { signal, number }));
+    };
+    take("time", 0..1);
+    if has_rigid {
+        take("rigid_tcp_position", 0..3);
+    }
+    take("tcp_position", 0..3);
+    if has_rigid {
+        take("error_world", 0..3);
+        take("error_rotation", 0..3);
+        take("error_path", 0..3);
+        take("error_static", 0..3);
+    }
+    if columns.column("contribution").is_some() {
+        take("contribution", 0..3 * columns.contributors.len());
+    }
+    for joint in 0..columns.joints.len() {
+        take("position", joint..joint + 1);
+        take("effort", joint..joint + 1);
+        if has_rigid {
+            take("rigid_effort", joint..joint + 1);
+        }
+    }
+    for element in 0..columns.elements.len() {
+        take("deflection", 6 * element..6 * element + 6);
+        take("load", 6 * element..6 * element + 6);
+    }
+    take("energy", 0..3);
+    places
+}
+
+/// The table as a stream of Arrow's C interface, one record batch long: other programs of the process take the numbers over
+/// without a copy.
+///
+/// # Errors
+/// If the columns make no record batch, which those of a run do.
+#[cfg(feature = "arrow")]
+pub fn arrow_stream(columns: &Columns) -> Result<impl Send + 'static, arrow_schema::ArrowError> {
+    use std::sync::Arc;
+
+    use arrow_array::ffi_stream::FFI_ArrowArrayStream;
+    use arrow_array::{ArrayRef, Float64Array, RecordBatch, RecordBatchIterator};
+
+    let named = flat_columns(columns)
+        .into_iter()
+        .map(|(name, numbers)| (name, Arc::new(Float64Array::from(numbers)) as ArrayRef, false));
+    let batch = RecordBatch::try_from_iter_with_nullable(named)?;
+    let schema = batch.schema();
+    Ok(FFI_ArrowArrayStream::new(Box::new(RecordBatchIterator::new([Ok(batch)], schema))))
+}

@@ -1,0 +1,135 @@
+"""Robot arms whose links bend.
+
+>>> import flexarm
+>>> arm = flexarm.load("kr210").flexible(links="modal", drives="elastic")
+>>> run = arm.simulate()
+>>> run.error.shape[1]
+3
+
+:func:`load` reads a robot, :meth:`Robot.flexible` puts links and drives in place, and the :class:`Arm` that it returns is asked
+with numpy arrays: :meth:`Arm.simulate`, :meth:`Arm.statics`, :meth:`Arm.modes`, :meth:`Arm.response`, :meth:`Arm.linearise`.
+SI units; six-vectors are linear first. What goes wrong is a :class:`flexarm.Error`, what is doubtful a warning of the class
+:class:`flexarm.Caveat`.
+"""
+
+from pathlib import Path as _Path
+
+from . import _flexarm
+from ._flexarm import (
+    Arm,
+    Compensated,
+    Deflections,
+    Linear,
+    Live,
+    Load,
+    Map,
+    Model,
+    Modes,
+    Motion,
+    OperatingPoint,
+    Payload,
+    Response,
+    Robot,
+    Run,
+    Sample,
+    Scenario,
+    Statics,
+    __version__,
+    check,
+    compensate,
+    export_link,
+    identify,
+    import_link,
+    load,
+    lobes,
+    map,
+    new_robot,
+    plan_measurements,
+    reduce,
+    robot,
+    sweep,
+)
+from .errors import (
+    Caveat,
+    CompensateError,
+    Error,
+    FileError,
+    IdentifyError,
+    InputError,
+    LimitsError,
+    LinkError,
+    LoadError,
+    MapError,
+    ModellingError,
+    MotionError,
+    PoseError,
+    RecordingError,
+    RobotError,
+    RunError,
+    SettingError,
+    StepError,
+    Stopped,
+    UrdfError,
+    WriteError,
+)
+
+__all__ = [
+    "Arm",
+    "Caveat",
+    "CompensateError",
+    "Compensated",
+    "Deflections",
+    "Error",
+    "FileError",
+    "IdentifyError",
+    "InputError",
+    "LimitsError",
+    "Linear",
+    "LinkError",
+    "Live",
+    "Load",
+    "LoadError",
+    "Map",
+    "MapError",
+    "Model",
+    "ModellingError",
+    "Modes",
+    "Motion",
+    "MotionError",
+    "OperatingPoint",
+    "Payload",
+    "PoseError",
+    "RecordingError",
+    "Response",
+    "Robot",
+    "RobotError",
+    "Run",
+    "RunError",
+    "Sample",
+    "Scenario",
+    "SettingError",
+    "Statics",
+    "StepError",
+    "Stopped",
+    "UrdfError",
+    "WriteError",
+    "__version__",
+    "check",
+    "compensate",
+    "export_link",
+    "identify",
+    "import_link",
+    "load",
+    "lobes",
+    "map",
+    "new_robot",
+    "plan_measurements",
+    "reduce",
+    "robot",
+    "sweep",
+]
+
+#: Robots and motions that come with the package.
+_SHARE = _Path(__file__).parent / "share"
+
+_flexarm.ship_from(_SHARE)

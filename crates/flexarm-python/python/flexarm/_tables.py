@@ -1,0 +1,26 @@
+"""Columns to where people are."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+def _module(name: str, extra: str) -> Any:
+    import importlib
+
+    try:
+        return importlib.import_module(name)
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError(f"this needs {name}: pip install flexarm[{extra}]", name=name) from error
+
+
+def to_arrow(run: Any) -> Any:
+    return _module("pyarrow", "tables").table(run)
+
+
+def to_pandas(run: Any) -> Any:
+    return _module("pandas", "tables").DataFrame(run.table()).set_index("time")
+
+
+def to_polars(run: Any) -> Any:
+    return _module("polars", "tables").DataFrame(run)

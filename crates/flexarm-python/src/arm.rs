@@ -1,0 +1,568 @@
+//! Arms: robots with their flexible links and drives in place, asked with numbers.
+
+use std::collections::HashMap;
+use std::sync::{Mutex, OnceLock, PoisonError};
+
+use flexarm::{Arm, Error, OperatingPoint, Outputs, RecordingFormat, RunOptions, Scenario};
+use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList, PyTuple};
+
+use crate::answers::{PyLinear, PyModes, PyResponse, PyStatics, ResponseArgs, linear, modes, response};
+use crate::arrays::numbers;
+use crate::caveat;
+use crate::deflections::{PyDeflections, variations};
+use crate::failure::{OrRaise, exception};
+use crate::live::PyLive;
+use crate::model::PyModel;
+use crate::operating_point::PyOperatingPoint;
+use crate::robot::PyRobot;
+use crate::run::{PyRun, PySample};
+use crate::scenario::scenario;
+use crate::values::{as_wrench, path, stepper, word, wrench};
+use crate::watch::{Watch, stoppable};
+
+/// A robot with its flexible links and drives in place. Made by :meth:`Robot.flexible`.
+///
+/// It does not change, threads share it, and it can be pickled.
+///
+/// Examples
+/// --------
+/// >>> arm = flexarm.load("reference_arm").flexible()
+/// >>> run = arm.simulate(step=2e-3)
+/// >>> run.error.shape[1]
+/// 3
+/// >>> arm.statics([0.0, -0.5, 0.8]).compliance.shape  # doctest: +SKIP
+/// (6, 6)
+#[pyclass(frozen, name = "Arm", module = "flexarm")]
+pub(crate) struct PyArm {
+    robot: Py<PyRobot>,
+    pub(crate) arm: Arm,
+    /// A workspace for single poses, made when it is first asked for.
+    point: OnceLock<Mutex<OperatingPoint>>,
+}
+
+impl PyArm {
+    pub(crate) fn new(robot: Py<PyRobot>, arm: Arm) -> Self {
+        Self { robot, arm, point: OnceLock::new() }
+    }
+
+    fn n(&self) -> usize {
+        self.arm.flexible().model.n_actuated()
+    }
+
+    /// One pose, if one is given.
+    pub(crate) fn pose(&self, q: Option<&Bound<'_, PyAny>>) -> PyResult<Option<Vec<f64>>> {
+        let n = self.n();
+        q.filter(|q| !q.is_none()).map(|q| Ok(numbers("q", q, &[(n, "joints")], false)?.values().to_vec())).transpose()
+    }
+
+    /// The workspace for single poses.
+    fn point(&self) -> PyResult<&Mutex<OperatingPoint>> {
+        if let Some(point) = self.point.get() {
+            return Ok(point);
+        }
+        let made = self.arm.operating_point().or_raise()?;
+        Ok(self.point.get_or_init(|| Mutex::new(made)))
+    }
+
+    fn scenarios(&self, py: Python<'_>, runs: &Bound<'_, PyAny>) -> PyResult<Vec<Scenario>> {
+        let robot = self.robot.bind(py);
+        let wrong = |_| PyTypeError::new_err("runs: expected a list of motions or Scenarios");
+        // The same object again, as in [None] * 1000, is the same scenario.
+        let mut known: HashMap<*mut pyo3::ffi::PyObject, (Bound<'_, PyAny>, Scenario)> = HashMap::new();
+        let mut all = Vec::new();
+        for run in runs.try_iter().map_err(wrong)? {
+            let run = run?;
+            if let Some((_, scenario)) = known.get(&run.as_ptr()) {
+                all.push(scenario.clone());
+                continue;
+            }
+            py.check_signals()?;
+            let made = scenario(robot, Some(&run), None, None, None)?;
+            all.push(made.clone());
+            known.insert(run.as_ptr(), (run, made));
+        }
+        Ok(all)
+    }
+}
+
+/// Options of a run that are the same for one and for many.
+fn run_options(step: f64, stepper_word: Option<&str>, options: Option<&Bound<'_, PyDict>>) -> PyResult<RunOptions> {
+    Ok(RunOptions { step_s: step, stepper: stepper(stepper_word, options)?, ..RunOptions::default() })
+}
+
+/// Where recordings go, and which.
+fn outputs(
+    folder: Option<&Bound<'_, PyAny>>,
+    overwrite: bool,
+    formats: Option<Vec<String>>,
+    figures: bool,
+) -> PyResult<Option<Outputs>> {
+    let Some(folder) = folder else {
+        let unused = overwrite || figures || formats.is_some();
+        return match unused {
+            true => Err(PyValueError::new_err("overwrite, formats and figures need an output folder")),
+            false => Ok(None),
+        };
+    };
+    let mut outputs = Outputs { overwrite, figures, ..Outputs::everything(path("output", folder)?) };
+    if let Some(formats) = formats {
+        let known: Vec<(&str, RecordingFormat)> =
+            RecordingFormat::ALL.into_iter().map(|format| (format.info().extension, format)).collect();
+        outputs.recordings = formats.iter().map(|found| word("formats", found, &known)).collect::<PyResult<_>>()?;
+    }
+    Ok(Some(outputs))
+}
+
+/// A function that is told how far a run is: the caller's, or a bar if True was given.
+pub(crate) fn progress_function<'py>(
+    py: Python<'py>,
+    given: Option<Bound<'py, PyAny>>,
+) -> PyResult<Option<Bound<'py, PyAny>>> {
+    let Some(given) = given.filter(|given| !given.is_none()) else { return Ok(None) };
+    match given.extract::<bool>() {
+        Ok(false) => Ok(None),
+        Ok(true) => {
+            let bar = py.import("flexarm._show")?.call_method0("progress_bar")?;
+            Ok(Some(bar).filter(|bar| !bar.is_none()))
+        }
+        Err(_) => Ok(Some(given)),
+    }
+}
+
+#[pymethods]
+impl PyArm {
+    /// The robot that it was made of.
+    #[getter]
+    fn robot(&self, py: Python<'_>) -> Py<PyRobot> {
+        self.robot.clone_ref(py)
+    }
+
+    /// Names of the actuated joints, in the order of all poses (tuple of str).
+    #[getter]
+    fn joints<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        PyTuple::new(py, self.arm.joints().collect::<Vec<_>>())
+    }
+
+    /// Names of the elastic elements (tuple of str).
+    #[getter]
+    fn elements<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        PyTuple::new(py, self.arm.flexible().springs.iter().map(|spring| spring.name.as_str()))
+    }
+
+    /// Number of elastic coordinates.
+    #[getter]
+    fn n_elastic(&self) -> usize {
+        self.arm.flexible().model.n_elastic()
+    }
+
+    /// Tree with the elastic coordinates after the actuated ones, for recursions (Model).
+    #[getter]
+    fn model(&self) -> PyModel {
+        PyModel::new(self.arm.recursions())
+    }
+
+    /// Runs a motion beside the rigid twin.
+    ///
+    /// The interpreter's lock is given back; Ctrl-C ends the run with readable files.
+    ///
+    /// Parameters
+    /// ----------
+    /// motion : Motion, Scenario, str or os.PathLike, optional
+    ///     Where the joints go: a file, the name of a shipped motion, or the robot's own motion without it.
+    /// step : float, default 1e-3
+    ///     Time step (s).
+    /// stepper : str, default "generalized-alpha"
+    ///     Or ``"spook"``, ``"rk4"``, ``"reference"``, ``"sdirk3"``.
+    /// stepper_options : dict, optional
+    ///     Settings of the stepper, such as ``{"rho": 0.9}``.
+    /// loads : sequence of Load, or path of a file of loads, optional
+    /// payloads : sequence of Payload, optional
+    /// start : {"equilibrium", "undeformed"}, default "equilibrium"
+    /// log_rate : float, default 500
+    ///     Samples per second; the nearest whole number of steps is used.
+    /// twin : bool, default True
+    ///     Measure against the rigid robot.
+    /// ignore_limits : bool, default False
+    ///     Run although the motion passes joint limits.
+    /// settling_band : float, default 1e-4
+    ///     Band of the settling time (m).
+    /// output : str or os.PathLike, optional
+    ///     Folder for recordings and a report; nothing is written without it.
+    /// overwrite : bool, default False
+    /// formats : sequence of str, optional
+    ///     Recordings to write, of ``"csv"``, ``"mcap"``, ``"rrd"``, ``"parquet"``, ``"arrow"``; the usual ones without it.
+    /// figures : bool, default False
+    ///     Also write plots and pictures for papers.
+    /// magnify : float, optional
+    ///     Factor by which recordings show deflections.
+    /// observer : callable, optional
+    ///     Called with each logged :class:`Sample`; if it returns False the run stops with :class:`flexarm.Stopped`.
+    /// progress : bool or callable, default False
+    ///     True for a bar of tqdm if that is there; or a function of simulated and total time.
+    ///
+    /// Returns
+    /// -------
+    /// Run
+    #[pyo3(signature = (motion=None, *, step=1e-3, stepper=None, stepper_options=None, loads=None, payloads=None, start=None,
+                        log_rate=None, twin=true, ignore_limits=false, settling_band=1e-4, output=None, overwrite=false,
+                        formats=None, figures=false, magnify=None, observer=None, progress=None))]
+    #[expect(clippy::too_many_arguments, reason = "keyword arguments")]
+    fn simulate(
+        &self,
+        py: Python<'_>,
+        motion: Option<&Bound<'_, PyAny>>,
+        step: f64,
+        stepper: Option<&str>,
+        stepper_options: Option<&Bound<'_, PyDict>>,
+        loads: Option<&Bound<'_, PyAny>>,
+        payloads: Option<&Bound<'_, PyAny>>,
+        start: Option<&str>,
+        log_rate: Option<f64>,
+        twin: bool,
+        ignore_limits: bool,
+        settling_band: f64,
+        output: Option<&Bound<'_, PyAny>>,
+        overwrite: bool,
+        formats: Option<Vec<String>>,
+        figures: bool,
+        magnify: Option<f64>,
+        observer: Option<Py<PyAny>>,
+        progress: Option<Bound<'_, PyAny>>,
+    ) -> PyResult<PyRun> {
+        let scenario = scenario(self.robot.bind(py), motion, loads, payloads, start)?;
+        let options = run_options(step, stepper, stepper_options)?;
+        let options = RunOptions {
+            log_rate_hz: log_rate.unwrap_or(options.log_rate_hz),
+            with_twin: twin,
+            ignore_limits,
+            settling_band_m: settling_band,
+            magnification: magnify,
+            ..options
+        };
+        let outputs = outputs(output, overwrite, formats, figures)?;
+        let bar = progress_function(py, progress)?;
+        let run = self.watched(py, &scenario, &options, outputs.as_ref(), observer, bar.clone().map(Bound::unbind));
+        if let Some(bar) = bar
+            && let Ok(close) = bar.getattr("close")
+        {
+            close.call0()?;
+        }
+        let run = run?;
+        caveat::warn(py, &run.summary.caveats)?;
+        Ok(PyRun::new(run))
+    }
+
+    /// Runs many motions or Scenarios on all cores; each has the bits of the run alone.
+    ///
+    /// Parameters
+    /// ----------
+    /// runs : sequence of Motion, Scenario, str or os.PathLike
+    /// step, stepper, stepper_options, log_rate, twin, ignore_limits, settling_band
+    ///     As for :meth:`simulate`.
+    /// errors : {"raise", "return"}, default "raise"
+    ///     What becomes of runs that fail: the first one is raised, or the exceptions stand in the list.
+    ///
+    /// Returns
+    /// -------
+    /// list of Run
+    #[pyo3(signature = (runs, *, step=1e-3, stepper=None, stepper_options=None, log_rate=None, twin=true,
+                        ignore_limits=false, settling_band=1e-4, errors="raise"))]
+    #[expect(clippy::too_many_arguments, reason = "keyword arguments")]
+    fn simulate_batch<'py>(
+        &self,
+        py: Python<'py>,
+        runs: &Bound<'py, PyAny>,
+        step: f64,
+        stepper: Option<&str>,
+        stepper_options: Option<&Bound<'_, PyDict>>,
+        log_rate: Option<f64>,
+        twin: bool,
+        ignore_limits: bool,
+        settling_band: f64,
+        errors: &str,
+    ) -> PyResult<Bound<'py, PyList>> {
+        let raises = word("errors", errors, &[("raise", true), ("return", false)])?;
+        let scenarios = self.scenarios(py, runs)?;
+        let options = run_options(step, stepper, stepper_options)?;
+        let options = RunOptions {
+            log_rate_hz: log_rate.unwrap_or(options.log_rate_hz),
+            with_twin: twin,
+            ignore_limits,
+            settling_band_m: settling_band,
+            ..options
+        };
+        let arm = self.arm.clone();
+        let found = stoppable(py, move |stop| arm.simulate_batch_until(&scenarios, &options, stop))?;
+        let list = PyList::empty(py);
+        for result in found {
+            match result {
+                Ok(run) => list.append(PyRun::new(run))?,
+                Err(error) if raises => return Err(exception(error)),
+                Err(error) => list.append(exception(error).into_value(py))?,
+            }
+        }
+        Ok(list)
+    }
+
+    /// How far the tool is off in many runs: figures alone, several runs at a time in vector registers, on all cores.
+    ///
+    /// Parameters
+    /// ----------
+    /// runs : sequence of Motion, Scenario, str or os.PathLike
+    /// stiffness, damping : float or array_like, shape (m,), default 1
+    ///     Factors of all stiffnesses and of all damping, one for all or one for each run.
+    /// step, stepper, stepper_options, ignore_limits
+    ///     As for :meth:`simulate`.
+    /// samples : bool, default False
+    ///     Keep the deflection after every step.
+    /// errors : {"raise", "nan"}, default "raise"
+    ///     Runs that fail are raised, or have NaN and stand in ``failures``.
+    ///
+    /// Returns
+    /// -------
+    /// Deflections
+    #[pyo3(signature = (runs, *, stiffness=None, damping=None, step=1e-3, stepper=None, stepper_options=None,
+                        ignore_limits=false, samples=false, errors="raise"))]
+    #[expect(clippy::too_many_arguments, reason = "keyword arguments")]
+    fn deflections(
+        &self,
+        py: Python<'_>,
+        runs: &Bound<'_, PyAny>,
+        stiffness: Option<&Bound<'_, PyAny>>,
+        damping: Option<&Bound<'_, PyAny>>,
+        step: f64,
+        stepper: Option<&str>,
+        stepper_options: Option<&Bound<'_, PyDict>>,
+        ignore_limits: bool,
+        samples: bool,
+        errors: &str,
+    ) -> PyResult<PyDeflections> {
+        let raises = word("errors", errors, &[("raise", true), ("nan", false)])?;
+        let variations = variations(self.scenarios(py, runs)?, stiffness, damping)?;
+        let options = RunOptions { ignore_limits, ..run_options(step, stepper, stepper_options)? };
+        let arm = self.arm.clone();
+        let found = stoppable(py, move |stop| arm.deflections_until(&variations, &options, samples, stop))?;
+        PyDeflections::of(found, raises, step)
+    }
+
+    /// Static equilibrium under weight and a wrench at the tool, drives locked, with compliance and natural frequencies.
+    ///
+    /// Parameters
+    /// ----------
+    /// q : array_like, shape (n,) or (m, n), optional
+    ///     Joints (rad or m), one pose or m poses, which all cores share; zero without it.
+    /// wrench : array_like, shape (3,) or (6,), optional
+    ///     Force (N), and moment (N m), on the tool at its origin, world axes.
+    ///
+    /// Returns
+    /// -------
+    /// Statics
+    ///     Of m poses its arrays have one more axis in front.
+    #[pyo3(signature = (q=None, wrench=None))]
+    fn statics(
+        slf: &Bound<'_, Self>,
+        q: Option<&Bound<'_, PyAny>>,
+        wrench: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<PyStatics> {
+        let (py, own) = (slf.py(), slf.get());
+        let F = self::wrench(wrench)?;
+        let zero = vec![0.0; own.n()];
+        let given = q.filter(|q| !q.is_none()).map(|q| numbers("q", q, &[(own.n(), "joints")], true)).transpose()?;
+        let poses = given.as_ref().map_or(zero.as_slice(), |given| given.values());
+        if let Some(m) = given.as_ref().and_then(|given| given.rows) {
+            let (poses, arm) = (poses.to_vec(), own.arm.clone());
+            let found = stoppable(py, move |stop| arm.operating_points_until(&poses, &as_wrench(F), stop))?;
+            return PyStatics::of_many(py, found.or_raise()?, m);
+        }
+        let mut at = own.point()?.lock().unwrap_or_else(PoisonError::into_inner);
+        let failed = |error| Error::Step { source: error, partial: false };
+        at.solve(poses, &as_wrench(F)).map_err(failed).or_raise()?;
+        PyStatics::of_one(slf, &mut at, poses, F)
+    }
+
+    /// A workspace for one pose after another, for loops in which the calls are to cost nothing (OperatingPoint).
+    fn operating_point(slf: &Bound<'_, Self>) -> PyResult<PyOperatingPoint> {
+        Ok(PyOperatingPoint::new(slf.get().arm.operating_point().or_raise()?, slf.get().n()))
+    }
+
+    /// Lowest natural modes at a pose under weight, drives locked or under their servos.
+    ///
+    /// Parameters
+    /// ----------
+    /// q : array_like, shape (n,), optional
+    ///     Joints (rad or m); zero without it.
+    /// count : int, default 10
+    ///
+    /// Returns
+    /// -------
+    /// Modes
+    #[pyo3(signature = (q=None, count=10))]
+    fn modes(&self, py: Python<'_>, q: Option<&Bound<'_, PyAny>>, count: usize) -> PyResult<PyModes> {
+        let q = self.pose(q)?;
+        let table = py.detach(|| self.arm.modes(q.as_deref(), count)).or_raise()?;
+        caveat::warn(py, &table.caveats)?;
+        modes(table)
+    }
+
+    /// Frequency response of the tool at a pose, other drives locked.
+    ///
+    /// Parameters
+    /// ----------
+    /// q : array_like, shape (n,), optional
+    ///     Joints (rad or m); zero without it.
+    /// inputs : sequence of str, default ("force-x", "force-y", "force-z")
+    ///     Of ``"force-x"`` to ``"torque-z"`` on the tool, and names of joints.
+    /// outputs : sequence of str, default ("x", "y", "z")
+    ///     Of x, y, z, rx, ry, rz of the tool, world axes.
+    /// quantity : {"displacement", "velocity", "acceleration"}, default "displacement"
+    /// from_hz, to_hz : float, optional
+    ///     Lowest and highest frequency; chosen by the modes without them.
+    /// points : int, default 500
+    /// spacing : {"log", "linear"}, default "log"
+    ///
+    /// Returns
+    /// -------
+    /// Response
+    #[pyo3(signature = (q=None, *, inputs=None, outputs=None, quantity="displacement", from_hz=None, to_hz=None, points=500,
+                        spacing="log"))]
+    #[expect(clippy::too_many_arguments, reason = "keyword arguments")]
+    fn response(
+        &self,
+        py: Python<'_>,
+        q: Option<&Bound<'_, PyAny>>,
+        inputs: Option<Vec<String>>,
+        outputs: Option<Vec<String>>,
+        quantity: &str,
+        from_hz: Option<f64>,
+        to_hz: Option<f64>,
+        points: usize,
+        spacing: &str,
+    ) -> PyResult<PyResponse> {
+        let request = ResponseArgs { inputs, outputs, quantity, from_hz, to_hz, points, spacing }.request()?;
+        let q = self.pose(q)?;
+        let found = py.detach(|| self.arm.response(q.as_deref(), &request)).or_raise()?;
+        caveat::warn(py, &found.caveats)?;
+        response(found, &request)
+    }
+
+    /// Mass, damping and stiffness of the free coordinates about the equilibrium at a pose.
+    ///
+    /// Parameters
+    /// ----------
+    /// q : array_like, shape (n,), optional
+    ///     Joints (rad or m); zero without it.
+    /// wrench : array_like, shape (3,) or (6,), optional
+    ///     On the tool, world axes (N, N m).
+    ///
+    /// Returns
+    /// -------
+    /// Linear
+    #[pyo3(signature = (q=None, wrench=None))]
+    fn linearise(
+        &self,
+        py: Python<'_>,
+        q: Option<&Bound<'_, PyAny>>,
+        wrench: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<PyLinear> {
+        let (q, F) = (self.pose(q)?, self::wrench(wrench)?);
+        Ok(linear(py.detach(|| self.arm.linearise(q.as_deref(), F)).or_raise()?))
+    }
+
+    /// The arm at rest at a pose, to be commanded while it moves.
+    ///
+    /// Parameters
+    /// ----------
+    /// q : array_like, shape (n,), optional
+    ///     Joints (rad or m); zero without it.
+    /// period : float, default 1e-3
+    ///     Control period (s), a whole number of steps.
+    /// step : float, default 1e-3
+    ///     Time step (s).
+    /// stepper, stepper_options
+    ///     As for :meth:`simulate`.
+    ///
+    /// Returns
+    /// -------
+    /// Live
+    #[pyo3(signature = (q=None, *, period=1e-3, step=1e-3, stepper=None, stepper_options=None))]
+    fn live(
+        &self,
+        q: Option<&Bound<'_, PyAny>>,
+        period: f64,
+        step: f64,
+        stepper: Option<&str>,
+        stepper_options: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<PyLive> {
+        let options = run_options(step, stepper, stepper_options)?;
+        let live = self.arm.live(self.pose(q)?.as_deref(), period, &options).or_raise()?;
+        Ok(PyLive::new(live, self.n()))
+    }
+
+    fn __repr__(&self) -> String {
+        let modelling = self.arm.modelling();
+        let links = modelling.links.word().unwrap_or("as filed");
+        let drives = modelling.drives.word().unwrap_or("as filed");
+        let (name, n) = (&self.arm.robot().name, self.n_elastic());
+        format!("<Arm {name:?}: links {links}, drives {drives}, {n} elastic coordinates>")
+    }
+
+    fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("flexarm._show")?.call_method1("arm_html", (slf,))
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let (py, own) = (slf.py(), slf.get());
+        let modelling = own.arm.modelling();
+        let choices = (modelling.links.word(), modelling.drives.word(), modelling.segments, modelling.modes);
+        let make = py.import("flexarm._pickle")?.getattr("arm")?;
+        Ok((make, (&own.robot, choices)).into_pyobject(py)?.into_any())
+    }
+}
+
+impl PyArm {
+    /// A run that signals, an observer and a progress function can end.
+    fn watched(
+        &self,
+        py: Python<'_>,
+        scenario: &Scenario,
+        options: &RunOptions,
+        outputs: Option<&Outputs>,
+        observer: Option<Py<PyAny>>,
+        progress: Option<Py<PyAny>>,
+    ) -> PyResult<flexarm::Run> {
+        let watch = Mutex::new(Watch::new(progress));
+        let locked = || watch.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut look = |done: f64, total: f64| locked().look(done, total);
+        let mut show = observer.map(|observer| {
+            let locked = &locked;
+            move |sample: &flexarm::Sample| {
+                let shown =
+                    Python::attach(|py| observer.call1(py, (PySample::new(sample),))?.extract::<Option<bool>>(py));
+                match shown {
+                    Ok(Some(false)) => std::ops::ControlFlow::Break(()),
+                    Ok(_) => std::ops::ControlFlow::Continue(()),
+                    Err(error) => locked().keep(Err(error)),
+                }
+            }
+        });
+        let result = py.detach(|| {
+            let show = show.as_mut().map(|show| show as &mut dyn FnMut(&flexarm::Sample) -> std::ops::ControlFlow<()>);
+            self.arm.simulate_watched(scenario, options, outputs, show, &mut look)
+        });
+        drop(show);
+        let mut watch = watch.into_inner().unwrap_or_else(PoisonError::into_inner);
+        if let Some(raised) = watch.raised.take() {
+            return Err(raised);
+        }
+        let run = result.or_raise()?;
+        watch.done(run.summary.duration_s)?;
+        Ok(run)
+    }
+}
+
+/// Kept for answers that cannot be had.
+pub(crate) fn only_for_one(what: &str) -> PyErr {
+    PyRuntimeError::new_err(format!("{what} is there for a single pose: ask for one"))
+}

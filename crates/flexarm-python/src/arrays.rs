@@ -1,0 +1,190 @@
+//! Arrays of numpy: what comes in is checked and named if it is wrong, what goes out is C-contiguous and not copied.
+//!
+//! A batch has one axis more in front. Start at [`numbers`] for what comes in, [`array`] for what goes out.
+#![allow(unsafe_code, reason = "an array that borrows from its owner says nothing of lifetimes; see `view`")]
+
+use numpy::ndarray::{Array, ArrayView, Dim, Dimension, IntoDimension, ShapeError};
+use numpy::{
+    Element, IntoPyArray, PyArray, PyArrayDescrMethods, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray,
+    PyUntypedArrayMethods,
+};
+use pyo3::exceptions::PyValueError;
+use pyo3::intern;
+use pyo3::prelude::*;
+
+/// Numbers that came in, C-contiguous and finite: one row, or m of them.
+pub(crate) struct Numbers<'py> {
+    array: PyReadonlyArrayDyn<'py, f64>,
+    /// Rows, if there is an axis for them.
+    pub(crate) rows: Option<usize>,
+}
+
+impl Numbers<'_> {
+    /// All numbers, row after row.
+    pub(crate) fn values(&self) -> &[f64] {
+        self.array.as_slice().unwrap_or(&[])
+    }
+
+    /// Number of rows, 1 without an axis for them.
+    pub(crate) fn len(&self) -> usize {
+        self.rows.unwrap_or(1)
+    }
+}
+
+/// How a shape is asked for in messages.
+fn expected(row: &[(usize, &str)], batch: bool) -> String {
+    let inner = row.iter().map(|(n, what)| format!("{n} {what}")).collect::<Vec<_>>().join(" x ");
+    let shape = row.iter().map(|(n, _)| n.to_string()).collect::<Vec<_>>().join(", ");
+    let one = if row.len() == 1 { format!("({shape},)") } else { format!("({shape})") };
+    match batch {
+        true => format!("expected {one} or (m, {shape}) for m of them: {inner}"),
+        false => format!("expected {one}: {inner}"),
+    }
+}
+
+fn shape_of(shape: &[usize]) -> String {
+    match shape {
+        [n] => format!("({n},)"),
+        _ => format!("({})", shape.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")),
+    }
+}
+
+/// An array of `float64` as it is, or made of what is nearly one: lists, integers, other orders in memory.
+fn floats<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    if let Ok(array) = value.cast::<PyArrayDyn<f64>>()
+        && array.is_c_contiguous()
+        && array.is_aligned()
+    {
+        return Ok(array.clone());
+    }
+    let py = value.py();
+    let numpy = py.import(intern!(py, "numpy"))?;
+    let wrong = |found: String| {
+        PyValueError::new_err(format!(
+            "{name} is {found}: expected real numbers that fit float64 (an array or nested lists)"
+        ))
+    };
+    let any = numpy.call_method1(intern!(py, "asarray"), (value,));
+    let any = any.map_err(|error| wrong(format!("no array ({})", error.value(py))))?;
+    let array = any.cast::<PyUntypedArray>()?;
+    let dtype = array.dtype();
+    let kind = char::from(dtype.kind());
+    if !matches!(kind, 'f' | 'i' | 'u') || (kind == 'f' && dtype.itemsize() > 8) {
+        return Err(wrong(format!("of dtype {}", dtype.str()?)));
+    }
+    let float = f64::get_dtype(py);
+    let array = numpy.call_method1(intern!(py, "ascontiguousarray"), (array, float))?;
+    Ok(array.cast_into::<PyArrayDyn<f64>>()?)
+}
+
+/// Numbers of an argument: a row of the shape `row`, or with `batch` also m rows.
+///
+/// # Errors
+/// `ValueError` with the argument, what was found and what is expected.
+pub(crate) fn numbers<'py>(
+    name: &str,
+    value: &Bound<'py, PyAny>,
+    row: &[(usize, &str)],
+    batch: bool,
+) -> PyResult<Numbers<'py>> {
+    let array = floats(name, value)?;
+    let shape = array.shape();
+    let fits = |shape: &[usize]| shape.len() == row.len() && shape.iter().zip(row).all(|(n, (want, _))| n == want);
+    // numpy's dimension 0 would swallow shapes of a single number.
+    let rows = match shape.split_first() {
+        _ if fits(shape) => None,
+        Some((m, rest)) if batch && fits(rest) => Some(*m),
+        _ => {
+            let (found, expected) = (shape_of(shape), expected(row, batch));
+            return Err(PyValueError::new_err(format!("{name} has the shape {found}, {expected}")));
+        }
+    };
+    let array = array.try_readonly().map_err(|error| PyValueError::new_err(format!("{name}: {error}")))?;
+    let numbers = Numbers { array, rows };
+    finite(name, numbers.values(), numbers.array.shape())?;
+    Ok(numbers)
+}
+
+/// An argument with any number of rows of `width` numbers; `width` 0 for plain numbers.
+pub(crate) fn table<'py>(name: &str, value: &Bound<'py, PyAny>, width: usize, what: &str) -> PyResult<Numbers<'py>> {
+    let array = floats(name, value)?;
+    let rows = match *array.shape() {
+        [m] if width == 0 => m,
+        [m, n] if width > 0 && n == width => m,
+        ref other => {
+            let expected = if width == 0 { "(m,)".into() } else { format!("(m, {width}): {width} {what} in each row") };
+            let message = format!("{name} has the shape {}, expected {expected}", shape_of(other));
+            return Err(PyValueError::new_err(message));
+        }
+    };
+    let array = array.try_readonly().map_err(|error| PyValueError::new_err(format!("{name}: {error}")))?;
+    let numbers = Numbers { array, rows: Some(rows) };
+    finite(name, numbers.values(), numbers.array.shape())?;
+    Ok(numbers)
+}
+
+fn finite(name: &str, values: &[f64], shape: &[usize]) -> PyResult<()> {
+    let Some(first) = values.iter().position(|x| !x.is_finite()) else { return Ok(()) };
+    let mut place = Vec::with_capacity(shape.len());
+    let mut rest = first;
+    for n in shape.iter().rev() {
+        place.push(rest % n);
+        rest /= n;
+    }
+    place.reverse();
+    let place = place.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
+    let found = values[first];
+    Err(PyValueError::new_err(format!("{name}[{place}] is {found}: expected finite numbers")))
+}
+
+/// An array of these numbers, which it takes over.
+pub(crate) fn array<'py, const N: usize>(
+    py: Python<'py>,
+    shape: [usize; N],
+    values: Vec<f64>,
+) -> PyResult<Bound<'py, PyAny>>
+where
+    [usize; N]: IntoDimension<Dim = Dim<[usize; N]>>,
+    Dim<[usize; N]>: Dimension,
+{
+    let wrong = |error: ShapeError| PyValueError::new_err(format!("a result has no shape {shape:?}: {error}"));
+    let array = Array::from_shape_vec(shape.into_dimension(), values).map_err(wrong)?;
+    Ok(array.into_pyarray(py).into_any())
+}
+
+/// An answer for one row, or for m of them: of shape `row`, or (m, row).
+pub(crate) fn answer<'py>(
+    py: Python<'py>,
+    rows: Option<usize>,
+    row: &[usize],
+    values: Vec<f64>,
+) -> PyResult<Bound<'py, PyAny>> {
+    match (rows, row) {
+        (None, &[a]) => array(py, [a], values),
+        (None, &[a, b]) => array(py, [a, b], values),
+        (Some(m), &[a]) => array(py, [m, a], values),
+        (Some(m), &[a, b]) => array(py, [m, a, b], values),
+        _ => array(py, [values.len()], values),
+    }
+}
+
+/// A read-only array on numbers that `owner` has; nothing is copied, and the array keeps its owner alive.
+///
+/// `values` must belong to `owner`, which must never change or move them: owners are frozen classes whose numbers lie on the
+/// heap and are never touched again.
+pub(crate) fn view<'py, const N: usize>(
+    owner: Bound<'py, PyAny>,
+    shape: [usize; N],
+    values: &[f64],
+) -> PyResult<Bound<'py, PyAny>>
+where
+    [usize; N]: IntoDimension<Dim = Dim<[usize; N]>>,
+    Dim<[usize; N]>: Dimension,
+{
+    let wrong = |error: ShapeError| PyValueError::new_err(format!("a result has no shape {shape:?}: {error}"));
+    let view = ArrayView::from_shape(shape.into_dimension(), values).map_err(wrong)?;
+    // SAFETY: the owner is alive as long as the array, and its numbers stay where they are and what they are.
+    let array = unsafe { PyArray::borrow_from_array(&view, owner) };
+    array.readwrite().make_nonwriteable();
+    Ok(array.into_any())
+}

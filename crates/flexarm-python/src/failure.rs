@@ -1,0 +1,77 @@
+//! Errors of the library as exceptions, by cause. The classes are Python's (`flexarm/errors.py`), for they have two parents.
+
+use flexarm::{Error, Fault};
+use pyo3::prelude::*;
+use pyo3::types::PyType;
+
+/// Name of the class of an error.
+fn class(error: &Error) -> &'static str {
+    match error {
+        Error::File { .. } | Error::Taken { .. } => "FileError",
+        Error::InStudy { source, .. } => class(source),
+        Error::Several(faults) => faults.first().map_or("InputError", class),
+        Error::RobotFile(_) | Error::Flex(_) | Error::New(_) | Error::NoTcp { .. } | Error::UnknownTcp { .. } => {
+            "RobotError"
+        }
+        Error::Urdf(_) | Error::Model { .. } => "UrdfError",
+        Error::Trajectory(_) | Error::Program(_) | Error::Path { .. } | Error::Motion(_) => "MotionError",
+        Error::Limits { .. } => "LimitsError",
+        Error::Value(_) | Error::Channel(_) | Error::Study(_) => "SettingError",
+        Error::Modelling(_) | Error::Balancer(_) => "ModellingError",
+        Error::Pose(_) | Error::Loop(_) => "PoseError",
+        Error::Load(_) => "LoadError",
+        Error::Identify(_) => "IdentifyError",
+        Error::Compensate(_) => "CompensateError",
+        Error::Map(_) => "MapError",
+        Error::Recording(_) => "RecordingError",
+        Error::Link(_) => "LinkError",
+        Error::Write { .. } | Error::Log(_) => "WriteError",
+        Error::Step { .. } => "StepError",
+        Error::Interrupted { .. } => "Stopped",
+        _ => "InputError",
+    }
+}
+
+/// The exception for an error.
+pub(crate) fn exception(error: Error) -> PyErr {
+    let fault = error.fault();
+    let mut message = error.to_string();
+    let mut source = std::error::Error::source(&error);
+    while let Some(cause) = source {
+        let text = cause.to_string();
+        if !message.contains(&text) {
+            message = format!("{message}\nbecause: {text}");
+        }
+        source = cause.source();
+    }
+    let named = class(&error);
+    // A step that cannot even start is bad input, a file that is not a recording too.
+    let class = match (fault, named) {
+        (Fault::Input, "StepError" | "WriteError") => "InputError",
+        (Fault::Run, "StepError" | "WriteError" | "Stopped") => named,
+        (Fault::Run, _) => "RunError",
+        (Fault::Input, _) => named,
+    };
+    Python::attach(|py| raised(py, class, message))
+}
+
+/// An exception of a class of `flexarm.errors`.
+fn raised(py: Python<'_>, class: &str, message: String) -> PyErr {
+    let made = || -> PyResult<PyErr> {
+        let class = py.import("flexarm.errors")?.getattr(class)?.cast_into::<PyType>()?;
+        Ok(PyErr::from_type(class, message))
+    };
+    made().unwrap_or_else(|error| error)
+}
+
+/// Results of the library as results of Python.
+pub(crate) trait OrRaise<T> {
+    /// The value, or the exception.
+    fn or_raise(self) -> PyResult<T>;
+}
+
+impl<T, E: Into<Error>> OrRaise<T> for Result<T, E> {
+    fn or_raise(self) -> PyResult<T> {
+        self.map_err(|error| exception(error.into()))
+    }
+}

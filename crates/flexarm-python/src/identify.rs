@@ -1,0 +1,119 @@
+//! Parameters from measurements, and poses that are worth measuring.
+
+use std::path::PathBuf;
+
+use flexarm::identify::{IdentifyRequest, PlanRequest, identify_robot, plan_measurements as plan};
+use pyo3::prelude::*;
+
+use crate::arrays::table;
+use crate::caveat;
+use crate::failure::OrRaise;
+use crate::robot::PyRobot;
+use crate::values::{modelling, plain};
+use crate::watch::stoppable;
+
+/// Finds numbers of a robot file from measurements at the robot: tracker, dial gauge, hammer, encoders.
+///
+/// Parameters
+/// ----------
+/// robot : Robot
+/// measurements : path
+///     A file of measurements (``flexarm format measurements`` describes it).
+/// fit : sequence of str, optional
+///     Names of what is unknown, ``*`` for anything, in the place of those in the file.
+/// links, drives : str, optional
+///     As for :meth:`Robot.flexible`.
+/// output : path, optional
+///     Folder of the new robot file and a page; nothing is written without it.
+/// overwrite : bool, default False
+///
+/// Returns
+/// -------
+/// dict
+///     Parameters with uncertainties and residuals, as ``flexarm identify --json``.
+#[pyfunction]
+#[pyo3(signature = (robot, measurements, *, fit=None, links=None, drives=None, output=None, overwrite=false))]
+#[expect(clippy::too_many_arguments, reason = "keyword arguments")]
+pub(crate) fn identify<'py>(
+    py: Python<'py>,
+    robot: &Bound<'py, PyRobot>,
+    measurements: PathBuf,
+    fit: Option<Vec<String>>,
+    links: Option<&str>,
+    drives: Option<&str>,
+    output: Option<PathBuf>,
+    overwrite: bool,
+) -> PyResult<Bound<'py, PyAny>> {
+    let modelling = modelling(links, drives, None, None)?;
+    let request = IdentifyRequest { modelling, fit: fit.unwrap_or_default(), output, overwrite };
+    let robot = robot.get().robot.clone();
+    let found = stoppable(py, move |_| identify_robot(&robot, &measurements, &request))?.or_raise()?;
+    caveat::warn(py, &found.caveats)?;
+    plain(py, &found)
+}
+
+/// Chooses poses and forces that tell most of what is unknown.
+///
+/// Parameters
+/// ----------
+/// robot : Robot
+/// count : int
+///     How many readings.
+/// fit : sequence of str, optional
+///     Names of what is to be found; all stiffnesses without it.
+/// forces : array_like, shape (m, 3), optional
+///     Forces on the tool among which the plan chooses, world axes (N).
+/// std : float, default 3e-5
+///     Deviation of a measured displacement (m).
+/// poses, work : path, optional
+///     Tables of poses: those that are reachable, and those where the work will be done.
+/// links, drives : str, optional
+///     As for :meth:`Robot.flexible`.
+/// output : path, optional
+///     Folder of the files to fill in; nothing is written without it.
+/// overwrite : bool, default False
+///
+/// Returns
+/// -------
+/// dict
+///     As ``flexarm identify --plan --json``.
+#[pyfunction]
+#[pyo3(signature = (robot, count, *, fit=None, forces=None, std=None, poses=None, work=None, links=None, drives=None,
+                    output=None, overwrite=false))]
+#[expect(clippy::too_many_arguments, reason = "keyword arguments")]
+pub(crate) fn plan_measurements<'py>(
+    py: Python<'py>,
+    robot: &Bound<'py, PyRobot>,
+    count: usize,
+    fit: Option<Vec<String>>,
+    forces: Option<&Bound<'py, PyAny>>,
+    std: Option<f64>,
+    poses: Option<PathBuf>,
+    work: Option<PathBuf>,
+    links: Option<&str>,
+    drives: Option<&str>,
+    output: Option<PathBuf>,
+    overwrite: bool,
+) -> PyResult<Bound<'py, PyAny>> {
+    let usual = PlanRequest::new(count);
+    let forces = match forces {
+        Some(forces) => {
+            let rows = table("forces", forces, 3, "numbers (N)")?;
+            rows.values().chunks_exact(3).map(|row| [row[0], row[1], row[2]]).collect()
+        }
+        None => usual.forces.clone(),
+    };
+    let request = PlanRequest {
+        modelling: modelling(links, drives, None, None)?,
+        fit: fit.unwrap_or_default(),
+        forces,
+        std_m: std.unwrap_or(usual.std_m),
+        poses,
+        work,
+        output,
+        overwrite,
+        ..usual
+    };
+    let robot = robot.get().robot.clone();
+    plain(py, &stoppable(py, move |_| plan(&robot, &request))?.or_raise()?)
+}

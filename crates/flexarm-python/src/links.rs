@@ -1,0 +1,193 @@
+//! Links from meshes and matrices, and back.
+
+use std::path::PathBuf;
+
+use flexarm::export::{ExportFormat, ExportJob, export};
+use flexarm::import::{ImportFormat, ImportJob, ImportOutputs, import};
+use flexarm::reduce::{ReduceJob, ReduceOptions, ReduceOutputs, reduce as reduce_job};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::failure::OrRaise;
+use crate::values::{path, plain, word};
+use crate::watch::stoppable;
+
+/// Reduces a mesh to a flexible link and writes its files.
+///
+/// Parameters
+/// ----------
+/// job : str, os.PathLike or dict
+///     A job file, a mesh, or the keys of a job file as a dict: ``mesh``, ``units``, ``material``, ``modes``, ``interface``, ...
+/// output : str or os.PathLike, optional
+///     Folder for the link file, the complete job, the figures and a report; nothing is written without it.
+/// overwrite : bool, default False
+///
+/// Returns
+/// -------
+/// dict
+///     Mass, stiffness, frequencies and checks, as ``flexarm reduce --json``.
+#[pyfunction]
+#[pyo3(signature = (job, *, output=None, overwrite=false))]
+pub(crate) fn reduce<'py>(
+    py: Python<'py>,
+    job: &Bound<'py, PyAny>,
+    output: Option<&Bound<'py, PyAny>>,
+    overwrite: bool,
+) -> PyResult<Bound<'py, PyAny>> {
+    crate::command::name_keywords();
+    let job = match job.cast::<PyDict>() {
+        Ok(keys) => {
+            let text: String = py.import("json")?.call_method1("dumps", (keys,))?.extract()?;
+            serde_json::from_str::<ReduceJob>(&text).map_err(|error| {
+                let what = error.to_string();
+                let what = what.split(" at line").next().unwrap_or_default();
+                PyValueError::new_err(format!("job: {what}"))
+            })?
+        }
+        Err(_) => ReduceJob::load(&path("job", job)?).or_raise()?,
+    };
+    let folder = output.map(|output| path("output", output)).transpose()?;
+    let outputs = folder.map(|folder| ReduceOutputs { folder: Some(folder), flex: None, overwrite });
+    let summary = stoppable(py, move |_| reduce_job(&job, &ReduceOptions::default(), outputs.as_ref(), &mut |_| {}))?;
+    plain(py, &summary.or_raise()?)
+}
+
+/// A text or several.
+fn paths(argument: &str, files: &Bound<'_, PyAny>) -> PyResult<Vec<PathBuf>> {
+    match path(argument, files) {
+        Ok(one) => Ok(vec![one]),
+        Err(wrong) => files.try_iter().map_err(|_| wrong)?.map(|file| path(argument, &file?)).collect(),
+    }
+}
+
+/// A value in the words of the command line.
+fn parsed<T: std::str::FromStr<Err: std::fmt::Display>>(argument: &str, text: Option<&str>) -> PyResult<Option<T>> {
+    let wrong = |error: T::Err| PyValueError::new_err(format!("{argument}: {error}"));
+    text.map(|text| text.parse().map_err(wrong)).transpose()
+}
+
+const FORMATS: [(&str, ImportFormat); 10] = [
+    ("matrix-market", ImportFormat::MatrixMarket),
+    ("user-element", ImportFormat::UserElement),
+    ("abaqus-text", ImportFormat::AbaqusText),
+    ("coordinate", ImportFormat::Coordinate),
+    ("dmig", ImportFormat::Dmig),
+    ("op4", ImportFormat::Op4),
+    ("harwell-boeing", ImportFormat::HarwellBoeing),
+    ("exudyn", ImportFormat::Exudyn),
+    ("simscape", ImportFormat::Simscape),
+    ("sid", ImportFormat::Sid),
+];
+
+/// Makes a flexible link of matrices of another finite element program.
+///
+/// Parameters
+/// ----------
+/// files : path or sequence of paths
+///     Files of one structure; companions beside them are found.
+/// format : str, optional
+///     The format that the files must have; by content without it.
+/// units : str, optional
+///     ``"m-kg-s"``, ``"mm-t-s"``, ...
+/// map : str, optional
+///     Which rows or nodes are which interface: ``"A=1001,B=1002"``.
+/// at : sequence of str, optional
+///     Frames of interfaces: ``"B=0,0,1.1"``.
+/// modes : int, optional
+///     Modes to keep of a full model.
+/// mass_file : path, optional
+/// name : str, optional
+///     Name of the link.
+/// output : path, optional
+///     Folder of the link file and its report; nothing is written without it.
+/// overwrite : bool, default False
+///
+/// Returns
+/// -------
+/// dict
+///     As ``flexarm import --json``.
+#[pyfunction]
+#[pyo3(signature = (files, *, format=None, units=None, map=None, at=None, modes=None, mass_file=None, name=None, output=None,
+                    overwrite=false))]
+#[expect(clippy::too_many_arguments, reason = "keyword arguments")]
+pub(crate) fn import_link<'py>(
+    py: Python<'py>,
+    files: &Bound<'py, PyAny>,
+    format: Option<&str>,
+    units: Option<&str>,
+    map: Option<&str>,
+    at: Option<Vec<String>>,
+    modes: Option<usize>,
+    mass_file: Option<PathBuf>,
+    name: Option<String>,
+    output: Option<PathBuf>,
+    overwrite: bool,
+) -> PyResult<Bound<'py, PyAny>> {
+    crate::command::name_keywords();
+    let mut frames = Vec::new();
+    for text in at.iter().flatten() {
+        frames.extend(parsed("at", Some(text))?);
+    }
+    let job = ImportJob {
+        files: paths("files", files)?,
+        format: format.map(|found| word("format", found, &FORMATS)).transpose()?,
+        units: parsed("units", units)?,
+        map: parsed("map", map)?,
+        at: frames,
+        modes,
+        mass_file,
+        name,
+        ..ImportJob::default()
+    };
+    let outputs = output.map(|folder| ImportOutputs { folder: Some(folder), flex: None, overwrite });
+    let summary = stoppable(py, move |_| import(&job, outputs.as_ref()))?;
+    plain(py, &summary.or_raise()?)
+}
+
+const EXPORTS: [(&str, ExportFormat); 6] = [
+    ("matrix-market", ExportFormat::MatrixMarket),
+    ("user-element", ExportFormat::UserElement),
+    ("dmig", ExportFormat::Dmig),
+    ("op4", ExportFormat::Op4),
+    ("simscape", ExportFormat::Simscape),
+    ("sid", ExportFormat::Sid),
+];
+
+/// Writes the matrices of a link for another program.
+///
+/// Parameters
+/// ----------
+/// link : path
+///     A ``.flex`` file.
+/// format : str
+///     ``"matrix-market"``, ``"user-element"``, ``"dmig"``, ``"op4"``, ``"simscape"`` or ``"sid"``.
+/// output : path
+///     Folder.
+/// units : str, default "m-kg-s"
+/// nodes : sequence of int, optional
+///     Node numbers of the interfaces.
+/// overwrite : bool, default False
+///
+/// Returns
+/// -------
+/// dict
+///     As ``flexarm export --json``.
+#[pyfunction]
+#[pyo3(signature = (link, format, output, *, units="m-kg-s", nodes=None, overwrite=false))]
+pub(crate) fn export_link<'py>(
+    py: Python<'py>,
+    link: PathBuf,
+    format: &str,
+    output: PathBuf,
+    units: &str,
+    nodes: Option<Vec<i64>>,
+    overwrite: bool,
+) -> PyResult<Bound<'py, PyAny>> {
+    crate::command::name_keywords();
+    let format = word("format", format, &EXPORTS)?;
+    let units = units.parse().map_err(|error| PyValueError::new_err(format!("units: {error}")))?;
+    let job = ExportJob { link, format, units, nodes: nodes.unwrap_or_default(), folder: output, overwrite };
+    let summary = stoppable(py, move |_| export(&job))?;
+    plain(py, &summary.or_raise()?)
+}

@@ -1,0 +1,132 @@
+//! An arm that is commanded while it moves.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use flexarm::Live;
+use pyo3::prelude::*;
+
+use crate::arrays::{array, numbers};
+use crate::failure::OrRaise;
+use crate::operating_point::homogeneous;
+use crate::values::{as_wrench, wrench};
+
+/// An arm that is commanded while it moves, control period by control period. Made by :meth:`Arm.live`.
+///
+/// Examples
+/// --------
+/// >>> import numpy as np
+/// >>> live = flexarm.load("reference_arm").flexible(drives="servo").live()
+/// >>> for k in range(3):
+/// ...     live.step(np.zeros(6))
+/// >>> round(live.time, 6)
+/// 0.003
+#[pyclass(frozen, name = "Live", module = "flexarm")]
+pub(crate) struct PyLive {
+    live: Mutex<Live>,
+    n: usize,
+}
+
+impl PyLive {
+    pub(crate) fn new(live: Live, n: usize) -> Self {
+        Self { live: Mutex::new(live), n }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Live> {
+        self.live.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn vector<'py>(py: Python<'py>, values: Vec<f64>) -> PyResult<Bound<'py, PyAny>> {
+        array(py, [values.len()], values)
+    }
+}
+
+#[pymethods]
+impl PyLive {
+    /// One control period, at whose end the joints are told to be at ``q``.
+    ///
+    /// Parameters
+    /// ----------
+    /// q : array_like, shape (n,)
+    ///     Targets (rad or m).
+    /// velocity : array_like, shape (n,), optional
+    ///     Target velocities. Without them joints go on the parabola through the last three targets, and the feed-forward
+    ///     of servos is a period late.
+    /// wrench : array_like, shape (3,) or (6,), optional
+    ///     What pulls at the tool meanwhile, world axes (N, N m).
+    #[pyo3(signature = (q, velocity=None, wrench=None))]
+    fn step(
+        &self,
+        q: &Bound<'_, PyAny>,
+        velocity: Option<&Bound<'_, PyAny>>,
+        wrench: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<()> {
+        let q = numbers("q", q, &[(self.n, "joints")], false)?;
+        let velocity = velocity.map(|v| numbers("velocity", v, &[(self.n, "joints")], false)).transpose()?;
+        let F = as_wrench(self::wrench(wrench)?);
+        self.lock().step(q.values(), velocity.as_ref().map(|v| v.values()), &F).or_raise()
+    }
+
+    /// To rest at a pose at time 0 again.
+    ///
+    /// Parameters
+    /// ----------
+    /// q : array_like, shape (n,), optional
+    ///     Joints (rad or m); zero without it.
+    #[pyo3(signature = (q=None))]
+    fn reset(&self, q: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
+        let q = q.map(|q| numbers("q", q, &[(self.n, "joints")], false)).transpose()?;
+        self.lock().reset(q.as_ref().map(|q| q.values())).or_raise()
+    }
+
+    /// Time (s).
+    #[getter]
+    fn time(&self) -> f64 {
+        self.lock().time_s()
+    }
+
+    /// Length of a control period (s).
+    #[getter]
+    fn period(&self) -> f64 {
+        self.lock().period_s()
+    }
+
+    /// Joints as they are (rad or m), (n,): behind their targets under servos.
+    #[getter]
+    fn position<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        Self::vector(py, self.lock().position().to_vec())
+    }
+
+    /// Their velocities, (n,).
+    #[getter]
+    fn velocity<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        Self::vector(py, self.lock().velocity().to_vec())
+    }
+
+    /// Forces of the drives (N m or N), (n,).
+    #[getter]
+    fn effort<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        Self::vector(py, self.lock().effort().to_vec())
+    }
+
+    /// Elastic coordinates (m, rad).
+    #[getter]
+    fn deflection<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        Self::vector(py, self.lock().deflection().to_vec())
+    }
+
+    /// Pose of the tool in the world, (4, 4).
+    #[getter]
+    fn tcp_pose<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        homogeneous(py, &self.lock().tcp_pose())
+    }
+
+    /// Where a rigid arm with its joints at the last targets has the tool, (4, 4).
+    #[getter]
+    fn target_pose<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        homogeneous(py, &self.lock().target_pose())
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<Live at {} s>", self.lock().time_s())
+    }
+}

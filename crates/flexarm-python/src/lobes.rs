@@ -1,0 +1,94 @@
+//! How deep a tool may cut.
+
+use std::path::PathBuf;
+
+use flexarm::lobes::{CuttingPlace, CuttingTool, LobesRequest, lobes as limits};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use crate::arrays::numbers;
+use crate::caveat;
+use crate::failure::OrRaise;
+use crate::robot::PyRobot;
+use crate::scenario::scenario;
+use crate::values::{modelling, plain};
+use crate::watch::stoppable;
+
+/// Finds the depth of cut beyond which a tool chatters, over the spindle speed.
+///
+/// Parameters
+/// ----------
+/// robot : Robot
+/// tool : path or str
+///     A file of a cutting tool (``flexarm format tool`` describes it), or the name of a shipped one, such as
+///     ``"endmill_20mm"``.
+/// q : array_like, shape (n,), optional
+///     The pose (rad or m), all zero without it.
+/// along : Motion or path, optional
+///     A motion in the place of a pose.
+/// places : int, default 12
+///     At how many places of it.
+/// rpm : array_like, optional
+///     Spindle speeds (1/min) in the place of those in the file.
+/// deepest : float, optional
+///     Deepest cut that is looked at (m).
+/// zero_order : bool, default False
+///     By the mean force alone.
+/// ranges : bool, default False
+///     All unstable ranges of depth at each speed.
+/// links, drives : str, optional
+///     As for :meth:`Robot.flexible`.
+/// output : path, optional
+///     Folder of table, picture and page; nothing is written without it.
+/// overwrite : bool, default False
+///
+/// Returns
+/// -------
+/// dict
+///     ``points`` with ``spindle_rpm``, ``depth_m``, ``chatter_hz`` and ``kind``, and more, as ``flexarm lobes --json``.
+#[pyfunction]
+#[pyo3(signature = (robot, tool, *, q=None, along=None, places=12, rpm=None, deepest=None, zero_order=false, ranges=false,
+                    links=None, drives=None, output=None, overwrite=false))]
+#[expect(clippy::too_many_arguments, reason = "keyword arguments")]
+pub(crate) fn lobes<'py>(
+    py: Python<'py>,
+    robot: &Bound<'py, PyRobot>,
+    tool: PathBuf,
+    q: Option<&Bound<'py, PyAny>>,
+    along: Option<&Bound<'py, PyAny>>,
+    places: usize,
+    rpm: Option<Vec<f64>>,
+    deepest: Option<f64>,
+    zero_order: bool,
+    ranges: bool,
+    links: Option<&str>,
+    drives: Option<&str>,
+    output: Option<PathBuf>,
+    overwrite: bool,
+) -> PyResult<Bound<'py, PyAny>> {
+    if q.is_some() && along.is_some() {
+        return Err(PyValueError::new_err("q and along exclude each other: give one of them"));
+    }
+    let mut tool = CuttingTool::load(flexarm_cli::shipped_tool(&tool)).or_raise()?;
+    if let Some(mut rpm) = rpm {
+        rpm.sort_by(f64::total_cmp);
+        rpm.dedup();
+        tool = tool.at_speeds(rpm);
+    }
+    let n = robot.get().robot.rigid_model().or_raise()?.n_actuated();
+    let q = q.map(|q| numbers("q", q, &[(n, "joints")], false)).transpose()?.map(|q| q.values().to_vec());
+    let motion = along.map(|along| scenario(robot, Some(along), None, None, None)).transpose()?.map(|s| s.motion);
+    let modelling = modelling(links, drives, None, None)?;
+    let request = LobesRequest { modelling, deepest_m: deepest, zero_order, ranges, output, overwrite };
+    let robot = robot.get().robot.clone();
+    let found = stoppable(py, move |stop| {
+        let place = match &motion {
+            Some(motion) => CuttingPlace::Along(motion, places),
+            None => CuttingPlace::At(q.as_deref()),
+        };
+        limits(&robot, &tool, &place, &request, &|_, _| !stop())
+    })?
+    .or_raise()?;
+    caveat::warn(py, &found.caveats)?;
+    plain(py, &found)
+}

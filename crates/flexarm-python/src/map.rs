@@ -1,0 +1,266 @@
+//! Maps of the workspace.
+
+use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError};
+
+use flexarm::map::{JointRange, KeptPoses, Map, MapRegion, MapRequest, ToolDirections, WorkspaceGrid, map as take};
+use flexarm::{Motion, Robot};
+use pyo3::exceptions::{PyKeyError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
+
+use crate::arm::progress_function;
+use crate::arrays::{array, numbers};
+use crate::caveat;
+use crate::failure::OrRaise;
+use crate::robot::PyRobot;
+use crate::scenario::scenario;
+use crate::values::{modelling, plain, word, wrench};
+use crate::watch::Watch;
+
+/// Sag, compliance, frequencies and error under load at many poses. Made by :func:`flexarm.map`.
+#[pyclass(frozen, name = "Map", module = "flexarm")]
+pub(crate) struct PyMap {
+    map: Map,
+}
+
+#[pymethods]
+impl PyMap {
+    /// Every pose as a row: names and numbers of the columns (dict of str to ndarray).
+    #[getter]
+    fn table<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let table = PyDict::new(py);
+        for column in &self.map.table.columns {
+            table.set_item(&column.name, self.column(py, &column.name)?)?;
+        }
+        Ok(table)
+    }
+
+    /// What each column means (dict of str to str).
+    #[getter]
+    fn meanings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let meanings = PyDict::new(py);
+        for column in &self.map.table.columns {
+            meanings.set_item(&column.name, &column.meaning)?;
+        }
+        Ok(meanings)
+    }
+
+    /// Pose with the worst value of the quantity that is compared (dict).
+    #[getter]
+    fn worst<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        plain(py, &self.map.worst)
+    }
+
+    /// Pose with the best one (dict).
+    #[getter]
+    fn best<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        plain(py, &self.map.best)
+    }
+
+    /// What limits the worth of the answer (list of flexarm.Caveat).
+    #[getter]
+    fn caveats<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        caveat::list(py, &self.map.caveats)
+    }
+
+    /// All figures (dict as ``flexarm map --json``).
+    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        plain(py, &self.map)
+    }
+
+    fn __getitem__<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        self.column(py, name)
+    }
+
+    fn __len__(&self) -> usize {
+        self.map.table.rows()
+    }
+
+    fn __repr__(&self) -> String {
+        let Map { robot, poses, points, reachable, .. } = &self.map;
+        format!("<Map {robot:?}: {poses} poses, {reachable} of {points} places within reach>")
+    }
+}
+
+impl PyMap {
+    fn column<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        let values = self.map.table.column(name).ok_or_else(|| {
+            let known: Vec<&str> = self.map.table.columns.iter().map(|column| column.name.as_str()).collect();
+            PyKeyError::new_err(format!("the map has no column {name:?}; its columns are {}", known.join(", ")))
+        })?;
+        array(py, [values.len()], values)
+    }
+}
+
+/// Three numbers.
+fn three(name: &str, value: &Bound<'_, PyAny>) -> PyResult<[f64; 3]> {
+    let found = numbers(name, value, &[(3, "numbers")], false)?;
+    let values = found.values();
+    Ok([values[0], values[1], values[2]])
+}
+
+/// A map over joints: ``{"joint_2": (from, to, points)}``.
+fn over_joints(joints: &Bound<'_, PyDict>) -> PyResult<MapRegion> {
+    let range = |(joint, range): (Bound<'_, PyAny>, Bound<'_, PyAny>)| -> PyResult<JointRange> {
+        let joint: String = joint.extract()?;
+        let (from, to, points): (f64, f64, usize) = range.extract().map_err(|_| {
+            PyValueError::new_err(format!(
+                "joints[{joint:?}]: expected (from, to, points), rad or m, such as (-2.0, 0.0, 50)"
+            ))
+        })?;
+        Ok(JointRange { joint, range: [from, to], points })
+    };
+    Ok(MapRegion::Joints(joints.iter().map(range).collect::<PyResult<_>>()?))
+}
+
+/// Maps sag, compliance, natural frequencies and error under load over the workspace.
+///
+/// Parameters
+/// ----------
+/// robot : Robot
+/// bounds : array_like, shape (2, 3), optional
+///     Lowest and highest corner of a box of places of the tool (m, world); all that the arm can reach without it.
+/// spacing : float, optional
+///     Distance of the places (m).
+/// keep_out : float, default 0
+///     Leave out places nearer than this to the upright line through the first joint (m).
+/// tool_axis : array_like, shape (3,), default (0, 0, -1)
+///     Where the z axis of the tool points in the world.
+/// roll, cone : float, default 0
+///     Rotation about that axis, half angle of a cone within which the tool may tilt (rad).
+/// tilts, rolls : int, optional
+///     Directions in the cone, and rotations of the tool, that count.
+/// joints : dict of str to (float, float, int), optional
+///     Go through values of joints instead: from, to, how many (rad or m).
+/// along : Motion or path, optional
+///     Go along a motion instead, at ``points`` instants.
+/// points : int, default 1000
+/// at : array_like, shape (n,), optional
+///     Joints that the map does not move, and near which branches are taken.
+/// wrench : array_like, shape (3,) or (6,), optional
+///     On the tool besides weight, world axes (N, N m).
+/// by : str, optional
+///     Quantity by which poses are compared.
+/// keep : {"best", "worst", "all"}, default "best"
+///     Which of a place's poses are kept.
+/// frequencies : int, default 3
+/// workpiece : array_like, shape (3,), optional
+///     Edges of a box whose best place is to be found (m).
+/// links, drives : str, optional
+///     As for :meth:`Robot.flexible`.
+/// output : path, optional
+///     Folder of table, page and recording; nothing is written without it.
+/// overwrite : bool, default False
+/// progress : bool or callable, default False
+///
+/// Returns
+/// -------
+/// Map
+///
+/// Examples
+/// --------
+/// >>> robot = flexarm.load("kr210")
+/// >>> found = flexarm.map(robot, joints={"joint_2": (-1.8, 0.0, 5), "joint_3": (0.0, 2.0, 5)})
+/// >>> len(found)
+/// 25
+#[pyfunction]
+#[pyo3(signature = (robot, *, bounds=None, spacing=None, keep_out=0.0, tool_axis=None, roll=0.0, cone=0.0, tilts=None, rolls=1,
+                    joints=None, along=None, points=1000, at=None, wrench=None, by=None, keep="best", frequencies=3,
+                    workpiece=None, links=None, drives=None, output=None, overwrite=false, progress=None))]
+#[expect(clippy::too_many_arguments, reason = "keyword arguments")]
+pub(crate) fn map<'py>(
+    py: Python<'py>,
+    robot: &Bound<'py, PyRobot>,
+    bounds: Option<&Bound<'py, PyAny>>,
+    spacing: Option<f64>,
+    keep_out: f64,
+    tool_axis: Option<&Bound<'py, PyAny>>,
+    roll: f64,
+    cone: f64,
+    tilts: Option<usize>,
+    rolls: usize,
+    joints: Option<&Bound<'py, PyDict>>,
+    along: Option<&Bound<'py, PyAny>>,
+    points: usize,
+    at: Option<&Bound<'py, PyAny>>,
+    wrench: Option<&Bound<'py, PyAny>>,
+    by: Option<String>,
+    keep: &str,
+    frequencies: usize,
+    workpiece: Option<&Bound<'py, PyAny>>,
+    links: Option<&str>,
+    drives: Option<&str>,
+    output: Option<PathBuf>,
+    overwrite: bool,
+    progress: Option<Bound<'py, PyAny>>,
+) -> PyResult<PyMap> {
+    let places = [bounds.is_some() || spacing.is_some(), joints.is_some(), along.is_some()];
+    if places.into_iter().filter(|given| *given).count() > 1 {
+        return Err(PyValueError::new_err(
+            "bounds and spacing, joints, and along exclude each other: give one of them",
+        ));
+    }
+    let region = match (joints, along) {
+        (Some(joints), _) => over_joints(joints)?,
+        (None, Some(along)) => {
+            let motion: Motion = scenario(robot, Some(along), None, None, None)?.motion;
+            MapRegion::Along { motion: Box::new(motion), points }
+        }
+        (None, None) => {
+            let usual = ToolDirections::default();
+            let tool = ToolDirections {
+                axis: tool_axis.map_or(Ok(usual.axis), |axis| three("tool_axis", axis))?,
+                roll_rad: roll,
+                cone_rad: cone,
+                tilts: tilts.unwrap_or(if cone > 0.0 { 9 } else { 1 }),
+                rolls,
+            };
+            let bounds = bounds.map(|bounds| numbers("bounds", bounds, &[(2, "corners"), (3, "numbers (m)")], false));
+            let bounds = bounds.transpose()?.map(|bounds| {
+                let b = bounds.values();
+                [[b[0], b[1], b[2]], [b[3], b[4], b[5]]]
+            });
+            MapRegion::Workspace(WorkspaceGrid { bounds, spacing_m: spacing, keep_out_m: keep_out, tool })
+        }
+    };
+    let kept = [("best", KeptPoses::Best), ("worst", KeptPoses::Worst), ("all", KeptPoses::All)];
+    let n = robot.get().robot.rigid_model().or_raise()?.n_actuated();
+    let at = at.map(|at| numbers("at", at, &[(n, "joints")], false)).transpose()?;
+    let request = MapRequest {
+        modelling: modelling(links, drives, None, None)?,
+        region,
+        at: at.map(|at| at.values().to_vec()),
+        wrench: self::wrench(wrench)?,
+        frequencies: Some(frequencies),
+        keep: word("keep", keep, &kept)?,
+        by,
+        workpiece_m: workpiece.map(|edges| three("workpiece", edges)).transpose()?,
+        output,
+        overwrite,
+    };
+    let bar = progress_function(py, progress)?;
+    let found = watched(py, &robot.get().robot, &request, bar.clone().map(Bound::unbind));
+    if let Some(bar) = bar
+        && let Ok(close) = bar.getattr("close")
+    {
+        close.call0()?;
+    }
+    let map = found?;
+    caveat::warn(py, &map.caveats)?;
+    Ok(PyMap { map })
+}
+
+/// A map that signals and a progress function can end.
+fn watched(py: Python<'_>, robot: &Robot, request: &MapRequest, progress: Option<Py<PyAny>>) -> PyResult<Map> {
+    let watch = Mutex::new(Watch::new(progress));
+    let locked = || watch.lock().unwrap_or_else(PoisonError::into_inner);
+    let result = py.detach(|| take(robot, request, &mut |done, all| locked().look(done, all)));
+    let mut watch = watch.into_inner().unwrap_or_else(PoisonError::into_inner);
+    if let Some(raised) = watch.raised.take() {
+        return Err(raised);
+    }
+    let map = result.or_raise()?;
+    watch.done(map.points as f64)?;
+    Ok(map)
+}

@@ -1,0 +1,33 @@
+//! What the settings of the library are called in Python: keyword arguments.
+
+use flexarm::{Names, Setting};
+
+/// The names, for all messages of this process.
+pub(crate) const NAMES: Names = Names { setting: keyword, caller: "the keyword arguments" };
+
+fn keyword(setting: Setting) -> &'static str {
+    match setting {
+        Setting::Step => "step",
+        Setting::LogRate => "log_rate",
+        Setting::Stepper => "stepper",
+        Setting::Tolerance => "stepper_options={\"rtol\": ...}",
+        Setting::ReferenceMethod => "stepper_options={\"method\": ...}",
+        Setting::RoundCorners => "round_corners",
+        Setting::Magnification => "magnify",
+        Setting::Variant => "runs",
+        Setting::ReadFormat => "from_format",
+        Setting::WrittenFormat => "to_format",
+        Setting::Rate => "rate",
+        Setting::WaiveInertia => "waive_inertia",
+        Setting::Payload => "payload",
+        Setting::LowestFrequency => "from_hz",
+        Setting::HighestFrequency => "to_hz",
+        Setting::ModesUpTo => "modes_up_to_hz",
+        Setting::Data => "data",
+        Setting::GridSpacing => "spacing",
+        Setting::ToolAxis => "tool_axis",
+        Setting::MapJoints => "joints",
+        // The library's own words are Python's as well.
+        other => other.key(),
+    }
+}

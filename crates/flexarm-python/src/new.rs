@@ -1,0 +1,48 @@
+//! A robot file from a robot description.
+
+use std::path::PathBuf;
+
+use flexarm::{NewOptions, ReadOptions, new_robot as make};
+use pyo3::prelude::*;
+
+use crate::failure::OrRaise;
+use crate::values::plain;
+
+/// Makes a robot file with first guesses, and a sample motion, of a URDF or xacro file.
+///
+/// Parameters
+/// ----------
+/// urdf : path
+/// folder : path
+///     Where the files go.
+/// base, tool : str, optional
+///     Link at which the arm begins, and link that is the tool.
+/// joints : sequence of str, optional
+///     Joints that the motion moves.
+/// payload : float, optional
+///     Mass at the tool (kg); 0 for none.
+/// overwrite : bool, default False
+///
+/// Returns
+/// -------
+/// dict
+///     Files, chain and every assumption, as ``flexarm new --json``.
+#[pyfunction]
+#[pyo3(signature = (urdf, folder, *, base=None, tool=None, joints=None, payload=None, overwrite=false))]
+#[expect(clippy::too_many_arguments, reason = "keyword arguments")]
+pub(crate) fn new_robot<'py>(
+    py: Python<'py>,
+    urdf: PathBuf,
+    folder: PathBuf,
+    base: Option<String>,
+    tool: Option<String>,
+    joints: Option<Vec<String>>,
+    payload: Option<f64>,
+    overwrite: bool,
+) -> PyResult<Bound<'py, PyAny>> {
+    crate::command::name_keywords();
+    let read = ReadOptions { search_paths: flexarm::search_paths_from_environment(), ..ReadOptions::default() };
+    let options = NewOptions { base, tool, joints, payload_kg: payload, urdf: read };
+    let made = py.detach(|| make(&urdf, &folder, overwrite, &options)).or_raise()?;
+    plain(py, &made)
+}

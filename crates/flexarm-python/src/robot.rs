@@ -1,0 +1,362 @@
+//! Robots as loaded.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use flexarm::{InertiaEstimate, LoadOptions, ReadOptions, Robot};
+use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyTuple};
+
+use crate::arm::PyArm;
+use crate::arrays::{array, numbers};
+use crate::caveat;
+use crate::failure::OrRaise;
+use crate::model::PyModel;
+use crate::motion::{MotionOptionsArgs, PyMotion, load_motion};
+use crate::values::{modelling, path, plain};
+
+/// A robot as loaded: links, joints, drives, tool. Made by :func:`flexarm.load`.
+///
+/// It does not change, threads share it, and it can be pickled: the files are read again.
+///
+/// Examples
+/// --------
+/// >>> import flexarm
+/// >>> robot = flexarm.load("kr210")
+/// >>> robot.joints[:2]
+/// ('joint_1', 'joint_2')
+/// >>> arm = robot.flexible(links="modal", drives="elastic")
+#[pyclass(frozen, name = "Robot", module = "flexarm")]
+pub(crate) struct PyRobot {
+    pub(crate) robot: Arc<Robot>,
+    /// How it is made again: a function of `flexarm._pickle` and its arguments.
+    again: (&'static str, Py<PyAny>),
+}
+
+/// Loads a robot.
+///
+/// Parameters
+/// ----------
+/// robot : str or os.PathLike, default "kr210"
+///     A ``robot.toml``, a folder with one, a bare ``.urdf`` or ``.xacro``, or the name of a shipped robot.
+/// tcp : str, optional
+///     Link to use as tool centre point instead of the file's.
+/// packages : dict of str to path, optional
+///     Folders of ROS packages by name, for ``package://name/...``.
+/// arguments : dict of str to str, optional
+///     Values of ``$(arg name)`` in xacro files.
+/// inertia_from_density : float, optional
+///     Density (kg/m³) from which missing inertias are estimated by the meshes.
+/// inertia_from_total_mass : float, optional
+///     Mass of the whole arm (kg) from which they are estimated.
+/// waive_inertia : sequence of str, optional
+///     Links whose inertia may be rank deficient.
+///
+/// Returns
+/// -------
+/// Robot
+///
+/// Raises
+/// ------
+/// flexarm.InputError
+///     With file, line, what was found and how to mend it.
+///
+/// Examples
+/// --------
+/// >>> flexarm.load("three_beams").name
+/// 'three_beams'
+#[pyfunction]
+#[pyo3(signature = (robot=None, *, tcp=None, packages=None, arguments=None, inertia_from_density=None,
+                    inertia_from_total_mass=None, waive_inertia=None))]
+#[expect(clippy::too_many_arguments, reason = "keyword arguments")]
+pub(crate) fn load(
+    py: Python<'_>,
+    robot: Option<&Bound<'_, PyAny>>,
+    tcp: Option<String>,
+    packages: Option<Bound<'_, PyDict>>,
+    arguments: Option<Bound<'_, PyDict>>,
+    inertia_from_density: Option<f64>,
+    inertia_from_total_mass: Option<f64>,
+    waive_inertia: Option<Vec<String>>,
+) -> PyResult<PyRobot> {
+    crate::command::name_keywords();
+    let given = robot.map_or(Ok(PathBuf::from("kr210")), |given| path("robot", given))?;
+    let found = flexarm_cli::shipped_robot(&given).or_raise()?;
+    let choices = PyDict::new(py);
+    let estimate = match (inertia_from_density, inertia_from_total_mass) {
+        (Some(density), _) => Some(InertiaEstimate::Density(positive("inertia_from_density", density)?)),
+        (None, Some(mass)) => Some(InertiaEstimate::TotalMass(positive("inertia_from_total_mass", mass)?)),
+        (None, None) => None,
+    };
+    let mut urdf = ReadOptions {
+        search_paths: flexarm::search_paths_from_environment(),
+        inertia_from_mesh: estimate,
+        waive: waive_inertia.clone().unwrap_or_default(),
+        ..ReadOptions::default()
+    };
+    for (name, folder) in packages.iter().flat_map(|packages| packages.iter()) {
+        urdf.packages.push((name.extract()?, path("packages", &folder)?));
+    }
+    for (name, value) in arguments.iter().flat_map(|arguments| arguments.iter()) {
+        urdf.arguments.push((name.extract()?, value.str()?.extract()?));
+    }
+    choices.set_item("tcp", &tcp)?;
+    choices.set_item("packages", packages)?;
+    choices.set_item("arguments", arguments)?;
+    choices.set_item("inertia_from_density", inertia_from_density)?;
+    choices.set_item("inertia_from_total_mass", inertia_from_total_mass)?;
+    choices.set_item("waive_inertia", waive_inertia)?;
+    let options = LoadOptions { tcp, urdf };
+    let robot = py.detach(|| Robot::load_with(&found, &options)).or_raise()?;
+    let path = std::path::absolute(&found).unwrap_or(found);
+    let again = ("load", (path, choices).into_pyobject(py)?.into_any().unbind());
+    Ok(PyRobot { robot: Arc::new(robot), again })
+}
+
+/// Makes a robot of values: the keys of a robot file as a dict, or changed ones of a file that was read.
+///
+/// Parameters
+/// ----------
+/// keys : dict
+///     What ``robot.toml`` would have: ``urdf``, ``tcp``, ``payload``, ``flexible_link``, ``drive``, ...
+///     (``flexarm format robot`` prints all). ``format = 1`` may be left out.
+/// folder : path, default "."
+///     Paths in the keys are relative to it.
+///
+/// Returns
+/// -------
+/// Robot
+///
+/// Examples
+/// --------
+/// >>> base = flexarm.load("one_beam").path.parent
+/// >>> robot = flexarm.robot({"urdf": "one_beam.urdf"}, folder=base)
+/// >>> robot.flexible().n_elastic
+/// 0
+#[pyfunction]
+#[pyo3(signature = (keys, folder=None))]
+pub(crate) fn robot(py: Python<'_>, keys: &Bound<'_, PyDict>, folder: Option<PathBuf>) -> PyResult<PyRobot> {
+    crate::command::name_keywords();
+    let wrong = |what: String| pyo3::exceptions::PyValueError::new_err(format!("keys: {what}"));
+    let json: String = py.import("json")?.call_method1("dumps", (keys,))?.extract()?;
+    let mut values: serde_json::Map<String, serde_json::Value> =
+        serde_json::from_str(&json).map_err(|error| wrong(error.to_string()))?;
+    values.entry("format").or_insert(1.into());
+    let text = toml::to_string(&values).map_err(|error| wrong(error.to_string()))?;
+    let folder = folder.unwrap_or_else(|| PathBuf::from("."));
+    let folder = std::path::absolute(&folder).unwrap_or(folder);
+    let urdf = ReadOptions { search_paths: flexarm::search_paths_from_environment(), ..ReadOptions::default() };
+    let options = LoadOptions { tcp: None, urdf };
+    let robot = py.detach(|| Robot::from_toml(&text, &folder.join("robot.toml"), &options)).or_raise()?;
+    let again = ("robot", (keys.copy()?, folder).into_pyobject(py)?.into_any().unbind());
+    Ok(PyRobot { robot: Arc::new(robot), again })
+}
+
+fn positive(what: &str, x: f64) -> PyResult<f64> {
+    match x.is_finite() && x > 0.0 {
+        true => Ok(x),
+        false => Err(pyo3::exceptions::PyValueError::new_err(format!("{what} must be positive, found {x}"))),
+    }
+}
+
+impl PyRobot {
+    /// A limit of the actuated joints.
+    fn limits_of<'py, const N: usize>(
+        &self,
+        py: Python<'py>,
+        of: impl Fn(&flexarm::Coordinate) -> [f64; N],
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let model = self.robot.rigid_model().or_raise()?;
+        let actuated = &model.coordinates()[..model.n_actuated()];
+        let values: Vec<f64> = actuated.iter().flat_map(of).collect();
+        match N {
+            1 => array(py, [actuated.len()], values),
+            _ => array(py, [actuated.len(), N], values),
+        }
+    }
+}
+
+#[pymethods]
+impl PyRobot {
+    /// Name of the robot.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.robot.name
+    }
+
+    /// File that was loaded.
+    #[getter]
+    fn path(&self) -> &Path {
+        &self.robot.path
+    }
+
+    /// Names of the actuated joints, in the order of all poses (tuple of str).
+    #[getter]
+    fn joints<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
+        let model = self.robot.rigid_model().or_raise()?;
+        PyTuple::new(py, model.coordinates()[..model.n_actuated()].iter().map(|c| c.joint.clone()))
+    }
+
+    /// Lowest and highest position of each joint, (n, 2) (rad or m); infinite where there is no limit.
+    #[getter]
+    fn limits<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.limits_of(py, |c| [c.limits.lower, c.limits.upper])
+    }
+
+    /// Highest speed of each joint, (n,) (rad/s or m/s).
+    #[getter]
+    fn velocity_limits<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.limits_of(py, |c| [c.limits.velocity])
+    }
+
+    /// Link that carries the tool centre point.
+    #[getter]
+    fn tcp_link(&self) -> &str {
+        &self.robot.tcp.0
+    }
+
+    /// File of the motion that the robot comes with, or None.
+    #[getter]
+    fn default_motion(&self) -> Option<&Path> {
+        self.robot.default_trajectory.as_deref()
+    }
+
+    /// What is probably wrong with the robot, or good to know (list of flexarm.Caveat).
+    #[getter]
+    fn caveats<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, pyo3::types::PyList>> {
+        caveat::list(py, &self.robot.caveats())
+    }
+
+    /// The rigid tree with the payload, for recursions (Model).
+    #[getter]
+    fn model(&self) -> PyResult<PyModel> {
+        Ok(PyModel::new(self.robot.recursions().or_raise()?))
+    }
+
+    /// Puts flexible links and drives in place, which costs milliseconds; the arm is then asked often.
+    ///
+    /// Parameters
+    /// ----------
+    /// links : {"rigid", "lumped", "modal"}, optional
+    ///     How flexible links are modelled; as the robot file says without it.
+    /// drives : {"rigid", "elastic", "servo"}, optional
+    ///     How drives are modelled: exactly on the motion, with gearboxes that yield, by torque under servos.
+    /// segments : int, optional
+    ///     Number of rigid parts of lumped links.
+    /// modes : int, optional
+    ///     Number of modes of modal links.
+    ///
+    /// Returns
+    /// -------
+    /// Arm
+    #[pyo3(signature = (*, links=None, drives=None, segments=None, modes=None))]
+    fn flexible(
+        slf: &Bound<'_, Self>,
+        links: Option<&str>,
+        drives: Option<&str>,
+        segments: Option<usize>,
+        modes: Option<usize>,
+    ) -> PyResult<PyArm> {
+        let modelling = modelling(links, drives, segments, modes)?;
+        let robot = slf.get().robot.clone();
+        let arm = slf.py().detach(|| robot.flexible(modelling)).or_raise()?;
+        Ok(PyArm::new(slf.clone().unbind(), arm))
+    }
+
+    /// Reads a motion for the robot: waypoints, tables, ROS messages and bags, tool paths, robot programs.
+    ///
+    /// Parameters
+    /// ----------
+    /// motion : str or os.PathLike, optional
+    ///     A file or the name of a shipped motion; the robot's own without it.
+    /// topic : str, optional
+    ///     Topic of a bag.
+    /// columns : str, optional
+    ///     Which columns of a table are time and joints: ``"t=Time[ms],joint_1=A1[deg]"``.
+    /// round_corners : float, optional
+    ///     Time (s) within which corners, where a velocity jumps, are rounded.
+    ///
+    /// Returns
+    /// -------
+    /// Motion
+    #[pyo3(signature = (motion=None, *, topic=None, columns=None, round_corners=None))]
+    fn motion(
+        slf: &Bound<'_, Self>,
+        motion: Option<&Bound<'_, PyAny>>,
+        topic: Option<String>,
+        columns: Option<String>,
+        round_corners: Option<f64>,
+    ) -> PyResult<PyMotion> {
+        let args = MotionOptionsArgs { topic, columns, round_corners };
+        load_motion(slf, motion, args)
+    }
+
+    /// What was loaded, with kinematics and dynamics at a pose (dict as ``flexarm inspect --json``).
+    ///
+    /// Parameters
+    /// ----------
+    /// q, velocity : array_like, shape (n,), optional
+    ///     Joints (rad or m) and their velocities; zero without them.
+    #[pyo3(signature = (q=None, velocity=None))]
+    fn inspect<'py>(
+        &self,
+        py: Python<'py>,
+        q: Option<&Bound<'py, PyAny>>,
+        velocity: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let n = self.robot.rigid_model().or_raise()?.nv();
+        let one = |name: &str, value: Option<&Bound<'py, PyAny>>| -> PyResult<Option<Vec<f64>>> {
+            value.map(|value| Ok(numbers(name, value, &[(n, "joints")], false)?.values().to_vec())).transpose()
+        };
+        let (q, velocity) = (one("q", q)?, one("velocity", velocity)?);
+        plain(py, &flexarm::inspect(&self.robot, q.as_deref(), velocity.as_deref()).or_raise()?)
+    }
+
+    fn __repr__(&self) -> PyResult<String> {
+        let n = self.robot.rigid_model().or_raise()?.n_actuated();
+        let (links, drives) = (self.robot.flexible.len(), self.robot.drives.len());
+        Ok(format!("<Robot {:?}: {n} joints, {links} flexible links, {drives} drives>", self.robot.name))
+    }
+
+    fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("flexarm._show")?.call_method1("robot_html", (slf,))
+    }
+
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let (function, arguments) = &self.again;
+        Ok((py.import("flexarm._pickle")?.getattr(*function)?, arguments).into_pyobject(py)?.into_any())
+    }
+}
+
+/// Everything that is wrong or doubtful with a robot and a motion, with the yardsticks.
+///
+/// Parameters
+/// ----------
+/// robot : str or os.PathLike
+///     As for :func:`load`.
+/// motion : str or os.PathLike, optional
+///     A file or the name of a shipped motion.
+///
+/// Returns
+/// -------
+/// list of dict
+///     With the keys severity, code, where, message and help, as ``flexarm check --json``.
+#[pyfunction]
+#[pyo3(signature = (robot, motion=None))]
+pub(crate) fn check<'py>(
+    py: Python<'py>,
+    robot: &Bound<'py, PyAny>,
+    motion: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyAny>> {
+    crate::command::name_keywords();
+    let robot = flexarm_cli::shipped_robot(&path("robot", robot)?).or_raise()?;
+    let motion = motion.map(|motion| path("motion", motion)).transpose()?;
+    let motion = motion.map(|motion| flexarm_cli::shipped_motion(&motion));
+    let urdf = ReadOptions { search_paths: flexarm::search_paths_from_environment(), ..ReadOptions::default() };
+    let options = LoadOptions { tcp: None, urdf };
+    let findings = py.detach(|| {
+        let input = flexarm::MotionOptions::default();
+        flexarm::check_with_motion(&robot, motion.as_deref(), &input, None, &options)
+    });
+    plain(py, &findings)
+}

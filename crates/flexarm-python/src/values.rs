@@ -1,0 +1,138 @@
+//! Words and plain values on their way in and out.
+
+use std::path::PathBuf;
+
+use flexarm::{
+    AlphaSettings, ConstraintForm, DriveModel, LinkModel, Modelling, ReferenceMethod, ReferenceSettings, STEPPERS,
+    SpookPreset, SpookSettings, Start, StepperKind, StepperOptions, Wrench, closest,
+};
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::arrays::numbers;
+
+/// One of several words.
+///
+/// # Errors
+/// `ValueError` with the argument, what was found, what is near, and all there are.
+pub(crate) fn word<T: Copy>(argument: &str, found: &str, words: &[(&str, T)]) -> PyResult<T> {
+    if let Some((_, value)) = words.iter().find(|(word, _)| *word == found) {
+        return Ok(*value);
+    }
+    let known = words.iter().map(|(word, _)| format!("{word:?}")).collect::<Vec<_>>().join(", ");
+    let meant = closest(found, words.iter().map(|(word, _)| *word));
+    let meant = meant.map_or_else(String::new, |near| format!("; did you mean {near:?}?"));
+    Err(PyValueError::new_err(format!("{argument}={found:?}: expected one of {known}{meant}")))
+}
+
+/// How links and drives are modelled.
+pub(crate) fn modelling(
+    links: Option<&str>,
+    drives: Option<&str>,
+    segments: Option<usize>,
+    modes: Option<usize>,
+) -> PyResult<Modelling> {
+    let known = LinkModel::WORDS.map(|(word, model, _)| (word, model));
+    let links = links.map_or(Ok(LinkModel::AsFiled), |found| word("links", found, &known))?;
+    let known = DriveModel::WORDS.map(|(word, model, _)| (word, model));
+    let drives = drives.map_or(Ok(DriveModel::AsFiled), |found| word("drives", found, &known))?;
+    Ok(Modelling { links, drives, segments, modes })
+}
+
+/// A stepper by its word, with its own options by theirs.
+pub(crate) fn stepper(name: Option<&str>, options: Option<&Bound<'_, PyDict>>) -> PyResult<StepperKind> {
+    let mut known: Vec<(&str, usize)> = Vec::new();
+    for (k, entry) in STEPPERS.iter().enumerate() {
+        known.push((entry.name, k));
+        known.extend(entry.aliases.iter().map(|alias| (*alias, k)));
+    }
+    let entry = STEPPERS[name.map_or(Ok(0), |found| word("stepper", found, &known))?];
+    let mut chosen = StepperOptions::default();
+    let Some(options) = options else { return Ok((entry.with)(&chosen)) };
+    let takes: &[&str] = match (entry.with)(&chosen) {
+        StepperKind::GeneralizedAlpha(_) => &["rho", "dispersion_correction"],
+        StepperKind::Spook(_) => &["form", "preset"],
+        StepperKind::Reference(_) => &["rtol", "atol", "method"],
+        _ => &[],
+    };
+    for (key, value) in options {
+        let key: String = key.extract()?;
+        if !takes.contains(&key.as_str()) {
+            let text = format!("stepper_options has the key {key:?}: {} takes {takes:?}", entry.name);
+            return Err(PyValueError::new_err(text));
+        }
+        set(&mut chosen, &key, &value)?;
+    }
+    Ok((entry.with)(&chosen))
+}
+
+/// One option of a stepper.
+fn set(chosen: &mut StepperOptions, key: &str, value: &Bound<'_, PyAny>) -> PyResult<()> {
+    let text = || value.extract::<String>();
+    match key {
+        "rho" => chosen.alpha = AlphaSettings { rho: value.extract()?, ..chosen.alpha },
+        "dispersion_correction" => {
+            chosen.alpha = AlphaSettings { dispersion_correction: value.extract()?, ..chosen.alpha };
+        }
+        "form" => {
+            let forms = [("local", ConstraintForm::Local), ("global", ConstraintForm::Global)];
+            chosen.spook = SpookSettings { form: word("form", &text()?, &forms)?, ..chosen.spook };
+        }
+        "preset" => {
+            let presets = [("exact", SpookPreset::Exact), ("source", SpookPreset::Source)];
+            chosen.spook = SpookSettings { preset: word("preset", &text()?, &presets)?, ..chosen.spook };
+        }
+        "rtol" => {
+            chosen.reference =
+                ReferenceSettings { method: chosen.reference.method, ..ReferenceSettings::new(value.extract()?) };
+        }
+        "atol" => chosen.reference.atol = value.extract()?,
+        "method" => {
+            let methods = [
+                ("bdf", ReferenceMethod::Bdf),
+                ("esdirk34", ReferenceMethod::Esdirk34),
+                ("tsit45", ReferenceMethod::Tsit45),
+            ];
+            chosen.reference.method = word("method", &text()?, &methods)?;
+        }
+        _ => {}
+    }
+    Ok(())
+}
+
+/// How a run starts.
+pub(crate) fn start(found: Option<&str>) -> PyResult<Start> {
+    let known = [("equilibrium", Start::Equilibrium), ("undeformed", Start::Undeformed)];
+    found.map_or(Ok(Start::Equilibrium), |found| word("start", found, &known))
+}
+
+/// Force and moment: six numbers, or three for a force alone; zero without it.
+pub(crate) fn wrench(value: Option<&Bound<'_, PyAny>>) -> PyResult<[f64; 6]> {
+    let Some(value) = value else { return Ok([0.0; 6]) };
+    let is_force = value.len().is_ok_and(|n| n == 3);
+    let n = if is_force { 3 } else { 6 };
+    let numbers = numbers("wrench", value, &[(n, "numbers, force (N) then moment (N m), world axes")], false)?;
+    let mut wrench = [0.0; 6];
+    wrench[..n].copy_from_slice(numbers.values());
+    Ok(wrench)
+}
+
+/// The same as the library takes it.
+pub(crate) fn as_wrench([x, y, z, rx, ry, rz]: [f64; 6]) -> Wrench {
+    Wrench::new([x, y, z].into(), [rx, ry, rz].into())
+}
+
+/// A path: a text or an object with `__fspath__`.
+pub(crate) fn path(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<PathBuf> {
+    value.extract::<PathBuf>().map_err(|_| {
+        let found = value.get_type();
+        PyTypeError::new_err(format!("{argument} is {found}: expected a path (str or os.PathLike)"))
+    })
+}
+
+/// Plain values as dicts, lists and numbers, in the order and with the keys of `--json`.
+pub(crate) fn plain<'py>(py: Python<'py>, value: &impl serde::Serialize) -> PyResult<Bound<'py, PyAny>> {
+    let text = serde_json::to_string(value).map_err(|error| PyValueError::new_err(error.to_string()))?;
+    py.import("json")?.call_method1("loads", (text,))
+}

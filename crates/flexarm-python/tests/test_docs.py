@@ -1,0 +1,30 @@
+"""Docstrings are run, and everything that can be held has one."""
+
+import doctest
+import inspect
+
+import pytest
+
+import flexarm
+
+
+def held() -> "list[tuple[str, object]]":
+    found: "list[tuple[str, object]]" = [("flexarm", flexarm)]
+    for name in flexarm.__all__:
+        thing = getattr(flexarm, name)
+        if isinstance(thing, str):
+            continue
+        found.append((name, thing))
+        if inspect.isclass(thing) and thing.__module__.startswith("flexarm"):
+            members = {k: v for k, v in vars(thing).items() if not k.startswith("_")}
+            found += [(f"{name}.{k}", v) for k, v in members.items()]
+    return found
+
+
+@pytest.mark.parametrize("name, thing", held(), ids=[name for name, _ in held()])
+def test_everything_has_a_docstring_whose_examples_run(name: str, thing: object) -> None:
+    doc = inspect.getdoc(thing)
+    assert doc, name
+    example = doctest.DocTestParser().get_doctest(doc, {"flexarm": flexarm}, name, None, None)
+    result = doctest.DocTestRunner(verbose=False, optionflags=doctest.ELLIPSIS).run(example)
+    assert result.failed == 0

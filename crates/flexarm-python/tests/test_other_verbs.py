@@ -1,0 +1,187 @@
+"""Links, identification, compensation, maps and new robots: the figures of the command line."""
+
+import json
+import pickle
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import SHARE, WORKING_POSE, command
+
+import flexarm
+
+tomllib = pytest.importorskip("tomllib")
+
+JOB = SHARE / "robots/lower_arm/lower_arm.reduce.toml"
+
+
+def told(*words: object, cwd: Path) -> dict:
+    done = command(*words, "--json", cwd=cwd)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
+def without_clock(figures: dict) -> dict:
+    clock = {"wall_s", "cpu_s", "peak_rss_bytes", "files", "phases", "file", "solver"}
+    return {key: value for key, value in figures.items() if key not in clock}
+
+
+def test_a_mesh_is_reduced_to_the_link_of_the_command_line(tmp_path: Path) -> None:
+    # The keys of the job as a dict, with paths from here.
+    job = tomllib.loads(JOB.read_text())
+    job["mesh"] = str(JOB.parent / job["mesh"])
+    job["modes"] = 2
+    ours = flexarm.reduce(job, output=tmp_path / "a")
+    theirs = told("reduce", JOB, "--modes", "2", "-o", "b", cwd=tmp_path)
+    assert without_clock(ours) == without_clock(theirs)
+    links = [next((tmp_path / folder).glob("*.flex")) for folder in "ab"]
+    assert links[0].read_bytes() == links[1].read_bytes()
+    with pytest.raises(flexarm.FileError, match="overwrite"):
+        flexarm.reduce(JOB, output=tmp_path / "a")
+    exported = flexarm.export_link(links[0], "matrix-market", tmp_path / "m")
+    assert exported["link"] == "lower_arm" and list((tmp_path / "m").iterdir())
+    imported = flexarm.import_link(sorted((tmp_path / "m").glob("*.mtx")))
+    assert imported["mass_kg"] == pytest.approx(ours["mass_kg"], rel=1e-6)
+    with pytest.raises(ValueError, match="unknown field `mash`"):
+        flexarm.reduce({"mash": 1})
+    with pytest.raises(ValueError, match='format="matrix": expected one of'):
+        flexarm.import_link([], format="matrix")
+
+
+def test_a_compensated_motion_is_that_of_the_command_line_and_helps(kr210: flexarm.Robot, tmp_path: Path) -> None:
+    found = flexarm.compensate(kr210, "point_to_point", sweep=False)
+    theirs = told("compensate", "kr210", "point_to_point", "--no-sweep", "--no-files", cwd=tmp_path)
+    assert without_clock(found.to_dict()) == without_clock(theirs)
+    assert found.after["peak_m"] < 0.2 * found.before["peak_m"]
+    arm = kr210.flexible()
+    was = np.linalg.norm(arm.simulate("point_to_point").tcp - arm.simulate("point_to_point").rigid_tcp, axis=1).max()
+    assert was == pytest.approx(found.before["peak_m"], rel=1e-3)
+    assert found.motion.joints == kr210.joints and found.curves.shape[1] == 3
+
+
+def test_a_plan_of_measurements_is_that_of_the_command_line(kr210: flexarm.Robot, tmp_path: Path) -> None:
+    ours = flexarm.plan_measurements(kr210, 4)
+    theirs = told("identify", "kr210", "--plan", "4", "--no-files", cwd=tmp_path)
+    assert without_clock(ours) == without_clock(theirs)
+
+
+def test_measurements_of_an_arm_give_its_stiffness_back(arm: flexarm.Arm, tmp_path: Path) -> None:
+    # A robot file whose second gearbox is 1.4 times too stiff, and displacements of the arm as it is.
+    shutil.copytree(SHARE / "robots/kr210", tmp_path / "kr210")
+    file = tmp_path / "kr210/robot.toml"
+    robot = tomllib.loads(file.read_text())
+    drive = next(drive for drive in robot["drive"] if drive["joint"] == "joint_2")
+    right = drive["gearbox"]["stiffness"]
+    written = re.search(r'joint = "joint_2"[^\[]*?gearbox = \{ stiffness = ([0-9.e+_]+)', file.read_text())
+    assert written is not None and float(written[1]) == right
+    at = written.span(1)
+    text = file.read_text()
+    file.write_text(text[: at[0]] + f"{1.4 * right:e}" + text[at[1] :])
+
+    readings = ["format = 1", 'fit = ["drive.joint_2.gearbox.stiffness"]']
+    for k in range(6):
+        q = np.array(WORKING_POSE) + 0.1 * k
+        force = [0.0, 0.0, -800.0] if k % 2 else [600.0, 0.0, 0.0]
+        moved = arm.statics(q, force).tcp - arm.statics(q).tcp
+        load = f"load = {{ force = {force} }}"
+        readings += ["[[displacement]]", f"joints = {q.tolist()}", load, f"value = {moved.tolist()}", "std = 1e-6"]
+    measurements = tmp_path / "measurements.toml"
+    measurements.write_text("\n".join(readings))
+
+    found = flexarm.identify(flexarm.load(file), measurements, output=tmp_path / "new")
+    [stiffness] = found["parameters"]
+    assert stiffness["initial"] == pytest.approx(1.4 * right)
+    assert stiffness["value"] == pytest.approx(right, rel=1e-3)
+    assert found["residual"]["after"] < 1e-3 * found["residual"]["before"]
+    mended = flexarm.load(found["file"]).flexible().statics(WORKING_POSE)
+    np.testing.assert_allclose(mended.deflection, arm.statics(WORKING_POSE).deflection, rtol=1e-3)
+    with pytest.raises(flexarm.FileError):
+        flexarm.identify(arm.robot, tmp_path / "nothing.toml")
+
+
+def test_a_map_is_that_of_the_command_line_and_of_statics(kr210: flexarm.Robot, arm: flexarm.Arm, tmp_path: Path) -> None:
+    joints = {"joint_2": (-1.8, -0.4, 4), "joint_3": (0.4, 2.0, 3)}
+    ours = flexarm.map(kr210, joints=joints, wrench=[0, 0, -500])
+    words = ["--over", "joint_2=-1.8:-0.4:4", "--over", "joint_3=0.4:2:3", "--wrench", "0,0,-500", "--no-files"]
+    theirs = told("map", "kr210", *words, cwd=tmp_path)
+    assert without_clock(ours.to_dict()) == without_clock(theirs)
+    table = ours.table
+    assert set(table) == set(ours.meanings) and len(table[next(iter(table))]) == len(ours) == 12
+    # Frequencies of a map are those under weight, to the last bit.
+    assert arm.statics(ours.worst["q"]).frequencies[0] == ours.worst["quantities"]["frequency_1_hz"]
+
+
+def test_maps_over_places_stop_on_what_is_wrong(kr210: flexarm.Robot) -> None:
+    found = flexarm.map(kr210, bounds=[[1.4, -0.4, 0.4], [2.0, 0.4, 1.2]], spacing=0.2)
+    assert len(found) > 10
+    with pytest.raises(ValueError, match="exclude each other"):
+        flexarm.map(kr210, spacing=0.1, along="point_to_point")
+    with pytest.raises(flexarm.MapError):
+        flexarm.map(kr210, spacing=-1.0)
+    with pytest.raises(ValueError, match=r"bounds has the shape \(3, 2\)"):
+        flexarm.map(kr210, bounds=np.zeros((3, 2)))
+
+
+def test_a_robot_is_made_of_values(tmp_path: Path) -> None:
+    folder = SHARE / "robots/kr210"
+    keys = tomllib.loads((folder / "robot.toml").read_text())
+    same = flexarm.robot(keys, folder)
+    assert np.array_equal(same.flexible().statics(WORKING_POSE).compliance, flexarm.load(folder).flexible().statics(WORKING_POSE).compliance)
+    lighter = flexarm.robot({**keys, "payload": {**keys["payload"], "mass": 10.0}}, folder)
+    again = pickle.loads(pickle.dumps(lighter))
+    for robot in [lighter, again]:
+        sag = np.linalg.norm(robot.flexible().statics(WORKING_POSE).deflection)
+        assert sag < 0.9 * np.linalg.norm(same.flexible().statics(WORKING_POSE).deflection)
+    with pytest.raises(flexarm.RobotError, match="unknown field `tpc`"):
+        flexarm.robot({"urdf": "kr210.urdf", "tpc": 1}, folder)
+    with pytest.raises(flexarm.RobotError, match="there is no file"):
+        flexarm.robot({"urdf": "kr211.urdf"}, folder)
+
+
+def test_a_robot_file_is_made_of_a_urdf(tmp_path: Path) -> None:
+    urdf = next((SHARE / "robots/kr210").glob("*.urdf"))
+    made = flexarm.new_robot(urdf, tmp_path / "mine", payload=10.0)
+    robot = flexarm.load(tmp_path / "mine")
+    assert len(robot.joints) == 6 and made["files"]
+    robot.flexible().statics(WORKING_POSE)
+    with pytest.raises(flexarm.FileError, match="overwrite"):
+        flexarm.new_robot(urdf, tmp_path / "mine")
+
+
+def test_limits_of_depth_are_those_of_the_command(kr210: flexarm.Robot, tmp_path: Path) -> None:
+    q = np.radians([0, -60, 90, 0, 60, 0])
+    found = flexarm.lobes(kr210, "endmill_20mm", q=q, rpm=[4000, 9000], output=tmp_path / "lobes")
+    assert [point["spindle_rpm"] for point in found["points"]] == [4000, 9000]
+    assert all(0 < point["depth_m"] < 0.02 for point in found["points"])
+    line = ["lobes", "kr210", "--at", "0,-60deg,90deg,0,60deg,0", "--tool", "endmill_20mm", "--rpm", "4000,9000", "--no-files"]
+    other = told(*line, cwd=tmp_path)
+    assert np.allclose([p["depth_m"] for p in found["points"]], [p["depth_m"] for p in other["points"]], rtol=1e-9)
+    with pytest.raises(ValueError, match="exclude each other"):
+        flexarm.lobes(kr210, "endmill_20mm", q=q, along="milling_square")
+    with pytest.raises(flexarm.InputError):
+        flexarm.lobes(kr210, "endmill_21mm")
+
+
+def test_a_study_runs_and_goes_on(tmp_path: Path) -> None:
+    study = tmp_path / "study.toml"
+    study.write_text(
+        """format = 1
+robot = "one_beam"
+metrics = ["peak_mm = 1e3 * tcp.peak_m"]
+[options]
+step = 0.005
+[[parameter]]
+path = "motion.speed"
+values = [0.6, 0.8, 1.0]
+"""
+    )
+    found = flexarm.sweep(study, tmp_path / "out", progress=lambda done, total: None)
+    assert (found["runs"], found["done"], found["failed"]) == (3, 3, 0)
+    assert Path(found["file"]).exists()
+    again = flexarm.sweep(study, tmp_path / "out")
+    assert again["done"] == 3
+    study.write_text(study.read_text().replace("motion.speed", "motion.sped"))
+    with pytest.raises(flexarm.InputError, match="leads nowhere"):
+        flexarm.sweep(study, tmp_path / "other")

@@ -1,0 +1,37 @@
+//! Designs of studies, and what their results tell: pure functions on numbers.
+//!
+//! A study tries many points of a cube: [`Sample`] (random, Latin hypercube, Sobol, Saltelli) or a full grid ([`grid_levels`]); a
+//! [`Distribution`] makes values of coordinates. Of the results [`main_effect`], [`sobol_indices`], [`spread`] and [`pareto_front`]
+//! say what matters; [`LeastSearch`] goes for the least of one of them within bounds.
+//!
+//! ```
+//! use flexarm_study::{Distribution, Sample, SampleMethod, sobol_indices};
+//!
+//! // Which of two springs in series makes more of the scatter of their compliance?
+//! let stiffness = [Distribution::Normal { mean: 1e6, std: 1e5 }, Distribution::Normal { mean: 2e6, std: 1e5 }];
+//! let sample = Sample::new(SampleMethod::Saltelli, 2, 256, 0).expect("few dimensions");
+//! let value = |point, k: usize| stiffness[k].quantile(sample.coordinate(point, k));
+//! let compliance: Vec<f64> = (0..sample.points()).map(|p| 1.0 / value(p, 0) + 1.0 / value(p, 1)).collect();
+//! let indices = sobol_indices(&compliance, 2, 0).expect("it varies");
+//! assert!(indices[0].first > 0.9 && indices[1].first < 0.1);
+//! ```
+//!
+//! Everything depends on its seed alone: any point can be had by its number on any machine. Not here: what is run, files.
+#![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
+
+mod distribution;
+mod effects;
+mod indices;
+mod joe_kuo;
+mod random;
+mod sample;
+mod search;
+mod sobol;
+
+pub use distribution::{Distribution, normal_quantile};
+pub use effects::{EffectGroup, MainEffect, Spread, main_effect, pareto_front, spread};
+pub use indices::{SobolIndex, sobol_indices};
+pub use random::uniform;
+pub use sample::{Sample, SampleMethod, grid_levels};
+pub use search::{Judged, LeastSearch};
+pub use sobol::SobolSequence;

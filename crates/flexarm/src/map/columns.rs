@@ -1,0 +1,120 @@
+//! What a map says of each pose: names, units and order of its columns, and which way is better.
+
+use flexarm_stepping::FlexibleArm;
+
+use super::MapError;
+
+/// Most natural frequencies of a map.
+const MOST_FREQUENCIES: usize = 12;
+
+/// A column of a map.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MapColumn {
+    /// Its name, which ends in its unit.
+    pub name: String,
+    /// What it says, in a few words.
+    pub meaning: String,
+    /// Whether it is an answer; else it says where the pose is.
+    pub quantity: bool,
+    /// Whether more is better, as for frequencies.
+    pub more_is_better: bool,
+}
+
+/// The columns of a row, in order.
+#[derive(Clone, Debug)]
+pub(super) struct Layout {
+    pub(super) columns: Vec<MapColumn>,
+    pub(super) joints: usize,
+    pub(super) frequencies: usize,
+    pub(super) loaded: bool,
+    /// Elastic elements: their coordinates after the joints.
+    pub(super) elements: Vec<std::ops::Range<usize>>,
+}
+
+/// Columns before the joints: place of the rigid tool, number of the place or instant, of the tool's direction, of the branch.
+pub(super) const HEAD: [(&str, &str); 6] = [
+    ("x_m", "place of the rigid arm's tool, world"),
+    ("y_m", "place of the rigid arm's tool, world"),
+    ("z_m", "place of the rigid arm's tool, world"),
+    ("place", "number of the place, x first, or of the instant"),
+    ("direction", "number of the tool's direction"),
+    ("branch", "number of the solution of the inverse kinematics"),
+];
+
+impl Layout {
+    /// * `joints`: names, and whether they slide.
+    /// * `loaded`: whether a wrench acts besides weight.
+    pub(super) fn new(arm: &FlexibleArm, joints: &[(String, bool)], loaded: bool, frequencies: usize) -> Self {
+        let elastic = arm.n_elastic_coordinates();
+        let frequencies = frequencies.min(elastic).min(MOST_FREQUENCIES);
+        let mut columns: Vec<MapColumn> = HEAD.iter().map(|(name, meaning)| place(name, meaning)).collect();
+        columns.extend(joints.iter().map(|(joint, slides)| {
+            place(&format!("{joint}_{}", if *slides { "m" } else { "rad" }), "where the joint is")
+        }));
+        columns.extend(displacement("sag", "from the rigid tool to the flexible one under weight"));
+        if loaded {
+            columns.extend(displacement("error", "the same under weight and the load"));
+            columns.push(less("load_m", "how far the load moves the tool"));
+        }
+        for (axis, name) in ["compliance_x_m_per_n", "compliance_y_m_per_n", "compliance_z_m_per_n"].iter().enumerate()
+        {
+            columns.push(less(name, &format!("displacement along {} per force along it", ["x", "y", "z"][axis])));
+        }
+        for pair in ["xy", "xz", "yz"] {
+            let (along, by) = pair.split_at(1);
+            let meaning = format!("displacement along {along} per force along {by}, mean with the reverse");
+            columns.push(place(&format!("compliance_{pair}_m_per_n"), &meaning));
+        }
+        columns.push(less("compliance_worst_m_per_n", "largest displacement per force, over all directions"));
+        for name in ["worst_x", "worst_y", "worst_z"] {
+            columns.push(place(name, "direction of that force, world"));
+        }
+        columns.push(less("rotation_worst_rad_per_nm", "largest rotation per moment, over all directions"));
+        for k in 1..=frequencies {
+            let column = less(&format!("frequency_{k}_hz"), "natural frequency under weight, undamped, drives locked");
+            columns.push(MapColumn { more_is_better: true, ..column });
+        }
+        let whole = if loaded { "error" } else { "sag" };
+        for element in &arm.elements {
+            let meaning = format!("part of it in the {whole}, along the {whole}, first order");
+            columns.push(MapColumn { quantity: true, ..place(&format!("share_{}", element.name), &meaning) });
+        }
+        let range = |first: usize, size: usize| first..first + size;
+        let elements = arm.elements.iter().map(|element| range(arm.offset(element), element.size)).collect();
+        Self { columns, joints: joints.len(), frequencies, loaded, elements }
+    }
+
+    pub(super) fn width(&self) -> usize {
+        self.columns.len()
+    }
+
+    /// The column by which poses are compared.
+    ///
+    /// # Errors
+    /// [`MapError::Quantity`].
+    pub(super) fn compared_by(&self, name: Option<&str>) -> Result<usize, MapError> {
+        let usual = if self.loaded { "error_m" } else { "compliance_worst_m_per_n" };
+        let wanted = name.unwrap_or(usual);
+        self.columns.iter().position(|c| c.quantity && c.name == wanted).ok_or_else(|| MapError::Quantity {
+            found: wanted.to_owned(),
+            known: self.columns.iter().filter(|c| c.quantity).map(|c| c.name.clone()).collect(),
+        })
+    }
+}
+
+fn place(name: &str, meaning: &str) -> MapColumn {
+    MapColumn { name: name.to_owned(), meaning: meaning.to_owned(), quantity: false, more_is_better: false }
+}
+
+fn less(name: &str, meaning: &str) -> MapColumn {
+    MapColumn { quantity: true, ..place(name, meaning) }
+}
+
+/// Components, size, and angle.
+fn displacement(what: &str, meaning: &str) -> Vec<MapColumn> {
+    let mut columns: Vec<MapColumn> =
+        ["x", "y", "z"].iter().map(|axis| place(&format!("{what}_{axis}_m"), meaning)).collect();
+    columns.push(less(&format!("{what}_m"), meaning));
+    columns.push(less(&format!("{what}_rad"), &format!("{meaning}: angle")));
+    columns
+}

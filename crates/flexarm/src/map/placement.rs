@@ -1,0 +1,112 @@
+//! Where to put a workpiece: the box of places whose worst place is best.
+
+use std::collections::VecDeque;
+
+use serde::Serialize;
+
+use super::region::Grid;
+
+/// The best place for a box.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Placement {
+    /// Lowest corner of the places that it covers (m, world).
+    pub lower_m: [f64; 3],
+    /// Highest corner (m, world).
+    pub upper_m: [f64; 3],
+    /// Centre (m, world).
+    pub centre_m: [f64; 3],
+    /// The worst value in it, of the quantity by which the map compares.
+    pub worst: f64,
+    /// Places of the map in it, all of which the tool reaches.
+    pub points: usize,
+}
+
+/// The box of that size with the lowest highest cost; none if no box has only places that are reached.
+///
+/// * `cost`: per place of the grid; infinite where the tool does not come.
+/// * `size_m`: edges along x, y and z; it covers the places that it takes to hold them.
+///
+/// Cost: linear in the number of places, whatever the size (running maxima, axis by axis).
+pub(super) fn best_box(grid: &Grid, cost: &[f64], size_m: [f64; 3]) -> Option<Placement> {
+    let window = size_m.map(|edge| (edge / grid.spacing_m - 1e-9).ceil().max(0.0) as usize + 1);
+    if (0..3).any(|c| window[c] > grid.count[c]) {
+        return None;
+    }
+    let mut worst = cost.to_vec();
+    for (axis, window) in window.iter().enumerate() {
+        running_maximum(&mut worst, grid.count, axis, *window);
+    }
+    let starts = (0..worst.len()).filter(|&k| {
+        let index = grid.index(k);
+        (0..3).all(|c| index[c] + window[c] <= grid.count[c])
+    });
+    let best = starts.min_by(|&a, &b| worst[a].total_cmp(&worst[b])).filter(|&k| worst[k].is_finite())?;
+    let lower_m = grid.place(best);
+    let upper_m = [0, 1, 2].map(|c| lower_m[c] + grid.spacing_m * (window[c] - 1) as f64);
+    Some(Placement {
+        lower_m,
+        upper_m,
+        centre_m: [0, 1, 2].map(|c| 0.5 * (lower_m[c] + upper_m[c])),
+        worst: worst[best],
+        points: window.iter().product(),
+    })
+}
+
+/// Replaces each value by the largest of itself and those that follow it along an axis within the window.
+fn running_maximum(values: &mut [f64], count: [usize; 3], axis: usize, window: usize) {
+    let stride = count[..axis].iter().product::<usize>();
+    let n = count[axis];
+    let mut line = vec![0.0; n];
+    let mut falling: VecDeque<usize> = VecDeque::new();
+    for start in (0..values.len()).filter(|k| k / stride % n == 0) {
+        (0..n).for_each(|k| line[k] = values[start + k * stride]);
+        falling.clear();
+        // From the end on, the front of the queue is the largest within the window.
+        for k in (0..n).rev() {
+            while falling.back().is_some_and(|&j| line[j] <= line[k]) {
+                falling.pop_back();
+            }
+            falling.push_back(k);
+            if falling.front().is_some_and(|&j| j >= k + window) {
+                falling.pop_front();
+            }
+            values[start + k * stride] = falling.front().map_or(f64::INFINITY, |&j| line[j]);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Truth: every box tried by hand.
+    #[test]
+    fn the_best_box_is_the_one_that_trying_all_of_them_finds() {
+        let grid = Grid { lower: [-1.0, 2.0, 0.5], spacing_m: 0.1, count: [9, 7, 5] };
+        let cost: Vec<f64> = (0..grid.places())
+            .map(|k| if k % 41 == 7 { f64::INFINITY } else { ((k as f64 * 0.618).fract() * 997.0).sin().abs() + 0.1 })
+            .collect();
+        for (size, window) in
+            [([0.2, 0.1, 0.2], [3, 2, 3]), ([0.0, 0.35, 0.1], [1, 5, 2]), ([0.11, 0.0, 0.0], [3, 1, 1])]
+        {
+            let found = best_box(&grid, &cost, size).unwrap();
+            let mut best = f64::INFINITY;
+            for z in 0..=grid.count[2] - window[2] {
+                for y in 0..=grid.count[1] - window[1] {
+                    for x in 0..=grid.count[0] - window[0] {
+                        let mut worst = 0.0_f64;
+                        for k in 0..window.iter().product::<usize>() {
+                            let (i, j, l) = (k % window[0], k / window[0] % window[1], k / (window[0] * window[1]));
+                            worst = worst.max(cost[(x + i) + 9 * ((y + j) + 7 * (z + l))]);
+                        }
+                        best = best.min(worst);
+                    }
+                }
+            }
+            assert_eq!(found.worst, best);
+            assert_eq!(found.points, window.iter().product::<usize>());
+        }
+        assert_eq!(best_box(&grid, &cost, [2.0, 0.1, 0.1]), None, "larger than the grid");
+        assert_eq!(best_box(&grid, &vec![f64::INFINITY; grid.places()], [0.0; 3]), None, "nothing is reached");
+    }
+}

@@ -1,0 +1,167 @@
+//! The rows of a map, and what they come to: ranges, quantiles, best and worst.
+
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::columns::{HEAD, MapColumn};
+
+/// Quantiles that are told.
+pub const QUANTILES: [f64; 5] = [0.05, 0.25, 0.5, 0.75, 0.95];
+
+/// Every pose of a map as a row of numbers.
+#[derive(Clone, Debug, Default)]
+pub struct MapTable {
+    /// Names and meanings.
+    pub columns: Vec<MapColumn>,
+    /// Row after row, as long as there are columns.
+    pub values: Vec<f64>,
+}
+
+impl MapTable {
+    /// Number of poses.
+    pub fn rows(&self) -> usize {
+        self.values.len() / self.columns.len().max(1)
+    }
+
+    /// Numbers of a pose.
+    pub fn row(&self, k: usize) -> &[f64] {
+        let width = self.columns.len();
+        &self.values[k * width..][..width]
+    }
+
+    /// Numbers of a column, pose after pose; none if there is none of that name.
+    pub fn column(&self, name: &str) -> Option<Vec<f64>> {
+        let k = self.columns.iter().position(|column| column.name == name)?;
+        Some(self.at(k))
+    }
+
+    /// Numbers of the column with that number.
+    pub(super) fn at(&self, column: usize) -> Vec<f64> {
+        self.values.iter().skip(column).step_by(self.columns.len()).copied().collect()
+    }
+
+    /// What is to be small: the value, or less it where more is better; infinite where there is none.
+    pub(super) fn cost(&self, column: usize, value: f64) -> f64 {
+        match self.columns[column].more_is_better {
+            _ if value.is_nan() => f64::INFINITY,
+            true => -value,
+            false => value,
+        }
+    }
+
+    /// Rows with the best and with the worst value of a column.
+    pub(super) fn extremes(&self, column: usize) -> Option<(usize, usize)> {
+        let cost = |row: usize| self.cost(column, self.row(row)[column]);
+        let known = || (0..self.rows()).filter(|&row| cost(row).is_finite());
+        let best = known().min_by(|&a, &b| cost(a).total_cmp(&cost(b)))?;
+        // Of equals the first, either way.
+        let worst = known().min_by(|&a, &b| cost(b).total_cmp(&cost(a)))?;
+        Some((best, worst))
+    }
+
+    /// Ranges of all quantities, in the order of the columns.
+    pub(super) fn spreads(&self) -> Vec<(String, Spread)> {
+        let quantities: Vec<usize> = (0..self.columns.len()).filter(|&k| self.columns[k].quantity).collect();
+        quantities.par_iter().map(|&k| (self.columns[k].name.clone(), Spread::of(self.at(k)))).collect()
+    }
+}
+
+/// How the values of a quantity are spread over the poses.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Spread {
+    /// Smallest.
+    pub min: f64,
+    /// Largest.
+    pub max: f64,
+    /// Mean.
+    pub mean: f64,
+    /// Values below which 5, 25, 50, 75 and 95 % of the poses are, under `0.05` to `0.95`.
+    pub quantiles: std::collections::BTreeMap<String, f64>,
+}
+
+impl Spread {
+    /// Of values in any order; those that are no numbers are left out.
+    pub(super) fn of(mut values: Vec<f64>) -> Self {
+        values.retain(|x| x.is_finite());
+        values.sort_unstable_by(f64::total_cmp);
+        let n = values.len();
+        let at = |part: f64| match n {
+            0 => f64::NAN,
+            _ => {
+                // Between the neighbours in proportion, as most programs do it.
+                let place = part * (n - 1) as f64;
+                let (k, rest) = (place.floor() as usize, place.fract());
+                let next = values[(k + 1).min(n - 1)];
+                values[k] + rest * (next - values[k])
+            }
+        };
+        Self {
+            min: at(0.0),
+            max: at(1.0),
+            mean: if n == 0 { f64::NAN } else { values.iter().sum::<f64>() / n as f64 },
+            quantiles: QUANTILES.iter().map(|&part| (part.to_string(), at(part))).collect(),
+        }
+    }
+}
+
+/// A pose of a map with all that it says.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MapPose {
+    /// Number of its row.
+    pub row: usize,
+    /// Joints, in coordinate order (rad or m).
+    pub q: Vec<f64>,
+    /// Place of the rigid arm's tool (m, world).
+    pub place_m: [f64; 3],
+    /// Its value of the quantity by which the map compares.
+    pub value: f64,
+    /// All quantities.
+    pub quantities: std::collections::BTreeMap<String, f64>,
+}
+
+impl MapPose {
+    pub(super) fn of(table: &MapTable, row: usize, joints: usize, by: usize) -> Self {
+        let values = table.row(row);
+        let quantities = table.columns.iter().zip(values).filter(|(column, _)| column.quantity);
+        Self {
+            row,
+            q: values[HEAD.len()..][..joints].to_vec(),
+            place_m: [values[0], values[1], values[2]],
+            value: values[by],
+            quantities: quantities.map(|(column, value)| (column.name.clone(), *value)).collect(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Truth: quantiles of 0, 1, ..., 100 are their percents.
+    #[test]
+    fn quantiles_of_equal_steps_are_their_percents() {
+        let values: Vec<f64> = (0..=100).rev().map(f64::from).chain([f64::NAN]).collect();
+        let spread = Spread::of(values);
+        for (part, value) in &spread.quantiles {
+            assert!((100.0 * part.parse::<f64>().unwrap() - value).abs() < 1e-12);
+        }
+        assert_eq!((spread.min, spread.max, spread.mean), (0.0, 100.0, 50.0));
+        assert!(Spread::of(vec![f64::NAN]).max.is_nan());
+    }
+
+    #[test]
+    fn the_best_frequency_is_the_highest_and_the_best_sag_the_least() {
+        let column = |name: &str, more_is_better| MapColumn {
+            name: name.into(),
+            meaning: String::new(),
+            quantity: true,
+            more_is_better,
+        };
+        let columns = vec![column("sag_m", false), column("frequency_1_hz", true)];
+        let table = MapTable { columns, values: vec![2.0, 10.0, 1.0, 12.0, f64::NAN, f64::NAN, 3.0, 9.0] };
+        assert_eq!(table.extremes(0), Some((1, 3)));
+        assert_eq!(table.extremes(1), Some((1, 3)));
+        assert_eq!(table.rows(), 4);
+        assert_eq!(table.column("sag_m").unwrap()[3], 3.0);
+    }
+}

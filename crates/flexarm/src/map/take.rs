@@ -1,0 +1,188 @@
+//! Goes through the places of a map on all cores.
+
+use std::ops::ControlFlow;
+
+use flexarm_kinematics::Pose;
+use nalgebra::Rotation3;
+use rayon::prelude::*;
+
+use super::columns::Layout;
+use super::evaluate::{Evaluator, Seat};
+use super::finder::Finder;
+use super::region::{Grid, pose_at};
+use super::{KeptPoses, MOST_PLACES, MapError};
+
+/// Places that one thread takes at a time.
+const CHUNK: usize = 64;
+/// Places between two looks at whether to go on.
+const BLOCK: usize = 8192;
+
+/// Appends the joint values of the pose of a number.
+pub(super) type PoseOf<'a> = dyn Fn(usize, &mut Vec<f64>) + Sync + 'a;
+
+/// What there is to go through.
+pub(super) enum Places<'a> {
+    /// Places of the tool, each in all directions.
+    Grid {
+        grid: Grid,
+        rotations: &'a [Rotation3<f64>],
+        finder: &'a Finder<'a>,
+        /// Radius around the upright line through the finder's foot within which places do not count (m).
+        keep_out_m: f64,
+    },
+    /// Joint values, by number of the pose.
+    Joints { count: usize, values: &'a PoseOf<'a> },
+}
+
+impl Places<'_> {
+    pub(super) fn count(&self) -> usize {
+        match self {
+            Self::Grid { grid, .. } => grid.places(),
+            Self::Joints { count, .. } => *count,
+        }
+    }
+}
+
+/// What came of them.
+#[derive(Default)]
+pub(super) struct Taken {
+    /// Row after row, in the order of the places.
+    pub(super) rows: Vec<f64>,
+    /// Places with at least one row.
+    pub(super) reachable: usize,
+    /// Poses that were tried.
+    pub(super) poses: usize,
+    /// Poses without an answer.
+    pub(super) failed: usize,
+    /// Why the first of them has none.
+    pub(super) first_failure: Option<String>,
+}
+
+impl Taken {
+    fn add(&mut self, other: Self) {
+        self.rows.extend(other.rows);
+        self.reachable += other.reachable;
+        self.poses += other.poses;
+        self.failed += other.failed;
+        self.first_failure = self.first_failure.take().or(other.first_failure);
+    }
+}
+
+/// Which of a place's poses are kept.
+pub(super) struct Choice<'a> {
+    pub(super) layout: &'a Layout,
+    pub(super) keep: KeptPoses,
+    /// Column by which poses are compared.
+    pub(super) by: usize,
+}
+
+/// Goes through all places; the rows are the same for every number of threads.
+///
+/// # Errors
+/// [`MapError::Interrupted`] if `go_on` breaks off, [`MapError::TooManyRows`].
+pub(super) fn take(
+    places: &Places<'_>,
+    evaluator: &Evaluator<'_>,
+    choice: &Choice<'_>,
+    go_on: &mut dyn FnMut(f64, f64) -> ControlFlow<()>,
+) -> Result<Taken, MapError> {
+    let (all, mut taken) = (places.count(), Taken::default());
+    for first in (0..all).step_by(BLOCK) {
+        if go_on(first as f64, all as f64).is_break() {
+            return Err(MapError::Interrupted { done: first, places: all });
+        }
+        let last = (first + BLOCK).min(all);
+        let chunks: Vec<usize> = (first..last).step_by(CHUNK).collect();
+        let worker = Worker::new(places, evaluator, choice);
+        let parts: Vec<Taken> = chunks
+            .into_par_iter()
+            .map_with(worker, |worker, from| worker.chunk(from, (from + CHUNK).min(last)))
+            .collect();
+        parts.into_iter().for_each(|part| taken.add(part));
+        if taken.rows.len() / choice.layout.width() > MOST_PLACES {
+            return Err(MapError::TooManyRows { most: MOST_PLACES });
+        }
+    }
+    let _ = go_on(all as f64, all as f64);
+    Ok(taken)
+}
+
+/// What a thread has.
+#[derive(Clone)]
+struct Worker<'a> {
+    places: &'a Places<'a>,
+    finder: Option<Finder<'a>>,
+    evaluator: Evaluator<'a>,
+    choice: &'a Choice<'a>,
+    /// Joint values of the branches of one direction.
+    branches: Vec<f64>,
+    /// Rows of one place.
+    rows: Vec<f64>,
+}
+
+impl<'a> Worker<'a> {
+    fn new(places: &'a Places<'a>, evaluator: &Evaluator<'a>, choice: &'a Choice<'a>) -> Self {
+        let finder = match places {
+            Places::Grid { finder, .. } => Some((*finder).clone()),
+            Places::Joints { .. } => None,
+        };
+        Self { places, finder, evaluator: evaluator.clone(), choice, branches: Vec::new(), rows: Vec::new() }
+    }
+
+    fn chunk(&mut self, from: usize, to: usize) -> Taken {
+        let mut taken = Taken::default();
+        for place in from..to {
+            self.rows.clear();
+            match self.places {
+                Places::Grid { grid, rotations, finder, keep_out_m } => {
+                    if finder.distance_from_foot(grid.place(place)) < *keep_out_m {
+                        continue;
+                    }
+                    for (direction, rotation) in rotations.iter().enumerate() {
+                        self.poses_at(&pose_at(grid.place(place), rotation), place, direction, &mut taken);
+                    }
+                }
+                Places::Joints { values, .. } => {
+                    self.branches.clear();
+                    values(place, &mut self.branches);
+                    self.answer(Seat { place, direction: 0, branch: 0 }, 0, &mut taken);
+                }
+            }
+            taken.reachable += usize::from(!self.rows.is_empty());
+            self.keep(&mut taken.rows);
+        }
+        taken
+    }
+
+    /// All branches at a pose of the tool.
+    fn poses_at(&mut self, X_WT: &Pose, place: usize, direction: usize, taken: &mut Taken) {
+        let Some(finder) = &mut self.finder else { return };
+        finder.find(X_WT, &mut self.branches);
+        for branch in 0..self.branches.len() / self.choice.layout.joints {
+            self.answer(Seat { place, direction, branch }, branch, taken);
+        }
+    }
+
+    fn answer(&mut self, seat: Seat, branch: usize, taken: &mut Taken) {
+        let joints = self.choice.layout.joints;
+        taken.poses += 1;
+        if let Err(error) = self.evaluator.push(&self.branches[branch * joints..][..joints], seat, &mut self.rows) {
+            taken.failed += 1;
+            taken.first_failure.get_or_insert_with(|| error.to_string());
+        }
+    }
+
+    /// The rows of the place that are asked for.
+    fn keep(&self, rows: &mut Vec<f64>) {
+        let Choice { layout, keep, by } = self.choice;
+        let more = layout.columns[*by].more_is_better;
+        let cost = |row: &&[f64]| if more { -row[*by] } else { row[*by] };
+        let all = self.rows.chunks_exact(layout.width());
+        let kept = match keep {
+            KeptPoses::All => return rows.extend(&self.rows),
+            KeptPoses::Best => all.min_by(|a, b| cost(a).total_cmp(&cost(b))),
+            KeptPoses::Worst => all.min_by(|a, b| cost(b).total_cmp(&cost(a))),
+        };
+        rows.extend(kept.unwrap_or_default());
+    }
+}

@@ -1,0 +1,431 @@
+//! What is asked of each run: numbers of its summary by their place in the JSON, parameters, and expressions of both.
+
+use exmex::{Express, FlatEx, FloatOpsFactory, MakeOperators};
+use serde_json::Value;
+
+use super::path::near;
+use super::value::ParameterValue;
+
+/// Keys of the summary that depend on the machine and the hour.
+const OF_THE_MACHINE: [&str; 4] = ["wall_s", "cpu_s", "real_time_factor", "cpu_s_per_simulated_s"];
+/// Longest expression that is read.
+const LONGEST: usize = 1000;
+/// Keys that name the entries of a list.
+const NAMES: [&str; 3] = ["name", "joint", "label"];
+
+/// A number that a run has without its whole summary.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Quick {
+    Peak,
+    PeakTime,
+    Rms,
+    End,
+    Sag,
+    Duration,
+    Frequency(usize),
+    Mass,
+}
+
+/// A variable of an expression.
+#[derive(Clone, Debug, PartialEq)]
+enum Variable {
+    /// A parameter by its column.
+    Parameter(usize),
+    /// A metric that stands before this one.
+    Metric(usize),
+    /// A number of the run.
+    Fact(Vec<String>, Option<Quick>),
+}
+
+/// A number that is asked of each run.
+#[derive(Clone, Debug)]
+pub(super) struct Metric {
+    pub(super) name: String,
+    /// As written.
+    pub(super) text: String,
+    formula: Formula,
+}
+
+/// An expression of parameters, metrics and numbers of a run.
+#[derive(Clone, Debug)]
+pub(super) struct Formula {
+    expression: FlatEx<f64>,
+    variables: Vec<Variable>,
+}
+
+/// What a metric may speak of.
+pub(super) struct Vocabulary<'a> {
+    /// Names of the parameters, in the order of their columns; none of those whose values are words.
+    pub(super) parameters: &'a [Option<String>],
+    /// Metrics before it.
+    pub(super) metrics: &'a [Metric],
+    /// A summary with all names that a run of this study has.
+    pub(super) summary: &'a Value,
+}
+
+/// Numbers of a run.
+pub(super) trait Facts {
+    /// The number at a place; NaN where there is none.
+    fn number(&self, path: &[String], quick: Option<Quick>) -> f64;
+}
+
+/// Facts of a whole summary.
+pub(super) struct SummaryFacts {
+    pub(super) summary: Value,
+    pub(super) mass_kg: f64,
+}
+
+impl Facts for SummaryFacts {
+    fn number(&self, path: &[String], quick: Option<Quick>) -> f64 {
+        match quick {
+            Some(Quick::Mass) => self.mass_kg,
+            _ => find(&self.summary, path).and_then(number).unwrap_or(f64::NAN),
+        }
+    }
+}
+
+/// A number; true is 1.
+fn number(value: &Value) -> Option<f64> {
+    value.as_f64().or_else(|| value.as_bool().map(|truth| if truth { 1.0 } else { 0.0 }))
+}
+
+/// The value at a place; entries of lists by number, or by their name.
+fn find<'a>(value: &'a Value, path: &[String]) -> Option<&'a Value> {
+    path.iter().try_fold(value, |value, word| match value {
+        Value::Object(map) => map.get(word),
+        Value::Array(list) => {
+            let named = |entry: &&Value| NAMES.iter().any(|key| entry.get(key).and_then(Value::as_str) == Some(word));
+            list.iter().find(named).or_else(|| list.get(word.parse::<usize>().ok()?))
+        }
+        _ => None,
+    })
+}
+
+impl Metric {
+    /// `expression`, or `name = expression`.
+    ///
+    /// # Errors
+    /// A sentence about what is not known or no expression.
+    pub(super) fn parse(text: &str, known: &Vocabulary<'_>) -> Result<Self, String> {
+        let (name, expression) = match text.split_once('=') {
+            Some((name, expression)) => (name.trim(), expression.trim()),
+            None => (text.trim(), text.trim()),
+        };
+        if name.is_empty() || name.chars().any(|c| c.is_control()) {
+            return Err(format!("metric {text:?} has no name: expected name = expression"));
+        }
+        if known.metrics.iter().any(|other| other.name == name)
+            || name != expression && known.parameters.iter().flatten().any(|other| other == name)
+        {
+            return Err(format!("metric {text:?}: the name {name:?} is taken: give it another one"));
+        }
+        let formula = Formula::parse(expression, known)?;
+        Ok(Self { name: name.to_owned(), text: text.trim().to_owned(), formula })
+    }
+
+    /// Whether a run needs no whole summary for it.
+    pub(super) fn is_quick(&self) -> bool {
+        self.formula.is_quick()
+    }
+
+    /// Its value.
+    ///
+    /// * `before`: values of the metrics before it.
+    pub(super) fn value(&self, parameters: &[ParameterValue], before: &[f64], facts: &dyn Facts) -> f64 {
+        self.formula.value(parameters, before, facts)
+    }
+}
+
+impl Formula {
+    /// # Errors
+    /// A sentence about what is not known or no expression.
+    pub(super) fn parse(text: &str, known: &Vocabulary<'_>) -> Result<Self, String> {
+        let (expression, variables) = expression_of(text, known)?;
+        Ok(Self { expression, variables })
+    }
+
+    /// Its value where it speaks of parameters alone.
+    pub(super) fn of_parameters(&self, parameters: &[ParameterValue]) -> f64 {
+        self.value(parameters, &[], &SummaryFacts { summary: Value::Null, mass_kg: f64::NAN })
+    }
+
+    /// Whether it speaks of parameters alone.
+    pub(super) fn is_of_parameters(&self) -> bool {
+        self.variables.iter().all(|variable| matches!(variable, Variable::Parameter(_)))
+    }
+
+    /// Whether a run needs no whole summary for it.
+    pub(super) fn is_quick(&self) -> bool {
+        self.variables.iter().all(|variable| !matches!(variable, Variable::Fact(_, None)))
+    }
+
+    /// Its value.
+    ///
+    /// * `before`: values of the metrics before it.
+    pub(super) fn value(&self, parameters: &[ParameterValue], before: &[f64], facts: &dyn Facts) -> f64 {
+        let of = |variable: &Variable| match variable {
+            Variable::Parameter(column) => parameters[*column].number().unwrap_or(f64::NAN),
+            Variable::Metric(number) => before.get(*number).copied().unwrap_or(f64::NAN),
+            Variable::Fact(path, quick) => facts.number(path, *quick),
+        };
+        let values: Vec<f64> = self.variables.iter().map(of).collect();
+        let value = self.expression.eval(&values).unwrap_or(f64::NAN);
+        // What is infinite has no place in a table that people make means of.
+        if value.is_finite() { value } else { f64::NAN }
+    }
+}
+
+/// The values of all metrics of a run.
+pub(super) fn values(metrics: &[Metric], parameters: &[ParameterValue], facts: &dyn Facts) -> Vec<f64> {
+    let mut found = Vec::with_capacity(metrics.len());
+    for metric in metrics {
+        let value = metric.value(parameters, &found, facts);
+        found.push(value);
+    }
+    found
+}
+
+/// The expression with a variable in the place of each path.
+fn expression_of(text: &str, known: &Vocabulary<'_>) -> Result<(FlatEx<f64>, Vec<Variable>), String> {
+    if text.len() > LONGEST {
+        return Err(format!("the expression has {} letters, at most {LONGEST} are read", text.len()));
+    }
+    let mut plain = String::new();
+    let mut words: Vec<String> = Vec::new();
+    for token in tokens(text) {
+        match token {
+            Token::Word(word) => {
+                let place = words.iter().position(|known| *known == word).unwrap_or_else(|| {
+                    words.push(word);
+                    words.len() - 1
+                });
+                plain += &format!("{{v{place}}}");
+            }
+            Token::Other(other) => plain += &other,
+        }
+    }
+    let variables = words.iter().map(|word| variable(word, known)).collect::<Result<Vec<_>, String>>()?;
+    let fail = |error: exmex::ExError| format!("expression {text:?}: {error}");
+    let parsed: FlatEx<f64> = exmex::parse(&plain).map_err(fail)?;
+    // The parser orders variables by name.
+    let place = |name: &String| name.strip_prefix('v').and_then(|number| number.parse::<usize>().ok());
+    let ordered = parsed.var_names().iter().filter_map(place).filter_map(|k| variables.get(k).cloned()).collect();
+    Ok((parsed, ordered))
+}
+
+enum Token {
+    /// A path.
+    Word(String),
+    /// Anything else, as the parser takes it.
+    Other(String),
+}
+
+/// Paths, numbers and the rest.
+fn tokens(text: &str) -> Vec<Token> {
+    let functions: Vec<&str> = FloatOpsFactory::<f64>::make().iter().map(|operator| operator.repr()).collect();
+    let letters: Vec<char> = text.chars().collect();
+    let mut found = Vec::new();
+    let mut k = 0;
+    while k < letters.len() {
+        let c = letters[k];
+        let start = k;
+        if c == '{' {
+            while k < letters.len() && letters[k] != '}' {
+                k += 1;
+            }
+            found.push(Token::Word(letters[start + 1..k].iter().collect()));
+            k += 1;
+        } else if c.is_ascii_digit() || c == '.' {
+            let is_sign = |k: usize| "+-".contains(letters[k]) && "eE".contains(letters[k - 1]);
+            while k < letters.len()
+                && (letters[k].is_ascii_alphanumeric() || letters[k] == '.' || k > start && is_sign(k))
+            {
+                k += 1;
+            }
+            let word: String = letters[start..k].iter().collect();
+            // Without an exponent, which the parser would take for a name.
+            found.push(Token::Other(word.parse::<f64>().map_or(word, |x| x.to_string())));
+        } else if c.is_alphabetic() || c == '_' {
+            while k < letters.len() && goes_on(&letters, k) {
+                k += 1;
+            }
+            let word: String = letters[start..k].iter().collect();
+            found.push(if functions.contains(&word.as_str()) { Token::Other(word) } else { Token::Word(word) });
+        } else {
+            found.push(Token::Other(c.to_string()));
+            k += 1;
+        }
+    }
+    found
+}
+
+/// Whether a path goes on with this letter.
+fn goes_on(letters: &[char], k: usize) -> bool {
+    let next = letters.get(k + 1).copied().unwrap_or(' ');
+    match letters[k] {
+        '.' => next.is_alphanumeric() || next == '_',
+        '[' => next.is_ascii_digit(),
+        ']' => letters[..k].iter().rev().find(|c| !c.is_ascii_digit()) == Some(&'['),
+        c => c.is_alphanumeric() || c == '_',
+    }
+}
+
+fn variable(word: &str, known: &Vocabulary<'_>) -> Result<Variable, String> {
+    if let Some(column) = known.parameters.iter().position(|name| name.as_deref() == Some(word)) {
+        return Ok(Variable::Parameter(column));
+    }
+    if let Some(number) = known.metrics.iter().position(|metric| metric.name == word) {
+        return Ok(Variable::Metric(number));
+    }
+    let path: Vec<String> = word.replace('[', ".").replace(']', "").split('.').map(str::to_owned).collect();
+    if path.len() == 1 && OF_THE_MACHINE.contains(&word) {
+        return Err(format!("{word} depends on the machine and the hour: it is no metric of a study"));
+    }
+    let quick = quick(&path);
+    match (quick, find(known.summary, &path)) {
+        (Some(Quick::Mass), _) => Ok(Variable::Fact(path, quick)),
+        (_, Some(Value::Null | Value::Number(_) | Value::Bool(_))) => Ok(Variable::Fact(path, quick)),
+        (_, found) => {
+            let what = match found {
+                Some(Value::String(_)) => "is a text, a number is expected",
+                Some(_) => "has several parts, a number is expected",
+                None if known.summary.is_null() => "is no parameter before this one",
+                None => "is not in the summary of a run",
+            };
+            let mut all = Vec::new();
+            if !known.summary.is_null() {
+                all.push("robot.mass_kg".to_owned());
+                leaves(known.summary, "", &mut all);
+            }
+            all.extend(known.parameters.iter().flatten().cloned());
+            Err(format!("{word:?} {what}; {}", near(word, &all)))
+        }
+    }
+}
+
+fn quick(path: &[String]) -> Option<Quick> {
+    let words: Vec<&str> = path.iter().map(String::as_str).collect();
+    Some(match words[..] {
+        ["tcp", "peak_m"] => Quick::Peak,
+        ["tcp", "t_peak_s"] => Quick::PeakTime,
+        ["tcp", "rms_m"] => Quick::Rms,
+        ["tcp", "end_m"] => Quick::End,
+        ["tcp", "static_sag_m"] => Quick::Sag,
+        ["duration_s"] => Quick::Duration,
+        ["frequencies_hz", number] => Quick::Frequency(number.parse().ok()?),
+        ["robot", "mass_kg"] => Quick::Mass,
+        _ => return None,
+    })
+}
+
+/// All places of numbers.
+fn leaves(value: &Value, place: &str, found: &mut Vec<String>) {
+    let below = |word: &str| if place.is_empty() { word.to_owned() } else { format!("{place}.{word}") };
+    match value {
+        Value::Object(map) => map.iter().for_each(|(key, inner)| leaves(inner, &below(key), found)),
+        Value::Array(list) => {
+            for (number, inner) in list.iter().enumerate() {
+                let name = NAMES.iter().find_map(|key| inner.get(key).and_then(Value::as_str));
+                leaves(inner, &below(name.unwrap_or(&number.to_string())), found);
+            }
+        }
+        Value::Null | Value::Number(_) | Value::Bool(_) => found.push(place.to_owned()),
+        Value::String(_) => {}
+    }
+}
+
+/// A bound that a run must keep: `expression <= expression`, or with >=.
+#[derive(Clone, Debug)]
+pub(super) struct Constraint {
+    pub(super) text: String,
+    /// What must not be larger.
+    less: Formula,
+    /// Than this.
+    more: Formula,
+}
+
+impl Constraint {
+    /// # Errors
+    /// As [`Metric::parse`].
+    pub(super) fn parse(text: &str, known: &Vocabulary<'_>) -> Result<Self, String> {
+        let (left, right, turned) = match (text.split_once("<="), text.split_once(">=")) {
+            (Some((left, right)), None) => (left, right, false),
+            (None, Some((left, right))) => (left, right, true),
+            _ => return Err(format!("constraint {text:?}: expected metric <= number, or >=")),
+        };
+        let (left, right) = (Formula::parse(left.trim(), known)?, Formula::parse(right.trim(), known)?);
+        let (less, more) = if turned { (right, left) } else { (left, right) };
+        Ok(Self { text: text.trim().to_owned(), less, more })
+    }
+
+    /// Whether a run needs no whole summary for it.
+    pub(super) fn is_quick(&self) -> bool {
+        self.less.is_quick() && self.more.is_quick()
+    }
+
+    /// By how much it is passed, in parts of the larger side; 0 if it is kept, NaN if a side has no value.
+    pub(super) fn violation(&self, parameters: &[ParameterValue], metrics: &[f64], facts: &dyn Facts) -> f64 {
+        let [less, more] = [&self.less, &self.more].map(|side| side.value(parameters, metrics, facts));
+        if less.is_nan() || more.is_nan() {
+            return f64::NAN;
+        }
+        (less - more).max(0.0) / less.abs().max(more.abs()).max(f64::MIN_POSITIVE)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    fn summary() -> Value {
+        json!({ "tcp": { "peak_m": 2e-3, "settling_s": null, "settling": "after 0.1 s", "holds": [] },
+                "links": [{ "name": "link_2", "peak_contribution_m": 1e-3 }], "frequencies_hz": [9.5, 20.0], "drives": { "joint_1": 4.0 } })
+    }
+
+    fn value(text: &str) -> Result<f64, String> {
+        let summary = summary();
+        let parameters = [Some("payload.mass".to_owned()), None];
+        let known = Vocabulary { parameters: &parameters, metrics: &[], summary: &summary };
+        let metric = Metric::parse(text, &known)?;
+        let facts = SummaryFacts { summary: summary.clone(), mass_kg: 100.0 };
+        Ok(metric.value(&[ParameterValue::Whole(50), ParameterValue::Text("a".into())], &[], &facts))
+    }
+
+    #[test]
+    fn metrics_are_places_of_the_summary_parameters_and_expressions_of_them() {
+        assert_eq!(value("tcp.peak_m").unwrap(), 2e-3);
+        assert_eq!(value("mm = 1e3 * tcp.peak_m").unwrap(), 2.0);
+        assert_eq!(value("links.link_2.peak_contribution_m + links[0].peak_contribution_m").unwrap(), 2e-3);
+        assert_eq!(value("frequencies_hz.1 - frequencies_hz[0]").unwrap(), 10.5);
+        assert_eq!(value("x = sqrt(drives.joint_1) * payload.mass - 1.5e+1").unwrap(), 85.0);
+        assert_eq!(value("max(tcp.peak_m, 1e-2)").unwrap(), 1e-2);
+        assert_eq!(value("robot.mass_kg / payload.mass").unwrap(), 2.0);
+        assert_eq!(value("b = {links.link_2.peak_contribution_m} * 2").unwrap(), 2e-3);
+        assert!(value("tcp.settling_s").unwrap().is_nan() && value("1 / (payload.mass - 50)").unwrap().is_nan());
+    }
+
+    #[test]
+    fn what_no_run_has_is_told_with_what_is_near() {
+        let told = value("tcp.peak").unwrap_err();
+        assert!(told.contains("\"tcp.peak\" is not in the summary") && told.contains("tcp.peak_m"), "{told}");
+        assert!(value("tcp.settling").unwrap_err().contains("is a text"));
+        assert!(value("tcp").unwrap_err().contains("several parts"));
+        assert!(value("wall_s").unwrap_err().contains("depends on the machine"));
+        assert!(value("tcp.peak_m +* 2").is_err() && value("= 2").is_err() && value("").is_err());
+        assert!(value("payload.mass = tcp.peak_m").unwrap_err().contains("taken"));
+    }
+
+    #[test]
+    fn constraints_say_by_how_much_they_are_passed() {
+        let summary = summary();
+        let known = Vocabulary { parameters: &[], metrics: &[], summary: &summary };
+        let facts = SummaryFacts { summary: summary.clone(), mass_kg: 100.0 };
+        let violation = |text: &str| Constraint::parse(text, &known).unwrap().violation(&[], &[], &facts);
+        assert_eq!(violation("tcp.peak_m <= 3e-3"), 0.0);
+        assert_eq!(violation("tcp.peak_m <= 1e-3"), 0.5);
+        assert_eq!(violation("frequencies_hz.0 >= 19"), 0.5);
+        assert!(violation("tcp.settling_s <= 1").is_nan());
+        assert!(Constraint::parse("tcp.peak_m < 1", &known).is_err());
+    }
+}

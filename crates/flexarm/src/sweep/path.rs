@@ -1,0 +1,320 @@
+//! Paths of numbers in a TOML file: `payload.mass`, `drive.joint_2.gearbox.stiffness`, `mounting.stiffness[2]`, `drive.*.gearbox`.
+//!
+//! An entry of a list is named by its `joint`, `link` or `name`, or by its number from 0; `*` stands for all. What is resolved
+//! against the file is a [`Place`], at which a text of the file is changed with everything else left as it was written.
+
+use flexarm_urdf::closest;
+use toml_edit::{DocumentMut, Item, Value};
+
+use super::value::ParameterValue;
+
+/// Keys that name the entries of a list.
+const NAMES: [&str; 3] = ["joint", "link", "name"];
+/// Paths that are told beside the nearest one.
+const MOST_TOLD: usize = 6;
+
+/// A part of a path.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Segment {
+    /// A key of a table, or the name of an entry.
+    Key(String),
+    /// An entry by its number.
+    Index(usize),
+    /// All keys or entries.
+    Any,
+}
+
+/// A part of the way to one value.
+#[derive(Clone, Debug, PartialEq)]
+enum Step {
+    Key(String),
+    Index(usize),
+}
+
+/// Where one value is, or would be.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Place {
+    steps: Vec<Step>,
+    /// With the names of entries, as a path that leads here again.
+    pub(super) name: String,
+    /// Whether there is a value already.
+    pub(super) is_there: bool,
+}
+
+/// The parts of a path; none if it has empty ones, brackets without a number or quotes without an end.
+pub(super) fn segments(text: &str) -> Option<Vec<Segment>> {
+    let mut found = Vec::new();
+    let mut rest = text.trim();
+    loop {
+        let (word, after) = match rest.strip_prefix('"') {
+            Some(quoted) => quoted.split_once('"').map(|(word, after)| (Segment::Key(word.to_owned()), after))?,
+            None => {
+                let end = rest.find(['.', '[']).unwrap_or(rest.len());
+                let word = match rest[..end].trim() {
+                    "" => return None,
+                    "*" => Segment::Any,
+                    word => Segment::Key(word.to_owned()),
+                };
+                (word, &rest[end..])
+            }
+        };
+        found.push(word);
+        rest = after;
+        while let Some(bracket) = rest.strip_prefix('[') {
+            let (number, after) = bracket.split_once(']')?;
+            found.push(if number.trim() == "*" { Segment::Any } else { Segment::Index(number.trim().parse().ok()?) });
+            rest = after;
+        }
+        match rest.strip_prefix('.') {
+            Some(more) => rest = more,
+            None => return rest.is_empty().then_some(found),
+        }
+    }
+}
+
+/// All places that a path means in a file; none if it leads nowhere. The last keys of it may be new in a table that is there.
+pub(super) fn places(root: &toml::Value, path: &[Segment]) -> Vec<Place> {
+    let mut found = Vec::new();
+    let start = Place { steps: Vec::new(), name: String::new(), is_there: true };
+    follow(root, path, start, &mut found);
+    found
+}
+
+fn follow(value: &toml::Value, path: &[Segment], so_far: Place, found: &mut Vec<Place>) {
+    let Some((segment, rest)) = path.split_first() else {
+        found.push(so_far);
+        return;
+    };
+    match (value, segment) {
+        (toml::Value::Table(table), Segment::Key(key)) => match table.get(key) {
+            Some(inner) => follow(inner, rest, so_far.with_key(key), found),
+            None => found.extend(new_place(path, so_far)),
+        },
+        (toml::Value::Table(table), Segment::Any) => {
+            table.iter().for_each(|(key, inner)| follow(inner, rest, so_far.with_key(key), found));
+        }
+        (toml::Value::Array(list), segment) => {
+            for (number, inner) in list.iter().enumerate() {
+                let own = name_of(inner);
+                let meant = match segment {
+                    Segment::Any => true,
+                    Segment::Index(k) => *k == number,
+                    Segment::Key(key) => own == Some(key) || own.is_none() && key.parse() == Ok(number),
+                };
+                if meant {
+                    follow(inner, rest, so_far.with_entry(number, own), found);
+                }
+            }
+        }
+        _ => {}
+    }
+}
+
+/// A value that the file does not have yet, in a table that it has.
+fn new_place(path: &[Segment], so_far: Place) -> Option<Place> {
+    if so_far.steps.is_empty() {
+        return None;
+    }
+    path.iter().try_fold(Place { is_there: false, ..so_far }, |place, segment| match segment {
+        Segment::Key(key) => Some(place.with_key(key)),
+        _ => None,
+    })
+}
+
+/// What an entry of a list is called.
+fn name_of(entry: &toml::Value) -> Option<&String> {
+    let table = entry.as_table()?;
+    NAMES.iter().find_map(|key| match table.get(*key) {
+        Some(toml::Value::String(name)) => Some(name),
+        _ => None,
+    })
+}
+
+impl Place {
+    fn with(&self, step: Step, name: &str) -> Self {
+        let mut steps = self.steps.clone();
+        steps.push(step);
+        Self { steps, name: name.to_owned(), is_there: self.is_there }
+    }
+
+    fn with_key(&self, key: &str) -> Self {
+        let dot = if self.name.is_empty() { "" } else { "." };
+        let name = format!("{}{dot}{}", self.name, quoted(key));
+        self.with(Step::Key(key.to_owned()), &name)
+    }
+
+    fn with_entry(&self, number: usize, own: Option<&String>) -> Self {
+        let name = match own {
+            Some(own) => format!("{}.{}", self.name, quoted(own)),
+            None => format!("{}[{number}]", self.name),
+        };
+        self.with(Step::Index(number), &name)
+    }
+
+    /// The value that is there.
+    pub(super) fn value<'a>(&self, root: &'a toml::Value) -> Option<&'a toml::Value> {
+        self.steps.iter().try_fold(root, |value, step| match step {
+            Step::Key(key) => value.get(key),
+            Step::Index(number) => value.get(*number),
+        })
+    }
+
+    /// Puts another value there, with the spaces and comments of the old one.
+    pub(super) fn put(&self, file: &mut DocumentMut, value: Value) {
+        let Some((last, way)) = self.steps.split_last() else { return };
+        let mut item: &mut Item = file.as_item_mut();
+        for step in way {
+            let next = match step {
+                Step::Key(key) => item.get_mut(key.as_str()),
+                Step::Index(number) => item.get_mut(*number),
+            };
+            let Some(next) = next else { return };
+            item = next;
+        }
+        let place = match last {
+            Step::Key(key) => &mut item[key.as_str()],
+            Step::Index(number) => &mut item[*number],
+        };
+        let mut value = value;
+        if let Item::Value(old) = place {
+            *value.decor_mut() = old.decor().clone();
+        }
+        *place = Item::Value(value);
+    }
+}
+
+fn quoted(key: &str) -> String {
+    if key.contains(['.', '[', '"', ' ']) { format!("\"{key}\"") } else { key.to_owned() }
+}
+
+/// All paths of a file that lead to a number, a text or a list of them.
+pub(super) fn leaves(root: &toml::Value) -> Vec<String> {
+    let mut found = Vec::new();
+    collect(root, &Place { steps: Vec::new(), name: String::new(), is_there: true }, &mut found);
+    found
+}
+
+fn collect(value: &toml::Value, place: &Place, found: &mut Vec<String>) {
+    match value {
+        toml::Value::Table(table) => {
+            table.iter().for_each(|(key, inner)| collect(inner, &place.with_key(key), found));
+        }
+        toml::Value::Array(list) if list.iter().any(toml::Value::is_table) => {
+            let entries = list.iter().enumerate();
+            entries.for_each(|(number, inner)| collect(inner, &place.with_entry(number, name_of(inner)), found));
+        }
+        _ => found.push(place.name.clone()),
+    }
+}
+
+/// The paths nearest to one that leads nowhere, as the end of a sentence.
+pub(super) fn near(path: &str, known: &[String]) -> String {
+    let meant = closest(path, known.iter().map(String::as_str));
+    // What begins alike, as far as it does.
+    let alike = |other: &String| path.bytes().zip(other.bytes()).take_while(|(a, b)| a == b).count();
+    let most = known.iter().map(alike).max().unwrap_or(0);
+    let mut others: Vec<&String> =
+        known.iter().filter(|other| alike(other) == most && meant.as_ref() != Some(*other)).collect();
+    others.truncate(MOST_TOLD);
+    let told: Vec<String> = others.iter().map(|other| format!("{other:?}")).collect();
+    match (meant, told.is_empty()) {
+        (Some(meant), true) => format!("did you mean {meant:?}?"),
+        (Some(meant), false) => format!("did you mean {meant:?}? there are also {}", told.join(", ")),
+        (None, true) => "it has none".into(),
+        (None, false) => format!("near it are {}", told.join(", ")),
+    }
+}
+
+/// A value as it is written into a file whose old value is `old`.
+pub(super) fn written(value: &ParameterValue, old: Option<&toml::Value>) -> Value {
+    match value {
+        ParameterValue::Whole(n) => Value::from(*n),
+        // Where the file counts, a whole number is one.
+        ParameterValue::Number(x)
+            if matches!(old, Some(toml::Value::Integer(_))) && x.fract() == 0.0 && x.abs() < 1e15 =>
+        {
+            Value::from(*x as i64)
+        }
+        ParameterValue::Number(x) => Value::from(*x),
+        ParameterValue::Text(text) => Value::from(text.as_str()),
+        ParameterValue::Truth(truth) => Value::from(*truth),
+    }
+}
+
+/// The numbers of a value that is there, each changed: one number, or lists of them.
+pub(super) fn changed(old: &toml::Value, change: &dyn Fn(f64) -> f64) -> Option<Value> {
+    match old {
+        toml::Value::Integer(n) => Some(Value::from(change(*n as f64))),
+        toml::Value::Float(x) => Some(Value::from(change(*x))),
+        toml::Value::Array(list) => {
+            let entries = list.iter().map(|entry| changed(entry, change)).collect::<Option<Vec<Value>>>()?;
+            Some(Value::Array(entries.into_iter().collect()))
+        }
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FILE: &str = "urdf = \"a.urdf\"\npayload = { mass = 5.0, com = [0, 0.1, 0.0] } # carried\n\n[[drive]]\njoint = \"j.1\" # first\n\
+                        gearbox = { stiffness = 1.0e6, damping = 3 }\n[[drive]]\njoint = \"j2\"\n[drive.gearbox]\nstiffness = [1.0, 2.0]\n";
+
+    fn names(path: &str) -> Vec<String> {
+        let root = toml::from_str(FILE).unwrap();
+        places(&root, &segments(path).unwrap()).into_iter().map(|place| place.name).collect()
+    }
+
+    #[test]
+    fn paths_lead_to_tables_entries_by_name_and_number_and_all_of_them() {
+        assert_eq!(names("payload.mass"), ["payload.mass"]);
+        assert_eq!(names("payload.com[1]"), ["payload.com[1]"]);
+        assert_eq!(names("drive.j2.gearbox.stiffness"), ["drive.j2.gearbox.stiffness"]);
+        assert_eq!(names("drive[0].gearbox.damping"), ["drive.\"j.1\".gearbox.damping"]);
+        assert_eq!(names("drive.\"j.1\".gearbox.damping"), ["drive.\"j.1\".gearbox.damping"]);
+        assert_eq!(names("drive.*.gearbox.stiffness").len(), 2);
+        assert_eq!(names("payload.*").len(), 2);
+        // New keys only in tables that are there.
+        assert_eq!(names("drive.j2.ratio"), ["drive.j2.ratio"]);
+        assert!(
+            names("drve.j2.ratio").is_empty()
+                && names("drive.j3.ratio").is_empty()
+                && names("payload.com[7]").is_empty()
+        );
+        for bad in ["", "a..b", "a.", "a[x]", "a[1", "\"a"] {
+            assert_eq!(segments(bad), None, "{bad}");
+        }
+    }
+
+    #[test]
+    fn a_value_is_changed_in_its_place_and_nothing_else_is() {
+        let root: toml::Value = toml::from_str(FILE).unwrap();
+        let mut file: DocumentMut = FILE.parse().unwrap();
+        let mut put = |path: &str, value: &ParameterValue| {
+            for place in places(&root, &segments(path).unwrap()) {
+                let value = written(value, place.value(&root));
+                place.put(&mut file, value);
+            }
+        };
+        put("payload.mass", &ParameterValue::Number(7.5));
+        put("payload.com[1]", &ParameterValue::Number(0.25));
+        put("drive[0].gearbox.damping", &ParameterValue::Number(4.0));
+        put("drive.j2.gearbox.stiffness[0]", &ParameterValue::Number(9.0));
+        put("drive.j2.ratio", &ParameterValue::Whole(3));
+        let expected = FILE
+            .replace("mass = 5.0", "mass = 7.5")
+            .replace("0, 0.1,", "0, 0.25,")
+            .replace("damping = 3 ", "damping = 4 ")
+            .replace("[1.0, 2.0]", "[9.0, 2.0]")
+            .replace("joint = \"j2\"\n", "joint = \"j2\"\nratio = 3\n");
+        assert_eq!(file.to_string(), expected);
+    }
+
+    #[test]
+    fn a_path_that_leads_nowhere_is_told_with_those_that_are_near() {
+        let root: toml::Value = toml::from_str(FILE).unwrap();
+        let told = near("drive.j2.gearbox.stifness", &leaves(&root));
+        assert!(told.contains("did you mean \"drive.j2.gearbox.stiffness\"?"), "{told}");
+    }
+}

@@ -1,0 +1,332 @@
+//! What a study tells: figures of its metrics, failures, the best run.
+
+use std::collections::BTreeMap;
+
+use flexarm_study::{SampleMethod, main_effect, pareto_front, sobol_indices, spread};
+use serde::Serialize;
+
+use super::Sweep;
+use super::evaluate::Answer;
+use super::minimise::MinimiseFigures;
+use super::replay::Replay;
+use super::store::Collected;
+use super::value::ParameterValue;
+
+/// Answer of `flexarm sweep`.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct SweepSummary {
+    /// Name of the study.
+    pub study: String,
+    /// Runs of the study.
+    pub runs: usize,
+    /// Runs that gave a result.
+    pub done: usize,
+    /// Runs that failed.
+    pub failed: usize,
+    /// The part of the runs that was run, as `number/of`; null for all.
+    pub shard: Option<String>,
+    /// Wall-clock time (s).
+    pub wall_s: f64,
+    /// Processor time, all threads (s).
+    pub cpu_s: f64,
+    /// The table of all runs, or the folder of a shard.
+    pub file: String,
+    /// The page.
+    pub page: Option<String>,
+    /// What is varied.
+    pub parameters: Vec<ParameterFigures>,
+    /// What came out.
+    pub metrics: Vec<MetricFigures>,
+    /// Why runs failed, the most frequent first.
+    pub failures: Vec<FailureFigures>,
+    /// The run with the least of what is to be least; null if none was done.
+    pub best: Option<BestRun>,
+    /// The runs that no other beats in two metrics; null with one metric.
+    pub pareto: Option<ParetoFigures>,
+    /// How the search went, if one was made.
+    pub minimise: Option<MinimiseFigures>,
+    /// Runs that several shards had, with the same result; they count once.
+    pub doubles: usize,
+}
+
+/// A parameter.
+#[derive(Clone, Debug, Serialize)]
+pub struct ParameterFigures {
+    /// Its name.
+    pub name: String,
+    /// Least and largest value; null of words.
+    pub range: Option<[f64; 2]>,
+}
+
+/// A metric over all runs that were done.
+#[derive(Clone, Debug, Serialize)]
+pub struct MetricFigures {
+    /// Its name.
+    pub name: String,
+    /// Runs that have it.
+    pub count: usize,
+    /// Least.
+    pub min: Option<f64>,
+    /// Largest.
+    pub max: Option<f64>,
+    /// Mean.
+    pub mean: Option<f64>,
+    /// Standard deviation.
+    pub std: Option<f64>,
+    /// Quantiles 0.05, 0.5 and 0.95.
+    pub quantiles: Option<[f64; 3]>,
+    /// Part of its variance that each parameter makes by itself (correlation ratio); null of words and where nothing varies.
+    pub shares: BTreeMap<String, Option<f64>>,
+    /// Sobol indices of the parameters that were drawn by Saltelli's design; empty otherwise.
+    pub sobol: Vec<IndexFigures>,
+}
+
+/// Sobol indices of a parameter.
+#[derive(Clone, Debug, Serialize)]
+pub struct IndexFigures {
+    /// The parameter.
+    pub parameter: String,
+    /// Part of the variance that it makes by itself.
+    pub first: f64,
+    /// Where that lies in 95 of 100 cases.
+    pub first_interval: [f64; 2],
+    /// Part that it makes with others too.
+    pub total: f64,
+    /// Likewise.
+    pub total_interval: [f64; 2],
+}
+
+/// The run with the least of a metric.
+#[derive(Clone, Debug, Serialize)]
+pub struct BestRun {
+    /// Its number.
+    pub run: usize,
+    /// What is least in it.
+    pub metric: String,
+    /// How much that is.
+    pub value: f64,
+    /// Values of its parameters.
+    pub parameters: BTreeMap<String, ParameterValue>,
+    /// Its metrics.
+    pub metrics: BTreeMap<String, Option<f64>>,
+    /// Its files, ready to be run; null where none are written.
+    pub files: Option<Replay>,
+    /// The command that runs it.
+    pub command: Option<String>,
+}
+
+/// Runs that no other beats in two metrics.
+#[derive(Clone, Debug, Serialize)]
+pub struct ParetoFigures {
+    /// Both, each better if less.
+    pub metrics: [String; 2],
+    /// By the first metric.
+    pub runs: Vec<ParetoRun>,
+}
+
+/// A run of the front.
+#[derive(Clone, Debug, Serialize)]
+pub struct ParetoRun {
+    /// Its number.
+    pub run: usize,
+    /// Both metrics.
+    pub values: [f64; 2],
+}
+
+/// A reason why runs failed.
+#[derive(Clone, Debug, Serialize)]
+pub struct FailureFigures {
+    /// The reason.
+    pub reason: String,
+    /// Runs.
+    pub runs: usize,
+    /// The first of them.
+    pub first: usize,
+}
+
+/// Results as columns: one value per run that is over, in the order of the runs.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Columns {
+    pub(super) runs: Vec<usize>,
+    /// Of numeric parameters.
+    pub(super) parameters: Vec<Option<Vec<f64>>>,
+    pub(super) metrics: Vec<Vec<f64>>,
+}
+
+/// Reasons that are told.
+const MOST_REASONS: usize = 10;
+
+impl Sweep {
+    /// Results as columns.
+    pub(super) fn columns(&self, answers: &[(&Answer, Vec<ParameterValue>)]) -> Columns {
+        let number = |value: &ParameterValue| value.number().unwrap_or(f64::NAN);
+        let parameter = |k: usize| {
+            let numeric = self.design.columns[k].is_numeric();
+            numeric.then(|| answers.iter().map(|(_, values)| number(&values[k])).collect())
+        };
+        let metric = |k: usize| {
+            let value =
+                |(answer, _): &(&Answer, Vec<ParameterValue>)| answer.result.as_ref().map_or(f64::NAN, |m| m[k]);
+            answers.iter().map(value).collect()
+        };
+        Columns {
+            runs: answers.iter().map(|(answer, _)| answer.run).collect(),
+            parameters: (0..self.design.columns.len()).map(parameter).collect(),
+            metrics: (0..self.metrics.len()).map(metric).collect(),
+        }
+    }
+
+    /// Figures of what is there, and the results as columns.
+    pub(super) fn summary(&self, collected: &Collected) -> (SweepSummary, Columns) {
+        let answers: Vec<(&Answer, Vec<ParameterValue>)> =
+            collected.answers.values().map(|(answer, _)| (answer, self.design.values(answer.run))).collect();
+        self.summary_of(&answers, collected.doubles)
+    }
+
+    /// Figures of runs with these values of the parameters.
+    pub(super) fn summary_of(
+        &self,
+        answers: &[(&Answer, Vec<ParameterValue>)],
+        doubles: usize,
+    ) -> (SweepSummary, Columns) {
+        let columns = self.columns(answers);
+        let failed = answers.iter().filter(|(answer, _)| answer.result.is_err()).count();
+        let summary = SweepSummary {
+            study: self.file.name.clone(),
+            runs: self.runs(),
+            done: answers.len() - failed,
+            failed,
+            parameters: self.parameter_figures(&columns),
+            metrics: self.metric_figures(&columns),
+            failures: failures(answers),
+            doubles,
+            best: self.best(answers, &columns),
+            pareto: self.pareto(&columns),
+            ..SweepSummary::default()
+        };
+        (summary, columns)
+    }
+
+    /// The place of the metric that is to be least.
+    pub(super) fn goal(&self) -> usize {
+        let named = self.file.best.as_ref().and_then(|best| self.metrics.iter().position(|m| m.name == best.text));
+        named.unwrap_or(0)
+    }
+
+    fn best(&self, answers: &[(&Answer, Vec<ParameterValue>)], columns: &Columns) -> Option<BestRun> {
+        let goal = self.goal();
+        let values = columns.metrics.get(goal)?;
+        let finite = values.iter().enumerate().filter(|(_, value)| value.is_finite());
+        let (row, _) = finite.min_by(|a, b| a.1.total_cmp(b.1).then(a.0.cmp(&b.0)))?;
+        Some(self.best_of(answers[row].0, &answers[row].1, goal))
+    }
+
+    /// A run as the best one.
+    pub(super) fn best_of(&self, answer: &Answer, values: &[ParameterValue], goal: usize) -> BestRun {
+        let empty = Vec::new();
+        let results = answer.result.as_ref().unwrap_or(&empty);
+        let parameters = self.design.columns.iter().zip(values);
+        let metric = |(k, metric): (usize, &super::metric::Metric)| {
+            (metric.name.clone(), results.get(k).copied().filter(|x| x.is_finite()))
+        };
+        BestRun {
+            run: answer.run,
+            metric: self.metrics[goal].name.clone(),
+            value: results.get(goal).copied().unwrap_or(f64::NAN),
+            parameters: parameters.map(|(column, value)| (column.name.clone(), value.clone())).collect(),
+            metrics: self.metrics.iter().enumerate().map(metric).collect(),
+            files: None,
+            command: None,
+        }
+    }
+
+    fn pareto(&self, columns: &Columns) -> Option<ParetoFigures> {
+        let place = |name: &String| self.metrics.iter().position(|metric| metric.name == *name);
+        let (a, b) = match &self.file.pareto {
+            Some(([a, b], _)) => (place(a)?, place(b)?),
+            None if self.metrics.len() >= 2 => (0, 1),
+            None => return None,
+        };
+        let (x, y) = (&columns.metrics[a], &columns.metrics[b]);
+        let run = |row: usize| ParetoRun { run: columns.runs[row], values: [x[row], y[row]] };
+        let runs: Vec<ParetoRun> = pareto_front(x, y).into_iter().map(run).collect();
+        let metrics = [a, b].map(|k| self.metrics[k].name.clone());
+        (!runs.is_empty()).then_some(ParetoFigures { metrics, runs })
+    }
+
+    /// Sobol indices of a metric; with a grid besides, of what scatters about the mean at each of its points.
+    fn indices(&self, values: &[f64], runs: &[usize]) -> Vec<IndexFigures> {
+        let drawn = self.design.drawn();
+        if self.file.method != SampleMethod::Saltelli || drawn.is_empty() {
+            return Vec::new();
+        }
+        // What is not there, or failed, is missing in its place.
+        let mut whole = vec![f64::NAN; self.runs()];
+        // The runs of a search are none of the design.
+        if runs.iter().any(|run| *run >= whole.len()) {
+            return Vec::new();
+        }
+        runs.iter().zip(values).for_each(|(run, value)| whole[*run] = *value);
+        // What the grid makes is not what scatters.
+        let points = self.runs() / self.design.grid_points().max(1);
+        for point in whole.chunks_mut(points.max(1)) {
+            let mean = spread(point).map_or(0.0, |spread| spread.mean);
+            point.iter_mut().for_each(|value| *value -= mean);
+        }
+        let found = sobol_indices(&whole, drawn.len(), self.file.seed).unwrap_or_default();
+        let index = |(column, index): (&usize, flexarm_study::SobolIndex)| IndexFigures {
+            parameter: self.design.columns[*column].name.clone(),
+            first: index.first,
+            first_interval: index.first_interval,
+            total: index.total,
+            total_interval: index.total_interval,
+        };
+        drawn.iter().zip(found).map(index).collect()
+    }
+
+    fn parameter_figures(&self, columns: &Columns) -> Vec<ParameterFigures> {
+        let of = |(k, values): (usize, &Option<Vec<f64>>)| ParameterFigures {
+            name: self.design.columns[k].name.clone(),
+            range: values.as_ref().and_then(|values| spread(values)).map(|spread| [spread.min, spread.max]),
+        };
+        columns.parameters.iter().enumerate().map(of).collect()
+    }
+
+    fn metric_figures(&self, columns: &Columns) -> Vec<MetricFigures> {
+        let of = |(k, values): (usize, &Vec<f64>)| {
+            let spread = spread(values);
+            let share = |(p, x): (usize, &Option<Vec<f64>>)| {
+                let effect = x.as_ref().and_then(|x| main_effect(x, values));
+                (self.design.columns[p].name.clone(), effect.map(|effect| effect.share))
+            };
+            MetricFigures {
+                name: self.metrics[k].name.clone(),
+                count: spread.map_or(0, |spread| spread.count),
+                min: spread.map(|spread| spread.min),
+                max: spread.map(|spread| spread.max),
+                mean: spread.map(|spread| spread.mean),
+                std: spread.map(|spread| spread.std),
+                quantiles: spread.map(|spread| spread.quantiles),
+                shares: columns.parameters.iter().enumerate().map(share).collect(),
+                sobol: self.indices(values, &columns.runs),
+            }
+        };
+        columns.metrics.iter().enumerate().map(of).collect()
+    }
+}
+
+fn failures(answers: &[(&Answer, Vec<ParameterValue>)]) -> Vec<FailureFigures> {
+    let mut found: Vec<FailureFigures> = Vec::new();
+    let mut places: BTreeMap<&str, usize> = BTreeMap::new();
+    for (answer, _) in answers {
+        let Err(reason) = &answer.result else { continue };
+        let place = *places.entry(reason).or_insert_with(|| {
+            found.push(FailureFigures { reason: reason.clone(), runs: 0, first: answer.run });
+            found.len() - 1
+        });
+        found[place].runs += 1;
+    }
+    found.sort_by(|a, b| b.runs.cmp(&a.runs).then(a.first.cmp(&b.first)));
+    found.truncate(MOST_REASONS);
+    found
+}

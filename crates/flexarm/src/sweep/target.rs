@@ -1,0 +1,139 @@
+//! What a path of a parameter leads to: the robot file, the motion, the loads, an option, a job by which a link is reduced again.
+
+use super::file::Role;
+use super::path::{Place, Segment, changed, leaves, near, places, segments, written};
+use super::value::ParameterValue;
+
+/// The file that a place is in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub(super) enum Which {
+    /// The robot file.
+    Robot,
+    /// The file of the motion.
+    Motion,
+    /// The file of loads.
+    Loads,
+    /// The job of a link, by its number.
+    Job(usize),
+}
+
+/// What one path of a parameter changes.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Target {
+    /// Which robot, motion or loads.
+    File(Which),
+    /// How fast the motion is run through.
+    Speed,
+    /// An option.
+    Option(String),
+    /// Values of a file.
+    Entry(Which, Vec<Segment>),
+}
+
+impl Target {
+    /// From a path as written.
+    ///
+    /// * `jobs`: names of the links that have one.
+    ///
+    /// # Errors
+    /// A sentence.
+    pub(super) fn parse(path: &str, jobs: &[String]) -> Result<Self, String> {
+        let all = segments(path).ok_or_else(|| {
+            format!(
+                "{path:?} is no path: expected names with dots between them, such as drive.joint_2.gearbox.stiffness"
+            )
+        })?;
+        let word = |k: usize| match all.get(k) {
+            Some(Segment::Key(key)) => key.as_str(),
+            _ => "",
+        };
+        match (word(0), all.len()) {
+            ("robot", 1) => Ok(Self::File(Which::Robot)),
+            ("motion", 1) => Ok(Self::File(Which::Motion)),
+            ("loads", 1) => Ok(Self::File(Which::Loads)),
+            ("motion", 2) if word(1) == "speed" => Ok(Self::Speed),
+            ("options", 2) => Ok(Self::Option(word(1).to_owned())),
+            ("options", _) => Err(format!("{path:?}: options have one word, such as options.step")),
+            ("motion", _) => Ok(Self::Entry(Which::Motion, all[1..].to_vec())),
+            ("loads", _) => Ok(Self::Entry(Which::Loads, all[1..].to_vec())),
+            ("reduce", 3..) => match jobs.iter().position(|link| link == word(1)) {
+                Some(job) => Ok(Self::Entry(Which::Job(job), all[2..].to_vec())),
+                None => Err(format!(
+                    "{path:?}: the study names no job for link {:?}; add {0} = \"job.toml\" to [reduce]",
+                    word(1)
+                )),
+            },
+            ("robot", _) => Ok(Self::Entry(Which::Robot, of_robot(all[1..].to_vec()))),
+            _ => Ok(Self::Entry(Which::Robot, of_robot(all))),
+        }
+    }
+}
+
+/// Links that bend are called links for short.
+fn of_robot(mut path: Vec<Segment>) -> Vec<Segment> {
+    if let Some(Segment::Key(key)) = path.first_mut()
+        && key == "link"
+        && path.len() > 1
+    {
+        path[0] = Segment::Key("flexible_link".into());
+    }
+    path
+}
+
+/// A change of one value of a file.
+#[derive(Clone, Debug)]
+pub(super) struct Edit {
+    pub(super) place: Place,
+    pub(super) value: toml_edit::Value,
+}
+
+/// The changes that a value makes where a path leads.
+///
+/// * `known`: changes before it: a factor or an offset goes on top of them.
+///
+/// # Errors
+/// A sentence: a path that leads nowhere, with those that are near; a factor or an offset of what is no number.
+pub(super) fn edits(
+    root: &toml::Value,
+    path: &[Segment],
+    text: &str,
+    role: Role,
+    value: &ParameterValue,
+    known: &[Edit],
+) -> Result<Vec<Edit>, String> {
+    let found = places(root, path);
+    if found.is_empty() {
+        return Err(format!("{text:?} leads nowhere; {}", near(text, &leaves(root))));
+    }
+    let edit = |place: Place| {
+        let before = known.iter().rev().find(|edit| edit.place == place).and_then(|edit| plain(&edit.value));
+        let old = before.as_ref().or(place.value(root));
+        let value = match (role, value.number(), old) {
+            (Role::Value, ..) => written(value, old),
+            (_, Some(x), Some(old)) => {
+                let change: &dyn Fn(f64) -> f64 = if role == Role::Factor { &move |y| y * x } else { &move |y| y + x };
+                changed(old, change)
+                    .ok_or_else(|| format!("{text:?}: {} is no number, and has no factor or offset", place.name))?
+            }
+            (_, Some(_), None) => {
+                let name = &place.name;
+                return Err(format!(
+                    "{text:?}: {name} is not in the file: a factor or offset needs a number to change"
+                ));
+            }
+            (_, None, _) => return Err(format!("{text:?}: as a factor or offset {value:?} must be a number")),
+        };
+        Ok(Edit { place, value })
+    };
+    found.into_iter().map(edit).collect()
+}
+
+/// Numbers and lists of them as they are read.
+fn plain(value: &toml_edit::Value) -> Option<toml::Value> {
+    match value {
+        toml_edit::Value::Integer(n) => Some(toml::Value::Integer(*n.value())),
+        toml_edit::Value::Float(x) => Some(toml::Value::Float(*x.value())),
+        toml_edit::Value::Array(list) => list.iter().map(plain).collect::<Option<Vec<_>>>().map(toml::Value::Array),
+        _ => None,
+    }
+}

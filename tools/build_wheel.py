@@ -1,0 +1,168 @@
+#!/usr/bin/env python3
+"""Builds the Python package and tests it as somebody would who has no compiler. Plain Python 3.11 or later, needs cargo and pip.
+
+    python3 tools/build_wheel.py                    a wheel for Linuxes as new as this one in target/wheels, tested
+    python3 tools/build_wheel.py --manylinux        one for all Linux machines of this kind (zig from PyPI is the linker)
+    python3 tools/build_wheel.py --sdist            the source package as well, and a wheel of it
+    python3 tools/build_wheel.py --no-test          build only
+    python3 tools/build_wheel.py --quick            test without the tools that check types and draw
+
+The tests run in an environment of their own, in an empty folder, with a PATH without cargo. Status 0: all is well; 1: something
+failed; 3: pip cannot get what it needs (no network).
+"""
+import argparse
+import os
+import platform
+import shutil
+import subprocess
+import sys
+import tarfile
+import tempfile
+import time
+import tomllib
+import venv
+import zipfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+PACKAGE = ROOT / "crates/flexarm-python"
+MOST_BYTES = 20e6
+MATURIN = "maturin>=1.13,<2"
+#: Of the Linuxes that a wheel for all of them still runs on.
+OLDEST_GLIBC = "2.28"
+#: Tests need the first; what they can do without is skipped.
+NEEDED = ["numpy", "pytest"]
+OTHERS = ["matplotlib", "pandas", "polars", "pyarrow", "pin", "mypy", "pyright[nodejs]", "nbclient", "nbformat", "ipykernel"]
+NO_NETWORK = 3
+
+
+def run(*line, **options):
+    print("+", " ".join(map(str, line)), flush=True)
+    subprocess.run([str(word) for word in line], check=True, **options)
+
+
+def environment(folder, *packages, without=()):
+    """A virtual environment; packages in `without` may be missing."""
+    venv.create(folder, with_pip=True)
+    python = folder / "bin/python"
+    install = [python, "-m", "pip", "install", "-q", "--disable-pip-version-check"]
+    if subprocess.run([*install, *packages]).returncode != 0:
+        print(f"skipped: pip cannot install {', '.join(packages)}")
+        sys.exit(NO_NETWORK)
+    for package in without:
+        if subprocess.run([*install, package]).returncode != 0:
+            print(f"without {package}: pip cannot install it")
+    return python
+
+
+def zig_linker(tools):
+    """A linker with the C library of old Linuxes: what is compiled already is only linked again."""
+    linker = tools / "zig-cc"
+    target = f"{platform.machine()}-linux-gnu.{OLDEST_GLIBC}"
+    linker.write_text(f'#!/bin/sh\nexec "{tools}/maturin" zig cc -- -target {target} "$@"\n')
+    linker.chmod(0o755)
+    return linker
+
+
+def build(tools, out, manylinux, source=PACKAGE):
+    """The wheel, made by maturin, which looks whether the symbols fit the name that the wheel gets."""
+    line = [tools / "maturin", "build", "--release", "--locked", "-o", out]
+    if manylinux:
+        line += ["--compatibility", f"manylinux_{OLDEST_GLIBC.replace('.', '_')}", "--", "-C", f"linker={zig_linker(tools)}"]
+    # Where the workspace is built: what tests have compiled is not compiled again.
+    extra = {"CARGO_TARGET_DIR": os.environ.get("CARGO_TARGET_DIR", str(ROOT / "target"))}
+    before = set(out.glob("*.whl"))
+    run(*line, cwd=source, env={**os.environ, **extra, "PATH": f"{tools}{os.pathsep}{os.environ['PATH']}"})
+    new = set(out.glob("*.whl")) - before
+    return new.pop() if new else max(out.glob("*.whl"), key=lambda file: file.stat().st_mtime)
+
+
+def sdist(out):
+    """The sources that a wheel is made of, as pip takes them: what git has, and pyproject.toml above it."""
+    version = tomllib.loads((ROOT / "Cargo.toml").read_text())["workspace"]["package"]["version"]
+    name = f"flexarm-{version}"
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch) / name
+        folder.mkdir()
+        archive = subprocess.run(["git", "archive", "HEAD"], cwd=ROOT, check=True, stdout=subprocess.PIPE).stdout
+        subprocess.run(["tar", "x", "-C", folder], input=archive, check=True)
+        # Tests and their data are not built.
+        for part in [".ci", "tests/golden", "tests/verification", "docs/images", "docs/verification"]:
+            shutil.rmtree(folder / part, ignore_errors=True)
+        text = (folder / "crates/flexarm-python/pyproject.toml").read_text()
+        text = text.replace('readme = "README.md"', 'readme = "crates/flexarm-python/README.md"')
+        text = text.replace('python-source = "python"', 'python-source = "crates/flexarm-python/python"\nmanifest-path = "crates/flexarm-python/Cargo.toml"')
+        (folder / "pyproject.toml").write_text(text)
+        about = tomllib.loads(text)["project"]
+        (folder / "PKG-INFO").write_text(
+            f"Metadata-Version: 2.1\nName: flexarm\nVersion: {version}\nSummary: {about['description']}\n"
+            f"Requires-Python: {about['requires-python']}\n" + "".join(f"Requires-Dist: {d}\n" for d in about["dependencies"])
+        )
+        file = out / f"{name}.tar.gz"
+        with tarfile.open(file, "w:gz") as tar:
+            tar.add(folder, name)
+    print(f"{file}: {file.stat().st_size / 1e6:.1f} MB")
+    return file
+
+
+def inspect(wheel):
+    """Small enough, and everything in it."""
+    size = wheel.stat().st_size
+    names = zipfile.ZipFile(wheel).namelist()
+    print(f"{wheel}: {size / 1e6:.1f} MB, {len(names)} files")
+    wanted = ["flexarm/py.typed", "flexarm/_flexarm.pyi", "flexarm/share/robots/kr210/robot.toml", "flexarm/share/trajectories/pick_and_place.toml"]
+    missing = [name for name in wanted if name not in names]
+    if missing or size > MOST_BYTES:
+        sys.exit(f"error: the wheel has {size} bytes (most {MOST_BYTES:.0f}) and lacks {missing}")
+
+
+def test(wheel, quick):
+    """Installs the wheel where there is no compiler, and runs its tests."""
+    with tempfile.TemporaryDirectory() as scratch:
+        scratch = Path(scratch)
+        python = environment(scratch / "venv", *NEEDED, without=() if quick else OTHERS)
+        begin = time.time()
+        run(python, "-m", "pip", "install", "-q", "--no-deps", "--disable-pip-version-check", wheel)
+        empty = scratch / "empty"
+        empty.mkdir()
+        path = os.pathsep.join([str(python.parent), "/usr/bin", "/bin"])
+        if shutil.which("cargo", path=path):
+            sys.exit(f"error: there is a cargo on {path}")
+        bare = {"PATH": path, "HOME": str(scratch), "MPLBACKEND": "Agg"}
+        run(python.parent / "flexarm", "compare", cwd=empty, env=bare)
+        study = "import flexarm; a = flexarm.load('kr210').flexible(); print(a.deflections([None] * 20, step=5e-3))"
+        run(python, "-c", study, cwd=empty, env=bare)
+        print(f"from the wheel to a recording, a report and a study of 20 runs: {time.time() - begin:.1f} s")
+        tests, examples = PACKAGE / "tests", PACKAGE / "examples"
+        there = {**bare, "FLEXARM_EXAMPLES": str(examples)}
+        run(python, "-m", "pytest", "-p", "no:cacheprovider", "-c", PACKAGE / "pyproject.toml", "--rootdir", tests, tests, cwd=empty, env=there)
+
+
+def main():
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    for flag in ["--manylinux", "--sdist", "--no-test", "--quick"]:
+        options.add_argument(flag, action="store_true")
+    options.add_argument("-o", "--out", type=Path, default=ROOT / "target/wheels")
+    args = options.parse_args()
+    out = args.out.resolve()
+    out.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory() as scratch:
+        scratch = Path(scratch)
+        packages = [MATURIN, "ziglang"] if args.manylinux else [MATURIN]
+        tools = environment(scratch / "tools", *packages).parent
+        wheel = build(tools, out, args.manylinux)
+        inspect(wheel)
+        if args.sdist:
+            file = sdist(out)
+            with tarfile.open(file) as tar:
+                tar.extractall(scratch, filter="data")
+            inspect(build(tools, scratch / "again", args.manylinux, scratch / file.name.removesuffix(".tar.gz")))
+    if not args.no_test:
+        test(wheel, args.quick)
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except subprocess.CalledProcessError as error:
+        sys.exit(f"error: status {error.returncode}: {' '.join(map(str, error.cmd))}")
