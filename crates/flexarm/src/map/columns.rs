@@ -20,6 +20,22 @@ pub struct MapColumn {
     pub more_is_better: bool,
 }
 
+impl MapColumn {
+    /// What is to be small: the value, or less it where more is better; infinite where there is none.
+    pub(super) fn cost(&self, value: f64) -> f64 {
+        match self.more_is_better {
+            _ if !value.is_finite() => f64::INFINITY,
+            true => -value,
+            false => value,
+        }
+    }
+}
+
+/// The one that costs least, of equals the first; what costs infinitely much does not count.
+pub(super) fn cheapest(count: usize, cost: impl Fn(usize) -> f64) -> Option<usize> {
+    (0..count).filter(|&k| cost(k).is_finite()).min_by(|&a, &b| cost(a).total_cmp(&cost(b)))
+}
+
 /// The columns of a row, in order.
 #[derive(Clone, Debug)]
 pub(super) struct Layout {
@@ -117,4 +133,21 @@ fn displacement(what: &str, meaning: &str) -> Vec<MapColumn> {
     columns.push(less(&format!("{what}_m"), meaning));
     columns.push(less(&format!("{what}_rad"), &format!("{meaning}: angle")));
     columns
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pose_without_an_answer_is_neither_the_best_nor_the_worst() {
+        let less = less("sag_m", "");
+        let more = MapColumn { more_is_better: true, ..less.clone() };
+        let values = [f64::NAN, 3.0, -f64::NAN, 5.0, f64::INFINITY, 1.0, 5.0, f64::NEG_INFINITY, 1.0];
+        for (column, best, worst) in [(less, 5, 3), (more, 3, 5)] {
+            assert_eq!(cheapest(values.len(), |k| column.cost(values[k])), Some(best));
+            assert_eq!(cheapest(values.len(), |k| -column.cost(values[k])), Some(worst));
+            assert_eq!(cheapest(1, |k| column.cost(values[k])), None);
+        }
+    }
 }

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::columns::{HEAD, MapColumn};
+use super::columns::{HEAD, MapColumn, cheapest};
 
 /// Quantiles that are told.
 pub const QUANTILES: [f64; 5] = [0.05, 0.25, 0.5, 0.75, 0.95];
@@ -40,23 +40,15 @@ impl MapTable {
         self.values.iter().skip(column).step_by(self.columns.len()).copied().collect()
     }
 
-    /// What is to be small: the value, or less it where more is better; infinite where there is none.
+    /// What is to be small; infinite where there is none.
     pub(super) fn cost(&self, column: usize, value: f64) -> f64 {
-        match self.columns[column].more_is_better {
-            _ if value.is_nan() => f64::INFINITY,
-            true => -value,
-            false => value,
-        }
+        self.columns[column].cost(value)
     }
 
     /// Rows with the best and with the worst value of a column.
     pub(super) fn extremes(&self, column: usize) -> Option<(usize, usize)> {
         let cost = |row: usize| self.cost(column, self.row(row)[column]);
-        let known = || (0..self.rows()).filter(|&row| cost(row).is_finite());
-        let best = known().min_by(|&a, &b| cost(a).total_cmp(&cost(b)))?;
-        // Of equals the first, either way.
-        let worst = known().min_by(|&a, &b| cost(b).total_cmp(&cost(a)))?;
-        Some((best, worst))
+        Some((cheapest(self.rows(), cost)?, cheapest(self.rows(), |row| -cost(row))?))
     }
 
     /// Ranges of all quantities, in the order of the columns.

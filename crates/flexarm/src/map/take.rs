@@ -6,7 +6,7 @@ use flexarm_kinematics::Pose;
 use nalgebra::Rotation3;
 use rayon::prelude::*;
 
-use super::columns::Layout;
+use super::columns::{Layout, cheapest};
 use super::evaluate::{Evaluator, Seat};
 use super::finder::Finder;
 use super::region::{Grid, pose_at};
@@ -172,17 +172,18 @@ impl<'a> Worker<'a> {
         }
     }
 
-    /// The rows of the place that are asked for.
+    /// The rows of the place that are asked for; the first if none has an answer.
     fn keep(&self, rows: &mut Vec<f64>) {
         let Choice { layout, keep, by } = self.choice;
-        let more = layout.columns[*by].more_is_better;
-        let cost = |row: &&[f64]| if more { -row[*by] } else { row[*by] };
-        let all = self.rows.chunks_exact(layout.width());
+        let (column, width) = (&layout.columns[*by], layout.width());
+        let count = self.rows.len() / width;
+        let cost = |row: usize| column.cost(self.rows[row * width + by]);
         let kept = match keep {
+            _ if count == 0 => return,
             KeptPoses::All => return rows.extend(&self.rows),
-            KeptPoses::Best => all.min_by(|a, b| cost(a).total_cmp(&cost(b))),
-            KeptPoses::Worst => all.min_by(|a, b| cost(b).total_cmp(&cost(a))),
+            KeptPoses::Best => cheapest(count, cost),
+            KeptPoses::Worst => cheapest(count, |row| -cost(row)),
         };
-        rows.extend(kept.unwrap_or_default());
+        rows.extend(&self.rows[kept.unwrap_or_default() * width..][..width]);
     }
 }
