@@ -16,6 +16,10 @@ pub struct HoldMetrics {
     pub start_s: f64,
     /// End, s.
     pub end_s: f64,
+    /// Where the rigid tool is, m, world axes.
+    pub place_m: [f64; 3],
+    /// Translation error at the end, m, in world axes.
+    pub end_error_m: [f64; 3],
     /// Translation error that the arm comes to rest at, m, in world axes: the given quasi-static value at the end of
     /// the hold; otherwise a weighted mean (`sin²`) over as many whole periods of the oscillation as fit into the
     /// second half of the hold (at least two); otherwise over its last quarter.
@@ -38,6 +42,8 @@ pub(crate) struct Hold<'a> {
     pub(crate) times: &'a [f64],
     /// Translation errors, m.
     pub(crate) errors: Vec<[f64; 3]>,
+    /// Place of the rigid tool, m.
+    pub(crate) place_m: [f64; 3],
     /// Quasi-static error at the end of the hold, m, when known.
     pub(crate) final_static: Option<[f64; 3]>,
     /// Direction in which the rigid tool arrived; `None` when it did not move.
@@ -54,6 +60,8 @@ impl Hold<'_> {
         HoldMetrics {
             start_s,
             end_s: self.end(),
+            place_m: self.place_m,
+            end_error_m: self.errors[self.errors.len() - 1],
             final_error_m: final_error,
             settling_s: self.settling(start_s, &final_error, band_m, line),
             overshoot_m: self.overshoot(&final_error, band_m),

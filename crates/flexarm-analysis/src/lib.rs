@@ -58,6 +58,7 @@ mod participation;
 mod path_frame;
 mod pose_error;
 mod record;
+mod repeated_pose;
 mod shaping;
 pub mod signal;
 mod spectrum;
@@ -78,5 +79,6 @@ pub use participation::{compliance_parts, effective_mass, mode_outputs, strain_e
 pub use path_frame::{PathFrame, path_frames};
 pub use pose_error::tcp_error;
 pub use record::{ErrorRecord, RecordError};
+pub use repeated_pose::RepeatedPose;
 pub use shaping::{Shaper, ShaperKind};
 pub use spectrum::{AmplitudeSpectrum, SpectralLine, Taper, amplitude_spectrum, strongest_line};

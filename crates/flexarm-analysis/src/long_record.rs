@@ -17,6 +17,7 @@ use crate::error_parts::{ErrorParts, error_parts};
 use crate::hold::HoldMetrics;
 use crate::metrics::{MetricSettings, TcpMetrics, tcp_metrics_on_path};
 use crate::record::{ErrorRecord, RecordError};
+use crate::repeated_pose::repeated_poses;
 
 /// First samples of a stop that are never dropped, and last ones of a move: ringing is seen there, and the way of arrival.
 const RINGING: usize = 1 << 15;
@@ -173,6 +174,7 @@ impl LongRecord {
             lateral_peak_m,
             path_accuracy_m: totals.off_path_m,
             path_rms_m: (totals.squares / totals.moving.max(1) as f64).sqrt(),
+            repeated: repeated_poses(&holds),
             holds,
             ..rest
         })

@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 use crate::hold::{Hold, HoldMetrics};
 use crate::path_frame::{path_frames, tangential_at};
 use crate::record::{ErrorRecord, RecordError};
+use crate::repeated_pose::{RepeatedPose, repeated_poses};
 use crate::spectrum::{Taper, strongest_line_from};
 
 /// What a user may choose about the figures.
@@ -66,6 +67,8 @@ pub struct TcpMetrics {
     pub path_rms_m: f64,
     /// The hold after each move, where there is one (two samples at least), in order.
     pub holds: Vec<HoldMetrics>,
+    /// Poses at which the tool rests more than once.
+    pub repeated: Vec<RepeatedPose>,
 }
 
 /// Condenses a record of the TCP error.
@@ -138,6 +141,7 @@ pub fn tcp_metrics_on_path(
         lateral_peak_m,
         path_accuracy_m,
         path_rms_m,
+        repeated: repeated_poses(&holds),
         holds,
     })
 }
@@ -202,6 +206,7 @@ fn holds(record: &ErrorRecord<'_>, band: f64) -> Vec<HoldMetrics> {
         let hold = Hold {
             times: &record.times[first..after],
             errors: record.errors[first..after].iter().map(|e| [e[0], e[1], e[2]]).collect(),
+            place_m: record.rigid_positions[after - 1],
             final_static: record.quasi_static.map(|values| values[after - 1]),
             approach: has_moved.then(|| tangential_at(record.times, record.rigid_positions, first)),
         };

@@ -1,6 +1,6 @@
 //! `flexarm lobes`: flags to a request, a table for people.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
@@ -78,15 +78,15 @@ pub(crate) struct LobesArgs {
     pub(crate) no_files: bool,
 }
 
+/// The tool of a file or a shipped one, at other speeds than its own if any are told.
+pub(crate) fn cutting_tool(given: &Path, rpm: &[f64]) -> Result<CuttingTool, Failure> {
+    let tool = CuttingTool::load(shipped::tool(given)?)?;
+    Ok(if rpm.is_empty() { tool } else { tool.at_speeds(rpm.to_vec()) })
+}
+
 pub(crate) fn run(cli: &Cli, args: &LobesArgs) -> Result<ExitCode, Failure> {
     let robot = Robot::load_with(&shipped::robot(Some(&args.pose.robot))?, &load_options(&args.pose.load)?)?;
-    let mut tool = CuttingTool::load(shipped::tool(&args.tool)?)?;
-    if !args.rpm.is_empty() {
-        let mut rpm = args.rpm.clone();
-        rpm.sort_by(f64::total_cmp);
-        rpm.dedup();
-        tool = tool.at_speeds(rpm);
-    }
+    let tool = cutting_tool(&args.tool, &args.rpm)?;
     let at = values::joint_values(args.pose.at.as_deref(), &robot)?;
     if let Some(words) = &args.cut {
         return follow(cli, args, words, &robot, &tool, at.as_deref());

@@ -13,6 +13,7 @@ use flexarm::{Motion, Robot};
 
 use crate::args::{Cli, ModellingArgs, RobotArgs};
 use crate::failure::Failure;
+use crate::lobes::cutting_tool;
 use crate::motion::MotionInputArgs;
 use crate::print::{lines, table, warning};
 use crate::shipped::OutputFolder;
@@ -29,7 +30,9 @@ Examples:
   In joints 2 and 3, the others at zero:
       flexarm map kr210 --over joint_2=-120deg:0deg:61 --over joint_3=0deg:120deg:61
   Along a motion:
-      flexarm map kr210 --along pick_and_place --points 500";
+      flexarm map kr210 --along pick_and_place --points 500
+  How deep an end mill may cut before it chatters, over a table:
+      flexarm map kr210 --box 1.2:2.4,-0.6:0.6,0.6:0.6 --grid 0.1 --tool endmill_20mm --rpm 8000";
 
 #[derive(Clone, Copy, Debug, Default, ValueEnum)]
 pub(crate) enum KeepName {
@@ -86,7 +89,23 @@ pub(crate) struct MapArgs {
     /// Force and moment on the TCP besides weight, world axes (N, N m)
     #[arg(long, help_heading = "What", value_name = "FX,FY,FZ[,TX,TY,TZ]", allow_hyphen_values = true)]
     pub(crate) wrench: Option<String>,
-    /// Quantity by which poses are compared [default: error_m with a wrench, else compliance_worst_m_per_n]
+    /// A tool that cuts: how deep it may before it chatters; a .toml file, or the name of a shipped one (flexarm format tool)
+    #[arg(long, help_heading = "What", value_name = "TOOL", requires = "rpm")]
+    pub(crate) tool: Option<PathBuf>,
+    /// Spindle speeds of the tool, of which the lowest limit counts (1/min)
+    #[arg(
+        long,
+        help_heading = "What",
+        value_name = "RPM,...",
+        value_delimiter = ',',
+        allow_hyphen_values = true,
+        requires = "tool"
+    )]
+    pub(crate) rpm: Vec<f64>,
+    /// Limits of depth from the mean cutting force alone (zero-order solution): quick, blind to period doubling
+    #[arg(long, help_heading = "What", requires = "tool")]
+    pub(crate) zero_order: bool,
+    /// Quantity by which poses are compared [default: depth_m with a tool, error_m with a wrench, else compliance_worst_m_per_n]
     #[arg(long, help_heading = "What", value_name = "NAME")]
     pub(crate) by: Option<String>,
     /// Which of a place's poses are kept, of all directions and branches
@@ -190,6 +209,8 @@ pub(crate) fn run(cli: &Cli, args: &MapArgs) -> Result<ExitCode, Failure> {
         region,
         at,
         wrench,
+        tool: args.tool.as_ref().map(|given| cutting_tool(given, &args.rpm)).transpose()?,
+        zero_order: args.zero_order,
         frequencies: Some(args.frequencies),
         keep: match args.keep {
             KeepName::Best => KeptPoses::Best,

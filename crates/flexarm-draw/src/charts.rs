@@ -5,10 +5,9 @@
 
 use std::fmt::Write as _;
 
-use crate::palette::{self, Ground, Rgb};
+use crate::palette::{self, Ground};
+use crate::svg::escaped;
 
-/// From low to high: after viridis [van der Walt and Smith 2015], even for people who see red and green alike.
-const SCALE: [Rgb; 6] = [[253, 231, 37], [122, 209, 81], [34, 168, 132], [42, 120, 142], [65, 68, 135], [68, 1, 84]];
 /// Letters.
 const FONT: &str = "font-family=\"system-ui, sans-serif\"";
 /// Frames and ticks.
@@ -147,8 +146,10 @@ fn upright(out: &mut String, (x, y): (f64, f64), font: u32, words: &str) {
     );
 }
 
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+fn polyline(out: &mut String, ink: &str, points: impl Iterator<Item = (f64, f64)>) {
+    let line: Vec<String> = points.map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
+    let _ =
+        writeln!(out, "<polyline points=\"{}\" fill=\"none\" stroke=\"{ink}\" stroke-width=\"1.5\"/>", line.join(" "));
 }
 
 fn picture(width: f64, height: f64, inside: &str) -> String {
@@ -173,13 +174,6 @@ fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
     (low - room, high + room)
 }
 
-/// Colour of a part of the scale.
-fn color(part: f64) -> Rgb {
-    let place = part.clamp(0.0, 1.0) * (SCALE.len() - 1) as f64;
-    let below = (place as usize).min(SCALE.len() - 2);
-    palette::mix(SCALE[below], SCALE[below + 1], place - below as f64)
-}
-
 impl HeatMap<'_> {
     /// The picture, with a number in each cell if there is room.
     pub fn svg(&self) -> String {
@@ -195,7 +189,7 @@ impl HeatMap<'_> {
             let (column, row) = (k % columns, k / columns);
             let (x, y) = (left + cell.0 * column as f64, top + height - cell.1 * (row + 1) as f64);
             let part = if high > low { (value - low) / (high - low) } else { 0.5 };
-            let fill = palette::hex(color(part));
+            let fill = palette::hex(palette::magnitude(part));
             let number = shown(*value, (low, high));
             let _ = writeln!(
                 out,
@@ -205,7 +199,7 @@ impl HeatMap<'_> {
                 escaped(&format!("{}, {}: {value}", self.x[column], self.y[row]))
             );
             if cell.0 >= 44.0 && cell.1 >= 16.0 {
-                let ink = if part < 0.5 { "#1c2530" } else { "#fff" };
+                let ink = if part < 0.5 { "#fff" } else { "#1c2530" };
                 let (x, y) = (x + 0.5 * cell.0, y + 0.5 * cell.1 + 4.0);
                 let _ = writeln!(
                     out,
@@ -234,7 +228,7 @@ fn legend(out: &mut String, (x, y): (f64, f64), height: f64, (low, high): (f64, 
     const STEPS: usize = 48;
     for k in 0..STEPS {
         let part = k as f64 / (STEPS - 1) as f64;
-        let fill = palette::hex(color(part));
+        let fill = palette::hex(palette::magnitude(part));
         let (top, step) = (y + height * (1.0 - (k + 1) as f64 / STEPS as f64), height / STEPS as f64 + 0.5);
         let _ = writeln!(out, "<rect x=\"{x:.1}\" y=\"{top:.1}\" width=\"14\" height=\"{step:.1}\" fill=\"{fill}\"/>");
     }
@@ -263,19 +257,7 @@ pub fn effects(rows: &[Vec<EffectPanel<'_>>]) -> String {
                 y,
             };
             frame.draw(&mut out, 10);
-            let line: Vec<String> = panel
-                .points
-                .iter()
-                .map(|p| {
-                    let (x, y) = frame.at(p[0], p[1]);
-                    format!("{x:.1},{y:.1}")
-                })
-                .collect();
-            let _ = writeln!(
-                out,
-                "<polyline points=\"{}\" fill=\"none\" stroke=\"{ink}\" stroke-width=\"1.5\"/>",
-                line.join(" ")
-            );
+            polyline(&mut out, &ink, panel.points.iter().map(|p| frame.at(p[0], p[1])));
             for [x, mean, error] in &panel.points {
                 let ((x, y), low, high) =
                     (frame.at(*x, *mean), frame.at(*x, mean - error).1, frame.at(*x, mean + error).1);
@@ -363,19 +345,7 @@ impl ScatterPlot<'_> {
         let mut out = String::new();
         frame.draw(&mut out, 11);
         dots(&mut out, &frame, self.points, 2.2, &grey, 0.5);
-        let line: Vec<String> = self
-            .front
-            .iter()
-            .map(|p| {
-                let (x, y) = frame.at(p[0], p[1]);
-                format!("{x:.1},{y:.1}")
-            })
-            .collect();
-        let _ = writeln!(
-            out,
-            "<polyline points=\"{}\" fill=\"none\" stroke=\"{ink}\" stroke-width=\"1.5\"/>",
-            line.join(" ")
-        );
+        polyline(&mut out, &ink, self.front.iter().map(|p| frame.at(p[0], p[1])));
         dots(&mut out, &frame, self.front, 3.5, &ink, 1.0);
         if let Some(best) = self.best {
             let (x, y) = frame.at(best[0], best[1]);

@@ -6,6 +6,7 @@
 use std::fmt::Write as _;
 
 use crate::palette::{hex, magnitude};
+use crate::svg::escaped;
 
 /// Most cells along an axis of the picture.
 const MOST_CELLS: usize = 120;
@@ -244,10 +245,6 @@ fn number_of_three_digits(x: f64) -> String {
         _ if !(1e-3..1e5).contains(&size) => format!("{x:.2e}"),
         _ => format!("{x:.*}", (2 - size.log10().floor() as i64).clamp(0, 6) as usize),
     }
-}
-
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 #[cfg(test)]

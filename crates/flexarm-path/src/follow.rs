@@ -5,7 +5,8 @@
 //! ```
 //! From one point to the next the joints are predicted by their Taylor polynomial and corrected by Newton's method; steps are
 //! halved where the two disagree, so that the branch of the inverse kinematics is kept. An arm with fewer than six joints
-//! follows paths that it can follow (least squares, and a check); of an arm with more, joints are held until six are left.
+//! follows paths that it can follow (least squares, and a check); of an arm with more, joints are held until six are left, or move
+//! as [`ToolWay::guided`] tells.
 //!
 //! Start at [`Follower::start`], then [`Follower::advance`].
 
@@ -16,7 +17,8 @@ use flexarm_kinematics::{
 use flexarm_spatial::{Pose, rotation_vector};
 use nalgebra::{DMatrix, DVector, Matrix6xX, Vector6};
 
-use crate::curve::{TURN_LENGTH, ToolCurve, ToolJet};
+use crate::curve::{TURN_LENGTH, ToolCurve};
+use crate::route::between;
 
 /// Newton's method has arrived below this, m and rad.
 const ARRIVED: f64 = 1e-12;
@@ -38,6 +40,49 @@ pub struct JointJet {
     pub d: DVector<f64>,
     /// Second derivative.
     pub dd: DVector<f64>,
+}
+
+/// A coordinate that moves along a way by its own polynomial while others follow the tool.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GuidedJoint {
+    /// Number of the coordinate.
+    pub k: usize,
+    /// Value and two derivatives by the parameter where the way begins (rad or m, and per m).
+    pub from: [f64; 3],
+    /// The same where it ends.
+    pub to: [f64; 3],
+}
+
+impl GuidedJoint {
+    /// Value and two derivatives at `s` of a way of length `h`: the quintic between both ends.
+    pub fn at(&self, h: f64, s: f64) -> [f64; 3] {
+        let one = |x: f64| DVector::from_element(1, x);
+        let jet = |[q, d, dd]: [f64; 3]| JointJet { q: one(q), d: one(d), dd: one(dd) };
+        let (found, _) = between(&jet(self.from), &jet(self.to), h, s);
+        [found.q[0], found.d[0], found.dd[0]]
+    }
+}
+
+/// A curve that a frame of the arm follows.
+#[derive(Debug, Clone)]
+pub struct ToolWay {
+    /// The curve.
+    pub curve: Box<ToolCurve>,
+    /// What follows it.
+    pub frame: Frame,
+    /// Joints of a redundant arm that move along it by themselves; the others that it has too many stay.
+    pub guided: Vec<GuidedJoint>,
+}
+
+impl ToolWay {
+    /// With all joints that are left over at rest.
+    pub fn new(curve: ToolCurve, frame: Frame) -> Self {
+        Self { curve: Box::new(curve), frame, guided: Vec::new() }
+    }
+
+    fn guides(&self, s: f64) -> impl Iterator<Item = (usize, [f64; 3])> {
+        self.guided.iter().map(move |joint| (joint.k, joint.at(self.curve.length(), s)))
+    }
 }
 
 /// The joints cannot follow the tool.
@@ -164,12 +209,21 @@ impl<'m> Follower<'m> {
         None
     }
 
-    /// Values and derivatives where the tool is `tool`, from values near by.
-    fn jet(&mut self, tool: &ToolJet, near: &DVector<f64>) -> Option<JointJet> {
+    /// Values and derivatives at `s` of a way, from values near by.
+    fn jet(&mut self, way: &ToolWay, s: f64, near: &DVector<f64>) -> Option<JointJet> {
+        let tool = way.curve.at(s);
         let mut q = near.clone();
+        for (k, [value, ..]) in way.guides(s) {
+            q[k] = value;
+        }
         self.correct(&tool.X, &mut q)?;
         let mut d = DVector::zeros(q.len());
-        for (x, &k) in self.solve(&tool.V)?.iter().zip(&self.active) {
+        let mut V = tool.V;
+        for (k, [_, rate, _]) in way.guides(s) {
+            d[k] = rate;
+            V -= self.J.column(k) * rate;
+        }
+        for (x, &k) in self.solve(&V)?.iter().zip(&self.active) {
             d[k] = *x;
         }
         self.state.q.copy_from(&q);
@@ -178,7 +232,12 @@ impl<'m> Follower<'m> {
         frame_jacobian_derivative(self.model, &self.data, &self.state, &self.frame, &mut self.Jdot);
         let bias: Vector6<f64> = (&self.Jdot * &d).fixed_rows::<6>(0).into();
         let mut dd = DVector::zeros(q.len());
-        for (x, &k) in self.solve(&(tool.A - bias))?.iter().zip(&self.active) {
+        let mut A = tool.A - bias;
+        for (k, [.., second]) in way.guides(s) {
+            dd[k] = second;
+            A -= self.J.column(k) * second;
+        }
+        for (x, &k) in self.solve(&A)?.iter().zip(&self.active) {
             dd[k] = *x;
         }
         Some(JointJet { q, d, dd })
@@ -204,27 +263,27 @@ impl<'m> Follower<'m> {
         self.scaled(&self.active).singular_values().min()
     }
 
-    /// Values and derivatives where a curve begins at `s`, from joint values that bring the tool there or near.
+    /// Values and derivatives where a way begins at `s`, from joint values that bring the tool there or near.
     ///
     /// # Errors
     /// [`Blocked`]: the pose is not met near these values, or the arm is singular there.
-    pub fn start(&mut self, curve: &ToolCurve, s: f64, q: &DVector<f64>) -> Result<JointJet, Blocked> {
-        self.jet(&curve.at(s), q).ok_or_else(|| self.blocked(s, q))
+    pub fn start(&mut self, way: &ToolWay, s: f64, q: &DVector<f64>) -> Result<JointJet, Blocked> {
+        self.jet(way, s, q).ok_or_else(|| self.blocked(s, q))
     }
 
     /// Values and derivatives at `to`, from those at `from`; either may be the larger.
     ///
     /// # Errors
     /// [`Blocked`]: the arm cannot reach that far on this branch, or passes a singular pose.
-    pub fn advance(&mut self, curve: &ToolCurve, from: f64, at: &JointJet, to: f64) -> Result<JointJet, Blocked> {
-        let shortest = SHORTEST * curve.length().max((to - from).abs());
+    pub fn advance(&mut self, way: &ToolWay, from: f64, at: &JointJet, to: f64) -> Result<JointJet, Blocked> {
+        let shortest = SHORTEST * way.curve.length().max((to - from).abs());
         let (mut s, mut jet, mut h) = (from, at.clone(), to - from);
         while s != to {
             let next = if (to - s).abs() <= h.abs() { to } else { s + h };
             let step = next - s;
             let predicted = &jet.q + &jet.d * step + &jet.dd * (0.5 * step * step);
             let moved = (&predicted - &jet.q).amax() <= 0.5;
-            let found = if moved { self.jet(&curve.at(next), &predicted) } else { None };
+            let found = if moved { self.jet(way, next, &predicted) } else { None };
             match found.filter(|found| (&found.q - &predicted).amax() <= SURPRISE) {
                 Some(found) => (s, jet, h) = (next, found, 2.0 * h),
                 None if 0.5 * step.abs() < shortest => return Err(self.blocked(s, &jet.q)),
@@ -271,13 +330,13 @@ mod tests {
         let X0 = pose_at(&model, &frame, &q);
         let turned = Rotation3::new(Vector3::new(0.2, -0.3, 0.1)) * X0.rotation;
         let X1 = Pose::from_parts(Translation3::from(X0.translation.vector + Vector3::new(0.1, -0.2, 0.1)), turned);
-        let line = ToolCurve::line(&X0, &X1);
+        let line = ToolWay::new(ToolCurve::line(&X0, &X1), frame.clone());
         let mut follower = Follower::new(&model, &frame, &q, None);
         let start = follower.start(&line, 0.0, &q).unwrap();
-        let end = follower.advance(&line, 0.0, &start, line.length()).unwrap();
+        let end = follower.advance(&line, 0.0, &start, line.curve.length()).unwrap();
         let X = pose_at(&model, &frame, &end.q);
         assert!((X.translation.vector - X1.translation.vector).norm() < 1e-12); // measured 1e-16
-        let middle = 0.4 * line.length();
+        let middle = 0.4 * line.curve.length();
         let at = |follower: &mut Follower, s: f64| follower.advance(&line, 0.0, &start, s).unwrap();
         let (h, mid) = (1e-4, at(&mut follower, middle));
         let (low, high) = (at(&mut follower, middle - h), at(&mut follower, middle + h));
@@ -291,9 +350,10 @@ mod tests {
         let X0 = pose_at(&model, &frame, &q);
         let far = X0.translation.vector + X0.translation.vector.normalize() * 20.0;
         let line = ToolCurve::line(&X0, &Pose::from_parts(Translation3::from(far), X0.rotation));
+        let line = ToolWay::new(line, frame.clone());
         let mut follower = Follower::new(&model, &frame, &q, None);
         let start = follower.start(&line, 0.0, &q).unwrap();
-        let blocked = follower.advance(&line, 0.0, &start, line.length()).unwrap_err();
+        let blocked = follower.advance(&line, 0.0, &start, line.curve.length()).unwrap_err();
         assert!(blocked.s > 0.0 && blocked.s < 20.0 && blocked.sigma < 0.05, "{blocked:?}");
     }
 }

@@ -1,12 +1,12 @@
 //! From the moves of a program to ways from target to target, with the joints at both ends.
 
-use flexarm_kinematics::Frame;
+use flexarm_kinematics::{Data, Frame, IkOptions, inverse_kinematics_with_rule};
 use flexarm_spatial::{Pose, rotation_vector};
 use nalgebra::{DVector, Vector3, Vector6};
 
 use crate::branch::{Branches, NoBranch};
 use crate::curve::{ToolCurve, ToolJet};
-use crate::follow::{Blocked, Follower, JointJet};
+use crate::follow::{Blocked, Follower, GuidedJoint, JointJet, ToolWay};
 use crate::plan::{PathError, PathOptions, ProgramArm};
 use crate::program::{Blend, Item, Move, MoveKind, Target};
 
@@ -15,11 +15,18 @@ const NO_WAY: f64 = 1e-12;
 /// Length that a radian counts in a joint move that does not move the tool, m.
 const JOINT_LENGTH: f64 = 0.5;
 
+/// Part of a joint's speed and acceleration that it may use for a better posture while the tool moves.
+const PART: f64 = 0.2;
+/// Speed of the tool where the program tells none, m/s.
+const SPEED: f64 = 0.5;
+/// A shift of less than this part of what is wanted is none.
+const SMALLEST_PART: f64 = 1e-6;
+
 /// Along which way a leg goes, over a parameter in metres.
 #[derive(Debug, Clone)]
 pub(crate) enum Way {
     /// A frame of the arm along a curve.
-    Tool { curve: Box<ToolCurve>, frame: Frame },
+    Tool(ToolWay),
     /// All joints straight: `q0 + d s`.
     Joints { q0: DVector<f64>, d: DVector<f64> },
     /// The quintic between two joint jets.
@@ -76,7 +83,7 @@ pub(crate) struct Legs<'m> {
 impl<'m> Legs<'m> {
     pub(crate) fn new(arm: &ProgramArm<'m>, options: &PathOptions, hold: Option<usize>) -> Self {
         let branches = Branches::new(arm.model);
-        Self { arm: arm.clone(), options: *options, branches, followers: Vec::new(), hold }
+        Self { arm: arm.clone(), options: options.clone(), branches, followers: Vec::new(), hold }
     }
 
     /// The flange with the tool of a move.
@@ -183,19 +190,13 @@ impl<'m> Legs<'m> {
             return Ok(None);
         }
         let q0 = start.q.clone();
-        let follower = self.follower(&frame, &q0);
-        let begun = follower.start(&curve, 0.0, &q0);
-        let ended = begun.and_then(|jet| follower.advance(&curve, 0.0, &jet, length));
-        let q1 = ended.map_err(|blocked| blocked_error(of, &curve, blocked))?.q;
+        let mut way = ToolWay::new(curve, frame);
+        let mut q1 = self.end_of(&way, &q0).map_err(|blocked| blocked_error(of, &way.curve, blocked))?;
+        if let Some((guided, q)) = self.guided(of, &way, &q0, &q1) {
+            (way.guided, q1) = (guided, q);
+        }
         start.q.copy_from(&q1);
-        Ok(Some(Leg {
-            of: of.clone(),
-            way: Way::Tool { curve: Box::new(curve), frame },
-            length,
-            q0,
-            q1,
-            smooth: false,
-        }))
+        Ok(Some(Leg { of: of.clone(), way: Way::Tool(way), length, q0, q1, smooth: false }))
     }
 
     /// Values of the controller's axes put into all coordinates.
@@ -245,6 +246,59 @@ impl<'m> Legs<'m> {
         };
         let points: Vec<Vector3<f64>> = (0..=CHORDS).map(&mut point).collect();
         points.windows(2).map(|pair| (pair[1] - pair[0]).norm()).sum()
+    }
+
+    /// Joints where a way ends.
+    fn end_of(&mut self, way: &ToolWay, q0: &DVector<f64>) -> Result<DVector<f64>, Blocked> {
+        let follower = self.follower(&way.frame, q0);
+        let begun = follower.start(way, 0.0, q0)?;
+        Ok(follower.advance(way, 0.0, &begun, way.curve.length())?.q)
+    }
+
+    /// How the joints that are left over move along a way so that it ends as the rule of the options wants, or part of the way
+    /// there; and the joints at its end. None without a rule, or if nothing better is found.
+    fn guided(
+        &mut self,
+        of: &Move,
+        way: &ToolWay,
+        q0: &DVector<f64>,
+        q1: &DVector<f64>,
+    ) -> Option<(Vec<GuidedJoint>, DVector<f64>)> {
+        let rule = self.options.rule.clone()?;
+        let left_over = self.follower(&way.frame, q0).held();
+        let length = way.curve.length();
+        if left_over.is_empty() {
+            return None;
+        }
+        let (model, X1) = (self.arm.model, way.curve.at(length).X);
+        let mut data = Data::new(model);
+        let options = IkOptions::default();
+        let wanted = inverse_kinematics_with_rule(model, &mut data, &way.frame, &X1, q1, &options, &rule).ok()?.q;
+        let room = left_over.iter().map(|&k| self.room(of, k, length) / (wanted[k] - q0[k]).abs()).fold(1.0, f64::min);
+        let mut part = room;
+        while part * room > SMALLEST_PART {
+            let joint = |&k: &usize| {
+                let to = q0[k] + part * (wanted[k] - q0[k]);
+                GuidedJoint { k, from: [q0[k], 0.0, 0.0], to: [to, 0.0, 0.0] }
+            };
+            let trial = ToolWay { guided: left_over.iter().map(joint).collect(), ..way.clone() };
+            if let Ok(q) = self.end_of(&trial, q0) {
+                return Some((trial.guided, q));
+            }
+            part *= 0.5;
+        }
+        None
+    }
+
+    /// How far a joint may go by itself along a way without slowing the tool: a fifth of its speed and acceleration.
+    fn room(&self, of: &Move, k: usize, length: f64) -> f64 {
+        // Largest derivatives of the quintic from rest to rest over its length.
+        const RATE: f64 = 1.875;
+        const SECOND: f64 = 5.7735;
+        let (bounds, speed) = (&self.arm.bounds[k], of.speed.linear_m_s.unwrap_or(SPEED));
+        let by_rate = PART * bounds.velocity / speed * length / RATE;
+        let by_second = PART * bounds.acceleration / speed.powi(2) * length.powi(2) / SECOND;
+        by_rate.min(by_second)
     }
 
     /// Pieces of a spline through the targets of moves that follow each other.

@@ -18,7 +18,7 @@ mod schedule;
 pub mod time_law;
 
 pub use curve::{ArcError, TURN_LENGTH, ToolCurve, ToolJet};
-pub use follow::{Blocked, Follower, JointJet, coordinates_of};
+pub use follow::{Blocked, Follower, GuidedJoint, JointJet, ToolWay, coordinates_of};
 pub use plan::{
     ControllerAxis, JointBounds, PathError, PathOptions, Planned, PlannedMove, ProgramArm, Slowed, SlowedBy, plan,
 };

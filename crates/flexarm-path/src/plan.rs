@@ -1,6 +1,6 @@
 //! From a program to joints over time: the public face of the planner, what it is told and what it tells.
 
-use flexarm_kinematics::{ControllerAxes, Frame, Model};
+use flexarm_kinematics::{ControllerAxes, Frame, Model, NullSpaceRule};
 use flexarm_spatial::Pose;
 use flexarm_trajectory::{JointKnots, Trajectory, TrajectoryError};
 use nalgebra::DVector;
@@ -27,7 +27,7 @@ pub struct JointBounds {
 }
 
 /// How paths are resolved.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct PathOptions {
     /// Points of the time law are no further apart than this, m of path.
     pub spacing_m: f64,
@@ -35,11 +35,14 @@ pub struct PathOptions {
     pub chord_m: f64,
     /// Accelerations rise and fall in this time, s; 0: they jump.
     pub rise_s: f64,
+    /// What an arm with more joints than the path needs does with them: it moves them along towards the posture of this rule; they
+    /// stay without it.
+    pub rule: Option<NullSpaceRule>,
 }
 
 impl Default for PathOptions {
     fn default() -> Self {
-        Self { spacing_m: 5e-3, chord_m: 1e-10, rise_s: 0.05 }
+        Self { spacing_m: 5e-3, chord_m: 1e-10, rise_s: 0.05, rule: None }
     }
 }
 

@@ -4,7 +4,7 @@ use flexarm_spatial::{Pose, rotation_vector};
 use nalgebra::{DVector, Vector3};
 
 use crate::curve::{TURN_LENGTH, ToolCurve, ToolJet};
-use crate::follow::{Follower, JointJet};
+use crate::follow::{Follower, GuidedJoint, JointJet, ToolWay};
 use crate::legs::{Leg, Legs, Way, blocked_error};
 use crate::plan::{PathError, PathOptions};
 use crate::program::{Blend, Speed};
@@ -127,22 +127,22 @@ impl Route {
 
     /// Puts stations along a stretch behind those that are there.
     fn add(&mut self, owner: &mut Legs<'_>, stretch: Stretch) -> Result<(), PathError> {
-        let options = owner.options;
+        let options = owner.options.clone();
         let (points, tool, sigma) = match &stretch.way {
-            Way::Tool { curve, frame } => {
+            Way::Tool(way) => {
                 let near =
                     self.stations.last().map_or_else(|| self.legs[stretch.leg].q0.clone(), |last| last.q.clone());
-                let follower = owner.follower(frame, &near);
+                let follower = owner.follower(&way.frame, &near);
                 let of = &self.legs[stretch.leg].of;
-                let walked = walk(follower, curve, stretch.range, &near, &options);
-                let (points, sigma) = walked.map_err(|blocked| blocked_error(of, curve, blocked))?;
-                let tool = points.iter().map(|(s, _)| curve.at(*s)).collect();
+                let walked = walk(follower, way, stretch.range, &near, &options);
+                let (points, sigma) = walked.map_err(|blocked| blocked_error(of, &way.curve, blocked))?;
+                let tool = points.iter().map(|(s, _)| way.curve.at(*s)).collect();
                 (points, tool, Some(sigma))
             }
             _ => (straight(&stretch.way, stretch.range, &options), Vec::new(), None),
         };
         let travel = match (&stretch.way, stretch.speed.linear_m_s) {
-            (Way::Tool { .. }, _) | (_, None) => Vec::new(),
+            (Way::Tool(_), _) | (_, None) => Vec::new(),
             (_, Some(_)) => travel(owner, &self.legs[stretch.leg], &points),
         };
         let origin = self.stations.last().map_or(0.0, |last| last.s) - stretch.range[0];
@@ -180,10 +180,10 @@ fn corner(a: &Leg, b: &Leg) -> Corner {
     if a.of.blend == Blend::Stop {
         return Corner::Stop("the program stops here");
     }
-    if let (Way::Tool { curve, frame }, Way::Tool { curve: next, frame: other }) = (&a.way, &b.way)
-        && frame.X_BF == other.X_BF
+    if let (Way::Tool(way), Way::Tool(next)) = (&a.way, &b.way)
+        && way.frame.X_BF == next.frame.X_BF
     {
-        let (end, start) = (curve.at(a.length).V, next.at(0.0).V);
+        let (end, start) = (way.curve.at(a.length).V, next.curve.at(0.0).V);
         if (end - start).norm() <= ALIGNED {
             return Corner::Smooth;
         }
@@ -224,7 +224,7 @@ fn blend_reach(owner: &mut Legs<'_>, a: &Leg, b: &Leg) -> [f64; 2] {
 fn leave(owner: &mut Legs<'_>, leg: &Leg, distance: f64, at_end: bool) -> f64 {
     // A tool that only turns leaves its pose by an angle that counts as a length.
     let travels = match &leg.way {
-        Way::Tool { curve, .. } => curve.at(0.0).V.fixed_rows::<3>(0).norm() > 0.0,
+        Way::Tool(way) => way.curve.at(0.0).V.fixed_rows::<3>(0).norm() > 0.0,
         _ => true,
     };
     from_corner(owner, leg, distance, at_end, |X, corner| match travels {
@@ -247,7 +247,7 @@ fn from_corner(owner: &mut Legs<'_>, leg: &Leg, most: f64, at_end: bool, away: i
     let place = |s: f64| if at_end { leg.length - s } else { s };
     let frame = owner.tool_frame(&leg.of);
     let mut pose = |s: f64| match &leg.way {
-        Way::Tool { curve, .. } => curve.at(place(s)).X,
+        Way::Tool(way) => way.curve.at(place(s)).X,
         way => owner.pose(&frame, &joint_jet(way, leg.length, place(s)).q),
     };
     let corner = pose(0.0);
@@ -281,11 +281,11 @@ fn stretches(owner: &mut Legs<'_>, legs: &[Leg], taken: &[[f64; 2]]) -> Result<V
         }
         let length = out + into;
         let way = match (&leg.way, &next.way) {
-            (Way::Tool { curve, frame }, Way::Tool { curve: other, frame: next_frame })
-                if frame.X_BF == next_frame.X_BF =>
-            {
-                let (a, b) = (curve.at(leg.length - out), other.at(into));
-                Way::Tool { curve: Box::new(ToolCurve::between(&a, &b, length)), frame: frame.clone() }
+            (Way::Tool(way), Way::Tool(other)) if way.frame.X_BF == other.frame.X_BF => {
+                let (a, b) = (way.curve.at(leg.length - out), other.curve.at(into));
+                let curve = ToolCurve::between(&a, &b, length);
+                let guided = guided_between((way, leg.length - out), (other, into), &leg.q1);
+                Way::Tool(ToolWay { guided, ..ToolWay::new(curve, way.frame.clone()) })
             }
             _ => {
                 let from = joints_at(owner, leg, leg.length - out, true)?;
@@ -299,14 +299,26 @@ fn stretches(owner: &mut Legs<'_>, legs: &[Leg], taken: &[[f64; 2]]) -> Result<V
     Ok(stretches)
 }
 
+/// Joints that move by themselves on a blend: between what they do at both of its ends; `corner`: joints where both ways meet.
+fn guided_between(a: (&ToolWay, f64), b: (&ToolWay, f64), corner: &DVector<f64>) -> Vec<GuidedJoint> {
+    let at = |(way, s): (&ToolWay, f64), k: usize| {
+        let found = way.guided.iter().find(|joint| joint.k == k);
+        found.map_or([corner[k], 0.0, 0.0], |joint| joint.at(way.curve.length(), s))
+    };
+    let mut joints: Vec<usize> = a.0.guided.iter().chain(&b.0.guided).map(|joint| joint.k).collect();
+    joints.sort_unstable();
+    joints.dedup();
+    joints.into_iter().map(|k| GuidedJoint { k, from: at(a, k), to: at(b, k) }).collect()
+}
+
 /// Joints on a leg at a parameter, continued from its end or its start.
 fn joints_at(owner: &mut Legs<'_>, leg: &Leg, s: f64, from_end: bool) -> Result<JointJet, PathError> {
     match &leg.way {
-        Way::Tool { curve, frame } => {
+        Way::Tool(way) => {
             let (origin, q) = if from_end { (leg.length, &leg.q1) } else { (0.0, &leg.q0) };
-            let follower = owner.follower(frame, q);
-            let found = follower.start(curve, origin, q).and_then(|jet| follower.advance(curve, origin, &jet, s));
-            found.map_err(|blocked| blocked_error(&leg.of, curve, blocked))
+            let follower = owner.follower(&way.frame, q);
+            let found = follower.start(way, origin, q).and_then(|jet| follower.advance(way, origin, &jet, s));
+            found.map_err(|blocked| blocked_error(&leg.of, &way.curve, blocked))
         }
         way => Ok(joint_jet(way, leg.length, s)),
     }
@@ -316,7 +328,7 @@ fn joint_jet(way: &Way, length: f64, s: f64) -> JointJet {
     match way {
         Way::Bridge { from, to } => between(from, to, length, s).0,
         Way::Joints { q0, d } => JointJet { q: q0 + d * s, d: d.clone(), dd: DVector::zeros(d.len()) },
-        Way::Tool { .. } => unreachable!("a tool's way has no joints of its own"),
+        Way::Tool(_) => unreachable!("a tool's way has no joints of its own"),
     }
 }
 
@@ -372,24 +384,24 @@ type Walked = (Vec<(f64, JointJet)>, (f64, f64));
 /// value with its parameter.
 fn walk(
     follower: &mut Follower<'_>,
-    curve: &ToolCurve,
+    way: &ToolWay,
     [from, to]: [f64; 2],
     near: &DVector<f64>,
     options: &PathOptions,
 ) -> Result<Walked, crate::follow::Blocked> {
     let n = intervals(to - from, options);
-    let mut last = (from, follower.start(curve, from, near)?);
+    let mut last = (from, follower.start(way, from, near)?);
     let mut least = (follower.sigma(), from);
     let mut points = vec![last.clone()];
     for k in 1..=n {
         let s = if k == n { to } else { from + (to - from) * k as f64 / n as f64 };
-        let jet = follower.advance(curve, last.0, &last.1, s)?;
+        let jet = follower.advance(way, last.0, &last.1, s)?;
         let sigma = follower.sigma();
         if sigma < least.0 {
             least = (sigma, s);
         }
         let next = (s, jet);
-        refine(follower, curve, &last, &next, options.chord_m, HALVINGS, &mut points)?;
+        refine(follower, way, &last, &next, options.chord_m, HALVINGS, &mut points)?;
         points.push(next.clone());
         last = next;
     }
@@ -399,7 +411,7 @@ fn walk(
 /// Puts points between two until the quintics keep to the curve in the middle.
 fn refine(
     follower: &mut Follower<'_>,
-    curve: &ToolCurve,
+    way: &ToolWay,
     a: &(f64, JointJet),
     b: &(f64, JointJet),
     chord: f64,
@@ -408,11 +420,11 @@ fn refine(
 ) -> Result<(), crate::follow::Blocked> {
     let middle = 0.5 * (a.0 + b.0);
     let (guess, _) = between(&a.1, &b.1, b.0 - a.0, middle - a.0);
-    if depth == 0 || follower.distance(curve, middle, &guess.q) <= chord {
+    if depth == 0 || follower.distance(&way.curve, middle, &guess.q) <= chord {
         return Ok(());
     }
-    let found = (middle, follower.advance(curve, a.0, &a.1, middle)?);
-    refine(follower, curve, a, &found, chord, depth - 1, points)?;
+    let found = (middle, follower.advance(way, a.0, &a.1, middle)?);
+    refine(follower, way, a, &found, chord, depth - 1, points)?;
     points.push(found.clone());
-    refine(follower, curve, &found, b, chord, depth - 1, points)
+    refine(follower, way, &found, b, chord, depth - 1, points)
 }

@@ -1,6 +1,6 @@
 //! How deep a tool may cut.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use flexarm::lobes::{CuttingPlace, CuttingTool, LobesRequest, lobes as limits};
 use pyo3::exceptions::PyValueError;
@@ -69,12 +69,7 @@ pub(crate) fn lobes<'py>(
     if q.is_some() && along.is_some() {
         return Err(PyValueError::new_err("q and along exclude each other: give one of them"));
     }
-    let mut tool = CuttingTool::load(flexarm_cli::shipped_tool(&tool)).or_raise()?;
-    if let Some(mut rpm) = rpm {
-        rpm.sort_by(f64::total_cmp);
-        rpm.dedup();
-        tool = tool.at_speeds(rpm);
-    }
+    let tool = cutting_tool(&tool, rpm)?;
     let n = robot.get().robot.rigid_model().or_raise()?.n_actuated();
     let q = q.map(|q| numbers("q", q, &[(n, "joints")], false)).transpose()?.map(|q| q.values().to_vec());
     let motion = along.map(|along| scenario(robot, Some(along), None, None, None)).transpose()?.map(|s| s.motion);
@@ -91,4 +86,13 @@ pub(crate) fn lobes<'py>(
     .or_raise()?;
     caveat::warn(py, &found.caveats)?;
     plain(py, &found)
+}
+
+/// The tool of a file or a shipped one, at other speeds than its own if any are told.
+pub(crate) fn cutting_tool(tool: &Path, rpm: Option<Vec<f64>>) -> PyResult<CuttingTool> {
+    let tool = CuttingTool::load(flexarm_cli::shipped_tool(tool)).or_raise()?;
+    Ok(match rpm {
+        Some(rpm) => tool.at_speeds(rpm),
+        None => tool,
+    })
 }

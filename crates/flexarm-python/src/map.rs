@@ -13,6 +13,7 @@ use crate::arm::progress_function;
 use crate::arrays::{array, numbers};
 use crate::caveat;
 use crate::failure::OrRaise;
+use crate::lobes::cutting_tool;
 use crate::robot::PyRobot;
 use crate::scenario::scenario;
 use crate::values::{modelling, plain, word, wrench};
@@ -147,6 +148,12 @@ fn over_joints(joints: &Bound<'_, PyDict>) -> PyResult<MapRegion> {
 /// frequencies : int, default 3
 /// workpiece : array_like, shape (3,), optional
 ///     Edges of a box whose best place is to be found (m).
+/// tool : path or str, optional
+///     A cutting tool as for :func:`lobes`: the depth beyond which it chatters becomes the quantity ``depth_m``.
+/// rpm : sequence of float, optional
+///     Its spindle speeds (1/min), of which the lowest limit counts; those of its file without them.
+/// zero_order : bool, default False
+///     Limits from the mean cutting force alone: quick, blind to period doubling.
 /// links, drives : str, optional
 ///     As for :meth:`Robot.flexible`.
 /// output : path, optional
@@ -167,7 +174,8 @@ fn over_joints(joints: &Bound<'_, PyDict>) -> PyResult<MapRegion> {
 #[pyfunction]
 #[pyo3(signature = (robot, *, bounds=None, spacing=None, keep_out=0.0, tool_axis=None, roll=0.0, cone=0.0, tilts=None, rolls=1,
                     joints=None, along=None, points=1000, at=None, wrench=None, by=None, keep="best", frequencies=3,
-                    workpiece=None, links=None, drives=None, output=None, overwrite=false, progress=None))]
+                    workpiece=None, tool=None, rpm=None, zero_order=false, links=None, drives=None, output=None, overwrite=false,
+                    progress=None))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments")]
 pub(crate) fn map<'py>(
     py: Python<'py>,
@@ -189,6 +197,9 @@ pub(crate) fn map<'py>(
     keep: &str,
     frequencies: usize,
     workpiece: Option<&Bound<'py, PyAny>>,
+    tool: Option<PathBuf>,
+    rpm: Option<Vec<f64>>,
+    zero_order: bool,
     links: Option<&str>,
     drives: Option<&str>,
     output: Option<PathBuf>,
@@ -235,6 +246,8 @@ pub(crate) fn map<'py>(
         frequencies: Some(frequencies),
         keep: word("keep", keep, &kept)?,
         by,
+        tool: tool.map(|tool| cutting_tool(&tool, rpm)).transpose()?,
+        zero_order,
         workpiece_m: workpiece.map(|edges| three("workpiece", edges)).transpose()?,
         output,
         overwrite,

@@ -113,6 +113,19 @@ def test_a_map_is_that_of_the_command_line_and_of_statics(kr210: flexarm.Robot, 
     assert arm.statics(ours.worst["q"]).frequencies[0] == ours.worst["quantities"]["frequency_1_hz"]
 
 
+def test_limits_of_depth_of_a_map_are_those_of_lobes(kr210: flexarm.Robot) -> None:
+    joints = {"joint_2": (-1.2, -1.0, 2), "joint_3": (1.4, 1.4, 1)}
+    found = flexarm.map(
+        kr210, joints=joints, at=[0, 0, 0, 0, 0.6, 0], tool="endmill_20mm", rpm=[8000.0], zero_order=True
+    )
+    assert found.to_dict()["by"] == "depth_m"
+    depths = found["depth_m"]
+    for k, joint_2 in enumerate([-1.2, -1.0]):
+        q = [0, joint_2, 1.4, 0, 0.6, 0]
+        alone = flexarm.lobes(kr210, "endmill_20mm", q=q, rpm=[8000.0], zero_order=True)
+        assert depths[k] == alone["stable_below_m"]
+
+
 def test_maps_over_places_stop_on_what_is_wrong(kr210: flexarm.Robot) -> None:
     found = flexarm.map(kr210, bounds=[[1.4, -0.4, 0.4], [2.0, 0.4, 1.2]], spacing=0.2)
     assert len(found) > 10

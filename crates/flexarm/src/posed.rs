@@ -33,7 +33,7 @@ pub(crate) struct Posed {
 }
 
 /// A step error of a command that takes no step.
-fn failed(source: StepError) -> Error {
+pub(crate) fn failed(source: StepError) -> Error {
     Error::Step { source, partial: false }
 }
 

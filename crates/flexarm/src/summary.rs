@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use flexarm_analysis::{ErrorParts, HoldMetrics, TcpMetrics};
+use flexarm_analysis::{ErrorParts, HoldMetrics, RepeatedPose, TcpMetrics};
 use flexarm_log::RecordingFormat;
 use flexarm_stepping::Counts;
 use serde::{Deserialize, Serialize};
@@ -304,6 +304,29 @@ pub struct TcpFigures {
     pub path_rms_m: f64,
     /// What happened at each stop.
     pub holds: Vec<HoldFigures>,
+    /// Poses at which the tool stops more than once.
+    pub poses: Vec<PoseFigures>,
+}
+
+/// Accuracy and repeatability at a pose, in the sense of ISO 9283.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct PoseFigures {
+    /// Place of the rigid tool, world axes (m).
+    pub place_m: [f64; 3],
+    /// How often the tool stopped there.
+    pub visits: usize,
+    /// Distance of the mean place at the end of the stops from the rigid tool's (m): AP.
+    pub accuracy_m: f64,
+    /// Mean distance of the places from their mean and three standard deviations (m): RP.
+    pub repeatability_m: f64,
+}
+
+impl From<&RepeatedPose> for PoseFigures {
+    fn from(pose: &RepeatedPose) -> Self {
+        let RepeatedPose { place_m, visits, accuracy_m, repeatability_m } = *pose;
+        Self { place_m, visits, accuracy_m, repeatability_m }
+    }
 }
 
 /// A stop: from the end of a move to the beginning of the next one or the end of the run.
@@ -354,6 +377,7 @@ impl From<&TcpMetrics> for TcpFigures {
             path_accuracy_m: m.path_accuracy_m,
             path_rms_m: m.path_rms_m,
             holds: m.holds.iter().map(HoldFigures::from).collect(),
+            poses: m.repeated.iter().map(PoseFigures::from).collect(),
             ..Self::default()
         }
     }

@@ -4,6 +4,7 @@
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
+use flexarm::lobes::{CuttingPlace, CuttingTool, LobesError, LobesRequest, lobes};
 use flexarm::map::{JointRange, KeptPoses, Map, MapError, MapRegion, MapRequest, ToolDirections, WorkspaceGrid, map};
 use flexarm::{Error, Fault, Modelling, Motion, Robot, modes, statics};
 
@@ -286,4 +287,71 @@ fn what_cannot_be_mapped_is_refused_with_its_cause() {
     assert_eq!(stopped.fault(), Fault::Run);
     let planar = Robot::load(root().join("robots/palletiser")).unwrap();
     assert!(matches!(refused(&planar, &MapRequest::default()), Error::Map(MapError::TooFewJoints { .. })));
+}
+
+fn end_mill() -> CuttingTool {
+    CuttingTool::load(root().join("robots/tools/endmill_20mm.toml")).unwrap().at_speeds(vec![8000.0])
+}
+
+#[test]
+fn limits_of_depth_of_a_map_are_those_of_lobes_to_the_last_bit() {
+    let (robot, tool) = (robot("kr210"), end_mill());
+    let ranges = vec![joint("joint_2", [-1.2, -0.8], 2), joint("joint_3", [1.2, 1.6], 2)];
+    let at = Some(vec![0.3, 0.0, 0.0, 0.2, 0.9, -0.1]);
+    let request = MapRequest { tool: Some(tool.clone()), at, ..over(ranges) };
+    let found = taken(&robot, &request);
+    assert_eq!((found.by.as_str(), found.table.rows()), ("depth_m", 4));
+    let quick = taken(&robot, &MapRequest { zero_order: true, ..request });
+    let mut depths = Vec::new();
+    for row in 0..4 {
+        let q = joints(&found, row);
+        let alone = |zero_order| {
+            let request = LobesRequest { zero_order, ..LobesRequest::default() };
+            lobes(&robot, &tool, &CuttingPlace::At(Some(&q)), &request, &|_, _| true).unwrap().stable_below_m.unwrap()
+        };
+        assert_eq!(value(&found, row, "depth_m"), alone(false));
+        assert_eq!(value(&quick, row, "depth_m"), alone(true));
+        depths.push(value(&found, row, "depth_m"));
+    }
+    assert!(depths.iter().all(|d| found.best.value >= *d && found.worst.value <= *d));
+    assert!(found.best.value > 1.05 * found.worst.value, "{depths:?}");
+}
+
+/// Truth: with the feed of the tool's own axes, turning the whole arm about the direction of gravity changes nothing.
+#[test]
+fn turning_the_arm_about_gravity_changes_no_limit_of_depth() {
+    let robot = robot("kr210");
+    let at = Some(vec![0.0, -1.0, 1.4, 0.2, 0.9, -0.1]);
+    let request = MapRequest { at, tool: Some(end_mill()), ..over(vec![joint("joint_1", [-2.0, 2.0], 3)]) };
+    let depths = taken(&robot, &request).table.column("depth_m").unwrap();
+    let worst = depths.iter().map(|d| (d / depths[0] - 1.0).abs()).fold(0.0, f64::max);
+    assert!(worst < 1e-6, "{worst:e} of {depths:?}"); // measured 3.5e-14
+}
+
+#[test]
+fn a_tool_that_cannot_be_judged_is_refused_before_the_map_is_taken() {
+    let robot = robot("kr210");
+    let region = MapRegion::Workspace(grid([[1.6, 0.0, 0.6], [1.6, 0.0, 0.6]], 0.5));
+    let request = |rpm| MapRequest {
+        tool: Some(end_mill().at_speeds(vec![rpm])),
+        region: region.clone(),
+        ..MapRequest::default()
+    };
+    for (rpm, speed) in [(-1.0, true), (f64::NAN, true)] {
+        let error = refused(&robot, &request(rpm));
+        assert_eq!(matches!(error, Error::Lobes(LobesError::Speed { .. })), speed, "{error}");
+    }
+    // A feed along the tool, which points down there: no pose has a limit.
+    let folder = std::env::temp_dir().join(format!("flexarm-map-tool-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let text = std::fs::read_to_string(root().join("robots/tools/endmill_20mm.toml")).unwrap();
+    let path = folder.join("tool.toml");
+    let upright = text.replace("feed = [1.0, 0.0, 0.0]", "feed_axes = \"world\"\nfeed = [0.0, 0.0, 1.0]");
+    assert_ne!(upright, text);
+    std::fs::write(&path, upright).unwrap();
+    let tool = Some(CuttingTool::load(&path).unwrap().at_speeds(vec![8000.0]));
+    let error = refused(&robot, &MapRequest { tool, region, ..MapRequest::default() });
+    std::fs::remove_dir_all(&folder).unwrap();
+    assert!(matches!(&error, Error::Map(MapError::NothingToCompare { by }) if by == "depth_m"), "{error}");
+    assert!(error.to_string().contains("feed"), "{error}");
 }

@@ -5,8 +5,9 @@
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
+use flexarm::reduce::{ReduceJob, ReduceOptions, ReduceOutputs, reduce};
 use flexarm::sweep::{Finders, Shard, Sweep, SweepError, SweepRequest, merge};
-use flexarm::{DataTable, DataValues, Error, Modelling, Motion, Robot, RunOptions, Scenario};
+use flexarm::{DataTable, DataValues, Error, Modelling, Motion, Robot, RunOptions, Scenario, modes, statics};
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).unwrap().to_owned()
@@ -348,5 +349,44 @@ fn a_parameter_that_follows_from_another_changes_the_mass_of_the_arm() {
     let wrong = text.replace("(wall - 0.014)", "(wal - 0.014)");
     let told = study(&place, &wrong).err().unwrap().to_string();
     assert!(told.contains("no parameter before this one") && told.contains("wall"), "{told}");
+    std::fs::remove_dir_all(&place).unwrap();
+}
+
+/// Truth: links that `reduce` makes of jobs written by hand, in robot files written by hand.
+#[test]
+fn a_link_that_is_reduced_again_is_that_of_a_job_written_by_hand() {
+    let (place, beam) = (folder("reduced"), root().join("robots/one_beam"));
+    let job = beam.join("fe/one_beam.reduce.toml");
+    let text = format!(
+        "format = 1\nrobot = {:?}\nmetrics = [\"sag = tcp.static_sag_m\", \"f = frequencies_hz.0\"]\n\
+         [options]\nstep = 0.01\n[reduce]\nbeam_1 = {job:?}\n\
+         [[parameter]]\npath = \"reduce.beam_1.material\"\nvalues = [\"aluminium\", \"steel\"]\n",
+        beam.join("mesh.toml")
+    );
+    let summary = study(&place, &text).unwrap().run(&request(place.join("out")), &mut go_on).unwrap();
+    assert_eq!((summary.done, summary.failed), (2, 0));
+    let table = DataTable::read(Path::new(&summary.file)).unwrap();
+    let (sag, f) = (numbers(&table, "sag"), numbers(&table, "f"));
+    let robot = std::fs::read_to_string(beam.join("mesh.toml")).unwrap();
+    for (k, material) in ["aluminium", "steel"].into_iter().enumerate() {
+        let by_hand = std::fs::read_to_string(&job).unwrap().replace("\"aluminium\"", &format!("{material:?}"));
+        let flex = place.join(format!("{material}.flex"));
+        let outputs = ReduceOutputs { flex: Some(flex.clone()), ..ReduceOutputs::default() };
+        let by_hand = ReduceJob::parse(&by_hand, &job).unwrap();
+        reduce(&by_hand, &ReduceOptions::default(), Some(&outputs), &mut |_| {}).unwrap();
+        let file = place.join(format!("{material}.toml"));
+        let at = |name: &str| format!("{:?}", beam.join(name));
+        let own = robot.replace("\"one_beam.urdf\"", &at("one_beam.urdf"));
+        let own = own.replace("\"../../trajectories/beam_swing.toml\"", &at("../../trajectories/beam_swing.toml"));
+        std::fs::write(&file, own.replace("\"fe/one_beam.flex\"", &format!("{flex:?}"))).unwrap();
+        let robot = Robot::load(&file).unwrap();
+        let found = modes(&robot, &Modelling::default(), None, 1).unwrap();
+        let sag_m = statics(&robot, &Modelling::default(), None, [0.0; 6]).unwrap().sag_m;
+        let wanted = sag_m.iter().map(|x| x * x).sum::<f64>().sqrt();
+        assert!((sag[k] / wanted - 1.0).abs() < 1e-9, "{material}: {} of {wanted}", sag[k]);
+        let (wanted, off) = (found.undamped_frequencies_hz[0], |x: f64| (f[k] / x - 1.0).abs());
+        assert!(off(wanted).min(off(found.frequencies_hz[0])) < 1e-9, "{material}: {} of {wanted}", f[k]);
+    }
+    assert!(sag[0] > 1.4 * sag[1], "{sag:?}");
     std::fs::remove_dir_all(&place).unwrap();
 }

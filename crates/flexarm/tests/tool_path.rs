@@ -190,3 +190,24 @@ fn what_is_wrong_is_told_with_its_place_and_the_remedy() {
     let error = error.unwrap_err().to_string();
     assert!(error.contains("wrong.src:3") && error.contains("WAIT FOR"), "{error}");
 }
+
+#[test]
+fn what_joints_do_that_a_path_does_not_need_is_a_known_word_or_a_posture() {
+    let robot = kr210();
+    let file = |redundancy: &str| {
+        format!(
+            "format = 1\n[path]\nlengths = \"m\"\nangles = \"deg\"\nspeed = 0.2\nredundancy = {redundancy}\n\
+             [[move]]\njoints = [0.0, -60.0, 90.0, 0.0, 60.0, 0.0]\n[[move]]\nline = [1.6, 0.1, 1.2]\n"
+        )
+    };
+    // Six joints have nothing left over: all rules give the same motion.
+    let durations: Vec<f64> = ["\"hold\"", "\"away-from-limits\"", "[0.0, -60.0, 90.0, 0.0, 60.0, 0.0]"]
+        .iter()
+        .map(|word| load(&robot, "path.toml", &file(word)).unwrap().trajectory.duration())
+        .collect();
+    assert!(durations.iter().all(|t| *t == durations[0]), "{durations:?}");
+    for wrong in ["\"sideways\"", "[0.0, 10.0]", "[0.0, -60.0, 90.0, 0.0, 60.0, nan]"] {
+        let error = load(&robot, "path.toml", &file(wrong)).unwrap_err().to_string();
+        assert!(error.contains("path.toml:6:14") && error.contains("6 joint values to stay near to"), "{error}");
+    }
+}

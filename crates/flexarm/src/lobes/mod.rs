@@ -230,9 +230,7 @@ pub fn lobes(
     if !(deepest_m.is_finite() && deepest_m > 0.0) {
         return Err(LobesError::Deepest { found: deepest_m }.into());
     }
-    if let Some(found) = tool.rpm.iter().copied().find(|rpm| !(rpm.is_finite() && *rpm > 0.0)) {
-        return Err(LobesError::Speed { found }.into());
-    }
+    check_speeds(tool)?;
     if tool.measured.is_some() && request.ranges {
         return Err(LobesError::MeasuredTool.into());
     }
@@ -311,6 +309,39 @@ fn point(
         }
     }
     Ok(point)
+}
+
+fn check_speeds(tool: &CuttingTool) -> Result<(), LobesError> {
+    let wrong = tool.rpm.iter().copied().find(|rpm| !(rpm.is_finite() && *rpm > 0.0));
+    wrong.map_or(Ok(()), |found| Err(LobesError::Speed { found }))
+}
+
+/// The lowest limit of depth at a pose over all speeds of the tool (m): the deepest cut that is looked at where nothing chatters, NaN
+/// where the feed is along the tool's axis.
+///
+/// * `zero_order`: by the mean force alone, as for a tool with a measured response.
+///
+/// # Errors
+/// Those of [`lobes`] at a pose.
+pub(crate) fn lowest_limit(
+    robot: &Robot,
+    modelling: &Modelling,
+    tool: &CuttingTool,
+    zero_order: bool,
+    q: &[f64],
+) -> Result<f64, Error> {
+    check_speeds(tool)?;
+    let place = match Place::at(robot, modelling, tool, Some(q)) {
+        Err(Error::Lobes(LobesError::FeedAlongAxis)) => return Ok(f64::NAN),
+        other => other?,
+    };
+    let mut lowest = tool.deepest;
+    for rpm in &tool.rpm {
+        let found = point(&place, tool, *rpm, tool.deepest, zero_order || tool.measured.is_some(), false, 0)
+            .map_err(|source| LobesError::Chatter { place: place.words(), source })?;
+        lowest = lowest.min(found.depth_m.unwrap_or(lowest));
+    }
+    Ok(lowest)
 }
 
 /// The smallest of two limits; none is the largest.

@@ -204,9 +204,11 @@ impl CuttingTool {
         &self.rpm
     }
 
-    /// The same tool at other spindle speeds (1/min, positive, ascending).
+    /// The same tool at other spindle speeds (1/min, positive), in any order.
     #[must_use]
-    pub fn at_speeds(mut self, rpm: Vec<f64>) -> Self {
+    pub fn at_speeds(mut self, mut rpm: Vec<f64>) -> Self {
+        rpm.sort_by(f64::total_cmp);
+        rpm.dedup();
         self.rpm = rpm;
         self
     }

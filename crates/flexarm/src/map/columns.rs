@@ -3,6 +3,7 @@
 use flexarm_stepping::FlexibleArm;
 
 use super::MapError;
+use crate::lobes::CuttingTool;
 
 /// Most natural frequencies of a map.
 const MOST_FREQUENCIES: usize = 12;
@@ -43,6 +44,7 @@ pub(super) struct Layout {
     pub(super) joints: usize,
     pub(super) frequencies: usize,
     pub(super) loaded: bool,
+    pub(super) cuts: bool,
     /// Elastic elements: their coordinates after the joints.
     pub(super) elements: Vec<std::ops::Range<usize>>,
 }
@@ -60,7 +62,14 @@ pub(super) const HEAD: [(&str, &str); 6] = [
 impl Layout {
     /// * `joints`: names, and whether they slide.
     /// * `loaded`: whether a wrench acts besides weight.
-    pub(super) fn new(arm: &FlexibleArm, joints: &[(String, bool)], loaded: bool, frequencies: usize) -> Self {
+    /// * `tool`: one that cuts.
+    pub(super) fn new(
+        arm: &FlexibleArm,
+        joints: &[(String, bool)],
+        loaded: bool,
+        frequencies: usize,
+        tool: Option<&CuttingTool>,
+    ) -> Self {
         let elastic = arm.n_elastic_coordinates();
         let frequencies = frequencies.min(elastic).min(MOST_FREQUENCIES);
         let mut columns: Vec<MapColumn> = HEAD.iter().map(|(name, meaning)| place(name, meaning)).collect();
@@ -90,6 +99,13 @@ impl Layout {
             let column = less(&format!("frequency_{k}_hz"), "natural frequency under weight, undamped, drives locked");
             columns.push(MapColumn { more_is_better: true, ..column });
         }
+        if let Some(tool) = tool {
+            let rpm: Vec<String> = tool.rpm.iter().map(f64::to_string).collect();
+            let (rpm, most) = (rpm.join(", "), tool.deepest);
+            let meaning =
+                format!("depth of cut above which {} chatters at {rpm} 1/min; {most} where it does not", tool.name);
+            columns.push(MapColumn { more_is_better: true, ..less("depth_m", &meaning) });
+        }
         let whole = if loaded { "error" } else { "sag" };
         for element in &arm.elements {
             let meaning = format!("part of it in the {whole}, along the {whole}, first order");
@@ -97,7 +113,7 @@ impl Layout {
         }
         let range = |first: usize, size: usize| first..first + size;
         let elements = arm.elements.iter().map(|element| range(arm.offset(element), element.size)).collect();
-        Self { columns, joints: joints.len(), frequencies, loaded, elements }
+        Self { columns, joints: joints.len(), frequencies, loaded, cuts: tool.is_some(), elements }
     }
 
     pub(super) fn width(&self) -> usize {
@@ -109,7 +125,11 @@ impl Layout {
     /// # Errors
     /// [`MapError::Quantity`].
     pub(super) fn compared_by(&self, name: Option<&str>) -> Result<usize, MapError> {
-        let usual = if self.loaded { "error_m" } else { "compliance_worst_m_per_n" };
+        let usual = match (self.cuts, self.loaded) {
+            (true, _) => "depth_m",
+            (false, true) => "error_m",
+            (false, false) => "compliance_worst_m_per_n",
+        };
         let wanted = name.unwrap_or(usual);
         self.columns.iter().position(|c| c.quantity && c.name == wanted).ok_or_else(|| MapError::Quantity {
             found: wanted.to_owned(),

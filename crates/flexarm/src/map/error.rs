@@ -145,12 +145,21 @@ pub enum MapError {
         axis: [f64; 3],
     },
     /// The arm stays nowhere.
-    #[error("at none of the {poses} poses the arm finds an equilibrium; at the first: {first}")]
+    #[error("none of the {poses} poses has an equilibrium; at the first: {first}")]
     NoEquilibrium {
         /// Poses that were tried.
         poses: usize,
         /// Why not.
         first: String,
+    },
+    /// All poses lack the quantity.
+    #[error(
+        "none of the poses has a {by}{}: compare by another quantity",
+        if by == "depth_m" { ", for the feed of the tool is along its axis (feed = [...] in [tool])" } else { "" }
+    )]
+    NothingToCompare {
+        /// The quantity.
+        by: String,
     },
     /// The user stopped it.
     #[error("stopped after {done} of {places} places; nothing is written")]

@@ -2,10 +2,15 @@
 
 use flexarm_analysis::tcp_error;
 use flexarm_kinematics::Wrench;
-use flexarm_stepping::{OperatingPoint, StepError};
+use flexarm_stepping::OperatingPoint;
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
 use super::columns::{HEAD, Layout};
+use crate::error::Error;
+use crate::lobes::{CuttingTool, lowest_limit};
+use crate::options::Modelling;
+use crate::posed::failed;
+use crate::robot::Robot;
 
 /// Where a pose is in the map.
 #[derive(Clone, Copy, Debug)]
@@ -21,12 +26,27 @@ pub(super) struct Evaluator<'a> {
     at: OperatingPoint,
     layout: &'a Layout,
     wrench: Wrench,
+    cut: Option<Cut<'a>>,
+}
+
+/// A tool that cuts, on an arm.
+#[derive(Clone, Copy)]
+pub(super) struct Cut<'a> {
+    pub(super) robot: &'a Robot,
+    pub(super) modelling: &'a Modelling,
+    pub(super) tool: &'a CuttingTool,
+    pub(super) zero_order: bool,
 }
 
 impl<'a> Evaluator<'a> {
-    pub(super) fn new(at: OperatingPoint, layout: &'a Layout, wrench: [f64; 6]) -> Self {
+    pub(super) fn new(at: OperatingPoint, layout: &'a Layout, wrench: [f64; 6], cut: Option<Cut<'a>>) -> Self {
         let [fx, fy, fz, tx, ty, tz] = wrench;
-        Self { at, layout, wrench: Wrench::new(Vector3::new(fx, fy, fz), Vector3::new(tx, ty, tz)) }
+        Self { at, layout, wrench: Wrench::new(Vector3::new(fx, fy, fz), Vector3::new(tx, ty, tz)), cut }
+    }
+
+    /// Whether a pose takes so long that few should be taken between two looks at whether to go on.
+    pub(super) fn is_slow(&self) -> bool {
+        self.cut.is_some()
     }
 
     /// Appends the row of a pose.
@@ -34,8 +54,8 @@ impl<'a> Evaluator<'a> {
     /// * `q`: actuated joints in coordinate order (rad or m).
     ///
     /// # Errors
-    /// [`OperatingPoint::solve`]; nothing is appended.
-    pub(super) fn push(&mut self, q: &[f64], seat: Seat, rows: &mut Vec<f64>) -> Result<(), StepError> {
+    /// [`OperatingPoint::solve`], and those of limits of depth; nothing is appended.
+    pub(super) fn push(&mut self, q: &[f64], seat: Seat, rows: &mut Vec<f64>) -> Result<(), Error> {
         let first = rows.len();
         let result = self.fill(q, seat, rows);
         if result.is_err() {
@@ -44,9 +64,9 @@ impl<'a> Evaluator<'a> {
         result
     }
 
-    fn fill(&mut self, q: &[f64], seat: Seat, rows: &mut Vec<f64>) -> Result<(), StepError> {
+    fn fill(&mut self, q: &[f64], seat: Seat, rows: &mut Vec<f64>) -> Result<(), Error> {
         let at = &mut self.at;
-        at.solve(q, &Wrench::zeros())?;
+        at.solve(q, &Wrench::zeros()).map_err(failed)?;
         let X_rigid = at.rigid_tcp_pose();
         rows.extend(X_rigid.translation.vector.iter());
         rows.extend([seat.place as f64, seat.direction as f64, seat.branch as f64]);
@@ -62,13 +82,16 @@ impl<'a> Evaluator<'a> {
         }
         let mut moved = sag;
         if self.layout.loaded {
-            at.solve(q, &self.wrench)?;
+            at.solve(q, &self.wrench).map_err(failed)?;
             moved = tcp_error(&X_rigid, &at.tcp_pose());
             push_displacement(&moved, rows);
             rows.push(size(&[moved[0] - sag[0], moved[1] - sag[1], moved[2] - sag[2]]));
         }
         push_compliance(&at.compliance(), rows);
         rows.extend(&hz[..self.layout.frequencies]);
+        if let Some(Cut { robot, modelling, tool, zero_order }) = self.cut {
+            rows.push(lowest_limit(robot, modelling, tool, zero_order, q)?);
+        }
         self.push_shares(&moved, rows);
         Ok(())
     }

@@ -48,7 +48,7 @@ pub use region::{Grid, JointRange, MOST_PLACES, MapRegion, ToolDirections, Works
 pub use table::{MapPose, MapTable, QUANTILES, Spread};
 
 use self::columns::Layout;
-use self::evaluate::Evaluator;
+use self::evaluate::{Cut, Evaluator};
 use self::finder::Finder;
 use self::region::{MOST_QUERIES, round_number};
 use self::take::{Choice, Places, PoseOf, Taken, take};
@@ -56,6 +56,7 @@ use crate::arm::Arm;
 use crate::caveat::{self, Caveat};
 use crate::error::Error;
 use crate::inspect::joint_values;
+use crate::lobes::{CuttingTool, lowest_limit};
 use crate::options::Modelling;
 use crate::robot::{Robot, tcp_frame};
 
@@ -89,11 +90,16 @@ pub struct MapRequest {
     pub at: Option<Vec<f64>>,
     /// Force and moment on the tool besides weight, world axes (N, N m).
     pub wrench: [f64; 6],
+    /// A tool that cuts, at its spindle speeds: the lowest limit of depth of each pose becomes a quantity.
+    pub tool: Option<CuttingTool>,
+    /// Limits of depth by the mean cutting force alone (zero-order solution): ten times as quick, blind to period doubling.
+    pub zero_order: bool,
     /// How many natural frequencies; three without it.
     pub frequencies: Option<usize>,
     /// Which poses of a place are kept.
     pub keep: KeptPoses,
-    /// Quantity by which poses are compared: the error under the load, or the worst compliance without one, unless told.
+    /// Quantity by which poses are compared: unless told the limit of depth of a tool, or the error under the load, or the worst
+    /// compliance without either.
     pub by: Option<String>,
     /// Edges of a workpiece that is to be placed (m, along world axes).
     pub workpiece_m: Option<[f64; 3]>,
@@ -220,10 +226,22 @@ pub fn map(
     let actuated = &model.coordinates()[..model.n_actuated()];
     let joints: Vec<(String, bool)> = actuated.iter().map(|c| (c.joint.clone(), c.kind == "prismatic")).collect();
     let loaded = request.wrench != [0.0; 6];
-    let layout = Layout::new(at.arm(), &joints, loaded, request.frequencies.unwrap_or(3));
+    let layout = Layout::new(at.arm(), &joints, loaded, request.frequencies.unwrap_or(3), request.tool.as_ref());
     let by = layout.compared_by(request.by.as_deref())?;
     let near = home(model, request.at.as_deref())?;
-    let evaluator = Evaluator::new(at, &layout, request.wrench);
+    if let Some(tool) = &request.tool
+        && let Err(error @ Error::Lobes(_)) = lowest_limit(robot, &request.modelling, tool, request.zero_order, &near)
+    {
+        // What is wrong with tool or robot is so everywhere.
+        return Err(error);
+    }
+    let cut = request.tool.as_ref().map(|tool| Cut {
+        robot,
+        modelling: &request.modelling,
+        tool,
+        zero_order: request.zero_order,
+    });
+    let evaluator = Evaluator::new(at, &layout, request.wrench, cut);
     let choice = Choice { layout: &layout, keep: request.keep, by };
 
     let rotations = match &request.region {
@@ -431,6 +449,7 @@ fn summed_up(
     let points = grid.map_or(taken.poses, Grid::places);
     let Some((best, worst)) = table.extremes(by) else {
         return Err(match (&request.region, &taken.first_failure) {
+            _ if table.rows() > 0 => MapError::NothingToCompare { by: table.columns[by].name.clone() },
             (_, Some(first)) => MapError::NoEquilibrium { poses: taken.poses, first: first.clone() },
             (MapRegion::Workspace(w), None) => MapError::OutOfReach { places: points, axis: w.tool.axis },
             (_, None) => MapError::Instants,

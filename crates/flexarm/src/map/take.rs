@@ -16,6 +16,8 @@ use super::{KeptPoses, MOST_PLACES, MapError};
 const CHUNK: usize = 64;
 /// Places between two looks at whether to go on.
 const BLOCK: usize = 8192;
+/// The same where a place takes long.
+const SLOW: [usize; 2] = [1, 16];
 
 /// Appends the joint values of the pose of a number.
 pub(super) type PoseOf<'a> = dyn Fn(usize, &mut Vec<f64>) + Sync + 'a;
@@ -87,16 +89,17 @@ pub(super) fn take(
     go_on: &mut dyn FnMut(f64, f64) -> ControlFlow<()>,
 ) -> Result<Taken, MapError> {
     let (all, mut taken) = (places.count(), Taken::default());
-    for first in (0..all).step_by(BLOCK) {
+    let [chunk, block] = if evaluator.is_slow() { SLOW } else { [CHUNK, BLOCK] };
+    for first in (0..all).step_by(block) {
         if go_on(first as f64, all as f64).is_break() {
             return Err(MapError::Interrupted { done: first, places: all });
         }
-        let last = (first + BLOCK).min(all);
-        let chunks: Vec<usize> = (first..last).step_by(CHUNK).collect();
+        let last = (first + block).min(all);
+        let chunks: Vec<usize> = (first..last).step_by(chunk).collect();
         let worker = Worker::new(places, evaluator, choice);
         let parts: Vec<Taken> = chunks
             .into_par_iter()
-            .map_with(worker, |worker, from| worker.chunk(from, (from + CHUNK).min(last)))
+            .map_with(worker, |worker, from| worker.chunk(from, (from + chunk).min(last)))
             .collect();
         parts.into_iter().for_each(|part| taken.add(part));
         if taken.rows.len() / choice.layout.width() > MOST_PLACES {

@@ -519,13 +519,16 @@ fn picture_key(header: &RunHeader) -> String {
     out + "</div>\n"
 }
 
+/// Most poses with several stops that a page lists.
+const MOST_POSES: usize = 50;
+
 /// A row of the ISO table: name, meaning, unit, value.
 type Iso = (&'static str, &'static str, &'static str, fn(&Summary) -> Option<f64>);
 
 /// The name of the settling time in the standard.
 const STABILISATION: &str = "Position stabilisation time";
 
-const ISO: [Iso; 7] = [
+const ISO: [Iso; 8] = [
     (
         "Path accuracy (AT)",
         "largest distance of the flexible tool from the rigid tool across the path, while moving",
@@ -553,6 +556,9 @@ const ISO: [Iso; 7] = [
     ("Pose accuracy (AP)", "largest distance from the rigid tool at rest, over all stops", "mm", |s| {
         let rests = moving(s)?.holds.iter().map(|hold| 1e3 * hold.final_m);
         rests.reduce(f64::max)
+    }),
+    ("Pose repeatability (RP)", "scatter of the places at the end of repeated stops, at the worst pose", "mm", |s| {
+        moving(s)?.poses.iter().map(|pose| 1e3 * pose.repeatability_m).reduce(f64::max)
     }),
     ("Static sag", "distance from the rigid tool at rest at the start", "mm", |s| {
         s.tcp.as_ref().map(|t| 1e3 * t.static_sag_m)
@@ -634,7 +640,19 @@ fn stops_table(s: &Summary, of: &str) -> String {
         .collect();
     let head =
         ["stop", "from (s)", "to (s)", "error at rest (mm)", "settled after (s)", "overshoot (mm)", "rings at (Hz)"];
-    table(&format!("Stops{of}"), &head, &rows)
+    let stops = table(&format!("Stops{of}"), &head, &rows);
+    let poses: Vec<Vec<String>> = (tcp.poses.iter().take(MOST_POSES))
+        .map(|pose| {
+            let place = pose.place_m.map(|x| number(1e3 * x, 5)).join(", ");
+            let visits = pose.visits.to_string();
+            vec![place, visits, number(1e3 * pose.accuracy_m, 4), number(1e3 * pose.repeatability_m, 4)]
+        })
+        .collect();
+    if poses.is_empty() {
+        return stops;
+    }
+    let head = ["place (mm)", "stops", "pose accuracy AP (mm)", "pose repeatability RP (mm)"];
+    stops + &table(&format!("Poses with several stops{of}"), &head, &poses)
 }
 
 fn parts_tables(s: &Summary, of: &str) -> String {

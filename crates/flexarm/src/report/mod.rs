@@ -189,6 +189,10 @@ fn tool_figures(summary: &Summary) -> Vec<Figure> {
     rows.push(Figure::new("error at the end", mm(tcp.end_m), "mm", ""));
     let rms = format!("RMS {} mrad", mm(tcp.rms_rad));
     rows.push(Figure::new("peak rotation", mm(tcp.peak_rad), "mrad", rms));
+    if let Some(worst) = tcp.poses.iter().max_by(|a, b| a.repeatability_m.total_cmp(&b.repeatability_m)) {
+        let note = format!("after ISO 9283, of {} poses with several stops the worst", tcp.poses.len());
+        rows.push(Figure::new("pose repeatability", mm(worst.repeatability_m), "mm", note));
+    }
     rows.push(Figure::new("overshoot after a move", mm(tcp.overshoot_m), "mm", ""));
     let settling = tcp.settling_state();
     let note = settling.note(&tcp.settling_band_m.map_or_else(String::new, within));

@@ -5,8 +5,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use flexarm_kinematics::Pose;
-use flexarm_kinematics::{Data, forward_kinematics};
+use flexarm_kinematics::{Data, NullSpaceRule, Pose, forward_kinematics};
 use flexarm_path::program::{Blend, Configuration, Item, Move, MoveKind, Program, Speed, Target};
 use flexarm_path::{ControllerAxis, PathOptions, ProgramArm};
 use flexarm_programs::{GCodeOptions, ReadOptions, Rotary};
@@ -91,6 +90,8 @@ struct PathTable {
     tool: Option<Spanned<FrameTable>>,
     /// s.
     rise: Option<Spanned<f64>>,
+    /// What joints do that the path does not need.
+    redundancy: Option<Spanned<Redundancy>>,
     speed: Option<f64>,
     acceleration: Option<f64>,
     jerk: Option<f64>,
@@ -99,6 +100,14 @@ struct PathTable {
     joint_speed: Option<f64>,
     joint_acceleration: Option<f64>,
     blend: Option<f64>,
+}
+
+/// `redundancy` of `[path]`: a word, or joint values.
+#[derive(Debug, Deserialize)]
+#[serde(untagged)]
+enum Redundancy {
+    Word(String),
+    Posture(Vec<f64>),
 }
 
 #[derive(Debug, Clone, Deserialize)]
@@ -216,7 +225,7 @@ pub(crate) fn read_path_file(
             let message = "[program] is a motion of its own: leave out [standard] and the [[move]]s, or it";
             return Err(source.error(table.span(), message).into());
         }
-        return reader.program(table, &options(&file, &source)?, notes);
+        return reader.program(table, &options(&file, &arm, units, &source)?, notes);
     }
     let items = match &file.standard {
         None => reader.items(&file.moves)?,
@@ -227,17 +236,47 @@ pub(crate) fn read_path_file(
         }
     };
     let program = Program { name: path.display().to_string(), items, ..Program::default() };
-    ToolPath::plan(path, &program, &arm, &options(&file, &source)?, notes)
+    ToolPath::plan(path, &program, &arm, &options(&file, &arm, units, &source)?, notes)
 }
 
 /// How the path is resolved.
-fn options(file: &PathFile, source: &Source) -> Result<PathOptions, RobotFileError> {
+fn options(
+    file: &PathFile,
+    arm: &ProgramArm<'_>,
+    units: Units,
+    source: &Source,
+) -> Result<PathOptions, RobotFileError> {
     let mut options = PathOptions::default();
     if let Some(rise) = &file.path.rise {
         if !(*rise.get_ref() > 0.0 && rise.get_ref().is_finite()) {
             return Err(source.error(rise.span(), "rise must be a positive time in s"));
         }
         options.rise_s = *rise.get_ref();
+    }
+    if let Some(told) = &file.path.redundancy {
+        options.rule = match told.get_ref() {
+            Redundancy::Word(word) if word == "hold" => None,
+            Redundancy::Word(word) if word == "away-from-limits" => Some(NullSpaceRule::AwayFromLimits),
+            Redundancy::Posture(values) if values.len() == arm.axes.len() && values.iter().all(|q| q.is_finite()) => {
+                let mut posture = arm.rest.clone();
+                for (value, &k) in values.iter().zip(&arm.axes) {
+                    let slides = arm.model.coordinates()[k].kind == "prismatic";
+                    posture[k] = value * if slides { units.length } else { units.angle };
+                }
+                Some(NullSpaceRule::NearestTo(posture))
+            }
+            found => {
+                let found = match found {
+                    Redundancy::Word(word) => format!("{word:?}"),
+                    Redundancy::Posture(values) => format!("{} joint values", values.len()),
+                };
+                let message = format!(
+                    "redundancy is {found}: expected \"hold\", \"away-from-limits\" or {} joint values to stay near to",
+                    arm.axes.len()
+                );
+                return Err(source.error(told.span(), message));
+            }
+        };
     }
     Ok(options)
 }

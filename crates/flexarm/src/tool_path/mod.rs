@@ -184,9 +184,11 @@ impl ToolPath {
         warnings.extend(first_of(stops));
         let held = planned.held.join(", ");
         if !held.is_empty() {
-            warnings.push(format!(
-                "the arm has more joints than the path needs: {held} stay while the tool follows its path"
-            ));
+            let what = match options.rule {
+                None => "stay while the tool follows its path (redundancy of a path file chooses otherwise)",
+                Some(_) => "move by themselves, towards the posture that is asked for",
+            };
+            warnings.push(format!("the arm has more joints than the path needs: {held} {what}"));
         }
         warnings.extend(tool_warning(program, arm));
         let slowed = planned.moves.iter().filter_map(|of| of.slowed.as_ref().map(|slowed| slowed_warning(of, slowed)));
