@@ -1,6 +1,6 @@
 //! How deep a tool may cut.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use flexarm::lobes::{CuttingPlace, CuttingTool, LobesRequest, lobes as limits};
 use pyo3::exceptions::PyValueError;
@@ -8,10 +8,10 @@ use pyo3::prelude::*;
 
 use crate::arrays::numbers;
 use crate::caveat;
-use crate::failure::OrRaise;
+use crate::failure::{OrRaise, raised};
 use crate::robot::PyRobot;
 use crate::scenario::scenario;
-use crate::values::{modelling, plain};
+use crate::values::{modelling, whole};
 use crate::watch::stoppable;
 
 /// Finds the depth of cut beyond which a tool chatters, over the spindle speed.
@@ -56,7 +56,7 @@ pub(crate) fn lobes<'py>(
     tool: PathBuf,
     q: Option<&Bound<'py, PyAny>>,
     along: Option<&Bound<'py, PyAny>>,
-    places: usize,
+    #[pyo3(from_py_with = whole)] places: usize,
     rpm: Option<Vec<f64>>,
     deepest: Option<f64>,
     zero_order: bool,
@@ -69,7 +69,11 @@ pub(crate) fn lobes<'py>(
     if q.is_some() && along.is_some() {
         return Err(PyValueError::new_err("q and along exclude each other: give one of them"));
     }
-    let mut tool = CuttingTool::load(flexarm_cli::shipped_tool(&tool)).or_raise()?;
+    let file = flexarm_cli::shipped_tool(&tool);
+    if !file.exists() {
+        return Err(no_tool(py, &tool)?);
+    }
+    let mut tool = CuttingTool::load(file).or_raise()?;
     if let Some(mut rpm) = rpm {
         rpm.sort_by(f64::total_cmp);
         rpm.dedup();
@@ -89,6 +93,18 @@ pub(crate) fn lobes<'py>(
         limits(&robot, &tool, &place, &request, &|_, _| !stop())
     })?
     .or_raise()?;
-    caveat::warn(py, &found.caveats)?;
-    plain(py, &found)
+    caveat::answer(py, &found, &found.caveats)
+}
+
+/// The exception for a tool that is not there, with those that are shipped.
+fn no_tool(py: Python<'_>, tool: &Path) -> PyResult<PyErr> {
+    let shipped: Vec<String> = py.import("flexarm._show")?.call_method0("shipped_tools")?.extract()?;
+    let name = tool.to_string_lossy();
+    let near = flexarm::closest(&name, shipped.iter().map(String::as_str));
+    let near = near.map_or_else(String::new, |near| format!("; did you mean {near:?}?"));
+    let message = format!(
+        "tool: {name}: there is no such file and no shipped tool of this name{near} Shipped are {}",
+        shipped.join(", ")
+    );
+    Ok(raised(py, "FileError", message))
 }

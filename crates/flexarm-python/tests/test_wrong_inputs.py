@@ -68,7 +68,7 @@ def test_other_memory_orders_and_types_give_the_same(arm: flexarm.Arm) -> None:
         (lambda a: a.response(inputs=["force-q"]), flexarm.SettingError, "force-q"),
         (lambda a: a.response(points=1), flexarm.SettingError, "points must lie between"),
         (lambda a: a.live(period=1.5e-3), flexarm.SettingError, "not a whole number of steps"),
-        (lambda a: a.deflections([None] * 3, stiffness=[1, 2]), ValueError, "2 factors for 3 runs"),
+        (lambda a: a.deflections([None] * 3, stiffness=[1, 2]), ValueError, "stiffness has 2 values, runs has 3"),
         (lambda a: a.statics(wrench=[1, 2, 3, 4]), ValueError, r"wrench has the shape \(4,\)"),
     ],
 )
