@@ -38,7 +38,10 @@ ROOTS = [
 NAMES = {"Caveat": "CaveatDict", "Files": "RunFiles"}
 #: Fields that are written by hand in Rust: key, type, whether it is always there, meaning.
 WRITTEN = {
-    "RecordingFiles": [(key, "str | None", True, f"Recording ({key}), if it was written.") for key in ["csv", "mcap", "rrd", "parquet", "arrow"]],
+    "RecordingFiles": [
+        *((key, "str | None", True, f"Recording ({key}), if it was written.") for key in ["csv", "mcap", "rrd", "parquet"]),
+        ("arrow", "str", False, "Recording (arrow), if it was written."),
+    ],
     "StepperSettings": [
         ("rho_inf", "float", False, "Of the generalised-alpha method."),
         ("dispersion_correction", "bool", False, "Of the generalised-alpha method."),

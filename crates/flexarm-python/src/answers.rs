@@ -272,7 +272,7 @@ impl Pickled for PyModes {
         parts.put_numbers("strain_energy", &self.strain_energy)?;
         parts.put("elements", self.elements.clone())?;
         parts.put("total", self.total)?;
-        self.figures.into_parts(parts)
+        self.figures.put_into(parts)
     }
 
     fn of_parts(parts: &Parts<'_>) -> PyResult<Self> {
@@ -449,7 +449,7 @@ impl Pickled for PyResponse {
         parts.put_numbers("phase", &self.phase)?;
         parts.put("inputs", self.inputs.clone())?;
         parts.put("outputs", self.outputs.clone())?;
-        self.figures.into_parts(parts)
+        self.figures.put_into(parts)
     }
 
     fn of_parts(parts: &Parts<'_>) -> PyResult<Self> {

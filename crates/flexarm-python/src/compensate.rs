@@ -83,7 +83,7 @@ impl Pickled for PyCompensated {
         parts.put("motion", &self.motion)?;
         parts.put_numbers("curves", &self.curves)?;
         parts.put("headline", &self.headline)?;
-        self.figures.into_parts(parts)
+        self.figures.put_into(parts)
     }
 
     fn of_parts(parts: &Parts<'_>) -> PyResult<Self> {

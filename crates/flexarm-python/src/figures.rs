@@ -56,7 +56,7 @@ impl Figures {
     }
 
     /// For a pickle.
-    pub(crate) fn into_parts(&self, parts: &Parts<'_>) -> PyResult<()> {
+    pub(crate) fn put_into(&self, parts: &Parts<'_>) -> PyResult<()> {
         let caveats = serde_json::to_string(&self.caveats).map_err(|error| PyValueError::new_err(error.to_string()))?;
         parts.put("figures", self.json()?)?;
         parts.put("caveats", caveats)

@@ -119,7 +119,7 @@ impl Pickled for PyMap {
         parts.put("columns", self.columns.clone())?;
         parts.put_numbers("values", &self.values)?;
         parts.put("headline", &self.headline)?;
-        self.figures.into_parts(parts)
+        self.figures.put_into(parts)
     }
 
     fn of_parts(parts: &Parts<'_>) -> PyResult<Self> {

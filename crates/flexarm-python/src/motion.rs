@@ -288,11 +288,11 @@ impl PyMotion {
     }
 }
 
+/// A joint with its knots and pieces, as arrays.
+type Curve<'py> = (String, Bound<'py, PyAny>, Bound<'py, PyAny>);
+
 /// The curves of a trajectory: of each joint its name, knots, and a row of seven numbers for each piece.
-fn pieces<'py>(
-    py: Python<'py>,
-    trajectory: &Trajectory,
-) -> PyResult<Vec<(String, Bound<'py, PyAny>, Bound<'py, PyAny>)>> {
+fn pieces<'py>(py: Python<'py>, trajectory: &Trajectory) -> PyResult<Vec<Curve<'py>>> {
     let mut curves = Vec::new();
     for (k, joint) in trajectory.joints().iter().enumerate() {
         let Some((knots, rows)) = trajectory.pieces(k) else { continue };
@@ -309,9 +309,9 @@ pub(crate) fn motion_of_pieces(
     robot: &Bound<'_, PyRobot>,
     name: &str,
     duration: f64,
-    curves: Vec<(String, Bound<'_, PyAny>, Bound<'_, PyAny>)>,
+    curves: Vec<Curve<'_>>,
 ) -> PyResult<PyMotion> {
-    let curve = |(joint, knots, rows): (String, Bound<'_, PyAny>, Bound<'_, PyAny>)| {
+    let curve = |(joint, knots, rows): Curve<'_>| {
         let rows = table("pieces", &rows, 7, "numbers")?;
         let rows = rows.values().chunks_exact(7).map(|row| std::array::from_fn(|k| row[k])).collect();
         Ok((joint, table("knots", &knots, 0, "times")?.values().to_vec(), rows))

@@ -300,7 +300,7 @@ impl Pickled for PyRun {
         for column in columns.columns() {
             parts.put_numbers(&column.name, &column.values)?;
         }
-        self.figures.into_parts(parts)
+        self.figures.put_into(parts)
     }
 
     fn of_parts(parts: &Parts<'_>) -> PyResult<Self> {

@@ -362,8 +362,6 @@ class _RunFiles(TypedDict):
     """Recording (rrd), if it was written."""
     parquet: str | None
     """Recording (parquet), if it was written."""
-    arrow: str | None
-    """Recording (arrow), if it was written."""
     report: str | None
     """Report: a page for the browser, with plots and pictures."""
     report_md: str | None
@@ -379,6 +377,8 @@ class _RunFiles(TypedDict):
 class RunFiles(_RunFiles, total=False):
     """Written files; null where none was written."""
 
+    arrow: str
+    """Recording (arrow), if it was written."""
     study: str | None
     """Rerun recording of all runs of a study."""
 
