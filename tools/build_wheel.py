@@ -3,7 +3,7 @@
 
     python3 tools/build_wheel.py                    a wheel for Linuxes as new as this one in target/wheels, tested
     python3 tools/build_wheel.py --manylinux        one for all Linux machines of this kind (zig from PyPI is the linker)
-    python3 tools/build_wheel.py --sdist            the source package as well, and a wheel of it
+    python3 tools/build_wheel.py --sdist            the source package as well, and a wheel of it alone, which is tried out
     python3 tools/build_wheel.py --no-test          build only
     python3 tools/build_wheel.py --quick            test without the tools that check types and draw
 
@@ -105,6 +105,28 @@ def sdist(out):
     return file
 
 
+RENDER = """
+import sys
+import rattler_build as rb
+
+variants = rb.VariantConfig({"c_compiler": ["gcc"], "rust_compiler": ["rust"], "python": ["3.11"]})
+recipe = rb.Stage0Recipe.from_file(sys.argv[1]).render(variants, rb.RenderConfig())[0].recipe.to_dict()
+print(f"recipe.yaml: {recipe['package']['name']} {recipe['package']['version']}, as rattler-build {rb.rattler_build_version()} reads it")
+"""
+
+
+def check_recipe(python):
+    """The recipe has the version of the workspace, and rattler-build, if pip has it, reads it."""
+    version = tomllib.loads((ROOT / "Cargo.toml").read_text())["workspace"]["package"]["version"]
+    recipe = PACKAGE / "recipe.yaml"
+    if f'  version: "{version}"\n' not in recipe.read_text():
+        sys.exit(f"error: {recipe.relative_to(ROOT)} is not of version {version}")
+    if subprocess.run([python, "-c", "import rattler_build"], capture_output=True).returncode == 0:
+        subprocess.run([python, "-c", RENDER, recipe], check=True)
+    else:
+        print("without rattler-build: the recipe is not read")
+
+
 def inspect(wheel):
     """Small enough, and everything in it."""
     size = wheel.stat().st_size
@@ -116,19 +138,32 @@ def inspect(wheel):
         sys.exit(f"error: the wheel has {size} bytes (most {MOST_BYTES:.0f}) and lacks {missing}")
 
 
+def installed(wheel, scratch, *needed, without=()):
+    """An environment with a wheel, an empty folder, and variables in which there is no compiler."""
+    python = environment(scratch / "venv", *needed, without=without)
+    run(python, "-m", "pip", "install", "-q", "--no-deps", "--disable-pip-version-check", wheel)
+    empty = scratch / "empty"
+    empty.mkdir()
+    path = os.pathsep.join([str(python.parent), "/usr/bin", "/bin"])
+    if shutil.which("cargo", path=path):
+        sys.exit(f"error: there is a cargo on {path}")
+    return python, empty, {"PATH": path, "HOME": str(scratch), "MPLBACKEND": "Agg"}
+
+
+def try_out(wheel):
+    """A wheel is imported and runs."""
+    with tempfile.TemporaryDirectory() as scratch:
+        python, empty, bare = installed(wheel, Path(scratch), "numpy")
+        run(python, "-c", "import flexarm; print(flexarm.load('kr210').flexible().simulate())", cwd=empty, env=bare)
+        run(python.parent / "flexarm", "compare", cwd=empty, env=bare)
+
+
 def test(wheel, quick):
     """Installs the wheel where there is no compiler, and runs its tests."""
     with tempfile.TemporaryDirectory() as scratch:
-        scratch = Path(scratch)
-        python = environment(scratch / "venv", *NEEDED, without=() if quick else OTHERS)
+        python, empty, bare = installed(wheel, Path(scratch), *NEEDED, without=() if quick else OTHERS)
         begin = time.time()
-        run(python, "-m", "pip", "install", "-q", "--no-deps", "--disable-pip-version-check", wheel)
-        empty = scratch / "empty"
-        empty.mkdir()
-        path = os.pathsep.join([str(python.parent), "/usr/bin", "/bin"])
-        if shutil.which("cargo", path=path):
-            sys.exit(f"error: there is a cargo on {path}")
-        bare = {"PATH": path, "HOME": str(scratch), "MPLBACKEND": "Agg"}
+        run(python, "-m", "pip", "install", "-q", "--no-deps", "--force-reinstall", "--disable-pip-version-check", wheel)
         run(python.parent / "flexarm", "compare", cwd=empty, env=bare)
         study = "import flexarm; a = flexarm.load('kr210').flexible(); print(a.deflections([None] * 20, step=5e-3))"
         run(python, "-c", study, cwd=empty, env=bare)
@@ -149,14 +184,19 @@ def main():
     with tempfile.TemporaryDirectory() as scratch:
         scratch = Path(scratch)
         packages = [MATURIN, "ziglang"] if args.manylinux else [MATURIN]
-        tools = environment(scratch / "tools", *packages).parent
+        python = environment(scratch / "tools", *packages, without=["py-rattler-build"])
+        check_recipe(python)
+        run(sys.executable, ROOT / "tools/python_types.py", "--check")
+        tools = python.parent
         wheel = build(tools, out, args.manylinux)
         inspect(wheel)
         if args.sdist:
             file = sdist(out)
             with tarfile.open(file) as tar:
                 tar.extractall(scratch, filter="data")
-            inspect(build(tools, scratch / "again", args.manylinux, scratch / file.name.removesuffix(".tar.gz")))
+            again = build(tools, scratch / "again", args.manylinux, scratch / file.name.removesuffix(".tar.gz"))
+            inspect(again)
+            try_out(again)
     if not args.no_test:
         test(wheel, args.quick)
 

@@ -29,5 +29,5 @@ mod text;
 
 pub use error::{FileError, taken};
 pub use number_table::NumberTable;
-pub use results::{Undo, check_free, file_stem, write_all};
+pub use results::{Undo, check_free, file_stem, write_all, writing_unless};
 pub use text::{Source, TextFileError, read_text};

@@ -1,8 +1,31 @@
 //! Files of a result: refused before the work if their places are taken, none left half written.
 
+use std::cell::RefCell;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 
 use crate::FileError;
+
+thread_local! {
+    /// Whether nobody wants the results of this thread any more.
+    static UNWANTED: RefCell<Option<Rc<dyn Fn() -> bool>>> = const { RefCell::new(None) };
+}
+
+/// Does work whose results somebody may stop waiting for: from when `unwanted` says so, [`write_all`] on this thread refuses.
+///
+/// So what was broken off leaves no files behind, wherever the work just was.
+pub fn writing_unless<T>(unwanted: impl Fn() -> bool + 'static, work: impl FnOnce() -> T) -> T {
+    /// Puts back what was before, whatever happens.
+    struct Before(Option<Rc<dyn Fn() -> bool>>);
+    impl Drop for Before {
+        fn drop(&mut self) {
+            UNWANTED.set(self.0.take());
+        }
+    }
+    let _before = Before(UNWANTED.replace(Some(Rc::new(unwanted))));
+    work()
+}
 
 /// Refuses places that are taken.
 ///
@@ -31,8 +54,14 @@ pub fn check_free(paths: &[PathBuf], overwrite: bool) -> Result<(), FileError> {
 /// rename that fails leaves new files behind. Files that were overwritten before it stay as they are now.
 ///
 /// # Errors
-/// [`FileError::Write`].
+/// [`FileError::Write`]; of the kind [`ErrorKind::Interrupted`] where nobody wants them any more ([`writing_unless`]).
 pub fn write_all(files: &[(PathBuf, impl AsRef<[u8]>)]) -> Result<(), FileError> {
+    let unwanted = UNWANTED.with_borrow(Clone::clone);
+    if let (Some(unwanted), Some((path, _))) = (unwanted, files.first())
+        && unwanted()
+    {
+        return Err(FileError::Write { path: path.clone(), source: ErrorKind::Interrupted.into() });
+    }
     let mut undo = Undo::default();
     for (path, bytes) in files {
         let failed = |source| FileError::Write { path: path.clone(), source };
@@ -124,6 +153,32 @@ mod tests {
         let left: Vec<_> = std::fs::read_dir(&place).unwrap().map(|entry| entry.unwrap().file_name()).collect();
         assert_eq!(left, ["file"]);
         std::fs::remove_dir_all(&place).unwrap();
+    }
+
+    #[test]
+    fn what_nobody_wants_any_more_is_not_written() {
+        use std::cell::Cell;
+
+        let folder = std::env::temp_dir().join(format!("flexarm-files-unwanted-{}", std::process::id()));
+        let files = [(folder.join("a"), "a")];
+        let unwanted = Rc::new(Cell::new(false));
+        let asked = unwanted.clone();
+        writing_unless(
+            move || asked.get(),
+            || {
+                write_all(&files).unwrap();
+                std::fs::remove_dir_all(&folder).unwrap();
+                unwanted.set(true);
+                let refused = write_all(&files);
+                assert!(
+                    matches!(refused, Err(FileError::Write { source, .. }) if source.kind() == ErrorKind::Interrupted)
+                );
+                assert!(!folder.exists());
+            },
+        );
+        // Other work of the thread writes as before.
+        write_all(&files).unwrap();
+        std::fs::remove_dir_all(&folder).unwrap();
     }
 
     #[test]

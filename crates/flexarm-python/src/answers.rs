@@ -1,13 +1,15 @@
-//! Answers at a pose: statics, modes, frequency response, the linear structure.
+//! Answers at a pose: statics, modes, frequency response.
 
-use flexarm::{Linear, ModeTable, OperatingPoint, OperatingPoints, Quantity, Response, ResponseRequest, Spacing};
+use flexarm::{ModeTable, OperatingPoint, OperatingPoints, Quantity, Response, ResponseRequest, Spacing};
 use pyo3::prelude::*;
 use pyo3::types::{PyList, PyTuple};
 
 use crate::arm::{PyArm, only_for_one};
-use crate::arrays::{answer, array, view};
+use crate::arrays::{array, view};
 use crate::caveat;
 use crate::failure::OrRaise;
+use crate::figures::Figures;
+use crate::parts::{Parts, Pickled};
 use crate::values::{plain, word};
 
 /// Static equilibrium at a pose, or at m of them: arrays then have an axis of m in front.
@@ -116,7 +118,7 @@ impl PyStatics {
     fn details<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let (arm, q, wrench) = self.asked.as_ref().ok_or_else(|| only_for_one("details"))?;
         let found = py.detach(|| arm.get().arm.statics(Some(q), *wrench)).or_raise()?;
-        caveat::warn(py, &found.caveats)?;
+        caveat::tell(py, &found.caveats)?;
         plain(py, &found)
     }
 
@@ -136,16 +138,68 @@ impl PyStatics {
             }
         }
     }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        Self::reduced(slf)
+    }
+}
+
+impl Pickled for PyStatics {
+    fn parts(&self, parts: &Parts<'_>) -> PyResult<()> {
+        parts.put("rows", self.rows)?;
+        parts.put("elastic", self.elastic)?;
+        parts.put("failures", self.failures.clone())?;
+        parts.put_numbers("tcp", &self.tcp)?;
+        parts.put_numbers("deflection", &self.deflection)?;
+        parts.put_numbers("compliance", &self.compliance)?;
+        parts.put_numbers("frequencies", &self.frequencies)?;
+        parts.put("asked", self.asked.as_ref().map(|(arm, q, wrench)| (arm, q.clone(), wrench.to_vec())))
+    }
+
+    fn of_parts(parts: &Parts<'_>) -> PyResult<Self> {
+        let (rows, elastic): (Option<usize>, usize) = (parts.get("rows")?, parts.get("elastic")?);
+        let m = rows.unwrap_or(1);
+        Ok(Self {
+            rows,
+            tcp: parts.shaped("tcp", &[m, 3])?,
+            deflection: parts.shaped("deflection", &[m, 3])?,
+            compliance: parts.shaped("compliance", &[m, 6, 6])?,
+            frequencies: parts.shaped("frequencies", &[m, elastic])?,
+            elastic,
+            failures: parts.get("failures")?,
+            asked: parts.get("asked")?,
+        })
+    }
 }
 
 /// Natural modes at a pose.
 #[pyclass(frozen, name = "Modes", module = "flexarm")]
 pub(crate) struct PyModes {
-    table: ModeTable,
+    frequencies: Vec<f64>,
+    damping_ratio: Vec<f64>,
+    /// Real and imaginary part, six numbers for each mode.
+    tcp: [Vec<f64>; 2],
+    strain_energy: Vec<f64>,
+    elements: Vec<String>,
+    /// How many modes there are; these may be fewer.
+    total: usize,
+    figures: Figures,
 }
 
-pub(crate) fn modes(table: ModeTable) -> PyResult<PyModes> {
-    Ok(PyModes { table })
+pub(crate) fn modes(table: ModeTable) -> PyModes {
+    let ModeTable { frequencies_hz, damping_ratio, modes, elements, total, caveats, .. } = table.clone();
+    PyModes {
+        frequencies: frequencies_hz,
+        damping_ratio,
+        tcp: [
+            modes.iter().flat_map(|mode| mode.tcp).collect(),
+            modes.iter().flat_map(|mode| mode.tcp_imaginary).collect(),
+        ],
+        strain_energy: modes.into_iter().flat_map(|mode| mode.strain_energy).collect(),
+        elements,
+        total,
+        figures: Figures::of(table, &caveats),
+    }
 }
 
 #[pymethods]
@@ -153,58 +207,86 @@ impl PyModes {
     /// Natural frequencies, ascending (Hz), (modes,).
     #[getter]
     fn frequencies<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        let values = &slf.get().table.frequencies_hz;
+        let values = &slf.get().frequencies;
         view(slf.clone().into_any(), [values.len()], values)
     }
 
     /// Damping ratios, (modes,).
     #[getter]
     fn damping_ratio<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        let values = &slf.get().table.damping_ratio;
+        let values = &slf.get().damping_ratio;
         view(slf.clone().into_any(), [values.len()], values)
     }
 
     /// Motion of the tool in each mode scaled to unit modal mass, (modes, 6), complex.
     #[getter]
     fn tcp<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let n = self.table.modes.len();
-        let part = |of: fn(&flexarm::ModeFigures) -> &[f64; 6]| -> PyResult<Bound<'py, PyAny>> {
-            array(py, [n, 6], self.table.modes.iter().flat_map(|mode| *of(mode)).collect())
-        };
-        complex(&part(|mode| &mode.tcp)?, &part(|mode| &mode.tcp_imaginary)?)
+        let part = |values: &[f64]| array(py, [values.len() / 6, 6], values.to_vec());
+        complex(&part(&self.tcp[0])?, &part(&self.tcp[1])?)
     }
 
     /// Share of each element in the strain energy of each mode, (modes, elements).
     #[getter]
-    fn strain_energy<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let values = self.table.modes.iter().flat_map(|mode| mode.strain_energy.iter().copied()).collect();
-        array(py, [self.table.modes.len(), self.table.elements.len()], values)
+    fn strain_energy<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let own = slf.get();
+        view(slf.clone().into_any(), [own.tcp[0].len() / 6, own.elements.len()], &own.strain_energy)
     }
 
     /// Names of the elements, in the order of :attr:`strain_energy` (tuple of str).
     #[getter]
     fn elements<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
-        PyTuple::new(py, &self.table.elements)
+        PyTuple::new(py, &self.elements)
     }
 
     /// What limits the worth of the answer (list of flexarm.Caveat).
     #[getter]
     fn caveats<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
-        caveat::list(py, &self.table.caveats)
+        self.figures.caveats(py)
     }
 
     /// All figures (dict as ``flexarm modes --json``).
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        plain(py, &self.table)
+        self.figures.plain(py)
     }
 
     fn __len__(&self) -> usize {
-        self.table.modes.len()
+        self.tcp[0].len() / 6
     }
 
     fn __repr__(&self) -> String {
-        let hz = self.table.frequencies_hz.iter().take(3).map(|hz| format!("{hz:.2}")).collect::<Vec<_>>().join(", ");
-        format!("<Modes: {} of {}, {hz} ... Hz>", self.table.modes.len(), self.table.total)
+        let hz = self.frequencies.iter().take(3).map(|hz| format!("{hz:.2}")).collect::<Vec<_>>().join(", ");
+        format!("<Modes: {} of {}, {hz} ... Hz>", self.__len__(), self.total)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        Self::reduced(slf)
+    }
+}
+
+impl Pickled for PyModes {
+    fn parts(&self, parts: &Parts<'_>) -> PyResult<()> {
+        parts.put_numbers("frequencies", &self.frequencies)?;
+        parts.put_numbers("damping_ratio", &self.damping_ratio)?;
+        parts.put_numbers("tcp", &self.tcp[0])?;
+        parts.put_numbers("tcp_imaginary", &self.tcp[1])?;
+        parts.put_numbers("strain_energy", &self.strain_energy)?;
+        parts.put("elements", self.elements.clone())?;
+        parts.put("total", self.total)?;
+        self.figures.put_into(parts)
+    }
+
+    fn of_parts(parts: &Parts<'_>) -> PyResult<Self> {
+        let tcp = parts.numbers("tcp")?;
+        let (n, elements): (usize, Vec<String>) = (tcp.len() / 6, parts.get("elements")?);
+        Ok(Self {
+            frequencies: parts.numbers("frequencies")?,
+            damping_ratio: parts.numbers("damping_ratio")?,
+            tcp: [tcp, parts.shaped("tcp_imaginary", &[n, 6])?],
+            strain_energy: parts.shaped("strain_energy", &[n, elements.len()])?,
+            elements,
+            total: parts.get("total")?,
+            figures: Figures::of_parts(parts)?,
+        })
     }
 }
 
@@ -249,21 +331,37 @@ impl ResponseArgs<'_> {
 /// Frequency response of the tool at a pose.
 #[pyclass(frozen, name = "Response", module = "flexarm")]
 pub(crate) struct PyResponse {
-    response: Response,
+    frequency: Vec<f64>,
+    natural_frequencies: Vec<f64>,
+    /// Curve after curve, outputs fastest.
+    magnitude: Vec<f64>,
+    phase: Vec<f64>,
     inputs: Vec<String>,
     outputs: Vec<String>,
+    figures: Figures,
 }
 
-pub(crate) fn response(response: Response, request: &ResponseRequest) -> PyResult<PyResponse> {
-    Ok(PyResponse { response, inputs: request.inputs.clone(), outputs: request.outputs.clone() })
+pub(crate) fn response(response: Response, request: &ResponseRequest) -> PyResponse {
+    let all = |of: fn(&flexarm::ResponseCurve) -> &[f64]| response.curves.iter().flat_map(of).copied().collect();
+    PyResponse {
+        frequency: response.frequency_hz.clone(),
+        natural_frequencies: response.frequencies_hz.clone(),
+        magnitude: all(|curve| &curve.magnitude),
+        phase: all(|curve| &curve.phase_rad),
+        inputs: request.inputs.clone(),
+        outputs: request.outputs.clone(),
+        figures: {
+            let caveats = response.caveats.clone();
+            Figures::of(response, &caveats)
+        },
+    }
 }
 
 impl PyResponse {
     /// A field of all curves, (inputs, outputs, f).
-    fn field<'py>(&self, py: Python<'py>, of: fn(&flexarm::ResponseCurve) -> &[f64]) -> PyResult<Bound<'py, PyAny>> {
-        let n = self.response.frequency_hz.len();
-        let values = self.response.curves.iter().flat_map(|curve| of(curve).iter().copied()).collect();
-        array(py, [self.inputs.len(), self.outputs.len(), n], values)
+    fn field<'py>(slf: &Bound<'py, Self>, values: &[f64]) -> PyResult<Bound<'py, PyAny>> {
+        let own = slf.get();
+        view(slf.clone().into_any(), [own.inputs.len(), own.outputs.len(), own.frequency.len()], values)
     }
 }
 
@@ -272,7 +370,7 @@ impl PyResponse {
     /// Frequencies of the curves (Hz), (f,).
     #[getter]
     fn frequency<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        let values = &slf.get().response.frequency_hz;
+        let values = &slf.get().frequency;
         view(slf.clone().into_any(), [values.len()], values)
     }
 
@@ -290,32 +388,32 @@ impl PyResponse {
 
     /// Amplitude of the output per amplitude of the input, (inputs, outputs, f).
     #[getter]
-    fn magnitude<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.field(py, |curve| &curve.magnitude)
+    fn magnitude<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        Self::field(slf, &slf.get().magnitude)
     }
 
     /// How far the output is ahead of the input (rad), (inputs, outputs, f).
     #[getter]
-    fn phase<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.field(py, |curve| &curve.phase_rad)
+    fn phase<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        Self::field(slf, &slf.get().phase)
     }
 
     /// Natural frequencies of all modes (Hz), (modes,).
     #[getter]
     fn natural_frequencies<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
-        let values = &slf.get().response.frequencies_hz;
+        let values = &slf.get().natural_frequencies;
         view(slf.clone().into_any(), [values.len()], values)
     }
 
     /// What limits the worth of the answer (list of flexarm.Caveat).
     #[getter]
     fn caveats<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
-        caveat::list(py, &self.response.caveats)
+        self.figures.caveats(py)
     }
 
     /// All figures, with peaks and units (dict as ``flexarm response --json``).
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        plain(py, &self.response)
+        self.figures.plain(py)
     }
 
     /// Draws the magnitudes with matplotlib.
@@ -335,118 +433,37 @@ impl PyResponse {
 
     fn __repr__(&self) -> String {
         let (inputs, outputs) = (self.inputs.join(","), self.outputs.join(","));
-        format!("<Response of {outputs} to {inputs}: {} frequencies>", self.response.frequency_hz.len())
+        format!("<Response of {outputs} to {inputs}: {} frequencies>", self.frequency.len())
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        Self::reduced(slf)
     }
 }
 
-/// Linear structure about an equilibrium; k free coordinates (joints driven by torque, then elastic ones), n joints.
-///
-/// World axes at the tool, linear first.
-#[pyclass(frozen, name = "Linear", module = "flexarm")]
-pub(crate) struct PyLinear {
-    linear: Linear,
-}
-
-pub(crate) fn linear(linear: Linear) -> PyLinear {
-    PyLinear { linear }
-}
-
-impl PyLinear {
-    /// A matrix whose numbers lie column after column.
-    fn matrix<'py>(
-        py: Python<'py>,
-        (rows, columns): (usize, usize),
-        by_columns: &[f64],
-    ) -> PyResult<Bound<'py, PyAny>> {
-        let values = (0..rows * columns).map(|k| by_columns[(k % columns) * rows + k / columns]).collect();
-        answer(py, None, &[rows, columns], values)
-    }
-}
-
-#[pymethods]
-#[expect(non_snake_case, reason = "the names of the matrices")]
-impl PyLinear {
-    /// Mass matrix, (k, k).
-    #[getter]
-    fn M<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        Self::matrix(py, self.linear.M.shape(), self.linear.M.as_slice())
+impl Pickled for PyResponse {
+    fn parts(&self, parts: &Parts<'_>) -> PyResult<()> {
+        parts.put_numbers("frequency", &self.frequency)?;
+        parts.put_numbers("natural_frequencies", &self.natural_frequencies)?;
+        parts.put_numbers("magnitude", &self.magnitude)?;
+        parts.put_numbers("phase", &self.phase)?;
+        parts.put("inputs", self.inputs.clone())?;
+        parts.put("outputs", self.outputs.clone())?;
+        self.figures.put_into(parts)
     }
 
-    /// Damping matrix, (k, k).
-    #[getter]
-    fn D<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        Self::matrix(py, self.linear.D.shape(), self.linear.D.as_slice())
-    }
-
-    /// Tangent stiffness: springs, change of weight and of the wrench, (k, k).
-    #[getter]
-    fn K<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        Self::matrix(py, self.linear.K.shape(), self.linear.K.as_slice())
-    }
-
-    /// Twist of the tool per rate of the free coordinates, (6, k).
-    #[getter]
-    fn J<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        Self::matrix(py, self.linear.J.shape(), self.linear.J.as_slice())
-    }
-
-    /// Forces on the free coordinates per acceleration of the commands, (k, n).
-    #[getter]
-    fn M_a<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        Self::matrix(py, self.linear.M_a.shape(), self.linear.M_a.as_slice())
-    }
-
-    /// Forces on the free coordinates per rate of the commands, (k, n).
-    #[getter]
-    fn D_a<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        Self::matrix(py, self.linear.D_a.shape(), self.linear.D_a.as_slice())
-    }
-
-    /// Forces on the free coordinates per command, (k, n).
-    #[getter]
-    fn K_a<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        Self::matrix(py, self.linear.K_a.shape(), self.linear.K_a.as_slice())
-    }
-
-    /// Twist of the tool per rate of the commands, the structure not yielding, (6, n).
-    #[getter]
-    fn J_a<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        Self::matrix(py, self.linear.J_a.shape(), self.linear.J_a.as_slice())
-    }
-
-    /// Free coordinates at the equilibrium, (k,).
-    #[getter]
-    fn equilibrium<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        array(py, [self.linear.equilibrium.len()], self.linear.equilibrium.as_slice().to_vec())
-    }
-
-    /// Forces with which the drives hold the pose (N m or N), (n,).
-    #[getter]
-    fn holding<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        array(py, [self.linear.holding.len()], self.linear.holding.as_slice().to_vec())
-    }
-
-    /// How many of the free coordinates are joints driven by torque; they come first.
-    #[getter]
-    fn driven(&self) -> usize {
-        self.linear.driven
-    }
-
-    /// Name, and first and last but one free coordinate, of each elastic element (list of (str, int, int)).
-    #[getter]
-    fn elements(&self) -> Vec<(String, usize, usize)> {
-        self.linear.elements.iter().map(|(name, range)| (name.clone(), range.start, range.end)).collect()
-    }
-
-    /// Displacement of the tool per wrench on it, motors held, (6, 6).
-    #[getter]
-    fn compliance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let failed = |source| flexarm::Error::Step { source, partial: false };
-        let C = self.linear.compliance().map_err(failed).or_raise()?;
-        Self::matrix(py, C.shape(), C.as_slice())
-    }
-
-    fn __repr__(&self) -> String {
-        format!("<Linear: {} free coordinates, {} commands>", self.linear.M.nrows(), self.linear.M_a.ncols())
+    fn of_parts(parts: &Parts<'_>) -> PyResult<Self> {
+        let (inputs, outputs): (Vec<String>, Vec<String>) = (parts.get("inputs")?, parts.get("outputs")?);
+        let frequency = parts.numbers("frequency")?;
+        let shape = [inputs.len(), outputs.len(), frequency.len()];
+        Ok(Self {
+            magnitude: parts.shaped("magnitude", &shape)?,
+            phase: parts.shaped("phase", &shape)?,
+            natural_frequencies: parts.numbers("natural_frequencies")?,
+            frequency,
+            inputs,
+            outputs,
+            figures: Figures::of_parts(parts)?,
+        })
     }
 }

@@ -8,18 +8,20 @@ use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList, PyTuple};
 
-use crate::answers::{PyLinear, PyModes, PyResponse, PyStatics, ResponseArgs, linear, modes, response};
+use crate::answers::{PyModes, PyResponse, PyStatics, ResponseArgs, modes, response};
 use crate::arrays::numbers;
 use crate::caveat;
-use crate::deflections::{PyDeflections, variations};
+use crate::deflections::{Parameters, PyDeflections, Scenarios, variations};
 use crate::failure::{OrRaise, exception};
+use crate::linear::{PyLinear, linear};
 use crate::live::PyLive;
 use crate::model::PyModel;
+use crate::motion::PyMotion;
 use crate::operating_point::PyOperatingPoint;
 use crate::robot::PyRobot;
 use crate::run::{PyRun, PySample};
-use crate::scenario::scenario;
-use crate::values::{as_wrench, path, stepper, word, wrench};
+use crate::scenario::{PyScenario, scenario};
+use crate::values::{as_wrench, path, stepper, texts, whole, word, wrench};
 use crate::watch::{Watch, stoppable};
 
 /// A robot with its flexible links and drives in place. Made by :meth:`Robot.flexible`.
@@ -68,11 +70,15 @@ impl PyArm {
 
     fn scenarios(&self, py: Python<'_>, runs: &Bound<'_, PyAny>) -> PyResult<Vec<Scenario>> {
         let robot = self.robot.bind(py);
-        let wrong = |_| PyTypeError::new_err("runs: expected a list of motions or Scenarios");
+        let wrong =
+            || PyTypeError::new_err(format!("runs is {}: expected a list of motions or Scenarios", runs.get_type()));
+        if is_one(runs) {
+            return Err(wrong());
+        }
         // The same object again, as in [None] * 1000, is the same scenario.
         let mut known: HashMap<*mut pyo3::ffi::PyObject, (Bound<'_, PyAny>, Scenario)> = HashMap::new();
         let mut all = Vec::new();
-        for run in runs.try_iter().map_err(wrong)? {
+        for run in runs.try_iter().map_err(|_| wrong())? {
             let run = run?;
             if let Some((_, scenario)) = known.get(&run.as_ptr()) {
                 all.push(scenario.clone());
@@ -85,6 +91,14 @@ impl PyArm {
         }
         Ok(all)
     }
+}
+
+/// Whether it is one motion or scenario, and not several.
+fn is_one(runs: &Bound<'_, PyAny>) -> bool {
+    runs.is_none()
+        || runs.cast::<PyMotion>().is_ok()
+        || runs.cast::<PyScenario>().is_ok()
+        || runs.extract::<std::path::PathBuf>().is_ok()
 }
 
 /// Options of a run that are the same for one and for many.
@@ -225,7 +239,7 @@ impl PyArm {
         settling_band: f64,
         output: Option<&Bound<'_, PyAny>>,
         overwrite: bool,
-        formats: Option<Vec<String>>,
+        #[pyo3(from_py_with = texts)] formats: Option<Vec<String>>,
         figures: bool,
         magnify: Option<f64>,
         observer: Option<Py<PyAny>>,
@@ -250,8 +264,13 @@ impl PyArm {
             close.call0()?;
         }
         let run = run?;
-        caveat::warn(py, &run.summary.caveats)?;
-        Ok(PyRun::new(run))
+        let (caveats, run) = (run.summary.caveats.clone(), PyRun::new(run));
+        caveat::say(py, "ran", (run.headline(),))?;
+        if outputs.is_some() {
+            caveat::say(py, "wrote", (run.summary(py)?,))?;
+        }
+        caveat::tell(py, &caveats)?;
+        Ok(run)
     }
 
     /// Runs many motions or Scenarios on all cores; each has the bits of the run alone.
@@ -308,11 +327,23 @@ impl PyArm {
 
     /// How far the tool is off in many runs: figures alone, several runs at a time in vector registers, on all cores.
     ///
+    /// Runs are a list, or one motion or Scenario with arrays of parameters; each parameter is one for all runs, or an array
+    /// with one for each. A run has the same bits in any company; :meth:`simulate` finds the same within rounding.
+    ///
     /// Parameters
     /// ----------
-    /// runs : sequence of Motion, Scenario, str or os.PathLike
+    /// runs : sequence of Motion, Scenario, str or os.PathLike, or one of them, optional
+    ///     The robot's own motion without it.
     /// stiffness, damping : float or array_like, shape (m,), default 1
-    ///     Factors of all stiffnesses and of all damping, one for all or one for each run.
+    ///     Factors of all stiffnesses and of all damping.
+    /// time_scale : float or array_like, shape (m,), default 1
+    ///     Each motion in so many times its time: 1.25 is slower, 0.8 faster.
+    /// payload_mass : float or array_like, shape (m,), optional
+    ///     What the tool carries from the start in the place of the robot's own payload (kg); 0 is nothing.
+    /// payload_com : array_like, shape (3,) or (m, 3), optional
+    ///     Its centre of mass in the link that carries it (m).
+    /// payload_inertia : array_like, shape (3, 3) or (m, 3, 3), optional
+    ///     About the centre of mass, axes of the link (kg m²); a point without it.
     /// step, stepper, stepper_options, ignore_limits
     ///     As for :meth:`simulate`.
     /// samples : bool, default False
@@ -323,15 +354,28 @@ impl PyArm {
     /// Returns
     /// -------
     /// Deflections
-    #[pyo3(signature = (runs, *, stiffness=None, damping=None, step=1e-3, stepper=None, stepper_options=None,
-                        ignore_limits=false, samples=false, errors="raise"))]
+    ///
+    /// Examples
+    /// --------
+    /// >>> import numpy as np
+    /// >>> arm = flexarm.load("reference_arm").flexible()
+    /// >>> found = arm.deflections(stiffness=np.linspace(0.8, 1.2, 5), step=5e-3)
+    /// >>> found.peak.shape, bool(np.all(np.diff(found.peak) < 0))
+    /// ((5,), True)
+    #[pyo3(signature = (runs=None, *, stiffness=None, damping=None, time_scale=None, payload_mass=None, payload_com=None,
+                        payload_inertia=None, step=1e-3, stepper=None, stepper_options=None, ignore_limits=false,
+                        samples=false, errors="raise"))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments")]
     fn deflections(
         &self,
         py: Python<'_>,
-        runs: &Bound<'_, PyAny>,
+        runs: Option<&Bound<'_, PyAny>>,
         stiffness: Option<&Bound<'_, PyAny>>,
         damping: Option<&Bound<'_, PyAny>>,
+        time_scale: Option<&Bound<'_, PyAny>>,
+        payload_mass: Option<&Bound<'_, PyAny>>,
+        payload_com: Option<&Bound<'_, PyAny>>,
+        payload_inertia: Option<&Bound<'_, PyAny>>,
         step: f64,
         stepper: Option<&str>,
         stepper_options: Option<&Bound<'_, PyDict>>,
@@ -340,7 +384,14 @@ impl PyArm {
         errors: &str,
     ) -> PyResult<PyDeflections> {
         let raises = word("errors", errors, &[("raise", true), ("nan", false)])?;
-        let variations = variations(self.scenarios(py, runs)?, stiffness, damping)?;
+        let robot = self.robot.bind(py);
+        let scenarios = match runs.filter(|runs| !is_one(runs)) {
+            Some(runs) => Scenarios::Each(self.scenarios(py, runs)?),
+            None => Scenarios::One(Box::new(scenario(robot, runs, None, None, None)?)),
+        };
+        let (mass, com, inertia) = (payload_mass, payload_com, payload_inertia);
+        let given = Parameters { stiffness, damping, time_scale, mass, com, inertia };
+        let variations = variations(robot, scenarios, &given)?;
         let options = RunOptions { ignore_limits, ..run_options(step, stepper, stepper_options)? };
         let arm = self.arm.clone();
         let found = stoppable(py, move |stop| arm.deflections_until(&variations, &options, samples, stop))?;
@@ -399,11 +450,16 @@ impl PyArm {
     /// -------
     /// Modes
     #[pyo3(signature = (q=None, count=10))]
-    fn modes(&self, py: Python<'_>, q: Option<&Bound<'_, PyAny>>, count: usize) -> PyResult<PyModes> {
+    fn modes(
+        &self,
+        py: Python<'_>,
+        q: Option<&Bound<'_, PyAny>>,
+        #[pyo3(from_py_with = whole)] count: usize,
+    ) -> PyResult<PyModes> {
         let q = self.pose(q)?;
         let table = py.detach(|| self.arm.modes(q.as_deref(), count)).or_raise()?;
-        caveat::warn(py, &table.caveats)?;
-        modes(table)
+        caveat::tell(py, &table.caveats)?;
+        Ok(modes(table))
     }
 
     /// Frequency response of the tool at a pose, other drives locked.
@@ -432,19 +488,19 @@ impl PyArm {
         &self,
         py: Python<'_>,
         q: Option<&Bound<'_, PyAny>>,
-        inputs: Option<Vec<String>>,
-        outputs: Option<Vec<String>>,
+        #[pyo3(from_py_with = texts)] inputs: Option<Vec<String>>,
+        #[pyo3(from_py_with = texts)] outputs: Option<Vec<String>>,
         quantity: &str,
         from_hz: Option<f64>,
         to_hz: Option<f64>,
-        points: usize,
+        #[pyo3(from_py_with = whole)] points: usize,
         spacing: &str,
     ) -> PyResult<PyResponse> {
         let request = ResponseArgs { inputs, outputs, quantity, from_hz, to_hz, points, spacing }.request()?;
         let q = self.pose(q)?;
         let found = py.detach(|| self.arm.response(q.as_deref(), &request)).or_raise()?;
-        caveat::warn(py, &found.caveats)?;
-        response(found, &request)
+        caveat::tell(py, &found.caveats)?;
+        Ok(response(found, &request))
     }
 
     /// Mass, damping and stiffness of the free coordinates about the equilibrium at a pose.
@@ -467,7 +523,7 @@ impl PyArm {
         wrench: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<PyLinear> {
         let (q, F) = (self.pose(q)?, self::wrench(wrench)?);
-        Ok(linear(py.detach(|| self.arm.linearise(q.as_deref(), F)).or_raise()?))
+        Ok(linear(&py.detach(|| self.arm.linearise(q.as_deref(), F)).or_raise()?))
     }
 
     /// The arm at rest at a pose, to be commanded while it moves.

@@ -33,6 +33,9 @@ impl Numbers<'_> {
 
 /// How a shape is asked for in messages.
 fn expected(row: &[(usize, &str)], batch: bool) -> String {
+    if row.is_empty() {
+        return "expected one number, or (m,) with one for each of m runs".into();
+    }
     let inner = row.iter().map(|(n, what)| format!("{n} {what}")).collect::<Vec<_>>().join(" x ");
     let shape = row.iter().map(|(n, _)| n.to_string()).collect::<Vec<_>>().join(", ");
     let one = if row.len() == 1 { format!("({shape},)") } else { format!("({shape})") };
@@ -75,6 +78,13 @@ fn floats<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyA
     let float = f64::get_dtype(py);
     let array = numpy.call_method1(intern!(py, "ascontiguousarray"), (array, float))?;
     Ok(array.cast_into::<PyArrayDyn<f64>>()?)
+}
+
+/// Numbers of an array of any shape, NaN and infinite ones too.
+pub(crate) fn any_numbers(name: &str, value: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+    let array = floats(name, value)?;
+    let array = array.try_readonly().map_err(|error| PyValueError::new_err(format!("{name}: {error}")))?;
+    Ok(array.as_slice().unwrap_or(&[]).to_vec())
 }
 
 /// Numbers of an argument: a row of the shape `row`, or with `batch` also m rows.

@@ -1,8 +1,11 @@
 //! Caveats: what is probably wrong with an input, or limits the worth of a result, as warnings of their own class.
 
 use flexarm::Caveat;
+use pyo3::call::PyCallArgs;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
+
+use crate::values::plain;
 
 /// Caveats as instances of `flexarm.Caveat`, which can be warned with as they are.
 pub(crate) fn list<'py>(py: Python<'py>, caveats: &[Caveat]) -> PyResult<Bound<'py, PyList>> {
@@ -22,17 +25,37 @@ pub(crate) fn list<'py>(py: Python<'py>, caveats: &[Caveat]) -> PyResult<Bound<'
     PyList::new(py, caveats.iter().map(instance).collect::<PyResult<Vec<_>>>()?)
 }
 
-/// Warns of those that warn, as if the caller's line did.
-pub(crate) fn warn(py: Python<'_>, caveats: &[Caveat]) -> PyResult<()> {
-    if !caveats.iter().any(Caveat::warns) {
+/// Warns of those that warn, as if the caller's line did, and logs the others.
+pub(crate) fn tell(py: Python<'_>, caveats: &[Caveat]) -> PyResult<()> {
+    let (told, notes): (Vec<Caveat>, Vec<Caveat>) = caveats.iter().cloned().partition(Caveat::warns);
+    if !notes.is_empty() {
+        say(py, "notes", (list(py, &notes)?,))?;
+    }
+    if told.is_empty() {
         return Ok(());
     }
     let warn = py.import("warnings")?.getattr("warn")?;
     let level = PyDict::new(py);
     level.set_item("stacklevel", 1)?;
-    let told: Vec<Caveat> = caveats.iter().filter(|caveat| caveat.warns()).cloned().collect();
     for caveat in list(py, &told)? {
         warn.call((caveat,), Some(&level))?;
     }
     Ok(())
+}
+
+/// Says something through `logging`, by a function of `flexarm._say`.
+pub(crate) fn say<'py>(py: Python<'py>, what: &str, arguments: impl PyCallArgs<'py>) -> PyResult<()> {
+    py.import("flexarm._say")?.call_method1(what, arguments).map(drop)
+}
+
+/// An answer as a dict; its caveats are told, and the files that it names.
+pub(crate) fn answer<'py>(
+    py: Python<'py>,
+    found: &impl serde::Serialize,
+    caveats: &[Caveat],
+) -> PyResult<Bound<'py, PyAny>> {
+    let figures = plain(py, found)?;
+    say(py, "wrote", (&figures,))?;
+    tell(py, caveats)?;
+    Ok(figures)
 }

@@ -2,18 +2,21 @@
 
 use std::path::PathBuf;
 
-use flexarm::compensate::{CompensateRequest, Compensation, Method, ShaperKind, compensate_motion};
+use flexarm::compensate::{CompensateRequest, Method, ShaperKind, compensate_motion_until};
 use flexarm::{Motion, RunOptions};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::PyList;
 
 use crate::arrays::view;
 use crate::caveat;
 use crate::failure::OrRaise;
+use crate::figures::Figures;
 use crate::motion::PyMotion;
+use crate::parts::{Parts, Pickled};
 use crate::robot::PyRobot;
 use crate::scenario::scenario;
-use crate::values::{modelling, plain, word};
+use crate::values::{modelling, texts, whole, word};
 use crate::watch::stoppable;
 
 const COMPONENTS: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
@@ -21,29 +24,31 @@ const COMPONENTS: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
 /// A motion whose flexible tool follows the rigid one's path. Made by :func:`flexarm.compensate`.
 #[pyclass(frozen, name = "Compensated", module = "flexarm")]
 pub(crate) struct PyCompensated {
-    found: Compensation,
-    motion: Motion,
+    motion: Py<PyMotion>,
     curves: Vec<f64>,
+    /// What is told in one line.
+    headline: String,
+    figures: Figures,
 }
 
 #[pymethods]
 impl PyCompensated {
     /// The new motion.
     #[getter]
-    fn motion(&self) -> PyMotion {
-        PyMotion::made(self.motion.clone())
+    fn motion(&self, py: Python<'_>) -> Py<PyMotion> {
+        self.motion.clone_ref(py)
     }
 
     /// Error of the tool with the motion as it was (dict): ``peak_m``, ``rms_m``, ``peak_rad``, ``end_m``.
     #[getter]
     fn before<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        plain(py, &self.found.before)
+        self.figures.plain(py)?.get_item("before")
     }
 
     /// The same with the new motion (dict).
     #[getter]
     fn after<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        plain(py, &self.found.after)
+        self.figures.plain(py)?.get_item("after")
     }
 
     /// Time (s), and distance of the tool before and after (m), (n, 3).
@@ -55,12 +60,39 @@ impl PyCompensated {
 
     /// All figures (dict as ``flexarm compensate --json``).
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        plain(py, &self.found)
+        self.figures.plain(py)
+    }
+
+    /// What limits the worth of the answer (list of flexarm.Caveat).
+    #[getter]
+    fn caveats<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        self.figures.caveats(py)
     }
 
     fn __repr__(&self) -> String {
-        let (before, after) = (1e3 * self.found.before.peak_m, 1e3 * self.found.after.peak_m);
-        format!("<Compensated {}: largest error {before:.4} mm before, {after:.4} mm after>", self.found.motion)
+        format!("<Compensated {}>", self.headline)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        Self::reduced(slf)
+    }
+}
+
+impl Pickled for PyCompensated {
+    fn parts(&self, parts: &Parts<'_>) -> PyResult<()> {
+        parts.put("motion", &self.motion)?;
+        parts.put_numbers("curves", &self.curves)?;
+        parts.put("headline", &self.headline)?;
+        self.figures.put_into(parts)
+    }
+
+    fn of_parts(parts: &Parts<'_>) -> PyResult<Self> {
+        Ok(Self {
+            motion: parts.get("motion")?,
+            curves: parts.numbers("curves")?,
+            headline: parts.get("headline")?,
+            figures: Figures::of_parts(parts)?,
+        })
     }
 }
 
@@ -104,8 +136,8 @@ pub(crate) fn compensate<'py>(
     robot: &Bound<'py, PyRobot>,
     motion: Option<&Bound<'py, PyAny>>,
     method: &str,
-    components: Option<Vec<String>>,
-    iterations: usize,
+    #[pyo3(from_py_with = texts)] components: Option<Vec<String>>,
+    #[pyo3(from_py_with = whole)] iterations: usize,
     cutoff_hz: Option<f64>,
     shaper: Option<&str>,
     plant: Option<&Bound<'py, PyRobot>>,
@@ -140,9 +172,17 @@ pub(crate) fn compensate<'py>(
     }
     let (of, motion) = (robot.get().robot.clone(), scenario.motion);
     let name = format!("{}_compensated", motion.name);
-    let found = stoppable(py, move |_| compensate_motion(&of, &motion, &request))?.or_raise()?;
-    caveat::warn(py, &found.caveats)?;
+    let found = stoppable(py, move |stop| compensate_motion_until(&of, &motion, &request, stop))?.or_raise()?;
+    caveat::answer(py, &found, &found.caveats)?;
     let motion = Motion::along((*found.trajectory).clone(), &name, &robot.get().robot).or_raise()?;
-    let curves = found.curves.iter().flatten().copied().collect();
-    Ok(PyCompensated { found, motion, curves })
+    let (before, after) = (1e3 * found.before.peak_m, 1e3 * found.after.peak_m);
+    Ok(PyCompensated {
+        motion: Py::new(py, PyMotion::made(motion, robot))?,
+        curves: found.curves.iter().flatten().copied().collect(),
+        headline: format!("{}: largest error {before:.4} mm before, {after:.4} mm after", found.motion),
+        figures: {
+            let caveats = found.caveats.clone();
+            Figures::of(found, &caveats)
+        },
+    })
 }

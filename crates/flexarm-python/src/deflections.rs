@@ -1,38 +1,125 @@
-//! How far the tool is off in many runs.
+//! How far the tool is off in many runs, by lists of runs or by arrays of parameters.
 
-use flexarm::{Scenario, ToolDeflection, Variation};
-use pyo3::exceptions::PyValueError;
+use flexarm::{PayloadChange, Scenario, ToolDeflection, Variation};
+use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 
-use crate::arrays::{array, table, view};
-use crate::failure::exception;
+use crate::arrays::{Numbers, numbers, view};
+use crate::failure::{OrRaise, exception};
+use crate::parts::{Parts, Pickled};
+use crate::robot::PyRobot;
+use crate::scenario::inertia_matrix;
 
-/// A factor for each of m runs.
-fn factors(name: &str, value: Option<&Bound<'_, PyAny>>, m: usize) -> PyResult<Vec<f64>> {
-    let Some(value) = value else { return Ok(vec![1.0; m]) };
-    if let Ok(one) = value.extract::<f64>() {
-        return Ok(vec![one; m]);
-    }
-    let many = table(name, value, 0, "factors")?;
-    match many.len() == m {
-        true => Ok(many.values().to_vec()),
-        false => {
-            let found = many.len();
-            Err(PyValueError::new_err(format!("{name} has {found} factors for {m} runs: expected one, or {m}")))
+/// Parameters of many runs as they were given: one for all, or one for each.
+pub(crate) struct Parameters<'a, 'py> {
+    pub(crate) stiffness: Option<&'a Bound<'py, PyAny>>,
+    pub(crate) damping: Option<&'a Bound<'py, PyAny>>,
+    pub(crate) time_scale: Option<&'a Bound<'py, PyAny>>,
+    pub(crate) mass: Option<&'a Bound<'py, PyAny>>,
+    pub(crate) com: Option<&'a Bound<'py, PyAny>>,
+    pub(crate) inertia: Option<&'a Bound<'py, PyAny>>,
+}
+
+/// One parameter of m runs.
+struct Parameter<'py> {
+    name: &'static str,
+    values: Option<Numbers<'py>>,
+}
+
+impl<'py> Parameter<'py> {
+    fn new(name: &'static str, value: Option<&Bound<'py, PyAny>>, row: &[(usize, &str)]) -> PyResult<Self> {
+        let Some(value) = value.filter(|value| !value.is_none()) else { return Ok(Self { name, values: None }) };
+        // A single number, which numpy's contiguous arrays have an axis for.
+        let axes: usize = value.getattr("ndim").and_then(|n| n.extract()).unwrap_or(0);
+        let is_one = row.is_empty() && axes == 0 && value.extract::<f64>().is_ok();
+        let mut found = numbers(name, value, row, true)?;
+        if is_one {
+            found.rows = None;
         }
+        Ok(Self { name, values: Some(found) })
+    }
+
+    /// How many there are, if there is one for each run.
+    fn rows(&self) -> Option<(&'static str, usize)> {
+        Some((self.name, self.values.as_ref()?.rows?))
+    }
+
+    /// Numbers of a run.
+    fn row(&self, k: usize) -> Option<&[f64]> {
+        let found = self.values.as_ref()?;
+        let width = found.values().len() / found.len().max(1);
+        let k = if found.rows.is_some() { k } else { 0 };
+        Some(&found.values()[k * width..][..width])
+    }
+
+    /// A factor of a run.
+    fn factor(&self, k: usize) -> f64 {
+        self.row(k).and_then(|row| row.first().copied()).unwrap_or(1.0)
     }
 }
 
-/// Scenarios with their factors.
+/// The runs that are meant: scenarios, or one for all, with their parameters.
 pub(crate) fn variations(
-    scenarios: Vec<Scenario>,
-    stiffness: Option<&Bound<'_, PyAny>>,
-    damping: Option<&Bound<'_, PyAny>>,
+    robot: &Bound<'_, PyRobot>,
+    scenarios: Scenarios,
+    given: &Parameters<'_, '_>,
 ) -> PyResult<Vec<Variation>> {
-    let m = scenarios.len();
-    let (stiffness, damping) = (factors("stiffness", stiffness, m)?, factors("damping", damping, m)?);
-    let each = scenarios.into_iter().zip(stiffness).zip(damping);
-    Ok(each.map(|((scenario, stiffness), damping)| Variation { scenario, stiffness, damping }).collect())
+    let plain = |name, value| Parameter::new(name, value, &[]);
+    let stiffness = plain("stiffness", given.stiffness)?;
+    let damping = plain("damping", given.damping)?;
+    let time_scale = plain("time_scale", given.time_scale)?;
+    let mass = plain("payload_mass", given.mass)?;
+    let com = Parameter::new("payload_com", given.com, &[(3, "numbers (m)")])?;
+    let inertia = Parameter::new("payload_inertia", given.inertia, &[(3, "rows"), (3, "columns (kg m²)")])?;
+    if mass.values.is_some() != com.values.is_some() || (inertia.values.is_some() && mass.values.is_none()) {
+        return Err(PyValueError::new_err(
+            "a payload needs payload_mass (kg) and payload_com (m, axes of the link that carries it)",
+        ));
+    }
+    let all = [&stiffness, &damping, &time_scale, &mass, &com, &inertia];
+    let mut counts: Vec<(&str, usize)> = all.iter().filter_map(|parameter| parameter.rows()).collect();
+    if let Scenarios::Each(each) = &scenarios {
+        counts.insert(0, ("runs", each.len()));
+    }
+    let m = counts.first().map_or(1, |(_, m)| *m);
+    if let Some((name, found)) = counts.iter().find(|(_, found)| *found != m) {
+        let first = counts[0].0;
+        return Err(PyValueError::new_err(format!(
+            "{name} has {found} values, {first} has {m}: expected one, or one for each run"
+        )));
+    }
+    let own = &robot.get().robot;
+    let model = own.rigid_model().or_raise()?;
+    let mut runs = Vec::with_capacity(m);
+    for k in 0..m {
+        if k % 64 == 0 {
+            robot.py().check_signals()?;
+        }
+        let mut scenario = match &scenarios {
+            Scenarios::Each(each) => each[k].clone(),
+            Scenarios::One(one) => (**one).clone(),
+        };
+        if time_scale.values.is_some() {
+            scenario.motion = scenario.motion.scaled(time_scale.factor(k), &model).or_raise()?;
+        }
+        if let (Some(mass), Some(com)) = (mass.row(k), com.row(k)) {
+            let mut payload = PayloadChange::attach(0.0, mass[0], [com[0], com[1], com[2]].into());
+            if let Some(inertia) = inertia.row(k) {
+                payload = payload.with_inertia(inertia_matrix("payload_inertia", inertia)?.into());
+            }
+            scenario = scenario.with_payload(payload);
+        }
+        runs.push(Variation { scenario, stiffness: stiffness.factor(k), damping: damping.factor(k) });
+    }
+    Ok(runs)
+}
+
+/// What happens in many runs.
+pub(crate) enum Scenarios {
+    /// The same in all.
+    One(Box<Scenario>),
+    /// In each its own.
+    Each(Vec<Scenario>),
 }
 
 /// How far the tool was off in each of m runs. Made by :meth:`Arm.deflections`.
@@ -105,11 +192,11 @@ impl PyDeflections {
     }
 
     /// The same at the start and after every step, of run ``k``, (steps + 1, 3); with ``samples=True``.
-    fn samples<'py>(&self, py: Python<'py>, k: usize) -> PyResult<Bound<'py, PyAny>> {
-        let values = self.samples.get(k).cloned().ok_or_else(|| {
-            pyo3::exceptions::PyIndexError::new_err(format!("there is no run {k} of {}", self.samples.len()))
-        })?;
-        array(py, [values.len() / 3, 3], values)
+    fn samples<'py>(slf: &Bound<'py, Self>, k: usize) -> PyResult<Bound<'py, PyAny>> {
+        let all = &slf.get().samples;
+        let missing = || PyIndexError::new_err(format!("there is no run {k} of {}", all.len()));
+        let values = all.get(k).ok_or_else(missing)?;
+        view(slf.clone().into_any(), [values.len() / 3, 3], values)
     }
 
     /// Time step of the samples (s).
@@ -131,5 +218,44 @@ impl PyDeflections {
     fn __repr__(&self) -> String {
         let largest = self.peak.iter().copied().fold(0.0, f64::max);
         format!("<Deflections of {} runs, at most {:.4} mm>", self.peak.len(), 1e3 * largest)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        Self::reduced(slf)
+    }
+}
+
+impl Pickled for PyDeflections {
+    fn parts(&self, parts: &Parts<'_>) -> PyResult<()> {
+        for (name, values) in
+            [("peak", &self.peak), ("time_of_peak", &self.time_of_peak), ("rms", &self.rms), ("end", &self.end)]
+        {
+            parts.put_numbers(name, values)?;
+        }
+        parts.put_numbers("samples", &self.samples.concat())?;
+        parts.put("lengths", self.samples.iter().map(Vec::len).collect::<Vec<_>>())?;
+        parts.put("failures", self.failures.clone())?;
+        parts.put("step", self.step)
+    }
+
+    fn of_parts(parts: &Parts<'_>) -> PyResult<Self> {
+        let (peak, lengths): (Vec<f64>, Vec<usize>) = (parts.numbers("peak")?, parts.get("lengths")?);
+        let m = peak.len();
+        let all = parts.shaped("samples", &[lengths.iter().sum()])?;
+        let mut rest = all.as_slice();
+        let mut next = |length: usize| {
+            let (own, after) = rest.split_at(length);
+            rest = after;
+            own.to_vec()
+        };
+        Ok(Self {
+            time_of_peak: parts.shaped("time_of_peak", &[m])?,
+            rms: parts.shaped("rms", &[m])?,
+            end: parts.shaped("end", &[m, 3])?,
+            samples: lengths.into_iter().map(&mut next).collect(),
+            failures: parts.get("failures")?,
+            step: parts.get("step")?,
+            peak,
+        })
     }
 }

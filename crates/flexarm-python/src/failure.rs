@@ -56,7 +56,7 @@ pub(crate) fn exception(error: Error) -> PyErr {
 }
 
 /// An exception of a class of `flexarm.errors`.
-fn raised(py: Python<'_>, class: &str, message: String) -> PyErr {
+pub(crate) fn raised(py: Python<'_>, class: &str, message: String) -> PyErr {
     let made = || -> PyResult<PyErr> {
         let class = py.import("flexarm.errors")?.getattr(class)?.cast_into::<PyType>()?;
         Ok(PyErr::from_type(class, message))

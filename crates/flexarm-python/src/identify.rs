@@ -9,7 +9,7 @@ use crate::arrays::table;
 use crate::caveat;
 use crate::failure::OrRaise;
 use crate::robot::PyRobot;
-use crate::values::{modelling, plain};
+use crate::values::{modelling, texts, whole};
 use crate::watch::stoppable;
 
 /// Finds numbers of a robot file from measurements at the robot: tracker, dial gauge, hammer, encoders.
@@ -38,7 +38,7 @@ pub(crate) fn identify<'py>(
     py: Python<'py>,
     robot: &Bound<'py, PyRobot>,
     measurements: PathBuf,
-    fit: Option<Vec<String>>,
+    #[pyo3(from_py_with = texts)] fit: Option<Vec<String>>,
     links: Option<&str>,
     drives: Option<&str>,
     output: Option<PathBuf>,
@@ -48,8 +48,7 @@ pub(crate) fn identify<'py>(
     let request = IdentifyRequest { modelling, fit: fit.unwrap_or_default(), output, overwrite };
     let robot = robot.get().robot.clone();
     let found = stoppable(py, move |_| identify_robot(&robot, &measurements, &request))?.or_raise()?;
-    caveat::warn(py, &found.caveats)?;
-    plain(py, &found)
+    caveat::answer(py, &found, &found.caveats)
 }
 
 /// Chooses poses and forces that tell most of what is unknown.
@@ -84,8 +83,8 @@ pub(crate) fn identify<'py>(
 pub(crate) fn plan_measurements<'py>(
     py: Python<'py>,
     robot: &Bound<'py, PyRobot>,
-    count: usize,
-    fit: Option<Vec<String>>,
+    #[pyo3(from_py_with = whole)] count: usize,
+    #[pyo3(from_py_with = texts)] fit: Option<Vec<String>>,
     forces: Option<&Bound<'py, PyAny>>,
     std: Option<f64>,
     poses: Option<PathBuf>,
@@ -115,5 +114,6 @@ pub(crate) fn plan_measurements<'py>(
         ..usual
     };
     let robot = robot.get().robot.clone();
-    plain(py, &stoppable(py, move |_| plan(&robot, &request))?.or_raise()?)
+    let found = stoppable(py, move |_| plan(&robot, &request))?.or_raise()?;
+    caveat::answer(py, &found, &[])
 }

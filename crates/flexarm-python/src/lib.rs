@@ -13,7 +13,9 @@ mod command;
 mod compensate;
 mod deflections;
 mod failure;
+mod figures;
 mod identify;
+mod linear;
 mod links;
 mod live;
 mod lobes;
@@ -23,6 +25,7 @@ mod motion;
 mod names;
 mod new;
 mod operating_point;
+mod parts;
 mod robot;
 mod run;
 mod scenario;
@@ -35,7 +38,7 @@ mod watch;
 #[pyo3::pymodule]
 mod _flexarm {
     #[pymodule_export]
-    use crate::answers::{PyLinear, PyModes, PyResponse, PyStatics};
+    use crate::answers::{PyModes, PyResponse, PyStatics};
     #[pymodule_export]
     use crate::arm::PyArm;
     #[pymodule_export]
@@ -47,6 +50,8 @@ mod _flexarm {
     #[pymodule_export]
     use crate::identify::{identify, plan_measurements};
     #[pymodule_export]
+    use crate::linear::PyLinear;
+    #[pymodule_export]
     use crate::links::{export_link, import_link, reduce};
     #[pymodule_export]
     use crate::live::PyLive;
@@ -57,11 +62,13 @@ mod _flexarm {
     #[pymodule_export]
     use crate::model::PyModel;
     #[pymodule_export]
-    use crate::motion::PyMotion;
+    use crate::motion::{PyMotion, motion_of_pieces};
     #[pymodule_export]
     use crate::new::new_robot;
     #[pymodule_export]
     use crate::operating_point::PyOperatingPoint;
+    #[pymodule_export]
+    use crate::parts::restore;
     #[pymodule_export]
     use crate::robot::{PyRobot, check, load, robot};
     #[pymodule_export]

@@ -1,17 +1,19 @@
 //! Links from meshes and matrices, and back.
 
 use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use flexarm::export::{ExportFormat, ExportJob, export};
 use flexarm::import::{ImportFormat, ImportJob, ImportOutputs, import};
-use flexarm::reduce::{ReduceJob, ReduceOptions, ReduceOutputs, reduce as reduce_job};
+use flexarm::reduce::{ReduceJob, ReduceOptions, ReduceOutputs, ReduceProgress, reduce as reduce_job};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::caveat;
 use crate::failure::OrRaise;
-use crate::values::{path, plain, word};
-use crate::watch::stoppable;
+use crate::values::{maybe_whole, path, texts, word};
+use crate::watch::{stoppable, stoppable_telling};
 
 /// Reduces a mesh to a flexible link and writes its files.
 ///
@@ -49,8 +51,21 @@ pub(crate) fn reduce<'py>(
     };
     let folder = output.map(|output| path("output", output)).transpose()?;
     let outputs = folder.map(|folder| ReduceOutputs { folder: Some(folder), flex: None, overwrite });
-    let summary = stoppable(py, move |_| reduce_job(&job, &ReduceOptions::default(), outputs.as_ref(), &mut |_| {}))?;
-    plain(py, &summary.or_raise()?)
+    // Steps as they begin, told by the thread that may call Python.
+    let begun: Arc<Mutex<Vec<ReduceProgress>>> = Arc::default();
+    let steps = begun.clone();
+    let lock =
+        |begun: &Mutex<Vec<ReduceProgress>>| std::mem::take(&mut *begun.lock().unwrap_or_else(PoisonError::into_inner));
+    let mut tell = |py: Python<'_>| {
+        let told = lock(&begun).into_iter();
+        told.map(|s| (s.step, s.number, s.of)).try_for_each(|step| caveat::say(py, "step", step))
+    };
+    let work = move |_: &(dyn Fn() -> bool + Sync)| {
+        let mut begin = |step| steps.lock().unwrap_or_else(PoisonError::into_inner).push(step);
+        reduce_job(&job, &ReduceOptions::default(), outputs.as_ref(), &mut begin)
+    };
+    let summary = stoppable_telling(py, work, &mut tell)?.or_raise()?;
+    caveat::answer(py, &summary, &summary.caveats)
 }
 
 /// A text or several.
@@ -117,8 +132,8 @@ pub(crate) fn import_link<'py>(
     format: Option<&str>,
     units: Option<&str>,
     map: Option<&str>,
-    at: Option<Vec<String>>,
-    modes: Option<usize>,
+    #[pyo3(from_py_with = texts)] at: Option<Vec<String>>,
+    #[pyo3(from_py_with = maybe_whole)] modes: Option<usize>,
     mass_file: Option<PathBuf>,
     name: Option<String>,
     output: Option<PathBuf>,
@@ -141,8 +156,8 @@ pub(crate) fn import_link<'py>(
         ..ImportJob::default()
     };
     let outputs = output.map(|folder| ImportOutputs { folder: Some(folder), flex: None, overwrite });
-    let summary = stoppable(py, move |_| import(&job, outputs.as_ref()))?;
-    plain(py, &summary.or_raise()?)
+    let summary = stoppable(py, move |_| import(&job, outputs.as_ref()))?.or_raise()?;
+    caveat::answer(py, &summary, &summary.caveats)
 }
 
 const EXPORTS: [(&str, ExportFormat); 6] = [
@@ -188,6 +203,7 @@ pub(crate) fn export_link<'py>(
     let format = word("format", format, &EXPORTS)?;
     let units = units.parse().map_err(|error| PyValueError::new_err(format!("units: {error}")))?;
     let job = ExportJob { link, format, units, nodes: nodes.unwrap_or_default(), folder: output, overwrite };
-    let summary = stoppable(py, move |_| export(&job))?;
-    plain(py, &summary.or_raise()?)
+    let summary = stoppable(py, move |_| export(&job))?.or_raise()?;
+    caveat::say(py, "warnings", (summary.warnings.clone(),))?;
+    caveat::answer(py, &summary, &[])
 }

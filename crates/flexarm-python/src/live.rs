@@ -126,6 +126,12 @@ impl PyLive {
         homogeneous(py, &self.lock().target_pose())
     }
 
+    fn __reduce__(&self) -> PyResult<()> {
+        Err(pyo3::exceptions::PyTypeError::new_err(
+            "a Live is a simulation that is going on and cannot be pickled: pickle its arm, and call arm.live(...) there",
+        ))
+    }
+
     fn __repr__(&self) -> String {
         format!("<Live at {} s>", self.lock().time_s())
     }

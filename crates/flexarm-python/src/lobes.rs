@@ -8,10 +8,10 @@ use pyo3::prelude::*;
 
 use crate::arrays::numbers;
 use crate::caveat;
-use crate::failure::OrRaise;
+use crate::failure::{OrRaise, raised};
 use crate::robot::PyRobot;
 use crate::scenario::scenario;
-use crate::values::{modelling, plain};
+use crate::values::{modelling, whole};
 use crate::watch::stoppable;
 
 /// Finds the depth of cut beyond which a tool chatters, over the spindle speed.
@@ -56,7 +56,7 @@ pub(crate) fn lobes<'py>(
     tool: PathBuf,
     q: Option<&Bound<'py, PyAny>>,
     along: Option<&Bound<'py, PyAny>>,
-    places: usize,
+    #[pyo3(from_py_with = whole)] places: usize,
     rpm: Option<Vec<f64>>,
     deepest: Option<f64>,
     zero_order: bool,
@@ -69,7 +69,7 @@ pub(crate) fn lobes<'py>(
     if q.is_some() && along.is_some() {
         return Err(PyValueError::new_err("q and along exclude each other: give one of them"));
     }
-    let tool = cutting_tool(&tool, rpm)?;
+    let tool = cutting_tool(py, &tool, rpm)?;
     let n = robot.get().robot.rigid_model().or_raise()?.n_actuated();
     let q = q.map(|q| numbers("q", q, &[(n, "joints")], false)).transpose()?.map(|q| q.values().to_vec());
     let motion = along.map(|along| scenario(robot, Some(along), None, None, None)).transpose()?.map(|s| s.motion);
@@ -84,13 +84,28 @@ pub(crate) fn lobes<'py>(
         limits(&robot, &tool, &place, &request, &|_, _| !stop())
     })?
     .or_raise()?;
-    caveat::warn(py, &found.caveats)?;
-    plain(py, &found)
+    caveat::answer(py, &found, &found.caveats)
+}
+
+/// The exception for a tool that is not there, with those that are shipped.
+fn no_tool(py: Python<'_>, tool: &Path) -> PyResult<PyErr> {
+    let shipped: Vec<String> = py.import("flexarm._show")?.call_method0("shipped_tools")?.extract()?;
+    let name = tool.to_string_lossy();
+    let near = flexarm::closest(&name, shipped.iter().map(String::as_str));
+    let near = near.map_or_else(String::new, |near| format!(" (did you mean {near:?}?)"));
+    let shipped = shipped.join(", ");
+    let what = format!("there is no such file and no shipped tool of this name{near}; shipped are {shipped}");
+    let message = format!("tool: {name}: {what}");
+    Ok(raised(py, "FileError", message))
 }
 
 /// The tool of a file or a shipped one, at other speeds than its own if any are told.
-pub(crate) fn cutting_tool(tool: &Path, rpm: Option<Vec<f64>>) -> PyResult<CuttingTool> {
-    let tool = CuttingTool::load(flexarm_cli::shipped_tool(tool)).or_raise()?;
+pub(crate) fn cutting_tool(py: Python<'_>, tool: &Path, rpm: Option<Vec<f64>>) -> PyResult<CuttingTool> {
+    let file = flexarm_cli::shipped_tool(tool);
+    if !file.exists() {
+        return Err(no_tool(py, tool)?);
+    }
+    let tool = CuttingTool::load(file).or_raise()?;
     Ok(match rpm {
         Some(rpm) => tool.at_speeds(rpm),
         None => tool,

@@ -13,16 +13,44 @@ use crate::arm::progress_function;
 use crate::arrays::{array, numbers};
 use crate::caveat;
 use crate::failure::OrRaise;
+use crate::figures::Figures;
 use crate::lobes::cutting_tool;
+use crate::parts::{Parts, Pickled};
 use crate::robot::PyRobot;
 use crate::scenario::scenario;
-use crate::values::{modelling, plain, word, wrench};
+use crate::values::{maybe_whole, modelling, whole, word, wrench};
 use crate::watch::Watch;
 
 /// Sag, compliance, frequencies and error under load at many poses. Made by :func:`flexarm.map`.
 #[pyclass(frozen, name = "Map", module = "flexarm")]
 pub(crate) struct PyMap {
-    map: Map,
+    /// Names and meanings of the columns.
+    columns: Vec<(String, String)>,
+    /// Row after row.
+    values: Vec<f64>,
+    /// What is told in one line.
+    headline: String,
+    figures: Figures,
+}
+
+impl PyMap {
+    fn new(mut map: Map) -> Self {
+        let Map { robot, poses, points, reachable, .. } = &map;
+        let headline = format!("{robot:?}: {poses} poses, {reachable} of {points} places within reach");
+        let table = std::mem::take(&mut map.table);
+        let columns = table.columns.into_iter().map(|column| (column.name, column.meaning)).collect();
+        let caveats = map.caveats.clone();
+        Self { columns, values: table.values, headline, figures: Figures::of(map, &caveats) }
+    }
+
+    fn column<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        let k = self.columns.iter().position(|(column, _)| column == name).ok_or_else(|| {
+            let known: Vec<&str> = self.columns.iter().map(|(column, _)| column.as_str()).collect();
+            PyKeyError::new_err(format!("the map has no column {name:?}; its columns are {}", known.join(", ")))
+        })?;
+        let values: Vec<f64> = self.values.iter().skip(k).step_by(self.columns.len()).copied().collect();
+        array(py, [values.len()], values)
+    }
 }
 
 #[pymethods]
@@ -31,8 +59,8 @@ impl PyMap {
     #[getter]
     fn table<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let table = PyDict::new(py);
-        for column in &self.map.table.columns {
-            table.set_item(&column.name, self.column(py, &column.name)?)?;
+        for (name, _) in &self.columns {
+            table.set_item(name, self.column(py, name)?)?;
         }
         Ok(table)
     }
@@ -41,8 +69,8 @@ impl PyMap {
     #[getter]
     fn meanings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let meanings = PyDict::new(py);
-        for column in &self.map.table.columns {
-            meanings.set_item(&column.name, &column.meaning)?;
+        for (name, meaning) in &self.columns {
+            meanings.set_item(name, meaning)?;
         }
         Ok(meanings)
     }
@@ -50,24 +78,24 @@ impl PyMap {
     /// Pose with the worst value of the quantity that is compared (dict).
     #[getter]
     fn worst<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        plain(py, &self.map.worst)
+        self.figures.plain(py)?.get_item("worst")
     }
 
     /// Pose with the best one (dict).
     #[getter]
     fn best<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        plain(py, &self.map.best)
+        self.figures.plain(py)?.get_item("best")
     }
 
     /// What limits the worth of the answer (list of flexarm.Caveat).
     #[getter]
     fn caveats<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
-        caveat::list(py, &self.map.caveats)
+        self.figures.caveats(py)
     }
 
     /// All figures (dict as ``flexarm map --json``).
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        plain(py, &self.map)
+        self.figures.plain(py)
     }
 
     fn __getitem__<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
@@ -75,22 +103,33 @@ impl PyMap {
     }
 
     fn __len__(&self) -> usize {
-        self.map.table.rows()
+        self.values.len() / self.columns.len().max(1)
     }
 
     fn __repr__(&self) -> String {
-        let Map { robot, poses, points, reachable, .. } = &self.map;
-        format!("<Map {robot:?}: {poses} poses, {reachable} of {points} places within reach>")
+        format!("<Map {}>", self.headline)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        Self::reduced(slf)
     }
 }
 
-impl PyMap {
-    fn column<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
-        let values = self.map.table.column(name).ok_or_else(|| {
-            let known: Vec<&str> = self.map.table.columns.iter().map(|column| column.name.as_str()).collect();
-            PyKeyError::new_err(format!("the map has no column {name:?}; its columns are {}", known.join(", ")))
-        })?;
-        array(py, [values.len()], values)
+impl Pickled for PyMap {
+    fn parts(&self, parts: &Parts<'_>) -> PyResult<()> {
+        parts.put("columns", self.columns.clone())?;
+        parts.put_numbers("values", &self.values)?;
+        parts.put("headline", &self.headline)?;
+        self.figures.put_into(parts)
+    }
+
+    fn of_parts(parts: &Parts<'_>) -> PyResult<Self> {
+        Ok(Self {
+            columns: parts.get("columns")?,
+            values: parts.numbers("values")?,
+            headline: parts.get("headline")?,
+            figures: Figures::of_parts(parts)?,
+        })
     }
 }
 
@@ -186,16 +225,16 @@ pub(crate) fn map<'py>(
     tool_axis: Option<&Bound<'py, PyAny>>,
     roll: f64,
     cone: f64,
-    tilts: Option<usize>,
-    rolls: usize,
+    #[pyo3(from_py_with = maybe_whole)] tilts: Option<usize>,
+    #[pyo3(from_py_with = whole)] rolls: usize,
     joints: Option<&Bound<'py, PyDict>>,
     along: Option<&Bound<'py, PyAny>>,
-    points: usize,
+    #[pyo3(from_py_with = whole)] points: usize,
     at: Option<&Bound<'py, PyAny>>,
     wrench: Option<&Bound<'py, PyAny>>,
     by: Option<String>,
     keep: &str,
-    frequencies: usize,
+    #[pyo3(from_py_with = whole)] frequencies: usize,
     workpiece: Option<&Bound<'py, PyAny>>,
     tool: Option<PathBuf>,
     rpm: Option<Vec<f64>>,
@@ -246,7 +285,7 @@ pub(crate) fn map<'py>(
         frequencies: Some(frequencies),
         keep: word("keep", keep, &kept)?,
         by,
-        tool: tool.map(|tool| cutting_tool(&tool, rpm)).transpose()?,
+        tool: tool.map(|tool| cutting_tool(py, &tool, rpm)).transpose()?,
         zero_order,
         workpiece_m: workpiece.map(|edges| three("workpiece", edges)).transpose()?,
         output,
@@ -260,8 +299,8 @@ pub(crate) fn map<'py>(
         close.call0()?;
     }
     let map = found?;
-    caveat::warn(py, &map.caveats)?;
-    Ok(PyMap { map })
+    caveat::answer(py, &map, &map.caveats)?;
+    Ok(PyMap::new(map))
 }
 
 /// A map that signals and a progress function can end.

@@ -8,6 +8,7 @@ use pyo3::types::PyTuple;
 
 use crate::arrays::{Numbers, answer, numbers};
 use crate::failure::OrRaise;
+use crate::values::word;
 
 /// Rows from which on the interpreter's lock is given back.
 const MANY: usize = 64;
@@ -34,6 +35,18 @@ pub(crate) struct PyModel {
 impl PyModel {
     pub(crate) fn new(recursions: Recursions) -> Self {
         Self { recursions: Arc::new(recursions) }
+    }
+
+    /// Names of the frames that there are.
+    fn frame_names(&self) -> Vec<&str> {
+        let named = self.recursions.model().frames().iter().map(|frame| frame.name.as_str());
+        named.filter(|name| !name.starts_with("__")).chain(["tcp"]).collect()
+    }
+
+    /// A frame that there is.
+    fn check_frame(&self, name: &str) -> PyResult<()> {
+        let known: Vec<(&str, ())> = self.frame_names().into_iter().map(|name| (name, ())).collect();
+        word("frame", name, &known)
     }
 
     fn input<'py>(&self, name: &str, value: &Bound<'py, PyAny>) -> PyResult<Numbers<'py>> {
@@ -100,8 +113,7 @@ impl PyModel {
     /// Names of frames: links, and ``"tcp"`` (tuple of str).
     #[getter]
     fn frames<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
-        let named = self.recursions.model().frames().iter().map(|frame| frame.name.as_str());
-        PyTuple::new(py, named.filter(|name| !name.starts_with("__")).chain(["tcp"]).collect::<Vec<_>>())
+        PyTuple::new(py, self.frame_names())
     }
 
     /// Mass of what moves (kg).
@@ -154,6 +166,7 @@ impl PyModel {
     /// Jacobian of a frame, world axes at its origin, linear rows first, (6, n) or (m, 6, n).
     #[pyo3(signature = (q, frame="tcp"))]
     fn jacobian<'py>(&self, q: &Bound<'py, PyAny>, frame: &str) -> PyResult<Bound<'py, PyAny>> {
+        self.check_frame(frame)?;
         let frame = self.recursions.frame(frame).or_raise()?;
         let row = [6, self.nv()];
         self.each(q.py(), ["q"], [q], &row, |r, [q], J| r.jacobian(q, &frame, J))
@@ -162,6 +175,7 @@ impl PyModel {
     /// Pose of a frame in the world as a homogeneous matrix, (4, 4) or (m, 4, 4): forward kinematics.
     #[pyo3(signature = (q, frame="tcp"))]
     fn fk<'py>(&self, q: &Bound<'py, PyAny>, frame: &str) -> PyResult<Bound<'py, PyAny>> {
+        self.check_frame(frame)?;
         let frame = self.recursions.frame(frame).or_raise()?;
         self.each(q.py(), ["q"], [q], &[4, 4], |r, [q], X| r.pose(q, &frame, X))
     }
@@ -169,6 +183,12 @@ impl PyModel {
     /// Centre of mass in the world, (3,) or (m, 3) (m).
     fn center_of_mass<'py>(&self, q: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         self.each(q.py(), ["q"], [q], &[3], |r, [q], com| r.center_of_mass(q, com))
+    }
+
+    fn __reduce__(&self) -> PyResult<()> {
+        Err(pyo3::exceptions::PyTypeError::new_err(
+            "a Model cannot be pickled: pickle the robot or the arm, and take .model there",
+        ))
     }
 
     fn __repr__(&self) -> String {

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use flexarm::{Motion, MotionOptions, Robot};
+use flexarm::{Motion, MotionOptions, Robot, Trajectory};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
@@ -43,8 +43,8 @@ pub(crate) struct PyMotion {
 enum Kind {
     /// Samples that no robot has seen: times, rows of positions, numbers per row.
     Samples { name: String, t: Vec<f64>, q: Vec<f64>, width: usize },
-    /// A motion of a robot, and how it is made again in another process.
-    Bound { motion: Box<Motion>, again: Option<Py<PyAny>> },
+    /// A motion of a robot, and how it is made again in another process: what was read, or its curves without that.
+    Bound { motion: Box<Motion>, robot: Py<PyRobot>, again: Option<Py<PyAny>> },
 }
 
 /// Choices at reading.
@@ -81,13 +81,14 @@ pub(crate) fn load_motion(
     });
     let file = std::path::absolute(&file).unwrap_or(file);
     let again = (robot, file, args.topic, args.columns, corners).into_pyobject(py)?.into_any().unbind();
-    Ok(PyMotion { kind: Kind::Bound { motion: Box::new(motion.or_raise()?), again: Some(again) } })
+    let motion = Box::new(motion.or_raise()?);
+    Ok(PyMotion { kind: Kind::Bound { motion, robot: robot.clone().unbind(), again: Some(again) } })
 }
 
 impl PyMotion {
-    /// A motion that was made.
-    pub(crate) fn made(motion: Motion) -> Self {
-        Self { kind: Kind::Bound { motion: Box::new(motion), again: None } }
+    /// A motion that was made for a robot.
+    pub(crate) fn made(motion: Motion, robot: &Bound<'_, PyRobot>) -> Self {
+        Self { kind: Kind::Bound { motion: Box::new(motion), robot: robot.clone().unbind(), again: None } }
     }
 
     /// The motion for a robot.
@@ -110,6 +111,15 @@ impl PyMotion {
                     true => Ok((**motion).clone()),
                     false => Motion::along((*motion.trajectory).clone(), &motion.name, robot).or_raise(),
                 }
+            }
+        }
+    }
+
+    fn robot<'a, 'py>(&'a self, py: Python<'py>) -> PyResult<&'a Bound<'py, PyRobot>> {
+        match &self.kind {
+            Kind::Bound { robot, .. } => Ok(robot.bind(py)),
+            Kind::Samples { .. } => {
+                Err(PyValueError::new_err("a motion of samples knows no robot yet: use motion.on(robot)"))
             }
         }
     }
@@ -157,7 +167,29 @@ impl PyMotion {
     fn on_robot(slf: &Bound<'_, Self>, robot: &Bound<'_, PyRobot>) -> PyResult<Self> {
         let motion = slf.get().on(&robot.get().robot)?;
         let again = (robot, slf).into_pyobject(slf.py())?.into_any().unbind();
-        Ok(Self { kind: Kind::Bound { motion: Box::new(motion), again: Some(again) } })
+        Ok(Self { kind: Kind::Bound { motion: Box::new(motion), robot: robot.clone().unbind(), again: Some(again) } })
+    }
+
+    /// The same motion in so many times its time, rests too; needs a robot.
+    ///
+    /// Parameters
+    /// ----------
+    /// factor : float
+    ///     1.25 is slower, 0.8 faster.
+    ///
+    /// Returns
+    /// -------
+    /// Motion
+    ///
+    /// Examples
+    /// --------
+    /// >>> motion = flexarm.load("kr210").motion("point_to_point")
+    /// >>> motion.scaled(2.0).duration == 2 * motion.duration
+    /// True
+    fn scaled(&self, py: Python<'_>, factor: f64) -> PyResult<Self> {
+        let (motion, robot) = (self.bound("scaled")?.clone(), self.robot(py)?);
+        let model = robot.get().robot.rigid_model().or_raise()?;
+        Ok(Self::made(motion.scaled(factor, &model).or_raise()?, robot))
     }
 
     /// Name, for logs.
@@ -246,12 +278,48 @@ impl PyMotion {
             Kind::Bound { again: Some(again), .. } => {
                 Ok((module.getattr("motion_again")?, again.bind(py)).into_pyobject(py)?.into_any())
             }
-            Kind::Bound { motion, again: None } => {
-                let message = format!("the motion {:?} cannot be pickled: it was made in this process", motion.name);
-                Err(pyo3::exceptions::PyTypeError::new_err(message))
+            Kind::Bound { motion, robot, again: None } => {
+                let make = module.getattr("motion_of_pieces")?;
+                let curves = pieces(py, &motion.trajectory)?;
+                let duration = motion.trajectory.duration();
+                Ok((make, (robot, &motion.name, duration, curves)).into_pyobject(py)?.into_any())
             }
         }
     }
+}
+
+/// A joint with its knots and pieces, as arrays.
+type Curve<'py> = (String, Bound<'py, PyAny>, Bound<'py, PyAny>);
+
+/// The curves of a trajectory: of each joint its name, knots, and a row of seven numbers for each piece.
+fn pieces<'py>(py: Python<'py>, trajectory: &Trajectory) -> PyResult<Vec<Curve<'py>>> {
+    let mut curves = Vec::new();
+    for (k, joint) in trajectory.joints().iter().enumerate() {
+        let Some((knots, rows)) = trajectory.pieces(k) else { continue };
+        let values = array(py, [rows.len(), 7], rows.concat())?;
+        curves.push((joint.clone(), array(py, [knots.len()], knots.to_vec())?, values));
+    }
+    Ok(curves)
+}
+
+/// A motion of such curves; for `flexarm._pickle`.
+#[pyfunction]
+#[pyo3(name = "_motion_of_pieces")]
+pub(crate) fn motion_of_pieces(
+    robot: &Bound<'_, PyRobot>,
+    name: &str,
+    duration: f64,
+    curves: Vec<Curve<'_>>,
+) -> PyResult<PyMotion> {
+    let curve = |(joint, knots, rows): Curve<'_>| {
+        let rows = table("pieces", &rows, 7, "numbers")?;
+        let rows = rows.values().chunks_exact(7).map(|row| std::array::from_fn(|k| row[k])).collect();
+        Ok((joint, table("knots", &knots, 0, "times")?.values().to_vec(), rows))
+    };
+    let curves = curves.into_iter().map(curve).collect::<PyResult<Vec<_>>>()?;
+    let trajectory = Trajectory::of_pieces(curves, duration).map_err(flexarm::Error::from).or_raise()?;
+    let motion = Motion::along(trajectory, name, &robot.get().robot).or_raise()?;
+    Ok(PyMotion::made(Motion { name: name.to_owned(), ..motion }, robot))
 }
 
 /// A path of a motion in words of people: a name that is shipped, or a file.

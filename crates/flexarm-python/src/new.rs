@@ -5,8 +5,9 @@ use std::path::PathBuf;
 use flexarm::{NewOptions, ReadOptions, new_robot as make};
 use pyo3::prelude::*;
 
+use crate::caveat;
 use crate::failure::OrRaise;
-use crate::values::plain;
+use crate::values::{plain, texts};
 
 /// Makes a robot file with first guesses, and a sample motion, of a URDF or xacro file.
 ///
@@ -36,7 +37,7 @@ pub(crate) fn new_robot<'py>(
     folder: PathBuf,
     base: Option<String>,
     tool: Option<String>,
-    joints: Option<Vec<String>>,
+    #[pyo3(from_py_with = texts)] joints: Option<Vec<String>>,
     payload: Option<f64>,
     overwrite: bool,
 ) -> PyResult<Bound<'py, PyAny>> {
@@ -44,5 +45,7 @@ pub(crate) fn new_robot<'py>(
     let read = ReadOptions { search_paths: flexarm::search_paths_from_environment(), ..ReadOptions::default() };
     let options = NewOptions { base, tool, joints, payload_kg: payload, urdf: read };
     let made = py.detach(|| make(&urdf, &folder, overwrite, &options)).or_raise()?;
-    plain(py, &made)
+    let doubtful: Vec<_> = made.findings.iter().filter(|finding| finding.severity != "note").collect();
+    caveat::say(py, "doubts", (plain(py, &doubtful)?,))?;
+    caveat::answer(py, &made, &[])
 }

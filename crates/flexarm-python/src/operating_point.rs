@@ -91,6 +91,12 @@ impl PyOperatingPoint {
         array(py, [values.len()], values)
     }
 
+    fn __reduce__(&self) -> PyResult<()> {
+        Err(pyo3::exceptions::PyTypeError::new_err(
+            "an OperatingPoint is a workspace and cannot be pickled: pickle its arm, and call arm.operating_point() there",
+        ))
+    }
+
     fn __repr__(&self) -> String {
         let point = self.lock();
         match point.residual().is_nan() {

@@ -4,16 +4,17 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use flexarm::{InertiaEstimate, LoadOptions, ReadOptions, Robot};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
 use crate::arm::PyArm;
 use crate::arrays::{array, numbers};
 use crate::caveat;
-use crate::failure::OrRaise;
+use crate::failure::{OrRaise, exception};
 use crate::model::PyModel;
 use crate::motion::{MotionOptionsArgs, PyMotion, load_motion};
-use crate::values::{modelling, path, plain};
+use crate::values::{maybe_whole, modelling, path, plain, texts};
 
 /// A robot as loaded: links, joints, drives, tool. Made by :func:`flexarm.load`.
 ///
@@ -77,11 +78,11 @@ pub(crate) fn load(
     arguments: Option<Bound<'_, PyDict>>,
     inertia_from_density: Option<f64>,
     inertia_from_total_mass: Option<f64>,
-    waive_inertia: Option<Vec<String>>,
+    #[pyo3(from_py_with = texts)] waive_inertia: Option<Vec<String>>,
 ) -> PyResult<PyRobot> {
     crate::command::name_keywords();
     let given = robot.map_or(Ok(PathBuf::from("kr210")), |given| path("robot", given))?;
-    let found = flexarm_cli::shipped_robot(&given).or_raise()?;
+    let found = shipped(&given)?;
     let choices = PyDict::new(py);
     let estimate = match (inertia_from_density, inertia_from_total_mass) {
         (Some(density), _) => Some(InertiaEstimate::Density(positive("inertia_from_density", density)?)),
@@ -113,15 +114,25 @@ pub(crate) fn load(
     Ok(PyRobot { robot: Arc::new(robot), again })
 }
 
+/// A path, or a shipped robot by its name or as the checkout has it, `robots/NAME`.
+fn shipped(given: &Path) -> PyResult<PathBuf> {
+    let name = given.strip_prefix("robots").ok().filter(|_| !given.exists());
+    flexarm_cli::shipped_robot(name.unwrap_or(given)).or_raise()
+}
+
 /// Makes a robot of values: the keys of a robot file as a dict, or changed ones of a file that was read.
+///
+/// :class:`RobotBuilder` writes the keys, one call each, and the links and joints too if there is no URDF.
 ///
 /// Parameters
 /// ----------
 /// keys : dict
 ///     What ``robot.toml`` would have: ``urdf``, ``tcp``, ``payload``, ``flexible_link``, ``drive``, ...
-///     (``flexarm format robot`` prints all). ``format = 1`` may be left out.
+///     (``flexarm format robot`` prints all). Arrays are taken as lists; ``format = 1`` may be left out.
 /// folder : path, default "."
 ///     Paths in the keys are relative to it.
+/// urdf : str, optional
+///     Text of a URDF or xacro, in the place of the file that the keys name.
 ///
 /// Returns
 /// -------
@@ -134,22 +145,54 @@ pub(crate) fn load(
 /// >>> robot.flexible().n_elastic
 /// 0
 #[pyfunction]
-#[pyo3(signature = (keys, folder=None))]
-pub(crate) fn robot(py: Python<'_>, keys: &Bound<'_, PyDict>, folder: Option<PathBuf>) -> PyResult<PyRobot> {
+#[pyo3(signature = (keys, folder=None, *, urdf=None))]
+pub(crate) fn robot(
+    py: Python<'_>,
+    keys: &Bound<'_, PyDict>,
+    folder: Option<PathBuf>,
+    urdf: Option<String>,
+) -> PyResult<PyRobot> {
     crate::command::name_keywords();
-    let wrong = |what: String| pyo3::exceptions::PyValueError::new_err(format!("keys: {what}"));
-    let json: String = py.import("json")?.call_method1("dumps", (keys,))?.extract()?;
+    let wrong = |what: String| PyValueError::new_err(format!("keys: {what}"));
+    let json: String = py.import("flexarm._build")?.call_method1("json_of", (keys,))?.extract()?;
     let mut values: serde_json::Map<String, serde_json::Value> =
         serde_json::from_str(&json).map_err(|error| wrong(error.to_string()))?;
     values.entry("format").or_insert(1.into());
+    if urdf.is_some() {
+        values.entry("urdf").or_insert("robot.urdf".into());
+    }
     let text = toml::to_string(&values).map_err(|error| wrong(error.to_string()))?;
     let folder = folder.unwrap_or_else(|| PathBuf::from("."));
     let folder = std::path::absolute(&folder).unwrap_or(folder);
-    let urdf = ReadOptions { search_paths: flexarm::search_paths_from_environment(), ..ReadOptions::default() };
-    let options = LoadOptions { tcp: None, urdf };
-    let robot = py.detach(|| Robot::from_toml(&text, &folder.join("robot.toml"), &options)).or_raise()?;
-    let again = ("robot", (keys.copy()?, folder).into_pyobject(py)?.into_any().unbind());
+    let path = folder.join(VALUES);
+    let read = ReadOptions { search_paths: flexarm::search_paths_from_environment(), ..ReadOptions::default() };
+    let options = LoadOptions { tcp: None, urdf: read };
+    let made = py.detach(|| match &urdf {
+        Some(urdf) => Robot::from_texts(&text, urdf, &path, &options),
+        None => Robot::from_toml(&text, &path, &options),
+    });
+    let robot = made.map_err(|error| of_keys(exception(error), py, &path))?;
+    let again = ("robot", (keys.copy()?, folder, urdf).into_pyobject(py)?.into_any().unbind());
     Ok(PyRobot { robot: Arc::new(robot), again })
+}
+
+/// Where a robot of values would be: nothing is there.
+const VALUES: &str = "robot of values";
+
+/// The exception without places in a text that nobody has seen.
+fn of_keys(error: PyErr, py: Python<'_>, path: &Path) -> PyErr {
+    let value = error.value(py);
+    let (message, place) = (value.to_string(), format!("{}:", path.display()));
+    let mut parts = message.split(&place);
+    let first = parts.next().unwrap_or_default().to_owned();
+    let told = parts.fold(first, |told, part| {
+        let rest = part.trim_start_matches(|c: char| c.is_ascii_digit() || c == ':').trim_start();
+        format!("{told}keys: {rest}")
+    });
+    match told == message {
+        true => error,
+        false => PyErr::from_type(error.get_type(py), told),
+    }
 }
 
 fn positive(what: &str, x: f64) -> PyResult<f64> {
@@ -254,8 +297,8 @@ impl PyRobot {
         slf: &Bound<'_, Self>,
         links: Option<&str>,
         drives: Option<&str>,
-        segments: Option<usize>,
-        modes: Option<usize>,
+        #[pyo3(from_py_with = maybe_whole)] segments: Option<usize>,
+        #[pyo3(from_py_with = maybe_whole)] modes: Option<usize>,
     ) -> PyResult<PyArm> {
         let modelling = modelling(links, drives, segments, modes)?;
         let robot = slf.get().robot.clone();
@@ -312,6 +355,27 @@ impl PyRobot {
         plain(py, &flexarm::inspect(&self.robot, q.as_deref(), velocity.as_deref()).or_raise()?)
     }
 
+    /// Keys, folder, text of the URDF and choices at loading, for `flexarm.RobotBuilder`.
+    fn _made_of<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let (function, arguments) = &self.again;
+        let arguments = arguments.bind(py);
+        if *function == "robot" {
+            let part = |k: usize| arguments.get_item(k);
+            return Ok((part(0)?, part(1)?, part(2)?, PyDict::new(py)).into_pyobject(py)?.into_any());
+        }
+        let (path, folder) = (&self.robot.path, self.robot.path.parent().unwrap_or(Path::new(".")));
+        let keys = match path.extension().is_some_and(|ending| ending == "toml") {
+            true => {
+                let text = std::fs::read_to_string(path)?;
+                let keys: toml::Table =
+                    toml::from_str(&text).map_err(|error| PyValueError::new_err(error.to_string()))?;
+                plain(py, &keys)?
+            }
+            false => plain(py, &serde_json::json!({ "urdf": path }))?,
+        };
+        Ok((keys, folder, py.None(), arguments.get_item(1)?).into_pyobject(py)?.into_any())
+    }
+
     fn __repr__(&self) -> PyResult<String> {
         let n = self.robot.rigid_model().or_raise()?.n_actuated();
         let (links, drives) = (self.robot.flexible.len(), self.robot.drives.len());
@@ -349,7 +413,7 @@ pub(crate) fn check<'py>(
     motion: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     crate::command::name_keywords();
-    let robot = flexarm_cli::shipped_robot(&path("robot", robot)?).or_raise()?;
+    let robot = shipped(&path("robot", robot)?)?;
     let motion = motion.map(|motion| path("motion", motion)).transpose()?;
     let motion = motion.map(|motion| flexarm_cli::shipped_motion(&motion));
     let urdf = ReadOptions { search_paths: flexarm::search_paths_from_environment(), ..ReadOptions::default() };

@@ -1,14 +1,14 @@
 //! Runs: figures, and every logged sample as columns.
 
-use flexarm::{Column, Run, Sample};
-use pyo3::exceptions::{PyAttributeError, PyKeyError};
+use flexarm::{Column, Columns, Run, Sample};
+use pyo3::exceptions::{PyAttributeError, PyKeyError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PyList, PyTuple};
 
 use crate::arrays::{array, view};
-use crate::caveat;
-use crate::values::plain;
+use crate::figures::Figures;
+use crate::parts::{Parts, Pickled};
 
 /// What a run gives: figures, and every logged sample as columns.
 ///
@@ -24,18 +24,33 @@ use crate::values::plain;
 /// >>> peak = run.summary["tcp"]["peak_m"]
 #[pyclass(frozen, name = "Run", module = "flexarm")]
 pub(crate) struct PyRun {
-    pub(crate) run: Run,
+    columns: Columns,
+    figures: Figures,
+    /// What is told in one line.
+    headline: String,
+    /// The figures as they were asked for.
     summary: PyOnceLock<Py<PyAny>>,
 }
 
 impl PyRun {
     pub(crate) fn new(run: Run) -> Self {
-        Self { run, summary: PyOnceLock::new() }
+        let Run { summary, columns } = run;
+        let peak =
+            summary.tcp.as_ref().map_or_else(String::new, |tcp| format!(", TCP error {:.4} mm", 1e3 * tcp.peak_m));
+        let (robot, trajectory, duration) = (&summary.robot, &summary.trajectory, summary.duration_s);
+        let headline = format!("{robot} {trajectory}: {duration} s, {} samples{peak}", columns.rows());
+        let caveats = summary.caveats.clone();
+        Self { columns, figures: Figures::of(summary, &caveats), headline, summary: PyOnceLock::new() }
+    }
+
+    /// What is told in one line.
+    pub(crate) fn headline(&self) -> &str {
+        &self.headline
     }
 
     /// Shape of a column.
     fn shape(&self, column: &Column) -> Vec<usize> {
-        let columns = &self.run.columns;
+        let columns = &self.columns;
         let n = columns.rows();
         match column.name.as_str() {
             "time" => vec![n],
@@ -47,7 +62,7 @@ impl PyRun {
 
     fn array<'py>(slf: &Bound<'py, Self>, name: &str) -> PyResult<Option<Bound<'py, PyAny>>> {
         let own = slf.get();
-        let Some(column) = own.run.columns.column(name) else { return Ok(None) };
+        let Some(column) = own.columns.column(name) else { return Ok(None) };
         let owner = slf.clone().into_any();
         let values = &column.values;
         Ok(Some(match *own.shape(column) {
@@ -71,22 +86,22 @@ impl PyRun {
 impl PyRun {
     /// Figures with the keys of ``summary.json`` and ``flexarm compare --json`` (dict).
     #[getter]
-    fn summary<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let made = self.summary.get_or_try_init(py, || plain(py, &self.run.summary).map(Bound::unbind))?;
+    pub(crate) fn summary<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let made = self.summary.get_or_try_init(py, || self.figures.plain(py).map(Bound::unbind))?;
         Ok(made.bind(py).clone())
     }
 
     /// What limits the worth of the result (list of flexarm.Caveat).
     #[getter]
     fn caveats<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
-        caveat::list(py, &self.run.summary.caveats)
+        self.figures.caveats(py)
     }
 
     /// Names of the columns and their units (dict of str to str).
     #[getter]
     fn columns<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let names = PyDict::new(py);
-        for column in self.run.columns.columns() {
+        for column in self.columns.columns() {
             names.set_item(&column.name, column.unit)?;
         }
         Ok(names)
@@ -95,25 +110,25 @@ impl PyRun {
     /// Names of the joints, in the order of ``position``, ``velocity`` and ``effort`` (tuple of str).
     #[getter]
     fn joints<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
-        PyTuple::new(py, &self.run.columns.joints)
+        PyTuple::new(py, &self.columns.joints)
     }
 
     /// Names of the elastic elements, in the order of ``deflection`` and ``load`` (tuple of str).
     #[getter]
     fn elements<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
-        PyTuple::new(py, &self.run.columns.elements)
+        PyTuple::new(py, &self.columns.elements)
     }
 
     /// Who moves the tool, in the order of ``contribution`` (tuple of str).
     #[getter]
     fn contributors<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyTuple>> {
-        PyTuple::new(py, &self.run.columns.contributors)
+        PyTuple::new(py, &self.columns.contributors)
     }
 
     /// Paths of the files that were written (dict of str to str).
     #[getter]
     fn files<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        plain(py, &self.run.summary.files)
+        self.summary(py)?.get_item("files")
     }
 
     /// Times of the samples (s), (n,).
@@ -190,23 +205,23 @@ impl PyRun {
 
     fn __getitem__<'py>(slf: &Bound<'py, Self>, name: &str) -> PyResult<Bound<'py, PyAny>> {
         Self::array(slf, name)?.ok_or_else(|| {
-            let known: Vec<&str> = slf.get().run.columns.columns().iter().map(|c| c.name.as_str()).collect();
+            let known: Vec<&str> = slf.get().columns.columns().iter().map(|c| c.name.as_str()).collect();
             PyKeyError::new_err(format!("the run has no column {name:?}; its columns are {}", known.join(", ")))
         })
     }
 
     fn __contains__(&self, name: &str) -> bool {
-        self.run.columns.column(name).is_some()
+        self.columns.column(name).is_some()
     }
 
     fn __len__(&self) -> usize {
-        self.run.columns.rows()
+        self.columns.rows()
     }
 
     /// Columns one number wide, with names as in ``run.csv`` (dict of str to ndarray); this copies.
     fn table<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let table = PyDict::new(py);
-        for (name, values) in crate::table::flat(&self.run) {
+        for (name, values) in flexarm::flat_columns(&self.columns) {
             table.set_item(name, array(py, [values.len()], values)?)?;
         }
         Ok(table)
@@ -220,7 +235,7 @@ impl PyRun {
         requested_schema: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         drop(requested_schema); // the protocol lets us ignore it
-        crate::table::stream(py, &self.run)
+        crate::table::stream(py, &self.columns)
     }
 
     /// The table as a ``pyarrow.Table``.
@@ -261,20 +276,49 @@ impl PyRun {
     }
 
     fn __repr__(&self) -> String {
-        let summary = &self.run.summary;
-        let peak =
-            summary.tcp.as_ref().map_or_else(String::new, |tcp| format!(", TCP error {:.4} mm", 1e3 * tcp.peak_m));
-        format!(
-            "<Run {} {}: {} s, {} samples{peak}>",
-            summary.robot,
-            summary.trajectory,
-            summary.duration_s,
-            self.__len__()
-        )
+        format!("<Run {}>", self.headline)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        Self::reduced(slf)
     }
 
     fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         slf.py().import("flexarm._show")?.call_method1("run_html", (slf,))
+    }
+}
+
+impl Pickled for PyRun {
+    fn parts(&self, parts: &Parts<'_>) -> PyResult<()> {
+        let columns = &self.columns;
+        parts.put("headline", &self.headline)?;
+        parts.put("joints", columns.joints.clone())?;
+        parts.put("prismatic", columns.prismatic.clone())?;
+        parts.put("elements", columns.elements.clone())?;
+        parts.put("contributors", columns.contributors.clone())?;
+        parts.put("columns", columns.columns().iter().map(|column| column.name.clone()).collect::<Vec<_>>())?;
+        for column in columns.columns() {
+            parts.put_numbers(&column.name, &column.values)?;
+        }
+        self.figures.put_into(parts)
+    }
+
+    fn of_parts(parts: &Parts<'_>) -> PyResult<Self> {
+        let names: Vec<String> = parts.get("columns")?;
+        let values = names.into_iter().map(|name| Ok((parts.numbers(&name)?, name))).collect::<PyResult<Vec<_>>>()?;
+        let mut empty = Columns::default();
+        empty.joints = parts.get("joints")?;
+        empty.prismatic = parts.get("prismatic")?;
+        empty.elements = parts.get("elements")?;
+        empty.contributors = parts.get("contributors")?;
+        let wrong = || PyValueError::new_err("the pickle has columns of another version");
+        let columns = empty.filled(values.into_iter().map(|(values, name)| (name, values))).ok_or_else(wrong)?;
+        Ok(Self {
+            columns,
+            figures: Figures::of_parts(parts)?,
+            headline: parts.get("headline")?,
+            summary: PyOnceLock::new(),
+        })
     }
 }
 
@@ -363,5 +407,35 @@ impl PySample {
 
     fn __repr__(&self) -> String {
         format!("<Sample at {} s>", self.time)
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        Self::reduced(slf)
+    }
+}
+
+impl Pickled for PySample {
+    fn parts(&self, parts: &Parts<'_>) -> PyResult<()> {
+        parts.put("time", self.time)?;
+        parts.put("step", self.step)?;
+        for (name, values) in [("position", &self.q), ("velocity", &self.velocity), ("effort", &self.effort)] {
+            parts.put_numbers(name, values)?;
+        }
+        let vectors = [("tcp", &self.tcp), ("error", &self.error), ("error_static", &self.error_static)];
+        vectors.into_iter().try_for_each(|(name, vector)| parts.put_numbers(name, vector))
+    }
+
+    fn of_parts(parts: &Parts<'_>) -> PyResult<Self> {
+        let three = |name: &str| parts.shaped(name, &[3]).map(|v| [v[0], v[1], v[2]]);
+        Ok(Self {
+            time: parts.get("time")?,
+            step: parts.get("step")?,
+            q: parts.numbers("position")?,
+            velocity: parts.numbers("velocity")?,
+            effort: parts.numbers("effort")?,
+            tcp: three("tcp")?,
+            error: three("error")?,
+            error_static: three("error_static")?,
+        })
     }
 }

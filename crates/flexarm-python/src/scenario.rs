@@ -117,17 +117,17 @@ impl PyPayload {
         inertia: Option<&Bound<'_, PyAny>>,
         link: Option<&str>,
     ) -> PyResult<Self> {
+        if !(at.is_finite() && at >= 0.0 && mass.is_finite() && mass >= 0.0) {
+            return Err(PyValueError::new_err(format!(
+                "at={at}, mass={mass}: expected a time (s) and a mass (kg) of at least 0"
+            )));
+        }
         let p = numbers("com", com, &[(3, "numbers (m)")], false)?;
         let p = p.values();
         let mut change = PayloadChange::attach(at, mass, [p[0], p[1], p[2]].into());
         if let Some(inertia) = inertia {
             let I = numbers("inertia", inertia, &[(3, "rows"), (3, "columns (kg m²)")], false)?;
-            let I = I.values();
-            if (0..3).any(|i| (0..i).any(|j| (I[3 * i + j] - I[3 * j + i]).abs() > 1e-9 * I[0].abs().max(1e-12))) {
-                return Err(PyValueError::new_err("inertia is not symmetric"));
-            }
-            let column = |k: usize| [I[k], I[3 + k], I[6 + k]];
-            change = change.with_inertia([column(0), column(1), column(2)].into());
+            change = change.with_inertia(inertia_matrix("inertia", I.values())?.into());
         }
         if let Some(link) = link {
             change = change.on_link(link);
@@ -152,6 +152,16 @@ impl PyPayload {
         let (name, arguments) = &slf.get().again;
         Ok((slf.get_type().getattr(*name)?, arguments).into_pyobject(slf.py())?.into_any())
     }
+}
+
+/// Columns of a moment of inertia of nine numbers.
+pub(crate) fn inertia_matrix(name: &str, I: &[f64]) -> PyResult<[[f64; 3]; 3]> {
+    let size = I.iter().fold(1e-12, |size: f64, x| size.max(x.abs()));
+    if (0..3).any(|i| (0..i).any(|j| (I[3 * i + j] - I[3 * j + i]).abs() > 1e-9 * size)) {
+        return Err(PyValueError::new_err(format!("{name} is not symmetric")));
+    }
+    let column = |k: usize| [I[k], I[3 + k], I[6 + k]];
+    Ok([column(0), column(1), column(2)])
 }
 
 /// A motion with what happens on it; for batches of runs that differ in more than their motion.
@@ -227,7 +237,9 @@ fn motion_of(robot: &Bound<'_, PyRobot>, given: Option<&Bound<'_, PyAny>>) -> Py
         Ok(file) => read(&file),
         Err(_) => {
             let found = given.get_type();
-            Err(PyTypeError::new_err(format!("motion is {found}: expected a flexarm.Motion, a path, or None")))
+            Err(PyTypeError::new_err(format!(
+                "motion is {found}: expected a flexarm.Motion, such as flexarm.Motion(t, q), a path, or None"
+            )))
         }
     }
 }

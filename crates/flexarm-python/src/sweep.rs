@@ -1,15 +1,17 @@
 //! Studies of many runs by a file.
 
+use std::ops::ControlFlow;
 use std::path::PathBuf;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use flexarm::sweep::{Finders, Shard, Sweep, SweepRequest};
 use pyo3::prelude::*;
 
 use crate::arm::progress_function;
+use crate::caveat;
 use crate::failure::OrRaise;
-use crate::values::plain;
-use crate::watch::Watch;
+use crate::values::maybe_whole;
+use crate::watch::stoppable_telling;
 
 /// Robots and motions by path or shipped name.
 const FINDERS: Finders = Finders { robot: flexarm_cli::shipped_robot_file, motion: flexarm_cli::shipped_motion };
@@ -41,25 +43,32 @@ pub(crate) fn sweep<'py>(
     py: Python<'py>,
     study: PathBuf,
     output: PathBuf,
-    threads: Option<usize>,
+    #[pyo3(from_py_with = maybe_whole)] threads: Option<usize>,
     overwrite: bool,
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let mut sweep = Sweep::load(&study, &FINDERS).or_raise()?;
     let request = SweepRequest { output, overwrite, shard: Shard::ALL, threads, command: None };
     let bar = progress_function(py, progress)?;
-    let watch = Mutex::new(Watch::new(bar.clone().map(Bound::unbind)));
-    let locked = || watch.lock().unwrap_or_else(PoisonError::into_inner);
-    let mut look = |done: usize, all: usize| locked().look(done as f64, all as f64);
-    let result = py.detach(|| sweep.run(&request, &mut look));
-    if let Some(bar) = bar
+    // How far it is, told by the thread that may call Python.
+    let at: Arc<Mutex<Option<(usize, usize)>>> = Arc::default();
+    let seen = at.clone();
+    let work = move |stop: &(dyn Fn() -> bool + Sync)| {
+        let mut look = |done: usize, all: usize| {
+            *at.lock().unwrap_or_else(PoisonError::into_inner) = Some((done, all));
+            if stop() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        };
+        sweep.run(&request, &mut look)
+    };
+    let mut tell = |_: Python<'_>| match (seen.lock().unwrap_or_else(PoisonError::into_inner).take(), &bar) {
+        (Some((done, all)), Some(bar)) => bar.call1((done as f64, all as f64)).map(drop),
+        _ => Ok(()),
+    };
+    let result = stoppable_telling(py, work, &mut tell);
+    if let Some(bar) = &bar
         && let Ok(close) = bar.getattr("close")
     {
         close.call0()?;
     }
-    let mut watch = watch.into_inner().unwrap_or_else(PoisonError::into_inner);
-    if let Some(raised) = watch.raised.take() {
-        return Err(raised);
-    }
-    plain(py, &result.or_raise()?)
+    caveat::answer(py, &result?.or_raise()?, &[])
 }

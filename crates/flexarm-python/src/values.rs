@@ -112,7 +112,8 @@ pub(crate) fn wrench(value: Option<&Bound<'_, PyAny>>) -> PyResult<[f64; 6]> {
     let Some(value) = value else { return Ok([0.0; 6]) };
     let is_force = value.len().is_ok_and(|n| n == 3);
     let n = if is_force { 3 } else { 6 };
-    let numbers = numbers("wrench", value, &[(n, "numbers, force (N) then moment (N m), world axes")], false)?;
+    let what = "numbers, force (N) then moment (N m), world axes; or (3,) for a force alone";
+    let numbers = numbers("wrench", value, &[(n, what)], false)?;
     let mut wrench = [0.0; 6];
     wrench[..n].copy_from_slice(numbers.values());
     Ok(wrench)
@@ -129,6 +130,46 @@ pub(crate) fn path(argument: &str, value: &Bound<'_, PyAny>) -> PyResult<PathBuf
         let found = value.get_type();
         PyTypeError::new_err(format!("{argument} is {found}: expected a path (str or os.PathLike)"))
     })
+}
+
+/// Several texts, or one; for arguments.
+///
+/// # Errors
+/// `TypeError` with what was found.
+pub(crate) fn texts(value: &Bound<'_, PyAny>) -> PyResult<Option<Vec<String>>> {
+    if value.is_none() {
+        return Ok(None);
+    }
+    if let Ok(one) = value.extract::<String>() {
+        return Ok(Some(vec![one]));
+    }
+    let wrong = |_| PyTypeError::new_err(format!("expected str or a list of str, found {}", found(value)));
+    value.try_iter().and_then(|each| each.map(|one| one?.extract()).collect()).map(Some).map_err(wrong)
+}
+
+/// A number of things; for arguments.
+///
+/// # Errors
+/// `ValueError` for what is negative, `TypeError` for what is no whole number.
+pub(crate) fn whole(value: &Bound<'_, PyAny>) -> PyResult<usize> {
+    let negative = value.lt(0).unwrap_or(false);
+    value.extract::<usize>().map_err(|_| {
+        let message = format!("expected a whole number of at least 0, found {}", found(value));
+        if negative { PyValueError::new_err(message) } else { PyTypeError::new_err(message) }
+    })
+}
+
+/// A number of things, or None; for arguments.
+///
+/// # Errors
+/// As [`whole`].
+pub(crate) fn maybe_whole(value: &Bound<'_, PyAny>) -> PyResult<Option<usize>> {
+    if value.is_none() { Ok(None) } else { whole(value).map(Some) }
+}
+
+/// How a value is told in messages.
+fn found(value: &Bound<'_, PyAny>) -> String {
+    value.repr().map_or_else(|_| value.get_type().to_string(), |text| text.to_string())
 }
 
 /// Plain values as dicts, lists and numbers, in the order and with the keys of `--json`.

@@ -74,7 +74,7 @@ impl Watch {
 
 /// Work on a thread of its own that looks at a flag; meanwhile this thread looks at signals.
 ///
-/// After a signal the work has a moment to end; then nobody waits for it any more, and what it finds is lost.
+/// After a signal the work has a moment to end; then nobody waits for it any more: what it finds is lost, and it writes no files.
 ///
 /// # Errors
 /// What a signal raised.
@@ -82,24 +82,41 @@ pub(crate) fn stoppable<T: Send + 'static>(
     py: Python<'_>,
     work: impl FnOnce(&(dyn Fn() -> bool + Sync)) -> T + Send + 'static,
 ) -> PyResult<T> {
+    stoppable_telling(py, work, &mut |_| Ok(()))
+}
+
+/// As [`stoppable`]; `tell` is called now and then on this thread, and once at the end.
+///
+/// # Errors
+/// What a signal or `tell` raised.
+pub(crate) fn stoppable_telling<T: Send + 'static>(
+    py: Python<'_>,
+    work: impl FnOnce(&(dyn Fn() -> bool + Sync)) -> T + Send + 'static,
+    tell: &mut dyn FnMut(Python<'_>) -> PyResult<()>,
+) -> PyResult<T> {
     let stop = Arc::new(AtomicBool::new(false));
-    let asked = stop.clone();
+    let (asked, unwanted) = (stop.clone(), stop.clone());
     let (sender, receiver) = channel::<T>();
     let worker = std::thread::spawn(move || {
-        let _ = sender.send(work(&|| asked.load(Ordering::Relaxed))); // nobody may be waiting
+        let work = || work(&|| asked.load(Ordering::Relaxed));
+        let found = flexarm::writing_unless(move || unwanted.load(Ordering::Relaxed), work);
+        let _ = sender.send(found); // nobody may be waiting
     });
     let receiver = Mutex::new(receiver);
     let receive = |wait| receiver.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(wait);
     loop {
         match py.detach(|| receive(LOOK_EVERY)) {
-            Ok(value) => return Ok(value),
+            Ok(value) => {
+                tell(py)?;
+                return Ok(value);
+            }
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => match worker.join() {
                 Err(panic) => std::panic::resume_unwind(panic),
                 Ok(()) => return Err(PyRuntimeError::new_err("the work ended without a result")),
             },
         }
-        if let Err(raised) = py.check_signals() {
+        if let Err(raised) = py.check_signals().and_then(|()| tell(py)) {
             stop.store(true, Ordering::Relaxed);
             let _ = py.detach(|| receive(PATIENCE));
             return Err(raised);

@@ -14,23 +14,27 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import WORKING_POSE
+from conftest import SHARE, WORKING_POSE
 
 import flexarm
 
+tomllib = pytest.importorskip("tomllib")
 
-def interrupted(code: str, cwd: Path) -> "tuple[float, str]":
-    """Send Ctrl-C once the script says "go"; seconds until it has KeyboardInterrupt, and what it said."""
+
+def interrupted(code: str, cwd: Path, after: float = 1.0) -> "tuple[float, str]":
+    """Send Ctrl-C `after` seconds since the script says "go"; seconds until it has KeyboardInterrupt, and what it said."""
     script = "import flexarm, numpy as np, time, sys\n" + textwrap.dedent(code)
     child = subprocess.Popen([sys.executable, "-u", "-c", script], cwd=cwd, stdout=subprocess.PIPE, text=True)
     assert child.stdout is not None
     assert child.stdout.readline().strip() == "go"
-    time.sleep(1.0)
+    time.sleep(after)
+    assert child.poll() is None
     begin = time.time()
     os.kill(child.pid, signal.SIGINT)
     said, _ = child.communicate(timeout=60)
-    caught = float(said.strip().splitlines()[-1])
-    return caught - begin, said
+    caught = float(said.strip().splitlines()[-1]) - begin
+    print(f"{1e3 * caught:.0f} ms")
+    return caught, said
 
 
 WRAP = """
@@ -49,12 +53,67 @@ except KeyboardInterrupt:
         ("arm = flexarm.load('kr210').flexible()", "arm.simulate_batch([None] * 500, step=1e-5)"),
         ("arm = flexarm.load('kr210').flexible()", "arm.deflections([None] * 2000, step=1e-4)"),
         ("arm = flexarm.load('kr210').flexible(); q = np.tile([0, -1.2, 1.5, 0, 0.4, 0], (2_000_000, 1))", "arm.statics(q)"),
+        ("robot = flexarm.load('kr210')", "flexarm.map(robot, spacing=0.05, output='out')"),
+        ("robot = flexarm.load('kr210')", "flexarm.compensate(robot, step=2e-5, output='out')"),
+        ("robot = flexarm.load('kr210')", "flexarm.lobes(robot, 'endmill_20mm', rpm=np.linspace(1e3, 2e4, 20000).tolist(), output='out')"),
+        ("robot = flexarm.load('kr210')", "flexarm.plan_measurements(robot, 400, output='out')"),
     ],
-    ids=["simulate", "simulate_batch", "deflections", "statics"],
+    ids=["simulate", "simulate_batch", "deflections", "statics", "map", "compensate", "lobes", "plan"],
 )
 def test_ctrl_c_ends_long_calls_at_once(prepare: str, call: str, tmp_path: Path) -> None:
     seconds, _ = interrupted(prepare + WRAP.format(call=call), tmp_path)
     assert seconds <= 5.0  # 0.2 s on an idle machine; a call that does not listen takes far longer
+    assert not list(tmp_path.rglob("*")), "what was broken off leaves no files"
+
+
+#: Work that is not looked into: nobody waits for it any more, and it writes nothing when it is done.
+BEHIND = """
+try:
+    print("go", flush=True)
+    {call}
+except KeyboardInterrupt:
+    end = time.time()
+    time.sleep({then})
+    print(end, flush=True)
+"""
+
+
+def test_ctrl_c_leaves_nothing_of_a_reduction_and_an_identification(tmp_path: Path) -> None:
+    job = SHARE / "robots/lower_arm/lower_arm.reduce.toml"
+    begin = time.perf_counter()
+    flexarm.reduce({**tomllib.loads(job.read_text()), "mesh": str(job.parent / "lower_arm.msh.gz"), "modes": 60, "chains": [8, 16]})
+    alone = time.perf_counter() - begin
+    keys = f"{{'mesh': {str(job.parent / 'lower_arm.msh.gz')!r}, 'modes': 60, 'chains': [8, 16]}}"
+    prepare = f"import tomllib; job = tomllib.loads(open({str(job)!r}).read()) | {keys}"
+    call = BEHIND.format(call="flexarm.reduce(job, output='out')", then=2 * alone)
+    seconds, _ = interrupted(prepare + call, tmp_path, after=min(1.0, 0.3 * alone))
+    assert seconds <= 5.0
+    assert not list(tmp_path.rglob("*"))
+
+
+def test_a_study_that_is_stopped_goes_on_with_the_same_call(tmp_path: Path) -> None:
+    study = """
+format = 1
+robot = "kr210"
+metrics = ["peak_mm = 1e3 * tcp.peak_m"]
+[options]
+step = 1e-4
+[[parameter]]
+path = "motion.speed"
+values = {values}
+"""
+    (tmp_path / "study.toml").write_text(study.format(values=[round(0.5 + 0.002 * k, 3) for k in range(200)]))
+    seconds, _ = interrupted(WRAP.format(call="flexarm.sweep('study.toml', 'out')"), tmp_path, after=4.0)
+    assert seconds <= 5.0
+    begun = []
+    with pytest.raises(LookupError):
+
+        def look(done: float, total: float) -> None:
+            begun.append(done)
+            raise LookupError
+
+        flexarm.sweep(tmp_path / "study.toml", tmp_path / "out", progress=look)
+    assert begun[0] >= 1, "runs that were done are kept"
 
 
 def test_ctrl_c_leaves_readable_files(tmp_path: Path) -> None:
@@ -91,6 +150,44 @@ def test_threads_share_an_arm(arm: flexarm.Arm) -> None:
     with ThreadPoolExecutor(4) as pool:
         runs = list(pool.map(lambda _: arm.simulate(step=4e-3).error, range(8)))
     assert all(np.array_equal(error, alone) for error in runs)
+
+
+def test_threads_share_everything_that_can_be_held(arm: flexarm.Arm) -> None:
+    """Eight threads ask robot, arm, model, motion and one workspace at once; each answer is the one of a single thread."""
+    robot, model, motion, run = arm.robot, arm.model, arm.robot.motion("point_to_point"), arm.simulate(step=4e-3)
+    rng = np.random.default_rng(5)
+    poses = np.array(WORKING_POSE) + 0.1 * rng.standard_normal((24, 6))
+
+    def asked(k: int) -> "list[bytes]":
+        q = poses[k % len(poses)]
+        full = np.concatenate([q, np.zeros(arm.n_elastic)])
+        answers = [
+            arm.statics(q).compliance,
+            arm.statics(poses).frequencies,
+            arm.modes(q).frequencies,
+            arm.response(q, points=20).magnitude,
+            arm.linearise(q).K,
+            model.crba(np.tile(full, (80, 1))),
+            robot.flexible(links="rigid").statics(q).compliance,
+            motion.sample([0.1, 0.2])[0],
+            run.to_pandas().to_numpy() if k % 8 == 0 else run.error,
+            arm.deflections([motion], step=5e-3).peak,
+            np.frombuffer(pickle.dumps(arm), dtype=np.uint8),
+        ]
+        return [answer.tobytes() for answer in answers]
+
+    pytest.importorskip("pandas")
+    alone = [asked(k) for k in range(24)]
+    with ThreadPoolExecutor(8) as pool:
+        together = list(pool.map(asked, range(24)))
+    assert together == alone
+
+
+def test_threads_share_an_arm_that_is_commanded(arm: flexarm.Arm) -> None:
+    live = arm.live(WORKING_POSE)
+    with ThreadPoolExecutor(8) as pool:
+        list(pool.map(lambda _: live.step(WORKING_POSE), range(400)))
+    assert live.time == pytest.approx(0.4)
 
 
 def peak(arm: flexarm.Arm, motion: flexarm.Motion) -> float:

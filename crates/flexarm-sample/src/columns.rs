@@ -110,6 +110,34 @@ impl Columns {
         }
     }
 
+    /// Columns of the same joints, elements and contributors with numbers that were kept elsewhere, each signal under its name.
+    ///
+    /// `None` if they are not all signals of a run, with or without the rigid twin, in their order and equally long.
+    #[must_use]
+    pub fn filled(&self, signals: impl IntoIterator<Item = (String, Vec<f64>)>) -> Option<Self> {
+        let signals: Vec<(String, Vec<f64>)> = signals.into_iter().collect();
+        let header = RunHeader {
+            joints: self.joints.clone(),
+            prismatic: self.prismatic.clone(),
+            elements: self.elements.clone(),
+            contributors: self.contributors.clone(),
+            has_rigid: signals.len() > OF_TWIN,
+            ..RunHeader::default()
+        };
+        let mut columns = Self::new(&header);
+        if columns.columns.len() != signals.len() {
+            return None;
+        }
+        columns.rows = signals.first().map_or(0, |(_, times)| times.len());
+        for (column, (name, values)) in columns.columns.iter_mut().zip(signals) {
+            if column.name != name || values.len() != column.width * columns.rows {
+                return None;
+            }
+            column.values = values;
+        }
+        Some(columns)
+    }
+
     /// Adds one instant.
     pub fn push(&mut self, sample: &Sample) {
         for (column, signal) in self.columns.iter_mut().zip(&SIGNALS) {

@@ -83,6 +83,33 @@ impl Trajectory {
         Ok(Self { joints, curves, duration, notes })
     }
 
+    /// The curve of a joint as it is stored, for programs that keep motions: knots (s), one more than there are pieces, and of
+    /// each piece its length (s) and the coefficients of 1, τ, ... τ⁵, where τ is the time since it began.
+    pub fn pieces(&self, joint: usize) -> Option<(&[f64], Vec<[f64; 7]>)> {
+        let row = |piece: &Piece| std::array::from_fn(|k| if k == 0 { piece.width } else { piece.c[k - 1] });
+        let curve = self.curves.get(joint)?;
+        Some((&curve.knots, curve.pieces.iter().map(row).collect()))
+    }
+
+    /// The trajectory of such curves, to the last bit: of each joint its name, knots and pieces.
+    ///
+    /// # Errors
+    /// [`TrajectoryError::OutOfRange`] for numbers that make no curve from 0 to `duration` (s).
+    pub fn of_pieces(joints: Vec<(String, Vec<f64>, Vec<[f64; 7]>)>, duration: f64) -> Result<Self, TrajectoryError> {
+        let piece = |row: &[f64; 7]| Piece { width: row[0], c: std::array::from_fn(|k| row[k + 1]) };
+        let (mut names, mut curves) = (Vec::new(), Vec::new());
+        for (joint, knots, pieces) in joints {
+            let begins = knots.first().is_some_and(|t| *t <= 0.0);
+            let ends = knots.last().is_some_and(|t| (t - duration).abs() <= 1e-9 * duration.abs());
+            if knots.len() != pieces.len() + 1 || !begins || !ends {
+                return Err(TrajectoryError::OutOfRange { joint, time_s: duration });
+            }
+            names.push(joint);
+            curves.push(Curve { knots, pieces: pieces.iter().map(piece).collect() });
+        }
+        Self::from_curves(names, curves, duration, Vec::new())
+    }
+
     /// Joint names; all slices follow this order.
     pub fn joints(&self) -> &[String] {
         &self.joints

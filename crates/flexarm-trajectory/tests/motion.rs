@@ -274,3 +274,29 @@ proptest! {
         }
     }
 }
+
+/// Truth: the trajectory itself, to the last bit.
+#[test]
+fn a_trajectory_of_its_pieces_is_the_same() {
+    let moves = vec![PlannedMove::quintic(vec![0.4, -1.0], 0.7), PlannedMove::quintic(vec![0.1, 0.2], 1.3)];
+    let trajectory = plan(&[0.0, 0.3], moves).scaled(1.1).unwrap();
+    let curve = |k: usize| {
+        let (knots, pieces) = trajectory.pieces(k).unwrap();
+        (trajectory.joints()[k].clone(), knots.to_vec(), pieces)
+    };
+    let again = Trajectory::of_pieces(vec![curve(0), curve(1)], trajectory.duration()).unwrap();
+    assert_eq!(again, trajectory);
+    assert!(trajectory.pieces(2).is_none());
+    // Numbers that make no curve are refused.
+    let (name, knots, pieces) = curve(0);
+    let spoilt = [
+        (knots[..1].to_vec(), pieces.clone()),
+        (knots.iter().map(|t| t + 0.5).collect(), pieces.clone()),
+        (knots.clone(), pieces.iter().map(|piece| piece.map(|_| f64::NAN)).collect()),
+        (Vec::new(), Vec::new()),
+    ];
+    for (knots, pieces) in spoilt {
+        let made = Trajectory::of_pieces(vec![(name.clone(), knots, pieces)], trajectory.duration());
+        assert!(matches!(made, Err(TrajectoryError::OutOfRange { .. })));
+    }
+}

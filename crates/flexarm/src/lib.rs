@@ -156,7 +156,7 @@ pub use summary::{
 pub use tool_path::ToolPath;
 
 pub use flexarm_analysis::{Quantity, Spacing};
-pub use flexarm_files::FileError;
+pub use flexarm_files::{FileError, writing_unless};
 pub use flexarm_flexlink::Mounting;
 pub use flexarm_kinematics::{
     BalancerCurve, BalancerCurveError, BalancerLaw, Coordinate, GasLaw, LinkInertia, Model, Pose, Wrench,

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use flexarm_kinematics::{Frame, Joint, JointKind, Link, LinkInertia, Mechanism, Model, Pose};
-use flexarm_urdf::{InertiaEstimate, ReadOptions, UrdfRobot, closest, default_tcp, read_urdf};
+use flexarm_urdf::{InertiaEstimate, ReadOptions, UrdfRobot, closest, default_tcp, parse_urdf, read_urdf};
 use nalgebra::{Matrix3, Rotation3, Translation3, Vector3};
 use toml::Spanned;
 
@@ -136,12 +136,33 @@ impl Robot {
         Self::of_text(path, text, options, &FileCache::default())
     }
 
+    /// As [`Robot::from_toml`], with the text of the URDF or xacro besides: nothing of both need be a file.
+    ///
+    /// The `urdf` of the robot file is then the name that messages give it, and meshes are looked for from its place.
+    ///
+    /// # Errors
+    /// As [`Robot::load`].
+    pub fn from_texts(text: &str, urdf: &str, path: &Path, options: &LoadOptions) -> Result<Self, Error> {
+        Self::of_texts(path, text, Some(urdf), options, &FileCache::default())
+    }
+
     /// As [`Robot::from_toml`]; what the file names is read through the cache.
     pub(crate) fn of_text(path: &Path, text: &str, options: &LoadOptions, files: &FileCache) -> Result<Self, Error> {
+        Self::of_texts(path, text, None, options, files)
+    }
+
+    /// The same, with the text of the description if there is one.
+    fn of_texts(
+        path: &Path,
+        text: &str,
+        description: Option<&str>,
+        options: &LoadOptions,
+        files: &FileCache,
+    ) -> Result<Self, Error> {
         let (file, source) = parse_robot_file(text, path)?;
         let folder = path.parent().unwrap_or(Path::new("."));
         let urdf_path = folder.join(file.urdf.get_ref());
-        if !urdf_path.is_file() {
+        if description.is_none() && !urdf_path.is_file() {
             let message = format!("urdf = {:?}: there is no file {}", file.urdf.get_ref(), urdf_path.display());
             return Err(source.error(file.urdf.span(), message).into());
         }
@@ -158,7 +179,10 @@ impl Robot {
         if let Some(estimate) = inertia_estimate(&file, &source)? {
             urdf_options.inertia_from_mesh.get_or_insert(estimate);
         }
-        let urdf = files.urdf(&urdf_path, &urdf_options)?;
+        let urdf = match description {
+            Some(text) => parse_urdf(text, &urdf_path, &urdf_options)?,
+            None => files.urdf(&urdf_path, &urdf_options)?,
+        };
         Self::of_file(path, urdf_path, urdf, &file, &source, options, files)
     }
 

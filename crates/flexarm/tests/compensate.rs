@@ -4,8 +4,10 @@
 
 use std::path::{Path, PathBuf};
 
-use flexarm::compensate::{CompensateRequest, Compensation, Method, ShaperKind, compensate_motion};
-use flexarm::{Modelling, Motion, Robot, RunOptions, Wrench};
+use flexarm::compensate::{
+    CompensateRequest, Compensation, Method, ShaperKind, compensate_motion, compensate_motion_until,
+};
+use flexarm::{Error, Modelling, Motion, Robot, RunOptions, Wrench};
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
@@ -161,5 +163,31 @@ fn what_cannot_be_compensated_is_said() {
         |robot: &Robot| robot.flexible(Modelling::default()).unwrap().joints().map(str::to_owned).collect::<Vec<_>>();
     if names(&other) != names(&robot) {
         fails(&robot, CompensateRequest { plant: Some(("other".into(), other)), ..request() }, "must be the same");
+    }
+}
+
+/// Asked to stop at any look, it stops there, and writes nothing.
+#[test]
+fn a_compensation_that_is_stopped_leaves_nothing() {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    let (robot, motion) = shipped("kr210", "point_to_point.toml");
+    let folder = std::env::temp_dir().join(format!("flexarm-compensate-stop-{}", std::process::id()));
+    let all = AtomicUsize::new(0);
+    let count = || all.fetch_add(1, Ordering::Relaxed) > usize::MAX - 1;
+    for method in [Method::Dynamic, Method::Static] {
+        let request = CompensateRequest { method, sweep: true, output: Some(folder.clone()), ..request() };
+        all.store(0, Ordering::Relaxed);
+        let unwritten = CompensateRequest { output: None, ..request.clone() };
+        compensate_motion_until(&robot, &motion, &unwritten, &count).unwrap();
+        let looks = all.load(Ordering::Relaxed);
+        eprintln!("{looks} looks");
+        for at in [0, looks / 10, looks / 2, looks - 1] {
+            let seen = AtomicUsize::new(0);
+            let stop = || seen.fetch_add(1, Ordering::Relaxed) >= at;
+            let stopped = compensate_motion_until(&robot, &motion, &request, &stop);
+            assert!(matches!(stopped, Err(Error::Interrupted { .. })), "at look {at} of {looks}");
+            assert!(!folder.exists());
+        }
     }
 }

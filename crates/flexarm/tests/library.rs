@@ -254,3 +254,49 @@ fn a_load_beyond_buckling_is_no_operating_point_and_the_next_pose_is() {
     at.solve(&[0.0], &Wrench::zeros()).unwrap();
     assert!(at.residual() < 1e-12, "{}", at.residual());
 }
+
+/// Truth: the same robot from its files.
+#[test]
+fn a_robot_of_texts_is_the_robot_of_its_files() {
+    let folder = root().join("robots/kr210");
+    let read = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();
+    let (text, urdf) = (read("robot.toml"), read("kr210.urdf"));
+    let options = flexarm::LoadOptions::default();
+    // The description has no file: its name in the robot file is one that is not there.
+    let text = text.replace("urdf = \"kr210.urdf\"", "urdf = \"nowhere.urdf\"");
+    let ours = Robot::from_texts(&text, &urdf, &folder.join("nowhere.toml"), &options).unwrap();
+    let theirs = Robot::load(&folder).unwrap();
+    let sag = |robot: &Robot| {
+        let mut at = robot.flexible(Modelling::default()).unwrap().operating_point().unwrap();
+        at.solve(&[0.0, -1.2, 1.5, 0.0, 0.4, 0.0], &Wrench::zeros()).unwrap();
+        (at.tcp_pose(), at.compliance())
+    };
+    assert_eq!(sag(&ours), sag(&theirs));
+    // What is wrong in the description is told with its line; what is wrong in the file too.
+    let wrong = Robot::from_texts(&text, &urdf.replace("joint_3", "joint_2"), &folder.join("nowhere.toml"), &options);
+    let told = wrong.unwrap_err().to_string();
+    assert!(told.contains("nowhere.urdf:") && told.contains("joint_2"), "{told}");
+    let wrong = Robot::from_toml(&text, &folder.join("nowhere.toml"), &options).unwrap_err().to_string();
+    assert!(wrong.contains("there is no file"), "{wrong}");
+}
+
+/// Truth: the columns themselves. What does not fit is refused, not mended.
+#[test]
+fn columns_that_were_kept_elsewhere_are_columns_again() {
+    let robot = Robot::load(root().join("robots/reference_arm")).unwrap();
+    let motion = Motion::load(robot.default_trajectory.clone().unwrap(), &robot).unwrap();
+    let arm = robot.flexible(Modelling::default()).unwrap();
+    for with_twin in [true, false] {
+        let options = RunOptions { step_s: 4e-3, with_twin, ..RunOptions::default() };
+        let columns = arm.simulate(&motion, &options).unwrap().columns;
+        let kept: Vec<_> = columns.columns().iter().map(|c| (c.name.clone(), c.values.clone())).collect();
+        assert_eq!(columns.filled(kept.clone()).unwrap(), columns);
+        let mut short = kept.clone();
+        short[2].1.pop();
+        assert!(columns.filled(short).is_none());
+        let mut turned = kept.clone();
+        turned.swap(1, 2);
+        assert!(columns.filled(turned).is_none());
+        assert!(columns.filled(kept[..5].to_vec()).is_none());
+    }
+}

@@ -13,6 +13,8 @@ SI units; six-vectors are linear first. What goes wrong is a :class:`flexarm.Err
 """
 
 from pathlib import Path as _Path
+from typing import TYPE_CHECKING as _TYPE_CHECKING
+from typing import Any as _Any
 
 from . import _flexarm
 from ._flexarm import (
@@ -49,6 +51,7 @@ from ._flexarm import (
     robot,
     sweep,
 )
+from ._build import RobotBuilder
 from .errors import (
     Caveat,
     CompensateError,
@@ -102,6 +105,7 @@ __all__ = [
     "RecordingError",
     "Response",
     "Robot",
+    "RobotBuilder",
     "RobotError",
     "Run",
     "RunError",
@@ -133,3 +137,15 @@ __all__ = [
 _SHARE = _Path(__file__).parent / "share"
 
 _flexarm.ship_from(_SHARE)
+
+if _TYPE_CHECKING:
+    from . import types as types
+
+
+def __getattr__(name: str) -> _Any:
+    # Of use to annotations alone, so that it is read when it is asked for.
+    if name == "types":
+        import importlib
+
+        return importlib.import_module("flexarm.types")
+    raise AttributeError(f"module 'flexarm' has no attribute {name!r}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Dict, Optional, Tuple
 
+from . import _flexarm
 from ._flexarm import Arm, Motion, Robot, Scenario
 from ._flexarm import load as _load
 from ._flexarm import robot as _robot
@@ -13,8 +14,8 @@ def load(path: Any, choices: Dict[str, Any]) -> Robot:
     return _load(path, **choices)
 
 
-def robot(keys: Dict[str, Any], folder: Any) -> Robot:
-    return _robot(keys, folder)
+def robot(keys: Dict[str, Any], folder: Any, urdf: Optional[str] = None) -> Robot:
+    return _robot(keys, folder, urdf=urdf)
 
 
 def arm(robot: Robot, choices: Tuple[Optional[str], Optional[str], Optional[int], Optional[int]]) -> Arm:
@@ -35,3 +36,11 @@ def motion_again(robot: Robot, source: Any, *read: Any) -> Motion:
 
 def scenario(motion: Any, loads: Any, payloads: Any, start: Any) -> Scenario:
     return Scenario(motion, loads=loads, payloads=payloads, start=start)
+
+
+def motion_of_pieces(robot: Robot, name: str, duration: float, curves: Any) -> Motion:
+    return _flexarm._motion_of_pieces(robot, name, duration, curves)
+
+
+def result(kind: type, parts: Dict[str, Any]) -> Any:
+    return _flexarm._restore(kind, parts)

@@ -8,6 +8,13 @@ from html import escape
 from typing import Any, Iterable, Optional, Tuple
 
 
+def shipped_tools() -> "list[str]":
+    """Names of the cutting tools that come with the package."""
+    from . import _SHARE
+
+    return sorted(file.stem for file in (_SHARE / "robots/tools").glob("*.toml"))
+
+
 def _table(title: str, rows: Iterable[Tuple[str, str]]) -> str:
     body = "".join(
         f'<tr><th style="text-align:left">{escape(name)}</th><td style="text-align:left">{escape(value)}</td></tr>'

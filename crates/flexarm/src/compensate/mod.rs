@@ -6,6 +6,7 @@
 
 mod page;
 
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -231,6 +232,19 @@ pub enum CompensateError {
 /// # Errors
 /// [`Error::Compensate`], and as [`crate::simulate`].
 pub fn compensate_motion(robot: &Robot, motion: &Motion, request: &CompensateRequest) -> Result<Compensation, Error> {
+    compensate_motion_until(robot, motion, request, &|| false)
+}
+
+/// As [`compensate_motion`]; as soon as `stop` says so, it ends with [`Error::Interrupted`], and nothing is written.
+///
+/// # Errors
+/// As [`compensate_motion`]; [`Error::Interrupted`].
+pub fn compensate_motion_until(
+    robot: &Robot,
+    motion: &Motion,
+    request: &CompensateRequest,
+    stop: &(dyn Fn() -> bool + Sync),
+) -> Result<Compensation, Error> {
     check(motion, request)?;
     let targets =
         request.output.as_ref().map(|folder| [folder.join("compensated.csv"), folder.join("compensation.html")]);
@@ -245,7 +259,7 @@ pub fn compensate_motion(robot: &Robot, motion: &Motion, request: &CompensateReq
         Some(kind) => shaped(&arm, motion, kind)?,
         None => (motion.clone(), 0.0),
     };
-    let job = Job::new(&arm, &motion, request)?;
+    let job = Job::new(&arm, &motion, request, stop)?;
     let found = match request.method {
         Method::Dynamic => job.dynamic()?,
         Method::Static => job.at_rest()?,
@@ -329,6 +343,7 @@ struct Job<'a> {
     /// The rigid arm's tool at these times.
     wanted: Vec<Pose>,
     rows: Vec<usize>,
+    stop: &'a (dyn Fn() -> bool + Sync),
 }
 
 /// Commands as they were found.
@@ -344,7 +359,12 @@ struct Commands {
 }
 
 impl<'a> Job<'a> {
-    fn new(arm: &'a Arm, motion: &'a Motion, request: &'a CompensateRequest) -> Result<Self, Error> {
+    fn new(
+        arm: &'a Arm,
+        motion: &'a Motion,
+        request: &'a CompensateRequest,
+        stop: &'a (dyn Fn() -> bool + Sync),
+    ) -> Result<Self, Error> {
         let model = arm.robot().rigid_model()?;
         // Whole numbers of steps, so that the run is logged at just these times; the last lies at the end or a little beyond, where
         // the joints are held.
@@ -364,7 +384,15 @@ impl<'a> Job<'a> {
             q.set_column(k, &at);
         }
         let rows = (0..6).filter(|k| request.components[*k]).collect();
-        Ok(Self { arm, request, motion, times, q, wanted, rows })
+        Ok(Self { arm, request, motion, times, q, wanted, rows, stop })
+    }
+
+    /// Goes on unless somebody wants it to stop; `t_s`: how far it is.
+    fn go_on(&self, t_s: f64) -> Result<(), Error> {
+        match (self.stop)() {
+            true => Err(Error::Interrupted { t: t_s, partial: false }),
+            false => Ok(()),
+        }
     }
 
     fn step_s(&self) -> f64 {
@@ -412,7 +440,8 @@ impl<'a> Job<'a> {
     fn error(&self, arm: &Arm, run: &RunOptions, motion: &Motion) -> Result<DMatrix<f64>, Error> {
         let options =
             RunOptions { log_rate_hz: 1.0 / self.step_s(), with_twin: false, ignore_limits: true, ..run.clone() };
-        let run = arm.simulate(Scenario::from(motion), &options)?;
+        let mut progress = |_, _| if (self.stop)() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
+        let run = arm.simulate_watched(Scenario::from(motion), &options, None, None, &mut progress)?;
         let (t, p, r) = (run.time_s(), run.values("tcp_position"), run.values("tcp_quaternion_wxyz"));
         let mut error = DMatrix::zeros(6, self.times.len());
         for (k, time) in self.times.iter().enumerate() {
@@ -441,6 +470,7 @@ impl<'a> Job<'a> {
         let flexible = self.arm.flexible();
         let m = self.q.nrows();
         let node = |k: usize| -> Result<Node, Error> {
+            self.go_on(spacing * k as f64)?;
             let (mut q, mut v, mut a) = (vec![0.0; m], vec![0.0; m], vec![0.0; m]);
             self.motion.trajectory.sample(spacing * k as f64, &mut q, &mut v, &mut a);
             let arm = flexible.arm(Arc::new(Held(q))).map_err(|error| flexible.explained(error))?;
@@ -508,12 +538,13 @@ impl<'a> Job<'a> {
         let every = ((NODE_S / self.step_s()).round() as usize).max(1);
         let nodes: Vec<usize> = (0..N - 1).step_by(every).chain([N - 1]).collect();
         let one = |k: &usize| {
+            self.go_on(self.times[*k])?;
             let q: Vec<f64> = self.q.column(*k).iter().copied().collect();
             let found = static_targets(&arm, &flexible.tcp, &q, &Wrench::zeros(), &self.request.components);
             let found = found.map_err(|source| CompensateError::Target { t_s: self.times[*k], source })?;
-            Ok(DVector::from_iterator(m, found.q.iter().zip(&q).map(|(new, old)| new - old)))
+            Ok::<_, Error>(DVector::from_iterator(m, found.q.iter().zip(&q).map(|(new, old)| new - old)))
         };
-        let found: Vec<DVector<f64>> = nodes.par_iter().map(one).collect::<Result<_, CompensateError>>()?;
+        let found: Vec<DVector<f64>> = nodes.par_iter().map(one).collect::<Result<_, Error>>()?;
         let mut change = DMatrix::zeros(m, N);
         for k in 0..N {
             let i = nodes.partition_point(|node| *node <= k).clamp(1, nodes.len() - 1);

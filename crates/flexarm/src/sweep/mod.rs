@@ -62,7 +62,7 @@ const PAGE: &str = "report.html";
 /// Runs that a thread takes at a time where four go side by side.
 const WINDOW: usize = 64;
 /// Between two looks at the wish to stop.
-const LOOK: Duration = Duration::from_millis(100);
+const LOOK: Duration = Duration::from_millis(50);
 
 /// How a study finds robots and motions that it calls by a name.
 #[derive(Clone, Copy, Debug)]

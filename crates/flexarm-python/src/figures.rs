@@ -1,0 +1,71 @@
+//! Figures of a result with the keys of `--json`, and their caveats: as they were found, or as a pickle told them.
+
+use std::sync::Arc;
+
+use flexarm::Caveat;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyList;
+
+use crate::caveat;
+use crate::parts::Parts;
+
+/// What becomes a text of `--json` when it is asked for.
+trait Json: Send + Sync {
+    fn json(&self) -> serde_json::Result<String>;
+}
+
+impl<T: serde::Serialize + Send + Sync> Json for T {
+    fn json(&self) -> serde_json::Result<String> {
+        serde_json::to_string(self)
+    }
+}
+
+enum Source {
+    Found(Arc<dyn Json>),
+    Told(String),
+}
+
+/// Figures and caveats of a result.
+pub(crate) struct Figures {
+    source: Source,
+    caveats: Vec<Caveat>,
+}
+
+impl Figures {
+    /// Figures as they were found.
+    pub(crate) fn of(found: impl serde::Serialize + Send + Sync + 'static, caveats: &[Caveat]) -> Self {
+        Self { source: Source::Found(Arc::new(found)), caveats: caveats.to_vec() }
+    }
+
+    fn json(&self) -> PyResult<String> {
+        match &self.source {
+            Source::Found(found) => found.json().map_err(|error| PyValueError::new_err(error.to_string())),
+            Source::Told(text) => Ok(text.clone()),
+        }
+    }
+
+    /// As dicts, lists and numbers, in the order and with the keys of `--json`.
+    pub(crate) fn plain<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        py.import("json")?.call_method1("loads", (self.json()?,))
+    }
+
+    /// The caveats as instances of `flexarm.Caveat`.
+    pub(crate) fn caveats<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        caveat::list(py, &self.caveats)
+    }
+
+    /// For a pickle.
+    pub(crate) fn put_into(&self, parts: &Parts<'_>) -> PyResult<()> {
+        let caveats = serde_json::to_string(&self.caveats).map_err(|error| PyValueError::new_err(error.to_string()))?;
+        parts.put("figures", self.json()?)?;
+        parts.put("caveats", caveats)
+    }
+
+    /// Out of a pickle.
+    pub(crate) fn of_parts(parts: &Parts<'_>) -> PyResult<Self> {
+        let caveats: String = parts.get("caveats")?;
+        let caveats = serde_json::from_str(&caveats).map_err(|error| PyValueError::new_err(error.to_string()))?;
+        Ok(Self { source: Source::Told(parts.get("figures")?), caveats })
+    }
+}

@@ -1,0 +1,223 @@
+//! The linear structure about an equilibrium.
+
+use flexarm::Linear;
+use pyo3::prelude::*;
+
+use crate::arrays::view;
+use crate::failure::raised;
+use crate::parts::{Parts, Pickled};
+
+/// Linear structure about an equilibrium; k free coordinates (joints driven by torque, then elastic ones), n joints.
+///
+/// World axes at the tool, linear first. Made by :meth:`Arm.linearise`.
+///
+/// Examples
+/// --------
+/// >>> at = flexarm.load("kr210").flexible().linearise([0.0, -1.2, 1.5, 0.0, 0.4, 0.0])
+/// >>> at.M.shape == at.K.shape == at.D.shape
+/// True
+/// >>> at.J.shape[0]
+/// 6
+#[pyclass(frozen, name = "Linear", module = "flexarm")]
+pub(crate) struct PyLinear {
+    M: Matrix,
+    D: Matrix,
+    K: Matrix,
+    J: Matrix,
+    M_a: Matrix,
+    D_a: Matrix,
+    K_a: Matrix,
+    J_a: Matrix,
+    equilibrium: Vec<f64>,
+    holding: Vec<f64>,
+    driven: usize,
+    elements: Vec<(String, usize, usize)>,
+    /// Why there is none, where a motion has no stiffness.
+    compliance: Result<Matrix, String>,
+}
+
+/// Rows after each other.
+struct Matrix {
+    shape: [usize; 2],
+    values: Vec<f64>,
+}
+
+impl Matrix {
+    /// Of numbers that lie column after column.
+    fn of((rows, columns): (usize, usize), by_columns: &[f64]) -> Self {
+        let values = (0..rows * columns).map(|k| by_columns[(k % columns) * rows + k / columns]).collect();
+        Self { shape: [rows, columns], values }
+    }
+
+    fn put(&self, name: &str, parts: &Parts<'_>) -> PyResult<()> {
+        parts.put(&format!("{name}_shape"), self.shape.to_vec())?;
+        parts.put_numbers(name, &self.values)
+    }
+
+    fn out_of(parts: &Parts<'_>, name: &str) -> PyResult<Self> {
+        let shape: [usize; 2] = parts.get(&format!("{name}_shape"))?;
+        Ok(Self { shape, values: parts.shaped(name, &shape)? })
+    }
+}
+
+pub(crate) fn linear(linear: &Linear) -> PyLinear {
+    let compliance =
+        linear.compliance().map(|C| Matrix::of(C.shape(), C.as_slice())).map_err(|error| error.to_string());
+    PyLinear {
+        M: Matrix::of(linear.M.shape(), linear.M.as_slice()),
+        D: Matrix::of(linear.D.shape(), linear.D.as_slice()),
+        K: Matrix::of(linear.K.shape(), linear.K.as_slice()),
+        J: Matrix::of(linear.J.shape(), linear.J.as_slice()),
+        M_a: Matrix::of(linear.M_a.shape(), linear.M_a.as_slice()),
+        D_a: Matrix::of(linear.D_a.shape(), linear.D_a.as_slice()),
+        K_a: Matrix::of(linear.K_a.shape(), linear.K_a.as_slice()),
+        J_a: Matrix::of(linear.J_a.shape(), linear.J_a.as_slice()),
+        equilibrium: linear.equilibrium.as_slice().to_vec(),
+        holding: linear.holding.as_slice().to_vec(),
+        driven: linear.driven,
+        elements: linear.elements.iter().map(|(name, range)| (name.clone(), range.start, range.end)).collect(),
+        compliance,
+    }
+}
+
+impl PyLinear {
+    fn matrix<'py>(slf: &Bound<'py, Self>, matrix: &Matrix) -> PyResult<Bound<'py, PyAny>> {
+        view(slf.clone().into_any(), matrix.shape, &matrix.values)
+    }
+}
+
+#[pymethods]
+#[expect(non_snake_case, reason = "the names of the matrices")]
+impl PyLinear {
+    /// Mass matrix, (k, k).
+    #[getter]
+    fn M<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        Self::matrix(slf, &slf.get().M)
+    }
+
+    /// Damping matrix, (k, k).
+    #[getter]
+    fn D<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        Self::matrix(slf, &slf.get().D)
+    }
+
+    /// Tangent stiffness: springs, change of weight and of the wrench, (k, k).
+    #[getter]
+    fn K<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        Self::matrix(slf, &slf.get().K)
+    }
+
+    /// Twist of the tool per rate of the free coordinates, (6, k).
+    #[getter]
+    fn J<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        Self::matrix(slf, &slf.get().J)
+    }
+
+    /// Forces on the free coordinates per acceleration of the commands, (k, n).
+    #[getter]
+    fn M_a<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        Self::matrix(slf, &slf.get().M_a)
+    }
+
+    /// Forces on the free coordinates per rate of the commands, (k, n).
+    #[getter]
+    fn D_a<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        Self::matrix(slf, &slf.get().D_a)
+    }
+
+    /// Forces on the free coordinates per command, (k, n).
+    #[getter]
+    fn K_a<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        Self::matrix(slf, &slf.get().K_a)
+    }
+
+    /// Twist of the tool per rate of the commands, the structure not yielding, (6, n).
+    #[getter]
+    fn J_a<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        Self::matrix(slf, &slf.get().J_a)
+    }
+
+    /// Free coordinates at the equilibrium, (k,).
+    #[getter]
+    fn equilibrium<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let values = &slf.get().equilibrium;
+        view(slf.clone().into_any(), [values.len()], values)
+    }
+
+    /// Forces with which the drives hold the pose (N m or N), (n,).
+    #[getter]
+    fn holding<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let values = &slf.get().holding;
+        view(slf.clone().into_any(), [values.len()], values)
+    }
+
+    /// How many of the free coordinates are joints driven by torque; they come first.
+    #[getter]
+    fn driven(&self) -> usize {
+        self.driven
+    }
+
+    /// Name, and first and last but one free coordinate, of each elastic element (list of (str, int, int)).
+    #[getter]
+    fn elements(&self) -> Vec<(String, usize, usize)> {
+        self.elements.clone()
+    }
+
+    /// Displacement of the tool per wrench on it, motors held, (6, 6).
+    #[getter]
+    fn compliance<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        match &slf.get().compliance {
+            Ok(compliance) => Self::matrix(slf, compliance),
+            Err(why) => Err(raised(slf.py(), "StepError", why.clone())),
+        }
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<Linear: {} free coordinates, {} commands>", self.M.shape[0], self.M_a.shape[1])
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        Self::reduced(slf)
+    }
+}
+
+impl Pickled for PyLinear {
+    fn parts(&self, parts: &Parts<'_>) -> PyResult<()> {
+        self.M.put("M", parts)?;
+        self.D.put("D", parts)?;
+        self.K.put("K", parts)?;
+        self.J.put("J", parts)?;
+        self.M_a.put("M_a", parts)?;
+        self.D_a.put("D_a", parts)?;
+        self.K_a.put("K_a", parts)?;
+        self.J_a.put("J_a", parts)?;
+        parts.put_numbers("equilibrium", &self.equilibrium)?;
+        parts.put_numbers("holding", &self.holding)?;
+        parts.put("driven", self.driven)?;
+        parts.put("elements", self.elements.clone())?;
+        parts.put("no_compliance", self.compliance.as_ref().err().cloned())?;
+        self.compliance.as_ref().map_or(Ok(()), |compliance| compliance.put("compliance", parts))
+    }
+
+    fn of_parts(parts: &Parts<'_>) -> PyResult<Self> {
+        let compliance = match parts.get::<Option<String>>("no_compliance")? {
+            Some(why) => Err(why),
+            None => Ok(Matrix::out_of(parts, "compliance")?),
+        };
+        Ok(Self {
+            M: Matrix::out_of(parts, "M")?,
+            D: Matrix::out_of(parts, "D")?,
+            K: Matrix::out_of(parts, "K")?,
+            J: Matrix::out_of(parts, "J")?,
+            M_a: Matrix::out_of(parts, "M_a")?,
+            D_a: Matrix::out_of(parts, "D_a")?,
+            K_a: Matrix::out_of(parts, "K_a")?,
+            J_a: Matrix::out_of(parts, "J_a")?,
+            equilibrium: parts.numbers("equilibrium")?,
+            holding: parts.numbers("holding")?,
+            driven: parts.get("driven")?,
+            elements: parts.get("elements")?,
+            compliance,
+        })
+    }
+}

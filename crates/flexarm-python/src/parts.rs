@@ -1,0 +1,88 @@
+//! Results in parts that can be pickled: numbers as arrays, the rest as plain values, under names.
+
+use pyo3::conversion::FromPyObjectOwned;
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+use pyo3::pyclass::boolean_struct::True;
+use pyo3::types::{PyDict, PyType};
+
+use crate::arrays::{any_numbers, array};
+
+/// The parts of a result.
+pub(crate) struct Parts<'py>(Bound<'py, PyDict>);
+
+/// A class whose instances are pickled by their parts.
+pub(crate) trait Pickled: pyo3::PyClass<Frozen = True> + Sync {
+    /// Takes them apart.
+    fn parts(&self, parts: &Parts<'_>) -> PyResult<()>;
+    /// Puts them together.
+    fn of_parts(parts: &Parts<'_>) -> PyResult<Self>;
+
+    /// What `__reduce__` returns.
+    fn reduced<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let py = slf.py();
+        let parts = Parts(PyDict::new(py));
+        slf.get().parts(&parts)?;
+        let class = slf.as_any().get_type();
+        let again = py.import("flexarm._pickle")?.getattr("result")?;
+        Ok((again, (class, parts.0)).into_pyobject(py)?.into_any())
+    }
+}
+
+impl<'py> Parts<'py> {
+    /// Keeps a value.
+    pub(crate) fn put(&self, name: &str, value: impl IntoPyObject<'py>) -> PyResult<()> {
+        self.0.set_item(name, value)
+    }
+
+    /// Keeps numbers.
+    pub(crate) fn put_numbers(&self, name: &str, values: &[f64]) -> PyResult<()> {
+        self.0.set_item(name, array(self.0.py(), [values.len()], values.to_vec())?)
+    }
+
+    fn item(&self, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        let missing = || PyValueError::new_err(format!("the pickle has no {name:?}: another version made it"));
+        self.0.get_item(name)?.ok_or_else(missing)
+    }
+
+    /// A value.
+    pub(crate) fn get<T: FromPyObjectOwned<'py>>(&self, name: &str) -> PyResult<T> {
+        self.item(name)?.extract().map_err(Into::into)
+    }
+
+    /// Numbers.
+    pub(crate) fn numbers(&self, name: &str) -> PyResult<Vec<f64>> {
+        any_numbers(name, &self.item(name)?)
+    }
+
+    /// As many numbers as a shape has.
+    pub(crate) fn shaped(&self, name: &str, shape: &[usize]) -> PyResult<Vec<f64>> {
+        let (values, wanted) = (self.numbers(name)?, shape.iter().product::<usize>());
+        match values.len() == wanted {
+            true => Ok(values),
+            false => {
+                Err(PyValueError::new_err(format!("the pickle has {} numbers as {name:?}, not {wanted}", values.len())))
+            }
+        }
+    }
+}
+
+/// Puts a result together again; for `flexarm._pickle`.
+#[pyfunction]
+#[pyo3(name = "_restore")]
+pub(crate) fn restore<'py>(kind: &Bound<'py, PyType>, parts: &Bound<'py, PyDict>) -> PyResult<Bound<'py, PyAny>> {
+    let (py, parts) = (kind.py(), Parts(parts.clone()));
+    let name = kind.name()?;
+    Ok(match name.to_str()? {
+        "Run" => Bound::new(py, crate::run::PyRun::of_parts(&parts)?)?.into_any(),
+        "Sample" => Bound::new(py, crate::run::PySample::of_parts(&parts)?)?.into_any(),
+        "Statics" => Bound::new(py, crate::answers::PyStatics::of_parts(&parts)?)?.into_any(),
+        "Modes" => Bound::new(py, crate::answers::PyModes::of_parts(&parts)?)?.into_any(),
+        "Response" => Bound::new(py, crate::answers::PyResponse::of_parts(&parts)?)?.into_any(),
+        "Linear" => Bound::new(py, crate::linear::PyLinear::of_parts(&parts)?)?.into_any(),
+        "Deflections" => Bound::new(py, crate::deflections::PyDeflections::of_parts(&parts)?)?.into_any(),
+        "Map" => Bound::new(py, crate::map::PyMap::of_parts(&parts)?)?.into_any(),
+        "Compensated" => Bound::new(py, crate::compensate::PyCompensated::of_parts(&parts)?)?.into_any(),
+        other => return Err(PyTypeError::new_err(format!("{other} is not pickled by its parts"))),
+    })
+}
