@@ -53,8 +53,9 @@ pub enum TargetError {
 
 /// Finds joint targets with which the tool at rest is where the rigid arm has it at `q`.
 ///
-/// * `arm`: its own motion does not count; loads and payloads of time 0 act.
+/// * `arm`: its own motion does not count; the payload is that of time 0.
 /// * `F_T_W`: constant wrench on the tool, world axes, as in [`linearise`].
+/// * `t`: time (s) whose loads of the arm act.
 /// * `components`: which of position and rotation (world axes) count.
 ///
 /// With fewer components than joints the joints move as little as possible.
@@ -66,6 +67,7 @@ pub fn static_targets(
     tool: &Frame,
     q: &[f64],
     F_T_W: &Wrench,
+    t: f64,
     components: &[bool; 6],
 ) -> Result<StaticTargets, TargetError> {
     let wanted = rigid_pose(arm, tool, q);
@@ -74,7 +76,7 @@ pub fn static_targets(
     let mut before = None;
     for iterations in 0..=MOST_ITERATIONS {
         let held = arm.along(Arc::new(Held(targets.as_slice().to_vec())));
-        let at = linearise(&held, tool, F_T_W, 0.0)?;
+        let at = linearise(&held, tool, F_T_W, t)?;
         let off = displacement(&wanted, &at.X_WT);
         let before = *before.get_or_insert(off);
         let left = DVector::from_iterator(rows.len(), rows.iter().map(|k| off[*k]));

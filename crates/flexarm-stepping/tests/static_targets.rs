@@ -26,7 +26,7 @@ fn arm(softer: f64) -> (FlexibleArm, Frame) {
 fn at_rest_the_tool_of_a_soft_arm_is_where_the_rigid_arm_has_it() {
     let (arm, tool) = arm(20.0);
     let load = Wrench::new(Vector3::new(90.0, 50.0, -200.0), Vector3::new(10.0, 0.0, 20.0));
-    let found = static_targets(&arm, &tool, &POSE, &load, &[true; 6]).unwrap();
+    let found = static_targets(&arm, &tool, &POSE, &load, 0.0, &[true; 6]).unwrap();
     let mut at = OperatingPoint::new(arm.clone(), tool.clone());
     at.solve(&POSE, &Wrench::zeros()).unwrap();
     let wanted = at.rigid_tcp_pose();
@@ -46,8 +46,8 @@ fn at_rest_the_tool_of_a_soft_arm_is_where_the_rigid_arm_has_it() {
 fn with_the_position_alone_the_joints_move_as_little_as_they_can() {
     let (arm, tool) = arm(20.0);
     let position = [true, true, true, false, false, false];
-    let all = static_targets(&arm, &tool, &POSE, &Wrench::zeros(), &[true; 6]).unwrap();
-    let some = static_targets(&arm, &tool, &POSE, &Wrench::zeros(), &position).unwrap();
+    let all = static_targets(&arm, &tool, &POSE, &Wrench::zeros(), 0.0, &[true; 6]).unwrap();
+    let some = static_targets(&arm, &tool, &POSE, &Wrench::zeros(), 0.0, &position).unwrap();
     let way = |found: &StaticTargets| found.q.iter().zip(POSE).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
     assert!(some.after.amax() < 1e-12 && way(&some) < way(&all), "{} {}", way(&some), way(&all));
 }
