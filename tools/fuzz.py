@@ -569,7 +569,7 @@ length = "mm"
 fit = ["link.bar.stiffness_factor", "link.bar.damping", "drive.swing.gearbox.damping"]
 
 [node.3]
-link = "bar"
+link = "ball"
 xyz = [100.0, 0.0, 5.0]
 axes = "frame"
 
@@ -922,7 +922,7 @@ def own_targets():
         Target("response-universal-binary", "hammer.uff", {**hammer, "hammer.uff": universal(True)}, [IDENTIFY_RESPONSES]),
         Target("response-table", "hammer.csv", hammer, [IDENTIFY_RESPONSES]),
         Target("motion-samples", "motion.toml", {**base, "motion.toml": MOTION_SAMPLES}, [check, COMPARE], True),
-        Target("compensate-program", "part.src", {"part.src": COMPENSATED_PROGRAM}, [["compensate", str(ROOT / "robots/kr210"), "part.src", "--method", "static", "-o", "made", "--force", "--no-recording", "--no-sweep", "--json"]]),
+        Target("compensate-program", "part.src", {"part.src": COMPENSATED_PROGRAM}, [["compensate", str(ROOT / "robots/kr210"), "part.src", "--method", "static", "--limits", "tell", "-o", "made", "--force", "--no-recording", "--no-sweep", "--json"]]),
         Target("compensate-loads", "loads.toml", {**base, "loads.toml": LOADS, "force.csv": TABLE}, [["compensate", "robot.toml", "motion.toml", "--loads", "loads.toml", "--no-files", "--no-sweep", "--iterations", "1", "--components", "z", "--limits", "tell", "--json"]], True),
         Target("plan-poses", "poses.csv", {**base, "poses.csv": "swing,elbow,finger\n0.1,0.2,0.01\n-0.3,0.5,0.0\n0.4,-0.2,0.02\n"}, [["identify", "robot.toml", "--plan", "2", "--poses", "poses.csv", "--no-files", "--json"]]),
         Target("sweep", "study.toml", {**base, "study.toml": SWEEP, "table.csv": "payload.mass,motion.speed\n1.0,1.0\n1.5,0.9\n"}, [["sweep", "study.toml", "-o", "made", "--force", "--threads", "1", "--json"], ["sweep", "study.toml", "--minimise", "--most-runs", "16", "-o", "made", "--force", "--threads", "1", "--json"]], True),

@@ -47,10 +47,10 @@ pub(crate) enum ShaperName {
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum LimitName {
+    /// The motion is slower; what time does not mend is an error
+    Slow,
     /// An error that names all of them
     Refuse,
-    /// The motion is slower, as far as that helps
-    Slow,
     /// They are listed, and the motion is written all the same
     Tell,
 }
@@ -83,7 +83,7 @@ pub(crate) struct CompensateArgs {
     #[arg(long, value_name = "FILE")]
     pub(crate) loads: Option<PathBuf>,
     /// What becomes of commands that pass a limit of position, speed, acceleration or torque which the motion itself keeps
-    #[arg(long, value_enum, default_value = "refuse")]
+    #[arg(long, value_enum, default_value = "slow")]
     pub(crate) limits: LimitName,
     /// Greatest acceleration of each joint in order (rad/s² or m/s²) [default: not looked at]
     #[arg(long, value_name = "A1,A2,...", value_delimiter = ',', allow_hyphen_values = true)]

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use flexarm_kinematics::{Data, Frame, Pose, Wrench, forward_kinematics, rotation_vector};
-use nalgebra::{DMatrix, DVector, Vector6};
+use nalgebra::{DVector, Vector6};
 
 use crate::arm::FlexibleArm;
 use crate::error::StepError;
@@ -84,10 +84,7 @@ pub fn static_targets(
             let after = Vector6::from_fn(|k, _| if components[k] { off[k] } else { 0.0 });
             return Ok(StaticTargets { q: targets.as_slice().to_vec(), before, after, iterations });
         }
-        // Commands move the tool and the equilibrium.
-        let yielding = at.K.clone().lu().solve(&at.K_a).unwrap_or_else(|| DMatrix::zeros(at.K.nrows(), at.K_a.ncols()));
-        let G = DMatrix::from_fn(6, targets.len(), |i, j| at.J_a[(i, j)]) - &at.J * yielding;
-        let G = G.select_rows(&rows);
+        let G = at.command_slopes().unwrap_or_else(|| at.J_a.clone()).select_rows(&rows);
         if iterations == MOST_ITERATIONS || !G.norm_squared().is_finite() {
             let norm = |range: std::ops::Range<usize>| {
                 range.filter(|k| components[*k]).map(|k| off[k].abs()).fold(0.0, f64::max)

@@ -49,7 +49,7 @@ pub enum CompensateError {
     #[error(
         "the new commands pass limits that the motion itself keeps: {}; {}",
         limits.join("; "),
-        if *slower { "a slower motion does not help" } else { "let the motion be slower (`limits` = slow), or take it all the same (tell)" }
+        if *slower { "a slower motion does not mend that, or loads hold its times: change it there, or take it all the same (`limits` = tell)" } else { "let the motion be slower (`limits` = slow), or take it all the same (tell)" }
     )]
     Limits {
         /// Each in a sentence.

@@ -4,6 +4,7 @@ use flexarm_trajectory::{Extreme, JointLimits};
 
 use super::{CompensateError, CompensateRequest, Compensation, Found, attempt};
 use crate::arm::Arm;
+use crate::caveat::Caveat;
 use crate::error::Error;
 use crate::motion::{Motion, limits as limits_of};
 use crate::motion_report::{MotionViolation, of_effort, of_limit};
@@ -22,11 +23,11 @@ const SLOWEST: f64 = 5.0;
 /// What becomes of commands that pass a limit which the motion itself keeps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LimitRule {
-    /// An error that names all of them.
+    /// The motion is run more slowly; what time does not mend is an error that names all of them.
     #[default]
-    Refuse,
-    /// The motion is run more slowly, as far as that helps.
     Slow,
+    /// An error that names all of them.
+    Refuse,
     /// They stand in the answer, with a caveat.
     Tell,
 }
@@ -74,6 +75,11 @@ pub(super) fn kept(
     for _ in 0..MOST_TIMES {
         let (mut answer, found, own) = attempt(robot, arm, &scenario, request)?;
         answer.slowed = slowed;
+        if slowed > 1.0 {
+            let text = format!("the motion takes {slowed:.4} times as long, so that limits of the joints are kept");
+            let help = "let commands pass them (`limits` = tell), or slow the motion where it is quickest";
+            answer.caveats.push(Caveat::said("slowed", "compensation", text, help));
+        }
         let worse: Vec<MotionViolation> = worse(&answer.limits, &own).cloned().collect();
         if worse.is_empty() || request.limits == LimitRule::Tell {
             return Ok((answer, found));

@@ -243,9 +243,14 @@ fn attempt(
     let as_it_is = job.as_it_is()?;
     let before = judge.figures(&job, &as_it_is)?;
     let after = judge.figures(&job, &found.motion)?;
-    let plants = if request.sweep { sweep(robot, request, &job, arm, &found.motion)? } else { Vec::new() };
     let limits = limits::passed(robot, &found.motion, &after.efforts, request)?;
     let own = limits::passed(robot, &scenario.motion, &before.efforts, request)?;
+    // What will be refused or run again is not judged elsewhere.
+    let kept = request.limits == LimitRule::Tell || limits::worse(&limits, &own).next().is_none();
+    let plants = match request.sweep && kept {
+        true => sweep(robot, request, &job, arm, &found.motion)?,
+        false => Vec::new(),
+    };
     let largest = |k: usize| found.change.row(k).amax();
     let changes = arm.joints().enumerate().map(|(k, joint)| JointChange { joint: joint.into(), largest: largest(k) });
     let curves = job.times.iter().zip(before.distance.iter().zip(&after.distance)).map(|(t, (a, b))| [*t, *a, *b]);

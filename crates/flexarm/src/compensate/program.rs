@@ -108,8 +108,7 @@ pub(super) fn corrected(
         .enumerate()
         .filter_map(|(k, (item, q))| if let (Item::Move(of), Some(q)) = (item, q) { Some((k, of, q)) } else { None })
         .collect();
-    let found: Vec<Result<(NewTarget, Option<Vector3<f64>>), String>> =
-        moves.par_iter().map(|(_, of, q)| rest.target(of, q)).collect();
+    let found: Vec<Result<Told, String>> = moves.par_iter().map(|(_, of, q)| rest.target(of, q)).collect();
     let mut left: Vec<(usize, String)> = Vec::new();
     let mut targets = Vec::new();
     for ((k, ..), found) in moves.iter().zip(found) {
@@ -176,6 +175,9 @@ fn plain(name: &str) -> String {
     name.chars().map(|c| if c.is_ascii_graphic() || c == ' ' { c } else { '_' }).collect()
 }
 
+/// What a program must say in the place of a target, and of an auxiliary point.
+type Told = (NewTarget, Option<Vector3<f64>>);
+
 /// The arm at rest, as its controller and as the world sees it.
 struct AtRest<'a> {
     arm: &'a ProgramArm<'a>,
@@ -208,7 +210,7 @@ impl AtRest<'_> {
     }
 
     /// What the program must say in the place of a target, and of an auxiliary point.
-    fn target(&self, of: &Move, q: &DVector<f64>) -> Result<(NewTarget, Option<Vector3<f64>>), String> {
+    fn target(&self, of: &Move, q: &DVector<f64>) -> Result<Told, String> {
         let target = match target_at(self.arm, of, &self.joints(of, q)?) {
             Target::Joints(values) => NewTarget::Joints(values),
             Target::Pose { X_BT, configuration } => NewTarget::Pose { X_BT, configuration },

@@ -390,6 +390,14 @@ pub enum IdentifyFileError {
         /// What to try.
         help: String,
     },
+    /// A point that does not move.
+    #[error(
+        "{reading}: the arm as it is does not move there along that direction, or cannot be hit so: look at nodes, their links and directions"
+    )]
+    Still {
+        /// Which.
+        reading: String,
+    },
     /// A response out of all proportion.
     #[error(
         "{reading}: the measured response is {ratio:.3e} times as large as that of the robot as it is: no robot is that far from its \
@@ -483,6 +491,9 @@ fn check_units(plant: &Plant, input: &MeasurementInput) -> Result<(), Error> {
         let (measured, expected) = both(&one)?;
         let off: f64 = measured.iter().zip(&expected).step_by(2).map(|(a, b)| a - b).sum();
         let ratio = (off / response.points.len() as f64).exp();
+        if expected.iter().any(|x| !x.is_finite()) {
+            return Err(IdentifyFileError::Still { reading: reading.name }.into());
+        }
         if !(1.0 / UNIT_RATIO..=UNIT_RATIO).contains(&ratio) {
             return Err(IdentifyFileError::ResponseUnits { reading: reading.name, ratio }.into());
         }

@@ -107,13 +107,16 @@ const UNITS: [(&str, Answer, f64); 11] = [
     ("mm/kN", Answer::Receptance, 1e-6),
 ];
 
-/// A response before its points of the arm are known: Hz, SI values, deviations as parts of themselves where the file has them.
+/// Hz, value in SI units, and its deviation where the file has one.
+type Point = (f64, Complex<f64>, Option<f64>);
+
+/// A response before its points of the arm are known.
 struct Curve {
     name: String,
     watched: (Option<String>, Vector3<f64>),
     hit: (Option<String>, Vector3<f64>),
     answer: Answer,
-    values: Vec<(f64, Complex<f64>, Option<f64>)>,
+    values: Vec<Point>,
 }
 
 impl Reader<'_> {
@@ -150,7 +153,7 @@ impl Reader<'_> {
                 return Err(self
                     .error(span.clone(), format!("{}: std stands in the table and here: leave one out", curve.name)));
             }
-            let point = |(hz, value, std): &(f64, Complex<f64>, Option<f64>)| {
+            let point = |(hz, value, std): &Point| {
                 let std = std.unwrap_or(own);
                 (TAU * hz, *value, [std, std])
             };
@@ -169,14 +172,12 @@ impl Reader<'_> {
     }
 
     /// The points within the range that is asked for.
-    fn kept(&self, curve: &Curve, e: &ResponseEntry) -> Result<Vec<(f64, Complex<f64>, Option<f64>)>, Error> {
+    fn kept(&self, curve: &Curve, e: &ResponseEntry) -> Result<Vec<Point>, Error> {
         let bound = |given: &Option<Spanned<f64>>, otherwise: f64| given.as_ref().map_or(otherwise, |x| *x.get_ref());
         let (from, to) = (bound(&e.from, 0.0), bound(&e.to, f64::INFINITY));
         let every = e.every.as_ref().map_or(1, |n| *n.get_ref()).max(1);
         // At rest nothing accelerates, and a logarithm needs a size.
-        let counts = |(hz, value, _): &&(f64, Complex<f64>, Option<f64>)| {
-            *hz > 0.0 && *hz >= from && *hz <= to && value.norm() > 0.0
-        };
+        let counts = |(hz, value, _): &&Point| *hz > 0.0 && *hz >= from && *hz <= to && value.norm() > 0.0;
         let kept: Vec<_> = curve.values.iter().filter(counts).step_by(every).copied().collect();
         match kept.len() {
             0 => Err(self.error(
