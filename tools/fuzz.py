@@ -563,6 +563,89 @@ Time[ms];swing[deg];elbow (deg);state;A1
 """
 
 
+RESPONSES = """format = 1
+angle = "deg"
+length = "mm"
+fit = ["link.bar.stiffness_factor", "link.bar.damping", "drive.swing.gearbox.damping"]
+
+[node.3]
+link = "ball"
+xyz = [100.0, 0.0, 5.0]
+axes = "frame"
+
+[node.4]
+
+[[response]]
+file = "hammer.uff"
+joints = [0.0, 0.0]
+load = { mass = 0.2, com = [10.0, 0.0, 0.0] }
+from = 1.0
+to = 60.0
+every = 1
+std = 0.05
+
+[[response]]
+file = "hammer.csv"
+joints = { swing = 0.0, elbow = 10.0 }
+watched = "3"
+watched_direction = "z"
+hit = "4"
+hit_direction = [0.0, 0.1, -1.0]
+unit = "mm/s2/N"
+form = "complex"
+std = 1.0
+
+[[shape]]
+joints = [0.0, 0.0]
+nodes = ["3", "4", "4"]
+directions = ["z", "-z", "x"]
+amplitudes = [0.3, -1.0, 0.01]
+std = 0.05
+"""
+IDENTIFY_RESPONSES = ["identify", "robot.toml", "job.toml", "-o", "made", "--force", "--json"]
+COMPENSATED_PROGRAM = """&ACCESS RVP
+DEF part()
+$VEL.CP = 0.5
+PTP {A1 10, A2 -80, A3 95, A4 5, A5 50, A6 -10}
+PTP {X 1650, Y 0, Z 1200, A 0, B 85, C 0, S 6, T 2}
+LIN {X 1620, Y 50} C_DIS
+CIRC {X 1640, Y 30, Z 1150}, {X 1600, Y 50, Z 1100, A 0, B 85, C 0}
+END
+"""
+HAMMER = "hz,re,im\n5.0,-120.0,-3.5\n12.0,900.0,-210.0\n22.5,-340.0,-55.0\n"
+MOTION_SAMPLES = """format = 1
+unit = "deg"
+metres = []
+joints = ["swing", "elbow"]
+
+[samples]
+time = [0.0, 0.1, 0.2, 0.3]
+position = [[0.0, 0.0], [1.0, -2.0], [2.0, -3.0], [2.0, -3.0]]
+velocity = [[0.0, 0.0], [12.0, -20.0], [5.0, -4.0], [0.0, 0.0]]
+acceleration = [[0.0, 0.0], [10.0, 0.0], [-90.0, 80.0], [0.0, 0.0]]
+"""
+
+
+def universal(binary):
+    """Two frequency responses and the units of a universal file (datasets 58 and 164)."""
+    out = b"    -1\n   164\n         1SI                           2\n 1.0D+00 1.0D+00 1.0D+00\n-2.7D+02\n    -1\n"
+    for direction in (3, -3):
+        values = [(5.0, -0.12, -0.0035), (12.0, 0.9, -0.21), (22.5, -0.34, -0.055)]
+        kind = f"58b     1     2          11  {24 * len(values):10d}     0     0           0           0" if binary else "58"
+        head = [f"    -1\n    {kind}", "blow", "NONE", "NONE", "NONE", "NONE",
+                f"{4:5d}{0:10d}{0:5d}{0:10d} {'NONE':10}{3:10d}{direction:4d} {'NONE':10}{4:10d}{3:4d}",
+                f"{6:10d}{len(values):10d}{0:10d}{0:13.5E}{0:13.5E}{0:13.5E}",
+                f"{18:10d}{0:5d}{0:5d}{0:5d} {'Frequency':20} {'Hz':20}",
+                f"{12:10d}{0:5d}{0:5d}{0:5d} {'Acceleration':20} {'m/s^2':20}",
+                f"{13:10d}{0:5d}{0:5d}{0:5d} {'Force':20} {'N':20}",
+                f"{0:10d}{0:5d}{0:5d}{0:5d} {'NONE':20} {'NONE':20}", ""]
+        out += "\n".join(head).encode()
+        for row in values:
+            out += struct.pack("<3d", *row) if binary else ("".join(f"{x:20.11E}" for x in row) + "\n").encode()
+        out += b"\n    -1\n"
+    return out
+
+
 def motion_csv():
     rows = [f"{0.01 * k:.2f},{0.3 * (1 - (k / 20 - 1) ** 2):.6f},{-0.2 * k / 40:.6f}" for k in range(41)]
     return "# unit: rad\n# time: s\ntime,swing,elbow\n" + "\n".join(rows) + "\n"
@@ -819,6 +902,7 @@ def own_targets():
     deck = bar_inp()
     reduce = ["--units", "mm-t-s", "--no-files", "--json", "--modes", "4"]
     seats = ["--interface", "SEAT_A", "--interface", "SEAT_B", "--at", "A=0,0,0", "--at", "B=800,0,0", "--material", "aluminium"]
+    hammer = {**base, "job.toml": RESPONSES, "hammer.csv": HAMMER, "hammer.uff": universal(False)}
     targets = [
         Target("robot", "robot.toml", base, [check, COMPARE, ["statics", "robot.toml", "--json"], ["modes", "robot.toml", "--json"]], True),
         Target("robot-loops", "robot.toml", {"beam.urdf": FOUR_BAR, "robot.toml": LOOPS, "motion.toml": FOUR_BAR_MOTION}, [check, COMPARE, ["statics", "robot.toml", "--json"], ["inspect", "robot.toml", "--json"]], True),
@@ -833,6 +917,13 @@ def own_targets():
         Target("new-xacro", "arm.xacro", {"arm.xacro": XACRO}, [["new", "arm.xacro", "-o", "made", "--force", "--no-run", "--mass", "20", "--json"]]),
         Target("measurements", "job.toml", {**base, "job.toml": MEASUREMENTS, "pulls.csv": PULLS}, [["identify", "robot.toml", "job.toml", "--no-files", "--json"]]),
         Target("measurement-table", "pulls.csv", {**base, "job.toml": MEASUREMENTS, "pulls.csv": PULLS}, [["identify", "robot.toml", "job.toml", "-o", "made", "--force", "--json"]]),
+        Target("responses", "job.toml", hammer, [IDENTIFY_RESPONSES]),
+        Target("response-universal", "hammer.uff", hammer, [IDENTIFY_RESPONSES]),
+        Target("response-universal-binary", "hammer.uff", {**hammer, "hammer.uff": universal(True)}, [IDENTIFY_RESPONSES]),
+        Target("response-table", "hammer.csv", hammer, [IDENTIFY_RESPONSES]),
+        Target("motion-samples", "motion.toml", {**base, "motion.toml": MOTION_SAMPLES}, [check, COMPARE], True),
+        Target("compensate-program", "part.src", {"part.src": COMPENSATED_PROGRAM}, [["compensate", str(ROOT / "robots/kr210"), "part.src", "--method", "static", "--limits", "tell", "-o", "made", "--force", "--no-recording", "--no-sweep", "--json"]]),
+        Target("compensate-loads", "loads.toml", {**base, "loads.toml": LOADS, "force.csv": TABLE}, [["compensate", "robot.toml", "motion.toml", "--loads", "loads.toml", "--no-files", "--no-sweep", "--iterations", "1", "--components", "z", "--limits", "tell", "--json"]], True),
         Target("plan-poses", "poses.csv", {**base, "poses.csv": "swing,elbow,finger\n0.1,0.2,0.01\n-0.3,0.5,0.0\n0.4,-0.2,0.02\n"}, [["identify", "robot.toml", "--plan", "2", "--poses", "poses.csv", "--no-files", "--json"]]),
         Target("sweep", "study.toml", {**base, "study.toml": SWEEP, "table.csv": "payload.mass,motion.speed\n1.0,1.0\n1.5,0.9\n"}, [["sweep", "study.toml", "-o", "made", "--force", "--threads", "1", "--json"], ["sweep", "study.toml", "--minimise", "--most-runs", "16", "-o", "made", "--force", "--threads", "1", "--json"]], True),
         Target("sweep-table", "table.csv", {**base, "study.toml": SWEEP_TABLE, "table.csv": "payload.mass,motion.speed\n1.0,1.0\n1.5,0.9\n"}, [["sweep", "study.toml", "-o", "made", "--force", "--threads", "1", "--json"]], True),

@@ -5,8 +5,10 @@ use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
 use comfy_table::CellAlignment;
-use flexarm::compensate::{CompensateRequest, Compensation, ErrorFigures, Method, ShaperKind, compensate_motion};
-use flexarm::{Motion, Robot, RunOptions};
+use flexarm::compensate::{
+    CompensateRequest, Compensation, ErrorFigures, LimitRule, Method, ShaperKind, compensate_motion,
+};
+use flexarm::{Motion, Robot, RunOptions, Scenario};
 
 use crate::args::{Cli, ModellingArgs, RobotArgs};
 use crate::failure::Failure;
@@ -21,9 +23,11 @@ Examples:
       flexarm compensate kr210 pick_and_place
   Sag alone, and the position of the tool alone:
       flexarm compensate kr210 pick_and_place --method static --components x,y,z
+  Under the force of a cutter, as JointTrajectory besides:
+      flexarm compensate kr210 milling_square --method static --loads cut.toml --write compensated.yaml
   Found with one model, judged with another:
       flexarm compensate my_robot motion.csv --plant my_other_robot
-Use it as any motion: flexarm compare kr210 out/kr210_compensated-001/compensated.csv; other formats: flexarm motion FILE ROBOT -o FILE";
+Use it as any motion: flexarm compare kr210 out/kr210_compensated-001/compensated.csv";
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum MethodName {
@@ -39,6 +43,16 @@ pub(crate) enum ShaperName {
     Zv,
     /// Three copies: forgives a frequency that is off, takes twice as long
     Zvd,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub(crate) enum LimitName {
+    /// The motion is slower; what time does not mend is an error
+    Slow,
+    /// An error that names all of them
+    Refuse,
+    /// They are listed, and the motion is written all the same
+    Tell,
 }
 
 #[derive(Debug, Args)]
@@ -65,6 +79,15 @@ pub(crate) struct CompensateArgs {
     /// Run the motion through a shaper of the arm's first mode before
     #[arg(long, value_enum)]
     pub(crate) shape: Option<ShaperName>,
+    /// Loads and payloads over time (TOML, see docs/loads.md) that act on the arm: forces of a process
+    #[arg(long, value_name = "FILE")]
+    pub(crate) loads: Option<PathBuf>,
+    /// What becomes of commands that pass a limit of position, speed, acceleration or torque which the motion itself keeps
+    #[arg(long, value_enum, default_value = "slow")]
+    pub(crate) limits: LimitName,
+    /// Greatest acceleration of each joint in order (rad/s² or m/s²) [default: not looked at]
+    #[arg(long, value_name = "A1,A2,...", value_delimiter = ',', allow_hyphen_values = true)]
+    pub(crate) accelerations: Vec<f64>,
     /// Another robot that judges: stiffness, links or drives that the first does not know
     #[arg(long, value_name = "ROBOT")]
     pub(crate) plant: Option<PathBuf>,
@@ -81,11 +104,18 @@ pub(crate) struct CompensateArgs {
     /// Folder of the new motion and the page [default: a new one in out/]
     #[arg(short, long, help_heading = "Files", value_name = "FOLDER")]
     pub(crate) output: Option<PathBuf>,
+    /// Write the new motion to this file too, by its ending: .csv (samples), .toml, .yaml or .json (JointTrajectory of ROS);
+    /// may be repeated
+    #[arg(long, help_heading = "Files", value_name = "FILE")]
+    pub(crate) write: Vec<PathBuf>,
+    /// No recording of the arm before and after
+    #[arg(long, help_heading = "Files")]
+    pub(crate) no_recording: bool,
     /// Write no files
-    #[arg(long, help_heading = "Files", conflicts_with = "output")]
+    #[arg(long, help_heading = "Files", conflicts_with_all = ["output", "write"])]
     pub(crate) no_files: bool,
-    /// Overwrite what is in the output folder
-    #[arg(long, help_heading = "Files", requires = "output")]
+    /// Overwrite what is there
+    #[arg(long, help_heading = "Files")]
     pub(crate) force: bool,
 }
 
@@ -135,10 +165,22 @@ pub(crate) fn run(cli: &Cli, args: &CompensateArgs) -> Result<ExitCode, Failure>
         }),
         plant,
         sweep: !args.no_sweep,
+        accelerations: args.accelerations.clone(),
+        limits: match args.limits {
+            LimitName::Refuse => LimitRule::Refuse,
+            LimitName::Slow => LimitRule::Slow,
+            LimitName::Tell => LimitRule::Tell,
+        },
         output: folder.path(),
+        motions: args.write.clone(),
+        recording: !args.no_recording,
         overwrite: args.force,
     };
-    let found = compensate_motion(&robot, &motion, &request)?;
+    let mut scenario = Scenario::new(motion);
+    if let Some(loads) = &args.loads {
+        scenario = scenario.with_loads_file(loads)?;
+    }
+    let found = compensate_motion(&robot, scenario, &request)?;
     if !cli.quiet {
         found.caveats.iter().for_each(|caveat| warning(&caveat.message));
     }
@@ -181,10 +223,26 @@ fn text(found: &Compensation) -> String {
     out += &lines(&t);
     let peaks: Vec<String> = found.model_peaks_m.iter().map(|peak| format!("{:.4}", 1e3 * peak)).collect();
     out += &format!("\npeak on the model after each iteration (mm): {}\n", peaks.join(", "));
-    for limit in &found.limits {
-        out += &format!("limit passed: {limit}\n");
+    if found.slowed > 1.0 {
+        out += &format!("the motion takes {:.4} times as long, so that limits are kept\n", found.slowed);
     }
-    for (what, file) in [("motion", &found.file), ("page", &found.page)] {
+    for limit in &found.limits {
+        out += &format!("limit passed: {}\n", limit.message);
+    }
+    for file in &found.files {
+        out += &format!("motion   {file}\n");
+    }
+    if let Some(program) = &found.program {
+        out += &format!(
+            "program: {} of {} targets corrected; at rest the tool is off by up to {:.4} mm before and {:.6} mm after\n",
+            program.corrected,
+            program.targets,
+            1e3 * program.before_m,
+            1e3 * program.residual_m
+        );
+        program.files.iter().for_each(|file| out += &format!("program  {file}\n"));
+    }
+    for (what, file) in [("motion", &found.file), ("view", &found.recording), ("page", &found.page)] {
         if let Some(file) = file {
             out += &format!("{what:<8} {file}\n");
         }

@@ -175,6 +175,12 @@ fn text(found: &Identification) -> String {
             if gear.told { "" } else { ": not told" }
         );
     }
+    for shape in &found.shapes {
+        out += &format!(
+            "{}: like mode {} by {:.4} (assurance), {:.4} before\n",
+            shape.reading, shape.mode, shape.assurance, shape.assurance_before
+        );
+    }
     for combination in &found.untold {
         let parts: Vec<String> = combination.iter().map(|w| format!("{:+.2} {}", w.weight, w.name)).collect();
         out += &format!("not told: {}\n", parts.join(" "));

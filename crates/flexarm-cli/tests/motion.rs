@@ -188,12 +188,14 @@ fn what_is_written_is_read_again_as_the_same_motion() {
     place.json(&arguments);
     place.refused(&["motion", "swing.toml", "-o", "a.xlsx"], &["-o writes by the ending of the name", ".yaml", "xlsx"]);
     place.refused(&["motion", "swing.toml", "-o", "b.csv", "--rate", "0"], &["sampling rate 0 Hz"]);
-    // Samples are no waypoints.
+    // Samples are no waypoints: they are written as samples.
     place.write("sine.csv", "time,swing\n0,0\n0.5,0.3\n1,0.5\n1.5,0.3\n2,0\n");
-    place.refused(
-        &["motion", "sine.csv", "robot.toml", "-o", "sine.toml"],
-        &["not made of quintic moves", "write it as samples"],
-    );
+    let first = place.json(&["motion", "sine.csv", "robot.toml", "-o", "sine.toml"]);
+    let again = place.json(&["motion", "sine.toml", "robot.toml"]);
+    for key in ["upper", "speed"] {
+        let [a, b] = [&first, &again].map(|found| found["peaks"][0][key].as_f64().unwrap());
+        assert!((a - b).abs() < 1e-9, "{key}: {a} {b}");
+    }
 }
 
 #[test]

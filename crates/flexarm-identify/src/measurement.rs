@@ -6,10 +6,11 @@
 
 use flexarm_kinematics::{Frame, Pose, SpatialInertia, Wrench, rotation_vector};
 use flexarm_stepping::{OperatingPoint, StepError};
-use nalgebra::{DMatrix, DVector, Matrix3xX, Rotation3, Translation3, Vector3};
+use nalgebra::{Complex, DMatrix, DVector, Matrix3xX, Rotation3, Translation3, Vector3};
 
 use crate::least_squares::Residuals;
 use crate::parameter::{Parameter, Plant};
+use crate::response::{Answer, Probe, StructureSlopes, structure_slopes};
 use crate::sensitivity::{frequency_slopes, tool_slopes};
 
 /// What the tool carries and what pulls at it.
@@ -67,6 +68,90 @@ pub struct Reading {
     pub kind: ReadingKind,
 }
 
+/// How a measured response is compared with the arm's.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Form {
+    /// Logarithm of the magnitude, and phase (rad): what is off by a part of itself counts alike everywhere.
+    #[default]
+    Logarithmic,
+    /// Real and imaginary part: what is large counts.
+    Complex,
+}
+
+/// The curve of a hammer test.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MeasuredResponse {
+    /// What the tool carries; a wrench does not count.
+    pub load: LoadCase,
+    /// What is watched.
+    pub watched: Probe,
+    /// What is hit.
+    pub hit: Probe,
+    /// What is measured per newton.
+    pub answer: Answer,
+    /// How it is compared.
+    pub form: Form,
+    /// Frequencies (rad/s), values in SI units, and the deviations of the two numbers that each becomes.
+    pub points: Vec<(f64, Complex<f64>, [f64; 2])>,
+}
+
+impl MeasuredResponse {
+    /// The two numbers of a value at a point: of a phase that one within half a turn of the measured.
+    fn numbers(&self, k: usize, value: Complex<f64>) -> [f64; 2] {
+        let measured = self.points[k].1;
+        match self.form {
+            Form::Complex => [value.re, value.im],
+            Form::Logarithmic => [value.norm().ln(), measured.arg() + (value / measured).arg()],
+        }
+    }
+
+    /// Change of the same two numbers with that of the value.
+    fn number_slopes(&self, value: Complex<f64>, slope: Complex<f64>) -> [f64; 2] {
+        match self.form {
+            Form::Complex => [slope.re, slope.im],
+            Form::Logarithmic => {
+                let part = slope / value;
+                [part.re, part.im]
+            }
+        }
+    }
+}
+
+/// The shape of a mode as it was seen at some points.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MeasuredShape {
+    /// What the tool carries; a wrench does not count.
+    pub load: LoadCase,
+    /// Where and along which directions it was seen.
+    pub probes: Vec<Probe>,
+    /// Amplitudes there, in any unit and with any sign in common.
+    pub amplitudes: DVector<f64>,
+    /// Deviation of each amplitude, as a part of the length of all of them.
+    pub std: f64,
+}
+
+impl MeasuredShape {
+    /// The measured amplitudes with length 1.
+    fn unit(&self) -> DVector<f64> {
+        self.amplitudes.normalize()
+    }
+
+    /// The mode of the arm that is most like it: its number, its modal assurance criterion `(aᵀb)²` of unit vectors a and b, and its amplitudes at the probes, with
+    /// length 1 and the sign of the measured.
+    fn likeliest(&self, found: &StructureSlopes) -> Option<(usize, f64, DVector<f64>)> {
+        let measured = self.unit();
+        let of = |j: usize| {
+            let phi = found.shapes.column(j);
+            let seen = DVector::from_iterator(self.probes.len(), found.structure.rows.iter().map(|row| (row * phi)[0]));
+            let seen = seen.try_normalize(0.0)?;
+            let along = seen.dot(&measured);
+            Some((j, along * along, if along < 0.0 { -seen } else { seen }))
+        };
+        let all = (0..found.omega2.len()).filter_map(of);
+        all.max_by(|a, b| a.1.total_cmp(&b.1))
+    }
+}
+
 /// Kinds of readings.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ReadingKind {
@@ -110,6 +195,10 @@ pub enum ReadingKind {
         /// Number of the mode, from 0 with the lowest; Hz.
         rows: Vec<Row<usize>>,
     },
+    /// A frequency response, drives locked.
+    Response(MeasuredResponse),
+    /// A mode's shape, drives locked. The arm's own is that which is most like it.
+    Shape(MeasuredShape),
 }
 
 impl Reading {
@@ -120,6 +209,8 @@ impl Reading {
             ReadingKind::Place { .. } => 3,
             ReadingKind::Known { .. } => 1,
             ReadingKind::Frequencies { rows, .. } => rows.len(),
+            ReadingKind::Response(response) => 2 * response.points.len(),
+            ReadingKind::Shape(shape) => shape.probes.len(),
         }
     }
 
@@ -130,6 +221,8 @@ impl Reading {
             ReadingKind::Place { std, .. } => std.iter().copied().collect(),
             ReadingKind::Known { std, .. } => vec![*std],
             ReadingKind::Frequencies { rows, .. } => rows.iter().map(|row| row.std).collect(),
+            ReadingKind::Response(response) => response.points.iter().flat_map(|(.., std)| *std).collect(),
+            ReadingKind::Shape(shape) => vec![shape.std; shape.probes.len()],
         }
     }
 }
@@ -335,9 +428,31 @@ impl MeasuredArm<'_> {
                 ReadingKind::Place { value, .. } => value.iter().copied().collect(),
                 ReadingKind::Known { value, .. } => vec![*value],
                 ReadingKind::Frequencies { rows, .. } => rows.iter().map(|row| row.value).collect(),
+                ReadingKind::Response(response) => {
+                    (0..response.points.len()).flat_map(|k| response.numbers(k, response.points[k].1)).collect()
+                }
+                ReadingKind::Shape(shape) => shape.unit().iter().copied().collect(),
             }
         };
         self.measurements.readings.iter().flat_map(of).collect()
+    }
+
+    /// Of each measured shape its reading's number, the mode of the arm that is most like it (from 0), and how much: the modal assurance
+    /// criterion, from 0 to 1.
+    ///
+    /// # Errors
+    /// [`NoAnswer`].
+    pub fn assurances(&self, unknowns: &DVector<f64>) -> Result<Vec<(usize, usize, f64)>, NoAnswer> {
+        let rooms = self.rooms(unknowns);
+        let mut all = Vec::new();
+        for (number, reading) in self.measurements.readings.iter().enumerate() {
+            let ReadingKind::Shape(shape) = &reading.kind else { continue };
+            let plant = rooms.loaded(&shape.load.carried);
+            let found = structure_slopes(&plant, &[], &reading.q, &shape.probes);
+            let found = found.map_err(|source| NoAnswer { reading: reading.name.clone(), source })?;
+            all.extend(shape.likeliest(&found).map(|(mode, assurance, _)| (number, mode, assurance)));
+        }
+        Ok(all)
     }
 
     fn rooms(&self, unknowns: &DVector<f64>) -> Workspaces<'_> {
@@ -375,14 +490,75 @@ impl MeasuredArm<'_> {
                 let parameters = if slopes { self.parameters } else { &[] };
                 let found = frequency_slopes(&plant, parameters, &reading.q).map_err(named)?;
                 let values = rows.iter().map(|row| found.hz.get(row.of).copied().unwrap_or(f64::NAN)).collect();
-                let columns = if slopes { self.parameters.len() + own.len() } else { 0 };
-                let slopes = DMatrix::from_fn(rows.len(), columns, |i, j| match j < parameters.len() {
-                    true => found.slopes[(rows[i].of, j)],
-                    false => 0.0,
-                });
+                let slopes = self.with_own(rows.len(), own.len(), slopes, |i, j| found.slopes[(rows[i].of, j)]);
                 Ok(Block { values, slopes })
             }
+            ReadingKind::Response(measured) => {
+                self.response(rooms, &reading.q, measured, own.len(), slopes).map_err(named)
+            }
+            ReadingKind::Shape(measured) => self.shape(rooms, &reading.q, measured, own.len(), slopes).map_err(named),
         }
+    }
+
+    /// Derivatives by the arm's parameters beside zeros for what belongs to the measurements.
+    fn with_own(&self, rows: usize, own: usize, slopes: bool, slope: impl Fn(usize, usize) -> f64) -> DMatrix<f64> {
+        let p = self.parameters.len();
+        let columns = if slopes { p + own } else { 0 };
+        DMatrix::from_fn(rows, columns, |i, j| if j < p { slope(i, j) } else { 0.0 })
+    }
+
+    fn response(
+        &self,
+        rooms: &Workspaces<'_>,
+        q: &[f64],
+        measured: &MeasuredResponse,
+        own: usize,
+        slopes: bool,
+    ) -> Result<Block, StepError> {
+        let plant = rooms.loaded(&measured.load.carried);
+        let parameters = if slopes { self.parameters } else { &[] };
+        let probes = [measured.watched.clone(), measured.hit.clone()];
+        let omega: Vec<f64> = measured.points.iter().map(|(omega, ..)| *omega).collect();
+        let found = structure_slopes(&plant, parameters, q, &probes)?.response(0, 1, measured.answer, &omega)?;
+        let values = found.values.iter().enumerate().flat_map(|(k, value)| measured.numbers(k, *value)).collect();
+        let slope = |i: usize, j: usize| {
+            let k = i / 2;
+            measured.number_slopes(found.values[k], found.slopes[(k, j)])[i % 2]
+        };
+        Ok(Block { values, slopes: self.with_own(2 * omega.len(), own, slopes, slope) })
+    }
+
+    fn shape(
+        &self,
+        rooms: &Workspaces<'_>,
+        q: &[f64],
+        measured: &MeasuredShape,
+        own: usize,
+        slopes: bool,
+    ) -> Result<Block, StepError> {
+        let plant = rooms.loaded(&measured.load.carried);
+        let parameters = if slopes { self.parameters } else { &[] };
+        let found = structure_slopes(&plant, parameters, q, &measured.probes)?;
+        let none = || StepError::Singular { matrix: "mode shapes at the measured points (they do not move)", t: 0.0 };
+        let (mode, _, seen) = measured.likeliest(&found).ok_or_else(none)?;
+        let all = found.shape_slopes(mode);
+        let changes: Vec<DVector<f64>> = (0..parameters.len())
+            .map(|p| {
+                let raw = |shape: &DVector<f64>| {
+                    DVector::from_iterator(seen.len(), found.structure.rows.iter().map(|row| (row * shape)[0]))
+                };
+                let phi = found.shapes.column(mode).into_owned();
+                let turned = found.slopes[p].rows.iter().map(|row| (row * &phi)[0]);
+                let change = raw(&all[p]) + DVector::from_iterator(seen.len(), turned);
+                let amplitude = raw(&phi);
+                // Of a vector of unit length, across it.
+                let sign = amplitude.dot(&seen).signum();
+                let change = change * (sign / amplitude.norm());
+                &change - &seen * seen.dot(&change)
+            })
+            .collect();
+        let slopes = self.with_own(seen.len(), own, slopes, |i, j| changes[j][i]);
+        Ok(Block { values: seen.iter().copied().collect(), slopes })
     }
 
     /// A target seen from an instrument.

@@ -32,6 +32,8 @@ pub enum Effect {
     /// Factor on the stiffness of springs. On one coordinate of a spring K becomes `S K S` with `√factor` there, so that it stays
     /// symmetric and positive definite.
     Stiffness(Vec<Place>),
+    /// Factor on the damping of springs, whatever describes it.
+    Damping(Vec<usize>),
     /// Mass (kg) on a body with inertia in proportion: `per_kg` about Bo, B axes.
     Mass {
         /// The body.
@@ -50,7 +52,7 @@ pub struct Parameter {
     pub unit: String,
     /// Value in the arm as it is.
     pub initial: f64,
-    /// Standard deviation of what is known before: of the logarithm for stiffnesses, in the unit else.
+    /// Standard deviation of what is known before: of the logarithm for stiffnesses and dampings, in the unit else.
     pub prior: f64,
     /// What it does.
     pub effect: Effect,
@@ -59,7 +61,7 @@ pub struct Parameter {
 impl Parameter {
     /// Whether the search goes along its logarithm, so that it stays positive.
     pub fn is_logarithmic(&self) -> bool {
-        matches!(self.effect, Effect::Stiffness(_))
+        matches!(self.effect, Effect::Stiffness(_) | Effect::Damping(_))
     }
 
     /// Value at a coordinate of the search, which is 0 at the initial value.
@@ -88,6 +90,12 @@ impl Plant {
                 Effect::Stiffness(places) => {
                     for place in places {
                         stiffen(&mut plant.springs[place.spring], place.coordinate, x.exp());
+                    }
+                }
+                Effect::Damping(springs) => {
+                    for spring in springs {
+                        let spring = &mut plant.springs[*spring];
+                        spring.damping = spring.damping.scaled(x.exp());
                     }
                 }
                 Effect::Mass { body, per_kg } => plant = plant.carrying(*body, &scaled(per_kg, *x)),

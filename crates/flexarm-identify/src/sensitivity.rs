@@ -8,7 +8,7 @@
 
 use flexarm_kinematics::{Frame, Wrench};
 use flexarm_stepping::{FlexibleArm, OperatingPoint, StepError, Tangents};
-use nalgebra::{DMatrix, DVector, Matrix6xX, SymmetricEigen};
+use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX, SymmetricEigen};
 
 use crate::parameter::{Effect, Parameter, Plant, scaled, slope_of};
 
@@ -16,7 +16,7 @@ use crate::parameter::{Effect, Parameter, Plant, scaled, slope_of};
 const DIFFERENCE: f64 = 1e-3;
 
 /// `dr/dx`: change of the unbalanced forces on the elastic coordinates per parameter, n×p.
-fn force_slopes(at: &mut OperatingPoint, parameters: &[Parameter]) -> Result<DMatrix<f64>, StepError> {
+pub(crate) fn force_slopes(at: &mut OperatingPoint, parameters: &[Parameter]) -> Result<DMatrix<f64>, StepError> {
     let n = at.deflections().len();
     let mut slopes = DMatrix::zeros(n, parameters.len());
     for (k, parameter) in parameters.iter().enumerate() {
@@ -36,6 +36,7 @@ fn force_slopes(at: &mut OperatingPoint, parameters: &[Parameter]) -> Result<DMa
                     }
                 }
             }
+            Effect::Damping(_) => {}
             Effect::Mass { body, per_kg } => {
                 // Forces are linear in a mass: a difference of any size is exact.
                 let (mut with, mut without) = (DVector::zeros(n), DVector::zeros(n));
@@ -98,9 +99,12 @@ pub fn frequency_slopes(plant: &Plant, parameters: &[Parameter], q: &[f64]) -> R
     let mut slopes = DMatrix::zeros(omega2.len(), parameters.len());
     for (k, parameter) in parameters.iter().enumerate() {
         let moved = -factor.solve(&forces.column(k));
-        let (dK, dM) = along(&arm, &plant.tool, at.coordinates(), &moved);
-        let (eK, eM) = explicit(&arm, &plant.tool, parameter, at.coordinates(), &here);
-        let (dK, dM) = (dK + eK, dM + eM);
+        let change = along(&arm, at.coordinates(), &moved, |q| {
+            let at = Tangents::at(&arm, &plant.tool, &none, q);
+            vec![at.K, at.M]
+        });
+        let (eK, eM) = explicit(&arm, &plant.tool, &none, parameter, at.coordinates(), &here);
+        let (dK, dM) = (&change[0] + eK, &change[1] + eM);
         for (i, w2) in omega2.iter().enumerate() {
             let phi = shapes.column(i);
             let slope = phi.dot(&(&dK * phi)) - w2 * phi.dot(&(&dM * phi));
@@ -111,7 +115,7 @@ pub fn frequency_slopes(plant: &Plant, parameters: &[Parameter], q: &[f64]) -> R
 }
 
 /// Squares of the natural frequencies, ascending, and shapes with `φᵀ M φ = 1`.
-fn eigen(at: &Tangents) -> Result<(Vec<f64>, DMatrix<f64>), StepError> {
+pub(crate) fn eigen(at: &Tangents) -> Result<(Vec<f64>, DMatrix<f64>), StepError> {
     let singular = |matrix| StepError::Singular { matrix, t: 0.0 };
     let K = (&at.K + at.K.transpose()) * 0.5;
     let L = K.cholesky().ok_or_else(|| singular("static stiffness (with the effect of weight)"))?.unpack();
@@ -136,29 +140,67 @@ fn eigen(at: &Tangents) -> Result<(Vec<f64>, DMatrix<f64>), StepError> {
     Ok((omega2, shapes))
 }
 
-/// Change of stiffness and mass as the equilibrium moves by `de` per unit.
-fn along(arm: &FlexibleArm, tool: &Frame, q: &DVector<f64>, de: &DVector<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
+/// Change of matrices that depend on the coordinates as the elastic ones move by `de` per unit: central differences of fourth order.
+pub(crate) fn along(
+    arm: &FlexibleArm,
+    q: &DVector<f64>,
+    de: &DVector<f64>,
+    look: impl Fn(&DVector<f64>) -> Vec<DMatrix<f64>>,
+) -> Vec<DMatrix<f64>> {
     let (m, n) = (arm.model.n_actuated(), de.len());
     let size = de.amax();
     if size == 0.0 {
-        return (DMatrix::zeros(n, n), DMatrix::zeros(n, n));
+        return look(q).into_iter().map(|here| here * 0.0).collect();
     }
     let h = DIFFERENCE / size;
     let shifted = |steps: f64| {
         let mut moved = q.clone();
         moved.rows_mut(m, n).axpy(steps * h, de, 1.0);
-        Tangents::at(arm, tool, &Wrench::zeros(), &moved)
+        look(&moved)
     };
     let [a, b, c, d] = [-2.0, -1.0, 1.0, 2.0].map(shifted);
-    let slope =
-        |a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>, d: &DMatrix<f64>| ((c - b) * 8.0 - (d - a)) / (12.0 * h);
-    (slope(&a.K, &b.K, &c.K, &d.K), slope(&a.M, &b.M, &c.M, &d.M))
+    (0..a.len()).map(|k| ((&c[k] - &b[k]) * 8.0 - (&d[k] - &a[k])) / (12.0 * h)).collect()
+}
+
+/// Derivatives of the Cartesian compliance of the tool, drives locked, at a pose that is solved: one 6×6 per parameter, per unit of
+/// its coordinate (m/N, rad/N; m/(N m), rad/(N m)).
+///
+/// * `F_T_W`: the wrench with which it was solved.
+///
+/// # Errors
+/// [`StepError::Singular`] where a motion has no stiffness.
+pub fn compliance_slopes(
+    at: &mut OperatingPoint,
+    F_T_W: &Wrench,
+    parameters: &[Parameter],
+) -> Result<Vec<Matrix6<f64>>, StepError> {
+    let forces = force_slopes(at, parameters)?;
+    let (arm, tool, q) = (at.arm().clone(), at.tool().clone(), at.coordinates().clone());
+    let here = Tangents::at(&arm, &tool, F_T_W, &q);
+    let singular = || StepError::Singular { matrix: "static stiffness (with the effect of weight and load)", t: 0.0 };
+    let solve = |K: &DMatrix<f64>, B: &DMatrix<f64>| K.clone().lu().solve(B).ok_or_else(singular);
+    let J = DMatrix::from_fn(6, here.J.ncols(), |i, j| here.J[(i, j)]);
+    let (U, Y) = (solve(&here.K, &J.transpose())?, solve(&here.K.transpose(), &J.transpose())?);
+    let look = |q: &DVector<f64>| {
+        let at = Tangents::at(&arm, &tool, F_T_W, q);
+        vec![DMatrix::from_fn(6, at.J.ncols(), |i, j| at.J[(i, j)]), at.K]
+    };
+    let mut found = Vec::with_capacity(parameters.len());
+    for (k, parameter) in parameters.iter().enumerate() {
+        let moved = -solve(&here.K, &forces.columns(k, 1).into_owned())?.column(0);
+        let change = along(&arm, &q, &moved, look);
+        let (eK, _) = explicit(&arm, &tool, F_T_W, parameter, &q, &here);
+        let dC = &change[0] * &U + Y.tr_mul(&change[0].transpose()) - Y.tr_mul(&((&change[1] + eK) * &U));
+        found.push(Matrix6::from_fn(|i, j| dC[(i, j)]));
+    }
+    Ok(found)
 }
 
 /// Change of stiffness and mass by the parameter itself.
-fn explicit(
+pub(crate) fn explicit(
     arm: &FlexibleArm,
     tool: &Frame,
+    F_T_W: &Wrench,
     parameter: &Parameter,
     q: &DVector<f64>,
     here: &Tangents,
@@ -178,8 +220,9 @@ fn explicit(
             }
             (dK, DMatrix::zeros(n, n))
         }
+        Effect::Damping(_) => (DMatrix::zeros(n, n), DMatrix::zeros(n, n)),
         Effect::Mass { body, per_kg } => {
-            let heavier = Tangents::at(&carrying(arm, *body, per_kg), tool, &Wrench::zeros(), q);
+            let heavier = Tangents::at(&carrying(arm, *body, per_kg), tool, F_T_W, q);
             (heavier.K - &here.K, heavier.M - &here.M)
         }
     }

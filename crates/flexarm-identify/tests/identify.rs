@@ -89,6 +89,7 @@ fn read(plant: &Plant, parameters: &[Parameter], truth: &[f64], from: &Measureme
             }
             ReadingKind::Known { value, std, .. } => *value = next(*std, draw),
             ReadingKind::Frequencies { rows, .. } => rows.iter_mut().for_each(|row| row.value = next(row.std, draw)),
+            other => panic!("not drawn here: {other:?}"),
         }
     }
     noisy

@@ -39,6 +39,33 @@ fn parameters(plant: &Plant) -> Vec<Parameter> {
     ]
 }
 
+/// Two dampings, one of each kind that springs have.
+fn with_damping(plant: &mut Plant) -> Vec<Parameter> {
+    plant.springs[1].damping = Damping::Rayleigh(0.4, 3e-4);
+    let damping = |name: &str, spring| Parameter {
+        name: name.into(),
+        unit: "1".into(),
+        initial: 1.0,
+        prior: 0.7,
+        effect: Effect::Damping(vec![spring]),
+    };
+    let mut all = parameters(plant);
+    all.extend([damping("modal damping of lower", 0), damping("Rayleigh damping of upper", 1)]);
+    all
+}
+
+/// A blow beside the tool, seen on the upper link.
+fn probes(plant: &Plant) -> [Probe; 2] {
+    let moved = |x: f64, y: f64, z: f64| {
+        let frame = plant.tool.clone();
+        flexarm_kinematics::Frame { X_BF: frame.X_BF * Pose::translation(x, y, z), ..frame }
+    };
+    [
+        Probe { frame: moved(0.1, 0.0, -0.2), direction: Vector3::new(0.6, 0.0, 0.8) },
+        Probe { frame: moved(0.0, 0.15, 0.05), direction: Vector3::new(0.0, -1.0, 0.0) },
+    ]
+}
+
 /// Derivative by differences of sixth order.
 fn richardson(h: f64, f: impl Fn(f64) -> DVector<f64>) -> DVector<f64> {
     let d = |h: f64| (f(h) - f(-h)) / (2.0 * h);
@@ -160,5 +187,141 @@ fn every_row_of_every_kind_of_reading_has_the_derivatives_of_its_residual() {
         let error = (J.column(k) - &truth).amax() / truth.amax();
         eprintln!("unknown {k}: {error:.1e}");
         assert!(error < 1e-8, "unknown {k}: {error:e}");
+    }
+}
+
+/// Truth: the linear system of the arm from its own matrices, as `flexarm response` solves it.
+#[test]
+fn a_response_is_that_of_the_linearised_arm() {
+    let mut plant = plant();
+    with_damping(&mut plant);
+    let probes = probes(&plant);
+    let arm = plant.held(&POSE).unwrap();
+    let at = |probe: &Probe| flexarm_stepping::linearise(&arm, &probe.frame, &Wrench::zeros(), 0.0).unwrap();
+    let (watched, hit) = (at(&probes[0]), at(&probes[1]));
+    let row = |J: &nalgebra::Matrix6xX<f64>, d: &Vector3<f64>| {
+        DVector::from_fn(J.ncols(), |j, _| nalgebra::Complex::new((0..3).map(|c| d[c] * J[(c, j)]).sum(), 0.0))
+    };
+    let omega = [3.0, 9.0, 25.0, 60.0];
+    let found =
+        structure_slopes(&plant, &[], &POSE, &probes).unwrap().response(0, 1, Answer::Accelerance, &omega).unwrap();
+    for (w, value) in omega.iter().zip(&found.values) {
+        let n = watched.K.nrows();
+        let Z = DMatrix::from_fn(n, n, |i, j| {
+            nalgebra::Complex::new(watched.K[(i, j)] - w * w * watched.M[(i, j)], w * watched.D[(i, j)])
+        });
+        let u = Z.lu().solve(&row(&hit.J, &probes[1].direction)).unwrap();
+        let truth = row(&watched.J, &probes[0].direction).dot(&u) * (-w * w);
+        assert!((value - truth).norm() < 1e-9 * truth.norm(), "{value} {truth}");
+    }
+}
+
+#[test]
+fn responses_and_shapes_change_with_each_parameter_as_differences_say() {
+    let mut plant = plant();
+    let parameters = with_damping(&mut plant);
+    let probes = probes(&plant);
+    let f =
+        structure_slopes(&plant, &[], &POSE, &probes).unwrap().omega2.iter().map(|w2| w2.sqrt()).collect::<Vec<_>>();
+    // Below, at and between resonances.
+    let omega = [0.5 * f[0], f[0], 1.02 * f[1], 0.5 * (f[1] + f[2]), f[2], 1.3 * f[3]];
+    let found = structure_slopes(&plant, &parameters, &POSE, &probes).unwrap();
+    let response = found.response(0, 1, Answer::Mobility, &omega).unwrap();
+    for (k, parameter) in parameters.iter().enumerate() {
+        let step = if parameter.is_logarithmic() { 0.002 } else { 0.1 };
+        let values = |x: f64| {
+            let plant = plant.with(std::slice::from_ref(parameter), &[x]);
+            let again = structure_slopes(&plant, &[], &POSE, &probes).unwrap();
+            let H = again.response(0, 1, Answer::Mobility, &omega).unwrap().values;
+            DVector::from_iterator(2 * H.len(), H.iter().flat_map(|h| [h.re, h.im]))
+        };
+        let truth = richardson(step, values);
+        let own = DVector::from_iterator(
+            2 * omega.len(),
+            (0..omega.len()).flat_map(|i| [response.slopes[(i, k)].re, response.slopes[(i, k)].im]),
+        );
+        let error = (&own - &truth).amax() / truth.amax();
+        eprintln!("{}: response {error:.1e} of {:.1e}", parameter.name, truth.amax());
+        assert!(error < 1e-8, "{}: {error:e}", parameter.name);
+        let shape = |x: f64| {
+            let plant = plant.with(std::slice::from_ref(parameter), &[x]);
+            let shape = structure_slopes(&plant, &[], &POSE, &[]).unwrap().shapes.column(1).into_owned();
+            let sign = shape.dot(&found.shapes.column(1)).signum();
+            shape * sign
+        };
+        let truth = richardson(step, shape);
+        let own = &found.shape_slopes(1)[k];
+        let error = (own - &truth).amax() / truth.amax().max(1e-3 * found.shapes.column(1).amax());
+        eprintln!("{}: shape {error:.1e} of {:.1e}", parameter.name, truth.amax());
+        assert!(error < 1e-8, "{}: {error:e}", parameter.name);
+    }
+}
+
+#[test]
+fn the_compliance_changes_with_each_parameter_as_differences_say() {
+    let plant = plant();
+    let parameters = parameters(&plant);
+    for moment in [0.0, 60.0] {
+        let load = Wrench::new(Vector3::new(90.0, 50.0, -200.0), Vector3::new(moment, -moment, 0.5 * moment));
+        let solved = |plant: &Plant| {
+            let mut at = OperatingPoint::new(plant.held(&POSE).unwrap(), plant.tool.clone());
+            at.solve(&POSE, &load).unwrap();
+            at
+        };
+        let slopes = compliance_slopes(&mut solved(&plant), &load, &parameters).unwrap();
+        for (k, parameter) in parameters.iter().enumerate() {
+            let C = |x: f64| {
+                let C = solved(&plant.with(std::slice::from_ref(parameter), &[x])).compliance();
+                DVector::from_column_slice(C.as_slice())
+            };
+            let truth = richardson(step_of(parameter), C);
+            let error = (DVector::from_column_slice(slopes[k].as_slice()) - &truth).amax() / truth.amax();
+            eprintln!("{}: compliance {error:.1e} of {:.1e}", parameter.name, truth.amax());
+            assert!(error < 1e-8, "{}: {error:e}", parameter.name);
+        }
+    }
+}
+
+#[test]
+fn rows_of_responses_and_shapes_have_the_derivatives_of_their_residuals() {
+    let mut plant = plant();
+    let parameters = with_damping(&mut plant);
+    let carried = SpatialInertia::from_com(12.0, &Vector3::new(0.0, 0.1, 0.2), &(Matrix3::identity() * 0.1));
+    let heavy = LoadCase { carried, ..LoadCase::none() };
+    let [watched, hit] = probes(&plant);
+    let response = |form| {
+        let value = |k: usize| nalgebra::Complex::from_polar(1e-3 * (k as f64 + 1.0), k as f64 - 1.0);
+        ReadingKind::Response(MeasuredResponse {
+            load: heavy.clone(),
+            watched: watched.clone(),
+            hit: hit.clone(),
+            answer: Answer::Accelerance,
+            form,
+            points: [4.0, 11.0, 19.0].iter().enumerate().map(|(k, w)| (*w, value(k), [0.05, 0.03])).collect(),
+        })
+    };
+    let shape = ReadingKind::Shape(MeasuredShape {
+        load: heavy.clone(),
+        probes: vec![watched.clone(), hit.clone(), Probe { direction: Vector3::x(), ..hit.clone() }],
+        amplitudes: DVector::from_vec(vec![1.0, -2.0, 0.5]),
+        std: 0.05,
+    });
+    let kinds = [response(Form::Logarithmic), response(Form::Complex), shape];
+    let readings = kinds.map(|kind| Reading { name: "a".into(), q: POSE.to_vec(), kind }).to_vec();
+    let measurements = Measurements { readings, ..Measurements::default() };
+    let arm = MeasuredArm { plant: &plant, parameters: &parameters, measurements: &measurements };
+    let at = DVector::from_fn(parameters.len(), |k, _| 0.05 * (k as f64 + 1.0).sin());
+    let mut J = DMatrix::zeros(0, 0);
+    arm.evaluate(&at, Some(&mut J)).unwrap();
+    for (k, parameter) in parameters.iter().enumerate() {
+        let residuals = |x: f64| {
+            let mut moved = at.clone();
+            moved[k] += x;
+            arm.evaluate(&moved, None).unwrap()
+        };
+        let truth = richardson(if parameter.is_logarithmic() { 0.004 } else { 0.2 }, residuals);
+        let error = (J.column(k) - &truth).amax() / truth.amax();
+        eprintln!("{}: {error:.1e}", parameter.name);
+        assert!(error < 1e-8, "{}: {error:e}", parameter.name);
     }
 }

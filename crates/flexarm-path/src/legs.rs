@@ -147,7 +147,7 @@ impl<'m> Legs<'m> {
     }
 
     /// The way of one move; nothing if the arm is there already.
-    fn leg(&mut self, of: &Move, start: &mut Start) -> Result<Option<Leg>, PathError> {
+    pub(crate) fn leg(&mut self, of: &Move, start: &mut Start) -> Result<Option<Leg>, PathError> {
         if of.kind == MoveKind::Joint {
             return self.joint_leg(of, start);
         }
@@ -302,7 +302,7 @@ impl<'m> Legs<'m> {
     }
 
     /// Pieces of a spline through the targets of moves that follow each other.
-    fn spline(&mut self, group: &[&Move], start: &mut Start) -> Result<Vec<Leg>, PathError> {
+    pub(crate) fn spline(&mut self, group: &[&Move], start: &mut Start) -> Result<Vec<Leg>, PathError> {
         let frame = self.tool_frame(group[0]);
         let mut poses = vec![self.pose(&frame, &start.q)];
         let mut owners: Vec<&Move> = Vec::new();
@@ -328,7 +328,7 @@ impl<'m> Legs<'m> {
 }
 
 /// Moves from `k` on that are knots of one spline: same tool and base kinds of moves that follow each other.
-fn spline_group(items: &[Item], k: usize) -> Vec<&Move> {
+pub(crate) fn spline_group(items: &[Item], k: usize) -> Vec<&Move> {
     let knot = |item: &'_ Item| matches!(item, Item::Move(of) if of.kind == MoveKind::Spline);
     let mut group: Vec<&Move> = Vec::new();
     for item in items[k..].iter().take_while(|item| knot(item)) {

@@ -15,6 +15,7 @@ mod plan;
 pub mod program;
 mod route;
 mod schedule;
+mod targets;
 pub mod time_law;
 
 pub use curve::{ArcError, TURN_LENGTH, ToolCurve, ToolJet};
@@ -22,3 +23,4 @@ pub use follow::{Blocked, Follower, GuidedJoint, JointJet, ToolWay, coordinates_
 pub use plan::{
     ControllerAxis, JointBounds, PathError, PathOptions, Planned, PlannedMove, ProgramArm, Slowed, SlowedBy, plan,
 };
+pub use targets::{base_of, target_at, target_joints, tool_of};

@@ -101,6 +101,18 @@ impl ProgramArm<'_> {
         }
     }
 
+    /// Values of the controller's axes for all coordinates: the inverse of [`ProgramArm::set_axes`].
+    pub fn axis_values(&self, q: &DVector<f64>) -> Vec<f64> {
+        let mut values: Vec<f64> = Vec::with_capacity(self.axes.len());
+        for (n, &k) in self.axes.iter().enumerate() {
+            let axis = self.controller.get(n).unwrap_or(&ControllerAxis::SAME);
+            // An axis is relative to one before it.
+            let other = axis.relative.and_then(|(other, factor)| Some(factor * values.get(other)?));
+            values.push((q[k] - axis.zero - other.unwrap_or(0.0)) / axis.sense);
+        }
+        values
+    }
+
     /// Zeros and senses of six joints, for words that speak of the controller's axes. What is measured against another axis
     /// decides none of them.
     pub(crate) fn controller_axes(&self, joints: [usize; 6]) -> ControllerAxes {

@@ -7,7 +7,9 @@ use flexarm_kinematics::{
     forward_kinematics, inverse_kinematics_with_rule, kuka_turn,
 };
 use flexarm_path::program::{Blend, Configuration, Item, Move, MoveKind, Program, Speed, Target};
-use flexarm_path::{ControllerAxis, JointBounds, PathError, PathOptions, Planned, ProgramArm, SlowedBy, plan};
+use flexarm_path::{
+    ControllerAxis, JointBounds, PathError, PathOptions, Planned, ProgramArm, SlowedBy, plan, target_at, target_joints,
+};
 use flexarm_spatial::{Pose, rotation_vector};
 use flexarm_testkit::reference_arm;
 use nalgebra::{DVector, Rotation3, Translation3, Vector3};
@@ -565,4 +567,53 @@ fn an_axis_that_is_counted_against_the_horizontal_keeps_the_forearm_level_while_
     };
     let tilted = (forearm(-1.2).inverse() * forearm(-0.3)).scaled_axis().norm();
     assert!(tilted < 1e-12, "{tilted:.1e}");
+}
+
+/// Truth: the joints that the targets were made of, with blends, knots of a spline and coupled axes of the controller.
+#[test]
+fn joints_at_targets_are_those_that_the_targets_were_made_of_and_make_them_again() {
+    let cell = Cell::new();
+    let mut arm = cell.arm();
+    let coupled = ControllerAxis { sense: -1.0, zero: 0.3, relative: Some((1, 0.5)) };
+    arm.controller = vec![ControllerAxis::SAME; 6];
+    arm.controller[2] = coupled;
+    let places: Vec<Vec<f64>> = (0..6)
+        .map(|k| START.iter().enumerate().map(|(j, q)| q + 0.03 * f64::from(k) * (1.0 + j as f64).sin()).collect())
+        .collect();
+    let axes = |q: &[f64]| arm.axis_values(&DVector::from_row_slice(q));
+    let mut back = DVector::zeros(6);
+    arm.set_axes(&axes(&places[3]), &mut back);
+    assert!((back - DVector::from_row_slice(&places[3])).amax() < 1e-15);
+
+    let free = Speed::default();
+    let spline = |k: usize, blend| to(MoveKind::Spline, pose(cell.pose(&places[k])), feed(0.1), blend);
+    let items = vec![
+        to(MoveKind::Joint, Target::Joints(axes(&places[0])), free, Blend::Stop),
+        to(MoveKind::Line, pose(cell.pose(&places[1])), feed(0.1), Blend::Distance(0.002)),
+        spline(2, Blend::Pass),
+        Item::Dwell { line: 1, seconds: 0.1 },
+        spline(3, Blend::Pass),
+        // Where the arm is already.
+        spline(3, Blend::Pass),
+        spline(4, Blend::Stop),
+        to(MoveKind::Joint, pose(cell.pose(&places[5])), free, Blend::Stop),
+    ];
+    let program = program(items);
+    let found = target_joints(&program, &arm, &PathOptions::default()).unwrap();
+    assert!(found[3].is_none());
+    for (item, place) in [(0, 0), (1, 1), (2, 2), (4, 3), (5, 3), (6, 4), (7, 5)] {
+        let q = found[item].as_ref().unwrap();
+        let off = (q - DVector::from_row_slice(&places[place])).amax();
+        assert!(off < 1e-8, "item {item}: {off:e}");
+        let Item::Move(of) = &program.items[item] else { panic!() };
+        match (target_at(&arm, of, q), &of.to) {
+            (Target::Joints(new), Target::Joints(old)) => {
+                assert!(new.iter().zip(old).all(|(a, b)| (a - b).abs() < 1e-14))
+            }
+            (Target::Pose { X_BT: new, .. }, Target::Pose { X_BT: old, .. }) => {
+                assert!((new.translation.vector - old.translation.vector).norm() < 1e-8);
+            }
+            other => panic!("{other:?}"),
+        }
+    }
 }

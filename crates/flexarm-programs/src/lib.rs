@@ -35,6 +35,7 @@ mod krl;
 mod options;
 mod rapid;
 mod recognise;
+mod rewrite;
 mod urscript;
 
 use std::path::{Path, PathBuf};
@@ -42,9 +43,11 @@ use std::path::{Path, PathBuf};
 use flexarm_files::{Source, TextFileError};
 use flexarm_path::program::Program;
 
+use common::recorder::Recorded;
 use common::{Fail, Text};
 pub use options::{ForwardKinematics, GCodeOptions, Language, ReadOptions, Rotary};
 pub use recognise::recognise;
+pub use rewrite::{NewTarget, ProgramText, Rewritten, read_program_text};
 
 /// Why a robot program cannot be read.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -83,6 +86,15 @@ pub enum ProgramError {
 /// read, that depends on what only the controller knows, or whose effect on the motion is not known here;
 /// [`ProgramError::NoMoves`] if nothing moves.
 pub fn read_program(path: &Path, bytes: &[u8], options: &ReadOptions<'_>) -> Result<Program, ProgramError> {
+    read_recorded(path, bytes, options).map(|(recorded, ..)| recorded.program)
+}
+
+/// A program with its language, its texts and the places of its targets in them.
+fn read_recorded(
+    path: &Path,
+    bytes: &[u8],
+    options: &ReadOptions<'_>,
+) -> Result<(Recorded, Language, Vec<Text>), ProgramError> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let Some(language) = options.language.or_else(|| recognise(bytes, &name)) else {
         return Err(ProgramError::Unknown { path: path.to_owned() });
@@ -94,8 +106,8 @@ pub fn read_program(path: &Path, bytes: &[u8], options: &ReadOptions<'_>) -> Res
         Language::UrScript => urscript::read(&mut texts, options),
         Language::GCode => gcode::read(&mut texts, options),
     };
-    let program = read.map_err(|fail| ProgramError::Statement(place(&texts, &fail)))?;
-    if program.items.is_empty() {
+    let recorded = read.map_err(|fail| ProgramError::Statement(place(&texts, &fail)))?;
+    if recorded.program.items.is_empty() {
         let hint = match language {
             Language::Krl => {
                 "is this the data list (.dat) instead of the program (.src), or is another routine meant (`entry`)?"
@@ -106,7 +118,7 @@ pub fn read_program(path: &Path, bytes: &[u8], options: &ReadOptions<'_>) -> Res
         };
         return Err(ProgramError::NoMoves { path: path.to_owned(), language: language.name(), hint });
     }
-    Ok(program)
+    Ok((recorded, language, texts))
 }
 
 /// Where and what, for people.

@@ -165,6 +165,7 @@ pub(crate) fn compensate<'py>(
         sweep,
         output,
         overwrite,
+        ..CompensateRequest::default()
     };
     let scenario = scenario(robot, motion, None, None, None)?;
     if !scenario.loads.is_empty() || !scenario.payloads.is_empty() {

@@ -90,6 +90,15 @@ impl Linear {
 }
 
 impl Linear {
+    /// Twist of the tool at rest per change of the commands, `J_a - J K^-1 K_a`, 6×m: commands move the tool and what it gives way.
+    /// None where a motion has no stiffness.
+    pub fn command_slopes(&self) -> Option<Matrix6xX<f64>> {
+        if self.K.is_empty() {
+            return Some(self.J_a.clone());
+        }
+        Some(&self.J_a - &self.J * self.K.clone().lu().solve(&self.K_a)?)
+    }
+
     /// As [`Linear::compliance`], with motors under servos yielding like springs; none where one of them is held by nothing.
     pub fn yielding_compliance(&self) -> Option<Matrix6<f64>> {
         let K = (&self.K + self.K.transpose()) * 0.5;

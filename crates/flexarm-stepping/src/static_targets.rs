@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use flexarm_kinematics::{Data, Frame, Pose, Wrench, forward_kinematics, rotation_vector};
-use nalgebra::{DMatrix, DVector, Vector6};
+use nalgebra::{DVector, Vector6};
 
 use crate::arm::FlexibleArm;
 use crate::error::StepError;
@@ -53,8 +53,9 @@ pub enum TargetError {
 
 /// Finds joint targets with which the tool at rest is where the rigid arm has it at `q`.
 ///
-/// * `arm`: its own motion does not count; loads and payloads of time 0 act.
+/// * `arm`: its own motion does not count; the payload is that of time 0.
 /// * `F_T_W`: constant wrench on the tool, world axes, as in [`linearise`].
+/// * `t`: time (s) whose loads of the arm act.
 /// * `components`: which of position and rotation (world axes) count.
 ///
 /// With fewer components than joints the joints move as little as possible.
@@ -66,6 +67,7 @@ pub fn static_targets(
     tool: &Frame,
     q: &[f64],
     F_T_W: &Wrench,
+    t: f64,
     components: &[bool; 6],
 ) -> Result<StaticTargets, TargetError> {
     let wanted = rigid_pose(arm, tool, q);
@@ -74,7 +76,7 @@ pub fn static_targets(
     let mut before = None;
     for iterations in 0..=MOST_ITERATIONS {
         let held = arm.along(Arc::new(Held(targets.as_slice().to_vec())));
-        let at = linearise(&held, tool, F_T_W, 0.0)?;
+        let at = linearise(&held, tool, F_T_W, t)?;
         let off = displacement(&wanted, &at.X_WT);
         let before = *before.get_or_insert(off);
         let left = DVector::from_iterator(rows.len(), rows.iter().map(|k| off[*k]));
@@ -82,10 +84,7 @@ pub fn static_targets(
             let after = Vector6::from_fn(|k, _| if components[k] { off[k] } else { 0.0 });
             return Ok(StaticTargets { q: targets.as_slice().to_vec(), before, after, iterations });
         }
-        // Commands move the tool and the equilibrium.
-        let yielding = at.K.clone().lu().solve(&at.K_a).unwrap_or_else(|| DMatrix::zeros(at.K.nrows(), at.K_a.ncols()));
-        let G = DMatrix::from_fn(6, targets.len(), |i, j| at.J_a[(i, j)]) - &at.J * yielding;
-        let G = G.select_rows(&rows);
+        let G = at.command_slopes().unwrap_or_else(|| at.J_a.clone()).select_rows(&rows);
         if iterations == MOST_ITERATIONS || !G.norm_squared().is_finite() {
             let norm = |range: std::ops::Range<usize>| {
                 range.filter(|k| components[*k]).map(|k| off[k].abs()).fold(0.0, f64::max)

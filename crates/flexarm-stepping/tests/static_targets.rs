@@ -1,13 +1,14 @@
 //! Joint targets at rest against the equilibrium found by another way.
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
+#![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::expect_used, clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
 use std::sync::Arc;
 
-use flexarm_kinematics::{Frame, Model, Wrench};
-use flexarm_stepping::{Damping, FlexibleArm, Held, OperatingPoint, StaticTargets, static_targets};
+use flexarm_kinematics::{Frame, Model, Wrench, rotation_vector};
+use flexarm_stepping::{Damping, FlexibleArm, Held, OperatingPoint, StaticTargets, linearise, static_targets};
 use flexarm_testkit::reference_arm;
-use nalgebra::Vector3;
+use nalgebra::{Vector3, Vector6};
 
 const POSE: [f64; 6] = [0.4, 0.5, -0.3, 0.7, 0.6, -1.2];
 
@@ -26,7 +27,7 @@ fn arm(softer: f64) -> (FlexibleArm, Frame) {
 fn at_rest_the_tool_of_a_soft_arm_is_where_the_rigid_arm_has_it() {
     let (arm, tool) = arm(20.0);
     let load = Wrench::new(Vector3::new(90.0, 50.0, -200.0), Vector3::new(10.0, 0.0, 20.0));
-    let found = static_targets(&arm, &tool, &POSE, &load, &[true; 6]).unwrap();
+    let found = static_targets(&arm, &tool, &POSE, &load, 0.0, &[true; 6]).unwrap();
     let mut at = OperatingPoint::new(arm.clone(), tool.clone());
     at.solve(&POSE, &Wrench::zeros()).unwrap();
     let wanted = at.rigid_tcp_pose();
@@ -46,8 +47,36 @@ fn at_rest_the_tool_of_a_soft_arm_is_where_the_rigid_arm_has_it() {
 fn with_the_position_alone_the_joints_move_as_little_as_they_can() {
     let (arm, tool) = arm(20.0);
     let position = [true, true, true, false, false, false];
-    let all = static_targets(&arm, &tool, &POSE, &Wrench::zeros(), &[true; 6]).unwrap();
-    let some = static_targets(&arm, &tool, &POSE, &Wrench::zeros(), &position).unwrap();
+    let all = static_targets(&arm, &tool, &POSE, &Wrench::zeros(), 0.0, &[true; 6]).unwrap();
+    let some = static_targets(&arm, &tool, &POSE, &Wrench::zeros(), 0.0, &position).unwrap();
     let way = |found: &StaticTargets| found.q.iter().zip(POSE).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
     assert!(some.after.amax() < 1e-12 && way(&some) < way(&all), "{} {}", way(&some), way(&all));
+}
+
+/// Truth: Richardson differences of the equilibrium of [`OperatingPoint`], on an arm that sags by 4 cm under a load besides.
+#[test]
+fn the_tool_at_rest_moves_with_each_command_as_its_equilibrium_does() {
+    let (arm, tool) = arm(20.0);
+    let load = Wrench::new(Vector3::new(90.0, 50.0, -200.0), Vector3::new(10.0, 0.0, 20.0));
+    let slopes = linearise(&arm, &tool, &load, 0.0).unwrap().command_slopes().unwrap();
+    let mut at = OperatingPoint::new(arm, tool);
+    at.solve(&POSE, &load).unwrap();
+    let here = at.tcp_pose();
+    for k in 0..6 {
+        let mut place = |x: f64| {
+            let mut q = POSE;
+            q[k] += x;
+            at.solve(&q, &load).unwrap();
+            let X = at.tcp_pose();
+            let turned = rotation_vector((X.rotation * here.rotation.inverse()).matrix());
+            let p = X.translation.vector;
+            Vector6::new(p.x, p.y, p.z, turned.x, turned.y, turned.z)
+        };
+        let mut d = |h: f64| (place(h) - place(-h)) / (2.0 * h);
+        let (a, b, c) = (d(0.02), d(0.01), d(0.005));
+        let truth = ((c * 4.0 - b) * 16.0 - (b * 4.0 - a)) / 45.0;
+        let error = (slopes.column(k) - truth).amax() / truth.amax();
+        eprintln!("joint {}: {error:.1e}", k + 1);
+        assert!(error < 1e-8, "joint {}: {error:e}", k + 1);
+    }
 }

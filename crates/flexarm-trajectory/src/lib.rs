@@ -61,6 +61,7 @@ mod plan;
 mod polynomial;
 mod problem;
 mod rounding;
+mod samples_toml;
 mod shape;
 mod spline;
 pub mod table;

@@ -35,11 +35,14 @@
 //! would have covered the same fraction of the way; all joints start and stop together. Points on the straight
 //! line from start to goal therefore change nothing.
 //!
+//! A motion that is not made of moves has `[samples]` in their place ([`Trajectory::to_samples_toml`] writes them).
+//!
 //! Start at [`Trajectory::parse_toml`]. Not here: the mathematics of the moves ([`crate::Plan`]).
 
 use crate::error::{FileError, TrajectoryError};
 use crate::limits::JointLimits;
 use crate::problem::{PlanError, Problem};
+use crate::samples_toml::{self, SamplesFileToml, has_samples};
 use crate::trajectory::Trajectory;
 use crate::waypoints_check::{Checked, check};
 use crate::waypoints_toml::FileToml;
@@ -58,11 +61,19 @@ impl Trajectory {
             let (line, column) = offset.map(|offset| place(text, offset)).unzip();
             TrajectoryError::from(Box::new(FileError { origin: origin.to_owned(), line, column, problem }))
         };
-        let file: FileToml = toml::from_str(text).map_err(|error| {
+        let unread = |error: toml::de::Error| {
             let message = error.message().split_whitespace().collect::<Vec<_>>().join(" ");
             let message = format!("{message}; docs/motions.md has all keys, with types and units");
             fail(error.span().map(|span| span.start), Problem::Toml { message })
-        })?;
+        };
+        if has_samples(text) {
+            let file: SamplesFileToml = toml::from_str(text).map_err(unread)?;
+            if *file.format.get_ref() != 1 {
+                return Err(fail(Some(file.format.span().start), Problem::Format { found: *file.format.get_ref() }));
+            }
+            return samples_toml::trajectory(&file).map_err(|error| fail(error.offset, *error.problem));
+        }
+        let file: FileToml = toml::from_str(text).map_err(unread)?;
 
         let Checked { plan, move_offsets } =
             check(&file, limits).map_err(|error| fail(error.offset, *error.problem))?;

@@ -30,7 +30,7 @@ fn located(span: Range<usize>, problem: Problem) -> Located {
     Located { offset: Some(span.start), problem: Box::new(problem) }
 }
 
-fn bad_value(span: Range<usize>, key: &str, found: impl ToString, expected: &'static str) -> Located {
+pub(crate) fn bad_value(span: Range<usize>, key: &str, found: impl ToString, expected: &'static str) -> Located {
     located(span, Problem::Value { key: key.to_owned(), found: found.to_string(), expected })
 }
 
@@ -40,8 +40,8 @@ pub(crate) fn check(file: &FileToml, known: &[(&str, JointLimits)]) -> Result<Ch
     if format != 1 {
         return Err(located(file.format.span(), Problem::Format { found: format }));
     }
-    let joints = joint_names(file)?;
-    let context = Context { file, scales: scales(file, &joints)?, joints };
+    let joints = joint_names(&file.joints)?;
+    let context = Context { file, scales: scales(&file.unit, &file.metres, &joints)?, joints };
     let robot_limits = context.limits(known)?;
 
     let start = context.full(&file.start, "start")?;
@@ -56,10 +56,10 @@ pub(crate) fn check(file: &FileToml, known: &[(&str, JointLimits)]) -> Result<Ch
     Ok(Checked { plan: Plan { joints: context.joints, start, moves }, move_offsets })
 }
 
-fn joint_names(file: &FileToml) -> Result<Vec<String>, Located> {
-    let entries = file.joints.get_ref();
+pub(crate) fn joint_names(joints: &Spanned<Vec<Spanned<String>>>) -> Result<Vec<String>, Located> {
+    let entries = joints.get_ref();
     if entries.is_empty() {
-        return Err(bad_value(file.joints.span(), "joints", "empty", "at least one joint name"));
+        return Err(bad_value(joints.span(), "joints", "empty", "at least one joint name"));
     }
     let mut names: Vec<String> = Vec::with_capacity(entries.len());
     for entry in entries {
@@ -74,21 +74,25 @@ fn joint_names(file: &FileToml) -> Result<Vec<String>, Located> {
 }
 
 /// Factor from the unit of the file to SI, per joint.
-fn scales(file: &FileToml, joints: &[String]) -> Result<Vec<f64>, Located> {
-    let angle = match file.unit.get_ref().as_str() {
+pub(crate) fn scales(
+    unit: &Spanned<String>,
+    metres: &[Spanned<String>],
+    joints: &[String],
+) -> Result<Vec<f64>, Located> {
+    let angle = match unit.get_ref().as_str() {
         "rad" => 1.0,
         "deg" => std::f64::consts::PI / 180.0,
         found => {
             let problem = Problem::UnknownUnit { key: "unit", found: found.to_owned(), accepted: "\"rad\", \"deg\"" };
-            return Err(located(file.unit.span(), problem));
+            return Err(located(unit.span(), problem));
         }
     };
-    for entry in &file.metres {
+    for entry in metres {
         if !joints.contains(entry.get_ref()) {
             return Err(unknown_joint(entry, "metres", joints));
         }
     }
-    let is_prismatic = |joint: &String| file.metres.iter().any(|entry| entry.get_ref() == joint);
+    let is_prismatic = |joint: &String| metres.iter().any(|entry| entry.get_ref() == joint);
     Ok(joints.iter().map(|joint| if is_prismatic(joint) { 1.0 } else { angle }).collect())
 }
 

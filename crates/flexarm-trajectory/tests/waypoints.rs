@@ -261,3 +261,36 @@ fn quintic_moves_are_written_as_the_waypoints_that_they_are_and_other_motions_ar
     let error = Trajectory::parse_csv(sine, "sine.csv").unwrap().to_waypoints_toml().unwrap_err();
     assert!(matches!(error, TrajectoryError::NotWaypoints { difference, .. } if difference > 0.1), "{error}");
 }
+
+/// Truth: the motion itself, whose knots are rows of the file.
+#[test]
+fn a_motion_that_is_not_made_of_moves_comes_back_from_its_samples() {
+    let sine = "time,a,rail\n0,0,1\n0.5,0.3,2\n1,0.5,2\n1.5,0.3,1\n2,0,1\n";
+    let motion = Trajectory::parse_csv(sine, "sine.csv").unwrap();
+    let text = motion.to_samples_toml(2.0).unwrap();
+    let back = Trajectory::parse_toml(&text, "sine.toml", &[]).unwrap();
+    assert_eq!((back.joints(), back.duration()), (motion.joints(), 2.0));
+    let mut worst = 0.0f64;
+    for i in 0..=400 {
+        let (mut q, mut p, mut x, mut y) = ([0.0; 2], [0.0; 2], [0.0; 2], [0.0; 2]);
+        motion.sample(0.005 * f64::from(i), &mut q, &mut x, &mut y);
+        back.sample(0.005 * f64::from(i), &mut p, &mut x, &mut y);
+        worst = worst.max((q[0] - p[0]).abs()).max((q[1] - p[1]).abs());
+    }
+    assert!(worst < 1e-12, "{worst:e}");
+    // In degrees, with a joint that slides, without velocities.
+    let text = "format = 1\nunit = \"deg\"\nmetres = [\"rail\"]\njoints = [\"a\", \"rail\"]\n[samples]\ntime = [0, 1]\nposition = [[0, 0], [90, 2]]\n";
+    let (mut q, mut x, mut y) = ([0.0; 2], [0.0; 2], [0.0; 2]);
+    Trajectory::parse_toml(text, "deg.toml", &[]).unwrap().sample(1.0, &mut q, &mut x, &mut y);
+    assert!((q[0] - std::f64::consts::FRAC_PI_2).abs() < 1e-15 && q[1] == 2.0);
+    for (from, to, told) in [
+        ("[90, 2]", "[90]", "a number for each joint"),
+        ("[[0, 0], ", "[", "a row for each time"),
+        ("[0, 1]\n", "[1, 0]\n", "increase"),
+        ("format = 1", "format = 2", "format"),
+        ("position", "place", "position"),
+    ] {
+        let error = Trajectory::parse_toml(&text.replacen(from, to, 1), "x.toml", &[]).unwrap_err().to_string();
+        assert!(error.contains(told) && error.contains("x.toml"), "{error}");
+    }
+}

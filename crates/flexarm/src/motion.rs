@@ -69,7 +69,8 @@ impl PrescribedMotion for Along {
     }
 }
 
-fn limits(model: &Model) -> Vec<JointLimits> {
+/// Positions and speeds that the joints may have.
+pub(crate) fn limits(model: &Model) -> Vec<JointLimits> {
     let actuated = &model.coordinates()[..model.n_actuated()];
     let limits = actuated.iter().map(|c| JointLimits {
         lower: c.limits.lower,

@@ -8,7 +8,7 @@ use flexarm_files::{check_free, write_all};
 use flexarm_kinematics::{Data, Model, State, forward_kinematics, inverse_dynamics};
 use flexarm_motion_io::{TextFormat, write_joint_trajectory};
 use flexarm_settings::Setting;
-use flexarm_trajectory::{Extreme, JointLimits, JointPeak, LimitKind, Trajectory};
+use flexarm_trajectory::{Extreme, JointLimits, JointPeak, LimitKind, Trajectory, TrajectoryError};
 use nalgebra::{DVector, Vector3};
 use serde::Serialize;
 
@@ -152,7 +152,7 @@ pub struct MotionCurve {
 ///
 /// # Errors
 /// As [`Motion::load_with`]; [`Error::File`] for an ending that is not known, [`Error::Taken`] and [`Error::Write`];
-/// [`Error::Trajectory`] for a rate that makes no sense and for a motion that is not made of waypoints (`.toml`).
+/// [`Error::Trajectory`] for a rate that makes no sense.
 pub fn motion_report(
     path: &Path,
     robot: Option<&Robot>,
@@ -292,7 +292,7 @@ fn of_joint(peak: &JointPeak, unit: &'static str, limits: &JointLimits) -> Motio
     }
 }
 
-fn of_limit(violation: &flexarm_trajectory::LimitViolation) -> MotionViolation {
+pub(crate) fn of_limit(violation: &flexarm_trajectory::LimitViolation) -> MotionViolation {
     let kind = match violation.kind {
         LimitKind::Lower => "lower",
         LimitKind::Upper => "upper",
@@ -346,18 +346,22 @@ impl Torques {
     fn violation(&self, k: usize, joint: &str, limit: f64) -> Option<MotionViolation> {
         let worst = self.peak(k);
         let over = |value: f64| value.abs() > limit * (1.0 + SLACK);
-        if !over(worst.value) {
-            return None;
-        }
         let since = self.times.iter().zip(&self.values[k]).find(|(_, value)| over(**value)).map(|(t, _)| *t);
-        let since_s = since.unwrap_or(worst.time_s);
-        let (value, time_s) = (worst.value, worst.time_s);
-        let message = format!(
-            "joint {joint:?}: effort exceeds its limit {limit:.4}: {value:.4} at t = {time_s:.4} s, first passed at \
-             {since_s:.4} s (N m or N, rigid robot with payload, no friction); allow the move more time"
-        );
-        Some(MotionViolation { joint: joint.to_owned(), kind: "effort", time_s, since_s, value, limit, message })
+        of_effort(joint, &worst, since.unwrap_or(worst.time_s), limit, "rigid robot with payload, no friction")
     }
+}
+
+/// A torque or force beyond its limit; `of`: whose it is.
+pub(crate) fn of_effort(joint: &str, worst: &Extreme, since_s: f64, limit: f64, of: &str) -> Option<MotionViolation> {
+    let Extreme { time_s, value } = *worst;
+    if value.abs() <= limit * (1.0 + SLACK) || limit.is_nan() {
+        return None;
+    }
+    let message = format!(
+        "joint {joint:?}: effort exceeds its limit {limit:.4}: {value:.4} at t = {time_s:.4} s, first passed at \
+         {since_s:.4} s (N m or N, {of}); allow the move more time"
+    );
+    Some(MotionViolation { joint: joint.to_owned(), kind: "effort", time_s, since_s, value, limit, message })
 }
 
 /// Length of the path of the tool (m) and its largest speed (m/s), from chords; what they leave out of the length is taken from
@@ -403,6 +407,22 @@ fn sampled(trajectory: &Trajectory, points: usize) -> Vec<(f64, Vec<f64>, Vec<f6
     (0..=points).map(at).collect()
 }
 
+/// A motion in the formats that the endings of files ask for: `.csv`, `.toml`, `.yaml` (`.yml`), `.json`.
+pub(crate) fn motion_texts(
+    outputs: &[PathBuf],
+    trajectory: &Trajectory,
+    rate_hz: f64,
+) -> Result<Vec<(PathBuf, Vec<u8>)>, Error> {
+    let written =
+        |output: &PathBuf| Ok((output.clone(), Target::of_motion(output)?.motion(trajectory, rate_hz)?.into_bytes()));
+    outputs.iter().map(written).collect()
+}
+
+/// Refuses files whose endings ask for no motion.
+pub(crate) fn check_motion_outputs(outputs: &[PathBuf]) -> Result<(), Error> {
+    outputs.iter().try_for_each(|output| Target::of_motion(output).map(|_| ()))
+}
+
 /// What a file is written as.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Target {
@@ -433,6 +453,17 @@ impl Target {
         }
     }
 
+    /// The same of what holds a motion.
+    fn of_motion(path: &Path) -> Result<Self, Error> {
+        match Self::of(path)? {
+            Self::Plot => {
+                let what = "a motion is written as .csv, .toml, .yaml or .json; found .svg".into();
+                Err(Error::File { path: path.to_owned(), what })
+            }
+            target => Ok(target),
+        }
+    }
+
     fn text(
         self,
         report: &MotionReport,
@@ -441,14 +472,25 @@ impl Target {
         rate_hz: f64,
     ) -> Result<String, Error> {
         match self {
+            Self::Plot => plot(report, trajectory, torques),
+            target => target.motion(trajectory, rate_hz),
+        }
+    }
+
+    /// The text of a motion; of a plot there is none.
+    fn motion(self, trajectory: &Trajectory, rate_hz: f64) -> Result<String, Error> {
+        match self {
             Self::Csv => {
                 let mut bytes = Vec::new();
                 trajectory.to_csv(rate_hz, &mut bytes)?;
                 Ok(String::from_utf8_lossy(&bytes).into_owned())
             }
-            Self::Toml => Ok(trajectory.to_waypoints_toml()?),
+            Self::Toml => match trajectory.to_waypoints_toml() {
+                Err(TrajectoryError::NotWaypoints { .. }) => Ok(trajectory.to_samples_toml(rate_hz)?),
+                written => Ok(written?),
+            },
             Self::Message(format) => Ok(write_joint_trajectory(trajectory, rate_hz, format)?),
-            Self::Plot => plot(report, trajectory, torques),
+            Self::Plot => Ok(String::new()),
         }
     }
 }

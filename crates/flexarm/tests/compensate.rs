@@ -5,9 +5,9 @@
 use std::path::{Path, PathBuf};
 
 use flexarm::compensate::{
-    CompensateRequest, Compensation, Method, ShaperKind, compensate_motion, compensate_motion_until,
+    CompensateRequest, Compensation, LimitRule, Method, ShaperKind, compensate_motion, compensate_motion_until,
 };
-use flexarm::{Error, Modelling, Motion, Robot, RunOptions, Wrench};
+use flexarm::{AppliedLoad, Error, Modelling, Motion, Robot, RunOptions, Scenario, TimedWrench, Wrench};
 
 fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
@@ -163,6 +163,205 @@ fn what_cannot_be_compensated_is_said() {
         |robot: &Robot| robot.flexible(Modelling::default()).unwrap().joints().map(str::to_owned).collect::<Vec<_>>();
     if names(&other) != names(&robot) {
         fails(&robot, CompensateRequest { plant: Some(("other".into(), other)), ..request() }, "must be the same");
+    }
+}
+
+/// A folder that goes away.
+struct Place(PathBuf);
+
+impl Place {
+    fn new(name: &str) -> Self {
+        let folder = std::env::temp_dir().join(format!("flexarm-compensate-{}-{name}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        Self(folder)
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+fn at(trajectory: &flexarm::Trajectory, t: f64) -> [f64; 6] {
+    let (mut q, mut v, mut a) = ([0.0; 6], [0.0; 6], [0.0; 6]);
+    trajectory.sample(t, &mut q, &mut v, &mut a);
+    q
+}
+
+/// Truth: the equilibrium under weight and the constant part of a milling force, found at the operating point.
+#[test]
+fn under_the_force_of_a_cutter_the_tool_at_rest_is_where_the_rigid_arm_has_it() {
+    let (robot, motion) = shipped("kr210", "pick_and_place.toml");
+    let mean = Wrench::new([300.0, -150.0, 400.0].into(), [0.0, 20.0, 0.0].into());
+    let cut = TimedWrench::new(move |t| mean * (1.0 + 0.8 * (std::f64::consts::TAU * 80.0 * t).sin()))
+        .with_period(1.0 / 80.0);
+    let scenario = Scenario::new(motion.clone()).with_load(AppliedLoad::new("tcp", cut));
+    let static_request = CompensateRequest { method: Method::Static, ..request() };
+    let found = compensate_motion(&robot, scenario, &static_request).unwrap();
+    told("cutter", &found);
+    let arm = robot.flexible(Modelling::default()).unwrap();
+    let mut point = arm.operating_point().unwrap();
+    let off = |trajectory: &flexarm::Trajectory, point: &mut flexarm::OperatingPoint| {
+        let end = motion.trajectory.duration();
+        point.solve(&at(&motion.trajectory, end), &Wrench::zeros()).unwrap();
+        let wanted = point.rigid_tcp_pose();
+        point.solve(&at(trajectory, end), &mean).unwrap();
+        (point.tcp_pose().translation.vector - wanted.translation.vector).norm()
+    };
+    let (before, after) = (off(&motion.trajectory, &mut point), off(&found.trajectory, &mut point));
+    eprintln!("under the mean force {before:.2e} m before, {after:.1e} m after");
+    assert!(before > 1e-3 && after <= 1e-9, "{before:e} {after:e}");
+    // Without the force the commands are others by what it bends.
+    let bare = compensate_motion(&robot, &motion, &static_request).unwrap();
+    assert!(off(&bare.trajectory, &mut point) > 0.2 * before);
+}
+
+/// Truth: peaks of the commands, from their curves.
+#[test]
+fn limits_of_speed_acceleration_and_torque_are_kept_or_named() {
+    let (mut robot, motion) = shipped("kr210", "pick_and_place.toml");
+    let free = compensate_motion(&robot, &motion, &request()).unwrap();
+    let (own, new) = (motion.trajectory.peak(), free.trajectory.peak());
+    let speeds = |k: usize| (own[k].velocity.value.abs(), new[k].velocity.value.abs());
+    // Of joints that move.
+    let moves = |k: &usize| speeds(*k).0 > 0.2;
+    let k = (0..6)
+        .filter(moves)
+        .max_by(|a, b| (speeds(*a).1 / speeds(*a).0).total_cmp(&(speeds(*b).1 / speeds(*b).0)))
+        .unwrap();
+    let (before, after) = speeds(k);
+    eprintln!("joint {}: {before:.4} rad/s before, {after:.4} after", k + 1);
+    assert!(after > 1.00001 * before);
+    let name = own[k].joint.clone();
+    let limit = 0.5 * (before + after);
+    robot.rigid.joints.iter_mut().filter(|joint| joint.name == name).for_each(|joint| joint.limits.velocity = limit);
+    let rule = |limits| CompensateRequest { limits, ..request() };
+    let error = compensate_motion(&robot, &motion, &rule(LimitRule::Refuse)).unwrap_err().to_string();
+    assert!(error.contains(&name) && error.contains("velocity exceeds its limit") && error.contains("slow"), "{error}");
+    let told = compensate_motion(&robot, &motion, &rule(LimitRule::Tell)).unwrap();
+    let [passed] = &told.limits[..] else { panic!("{:?}", told.limits) };
+    assert_eq!((passed.joint.as_str(), passed.kind, passed.limit.abs()), (name.as_str(), "velocity", limit));
+    assert!((passed.value.abs() - after).abs() < 1e-6 && passed.time_s > 0.0 && told.slowed == 1.0);
+    assert!(told.caveats.iter().any(|caveat| caveat.code == "limits"));
+    let slow = compensate_motion(&robot, &motion, &rule(LimitRule::Slow)).unwrap();
+    eprintln!("slowed {:.4} times", slow.slowed);
+    assert!(slow.slowed > 1.0 && slow.slowed < 1.1 && slow.limits.is_empty());
+    assert!(slow.caveats.iter().any(|caveat| caveat.code == "slowed"));
+    assert!(slow.trajectory.peak()[k].velocity.value.abs() <= limit * (1.0 + 1e-9));
+    assert!((slow.trajectory.duration() / motion.trajectory.duration() / slow.slowed - 1.0).abs() < 1e-3);
+    assert!(slow.after.peak_m <= 0.01 * slow.before.peak_m);
+
+    // Accelerations are asked for, torques stand in the URDF.
+    let (robot, _) = shipped("kr210", "pick_and_place.toml");
+    let accelerations: Vec<f64> = own.iter().map(|peak| peak.acceleration.value.abs().max(1e-3)).collect();
+    let tell = CompensateRequest { accelerations, ..rule(LimitRule::Tell) };
+    let found = compensate_motion(&robot, &motion, &tell).unwrap();
+    assert!(found.limits.iter().all(|limit| limit.kind == "acceleration") && !found.limits.is_empty());
+    let short = CompensateRequest { accelerations: vec![1.0], ..request() };
+    assert!(compensate_motion(&robot, &motion, &short).unwrap_err().to_string().contains("one for each"));
+
+    let arm = robot.flexible(Modelling::default()).unwrap();
+    let compensated = Motion::along((*free.trajectory).clone(), "again", &robot).unwrap();
+    let run = arm.simulate(&compensated, &RunOptions { log_rate_hz: 1000.0, ..RunOptions::default() }).unwrap();
+    let peak = run.values("effort").iter().skip(1).step_by(6).fold(0.0f64, |most, x| most.max(x.abs()));
+    let mut weak = robot.clone();
+    let second = own[1].joint.clone();
+    weak.rigid
+        .joints
+        .iter_mut()
+        .filter(|joint| joint.name == second)
+        .for_each(|joint| joint.limits.effort = 0.9 * peak);
+    let found = compensate_motion(&weak, &motion, &rule(LimitRule::Tell)).unwrap();
+    let effort = found.limits.iter().find(|limit| limit.kind == "effort").unwrap();
+    eprintln!("torque {:.1} N m of {peak:.1}", effort.value);
+    assert!(effort.joint == second && (effort.value.abs() / peak - 1.0).abs() < 1e-3);
+}
+
+/// Truth: each file, read again.
+#[test]
+fn the_new_motion_is_written_by_the_endings_of_its_files_with_a_recording_of_both_runs() {
+    let (robot, motion) = shipped("kr210", "pick_and_place.toml");
+    let place = Place::new("files");
+    let motions: Vec<PathBuf> = ["new.toml", "new.yaml", "new.json"].map(|name| place.0.join(name)).to_vec();
+    let asked = CompensateRequest { output: Some(place.0.join("out")), motions: motions.clone(), ..request() };
+    let found = compensate_motion(&robot, &motion, &asked).unwrap();
+    assert_eq!(found.files.len(), 3);
+    for file in found.file.iter().map(PathBuf::from).chain(motions) {
+        let again = Motion::load(&file, &robot).unwrap();
+        let end = motion.trajectory.duration();
+        let worst = (0..=500).flat_map(|k| {
+            let t = end * f64::from(k) / 500.0;
+            let (a, b) = (at(&again.trajectory, t), at(&found.trajectory, t));
+            (0..6).map(move |j| (a[j] - b[j]).abs())
+        });
+        let worst = worst.fold(0.0, f64::max);
+        eprintln!("{}: {worst:.1e} rad", file.display());
+        assert!(worst < 1e-9, "{}: {worst:e}", file.display());
+    }
+    let recording = PathBuf::from(found.recording.clone().unwrap());
+    assert!(std::fs::metadata(&recording).unwrap().len() > 100_000);
+    let error = compensate_motion(&robot, &motion, &asked).unwrap_err().to_string();
+    assert!(error.contains("compensated.csv"), "{error}");
+    let wrong = CompensateRequest { motions: vec![place.0.join("new.svg")], ..request() };
+    assert!(compensate_motion(&robot, &motion, &wrong).unwrap_err().to_string().contains(".yaml"));
+}
+
+const KRL: &str = "&ACCESS RVP\nDEF cut()\n$VEL.CP = 0.2\n$APO.CDIS = 5\nPTP {A1 10, A2 -80, A3 95, A4 5, A5 50, A6 -10}\n\
+    PTP XP1\nLIN {X 1600, Y 100, Z 1100, A 10, B 80, C 20} C_DIS\nLIN {Y -100}\n\
+    CIRC {X 1700, Y 0, Z 1000}, {X 1600, Y 100, Z 900, A 10, B 80, C 20}\nLIN_REL {Z 20}\nEND\n";
+const DAT: &str = "DEFDAT cut\nDECL E6POS XP1={X 1650.0,Y 0.0,Z 1200.0,A 0.0,B 85.0,C 0.0,S 6,T 2}\nENDDAT\n";
+const RAPID: &str = "MODULE Cut\n  CONST robtarget p1:=[[1650,0,1200],[0.7071068,0,0.7071068,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];\n\
+    PROC main()\n  ConfL \\Off; ConfJ \\Off;\n  MoveAbsJ [[0,-70,80,0,60,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v200,fine,tool0;\n  MoveJ p1,v200,z5,tool0;\n\
+      MoveL [[1600,150,1100],[0.7,0.1,0.7,0.1],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;\n  ENDPROC\nENDMODULE\n";
+
+/// Truth: the equilibria at the targets of the program as it was written, read by the same reader as any program.
+#[test]
+fn a_robot_program_comes_back_with_targets_at_which_the_flexible_tool_is_where_it_was_told_to_be() {
+    let (robot, _) = shipped("kr210", "pick_and_place.toml");
+    for (name, text, corrected, targets) in [("cut.src", KRL, 5, 6), ("cut.mod", RAPID, 3, 3)] {
+        let place = Place::new(name);
+        let file = place.0.join(name);
+        std::fs::write(&file, text).unwrap();
+        std::fs::write(place.0.join("cut.dat"), DAT).unwrap();
+        let motion = Motion::load(&file, &robot).unwrap();
+        let asked = CompensateRequest {
+            output: Some(place.0.join("out")),
+            method: Method::Static,
+            recording: false,
+            ..request()
+        };
+        let found = compensate_motion(&robot, &motion, &asked).unwrap();
+        for caveat in &found.caveats {
+            eprintln!("{name}: {}", caveat.message);
+        }
+        let program = found.program.unwrap();
+        eprintln!("{name}: {program:?}");
+        assert_eq!((program.corrected, program.targets), (corrected, targets));
+        assert!(program.before_m > 1e-3 && program.residual_m < 3e-7, "{:e}", program.residual_m);
+        let new = std::fs::read_to_string(&program.files[0]).unwrap();
+        assert_eq!(new.lines().count(), text.lines().count());
+        assert!(new.contains("corrected by flexarm for"), "{new}");
+        // Read and run as any program; the end of the path is a target.
+        let again = Motion::load(&program.files[0], &robot).unwrap();
+        let arm = robot.flexible(Modelling::default()).unwrap();
+        let mut point = arm.operating_point().unwrap();
+        let end = |motion: &Motion| at(&motion.trajectory, motion.trajectory.duration());
+        point.solve(&end(&motion), &Wrench::zeros()).unwrap();
+        let (wanted, sagged) = (point.rigid_tcp_pose().translation.vector, point.tcp_pose().translation.vector);
+        point.solve(&end(&again), &Wrench::zeros()).unwrap();
+        let left = (point.tcp_pose().translation.vector - wanted).norm();
+        eprintln!("{name}: at the end {:.2e} m before, {left:.1e} m after", (sagged - wanted).norm());
+        // The relative move of the first keeps what it gives way on its own 20 mm.
+        let bound = if name == "cut.src" { 2e-5 } else { 3e-7 };
+        assert!(left < bound, "{left:e}");
+        // A corrected program is corrected into another folder, never over itself.
+        let inner = Motion::load(&program.files[0], &robot).unwrap();
+        let careless = CompensateRequest { overwrite: true, ..asked.clone() };
+        let error = compensate_motion(&robot, &inner, &careless).unwrap_err().to_string();
+        assert!(error.contains("the program that is corrected"), "{error}");
+        let twice = compensate_motion(&robot, &motion, &asked).unwrap_err().to_string();
+        assert!(twice.contains("out"), "{twice}");
     }
 }
 

@@ -135,14 +135,13 @@ fn every_example_of_a_motion_file_loads_and_goes_where_it_says() {
             let motion = Motion::load_for(&path, &model).unwrap_or_else(|e| panic!("{e}"));
             assert!(motion.violations.is_empty(), "{:?}", motion.violations);
             let (mut q, mut v, mut a) = ([0.0; 3], [0.0; 3], [0.0; 3]);
-            let t = if language == "toml" { 1.6 } else { 0.04 };
-            motion.trajectory.sample(t, &mut q, &mut v, &mut a);
             let degrees = f64::to_radians(1.0);
-            let goal = if language == "toml" {
-                [0.2, 60.0 * degrees, 30.0 * degrees]
-            } else {
-                [0.003, 0.3 * degrees, -0.5 * degrees]
+            let (t, goal) = match (language, block.contains("[samples]")) {
+                ("toml", false) => (1.6, [0.2, 60.0 * degrees, 30.0 * degrees]),
+                ("toml", true) => (0.01, [0.0, 0.1 * degrees, -0.2 * degrees]),
+                _ => (0.04, [0.003, 0.3 * degrees, -0.5 * degrees]),
             };
+            motion.trajectory.sample(t, &mut q, &mut v, &mut a);
             // measured 6e-17
             assert!(q.iter().zip(goal).all(|(q, goal)| (q - goal).abs() < 1e-14), "{q:?}");
         }
@@ -188,7 +187,8 @@ const ROBOT: [&str; 9] = [
 ];
 
 const LOADS: [&str; 1] = ["crates/flexarm/src/loads_file.rs"];
-const MOTION: [&str; 1] = ["crates/flexarm-trajectory/src/waypoints_toml.rs"];
+const MOTION: [&str; 2] =
+    ["crates/flexarm-trajectory/src/waypoints_toml.rs", "crates/flexarm-trajectory/src/samples_toml.rs"];
 
 #[test]
 fn every_key_is_on_its_page() {
@@ -210,13 +210,14 @@ fn every_key_is_on_its_page() {
 }
 
 /// Definitions of a schema by name, with the struct that each describes; the first is the whole file.
-fn same_keys(schema: &str, sources: &[&str], file: &str, definitions: &[(&str, &str)]) {
+fn same_keys(schema: &str, sources: &[&str], files: &[&str], definitions: &[(&str, &str)]) {
     let schema: serde_json::Value = serde_json::from_str(&read(schema)).unwrap();
     let properties = |node: &serde_json::Value| -> BTreeSet<String> {
         node["properties"].as_object().unwrap().keys().cloned().collect()
     };
     let all = keys(sources);
-    assert_eq!(properties(&schema), all[file]);
+    let of_files: BTreeSet<String> = files.iter().flat_map(|file| all[*file].iter().cloned()).collect();
+    assert_eq!(properties(&schema), of_files);
     assert_eq!(schema["additionalProperties"], false);
     for (definition, entry) in definitions {
         let node = &schema["$defs"][definition];
@@ -251,7 +252,8 @@ fn the_schemas_have_the_same_keys() {
         ("balancer_gas_spring", "GasSpringEntry"),
         ("balancer_sine", "SineEntry"),
     ];
-    same_keys("docs/robot.schema.json", &ROBOT, "RobotFile", &robot);
-    same_keys("docs/loads.schema.json", &LOADS, "LoadsFile", &[("load", "LoadEntry"), ("payload", "PayloadEntry")]);
-    same_keys("docs/motion.schema.json", &MOTION, "FileToml", &[("move", "MoveToml"), ("limits", "LimitsToml")]);
+    same_keys("docs/robot.schema.json", &ROBOT, &["RobotFile"], &robot);
+    same_keys("docs/loads.schema.json", &LOADS, &["LoadsFile"], &[("load", "LoadEntry"), ("payload", "PayloadEntry")]);
+    let motion = [("move", "MoveToml"), ("limits", "LimitsToml"), ("samples", "SamplesToml")];
+    same_keys("docs/motion.schema.json", &MOTION, &["FileToml", "SamplesFileToml"], &motion);
 }

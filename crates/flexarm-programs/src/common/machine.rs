@@ -56,6 +56,8 @@ pub(crate) trait Dialect: Sized {
 /// A variable.
 #[derive(Debug, Clone)]
 pub(crate) struct Variable {
+    /// Where the literal stands that it has its value from, as long as nothing else has changed it.
+    origin: Option<Span>,
     pub(crate) value: Value,
     pub(crate) kind: Rc<str>,
 }
@@ -103,7 +105,7 @@ impl<'a, D: Dialect> Machine<'a, D> {
     }
 
     pub(crate) fn set_global(&mut self, name: &str, value: Value) {
-        self.globals.insert(name.into(), Variable { value, kind: "".into() });
+        self.globals.insert(name.into(), Variable { origin: None, value, kind: "".into() });
     }
 
     pub(crate) fn global(&self, name: &str) -> Option<&Value> {
@@ -159,7 +161,11 @@ impl<'a, D: Dialect> Machine<'a, D> {
                 if value == Value::Nothing {
                     value.clone().known(expression.span)?;
                 }
+                let origin = self.origin(expression).filter(|_| matches!(place.kind, Kind::Name(_)));
                 self.assign(place, value)?;
+                if let Some(variable) = root_name(place).and_then(|name| self.variable(name)) {
+                    variable.origin = origin;
+                }
             }
             Action::If { branches, otherwise } => return self.branch(branches, otherwise, span),
             Action::While { condition, body } => return self.while_loop(condition, body, span),
@@ -193,6 +199,7 @@ impl<'a, D: Dialect> Machine<'a, D> {
         value: Option<&Expr>,
         span: Span,
     ) -> Result<()> {
+        let origin = value.and_then(|value| self.origin(value));
         let declared = value.map(|value| self.value(value)).transpose()?;
         let variables = self.locals.last_mut().unwrap_or(&mut self.globals);
         if let (None, Some(old)) = (&declared, variables.get_mut(name)) {
@@ -205,7 +212,7 @@ impl<'a, D: Dialect> Machine<'a, D> {
             None => D::coerce(self, kind, Value::Nothing, span)?,
         };
         let variables = self.locals.last_mut().unwrap_or(&mut self.globals);
-        variables.insert(name.clone(), Variable { value, kind: kind.clone() });
+        variables.insert(name.clone(), Variable { origin, value, kind: kind.clone() });
         Ok(())
     }
 
@@ -445,7 +452,8 @@ impl<'a, D: Dialect> Machine<'a, D> {
             };
             let value =
                 if matches!(value, Value::Nothing) { value } else { self.fit(&parameter.kind, value, argument.span)? };
-            scope.insert(parameter.name.clone(), Variable { value, kind: parameter.kind.clone() });
+            let origin = argument.value.as_ref().and_then(|expression| self.origin(expression));
+            scope.insert(parameter.name.clone(), Variable { origin, value, kind: parameter.kind.clone() });
             if let (true, Some(place)) = (parameter.returned, &argument.value) {
                 returned.push((parameter.name.clone(), place.clone()));
             }
@@ -458,7 +466,7 @@ impl<'a, D: Dialect> Machine<'a, D> {
                 return fail(span, format!("`{}` needs a value for `{}`", routine.name, parameter.name));
             };
             let value = self.value(default)?;
-            scope.insert(parameter.name.clone(), Variable { value, kind: parameter.kind.clone() });
+            scope.insert(parameter.name.clone(), Variable { origin: None, value, kind: parameter.kind.clone() });
         }
         self.locals.push(scope);
         let flow = self.nested(span, |machine| machine.run(&routine.body));
@@ -511,10 +519,10 @@ impl<'a, D: Dialect> Machine<'a, D> {
     fn set(&mut self, name: &Rc<str>, value: Value) {
         self.changed(name);
         match self.variable(name) {
-            Some(variable) => variable.value = value,
+            Some(variable) => (variable.value, variable.origin) = (value, None),
             None => {
                 let variables = self.locals.last_mut().unwrap_or(&mut self.globals);
-                variables.insert(name.clone(), Variable { value, kind: "".into() });
+                variables.insert(name.clone(), Variable { origin: None, value, kind: "".into() });
             }
         }
     }
@@ -533,7 +541,7 @@ impl<'a, D: Dialect> Machine<'a, D> {
             if !D::undeclared(self, &name, place.span)? {
                 return Ok(());
             }
-            self.globals.insert(name.clone(), Variable { value: Value::Nothing, kind: "".into() });
+            self.globals.insert(name.clone(), Variable { origin: None, value: Value::Nothing, kind: "".into() });
         }
         let kind = self.variable(&name).map(|variable| variable.kind.clone()).unwrap_or_default();
         if let Some(number) = self.number_of_pose(&name, &parts, place.span)? {
@@ -737,6 +745,20 @@ impl<'a, D: Dialect> Machine<'a, D> {
         combine(operator, &a, &b, [left.span, right.span], span)
     }
 
+    /// Where the literal stands that an expression has its value from: itself, or what was assigned to a variable.
+    pub(crate) fn origin(&mut self, expression: &Expr) -> Option<Span> {
+        match &expression.kind {
+            Kind::Record(..) | Kind::List(_) => Some(expression.span),
+            Kind::Name(name) => self.variable(name)?.origin,
+            _ => None,
+        }
+    }
+
+    /// As [`Machine::origin`], of an argument.
+    pub(crate) fn argument_origin(&mut self, arguments: &[Argument], position: usize) -> Option<Span> {
+        self.origin(positional(arguments, position)?)
+    }
+
     /// Value of an argument, or an error that says that it is missing.
     pub(crate) fn argument(&mut self, arguments: &[Argument], position: usize, span: Span) -> Result<(Value, Span)> {
         match positional(arguments, position) {
@@ -764,6 +786,15 @@ impl<'a, D: Dialect> Machine<'a, D> {
 /// The argument at a position among those without names.
 pub(crate) fn positional(arguments: &[Argument], position: usize) -> Option<&Expr> {
     arguments.iter().filter(|argument| argument.name.is_none()).nth(position)?.value.as_ref()
+}
+
+/// The variable of which an expression is a part.
+fn root_name(place: &Expr) -> Option<&Rc<str>> {
+    match &place.kind {
+        Kind::Name(name) => Some(name),
+        Kind::Field(base, _) | Kind::Index(base, _) => root_name(base),
+        _ => None,
+    }
 }
 
 /// Is there a way out of an endless loop?

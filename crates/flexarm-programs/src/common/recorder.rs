@@ -11,11 +11,28 @@ pub(crate) struct Recorder<'a> {
     pub(crate) options: &'a ReadOptions<'a>,
     pub(crate) texts: Vec<Text>,
     pub(crate) items: Vec<Item>,
+    /// Of each item, where the literals of its target and of the auxiliary point of its circle stand.
+    sources: Vec<Sources>,
+    /// The same of the next move.
+    pub(crate) next: Sources,
     notes: Vec<Told>,
     moves: usize,
     /// Values of external axes, and where they were told first.
     external: [Option<(f64, usize)>; 6],
     place: Place,
+}
+
+/// Where the literals stand that a move has its target and the auxiliary point of its circle from.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Sources {
+    pub(crate) target: Option<Span>,
+    pub(crate) via: Option<Span>,
+}
+
+/// A program with the places of its targets, item by item.
+pub(crate) struct Recorded {
+    pub(crate) program: Program,
+    pub(crate) sources: Vec<Sources>,
 }
 
 /// A note that is told once, with all its lines.
@@ -45,7 +62,17 @@ enum Place {
 impl<'a> Recorder<'a> {
     pub(crate) fn new(options: &'a ReadOptions<'a>, texts: Vec<Text>) -> Self {
         let place = options.start.as_ref().map_or(Place::Unknown, |start| Place::Joints(start.clone()));
-        Self { options, texts, items: Vec::new(), notes: Vec::new(), moves: 0, external: [None; 6], place }
+        Self {
+            options,
+            texts,
+            items: Vec::new(),
+            sources: Vec::new(),
+            next: Sources::default(),
+            notes: Vec::new(),
+            moves: 0,
+            external: [None; 6],
+            place,
+        }
     }
 
     pub(crate) fn line(&self, span: Span) -> usize {
@@ -97,6 +124,7 @@ impl<'a> Recorder<'a> {
             self.count(span)?;
             let line = self.line(span);
             self.items.push(Item::Dwell { line, seconds });
+            self.sources.push(Sources::default());
             self.stop();
         }
         Ok(())
@@ -141,6 +169,7 @@ impl<'a> Recorder<'a> {
             (Target::Pose { X_BT, .. }, _) => Place::Tool { X_WB: step.X_WB, X_FT: step.X_FT, X_BT: *X_BT },
         };
         self.items.push(Item::Move(step));
+        self.sources.push(std::mem::take(&mut self.next));
         Ok(())
     }
 
@@ -231,11 +260,11 @@ impl<'a> Recorder<'a> {
     }
 
     /// The program.
-    pub(crate) fn finish(mut self, name: &str) -> Program {
+    pub(crate) fn finish(mut self, name: &str) -> Recorded {
         self.notes.sort_by_key(|told| (told.file, told.lines.first().copied().unwrap_or(0)));
         let texts = &self.texts;
         let notes = self.notes.iter().map(|told| told.as_note(texts)).collect();
-        Program { name: name.to_owned(), items: self.items, notes }
+        Recorded { program: Program { name: name.to_owned(), items: self.items, notes }, sources: self.sources }
     }
 }
 

@@ -11,12 +11,12 @@ mod words;
 
 use std::collections::HashMap;
 
-use flexarm_path::program::{Blend, Configuration, Move, MoveKind, Program, Speed, Target};
+use flexarm_path::program::{Blend, Configuration, Move, MoveKind, Speed, Target};
 use flexarm_spatial::Pose;
 use nalgebra::{Rotation3, Translation3, Vector3};
 
 use crate::common::frames::rotation_zyx;
-use crate::common::recorder::Recorder;
+use crate::common::recorder::{Recorded, Recorder};
 use crate::common::{Result, Span, Text, fail};
 use crate::{ReadOptions, Rotary};
 
@@ -68,7 +68,7 @@ struct Gcode<'a> {
     has_moved: bool,
 }
 
-pub(crate) fn read(texts: &mut [Text], options: &ReadOptions<'_>) -> Result<Program> {
+pub(crate) fn read(texts: &mut [Text], options: &ReadOptions<'_>) -> Result<Recorded> {
     let text = texts[0].text.clone();
     let path = texts[0].path.clone();
     let mut parameters = Parameters::default();

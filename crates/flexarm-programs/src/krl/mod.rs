@@ -13,15 +13,14 @@ use std::collections::HashSet;
 use std::path::Path;
 use std::rc::Rc;
 
-use flexarm_path::program::Program;
-
 use crate::common::machine::{Flow, Machine};
-use crate::common::recorder::Recorder;
+use crate::common::recorder::{Recorded, Recorder};
 use crate::common::tree::{Action, Routine, Statement};
 use crate::common::value::Value;
 use crate::common::{Result, Span, Text, fail};
 use crate::{ReadOptions, decode, given_text};
 
+pub(crate) use parse::SPELLING;
 use parse::Unit;
 use system::Krl;
 
@@ -31,7 +30,7 @@ const MOST_SIBLINGS: usize = 64;
 /// Folders above the program in which its controller's data are looked for.
 const LEVELS_OF_A_BACKUP: usize = 4;
 
-pub(crate) fn read(texts: &mut Vec<Text>, options: &ReadOptions<'_>) -> Result<Program> {
+pub(crate) fn read(texts: &mut Vec<Text>, options: &ReadOptions<'_>) -> Result<Recorded> {
     let mut unit = parse::parse(&texts[0], 0)?;
     let mut data = Vec::new();
     let path = texts[0].path.clone();

@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 use super::system::{CARTESIAN, Krl, frame_of, is_name, set_axes, tool_data, unknown_tool_number};
 use crate::common::frames::{Circle, mm_deg_zyx, pose_zyx_mm_deg};
 use crate::common::machine::{Flow, Machine};
+use crate::common::recorder::Sources;
 use crate::common::tree::{Argument, Expr, Kind, Operator, Statement};
 use crate::common::value::{Record, Value, depends};
 use crate::common::{Result, Span, fail};
@@ -145,11 +146,26 @@ fn make(machine: &mut Krls<'_>, word: &str, arguments: &[Argument], span: Span) 
     let blend = if machine.dialect.in_spline { Blend::Pass } else { blend(machine, arguments, span)? };
     let end = end_of_arc(machine, &context, &kind, &to, span);
     let step = Move { line: 0, statement: String::new(), kind, to, X_WB, X_FT, speed, blend };
+    machine.recorder.next = sources(machine, arguments, &context, &step);
     machine.recorder.add(step, span)?;
     if let Some(X_BT) = end {
         machine.recorder.now_at(X_WB, X_FT, X_BT);
     }
     Ok(())
+}
+
+/// Where the literals of a move stand; none where it is told relative to others.
+fn sources(machine: &mut Krls<'_>, arguments: &[Argument], context: &Context, step: &Move) -> Sources {
+    let constant = matches!(machine.global("$ori_type"), Some(Value::Word(word)) if &**word == "constant");
+    let joint = step.kind == MoveKind::Joint;
+    match &step.kind {
+        _ if context.is_relative || (constant && !joint) => Sources::default(),
+        MoveKind::Arc { angle: Some(_), .. } => Sources::default(),
+        MoveKind::Arc { .. } => {
+            Sources { target: machine.argument_origin(arguments, 1), via: machine.argument_origin(arguments, 0) }
+        }
+        _ => Sources { target: machine.argument_origin(arguments, 0), via: None },
+    }
 }
 
 /// Frames of a move, and how its targets are meant.

@@ -8,7 +8,7 @@ use crate::common::tree::{Action, Argument, Expr, Kind, Operator, Parameter, Rou
 use crate::common::value::Value;
 use crate::common::{Fail, Result, Text, fail};
 
-const SPELLING: Spelling = Spelling {
+pub(crate) const SPELLING: Spelling = Spelling {
     comment: ';',
     lines: true,
     folds_case: true,

@@ -13,16 +13,15 @@ mod types;
 
 use std::rc::Rc;
 
-use flexarm_path::program::Program;
-
 use crate::common::machine::{Dialect, Flow, Machine};
-use crate::common::recorder::Recorder;
+use crate::common::recorder::{Recorded, Recorder};
 use crate::common::tree::{Argument, Operator, Statement};
 use crate::common::value::{Value, depends};
 use crate::common::{Result, Span, Text, fail};
 use crate::{ReadOptions, decode, given_text};
 
 use motion::Settings;
+pub(crate) use parse::SPELLING;
 
 /// What RAPID keeps beside its variables.
 pub(crate) struct Rapid {
@@ -39,7 +38,7 @@ const MOST_SIBLINGS: usize = 64;
 
 type Rapids<'a> = Machine<'a, Rapid>;
 
-pub(crate) fn read(texts: &mut Vec<Text>, options: &ReadOptions<'_>) -> Result<Program> {
+pub(crate) fn read(texts: &mut Vec<Text>, options: &ReadOptions<'_>) -> Result<Recorded> {
     let mut unit = parse::parse(&texts[0], 0)?;
     for (path, bytes) in &options.companions {
         texts.push(Text::new(path, &decode(bytes)));

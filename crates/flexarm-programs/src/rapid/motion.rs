@@ -10,6 +10,7 @@ use super::functions::{pose_mm, position, rotation, typed};
 use super::{Rapid, Rapids, types};
 use crate::common::frames::quaternion;
 use crate::common::machine::{Dialect, positional};
+use crate::common::recorder::Sources;
 use crate::common::tree::{Argument, Expr, Kind};
 use crate::common::value::{Record, Value};
 use crate::common::{Result, Span, fail};
@@ -123,6 +124,9 @@ pub(super) fn motion(machine: &mut Rapids<'_>, name: &str, arguments: &[Argument
     let speed = speed(machine, arguments, places.speed, span)?;
     let blend = zone(machine, arguments, places.zone, span)?;
     let step = Move { line: 0, statement: String::new(), kind, to, X_WB, X_FT, speed, blend };
+    let target = machine.argument_origin(arguments, places.target);
+    let via = places.circle_point.and_then(|place| machine.argument_origin(arguments, place));
+    machine.recorder.next = Sources { target, via };
     machine.recorder.add(step, span)?;
     Ok(true)
 }

@@ -9,7 +9,7 @@ use crate::common::lexer::{Spelling, Token, tokens};
 use crate::common::tree::{Action, Argument, Expr, Kind, Parameter, Routine, Statement};
 use crate::common::{Fail, Result, Span, Text, fail};
 
-const SPELLING: Spelling = Spelling {
+pub(crate) const SPELLING: Spelling = Spelling {
     comment: '!',
     lines: false,
     folds_case: true,

@@ -9,12 +9,12 @@ mod parse;
 
 use std::rc::Rc;
 
-use flexarm_path::program::{Blend, Configuration, Item, Move, MoveKind, Program, Speed, Target};
+use flexarm_path::program::{Blend, Configuration, Item, Move, MoveKind, Speed, Target};
 use flexarm_spatial::Pose;
 
 use crate::common::frames::{Circle, pose_rotation_vector, rotation_vector_of};
 use crate::common::machine::{Dialect, Flow, Machine, positional};
-use crate::common::recorder::Recorder;
+use crate::common::recorder::{Recorded, Recorder};
 use crate::common::tree::{Argument, Operator, Statement};
 use crate::common::value::{Value, depends};
 use crate::common::{Result, Span, Text, fail};
@@ -27,7 +27,7 @@ pub(crate) struct UrScript {
 
 type UrScripts<'a> = Machine<'a, UrScript>;
 
-pub(crate) fn read(texts: &mut Vec<Text>, options: &ReadOptions<'_>) -> Result<Program> {
+pub(crate) fn read(texts: &mut Vec<Text>, options: &ReadOptions<'_>) -> Result<Recorded> {
     let mut unit = parse::parse(&texts[0], 0)?;
     for (path, bytes) in &options.companions {
         texts.push(Text::new(path, &decode(bytes)));

@@ -4,47 +4,47 @@
 //! ([`Inversion`]), and the new motion is run again, a few times. At rest ([`Method::Static`]) each point is corrected to its
 //! equilibrium alone. [`static_targets`], [`Inversion`] and [`Shaper`] take and give values.
 
+mod error;
+mod files;
+mod job;
+mod judge;
+mod limits;
 mod page;
+mod program;
+mod shaped;
 
-use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 pub use flexarm_analysis::{Inversion, InversionError, Node, Shaper, ShaperKind};
-use flexarm_files::{check_free, write_all};
-use flexarm_flexlink::GearStiffness;
-use flexarm_kinematics::{Data, Pose, Wrench, forward_kinematics, rotation_vector};
-use flexarm_stepping::{Held, linearise};
 pub use flexarm_stepping::{StaticTargets, TargetError, static_targets};
-use flexarm_trajectory::{JointKnots, Trajectory};
-use nalgebra::{DMatrix, DVector, Quaternion, Rotation3, Translation3, UnitQuaternion};
-use rayon::prelude::*;
+use flexarm_trajectory::Trajectory;
 use serde::Serialize;
 
 use crate::arm::Arm;
 use crate::caveat::Caveat;
 use crate::error::Error;
 use crate::motion::Motion;
-use crate::options::{DriveModel, LinkModel, Modelling, RunOptions};
-use crate::robot::{Robot, tcp_frame};
+use crate::motion_report::MotionViolation;
+use crate::options::RunOptions;
+use crate::robot::Robot;
 use crate::scenario::Scenario;
+pub use error::CompensateError;
+use files::Files;
+use job::Job;
+use judge::{Judge, sweep};
+pub use limits::LimitRule;
+pub use program::{LeftTarget, ProgramFigures};
+use shaped::shaped;
 
-/// Time between two nodes at which the arm is linearised (s).
-const NODE_S: f64 = 0.02;
 /// Time between two samples of the error and two knots of the commands (s).
 const SAMPLE_S: f64 = 1e-3;
-/// Part of a sample by which logged times may differ from those that are asked for.
-const LOGGED_WITHIN: f64 = 1e-3;
 /// Longest step (s): the error is sampled with it.
 const LONGEST_STEP_S: f64 = 4e-3;
 /// Most iterations that may be asked for.
 const MOST_ITERATIONS: usize = 100;
 /// Longest motion that is taken (s): all of it is held in memory, a sample a millisecond.
 const LONGEST_S: f64 = 600.0;
-/// An iteration that leaves more than this part of the one before is the last.
-const SETTLED: f64 = 0.9;
-/// Least part of the peak below which nothing more is asked for.
-const ENOUGH: f64 = 1e-5;
 
 /// How commands are found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -75,8 +75,16 @@ pub struct CompensateRequest {
     pub plant: Option<(String, Robot)>,
     /// Judge with stiffness, damping and drives that are off as well.
     pub sweep: bool,
-    /// Folder of the new motion and the page; nothing is written without it.
+    /// Greatest acceleration of each joint (rad/s² or m/s²), in coordinate order; not looked at where it is empty.
+    pub accelerations: Vec<f64>,
+    /// What becomes of commands that pass a limit which the motion itself keeps.
+    pub limits: LimitRule,
+    /// Folder of the new motion, the page and the recording; nothing is written without it.
     pub output: Option<PathBuf>,
+    /// Further files of the new motion, by their endings: `.csv`, `.toml`, `.yaml` and `.json`.
+    pub motions: Vec<PathBuf>,
+    /// Write a recording of the arm before and after (`.rrd`), if this build can.
+    pub recording: bool,
     /// Overwrite what is there.
     pub overwrite: bool,
 }
@@ -92,7 +100,11 @@ impl Default for CompensateRequest {
             shaper: None,
             plant: None,
             sweep: true,
+            accelerations: Vec::new(),
+            limits: LimitRule::default(),
             output: None,
+            motions: Vec::new(),
+            recording: true,
             overwrite: false,
         }
     }
@@ -132,14 +144,22 @@ pub struct Compensation {
     pub cutoff_hz: Option<f64>,
     /// Largest change of each joint (rad or m).
     pub changes: Vec<JointChange>,
-    /// Limits that the new motion passes.
-    pub limits: Vec<String>,
+    /// Limits that the new motion passes: positions, speeds and accelerations of the commands, torques of the run on the plant.
+    pub limits: Vec<MotionViolation>,
+    /// How many times as long the motion takes so that limits are kept; 1 if it is as it was.
+    pub slowed: f64,
     /// How much longer the motion takes by its shaper (s).
     pub shaper_delay_s: f64,
     /// The same commands on other plants.
     pub plants: Vec<PlantFigures>,
     /// The new motion (.csv).
     pub file: Option<String>,
+    /// Further files of the new motion.
+    pub files: Vec<String>,
+    /// The arm before and after (.rrd).
+    pub recording: Option<String>,
+    /// The robot program with corrected targets, of motions that were read from one (KRL, RAPID).
+    pub program: Option<ProgramFigures>,
     /// The page.
     pub page: Option<String>,
     /// What is doubtful.
@@ -172,68 +192,20 @@ pub struct PlantFigures {
     pub after: ErrorFigures,
 }
 
-/// Why a motion cannot be compensated.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum CompensateError {
-    /// A rigid robot.
-    #[error("the robot has no flexible link and no elastic drive: its tool is where the rigid arm has it")]
-    NothingYields,
-    /// Corners.
-    #[error("the velocity jumps at {t_s} s: no command takes that away; round the corners of the motion first")]
-    Corner {
-        /// When (s).
-        t_s: f64,
-    },
-    /// Nothing is to be kept.
-    #[error("no component of the tool is chosen: choose some of x, y, z, rx, ry, rz")]
-    NoComponent,
-    /// A number that makes no sense.
-    #[error("{what} is {found}, expected {expected}")]
-    Value {
-        /// Which.
-        what: &'static str,
-        /// Found.
-        found: f64,
-        /// Expected.
-        expected: &'static str,
-    },
-    /// The run is not logged at the times at which the rigid arm is looked at.
-    #[error("the run has no sample at {t_s} s (off by {off_s:.1e} s): choose a step that divides 0.001 s")]
-    Logged {
-        /// When (s).
-        t_s: f64,
-        /// By how much (s).
-        off_s: f64,
-    },
-    /// The other robot does not have the same joints.
-    #[error("the plant has the joints {found:?}, the robot {expected:?}: they must be the same")]
-    OtherJoints {
-        /// Of the plant.
-        found: Vec<String>,
-        /// Of the robot.
-        expected: Vec<String>,
-    },
-    /// The linearised arm cannot be inverted.
-    #[error(transparent)]
-    Inversion(#[from] InversionError),
-    /// A pose without targets.
-    #[error("at {t_s:.3} s: {source}")]
-    Target {
-        /// When (s).
-        t_s: f64,
-        /// Why.
-        source: TargetError,
-    },
-}
-
-/// Finds commands for a motion, and judges them.
+/// Finds commands for a motion, and judges them. Loads and payloads of the scenario act in all runs.
 ///
 /// # Errors
 /// [`Error::Compensate`], and as [`crate::simulate`].
-pub fn compensate_motion(robot: &Robot, motion: &Motion, request: &CompensateRequest) -> Result<Compensation, Error> {
-    compensate_motion_until(robot, motion, request, &|| false)
+pub fn compensate_motion(
+    robot: &Robot,
+    scenario: impl Into<Scenario>,
+    request: &CompensateRequest,
+) -> Result<Compensation, Error> {
+    compensate_motion_until(robot, scenario, request, &|| false)
 }
+
+/// Whether somebody wants a computation to stop.
+type Stop<'a> = &'a (dyn Fn() -> bool + Sync);
 
 /// As [`compensate_motion`]; as soon as `stop` says so, it ends with [`Error::Interrupted`], and nothing is written.
 ///
@@ -241,72 +213,95 @@ pub fn compensate_motion(robot: &Robot, motion: &Motion, request: &CompensateReq
 /// As [`compensate_motion`]; [`Error::Interrupted`].
 pub fn compensate_motion_until(
     robot: &Robot,
-    motion: &Motion,
+    scenario: impl Into<Scenario>,
     request: &CompensateRequest,
     stop: &(dyn Fn() -> bool + Sync),
 ) -> Result<Compensation, Error> {
-    check(motion, request)?;
-    let targets =
-        request.output.as_ref().map(|folder| [folder.join("compensated.csv"), folder.join("compensation.html")]);
-    if let Some(targets) = &targets {
-        check_free(targets, request.overwrite)?;
-    }
+    let scenario = scenario.into();
+    let files = Files::of(&scenario.motion, request)?;
     let arm = robot.flexible(request.run.modelling)?;
-    if arm.flexible().springs.is_empty() {
-        return Err(CompensateError::NothingYields.into());
+    check(&scenario, request, &arm)?;
+    let (mut answer, found) = limits::kept(robot, &arm, &scenario, request, stop)?;
+    let program = files.program(robot, &arm, &scenario, request, &mut answer);
+    files.write(&mut answer, &arm, &found, program, request)?;
+    Ok(answer)
+}
+
+/// What was found and for what, for files.
+struct Found {
+    /// What was asked for, slowed and shaped.
+    scenario: Scenario,
+    /// The new motion.
+    motion: Motion,
+}
+
+/// Commands for a motion as it is.
+fn attempt(
+    robot: &Robot,
+    arm: &Arm,
+    scenario: &Scenario,
+    request: &CompensateRequest,
+    stop: Stop<'_>,
+) -> Result<(Compensation, Found, Vec<MotionViolation>), Error> {
+    let mut scenario = scenario.clone();
+    let mut shaper_delay_s = 0.0;
+    if let Some(kind) = request.shaper {
+        (scenario.motion, shaper_delay_s) = shaped(arm, &scenario.motion, kind)?;
     }
-    let (motion, shaper_delay_s) = match request.shaper {
-        Some(kind) => shaped(&arm, motion, kind)?,
-        None => (motion.clone(), 0.0),
-    };
-    let job = Job::new(&arm, &motion, request, stop)?;
+    let job = Job::new(arm, &scenario, request, stop)?;
     let found = match request.method {
         Method::Dynamic => job.dynamic()?,
         Method::Static => job.at_rest()?,
     };
     let judge = match &request.plant {
-        Some((_, plant)) => Judge::of(plant, request, &arm)?,
+        Some((_, plant)) => Judge::of(plant, request, arm)?,
         None => Judge { arm: arm.clone(), run: request.run.clone() },
     };
     let as_it_is = job.as_it_is()?;
-    let (before, wander) = judge.figures(&job, &as_it_is)?;
-    let (after, left) = judge.figures(&job, &found.motion)?;
-    let plants = if request.sweep { sweep(robot, request, &job, &arm, &found.motion)? } else { Vec::new() };
-    let names: Vec<String> = arm.joints().map(str::to_owned).collect();
+    let before = judge.figures(&job, &as_it_is)?;
+    let after = judge.figures(&job, &found.motion)?;
+    let limits = limits::passed(robot, &found.motion, &after.efforts, request)?;
+    let own = limits::passed(robot, &scenario.motion, &before.efforts, request)?;
+    // What will be refused or run again is not judged elsewhere.
+    let kept = request.limits == LimitRule::Tell || limits::worse(&limits, &own).next().is_none();
+    let plants = match request.sweep && kept {
+        true => sweep(robot, request, &job, arm, &found.motion)?,
+        false => Vec::new(),
+    };
     let largest = |k: usize| found.change.row(k).amax();
-    let changes = names.iter().enumerate().map(|(k, joint)| JointChange { joint: joint.clone(), largest: largest(k) });
+    let changes = arm.joints().enumerate().map(|(k, joint)| JointChange { joint: joint.into(), largest: largest(k) });
+    let curves = job.times.iter().zip(before.distance.iter().zip(&after.distance)).map(|(t, (a, b))| [*t, *a, *b]);
     let mut answer = Compensation {
         robot: robot.name.clone(),
-        motion: motion.path.display().to_string(),
+        motion: scenario.motion.path.display().to_string(),
         method: if request.method == Method::Dynamic { "dynamic" } else { "static" },
-        before,
-        after,
+        before: before.figures,
+        after: after.figures,
         model_peaks_m: found.peaks.clone(),
         iterations: found.kept,
         cutoff_hz: found.cutoff_hz,
         changes: changes.collect(),
-        limits: found.motion.violations.iter().map(ToString::to_string).collect(),
+        limits,
+        slowed: 1.0,
         shaper_delay_s,
         plants,
         file: None,
+        files: Vec::new(),
+        recording: None,
+        program: None,
         page: None,
         caveats: Vec::new(),
         trajectory: found.motion.trajectory.clone(),
-        curves: job.times.iter().zip(wander.iter().zip(&left)).map(|(t, (a, b))| [*t, *a, *b]).collect(),
+        curves: curves.collect(),
     };
-    answer.caveats = caveats(&answer, &motion, robot);
+    answer.caveats = caveats(&answer, &own, robot);
     answer.caveats.extend(found.fewest.and_then(|fewest| singular_caveat(fewest, job.rows.len())));
-    if let Some([file, page]) = targets {
-        let mut csv = Vec::new();
-        found.motion.trajectory.to_csv(1.0 / SAMPLE_S, &mut csv)?;
-        (answer.file, answer.page) = (Some(file.display().to_string()), Some(page.display().to_string()));
-        let html = page::html(&answer).into_bytes();
-        write_all(&[(file, csv), (page, html)])?;
-    }
-    Ok(answer)
+    let motion = found.motion;
+    Ok((answer, Found { scenario, motion }, own))
 }
 
-fn check(motion: &Motion, request: &CompensateRequest) -> Result<(), CompensateError> {
+fn check(scenario: &Scenario, request: &CompensateRequest, arm: &Arm) -> Result<(), CompensateError> {
+    let motion = &scenario.motion;
     if !request.components.contains(&true) {
         return Err(CompensateError::NoComponent);
     }
@@ -325,392 +320,25 @@ fn check(motion: &Motion, request: &CompensateRequest) -> Result<(), CompensateE
         let found = request.iterations as f64;
         return Err(CompensateError::Value { what: "the number of iterations", found, expected: "at most 100" });
     }
+    let (found, expected) = (request.accelerations.len(), arm.joints().count());
+    if found != 0 && found != expected {
+        return Err(CompensateError::Accelerations { found, expected });
+    }
+    if let Some(found) = request.accelerations.iter().copied().find(|limit| limit.is_nan() || *limit <= 0.0) {
+        let expected = "a positive number (rad/s2 or m/s2)";
+        return Err(CompensateError::Value { what: "a limit of the acceleration", found, expected });
+    }
+    if let Some(change) = scenario.payloads.iter().find(|change| request.method == Method::Static && change.at_s > 0.0)
+    {
+        return Err(CompensateError::StaticPayload { at_s: change.at_s });
+    }
+    if arm.flexible().springs.is_empty() {
+        return Err(CompensateError::NothingYields);
+    }
     match motion.trajectory.velocity_jumps().first() {
         Some(jump) => Err(CompensateError::Corner { t_s: jump.time_s }),
         None => Ok(()),
     }
-}
-
-/// A motion on the model, with the poses that its tool should have.
-struct Job<'a> {
-    arm: &'a Arm,
-    request: &'a CompensateRequest,
-    motion: &'a Motion,
-    /// Times of samples (s).
-    times: Vec<f64>,
-    /// Joints at these times, m×N.
-    q: DMatrix<f64>,
-    /// The rigid arm's tool at these times.
-    wanted: Vec<Pose>,
-    rows: Vec<usize>,
-    stop: &'a (dyn Fn() -> bool + Sync),
-}
-
-/// Commands as they were found.
-struct Commands {
-    motion: Motion,
-    /// Change of the joints, m×N.
-    change: DMatrix<f64>,
-    peaks: Vec<f64>,
-    kept: usize,
-    cutoff_hz: Option<f64>,
-    /// When the joints move the tool in fewest directions (s), and in how many.
-    fewest: Option<(f64, usize)>,
-}
-
-impl<'a> Job<'a> {
-    fn new(
-        arm: &'a Arm,
-        motion: &'a Motion,
-        request: &'a CompensateRequest,
-        stop: &'a (dyn Fn() -> bool + Sync),
-    ) -> Result<Self, Error> {
-        let model = arm.robot().rigid_model()?;
-        // Whole numbers of steps, so that the run is logged at just these times; the last lies at the end or a little beyond, where
-        // the joints are held.
-        let step = request.run.step_s;
-        let spacing = step * (SAMPLE_S / step).round().max(1.0);
-        let n = ((motion.trajectory.duration() / spacing - 1e-6).ceil() as usize).max(8);
-        let times: Vec<f64> = (0..=n).map(|k| spacing * k as f64).collect();
-        let m = model.n_actuated();
-        let (frame, mut data) = (tcp_frame(&model), Data::new(&model));
-        let mut q = DMatrix::zeros(m, times.len());
-        let mut wanted = Vec::with_capacity(times.len());
-        let (mut at, mut v, mut a) = (DVector::zeros(m), vec![0.0; m], vec![0.0; m]);
-        for (k, t) in times.iter().enumerate() {
-            motion.trajectory.sample(*t, at.as_mut_slice(), &mut v, &mut a);
-            forward_kinematics(&model, &mut data, &at);
-            wanted.push(data.X_WF(&frame));
-            q.set_column(k, &at);
-        }
-        let rows = (0..6).filter(|k| request.components[*k]).collect();
-        Ok(Self { arm, request, motion, times, q, wanted, rows, stop })
-    }
-
-    /// Goes on unless somebody wants it to stop; `t_s`: how far it is.
-    fn go_on(&self, t_s: f64) -> Result<(), Error> {
-        match (self.stop)() {
-            true => Err(Error::Interrupted { t: t_s, partial: false }),
-            false => Ok(()),
-        }
-    }
-
-    fn step_s(&self) -> f64 {
-        self.times[1]
-    }
-
-    /// The motion with changed joints.
-    fn moved(&self, change: &DMatrix<f64>) -> Result<Motion, Error> {
-        let (m, h, last) = (self.q.nrows(), self.step_s(), self.times.len() - 1);
-        let of = |k: usize, i: i64| change[(k, i.clamp(0, last as i64) as usize)];
-        let mut reference = vec![Vec::with_capacity(last + 1); m];
-        let (mut q, mut v, mut a) = (vec![0.0; m], vec![0.0; m], vec![0.0; m]);
-        for t in &self.times {
-            self.motion.trajectory.sample(*t, &mut q, &mut v, &mut a);
-            (0..m).for_each(|k| reference[k].push([q[k], v[k], a[k]]));
-        }
-        let joint = |k: usize| {
-            let mut knots = JointKnots { name: self.motion.trajectory.joints()[k].clone(), ..JointKnots::default() };
-            for (i, [q, v, a]) in reference[k].iter().enumerate() {
-                let i = i as i64;
-                // At rest at both ends.
-                let inner = i > 0 && i < last as i64;
-                let rate = (8.0 * (of(k, i + 1) - of(k, i - 1)) - (of(k, i + 2) - of(k, i - 2))) / (12.0 * h);
-                let acceleration =
-                    (16.0 * (of(k, i + 1) + of(k, i - 1)) - (of(k, i + 2) + of(k, i - 2)) - 30.0 * of(k, i))
-                        / (12.0 * h * h);
-                let (rate, acceleration) = if inner { (rate, acceleration) } else { (0.0, 0.0) };
-                knots.position.push(q + of(k, i));
-                knots.velocity.push(v + rate);
-                knots.acceleration.push([a + acceleration; 2]);
-            }
-            knots
-        };
-        let joints: Vec<JointKnots> = (0..m).map(joint).collect();
-        let trajectory = Trajectory::through_knots(&self.times, &joints)?;
-        Motion::along(trajectory, &format!("{}_compensated", self.motion.name), self.arm.robot())
-    }
-
-    /// The motion as it is, at the times of this job.
-    fn as_it_is(&self) -> Result<Motion, Error> {
-        self.moved(&DMatrix::zeros(self.q.nrows(), self.q.ncols()))
-    }
-
-    /// Run of a motion on an arm: displacement of the tool from where it should be, 6×N, world axes.
-    fn error(&self, arm: &Arm, run: &RunOptions, motion: &Motion) -> Result<DMatrix<f64>, Error> {
-        let options =
-            RunOptions { log_rate_hz: 1.0 / self.step_s(), with_twin: false, ignore_limits: true, ..run.clone() };
-        let mut progress = |_, _| if (self.stop)() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
-        let run = arm.simulate_watched(Scenario::from(motion), &options, None, None, &mut progress)?;
-        let (t, p, r) = (run.time_s(), run.values("tcp_position"), run.values("tcp_quaternion_wxyz"));
-        let mut error = DMatrix::zeros(6, self.times.len());
-        for (k, time) in self.times.iter().enumerate() {
-            let row = t.partition_point(|x| *x < time - 0.5 * self.step_s()).min(t.len() - 1);
-            let off = (t[row] - time).abs();
-            if off > LOGGED_WITHIN * self.step_s() {
-                return Err(CompensateError::Logged { t_s: *time, off_s: off }.into());
-            }
-            let place = Translation3::new(p[3 * row], p[3 * row + 1], p[3 * row + 2]);
-            let turn = Quaternion::new(r[4 * row], r[4 * row + 1], r[4 * row + 2], r[4 * row + 3]);
-            let turn: Rotation3<f64> = UnitQuaternion::from_quaternion(turn).to_rotation_matrix();
-            let wanted = &self.wanted[k];
-            let moved = place.vector - wanted.translation.vector;
-            let turned = rotation_vector((turn * wanted.rotation.inverse()).matrix());
-            error.fixed_view_mut::<3, 1>(0, k).copy_from(&moved);
-            error.fixed_view_mut::<3, 1>(3, k).copy_from(&turned);
-        }
-        Ok(error)
-    }
-
-    /// The arm linearised along the motion.
-    fn inversion(&self) -> Result<(Inversion, f64), Error> {
-        let duration = self.motion.trajectory.duration();
-        let count = ((duration / NODE_S).ceil() as usize).max(1);
-        let spacing = duration / count as f64;
-        let flexible = self.arm.flexible();
-        let m = self.q.nrows();
-        let node = |k: usize| -> Result<Node, Error> {
-            self.go_on(spacing * k as f64)?;
-            let (mut q, mut v, mut a) = (vec![0.0; m], vec![0.0; m], vec![0.0; m]);
-            self.motion.trajectory.sample(spacing * k as f64, &mut q, &mut v, &mut a);
-            let arm = flexible.arm(Arc::new(Held(q))).map_err(|error| flexible.explained(error))?;
-            let at =
-                linearise(&arm, &flexible.tcp, &Wrench::zeros(), 0.0).map_err(|error| flexible.explained(error))?;
-            let rows = |M: &nalgebra::Matrix6xX<f64>| {
-                DMatrix::from_fn(self.rows.len(), M.ncols(), |i, j| M[(self.rows[i], j)])
-            };
-            let (J, J_a) = (rows(&at.J), rows(&at.J_a));
-            Ok(Node { M: at.M, D: at.D, K: at.K, M_a: at.M_a, D_a: at.D_a, K_a: at.K_a, J, J_a })
-        };
-        let nodes = (0..=count).into_par_iter().map(node).collect::<Result<Vec<Node>, Error>>()?;
-        let inversion = Inversion::new(&nodes, spacing).map_err(CompensateError::from)?;
-        let inversion = match self.request.cutoff_hz {
-            Some(hz) => inversion.below(hz),
-            None => inversion,
-        };
-        let cutoff = inversion.cutoff_hz();
-        Ok((inversion, cutoff))
-    }
-
-    fn dynamic(&self) -> Result<Commands, Error> {
-        let (inversion, cutoff) = self.inversion()?;
-        let (m, N) = self.q.shape();
-        let run = &self.request.run;
-        let mut change = DMatrix::zeros(m, N);
-        let mut best = Commands {
-            motion: self.motion.clone(),
-            change: change.clone(),
-            peaks: Vec::new(),
-            kept: 0,
-            cutoff_hz: Some(cutoff),
-            fewest: inversion.fewest_directions(),
-        };
-        let mut error = self.error(self.arm, run, &self.as_it_is()?)?;
-        let size = |error: &DMatrix<f64>| error.select_rows(&self.rows).norm();
-        let (first, mut least) = (size(&error), size(&error));
-        best.peaks.push(peak(&error));
-        for iteration in 1..=self.request.iterations {
-            let y = -error.select_rows(&self.rows);
-            change += inversion.commands(&y, self.step_s());
-            let motion = self.moved(&change)?;
-            error = self.error(self.arm, run, &motion)?;
-            let left = size(&error);
-            best.peaks.push(peak(&error));
-            if left.is_nan() || left >= least {
-                break;
-            }
-            let settled = left > SETTLED * least || left < ENOUGH * first;
-            (least, best.motion, best.change, best.kept) = (left, motion, change.clone(), iteration);
-            if settled {
-                break;
-            }
-        }
-        Ok(best)
-    }
-
-    /// Each node at rest, a spline between them.
-    fn at_rest(&self) -> Result<Commands, Error> {
-        let flexible = self.arm.flexible();
-        let (m, N) = self.q.shape();
-        let arm = flexible
-            .arm(Arc::new(Held(self.q.column(0).iter().copied().collect())))
-            .map_err(|e| flexible.explained(e))?;
-        let every = ((NODE_S / self.step_s()).round() as usize).max(1);
-        let nodes: Vec<usize> = (0..N - 1).step_by(every).chain([N - 1]).collect();
-        let one = |k: &usize| {
-            self.go_on(self.times[*k])?;
-            let q: Vec<f64> = self.q.column(*k).iter().copied().collect();
-            let found = static_targets(&arm, &flexible.tcp, &q, &Wrench::zeros(), &self.request.components);
-            let found = found.map_err(|source| CompensateError::Target { t_s: self.times[*k], source })?;
-            Ok::<_, Error>(DVector::from_iterator(m, found.q.iter().zip(&q).map(|(new, old)| new - old)))
-        };
-        let found: Vec<DVector<f64>> = nodes.par_iter().map(one).collect::<Result<_, Error>>()?;
-        let mut change = DMatrix::zeros(m, N);
-        for k in 0..N {
-            let i = nodes.partition_point(|node| *node <= k).clamp(1, nodes.len() - 1);
-            let (a, b) = (nodes[i - 1], nodes[i]);
-            let s = (k - a) as f64 / (b - a) as f64;
-            let slope = |i: usize| match i {
-                0 => DVector::zeros(m),
-                i if i + 1 >= nodes.len() => DVector::zeros(m),
-                i => (&found[i + 1] - &found[i - 1]) / (nodes[i + 1] - nodes[i - 1]) as f64,
-            };
-            let (m0, m1) = (slope(i - 1) * (b - a) as f64, slope(i) * (b - a) as f64);
-            let (p0, p1) = (&found[i - 1], &found[i]);
-            let (s2, s3) = (s * s, s * s * s);
-            let value = p0 * (2.0 * s3 - 3.0 * s2 + 1.0)
-                + m0 * (s3 - 2.0 * s2 + s)
-                + p1 * (3.0 * s2 - 2.0 * s3)
-                + m1 * (s3 - s2);
-            change.set_column(k, &value);
-        }
-        let motion = self.moved(&change)?;
-        let run = &self.request.run;
-        let peaks =
-            vec![peak(&self.error(self.arm, run, &self.as_it_is()?)?), peak(&self.error(self.arm, run, &motion)?)];
-        Ok(Commands { motion, change, peaks, kept: 1, cutoff_hz: None, fewest: None })
-    }
-}
-
-fn distances(error: &DMatrix<f64>) -> Vec<f64> {
-    error.column_iter().map(|e| e.rows(0, 3).norm()).collect()
-}
-
-fn peak(error: &DMatrix<f64>) -> f64 {
-    distances(error).into_iter().fold(0.0, f64::max)
-}
-
-/// A plant on which commands are judged.
-struct Judge {
-    arm: Arm,
-    run: RunOptions,
-}
-
-impl Judge {
-    /// Another robot with the same joints.
-    fn of(plant: &Robot, request: &CompensateRequest, arm: &Arm) -> Result<Self, Error> {
-        let judge = Self { arm: plant.flexible(Modelling::default())?, run: request.run.clone() };
-        let names = |arm: &Arm| arm.joints().map(str::to_owned).collect::<Vec<_>>();
-        let (found, expected) = (names(&judge.arm), names(arm));
-        if found != expected {
-            return Err(CompensateError::OtherJoints { found, expected }.into());
-        }
-        Ok(judge)
-    }
-
-    fn figures(&self, job: &Job<'_>, motion: &Motion) -> Result<(ErrorFigures, Vec<f64>), Error> {
-        let error = job.error(&self.arm, &self.run, motion)?;
-        let distance = distances(&error);
-        let turns = error.column_iter().map(|e| e.rows(3, 3).norm()).fold(0.0, f64::max);
-        let figures = ErrorFigures {
-            peak_m: distance.iter().copied().fold(0.0, f64::max),
-            rms_m: (distance.iter().map(|d| d * d).sum::<f64>() / distance.len() as f64).sqrt(),
-            peak_rad: turns,
-            end_m: distance.last().copied().unwrap_or(0.0),
-        };
-        Ok((figures, distance))
-    }
-}
-
-/// The robot with all stiffness and damping so many times as large.
-fn changed(robot: &Robot, stiffness: f64, damping: f64) -> Robot {
-    let mut changed = robot.clone();
-    for drive in &mut changed.drives {
-        if let Some((gearbox, gear)) = &mut drive.gearbox {
-            gearbox.stiffness = match &gearbox.stiffness {
-                GearStiffness::Axis(k) => GearStiffness::Axis(stiffness * k),
-                GearStiffness::Tilting(k) => GearStiffness::Tilting(k.map(|k| stiffness * k)),
-                GearStiffness::Full(K) => GearStiffness::Full(K * stiffness),
-            };
-            gear.curve = gear.curve.as_ref().map(|curve| curve.scaled(stiffness));
-            gear.dampers = gear.dampers.as_ref().map(|d| d.iter().map(|d| damping * d).collect());
-        }
-    }
-    for link in &mut changed.flexible {
-        link.stiffness_factor *= stiffness;
-        link.damping = link.damping.scaled(damping);
-    }
-    changed
-}
-
-/// The commands on plants that are off.
-fn sweep(
-    robot: &Robot,
-    request: &CompensateRequest,
-    job: &Job<'_>,
-    arm: &Arm,
-    found: &Motion,
-) -> Result<Vec<PlantFigures>, Error> {
-    let modelling = request.run.modelling;
-    let mut plants: Vec<(String, Robot, Modelling)> = vec![
-        ("stiffness 30 % lower".into(), changed(robot, 0.7, 1.0), modelling),
-        ("stiffness 30 % higher".into(), changed(robot, 1.3, 1.0), modelling),
-        ("damping halved".into(), changed(robot, 1.0, 0.5), modelling),
-    ];
-    let links = !arm.flexible().spans.is_empty();
-    if links && arm.flexible().springs.len() > arm.flexible().spans.len() {
-        plants.push((
-            "drives alone give way".into(),
-            robot.clone(),
-            Modelling { links: LinkModel::Rigid, ..modelling },
-        ));
-        plants.push((
-            "links alone give way".into(),
-            robot.clone(),
-            Modelling { drives: DriveModel::Rigid, ..modelling },
-        ));
-    }
-    let as_it_is = job.as_it_is()?;
-    let judged = plants.into_par_iter().map(|(plant, robot, modelling)| {
-        let judge = Judge { arm: robot.flexible(modelling)?, run: RunOptions { modelling, ..request.run.clone() } };
-        let (before, after) = (judge.figures(job, &as_it_is)?.0, judge.figures(job, found)?.0);
-        Ok(PlantFigures { plant, before, after })
-    });
-    judged.collect()
-}
-
-/// The motion through a shaper of the first mode at its end.
-fn shaped(arm: &Arm, motion: &Motion, kind: ShaperKind) -> Result<(Motion, f64), Error> {
-    let flexible = arm.flexible();
-    let m = motion.trajectory.joints().len();
-    let (mut q, mut v, mut a) = (vec![0.0; m], vec![0.0; m], vec![0.0; m]);
-    let duration = motion.trajectory.duration();
-    motion.trajectory.sample(duration, &mut q, &mut v, &mut a);
-    let held = flexible.arm(Arc::new(Held(q.clone()))).map_err(|e| flexible.explained(e))?;
-    let (Some(hz), Some(phi)) = (held.modes.frequencies_hz().first().copied(), held.modes.shapes.column_iter().next())
-    else {
-        return Err(CompensateError::NothingYields.into());
-    };
-    let ratio = (phi.dot(&(&held.D * phi)) / (2.0 * std::f64::consts::TAU * hz)).clamp(0.0, 0.9);
-    let shaper = Shaper::new(kind, hz, ratio);
-    let total = duration + shaper.delay_s();
-    let n = (total / SAMPLE_S).ceil() as usize;
-    let times: Vec<f64> = (0..=n).map(|k| total * k as f64 / n as f64).collect();
-    let mut joints: Vec<JointKnots> = motion
-        .trajectory
-        .joints()
-        .iter()
-        .map(|name| JointKnots { name: name.clone(), ..JointKnots::default() })
-        .collect();
-    for t in &times {
-        let mut sum = vec![[0.0; 3]; m];
-        for (delay, part) in &shaper.copies {
-            motion.trajectory.sample(t - delay, &mut q, &mut v, &mut a);
-            for k in 0..m {
-                sum[k][0] += part * q[k];
-                sum[k][1] += part * v[k];
-                sum[k][2] += part * a[k];
-            }
-        }
-        for (joint, [q, v, a]) in joints.iter_mut().zip(sum) {
-            joint.position.push(q);
-            joint.velocity.push(v);
-            joint.acceleration.push([a; 2]);
-        }
-    }
-    let trajectory = Trajectory::through_knots(&times, &joints)?;
-    let shaped = Motion::along(trajectory, &format!("{}_shaped", motion.name), arm.robot())?;
-    Ok((shaped, shaper.delay_s()))
 }
 
 /// Where the joints cannot correct everything that is asked for.
@@ -724,10 +352,11 @@ fn singular_caveat((t_s, directions): (f64, usize), asked: usize) -> Option<Cave
     })
 }
 
-fn caveats(answer: &Compensation, motion: &Motion, robot: &Robot) -> Vec<Caveat> {
+fn caveats(answer: &Compensation, own: &[MotionViolation], robot: &Robot) -> Vec<Caveat> {
     let mut caveats = Vec::new();
-    if answer.limits.len() > motion.violations.len() {
-        let text = format!("the new commands pass limits that the motion keeps: {}", answer.limits.join("; "));
+    let worse: Vec<&str> = limits::worse(&answer.limits, own).map(|limit| limit.message.as_str()).collect();
+    if !worse.is_empty() {
+        let text = format!("the new commands pass limits that the motion keeps: {}", worse.join("; "));
         caveats.push(Caveat::said("limits", "compensation", text, "slow the motion down a little"));
     }
     let untold: Vec<&str> = robot

@@ -38,8 +38,33 @@ pub(super) fn html(answer: &Compensation) -> String {
         );
     }
     page += "</table>\n";
+    page += &limits(answer);
     page += "<p>Not taken away: noise, play and hysteresis of gears, what is quicker than the cutoff, and what the model does not know.</p>\n";
     page + "</body></html>\n"
+}
+
+/// Limits that are passed, and how much slower the motion is for their sake.
+fn limits(answer: &Compensation) -> String {
+    let mut text = String::from("<h2>Limits of the joints</h2>\n");
+    if answer.slowed > 1.0 {
+        let _ = writeln!(text, "<p>The motion takes {:.4} times as long, so that limits are kept.</p>", answer.slowed);
+    }
+    if answer.limits.is_empty() {
+        return text + "<p>All are kept.</p>\n";
+    }
+    text += "<table><tr><th>joint</th><th>of</th><th>value</th><th>limit</th><th>time (s)</th></tr>\n";
+    for limit in &answer.limits {
+        let _ = writeln!(
+            text,
+            "<tr><td>{}</td><td>{}</td><td>{:.4}</td><td>{:.4}</td><td>{:.3}</td></tr>",
+            escaped(&limit.joint),
+            limit.kind,
+            limit.value,
+            limit.limit,
+            limit.time_s
+        );
+    }
+    text + "</table>\n"
 }
 
 fn row(name: &str, before: &ErrorFigures, after: &ErrorFigures) -> String {

@@ -11,6 +11,8 @@ use nalgebra::{Matrix3, Rotation3, Translation3, Vector3};
 use serde::Deserialize;
 use toml::Spanned;
 
+use super::response_file::{NodeEntry, ResponseEntry, ShapeEntry};
+use crate::arm::Arm;
 use crate::error::Error;
 use crate::robot_file::{RobotFileError, Source};
 
@@ -42,6 +44,13 @@ struct MeasurementFile {
     frequency: Vec<Spanned<FrequencyEntry>>,
     #[serde(default)]
     encoders: Vec<Spanned<EncodersEntry>>,
+    /// Points of the arm that are hit or watched.
+    #[serde(default)]
+    node: BTreeMap<String, Spanned<NodeEntry>>,
+    #[serde(default)]
+    response: Vec<Spanned<ResponseEntry>>,
+    #[serde(default)]
+    shape: Vec<Spanned<ShapeEntry>>,
 }
 
 /// Positions of motors and links over time.
@@ -108,14 +117,14 @@ struct TargetEntry {
 /// Values of the joints: all in order, or by name.
 #[derive(Debug, Deserialize, Clone)]
 #[serde(untagged, expecting = "expected a list of joint values, or a table { joint = value }")]
-enum Joints {
+pub(super) enum Joints {
     List(Vec<f64>),
     Named(BTreeMap<String, f64>),
 }
 
 #[derive(Debug, Default, Deserialize, Clone, Copy)]
 #[serde(deny_unknown_fields)]
-struct LoadEntry {
+pub(super) struct LoadEntry {
     #[serde(default)]
     force: [f64; 3],
     #[serde(default)]
@@ -216,9 +225,9 @@ pub(super) struct MeasurementInput {
 
 /// Factors of the units of a file.
 #[derive(Clone, Copy, Debug)]
-struct Units {
-    length: f64,
-    angle: f64,
+pub(super) struct Units {
+    pub(super) length: f64,
+    pub(super) angle: f64,
     force: f64,
 }
 
@@ -230,6 +239,8 @@ const FORCES: [(&str, f64); 2] = [("N", 1.0), ("kN", 1e3)];
 pub(super) struct Cell<'a> {
     /// Actuated joints in coordinate order, and whether they slide.
     pub(super) joints: &'a [(String, bool)],
+    /// The arm that is measured.
+    pub(super) arm: &'a Arm,
 }
 
 /// Reads a file.
@@ -276,6 +287,12 @@ pub(super) fn read(path: &Path, cell: &Cell<'_>) -> Result<MeasurementInput, Err
     }
     for (k, entry) in file.frequency.iter().enumerate() {
         reader.frequency(k, entry)?;
+    }
+    for entry in &file.response {
+        reader.response(&file.node, entry)?;
+    }
+    for (k, entry) in file.shape.iter().enumerate() {
+        reader.shape(&file.node, k, entry)?;
     }
     reader.drop_unused();
     let recordings = file.encoders.iter().map(|entry| reader.encoders(entry)).collect::<Result<Vec<_>, Error>>()?;
@@ -332,16 +349,16 @@ fn loss(given: &Option<Spanned<String>>, source: &Source) -> Result<Loss, RobotF
 }
 
 /// Readings being collected.
-struct Reader<'a> {
-    cell: &'a Cell<'a>,
+pub(super) struct Reader<'a> {
+    pub(super) cell: &'a Cell<'a>,
     source: &'a Source,
-    folder: &'a Path,
-    units: Units,
+    pub(super) folder: &'a Path,
+    pub(super) units: Units,
     instruments: Vec<String>,
     targets: Vec<String>,
-    measurements: Measurements,
+    pub(super) measurements: Measurements,
     /// Of each reading: what was measured in, whether a deviation is given, where.
-    given: Vec<(&'static str, bool, Range<usize>)>,
+    pub(super) given: Vec<(&'static str, bool, Range<usize>)>,
 }
 
 /// A row of a table, by the names of its columns.
@@ -384,7 +401,7 @@ const DISPLACEMENT_COLUMNS: [&str; 16] =
 const PLACE_COLUMNS: [&str; 11] = ["fx", "fy", "fz", "mx", "my", "mz", "mass", "x", "y", "z", "std"];
 
 impl Reader<'_> {
-    fn error(&self, span: Range<usize>, message: impl Into<String>) -> Error {
+    pub(super) fn error(&self, span: Range<usize>, message: impl Into<String>) -> Error {
         self.source.error(span, message).into()
     }
 
@@ -421,7 +438,7 @@ impl Reader<'_> {
     }
 
     /// Joint values of a reading in SI units.
-    fn joints(&self, joints: &Spanned<Joints>) -> Result<Vec<f64>, Error> {
+    pub(super) fn joints(&self, joints: &Spanned<Joints>) -> Result<Vec<f64>, Error> {
         let known = self.cell.joints;
         let names: Vec<&str> = known.iter().map(|(name, _)| name.as_str()).collect();
         let values: Vec<f64> = match joints.get_ref() {
@@ -465,7 +482,7 @@ impl Reader<'_> {
     }
 
     /// A load in SI units.
-    fn load(&self, load: &LoadEntry, span: &Range<usize>) -> Result<LoadCase, Error> {
+    pub(super) fn load(&self, load: &LoadEntry, span: &Range<usize>) -> Result<LoadCase, Error> {
         let LoadEntry { force, torque, at, mass, com } = *load;
         let all = [&force[..], &torque, &at, &[mass], &com].concat();
         if let Some(bad) = all.iter().find(|x| !x.is_finite()) {
@@ -482,7 +499,7 @@ impl Reader<'_> {
     }
 
     /// A standard deviation in SI units; 1 where none is given.
-    fn std(&self, given: Option<&Spanned<f64>>, factor: f64) -> Result<f64, Error> {
+    pub(super) fn std(&self, given: Option<&Spanned<f64>>, factor: f64) -> Result<f64, Error> {
         match given {
             None => Ok(1.0),
             Some(std) if std.get_ref().is_finite() && *std.get_ref() > 0.0 => Ok(std.get_ref() * factor),
@@ -824,7 +841,7 @@ impl Reader<'_> {
             if recordings {
                 return Ok(true);
             }
-            let text = "there is no reading: add [[displacement]], [[place]], [[frequency]] or [[encoders]]";
+            let text = "there is no reading: add [[displacement]], [[place]], [[frequency]], [[response]], [[shape]] or [[encoders]]";
             return Err(self.error(0..0, text));
         };
         if self.given.iter().all(|(_, given, _)| *given) {

@@ -9,15 +9,19 @@ mod file;
 mod page;
 mod parameters;
 mod plan_file;
+mod response_file;
 pub(crate) mod rewrite;
+mod uff;
 
 use std::path::{Path, PathBuf};
 
 use flexarm_files::{check_free, write_all};
 pub use flexarm_identify::{
-    Candidate, Component, Effect, Found, GearEstimate, GearRun, HeldOut, Identified, IdentifyError, IdentifyOptions,
-    Instrument, LoadCase, Loss, MeasuredArm, Measurements, NoAnswer, Parameter, Place, Plan, PlanOptions, Plant,
-    Reading, ReadingKind, Row, Search, Target, frequency_slopes, gear_stiffness, identify, plan, tool_slopes,
+    Answer, Candidate, Component, Effect, Form, Found, GearEstimate, GearRun, HeldOut, Identified, IdentifyError,
+    IdentifyOptions, Instrument, LoadCase, Loss, MeasuredArm, MeasuredResponse, MeasuredShape, Measurements, NoAnswer,
+    Parameter, Place, Plan, PlanOptions, Plant, Probe, Reading, ReadingKind, ResponseSlopes, Row, Search, Structure,
+    StructureSlopes, Target, compliance_slopes, frequency_slopes, gear_stiffness, identify, plan, structure_slopes,
+    tool_slopes,
 };
 use flexarm_kinematics::Pose;
 use nalgebra::{DVector, Vector3};
@@ -96,6 +100,8 @@ pub struct Identification {
     pub encoders: Vec<EncoderFigures>,
     /// Readings that argue against the rest, the worst first.
     pub suspicious: Vec<Suspicious>,
+    /// Measured shapes of modes against those of the arm.
+    pub shapes: Vec<ShapeFigures>,
     /// Unknown instruments as found, in the world.
     pub instruments: Vec<FoundFrame>,
     /// Unknown targets as found, tool axes (m).
@@ -180,6 +186,19 @@ pub struct Suspicious {
     pub normalised: f64,
 }
 
+/// A measured shape against the arm's mode that is most like it.
+#[derive(Clone, Debug, Serialize)]
+pub struct ShapeFigures {
+    /// Which reading.
+    pub reading: String,
+    /// The mode, from 1, with what was found.
+    pub mode: usize,
+    /// Modal assurance criterion with the robot file as it is, from 0 to 1.
+    pub assurance_before: f64,
+    /// The same with what was found.
+    pub assurance: f64,
+}
+
 /// Where an instrument stands.
 #[derive(Clone, Debug, Serialize)]
 pub struct FoundFrame {
@@ -228,7 +247,7 @@ pub fn identify_robot(robot: &Robot, measurements: &Path, request: &IdentifyRequ
         return Err(IdentifyFileError::NothingGives.into());
     }
     let joints = joints_of(&arm);
-    let mut input = file::read(measurements, &Cell { joints: &joints })?;
+    let mut input = file::read(measurements, &Cell { joints: &joints, arm: &arm })?;
     let chosen = chosen(&arm, &input, &request.fit)?;
     let encoders = encoders::told(&arm, &input, &chosen)?;
     input.measurements.readings.extend(encoders.iter().filter_map(EncoderFigures::reading));
@@ -296,8 +315,8 @@ fn chosen(arm: &Arm, input: &MeasurementInput, fit: &[String]) -> Result<Vec<par
     let wanted = |name: &str| match (fit.is_empty(), input.fit.is_empty()) {
         (false, _) => fit.iter().any(|p| parameters::fits(p, name)),
         (true, false) => input.fit.iter().any(|(p, _)| parameters::fits(p, name)),
-        // A mass is asked for by name.
-        (true, true) => name != "payload.mass",
+        // Masses and dampings are asked for by name.
+        (true, true) => name != "payload.mass" && !name.ends_with(".damping"),
     };
     let kept = |name: &str| input.keep.iter().any(|(p, _)| parameters::fits(p, name));
     let mut chosen: Vec<_> = all.clone();
@@ -317,7 +336,7 @@ fn chosen(arm: &Arm, input: &MeasurementInput, fit: &[String]) -> Result<Vec<par
         };
         let logarithmic = candidate.parameter.is_logarithmic();
         if logarithmic && *uncertainty <= 1.0 {
-            let text = "of a stiffness the uncertainty is a factor above 1: 1.5 for half as much again either way";
+            let text = "of a stiffness or a damping the uncertainty is a factor above 1: 1.5 for half as much again either way";
             return Err(placed(place, text.into()));
         }
         candidate.parameter.prior = if logarithmic { uncertainty.ln() } else { *uncertainty };
@@ -370,6 +389,25 @@ pub enum IdentifyFileError {
         length: &'static str,
         /// What to try.
         help: String,
+    },
+    /// A point that does not move.
+    #[error(
+        "{reading}: the arm as it is does not move there along that direction, or cannot be hit so: look at nodes, their links and directions"
+    )]
+    Still {
+        /// Which.
+        reading: String,
+    },
+    /// A response out of all proportion.
+    #[error(
+        "{reading}: the measured response is {ratio:.3e} times as large as that of the robot as it is: no robot is that far from its \
+         description; look at unit, at what was measured (displacement, velocity, acceleration), at nodes and directions"
+    )]
+    ResponseUnits {
+        /// Which.
+        reading: String,
+        /// Measured over expected.
+        ratio: f64,
     },
     /// A mode that the model does not have.
     #[error("{reading}: mode {mode} is asked for, the model has {modes} modes")]
@@ -444,7 +482,23 @@ fn check_units(plant: &Plant, input: &MeasurementInput) -> Result<(), Error> {
         let middle = points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
         points.iter().map(|p| (p - middle).norm_squared()).sum::<f64>().sqrt()
     };
-    told_ratio("distances between places", spread(&measured), spread(&expected), input)
+    told_ratio("distances between places", spread(&measured), spread(&expected), input)?;
+    for reading in &input.measurements.readings {
+        let ReadingKind::Response(response) = &reading.kind else { continue };
+        let plain = MeasuredResponse { form: Form::Logarithmic, ..response.clone() };
+        let reading = Reading { kind: ReadingKind::Response(plain), ..reading.clone() };
+        let one = Measurements { readings: vec![reading.clone()], ..Measurements::default() };
+        let (measured, expected) = both(&one)?;
+        let off: f64 = measured.iter().zip(&expected).step_by(2).map(|(a, b)| a - b).sum();
+        let ratio = (off / response.points.len() as f64).exp();
+        if expected.iter().any(|x| !x.is_finite()) {
+            return Err(IdentifyFileError::Still { reading: reading.name }.into());
+        }
+        if !(1.0 / UNIT_RATIO..=UNIT_RATIO).contains(&ratio) {
+            return Err(IdentifyFileError::ResponseUnits { reading: reading.name, ratio }.into());
+        }
+    }
+    Ok(())
 }
 
 fn told_ratio(what: &'static str, measured: f64, expected: f64, input: &MeasurementInput) -> Result<(), Error> {
@@ -486,6 +540,19 @@ fn numbers(measurements: &Measurements) -> Vec<(String, &'static str)> {
             ReadingKind::Known { .. } => all.push((reading.name.clone(), "ln")),
             ReadingKind::Frequencies { rows, .. } => {
                 all.extend(rows.iter().map(|row| (format!("{}, mode {}", reading.name, row.of + 1), "Hz")));
+            }
+            ReadingKind::Response(response) => {
+                let (words, units) = match response.form {
+                    Form::Logarithmic => (["magnitude (ln)", "phase"], ["ln", "rad"]),
+                    Form::Complex => (["real part", "imaginary part"], [response.answer.unit(); 2]),
+                };
+                for (omega, ..) in &response.points {
+                    let hz = omega / std::f64::consts::TAU;
+                    all.extend([0, 1].map(|k| (format!("{}, {hz:.4} Hz, {}", reading.name, words[k]), units[k])));
+                }
+            }
+            ReadingKind::Shape(shape) => {
+                all.extend((0..shape.probes.len()).map(|k| (format!("{}, point {}", reading.name, k + 1), "1")));
             }
         }
     }
@@ -562,6 +629,7 @@ fn answer(
         deviations_known: input.deviations_known,
         encoders: Vec::new(),
         suspicious: suspicious.collect(),
+        shapes: shapes(plant, fitted, measurements, &found.solution.unknowns)?,
         instruments: frames(input, found),
         targets: points(input, found),
         iterations: found.solution.iterations,
@@ -571,6 +639,26 @@ fn answer(
         caveats: caveats(found),
         compared,
     })
+}
+
+fn shapes(
+    plant: &Plant,
+    fitted: &[Parameter],
+    measurements: &Measurements,
+    unknowns: &DVector<f64>,
+) -> Result<Vec<ShapeFigures>, Error> {
+    let arm = MeasuredArm { plant, parameters: fitted, measurements };
+    let of = |unknowns: &DVector<f64>| {
+        arm.assurances(unknowns).map_err(|error| Error::from(IdentifyFileError::Fit(error.to_string())))
+    };
+    let (before, after) = (of(&DVector::zeros(unknowns.len()))?, of(unknowns)?);
+    let figures = before.iter().zip(after).map(|((_, _, before), (number, mode, assurance))| ShapeFigures {
+        reading: measurements.readings[number].name.clone(),
+        mode: mode + 1,
+        assurance_before: *before,
+        assurance,
+    });
+    Ok(figures.collect())
 }
 
 fn frames(input: &MeasurementInput, found: &Identified) -> Vec<FoundFrame> {

@@ -24,7 +24,7 @@ pub(super) fn html(answer: &Identification) -> String {
     }
     page += &parameters(answer);
     page += &suspicious(answer);
-    for unit in ["m", "rad", "Hz"] {
+    for unit in ["m", "rad", "Hz", "ln", "1", "m/N", "m/(s N)", "m/(s2 N)"] {
         let of: Vec<&Compared> = answer.compared.iter().filter(|c| c.unit == unit).collect();
         if !of.is_empty() {
             page += &plots(unit, &of);
@@ -40,6 +40,11 @@ fn readable(unit: &str) -> (&'static str, f64) {
         "m" => ("mm", 1e3),
         "rad" => ("mrad", 1e3),
         "Hz" => ("Hz", 1.0),
+        "ln" => ("of the logarithm", 1.0),
+        "1" => ("parts of the shape", 1.0),
+        "m/N" => ("mm/kN", 1e6),
+        "m/(s N)" => ("m/(s N)", 1.0),
+        "m/(s2 N)" => ("m/(s² N)", 1.0),
         _ => ("standard deviations", 1.0),
     }
 }

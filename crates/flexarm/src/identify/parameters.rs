@@ -6,11 +6,14 @@
 //! | `drive.JOINT.gearbox.stiffness[k]` | one of three or six, from 0 |
 //! | `link.LINK.stiffness_factor` | all of a flexible link's stiffness, as a factor |
 //! | `mounting.stiffness[k]` | one of six springs under the base, from 0 |
+//! | `drive.JOINT.gearbox.damping` | its damping, if the file has it (N m s/rad, N s/m; a factor on lists) |
+//! | `link.LINK.damping` | modal ratio, `stiffness_beta` (s), or a factor on `rayleigh` |
 //! | `payload.mass` | kg, at its centre of mass |
 
 use flexarm_flexlink::GearStiffness;
 use flexarm_identify::{Effect, Parameter, Place, Plant};
 use flexarm_kinematics::SpatialInertia;
+use flexarm_stepping::Damping;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::flexible::{FlexibleRobot, Owner};
@@ -27,6 +30,10 @@ const PAYLOAD_UNCERTAINTY: (f64, f64) = (0.5, 1.0);
 pub(crate) enum Written {
     /// `[[drive]]` of the joint: the stiffness of its gearbox, or one of its entries.
     Gearbox { joint: String, entry: Option<usize> },
+    /// `[[drive]]` of the joint: the damping of its gearbox.
+    GearboxDamping { joint: String },
+    /// `[[flexible_link]]` of the link: its damping.
+    LinkDamping { link: String },
     /// `[[flexible_link]]` of the link: its `stiffness_factor`.
     Link { link: String },
     /// `mounting.stiffness`, one of six.
@@ -57,6 +64,21 @@ pub(crate) fn candidates(robot: &Robot, flexible: &FlexibleRobot) -> Vec<Candida
         }
         let slides = flexible.model.coordinates().iter().any(|c| c.joint == drive.joint && c.kind == "prismatic");
         found.extend(gearbox_parameters(&drive.joint, &gearbox.stiffness, &springs, slides));
+        if let Some(dampers) = damping.dampers.as_ref().filter(|d| d.iter().any(|d| *d > 0.0)) {
+            let name = format!("drive.{}.gearbox.damping", drive.joint);
+            let (unit, initial) = match (&dampers[..], slides) {
+                ([one], false) => ("N m s/rad", *one),
+                ([one], true) => ("N s/m", *one),
+                _ => ("1", 1.0),
+            };
+            found.push(damping_of(
+                name,
+                unit,
+                initial,
+                &springs,
+                Written::GearboxDamping { joint: drive.joint.clone() },
+            ));
+        }
     }
     for (number, span) in flexible.spans.iter().enumerate() {
         let springs = of(Owner::Link(number));
@@ -65,10 +87,19 @@ pub(crate) fn candidates(robot: &Robot, flexible: &FlexibleRobot) -> Vec<Candida
             continue;
         }
         let Some(link) = robot.flexible.iter().find(|link| link.flexible.link == span.link) else { continue };
-        let places = springs.into_iter().map(|spring| Place { spring, coordinate: None }).collect();
+        let places = springs.iter().map(|spring| Place { spring: *spring, coordinate: None }).collect();
         let name = format!("link.{}.stiffness_factor", span.link);
         let written = Written::Link { link: span.link.clone() };
         found.push(stiffness(name, "1", link.stiffness_factor, places, written));
+        let (unit, initial) = match link.damping {
+            Damping::Modal(zeta) => ("1", zeta),
+            Damping::StiffnessProportional(beta) => ("s", beta),
+            _ => ("1", 1.0),
+        };
+        if initial > 0.0 {
+            let name = format!("link.{}.damping", span.link);
+            found.push(damping_of(name, unit, initial, &springs, Written::LinkDamping { link: span.link.clone() }));
+        }
     }
     if let Some(frame) = flexible.model.frame(PAYLOAD_LINK) {
         let mass = robot.rigid.link(PAYLOAD_LINK).and_then(|link| link.inertia).map_or(0.0, |inertia| inertia.mass);
@@ -85,6 +116,11 @@ fn stiffness(name: String, unit: &str, initial: f64, places: Vec<Place>, written
     let effect = Effect::Stiffness(places);
     let parameter = Parameter { name, unit: unit.into(), initial, prior: UNCERTAINTY.ln(), effect };
     Candidate { parameter, written }
+}
+
+fn damping_of(name: String, unit: &str, initial: f64, springs: &[usize], written: Written) -> Candidate {
+    let effect = Effect::Damping(springs.to_vec());
+    Candidate { parameter: Parameter { name, unit: unit.into(), initial, prior: UNCERTAINTY.ln(), effect }, written }
 }
 
 fn gearbox_parameters(joint: &str, K: &GearStiffness, springs: &[usize], slides: bool) -> Vec<Candidate> {

@@ -32,6 +32,31 @@ pub(super) fn rewritten(text: &str, found: &[(Found, Written)], home: &Path, to:
                 entry.insert("stiffness_factor", toml_edit::value(rounded(parameter.value, parameter.std)));
                 told.push((format!("link {link}"), parameter));
             }
+            Written::GearboxDamping { joint } => {
+                let drive = named(&mut file, "drive", "joint", joint)?;
+                let gearbox = drive.get_mut("gearbox").and_then(Item::as_table_like_mut);
+                let damping = gearbox.and_then(|gearbox| gearbox.get_mut("damping")).and_then(Item::as_value_mut);
+                let damping = damping.ok_or_else(|| format!("the drive of joint {joint:?} has no gearbox.damping"))?;
+                put_damping(damping, parameter);
+                told.push((format!("drive of {joint}"), parameter));
+            }
+            Written::LinkDamping { link } => {
+                let entry = named(&mut file, "flexible_link", "link", link)?;
+                let damping = entry.get_mut("damping").and_then(Item::as_table_like_mut);
+                match damping.and_then(|damping| damping.iter_mut().next().map(|(_, value)| value)) {
+                    Some(value) => {
+                        let value =
+                            value.as_value_mut().ok_or_else(|| format!("the damping of link {link:?} is no number"))?;
+                        put_damping(value, parameter);
+                    }
+                    None => {
+                        let mut modal = toml_edit::InlineTable::new();
+                        modal.insert("modal", rounded(parameter.value, parameter.std).into());
+                        entry.insert("damping", toml_edit::value(modal));
+                    }
+                }
+                told.push((format!("link {link}"), parameter));
+            }
             Written::Mounting { entry } => {
                 let mounting = file.get_mut("mounting").and_then(Item::as_table_like_mut);
                 let stiffness = mounting.and_then(|mounting| mounting.get_mut("stiffness"));
@@ -115,6 +140,23 @@ fn put_stiffness(item: &mut Item, entry: Option<usize>, found: &Found) -> Result
         (value, _) => replace(value, number),
     }
     Ok(())
+}
+
+/// A number by the new one; of a list every entry by how many times as large it is.
+fn put_damping(item: &mut Value, found: &Found) {
+    let factor = found.value / found.initial;
+    match item {
+        Value::Array(list) if list.len() == 1 => {
+            list.iter_mut().for_each(|cell| replace(cell, rounded(found.value, found.std)));
+        }
+        Value::Array(list) => {
+            for cell in list.iter_mut() {
+                let old = cell.as_float().or_else(|| cell.as_integer().map(|n| n as f64)).unwrap_or(0.0);
+                replace(cell, old * factor);
+            }
+        }
+        number => replace(number, rounded(found.value, found.std)),
+    }
 }
 
 /// Another number with the spaces and comments of the old one.

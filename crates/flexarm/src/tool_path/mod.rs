@@ -22,7 +22,7 @@ use crate::error::Error;
 use crate::robot::tcp_frame;
 
 pub(crate) use file::{is_path_file, read_path_file};
-pub(crate) use program::read_robot_program;
+pub(crate) use program::{program_text, read_robot_program};
 
 /// A joint reaches its top speed in this time where nothing is known of its acceleration, s.
 const TO_TOP_SPEED: f64 = 0.4;

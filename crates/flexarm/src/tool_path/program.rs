@@ -1,11 +1,11 @@
 //! Robot programs as motions: read by `flexarm-programs`, planned for a robot.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use flexarm_kinematics::{Data, Pose, forward_kinematics};
 use flexarm_path::program::Program;
 use flexarm_path::{ControllerAxis, PathOptions, ProgramArm};
-use flexarm_programs::{ReadOptions, read_program, recognise};
+use flexarm_programs::{ProgramText, ReadOptions, read_program, read_program_text, recognise};
 use flexarm_trajectory::Trajectory;
 
 use super::{Cell, Overrides, ToolPath};
@@ -33,6 +33,19 @@ pub(crate) fn read_robot_program(
     )?;
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     Ok((planned, recognise(&bytes, &name).map_or("", |language| language.name())))
+}
+
+/// A program with the places of its targets; further files of it in the place of those on the disk.
+pub(crate) fn program_text(
+    path: &Path,
+    bytes: &[u8],
+    arm: &ProgramArm<'_>,
+    companions: Vec<(PathBuf, Vec<u8>)>,
+) -> Result<ProgramText, Error> {
+    let forward = |values: &[f64]| flange_at(arm, values);
+    let options =
+        ReadOptions { forward: Some(&forward), own_tool: Some(arm.X_FT), companions, ..ReadOptions::default() };
+    Ok(read_program_text(path, bytes, &options).map_err(Box::new)?)
 }
 
 /// Reads a program with what is told beside it, and plans it.

@@ -1,0 +1,91 @@
+//! Targets of a program and the joints that they stand for, both ways.
+
+use flexarm_kinematics::{AnalyticArm, Data, Frame, forward_kinematics, kuka_turn};
+use flexarm_spatial::Pose;
+use nalgebra::DVector;
+
+use crate::legs::{Legs, Start, spline_group};
+use crate::plan::{PathError, PathOptions, ProgramArm};
+use crate::program::{Configuration, Item, Move, MoveKind, Program, Target};
+
+/// Joints at the target of each item, whether a blend lets the tool pass it or not; none of dwells, and of arcs with a told
+/// angle, which do not end at their target.
+///
+/// # Errors
+/// As [`crate::plan`].
+pub fn target_joints(
+    program: &Program,
+    arm: &ProgramArm<'_>,
+    options: &PathOptions,
+) -> Result<Vec<Option<DVector<f64>>>, PathError> {
+    let items = &program.items;
+    let mut legs = Legs::new(arm, options, None);
+    let mut start = Start::of(items, arm)?;
+    let mut found = vec![None; items.len()];
+    let mut k = 0;
+    while k < items.len() {
+        let Item::Move(of) = &items[k] else {
+            k += 1;
+            continue;
+        };
+        let group = spline_group(items, k);
+        if group.is_empty() {
+            legs.leg(of, &mut start)?;
+            let ends_there = !matches!(of.kind, MoveKind::Arc { angle: Some(_), .. });
+            found[k] = ends_there.then(|| start.q.clone());
+            k += 1;
+            continue;
+        }
+        // A knot where the arm is already has no leg of its own.
+        let mut at = start.q.clone();
+        let mut pieces = legs.spline(&group, &mut start)?.into_iter().peekable();
+        for of in &group {
+            if pieces.peek().is_some_and(|leg| leg.of == **of) {
+                at = pieces.next().map_or(at, |leg| leg.q1);
+            }
+            found[k] = Some(at.clone());
+            k += 1;
+        }
+    }
+    Ok(found)
+}
+
+/// The flange with the tool of a move, on the rigid arm.
+pub fn tool_of(arm: &ProgramArm<'_>, of: &Move) -> Frame {
+    let X_FT = of.X_FT.unwrap_or(arm.X_FT);
+    Frame { X_BF: arm.flange.X_BF * X_FT, ..arm.flange.clone() }
+}
+
+/// Base of a move in the world of the model, `X_MB`.
+pub fn base_of(arm: &ProgramArm<'_>, of: &Move) -> Pose {
+    arm.X_MW * of.X_WB
+}
+
+/// The target with which a move ends at joint values, told as the old one is: axis values, or a pose with its branch.
+pub fn target_at(arm: &ProgramArm<'_>, of: &Move, q: &DVector<f64>) -> Target {
+    if let Target::Joints(old) = &of.to {
+        let mut values = arm.axis_values(q);
+        values.truncate(old.len());
+        return Target::Joints(values);
+    }
+    let frame = tool_of(arm, of);
+    let mut data = Data::new(arm.model);
+    forward_kinematics(arm.model, &mut data, q);
+    let X_BT = base_of(arm, of).inverse() * data.X_WF(&frame);
+    let Target::Pose { configuration, .. } = &of.to else { return of.to.clone() };
+    let configuration = match (configuration, AnalyticArm::new(arm.model, &frame)) {
+        (Configuration::Kuka { status, turn }, Ok(analytic)) => {
+            let (counted, six) = (arm.controller_axes(*analytic.joints()), analytic.joints().map(|k| q[k]));
+            let status = status.map(|old| analytic.kuka_status(&six, &counted).unwrap_or(old));
+            Configuration::Kuka { status, turn: turn.map(|_| kuka_turn(&six, &counted)) }
+        }
+        (Configuration::Abb { .. }, Ok(analytic)) => {
+            let (counted, six) = (arm.controller_axes(*analytic.joints()), analytic.joints().map(|k| q[k]));
+            let told = analytic.abb_configuration(&six, &counted);
+            told.map_or(configuration.clone(), |(quadrants, cfx)| Configuration::Abb { quadrants, cfx })
+        }
+        (Configuration::Near(_), _) => Configuration::Near(arm.axis_values(q)),
+        (other, _) => other.clone(),
+    };
+    Target::Pose { X_BT, configuration }
+}

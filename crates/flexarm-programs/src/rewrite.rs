@@ -1,0 +1,345 @@
+//! A program with other targets: the numbers of their literals are replaced, everything else stays as it is written.
+//!
+//! Start at [`read_program_text`]. A target can be replaced where it is a literal (`{X 1000, ...}`, `[[1000, ...], ...]`), in the
+//! statement or assigned to a variable that it names; what is computed, relative or indexed has no place of its own.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use flexarm_path::program::{Configuration, Program};
+use flexarm_spatial::Pose;
+use nalgebra::Vector3;
+
+use crate::common::expressions::{Parser, Syntax};
+use crate::common::frames::{mm_deg_zyx, quaternion};
+use crate::common::lexer::tokens;
+use crate::common::recorder::Sources;
+use crate::common::tree::{Expr, Kind};
+use crate::common::value::Value;
+use crate::common::{Span, Text};
+use crate::{Language, ProgramError, ReadOptions, krl, rapid, read_recorded};
+
+/// Digits behind the point: mm, degrees, parts of quaternions. Nothing is lost by them that a controller would notice.
+const DIGITS: [usize; 3] = [4, 6, 9];
+/// Values from several visits of one literal that differ by less than so many units of the last digit are one value.
+const SAME: f64 = 2.5;
+/// The controller's own file, which other programs use as well.
+const CONFIGURATION: &str = "$config.dat";
+
+/// Where a move is to go.
+#[derive(Clone, Debug, PartialEq)]
+pub enum NewTarget {
+    /// Values of the controller's axes (rad or m).
+    Joints(Vec<f64>),
+    /// Pose `X_BT`, with the branch of the inverse kinematics; as much of the branch is written as the old target tells.
+    Pose {
+        /// `X_BT`.
+        X_BT: Pose,
+        /// Which branch.
+        configuration: Configuration,
+    },
+}
+
+/// A program that was read, with its texts.
+pub struct ProgramText {
+    /// Its moves.
+    pub program: Program,
+    /// Its language.
+    pub language: Language,
+    texts: Vec<Text>,
+    sources: Vec<Sources>,
+    /// Bytes of the files as they are on the disk, as far as they are written again.
+    main: Vec<u8>,
+}
+
+/// The files of a program with other targets.
+pub struct Rewritten {
+    /// Files that changed, with the program's own first: names as they were, and bytes.
+    pub files: Vec<(PathBuf, Vec<u8>)>,
+    /// Moves by their number among the items whose targets were replaced.
+    pub replaced: Vec<usize>,
+    /// Moves whose targets stay, and why.
+    pub left: Vec<(usize, &'static str)>,
+}
+
+/// Reads a program as [`crate::read_program`], and keeps where its targets stand.
+///
+/// # Errors
+/// As [`crate::read_program`].
+pub fn read_program_text(path: &Path, bytes: &[u8], options: &ReadOptions<'_>) -> Result<ProgramText, ProgramError> {
+    let (recorded, language, texts) = read_recorded(path, bytes, options)?;
+    let (program, sources) = (recorded.program, recorded.sources);
+    Ok(ProgramText { program, language, texts, sources, main: bytes.to_vec() })
+}
+
+/// A number in a text and what takes its place.
+#[derive(Clone, Debug)]
+struct Edit {
+    value: f64,
+    digits: usize,
+    /// What stands before the number: nothing, or the name of a coordinate that was not told.
+    before: String,
+}
+
+type Edits = BTreeMap<(usize, usize, usize), Edit>;
+
+impl ProgramText {
+    /// Whether targets of this language can be replaced.
+    pub fn is_rewritable(&self) -> bool {
+        matches!(self.language, Language::Krl | Language::Rapid)
+    }
+
+    /// The files with other targets, their lines as they were.
+    ///
+    /// * `targets`: of some items (by number among those of the program) where they are to go, and auxiliary points of circles, in
+    ///   the base B (m).
+    /// * `comment`: one line for the head of each file that changes, plain letters.
+    ///
+    /// A literal that several moves use must become the same for all of them; otherwise it stays.
+    pub fn rewritten(&self, targets: &[(usize, NewTarget, Option<Vector3<f64>>)], comment: &str) -> Rewritten {
+        let mut edits = Edits::new();
+        let (mut replaced, mut left) = (Vec::new(), Vec::new());
+        let mut torn: Vec<Span> = Vec::new();
+        let mut wanted = Vec::new();
+        for (item, target, via) in targets {
+            match self.edits_of(*item, target, via.as_ref()) {
+                Ok(own) => wanted.push((*item, own)),
+                Err(why) => left.push((*item, why)),
+            }
+        }
+        // What several moves ask for differently stays as it is, for all of them.
+        for (item, own) in &wanted {
+            let differs = own.iter().any(|(place, edit)| {
+                edits.get(place).is_some_and(|old: &Edit| {
+                    (old.value - edit.value).abs() > SAME * 0.1f64.powi(edit.digits as i32) || old.before != edit.before
+                })
+            });
+            if differs {
+                torn.extend(self.sources[*item].target);
+            }
+            edits.extend(own.iter().map(|(place, edit)| (*place, edit.clone())));
+        }
+        edits
+            .retain(|(file, start, _), _| !torn.iter().any(|s| s.file == *file && s.start <= *start && *start < s.end));
+        for (item, _) in &wanted {
+            match self.sources[*item].target.is_some_and(|source| torn.contains(&source)) {
+                true => left.push((*item, "moves with different corrections share the target")),
+                false => replaced.push(*item),
+            }
+        }
+        left.sort_unstable();
+        Rewritten { files: self.files(&edits, comment), replaced, left }
+    }
+
+    fn edits_of(&self, item: usize, target: &NewTarget, via: Option<&Vector3<f64>>) -> Result<Edits, &'static str> {
+        let sources = self.sources.get(item).ok_or("there is no such move")?;
+        let source =
+            sources.target.ok_or("its target is computed, relative or the end of a told angle, not a literal")?;
+        let mut edits = self.literal(source, target)?;
+        if let Some(via) = via {
+            let source = sources.via.ok_or("its auxiliary point is no literal")?;
+            edits.extend(self.point(source, via)?);
+        }
+        Ok(edits)
+    }
+
+    /// The literal at a place, with places in its file.
+    fn parsed(&self, source: Span) -> Result<Expr, &'static str> {
+        let text = self.texts.get(source.file).ok_or("its target stands in no file")?;
+        let name = text.path.file_name().unwrap_or_default().to_string_lossy().to_lowercase();
+        // The last text is what was given beside the files.
+        if source.file + 1 == self.texts.len() && self.texts.len() > 1 {
+            return Err("its target was given beside the files");
+        }
+        if name == CONFIGURATION {
+            return Err("its target stands in the controller's own data");
+        }
+        let (syntax, spelling) = match self.language {
+            Language::Krl => (Syntax::Krl, &krl::SPELLING),
+            _ => (Syntax::Rapid, &rapid::SPELLING),
+        };
+        let literal = text.text.get(source.start..source.end).ok_or("its target stands in no file")?;
+        let mut lexemes = tokens(literal, source.file, spelling).map_err(|_| "its target is no literal")?;
+        for lexeme in &mut lexemes {
+            lexeme.span.start += source.start;
+            lexeme.span.end += source.start;
+        }
+        Parser::new(syntax, lexemes).expression().map_err(|_| "its target is no literal")
+    }
+
+    fn literal(&self, source: Span, target: &NewTarget) -> Result<Edits, &'static str> {
+        let literal = self.parsed(source)?;
+        let mut edits = Edits::new();
+        match (&literal.kind, target) {
+            (Kind::Record(_, fields), NewTarget::Joints(values)) => {
+                for (k, value) in values.iter().enumerate().take(6) {
+                    put_field(
+                        &mut edits,
+                        &literal,
+                        fields,
+                        &format!("a{}", k + 1),
+                        value.to_degrees(),
+                        DIGITS[1],
+                        true,
+                    )?;
+                }
+            }
+            (Kind::Record(_, fields), NewTarget::Pose { X_BT, configuration }) => {
+                let names = ["x", "y", "z", "a", "b", "c"];
+                for (k, (name, value)) in names.iter().zip(mm_deg_zyx(X_BT)).enumerate() {
+                    put_field(&mut edits, &literal, fields, name, value, DIGITS[usize::from(k > 2)], true)?;
+                }
+                if let Configuration::Kuka { status, turn } = configuration {
+                    for (name, bits) in [("s", status), ("t", turn)] {
+                        if let Some(bits) = bits {
+                            put_field(&mut edits, &literal, fields, name, f64::from(*bits), 0, false)?;
+                        }
+                    }
+                }
+            }
+            (Kind::List(parts), NewTarget::Joints(values)) => {
+                put_list(
+                    &mut edits,
+                    parts.first(),
+                    &values.iter().map(|v| v.to_degrees()).collect::<Vec<_>>(),
+                    DIGITS[1],
+                )?;
+            }
+            (Kind::List(parts), NewTarget::Pose { X_BT, configuration }) => {
+                let place = X_BT.translation.vector * 1e3;
+                put_list(&mut edits, parts.first(), place.as_slice(), DIGITS[0])?;
+                put_list(&mut edits, parts.get(1), &quaternion(&X_BT.rotation), DIGITS[2])?;
+                if let Configuration::Abb { quadrants: [a, b, c], cfx } = configuration {
+                    put_list(&mut edits, parts.get(2), &[*a, *b, *c, *cfx].map(f64::from), 0)?;
+                }
+            }
+            _ => return Err("its target is no literal"),
+        }
+        Ok(edits)
+    }
+
+    /// The place of an auxiliary point.
+    fn point(&self, source: Span, p_B: &Vector3<f64>) -> Result<Edits, &'static str> {
+        let literal = self.parsed(source)?;
+        let (mut edits, p) = (Edits::new(), p_B * 1e3);
+        match &literal.kind {
+            Kind::Record(_, fields) => {
+                for (name, value) in ["x", "y", "z"].iter().zip(p.iter()) {
+                    put_field(&mut edits, &literal, fields, name, *value, DIGITS[0], true)?;
+                }
+            }
+            Kind::List(parts) => put_list(&mut edits, parts.first(), p.as_slice(), DIGITS[0])?,
+            _ => return Err("its auxiliary point is no literal"),
+        }
+        Ok(edits)
+    }
+
+    /// The changed files, and always the program's own.
+    fn files(&self, edits: &Edits, comment: &str) -> Vec<(PathBuf, Vec<u8>)> {
+        let changed = |k: usize| k == 0 || edits.keys().any(|(file, ..)| *file == k);
+        let texts = self.texts.iter().enumerate().filter(|(k, _)| changed(*k));
+        texts
+            .map(|(k, text)| {
+                let mut new = String::with_capacity(text.text.len() + 64);
+                let mut at = 0;
+                for ((_, start, end), edit) in edits.range((k, 0, 0)..(k + 1, 0, 0)) {
+                    new += &text.text[at..*start];
+                    new += &edit.before;
+                    new += &number(edit.value, edit.digits);
+                    at = *end;
+                }
+                new += &text.text[at..];
+                (text.path.clone(), self.encoded(k, &self.with_comment(new, comment)))
+            })
+            .collect()
+    }
+
+    /// The comment behind the first line of the program, so that no line moves.
+    fn with_comment(&self, text: String, comment: &str) -> String {
+        let (words, mark): (&[&str], _) = match self.language {
+            Language::Krl => (&["def ", "deffct ", "defdat ", "global def"], ';'),
+            _ => (&["module "], '!'),
+        };
+        let begins = |line: &str| words.iter().any(|word| line.trim_start().to_lowercase().starts_with(word));
+        let head = text.split_inclusive('\n').scan(0, |at, line| {
+            let start = *at;
+            *at += line.len();
+            Some((start, line))
+        });
+        let plain = |line: &str| !(line.trim().is_empty() || line.starts_with('&') || line.starts_with("%%%"));
+        let lines: Vec<(usize, &str)> = head.collect();
+        let line = lines.iter().find(|(_, line)| begins(line)).or(lines.iter().rfind(|(_, line)| plain(line)));
+        let Some((start, line)) = line else { return text };
+        let end = start + line.trim_end().len();
+        format!("{} {mark} {comment}{}", &text[..end], &text[end..])
+    }
+
+    /// In the encoding that the file had.
+    fn encoded(&self, file: usize, text: &str) -> Vec<u8> {
+        let old = if file == 0 { self.main.clone() } else { std::fs::read(&self.texts[file].path).unwrap_or_default() };
+        match std::str::from_utf8(&old) {
+            Ok(old) if old.starts_with('\u{feff}') => format!("\u{feff}{text}").into_bytes(),
+            Ok(_) => text.as_bytes().to_vec(),
+            Err(_) => text.chars().map(|c| u8::try_from(u32::from(c)).unwrap_or(b'?')).collect(),
+        }
+    }
+}
+
+/// A field of a record; one that is not told is added if it may be.
+fn put_field(
+    edits: &mut Edits,
+    record: &Expr,
+    fields: &[(std::rc::Rc<str>, Expr)],
+    name: &str,
+    value: f64,
+    digits: usize,
+    add: bool,
+) -> Result<(), &'static str> {
+    match fields.iter().find(|(field, _)| &**field == name) {
+        Some((_, old)) => put(edits, old, value, digits),
+        None if !add => Ok(()),
+        None => {
+            let end = record.span.end - 1;
+            let comma = if fields.is_empty() { "" } else { ", " };
+            let before = format!("{comma}{} ", name.to_uppercase());
+            // Several are added at one place: they stand after each other.
+            match edits.get_mut(&(record.span.file, end, end)) {
+                Some(edit) => {
+                    edit.before += &format!("{}{before}", number(edit.value, edit.digits));
+                    (edit.value, edit.digits) = (value, digits);
+                }
+                None => {
+                    edits.insert((record.span.file, end, end), Edit { value, digits, before });
+                }
+            }
+            Ok(())
+        }
+    }
+}
+
+fn put_list(edits: &mut Edits, list: Option<&Expr>, values: &[f64], digits: usize) -> Result<(), &'static str> {
+    let Some(Expr { kind: Kind::List(old), .. }) = list else { return Err("a part of its target is no literal") };
+    if old.len() < values.len() {
+        return Err("its target has too few numbers");
+    }
+    old.iter().zip(values).try_for_each(|(old, value)| put(edits, old, *value, digits))
+}
+
+fn put(edits: &mut Edits, old: &Expr, value: f64, digits: usize) -> Result<(), &'static str> {
+    if !matches!(old.kind, Kind::Literal(Value::Number(_) | Value::Whole(_))) {
+        return Err("a number of its target is computed");
+    }
+    edits.insert((old.span.file, old.span.start, old.span.end), Edit { value, digits, before: String::new() });
+    Ok(())
+}
+
+/// A number with so many digits, without zeros at the end; one digit stays behind the point unless none is asked for.
+fn number(value: f64, digits: usize) -> String {
+    let text = format!("{value:.digits$}");
+    if digits == 0 {
+        return text;
+    }
+    let text = text.trim_end_matches('0');
+    let text = if text.ends_with('.') { format!("{text}0") } else { text.to_owned() };
+    if text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.') { "0.0".to_owned() } else { text }
+}

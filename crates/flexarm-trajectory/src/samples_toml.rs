@@ -1,0 +1,124 @@
+//! Samples in a motion file: what is not made of moves from rest to rest, in TOML.
+//!
+//! ```toml
+//! format = 1
+//! unit = "deg"
+//! joints = ["joint_1", "joint_2"]
+//!
+//! [samples]
+//! time = [0.0, 0.01, 0.02]                                # s
+//! position = [[0.0, 0.0], [0.1, -0.2], [0.2, -0.4]]       # a row per time, a number per joint
+//! velocity = [[0.0, 0.0], [10.0, -20.0], [0.0, 0.0]]      # optional, and `acceleration` with it
+//! ```
+//!
+//! The same as samples in CSV ([`crate::csv_file`]): quintics between the rows.
+
+use serde::Deserialize;
+use toml::Spanned;
+
+use crate::error::TrajectoryError;
+use crate::problem::Problem;
+use crate::spline::{JointSamples, Samples};
+use crate::trajectory::Trajectory;
+use crate::waypoints_check::{Located, bad_value, joint_names, scales};
+
+/// Most rows that are written.
+const MOST_ROWS: f64 = 5e6;
+
+/// The whole file.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct SamplesFileToml {
+    pub(crate) format: Spanned<i64>,
+    unit: Spanned<String>,
+    #[serde(default)]
+    metres: Vec<Spanned<String>>,
+    joints: Spanned<Vec<Spanned<String>>>,
+    samples: Spanned<SamplesToml>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SamplesToml {
+    time: Spanned<Vec<f64>>,
+    position: Spanned<Vec<Vec<f64>>>,
+    velocity: Option<Spanned<Vec<Vec<f64>>>>,
+    acceleration: Option<Spanned<Vec<Vec<f64>>>>,
+}
+
+/// Does the text hold samples instead of moves?
+pub(crate) fn has_samples(text: &str) -> bool {
+    text.lines().any(|line| line.split('#').next().is_some_and(|line| line.trim() == "[samples]"))
+}
+
+/// Converts and checks the file.
+pub(crate) fn trajectory(file: &SamplesFileToml) -> Result<Trajectory, Located> {
+    let names = joint_names(&file.joints)?;
+    let scales = scales(&file.unit, &file.metres, &names)?;
+    let SamplesToml { time, position, velocity, acceleration } = file.samples.get_ref();
+    let columns = |rows: &Spanned<Vec<Vec<f64>>>, key: &'static str| -> Result<Vec<Vec<f64>>, Located> {
+        let (found, expected) = (rows.get_ref().len(), time.get_ref().len());
+        if found != expected {
+            return Err(bad_value(rows.span(), key, format!("{found} rows"), "a row for each time"));
+        }
+        if let Some(row) = rows.get_ref().iter().position(|row| row.len() != names.len()) {
+            let found = format!("{} numbers in row {}", rows.get_ref()[row].len(), row + 1);
+            return Err(bad_value(rows.span(), key, found, "a number for each joint in each row"));
+        }
+        let column = |k: usize| rows.get_ref().iter().map(|row| row[k] * scales[k]).collect();
+        Ok((0..names.len()).map(column).collect())
+    };
+    let optional =
+        |rows: &Option<Spanned<Vec<Vec<f64>>>>, key| rows.as_ref().map(|rows| columns(rows, key)).transpose();
+    let position = columns(position, "samples.position")?;
+    let velocity = optional(velocity, "samples.velocity")?;
+    let acceleration = optional(acceleration, "samples.acceleration")?;
+    let joint = |(k, name): (usize, &String)| JointSamples {
+        name: name.clone(),
+        position: position[k].clone(),
+        velocity: velocity.as_ref().map(|columns| columns[k].clone()),
+        acceleration: acceleration.as_ref().map(|columns| columns[k].clone()),
+    };
+    let samples = Samples { times: time.get_ref().clone(), joints: names.iter().enumerate().map(joint).collect() };
+    samples.interpolate().map_err(|error| {
+        let problem = match error {
+            TrajectoryError::Samples(error) => Problem::Samples(error),
+            TrajectoryError::OutOfRange { joint, .. } => Problem::OutOfRange { joint },
+            other => Problem::Toml { message: other.to_string() },
+        };
+        Located { offset: Some(time.span().start), problem: Box::new(problem) }
+    })
+}
+
+impl Trajectory {
+    /// Writes any motion as a motion file with positions, velocities and accelerations in SI units: a row every
+    /// `1 / rate_hz` s from `t = 0`, and one at the end. Numbers are written in full.
+    ///
+    /// # Errors
+    /// [`TrajectoryError::BadRate`].
+    pub fn to_samples_toml(&self, rate_hz: f64) -> Result<String, TrajectoryError> {
+        let duration_s = self.duration();
+        let intervals = duration_s * rate_hz;
+        if !(rate_hz > 0.0 && rate_hz.is_finite() && intervals <= MOST_ROWS) {
+            return Err(TrajectoryError::BadRate { rate_hz, duration_s });
+        }
+        let n = self.joints().len();
+        let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+        let regular = (intervals - 1e-6).ceil().max(1.0) as usize;
+        let (mut times, mut rows) = (Vec::new(), [String::new(), String::new(), String::new()]);
+        for k in 0..=regular {
+            let t = if k == regular { duration_s } else { k as f64 / rate_hz };
+            self.sample(t, &mut q, &mut v, &mut a);
+            times.push(t);
+            for (rows, values) in rows.iter_mut().zip([&q, &v, &a]) {
+                *rows += &format!("    {values:?},\n");
+            }
+        }
+        let [position, velocity, acceleration] = rows;
+        Ok(format!(
+            "format = 1\nunit = \"rad\"\njoints = {:?}\n\n[samples]\ntime = {times:?}\nposition = [\n{position}]\n\
+             velocity = [\n{velocity}]\nacceleration = [\n{acceleration}]\n",
+            self.joints()
+        ))
+    }
+}

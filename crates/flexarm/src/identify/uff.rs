@@ -1,0 +1,335 @@
+//! Universal files with dataset 58: functions of a modal test, as text (58) and binary (58b); dataset 164 tells their units.
+//!
+//! Start at [`read_functions`]. Frequency responses (function type 4) are taken, other functions and other datasets are passed over.
+
+use nalgebra::Complex;
+
+/// Most values of a file.
+const MOST: usize = 10_000_000;
+/// Lines before the values of a function.
+const HEAD: usize = 11;
+/// Function type of a frequency response.
+const RESPONSE: i64 = 4;
+
+/// A frequency response of a file.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct UffFunction {
+    /// Line at which its dataset begins, from 1.
+    pub(super) line: usize,
+    /// Node and direction (±1 to ±3 for x, y, z) of the response.
+    pub(super) response: (i64, i64),
+    /// The same of the force.
+    pub(super) reference: (i64, i64),
+    /// What is measured: 8 displacement, 11 velocity, 12 acceleration; others are unknown.
+    pub(super) ordinate: i64,
+    /// Its unit as the file labels it; may be empty.
+    pub(super) unit: String,
+    /// Length and force of the file per m and N, if dataset 164 before it tells them.
+    pub(super) per_si: Option<[f64; 2]>,
+    /// Hz and values.
+    pub(super) values: Vec<(f64, Complex<f64>)>,
+}
+
+/// All frequency responses of a file.
+///
+/// # Errors
+/// A sentence with the line of what cannot be read.
+pub(super) fn read_functions(bytes: &[u8]) -> Result<Vec<UffFunction>, String> {
+    let mut reader = Lines { bytes, at: 0, line: 0 };
+    let (mut found, mut per_si, mut sets) = (Vec::new(), None, 0);
+    while let Some(line) = reader.next() {
+        if line.trim() != "-1" {
+            continue;
+        }
+        let Some(kind) = reader.next() else { break };
+        let start = reader.line;
+        sets += 1;
+        let mut words = kind.split_whitespace();
+        match words.next() {
+            Some("58") => found.extend(function(&mut reader, start, None, per_si)?),
+            Some("58b") => {
+                let numbers: Vec<&str> = words.collect();
+                let binary = Binary::of(&numbers).ok_or_else(|| {
+                    format!("line {start}: expected `58b`, byte order (1 or 2), number format (2), lines and bytes; found {kind:?}")
+                })?;
+                found.extend(function(&mut reader, start, Some(binary), per_si)?);
+            }
+            Some("164") => per_si = Some(units(&mut reader)?),
+            _ => {}
+        }
+        // To the end of the dataset.
+        while let Some(line) = reader.next() {
+            if line.trim() == "-1" {
+                break;
+            }
+        }
+    }
+    match (sets, found.is_empty()) {
+        (0, _) => Err("this is no universal file: it has no dataset between lines of -1".into()),
+        (_, true) => Err("the file has no frequency response (dataset 58 with function type 4)".into()),
+        _ => Ok(found),
+    }
+}
+
+/// Lines of text, among which bytes may stand.
+struct Lines<'a> {
+    bytes: &'a [u8],
+    at: usize,
+    line: usize,
+}
+
+impl Lines<'_> {
+    fn next(&mut self) -> Option<String> {
+        let rest = self.bytes.get(self.at..).filter(|rest| !rest.is_empty())?;
+        let length = rest.iter().position(|b| *b == b'\n').map_or(rest.len(), |k| k + 1);
+        self.at += length;
+        self.line += 1;
+        Some(
+            rest[..length].iter().map(|b| char::from(*b)).collect::<String>().trim_end_matches(['\n', '\r']).to_owned(),
+        )
+    }
+
+    fn expect(&mut self, what: &str) -> Result<String, String> {
+        let line = self.line + 1;
+        self.next().ok_or_else(|| format!("line {line}: the file ends where {what} is expected"))
+    }
+}
+
+/// How the values of a dataset 58b stand.
+struct Binary {
+    little: bool,
+    bytes: usize,
+}
+
+impl Binary {
+    /// From byte order, number format, lines of the head, and bytes.
+    fn of(words: &[&str]) -> Option<Self> {
+        let number = |k: usize| words.get(k)?.parse::<usize>().ok();
+        let (order, format, lines, bytes) = (number(0)?, number(1)?, number(2)?, number(3)?);
+        ((order == 1 || order == 2) && format == 2 && lines == HEAD).then_some(Self { little: order == 1, bytes })
+    }
+}
+
+/// Factors from SI to the units of the file: length, force.
+fn units(reader: &mut Lines<'_>) -> Result<[f64; 2], String> {
+    reader.expect("the code of the units")?;
+    let line = reader.expect("factors of the units")?;
+    let factors: Option<Vec<f64>> = line.split_whitespace().map(number).collect();
+    match factors.as_deref() {
+        Some([length, force, ..]) if *length > 0.0 && *force > 0.0 => Ok([*length, *force]),
+        _ => Err(format!("line {}: expected factors of length and force above 0, found {line:?}", reader.line)),
+    }
+}
+
+/// A number as Fortran writes it.
+fn number(word: &str) -> Option<f64> {
+    word.replace(['D', 'd'], "E").parse().ok().filter(|x: &f64| x.is_finite())
+}
+
+/// Letters of a line from one place to another.
+fn part(line: &str, from: usize, to: usize) -> String {
+    line.chars().skip(from).take(to - from).collect::<String>().trim().to_owned()
+}
+
+fn function(
+    reader: &mut Lines<'_>,
+    start: usize,
+    binary: Option<Binary>,
+    per_si: Option<[f64; 2]>,
+) -> Result<Option<UffFunction>, String> {
+    for _ in 0..5 {
+        reader.expect("the name of a function")?;
+    }
+    let line = reader.expect("kind and places of a function")?;
+    let place = reader.line;
+    let whole = |from: usize, to: usize| part(&line, from, to).parse::<i64>().ok();
+    let fields = (whole(0, 5), whole(41, 51), whole(51, 55), whole(66, 76), whole(76, 80));
+    let (Some(kind), Some(node), Some(direction), Some(other), Some(other_direction)) = fields else {
+        return Err(format!("line {place}: expected kind, nodes and directions in their columns, found {line:?}"));
+    };
+    let line = reader.expect("form of the values")?;
+    let place = reader.line;
+    let words: Vec<Option<f64>> = line.split_whitespace().map(number).collect();
+    let form = |k: usize| words.get(k).copied().flatten();
+    let (Some(form_of_values), Some(count), Some(spacing), Some(first), Some(step)) =
+        (form(0), form(1), form(2), form(3), form(4))
+    else {
+        return Err(format!("line {place}: expected form, number and spacing of the values, found {line:?}"));
+    };
+    if !(0.0..=MOST as f64).contains(&count) || count.fract() != 0.0 {
+        return Err(format!("line {place}: {count} values are announced, expected up to {MOST}"));
+    }
+    reader.expect("the abscissa")?;
+    let line = reader.expect("the ordinate")?;
+    let ordinate = part(&line, 0, 10).parse::<i64>().unwrap_or(0);
+    let unit = part(&line, 47, 67);
+    reader.expect("the denominator")?;
+    reader.expect("the third axis")?;
+    let (complex, double) = match form_of_values as i64 {
+        2 => (false, false),
+        4 => (false, true),
+        5 => (true, false),
+        6 => (true, true),
+        other => return Err(format!("line {place}: form {other} of values is not known; 2, 4, 5 and 6 are")),
+    };
+    let even = spacing == 1.0;
+    let per_value = usize::from(!even) + 1 + usize::from(complex);
+    let wanted = count as usize * per_value;
+    let numbers = match binary {
+        Some(binary) => bytes_to_numbers(reader, &binary, double, wanted, place)?,
+        None => text_to_numbers(reader, wanted, place)?,
+    };
+    if kind != RESPONSE || !complex {
+        return Ok(None);
+    }
+    let value = |(k, row): (usize, &[f64])| match even {
+        true => (first + step * k as f64, Complex::new(row[0], row[1])),
+        false => (row[0], Complex::new(row[1], row[2])),
+    };
+    let values: Vec<(f64, Complex<f64>)> = numbers.chunks_exact(per_value).enumerate().map(value).collect();
+    if values.iter().any(|(hz, H)| !(hz.is_finite() && H.re.is_finite() && H.im.is_finite())) {
+        return Err(format!("line {start}: a value of this function is no number"));
+    }
+    let (response, reference) = ((node, direction), (other, other_direction));
+    Ok(Some(UffFunction { line: start, response, reference, ordinate, unit, per_si, values }))
+}
+
+fn text_to_numbers(reader: &mut Lines<'_>, wanted: usize, place: usize) -> Result<Vec<f64>, String> {
+    let mut numbers = Vec::new();
+    while numbers.len() < wanted {
+        let line = reader.expect("a value")?;
+        if line.trim() == "-1" {
+            return Err(format!(
+                "line {}: {} values of {wanted} that line {place} announces",
+                reader.line,
+                numbers.len()
+            ));
+        }
+        for word in fields(&line) {
+            let value =
+                number(&word).ok_or_else(|| format!("line {}: expected a number, found {word:?}", reader.line))?;
+            numbers.push(value);
+        }
+    }
+    numbers.truncate(wanted);
+    Ok(numbers)
+}
+
+/// Numbers of a line; where no blank stands between them, each begins at its sign.
+fn fields(line: &str) -> Vec<String> {
+    let mut words: Vec<String> = vec![String::new()];
+    let mut before = ' ';
+    for c in line.chars() {
+        let exponent = matches!(before, 'e' | 'E' | 'd' | 'D');
+        if c == ' ' || ((c == '-' || c == '+') && !exponent && before != ' ') {
+            words.push(String::new());
+        }
+        if c != ' '
+            && let Some(word) = words.last_mut()
+        {
+            word.push(c);
+        }
+        before = c;
+    }
+    words.retain(|word| !word.is_empty());
+    words
+}
+
+fn bytes_to_numbers(
+    reader: &mut Lines<'_>,
+    binary: &Binary,
+    double: bool,
+    wanted: usize,
+    place: usize,
+) -> Result<Vec<f64>, String> {
+    let size = if double { 8 } else { 4 };
+    let bytes = reader.bytes.get(reader.at..).unwrap_or_default();
+    if binary.bytes != wanted * size || bytes.len() < binary.bytes {
+        return Err(format!(
+            "line {place}: {wanted} numbers of {size} bytes are announced; the dataset has {} bytes, the file {}",
+            binary.bytes,
+            bytes.len()
+        ));
+    }
+    let value = |chunk: &[u8]| {
+        let mut own = [0u8; 8];
+        own[..size].copy_from_slice(chunk);
+        if !binary.little {
+            own[..size].reverse();
+        }
+        match double {
+            true => f64::from_le_bytes(own),
+            false => f64::from(f32::from_le_bytes([own[0], own[1], own[2], own[3]])),
+        }
+    };
+    let numbers = bytes[..binary.bytes].chunks_exact(size).map(value).collect();
+    reader.at += binary.bytes;
+    Ok(numbers)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A function of three even values; what follows the head is given.
+    fn dataset(kind: &str, form: i64, spacing: i64, values: &[u8]) -> Vec<u8> {
+        let mut text = format!("    -1\n    {kind}\nfirst\nNONE\nNONE\nNONE\nNONE\n").into_bytes();
+        let places =
+            format!("{:5}{:10}{:5}{:10} {:10}{:10}{:4} {:10}{:10}{:4}\n", 4, 0, 0, 0, "NONE", 12, -3, "NONE", 7, 1);
+        text.extend(places.bytes());
+        text.extend(format!("{form:10}{:10}{spacing:10}{:13.5E}{:13.5E}{:13.5E}\n", 3, 10.0, 0.5, 0.0).bytes());
+        text.extend(format!("{:10}{:5}{:5}{:5} {:20} {:20}\n", 18, 0, 0, 0, "Frequency", "Hz").bytes());
+        text.extend(format!("{:10}{:5}{:5}{:5} {:20} {:20}\n", 12, 0, 0, 0, "Acceleration", "m/s^2").bytes());
+        text.extend(format!("{:10}{:5}{:5}{:5} {:20} {:20}\n", 13, 0, 0, 0, "Force", "N").bytes());
+        text.extend(b"         0    0    0    0 NONE                 NONE\n");
+        text.extend(values);
+        text.extend(b"\n    -1\n");
+        text
+    }
+
+    /// Truth: the numbers that went in.
+    #[test]
+    fn a_function_is_the_same_as_text_and_in_both_orders_of_bytes() {
+        let H = [(1.5, -2.0), (0.25, 3.0), (-1e-3, 4e-7)];
+        let text = "  1.50000E+00 -2.00000E+00  2.50000E-01  3.00000E+00 -1.00000E-03  4.00000E-07";
+        let flat: Vec<f64> = H.iter().flat_map(|(a, b)| [*a, *b]).collect();
+        let expected: Vec<(f64, Complex<f64>)> =
+            H.iter().enumerate().map(|(k, (a, b))| (10.0 + 0.5 * k as f64, Complex::new(*a, *b))).collect();
+        let head = |order: usize, bytes: usize| {
+            format!("58b     {order}     2          11  {bytes:12}     0     0           0           0")
+        };
+        let little: Vec<u8> = flat.iter().flat_map(|x| x.to_le_bytes()).collect();
+        let big: Vec<u8> = flat.iter().flat_map(|x| x.to_be_bytes()).collect();
+        let single: Vec<u8> = flat.iter().flat_map(|x| (*x as f32).to_le_bytes()).collect();
+        let uneven = "  1.00000E+01  1.50000000000E+00 -2.00000000000E+00\n  1.05000E+01  2.50000000000E-01  3.00000000000E+00\n\
+                      1.10000E+01-1.00000000000E-03 4.00000000000E-07";
+        for (kind, form, spacing, values, within) in [
+            ("58".to_owned(), 5, 1, text.as_bytes(), 1e-15),
+            ("58".to_owned(), 6, 0, uneven.as_bytes(), 1e-15),
+            (head(1, 48), 6, 1, &little[..], 0.0),
+            (head(2, 48), 6, 1, &big[..], 0.0),
+            (head(1, 24), 5, 1, &single[..], 1e-7),
+        ] {
+            let found = read_functions(&dataset(&kind, form, spacing, values)).unwrap();
+            let [one] = &found[..] else { panic!("{found:?}") };
+            assert_eq!((one.response, one.reference, one.ordinate), ((12, -3), (7, 1), 12));
+            assert_eq!((one.unit.as_str(), one.values.len()), ("m/s^2", 3));
+            for ((hz, H), (f, truth)) in one.values.iter().zip(&expected) {
+                assert!((hz - f).abs() < 1e-12 && (H - truth).norm() <= within * 5.0, "{kind}: {hz} {H}");
+            }
+        }
+        let cut = dataset(&head(1, 96), 6, 1, &little);
+        assert!(read_functions(&cut).unwrap_err().contains("announced"));
+        let short = dataset("58", 5, 1, b"  1.5 2.5");
+        assert!(read_functions(&short).unwrap_err().contains("2 values of 6"));
+        assert!(read_functions(b"solid x").unwrap_err().contains("no universal file"));
+        assert!(read_functions(b"    -1\n    151\nx\n    -1\n").unwrap_err().contains("no frequency response"));
+    }
+
+    #[test]
+    fn units_before_a_function_belong_to_it() {
+        let mut text = b"    -1\n   164\n         9mm, mN                       2\n 1.00000000000000D+03 1.00000000000000D+03 1.0\n-2.7E+02\n    -1\n".to_vec();
+        text.extend(dataset("58", 5, 1, b" 1 2 3 4 5 6"));
+        assert_eq!(read_functions(&text).unwrap()[0].per_si, Some([1e3, 1e3]));
+    }
+}
