@@ -5,7 +5,7 @@ use flexarm_stepping::FlexibleArm;
 use super::MapError;
 
 /// Most natural frequencies of a map.
-const MOST_FREQUENCIES: usize = 12;
+pub(super) const MOST_FREQUENCIES: usize = 12;
 
 /// A column of a map.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -56,6 +56,9 @@ pub(super) const HEAD: [(&str, &str); 6] = [
     ("direction", "number of the tool's direction"),
     ("branch", "number of the solution of the inverse kinematics"),
 ];
+
+/// Which of them is the number of the place.
+pub(super) const PLACE: usize = 3;
 
 impl Layout {
     /// * `joints`: names, and whether they slide.
