@@ -288,7 +288,7 @@ mod tests {
             let entry = |i: usize, j: usize| ((i * 7 + j * 11) as f64 * 0.731).sin();
             let B = DMatrix::from_fn(n, n, entry);
             let A = &B * B.transpose() + DMatrix::identity(n, n);
-            let M = &B + B.transpose();
+            let M = &B + B.transpose() + DMatrix::identity(n, n);
             let mut factor = Factor::new(n);
             assert_eq!(factor.compute(A.as_slice()), 1.0);
             let mut x = DVector::from_fn(n, |i, _| entry(i, 5));

@@ -64,16 +64,21 @@ fn assert_equal_alone(stiffness: f64, F: &Wrench) -> usize {
     answered
 }
 
-/// Truth: each pose alone. The softest springs of the list are so soft that no pose, or only some, go the way of lanes.
+/// Truth: each pose alone. Under the last load soft arms turn so far that no pose, or only some, go the way of lanes, and some
+/// have no equilibrium.
 #[test]
 fn every_pose_among_many_has_the_bits_of_the_pose_alone() {
-    let force = Vector3::new(20.0, -35.0, 60.0);
-    let wrenches =
-        [Wrench::zeros(), Wrench::new(force, Vector3::zeros()), Wrench::new(force, Vector3::new(3.0, 8.0, -5.0))];
-    for stiffness in [1.0, 0.1, 0.02, 5e-3, 1e-3, 2e-4] {
+    let (force, moment) = (Vector3::new(20.0, -35.0, 60.0), Vector3::new(3.0, 8.0, -5.0));
+    let wrenches = [
+        Wrench::zeros(),
+        Wrench::new(force, Vector3::zeros()),
+        Wrench::new(force, moment),
+        Wrench::new(force * 30.0, moment * 10.0),
+    ];
+    for stiffness in [1.0, 0.1, 0.02, 5e-3] {
         let answered = wrenches.each_ref().map(|F| assert_equal_alone(stiffness, F));
         eprintln!("{stiffness}: {answered:?} of 31");
-        assert!(stiffness < 0.1 || answered == [30; 3], "{stiffness}: {answered:?}");
+        assert!(stiffness < 0.1 || answered[..3] == [30; 3], "{stiffness}: {answered:?}");
     }
 }
 

@@ -19,7 +19,7 @@ const MOST_WAITING: usize = 256;
 /// Places between two looks at whether to go on.
 const BLOCK: usize = 8192;
 
-/// Appends the joint values of the pose of a number.
+/// Puts the joint values of the pose of a number into an empty list.
 pub(super) type PoseOf<'a> = dyn Fn(usize, &mut Vec<f64>) + Sync + 'a;
 
 /// What there is to go through.
@@ -148,7 +148,9 @@ impl<'a> Worker<'a> {
                     }
                 }
                 Places::Joints { values, .. } => {
-                    values(place, &mut self.waiting);
+                    self.branches.clear();
+                    values(place, &mut self.branches);
+                    self.waiting.extend(&self.branches);
                     self.seats.push(Seat { place, direction: 0, branch: 0 });
                 }
             }
