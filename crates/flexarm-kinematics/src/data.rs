@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector, Isometry, Matrix3, Rotation3, Scalar, Translati
 use crate::axis_motion::AxisMotion;
 use crate::closure::LoopData;
 use crate::modal::ModalData;
-use crate::model::{Body, JointMotion, Model};
+use crate::model::{Body, Frame, JointMotion, Model};
 
 /// Positions and velocities of all independent coordinates, in the model's coordinate order.
 #[derive(Clone, Debug, PartialEq)]
@@ -68,7 +68,6 @@ pub struct Data<T: Scalar = f64> {
     pub(crate) U: Vec<Wrench<T>>,
     pub(crate) inverse_d: Vec<f64>,
     pub(crate) u: Vec<f64>,
-    pub(crate) scratch: Vec<T>,
     /// The caller's external wrenches while those of the balancers are added; none without balancers.
     pub(crate) F_held: Vec<Wrench<T>>,
     /// Length or joint value of each balancer at the last poses.
@@ -108,7 +107,6 @@ impl<T: Real> Data<T> {
             U: vec![Wrench::zeros(); n],
             inverse_d: vec![0.0; n],
             u: vec![0.0; n],
-            scratch: vec![T::zero(); model.nv()],
             F_held: vec![Wrench::zeros(); if model.balancers.is_empty() { 0 } else { n }],
             balanced: vec![0.0; model.balancers.len()],
             modal: model.modal.iter().map(|m| ModalData::new(&m.tables)).collect(),
@@ -124,12 +122,14 @@ impl<T: Real> Data<T> {
     pub fn clear_external_wrenches(&mut self) {
         self.F_ext.fill(Wrench::zeros());
     }
-}
 
-impl Data {
     /// Pose of a frame in the world, from the last [`crate::forward_kinematics`].
-    pub fn X_WF(&self, frame: &crate::model::Frame) -> Pose {
-        self.X_WB[frame.body] * frame.X_BF
+    #[inline(always)]
+    pub fn X_WF(&self, frame: &Frame) -> Pose<T> {
+        let (X_WB, X_BF) = (&self.X_WB[frame.body], &frame.X_BF);
+        let R_WB = X_WB.rotation.matrix();
+        let p = add(&X_WB.translation.vector, &mul(R_WB, &lift(&X_BF.translation.vector)));
+        pose(mul3(R_WB, &lift3(X_BF.rotation.matrix())), p)
     }
 }
 

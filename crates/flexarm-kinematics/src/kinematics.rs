@@ -3,7 +3,7 @@
 //! Frames: W world, B a body, T any frame fixed to a body (usually the tool). `J_WT_W` maps `q̇` to the
 //! twist of T: velocity of the point To and angular velocity, both in **world axes** (rows linear first).
 
-use flexarm_spatial::products::{add, mul, mul3};
+use flexarm_spatial::products::{add, column, cross, lift, mul, mul3, scaled, sub};
 use flexarm_spatial::{ElasticAngles, Real, Twist};
 use nalgebra::{Matrix3, Matrix6xX, Vector3};
 
@@ -95,38 +95,64 @@ pub fn frame_twist(data: &Data, frame: &Frame) -> Twist {
 /// If `J` does not have nv columns.
 pub fn frame_jacobian(model: &Model, data: &Data, frame: &Frame, J: &mut Matrix6xX<f64>) {
     assert_eq!(J.ncols(), model.nv(), "the Jacobian needs one column per coordinate");
-    J.fill(0.0);
-    let p_T = (data.X_WB[frame.body] * frame.X_BF).translation.vector;
+    tree_jacobian(model, data, frame, J.as_mut_slice(), |k, column, J| {
+        let loops = data.loops.iter();
+        loops.for_each(|loops| loops.each_leader(k, &mut |k, factor| add_column(column, factor, &mut J[6 * k..])));
+    });
+}
+
+/// [`frame_jacobian`] over any scalar; `J`: 6 × nv, column after column. Columns of coordinates beyond nv, which closed loops
+/// have, go to `beyond`.
+#[inline(always)]
+pub(crate) fn tree_jacobian<T: Real>(
+    model: &Model,
+    data: &Data<T>,
+    frame: &Frame,
+    J: &mut [T],
+    mut beyond: impl FnMut(usize, &Twist<T>, &mut [T]),
+) {
+    J.fill(T::zero());
+    let p_T = data.X_WF(frame).translation.vector;
     let mut i = frame.body;
     while i > 0 {
-        let R = data.X_WB[i].rotation.matrix();
-        let r = p_T - data.X_WB[i].translation.vector;
-        joint_columns(model, data, i, R, |k, linear, angular| {
-            let column = linear + angular.cross(&r);
-            let mut add = |k: usize, factor: f64| {
-                for c in 0..3 {
-                    J[(c, k)] += factor * column[c];
-                    J[(3 + c, k)] += factor * angular[c];
+        let X_WB = &data.X_WB[i];
+        let r = sub(&p_T, &X_WB.translation.vector);
+        joint_columns(
+            model,
+            data,
+            i,
+            X_WB.rotation.matrix(),
+            #[inline(always)]
+            |k, linear, angular| {
+                let column = Twist::new(add(&linear, &cross(&angular, &r)), angular);
+                match k < model.nv() {
+                    true => add_column(&column, T::one(), &mut J[6 * k..]),
+                    false => beyond(k, &column, J),
                 }
-            };
-            match k < model.nv() {
-                true => add(k, 1.0),
-                false => data.loops.iter().for_each(|loops| loops.each_leader(k, &mut add)),
-            }
-        });
+            },
+        );
         i = model.bodies[i].parent;
+    }
+}
+
+/// Adds a multiple of a twist to the first six numbers.
+#[inline(always)]
+fn add_column<T: Real>(column: &Twist<T>, factor: T, to: &mut [T]) {
+    let (l, a) = (&column.linear, &column.angular);
+    for (to, x) in to.iter_mut().zip([l.x, l.y, l.z, a.x, a.y, a.z]) {
+        *to += factor * x;
     }
 }
 
 /// Columns by which the joint of body i moves it, at Bo, in the axes to which R turns those of B: coordinate of the tree, linear
 /// and angular part.
 #[inline(always)]
-pub(crate) fn joint_columns(
+pub(crate) fn joint_columns<T: Real>(
     model: &Model,
-    data: &Data,
+    data: &Data<T>,
     i: usize,
-    R: &Matrix3<f64>,
-    mut add: impl FnMut(usize, Vector3<f64>, Vector3<f64>),
+    R: &Matrix3<T>,
+    mut add: impl FnMut(usize, Vector3<T>, Vector3<T>),
 ) {
     let body = &model.bodies[i];
     match body.motion {
@@ -137,17 +163,17 @@ pub(crate) fn joint_columns(
         JointMotion::Welded => {}
         JointMotion::Elastic(_) => {
             let S = &data.elastic[i];
-            let (L, B) = (R * S.L, R * S.B);
+            let (L, B) = (mul3(R, &S.L), mul3(R, &S.B));
             for c in 0..3 {
-                add(body.coordinate + c, L.column(c).into(), Vector3::zeros());
-                add(body.coordinate + 3 + c, Vector3::zeros(), B.column(c).into());
+                add(body.coordinate + c, column(&L, c), Vector3::zeros());
+                add(body.coordinate + 3 + c, Vector3::zeros(), column(&B, c));
             }
         }
         JointMotion::Interface { modal, interface } => {
             let (S, modal) = (&data.elastic[i], &model.modal[modal]);
             for c in 0..modal.n {
                 let column = modal.tables.shapes.interfaces[interface].twist(c, &S.L, &S.B);
-                add(body.coordinate + c, R * column.linear, R * column.angular);
+                add(body.coordinate + c, mul(R, &column.linear), mul(R, &column.angular));
             }
         }
     }
@@ -155,10 +181,13 @@ pub(crate) fn joint_columns(
 
 /// `R_WB S` times the ratio of a mimic joint: a column of the Jacobian at Bo, in W axes.
 #[inline(always)]
-fn turned(motion: AxisMotion, R_WB: &Matrix3<f64>, ratio: f64) -> Twist {
+fn turned<T: Real>(motion: AxisMotion, R_WB: &Matrix3<T>, ratio: f64) -> Twist<T> {
+    let ratio = T::splat(ratio);
     motion.linear(
-        |axis| Twist::new(Vector3::zeros(), R_WB * axis * ratio),
-        |axis| Twist::new(R_WB * axis * ratio, Vector3::zeros()),
+        #[inline(always)]
+        |axis| Twist::new(Vector3::zeros(), scaled(&mul(R_WB, &lift(&axis)), ratio)),
+        #[inline(always)]
+        |axis| Twist::new(scaled(&mul(R_WB, &lift(&axis)), ratio), Vector3::zeros()),
     )
 }
 

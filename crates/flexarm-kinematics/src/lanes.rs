@@ -13,9 +13,10 @@ use nalgebra::Vector3;
 use crate::axis_motion::AxisMotion;
 use crate::crba::composite_bodies;
 use crate::data::{Data, State, identity};
-use crate::kinematics::place_bodies;
+use crate::kinematics::{place_bodies, tree_jacobian};
 use crate::model::{Body, Frame, JointMotion, Model};
-use crate::rnea::newton_euler;
+use crate::rnea::{at_rest, newton_euler};
+use crate::static_tangent::{PointLoad, StaticTangent};
 
 /// A tree whose inertias are in the scalar of a recursion: a [`Model`], or one with several sets of them
 /// ([`LaneTree`]).
@@ -108,6 +109,38 @@ pub fn mass_matrix_at_poses<T: Real>(tree: &LaneTree<T>, data: &mut Data<T>) {
 #[inline(always)]
 pub fn forward_kinematics<T: Real>(tree: &LaneTree<T>, data: &mut Data<T>, q: &[T]) {
     place_bodies(&tree.model, data, q);
+}
+
+/// [`crate::gravity_forces_at_poses`] without balancers: `data.tau` has the generalised forces.
+#[inline(always)]
+pub fn gravity_forces_at_poses<T: Real>(tree: &LaneTree<T>, data: &mut Data<T>) {
+    at_rest(tree, data);
+}
+
+/// [`crate::frame_jacobian`], column after column in `J` (6 × nv).
+#[inline(always)]
+pub fn frame_jacobian<T: Real>(tree: &LaneTree<T>, data: &Data<T>, frame: &Frame, J: &mut [T]) {
+    tree_jacobian(
+        &tree.model,
+        data,
+        frame,
+        J,
+        #[inline(always)]
+        |_, _, _| (),
+    );
+}
+
+/// [`StaticTangent::compute`] without balancers, under one load, column after column in `G`.
+#[inline(always)]
+pub fn static_tangent<T: Real>(
+    tangent: &mut StaticTangent<T>,
+    tree: &LaneTree<T>,
+    data: &Data<T>,
+    q: &[T],
+    load: PointLoad,
+    G: &mut [T],
+) {
+    tangent.of_bodies(tree, data, q, std::iter::once(load), G);
 }
 
 /// Places of a frame's origin in the world (m): with all elastic coordinates at zero, and at `q`.

@@ -94,5 +94,5 @@ pub use model::{
     Body, Coordinate, ElasticGroup, Frame, JointMotion, MOST_COORDINATES, Model, ModelError, moment_floor,
 };
 pub use redundancy::{NullSpaceRule, RuledSolution, inverse_kinematics_with_rule};
-pub use rnea::{gravity_forces, inverse_dynamics, nonlinear_effects};
+pub use rnea::{gravity_forces, gravity_forces_at_poses, inverse_dynamics, nonlinear_effects};
 pub use static_tangent::{PointLoad, StaticTangent};

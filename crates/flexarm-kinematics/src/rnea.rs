@@ -11,13 +11,13 @@
 //! `Ṡ_B` is the rate of S in B axes: zero for one-DoF joints, not for elastic ones. A body that bends in modes adds its
 //! own inertia forces to (3) and to the forces of its coordinates, see [`crate::ModalBody`].
 
-use flexarm_spatial::products::lift;
+use flexarm_spatial::products::{cross, lift, scaled, tr_mul};
 use flexarm_spatial::{Real, Twist, Wrench};
 use nalgebra::{DVector, Vector3};
 
 use crate::balancer::{add_joint_torques, with_lines};
 use crate::closure;
-use crate::data::{Data, State, add_projection, begin, joint_motion, rotor_energy, subspace_times};
+use crate::data::{Data, State, add_projection, begin, joint_motion, joint_position, rotor_energy, subspace_times};
 use crate::lanes::Tree;
 use crate::model::Model;
 
@@ -55,15 +55,55 @@ pub fn nonlinear_effects<'d>(model: &Model, data: &'d mut Data, state: &State) -
 
 /// Generalised forces that hold the mechanism still at `q`, against gravity, balancers and external loads.
 pub fn gravity_forces<'d>(model: &Model, data: &'d mut Data, q: &DVector<f64>) -> &'d DVector<f64> {
-    if !model.loops.is_empty() {
-        closure::inverse_dynamics(model, data, q.as_slice(), None, None);
-        return &data.tau;
+    if model.loops.is_empty() {
+        begin(model, data, q.as_slice());
+        for i in 1..model.bodies.len() {
+            joint_position(model, data, i, q.as_slice());
+        }
     }
-    let mut at_rest = std::mem::take(&mut data.scratch);
-    at_rest.fill(0.0);
-    balanced(model, data, q.as_slice(), &at_rest, None);
-    data.scratch = at_rest;
+    gravity_forces_at_poses(model, data, q)
+}
+
+/// As [`gravity_forces`], for the joint poses that [`crate::forward_kinematics`] at `q` left in `data`.
+pub fn gravity_forces_at_poses<'d>(model: &Model, data: &'d mut Data, q: &DVector<f64>) -> &'d DVector<f64> {
+    match (model.loops.is_empty(), model.balancers.is_empty()) {
+        (true, true) => at_rest(model, data),
+        (true, false) => {
+            with_lines(model, data, q.as_slice(), |data| at_rest(model, data));
+            add_joint_torques(model, data, 1.0);
+        }
+        (false, _) => closure::inverse_dynamics(model, data, q.as_slice(), None, None),
+    }
     &data.tau
+}
+
+/// [`newton_euler`] of a tree that stands still, for the joint poses in `data`: the same bits without everything that a
+/// velocity would make.
+#[inline(always)]
+pub(crate) fn at_rest<T: Real>(tree: &impl Tree<T>, data: &mut Data<T>) {
+    let model = tree.model();
+    let n = model.bodies.len();
+    data.rotor_energy = T::zero();
+    data.V.fill(Twist::zeros());
+    data.A[0] = Twist::new(lift(&-model.gravity), Vector3::zeros());
+    data.F[0] = Wrench::zeros();
+    for i in 0..n {
+        let body = &model.bodies[i];
+        if i > 0 {
+            // (2) and (3)
+            let a = tr_mul(data.X_PB[i].rotation.matrix(), &data.A[body.parent].linear);
+            let inertia = tree.inertia(i);
+            data.A[i] = Twist::new(a, Vector3::zeros());
+            data.F[i] = Wrench::new(scaled(&a, inertia.mass), cross(&inertia.first_moment, &a)) - data.F_ext[i];
+        }
+        if let Some(m) = body.modal {
+            let modal = &mut data.modal[m];
+            modal.rates.fill(T::zero());
+            modal.f.fill(T::zero());
+            data.F[i] += modal.inertia_forces(&model.modal[m].tables, &data.A[i], None);
+        }
+    }
+    carry_inward(model, data);
 }
 
 /// [`newton_euler`] with the balancers of the model, of the tree: closed loops come around it (`closure.rs`).
@@ -113,8 +153,23 @@ pub(crate) fn newton_euler<T: Real>(tree: &impl Tree<T>, data: &mut Data<T>, q: 
             add_modal_forces(model, data, i, m, qdot, qddot);
         }
     }
+    carry_inward(model, data);
+    if let Some(qddot) = qddot {
+        for &(k, armature) in &model.rotors {
+            data.tau[k] += T::splat(armature) * qddot[k];
+        }
+        for &(a, b, inertia) in &model.rotor_couplings {
+            data.tau[a] += T::splat(inertia) * qddot[b];
+            data.tau[b] += T::splat(inertia) * qddot[a];
+        }
+    }
+}
+
+/// The inward pass (4): generalised forces into `data.tau`, wrenches onto the bodies inward.
+#[inline(always)]
+fn carry_inward<T: Real>(model: &Model, data: &mut Data<T>) {
     data.tau.as_mut_slice().fill(T::zero());
-    for i in (1..n).rev() {
+    for i in (1..model.bodies.len()).rev() {
         let F = data.F[i];
         add_projection(model, &data.elastic[i], i, &F, data.tau.as_mut_slice()); // (4)
         let parent = model.bodies[i].parent;
@@ -126,15 +181,6 @@ pub(crate) fn newton_euler<T: Real>(tree: &impl Tree<T>, data: &mut Data<T>, q: 
     for (entry, modal) in model.modal.iter().zip(&data.modal) {
         for (tau, f) in data.tau.as_mut_slice()[entry.coordinate..].iter_mut().zip(&modal.f) {
             *tau += *f;
-        }
-    }
-    if let Some(qddot) = qddot {
-        for &(k, armature) in &model.rotors {
-            data.tau[k] += T::splat(armature) * qddot[k];
-        }
-        for &(a, b, inertia) in &model.rotor_couplings {
-            data.tau[a] += T::splat(inertia) * qddot[b];
-            data.tau[b] += T::splat(inertia) * qddot[a];
         }
     }
 }

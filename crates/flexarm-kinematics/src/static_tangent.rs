@@ -27,13 +27,14 @@
 //! One pass over the bodies and one over the pairs of coordinates; central differences of [`crate::gravity_forces`] take 2 n
 //! passes over the bodies.
 
-use flexarm_spatial::products::{mul, tr_mul};
-use flexarm_spatial::{ElasticAngles, Twist, Wrench};
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use flexarm_spatial::products::{add, add3, column as column_of, cross, cross3, dot, lift, mul, scaled, sub, tr_mul};
+use flexarm_spatial::{ElasticAngles, Pose, Real, Twist, Wrench};
+use nalgebra::{DMatrix, DVector, Matrix3, Scalar, Vector3};
 
 use crate::balancer::{BalancerLine, BalancerPlace};
 use crate::closure::LoopTangent;
 use crate::data::Data;
+use crate::lanes::Tree;
 use crate::model::{JointMotion, Model};
 
 /// A wrench on a body, for [`StaticTangent::compute`].
@@ -51,13 +52,13 @@ pub struct PointLoad {
 
 /// `∂τ/∂q` of the static forces, with its workspace.
 #[derive(Clone, Debug)]
-pub struct StaticTangent {
+pub struct StaticTangent<T: Scalar = f64> {
     /// First coordinate of the matrix.
     first: usize,
-    columns: Vec<Column>,
+    columns: Vec<Column<T>>,
     /// One per body: weight and loads on all outward of it, and how they change.
-    carried: Vec<Carried>,
-    g: Vec<Vector3<f64>>,
+    carried: Vec<Carried<T>>,
+    g: Vec<Vector3<T>>,
     /// Of closed loops: slopes of the tree, and forces on the dependent coordinates.
     loops: Option<Box<LoopTangent>>,
     tau_d: Vec<f64>,
@@ -65,95 +66,110 @@ pub struct StaticTangent {
 
 /// A twist by which a coordinate moves what is outward of a body.
 #[derive(Clone, Copy, Debug)]
-struct Column {
+struct Column<T: Scalar = f64> {
     /// Coordinate, from the first one of the matrix.
     k: usize,
     body: usize,
     /// Displacement in joint axes and rates of the angles per rate of the coordinate, of joints with angles.
     t: Vector3<f64>,
     phi: Vector3<f64>,
-    v: Vector3<f64>,
-    w: Vector3<f64>,
+    v: Vector3<T>,
+    w: Vector3<T>,
     /// `T s` in (3).
-    force: Vector3<f64>,
-    moment: Vector3<f64>,
+    force: Vector3<T>,
+    moment: Vector3<T>,
     /// The bracket of (4).
-    row: Vector3<f64>,
+    row: Vector3<T>,
     /// d of (7) for the balancer at hand.
     d: Vector3<f64>,
 }
 
 /// W and T of (2).
 #[derive(Clone, Copy, Debug)]
-struct Carried {
-    f: Vector3<f64>,
-    n: Vector3<f64>,
-    A: Matrix3<f64>,
-    N: Matrix3<f64>,
+struct Carried<T: Scalar> {
+    f: Vector3<T>,
+    n: Vector3<T>,
+    A: Matrix3<T>,
+    N: Matrix3<T>,
 }
 
-impl Carried {
-    const ZERO: Self = Self {
-        f: Vector3::new(0.0, 0.0, 0.0),
-        n: Vector3::new(0.0, 0.0, 0.0),
-        A: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-        N: Matrix3::new(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-    };
-
+impl<T: Real> Carried<T> {
     /// A force that keeps its direction, at the point c.
-    fn weight(f: Vector3<f64>, c: &Vector3<f64>) -> Self {
-        Self { f, n: c.cross(&f), A: Matrix3::zeros(), N: arm_turns(c, &f) }
+    #[inline(always)]
+    fn weight(f: Vector3<T>, c: &Vector3<T>) -> Self {
+        Self { f, n: cross(c, &f), A: zeros(), N: arm_turns(c, &f) }
     }
 
+    #[inline(always)]
     fn add(&mut self, other: &Self) {
-        self.f += other.f;
-        self.n += other.n;
-        self.A += other.A;
-        self.N += other.N;
+        self.f = add(&self.f, &other.f);
+        self.n = add(&self.n, &other.n);
+        self.A = add3(&self.A, &other.A);
+        self.N = add3(&self.N, &other.N);
     }
 }
 
-/// `(w × r) × f` as a matrix on w.
-fn arm_turns(r: &Vector3<f64>, f: &Vector3<f64>) -> Matrix3<f64> {
-    r * f.transpose() - Matrix3::from_diagonal_element(r.dot(f))
+#[inline(always)]
+fn zeros<T: Real>() -> Matrix3<T> {
+    let zero = T::zero();
+    Matrix3::new(zero, zero, zero, zero, zero, zero, zero, zero, zero)
+}
+
+/// `(w × r) × f` as a matrix on w: `r fᵀ - (r · f) 1`.
+#[inline(always)]
+fn arm_turns<T: Real>(r: &Vector3<T>, f: &Vector3<T>) -> Matrix3<T> {
+    let s = dot(r, f);
+    Matrix3::new(
+        r.x * f.x - s,
+        r.x * f.y,
+        r.x * f.z,
+        r.y * f.x,
+        r.y * f.y - s,
+        r.y * f.z,
+        r.z * f.x,
+        r.z * f.y,
+        r.z * f.z - s,
+    )
 }
 
 /// `w × a` as a matrix on w.
-fn turned(a: &Vector3<f64>) -> Matrix3<f64> {
-    Matrix3::new(0.0, a.z, -a.y, -a.z, 0.0, a.x, a.y, -a.x, 0.0)
+#[inline(always)]
+fn turned<T: Real>(a: &Vector3<T>) -> Matrix3<T> {
+    let zero = T::zero();
+    Matrix3::new(zero, a.z, -a.y, -a.z, zero, a.x, a.y, -a.x, zero)
 }
 
 impl PointLoad {
     /// W and T of (2).
-    fn carried(&self, data: &Data) -> Carried {
-        let X_WB = &data.X_WB[self.body];
-        let p = X_WB.translation.vector + mul(X_WB.rotation.matrix(), &self.p_B);
-        let (f, m) = (self.F_W.force, self.F_W.torque);
+    #[inline(always)]
+    fn carried<T: Real>(&self, X_WB: &Pose<T>) -> Carried<T> {
+        let p = add(&X_WB.translation.vector, &mul(X_WB.rotation.matrix(), &lift(&self.p_B)));
+        let (f, m) = (lift(&self.F_W.force), lift(&self.F_W.torque));
         let mut carried = Carried::weight(f, &p);
-        carried.n += m;
+        carried.n = add(&carried.n, &m);
         if self.turns {
             carried.A = turned(&f);
-            carried.N += turned(&m) + p.cross_matrix() * carried.A;
+            carried.N = add3(&carried.N, &add3(&turned(&m), &cross3(&p, &carried.A)));
         }
         carried
     }
 }
 
-impl StaticTangent {
+impl<T: Real> StaticTangent<T> {
     /// For the coordinates from `first` on: 0, or [`Model::n_actuated`] for the elastic ones.
     pub fn new(model: &Model, first: usize) -> Self {
         let mut columns = Vec::new();
-        let zero = Vector3::zeros();
+        let (zero, nothing) = (Vector3::zeros(), Vector3::from_element(T::zero()));
         let column = |k: usize, body: usize, t: Vector3<f64>, phi: Vector3<f64>| Column {
             k: k - first,
             body,
             t,
             phi,
-            v: zero,
-            w: zero,
-            force: zero,
-            moment: zero,
-            row: zero,
+            v: nothing,
+            w: nothing,
+            force: nothing,
+            moment: nothing,
+            row: nothing,
             d: zero,
         };
         for (i, body) in model.bodies.iter().enumerate().skip(1) {
@@ -179,9 +195,187 @@ impl StaticTangent {
         let widest = model.modal.iter().map(|modal| modal.n).max().unwrap_or(0);
         let loops = (!model.loops.is_empty()).then(|| Box::new(LoopTangent::new(model, first)));
         let tau_d = vec![0.0; model.dependent().len()];
-        Self { first, columns, carried: vec![Carried::ZERO; model.bodies.len()], g: vec![zero; widest], loops, tau_d }
+        let carried = vec![Carried::weight(nothing, &nothing); model.bodies.len()];
+        Self { first, columns, carried, g: vec![nothing; widest], loops, tau_d }
     }
 
+    /// [`StaticTangent::compute`] without balancers and loops; `G`: column after column.
+    #[inline(always)]
+    pub(crate) fn of_bodies(
+        &mut self,
+        tree: &impl Tree<T>,
+        data: &Data<T>,
+        q: &[T],
+        loads: impl Iterator<Item = PointLoad>,
+        G: &mut [T],
+    ) {
+        G.fill(T::zero());
+        self.carry_weights(tree, data);
+        for load in loads {
+            self.carried[load.body].add(&load.carried(&data.X_WB[load.body]));
+        }
+        self.finish(tree.model(), data, q, G);
+    }
+
+    /// W and T of (2) of the weight of each body.
+    #[inline(always)]
+    fn carry_weights(&mut self, tree: &impl Tree<T>, data: &Data<T>) {
+        let model = tree.model();
+        let gravity = lift(&model.gravity);
+        for (i, (carried, body)) in self.carried.iter_mut().zip(&model.bodies).enumerate() {
+            let inertia = tree.inertia(i);
+            let (mut mass, mut h_B) = (inertia.mass, inertia.first_moment);
+            if let Some(m) = body.modal {
+                mass += data.modal[m].inertia.mass;
+                h_B = add(&h_B, &data.modal[m].inertia.first_moment);
+            }
+            let X_WB = &data.X_WB[i];
+            // m c, so that a body without mass is no exception: (m c) gᵀ - (m c · g) 1.
+            let h = add(&scaled(&X_WB.translation.vector, mass), &mul(X_WB.rotation.matrix(), &h_B));
+            *carried = Carried { f: scaled(&gravity, mass), ..Carried::weight(gravity, &h) };
+        }
+    }
+
+    /// What the columns make of all that is carried.
+    #[inline(always)]
+    fn finish(&mut self, model: &Model, data: &Data<T>, q: &[T], G: &mut [T]) {
+        for i in (1..model.bodies.len()).rev() {
+            let parent = model.bodies[i].parent;
+            let (inner, outer) = self.carried.split_at_mut(i);
+            inner[parent].add(&outer[0]);
+        }
+        // With closed loops there are coordinates of the opened tree besides.
+        let n = G.len().isqrt();
+        self.place_columns(model, data);
+        self.add_pairs(model, G, n);
+        self.add_own_joints(model, data, q, G, n);
+        self.add_modal_weights(model, data, G, n);
+    }
+
+    /// Twists of the coordinates, and what (3) and (4) make of them.
+    #[inline(always)]
+    fn place_columns(&mut self, model: &Model, data: &Data<T>) {
+        for column in &mut self.columns {
+            let (i, body) = (column.body, &model.bodies[column.body]);
+            let X_WB = &data.X_WB[i];
+            let (R, p) = (X_WB.rotation.matrix(), &X_WB.translation.vector);
+            let S_B = match body.motion {
+                JointMotion::Axis(motion) => motion.twist(T::splat(body.ratio)),
+                _ => {
+                    let S = &data.elastic[i];
+                    Twist::new(mul(&S.L, &lift(&column.t)), mul(&S.B, &lift(&column.phi)))
+                }
+            };
+            let w = mul(R, &S_B.angular);
+            let v = add(&mul(R, &S_B.linear), &cross(p, &w));
+            let Carried { f, n, A, N } = &self.carried[i];
+            let vf = cross(&v, f);
+            (column.v, column.w) = (v, w);
+            (column.force, column.moment) = (mul(A, &w), add(&mul(N, &w), &vf)); // (3)
+            column.row = add(&add(&vf, &cross(&w, n)), &add(&tr_mul(A, &v), &tr_mul(N, &w))); // (4)
+        }
+    }
+
+    /// (3) and (4) for all pairs of which one moves the other.
+    #[inline(always)]
+    fn add_pairs(&self, model: &Model, G: &mut [T], n: usize) {
+        for (a, inner) in self.columns.iter().enumerate() {
+            let end = model.bodies[inner.body].subtree_end;
+            // Columns are in the order of bodies: what `inner` moves comes after it.
+            for outer in &self.columns[a..] {
+                if outer.body >= end {
+                    break;
+                }
+                G[outer.k * n + inner.k] -= dot(&inner.v, &outer.force) + dot(&inner.w, &outer.moment);
+                if outer.body > inner.body {
+                    G[inner.k * n + outer.k] -= dot(&inner.w, &outer.row);
+                } else if outer.k != inner.k {
+                    G[inner.k * n + outer.k] -= dot(&outer.v, &inner.force) + dot(&outer.w, &inner.moment);
+                }
+            }
+        }
+    }
+
+    /// (5): with t translations in joint axes and φ angles, about Bo,
+    ///
+    /// ```text
+    /// ∂s_i/∂q_j · W = (t_j × w_i) · f + ([B φ_j]x B φ_i + ∂B/∂φ_j φ_i) · n_Bo
+    /// ```
+    #[inline(always)]
+    fn add_own_joints(&self, model: &Model, data: &Data<T>, q: &[T], G: &mut [T], n: usize) {
+        let mut columns = &self.columns[..];
+        while let Some(head) = columns.first() {
+            let i = head.body;
+            let mut count = 1;
+            while count < columns.len() && columns[count].body == i {
+                count += 1;
+            }
+            let (joint, rest) = columns.split_at(count);
+            columns = rest;
+            let (angles, phi) = match model.bodies[i].motion {
+                JointMotion::Elastic(angles) => {
+                    let k = model.bodies[i].coordinate + 3;
+                    (angles, Vector3::new(q[k], q[k + 1], q[k + 2]))
+                }
+                JointMotion::Interface { modal, interface } => {
+                    let entry = &model.modal[modal];
+                    let eta = &q[entry.coordinate..entry.coordinate + entry.n];
+                    (ElasticAngles::RotationVector, entry.tables.shapes.interfaces[interface].times(eta).1)
+                }
+                JointMotion::Axis(_) | JointMotion::Welded => continue,
+            };
+            let (S, X_WB) = (&data.elastic[i], &data.X_WB[i]);
+            let R = X_WB.rotation.matrix();
+            let f = &self.carried[i].f;
+            let n_B = tr_mul(R, &sub(&self.carried[i].n, &cross(&X_WB.translation.vector, f)));
+            // (t_j × w_i) · f = t_j · (w_i × f)
+            let f_B = tr_mul(R, f);
+            let (mut turns, mut slides) = (zeros(), zeros());
+            for c in 0..3 {
+                let (unit, w_B) = (lift(&Vector3::ith(c, 1.0)), column_of(&S.B, c));
+                let dB = angles.rate_map_derivative(&phi, &unit);
+                // The covector on φ_i for φ_j along axis c, as a column.
+                let turn = add(&tr_mul(&S.B, &cross(&n_B, &w_B)), &tr_mul(&dB, &n_B));
+                let slide = tr_mul(&S.L, &cross(&w_B, &f_B));
+                turns.data.0[c] = [turn.x, turn.y, turn.z];
+                slides.data.0[c] = [slide.x, slide.y, slide.z];
+            }
+            for row in joint {
+                let phi = lift(&row.phi);
+                let (slid, turned) = (mul(&slides, &phi), tr_mul(&turns, &phi));
+                for column in joint {
+                    G[column.k * n + row.k] -= dot(&lift(&column.t), &slid) + dot(&lift(&column.phi), &turned);
+                }
+            }
+        }
+    }
+
+    /// (6).
+    #[inline(always)]
+    fn add_modal_weights(&mut self, model: &Model, data: &Data<T>, G: &mut [T], n: usize) {
+        let gravity = lift(&model.gravity);
+        for entry in model.modal.iter().filter(|entry| entry.coordinate >= self.first) {
+            let R = data.X_WB[entry.body].rotation.matrix();
+            for (g, C_t) in self.g.iter_mut().zip(&entry.tables.shapes.C_t) {
+                *g = cross(&mul(R, &lift(C_t)), &gravity);
+            }
+            for column in &self.columns {
+                let moves = column.body <= entry.body && entry.body < model.bodies[column.body].subtree_end;
+                if !moves {
+                    continue;
+                }
+                for (k, g) in self.g[..entry.n].iter().enumerate() {
+                    let k = entry.coordinate - self.first + k;
+                    let slope = dot(&column.w, g);
+                    G[k * n + column.k] -= slope;
+                    G[column.k * n + k] -= slope;
+                }
+            }
+        }
+    }
+}
+
+impl StaticTangent {
     /// `∂τ/∂q` of the forces that hold the mechanism still under weight and `loads`, without springs; (n - first)×(n - first),
     /// written over all of `G`. Symmetric but where a load has a moment or turns with its body. No allocation.
     ///
@@ -205,154 +399,22 @@ impl StaticTangent {
 
     /// [`StaticTangent::compute`] with all coordinates of the opened tree.
     fn of_tree(&mut self, model: &Model, data: &Data, q: &DVector<f64>, loads: &[PointLoad], G: &mut DMatrix<f64>) {
-        G.as_mut_slice().fill(0.0);
-        self.carry(model, data, loads);
-        self.place_columns(model, data);
-        self.add_pairs(model, G);
-        self.add_own_joints(model, data, q, G);
-        self.add_modal_weights(model, data, G);
-        self.add_balancers(model, data, G);
-    }
-
-    /// W and T of (2) of everything outward of each body.
-    fn carry(&mut self, model: &Model, data: &Data, loads: &[PointLoad]) {
-        for (i, (carried, body)) in self.carried.iter_mut().zip(&model.bodies).enumerate() {
-            let (mut mass, mut h_B) = (body.inertia.mass, body.inertia.first_moment);
-            if let Some(m) = body.modal {
-                mass += data.modal[m].inertia.mass;
-                h_B += data.modal[m].inertia.first_moment;
-            }
-            let X_WB = &data.X_WB[i];
-            // m c, so that a body without mass is no exception: (m c) gᵀ - (m c · g) 1.
-            let h = X_WB.translation.vector * mass + mul(X_WB.rotation.matrix(), &h_B);
-            *carried = Carried { f: model.gravity * mass, ..Carried::weight(model.gravity, &h) };
+        let loads = loads.iter().copied();
+        if model.balancers.is_empty() {
+            return self.of_bodies(model, data, q.as_slice(), loads, G.as_mut_slice());
         }
+        G.as_mut_slice().fill(0.0);
+        self.carry_weights(model, data);
         for load in loads {
-            self.carried[load.body].add(&load.carried(data));
+            self.carried[load.body].add(&load.carried(&data.X_WB[load.body]));
         }
         for line in model.balancers.iter().filter_map(|balancer| balancer.line(&data.X_WB)) {
             for (end, F_W) in [line.F_W, -line.F_W].into_iter().enumerate() {
                 self.carried[line.bodies[end]].add(&Carried::weight(F_W, &line.p_W[end]));
             }
         }
-        for i in (1..model.bodies.len()).rev() {
-            let parent = model.bodies[i].parent;
-            let (inner, outer) = self.carried.split_at_mut(i);
-            inner[parent].add(&outer[0]);
-        }
-    }
-
-    /// Twists of the coordinates, and what (3) and (4) make of them.
-    fn place_columns(&mut self, model: &Model, data: &Data) {
-        for column in &mut self.columns {
-            let (i, body) = (column.body, &model.bodies[column.body]);
-            let X_WB = &data.X_WB[i];
-            let (R, p) = (X_WB.rotation.matrix(), &X_WB.translation.vector);
-            let S_B = match body.motion {
-                JointMotion::Axis(motion) => motion.twist(body.ratio),
-                _ => {
-                    let S = &data.elastic[i];
-                    Twist::new(mul(&S.L, &column.t), mul(&S.B, &column.phi))
-                }
-            };
-            let w = mul(R, &S_B.angular);
-            let v = mul(R, &S_B.linear) + p.cross(&w);
-            let Carried { f, n, A, N } = &self.carried[i];
-            (column.v, column.w) = (v, w);
-            (column.force, column.moment) = (mul(A, &w), mul(N, &w) + v.cross(f)); // (3)
-            column.row = v.cross(f) + w.cross(n) + tr_mul(A, &v) + tr_mul(N, &w); // (4)
-        }
-    }
-
-    /// (3) and (4) for all pairs of which one moves the other.
-    fn add_pairs(&self, model: &Model, G: &mut DMatrix<f64>) {
-        for (a, inner) in self.columns.iter().enumerate() {
-            let end = model.bodies[inner.body].subtree_end;
-            // Columns are in the order of bodies: what `inner` moves comes after it.
-            for outer in &self.columns[a..] {
-                if outer.body >= end {
-                    break;
-                }
-                G[(inner.k, outer.k)] -= inner.v.dot(&outer.force) + inner.w.dot(&outer.moment);
-                if outer.body > inner.body {
-                    G[(outer.k, inner.k)] -= inner.w.dot(&outer.row);
-                } else if outer.k != inner.k {
-                    G[(outer.k, inner.k)] -= outer.v.dot(&inner.force) + outer.w.dot(&inner.moment);
-                }
-            }
-        }
-    }
-
-    /// (5): with t translations in joint axes and φ angles, about Bo,
-    ///
-    /// ```text
-    /// ∂s_i/∂q_j · W = (t_j × w_i) · f + ([B φ_j]x B φ_i + ∂B/∂φ_j φ_i) · n_Bo
-    /// ```
-    fn add_own_joints(&self, model: &Model, data: &Data, q: &DVector<f64>, G: &mut DMatrix<f64>) {
-        let mut columns = &self.columns[..];
-        while let Some(head) = columns.first() {
-            let i = head.body;
-            let count = columns.iter().take_while(|column| column.body == i).count();
-            let (joint, rest) = columns.split_at(count);
-            columns = rest;
-            let (angles, phi) = match model.bodies[i].motion {
-                JointMotion::Elastic(angles) => {
-                    let k = model.bodies[i].coordinate + 3;
-                    (angles, Vector3::new(q[k], q[k + 1], q[k + 2]))
-                }
-                JointMotion::Interface { modal, interface } => {
-                    let entry = &model.modal[modal];
-                    let eta = &q.as_slice()[entry.coordinate..entry.coordinate + entry.n];
-                    (ElasticAngles::RotationVector, entry.tables.shapes.interfaces[interface].times(eta).1)
-                }
-                JointMotion::Axis(_) | JointMotion::Welded => continue,
-            };
-            let (S, X_WB) = (&data.elastic[i], &data.X_WB[i]);
-            let R = X_WB.rotation.matrix();
-            let f = &self.carried[i].f;
-            let n_B = tr_mul(R, &(self.carried[i].n - X_WB.translation.vector.cross(f)));
-            // Row j: (…) · n_Bo as a covector on φ_i.
-            let turns = Matrix3::from_rows(&[0, 1, 2].map(|c| {
-                let unit = Vector3::ith(c, 1.0);
-                let dB = angles.rate_map_derivative(&phi, &unit);
-                let turn: Vector3<f64> = S.B.column(c).into();
-                (tr_mul(&S.B, &n_B.cross(&turn)) + tr_mul(&dB, &n_B)).transpose()
-            }));
-            // (t_j × w_i) · f = t_j · (w_i × f)
-            let f_B = tr_mul(R, f);
-            let slides = Matrix3::from_columns(&[0, 1, 2].map(|c| {
-                let w_B: Vector3<f64> = S.B.column(c).into();
-                tr_mul(&S.L, &w_B.cross(&f_B))
-            }));
-            for row in joint {
-                let (slid, turned) = (mul(&slides, &row.phi), mul(&turns, &row.phi));
-                for column in joint {
-                    G[(row.k, column.k)] -= column.t.dot(&slid) + column.phi.dot(&turned);
-                }
-            }
-        }
-    }
-
-    /// (6).
-    fn add_modal_weights(&mut self, model: &Model, data: &Data, G: &mut DMatrix<f64>) {
-        for entry in model.modal.iter().filter(|entry| entry.coordinate >= self.first) {
-            let R = data.X_WB[entry.body].rotation.matrix();
-            for (g, C_t) in self.g.iter_mut().zip(&entry.tables.shapes.C_t) {
-                *g = mul(R, C_t).cross(&model.gravity);
-            }
-            for column in &self.columns {
-                let moves = column.body <= entry.body && entry.body < model.bodies[column.body].subtree_end;
-                if !moves {
-                    continue;
-                }
-                for (k, g) in self.g[..entry.n].iter().enumerate() {
-                    let k = entry.coordinate - self.first + k;
-                    let slope = column.w.dot(g);
-                    G[(column.k, k)] -= slope;
-                    G[(k, column.k)] -= slope;
-                }
-            }
-        }
+        self.finish(model, data, q.as_slice(), G.as_mut_slice());
+        self.add_balancers(model, data, G);
     }
 
     /// (7).

@@ -90,7 +90,7 @@ fn columns<T: Real>(a: Vector3<T>, b: Vector3<T>, c: Vector3<T>) -> Matrix3<T> {
 
 /// Column j as a vector.
 #[inline(always)]
-fn column<T: Real>(A: &Matrix3<T>, j: usize) -> Vector3<T> {
+pub fn column<T: Real>(A: &Matrix3<T>, j: usize) -> Vector3<T> {
     let c = &A.data.0[j];
     Vector3::new(c[0], c[1], c[2])
 }

@@ -7,7 +7,7 @@
 
 use nalgebra::{Matrix3, Scalar, Vector3};
 
-use crate::products::{add, cross, dot, mul, scaled};
+use crate::products::{add, add3, cross, dot, mul, mul3, scaled, scaled3};
 use crate::real::Real;
 use crate::vectors::skew;
 
@@ -58,13 +58,17 @@ impl ElasticAngles {
     }
 
     /// `dB/dt` at `angles` (rad) and `rates` (rad/s), as a matrix.
-    pub fn rate_map_derivative(self, angles: &Vector3<f64>, rates: &Vector3<f64>) -> Matrix3<f64> {
+    #[inline(always)]
+    pub fn rate_map_derivative<T: Real>(self, angles: &Vector3<T>, rates: &Vector3<T>) -> Matrix3<T> {
         match self {
             Self::RotationVector => {
-                let [_, a, b, da, db] = exponential_coefficients(angles.dot(angles));
+                let [_, a, b, da, db] = exponential_coefficients(dot(angles, angles));
                 let (P, Pdot) = (skew(angles), skew(rates));
-                let xdot = 2.0 * angles.dot(rates);
-                P * (-da * xdot) - Pdot * a + P * P * (db * xdot) + (Pdot * P + P * Pdot) * b
+                let xdot = T::splat(2.0) * dot(angles, rates);
+                // -a' x' [phi]x - a [rates]x + b' x' [phi]x² + b ([rates]x [phi]x + [phi]x [rates]x)
+                let first = add3(&scaled3(&P, -da * xdot), &scaled3(&Pdot, -a));
+                let second = add3(&first, &scaled3(&mul3(&P, &P), db * xdot));
+                add3(&second, &scaled3(&add3(&mul3(&Pdot, &P), &mul3(&P, &Pdot)), b))
             }
             Self::EulerZyx => euler_zyx_rate_derivative(angles, rates),
         }

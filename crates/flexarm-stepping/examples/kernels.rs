@@ -18,7 +18,7 @@ use nalgebra::DVector;
 /// A kernel, to be called so many times.
 type Kernel = fn(usize);
 
-const KERNELS: [(&str, Kernel); 9] = [
+const KERNELS: [(&str, Kernel); 11] = [
     ("inverse_dynamics", |times| {
         recursion(times, |c| {
             inverse_dynamics(&c.model, &mut c.data, &c.state, &c.a);
@@ -39,6 +39,20 @@ const KERNELS: [(&str, Kernel); 9] = [
             hybrid_dynamics(&c.model, &mut c.data, &c.state, &c.prescribed, &mut c.a, &mut c.f);
             c.a.rows_mut(6, 12).fill(0.0);
             c.f.fill(0.1);
+        });
+    }),
+    ("pose", |times| {
+        let (mut at, poses) = poses(times);
+        for q in poses.chunks_exact(6) {
+            at.solve(q, &Wrench::zeros()).unwrap();
+            black_box((at.compliance(), at.frequencies_hz()));
+        }
+    }),
+    ("pose_among_many", |times| {
+        let (mut at, poses) = poses(times);
+        let asked = Asked { compliance: true, frequencies: true, jacobian: false };
+        at.solve_each(&poses, &Wrench::zeros(), asked, |_, answer| {
+            black_box(answer.unwrap());
         });
     }),
     ("step_generalized_alpha", |times| {
@@ -81,6 +95,14 @@ fn steps(times: usize, arm: FlexibleArm, kind: StepperKind, h: f64) {
         stepper.step().unwrap();
     }
     black_box(stepper.time());
+}
+
+/// The reference arm and so many poses.
+fn poses(times: usize) -> (OperatingPoint, Vec<f64>) {
+    let arm = beams();
+    let tool = arm.model.frame("tcp").unwrap().clone();
+    let poses = (0..6 * times).map(|k| 2.0 * (k as f64 * 0.618_034).fract() - 1.0).collect();
+    (OperatingPoint::new(arm, tool), poses)
 }
 
 /// The reference arm on its motion.

@@ -1,126 +1,211 @@
 //! Eigenvalues of small symmetric matrices in storage that the caller keeps: no allocation.
 //!
-//! Householder's reduction to a tridiagonal matrix, then QL with implicit shifts ([Golub and Van Loan 2013], 8.3). Eigenvalues
-//! alone; absolute errors are some units in the last place of the largest. Where eigenvectors are wanted, nalgebra has them.
+//! Householder's reduction to a tridiagonal matrix ([Golub and Van Loan 2013], 8.3), then QL steps with squares of rotations, as
+//! in LAPACK's `dsterf`: two divisions side by side instead of a root and then a division. Eigenvalues alone; absolute errors
+//! are some units in the last place of the largest. Where eigenvectors are wanted, nalgebra has them. Of one matrix or of
+//! several side by side: each lane has the bits of its matrix alone.
 
-use nalgebra::DMatrix;
+use flexarm_kinematics::Real;
+
+use crate::dense::{dot, larger};
 
 /// Most QL steps per eigenvalue; two are usual.
 const MOST_STEPS: usize = 60;
 
-/// Eigenvalues of the symmetric matrix `A` (n×n, lower triangle read, destroyed), unsorted, into `d` (n).
+/// Squares below this are not divided by; the matrix is about one.
+const SMALLEST: f64 = 1e-280;
+
+/// Eigenvalues of the symmetric matrix `A` (n×n, column after column, lower triangle read, destroyed), unsorted, into `d` (n).
 ///
 /// * `e`: n numbers of workspace.
 ///
-/// Returns false where the iteration does not end, as with entries that are no numbers.
-pub(crate) fn symmetric_eigenvalues(A: &mut DMatrix<f64>, d: &mut [f64], e: &mut [f64]) -> bool {
+/// Returns 1, and 0 where the iteration does not end, as with entries that are no numbers.
+#[inline(always)]
+pub(crate) fn symmetric_eigenvalues<T: Real>(A: &mut [T], d: &mut [T], e: &mut [T]) -> T {
     tridiagonalise(A, d, e);
     // About one, so that squares neither overflow nor vanish.
-    let largest = d.iter().chain(e.iter()).fold(0.0_f64, |m, x| m.max(x.abs()));
-    if largest > 0.0 && largest.is_finite() {
-        d.iter_mut().chain(e.iter_mut()).for_each(|x| *x /= largest);
+    let (mut largest, mut broken) = (T::zero(), T::zero());
+    for x in d.iter().chain(e.iter()) {
+        largest = larger(largest, x.abs());
+        broken += *x * T::zero();
     }
-    let ends = ql(d, e);
-    if largest > 0.0 && largest.is_finite() {
-        d.iter_mut().for_each(|x| *x *= largest);
+    let usual = largest.pick_below(T::splat(f64::INFINITY), largest, T::one());
+    let scale = T::zero().pick_below(largest, usual, T::one());
+    for (d, e) in d.iter_mut().zip(e.iter_mut()) {
+        *d /= scale;
+        let ratio = *e / scale;
+        // What is no number has nothing to iterate.
+        *e = broken.pick_below(T::one(), ratio * ratio, T::zero());
     }
-    ends
+    let ended = ql(d, e);
+    for x in d.iter_mut() {
+        *x *= scale;
+    }
+    broken.pick_below(T::one(), ended, T::zero())
 }
 
 /// Diagonal into `d`, subdiagonal into `e[..n-1]`, `e[n-1] = 0`.
-fn tridiagonalise(A: &mut DMatrix<f64>, d: &mut [f64], e: &mut [f64]) {
-    let n = A.nrows();
-    let w = &mut *e;
+#[inline(always)]
+fn tridiagonalise<T: Real>(A: &mut [T], d: &mut [T], e: &mut [T]) {
+    let n = d.len();
     for k in 0..n.saturating_sub(2) {
+        let (inward, B) = A.split_at_mut((k + 1) * n);
+        let (v, w) = (&mut inward[k * n + k + 1..], &mut e[k + 1..]);
         // v = x - α e_1 below the diagonal of column k; H = 1 - 2 v vᵀ / vᵀv makes it (α, 0, 0, ...).
-        let norm = A.view((k + 1, k), (n - k - 1, 1)).norm();
-        if norm == 0.0 {
-            continue;
+        let (norm, first) = (dot(v, v).sqrt(), v[0]);
+        let alpha = first.pick_below(T::zero(), norm, -norm);
+        v[0] -= alpha;
+        // A column that is zero stays: v is zero then.
+        let half = norm * (norm + first.abs());
+        let half = T::zero().pick_below(norm, half, T::one());
+        // p = B v / (vᵀv / 2);  w = p - v (pᵀv) / vᵀv;  B -= v wᵀ + w vᵀ
+        multiply(B, k + 1, v, w);
+        let inverse = T::one() / half;
+        for w in w.iter_mut() {
+            *w *= inverse;
         }
-        let alpha = -norm.copysign(A[(k + 1, k)]);
-        A[(k + 1, k)] -= alpha;
-        let square = 2.0 * norm * (norm + (A[(k + 1, k)] + alpha).abs());
-        let half = 0.5 * square;
-        // p = A v / (vᵀv / 2);  w = p - v (pᵀv) / vᵀv;  A -= v wᵀ + w vᵀ
-        let mut pv = 0.0;
-        for i in k + 1..n {
-            let row: f64 = (k + 1..=i).map(|j| A[(i, j)] * A[(j, k)]).sum();
-            let column: f64 = (i + 1..n).map(|j| A[(j, i)] * A[(j, k)]).sum();
-            w[i] = (row + column) / half;
-            pv += w[i] * A[(i, k)];
+        let along = dot(w, v) * inverse * T::splat(0.5);
+        for (w, v) in w.iter_mut().zip(v.iter()) {
+            *w -= *v * along;
         }
-        for i in k + 1..n {
-            w[i] -= A[(i, k)] * pv / square;
-        }
-        for j in k + 1..n {
-            let (v_j, w_j) = (A[(j, k)], w[j]);
-            for i in j..n {
-                let v_i = A[(i, k)];
-                A[(i, j)] -= v_i * w_j + w[i] * v_j;
+        for (j, column) in B.chunks_exact_mut(n).enumerate() {
+            let (v_j, w_j) = (v[j], w[j]);
+            for ((to, v), w) in column[k + 1 + j..].iter_mut().zip(&v[j..]).zip(&w[j..]) {
+                *to -= *v * w_j + *w * v_j;
             }
         }
-        A[(k + 1, k)] = alpha;
+        v[0] = alpha;
     }
     for i in 0..n {
-        d[i] = A[(i, i)];
-        e[i] = if i + 1 < n { A[(i + 1, i)] } else { 0.0 };
+        d[i] = A[i * n + i];
+        e[i] = if i + 1 < n { A[i * n + i + 1] } else { T::zero() };
     }
 }
 
-/// Eigenvalues of a tridiagonal matrix, in place of its diagonal.
-fn ql(d: &mut [f64], e: &mut [f64]) -> bool {
+/// `w = B v` with the lower triangle of a symmetric B, whose columns begin with `above` entries that do not count.
+#[inline(always)]
+fn multiply<T: Real>(B: &[T], above: usize, v: &[T], w: &mut [T]) {
+    w.fill(T::zero());
+    for (j, column) in B.chunks_exact(above + v.len()).enumerate() {
+        let (column, v_j) = (&column[above + j..], v[j]);
+        w[j] += column[0] * v_j + dot(&column[1..], &v[j + 1..]);
+        for (w, b) in w[j + 1..].iter_mut().zip(&column[1..]) {
+            *w += *b * v_j;
+        }
+    }
+}
+
+/// Eigenvalues of a tridiagonal matrix with squares beside its diagonal, in place of the latter; 1 where that came to an end, else 0.
+///
+/// Lanes go together from eigenvalue to eigenvalue: one that has found its own waits for the others.
+#[inline(always)]
+fn ql<T: Real>(d: &mut [T], e: &mut [T]) -> T {
     let n = d.len();
+    let mut ended = T::one();
     for l in 0..n {
         for step in 0.. {
-            // The block l..=m that has not fallen apart.
-            let small = |m: usize| e[m].abs() <= f64::EPSILON * (d[m].abs() + d[m + 1].abs());
-            let m = (l..n - 1).find(|m| small(*m)).unwrap_or(n - 1);
-            if m == l {
+            let block = Block::new(d, e, l);
+            if !block.end.any_above(l as f64) {
                 break;
             }
             if step == MOST_STEPS {
-                return false;
+                ended = T::splat(l as f64).pick_below(block.end, T::zero(), ended);
+                break;
             }
-            // Wilkinson's shift, then rotations that chase the bulge from the bottom up.
-            let mut g = (d[l + 1] - d[l]) / (2.0 * e[l]);
-            g = d[m] - d[l] + e[l] / (g + (g * g + 1.0).sqrt().copysign(g));
-            let (mut s, mut c, mut p) = (1.0, 1.0, 0.0);
-            let mut whole = true;
-            for i in (l..m).rev() {
-                let (f, b) = (s * e[i], c * e[i]);
-                let r = (f * f + g * g).sqrt();
-                e[i + 1] = r;
-                if r == 0.0 {
-                    d[i + 1] -= p;
-                    whole = false;
-                    break;
-                }
-                (s, c) = (f / r, g / r);
-                g = d[i + 1] - p;
-                let t = (d[i] - g) * s + 2.0 * c * b;
-                p = s * t;
-                d[i + 1] = g + p;
-                g = c * t - b;
-            }
-            if whole {
-                d[l] -= p;
-                e[l] = g;
-            }
-            e[m] = 0.0;
+            sweep(d, e, l, &block);
         }
     }
-    true
+    ended
+}
+
+/// What has not fallen apart from row l on.
+struct Block<T> {
+    /// Its last row, of each lane, as a number, and its diagonal entry.
+    end: T,
+    d_end: T,
+    /// The largest of them.
+    last: usize,
+    /// Whether it is the same in all lanes.
+    alike: bool,
+}
+
+impl<T: Real> Block<T> {
+    #[inline(always)]
+    fn new(d: &[T], e: &[T], l: usize) -> Self {
+        let last = d.len() - 1;
+        let none = T::splat(d.len() as f64);
+        let (mut end, mut d_end) = (none, d[last]);
+        let mut row = l;
+        while row < last {
+            let bound = T::splat(f64::EPSILON) * (d[row].abs() + d[row + 1].abs());
+            let small = (bound * bound).pick_below(e[row], T::zero(), T::one());
+            // Where it is small for the first time.
+            let here = end.pick_below(none, T::zero(), small);
+            end = T::splat(0.5).pick_below(here, T::splat(row as f64), end);
+            d_end = T::splat(0.5).pick_below(here, d[row], d_end);
+            if end.all_below(d.len() as f64) {
+                break;
+            }
+            row += 1;
+        }
+        end = end.pick_below(none, end, T::splat(last as f64));
+        Self { end, d_end, last: row, alike: !end.any_below(row as f64) }
+    }
+}
+
+/// A QL step with Wilkinson's shift σ on the rows from l to the end of a block, from the bottom up. Of rotations by c and s the
+/// squares are enough:
+///
+/// ```text
+/// r = p + e²,   c² = p/r,   s² = e²/r,   γ' = c² (d - σ) - s² γ,   p' = γ'²/c²
+/// ```
+#[inline(always)]
+fn sweep<T: Real>(d: &mut [T], e: &mut [T], l: usize, block: &Block<T>) {
+    let (zero, one, two, half) = (T::zero(), T::one(), T::splat(2.0), T::splat(0.5));
+    let root = e[l].sqrt();
+    let g = (d[l + 1] - d[l]) / (two * root);
+    let away = (g * g + one).sqrt();
+    let shift = d[l] - root / (g + g.pick_below(zero, -away, away));
+    let (mut c, mut s, mut gamma) = (one, zero, block.d_end - shift);
+    let mut p = gamma * gamma;
+    for i in (l..block.last).rev() {
+        let (a, b) = (d[i], e[i]);
+        let r = p + b;
+        let (c_new, s_new, inverse) = (p / r, b / r, r / p);
+        let gamma_new = c_new * (a - shift) - s_new * gamma;
+        // γ is nearly zero where p is.
+        let p_new = T::splat(SMALLEST).pick_below(p, gamma_new * gamma_new * inverse, c * b);
+        // In the first rotation s is zero: the block ends there.
+        let (above, below) = (s * r, gamma + (a - gamma_new));
+        if block.alike {
+            (e[i + 1], d[i + 1]) = (above, below);
+            (c, s, gamma, p) = (c_new, s_new, gamma_new, p_new);
+            continue;
+        }
+        let on = T::splat(i as f64).pick_below(block.end, one, zero);
+        e[i + 1] = half.pick_below(on, above, e[i + 1]);
+        d[i + 1] = half.pick_below(on, below, d[i + 1]);
+        c = half.pick_below(on, c_new, c);
+        s = half.pick_below(on, s_new, s);
+        gamma = half.pick_below(on, gamma_new, gamma);
+        p = half.pick_below(on, p_new, p);
+    }
+    // Lanes of which the block is a single row did not take part.
+    let row = T::splat(l as f64);
+    d[l] = row.pick_below(block.end, shift + gamma, d[l]);
+    e[l] = row.pick_below(block.end, s * p, e[l]);
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::DMatrix;
     use proptest::prelude::*;
 
     fn eigenvalues(A: &DMatrix<f64>) -> Vec<f64> {
         let n = A.nrows();
         let (mut d, mut e) = (vec![0.0; n], vec![0.0; n]);
-        assert!(symmetric_eigenvalues(&mut A.clone(), &mut d, &mut e));
+        assert_eq!(symmetric_eigenvalues(A.clone().as_mut_slice(), &mut d, &mut e), 1.0);
         d.sort_by(f64::total_cmp);
         d
     }
@@ -141,11 +226,60 @@ mod tests {
         });
     }
 
+    /// Truth: each matrix alone. Lanes whose blocks fall apart at other rows, at once, or that are no numbers.
+    #[cfg(target_arch = "x86_64")]
+    #[test]
+    fn every_lane_has_the_bits_of_its_matrix_alone() {
+        use flexarm_kinematics::{OverLanes, with_lanes};
+
+        struct Together<'a>(&'a [DMatrix<f64>]);
+        impl OverLanes for Together<'_> {
+            type Output = Vec<(f64, Vec<u64>)>;
+
+            #[inline(always)]
+            fn run<T: Real>(self) -> Self::Output {
+                let n = self.0[0].nrows();
+                let mut A = vec![T::zero(); n * n];
+                for (lane, own) in self.0.iter().enumerate() {
+                    A.iter_mut().zip(own).for_each(|(to, x)| to.set_lane(lane, *x));
+                }
+                let (mut d, mut e) = (vec![T::zero(); n], vec![T::zero(); n]);
+                let ended = symmetric_eigenvalues(&mut A, &mut d, &mut e);
+                let own = |lane: usize| d.iter().map(|x| x.lane(lane).to_bits()).collect();
+                (0..T::LANES).map(|lane| (ended.lane(lane), own(lane))).collect()
+            }
+        }
+        for n in [1, 2, 5, 18] {
+            let random = |seed: f64| {
+                let B = DMatrix::from_fn(n, n, |i, j| ((7 * i + 11 * j) as f64 * seed).sin());
+                &B + B.transpose()
+            };
+            let mut block = random(0.31);
+            (0..n).filter(|k| *k != n / 2).for_each(|k| {
+                (block[(k, n / 2)], block[(n / 2, k)]) = (0.0, 0.0);
+            });
+            let first = DMatrix::from_fn(n, n, |i, j| f64::from(u8::from(i + j == 1)));
+            for matrices in [
+                [random(0.7), random(0.31) * 1e-9, random(1.3), random(2.1) * 1e200],
+                [random(0.7), DMatrix::zeros(n, n), DMatrix::identity(n, n), block],
+                [first, random(0.7), DMatrix::from_element(n, n, f64::NAN), random(1.3)],
+            ] {
+                let Some(together) = with_lanes(Together(&matrices)) else { return };
+                for ((ended, lane), A) in together.iter().zip(&matrices) {
+                    let (mut d, mut e) = (vec![0.0; n], vec![0.0; n]);
+                    assert_eq!(symmetric_eigenvalues(A.clone().as_mut_slice(), &mut d, &mut e), *ended);
+                    let alone: Vec<u64> = d.iter().map(|x| x.to_bits()).collect();
+                    assert!(*ended == 0.0 || *lane == alone, "{n}");
+                }
+            }
+        }
+    }
+
     #[test]
     fn diagonal_and_empty_matrices_have_theirs() {
         assert_eq!(eigenvalues(&DMatrix::from_diagonal(&vec![3.0, -1.0, 2.0].into())), [-1.0, 2.0, 3.0]);
         assert_eq!(eigenvalues(&DMatrix::zeros(0, 0)), [0.0; 0]);
         let mut wrong = DMatrix::from_element(3, 3, f64::NAN);
-        assert!(!symmetric_eigenvalues(&mut wrong, &mut [0.0; 3], &mut [0.0; 3]));
+        assert_eq!(symmetric_eigenvalues(wrong.as_mut_slice(), &mut [0.0; 3], &mut [0.0; 3]), 0.0);
     }
 }

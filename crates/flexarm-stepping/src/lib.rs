@@ -33,6 +33,7 @@
 
 mod arm;
 mod batch;
+mod dense;
 #[cfg(test)]
 mod draw;
 mod drive;
@@ -73,7 +74,7 @@ pub use mode_matrix::ModeMatrices;
 pub use modes::{Modes, modes_at};
 pub use motion::{Held, MotionFn, PrescribedMotion};
 pub use observation::Observation;
-pub use operating_point::OperatingPoint;
+pub use operating_point::{Asked, OperatingPoint, PoseAnswer};
 pub use reduced::ReducedArm;
 pub use static_path::StaticPath;
 pub use static_targets::{StaticTargets, TargetError, static_targets};

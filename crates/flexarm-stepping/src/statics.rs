@@ -1,6 +1,10 @@
 //! Static equilibrium of the elastic coordinates, drives held: Newton on `K e + g_e(q_a, e) = 0`.
 
-use flexarm_kinematics::{Data, Frame, PointLoad, State, StaticTangent, Wrench, forward_kinematics, gravity_forces};
+use flexarm_kinematics::products::{add, cross, lift, tr_mul};
+use flexarm_kinematics::{
+    Data, Frame, PointLoad, Real, State, StaticTangent, Wrench, forward_kinematics, gravity_forces,
+    gravity_forces_at_poses,
+};
 use nalgebra::{DMatrix, DVector};
 
 use crate::arm::FlexibleArm;
@@ -124,12 +128,19 @@ pub(crate) fn static_forces(
     data.clear_external_wrenches();
     arm.apply_loads(data, t);
     if let Some((tool, F_T_W)) = tool {
-        let R = data.X_WF(tool).rotation.inverse();
-        let F_T = Wrench::new(R * F_T_W.force, R * F_T_W.torque);
-        data.F_ext[tool.body] += F_T.at_parent(&tool.X_BF);
+        add_wrench(data, tool, F_T_W);
     }
-    p.copy_from(gravity_forces(model, data, q));
+    p.copy_from(gravity_forces_at_poses(model, data, q));
     add_geometric_forces(arm, data, &q.as_slice()[m..], &mut p.as_mut_slice()[m..]);
+}
+
+/// Adds a wrench at a frame's origin (world axes) to those on its body, for the poses in `data.X_WB`.
+#[inline(always)]
+pub(crate) fn add_wrench<T: Real>(data: &mut Data<T>, at: &Frame, F_W: &Wrench) {
+    let R_WB = data.X_WB[at.body].rotation.matrix();
+    let (force, moment) = (tr_mul(R_WB, &lift(&F_W.force)), tr_mul(R_WB, &lift(&F_W.torque)));
+    let p_B = lift(&at.X_BF.translation.vector);
+    data.F_ext[at.body] += Wrench::new(force, add(&moment, &cross(&p_B, &force)));
 }
 
 fn gravity_part(arm: &FlexibleArm, data: &mut Data, t: f64, e: &DVector<f64>) -> DVector<f64> {
@@ -217,6 +228,11 @@ pub(crate) struct StaticSlopes {
     down: DVector<f64>,
 }
 
+/// A wrench at a frame's origin that keeps its direction, world axes.
+pub(crate) fn load_at(frame: &Frame, F_W: &Wrench) -> PointLoad {
+    PointLoad { body: frame.body, p_B: frame.X_BF.translation.vector, F_W: *F_W, turns: false }
+}
+
 impl StaticSlopes {
     pub(crate) fn new(arm: &FlexibleArm, first: usize) -> Self {
         let zeros = DVector::zeros(arm.model.nv());
@@ -240,17 +256,27 @@ impl StaticSlopes {
         q: &DVector<f64>,
         G: &mut DMatrix<f64>,
     ) {
+        forward_kinematics(&arm.model, data, q);
+        self.compute_at_poses(arm, tool, t, data, q, G);
+    }
+
+    /// As [`StaticSlopes::compute`], with the poses at `q` in `data`.
+    pub(crate) fn compute_at_poses(
+        &mut self,
+        arm: &FlexibleArm,
+        tool: Option<(&Frame, &Wrench)>,
+        t: f64,
+        data: &mut Data,
+        q: &DVector<f64>,
+        G: &mut DMatrix<f64>,
+    ) {
         if arm.elements.iter().any(|element| element.geometric.is_some()) {
             self.difference(arm, tool, t, data, q, G);
             return forward_kinematics(&arm.model, data, q);
         }
-        forward_kinematics(&arm.model, data, q);
         self.loads.clear();
         self.loads.extend(arm.loads.iter().map(|load| load.point_load(t, &data.X_WB[load.body])));
-        self.loads.extend(tool.map(|(tool, F_T_W)| {
-            let p_B = tool.X_BF.translation.vector;
-            PointLoad { body: tool.body, p_B, F_W: *F_T_W, turns: false }
-        }));
+        self.loads.extend(tool.map(|(tool, F_T_W)| load_at(tool, F_T_W)));
         self.exact.compute(&arm.model, data, q, &self.loads, G);
     }
 

@@ -172,9 +172,9 @@ pub use flexarm_motion_io::MotionError;
 pub use flexarm_path::{PathError, PlannedMove, Slowed, SlowedBy};
 pub use flexarm_settings::{Names, Setting, name_settings};
 pub use flexarm_stepping::{
-    AlphaSettings, ConstraintForm, InertiaChange, Linear, Load, LoadAxes, OperatingPoint, ReferenceMethod,
-    ReferenceSettings, STEPPERS, SpookPreset, SpookSettings, Start, StepError, StepRule, StepperEntry, StepperKind,
-    StepperOptions, StepperSetting, TimedWrench, ToolDeflection,
+    AlphaSettings, Asked, ConstraintForm, InertiaChange, Linear, Load, LoadAxes, OperatingPoint, PoseAnswer,
+    ReferenceMethod, ReferenceSettings, STEPPERS, SpookPreset, SpookSettings, Start, StepError, StepRule, StepperEntry,
+    StepperKind, StepperOptions, StepperSetting, TimedWrench, ToolDeflection,
 };
 pub use flexarm_trajectory::{ColumnMap, ColumnMapError, Trajectory, TrajectoryError};
 pub use flexarm_urdf::{InertiaEstimate, ReadOptions, closest, search_paths_from_environment};

@@ -8,8 +8,8 @@ use flexarm_kinematics::{Frame, Real};
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::arm::FlexibleArm;
-use crate::batch::dense::{cholesky, dot, product, solve_transposed, transpose};
 use crate::batch::lane_arm::{LaneArm, set_lane};
+use crate::dense::{cholesky, dot, larger, product, solve_transposed, transpose};
 use crate::error::StepError;
 use crate::implicit::{ImplicitStep, Newton, Search, Sizes};
 use crate::integrator::TimeGrid;
@@ -397,7 +397,7 @@ impl Matrices {
         let Self { n, S, product, L, M_inverse_K, inverse } = self;
         let n = *n;
         L.copy_from_slice(S);
-        let positive = cholesky(L, n);
+        let positive = cholesky(L, n) == 1.0;
         M_inverse_K.copy_from_slice(K);
         solve_transposed(L, M_inverse_K, n);
         transpose(M_inverse_K, n);
@@ -429,7 +429,7 @@ impl Matrices {
         for (i, s) in inverse.iter_mut().zip(M_inverse_K.iter()) {
             *i += c_h2 * *s;
         }
-        let positive = cholesky(S, n) && positive;
+        let positive = cholesky(S, n) == 1.0 && positive;
         solve_transposed(S, inverse, n);
         transpose(inverse, n);
         positive
@@ -466,9 +466,4 @@ impl<T: Real> LaneSizes<T> {
 #[inline(always)]
 fn picked<T: Real>(active: T, old: T, new: T) -> T {
     active.pick_below(T::splat(0.5), old, new)
-}
-
-#[inline(always)]
-fn larger<T: Real>(a: T, b: T) -> T {
-    a.pick_below(b, b, a)
 }

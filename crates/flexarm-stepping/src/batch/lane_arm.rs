@@ -11,7 +11,7 @@ use flexarm_kinematics::{Data, Frame, Real, State};
 use nalgebra::Vector3;
 
 use crate::arm::FlexibleArm;
-use crate::batch::dense::add_product;
+use crate::dense::add_product;
 use crate::elastic_tree::ElasticTree;
 use crate::reduced::HeldModes;
 

@@ -6,7 +6,6 @@
 //! What a batch tells of a run is how far the tool is from where the rigid arm has it. Start at [`Batch::run`]; threads are
 //! the caller's. Not here: recordings, figures of settling, drives.
 
-mod dense;
 mod lane_alpha;
 mod lane_arm;
 

@@ -6,7 +6,7 @@ use super::MapError;
 use crate::lobes::CuttingTool;
 
 /// Most natural frequencies of a map.
-const MOST_FREQUENCIES: usize = 12;
+pub(super) const MOST_FREQUENCIES: usize = 12;
 
 /// A column of a map.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -58,6 +58,9 @@ pub(super) const HEAD: [(&str, &str); 6] = [
     ("direction", "number of the tool's direction"),
     ("branch", "number of the solution of the inverse kinematics"),
 ];
+
+/// Which of them is the number of the place.
+pub(super) const PLACE: usize = 3;
 
 impl Layout {
     /// * `joints`: names, and whether they slide.

@@ -1,15 +1,15 @@
-//! One pose of a map: equilibrium, compliance, frequencies and shares as a row of numbers.
+//! Poses of a map: equilibrium, compliance, frequencies and shares of each as a row of numbers.
 
 use flexarm_analysis::tcp_error;
 use flexarm_kinematics::Wrench;
-use flexarm_stepping::OperatingPoint;
+use flexarm_stepping::{Asked, OperatingPoint, PoseAnswer};
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
-use super::columns::{HEAD, Layout};
+use super::columns::{HEAD, Layout, MOST_FREQUENCIES};
 use crate::error::Error;
 use crate::lobes::{CuttingTool, lowest_limit};
 use crate::options::Modelling;
-use crate::posed::failed;
+use crate::posed;
 use crate::robot::Robot;
 
 /// Where a pose is in the map.
@@ -20,7 +20,22 @@ pub(super) struct Seat {
     pub(super) branch: usize,
 }
 
-/// Answers pose after pose.
+/// What weight alone does at a pose.
+#[derive(Clone, Copy)]
+struct Weighed {
+    sag: [f64; 6],
+    hz: [f64; MOST_FREQUENCIES],
+}
+
+impl Weighed {
+    fn new(found: &PoseAnswer, layout: &Layout) -> Self {
+        let mut hz = [f64::NAN; MOST_FREQUENCIES];
+        hz[..layout.frequencies].copy_from_slice(&found.frequencies_hz[..layout.frequencies]);
+        Self { sag: tcp_error(&found.rigid_tcp_pose, &found.tcp_pose), hz }
+    }
+}
+
+/// Answers many poses at a time.
 #[derive(Clone)]
 pub(super) struct Evaluator<'a> {
     at: OperatingPoint,
@@ -38,6 +53,12 @@ pub(super) struct Cut<'a> {
     pub(super) zero_order: bool,
 }
 
+impl Cut<'_> {
+    fn lowest_limit(&self, q: &[f64]) -> Result<f64, Error> {
+        lowest_limit(self.robot, self.modelling, self.tool, self.zero_order, q)
+    }
+}
+
 impl<'a> Evaluator<'a> {
     pub(super) fn new(at: OperatingPoint, layout: &'a Layout, wrench: [f64; 6], cut: Option<Cut<'a>>) -> Self {
         let [fx, fy, fz, tx, ty, tz] = wrench;
@@ -49,65 +70,79 @@ impl<'a> Evaluator<'a> {
         self.cut.is_some()
     }
 
-    /// Appends the row of a pose.
+    /// Appends a row for each pose that has an answer, in order; what the others have instead goes to `failed`, in order too.
     ///
-    /// * `q`: actuated joints in coordinate order (rad or m).
-    ///
-    /// # Errors
-    /// [`OperatingPoint::solve`], and those of limits of depth; nothing is appended.
-    pub(super) fn push(&mut self, q: &[f64], seat: Seat, rows: &mut Vec<f64>) -> Result<(), Error> {
-        let first = rows.len();
-        let result = self.fill(q, seat, rows);
-        if result.is_err() {
-            rows.truncate(first);
-        }
-        result
-    }
-
-    fn fill(&mut self, q: &[f64], seat: Seat, rows: &mut Vec<f64>) -> Result<(), Error> {
-        let at = &mut self.at;
-        at.solve(q, &Wrench::zeros()).map_err(failed)?;
-        let X_rigid = at.rigid_tcp_pose();
-        rows.extend(X_rigid.translation.vector.iter());
-        rows.extend([seat.place as f64, seat.direction as f64, seat.branch as f64]);
-        debug_assert_eq!(HEAD.len(), 6);
-        rows.extend(q);
-        let sag = tcp_error(&X_rigid, &at.tcp_pose());
-        push_displacement(&sag, rows);
+    /// * `poses`: actuated joints in coordinate order (rad or m), pose after pose.
+    /// * `seats`: one for each pose.
+    pub(super) fn push(&mut self, poses: &[f64], seats: &[Seat], rows: &mut Vec<f64>, mut failed: impl FnMut(Error)) {
+        let Self { at, layout, wrench, cut } = self;
+        let (joints, loaded) = (layout.joints, layout.loaded);
+        let mut push = |k: usize, weighed: &Weighed, found: &PoseAnswer| -> Result<(), Error> {
+            let q = &poses[k * joints..][..joints];
+            let depth = cut.map(|cut| cut.lowest_limit(q)).transpose()?;
+            push_row(layout, q, seats[k], weighed, found, depth, rows);
+            Ok(())
+        };
         // Frequencies are those under weight alone, compliance and shares those under the load.
-        let mut hz = [f64::NAN; 12];
-        if self.layout.frequencies > 0 {
-            let found = &at.frequencies_hz()[..self.layout.frequencies];
-            hz[..found.len()].copy_from_slice(found);
+        let under_weight = Asked { frequencies: layout.frequencies > 0, compliance: !loaded, jacobian: !loaded };
+        if !loaded {
+            return at.solve_each(poses, &Wrench::zeros(), under_weight, |k, answer| match answer {
+                Ok(found) => push(k, &Weighed::new(found, layout), found).unwrap_or_else(&mut failed),
+                Err(error) => failed(posed::failed(error)),
+            });
         }
-        let mut moved = sag;
-        if self.layout.loaded {
-            at.solve(q, &self.wrench).map_err(failed)?;
-            moved = tcp_error(&X_rigid, &at.tcp_pose());
-            push_displacement(&moved, rows);
-            rows.push(size(&[moved[0] - sag[0], moved[1] - sag[1], moved[2] - sag[2]]));
-        }
-        push_compliance(&at.compliance(), rows);
-        rows.extend(&hz[..self.layout.frequencies]);
-        if let Some(Cut { robot, modelling, tool, zero_order }) = self.cut {
-            rows.push(lowest_limit(robot, modelling, tool, zero_order, q)?);
-        }
-        self.push_shares(&moved, rows);
-        Ok(())
+        let mut weighed = Vec::with_capacity(seats.len());
+        at.solve_each(poses, &Wrench::zeros(), under_weight, |_, answer| {
+            weighed.push(answer.map(|found| Weighed::new(found, layout)));
+        });
+        let under_load = Asked { frequencies: false, compliance: true, jacobian: true };
+        let mut weighed = weighed.into_iter();
+        at.solve_each(poses, wrench, under_load, |k, answer| match (weighed.next(), answer) {
+            (Some(Ok(weighed)), Ok(found)) => push(k, &weighed, found).unwrap_or_else(&mut failed),
+            (Some(Err(error)), _) | (_, Err(error)) => failed(posed::failed(error)),
+            (None, Ok(_)) => {}
+        });
     }
+}
 
-    /// Part of each element in the displacement of the tool: `J_e δ_e` along it, over its size.
-    fn push_shares(&self, moved: &[f64; 6], rows: &mut Vec<f64>) {
-        let d = Vector3::new(moved[0], moved[1], moved[2]);
-        let whole = d.norm_squared();
-        let (J, e) = (self.at.jacobian(), self.at.deflections());
-        for range in &self.layout.elements {
-            let mut along = 0.0;
-            for k in range.clone() {
-                along += J.column(self.layout.joints + k).fixed_rows::<3>(0).dot(&d) * e[k];
-            }
-            rows.push(if whole > 0.0 { along / whole } else { f64::NAN });
+fn push_row(
+    layout: &Layout,
+    q: &[f64],
+    seat: Seat,
+    weighed: &Weighed,
+    found: &PoseAnswer,
+    depth: Option<f64>,
+    rows: &mut Vec<f64>,
+) {
+    rows.extend(found.rigid_tcp_pose.translation.vector.iter());
+    rows.extend([seat.place as f64, seat.direction as f64, seat.branch as f64]);
+    debug_assert_eq!(HEAD.len(), 6);
+    rows.extend(q);
+    let sag = &weighed.sag;
+    push_displacement(sag, rows);
+    let mut moved = *sag;
+    if layout.loaded {
+        moved = tcp_error(&found.rigid_tcp_pose, &found.tcp_pose);
+        push_displacement(&moved, rows);
+        rows.push(size(&[moved[0] - sag[0], moved[1] - sag[1], moved[2] - sag[2]]));
+    }
+    push_compliance(&found.compliance, rows);
+    rows.extend(&weighed.hz[..layout.frequencies]);
+    rows.extend(depth);
+    push_shares(layout, &moved, found, rows);
+}
+
+/// Part of each element in the displacement of the tool: `J_e δ_e` along it, over its size.
+fn push_shares(layout: &Layout, moved: &[f64; 6], found: &PoseAnswer, rows: &mut Vec<f64>) {
+    let d = Vector3::new(moved[0], moved[1], moved[2]);
+    let whole = d.norm_squared();
+    let (J, e) = (&found.jacobian, &found.deflections);
+    for range in &layout.elements {
+        let mut along = 0.0;
+        for k in range.clone() {
+            along += J.column(k).fixed_rows::<3>(0).dot(&d) * e[k];
         }
+        rows.push(if whole > 0.0 { along / whole } else { f64::NAN });
     }
 }
 

@@ -6,7 +6,7 @@ use flexarm_kinematics::Pose;
 use nalgebra::Rotation3;
 use rayon::prelude::*;
 
-use super::columns::{Layout, cheapest};
+use super::columns::{Layout, PLACE, cheapest};
 use super::evaluate::{Evaluator, Seat};
 use super::finder::Finder;
 use super::region::{Grid, pose_at};
@@ -14,12 +14,14 @@ use super::{KeptPoses, MOST_PLACES, MapError};
 
 /// Places that one thread takes at a time.
 const CHUNK: usize = 64;
+/// Poses that are answered at a time, or as many more as a place has.
+const MOST_WAITING: usize = 256;
 /// Places between two looks at whether to go on.
 const BLOCK: usize = 8192;
 /// The same where a place takes long.
 const SLOW: [usize; 2] = [1, 16];
 
-/// Appends the joint values of the pose of a number.
+/// Puts the joint values of the pose of a number into an empty list.
 pub(super) type PoseOf<'a> = dyn Fn(usize, &mut Vec<f64>) + Sync + 'a;
 
 /// What there is to go through.
@@ -119,7 +121,10 @@ struct Worker<'a> {
     choice: &'a Choice<'a>,
     /// Joint values of the branches of one direction.
     branches: Vec<f64>,
-    /// Rows of one place.
+    /// Joint values of the poses of whole places that wait for their answers, and where they are.
+    waiting: Vec<f64>,
+    seats: Vec<Seat>,
+    /// Their rows.
     rows: Vec<f64>,
 }
 
@@ -129,64 +134,79 @@ impl<'a> Worker<'a> {
             Places::Grid { finder, .. } => Some((*finder).clone()),
             Places::Joints { .. } => None,
         };
-        Self { places, finder, evaluator: evaluator.clone(), choice, branches: Vec::new(), rows: Vec::new() }
+        let (evaluator, branches, waiting) = (evaluator.clone(), Vec::new(), Vec::new());
+        Self { places, finder, evaluator, choice, branches, waiting, seats: Vec::new(), rows: Vec::new() }
     }
 
     fn chunk(&mut self, from: usize, to: usize) -> Taken {
         let mut taken = Taken::default();
         for place in from..to {
-            self.rows.clear();
             match self.places {
                 Places::Grid { grid, rotations, finder, keep_out_m } => {
                     if finder.distance_from_foot(grid.place(place)) < *keep_out_m {
                         continue;
                     }
                     for (direction, rotation) in rotations.iter().enumerate() {
-                        self.poses_at(&pose_at(grid.place(place), rotation), place, direction, &mut taken);
+                        self.poses_at(&pose_at(grid.place(place), rotation), place, direction);
                     }
                 }
                 Places::Joints { values, .. } => {
                     self.branches.clear();
                     values(place, &mut self.branches);
-                    self.answer(Seat { place, direction: 0, branch: 0 }, 0, &mut taken);
+                    self.waiting.extend(&self.branches);
+                    self.seats.push(Seat { place, direction: 0, branch: 0 });
                 }
             }
-            taken.reachable += usize::from(!self.rows.is_empty());
-            self.keep(&mut taken.rows);
+            if self.seats.len() >= MOST_WAITING {
+                self.answer(&mut taken);
+            }
         }
+        self.answer(&mut taken);
         taken
     }
 
     /// All branches at a pose of the tool.
-    fn poses_at(&mut self, X_WT: &Pose, place: usize, direction: usize, taken: &mut Taken) {
+    fn poses_at(&mut self, X_WT: &Pose, place: usize, direction: usize) {
         let Some(finder) = &mut self.finder else { return };
         finder.find(X_WT, &mut self.branches);
-        for branch in 0..self.branches.len() / self.choice.layout.joints {
-            self.answer(Seat { place, direction, branch }, branch, taken);
-        }
+        let found = self.branches.len() / self.choice.layout.joints;
+        self.waiting.extend(&self.branches);
+        self.seats.extend((0..found).map(|branch| Seat { place, direction, branch }));
     }
 
-    fn answer(&mut self, seat: Seat, branch: usize, taken: &mut Taken) {
-        let joints = self.choice.layout.joints;
-        taken.poses += 1;
-        if let Err(error) = self.evaluator.push(&self.branches[branch * joints..][..joints], seat, &mut self.rows) {
+    /// Answers all poses that wait, and keeps what is asked for of each place.
+    fn answer(&mut self, taken: &mut Taken) {
+        taken.poses += self.seats.len();
+        let mut rows = std::mem::take(&mut self.rows);
+        self.evaluator.push(&self.waiting, &self.seats, &mut rows, |error| {
             taken.failed += 1;
             taken.first_failure.get_or_insert_with(|| error.to_string());
+        });
+        let (width, mut left) = (self.choice.layout.width(), &rows[..]);
+        while !left.is_empty() {
+            let alike = left.chunks_exact(width).take_while(|row| row[PLACE] == left[PLACE]).count();
+            let (place, others) = left.split_at(alike * width);
+            taken.reachable += 1;
+            self.keep(place, &mut taken.rows);
+            left = others;
         }
+        rows.clear();
+        self.rows = rows;
+        self.waiting.clear();
+        self.seats.clear();
     }
 
-    /// The rows of the place that are asked for; the first if none has an answer.
-    fn keep(&self, rows: &mut Vec<f64>) {
+    /// The rows of one place that are asked for; the first if none has an answer.
+    fn keep(&self, all: &[f64], rows: &mut Vec<f64>) {
         let Choice { layout, keep, by } = self.choice;
         let (column, width) = (&layout.columns[*by], layout.width());
-        let count = self.rows.len() / width;
-        let cost = |row: usize| column.cost(self.rows[row * width + by]);
+        let count = all.len() / width;
+        let cost = |row: usize| column.cost(all[row * width + by]);
         let kept = match keep {
-            _ if count == 0 => return,
-            KeptPoses::All => return rows.extend(&self.rows),
+            KeptPoses::All => return rows.extend(all),
             KeptPoses::Best => cheapest(count, cost),
             KeptPoses::Worst => cheapest(count, |row| -cost(row)),
         };
-        rows.extend(&self.rows[kept.unwrap_or_default() * width..][..width]);
+        rows.extend(&all[kept.unwrap_or_default() * width..][..width]);
     }
 }

@@ -9,15 +9,20 @@
 //!
 //! Start at [`OperatingPoint::new`]. For damping, servos and inputs about one pose: [`crate::linearise`].
 
-use flexarm_kinematics::{Data, Frame, Pose, Wrench, forward_kinematics, frame_jacobian, mass_matrix};
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn, Matrix6, Matrix6xX};
+mod each;
+mod lanes;
+mod tangent;
+
+use flexarm_kinematics::{Data, Frame, Pose, Wrench, forward_kinematics, frame_jacobian, mass_matrix_at_poses};
+use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX};
 
 use crate::arm::FlexibleArm;
-use crate::eigenvalues::symmetric_eigenvalues;
+use crate::dense::Factor;
 use crate::error::StepError;
-use crate::iteration_matrix::solve_lower_transposed;
 use crate::motion::Held;
 use crate::statics::{MOST_HALVINGS, StaticSlopes, add_spring_forces, static_equilibrium, static_forces};
+pub use each::{Asked, PoseAnswer};
+use tangent::{Tangent, to_hertz};
 
 /// Accepted unbalanced force over the largest force.
 const TOLERANCE: f64 = 1e-13;
@@ -25,8 +30,6 @@ const TOLERANCE: f64 = 1e-13;
 const MOST_ITERATIONS: usize = 60;
 /// A step that leaves more than this part of the residual asks for a new tangent.
 const SLOW: f64 = 0.1;
-/// Passes of refinement where a constant moment makes the tangent unsymmetric: each leaves a thousandth or less.
-const REFINEMENTS: usize = 8;
 
 /// Equilibria of an arm at given poses, with the workspace that they need.
 ///
@@ -40,7 +43,7 @@ pub struct OperatingPoint {
     curved: bool,
     /// Springs at rest, n×n, and their factor, if they have one.
     K: DMatrix<f64>,
-    rest: Option<Cholesky<f64, Dyn>>,
+    rest: Option<Factor<f64>>,
     /// All coordinates: joints, then elastic ones.
     q: DVector<f64>,
     F_T_W: Wrench,
@@ -49,28 +52,25 @@ pub struct OperatingPoint {
     slopes: StaticSlopes,
     /// Unbalanced forces, and Newton's step.
     r: DVector<f64>,
-    /// `K + dp/de` as it is, n×n.
-    tangent: DMatrix<f64>,
-    /// Factor of its symmetric part.
-    factor: Option<Cholesky<f64, Dyn>>,
-    symmetric: bool,
+    dp_de: DMatrix<f64>,
+    tangent: Tangent<f64>,
+    /// Whether the tangent has a factor.
+    factored: bool,
     X_WT: Pose,
     X_WT_rigid: Pose,
     J: Matrix6xX<f64>,
     residual: f64,
     iterations: usize,
-    /// Workspaces of compliance and frequencies.
-    Jt: DMatrix<f64>,
-    Y: DMatrix<f64>,
-    R: DMatrix<f64>,
-    A: DMatrix<f64>,
-    d: Vec<f64>,
-    e: Vec<f64>,
 }
 
 /// The arm does not stay at an equilibrium whose tangent is not positive definite.
 fn beyond_buckling() -> StepError {
     StepError::Singular { matrix: "static stiffness (with the effect of weight and load)", t: 0.0 }
+}
+
+/// Whether the iteration has come to its end.
+fn settled(iteration: usize, residual: f64, previous: f64) -> bool {
+    residual <= TOLERANCE || (iteration > 2 && residual < 1e-9 && residual >= 0.5 * previous)
 }
 
 impl OperatingPoint {
@@ -80,8 +80,10 @@ impl OperatingPoint {
     pub fn new(arm: FlexibleArm, tool: Frame) -> Self {
         let (n, nv) = (arm.n_elastic_coordinates(), arm.model.nv());
         let K = arm.stiffness();
+        let mut rest = Factor::new(n);
+        let stiff = n > 0 && rest.compute(K.as_slice()) == 1.0;
         Self {
-            rest: Cholesky::new(K.clone()).filter(|_| n > 0),
+            rest: stiff.then_some(rest),
             data: Data::new(&arm.model),
             curved: arm.elements.iter().any(|element| element.curve.is_some()),
             K,
@@ -90,20 +92,14 @@ impl OperatingPoint {
             p: DVector::zeros(nv),
             slopes: StaticSlopes::new(&arm, arm.model.n_actuated()),
             r: DVector::zeros(n),
-            tangent: DMatrix::zeros(n, n),
-            factor: None,
-            symmetric: true,
+            dp_de: DMatrix::zeros(n, n),
+            tangent: Tangent::new(n),
+            factored: false,
             X_WT: Pose::identity(),
             X_WT_rigid: Pose::identity(),
             J: Matrix6xX::zeros(nv),
             residual: f64::NAN,
             iterations: 0,
-            Jt: DMatrix::zeros(n, 6),
-            Y: DMatrix::zeros(n, 6),
-            R: DMatrix::zeros(n, 6),
-            A: DMatrix::zeros(n, n),
-            d: vec![0.0; n],
-            e: vec![0.0; n],
             arm,
             tool,
         }
@@ -148,30 +144,23 @@ impl OperatingPoint {
             let e = static_equilibrium(&held, 0.0)?;
             self.q.rows_mut(m, e.len()).copy_from(&e);
             // The springs at rest are not those beyond the play.
-            self.factor = None;
+            self.factored = false;
         }
         let residual = self.newton()?;
         // What is asked for next belongs to the equilibrium itself.
         self.refactor(true)?;
-        forward_kinematics(&self.arm.model, &mut self.data, &self.q);
         self.X_WT = self.data.X_WF(&self.tool);
         frame_jacobian(&self.arm.model, &self.data, &self.tool, &mut self.J);
         self.residual = residual;
         Ok(())
     }
 
-    /// The factor of the springs at rest, in the room of the last one.
+    /// The factor of the springs at rest.
     fn start_from_springs(&mut self) {
-        let Some(rest) = &self.rest else {
-            self.factor = None;
-            return;
-        };
-        let mut room = match self.factor.take() {
-            Some(factor) => factor.unpack_dirty(),
-            None => self.K.clone(),
-        };
-        room.copy_from(rest.l_dirty());
-        self.factor = Some(Cholesky::pack_dirty(room));
+        self.factored = self.rest.is_some();
+        if let Some(rest) = &self.rest {
+            self.tangent.factor.copy_from(rest);
+        }
     }
 
     /// Newton's iteration from the elastic coordinates in `q`; returns the residual.
@@ -184,24 +173,26 @@ impl OperatingPoint {
             let scale = self.unbalance();
             let previous = residual;
             residual = if n == 0 { 0.0 } else { self.r.amax() / scale };
-            if residual <= TOLERANCE || (iteration > 2 && residual < 1e-9 && residual >= 0.5 * previous) {
+            if settled(iteration, residual, previous) {
                 return Ok(residual);
             }
             if !residual.is_finite() {
                 break;
             }
-            if self.factor.is_none() || residual > SLOW * previous {
+            if !self.factored || residual > SLOW * previous {
                 if self.refactor(false).is_err() {
                     buckled = true;
                     // Its step would lead uphill, to a saddle: the springs alone lead down.
-                    self.factor.clone_from(&self.rest);
+                    self.start_from_springs();
                 }
                 self.forces();
                 self.unbalance();
             }
             let unbalanced = self.r.norm();
-            let Some(factor) = &self.factor else { break };
-            factor.solve_mut(&mut self.r);
+            if !self.factored {
+                break;
+            }
+            self.tangent.factor.solve(self.r.as_mut_slice());
             // Far from small deflections the full step may overshoot: no coordinate moves by more than 0.5.
             let shorten = (0.5 / self.r.amax()).min(1.0);
             self.q.rows_mut(m, n).axpy(-shorten, &self.r, 1.0);
@@ -255,34 +246,27 @@ impl OperatingPoint {
     fn refactor(&mut self, small: bool) -> Result<(), StepError> {
         let (m, n) = (self.arm.model.n_actuated(), self.r.len());
         let tool = Some((&self.tool, &self.F_T_W));
-        self.slopes.compute(&self.arm, tool, 0.0, &mut self.data, &self.q, &mut self.tangent);
-        self.tangent += &self.K;
+        // The last forces were those at `q`.
+        self.slopes.compute_at_poses(&self.arm, tool, 0.0, &mut self.data, &self.q, &mut self.dp_de);
+        self.tangent.T.copy_from_slice(self.dp_de.as_slice());
+        self.tangent.add_springs(&self.K);
         for (number, element) in self.arm.elements.iter().enumerate() {
             if let Some(curve) = &element.curve {
                 let k = self.arm.offset(element);
                 let delta = self.arm.deflection(number, self.q[m + k], self.q.as_slice());
                 let stuck = self.arm.hysteresis.iter().find(|law| small && law.element == number);
                 let slope = stuck.map_or_else(|| curve.slope(delta), |law| law.stuck_slope(delta));
-                self.tangent[(k, k)] += if slope > 0.0 { slope } else { curve.stiffest() } - self.K[(k, k)];
+                self.tangent.T[k * n + k] += if slope > 0.0 { slope } else { curve.stiffest() } - self.K[(k, k)];
             }
         }
         // A constant moment is not conservative; what differences leave without one is their error.
         let moments = self.arm.loads.iter().any(|load| load.wrench.at(0.0).torque.norm() > 0.0);
-        self.symmetric = self.F_T_W.torque.norm() == 0.0 && !moments;
-        let mut S = match self.factor.take() {
-            Some(factor) => factor.unpack_dirty(),
-            None => DMatrix::zeros(n, n),
-        };
-        for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
-            S[(i, j)] = 0.5 * (self.tangent[(i, j)] + self.tangent[(j, i)]);
+        self.tangent.symmetric = self.F_T_W.torque.norm() == 0.0 && !moments;
+        self.factored = self.tangent.factorise() == 1.0;
+        match self.factored {
+            true => Ok(()),
+            false => Err(beyond_buckling()),
         }
-        if self.symmetric {
-            self.tangent.copy_from(&S);
-        }
-        if n > 0 {
-            self.factor = Some(Cholesky::new(S).ok_or_else(beyond_buckling)?);
-        }
-        Ok(())
     }
 
     /// The arm, driven along a motion of its own; its springs and loads are those here.
@@ -347,11 +331,11 @@ impl OperatingPoint {
     ///
     /// Cost: six solutions with the factor that is there.
     pub fn compliance(&mut self) -> Matrix6<f64> {
-        if self.factor.is_none() {
+        if !self.factored {
             return Matrix6::zeros();
         }
-        self.solve_for_jacobian(false);
-        Matrix6::from_fn(|i, j| self.Jt.column(i).dot(&self.Y.column(j)))
+        let C = self.tangent.compliance(&self.J.as_slice()[6 * self.arm.model.n_actuated()..]);
+        Matrix6::from_fn(|i, j| C[i][j])
     }
 
     /// Twist of the tool per generalised force on each elastic coordinate, `J (K + dp/de)^-1`, transposed: n×6.
@@ -361,54 +345,22 @@ impl OperatingPoint {
     ///
     /// Cost: as [`OperatingPoint::compliance`].
     pub fn yielding(&mut self) -> &DMatrix<f64> {
-        if self.factor.is_some() {
-            self.solve_for_jacobian(true);
+        if self.factored {
+            self.tangent.solve(&self.J.as_slice()[6 * self.arm.model.n_actuated()..], true);
         }
-        &self.Y
-    }
-
-    /// `Y = T^-1 Jᵀ` with the tangent T, or its transpose.
-    fn solve_for_jacobian(&mut self, transposed: bool) {
-        let (m, n) = (self.arm.model.n_actuated(), self.r.len());
-        let Some(factor) = &self.factor else { return };
-        let J = self.J.columns(m, n);
-        self.Jt.iter_mut().zip(J.row_iter().flat_map(|row| row.into_iter())).for_each(|(t, x)| *t = *x);
-        self.Y.copy_from(&self.Jt);
-        factor.solve_mut(&mut self.Y);
-        if self.symmetric {
-            return;
-        }
-        for _ in 0..REFINEMENTS {
-            // Y += S^-1 (Jᵀ - T Y)
-            self.R.copy_from(&self.Jt);
-            for (mut r, y) in self.R.column_iter_mut().zip(self.Y.column_iter()) {
-                match transposed {
-                    true => r.gemv_tr(-1.0, &self.tangent, &y, 1.0),
-                    false => r.gemv(-1.0, &self.tangent, &y, 1.0),
-                }
-            }
-            factor.solve_mut(&mut self.R);
-            self.Y += &self.R;
-        }
+        &self.tangent.Y
     }
 
     /// Natural frequencies (Hz), ascending, undamped, drives locked; of the symmetric part of the stiffness.
     ///
     /// Cost: a mass matrix and the eigenvalues of an n×n matrix. Not a number where a coordinate moves no mass.
     pub fn frequencies_hz(&mut self) -> &[f64] {
-        let (m, n) = (self.arm.model.n_actuated(), self.r.len());
-        let Some(factor) = &self.factor else { return &[] };
-        let M = mass_matrix(&self.arm.model, &mut self.data, &self.q);
-        self.A.copy_from(&M.view((m, m), (n, n)));
-        // 1/ω² are the eigenvalues of L^-1 M L^-T: the low modes are the largest and most accurate.
-        solve_lower_transposed(factor, &mut self.A);
-        self.A.transpose_mut();
-        solve_lower_transposed(factor, &mut self.A);
-        if !symmetric_eigenvalues(&mut self.A, &mut self.d, &mut self.e) {
-            self.d.fill(f64::NAN);
+        if !self.factored {
+            return &[];
         }
-        self.d.sort_unstable_by(|a, b| b.total_cmp(a));
-        self.d.iter_mut().for_each(|x| *x = 1.0 / (x.sqrt() * std::f64::consts::TAU));
-        &self.d
+        mass_matrix_at_poses(&self.arm.model, &mut self.data);
+        let found = self.tangent.find_frequencies(self.data.M.as_slice()) == 1.0;
+        to_hertz(found, &mut self.tangent.d);
+        &self.tangent.d
     }
 }

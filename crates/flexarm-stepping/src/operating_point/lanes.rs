@@ -1,0 +1,222 @@
+//! Equilibria of one arm at several poses at once, in lanes: what [`super::OperatingPoint`] does on its plain way, operation by
+//! operation, so that each lane has its bits.
+//!
+//! The plain way is Newton's iteration with the factor of the springs at rest, to the end. A lane that leaves it (weight or loads
+//! that change the stiffness much, steps that are too long, no equilibrium) says so and is solved alone.
+
+use flexarm_kinematics::lanes::{
+    LaneTree, forward_kinematics, frame_jacobian, gravity_forces_at_poses, mass_matrix_at_poses, static_tangent,
+};
+use flexarm_kinematics::{Data, Frame, Pose, Real, StaticTangent, Wrench};
+use nalgebra::DMatrix;
+
+use super::each::{Asked, PoseAnswer};
+use super::tangent::{Tangent, to_hertz};
+use super::{MOST_ITERATIONS, OperatingPoint, SLOW, settled};
+use crate::arm::FlexibleArm;
+use crate::dense::{Factor, larger, largest};
+use crate::statics::{add_wrench, load_at};
+
+/// Whether poses of an arm can be taken in lanes.
+pub(super) fn plain(arm: &FlexibleArm) -> bool {
+    arm.n_elastic_coordinates() > 0
+        && !arm.has_gear_laws()
+        && arm.loads.is_empty()
+        && arm.model.balancers().is_empty()
+        && arm.elements.iter().all(|element| element.curve.is_none() && element.geometric.is_none())
+}
+
+/// Springs of an element in their place.
+struct Element {
+    first: usize,
+    /// size × size, column after column.
+    K: Vec<f64>,
+    size: usize,
+}
+
+/// Poses in lanes, and the workspaces that they need.
+pub(super) struct LanePoints<T: Real> {
+    tool: Frame,
+    tree: LaneTree<T>,
+    data: Data<T>,
+    slopes: StaticTangent<T>,
+    elements: Vec<Element>,
+    K: DMatrix<f64>,
+    rest: Factor<T>,
+    /// Joints, then elastic coordinates.
+    q: Vec<T>,
+    r: Vec<T>,
+    tangent: Tangent<T>,
+    X_WT: Pose<T>,
+    X_WT_rigid: Pose<T>,
+    J: Vec<T>,
+}
+
+impl<T: Real> LanePoints<T> {
+    /// Workspaces for a plain arm; `None` if its tree has closed loops, or its springs have no factor.
+    pub(super) fn new(point: &OperatingPoint) -> Option<Self> {
+        let OperatingPoint { arm, tool, K, .. } = point;
+        let (model, n) = (&arm.model, arm.n_elastic_coordinates());
+        let tree = LaneTree::new(&vec![model.clone(); T::LANES])?;
+        let springs: Vec<T> = K.iter().map(|k| T::splat(*k)).collect();
+        let mut rest = Factor::new(n);
+        if rest.compute(&springs).any_below(0.5) {
+            return None;
+        }
+        let element = |own: &crate::ElasticElement| Element {
+            first: arm.offset(own),
+            K: own.K.as_slice().to_vec(),
+            size: own.size,
+        };
+        let data = Data::new(model);
+        let X = data.X_WB[0];
+        Some(Self {
+            tool: tool.clone(),
+            data,
+            slopes: StaticTangent::new(model, model.n_actuated()),
+            elements: arm.elements.iter().map(element).collect(),
+            K: K.clone(),
+            rest,
+            q: vec![T::zero(); model.nv()],
+            r: vec![T::zero(); n],
+            tangent: Tangent::new(n),
+            X_WT: X,
+            X_WT_rigid: X,
+            J: vec![T::zero(); 6 * model.nv()],
+            tree,
+        })
+    }
+
+    /// Puts the joints of a lane at a pose.
+    pub(super) fn place(&mut self, lane: usize, pose: &[f64]) {
+        for (to, from) in self.q.iter_mut().zip(pose) {
+            to.set_lane(lane, *from);
+        }
+    }
+
+    /// Finds the equilibria of all lanes, and what is asked of them; 1 in the lanes that have one on the plain way.
+    #[inline(always)]
+    pub(super) fn solve(&mut self, F_T_W: &Wrench) -> T {
+        let joints = self.q.len() - self.r.len();
+        self.q[joints..].fill(T::zero());
+        forward_kinematics(&self.tree, &mut self.data, &self.q);
+        self.X_WT_rigid = self.data.X_WF(&self.tool);
+        let found = self.newton(F_T_W);
+        self.X_WT = self.data.X_WF(&self.tool);
+        static_tangent(
+            &mut self.slopes,
+            &self.tree,
+            &self.data,
+            &self.q,
+            load_at(&self.tool, F_T_W),
+            &mut self.tangent.T,
+        );
+        self.tangent.add_springs(&self.K);
+        self.tangent.symmetric = F_T_W.torque.norm() == 0.0;
+        let positive = self.tangent.factorise();
+        frame_jacobian(&self.tree, &self.data, &self.tool, &mut self.J);
+        found * positive
+    }
+
+    /// Newton's iteration of all lanes until each has ended; 1 where it ended at an equilibrium.
+    #[inline(always)]
+    fn newton(&mut self, F_T_W: &Wrench) -> T {
+        let (mut active, mut found) = (T::one(), T::zero());
+        let mut previous = T::splat(f64::INFINITY);
+        let half = T::splat(0.5);
+        for iteration in 0..MOST_ITERATIONS {
+            let residual = self.unbalance(F_T_W);
+            for lane in 0..T::LANES {
+                if active.lane(lane) != 1.0 {
+                    continue;
+                }
+                let (now, before) = (residual.lane(lane), previous.lane(lane));
+                let done = settled(iteration, now, before);
+                if done || !now.is_finite() || now > SLOW * before {
+                    active.set_lane(lane, 0.0);
+                    found.set_lane(lane, f64::from(u8::from(done)));
+                }
+            }
+            if !active.any_above(0.5) {
+                break;
+            }
+            previous = residual;
+            self.rest.solve(&mut self.r);
+            // A step that would have to be shortened.
+            active = largest(&self.r).pick_below(T::splat(0.5 + 0.5 * f64::EPSILON), active, T::zero());
+            let joints = self.q.len() - self.r.len();
+            for (q, r) in self.q[joints..].iter_mut().zip(&self.r) {
+                *q = half.pick_below(active, *q - *r, *q);
+            }
+        }
+        found
+    }
+
+    /// `r = K e + p`; the largest of it over the largest of both.
+    #[inline(always)]
+    fn unbalance(&mut self, F_T_W: &Wrench) -> T {
+        let Self { tool, tree, data, elements, q, r, .. } = self;
+        forward_kinematics(tree, data, q);
+        data.clear_external_wrenches();
+        add_wrench(data, tool, F_T_W);
+        gravity_forces_at_poses(tree, data);
+        let joints = q.len() - r.len();
+        let (e, p) = (&q[joints..], &data.tau.as_slice()[joints..]);
+        r.fill(T::zero());
+        for Element { first, K, size } in elements.iter() {
+            let (r, e) = (&mut r[*first..first + size], &e[*first..first + size]);
+            for (column, e) in K.chunks_exact(*size).zip(e) {
+                for (r, k) in r.iter_mut().zip(column) {
+                    *r += T::splat(*k) * *e;
+                }
+            }
+        }
+        let scale = larger(larger(largest(r), largest(p)), T::splat(f64::MIN_POSITIVE));
+        for (r, p) in r.iter_mut().zip(p) {
+            *r += *p;
+        }
+        largest(r) / scale
+    }
+
+    /// The rest of what is asked, of all lanes, for [`LanePoints::tell`].
+    #[inline(always)]
+    pub(super) fn answer(&mut self, asked: Asked, answers: &mut [PoseAnswer]) {
+        let joints = self.q.len() - self.r.len();
+        let zeros = [[T::zero(); 6]; 6];
+        let C = if asked.compliance { self.tangent.compliance(&self.J[6 * joints..]) } else { zeros };
+        let mut whole = T::zero();
+        if asked.frequencies {
+            mass_matrix_at_poses(&self.tree, &mut self.data);
+            whole = self.tangent.find_frequencies(self.data.M.as_slice());
+        }
+        for (lane, answer) in answers.iter_mut().enumerate() {
+            answer.tcp_pose = pose_of(&self.X_WT, lane);
+            answer.rigid_tcp_pose = pose_of(&self.X_WT_rigid, lane);
+            copy_lane(&self.q[joints..], lane, &mut answer.deflections);
+            if asked.jacobian {
+                copy_lane(&self.J[6 * joints..], lane, answer.jacobian.as_mut_slice());
+            }
+            if asked.compliance {
+                answer.compliance = nalgebra::Matrix6::from_fn(|i, j| C[i][j].lane(lane));
+            }
+            if asked.frequencies {
+                copy_lane(&self.tangent.d, lane, &mut answer.frequencies_hz);
+                to_hertz(whole.lane(lane) == 1.0, &mut answer.frequencies_hz);
+            }
+        }
+    }
+}
+
+/// The numbers of one lane.
+#[inline(always)]
+fn copy_lane<T: Real>(from: &[T], lane: usize, to: &mut [f64]) {
+    for (to, from) in to.iter_mut().zip(T::flat(from).iter().skip(lane).step_by(T::LANES)) {
+        *to = *from;
+    }
+}
+
+fn pose_of<T: Real>(X: &Pose<T>, lane: usize) -> Pose {
+    let R = X.rotation.matrix().map(|x| x.lane(lane));
+    let p = X.translation.vector.map(|x| x.lane(lane));
+    Pose::from_parts(p.into(), nalgebra::Rotation3::from_matrix_unchecked(R))
+}
