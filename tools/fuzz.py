@@ -1274,7 +1274,7 @@ def nulls(value, key=""):
 
 
 # Keys that may be null with a reason that docs or comments of the summary give.
-MAY_BE_NULL = {"settling_s", "frequency_hz", "at_rest", "compliance_share[]", "overshoot", "damping", "duration_s", "first_frequency_hz"}
+MAY_BE_NULL = {"settling_s", "frequency_hz", "at_rest", "compliance_share[]", "overshoot", "damping", "duration_s", "first_frequency_hz", "misfit"}
 # Of new: what a link has no section for, what a description does not limit, a run that was left out (docs/new_robot.md).
 NEW_MAY_BE_NULL = {"section", "width", "height", "wall", "wall_of_half_mass", "material", "y_axis", "offset", "taper", "open_cuts", "reason", "mass", "lower", "upper", "velocity", "effort", "effort_fault", "summary", "lower_limit", "upper_limit", "speed_limit", "torque_limit"}
 
