@@ -178,7 +178,7 @@ impl<T: Real> LanePoints<T> {
         largest(r) / scale
     }
 
-    /// The rest of what is asked, of all lanes, for [`LanePoints::tell`].
+    /// The rest of what is asked, of all lanes: one answer for each.
     #[inline(always)]
     pub(super) fn answer(&mut self, asked: Asked, answers: &mut [PoseAnswer]) {
         let joints = self.q.len() - self.r.len();

@@ -84,11 +84,9 @@ impl<T: Real> Tangent<T> {
         for column in self.Jt.chunks_exact_mut(self.n) {
             self.factor.solve_lower(column);
         }
-        for i in 0..6 {
-            for j in 0..=i {
-                let entry = dot(rows(&self.Jt, self.n, i), rows(&self.Jt, self.n, j));
-                (C[i][j], C[j][i]) = (entry, entry);
-            }
+        for (i, j) in (0..6).flat_map(|i| (0..=i).map(move |j| (i, j))) {
+            let entry = dot(rows(&self.Jt, self.n, i), rows(&self.Jt, self.n, j));
+            (C[i][j], C[j][i]) = (entry, entry);
         }
         C
     }
