@@ -48,6 +48,7 @@ __all__ = [
     "InterfaceFigures",
     "JointChange",
     "JointInfo",
+    "LeftTarget",
     "LinkFigures",
     "LinkInfo",
     "LobePoint",
@@ -65,6 +66,7 @@ __all__ = [
     "ModeFigures",
     "ModesSummary",
     "MotionPeak",
+    "MotionViolation",
     "MountingInfo",
     "NewDrive",
     "NewHeld",
@@ -83,7 +85,9 @@ __all__ = [
     "Placement",
     "PlannedReading",
     "PlantFigures",
+    "PoseFigures",
     "PoseLobes",
+    "ProgramFigures",
     "ReduceFiles",
     "ReduceModeFigures",
     "ReduceSummary",
@@ -95,6 +99,7 @@ __all__ = [
     "ResponseSummary",
     "RunFiles",
     "RunSummary",
+    "ShapeFigures",
     "ShareFigures",
     "SolverFigures",
     "Spread",
@@ -185,6 +190,19 @@ class HoldFigures(TypedDict):
     """Strongest frequency (Hz)."""
 
 
+class PoseFigures(TypedDict):
+    """Accuracy and repeatability at a pose, in the sense of ISO 9283."""
+
+    place_m: list[float]
+    """Place of the rigid tool, world axes (m)."""
+    visits: int
+    """How often the tool stopped there."""
+    accuracy_m: float
+    """Distance of the mean place at the end of the stops from the rigid tool's (m): AP."""
+    repeatability_m: float
+    """Mean distance of the places from their mean and three standard deviations (m): RP."""
+
+
 class TcpFigures(TypedDict):
     """Flexible against rigid tool centre point."""
 
@@ -234,6 +252,8 @@ class TcpFigures(TypedDict):
     """Root mean square of that distance over the moves (m)."""
     holds: list[HoldFigures]
     """What happened at each stop."""
+    poses: list[PoseFigures]
+    """Poses at which the tool stops more than once."""
 
 
 class PathMoveFigures(TypedDict):
@@ -799,6 +819,25 @@ class JointChange(TypedDict):
     """Largest change (rad or m)."""
 
 
+class MotionViolation(TypedDict):
+    """A limit that is passed."""
+
+    joint: str
+    """Joint."""
+    kind: str
+    """lower, upper, velocity or effort."""
+    time_s: float
+    """When it is worst (s)."""
+    since_s: float
+    """When it is passed first (s)."""
+    value: float
+    """The worst value."""
+    limit: float
+    """The limit."""
+    message: str
+    """All of it in one sentence."""
+
+
 class PlantFigures(TypedDict):
     """The commands on a plant that is not the model."""
 
@@ -808,6 +847,38 @@ class PlantFigures(TypedDict):
     """With the motion as it is."""
     after: ErrorFigures
     """With the new commands."""
+
+
+class LeftTarget(TypedDict):
+    """A target that stays as it was."""
+
+    line: int
+    """Line of the move."""
+    statement: str
+    """The move."""
+    why: str
+    """Why."""
+    residual_m: float
+    """Distance of the flexible tool from its target at rest (m)."""
+
+
+class ProgramFigures(TypedDict):
+    """What became of the targets of a robot program."""
+
+    files: list[str]
+    """The corrected program, and data lists that changed with it."""
+    targets: int
+    """Targets that moves end at; dwells and arcs of a told angle have none."""
+    corrected: int
+    """How many of them were replaced."""
+    before_m: float
+    """Largest distance of the flexible tool from its target at rest, with the program as it was (m)."""
+    residual_m: float
+    """The same of the replaced ones, with the program as it was written and read again (m)."""
+    residual_rad: float
+    """Largest rotation there (rad)."""
+    left: list[LeftTarget]
+    """Those that stay as they were, the first of them."""
 
 
 class Compensation(TypedDict):
@@ -831,14 +902,22 @@ class Compensation(TypedDict):
     """Highest frequency that was corrected (Hz); null at rest."""
     changes: list[JointChange]
     """Largest change of each joint (rad or m)."""
-    limits: list[str]
-    """Limits that the new motion passes."""
+    limits: list[MotionViolation]
+    """Limits that the new motion passes: positions, speeds and accelerations of the commands, torques of the run on the plant."""
+    slowed: float
+    """How many times as long the motion takes so that limits are kept; 1 if it is as it was."""
     shaper_delay_s: float
     """How much longer the motion takes by its shaper (s)."""
     plants: list[PlantFigures]
     """The same commands on other plants."""
     file: str | None
     """The new motion (.csv)."""
+    files: list[str]
+    """Further files of the new motion."""
+    recording: str | None
+    """The arm before and after (.rrd)."""
+    program: ProgramFigures | None
+    """The robot program with corrected targets, of motions that were read from one (KRL, RAPID)."""
     page: str | None
     """The page."""
     caveats: list[CaveatDict]
@@ -935,6 +1014,19 @@ class Suspicious(TypedDict):
     """Difference over what its scatter would be."""
 
 
+class ShapeFigures(TypedDict):
+    """A measured shape against the arm's mode that is most like it."""
+
+    reading: str
+    """Which reading."""
+    mode: int
+    """The mode, from 1, with what was found."""
+    assurance_before: float
+    """Modal assurance criterion with the robot file as it is, from 0 to 1."""
+    assurance: float
+    """The same with what was found."""
+
+
 class FoundFrame(TypedDict):
     """Where an instrument stands."""
 
@@ -984,6 +1076,8 @@ class Identification(TypedDict):
     """Gears of which motor and link were recorded."""
     suspicious: list[Suspicious]
     """Readings that argue against the rest, the worst first."""
+    shapes: list[ShapeFigures]
+    """Measured shapes of modes against those of the arm."""
     instruments: list[FoundFrame]
     """Unknown instruments as found, in the world."""
     targets: list[FoundPoint]
