@@ -2,13 +2,12 @@
 
 use std::path::PathBuf;
 
-use flexarm::compensate::{CompensateRequest, Method, ShaperKind, compensate_motion_until};
+use flexarm::compensate::{CompensateRequest, LimitRule, Method, ShaperKind, compensate_motion_until};
 use flexarm::{Motion, RunOptions};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyList;
 
-use crate::arrays::view;
+use crate::arrays::{numbers, view};
 use crate::caveat;
 use crate::failure::OrRaise;
 use crate::figures::Figures;
@@ -101,7 +100,7 @@ impl Pickled for PyCompensated {
 /// Parameters
 /// ----------
 /// robot : Robot
-/// motion : Motion or path, optional
+/// motion : Motion, Scenario or path, optional
 ///     The robot's own motion without it.
 /// method : {"dynamic", "static"}, default "dynamic"
 ///     With inertia and damping, iterated on the simulation; or weight alone, point by point.
@@ -118,10 +117,19 @@ impl Pickled for PyCompensated {
 ///     Judge with stiffness, damping and drives that are off as well.
 /// step : float, default 1e-3
 ///     Time step (s).
+/// loads : sequence of Load, or path of a file of loads, optional
+/// payloads : sequence of Payload, optional
+///     What acts on the arm besides weight, corrected as well.
+/// limits : {"slow", "refuse", "tell"}, default "slow"
+///     What becomes of commands that pass a limit of a joint which the motion itself keeps.
+/// accelerations : array_like, optional
+///     Greatest acceleration of each joint (rad/s² or m/s²); not looked at without it.
 /// links, drives : str, optional
 ///     As for :meth:`Robot.flexible`.
 /// output : path, optional
-///     Folder of the new motion and a page; nothing is written without it.
+///     Folder of the new motion, a page and a recording; nothing is written without it.
+/// write : sequence of path, optional
+///     Further files of the new motion: .csv, .toml, .yaml or .json by their endings.
 /// overwrite : bool, default False
 ///
 /// Returns
@@ -129,7 +137,8 @@ impl Pickled for PyCompensated {
 /// Compensated
 #[pyfunction]
 #[pyo3(signature = (robot, motion=None, *, method="dynamic", components=None, iterations=5, cutoff_hz=None, shaper=None,
-                    plant=None, sweep=true, step=1e-3, links=None, drives=None, output=None, overwrite=false))]
+                    plant=None, sweep=true, step=1e-3, loads=None, payloads=None, limits="slow", accelerations=None,
+                    links=None, drives=None, output=None, write=None, overwrite=false))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments")]
 pub(crate) fn compensate<'py>(
     py: Python<'py>,
@@ -143,9 +152,14 @@ pub(crate) fn compensate<'py>(
     plant: Option<&Bound<'py, PyRobot>>,
     sweep: bool,
     step: f64,
+    loads: Option<&Bound<'py, PyAny>>,
+    payloads: Option<&Bound<'py, PyAny>>,
+    limits: &str,
+    accelerations: Option<&Bound<'py, PyAny>>,
     links: Option<&str>,
     drives: Option<&str>,
     output: Option<PathBuf>,
+    write: Option<Vec<PathBuf>>,
     overwrite: bool,
 ) -> PyResult<PyCompensated> {
     let mut chosen = [components.is_none(); 6];
@@ -153,6 +167,9 @@ pub(crate) fn compensate<'py>(
         let known: Vec<(&str, usize)> = COMPONENTS.into_iter().zip(0..).collect();
         chosen[word("components", found, &known)?] = true;
     }
+    let n = robot.get().robot.rigid_model().or_raise()?.n_actuated();
+    let accelerations = accelerations.map(|a| numbers("accelerations", a, &[(n, "joints")], false)).transpose()?;
+    let rules = [("slow", LimitRule::Slow), ("refuse", LimitRule::Refuse), ("tell", LimitRule::Tell)];
     let shapers = [("zv", ShaperKind::Zv), ("zvd", ShaperKind::Zvd)];
     let request = CompensateRequest {
         run: RunOptions { step_s: step, modelling: modelling(links, drives, None, None)?, ..RunOptions::default() },
@@ -163,17 +180,17 @@ pub(crate) fn compensate<'py>(
         shaper: shaper.map(|found| word("shaper", found, &shapers)).transpose()?,
         plant: plant.map(|plant| (plant.get().robot.name.clone(), (*plant.get().robot).clone())),
         sweep,
+        accelerations: accelerations.map_or_else(Vec::new, |a| a.values().to_vec()),
+        limits: word("limits", limits, &rules)?,
         output,
+        motions: write.unwrap_or_default(),
         overwrite,
         ..CompensateRequest::default()
     };
-    let scenario = scenario(robot, motion, None, None, None)?;
-    if !scenario.loads.is_empty() || !scenario.payloads.is_empty() {
-        return Err(PyValueError::new_err("motion: loads and payloads are not compensated: give the motion alone"));
-    }
-    let (of, motion) = (robot.get().robot.clone(), scenario.motion);
-    let name = format!("{}_compensated", motion.name);
-    let found = stoppable(py, move |stop| compensate_motion_until(&of, &motion, &request, stop))?.or_raise()?;
+    let scenario = scenario(robot, motion, loads, payloads, None)?;
+    let of = robot.get().robot.clone();
+    let name = format!("{}_compensated", scenario.motion.name);
+    let found = stoppable(py, move |stop| compensate_motion_until(&of, scenario, &request, stop))?.or_raise()?;
     caveat::answer(py, &found, &found.caveats)?;
     let motion = Motion::along((*found.trajectory).clone(), &name, &robot.get().robot).or_raise()?;
     let (before, after) = (1e3 * found.before.peak_m, 1e3 * found.after.peak_m);

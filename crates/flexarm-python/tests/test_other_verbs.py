@@ -113,6 +113,28 @@ def test_a_map_is_that_of_the_command_line_and_of_statics(kr210: flexarm.Robot, 
     assert arm.statics(ours.worst["q"]).frequencies[0] == ours.worst["quantities"]["frequency_1_hz"]
 
 
+def test_a_compensation_takes_loads_and_limits_and_writes_other_files(kr210: flexarm.Robot, tmp_path: Path) -> None:
+    wrench = [300.0, 0.0, -200.0, 0.0, 0.0, 0.0]
+    load = flexarm.Load.during(wrench, 0.0, 10.0)
+    ways = {"method": "static", "sweep": False}
+    bare = flexarm.compensate(kr210, "pick_and_place", **ways)
+    found = flexarm.compensate(
+        kr210, "pick_and_place", loads=[load], output=tmp_path / "out", write=[tmp_path / "new.yaml"], **ways
+    )
+    scenario = flexarm.Scenario("pick_and_place", loads=[load])
+    assert flexarm.compensate(kr210, scenario, **ways).after == found.after
+    assert found.before["peak_m"] > 1.02 * bare.before["peak_m"]
+    assert found.after["end_m"] < 0.1 * found.before["end_m"]
+    assert (tmp_path / "new.yaml").exists() and flexarm.Motion.load(tmp_path / "new.yaml", kr210)
+    slow = np.full(6, 1e-2)
+    told = flexarm.compensate(kr210, "pick_and_place", limits="tell", accelerations=slow, **ways)
+    assert {limit["kind"] for limit in told.to_dict()["limits"]} == {"acceleration"}
+    with pytest.raises(ValueError, match="limits"):
+        flexarm.compensate(kr210, "pick_and_place", limits="loose", **ways)
+    with pytest.raises(ValueError, match="accelerations"):
+        flexarm.compensate(kr210, "pick_and_place", accelerations=[1.0], **ways)
+
+
 def test_limits_of_depth_of_a_map_are_those_of_lobes(kr210: flexarm.Robot) -> None:
     joints = {"joint_2": (-1.2, -1.0, 2), "joint_3": (1.4, 1.4, 1)}
     found = flexarm.map(

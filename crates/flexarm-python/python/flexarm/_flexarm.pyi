@@ -127,7 +127,7 @@ def plan_measurements(
 ) -> types.MeasurementPlan: ...
 def compensate(
     robot: Robot,
-    motion: Motion | _Path | None = None,
+    motion: Motion | Scenario | _Path | None = None,
     *,
     method: Literal["dynamic", "static"] = "dynamic",
     components: Sequence[str] | None = None,
@@ -137,9 +137,14 @@ def compensate(
     plant: Robot | None = None,
     sweep: bool = True,
     step: float = 1e-3,
+    loads: Sequence[Load] | _Path | None = None,
+    payloads: Sequence[Payload] | None = None,
+    limits: Literal["slow", "refuse", "tell"] = "slow",
+    accelerations: ArrayLike | None = None,
     links: _Links | None = None,
     drives: _Drives | None = None,
     output: _Path | None = None,
+    write: Sequence[_Path] | None = None,
     overwrite: bool = False,
 ) -> Compensated: ...
 
