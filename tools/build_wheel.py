@@ -66,7 +66,7 @@ def zig_linker(tools):
 
 def build(tools, out, manylinux, source=PACKAGE):
     """The wheel, made by maturin, which looks whether the symbols fit the name that the wheel gets."""
-    line = [tools / "maturin", "build", "--release", "--locked", "-o", out]
+    line = [tools / "maturin", "build", "--release", "--locked", "--compression-level", "9", "-o", out]
     if manylinux:
         line += ["--compatibility", f"manylinux_{OLDEST_GLIBC.replace('.', '_')}", "--", "-C", f"linker={zig_linker(tools)}"]
     # Where the workspace is built: what tests have compiled is not compiled again.
