@@ -278,7 +278,7 @@ pub fn effects(rows: &[Vec<EffectPanel<'_>>]) -> String {
             }
         }
     }
-    picture(width * columns as f64 + 10.0, height * rows.len().max(1) as f64 + 8.0, &out)
+    picture(width * columns as f64 + 34.0, height * rows.len().max(1) as f64 + 8.0, &out)
 }
 
 /// Pairs of bars with intervals.
