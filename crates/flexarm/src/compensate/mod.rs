@@ -11,6 +11,8 @@ mod judge;
 mod limits;
 mod page;
 mod program;
+#[cfg(feature = "rerun")]
+mod recording;
 mod shaped;
 
 use std::path::PathBuf;
@@ -228,6 +230,7 @@ pub fn compensate_motion_until(
 }
 
 /// What was found and for what, for files.
+#[cfg_attr(not(feature = "rerun"), expect(dead_code, reason = "for recordings alone"))]
 struct Found {
     /// What was asked for, slowed and shaped.
     scenario: Scenario,
