@@ -100,6 +100,7 @@ mod stepper_settings;
 mod study;
 mod summary;
 pub mod sweep;
+mod toml_file;
 mod tool_path;
 mod twin;
 

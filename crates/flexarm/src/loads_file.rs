@@ -22,6 +22,7 @@ use crate::error::{Error, LoadError};
 use crate::load_jumps::jumps_of;
 use crate::payload::PayloadChange;
 use crate::robot_file::{RobotFileError, Source};
+use crate::toml_file::parsed;
 
 /// The file as written.
 #[derive(Clone, Debug, Deserialize)]
@@ -152,14 +153,7 @@ pub(crate) fn parse_loads(
     duration: f64,
 ) -> Result<(Vec<AppliedLoad>, Vec<PayloadChange>), Error> {
     let source = Source::new(path, text);
-    let file: LoadsFile = toml::from_str(text).map_err(|error| {
-        let message = error.message().trim().replace('\n', " ");
-        source.error(error.span().unwrap_or(0..0), message)
-    })?;
-    if *file.format.get_ref() != 1 {
-        let message = format!("format is {}, this program reads format 1", file.format.get_ref());
-        return Err(source.error(file.format.span(), message).into());
-    }
+    let file: LoadsFile = parsed(text, &source, |file: &LoadsFile| &file.format)?;
     let folder = path.parent().unwrap_or(Path::new("."));
     let loads = file.load.iter().map(|entry| load(entry, folder, duration, &source));
     let payloads = file.payload.iter().map(|entry| payload(entry, &source));

@@ -18,6 +18,7 @@ use crate::drive_entry::DriveEntry;
 use crate::gear_entry::CouplingEntry;
 use crate::loop_entry::LoopEntry;
 use crate::mounting::MountingEntry;
+use crate::toml_file::parsed;
 
 /// The file as written.
 #[derive(Clone, Debug, Deserialize)]
@@ -164,17 +165,6 @@ pub(crate) struct DampingEntry {
 /// [`RobotFileError`] with line and column for anything that is not the format.
 pub(crate) fn parse_robot_file(text: &str, path: &Path) -> Result<(RobotFile, Source), RobotFileError> {
     let source = Source::new(path, text);
-    let file: RobotFile = toml::from_str(text).map_err(|error| {
-        let mut message = error.message().trim().replace('\n', " ");
-        if message.contains("missing field `format`") {
-            message += ": add format = 1 as the first line";
-        }
-        source.error(error.span().unwrap_or(0..0), message)
-    })?;
-    if *file.format.get_ref() != 1 {
-        let found = file.format.get_ref();
-        let message = format!("format is {found}, this program reads format 1: change it or update flexarm");
-        return Err(source.error(file.format.span(), message));
-    }
+    let file: RobotFile = parsed(text, &source, |file: &RobotFile| &file.format)?;
     Ok((file, source))
 }

@@ -15,6 +15,7 @@ use super::response_file::{NodeEntry, ResponseEntry, ShapeEntry};
 use crate::arm::Arm;
 use crate::error::Error;
 use crate::robot_file::{RobotFileError, Source};
+use crate::toml_file::parsed;
 
 /// The file as written.
 #[derive(Debug, Deserialize)]
@@ -250,17 +251,7 @@ pub(super) struct Cell<'a> {
 pub(super) fn read(path: &Path, cell: &Cell<'_>) -> Result<MeasurementInput, Error> {
     let text = read_text(path)?;
     let source = Source::new(path, &text);
-    let file: MeasurementFile = toml::from_str(&text).map_err(|error| {
-        let mut message = error.message().trim().replace('\n', " ");
-        if message.contains("missing field `format`") {
-            message += ": add format = 1 as the first line";
-        }
-        source.error(error.span().unwrap_or(0..0), message)
-    })?;
-    if *file.format.get_ref() != 1 {
-        let message = format!("format is {}, this program reads format 1", file.format.get_ref());
-        return Err(source.error(file.format.span(), message).into());
-    }
+    let file: MeasurementFile = parsed(&text, &source, |file: &MeasurementFile| &file.format)?;
     let (length, length_m) = unit("length", &file.length, &LENGTHS, &source)?;
     let units = Units {
         length: length_m,

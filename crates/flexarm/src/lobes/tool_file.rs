@@ -12,6 +12,7 @@ use toml::Spanned;
 use super::measured::MeasuredResponse;
 use crate::error::Error;
 use crate::robot_file::{RobotFileError, Source};
+use crate::toml_file::parsed;
 
 /// The file as written.
 #[derive(Debug, Deserialize)]
@@ -177,17 +178,7 @@ impl CuttingTool {
         let path = path.as_ref();
         let text = read_text(path)?;
         let source = Source::new(path, &text);
-        let file: ToolFile = toml::from_str(&text).map_err(|error| {
-            let mut message = error.message().trim().replace('\n', " ");
-            if message.contains("missing field `format`") {
-                message += ": add format = 1 as the first line";
-            }
-            source.error(error.span().unwrap_or(0..0), message)
-        })?;
-        if *file.format.get_ref() != 1 {
-            let message = format!("format is {}, this program reads format 1", file.format.get_ref());
-            return Err(source.error(file.format.span(), message).into());
-        }
+        let file: ToolFile = parsed(&text, &source, |file: &ToolFile| &file.format)?;
         let reader = Reader {
             source: &source,
             folder: path.parent().unwrap_or(Path::new(".")),

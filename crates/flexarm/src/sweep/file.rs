@@ -12,6 +12,7 @@ use toml::Spanned;
 use super::value::ParameterValue;
 use crate::error::Error;
 use crate::robot_file::{RobotFileError, Source};
+use crate::toml_file::parsed;
 
 /// The file as written.
 #[derive(Debug, Deserialize)]
@@ -176,14 +177,7 @@ const MOST_VALUES: i64 = 1_000_000;
 pub(super) fn read(path: &Path) -> Result<StudyFile, Error> {
     let text = read_text(path)?;
     let source = Source::new(path, &text);
-    let file: StudyToml = toml::from_str(&text).map_err(|error| {
-        let message = error.message().trim().replace('\n', " ");
-        source.error(error.span().unwrap_or(0..0), message)
-    })?;
-    if *file.format.get_ref() != 1 {
-        let message = format!("format is {}, this program reads format 1", file.format.get_ref());
-        return Err(source.error(file.format.span(), message).into());
-    }
+    let file: StudyToml = parsed(&text, &source, |file: &StudyToml| &file.format)?;
     let placed = |text: &Spanned<String>| Placed { text: text.get_ref().clone(), place: source.error(text.span(), "") };
     let folder = path.parent().unwrap_or(Path::new("."));
     let mut parameters =

@@ -1,0 +1,34 @@
+//! Our own TOML files: each begins with `format = 1`, and what is wrong in it is told with its place.
+
+use flexarm_files::Source;
+use serde::de::DeserializeOwned;
+use toml::Spanned;
+
+use crate::robot_file::RobotFileError;
+
+/// The content of a file.
+///
+/// * `format`: where its version stands.
+///
+/// # Errors
+/// [`RobotFileError`] with line and column for anything that is not the format.
+pub(crate) fn parsed<T: DeserializeOwned>(
+    text: &str,
+    source: &Source,
+    format: impl Fn(&T) -> &Spanned<i64>,
+) -> Result<T, RobotFileError> {
+    let file: T = toml::from_str(text).map_err(|error| {
+        let mut message = error.message().trim().replace('\n', " ");
+        if message.contains("missing field `format`") {
+            message += ": add format = 1 as the first line";
+        }
+        source.error(error.span().unwrap_or(0..0), message)
+    })?;
+    let version = format(&file);
+    if *version.get_ref() != 1 {
+        let found = version.get_ref();
+        let message = format!("format is {found}, this program reads format 1: change it or update flexarm");
+        return Err(source.error(version.span(), message));
+    }
+    Ok(file)
+}
