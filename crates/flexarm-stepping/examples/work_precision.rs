@@ -38,7 +38,8 @@ fn path(arm: &FlexibleArm, kind: StepperKind, h: f64) -> (Vec<Vector3<f64>>, Cou
     let tool = arm.model.frame("tcp").unwrap();
     let mut stepper = new_stepper(kind, arm.clone(), h, Start::Equilibrium).unwrap();
     let mut seen = Observation::new(arm);
-    let every = (POINTS / h).round() as usize;
+    // Longer steps are compared at their own times.
+    let every = (POINTS / h).round().max(1.0) as usize;
     let mut points = Vec::new();
     for step in 0..=(DURATION / h).round() as usize {
         if step % every == 0 {
@@ -81,7 +82,7 @@ fn main() {
     let peak = truth.iter().zip(&rigid).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
 
     let mut lines: Vec<(StepperKind, f64)> = Vec::new();
-    lines.extend([10e-3, 5e-3, 2.5e-3, 2e-3, 1e-3, 0.5e-3, 0.25e-3].map(|h| (alpha, h)));
+    lines.extend([20e-3, 10e-3, 5e-3, 2.5e-3, 2e-3, 1e-3, 0.5e-3, 0.25e-3].map(|h| (alpha, h)));
     lines.extend([10e-3, 5e-3, 2.5e-3, 1e-3, 0.5e-3].map(|h| (StepperKind::Sdirk3, h)));
     lines.extend([1e-6, 1e-8].map(|rtol| (StepperKind::Reference(ReferenceSettings::new(rtol)), 10e-3)));
     let mut least = vec![f64::INFINITY; lines.len()];
@@ -96,7 +97,8 @@ fn main() {
     );
     for ((kind, h), cost) in lines.iter().zip(&least) {
         let (points, counts) = path(&arm, *kind, *h);
-        let error = points.iter().zip(&truth).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+        let stride = (h / POINTS).round().max(1.0) as usize;
+        let error = points.iter().zip(truth.iter().step_by(stride)).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
         println!(
             "{:<18} {:>8} {:>10.1e} {:>10.2} {:>10} {:>12.3}",
             kind.name(),

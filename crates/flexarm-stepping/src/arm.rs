@@ -10,6 +10,7 @@ use std::sync::Arc;
 use flexarm_kinematics::{AxisMotion, Data, JointMotion, Model, SpatialInertia, State, Wrench, mass_matrix};
 use nalgebra::{DMatrix, DVector, Matrix6};
 
+use crate::dense;
 use crate::drive::{Friction, ServoAxis, TorqueCurve};
 use crate::error::StepError;
 use crate::events::SAME_TIME;
@@ -114,11 +115,7 @@ impl ElasticElement {
 /// `y += A x` for a square A.
 #[inline(always)]
 pub(crate) fn add_product(A: &DMatrix<f64>, x: &[f64], y: &mut [f64]) {
-    for (column, x) in A.as_slice().chunks_exact(A.nrows()).zip(x) {
-        for (y, a) in y.iter_mut().zip(column) {
-            *y += a * x;
-        }
-    }
+    dense::add_product(A.as_slice(), x, y);
 }
 
 /// Damping of an elastic element.

@@ -8,25 +8,69 @@ use flexarm_kinematics::Real;
 /// `y = A x`.
 #[inline(always)]
 pub(crate) fn product<T: Real>(A: &[T], x: &[T], y: &mut [T]) {
-    let n = y.len();
-    for (y, a) in y.iter_mut().zip(&A[..n]) {
-        *y = *a * x[0];
+    let Some((x_0, x)) = x.split_first() else { return };
+    let (first, columns) = A.split_at(y.len());
+    for (y, a) in y.iter_mut().zip(first) {
+        *y = *a * *x_0;
     }
-    for (column, x) in A.chunks_exact(n).zip(x).skip(1) {
-        for (y, a) in y.iter_mut().zip(column) {
-            *y = *a * *x + *y;
-        }
-    }
+    add_columns(columns, x.iter().copied(), y);
 }
 
 /// `y += A x`.
 #[inline(always)]
 pub(crate) fn add_product<T: Real>(A: &[T], x: &[T], y: &mut [T]) {
-    for (column, x) in A.chunks_exact(y.len()).zip(x) {
-        for (y, a) in y.iter_mut().zip(column) {
-            *y += *a * *x;
+    add_columns(A, x.iter().copied(), y);
+}
+
+/// `y -= A x`.
+#[inline(always)]
+pub(crate) fn subtract_product<T: Real>(A: &[T], x: &[T], y: &mut [T]) {
+    add_columns(
+        A,
+        x.iter().map(
+            #[inline(always)]
+            |x| -*x,
+        ),
+        y,
+    );
+}
+
+/// Rows whose sums are in registers at a time.
+const ROWS: usize = 6;
+
+/// Adds multiples of columns, to each row one after the other.
+#[inline(always)]
+fn add_columns<T: Real>(A: &[T], factors: impl Iterator<Item = T> + Clone, y: &mut [T]) {
+    let n = y.len();
+    let mut first = 0;
+    while first + ROWS <= n {
+        add_to_rows::<T, ROWS>(A, factors.clone(), first, y);
+        first += ROWS;
+    }
+    while first + 2 <= n {
+        add_to_rows::<T, 2>(A, factors.clone(), first, y);
+        first += 2;
+    }
+    if first < n {
+        add_to_rows::<T, 1>(A, factors, first, y);
+    }
+}
+
+/// [`add_columns`] for N rows.
+#[inline(always)]
+fn add_to_rows<T: Real, const N: usize>(A: &[T], factors: impl Iterator<Item = T>, first: usize, y: &mut [T]) {
+    let n = y.len();
+    let rows = &mut y[first..first + N];
+    let mut sums: [T; N] = std::array::from_fn(
+        #[inline(always)]
+        |k| rows[k],
+    );
+    for (column, factor) in A.chunks_exact(n).zip(factors) {
+        for (sum, a) in sums.iter_mut().zip(&column[first..first + N]) {
+            *sum = *a * factor + *sum;
         }
     }
+    rows.copy_from_slice(&sums);
 }
 
 /// `aᵀ b`.
@@ -71,26 +115,29 @@ pub(crate) fn cholesky<T: Real>(A: &mut [T], n: usize) -> T {
     positive
 }
 
-/// Solves `A X = B` with the factor of A; takes `Bᵀ`, leaves `Xᵀ`.
+/// Replaces A by its factor and `Bᵀ` by `A^-1 B`; false if A is not positive definite.
 #[inline(always)]
-pub(crate) fn solve_transposed(L: &[f64], Bt: &mut [f64], n: usize) {
+pub(crate) fn solve_in_place(A: &mut [f64], Bt: &mut [f64], n: usize) -> bool {
+    let positive = cholesky(A, n) == 1.0;
+    solve_transposed(A, Bt, n);
+    transpose(Bt, n);
+    positive
+}
+
+/// Solves `A X = B` with the factor of A; takes `Bᵀ`, leaves `Xᵀ`: turned round, elimination goes over whole columns.
+#[inline(always)]
+fn solve_transposed(L: &[f64], Bt: &mut [f64], n: usize) {
     for k in 0..n {
-        let (inward, outward) = Bt.split_at_mut((k + 1) * n);
-        let column = &mut inward[k * n..];
-        let factors = &L[k * n + k..(k + 1) * n];
-        scale(column, 1.0 / factors[0]);
-        for (to, factor) in outward.chunks_exact_mut(n).zip(&factors[1..]) {
-            subtract(to, *factor, column);
-        }
+        let (inward, outward) = Bt.split_at_mut(k * n);
+        let column = &mut outward[..n];
+        add_columns(inward, L[k..].iter().step_by(n).map(|factor| -factor), column);
+        scale(column, 1.0 / L[k * n + k]);
     }
     for k in (0..n).rev() {
         let (inward, outward) = Bt.split_at_mut((k + 1) * n);
         let column = &mut inward[k * n..];
-        let factors = &L[k * n + k..(k + 1) * n];
-        for (from, factor) in outward.chunks_exact(n).zip(&factors[1..]) {
-            subtract(column, *factor, from);
-        }
-        scale(column, 1.0 / factors[0]);
+        subtract_product(outward, &L[k * n + k + 1..(k + 1) * n], column);
+        scale(column, 1.0 / L[k * n + k]);
     }
 }
 
@@ -109,11 +156,20 @@ fn subtract<T: Real>(to: &mut [T], factor: T, from: &[T]) {
     }
 }
 
-/// `y -= A x`.
+/// `S C Sᵀ` with `Sᵀ = 1 + c X` of a symmetric C; `room` is as large.
 #[inline(always)]
-pub(crate) fn subtract_product<T: Real>(A: &[T], x: &[T], y: &mut [T]) {
-    for (column, x) in A.chunks_exact(y.len()).zip(x) {
-        subtract(y, *x, column);
+pub(crate) fn congruence(c: f64, X: &[f64], C: &[f64], n: usize, room: &mut [f64], product: &mut [f64]) {
+    // P = C Sᵀ
+    room.copy_from_slice(C);
+    for (column, x) in room.chunks_exact_mut(n).zip(X.chunks_exact(n)) {
+        add_columns(C, x.iter().map(|x| c * x), column);
+    }
+    // P + c Xᵀ P
+    product.copy_from_slice(room);
+    for (column, x) in product.chunks_exact_mut(n).zip(room.chunks_exact(n)) {
+        for (y, a) in column.iter_mut().zip(X.chunks_exact(n)) {
+            *y += c * dot(a, x);
+        }
     }
 }
 
@@ -237,7 +293,7 @@ impl<T: Real> Factor<T> {
 
 /// `A ← Aᵀ`.
 #[inline(always)]
-pub(crate) fn transpose(A: &mut [f64], n: usize) {
+fn transpose(A: &mut [f64], n: usize) {
     for j in 0..n {
         for i in j + 1..n {
             A.swap(j * n + i, i * n + j);
@@ -272,10 +328,17 @@ mod tests {
             assert_eq!(lower, factor.l());
             let (mut ours, mut theirs) = (B.clone(), B.clone());
             solve_transposed(&L, ours.as_mut_slice(), n);
-            crate::iteration_matrix::solve_transposed(&factor, &mut theirs);
-            assert_eq!(ours, theirs);
+            theirs.transpose_mut();
+            factor.solve_mut(&mut theirs);
             transpose(ours.as_mut_slice(), n);
-            assert_eq!(ours, theirs.transpose());
+            assert!((&ours - &theirs).amax() < 1e-13 * theirs.amax(), "{ours} {theirs}");
+
+            let C = B.symmetric_part();
+            let (mut room, mut found) = (A.clone(), A.clone());
+            congruence(0.3, B.as_slice(), C.as_slice(), n, room.as_mut_slice(), found.as_mut_slice());
+            let St = DMatrix::identity(n, n) + 0.3 * &B;
+            let expected = St.transpose() * &C * St;
+            assert!((&found - &expected).amax() < 1e-14 * n as f64 * expected.amax(), "{found} {expected}");
         }
         assert_eq!(cholesky(&mut [1.0, 2.0, 2.0, 1.0], 2), 0.0);
         assert_eq!(cholesky(&mut [f64::NAN], 1), 0.0);

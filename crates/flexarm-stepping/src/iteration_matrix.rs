@@ -8,6 +8,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
+use crate::dense::{product, solve_in_place};
 use crate::error::StepError;
 use crate::mode_matrix::ModeInverse;
 use crate::system::SecondOrderSystem;
@@ -35,48 +36,38 @@ pub(crate) enum Way {
 /// `(S + C)^-1 B`; as read, `S = M`, `C = c_D D + c_K K` and `B = 1`. All are n × n and symmetric but B.
 #[derive(Clone, Debug)]
 pub(crate) struct DenseInverse {
-    /// M; empty when its storage is that of the factor.
+    /// M; after the inversion the factor.
     pub(crate) S: DMatrix<f64>,
     pub(crate) C: DMatrix<f64>,
     /// Bᵀ, after the inversion the inverse.
     pub(crate) inverse: DMatrix<f64>,
-    factor: Option<Cholesky<f64, Dyn>>,
     product: DVector<f64>,
 }
 
 impl DenseInverse {
     /// Room for n coordinates.
     fn new(n: usize) -> Self {
-        Self {
-            S: DMatrix::zeros(0, 0),
-            C: DMatrix::zeros(n, n),
-            inverse: DMatrix::zeros(n, n),
-            factor: None,
-            product: DVector::zeros(n),
-        }
+        let square = || DMatrix::zeros(n, n);
+        Self { S: square(), C: square(), inverse: square(), product: DVector::zeros(n) }
     }
 
     fn read(&mut self, system: &mut impl SecondOrderSystem, c_D: f64, c_K: f64) {
-        if self.S.is_empty() {
-            self.S = storage_of(&mut self.factor, self.C.nrows());
-        }
         system.mass(&mut self.S);
         system.damping_and_stiffness(c_D, c_K, &mut self.C);
         self.inverse.fill_with_identity();
     }
 
     fn invert(&mut self, t: f64) -> Result<(), StepError> {
-        let mut S = std::mem::replace(&mut self.S, DMatrix::zeros(0, 0));
-        S += &self.C;
-        let factor = Cholesky::new(S).ok_or(StepError::Singular { matrix: "iteration matrix", t })?;
-        solve_transposed(&factor, &mut self.inverse);
-        self.inverse.transpose_mut();
-        self.factor = Some(factor);
-        Ok(())
+        self.S += &self.C;
+        let n = self.S.nrows();
+        match solve_in_place(self.S.as_mut_slice(), self.inverse.as_mut_slice(), n) {
+            true => Ok(()),
+            false => Err(StepError::Singular { matrix: "iteration matrix", t }),
+        }
     }
 
     fn solve(&mut self, r: &mut DVector<f64>) {
-        self.product.gemv(1.0, &self.inverse, r, 0.0);
+        product(self.inverse.as_slice(), r.as_slice(), self.product.as_mut_slice());
         r.copy_from(&self.product);
     }
 }
@@ -136,35 +127,5 @@ pub(crate) fn storage_of(factor: &mut Option<Cholesky<f64, Dyn>>, n: usize) -> D
     match factor.take() {
         Some(old) => old.unpack_dirty(),
         None => DMatrix::zeros(n, n),
-    }
-}
-
-/// Solves `L X = B` with the factor `A = L Lᵀ`, likewise.
-pub(crate) fn solve_lower_transposed(factor: &Cholesky<f64, Dyn>, Bt: &mut DMatrix<f64>) {
-    let (L, n) = (factor.l_dirty(), Bt.ncols());
-    for k in 0..n {
-        let scale = 1.0 / L[(k, k)];
-        Bt.column_mut(k).scale_mut(scale);
-        for i in k + 1..n {
-            let (from, mut to) = Bt.columns_range_pair_mut(k, i);
-            to.axpy(-L[(i, k)], &from, 1.0);
-        }
-    }
-}
-
-/// Solves `A X = B` for all columns at once; takes `Bᵀ`, leaves `Xᵀ`.
-///
-/// Turned round, elimination goes over whole contiguous columns; on right-hand sides one after another (nalgebra's
-/// `solve_mut`) it takes six times as long at 24 coordinates.
-pub(crate) fn solve_transposed(factor: &Cholesky<f64, Dyn>, Bt: &mut DMatrix<f64>) {
-    solve_lower_transposed(factor, Bt);
-    let (L, n) = (factor.l_dirty(), Bt.ncols());
-    for k in (0..n).rev() {
-        for i in k + 1..n {
-            let (mut to, from) = Bt.columns_range_pair_mut(k, i);
-            to.axpy(-L[(i, k)], &from, 1.0);
-        }
-        let scale = 1.0 / L[(k, k)];
-        Bt.column_mut(k).scale_mut(scale);
     }
 }

@@ -2,24 +2,62 @@
 //! `cargo run --release -p flexarm --no-default-features --example prepared_runs`
 //!
 //! CPU time of one thread, the smallest of nine runs. Set-up is what a run of one step at rest takes.
+//!
+//! With arguments `STEPPER:STEP ...` (the step in s; of `reference` the relative tolerance) a line for each with the CPU ms per simulated
+//! second of the reference arm, the figures alone, 100 samples a second: what `tools/peers.py` puts beside other programs.
 #![allow(clippy::print_stdout, reason = "an example shows its answer")]
 
 use std::path::Path;
 
 use cpu_time::ThreadTime;
-use flexarm::{Arm, Error, Modelling, Motion, Robot, RunOptions};
+use flexarm::{Arm, Error, Modelling, Motion, ReferenceSettings, Robot, RunOptions, STEPPERS, StepperOptions};
 
 const TIMES: usize = 9;
 
 /// CPU time of a run (s), the smallest of some.
-fn cost(arm: &Arm, motion: &Motion, options: &RunOptions) -> Result<f64, Error> {
+fn cost(mut run: impl FnMut() -> Result<(), Error>) -> Result<f64, Error> {
     let mut least = f64::INFINITY;
     for _ in 0..TIMES {
         let start = ThreadTime::now();
-        arm.simulate(motion, options)?;
+        run()?;
         least = least.min(start.elapsed().as_secs_f64());
     }
     Ok(least)
+}
+
+fn columns(arm: &Arm, motion: &Motion, options: &RunOptions) -> Result<f64, Error> {
+    cost(|| arm.simulate(motion, options).map(drop))
+}
+
+/// The options that `STEPPER:STEP` means.
+fn told(line: &str) -> Option<RunOptions> {
+    let (name, step) = line.split_once(':')?;
+    let (entry, step) = (STEPPERS.iter().find(|entry| entry.name == name)?, step.parse().ok()?);
+    let default = RunOptions { log_rate_hz: 100.0, ..RunOptions::default() };
+    Some(match name {
+        "reference" => {
+            let settings = StepperOptions { reference: ReferenceSettings::new(step), ..StepperOptions::default() };
+            RunOptions { stepper: (entry.with)(&settings), ..default }
+        }
+        _ => RunOptions { stepper: (entry.with)(&StepperOptions::default()), step_s: step, ..default },
+    })
+}
+
+/// A line with CPU ms per simulated second for each argument.
+fn lines(root: &Path, wanted: &[String]) -> Result<(), Error> {
+    let robot = Robot::load(root.join("robots/reference_arm"))?;
+    let motion = Motion::load(root.join("trajectories/reference_arm.toml"), &robot)?;
+    let arm = robot.flexible(Modelling::default())?;
+    for line in wanted {
+        match told(line) {
+            Some(options) => {
+                let spent = cost(|| arm.simulate_summary(&motion, &options).map(drop))?;
+                println!("{line} {:.4}", 1e3 * spent / motion.trajectory.duration());
+            }
+            None => println!("{line} is no STEPPER:STEP"),
+        }
+    }
+    Ok(())
 }
 
 /// The first place of a motion, for the time of a step.
@@ -33,6 +71,10 @@ fn at_rest(motion: &Motion, robot: &Robot) -> Result<Motion, Error> {
 
 fn main() -> Result<(), Error> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(2).expect("the checkout");
+    let wanted: Vec<String> = std::env::args().skip(1).collect();
+    if !wanted.is_empty() {
+        return lines(root, &wanted);
+    }
     println!("{:<16} {:>8} {:>12} {:>18} {:>12}", "robot", "step ms", "set-up us", "CPU ms per sim. s", "us per step");
     for (name, motion) in [("reference_arm", "reference_arm.toml"), ("kr210", "pick_and_place.toml")] {
         let robot = Robot::load(root.join("robots").join(name))?;
@@ -41,8 +83,8 @@ fn main() -> Result<(), Error> {
         let duration = motion.trajectory.duration();
         for step_s in [10e-3, 5e-3, 1e-3] {
             let options = RunOptions { step_s, ..RunOptions::default() };
-            let whole = cost(&arm, &motion, &options)?;
-            let set_up = cost(&arm, &at_rest(&motion, &robot)?, &RunOptions::default())?;
+            let whole = columns(&arm, &motion, &options)?;
+            let set_up = columns(&arm, &at_rest(&motion, &robot)?, &RunOptions::default())?;
             let steps = duration / step_s;
             println!(
                 "{name:<16} {:>8} {:>12.0} {:>18.3} {:>12.2}",

@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::arm::FlexibleArm;
 use crate::batch::lane_arm::{LaneArm, set_lane};
-use crate::dense::{cholesky, dot, larger, product, solve_transposed, transpose};
+use crate::dense::{congruence, dot, larger, product, solve_in_place};
 use crate::error::StepError;
 use crate::implicit::{ImplicitStep, Newton, Search, Sizes};
 use crate::integrator::TimeGrid;
@@ -397,26 +397,9 @@ impl Matrices {
         let Self { n, S, product, L, M_inverse_K, inverse } = self;
         let n = *n;
         L.copy_from_slice(S);
-        let positive = cholesky(L, n) == 1.0;
         M_inverse_K.copy_from_slice(K);
-        solve_transposed(L, M_inverse_K, n);
-        transpose(M_inverse_K, n);
-
-        // S C Sᵀ
-        L.copy_from_slice(C);
-        for (column, x) in L.chunks_exact_mut(n).zip(M_inverse_K.chunks_exact(n)) {
-            for (c, x) in C.chunks_exact(n).zip(x) {
-                for (y, c) in column.iter_mut().zip(c) {
-                    *y += c_h2 * *c * *x;
-                }
-            }
-        }
-        product.copy_from_slice(L);
-        for (column, x) in product.chunks_exact_mut(n).zip(L.chunks_exact(n)) {
-            for (y, a) in column.iter_mut().zip(M_inverse_K.chunks_exact(n)) {
-                *y += c_h2 * dot(a, x);
-            }
-        }
+        let positive = solve_in_place(L, M_inverse_K, n);
+        congruence(c_h2, M_inverse_K, C, n, L, product);
         // M + c h² K + S C Sᵀ, and Sᵀ on the right-hand side, which is kept transposed.
         for ((s, k), c) in S.iter_mut().zip(K).zip(product.iter()) {
             *s += c_h2 * *k;
@@ -429,10 +412,7 @@ impl Matrices {
         for (i, s) in inverse.iter_mut().zip(M_inverse_K.iter()) {
             *i += c_h2 * *s;
         }
-        let positive = cholesky(S, n) == 1.0 && positive;
-        solve_transposed(S, inverse, n);
-        transpose(inverse, n);
-        positive
+        solve_in_place(S, inverse, n) && positive
     }
 }
 

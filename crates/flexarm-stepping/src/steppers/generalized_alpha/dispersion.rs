@@ -8,10 +8,11 @@
 //! ```
 //! Along a tree, and with modes, the matrix has all of it in itself: [`crate::tree_matrix`], [`crate::mode_matrix`].
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use nalgebra::{DMatrix, DVector};
 
+use crate::dense::{congruence, product, solve_in_place};
 use crate::error::StepError;
-use crate::iteration_matrix::{IterationMatrix, Way, solve_transposed, storage_of};
+use crate::iteration_matrix::{IterationMatrix, Way};
 use crate::system::SecondOrderSystem;
 
 /// The correction for steps of one length. Allocates when it is made and for its first matrix, not after.
@@ -25,8 +26,8 @@ pub(super) struct DispersionCorrection {
     K: DMatrix<f64>,
     /// `M^-1 K` at the configuration of the last matrix.
     M_inverse_K: DMatrix<f64>,
-    mass_factor: Option<Cholesky<f64, Dyn>>,
-    product: DMatrix<f64>,
+    /// Room for the factor of M and products.
+    room: [DMatrix<f64>; 2],
     /// `M^-1 K` times a vector.
     shift: DVector<f64>,
 }
@@ -40,8 +41,7 @@ impl DispersionCorrection {
             c_h2: c * h * h,
             K: none.clone(),
             M_inverse_K: none.clone(),
-            mass_factor: None,
-            product: none,
+            room: [none.clone(), none],
             shift: DVector::zeros(n),
         }
     }
@@ -67,30 +67,25 @@ impl DispersionCorrection {
         t: f64,
     ) -> Result<(), StepError> {
         let Way::Dense(matrix) = &mut matrix.way else { return Ok(()) };
-        let Self { c_h2, K, M_inverse_K, mass_factor, product, shift, .. } = self;
+        let Self { c_h2, K, M_inverse_K, room: [factor, product], shift, .. } = self;
         let (c_h2, n) = (*c_h2, shift.len());
         if K.nrows() != n {
-            for matrix in [&mut *K, &mut *M_inverse_K, &mut *product] {
+            for matrix in [&mut *K, &mut *M_inverse_K, &mut *factor, &mut *product] {
                 *matrix = DMatrix::zeros(n, n);
             }
         }
-        // M^-1 K
-        let mut M = storage_of(mass_factor, K.nrows());
-        M.copy_from(&matrix.S);
-        let factor = Cholesky::new(M).ok_or(StepError::Singular { matrix: "mass matrix", t })?;
+        factor.copy_from(&matrix.S);
         system.stiffness(K);
+        // M^-1 K; K is symmetric.
         M_inverse_K.copy_from(K);
-        solve_transposed(&factor, M_inverse_K);
-        M_inverse_K.transpose_mut();
-        *mass_factor = Some(factor);
-
-        // S C Sᵀ. Column by column: the product of whole matrices allocates.
-        product.copy_from(&matrix.C);
-        for (mut column, x) in product.column_iter_mut().zip(M_inverse_K.column_iter()) {
-            column.gemv(c_h2, &matrix.C, &x, 1.0);
+        if !solve_in_place(factor.as_mut_slice(), M_inverse_K.as_mut_slice(), n) {
+            return Err(StepError::Singular { matrix: "mass matrix", t });
         }
+
+        // S C Sᵀ
+        let (X, C) = (M_inverse_K.as_slice(), matrix.C.as_slice());
+        congruence(c_h2, X, C, n, factor.as_mut_slice(), product.as_mut_slice());
         matrix.C.copy_from(product);
-        matrix.C.gemm_tr(c_h2, M_inverse_K, product, 1.0);
 
         // M + c h² K, and Sᵀ on the right-hand side, which is kept transposed.
         matrix.S.zip_apply(K, |s, k| *s += c_h2 * k);
@@ -110,7 +105,7 @@ impl DispersionCorrection {
             Way::Modes(modes) => return modes.correct(acceleration, x_tilde),
             Way::Dense(_) => {}
         }
-        self.shift.gemv(1.0, &self.M_inverse_K, acceleration, 0.0);
+        self.shift_by(acceleration);
         x_tilde.copy_from(acceleration);
         x_tilde.axpy(self.c_h2, &self.shift, 1.0);
     }
@@ -123,7 +118,12 @@ impl DispersionCorrection {
             Way::Modes(modes) => return (1.0, modes.shift()),
             Way::Dense(_) => {}
         }
-        self.shift.gemv(1.0, &self.M_inverse_K, d, 0.0);
+        self.shift_by(d);
         (self.c_h2, &self.shift)
+    }
+
+    /// `M^-1 K d`.
+    fn shift_by(&mut self, d: &DVector<f64>) {
+        product(self.M_inverse_K.as_slice(), d.as_slice(), self.shift.as_mut_slice());
     }
 }

@@ -108,7 +108,8 @@ impl Method for AlphaSettings {
 /// What the steps of an arm may leave; `None`: nothing.
 pub(crate) fn leave_of(settings: AlphaSettings, arm: &FlexibleArm, h: f64) -> Option<f64> {
     let followed = arm.modes.omega.first().is_none_or(|omega| h * omega <= FOLLOWED);
-    (followed && forgets_errors(arm)).then(|| settings.may_leave()).filter(|left| *left > 0.0)
+    let left = if followed { settings.may_leave() } else { settings.may_leave().min(COARSE) };
+    (left > 0.0 && forgets_errors(arm)).then_some(left)
 }
 
 /// Part of the first correction of Newton's method that steps of a damped arm may leave: an error well below the scheme's own, for
@@ -123,6 +124,9 @@ const OF_DAMPING: f64 = 0.3;
 const DAMPED: f64 = 1e-3;
 /// `h ω` of the first mode up to which a step follows it, twelve steps in its period; beyond, extrapolations are no guide.
 const FOLLOWED: f64 = 0.5;
+
+/// Part that may be left in such steps.
+const COARSE: f64 = 1e-3;
 
 /// Whether nothing in the arm keeps what a step leaves: joints are where their motion is, springs straight and in Newton's
 /// matrix whole, modes damped.
