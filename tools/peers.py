@@ -5,10 +5,10 @@
     python3 tools/peers.py --draw              write table and picture again from the stored numbers, without measuring
 
 The robot is robots/reference_arm (18 coordinates, 12 of them elastic) on its motion of 4 s. The error is the largest distance of the
-tool from tests/golden/reference_arm_mid.csv over the peak deflection, every 4 ms. Ours twice: a run of an arm that is built
-(crates/flexarm/examples/prepared_runs.rs: set-up of the run, steps, 100 samples a second beside the rigid twin, figures), and the whole
-process `flexarm compare --no-files`; the others: the call that steps, without set-up. CPU time of one thread, all lines in turn, the
-smallest of --repeat runs.
+tool from tests/golden/reference_arm_mid.csv over the peak deflection, every 4 ms. Ours thrice: a run of an arm that is built (set-up of
+the run, steps, a sample at its start and its end: crates/flexarm/examples/prepared_runs.rs), the same with 100 samples a second beside the
+rigid twin, and the whole process `flexarm compare --no-files`; the others: the call that steps, without set-up. CPU time of one thread,
+all lines in turn, the smallest of --repeat runs.
 
 MuJoCo and Exudyn come from PyPI into an environment of the script's own (target/peers-venv); where they cannot be had the line says so,
 and ours are measured alone. Needs cargo's release build of flexarm and its example, or --flexarm PROGRAM --prepared PROGRAM.
@@ -107,10 +107,10 @@ def flexarm(program, stepper, step, files=None):
 
 
 def prepared(program):
-    """CPU ms per simulated second of runs of an arm that is built, for all our lines."""
+    """CPU ms per simulated second of runs of an arm that is built, without and with samples, for all our lines."""
     wanted = [f"{name}:{h!r}" for name, steps in OURS for h in steps]
     done = subprocess.run([program, *wanted], capture_output=True, text=True, check=True)
-    return {line.split()[0]: float(line.split()[1]) for line in done.stdout.splitlines()}
+    return {name: [float(x) for x in spent] for name, *spent in map(str.split, done.stdout.splitlines())}
 
 
 def our_error(program, stepper, step):
@@ -346,7 +346,7 @@ def measure(program, example, repeat):
         peers += [("MuJoCo", mujoco, name, h) for name, steps in MUJOCO for h in steps]
         peers += [("Exudyn", exudyn, name, h) for name, steps in EXUDYN for h in steps]
     versions["flexarm"] = subprocess.run([program, "--version"], capture_output=True, text=True).stdout.split()[-1]
-    lines = [dict(program="flexarm", stepper=name, step=h, error=our_error(program, name, h), cpu_ms=math.inf, process_ms=math.inf) for name, steps in OURS for h in steps]
+    lines = [dict(program="flexarm", stepper=name, step=h, error=our_error(program, name, h), cpu_ms=math.inf, sampled_ms=math.inf, process_ms=math.inf) for name, steps in OURS for h in steps]
     lines += [dict(program=who, stepper=name, step=h, error=None, cpu_ms=math.inf, peer=peer) for who, peer, name, h in peers]
     for _ in range(repeat):
         built = prepared(example)
@@ -359,7 +359,8 @@ def measure(program, example, repeat):
             else:
                 process = flexarm(program, line["stepper"], line["step"])["cpu_s_per_simulated_s"]
                 line["process_ms"] = min(line["process_ms"], 1e3 * process)
-                cpu_ms = built[f"{line['stepper']}:{line['step']!r}"]
+                cpu_ms, sampled = built[f"{line['stepper']}:{line['step']!r}"]
+                line["sampled_ms"] = min(line["sampled_ms"], sampled)
             line["cpu_ms"] = min(line["cpu_ms"], cpu_ms)
     for line in lines:
         line.pop("peer", None)
@@ -383,22 +384,25 @@ def named(line, figure="cpu_ms"):
 def markdown(found):
     others = ", ".join(f"{name} {version}" for name, version in sorted(found["versions"].items()) if name != "flexarm")
     text = f"Measured on {found['date']}, {found['machine']}; {others or 'no other program'}; smallest of {found['repeat']} runs in turn.\n\n"
-    text += "Ours, a run: of an arm that is built, set-up, steps, samples beside the rigid twin and figures; a process: `compare --no-files` from start to end. The others: the call that steps.\n\n"
-    text += "| error, at most | aim | ours, a run | ours, a process | best other program | ratio, run | ratio, process |\n| --- | --- | --- | --- | --- | --- | --- |\n"
+    text += "Ours, a run: of an arm that is built, its set-up and its steps; sampled: with 100 samples a second beside the rigid twin and all figures; a process: `compare --no-files` from start to end, sampled likewise. The others: the call that steps.\n\n"
+    text += "| error, at most | aim | ours, a run | best other program | ratio | sampled | ratio | a process | ratio |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n"
     ours = [line for line in found["lines"] if line["program"] == "flexarm"]
     peers = [line for line in found["lines"] if line["program"] != "flexarm"]
     for error, aim in CLASSES:
         other = fastest(peers, error)
-        own = [(fastest(ours, error, figure), figure) for figure in ("cpu_ms", "process_ms")]
-        ratios = [f"{other['cpu_ms'] / line[figure]:.1f}" if line and other else "" for line, figure in own]
         who = f"{other['program']} {named(other)}" if other else "none"
-        cells = [f"{100 * error:g} %", str(aim), *(named(line, figure) for line, figure in own), who, *ratios]
+        cells = [f"{100 * error:g} %", str(aim)]
+        for figure in ("cpu_ms", "sampled_ms", "process_ms"):
+            own = fastest(ours, error, figure)
+            cells.append(named(own, figure))
+            cells += [who] if figure == "cpu_ms" else []
+            cells.append(f"{other['cpu_ms'] / own[figure]:.1f}" if own and other else "")
         text += f"| {' | '.join(cells)} |\n"
-    text += "\nCPU ms per simulated second. All lines:\n\n| program | stepper | step | error | CPU ms per simulated s | process |\n| --- | --- | --- | --- | --- | --- |\n"
+    text += "\nCPU ms per simulated second. All lines:\n\n| program | stepper | step | error | CPU ms per simulated s | sampled | process |\n| --- | --- | --- | --- | --- | --- | --- |\n"
     for line in found["lines"]:
         error = "unstable" if line["error"] is None else f"{line['error']:.1e}"
-        process = f"{line['process_ms']:.3g}" if "process_ms" in line else ""
-        text += f"| {line['program']} | {line['stepper']} | {told_step(line)} | {error} | {line['cpu_ms']:.3g} | {process} |\n"
+        times = [f"{line[figure]:.3g}" if figure in line else "" for figure in ("cpu_ms", "sampled_ms", "process_ms")]
+        text += f"| {line['program']} | {line['stepper']} | {told_step(line)} | {error} | {' | '.join(times)} |\n"
     return text
 
 

@@ -1,6 +1,6 @@
-//! What does one call of each recursion cost on the reference arm, rigid (6) and flexible (18)?
+//! What does one call of each recursion cost on the reference arm, rigid (6), flexible (18) and with three elastic joints a link (42)?
 //!
-//! `tools/pinocchio_bench.sh` prints Pinocchio's C++ times on the same models for the comparison.
+//! `tools/pinocchio_bench.sh` has Pinocchio's C++ and the example `recursion_times` on the same models in turn.
 #![allow(missing_docs, reason = "criterion's macros make public items")]
 #![allow(non_snake_case, reason = "monogram notation")]
 
@@ -8,7 +8,7 @@ use std::hint::black_box;
 
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use flexarm_kinematics::*;
-use flexarm_testkit::{Draw, reference_arm};
+use flexarm_testkit::{Draw, arm_of_parts, reference_arm};
 use nalgebra::DVector;
 
 struct Case {
@@ -19,8 +19,7 @@ struct Case {
 }
 
 /// 64 random states like those of the comparison bench.
-fn case(elastic: bool) -> Case {
-    let mut tree = reference_arm(elastic).mechanism;
+fn case(mut tree: Mechanism) -> Case {
     for joint in &mut tree.joints {
         if let JointKind::Elastic(angles) = &mut joint.kind {
             *angles = ElasticAngles::RotationVector;
@@ -36,8 +35,8 @@ fn case(elastic: bool) -> Case {
 }
 
 fn recursions(c: &mut Criterion) {
-    for elastic in [false, true] {
-        let Case { model, mut data, states, qddot } = case(elastic);
+    for tree in [reference_arm(false).mechanism, arm_of_parts(1), arm_of_parts(3)] {
+        let Case { model, mut data, states, qddot } = case(tree);
         let n = model.nv();
         let mut i = 0;
         let mut next = move || {
@@ -64,7 +63,7 @@ fn recursions(c: &mut Criterion) {
                 forward_dynamics(&model, &mut data, black_box(&states[i]), &roles, &qddot[i])[0]
             })
         });
-        if elastic {
+        if n > 6 {
             let roles = Roles::actuated_prescribed(&model);
             let (mut a, mut f) = (qddot[0].clone(), qddot[1].clone());
             group.bench_function(BenchmarkId::new("hybrid", n), |b| {

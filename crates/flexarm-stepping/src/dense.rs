@@ -159,6 +159,9 @@ fn subtract<T: Real>(to: &mut [T], factor: T, from: &[T]) {
 /// `S C Sᵀ` with `Sᵀ = 1 + c X` of a symmetric C; `room` is as large.
 #[inline(always)]
 pub(crate) fn congruence(c: f64, X: &[f64], C: &[f64], n: usize, room: &mut [f64], product: &mut [f64]) {
+    if n == 0 {
+        return;
+    }
     // P = C Sᵀ
     room.copy_from_slice(C);
     for (column, x) in room.chunks_exact_mut(n).zip(X.chunks_exact(n)) {

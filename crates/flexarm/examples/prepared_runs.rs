@@ -4,7 +4,8 @@
 //! CPU time of one thread, the smallest of nine runs. Set-up is what a run of one step at rest takes.
 //!
 //! With arguments `STEPPER:STEP ...` (the step in s; of `reference` the relative tolerance) a line for each with the CPU ms per simulated
-//! second of the reference arm, the figures alone, 100 samples a second: what `tools/peers.py` puts beside other programs.
+//! second of the reference arm: of a run with a sample at its start and its end, and of one with 100 samples a second beside the rigid twin.
+//! That is what `tools/peers.py` puts beside other programs.
 #![allow(clippy::print_stdout, reason = "an example shows its answer")]
 
 use std::path::Path;
@@ -33,7 +34,7 @@ fn columns(arm: &Arm, motion: &Motion, options: &RunOptions) -> Result<f64, Erro
 fn told(line: &str) -> Option<RunOptions> {
     let (name, step) = line.split_once(':')?;
     let (entry, step) = (STEPPERS.iter().find(|entry| entry.name == name)?, step.parse().ok()?);
-    let default = RunOptions { log_rate_hz: 100.0, ..RunOptions::default() };
+    let default = RunOptions::default();
     Some(match name {
         "reference" => {
             let settings = StepperOptions { reference: ReferenceSettings::new(step), ..StepperOptions::default() };
@@ -51,8 +52,13 @@ fn lines(root: &Path, wanted: &[String]) -> Result<(), Error> {
     for line in wanted {
         match told(line) {
             Some(options) => {
-                let spent = cost(|| arm.simulate_summary(&motion, &options).map(drop))?;
-                println!("{line} {:.4}", 1e3 * spent / motion.trajectory.duration());
+                let duration = motion.trajectory.duration();
+                let mut spent = [0.0; 2];
+                for (spent, log_rate_hz) in spent.iter_mut().zip([1.0 / duration, 100.0]) {
+                    let options = RunOptions { log_rate_hz, ..options.clone() };
+                    *spent = 1e3 * cost(|| arm.simulate_summary(&motion, &options).map(drop))? / duration;
+                }
+                println!("{line} {:.4} {:.4}", spent[0], spent[1]);
             }
             None => println!("{line} is no STEPPER:STEP"),
         }

@@ -1,5 +1,5 @@
-//! Prints the reference arm as text, rigid (6 coordinates) and flexible (18), for programs that know no URDF with
-//! elastic joints: `cargo run --release -p flexarm-testkit --example reference_arm_text`.
+//! Prints the reference arm as text, rigid (6 coordinates), flexible (18) and with three elastic joints a link (42), for programs that know
+//! no URDF with elastic joints: `cargo run --release -p flexarm-testkit --example reference_arm_text`.
 //!
 //! A line `model NAME` starts each model; then one line per moving body, parents before children:
 //!
@@ -11,11 +11,13 @@
 #![allow(non_snake_case, reason = "monogram notation, as in the crates under test")]
 
 use flexarm_kinematics::{JointMotion, Model};
-use flexarm_testkit::reference_arm;
+use flexarm_testkit::{arm_of_parts, reference_arm};
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    for (name, elastic) in [("rigid6", false), ("flexible18", true)] {
-        let model = Model::new(&reference_arm(elastic).mechanism)?;
+    let arms =
+        [("rigid6", reference_arm(false).mechanism), ("flexible18", arm_of_parts(1)), ("flexible42", arm_of_parts(3))];
+    for (name, mechanism) in arms {
+        let model = Model::new(&mechanism)?;
         println!("model {name}");
         for body in &model.bodies()[1..] {
             let (kind, axis) = match body.motion {

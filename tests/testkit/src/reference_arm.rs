@@ -167,3 +167,26 @@ pub fn reference_motion(t: f64) -> ([f64; 6], [f64; 6], [f64; 6]) {
     let (a, b) = (ramp(t / 1.2), ramp((t - 2.0) / 1.2));
     (goal.map(|g| g * (a[0] - b[0])), goal.map(|g| g * (a[1] - b[1])), goal.map(|g| g * (a[2] - b[2])))
 }
+
+/// The flexible arm with each of its elastic joints as so many in a row, and a part between any two: a tree of 6 + 12 n coordinates for
+/// times and instructions.
+pub fn arm_of_parts(n: usize) -> Mechanism {
+    let mut arm = reference_arm(true).mechanism;
+    for joint in std::mem::take(&mut arm.joints) {
+        let JointKind::Elastic(_) = joint.kind else {
+            arm.joints.push(joint);
+            continue;
+        };
+        let (mut parent, mut X) = (joint.parent.clone(), joint.X_PJ);
+        for k in 1..n {
+            let part = format!("{} part {k}", joint.name);
+            let name = format!("{} {k}", joint.name);
+            arm.joints.push(Joint::new(name, joint.kind, parent, part.clone(), X));
+            let inertia = Matrix3::from_diagonal(&Vector3::new(0.11, 0.12, 0.02));
+            arm.links.push(Link { name: part.clone(), inertia: Some(body(8.0, [0.0, 0.0, 0.1], inertia)) });
+            (parent, X) = (part, Pose::translation(0.0, 0.0, 0.2));
+        }
+        arm.joints.push(Joint { parent, X_PJ: X, ..joint });
+    }
+    arm
+}

@@ -6,6 +6,7 @@
 
 use flexarm_analysis::engineering_strain;
 use flexarm_kinematics::{Frame, Model, Pose, rotation_vector};
+use nalgebra::Rotation3;
 
 use crate::flexible::FlexibleRobot;
 
@@ -36,6 +37,8 @@ struct Span {
     far: Interface,
     /// Distance of the interfaces (m).
     length: f64,
+    /// Attitude of the far interface in the near one, undeformed; from the first sample.
+    R_AE: Option<Rotation3<f64>>,
 }
 
 /// Watches the flexible links, in the order of [`FlexibleRobot::spans`].
@@ -51,19 +54,21 @@ impl Strains {
             near: Interface { frame: frame(&span.link), X_FI: span.X_LA },
             far: Interface { frame: frame(&span.distal_link), X_FI: span.X_DB },
             length: span.length,
+            R_AE: None,
         });
         Self { spans: spans.collect(), largest: vec![LinkStrain::default(); flexible.spans.len()] }
     }
 
-    /// * `X_WB`: poses of all bodies in the world; `rigid`: those of the rigid twin.
+    /// * `X_WB`: poses of all bodies in the world; `rigid`: those of the rigid twin, in which a link always is as it is undeformed.
     pub(crate) fn update(&mut self, X_WB: &[Pose], rigid: &[Pose]) {
-        for (span, largest) in self.spans.iter().zip(&mut self.largest) {
+        for (span, largest) in self.spans.iter_mut().zip(&mut self.largest) {
             let (X_WA, X_WE) = (span.near.pose(X_WB), span.far.pose(X_WB));
             let distance = (X_WE.translation.vector - X_WA.translation.vector).norm();
             let strain = engineering_strain(distance - span.length, span.length).map_or(0.0, f64::abs);
             // Both ends have the attitude that they have undeformed, up to the bending.
-            let (U_WA, U_WE) = (span.near.pose(rigid), span.far.pose(rigid));
-            let turn = (U_WA.rotation.inverse() * U_WE.rotation).inverse() * (X_WA.rotation.inverse() * X_WE.rotation);
+            let Span { near, far, R_AE, .. } = span;
+            let R_AE = R_AE.get_or_insert_with(|| near.pose(rigid).rotation.inverse() * far.pose(rigid).rotation);
+            let turn = R_AE.inverse() * (X_WA.rotation.inverse() * X_WE.rotation);
             largest.strain = largest.strain.max(strain);
             largest.rotation = largest.rotation.max(rotation_vector(turn.matrix()).norm());
         }
@@ -78,7 +83,7 @@ impl Strains {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::{Rotation3, Vector3};
+    use nalgebra::Vector3;
 
     /// Truth: a link of 2 m whose far end moves by 1 mm along it and turns by 0.02 rad; the whole arm turned and moved is the
     /// same link.
@@ -90,7 +95,7 @@ mod tests {
         };
         let near = on(1, Pose::translation(0.1, 0.0, 0.0));
         let far = on(2, Pose::translation(0.0, 0.0, 0.3));
-        let spans = vec![Span { near, far, length: 2.0 }];
+        let spans = vec![Span { near, far, length: 2.0, R_AE: None }];
         let mut seen = Strains { spans, largest: vec![LinkStrain::default()] };
         for X_WA in
             [Pose::identity(), Pose::from_parts([3.0, -1.0, 0.5].into(), Rotation3::new(Vector3::new(0.3, 2.0, -1.0)))]
