@@ -1,0 +1,265 @@
+//! The report as one page that loads nothing: style, behaviour, data and pictures are written into it.
+//!
+//! The same runs give the same bytes, but for the paragraph with the id `timings`. Start at [`html`].
+//! Rooms: the largest figures and the comparison of runs (`figures`), the arm (`arm`), tables (`tables`), what the plots are made of (`data`).
+//! Not here: what is plotted (`curves`), how the arm is drawn (`picture`), how plots behave (`assets/report.js`).
+
+mod arm;
+mod data;
+mod figures;
+mod number;
+mod tables;
+
+use std::fmt::Write as _;
+
+use flexarm_draw::palette::{self, Ground, hex};
+use flexarm_log::Trace;
+
+use self::arm::arm_pictures;
+use self::data::{data, thinning};
+use self::figures::{comparison, tiles};
+use self::number::number;
+use self::tables::{iso_table, parts_tables, stops_table, tool_path};
+use super::curves::{Plot, plots};
+use crate::html_page::escaped;
+use crate::stepper_settings::SettingValue;
+use crate::summary::Summary;
+
+const STYLE: &str = include_str!("../../../assets/report.css");
+
+const BEHAVIOUR: &str = include_str!("../../../assets/report.js");
+
+const UPLOT: &str = include_str!("../../../assets/uplot/uPlot.iife.min.js");
+
+const UPLOT_STYLE: &str = include_str!("../../../assets/uplot/uPlot.min.css");
+
+const UPLOT_LICENSE: &str = include_str!("../../../assets/uplot/LICENSE");
+
+const UPLOT_VERSION: &str = "1.6.32";
+
+/// A run in a report.
+#[derive(Clone, Copy, Debug)]
+pub struct ReportRun<'a> {
+    /// Name of the run, where there are several.
+    pub label: &'a str,
+    /// Its figures.
+    pub summary: &'a Summary,
+    /// Its curves.
+    pub trace: &'a Trace,
+}
+
+/// The report of one run, or of several beside each other: the first is the main one.
+#[must_use]
+pub fn html(runs: &[ReportRun<'_>]) -> String {
+    let Some(main) = runs.first() else {
+        return "<!DOCTYPE html>\n<title>flexarm report</title>\n<p>No runs.\n".to_owned();
+    };
+    let title = match runs {
+        [run] => super::title(run.summary),
+        _ => format!("{} runs: {}", runs.len(), runs.iter().map(|run| run.label).collect::<Vec<_>>().join(", ")),
+    };
+    // The banner of the minified file names an address; licence and origin stand in a comment of this page.
+    let uplot = UPLOT.split_once("*/").map_or(UPLOT, |(_, code)| code);
+    let mut page = String::new();
+    let _ = write!(
+        page,
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <meta name=\"generator\" content=\"flexarm {}\">\n<title>{}</title>\n\
+         <style>\n{UPLOT_STYLE}\n{}{STYLE}</style>\n</head>\n<body>\n",
+        env!("CARGO_PKG_VERSION"),
+        escaped(&title),
+        colors()
+    );
+    let drawn: Vec<Vec<Plot>> = runs.iter().map(|run| plots(run.summary, run.trace)).collect();
+    let body = body(main, runs, &thinning(runs, &drawn));
+    page += &heading(&title, runs, &body);
+    let _ = write!(page, "<main>\n{body}</main>\n");
+    let _ = write!(
+        page,
+        "<script type=\"application/json\" id=\"data\">{}</script>\n\
+         <script>\n/* uPlot {UPLOT_VERSION}\n\n{}\n*/\n{}</script>\n<script>\n{BEHAVIOUR}</script>\n</body>\n</html>\n",
+        data(runs, &drawn),
+        UPLOT_LICENSE.trim(),
+        uplot.trim_start()
+    );
+    page
+}
+
+/// The colours of curves as variables of the style: `--c0` and so on, `--x`, `--y`, `--z`, `--rigid`, dark where the reader
+/// wants it dark; and under `--paper-...` for print.
+fn colors() -> String {
+    let list = |prefix: &str, ground: Ground| {
+        let series = (0..palette::SERIES_LENGTH).map(|k| (format!("c{k}"), palette::series(k, ground)));
+        let axes = ["x", "y", "z"].into_iter().enumerate().map(|(k, name)| (name.to_owned(), palette::axis(k, ground)));
+        let all = series.chain(axes).chain([("rigid".to_owned(), palette::rigid(ground))]);
+        all.map(|(name, color)| format!(" --{prefix}{name}: {};", hex(color))).collect::<String>()
+    };
+    format!(
+        ":root {{{}{} }}\n@media screen and (prefers-color-scheme: dark) {{ :root {{{} }} }}\n",
+        list("", Ground::Paper),
+        list("paper-", Ground::Paper),
+        list("", Ground::Dark)
+    )
+}
+
+fn body(main: &ReportRun<'_>, runs: &[ReportRun<'_>], thinning: &str) -> String {
+    let mut body: String = runs.iter().map(|run| troubles(run, runs.len() > 1)).collect();
+    if let [run] = runs {
+        body += &tiles(run);
+    } else {
+        body += &comparison(runs);
+    }
+    body += &arm_pictures(runs);
+    body += &tool_path(main);
+    body += "<section id=\"plots\"><noscript><p>The plots need JavaScript.</p></noscript></section>\n";
+    body += thinning;
+    body += &iso_table(runs);
+    let of = if runs.len() > 1 { format!(" of {}", escaped(main.label)) } else { String::new() };
+    body += &stops_table(main.summary, &of);
+    body += &parts_tables(main.summary, &of);
+    let inputs: String = runs.iter().map(|run| inputs(run, runs.len() > 1)).collect();
+    if !inputs.is_empty() {
+        let _ = write!(body, "<div id=\"inputs\">\n{inputs}</div>\n");
+    }
+    body + &timings(runs)
+}
+
+/// Parts of the page that can be gone to: name of the link, place.
+const PLACES: [(&str, &str); 5] =
+    [("Figures", "summary"), ("Arm", "arm"), ("Plots", "plots"), ("Tables", "tables"), ("Inputs", "inputs")];
+
+fn heading(title: &str, runs: &[ReportRun<'_>], body: &str) -> String {
+    let s = runs[0].summary;
+    let mut facts = Vec::new();
+    if runs.len() == 1 {
+        if runs[0].trace.header.has_rigid {
+            facts.push("flexible arm against its rigid twin".to_owned());
+        }
+        if !s.links_model.is_empty() {
+            facts.push(format!("{} links", s.links_model));
+        }
+        facts.push(format!("{} s", number(s.duration_s, 4)));
+        facts.extend(method(s, "step "));
+    }
+    facts.push(format!("flexarm {}", env!("CARGO_PKG_VERSION")));
+    let facts: Vec<String> = facts.iter().map(|fact| format!("<span>{}</span>", escaped(fact))).collect();
+    // Names of runs are escaped: none can look like a place.
+    let there = PLACES.iter().filter(|(_, id)| body.contains(&format!("id=\"{id}\"")));
+    let links: String = there.map(|(name, id)| format!("<a href=\"#{id}\">{name}</a>")).collect();
+    format!(
+        "<header>\n<h1>{}</h1>\n{}<p class=\"facts\">{}</p>\n<nav>{links}</nav>\n</header>\n",
+        escaped(title),
+        headlines(runs),
+        facts.join("")
+    )
+}
+
+/// What bends and how far, a line for each run.
+fn headlines(runs: &[ReportRun<'_>]) -> String {
+    let line = |run: &ReportRun<'_>| {
+        let who = if runs.len() > 1 { format!("{}: ", run.label) } else { String::new() };
+        format!("<p class=\"headline\">{}</p>\n", escaped(&(who + &run.summary.headline)))
+    };
+    runs.iter().filter(|run| !run.summary.headline.is_empty()).map(line).collect()
+}
+
+/// Stepper and step, as far as they are known.
+fn method(s: &Summary, before: &str) -> Option<String> {
+    let step = (s.stepper.h_s > 0.0).then(|| format!("{before}{} ms", number(1e3 * s.stepper.h_s, 4)));
+    let name = Some(s.stepper.name.clone()).filter(|name| !name.is_empty());
+    let known: Vec<String> = name.into_iter().chain(step).collect();
+    (!known.is_empty()).then(|| known.join(", "))
+}
+
+/// Why a run stopped, and its warnings.
+fn troubles(run: &ReportRun<'_>, named: bool) -> String {
+    let s = run.summary;
+    let who = if named { format!("{}: ", escaped(run.label)) } else { String::new() };
+    let mut out = String::new();
+    if s.computed {
+        let why =
+            "The recording holds no result: the figures of the tool are computed from its curves, others are missing.";
+        let _ = writeln!(out, "<p class=\"block note\"><strong>{who}End not known.</strong> {why}</p>");
+    } else if s.end != "complete" {
+        let _ = writeln!(out, "<p class=\"stopped\"><strong>{who}Stopped early.</strong> {}</p>", escaped(&s.end));
+    }
+    if !s.warnings.is_empty() {
+        let plural = if s.warnings.len() == 1 { "warning" } else { "warnings" };
+        let items: String = s.warnings.iter().map(|w| format!("<li>{}</li>", escaped(w))).collect();
+        let count = s.warnings.len();
+        let _ = writeln!(
+            out,
+            "<details class=\"warnings\" open><summary>{who}{count} {plural}</summary><ul>{items}</ul></details>"
+        );
+    }
+    out
+}
+
+fn inputs(run: &ReportRun<'_>, named: bool) -> String {
+    let (s, header) = (run.summary, &run.trace.header);
+    let who = if named { format!(" of {}", escaped(run.label)) } else { String::new() };
+    let mut out = String::new();
+    let mut group = |title: &str, rows: &[(String, String)]| {
+        let rows: String = (rows.iter().filter(|(_, value)| !value.is_empty()))
+            .map(|(key, value)| format!("<dt>{}</dt><dd>{}</dd>", escaped(key), escaped(value)))
+            .collect();
+        if !rows.is_empty() {
+            let _ = writeln!(out, "<div><h3>{}</h3><dl>{rows}</dl></div>", escaped(title));
+        }
+    };
+    for (title, rows) in &header.metadata {
+        group(title, rows);
+    }
+    let count = |n: u64| if s.computed { String::new() } else { n.to_string() };
+    let step = &s.stepper;
+    let row = |key: &str, value: String| (key.to_owned(), value);
+    let mut rows = vec![
+        row("name", step.name.clone()),
+        row("step_s", if step.h_s > 0.0 { number(step.h_s, 6) } else { String::new() }),
+    ];
+    rows.extend(step.settings.0.iter().map(|(key, value)| match value {
+        SettingValue::Number(x) => row(key, number(*x, 6)),
+        SettingValue::Flag(_) | SettingValue::Word(_) => row(key, value.to_string()),
+    }));
+    rows.push(row("steps", count(step.steps)));
+    rows.push(row("evaluations", count(step.evaluations)));
+    rows.push(row("factorisations", count(step.factorisations)));
+    group("stepper", &rows);
+    // File names alone: the same run in another folder is the same page.
+    let f = &s.files;
+    let pages = [&f.report, &f.report_md].into_iter().flatten().map(String::as_str);
+    let names: Vec<String> = pages
+        .chain(f.recordings.iter().map(|(_, path)| path))
+        .chain(f.figures.as_deref())
+        .filter_map(|path| std::path::Path::new(path).file_name().map(|name| name.to_string_lossy().into_owned()))
+        .collect();
+    group("files beside this page", &[("files".to_owned(), names.join(", "))]);
+    if out.is_empty() {
+        return out;
+    }
+    format!(
+        "<section class=\"block\"><h2>Inputs and versions{who}</h2>\n<div class=\"groups\">\n{out}</div></section>\n"
+    )
+}
+
+/// What depends on the machine and the day, in one place.
+fn timings(runs: &[ReportRun<'_>]) -> String {
+    let text = |run: &ReportRun<'_>| {
+        let s = run.summary;
+        let who = if runs.len() > 1 { format!("{}: ", run.label) } else { String::new() };
+        escaped(&format!(
+            "{who}{:.2} s simulated in {:.2} s ({:.0} times real time), {:.1} ms processor time per simulated second.",
+            s.duration_s,
+            s.wall_s,
+            s.real_time_factor,
+            1e3 * s.cpu_s_per_simulated_s
+        ))
+    };
+    // Recordings hold no times of the machine.
+    let lines: Vec<String> = runs.iter().filter(|run| run.summary.wall_s > 0.0).map(text).collect();
+    if lines.is_empty() {
+        return String::new();
+    }
+    format!("<p id=\"timings\" class=\"note\">{}</p>\n", lines.join("<br>"))
+}
