@@ -145,7 +145,7 @@ fn peaks(peaks: &[MotionPeak]) -> String {
             rounded(factor * peak.upper),
             format!("{}{}", rounded(factor * peak.speed), used(peak.speed, peak.speed_limit)),
             rounded(factor * peak.acceleration),
-            rounded(factor * peak.jerk),
+            format!("{}{}", rounded(factor * peak.jerk), used(peak.jerk, peak.jerk_limit)),
         ];
         if with_torque {
             let torque = peak.torque.unwrap_or(0.0);

@@ -7,10 +7,15 @@
 #![allow(non_snake_case, reason = "monogram notation: X_WT, R_AB; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test stops at the first failure"))]
 
+mod averaged;
+mod barrier;
 mod branch;
 mod curve;
 mod follow;
+mod jerk_bounded;
+pub mod jerk_law;
 mod legs;
+mod limits;
 mod plan;
 pub mod program;
 mod route;

@@ -24,6 +24,9 @@ pub struct JointBounds {
     pub acceleration: f64,
     /// N m or N of the rigid arm, positive; `None`: not looked at.
     pub torque: Option<f64>,
+    /// rad/s³ or m/s³, positive. Where it is told of some joint, the accelerations of the others rise to their bounds in
+    /// [`PathOptions::rise_s`] or more.
+    pub jerk: Option<f64>,
 }
 
 /// How paths are resolved.
@@ -166,6 +169,8 @@ pub enum SlowedBy {
     JointAcceleration(String),
     /// Torque of a joint.
     JointTorque(String),
+    /// Jerk of a joint.
+    JointJerk(String),
     /// Turning of the tool.
     Turning,
     /// Acceleration of the tool across its path.

@@ -5,14 +5,19 @@ use nalgebra::{DVector, Vector3};
 
 use crate::curve::{TURN_LENGTH, ToolCurve, ToolJet};
 use crate::follow::{Follower, GuidedJoint, JointJet, ToolWay};
+use crate::jerk_bounded::has_jerks;
 use crate::legs::{Leg, Legs, Way, blocked_error};
 use crate::plan::{PathError, PathOptions};
 use crate::program::{Blend, Speed};
 
 /// Two legs go on without a corner if their derivatives agree to this (m/m, rad/m).
 const ALIGNED: f64 = 1e-6;
+/// And without a jump of the curvature if their second derivatives agree to this (1/m, rad/m²).
+const CURVED: f64 = 1e-6;
 /// Cosine between two tangents below which a corner turns back: within 10 degrees.
 const TURNED_BACK: f64 = -0.985;
+/// Why a path without a corner has a stop.
+const CURVATURE: &str = "the curvature of the path jumps, and joints with a bound of their jerk pass that only at rest";
 /// No blend is shorter than this, m.
 const SHORTEST_BLEND: f64 = 1e-7;
 /// Acceleration with which a blend by speed is measured where the program tells none, m/s².
@@ -90,9 +95,9 @@ impl Route {
         let (mut routes, mut here) = (Vec::new(), Vec::new());
         for leg in legs {
             if let Some(last) = here.last()
-                && let Corner::Stop(why) = corner(last, &leg)
+                && let Corner::Stop(why) = corner(last, &leg, has_jerks(&owner.arm))
             {
-                if last.of.blend != Blend::Pass {
+                if last.of.blend != Blend::Pass || why == CURVATURE {
                     stops.push((last.of.line, why.to_owned()));
                 }
                 routes.push(Self::new(owner, std::mem::take(&mut here))?);
@@ -110,7 +115,7 @@ impl Route {
         // How much of each leg its two blends take.
         let mut taken = vec![[0.0, 0.0]; n];
         for k in 0..n - 1 {
-            if matches!(corner(&legs[k], &legs[k + 1]), Corner::Blend) {
+            if matches!(corner(&legs[k], &legs[k + 1], has_jerks(&owner.arm)), Corner::Blend) {
                 let reach = blend_reach(owner, &legs[k], &legs[k + 1]);
                 taken[k][1] = reach[0];
                 taken[k + 1][0] = reach[1];
@@ -123,6 +128,15 @@ impl Route {
             route.add(owner, stretch)?;
         }
         Ok(route)
+    }
+
+    /// Joints at a parameter of the interval between station `k` and the next, with their third derivative.
+    pub(crate) fn joints(&self, k: usize, s: f64) -> (JointJet, DVector<f64>) {
+        let (a, b) = (&self.stations[k], &self.stations[k + 1]);
+        let from = JointJet { q: a.q.clone(), d: a.d.clone(), dd: a.after.clone() };
+        let to = JointJet { q: b.q.clone(), d: b.d.clone(), dd: b.before.clone() };
+        let h = b.s - a.s;
+        between(&from, &to, h, (s - a.s).clamp(0.0, h))
     }
 
     /// Puts stations along a stretch behind those that are there.
@@ -173,7 +187,9 @@ fn travel(owner: &mut Legs<'_>, leg: &Leg, points: &[(f64, JointJet)]) -> Vec<f6
 }
 
 /// What two legs that follow each other have between them.
-fn corner(a: &Leg, b: &Leg) -> Corner {
+///
+/// * `jerks`: joints whose jerks are bounded pass a jump of the curvature only at rest.
+fn corner(a: &Leg, b: &Leg, jerks: bool) -> Corner {
     if a.smooth {
         return Corner::Smooth;
     }
@@ -183,10 +199,15 @@ fn corner(a: &Leg, b: &Leg) -> Corner {
     if let (Way::Tool(way), Way::Tool(next)) = (&a.way, &b.way)
         && way.frame.X_BF == next.frame.X_BF
     {
-        let (end, start) = (way.curve.at(a.length).V, next.curve.at(0.0).V);
-        if (end - start).norm() <= ALIGNED {
-            return Corner::Smooth;
+        let (end, start) = (way.curve.at(a.length), next.curve.at(0.0));
+        if (end.V - start.V).norm() <= ALIGNED {
+            return match (jerks && (end.A - start.A).norm() > CURVED, a.of.blend) {
+                (false, _) => Corner::Smooth,
+                (true, Blend::Pass) => Corner::Stop(CURVATURE),
+                (true, _) => Corner::Blend,
+            };
         }
+        let (end, start) = (end.V, start.V);
         let (u, v): (Vector3<f64>, Vector3<f64>) = (end.fixed_rows::<3>(0).into(), start.fixed_rows::<3>(0).into());
         if u.dot(&v) < TURNED_BACK * u.norm() * v.norm() && u.norm() > 0.5 {
             return Corner::Stop("the path turns back, so the tool stops");

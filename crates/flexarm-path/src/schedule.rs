@@ -1,19 +1,21 @@
-//! A route over time: bounds at its stations, the time law, smoothing, and the knots of the joints' curves.
+//! A route over time: its time law, the knots of the joints' curves, and what became of its moves.
 
-use flexarm_kinematics::{Data, State, inverse_dynamics};
-use nalgebra::{DVector, Vector6};
+use nalgebra::DVector;
 
+use crate::averaged::kept;
 use crate::follow::JointJet;
-use crate::plan::{JointBounds, PathError, PathOptions, PlannedMove, ProgramArm, Slowed, SlowedBy};
-use crate::route::{Piece, Route, Station, between};
-use crate::time_law::{Bound, Law, LawError, PathPoint, least_time};
+use crate::jerk_bounded::{JerkBounded, has_jerks};
+use crate::limits::{Cap, Limited, Limits};
+use crate::plan::{PathError, PathOptions, PlannedMove, ProgramArm, Slowed, SlowedBy};
+use crate::route::{Route, Station, between};
+use crate::time_law::{Law, LawError, Progress};
 
 /// Limits count as kept up to this part.
-const SLACK: f64 = 1e-3;
-/// Attempts to bring an averaged law below its limits by local slowing, before all of it is slowed.
-const ATTEMPTS: usize = 12;
+pub(crate) const SLACK: f64 = 1e-3;
 /// A place is slowed by a limit where its speed is within this part of it.
 const AT_LIMIT: f64 = 0.02;
+/// A jerk slows a place where it is nearer to its bound than this part.
+const AT_JERK: f64 = 0.9;
 /// Knots nearer than this are one, s.
 const SAME_TIME: f64 = 1e-6;
 /// Joints over time keep to those along the path within this, rad or m.
@@ -22,8 +24,10 @@ const KEPT: f64 = 1e-10;
 const MOST_INTERVALS: usize = 64;
 /// Most halvings between two knots.
 const HALVINGS: usize = 10;
-/// Widest jerk window that is tried, as a multiple of the one asked for.
-const WIDEST: f64 = 200.0;
+/// Jerks of joints over time keep to those along the path within this part of their bounds.
+const JERK_KEPT: f64 = 2e-4;
+/// Parts of an interval at which that is looked at.
+const JERKS_AT: [f64; 9] = [1e-3, 0.07, 0.19, 0.31, 0.43, 0.57, 0.69, 0.81, 0.999];
 
 /// Joints at a moment.
 #[derive(Debug, Clone)]
@@ -44,17 +48,41 @@ impl Knot {
     }
 }
 
-/// What limits the speed at a station beyond the program, with the greatest squared speed.
-#[derive(Debug, Clone)]
-struct Cap {
-    x: f64,
-    by: SlowedBy,
+/// The law of a route.
+enum Timing {
+    /// Its speed is averaged.
+    Averaged(Law),
+    /// Jerks of joints are bounded.
+    Bounded(JerkBounded),
+}
+
+impl Timing {
+    fn at(&self, t: f64) -> Progress {
+        match self {
+            Self::Averaged(law) => law.at(t),
+            Self::Bounded(bounded) => bounded.law.at(t),
+        }
+    }
+
+    fn duration(&self) -> f64 {
+        match self {
+            Self::Averaged(law) => law.duration(),
+            Self::Bounded(bounded) => bounded.law.duration(),
+        }
+    }
+
+    fn knots(&self) -> Vec<f64> {
+        match self {
+            Self::Averaged(law) => law.knots(),
+            Self::Bounded(bounded) => bounded.law.t.clone(),
+        }
+    }
 }
 
 /// A route with its time law.
 pub(crate) struct Schedule<'r> {
     route: &'r Route,
-    law: Law,
+    law: Timing,
     /// All times are multiplied by this.
     stretch: f64,
     /// Programmed squared speed and the tightest limit of the robot, by station.
@@ -71,8 +99,13 @@ impl<'r> Schedule<'r> {
         if !(options.rise_s > 0.0 && options.rise_s.is_finite()) {
             return Err(fail(format!("accelerations rise in {} s: give a positive time", options.rise_s)));
         }
-        let Limited { points, programmed, caps } = limited(route, arm);
-        let law = kept(&points, route, options.rise_s).map_err(|error| match error {
+        let rise = has_jerks(arm).then_some(options.rise_s);
+        let Limited { points, programmed, caps } = Limits::new(route, arm, rise).at_stations();
+        let law = match rise {
+            None => kept(&points, route, options.rise_s).map(|(law, stretch)| (Timing::Averaged(law), stretch)),
+            Some(rise) => JerkBounded::new(&points, route, arm, rise).map(|law| (Timing::Bounded(law), 1.0)),
+        };
+        let law = law.map_err(|error| match error {
             LawError::Infeasible(k) => {
                 let s = points[k].s;
                 fail(format!(
@@ -112,9 +145,9 @@ impl<'r> Schedule<'r> {
     }
 
     /// Parameter with derivatives at a time of this route.
-    fn progress(&self, t: f64) -> [f64; 3] {
-        let at = self.law.at(t / self.stretch);
-        [at.s, at.v / self.stretch, at.a / (self.stretch * self.stretch)]
+    fn progress(&self, t: f64) -> [f64; 4] {
+        let (at, stretch) = (self.law.at(t / self.stretch), self.stretch);
+        [at.s, at.v / stretch, at.a / (stretch * stretch), at.j / stretch.powi(3)]
     }
 
     /// Time at which the run is at `s`.
@@ -191,10 +224,10 @@ impl<'r> Schedule<'r> {
         let from = JointJet { q: a.q.clone(), d: a.v.clone(), dd: a.after.clone() };
         let to = JointJet { q: b.q.clone(), d: b.v.clone(), dd: b.before.clone() };
         let h = b.t - a.t;
-        [0.5, 0.25, 0.75, 0.1, 0.9].iter().all(|part| {
-            let guess = between(&from, &to, h, part * h).0;
-            (&guess.q - &self.knot(a.t + part * h).q).amax() <= KEPT
-        })
+        let at = |part: &f64| between(&from, &to, h, part * h);
+        let near = |part: &f64| (&at(part).0.q - &self.knot(a.t + part * h).q).amax() <= KEPT;
+        [0.5, 0.25, 0.75, 0.1, 0.9].iter().all(near)
+            && (!self.bounds_jerks() || JERKS_AT.iter().all(|part| self.keeps_jerk(a.t + part * h, &at(part).1)))
     }
 
     /// The first piece of each leg that is no blend, and the blend at its end.
@@ -216,7 +249,7 @@ impl<'r> Schedule<'r> {
         let to = JointJet { q: b.q.clone(), d: b.v.clone(), dd: b.before.clone() };
         let guess = between(&from, &to, b.t - a.t, middle - a.t).0;
         let truth = self.knot(middle);
-        if (&guess.q - &truth.q).amax() <= KEPT {
+        if (&guess.q - &truth.q).amax() <= KEPT && (!self.bounds_jerks() || self.fits(a, b)) {
             return;
         }
         self.refine(a, &truth, depth - 1, now, knots);
@@ -225,7 +258,7 @@ impl<'r> Schedule<'r> {
     }
 
     fn knot(&self, t: f64) -> Knot {
-        let [s, v, a] = self.progress(t);
+        let [s, v, a, _] = self.progress(t);
         let (jet, _) = self.joints(s);
         let acceleration = &jet.dd * (v * v) + &jet.d * a;
         Knot { t, q: jet.q, v: jet.d * v, before: acceleration.clone(), after: acceleration }
@@ -233,7 +266,7 @@ impl<'r> Schedule<'r> {
 
     /// The knot at a station between two pieces.
     fn knot_at(&self, t: f64, station: usize) -> Knot {
-        let [_, v, a] = self.progress(t);
+        let [_, v, a, _] = self.progress(t);
         let Station { q, d, before, after, .. } = &self.route.stations[station];
         let acceleration = |dd: &DVector<f64>| dd * (v * v) + d * a;
         Knot { t, q: q.clone(), v: d * v, before: acceleration(before), after: acceleration(after) }
@@ -244,11 +277,26 @@ impl<'r> Schedule<'r> {
         let stations = &self.route.stations;
         let last = stations.len() - 1;
         let k = stations.partition_point(|station| station.s <= s).clamp(1, last) - 1;
-        let (a, b) = (&stations[k], &stations[k + 1]);
-        let from = JointJet { q: a.q.clone(), d: a.d.clone(), dd: a.after.clone() };
-        let to = JointJet { q: b.q.clone(), d: b.d.clone(), dd: b.before.clone() };
-        let h = b.s - a.s;
-        between(&from, &to, h, (s - a.s).clamp(0.0, h))
+        self.route.joints(k, s)
+    }
+
+    /// Jerks of the joints at a moment.
+    fn jerks(&self, t: f64) -> DVector<f64> {
+        let [s, v, a, j] = self.progress(t);
+        let (jet, ddd) = self.joints(s);
+        ddd * v.powi(3) + jet.dd * (3.0 * v * a) + jet.d * j
+    }
+
+    fn bounds_jerks(&self) -> bool {
+        matches!(self.law, Timing::Bounded(_))
+    }
+
+    /// Are the jerks of a quintic over time those along the path at a moment, where they are bounded?
+    fn keeps_jerk(&self, t: f64, jerk: &DVector<f64>) -> bool {
+        let Timing::Bounded(bounded) = &self.law else { return true };
+        let truth = self.jerks(t);
+        let near = |k: usize| (truth[k] - jerk[k]).abs() <= JERK_KEPT * bounded.jerks[k];
+        (0..truth.len()).all(near)
     }
 
     /// What became of a leg.
@@ -260,6 +308,9 @@ impl<'r> Schedule<'r> {
         let own = by_leg[leg][0].or(by_leg[leg][1]).map(|k| &route.pieces[k]);
         let (mut top, mut slowed): (Option<f64>, Option<Slowed>) = (None, None);
         let least_sigma = own.and_then(|piece| piece.least_sigma);
+        if self.bounds_jerks() {
+            slowed = self.slowest(leg, by_leg).map(|slow| Slowed { time_s: now + slow.time_s, ..slow });
+        }
         for (tool, k) in own.iter().flat_map(|piece| piece.tool.iter().zip(piece.stations[0]..)) {
             let t = self.time_of_station(k);
             let speed = tool.V.fixed_rows::<3>(0).norm() * self.progress(t)[1];
@@ -280,6 +331,42 @@ impl<'r> Schedule<'r> {
             least_sigma: least_sigma.map(|(sigma, s)| (sigma, now + self.time_of(s))),
             blend_m: route.blends[leg],
         }
+    }
+
+    /// Where a leg, or the blend behind it, is slowest against its program, within bounds of jerks.
+    fn slowest(&self, leg: usize, by_leg: &[[Option<usize>; 2]]) -> Option<Slowed> {
+        let pieces = by_leg[leg].iter().flatten().map(|k| &self.route.pieces[*k]);
+        let along =
+            pieces.filter(|piece| !piece.tool.is_empty()).flat_map(|piece| piece.stations[0]..=piece.stations[1]);
+        let inner = along.filter(|k| *k > 0 && k + 1 < self.route.stations.len());
+        let slowed = inner.filter_map(|k| {
+            let time_s = self.time_of_station(k);
+            let by = self.part(k, time_s).map(|(_, by)| by).or_else(|| self.least_by_jerk(k))?;
+            let part = self.progress(time_s)[1] / self.programmed[k].sqrt();
+            (part < 1.0 - AT_LIMIT).then_some(Slowed { time_s, part, by })
+        });
+        slowed.min_by(|a, b| a.part.total_cmp(&b.part))
+    }
+
+    /// The joint whose jerk makes a station slower than its neighbours.
+    fn least_by_jerk(&self, k: usize) -> Option<SlowedBy> {
+        let Timing::Bounded(bounded) = &self.law else { return None };
+        let [before, t, after] = [k - 1, k, k + 1].map(|k| self.time_of_station(k));
+        let [left, v, right] = [before, t, after].map(|t| self.progress(t)[1]);
+        if v > left.min(right) {
+            return None;
+        }
+        let (mut most, mut by) = (AT_JERK, None);
+        for i in 0..=8 {
+            let jerks = self.jerks(before + (after - before) * f64::from(i) / 8.0);
+            for (joint, jerk) in jerks.iter().enumerate() {
+                let ratio = (jerk / bounded.jerks[joint]).abs();
+                if ratio > most {
+                    (most, by) = (ratio, bounded.told[joint].as_ref());
+                }
+            }
+        }
+        by.map(|name| SlowedBy::JointJerk(name.clone()))
     }
 
     /// First and last moment of a leg, with half of the blends.
@@ -314,257 +401,4 @@ impl<'r> Schedule<'r> {
 
 fn push(knots: &mut Vec<Knot>, now: f64, knot: Knot) {
     knots.push(Knot { t: now + knot.t, ..knot });
-}
-
-/// Bounds of all stations, what the program asks, and the tightest limit of the robot.
-struct Limited {
-    points: Vec<PathPoint>,
-    programmed: Vec<f64>,
-    caps: Vec<Option<Cap>>,
-}
-
-fn limited(route: &Route, arm: &ProgramArm<'_>) -> Limited {
-    let n = route.stations.len();
-    let mut points: Vec<PathPoint> = route
-        .stations
-        .iter()
-        .map(|station| PathPoint { s: station.s, x_max: f64::INFINITY, bounds: Vec::new() })
-        .collect();
-    let mut programmed = vec![f64::INFINITY; n];
-    let mut caps: Vec<Option<Cap>> = vec![None; n];
-    let mut torques = arm.bounds.iter().any(|bound| bound.torque.is_some()).then(|| Torques::new(arm));
-    for piece in &route.pieces {
-        let [first, last] = piece.stations;
-        for k in first..=last {
-            let station = &route.stations[k];
-            // A station between two pieces has the bounds of both.
-            let dd = if k == first { &station.after } else { &station.before };
-            let mut at = AtStation { point: &mut points[k], programmed: &mut programmed[k], cap: &mut caps[k] };
-            for (joint, bounds) in arm.bounds.iter().enumerate() {
-                let name = || arm.model.coordinates()[joint].joint.clone();
-                at.joint(station.d[joint], dd[joint], bounds, piece, &name);
-            }
-            if let Some(tool) = piece.tool.get(k - first) {
-                at.tool(&tool.V, &tool.A, piece);
-            }
-            if let (Some(travel), Some(most)) = (piece.travel.get(k - first), piece.speed.linear_m_s) {
-                at.program((most / travel.max(1e-12)).powi(2));
-            }
-            if let Some(torques) = &mut torques {
-                torques.add(arm, station, dd, &mut at);
-            }
-        }
-    }
-    Limited { points, programmed, caps }
-}
-
-/// What is collected at one station.
-struct AtStation<'a> {
-    point: &'a mut PathPoint,
-    programmed: &'a mut f64,
-    cap: &'a mut Option<Cap>,
-}
-
-impl AtStation<'_> {
-    /// The robot allows `x` at most.
-    fn limit(&mut self, x: f64, by: impl FnOnce() -> SlowedBy) {
-        if x.is_finite() && self.cap.as_ref().is_none_or(|cap| x < cap.x) {
-            *self.cap = Some(Cap { x, by: by() });
-        }
-        self.point.x_max = self.point.x_max.min(x);
-    }
-
-    /// The program allows `x` at most.
-    fn program(&mut self, x: f64) {
-        *self.programmed = self.programmed.min(x);
-        self.point.x_max = self.point.x_max.min(x);
-    }
-
-    fn joint(&mut self, d: f64, dd: f64, bounds: &JointBounds, piece: &Piece, name: &dyn Fn() -> String) {
-        if d == 0.0 && dd == 0.0 {
-            return;
-        }
-        let speed = &piece.speed;
-        let is_joint_move = piece.tool.is_empty();
-        let part = |fraction: Option<f64>| if is_joint_move { fraction.unwrap_or(1.0).min(1.0) } else { 1.0 };
-        let mut velocity = bounds.velocity * part(speed.joint_fraction);
-        let mut acceleration = bounds.acceleration * speed.joint_acceleration_fraction.unwrap_or(1.0).min(1.0);
-        if is_joint_move {
-            velocity = velocity.min(speed.joint_rad_s.unwrap_or(f64::INFINITY));
-            acceleration = acceleration.min(speed.joint_rad_s2.unwrap_or(f64::INFINITY));
-        }
-        self.limit((velocity / d).powi(2), || SlowedBy::JointSpeed(name()));
-        if acceleration.is_finite() {
-            self.point.bounds.push(Bound { a: d, b: dd, low: -acceleration, high: acceleration });
-            if dd != 0.0 {
-                // Recorded as a cap at constant speed; the law itself keeps the bound.
-                let x = acceleration / dd.abs();
-                if self.cap.as_ref().is_none_or(|cap| x < cap.x) {
-                    *self.cap = Some(Cap { x, by: SlowedBy::JointAcceleration(name()) });
-                }
-            }
-        }
-    }
-
-    fn tool(&mut self, V: &Vector6<f64>, A: &Vector6<f64>, piece: &Piece) {
-        let speed = &piece.speed;
-        let (v, w) = (V.fixed_rows::<3>(0), V.fixed_rows::<3>(3));
-        let (dv, dw) = (A.fixed_rows::<3>(0), A.fixed_rows::<3>(3));
-        if v.norm() > 1e-9 {
-            if let Some(most) = speed.linear_m_s {
-                self.program((most / v.norm()).powi(2));
-            }
-            if let Some(most) = speed.linear_m_s2 {
-                let along = v.dot(&dv) / v.norm();
-                self.point.bounds.push(Bound { a: v.norm(), b: along, low: -most, high: most });
-                let across = (dv - v * (v.dot(&dv) / v.norm_squared())).norm();
-                if across > 0.0 {
-                    self.limit(most / across, || SlowedBy::PathAcceleration);
-                }
-            }
-        }
-        if w.norm() > 1e-9 {
-            if let Some(most) = speed.angular_rad_s {
-                let x = (most / w.norm()).powi(2);
-                // Where the tool travels as well, turning slows the path; where it only turns, it is what was programmed.
-                if v.norm() > 1e-9 && speed.linear_m_s.is_some() {
-                    self.limit(x, || SlowedBy::Turning);
-                } else {
-                    self.program(x);
-                }
-            }
-            if let Some(most) = speed.angular_rad_s2 {
-                let along = w.dot(&dw) / w.norm();
-                self.point.bounds.push(Bound { a: w.norm(), b: along, low: -most, high: most });
-            }
-        }
-    }
-}
-
-/// Torques of the rigid arm as bounds: `M q' u + (M q'' + C q') x + g`.
-struct Torques {
-    data: Data,
-    state: State,
-    zero: DVector<f64>,
-}
-
-impl Torques {
-    fn new(arm: &ProgramArm<'_>) -> Self {
-        let model = arm.model;
-        Self { data: Data::new(model), state: State::zeros(model), zero: DVector::zeros(model.nv()) }
-    }
-
-    fn add(&mut self, arm: &ProgramArm<'_>, station: &Station, dd: &DVector<f64>, at: &mut AtStation<'_>) {
-        self.state.q.copy_from(&station.q);
-        self.state.qdot.fill(0.0);
-        let weight = inverse_dynamics(arm.model, &mut self.data, &self.state, &self.zero).clone();
-        let a = inverse_dynamics(arm.model, &mut self.data, &self.state, &station.d) - &weight;
-        self.state.qdot.copy_from(&station.d);
-        let b = inverse_dynamics(arm.model, &mut self.data, &self.state, dd) - &weight;
-        for (joint, bounds) in arm.bounds.iter().enumerate() {
-            let Some(most) = bounds.torque else { continue };
-            let bound = Bound { a: a[joint], b: b[joint], low: -most - weight[joint], high: most - weight[joint] };
-            at.point.bounds.push(bound);
-            let x = if bound.b > 0.0 { bound.high / bound.b } else { bound.low / bound.b };
-            if bound.b != 0.0 && x >= 0.0 && at.cap.as_ref().is_none_or(|cap| x < cap.x) {
-                let name = arm.model.coordinates()[joint].joint.clone();
-                *at.cap = Some(Cap { x, by: SlowedBy::JointTorque(name) });
-            }
-        }
-    }
-}
-
-/// A smoothed law that keeps all bounds, and by how much it must be slowed as a whole.
-fn kept(points: &[PathPoint], route: &Route, rise: f64) -> Result<(Law, f64), LawError> {
-    let mut points = points.to_vec();
-    let limits: Vec<PathPoint> = points.clone();
-    let s: Vec<f64> = points.iter().map(|point| point.s).collect();
-    let mut window = rise;
-    for _ in 0..ATTEMPTS {
-        let x = least_time(&points)?;
-        let law = Law::new(&s, &x).smoothed(window);
-        let worst_jerk = path_jerk(&law, route);
-        let excess = excesses(&law, &limits);
-        let most = excess.iter().fold(1.0, |most: f64, (_, ratio)| most.max(*ratio));
-        if worst_jerk <= 1.0 + SLACK && most <= 1.0 + SLACK {
-            return Ok((law, 1.0));
-        }
-        if worst_jerk > 1.0 + SLACK && window < WIDEST * rise {
-            window *= worst_jerk.min(4.0);
-        }
-        // Slower where the average took in faster neighbours.
-        let times = Law::new(&s, &x);
-        let mut slower = x.clone();
-        for (t, ratio) in excess {
-            let [from, to] = [t - window, t].map(|t| times.at(t).s);
-            let first = s.partition_point(|s| *s < from).saturating_sub(1);
-            let last = s.partition_point(|s| *s <= to).min(s.len() - 1);
-            for k in first..=last {
-                slower[k] = f64::min(slower[k], x[k] / (ratio * (1.0 + 0.2 * SLACK)));
-            }
-        }
-        for (point, (slower, x)) in points.iter_mut().zip(slower.iter().zip(&x)) {
-            if slower < x {
-                point.x_max = point.x_max.min(*slower);
-            }
-        }
-    }
-    let x = least_time(&points)?;
-    let law = Law::new(&s, &x).smoothed(window);
-    let most = excesses(&law, &limits).iter().fold(path_jerk(&law, route).powf(2.0 / 3.0), |most, (_, r)| most.max(*r));
-    Ok((law, most.max(1.0).sqrt()))
-}
-
-/// Moments at which an averaged law passes a limit, with the ratio by which squared speeds are too large.
-fn excesses(law: &Law, limits: &[PathPoint]) -> Vec<(f64, f64)> {
-    let mut found = Vec::new();
-    let knots = law.knots();
-    let middles = knots.windows(2).map(|pair| 0.5 * (pair[0] + pair[1]));
-    for t in knots.iter().copied().chain(middles) {
-        let at = law.at(t);
-        let (x, u) = (at.v * at.v, at.a);
-        let last = limits.len() - 1;
-        let k = limits.partition_point(|point| point.s <= at.s).clamp(1, last) - 1;
-        let ratio = |point: &PathPoint| {
-            let by_bounds = point.bounds.iter().map(|bound| {
-                let value = bound.a * u + bound.b * x;
-                if value > 0.0 {
-                    value / bound.high
-                } else if value < 0.0 {
-                    value / bound.low
-                } else {
-                    0.0
-                }
-            });
-            by_bounds.fold(x / point.x_max, f64::max)
-        };
-        // Between two points the wider of the two bounds: at a step of the program both are right.
-        let least = ratio(&limits[k]).min(ratio(&limits[k + 1]));
-        if least > 1.0 + SLACK {
-            found.push((t, least));
-        }
-    }
-    found
-}
-
-/// Greatest jerk along the path of the tool over the programmed one; 0 where none is programmed.
-fn path_jerk(law: &Law, route: &Route) -> f64 {
-    let bounded: Vec<(f64, f64, f64)> = route
-        .pieces
-        .iter()
-        .filter(|piece| !piece.tool.is_empty())
-        .filter_map(|piece| {
-            let [a, b] = piece.stations.map(|k| route.stations[k].s);
-            Some((a, b, piece.speed.linear_m_s3?))
-        })
-        .collect();
-    if bounded.is_empty() {
-        return 0.0;
-    }
-    let ratio = |t: f64| {
-        let at = law.at(t);
-        let k = bounded.partition_point(|(_, b, _)| *b < at.s);
-        bounded.get(k).filter(|(a, _, _)| at.s >= *a).map_or(0.0, |(_, _, most)| at.j.abs() / most)
-    };
-    law.knots().into_iter().map(ratio).fold(0.0, f64::max)
 }

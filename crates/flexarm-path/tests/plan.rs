@@ -26,7 +26,7 @@ impl Cell {
     }
 
     fn arm(&self) -> ProgramArm<'_> {
-        let bounds = JointBounds { velocity: 3.0, acceleration: 20.0, torque: None };
+        let bounds = JointBounds { velocity: 3.0, acceleration: 20.0, torque: None, jerk: None };
         ProgramArm {
             model: &self.model,
             flange: self.model.frame("tcp").unwrap().clone(),
@@ -354,7 +354,7 @@ fn seven_joint_arm(model: &Model) -> ProgramArm<'_> {
         X_MW: Pose::identity(),
         axes: (0..7).collect(),
         controller: Vec::new(),
-        bounds: vec![JointBounds { velocity: 3.0, acceleration: 20.0, torque: None }; 7],
+        bounds: vec![JointBounds { velocity: 3.0, acceleration: 20.0, torque: None, jerk: None }; 7],
         rest: DVector::zeros(7),
         starts_at_rest: false,
     }
@@ -489,7 +489,7 @@ fn arm_of<'m>(model: &'m Model, controller: Vec<ControllerAxis>) -> ProgramArm<'
         X_MW: Pose::identity(),
         axes: (0..6).collect(),
         controller,
-        bounds: vec![JointBounds { velocity: 3.0, acceleration: 20.0, torque: None }; 6],
+        bounds: vec![JointBounds { velocity: 3.0, acceleration: 20.0, torque: None, jerk: None }; 6],
         rest: DVector::zeros(6),
         starts_at_rest: false,
     }
@@ -615,5 +615,121 @@ fn joints_at_targets_are_those_that_the_targets_were_made_of_and_make_them_again
             }
             other => panic!("{other:?}"),
         }
+    }
+}
+
+/// Largest jerk of each joint, jumps of its acceleration counted with their time.
+fn hardest(planned: &Planned) -> Vec<[f64; 2]> {
+    planned.trajectory.peak().iter().map(|peak| [peak.jerk.value.abs(), peak.acceleration_jump.value.abs()]).collect()
+}
+
+/// Truth: the S-curve of seven phases of one joint, v/a + a/j + L/v.
+#[test]
+fn one_joint_moves_in_the_least_time_of_its_speed_acceleration_and_jerk() {
+    let cell = Cell::new();
+    let mut arm = cell.arm();
+    let [v, a, j] = [3.0, 20.0, 200.0];
+    for bounds in &mut arm.bounds {
+        (bounds.velocity, bounds.acceleration, bounds.jerk) = (v, a, Some(j));
+    }
+    let mut end = START;
+    end[0] += 2.0;
+    let planned = plan(&program(vec![joints(&START), joints(&end)]), &arm, &PathOptions::default()).unwrap();
+    let truth = v / a + a / j + 2.0 / v;
+    let late = planned.trajectory.duration() / truth - 1.0;
+    let peak = &planned.trajectory.peak()[0];
+    assert!(late.abs() < 1e-3, "{late:.1e}"); // measured 1.1e-4
+    assert!(peak.jerk.value.abs() < j * 1.001 && peak.acceleration.value.abs() < a * 1.001);
+    assert!(peak.acceleration_jump.value.abs() < 1e-6);
+}
+
+#[test]
+fn jerks_of_all_joints_hold_along_lines_blends_arcs_and_splines() {
+    let cell = Cell::new();
+    let X = cell.pose(&START);
+    let mut arm = cell.arm();
+    for bounds in &mut arm.bounds {
+        bounds.jerk = Some(60.0);
+    }
+    let spline = |d: [f64; 3], blend| to(MoveKind::Spline, pose(shifted(&X, d)), feed(0.4), blend);
+    let via = X.translation.vector + Vector3::new(0.0, 0.2, 0.05);
+    let arc = MoveKind::Arc { via, via_rotation: None, angle: None, turns_with_path: false };
+    let other = [0.5, 0.3, 0.9, 0.1, 0.9, 0.0];
+    let items = vec![
+        joints(&other),
+        to(MoveKind::Joint, Target::Joints(START.to_vec()), Speed::default(), Blend::Distance(0.03)),
+        to(MoveKind::Line, pose(shifted(&X, [0.0, 0.15, 0.0])), feed(0.4), Blend::Distance(0.02)),
+        to(arc, pose(shifted(&X, [0.0, 0.25, 0.0])), feed(0.4), Blend::Distance(0.02)),
+        to(MoveKind::Line, pose(shifted(&X, [0.05, 0.25, 0.1])), feed(0.4), Blend::Distance(0.02)),
+        spline([0.05, 0.2, 0.15], Blend::Pass),
+        spline([0.0, 0.15, 0.1], Blend::Pass),
+        spline([-0.05, 0.1, 0.0], Blend::Stop),
+    ];
+    let free = plan(&program(items.clone()), &cell.arm(), &PathOptions::default()).unwrap();
+    let planned = plan(&program(items), &arm, &PathOptions::default()).unwrap();
+    for [jerk, jump] in hardest(&planned) {
+        assert!(jerk < 60.0 * 1.001 && jump < 1e-6, "{jerk} {jump}"); // measured 60.0084, 1.2e-11
+    }
+    // Corners are rounded without a stop, and the tool keeps to its speed elsewhere.
+    assert!(planned.stops.is_empty() && hardest(&free).iter().all(|[jerk, _]| *jerk > 180.0));
+    let (free, bounded) = (free.trajectory.duration(), planned.trajectory.duration());
+    assert!(bounded > free && bounded < 1.15 * free, "{free} {bounded}"); // measured 2.644 s and 2.888 s
+    assert!(planned.moves[1].top_m_s.unwrap() > 0.399);
+    // The sharp corner between arc and line, where the tool is nearly at rest.
+    let slowed = planned.moves[2].slowed.as_ref().unwrap();
+    assert!(slowed.part < 0.2 && (slowed.time_s - planned.moves[2].span_s[1]).abs() < 0.05, "{slowed:?}");
+}
+
+#[test]
+fn a_corner_that_the_jerk_of_a_joint_slows_is_told_with_that_joint_and_its_place() {
+    let cell = Cell::new();
+    let corners = square(&cell.pose(&START), 0.2);
+    let mut arm = cell.arm();
+    arm.bounds[0].jerk = Some(5.0);
+    let speed = Speed { linear_m_s: Some(0.25), ..Speed::default() };
+    let line = |k: usize, blend| to(MoveKind::Line, pose(corners[k]), speed, blend);
+    let items = vec![joints(&START), line(1, Blend::Distance(0.02)), line(2, Blend::Stop)];
+    let planned = plan(&program(items), &arm, &PathOptions::default()).unwrap();
+    let slowed = planned.moves[0].slowed.as_ref().unwrap();
+    assert_eq!(slowed.by, SlowedBy::JointJerk(cell.model.coordinates()[0].joint.clone()));
+    assert!((slowed.time_s - planned.moves[0].span_s[1]).abs() < 0.2, "{slowed:?}");
+    let samples = cell.sampled(&planned, 20000);
+    let at = samples
+        .windows(2)
+        .min_by(|a, b| (a[0].t - slowed.time_s).abs().total_cmp(&(b[0].t - slowed.time_s).abs()))
+        .unwrap();
+    let speed = (at[1].X.translation.vector - at[0].X.translation.vector).norm() / (at[1].t - at[0].t);
+    assert!((speed / 0.25 - slowed.part).abs() < 0.01, "{speed} {slowed:?}");
+}
+
+#[test]
+fn an_arc_that_leaves_a_line_along_its_tangent_is_entered_at_rest_or_by_a_blend_where_jerks_are_bounded() {
+    let cell = Cell::new();
+    let X = cell.pose(&START);
+    let mut arm = cell.arm();
+    arm.bounds[2].jerk = Some(200.0);
+    let (r, corner) = (0.1, shifted(&X, [0.0, 0.15, 0.0]));
+    let centre = corner.translation.vector + Vector3::z() * r;
+    let (sin, cos) = (0.5f64.sin(), 0.5f64.cos());
+    let via = centre + Vector3::new(0.0, r * sin, -r * cos);
+    let end = centre + Vector3::new(0.0, r, 0.0) - corner.translation.vector;
+    let arc = MoveKind::Arc { via, via_rotation: None, angle: None, turns_with_path: false };
+    let run = |arm: &ProgramArm<'_>, blend| {
+        let line = to(MoveKind::Line, pose(corner), feed(0.3), blend);
+        let arc = to(arc.clone(), pose(shifted(&corner, end.into())), feed(0.3), Blend::Stop);
+        plan(&program(vec![joints(&START), line, arc]), arm, &PathOptions::default()).unwrap()
+    };
+    // Without a bound the joints' accelerations jump at the seam.
+    let jumps = |planned: &Planned| hardest(planned).iter().map(|[_, jump]| *jump).fold(0.0, f64::max);
+    let free = run(&cell.arm(), Blend::Pass);
+    assert!(free.stops.is_empty() && jumps(&free) > 0.5, "{}", jumps(&free));
+    let stopped = run(&arm, Blend::Pass);
+    assert!(stopped.stops.len() == 1 && stopped.stops[0].1.contains("curvature"), "{:?}", stopped.stops);
+    assert!(jumps(&stopped) < 1e-8);
+    let blended = run(&arm, Blend::Distance(0.01));
+    assert!(blended.stops.is_empty() && jumps(&blended) < 1e-8);
+    assert!(blended.trajectory.duration() < stopped.trajectory.duration() - 0.05);
+    for planned in [&stopped, &blended] {
+        assert!(hardest(planned)[2][0] < 200.0 * 1.001, "{:?}", hardest(planned));
     }
 }

@@ -24,6 +24,8 @@ const TIMES: usize = 4000;
 const CURVE_POINTS: usize = 600;
 /// A torque counts as over its limit beyond this part of it.
 const SLACK: f64 = 1e-9;
+/// A jerk likewise: the planner keeps it to this.
+const JERK_SLACK: f64 = 1e-3;
 
 /// Answer of `flexarm motion`. SI units; angles in rad.
 #[derive(Clone, Debug, Serialize)]
@@ -98,6 +100,8 @@ pub struct MotionPeak {
     pub jerk: f64,
     /// When.
     pub jerk_at_s: f64,
+    /// The limit: that of a path file.
+    pub jerk_limit: Option<f64>,
     /// Largest jump of the acceleration.
     pub acceleration_jump: f64,
     /// Torque or force of greatest magnitude that the rigid robot with its payload needs (N m, N), with a robot.
@@ -113,7 +117,7 @@ pub struct MotionPeak {
 pub struct MotionViolation {
     /// Joint.
     pub joint: String,
-    /// lower, upper, velocity or effort.
+    /// lower, upper, velocity, jerk or effort.
     pub kind: &'static str,
     /// When it is worst (s).
     pub time_s: f64,
@@ -241,7 +245,9 @@ fn on_robot(path: &Path, robot: &Robot, options: &MotionOptions) -> Result<(Moti
         let (torque, torque_at_s) = (Some(worst.value), Some(worst.time_s));
         let unit = if c.kind == "prismatic" { "m" } else { "rad" };
         let own = of_joint(peak, unit, &limits);
-        peaks.push(MotionPeak { torque, torque_at_s, torque_limit: limit(c.limits.effort), ..own });
+        let jerk_limit = motion.tool_path.as_ref().and_then(|path| path.jerk_of(&c.joint));
+        violations.extend(jerk_limit.and_then(|limit| of_jerk(peak, limit)));
+        peaks.push(MotionPeak { torque, torque_at_s, torque_limit: limit(c.limits.effort), jerk_limit, ..own });
         violations.extend(torques.violation(k, &c.joint, c.limits.effort));
     }
     let (length, speed) = way_of_tool(&trajectory, &model);
@@ -285,6 +291,7 @@ fn of_joint(peak: &JointPeak, unit: &'static str, limits: &JointLimits) -> Motio
         acceleration_at_s: peak.acceleration.time_s,
         jerk: peak.jerk.value,
         jerk_at_s: peak.jerk.time_s,
+        jerk_limit: None,
         acceleration_jump: peak.acceleration_jump.value,
         torque: None,
         torque_at_s: None,
@@ -308,6 +315,25 @@ pub(crate) fn of_limit(violation: &flexarm_trajectory::LimitViolation) -> Motion
         limit: violation.limit,
         message: violation.to_string(),
     }
+}
+
+/// A jerk beyond its limit.
+fn of_jerk(peak: &JointPeak, limit: f64) -> Option<MotionViolation> {
+    let Extreme { time_s, value } = peak.jerk;
+    let message = format!(
+        "joint {:?}: jerk exceeds its limit {limit:.4}: {value:.4} at t = {time_s:.4} s; allow the move more time",
+        peak.joint
+    );
+    let (joint, since_s) = (peak.joint.clone(), time_s);
+    (value.abs() > limit * (1.0 + JERK_SLACK)).then_some(MotionViolation {
+        joint,
+        kind: "jerk",
+        time_s,
+        since_s,
+        value,
+        limit,
+        message,
+    })
 }
 
 /// Torques of the rigid robot at equal distances in time.

@@ -211,3 +211,46 @@ fn what_joints_do_that_a_path_does_not_need_is_a_known_word_or_a_posture() {
         assert!(error.contains("path.toml:6:14") && error.contains("6 joint values to stay near to"), "{error}");
     }
 }
+
+/// Truth: the third derivative of the joints' curves.
+#[test]
+fn jerks_of_joints_hold_in_a_path_file_and_in_a_program_and_are_shown_with_their_limits() {
+    let robot = kr210();
+    let folder = folder("jerks");
+    let limits: String = (1..=6).map(|k| format!("joint_{k} = {{ acceleration = 300, jerk = 1500 }}\n")).collect();
+    let head = "format = 1\n[path]\nlengths = \"mm\"\nangles = \"deg\"\nspeed = 250.0\n";
+    let path = format!(
+        "{head}blend = 10.0\n[limits]\n{limits}\
+         [[move]]\njoints = [0, -60, 90, 0, 60, 0]\nblend = 0.0\n\
+         [[move]]\nline = [1700, 0, 1300]\nrpy = [0, 90, 0]\n\
+         [[move]]\nline = [1700, 200, 1300]\n\
+         [[move]]\nline = [1700, 200, 1400]\nblend = 0.0\n"
+    );
+    let program = format!("{head}[limits]\n{limits}[program]\nfile = \"part.src\"\n");
+    let krl = "DEF part()\nPTP {A1 0, A2 -60, A3 90, A4 0, A5 60, A6 0}\n\
+        LIN {X 1700, Y 0, Z 1300, A 0, B 90, C 0} C_DIS\nLIN {X 1700, Y 200, Z 1300, A 0, B 90, C 0}\nEND\n";
+    std::fs::write(folder.join("part.src"), krl).unwrap();
+    for (name, text) in [("path.toml", &path), ("program.toml", &program)] {
+        let file = folder.join(name);
+        std::fs::write(&file, text).unwrap();
+        let report = flexarm::motion_report(&file, Some(&robot), &Default::default(), &[], 500.0, false).unwrap();
+        let limit = 1500f64.to_radians();
+        for peak in &report.peaks {
+            assert!((peak.jerk_limit.unwrap() - limit).abs() < 1e-9);
+            assert!(peak.jerk.abs() < limit * 1.001 && peak.acceleration_jump < 1e-6, "{} {}", peak.joint, peak.jerk);
+        }
+        let most = report.peaks.iter().map(|peak| peak.jerk.abs()).fold(0.0, f64::max);
+        assert!(most > 0.98 * limit, "{most}");
+        assert!(report.violations.iter().all(|violation| violation.kind != "jerk"));
+    }
+    // A limit that binds nothing but a corner: told with its joint.
+    let slowed = load(&robot, "path.toml", &path).unwrap();
+    let said = &slowed.tool_path.as_ref().unwrap().moves;
+    let by_jerk =
+        said.iter().filter_map(|of| of.slowed.as_ref()).any(|slow| matches!(&slow.by, flexarm::SlowedBy::JointJerk(_)));
+    assert!(by_jerk, "{said:?}");
+    let wrong = path.replacen("jerk = 1500", "jerk = 0", 1);
+    let error = load(&robot, "path.toml", &wrong).unwrap_err().to_string();
+    assert!(error.contains("path.toml:") && error.contains("a limit must be a positive number"), "{error}");
+    std::fs::remove_dir_all(folder).unwrap();
+}

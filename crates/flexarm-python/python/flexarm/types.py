@@ -825,7 +825,7 @@ class MotionViolation(TypedDict):
     joint: str
     """Joint."""
     kind: str
-    """lower, upper, velocity or effort."""
+    """lower, upper, velocity, jerk or effort."""
     time_s: float
     """When it is worst (s)."""
     since_s: float
@@ -2184,6 +2184,8 @@ class MotionPeak(TypedDict):
     """Jerk of greatest magnitude, jumps of the acceleration apart."""
     jerk_at_s: float
     """When."""
+    jerk_limit: float | None
+    """The limit: that of a path file."""
     acceleration_jump: float
     """Largest jump of the acceleration."""
     torque: float | None

@@ -124,6 +124,7 @@ struct FrameTable {
 struct LimitsTable {
     velocity: Option<Spanned<f64>>,
     acceleration: Option<Spanned<f64>>,
+    jerk: Option<Spanned<f64>>,
     torque: Option<Spanned<f64>>,
 }
 
@@ -299,7 +300,8 @@ fn units(path: &PathTable, source: &Source) -> Result<Units, RobotFileError> {
 fn overrides(file: &PathFile, source: &Source, cell: &Cell<'_>, units: Units) -> Result<Overrides, RobotFileError> {
     let coordinates = cell.model.coordinates();
     let none = vec![None; cell.model.nv()];
-    let mut overrides = Overrides { velocities: none.clone(), accelerations: none.clone(), torques: none };
+    let mut overrides =
+        Overrides { velocities: none.clone(), accelerations: none.clone(), jerks: none.clone(), torques: none };
     for (joint, limits) in &file.limits {
         let Some(k) = coordinates.iter().position(|c| c.joint == *joint.get_ref()) else {
             let names: Vec<&str> = coordinates.iter().map(|c| c.joint.as_str()).collect();
@@ -315,6 +317,7 @@ fn overrides(file: &PathFile, source: &Source, cell: &Cell<'_>, units: Units) ->
         };
         overrides.velocities[k] = value(&limits.velocity, unit)?;
         overrides.accelerations[k] = value(&limits.acceleration, unit)?;
+        overrides.jerks[k] = value(&limits.jerk, unit)?;
         overrides.torques[k] = value(&limits.torque, 1.0)?;
     }
     Ok(overrides)

@@ -43,6 +43,8 @@ pub struct ToolPath {
     pub moves: Vec<PlannedMove>,
     /// The file.
     pub(crate) file: String,
+    /// Bounds of jerks that the motion keeps, by joint, rad/s³ or m/s³.
+    pub(crate) jerks: Vec<(String, f64)>,
     /// Things worth telling.
     pub(crate) warnings: Vec<String>,
     /// Things that may be known anyway.
@@ -78,9 +80,9 @@ impl Assumed {
 /// Changes to what the robot's description says of its joints.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Overrides {
-    /// Fraction of the speed limits that joint moves use.
-    pub(crate) accelerations: Vec<Option<f64>>,
     pub(crate) velocities: Vec<Option<f64>>,
+    pub(crate) accelerations: Vec<Option<f64>>,
+    pub(crate) jerks: Vec<Option<f64>>,
     pub(crate) torques: Vec<Option<f64>>,
 }
 
@@ -149,7 +151,8 @@ impl<'a> Cell<'a> {
                     assumed = true;
                     if velocity.is_finite() { velocity / TO_TOP_SPEED } else { ACCELERATION }
                 });
-                JointBounds { velocity, acceleration, torque: of(&overrides.torques, k) }
+                let (torque, jerk) = (of(&overrides.torques, k), of(&overrides.jerks, k));
+                JointBounds { velocity, acceleration, torque, jerk }
             })
             .collect();
         let accelerations = assumed.then(|| {
@@ -203,7 +206,15 @@ impl ToolPath {
         });
         warnings.extend(first_of(near.collect()));
         let notes = program.notes.iter().map(noted).collect();
-        Ok((planned.trajectory, Self { moves: planned.moves, file: file.display().to_string(), warnings, notes }))
+        let jerk = |(k, bounds): (usize, &JointBounds)| Some((arm.model.coordinates()[k].joint.clone(), bounds.jerk?));
+        let jerks = arm.bounds.iter().enumerate().filter_map(jerk).collect();
+        let file = file.display().to_string();
+        Ok((planned.trajectory, Self { moves: planned.moves, file, jerks, warnings, notes }))
+    }
+
+    /// Bound of a joint's jerk, rad/s³ or m/s³, if one was told.
+    pub(crate) fn jerk_of(&self, joint: &str) -> Option<f64> {
+        self.jerks.iter().find(|(name, _)| name == joint).map(|(_, jerk)| *jerk)
     }
 
     /// What is worth knowing.
@@ -252,6 +263,7 @@ fn slowed_warning(of: &PlannedMove, slowed: &Slowed) -> String {
     let by = match &slowed.by {
         SlowedBy::JointSpeed(joint) => format!("the speed of joint {joint:?}"),
         SlowedBy::JointAcceleration(joint) => format!("the acceleration of joint {joint:?}"),
+        SlowedBy::JointJerk(joint) => format!("the jerk of joint {joint:?}"),
         SlowedBy::JointTorque(joint) => format!("the torque of joint {joint:?}"),
         SlowedBy::Turning => "the turning of the tool".to_owned(),
         SlowedBy::PathAcceleration => "the acceleration across the path".to_owned(),

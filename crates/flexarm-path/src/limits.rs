@@ -1,0 +1,258 @@
+//! What holds at the stations of a route: bounds of joints, torques and the tool, and which of them slows a move.
+
+use flexarm_kinematics::{Data, State, inverse_dynamics};
+use nalgebra::{DVector, Vector6};
+
+use crate::curve::ToolJet;
+use crate::jerk_law::{JerkBound, Place};
+use crate::plan::{JointBounds, ProgramArm, SlowedBy};
+use crate::route::{Piece, Route, Station};
+use crate::time_law::{Bound, PathPoint};
+
+/// What limits the speed at a station beyond the program, with the greatest squared speed.
+#[derive(Debug, Clone)]
+pub(crate) struct Cap {
+    pub(crate) x: f64,
+    pub(crate) by: SlowedBy,
+}
+
+/// Bounds of all stations, what the program asks, and the tightest limit of the robot.
+pub(crate) struct Limited {
+    pub(crate) points: Vec<PathPoint>,
+    pub(crate) programmed: Vec<f64>,
+    pub(crate) caps: Vec<Option<Cap>>,
+}
+
+/// Limits at places of a route.
+pub(crate) struct Limits<'a> {
+    route: &'a Route,
+    arm: &'a ProgramArm<'a>,
+    torques: Option<Torques>,
+    /// Accelerations of joints whose jerk is not told rise in this time, s; `None`: no jerk is looked at.
+    rise: Option<f64>,
+}
+
+/// Joints and the tool at a place, by the parameter.
+struct There<'a> {
+    q: &'a DVector<f64>,
+    d: &'a DVector<f64>,
+    dd: &'a DVector<f64>,
+    /// Not looked at where no jerk is.
+    ddd: Option<DVector<f64>>,
+    tool: Option<[Vector6<f64>; 2]>,
+    travel: Option<f64>,
+}
+
+impl<'a> Limits<'a> {
+    pub(crate) fn new(route: &'a Route, arm: &'a ProgramArm<'a>, rise: Option<f64>) -> Self {
+        let torques = arm.bounds.iter().any(|bound| bound.torque.is_some()).then(|| Torques::new(arm));
+        Self { route, arm, torques, rise }
+    }
+
+    /// What holds at all stations; one between two pieces has the bounds of both.
+    pub(crate) fn at_stations(&mut self) -> Limited {
+        let route = self.route;
+        let n = route.stations.len();
+        let mut points: Vec<PathPoint> = route
+            .stations
+            .iter()
+            .map(|station| PathPoint { s: station.s, x_max: f64::INFINITY, bounds: Vec::new() })
+            .collect();
+        let mut programmed = vec![f64::INFINITY; n];
+        let mut caps: Vec<Option<Cap>> = vec![None; n];
+        let mut jerks = Vec::new();
+        for piece in &route.pieces {
+            let [first, last] = piece.stations;
+            for k in first..=last {
+                let Station { s, q, d, before, after } = &route.stations[k];
+                let dd = if k == first { after } else { before };
+                let ddd = self.rise.map(|_| route.joints(if k == first { k } else { k - 1 }, *s).1);
+                let tool = piece.tool.get(k - first).map(|tool| [tool.V, tool.A]);
+                let there = There { q, d, dd, ddd, tool, travel: piece.travel.get(k - first).copied() };
+                let point = &mut points[k];
+                let mut at = AtStation { point, programmed: &mut programmed[k], cap: &mut caps[k], jerks: &mut jerks };
+                self.collect(piece, &there, &mut at);
+            }
+        }
+        Limited { points, programmed, caps }
+    }
+
+    /// What holds at a parameter of the interval between station `k` and the next.
+    pub(crate) fn at(&mut self, k: usize, s: f64) -> Place {
+        let piece = &self.route.pieces[self.route.pieces.partition_point(|piece| piece.stations[1] <= k)];
+        let (jet, ddd) = self.route.joints(k, s);
+        let [a, b] = [k, k + 1].map(|k| self.route.stations[k].s);
+        let first = piece.stations[0];
+        let tool =
+            (!piece.tool.is_empty()).then(|| cubic(&piece.tool[k - first], &piece.tool[k + 1 - first], b - a, s - a));
+        let travel = piece.travel.get(k - first).zip(piece.travel.get(k + 1 - first));
+        let travel = travel.map(|(from, to)| from + (to - from) * (s - a) / (b - a));
+        let there = There { q: &jet.q, d: &jet.d, dd: &jet.dd, ddd: Some(ddd), tool, travel };
+        let mut point = PathPoint { s, x_max: f64::INFINITY, bounds: Vec::new() };
+        let (mut programmed, mut cap, mut jerks) = (f64::INFINITY, None, Vec::new());
+        let mut at = AtStation { point: &mut point, programmed: &mut programmed, cap: &mut cap, jerks: &mut jerks };
+        self.collect(piece, &there, &mut at);
+        Place { x_max: point.x_max, bounds: point.bounds, jerks }
+    }
+
+    fn collect(&mut self, piece: &Piece, there: &There<'_>, at: &mut AtStation<'_>) {
+        for (joint, bounds) in self.arm.bounds.iter().enumerate() {
+            let name = || self.arm.model.coordinates()[joint].joint.clone();
+            at.joint(there.d[joint], there.dd[joint], bounds, piece, &name);
+            if let (Some(ddd), Some(rise)) = (&there.ddd, self.rise) {
+                at.jerk([there.d[joint], there.dd[joint], ddd[joint]], bounds, rise, &name);
+            }
+        }
+        if let Some([V, A]) = &there.tool {
+            at.tool(V, A, piece);
+            if let (Some(most), Some(_)) = (piece.speed.linear_m_s3, self.rise) {
+                at.jerks.push(JerkBound { a: 1.0, b: 0.0, c: 0.0, most });
+            }
+        }
+        if let (Some(travel), Some(most)) = (there.travel, piece.speed.linear_m_s) {
+            at.program((most / travel.max(1e-12)).powi(2));
+        }
+        if let Some(torques) = &mut self.torques {
+            torques.add(self.arm, there, at);
+        }
+    }
+}
+
+/// What is collected at one station.
+struct AtStation<'a> {
+    point: &'a mut PathPoint,
+    programmed: &'a mut f64,
+    cap: &'a mut Option<Cap>,
+    jerks: &'a mut Vec<JerkBound>,
+}
+
+impl AtStation<'_> {
+    /// The robot allows `x` at most.
+    fn limit(&mut self, x: f64, by: impl FnOnce() -> SlowedBy) {
+        if x.is_finite() && self.cap.as_ref().is_none_or(|cap| x < cap.x) {
+            *self.cap = Some(Cap { x, by: by() });
+        }
+        self.point.x_max = self.point.x_max.min(x);
+    }
+
+    /// The program allows `x` at most.
+    fn program(&mut self, x: f64) {
+        *self.programmed = self.programmed.min(x);
+        self.point.x_max = self.point.x_max.min(x);
+    }
+
+    fn joint(&mut self, d: f64, dd: f64, bounds: &JointBounds, piece: &Piece, name: &dyn Fn() -> String) {
+        if d == 0.0 && dd == 0.0 {
+            return;
+        }
+        let speed = &piece.speed;
+        let is_joint_move = piece.tool.is_empty();
+        let part = |fraction: Option<f64>| if is_joint_move { fraction.unwrap_or(1.0).min(1.0) } else { 1.0 };
+        let mut velocity = bounds.velocity * part(speed.joint_fraction);
+        let mut acceleration = bounds.acceleration * speed.joint_acceleration_fraction.unwrap_or(1.0).min(1.0);
+        if is_joint_move {
+            velocity = velocity.min(speed.joint_rad_s.unwrap_or(f64::INFINITY));
+            acceleration = acceleration.min(speed.joint_rad_s2.unwrap_or(f64::INFINITY));
+        }
+        self.limit((velocity / d).powi(2), || SlowedBy::JointSpeed(name()));
+        if acceleration.is_finite() {
+            self.point.bounds.push(Bound { a: d, b: dd, low: -acceleration, high: acceleration });
+            if dd != 0.0 {
+                // Recorded as a cap at constant speed; the law itself keeps the bound.
+                let x = acceleration / dd.abs();
+                if self.cap.as_ref().is_none_or(|cap| x < cap.x) {
+                    *self.cap = Some(Cap { x, by: SlowedBy::JointAcceleration(name()) });
+                }
+            }
+        }
+    }
+
+    /// Jerk of a joint with its derivatives by the parameter.
+    fn jerk(&mut self, [d, dd, ddd]: [f64; 3], bounds: &JointBounds, rise: f64, name: &dyn Fn() -> String) {
+        let most = bounds.jerk.unwrap_or(bounds.acceleration / rise);
+        if (d == 0.0 && dd == 0.0 && ddd == 0.0) || !most.is_finite() {
+            return;
+        }
+        self.jerks.push(JerkBound { a: d, b: 3.0 * dd, c: ddd, most });
+        // Recorded as a cap at constant speed.
+        let x = (most / ddd.abs()).powf(2.0 / 3.0);
+        if bounds.jerk.is_some() && x.is_finite() && self.cap.as_ref().is_none_or(|cap| x < cap.x) {
+            *self.cap = Some(Cap { x, by: SlowedBy::JointJerk(name()) });
+        }
+    }
+
+    fn tool(&mut self, V: &Vector6<f64>, A: &Vector6<f64>, piece: &Piece) {
+        let speed = &piece.speed;
+        let (v, w) = (V.fixed_rows::<3>(0), V.fixed_rows::<3>(3));
+        let (dv, dw) = (A.fixed_rows::<3>(0), A.fixed_rows::<3>(3));
+        if v.norm() > 1e-9 {
+            if let Some(most) = speed.linear_m_s {
+                self.program((most / v.norm()).powi(2));
+            }
+            if let Some(most) = speed.linear_m_s2 {
+                let along = v.dot(&dv) / v.norm();
+                self.point.bounds.push(Bound { a: v.norm(), b: along, low: -most, high: most });
+                let across = (dv - v * (v.dot(&dv) / v.norm_squared())).norm();
+                if across > 0.0 {
+                    self.limit(most / across, || SlowedBy::PathAcceleration);
+                }
+            }
+        }
+        if w.norm() > 1e-9 {
+            if let Some(most) = speed.angular_rad_s {
+                let x = (most / w.norm()).powi(2);
+                // Where the tool travels as well, turning slows the path; where it only turns, it is what was programmed.
+                if v.norm() > 1e-9 && speed.linear_m_s.is_some() {
+                    self.limit(x, || SlowedBy::Turning);
+                } else {
+                    self.program(x);
+                }
+            }
+            if let Some(most) = speed.angular_rad_s2 {
+                let along = w.dot(&dw) / w.norm();
+                self.point.bounds.push(Bound { a: w.norm(), b: along, low: -most, high: most });
+            }
+        }
+    }
+}
+
+/// Torques of the rigid arm as bounds: `M q' u + (M q'' + C q') x + g`.
+struct Torques {
+    data: Data,
+    state: State,
+    zero: DVector<f64>,
+}
+
+impl Torques {
+    fn new(arm: &ProgramArm<'_>) -> Self {
+        let model = arm.model;
+        Self { data: Data::new(model), state: State::zeros(model), zero: DVector::zeros(model.nv()) }
+    }
+
+    fn add(&mut self, arm: &ProgramArm<'_>, there: &There<'_>, at: &mut AtStation<'_>) {
+        self.state.q.copy_from(there.q);
+        self.state.qdot.fill(0.0);
+        let weight = inverse_dynamics(arm.model, &mut self.data, &self.state, &self.zero).clone();
+        let a = inverse_dynamics(arm.model, &mut self.data, &self.state, there.d) - &weight;
+        self.state.qdot.copy_from(there.d);
+        let b = inverse_dynamics(arm.model, &mut self.data, &self.state, there.dd) - &weight;
+        for (joint, bounds) in arm.bounds.iter().enumerate() {
+            let Some(most) = bounds.torque else { continue };
+            let bound = Bound { a: a[joint], b: b[joint], low: -most - weight[joint], high: most - weight[joint] };
+            at.point.bounds.push(bound);
+            let x = if bound.b > 0.0 { bound.high / bound.b } else { bound.low / bound.b };
+            if bound.b != 0.0 && x >= 0.0 && at.cap.as_ref().is_none_or(|cap| x < cap.x) {
+                let name = arm.model.coordinates()[joint].joint.clone();
+                *at.cap = Some(Cap { x, by: SlowedBy::JointTorque(name) });
+            }
+        }
+    }
+}
+
+/// The tool's derivatives at `s` of an interval of length `h`: the cubic through those at its ends.
+fn cubic(from: &ToolJet, to: &ToolJet, h: f64, s: f64) -> [Vector6<f64>; 2] {
+    let (step, z) = ((to.V - from.V) / h, s / h);
+    let c2 = step * 3.0 - from.A * 2.0 - to.A;
+    let c3 = from.A + to.A - step * 2.0;
+    [from.V + (from.A + (c2 + c3 * z) * z) * s, from.A + (c2 * 2.0 + c3 * (3.0 * z)) * z]
+}
