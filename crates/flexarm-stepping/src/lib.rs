@@ -77,7 +77,7 @@ pub use motion::{Held, MotionFn, PrescribedMotion};
 pub use observation::Observation;
 pub use operating_point::{Asked, OperatingPoint, PoseAnswer};
 pub use reduced::ReducedArm;
-pub use run_slopes::{Direction, ErrorSlopes, RunSlopes, SlopesRequest, SpringSlope, run_slopes};
+pub use run_slopes::{Direction, ErrorSlopes, RunSlopes, SlopesRequest, SpringSlope, equilibrium_slopes, run_slopes};
 pub use static_path::StaticPath;
 pub use static_targets::{StaticTargets, TargetError, static_targets};
 pub use statics::static_equilibrium;

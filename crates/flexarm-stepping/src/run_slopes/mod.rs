@@ -164,7 +164,7 @@ pub fn run_slopes(
             run.step()?;
         }
         let error = tool.look(&run);
-        let parts = |k: usize| [error.fixed_rows::<3>(k).into_owned(), error.fixed_rows::<3>(k).into_owned()][0];
+        let parts = |k: usize| error.fixed_rows::<3>(k).into_owned();
         let t = run.time();
         let slopes = &tool.slopes;
         found.position.include(t, parts(0), slopes.iter().map(|s| Vector3::new(s[0], s[1], s[2])));
@@ -179,6 +179,26 @@ pub fn run_slopes(
     found.position.finish((steps + 1) as f64);
     found.rotation.finish((steps + 1) as f64);
     Ok(found)
+}
+
+/// Change of the elastic coordinates at rest at the start, n × p.
+///
+/// # Errors
+/// As [`run_slopes`].
+pub fn equilibrium_slopes(arm: &FlexibleArm, directions: &[Direction]) -> Result<DMatrix<f64>, StepError> {
+    let request = SlopesRequest {
+        settings: AlphaSettings::default(),
+        step_s: 1e-3,
+        duration_s: 0.0,
+        start: Start::Equilibrium,
+        tool: arm.model.frames()[0].clone(),
+        keep_samples: false,
+    };
+    let mut arm = arm.clone();
+    arm.carry_from_start()?;
+    check(&arm, &request, directions)?;
+    let e = static_equilibrium(&arm, 0.0)?;
+    Ok(Recurrence::new(arm, &request, directions, &e)?.x)
 }
 
 /// What of the arm and of the directions is not differentiated.
