@@ -100,9 +100,9 @@ fn the_error_along_a_motion_depends_on_each_parameter_with_the_damping_that_foll
         };
         // The truth is lost in rounding where the step is small, and damping does little.
         let h = match parameter {
-            RunParameter::Arm(Parameter { effect: Effect::Mass { .. }, .. }) => 0.5,
+            RunParameter::Arm(Parameter { effect: Effect::Mass { .. }, .. }) => 0.2,
             RunParameter::Arm(Parameter { effect: Effect::Damping(_), .. }) => 0.15,
-            _ => 0.03,
+            _ => 0.015,
         };
         let truth = richardson(h, run);
         let own: Vec<f64> = found.slopes.iter().skip(k).step_by(parameters.len()).flatten().copied().collect();

@@ -92,6 +92,7 @@ mod robot;
 mod robot_file;
 mod run;
 mod scenario;
+pub mod sensitivity;
 mod settling;
 mod static_part;
 mod statics;

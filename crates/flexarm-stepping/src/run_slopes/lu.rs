@@ -1,8 +1,9 @@
 //! A square system that is factored and solved in place, again and again. Not here: systems that are symmetric.
 
-use nalgebra::{DMatrix, DMatrixViewMut};
+use nalgebra::DMatrix;
 
 use crate::error::StepError;
+use crate::run_slopes::columns::{self, Work};
 
 /// `P A = L U`.
 #[derive(Clone, Debug)]
@@ -43,23 +44,48 @@ impl Lu {
         Ok(())
     }
 
-    /// Replaces the columns of `B` by `A^-1 B`.
-    pub(super) fn solve(&self, mut B: DMatrixViewMut<'_, f64>) {
-        let n = self.A.nrows();
-        for mut b in B.column_iter_mut() {
-            for (k, row) in self.rows.iter().enumerate() {
-                b.swap_rows(k, *row);
-            }
-            for k in 0..n {
-                let factor = -b[k];
-                b.rows_range_mut(k + 1..).axpy(factor, &self.A.column(k).rows_range(k + 1..), 1.0);
-            }
-            for k in (0..n).rev() {
-                b[k] /= self.A[(k, k)];
-                let factor = -b[k];
-                b.rows_range_mut(..k).axpy(factor, &self.A.column(k).rows_range(..k), 1.0);
-            }
+    /// Replaces the rows of `B` (p × n) by the solutions: `Bᵀ` by `A^-1 Bᵀ`.
+    pub(super) fn solve_transposed(&self, B: &mut DMatrix<f64>) {
+        let p = B.nrows();
+        if p == 0 {
+            return;
         }
+        for (k, row) in self.rows.iter().enumerate() {
+            B.swap_columns(k, *row);
+        }
+        columns::quickly(Eliminate { A: &self.A, B: B.as_mut_slice(), p });
+    }
+}
+
+struct Eliminate<'a> {
+    A: &'a DMatrix<f64>,
+    B: &'a mut [f64],
+    p: usize,
+}
+
+impl Work for Eliminate<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { A, B, p } = self;
+        let n = A.nrows();
+        for (k, factors) in A.as_slice().chunks_exact(n).enumerate() {
+            let (inner, outer) = B.split_at_mut((k + 1) * p);
+            subtract(&inner[k * p..], &factors[k + 1..], outer);
+        }
+        for (k, factors) in A.as_slice().chunks_exact(n).enumerate().rev() {
+            let (outer, inner) = B.split_at_mut(k * p);
+            let (scale, own) = (1.0 / factors[k], &mut inner[..p]);
+            own.iter_mut().for_each(|x| *x *= scale);
+            subtract(own, &factors[..k], outer);
+        }
+    }
+}
+
+/// Takes multiples of one column off others.
+#[inline(always)]
+fn subtract(from: &[f64], factors: &[f64], others: &mut [f64]) {
+    for (to, factor) in others.chunks_exact_mut(from.len()).zip(factors) {
+        to.iter_mut().zip(from).for_each(|(to, x)| *to -= factor * x);
     }
 }
 
@@ -76,8 +102,8 @@ mod tests {
         let mut lu = Lu::new(n);
         lu.A.copy_from(&A);
         lu.factor("test", 0.0).unwrap();
-        let mut X = B.clone();
-        lu.solve(X.as_view_mut());
-        assert!((A * X - B).amax() < 1e-12);
+        let mut X = B.transpose();
+        lu.solve_transposed(&mut X);
+        assert!((A * X.transpose() - B).amax() < 1e-12);
     }
 }

@@ -12,6 +12,7 @@
 //! Start at [`run_slopes`]. Not here: names and units of parameters (`flexarm-identify`), drives under torque, gears with laws of their own,
 //! links in modes, closed loops, payloads that change: these are refused.
 
+mod columns;
 mod lu;
 mod recurrence;
 mod tool;
@@ -198,7 +199,7 @@ pub fn equilibrium_slopes(arm: &FlexibleArm, directions: &[Direction]) -> Result
     arm.carry_from_start()?;
     check(&arm, &request, directions)?;
     let e = static_equilibrium(&arm, 0.0)?;
-    Ok(Recurrence::new(arm, &request, directions, &e)?.x)
+    Ok(Recurrence::new(arm, &request, directions, &e)?.x.transpose())
 }
 
 /// What of the arm and of the directions is not differentiated.

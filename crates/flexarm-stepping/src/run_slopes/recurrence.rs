@@ -20,6 +20,7 @@ use crate::events::Change;
 use crate::implicit::ImplicitStep;
 use crate::integrator::{Integrator, check_deflection};
 use crate::reduced::ReducedArm;
+use crate::run_slopes::columns::{self, Work};
 use crate::run_slopes::lu::Lu;
 use crate::run_slopes::{Direction, SlopesRequest, SpringSlope};
 use crate::steppers::{Coefficients, GeneralizedAlpha};
@@ -37,16 +38,17 @@ pub(super) struct Recurrence<'a> {
     c: f64,
     /// All coordinates at the current time.
     pub(super) q: DVector<f64>,
-    /// Derivatives of the elastic coordinates, n × p, of their rates and accelerations, and of what the scheme remembers.
+    /// Derivatives of the elastic coordinates, p × n, of their rates and accelerations, and of what the scheme remembers: all directions of
+    /// a coordinate stand together, so that sums go over whole columns.
     pub(super) x: DMatrix<f64>,
     v: DMatrix<f64>,
     acceleration: DMatrix<f64>,
     a: DMatrix<f64>,
     x_tilde: DMatrix<f64>,
-    /// Of the joints, their rates and accelerations, m × p.
+    /// Of the joints, their rates and accelerations, p × m.
     pub(super) joints: [DMatrix<f64>; 3],
     tangent: Tangent,
-    /// S, and M of the start of the step.
+    /// Sᵀ, then S, and M of the start of the step.
     S: DMatrix<f64>,
     mass: Lu,
     matrix: Lu,
@@ -65,6 +67,9 @@ pub(super) struct Recurrence<'a> {
     v_h: DMatrix<f64>,
     rhs: DMatrix<f64>,
     room: DVector<f64>,
+    /// Room for one direction: its joints, its elastic coordinates.
+    sample: [Vec<f64>; 3],
+    own: Vec<f64>,
 }
 
 /// Matrices of (1) of the module above at the current state.
@@ -102,7 +107,7 @@ impl<'a> Recurrence<'a> {
         let integrator = GeneralizedAlpha::new(&mut system, 0.0, h, request.settings, x, v)?.exactly();
         let coefficients = Coefficients::new(request.settings.rho);
         let c = if request.settings.dispersion_correction { coefficients.dispersion().max(0.0) } else { 0.0 };
-        let zeros = || DMatrix::zeros(n, p);
+        let zeros = || DMatrix::zeros(p, n);
         let mut run = Self {
             integrator,
             directions,
@@ -114,7 +119,9 @@ impl<'a> Recurrence<'a> {
             acceleration: zeros(),
             a: zeros(),
             x_tilde: zeros(),
-            joints: std::array::from_fn(|_| DMatrix::zeros(m, p)),
+            joints: std::array::from_fn(|_| DMatrix::zeros(p, m)),
+            sample: std::array::from_fn(|_| vec![0.0; m]),
+            own: vec![0.0; n],
             tangent,
             S: DMatrix::zeros(n, n),
             mass: Lu::new(n),
@@ -122,7 +129,7 @@ impl<'a> Recurrence<'a> {
             of_inertia: DMatrix::zeros(m + n, m + n),
             y: DVector::zeros(m + n),
             q_start: DVector::zeros(m + n),
-            joints_start: DMatrix::zeros(m, p),
+            joints_start: DMatrix::zeros(p, m),
             C: DMatrix::zeros(n, n),
             z: zeros(),
             x_h: zeros(),
@@ -152,18 +159,20 @@ impl<'a> Recurrence<'a> {
 
     /// Derivatives of the motion of the joints.
     fn sample_joints(&mut self, t: f64) {
-        let [q, qdot, qddot] = &mut self.joints;
         for (k, direction) in self.directions.iter().enumerate() {
             if let Some(motion) = &direction.motion {
-                let (mut q, mut qdot, mut qddot) = (q.column_mut(k), qdot.column_mut(k), qddot.column_mut(k));
-                motion.sample(t, q.as_mut_slice(), qdot.as_mut_slice(), qddot.as_mut_slice());
+                let [q, qdot, qddot] = &mut self.sample;
+                motion.sample(t, q, qdot, qddot);
+                for (to, from) in self.joints.iter_mut().zip(&self.sample) {
+                    from.iter().enumerate().for_each(|(i, x)| to[(k, i)] = *x);
+                }
             }
         }
     }
 
     /// δx of the equilibrium at the start.
     fn rest(&mut self, e: &DVector<f64>) -> Result<(), StepError> {
-        let Self { system, tangent, directions, joints, x, rhs, room, matrix, .. } = self;
+        let Self { system, tangent, directions, joints, x, rhs, room, own, matrix, .. } = self;
         let arm = &system.arm;
         let (m, n) = (arm.model.n_actuated(), e.len());
         let mut state = State::zeros(&arm.model);
@@ -179,15 +188,16 @@ impl<'a> Recurrence<'a> {
         rhs.fill(0.0);
         let still = DVector::zeros(n);
         for (k, direction) in directions.iter().enumerate() {
-            let mut to = rhs.column_mut(k);
-            tangent.add_explicit(arm, &data, direction, e.as_slice(), still.as_slice(), room, to.as_mut_slice());
+            own.fill(0.0);
+            tangent.add_explicit(arm, &data, direction, e.as_slice(), still.as_slice(), room, own);
+            put(own, rhs, k);
         }
         add_product(&tangent.by_q, (m, 0), &joints[0], rhs);
         matrix.A.copy_from(&tangent.by_q.view((m, m), (n, n)));
         matrix.factor("static stiffness (with the effect of weight)", 0.0)?;
         x.copy_from(rhs);
         x.neg_mut();
-        matrix.solve(x.as_view_mut());
+        matrix.solve_transposed(x);
         Ok(())
     }
 
@@ -207,14 +217,15 @@ impl<'a> Recurrence<'a> {
 
     /// δr of (3), with what the joints' motion does, into `rhs`.
     fn explicit(&mut self) {
-        let Self { system, integrator, tangent, directions, joints, rhs, room, .. } = self;
+        let Self { system, integrator, tangent, directions, joints, rhs, room, own, .. } = self;
         let now = Integrator::current(integrator);
         let m = system.arm.model.n_actuated();
         rhs.fill(0.0);
         for (k, direction) in directions.iter().enumerate() {
-            let mut to = rhs.column_mut(k);
             let (x, v) = (now.x.as_slice(), now.v.as_slice());
-            tangent.add_explicit(&system.arm, &system.data, direction, x, v, room, to.as_mut_slice());
+            own.fill(0.0);
+            tangent.add_explicit(&system.arm, &system.data, direction, x, v, room, own);
+            put(own, rhs, k);
         }
         if directions.iter().any(|direction| direction.motion.is_some()) {
             for (matrix, joints) in [&tangent.by_q, &tangent.by_rate, &tangent.M].into_iter().zip(joints) {
@@ -231,13 +242,13 @@ impl<'a> Recurrence<'a> {
         self.explicit();
         let Self { system, tangent, rhs, x, v, matrix, .. } = self;
         let m = system.arm.model.n_actuated();
-        let n = x.nrows();
+        let n = x.ncols();
         add_product(&tangent.by_q, (m, m), x, rhs);
         add_product(&tangent.by_rate, (m, m), v, rhs);
         matrix.A.copy_from(&tangent.M.view((m, m), (n, n)));
         matrix.factor("mass matrix", self.integrator.time())?;
         rhs.neg_mut();
-        matrix.solve(rhs.as_view_mut());
+        matrix.solve_transposed(rhs);
         for to in [&mut self.acceleration, &mut self.a, &mut self.x_tilde] {
             to.copy_from(&self.rhs);
         }
@@ -272,7 +283,7 @@ impl<'a> Recurrence<'a> {
         let (dt, fresh) = self.next_length(stop);
         let differentiated = !self.directions.is_empty();
         if differentiated {
-            let (m, n) = (self.system.arm.model.n_actuated(), self.x.nrows());
+            let (m, n) = (self.system.arm.model.n_actuated(), self.x.ncols());
             self.q_start.copy_from(&self.q);
             self.joints_start.copy_from(&self.joints[0]);
             self.mass.A.copy_from(&self.tangent.M.view((m, m), (n, n)));
@@ -314,14 +325,15 @@ impl<'a> Recurrence<'a> {
         if c_h2 == 0.0 {
             return;
         }
-        let Self { system, integrator, tangent, directions, S, z, mass, of_inertia, y, room, x, .. } = self;
+        let Self { system, integrator, tangent, directions, S, z, mass, of_inertia, y, room, own, x, .. } = self;
         let arm = &system.arm;
-        let (m, n) = (arm.model.n_actuated(), z.nrows());
+        let (m, n) = (arm.model.n_actuated(), z.ncols());
         let acceleration = &Integrator::current(integrator).acceleration;
+        // K is symmetric: the transposed of M^-1 K.
         S.copy_from(&tangent.K);
-        mass.solve(S.as_view_mut());
+        mass.solve_transposed(S);
         y.fill(0.0);
-        y.rows_mut(m, n).gemv(1.0, S, acceleration, 0.0);
+        y.rows_mut(m, n).gemv_tr(1.0, S, acceleration, 0.0);
         let Tangent { inertia, work, .. } = tangent;
         forward_kinematics(&arm.model, work, &self.q_start);
         inertia.of_inertia(&arm.model, work, &self.q_start, y, of_inertia);
@@ -332,18 +344,17 @@ impl<'a> Recurrence<'a> {
             for (body, more) in &direction.inertias {
                 inertia.add_inertia_forces(&arm.model, work, *body, more, 1.0, room.as_mut_slice());
             }
-            let mut to = z.column_mut(k);
-            to.axpy(1.0, &room.rows(m, n), 1.0);
-            to.neg_mut();
+            own.iter_mut().zip(&room.as_slice()[m..]).enumerate().for_each(|(i, (own, x))| *own = -x - z[(k, i)]);
             for (number, slope) in &direction.springs {
                 let element = &arm.elements[*number];
                 let range = arm.offset(element)..arm.offset(element) + element.size;
-                let to = &mut to.as_mut_slice()[range.clone()];
+                let to = &mut own[range.clone()];
                 slope.add_linear(&element.K, &acceleration.as_slice()[range], to);
             }
-            to.scale_mut(c_h2);
+            own.iter_mut().for_each(|own| *own *= c_h2);
+            put(own, z, k);
         }
-        mass.solve(z.as_view_mut());
+        mass.solve_transposed(z);
         S.scale_mut(c_h2);
         (0..n).for_each(|k| S[(k, k)] += 1.0);
     }
@@ -358,16 +369,17 @@ impl<'a> Recurrence<'a> {
         }
         self.explicit();
         let Self { system, tangent, S, matrix, rhs, x_h, v_h, C, .. } = self;
-        let (m, n) = (system.arm.model.n_actuated(), x_h.nrows());
+        let (m, n) = (system.arm.model.n_actuated(), x_h.ncols());
         add_product(&tangent.by_q, (m, m), x_h, rhs);
         add_product(&tangent.by_rate, (m, m), v_h, rhs);
         rhs.neg_mut();
         C.copy_from(&tangent.by_rate.view((m, m), (n, n)));
         C.zip_apply(&tangent.by_q.view((m, m), (n, n)), |c, k| *c = c_D * *c + c_K * k);
         matrix.A.copy_from(&tangent.M.view((m, m), (n, n)));
-        add_product(C, (0, 0), S, &mut matrix.A);
+        add_product(S, (0, 0), C, &mut matrix.A);
+        S.transpose_mut();
         matrix.factor("matrix of a step's tangent", t)?;
-        matrix.solve(rhs.as_view_mut());
+        matrix.solve_transposed(rhs);
 
         self.acceleration.copy_from(&self.rhs);
         // S δẍ⁺ in the place of the right-hand side.
@@ -481,11 +493,51 @@ impl SpringSlope {
     }
 }
 
-/// `to += A X` for the block of A from this row and column on.
+/// Puts the numbers of a direction into its row.
+fn put(from: &[f64], to: &mut DMatrix<f64>, row: usize) {
+    from.iter().enumerate().for_each(|(i, x)| to[(row, i)] = *x);
+}
+
+/// `toᵀ += A Xᵀ` for the block of A from this row and column on.
 fn add_product(A: &DMatrix<f64>, corner: (usize, usize), X: &DMatrix<f64>, to: &mut DMatrix<f64>) {
-    let rows = to.nrows();
-    for (x, to) in X.column_iter().zip(to.as_mut_slice().chunks_exact_mut(rows.max(1))) {
-        add_columns(A, corner, x.as_slice(), to);
+    let p = X.nrows();
+    if p > 0 {
+        columns::quickly(AddProduct { A, corner, X: X.as_slice(), to: to.as_mut_slice(), p });
+    }
+}
+
+struct AddProduct<'a> {
+    A: &'a DMatrix<f64>,
+    corner: (usize, usize),
+    X: &'a [f64],
+    to: &'a mut [f64],
+    p: usize,
+}
+
+impl Work for AddProduct<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { A, corner: (row, column), X, to, p } = self;
+        let (rows, all) = (A.nrows(), A.as_slice());
+        for (i, to) in to.chunks_exact_mut(p).enumerate() {
+            let entry = |k: usize| all[(column + k) * rows + row + i];
+            let mut fours = X.chunks_exact(4 * p);
+            let mut k = 0;
+            // Four columns at a time: the sums go through the registers once for all four.
+            for x in fours.by_ref() {
+                let (a, x0) = ([entry(k), entry(k + 1), entry(k + 2), entry(k + 3)], &x[..p]);
+                let (x1, x2, x3) = (&x[p..2 * p], &x[2 * p..3 * p], &x[3 * p..]);
+                for ((((to, x0), x1), x2), x3) in to.iter_mut().zip(x0).zip(x1).zip(x2).zip(x3) {
+                    *to += (a[0] * x0 + a[1] * x1) + (a[2] * x2 + a[3] * x3);
+                }
+                k += 4;
+            }
+            for x in fours.remainder().chunks_exact(p) {
+                let a = entry(k);
+                to.iter_mut().zip(x).for_each(|(to, x)| *to += a * x);
+                k += 1;
+            }
+        }
     }
 }
 

@@ -62,7 +62,7 @@ impl ToolError {
         let (_, B) = ElasticAngles::RotationVector.pose(&theta);
         let rates = B.try_inverse().unwrap_or(B) * turned.transpose();
         for (k, slope) in self.slopes.iter_mut().enumerate() {
-            let (x, joints) = (run.x.column(k), run.joints[0].column(k));
+            let (x, joints) = (run.x.row(k), run.joints[0].row(k));
             let mut V = Vector6::zeros();
             for (column, x) in self.J.columns(m, x.len()).column_iter().zip(x.iter()) {
                 V.axpy(*x, &column, 1.0);
