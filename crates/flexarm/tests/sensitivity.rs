@@ -169,7 +169,7 @@ fn a_factor_of_one_direction_in_the_robot_file_does_what_its_derivative_says() {
 
 #[test]
 fn what_has_no_derivatives_and_names_that_are_none_are_refused() {
-    let (robot, _, motion) = shipped("kr210", "point_to_point");
+    let (robot, _, motion) = shipped("manutec_r3", "manutec_r3");
     let servo = Modelling { drives: DriveModel::Servo, ..Modelling::default() };
     let run = RunOptions { modelling: servo, ..RunOptions::default() };
     let error = sensitivity(&robot, &motion, &SensitivityRequest { run, ..Default::default() }).unwrap_err();

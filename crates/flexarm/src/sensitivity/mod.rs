@@ -243,7 +243,7 @@ fn change_of(parameter: &Parameter) -> (&'static str, f64) {
 fn table(named: &[Named], found: &RunSlopes) -> String {
     const AXES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
     let mut text = String::from("time_s");
-    let names = std::iter::once("error".to_owned()).chain(named.iter().map(|own| format!("{}/{}", own.name, own.per)));
+    let names = std::iter::once("error").chain(named.iter().map(|own| own.name.as_str()));
     for name in names {
         AXES.iter().for_each(|axis| text += &format!(",{name}.{axis}"));
     }
