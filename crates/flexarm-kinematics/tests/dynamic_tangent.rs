@@ -22,8 +22,7 @@ struct Case {
 fn case(seed: u64, n_joints: usize) -> Case {
     let mut tree = random_tree(seed, n_joints);
     // Rotors, and a joint that follows another one.
-    let single: Vec<usize> =
-        (0..tree.joints.len()).filter(|&k| tree.joints[k].kind.axis_motion().is_some()).collect();
+    let single: Vec<usize> = (0..tree.joints.len()).filter(|&k| tree.joints[k].kind.axis_motion().is_some()).collect();
     single.iter().for_each(|&k| tree.joints[k].armature = 0.3 * k as f64);
     if let [first, .., last] = single[..] {
         let leader = tree.joints[first].name.clone();

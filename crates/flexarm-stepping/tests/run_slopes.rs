@@ -181,7 +181,8 @@ impl Case {
         if !self.loaded {
             return arm;
         }
-        let force = |t: f64| Wrench::new(Vector3::new(80.0 * (9.0 * t).sin(), 0.0, -50.0), Vector3::new(0.0, 20.0, 5.0));
+        let force =
+            |t: f64| Wrench::new(Vector3::new(80.0 * (9.0 * t).sin(), 0.0, -50.0), Vector3::new(0.0, 20.0, 5.0));
         let world = Load::at_origin(body, TimedWrench::new(force));
         // From the middle of a step on.
         let late = move |t: f64| if t < 0.1013 { Wrench::zeros() } else { force(2.0 * t) };
@@ -214,15 +215,14 @@ impl Case {
             What::Mass => direction.inertias.push((arm.model.frame("tcp").unwrap().body, per_kg())),
             What::Shift(k) => direction.motion = Some(Arc::new(Held(unit(k).to_vec()))),
             What::Stretch(k) => {
-                direction.motion = Some(Arc::new(MotionFn(
-                    move |t: f64, q: &mut [f64], v: &mut [f64], a: &mut [f64]| {
+                direction.motion =
+                    Some(Arc::new(MotionFn(move |t: f64, q: &mut [f64], v: &mut [f64], a: &mut [f64]| {
                         let (x, y, z) = reference_motion(t);
                         q.fill(0.0);
                         v.fill(0.0);
                         a.fill(0.0);
                         (q[k], v[k], a[k]) = (x[k], y[k], z[k]);
-                    },
-                )));
+                    })));
             }
             What::Tool => direction.tool = Vector3::new(0.3, -0.2, 0.5),
         }
@@ -267,8 +267,7 @@ impl Case {
             let peaks = [&found.position, &found.rotation].map(|s| (s.t_peak_s / 2e-3).round() as usize);
             let truth = richardson(h, |x| self.run(what, x, peaks));
             let (along, figures) = truth.as_slice().split_at(truth.len() - 4);
-            let own: Vec<f64> =
-                found.slopes.iter().skip(k).step_by(ALL.len()).flatten().copied().collect();
+            let own: Vec<f64> = found.slopes.iter().skip(k).step_by(ALL.len()).flatten().copied().collect();
             let scale = |x: &[f64]| x.iter().fold(0.0f64, |m, x| m.max(x.abs()));
             let off: Vec<f64> = own.iter().zip(along).map(|(a, b)| a - b).collect();
             let at = |s: &ErrorSlopes| [s.peak_slopes[k], s.rms_slopes[k]];
@@ -317,8 +316,7 @@ fn loads_that_jump_and_turn_and_balancers_are_in_the_derivatives() {
 /// An ordinary run ends its iterations early and keeps its matrices: what that does is small beside the run, and beside its error.
 #[test]
 fn the_run_that_is_differentiated_is_the_ordinary_run_but_for_what_iterations_leave() {
-    let case =
-        Case { tree: reference_arm(true).mechanism, loaded: false, settings: AlphaSettings::default() };
+    let case = Case { tree: reference_arm(true).mechanism, loaded: false, settings: AlphaSettings::default() };
     let arm = case.arm(What::Tool, 0.0);
     let request = case.request(&arm, Vector3::zeros());
     let exact = run_slopes(&arm, &request, &[]).unwrap();
@@ -346,8 +344,7 @@ fn the_run_that_is_differentiated_is_the_ordinary_run_but_for_what_iterations_le
 
 #[test]
 fn what_is_not_differentiated_is_refused_with_a_way_out() {
-    let case =
-        Case { tree: reference_arm(true).mechanism, loaded: false, settings: AlphaSettings::default() };
+    let case = Case { tree: reference_arm(true).mechanism, loaded: false, settings: AlphaSettings::default() };
     let arm = case.arm(What::Tool, 0.0);
     let request = case.request(&arm, Vector3::zeros());
     let body = arm.model.frame("tcp").unwrap().body;

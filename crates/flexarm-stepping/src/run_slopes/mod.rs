@@ -154,11 +154,8 @@ pub fn run_slopes(
     let mut tool = ToolError::new(&arm, &request.tool, directions);
     let mut run = Recurrence::new(arm, request, directions, &e)?;
     let count = directions.len();
-    let mut found = RunSlopes {
-        position: ErrorSlopes::new(count),
-        rotation: ErrorSlopes::new(count),
-        ..RunSlopes::default()
-    };
+    let mut found =
+        RunSlopes { position: ErrorSlopes::new(count), rotation: ErrorSlopes::new(count), ..RunSlopes::default() };
     let steps = (request.duration_s / request.step_s - 1e-9).ceil().max(0.0) as u64;
     for step in 0..=steps {
         if step > 0 {
@@ -209,10 +206,7 @@ fn check(arm: &FlexibleArm, request: &SlopesRequest, directions: &[Direction]) -
         return Err(StepError::Setup(format!("the step must be a positive time in seconds, found {step_s}")));
     }
     if !(0.0..=1.0).contains(&settings.rho) {
-        return Err(StepError::Setup(format!(
-            "the spectral radius must lie between 0 and 1, found {}",
-            settings.rho
-        )));
+        return Err(StepError::Setup(format!("the spectral radius must lie between 0 and 1, found {}", settings.rho)));
     }
     let refuse = |what, mend| Err(StepError::NoSlopes { what, mend });
     if !arm.torque_driven.is_empty() {

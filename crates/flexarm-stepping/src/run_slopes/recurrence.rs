@@ -20,7 +20,7 @@ use crate::events::Change;
 use crate::implicit::ImplicitStep;
 use crate::integrator::{Integrator, check_deflection};
 use crate::reduced::ReducedArm;
-use crate::run_slopes::columns::{self, Work};
+use crate::run_slopes::columns::add_product;
 use crate::run_slopes::lu::Lu;
 use crate::run_slopes::{Direction, SlopesRequest, SpringSlope};
 use crate::steppers::{Coefficients, GeneralizedAlpha};
@@ -496,49 +496,6 @@ impl SpringSlope {
 /// Puts the numbers of a direction into its row.
 fn put(from: &[f64], to: &mut DMatrix<f64>, row: usize) {
     from.iter().enumerate().for_each(|(i, x)| to[(row, i)] = *x);
-}
-
-/// `toᵀ += A Xᵀ` for the block of A from this row and column on.
-fn add_product(A: &DMatrix<f64>, corner: (usize, usize), X: &DMatrix<f64>, to: &mut DMatrix<f64>) {
-    let p = X.nrows();
-    if p > 0 {
-        columns::quickly(AddProduct { A, corner, X: X.as_slice(), to: to.as_mut_slice(), p });
-    }
-}
-
-struct AddProduct<'a> {
-    A: &'a DMatrix<f64>,
-    corner: (usize, usize),
-    X: &'a [f64],
-    to: &'a mut [f64],
-    p: usize,
-}
-
-impl Work for AddProduct<'_> {
-    #[inline(always)]
-    fn run(self) {
-        let Self { A, corner: (row, column), X, to, p } = self;
-        let (rows, all) = (A.nrows(), A.as_slice());
-        for (i, to) in to.chunks_exact_mut(p).enumerate() {
-            let entry = |k: usize| all[(column + k) * rows + row + i];
-            let mut fours = X.chunks_exact(4 * p);
-            let mut k = 0;
-            // Four columns at a time: the sums go through the registers once for all four.
-            for x in fours.by_ref() {
-                let (a, x0) = ([entry(k), entry(k + 1), entry(k + 2), entry(k + 3)], &x[..p]);
-                let (x1, x2, x3) = (&x[p..2 * p], &x[2 * p..3 * p], &x[3 * p..]);
-                for ((((to, x0), x1), x2), x3) in to.iter_mut().zip(x0).zip(x1).zip(x2).zip(x3) {
-                    *to += (a[0] * x0 + a[1] * x1) + (a[2] * x2 + a[3] * x3);
-                }
-                k += 4;
-            }
-            for x in fours.remainder().chunks_exact(p) {
-                let a = entry(k);
-                to.iter_mut().zip(x).for_each(|(to, x)| *to += a * x);
-                k += 1;
-            }
-        }
-    }
 }
 
 /// `to += A x`, likewise.

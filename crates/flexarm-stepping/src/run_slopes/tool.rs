@@ -1,10 +1,11 @@
 //! The tool's error against the rigid arm, and its derivatives from those of the coordinates.
 
 use flexarm_kinematics::{Data, ElasticAngles, Frame, forward_kinematics, frame_jacobian, rotation_vector};
-use nalgebra::{DVector, Matrix6xX, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Matrix6xX, Vector3, Vector6};
 
 use crate::arm::FlexibleArm;
 use crate::run_slopes::Direction;
+use crate::run_slopes::columns::add_product;
 use crate::run_slopes::recurrence::Recurrence;
 
 /// Error and derivatives of one time, with workspaces.
@@ -15,6 +16,9 @@ pub(super) struct ToolError {
     q: DVector<f64>,
     J: Matrix6xX<f64>,
     J_rigid: Matrix6xX<f64>,
+    /// Twists of the tool and of the rigid arm's, p × 6.
+    twists: DMatrix<f64>,
+    rigid_twists: DMatrix<f64>,
     /// Change of the tool's point per direction, tool axes.
     points: Vec<Vector3<f64>>,
     /// Whether the motion of the joints changes.
@@ -32,6 +36,8 @@ impl ToolError {
             q: DVector::zeros(nv),
             J: Matrix6xX::zeros(nv),
             J_rigid: Matrix6xX::zeros(nv),
+            twists: DMatrix::zeros(directions.len(), 6),
+            rigid_twists: DMatrix::zeros(directions.len(), 6),
             points: directions.iter().map(|direction| direction.tool).collect(),
             moves: directions.iter().any(|direction| direction.motion.is_some()),
             slopes: vec![[0.0; 6]; directions.len()],
@@ -61,23 +67,19 @@ impl ToolError {
         // w = B θ' in the axes of the turned frame.
         let (_, B) = ElasticAngles::RotationVector.pose(&theta);
         let rates = B.try_inverse().unwrap_or(B) * turned.transpose();
+        self.twists.fill(0.0);
+        add_product(&self.J, (0, m), &run.x, &mut self.twists);
+        if self.moves {
+            add_product(&self.J, (0, 0), &run.joints[0], &mut self.twists);
+            self.rigid_twists.fill(0.0);
+            add_product(&self.J_rigid, (0, 0), &run.joints[0], &mut self.rigid_twists);
+        }
         for (k, slope) in self.slopes.iter_mut().enumerate() {
-            let (x, joints) = (run.x.row(k), run.joints[0].row(k));
-            let mut V = Vector6::zeros();
-            for (column, x) in self.J.columns(m, x.len()).column_iter().zip(x.iter()) {
-                V.axpy(*x, &column, 1.0);
-            }
-            let mut V_rigid = Vector6::zeros();
-            if self.moves {
-                for (i, q) in joints.iter().enumerate().filter(|(_, q)| **q != 0.0) {
-                    V.axpy(*q, &self.J.column(i), 1.0);
-                    V_rigid.axpy(*q, &self.J_rigid.column(i), 1.0);
-                }
-            }
-            let parts = |V: &Vector6<f64>| [0, 3].map(|k| V.fixed_rows::<3>(k).into_owned());
-            let ([v, w], [v_rigid, w_rigid]) = (parts(&V), parts(&V_rigid));
-            let moved = v - v_rigid + (R - R_rigid) * self.points[k];
-            let turning = rates * (w - turned * w_rigid);
+            let part =
+                |twists: &DMatrix<f64>, c: usize| Vector3::new(twists[(k, c)], twists[(k, c + 1)], twists[(k, c + 2)]);
+            let (twists, rigid) = (&self.twists, &self.rigid_twists);
+            let moved = part(twists, 0) - part(rigid, 0) + (R - R_rigid) * self.points[k];
+            let turning = rates * (part(twists, 3) - turned * part(rigid, 3));
             *slope = [moved.x, moved.y, moved.z, turning.x, turning.y, turning.z];
         }
         error

@@ -187,8 +187,7 @@ pub fn sensitivity(
     let arm = robot.flexible(request.run.modelling)?;
     let named = chosen(arm.run_parameters(), &request.parameters, |own| &own.name)?;
     let parameters: Vec<RunParameter> = named.iter().map(|own| own.parameter.clone()).collect();
-    let (found, mut caveats) =
-        arm.error_slopes_told(&scenario, &request.run, &parameters, request.table.is_some())?;
+    let (found, mut caveats) = arm.error_slopes_told(&scenario, &request.run, &parameters, request.table.is_some())?;
     caveats.extend_from_slice(arm.robot_caveats());
     if let Some(path) = &request.table {
         write_all(&[(path.clone(), table(&named, &found))])?;
