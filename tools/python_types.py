@@ -23,6 +23,8 @@ ROOTS = [
     ("Response", "flexarm/src/response.rs", "ResponseSummary"),
     ("Map", "flexarm/src/map/mod.rs", "MapSummary"),
     ("Compensation", "flexarm/src/compensate/mod.rs", "Compensation"),
+    ("Sensitivity", "flexarm/src/sensitivity/mod.rs", "Sensitivity"),
+    ("PoseSensitivity", "flexarm/src/sensitivity/pose.rs", "PoseSensitivity"),
     ("Identification", "flexarm/src/identify/mod.rs", "Identification"),
     ("MeasurementPlan", "flexarm/src/identify/plan_file.rs", "MeasurementPlan"),
     ("Lobes", "flexarm/src/lobes/mod.rs", "Lobes"),

@@ -18,6 +18,7 @@ use crate::new::NewArgs;
 use crate::posed_args::{ModesArgs, ResponseArgs, StaticsArgs};
 use crate::reduce_args::ReduceArgs;
 use crate::report::ReportArgs;
+use crate::sensitivity::SensitivityArgs;
 use crate::sweep::SweepArgs;
 use crate::verify::VerifyArgs;
 use crate::view::ViewArgs;
@@ -56,6 +57,8 @@ pub(crate) enum Command {
     Identify(Box<IdentifyArgs>),
     /// Find the motion with which the flexible arm's tool follows the rigid one's, and judge it on other plants
     Compensate(Box<CompensateArgs>),
+    /// How the tool's error along a motion depends on every number of the robot: derivatives of one run, for all at once
+    Sensitivity(Box<SensitivityArgs>),
     /// Sag, stiffness and frequencies over the workspace, over joints or along a motion, and where to put a workpiece
     Map(Box<MapArgs>),
     /// Run a study: many runs with other payloads, stiffness, speeds, options; tables, sensitivities, shards

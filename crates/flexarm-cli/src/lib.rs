@@ -23,6 +23,7 @@ mod print;
 mod reduce;
 mod reduce_args;
 mod report;
+mod sensitivity;
 mod shipped;
 mod signals;
 mod study;
@@ -124,6 +125,7 @@ fn command(cli: &Cli, line: &[OsString]) -> Result<ExitCode, Failure> {
         Command::Motion(args) => motion::run(cli, args),
         Command::Identify(args) => identify::run(cli, args),
         Command::Compensate(args) => compensate::run(cli, args),
+        Command::Sensitivity(args) => sensitivity::run(cli, args),
         Command::Map(args) => map::run(cli, args),
         Command::Sweep(args) => sweep::run(cli, args),
         Command::New(args) => new::run(cli, args),

@@ -3,7 +3,7 @@
 //! A [`Plant`] is an arm as it is known, [`Parameter`]s say what of it is unknown, [`Measurements`] what was read at the robot.
 //! [`MeasuredArm`] puts them together; [`identify`] finds the parameters, says which of them the readings tell and how well, and
 //! which readings argue against the model. [`plan`] chooses poses and loads that are worth measuring. Derivatives are in closed
-//! form ([`tool_slopes`], [`compliance_slopes`], [`frequency_slopes`], [`structure_slopes`]).
+//! form ([`tool_slopes`], [`compliance_slopes`], [`frequency_slopes`], [`structure_slopes`], and [`error_slopes`] along a motion).
 //!
 //! Not here: files, units, robots by name (the facade).
 #![allow(non_snake_case, reason = "monogram notation: X_WT, J; see docs/references.md")]
@@ -17,6 +17,7 @@ mod parameter;
 mod plan;
 mod response;
 mod sensitivity;
+mod trajectory;
 
 pub use encoders::{GearEstimate, GearRun, gear_stiffness};
 pub use identify::{Found, HeldOut, Identified, IdentifyError, IdentifyOptions, identify};
@@ -29,3 +30,4 @@ pub use parameter::{Effect, Parameter, Place, Plant};
 pub use plan::{Candidate, Plan, PlanOptions, plan};
 pub use response::{Answer, Probe, ResponseSlopes, Structure, StructureSlopes, structure_slopes};
 pub use sensitivity::{FrequencySlopes, compliance_slopes, frequency_slopes, tool_slopes};
+pub use trajectory::{RunParameter, error_slopes};

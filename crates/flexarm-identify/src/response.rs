@@ -133,9 +133,9 @@ pub fn structure_slopes(
                 rows(&arm, probes, q).into_iter().map(|row| DMatrix::from_row_slice(1, row.len(), row.as_slice()));
             [at.K, at.M].into_iter().chain(rows).collect()
         });
-        let (eK, eM) = explicit(&arm, &plant.tool, &none, parameter, &q, &here);
+        let (eK, eM) = explicit(&arm, &plant.tool, &none, &parameter.effect, &q, &here);
         let (K, M) = (&change[0] + eK, &change[1] + eM);
-        let D = damped.slope(parameter, &K, &M);
+        let D = damped.slope(&parameter.effect, &K, &M);
         let rows = change[2..].iter().map(|row| RowDVector::from_row_slice(row.as_slice())).collect();
         slopes.push(Structure { M, D, K, rows });
     }
@@ -158,11 +158,11 @@ fn rows(arm: &FlexibleArm, probes: &[Probe], q: &DVector<f64>) -> Vec<RowDVector
 }
 
 /// Damping that follows modes and springs.
-struct Damped<'a> {
-    arm: &'a FlexibleArm,
-    M: &'a DMatrix<f64>,
-    omega2: &'a [f64],
-    shapes: &'a DMatrix<f64>,
+pub(crate) struct Damped<'a> {
+    pub(crate) arm: &'a FlexibleArm,
+    pub(crate) M: &'a DMatrix<f64>,
+    pub(crate) omega2: &'a [f64],
+    pub(crate) shapes: &'a DMatrix<f64>,
 }
 
 /// A spring's stiffness and damping, and their change by a parameter.
@@ -178,8 +178,8 @@ struct SpringSlope {
 
 impl Damped<'_> {
     /// Change of the damping matrix with that of the structure.
-    fn slope(&self, parameter: &Parameter, dK: &DMatrix<f64>, dM: &DMatrix<f64>) -> DMatrix<f64> {
-        let springs = self.springs(parameter);
+    pub(crate) fn slope(&self, effect: &Effect, dK: &DMatrix<f64>, dM: &DMatrix<f64>) -> DMatrix<f64> {
+        let springs = self.springs(effect);
         let n = dK.nrows();
         let mut dD = DMatrix::zeros(n, n);
         if springs.iter().any(|spring| matches!(spring.damping, Damping::Modal(zeta) if zeta != 0.0)) {
@@ -202,11 +202,11 @@ impl Damped<'_> {
         dD
     }
 
-    fn springs(&self, parameter: &Parameter) -> Vec<SpringSlope> {
+    fn springs(&self, effect: &Effect) -> Vec<SpringSlope> {
         let of = |(number, e): (usize, &flexarm_stepping::ElasticElement)| {
             let mut dK = DMatrix::zeros(e.size, e.size);
             let mut more = 0.0;
-            match &parameter.effect {
+            match effect {
                 Effect::Stiffness(places) => {
                     for place in places.iter().filter(|place| place.spring == number) {
                         dK += slope_of(&e.K, place.coordinate);

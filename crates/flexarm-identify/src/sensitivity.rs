@@ -103,7 +103,7 @@ pub fn frequency_slopes(plant: &Plant, parameters: &[Parameter], q: &[f64]) -> R
             let at = Tangents::at(&arm, &plant.tool, &none, q);
             vec![at.K, at.M]
         });
-        let (eK, eM) = explicit(&arm, &plant.tool, &none, parameter, at.coordinates(), &here);
+        let (eK, eM) = explicit(&arm, &plant.tool, &none, &parameter.effect, at.coordinates(), &here);
         let (dK, dM) = (&change[0] + eK, &change[1] + eM);
         for (i, w2) in omega2.iter().enumerate() {
             let phi = shapes.column(i);
@@ -140,24 +140,30 @@ pub(crate) fn eigen(at: &Tangents) -> Result<(Vec<f64>, DMatrix<f64>), StepError
     Ok((omega2, shapes))
 }
 
-/// Change of matrices that depend on the coordinates as the elastic ones move by `de` per unit: central differences of fourth order.
+/// Change of matrices that depend on the coordinates as the elastic ones move by `de` per unit.
 pub(crate) fn along(
     arm: &FlexibleArm,
     q: &DVector<f64>,
     de: &DVector<f64>,
     look: impl Fn(&DVector<f64>) -> Vec<DMatrix<f64>>,
 ) -> Vec<DMatrix<f64>> {
-    let (m, n) = (arm.model.n_actuated(), de.len());
-    let size = de.amax();
+    let mut dq = DVector::zeros(q.len());
+    dq.rows_mut(arm.model.n_actuated(), de.len()).copy_from(de);
+    along_coordinates(q, &dq, look)
+}
+
+/// As [`along`], as all coordinates move by `dq` per unit: central differences of fourth order.
+pub(crate) fn along_coordinates(
+    q: &DVector<f64>,
+    dq: &DVector<f64>,
+    look: impl Fn(&DVector<f64>) -> Vec<DMatrix<f64>>,
+) -> Vec<DMatrix<f64>> {
+    let size = dq.amax();
     if size == 0.0 {
         return look(q).into_iter().map(|here| here * 0.0).collect();
     }
     let h = DIFFERENCE / size;
-    let shifted = |steps: f64| {
-        let mut moved = q.clone();
-        moved.rows_mut(m, n).axpy(steps * h, de, 1.0);
-        look(&moved)
-    };
+    let shifted = |steps: f64| look(&(q + dq * (steps * h)));
     let [a, b, c, d] = [-2.0, -1.0, 1.0, 2.0].map(shifted);
     (0..a.len()).map(|k| ((&c[k] - &b[k]) * 8.0 - (&d[k] - &a[k])) / (12.0 * h)).collect()
 }
@@ -189,7 +195,7 @@ pub fn compliance_slopes(
     for (k, parameter) in parameters.iter().enumerate() {
         let moved = -solve(&here.K, &forces.columns(k, 1).into_owned())?.column(0);
         let change = along(&arm, &q, &moved, look);
-        let (eK, _) = explicit(&arm, &tool, F_T_W, parameter, &q, &here);
+        let (eK, _) = explicit(&arm, &tool, F_T_W, &parameter.effect, &q, &here);
         let dC = &change[0] * &U + Y.tr_mul(&change[0].transpose()) - Y.tr_mul(&((&change[1] + eK) * &U));
         found.push(Matrix6::from_fn(|i, j| dC[(i, j)]));
     }
@@ -201,12 +207,12 @@ pub(crate) fn explicit(
     arm: &FlexibleArm,
     tool: &Frame,
     F_T_W: &Wrench,
-    parameter: &Parameter,
+    effect: &Effect,
     q: &DVector<f64>,
     here: &Tangents,
 ) -> (DMatrix<f64>, DMatrix<f64>) {
     let (m, n) = (arm.model.n_actuated(), here.K.nrows());
-    match &parameter.effect {
+    match effect {
         Effect::Stiffness(places) => {
             let mut dK = DMatrix::zeros(n, n);
             for place in places {

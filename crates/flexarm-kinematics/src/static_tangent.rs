@@ -397,6 +397,27 @@ impl StaticTangent {
         self.loops = Some(tangent);
     }
 
+    /// As [`StaticTangent::compute`], of loads and balancers alone, without the weight; of trees without closed loops and modal bodies.
+    ///
+    /// # Panics
+    /// If `G` has another size.
+    pub fn of_loads(
+        &mut self,
+        model: &Model,
+        data: &Data,
+        q: &DVector<f64>,
+        loads: &[PointLoad],
+        G: &mut DMatrix<f64>,
+    ) {
+        let n = model.nv() - self.first;
+        assert_eq!(G.shape(), (n, n), "a row and a column per coordinate");
+        G.fill(0.0);
+        self.carried.fill(Carried::weight(Vector3::zeros(), &Vector3::zeros()));
+        self.carry_loads(model, data, loads.iter().copied());
+        self.finish(model, data, q.as_slice(), G.as_mut_slice());
+        self.add_balancers(model, data, G);
+    }
+
     /// [`StaticTangent::compute`] with all coordinates of the opened tree.
     fn of_tree(&mut self, model: &Model, data: &Data, q: &DVector<f64>, loads: &[PointLoad], G: &mut DMatrix<f64>) {
         let loads = loads.iter().copied();
@@ -405,6 +426,13 @@ impl StaticTangent {
         }
         G.as_mut_slice().fill(0.0);
         self.carry_weights(model, data);
+        self.carry_loads(model, data, loads);
+        self.finish(model, data, q.as_slice(), G.as_mut_slice());
+        self.add_balancers(model, data, G);
+    }
+
+    /// Loads, and the forces at both ends of balancers.
+    fn carry_loads(&mut self, model: &Model, data: &Data, loads: impl Iterator<Item = PointLoad>) {
         for load in loads {
             self.carried[load.body].add(&load.carried(&data.X_WB[load.body]));
         }
@@ -413,8 +441,6 @@ impl StaticTangent {
                 self.carried[line.bodies[end]].add(&Carried::weight(F_W, &line.p_W[end]));
             }
         }
-        self.finish(model, data, q.as_slice(), G.as_mut_slice());
-        self.add_balancers(model, data, G);
     }
 
     /// (7).

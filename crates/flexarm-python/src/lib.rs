@@ -29,6 +29,7 @@ mod parts;
 mod robot;
 mod run;
 mod scenario;
+mod sensitivity;
 mod sweep;
 mod table;
 mod values;
@@ -75,6 +76,8 @@ mod _flexarm {
     use crate::run::{PyRun, PySample};
     #[pymodule_export]
     use crate::scenario::{PyLoad, PyPayload, PyScenario};
+    #[pymodule_export]
+    use crate::sensitivity::sensitivity;
     #[pymodule_export]
     use crate::sweep::sweep;
 

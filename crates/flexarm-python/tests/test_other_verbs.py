@@ -61,6 +61,18 @@ def test_a_compensated_motion_is_that_of_the_command_line_and_helps(kr210: flexa
     assert found.motion.joints == kr210.joints and found.curves.shape[1] == 3
 
 
+def test_sensitivities_are_those_of_the_command_line_and_of_runs(kr210: flexarm.Robot, tmp_path: Path) -> None:
+    ours = flexarm.sensitivity(kr210, "point_to_point", by=["drive.*", "payload.mass"], table=tmp_path / "slopes.csv")
+    theirs = told("sensitivity", "kr210", "point_to_point", "--by", "drive.*", "--by", "payload.mass", cwd=tmp_path)
+    assert without_clock({**ours, "table": None}) == without_clock(theirs)
+    run = kr210.flexible().simulate("point_to_point")
+    assert ours["peak_m"] == pytest.approx(np.linalg.norm(run.tcp - run.rigid_tcp, axis=1).max(), rel=1e-3)
+    header = (tmp_path / "slopes.csv").read_text().splitlines()[0].split(",")
+    assert len(header) == 1 + 6 * (1 + len(ours["parameters"])) and "payload.mass.z" in header
+    with pytest.raises(ValueError, match="no parameter is called"):
+        flexarm.sensitivity(kr210, by=["elbow"])
+
+
 def test_a_plan_of_measurements_is_that_of_the_command_line(kr210: flexarm.Robot, tmp_path: Path) -> None:
     ours = flexarm.plan_measurements(kr210, 4)
     theirs = told("identify", "kr210", "--plan", "4", "--no-files", cwd=tmp_path)

@@ -101,6 +101,14 @@ pub enum StepError {
         /// Largest stable step (s).
         largest_s: f64,
     },
+    /// A run is not differentiated.
+    #[error("derivatives of a run are not known with {what}: {mend}")]
+    NoSlopes {
+        /// What is in the way.
+        what: &'static str,
+        /// What to do.
+        mend: &'static str,
+    },
     /// The parts of the arm do not fit together.
     #[error("{0}")]
     Setup(String),
@@ -133,7 +141,7 @@ impl StepError {
             Self::SolverGaveUp { .. } => &[Setting::Tolerance, Setting::ReferenceMethod],
             Self::UnstableStep { .. } => &[Setting::Step, Setting::Stepper],
             Self::ModalLinks => &[Setting::Links, Setting::Stepper],
-            Self::Singular { .. } | Self::Setup(_) | Self::OpenLoop { .. } => &[],
+            Self::Singular { .. } | Self::Setup(_) | Self::OpenLoop { .. } | Self::NoSlopes { .. } => &[],
         }
     }
 }

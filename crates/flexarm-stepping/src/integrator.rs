@@ -261,7 +261,7 @@ impl<I: Integrator> Stepper for ReducedStepper<I> {
 }
 
 /// Stops a run whose links have come apart.
-fn check_deflection(arm: &FlexibleArm, x: &DVector<f64>, t: f64, h: f64) -> Result<(), StepError> {
+pub(crate) fn check_deflection(arm: &FlexibleArm, x: &DVector<f64>, t: f64, h: f64) -> Result<(), StepError> {
     for element in arm.elements.iter().filter(|e| !e.modal || e.size >= 6) {
         let first = arm.torque_driven.len() + arm.offset(element);
         let largest = x.as_slice()[first..first + element.size.min(6)].iter().fold(0.0f64, |m, e| m.max(e.abs()));

@@ -16,7 +16,7 @@ use flexarm_stepping::{
     Damping, FlexibleArm, Friction, GearCoupling, GeometricStiffness, PrescribedMotion, Servo, ServoAxis, Spring,
     StepError,
 };
-use nalgebra::{DMatrix, DVector, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix6, Vector3};
 
 use crate::caveat::Caveat;
 use crate::drive_entry::{DriveKind, ServoEntry};
@@ -50,6 +50,8 @@ pub struct RobotLink {
     pub damping: Damping,
     /// Factor on the stiffness of all its models.
     pub stiffness_factor: f64,
+    /// Factors on the springs of a lumped link, direction by direction, beside that: K becomes `S K S` with their roots on the diagonal of S.
+    pub stiffness_factors: [f64; 6],
     /// The beam that it is, if it is one.
     pub beam: Option<BeamLink>,
     /// What the robot file asks for.
@@ -82,9 +84,16 @@ pub(crate) enum Asked {
     Modes,
     Eigenmodes,
     Geometric,
+    Directions,
 }
 
 impl RobotLink {
+    /// A spring of its lumped models with the factors.
+    fn scaled(&self, K: &Matrix6<f64>) -> Matrix6<f64> {
+        let root = self.stiffness_factors.map(f64::sqrt);
+        Matrix6::from_fn(|i, j| root[i] * K[(i, j)] * root[j]) * self.stiffness_factor
+    }
+
     /// Whether its source can have its stiffness changed by loads as a modal link.
     pub fn has_geometric(&self) -> bool {
         let stored = self.flexible.reduced.details.as_ref().and_then(|details| details.modal.as_ref());
@@ -103,6 +112,13 @@ impl RobotLink {
     pub(crate) fn form_or_key(&self, modelling: &Modelling) -> Result<LinkForm, (Asked, String)> {
         let model = if modelling.links == LinkModel::AsFiled { self.choices.model } else { modelling.links };
         match model {
+            LinkModel::Modal if self.stiffness_factors != [1.0; 6] => {
+                let name = &self.flexible.link;
+                let message = format!(
+                    "link {name:?}: stiffness_factors are those of the springs of a lumped link; a modal link has one stiffness_factor"
+                );
+                Err((Asked::Directions, message))
+            }
             LinkModel::Modal => self.modal(modelling).map(|modal| LinkForm::Modal(Arc::new(modal))),
             _ => self
                 .lumped(modelling.segments.unwrap_or(self.choices.segments))
@@ -483,7 +499,7 @@ impl Robot {
                 let (group, damping) = (spring.joint.clone(), self.flexible[k].damping);
                 owned.push(OwnedSpring {
                     group,
-                    spring: Spring::from((name, spring.K_S * self.flexible[k].stiffness_factor, damping)),
+                    spring: Spring::from((name, self.flexible[k].scaled(&spring.K_S), damping)),
                     owner: Owner::Link(k),
                 });
             }

@@ -33,6 +33,7 @@
 //! | `stop_at_rest` | an observer that looks at every sample and ends the run |
 //! | `servo_study` | a study: gains of the servos against settling time and overshoot |
 //! | `study_report` | link models compared on one page for the browser |
+//! | `sensitivity` | which number of the robot the error depends on most |
 //! | `link_models` | every link model against a reference: accuracy and cost |
 //!
 //! What goes wrong is an [`Error`] by cause with its numbers, what is doubtful a [`Caveat`]. Both carry settings that mend them
@@ -92,6 +93,7 @@ mod robot;
 mod robot_file;
 mod run;
 mod scenario;
+pub mod sensitivity;
 mod settling;
 mod static_part;
 mod statics;

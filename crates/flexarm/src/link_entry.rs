@@ -108,7 +108,17 @@ pub(crate) fn flexible_link(
             return Err(at(factor.span(), message).into());
         }
     };
-    let link = RobotLink { flexible, damping, stiffness_factor, beam, choices };
+    let stiffness_factors = match &entry.stiffness_factors {
+        None => [1.0; 6],
+        Some(given) => match <[f64; 6]>::try_from(given.get_ref().as_slice()) {
+            Ok(all) if all.iter().all(|factor| factor.is_finite() && *factor > 0.0) => all,
+            _ => {
+                let message = format!("stiffness_factors = {:?}: expected six positive numbers", given.get_ref());
+                return Err(at(given.span(), message).into());
+            }
+        },
+    };
+    let link = RobotLink { flexible, damping, stiffness_factor, stiffness_factors, beam, choices };
     // What the file asks for must be there; overrides are looked at when they are used.
     link.form_or_key(&Modelling::default()).map_err(|(asked, message)| {
         let key = match asked {
@@ -117,6 +127,7 @@ pub(crate) fn flexible_link(
             Asked::Modes => entry.modes.as_ref().map(Spanned::span),
             Asked::Eigenmodes => entry.eigenmodes.as_ref().map(Spanned::span),
             Asked::Geometric => entry.geometric_stiffening.as_ref().map(Spanned::span),
+            Asked::Directions => entry.stiffness_factors.as_ref().map(Spanned::span),
         };
         at(key.or(entry.model.as_ref().map(Spanned::span)).unwrap_or(entry.link.span()), message)
     })?;

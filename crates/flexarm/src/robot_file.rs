@@ -134,6 +134,8 @@ pub(crate) struct FlexibleLinkEntry {
     pub mass: Option<Spanned<f64>>,
     /// Factor on its stiffness, as measurements told; 1 if not given.
     pub stiffness_factor: Option<Spanned<f64>>,
+    /// Factors on the six directions of its springs beside that, lumped links; 1 if not given.
+    pub stiffness_factors: Option<Spanned<Vec<f64>>>,
     /// Damping; 3 % modal if not given.
     pub damping: Option<Spanned<DampingEntry>>,
     /// `rotation-vector` or `euler-zyx`.

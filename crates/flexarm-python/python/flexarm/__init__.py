@@ -49,6 +49,7 @@ from ._flexarm import (
     plan_measurements,
     reduce,
     robot,
+    sensitivity,
     sweep,
 )
 from ._build import RobotBuilder
@@ -130,6 +131,7 @@ __all__ = [
     "plan_measurements",
     "reduce",
     "robot",
+    "sensitivity",
     "sweep",
 ]
 

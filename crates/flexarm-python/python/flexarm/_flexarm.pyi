@@ -52,6 +52,7 @@ __all__ = [
     "reduce",
     "robot",
     "run_command",
+    "sensitivity",
     "ship_from",
     "sweep",
     "_motion_of_pieces",
@@ -148,6 +149,19 @@ def compensate(
     overwrite: bool = False,
 ) -> Compensated: ...
 
+def sensitivity(
+    robot: Robot,
+    motion: Motion | Scenario | _Path | None = None,
+    *,
+    by: Sequence[str] | None = None,
+    step: float = 1e-3,
+    loads: Sequence[Load] | _Path | None = None,
+    payloads: Sequence[Payload] | None = None,
+    links: _Links | None = None,
+    drives: _Drives | None = None,
+    table: _Path | None = None,
+    overwrite: bool = False,
+) -> types.Sensitivity: ...
 def lobes(
     robot: Robot,
     tool: _Path,

@@ -75,6 +75,7 @@ __all__ = [
     "NewPayload",
     "NewRobot",
     "ParameterFigures",
+    "ParameterSensitivity",
     "ParetoFigures",
     "ParetoRun",
     "PartFigures",
@@ -87,6 +88,8 @@ __all__ = [
     "PlantFigures",
     "PoseFigures",
     "PoseLobes",
+    "PoseParameter",
+    "PoseSensitivity",
     "ProgramFigures",
     "ReduceFiles",
     "ReduceModeFigures",
@@ -99,6 +102,7 @@ __all__ = [
     "ResponseSummary",
     "RunFiles",
     "RunSummary",
+    "Sensitivity",
     "ShapeFigures",
     "ShareFigures",
     "SolverFigures",
@@ -920,6 +924,96 @@ class Compensation(TypedDict):
     """The robot program with corrected targets, of motions that were read from one (KRL, RAPID)."""
     page: str | None
     """The page."""
+    caveats: list[CaveatDict]
+    """What is doubtful."""
+
+
+class ParameterSensitivity(TypedDict):
+    """What a change of one number does to the error."""
+
+    name: str
+    """By the names of the robot file; `motion.JOINT` for a shift of a joint, `tcp.x`, `.y` and `.z` for the place of the tool in its own axes."""
+    unit: str
+    """Its unit."""
+    value: float
+    """Its value; 0 of a shift."""
+    per: str
+    """Of which change of it the following are the effect: `1 %`, `1 kg`, `1 mrad` or `1 mm`. They are derivatives, times that."""
+    peak_m: float
+    """Of the largest distance, at the time where it is (m)."""
+    rms_m: float
+    """Of the RMS distance (m)."""
+    peak_rad: float
+    """Of the largest angle (rad)."""
+    rms_rad: float
+    """Of the RMS angle (rad)."""
+
+
+class Sensitivity(TypedDict):
+    """Answer of `flexarm sensitivity`."""
+
+    robot: str
+    """The robot."""
+    motion: str
+    """The motion."""
+    step_s: float
+    """Step (s), and how many."""
+    steps: int
+    """Steps taken."""
+    peak_m: float
+    """Largest distance of the tool from the rigid one's (m)."""
+    t_peak_s: float
+    """When (s)."""
+    rms_m: float
+    """Root of its mean square (m)."""
+    peak_rad: float
+    """Largest angle (rad)."""
+    rms_rad: float
+    """Root of its mean square (rad)."""
+    parameters: list[ParameterSensitivity]
+    """One per number of the robot, its tool and its motion; what the RMS depends on most comes first."""
+    table: str | None
+    """Error and derivatives over time."""
+    caveats: list[CaveatDict]
+    """What is doubtful."""
+
+
+class PoseParameter(TypedDict):
+    """What a change of one number does."""
+
+    name: str
+    """By the names of the robot file."""
+    unit: str
+    """Its unit."""
+    value: float
+    """Its value."""
+    per: str
+    """Of which change of it the following are the effect: `1 %` or `1 kg`. They are derivatives, times that."""
+    tcp_m: list[float]
+    """Of the tool's place (m)."""
+    tcp_rad: list[float]
+    """Of its attitude, a rotation vector (rad)."""
+    compliance: list[list[float]]
+    """Of the compliance."""
+    frequencies_hz: list[float]
+    """Of the natural frequencies (Hz)."""
+
+
+class PoseSensitivity(TypedDict):
+    """Answer of `flexarm sensitivity --at`: drives locked, world axes, under the robot's own weight."""
+
+    robot: str
+    """The robot."""
+    joints: list[str]
+    """Joints, in coordinate order."""
+    at: list[float]
+    """Where they are held (rad or m)."""
+    compliance: list[list[float]]
+    """Compliance of the tool, displacement (m, rad) per force (N) and moment (N m), 6×6."""
+    frequencies_hz: list[float]
+    """Natural frequencies (Hz)."""
+    parameters: list[PoseParameter]
+    """One per number of the robot."""
     caveats: list[CaveatDict]
     """What is doubtful."""
 

@@ -109,6 +109,14 @@ pub enum ValueError {
         /// The lowest frequency (Hz).
         lowest: f64,
     },
+    /// A name of which no number of the robot is called.
+    #[error("no parameter is called {pattern:?}: expected some of {}, * for anything", names.join(", "))]
+    NoParameter {
+        /// The name or pattern.
+        pattern: String,
+        /// What there is.
+        names: Vec<String>,
+    },
 }
 
 fn lowest(logarithmic: bool) -> String {

@@ -7,7 +7,7 @@
 mod encoders;
 mod file;
 mod page;
-mod parameters;
+pub(crate) mod parameters;
 mod plan_file;
 mod response_file;
 pub(crate) mod rewrite;
@@ -313,10 +313,10 @@ fn chosen(arm: &Arm, input: &MeasurementInput, fit: &[String]) -> Result<Vec<par
         return Err(IdentifyFileError::UnknownParameter { text: unknown(pattern) }.into());
     }
     let wanted = |name: &str| match (fit.is_empty(), input.fit.is_empty()) {
-        (false, _) => fit.iter().any(|p| parameters::fits(p, name)),
-        (true, false) => input.fit.iter().any(|(p, _)| parameters::fits(p, name)),
-        // Masses and dampings are asked for by name.
-        (true, true) => name != "payload.mass" && !name.ends_with(".damping"),
+        (false, _) => fit.iter().any(|p| parameters::asks_for(p, name)),
+        (true, false) => input.fit.iter().any(|(p, _)| parameters::asks_for(p, name)),
+        // Masses, dampings and single directions of links are asked for by name.
+        (true, true) => name != "payload.mass" && !name.ends_with(".damping") && !parameters::is_direction(name),
     };
     let kept = |name: &str| input.keep.iter().any(|(p, _)| parameters::fits(p, name));
     let mut chosen: Vec<_> = all.clone();

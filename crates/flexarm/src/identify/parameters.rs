@@ -5,6 +5,7 @@
 //! | `drive.JOINT.gearbox.stiffness` | a gearbox with one stiffness (N m/rad, N/m of a joint that slides) |
 //! | `drive.JOINT.gearbox.stiffness[k]` | one of three or six, from 0 |
 //! | `link.LINK.stiffness_factor` | all of a flexible link's stiffness, as a factor |
+//! | `link.LINK.stiffness_factors[k]` | one of the six directions of a lumped link's springs, as a factor, from 0 |
 //! | `mounting.stiffness[k]` | one of six springs under the base, from 0 |
 //! | `drive.JOINT.gearbox.damping` | its damping, if the file has it (N m s/rad, N s/m; a factor on lists) |
 //! | `link.LINK.damping` | modal ratio, `stiffness_beta` (s), or a factor on `rayleigh` |
@@ -25,6 +26,9 @@ pub(crate) const UNCERTAINTY: f64 = 2.0;
 /// Of a payload's mass: this part of it, and kg at least.
 const PAYLOAD_UNCERTAINTY: (f64, f64) = (0.5, 1.0);
 
+/// Key of what is only fitted if it is named: its directions together are the whole of a link's stiffness.
+const DIRECTIONS: &str = "stiffness_factors";
+
 /// Where a parameter is written in the robot file.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Written {
@@ -36,6 +40,8 @@ pub(crate) enum Written {
     LinkDamping { link: String },
     /// `[[flexible_link]]` of the link: its `stiffness_factor`.
     Link { link: String },
+    /// The same: one of its `stiffness_factors`.
+    LinkDirection { link: String, entry: usize },
     /// `mounting.stiffness`, one of six.
     Mounting { entry: usize },
     /// `payload.mass`.
@@ -91,6 +97,10 @@ pub(crate) fn candidates(robot: &Robot, flexible: &FlexibleRobot) -> Vec<Candida
         let name = format!("link.{}.stiffness_factor", span.link);
         let written = Written::Link { link: span.link.clone() };
         found.push(stiffness(name, "1", link.stiffness_factor, places, written));
+        let groups = flexible.model.elastic();
+        if springs.iter().all(|spring| groups[*spring].size == 6 && !groups[*spring].modal) {
+            found.extend(link_directions(&span.link, &link.stiffness_factors, &springs));
+        }
         let (unit, initial) = match link.damping {
             Damping::Modal(zeta) => ("1", zeta),
             Damping::StiffnessProportional(beta) => ("s", beta),
@@ -121,6 +131,19 @@ fn stiffness(name: String, unit: &str, initial: f64, places: Vec<Place>, written
 fn damping_of(name: String, unit: &str, initial: f64, springs: &[usize], written: Written) -> Candidate {
     let effect = Effect::Damping(springs.to_vec());
     Candidate { parameter: Parameter { name, unit: unit.into(), initial, prior: UNCERTAINTY.ln(), effect }, written }
+}
+
+/// The six directions of a lumped link's springs, in all of them alike.
+fn link_directions<'a>(
+    link: &'a str,
+    factors: &'a [f64; 6],
+    springs: &'a [usize],
+) -> impl Iterator<Item = Candidate> + 'a {
+    factors.iter().enumerate().map(move |(entry, factor)| {
+        let places = springs.iter().map(|spring| Place { spring: *spring, coordinate: Some(entry) }).collect();
+        let written = Written::LinkDirection { link: link.to_owned(), entry };
+        stiffness(format!("link.{link}.{DIRECTIONS}[{entry}]"), "1", *factor, places, written)
+    })
 }
 
 fn gearbox_parameters(joint: &str, K: &GearStiffness, springs: &[usize], slides: bool) -> Vec<Candidate> {
@@ -174,6 +197,16 @@ fn is_diagonal(K: &nalgebra::Matrix6<f64>) -> bool {
 /// The arm as the identification takes it.
 pub(crate) fn plant(flexible: &FlexibleRobot) -> Plant {
     Plant { model: flexible.model.clone(), springs: flexible.springs.clone(), tool: flexible.tcp.clone() }
+}
+
+/// Whether a pattern asks for a parameter to be fitted.
+pub(crate) fn asks_for(pattern: &str, name: &str) -> bool {
+    fits(pattern, name) && (!is_direction(name) || pattern.contains(DIRECTIONS))
+}
+
+/// Whether it is one direction of a link's springs.
+pub(crate) fn is_direction(name: &str) -> bool {
+    name.starts_with("link.") && name.contains(DIRECTIONS)
 }
 
 /// Whether a name fits a pattern in which * stands for anything.

@@ -32,6 +32,18 @@ pub(super) fn rewritten(text: &str, found: &[(Found, Written)], home: &Path, to:
                 entry.insert("stiffness_factor", toml_edit::value(rounded(parameter.value, parameter.std)));
                 told.push((format!("link {link}"), parameter));
             }
+            Written::LinkDirection { link, entry: number } => {
+                let entry = named(&mut file, "flexible_link", "link", link)?;
+                if entry.get("stiffness_factors").is_none() {
+                    let ones: toml_edit::Array = [1.0; 6].into_iter().collect();
+                    entry.insert("stiffness_factors", toml_edit::value(ones));
+                }
+                let factors = entry.get_mut("stiffness_factors").and_then(Item::as_array_mut);
+                let old = factors.and_then(|factors| factors.get_mut(*number));
+                let old = old.ok_or_else(|| format!("link {link:?} has no stiffness_factors[{number}]"))?;
+                replace(old, rounded(parameter.value, parameter.std));
+                told.push((format!("link {link}"), parameter));
+            }
             Written::GearboxDamping { joint } => {
                 let drive = named(&mut file, "drive", "joint", joint)?;
                 let gearbox = drive.get_mut("gearbox").and_then(Item::as_table_like_mut);
@@ -222,6 +234,7 @@ mod tests {
             (found("a", 1e6, 1.234567e6, 2.0e3), gear("j1", None)),
             (found("b", 2.0, 2.51234, 0.02), gear("j2", Some(1))),
             (found("c", 1.0, 0.87654321, 0.01), Written::Link { link: "arm".into() }),
+            (found("d", 1.0, 1.2345, 0.01), Written::LinkDirection { link: "arm".into(), entry: 4 }),
         ];
         let here = Path::new(".");
         let new = rewritten(text, &all, here, here).unwrap();
@@ -230,7 +243,7 @@ mod tests {
         let expected = text
             .replace("1.0e6", "1234570.0")
             .replace("[1.0, 2.0, 3.0]", "[1.0, 2.5123, 3.0]")
-            .replace("link = \"arm\" # bends\n", "link = \"arm\" # bends\nstiffness_factor = 0.8765\n");
+            .replace("link = \"arm\" # bends\n", "link = \"arm\" # bends\nstiffness_factor = 0.8765\nstiffness_factors = [1.0, 1.0, 1.0, 1.0, 1.2345, 1.0]\n");
         assert_eq!(body, expected);
     }
 }

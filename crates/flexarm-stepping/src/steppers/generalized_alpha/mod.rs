@@ -148,6 +148,8 @@ pub struct GeneralizedAlpha {
     coefficients: Coefficients,
     correction: Option<DispersionCorrection>,
     newton: Newton,
+    /// See [`GeneralizedAlpha::exactly`].
+    exact: bool,
     /// Time, positions, velocities and accelerations.
     pub now: Current,
     /// a and x̃ at the current time, ẍ one step before it.
@@ -239,6 +241,7 @@ impl GeneralizedAlpha {
             coefficients,
             correction: (dispersion_correction && c > 0.0).then(|| DispersionCorrection::new(c, h, n)),
             newton: Newton::new(n, h),
+            exact: false,
             x_new: now.x.clone(),
             v_new: now.v.clone(),
             a: now.acceleration.clone(),
@@ -255,6 +258,13 @@ impl GeneralizedAlpha {
     #[must_use]
     pub fn leaving(self, part: f64) -> Self {
         Self { newton: self.newton.leaving(part), ..self }
+    }
+
+    /// The same, with steps that are smooth functions of all that goes into them: the matrix, with that of the dispersion correction, is taken
+    /// at the start of each step, and the iteration goes on until nothing is left.
+    #[must_use]
+    pub fn exactly(self) -> Self {
+        Self { exact: true, ..self.leaving(0.0) }
     }
 
     /// a and x̃ of the current acceleration alone. With the correction in x̃, a jump would set modes of `hω >> 1` ringing
@@ -355,7 +365,7 @@ impl ImplicitStep for GeneralizedAlpha {
     }
 
     fn attempt(&mut self, system: &mut impl SecondOrderSystem, t: f64) -> Result<(), StepError> {
-        if !self.newton.factored {
+        if self.exact || !self.newton.factored {
             // The matrix belongs to the configuration of the last residual.
             system.residual(self.now.grid.time(), &self.now.x, &self.now.v, &self.now.acceleration, &mut self.newton.r);
             self.factor(system, t)?;
@@ -385,6 +395,12 @@ impl ImplicitStep for GeneralizedAlpha {
             if search.ends(sizes, &mut self.newton)? {
                 break;
             }
+        }
+        if self.exact {
+            // What is left of the last correction is as small beside it as that beside the one before.
+            self.residual(system, t);
+            self.newton.matrix.solve(&mut self.newton.r);
+            self.correct(Sizes::default());
         }
         self.newton.found(search.iterations, search.iterations);
         self.accept(t);

@@ -1,0 +1,174 @@
+//! `flexarm sensitivity`: how the tool's error along a motion depends on the numbers of the robot.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Args;
+use comfy_table::CellAlignment;
+use flexarm::sensitivity::{PoseSensitivity, Sensitivity, SensitivityRequest, pose_sensitivity, sensitivity};
+use flexarm::{Motion, Robot, RunOptions, Scenario};
+
+use crate::args::{Cli, ModellingArgs, RobotArgs};
+use crate::failure::Failure;
+use crate::motion::MotionInputArgs;
+use crate::print::{lines, table, warning};
+use crate::{answer, load_options, shipped, to_json, values};
+
+const EXAMPLES: &str = "\
+Examples:
+  What the error of kr210 on its pick-and-place cycle depends on:
+      flexarm sensitivity kr210 pick_and_place
+  On the gearboxes alone, with the derivatives over time as a table:
+      flexarm sensitivity kr210 pick_and_place --by 'drive.*' --table slopes.csv
+  On shifts of the joints:
+      flexarm sensitivity kr210 milling_square --by 'motion.*'
+  What sag, compliance and frequencies at a pose depend on:
+      flexarm sensitivity kr210 --at 0,-60deg,60deg,0,30deg,0";
+
+#[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
+pub(crate) struct SensitivityArgs {
+    /// robot.toml, a folder with one, or the name of a shipped robot
+    pub(crate) robot: PathBuf,
+    /// Motion of any format (flexarm format motion), or the name of a shipped one [default: the robot's own]
+    pub(crate) motion: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) input: MotionInputArgs,
+    /// Names of what counts, * for anything: drive.joint_2.gearbox.stiffness, link.*, motion.joint_1, tcp.x (may be repeated)
+    /// [default: all]
+    #[arg(long = "by", value_name = "NAME")]
+    pub(crate) by: Vec<String>,
+    /// A pose instead of a motion: the tool at rest, its compliance, natural frequencies. Joint values in coordinate order, or name=value pairs (rad
+    /// or m; 30deg for degrees)
+    #[arg(long, value_name = "Q1,Q2,...", allow_hyphen_values = true, conflicts_with_all = ["motion", "loads", "table"])]
+    pub(crate) at: Option<String>,
+    /// Loads and payloads over time (TOML, see docs/loads.md) that act on the arm
+    #[arg(long, value_name = "FILE")]
+    pub(crate) loads: Option<PathBuf>,
+    /// Step of the run (s)
+    #[arg(long, value_name = "S", default_value_t = 1e-3)]
+    pub(crate) step: f64,
+    /// Go on although the motion passes joint limits
+    #[arg(long)]
+    pub(crate) ignore_limits: bool,
+    #[command(flatten)]
+    pub(crate) modelling: ModellingArgs,
+    #[command(flatten)]
+    pub(crate) load: RobotArgs,
+    /// Write error and derivatives after every step (CSV)
+    #[arg(long, help_heading = "Files", value_name = "FILE")]
+    pub(crate) table: Option<PathBuf>,
+    /// Overwrite what is there
+    #[arg(long, help_heading = "Files")]
+    pub(crate) force: bool,
+}
+
+pub(crate) fn run(cli: &Cli, args: &SensitivityArgs) -> Result<ExitCode, Failure> {
+    let robot = Robot::load_with(&shipped::robot(Some(&args.robot))?, &load_options(&args.load)?)?;
+    if args.at.is_some() {
+        let at = values::joint_values(args.at.as_deref(), &robot)?;
+        let found = pose_sensitivity(&robot, args.modelling.modelling(), at.as_deref(), &args.by)?;
+        if !cli.quiet {
+            found.caveats.iter().for_each(|caveat| warning(&caveat.message));
+        }
+        answer(cli, || to_json(&found), || pose_text(&found));
+        return Ok(ExitCode::SUCCESS);
+    }
+    let motion = match (&args.motion, &robot.default_trajectory) {
+        (Some(given), _) => shipped::trajectory(given),
+        (None, Some(own)) => own.clone(),
+        (None, None) => return Err(Failure::Usage("the robot has no motion of its own: give one".into())),
+    };
+    let motion = Motion::load_with(&motion, &robot, &args.input.options())?;
+    let mut scenario = Scenario::new(motion);
+    if let Some(loads) = &args.loads {
+        scenario = scenario.with_loads_file(loads)?;
+    }
+    let request = SensitivityRequest {
+        run: RunOptions {
+            step_s: args.step,
+            modelling: args.modelling.modelling(),
+            ignore_limits: args.ignore_limits,
+            ..RunOptions::default()
+        },
+        parameters: args.by.clone(),
+        table: args.table.clone(),
+        overwrite: args.force,
+    };
+    let found = sensitivity(&robot, scenario, &request)?;
+    if !cli.quiet {
+        found.caveats.iter().for_each(|caveat| warning(&caveat.message));
+    }
+    answer(cli, || to_json(&found), || text(&found));
+    Ok(ExitCode::SUCCESS)
+}
+
+fn text(found: &Sensitivity) -> String {
+    let mut out = format!("{} on {}: {} steps of {} s\n", found.motion, found.robot, found.steps, found.step_s);
+    out += &format!(
+        "error of the tool: peak {:.4} mm at {:.3} s, RMS {:.4} mm; peak {:.4} mrad, RMS {:.4} mrad\n\n",
+        1e3 * found.peak_m,
+        found.t_peak_s,
+        1e3 * found.rms_m,
+        1e3 * found.peak_rad,
+        1e3 * found.rms_rad
+    );
+    let mut t = table(&["what a change does", "value", "change", "peak, um", "RMS, um", "peak, urad", "RMS, urad"]);
+    for own in &found.parameters {
+        let is_shift = own.name.starts_with("motion.") || own.name.starts_with("tcp.");
+        t.add_row(vec![
+            own.name.clone(),
+            if is_shift { String::new() } else { value(own.value, &own.unit) },
+            format!("+{}", own.per),
+            micro(own.peak_m),
+            micro(own.rms_m),
+            micro(own.peak_rad),
+            micro(own.rms_rad),
+        ]);
+    }
+    out += &right(&mut t);
+    if let Some(file) = &found.table {
+        out += &format!("\ntable    {file}\n");
+    }
+    out
+}
+
+fn micro(x: f64) -> String {
+    format!("{:+.4}", 1e6 * x)
+}
+
+fn value(value: f64, unit: &str) -> String {
+    if unit == "1" { value.to_string() } else { format!("{value} {unit}") }
+}
+
+/// The table with numbers to the right.
+fn right(t: &mut comfy_table::Table) -> String {
+    for column in t.column_iter_mut().skip(1) {
+        column.set_cell_alignment(CellAlignment::Right);
+    }
+    lines(t)
+}
+
+/// Frequencies that are told of each parameter.
+const FREQUENCIES: usize = 3;
+
+fn pose_text(found: &PoseSensitivity) -> String {
+    let at: Vec<String> = found.joints.iter().zip(&found.at).map(|(joint, q)| format!("{joint} = {q:.4}")).collect();
+    let mut out = format!("{} at {}\n", found.robot, at.join(", "));
+    let hz: Vec<String> = found.frequencies_hz.iter().take(FREQUENCIES).map(|hz| format!("{hz:.4}")).collect();
+    out += &format!("lowest frequencies {} Hz\n\n", hz.join(", "));
+    let axes = ["x", "y", "z"];
+    let mut heads: Vec<String> = vec!["what a change does".into(), "value".into(), "change".into()];
+    heads.extend(axes.map(|axis| format!("tool {axis}, um")));
+    heads.extend(axes.map(|axis| format!("C_{axis}{axis}, um/kN")));
+    heads.extend((1..=hz.len()).map(|k| format!("mode {k}, mHz")));
+    let mut t = table(&heads.iter().map(String::as_str).collect::<Vec<_>>());
+    for own in &found.parameters {
+        let mut row = vec![own.name.clone(), value(own.value, &own.unit), format!("+{}", own.per)];
+        row.extend(own.tcp_m.map(micro));
+        row.extend((0..3).map(|k| format!("{:+.4}", 1e9 * own.compliance[k][k])));
+        row.extend(own.frequencies_hz.iter().take(hz.len()).map(|hz| format!("{:+.4}", 1e3 * hz)));
+        t.add_row(row);
+    }
+    out + &right(&mut t)
+}

@@ -1,0 +1,66 @@
+//! How the tool's error along a motion depends on the numbers of the robot.
+
+use std::path::PathBuf;
+
+use flexarm::RunOptions;
+use flexarm::sensitivity::{SensitivityRequest, sensitivity as slopes};
+use pyo3::prelude::*;
+
+use crate::caveat;
+use crate::failure::OrRaise;
+use crate::robot::PyRobot;
+use crate::scenario::scenario;
+use crate::values::{modelling, texts};
+
+/// Derivatives of the tool's error along a motion by every number of the robot, its tool and its motion, in one run.
+///
+/// Parameters
+/// ----------
+/// robot : Robot
+/// motion : Motion, Scenario or path, optional
+///     The robot's own motion without it.
+/// by : sequence of str, optional
+///     Names of what counts, ``*`` for anything: ``"drive.*"``, ``"motion.joint_1"``; all without it.
+/// step : float, default 1e-3
+///     Time step (s).
+/// loads : sequence of Load, or path of a file of loads, optional
+/// payloads : sequence of Payload, optional
+///     What acts on the arm besides weight.
+/// links, drives : str, optional
+///     As for :meth:`Robot.flexible`.
+/// table : path, optional
+///     A table of error and derivatives after every step (CSV).
+/// overwrite : bool, default False
+///
+/// Returns
+/// -------
+/// dict
+///     ``peak_m``, ``rms_m``, ``parameters`` and more, as ``flexarm sensitivity --json``.
+#[pyfunction]
+#[pyo3(signature = (robot, motion=None, *, by=None, step=1e-3, loads=None, payloads=None, links=None, drives=None,
+                    table=None, overwrite=false))]
+#[expect(clippy::too_many_arguments, reason = "keyword arguments")]
+pub(crate) fn sensitivity<'py>(
+    py: Python<'py>,
+    robot: &Bound<'py, PyRobot>,
+    motion: Option<&Bound<'py, PyAny>>,
+    #[pyo3(from_py_with = texts)] by: Option<Vec<String>>,
+    step: f64,
+    loads: Option<&Bound<'py, PyAny>>,
+    payloads: Option<&Bound<'py, PyAny>>,
+    links: Option<&str>,
+    drives: Option<&str>,
+    table: Option<PathBuf>,
+    overwrite: bool,
+) -> PyResult<Bound<'py, PyAny>> {
+    let request = SensitivityRequest {
+        run: RunOptions { step_s: step, modelling: modelling(links, drives, None, None)?, ..RunOptions::default() },
+        parameters: by.unwrap_or_default(),
+        table,
+        overwrite,
+    };
+    let scenario = scenario(robot, motion, loads, payloads, None)?;
+    let of = robot.get().robot.clone();
+    let found = py.detach(move || slopes(&of, scenario, &request)).or_raise()?;
+    caveat::answer(py, &found, &found.caveats)
+}

@@ -1,0 +1,87 @@
+//! Loops over whole columns, with the vector instructions that the processor has. Operations and their order are the same with and without.
+
+use nalgebra::{DMatrix, Dim, Dyn, IsContiguous, Matrix, RawStorage};
+
+/// Loops over slices, inlined down to them.
+pub(super) trait Work {
+    /// Does it.
+    fn run(self);
+}
+
+/// Does the work.
+#[cfg(target_arch = "x86_64")]
+pub(super) fn quickly(work: impl Work) {
+    use flexarm_kinematics::{OverLanes, Real, with_lanes};
+
+    /// Lanes are the compiler's here.
+    struct Compiled<'a, W>(&'a mut Option<W>);
+    impl<W: Work> OverLanes for Compiled<'_, W> {
+        type Output = ();
+
+        #[inline(always)]
+        fn run<T: Real>(self) {
+            if let Some(work) = self.0.take() {
+                work.run();
+            }
+        }
+    }
+    let mut work = Some(work);
+    with_lanes(Compiled(&mut work));
+    if let Some(work) = work {
+        work.run();
+    }
+}
+
+/// Does the work.
+#[cfg(not(target_arch = "x86_64"))]
+pub(super) fn quickly(work: impl Work) {
+    work.run();
+}
+
+/// `toᵀ += A Xᵀ` for the block of A from this row and column on.
+pub(super) fn add_product<R: Dim, S: RawStorage<f64, R, Dyn> + IsContiguous>(
+    A: &Matrix<f64, R, Dyn, S>,
+    corner: (usize, usize),
+    X: &DMatrix<f64>,
+    to: &mut DMatrix<f64>,
+) {
+    let (p, rows) = (X.nrows(), A.nrows());
+    if p > 0 {
+        quickly(AddProduct { A: A.as_slice(), rows, corner, X: X.as_slice(), to: to.as_mut_slice(), p });
+    }
+}
+
+struct AddProduct<'a> {
+    A: &'a [f64],
+    rows: usize,
+    corner: (usize, usize),
+    X: &'a [f64],
+    to: &'a mut [f64],
+    p: usize,
+}
+
+impl Work for AddProduct<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { A, rows, corner: (row, column), X, to, p } = self;
+        for (i, to) in to.chunks_exact_mut(p).enumerate() {
+            let entry = |k: usize| A[(column + k) * rows + row + i];
+            let mut fours = X.chunks_exact(4 * p);
+            let mut k = 0;
+            // Four columns at a time: the sums go through the registers once for all four.
+            for x in fours.by_ref() {
+                let (a, x0) = ([entry(k), entry(k + 1), entry(k + 2), entry(k + 3)], &x[..p]);
+                let (x1, x2, x3) = (&x[p..2 * p], &x[2 * p..3 * p], &x[3 * p..]);
+                for ((((to, x0), x1), x2), x3) in to.iter_mut().zip(x0).zip(x1).zip(x2).zip(x3) {
+                    *to += (a[0] * x0 + a[1] * x1) + (a[2] * x2 + a[3] * x3);
+                }
+                k += 4;
+            }
+            for x in fours.remainder().chunks_exact(p) {
+                let a = entry(k);
+                to.iter_mut().zip(x).for_each(|(to, x)| *to += a * x);
+                k += 1;
+            }
+        }
+    }
+}

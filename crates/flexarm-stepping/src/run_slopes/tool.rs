@@ -1,0 +1,87 @@
+//! The tool's error against the rigid arm, and its derivatives from those of the coordinates.
+
+use flexarm_kinematics::{Data, ElasticAngles, Frame, forward_kinematics, frame_jacobian, rotation_vector};
+use nalgebra::{DMatrix, DVector, Matrix6xX, Vector3, Vector6};
+
+use crate::arm::FlexibleArm;
+use crate::run_slopes::Direction;
+use crate::run_slopes::columns::add_product;
+use crate::run_slopes::recurrence::Recurrence;
+
+/// Error and derivatives of one time, with workspaces.
+pub(super) struct ToolError {
+    tool: Frame,
+    /// The arm with all elastic coordinates at zero.
+    rigid: Data,
+    q: DVector<f64>,
+    J: Matrix6xX<f64>,
+    J_rigid: Matrix6xX<f64>,
+    /// Twists of the tool and of the rigid arm's, p × 6.
+    twists: DMatrix<f64>,
+    rigid_twists: DMatrix<f64>,
+    /// Change of the tool's point per direction, tool axes.
+    points: Vec<Vector3<f64>>,
+    /// Whether the motion of the joints changes.
+    moves: bool,
+    /// Per direction, after [`ToolError::look`].
+    pub(super) slopes: Vec<[f64; 6]>,
+}
+
+impl ToolError {
+    pub(super) fn new(arm: &FlexibleArm, tool: &Frame, directions: &[Direction]) -> Self {
+        let nv = arm.model.nv();
+        Self {
+            tool: tool.clone(),
+            rigid: Data::new(&arm.model),
+            q: DVector::zeros(nv),
+            J: Matrix6xX::zeros(nv),
+            J_rigid: Matrix6xX::zeros(nv),
+            twists: DMatrix::zeros(directions.len(), 6),
+            rigid_twists: DMatrix::zeros(directions.len(), 6),
+            points: directions.iter().map(|direction| direction.tool).collect(),
+            moves: directions.iter().any(|direction| direction.motion.is_some()),
+            slopes: vec![[0.0; 6]; directions.len()],
+        }
+    }
+
+    /// The error at the run's time: displacement and rotation vector, world axes.
+    pub(super) fn look(&mut self, run: &Recurrence<'_>) -> Vector6<f64> {
+        let (model, data) = run.poses();
+        let m = model.n_actuated();
+        self.q.fill(0.0);
+        self.q.rows_mut(0, m).copy_from(&run.q.rows(0, m));
+        forward_kinematics(model, &mut self.rigid, &self.q);
+        let (X, X_rigid) = (data.X_WF(&self.tool), self.rigid.X_WF(&self.tool));
+        let (R, R_rigid) = (X.rotation.matrix(), X_rigid.rotation.matrix());
+        let turned = R * R_rigid.transpose();
+        let theta = rotation_vector(&turned);
+        let p = X.translation.vector - X_rigid.translation.vector;
+        let error = Vector6::new(p.x, p.y, p.z, theta.x, theta.y, theta.z);
+        if self.slopes.is_empty() {
+            return error;
+        }
+        frame_jacobian(model, data, &self.tool, &mut self.J);
+        if self.moves {
+            frame_jacobian(model, &self.rigid, &self.tool, &mut self.J_rigid);
+        }
+        // w = B θ' in the axes of the turned frame.
+        let (_, B) = ElasticAngles::RotationVector.pose(&theta);
+        let rates = B.try_inverse().unwrap_or(B) * turned.transpose();
+        self.twists.fill(0.0);
+        add_product(&self.J, (0, m), &run.x, &mut self.twists);
+        if self.moves {
+            add_product(&self.J, (0, 0), &run.joints[0], &mut self.twists);
+            self.rigid_twists.fill(0.0);
+            add_product(&self.J_rigid, (0, 0), &run.joints[0], &mut self.rigid_twists);
+        }
+        for (k, slope) in self.slopes.iter_mut().enumerate() {
+            let part =
+                |twists: &DMatrix<f64>, c: usize| Vector3::new(twists[(k, c)], twists[(k, c + 1)], twists[(k, c + 2)]);
+            let (twists, rigid) = (&self.twists, &self.rigid_twists);
+            let moved = part(twists, 0) - part(rigid, 0) + (R - R_rigid) * self.points[k];
+            let turning = rates * (part(twists, 3) - turned * part(rigid, 3));
+            *slope = [moved.x, moved.y, moved.z, turning.x, turning.y, turning.z];
+        }
+        error
+    }
+}
