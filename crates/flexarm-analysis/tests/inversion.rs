@@ -37,6 +37,7 @@ fn commands_by_the_series_of_the_inverse_move_the_tool_as_asked_at_a_third_of_th
         K_a: at.K_a.clone(),
         J: six(&at.J),
         J_a: six(&at.J_a),
+        servo: None,
     };
     let hz = arm.modes.frequencies_hz()[0];
     let (length, h) = (3.0, 2.5e-4);

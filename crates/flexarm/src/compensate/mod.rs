@@ -18,9 +18,11 @@ mod shaped;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-pub use flexarm_analysis::{Inversion, InversionError, Node, Shaper, ShaperKind};
+pub use flexarm_analysis::{
+    Inversion, InversionError, Node, NodeServo, OptimalShaper, ShapedMode, Shaper, ShaperError, ShaperKind,
+};
 pub use flexarm_stepping::{StaticTargets, TargetError, static_targets};
-use flexarm_trajectory::Trajectory;
+use flexarm_trajectory::{Extreme, Trajectory};
 use serde::Serialize;
 
 use crate::arm::Arm;
@@ -38,6 +40,7 @@ use judge::{Judge, sweep};
 pub use limits::LimitRule;
 pub use program::{LeftTarget, ProgramFigures};
 use shaped::shaped;
+pub use shaped::{ShapedModeFigures, ShaperFigures, Shaping};
 
 /// Time between two samples of the error and two knots of the commands (s).
 const SAMPLE_S: f64 = 1e-3;
@@ -47,6 +50,9 @@ const LONGEST_STEP_S: f64 = 4e-3;
 const MOST_ITERATIONS: usize = 100;
 /// Longest motion that is taken (s): all of it is held in memory, a sample a millisecond.
 const LONGEST_S: f64 = 600.0;
+
+/// A servo that gives this part of its largest torque gives all of it.
+const AT_LIMIT: f64 = 1.0 - 1e-9;
 
 /// How commands are found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -71,8 +77,8 @@ pub struct CompensateRequest {
     pub iterations: usize,
     /// Highest frequency that is corrected (Hz); as far as the inverse holds without it.
     pub cutoff_hz: Option<f64>,
-    /// Also run the motion through a shaper of the first mode at its end.
-    pub shaper: Option<ShaperKind>,
+    /// Also run the motion through a shaper of the modes at its end.
+    pub shaper: Option<Shaping>,
     /// Another robot that judges, with its name.
     pub plant: Option<(String, Robot)>,
     /// Judge with stiffness, damping and drives that are off as well.
@@ -152,6 +158,8 @@ pub struct Compensation {
     pub slowed: f64,
     /// How much longer the motion takes by its shaper (s).
     pub shaper_delay_s: f64,
+    /// The shaper, if there is one.
+    pub shaper: Option<ShaperFigures>,
     /// The same commands on other plants.
     pub plants: Vec<PlantFigures>,
     /// The new motion (.csv).
@@ -247,9 +255,11 @@ fn attempt(
     stop: Stop<'_>,
 ) -> Result<(Compensation, Found, Vec<MotionViolation>), Error> {
     let mut scenario = scenario.clone();
-    let mut shaper_delay_s = 0.0;
-    if let Some(kind) = request.shaper {
-        (scenario.motion, shaper_delay_s) = shaped(arm, &scenario.motion, kind)?;
+    let mut shaper = None;
+    if let Some(shaping) = request.shaper {
+        let figures;
+        (scenario.motion, figures) = shaped(arm, &scenario, shaping)?;
+        shaper = Some(figures);
     }
     let job = Job::new(arm, &scenario, request, stop)?;
     let found = match request.method {
@@ -286,7 +296,8 @@ fn attempt(
         changes: changes.collect(),
         limits,
         slowed: 1.0,
-        shaper_delay_s,
+        shaper_delay_s: shaper.iter().flat_map(|shaper| &shaper.copies).map(|copy| copy[0]).fold(0.0, f64::max),
+        shaper,
         plants,
         file: None,
         files: Vec::new(),
@@ -298,6 +309,7 @@ fn attempt(
         curves: curves.collect(),
     };
     answer.caveats = caveats(&answer, &own, robot);
+    answer.caveats.extend(servo_caveat(&judge.arm, &after.efforts));
     answer.caveats.extend(found.fewest.and_then(|fewest| singular_caveat(fewest, job.rows.len())));
     let motion = found.motion;
     Ok((answer, Found { scenario, motion }, own))
@@ -335,7 +347,7 @@ fn check(scenario: &Scenario, request: &CompensateRequest, arm: &Arm) -> Result<
     {
         return Err(CompensateError::StaticPayload { at_s: change.at_s });
     }
-    if arm.flexible().springs.is_empty() {
+    if arm.flexible().springs.is_empty() && !arm.flexible().has_servo() {
         return Err(CompensateError::NothingYields);
     }
     match motion.trajectory.velocity_jumps().first() {
@@ -352,6 +364,20 @@ fn singular_caveat((t_s, directions): (f64, usize), asked: usize) -> Option<Cave
              the others are corrected little or not at all there"
         );
         Caveat::said("singular", "compensation", text, "ask for fewer components, or begin and pass elsewhere")
+    })
+}
+
+/// Servos of the plant that give all they have: what they lack, no command gives them.
+fn servo_caveat(plant: &Arm, efforts: &[Extreme]) -> Option<Caveat> {
+    let joints: Vec<&str> = plant.joints().collect();
+    let at_limit = plant.flexible().servo_limits().filter_map(|(k, limit)| {
+        let worst = efforts.get(k).filter(|worst| worst.value.abs() >= AT_LIMIT * limit)?;
+        Some(format!("{} ({limit:.1} N m or N at {:.3} s)", joints.get(k)?, worst.time_s))
+    });
+    let named: Vec<String> = at_limit.collect();
+    (!named.is_empty()).then(|| {
+        let text = format!("servos are at their torque limits: {}: what they lack there is not corrected", named.join(", "));
+        Caveat::said("servo-limit", "compensation", text, "slow the motion down where it is quickest")
     })
 }
 
