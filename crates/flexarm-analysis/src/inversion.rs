@@ -172,6 +172,15 @@ impl Inversion {
         self.cutoff_hz
     }
 
+    /// What of an error (k×N, `step_s` apart) is above the cutoff.
+    pub fn quicker_than_cutoff(&self, y: &DMatrix<f64>, step_s: f64) -> DMatrix<f64> {
+        if y.ncols() == 0 {
+            return y.clone();
+        }
+        let (slow, pad) = filtered(y, step_s, self.cutoff_hz);
+        y - slow.columns(pad, y.ncols())
+    }
+
     /// Change of the commands for which the tool moves by `y`, below the cutoff.
     ///
     /// * `y`: k×N, a column per time from 0, `step_s` apart; before and after it stays as at the ends.
@@ -205,7 +214,8 @@ impl Inversion {
         if let Some(servo) = self.servos.first() {
             // From before the motion begins, so that it is met at rest.
             let torques = of(|series| &series.torques, servo.axes.len(), 0, pad + N);
-            let at = |column: usize| NodeServo::between(&self.servos, self.place((column as f64 - pad as f64) * step_s));
+            let at =
+                |column: usize| NodeServo::between(&self.servos, self.place((column as f64 - pad as f64) * step_s));
             let ahead = NodeServo::leads(at, &torques, step_s);
             for (i, axis) in servo.axes.iter().enumerate() {
                 let mut row = u.row_mut(*axis);
@@ -274,9 +284,8 @@ impl Series {
     /// Largest part of an error that one use leaves at a frequency, each component of the tool by its own unit.
     fn leaves(&self, node: &Node, hz: f64) -> Option<f64> {
         let s = Complex::new(0.0, std::f64::consts::TAU * hz);
-        let poly = |a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>| {
-            complex(a) + complex(b) * s + complex(c) * (s * s)
-        };
+        let poly =
+            |a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>| complex(a) + complex(b) * s + complex(c) * (s * s);
         let (mut Z, mut N) = (poly(&node.K, &node.D, &node.M), poly(&node.K_a, &node.D_a, &node.M_a));
         if let Some(servo) = &node.servo {
             servo.close(s, &mut Z, &mut N);

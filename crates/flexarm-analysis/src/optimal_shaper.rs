@@ -97,7 +97,11 @@ impl Shaper {
             let (left, parts) = Cones::of(modes, band, delay_s, size, &times).least();
             // Many shapers leave nothing: the one in their middle, as it is.
             let many = left < 10.0 * GAP;
-            let shaper = if many { Shaper { copies: times.into_iter().zip(parts).collect() } } else { gathered(&times, &parts, step) };
+            let shaper = if many {
+                Shaper { copies: times.into_iter().zip(parts).collect() }
+            } else {
+                gathered(&times, &parts, step)
+            };
             let around: Vec<f64> = shaper.copies.iter().map(|(t, _)| *t).collect();
             if best.as_ref().is_none_or(|(least, _)| left < *least) {
                 best = Some((left, shaper));
@@ -265,8 +269,7 @@ impl Cones {
             let sure = decrement < 0.1;
             let mut part = 1.0;
             let next = loop {
-                let trial =
-                    Inside { a: &at.a + &step * part, t: at.t + step_t * part, r: &at.r + &moved * part };
+                let trial = Inside { a: &at.a + &step * part, t: at.t + step_t * part, r: &at.r + &moved * part };
                 if trial.barrier(weight).is_some_and(|there| sure || there <= here - 0.1 * part * decrement) {
                     break Some(trial);
                 }
@@ -372,7 +375,11 @@ mod tests {
     /// Truth: what is possible with a delay is possible with a longer one, where undamped modes are concerned.
     #[test]
     fn more_delay_never_leaves_more_of_two_modes() {
-        let modes = [mode(6.6, 0.0), ShapedMode { vibration: 0.6, ..mode(7.4, 0.0) }, ShapedMode { vibration: 0.1, ..mode(19.0, 0.0) }];
+        let modes = [
+            mode(6.6, 0.0),
+            ShapedMode { vibration: 0.6, ..mode(7.4, 0.0) },
+            ShapedMode { vibration: 0.1, ..mode(19.0, 0.0) },
+        ];
         let delays = [0.03, 0.05, 0.07, 0.08, 0.1, 0.13, 0.16, 0.2];
         let left: Vec<f64> = delays.iter().map(|d| Shaper::optimal(&modes, *d, 0.1).unwrap().left).collect();
         for pair in left.windows(2) {

@@ -112,9 +112,8 @@ impl NodeServo {
         }
         let lead = left.lu().solve(&right).unwrap_or_else(|| DVector::zeros(torques.len()));
         let rest = torques - K * &lead;
-        let sum = DVector::from_fn(rest.len(), |i, _| {
-            if self.integral[i] > 0.0 { rest[i] / self.integral[i] } else { 0.0 }
-        });
+        let sum =
+            DVector::from_fn(rest.len(), |i, _| if self.integral[i] > 0.0 { rest[i] / self.integral[i] } else { 0.0 });
         (sum, lead)
     }
 }
@@ -123,20 +122,35 @@ impl NodeServo {
 mod tests {
     use super::*;
 
-    /// Truth: amplitude and phase of `1 / (C + F)` at a frequency, of two axes, one with all of it fed forward and one without, which has
-    /// no integrator either.
-    #[test]
-    fn leads_are_those_of_the_frequency_response_once_the_start_has_died_away() {
-        let (h, omega, N) = (1e-3, 12.0, 6000);
+    fn two_axes() -> NodeServo {
         let mut mass = DMatrix::zeros(2, 3);
         (mass[(0, 0)], mass[(0, 2)]) = (30.0, 4.0);
-        let servo = NodeServo {
+        NodeServo {
             axes: vec![0, 2],
             stiffness: DVector::from_vec(vec![1.2e5, 4e4]),
             damping: DVector::from_vec(vec![3e3, 2e3]),
             integral: DVector::from_vec(vec![1.2e6, 0.0]),
             ahead: [DMatrix::zeros(2, 3), DMatrix::zeros(2, 3), mass],
-        };
+        }
+    }
+
+    /// Truth: at rest what integrates leads by nothing, the other by its torque over its stiffness, from the first moment on.
+    #[test]
+    fn torques_that_last_are_met_at_rest() {
+        let servo = two_axes();
+        let torques = DMatrix::from_fn(2, 50, |i, _| [100.0, -70.0][i]);
+        let found = NodeServo::leads(|_| servo.clone(), &torques, 1e-3);
+        for column in found.column_iter() {
+            assert!(column[0].abs() < 1e-16 && (column[1] + 70.0 / 4e4).abs() < 1e-16, "{column}");
+        }
+    }
+
+    /// Truth: amplitude and phase of `1 / (C + F)` at a frequency, of two axes, one with all of it fed forward and one without, which has
+    /// no integrator either.
+    #[test]
+    fn leads_are_those_of_the_frequency_response_once_the_start_has_died_away() {
+        let (h, omega, N) = (1e-3, 12.0, 6000);
+        let servo = two_axes();
         let size = [100.0, -70.0];
         let torques = DMatrix::from_fn(2, N, |i, k| size[i] * (1.0 + (omega * h * k as f64).sin()));
         let found = NodeServo::leads(|_| servo.clone(), &torques, h);

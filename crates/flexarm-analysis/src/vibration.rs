@@ -16,13 +16,7 @@ use crate::inversion::Node;
 /// * `node`: the structure at the end, controllers in its matrices; the first three components of its tool are the position.
 /// * `accelerations`: of the commands, m×N, `step_s` apart, the last at the end.
 /// * `detuned`: factor on the eigenvalue in the motion's spectrum, 1 for the mode as it is.
-pub fn vibration_left(
-    node: &Node,
-    mode: &DampedMode,
-    accelerations: &DMatrix<f64>,
-    step_s: f64,
-    detuned: f64,
-) -> f64 {
+pub fn vibration_left(node: &Node, mode: &DampedMode, accelerations: &DMatrix<f64>, step_s: f64, detuned: f64) -> f64 {
     let (lambda, phi) = (mode.eigenvalue, &mode.shape);
     let last = accelerations.ncols().saturating_sub(1);
     let mut spectrum = DVector::from_element(accelerations.nrows(), Complex::new(0.0, 0.0));
@@ -33,8 +27,8 @@ pub fn vibration_left(
     }
     let complex = |A: &DMatrix<f64>| A.map(|x| Complex::new(x, 0.0));
     let per_acceleration = complex(&node.M_a) + complex(&node.D_a) / lambda + complex(&node.K_a) / (lambda * lambda);
-    let force = phi.tr_dot(&(per_acceleration * spectrum));
-    let own = phi.tr_dot(&(complex(&node.M) * phi)) * lambda * 2.0 + phi.tr_dot(&(complex(&node.D) * phi));
+    let force = phi.dot(&(per_acceleration * spectrum));
+    let own = phi.dot(&(complex(&node.M) * phi)) * lambda * 2.0 + phi.dot(&(complex(&node.D) * phi));
     let tool = complex(&node.J.rows(0, 3).into_owned()) * phi;
     2.0 * tool.norm() * (force / own).norm()
 }
@@ -52,29 +46,31 @@ mod tests {
         let (omega, a, tau, h) = (40.0, 2.0, 0.05, 1e-5);
         let half = (tau / h) as usize;
         let pulse = DMatrix::from_fn(1, 2 * half, |_, k| if k < half { a } else { -a });
-        let J = dmatrix![1.0; 0.0; 0.0];
-        let zero = dmatrix![0.0];
+        // Beside it a mass that the motion does not move.
+        let J = dmatrix![1.0, 0.0; 0.0, 0.0; 0.0, 0.0];
+        let (zero, one) = (DMatrix::zeros(2, 2), DMatrix::identity(2, 2));
         let stiffness = omega * omega;
+        let K = dmatrix![stiffness, 0.0; 0.0, 9.0 * stiffness];
         let node = |M_a: f64, K_a: f64| Node {
-            M: dmatrix![1.0],
+            M: one.clone(),
             D: zero.clone(),
-            K: dmatrix![stiffness],
-            M_a: dmatrix![M_a],
-            D_a: zero.clone(),
-            K_a: dmatrix![K_a],
+            K: K.clone(),
+            M_a: dmatrix![M_a; 0.0],
+            D_a: dmatrix![0.0; 0.0],
+            K_a: dmatrix![K_a; 0.0],
             J: J.clone(),
             J_a: DMatrix::zeros(3, 1),
             servo: None,
         };
-        let mode = damped_modes(&dmatrix![1.0], &zero, &dmatrix![stiffness]).unwrap().remove(0);
+        let mode = damped_modes(&one, &zero, &K).unwrap().remove(0);
         let wanted = 4.0 * a * (0.5 * omega * tau).sin().powi(2) / stiffness;
         for node in [node(1.0, 0.0), node(0.0, -stiffness)] {
             let found = vibration_left(&node, &mode, &pulse, h, 1.0);
             assert!((found / wanted - 1.0).abs() < 1e-3, "{found:e} {wanted:e}"); // 2e-4
         }
-        let damping = dmatrix![2.0 * 0.02 * omega];
+        let damping = &one * (2.0 * 0.02 * omega);
         let damped = Node { D: damping.clone(), ..node(1.0, 0.0) };
-        let mode = damped_modes(&dmatrix![1.0], &damping, &dmatrix![stiffness]).unwrap().remove(0);
+        let mode = damped_modes(&one, &damping, &K).unwrap().remove(0);
         let lambda = mode.eigenvalue;
         let part = (lambda * tau).exp() - 1.0;
         let wanted = (part * part * a / lambda).norm() / lambda.im;

@@ -2,9 +2,7 @@
 
 use std::sync::Arc;
 
-use flexarm_kinematics::{
-    Data, Frame, Pose, State, Wrench, forward_kinematics, inverse_dynamics, rotation_vector,
-};
+use flexarm_kinematics::{Data, Frame, Pose, State, Wrench, forward_kinematics, inverse_dynamics, rotation_vector};
 use nalgebra::{DVector, Vector6};
 
 use crate::arm::{FlexibleArm, Servo};

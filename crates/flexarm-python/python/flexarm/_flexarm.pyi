@@ -117,6 +117,8 @@ def plan_measurements(
     *,
     fit: Sequence[str] | None = None,
     forces: ArrayLike | None = None,
+    levers: ArrayLike | None = None,
+    gauges: ArrayLike | None = None,
     std: float | None = None,
     poses: _Path | None = None,
     work: _Path | None = None,

@@ -1131,8 +1131,12 @@ class PlannedReading(TypedDict):
     """Joints (rad or m)."""
     force: list[float]
     """Force on the tool, world axes (N)."""
+    at: list[float]
+    """Where it acts, tool axes (m)."""
+    direction: list[float] | None
+    """Direction of the gauge, world axes; null where all three numbers are read."""
     expected_m: list[float]
-    """Displacement to expect with the robot file as it is (m)."""
+    """Displacement of the TCP to expect with the robot file as it is (m)."""
 
 
 class ExpectedParameter(TypedDict):

@@ -5,9 +5,7 @@ use std::sync::Arc;
 
 use flexarm_analysis::{Inversion, Node, NodeServo};
 use flexarm_kinematics::{Data, Pose, Wrench, forward_kinematics, rotation_vector};
-use flexarm_stepping::{
-    FlexibleArm, Friction, Held, Servo, ServoAxis, TimedWrench, linearise, static_targets,
-};
+use flexarm_stepping::{FlexibleArm, Friction, Held, Servo, ServoAxis, TimedWrench, linearise, static_targets};
 use flexarm_trajectory::{Extreme, JointKnots, Trajectory};
 use nalgebra::{DMatrix, DVector, Quaternion, Rotation3, Translation3, UnitQuaternion};
 use rayon::prelude::*;
@@ -70,6 +68,8 @@ pub(super) struct Commands {
     pub(super) cutoff_hz: Option<f64>,
     /// When the joints move the tool in fewest directions (s), and in how many.
     pub(super) fewest: Option<(f64, usize)>,
+    /// Part of what is left on the model, by its RMS, that is quicker than the cutoff.
+    pub(super) quicker: f64,
 }
 
 impl<'a> Job<'a> {
@@ -236,9 +236,8 @@ impl<'a> Job<'a> {
         let servo = start.servo.as_ref().map(|servo| controllers(servo, &q, &start.friction));
         let arm = start.along(Arc::new(Held(q))).with_servo_opened();
         let at = linearise(&arm, &flexible.tcp, &Wrench::zeros(), 0.0).map_err(|error| flexible.explained(error))?;
-        let rows = |M: &nalgebra::Matrix6xX<f64>| {
-            DMatrix::from_fn(self.rows.len(), M.ncols(), |i, j| M[(self.rows[i], j)])
-        };
+        let rows =
+            |M: &nalgebra::Matrix6xX<f64>| DMatrix::from_fn(self.rows.len(), M.ncols(), |i, j| M[(self.rows[i], j)]);
         let (J, J_a) = (rows(&at.J), rows(&at.J_a));
         Ok(Node { M: at.M, D: at.D, K: at.K, M_a: at.M_a, D_a: at.D_a, K_a: at.K_a, J, J_a, servo })
     }
@@ -254,10 +253,12 @@ impl<'a> Job<'a> {
             kept: 0,
             cutoff_hz: Some(cutoff),
             fewest: inversion.fewest_directions(),
+            quicker: 0.0,
         };
         let mut error = self.error(&self.as_it_is()?)?;
         let size = |error: &DMatrix<f64>| error.select_rows(&self.rows).norm();
         let (first, mut least) = (size(&error), size(&error));
+        let mut left_over = error.clone();
         best.peaks.push(peak(&error));
         for iteration in 1..=self.request.iterations {
             let y = -error.select_rows(&self.rows);
@@ -271,10 +272,14 @@ impl<'a> Job<'a> {
             }
             let settled = left > SETTLED * least || left < ENOUGH * first;
             (least, best.motion, best.change, best.kept) = (left, motion, change.clone(), iteration);
+            left_over.copy_from(&error);
             if settled {
                 break;
             }
         }
+        let left_over = left_over.select_rows(&self.rows);
+        best.quicker =
+            inversion.quicker_than_cutoff(&left_over, self.step_s()).norm() / left_over.norm().max(f64::MIN_POSITIVE);
         Ok(best)
     }
 
@@ -318,7 +323,7 @@ impl<'a> Job<'a> {
         }
         let motion = self.moved(&change)?;
         let peaks = vec![peak(&self.error(&self.as_it_is()?)?), peak(&self.error(&motion)?)];
-        Ok(Commands { motion, change, peaks, kept: 1, cutoff_hz: None, fewest: None })
+        Ok(Commands { motion, change, peaks, kept: 1, cutoff_hz: None, fewest: None, quicker: 0.0 })
     }
 }
 

@@ -51,6 +51,9 @@ const MOST_ITERATIONS: usize = 100;
 /// Longest motion that is taken (s): all of it is held in memory, a sample a millisecond.
 const LONGEST_S: f64 = 600.0;
 
+/// More than this part of the peak left on the model is explained, if it is mostly quick: by more than the second.
+const ENOUGH_LEFT: f64 = 0.01;
+const MOSTLY: f64 = 0.5;
 /// A servo that gives this part of its largest torque gives all of it.
 const AT_LIMIT: f64 = 1.0 - 1e-9;
 
@@ -310,6 +313,7 @@ fn attempt(
     };
     answer.caveats = caveats(&answer, &own, robot);
     answer.caveats.extend(servo_caveat(&judge.arm, &after.efforts));
+    answer.caveats.extend(quick_caveat(&answer, found.quicker));
     answer.caveats.extend(found.fewest.and_then(|fewest| singular_caveat(fewest, job.rows.len())));
     let motion = found.motion;
     Ok((answer, Found { scenario, motion }, own))
@@ -367,6 +371,20 @@ fn singular_caveat((t_s, directions): (f64, usize), asked: usize) -> Option<Cave
     })
 }
 
+/// Why more than a hundredth of the peak is left on the model, where the motion is too quick.
+fn quick_caveat(answer: &Compensation, quicker: f64) -> Option<Caveat> {
+    let (first, hz) = (answer.model_peaks_m.first()?, answer.cutoff_hz?);
+    let least = answer.model_peaks_m.iter().copied().fold(f64::INFINITY, f64::min);
+    (answer.iterations > 0 && least > ENOUGH_LEFT * first && quicker > MOSTLY).then(|| {
+        let text = format!(
+            "{:.1} % of the peak is left on the model itself; {:.0} % of that, by its RMS, is quicker than {hz:.1} Hz, above which the arm is not inverted",
+            100.0 * least / first,
+            100.0 * quicker
+        );
+        Caveat::said("too-quick", "compensation", text, "give the motion more time or smoother accelerations")
+    })
+}
+
 /// Servos of the plant that give all they have: what they lack, no command gives them.
 fn servo_caveat(plant: &Arm, efforts: &[Extreme]) -> Option<Caveat> {
     let joints: Vec<&str> = plant.joints().collect();
@@ -376,7 +394,8 @@ fn servo_caveat(plant: &Arm, efforts: &[Extreme]) -> Option<Caveat> {
     });
     let named: Vec<String> = at_limit.collect();
     (!named.is_empty()).then(|| {
-        let text = format!("servos are at their torque limits: {}: what they lack there is not corrected", named.join(", "));
+        let text =
+            format!("servos are at their torque limits: {}: what they lack there is not corrected", named.join(", "));
         Caveat::said("servo-limit", "compensation", text, "slow the motion down where it is quickest")
     })
 }

@@ -147,7 +147,8 @@ pub(super) fn corrected(
         return Err(Error::File { path: path.clone(), what: "the program has no text".into() });
     };
     let again = understood(main, others.to_vec())?;
-    let judged = judged(&rest, &stops, &again.places, &left).map_err(|what| Error::File { path: path.clone(), what })?;
+    let judged =
+        judged(&rest, &stops, &again.places, &left).map_err(|what| Error::File { path: path.clone(), what })?;
     let figures = ProgramFigures {
         files: rewritten.files.iter().map(|(file, _)| in_folder(folder, file).display().to_string()).collect(),
         corrected: rewritten.replaced.len(),
@@ -224,7 +225,10 @@ fn uncovered(rest: &AtRest<'_>, stops: &[Stop<'_>], scenario: &Scenario) -> Vec<
     if scenario.motion.tool_path.is_none() {
         told.push("when the motion is at its targets is not known: the loads are those of the start".to_owned());
     }
-    told.push("loads between the targets are not in the program: each target has those that act while the arm is there".to_owned());
+    told.push(
+        "loads between the targets are not in the program: each target has those that act while the arm is there"
+            .to_owned(),
+    );
     let passed = stops.iter().filter(|stop| stop.rest_s[1] <= stop.rest_s[0] && rest.acts(stop.rest_s)).count();
     if passed > 0 {
         told.push(format!("{passed} targets are passed without a rest: the loads there are those of the moment"));

@@ -181,9 +181,7 @@ impl AtEnd {
     /// Modes that the motion makes swing, up to a frequency, the first in any case, the largest first.
     fn vibrations(&self, band: f64, up_to_hz: f64) -> Vec<ShapedMode> {
         let of = |mode: &DampedMode| {
-            let at = |part: &f64| {
-                vibration_left(&self.node, mode, &self.accelerations, self.step_s, 1.0 + band * part)
-            };
+            let at = |part: &f64| vibration_left(&self.node, mode, &self.accelerations, self.step_s, 1.0 + band * part);
             let vibration = IN_BAND.iter().map(at).fold(f64::MIN_POSITIVE, f64::max);
             ShapedMode { hz: mode.frequency_hz(), ratio: mode.damping_ratio(), vibration }
         };
