@@ -4,7 +4,7 @@
 //! min over a of  max over k of  w_k |r_k|,    r_k = Σ a_i exp(λ_k (Δ - t_i)),    a_i >= 0,  Σ a_i = 1,  0 <= t_i <= Δ
 //! ```
 //! with modes λ, each at some frequencies of its band. The problem is convex: cones on a grid of times t_i, solved by Newton's method
-//! on a logarithmic barrier [Boyd and Vandenberghe 2004, section 11.3] with `-log(t² - w²|r|²)` for each mode and frequency and
+//! on a logarithmic barrier [Boyd & Vandenberghe 2004, section 11.3] with `-log(t² - w²|r|²)` for each mode and frequency and
 //! `-log a_i` for each copy. The grid is then drawn closer about the copies that were found. Parts that are not negative keep the shaped
 //! motion within the ranges and below the speeds of the motion itself.
 

@@ -6,7 +6,7 @@
 use std::sync::Arc;
 
 use flexarm_analysis::{Inversion, Node, NodeServo};
-use flexarm_kinematics::{Frame, Model, Wrench};
+use flexarm_kinematics::{Data, Frame, Model, Wrench, mass_matrix};
 use flexarm_stepping::{Damping, FlexibleArm, Held, Servo, ServoAxis, linearise};
 use flexarm_testkit::reference_arm;
 use nalgebra::{DMatrix, DVector};
@@ -77,10 +77,11 @@ fn commands_by_the_series_of_the_inverse_move_the_tool_as_asked_at_a_third_of_th
 fn commands_of_servos_move_the_tool_as_asked_far_above_their_position_gains() {
     let (arm, tool) = arm();
     let rigid = Arc::new(Model::new(&reference_arm(false).mechanism).expect("valid"));
+    let M = mass_matrix(&rigid, &mut Data::new(&rigid), &DVector::from_column_slice(&POSE)).clone();
     let axis = |(i, coordinate): (usize, usize)| ServoAxis {
         coordinate,
         position_gain: 15.0,
-        velocity_gain: [900.0, 900.0, 300.0, 60.0][i],
+        velocity_gain: 60.0 * M[(coordinate, coordinate)],
         integral_gain: 0.0,
         feed_forward: i % 2 == 0,
         limit: f64::INFINITY,
@@ -103,7 +104,7 @@ fn commands_of_servos_move_the_tool_as_asked_far_above_their_position_gains() {
         Node { M: at.M, D: at.D, K: at.K, M_a: at.M_a, D_a: at.D_a, K_a: at.K_a, J, J_a, servo }
     };
     let (open, closed) = (node(&arm.with_servo_opened(), Some(controllers)), node(&arm, None));
-    let (length, h, hz) = (3.0, 2.5e-4, 6.0);
+    let (length, h, hz) = (3.0, 2.5e-4, 4.0);
     let N = (length / h) as usize + 1;
     let wave = |t: f64| (t / length * std::f64::consts::PI).sin().powi(8) * (std::f64::consts::TAU * hz * t).cos();
     let size = [2e-3, -1e-3, 1.5e-3, 1e-3, 2e-3, -1e-3];

@@ -56,6 +56,9 @@ pub(crate) struct IdentifyArgs {
     /// Points of the tool at which the forces may act, tool axes (m; may be repeated) [default: the TCP]
     #[arg(long = "lever", help_heading = "Plan", value_name = "X,Y,Z", requires = "plan", allow_hyphen_values = true)]
     pub(crate) levers: Vec<String>,
+    /// Points of the tool that may be watched, tool axes (m; may be repeated) [default: the TCP]
+    #[arg(long = "point", help_heading = "Plan", value_name = "X,Y,Z", requires = "plan", allow_hyphen_values = true)]
+    pub(crate) points: Vec<String>,
     /// Directions along which a dial gauge may stand, world axes (may be repeated) [default: all three numbers are read]
     #[arg(long = "gauge", help_heading = "Plan", value_name = "X,Y,Z", requires = "plan", allow_hyphen_values = true)]
     pub(crate) gauges: Vec<String>,
@@ -122,6 +125,7 @@ fn plan(cli: &Cli, args: &IdentifyArgs, robot: &Robot, count: usize) -> Result<E
         poses: args.poses.clone(),
         work: args.work.clone(),
         levers: threes("--lever", "a point of three numbers", &args.levers)?,
+        points: threes("--point", "a point of three numbers", &args.points)?,
         directions: threes("--gauge", "a direction of three numbers", &args.gauges)?,
         output: folder.path(),
         overwrite: args.force,
@@ -233,6 +237,8 @@ fn plan_text(found: &MeasurementPlan) -> String {
     let gauges = found.poses.iter().any(|pose| pose.direction.is_some());
     header.push("force (N)");
     header.extend(levers.then_some("at (mm, tool)"));
+    let points = found.poses.iter().any(|pose| pose.point != [0.0; 3]);
+    header.extend(points.then_some("watched (mm, tool)"));
     header.extend(gauges.then_some("gauge along"));
     header.push("expected (mm)");
     let mut t = table(&header);
@@ -242,6 +248,7 @@ fn plan_text(found: &MeasurementPlan) -> String {
         row.extend(pose.joints.iter().map(|q| format!("{:.1}", q.to_degrees())));
         row.push(three(pose.force, 0));
         row.extend(levers.then(|| three(pose.at.map(|x| 1e3 * x), 1)));
+        row.extend(points.then(|| three(pose.point.map(|x| 1e3 * x), 1)));
         row.extend(pose.direction.map(|direction| three(direction, 2)));
         row.push(three(pose.expected_m.map(|x| 1e3 * x), 3));
         t.add_row(row);

@@ -64,6 +64,8 @@ pub(crate) fn identify<'py>(
 ///     Forces on the tool among which the plan chooses, world axes (N).
 /// levers : array_like, optional
 ///     Points of the tool at which the forces may act, tool axes (m), a row each; the TCP without.
+/// points : array_like, optional
+///     Points of the tool that may be watched, tool axes (m), a row each; the TCP without.
 /// gauges : array_like, optional
 ///     Directions along which a dial gauge may stand, world axes, a row each; without, all three numbers are read.
 /// std : float, default 3e-5
@@ -81,7 +83,7 @@ pub(crate) fn identify<'py>(
 /// dict
 ///     As ``flexarm identify --plan --json``.
 #[pyfunction]
-#[pyo3(signature = (robot, count, *, fit=None, forces=None, levers=None, gauges=None, std=None, poses=None, work=None,
+#[pyo3(signature = (robot, count, *, fit=None, forces=None, levers=None, points=None, gauges=None, std=None, poses=None, work=None,
                     links=None, drives=None, output=None, overwrite=false))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments")]
 pub(crate) fn plan_measurements<'py>(
@@ -91,6 +93,7 @@ pub(crate) fn plan_measurements<'py>(
     #[pyo3(from_py_with = texts)] fit: Option<Vec<String>>,
     forces: Option<&Bound<'py, PyAny>>,
     levers: Option<&Bound<'py, PyAny>>,
+    points: Option<&Bound<'py, PyAny>>,
     gauges: Option<&Bound<'py, PyAny>>,
     std: Option<f64>,
     poses: Option<PathBuf>,
@@ -112,6 +115,7 @@ pub(crate) fn plan_measurements<'py>(
         fit: fit.unwrap_or_default(),
         forces,
         levers: threes("levers", levers, "numbers (m)")?.unwrap_or_default(),
+        points: threes("points", points, "numbers (m)")?.unwrap_or_default(),
         directions: threes("gauges", gauges, "numbers")?.unwrap_or_default(),
         std_m: std.unwrap_or(usual.std_m),
         poses,

@@ -4,7 +4,7 @@
 
 use std::path::{Path, PathBuf};
 
-use flexarm::compensate::{CompensateRequest, Compensation, Method, ShaperKind, Shaping, compensate_motion};
+use flexarm::compensate::{CompensateRequest, Compensation, LimitRule, Method, ShaperKind, Shaping, compensate_motion};
 use flexarm::{
     AppliedLoad, DriveModel, Modelling, Motion, PayloadChange, Robot, RunOptions, Scenario, TimedWrench, Wrench,
 };
@@ -41,18 +41,37 @@ fn told(name: &str, found: &Compensation) {
 /// Truth: the simulation itself, sampled controllers and springs in it; the rigid arm on the motion that was asked for, so that the lag
 /// of the servos counts.
 #[test]
-fn targets_of_servos_leave_a_hundredth_of_the_peak_on_real_robots() {
-    for (robot, motion) in [("kr300", "kr300.toml"), ("manutec_r3", "manutec_r3.toml")] {
-        let (robot, motion) = shipped(robot, motion);
-        let found = compensate_motion(&robot, &motion, &servo()).unwrap();
-        told(&robot.name, &found);
-        assert!(
-            found.after.peak_m <= 0.01 * found.before.peak_m,
-            "{:e} of {:e}",
-            found.after.peak_m,
-            found.before.peak_m
-        );
+fn targets_of_servos_leave_a_hundredth_of_the_peak_or_the_cause_is_told() {
+    let (robot, motion) = shipped("kr300", "kr300.toml");
+    let found = compensate_motion(&robot, &motion, &servo()).unwrap();
+    told("kr300", &found);
+    // 8e-4 of the peak; the inverse holds up to 25 Hz, the position loops have 3 Hz.
+    assert!(found.after.peak_m <= 0.002 * found.before.peak_m, "{:e} of {:e}", found.after.peak_m, found.before.peak_m);
+    assert!(found.cutoff_hz.unwrap() > 20.0 && found.caveats.iter().all(|caveat| caveat.code != "servo-limit"));
+    // Half a second with all that the motors have.
+    let (robot, motion) = shipped("manutec_r3", "manutec_r3.toml");
+    let found = compensate_motion(&robot, &motion, &servo()).unwrap();
+    told("manutec_r3", &found);
+    assert!(found.after.peak_m <= 0.2 * found.before.peak_m, "{:e} of {:e}", found.after.peak_m, found.before.peak_m);
+    assert!(found.caveats.iter().any(|caveat| caveat.code == "servo-limit" && caveat.message.contains("joint_2")));
+}
+
+/// Truth: the simulation; nothing fed forward and no integral, so that motors lag and sag into their gains.
+#[test]
+fn servos_that_lag_and_sag_are_told_ahead_of_it() {
+    let (mut robot, motion) = shipped("kr300", "kr300.toml");
+    for drive in &mut robot.drives {
+        drive.servo.feed_forward = Some(false);
+        drive.servo.integral_gain = Some(0.0);
     }
+    let found = compensate_motion(&robot, &motion, &CompensateRequest { iterations: 5, ..servo() }).unwrap();
+    told("lagging", &found);
+    assert!(found.before.peak_m > 3e-3 && found.after.peak_m <= 0.01 * found.before.peak_m, "{:e}", found.after.peak_m);
+    for drive in &mut robot.drives {
+        drive.servo.position_gain = Some(0.0);
+    }
+    let error = compensate_motion(&robot, &motion, &servo()).unwrap_err().to_string();
+    assert!(error.contains("joint_a1") && error.contains("holds no position"), "{error}");
 }
 
 /// A folder that goes away.
@@ -119,7 +138,7 @@ fn a_shaper_of_all_modes_leaves_less_than_zv_within_the_same_delay_and_zvd_withi
     let shaper = found.shaper.unwrap();
     assert_eq!(shaper.kind, "optimal");
     assert!((shaper.copies.iter().map(|copy| copy[1]).sum::<f64>() - 1.0).abs() < 1e-12);
-    assert!(within_zvd < 0.1 * plain);
+    assert!(within_zv < zv && within_zvd < zvd && within_zvd < 0.05 * plain);
     let bad = CompensateRequest { shaper: optimal(-1.0), ..request() };
     assert!(compensate_motion(&robot, &motion, &bad).unwrap_err().to_string().contains("delay of the shaper"));
 }
@@ -145,7 +164,8 @@ fn targets_at_which_the_arm_waits_under_a_force_are_corrected_for_it() {
     let scenario = Scenario::new(motion.clone())
         .with_load(AppliedLoad::new("tcp", push))
         .with_payload(PayloadChange::attach(arrives + 0.6, 90.0, [0.0, 0.0, 0.1].into()));
-    let asked = CompensateRequest { output: Some(place.0.join("out")), recording: false, ..request() };
+    let asked =
+        CompensateRequest { output: Some(place.0.join("out")), recording: false, limits: LimitRule::Tell, ..request() };
     let found = compensate_motion(&robot, scenario, &asked).unwrap();
     let program = found.program.unwrap();
     eprintln!("{program:?}");

@@ -1,5 +1,6 @@
 //! Plans that choose among levers and gauges, and arms whose gears are coupled.
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
+#![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 
 use std::path::{Path, PathBuf};
@@ -79,7 +80,7 @@ fn springs_of_coupled_motors_have_the_derivatives_of_their_arm_and_are_found_fro
     let hz = |x: &[f64]| DVector::from_vec(frequency_slopes(&plant.with(&parameters, x), &[], q).unwrap().hz);
     let slopes = frequency_slopes(&plant, &parameters, q).unwrap().slopes;
     let mut J = nalgebra::DMatrix::zeros(0, 0);
-    flexarm_identify_residuals(&measured, &mut J);
+    evaluated(&measured, &mut J);
     let richardson = |k: usize, f: &dyn Fn(&[f64]) -> DVector<f64>| {
         let at = |h: f64| {
             let mut x = vec![0.0; 6];
@@ -117,7 +118,7 @@ fn springs_of_coupled_motors_have_the_derivatives_of_their_arm_and_are_found_fro
 }
 
 /// Derivatives of the residuals, over the deviations.
-fn flexarm_identify_residuals(arm: &MeasuredArm<'_>, J: &mut nalgebra::DMatrix<f64>) {
+fn evaluated(arm: &MeasuredArm<'_>, J: &mut nalgebra::DMatrix<f64>) {
     use flexarm_identify::Residuals;
     arm.evaluate(&DVector::zeros(arm.parameters.len()), Some(J)).unwrap();
 }
@@ -132,19 +133,24 @@ fn a_plan_with_levers_tells_the_last_gearbox_and_its_table_with_gauges_is_read_a
     };
     let plain = plan_measurements(&robot, &PlanRequest::new(8)).unwrap();
     let levers = vec![[0.0; 3], [0.0, 0.5, 0.0]];
-    let with = plan_measurements(&robot, &PlanRequest { levers: levers.clone(), ..PlanRequest::new(8) }).unwrap();
+    let points = levers.clone();
+    let with = PlanRequest { levers: levers.clone(), points: points.clone(), ..PlanRequest::new(8) };
+    let with = plan_measurements(&robot, &with).unwrap();
     eprintln!("joint_6 to {:.3} of itself at the TCP, {:.3} with a lever", std_of(&plain), std_of(&with));
     assert!(std_of(&with) < 0.5 * std_of(&plain));
-    assert!(with.poses.iter().any(|pose| pose.at == levers[1]) && plain.poses.iter().all(|pose| pose.at == [0.0; 3]));
+    assert!(
+        with.poses.iter().any(|pose| pose.at == levers[1] && pose.point == points[1])
+            && plain.poses.iter().all(|pose| pose.at == [0.0; 3])
+    );
 
     let place = Place::new("gauges");
     let directions = vec![[0.0, 0.0, -2.0], [1.0, 1.0, 0.0]];
-    let request = PlanRequest { levers, directions, output: Some(place.0.clone()), ..PlanRequest::new(14) };
+    let request = PlanRequest { levers, points, directions, output: Some(place.0.clone()), ..PlanRequest::new(14) };
     let plan = plan_measurements(&robot, &request).unwrap();
     let table = PathBuf::from(plan.table.clone().unwrap());
     let text = std::fs::read_to_string(&table).unwrap();
     assert!(
-        text.starts_with("joint_1,joint_2,joint_3,joint_4,joint_5,joint_6,fx,fy,fz,ax,ay,az,ux,uy,uz,d\n"),
+        text.starts_with("joint_1,joint_2,joint_3,joint_4,joint_5,joint_6,fx,fy,fz,ax,ay,az,px,py,pz,ux,uy,uz,d\n"),
         "{text}"
     );
     let mut lines = text.lines();

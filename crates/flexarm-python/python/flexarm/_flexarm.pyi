@@ -118,6 +118,7 @@ def plan_measurements(
     fit: Sequence[str] | None = None,
     forces: ArrayLike | None = None,
     levers: ArrayLike | None = None,
+    points: ArrayLike | None = None,
     gauges: ArrayLike | None = None,
     std: float | None = None,
     poses: _Path | None = None,

@@ -1133,10 +1133,12 @@ class PlannedReading(TypedDict):
     """Force on the tool, world axes (N)."""
     at: list[float]
     """Where it acts, tool axes (m)."""
+    point: list[float]
+    """What is watched, tool axes (m)."""
     direction: list[float] | None
     """Direction of the gauge, world axes; null where all three numbers are read."""
     expected_m: list[float]
-    """Displacement of the TCP to expect with the robot file as it is (m)."""
+    """Displacement of the point to expect with the robot file as it is (m)."""
 
 
 class ExpectedParameter(TypedDict):

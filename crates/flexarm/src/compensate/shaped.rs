@@ -17,6 +17,8 @@ use crate::scenario::Scenario;
 
 /// Damping ratio beyond which a mode hardly swings.
 const SWINGS: f64 = 0.4;
+/// Commands with less than this part of their largest acceleration are at rest.
+const RESTS: f64 = 1e-9;
 /// Modes with less than this part of the largest vibration are left alone.
 const SMALL: f64 = 1e-3;
 /// Most modes, and most periods of one in a delay.
@@ -142,7 +144,7 @@ struct AtEnd {
     node: Node,
     /// Those that swing, by frequency.
     modes: Vec<DampedMode>,
-    /// Accelerations of the motion, m×N.
+    /// Accelerations of the motion until it comes to rest, m×N.
     accelerations: DMatrix<f64>,
     step_s: f64,
 }
@@ -163,6 +165,9 @@ impl AtEnd {
             motion.sample(step_s * k as f64, &mut q, &mut v, &mut a);
             column.copy_from_slice(&a);
         }
+        // Up to where the commands come to rest: what swings then is what is to be small.
+        let moving = accelerations.column_iter().rposition(|column| column.amax() > RESTS * accelerations.amax());
+        let accelerations = accelerations.columns(0, (moving.unwrap_or(0) + 2).min(count + 1)).into_owned();
         // Gains of servos and dampings are those of the start, as in a run.
         let mut held: FlexibleArm = start.along(Arc::new(Held(q)));
         for change in scenario.acting_on(arm.robot(), &held.model)?.changes {

@@ -387,7 +387,7 @@ impl TableRow<'_> {
     }
 }
 
-const DISPLACEMENT_COLUMNS: [&str; 22] = [
+const DISPLACEMENT_COLUMNS: [&str; 25] = [
     "fx",
     "fy",
     "fz",
@@ -397,6 +397,9 @@ const DISPLACEMENT_COLUMNS: [&str; 22] = [
     "ax",
     "ay",
     "az",
+    "px",
+    "py",
+    "pz",
     "mass",
     "dx",
     "dy",
@@ -556,13 +559,16 @@ impl Reader<'_> {
         self.scaled(values, span)
     }
 
+    /// An empty cell of a row whose number is needed.
+    fn empty(&self, row: &TableRow<'_>, file: &Spanned<PathBuf>, name: &str) -> Error {
+        let line = row.table.lines[row.row];
+        let text = format!("{} line {line}: {name} is empty: a number is needed", file.get_ref().display());
+        self.error(file.span(), text)
+    }
+
     /// A load with what a row of a table says of it.
     fn with_columns(&self, load: LoadEntry, row: &TableRow<'_>, file: &Spanned<PathBuf>) -> Result<LoadEntry, Error> {
-        let line = row.table.lines[row.row];
-        let empty = |name: String| {
-            let message = format!("{} line {line}: {name} is empty: a load needs a number", file.get_ref().display());
-            self.error(file.span(), message)
-        };
+        let empty = |name: String| self.empty(row, file, &name);
         let mass = match row.table.column("mass") {
             None => load.mass,
             Some(_) => row.get("mass").ok_or_else(|| empty("mass".into()))?,
@@ -578,11 +584,7 @@ impl Reader<'_> {
         if row.get("d").is_none() {
             return Ok(None);
         }
-        let line = row.table.lines[row.row];
-        let empty = |name: String| {
-            let text = format!("{} line {line}: {name} is empty: d is along ux, uy, uz", file.get_ref().display());
-            self.error(file.span(), text)
-        };
+        let empty = |name: String| self.empty(row, file, &name);
         let direction = row.three(["ux", "uy", "uz"]).map_err(empty)?;
         Ok(direction.map(|direction| Spanned::new(file.span(), direction)))
     }
@@ -610,7 +612,9 @@ impl Reader<'_> {
                     let q = self.table_joints(&at, file.span())?;
                     let rotation = at.filled(["rx", "ry", "rz"]);
                     let direction = self.table_direction(&at, file)?.or_else(|| e.direction.clone());
-                    let said = Said { name, q, load, value, direction, rotation, std, std_rotation };
+                    let point =
+                        at.three(["px", "py", "pz"]).map_err(|name| self.empty(&at, file, &name))?.unwrap_or(e.point);
+                    let said = Said { name, q, load, point, value, direction, rotation, std, std_rotation };
                     self.moved(entry, said)?;
                 }
                 Ok(())
@@ -620,6 +624,7 @@ impl Reader<'_> {
                     name: format!("displacement {}", number + 1),
                     q: self.joints(joints)?,
                     load: e.load,
+                    point: e.point,
                     value: e.value.as_ref().map(|value| value.get_ref().read()),
                     direction: e.direction.clone(),
                     rotation: e.rotation.map(|turn| turn.map(Some)),
@@ -637,7 +642,7 @@ impl Reader<'_> {
     /// One displacement.
     fn moved(&mut self, entry: &Spanned<DisplacementEntry>, said: Said) -> Result<(), Error> {
         let (e, span) = (entry.get_ref(), entry.span());
-        let Said { name, q, load, value, direction, rotation, std, std_rotation } = said;
+        let Said { name, q, load, point, value, direction, rotation, std, std_rotation } = said;
         let mut rows = Vec::new();
         let sigma = self.std(std.as_ref(), self.units.length)?;
         let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
@@ -682,7 +687,7 @@ impl Reader<'_> {
         if before == after {
             return Err(self.error(span, format!("{name}: the loads before and after are the same: nothing moves")));
         }
-        let point = Vector3::from(e.point) * self.units.length;
+        let point = Vector3::from(point) * self.units.length;
         let kind = ReadingKind::Displacement { before, after, point, rows };
         let what = if rotation.is_some() { "displacement and rotation" } else { "displacement" };
         self.given.push((what, std.is_some() || (value.is_none() && std_rotation.is_some()), span));
@@ -911,6 +916,7 @@ struct Said {
     name: String,
     q: Vec<f64>,
     load: LoadEntry,
+    point: [f64; 3],
     value: Option<Measured>,
     direction: Option<Spanned<[f64; 3]>>,
     rotation: Option<[Option<f64>; 3]>,

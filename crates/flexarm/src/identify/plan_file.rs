@@ -33,8 +33,10 @@ pub struct PlanRequest {
     pub count: usize,
     /// Forces on the tool among which the plan chooses, world axes (N).
     pub forces: Vec<[f64; 3]>,
-    /// Points of the tool at which a force may act, tool axes (m); the TCP where it is empty. A lever tells what turns about the tool.
+    /// Points of the tool at which a force may act, tool axes (m); the TCP where it is empty. About an axis through the point nothing turns.
     pub levers: Vec<[f64; 3]>,
+    /// Points of the tool that may be watched, tool axes (m); the TCP where it is empty.
+    pub points: Vec<[f64; 3]>,
     /// Directions along which a gauge may stand, world axes; all three numbers of the displacement are read where it is empty.
     pub directions: Vec<[f64; 3]>,
     /// Deviation of a measured displacement (m).
@@ -59,6 +61,7 @@ impl PlanRequest {
             count,
             forces,
             levers: Vec::new(),
+            points: Vec::new(),
             directions: Vec::new(),
             std_m: 3e-5,
             poses: None,
@@ -102,9 +105,11 @@ pub struct PlannedReading {
     pub force: [f64; 3],
     /// Where it acts, tool axes (m).
     pub at: [f64; 3],
+    /// What is watched, tool axes (m).
+    pub point: [f64; 3],
     /// Direction of the gauge, world axes; null where all three numbers are read.
     pub direction: Option<[f64; 3]>,
-    /// Displacement of the TCP to expect with the robot file as it is (m).
+    /// Displacement of the point to expect with the robot file as it is (m).
     pub expected_m: [f64; 3],
 }
 
@@ -115,22 +120,29 @@ struct Setup {
     force: [f64; 3],
     /// Tool axes (m).
     at: [f64; 3],
+    /// Tool axes (m).
+    point: [f64; 3],
     /// Of unit length, world axes.
     direction: Option<[f64; 3]>,
 }
 
 impl PlanRequest {
-    /// Every force at every lever, seen along every direction.
+    /// Every force at every lever, each point seen along every direction.
     fn setups(&self) -> Vec<Setup> {
-        let levers = if self.levers.is_empty() { &[[0.0; 3]][..] } else { &self.levers };
+        let or_tcp = |points: &[[f64; 3]]| if points.is_empty() { vec![[0.0; 3]] } else { points.to_vec() };
         let unit = |d: &[f64; 3]| Some(Vector3::from(*d).normalize().into());
         let directions =
             if self.directions.is_empty() { vec![None] } else { self.directions.iter().map(unit).collect() };
-        let of = |at: &[f64; 3], direction: &Option<[f64; 3]>| {
-            let (at, direction) = (*at, *direction);
-            self.forces.iter().map(move |force| Setup { force: *force, at, direction }).collect::<Vec<_>>()
-        };
-        levers.iter().flat_map(|at| directions.iter().flat_map(move |direction| of(at, direction))).collect()
+        let mut all = Vec::new();
+        for at in or_tcp(&self.levers) {
+            for point in or_tcp(&self.points) {
+                for direction in &directions {
+                    let of = |force: &[f64; 3]| Setup { force: *force, at, point, direction: *direction };
+                    all.extend(self.forces.iter().map(of));
+                }
+            }
+        }
+        all
     }
 
     /// What makes no plan, as a sentence.
@@ -138,7 +150,9 @@ impl PlanRequest {
         if self.count == 0 || self.forces.is_empty() || !(self.std_m > 0.0 && self.std_m.is_finite()) {
             return Some("a plan needs at least one reading, one force and a positive deviation".into());
         }
-        for (what, rows) in [("force", &self.forces), ("lever", &self.levers), ("direction", &self.directions)] {
+        for (what, rows) in
+            [("force", &self.forces), ("lever", &self.levers), ("point", &self.points), ("direction", &self.directions)]
+        {
             if let Some(bad) = rows.iter().flatten().find(|x| !x.is_finite()) {
                 return Some(format!("a {what} has the entry {bad}, expected finite numbers"));
             }
@@ -189,7 +203,7 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
         poses.iter().flat_map(|q| setups.iter().map(move |setup| Candidate(reading(q, setup)))).collect();
     let purpose: Vec<Reading> = match &request.work {
         Some(path) => {
-            let work = Setup { force: request.forces[0], at: [0.0; 3], direction: None };
+            let work = Setup { force: request.forces[0], at: [0.0; 3], point: [0.0; 3], direction: None };
             poses_of(path, &joints)?.iter().map(|q| reading(q, &work)).collect()
         }
         None => Vec::new(),
@@ -255,7 +269,7 @@ fn displacement(q: &[f64], setup: &Setup, std: f64) -> Reading {
     let kind = ReadingKind::Displacement {
         before: LoadCase::none(),
         after: LoadCase { wrench, at: Vector3::from(setup.at), ..LoadCase::none() },
-        point: Vector3::zeros(),
+        point: Vector3::from(setup.point),
         rows: axes.into_iter().map(|d| Row { of: Component::Along(d), value: 0.0, std }).collect(),
     };
     Reading { name: format!("pose {q:?}"), q: q.to_vec(), kind }
@@ -327,8 +341,8 @@ fn planned(
         let measurements = flexarm_identify::Measurements { readings: vec![reading], ..Default::default() };
         let arm = flexarm_identify::MeasuredArm { plant, parameters: &[], measurements: &measurements };
         let moved = arm.predicted(&nalgebra::DVector::zeros(0)).map_err(|e| IdentifyFileError::Fit(e.to_string()))?;
-        let Setup { force, at, direction } = setup;
-        Ok(PlannedReading { joints: q, force, at, direction, expected_m: [moved[0], moved[1], moved[2]] })
+        let Setup { force, at, point, direction } = setup;
+        Ok(PlannedReading { joints: q, force, at, point, direction, expected_m: [moved[0], moved[1], moved[2]] })
     };
     best.chosen.iter().map(one).collect()
 }
@@ -343,10 +357,11 @@ fn job(answer: &MeasurementPlan, request: &PlanRequest) -> String {
         true => ("dx, dy, dz", "world axes"),
         false => ("d", "along ux, uy, uz, world axes"),
     };
+    let what = if request.points.is_empty() { "the TCP" } else { "the point px, py, pz (mm, tool axes)" };
     let lever = if request.levers.is_empty() { "" } else { ", which acts at ax, ay, az (mm, tool axes)" };
     format!(
         "# Measurements of {}: {} readings, planned by flexarm identify.\n\
-         # Fill in {read} of displacements.csv (mm, {how}): how far the TCP moves from no load to the force{lever}.\n\
+         # Fill in {read} of displacements.csv (mm, {how}): how far {what} moves from no load to the force{lever}.\n\
          # Then: flexarm identify ROBOT measurements.toml\n\
          format = 1\nlength = \"mm\"\nangle = \"deg\"\n{fit}\n[[displacement]]\nfile = \"displacements.csv\"\nstd = {}\n",
         answer.robot,
@@ -358,9 +373,11 @@ fn job(answer: &MeasurementPlan, request: &PlanRequest) -> String {
 /// The table with empty cells.
 fn to_fill_in(answer: &MeasurementPlan, request: &PlanRequest, slides: &[bool]) -> String {
     let (levers, gauges) = (!request.levers.is_empty(), !request.directions.is_empty());
+    let points = !request.points.is_empty();
     let lever = if levers { ",ax,ay,az" } else { "" };
+    let point = if points { ",px,py,pz" } else { "" };
     let read = if gauges { ",ux,uy,uz,d" } else { ",dx,dy,dz" };
-    let mut out = format!("{},fx,fy,fz{lever}{read}\n", answer.joints.join(","));
+    let mut out = format!("{},fx,fy,fz{lever}{point}{read}\n", answer.joints.join(","));
     for pose in &answer.poses {
         let of = |(q, slides): (&f64, &bool)| format!("{:.4}", if *slides { 1e3 * q } else { q.to_degrees() });
         let joints: Vec<String> = pose.joints.iter().zip(slides).map(of).collect();
@@ -368,6 +385,9 @@ fn to_fill_in(answer: &MeasurementPlan, request: &PlanRequest, slides: &[bool]) 
         out += &format!("{}{}", joints.join(","), three(pose.force));
         if levers {
             out += &three(pose.at.map(|x| 1e3 * x));
+        }
+        if points {
+            out += &three(pose.point.map(|x| 1e3 * x));
         }
         out += &match pose.direction {
             Some(direction) => three(direction) + ",\n",
