@@ -14,7 +14,7 @@ use crate::args::{Cli, ModellingArgs, RobotArgs};
 use crate::failure::Failure;
 use crate::print::{lines, table, warning};
 use crate::shipped::OutputFolder;
-use crate::{answer, load_options, shipped, to_json, values};
+use crate::{answer, load_options, shipped, to_json};
 
 const EXAMPLES: &str = "\
 Examples:

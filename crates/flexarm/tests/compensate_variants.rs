@@ -48,7 +48,7 @@ fn targets_of_servos_leave_a_hundredth_of_the_peak_or_the_cause_is_told() {
     // 8e-4 of the peak; the inverse holds up to 25 Hz, the position loops have 3 Hz.
     assert!(found.after.peak_m <= 0.002 * found.before.peak_m, "{:e} of {:e}", found.after.peak_m, found.before.peak_m);
     assert!(found.cutoff_hz.unwrap() > 20.0 && found.caveats.iter().all(|caveat| caveat.code != "servo-limit"));
-    // Half a second with all that the motors have.
+    // Accelerations that jump, and torques at their limit.
     let (robot, motion) = shipped("manutec_r3", "manutec_r3.toml");
     let found = compensate_motion(&robot, &motion, &servo()).unwrap();
     told("manutec_r3", &found);

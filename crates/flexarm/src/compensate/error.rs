@@ -75,7 +75,7 @@ pub enum CompensateError {
     },
     /// A servo that does not hold its joint.
     #[error(
-        "the servo of joint {joint:?} holds no position, so that there are no targets for it: give it a position_gain and a velocity_gain, or compensate with --drives elastic"
+        "the servo of joint {joint:?} holds no position, so that there are no targets for it: give it a position_gain and a velocity_gain, or take motors that are where they are commanded (drives = elastic)"
     )]
     NothingHolds {
         /// The joint.
