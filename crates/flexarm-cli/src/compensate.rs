@@ -208,28 +208,23 @@ pub(crate) fn run(cli: &Cli, args: &CompensateArgs) -> Result<ExitCode, Failure>
     Ok(ExitCode::SUCCESS)
 }
 
-fn text(found: &Compensation) -> String {
-    let mut out =
-        format!("{} on {}: {} method, {} iterations", found.motion, found.robot, found.method, found.iterations);
-    if let Some(hz) = found.cutoff_hz {
-        out += &format!(", up to {hz:.1} Hz");
+/// What the motion makes swing, and what a shaper leaves of it.
+fn shaper_text(found: &Compensation) -> String {
+    let Some(shaper) = &found.shaper else { return String::new() };
+    let mut t = table(&["mode Hz", "damping ratio", "swings behind the motion mm", "shaped mm"]);
+    for mode in &shaper.modes {
+        t.add_row(vec![
+            format!("{:.2}", mode.frequency_hz),
+            format!("{:.4}", mode.damping_ratio),
+            format!("{:.4}", 1e3 * mode.before_m),
+            format!("{:.4}", 1e3 * mode.after_m),
+        ]);
     }
-    if found.shaper_delay_s > 0.0 {
-        out += &format!("; the shaper takes {:.3} s", found.shaper_delay_s);
-    }
-    out += "\n\n";
-    if let Some(shaper) = &found.shaper {
-        let mut t = table(&["mode Hz", "damping ratio", "swings behind the motion mm", "shaped mm"]);
-        for mode in &shaper.modes {
-            t.add_row(vec![
-                format!("{:.2}", mode.frequency_hz),
-                format!("{:.4}", mode.damping_ratio),
-                format!("{:.4}", 1e3 * mode.before_m),
-                format!("{:.4}", 1e3 * mode.after_m),
-            ]);
-        }
-        out += &format!("{}\n\n", lines(&t));
-    }
+    format!("{}\n\n", lines(&t))
+}
+
+/// Errors before and after, on the arm and on others.
+fn plants_text(found: &Compensation) -> String {
     let mut t = table(&["mm", "peak before", "after", "RMS before", "after", "taken away", "end before", "after"]);
     let mut row = |name: &str, before: &ErrorFigures, after: &ErrorFigures| {
         let mm = |x: f64| format!("{:.4}", 1e3 * x);
@@ -252,7 +247,21 @@ fn text(found: &Compensation) -> String {
             column.set_cell_alignment(CellAlignment::Right);
         }
     }
-    out += &lines(&t);
+    lines(&t)
+}
+
+fn text(found: &Compensation) -> String {
+    let mut out =
+        format!("{} on {}: {} method, {} iterations", found.motion, found.robot, found.method, found.iterations);
+    if let Some(hz) = found.cutoff_hz {
+        out += &format!(", up to {hz:.1} Hz");
+    }
+    if found.shaper_delay_s > 0.0 {
+        out += &format!("; the shaper takes {:.3} s", found.shaper_delay_s);
+    }
+    out += "\n\n";
+    out += &shaper_text(found);
+    out += &plants_text(found);
     let peaks: Vec<String> = found.model_peaks_m.iter().map(|peak| format!("{:.4}", 1e3 * peak)).collect();
     out += &format!("\npeak on the model after each iteration (mm): {}\n", peaks.join(", "));
     if found.slowed > 1.0 {

@@ -4,6 +4,7 @@
 //! ([`Inversion`]), and the new motion is run again, a few times. At rest ([`Method::Static`]) each point is corrected to its
 //! equilibrium alone. [`static_targets`], [`Inversion`] and [`Shaper`] take and give values.
 
+mod caveats;
 mod error;
 mod files;
 mod job;
@@ -22,7 +23,7 @@ pub use flexarm_analysis::{
     Inversion, InversionError, Node, NodeServo, OptimalShaper, ShapedMode, Shaper, ShaperError, ShaperKind,
 };
 pub use flexarm_stepping::{StaticTargets, TargetError, static_targets};
-use flexarm_trajectory::{Extreme, Trajectory};
+use flexarm_trajectory::Trajectory;
 use serde::Serialize;
 
 use crate::arm::Arm;
@@ -50,12 +51,6 @@ const LONGEST_STEP_S: f64 = 4e-3;
 const MOST_ITERATIONS: usize = 100;
 /// Longest motion that is taken (s): all of it is held in memory, a sample a millisecond.
 const LONGEST_S: f64 = 600.0;
-
-/// More than this part of the peak left on the model is explained, if it is mostly quick: by more than the second.
-const ENOUGH_LEFT: f64 = 0.01;
-const MOSTLY: f64 = 0.5;
-/// A servo that gives this part of its largest torque gives all of it.
-const AT_LIMIT: f64 = 1.0 - 1e-9;
 
 /// How commands are found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -257,22 +252,17 @@ fn attempt(
     request: &CompensateRequest,
     stop: Stop<'_>,
 ) -> Result<(Compensation, Found, Vec<MotionViolation>), Error> {
-    let mut scenario = scenario.clone();
-    let mut shaper = None;
-    if let Some(shaping) = request.shaper {
-        let figures;
-        (scenario.motion, figures) = shaped(arm, &scenario, shaping)?;
-        shaper = Some(figures);
-    }
+    let (motion, shaper) = match request.shaper {
+        Some(shaping) => shaped(arm, scenario, shaping).map(|(motion, figures)| (motion, Some(figures)))?,
+        None => (scenario.motion.clone(), None),
+    };
+    let scenario = Scenario { motion, ..scenario.clone() };
     let job = Job::new(arm, &scenario, request, stop)?;
     let found = match request.method {
         Method::Dynamic => job.dynamic()?,
         Method::Static => job.at_rest()?,
     };
-    let judge = match &request.plant {
-        Some((_, plant)) => Judge::of(plant, request, arm)?,
-        None => Judge { arm: arm.clone(), run: request.run.clone() },
-    };
+    let judge = Judge::of(request, arm)?;
     let as_it_is = job.as_it_is()?;
     let before = judge.figures(&job, &as_it_is)?;
     let after = judge.figures(&job, &found.motion)?;
@@ -284,8 +274,7 @@ fn attempt(
         true => sweep(robot, request, &job, arm, &found.motion)?,
         false => Vec::new(),
     };
-    let largest = |k: usize| found.change.row(k).amax();
-    let changes = arm.joints().enumerate().map(|(k, joint)| JointChange { joint: joint.into(), largest: largest(k) });
+    let change = |(k, joint): (usize, &str)| JointChange { joint: joint.into(), largest: found.change.row(k).amax() };
     let curves = job.times.iter().zip(before.distance.iter().zip(&after.distance)).map(|(t, (a, b))| [*t, *a, *b]);
     let mut answer = Compensation {
         robot: robot.name.clone(),
@@ -296,7 +285,7 @@ fn attempt(
         model_peaks_m: found.peaks.clone(),
         iterations: found.kept,
         cutoff_hz: found.cutoff_hz,
-        changes: changes.collect(),
+        changes: arm.joints().enumerate().map(change).collect(),
         limits,
         slowed: 1.0,
         shaper_delay_s: shaper.iter().flat_map(|shaper| &shaper.copies).map(|copy| copy[0]).fold(0.0, f64::max),
@@ -311,10 +300,8 @@ fn attempt(
         trajectory: found.motion.trajectory.clone(),
         curves: curves.collect(),
     };
-    answer.caveats = caveats(&answer, &own, robot);
-    answer.caveats.extend(servo_caveat(&judge.arm, &after.efforts));
-    answer.caveats.extend(quick_caveat(&answer, found.quicker));
-    answer.caveats.extend(found.fewest.and_then(|fewest| singular_caveat(fewest, job.rows.len())));
+    answer.caveats = caveats::of(&answer, &own, robot, &found, job.rows.len());
+    answer.caveats.extend(caveats::of_servos(&judge.arm, &after.efforts));
     let motion = found.motion;
     Ok((answer, Found { scenario, motion }, own))
 }
@@ -358,80 +345,4 @@ fn check(scenario: &Scenario, request: &CompensateRequest, arm: &Arm) -> Result<
         Some(jump) => Err(CompensateError::Corner { t_s: jump.time_s }),
         None => Ok(()),
     }
-}
-
-/// Where the joints cannot correct everything that is asked for.
-fn singular_caveat((t_s, directions): (f64, usize), asked: usize) -> Option<Caveat> {
-    (directions < asked).then(|| {
-        let text = format!(
-            "at {t_s:.2} s the joints move the tool in {directions} of the {asked} directions asked for (a singular pose, or too few joints): \
-             the others are corrected little or not at all there"
-        );
-        Caveat::said("singular", "compensation", text, "ask for fewer components, or begin and pass elsewhere")
-    })
-}
-
-/// Why more than a hundredth of the peak is left on the model, where the motion is too quick.
-fn quick_caveat(answer: &Compensation, quicker: f64) -> Option<Caveat> {
-    let (first, hz) = (answer.model_peaks_m.first()?, answer.cutoff_hz?);
-    let least = answer.model_peaks_m.iter().copied().fold(f64::INFINITY, f64::min);
-    (answer.iterations > 0 && least > ENOUGH_LEFT * first && quicker > MOSTLY).then(|| {
-        let text = format!(
-            "{:.1} % of the peak is left on the model itself; {:.0} % of that, by its RMS, is quicker than {hz:.1} Hz, above which the arm is not inverted",
-            100.0 * least / first,
-            100.0 * quicker
-        );
-        Caveat::said("too-quick", "compensation", text, "give the motion more time or smoother accelerations")
-    })
-}
-
-/// Servos of the plant that give all they have: what they lack, no command gives them.
-fn servo_caveat(plant: &Arm, efforts: &[Extreme]) -> Option<Caveat> {
-    let joints: Vec<&str> = plant.joints().collect();
-    let at_limit = plant.flexible().servo_limits().filter_map(|(k, limit)| {
-        let worst = efforts.get(k).filter(|worst| worst.value.abs() >= AT_LIMIT * limit)?;
-        Some(format!("{} ({limit:.1} N m or N at {:.3} s)", joints.get(k)?, worst.time_s))
-    });
-    let named: Vec<String> = at_limit.collect();
-    (!named.is_empty()).then(|| {
-        let text =
-            format!("servos are at their torque limits: {}: what they lack there is not corrected", named.join(", "));
-        Caveat::said("servo-limit", "compensation", text, "slow the motion down where it is quickest")
-    })
-}
-
-fn caveats(answer: &Compensation, own: &[MotionViolation], robot: &Robot) -> Vec<Caveat> {
-    let mut caveats = Vec::new();
-    let worse: Vec<&str> = limits::worse(&answer.limits, own).map(|limit| limit.message.as_str()).collect();
-    if !worse.is_empty() {
-        let text = format!("the new commands pass limits that the motion keeps: {}", worse.join("; "));
-        caveats.push(Caveat::said("limits", "compensation", text, "slow the motion down a little"));
-    }
-    let untold: Vec<&str> = robot
-        .drives
-        .iter()
-        .filter(|d| d.backlash > 0.0 || d.friction != flexarm_stepping::Friction::NONE)
-        .map(|d| d.joint.as_str())
-        .collect();
-    if !untold.is_empty() {
-        let text = format!(
-            "play and friction of {} are not taken away: what they leave depends on the way the joint came",
-            untold.join(", ")
-        );
-        caveats.push(Caveat::said("play", "compensation", text, "come to every point from the same side").as_note());
-    }
-    if answer.after.peak_m > 0.5 * answer.before.peak_m {
-        let text = format!(
-            "less than half of the error is taken away on the plant ({:.3} of {:.3} mm left)",
-            1e3 * answer.after.peak_m,
-            1e3 * answer.before.peak_m
-        );
-        caveats.push(Caveat::said(
-            "little-gained",
-            "compensation",
-            text,
-            "the model is not that of the plant, or the motion is too quick for it",
-        ));
-    }
-    caveats
 }

@@ -231,7 +231,7 @@ fn uncovered(rest: &AtRest<'_>, stops: &[Stop<'_>], scenario: &Scenario) -> Vec<
     );
     let passed = stops.iter().filter(|stop| stop.rest_s[1] <= stop.rest_s[0] && rest.acts(stop.rest_s)).count();
     if passed > 0 {
-        told.push(format!("{passed} targets are passed without a rest: the loads there are those of the moment"));
+        told.push(format!("targets that are passed without a rest: {passed}; the loads there are those of the moment"));
     }
     let changing = stops.iter().filter_map(|stop| Some((rest.change(stop.rest_s)?, stop.of.line)));
     let changing: Vec<(f64, usize)> = changing.filter(|(change, _)| *change > CHANGES).collect();
