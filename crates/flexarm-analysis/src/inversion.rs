@@ -11,14 +11,20 @@
 //! looks ahead by derivatives alone. Each use leaves `1 - H A` of the error: where that is more than half the commands are filtered
 //! off, without phase, so that iteration settles and noise does not grow. With other numbers of joints than of components A_0 is
 //! the pseudo-inverse; near singular poses it is damped.
+//!
+//! Joints under servos: the series is that of the arm whose motors are prescribed, and gives the motion of the motors and the torques
+//! that they need beyond those fed forward; what the servos must be told for these is a small equation over time (`servo`), stable as
+//! the servos themselves.
 
 use nalgebra::{Complex, DMatrix};
 
+use crate::servo::NodeServo;
 use crate::signal::LowPass;
 
 /// The arm linearised at a time of its motion; world axes at the tool, components that count only.
 ///
-/// As `Linear` of `flexarm-stepping`: n free coordinates, m commands, k components of the tool.
+/// As `Linear` of `flexarm-stepping`: n free coordinates, m commands, k components of the tool. Joints under servos are free
+/// coordinates, the first of them, driven by nothing; the columns of their commands are zero.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Node {
     /// Mass, n×n.
@@ -37,6 +43,52 @@ pub struct Node {
     pub J: DMatrix<f64>,
     /// Tool per command, k×m.
     pub J_a: DMatrix<f64>,
+    /// Controllers of the joints among the free coordinates.
+    pub servo: Option<NodeServo>,
+}
+
+/// The equations of a node whose motors are prescribed, for its series.
+#[derive(Clone, Debug)]
+struct Prescribed {
+    /// Stiffness, damping, mass of the elastic coordinates, e×e.
+    own: [DMatrix<f64>; 3],
+    /// The same per command, e×m.
+    by_commands: [DMatrix<f64>; 3],
+    /// Torques of the motors per elastic coordinate, d×e.
+    motors: [DMatrix<f64>; 3],
+    /// And per command, d×m; without what is fed forward.
+    motors_by_commands: [DMatrix<f64>; 3],
+    J: DMatrix<f64>,
+    J_a: DMatrix<f64>,
+}
+
+impl Node {
+    fn prescribed(&self) -> Prescribed {
+        let axes: &[usize] = self.servo.as_ref().map_or(&[], |servo| &servo.axes);
+        let (n, d) = (self.K.nrows(), axes.len());
+        let parts = [&self.K, &self.D, &self.M];
+        // A motor's column is that of its command now.
+        let moved = |by_commands: &DMatrix<f64>, free: &DMatrix<f64>| {
+            let mut all = by_commands.clone();
+            axes.iter().enumerate().for_each(|(i, k)| all.set_column(*k, &free.column(i)));
+            all
+        };
+        let commands = [moved(&self.K_a, &self.K), moved(&self.D_a, &self.D), moved(&self.M_a, &self.M)];
+        let ahead = |k: usize| self.servo.as_ref().map(|servo| &servo.ahead[k]);
+        let below = |A: &DMatrix<f64>| A.rows(d, n - d).into_owned();
+        let motors = |k: usize| {
+            let needed = commands[k].rows(0, d).into_owned();
+            ahead(k).map_or_else(|| needed.clone(), |ahead| &needed - ahead)
+        };
+        Prescribed {
+            own: parts.map(|A| A.view((d, d), (n - d, n - d)).into_owned()),
+            motors: parts.map(|A| A.view((0, d), (d, n - d)).into_owned()),
+            motors_by_commands: [motors(0), motors(1), motors(2)],
+            by_commands: [below(&commands[0]), below(&commands[1]), below(&commands[2])],
+            J: self.J.columns(d, n - d).into_owned(),
+            J_a: moved(&self.J_a, &self.J),
+        }
+    }
 }
 
 /// Why an error cannot be taken away.
@@ -70,6 +122,8 @@ const SEARCH: (f64, f64, f64) = (0.5, 200.0, 1.1);
 #[derive(Clone, Debug)]
 struct Series {
     A: [DMatrix<f64>; ORDER],
+    /// Torques that the motors of joints under servos need beyond those fed forward, d×k each.
+    torques: [DMatrix<f64>; ORDER],
     /// Directions of the tool that the joints move well, k×r, orthonormal.
     moved: DMatrix<f64>,
 }
@@ -78,6 +132,8 @@ struct Series {
 #[derive(Clone, Debug)]
 pub struct Inversion {
     series: Vec<Series>,
+    /// Controllers at the nodes; none without.
+    servos: Vec<NodeServo>,
     spacing_s: f64,
     cutoff_hz: f64,
 }
@@ -95,7 +151,8 @@ impl Inversion {
             cutoff_hz = cutoff_hz.min(found.holds_up_to(node, cutoff_hz));
             series.push(found);
         }
-        Ok(Self { series, spacing_s, cutoff_hz })
+        let servos = nodes.iter().filter_map(|node| node.servo.clone()).collect();
+        Ok(Self { series, servos, spacing_s, cutoff_hz })
     }
 
     /// The same with the commands corrected up to this frequency at most (Hz).
@@ -115,6 +172,15 @@ impl Inversion {
         self.cutoff_hz
     }
 
+    /// What of an error (k×N, `step_s` apart) is above the cutoff.
+    pub fn quicker_than_cutoff(&self, y: &DMatrix<f64>, step_s: f64) -> DMatrix<f64> {
+        if y.ncols() == 0 {
+            return y.clone();
+        }
+        let (slow, pad) = filtered(y, step_s, self.cutoff_hz);
+        y - slow.columns(pad, y.ncols())
+    }
+
     /// Change of the commands for which the tool moves by `y`, below the cutoff.
     ///
     /// * `y`: k×N, a column per time from 0, `step_s` apart; before and after it stays as at the ends.
@@ -132,52 +198,60 @@ impl Inversion {
         for order in 1..ORDER {
             derivatives.push(derivative(&derivatives[order - 1], step_s));
         }
-        let mut u = DMatrix::zeros(m, N);
-        for column in 0..N {
-            let (first, part) = self.place(column as f64 * step_s);
-            let next = (first + 1).min(self.series.len() - 1);
-            let mut to = u.column_mut(column);
-            for (node, weight) in [(first, 1.0 - part), (next, part)] {
-                for (A, y) in self.series[node].A.iter().zip(&derivatives) {
-                    to.gemv(weight, A, &y.column(pad + column), 1.0);
+        let of = |terms: fn(&Series) -> &[DMatrix<f64>; ORDER], rows: usize, first: usize, count: usize| {
+            let mut sum = DMatrix::zeros(rows, count);
+            for column in 0..count {
+                let time = (first + column) as f64 - pad as f64;
+                for (node, weight) in self.place(time * step_s) {
+                    for (A, y) in terms(&self.series[node]).iter().zip(&derivatives) {
+                        sum.column_mut(column).gemv(weight, A, &y.column(first + column), 1.0);
+                    }
                 }
+            }
+            sum
+        };
+        let mut u = of(|series| &series.A, m, pad, N);
+        if let Some(servo) = self.servos.first() {
+            // From before the motion begins, so that it is met at rest.
+            let torques = of(|series| &series.torques, servo.axes.len(), 0, pad + N);
+            let at =
+                |column: usize| NodeServo::between(&self.servos, self.place((column as f64 - pad as f64) * step_s));
+            let ahead = NodeServo::leads(at, &torques, step_s);
+            for (i, axis) in servo.axes.iter().enumerate() {
+                let mut row = u.row_mut(*axis);
+                row += ahead.view((i, pad), (1, N));
             }
         }
         u
     }
 
-    /// Number of the node before a time, and how far between it and the next.
-    fn place(&self, t: f64) -> (usize, f64) {
+    /// Numbers of the nodes before and behind a time, with their weights.
+    fn place(&self, t: f64) -> [(usize, f64); 2] {
         let last = self.series.len() - 1;
         let at = (t / self.spacing_s).clamp(0.0, last as f64);
         let k = (at as usize).min(last.saturating_sub(1));
-        (k, at - k as f64)
+        let part = at - k as f64;
+        [(k, 1.0 - part), ((k + 1).min(last), part)]
     }
 }
 
 impl Series {
     fn of(node: &Node, t_s: f64) -> Result<Self, InversionError> {
-        // x = X_0 u + X_1 u̇ + X_2 ü + ..., and the tool by it.
-        let lu = node.K.clone().lu();
+        let arm = node.prescribed();
+        // x = X_0 u + X_1 u̇ + X_2 ü + ..., the tool and the torques by it.
+        let lu = arm.own[0].clone().lu();
         let solve = |F: DMatrix<f64>| lu.solve(&F).map(|x| -x).ok_or(InversionError::Slack { t_s });
+        let by = |parts: &[DMatrix<f64>; 3], direct: &[DMatrix<f64>; 3], X: &[DMatrix<f64>], order: usize| {
+            let zero = DMatrix::zeros(direct[0].nrows(), direct[0].ncols());
+            let sum = direct.get(order).cloned().unwrap_or(zero);
+            (0..3).filter(|k| *k <= order && order - k < X.len()).fold(sum, |sum, k| sum + &parts[k] * &X[order - k])
+        };
         let mut X: Vec<DMatrix<f64>> = Vec::with_capacity(ORDER);
         for order in 0..ORDER {
-            let mut force = match order {
-                0 => node.K_a.clone(),
-                1 => node.D_a.clone(),
-                2 => node.M_a.clone(),
-                _ => DMatrix::zeros(node.K.nrows(), node.K_a.ncols()),
-            };
-            if order >= 1 {
-                force += &node.D * &X[order - 1];
-            }
-            if order >= 2 {
-                force += &node.M * &X[order - 2];
-            }
-            X.push(solve(force)?);
+            X.push(solve(by(&arm.own, &arm.by_commands, &X, order))?);
         }
-        let H: Vec<DMatrix<f64>> = X.iter().map(|X| &node.J * X).collect();
-        let H_0 = &node.J_a + &H[0];
+        let H: Vec<DMatrix<f64>> = X.iter().map(|X| &arm.J * X).collect();
+        let H_0 = &arm.J_a + &H[0];
         let (A_0, moved) = damped_inverse(&H_0).ok_or(InversionError::Singular { t_s })?;
         // H(s) A(s) = 1, power by power.
         let mut A = vec![A_0];
@@ -185,8 +259,13 @@ impl Series {
             let sum = (1..=order).fold(DMatrix::zeros(H_0.nrows(), H_0.nrows()), |sum, k| sum + &H[k] * &A[order - k]);
             A.push(-(&A[0] * sum));
         }
+        let T: Vec<DMatrix<f64>> = (0..ORDER).map(|k| by(&arm.motors, &arm.motors_by_commands, &X, k)).collect();
+        let torques = std::array::from_fn(|order| {
+            let zero = DMatrix::zeros(T[0].nrows(), H_0.nrows());
+            (0..=order).fold(zero, |sum, k| sum + &T[k] * &A[order - k])
+        });
         let A = A.try_into().unwrap_or_else(|_| unreachable!("as many terms as the order"));
-        Ok(Self { A, moved })
+        Ok(Self { A, torques, moved })
     }
 
     /// The highest frequency below `most` up to which one use leaves less than [`LEFT`] (Hz).
@@ -205,14 +284,25 @@ impl Series {
     /// Largest part of an error that one use leaves at a frequency, each component of the tool by its own unit.
     fn leaves(&self, node: &Node, hz: f64) -> Option<f64> {
         let s = Complex::new(0.0, std::f64::consts::TAU * hz);
-        let complex = |A: &DMatrix<f64>| A.map(|x| Complex::new(x, 0.0));
         let poly =
             |a: &DMatrix<f64>, b: &DMatrix<f64>, c: &DMatrix<f64>| complex(a) + complex(b) * s + complex(c) * (s * s);
-        let x = poly(&node.K, &node.D, &node.M).lu().solve(&poly(&node.K_a, &node.D_a, &node.M_a))?;
-        let H = complex(&node.J_a) - complex(&node.J) * x;
-        let zero = DMatrix::from_element(self.A[0].nrows(), self.A[0].ncols(), Complex::new(0.0, 0.0));
-        let (A, _) =
-            self.A.iter().fold((zero, Complex::new(1.0, 0.0)), |(sum, power), A| (sum + complex(A) * power, power * s));
+        let (mut Z, mut N) = (poly(&node.K, &node.D, &node.M), poly(&node.K_a, &node.D_a, &node.M_a));
+        if let Some(servo) = &node.servo {
+            servo.close(s, &mut Z, &mut N);
+        }
+        let H = complex(&node.J_a) - complex(&node.J) * Z.lu().solve(&N)?;
+        let sum = |terms: &[DMatrix<f64>; ORDER]| {
+            let zero = DMatrix::from_element(terms[0].nrows(), terms[0].ncols(), Complex::new(0.0, 0.0));
+            terms.iter().fold((zero, Complex::new(1.0, 0.0)), |(sum, power), A| (sum + complex(A) * power, power * s)).0
+        };
+        let mut A = sum(&self.A);
+        if let Some(servo) = &node.servo {
+            let ahead = servo.references(s).lu().solve(&sum(&self.torques))?;
+            for (i, axis) in servo.axes.iter().enumerate() {
+                let mut row = A.row_mut(*axis);
+                row += ahead.row(i);
+            }
+        }
         let mut left = -(H * A);
         for k in 0..left.nrows() {
             left[(k, k)] += Complex::new(1.0, 0.0);
@@ -222,6 +312,10 @@ impl Series {
         let left = moved.tr_mul(&left) * moved;
         Some(left.map(|z| z.norm()).singular_values().amax())
     }
+}
+
+fn complex(A: &DMatrix<f64>) -> DMatrix<Complex<f64>> {
+    A.map(|x| Complex::new(x, 0.0))
 }
 
 /// The damped pseudo-inverse, and an orthonormal basis of the directions that it does not damp; none of a matrix without any.

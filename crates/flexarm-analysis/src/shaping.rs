@@ -4,7 +4,8 @@
 //! q_s(t) = Σ a_i q(t - t_i),   Σ a_i = 1
 //! ```
 //! Zero vibration (ZV, two copies half a damped period apart), and zero vibration and slope (ZVD, three), which forgives a
-//! frequency that is off (Singer and Seering 1990). Shapers of several modes are convolved.
+//! frequency that is off (Singer and Seering 1990). Shapers of several modes are convolved; the best one within a given delay is in
+//! `optimal_shaper`.
 
 use std::f64::consts::{PI, TAU};
 
@@ -60,8 +61,13 @@ impl Shaper {
 
     /// Vibration of a mode after a step, over that without the shaper.
     pub fn residual(&self, hz: f64, ratio: f64) -> f64 {
+        self.residual_at(hz, ratio, self.delay_s())
+    }
+
+    /// The same at a time after the step (s), when the last copy is through.
+    pub fn residual_at(&self, hz: f64, ratio: f64, end_s: f64) -> f64 {
         let (w, wd) = (TAU * hz, TAU * hz * (1.0 - ratio * ratio).sqrt());
-        let end = self.delay_s();
+        let end = end_s;
         let sum = |f: fn(f64) -> f64| -> f64 {
             self.copies.iter().map(|(t, a)| a * (ratio * w * (t - end)).exp() * f(wd * t)).sum()
         };

@@ -5,9 +5,9 @@
 
 use std::sync::Arc;
 
-use flexarm_analysis::{Inversion, Node};
-use flexarm_kinematics::{Frame, Model, Wrench};
-use flexarm_stepping::{Damping, FlexibleArm, Held, linearise};
+use flexarm_analysis::{Inversion, Node, NodeServo};
+use flexarm_kinematics::{Data, Frame, Model, Wrench, mass_matrix};
+use flexarm_stepping::{Damping, FlexibleArm, Held, Servo, ServoAxis, linearise};
 use flexarm_testkit::reference_arm;
 use nalgebra::{DMatrix, DVector};
 
@@ -37,6 +37,7 @@ fn commands_by_the_series_of_the_inverse_move_the_tool_as_asked_at_a_third_of_th
         K_a: at.K_a.clone(),
         J: six(&at.J),
         J_a: six(&at.J_a),
+        servo: None,
     };
     let hz = arm.modes.frequencies_hz()[0];
     let (length, h) = (3.0, 2.5e-4);
@@ -68,6 +69,61 @@ fn commands_by_the_series_of_the_inverse_move_the_tool_as_asked_at_a_third_of_th
     assert!((1.2 * hz..25.0).contains(&cutoff), "{cutoff}");
     assert!(error < 1e-2 && twice < 0.1 * error, "{error:e} {twice:e}");
     assert!(as_at_rest > 10.0 * error);
+}
+
+/// Truth: forward integration of the closed loop, which `linearise` makes by itself of the same servos; two joints follow their commands
+/// at once, two of the others have nothing fed forward. Without integral, so that the loop is of second order.
+#[test]
+fn commands_of_servos_move_the_tool_as_asked_far_above_their_position_gains() {
+    let (arm, tool) = arm();
+    let rigid = Arc::new(Model::new(&reference_arm(false).mechanism).expect("valid"));
+    let M = mass_matrix(&rigid, &mut Data::new(&rigid), &DVector::from_column_slice(&POSE)).clone();
+    let axis = |(i, coordinate): (usize, usize)| ServoAxis {
+        coordinate,
+        position_gain: 15.0,
+        velocity_gain: 60.0 * M[(coordinate, coordinate)],
+        integral_gain: 0.0,
+        feed_forward: i % 2 == 0,
+        limit: f64::INFINITY,
+    };
+    let axes = [0, 1, 2, 4].into_iter().enumerate().map(axis).collect();
+    let arm = arm.with_servo(Servo { sample_s: 1e-3, axes, rigid }).unwrap();
+    let servo = arm.servo.clone().unwrap();
+    let of = |value: fn(&ServoAxis) -> f64| DVector::from_iterator(4, servo.axes.iter().map(value));
+    let controllers = NodeServo {
+        axes: servo.axes.iter().map(|axis| axis.coordinate).collect(),
+        stiffness: of(|axis| axis.velocity_gain * axis.position_gain),
+        damping: of(|axis| axis.velocity_gain),
+        integral: DVector::zeros(4),
+        ahead: servo.fed_forward(&POSE, &arm.friction),
+    };
+    let node = |arm: &FlexibleArm, servo: Option<NodeServo>| {
+        let at = linearise(arm, &tool, &Wrench::zeros(), 0.0).unwrap();
+        let six = |M: &nalgebra::Matrix6xX<f64>| DMatrix::from_fn(6, M.ncols(), |i, j| M[(i, j)]);
+        let (J, J_a) = (six(&at.J), six(&at.J_a));
+        Node { M: at.M, D: at.D, K: at.K, M_a: at.M_a, D_a: at.D_a, K_a: at.K_a, J, J_a, servo }
+    };
+    let (open, closed) = (node(&arm.with_servo_opened(), Some(controllers)), node(&arm, None));
+    let (length, h, hz) = (3.0, 2.5e-4, 4.0);
+    let N = (length / h) as usize + 1;
+    let wave = |t: f64| (t / length * std::f64::consts::PI).sin().powi(8) * (std::f64::consts::TAU * hz * t).cos();
+    let size = [2e-3, -1e-3, 1.5e-3, 1e-3, 2e-3, -1e-3];
+    let y = DMatrix::from_fn(6, N, |i, k| size[i] * wave(h * k as f64));
+    let inversion = Inversion::new(&[open.clone(), open.clone()], length).unwrap();
+    let u = inversion.commands(&y, h);
+    let shown = forwards(&closed, &u, h);
+    let error = (&shown - &y).amax() / y.amax();
+    let twice = &u + inversion.commands(&(&y - &shown), h);
+    let twice = (forwards(&closed, &twice, h) - &y).amax() / y.amax();
+    // The series of the closed loop itself, slow as its position gain.
+    let slow = Inversion::new(&[closed.clone(), closed.clone()], length).unwrap();
+    eprintln!(
+        "cutoff {:.1} Hz, of the closed loop {:.1} Hz; left {error:.1e}, {twice:.1e}",
+        inversion.cutoff_hz(),
+        slow.cutoff_hz()
+    );
+    assert!(inversion.cutoff_hz() > 2.0 * hz && inversion.cutoff_hz() > 2.0 * slow.cutoff_hz());
+    assert!(error < 2e-2 && twice < 0.1 * error, "{error:e} {twice:e}");
 }
 
 /// The tool under commands: the trapezoidal rule, rates by central differences.

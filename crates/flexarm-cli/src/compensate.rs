@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::{Args, ValueEnum};
 use comfy_table::CellAlignment;
 use flexarm::compensate::{
-    CompensateRequest, Compensation, ErrorFigures, LimitRule, Method, ShaperKind, compensate_motion,
+    CompensateRequest, Compensation, ErrorFigures, LimitRule, Method, ShaperKind, Shaping, compensate_motion,
 };
 use flexarm::{Motion, Robot, RunOptions, Scenario};
 
@@ -43,6 +43,8 @@ pub(crate) enum ShaperName {
     Zv,
     /// Three copies: forgives a frequency that is off, takes twice as long
     Zvd,
+    /// What leaves least of all modes that the motion makes swing within --delay, their frequencies off by up to --band
+    Optimal,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -76,9 +78,15 @@ pub(crate) struct CompensateArgs {
     /// Highest frequency that is corrected (Hz) [default: as far as the arm can be inverted]
     #[arg(long, value_name = "HZ")]
     pub(crate) cutoff: Option<f64>,
-    /// Run the motion through a shaper of the arm's first mode before
+    /// Run the motion through a shaper of the modes at its end before
     #[arg(long, value_enum)]
     pub(crate) shape: Option<ShaperName>,
+    /// Longest delay of the optimal shaper (s) [default: a period of the first mode]
+    #[arg(long, value_name = "S")]
+    pub(crate) delay: Option<f64>,
+    /// Part by which each frequency may be off, for the optimal shaper [default: 0.1]
+    #[arg(long, value_name = "PART")]
+    pub(crate) band: Option<f64>,
     /// Loads and payloads over time (TOML, see docs/loads.md) that act on the arm: forces of a process
     #[arg(long, value_name = "FILE")]
     pub(crate) loads: Option<PathBuf>,
@@ -134,6 +142,20 @@ fn components(words: &[String]) -> Result<[bool; 6], Failure> {
     Ok(chosen)
 }
 
+fn shaping(args: &CompensateArgs) -> Result<Option<Shaping>, Failure> {
+    let optimal = matches!(args.shape, Some(ShaperName::Optimal));
+    for (flag, given) in [("--delay", args.delay.is_some()), ("--band", args.band.is_some())] {
+        if given && !optimal {
+            return Err(Failure::Usage(format!("{flag} is for --shape optimal alone: the others have their own")));
+        }
+    }
+    Ok(args.shape.map(|shape| match shape {
+        ShaperName::Zv => ShaperKind::Zv.into(),
+        ShaperName::Zvd => ShaperKind::Zvd.into(),
+        ShaperName::Optimal => Shaping::Optimal { delay_s: args.delay, band: args.band.unwrap_or(Shaping::BAND) },
+    }))
+}
+
 pub(crate) fn run(cli: &Cli, args: &CompensateArgs) -> Result<ExitCode, Failure> {
     let robot = Robot::load_with(&shipped::robot(Some(&args.robot))?, &load_options(&args.load)?)?;
     let motion = match (&args.motion, &robot.default_trajectory) {
@@ -149,6 +171,7 @@ pub(crate) fn run(cli: &Cli, args: &CompensateArgs) -> Result<ExitCode, Failure>
         }
         None => None,
     };
+    let shaper = shaping(args)?;
     let folder = OutputFolder::of(args.output.as_deref(), &format!("{}_compensated", robot.name), !args.no_files)?;
     let request = CompensateRequest {
         run: RunOptions { step_s: args.step, modelling: args.modelling.modelling(), ..RunOptions::default() },
@@ -159,10 +182,7 @@ pub(crate) fn run(cli: &Cli, args: &CompensateArgs) -> Result<ExitCode, Failure>
         components: components(&args.components)?,
         iterations: args.iterations,
         cutoff_hz: args.cutoff,
-        shaper: args.shape.map(|shape| match shape {
-            ShaperName::Zv => ShaperKind::Zv,
-            ShaperName::Zvd => ShaperKind::Zvd,
-        }),
+        shaper,
         plant,
         sweep: !args.no_sweep,
         accelerations: args.accelerations.clone(),
@@ -188,16 +208,23 @@ pub(crate) fn run(cli: &Cli, args: &CompensateArgs) -> Result<ExitCode, Failure>
     Ok(ExitCode::SUCCESS)
 }
 
-fn text(found: &Compensation) -> String {
-    let mut out =
-        format!("{} on {}: {} method, {} iterations", found.motion, found.robot, found.method, found.iterations);
-    if let Some(hz) = found.cutoff_hz {
-        out += &format!(", up to {hz:.1} Hz");
+/// What the motion makes swing, and what a shaper leaves of it.
+fn shaper_text(found: &Compensation) -> String {
+    let Some(shaper) = &found.shaper else { return String::new() };
+    let mut t = table(&["mode Hz", "damping ratio", "swings behind the motion mm", "shaped mm"]);
+    for mode in &shaper.modes {
+        t.add_row(vec![
+            format!("{:.2}", mode.frequency_hz),
+            format!("{:.4}", mode.damping_ratio),
+            format!("{:.4}", 1e3 * mode.before_m),
+            format!("{:.4}", 1e3 * mode.after_m),
+        ]);
     }
-    if found.shaper_delay_s > 0.0 {
-        out += &format!("; the shaper takes {:.3} s", found.shaper_delay_s);
-    }
-    out += "\n\n";
+    format!("{}\n\n", lines(&t))
+}
+
+/// Errors before and after, on the arm and on others.
+fn plants_text(found: &Compensation) -> String {
     let mut t = table(&["mm", "peak before", "after", "RMS before", "after", "taken away", "end before", "after"]);
     let mut row = |name: &str, before: &ErrorFigures, after: &ErrorFigures| {
         let mm = |x: f64| format!("{:.4}", 1e3 * x);
@@ -220,7 +247,21 @@ fn text(found: &Compensation) -> String {
             column.set_cell_alignment(CellAlignment::Right);
         }
     }
-    out += &lines(&t);
+    lines(&t)
+}
+
+fn text(found: &Compensation) -> String {
+    let mut out =
+        format!("{} on {}: {} method, {} iterations", found.motion, found.robot, found.method, found.iterations);
+    if let Some(hz) = found.cutoff_hz {
+        out += &format!(", up to {hz:.1} Hz");
+    }
+    if found.shaper_delay_s > 0.0 {
+        out += &format!("; the shaper takes {:.3} s", found.shaper_delay_s);
+    }
+    out += "\n\n";
+    out += &shaper_text(found);
+    out += &plants_text(found);
     let peaks: Vec<String> = found.model_peaks_m.iter().map(|peak| format!("{:.4}", 1e3 * peak)).collect();
     out += &format!("\npeak on the model after each iteration (mm): {}\n", peaks.join(", "));
     if found.slowed > 1.0 {

@@ -14,7 +14,7 @@ use crate::args::{Cli, ModellingArgs, RobotArgs};
 use crate::failure::Failure;
 use crate::print::{lines, table, warning};
 use crate::shipped::OutputFolder;
-use crate::{answer, load_options, shipped, to_json, values};
+use crate::{answer, load_options, shipped, to_json};
 
 const EXAMPLES: &str = "\
 Examples:
@@ -53,6 +53,15 @@ pub(crate) struct IdentifyArgs {
         allow_hyphen_values = true
     )]
     pub(crate) forces: Vec<String>,
+    /// Points of the tool at which the forces may act, tool axes (m; may be repeated) [default: the TCP]
+    #[arg(long = "lever", help_heading = "Plan", value_name = "X,Y,Z", requires = "plan", allow_hyphen_values = true)]
+    pub(crate) levers: Vec<String>,
+    /// Points of the tool that may be watched, tool axes (m; may be repeated) [default: the TCP]
+    #[arg(long = "point", help_heading = "Plan", value_name = "X,Y,Z", requires = "plan", allow_hyphen_values = true)]
+    pub(crate) points: Vec<String>,
+    /// Directions along which a dial gauge may stand, world axes (may be repeated) [default: all three numbers are read]
+    #[arg(long = "gauge", help_heading = "Plan", value_name = "X,Y,Z", requires = "plan", allow_hyphen_values = true)]
+    pub(crate) gauges: Vec<String>,
     /// Standard deviation of a measured displacement (m)
     #[arg(long, help_heading = "Plan", value_name = "M", requires = "plan", default_value_t = 3e-5)]
     pub(crate) std: f64,
@@ -97,24 +106,33 @@ pub(crate) fn run(cli: &Cli, args: &IdentifyArgs) -> Result<ExitCode, Failure> {
     }
 }
 
+/// Three numbers each.
+fn threes(flag: &str, what: &str, texts: &[String]) -> Result<Vec<[f64; 3]>, Failure> {
+    let of = |text: &String| match flexarm::reduce::numbers(text).as_deref() {
+        Ok([x, y, z]) => Ok([*x, *y, *z]),
+        _ => Err(Failure::Usage(format!("{flag} {text:?}: expected {what}"))),
+    };
+    texts.iter().map(of).collect()
+}
+
 fn plan(cli: &Cli, args: &IdentifyArgs, robot: &Robot, count: usize) -> Result<ExitCode, Failure> {
     let folder = OutputFolder::of(args.output.as_deref(), &format!("{}_plan", robot.name), !args.no_files)?;
-    let forces = args.forces.iter().map(|text| values::wrench("--pull", text)).collect::<Result<Vec<_>, _>>()?;
-    if forces.iter().any(|[.., x, y, z]| [x, y, z].iter().any(|m| **m != 0.0)) {
-        return Err(Failure::Usage("--pull takes a force of three numbers".into()));
-    }
+    let forces = threes("--pull", "a force of three numbers", &args.forces)?;
     let mut request = PlanRequest {
         modelling: args.modelling.modelling(),
         fit: args.fit.clone(),
         std_m: args.std,
         poses: args.poses.clone(),
         work: args.work.clone(),
+        levers: threes("--lever", "a point of three numbers", &args.levers)?,
+        points: threes("--point", "a point of three numbers", &args.points)?,
+        directions: threes("--gauge", "a direction of three numbers", &args.gauges)?,
         output: folder.path(),
         overwrite: args.force,
         ..PlanRequest::new(count)
     };
     if !forces.is_empty() {
-        request.forces = forces.iter().map(|[x, y, z, ..]| [*x, *y, *z]).collect();
+        request.forces = forces;
     }
     let found = plan_measurements(robot, &request)?;
     answer(cli, || to_json(&found), || plan_text(&found));
@@ -215,13 +233,24 @@ fn plan_text(found: &MeasurementPlan) -> String {
         format!("{}: {} readings of {} candidate poses\n\n", found.robot, found.poses.len(), found.candidates);
     let mut header = vec!["pose"];
     header.extend(found.joints.iter().map(String::as_str));
-    header.extend(["force (N)", "expected (mm)"]);
+    let levers = found.poses.iter().any(|pose| pose.at != [0.0; 3]);
+    let gauges = found.poses.iter().any(|pose| pose.direction.is_some());
+    header.push("force (N)");
+    header.extend(levers.then_some("at (mm, tool)"));
+    let points = found.poses.iter().any(|pose| pose.point != [0.0; 3]);
+    header.extend(points.then_some("watched (mm, tool)"));
+    header.extend(gauges.then_some("gauge along"));
+    header.push("expected (mm)");
     let mut t = table(&header);
     let three = |v: [f64; 3], digits: usize| v.map(|x| format!("{x:.digits$}")).join(" ");
     for (k, pose) in found.poses.iter().enumerate() {
         let mut row = vec![(k + 1).to_string()];
         row.extend(pose.joints.iter().map(|q| format!("{:.1}", q.to_degrees())));
-        row.extend([three(pose.force, 0), three(pose.expected_m.map(|x| 1e3 * x), 3)]);
+        row.push(three(pose.force, 0));
+        row.extend(levers.then(|| three(pose.at.map(|x| 1e3 * x), 1)));
+        row.extend(points.then(|| three(pose.point.map(|x| 1e3 * x), 1)));
+        row.extend(pose.direction.map(|direction| three(direction, 2)));
+        row.push(three(pose.expected_m.map(|x| 1e3 * x), 3));
         t.add_row(row);
     }
     out += &lines(&t);

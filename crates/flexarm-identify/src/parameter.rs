@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use flexarm_kinematics::{Frame, Model, SpatialInertia};
-use flexarm_stepping::{FlexibleArm, Held, Spring, StepError};
+use flexarm_stepping::{FlexibleArm, GearCoupling, Held, Spring, StepError};
 use nalgebra::DMatrix;
 
 /// An arm before anything is measured: tree, springs in coordinate order, tool.
@@ -15,6 +15,8 @@ pub struct Plant {
     pub springs: Vec<Spring>,
     /// The tool.
     pub tool: Frame,
+    /// Gears that move several joints; their springs above are those of the motors.
+    pub coupling: Option<GearCoupling>,
 }
 
 /// Where a stiffness or a damping acts.
@@ -115,9 +117,13 @@ impl Plant {
     /// The arm held at a pose.
     ///
     /// # Errors
-    /// As [`FlexibleArm::new`].
+    /// As [`FlexibleArm::new`] and [`FlexibleArm::with_coupling`].
     pub fn held(&self, q: &[f64]) -> Result<FlexibleArm, StepError> {
-        FlexibleArm::new(self.model.clone(), self.springs.clone(), Arc::new(Held(q.to_vec())))
+        let arm = FlexibleArm::new(self.model.clone(), self.springs.clone(), Arc::new(Held(q.to_vec())))?;
+        match &self.coupling {
+            Some(coupling) => arm.with_coupling(coupling.clone()),
+            None => Ok(arm),
+        }
     }
 }
 

@@ -208,8 +208,16 @@ impl Damped<'_> {
             let mut more = 0.0;
             match effect {
                 Effect::Stiffness(places) => {
-                    for place in places.iter().filter(|place| place.spring == number) {
-                        dK += slope_of(&e.K, place.coordinate);
+                    for place in places {
+                        // Of coupled gears each motor's spring is in the stiffness of several joints.
+                        match self.arm.coupled_stiffness_slope(place.spring) {
+                            Some((coupled, slope)) => {
+                                let own = coupled.iter().position(|k| *k == self.arm.offset(e));
+                                dK.iter_mut().for_each(|dK| *dK += own.map_or(0.0, |k| slope[(k, k)]));
+                            }
+                            None if place.spring == number => dK += slope_of(&e.K, place.coordinate),
+                            None => {}
+                        }
                     }
                 }
                 Effect::Damping(springs) => more = f64::from(u8::from(springs.contains(&number))),

@@ -24,6 +24,11 @@ pub(crate) fn force_slopes(at: &mut OperatingPoint, parameters: &[Parameter]) ->
             Effect::Stiffness(places) => {
                 for place in places {
                     let (arm, e) = (at.arm(), at.deflections());
+                    if let Some((places, dK)) = arm.coupled_stiffness_slope(place.spring) {
+                        let f = dK * DVector::from_iterator(places.len(), places.iter().map(|i| e[*i]));
+                        places.iter().zip(f.iter()).for_each(|(i, f)| slopes[(*i, k)] += f);
+                        continue;
+                    }
                     let element = &arm.elements[place.spring];
                     let first = arm.offset(element);
                     let e = &e[first..first + element.size];
@@ -216,6 +221,12 @@ pub(crate) fn explicit(
         Effect::Stiffness(places) => {
             let mut dK = DMatrix::zeros(n, n);
             for place in places {
+                if let Some((places, coupled)) = arm.coupled_stiffness_slope(place.spring) {
+                    for (a, i) in places.iter().enumerate() {
+                        places.iter().enumerate().for_each(|(b, j)| dK[(*i, *j)] += coupled[(a, b)]);
+                    }
+                    continue;
+                }
                 let element = &arm.elements[place.spring];
                 let (first, size) = (arm.offset(element), element.size);
                 let mut block = dK.view_mut((first, first), (size, size));

@@ -19,7 +19,7 @@ fn plant() -> Plant {
     let model = Arc::new(Model::new(&reference.mechanism).expect("valid"));
     let spring = |name: &str, k: usize| Spring::from((name.to_owned(), reference.K_S[k] / 20.0, Damping::Modal(0.03)));
     let tool = model.frame("tcp").expect("there").clone();
-    Plant { model, springs: vec![spring("lower", 0), spring("upper", 1)], tool }
+    Plant { model, springs: vec![spring("lower", 0), spring("upper", 1)], tool, coupling: None }
 }
 
 fn stiffness(name: &str, spring: usize, coordinate: Option<usize>) -> Parameter {

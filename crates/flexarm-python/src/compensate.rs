@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use flexarm::compensate::{CompensateRequest, LimitRule, Method, ShaperKind, compensate_motion_until};
+use flexarm::compensate::{CompensateRequest, LimitRule, Method, ShaperKind, Shaping, compensate_motion_until};
 use flexarm::{Motion, RunOptions};
 use pyo3::prelude::*;
 use pyo3::types::PyList;
@@ -109,8 +109,13 @@ impl Pickled for PyCompensated {
 /// iterations : int, default 5
 /// cutoff_hz : float, optional
 ///     Highest frequency that is corrected.
-/// shaper : {"zv", "zvd"}, optional
-///     Run the motion through a shaper of the first mode before.
+/// shaper : {"zv", "zvd", "optimal"}, optional
+///     Run the motion through a shaper before: of the first mode at its end, or what leaves least of all modes there
+///     within ``delay``.
+/// delay : float, optional
+///     At most so much longer the motion is with the optimal shaper (s); a period of the first mode without it.
+/// band : float, default 0.1
+///     Part by which frequencies may be off, for the optimal shaper.
 /// plant : Robot, optional
 ///     Another robot that judges.
 /// sweep : bool, default True
@@ -137,7 +142,7 @@ impl Pickled for PyCompensated {
 /// Compensated
 #[pyfunction]
 #[pyo3(signature = (robot, motion=None, *, method="dynamic", components=None, iterations=5, cutoff_hz=None, shaper=None,
-                    plant=None, sweep=true, step=1e-3, loads=None, payloads=None, limits="slow", accelerations=None,
+                    delay=None, band=Shaping::BAND, plant=None, sweep=true, step=1e-3, loads=None, payloads=None, limits="slow", accelerations=None,
                     links=None, drives=None, output=None, write=None, overwrite=false))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments")]
 pub(crate) fn compensate<'py>(
@@ -149,6 +154,8 @@ pub(crate) fn compensate<'py>(
     #[pyo3(from_py_with = whole)] iterations: usize,
     cutoff_hz: Option<f64>,
     shaper: Option<&str>,
+    delay: Option<f64>,
+    band: f64,
     plant: Option<&Bound<'py, PyRobot>>,
     sweep: bool,
     step: f64,
@@ -170,7 +177,8 @@ pub(crate) fn compensate<'py>(
     let n = robot.get().robot.rigid_model().or_raise()?.n_actuated();
     let accelerations = accelerations.map(|a| numbers("accelerations", a, &[(n, "joints")], false)).transpose()?;
     let rules = [("slow", LimitRule::Slow), ("refuse", LimitRule::Refuse), ("tell", LimitRule::Tell)];
-    let shapers = [("zv", ShaperKind::Zv), ("zvd", ShaperKind::Zvd)];
+    let optimal = Shaping::Optimal { delay_s: delay, band };
+    let shapers = [("zv", ShaperKind::Zv.into()), ("zvd", ShaperKind::Zvd.into()), ("optimal", optimal)];
     let request = CompensateRequest {
         run: RunOptions { step_s: step, modelling: modelling(links, drives, None, None)?, ..RunOptions::default() },
         method: word("method", method, &[("dynamic", Method::Dynamic), ("static", Method::Static)])?,

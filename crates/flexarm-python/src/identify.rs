@@ -62,6 +62,12 @@ pub(crate) fn identify<'py>(
 ///     Names of what is to be found; all stiffnesses without it.
 /// forces : array_like, shape (m, 3), optional
 ///     Forces on the tool among which the plan chooses, world axes (N).
+/// levers : array_like, optional
+///     Points of the tool at which the forces may act, tool axes (m), a row each; the TCP without.
+/// points : array_like, optional
+///     Points of the tool that may be watched, tool axes (m), a row each; the TCP without.
+/// gauges : array_like, optional
+///     Directions along which a dial gauge may stand, world axes, a row each; without, all three numbers are read.
 /// std : float, default 3e-5
 ///     Deviation of a measured displacement (m).
 /// poses, work : path, optional
@@ -77,8 +83,8 @@ pub(crate) fn identify<'py>(
 /// dict
 ///     As ``flexarm identify --plan --json``.
 #[pyfunction]
-#[pyo3(signature = (robot, count, *, fit=None, forces=None, std=None, poses=None, work=None, links=None, drives=None,
-                    output=None, overwrite=false))]
+#[pyo3(signature = (robot, count, *, fit=None, forces=None, levers=None, points=None, gauges=None, std=None, poses=None, work=None,
+                    links=None, drives=None, output=None, overwrite=false))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments")]
 pub(crate) fn plan_measurements<'py>(
     py: Python<'py>,
@@ -86,6 +92,9 @@ pub(crate) fn plan_measurements<'py>(
     #[pyo3(from_py_with = whole)] count: usize,
     #[pyo3(from_py_with = texts)] fit: Option<Vec<String>>,
     forces: Option<&Bound<'py, PyAny>>,
+    levers: Option<&Bound<'py, PyAny>>,
+    points: Option<&Bound<'py, PyAny>>,
+    gauges: Option<&Bound<'py, PyAny>>,
     std: Option<f64>,
     poses: Option<PathBuf>,
     work: Option<PathBuf>,
@@ -95,17 +104,19 @@ pub(crate) fn plan_measurements<'py>(
     overwrite: bool,
 ) -> PyResult<Bound<'py, PyAny>> {
     let usual = PlanRequest::new(count);
-    let forces = match forces {
-        Some(forces) => {
-            let rows = table("forces", forces, 3, "numbers (N)")?;
-            rows.values().chunks_exact(3).map(|row| [row[0], row[1], row[2]]).collect()
-        }
-        None => usual.forces.clone(),
+    let threes = |name: &str, rows: Option<&Bound<'py, PyAny>>, what: &str| -> PyResult<Option<Vec<[f64; 3]>>> {
+        let Some(rows) = rows else { return Ok(None) };
+        let rows = table(name, rows, 3, what)?;
+        Ok(Some(rows.values().chunks_exact(3).map(|row| [row[0], row[1], row[2]]).collect()))
     };
+    let forces = threes("forces", forces, "numbers (N)")?.unwrap_or_else(|| usual.forces.clone());
     let request = PlanRequest {
         modelling: modelling(links, drives, None, None)?,
         fit: fit.unwrap_or_default(),
         forces,
+        levers: threes("levers", levers, "numbers (m)")?.unwrap_or_default(),
+        points: threes("points", points, "numbers (m)")?.unwrap_or_default(),
+        directions: threes("gauges", gauges, "numbers")?.unwrap_or_default(),
         std_m: std.unwrap_or(usual.std_m),
         poses,
         work,

@@ -147,6 +147,34 @@ def test_a_compensation_takes_loads_and_limits_and_writes_other_files(kr210: fle
         flexarm.compensate(kr210, "pick_and_place", accelerations=[1.0], **ways)
 
 
+def test_a_shaper_of_all_modes_is_that_of_the_command_line_and_keeps_its_delay(kr210: flexarm.Robot, tmp_path: Path) -> None:
+    ways = {"iterations": 0, "sweep": False}
+    found = flexarm.compensate(kr210, "point_to_point", shaper="optimal", delay=0.15, band=0.05, **ways).to_dict()
+    flags = ("--shape", "optimal", "--delay", "0.15", "--band", "0.05", "--iterations", "0", "--no-sweep", "--no-files")
+    theirs = told("compensate", "kr210", "point_to_point", *flags, cwd=tmp_path)
+    assert without_clock(found) == without_clock(theirs)
+    assert found["shaper"]["kind"] == "optimal" and found["shaper_delay_s"] <= 0.15
+    assert sum(part for _, part in found["shaper"]["copies"]) == pytest.approx(1.0, abs=1e-12)
+    assert all(mode["after_m"] < 0.3 * found["shaper"]["modes"][0]["before_m"] for mode in found["shaper"]["modes"])
+    with pytest.raises(ValueError, match="band"):
+        flexarm.compensate(kr210, "point_to_point", shaper="optimal", band=0.9, **ways)
+
+
+def test_targets_of_servos_are_told_ahead_of_their_lag() -> None:
+    found = flexarm.compensate(flexarm.load("kr300"), drives="servo", iterations=2, sweep=False)
+    assert found.after["peak_m"] < 0.01 * found.before["peak_m"]
+
+
+def test_a_plan_chooses_among_levers_points_and_gauges() -> None:
+    levers = [[0.0, 0.0, 0.0], [0.0, 0.5, 0.0]]
+    robot = flexarm.load("kr210_identified")
+    plan = flexarm.plan_measurements(robot, 8, levers=levers, points=levers, gauges=[[0.0, 0.0, 1.0]])
+    assert any(pose["at"] == levers[1] and pose["point"] == levers[1] for pose in plan["poses"])
+    assert all(pose["direction"] == [0.0, 0.0, 1.0] for pose in plan["poses"])
+    with pytest.raises(ValueError, match="levers"):
+        flexarm.plan_measurements(robot, 3, levers=[[0.0, 1.0]])
+
+
 def test_limits_of_depth_of_a_map_are_those_of_lobes(kr210: flexarm.Robot) -> None:
     joints = {"joint_2": (-1.2, -1.0, 2), "joint_3": (1.4, 1.4, 1)}
     found = flexarm.map(

@@ -223,6 +223,18 @@ impl FlexibleArm {
         Ok(self)
     }
 
+    /// `dK/d(ln k)` for the stiffness k of one motor's spring in coupled gears: the elastic coordinates of all of them, and the matrix over
+    /// these; none of an element whose gear moves its own joint alone.
+    pub fn coupled_stiffness_slope(&self, element: usize) -> Option<(Vec<usize>, DMatrix<f64>)> {
+        let coupling = self.coupling.as_ref()?;
+        let motor = coupling.elements.iter().position(|k| *k == element)?;
+        let places: Vec<usize> = coupling.elements.iter().map(|k| self.offset(&self.elements[*k])).collect();
+        let K = self.stiffness().select_rows(&places).select_columns(&places);
+        let own = (coupling.C.tr_mul(&K) * &coupling.C)[(motor, motor)];
+        let row = coupling.C_inverse.row(motor);
+        Some((places, row.tr_mul(&row) * own))
+    }
+
     /// The same arm with gears whose torque has a history; their elements have the curve of first loading from here on.
     ///
     /// # Errors

@@ -10,6 +10,7 @@
 //! in the few functions of this file. Not here: eigenvalues and frequency response (`flexarm-analysis`).
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use flexarm_kinematics::{
     Data, Frame, Pose, State, StaticTangent, Wrench, forward_kinematics, frame_jacobian, mass_matrix,
@@ -17,6 +18,7 @@ use flexarm_kinematics::{
 use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX};
 
 use crate::arm::{ElasticElement, FlexibleArm, Servo};
+use crate::drive::{Friction, ServoAxis};
 use crate::error::StepError;
 use crate::statics::{
     MOST_HALVINGS, StaticSlopes, for_vibration, spring_forces, static_equilibrium, static_forces, with_curves,
@@ -195,38 +197,72 @@ impl Linear {
     /// Servos: springs and dampers towards the commands, and what they feed forward.
     fn close_loops(&mut self, arm: &FlexibleArm, servo: &Servo) {
         let m = arm.model.n_actuated();
-        let ahead = FeedForward::new(servo, &self.q.rows(0, m).into_owned());
+        let [K, D, M] = servo.fed_forward(self.q.rows(0, m).as_slice(), &arm.friction);
         for (i, axis) in servo.axes.iter().enumerate() {
             let (position, rate) = (axis.velocity_gain * axis.position_gain, axis.velocity_gain);
             self.K[(i, i)] += position;
-            self.D[(i, i)] += rate + arm.friction.get(axis.coordinate).map_or(0.0, |f| f.viscous);
+            self.D[(i, i)] += rate + viscous(&arm.friction, axis.coordinate);
             self.K_a[(i, axis.coordinate)] -= position;
             self.D_a[(i, axis.coordinate)] -= rate;
-            if axis.feed_forward {
-                for k in 0..m {
-                    self.M_a[(i, k)] -= ahead.M[(axis.coordinate, k)];
-                    self.K_a[(i, k)] -= ahead.K[(axis.coordinate, k)];
-                }
+            for k in 0..m {
+                self.K_a[(i, k)] -= K[(i, k)];
+                self.D_a[(i, k)] -= D[(i, k)];
+                self.M_a[(i, k)] -= M[(i, k)];
             }
         }
     }
 }
 
-/// What the feed-forward of a servo adds per acceleration and per displacement of the commands.
-struct FeedForward {
-    M: DMatrix<f64>,
-    K: DMatrix<f64>,
+fn viscous(friction: &[Friction], coordinate: usize) -> f64 {
+    friction.get(coordinate).map_or(0.0, |friction| friction.viscous)
 }
 
-impl FeedForward {
-    fn new(servo: &Servo, pose: &DVector<f64>) -> Self {
-        let model = &servo.rigid;
-        let mut data = Data::new(model);
-        let M = mass_matrix(model, &mut data, pose).clone();
-        let mut K = DMatrix::zeros(pose.len(), pose.len());
-        forward_kinematics(model, &mut data, pose);
-        StaticTangent::new(model, 0).compute(model, &data, pose, &[], &mut K);
-        Self { M, K }
+impl Servo {
+    /// Torques fed forward about rest at a pose, per command, its rate and its acceleration: a row per axis, a column per joint.
+    ///
+    /// * `pose`: all actuated joints; `friction`: theirs, as in [`FlexibleArm::friction`], whose viscous part is fed forward as well.
+    pub fn fed_forward(&self, pose: &[f64], friction: &[Friction]) -> [DMatrix<f64>; 3] {
+        let (model, m) = (&self.rigid, pose.len());
+        let (mut data, pose) = (Data::new(model), DVector::from_column_slice(pose));
+        let M = mass_matrix(model, &mut data, &pose).clone();
+        let mut K = DMatrix::zeros(m, m);
+        forward_kinematics(model, &mut data, &pose);
+        StaticTangent::new(model, 0).compute(model, &data, &pose, &[], &mut K);
+        let D = DMatrix::from_fn(m, m, |i, j| if i == j { viscous(friction, i) } else { 0.0 });
+        let of = |A: &DMatrix<f64>| {
+            DMatrix::from_fn(self.axes.len(), m, |i, k| {
+                let axis = &self.axes[i];
+                if axis.feed_forward { A[(axis.coordinate, k)] } else { 0.0 }
+            })
+        };
+        [of(&K), of(&D), of(&M)]
+    }
+
+    /// The same with gains of zero and nothing fed forward: motors that nothing holds.
+    #[must_use]
+    pub fn opened(&self) -> Self {
+        let open = |axis: &ServoAxis| ServoAxis {
+            position_gain: 0.0,
+            velocity_gain: 0.0,
+            integral_gain: 0.0,
+            feed_forward: false,
+            ..*axis
+        };
+        Self { axes: self.axes.iter().map(open).collect(), ..self.clone() }
+    }
+}
+
+impl FlexibleArm {
+    /// The same arm with motors that are where they are commanded, without its servos.
+    #[must_use]
+    pub fn with_motors_held(&self) -> Self {
+        Self { torque_driven: Vec::new(), servo: None, ..self.clone() }
+    }
+
+    /// The same arm with motors that nothing holds.
+    #[must_use]
+    pub fn with_servo_opened(&self) -> Self {
+        Self { servo: self.servo.as_ref().map(|servo| Arc::new(servo.opened())), ..self.clone() }
     }
 }
 

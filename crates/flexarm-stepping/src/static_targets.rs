@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
-use flexarm_kinematics::{Data, Frame, Pose, Wrench, forward_kinematics, rotation_vector};
+use flexarm_kinematics::{Data, Frame, Pose, State, Wrench, forward_kinematics, inverse_dynamics, rotation_vector};
 use nalgebra::{DVector, Vector6};
 
-use crate::arm::FlexibleArm;
+use crate::arm::{FlexibleArm, Servo};
+use crate::drive::ServoAxis;
 use crate::error::StepError;
 use crate::linear::linearise;
 use crate::motion::Held;
@@ -37,6 +38,12 @@ pub enum TargetError {
     /// No equilibrium.
     #[error(transparent)]
     Step(#[from] StepError),
+    /// A servo without position gain.
+    #[error("the servo of joint {joint:?} holds no position: give it a position_gain and a velocity_gain")]
+    NothingHolds {
+        /// The joint.
+        joint: String,
+    },
     /// The joints cannot move the tool so, or the iteration does not settle.
     #[error(
         "after {iterations} iterations the tool is still {left_m:.1e} m and {left_rad:.1e} rad from its place: the arm cannot move it there (singular pose, too few joints)"
@@ -58,7 +65,8 @@ pub enum TargetError {
 /// * `t`: time (s) whose loads of the arm act.
 /// * `components`: which of position and rotation (world axes) count.
 ///
-/// With fewer components than joints the joints move as little as possible.
+/// With fewer components than joints the joints move as little as possible. Motors under servos with an integral are where they are
+/// commanded at rest; those without sag into their gains, and are told so much more.
 ///
 /// # Errors
 /// [`TargetError`].
@@ -70,6 +78,7 @@ pub fn static_targets(
     t: f64,
     components: &[bool; 6],
 ) -> Result<StaticTargets, TargetError> {
+    let (servo, arm) = (&arm.servo, &arm.with_motors_held());
     let wanted = rigid_pose(arm, tool, q);
     let rows: Vec<usize> = (0..6).filter(|k| components[*k]).collect();
     let mut targets = DVector::from_column_slice(q);
@@ -82,7 +91,11 @@ pub fn static_targets(
         let left = DVector::from_iterator(rows.len(), rows.iter().map(|k| off[*k]));
         if left.amax() <= TOLERANCE {
             let after = Vector6::from_fn(|k, _| if components[k] { off[k] } else { 0.0 });
-            return Ok(StaticTargets { q: targets.as_slice().to_vec(), before, after, iterations });
+            let mut q = targets.as_slice().to_vec();
+            if let Some(servo) = servo {
+                lead(servo, &mut q, &at.holding)?;
+            }
+            return Ok(StaticTargets { q, before, after, iterations });
         }
         let G = at.command_slopes().unwrap_or_else(|| at.J_a.clone()).select_rows(&rows);
         if iterations == MOST_ITERATIONS || !G.norm_squared().is_finite() {
@@ -97,6 +110,34 @@ pub fn static_targets(
         targets -= step;
     }
     unreachable!("the loop returns at its last iteration")
+}
+
+/// Moves the targets of servos without an integral on, so that their motors hold the torques `holding` where they are.
+fn lead(servo: &Servo, q: &mut [f64], holding: &DVector<f64>) -> Result<(), TargetError> {
+    let (motors, n) = (q.to_vec(), servo.rigid.nv());
+    let sagging = |axis: &&ServoAxis| axis.integral_gain * axis.position_gain == 0.0;
+    if let Some(axis) = servo.axes.iter().filter(sagging).find(|axis| axis.position_gain * axis.velocity_gain <= 0.0) {
+        let joint = servo.rigid.coordinates()[axis.coordinate].joint.clone();
+        return Err(TargetError::NothingHolds { joint });
+    }
+    let (mut data, mut state) = (Data::new(&servo.rigid), State::zeros(&servo.rigid));
+    for _ in 0..MOST_ITERATIONS {
+        state.q.copy_from_slice(q);
+        let fed = inverse_dynamics(&servo.rigid, &mut data, &state, &DVector::zeros(n)).clone();
+        let mut moved = 0.0f64;
+        for axis in servo.axes.iter().filter(sagging) {
+            let k = axis.coordinate;
+            let fed = if axis.feed_forward { fed[k] } else { 0.0 };
+            let target = motors[k] + (holding[k] - fed) / (axis.position_gain * axis.velocity_gain);
+            moved = moved.max((target - q[k]).abs());
+            q[k] = target;
+        }
+        if moved <= TOLERANCE {
+            return Ok(());
+        }
+    }
+    let (left_m, left_rad) = (f64::INFINITY, f64::INFINITY);
+    Err(TargetError::NotReached { iterations: MOST_ITERATIONS, left_m, left_rad })
 }
 
 /// The tool of the rigid arm: every elastic coordinate at zero.

@@ -374,6 +374,11 @@ impl FlexibleRobot {
         !self.torque.is_empty()
     }
 
+    /// Coordinates of the joints driven by torque, with the largest torque of each (N m or N).
+    pub(crate) fn servo_limits(&self) -> impl Iterator<Item = (usize, f64)> {
+        self.torque.iter().map(|(coordinate, _, limit)| (*coordinate, *limit))
+    }
+
     /// A word for the models of the links.
     pub fn links_model(&self) -> &'static str {
         let modal = self.model.elastic().iter().filter(|g| g.modal).count();

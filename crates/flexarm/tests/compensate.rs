@@ -107,7 +107,7 @@ fn a_shaped_motion_ends_with_less_vibration() {
     let bare = CompensateRequest { iterations: 0, ..request() };
     let plain = compensate_motion(&robot, &motion, &bare).unwrap();
     let shaped =
-        compensate_motion(&robot, &motion, &CompensateRequest { shaper: Some(ShaperKind::Zv), ..bare }).unwrap();
+        compensate_motion(&robot, &motion, &CompensateRequest { shaper: Some(ShaperKind::Zv.into()), ..bare }).unwrap();
     let swing = |found: &Compensation| {
         let last = &found.curves[found.curves.len().saturating_sub(200)..];
         let (low, high) = last.iter().fold((f64::INFINITY, 0.0f64), |(l, h), c| (l.min(c[1]), h.max(c[1])));

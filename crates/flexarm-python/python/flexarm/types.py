@@ -104,6 +104,8 @@ __all__ = [
     "RunSummary",
     "Sensitivity",
     "ShapeFigures",
+    "ShapedModeFigures",
+    "ShaperFigures",
     "ShareFigures",
     "SolverFigures",
     "Spread",
@@ -842,6 +844,30 @@ class MotionViolation(TypedDict):
     """All of it in one sentence."""
 
 
+class ShapedModeFigures(TypedDict):
+    """A mode and what a shaper leaves of it."""
+
+    frequency_hz: float
+    """Natural frequency (Hz)."""
+    damping_ratio: float
+    """Damping ratio."""
+    before_m: float
+    """Oscillation of the tool that the motion would leave, the largest within the band of the frequency (m)."""
+    after_m: float
+    """The same with the shaper."""
+
+
+class ShaperFigures(TypedDict):
+    """A shaper as it was used."""
+
+    kind: str
+    """`zv`, `zvd` or `optimal`."""
+    copies: list[list[float]]
+    """Delay (s) and part of each copy of the motion."""
+    modes: list[ShapedModeFigures]
+    """Modes at the end of the motion that it was made against, the one that would swing most first."""
+
+
 class PlantFigures(TypedDict):
     """The commands on a plant that is not the model."""
 
@@ -875,6 +901,8 @@ class ProgramFigures(TypedDict):
     """Targets that moves end at; dwells and arcs of a told angle have none."""
     corrected: int
     """How many of them were replaced."""
+    loaded: int
+    """At how many of them loads act, or another payload hangs than at the start."""
     before_m: float
     """Largest distance of the flexible tool from its target at rest, with the program as it was (m)."""
     residual_m: float
@@ -912,6 +940,8 @@ class Compensation(TypedDict):
     """How many times as long the motion takes so that limits are kept; 1 if it is as it was."""
     shaper_delay_s: float
     """How much longer the motion takes by its shaper (s)."""
+    shaper: ShaperFigures | None
+    """The shaper, if there is one."""
     plants: list[PlantFigures]
     """The same commands on other plants."""
     file: str | None
@@ -1195,8 +1225,14 @@ class PlannedReading(TypedDict):
     """Joints (rad or m)."""
     force: list[float]
     """Force on the tool, world axes (N)."""
+    at: list[float]
+    """Where it acts, tool axes (m)."""
+    point: list[float]
+    """What is watched, tool axes (m)."""
+    direction: list[float] | None
+    """Direction of the gauge, world axes; null where all three numbers are read."""
     expected_m: list[float]
-    """Displacement to expect with the robot file as it is (m)."""
+    """Displacement of the point to expect with the robot file as it is (m)."""
 
 
 class ExpectedParameter(TypedDict):

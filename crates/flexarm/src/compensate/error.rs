@@ -1,6 +1,6 @@
 //! Why a motion cannot be compensated.
 
-use flexarm_analysis::InversionError;
+use flexarm_analysis::{InversionError, LinearError, ShaperError};
 use flexarm_stepping::TargetError;
 
 /// Why a motion cannot be compensated.
@@ -73,6 +73,20 @@ pub enum CompensateError {
         /// When (s).
         at_s: f64,
     },
+    /// A servo that does not hold its joint.
+    #[error(
+        "the servo of joint {joint:?} holds no position, so that there are no targets for it: give it a position_gain and a velocity_gain, or take motors that are where they are commanded (drives = elastic)"
+    )]
+    NothingHolds {
+        /// The joint.
+        joint: String,
+    },
+    /// There is no such shaper.
+    #[error(transparent)]
+    Shaper(#[from] ShaperError),
+    /// The modes at the end of the motion are not found.
+    #[error("the modes at the end of the motion, for the shaper: {0}")]
+    Modes(#[from] LinearError),
     /// The linearised arm cannot be inverted.
     #[error(transparent)]
     Inversion(#[from] InversionError),

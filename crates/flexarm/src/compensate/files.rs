@@ -52,12 +52,12 @@ impl Files {
         request: &CompensateRequest,
         answer: &mut Compensation,
     ) -> Option<Corrected> {
-        let [path, folder] = self.program.as_ref()?;
+        let place = self.program.as_ref()?;
         let mut said = |text: String, help: &str| {
             answer.caveats.push(Caveat::said("program", "compensation", text, help));
         };
-        let corrected = match program::corrected(robot, arm, path, request, folder) {
-            Ok(corrected) => corrected,
+        let (corrected, uncovered) = match program::corrected(robot, arm, scenario, request, place) {
+            Ok(found) => found,
             Err(error) => {
                 said(format!("the program was not corrected: {error}"), "use the motion instead");
                 return None;
@@ -78,12 +78,7 @@ impl Files {
             let text = format!("the corrected program misses a target by {:.4} mm", 1e3 * residual_m);
             said(text, "a move depends on a target that was not corrected");
         }
-        if !(scenario.loads.is_empty() && scenario.payloads.is_empty()) {
-            said(
-                "targets of the program are corrected for weight alone, without the loads".into(),
-                "use the motion instead",
-            );
-        }
+        uncovered.into_iter().for_each(|text| said(text, "use the motion instead where that matters"));
         Some(corrected)
     }
 

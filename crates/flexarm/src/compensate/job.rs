@@ -3,9 +3,9 @@
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-use flexarm_analysis::{Inversion, Node};
+use flexarm_analysis::{Inversion, Node, NodeServo};
 use flexarm_kinematics::{Data, Pose, Wrench, forward_kinematics, rotation_vector};
-use flexarm_stepping::{Held, TimedWrench, linearise, static_targets};
+use flexarm_stepping::{FlexibleArm, Friction, Held, Servo, ServoAxis, TimedWrench, linearise, static_targets};
 use flexarm_trajectory::{Extreme, JointKnots, Trajectory};
 use nalgebra::{DMatrix, DVector, Quaternion, Rotation3, Translation3, UnitQuaternion};
 use rayon::prelude::*;
@@ -26,6 +26,8 @@ const NODE_S: f64 = 0.02;
 const LOGGED_WITHIN: f64 = 1e-3;
 /// Values of a load of which a mean is made.
 const PIECES: u32 = 64;
+/// Windows of a rest over which a load is looked at, at most.
+const LONGEST_REST: f64 = 500.0;
 /// An iteration that leaves more than this part of the one before is the last.
 const SETTLED: f64 = 0.9;
 /// Least part of the peak below which nothing more is asked for.
@@ -66,6 +68,8 @@ pub(super) struct Commands {
     pub(super) cutoff_hz: Option<f64>,
     /// When the joints move the tool in fewest directions (s), and in how many.
     pub(super) fewest: Option<(f64, usize)>,
+    /// Part of what is left on the model, by its RMS, that is quicker than the cutoff.
+    pub(super) quicker: f64,
 }
 
 impl<'a> Job<'a> {
@@ -194,20 +198,10 @@ impl<'a> Job<'a> {
         let duration = self.motion.trajectory.duration();
         let count = ((duration / NODE_S).ceil() as usize).max(1);
         let spacing = duration / count as f64;
-        let flexible = self.arm.flexible();
-        let m = self.q.nrows();
-        let node = |k: usize| -> Result<Node, Error> {
+        let start = self.at_start()?;
+        let node = |k: usize| {
             self.go_on(spacing * k as f64)?;
-            let (mut q, mut v, mut a) = (vec![0.0; m], vec![0.0; m], vec![0.0; m]);
-            self.motion.trajectory.sample(spacing * k as f64, &mut q, &mut v, &mut a);
-            let arm = flexible.arm(Arc::new(Held(q))).map_err(|error| flexible.explained(error))?;
-            let at =
-                linearise(&arm, &flexible.tcp, &Wrench::zeros(), 0.0).map_err(|error| flexible.explained(error))?;
-            let rows = |M: &nalgebra::Matrix6xX<f64>| {
-                DMatrix::from_fn(self.rows.len(), M.ncols(), |i, j| M[(self.rows[i], j)])
-            };
-            let (J, J_a) = (rows(&at.J), rows(&at.J_a));
-            Ok(Node { M: at.M, D: at.D, K: at.K, M_a: at.M_a, D_a: at.D_a, K_a: at.K_a, J, J_a })
+            self.node(&start, spacing * k as f64)
         };
         let nodes = (0..=count).into_par_iter().map(node).collect::<Result<Vec<Node>, Error>>()?;
         let inversion = Inversion::new(&nodes, spacing).map_err(CompensateError::from)?;
@@ -217,6 +211,35 @@ impl<'a> Job<'a> {
         };
         let cutoff = inversion.cutoff_hz();
         Ok((inversion, cutoff))
+    }
+
+    /// The arm held where the motion begins: gains of servos and dampings of a run are those of its start.
+    fn at_start(&self) -> Result<FlexibleArm, Error> {
+        let flexible = self.arm.flexible();
+        let held = Held(self.q.column(0).iter().copied().collect());
+        let arm = flexible.arm(Arc::new(held)).map_err(|error| flexible.explained(error))?;
+        let mut axes = arm.servo.iter().flat_map(|servo| &servo.axes);
+        match axes.find(|axis| axis.position_gain * axis.velocity_gain <= 0.0) {
+            Some(axis) => {
+                let joint = self.motion.trajectory.joints()[axis.coordinate].clone();
+                Err(CompensateError::NothingHolds { joint }.into())
+            }
+            None => Ok(arm),
+        }
+    }
+
+    /// The arm linearised at a time of the motion, motors of servos free.
+    fn node(&self, start: &FlexibleArm, t: f64) -> Result<Node, Error> {
+        let (flexible, m) = (self.arm.flexible(), self.q.nrows());
+        let (mut q, mut v, mut a) = (vec![0.0; m], vec![0.0; m], vec![0.0; m]);
+        self.motion.trajectory.sample(t, &mut q, &mut v, &mut a);
+        let servo = start.servo.as_ref().map(|servo| controllers(servo, &q, &start.friction));
+        let arm = start.along(Arc::new(Held(q))).with_servo_opened();
+        let at = linearise(&arm, &flexible.tcp, &Wrench::zeros(), 0.0).map_err(|error| flexible.explained(error))?;
+        let rows =
+            |M: &nalgebra::Matrix6xX<f64>| DMatrix::from_fn(self.rows.len(), M.ncols(), |i, j| M[(self.rows[i], j)]);
+        let (J, J_a) = (rows(&at.J), rows(&at.J_a));
+        Ok(Node { M: at.M, D: at.D, K: at.K, M_a: at.M_a, D_a: at.D_a, K_a: at.K_a, J, J_a, servo })
     }
 
     pub(super) fn dynamic(&self) -> Result<Commands, Error> {
@@ -230,10 +253,12 @@ impl<'a> Job<'a> {
             kept: 0,
             cutoff_hz: Some(cutoff),
             fewest: inversion.fewest_directions(),
+            quicker: 0.0,
         };
         let mut error = self.error(&self.as_it_is()?)?;
         let size = |error: &DMatrix<f64>| error.select_rows(&self.rows).norm();
         let (first, mut least) = (size(&error), size(&error));
+        let mut left_over = error.clone();
         best.peaks.push(peak(&error));
         for iteration in 1..=self.request.iterations {
             let y = -error.select_rows(&self.rows);
@@ -247,21 +272,24 @@ impl<'a> Job<'a> {
             }
             let settled = left > SETTLED * least || left < ENOUGH * first;
             (least, best.motion, best.change, best.kept) = (left, motion, change.clone(), iteration);
+            left_over.copy_from(&error);
             if settled {
                 break;
             }
         }
+        let left_over = left_over.select_rows(&self.rows);
+        best.quicker =
+            inversion.quicker_than_cutoff(&left_over, self.step_s()).norm() / left_over.norm().max(f64::MIN_POSITIVE);
         Ok(best)
     }
 
     /// Each node at rest, a spline between them.
     pub(super) fn at_rest(&self) -> Result<Commands, Error> {
-        let flexible = self.arm.flexible();
         let (m, N) = self.q.shape();
-        let arm = flexible
-            .arm(Arc::new(Held(self.q.column(0).iter().copied().collect())))
-            .map_err(|e| flexible.explained(e))?;
-        let scenario = Scenario { loads: self.scenario.loads.iter().map(averaged).collect(), ..self.scenario.clone() };
+        let (flexible, arm) = (self.arm.flexible(), self.at_start()?);
+        let end = self.scenario.duration_s();
+        let loads = self.scenario.loads.iter().map(|load| averaged(load, end, |_| None)).collect();
+        let scenario = Scenario { loads, ..self.scenario.clone() };
         let (arm, _) = loaded(self.arm.robot(), &scenario, &self.request.run, arm)?;
         let every = ((NODE_S / self.step_s()).round() as usize).max(1);
         let nodes: Vec<usize> = (0..N - 1).step_by(every).chain([N - 1]).collect();
@@ -295,20 +323,42 @@ impl<'a> Job<'a> {
         }
         let motion = self.moved(&change)?;
         let peaks = vec![peak(&self.error(&self.as_it_is()?)?), peak(&self.error(&motion)?)];
-        Ok(Commands { motion, change, peaks, kept: 1, cutoff_hz: None, fewest: None })
+        Ok(Commands { motion, change, peaks, kept: 1, cutoff_hz: None, fewest: None, quicker: 0.0 })
     }
 }
 
-/// A load as its mean about each moment, over a node or whole periods: what is quicker moves no arm at rest.
-fn averaged(load: &AppliedLoad) -> AppliedLoad {
+/// Servos about a pose, linear.
+fn controllers(servo: &Servo, q: &[f64], friction: &[Friction]) -> NodeServo {
+    let of = |value: fn(&ServoAxis) -> f64| DVector::from_iterator(servo.axes.len(), servo.axes.iter().map(value));
+    NodeServo {
+        axes: servo.axes.iter().map(|axis| axis.coordinate).collect(),
+        stiffness: of(|axis| axis.velocity_gain * axis.position_gain + axis.integral_gain),
+        damping: of(|axis| axis.velocity_gain),
+        integral: of(|axis| axis.integral_gain * axis.position_gain),
+        ahead: servo.fed_forward(q, friction),
+    }
+}
+
+/// A load as its mean about each moment, over a node or whole periods: what is quicker moves no arm at rest. Where the arm rests longer
+/// the mean is over its rest; nothing before the motion and behind its end (s) counts.
+pub(super) fn averaged(
+    load: &AppliedLoad,
+    end: f64,
+    rest: impl Fn(f64) -> Option<[f64; 2]> + Send + Sync + 'static,
+) -> AppliedLoad {
     let wrench = load.wrench.clone();
     let period = wrench.period;
     let window = if period > 0.0 && period < NODE_S { period * (NODE_S / period).ceil() } else { NODE_S };
     let mean = TimedWrench::new({
         let wrench = wrench.clone();
         move |t| {
-            let pieces = (0..PIECES).map(|k| t + window * ((f64::from(k) + 0.5) / f64::from(PIECES) - 0.5));
-            pieces.fold(Wrench::zeros(), |sum, t| sum + wrench.at(t.max(0.0)) * (1.0 / f64::from(PIECES)))
+            let [from, to] = rest(t).filter(|[from, to]| to - from > window).unwrap_or_else(|| {
+                let from = (t - 0.5 * window).min(end - window).max(0.0);
+                [from, from + window]
+            });
+            let pieces = PIECES * ((to - from) / window).ceil().clamp(1.0, LONGEST_REST) as u32;
+            let at = |k: u32| from + (to - from) * (f64::from(k) + 0.5) / f64::from(pieces);
+            (0..pieces).fold(Wrench::zeros(), |sum, k| sum + wrench.at(at(k)) * (1.0 / f64::from(pieces)))
         }
     });
     AppliedLoad { wrench: mean.in_axes(wrench.axes), ..load.clone() }

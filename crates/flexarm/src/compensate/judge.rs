@@ -28,8 +28,11 @@ pub(super) struct Judge {
 }
 
 impl Judge {
-    /// Another robot with the same joints.
-    pub(super) fn of(plant: &Robot, request: &CompensateRequest, arm: &Arm) -> Result<Self, Error> {
+    /// Another robot with the same joints, if one is asked for, or the arm itself.
+    pub(super) fn of(request: &CompensateRequest, arm: &Arm) -> Result<Self, Error> {
+        let Some((_, plant)) = &request.plant else {
+            return Ok(Self { arm: arm.clone(), run: request.run.clone() });
+        };
         let judge = Self { arm: plant.flexible(Modelling::default())?, run: request.run.clone() };
         let names = |arm: &Arm| arm.joints().map(str::to_owned).collect::<Vec<_>>();
         let (found, expected) = (names(&judge.arm), names(arm));

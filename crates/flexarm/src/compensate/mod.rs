@@ -4,6 +4,7 @@
 //! ([`Inversion`]), and the new motion is run again, a few times. At rest ([`Method::Static`]) each point is corrected to its
 //! equilibrium alone. [`static_targets`], [`Inversion`] and [`Shaper`] take and give values.
 
+mod caveats;
 mod error;
 mod files;
 mod job;
@@ -18,7 +19,9 @@ mod shaped;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-pub use flexarm_analysis::{Inversion, InversionError, Node, Shaper, ShaperKind};
+pub use flexarm_analysis::{
+    Inversion, InversionError, Node, NodeServo, OptimalShaper, ShapedMode, Shaper, ShaperError, ShaperKind,
+};
 pub use flexarm_stepping::{StaticTargets, TargetError, static_targets};
 use flexarm_trajectory::Trajectory;
 use serde::Serialize;
@@ -38,6 +41,7 @@ use judge::{Judge, sweep};
 pub use limits::LimitRule;
 pub use program::{LeftTarget, ProgramFigures};
 use shaped::shaped;
+pub use shaped::{ShapedModeFigures, ShaperFigures, Shaping};
 
 /// Time between two samples of the error and two knots of the commands (s).
 const SAMPLE_S: f64 = 1e-3;
@@ -71,8 +75,8 @@ pub struct CompensateRequest {
     pub iterations: usize,
     /// Highest frequency that is corrected (Hz); as far as the inverse holds without it.
     pub cutoff_hz: Option<f64>,
-    /// Also run the motion through a shaper of the first mode at its end.
-    pub shaper: Option<ShaperKind>,
+    /// Also run the motion through a shaper of the modes at its end.
+    pub shaper: Option<Shaping>,
     /// Another robot that judges, with its name.
     pub plant: Option<(String, Robot)>,
     /// Judge with stiffness, damping and drives that are off as well.
@@ -152,6 +156,8 @@ pub struct Compensation {
     pub slowed: f64,
     /// How much longer the motion takes by its shaper (s).
     pub shaper_delay_s: f64,
+    /// The shaper, if there is one.
+    pub shaper: Option<ShaperFigures>,
     /// The same commands on other plants.
     pub plants: Vec<PlantFigures>,
     /// The new motion (.csv).
@@ -246,20 +252,17 @@ fn attempt(
     request: &CompensateRequest,
     stop: Stop<'_>,
 ) -> Result<(Compensation, Found, Vec<MotionViolation>), Error> {
-    let mut scenario = scenario.clone();
-    let mut shaper_delay_s = 0.0;
-    if let Some(kind) = request.shaper {
-        (scenario.motion, shaper_delay_s) = shaped(arm, &scenario.motion, kind)?;
-    }
+    let (motion, shaper) = match request.shaper {
+        Some(shaping) => shaped(arm, scenario, shaping).map(|(motion, figures)| (motion, Some(figures)))?,
+        None => (scenario.motion.clone(), None),
+    };
+    let scenario = Scenario { motion, ..scenario.clone() };
     let job = Job::new(arm, &scenario, request, stop)?;
     let found = match request.method {
         Method::Dynamic => job.dynamic()?,
         Method::Static => job.at_rest()?,
     };
-    let judge = match &request.plant {
-        Some((_, plant)) => Judge::of(plant, request, arm)?,
-        None => Judge { arm: arm.clone(), run: request.run.clone() },
-    };
+    let judge = Judge::of(request, arm)?;
     let as_it_is = job.as_it_is()?;
     let before = judge.figures(&job, &as_it_is)?;
     let after = judge.figures(&job, &found.motion)?;
@@ -271,8 +274,7 @@ fn attempt(
         true => sweep(robot, request, &job, arm, &found.motion)?,
         false => Vec::new(),
     };
-    let largest = |k: usize| found.change.row(k).amax();
-    let changes = arm.joints().enumerate().map(|(k, joint)| JointChange { joint: joint.into(), largest: largest(k) });
+    let change = |(k, joint): (usize, &str)| JointChange { joint: joint.into(), largest: found.change.row(k).amax() };
     let curves = job.times.iter().zip(before.distance.iter().zip(&after.distance)).map(|(t, (a, b))| [*t, *a, *b]);
     let mut answer = Compensation {
         robot: robot.name.clone(),
@@ -283,10 +285,11 @@ fn attempt(
         model_peaks_m: found.peaks.clone(),
         iterations: found.kept,
         cutoff_hz: found.cutoff_hz,
-        changes: changes.collect(),
+        changes: arm.joints().enumerate().map(change).collect(),
         limits,
         slowed: 1.0,
-        shaper_delay_s,
+        shaper_delay_s: shaper.iter().flat_map(|shaper| &shaper.copies).map(|copy| copy[0]).fold(0.0, f64::max),
+        shaper,
         plants,
         file: None,
         files: Vec::new(),
@@ -297,8 +300,8 @@ fn attempt(
         trajectory: found.motion.trajectory.clone(),
         curves: curves.collect(),
     };
-    answer.caveats = caveats(&answer, &own, robot);
-    answer.caveats.extend(found.fewest.and_then(|fewest| singular_caveat(fewest, job.rows.len())));
+    answer.caveats = caveats::of(&answer, &own, robot, &found, job.rows.len());
+    answer.caveats.extend(caveats::of_servos(&judge.arm, &after.efforts));
     let motion = found.motion;
     Ok((answer, Found { scenario, motion }, own))
 }
@@ -335,58 +338,11 @@ fn check(scenario: &Scenario, request: &CompensateRequest, arm: &Arm) -> Result<
     {
         return Err(CompensateError::StaticPayload { at_s: change.at_s });
     }
-    if arm.flexible().springs.is_empty() {
+    if arm.flexible().springs.is_empty() && !arm.flexible().has_servo() {
         return Err(CompensateError::NothingYields);
     }
     match motion.trajectory.velocity_jumps().first() {
         Some(jump) => Err(CompensateError::Corner { t_s: jump.time_s }),
         None => Ok(()),
     }
-}
-
-/// Where the joints cannot correct everything that is asked for.
-fn singular_caveat((t_s, directions): (f64, usize), asked: usize) -> Option<Caveat> {
-    (directions < asked).then(|| {
-        let text = format!(
-            "at {t_s:.2} s the joints move the tool in {directions} of the {asked} directions asked for (a singular pose, or too few joints): \
-             the others are corrected little or not at all there"
-        );
-        Caveat::said("singular", "compensation", text, "ask for fewer components, or begin and pass elsewhere")
-    })
-}
-
-fn caveats(answer: &Compensation, own: &[MotionViolation], robot: &Robot) -> Vec<Caveat> {
-    let mut caveats = Vec::new();
-    let worse: Vec<&str> = limits::worse(&answer.limits, own).map(|limit| limit.message.as_str()).collect();
-    if !worse.is_empty() {
-        let text = format!("the new commands pass limits that the motion keeps: {}", worse.join("; "));
-        caveats.push(Caveat::said("limits", "compensation", text, "slow the motion down a little"));
-    }
-    let untold: Vec<&str> = robot
-        .drives
-        .iter()
-        .filter(|d| d.backlash > 0.0 || d.friction != flexarm_stepping::Friction::NONE)
-        .map(|d| d.joint.as_str())
-        .collect();
-    if !untold.is_empty() {
-        let text = format!(
-            "play and friction of {} are not taken away: what they leave depends on the way the joint came",
-            untold.join(", ")
-        );
-        caveats.push(Caveat::said("play", "compensation", text, "come to every point from the same side").as_note());
-    }
-    if answer.after.peak_m > 0.5 * answer.before.peak_m {
-        let text = format!(
-            "less than half of the error is taken away on the plant ({:.3} of {:.3} mm left)",
-            1e3 * answer.after.peak_m,
-            1e3 * answer.before.peak_m
-        );
-        caveats.push(Caveat::said(
-            "little-gained",
-            "compensation",
-            text,
-            "the model is not that of the plant, or the motion is too quick for it",
-        ));
-    }
-    caveats
 }

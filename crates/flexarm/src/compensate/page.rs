@@ -38,9 +38,33 @@ pub(super) fn html(answer: &Compensation) -> String {
         );
     }
     page += "</table>\n";
+    page += &shaper(answer);
     page += &limits(answer);
     page += "<p>Not taken away: noise, play and hysteresis of gears, what is quicker than the cutoff, and what the model does not know.</p>\n";
     page + "</body></html>\n"
+}
+
+/// What the motion would make swing at its end, and what its shaper leaves.
+fn shaper(answer: &Compensation) -> String {
+    let Some(shaper) = &answer.shaper else { return String::new() };
+    let mut text = format!(
+        "<h2>Shaper</h2>\n<p>{}, {} copies, {:.4} s longer. Forecast of how far the tool swings behind the motion:</p>\n\
+         <table><tr><th>mode (Hz)</th><th>damping ratio</th><th>as it is (mm)</th><th>shaped (mm)</th></tr>\n",
+        shaper.kind,
+        shaper.copies.len(),
+        answer.shaper_delay_s
+    );
+    for mode in &shaper.modes {
+        let _ = writeln!(
+            text,
+            "<tr><td>{:.3}</td><td>{:.4}</td><td>{:.4}</td><td>{:.4}</td></tr>",
+            mode.frequency_hz,
+            mode.damping_ratio,
+            1e3 * mode.before_m,
+            1e3 * mode.after_m
+        );
+    }
+    text + "</table>\n"
 }
 
 /// Limits that are passed, and how much slower the motion is for their sake.

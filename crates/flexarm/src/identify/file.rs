@@ -387,9 +387,34 @@ impl TableRow<'_> {
     }
 }
 
-const DISPLACEMENT_COLUMNS: [&str; 16] =
-    ["fx", "fy", "fz", "mx", "my", "mz", "mass", "dx", "dy", "dz", "rx", "ry", "rz", "d", "std", "std_rotation"];
-const PLACE_COLUMNS: [&str; 11] = ["fx", "fy", "fz", "mx", "my", "mz", "mass", "x", "y", "z", "std"];
+const DISPLACEMENT_COLUMNS: [&str; 25] = [
+    "fx",
+    "fy",
+    "fz",
+    "mx",
+    "my",
+    "mz",
+    "ax",
+    "ay",
+    "az",
+    "px",
+    "py",
+    "pz",
+    "mass",
+    "dx",
+    "dy",
+    "dz",
+    "rx",
+    "ry",
+    "rz",
+    "d",
+    "ux",
+    "uy",
+    "uz",
+    "std",
+    "std_rotation",
+];
+const PLACE_COLUMNS: [&str; 14] = ["fx", "fy", "fz", "mx", "my", "mz", "ax", "ay", "az", "mass", "x", "y", "z", "std"];
 
 impl Reader<'_> {
     pub(super) fn error(&self, span: Range<usize>, message: impl Into<String>) -> Error {
@@ -534,20 +559,34 @@ impl Reader<'_> {
         self.scaled(values, span)
     }
 
+    /// An empty cell of a row whose number is needed.
+    fn empty(&self, row: &TableRow<'_>, file: &Spanned<PathBuf>, name: &str) -> Error {
+        let line = row.table.lines[row.row];
+        let text = format!("{} line {line}: {name} is empty: a number is needed", file.get_ref().display());
+        self.error(file.span(), text)
+    }
+
     /// A load with what a row of a table says of it.
     fn with_columns(&self, load: LoadEntry, row: &TableRow<'_>, file: &Spanned<PathBuf>) -> Result<LoadEntry, Error> {
-        let line = row.table.lines[row.row];
-        let empty = |name: String| {
-            let message = format!("{} line {line}: {name} is empty: a load needs a number", file.get_ref().display());
-            self.error(file.span(), message)
-        };
+        let empty = |name: String| self.empty(row, file, &name);
         let mass = match row.table.column("mass") {
             None => load.mass,
             Some(_) => row.get("mass").ok_or_else(|| empty("mass".into()))?,
         };
         let force = row.three(["fx", "fy", "fz"]).map_err(empty)?.unwrap_or(load.force);
         let torque = row.three(["mx", "my", "mz"]).map_err(empty)?.unwrap_or(load.torque);
-        Ok(LoadEntry { force, torque, mass, ..load })
+        let at = row.three(["ax", "ay", "az"]).map_err(empty)?.unwrap_or(load.at);
+        Ok(LoadEntry { force, torque, at, mass, ..load })
+    }
+
+    /// The direction of the gauge of a row that has one read.
+    fn table_direction(&self, row: &TableRow<'_>, file: &Spanned<PathBuf>) -> Result<Option<Spanned<[f64; 3]>>, Error> {
+        if row.get("d").is_none() {
+            return Ok(None);
+        }
+        let empty = |name: String| self.empty(row, file, &name);
+        let direction = row.three(["ux", "uy", "uz"]).map_err(empty)?;
+        Ok(direction.map(|direction| Spanned::new(file.span(), direction)))
     }
 
     fn displacement(&mut self, number: usize, entry: &Spanned<DisplacementEntry>) -> Result<(), Error> {
@@ -572,7 +611,10 @@ impl Reader<'_> {
                     let std_rotation = at.get("std_rotation").map(spanned).or_else(|| e.std_rotation.clone());
                     let q = self.table_joints(&at, file.span())?;
                     let rotation = at.filled(["rx", "ry", "rz"]);
-                    let said = Said { name, q, load, value, rotation, std, std_rotation };
+                    let direction = self.table_direction(&at, file)?.or_else(|| e.direction.clone());
+                    let point =
+                        at.three(["px", "py", "pz"]).map_err(|name| self.empty(&at, file, &name))?.unwrap_or(e.point);
+                    let said = Said { name, q, load, point, value, direction, rotation, std, std_rotation };
                     self.moved(entry, said)?;
                 }
                 Ok(())
@@ -582,7 +624,9 @@ impl Reader<'_> {
                     name: format!("displacement {}", number + 1),
                     q: self.joints(joints)?,
                     load: e.load,
+                    point: e.point,
                     value: e.value.as_ref().map(|value| value.get_ref().read()),
+                    direction: e.direction.clone(),
                     rotation: e.rotation.map(|turn| turn.map(Some)),
                     std: e.std.clone(),
                     std_rotation: e.std_rotation.clone(),
@@ -598,11 +642,11 @@ impl Reader<'_> {
     /// One displacement.
     fn moved(&mut self, entry: &Spanned<DisplacementEntry>, said: Said) -> Result<(), Error> {
         let (e, span) = (entry.get_ref(), entry.span());
-        let Said { name, q, load, value, rotation, std, std_rotation } = said;
+        let Said { name, q, load, point, value, direction, rotation, std, std_rotation } = said;
         let mut rows = Vec::new();
         let sigma = self.std(std.as_ref(), self.units.length)?;
         let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
-        match (value, &e.direction) {
+        match (value, &direction) {
             (Some(Measured::One(d)), Some(direction)) => {
                 let along = Vector3::from(*direction.get_ref());
                 let along = along.try_normalize(1e-9).filter(|v| v.iter().all(|x| x.is_finite()));
@@ -643,7 +687,7 @@ impl Reader<'_> {
         if before == after {
             return Err(self.error(span, format!("{name}: the loads before and after are the same: nothing moves")));
         }
-        let point = Vector3::from(e.point) * self.units.length;
+        let point = Vector3::from(point) * self.units.length;
         let kind = ReadingKind::Displacement { before, after, point, rows };
         let what = if rotation.is_some() { "displacement and rotation" } else { "displacement" };
         self.given.push((what, std.is_some() || (value.is_none() && std_rotation.is_some()), span));
@@ -872,7 +916,9 @@ struct Said {
     name: String,
     q: Vec<f64>,
     load: LoadEntry,
+    point: [f64; 3],
     value: Option<Measured>,
+    direction: Option<Spanned<[f64; 3]>>,
     rotation: Option<[Option<f64>; 3]>,
     std: Option<Spanned<f64>>,
     std_rotation: Option<Spanned<f64>>,

@@ -294,7 +294,8 @@ fn gives_way(arm: &Arm) -> bool {
 
 /// What the file or the request asks for, in the robot's order.
 fn chosen(arm: &Arm, input: &MeasurementInput, fit: &[String]) -> Result<Vec<parameters::Candidate>, Error> {
-    if let Some(coupling) = arm.robot().coupling.as_ref().filter(|_| gives_way(arm)) {
+    let coupled = arm.robot().coupling.as_ref().filter(|_| gives_way(arm) && !input.recordings.is_empty());
+    if let Some(coupling) = coupled {
         return Err(IdentifyFileError::Coupled { joints: coupling.joints.clone() }.into());
     }
     let all = parameters::candidates(arm.robot(), arm.flexible());
@@ -356,8 +357,8 @@ pub enum IdentifyFileError {
     NothingGives,
     /// Gears that move several joints.
     #[error(
-        "the gears of {joints:?} are coupled: which of their springs a displacement tells is not worked out; identify without the \
-         [coupling] table, joint by joint, or keep these drives rigid"
+        "the gears of {joints:?} are coupled: motor less link of one joint is not the deflection of one spring; leave [[encoders]] out and \
+         measure displacements, places, frequencies or responses, which know the coupling"
     )]
     Coupled {
         /// Joints.

@@ -70,7 +70,10 @@ pub(crate) fn candidates(robot: &Robot, flexible: &FlexibleRobot) -> Vec<Candida
         }
         let slides = flexible.model.coordinates().iter().any(|c| c.joint == drive.joint && c.kind == "prismatic");
         found.extend(gearbox_parameters(&drive.joint, &gearbox.stiffness, &springs, slides));
-        if let Some(dampers) = damping.dampers.as_ref().filter(|d| d.iter().any(|d| *d > 0.0)) {
+        // A damper of coupled gears is not one of its joint's.
+        let coupled = robot.coupling.as_ref().is_some_and(|coupling| coupling.joints.contains(&drive.joint));
+        let dampers = damping.dampers.as_ref().filter(|d| !coupled && d.iter().any(|d| *d > 0.0));
+        if let Some(dampers) = dampers {
             let name = format!("drive.{}.gearbox.damping", drive.joint);
             let (unit, initial) = match (&dampers[..], slides) {
                 ([one], false) => ("N m s/rad", *one),
@@ -196,7 +199,12 @@ fn is_diagonal(K: &nalgebra::Matrix6<f64>) -> bool {
 
 /// The arm as the identification takes it.
 pub(crate) fn plant(flexible: &FlexibleRobot) -> Plant {
-    Plant { model: flexible.model.clone(), springs: flexible.springs.clone(), tool: flexible.tcp.clone() }
+    Plant {
+        model: flexible.model.clone(),
+        springs: flexible.springs.clone(),
+        tool: flexible.tcp.clone(),
+        coupling: flexible.gears.coupling.clone(),
+    }
 }
 
 /// Whether a pattern asks for a parameter to be fitted.

@@ -33,6 +33,12 @@ pub struct PlanRequest {
     pub count: usize,
     /// Forces on the tool among which the plan chooses, world axes (N).
     pub forces: Vec<[f64; 3]>,
+    /// Points of the tool at which a force may act, tool axes (m); the TCP where it is empty. About an axis through the point nothing turns.
+    pub levers: Vec<[f64; 3]>,
+    /// Points of the tool that may be watched, tool axes (m); the TCP where it is empty.
+    pub points: Vec<[f64; 3]>,
+    /// Directions along which a gauge may stand, world axes; all three numbers of the displacement are read where it is empty.
+    pub directions: Vec<[f64; 3]>,
     /// Deviation of a measured displacement (m).
     pub std_m: f64,
     /// A table of poses (a column per joint) among which is chosen: those that are reachable and free; rad or m.
@@ -54,6 +60,9 @@ impl PlanRequest {
             fit: Vec::new(),
             count,
             forces,
+            levers: Vec::new(),
+            points: Vec::new(),
+            directions: Vec::new(),
             std_m: 3e-5,
             poses: None,
             work: None,
@@ -94,8 +103,63 @@ pub struct PlannedReading {
     pub joints: Vec<f64>,
     /// Force on the tool, world axes (N).
     pub force: [f64; 3],
-    /// Displacement to expect with the robot file as it is (m).
+    /// Where it acts, tool axes (m).
+    pub at: [f64; 3],
+    /// What is watched, tool axes (m).
+    pub point: [f64; 3],
+    /// Direction of the gauge, world axes; null where all three numbers are read.
+    pub direction: Option<[f64; 3]>,
+    /// Displacement of the point to expect with the robot file as it is (m).
     pub expected_m: [f64; 3],
+}
+
+/// What may be done at a pose.
+#[derive(Clone, Copy, Debug)]
+struct Setup {
+    /// World axes (N).
+    force: [f64; 3],
+    /// Tool axes (m).
+    at: [f64; 3],
+    /// Tool axes (m).
+    point: [f64; 3],
+    /// Of unit length, world axes.
+    direction: Option<[f64; 3]>,
+}
+
+impl PlanRequest {
+    /// Every force at every lever, each point seen along every direction.
+    fn setups(&self) -> Vec<Setup> {
+        let or_tcp = |points: &[[f64; 3]]| if points.is_empty() { vec![[0.0; 3]] } else { points.to_vec() };
+        let unit = |d: &[f64; 3]| Some(Vector3::from(*d).normalize().into());
+        let directions =
+            if self.directions.is_empty() { vec![None] } else { self.directions.iter().map(unit).collect() };
+        let mut all = Vec::new();
+        for at in or_tcp(&self.levers) {
+            for point in or_tcp(&self.points) {
+                for direction in &directions {
+                    let of = |force: &[f64; 3]| Setup { force: *force, at, point, direction: *direction };
+                    all.extend(self.forces.iter().map(of));
+                }
+            }
+        }
+        all
+    }
+
+    /// What makes no plan, as a sentence.
+    fn fault(&self) -> Option<String> {
+        if self.count == 0 || self.forces.is_empty() || !(self.std_m > 0.0 && self.std_m.is_finite()) {
+            return Some("a plan needs at least one reading, one force and a positive deviation".into());
+        }
+        for (what, rows) in
+            [("force", &self.forces), ("lever", &self.levers), ("point", &self.points), ("direction", &self.directions)]
+        {
+            if let Some(bad) = rows.iter().flatten().find(|x| !x.is_finite()) {
+                return Some(format!("a {what} has the entry {bad}, expected finite numbers"));
+            }
+        }
+        let none = self.directions.iter().find(|d| Vector3::from(**d).norm() < 1e-9);
+        none.map(|d| format!("the direction {d:?} of a gauge has no length"))
+    }
 }
 
 /// What to expect of a parameter.
@@ -119,12 +183,8 @@ pub struct ExpectedParameter {
 pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<MeasurementPlan, Error> {
     let arm = robot.flexible(request.modelling)?;
     let (joints, slides): (Vec<String>, Vec<bool>) = joints_of(&arm).into_iter().unzip();
-    if request.count == 0 || request.forces.is_empty() || !(request.std_m > 0.0 && request.std_m.is_finite()) {
-        let text = "a plan needs at least one reading, one force and a positive deviation";
-        return Err(IdentifyFileError::Fit(text.into()).into());
-    }
-    if let Some(bad) = request.forces.iter().flatten().find(|x| !x.is_finite()) {
-        return Err(IdentifyFileError::Fit(format!("a force has the entry {bad}, expected finite numbers")).into());
+    if let Some(text) = request.fault() {
+        return Err(IdentifyFileError::Fit(text).into());
     }
     let targets =
         request.output.as_ref().map(|folder| [folder.join("measurements.toml"), folder.join("displacements.csv")]);
@@ -137,11 +197,15 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
         Some(path) => poses_of(path, &joints)?,
         None => spread_poses(&arm),
     };
-    let reading = |q: &Vec<f64>, force: &[f64; 3]| displacement(q, force, request.std_m);
+    let setups = request.setups();
+    let reading = |q: &Vec<f64>, setup: &Setup| displacement(q, setup, request.std_m);
     let candidates: Vec<Candidate> =
-        poses.iter().flat_map(|q| request.forces.iter().map(move |f| Candidate(reading(q, f)))).collect();
+        poses.iter().flat_map(|q| setups.iter().map(move |setup| Candidate(reading(q, setup)))).collect();
     let purpose: Vec<Reading> = match &request.work {
-        Some(path) => poses_of(path, &joints)?.iter().map(|q| reading(q, &request.forces[0])).collect(),
+        Some(path) => {
+            let work = Setup { force: request.forces[0], at: [0.0; 3], point: [0.0; 3], direction: None };
+            poses_of(path, &joints)?.iter().map(|q| reading(q, &work)).collect()
+        }
         None => Vec::new(),
     };
     let plant = arm.plant();
@@ -155,7 +219,7 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
     let first = plan(&plant, &fitted, &candidates[..request.count.min(candidates.len())], &options).map_err(failed)?;
     let mut answer = MeasurementPlan {
         robot: robot.name.clone(),
-        poses: planned(&plant, &candidates, &best, request)?,
+        poses: planned(&plant, &candidates, &best, &setups)?,
         joints,
         parameters: fitted
             .iter()
@@ -174,7 +238,7 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
         table: None,
     };
     if let Some([file, table]) = targets {
-        let texts = [(file.clone(), job(&answer, request)), (table.clone(), to_fill_in(&answer, &slides))];
+        let texts = [(file.clone(), job(&answer, request)), (table.clone(), to_fill_in(&answer, request, &slides))];
         write_all(&texts)?;
         (answer.file, answer.table) = (Some(file.display().to_string()), Some(table.display().to_string()));
     }
@@ -198,14 +262,15 @@ fn nothing_measured() -> super::MeasurementInput {
     }
 }
 
-fn displacement(q: &[f64], force: &[f64; 3], std: f64) -> Reading {
-    let wrench = Wrench::new(Vector3::from(*force), Vector3::zeros());
-    let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
+fn displacement(q: &[f64], setup: &Setup, std: f64) -> Reading {
+    let wrench = Wrench::new(Vector3::from(setup.force), Vector3::zeros());
+    let all = [Vector3::x(), Vector3::y(), Vector3::z()];
+    let axes = setup.direction.map_or_else(|| all.to_vec(), |direction| vec![Vector3::from(direction)]);
     let kind = ReadingKind::Displacement {
         before: LoadCase::none(),
-        after: LoadCase { wrench, ..LoadCase::none() },
-        point: Vector3::zeros(),
-        rows: axes.map(|d| Row { of: Component::Along(d), value: 0.0, std }).to_vec(),
+        after: LoadCase { wrench, at: Vector3::from(setup.at), ..LoadCase::none() },
+        point: Vector3::from(setup.point),
+        rows: axes.into_iter().map(|d| Row { of: Component::Along(d), value: 0.0, std }).collect(),
     };
     Reading { name: format!("pose {q:?}"), q: q.to_vec(), kind }
 }
@@ -267,15 +332,17 @@ fn planned(
     plant: &Plant,
     candidates: &[Candidate],
     best: &Plan,
-    request: &PlanRequest,
+    setups: &[Setup],
 ) -> Result<Vec<PlannedReading>, Error> {
     let one = |number: &usize| {
-        let reading = candidates[*number].0.clone();
-        let (q, force) = (reading.q.clone(), request.forces[number % request.forces.len()]);
+        let setup = setups[number % setups.len()];
+        let q = candidates[*number].0.q.clone();
+        let reading = displacement(&q, &Setup { direction: None, ..setup }, 1.0);
         let measurements = flexarm_identify::Measurements { readings: vec![reading], ..Default::default() };
         let arm = flexarm_identify::MeasuredArm { plant, parameters: &[], measurements: &measurements };
         let moved = arm.predicted(&nalgebra::DVector::zeros(0)).map_err(|e| IdentifyFileError::Fit(e.to_string()))?;
-        Ok(PlannedReading { joints: q, force, expected_m: [moved[0], moved[1], moved[2]] })
+        let Setup { force, at, point, direction } = setup;
+        Ok(PlannedReading { joints: q, force, at, point, direction, expected_m: [moved[0], moved[1], moved[2]] })
     };
     best.chosen.iter().map(one).collect()
 }
@@ -286,9 +353,15 @@ fn job(answer: &MeasurementPlan, request: &PlanRequest) -> String {
         true => String::new(),
         false => format!("fit = {:?}\n", request.fit),
     };
+    let (read, how) = match request.directions.is_empty() {
+        true => ("dx, dy, dz", "world axes"),
+        false => ("d", "along ux, uy, uz, world axes"),
+    };
+    let what = if request.points.is_empty() { "the TCP" } else { "the point px, py, pz (mm, tool axes)" };
+    let lever = if request.levers.is_empty() { "" } else { ", which acts at ax, ay, az (mm, tool axes)" };
     format!(
         "# Measurements of {}: {} readings, planned by flexarm identify.\n\
-         # Fill in dx, dy, dz of displacements.csv (mm, world axes): how far the tool moves from no load to the force.\n\
+         # Fill in {read} of displacements.csv (mm, {how}): how far {what} moves from no load to the force{lever}.\n\
          # Then: flexarm identify ROBOT measurements.toml\n\
          format = 1\nlength = \"mm\"\nangle = \"deg\"\n{fit}\n[[displacement]]\nfile = \"displacements.csv\"\nstd = {}\n",
         answer.robot,
@@ -298,13 +371,28 @@ fn job(answer: &MeasurementPlan, request: &PlanRequest) -> String {
 }
 
 /// The table with empty cells.
-fn to_fill_in(answer: &MeasurementPlan, slides: &[bool]) -> String {
-    let mut out = format!("{},fx,fy,fz,dx,dy,dz\n", answer.joints.join(","));
+fn to_fill_in(answer: &MeasurementPlan, request: &PlanRequest, slides: &[bool]) -> String {
+    let (levers, gauges) = (!request.levers.is_empty(), !request.directions.is_empty());
+    let points = !request.points.is_empty();
+    let lever = if levers { ",ax,ay,az" } else { "" };
+    let point = if points { ",px,py,pz" } else { "" };
+    let read = if gauges { ",ux,uy,uz,d" } else { ",dx,dy,dz" };
+    let mut out = format!("{},fx,fy,fz{lever}{point}{read}\n", answer.joints.join(","));
     for pose in &answer.poses {
         let of = |(q, slides): (&f64, &bool)| format!("{:.4}", if *slides { 1e3 * q } else { q.to_degrees() });
         let joints: Vec<String> = pose.joints.iter().zip(slides).map(of).collect();
-        let [x, y, z] = pose.force;
-        out += &format!("{},{x},{y},{z},,,\n", joints.join(","));
+        let three = |[x, y, z]: [f64; 3]| format!(",{x},{y},{z}");
+        out += &format!("{}{}", joints.join(","), three(pose.force));
+        if levers {
+            out += &three(pose.at.map(|x| 1e3 * x));
+        }
+        if points {
+            out += &three(pose.point.map(|x| 1e3 * x));
+        }
+        out += &match pose.direction {
+            Some(direction) => three(direction) + ",\n",
+            None => ",,,\n".to_owned(),
+        };
     }
     out
 }

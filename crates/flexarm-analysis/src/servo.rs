@@ -1,0 +1,171 @@
+//! What servos must be told so that their motors move as asked, linear about a motion.
+//!
+//! ```text
+//! τ = C(s) (u - q) + F(s) u            C(s) = k_v s + p + i/s,   p = k_v k_p + k_i,   i = k_i k_p
+//! (C + F) (u - q) = τ - F q
+//! ```
+//! with the commands u, the motors q, the torques τ that their motion needs and what is fed forward, F. The lead `u - q` obeys the
+//! equation of the servo on a rigid arm: it is stable where the servo is, and needs no look ahead. Here it is stepped by backward
+//! differences of second order, which also hold where nothing is fed forward.
+
+use nalgebra::{Complex, DMatrix, DVector};
+
+/// Controllers of d joints, linear, at a time of a motion; m commands.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NodeServo {
+    /// Number of the command that each follows.
+    pub axes: Vec<usize>,
+    /// `k_v k_p + k_i` of each (N m/rad or N/m).
+    pub stiffness: DVector<f64>,
+    /// `k_v` (N m s/rad or N s/m).
+    pub damping: DVector<f64>,
+    /// `k_i k_p` (N m/(rad s) or N/(m s)).
+    pub integral: DVector<f64>,
+    /// Torques fed forward per command, its rate and its acceleration, d×m.
+    pub ahead: [DMatrix<f64>; 3],
+}
+
+impl NodeServo {
+    /// Controllers between two nodes, by their weights.
+    pub(crate) fn between(all: &[Self], [(a, weight_a), (b, weight_b)]: [(usize, f64); 2]) -> Self {
+        let (a, b) = (&all[a], &all[b]);
+        let ahead = std::array::from_fn(|k| &a.ahead[k] * weight_a + &b.ahead[k] * weight_b);
+        Self { ahead, ..a.clone() }
+    }
+
+    /// Adds the controllers to the dynamic stiffness of the free coordinates, of which their motors are the first, and to the forces
+    /// per command.
+    pub(crate) fn close(&self, s: Complex<f64>, Z: &mut DMatrix<Complex<f64>>, N: &mut DMatrix<Complex<f64>>) {
+        let F = self.fed(s);
+        for (i, axis) in self.axes.iter().enumerate() {
+            let C = s * self.damping[i] + self.stiffness[i] + self.integral[i] / s;
+            Z[(i, i)] += C;
+            N[(i, *axis)] -= C;
+            let mut row = N.row_mut(i);
+            row -= F.row(i);
+        }
+    }
+
+    /// `C + F`, d×d.
+    pub(crate) fn references(&self, s: Complex<f64>) -> DMatrix<Complex<f64>> {
+        let mut all = self.fed(s).select_columns(&self.axes);
+        for i in 0..self.axes.len() {
+            all[(i, i)] += s * self.damping[i] + self.stiffness[i] + self.integral[i] / s;
+        }
+        all
+    }
+
+    fn fed(&self, s: Complex<f64>) -> DMatrix<Complex<f64>> {
+        let part = |k: usize, power: Complex<f64>| self.ahead[k].map(|x| power * x);
+        part(0, Complex::new(1.0, 0.0)) + part(1, s) + part(2, s * s)
+    }
+
+    /// How far commands must be ahead of their motors for torques beyond those fed forward, from rest.
+    ///
+    /// * `at`: the controllers at each column; `torques`: d×N, `step_s` apart.
+    ///
+    /// Returns d×N.
+    pub(crate) fn leads(at: impl Fn(usize) -> Self, torques: &DMatrix<f64>, step_s: f64) -> DMatrix<f64> {
+        let (d, N) = torques.shape();
+        let mut leads = DMatrix::zeros(d, N);
+        if N == 0 {
+            return leads;
+        }
+        let (sum, lead) = at(0).at_rest(&torques.column(0).into_owned());
+        // Integral, lead and its rate at the last two times.
+        let mut before = [[sum.clone(), lead.clone(), DVector::zeros(d)], [sum, lead, DVector::zeros(d)]];
+        let b = 1.5 / step_s;
+        for column in 0..N {
+            let servo = at(column);
+            let [K, D, M] = servo.equation();
+            // x = b X + x_0 for each X and its derivative x.
+            let past = |k: usize| (&before[1][k] * 0.5 - &before[0][k] * 2.0) / step_s;
+            let (lead_0, rate_0, acceleration_0) = (past(0), past(1), past(2));
+            let integral = DMatrix::from_diagonal(&servo.integral);
+            let left = &M * (b * b) + &D * b + &K + &integral / b;
+            let known = &M * (&rate_0 * b + &acceleration_0) + &D * &rate_0 - &integral * &lead_0 / b;
+            let right = torques.column(column) - known;
+            let lead = left.lu().solve(&right).unwrap_or_else(|| DVector::zeros(d));
+            let now = [(&lead - &lead_0) / b, lead.clone(), &lead * b + &rate_0];
+            let [last, _] = before;
+            before = [now, last];
+            leads.set_column(column, &lead);
+        }
+        leads
+    }
+
+    /// Of lead, rate and acceleration, d×d.
+    fn equation(&self) -> [DMatrix<f64>; 3] {
+        let [K, D, M] = [0, 1, 2].map(|k| self.ahead[k].select_columns(&self.axes));
+        [K + DMatrix::from_diagonal(&self.stiffness), D + DMatrix::from_diagonal(&self.damping), M]
+    }
+
+    /// Integral of the lead, and lead, under torques that last.
+    fn at_rest(&self, torques: &DVector<f64>) -> (DVector<f64>, DVector<f64>) {
+        let [K, _, _] = self.equation();
+        let (mut left, mut right) = (K.clone(), torques.clone());
+        for i in (0..self.axes.len()).filter(|i| self.integral[*i] > 0.0) {
+            // What integrates leads by nothing at rest.
+            left.row_mut(i).fill(0.0);
+            left[(i, i)] = 1.0;
+            right[i] = 0.0;
+        }
+        let lead = left.lu().solve(&right).unwrap_or_else(|| DVector::zeros(torques.len()));
+        let rest = torques - K * &lead;
+        let sum =
+            DVector::from_fn(rest.len(), |i, _| if self.integral[i] > 0.0 { rest[i] / self.integral[i] } else { 0.0 });
+        (sum, lead)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn two_axes() -> NodeServo {
+        let mut mass = DMatrix::zeros(2, 3);
+        (mass[(0, 0)], mass[(0, 2)]) = (30.0, 4.0);
+        NodeServo {
+            axes: vec![0, 2],
+            stiffness: DVector::from_vec(vec![1.2e5, 4e4]),
+            damping: DVector::from_vec(vec![3e3, 2e3]),
+            integral: DVector::from_vec(vec![1.2e6, 0.0]),
+            ahead: [DMatrix::zeros(2, 3), DMatrix::zeros(2, 3), mass],
+        }
+    }
+
+    /// Truth: at rest what integrates leads by nothing, the other by its torque over its stiffness, from the first moment on.
+    #[test]
+    fn torques_that_last_are_met_at_rest() {
+        let servo = two_axes();
+        let torques = DMatrix::from_fn(2, 50, |i, _| [100.0, -70.0][i]);
+        let found = NodeServo::leads(|_| servo.clone(), &torques, 1e-3);
+        for column in found.column_iter() {
+            assert!(column[0].abs() < 1e-16 && (column[1] + 70.0 / 4e4).abs() < 1e-16, "{column}");
+        }
+    }
+
+    /// Truth: amplitude and phase of `1 / (C + F)` at a frequency, of two axes, one with all of it fed forward and one without, which has
+    /// no integrator either.
+    #[test]
+    fn leads_are_those_of_the_frequency_response_once_the_start_has_died_away() {
+        let (h, omega, N) = (1e-3, 12.0, 6000);
+        let servo = two_axes();
+        let size = [100.0, -70.0];
+        let torques = DMatrix::from_fn(2, N, |i, k| size[i] * (1.0 + (omega * h * k as f64).sin()));
+        let found = NodeServo::leads(|_| servo.clone(), &torques, h);
+        let s = Complex::new(0.0, omega);
+        let size = DVector::from_vec(size.map(|x| Complex::new(x, 0.0)).to_vec());
+        let wave = servo.references(s).lu().solve(&size).unwrap();
+        // The steady part: an integrator leads by nothing.
+        let steady = [0.0, -70.0 / 4e4];
+        for k in N / 2..N {
+            let turn = (s * h * k as f64).exp();
+            for (i, steady) in steady.iter().enumerate() {
+                let wanted = steady + (wave[i] * turn).im;
+                let error = (found[(i, k)] - wanted).abs() / wave[i].norm();
+                assert!(error < 2e-4, "{i} {k}: {error:e}"); // 5e-5
+            }
+        }
+    }
+}
