@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use flexarm_files::{NumberTable, check_free, write_all};
-use flexarm_identify::{Candidate, Component, LoadCase, Plan, PlanOptions, Plant, Reading, ReadingKind, Row, plan};
+use flexarm_identify::{
+    Candidate, Component, LoadCase, Parameter, Plan, PlanOptions, Plant, Reading, ReadingKind, Row, plan,
+};
 use flexarm_kinematics::Wrench;
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -221,16 +223,7 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
         robot: robot.name.clone(),
         poses: planned(&plant, &candidates, &best, &setups)?,
         joints,
-        parameters: fitted
-            .iter()
-            .zip(&best.deviations)
-            .map(|(p, std)| ExpectedParameter {
-                name: p.name.clone(),
-                unit: p.unit.clone(),
-                initial: p.initial,
-                std: p.deviation(0.0, *std),
-            })
-            .collect(),
+        parameters: fitted.iter().zip(&best.deviations).map(expected).collect(),
         work_std_m: best.purpose.iter().copied().reduce(f64::max),
         gain_over_first: 0.5 * (best.gain - first.gain) / fitted.len() as f64,
         candidates: poses.len(),
@@ -243,6 +236,15 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
         (answer.file, answer.table) = (Some(file.display().to_string()), Some(table.display().to_string()));
     }
     Ok(answer)
+}
+
+fn expected((parameter, std): (&Parameter, &f64)) -> ExpectedParameter {
+    ExpectedParameter {
+        name: parameter.name.clone(),
+        unit: parameter.unit.clone(),
+        initial: parameter.initial,
+        std: parameter.deviation(0.0, *std),
+    }
 }
 
 fn nothing_measured() -> super::MeasurementInput {
