@@ -355,6 +355,16 @@ impl Solved {
 }
 
 impl PlacedLoop {
+    /// The pin in the body that carries it, `X_AP`, its axis along z.
+    pub fn pin(&self) -> &Pose {
+        &self.X_pin
+    }
+
+    /// The eye in the body that carries it, `p_BE_B` (m).
+    pub fn eye(&self) -> &Vector3<f64> {
+        &self.p_eye
+    }
+
     /// Poses of the bodies of the loop in the common one.
     fn place_chains(&self, model: &Model, data: &Data, X: &mut [Pose]) {
         X[self.common] = Pose::identity();

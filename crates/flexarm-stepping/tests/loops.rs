@@ -84,6 +84,24 @@ fn steppers_agree_on_an_arm_with_a_loop() {
     }
 }
 
+/// Truth: the reference stepper. SPOOK is of first order: its torques are off by half as much with half the step (1.3e-3 at 0.4 ms,
+/// 1.6e-4 at 0.05 ms), its tool by 3.7e-6 m and 1.2e-7 m.
+#[test]
+fn spook_tends_to_the_others_on_an_arm_with_a_loop() {
+    let arm = arm(moving(), 1e-3);
+    let (truth, _, drives) = end(&arm, of("reference"), 1e-3, 0.5);
+    let mut last = f64::INFINITY;
+    for h in [4e-4, 2e-4, 1e-4, 5e-5] {
+        let (found, _, torque) = end(&arm, of("spook"), h, 0.5);
+        let off = (found - truth).norm();
+        let torque = (torque - &drives).amax() / drives.amax();
+        eprintln!("spook h {h:.0e}: {off:.2e} m, torques {torque:.1e}");
+        assert!(off < 2e-2 * h && torque < 10.0 * h, "{off:e} {torque:e}");
+        assert!(torque < 0.55 * last, "{torque:e} {last:e}");
+        last = torque;
+    }
+}
+
 /// Truth: virtual work of springs and weight about the rigid pose. To first order of the springs' compliance the tool moves by
 /// `-J K^-1 g`, with J and g of the closed model; the deflection itself makes the rest, measured 7.7e-8 of it.
 #[test]
@@ -204,7 +222,7 @@ fn servos_drive_a_rigid_arm_with_a_loop_along_its_motion() {
 
 #[test]
 fn steps_over_a_loop_do_not_allocate() {
-    for (word, h) in [("generalized-alpha", 2e-4), ("sdirk3", 2e-4), ("rk4", 2e-5)] {
+    for (word, h) in [("generalized-alpha", 2e-4), ("sdirk3", 2e-4), ("rk4", 2e-5), ("spook", 2e-4)] {
         let mut stepper = new_stepper(of(word), arm(moving(), 1e-4), h, Start::Equilibrium).unwrap();
         (0..20).for_each(|_| stepper.step().unwrap());
         assert_eq!(count_allocations(|| (0..100).for_each(|_| stepper.step().unwrap())), 0, "{word}");
@@ -212,7 +230,7 @@ fn steps_over_a_loop_do_not_allocate() {
 }
 
 #[test]
-fn runs_side_by_side_are_those_alone_and_spook_says_what_it_does_not_know() {
+fn runs_side_by_side_are_those_alone() {
     let one = |beta: f64| BatchRun { arm: arm(moving(), beta), duration_s: 0.05 };
     let runs = [one(1e-4), one(2e-4), one(3e-4), one(4e-4)];
     let batch = Batch {
@@ -227,8 +245,6 @@ fn runs_side_by_side_are_those_alone_and_spook_says_what_it_does_not_know() {
         let alone = batch.run(std::slice::from_ref(run)).remove(0).unwrap();
         assert_eq!(found.unwrap().samples_m, alone.samples_m);
     }
-    let error = new_stepper(of("spook"), arm(moving(), 1e-4), 1e-3, Start::Equilibrium).err().unwrap().to_string();
-    assert!(error.contains("does not know closed loops of links: use generalized-alpha"), "{error}");
 }
 
 /// A crank that turns until the rod is too short: all steppers stop there, and say where and why.
@@ -244,7 +260,7 @@ fn a_motion_that_tears_a_loop_apart_ends_with_its_name_and_time() {
             }
         }))
     };
-    for word in ["generalized-alpha", "sdirk3", "rk4", "reference"] {
+    for word in ["generalized-alpha", "sdirk3", "rk4", "reference", "spook"] {
         let mut stepper =
             new_stepper(of(word), arm(tearing(), 1e-3), if word == "rk4" { 2e-5 } else { 1e-3 }, Start::Equilibrium)
                 .unwrap();

@@ -84,9 +84,12 @@ fn a_run_of_the_palletiser_keeps_the_books_in_every_stepper() {
     });
     eprintln!("peaks {peaks:?}");
     assert!(peaks[0] > 3e-4 && (peaks[0] / peaks[1] - 1.0).abs() < 1e-5, "{peaks:?}");
+    // SPOOK in its own coordinates, of first order and with damping in proportion to the stiffness.
     let spook = StepperKind::Spook(flexarm::SpookSettings::default());
-    let error = arm.simulate(&motion, &options(spook)).unwrap_err().to_string();
-    assert!(error.contains("closed loops of links"), "{error}");
+    let run = arm.simulate(&motion, &options(spook)).unwrap();
+    let off = run.summary.tcp.as_ref().unwrap().peak_m / peaks[0] - 1.0;
+    eprintln!("SPOOK {off:.1e}");
+    assert!(off.abs() < 1e-2, "{off:.1e}");
 }
 
 /// Truth: one spring on the crank, virtual work: with the gearbox of joint_3 alone the tool sinks by (dz/dq)² F/k, dz/dq = 1.35 cos q3.

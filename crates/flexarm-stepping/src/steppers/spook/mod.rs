@@ -16,14 +16,15 @@
 //! A step ends where a load or a prescribed velocity jumps; the next one has a length of its own, and with it Σ and Υ.
 //!
 //! Frames: P, Q proximal and distal face of a joint, P = Q when undeformed. [`constraint`] has the rows,
-//! [`solve`] the elimination. Source: [Lacoursière 2007]; theory page, section 4.
+//! [`solve`] the elimination, [`pins`] what closes a loop of links. Source: [Lacoursière 2007]; theory page, section 4.
 
 mod constraint;
+mod pins;
 mod solve;
 
 use flexarm_kinematics::{
     BalancerPlace, Data, ElasticAngles, JointMotion, Model, PlacedBalancer, Pose, State, Twist, Wrench,
-    forward_kinematics_velocity,
+    forward_kinematics_velocity, rotation_vector,
 };
 use flexarm_spatial::products::{mul, turn_symmetric};
 use nalgebra::{DVector, Matrix3, Matrix6, UnitQuaternion, Vector3, Vector6};
@@ -35,6 +36,7 @@ use crate::observation::Observation;
 use crate::stepper::{Counts, LARGEST_DEFLECTION, Stepper};
 use crate::steppers::{Method, StepRule, StepperEntry, StepperKind, StepperSetting};
 use constraint::Rows;
+use pins::Pins;
 use solve::{Sigma, Symmetric, TreeSolver, joined};
 
 pub(super) static ENTRY: StepperEntry = StepperEntry {
@@ -172,6 +174,9 @@ pub struct Spook {
     rows: Vec<Rows>,
     lambda: Vec<Vector6<f64>>,
     solver: TreeSolver,
+    pins: Pins,
+    /// M and zeros: blocks of the bodies before the elimination, of arms with loops.
+    masses: Vec<Symmetric>,
     /// Prescribed motion at the current time and at the end of the step.
     now: Sampled,
     next: Sampled,
@@ -213,6 +218,8 @@ impl Spook {
         let loads = vec![Vector6::zeros(); n];
         let mut spook = Self {
             solver: TreeSolver::new(model.bodies().iter().map(|b| b.parent).collect()),
+            pins: Pins::new(&model),
+            masses: vec![Symmetric::zeros(); n],
             arm,
             h,
             steps: 0,
@@ -266,7 +273,6 @@ fn check_known(arm: &FlexibleArm) -> Result<(), StepError> {
         (!arm.load_friction.is_empty(), "friction that grows with the load"),
         (arm.coupling.as_ref().is_some_and(|coupling| !coupling.is_none()), "gears that move several joints"),
         (arm.model.has_mimic(), "mimic joints"),
-        (!arm.model.loops().is_empty(), "closed loops of links"),
     ];
     match unknown.iter().find(|(there, _)| *there) {
         _ if arm.model.has_modal() => Err(StepError::ModalLinks),
@@ -300,12 +306,24 @@ fn check_ends(model: &Model) -> Result<(), StepError> {
     Ok(())
 }
 
+/// Υ of rows that do not give way: of τ = 2h.
+fn rigid_upsilon(preset: SpookPreset) -> f64 {
+    match preset {
+        SpookPreset::Exact => 1.0 / 9.0,
+        SpookPreset::Source => 1.0 / 8.0,
+    }
+}
+
+/// Does the joint of a body follow from a closed loop?
+fn is_dependent(model: &Model, body: usize) -> bool {
+    model.loops().iter().any(|own| own.dependent.contains(&body))
+}
+
 fn joint_compliance(arm: &FlexibleArm, body: usize, h: f64, preset: SpookPreset) -> JointCompliance {
     let element = arm.elements.iter().position(|e| e.body == body);
-    let tau = element.map_or(2.0 * h, |k| arm.tau[k]);
-    let upsilon = match preset {
-        SpookPreset::Exact => 1.0 / (1.0 + 4.0 * tau / h),
-        SpookPreset::Source => 1.0 / 8.0,
+    let upsilon = match (preset, element) {
+        (SpookPreset::Exact, Some(k)) => 1.0 / (1.0 + 4.0 * arm.tau[k] / h),
+        (preset, _) => rigid_upsilon(preset),
     };
     let factor = 4.0 / (h * h) * upsilon;
     let six = |X: &nalgebra::DMatrix<f64>| Symmetric::new(&Matrix6::from_column_slice(X.as_slice()));
@@ -322,6 +340,7 @@ fn joint_compliance(arm: &FlexibleArm, body: usize, h: f64, preset: SpookPreset)
             }
             Sigma::Mixed(Symmetric::new(&C).scaled(factor))
         }
+        None if is_dependent(&arm.model, body) => Sigma::Free(RIGID_COMPLIANCE * factor),
         None => Sigma::Hard(RIGID_COMPLIANCE * factor),
     };
     JointCompliance { sigma, upsilon }
@@ -409,7 +428,10 @@ impl Spook {
                     out.load[k][0] = -self.arm.elements[k].K[(0, 0)] * (e + rate * self.arm.tau[k]);
                 }
             }
-            JointMotion::Axis(_) => out.drive[body.coordinate] = self.rows[i].S.dot(&force),
+            JointMotion::Axis(_) if body.coordinate < out.drive.len() => {
+                out.drive[body.coordinate] = self.rows[i].S.dot(&force);
+            }
+            JointMotion::Axis(_) => {}
             JointMotion::Interface { .. } | JointMotion::Welded => {}
             JointMotion::Elastic(angles) => {
                 let (g, rate) = self.deflection_now(i, angles);
@@ -472,10 +494,29 @@ impl Spook {
         self.update_body_blocks();
 
         self.update_right_hand_sides();
-        let Self { rows, sigma, solver, velocities, lambda, .. } = self;
-        solver
-            .solve(rows, sigma, velocities, lambda)
-            .map_err(|_| StepError::Singular { matrix: "constraint matrix", t })
+        let Self { rows, sigma, solver, velocities, lambda, pins, masses, .. } = self;
+        let singular = || StepError::Singular { matrix: "constraint matrix", t };
+        if pins.is_empty() {
+            return solver.solve(rows, sigma, velocities, lambda).map_err(|_| singular());
+        }
+        if let Some(k) = pins.update(&self.arm.model, &self.poses, &self.bodies) {
+            return Err(StepError::OpenLoop { t, name: self.arm.model.loops()[k].name.clone() });
+        }
+        masses.copy_from_slice(&solver.M);
+        solver.solve(rows, sigma, velocities, lambda).map_err(|_| singular())?;
+        let h = self.dt;
+        let upsilon = rigid_upsilon(self.settings.preset);
+        let of_pins = [h, upsilon, RIGID_COMPLIANCE * 4.0 / (h * h) * upsilon];
+        let closed = pins.close((velocities, lambda), &self.bodies, of_pins, |momenta, (v, lambda)| {
+            solver.M.copy_from_slice(masses);
+            solver.b.fill(Vector6::zeros());
+            solver.s.fill(Vector6::zeros());
+            for (body, momentum) in momenta {
+                solver.b[body] += momentum;
+            }
+            solver.solve(rows, sigma, v, lambda)
+        });
+        closed.map_err(|_| singular())?.ok_or_else(singular)
     }
 
     /// Right-hand sides of the joints, and compliances in the axes of their rows.
@@ -492,7 +533,7 @@ impl Spook {
             let (parent, child) = (&self.bodies[body.parent], &self.bodies[i]);
             let rate = row.G.of_parent(&parent.V.to_vector()) + row.G.of_child(&child.V.to_vector());
             let mut s = row.g * (-4.0 / h * upsilon) + rate * *upsilon;
-            if matches!(body.motion, JointMotion::Axis(_)) && !body.elastic {
+            if matches!(body.motion, JointMotion::Axis(_)) && !body.elastic && body.coordinate < self.rates.len() {
                 // g_t = -S q̇, now and at the end of the step.
                 s -= row.S * (upsilon * self.rates[body.coordinate] - self.next.qdot[body.coordinate]);
             }
@@ -515,7 +556,16 @@ impl Spook {
                     Rows::new(ConstraintForm::Local, Default::default(), &X_WP, &parent.x, &X_WQ, &child.x)
                 }
                 JointMotion::Axis(motion) => {
-                    let moved = X_WP * motion.pose(self.now.q[body.coordinate]);
+                    let q = match self.now.q.get(body.coordinate) {
+                        Some(q) => *q,
+                        // A dependent joint is where its bodies are.
+                        None => {
+                            let X = X_WP.inverse() * X_WQ;
+                            let turn = rotation_vector(X.rotation.matrix());
+                            motion.coordinate_of(&joined(&X.translation.vector, &turn))
+                        }
+                    };
+                    let moved = X_WP * motion.pose(q);
                     Rows::hard(Some(motion), &moved, &parent.x, &X_WQ, &child.x)
                 }
                 JointMotion::Interface { .. } | JointMotion::Welded => {

@@ -14,7 +14,12 @@
 //! S^-1 = Σ^-1 H^-1 M̃,   S^-1 ŝ = Σ^-1 H^-1 (M̃ s - b̃),   v_c = G_c^-1 (s - Σ λ - G_p v_p)               (4)
 //! ```
 //! which holds for hard joints (Σ next to nothing) and soft ones alike. Where Σ is hard in some directions and soft in others,
-//! `S = Σ + M̃^-1` is inverted itself.
+//! `S = Σ + M̃^-1` is inverted itself. A joint that is free along a line σ of its rows (it follows from a closed loop) has there a
+//! rate ε and no force: with `a = S_0^-1 σ` of the joint that is hard there as well
+//!
+//! ```text
+//! S^-1 = S_0^-1 - a aᵀ / σᵀa,     σᵀλ = 0,     ε = (σᵀ S_0^-1 ŝ - aᵀ G_p v_p) / σᵀa,     v_c = G_c^-1 (s - Σ λ - G_p v_p - σ ε)    (5)
+//! ```
 
 use flexarm_spatial::products::{cross3, mul, mul3, tr_mul, tr_mul3, turn_symmetric};
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
@@ -245,13 +250,15 @@ pub(super) enum Sigma {
     Soft(Symmetric, Symmetric),
     /// Σ alone.
     Mixed(Symmetric),
+    /// This times the identity, but for the line S of the rows, which is free.
+    Free(f64),
 }
 
 impl Sigma {
     #[inline(always)]
     fn times(&self, v: &Vector6<f64>) -> Vector6<f64> {
         match self {
-            Self::Hard(sigma) => v * *sigma,
+            Self::Hard(sigma) | Self::Free(sigma) => v * *sigma,
             Self::Soft(sigma, _) | Self::Mixed(sigma) => sigma.times(v),
         }
     }
@@ -261,7 +268,7 @@ impl Sigma {
     fn hold(&self, M: &Symmetric, b: &Vector6<f64>, s: &Vector6<f64>) -> Option<(Symmetric, Vector6<f64>)> {
         let push = M.times(s) - b;
         Some(match self {
-            Self::Hard(sigma) => {
+            Self::Hard(sigma) | Self::Free(sigma) => {
                 // Σ^-1 H^-1 = (1 + σ M̃)^-1, which commutes with M̃.
                 let mut E = M.scaled(*sigma);
                 E.A += Matrix3::identity();
@@ -288,6 +295,25 @@ impl Sigma {
 struct Held {
     S_inverse: Symmetric,
     y: Vector6<f64>,
+    /// `a / σᵀa` and what of ε does not come from the parent, of a joint with a free line.
+    free: Option<(Vector6<f64>, f64)>,
+}
+
+impl Held {
+    /// With the line σ free: (5).
+    fn freed(self, line: &Vector6<f64>) -> Option<Self> {
+        let Self { S_inverse, y, .. } = self;
+        let a = S_inverse.times(line);
+        let inertia = line.dot(&a);
+        if !(inertia > 0.0 && inertia.is_finite()) {
+            return None;
+        }
+        let (a, own) = (a / inertia, line.dot(&y) / inertia);
+        let (f, t) = halves(&(a * inertia.sqrt()));
+        let outer = Symmetric { A: f * f.transpose(), B: f * t.transpose(), C: t * t.transpose() };
+        let S_inverse = S_inverse.plus(&outer.scaled(-1.0));
+        Some(Self { S_inverse, y: y - a * (own * inertia), free: Some((a, own)) })
+    }
 }
 
 /// Workspaces of the elimination.
@@ -303,7 +329,7 @@ pub(super) struct TreeSolver {
 impl TreeSolver {
     pub(super) fn new(parent: Vec<usize>) -> Self {
         let (n, zero) = (parent.len(), Vector6::zeros());
-        let joints = vec![Held { S_inverse: Symmetric::zeros(), y: zero }; n];
+        let joints = vec![Held { S_inverse: Symmetric::zeros(), y: zero, free: None }; n];
         Self { parent, M: vec![Symmetric::zeros(); n], b: vec![zero; n], s: vec![zero; n], joints }
     }
 
@@ -323,20 +349,29 @@ impl TreeSolver {
         for i in (1..n).rev() {
             let (M, b) = rows[i].G.in_rows(&self.M[i], &self.b[i]);
             let (S_inverse, y) = sigma[i].hold(&M, &b, &self.s[i]).ok_or(i)?;
+            let mut held = Held { S_inverse, y, free: None };
+            if let Sigma::Free(_) = sigma[i] {
+                held = held.freed(&rows[i].S).ok_or(i)?;
+            }
+            let Held { S_inverse, y, .. } = held;
             let p = self.parent[i];
             if p > 0 {
                 let (M, b) = rows[i].G.on_parent(&S_inverse, &y);
                 self.M[p] = self.M[p].plus(&M);
                 self.b[p] += b;
             }
-            self.joints[i] = Held { S_inverse, y };
+            self.joints[i] = held;
         }
         v[0] = Vector6::zeros();
         for i in 1..n {
-            let Held { S_inverse, y } = &self.joints[i];
+            let Held { S_inverse, y, free } = &self.joints[i];
             let moved = rows[i].G.of_parent(&v[self.parent[i]]);
             lambda[i] = y - S_inverse.times(&moved);
-            v[i] = rows[i].G.back(&(self.s[i] - sigma[i].times(&lambda[i]) - moved));
+            let mut u = self.s[i] - sigma[i].times(&lambda[i]) - moved;
+            if let Some((a, own)) = free {
+                u -= rows[i].S * (own - a.dot(&moved));
+            }
+            v[i] = rows[i].G.back(&u);
         }
         Ok(())
     }
@@ -368,18 +403,19 @@ mod tests {
                 let (tv, rw) = (child.tv.try_inverse().unwrap(), child.rw.try_inverse().unwrap());
                 Jacobian::Turned { parent, child, back: Triangle { tv, tw: -(tv * child.tw * rw), rw } }
             };
-            Rows { g: Vector6::zeros(), G, S: Vector6::zeros() }
+            Rows { g: Vector6::zeros(), G, S: self.vector() }
         }
 
-        /// Hard, soft, and soft along one line alone; and Σ as it is.
+        /// Hard, soft, soft along one line alone, and free along the line of the rows; and Σ as it is.
         fn sigma(&mut self, kind: u64) -> (Sigma, Matrix6<f64>) {
             let hard = 1e-8;
-            match kind % 3 {
+            match kind % 4 {
                 0 => (Sigma::Hard(hard), Matrix6::identity() * hard),
                 1 => {
                     let C = self.definite(0.3) * 1e-3;
                     (Sigma::Soft(Symmetric::new(&C), Symmetric::new(&C.try_inverse().unwrap())), C)
                 }
+                2 => (Sigma::Free(hard), Matrix6::identity() * hard),
                 _ => {
                     let line = self.vector();
                     let C = Matrix6::identity() * hard + line * line.transpose();
@@ -395,7 +431,7 @@ mod tests {
     }
 
     /// Truth: the saddle-point matrix (1) of the whole tree, dense, by LU; bodies on levers and on turned rows, joints that are hard,
-    /// soft, and soft in one direction. Measured: 2e-12 of the velocities and 9e-12 of the impulses, at compliances from 1e-8 to 1.
+    /// soft, soft in one direction, and free in one. Measured: 2e-12 of the velocities and 9e-12 of the impulses, at compliances from 1e-8 to 1.
     #[test]
     fn elimination_along_the_tree_solves_the_whole_matrix() {
         proptest!(|(seed in any::<u64>(), count in 1_usize..9)| {
@@ -410,8 +446,8 @@ mod tests {
                 (solver.M[i], solver.b[i], solver.s[i]) = (Symmetric::new(M), draw.vector(), draw.vector());
             }
 
-            // Velocities, then impulses.
-            let (mut A, mut right) = (DMatrix::zeros(12 * count, 12 * count), DVector::zeros(12 * count));
+            // Velocities, then impulses, then the rates ε of free lines.
+            let (mut A, mut right) = (DMatrix::zeros(13 * count, 13 * count), DVector::zeros(13 * count));
             for i in 1..n {
                 let (v, l) = (6 * (i - 1), 6 * (count + i - 1));
                 let (G_p, G_c) = (matrix(|x| rows[i].G.of_parent(x)), matrix(|x| rows[i].G.of_child(x)));
@@ -423,6 +459,14 @@ mod tests {
                     let p = 6 * (parent[i] - 1);
                     A.view_mut((p, l), (6, 6)).copy_from(&-G_p.transpose());
                     A.view_mut((l, p), (6, 6)).copy_from(&G_p);
+                }
+                let e = 12 * count + i - 1;
+                match sigma[i] {
+                    Sigma::Free(_) => {
+                        A.view_mut((l, e), (6, 1)).copy_from(&rows[i].S);
+                        A.view_mut((e, l), (1, 6)).copy_from(&rows[i].S.transpose());
+                    }
+                    _ => A[(e, e)] = 1.0,
                 }
                 right.rows_mut(v, 6).copy_from(&solver.b[i]);
                 right.rows_mut(l, 6).copy_from(&solver.s[i]);
