@@ -318,7 +318,10 @@ impl Moving {
     fn load(&mut self, inertia: &SpatialInertia, X_WB: &Pose) {
         let inertia = inertia.at_parent(X_WB);
         let (V, momentum) = (self.V, inertia.mul_twist(&self.V));
-        for c in 0..3 {
+        self.C = [Matrix3::zeros(); 2];
+        // At rest C is zero.
+        let moving = if V == Twist::zeros() { 0 } else { 3 };
+        for c in 0..moving {
             let psi = Twist::new(Vector3::zeros(), Vector3::ith(c, 1.0));
             let column = inertia.mul_twist(&psi.cross(&V))
                 + psi.cross_force(&momentum)

@@ -10,8 +10,12 @@ use flexarm_kinematics::{
     Wrench,
 };
 use flexarm_stepping::*;
+use flexarm_testkit::allocations::{CountingAllocator, count_allocations};
 use flexarm_testkit::{reference_arm, reference_motion};
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Vector3};
+
+#[global_allocator]
+static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 /// A mass on a vertical spring, with a damper.
 fn oscillator(m: f64, k: f64, d: f64) -> FlexibleArm {
@@ -355,4 +359,16 @@ fn what_is_not_differentiated_is_refused_with_a_way_out() {
     let nowhere = Direction { springs: vec![(7, SpringSlope::Factor(1.0))], ..Direction::default() };
     let error = run_slopes(&arm, &request, &[nowhere]).unwrap_err();
     assert!(error.to_string().contains("spring 7"), "{error}");
+}
+
+#[test]
+fn twice_as_many_steps_allocate_no_more() {
+    let case = Case { tree: reference_arm(true).mechanism, loaded: true, settings: AlphaSettings::default() };
+    let arm = case.arm(What::Tool, 0.0);
+    let directions = ALL.map(|what| case.direction(what));
+    let counts = [0.3, 0.6].map(|duration_s| {
+        let request = SlopesRequest { duration_s, keep_samples: false, ..case.request(&arm, Vector3::zeros()) };
+        count_allocations(|| drop(run_slopes(&arm, &request, &directions).unwrap()))
+    });
+    assert_eq!(counts[0], counts[1]);
 }

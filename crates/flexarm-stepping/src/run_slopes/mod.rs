@@ -133,8 +133,8 @@ impl ErrorSlopes {
 
 /// Error of the tool along a run and its exact derivatives in some directions; without any the run alone, to the end of each iteration.
 ///
-/// Cost: about two ordinary runs, and a few microseconds per step and direction (18 coordinates). No allocation in the steps but for what is
-/// kept of them.
+/// Cost: with 18 coordinates about ten ordinary runs, of which a step is often one evaluation, and a quarter of one for each direction. No
+/// allocation in the steps but for what is kept of them.
 ///
 /// # Errors
 /// [`StepError::NoSlopes`] where the arm has what is not differentiated; [`StepError::Setup`] for a step that is no time or a spring

@@ -54,7 +54,18 @@ impl Arm {
 
     /// What of the robot file can be identified on this arm, by the names that files and `--fit` use.
     pub fn parameters(&self) -> Vec<Parameter> {
-        parameters::candidates(self.robot(), self.flexible()).into_iter().map(|c| c.parameter).collect()
+        self.candidates_that(|name| !parameters::is_direction(name))
+    }
+
+    /// The six directions of each lumped link's springs, `link.LINK.stiffness_factors[k]`: together they are the link's stiffness, which
+    /// [`Arm::parameters`] has as a whole.
+    pub fn link_directions(&self) -> Vec<Parameter> {
+        self.candidates_that(parameters::is_direction)
+    }
+
+    fn candidates_that(&self, wanted: impl Fn(&str) -> bool) -> Vec<Parameter> {
+        let all = parameters::candidates(self.robot(), self.flexible()).into_iter();
+        all.map(|c| c.parameter).filter(|parameter| wanted(&parameter.name)).collect()
     }
 }
 

@@ -70,7 +70,7 @@ pub fn pose_sensitivity(
     let joints: Vec<String> = arm.joints().map(str::to_owned).collect();
     let names: Vec<&str> = joints.iter().map(String::as_str).collect();
     let at = joint_values(at, &names)?;
-    let all: Vec<Parameter> = arm.parameters();
+    let all: Vec<Parameter> = arm.parameters().into_iter().chain(arm.link_directions()).collect();
     let all = chosen(all, parameters, |parameter| &parameter.name)?;
     let still = |parameter: &&Parameter| !matches!(parameter.effect, Effect::Damping(_));
     let all: Vec<Parameter> = all.iter().filter(still).cloned().collect();
