@@ -18,6 +18,8 @@
 //! Frames: P, Q proximal and distal face of a joint, P = Q when undeformed. [`constraint`] has the rows,
 //! [`solve`] the elimination, [`pins`] what closes a loop of links. Source: [Lacoursière 2007]; theory page, section 4.
 
+mod checks;
+mod compliance;
 mod constraint;
 mod pins;
 mod solve;
@@ -35,6 +37,8 @@ use crate::events::{EventQueue, SAME_TIME};
 use crate::observation::Observation;
 use crate::stepper::{Counts, LARGEST_DEFLECTION, Stepper};
 use crate::steppers::{Method, StepRule, StepperEntry, StepperKind, StepperSetting};
+use checks::{check_ends, check_known};
+use compliance::{JointCompliance, joint_compliance, rigid_upsilon};
 use constraint::Rows;
 use pins::Pins;
 use solve::{Sigma, Symmetric, TreeSolver, joined};
@@ -120,13 +124,6 @@ impl BodyState {
         let R = self.R.to_rotation_matrix();
         Pose::from_parts((self.x - R * self.com).into(), R)
     }
-}
-
-/// What a joint's rows are made of.
-#[derive(Clone, Copy, Debug)]
-struct JointCompliance {
-    sigma: Sigma,
-    upsilon: f64,
 }
 
 /// Prescribed motion at one time.
@@ -260,90 +257,6 @@ fn body_state(model: &Model, data: &Data, i: usize) -> BodyState {
         J: if mass > 0.0 { body.inertia.inertia_com() } else { Matrix3::zeros() },
         com,
     }
-}
-
-/// Refuses what has no place in maximal coordinates here.
-fn check_known(arm: &FlexibleArm) -> Result<(), StepError> {
-    let unknown = [
-        (!arm.torque_driven.is_empty(), "joints driven by torque"),
-        (!arm.inertia_changes.is_empty(), "payloads that change"),
-        (!arm.hysteresis.is_empty(), "gears with hysteresis"),
-        (arm.elements.iter().any(|e| e.curve.is_some()), "springs with play or curves"),
-        (!arm.transmission.is_empty(), "transmission errors"),
-        (!arm.load_friction.is_empty(), "friction that grows with the load"),
-        (arm.coupling.as_ref().is_some_and(|coupling| !coupling.is_none()), "gears that move several joints"),
-        (arm.model.has_mimic(), "mimic joints"),
-    ];
-    match unknown.iter().find(|(there, _)| *there) {
-        _ if arm.model.has_modal() => Err(StepError::ModalLinks),
-        None => Ok(()),
-        Some((_, what)) => Err(StepError::Setup(format!(
-            "spook works in maximal coordinates and does not know {what}: use generalized-alpha"
-        ))),
-    }
-}
-
-/// Least moment of inertia over the largest with which a body can be turned about all its axes.
-const LEAST_MOMENT: f64 = 1e-9;
-
-/// A body at an end of the arm has six degrees of freedom and nothing behind it: its own mass and moments must hold them.
-/// Elsewhere the bodies that it carries do.
-fn check_ends(model: &Model) -> Result<(), StepError> {
-    let carries = |i: usize| model.bodies().iter().any(|body| body.parent == i);
-    for (_, body) in model.bodies().iter().enumerate().skip(1).filter(|(i, _)| !carries(*i)) {
-        let mass = body.inertia.mass;
-        let moments = if mass > 0.0 { body.inertia.inertia_com().symmetric_eigenvalues() } else { Vector3::zeros() };
-        let (least, most) = (moments.min(), moments.max());
-        if mass <= 0.0 || least <= LEAST_MOMENT * most {
-            return Err(StepError::Setup(format!(
-                "spook works in maximal coordinates and needs a mass and three moments of inertia of link {:?}, at the end of \
-                 the arm: it has {mass} kg and principal moments of {least:.3e} to {most:.3e} kg m²; give it (or its payload) \
-                 an inertia, or use generalized-alpha",
-                body.name
-            )));
-        }
-    }
-    Ok(())
-}
-
-/// Υ of rows that do not give way: of τ = 2h.
-fn rigid_upsilon(preset: SpookPreset) -> f64 {
-    match preset {
-        SpookPreset::Exact => 1.0 / 9.0,
-        SpookPreset::Source => 1.0 / 8.0,
-    }
-}
-
-/// Does the joint of a body follow from a closed loop?
-fn is_dependent(model: &Model, body: usize) -> bool {
-    model.loops().iter().any(|own| own.dependent.contains(&body))
-}
-
-fn joint_compliance(arm: &FlexibleArm, body: usize, h: f64, preset: SpookPreset) -> JointCompliance {
-    let element = arm.elements.iter().position(|e| e.body == body);
-    let upsilon = match (preset, element) {
-        (SpookPreset::Exact, Some(k)) => 1.0 / (1.0 + 4.0 * arm.tau[k] / h),
-        (preset, _) => rigid_upsilon(preset),
-    };
-    let factor = 4.0 / (h * h) * upsilon;
-    let six = |X: &nalgebra::DMatrix<f64>| Symmetric::new(&Matrix6::from_column_slice(X.as_slice()));
-    let sigma = match element.map(|k| &arm.elements[k]) {
-        Some(element) if element.size == 6 => {
-            Sigma::Soft(six(&element.C).scaled(factor), six(&element.K).scaled(1.0 / factor))
-        }
-        // One compliant row among rigid ones.
-        Some(element) => {
-            let mut C = Matrix6::identity() * RIGID_COMPLIANCE;
-            if let Some(motion) = arm.single_axis(body) {
-                let S = motion.column();
-                C += S * S.transpose() * element.C[(0, 0)];
-            }
-            Sigma::Mixed(Symmetric::new(&C).scaled(factor))
-        }
-        None if is_dependent(&arm.model, body) => Sigma::Free(RIGID_COMPLIANCE * factor),
-        None => Sigma::Hard(RIGID_COMPLIANCE * factor),
-    };
-    JointCompliance { sigma, upsilon }
 }
 
 impl Stepper for Spook {

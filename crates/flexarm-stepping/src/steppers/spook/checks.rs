@@ -1,0 +1,51 @@
+//! What maximal coordinates cannot take: refused before a run.
+
+use flexarm_kinematics::Model;
+use nalgebra::Vector3;
+
+use crate::arm::FlexibleArm;
+use crate::error::StepError;
+
+/// Refuses what has no place in maximal coordinates here.
+pub(super) fn check_known(arm: &FlexibleArm) -> Result<(), StepError> {
+    let unknown = [
+        (!arm.torque_driven.is_empty(), "joints driven by torque"),
+        (!arm.inertia_changes.is_empty(), "payloads that change"),
+        (!arm.hysteresis.is_empty(), "gears with hysteresis"),
+        (arm.elements.iter().any(|e| e.curve.is_some()), "springs with play or curves"),
+        (!arm.transmission.is_empty(), "transmission errors"),
+        (!arm.load_friction.is_empty(), "friction that grows with the load"),
+        (arm.coupling.as_ref().is_some_and(|coupling| !coupling.is_none()), "gears that move several joints"),
+        (arm.model.has_mimic(), "mimic joints"),
+    ];
+    match unknown.iter().find(|(there, _)| *there) {
+        _ if arm.model.has_modal() => Err(StepError::ModalLinks),
+        None => Ok(()),
+        Some((_, what)) => Err(StepError::Setup(format!(
+            "spook works in maximal coordinates and does not know {what}: use generalized-alpha"
+        ))),
+    }
+}
+
+/// Least moment of inertia over the largest with which a body can be turned about all its axes.
+const LEAST_MOMENT: f64 = 1e-9;
+
+/// A body at an end of the arm has six degrees of freedom and nothing behind it: its own mass and moments must hold them.
+/// Elsewhere the bodies that it carries do.
+pub(super) fn check_ends(model: &Model) -> Result<(), StepError> {
+    let carries = |i: usize| model.bodies().iter().any(|body| body.parent == i);
+    for (_, body) in model.bodies().iter().enumerate().skip(1).filter(|(i, _)| !carries(*i)) {
+        let mass = body.inertia.mass;
+        let moments = if mass > 0.0 { body.inertia.inertia_com().symmetric_eigenvalues() } else { Vector3::zeros() };
+        let (least, most) = (moments.min(), moments.max());
+        if mass <= 0.0 || least <= LEAST_MOMENT * most {
+            return Err(StepError::Setup(format!(
+                "spook works in maximal coordinates and needs a mass and three moments of inertia of link {:?}, at the end of \
+                 the arm: it has {mass} kg and principal moments of {least:.3e} to {most:.3e} kg m²; give it (or its payload) \
+                 an inertia, or use generalized-alpha",
+                body.name
+            )));
+        }
+    }
+    Ok(())
+}
