@@ -47,7 +47,7 @@ ALLOWED = {  # file: what it may have (a pattern of the hit), and why
     "crates/flexarm-fe-io/src/mesh/read.rs": (r"-o", "tells how to call another program, Gmsh"),
     "crates/flexarm-urdf/src/resolve.rs": (r"std::env", "search_paths_from_environment, which the caller may use or not"),
     "crates/flexarm-urdf/src/xacro/substitution.rs": (r"std::env|env::var|env::current", "xacro's own $(env NAME), $(optenv NAME) and $(cwd)"),
-    "crates/flexarm/src/report/html.rs": (r"--c", "a custom property of a style sheet"),
+    "crates/flexarm/src/report/html/figures.rs": (r"--c", "a custom property of a style sheet"),
     "crates/flexarm-verify/src/files.rs": (r"--force|--check|-o", "the page tells how it is written, and is compared letter by letter"),
     "crates/flexarm-verify/src/one_beam/page.rs": (r"--[a-z-]+|-o", "the page tells how a figure is had by hand"),
     "crates/flexarm-verify/src/three_beams/page.rs": (r"--[a-z-]+|-o", "the page tells how a figure is had by hand"),

@@ -174,6 +174,35 @@ fn a_factor_of_one_direction_in_the_robot_file_does_what_its_derivative_says() {
     std::fs::remove_dir_all(&folder).unwrap();
 }
 
+/// Truth: the same robot with its tool elsewhere. The compliance is a polynomial of second degree in the place of the tool, so that
+/// differences of second order are exact but for rounding.
+#[test]
+fn the_place_of_the_tool_moves_it_and_changes_its_compliance_as_another_tool_does() {
+    let at = [0.3, -1.2, 1.5, 0.2, 0.4, -0.5];
+    let by = ["tcp.*".to_owned()];
+    let with_tool = |axis: usize, h: f64| {
+        let mut robot = Robot::load(place("robots/kr210")).unwrap();
+        let moved = robot.tcp.1.rotation * nalgebra::Vector3::ith(axis, h);
+        robot.tcp.1.translation.vector += moved;
+        pose_sensitivity(&robot, Modelling::default(), Some(&at), &by).unwrap()
+    };
+    let found = with_tool(0, 0.0);
+    assert_eq!(found.parameters.iter().map(|own| own.name.as_str()).collect::<Vec<_>>(), ["tcp.x", "tcp.y", "tcp.z"]);
+    for (axis, own) in found.parameters.iter().enumerate() {
+        let (more, less) = (with_tool(axis, 0.05), with_tool(axis, -0.05));
+        let (mut error, mut size) = (0.0f64, 0.0f64);
+        for (i, j) in (0..6).flat_map(|i| (0..6).map(move |j| (i, j))) {
+            let difference = 1e-3 * (more.compliance[i][j] - less.compliance[i][j]) / 0.1;
+            error = error.max((difference - own.compliance[i][j]).abs());
+            size = size.max(difference.abs());
+        }
+        eprintln!("{}: {:.1e} of the compliance's change", own.name, error / size);
+        assert!(error < 1e-9 * size, "{error} {size}");
+        assert!((nalgebra::Vector3::from(own.tcp_m).norm() - 1e-3).abs() < 1e-15);
+        assert!(own.frequencies_hz.iter().all(|x| *x == 0.0));
+    }
+}
+
 #[test]
 fn what_has_no_derivatives_and_names_that_are_none_are_refused() {
     let (robot, _, motion) = shipped("manutec_r3", "manutec_r3");

@@ -212,6 +212,7 @@ mod tests {
         let path = ToolPath {
             moves: vec![a_move(3, [0.0, 1.0]), a_move(4, [1.0, 2.0])],
             file: String::new(),
+            jerks: Vec::new(),
             warnings: Vec::new(),
             notes: Vec::new(),
         };

@@ -222,10 +222,10 @@ pub fn sensitivity(
 }
 
 /// Those of these names, all without any.
-fn chosen<T>(mut all: Vec<T>, patterns: &[String], name: impl Fn(&T) -> &String) -> Result<Vec<T>, Error> {
+fn chosen<T>(mut all: Vec<T>, patterns: &[String], name: impl Fn(&T) -> &str) -> Result<Vec<T>, Error> {
     for pattern in patterns {
         if !all.iter().any(|own| fits(pattern, name(own))) {
-            let names = all.iter().map(|own| name(own).clone()).collect();
+            let names = all.iter().map(|own| name(own).to_owned()).collect();
             return Err(ValueError::NoParameter { pattern: pattern.clone(), names }.into());
         }
     }
