@@ -84,7 +84,9 @@ pub(super) fn of(
         );
         caveats.push(Caveat::said("play", "compensation", text, "come to every point from the same side").as_note());
     }
-    if answer.after.peak_m > 0.5 * answer.before.peak_m {
+    // Shaping alone, with the peak of the start and no other, is not meant to.
+    let corrected = answer.model_peaks_m.len() != 1;
+    if corrected && answer.after.peak_m > 0.5 * answer.before.peak_m {
         let text = format!(
             "less than half of the error is taken away on the plant ({:.3} of {:.3} mm left)",
             1e3 * answer.after.peak_m,
