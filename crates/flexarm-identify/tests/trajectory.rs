@@ -32,7 +32,7 @@ fn plant() -> Plant {
     let spring = |name: &str, k: usize, damping| Spring::from((name.to_owned(), reference.K_S[k] / 10.0, damping));
     let springs = vec![spring("lower", 0, Damping::Modal(0.03)), spring("upper", 1, Damping::Rayleigh(0.4, 3e-4))];
     let tool = model.frame("tcp").unwrap().clone();
-    Plant { model, springs, tool }
+    Plant { model, springs, tool, coupling: None }
 }
 
 fn parameters(plant: &Plant) -> Vec<RunParameter> {
