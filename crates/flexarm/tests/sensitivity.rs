@@ -131,26 +131,47 @@ fn the_six_directions_of_a_link_are_together_its_factor() {
     }
 }
 
+/// The robot file of kr210 in a folder of its own, to be changed.
+struct Changed {
+    folder: std::path::PathBuf,
+    text: String,
+}
+
+impl Changed {
+    fn new(name: &str) -> Self {
+        let folder = std::env::temp_dir().join(format!("flexarm-sensitivity-{name}-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let home = place("robots/kr210").canonicalize().unwrap();
+        let text = std::fs::read_to_string(home.join("robot.toml")).unwrap();
+        let absolute = |text: String, key: &str, path: &str| {
+            text.replace(&format!("{key} = \"{path}"), &format!("{key} = \"{}/{path}", home.display()))
+        };
+        let text = absolute(text, "urdf", "kr210.urdf");
+        let text = absolute(text, "reduced", "fe/");
+        Self { folder, text: absolute(text, "default_trajectory", "../../") }
+    }
+
+    fn with(&self, old: &str, new: &str) -> Result<Robot, flexarm::Error> {
+        assert!(self.text.contains(old), "{old}");
+        let file = self.folder.join("robot.toml");
+        std::fs::write(&file, self.text.replace(old, new)).unwrap();
+        Robot::load(&file)
+    }
+}
+
+impl Drop for Changed {
+    fn drop(&mut self) {
+        let _gone = std::fs::remove_dir_all(&self.folder);
+    }
+}
+
 /// Truth: the same robot with a factor in its file, against the derivative; five digits are those of the difference.
 #[test]
 fn a_factor_of_one_direction_in_the_robot_file_does_what_its_derivative_says() {
-    let folder = std::env::temp_dir().join(format!("flexarm-sensitivity-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).unwrap();
-    let home = place("robots/kr210").canonicalize().unwrap();
-    let text = std::fs::read_to_string(home.join("robot.toml")).unwrap();
-    let absolute = |text: String, key: &str, path: &str| {
-        text.replace(&format!("{key} = \"{path}"), &format!("{key} = \"{}/{path}", home.display()))
-    };
-    let text = absolute(text, "urdf", "kr210.urdf");
-    let text = absolute(text, "reduced", "fe/");
-    let text = absolute(text, "default_trajectory", "../../");
-    let (key, at) = ("link = \"link_2\"\n", [0.0, -1.2, 1.5, 0.0, 0.4, 0.0]);
-    assert!(text.contains(key));
-    let robot_with = |factors: &str| {
-        let file = folder.join("robot.toml");
-        std::fs::write(&file, text.replace(key, &format!("{key}stiffness_factors = {factors}\n"))).unwrap();
-        Robot::load(&file)
-    };
+    let kr210 = Changed::new("factors");
+    let at = [0.0, -1.2, 1.5, 0.0, 0.4, 0.0];
+    let key = "link = \"link_2\"\n";
+    let robot_with = |factors: &str| kr210.with(key, &format!("{key}stiffness_factors = {factors}\n"));
     let sag = |factor: f64| {
         let robot = robot_with(&format!("[1, 1, 1, 1, {factor:?}, 1]")).unwrap();
         flexarm::statics(&robot, &Modelling::default(), Some(&at), [0.0; 6]).unwrap().sag_m[2]
@@ -171,7 +192,6 @@ fn a_factor_of_one_direction_in_the_robot_file_does_what_its_derivative_says() {
     let robot = robot_with("[1, 1, 1, 1, 1.25, 1]").unwrap();
     let error = robot.flexible(modal).map(|_| ()).unwrap_err().to_string();
     assert!(error.contains("lumped link"), "{error}");
-    std::fs::remove_dir_all(&folder).unwrap();
 }
 
 /// Truth: the same robot with its tool elsewhere. The compliance is a polynomial of second degree in the place of the tool, so that
@@ -180,10 +200,11 @@ fn a_factor_of_one_direction_in_the_robot_file_does_what_its_derivative_says() {
 fn the_place_of_the_tool_moves_it_and_changes_its_compliance_as_another_tool_does() {
     let at = [0.3, -1.2, 1.5, 0.2, 0.4, -0.5];
     let by = ["tcp.*".to_owned()];
+    let kr210 = Changed::new("tool");
     let with_tool = |axis: usize, h: f64| {
-        let mut robot = Robot::load(place("robots/kr210")).unwrap();
-        let moved = robot.tcp.1.rotation * nalgebra::Vector3::ith(axis, h);
-        robot.tcp.1.translation.vector += moved;
+        let mut xyz = [0.0, 0.0, 0.35];
+        xyz[axis] += h;
+        let robot = kr210.with("xyz = [0.0, 0.0, 0.35]", &format!("xyz = {xyz:?}")).unwrap();
         pose_sensitivity(&robot, Modelling::default(), Some(&at), &by).unwrap()
     };
     let found = with_tool(0, 0.0);
