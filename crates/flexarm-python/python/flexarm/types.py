@@ -1012,13 +1012,13 @@ class PoseParameter(TypedDict):
     """What a change of one number does."""
 
     name: str
-    """By the names of the robot file."""
+    """By the names of the robot file; `tcp.x`, `.y` and `.z` for the place of the tool in its own axes."""
     unit: str
     """Its unit."""
     value: float
     """Its value."""
     per: str
-    """Of which change of it the following are the effect: `1 %` or `1 kg`. They are derivatives, times that."""
+    """Of which change of it the following are the effect: `1 %`, `1 kg` or `1 mm`. They are derivatives, times that."""
     tcp_m: list[float]
     """Of the tool's place (m)."""
     tcp_rad: list[float]

@@ -226,8 +226,11 @@ fn check(arm: &FlexibleArm, request: &SlopesRequest, directions: &[Direction]) -
     if arm.elements.iter().any(|element| element.geometric.is_some()) {
         return refuse("links that stiffen under load", "leave geometric stiffening out");
     }
+    if !arm.model.loops().is_empty() {
+        return refuse("closed loops", "take differences of runs");
+    }
     if DynamicTangent::new(&arm.model).is_none() {
-        return refuse("closed loops and links that bend in modes", "model the links as lumped");
+        return refuse("links that bend in modes", "model them as lumped");
     }
     for direction in directions {
         for (spring, slope) in &direction.springs {
