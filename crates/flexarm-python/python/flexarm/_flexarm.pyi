@@ -139,7 +139,7 @@ def compensate(
     cutoff_hz: float | None = None,
     shaper: Literal["zv", "zvd", "optimal"] | None = None,
     delay: float | None = None,
-    band: float = 0.1,
+    band: float = ...,
     plant: Robot | None = None,
     sweep: bool = True,
     step: float = 1e-3,
