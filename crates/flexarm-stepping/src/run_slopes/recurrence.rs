@@ -403,7 +403,7 @@ impl Tangent {
         let nv = model.nv();
         let dynamic = DynamicTangent::new(model);
         let Some(dynamic) = dynamic else {
-            return Err(StepError::NoSlopes { what: "closed loops and links that bend in modes", mend: "" });
+            return Err(StepError::NoSlopes { what: "links that bend in modes", mend: "model them as lumped" });
         };
         let square = || DMatrix::zeros(nv, nv);
         Ok(Self {
