@@ -240,8 +240,14 @@ fn place_axis<T: Real>(body: &Body, motion: AxisMotion, data: &mut Data<T>, i: u
 /// `Σ ½ a q̇² + Σ a_12 q̇_1 q̇_2` of the rotors.
 #[inline(always)]
 pub(crate) fn rotor_energy<T: Real>(model: &Model, qdot: &[T]) -> T {
-    let own = model.rotors.iter().fold(T::zero(), |sum, &(k, a)| sum + T::splat(0.5 * a) * qdot[k] * qdot[k]);
-    model.rotor_couplings.iter().fold(own, |sum, &(j, k, a)| sum + T::splat(a) * qdot[j] * qdot[k])
+    let mut energy = T::zero();
+    for &(k, a) in &model.rotors {
+        energy += T::splat(0.5 * a) * qdot[k] * qdot[k];
+    }
+    for &(j, k, a) in &model.rotor_couplings {
+        energy += T::splat(a) * qdot[j] * qdot[k];
+    }
+    energy
 }
 
 /// What an algorithm begins with at new coordinates: mass integrals of all modal bodies and, in one go, sines and cosines of

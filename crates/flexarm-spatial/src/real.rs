@@ -81,11 +81,11 @@ pub trait Real:
         if !self.any_below(bound) {
             return no();
         }
-        let (yes, no) = (yes(), no());
-        std::array::from_fn(
-            #[inline(always)]
-            |k| self.pick_below(Self::splat(bound), yes[k], no[k]),
-        )
+        let (mut all, no) = (yes(), no());
+        for (yes, no) in all.iter_mut().zip(no) {
+            *yes = self.pick_below(Self::splat(bound), *yes, no);
+        }
+        all
     }
 
     /// Absolute value.
@@ -109,10 +109,12 @@ pub trait Real:
 pub fn sin_cos_all<T: Real>(angles: &[T], sines: &mut [T], cosines: &mut [T]) {
     assert!(sines.len() == angles.len() && cosines.len() == angles.len(), "a sine and a cosine for each angle");
     // Without a branch in between, numbers too go side by side.
-    if angles.iter().all(
-        #[inline(always)]
-        |angle| angle.abs().all_below(LARGEST_ANGLE),
-    ) {
+    // Loops and no closures here and below: over lanes all of it must be inlined.
+    let mut in_range = true;
+    for angle in angles {
+        in_range &= angle.abs().all_below(LARGEST_ANGLE);
+    }
+    if in_range {
         for ((angle, sine), cosine) in angles.iter().zip(sines).zip(cosines) {
             (*sine, *cosine) = sine_and_cosine(*angle);
         }
@@ -142,7 +144,7 @@ fn sin_cos_by_lane<T: Real>(x: T) -> (T, T) {
 fn sine_and_cosine<T: Real>(x: T) -> (T, T) {
     // π/2 in three parts: products of k with the first two are exact.
     const PARTS: [f64; 3] = [1.570_796_326_734_125_6, 6.077_100_506_303_966e-11, 2.022_266_248_795_950_6e-21];
-    let [first, second, third] = PARTS.map(T::splat);
+    let [first, second, third] = splat_all(PARTS);
     let k = rounded(x * T::splat(FRAC_2_PI));
     let a = x - k * first;
     let b = k * second;
@@ -157,6 +159,16 @@ fn sine_and_cosine<T: Real>(x: T) -> (T, T) {
     let odd = (quarter.abs() - one).abs();
     let (s, c) = (odd.pick_below(half, cosine, sine), odd.pick_below(half, sine, cosine));
     ((quarter - half).abs().pick_below(one, s, -s), (quarter + half).abs().pick_below(one, c, -c))
+}
+
+/// Each number in all lanes. Arrays' `map` is not inlined over lanes.
+#[inline(always)]
+fn splat_all<T: Real, const N: usize>(numbers: [f64; N]) -> [T; N] {
+    let mut all = [T::zero(); N];
+    for (lanes, number) in all.iter_mut().zip(numbers) {
+        *lanes = T::splat(number);
+    }
+    all
 }
 
 /// The nearest whole number, for `|x| < 2^51`.
@@ -177,7 +189,7 @@ fn sine_near_zero<T: Real>(x: T, tail: T) -> T {
         -2.505_076_025_340_686_3e-8,
         1.589_690_995_211_55e-10,
     ];
-    let [s1, s2, s3, s4, s5, s6] = S.map(T::splat);
+    let [s1, s2, s3, s4, s5, s6] = splat_all(S);
     let z = x * x;
     let r = s2 + z * (s3 + z * s4) + z * (z * z) * (s5 + z * s6);
     let v = z * x;
@@ -195,7 +207,7 @@ fn cosine_near_zero<T: Real>(x: T, tail: T) -> T {
         2.087_572_321_298_175e-9,
         -1.135_964_755_778_819_5e-11,
     ];
-    let [c1, c2, c3, c4, c5, c6] = C.map(T::splat);
+    let [c1, c2, c3, c4, c5, c6] = splat_all(C);
     let z = x * x;
     let r = z * (c1 + z * (c2 + z * c3)) + (z * z) * (z * z) * (c4 + z * (c5 + z * c6));
     let half = z * T::splat(0.5);

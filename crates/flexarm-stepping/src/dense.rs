@@ -61,11 +61,13 @@ fn add_columns<T: Real>(A: &[T], factors: impl Iterator<Item = T> + Clone, y: &m
 fn add_to_rows<T: Real, const N: usize>(A: &[T], factors: impl Iterator<Item = T>, first: usize, y: &mut [T]) {
     let n = y.len();
     let rows = &mut y[first..first + N];
-    let mut sums: [T; N] = std::array::from_fn(
-        #[inline(always)]
-        |k| rows[k],
-    );
-    for (column, factor) in A.chunks_exact(n).zip(factors) {
+    let mut sums = [T::zero(); N];
+    sums.copy_from_slice(rows);
+    // Not by `chunks_exact(n).zip(...)`, which divides by n first.
+    let mut rest = A;
+    for factor in factors {
+        let Some((column, next)) = rest.split_at_checked(n) else { break };
+        rest = next;
         for (sum, a) in sums.iter_mut().zip(&column[first..first + N]) {
             *sum = *a * factor + *sum;
         }

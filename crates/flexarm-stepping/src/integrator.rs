@@ -192,22 +192,22 @@ pub trait Integrator: Send {
 
 /// A stepper of reduced coordinates; its steps end at events too.
 pub(crate) struct ReducedStepper<I> {
-    system: ReducedArm,
-    integrator: I,
+    pub(crate) system: ReducedArm,
+    pub(crate) integrator: I,
 }
 
-impl<I: Integrator + 'static> ReducedStepper<I> {
+impl<I: Integrator> ReducedStepper<I> {
     /// An arm at `t = 0` with elastic coordinates `e`, and the integrator that is made for it from positions and velocities.
     pub(crate) fn start(
         arm: FlexibleArm,
         e: &DVector<f64>,
         make: impl FnOnce(&mut ReducedArm, DVector<f64>, DVector<f64>) -> Result<I, StepError>,
-    ) -> Result<Box<dyn Stepper>, StepError> {
+    ) -> Result<Self, StepError> {
         let mut system = ReducedArm::new(arm);
         let (x, v) = system.start(e)?;
         system.check_loops(&x, &v)?;
         let integrator = make(&mut system, x, v)?;
-        Ok(Box::new(Self { system, integrator }))
+        Ok(Self { system, integrator })
     }
 }
 

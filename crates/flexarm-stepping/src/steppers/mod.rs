@@ -6,6 +6,7 @@
 //! summaries and the tests that go over all steppers read [`STEPPERS`]; settings that users choose are fields of
 //! [`StepperOptions`] besides.
 
+mod extrapolated;
 mod generalized_alpha;
 mod reference;
 mod rk4;
@@ -19,6 +20,7 @@ use crate::error::StepError;
 use crate::statics::static_equilibrium;
 use crate::stepper::{Start, Stepper};
 
+pub use extrapolated::ExtrapolatedAlpha;
 pub use generalized_alpha::{AlphaSettings, GeneralizedAlpha};
 pub(crate) use generalized_alpha::{Coefficients, leave_of};
 pub use reference::{Reference, ReferenceMethod, ReferenceSettings};
@@ -39,11 +41,13 @@ pub enum StepperKind {
     Reference(ReferenceSettings),
     /// Implicit, third order, L-stable, reduced coordinates.
     Sdirk3,
+    /// Generalised-alpha with the step and its half, extrapolated.
+    ExtrapolatedAlpha(ExtrapolatedAlpha),
 }
 
 /// All steppers, the default first.
-pub static STEPPERS: [&StepperEntry; 5] =
-    [&generalized_alpha::ENTRY, &spook::ENTRY, &rk4::ENTRY, &reference::ENTRY, &sdirk3::ENTRY];
+pub static STEPPERS: [&StepperEntry; 6] =
+    [&generalized_alpha::ENTRY, &spook::ENTRY, &rk4::ENTRY, &reference::ENTRY, &sdirk3::ENTRY, &extrapolated::ENTRY];
 
 impl StepperKind {
     fn method(&self) -> &dyn Method {
@@ -53,6 +57,7 @@ impl StepperKind {
             Self::Rk4 => &rk4::Rk4Settings,
             Self::Reference(settings) => settings,
             Self::Sdirk3 => &sdirk3::Sdirk3Settings,
+            Self::ExtrapolatedAlpha(settings) => settings,
         }
     }
 

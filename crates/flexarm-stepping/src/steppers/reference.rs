@@ -141,7 +141,7 @@ impl Method for ReferenceSettings {
                         sdirk3 or rk4 with a small step";
             return Err(StepError::Setup(text.into()));
         }
-        ReducedStepper::start(arm, e, |system, x, v| {
+        let stepper = ReducedStepper::start(arm, e, |system, x, v| {
             let mut integrator = Reference::new(system, 0.0, h, *self, x, v)?;
             // Else a solver that takes long steps may not see a short load at all.
             for t in system.arm.load_jumps().filter(|t| *t > 0.0) {
@@ -151,7 +151,8 @@ impl Method for ReferenceSettings {
             let period = system.arm.loads.iter().map(|load| load.wrench.period).fold(f64::INFINITY, f64::min);
             integrator.limit_steps(0.137 * period);
             Ok(integrator)
-        })
+        })?;
+        Ok(Box::new(stepper))
     }
 }
 

@@ -44,7 +44,7 @@ impl Method for Rk4Settings {
                 check_explicit_step(&changed, h)?;
             }
         }
-        ReducedStepper::start(arm, e, |system, x, v| Rk4::new(system, 0.0, h, x, v))
+        Ok(Box::new(ReducedStepper::start(arm, e, |system, x, v| Rk4::new(system, 0.0, h, x, v))?))
     }
 }
 

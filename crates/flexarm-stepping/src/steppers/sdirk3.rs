@@ -58,7 +58,7 @@ impl Method for Sdirk3Settings {
     }
 
     fn start(&self, arm: FlexibleArm, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
-        ReducedStepper::start(arm, e, |system, x, v| Sdirk3::new(system, 0.0, h, x, v))
+        Ok(Box::new(ReducedStepper::start(arm, e, |system, x, v| Sdirk3::new(system, 0.0, h, x, v))?))
     }
 }
 

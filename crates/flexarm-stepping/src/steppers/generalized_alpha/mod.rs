@@ -72,13 +72,6 @@ impl Default for AlphaSettings {
     }
 }
 
-impl AlphaSettings {
-    /// What the steps of a damped arm may leave.
-    fn may_leave(&self) -> f64 {
-        (OF_DAMPING * (1.0 - self.rho)).min(QUICK)
-    }
-}
-
 impl Method for AlphaSettings {
     fn entry(&self) -> &'static StepperEntry {
         &ENTRY
@@ -90,13 +83,30 @@ impl Method for AlphaSettings {
     }
 
     fn start(&self, arm: FlexibleArm, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
+        Ok(Box::new(self.stepper(arm, h, e)?))
+    }
+}
+
+impl AlphaSettings {
+    /// What the steps of a damped arm may leave.
+    fn may_leave(&self) -> f64 {
+        (OF_DAMPING * (1.0 - self.rho)).min(QUICK)
+    }
+
+    /// The stepper of an arm, with what its searches may leave.
+    pub(crate) fn stepper(
+        self,
+        arm: FlexibleArm,
+        h: f64,
+        e: &DVector<f64>,
+    ) -> Result<ReducedStepper<GeneralizedAlpha>, StepError> {
         let rho = self.rho;
+        let left = leave_of(self, &arm, h);
         if !(0.0..=1.0).contains(&rho) {
             return Err(StepError::Setup(format!("the spectral radius must lie between 0 and 1, found {rho}")));
         }
-        let left = leave_of(*self, &arm, h);
         ReducedStepper::start(arm, e, |system, x, v| {
-            let integrator = GeneralizedAlpha::new(system, 0.0, h, *self, x, v)?;
+            let integrator = GeneralizedAlpha::new(system, 0.0, h, self, x, v)?;
             Ok(match left {
                 Some(left) => integrator.leaving(left),
                 None => integrator,

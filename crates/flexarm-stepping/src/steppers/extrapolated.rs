@@ -1,0 +1,121 @@
+//! Generalised-alpha twice, with h and with h/2, and what both say together: Richardson's extrapolation.
+//!
+//! ```text
+//! y = y_{h/2} + (y_{h/2} - y_h) / 3                 y: positions, velocities, accelerations          (1)
+//! ```
+//! The error of generalised-alpha begins with `h²`, and (1) has none of that left: third order, and with ρ near 1, where the scheme is
+//! nearly its own mirror image in time, close to the fourth. It costs three steps of h instead of one. The two runs go side by side and
+//! know nothing of each other (*passive* extrapolation), so that what is stable, and how modes are damped that are too fast for
+//! the step, is as in each of them. What a jump of loads or velocities does, both meet at its time.
+//!
+//! Where the error has no series in h (steps longer than a third of the period of a mode that rings, friction that sticks, hysteresis)
+//! nothing is gained, but nothing lost: the result is off by at most the error of the finer run and a third of the difference.
+//!
+//! Source: [Hairer & Wanner 1996], section IV.9; passive: [Hairer, Nørsett & Wanner 1993], section II.9.
+
+use nalgebra::DVector;
+
+use crate::arm::FlexibleArm;
+use crate::error::StepError;
+use crate::integrator::ReducedStepper;
+use crate::observation::{Observation, observe_reduced};
+use crate::stepper::{Counts, Stepper};
+use crate::steppers::generalized_alpha::{AlphaSettings, GeneralizedAlpha};
+use crate::steppers::{Method, StepRule, StepperEntry, StepperKind, StepperSetting};
+
+pub(super) static ENTRY: StepperEntry = StepperEntry {
+    name: "extrapolated-alpha",
+    aliases: &["extrapolated"],
+    help: "Generalised-alpha with the step and its half, extrapolated: third order and more, for errors below 0.1 %",
+    steps: StepRule::AnyLength,
+    order: 3,
+    maximal: false,
+    allocates: false,
+    with: |options| StepperKind::ExtrapolatedAlpha(ExtrapolatedAlpha(options.alpha)),
+};
+
+/// Generalised-alpha, extrapolated, with the settings of both runs.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct ExtrapolatedAlpha(pub AlphaSettings);
+
+impl Method for ExtrapolatedAlpha {
+    fn entry(&self) -> &'static StepperEntry {
+        &ENTRY
+    }
+
+    fn settings(&self) -> Vec<(&'static str, StepperSetting)> {
+        self.0.settings()
+    }
+
+    fn start(&self, arm: FlexibleArm, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
+        let coarse = self.0.stepper(arm.clone(), h, e)?;
+        let fine = self.0.stepper(arm, 0.5 * h, e)?;
+        // Both begin in the same state.
+        let now = fine.integrator.now.clone();
+        Ok(Box::new(Extrapolated { x: now.x, v: now.v, a: now.acceleration, t: 0.0, coarse, fine }))
+    }
+}
+
+/// The two runs, and what both say.
+struct Extrapolated {
+    coarse: ReducedStepper<GeneralizedAlpha>,
+    fine: ReducedStepper<GeneralizedAlpha>,
+    /// (1), after the last whole step.
+    x: DVector<f64>,
+    v: DVector<f64>,
+    a: DVector<f64>,
+    t: f64,
+}
+
+impl Extrapolated {
+    fn extrapolate(&mut self) {
+        let (coarse, fine) = (&self.coarse.integrator.now, &self.fine.integrator.now);
+        let extrapolated = |to: &mut DVector<f64>, fine: &DVector<f64>, coarse: &DVector<f64>| {
+            to.copy_from(fine);
+            to.axpy(-1.0 / 3.0, coarse, 4.0 / 3.0);
+        };
+        let Self { x, v, a, .. } = self;
+        for (to, fine, coarse) in [
+            (x, &fine.x, &coarse.x),
+            (v, &fine.v, &coarse.v),
+            (a, &fine.acceleration, &coarse.acceleration),
+        ] {
+            extrapolated(to, fine, coarse);
+        }
+        self.t = self.coarse.time();
+    }
+}
+
+impl Stepper for Extrapolated {
+    fn time(&self) -> f64 {
+        self.t
+    }
+
+    fn step(&mut self) -> Result<(), StepError> {
+        self.coarse.step()?;
+        self.fine.step()?;
+        self.fine.step()?;
+        self.extrapolate();
+        Ok(())
+    }
+
+    fn observe(&mut self, out: &mut Observation) {
+        // Controllers and gears are those of the finer run.
+        observe_reduced(&mut self.fine.system, self.t, &self.x, &self.v, &self.a, out);
+    }
+
+    /// Steps are those of h; the work is that of both runs.
+    fn counts(&self) -> Counts {
+        let (coarse, fine) = (self.coarse.counts(), self.fine.counts());
+        Counts {
+            steps: coarse.steps,
+            evaluations: coarse.evaluations + fine.evaluations,
+            factorisations: coarse.factorisations + fine.factorisations,
+        }
+    }
+
+    fn last_iteration(&self) -> (usize, f64) {
+        let (coarse, fine) = (self.coarse.last_iteration(), self.fine.last_iteration());
+        (coarse.0.max(fine.0), coarse.1.max(fine.1))
+    }
+}
