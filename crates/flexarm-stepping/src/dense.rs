@@ -172,7 +172,10 @@ pub(crate) fn congruence(c: f64, X: &[f64], C: &[f64], n: usize, room: &mut [f64
     // P + c Xᵀ P
     product.copy_from_slice(room);
     for (column, x) in product.chunks_exact_mut(n).zip(room.chunks_exact(n)) {
-        for (y, a) in column.iter_mut().zip(X.chunks_exact(n)) {
+        let mut rest = X;
+        for y in column {
+            let Some((a, next)) = rest.split_at_checked(n) else { break };
+            rest = next;
             *y += c * dot(a, x);
         }
     }

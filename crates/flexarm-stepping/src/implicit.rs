@@ -24,7 +24,7 @@ const MAX_ITERATIONS: usize = 25;
 const MOST_HALVINGS: u32 = 6;
 /// A step that needed more iterations than this renews the matrix for the next one; twice as many, for itself.
 const RENEW_ABOVE: usize = 4;
-/// Largest ρ of a matrix that is kept.
+/// Largest ρ of a matrix that is kept, unless told otherwise.
 const STALE: f64 = 0.03;
 /// Accepted correction over the size of the acceleration.
 const TOLERANCE: f64 = 1e-9;
@@ -56,6 +56,8 @@ pub(crate) struct Newton {
     pub(crate) factored: bool,
     /// Whether what is remembered of the steps before is to be taken anew.
     pub(crate) fresh: bool,
+    /// Whether the next matrix continues the last one: same length of the step, same masses but for the motion.
+    pub(crate) same_course: bool,
     iterations: u64,
     factorisations: u64,
     last_iterations: usize,
@@ -67,6 +69,8 @@ pub(crate) struct Newton {
     measuring: bool,
     /// Part of the first correction that a search may leave.
     left: f64,
+    /// Largest ρ of a matrix that is kept.
+    stale: f64,
     /// Whether the matrix was taken in the search under way.
     new: bool,
     /// Largest first correction of late.
@@ -82,6 +86,7 @@ impl Newton {
             dt: h,
             factored: false,
             fresh: true,
+            same_course: false,
             iterations: 0,
             factorisations: 0,
             last_iterations: 0,
@@ -90,6 +95,7 @@ impl Newton {
             first_contraction: f64::INFINITY,
             measuring: false,
             left: TO_THE_END,
+            stale: STALE,
             new: false,
             largest_first: 0.0,
         }
@@ -100,6 +106,11 @@ impl Newton {
         Self { left, ..self }
     }
 
+    /// The same, with a matrix that is kept up to this ρ.
+    pub(crate) fn keeping(self, stale: f64) -> Self {
+        Self { stale, ..self }
+    }
+
     /// After so many whole steps the next one begins.
     pub(crate) fn begin_step(&mut self, steps: u64) {
         self.measuring = steps.is_multiple_of(MEASURED_EVERY);
@@ -107,12 +118,12 @@ impl Newton {
 
     /// Matrix and memory are out of date.
     fn forget(&mut self) {
-        (self.factored, self.fresh) = (false, true);
+        (self.factored, self.fresh, self.same_course) = (false, true, false);
     }
 
     /// The matrix in `self.matrix` was inverted.
     pub(crate) fn renewed(&mut self) {
-        (self.factored, self.new) = (true, true);
+        (self.factored, self.new, self.same_course) = (true, true, true);
         (self.contraction, self.first_contraction) = (f64::INFINITY, f64::INFINITY);
         self.factorisations += 1;
     }
@@ -126,7 +137,7 @@ impl Newton {
     pub(crate) fn found(&mut self, iterations: usize, longest: usize) {
         self.iterations += iterations as u64;
         self.last_iterations += iterations;
-        let stale = self.contraction.is_finite() && self.contraction > STALE;
+        let stale = self.contraction.is_finite() && self.contraction > self.stale;
         self.new = false;
         self.factored = longest <= RENEW_ABOVE && !stale;
     }
@@ -291,7 +302,7 @@ impl<M: ImplicitStep> Integrator for M {
     }
 
     fn renew(&mut self, system: &mut impl SecondOrderSystem) -> Result<(), StepError> {
-        self.newton_mut().factored = false;
+        (self.newton_mut().factored, self.newton_mut().same_course) = (false, false);
         self.restart(system)
     }
 

@@ -16,7 +16,7 @@ use crate::integrator::TimeGrid;
 use crate::reduced::ReducedArm;
 use crate::statics::static_equilibrium;
 use crate::stepper::{LARGEST_DEFLECTION, Start};
-use crate::steppers::{AlphaSettings, Coefficients, GeneralizedAlpha, leave_of};
+use crate::steppers::{AlphaSettings, Coefficients, Course, FOLLOWED_TO, GeneralizedAlpha, add, follows, leave_of};
 use crate::system::SecondOrderSystem;
 
 /// Parts of a step.
@@ -37,6 +37,8 @@ struct Lane {
     /// `c_D D + c_K K` and K, which do not change.
     C: DMatrix<f64>,
     K: DMatrix<f64>,
+    /// Its matrices between two renewals, where they are followed.
+    course: Option<Course>,
     /// Whether its run goes on here.
     alive: bool,
 }
@@ -69,6 +71,8 @@ pub(super) struct LaneAlpha<T: Real> {
     /// `M^-1 K` and the inverse of Newton's matrix.
     M_inverse_K: Vec<T>,
     inverse: Vec<T>,
+    /// What a step adds to both, by their courses.
+    changes: [Vec<T>; 2],
     /// Workspaces of the matrices.
     S: Vec<T>,
     matrices: Matrices,
@@ -113,6 +117,7 @@ impl<T: Real> LaneAlpha<T> {
             shift: zeros(),
             M_inverse_K: square(),
             inverse: square(),
+            changes: [square(), square()],
             S: square(),
             matrices: Matrices::new(n),
         };
@@ -160,7 +165,11 @@ impl<T: Real> LaneAlpha<T> {
         let (c_D, c_K) = self.coefficients.derivatives(h);
         system.damping_and_stiffness(c_D, c_K, &mut C);
         system.stiffness(&mut K);
-        Ok(Lane { system, newton, C, K, alive: true })
+        let course = follows(settings, arm, h).then(Course::default);
+        if course.is_some() {
+            newton = newton.keeping(FOLLOWED_TO);
+        }
+        Ok(Lane { system, newton, C, K, course, alive: true })
     }
 
     fn place_joints(&mut self, lane: usize, system: &ReducedArm) {
@@ -200,6 +209,7 @@ impl<T: Real> LaneAlpha<T> {
             self.v_new.copy_from_slice(&self.v);
             self.trial.copy_from_slice(&self.acceleration);
         } else {
+            self.follow();
             active = self.begin_search(t);
         }
         loop {
@@ -236,6 +246,19 @@ impl<T: Real> LaneAlpha<T> {
                 }
             }
         }
+    }
+
+    /// The matrices of the next step, where they are followed.
+    #[inline(always)]
+    fn follow(&mut self) {
+        for (k, lane) in self.lanes.iter_mut().enumerate() {
+            if let Some((change, true)) = lane.course.as_mut().map(Course::step) {
+                set_lane(&mut self.changes[0], k, &change[0]);
+                set_lane(&mut self.changes[1], k, &change[1]);
+            }
+        }
+        add(&mut self.inverse, &self.changes[0]);
+        add(&mut self.M_inverse_K, &self.changes[1]);
     }
 
     /// 1 in the lanes that fulfil a condition, else 0.
@@ -368,6 +391,11 @@ impl<T: Real> LaneAlpha<T> {
             lane.newton.fresh = false;
             set_lane(&mut self.M_inverse_K, k, &matrices.M_inverse_K);
             set_lane(&mut self.inverse, k, &matrices.inverse);
+            if let Some(course) = &mut lane.course {
+                let change = course.taken([&matrices.inverse, &matrices.M_inverse_K]);
+                set_lane(&mut self.changes[0], k, &change[0]);
+                set_lane(&mut self.changes[1], k, &change[1]);
+            }
         }
     }
 }

@@ -46,6 +46,16 @@ impl DispersionCorrection {
         }
     }
 
+    /// `M^-1 K`, n × n.
+    pub(super) fn M_inverse_K(&self) -> &[f64] {
+        self.M_inverse_K.as_slice()
+    }
+
+    /// The same, to be followed.
+    pub(super) fn M_inverse_K_mut(&mut self) -> &mut [f64] {
+        self.M_inverse_K.as_mut_slice()
+    }
+
     /// `c h²`.
     pub(super) fn c_h2(&self) -> f64 {
         self.c_h2

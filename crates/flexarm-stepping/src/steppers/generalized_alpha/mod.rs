@@ -32,6 +32,7 @@
 //! anywhere before the next multiple of h ([`Integrator::advance_to`]). A step whose iteration fails is tried again
 //! with a matrix of its start, then in halves, down to `h/64`; after that the multiples of h go on.
 
+mod course;
 mod dispersion;
 
 use flexarm_kinematics::Real;
@@ -41,9 +42,11 @@ use crate::arm::FlexibleArm;
 use crate::error::StepError;
 use crate::implicit::{ImplicitStep, Newton, Search, Sizes};
 use crate::integrator::{Current, ReducedStepper};
+use crate::iteration_matrix::Way;
 use crate::stepper::Stepper;
 use crate::steppers::{Method, StepRule, StepperEntry, StepperKind, StepperSetting};
 use crate::system::SecondOrderSystem;
+pub(crate) use course::{Course, FOLLOWED_TO};
 use dispersion::DispersionCorrection;
 
 pub(super) static ENTRY: StepperEntry = StepperEntry {
@@ -83,7 +86,7 @@ impl Method for AlphaSettings {
     }
 
     fn start(&self, arm: FlexibleArm, h: f64, e: &DVector<f64>) -> Result<Box<dyn Stepper>, StepError> {
-        Ok(Box::new(self.stepper(arm, h, e)?))
+        Ok(Box::new(self.stepper(arm, h, e, true)?))
     }
 }
 
@@ -93,24 +96,26 @@ impl AlphaSettings {
         (OF_DAMPING * (1.0 - self.rho)).min(QUICK)
     }
 
-    /// The stepper of an arm, with what its searches may leave.
+    /// The stepper of an arm, with what its searches may leave; `follow`: its matrices go on along lines where that is good.
     pub(crate) fn stepper(
         self,
         arm: FlexibleArm,
         h: f64,
         e: &DVector<f64>,
+        follow: bool,
     ) -> Result<ReducedStepper<GeneralizedAlpha>, StepError> {
         let rho = self.rho;
-        let left = leave_of(self, &arm, h);
+        let (left, follows) = (leave_of(self, &arm, h), follow && follows(self, &arm, h));
         if !(0.0..=1.0).contains(&rho) {
             return Err(StepError::Setup(format!("the spectral radius must lie between 0 and 1, found {rho}")));
         }
         ReducedStepper::start(arm, e, |system, x, v| {
             let integrator = GeneralizedAlpha::new(system, 0.0, h, self, x, v)?;
-            Ok(match left {
+            let integrator = match left {
                 Some(left) => integrator.leaving(left),
                 None => integrator,
-            })
+            };
+            Ok(if follows { integrator.following() } else { integrator })
         })
     }
 }
@@ -120,6 +125,12 @@ pub(crate) fn leave_of(settings: AlphaSettings, arm: &FlexibleArm, h: f64) -> Op
     let followed = arm.modes.omega.first().is_none_or(|omega| h * omega <= FOLLOWED);
     let left = if followed { settings.may_leave() } else { settings.may_leave().min(COARSE) };
     (left > 0.0 && forgets_errors(arm)).then_some(left)
+}
+
+/// Whether the matrices of an arm go on along a line between two renewals ([`Course`]): of arms whose steps are quick, and short.
+pub(crate) fn follows(settings: AlphaSettings, arm: &FlexibleArm, h: f64) -> bool {
+    let short = arm.modes.omega.first().is_some_and(|omega| h * omega <= course::SHORT);
+    short && settings.dispersion_correction && leave_of(settings, arm, h).is_some()
 }
 
 /// Part of the first correction of Newton's method that steps of a damped arm may leave: an error well below the scheme's own, for
@@ -160,6 +171,8 @@ pub struct GeneralizedAlpha {
     newton: Newton,
     /// See [`GeneralizedAlpha::exactly`].
     exact: bool,
+    /// See [`GeneralizedAlpha::following`].
+    course: Option<Course>,
     /// Time, positions, velocities and accelerations.
     pub now: Current,
     /// a and x̃ at the current time, ẍ one step before it.
@@ -252,6 +265,7 @@ impl GeneralizedAlpha {
             correction: (dispersion_correction && c > 0.0).then(|| DispersionCorrection::new(c, h, n)),
             newton: Newton::new(n, h),
             exact: false,
+            course: None,
             x_new: now.x.clone(),
             v_new: now.v.clone(),
             a: now.acceleration.clone(),
@@ -270,11 +284,17 @@ impl GeneralizedAlpha {
         Self { newton: self.newton.leaving(part), ..self }
     }
 
+    /// The same, with dense matrices that go on along a line between two renewals.
+    #[must_use]
+    pub fn following(self) -> Self {
+        Self { course: Some(Course::default()), newton: self.newton.keeping(FOLLOWED_TO), ..self }
+    }
+
     /// The same, with steps that are smooth functions of all that goes into them: the matrix, with that of the dispersion correction, is taken
     /// at the start of each step, and the iteration goes on until nothing is left.
     #[must_use]
     pub fn exactly(self) -> Self {
-        Self { exact: true, ..self.leaving(0.0) }
+        Self { exact: true, course: None, ..self.leaving(0.0) }
     }
 
     /// a and x̃ of the current acceleration alone. With the correction in x̃, a jump would set modes of `hω >> 1` ringing
@@ -295,8 +315,25 @@ impl GeneralizedAlpha {
             correction.correct(system, matrix, t)?;
         }
         matrix.invert(t)?;
+        if let (Some(course), Some(correction), Way::Dense(dense)) = (&mut self.course, &self.correction, &matrix.way) {
+            if !self.newton.same_course {
+                course.forget();
+            }
+            course.taken([dense.inverse.as_slice(), correction.M_inverse_K()]);
+        }
         self.newton.renewed();
         Ok(())
+    }
+
+    /// The matrices of the next step, where they are followed.
+    fn follow(&mut self) {
+        if let (Some(course), Some(correction), Way::Dense(dense)) =
+            (&mut self.course, &mut self.correction, &mut self.newton.matrix.way)
+        {
+            let (change, _) = course.step();
+            add(dense.inverse.as_mut_slice(), &change[0]);
+            add(correction.M_inverse_K_mut(), &change[1]);
+        }
     }
 
     /// x̃⁺, a⁺, x⁺, v⁺ of the trial ẍ⁺ by (5), (4), (2), (3).
@@ -348,6 +385,14 @@ impl GeneralizedAlpha {
     }
 }
 
+/// `A ← A + B`, over numbers or lanes.
+#[inline(always)]
+pub(crate) fn add<T: Real>(A: &mut [T], B: &[T]) {
+    for (a, b) in A.iter_mut().zip(B) {
+        *a += *b;
+    }
+}
+
 impl ImplicitStep for GeneralizedAlpha {
     /// At the ends alone.
     const MOTION_RULE: &'static [(f64, f64)] = &[(0.0, 0.5), (1.0, 0.5)];
@@ -379,6 +424,8 @@ impl ImplicitStep for GeneralizedAlpha {
             // The matrix belongs to the configuration of the last residual.
             system.residual(self.now.grid.time(), &self.now.x, &self.now.v, &self.now.acceleration, &mut self.newton.r);
             self.factor(system, t)?;
+        } else {
+            self.follow();
         }
         if self.newton.fresh {
             self.remember();
