@@ -35,7 +35,8 @@ END_S = 4.0
 
 # Program, stepper, steps (s).
 OURS = [
-    ("generalized-alpha", [1.6e-2, 1e-2, 8e-3, 5e-3, 4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4]),
+    ("generalized-alpha", [1.6e-2, 1e-2, 8e-3, 5e-3, 4e-3, 2.5e-3, 2e-3, 1e-3, 5e-4, 2.5e-4]),
+    ("extrapolated-alpha", [8e-3, 4e-3, 3e-3, 2.5e-3, 2e-3]),
     ("sdirk3", [4e-3, 2e-3, 1e-3, 5e-4]),
     ("spook", [1e-3, 5e-4, 2e-4, 1e-4]),
     ("rk4", [1.25e-4]),

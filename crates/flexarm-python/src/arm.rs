@@ -188,7 +188,7 @@ impl PyArm {
     /// step : float, default 1e-3
     ///     Time step (s).
     /// stepper : str, default "generalized-alpha"
-    ///     Or ``"spook"``, ``"rk4"``, ``"reference"``, ``"sdirk3"``.
+    ///     Or ``"spook"``, ``"rk4"``, ``"reference"``, ``"sdirk3"``, ``"extrapolated-alpha"``.
     /// stepper_options : dict, optional
     ///     Settings of the stepper, such as ``{"rho": 0.9}``.
     /// loads : sequence of Load, or path of a file of loads, optional

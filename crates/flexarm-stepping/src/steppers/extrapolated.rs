@@ -8,10 +8,10 @@
 //! know nothing of each other (*passive* extrapolation), so that what is stable, and how modes are damped that are too fast for
 //! the step, is as in each of them. What a jump of loads or velocities does, both meet at its time.
 //!
-//! Where the error has no series in h (steps longer than a third of the period of a mode that rings, friction that sticks, hysteresis)
+//! Where the error has no series in h (friction that sticks, hysteresis, steps longer than a twelfth of a period)
 //! nothing is gained, but nothing lost: the result is off by at most the error of the finer run and a third of the difference.
 //!
-//! Source: [Hairer & Wanner 1996], section IV.9; passive: [Hairer, Nørsett & Wanner 1993], section II.9.
+//! Source: [Hairer & Wanner 1996], section IV.9.
 
 use nalgebra::DVector;
 
