@@ -5,7 +5,7 @@
 //! ```
 //! The first correction `d = J^-1 r` is the error of an extrapolation over the step. Each iteration leaves a part ρ of the one
 //! before, as lengths of vectors; what a search may leave of the first one is a part of it ([`Newton::leaving`]). ρ is measured
-//! where two iterations are made, in every eighth step for certain, and grows as the arm moves away from where J was taken:
+//! where two iterations are made, in every eighth step for certain (every 24th while it is small), and grows as the arm moves away from where J was taken:
 //! while it is known to be small enough, a step needs one evaluation.
 //!
 //! A step whose iteration fails is tried again with a matrix of its start, then in halves, down to `h/64`.
@@ -35,6 +35,10 @@ const TO_THE_END: f64 = 1e-6;
 const EXACT: f64 = 0.5;
 /// In every step whose number is a multiple of this ρ is measured anew: in all runs that go side by side at once.
 const MEASURED_EVERY: u64 = 8;
+/// The same while ρ is below this part of what may be left: until it has grown to that the arm moves on for a while.
+const MEASURED_RARELY: u64 = 24;
+/// See [`MEASURED_RARELY`].
+const WELL_BELOW: f64 = 0.3;
 /// A first correction so many times as large as the largest of late comes from something new, of which ρ says nothing.
 const SUDDEN: f64 = 1.2;
 /// What is left of the largest of late after each search.
@@ -113,7 +117,8 @@ impl Newton {
 
     /// After so many whole steps the next one begins.
     pub(crate) fn begin_step(&mut self, steps: u64) {
-        self.measuring = steps.is_multiple_of(MEASURED_EVERY);
+        let every = if self.contraction <= WELL_BELOW * self.left { MEASURED_RARELY } else { MEASURED_EVERY };
+        self.measuring = steps.is_multiple_of(every);
     }
 
     /// Matrix and memory are out of date.
