@@ -13,8 +13,11 @@
 //! links in modes, closed loops, payloads that change: these are refused.
 
 mod columns;
+mod gears;
 mod lu;
 mod recurrence;
+mod servo;
+mod tangent;
 mod tool;
 
 use std::sync::Arc;
@@ -23,6 +26,7 @@ use flexarm_kinematics::{DynamicTangent, Frame, SpatialInertia};
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::arm::FlexibleArm;
+use crate::drive::Friction;
 use crate::error::StepError;
 use crate::motion::PrescribedMotion;
 use crate::statics::static_equilibrium;
@@ -36,14 +40,67 @@ use tool::ToolError;
 pub struct Direction {
     /// Stiffness of springs, by their number.
     pub springs: Vec<(usize, SpringSlope)>,
+    /// Stiffness of all elastic coordinates together, where springs are coupled.
+    pub stiffness: Option<DMatrix<f64>>,
     /// Damping matrix of the elastic coordinates.
     pub damping: Option<DMatrix<f64>>,
-    /// Inertia of bodies, about Bo, B axes.
+    /// The same after each change of inertia, in their order; as before without.
+    pub dampings_after: Vec<DMatrix<f64>>,
+    /// Inertia of bodies, about Bo, B axes; until another one is put in its place on the way.
     pub inertias: Vec<(usize, SpatialInertia)>,
-    /// Motion of the joints.
+    /// Inertia of bodies of the rigid robot that servos feed forward, about Bo, B axes.
+    pub fed_forward: Vec<(usize, SpatialInertia)>,
+    /// Friction of actuated coordinates: changes of the numbers of their law.
+    pub friction: Vec<(usize, Friction)>,
+    /// Controllers, by the number of the axis in [`crate::Servo::axes`].
+    pub servo: Vec<(usize, AxisSlope)>,
+    /// Motion of the joints; of those driven by torque their reference.
     pub motion: Option<Arc<dyn PrescribedMotion>>,
     /// Place of the tool's point, tool axes (m).
     pub tool: Vector3<f64>,
+}
+
+/// Change of the controller of an axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct AxisSlope {
+    /// Of [`crate::ServoAxis::position_gain`] (1/s).
+    pub position_gain: f64,
+    /// Of [`crate::ServoAxis::velocity_gain`] (N m s/rad).
+    pub velocity_gain: f64,
+    /// Of [`crate::ServoAxis::integral_gain`] (N m/rad).
+    pub integral_gain: f64,
+    /// So many times the torque that is fed forward.
+    pub feed_forward: f64,
+}
+
+impl Direction {
+    /// Change of the damping matrix after so many changes of inertia.
+    fn damping_after(&self, changes: usize) -> Option<&DMatrix<f64>> {
+        let later = changes.checked_sub(1).and_then(|k| self.dampings_after.get(k));
+        later.or(self.damping.as_ref())
+    }
+
+    /// Change of inertias that is still there after so many changes of inertia.
+    fn inertias_after<'a>(
+        &'a self,
+        arm: &'a FlexibleArm,
+        changes: usize,
+    ) -> impl Iterator<Item = (usize, &'a SpatialInertia)> {
+        let over = &arm.inertia_changes[..changes];
+        let there = move |body: usize| over.iter().all(|change| change.body != body);
+        self.inertias.iter().filter(move |(body, _)| there(*body)).map(|(body, more)| (*body, more))
+    }
+
+    /// Change of the controller of an axis.
+    fn axis(&self, number: usize) -> AxisSlope {
+        let own = self.servo.iter().filter(|(axis, _)| *axis == number);
+        own.fold(AxisSlope::default(), |sum, (_, by)| AxisSlope {
+            position_gain: sum.position_gain + by.position_gain,
+            velocity_gain: sum.velocity_gain + by.velocity_gain,
+            integral_gain: sum.integral_gain + by.integral_gain,
+            feed_forward: sum.feed_forward + by.feed_forward,
+        })
+    }
 }
 
 /// Change of a spring.
@@ -81,12 +138,25 @@ pub struct RunSlopes {
     pub position: ErrorSlopes,
     /// Angle (rad).
     pub rotation: ErrorSlopes,
+    /// Servos that were at their torque limits, by the time when they first were.
+    pub limited: Vec<TorqueLimited>,
     /// Times of the start and after every step (s), if kept.
     pub times_s: Vec<f64>,
     /// Error then: displacement (m) and rotation vector (rad), world axes.
     pub errors: Vec<[f64; 6]>,
     /// Its derivatives, a column per direction: those of one time after those of the time before.
     pub slopes: Vec<[f64; 6]>,
+}
+
+/// A servo that was at its torque limit: the derivatives are those with these very samples at the limit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TorqueLimited {
+    /// Coordinate of the joint.
+    pub coordinate: usize,
+    /// In how many samples.
+    pub samples: u64,
+    /// When first (s).
+    pub first_s: f64,
 }
 
 /// Largest and mean size of an error, with derivatives.
@@ -174,6 +244,7 @@ pub fn run_slopes(
         }
     }
     found.steps = steps;
+    found.limited = run.limited();
     found.position.finish((steps + 1) as f64);
     found.rotation.finish((steps + 1) as f64);
     Ok(found)
@@ -192,7 +263,7 @@ pub fn equilibrium_slopes(arm: &FlexibleArm, directions: &[Direction]) -> Result
         tool: arm.model.frames()[0].clone(),
         keep_samples: false,
     };
-    let mut arm = arm.clone();
+    let mut arm = arm.with_motors_held();
     arm.carry_from_start()?;
     check(&arm, &request, directions)?;
     let e = static_equilibrium(&arm, 0.0)?;
@@ -209,15 +280,6 @@ fn check(arm: &FlexibleArm, request: &SlopesRequest, directions: &[Direction]) -
         return Err(StepError::Setup(format!("the spectral radius must lie between 0 and 1, found {}", settings.rho)));
     }
     let refuse = |what, mend| Err(StepError::NoSlopes { what, mend });
-    if !arm.torque_driven.is_empty() {
-        return refuse("drives under torque", "prescribe the joints' motion");
-    }
-    if arm.has_gear_laws() || !arm.cross_stiffness.is_empty() || !arm.cross_damping.is_empty() {
-        return refuse("gears with hysteresis, friction by load, ripple or coupling", "leave these laws out");
-    }
-    if !arm.inertia_changes.is_empty() {
-        return refuse("a payload that changes on the way", "carry it from the start");
-    }
     let jumps = |motion: &dyn PrescribedMotion| !motion.velocity_jumps().is_empty();
     let moved = directions.iter().filter_map(|direction| direction.motion.as_deref());
     if jumps(&*arm.motion) || moved.into_iter().any(jumps) {
@@ -245,8 +307,15 @@ fn check(arm: &FlexibleArm, request: &SlopesRequest, directions: &[Direction]) -
             }
         }
         let n = arm.n_elastic_coordinates();
-        if direction.damping.as_ref().is_some_and(|dD| dD.shape() != (n, n)) {
-            return Err(StepError::Setup(format!("the change of the damping must have {n} rows and columns")));
+        let matrices = [&direction.damping, &direction.stiffness].into_iter().flatten();
+        if matrices.chain(&direction.dampings_after).any(|own| own.shape() != (n, n)) {
+            return Err(StepError::Setup(format!(
+                "the change of the damping or of the stiffness of all springs must have {n} rows and columns"
+            )));
+        }
+        let axes = arm.torque_driven.len();
+        if let Some((axis, _)) = direction.servo.iter().find(|(axis, _)| *axis >= axes) {
+            return Err(StepError::Setup(format!("a direction changes servo {axis}, the arm has {axes}")));
         }
     }
     Ok(())
