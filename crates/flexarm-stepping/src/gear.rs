@@ -303,6 +303,19 @@ impl FlexibleArm {
         errors.fold(e, |delta, error| delta - error.at(q[error.motor]))
     }
 
+    /// Slope of a curved spring in small motions about all coordinates `q`, none of a straight one: no friction slips, and from within a
+    /// play the steepest.
+    pub fn vibration_slope(&self, element: usize, q: &[f64]) -> Option<f64> {
+        let own = &self.elements[element];
+        let curve = own.curve.as_ref()?;
+        let delta = self.deflection(element, q[own.coordinate], q);
+        if let Some(law) = self.hysteresis.iter().find(|law| law.element == element) {
+            return Some(law.stuck_slope(delta));
+        }
+        let slope = curve.slope(delta);
+        Some(if slope > 0.0 { slope } else { curve.stiffest() })
+    }
+
     /// What the springs pull with, and the energy in each element, at rest with all coordinates at `q`.
     ///
     /// Forces over the elastic coordinates (N, N m); of coupled gears the energy is that of the joint's part, `F e / 2`.

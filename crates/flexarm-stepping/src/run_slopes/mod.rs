@@ -265,6 +265,10 @@ pub fn equilibrium_slopes(arm: &FlexibleArm, directions: &[Direction]) -> Result
     };
     let mut arm = arm.with_motors_held();
     arm.carry_from_start()?;
+    // Nothing of a motion or of a controller counts here.
+    let still = |own: &Direction| Direction { servo: Vec::new(), ..own.clone() };
+    let directions: Vec<Direction> = directions.iter().map(still).collect();
+    let directions = &directions[..];
     check(&arm, &request, directions)?;
     let e = static_equilibrium(&arm, 0.0)?;
     Ok(Recurrence::new(arm, &request, directions, &e)?.x.transpose())
