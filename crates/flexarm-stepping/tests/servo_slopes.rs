@@ -412,8 +412,8 @@ impl Case {
             What::Integral => 300.0,
             _ => 0.02,
         };
-        // So short that no slider begins to slip at another time, no torque comes to its limit.
-        let kinked = self.gears == Gears::Hysteresis || self.limit.is_finite();
+        // So short that no torque changes its sign and no slider or servo begins to slip or to be at its limit at another sample.
+        let kinked = [Gears::Hysteresis, Gears::LoadFriction].contains(&self.gears) || self.limit.is_finite();
         if kinked { 0.02 * size } else { size }
     }
 }

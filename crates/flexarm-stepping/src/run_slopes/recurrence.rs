@@ -20,6 +20,7 @@ use crate::events::Change;
 use crate::gear::GearState;
 use crate::implicit::ImplicitStep;
 use crate::integrator::{Integrator, check_deflection};
+use crate::iteration_matrix::Way;
 use crate::reduced::ReducedArm;
 use crate::run_slopes::columns::add_product;
 use crate::run_slopes::lu::Lu;
@@ -28,7 +29,7 @@ use crate::run_slopes::tangent::{Look, Tangent, add_columns, put};
 use crate::run_slopes::{Direction, SlopesRequest, TorqueLimited};
 use crate::steppers::{Coefficients, GeneralizedAlpha};
 
-/// Iterations of a step that finds its way; after more the matrix would be taken anew within it.
+/// Iterations of a step that finds its way; after more a matrix that has the dispersion correction in itself would be taken anew within it.
 const MOST_ITERATIONS: usize = 8;
 
 /// A run with its tangent: N free coordinates (d joints driven by torque, n elastic ones), m joints, p directions.
@@ -404,7 +405,8 @@ impl<'a> Recurrence<'a> {
         }
         self.integrator.advance_to(&mut self.system, stop)?;
         let newton = ImplicitStep::newton(&self.integrator);
-        if newton.dt != dt || newton.last().0 > MOST_ITERATIONS {
+        let dense = matches!(newton.matrix.way, Way::Dense(_));
+        if newton.dt != dt || (newton.last().0 > MOST_ITERATIONS && !dense) {
             let what = "a step that does not converge at once";
             return Err(StepError::NoSlopes { what, mend: "take a smaller step" });
         }
