@@ -497,3 +497,150 @@ fn twice_as_many_steps_allocate_no_more() {
     });
     assert_eq!(counts[0], counts[1]);
 }
+
+// --- Closed loops and links in modes -----------------------------------------------------------------------------------
+
+/// An arm whose forces are differenced: what changes is a spring, a mass, the motion, the tool.
+struct Other {
+    tree: Mechanism,
+    /// Per group of the model, ten times as soft as the arm that is shipped.
+    springs: Vec<Spring>,
+    tool: &'static str,
+    servo: Option<Mechanism>,
+    motion: fn(f64, &mut [f64], &mut [f64], &mut [f64]),
+}
+
+const OTHERS: [&str; 5] = ["spring", "mass", "shift", "stretch", "tool"];
+
+impl Other {
+    fn arm(&self, what: &str, x: f64) -> FlexibleArm {
+        let by = |other: &str| if what == other { x } else { 0.0 };
+        let heavier = |tree: &Mechanism| {
+            let model = Model::new(tree).unwrap();
+            let frame = model.frame(self.tool).unwrap().clone();
+            let more = per_kg().at_parent(&frame.X_BF);
+            let mut inertia = model.bodies()[frame.body].inertia;
+            inertia += SpatialInertia {
+                mass: by("mass") * more.mass,
+                first_moment: more.first_moment * by("mass"),
+                rotational: more.rotational * by("mass"),
+            };
+            model.with_inertia(frame.body, inertia)
+        };
+        let mut springs = self.springs.clone();
+        springs[0].K *= 1.0 + by("spring");
+        let (shift, stretch, motion) = (by("shift"), 1.0 + by("stretch"), self.motion);
+        let motion = MotionFn(move |t: f64, q: &mut [f64], v: &mut [f64], a: &mut [f64]| {
+            motion(t, q, v, a);
+            q.iter_mut().chain(v).chain(a).for_each(|x| *x *= stretch);
+            q[1] += shift;
+        });
+        let arm = FlexibleArm::new(Arc::new(heavier(&self.tree)), springs, Arc::new(motion)).unwrap();
+        let body = arm.model.frame(self.tool).unwrap().body;
+        let force = |t: f64| Wrench::new(vector![90.0 * (19.0 * t).sin(), 0.0, -50.0], vector![0.0, 20.0, 5.0]);
+        let load = Load::at_origin(body, TimedWrench::new(force).in_axes(LoadAxes::Frame));
+        let arm = arm.with_timed_loads(vec![load]).unwrap();
+        let Some(rigid) = &self.servo else { return arm };
+        let axis = |coordinate: usize| ServoAxis {
+            coordinate,
+            position_gain: 15.0,
+            velocity_gain: 900.0,
+            integral_gain: 8e3,
+            feed_forward: true,
+            limit: f64::INFINITY,
+        };
+        let axes = (0..arm.model.n_actuated()).map(axis).collect();
+        arm.with_servo(Servo { sample_s: 2e-3, axes, rigid: Arc::new(heavier(rigid)) }).unwrap()
+    }
+
+    fn direction(&self, what: &str) -> Direction {
+        let arm = self.arm("", 0.0);
+        let n = arm.n_elastic_coordinates();
+        let mut direction = Direction::default();
+        match what {
+            "spring" => {
+                direction.springs.push((0, SpringSlope::Factor(1.0)));
+                let element = &arm.elements[0];
+                let (first, size) = (arm.offset(element), element.size);
+                let mut dD = DMatrix::zeros(n, n);
+                if let Damping::StiffnessProportional(beta) = element.damping {
+                    dD.view_mut((first, first), (size, size)).copy_from(&(&element.K * beta));
+                }
+                direction.damping = Some(dD);
+            }
+            "mass" => {
+                let frame = arm.model.frame(self.tool).unwrap();
+                direction.inertias.push((frame.body, per_kg().at_parent(&frame.X_BF)));
+                if let Some(servo) = &arm.servo {
+                    let frame = servo.rigid.frame(self.tool).unwrap();
+                    direction.fed_forward.push((frame.body, per_kg().at_parent(&frame.X_BF)));
+                }
+            }
+            "shift" => {
+                let shift = (0..arm.model.n_actuated()).map(|k| f64::from(u8::from(k == 1))).collect();
+                direction.motion = Some(Arc::new(Held(shift)));
+            }
+            "stretch" => direction.motion = Some(Arc::new(MotionFn(self.motion))),
+            _ => direction.tool = vector![0.3, -0.2, 0.5],
+        }
+        direction
+    }
+
+    fn request(&self, arm: &FlexibleArm, tool: Vector3<f64>) -> SlopesRequest {
+        let frame = arm.model.frame(self.tool).unwrap();
+        SlopesRequest {
+            settings: AlphaSettings::default(),
+            step_s: STEP,
+            duration_s: 0.2,
+            start: Start::Equilibrium,
+            tool: Frame { X_BF: frame.X_BF * Pose::from(tool), ..frame.clone() },
+            keep_samples: true,
+        }
+    }
+
+    fn compare(&self, name: &str, bound: f64) {
+        let arm = self.arm("", 0.0);
+        let directions = OTHERS.map(|what| self.direction(what));
+        let found = run_slopes(&arm, &self.request(&arm, Vector3::zeros()), &directions).unwrap();
+        for (k, what) in OTHERS.into_iter().enumerate() {
+            let run = |x: f64| {
+                let arm = self.arm(what, x);
+                let tool = if what == "tool" { vector![0.3, -0.2, 0.5] * x } else { Vector3::zeros() };
+                let found = run_slopes(&arm, &self.request(&arm, tool), &[]).unwrap();
+                DVector::from_iterator(6 * found.errors.len(), found.errors.iter().flatten().copied())
+            };
+            let size = if matches!(what, "mass" | "tool") { 0.4 } else { 0.03 };
+            let truth = richardson(size, run);
+            let own: Vec<f64> = found.slopes.iter().skip(k).step_by(OTHERS.len()).flatten().copied().collect();
+            let error = (DVector::from_vec(own) - &truth).amax() / truth.amax();
+            eprintln!("{name}, {what}: {error:.1e} of {:.2e}", truth.amax());
+            assert!(error < bound, "{name}, {what}: {error:e}");
+        }
+    }
+}
+
+/// Truth: differences of whole runs.
+#[test]
+fn arms_with_closed_loops_are_differentiated() {
+    let made = flexarm_testkit::palletising_arm(true);
+    let spring = |(name, K): (String, DMatrix<f64>)| Spring {
+        name,
+        K,
+        damping: Damping::StiffnessProportional(BETA),
+        curve: None,
+        geometric: None,
+    };
+    let springs: Vec<Spring> = made.springs.into_iter().map(spring).collect();
+    fn motion(t: f64, q: &mut [f64], v: &mut [f64], a: &mut [f64]) {
+        for (k, (start, by)) in [(0.3, 0.3), (0.35, 0.15), (0.2, -0.15)].into_iter().enumerate() {
+            let w = 11.0;
+            (q[k], v[k], a[k]) =
+                (start + by * (1.0 - (w * t).cos()), by * w * (w * t).sin(), by * w * w * (w * t).cos());
+        }
+    }
+    let rigid = flexarm_testkit::palletising_arm(false).mechanism;
+    for servo in [None, Some(rigid)] {
+        let name = if servo.is_some() { "loops under servos" } else { "loops" };
+        Other { tree: made.mechanism.clone(), springs: springs.clone(), tool: "tool", servo, motion }.compare(name, 1e-8);
+    }
+}

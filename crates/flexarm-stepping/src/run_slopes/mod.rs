@@ -3,16 +3,19 @@
 //! ```text
 //! r(q, q̇, q̈; p) = 0:     M δẍ + V δẋ + K δx = -(∂r/∂p + K_a δq_a + V_a δq̇_a + M_a δq̈_a)                           (1)
 //! ```
-//! holds at the end of every step, with `K = ∂r/∂x`, `V = ∂r/∂ẋ` in closed form ([`DynamicTangent`]); the formulas that join x, ẋ and ẍ
+//! holds at the end of every step, with `K = ∂r/∂x`, `V = ∂r/∂ẋ` in closed form ([`flexarm_kinematics::DynamicTangent`]), where loops close or
+//! links bend in modes by differences of the recursions (`forces.rs`); the formulas that join x, ẋ and ẍ
 //! of two steps are linear, so that a step is one linear system for all parameters: a column each. What differs from a run of
 //! [`crate::GeneralizedAlpha`] is that its iterations go on to the end and that the matrix of its dispersion correction is that of the
 //! start of each step: a run whose result is a smooth function of the parameters, of which differences can be taken
 //! ([`GeneralizedAlpha::exactly`]). An ordinary run differs from it by what its iterations leave, far less than the error of its step.
 //!
-//! Start at [`run_slopes`]. Not here: names and units of parameters (`flexarm-identify`), drives under torque, gears with laws of their own,
-//! links in modes, closed loops, payloads that change: these are refused.
+//! Torques under servos are held from sample to sample, and so are their derivatives (`servo.rs`); ripple, hysteresis, coupling and
+//! friction by load are in `gears.rs`. Start at [`run_slopes`]. Not here: names and units of parameters (`flexarm-identify`), motions whose
+//! velocity jumps, links that stiffen under load: these are refused.
 
 mod columns;
+mod forces;
 mod gears;
 mod lu;
 mod recurrence;
@@ -22,7 +25,7 @@ mod tool;
 
 use std::sync::Arc;
 
-use flexarm_kinematics::{DynamicTangent, Frame, SpatialInertia};
+use flexarm_kinematics::{Frame, SpatialInertia};
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::arm::FlexibleArm;
@@ -291,12 +294,6 @@ fn check(arm: &FlexibleArm, request: &SlopesRequest, directions: &[Direction]) -
     }
     if arm.elements.iter().any(|element| element.geometric.is_some()) {
         return refuse("links that stiffen under load", "leave geometric stiffening out");
-    }
-    if !arm.model.loops().is_empty() {
-        return refuse("closed loops", "take differences of runs");
-    }
-    if DynamicTangent::new(&arm.model).is_none() {
-        return refuse("links that bend in modes", "model them as lumped");
     }
     for direction in directions {
         for (spring, slope) in &direction.springs {

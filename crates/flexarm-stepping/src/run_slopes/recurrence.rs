@@ -92,10 +92,10 @@ impl<'a> Recurrence<'a> {
     ) -> Result<Self, StepError> {
         let (m, n, p) = (arm.model.n_actuated(), arm.n_free(), directions.len());
         let nv = arm.model.nv();
-        let tangent = Tangent::new(&arm, p)?;
+        let tangent = Tangent::new(&arm, p);
         let mut system = ReducedArm::new(arm);
         let (x, v) = system.start(e)?;
-        let servo = system.servo.as_ref().map(|servo| ServoSlopes::new(servo, directions)).transpose()?;
+        let servo = system.servo.as_ref().map(|servo| ServoSlopes::new(servo, directions));
         let h = request.step_s;
         let integrator = GeneralizedAlpha::new(&mut system, 0.0, h, request.settings, x, v)?.exactly();
         let coefficients = Coefficients::new(request.settings.rho);
@@ -470,7 +470,7 @@ impl<'a> Recurrence<'a> {
         for (k, direction) in directions.iter().enumerate() {
             room.fill(0.0);
             for (body, more) in direction.inertias_after(arm, system.events.changes_over()) {
-                inertia.add_inertia_forces(&arm.model, work, body, more, 1.0, room.as_mut_slice());
+                inertia.add_inertia_forces(&arm.model, work, body, more, room.as_mut_slice());
             }
             own.iter_mut().zip(free).enumerate().for_each(|(i, (own, f))| *own = -room[*f] - z[(k, i)]);
             let (elastic, bent) = (&mut own[driven..], &acceleration.as_slice()[driven..]);

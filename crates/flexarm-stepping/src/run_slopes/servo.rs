@@ -9,13 +9,13 @@
 //! with a small enough change of a parameter; where one more or less of them is, the integral steps by `k_i T error`: the derivative is
 //! that of the run up to there, and how many samples are at limits is told ([`crate::TorqueLimited`]).
 //!
-//! τ_ff is the rigid robot's inverse dynamics on the reference, whose tangent is that of the motion ([`DynamicTangent`]).
+//! τ_ff is the rigid robot's inverse dynamics on the reference, whose tangent is that of the motion ([`ForceTangent`]).
 
-use flexarm_kinematics::{Data, DynamicTangent, State, inverse_dynamics, mass_matrix_at_poses, world_poses};
+use flexarm_kinematics::{Data, State, inverse_dynamics, mass_matrix_at_poses, world_poses};
 use nalgebra::{DMatrix, DVector};
 
 use crate::arm::FlexibleArm;
-use crate::error::StepError;
+use crate::run_slopes::forces::ForceTangent;
 use crate::run_slopes::{Direction, TorqueLimited};
 use crate::servo::ServoState;
 
@@ -36,7 +36,7 @@ pub(super) struct ServoSlopes {
 
 /// The rigid robot on its reference.
 struct Rigid {
-    tangent: DynamicTangent,
+    tangent: ForceTangent,
     data: Data,
     by_q: DMatrix<f64>,
     by_rate: DMatrix<f64>,
@@ -45,14 +45,12 @@ struct Rigid {
 }
 
 impl ServoSlopes {
-    pub(super) fn new(servo: &ServoState, directions: &[Direction]) -> Result<Self, StepError> {
+    pub(super) fn new(servo: &ServoState, directions: &[Direction]) -> Self {
         let (model, d, p) = (&servo.servo.rigid, servo.servo.axes.len(), directions.len());
         let n = model.nv();
-        let Some(tangent) = DynamicTangent::new(model) else {
-            return Err(StepError::NoSlopes { what: "closed loops", mend: "take differences of runs" });
-        };
+        let tangent = ForceTangent::new(model);
         let zeros = || DMatrix::zeros(p, d);
-        Ok(Self {
+        Self {
             torque: zeros(),
             integral: zeros(),
             ahead: zeros(),
@@ -66,7 +64,7 @@ impl ServoSlopes {
                 by_rate: DMatrix::zeros(n, n),
                 room: vec![0.0; n],
             },
-        })
+        }
     }
 
     /// Takes in the sample that a servo has just taken at t, if any; whether there was one.
@@ -166,7 +164,7 @@ impl Rigid {
         let (model, state, qddot): (_, &State, &DVector<f64>) = (&servo.servo.rigid, &servo.reference, &servo.qddot);
         inverse_dynamics(model, &mut self.data, state, qddot);
         world_poses(model, &mut self.data);
-        self.tangent.compute(model, &self.data, state, qddot, &mut self.by_q, &mut self.by_rate);
+        self.tangent.compute(model, (&self.data, state, qddot), None, &mut self.by_q, &mut self.by_rate);
         mass_matrix_at_poses(model, &mut self.data);
     }
 
@@ -175,7 +173,7 @@ impl Rigid {
         let Self { tangent, data, by_q, by_rate, room } = self;
         room.fill(0.0);
         for (body, more) in &direction.fed_forward {
-            tangent.add_inertia_forces(&servo.servo.rigid, data, *body, more, 1.0, room);
+            tangent.add_inertia_forces(&servo.servo.rigid, data, *body, more, room);
         }
         if direction.motion.is_some() {
             for (matrix, joints) in [&*by_q, by_rate, &data.M].into_iter().zip(joints) {

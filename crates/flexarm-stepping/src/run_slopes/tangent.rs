@@ -1,18 +1,18 @@
 //! Matrices of the equations of motion about the current state, and what parameters do to these equations there.
 
-use flexarm_kinematics::{Data, DynamicTangent, PointLoad, State, StaticTangent};
+use flexarm_kinematics::{Data, PointLoad, State, StaticTangent};
 use nalgebra::{DMatrix, DVector};
 
 use crate::arm::FlexibleArm;
-use crate::error::StepError;
 use crate::gear::GearState;
+use crate::run_slopes::forces::ForceTangent;
 use crate::run_slopes::gears::GearSlopes;
 use crate::run_slopes::{Direction, SpringSlope};
 
 /// Matrices of (1) of the module above at the current state.
 pub(super) struct Tangent {
-    dynamic: DynamicTangent,
-    pub(super) inertia: DynamicTangent,
+    dynamic: ForceTangent,
+    pub(super) inertia: ForceTangent,
     loads: StaticTangent,
     points: Vec<PointLoad>,
     /// Whether there are loads or balancers.
@@ -50,23 +50,20 @@ pub(super) struct Look<'a> {
 }
 
 impl Tangent {
-    pub(super) fn new(arm: &FlexibleArm, directions: usize) -> Result<Self, StepError> {
+    pub(super) fn new(arm: &FlexibleArm, directions: usize) -> Self {
         let model = &arm.model;
         let (nv, m, driven, size) = (model.nv(), model.n_actuated(), arm.torque_driven.len(), arm.n_free());
-        let dynamic = DynamicTangent::new(model);
-        let Some(dynamic) = dynamic else {
-            return Err(StepError::NoSlopes { what: "links that bend in modes", mend: "model them as lumped" });
-        };
         let square = |n: usize| DMatrix::zeros(n, n);
         let mut K = square(size);
         let n = size - driven;
         K.view_mut((driven, driven), (n, n)).copy_from(&arm.stiffness());
-        Ok(Self {
-            inertia: dynamic.clone(),
-            dynamic,
+        let dynamic = ForceTangent::new(model);
+        Self {
+            inertia: ForceTangent::new(model),
             loads: StaticTangent::new(model, 0),
             points: Vec::with_capacity(arm.loads.len()),
-            loaded: !arm.loads.is_empty() || !model.balancers().is_empty(),
+            loaded: !dynamic.has_loads() && (!arm.loads.is_empty() || !model.balancers().is_empty()),
+            dynamic,
             work: Data::new(model),
             by_q: square(nv),
             by_rate: square(nv),
@@ -76,7 +73,7 @@ impl Tangent {
             own: std::array::from_fn(|_| square(size)),
             by_joints: std::array::from_fn(|_| DMatrix::zeros(size, m)),
             gears: arm.has_gear_laws().then(|| GearSlopes::new(arm, directions)),
-        })
+        }
     }
 
     /// `∂r/∂q` and `∂r/∂q̇` of the motion that was last given to `data`, loads of time t; `gears`: of the same motion.
@@ -91,7 +88,7 @@ impl Tangent {
     ) {
         let model = &arm.model;
         let (m, n) = (model.n_actuated(), arm.n_elastic_coordinates());
-        self.dynamic.compute(model, data, state, qddot, &mut self.by_q, &mut self.by_rate);
+        self.dynamic.compute(model, (data, state, qddot), Some((arm, t)), &mut self.by_q, &mut self.by_rate);
         if self.loaded {
             self.points.clear();
             self.points.extend(arm.loads.iter().map(|load| load.point_load(t, &data.X_WB[load.body])));
@@ -140,7 +137,7 @@ impl Tangent {
     /// Adds `∂r/∂p` of a direction without the joints' motion to `to`, free coordinates, in the motion of [`Tangent::compute`]; without
     /// what the controller does.
     pub(super) fn add_explicit(
-        &self,
+        &mut self,
         at: &Look<'_>,
         (number, direction): (usize, &Direction),
         room: &mut DVector<f64>,
@@ -165,7 +162,7 @@ impl Tangent {
         if !direction.inertias.is_empty() {
             room.fill(0.0);
             for (body, more) in direction.inertias_after(arm, at.changes) {
-                self.dynamic.add_inertia_forces(&arm.model, at.data, body, more, 1.0, room.as_mut_slice());
+                self.dynamic.add_inertia_forces(&arm.model, at.data, body, more, room.as_mut_slice());
             }
             to.iter_mut().zip(at.free).for_each(|(to, k)| *to += room[*k]);
         }
