@@ -6,9 +6,12 @@
 
 use std::sync::Arc;
 
+use flexarm_fem::{BeamLink, Material, ModalOptions, Section};
+use flexarm_flexlink::{FlexibleLink, LinkForm, substitute};
 use flexarm_kinematics::*;
 use flexarm_stepping::*;
 use flexarm_testkit::allocations::{CountingAllocator, count_allocations};
+use flexarm_testkit::{reference_arm, reference_motion};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3, vector};
 
 #[global_allocator]
@@ -641,6 +644,44 @@ fn arms_with_closed_loops_are_differentiated() {
     let rigid = flexarm_testkit::palletising_arm(false).mechanism;
     for servo in [None, Some(rigid)] {
         let name = if servo.is_some() { "loops under servos" } else { "loops" };
-        Other { tree: made.mechanism.clone(), springs: springs.clone(), tool: "tool", servo, motion }.compare(name, 1e-8);
+        Other { tree: made.mechanism.clone(), springs: springs.clone(), tool: "tool", servo, motion }
+            .compare(name, 1e-8);
+    }
+}
+
+/// The reference arm whose upper arm is one link, a tube of six modes; with servos a rotor on each joint.
+fn modal_arm(damping: Damping, servo: bool) -> Other {
+    let mut arm = reference_arm(false).mechanism;
+    arm.links.retain(|link| link.name != "link4b");
+    arm.joints.retain(|joint| joint.name != "joint4b");
+    for joint in &mut arm.joints {
+        joint.armature = if servo { 5.0 } else { 0.0 };
+        if joint.name == "joint5" {
+            (joint.parent, joint.X_PJ) = ("link4".into(), Pose::translation(1.0, 0.0, 0.0));
+        }
+    }
+    let tube = Section::Tube { outer_diameter: 0.09, wall: 0.004 };
+    let beam = BeamLink { mass: Some(40.0), ..BeamLink::new("link4", tube, Material::STEEL, 1.0) };
+    let beam = beam.along(Vector3::x(), Vector3::y(), 0.0, Vector3::zeros()).unwrap();
+    let modal = Arc::new(beam.modal_with(&ModalOptions::default()).unwrap());
+    let link =
+        FlexibleLink { form: LinkForm::Modal(modal.clone()), ..FlexibleLink::new("link4", beam.reduce().unwrap()) };
+    let tree = substitute(&arm, &[link]).unwrap().mechanism;
+    let spring = Spring { name: "link4".into(), K: modal.K.clone(), damping, curve: None, geometric: None };
+    fn motion(t: f64, q: &mut [f64], v: &mut [f64], a: &mut [f64]) {
+        let (x, y, z) = reference_motion(t);
+        q.copy_from_slice(&x);
+        v.copy_from_slice(&y);
+        a.copy_from_slice(&z);
+    }
+    Other { tree, springs: vec![spring], tool: "tcp", servo: servo.then_some(arm), motion }
+}
+
+/// Truth: differences of whole runs.
+#[test]
+fn arms_with_links_in_modes_are_differentiated() {
+    for servo in [false, true] {
+        let name = if servo { "modes under servos" } else { "modes" };
+        modal_arm(Damping::StiffnessProportional(BETA), servo).compare(name, 1e-8);
     }
 }
