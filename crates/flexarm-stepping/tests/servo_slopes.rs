@@ -685,3 +685,76 @@ fn arms_with_links_in_modes_are_differentiated() {
         modal_arm(Damping::StiffnessProportional(BETA), servo).compare(name, 1e-8);
     }
 }
+
+// --- Corners -----------------------------------------------------------------------------------------------------------
+
+/// The reference arm, at rest until 0.05 s and from 0.13 s on, in between with the speeds of its motion; or moving from the start.
+struct Corners {
+    from: f64,
+    stretch: f64,
+    shift: f64,
+}
+
+impl PrescribedMotion for Corners {
+    fn sample(&self, t: f64, q: &mut [f64], qdot: &mut [f64], qddot: &mut [f64]) {
+        let (x, v, a) = reference_motion(0.4 + t.clamp(self.from, 0.13));
+        let moves = f64::from(u8::from(t >= self.from && t < 0.13));
+        for k in 0..6 {
+            q[k] = self.stretch * x[k] + if k == 1 { self.shift } else { 0.0 };
+            (qdot[k], qddot[k]) = (moves * self.stretch * v[k], moves * self.stretch * a[k]);
+        }
+    }
+
+    fn velocity_jumps(&self) -> Vec<f64> {
+        vec![self.from, 0.13]
+    }
+}
+
+/// Truth: differences of whole runs, blows within a step, at its end and at the start of the run.
+#[test]
+fn motions_whose_velocity_jumps_are_differentiated() {
+    let reference = reference_arm(true);
+    let soft = |k: usize| DMatrix::from_column_slice(6, 6, (reference.K_S[k] / 10.0).as_slice());
+    for from in [0.0513, 0.0] {
+        let arm = |what: &str, x: f64| {
+            let by = |other: &str| if what == other { x } else { 0.0 };
+            let model = heavier(&Model::new(&reference.mechanism).unwrap(), by("mass"));
+            let motion = Corners { from, stretch: 1.0 + by("stretch"), shift: by("shift") };
+            let spring = |name: &str, K: DMatrix<f64>| Spring {
+                name: name.into(),
+                K,
+                damping: Damping::Dampers([400.0, 400.0, 400.0, 30.0, 30.0, 30.0]),
+                curve: None,
+                geometric: None,
+            };
+            let springs = vec![spring("lower", soft(0) * (1.0 + by("spring"))), spring("upper", soft(1))];
+            FlexibleArm::new(Arc::new(model), springs, Arc::new(motion)).unwrap()
+        };
+        let body = arm("", 0.0).model.frame("tcp").unwrap().body;
+        let moved = |stretch: f64, shift: f64| -> Option<Arc<dyn PrescribedMotion>> {
+            Some(Arc::new(Corners { from, stretch, shift }))
+        };
+        let directions = [
+            Direction { springs: vec![(0, SpringSlope::Factor(1.0))], ..Direction::default() },
+            Direction { inertias: vec![(body, per_kg())], ..Direction::default() },
+            Direction { motion: moved(1.0, 0.0), ..Direction::default() },
+            Direction { motion: Some(Arc::new(Held(vec![0.0, 1.0, 0.0, 0.0, 0.0, 0.0]))), ..Direction::default() },
+        ];
+        let case = Case::new();
+        let request = |arm: &FlexibleArm| case.request(arm, Vector3::zeros());
+        let own_arm = arm("", 0.0);
+        let found = run_slopes(&own_arm, &request(&own_arm), &directions).unwrap();
+        for (k, what) in ["spring", "mass", "stretch", "shift"].into_iter().enumerate() {
+            let run = |x: f64| {
+                let arm = arm(what, x);
+                let found = run_slopes(&arm, &request(&arm), &[]).unwrap();
+                DVector::from_iterator(6 * found.errors.len(), found.errors.iter().flatten().copied())
+            };
+            let truth = richardson(if what == "mass" { 0.1 } else { 0.02 }, run);
+            let own: Vec<f64> = found.slopes.iter().skip(k).step_by(directions.len()).flatten().copied().collect();
+            let error = (DVector::from_vec(own) - &truth).amax() / truth.amax();
+            eprintln!("corners from {from}, {what}: {error:.1e} of {:.2e}", truth.amax());
+            assert!(error < 1e-8, "{what}: {error:e}");
+        }
+    }
+}

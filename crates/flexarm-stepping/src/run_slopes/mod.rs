@@ -12,7 +12,7 @@
 //!
 //! Torques under servos are held from sample to sample, and so are their derivatives (`servo.rs`); ripple, hysteresis, coupling and
 //! friction by load are in `gears.rs`. Start at [`run_slopes`]. Not here: names and units of parameters (`flexarm-identify`), motions whose
-//! velocity jumps, links that stiffen under load: these are refused.
+//! velocity jumps under servos, links that stiffen under load: these are refused.
 
 mod columns;
 mod forces;
@@ -31,6 +31,7 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use crate::arm::FlexibleArm;
 use crate::drive::Friction;
 use crate::error::StepError;
+use crate::events::SAME_TIME;
 use crate::motion::PrescribedMotion;
 use crate::statics::static_equilibrium;
 use crate::stepper::Start;
@@ -287,10 +288,14 @@ fn check(arm: &FlexibleArm, request: &SlopesRequest, directions: &[Direction]) -
         return Err(StepError::Setup(format!("the spectral radius must lie between 0 and 1, found {}", settings.rho)));
     }
     let refuse = |what, mend| Err(StepError::NoSlopes { what, mend });
-    let jumps = |motion: &dyn PrescribedMotion| !motion.velocity_jumps().is_empty();
+    let jumps = arm.motion.velocity_jumps();
+    if !jumps.is_empty() && !arm.torque_driven.is_empty() {
+        return refuse("a motion whose velocity jumps, under servos", "round its corners");
+    }
     let moved = directions.iter().filter_map(|direction| direction.motion.as_deref());
-    if jumps(&*arm.motion) || moved.into_iter().any(jumps) {
-        return refuse("a motion whose velocity jumps", "round its corners");
+    let known = |t: f64| jumps.iter().any(|jump| (jump - t).abs() <= SAME_TIME);
+    if !moved.flat_map(PrescribedMotion::velocity_jumps).all(known) {
+        return refuse("a change of the motion whose velocity jumps elsewhere", "round its corners");
     }
     if arm.elements.iter().any(|element| element.geometric.is_some()) {
         return refuse("links that stiffen under load", "leave geometric stiffening out");

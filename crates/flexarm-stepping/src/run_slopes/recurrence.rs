@@ -95,6 +95,8 @@ impl<'a> Recurrence<'a> {
         let tangent = Tangent::new(&arm, p);
         let mut system = ReducedArm::new(arm);
         let (x, v) = system.start(e)?;
+        // Jumps of all velocities at the start.
+        let blow = (system.events.jumps_over() > 0).then(|| system.tau.clone());
         let servo = system.servo.as_ref().map(|servo| ServoSlopes::new(servo, directions));
         let h = request.step_s;
         let integrator = GeneralizedAlpha::new(&mut system, 0.0, h, request.settings, x, v)?.exactly();
@@ -135,11 +137,16 @@ impl<'a> Recurrence<'a> {
             room: DVector::zeros(nv),
             system,
         };
-        run.sample_joints(0.0);
+        let side = run.system.events.side(0.0);
+        run.sample_joints(side);
         if p > 0 {
             run.begin(e, request.start == crate::stepper::Start::Equilibrium)?;
         }
         run.look();
+        if let Some(blow) = &blow {
+            // From rest.
+            run.strike(0.0, blow, None)?;
+        }
         run.accelerate()?;
         Ok(run)
     }
@@ -376,8 +383,10 @@ impl<'a> Recurrence<'a> {
             let h = self.integrator.step_size();
             let now = Integrator::current_mut(&mut self.integrator);
             check_deflection(&self.system.arm, &now.x, stop, h)?;
+            let jumps = self.system.events.jumps_over();
             let change = self.system.at_time(stop, &now.x, &mut now.v)?;
             if change != Change::Nothing {
+                let blow = (self.system.events.jumps_over() > jumps).then(|| self.system.tau.clone());
                 if change == Change::Matrices {
                     self.integrator.renew(&mut self.system)?;
                 } else {
@@ -385,12 +394,61 @@ impl<'a> Recurrence<'a> {
                 }
                 self.sample_servo(stop);
                 self.look();
+                if let Some(blow) = &blow {
+                    let before = self.joints[1].clone();
+                    self.sample_joints(self.system.events.side(stop));
+                    self.strike(stop, blow, Some(&before))?;
+                }
                 self.accelerate()?;
             }
             if stop == end {
                 return Ok(());
             }
         }
+    }
+
+    /// Derivatives of the free velocities where those of the motion jump, `M_ff Δv_f + M_fp Δv_p = 0`: here all jumps are w = `blow`.
+    ///
+    /// ```text
+    /// M_ff δΔv_f = -(∂(M w)/∂q δq + δM w + M_fp δΔv_p)
+    /// ```
+    /// * `before`: derivatives of the motion's velocities on the other side of the jump, none of rest.
+    fn strike(&mut self, t: f64, blow: &DVector<f64>, before: Option<&DMatrix<f64>>) -> Result<(), StepError> {
+        if self.directions.is_empty() {
+            return Ok(());
+        }
+        let Self { system, tangent, directions, joints, x, v, room, own, rhs, matrix, of_inertia, .. } = self;
+        let (arm, free) = (&system.arm, &system.free);
+        rhs.fill(0.0);
+        let Tangent { inertia, work, by_joints, own: [_, _, M], .. } = tangent;
+        forward_kinematics(&arm.model, work, &self.q);
+        inertia.of_inertia(&arm.model, work, &self.q, blow, of_inertia);
+        let [of_free, of_joints] = &mut self.inertia_by;
+        select(of_inertia, free, |j| Some(free[j]), of_free);
+        add_product(of_free, (0, 0), x, rhs);
+        if self.moves {
+            select(of_inertia, free, Some, of_joints);
+            add_product(of_joints, (0, 0), &joints[0], rhs);
+            add_product(&by_joints[2], (0, 0), &joints[1], rhs);
+            if let Some(before) = before {
+                let back = -before;
+                add_product(&by_joints[2], (0, 0), &back, rhs);
+            }
+        }
+        for (k, direction) in directions.iter().enumerate() {
+            room.fill(0.0);
+            for (body, more) in direction.inertias_after(arm, system.events.changes_over()) {
+                inertia.add_inertia_forces(&arm.model, work, body, more, room.as_mut_slice());
+            }
+            own.iter_mut().zip(free).enumerate().for_each(|(i, (own, f))| *own = rhs[(k, i)] + room[*f]);
+            put(own, rhs, k);
+        }
+        matrix.A.copy_from(M);
+        matrix.factor("mass matrix", t)?;
+        rhs.neg_mut();
+        matrix.solve_transposed(rhs);
+        *v += &*rhs;
+        Ok(())
     }
 
     /// Run and tangent to `stop`.
