@@ -319,6 +319,16 @@ fn check(arm: &FlexibleArm, request: &SlopesRequest, directions: &[Direction]) -
                 "the change of the damping or of the stiffness of all springs must have {n} rows and columns"
             )));
         }
+        let rigid = arm.servo.as_ref().map_or(0, |servo| servo.rigid.bodies().len());
+        let beyond =
+            |own: &[(usize, SpatialInertia)], count: usize| own.iter().map(|own| own.0).find(|body| *body >= count);
+        let inertias = beyond(&direction.inertias, arm.model.bodies().len());
+        let fed_forward = if arm.servo.is_some() { beyond(&direction.fed_forward, rigid) } else { None };
+        if let Some(body) = inertias.or(fed_forward) {
+            return Err(StepError::Setup(format!(
+                "a direction changes the inertia of body {body}, which is not there"
+            )));
+        }
         let axes = arm.torque_driven.len();
         if let Some((axis, _)) = direction.servo.iter().find(|(axis, _)| *axis >= axes) {
             return Err(StepError::Setup(format!("a direction changes servo {axis}, the arm has {axes}")));
