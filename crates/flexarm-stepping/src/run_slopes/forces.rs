@@ -2,10 +2,10 @@
 //!
 //! ```text
 //! ∂τ/∂q̇: τ is a polynomial of second degree in q̇, of which central differences of any length are exact
-//! ∂τ/∂q: central differences of sixth order                                            3e-12 with steps of 0.01
+//! ∂τ/∂q: central differences of sixth order
 //! of an inertia I more on a body: Jᵀ (I A + V × I V)                                     J of its origin
 //! ```
-//! Differences take eight passes of the recursions for each coordinate, fourteen with the dispersion correction.
+//! Differences take eight passes of the recursions for each coordinate, twenty with the dispersion correction.
 
 use flexarm_kinematics::{
     Data, DynamicTangent, Frame, Model, Pose, SpatialInertia, State, Twist, forward_kinematics, frame_jacobian,

@@ -107,10 +107,12 @@ impl Arm {
     /// Error of the tool along a run and its derivatives by parameters, side by side. No other stepper than generalised-alpha; iterations go on
     /// to the end, so that the run is a smooth function of all that goes into it.
     ///
-    /// Cost: of kr210 (18 elastic coordinates) about ten ordinary runs, and a quarter of one for each parameter.
+    /// Cost: of kr210 (18 elastic coordinates) about ten ordinary runs, and a quarter of one for each parameter. With closed loops or links in
+    /// modes a hundred runs and more.
     ///
     /// # Errors
-    /// As [`crate::simulate`]; [`Error::Step`] where the arm has what is not differentiated (closed loops, links in modes).
+    /// As [`crate::simulate`]; [`Error::Step`] where the arm has what is not differentiated (links that stiffen under load, motions
+    /// whose velocity jumps under servos).
     pub fn error_slopes(
         &self,
         scenario: impl Into<Scenario>,
