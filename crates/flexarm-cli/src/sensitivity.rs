@@ -20,6 +20,8 @@ Examples:
       flexarm sensitivity kr210 pick_and_place
   On the gearboxes alone, with the derivatives over time as a table:
       flexarm sensitivity kr210 pick_and_place --by 'drive.*' --table slopes.csv
+  On friction and gains of joints under servos:
+      flexarm sensitivity kr300 --drives servo --by 'drive.*.friction.*' --by 'drive.*.servo.*'
   On shifts of the joints:
       flexarm sensitivity kr210 milling_square --by 'motion.*'
   What sag, compliance and frequencies at a pose depend on:
@@ -34,7 +36,8 @@ pub(crate) struct SensitivityArgs {
     pub(crate) motion: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) input: MotionInputArgs,
-    /// Names of what counts, * for anything: drive.joint_2.gearbox.stiffness, link.*, motion.joint_1, tcp.x (may be repeated)
+    /// Names of what counts, * for anything: drive.joint_2.gearbox.stiffness, drive.*.friction.*, drive.*.servo.*, link.*, motion.joint_1, tcp.x
+    /// (may be repeated)
     /// [default: all]
     #[arg(long = "by", value_name = "NAME")]
     pub(crate) by: Vec<String>,
@@ -138,7 +141,9 @@ fn micro(x: f64) -> String {
 }
 
 fn value(value: f64, unit: &str) -> String {
-    if unit == "1" { value.to_string() } else { format!("{value} {unit}") }
+    // Gains that were found have as many digits as numbers have; what a file says has few.
+    let short = format!("{value:.6e}").parse().unwrap_or(value);
+    if unit == "1" { short.to_string() } else { format!("{short} {unit}") }
 }
 
 /// The table with numbers to the right.

@@ -216,7 +216,7 @@ pub(crate) fn explicit(
     q: &DVector<f64>,
     here: &Tangents,
 ) -> (DMatrix<f64>, DMatrix<f64>) {
-    let (m, n) = (arm.model.n_actuated(), here.K.nrows());
+    let n = here.K.nrows();
     match effect {
         Effect::Stiffness(places) => {
             let mut dK = DMatrix::zeros(n, n);
@@ -230,8 +230,8 @@ pub(crate) fn explicit(
                 let element = &arm.elements[place.spring];
                 let (first, size) = (arm.offset(element), element.size);
                 let mut block = dK.view_mut((first, first), (size, size));
-                match &element.curve {
-                    Some(curve) => block[(0, 0)] += curve.slope(q[m + first]),
+                match arm.vibration_slope(place.spring, q.as_slice()) {
+                    Some(slope) => block[(0, 0)] += slope,
                     None => block += slope_of(&element.K, place.coordinate),
                 }
             }

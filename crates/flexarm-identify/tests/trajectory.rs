@@ -8,7 +8,7 @@ use std::sync::Arc;
 use flexarm_identify::*;
 use flexarm_kinematics::{Frame, Model, Pose, SpatialInertia};
 use flexarm_stepping::{
-    AlphaSettings, Damping, FlexibleArm, PrescribedMotion, SlopesRequest, Spring, Start, run_slopes,
+    AlphaSettings, Damping, FlexibleArm, InertiaChange, PrescribedMotion, SlopesRequest, Spring, Start, run_slopes,
 };
 use flexarm_testkit::{reference_arm, reference_motion};
 use nalgebra::{DVector, Matrix3, Vector3};
@@ -88,14 +88,30 @@ fn richardson(h: f64, f: impl Fn(f64) -> DVector<f64>) -> DVector<f64> {
 
 #[test]
 fn the_error_along_a_motion_depends_on_each_parameter_with_the_damping_that_follows_it() {
+    compare(|arm| arm);
+}
+
+/// What is carried changes twice: on the body of the mass that is a parameter, which is gone then, and modal damping follows.
+#[test]
+fn the_damping_after_a_change_of_payload_follows_the_parameters() {
+    let body = plant().tool.body;
+    let carried =
+        |mass: f64| SpatialInertia::from_com(mass, &Vector3::new(0.1, 0.0, 0.1), &(Matrix3::identity() * 0.1));
+    compare(|arm| {
+        let change = |t: f64, mass: f64| InertiaChange { t, body, inertia: carried(mass) };
+        arm.with_inertia_changes(vec![change(0.093, 25.0), change(0.21, 8.0)]).unwrap()
+    });
+}
+
+fn compare(carrying: impl Fn(FlexibleArm) -> FlexibleArm) {
     let plant = plant();
     let parameters = parameters(&plant);
     let (arm, tool) = changed(&plant, None, 0.0);
-    let found = error_slopes(&arm, &parameters, &request(tool)).unwrap();
+    let found = error_slopes(&carrying(arm), &parameters, &request(tool)).unwrap();
     for (k, parameter) in parameters.iter().enumerate() {
         let run = |x: f64| {
             let (arm, tool) = changed(&plant, Some(parameter), x);
-            let found = run_slopes(&arm, &request(tool), &[]).unwrap();
+            let found = run_slopes(&carrying(arm), &request(tool), &[]).unwrap();
             DVector::from_iterator(6 * found.errors.len(), found.errors.iter().flatten().copied())
         };
         // The truth is lost in rounding where the step is small, and damping does little.

@@ -73,6 +73,19 @@ def test_sensitivities_are_those_of_the_command_line_and_of_runs(kr210: flexarm.
         flexarm.sensitivity(kr210, by=["elbow"])
 
 
+def test_friction_and_gains_of_servos_are_parameters_of_a_run(tmp_path: Path) -> None:
+    kr300 = flexarm.load("kr300")
+    by = ["drive.joint_a2.friction.*", "drive.joint_a2.servo.*"]
+    ours = flexarm.sensitivity(kr300, by=by, drives="servo", step=4e-3)
+    theirs = told(
+        "sensitivity", "kr300", "--drives", "servo", "--step", "0.004", "--by", by[0], "--by", by[1], cwd=tmp_path
+    )
+    names = {own["name"].removeprefix("drive.joint_a2.") for own in ours["parameters"]}
+    gains = {"servo.position_gain", "servo.velocity_gain", "servo.integral_gain", "servo.feed_forward"}
+    assert names == gains | {"friction.viscous", "friction.coulomb", "friction.regularisation"}
+    assert [own["peak_m"] for own in ours["parameters"]] == [own["peak_m"] for own in theirs["parameters"]]
+
+
 def test_a_plan_of_measurements_is_that_of_the_command_line(kr210: flexarm.Robot, tmp_path: Path) -> None:
     ours = flexarm.plan_measurements(kr210, 4)
     theirs = told("identify", "kr210", "--plan", "4", "--no-files", cwd=tmp_path)

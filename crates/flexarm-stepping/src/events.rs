@@ -121,6 +121,16 @@ impl EventQueue {
         Some((first.next_down(), self.jumps[self.jumps_over - 1].next_up()))
     }
 
+    /// How many jumps are over.
+    pub(crate) fn jumps_over(&self) -> usize {
+        self.jumps_over
+    }
+
+    /// How many changes of inertia are over.
+    pub(crate) fn changes_over(&self) -> usize {
+        self.changes_over
+    }
+
     /// The next change of inertia that is due at t, which is over with that, and its number.
     pub(crate) fn due_change(&mut self, t: f64) -> Option<(usize, &InertiaChange)> {
         self.changes_before(t + SAME_TIME)

@@ -51,6 +51,11 @@ impl TransmissionError {
         self.harmonics.iter().map(|h| h.amplitude * (h.cycles * q + h.phase).sin()).sum()
     }
 
+    /// d²ε/dq².
+    pub(crate) fn bend(&self, q: f64) -> f64 {
+        self.harmonics.iter().map(|h| -h.amplitude * h.cycles * h.cycles * (h.cycles * q + h.phase).sin()).sum()
+    }
+
     /// dε/dq.
     pub fn slope(&self, q: f64) -> f64 {
         let cosine = |h: &Harmonic| h.amplitude * h.cycles * (h.cycles * q + h.phase + FRAC_PI_2).sin();
@@ -128,9 +133,14 @@ impl LoadFriction {
         self.coefficient * transmitted.abs() * (rate / self.regularisation).tanh()
     }
 
-    fn slope(&self, transmitted: f64, rate: f64) -> f64 {
+    pub(crate) fn slope(&self, transmitted: f64, rate: f64) -> f64 {
         let t = (rate / self.regularisation).tanh();
         self.coefficient * transmitted.abs() * (1.0 - t * t) / self.regularisation
+    }
+
+    /// Derivative of the friction by the transmitted torque.
+    pub(crate) fn by_torque(&self, transmitted: f64, rate: f64) -> f64 {
+        self.coefficient * transmitted.signum() * (rate / self.regularisation).tanh()
     }
 }
 
@@ -165,12 +175,12 @@ impl GearCoupling {
     }
 
     /// Place of a coordinate among the coupled ones.
-    fn place(&self, coordinate: usize) -> Option<usize> {
+    pub(crate) fn place(&self, coordinate: usize) -> Option<usize> {
         self.coordinates.iter().position(|k| *k == coordinate)
     }
 
     /// Rate of the motor of that number behind its gear.
-    fn motor_rate(&self, number: usize, rates: &[f64]) -> f64 {
+    pub(crate) fn motor_rate(&self, number: usize, rates: &[f64]) -> f64 {
         self.coordinates.iter().enumerate().map(|(j, k)| self.C_inverse[(number, j)] * rates[*k]).sum()
     }
 }
@@ -293,6 +303,19 @@ impl FlexibleArm {
         errors.fold(e, |delta, error| delta - error.at(q[error.motor]))
     }
 
+    /// Slope of a curved spring in small motions about all coordinates `q`, none of a straight one: no friction slips, and from within a
+    /// play the steepest.
+    pub fn vibration_slope(&self, element: usize, q: &[f64]) -> Option<f64> {
+        let own = &self.elements[element];
+        let curve = own.curve.as_ref()?;
+        let delta = self.deflection(element, q[own.coordinate], q);
+        if let Some(law) = self.hysteresis.iter().find(|law| law.element == element) {
+            return Some(law.stuck_slope(delta));
+        }
+        let slope = curve.slope(delta);
+        Some(if slope > 0.0 { slope } else { curve.stiffest() })
+    }
+
     /// What the springs pull with, and the energy in each element, at rest with all coordinates at `q`.
     ///
     /// Forces over the elastic coordinates (N, N m); of coupled gears the energy is that of the joint's part, `F e / 2`.
@@ -355,20 +378,26 @@ impl FlexibleArm {
 
     /// Slope of the friction of a coordinate by the rate of another one; never falling.
     pub(crate) fn friction_slope(&self, row: usize, column: usize, rates: &[f64], gears: &GearState) -> f64 {
-        let own = |k: usize, rate: f64| self.friction.get(k).map_or(0.0, |f| f.slope(rate).max(0.0));
+        let unloaded = self.unloaded_friction_slope(row, column, rates, 0.0);
+        if row != column {
+            return unloaded;
+        }
+        let loaded = self.load_friction.iter().filter(|law| law.coordinate == row);
+        let loaded = loaded
+            .map(|law| law.slope(law.element.map_or(0.0, |k| gears.F[self.offset(&self.elements[k])]), rates[row]));
+        unloaded + loaded.sum::<f64>()
+    }
+
+    /// The same without what grows with the transmitted torque; the slope of each motor is this or more.
+    pub(crate) fn unloaded_friction_slope(&self, row: usize, column: usize, rates: &[f64], least: f64) -> f64 {
+        let own = |k: usize, rate: f64| self.friction.get(k).map_or(0.0, |f| f.slope(rate).max(least));
         let places = self.coupling.as_ref().and_then(|c| Some((c, c.place(row)?, c.place(column)?)));
         if let Some((coupling, i, j)) = places {
             let C = &coupling.C_inverse;
             let motors = coupling.coordinates.iter().enumerate();
             return motors.map(|(m, k)| C[(m, i)] * own(*k, coupling.motor_rate(m, rates)) * C[(m, j)]).sum();
         }
-        if row != column {
-            return 0.0;
-        }
-        let loaded = self.load_friction.iter().filter(|law| law.coordinate == row);
-        let loaded = loaded
-            .map(|law| law.slope(law.element.map_or(0.0, |k| gears.F[self.offset(&self.elements[k])]), rates[row]));
-        own(row, rates[row]) + loaded.sum::<f64>()
+        if row == column { own(row, rates[row]) } else { 0.0 }
     }
 }
 
@@ -388,8 +417,8 @@ struct Slipped {
 #[derive(Clone, Debug)]
 pub(crate) struct GearState {
     /// Deflections and their rates, per elastic coordinate.
-    delta: DVector<f64>,
-    rate: DVector<f64>,
+    pub(crate) delta: DVector<f64>,
+    pub(crate) rate: DVector<f64>,
     /// Forces of springs and dampers on them.
     pub(crate) F: DVector<f64>,
     /// The part of the dampers.
@@ -464,6 +493,25 @@ impl GearState {
         match arm.hysteresis.iter().zip(&self.slipped).find(|(law, _)| law.element == k) {
             Some((law, slipped)) => law.elastic.slope(delta) + slipped.slope(law, delta),
             None => curve.slope(delta),
+        }
+    }
+
+    /// Torque of a spring with hysteresis at its last deflection, none of another one.
+    pub(crate) fn hysteresis_torque(&self, arm: &FlexibleArm, element: usize) -> Option<f64> {
+        let (law, slipped) = arm.hysteresis.iter().zip(&self.slipped).find(|(law, _)| law.element == element)?;
+        let delta = self.delta[arm.offset(&arm.elements[element])];
+        Some(law.elastic.torque(delta) + slipped.torque(law, delta))
+    }
+
+    /// Of each slider of each law its stiffness, 0 where it slips.
+    pub(crate) fn stuck(&self, arm: &FlexibleArm, mut tell: impl FnMut(usize, usize, f64)) {
+        let mut number = 0;
+        for (law, slipped) in arm.hysteresis.iter().zip(&self.slipped) {
+            let k = arm.offset(&arm.elements[law.element]);
+            for (s, slider) in slipped.at(law, self.delta[k]) {
+                tell(number, k, if s.abs() < slider.reach { slider.stiffness } else { 0.0 });
+                number += 1;
+            }
         }
     }
 
@@ -588,6 +636,9 @@ mod tests {
             let slope = (error.at(q + 1e-6) - error.at(q - 1e-6)) / 2e-6;
             // measured 1.3e-11
             assert!((slope - error.slope(q)).abs() < 1e-9, "{slope} {}", error.slope(q));
+            let bend = (error.slope(q + 1e-5) - error.slope(q - 1e-5)) / 2e-5;
+            // measured 2e-7 of 0.6
+            assert!((bend - error.bend(q)).abs() < 2e-6, "{bend} {}", error.bend(q));
         }
     }
 }

@@ -77,7 +77,10 @@ pub use motion::{Held, MotionFn, PrescribedMotion};
 pub use observation::Observation;
 pub use operating_point::{Asked, OperatingPoint, PoseAnswer};
 pub use reduced::ReducedArm;
-pub use run_slopes::{Direction, ErrorSlopes, RunSlopes, SlopesRequest, SpringSlope, equilibrium_slopes, run_slopes};
+pub use run_slopes::{
+    AxisSlope, Direction, ErrorSlopes, RunSlopes, SlopesRequest, SpringSlope, TorqueLimited, equilibrium_slopes,
+    run_slopes,
+};
 pub use static_path::StaticPath;
 pub use static_targets::{StaticTargets, TargetError, static_targets};
 pub use statics::static_equilibrium;

@@ -10,9 +10,26 @@ use crate::arm::{FlexibleArm, Servo};
 use crate::drive::Friction;
 use crate::gear::LoadFriction;
 
+/// What a sample found and did on an axis, for those who differentiate it.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct AxisSample {
+    /// Reference less joint (rad or m).
+    pub(crate) lag: f64,
+    /// Error of the speed loop.
+    pub(crate) error: f64,
+    /// What was fed forward.
+    pub(crate) ahead: f64,
+    /// Whether it set the integral from the torque held.
+    pub(crate) filled: bool,
+    /// Whether the torque is at its limit.
+    pub(crate) limited: bool,
+    /// Whether the integral went on.
+    pub(crate) integrated: bool,
+}
+
 /// State of a [`Servo`] in a run.
 pub(crate) struct ServoState {
-    servo: Arc<Servo>,
+    pub(crate) servo: Arc<Servo>,
     friction: Vec<Friction>,
     load_friction: Vec<LoadFriction>,
     /// Torque held until the next sample, one per axis.
@@ -22,8 +39,11 @@ pub(crate) struct ServoState {
     /// The first sample sets the integrals so that the torques stay what they are.
     fresh: bool,
     data: Data,
-    reference: State,
-    qddot: DVector<f64>,
+    pub(crate) reference: State,
+    pub(crate) qddot: DVector<f64>,
+    /// Samples so far, and what the last one did.
+    pub(crate) samples: u64,
+    pub(crate) last: Vec<AxisSample>,
 }
 
 impl ServoState {
@@ -38,6 +58,8 @@ impl ServoState {
             data: Data::new(&servo.rigid),
             reference: State::zeros(&servo.rigid),
             qddot: DVector::zeros(servo.rigid.nv()),
+            samples: 0,
+            last: vec![AxisSample::default(); n],
             servo,
         }
     }
@@ -48,6 +70,11 @@ impl ServoState {
         let (q, qdot) = (self.reference.q.as_mut_slice(), self.reference.qdot.as_mut_slice());
         arm.motion.sample(t, &mut q[..n], &mut qdot[..n], self.qddot.as_mut_slice());
         inverse_dynamics(&self.servo.rigid, &mut self.data, &self.reference, &self.qddot);
+    }
+
+    /// Torque of the rigid robot on the reference of the last sample.
+    pub(crate) fn rigid_torque(&self, coordinate: usize) -> f64 {
+        self.data.tau[coordinate]
     }
 
     fn feed_forward(&self, axis: usize) -> f64 {
@@ -74,20 +101,26 @@ impl ServoState {
         for axis in 0..self.servo.axes.len() {
             let a = self.servo.axes[axis];
             let k = a.coordinate;
-            let wanted = self.reference.qdot[k] + a.position_gain * (self.reference.q[k] - x[axis]);
+            let lag = self.reference.q[k] - x[axis];
+            let wanted = self.reference.qdot[k] + a.position_gain * lag;
             let error = wanted - v[axis];
             let ahead = self.feed_forward(axis);
             // Without an integrator nothing remembers the load: the joint sags into its gains.
-            if self.fresh && a.integral_gain > 0.0 {
+            let filled = self.fresh && a.integral_gain > 0.0;
+            if filled {
                 self.integral[axis] = self.torque[axis] - ahead - a.velocity_gain * error;
             }
             let unlimited = a.velocity_gain * error + self.integral[axis] + ahead;
             self.torque[axis] = unlimited.clamp(-a.limit, a.limit);
             // At the limit the integral only runs back.
-            if unlimited == self.torque[axis] || (unlimited > 0.0) != (error > 0.0) {
+            let limited = unlimited != self.torque[axis];
+            let integrated = !limited || (unlimited > 0.0) != (error > 0.0);
+            self.last[axis] = AxisSample { lag, error, ahead, filled, limited, integrated };
+            if integrated {
                 self.integral[axis] += a.integral_gain * self.servo.sample_s * error;
             }
         }
         self.fresh = false;
+        self.samples += 1;
     }
 }

@@ -351,11 +351,25 @@ fn what_is_not_differentiated_is_refused_with_a_way_out() {
     let case = Case { tree: reference_arm(true).mechanism, loaded: false, settings: AlphaSettings::default() };
     let arm = case.arm(What::Tool, 0.0);
     let request = case.request(&arm, Vector3::zeros());
-    let body = arm.model.frame("tcp").unwrap().body;
-    let inertia = arm.model.bodies()[body].inertia;
-    let change = InertiaChange { t: 0.1, body, inertia };
-    let error = run_slopes(&arm.clone().with_inertia_changes(vec![change]).unwrap(), &request, &[]).unwrap_err();
-    assert!(matches!(error, StepError::NoSlopes { .. }) && error.to_string().contains("from the start"), "{error}");
+    struct Jumps;
+    impl PrescribedMotion for Jumps {
+        fn sample(&self, _t: f64, q: &mut [f64], qdot: &mut [f64], qddot: &mut [f64]) {
+            [q, qdot, qddot].into_iter().for_each(|x| x.fill(0.0));
+        }
+
+        fn velocity_jumps(&self) -> Vec<f64> {
+            vec![0.1]
+        }
+    }
+    let elsewhere = Direction { motion: Some(Arc::new(Jumps)), ..Direction::default() };
+    let error = run_slopes(&arm, &request, &[elsewhere]).unwrap_err();
+    assert!(matches!(error, StepError::NoSlopes { .. }) && error.to_string().contains("round its corners"), "{error}");
+    let unknown = Direction { servo: vec![(0, AxisSlope::default())], ..Direction::default() };
+    let error = run_slopes(&arm, &request, &[unknown]).unwrap_err();
+    assert!(error.to_string().contains("servo 0"), "{error}");
+    let beyond = Direction { inertias: vec![(99, per_kg())], ..Direction::default() };
+    let error = run_slopes(&arm, &request, &[beyond]).unwrap_err();
+    assert!(error.to_string().contains("body 99"), "{error}");
     let nowhere = Direction { springs: vec![(7, SpringSlope::Factor(1.0))], ..Direction::default() };
     let error = run_slopes(&arm, &request, &[nowhere]).unwrap_err();
     assert!(error.to_string().contains("spring 7"), "{error}");

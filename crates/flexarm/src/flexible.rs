@@ -13,8 +13,7 @@ use flexarm_flexlink::{
 use flexarm_kinematics::{Coordinate, Data, ElasticAngles, ElasticGroup, Frame, MOST_COORDINATES, Model, mass_matrix};
 use flexarm_settings::Setting;
 use flexarm_stepping::{
-    Damping, FlexibleArm, Friction, GearCoupling, GeometricStiffness, PrescribedMotion, Servo, ServoAxis, Spring,
-    StepError,
+    Damping, FlexibleArm, Friction, GearCoupling, GeometricStiffness, PrescribedMotion, Servo, Spring, StepError,
 };
 use nalgebra::{DMatrix, DVector, Matrix6, Vector3};
 
@@ -31,11 +30,6 @@ use crate::robot::{Robot, tcp_frame};
 /// chain of n parts divides by n only.
 const EULER_CHAIN: &str = "its chain has angles = \"euler-zyx\": where it bends about two axes or twists, its deflection \
                            converges with the number of parts, not with the square of it as with rotation vectors";
-/// Default gain of the position loop (1/s), bandwidth of the speed loop (1/s), integral over speed gain (1/s), sample (s).
-const SERVO: [f64; 4] = [20.0, 100.0, 20.0, 1e-3];
-/// Most of the quick inertia over the sampling time that a default velocity gain takes: 2 is where a sampled speed loop
-/// becomes unstable.
-const QUICK_GAIN: f64 = 0.4;
 /// Most fixed-interface modes of a link.
 const MOST_MODES: usize = 200;
 /// Fixed-interface modes of a beam link that does not say how many.
@@ -237,7 +231,7 @@ pub struct FlexibleRobot {
     /// What gears do beside giving way.
     pub(crate) gears: GearLaws,
     /// Joints driven by torque: coordinate, servo, limit.
-    torque: Vec<(usize, ServoEntry, f64)>,
+    pub(crate) torque: Vec<(usize, ServoEntry, f64)>,
     /// Doubts about the models of the links.
     pub doubts: Vec<Caveat>,
     /// The springs under the base, as the last of the spans.
@@ -279,32 +273,11 @@ impl FlexibleRobot {
         if self.torque.is_empty() {
             return Ok(arm);
         }
-        // Default gains fit the inertia that each motor sees at the start.
         let n = self.rigid.nv();
         let (mut q, mut v, mut a) = (DVector::zeros(n), DVector::zeros(n), DVector::zeros(n));
         arm.motion.sample(0.0, q.as_mut_slice(), v.as_mut_slice(), a.as_mut_slice());
-        let M = mass_matrix(&self.rigid, &mut Data::new(&self.rigid), &q).clone();
-        let [position, bandwidth, integral, sample] = SERVO;
-        let sample_s = self.torque.iter().find_map(|(_, servo, _)| servo.sample_s).unwrap_or(sample);
-        let quick = self.quick_inertia(&q);
-        let axes = self.torque.iter().zip(&quick).map(|(&(coordinate, servo, limit), quick)| {
-            // Between samples a motor feels only what follows it at once: the springs give way first.
-            let most = QUICK_GAIN * quick / sample_s;
-            let inertia = M[(coordinate, coordinate)];
-            let velocity_gain = servo.velocity_gain.unwrap_or((bandwidth * inertia).min(most));
-            // The outer loops must be slower than the speed loop within them.
-            let slower = 0.25 * velocity_gain / inertia;
-            let inner = |gain: f64| if servo.velocity_gain.is_none() { gain.min(slower) } else { gain };
-            ServoAxis {
-                coordinate,
-                position_gain: servo.position_gain.unwrap_or(inner(position)),
-                velocity_gain,
-                integral_gain: servo.integral_gain.unwrap_or(inner(integral) * velocity_gain),
-                feed_forward: servo.feed_forward.unwrap_or(true),
-                limit,
-            }
-        });
-        arm.with_servo(Servo { sample_s, axes: axes.collect(), rigid: self.rigid.clone() })
+        let axes = self.servo_axes(&self.inertias_felt(&self.model, &self.rigid, &q));
+        arm.with_servo(Servo { sample_s: self.sample_s(), axes, rigid: self.rigid.clone() })
     }
 
     /// An error with the links that lack inertia, if that is the reason.
@@ -353,7 +326,11 @@ impl FlexibleRobot {
 
     /// Inertia that each torque-driven joint feels at once, all other free coordinates yielding: `1 / (M_ff^-1)_ii`.
     pub(crate) fn quick_inertia(&self, actuated: &DVector<f64>) -> Vec<f64> {
-        let (model, n) = (&self.model, self.model.n_actuated());
+        self.quick_inertia_of(&self.model, actuated)
+    }
+
+    pub(crate) fn quick_inertia_of(&self, model: &Model, actuated: &DVector<f64>) -> Vec<f64> {
+        let n = model.n_actuated();
         let mut q = DVector::zeros(model.nv());
         q.rows_mut(0, n).copy_from(actuated);
         let M = mass_matrix(model, &mut Data::new(model), &q).clone();

@@ -94,6 +94,7 @@ mod robot_file;
 mod run;
 mod scenario;
 pub mod sensitivity;
+mod servo_gains;
 mod settling;
 mod static_part;
 mod statics;

@@ -1,5 +1,6 @@
 //! Derivatives of the tool's error by the numbers of shipped robots: against Richardson differences of runs, what they cost, what is refused.
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
+#![allow(non_snake_case, reason = "monogram notation")]
 #![allow(clippy::print_stderr, reason = "measured numbers are shown with --nocapture")]
 
 use std::path::Path;
@@ -131,7 +132,7 @@ fn the_six_directions_of_a_link_are_together_its_factor() {
     }
 }
 
-/// The robot file of kr210 in a folder of its own, to be changed.
+/// The robot file of a shipped robot in a folder of its own, to be changed.
 struct Changed {
     folder: std::path::PathBuf,
     text: String,
@@ -139,16 +140,27 @@ struct Changed {
 
 impl Changed {
     fn new(name: &str) -> Self {
+        Self::of("kr210", name)
+    }
+
+    fn of(robot: &str, name: &str) -> Self {
         let folder = std::env::temp_dir().join(format!("flexarm-sensitivity-{name}-{}", std::process::id()));
         std::fs::create_dir_all(&folder).unwrap();
-        let home = place("robots/kr210").canonicalize().unwrap();
+        let home = place(&format!("robots/{robot}")).canonicalize().unwrap();
         let text = std::fs::read_to_string(home.join("robot.toml")).unwrap();
         let absolute = |text: String, key: &str, path: &str| {
             text.replace(&format!("{key} = \"{path}"), &format!("{key} = \"{}/{path}", home.display()))
         };
-        let text = absolute(text, "urdf", "kr210.urdf");
+        let text = absolute(text, "urdf", &format!("{robot}.urdf"));
         let text = absolute(text, "reduced", "fe/");
         Self { folder, text: absolute(text, "default_trajectory", "../../") }
+    }
+
+    /// The robot with one place of its file changed for good.
+    fn kept(mut self, old: &str, new: &str) -> Self {
+        assert!(self.text.contains(old), "{old}");
+        self.text = self.text.replacen(old, new, 1);
+        self
     }
 
     fn with(&self, old: &str, new: &str) -> Result<Robot, flexarm::Error> {
@@ -157,6 +169,133 @@ impl Changed {
         std::fs::write(&file, self.text.replace(old, new)).unwrap();
         Robot::load(&file)
     }
+}
+
+/// A number of a robot or motion file, and the parameter of that name.
+struct Written<'a> {
+    name: &'a str,
+    /// Text before it, the number, text after it.
+    text: [&'a str; 3],
+    /// Length of the differences, of the logarithm for what is told per 1 %.
+    size: f64,
+}
+
+impl Changed {
+    /// Errors of all times of a run, with a number of the robot file, or else of the motion file, changed by x.
+    fn errors(&self, motion: &str, run: &RunOptions, own: Option<&Written<'_>>, x: f64) -> Vec<f64> {
+        let motion = std::fs::read_to_string(place(&format!("trajectories/{motion}.toml"))).unwrap();
+        let (mut robot, mut moved) = (self.text.clone(), motion);
+        if let Some(Written { name, text: [before, number, after], .. }) = own {
+            let value: f64 = number.parse().unwrap();
+            let linear = *name == "payload.mass" || name.starts_with("motion.");
+            let changed = if linear { value + x } else { value * x.exp() };
+            let (old, new) = (format!("{before}{number}{after}"), format!("{before}{changed:?}{after}"));
+            let own = if name.starts_with("motion.") { &mut moved } else { &mut robot };
+            assert!(own.contains(&old), "{old}");
+            *own = own.replace(&old, &new);
+            if name.starts_with("motion.") {
+                // Start and end alike.
+                let end = -1.2217304763960306f64;
+                *own = own.replace(&format!("{end:?}"), &format!("{:?}", end + x));
+            }
+        }
+        let (file, path) = (self.folder.join("robot.toml"), self.folder.join("motion.toml"));
+        std::fs::write(&file, robot).unwrap();
+        std::fs::write(&path, moved).unwrap();
+        let robot = Robot::load(&file).unwrap();
+        let motion = Motion::load(&path, &robot).unwrap();
+        let found = robot.flexible(run.modelling).unwrap().error_slopes(&motion, run, &[], true).unwrap();
+        found.errors.into_iter().flatten().collect()
+    }
+
+    /// Derivatives against differences of runs of changed files.
+    fn compare(&self, motion: &str, run: &RunOptions, all: &[Written<'_>]) {
+        let file = self.folder.join("robot.toml");
+        std::fs::write(&file, &self.text).unwrap();
+        let robot = Robot::load(&file).unwrap();
+        let motion_file = Motion::load(place(&format!("trajectories/{motion}.toml")), &robot).unwrap();
+        let parameters = all.iter().map(|own| own.name.to_owned()).collect();
+        let table = Some(self.folder.join("slopes.csv"));
+        let request = SensitivityRequest { run: run.clone(), parameters, table: table.clone(), overwrite: true };
+        let found = sensitivity(&robot, &motion_file, &request).unwrap();
+        assert_eq!(found.parameters.len(), all.len());
+        let table = std::fs::read_to_string(table.unwrap()).unwrap();
+        let mut lines = table.lines();
+        let head: Vec<&str> = lines.next().unwrap().split(',').collect();
+        let rows: Vec<Vec<f64>> = lines.map(|row| row.split(',').map(|x| x.parse().unwrap()).collect()).collect();
+        for own in all {
+            let first = head.iter().position(|name| *name == format!("{}.x", own.name)).unwrap();
+            let per = &found.parameters.iter().find(|parameter| parameter.name == own.name).unwrap().per;
+            let scale = if *per == "1 kg" {
+                1.0
+            } else if *per == "1 %" {
+                0.01
+            } else {
+                1e-3
+            };
+            let slopes = rows.iter().flat_map(|row| row[first..first + 6].iter().map(|x| x / scale));
+            let truth = richardson(own.size, |x| self.errors(motion, run, Some(own), x));
+            let largest = truth.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+            let off = slopes.zip(&truth).fold(0.0f64, |m, (a, b)| m.max((a - b).abs()));
+            eprintln!("{}: {:.1e} of {largest:.2e}", own.name, off / largest);
+            assert!(off < 1e-8 * largest + 4e-14 / own.size, "{}: {:e}", own.name, off / largest);
+        }
+    }
+}
+
+/// Truth: differences of whole runs of the robot with other numbers in its file: under servos whose gains follow the inertia at the start
+/// where the file leaves them out, and of which one is at its torque limit for a while.
+#[test]
+fn the_error_of_manutec_r3_under_servos_depends_on_the_numbers_of_its_files() {
+    let friction = "friction = { viscous = 20.0, coulomb = 30.0, stribeck = 9.0, regularisation = 0.05 }";
+    let servo = "servo = { position_gain = 15.0, velocity_gain = 6000.0, integral_gain = 90000.0 }";
+    let head = "joint = \"joint_1\"\n";
+    let manutec = Changed::of("manutec_r3", "servo").kept(head, &format!("{head}{friction}\n{servo}\n"));
+    let own = |name: &'static str, text: [&'static str; 3], size: f64| Written { name, text, size };
+    let all = [
+        own("payload.mass", ["mass = ", "15.0", ","], 0.02),
+        own("drive.joint_2.gearbox.stiffness", ["stiffness = ", "352800.0", ","], 1e-3),
+        own("drive.joint_1.gearbox.damping", ["damping = ", "55.125", " "], 0.05),
+        own("drive.joint_1.friction.viscous", ["viscous = ", "20.0", ","], 0.05),
+        own("drive.joint_1.friction.coulomb", ["coulomb = ", "30.0", ","], 0.05),
+        own("drive.joint_1.friction.stribeck", ["stribeck = ", "9.0", ","], 0.1),
+        own("drive.joint_1.friction.regularisation", ["regularisation = ", "0.05", " "], 0.02),
+        own("drive.joint_1.servo.position_gain", ["position_gain = ", "15.0", ","], 0.01),
+        own("drive.joint_1.servo.velocity_gain", ["velocity_gain = ", "6000.0", ","], 0.01),
+        own("drive.joint_1.servo.integral_gain", ["integral_gain = ", "90000.0", " "], 0.01),
+        own("motion.joint_2", ["", "0.3490658503988659", ""], 1e-4),
+    ];
+    let modelling = Modelling { drives: DriveModel::Servo, ..Modelling::default() };
+    let run = RunOptions { modelling, ..RunOptions::default() };
+    manutec.compare("manutec_r3", &run, &all);
+    let robot = Robot::load(manutec.folder.join("robot.toml")).unwrap();
+    let motion = Motion::load(place("trajectories/manutec_r3.toml"), &robot).unwrap();
+    let parameters = vec!["payload.mass".to_owned()];
+    let found = sensitivity(&robot, &motion, &SensitivityRequest { run, parameters, ..Default::default() }).unwrap();
+    let limited = found.caveats.iter().find(|caveat| caveat.code == "servo-limit").unwrap();
+    assert!(limited.message.contains("joint_2") && limited.message.contains("first at 1.2"), "{}", limited.message);
+}
+
+/// Truth: differences of whole runs of changed files, of an arm with closed loops and of one whose links bend in modes with modal damping.
+#[test]
+fn loops_and_modes_depend_on_the_numbers_of_their_files() {
+    let own = |name: &'static str, text: [&'static str; 3], size: f64| Written { name, text, size };
+    let coarse = RunOptions { step_s: 0.01, ..RunOptions::default() };
+    let all = [
+        own("payload.mass", ["mass = ", "180.0", ","], 1.0),
+        own("drive.joint_2.gearbox.stiffness", ["stiffness = ", "3.4e6", ","], 0.01),
+    ];
+    Changed::of("palletiser", "loops").compare("palletise", &coarse, &all);
+    let modelling = Modelling { links: flexarm::LinkModel::Modal, ..Modelling::default() };
+    let all = [
+        own("payload.mass", ["mass = ", "150.0", ","], 0.5),
+        own("link.link_2.damping", ["damping = { modal = ", "0.03", " }"], 0.1),
+    ];
+    // The first of the two links is link_2: the other one's damping is written otherwise.
+    let mut kr210 = Changed::new("modes");
+    let second = kr210.text.rfind("damping = { modal = 0.03 }").unwrap();
+    kr210.text.replace_range(second.., &kr210.text[second..].replacen("0.03 }", "0.0300 }", 1));
+    kr210.compare("point_to_point", &RunOptions { modelling, ..coarse }, &all);
 }
 
 impl Drop for Changed {
@@ -194,6 +333,57 @@ fn a_factor_of_one_direction_in_the_robot_file_does_what_its_derivative_says() {
     assert!(error.contains("lumped link"), "{error}");
 }
 
+/// Truth: closed form. A point at r from the TCP, tool axes, moves with the tool as a rigid lever: its compliance is `X C Xᵀ` with
+/// `X = [1 -[R r]x; 0 1]`, R the tool's axes in the world, whatever the arm. The compliance of such a tool in the robot file shows whether the
+/// derivative has the right axes (other ones, or those of the flange, are far off), its first order whether it has the right sign.
+#[test]
+fn the_compliance_beside_the_tool_is_that_of_a_rigid_lever_in_the_tools_own_axes() {
+    use nalgebra::{Matrix3, Matrix6, Rotation3, Vector3};
+    let at = [0.3, -1.2, 1.5, 0.2, 0.4, -0.5];
+    // Turned against the flange, so that its axes are those of nothing else.
+    let turn = [0.4, -0.7, 1.1];
+    let kr210 = Changed::new("lever");
+    let tool = |xyz: [f64; 3]| {
+        let robot = kr210
+            .with("xyz = [0.0, 0.0, 0.35], rpy = [0.0, 0.0, 0.0]", &format!("xyz = {xyz:?}, rpy = {turn:?}"))
+            .unwrap();
+        pose_sensitivity(&robot, Modelling::default(), Some(&at), &["tcp.*".to_owned()]).unwrap()
+    };
+    let base = [0.0, 0.0, 0.35];
+    let matrix = |rows: [[f64; 6]; 6]| Matrix6::from_fn(|i, j| rows[i][j]);
+    let here = tool(base);
+    let C = matrix(here.compliance);
+    let R_FT = Rotation3::from_euler_angles(turn[0], turn[1], turn[2]);
+    for (axis, own) in here.parameters.iter().enumerate() {
+        // The tool 0.2 m along its own axis, by the robot file, in the axes of the flange.
+        let r = 0.2;
+        let place = Vector3::from(base) + R_FT * Vector3::ith(axis, r);
+        let moved = matrix(tool(place.into()).compliance);
+        // Where that lies in the world: the derivative's direction, checked for itself.
+        let a = Vector3::from(own.tcp_m) * (r / 1e-3);
+        let lever = |a: Vector3<f64>| {
+            let mut X = Matrix6::identity();
+            let turned: Matrix3<f64> = -a.cross_matrix();
+            X.fixed_view_mut::<3, 3>(0, 3).copy_from(&turned);
+            X
+        };
+        let closed = lever(a) * C * lever(a).transpose();
+        let scale = moved.amax();
+        assert!((closed - moved).amax() < 1e-9 * scale, "{}: {:e}", own.name, (closed - moved).amax() / scale);
+        // The other side, and other axes, are far off.
+        for a in [-a, Vector3::ith(axis, r), R_FT * Vector3::ith(axis, r)] {
+            let other = lever(a) * C * lever(a).transpose();
+            assert!((other - moved).amax() > 1e-2 * scale, "{}", own.name);
+        }
+        // To first order the derivative is the lever's.
+        let X = lever(a) - Matrix6::identity();
+        let slope = (X * C + C * X.transpose()) * (1e-3 / r);
+        let error = (slope - matrix(own.compliance)).amax() / slope.amax();
+        eprintln!("{}: {error:.1e}", own.name);
+        assert!(error < 1e-12, "{}: {error:e}", own.name);
+    }
+}
+
 /// Truth: the same robot with its tool elsewhere. The compliance is a polynomial of second degree in the place of the tool, so that
 /// differences of second order are exact but for rounding.
 #[test]
@@ -225,12 +415,8 @@ fn the_place_of_the_tool_moves_it_and_changes_its_compliance_as_another_tool_doe
 }
 
 #[test]
-fn what_has_no_derivatives_and_names_that_are_none_are_refused() {
+fn names_that_are_none_are_refused() {
     let (robot, _, motion) = shipped("manutec_r3", "manutec_r3");
-    let servo = Modelling { drives: DriveModel::Servo, ..Modelling::default() };
-    let run = RunOptions { modelling: servo, ..RunOptions::default() };
-    let error = sensitivity(&robot, &motion, &SensitivityRequest { run, ..Default::default() }).unwrap_err();
-    assert!(error.to_string().contains("prescribe the joints' motion"), "{error}");
     let request = SensitivityRequest { parameters: vec!["drive.elbow".into()], ..SensitivityRequest::default() };
     let error = sensitivity(&robot, &motion, &request).unwrap_err();
     assert!(error.to_string().contains("motion.joint_1"), "{error}");

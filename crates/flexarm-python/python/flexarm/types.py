@@ -962,11 +962,11 @@ class ParameterSensitivity(TypedDict):
     """What a change of one number does to the error."""
 
     name: str
-    """By the names of the robot file; `motion.JOINT` for a shift of a joint, `tcp.x`, `.y` and `.z` for the place of the tool in its own axes."""
+    """By the names of the robot file, of joints under servos `drive.JOINT.servo.` with their gains and `drive.JOINT.friction.` too; `motion.JOINT` for a shift of a joint, `tcp.x`, `.y` and `.z` for the place of the tool in its own axes."""
     unit: str
     """Its unit."""
     value: float
-    """Its value; 0 of a shift."""
+    """Its value; 0 of a shift, 1 of what a servo feeds forward."""
     per: str
     """Of which change of it the following are the effect: `1 %`, `1 kg`, `1 mrad` or `1 mm`. They are derivatives, times that."""
     peak_m: float

@@ -3,27 +3,35 @@
 //! ```text
 //! r(q, q̇, q̈; p) = 0:     M δẍ + V δẋ + K δx = -(∂r/∂p + K_a δq_a + V_a δq̇_a + M_a δq̈_a)                           (1)
 //! ```
-//! holds at the end of every step, with `K = ∂r/∂x`, `V = ∂r/∂ẋ` in closed form ([`DynamicTangent`]); the formulas that join x, ẋ and ẍ
+//! holds at the end of every step, with `K = ∂r/∂x`, `V = ∂r/∂ẋ` in closed form ([`flexarm_kinematics::DynamicTangent`]), where loops close or
+//! links bend in modes by differences of the recursions (`forces.rs`); the formulas that join x, ẋ and ẍ
 //! of two steps are linear, so that a step is one linear system for all parameters: a column each. What differs from a run of
 //! [`crate::GeneralizedAlpha`] is that its iterations go on to the end and that the matrix of its dispersion correction is that of the
 //! start of each step: a run whose result is a smooth function of the parameters, of which differences can be taken
 //! ([`GeneralizedAlpha::exactly`]). An ordinary run differs from it by what its iterations leave, far less than the error of its step.
 //!
-//! Start at [`run_slopes`]. Not here: names and units of parameters (`flexarm-identify`), drives under torque, gears with laws of their own,
-//! links in modes, closed loops, payloads that change: these are refused.
+//! Torques under servos are held from sample to sample, and so are their derivatives (`servo.rs`); ripple, hysteresis, coupling and
+//! friction by load are in `gears.rs`. Start at [`run_slopes`]. Not here: names and units of parameters (`flexarm-identify`), motions whose
+//! velocity jumps under servos, links that stiffen under load: these are refused.
 
 mod columns;
+mod forces;
+mod gears;
 mod lu;
 mod recurrence;
+mod servo;
+mod tangent;
 mod tool;
 
 use std::sync::Arc;
 
-use flexarm_kinematics::{DynamicTangent, Frame, SpatialInertia};
+use flexarm_kinematics::{Frame, SpatialInertia};
 use nalgebra::{DMatrix, DVector, Vector3};
 
 use crate::arm::FlexibleArm;
+use crate::drive::Friction;
 use crate::error::StepError;
+use crate::events::SAME_TIME;
 use crate::motion::PrescribedMotion;
 use crate::statics::static_equilibrium;
 use crate::stepper::Start;
@@ -36,14 +44,67 @@ use tool::ToolError;
 pub struct Direction {
     /// Stiffness of springs, by their number.
     pub springs: Vec<(usize, SpringSlope)>,
+    /// Stiffness of all elastic coordinates together, where springs are coupled.
+    pub stiffness: Option<DMatrix<f64>>,
     /// Damping matrix of the elastic coordinates.
     pub damping: Option<DMatrix<f64>>,
-    /// Inertia of bodies, about Bo, B axes.
+    /// The same after each change of inertia, in their order; as before without.
+    pub dampings_after: Vec<DMatrix<f64>>,
+    /// Inertia of bodies, about Bo, B axes; until another one is put in its place on the way.
     pub inertias: Vec<(usize, SpatialInertia)>,
-    /// Motion of the joints.
+    /// Inertia of bodies of the rigid robot that servos feed forward, about Bo, B axes.
+    pub fed_forward: Vec<(usize, SpatialInertia)>,
+    /// Friction of actuated coordinates: changes of the numbers of their law.
+    pub friction: Vec<(usize, Friction)>,
+    /// Controllers, by the number of the axis in [`crate::Servo::axes`].
+    pub servo: Vec<(usize, AxisSlope)>,
+    /// Motion of the joints; of those driven by torque their reference.
     pub motion: Option<Arc<dyn PrescribedMotion>>,
     /// Place of the tool's point, tool axes (m).
     pub tool: Vector3<f64>,
+}
+
+/// Change of the controller of an axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct AxisSlope {
+    /// Of [`crate::ServoAxis::position_gain`] (1/s).
+    pub position_gain: f64,
+    /// Of [`crate::ServoAxis::velocity_gain`] (N m s/rad).
+    pub velocity_gain: f64,
+    /// Of [`crate::ServoAxis::integral_gain`] (N m/rad).
+    pub integral_gain: f64,
+    /// So many times the torque that is fed forward.
+    pub feed_forward: f64,
+}
+
+impl Direction {
+    /// Change of the damping matrix after so many changes of inertia.
+    fn damping_after(&self, changes: usize) -> Option<&DMatrix<f64>> {
+        let later = changes.checked_sub(1).and_then(|k| self.dampings_after.get(k));
+        later.or(self.damping.as_ref())
+    }
+
+    /// Change of inertias that is still there after so many changes of inertia.
+    fn inertias_after<'a>(
+        &'a self,
+        arm: &'a FlexibleArm,
+        changes: usize,
+    ) -> impl Iterator<Item = (usize, &'a SpatialInertia)> {
+        let over = &arm.inertia_changes[..changes];
+        let there = move |body: usize| over.iter().all(|change| change.body != body);
+        self.inertias.iter().filter(move |(body, _)| there(*body)).map(|(body, more)| (*body, more))
+    }
+
+    /// Change of the controller of an axis.
+    fn axis(&self, number: usize) -> AxisSlope {
+        let own = self.servo.iter().filter(|(axis, _)| *axis == number);
+        own.fold(AxisSlope::default(), |sum, (_, by)| AxisSlope {
+            position_gain: sum.position_gain + by.position_gain,
+            velocity_gain: sum.velocity_gain + by.velocity_gain,
+            integral_gain: sum.integral_gain + by.integral_gain,
+            feed_forward: sum.feed_forward + by.feed_forward,
+        })
+    }
 }
 
 /// Change of a spring.
@@ -81,12 +142,25 @@ pub struct RunSlopes {
     pub position: ErrorSlopes,
     /// Angle (rad).
     pub rotation: ErrorSlopes,
+    /// Servos that were at their torque limits, by the time when they first were.
+    pub limited: Vec<TorqueLimited>,
     /// Times of the start and after every step (s), if kept.
     pub times_s: Vec<f64>,
     /// Error then: displacement (m) and rotation vector (rad), world axes.
     pub errors: Vec<[f64; 6]>,
     /// Its derivatives, a column per direction: those of one time after those of the time before.
     pub slopes: Vec<[f64; 6]>,
+}
+
+/// A servo that was at its torque limit: the derivatives are those with these very samples at the limit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TorqueLimited {
+    /// Coordinate of the joint.
+    pub coordinate: usize,
+    /// In how many samples.
+    pub samples: u64,
+    /// When first (s).
+    pub first_s: f64,
 }
 
 /// Largest and mean size of an error, with derivatives.
@@ -174,6 +248,7 @@ pub fn run_slopes(
         }
     }
     found.steps = steps;
+    found.limited = run.limited();
     found.position.finish((steps + 1) as f64);
     found.rotation.finish((steps + 1) as f64);
     Ok(found)
@@ -192,8 +267,12 @@ pub fn equilibrium_slopes(arm: &FlexibleArm, directions: &[Direction]) -> Result
         tool: arm.model.frames()[0].clone(),
         keep_samples: false,
     };
-    let mut arm = arm.clone();
+    let mut arm = arm.with_motors_held();
     arm.carry_from_start()?;
+    // Nothing of a motion or of a controller counts here.
+    let still = |own: &Direction| Direction { servo: Vec::new(), ..own.clone() };
+    let directions: Vec<Direction> = directions.iter().map(still).collect();
+    let directions = &directions[..];
     check(&arm, &request, directions)?;
     let e = static_equilibrium(&arm, 0.0)?;
     Ok(Recurrence::new(arm, &request, directions, &e)?.x.transpose())
@@ -209,28 +288,17 @@ fn check(arm: &FlexibleArm, request: &SlopesRequest, directions: &[Direction]) -
         return Err(StepError::Setup(format!("the spectral radius must lie between 0 and 1, found {}", settings.rho)));
     }
     let refuse = |what, mend| Err(StepError::NoSlopes { what, mend });
-    if !arm.torque_driven.is_empty() {
-        return refuse("drives under torque", "prescribe the joints' motion");
+    let jumps = arm.motion.velocity_jumps();
+    if !jumps.is_empty() && !arm.torque_driven.is_empty() {
+        return refuse("a motion whose velocity jumps, under servos", "round its corners");
     }
-    if arm.has_gear_laws() || !arm.cross_stiffness.is_empty() || !arm.cross_damping.is_empty() {
-        return refuse("gears with hysteresis, friction by load, ripple or coupling", "leave these laws out");
-    }
-    if !arm.inertia_changes.is_empty() {
-        return refuse("a payload that changes on the way", "carry it from the start");
-    }
-    let jumps = |motion: &dyn PrescribedMotion| !motion.velocity_jumps().is_empty();
     let moved = directions.iter().filter_map(|direction| direction.motion.as_deref());
-    if jumps(&*arm.motion) || moved.into_iter().any(jumps) {
-        return refuse("a motion whose velocity jumps", "round its corners");
+    let known = |t: f64| jumps.iter().any(|jump| (jump - t).abs() <= SAME_TIME);
+    if !moved.flat_map(PrescribedMotion::velocity_jumps).all(known) {
+        return refuse("a change of the motion whose velocity jumps elsewhere", "round its corners");
     }
     if arm.elements.iter().any(|element| element.geometric.is_some()) {
         return refuse("links that stiffen under load", "leave geometric stiffening out");
-    }
-    if !arm.model.loops().is_empty() {
-        return refuse("closed loops", "take differences of runs");
-    }
-    if DynamicTangent::new(&arm.model).is_none() {
-        return refuse("links that bend in modes", "model them as lumped");
     }
     for direction in directions {
         for (spring, slope) in &direction.springs {
@@ -245,8 +313,25 @@ fn check(arm: &FlexibleArm, request: &SlopesRequest, directions: &[Direction]) -
             }
         }
         let n = arm.n_elastic_coordinates();
-        if direction.damping.as_ref().is_some_and(|dD| dD.shape() != (n, n)) {
-            return Err(StepError::Setup(format!("the change of the damping must have {n} rows and columns")));
+        let matrices = [&direction.damping, &direction.stiffness].into_iter().flatten();
+        if matrices.chain(&direction.dampings_after).any(|own| own.shape() != (n, n)) {
+            return Err(StepError::Setup(format!(
+                "the change of the damping or of the stiffness of all springs must have {n} rows and columns"
+            )));
+        }
+        let rigid = arm.servo.as_ref().map_or(0, |servo| servo.rigid.bodies().len());
+        let beyond =
+            |own: &[(usize, SpatialInertia)], count: usize| own.iter().map(|own| own.0).find(|body| *body >= count);
+        let inertias = beyond(&direction.inertias, arm.model.bodies().len());
+        let fed_forward = if arm.servo.is_some() { beyond(&direction.fed_forward, rigid) } else { None };
+        if let Some(body) = inertias.or(fed_forward) {
+            return Err(StepError::Setup(format!(
+                "a direction changes the inertia of body {body}, which is not there"
+            )));
+        }
+        let axes = arm.torque_driven.len();
+        if let Some((axis, _)) = direction.servo.iter().find(|(axis, _)| *axis >= axes) {
+            return Err(StepError::Setup(format!("a direction changes servo {axis}, the arm has {axes}")));
         }
     }
     Ok(())

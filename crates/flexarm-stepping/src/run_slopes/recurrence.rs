@@ -10,50 +10,60 @@
 
 use std::sync::Arc;
 
-use flexarm_kinematics::{Data, DynamicTangent, Model, PointLoad, State, StaticTangent, forward_kinematics};
+use flexarm_kinematics::{Data, Model, State, forward_kinematics};
 use flexarm_kinematics::{inverse_dynamics, mass_matrix_at_poses, world_poses};
 use nalgebra::{DMatrix, DVector};
 
 use crate::arm::FlexibleArm;
 use crate::error::StepError;
 use crate::events::Change;
+use crate::gear::GearState;
 use crate::implicit::ImplicitStep;
 use crate::integrator::{Integrator, check_deflection};
+use crate::iteration_matrix::Way;
 use crate::reduced::ReducedArm;
 use crate::run_slopes::columns::add_product;
 use crate::run_slopes::lu::Lu;
-use crate::run_slopes::{Direction, SlopesRequest, SpringSlope};
+use crate::run_slopes::servo::ServoSlopes;
+use crate::run_slopes::tangent::{Look, Tangent, add_columns, put};
+use crate::run_slopes::{Direction, SlopesRequest, TorqueLimited};
 use crate::steppers::{Coefficients, GeneralizedAlpha};
 
-/// Iterations of a step that finds its way; after more the matrix would be taken anew within it.
+/// Iterations of a step that finds its way; after more a matrix that has the dispersion correction in itself would be taken anew within it.
 const MOST_ITERATIONS: usize = 8;
 
-/// A run with its tangent: n elastic coordinates, m joints, p directions.
+/// A run with its tangent: N free coordinates (d joints driven by torque, n elastic ones), m joints, p directions.
 pub(super) struct Recurrence<'a> {
     system: ReducedArm,
     integrator: GeneralizedAlpha,
     directions: &'a [Direction],
+    /// Whether the motion of the joints changes.
+    moves: bool,
     coefficients: Coefficients,
     /// c of the dispersion correction; 0 without.
     c: f64,
     /// All coordinates at the current time.
     pub(super) q: DVector<f64>,
-    /// Derivatives of the elastic coordinates, p × n, of their rates and accelerations, and of what the scheme remembers: all directions of
+    /// Derivatives of the free coordinates, p × N, of their rates and accelerations, and of what the scheme remembers: all directions of
     /// a coordinate stand together, so that sums go over whole columns.
     pub(super) x: DMatrix<f64>,
     v: DMatrix<f64>,
     acceleration: DMatrix<f64>,
     a: DMatrix<f64>,
     x_tilde: DMatrix<f64>,
-    /// Of the joints, their rates and accelerations, p × m.
+    /// Of the motion that joints are given, their rates and accelerations, p × m: their own, or the reference of a servo.
     pub(super) joints: [DMatrix<f64>; 3],
+    /// Where they are to be, m.
+    pub(super) reference: [Vec<f64>; 3],
+    servo: Option<ServoSlopes>,
     tangent: Tangent,
     /// Sᵀ, then S, and M of the start of the step.
     S: DMatrix<f64>,
     mass: Lu,
     matrix: Lu,
-    /// δM y by all coordinates, nv × nv.
+    /// δM y by all coordinates, nv × nv, and its rows of free ones by those, and by the joints.
     of_inertia: DMatrix<f64>,
+    inertia_by: [DMatrix<f64>; 2],
     /// `M^-1 K ẍ⁺`, all coordinates.
     y: DVector<f64>,
     /// All coordinates at the start of the step, and the derivatives of the joints there.
@@ -67,28 +77,9 @@ pub(super) struct Recurrence<'a> {
     v_h: DMatrix<f64>,
     rhs: DMatrix<f64>,
     room: DVector<f64>,
-    /// Room for one direction: its joints, its elastic coordinates.
+    /// Room for one direction: its joints, its free coordinates.
     sample: [Vec<f64>; 3],
     own: Vec<f64>,
-}
-
-/// Matrices of (1) of the module above at the current state.
-struct Tangent {
-    dynamic: DynamicTangent,
-    inertia: DynamicTangent,
-    loads: StaticTangent,
-    points: Vec<PointLoad>,
-    /// Whether there are loads or balancers.
-    loaded: bool,
-    /// Of other places than the current one.
-    work: Data,
-    /// `∂r/∂q`, `∂r/∂q̇` and M, nv × nv.
-    by_q: DMatrix<f64>,
-    by_rate: DMatrix<f64>,
-    M: DMatrix<f64>,
-    G: DMatrix<f64>,
-    /// Stiffness about the relaxed springs, n × n.
-    K: DMatrix<f64>,
 }
 
 impl<'a> Recurrence<'a> {
@@ -99,10 +90,14 @@ impl<'a> Recurrence<'a> {
         directions: &'a [Direction],
         e: &DVector<f64>,
     ) -> Result<Self, StepError> {
-        let (m, n, p) = (arm.model.n_actuated(), arm.n_elastic_coordinates(), directions.len());
-        let tangent = Tangent::new(&arm)?;
+        let (m, n, p) = (arm.model.n_actuated(), arm.n_free(), directions.len());
+        let nv = arm.model.nv();
+        let tangent = Tangent::new(&arm, p);
         let mut system = ReducedArm::new(arm);
         let (x, v) = system.start(e)?;
+        // Jumps of all velocities at the start.
+        let blow = (system.events.jumps_over() > 0).then(|| system.tau.clone());
+        let servo = system.servo.as_ref().map(|servo| ServoSlopes::new(servo, directions));
         let h = request.step_s;
         let integrator = GeneralizedAlpha::new(&mut system, 0.0, h, request.settings, x, v)?.exactly();
         let coefficients = Coefficients::new(request.settings.rho);
@@ -110,41 +105,76 @@ impl<'a> Recurrence<'a> {
         let zeros = || DMatrix::zeros(p, n);
         let mut run = Self {
             integrator,
+            moves: directions.iter().any(|direction| direction.motion.is_some()),
             directions,
             coefficients,
             c,
-            q: DVector::zeros(m + n),
+            q: DVector::zeros(nv),
             x: zeros(),
             v: zeros(),
             acceleration: zeros(),
             a: zeros(),
             x_tilde: zeros(),
             joints: std::array::from_fn(|_| DMatrix::zeros(p, m)),
+            reference: std::array::from_fn(|_| vec![0.0; m]),
+            servo,
             sample: std::array::from_fn(|_| vec![0.0; m]),
             own: vec![0.0; n],
             tangent,
             S: DMatrix::zeros(n, n),
             mass: Lu::new(n),
             matrix: Lu::new(n),
-            of_inertia: DMatrix::zeros(m + n, m + n),
-            y: DVector::zeros(m + n),
-            q_start: DVector::zeros(m + n),
+            of_inertia: DMatrix::zeros(nv, nv),
+            inertia_by: [DMatrix::zeros(n, n), DMatrix::zeros(n, m)],
+            y: DVector::zeros(nv),
+            q_start: DVector::zeros(nv),
             joints_start: DMatrix::zeros(p, m),
             C: DMatrix::zeros(n, n),
             z: zeros(),
             x_h: zeros(),
             v_h: zeros(),
             rhs: zeros(),
-            room: DVector::zeros(m + n),
+            room: DVector::zeros(nv),
             system,
         };
-        run.sample_joints(0.0);
-        if p > 0 && request.start == crate::stepper::Start::Equilibrium {
-            run.rest(e)?;
+        let side = run.system.events.side(0.0);
+        run.sample_joints(side);
+        if p > 0 {
+            run.begin(e, request.start == crate::stepper::Start::Equilibrium)?;
         }
         run.look();
+        if let Some(blow) = &blow {
+            // From rest.
+            run.strike(0.0, blow, None)?;
+        }
         run.accelerate()?;
         Ok(run)
+    }
+
+    /// Derivatives of the start: where it begins, what the controllers hold there.
+    fn begin(&mut self, e: &DVector<f64>, at_rest: bool) -> Result<(), StepError> {
+        for (i, &k) in self.system.arm.torque_driven.iter().enumerate() {
+            self.x.column_mut(i).copy_from(&self.joints[0].column(k));
+            self.v.column_mut(i).copy_from(&self.joints[1].column(k));
+        }
+        if at_rest {
+            self.rest(e)?;
+        }
+        if let Some(gears) = &self.system.gears
+            && let Some(slopes) = &mut self.tangent.gears
+        {
+            slopes.settle(&self.system.arm, gears, &self.x, &self.joints[0]);
+        }
+        if self.servo.is_some() {
+            self.hold();
+            self.sample_servo(0.0);
+        }
+        Ok(())
+    }
+
+    /// Servos that were at their limits.
+    pub(super) fn limited(&self) -> Vec<TorqueLimited> {
+        self.servo.as_ref().map_or(Vec::new(), |servo| servo.limited.clone())
     }
 
     /// Current time (s).
@@ -152,13 +182,20 @@ impl<'a> Recurrence<'a> {
         self.integrator.time()
     }
 
+    /// The free coordinates.
+    pub(super) fn free(&self) -> &[usize] {
+        &self.system.free
+    }
+
     /// Poses of the current state.
     pub(super) fn poses(&self) -> (&Arc<Model>, &Data) {
         (&self.system.arm.model, &self.system.data)
     }
 
-    /// Derivatives of the motion of the joints.
+    /// Where the joints are to be at t, and the derivatives of that.
     fn sample_joints(&mut self, t: f64) {
+        let [q, qdot, qddot] = &mut self.reference;
+        self.system.arm.motion.sample(t, q, qdot, qddot);
         for (k, direction) in self.directions.iter().enumerate() {
             if let Some(motion) = &direction.motion {
                 let [q, qdot, qddot] = &mut self.sample;
@@ -172,11 +209,11 @@ impl<'a> Recurrence<'a> {
 
     /// δx of the equilibrium at the start.
     fn rest(&mut self, e: &DVector<f64>) -> Result<(), StepError> {
-        let Self { system, tangent, directions, joints, x, rhs, room, own, matrix, .. } = self;
+        let Self { system, tangent, directions, joints, x, room, .. } = self;
         let arm = &system.arm;
-        let (m, n) = (arm.model.n_actuated(), e.len());
+        let (m, n, p, driven) = (arm.model.n_actuated(), e.len(), directions.len(), arm.torque_driven.len());
         let mut state = State::zeros(&arm.model);
-        let mut qddot = DVector::zeros(m + n);
+        let mut qddot = DVector::zeros(arm.model.nv());
         arm.prescribed_state(0.0, &mut state, &mut qddot);
         state.qdot.fill(0.0);
         qddot.fill(0.0);
@@ -184,21 +221,88 @@ impl<'a> Recurrence<'a> {
         let mut data = Data::new(&arm.model);
         inverse_dynamics(&arm.model, &mut data, &state, &qddot);
         world_poses(&arm.model, &mut data);
-        tangent.compute(arm, 0.0, &data, &state, &qddot);
-        rhs.fill(0.0);
-        let still = DVector::zeros(n);
+        let mut gears = GearState::of(arm);
+        if let Some(gears) = &mut gears {
+            gears.begin(arm, state.q.as_slice(), e.as_slice());
+            gears.update(arm, state.q.as_slice(), state.qdot.as_slice(), e.as_slice(), &state.qdot.as_slice()[m..]);
+        }
+        tangent.compute(arm, 0.0, &data, &state, &qddot, gears.as_deref());
+        let mut rhs = DMatrix::zeros(p, n);
+        let mut own = vec![0.0; driven + n];
+        let place: Vec<f64> = vec![0.0; driven].into_iter().chain(e.iter().copied()).collect();
+        let at = Look {
+            arm,
+            data: &data,
+            x: &place,
+            v: &vec![0.0; driven + n],
+            free: &system.free,
+            rates: state.qdot.as_slice(),
+            gears: gears.as_deref(),
+            changes: 0,
+        };
         for (k, direction) in directions.iter().enumerate() {
             own.fill(0.0);
-            tangent.add_explicit(arm, &data, direction, e.as_slice(), still.as_slice(), room, own);
-            put(own, rhs, k);
+            tangent.add_explicit(&at, (k, direction), room, &mut own);
+            put(&own[driven..], &mut rhs, k);
         }
-        add_product(&tangent.by_q, (m, 0), &joints[0], rhs);
+        add_product(&tangent.by_q, (m, 0), &joints[0], &mut rhs);
+        let mut matrix = Lu::new(n);
         matrix.A.copy_from(&tangent.by_q.view((m, m), (n, n)));
         matrix.factor("static stiffness (with the effect of weight)", 0.0)?;
-        x.copy_from(rhs);
-        x.neg_mut();
-        matrix.solve_transposed(x);
+        rhs.neg_mut();
+        matrix.solve_transposed(&mut rhs);
+        x.columns_mut(driven, n).copy_from(&rhs);
         Ok(())
+    }
+
+    /// Derivatives of the torques that hold the joints on their reference at the start, springs as they are.
+    fn hold(&mut self) {
+        let Self { system, integrator, tangent, directions, joints, x, room, own, servo: Some(servo), .. } = self
+        else {
+            return;
+        };
+        let now = Integrator::current(integrator);
+        let m = system.arm.model.n_actuated();
+        own.fill(0.0);
+        for (to, &k) in own.iter_mut().zip(&system.arm.torque_driven) {
+            *to = self.reference[2][k];
+        }
+        let at_rest = DVector::from_column_slice(own);
+        system.evaluate(0.0, &now.x, &now.v, &at_rest);
+        tangent.compute(&system.arm, 0.0, &system.data, &system.state, &system.qddot, system.gears.as_deref());
+        mass_matrix_at_poses(&system.arm.model, &mut system.data);
+        let at = Look {
+            arm: &system.arm,
+            data: &system.data,
+            x: now.x.as_slice(),
+            v: now.v.as_slice(),
+            free: &system.free,
+            rates: system.state.qdot.as_slice(),
+            gears: system.gears.as_deref(),
+            changes: system.events.changes_over(),
+        };
+        for (p, direction) in directions.iter().enumerate() {
+            own.fill(0.0);
+            tangent.add_explicit(&at, (p, direction), room, own);
+            for (i, &k) in at.arm.torque_driven.iter().enumerate() {
+                let given = (0..m).map(|j| {
+                    tangent.by_q[(k, j)] * joints[0][(p, j)]
+                        + tangent.by_rate[(k, j)] * joints[1][(p, j)]
+                        + at.data.M[(k, j)] * joints[2][(p, j)]
+                });
+                let driven = at.arm.torque_driven.len();
+                let bent = (driven..x.ncols()).map(|j| tangent.by_q[(k, at.free[j])] * x[(p, j)]);
+                servo.torque[(p, i)] = own[i] + given.chain(bent).sum::<f64>();
+            }
+        }
+    }
+
+    /// Takes in a sample of the controllers at t, if one was just taken.
+    fn sample_servo(&mut self, t: f64) {
+        let Self { system, servo: Some(slopes), directions, x, v, joints, .. } = self else { return };
+        if let Some(servo) = &system.servo {
+            slopes.sample(t, &system.arm, servo, directions, (x, v), joints);
+        }
     }
 
     /// Motion and matrices of the current state.
@@ -209,27 +313,41 @@ impl<'a> Recurrence<'a> {
         system.evaluate(t, &now.x, &now.v, &now.acceleration);
         self.q.copy_from(&system.state.q);
         if !directions.is_empty() {
-            tangent.compute(&system.arm, system.events.side(t), &system.data, &system.state, &system.qddot);
+            let (side, gears) = (system.events.side(t), system.gears.as_deref());
+            tangent.compute(&system.arm, side, &system.data, &system.state, &system.qddot, gears);
             mass_matrix_at_poses(&system.arm.model, &mut system.data);
             tangent.M.copy_from(&system.data.M);
+            tangent.gather(&system.arm, &system.free, self.moves);
         }
     }
 
-    /// δr of (3), with what the joints' motion does, into `rhs`.
+    /// δr of (3), with what the joints' motion and the controllers do, into `rhs`.
     fn explicit(&mut self) {
-        let Self { system, integrator, tangent, directions, joints, rhs, room, own, .. } = self;
+        let Self { system, integrator, tangent, directions, joints, rhs, room, own, servo, .. } = self;
         let now = Integrator::current(integrator);
-        let m = system.arm.model.n_actuated();
         rhs.fill(0.0);
+        let at = Look {
+            arm: &system.arm,
+            data: &system.data,
+            x: now.x.as_slice(),
+            v: now.v.as_slice(),
+            free: &system.free,
+            rates: system.state.qdot.as_slice(),
+            gears: system.gears.as_deref(),
+            changes: system.events.changes_over(),
+        };
         for (k, direction) in directions.iter().enumerate() {
-            let (x, v) = (now.x.as_slice(), now.v.as_slice());
             own.fill(0.0);
-            tangent.add_explicit(&system.arm, &system.data, direction, x, v, room, own);
+            tangent.add_explicit(&at, (k, direction), room, own);
             put(own, rhs, k);
         }
-        if directions.iter().any(|direction| direction.motion.is_some()) {
-            for (matrix, joints) in [&tangent.by_q, &tangent.by_rate, &tangent.M].into_iter().zip(joints) {
-                add_product(matrix, (m, 0), joints, rhs);
+        if let Some(servo) = servo {
+            let mut driven = rhs.columns_mut(0, servo.torque.ncols());
+            driven -= &servo.torque;
+        }
+        if self.moves {
+            for (matrix, joints) in tangent.by_joints.iter().zip(joints) {
+                add_product(matrix, (0, 0), joints, rhs);
             }
         }
     }
@@ -240,12 +358,10 @@ impl<'a> Recurrence<'a> {
             return Ok(());
         }
         self.explicit();
-        let Self { system, tangent, rhs, x, v, matrix, .. } = self;
-        let m = system.arm.model.n_actuated();
-        let n = x.ncols();
-        add_product(&tangent.by_q, (m, m), x, rhs);
-        add_product(&tangent.by_rate, (m, m), v, rhs);
-        matrix.A.copy_from(&tangent.M.view((m, m), (n, n)));
+        let Self { tangent: Tangent { own: [K, V, M], .. }, rhs, x, v, matrix, .. } = self;
+        add_product(K, (0, 0), x, rhs);
+        add_product(V, (0, 0), v, rhs);
+        matrix.A.copy_from(M);
         matrix.factor("mass matrix", self.integrator.time())?;
         rhs.neg_mut();
         matrix.solve_transposed(rhs);
@@ -267,9 +383,22 @@ impl<'a> Recurrence<'a> {
             let h = self.integrator.step_size();
             let now = Integrator::current_mut(&mut self.integrator);
             check_deflection(&self.system.arm, &now.x, stop, h)?;
-            if self.system.at_time(stop, &now.x, &mut now.v)? != Change::Nothing {
-                self.integrator.restart(&mut self.system)?;
+            let jumps = self.system.events.jumps_over();
+            let change = self.system.at_time(stop, &now.x, &mut now.v)?;
+            if change != Change::Nothing {
+                let blow = (self.system.events.jumps_over() > jumps).then(|| self.system.tau.clone());
+                if change == Change::Matrices {
+                    self.integrator.renew(&mut self.system)?;
+                } else {
+                    self.integrator.restart(&mut self.system)?;
+                }
+                self.sample_servo(stop);
                 self.look();
+                if let Some(blow) = &blow {
+                    let before = self.joints[1].clone();
+                    self.sample_joints(self.system.events.side(stop));
+                    self.strike(stop, blow, Some(&before))?;
+                }
                 self.accelerate()?;
             }
             if stop == end {
@@ -278,32 +407,79 @@ impl<'a> Recurrence<'a> {
         }
     }
 
+    /// Derivatives of the free velocities where those of the motion jump, `M_ff Δv_f + M_fp Δv_p = 0`: here all jumps are w = `blow`.
+    ///
+    /// ```text
+    /// M_ff δΔv_f = -(∂(M w)/∂q δq + δM w + M_fp δΔv_p)
+    /// ```
+    /// * `before`: derivatives of the motion's velocities on the other side of the jump, none of rest.
+    fn strike(&mut self, t: f64, blow: &DVector<f64>, before: Option<&DMatrix<f64>>) -> Result<(), StepError> {
+        if self.directions.is_empty() {
+            return Ok(());
+        }
+        let Self { system, tangent, directions, joints, x, v, room, own, rhs, matrix, of_inertia, .. } = self;
+        let (arm, free) = (&system.arm, &system.free);
+        rhs.fill(0.0);
+        let Tangent { inertia, work, by_joints, own: [_, _, M], .. } = tangent;
+        forward_kinematics(&arm.model, work, &self.q);
+        inertia.of_inertia(&arm.model, work, &self.q, blow, of_inertia);
+        let [of_free, of_joints] = &mut self.inertia_by;
+        select(of_inertia, free, |j| Some(free[j]), of_free);
+        add_product(of_free, (0, 0), x, rhs);
+        if self.moves {
+            select(of_inertia, free, Some, of_joints);
+            add_product(of_joints, (0, 0), &joints[0], rhs);
+            add_product(&by_joints[2], (0, 0), &joints[1], rhs);
+            if let Some(before) = before {
+                let back = -before;
+                add_product(&by_joints[2], (0, 0), &back, rhs);
+            }
+        }
+        for (k, direction) in directions.iter().enumerate() {
+            room.fill(0.0);
+            for (body, more) in direction.inertias_after(arm, system.events.changes_over()) {
+                inertia.add_inertia_forces(&arm.model, work, body, more, room.as_mut_slice());
+            }
+            own.iter_mut().zip(free).enumerate().for_each(|(i, (own, f))| *own = rhs[(k, i)] + room[*f]);
+            put(own, rhs, k);
+        }
+        matrix.A.copy_from(M);
+        matrix.factor("mass matrix", t)?;
+        rhs.neg_mut();
+        matrix.solve_transposed(rhs);
+        *v += &*rhs;
+        Ok(())
+    }
+
     /// Run and tangent to `stop`.
     fn advance(&mut self, stop: f64) -> Result<(), StepError> {
         let (dt, fresh) = self.next_length(stop);
         let differentiated = !self.directions.is_empty();
         if differentiated {
-            let (m, n) = (self.system.arm.model.n_actuated(), self.x.ncols());
             self.q_start.copy_from(&self.q);
             self.joints_start.copy_from(&self.joints[0]);
-            self.mass.A.copy_from(&self.tangent.M.view((m, m), (n, n)));
+            self.mass.A.copy_from(&self.tangent.own[2]);
             self.mass.factor("mass matrix", self.integrator.time())?;
         }
         self.integrator.advance_to(&mut self.system, stop)?;
         let newton = ImplicitStep::newton(&self.integrator);
-        if newton.dt != dt || newton.last().0 > MOST_ITERATIONS {
+        let dense = matches!(newton.matrix.way, Way::Dense(_));
+        if newton.dt != dt || (newton.last().0 > MOST_ITERATIONS && !dense) {
             let what = "a step that does not converge at once";
             return Err(StepError::NoSlopes { what, mend: "take a smaller step" });
         }
         self.look();
+        self.sample_joints(self.system.events.side(stop));
         if differentiated {
-            self.sample_joints(self.system.events.side(stop));
             if fresh {
                 self.a.copy_from(&self.acceleration);
                 self.x_tilde.copy_from(&self.acceleration);
             }
             self.correct(dt);
             self.solve(dt, stop)?;
+            if let (Some(slopes), Some(gears)) = (&mut self.tangent.gears, &self.system.gears) {
+                slopes.settle(&self.system.arm, gears, &self.x, &self.joints[0]);
+            }
         }
         Ok(())
     }
@@ -326,37 +502,50 @@ impl<'a> Recurrence<'a> {
             return;
         }
         let Self { system, integrator, tangent, directions, S, z, mass, of_inertia, y, room, own, x, .. } = self;
-        let arm = &system.arm;
-        let (m, n) = (arm.model.n_actuated(), z.ncols());
+        let (arm, free) = (&system.arm, &system.free);
+        let driven = arm.torque_driven.len();
         let acceleration = &Integrator::current(integrator).acceleration;
         // K is symmetric: the transposed of M^-1 K.
         S.copy_from(&tangent.K);
         mass.solve_transposed(S);
+        // One direction's room serves for M^-1 K ẍ⁺.
+        own.fill(0.0);
+        for (own, column) in own.iter_mut().zip(S.column_iter()) {
+            *own = column.dot(acceleration);
+        }
         y.fill(0.0);
-        y.rows_mut(m, n).gemv_tr(1.0, S, acceleration, 0.0);
+        own.iter().zip(free).for_each(|(own, k)| y[*k] = *own);
         let Tangent { inertia, work, .. } = tangent;
         forward_kinematics(&arm.model, work, &self.q_start);
         inertia.of_inertia(&arm.model, work, &self.q_start, y, of_inertia);
-        add_product(of_inertia, (m, 0), &self.joints_start, z);
-        add_product(of_inertia, (m, m), x, z);
+        let [by_free, by_joints] = &mut self.inertia_by;
+        select(of_inertia, free, |j| Some(free[j]), by_free);
+        if self.moves {
+            select(of_inertia, free, |j| (!arm.torque_driven.contains(&j)).then_some(j), by_joints);
+            add_product(by_joints, (0, 0), &self.joints_start, z);
+        }
+        add_product(by_free, (0, 0), x, z);
         for (k, direction) in directions.iter().enumerate() {
             room.fill(0.0);
-            for (body, more) in &direction.inertias {
-                inertia.add_inertia_forces(&arm.model, work, *body, more, 1.0, room.as_mut_slice());
+            for (body, more) in direction.inertias_after(arm, system.events.changes_over()) {
+                inertia.add_inertia_forces(&arm.model, work, body, more, room.as_mut_slice());
             }
-            own.iter_mut().zip(&room.as_slice()[m..]).enumerate().for_each(|(i, (own, x))| *own = -x - z[(k, i)]);
+            own.iter_mut().zip(free).enumerate().for_each(|(i, (own, f))| *own = -room[*f] - z[(k, i)]);
+            let (elastic, bent) = (&mut own[driven..], &acceleration.as_slice()[driven..]);
             for (number, slope) in &direction.springs {
                 let element = &arm.elements[*number];
                 let range = arm.offset(element)..arm.offset(element) + element.size;
-                let to = &mut own[range.clone()];
-                slope.add_linear(&element.K, &acceleration.as_slice()[range], to);
+                slope.add_linear(&element.K, &bent[range.clone()], &mut elastic[range]);
+            }
+            if let Some(dK) = &direction.stiffness {
+                add_columns(dK, bent, elastic);
             }
             own.iter_mut().for_each(|own| *own *= c_h2);
             put(own, z, k);
         }
         mass.solve_transposed(z);
         S.scale_mut(c_h2);
-        (0..n).for_each(|k| S[(k, k)] += 1.0);
+        (0..S.nrows()).for_each(|k| S[(k, k)] += 1.0);
     }
 
     /// (3), and what follows from it.
@@ -368,14 +557,13 @@ impl<'a> Recurrence<'a> {
             (self.x_h[k], self.v_h[k]) = (x, v);
         }
         self.explicit();
-        let Self { system, tangent, S, matrix, rhs, x_h, v_h, C, .. } = self;
-        let (m, n) = (system.arm.model.n_actuated(), x_h.ncols());
-        add_product(&tangent.by_q, (m, m), x_h, rhs);
-        add_product(&tangent.by_rate, (m, m), v_h, rhs);
+        let Self { tangent: Tangent { own: [K, V, M], .. }, S, matrix, rhs, x_h, v_h, C, .. } = self;
+        add_product(K, (0, 0), x_h, rhs);
+        add_product(V, (0, 0), v_h, rhs);
         rhs.neg_mut();
-        C.copy_from(&tangent.by_rate.view((m, m), (n, n)));
-        C.zip_apply(&tangent.by_q.view((m, m), (n, n)), |c, k| *c = c_D * *c + c_K * k);
-        matrix.A.copy_from(&tangent.M.view((m, m), (n, n)));
+        C.copy_from(V);
+        C.zip_apply(K, |c, k| *c = c_D * *c + c_K * k);
+        matrix.A.copy_from(M);
         add_product(S, (0, 0), C, &mut matrix.A);
         S.transpose_mut();
         matrix.factor("matrix of a step's tangent", t)?;
@@ -397,112 +585,12 @@ impl<'a> Recurrence<'a> {
     }
 }
 
-impl Tangent {
-    fn new(arm: &FlexibleArm) -> Result<Self, StepError> {
-        let model = &arm.model;
-        let nv = model.nv();
-        let dynamic = DynamicTangent::new(model);
-        let Some(dynamic) = dynamic else {
-            return Err(StepError::NoSlopes { what: "links that bend in modes", mend: "model them as lumped" });
-        };
-        let square = || DMatrix::zeros(nv, nv);
-        Ok(Self {
-            inertia: dynamic.clone(),
-            dynamic,
-            loads: StaticTangent::new(model, 0),
-            points: Vec::with_capacity(arm.loads.len()),
-            loaded: !arm.loads.is_empty() || !model.balancers().is_empty(),
-            work: Data::new(model),
-            by_q: square(),
-            by_rate: square(),
-            M: square(),
-            G: square(),
-            K: arm.stiffness(),
-        })
-    }
-
-    /// `∂r/∂q` and `∂r/∂q̇` of the motion that was last given to `data`, loads of time t.
-    fn compute(&mut self, arm: &FlexibleArm, t: f64, data: &Data, state: &State, qddot: &DVector<f64>) {
-        let model = &arm.model;
-        let (m, n) = (model.n_actuated(), arm.n_elastic_coordinates());
-        self.dynamic.compute(model, data, state, qddot, &mut self.by_q, &mut self.by_rate);
-        if self.loaded {
-            self.points.clear();
-            self.points.extend(arm.loads.iter().map(|load| load.point_load(t, &data.X_WB[load.body])));
-            self.loads.of_loads(model, data, &state.q, &self.points, &mut self.G);
-            self.by_q += &self.G;
+/// Takes rows of free coordinates; `column`: which stands in the place of each column, zeros without.
+fn select(from: &DMatrix<f64>, free: &[usize], column: impl Fn(usize) -> Option<usize>, to: &mut DMatrix<f64>) {
+    for j in 0..to.ncols() {
+        match column(j) {
+            Some(own) => free.iter().enumerate().for_each(|(i, &row)| to[(i, j)] = from[(row, own)]),
+            None => to.column_mut(j).fill(0.0),
         }
-        for element in &arm.elements {
-            let first = element.coordinate;
-            match &element.curve {
-                Some(curve) => self.by_q[(first, first)] += curve.slope(state.q[first]),
-                None => {
-                    let mut block = self.by_q.view_mut((first, first), (element.size, element.size));
-                    block += &element.K;
-                }
-            }
-        }
-        let mut block = self.by_rate.view_mut((m, m), (n, n));
-        block += &arm.D;
-    }
-
-    /// Adds `∂r/∂p` of a direction without the joints' motion to `to`, in the motion of [`Tangent::compute`].
-    #[allow(clippy::too_many_arguments, reason = "the state of a run and a room for it")]
-    fn add_explicit(
-        &self,
-        arm: &FlexibleArm,
-        data: &Data,
-        direction: &Direction,
-        x: &[f64],
-        v: &[f64],
-        room: &mut DVector<f64>,
-        to: &mut [f64],
-    ) {
-        for (number, slope) in &direction.springs {
-            let element = &arm.elements[*number];
-            let range = arm.offset(element)..arm.offset(element) + element.size;
-            match (&element.curve, slope) {
-                (Some(curve), SpringSlope::Factor(factor)) => to[range.start] += factor * curve.torque(x[range.start]),
-                _ => slope.add_linear(&element.K, &x[range.clone()], &mut to[range]),
-            }
-        }
-        if let Some(dD) = &direction.damping {
-            add_columns(dD, (0, 0), v, to);
-        }
-        if !direction.inertias.is_empty() {
-            room.fill(0.0);
-            for (body, more) in &direction.inertias {
-                self.dynamic.add_inertia_forces(&arm.model, data, *body, more, 1.0, room.as_mut_slice());
-            }
-            let m = arm.model.n_actuated();
-            to.iter_mut().zip(&room.as_slice()[m..]).for_each(|(to, force)| *to += force);
-        }
-    }
-}
-
-impl SpringSlope {
-    /// Adds its part of `δK x`.
-    fn add_linear(&self, K: &DMatrix<f64>, x: &[f64], to: &mut [f64]) {
-        let (matrix, factor) = match self {
-            Self::Factor(factor) => (K, *factor),
-            Self::Matrix(dK) => (dK, 1.0),
-        };
-        for (column, x) in matrix.as_slice().chunks_exact(matrix.nrows()).zip(x) {
-            to.iter_mut().zip(column).for_each(|(to, k)| *to += factor * k * x);
-        }
-    }
-}
-
-/// Puts the numbers of a direction into its row.
-fn put(from: &[f64], to: &mut DMatrix<f64>, row: usize) {
-    from.iter().enumerate().for_each(|(i, x)| to[(row, i)] = *x);
-}
-
-/// `to += A x`, likewise.
-fn add_columns(A: &DMatrix<f64>, (row, column): (usize, usize), x: &[f64], to: &mut [f64]) {
-    let (rows, all) = (A.nrows(), A.as_slice());
-    for (k, x) in x.iter().enumerate().filter(|(_, x)| **x != 0.0) {
-        let from = &all[(column + k) * rows + row..][..to.len()];
-        to.iter_mut().zip(from).for_each(|(to, a)| *to += a * x);
     }
 }

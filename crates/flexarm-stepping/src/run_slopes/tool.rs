@@ -21,6 +21,9 @@ pub(super) struct ToolError {
     rigid_twists: DMatrix<f64>,
     /// Change of the tool's point per direction, tool axes.
     points: Vec<Vector3<f64>>,
+    /// Columns of J for free coordinates and for the joints, these zero where a joint is itself free.
+    J_free: Matrix6xX<f64>,
+    J_joints: Matrix6xX<f64>,
     /// Whether the motion of the joints changes.
     moves: bool,
     /// Per direction, after [`ToolError::look`].
@@ -36,6 +39,8 @@ impl ToolError {
             q: DVector::zeros(nv),
             J: Matrix6xX::zeros(nv),
             J_rigid: Matrix6xX::zeros(nv),
+            J_free: Matrix6xX::zeros(arm.n_free()),
+            J_joints: Matrix6xX::zeros(arm.model.n_actuated()),
             twists: DMatrix::zeros(directions.len(), 6),
             rigid_twists: DMatrix::zeros(directions.len(), 6),
             points: directions.iter().map(|direction| direction.tool).collect(),
@@ -49,7 +54,7 @@ impl ToolError {
         let (model, data) = run.poses();
         let m = model.n_actuated();
         self.q.fill(0.0);
-        self.q.rows_mut(0, m).copy_from(&run.q.rows(0, m));
+        self.q.rows_mut(0, m).copy_from_slice(&run.reference[0]);
         forward_kinematics(model, &mut self.rigid, &self.q);
         let (X, X_rigid) = (data.X_WF(&self.tool), self.rigid.X_WF(&self.tool));
         let (R, R_rigid) = (X.rotation.matrix(), X_rigid.rotation.matrix());
@@ -68,9 +73,16 @@ impl ToolError {
         let (_, B) = ElasticAngles::RotationVector.pose(&theta);
         let rates = B.try_inverse().unwrap_or(B) * turned.transpose();
         self.twists.fill(0.0);
-        add_product(&self.J, (0, m), &run.x, &mut self.twists);
+        for (i, k) in run.free().iter().enumerate() {
+            self.J_free.column_mut(i).copy_from(&self.J.column(*k));
+        }
+        add_product(&self.J_free, (0, 0), &run.x, &mut self.twists);
         if self.moves {
-            add_product(&self.J, (0, 0), &run.joints[0], &mut self.twists);
+            for k in 0..m {
+                let own = if run.free().contains(&k) { Vector6::zeros() } else { self.J.column(k).into_owned() };
+                self.J_joints.set_column(k, &own);
+            }
+            add_product(&self.J_joints, (0, 0), &run.joints[0], &mut self.twists);
             self.rigid_twists.fill(0.0);
             add_product(&self.J_rigid, (0, 0), &run.joints[0], &mut self.rigid_twists);
         }

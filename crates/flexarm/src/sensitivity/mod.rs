@@ -2,13 +2,14 @@
 //!
 //! Start at [`sensitivity`], or at [`Arm::error_slopes`] for numbers alone; [`pose_sensitivity`] answers for a pose.
 
+mod controllers;
 mod pose;
 
 use std::path::PathBuf;
 
 use flexarm_files::{check_free, write_all};
 pub use flexarm_identify::RunParameter;
-use flexarm_identify::{Parameter, error_slopes};
+use flexarm_identify::{Effect, Parameter, error_slopes};
 pub use flexarm_stepping::{ErrorSlopes, RunSlopes};
 use flexarm_stepping::{SlopesRequest, StepError, StepperKind};
 use nalgebra::Vector3;
@@ -24,6 +25,9 @@ use crate::robot::Robot;
 use crate::scenario::Scenario;
 
 pub use pose::{PoseParameter, PoseSensitivity, pose_sensitivity};
+
+/// Times nearer to the start than this are it (s).
+const SAME_TIME: f64 = 1e-9;
 
 /// What is asked of [`sensitivity`].
 #[derive(Clone, Debug, Default)]
@@ -70,11 +74,12 @@ pub struct Sensitivity {
 /// What a change of one number does to the error.
 #[derive(Clone, Debug, Serialize)]
 pub struct ParameterSensitivity {
-    /// By the names of the robot file; `motion.JOINT` for a shift of a joint, `tcp.x`, `.y` and `.z` for the place of the tool in its own axes.
+    /// By the names of the robot file, of joints under servos `drive.JOINT.servo.` with their gains and `drive.JOINT.friction.` too;
+    /// `motion.JOINT` for a shift of a joint, `tcp.x`, `.y` and `.z` for the place of the tool in its own axes.
     pub name: String,
     /// Its unit.
     pub unit: String,
-    /// Its value; 0 of a shift.
+    /// Its value; 0 of a shift, 1 of what a servo feeds forward.
     pub value: f64,
     /// Of which change of it the following are the effect: `1 %`, `1 kg`, `1 mrad` or `1 mm`. They are derivatives, times that.
     pub per: &'static str,
@@ -102,11 +107,12 @@ impl Arm {
     /// Error of the tool along a run and its derivatives by parameters, side by side. No other stepper than generalised-alpha; iterations go on
     /// to the end, so that the run is a smooth function of all that goes into it.
     ///
-    /// Cost: of kr210 (18 elastic coordinates) about ten ordinary runs, and a quarter of one for each parameter.
+    /// Cost: of kr210 (18 elastic coordinates) about ten ordinary runs, and a quarter of one for each parameter. With closed loops or links in
+    /// modes a hundred runs and more.
     ///
     /// # Errors
-    /// As [`crate::simulate`]; [`Error::Step`] where the arm has what is not differentiated (servos, hysteresis, closed loops, links in
-    /// modes).
+    /// As [`crate::simulate`]; [`Error::Step`] where the arm has what is not differentiated (links that stiffen under load, motions
+    /// whose velocity jumps under servos).
     pub fn error_slopes(
         &self,
         scenario: impl Into<Scenario>,
@@ -134,7 +140,7 @@ impl Arm {
         crate::loops::along_motion(&flexible.rigid, &scenario.motion.trajectory)?;
         let explained = |error| flexible.explained(error);
         let arm = flexible.arm(scenario.motion.prescribed()).map_err(explained)?;
-        let (arm, caveats) = loaded(self.robot(), scenario, options, arm)?;
+        let (arm, mut caveats) = loaded(self.robot(), scenario, options, arm)?;
         let request = SlopesRequest {
             settings,
             step_s: options.step_s,
@@ -144,17 +150,22 @@ impl Arm {
             keep_samples,
         };
         let found = error_slopes(&arm, parameters, &request).map_err(explained)?;
+        caveats.extend(self.limited(&found));
         Ok((found, caveats))
     }
 
     /// All numbers by which the error along a motion is differentiated.
-    fn run_parameters(&self) -> Vec<Named> {
+    fn run_parameters(&self, scenario: &Scenario) -> Result<Vec<Named>, Error> {
         let of_arm = |parameter: Parameter| {
             let (per, scale) = change_of(&parameter);
             let Parameter { name, unit, initial: value, .. } = parameter.clone();
             Named { name, unit, value, per, scale, parameter: RunParameter::Arm(parameter) }
         };
-        let mut all: Vec<Named> = self.parameters().into_iter().chain(self.link_directions()).map(of_arm).collect();
+        // What another payload takes the place of at the start does nothing.
+        let gone = scenario.payloads.iter().any(|payload| payload.at_s <= SAME_TIME);
+        let there = |own: &Parameter| !(gone && matches!(own.effect, Effect::Mass { .. }));
+        let own = self.parameters().into_iter().chain(self.link_directions()).filter(there);
+        let mut all: Vec<Named> = own.map(of_arm).collect();
         let model = &self.flexible().model;
         for (k, coordinate) in model.coordinates()[..model.n_actuated()].iter().enumerate() {
             let slides = coordinate.kind == "prismatic";
@@ -168,12 +179,13 @@ impl Arm {
             let parameter = RunParameter::Tool(Vector3::ith(k, 1.0));
             all.push(Named { name, unit, value: 0.0, per: "1 mm", scale: 1e-3, parameter });
         }
-        all
+        self.add_controllers(scenario, &mut all)?;
+        Ok(all)
     }
 }
 
 /// How the tool's error along a motion depends on every number of the robot: stiffness and damping of gearboxes and links, masses, the tool's
-/// place, the joints of the motion.
+/// place, the joints of the motion; of joints under servos their friction and gains.
 ///
 /// # Errors
 /// As [`Arm::error_slopes`]; [`Error::Value`] for a name that fits nothing, [`Error::File`] and [`Error::Write`] for the table.
@@ -185,7 +197,7 @@ pub fn sensitivity(
     let scenario = scenario.into();
     check_free(request.table.as_slice(), request.overwrite)?;
     let arm = robot.flexible(request.run.modelling)?;
-    let named = chosen(arm.run_parameters(), &request.parameters, |own| &own.name)?;
+    let named = chosen(arm.run_parameters(&scenario)?, &request.parameters, |own| &own.name)?;
     let parameters: Vec<RunParameter> = named.iter().map(|own| own.parameter.clone()).collect();
     let (found, mut caveats) = arm.error_slopes_told(&scenario, &request.run, &parameters, request.table.is_some())?;
     caveats.extend_from_slice(arm.robot_caveats());

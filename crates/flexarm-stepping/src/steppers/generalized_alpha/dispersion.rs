@@ -66,7 +66,7 @@ impl DispersionCorrection {
         self.c_h2 = self.c * dt * dt;
     }
 
-    /// Makes of M and C, as they were read, what (8) has in their places.
+    /// Makes of M and C, as they were read, what (8) has in their places; with `kept` (6) stays as it is, and only the matrix is another.
     ///
     /// # Errors
     /// [`StepError::Singular`] if the mass matrix is not positive definite.
@@ -75,6 +75,7 @@ impl DispersionCorrection {
         system: &mut impl SecondOrderSystem,
         matrix: &mut IterationMatrix,
         t: f64,
+        kept: bool,
     ) -> Result<(), StepError> {
         let Way::Dense(matrix) = &mut matrix.way else { return Ok(()) };
         let Self { c_h2, K, M_inverse_K, room: [factor, product], shift, .. } = self;
@@ -87,9 +88,11 @@ impl DispersionCorrection {
         factor.copy_from(&matrix.S);
         system.stiffness(K);
         // M^-1 K; K is symmetric.
-        M_inverse_K.copy_from(K);
-        if !solve_in_place(factor.as_mut_slice(), M_inverse_K.as_mut_slice(), n) {
-            return Err(StepError::Singular { matrix: "mass matrix", t });
+        if !kept {
+            M_inverse_K.copy_from(K);
+            if !solve_in_place(factor.as_mut_slice(), M_inverse_K.as_mut_slice(), n) {
+                return Err(StepError::Singular { matrix: "mass matrix", t });
+            }
         }
 
         // S C Sᵀ

@@ -291,7 +291,8 @@ impl GeneralizedAlpha {
     }
 
     /// The same, with steps that are smooth functions of all that goes into them: the matrix, with that of the dispersion correction, is taken
-    /// at the start of each step, and the iteration goes on until nothing is left.
+    /// at the start of each step, and the iteration goes on until nothing is left. Along trees and with modes, whose matrix has the
+    /// correction in itself, that holds of steps that need no more than eight iterations.
     #[must_use]
     pub fn exactly(self) -> Self {
         Self { exact: true, course: None, ..self.leaving(0.0) }
@@ -306,13 +307,13 @@ impl GeneralizedAlpha {
         self.newton.fresh = false;
     }
 
-    /// Newton's matrix, (7) or (8), at the configuration of the last residual.
-    fn factor(&mut self, system: &mut impl SecondOrderSystem, t: f64) -> Result<(), StepError> {
+    /// Newton's matrix, (7) or (8), at the configuration of the last residual; `kept`: without (6).
+    fn factor(&mut self, system: &mut impl SecondOrderSystem, t: f64, kept: bool) -> Result<(), StepError> {
         let (c_D, c_K) = self.coefficients.derivatives(self.newton.dt);
         let matrix = &mut self.newton.matrix;
         matrix.read(system, c_D, c_K, self.correction.as_ref().map(DispersionCorrection::c_h2));
         if let Some(correction) = &mut self.correction {
-            correction.correct(system, matrix, t)?;
+            correction.correct(system, matrix, t, kept)?;
         }
         matrix.invert(t)?;
         if let (Some(course), Some(correction), Way::Dense(dense)) = (&mut self.course, &self.correction, &matrix.way) {
@@ -423,7 +424,7 @@ impl ImplicitStep for GeneralizedAlpha {
         if self.exact || !self.newton.factored {
             // The matrix belongs to the configuration of the last residual.
             system.residual(self.now.grid.time(), &self.now.x, &self.now.v, &self.now.acceleration, &mut self.newton.r);
-            self.factor(system, t)?;
+            self.factor(system, t, false)?;
         } else {
             self.follow();
         }
@@ -443,7 +444,8 @@ impl ImplicitStep for GeneralizedAlpha {
         loop {
             self.residual(system, t);
             if search.stalls() {
-                self.factor(system, t)?;
+                // What a step that is to be smooth places is that of its start.
+                self.factor(system, t, self.exact)?;
                 self.place();
                 self.residual(system, t);
             }
@@ -464,7 +466,7 @@ impl ImplicitStep for GeneralizedAlpha {
         system.settle(t, &self.now.x);
         if !self.newton.factored {
             // The last residual was as good as here, and (6) is the same for all that a step places.
-            let _singular_is_found_again_in_the_next_step = self.factor(system, t);
+            let _singular_is_found_again_in_the_next_step = self.factor(system, t, false);
             self.newton.renewed_between();
         }
         Ok(())

@@ -1,0 +1,97 @@
+//! Gains of servos that a robot file leaves out: such as fit the inertia at the start, and how they follow it.
+
+use flexarm_kinematics::{Data, Model, mass_matrix};
+use flexarm_stepping::{AxisSlope, ServoAxis};
+use nalgebra::DVector;
+
+use crate::drive_entry::ServoEntry;
+use crate::flexible::FlexibleRobot;
+
+/// Default gain of the position loop (1/s), bandwidth of the speed loop (1/s), integral over speed gain (1/s), sample (s).
+const SERVO: [f64; 4] = [20.0, 100.0, 20.0, 1e-3];
+/// Most of the quick inertia over the sampling time that a default velocity gain takes: 2 is where a sampled speed loop
+/// becomes unstable.
+const QUICK_GAIN: f64 = 0.4;
+
+/// Inertia that a joint under a servo feels (kg m² or kg).
+pub(crate) struct Felt {
+    /// Of the rigid robot.
+    inertia: f64,
+    /// At once, all else yielding.
+    quick: f64,
+}
+
+impl Felt {
+    /// Gains of position, speed and integral: as given, else such as fit. Which of two rules limits them is decided at `rule`.
+    fn gains(&self, servo: &ServoEntry, sample_s: f64, rule: &Felt) -> [f64; 3] {
+        let [position, bandwidth, integral, _] = SERVO;
+        // Between samples a motor feels only what follows it at once: the springs give way first.
+        let most = |felt: &Felt| QUICK_GAIN * felt.quick / sample_s;
+        let yields = bandwidth * rule.inertia > most(rule);
+        let fitting = |felt: &Felt| if yields { most(felt) } else { bandwidth * felt.inertia };
+        let velocity = |felt: &Felt| servo.velocity_gain.unwrap_or_else(|| fitting(felt));
+        // The outer loops must be slower than the speed loop within them.
+        let slower = |felt: &Felt| 0.25 * velocity(felt) / felt.inertia;
+        let limited = |gain: f64| servo.velocity_gain.is_none() && gain > slower(rule);
+        let inner = |gain: f64| if limited(gain) { slower(self) } else { gain };
+        let velocity_gain = velocity(self);
+        let integral_gain = servo.integral_gain.unwrap_or_else(|| inner(integral) * velocity_gain);
+        [servo.position_gain.unwrap_or_else(|| inner(position)), velocity_gain, integral_gain]
+    }
+}
+
+impl FlexibleRobot {
+    /// Time between two samples of the servos (s).
+    pub(crate) fn sample_s(&self) -> f64 {
+        self.torque.iter().find_map(|(_, servo, _)| servo.sample_s).unwrap_or(SERVO[3])
+    }
+
+    /// Inertia of the rigid robot that each joint under a servo moves with the joints at `q`, and what it feels at once.
+    pub(crate) fn inertias_felt(&self, model: &Model, rigid: &Model, q: &DVector<f64>) -> Vec<Felt> {
+        let M = mass_matrix(rigid, &mut Data::new(rigid), q).clone();
+        let felt = |((k, ..), quick): (&(usize, ServoEntry, f64), f64)| Felt { inertia: M[(*k, *k)], quick };
+        self.torque.iter().zip(self.quick_inertia_of(model, q)).map(felt).collect()
+    }
+
+    /// Servos of joints that feel these inertias.
+    pub(crate) fn servo_axes(&self, felt: &[Felt]) -> Vec<ServoAxis> {
+        let sample_s = self.sample_s();
+        let axis = |((coordinate, servo, limit), felt): (&(usize, ServoEntry, f64), &Felt)| {
+            let [position_gain, velocity_gain, integral_gain] = felt.gains(servo, sample_s, felt);
+            let (coordinate, limit) = (*coordinate, *limit);
+            let feed_forward = servo.feed_forward.unwrap_or(true);
+            ServoAxis { coordinate, position_gain, velocity_gain, integral_gain, feed_forward, limit }
+        };
+        self.torque.iter().zip(felt).map(axis).collect()
+    }
+
+    /// How gains that are not given follow a change of the robot: `at` gives the tree, the rigid robot's, and the joints' places where the
+    /// motion begins, so many times changed; about no change, per unit. None where they do not.
+    ///
+    /// * `step`: a change that is small.
+    pub(crate) fn gain_slopes(
+        &self,
+        step: f64,
+        at: impl Fn(f64) -> (Model, Model, DVector<f64>),
+    ) -> Vec<(usize, AxisSlope)> {
+        let felt = |x: f64| {
+            let (model, rigid, q) = at(x);
+            self.inertias_felt(&model, &rigid, &q)
+        };
+        let here = felt(0.0);
+        // Central differences of fourth order; which of two rules holds is decided once.
+        let stencil =
+            [(-2.0, 1.0), (-1.0, -8.0), (1.0, 8.0), (2.0, -1.0)].map(|(k, c)| (felt(k * step), c / (12.0 * step)));
+        let mut slopes = Vec::new();
+        for (number, (_, servo, _)) in self.torque.iter().enumerate() {
+            let mut slope = [0.0; 3];
+            for (felt, weight) in &stencil {
+                let gains = felt[number].gains(servo, self.sample_s(), &here[number]);
+                slope.iter_mut().zip(gains).for_each(|(slope, gain)| *slope += weight * gain);
+            }
+            let [position_gain, velocity_gain, integral_gain] = slope;
+            slopes.push((number, AxisSlope { position_gain, velocity_gain, integral_gain, feed_forward: 0.0 }));
+        }
+        slopes
+    }
+}
