@@ -15,6 +15,7 @@ mod least_squares;
 mod measurement;
 mod parameter;
 mod plan;
+mod reading;
 mod response;
 mod sensitivity;
 mod trajectory;
@@ -22,12 +23,13 @@ mod trajectory;
 pub use encoders::{GearEstimate, GearRun, gear_stiffness};
 pub use identify::{Found, HeldOut, Identified, IdentifyError, IdentifyOptions, identify};
 pub use least_squares::{Loss, Residuals, Search, Solution, SolveError, solve};
-pub use measurement::{
-    Component, Form, Instrument, LoadCase, MeasuredArm, MeasuredResponse, MeasuredShape, Measurements, NoAnswer,
-    Reading, ReadingKind, Row, Target,
-};
+pub use measurement::{MeasuredArm, NoAnswer};
 pub use parameter::{Effect, Parameter, Place, Plant};
 pub use plan::{Candidate, Plan, PlanOptions, plan};
+pub use reading::{
+    Component, Form, Instrument, LoadCase, MeasuredResponse, MeasuredShape, Measurements, Reading, ReadingKind, Row,
+    Target,
+};
 pub use response::{Answer, Probe, ResponseSlopes, Structure, StructureSlopes, structure_slopes};
 pub use sensitivity::{FrequencySlopes, compliance_slopes, frequency_slopes, tool_slopes};
 pub use trajectory::{RunParameter, error_slopes};

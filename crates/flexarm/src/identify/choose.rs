@@ -1,0 +1,66 @@
+//! What is to be found, by the file of measurements or by the request.
+
+use super::error::IdentifyFileError;
+use super::file::MeasurementInput;
+use super::parameters;
+use crate::arm::Arm;
+use crate::error::Error;
+use crate::robot_file::RobotFileError;
+
+/// Whether any drive has a spring in this modelling.
+fn gives_way(arm: &Arm) -> bool {
+    arm.flexible().owners.iter().any(|owner| matches!(owner, crate::flexible::Owner::Drive(_)))
+}
+
+/// What the file or the request asks for, in the robot's order.
+pub(super) fn chosen(arm: &Arm, input: &MeasurementInput, fit: &[String]) -> Result<Vec<parameters::Candidate>, Error> {
+    let coupled = arm.robot().coupling.as_ref().filter(|_| gives_way(arm) && !input.recordings.is_empty());
+    if let Some(coupling) = coupled {
+        return Err(IdentifyFileError::Coupled { joints: coupling.joints.clone() }.into());
+    }
+    let all = parameters::candidates(arm.robot(), arm.flexible());
+    let names = || all.iter().map(|c| c.parameter.name.clone()).collect::<Vec<_>>();
+    if all.is_empty() {
+        return Err(IdentifyFileError::NothingGives.into());
+    }
+    let unknown = |pattern: &str| format!("no parameter of this robot is called {pattern:?}; they are {:?}", names());
+    let placed = |place: &RobotFileError, text: String| Error::from(RobotFileError { message: text, ..place.clone() });
+    for (pattern, place) in input.fit.iter().chain(&input.keep) {
+        if !all.iter().any(|c| parameters::fits(pattern, &c.parameter.name)) {
+            return Err(placed(place, unknown(pattern)));
+        }
+    }
+    if let Some(pattern) = fit.iter().find(|p| !all.iter().any(|c| parameters::fits(p, &c.parameter.name))) {
+        return Err(IdentifyFileError::UnknownParameter { text: unknown(pattern) }.into());
+    }
+    let wanted = |name: &str| match (fit.is_empty(), input.fit.is_empty()) {
+        (false, _) => fit.iter().any(|p| parameters::asks_for(p, name)),
+        (true, false) => input.fit.iter().any(|(p, _)| parameters::asks_for(p, name)),
+        // Masses, dampings and single directions of links are asked for by name.
+        (true, true) => name != "payload.mass" && !name.ends_with(".damping") && !parameters::is_direction(name),
+    };
+    let kept = |name: &str| input.keep.iter().any(|(p, _)| parameters::fits(p, name));
+    let mut chosen: Vec<_> = all.clone();
+    chosen.retain(|c| wanted(&c.parameter.name) && !kept(&c.parameter.name));
+    if chosen.is_empty() {
+        return Err(IdentifyFileError::NothingFitted { known: names() }.into());
+    }
+    for candidate in &mut chosen {
+        let logarithmic = candidate.parameter.is_logarithmic();
+        if let Some(factor) = input.uncertainty.filter(|_| logarithmic) {
+            candidate.parameter.prior = factor.ln();
+        }
+    }
+    for (name, uncertainty, place) in &input.known {
+        let Some(candidate) = chosen.iter_mut().find(|c| c.parameter.name == *name) else {
+            return Err(placed(place, format!("{name:?} is not fitted; fitted are {:?}", names())));
+        };
+        let logarithmic = candidate.parameter.is_logarithmic();
+        if logarithmic && *uncertainty <= 1.0 {
+            let text = "of a stiffness or a damping the uncertainty is a factor above 1: 1.5 for half as much again either way";
+            return Err(placed(place, text.into()));
+        }
+        candidate.parameter.prior = if logarithmic { uncertainty.ln() } else { *uncertainty };
+    }
+    Ok(chosen)
+}
