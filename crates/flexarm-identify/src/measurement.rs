@@ -4,12 +4,14 @@
 //! natural frequencies of a hammer test. Each becomes rows: residual over standard deviation, and its derivatives by the
 //! parameters and by the unknowns that belong to the measurement (where the instrument stands, where the target is on the tool).
 
+use std::borrow::Cow;
+
 use flexarm_kinematics::{Frame, Pose, SpatialInertia, rotation_vector};
 use flexarm_stepping::{OperatingPoint, StepError};
 use nalgebra::{DMatrix, DVector, Matrix3xX, Rotation3, Translation3, Vector3};
 
 use crate::least_squares::Residuals;
-use crate::parameter::{Parameter, Plant};
+use crate::parameter::{Effect, Parameter, Plant, carried_along, tool_shift};
 use crate::reading::{Component, LoadCase, MeasuredResponse, MeasuredShape, Measurements, Reading, ReadingKind, Row};
 use crate::response::structure_slopes;
 use crate::sensitivity::{frequency_slopes, tool_slopes};
@@ -73,7 +75,7 @@ struct Workspaces<'a> {
     known: Vec<(Vector3<f64>, SpatialInertia, OperatingPoint)>,
 }
 
-impl Workspaces<'_> {
+impl<'a> Workspaces<'a> {
     /// The tool at rest at a pose under a load.
     fn at_rest(&mut self, q: &[f64], load: &LoadCase, slopes: bool) -> Result<AtRest, StepError> {
         let known = self.known.iter().position(|(at, carried, _)| *at == load.at && *carried == load.carried);
@@ -88,6 +90,8 @@ impl Workspaces<'_> {
                 self.known.len() - 1
             }
         };
+        let parameters = if slopes { self.under(&load.carried) } else { Cow::Borrowed(&[][..]) };
+        let turn = tool_shift(self.parameters, &self.x).1;
         let at = &mut self.known[number].2;
         at.solve(q, &load.wrench)?;
         let X = Pose::from_parts(Translation3::from(-load.at), Rotation3::identity());
@@ -95,15 +99,43 @@ impl Workspaces<'_> {
         if !slopes {
             return Ok(AtRest { X_WT, slopes: None, turns: None });
         }
-        let V = tool_slopes(at, self.parameters)?;
-        let turns = V.fixed_rows::<3>(3).into_owned();
-        let mut moved = V.fixed_rows::<3>(0).into_owned();
+        let mut V = tool_slopes(at, &parameters)?;
         let arm = X_WT.rotation * load.at;
+        let tools: Vec<(usize, [Vector3<f64>; 2])> = tool_twists(self.parameters, &X_WT.rotation, &turn).collect();
+        if !tools.is_empty() {
+            // A force that moves along has another moment.
+            let C = at.compliance();
+            for (k, [v, w]) in &tools {
+                let moment = (v + w.cross(&arm)).cross(&load.wrench.force);
+                V.column_mut(*k).gemv(1.0, &C.fixed_columns::<3>(3), &moment, 1.0);
+            }
+        }
+        let mut turns = V.fixed_rows::<3>(3).into_owned();
+        let mut moved = V.fixed_rows::<3>(0).into_owned();
         for (mut to, w) in moved.column_iter_mut().zip(turns.column_iter()) {
             // From where the load acts to the tool's origin.
             to -= w.cross(&arm);
         }
+        for (k, [v, w]) in tools {
+            moved.column_mut(k).axpy(1.0, &v, 1.0);
+            turns.column_mut(k).axpy(1.0, &w, 1.0);
+        }
         Ok(AtRest { X_WT, slopes: Some(moved), turns: Some(turns) })
+    }
+
+    /// The parameters as they act on an arm that carries this at its tool: moving the tool moves that mass.
+    fn under(&self, carried: &SpatialInertia) -> Cow<'a, [Parameter]> {
+        if !self.parameters.iter().any(|p| matches!(p.effect, Effect::Tool(_))) {
+            return Cow::Borrowed(self.parameters);
+        }
+        let (body, X_BF) = (self.plant.tool.body, self.plant.tool.X_BF);
+        let I = carried.at_parent(&X_BF);
+        let mut all = self.parameters.to_vec();
+        for (k, [v, w]) in tool_twists(self.parameters, &X_BF.rotation, &tool_shift(self.parameters, &self.x).1) {
+            let per_kg = carried_along(&I, &X_BF.translation.vector, &v, &w);
+            all[k].effect = Effect::Mass { body, per_kg };
+        }
+        Cow::Owned(all)
     }
 
     fn loaded(&self, carried: &SpatialInertia) -> Plant {
@@ -194,8 +226,8 @@ impl MeasuredArm<'_> {
             }
             ReadingKind::Frequencies { load, rows } => {
                 let plant = rooms.loaded(&load.carried);
-                let parameters = if slopes { self.parameters } else { &[] };
-                let found = frequency_slopes(&plant, parameters, &reading.q).map_err(named)?;
+                let parameters = if slopes { rooms.under(&load.carried) } else { Cow::Borrowed(&[][..]) };
+                let found = frequency_slopes(&plant, &parameters, &reading.q).map_err(named)?;
                 let values = rows.iter().map(|row| found.hz.get(row.of).copied().unwrap_or(f64::NAN)).collect();
                 let slopes = self.with_own(rows.len(), own.len(), slopes, |i, j| found.slopes[(rows[i].of, j)]);
                 Ok(Block { values, slopes })
@@ -223,10 +255,10 @@ impl MeasuredArm<'_> {
         slopes: bool,
     ) -> Result<Block, StepError> {
         let plant = rooms.loaded(&measured.load.carried);
-        let parameters = if slopes { self.parameters } else { &[] };
+        let parameters = if slopes { rooms.under(&measured.load.carried) } else { Cow::Borrowed(&[][..]) };
         let probes = [measured.watched.clone(), measured.hit.clone()];
         let omega: Vec<f64> = measured.points.iter().map(|(omega, ..)| *omega).collect();
-        let found = structure_slopes(&plant, parameters, q, &probes)?.response(0, 1, measured.answer, &omega)?;
+        let found = structure_slopes(&plant, &parameters, q, &probes)?.response(0, 1, measured.answer, &omega)?;
         let values = found.values.iter().enumerate().flat_map(|(k, value)| measured.numbers(k, *value)).collect();
         let slope = |i: usize, j: usize| {
             let k = i / 2;
@@ -244,8 +276,8 @@ impl MeasuredArm<'_> {
         slopes: bool,
     ) -> Result<Block, StepError> {
         let plant = rooms.loaded(&measured.load.carried);
-        let parameters = if slopes { self.parameters } else { &[] };
-        let found = structure_slopes(&plant, parameters, q, &measured.probes)?;
+        let parameters = if slopes { rooms.under(&measured.load.carried) } else { Cow::Borrowed(&[][..]) };
+        let found = structure_slopes(&plant, &parameters, q, &measured.probes)?;
         let none = || StepError::Singular { matrix: "mode shapes at the measured points (they do not move)", t: 0.0 };
         let (mode, _, seen) = measured.likeliest(&found).ok_or_else(none)?;
         let all = found.shape_slopes(mode);
@@ -292,6 +324,23 @@ impl MeasuredArm<'_> {
         }
         Block { values, slopes }
     }
+}
+
+/// Velocity at the tool's origin and angular velocity per unit of each parameter that moves the tool, by its number.
+///
+/// * `R`: rotation of the tool as it is now, in the axes asked for; `turn`: by which of that it is turned from its own axes.
+fn tool_twists<'a>(
+    parameters: &'a [Parameter],
+    R: &Rotation3<f64>,
+    turn: &Vector3<f64>,
+) -> impl Iterator<Item = (usize, [Vector3<f64>; 2])> + use<'a> {
+    let before = R * Rotation3::new(*turn).inverse();
+    let rates = before * left_jacobian(turn);
+    parameters.iter().enumerate().filter_map(move |(k, parameter)| match parameter.effect {
+        Effect::Tool(axis @ 0..3) => Some((k, [before * Vector3::ith(axis, 1.0), Vector3::zeros()])),
+        Effect::Tool(axis) => Some((k, [Vector3::zeros(), rates.column(axis - 3).into_owned()])),
+        _ => None,
+    })
 }
 
 /// Angular velocity (fixed axes) per rate of a rotation vector.

@@ -30,6 +30,33 @@ pub enum IdentifyFileError {
         /// All of it.
         text: String,
     },
+    /// An entry of a matrix and a factor on it.
+    #[error("{entry} and {factor} say the same twice: fit one of them and keep the other")]
+    Twice {
+        /// Entry.
+        entry: String,
+        /// Factor.
+        factor: String,
+    },
+    /// A tool that is not the robot file's.
+    #[error("{name} is that of the robot file, and link {link:?} was chosen in its place at loading: leave that out")]
+    OtherTool {
+        /// Parameter.
+        name: String,
+        /// Link.
+        link: String,
+    },
+    /// Nodes on a tool that is to be found.
+    #[error(
+        "{reading} is seen or hit at a node on the tool, which {name} would move: give the node the link on which the sensor sits, and its \
+         place there"
+    )]
+    ToolNode {
+        /// Parameter.
+        name: String,
+        /// Which.
+        reading: String,
+    },
     /// Everything is kept.
     #[error("nothing is left to fit: of {known:?} all are kept")]
     NothingFitted {

@@ -30,7 +30,7 @@ pub use flexarm_identify::{
 };
 
 use self::answer::answer;
-use self::choose::chosen;
+use self::choose::{check_tool, chosen};
 use self::doubts::{frame_caveat, gear_caveat};
 use self::error::of_names;
 use self::file::{Cell, MeasurementInput};
@@ -57,13 +57,26 @@ impl Arm {
 
     /// What of the robot file can be identified on this arm, by the names that files and `--fit` use.
     pub fn parameters(&self) -> Vec<Parameter> {
-        self.candidates_that(|name| !parameters::is_direction(name))
+        let special =
+            |name: &str| parameters::is_direction(name) || parameters::is_entry(name) || parameters::is_tool(name);
+        self.candidates_that(|name| !special(name))
     }
 
     /// The six directions of each lumped link's springs, `link.LINK.stiffness_factors[k]`: together they are the link's stiffness, which
     /// [`Arm::parameters`] has as a whole.
     pub fn link_directions(&self) -> Vec<Parameter> {
         self.candidates_that(parameters::is_direction)
+    }
+
+    /// The 21 entries of the 6x6 of each lumped link in two parts, `link.LINK.stiffness[i][j]` with i up to j: not to be taken beside the
+    /// link's factors.
+    pub fn link_entries(&self) -> Vec<Parameter> {
+        self.candidates_that(parameters::is_entry)
+    }
+
+    /// The place and the attitude of the tool, `tcp.x` to `tcp.rz`: moved and turned about its own axes (m, rad).
+    pub fn tool_parameters(&self) -> Vec<Parameter> {
+        self.candidates_that(parameters::is_tool)
     }
 
     fn candidates_that(&self, wanted: impl Fn(&str) -> bool) -> Vec<Parameter> {
@@ -109,6 +122,7 @@ pub fn identify_robot(robot: &Robot, measurements: &Path, request: &IdentifyRequ
         Some(folder) => Some(Targets::in_folder(folder, request.overwrite)?),
         None => None,
     };
+    check_tool(robot, &chosen, &input)?;
     let plant = arm.plant();
     check_modes(&plant, &input)?;
     check_units(&plant, &input)?;
@@ -163,7 +177,7 @@ impl Targets {
         let folder = self.robot.parent().unwrap_or(Path::new("."));
         // The place of the new file must be there for paths as seen from it.
         std::fs::create_dir_all(folder).map_err(|source| Error::Write { path: folder.to_owned(), source })?;
-        let new = rewrite::rewritten(&text, &told, home, folder)
+        let new = rewrite::rewritten(&text, &told, robot.tcp(), home, folder)
             .map_err(|what| Error::File { path: robot.path.clone(), what })?;
         (answer.file, answer.page) = (Some(self.robot.display().to_string()), Some(self.page.display().to_string()));
         let page = page::html(answer);

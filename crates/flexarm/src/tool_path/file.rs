@@ -309,16 +309,20 @@ fn overrides(file: &PathFile, source: &Source, cell: &Cell<'_>, units: Units) ->
             return Err(source.error(joint.span(), message));
         };
         let unit = if coordinates[k].kind == "prismatic" { units.length } else { units.angle };
-        let value = |value: &Option<Spanned<f64>>, factor: f64| match value {
+        let value = |key: &str, value: &Option<Spanned<f64>>, factor: f64| match value {
             Some(value) if !(*value.get_ref() > 0.0 && value.get_ref().is_finite()) => {
-                Err(source.error(value.span(), "a limit must be a positive number"))
+                let (joint, found) = (joint.get_ref(), value.get_ref());
+                let message = format!(
+                    "limits: {key} of joint {joint:?} is {found}, expected a positive number; leave it out to keep the robot's own"
+                );
+                Err(source.error(value.span(), message))
             }
             value => Ok(value.as_ref().map(|value| value.get_ref() * factor)),
         };
-        overrides.velocities[k] = value(&limits.velocity, unit)?;
-        overrides.accelerations[k] = value(&limits.acceleration, unit)?;
-        overrides.jerks[k] = value(&limits.jerk, unit)?;
-        overrides.torques[k] = value(&limits.torque, 1.0)?;
+        overrides.velocities[k] = value("velocity", &limits.velocity, unit)?;
+        overrides.accelerations[k] = value("acceleration", &limits.acceleration, unit)?;
+        overrides.jerks[k] = value("jerk", &limits.jerk, unit)?;
+        overrides.torques[k] = value("torque", &limits.torque, 1.0)?;
     }
     Ok(overrides)
 }

@@ -110,6 +110,7 @@ pub(super) struct MeasurementInput {
     /// Name of the unit of length, for words about it.
     pub(super) length: &'static str,
     pub(super) length_m: f64,
+    pub(super) angle_rad: f64,
 }
 
 /// Factors of the units of a file.
@@ -199,6 +200,7 @@ pub(super) fn read(path: &Path, cell: &Cell<'_>) -> Result<MeasurementInput, Err
         deviations_known,
         length,
         length_m,
+        angle_rad: units.angle,
     })
 }
 
