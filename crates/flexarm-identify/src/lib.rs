@@ -9,6 +9,7 @@
 #![allow(non_snake_case, reason = "monogram notation: X_WT, J; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 
+mod coupled_gears;
 mod encoders;
 mod identify;
 mod least_squares;
@@ -20,6 +21,7 @@ mod response;
 mod sensitivity;
 mod trajectory;
 
+pub use coupled_gears::{CoupledOutput, coupled_gear_stiffness};
 pub use encoders::{GearEstimate, GearRun, gear_stiffness};
 pub use identify::{Found, HeldOut, Identified, IdentifyError, IdentifyOptions, identify};
 pub use least_squares::{Loss, Residuals, Search, Solution, SolveError, solve};

@@ -10,17 +10,8 @@ use crate::error::Error;
 use crate::robot::{Robot, TCP_FRAME};
 use crate::robot_file::RobotFileError;
 
-/// Whether any drive has a spring in this modelling.
-fn gives_way(arm: &Arm) -> bool {
-    arm.flexible().owners.iter().any(|owner| matches!(owner, crate::flexible::Owner::Drive(_)))
-}
-
 /// What the file or the request asks for, in the robot's order.
 pub(super) fn chosen(arm: &Arm, input: &MeasurementInput, fit: &[String]) -> Result<Vec<parameters::Candidate>, Error> {
-    let coupled = arm.robot().coupling.as_ref().filter(|_| gives_way(arm) && !input.recordings.is_empty());
-    if let Some(coupling) = coupled {
-        return Err(IdentifyFileError::Coupled { joints: coupling.joints.clone() }.into());
-    }
     let all = parameters::candidates(arm.robot(), arm.flexible());
     // Entries of matrices are many: their names say what they are.
     let names = || {

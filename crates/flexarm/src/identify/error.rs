@@ -15,15 +15,6 @@ pub enum IdentifyFileError {
          entries with a first guess"
     )]
     NothingGives,
-    /// Gears that move several joints.
-    #[error(
-        "the gears of {joints:?} are coupled: motor less link of one joint is not the deflection of one spring; leave [[encoders]] out and \
-         measure displacements, places, frequencies or responses, which know the coupling"
-    )]
-    Coupled {
-        /// Joints.
-        joints: Vec<String>,
-    },
     /// A name that is not there.
     #[error("{text}")]
     UnknownParameter {

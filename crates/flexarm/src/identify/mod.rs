@@ -22,11 +22,11 @@ use std::path::{Path, PathBuf};
 
 use flexarm_files::{check_free, write_all};
 pub use flexarm_identify::{
-    Answer, Candidate, Component, Effect, Form, Found, GearEstimate, GearRun, HeldOut, Identified, IdentifyError,
-    IdentifyOptions, Instrument, LoadCase, Loss, MeasuredArm, MeasuredResponse, MeasuredShape, Measurements, NoAnswer,
-    Parameter, Place, Plan, PlanOptions, Plant, Probe, Reading, ReadingKind, ResponseSlopes, Row, Search, Structure,
-    StructureSlopes, Target, compliance_slopes, frequency_slopes, gear_stiffness, identify, plan, structure_slopes,
-    tool_slopes,
+    Answer, Candidate, Component, CoupledOutput, Effect, Form, Found, GearEstimate, GearRun, HeldOut, Identified,
+    IdentifyError, IdentifyOptions, Instrument, LoadCase, Loss, MeasuredArm, MeasuredResponse, MeasuredShape,
+    Measurements, NoAnswer, Parameter, Place, Plan, PlanOptions, Plant, Probe, Reading, ReadingKind, ResponseSlopes,
+    Row, Search, Structure, StructureSlopes, Target, compliance_slopes, coupled_gear_stiffness, frequency_slopes,
+    gear_stiffness, identify, plan, structure_slopes, tool_slopes,
 };
 
 use self::answer::answer;

@@ -23,6 +23,8 @@ pub(super) struct EncodersEntry {
     motor: Spanned<BTreeMap<String, String>>,
     /// Columns of the encoders behind the gears, of some joints.
     link: Spanned<BTreeMap<String, String>>,
+    /// Of coupled gears: whether the columns of motors are those of the motors behind their gears or what the controller makes of them.
+    positions: Option<Spanned<String>>,
     below: Option<Spanned<f64>>,
     edge: Option<Spanned<f64>>,
 }
@@ -32,7 +34,7 @@ pub(super) struct EncodersEntry {
 pub(in crate::identify) struct EncoderRecording {
     pub(in crate::identify) place: RobotFileError,
     pub(in crate::identify) step_s: f64,
-    /// One list per joint (rad or m).
+    /// One list per joint (rad or m): where the motors say that it is.
     pub(in crate::identify) motor: Vec<Vec<f64>>,
     /// Of the joints that have one.
     pub(in crate::identify) link: Vec<Option<Vec<f64>>>,
@@ -106,10 +108,12 @@ impl Reader<'_> {
         if link.iter().all(Option::is_none) {
             return Err(self.error(e.link.span(), "no joint has an encoder behind its gear"));
         }
+        let mut motor: Vec<Vec<f64>> = of(&e.motor, true)?.into_iter().flatten().collect();
+        self.behind_coupling(e, &mut motor)?;
         Ok(EncoderRecording {
             place: self.source.error(entry.span(), ""),
             step_s,
-            motor: of(&e.motor, true)?.into_iter().flatten().collect(),
+            motor,
             link,
             below_hz: positive(&e.below, "below", BELOW_HZ)?,
             edge_s: positive(&e.edge, "edge", EDGE_S)?,
@@ -126,4 +130,36 @@ fn even_step(time: &[f64]) -> Option<f64> {
     let step = (time[n - 1] - time[0]) / (n - 1) as f64;
     let even = time.windows(2).all(|pair| (pair[1] - pair[0] - step).abs() <= UNEVEN * step);
     (step > 0.0 && even).then_some(step)
+}
+
+impl Reader<'_> {
+    /// Joints from motors that move several of them, `q = C q_m`; joints that the controller has made of them stay.
+    fn behind_coupling(&self, e: &EncodersEntry, motor: &mut [Vec<f64>]) -> Result<(), Error> {
+        let Some(coupling) = self.cell.arm.robot().coupling() else { return Ok(()) };
+        match e.positions.as_ref().map(|word| (word.get_ref().as_str(), word.span())) {
+            Some(("joints", _)) => return Ok(()),
+            Some(("motors", _)) => {}
+            Some((other, span)) => {
+                let text = format!("positions = {other:?} is not known; use \"motors\" or \"joints\"");
+                return Err(self.error(span, text));
+            }
+            None => {
+                let text = format!(
+                    "the gears of {:?} are coupled: say whether motor has the angles of the motors behind their gears (positions = \"motors\") \
+                     or the joints that the controller makes of them (positions = \"joints\")",
+                    coupling.joints
+                );
+                return Err(self.error(e.motor.span(), text));
+            }
+        }
+        let place = |joint: &String| self.cell.joints.iter().position(|(name, _)| name == joint);
+        let places: Vec<usize> = coupling.joints.iter().filter_map(place).collect();
+        let before: Vec<Vec<f64>> = places.iter().map(|k| motor[*k].clone()).collect();
+        for (i, joint) in places.iter().enumerate() {
+            for (sample, to) in motor[*joint].iter_mut().enumerate() {
+                *to = before.iter().enumerate().map(|(k, q)| coupling.C[(i, k)] * q[sample]).sum();
+            }
+        }
+        Ok(())
+    }
 }
