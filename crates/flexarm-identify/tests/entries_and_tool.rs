@@ -37,7 +37,7 @@ fn tool(axis: usize) -> Parameter {
 }
 
 fn parameters(plant: &Plant) -> Vec<Parameter> {
-    let mut all = vec![entry(plant, 0, 1, 5), entry(plant, 0, 2, 2), entry(plant, 1, 0, 4)];
+    let mut all = vec![entry(plant, 0, 1, 5), entry(plant, 0, 4, 4), entry(plant, 1, 0, 4)];
     all.extend((0..6).map(tool));
     all
 }
@@ -126,7 +126,8 @@ fn readings_of_all_kinds_change_with_entries_and_with_the_tool_as_differences_sa
         let arm = MeasuredArm { plant: &plant, parameters: &parameters, measurements: &one };
         let mut J = DMatrix::zeros(0, 0);
         arm.evaluate(&x, Some(&mut J)).unwrap();
-        let largest = J.amax();
+        // What a step of each does; entries that do next to nothing are held against the others.
+        let largest = (0..J.ncols()).map(|p| J.column(p).amax() * step_of(&parameters[p])).fold(0.0, f64::max);
         for (p, parameter) in parameters.iter().enumerate() {
             let residuals = |h: f64| {
                 let mut moved = x.clone();
@@ -135,10 +136,11 @@ fn readings_of_all_kinds_change_with_entries_and_with_the_tool_as_differences_sa
             };
             let h = step_of(parameter) * if k > 2 { 0.2 } else { 1.0 };
             let truth = richardson(h, residuals);
-            let size = truth.amax().max(1e-9 * largest * h);
+            let size = truth.amax().max(1e-3 * largest / step_of(parameter));
             let error = (J.column(p) - &truth).amax();
             eprintln!("reading {k}, {}: {:.1e} of {:.2e}", parameter.name, error / size, truth.amax());
-            assert!(error < 1e-8 * size || truth.amax() == 0.0 && error == 0.0, "reading {k}, {}", parameter.name);
+            // Measured: 7e-10 and less.
+            assert!(error < 1e-8 * size, "reading {k}, {}: {:e}", parameter.name, error / size);
         }
     }
 }

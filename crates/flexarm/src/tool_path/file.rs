@@ -250,7 +250,8 @@ fn options(
     let mut options = PathOptions::default();
     if let Some(rise) = &file.path.rise {
         if !(*rise.get_ref() > 0.0 && rise.get_ref().is_finite()) {
-            return Err(source.error(rise.span(), "rise must be a positive time in s"));
+            let message = format!("rise is {}, it must be a positive time in s", rise.get_ref());
+            return Err(source.error(rise.span(), message));
         }
         options.rise_s = *rise.get_ref();
     }
@@ -563,7 +564,8 @@ impl Reader<'_> {
         let R = R.ok_or_else(|| self.source.error(table.span(), "tell how the tool stands: rpy or quaternion"))?;
         let side = *entry.side.get_ref() * self.units.length;
         if !(side > 0.0 && side.is_finite()) {
-            return Err(self.source.error(entry.side.span(), "side must be a positive length"));
+            let message = format!("side is {}, it must be a positive length", entry.side.get_ref());
+            return Err(self.source.error(entry.side.span(), message));
         }
         let (centre, repeats) = (Vector3::from(entry.centre) * self.units.length, entry.repeats.unwrap_or(1));
         if !(1..=1000).contains(&repeats) {
