@@ -25,7 +25,7 @@ ROOTS = [
     ("Compensation", "flexarm/src/compensate/mod.rs", "Compensation"),
     ("Sensitivity", "flexarm/src/sensitivity/mod.rs", "Sensitivity"),
     ("PoseSensitivity", "flexarm/src/sensitivity/pose.rs", "PoseSensitivity"),
-    ("Identification", "flexarm/src/identify/mod.rs", "Identification"),
+    ("Identification", "flexarm/src/identify/answer.rs", "Identification"),
     ("MeasurementPlan", "flexarm/src/identify/plan_file.rs", "MeasurementPlan"),
     ("Lobes", "flexarm/src/lobes/mod.rs", "Lobes"),
     ("SweepSummary", "flexarm/src/sweep/results.rs", "SweepSummary"),

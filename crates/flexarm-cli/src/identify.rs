@@ -155,7 +155,7 @@ fn text(found: &Identification) -> String {
     let mut t = table(&["parameter", "before", "value", "std", "", "unit"]);
     for p in &found.parameters {
         let (value, part) = match p.identifiable {
-            true => (number(p.value), format!("{:.1} %", 100.0 * p.std / p.value.abs())),
+            true => (number(p.value), part_of(p.std, p.value, p.initial)),
             false => ("not told".to_owned(), String::new()),
         };
         t.add_row(vec![p.name.clone(), number(p.initial), value, number(p.std), part, p.unit.clone()]);
@@ -257,7 +257,7 @@ fn plan_text(found: &MeasurementPlan) -> String {
     out += "\n";
     let mut t = table(&["parameter", "now", "expected std", "", "unit"]);
     for p in &found.parameters {
-        let part = format!("{:.1} %", 100.0 * p.std / p.initial.abs());
+        let part = part_of(p.std, p.initial, p.initial);
         t.add_row(vec![p.name.clone(), number(p.initial), number(p.std), part, p.unit.clone()]);
     }
     out += &lines(&t);
@@ -282,4 +282,9 @@ fn number(x: f64) -> String {
         }
         _ => format!("{x:.3e}"),
     }
+}
+
+/// A deviation as a part of a value; none of what counts from zero, such as the place of the tool.
+fn part_of(std: f64, value: f64, initial: f64) -> String {
+    if initial == 0.0 { "-".to_owned() } else { format!("{:.1} %", 100.0 * std / value.abs()) }
 }

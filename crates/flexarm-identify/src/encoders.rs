@@ -54,7 +54,7 @@ impl GearEstimate {
 }
 
 /// Samples of one block of the jackknife.
-const BLOCK: usize = 250;
+pub(crate) const BLOCK: usize = 250;
 
 /// Finds the stiffness of a gear from all its runs; one run is taken as two halves.
 ///
@@ -158,7 +158,7 @@ impl Fit {
     }
 }
 
-fn centred(x: &[f64], kept: &[usize]) -> Vec<f64> {
+pub(crate) fn centred(x: &[f64], kept: &[usize]) -> Vec<f64> {
     let mean = kept.iter().map(|i| x[*i]).sum::<f64>() / kept.len().max(1) as f64;
     kept.iter().map(|i| x[*i] - mean).collect()
 }

@@ -4,8 +4,9 @@ use flexarm_kinematics::Pose;
 use nalgebra::{DMatrix, DVector, Matrix3, Rotation3, Translation3, Vector3};
 
 use crate::least_squares::{Residuals, Search, Solution, SolveError, solve};
-use crate::measurement::{Instrument, MeasuredArm, Measurements, NoAnswer, ReadingKind, Target};
+use crate::measurement::{MeasuredArm, NoAnswer};
 use crate::parameter::{Parameter, Plant};
+use crate::reading::{Instrument, Measurements, ReadingKind, Target};
 
 /// A residual over its own standard deviation beyond which a reading is named.
 const SUSPICIOUS: f64 = 4.0;

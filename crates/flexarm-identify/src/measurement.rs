@@ -1,311 +1,20 @@
-//! What was measured, and what an arm with given parameters would have shown.
+//! What an arm with given parameters would have shown of what was measured.
 //!
 //! A reading is one thing done at the robot: a displacement between two loads at a pose, a place in the axes of an instrument, the
 //! natural frequencies of a hammer test. Each becomes rows: residual over standard deviation, and its derivatives by the
 //! parameters and by the unknowns that belong to the measurement (where the instrument stands, where the target is on the tool).
 
-use flexarm_kinematics::{Frame, Pose, SpatialInertia, Wrench, rotation_vector};
+use std::borrow::Cow;
+
+use flexarm_kinematics::{Frame, Pose, SpatialInertia, rotation_vector};
 use flexarm_stepping::{OperatingPoint, StepError};
-use nalgebra::{Complex, DMatrix, DVector, Matrix3xX, Rotation3, Translation3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3xX, Rotation3, Translation3, Vector3};
 
 use crate::least_squares::Residuals;
-use crate::parameter::{Parameter, Plant};
-use crate::response::{Answer, Probe, StructureSlopes, structure_slopes};
+use crate::parameter::{Effect, Parameter, Plant, carried_along, tool_shift};
+use crate::reading::{Component, LoadCase, MeasuredResponse, MeasuredShape, Measurements, Reading, ReadingKind, Row};
+use crate::response::structure_slopes;
 use crate::sensitivity::{frequency_slopes, tool_slopes};
-
-/// What the tool carries and what pulls at it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct LoadCase {
-    /// Force and moment at the point, world axes (N, N m).
-    pub wrench: Wrench,
-    /// Where they act, in tool axes (m).
-    pub at: Vector3<f64>,
-    /// What is fixed to the tool besides what the robot carries: inertia about the tool's origin, tool axes.
-    pub carried: SpatialInertia,
-}
-
-impl LoadCase {
-    /// Nothing besides what the robot carries anyway.
-    pub fn none() -> Self {
-        Self { wrench: Wrench::zeros(), at: Vector3::zeros(), carried: SpatialInertia::zeros() }
-    }
-}
-
-impl Default for LoadCase {
-    fn default() -> Self {
-        Self::none()
-    }
-}
-
-/// One number: what it is of, what was read, how sure it is.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Row<T> {
-    /// What of the reading.
-    pub of: T,
-    /// The number (m, rad or Hz).
-    pub value: f64,
-    /// Its standard deviation.
-    pub std: f64,
-}
-
-/// A component of a displacement.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Component {
-    /// Along a direction, world axes, of unit length.
-    Along(Vector3<f64>),
-    /// Rotation about a direction, world axes.
-    About(Vector3<f64>),
-}
-
-/// One thing measured at a pose.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Reading {
-    /// Name for people: file and row.
-    pub name: String,
-    /// Actuated joints (rad or m).
-    pub q: Vec<f64>,
-    /// What.
-    pub kind: ReadingKind,
-}
-
-/// How a measured response is compared with the arm's.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Form {
-    /// Logarithm of the magnitude, and phase (rad): what is off by a part of itself counts alike everywhere.
-    #[default]
-    Logarithmic,
-    /// Real and imaginary part: what is large counts.
-    Complex,
-}
-
-/// The curve of a hammer test.
-#[derive(Clone, Debug, PartialEq)]
-pub struct MeasuredResponse {
-    /// What the tool carries; a wrench does not count.
-    pub load: LoadCase,
-    /// What is watched.
-    pub watched: Probe,
-    /// What is hit.
-    pub hit: Probe,
-    /// What is measured per newton.
-    pub answer: Answer,
-    /// How it is compared.
-    pub form: Form,
-    /// Frequencies (rad/s), values in SI units, and the deviations of the two numbers that each becomes.
-    pub points: Vec<(f64, Complex<f64>, [f64; 2])>,
-}
-
-impl MeasuredResponse {
-    /// The two numbers of a value at a point: of a phase that one within half a turn of the measured.
-    fn numbers(&self, k: usize, value: Complex<f64>) -> [f64; 2] {
-        let measured = self.points[k].1;
-        match self.form {
-            Form::Complex => [value.re, value.im],
-            Form::Logarithmic => [value.norm().ln(), measured.arg() + (value / measured).arg()],
-        }
-    }
-
-    /// Change of the same two numbers with that of the value.
-    fn number_slopes(&self, value: Complex<f64>, slope: Complex<f64>) -> [f64; 2] {
-        match self.form {
-            Form::Complex => [slope.re, slope.im],
-            Form::Logarithmic => {
-                let part = slope / value;
-                [part.re, part.im]
-            }
-        }
-    }
-}
-
-/// The shape of a mode as it was seen at some points.
-#[derive(Clone, Debug, PartialEq)]
-pub struct MeasuredShape {
-    /// What the tool carries; a wrench does not count.
-    pub load: LoadCase,
-    /// Where and along which directions it was seen.
-    pub probes: Vec<Probe>,
-    /// Amplitudes there, in any unit and with any sign in common.
-    pub amplitudes: DVector<f64>,
-    /// Deviation of each amplitude, as a part of the length of all of them.
-    pub std: f64,
-}
-
-impl MeasuredShape {
-    /// The measured amplitudes with length 1.
-    fn unit(&self) -> DVector<f64> {
-        self.amplitudes.normalize()
-    }
-
-    /// The mode of the arm that is most like it: its number, its modal assurance criterion `(aᵀb)²` of unit vectors a and b, and its amplitudes at the probes, with
-    /// length 1 and the sign of the measured.
-    fn likeliest(&self, found: &StructureSlopes) -> Option<(usize, f64, DVector<f64>)> {
-        let measured = self.unit();
-        let of = |j: usize| {
-            let phi = found.shapes.column(j);
-            let seen = DVector::from_iterator(self.probes.len(), found.structure.rows.iter().map(|row| (row * phi)[0]));
-            let seen = seen.try_normalize(0.0)?;
-            let along = seen.dot(&measured);
-            Some((j, along * along, if along < 0.0 { -seen } else { seen }))
-        };
-        let all = (0..found.omega2.len()).filter_map(of);
-        all.max_by(|a, b| a.1.total_cmp(&b.1))
-    }
-}
-
-/// Kinds of readings.
-#[derive(Clone, Debug, PartialEq)]
-pub enum ReadingKind {
-    /// How far a point of the tool moves from one load to another.
-    Displacement {
-        /// Before.
-        before: LoadCase,
-        /// After.
-        after: LoadCase,
-        /// The point, tool axes (m).
-        point: Vector3<f64>,
-        /// What was read.
-        rows: Vec<Row<Component>>,
-    },
-    /// Where a target on the tool is, in the axes of an instrument.
-    Place {
-        /// Load at that time.
-        load: LoadCase,
-        /// Number of the target.
-        target: usize,
-        /// Number of the instrument.
-        instrument: usize,
-        /// Place (m).
-        value: Vector3<f64>,
-        /// Standard deviation of each component (m).
-        std: Vector3<f64>,
-    },
-    /// A parameter by itself, told by a measurement of another kind ([`crate::gear_stiffness`]).
-    Known {
-        /// Name of the parameter.
-        parameter: String,
-        /// Its coordinate: of stiffnesses the logarithm of the value over the initial one, else the difference.
-        value: f64,
-        /// Standard deviation of that.
-        std: f64,
-    },
-    /// Natural frequencies, drives locked.
-    Frequencies {
-        /// What the tool carries; a wrench does not count.
-        load: LoadCase,
-        /// Number of the mode, from 0 with the lowest; Hz.
-        rows: Vec<Row<usize>>,
-    },
-    /// A frequency response, drives locked.
-    Response(MeasuredResponse),
-    /// A mode's shape, drives locked. The arm's own is that which is most like it.
-    Shape(MeasuredShape),
-}
-
-impl Reading {
-    /// How many numbers.
-    pub fn rows(&self) -> usize {
-        match &self.kind {
-            ReadingKind::Displacement { rows, .. } => rows.len(),
-            ReadingKind::Place { .. } => 3,
-            ReadingKind::Known { .. } => 1,
-            ReadingKind::Frequencies { rows, .. } => rows.len(),
-            ReadingKind::Response(response) => 2 * response.points.len(),
-            ReadingKind::Shape(shape) => shape.probes.len(),
-        }
-    }
-
-    /// Standard deviation of each number.
-    pub fn deviations(&self) -> Vec<f64> {
-        match &self.kind {
-            ReadingKind::Displacement { rows, .. } => rows.iter().map(|row| row.std).collect(),
-            ReadingKind::Place { std, .. } => std.iter().copied().collect(),
-            ReadingKind::Known { std, .. } => vec![*std],
-            ReadingKind::Frequencies { rows, .. } => rows.iter().map(|row| row.std).collect(),
-            ReadingKind::Response(response) => response.points.iter().flat_map(|(.., std)| *std).collect(),
-            ReadingKind::Shape(shape) => vec![shape.std; shape.probes.len()],
-        }
-    }
-}
-
-/// A point on the tool whose place is measured.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Target {
-    /// Known, tool axes (m).
-    Known(Vector3<f64>),
-    /// Unknown; a guess.
-    Unknown(Vector3<f64>),
-}
-
-/// Where an instrument stands: the world in its axes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Instrument {
-    /// Known.
-    Known(Pose),
-    /// Unknown; a guess.
-    Unknown(Pose),
-}
-
-/// Readings, and what belongs to them.
-#[derive(Clone, Debug, Default)]
-pub struct Measurements {
-    /// What was read.
-    pub readings: Vec<Reading>,
-    /// Points that places are of.
-    pub targets: Vec<Target>,
-    /// Instruments that places are seen from.
-    pub instruments: Vec<Instrument>,
-}
-
-impl Measurements {
-    /// How many unknowns belong to the measurements: six per unknown instrument, then three per unknown target.
-    pub fn own_unknowns(&self) -> usize {
-        let instruments = self.instruments.iter().filter(|i| matches!(i, Instrument::Unknown(_))).count();
-        let targets = self.targets.iter().filter(|t| matches!(t, Target::Unknown(_))).count();
-        6 * instruments + 3 * targets
-    }
-
-    /// How many numbers were read.
-    pub fn rows(&self) -> usize {
-        self.readings.iter().map(Reading::rows).sum()
-    }
-
-    /// The same with some of the readings.
-    #[must_use]
-    pub fn of_readings(&self, keep: impl Fn(usize) -> bool) -> Self {
-        let readings = self.readings.iter().enumerate().filter(|(k, _)| keep(*k)).map(|(_, r)| r.clone()).collect();
-        Self { readings, ..self.clone() }
-    }
-
-    /// The world in the axes of an instrument, and where in `own` its six unknowns begin.
-    pub(crate) fn instrument(&self, number: usize, own: &[f64]) -> (Pose, Option<usize>) {
-        let before = self.instruments[..number].iter().filter(|i| matches!(i, Instrument::Unknown(_))).count();
-        match self.instruments[number] {
-            Instrument::Known(X) => (X, None),
-            Instrument::Unknown(X) => {
-                let at = 6 * before;
-                let v = |k: usize| Vector3::new(own[at + k], own[at + k + 1], own[at + k + 2]);
-                let moved = Pose {
-                    rotation: Rotation3::new(v(3)) * X.rotation,
-                    translation: Translation3::from(X.translation.vector + v(0)),
-                };
-                (moved, Some(at))
-            }
-        }
-    }
-
-    /// A target on the tool, and where in `own` its three unknowns begin.
-    pub(crate) fn target(&self, number: usize, own: &[f64]) -> (Vector3<f64>, Option<usize>) {
-        let instruments = self.instruments.iter().filter(|i| matches!(i, Instrument::Unknown(_))).count();
-        let before = self.targets[..number].iter().filter(|t| matches!(t, Target::Unknown(_))).count();
-        match self.targets[number] {
-            Target::Known(p) => (p, None),
-            Target::Unknown(p) => {
-                let at = 6 * instruments + 3 * before;
-                (p + Vector3::new(own[at], own[at + 1], own[at + 2]), Some(at))
-            }
-        }
-    }
-}
 
 /// An arm with unknown parameters under measurements.
 pub struct MeasuredArm<'a> {
@@ -366,7 +75,7 @@ struct Workspaces<'a> {
     known: Vec<(Vector3<f64>, SpatialInertia, OperatingPoint)>,
 }
 
-impl Workspaces<'_> {
+impl<'a> Workspaces<'a> {
     /// The tool at rest at a pose under a load.
     fn at_rest(&mut self, q: &[f64], load: &LoadCase, slopes: bool) -> Result<AtRest, StepError> {
         let known = self.known.iter().position(|(at, carried, _)| *at == load.at && *carried == load.carried);
@@ -381,6 +90,8 @@ impl Workspaces<'_> {
                 self.known.len() - 1
             }
         };
+        let parameters = if slopes { self.under(&load.carried) } else { Cow::Borrowed(&[][..]) };
+        let turn = tool_shift(self.parameters, &self.x).1;
         let at = &mut self.known[number].2;
         at.solve(q, &load.wrench)?;
         let X = Pose::from_parts(Translation3::from(-load.at), Rotation3::identity());
@@ -388,15 +99,43 @@ impl Workspaces<'_> {
         if !slopes {
             return Ok(AtRest { X_WT, slopes: None, turns: None });
         }
-        let V = tool_slopes(at, self.parameters)?;
-        let turns = V.fixed_rows::<3>(3).into_owned();
-        let mut moved = V.fixed_rows::<3>(0).into_owned();
+        let mut V = tool_slopes(at, &parameters)?;
         let arm = X_WT.rotation * load.at;
+        let tools: Vec<(usize, [Vector3<f64>; 2])> = tool_twists(self.parameters, &X_WT.rotation, &turn).collect();
+        if !tools.is_empty() {
+            // A force that moves along has another moment.
+            let C = at.compliance();
+            for (k, [v, w]) in &tools {
+                let moment = (v + w.cross(&arm)).cross(&load.wrench.force);
+                V.column_mut(*k).gemv(1.0, &C.fixed_columns::<3>(3), &moment, 1.0);
+            }
+        }
+        let mut turns = V.fixed_rows::<3>(3).into_owned();
+        let mut moved = V.fixed_rows::<3>(0).into_owned();
         for (mut to, w) in moved.column_iter_mut().zip(turns.column_iter()) {
             // From where the load acts to the tool's origin.
             to -= w.cross(&arm);
         }
+        for (k, [v, w]) in tools {
+            moved.column_mut(k).axpy(1.0, &v, 1.0);
+            turns.column_mut(k).axpy(1.0, &w, 1.0);
+        }
         Ok(AtRest { X_WT, slopes: Some(moved), turns: Some(turns) })
+    }
+
+    /// The parameters as they act on an arm that carries this at its tool: moving the tool moves that mass.
+    fn under(&self, carried: &SpatialInertia) -> Cow<'a, [Parameter]> {
+        if !self.parameters.iter().any(|p| matches!(p.effect, Effect::Tool(_))) {
+            return Cow::Borrowed(self.parameters);
+        }
+        let (body, X_BF) = (self.plant.tool.body, self.plant.tool.X_BF);
+        let I = carried.at_parent(&X_BF);
+        let mut all = self.parameters.to_vec();
+        for (k, [v, w]) in tool_twists(self.parameters, &X_BF.rotation, &tool_shift(self.parameters, &self.x).1) {
+            let per_kg = carried_along(&I, &X_BF.translation.vector, &v, &w);
+            all[k].effect = Effect::Mass { body, per_kg };
+        }
+        Cow::Owned(all)
     }
 
     fn loaded(&self, carried: &SpatialInertia) -> Plant {
@@ -487,8 +226,8 @@ impl MeasuredArm<'_> {
             }
             ReadingKind::Frequencies { load, rows } => {
                 let plant = rooms.loaded(&load.carried);
-                let parameters = if slopes { self.parameters } else { &[] };
-                let found = frequency_slopes(&plant, parameters, &reading.q).map_err(named)?;
+                let parameters = if slopes { rooms.under(&load.carried) } else { Cow::Borrowed(&[][..]) };
+                let found = frequency_slopes(&plant, &parameters, &reading.q).map_err(named)?;
                 let values = rows.iter().map(|row| found.hz.get(row.of).copied().unwrap_or(f64::NAN)).collect();
                 let slopes = self.with_own(rows.len(), own.len(), slopes, |i, j| found.slopes[(rows[i].of, j)]);
                 Ok(Block { values, slopes })
@@ -516,10 +255,10 @@ impl MeasuredArm<'_> {
         slopes: bool,
     ) -> Result<Block, StepError> {
         let plant = rooms.loaded(&measured.load.carried);
-        let parameters = if slopes { self.parameters } else { &[] };
+        let parameters = if slopes { rooms.under(&measured.load.carried) } else { Cow::Borrowed(&[][..]) };
         let probes = [measured.watched.clone(), measured.hit.clone()];
         let omega: Vec<f64> = measured.points.iter().map(|(omega, ..)| *omega).collect();
-        let found = structure_slopes(&plant, parameters, q, &probes)?.response(0, 1, measured.answer, &omega)?;
+        let found = structure_slopes(&plant, &parameters, q, &probes)?.response(0, 1, measured.answer, &omega)?;
         let values = found.values.iter().enumerate().flat_map(|(k, value)| measured.numbers(k, *value)).collect();
         let slope = |i: usize, j: usize| {
             let k = i / 2;
@@ -537,8 +276,8 @@ impl MeasuredArm<'_> {
         slopes: bool,
     ) -> Result<Block, StepError> {
         let plant = rooms.loaded(&measured.load.carried);
-        let parameters = if slopes { self.parameters } else { &[] };
-        let found = structure_slopes(&plant, parameters, q, &measured.probes)?;
+        let parameters = if slopes { rooms.under(&measured.load.carried) } else { Cow::Borrowed(&[][..]) };
+        let found = structure_slopes(&plant, &parameters, q, &measured.probes)?;
         let none = || StepError::Singular { matrix: "mode shapes at the measured points (they do not move)", t: 0.0 };
         let (mode, _, seen) = measured.likeliest(&found).ok_or_else(none)?;
         let all = found.shape_slopes(mode);
@@ -585,6 +324,23 @@ impl MeasuredArm<'_> {
         }
         Block { values, slopes }
     }
+}
+
+/// Velocity at the tool's origin and angular velocity per unit of each parameter that moves the tool, by its number.
+///
+/// * `R`: rotation of the tool as it is now, in the axes asked for; `turn`: by which of that it is turned from its own axes.
+fn tool_twists<'a>(
+    parameters: &'a [Parameter],
+    R: &Rotation3<f64>,
+    turn: &Vector3<f64>,
+) -> impl Iterator<Item = (usize, [Vector3<f64>; 2])> + use<'a> {
+    let before = R * Rotation3::new(*turn).inverse();
+    let rates = before * left_jacobian(turn);
+    parameters.iter().enumerate().filter_map(move |(k, parameter)| match parameter.effect {
+        Effect::Tool(axis @ 0..3) => Some((k, [before * Vector3::ith(axis, 1.0), Vector3::zeros()])),
+        Effect::Tool(axis) => Some((k, [Vector3::zeros(), rates.column(axis - 3).into_owned()])),
+        _ => None,
+    })
 }
 
 /// Angular velocity (fixed axes) per rate of a rotation vector.

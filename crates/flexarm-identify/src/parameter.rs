@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use flexarm_kinematics::{Frame, Model, SpatialInertia};
+use flexarm_kinematics::{Frame, Model, Pose, SpatialInertia};
 use flexarm_stepping::{FlexibleArm, GearCoupling, Held, Spring, StepError};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Matrix3, Rotation3, Translation3, Vector3};
 
 /// An arm before anything is measured: tree, springs in coordinate order, tool.
 #[derive(Clone, Debug)]
@@ -34,6 +34,24 @@ pub enum Effect {
     /// Factor on the stiffness of springs. On one coordinate of a spring K becomes `S K S` with `√factor` there, so that it stays
     /// symmetric and positive definite.
     Stiffness(Vec<Place>),
+    /// Entry of a spring's matrix and its mirror image: the search's coordinate is the change of the parameter's value, and the entry
+    /// changes by `factor` times that. The matrix must stay positive definite: an arm without is no answer, and the search goes no step
+    /// that leads there. Not to be taken beside [`Effect::Stiffness`] on the same spring.
+    Entry {
+        /// Number of the spring.
+        spring: usize,
+        /// Row, from 0.
+        row: usize,
+        /// Column, from 0.
+        column: usize,
+        /// Change of the entry per unit of the value.
+        factor: f64,
+        /// `√(K_ii K_jj)` in the unit of the value: what the entry is large or small against.
+        size: f64,
+    },
+    /// Tool moved along one of its own axes (0 to 2; m), or turned by a rotation vector about them (3 to 5; rad): together
+    /// `X_BT exp`, the displacement in the axes as they were. What is measured, loaded and carried at the tool moves along.
+    Tool(usize),
     /// Factor on the damping of springs, whatever describes it.
     Damping(Vec<usize>),
     /// Mass (kg) on a body with inertia in proportion: `per_kg` about Bo, B axes.
@@ -100,8 +118,17 @@ impl Plant {
                         spring.damping = spring.damping.scaled(x.exp());
                     }
                 }
+                Effect::Entry { spring, row, column, factor, .. } => {
+                    let K = &mut plant.springs[*spring].K;
+                    *K += entry_slope(K.nrows(), *row, *column, factor * x);
+                }
+                Effect::Tool(_) => {}
                 Effect::Mass { body, per_kg } => plant = plant.carrying(*body, &scaled(per_kg, *x)),
             }
+        }
+        let (p, turn) = tool_shift(parameters, x);
+        if p != Vector3::zeros() || turn != Vector3::zeros() {
+            plant.tool.X_BF *= Pose::from_parts(Translation3::from(p), Rotation3::new(turn));
         }
         plant
     }
@@ -124,6 +151,37 @@ impl Plant {
             Some(coupling) => arm.with_coupling(coupling.clone()),
             None => Ok(arm),
         }
+    }
+}
+
+/// Displacement (m) and rotation vector (rad) of the tool in its own axes at coordinates of the search.
+pub(crate) fn tool_shift(parameters: &[Parameter], x: &[f64]) -> (Vector3<f64>, Vector3<f64>) {
+    let (mut p, mut turn) = (Vector3::zeros(), Vector3::zeros());
+    for (parameter, x) in parameters.iter().zip(x) {
+        match parameter.effect {
+            Effect::Tool(axis @ 0..3) => p[axis] += x,
+            Effect::Tool(axis) => turn[axis - 3] += x,
+            _ => {}
+        }
+    }
+    (p, turn)
+}
+
+/// Change of an inertia about Bo, B axes, as it moves with velocity `v` at the point `p` and angular velocity `w`.
+pub(crate) fn carried_along(
+    I: &SpatialInertia,
+    p: &Vector3<f64>,
+    v: &Vector3<f64>,
+    w: &Vector3<f64>,
+) -> SpatialInertia {
+    let at_Bo = v - w.cross(p);
+    let c = I.first_moment;
+    let turned = w.cross_matrix() * I.rotational;
+    let moved = Matrix3::identity() * (2.0 * at_Bo.dot(&c)) - at_Bo * c.transpose() - c * at_Bo.transpose();
+    SpatialInertia {
+        mass: 0.0,
+        first_moment: at_Bo * I.mass + w.cross(&c),
+        rotational: turned + turned.transpose() + moved,
     }
 }
 
@@ -151,6 +209,13 @@ fn stiffen(spring: &mut Spring, coordinate: Option<usize>, factor: f64) {
             }
         }
     }
+}
+
+/// A change of one entry of a symmetric matrix of n rows.
+pub(crate) fn entry_slope(n: usize, row: usize, column: usize, change: f64) -> DMatrix<f64> {
+    let mut dK = DMatrix::zeros(n, n);
+    (dK[(row, column)], dK[(column, row)]) = (change, change);
+    dK
 }
 
 /// `dK/d(ln factor)` of a spring's matrix.

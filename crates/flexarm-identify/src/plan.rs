@@ -7,8 +7,9 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use crate::least_squares::Residuals;
-use crate::measurement::{MeasuredArm, Measurements, NoAnswer, Reading};
+use crate::measurement::{MeasuredArm, NoAnswer};
 use crate::parameter::{Parameter, Plant};
+use crate::reading::{Measurements, Reading};
 
 /// Something that could be measured: a reading with the deviations expected of it; its values do not count.
 #[derive(Clone, Debug, PartialEq)]

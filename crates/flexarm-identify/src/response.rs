@@ -16,7 +16,7 @@ use flexarm_kinematics::{Frame, Wrench};
 use flexarm_stepping::{Damping, FlexibleArm, OperatingPoint, StepError, Tangents};
 use nalgebra::{Complex, DMatrix, DVector, RowDVector, Vector3};
 
-use crate::parameter::{Effect, Parameter, Plant, slope_of};
+use crate::parameter::{Effect, Parameter, Plant, entry_slope, slope_of};
 use crate::sensitivity::{along, eigen, explicit, force_slopes};
 
 /// Squares of two frequencies nearer than this part of each other belong to modes whose shapes are not determined.
@@ -199,6 +199,13 @@ impl Damped<'_> {
                 Damping::Dampers(d) => (0..size.min(6)).for_each(|c| block[(c, c)] += s.more * d[c]),
             }
         }
+        // Of coupled gears each motor's damper is in the damping of several joints.
+        let Effect::Damping(dampers) = effect else { return dD };
+        for (places, coupled) in dampers.iter().filter_map(|spring| self.arm.coupled_damping_slope(*spring)) {
+            for (a, i) in places.iter().enumerate() {
+                places.iter().enumerate().for_each(|(b, j)| dD[(*i, *j)] += coupled[(a, b)]);
+            }
+        }
         dD
     }
 
@@ -220,8 +227,14 @@ impl Damped<'_> {
                         }
                     }
                 }
-                Effect::Damping(springs) => more = f64::from(u8::from(springs.contains(&number))),
-                Effect::Mass { .. } => {}
+                Effect::Entry { spring, row, column, factor, .. } if *spring == number => {
+                    dK += entry_slope(e.size, *row, *column, *factor);
+                }
+                Effect::Damping(springs) => {
+                    let own = springs.contains(&number) && self.arm.coupled_damping_slope(number).is_none();
+                    more = f64::from(u8::from(own));
+                }
+                Effect::Entry { .. } | Effect::Tool(_) | Effect::Mass { .. } => {}
             }
             SpringSlope { first: self.arm.offset(e), size: e.size, K: e.K.clone(), dK, damping: e.damping, more }
         };

@@ -10,7 +10,7 @@ use flexarm_kinematics::{Frame, Wrench};
 use flexarm_stepping::{FlexibleArm, OperatingPoint, StepError, Tangents};
 use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX, SymmetricEigen};
 
-use crate::parameter::{Effect, Parameter, Plant, scaled, slope_of};
+use crate::parameter::{Effect, Parameter, Plant, entry_slope, scaled, slope_of};
 
 /// Length of the differences along the equilibrium's path, over the size of the elastic coordinates.
 const DIFFERENCE: f64 = 1e-3;
@@ -41,7 +41,16 @@ pub(crate) fn force_slopes(at: &mut OperatingPoint, parameters: &[Parameter]) ->
                     }
                 }
             }
-            Effect::Damping(_) => {}
+            Effect::Entry { spring, row, column, factor, .. } => {
+                let arm = at.arm();
+                let (first, e) = (arm.offset(&arm.elements[*spring]), at.deflections());
+                slopes[(first + row, k)] += factor * e[first + column];
+                if row != column {
+                    slopes[(first + column, k)] += factor * e[first + row];
+                }
+            }
+            // What a tool carries and where it is loaded is known to the measurement.
+            Effect::Damping(_) | Effect::Tool(_) => {}
             Effect::Mass { body, per_kg } => {
                 // Forces are linear in a mass: a difference of any size is exact.
                 let (mut with, mut without) = (DVector::zeros(n), DVector::zeros(n));
@@ -64,6 +73,9 @@ fn carrying(arm: &FlexibleArm, body: usize, per_kg: &flexarm_kinematics::Spatial
 }
 
 /// Twist of the tool (world axes, at its point; m, rad) per unit of each parameter's coordinate, 6×p, at a pose that is solved.
+///
+/// Of [`Effect::Tool`] the part by deflection, which is zero here: loads stay where they are, and the frame itself is not moved.
+/// [`crate::MeasuredArm`] has all of it.
 ///
 /// # Errors
 /// As [`OperatingPoint::solve`].
@@ -237,7 +249,14 @@ pub(crate) fn explicit(
             }
             (dK, DMatrix::zeros(n, n))
         }
-        Effect::Damping(_) => (DMatrix::zeros(n, n), DMatrix::zeros(n, n)),
+        Effect::Entry { spring, row, column, factor, .. } => {
+            let element = &arm.elements[*spring];
+            let (first, size) = (arm.offset(element), element.size);
+            let mut dK = DMatrix::zeros(n, n);
+            dK.view_mut((first, first), (size, size)).copy_from(&entry_slope(size, *row, *column, *factor));
+            (dK, DMatrix::zeros(n, n))
+        }
+        Effect::Damping(_) | Effect::Tool(_) => (DMatrix::zeros(n, n), DMatrix::zeros(n, n)),
         Effect::Mass { body, per_kg } => {
             let heavier = Tangents::at(&carrying(arm, *body, per_kg), tool, F_T_W, q);
             (heavier.K - &here.K, heavier.M - &here.M)

@@ -12,7 +12,7 @@ use flexarm_stepping::{
 };
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use crate::parameter::{Effect, Parameter, slope_of};
+use crate::parameter::{Effect, Parameter, entry_slope, slope_of};
 use crate::response::Damped;
 use crate::sensitivity::{along_coordinates, eigen, explicit};
 
@@ -126,7 +126,13 @@ fn direction(arm: &FlexibleArm, parameter: &RunParameter) -> Direction {
                     direction.springs.push((place.spring, slope));
                 }
             }
-            Effect::Damping(_) => {}
+            Effect::Entry { spring, row, column, factor, .. } => {
+                let slope = entry_slope(arm.elements[*spring].size, *row, *column, *factor);
+                direction.springs.push((*spring, SpringSlope::Matrix(slope)));
+            }
+            Effect::Tool(axis @ 0..3) => direction.tool = Vector3::ith(*axis, 1.0),
+            // A tool that is turned in its place is off by the same angle.
+            Effect::Damping(_) | Effect::Tool(_) => {}
             Effect::Mass { body, per_kg } => direction.inertias.push((*body, *per_kg)),
         },
         RunParameter::Joint(k) => {

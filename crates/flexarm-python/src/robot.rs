@@ -255,7 +255,7 @@ impl PyRobot {
     /// Link that carries the tool centre point.
     #[getter]
     fn tcp_link(&self) -> &str {
-        &self.robot.tcp.0
+        self.robot.tcp().0
     }
 
     /// File of the motion that the robot comes with, or None.

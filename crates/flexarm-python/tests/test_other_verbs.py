@@ -126,6 +126,32 @@ def test_measurements_of_an_arm_give_its_stiffness_back(arm: flexarm.Arm, tmp_pa
         flexarm.identify(arm.robot, tmp_path / "nothing.toml")
 
 
+def test_an_entry_of_a_links_matrix_and_the_tool_are_found_and_differentiated(arm: flexarm.Arm, tmp_path: Path) -> None:
+    # The tool of the file is 3 mm off along its own x.
+    shutil.copytree(SHARE / "robots/kr210", tmp_path / "kr210")
+    file = tmp_path / "kr210/robot.toml"
+    text = file.read_text()
+    assert "xyz = [0.0, 0.0, 0.35]" in text
+    file.write_text(text.replace("xyz = [0.0, 0.0, 0.35]", "xyz = [0.003, 0.0, 0.35]", 1))
+    readings = ["format = 1", 'fit = ["tcp.x", "tcp.y", "tcp.z"]', "[instrument.tracker]", "xyz = [0, 0, 0]", "[target.tool]"]
+    readings += ["xyz = [0, 0, 0]"]
+    for k in range(5):
+        q = np.array(WORKING_POSE) + 0.2 * np.sin(np.arange(6) + k)
+        place = arm.statics(q).tcp
+        readings += ["[[place]]", f"joints = {q.tolist()}", f"value = {place.tolist()}", "std = 1e-5"]
+    measurements = tmp_path / "measurements.toml"
+    measurements.write_text("\n".join(readings))
+    found = flexarm.identify(flexarm.load(file), measurements, output=tmp_path / "new")
+    assert [p["value"] for p in found["parameters"]] == pytest.approx([-0.003, 0.0, 0.0], abs=1e-7)
+    mended = flexarm.load(found["file"]).flexible().statics(WORKING_POSE)
+    np.testing.assert_allclose(mended.tcp, arm.statics(WORKING_POSE).tcp, atol=1e-6)
+
+    by = ["link.link_2.stiffness[5][1]", "link.link_2.stiffness[1][1]"]
+    entries = flexarm.sensitivity(arm.robot, "point_to_point", by=by)["parameters"]
+    assert {p["name"] for p in entries} == {"link.link_2.stiffness[1][5]", "link.link_2.stiffness[1][1]"}
+    assert {p["per"] for p in entries} == {"1 % of the root of K_ii K_jj"}
+
+
 def test_a_map_is_that_of_the_command_line_and_of_statics(kr210: flexarm.Robot, arm: flexarm.Arm, tmp_path: Path) -> None:
     joints = {"joint_2": (-1.8, -0.4, 4), "joint_3": (0.4, 2.0, 3)}
     ours = flexarm.map(kr210, joints=joints, wrench=[0, 0, -500])

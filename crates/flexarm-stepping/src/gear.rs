@@ -245,6 +245,26 @@ impl FlexibleArm {
         Some((places, row.tr_mul(&row) * own))
     }
 
+    /// `dD/d(ln d)` for the damper d of one motor in coupled gears, as [`FlexibleArm::coupled_stiffness_slope`].
+    pub fn coupled_damping_slope(&self, element: usize) -> Option<(Vec<usize>, DMatrix<f64>)> {
+        let coupling = self.coupling.as_ref()?;
+        let motor = coupling.elements.iter().position(|k| *k == element)?;
+        let places: Vec<usize> = coupling.elements.iter().map(|k| self.offset(&self.elements[*k])).collect();
+        // Dampers alone: what else damps follows the modes.
+        let mut D = DMatrix::zeros(places.len(), places.len());
+        for (i, k) in coupling.elements.iter().enumerate() {
+            D[(i, i)] = if let Damping::Dampers(d) = self.elements[*k].damping { d[0] } else { 0.0 };
+        }
+        let place = |row: usize| places.iter().position(|k| *k == row);
+        for &(row, column, d) in &self.cross_damping {
+            let (Some(i), Some(j)) = (place(row), place(column)) else { continue };
+            (D[(i, j)], D[(j, i)]) = (d, d);
+        }
+        let own = (coupling.C.tr_mul(&D) * &coupling.C)[(motor, motor)];
+        let row = coupling.C_inverse.row(motor);
+        Some((places, row.tr_mul(&row) * own))
+    }
+
     /// The same arm with gears whose torque has a history; their elements have the curve of first loading from here on.
     ///
     /// # Errors

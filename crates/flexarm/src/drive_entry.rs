@@ -137,13 +137,13 @@ pub struct Drive {
     /// How it is driven.
     pub kind: DriveKind,
     /// Turns of the motor per turn of the joint.
-    pub ratio: f64,
+    pub(crate) ratio: f64,
     /// Inertia of the rotor seen from the joint (kg m²).
-    pub armature: f64,
+    pub(crate) armature: f64,
     /// Spring of the gearbox.
     pub gearbox: Option<(Gearbox, GearDamping)>,
     /// Its play to each side (rad or m).
-    pub backlash: f64,
+    pub(crate) backlash: f64,
     /// Friction.
     pub friction: Friction,
     /// Its part of the transmitted torque.
@@ -152,6 +152,23 @@ pub struct Drive {
     pub torque_limit: f64,
     /// Servo as written.
     pub servo: ServoEntry,
+}
+
+impl Drive {
+    /// Turns of the motor per turn of the joint.
+    pub fn ratio(&self) -> f64 {
+        self.ratio
+    }
+
+    /// Inertia of the rotor seen from the joint (kg m²); models have it from [`crate::Robot::rigid`], where the joint has it too.
+    pub fn armature(&self) -> f64 {
+        self.armature
+    }
+
+    /// Play of the gearbox to each side (rad or m); its curve has it.
+    pub fn backlash(&self) -> f64 {
+        self.backlash
+    }
 }
 
 /// Damping and curve of a gearbox's springs.

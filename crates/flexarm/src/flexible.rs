@@ -42,6 +42,8 @@ pub struct RobotLink {
     pub flexible: FlexibleLink,
     /// Its damping.
     pub damping: Damping,
+    /// Stiffness of the spring between its two parts, symmetric and positive definite, in the place of its source's (N/m, N, N m/rad).
+    pub stiffness: Option<Matrix6<f64>>,
     /// Factor on the stiffness of all its models.
     pub stiffness_factor: f64,
     /// Factors on the springs of a lumped link, direction by direction, beside that: K becomes `S K S` with their roots on the diagonal of S.
@@ -79,12 +81,14 @@ pub(crate) enum Asked {
     Eigenmodes,
     Geometric,
     Directions,
+    Stiffness,
 }
 
 impl RobotLink {
     /// A spring of its lumped models with the factors.
     fn scaled(&self, K: &Matrix6<f64>) -> Matrix6<f64> {
         let root = self.stiffness_factors.map(f64::sqrt);
+        let K = self.stiffness.as_ref().unwrap_or(K);
         Matrix6::from_fn(|i, j| root[i] * K[(i, j)] * root[j]) * self.stiffness_factor
     }
 
@@ -113,17 +117,23 @@ impl RobotLink {
                 );
                 Err((Asked::Directions, message))
             }
+            LinkModel::Modal if self.stiffness.is_some() => Err((Asked::Stiffness, self.one_spring("bends in modes"))),
             LinkModel::Modal => self.modal(modelling).map(|modal| LinkForm::Modal(Arc::new(modal))),
-            _ => self
-                .lumped(modelling.segments.unwrap_or(self.choices.segments))
-                .map_err(|message| (Asked::Segments, message)),
+            _ => match modelling.segments.unwrap_or(self.choices.segments) {
+                2 => Ok(LinkForm::TwoParts),
+                n if self.stiffness.is_some() => Err((Asked::Stiffness, self.one_spring(&format!("has {n} parts")))),
+                n => self.lumped(n).map_err(|message| (Asked::Segments, message)),
+            },
         }
     }
 
+    /// Why its own stiffness fits no other model.
+    fn one_spring(&self, has: &str) -> String {
+        let name = &self.flexible.link;
+        format!("link {name:?} {has}: its stiffness is that of the one spring between two rigid parts; leave it out")
+    }
+
     fn lumped(&self, segments: usize) -> Result<LinkForm, String> {
-        if segments == 2 {
-            return Ok(LinkForm::TwoParts);
-        }
         let name = &self.flexible.link;
         let coordinates = 6 * segments.saturating_sub(1);
         if coordinates > MOST_COORDINATES {

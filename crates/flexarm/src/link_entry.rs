@@ -6,7 +6,7 @@ use flexarm_fem::{BeamLink, BeamTheory, Material, ReducedLink, Section, UnitSyst
 use flexarm_flexlink::{FlexibleLink, LinkForm, Parts, SubstitutionError, distal_joint};
 use flexarm_kinematics::{ElasticAngles, Mechanism, Pose};
 use flexarm_stepping::Damping;
-use nalgebra::Vector3;
+use nalgebra::{Matrix6, Vector3};
 use toml::Spanned;
 
 use crate::beam_entry::beam_section;
@@ -16,6 +16,11 @@ use crate::flexible::{Asked, LinkChoices, RobotLink};
 use crate::options::{LinkModel, Modelling};
 use crate::robot::keep;
 use crate::robot_file::{BeamEntry, DampingEntry, FlexibleLinkEntry, RobotFileError, Source};
+
+/// Difference of mirrored entries, over the root of those on the diagonal, up to which a matrix is symmetric as written.
+const SYMMETRIC: f64 = 1e-9;
+/// Smallest eigenvalue of a stiffness with its diagonal scaled to one: below, rounding decides.
+const DEFINITE: f64 = 1e-12;
 
 /// Where the files of links are looked for, and who reads them.
 pub(crate) struct LinkHome<'a> {
@@ -118,7 +123,8 @@ pub(crate) fn flexible_link(
             }
         },
     };
-    let link = RobotLink { flexible, damping, stiffness_factor, stiffness_factors, beam, choices };
+    let stiffness = entry.stiffness.as_ref().map(|given| matrix6(given, entry, source)).transpose()?;
+    let link = RobotLink { flexible, damping, stiffness, stiffness_factor, stiffness_factors, beam, choices };
     // What the file asks for must be there; overrides are looked at when they are used.
     link.form_or_key(&Modelling::default()).map_err(|(asked, message)| {
         let key = match asked {
@@ -127,11 +133,58 @@ pub(crate) fn flexible_link(
             Asked::Modes => entry.modes.as_ref().map(Spanned::span),
             Asked::Eigenmodes => entry.eigenmodes.as_ref().map(Spanned::span),
             Asked::Geometric => entry.geometric_stiffening.as_ref().map(Spanned::span),
+            Asked::Stiffness => entry.stiffness.as_ref().map(Spanned::span),
             Asked::Directions => entry.stiffness_factors.as_ref().map(Spanned::span),
         };
         at(key.or(entry.model.as_ref().map(Spanned::span)).unwrap_or(entry.link.span()), message)
     })?;
     Ok(link)
+}
+
+/// The stiffness of a spring as the file has it: symmetric and positive definite.
+fn matrix6(
+    given: &Spanned<Vec<Vec<f64>>>,
+    entry: &FlexibleLinkEntry,
+    source: &Source,
+) -> Result<Matrix6<f64>, RobotFileError> {
+    let name = entry.link.get_ref();
+    let fail = |message: String| Err(source.error(given.span(), format!("stiffness of link {name:?}: {message}")));
+    let rows = given.get_ref();
+    if rows.len() != 6 || rows.iter().any(|row| row.len() != 6) {
+        return fail("expected 6 rows of 6 numbers (N/m, N, N m/rad)".into());
+    }
+    if !entry.coupling {
+        return fail(
+            "coupling = false belongs to the stiffness of a .flex file or beam: write zeros here instead".into(),
+        );
+    }
+    let K = Matrix6::from_fn(|i, j| rows[i][j]);
+    if let Some(i) = (0..6).find(|i| !(K[(*i, *i)].is_finite() && K[(*i, *i)] > 0.0)) {
+        return fail(format!("[{i}][{i}] is {}, expected a positive number", K[(i, i)]));
+    }
+    let size = |i: usize, j: usize| (K[(i, i)] * K[(j, j)]).sqrt();
+    let pairs = || (0..6).flat_map(|i| (i + 1..6).map(move |j| (i, j)));
+    let odd = |(i, j): &(usize, usize)| {
+        let apart = (K[(*i, *j)] - K[(*j, *i)]).abs();
+        apart.is_nan() || apart > SYMMETRIC * size(*i, *j)
+    };
+    if let Some((i, j)) = pairs().find(odd) {
+        let (a, b) = (K[(i, j)], K[(j, i)]);
+        return fail(format!("[{i}][{j}] is {a} and [{j}][{i}] is {b}: it must be symmetric"));
+    }
+    let unit = Matrix6::from_fn(|i, j| 0.5 * (K[(i, j)] + K[(j, i)]) / size(i, j));
+    let least = unit.symmetric_eigenvalues().min();
+    if least > DEFINITE {
+        return Ok((K + K.transpose()) * 0.5);
+    }
+    let largest = pairs().max_by(|a, b| unit[*a].abs().total_cmp(&unit[*b].abs()));
+    let (i, j) = largest.unwrap_or((0, 0));
+    fail(format!(
+        "it is not positive definite: with its diagonal scaled to one its smallest eigenvalue is {least:.3e}, expected above {DEFINITE:e}; \
+         the largest coupling is [{i}][{j}] = {}, {:.4} of the root of [{i}][{i}] [{j}][{j}]",
+        K[(i, j)],
+        unit[(i, j)].abs()
+    ))
 }
 
 pub(crate) fn damping_of(entry: Option<&Spanned<DampingEntry>>, source: &Source) -> Result<Damping, RobotFileError> {

@@ -316,6 +316,7 @@ fn flexible_mounting(
         geometric_stiffening: None,
         mass: None,
         stiffness_factor: None,
+        stiffness: None,
         stiffness_factors: None,
         damping: given.damping.clone(),
         angles: None,

@@ -12,7 +12,7 @@ use crate::balancer_entry::add_balancers;
 use crate::caveat::{self, Caveat};
 use crate::controller_entry::{RobotAxis, controller_axes};
 use crate::drive_entry::{Drive, drives};
-use crate::error::Error;
+use crate::error::{Error, ValueError};
 use crate::file_cache::FileCache;
 use crate::flexible::RobotLink;
 use crate::gear_entry::{RobotCoupling, coupling};
@@ -43,7 +43,7 @@ pub struct Robot {
     pub name: String,
     /// The file that was loaded.
     pub path: PathBuf,
-    /// The URDF.
+    /// The description as it was read. Models are made of [`Self::rigid`], which has TCP, payload and rotors besides.
     pub urdf: UrdfRobot,
     /// Path of the URDF.
     pub urdf_path: PathBuf,
@@ -52,13 +52,15 @@ pub struct Robot {
     /// Flexible links.
     pub flexible: Vec<RobotLink>,
     /// What the base stands on, if it yields.
-    pub mounting: Option<RobotMounting>,
+    pub(crate) mounting: Option<RobotMounting>,
     /// Drives that the file tells about; all other joints are prescribed.
     pub drives: Vec<Drive>,
     /// Motors that move several joints.
-    pub coupling: Option<RobotCoupling>,
+    pub(crate) coupling: Option<RobotCoupling>,
     /// Link that carries the TCP and pose of the TCP in it.
-    pub tcp: (String, Pose),
+    pub(crate) tcp: (String, Pose),
+    /// Link that was asked for as the tool in the place of the file's.
+    pub(crate) tcp_override: Option<String>,
     /// Trajectory for runs without one.
     pub default_trajectory: Option<PathBuf>,
     /// Where joints stay that a motion does not name (rad or m).
@@ -116,6 +118,7 @@ impl Robot {
             drives: Vec::new(),
             coupling: None,
             tcp: (link, Pose::identity()),
+            tcp_override: options.tcp.clone(),
             default_trajectory: None,
             hold: Vec::new(),
             warnings: Vec::new(),
@@ -223,6 +226,7 @@ impl Robot {
             drives: Vec::new(),
             coupling: None,
             tcp: tcp.unwrap_or_default(),
+            tcp_override: options.tcp.clone(),
             default_trajectory: file.default_trajectory.as_ref().map(|t| folder.join(t.get_ref())),
             hold: Vec::new(),
             warnings: Vec::new(),
@@ -362,6 +366,44 @@ impl Robot {
         let joint = Joint::new("__payload_joint", JointKind::Fixed, link, PAYLOAD_LINK, pose(payload.com, [0.0; 3]));
         self.rigid.joints.push(joint);
         Ok(())
+    }
+
+    /// Link that carries the tool centre point, and the pose of that point in the link, `X_LT`.
+    pub fn tcp(&self) -> (&str, &Pose) {
+        (&self.tcp.0, &self.tcp.1)
+    }
+
+    /// The robot with another tool centre point; the payload stays where it is. Arms made of the robot before keep theirs.
+    ///
+    /// * `link`: of the robot; `X_LT`: pose of the point in its axes (m).
+    ///
+    /// # Errors
+    /// [`Error::UnknownTcp`] for a link that is not there, [`Error::Value`] for a pose that is no numbers.
+    pub fn with_tcp(mut self, link: &str, X_LT: Pose) -> Result<Self, Error> {
+        let known = || self.rigid.links.iter().map(|l| l.name.clone()).filter(|name| !name.starts_with("__")).collect();
+        if link.starts_with("__") || self.rigid.link(link).is_none() {
+            return Err(Error::UnknownTcp { link: link.to_owned(), known: known() });
+        }
+        let place = X_LT.translation.vector;
+        if let Some(found) = place.iter().chain(X_LT.rotation.matrix().iter()).find(|x| !x.is_finite()) {
+            return Err(ValueError::NotFinite { what: "the pose of the TCP", found: *found }.into());
+        }
+        for joint in self.rigid.joints.iter_mut().filter(|joint| joint.child == TCP_FRAME) {
+            (joint.parent, joint.X_PJ) = (link.to_owned(), X_LT);
+        }
+        self.tcp_override = Some(link.to_owned());
+        self.tcp = (link.to_owned(), X_LT);
+        Ok(self)
+    }
+
+    /// What the base stands on, if it yields.
+    pub fn mounting(&self) -> Option<&RobotMounting> {
+        self.mounting.as_ref()
+    }
+
+    /// Motors that move several joints; their rotors are in [`Self::rigid`].
+    pub fn coupling(&self) -> Option<&RobotCoupling> {
+        self.coupling.as_ref()
     }
 
     /// What is worth knowing about it before anything is computed.

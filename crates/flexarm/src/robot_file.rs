@@ -134,6 +134,8 @@ pub(crate) struct FlexibleLinkEntry {
     pub mass: Option<Spanned<f64>>,
     /// Factor on its stiffness, as measurements told; 1 if not given.
     pub stiffness_factor: Option<Spanned<f64>>,
+    /// Stiffness of the spring between its two parts in the place of its source's, lumped links; 6x6, N/m, N, N m/rad.
+    pub stiffness: Option<Spanned<Vec<Vec<f64>>>>,
     /// Factors on the six directions of its springs beside that, lumped links; 1 if not given.
     pub stiffness_factors: Option<Spanned<Vec<f64>>>,
     /// Damping; 3 % modal if not given.

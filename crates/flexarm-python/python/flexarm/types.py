@@ -968,7 +968,7 @@ class ParameterSensitivity(TypedDict):
     value: float
     """Its value; 0 of a shift, 1 of what a servo feeds forward."""
     per: str
-    """Of which change of it the following are the effect: `1 %`, `1 kg`, `1 mrad` or `1 mm`. They are derivatives, times that."""
+    """Of which change of it the following are the effect: `1 %`, `1 % of the root of K_ii K_jj`, `1 kg`, `1 mrad` or `1 mm`. They are derivatives, times that."""
     peak_m: float
     """Of the largest distance, at the time where it is (m)."""
     rms_m: float
@@ -1018,7 +1018,7 @@ class PoseParameter(TypedDict):
     value: float
     """Its value."""
     per: str
-    """Of which change of it the following are the effect: `1 %`, `1 kg` or `1 mm`. They are derivatives, times that."""
+    """Of which change of it the following are the effect: `1 %`, `1 % of the root of K_ii K_jj`, `1 kg` or `1 mm`. They are derivatives, times that."""
     tcp_m: list[float]
     """Of the tool's place (m)."""
     tcp_rad: list[float]

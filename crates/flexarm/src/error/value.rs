@@ -9,6 +9,14 @@ pub enum ValueError {
     /// The step, which must be positive.
     #[error("the step must be positive, found {0} s")]
     Step(f64),
+    /// A number that is none.
+    #[error("{what} has the entry {found}, expected finite numbers")]
+    NotFinite {
+        /// Of what.
+        what: &'static str,
+        /// The entry.
+        found: f64,
+    },
     /// The log rate, which must be positive.
     #[error("the log rate must be positive, found {0} Hz")]
     LogRate(f64),

@@ -6,6 +6,8 @@
 //! | `drive.JOINT.gearbox.stiffness[k]` | one of three or six, from 0 |
 //! | `link.LINK.stiffness_factor` | all of a flexible link's stiffness, as a factor |
 //! | `link.LINK.stiffness_factors[k]` | one of the six directions of a lumped link's springs, as a factor, from 0 |
+//! | `link.LINK.stiffness[i][j]` | an entry of the 6x6 of a lumped link in two parts, and its mirror image (N/m, N, N m/rad) |
+//! | `tcp.x`, `.y`, `.z`, `.rx`, `.ry`, `.rz` | the tool moved and turned about its own axes (m, rad) |
 //! | `mounting.stiffness[k]` | one of six springs under the base, from 0 |
 //! | `drive.JOINT.gearbox.damping` | its damping, if the file has it (N m s/rad, N s/m; a factor on lists) |
 //! | `link.LINK.damping` | modal ratio, `stiffness_beta` (s), or a factor on `rayleigh` |
@@ -15,9 +17,9 @@ use flexarm_flexlink::GearStiffness;
 use flexarm_identify::{Effect, Parameter, Place, Plant};
 use flexarm_kinematics::SpatialInertia;
 use flexarm_stepping::Damping;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix3, Matrix6, Vector3};
 
-use crate::flexible::{FlexibleRobot, Owner};
+use crate::flexible::{FlexibleRobot, Owner, RobotLink};
 use crate::mounting::RobotMounting;
 use crate::robot::{PAYLOAD_LINK, Robot};
 
@@ -25,6 +27,11 @@ use crate::robot::{PAYLOAD_LINK, Robot};
 pub(crate) const UNCERTAINTY: f64 = 2.0;
 /// Of a payload's mass: this part of it, and kg at least.
 const PAYLOAD_UNCERTAINTY: (f64, f64) = (0.5, 1.0);
+
+/// Of an entry of a matrix, over the root of its diagonal entries.
+const ENTRY_UNCERTAINTY: f64 = 0.5;
+/// Of the place of a tool (m) and its attitude (rad).
+const TOOL_UNCERTAINTY: f64 = 0.01;
 
 /// Key of what is only fitted if it is named: its directions together are the whole of a link's stiffness.
 const DIRECTIONS: &str = "stiffness_factors";
@@ -42,6 +49,10 @@ pub(crate) enum Written {
     Link { link: String },
     /// The same: one of its `stiffness_factors`.
     LinkDirection { link: String, entry: usize },
+    /// The same: an entry of its `stiffness`, which is this if the file has none.
+    LinkEntry { link: String, row: usize, column: usize, K: Box<Matrix6<f64>> },
+    /// `tcp`: x, y, z, rx, ry, rz.
+    Tool { axis: usize },
     /// `mounting.stiffness`, one of six.
     Mounting { entry: usize },
     /// `payload.mass`.
@@ -70,9 +81,7 @@ pub(crate) fn candidates(robot: &Robot, flexible: &FlexibleRobot) -> Vec<Candida
         }
         let slides = flexible.model.coordinates().iter().any(|c| c.joint == drive.joint && c.kind == "prismatic");
         found.extend(gearbox_parameters(&drive.joint, &gearbox.stiffness, &springs, slides));
-        // A damper of coupled gears is not one of its joint's.
-        let coupled = robot.coupling.as_ref().is_some_and(|coupling| coupling.joints.contains(&drive.joint));
-        let dampers = damping.dampers.as_ref().filter(|d| !coupled && d.iter().any(|d| *d > 0.0));
+        let dampers = damping.dampers.as_ref().filter(|d| d.iter().any(|d| *d > 0.0));
         if let Some(dampers) = dampers {
             let name = format!("drive.{}.gearbox.damping", drive.joint);
             let (unit, initial) = match (&dampers[..], slides) {
@@ -104,6 +113,9 @@ pub(crate) fn candidates(robot: &Robot, flexible: &FlexibleRobot) -> Vec<Candida
         if springs.iter().all(|spring| groups[*spring].size == 6 && !groups[*spring].modal) {
             found.extend(link_directions(&span.link, &link.stiffness_factors, &springs));
         }
+        if let ([spring], true) = (&springs[..], link.flexible.coupling) {
+            found.extend(link_entries(link, *spring, flexible));
+        }
         let (unit, initial) = match link.damping {
             Damping::Modal(zeta) => ("1", zeta),
             Damping::StiffnessProportional(beta) => ("s", beta),
@@ -121,6 +133,9 @@ pub(crate) fn candidates(robot: &Robot, flexible: &FlexibleRobot) -> Vec<Candida
         let effect = Effect::Mass { body: frame.body, per_kg };
         let parameter = Parameter { name: "payload.mass".into(), unit: "kg".into(), initial: mass, prior, effect };
         found.push(Candidate { parameter, written: Written::Payload });
+    }
+    if !found.is_empty() {
+        found.extend(tool_parameters());
     }
     found
 }
@@ -146,6 +161,46 @@ fn link_directions<'a>(
         let places = springs.iter().map(|spring| Place { spring: *spring, coordinate: Some(entry) }).collect();
         let written = Written::LinkDirection { link: link.to_owned(), entry };
         stiffness(format!("link.{link}.{DIRECTIONS}[{entry}]"), "1", *factor, places, written)
+    })
+}
+
+/// Entries of the 6x6 of a link that is one spring between two rigid parts, in the matrix before its factors.
+fn link_entries(link: &RobotLink, spring: usize, flexible: &FlexibleRobot) -> Vec<Candidate> {
+    let group = &flexible.model.elastic()[spring];
+    if group.size != 6 || group.modal {
+        return Vec::new();
+    }
+    let root = link.stiffness_factors.map(f64::sqrt);
+    let factor = |i: usize, j: usize| link.stiffness_factor * root[i] * root[j];
+    let K = Matrix6::from_fn(|i, j| flexible.springs[spring].K[(i, j)] / factor(i, j));
+    let name = &link.flexible.link;
+    let entry = |row: usize, column: usize| {
+        let unit = match (row < 3, column < 3) {
+            (true, true) => "N/m",
+            (false, false) => "N m/rad",
+            _ => "N",
+        };
+        let size = (K[(row, row)] * K[(column, column)]).sqrt();
+        let effect = Effect::Entry { spring, row, column, factor: factor(row, column), size };
+        let parameter = Parameter {
+            name: format!("link.{name}.stiffness[{row}][{column}]"),
+            unit: unit.into(),
+            initial: K[(row, column)],
+            prior: ENTRY_UNCERTAINTY * size,
+            effect,
+        };
+        Candidate { parameter, written: Written::LinkEntry { link: name.clone(), row, column, K: Box::new(K) } }
+    };
+    (0..6).flat_map(|row| (row..6).map(move |column| (row, column))).map(|(row, column)| entry(row, column)).collect()
+}
+
+/// The tool moved and turned about its own axes.
+fn tool_parameters() -> impl Iterator<Item = Candidate> {
+    ["x", "y", "z", "rx", "ry", "rz"].into_iter().enumerate().map(|(axis, name)| {
+        let unit = if axis < 3 { "m" } else { "rad" }.to_owned();
+        let effect = Effect::Tool(axis);
+        let parameter = Parameter { name: format!("tcp.{name}"), unit, initial: 0.0, prior: TOOL_UNCERTAINTY, effect };
+        Candidate { parameter, written: Written::Tool { axis } }
     })
 }
 
@@ -209,7 +264,30 @@ pub(crate) fn plant(flexible: &FlexibleRobot) -> Plant {
 
 /// Whether a pattern asks for a parameter to be fitted.
 pub(crate) fn asks_for(pattern: &str, name: &str) -> bool {
-    fits(pattern, name) && (!is_direction(name) || pattern.contains(DIRECTIONS))
+    let by_name = match name {
+        _ if is_direction(name) => pattern.contains(DIRECTIONS),
+        _ if is_entry(name) => pattern.contains("]["),
+        _ if is_tool(name) => pattern.starts_with("tcp"),
+        _ => true,
+    };
+    by_name && fits(pattern, name)
+}
+
+/// Whether it is an entry of a link's matrix.
+pub(crate) fn is_entry(name: &str) -> bool {
+    name.starts_with("link.") && name.contains("][")
+}
+
+/// Whether it is the place or the attitude of the tool.
+pub(crate) fn is_tool(name: &str) -> bool {
+    name.starts_with("tcp.")
+}
+
+/// An entry of a matrix by the name of its mirror image.
+fn mirrored(name: &str) -> Option<String> {
+    let (head, indices) = name.strip_suffix(']')?.split_once(".stiffness[")?;
+    let (row, column) = indices.split_once("][")?;
+    Some(format!("{head}.stiffness[{column}][{row}]"))
 }
 
 /// Whether it is one direction of a link's springs.
@@ -217,20 +295,32 @@ pub(crate) fn is_direction(name: &str) -> bool {
     name.starts_with("link.") && name.contains(DIRECTIONS)
 }
 
-/// Whether a name fits a pattern in which * stands for anything.
+/// Whether a name, or that of the mirrored entry, fits a pattern in which * stands for anything.
 pub(crate) fn fits(pattern: &str, name: &str) -> bool {
+    matches(pattern, name) || mirrored(name).is_some_and(|name| matches(pattern, &name))
+}
+
+fn matches(pattern: &str, name: &str) -> bool {
     match pattern.split_once('*') {
         None => pattern == name,
         Some((before, after)) => {
             let Some(rest) = name.strip_prefix(before) else { return false };
-            rest.char_indices().map(|(k, _)| &rest[k..]).chain([""]).any(|rest| fits(after, rest))
+            rest.char_indices().map(|(k, _)| &rest[k..]).chain([""]).any(|rest| matches(after, rest))
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::fits;
+    use super::{asks_for, fits};
+
+    #[test]
+    fn an_entry_has_two_names_and_is_asked_for_by_its_indices_alone() {
+        let name = "link.arm.stiffness[1][5]";
+        assert!(fits("link.arm.stiffness[5][1]", name) && asks_for("link.*.stiffness[*][*]", name));
+        assert!(!asks_for("*", name) && !asks_for("link.*stiffness*", name));
+        assert!(asks_for("tcp.*", "tcp.rx") && !asks_for("*", "tcp.x"));
+    }
 
     #[test]
     fn a_star_stands_for_anything_in_a_name() {

@@ -260,6 +260,7 @@ fn nothing_measured() -> super::MeasurementInput {
         loss: flexarm_identify::Loss::Square,
         deviations_known: true,
         length: "m",
+        angle_rad: 1.0,
         length_m: 1.0,
     }
 }

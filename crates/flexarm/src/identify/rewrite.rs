@@ -3,17 +3,25 @@
 use std::path::Path;
 
 use flexarm_identify::Found;
-use toml_edit::{DocumentMut, Item, Table, TableLike, Value};
+use flexarm_kinematics::Pose;
+use nalgebra::{Matrix6, Rotation3, Translation3, Vector3};
+use toml_edit::{Array, DocumentMut, InlineTable, Item, Table, TableLike, Value};
 
 use super::parameters::Written;
 
 /// The text of the robot file with other values; each with its standard deviation as a comment.
 ///
-/// * `home`: folder of the old file, `to`: of the new one; paths in the file are rewritten if they differ.
+/// * `tool`: link of the tool and its pose in the link, as it was; `home`: folder of the old file, `to`: of the new one; paths in the file are rewritten if they differ.
 ///
 /// # Errors
 /// A sentence about what was not found where it should be.
-pub(super) fn rewritten(text: &str, found: &[(Found, Written)], home: &Path, to: &Path) -> Result<String, String> {
+pub(super) fn rewritten(
+    text: &str,
+    found: &[(Found, Written)],
+    tool: (&str, &Pose),
+    home: &Path,
+    to: &Path,
+) -> Result<String, String> {
     let mut file: DocumentMut = text.parse().map_err(|error: toml_edit::TomlError| error.to_string())?;
     let mut told: Vec<(String, &Found)> = Vec::new();
     for (parameter, written) in found {
@@ -69,6 +77,13 @@ pub(super) fn rewritten(text: &str, found: &[(Found, Written)], home: &Path, to:
                 }
                 told.push((format!("link {link}"), parameter));
             }
+            Written::LinkEntry { link, row, column, K } => {
+                let entry = named(&mut file, "flexible_link", "link", link)?;
+                put_entry(entry, (*row, *column), K, rounded(parameter.value, parameter.std))
+                    .ok_or_else(|| format!("the stiffness of link {link:?} is no 6x6 matrix"))?;
+                told.push((format!("link {link}"), parameter));
+            }
+            Written::Tool { .. } => told.push(("tcp".into(), parameter)),
             Written::Mounting { entry } => {
                 let mounting = file.get_mut("mounting").and_then(Item::as_table_like_mut);
                 let stiffness = mounting.and_then(|mounting| mounting.get_mut("stiffness"));
@@ -82,6 +97,7 @@ pub(super) fn rewritten(text: &str, found: &[(Found, Written)], home: &Path, to:
             }
         }
     }
+    put_tool(&mut file, found, tool)?;
     if home != to {
         moved_paths(&mut file, home, to);
     }
@@ -150,6 +166,50 @@ fn put_stiffness(item: &mut Item, entry: Option<usize>, found: &Found) -> Result
             }
         }
         (value, _) => replace(value, number),
+    }
+    Ok(())
+}
+
+/// An entry and its mirror image in the `stiffness` of a link, which is `K` where the file has none.
+fn put_entry(link: &mut dyn TableLike, place: (usize, usize), K: &Matrix6<f64>, number: f64) -> Option<()> {
+    if link.get("stiffness").is_none() {
+        let mut rows: Array = (0..6).map(|i| (0..6).map(|j| K[(i, j)]).collect::<Array>()).collect();
+        rows.iter_mut().for_each(|row| row.decor_mut().set_prefix("\n    "));
+        rows.set_trailing_comma(true);
+        rows.set_trailing("\n");
+        link.insert("stiffness", toml_edit::value(rows));
+    }
+    let rows = link.get_mut("stiffness").and_then(Item::as_array_mut)?;
+    for (i, j) in [place, (place.1, place.0)] {
+        replace(rows.get_mut(i)?.as_array_mut()?.get_mut(j)?, number);
+    }
+    Some(())
+}
+
+/// The place of the tool, moved and turned about its own axes by what was found of it.
+fn put_tool(file: &mut DocumentMut, found: &[(Found, Written)], tool: (&str, &Pose)) -> Result<(), String> {
+    let mut shift = [0.0; 6];
+    for (parameter, written) in found {
+        if let Written::Tool { axis } = written {
+            shift[*axis] = parameter.value;
+        }
+    }
+    if shift == [0.0; 6] {
+        return Ok(());
+    }
+    let part = |first: usize| Vector3::new(shift[first], shift[first + 1], shift[first + 2]);
+    let X_LT = tool.1 * Pose::from_parts(Translation3::from(part(0)), Rotation3::new(part(3)));
+    if file.get("tcp").is_none() {
+        let link = [("link", Value::from(tool.0))].into_iter().collect::<InlineTable>();
+        file.insert("tcp", toml_edit::value(link));
+    }
+    let entry = file.get_mut("tcp").and_then(Item::as_table_like_mut).ok_or("tcp is no table")?;
+    // Tenths of micrometres and of microradians.
+    let list = |values: [f64; 3]| values.map(|x| (x * 1e7).round() / 1e7).into_iter().collect::<Array>();
+    entry.insert("xyz", toml_edit::value(list(X_LT.translation.vector.into())));
+    if part(3) != Vector3::zeros() {
+        let (roll, pitch, yaw) = X_LT.rotation.euler_angles();
+        entry.insert("rpy", toml_edit::value(list([roll, pitch, yaw])));
     }
     Ok(())
 }
@@ -237,7 +297,7 @@ mod tests {
             (found("d", 1.0, 1.2345, 0.01), Written::LinkDirection { link: "arm".into(), entry: 4 }),
         ];
         let here = Path::new(".");
-        let new = rewritten(text, &all, here, here).unwrap();
+        let new = rewritten(text, &all, ("tool", &Pose::identity()), here, here).unwrap();
         let (comments, body) = new.split_once("\n\n").unwrap();
         assert!(comments.contains("a = 1234570 +- 2000 N m/rad, was 1000000"), "{comments}");
         let expected = text

@@ -18,7 +18,7 @@ use serde::Serialize;
 use crate::arm::Arm;
 use crate::caveat::Caveat;
 use crate::error::{Error, ValueError};
-use crate::identify::parameters::fits;
+use crate::identify::parameters::{asks_for, fits};
 use crate::options::RunOptions;
 use crate::prepare::{loaded, runnable};
 use crate::robot::Robot;
@@ -81,7 +81,7 @@ pub struct ParameterSensitivity {
     pub unit: String,
     /// Its value; 0 of a shift, 1 of what a servo feeds forward.
     pub value: f64,
-    /// Of which change of it the following are the effect: `1 %`, `1 kg`, `1 mrad` or `1 mm`. They are derivatives, times that.
+    /// Of which change of it the following are the effect: `1 %`, `1 % of the root of K_ii K_jj`, `1 kg`, `1 mrad` or `1 mm`. They are derivatives, times that.
     pub per: &'static str,
     /// Of the largest distance, at the time where it is (m).
     pub peak_m: f64,
@@ -154,8 +154,15 @@ impl Arm {
         Ok((found, caveats))
     }
 
+    /// Numbers of the arm by which is differentiated: entries of matrices, of which there are many, only by their names.
+    fn numbers(&self, asked: &[String]) -> Vec<Parameter> {
+        let entries = self.link_entries().into_iter();
+        let entries = entries.filter(|own| asked.iter().any(|pattern| asks_for(pattern, &own.name)));
+        self.parameters().into_iter().chain(self.link_directions()).chain(entries).collect()
+    }
+
     /// All numbers by which the error along a motion is differentiated.
-    fn run_parameters(&self, scenario: &Scenario) -> Result<Vec<Named>, Error> {
+    fn run_parameters(&self, scenario: &Scenario, asked: &[String]) -> Result<Vec<Named>, Error> {
         let of_arm = |parameter: Parameter| {
             let (per, scale) = change_of(&parameter);
             let Parameter { name, unit, initial: value, .. } = parameter.clone();
@@ -164,8 +171,7 @@ impl Arm {
         // What another payload takes the place of at the start does nothing.
         let gone = scenario.payloads.iter().any(|payload| payload.at_s <= SAME_TIME);
         let there = |own: &Parameter| !(gone && matches!(own.effect, Effect::Mass { .. }));
-        let own = self.parameters().into_iter().chain(self.link_directions()).filter(there);
-        let mut all: Vec<Named> = own.map(of_arm).collect();
+        let mut all: Vec<Named> = self.numbers(asked).into_iter().filter(there).map(of_arm).collect();
         let model = &self.flexible().model;
         for (k, coordinate) in model.coordinates()[..model.n_actuated()].iter().enumerate() {
             let slides = coordinate.kind == "prismatic";
@@ -197,7 +203,7 @@ pub fn sensitivity(
     let scenario = scenario.into();
     check_free(request.table.as_slice(), request.overwrite)?;
     let arm = robot.flexible(request.run.modelling)?;
-    let named = chosen(arm.run_parameters(&scenario)?, &request.parameters, |own| &own.name)?;
+    let named = chosen(arm.run_parameters(&scenario, &request.parameters)?, &request.parameters, |own| &own.name)?;
     let parameters: Vec<RunParameter> = named.iter().map(|own| own.parameter.clone()).collect();
     let (found, mut caveats) = arm.error_slopes_told(&scenario, &request.run, &parameters, request.table.is_some())?;
     caveats.extend_from_slice(arm.robot_caveats());
@@ -247,7 +253,11 @@ fn chosen<T>(mut all: Vec<T>, patterns: &[String], name: impl Fn(&T) -> &str) ->
 
 /// The change by which a parameter of the arm is told, as words and in its coordinate of the search.
 fn change_of(parameter: &Parameter) -> (&'static str, f64) {
-    if parameter.is_logarithmic() { ("1 %", 0.01) } else { ("1 kg", 1.0) }
+    match parameter.effect {
+        Effect::Entry { size, .. } => ("1 % of the root of K_ii K_jj", 0.01 * size),
+        _ if parameter.is_logarithmic() => ("1 %", 0.01),
+        _ => ("1 kg", 1.0),
+    }
 }
 
 /// Error and derivatives after every step: six columns of each, world axes, m and rad, for the changes by which parameters are told.

@@ -43,7 +43,7 @@ pub struct PoseParameter {
     pub unit: String,
     /// Its value.
     pub value: f64,
-    /// Of which change of it the following are the effect: `1 %`, `1 kg` or `1 mm`. They are derivatives, times that.
+    /// Of which change of it the following are the effect: `1 %`, `1 % of the root of K_ii K_jj`, `1 kg` or `1 mm`. They are derivatives, times that.
     pub per: &'static str,
     /// Of the tool's place (m).
     pub tcp_m: [f64; 3],
@@ -71,7 +71,7 @@ pub fn pose_sensitivity(
     let joints: Vec<String> = arm.joints().map(str::to_owned).collect();
     let names: Vec<&str> = joints.iter().map(String::as_str).collect();
     let at = joint_values(at, &names)?;
-    let all: Vec<Parameter> = arm.parameters().into_iter().chain(arm.link_directions()).collect();
+    let all: Vec<Parameter> = arm.numbers(parameters);
     let still = |parameter: &Parameter| !matches!(parameter.effect, Effect::Damping(_));
     let all = all.into_iter().filter(still).map(Asked::Arm).chain((0..3).map(Asked::Tool)).collect();
     slopes(robot, &arm, joints, at, chosen(all, parameters, Asked::name)?)

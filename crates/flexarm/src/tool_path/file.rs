@@ -250,7 +250,8 @@ fn options(
     let mut options = PathOptions::default();
     if let Some(rise) = &file.path.rise {
         if !(*rise.get_ref() > 0.0 && rise.get_ref().is_finite()) {
-            return Err(source.error(rise.span(), "rise must be a positive time in s"));
+            let message = format!("rise is {}, it must be a positive time in s", rise.get_ref());
+            return Err(source.error(rise.span(), message));
         }
         options.rise_s = *rise.get_ref();
     }
@@ -309,16 +310,20 @@ fn overrides(file: &PathFile, source: &Source, cell: &Cell<'_>, units: Units) ->
             return Err(source.error(joint.span(), message));
         };
         let unit = if coordinates[k].kind == "prismatic" { units.length } else { units.angle };
-        let value = |value: &Option<Spanned<f64>>, factor: f64| match value {
+        let value = |key: &str, value: &Option<Spanned<f64>>, factor: f64| match value {
             Some(value) if !(*value.get_ref() > 0.0 && value.get_ref().is_finite()) => {
-                Err(source.error(value.span(), "a limit must be a positive number"))
+                let (joint, found) = (joint.get_ref(), value.get_ref());
+                let message = format!(
+                    "limits: {key} of joint {joint:?} is {found}, expected a positive number; leave it out to keep the robot's own"
+                );
+                Err(source.error(value.span(), message))
             }
             value => Ok(value.as_ref().map(|value| value.get_ref() * factor)),
         };
-        overrides.velocities[k] = value(&limits.velocity, unit)?;
-        overrides.accelerations[k] = value(&limits.acceleration, unit)?;
-        overrides.jerks[k] = value(&limits.jerk, unit)?;
-        overrides.torques[k] = value(&limits.torque, 1.0)?;
+        overrides.velocities[k] = value("velocity", &limits.velocity, unit)?;
+        overrides.accelerations[k] = value("acceleration", &limits.acceleration, unit)?;
+        overrides.jerks[k] = value("jerk", &limits.jerk, unit)?;
+        overrides.torques[k] = value("torque", &limits.torque, 1.0)?;
     }
     Ok(overrides)
 }
@@ -559,7 +564,8 @@ impl Reader<'_> {
         let R = R.ok_or_else(|| self.source.error(table.span(), "tell how the tool stands: rpy or quaternion"))?;
         let side = *entry.side.get_ref() * self.units.length;
         if !(side > 0.0 && side.is_finite()) {
-            return Err(self.source.error(entry.side.span(), "side must be a positive length"));
+            let message = format!("side is {}, it must be a positive length", entry.side.get_ref());
+            return Err(self.source.error(entry.side.span(), message));
         }
         let (centre, repeats) = (Vector3::from(entry.centre) * self.units.length, entry.repeats.unwrap_or(1));
         if !(1..=1000).contains(&repeats) {

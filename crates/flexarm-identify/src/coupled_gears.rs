@@ -1,0 +1,239 @@
+//! Stiffness of gears that move several joints, from the positions of the motors and of the links behind them.
+//!
+//! ```text
+//! C q_m - q_link = C diag(c) Cᵀ τ:     row i:  Σ_k c_k C_ik (Cᵀ τ)_k + d_i q̇_i + offset of the run
+//! ```
+//! with the compliance `c_k` of each motor's spring behind its gear and a delay `d_i` of each link's encoder: what one link shows is a
+//! combination of springs, and one encoder may tell several of them. Deviations and what counts as told as for a single gear
+//! ([`crate::gear_stiffness`]), of each spring beside what the others do.
+
+use nalgebra::{DMatrix, DVector};
+
+use crate::encoders::{BLOCK, GearEstimate, centred};
+
+/// One link's encoder in a recording, evenly sampled, all filtered alike.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CoupledOutput {
+    /// Where the motors say that the joint is, less the link (rad).
+    pub deflection: Vec<f64>,
+    /// Speed of the joint (rad/s).
+    pub rate: Vec<f64>,
+    /// Of each spring its part of the deflection per compliance: `C_ik (Cᵀ τ)_k` (N m).
+    pub torques: Vec<Vec<f64>>,
+}
+
+/// Finds the stiffness of each spring from all recordings of the same encoders; one recording is taken as two halves.
+///
+/// None for less than two blocks of samples, or springs that these encoders do not tell apart.
+pub fn coupled_gear_stiffness(runs: &[Vec<CoupledOutput>]) -> Option<Vec<GearEstimate>> {
+    let halves;
+    let runs = match runs {
+        [one] => {
+            halves = split(one);
+            &halves[..]
+        }
+        runs => runs,
+    };
+    let first = runs.first()?.first()?;
+    let length = |run: &[CoupledOutput]| run.first().map_or(0, |output| output.deflection.len());
+    if runs.iter().map(|run| length(run)).sum::<usize>() < 2 * BLOCK {
+        return None;
+    }
+    let all: Vec<usize> = (0..runs.len()).collect();
+    let fit = Fit::of(runs, &all, None)?;
+    let blocks = all.iter().flat_map(|run| (0..length(&runs[*run]) / BLOCK).map(move |k| (*run, k * BLOCK)));
+    let left: Vec<Fit> = blocks.filter_map(|block| Fit::of(runs, &all, Some(block))).collect();
+    let others = |run: usize| all.iter().copied().filter(|k| *k != run).collect::<Vec<_>>();
+    let without: Vec<Fit> = all.iter().map(|run| Fit::of(runs, &others(*run), None)).collect::<Option<_>>()?;
+    let of = |motor: usize| {
+        let n = left.len() as f64;
+        let mean = left.iter().map(|fit| fit.compliance[motor]).sum::<f64>() / n;
+        let variance = (n - 1.0) / n * left.iter().map(|fit| (fit.compliance[motor] - mean).powi(2)).sum::<f64>();
+        let unseen = runs.iter().zip(&without).map(|(run, fit)| fit.left_of(run, motor));
+        let sums = runs.iter().map(|run| fit.left_of(run, motor)).fold([0.0; 3], |a, b| [0, 1, 2].map(|k| a[k] + b[k]));
+        let compliance = fit.compliance[motor];
+        GearEstimate {
+            stiffness: 1.0 / compliance,
+            std_ln: variance.sqrt() / compliance.abs(),
+            delay_s: fit.delay[seen_most(runs, motor)],
+            r2: 1.0 - sums[0] / sums[1],
+            unseen_r2: unseen.map(|[rest, whole, _]| 1.0 - rest / whole).collect(),
+            without_each: without.iter().map(|fit| 1.0 / fit.compliance[motor]).collect(),
+            rest_rms: (sums[0] / sums[2]).sqrt(),
+            deflection_rms: (sums[1] / sums[2]).sqrt(),
+        }
+    };
+    Some((0..first.torques.len()).map(of).collect())
+}
+
+/// The encoder that shows most of a spring.
+fn seen_most(runs: &[Vec<CoupledOutput>], motor: usize) -> usize {
+    let size = |output: usize| {
+        runs.iter().flat_map(|run| &run[output].torques[motor]).map(|torque| torque * torque).sum::<f64>()
+    };
+    (0..runs[0].len()).max_by(|a, b| size(*a).total_cmp(&size(*b))).unwrap_or(0)
+}
+
+fn split(run: &[CoupledOutput]) -> [Vec<CoupledOutput>; 2] {
+    let half = |second: bool| {
+        let cut = |x: &Vec<f64>| {
+            let (a, b) = x.split_at(x.len() / 2);
+            if second { b.to_vec() } else { a.to_vec() }
+        };
+        let of = |output: &CoupledOutput| CoupledOutput {
+            deflection: cut(&output.deflection),
+            rate: cut(&output.rate),
+            torques: output.torques.iter().map(cut).collect(),
+        };
+        run.iter().map(of).collect()
+    };
+    [half(false), half(true)]
+}
+
+/// Compliance of each spring, delay of each encoder.
+struct Fit {
+    compliance: Vec<f64>,
+    delay: Vec<f64>,
+}
+
+impl Fit {
+    /// Least squares with an offset for each encoder of each run, without one block.
+    fn of(runs: &[Vec<CoupledOutput>], some: &[usize], without: Option<(usize, usize)>) -> Option<Self> {
+        let (outputs, motors) = (runs[0].len(), runs[0][0].torques.len());
+        let size = motors + outputs;
+        let (mut normal, mut right) = (DMatrix::<f64>::zeros(size, size), DVector::<f64>::zeros(size));
+        for &k in some {
+            let left_out = |i: &usize| without.is_some_and(|(r, first)| r == k && (first..first + BLOCK).contains(i));
+            let kept: Vec<usize> = (0..runs[k][0].deflection.len()).filter(|i| !left_out(i)).collect();
+            for (number, output) in runs[k].iter().enumerate() {
+                let y = centred(&output.deflection, &kept);
+                let mut columns: Vec<(usize, Vec<f64>)> =
+                    output.torques.iter().map(|torque| centred(torque, &kept)).enumerate().collect();
+                columns.push((motors + number, centred(&output.rate, &kept)));
+                for (a, x) in &columns {
+                    right[*a] += x.iter().zip(&y).map(|(x, y)| x * y).sum::<f64>();
+                    for (b, z) in &columns {
+                        normal[(*a, *b)] += x.iter().zip(z).map(|(x, z)| x * z).sum::<f64>();
+                    }
+                }
+            }
+        }
+        let scale: Vec<f64> = (0..size).map(|k| f64::sqrt(normal[(k, k)])).collect();
+        if scale[..motors].iter().any(|scale| scale.is_nan() || *scale <= 0.0) {
+            return None;
+        }
+        // A joint that stands still has no delay to be told.
+        let told: Vec<usize> = (0..size).filter(|k| scale[*k] > 0.0).collect();
+        let unit = DMatrix::from_fn(told.len(), told.len(), |i, j| {
+            normal[(told[i], told[j])] / (scale[told[i]] * scale[told[j]])
+        });
+        let found = unit.cholesky()?.solve(&DVector::from_fn(told.len(), |i, _| right[told[i]] / scale[told[i]]));
+        let mut values = vec![0.0; size];
+        told.iter().zip(found.iter()).for_each(|(k, x)| values[*k] = x / scale[*k]);
+        let delay = values.split_off(motors);
+        Some(Self { compliance: values, delay })
+    }
+
+    /// Sums of squares of a run over the encoders that show a spring: what is left, the same without that spring, how many samples.
+    fn left_of(&self, run: &[CoupledOutput], motor: usize) -> [f64; 3] {
+        let mut sums = [0.0; 3];
+        for (output, delay) in run.iter().zip(&self.delay) {
+            if output.torques[motor].iter().all(|torque| *torque == 0.0) {
+                continue;
+            }
+            let kept: Vec<usize> = (0..output.deflection.len()).collect();
+            let mut rest = centred(&output.deflection, &kept);
+            let mut take = |x: &[f64], factor: f64| {
+                rest.iter_mut().zip(centred(x, &kept)).for_each(|(rest, x)| *rest -= factor * x);
+            };
+            take(&output.rate, *delay);
+            output.torques.iter().zip(&self.compliance).for_each(|(torque, c)| take(torque, *c));
+            let own = centred(&output.torques[motor], &kept);
+            for (rest, torque) in rest.iter().zip(own) {
+                sums[0] += rest * rest;
+                sums[1] += (rest + self.compliance[motor] * torque).powi(2);
+                sums[2] += 1.0;
+            }
+        }
+        sums
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{GearRun, gear_stiffness};
+
+    const C: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [-0.2, 1.0, 0.0], [0.4, -0.3, 1.0]];
+    const STIFFNESS: [f64; 3] = [2e6, 9e5, 4e5];
+    const DELAY: [f64; 3] = [3e-3, -1e-3, 2e-3];
+
+    fn run(seed: f64, noise: f64) -> Vec<CoupledOutput> {
+        let t = |k: usize| 0.004 * k as f64;
+        let tau: Vec<Vec<f64>> = (0..3)
+            .map(|j| {
+                let f = 0.9 + 0.37 * j as f64;
+                (0..2500).map(|k| 900.0 * (f * t(k) + seed).sin() + 400.0 * (2.3 * f * t(k) + j as f64).cos()).collect()
+            })
+            .collect();
+        let motor = |k: usize, i: usize| (0..3).map(|j| C[j][k] * tau[j][i]).sum::<f64>();
+        let output = |i: usize| {
+            let rate: Vec<f64> = (0..2500).map(|k| 0.4 * ((1.3 + 0.2 * i as f64) * t(k) + 2.0 * seed).cos()).collect();
+            let torques: Vec<Vec<f64>> = (0..3).map(|k| (0..2500).map(|s| C[i][k] * motor(k, s)).collect()).collect();
+            let error = |s: usize| noise * (17.0 * t(s) * (1.0 + 0.1 * seed + 0.3 * i as f64)).sin();
+            let spring = |s: usize| (0..3).map(|k| torques[k][s] / STIFFNESS[k]).sum::<f64>();
+            let deflection = (0..2500).map(|s| spring(s) + DELAY[i] * rate[s] + 1e-3 * seed + error(s)).collect();
+            CoupledOutput { deflection, rate, torques }
+        };
+        (0..3).map(output).collect()
+    }
+
+    #[test]
+    fn springs_of_coupled_motors_are_found_from_all_encoders_and_from_the_last_one_alone() {
+        let runs: Vec<_> = [0.0, 1.0, 2.0].map(|seed| run(seed, 0.0)).to_vec();
+        let last: Vec<_> = runs.iter().map(|run| run[2..].to_vec()).collect();
+        for runs in [&runs[..], &runs[..1], &last[..]] {
+            let found = coupled_gear_stiffness(runs).unwrap();
+            for (gear, truth) in found.iter().zip(STIFFNESS) {
+                let error = (gear.stiffness / truth - 1.0).abs();
+                // Measured: 1e-12 and less.
+                assert!(error < 1e-9 && gear.is_told() && gear.r2 > 1.0 - 1e-12, "{gear:?}");
+            }
+        }
+        // Without noise the delays come out too; the first spring is seen most by its own encoder.
+        let found = coupled_gear_stiffness(&runs).unwrap();
+        assert!((found[0].delay_s - DELAY[0]).abs() < 1e-10 && (found[2].delay_s - DELAY[2]).abs() < 1e-10);
+    }
+
+    #[test]
+    fn a_single_gear_comes_out_as_by_itself() {
+        let runs: Vec<_> = [0.0, 1.0, 2.0].map(|seed| vec![run(seed, 1e-5).swap_remove(0)]).to_vec();
+        let only = |run: &Vec<CoupledOutput>| {
+            let CoupledOutput { deflection, rate, torques } = run[0].clone();
+            vec![CoupledOutput { deflection, rate, torques: vec![torques[0].clone()] }]
+        };
+        let runs: Vec<_> = runs.iter().map(only).collect();
+        let plain: Vec<GearRun> = runs
+            .iter()
+            .map(|run| GearRun {
+                deflection: run[0].deflection.clone(),
+                torque: run[0].torques[0].clone(),
+                rate: run[0].rate.clone(),
+            })
+            .collect();
+        let (a, b) = (&coupled_gear_stiffness(&runs).unwrap()[0], gear_stiffness(&plain).unwrap());
+        assert!((a.stiffness / b.stiffness - 1.0).abs() < 1e-12 && (a.std_ln / b.std_ln - 1.0).abs() < 1e-9);
+        assert!((a.r2 - b.r2).abs() < 1e-12 && (a.unseen_r2[1] - b.unseen_r2[1]).abs() < 1e-12);
+    }
+
+    #[test]
+    fn springs_that_the_encoders_do_not_tell_apart_are_not_made_up() {
+        let mut runs: Vec<_> = [0.0, 1.0].map(|seed| run(seed, 0.0)).to_vec();
+        // Two springs with the same torque in one encoder.
+        for run in &mut runs {
+            run.truncate(1);
+            run[0].torques = vec![run[0].torques[0].clone(); 2];
+        }
+        assert!(coupled_gear_stiffness(&runs).is_none());
+    }
+}

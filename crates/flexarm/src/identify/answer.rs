@@ -1,0 +1,343 @@
+//! What `flexarm identify` answers, and how it is made of what was found.
+
+use std::path::Path;
+
+use flexarm_identify::{
+    Component, Form, Identified, Instrument, MeasuredArm, Measurements, Parameter, Plant, Reading, ReadingKind, Target,
+};
+use flexarm_kinematics::Pose;
+use nalgebra::{DVector, Vector3};
+use serde::Serialize;
+
+use super::doubts::caveats;
+use super::encoders::EncoderFigures;
+use super::error::IdentifyFileError;
+use super::file::MeasurementInput;
+use crate::caveat::Caveat;
+use crate::error::Error;
+use crate::robot::Robot;
+
+/// Readings that are named as arguing against the model.
+const MOST_SUSPICIOUS: usize = 10;
+
+/// Answer of `flexarm identify`.
+#[derive(Clone, Debug, Serialize)]
+pub struct Identification {
+    /// The robot.
+    pub robot: String,
+    /// The file of measurements.
+    pub measurements: String,
+    /// How many readings, and numbers in them.
+    pub readings: usize,
+    /// Numbers that were measured.
+    pub numbers: usize,
+    /// What was fitted.
+    pub parameters: Vec<FittedParameter>,
+    /// Correlation of the parameters, row after row.
+    pub correlation: Vec<Vec<f64>>,
+    /// Combinations that the readings do not tell.
+    pub untold: Vec<Vec<Weight>>,
+    /// RMS of the residuals.
+    pub residual: Residual,
+    /// RMS over readings that the fit had not seen; null with fewer than two readings.
+    pub held_out: Option<HeldOutFigures>,
+    /// How many times larger than its declared deviation the scatter is, where chance does not explain it; else null.
+    pub misfit: Option<f64>,
+    /// Whether the deviations of the readings were given; if not, the scatter tells them.
+    pub deviations_known: bool,
+    /// Gears of which motor and link were recorded.
+    pub encoders: Vec<EncoderFigures>,
+    /// Readings that argue against the rest, the worst first.
+    pub suspicious: Vec<Suspicious>,
+    /// Measured shapes of modes against those of the arm.
+    pub shapes: Vec<ShapeFigures>,
+    /// Unknown instruments as found, in the world.
+    pub instruments: Vec<FoundFrame>,
+    /// Unknown targets as found, tool axes (m).
+    pub targets: Vec<FoundPoint>,
+    /// Iterations.
+    pub iterations: usize,
+    /// Whether the search ended by itself.
+    pub converged: bool,
+    /// The new robot file.
+    pub file: Option<String>,
+    /// The page.
+    pub page: Option<String>,
+    /// What is doubtful.
+    pub caveats: Vec<Caveat>,
+    /// Each number: measured, expected before and after.
+    #[serde(skip)]
+    pub compared: Vec<Compared>,
+}
+
+/// A number of the robot file as it was found.
+#[derive(Clone, Debug, Serialize)]
+pub struct FittedParameter {
+    /// By the names of the robot file.
+    pub name: String,
+    /// Unit of the values.
+    pub unit: String,
+    /// Before.
+    pub initial: f64,
+    /// Now; the initial value where the readings say nothing.
+    pub value: f64,
+    /// Standard deviation.
+    pub std: f64,
+    /// Where it lies in 95 of 100 cases.
+    pub interval: [f64; 2],
+    /// Whether the readings tell it.
+    pub identifiable: bool,
+}
+
+/// A parameter in a combination.
+#[derive(Clone, Debug, Serialize)]
+pub struct Weight {
+    /// Its name.
+    pub name: String,
+    /// Its weight, over the prior deviation.
+    pub weight: f64,
+}
+
+/// RMS before and after.
+#[derive(Clone, Debug, Serialize)]
+pub struct Residual {
+    /// With the robot file as it is.
+    pub before: f64,
+    /// With what was found.
+    pub after: f64,
+    /// `m`, `Hz`, or `std` where readings of several units are mixed.
+    pub unit: &'static str,
+}
+
+/// RMS over readings that the fit had not seen.
+#[derive(Clone, Debug, Serialize)]
+pub struct HeldOutFigures {
+    /// Parts that were held out in turn.
+    pub folds: usize,
+    /// With the parameters fitted to the others.
+    pub rms: f64,
+    /// With the robot file as it is.
+    pub rms_before: f64,
+    /// As of the residual.
+    pub unit: &'static str,
+}
+
+/// A reading that argues against the rest.
+#[derive(Clone, Debug, Serialize)]
+pub struct Suspicious {
+    /// Which reading and number of it.
+    pub reading: String,
+    /// Measured (SI).
+    pub measured: f64,
+    /// Expected with what was found.
+    pub expected: f64,
+    /// Difference over what its scatter would be.
+    pub normalised: f64,
+}
+
+/// A measured shape against the arm's mode that is most like it.
+#[derive(Clone, Debug, Serialize)]
+pub struct ShapeFigures {
+    /// Which reading.
+    pub reading: String,
+    /// The mode, from 1, with what was found.
+    pub mode: usize,
+    /// Modal assurance criterion with the robot file as it is, from 0 to 1.
+    pub assurance_before: f64,
+    /// The same with what was found.
+    pub assurance: f64,
+}
+
+/// Where an instrument stands.
+#[derive(Clone, Debug, Serialize)]
+pub struct FoundFrame {
+    /// Its name.
+    pub name: String,
+    /// In the world (m).
+    pub xyz: [f64; 3],
+    /// Roll, pitch, yaw (rad).
+    pub rpy: [f64; 3],
+}
+
+/// Where a target is.
+#[derive(Clone, Debug, Serialize)]
+pub struct FoundPoint {
+    /// Its name.
+    pub name: String,
+    /// In tool axes (m).
+    pub xyz: [f64; 3],
+}
+
+/// One measured number.
+#[derive(Clone, Debug, Serialize)]
+pub struct Compared {
+    /// Which.
+    pub name: String,
+    /// Its unit.
+    pub unit: &'static str,
+    /// Measured.
+    pub measured: f64,
+    /// Expected of the robot file as it is.
+    pub before: f64,
+    /// Expected with what was found.
+    pub after: f64,
+    /// Its deviation.
+    pub std: f64,
+}
+
+/// Unit of each number, and its name within the reading.
+fn numbers(measurements: &Measurements) -> Vec<(String, &'static str)> {
+    let axis = |v: &Vector3<f64>| match v.iter().position(|x| *x == 1.0) {
+        Some(k) => ["x", "y", "z"][k].to_owned(),
+        None => "along its direction".to_owned(),
+    };
+    let mut all = Vec::new();
+    for reading in &measurements.readings {
+        match &reading.kind {
+            ReadingKind::Displacement { rows, .. } => all.extend(rows.iter().map(|row| match &row.of {
+                Component::Along(d) => (format!("{}, {}", reading.name, axis(d)), "m"),
+                Component::About(d) => (format!("{}, about {}", reading.name, axis(d)), "rad"),
+            })),
+            ReadingKind::Place { .. } => {
+                all.extend(["x", "y", "z"].map(|axis| (format!("{}, {axis}", reading.name), "m")));
+            }
+            ReadingKind::Known { .. } => all.push((reading.name.clone(), "ln")),
+            ReadingKind::Frequencies { rows, .. } => {
+                all.extend(rows.iter().map(|row| (format!("{}, mode {}", reading.name, row.of + 1), "Hz")));
+            }
+            ReadingKind::Response(response) => {
+                let (words, units) = match response.form {
+                    Form::Logarithmic => (["magnitude (ln)", "phase"], ["ln", "rad"]),
+                    Form::Complex => (["real part", "imaginary part"], [response.answer.unit(); 2]),
+                };
+                for (omega, ..) in &response.points {
+                    let hz = omega / std::f64::consts::TAU;
+                    all.extend([0, 1].map(|k| (format!("{}, {hz:.4} Hz, {}", reading.name, words[k]), units[k])));
+                }
+            }
+            ReadingKind::Shape(shape) => {
+                all.extend((0..shape.probes.len()).map(|k| (format!("{}, point {}", reading.name, k + 1), "1")));
+            }
+        }
+    }
+    all
+}
+
+pub(super) fn rms(values: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let n = values.len() as f64;
+    (values.map(|x| x * x).sum::<f64>() / n).sqrt()
+}
+
+pub(super) fn answer(
+    robot: &Robot,
+    path: &Path,
+    plant: &Plant,
+    fitted: &[Parameter],
+    input: &MeasurementInput,
+    found: &Identified,
+) -> Result<Identification, Error> {
+    let measurements = &input.measurements;
+    let names = numbers(measurements);
+    let deviations: Vec<f64> = measurements.readings.iter().flat_map(Reading::deviations).collect();
+    let observed = MeasuredArm { plant, parameters: &[], measurements }.observed();
+    let one_unit = names.windows(2).all(|pair| pair[0].1 == pair[1].1);
+    let unit = if one_unit { names[0].1 } else { "std" };
+    let in_unit = |r: f64, k: usize| if one_unit { r * deviations[k] } else { r };
+    let of = |residuals: &[f64]| rms(residuals.iter().enumerate().map(|(k, r)| in_unit(*r, k)));
+    let residuals = found.solution.residuals.as_slice();
+    let compared: Vec<Compared> = (0..names.len())
+        .map(|k| Compared {
+            name: names[k].0.clone(),
+            unit: names[k].1,
+            measured: observed[k],
+            before: observed[k] + found.before[k] * deviations[k],
+            after: observed[k] + residuals[k] * deviations[k],
+            std: deviations[k],
+        })
+        .collect();
+    let held_out = found.held_out.as_ref().map(|held| {
+        let seen: Vec<usize> = (0..held.residuals.len()).filter(|k| held.residuals[*k].is_finite()).collect();
+        let of = |values: &[f64]| rms(seen.iter().map(|k| in_unit(values[*k], *k)));
+        HeldOutFigures { folds: held.folds, rms: of(&held.residuals), rms_before: of(&found.before), unit }
+    });
+    let suspicious = found.suspicious.iter().take(MOST_SUSPICIOUS).map(|k| Suspicious {
+        reading: compared[*k].name.clone(),
+        measured: compared[*k].measured,
+        expected: compared[*k].after,
+        normalised: found.normalised[*k],
+    });
+    let weights = |combination: &Vec<(usize, f64)>| {
+        combination.iter().map(|(k, weight)| Weight { name: fitted[*k].name.clone(), weight: *weight }).collect()
+    };
+    let parameters = found.parameters.iter().map(|p| FittedParameter {
+        name: p.name.clone(),
+        unit: p.unit.clone(),
+        initial: p.initial,
+        value: p.value,
+        std: p.std,
+        interval: p.interval,
+        identifiable: p.identifiable,
+    });
+    let p = fitted.len();
+    Ok(Identification {
+        robot: robot.name.clone(),
+        measurements: path.display().to_string(),
+        readings: measurements.readings.len(),
+        numbers: names.len(),
+        parameters: parameters.collect(),
+        correlation: (0..p).map(|i| (0..p).map(|j| found.correlation[(i, j)]).collect()).collect(),
+        untold: found.untold.iter().map(weights).collect(),
+        residual: Residual { before: of(&found.before), after: of(residuals), unit },
+        held_out,
+        misfit: found.misfit,
+        deviations_known: input.deviations_known,
+        encoders: Vec::new(),
+        suspicious: suspicious.collect(),
+        shapes: shapes(plant, fitted, measurements, &found.solution.unknowns)?,
+        instruments: frames(input, found),
+        targets: points(input, found),
+        iterations: found.solution.iterations,
+        converged: found.solution.converged,
+        file: None,
+        page: None,
+        caveats: caveats(found),
+        compared,
+    })
+}
+
+fn shapes(
+    plant: &Plant,
+    fitted: &[Parameter],
+    measurements: &Measurements,
+    unknowns: &DVector<f64>,
+) -> Result<Vec<ShapeFigures>, Error> {
+    let arm = MeasuredArm { plant, parameters: fitted, measurements };
+    let of = |unknowns: &DVector<f64>| {
+        arm.assurances(unknowns).map_err(|error| Error::from(IdentifyFileError::Fit(error.to_string())))
+    };
+    let (before, after) = (of(&DVector::zeros(unknowns.len()))?, of(unknowns)?);
+    let figures = before.iter().zip(after).map(|((_, _, before), (number, mode, assurance))| ShapeFigures {
+        reading: measurements.readings[number].name.clone(),
+        mode: mode + 1,
+        assurance_before: *before,
+        assurance,
+    });
+    Ok(figures.collect())
+}
+
+fn frames(input: &MeasurementInput, found: &Identified) -> Vec<FoundFrame> {
+    let all = input.instruments.iter().zip(&found.instruments).zip(&input.measurements.instruments);
+    let unknown = all.filter(|(_, given)| matches!(given, Instrument::Unknown(_)));
+    let frame = |((name, X_IW), _): ((&String, &Pose), _)| {
+        let X_WI = X_IW.inverse();
+        let (roll, pitch, yaw) = X_WI.rotation.euler_angles();
+        FoundFrame { name: name.clone(), xyz: X_WI.translation.vector.into(), rpy: [roll, pitch, yaw] }
+    };
+    unknown.map(frame).collect()
+}
+
+fn points(input: &MeasurementInput, found: &Identified) -> Vec<FoundPoint> {
+    let all = input.targets.iter().zip(&found.targets).zip(&input.measurements.targets);
+    let unknown = all.filter(|(_, given)| matches!(given, Target::Unknown(_)));
+    unknown.map(|((name, p), _)| FoundPoint { name: name.clone(), xyz: (*p).into() }).collect()
+}
