@@ -10,7 +10,7 @@ use flexarm_spatial::Pose;
 use nalgebra::{Matrix2x3, Matrix3, Point3, SymmetricEigen, Vector3};
 
 use crate::mesh_picture::draw::{Align, Style, text_width};
-use crate::mesh_picture::scene::{Layer, Paint, Scene};
+use crate::mesh_picture::scene::{Layer, Paint, Scene, corner_normals};
 use crate::mesh_picture::{Image, Rgb, View, color};
 use crate::{BentMesh, Magnifier, stations_in_link};
 use flexarm_sample::{BendInfo, LinkMesh, RunHeader, Sample, TwinSample};
@@ -197,9 +197,9 @@ impl Stage {
         let bodies = bodies(header, sample);
         let magnifier = Magnifier::new(header);
         let magnified = magnifier.magnified(sample);
-        let rigid = Skin::rigid(&bodies, &sample.rigid);
+        let rigid = Skin::rigid(&bodies, &sample.rigid).with_normals();
         let real = Skin::bent(&bodies, header, &sample.flexible);
-        let shown = Skin::bent(&bodies, header, &magnified);
+        let shown = Skin::bent(&bodies, header, &magnified).with_normals();
         if rigid.triangles.is_empty() {
             return Err(ArmPictureError::Nothing);
         }
@@ -251,10 +251,10 @@ impl Stage {
         let side_of = vec![-1.0; self.rigid.positions.len()];
         let paint = Paint::Faces { colors: &colors, bright: &bright, side: &side_of };
         let ghost = Scene { positions: &self.rigid.positions, triangles: &self.rigid.triangles, paint, marks: &[] };
-        let ghost = Layer::new(&ghost, view, width, height);
+        let ghost = Layer::new(&ghost, &self.rigid.normals, view, width, height);
         let paint = Paint::Magnitude { values: &self.values, peak: 1.0 };
         let flexible = Scene { positions: &self.shown.positions, triangles: &self.shown.triangles, paint, marks: &[] };
-        Layers { outline: ghost.outline(), ghost, flexible: Layer::new(&flexible, view, width, height) }
+        Layers { ghost, flexible: Layer::new(&flexible, &self.shown.normals, view, width, height) }
     }
 
     /// On white, with everything that is to be known.
@@ -275,23 +275,15 @@ impl Stage {
 struct Layers {
     ghost: Layer,
     flexible: Layer,
-    /// How much of each pixel the outline of the rigid arm covers.
-    outline: Vec<f32>,
 }
 
 impl Layers {
     /// Both arms on a ground of one colour.
     fn on(&self, ground: Rgb, [width, height]: [usize; 2]) -> Image {
-        let mut under = self.ghost.over(&Image::new(width, height, ground));
-        for (x, y) in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
-            if under.pixel(x, y) != ground {
-                under.blend(x, y, ground, GHOST_FADE as f32);
-            }
-        }
-        let mut image = self.flexible.over(&under);
-        for (at, share) in self.outline.iter().enumerate().filter(|(_, share)| **share > 0.0) {
-            image.blend(at % width, at / width, GHOST_LINE, 0.8 * share);
-        }
+        let mut image = Image::new(width, height, ground);
+        self.ghost.lay_faintly_over(&mut image, GHOST_FADE as f32);
+        self.flexible.lay_over(&mut image);
+        self.ghost.outline(|x, y, share| image.blend(x, y, GHOST_LINE, 0.8 * share));
         image
     }
 }
@@ -493,9 +485,15 @@ fn rod(link: usize, from: &Vector3<f64>, to: &Vector3<f64>, radius: f64) -> Opti
 struct Skin {
     positions: Vec<Vector3<f64>>,
     triangles: Vec<[u32; 3]>,
+    /// At the corners of each triangle; of skins that are drawn.
+    normals: Vec<[Vector3<f64>; 3]>,
 }
 
 impl Skin {
+    fn with_normals(self) -> Self {
+        Self { normals: corner_normals(&self.positions, &self.triangles), ..self }
+    }
+
     fn rigid(bodies: &[Body], twin: &TwinSample) -> Self {
         let mut skin = Self::default();
         for body in bodies {

@@ -57,34 +57,50 @@ impl BendLine {
         self.along[self.along.len() - 1]
     }
 
-    /// Where a point of the undeformed link is (link axes), the stations being moved to `moved` (in the link, turned from the
-    /// link's axes).
+    /// The line with its stations moved to `moved` (in the link, turned from the link's axes).
     #[must_use]
-    pub fn deformed(&self, point: &Vector3<f64>, moved: &[Pose]) -> Vector3<f64> {
-        self.section(self.place(point), moved).transform_point(&Point3::from(*point)).coords
+    pub fn bent<'a>(&'a self, moved: &'a [Pose]) -> BentLine<'a> {
+        let end = |(X, station): (&Pose, &Vector3<f64>)| {
+            (X.translation.vector - station, rotation_vector(X.rotation.matrix()))
+        };
+        BentLine { line: self, moved, ends: moved.iter().zip(&self.stations).map(end).collect() }
+    }
+}
+
+/// A line whose stations have moved.
+#[derive(Clone, Debug)]
+pub struct BentLine<'a> {
+    line: &'a BendLine,
+    moved: &'a [Pose],
+    /// Of each station its displacement and its rotation vector (link axes).
+    ends: Vec<(Vector3<f64>, Vector3<f64>)>,
+}
+
+impl BentLine<'_> {
+    /// Where a point of the undeformed link is (link axes).
+    #[must_use]
+    pub fn deformed(&self, point: &Vector3<f64>) -> Vector3<f64> {
+        self.section(self.line.place(point)).transform_point(&Point3::from(*point)).coords
     }
 
-    /// The motion of the section at `s` metres along the line (link axes), the stations being moved to `moved`.
+    /// The motion of the section at `s` metres along the line (link axes).
     #[must_use]
-    pub fn section(&self, s: f64, moved: &[Pose]) -> Pose {
-        let last = self.stations.len() - 1;
-        let rigid = |k: usize| moved[k] * Translation3::from(-self.stations[k]);
+    pub fn section(&self, s: f64) -> Pose {
+        let BendLine { stations, along, .. } = self.line;
+        let last = stations.len() - 1;
+        let rigid = |k: usize| self.moved[k] * Translation3::from(-stations[k]);
         if s <= 0.0 {
             return rigid(0);
         }
-        if s >= self.along[last] {
+        if s >= along[last] {
             return rigid(last);
         }
-        let k = self.along.partition_point(|place| *place <= s).clamp(1, last) - 1;
-        let ends = [k, k + 1].map(|k| {
-            let angle = rotation_vector(moved[k].rotation.matrix());
-            (moved[k].translation.vector - self.stations[k], angle)
-        });
-        let [(u0, theta0), (u1, theta1)] = ends;
-        let line = self.stations[k + 1] - self.stations[k];
+        let k = along.partition_point(|place| *place <= s).clamp(1, last) - 1;
+        let [(u0, theta0), (u1, theta1)] = [self.ends[k], self.ends[k + 1]];
+        let line = stations[k + 1] - stations[k];
         let length = line.norm();
         let direction = line / length;
-        let x = (s - self.along[k]) / (self.along[k + 1] - self.along[k]);
+        let x = (s - along[k]) / (along[k + 1] - along[k]);
         // Slopes of the deflection across the line, per unit of x.
         let (slope0, slope1) = (theta0.cross(&line), theta1.cross(&line));
         let across = |v: Vector3<f64>| v - direction * direction.dot(&v);
@@ -102,7 +118,7 @@ impl BendLine {
         let stretch = direction * mixed(&u0, &u1);
         let twist = direction * mixed(&theta0, &theta1);
         let turn = Rotation3::from_scaled_axis(direction.cross(&(slope / length)) + twist);
-        let middle = self.stations[k] + line * x;
+        let middle = stations[k] + line * x;
         Pose::from_parts(Translation3::from(middle + stretch + deflection - turn * middle), turn)
     }
 }
@@ -152,7 +168,8 @@ impl BentMesh {
 
     /// Corners in link axes (m), the stations being moved to `moved` (poses in the link).
     pub fn positions<'a>(&'a self, moved: &[Pose]) -> impl Iterator<Item = [f32; 3]> + 'a {
-        let at = |k: usize| self.line.section(self.line.length() * k as f64 / SECTIONS as f64, moved);
+        let bent = self.line.bent(moved);
+        let at = |k: usize| bent.section(self.line.length() * k as f64 / SECTIONS as f64);
         let sections: Vec<Pose> = (0..=SECTIONS).map(at).collect();
         self.mesh.positions.iter().zip(&self.places).map(move |(p, (section, share))| {
             let (point, share) = (Point3::from(p.map(f64::from)), f64::from(*share));
@@ -169,7 +186,7 @@ pub struct BentPieces {
     pub near: LinkMesh,
     /// Between the stations.
     pub middle: BentMesh,
-    /// Beyond the last station; moves by [`BendLine::section`] of the end.
+    /// Beyond the last station; moves by [`BentLine::section`] of the end.
     pub far: LinkMesh,
 }
 
@@ -259,7 +276,7 @@ mod tests {
         for k in 0..=10 {
             let x = 0.1 * f64::from(k);
             let truth = v_end * (3.0 * x * x - x * x * x) / 2.0;
-            let p = line.deformed(&Vector3::new(0.2 + L * x, 0.0, 0.0), &moved);
+            let p = line.bent(&moved).deformed(&Vector3::new(0.2 + L * x, 0.0, 0.0));
             assert!((p.y - truth).abs() < 1e-15, "at {x}: {} beside {truth}", p.y);
         }
     }
@@ -272,7 +289,7 @@ mod tests {
         let moved = [pose([0.0; 3], [0.0; 3]), pose([0.5, 0.01, 0.12], [0.05, -0.1, 0.1]), far];
         for p in [[1.0, 0.0, 0.2], [1.2, 0.1, 0.3], [1.1, -0.4, 0.9]].map(Vector3::from) {
             let truth = far * nalgebra::Point3::from(p - Vector3::new(1.0, 0.0, 0.2));
-            assert!((line.deformed(&p, &moved) - truth.coords).norm() < 1e-12);
+            assert!((line.bent(&moved).deformed(&p) - truth.coords).norm() < 1e-12);
         }
     }
 
@@ -289,7 +306,7 @@ mod tests {
         });
         for p in [[0.1, 0.2, 0.0], [0.5, -0.1, 0.2], [0.9, 0.0, -0.1]].map(Vector3::from) {
             let truth = X * nalgebra::Point3::from(p);
-            let error = (line.deformed(&p, &moved) - truth.coords).norm();
+            let error = (line.bent(&moved).deformed(&p) - truth.coords).norm();
             assert!(error < 1e-7, "{error:e}"); // second order in the angle
         }
     }
@@ -304,7 +321,7 @@ mod tests {
         let bent = BentMesh::new(&mesh, &bend).unwrap();
         let moved = [pose([0.0; 3], [0.0; 3]), pose([1.0, 0.1, -0.05], [0.2, 0.1, 0.15])];
         for (p, found) in bent.mesh.positions.iter().zip(bent.positions(&moved)) {
-            let truth = bent.line().deformed(&Vector3::from(p.map(f64::from)), &moved);
+            let truth = bent.line().bent(&moved).deformed(&Vector3::from(p.map(f64::from)));
             let error = (Vector3::from(found.map(f64::from)) - truth).norm();
             let bound = if p[0] >= 1.0 || p[0] <= 0.0 { 2e-7 } else { 5e-5 };
             assert!(error < bound, "at {}: {error:e}", p[0]); // single precision; 1e-4 of the deflection between

@@ -31,6 +31,11 @@ fn file_id(path: &Path) -> Option<FileId> {
     Some(id)
 }
 
+/// To ask takes as long as to begin a run: only where there are files.
+fn several_processors() -> bool {
+    std::thread::available_parallelism().is_ok_and(|processors| processors.get() > 1)
+}
+
 impl RecorderSet {
     /// An empty set: every call succeeds and writes nothing.
     #[must_use]
@@ -64,7 +69,7 @@ impl RecorderSet {
     pub fn begin(&mut self, header: &RunHeader) -> Result<(), LogError> {
         self.check()?;
         let new: Vec<PathBuf> = self.paths().filter(|path| !path.exists()).map(Path::to_owned).collect();
-        let begun = self.all(|recorder| recorder.begin(header));
+        let begun = self.begin_all(header);
         if begun.is_err() {
             self.recorders.clear(); // closes the files
             for path in new {
@@ -76,13 +81,26 @@ impl RecorderSet {
         Ok(())
     }
 
+    /// Surfaces and files of the robot are much to write: each recorder begins on a thread of its own.
+    fn begin_all(&mut self, header: &RunHeader) -> Result<(), LogError> {
+        if self.recorders.len() < 2 || !several_processors() {
+            return self.all(|recorder| recorder.begin(header));
+        }
+        std::thread::scope(|scope| {
+            let recorders = self.recorders.iter_mut();
+            let threads: Vec<_> = recorders.map(|recorder| scope.spawn(move || recorder.begin(header))).collect();
+            let joined = |thread: std::thread::ScopedJoinHandle<'_, _>| {
+                thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+            };
+            threads.into_iter().map(joined).fold(Ok(()), Result::and)
+        })
+    }
+
     /// Has each file written on a thread of its own from here on, after [`RecorderSet::begin`]. The files get the same bytes.
     ///
     /// Where there is one processor, nothing changes.
     pub fn on_threads(&mut self) {
-        // To ask how many processors there are takes as long as to begin a run.
-        let several = || std::thread::available_parallelism().is_ok_and(|processors| processors.get() > 1);
-        if self.threads.is_none() && !self.recorders.is_empty() && several() {
+        if self.threads.is_none() && !self.recorders.is_empty() && several_processors() {
             self.threads = Some(Threads::start(std::mem::take(&mut self.recorders)));
         }
     }
@@ -98,7 +116,15 @@ impl RecorderSet {
         }
     }
 
-    /// Adds the result to all files and closes them.
+    /// Has the threads add the result and close their files, and does not wait for that; [`RecorderSet::finish`] does. Without
+    /// threads nothing happens yet.
+    pub fn begin_to_finish(&mut self, result: &RunResult) {
+        if let Some(threads) = &mut self.threads {
+            threads.close(result);
+        }
+    }
+
+    /// Adds the result to all files and closes them, unless [`RecorderSet::begin_to_finish`] did; then the result is that one's.
     ///
     /// # Errors
     /// The first error of a recorder; [`LogError::Gone`] if files are no longer where they were made: what was written

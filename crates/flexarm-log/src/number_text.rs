@@ -13,11 +13,16 @@ const SMALL: f64 = 1e-4;
 
 /// Adds what `{value:?}` is.
 pub(crate) fn push_number(text: &mut Vec<u8>, value: f64) {
+    if value == 0.0 {
+        // Of a spring that turns about one axis most numbers are.
+        text.extend_from_slice(if value.is_sign_negative() { b"-0.0" } else { b"0.0" });
+        return;
+    }
     let size = value.abs();
     let mut buffer = zmij::Buffer::new();
-    if value != 0.0 && binary_digits(value) <= MOST_BINARY_DIGITS {
+    if binary_digits(value) <= MOST_BINARY_DIGITS {
         let _ = write!(text, "{value:?}"); // memory does not fail
-    } else if value == 0.0 || size >= SMALL {
+    } else if size >= SMALL {
         text.extend_from_slice(buffer.format_finite(value).as_bytes());
     } else {
         push_with_exponent(text, buffer.format_finite(value).as_bytes());
@@ -40,18 +45,35 @@ fn push_with_exponent(text: &mut Vec<u8>, written: &[u8]) {
         None => (unsigned, Some(0_i32)),
     };
     let point = mantissa.iter().position(|letter| *letter == b'.').unwrap_or(mantissa.len());
-    let digits: Vec<u8> = mantissa.iter().copied().filter(u8::is_ascii_digit).collect();
-    let leading = digits.iter().take_while(|digit| **digit == b'0').count();
-    let trailing = digits.iter().rev().take_while(|digit| **digit == b'0').count();
-    let digits = &digits[leading..digits.len() - trailing];
-    let power = exponent.unwrap_or(0) + point as i32 - leading as i32 - 1;
     text.extend_from_slice(&written[..written.len() - unsigned.len()]);
-    text.push(digits[0]);
-    if digits.len() > 1 {
-        text.push(b'.');
-        text.extend_from_slice(&digits[1..]);
+    // The digits from the first that is not zero on, a point behind it.
+    let start = text.len();
+    let digits = mantissa.iter().filter(|letter| letter.is_ascii_digit());
+    let mut leading = 0;
+    for digit in digits {
+        match (text.len() == start, *digit) {
+            (true, b'0') => leading += 1,
+            (true, _) => text.extend_from_slice(&[*digit, b'.']),
+            (false, _) => text.push(*digit),
+        }
     }
-    let _ = write!(text, "e{power}");
+    while text.ends_with(b"0") {
+        text.pop();
+    }
+    if text.ends_with(b".") {
+        text.pop();
+    }
+    let power = exponent.unwrap_or(0) + point as i32 - leading - 1;
+    text.push(b'e');
+    if power < 0 {
+        text.push(b'-');
+    }
+    let power = power.unsigned_abs();
+    for unit in [100, 10, 1] {
+        if power >= unit || unit == 1 {
+            text.push(b'0' + (power / unit % 10) as u8);
+        }
+    }
 }
 
 #[cfg(test)]

@@ -39,6 +39,12 @@ impl TailFile {
         self.written + self.pending.len() as u64
     }
 
+    /// Number of committed bytes that are not in the file yet.
+    #[cfg(feature = "mcap")]
+    pub(crate) fn pending(&self) -> usize {
+        self.pending.len()
+    }
+
     /// Whether so much is held back that a new tail should be set even before its time.
     pub(crate) fn is_full(&self) -> bool {
         self.pending.len() > ((self.written / 4) as usize).clamp(LEAST_PENDING, PENDING_LIMIT)
@@ -88,76 +94,6 @@ impl Write for TailFile {
     /// Writes out what is committed and removes the tail.
     fn flush(&mut self) -> io::Result<()> {
         self.set_tail(&[])
-    }
-}
-
-/// Writers that keep their output to themselves share the file through this handle.
-#[cfg(feature = "mcap")]
-#[derive(Clone, Debug)]
-pub(crate) struct SharedTail(std::sync::Arc<std::sync::Mutex<TailFile>>);
-
-#[cfg(feature = "mcap")]
-impl SharedTail {
-    pub(crate) fn new(file: File) -> Self {
-        Self(std::sync::Arc::new(std::sync::Mutex::new(TailFile::new(file))))
-    }
-
-    pub(crate) fn set_tail(&self, tail: &[u8]) -> io::Result<()> {
-        self.lock().set_tail(tail)
-    }
-
-    /// Committed bytes that are not in the file yet.
-    pub(crate) fn pending(&self) -> usize {
-        self.lock().pending.len()
-    }
-
-    /// Number of committed bytes.
-    pub(crate) fn position(&self) -> u64 {
-        self.lock().position()
-    }
-
-    /// Shows the committed bytes that are not in the file yet, with the place at which they will be.
-    pub(crate) fn look(&self, look: impl FnOnce(u64, &[u8])) {
-        let file = self.lock();
-        look(file.written, &file.pending);
-    }
-
-    /// See [`TailFile::is_full`].
-    pub(crate) fn is_full(&self) -> bool {
-        self.lock().is_full()
-    }
-
-    pub(crate) fn flush(&self) -> io::Result<()> {
-        self.lock().flush()
-    }
-
-    fn lock(&self) -> std::sync::MutexGuard<'_, TailFile> {
-        self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
-    }
-}
-
-#[cfg(feature = "mcap")]
-impl Write for SharedTail {
-    /// Only holds the bytes back, so a format writer never meets an error in the middle of a record.
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.lock().pending.extend_from_slice(bytes);
-        Ok(bytes.len())
-    }
-
-    /// Nothing: when bytes go to the disk is the recorder's decision, not the format writer's.
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
-}
-
-#[cfg(feature = "mcap")]
-impl Seek for SharedTail {
-    /// Only asks where the end is: committed bytes are never changed.
-    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        match to {
-            SeekFrom::Current(0) => Ok(self.lock().position()),
-            _ => Err(io::Error::new(io::ErrorKind::Unsupported, "committed bytes cannot be written again")),
-        }
     }
 }
 

@@ -62,6 +62,8 @@ pub(crate) struct Threads {
     folder: PathBuf,
     scarce: bool,
     looked: Instant,
+    /// The result is handed over.
+    closed: bool,
 }
 
 impl Threads {
@@ -81,7 +83,7 @@ impl Threads {
         let folder = folder_of(recorders.first().map_or(Path::new(""), |recorder| recorder.path())).to_owned();
         let (scarce, now) = (is_scarce(&folder), Instant::now());
         let workers = recorders.into_iter().map(start).collect();
-        Self { workers, batches, handed_over: now, folder, scarce, looked: now }
+        Self { workers, batches, handed_over: now, folder, scarce, looked: now, closed: false }
     }
 
     /// Adds one instant.
@@ -140,16 +142,24 @@ impl Threads {
         all.iter().for_each(drop);
     }
 
-    /// Writes what waits and the result; the recorders again, and what went wrong first.
-    ///
-    /// # Panics
-    /// If a recorder did.
-    pub(crate) fn finish(mut self, result: &RunResult) -> (Vec<Box<dyn Recorder>>, Result<(), LogError>) {
+    /// Hands over what waits and the result, once.
+    pub(crate) fn close(&mut self, result: &RunResult) {
+        if std::mem::replace(&mut self.closed, true) {
+            return;
+        }
         self.hand_over();
         let result = Arc::new(result.clone());
         for worker in &self.workers {
             let _ = worker.queue.send(Message::Finish(result.clone()));
         }
+    }
+
+    /// Until all is written, and the result ([`Threads::close`]); the recorders again, and what went wrong first.
+    ///
+    /// # Panics
+    /// If a recorder did.
+    pub(crate) fn finish(mut self, result: &RunResult) -> (Vec<Box<dyn Recorder>>, Result<(), LogError>) {
+        self.close(result);
         let (mut recorders, mut outcome) = (Vec::new(), Ok(()));
         for Worker { queue, thread, failed } in std::mem::take(&mut self.workers) {
             drop(queue);

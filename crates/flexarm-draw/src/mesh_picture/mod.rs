@@ -21,6 +21,7 @@ mod image;
 mod interface_sheet;
 mod legend;
 mod numbers;
+mod raster;
 pub mod scene;
 mod sheet;
 mod surface;

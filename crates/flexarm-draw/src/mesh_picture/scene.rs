@@ -8,11 +8,14 @@ use nalgebra::Vector3;
 use super::color;
 use super::draw::cover_line;
 use super::image::{Image, Rgb};
-use super::topology::corner_normals;
+use super::raster::{Facet, Nearest};
+pub use super::topology::corner_normals;
 use super::view::View;
 
 /// Samples per pixel in each direction.
 const FINE: usize = 2;
+/// Samples per pixel.
+const SAMPLES: u16 = (FINE * FINE) as u16;
 /// A step in depth that gets an outline, as a share of the size of the scene.
 const OUTLINE: f64 = 0.02;
 /// How much ink an outline has.
@@ -99,10 +102,7 @@ pub fn render(scene: &Scene<'_>, view: &View, width: usize, height: usize) -> Im
 
 /// Draws a scene over what is on an image already.
 pub fn render_over(scene: &Scene<'_>, view: &View, under: &Image) -> Image {
-    let mut canvas = Canvas::new(scene, view, [under.width, under.height]);
-    canvas.triangles(scene);
-    canvas.outline();
-    canvas.lay_over(under);
+    let mut canvas = Canvas::new(scene, view, under);
     for mark in scene.marks {
         canvas.mark(mark);
     }
@@ -110,48 +110,208 @@ pub fn render_over(scene: &Scene<'_>, view: &View, under: &Image) -> Image {
 }
 
 /// The triangles of a scene as they cover what is under them: drawn once, laid over any ground.
-pub struct Layer(Canvas);
+pub struct Layer {
+    width: usize,
+    /// What of each pixel is covered, packed; nothing takes no memory.
+    pixels: Vec<u64>,
+    /// Pixels of each row outside of which there is nothing.
+    touched: Vec<std::ops::Range<usize>>,
+}
+
+/// A row of pixels in the making: memory of its own, so that of a layer only what is covered is ever touched.
+struct OpenRow {
+    y: usize,
+    /// Outside of which there is nothing.
+    columns: std::ops::Range<usize>,
+    pixels: Vec<u64>,
+}
+
+/// What covers a pixel: sum of the colours of its covered samples, their number, and how many of them the outline runs over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Cover {
+    sum: [u16; 3],
+    count: u8,
+    lines: u8,
+}
+
+impl Cover {
+    /// What one sample adds to a packed pixel: sums of at most four of them do not run into each other.
+    fn of_sample([r, g, b]: Rgb, line: bool) -> u64 {
+        u64::from(r) << 48 | u64::from(g) << 32 | u64::from(b) << 16 | 1 << 8 | u64::from(line)
+    }
+
+    fn unpacked(pixel: u64) -> Self {
+        let sum = [(pixel >> 48) as u16, (pixel >> 32) as u16, (pixel >> 16) as u16];
+        Self { sum, count: (pixel >> 8) as u8, lines: pixel as u8 }
+    }
+
+    /// Mean of the samples, with the ground where they do not cover it.
+    fn over(self, ground: Rgb) -> Rgb {
+        let open = SAMPLES - u16::from(self.count);
+        let part = |c: usize| ((self.sum[c] + open * u16::from(ground[c])) / SAMPLES) as u8;
+        [part(0), part(1), part(2)]
+    }
+
+    /// How much of the pixel the outline covers.
+    fn outline(self) -> f32 {
+        let (paper, ink) =
+            (u16::from(color::PAPER[0]), u16::from(color::mix(color::PAPER, color::INK, OUTLINE_INK)[0]));
+        let lines = u16::from(self.lines);
+        let mean = (lines * ink + (SAMPLES - lines) * paper) / SAMPLES;
+        f32::from(paper - mean) / f32::from(paper - ink)
+    }
+}
 
 impl Layer {
-    /// Draws the triangles; marks are left out.
-    pub fn new(scene: &Scene<'_>, view: &View, width: usize, height: usize) -> Self {
-        let mut canvas = Canvas::new(scene, view, [width, height]);
-        canvas.triangles(scene);
-        canvas.outline();
-        Self(canvas)
+    /// Draws the triangles; marks are left out. `normals`: of the corners of each triangle ([`corner_normals`]).
+    pub fn new(scene: &Scene<'_>, normals: &[[Vector3<f64>; 3]], view: &View, width: usize, height: usize) -> Self {
+        let mut layer = Self { width, pixels: vec![0; width * height], touched: vec![0..0; height] };
+        let mut row = OpenRow { y: 0, columns: 0..0, pixels: vec![0; width] };
+        Samples::new(scene, view, [width, height]).each(scene, normals, |x, y, _, color, line| {
+            let (x, y) = (x / FINE, y / FINE);
+            if y != row.y {
+                layer.close(&mut row);
+                row.y = y;
+            }
+            row.columns =
+                if row.columns.is_empty() { x..x + 1 } else { row.columns.start.min(x)..row.columns.end.max(x + 1) };
+            row.pixels[x] += Cover::of_sample(color, line);
+        });
+        layer.close(&mut row);
+        layer
     }
 
-    /// The layer over an image of its size: what [`render_over`] draws, without marks.
-    pub fn over(&self, under: &Image) -> Image {
-        let mut image = under.clone();
-        for (number, pixel) in image.rgba.chunks_exact_mut(4).enumerate() {
-            let samples = self.0.samples_of(number);
-            if samples.iter().all(|at| self.0.depths[*at] == f32::NEG_INFINITY) {
-                continue;
-            }
-            for (channel, out) in pixel.iter_mut().take(3).enumerate() {
-                let ground = *out;
-                let color = |at: usize| match self.0.depths[at] {
-                    f32::NEG_INFINITY => ground,
-                    _ => self.0.colors[at][channel],
-                };
-                *out = (samples.map(|at| usize::from(color(at))).iter().sum::<usize>() / samples.len()) as u8;
+    /// Takes over a row of pixels and empties it.
+    fn close(&mut self, row: &mut OpenRow) {
+        let columns = std::mem::take(&mut row.columns);
+        self.pixels[row.y * self.width..][columns.clone()].copy_from_slice(&row.pixels[columns.clone()]);
+        row.pixels[columns.clone()].fill(0);
+        self.touched[row.y] = columns;
+    }
+
+    /// Calls with each pixel that is covered, at least in part.
+    fn each(&self, mut call: impl FnMut(usize, usize, Cover)) {
+        for (y, columns) in self.touched.iter().enumerate() {
+            for x in columns.clone() {
+                match self.pixels[y * self.width + x] {
+                    0 => {}
+                    pixel => call(x, y, Cover::unpacked(pixel)),
+                }
             }
         }
-        image
     }
 
-    /// Where the outline of the triangles runs: how much of each pixel it covers, row by row.
-    pub fn outline(&self) -> Vec<f32> {
-        let (paper, ink) = (color::PAPER, color::mix(color::PAPER, color::INK, OUTLINE_INK));
-        let full = 255.0 - f32::from(ink[0]);
-        let (width, height) = (self.0.width / FINE, self.0.height / FINE);
-        let mean = |number: usize| {
-            let samples =
-                self.0.samples_of(number).map(|at| usize::from(if self.0.lines[at] { ink } else { paper }[0]));
-            (samples.iter().sum::<usize>() / samples.len()) as u8
+    /// Lays it over an image of its size: then that is what [`render_over`] draws, without marks.
+    pub fn lay_over(&self, image: &mut Image) {
+        self.each(|x, y, cover| image.set(x, y, cover.over(image.pixel(x, y))));
+    }
+
+    /// As [`Layer::lay_over`], and of what has changed colour takes a share away again.
+    pub fn lay_faintly_over(&self, image: &mut Image, faded: f32) {
+        self.each(|x, y, cover| {
+            let ground = image.pixel(x, y);
+            let color = cover.over(ground);
+            if color != ground {
+                image.set(x, y, color);
+                image.blend(x, y, ground, faded);
+            }
+        });
+    }
+
+    /// Where the outline of the triangles runs: pixels with how much of them it covers.
+    pub fn outline(&self, mut call: impl FnMut(usize, usize, f32)) {
+        self.each(|x, y, cover| {
+            if cover.lines > 0 {
+                call(x, y, cover.outline());
+            }
+        });
+    }
+}
+
+/// The triangles of a scene at the samples of a picture.
+struct Samples {
+    view: View,
+    projected: Vec<[f64; 3]>,
+    width: usize,
+    height: usize,
+    /// Size of the scene, samples.
+    size: f64,
+}
+
+impl Samples {
+    /// For an image of this size, pixels.
+    fn new(scene: &Scene<'_>, view: &View, size: [usize; 2]) -> Self {
+        let [width, height] = size.map(|pixels| FINE * pixels);
+        let fine = FINE as f64;
+        let view = View { scale: view.scale * fine, origin: view.origin.map(|x| x * fine), ..*view };
+        let used = scene.triangles.as_flattened().iter().map(|v| scene.positions[*v as usize]);
+        let limits = used.fold(None, |limits: Option<(Vector3<f64>, Vector3<f64>)>, p| {
+            Some(limits.map_or((p, p), |(low, high)| (low.inf(&p), high.sup(&p))))
+        });
+        let size = limits.map_or(0.0, |(low, high)| (high - low).norm()) * view.scale;
+        let projected: Vec<[f64; 3]> = scene.positions.iter().map(|p| view.project(p)).collect();
+        Self { view, projected, width, height, size }
+    }
+
+    /// Calls with each sample that is covered, row by row: column, row, depth, colour, and whether the outline runs there,
+    /// which is in the colour.
+    ///
+    /// The outline of the body and of its limbs runs where it goes down a long way behind a sample's neighbours.
+    fn each(
+        &self,
+        scene: &Scene<'_>,
+        normals: &[[Vector3<f64>; 3]],
+        mut call: impl FnMut(usize, usize, f32, Rgb, bool),
+    ) {
+        let step = (OUTLINE * self.size) as f32;
+        let mut seen = Seen { number: usize::MAX, facet: Facet::default(), light: [0.0; 3], values: [0.0; 3] };
+        let corners = |number: usize| scene.triangles[number].map(|v| self.projected[v as usize]);
+        Nearest::each_row([self.width, self.height], scene.triangles.len(), corners, |nearest, y| {
+            for x in nearest.columns(y) {
+                let Some((depth, number)) = nearest.at(x, y) else { continue };
+                // Samples beside each other mostly show the same triangle.
+                if seen.number != number {
+                    seen = self.seen(scene, normals, number, [x, y]);
+                }
+                let (color, line) = (seen.color(scene, x, y), nearest.is_below_beside(x, y, depth - step));
+                let color = if line { color::mix(color, color::INK, OUTLINE_INK) } else { color };
+                call(x, y, depth, color, line);
+            }
+        });
+    }
+
+    fn seen(&self, scene: &Scene<'_>, normals: &[[Vector3<f64>; 3]], number: usize, near: [usize; 2]) -> Seen {
+        let View { right, up, toward, .. } = self.view;
+        let corners = scene.triangles[number].map(|v| v as usize);
+        let light = normals[number].map(|n| brightness(right.dot(&n), up.dot(&n), toward.dot(&n)));
+        let (values, light) = match scene.paint {
+            Paint::Faces { bright, side, .. } if bright[number] => (side, light.map(|light| 0.68 + 0.32 * light)),
+            Paint::Faces { side, .. } => (side, light),
+            Paint::Magnitude { values, .. } => (values, light),
         };
-        (0..width * height).map(|number| (255.0 - f32::from(mean(number))) / full).collect()
+        let facet = Facet::new(corners.map(|v| self.projected[v]), near).unwrap_or_default();
+        Seen { number, facet, light, values: corners.map(|v| values[v]) }
+    }
+}
+
+/// What is to be known of a triangle to colour its samples.
+struct Seen {
+    number: usize,
+    facet: Facet,
+    /// At its corners.
+    light: [f64; 3],
+    values: [f64; 3],
+}
+
+impl Seen {
+    fn color(&self, scene: &Scene<'_>, x: usize, y: usize) -> Rgb {
+        let w = self.facet.at(x, y);
+        let mean = |x: [f64; 3]| w[0] * x[0] + w[1] * x[1] + w[2] * x[2];
+        let own = match scene.paint {
+            Paint::Faces { colors, .. } => colors[self.number][usize::from(mean(self.values) > 0.0)],
+            Paint::Magnitude { peak, .. } => color::magnitude(mean(self.values) / peak),
+        };
+        lit(own, mean(self.light))
     }
 }
 
@@ -163,132 +323,23 @@ struct Canvas {
     colors: Vec<Rgb>,
     /// Nearness to the viewer, samples; minus infinity where there is nothing.
     depths: Vec<f32>,
-    /// Where the outline of the triangles runs.
-    lines: Vec<bool>,
     /// Size of the scene, samples.
     size: f64,
 }
 
 impl Canvas {
-    /// For an image of this size, pixels.
-    fn new(scene: &Scene<'_>, view: &View, size: [usize; 2]) -> Self {
-        let [width, height] = size.map(|pixels| FINE * pixels);
-        let fine = FINE as f64;
-        let view = View { scale: view.scale * fine, origin: view.origin.map(|x| x * fine), ..*view };
-        let used = scene.triangles.as_flattened().iter().map(|v| scene.positions[*v as usize]);
-        let limits = used.fold(None, |limits: Option<(Vector3<f64>, Vector3<f64>)>, p| {
-            Some(limits.map_or((p, p), |(low, high)| (low.inf(&p), high.sup(&p))))
-        });
-        let size = limits.map_or(0.0, |(low, high)| (high - low).norm()) * view.scale;
-        let samples = width * height;
-        let (colors, depths) = (vec![color::PAPER; samples], vec![f32::NEG_INFINITY; samples]);
-        Self { view, width, height, colors, depths, lines: vec![false; samples], size }
-    }
-
-    /// Puts an image where there is nothing yet.
-    fn lay_over(&mut self, under: &Image) {
-        for (at, (color, depth)) in self.colors.iter_mut().zip(&self.depths).enumerate() {
-            if *depth == f32::NEG_INFINITY {
-                *color = under.pixel(at % self.width / FINE, at / self.width / FINE);
-            }
-        }
-    }
-
-    /// Places of the samples of a pixel.
-    fn samples_of(&self, pixel: usize) -> [usize; FINE * FINE] {
-        let width = self.width / FINE;
-        let (x, y) = (FINE * (pixel % width), FINE * (pixel / width));
-        std::array::from_fn(|k| (y + k / FINE) * self.width + x + k % FINE)
-    }
-
-    fn triangles(&mut self, scene: &Scene<'_>) {
-        let View { right, up, toward, .. } = self.view;
-        let projected: Vec<[f64; 3]> = scene.positions.iter().map(|p| self.view.project(p)).collect();
-        let corners = |number: usize| scene.triangles[number].map(|v| projected[v as usize]);
-        // Which triangle is nearest; what it looks like is asked where it is seen.
-        let mut nearest = vec![u32::MAX; self.depths.len()];
-        let mut depths = std::mem::take(&mut self.depths);
-        for (triangle, number) in (0..scene.triangles.len()).zip(0_u32..) {
-            self.samples(corners(triangle), |at, depth, _| {
-                if depth as f32 > depths[at] {
-                    (depths[at], nearest[at]) = (depth as f32, number);
-                }
-            });
-        }
-        self.depths = depths;
-
+    /// The triangles of a scene over an image.
+    fn new(scene: &Scene<'_>, view: &View, under: &Image) -> Self {
+        let [width, height] = [under.width, under.height].map(|pixels| FINE * pixels);
+        let ground = |at: usize| under.pixel(at % width / FINE, at / width / FINE);
+        let mut colors: Vec<Rgb> = (0..width * height).map(ground).collect();
+        let mut depths = vec![f32::NEG_INFINITY; width * height];
+        let samples = Samples::new(scene, view, [under.width, under.height]);
         let normals = corner_normals(scene.positions, scene.triangles);
-        let mean = |w: [f64; 3], x: [f64; 3]| w[0] * x[0] + w[1] * x[1] + w[2] * x[2];
-        let light =
-            |normals: &[Vector3<f64>; 3]| normals.map(|n| brightness(right.dot(&n), up.dot(&n), toward.dot(&n)));
-        let lights: Vec<[f64; 3]> = normals.iter().map(light).collect();
-        for (at, number) in nearest.into_iter().enumerate().filter(|(_, number)| *number != u32::MAX) {
-            let number = number as usize;
-            let Some(w) = Weights::new(corners(number)).map(|of| of.at(at % self.width, at / self.width)) else {
-                continue;
-            };
-            let own = |values: &[f64]| scene.triangles[number].map(|v| values[v as usize]);
-            let light = lights[number];
-            self.colors[at] = match scene.paint {
-                Paint::Faces { colors, bright, side } => {
-                    let light = if bright[number] { light.map(|light| 0.68 + 0.32 * light) } else { light };
-                    lit(colors[number][usize::from(mean(w, own(side)) > 0.0)], mean(w, light))
-                }
-                Paint::Magnitude { values, peak } => lit(color::magnitude(mean(w, own(values)) / peak), mean(w, light)),
-            };
-        }
-    }
-
-    /// Calls with index, depth and weights of every sample in a triangle.
-    fn samples(&self, corners: [[f64; 3]; 3], mut call: impl FnMut(usize, f64, [f64; 3])) {
-        let Some(weights) = Weights::new(corners) else { return };
-        let [a, b, c] = corners;
-        let range = |k: usize, end: usize| {
-            let low = (a[k].min(b[k]).min(c[k]) - 0.5).ceil().max(0.0);
-            let high = (a[k].max(b[k]).max(c[k]) + 0.5).floor().min(end as f64).max(0.0);
-            low as usize..high as usize
-        };
-        let columns = range(0, self.width);
-        for y in range(1, self.height) {
-            let columns = if columns.len() > NARROW { weights.columns(y, columns.clone()) } else { columns.clone() };
-            for x in columns {
-                if weights.are_far_out(x, y) {
-                    continue;
-                }
-                let w = weights.at(x, y);
-                if w.iter().all(|w| *w >= -EDGE) {
-                    call(y * self.width + x, w[0] * a[2] + w[1] * b[2] + w[2] * c[2], w);
-                }
-            }
-        }
-    }
-
-    /// Darkens samples behind whose neighbours it goes down a long way: the outline of the body and of its limbs.
-    fn outline(&mut self) {
-        let step = (OUTLINE * self.size) as f32;
-        let (width, height) = (self.width as isize, self.height as isize);
-        for y in 0..height {
-            for x in 0..width {
-                let at = (y * width + x) as usize;
-                let own = self.depths[at];
-                if own == f32::NEG_INFINITY {
-                    continue;
-                }
-                let falls = |dx: isize, dy: isize| {
-                    let (x, y) = (x + dx, y + dy);
-                    let inside = (0..width).contains(&x) && (0..height).contains(&y);
-                    inside && own - self.depths[(y * width + x) as usize] > step
-                };
-                let count: u8 = [(1, 0), (-1, 0), (0, 1), (0, -1), (2, 0), (-2, 0), (0, 2), (0, -2)]
-                    .map(|(dx, dy)| u8::from(falls(dx, dy)))
-                    .iter()
-                    .sum();
-                if count > 0 {
-                    self.lines[at] = true;
-                    self.colors[at] = color::mix(self.colors[at], color::INK, OUTLINE_INK);
-                }
-            }
-        }
+        samples.each(scene, &normals, |x, y, depth, color, _| {
+            (depths[y * width + x], colors[y * width + x]) = (depth, color);
+        });
+        Self { view: samples.view, width, height, colors, depths, size: samples.size }
     }
 
     fn mark(&mut self, mark: &Mark) {
@@ -311,8 +362,12 @@ impl Canvas {
                 let projected: Vec<_> = corners.iter().map(|p| self.view.project(p)).collect();
                 let mut touched = Vec::new();
                 for k in 2..projected.len() {
-                    self.samples([projected[0], projected[k - 1], projected[k]], |at, depth, _| {
-                        touched.push((at, alpha[usize::from(!self.in_front(at, depth))]));
+                    let corners = [projected[0], projected[k - 1], projected[k]];
+                    Facet::rows(corners, self.width, &(0..self.height), |y, columns, [depth, slope]| {
+                        for (k, x) in columns.enumerate() {
+                            let at = y * self.width + x;
+                            touched.push((at, alpha[usize::from(!self.in_front(at, depth + slope * k as f64))]));
+                        }
                     });
                 }
                 // Triangles share samples on their common side.
@@ -339,6 +394,13 @@ impl Canvas {
         (depth + LIFT * self.size) as f32 >= self.depths[at]
     }
 
+    /// Places of the samples of a pixel.
+    fn samples_of(&self, pixel: usize) -> [usize; FINE * FINE] {
+        let width = self.width / FINE;
+        let (x, y) = (FINE * (pixel % width), FINE * (pixel / width));
+        std::array::from_fn(|k| (y + k / FINE) * self.width + x + k % FINE)
+    }
+
     /// Mean of the samples of each pixel.
     fn image(&self) -> Image {
         let mut image = Image::new(self.width / FINE, self.height / FINE, color::PAPER);
@@ -352,68 +414,6 @@ impl Canvas {
     }
 }
 
-/// A sample belongs to a triangle if none of its weights is below minus this.
-const EDGE: f64 = 1e-9;
-
-/// So many samples of a row are looked at one by one: that costs no more than to ask where the triangle is in it.
-const NARROW: usize = 8;
-/// A side is steep if it moves down by more than this while twice the area to it changes by as much, samples.
-const STEEP: f64 = 1e-3;
-
-/// Weights of the corners of a triangle at the samples of a picture: 1 at its own corner, 0 on the side across.
-struct Weights {
-    corners: [[f64; 3]; 3],
-    /// Twice the area, with the sign of the sense of rotation.
-    double: f64,
-    /// Twice the area of what has a weight surely below the edge, less than zero.
-    far_out: f64,
-}
-
-impl Weights {
-    /// None for a triangle without area.
-    fn new(corners: [[f64; 3]; 3]) -> Option<Self> {
-        let [a, b, c] = corners;
-        let double = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
-        (double != 0.0).then(|| Self { corners, double, far_out: -1.001 * EDGE * double.abs() })
-    }
-
-    /// Twice the areas between a sample and the sides.
-    fn areas(&self, x: usize, y: usize) -> [f64; 3] {
-        let [a, b, c] = self.corners;
-        let (px, py) = (x as f64 + 0.5, y as f64 + 0.5);
-        let area = |p: [f64; 3], q: [f64; 3]| (p[0] - px) * (q[1] - py) - (p[1] - py) * (q[0] - px);
-        [area(b, c), area(c, a), area(a, b)]
-    }
-
-    fn at(&self, x: usize, y: usize) -> [f64; 3] {
-        self.areas(x, y).map(|area| area / self.double)
-    }
-
-    /// The part of a row that may be in the triangle: one sample more on either side than the sides say.
-    fn columns(&self, y: usize, mut row: std::ops::Range<usize>) -> std::ops::Range<usize> {
-        let (py, sign) = (y as f64 + 0.5, self.double.signum());
-        let [a, b, c] = self.corners;
-        for (p, q) in [(b, c), (c, a), (a, b)] {
-            // Twice the area to a side is linear along the row: first + px slope.
-            let slope = sign * (p[1] - q[1]);
-            let first = sign * (p[0] * (q[1] - py) - q[0] * (p[1] - py));
-            let limit = (self.far_out - first) / slope - 0.5;
-            if slope > STEEP {
-                row.start = row.start.max((limit - 1.0).max(0.0) as usize);
-            } else if slope < -STEEP {
-                row.end = row.end.min((limit + 2.0).max(0.0) as usize);
-            }
-        }
-        row.start..row.end.max(row.start)
-    }
-
-    /// Whether a sample is not in the triangle, as far as that is seen without a division.
-    fn are_far_out(&self, x: usize, y: usize) -> bool {
-        let sign = self.double.signum();
-        self.areas(x, y).iter().any(|area| sign * area < self.far_out)
-    }
-}
-
 /// Light on a wall by its normal in axes of the picture: a key light from the upper left, one from the viewer.
 fn brightness(right: f64, up: f64, toward: f64) -> f64 {
     // A wall seen from behind is lit like one seen from the front.
@@ -424,5 +424,7 @@ fn brightness(right: f64, up: f64, toward: f64) -> f64 {
 
 /// A colour under light; more than full light whitens.
 fn lit(color: Rgb, light: f64) -> Rgb {
-    if light <= 1.0 { color.map(|c| (f64::from(c) * light) as u8) } else { color::mix(color, [255; 3], light - 1.0) }
+    let dimmed = |c: u8| (f64::from(c) * light) as u8;
+    let [r, g, b] = color;
+    if light <= 1.0 { [dimmed(r), dimmed(g), dimmed(b)] } else { color::mix(color, [255; 3], light - 1.0) }
 }

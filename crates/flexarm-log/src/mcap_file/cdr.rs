@@ -25,6 +25,13 @@ impl Cdr {
         &self.bytes
     }
 
+    /// Any bytes instead of a message.
+    #[cfg(test)]
+    pub(crate) fn raw(&mut self, bytes: &[u8]) {
+        self.bytes.clear();
+        self.bytes.extend_from_slice(bytes);
+    }
+
     /// `bool`, `byte` and `uint8`.
     pub(crate) fn u8(&mut self, value: u8) -> &mut Self {
         self.bytes.push(value);
@@ -61,8 +68,14 @@ impl Cdr {
 
     /// Values without a count: a fixed-size part of a message.
     pub(crate) fn f64s(&mut self, values: &[f64]) -> &mut Self {
-        for value in values {
-            self.f64(*value);
+        if values.is_empty() {
+            return self;
+        }
+        self.align::<8>();
+        let first = self.bytes.len();
+        self.bytes.resize(first + size_of_val(values), 0);
+        for (place, value) in self.bytes[first..].chunks_exact_mut(size_of::<f64>()).zip(values) {
+            place.copy_from_slice(&value.to_le_bytes());
         }
         self
     }
@@ -82,10 +95,16 @@ impl Cdr {
     }
 
     fn aligned<const N: usize>(&mut self, value: [u8; N]) -> &mut Self {
-        let used = self.bytes.len() - ENCAPSULATION.len();
-        self.bytes.resize(ENCAPSULATION.len() + used.next_multiple_of(N), 0);
-        self.bytes.extend(value);
+        self.align::<N>();
+        self.bytes.extend_from_slice(&value);
         self
+    }
+
+    /// Goes on at a multiple of `N`, which is a power of two of at most 8.
+    fn align<const N: usize>(&mut self) {
+        let used = self.bytes.len() - ENCAPSULATION.len();
+        let gap = used.wrapping_neg() % N;
+        self.bytes.extend_from_slice(&[0; 8][..gap]);
     }
 }
 

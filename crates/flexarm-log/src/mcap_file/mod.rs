@@ -2,7 +2,7 @@
 //!
 //! Profile `ros2`: CDR messages, their definitions embedded, `offered_qos_profiles` on every channel. Chunks of
 //! at most 1 MiB, compressed with zstd, are closed where the data says so; between two chunks the open one is
-//! in the file as a provisional chunk with a provisional index ([`provisional`], [`crate::tail_file`]), so that what a
+//! in the file as a provisional chunk with a provisional index ([`index`], [`crate::tail_file`]), so that what a
 //! killed run leaves is a whole MCAP file.
 //!
 //! Start at [`McapRecorder`]; topics are in [`channels`], messages in [`messages`] and [`cdr`], coordinate frames in
@@ -12,18 +12,20 @@ mod beat;
 mod bent;
 mod cdr;
 pub(crate) mod channels;
+mod chunk;
 mod definitions;
 mod frames;
+mod index;
 pub(crate) mod layouts;
 mod markers;
 mod mesh_files;
 mod messages;
 mod output;
-mod provisional;
+mod records;
 
+use std::fs::File;
+use std::io;
 use std::path::Path;
-
-use mcap::{McapError, McapResult};
 
 use self::cdr::Cdr;
 use self::channels::Channels;
@@ -35,7 +37,6 @@ use self::output::Output;
 use crate::create::FlushClock;
 use crate::file_recorder::{FileRecorder, OpenFile};
 use crate::shape::Shape;
-use crate::tail_file::SharedTail;
 use crate::{CreateOptions, EventKind, LogError, RunHeader, RunResult, START_NS, Sample, TwinSample};
 
 /// Writes a run as an MCAP file.
@@ -88,10 +89,10 @@ impl OpenFile for McapFile {
     fn begin(path: &Path, options: CreateOptions, header: &RunHeader) -> Result<Self, LogError> {
         let start = stamp(path, header.start_ns.unwrap_or(START_NS), 0.0)?;
         let meshes = mesh_files(header)?;
-        let file = SharedTail::new(options.create(path)?);
-        let error = mcap_error(path, "write the description of the run");
+        let file = options.create(path)?;
+        let error = LogError::io(path, "write the description of the run");
         let mut open = Self::new(file, header, start, options.flush_clock(path)).map_err(error)?;
-        let error = mcap_error(path, "write the description of the run");
+        let error = LogError::io(path, "write the description of the run");
         open.describe(header, &meshes).map_err(error)?;
         Ok(open)
     }
@@ -99,7 +100,7 @@ impl OpenFile for McapFile {
     fn record(&mut self, path: &Path, sample: &Sample) -> Result<(), LogError> {
         let stamp = stamp(path, self.start.0, sample.time_s)?;
         self.shape.check(path, sample)?;
-        self.sample(stamp, sample).map_err(mcap_error(path, "write a sample"))?;
+        self.sample(stamp, sample).map_err(LogError::io(path, "write a sample"))?;
         if self.flush.due() || self.output.is_full() {
             self.output.flush().map_err(LogError::io(path, "write samples"))?;
             self.flush.done();
@@ -110,7 +111,7 @@ impl OpenFile for McapFile {
     fn finish(&mut self, path: &Path, result: &RunResult) -> Result<(), LogError> {
         let times = result.events.iter().map(|event| stamp(path, self.start.0, event.time_s));
         let times = times.collect::<Result<Vec<_>, _>>()?;
-        self.end(result, &times).map_err(mcap_error(path, "write the result and the index"))
+        self.end(result, &times).map_err(LogError::io(path, "write the result and the index"))
     }
 }
 
@@ -139,9 +140,9 @@ pub struct McapFile {
 }
 
 impl McapFile {
-    fn new(file: SharedTail, header: &RunHeader, start: Stamp, flush: FlushClock) -> McapResult<Self> {
+    fn new(file: File, header: &RunHeader, start: Stamp, flush: FlushClock) -> io::Result<Self> {
         let mut output = Output::new(file)?;
-        let channels = Channels::add(&mut output, header)?;
+        let channels = Channels::add(&mut output, header);
         let parts = |names: &[String], parts: &[&str], joint: &str| -> Vec<String> {
             names.iter().flat_map(|name| parts.iter().map(move |part| format!("{name}{joint}{part}"))).collect()
         };
@@ -166,7 +167,7 @@ impl McapFile {
     }
 
     /// Everything that is known before the first sample.
-    fn describe(&mut self, header: &RunHeader, meshes: &[crate::Attachment]) -> McapResult<()> {
+    fn describe(&mut self, header: &RunHeader, meshes: &[crate::Attachment]) -> io::Result<()> {
         let (start, output) = (self.start, &mut self.output);
         if let Some(channel) = self.channels.robot_description {
             output.send(channel, 0, start, |cdr| messages::string(cdr, &header.urdf))?;
@@ -205,7 +206,7 @@ impl McapFile {
         Ok(output.flush()?)
     }
 
-    fn sample(&mut self, stamp: Stamp, sample: &Sample) -> McapResult<()> {
+    fn sample(&mut self, stamp: Stamp, sample: &Sample) -> io::Result<()> {
         let since_start = stamp.0 - self.start.0;
         let rigid = self.channels.rigid.map(|channels| (channels, &sample.rigid));
 
@@ -266,17 +267,17 @@ impl McapFile {
     }
 
     /// A message of a topic that has one of each sample.
-    fn send(&mut self, channel: u16, stamp: Stamp, write: impl FnOnce(&mut Cdr)) -> McapResult<()> {
+    fn send(&mut self, channel: u16, stamp: Stamp, write: impl FnOnce(&mut Cdr)) -> io::Result<()> {
         self.output.send(channel, self.samples, stamp, write)
     }
 
-    fn joint_states(&mut self, channel: u16, stamp: Stamp, twin: &TwinSample) -> McapResult<()> {
+    fn joint_states(&mut self, channel: u16, stamp: Stamp, twin: &TwinSample) -> io::Result<()> {
         let values = [&twin.q, &twin.qdot, &twin.effort].map(Vec::as_slice);
         self.output.send(channel, self.samples, stamp, |cdr| messages::joint_state(cdr, stamp, &self.joints, values))
     }
 
     /// Deflections and loads: one topic pair per element, and all by name for tools that plot joints.
-    fn elastic(&mut self, stamp: Stamp, sample: &Sample) -> McapResult<()> {
+    fn elastic(&mut self, stamp: Stamp, sample: &Sample) -> io::Result<()> {
         for (index, element) in sample.elastic.iter().enumerate() {
             let (channels, name) = (self.channels.elastic[index], &self.elements[index]);
             let load = |cdr: &mut Cdr| messages::six_vector_stamped(cdr, stamp, name, &element.load);
@@ -295,7 +296,7 @@ impl McapFile {
     }
 
     /// An error as a six-vector, and its translation with the norm as plain numbers.
-    fn error(&mut self, stamp: Stamp, vector: u16, plot: u16, axes: &str, error: &[f64; 6]) -> McapResult<()> {
+    fn error(&mut self, stamp: Stamp, vector: u16, plot: u16, axes: &str, error: &[f64; 6]) -> io::Result<()> {
         self.send(vector, stamp, |cdr| messages::six_vector_stamped(cdr, stamp, WORLD, error))?;
         let [x, y, z, ..] = *error;
         let norm = (x * x + y * y + z * z).sqrt();
@@ -304,7 +305,7 @@ impl McapFile {
     }
 
     /// The paths up to the last sample, unless they are in the file already.
-    fn paths(&mut self) -> McapResult<()> {
+    fn paths(&mut self) -> io::Result<()> {
         let stamp = self.last;
         let paths = self.markers.paths();
         if self.paths_at == Some(stamp) || paths.is_empty() {
@@ -318,7 +319,7 @@ impl McapFile {
     }
 
     /// The last paths, the events, the result and the index.
-    fn end(&mut self, result: &RunResult, event_times: &[Stamp]) -> McapResult<()> {
+    fn end(&mut self, result: &RunResult, event_times: &[Stamp]) -> io::Result<()> {
         self.paths()?;
         // In a chunk of their own: their times span the run, those of the chunk before need not.
         self.output.close_chunk()?;
@@ -343,12 +344,5 @@ impl Drop for McapFile {
     /// A run that was given up still gets its index; errors have nowhere to go.
     fn drop(&mut self) {
         let _ = self.output.finish();
-    }
-}
-
-fn mcap_error(path: &Path, action: &'static str) -> impl FnOnce(McapError) -> LogError {
-    move |error| match error {
-        McapError::Io(source) => LogError::io(path, action)(source),
-        other => LogError::Format { path: path.to_owned(), action, cause: other.to_string() },
     }
 }

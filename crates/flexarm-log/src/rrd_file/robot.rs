@@ -300,11 +300,11 @@ impl BentTracks {
         let (first, count) = self.stations;
         let shown = stations_in_link(twin, self.link, first, count);
         let line = self.middle.line();
-        self.far.push(when, &line.section(line.length(), &shown));
+        self.far.push(when, &line.bent(&shown).section(line.length()));
         if let (Paint::Deviation(scale), Some((middle, far))) = (look.paint, &mut self.tint) {
             let real = stations_in_link(&sample.flexible, self.link, first, count);
             let tints = tints(line, &real, sample, self.link, scale);
-            far.push(when, tints.last().copied());
+            far.push(when, [tints[TINTS - 1]]);
             middle.push(when, tints);
         }
         let still = |written: &Vec<Pose>| !moved(written, &shown, line.length(), look.tolerance_m);
@@ -331,13 +331,13 @@ fn moved(before: &[Pose], now: &[Pose], length: f64, tolerance_m: f64) -> bool {
 }
 
 /// Colours along a bent link: how far its line is from where the rigid twin has it.
-fn tints(line: &BendLine, real: &[Pose], sample: &Sample, link: usize, scale: ColorScale) -> Vec<[u8; 3]> {
+fn tints(line: &BendLine, real: &[Pose], sample: &Sample, link: usize, scale: ColorScale) -> [[u8; 3]; TINTS] {
     let (X_flexible, X_rigid) = (&sample.flexible.X_WL[link], &sample.rigid.X_WL[link]);
-    let at = |k: usize| {
+    let bent = line.bent(real);
+    std::array::from_fn(|k| {
         let s = line.length() * (k as f64 + 0.5) / TINTS as f64;
         let point = line.point(s);
-        let deviation = X_flexible * (line.section(s, real) * point) - X_rigid * point;
+        let deviation = X_flexible * (bent.section(s) * point) - X_rigid * point;
         scale.rgb(deviation.norm())
-    };
-    (0..TINTS).map(at).collect()
+    })
 }

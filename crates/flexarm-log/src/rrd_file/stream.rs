@@ -9,6 +9,7 @@ use std::fs::File;
 use std::io::{self, Write};
 
 use crate::rerun::Span;
+use crate::rerun::arrow::array::RecordBatch;
 use crate::rerun::arrow::datatypes::Schema;
 use crate::rerun::{AsComponents, EntityPath, SerializationError, SerializedComponentColumn, StoreId, TimePoint};
 use crate::rerun::{Chunk, ChunkComponents, ChunkError, ChunkId, LogMsg, RowId, TimeColumn};
@@ -16,7 +17,7 @@ use re_log_encoding::{
     CodecError, CrateVersion, Encodable, EncodingOptions, MessageHeader, MessageKind, RRD_FOURCC, RawRrdManifest,
     RrdFooter, RrdManifestBuilder, StreamFooter, StreamHeader, ToTransport,
 };
-use re_log_types::{BlueprintActivationCommand, SetStoreInfo, StoreInfo, StoreSource};
+use re_log_types::{ArrowMsg, BlueprintActivationCommand, SetStoreInfo, StoreInfo, StoreSource};
 use re_tuid::Tuid;
 
 use crate::tail_file::TailFile;
@@ -98,16 +99,16 @@ struct Manifest {
 const MOST_LISTED: usize = 10_000;
 
 impl Manifest {
-    fn append(&mut self, chunk: &Chunk, span: Span<u64>, uncompressed: u64) -> Result<()> {
-        let batch = chunk.to_chunk_batch()?;
+    /// `add`: puts a chunk into a list.
+    fn append(&mut self, add: impl Fn(&mut RrdManifestBuilder) -> std::result::Result<(), CodecError>) -> Result<()> {
         self.chunks += 1;
         if self.is_listed() {
-            self.since.append(&batch, span, uncompressed)?;
+            add(&mut self.since)?;
             self.new += 1;
         } else {
             (self.before, self.since, self.new) = Default::default();
         }
-        Ok(self.all.append(&batch, span, uncompressed)?)
+        Ok(add(&mut self.all)?)
     }
 
     fn is_listed(&self) -> bool {
@@ -178,13 +179,15 @@ impl RrdStream {
     /// Adds a chunk for good.
     pub(crate) fn append(&mut self, store: &StoreId, chunk: &Chunk) -> Result<()> {
         let start = self.file.position() + MessageHeader::ENCODED_SIZE_BYTES as u64;
-        let (bytes, uncompressed) = encode(&LogMsg::ArrowMsg(store.clone(), chunk.to_arrow_msg()?))?;
+        // Made once, for the message and for the list.
+        let batch = chunk.to_chunk_batch()?;
+        let (bytes, uncompressed) = encode(&arrow_message(store, chunk, (&batch).into()))?;
         self.file.write_all(&bytes)?;
 
         let span = Span::from_start_end(start, self.file.position());
         let manifest = self.manifests.iter_mut().find(|(known, _)| known == store);
         let (_, manifest) = manifest.expect("a store is opened before chunks are added to it");
-        manifest.append(chunk, span, uncompressed)
+        manifest.append(|list| list.append(&batch, span, uncompressed))
     }
 
     /// Writes out everything, with these chunks as the provisional end, and a footer: what a killed run leaves is a whole
@@ -194,10 +197,11 @@ impl RrdStream {
         let (mut tail, mut builder) = (Vec::new(), RrdManifestBuilder::default());
         for chunk in chunks {
             let start = position + (tail.len() + MessageHeader::ENCODED_SIZE_BYTES) as u64;
-            let (bytes, uncompressed) = encode(&LogMsg::ArrowMsg(store.clone(), chunk.to_arrow_msg()?))?;
+            let batch = chunk.to_chunk_batch()?;
+            let (bytes, uncompressed) = encode(&arrow_message(store, chunk, (&batch).into()))?;
             tail.extend(bytes);
             let span = Span::from_start_end(start, position + tail.len() as u64);
-            builder.append(&chunk.to_chunk_batch()?, span, uncompressed)?;
+            builder.append(&batch, span, uncompressed)?;
         }
         if self.manifests.iter().any(|(_, manifest)| !manifest.is_listed()) {
             return Ok(self.file.set_tail(&tail)?);
@@ -241,6 +245,11 @@ fn end(manifests: Vec<RawRrdManifest>, position: u64) -> Result<Vec<u8>> {
     end.extend(&payload);
     StreamFooter::from_rrd_footer_bytes(payload_start, &payload).to_rrd_bytes(&mut end)?;
     Ok(end)
+}
+
+/// The message that brings a chunk.
+fn arrow_message(store: &StoreId, chunk: &Chunk, batch: RecordBatch) -> LogMsg {
+    LogMsg::ArrowMsg(store.clone(), ArrowMsg { chunk_id: chunk.id().as_tuid(), batch, on_release: None })
 }
 
 /// A message with its header, and its size without compression.

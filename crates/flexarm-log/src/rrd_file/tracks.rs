@@ -110,21 +110,24 @@ impl Track for PoseTrack {
 pub(crate) struct TintTrack {
     path: EntityPath,
     times: Times,
-    strips: Vec<Vec<u8>>,
+    /// Strip after strip, each as long as the last one.
+    strips: Vec<u8>,
     last: Vec<u8>,
+    next: Vec<u8>,
 }
 
 impl TintTrack {
     pub(crate) fn new(path: EntityPath) -> Self {
-        Self { path, times: Times::default(), strips: Vec::new(), last: Vec::new() }
+        Self { path, times: Times::default(), strips: Vec::new(), last: Vec::new(), next: Vec::new() }
     }
 
     pub(crate) fn push(&mut self, when: Instant, colors: impl IntoIterator<Item = [u8; 3]>) {
-        let strip: Vec<u8> = colors.into_iter().flatten().collect();
-        if self.last != strip {
+        self.next.clear();
+        self.next.extend(colors.into_iter().flatten());
+        if self.last != self.next {
             self.times.push(when);
-            self.strips.push(strip.clone());
-            self.last = strip;
+            self.strips.extend_from_slice(&self.next);
+            std::mem::swap(&mut self.last, &mut self.next);
         }
     }
 
@@ -139,7 +142,7 @@ impl Track for TintTrack {
         if self.times.rows() == 0 {
             return Ok(None);
         }
-        let strips = self.strips.iter().map(|strip| ImageBuffer(strip.clone().into()));
+        let strips = self.strips.chunks_exact(self.last.len()).map(|strip| ImageBuffer(strip.to_vec().into()));
         let mesh = Mesh3D::update_fields().with_many_albedo_texture_buffer(strips);
         ids.columns(&self.path, &self.times.columns(), mesh.columns_of_unit_batches()?).map(Some)
     }

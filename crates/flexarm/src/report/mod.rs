@@ -32,10 +32,14 @@ fn title(summary: &Summary) -> String {
     }
 }
 
-/// Writes report, figures and `summary.json` into the output folder.
-pub(crate) fn write(outputs: &Outputs, summary: &Summary, trace: &Trace) -> Result<(), Error> {
-    let label = title(summary);
-    write_page(outputs, summary, &html(&[ReportRun { label: &label, summary, trace }]))?;
+/// The report of a run.
+pub(crate) fn page(summary: &Summary, trace: &Trace) -> String {
+    html(&[ReportRun { label: &title(summary), summary, trace }])
+}
+
+/// Writes the report, figures and `summary.json` into the output folder.
+pub(crate) fn write(outputs: &Outputs, summary: &Summary, trace: &Trace, page: &str) -> Result<(), Error> {
+    write_page(outputs, summary, page)?;
     match outputs.figures {
         true => figures::write(&outputs.folder.join(FIGURES_FOLDER), summary, trace),
         false => Ok(()),

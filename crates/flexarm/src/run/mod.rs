@@ -180,9 +180,12 @@ pub(crate) fn run_traced(
     summary.cpu_s_per_simulated_s = summary.cpu_s / summary.duration_s.max(1e-9);
     summary.files = files.names.clone();
     run.trace.finish(if wanted < Wanted::Curves { RunResult::default() } else { result(&summary, events) });
+    // The page is made while the recordings are closed.
+    files.set.begin_to_finish(&run.trace.result);
+    let page = outputs.map(|_| crate::report::page(&summary, &run.trace));
     let closed = files.set.finish(&run.trace.result).map_err(Error::from);
-    let reported =
-        closed.and_then(|()| outputs.map_or(Ok(()), |outputs| crate::report::write(outputs, &summary, &run.trace)));
+    let write = |(outputs, page): (_, String)| crate::report::write(outputs, &summary, &run.trace, &page);
+    let reported = closed.and_then(|()| outputs.zip(page).map_or(Ok(()), write));
     how_it_ended(end, reported).map(|()| (summary, run.trace))
 }
 

@@ -4,7 +4,7 @@ use flexarm_log::EventKind;
 
 use super::ReportRun;
 use super::figures::lies_on_twin;
-use super::number::short;
+use super::number::{push_short, short};
 use crate::html_page::escaped;
 use crate::report::curves::{Kind, Plot, overlays};
 
@@ -63,7 +63,14 @@ fn json_text(text: &str) -> String {
 }
 
 fn json_plot(plot: &Plot) -> String {
-    let numbers = |values: &[f64], digits| values.iter().map(|x| short(*x, digits)).collect::<Vec<_>>().join(",");
+    let numbers = |values: &[f64], digits| {
+        let mut text = String::with_capacity(8 * values.len());
+        for (k, x) in values.iter().enumerate() {
+            text.push_str(if k > 0 { "," } else { "" });
+            push_short(&mut text, *x, digits);
+        }
+        text
+    };
     let views = plot.views.iter().map(|view| {
         let tables = view.tables.iter().map(|table| {
             let curves = table.curves.iter().map(|curve| {

@@ -71,15 +71,21 @@ pub fn html(runs: &[ReportRun<'_>]) -> String {
         escaped(&title),
         colors()
     );
-    let drawn: Vec<Vec<Plot>> = runs.iter().map(|run| plots(run.summary, run.trace)).collect();
-    let body = body(main, runs, &thinning(runs, &drawn));
+    // The arm is drawn while the plots are written.
+    let (arm, drawn, data) = std::thread::scope(|scope| {
+        let arm = scope.spawn(|| arm_pictures(runs));
+        let drawn: Vec<Vec<Plot>> = runs.iter().map(|run| plots(run.summary, run.trace)).collect();
+        let data = data(runs, &drawn);
+        (arm.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)), drawn, data)
+    });
+    let body = body(main, runs, &arm, &thinning(runs, &drawn));
     page += &heading(&title, runs, &body);
     let _ = write!(page, "<main>\n{body}</main>\n");
     let _ = write!(
         page,
         "<script type=\"application/json\" id=\"data\">{}</script>\n\
          <script>\n/* uPlot {UPLOT_VERSION}\n\n{}\n*/\n{}</script>\n<script>\n{BEHAVIOUR}</script>\n</body>\n</html>\n",
-        data(runs, &drawn),
+        data,
         UPLOT_LICENSE.trim(),
         uplot.trim_start()
     );
@@ -103,14 +109,14 @@ fn colors() -> String {
     )
 }
 
-fn body(main: &ReportRun<'_>, runs: &[ReportRun<'_>], thinning: &str) -> String {
+fn body(main: &ReportRun<'_>, runs: &[ReportRun<'_>], arm: &str, thinning: &str) -> String {
     let mut body: String = runs.iter().map(|run| troubles(run, runs.len() > 1)).collect();
     if let [run] = runs {
         body += &tiles(run);
     } else {
         body += &comparison(runs);
     }
-    body += &arm_pictures(runs);
+    body += arm;
     body += &tool_path(main);
     body += "<section id=\"plots\"><noscript><p>The plots need JavaScript.</p></noscript></section>\n";
     body += thinning;
