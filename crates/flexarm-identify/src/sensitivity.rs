@@ -31,7 +31,9 @@ pub(crate) fn force_slopes(at: &mut OperatingPoint, parameters: &[Parameter]) ->
                     }
                     let element = &arm.elements[place.spring];
                     let first = arm.offset(element);
-                    let e = &e[first..first + element.size];
+                    // A spring of one coordinate is turned by the error of its transmission as well.
+                    let turned = arm.deflection(place.spring, e[first], at.coordinates().as_slice());
+                    let e = if element.size == 1 { &[turned] } else { &e[first..first + element.size] };
                     let f = match &element.curve {
                         Some(_) => element.spring_force(e),
                         None => slope_of(&element.K, place.coordinate) * DVector::from_column_slice(e),

@@ -317,8 +317,8 @@ impl FlexibleArm {
         self.hysteresis.iter().map(of_law).fold(0.0, f64::max)
     }
 
-    /// Deflection δ of a spring of one coordinate e, with the joints at `q`.
-    pub(crate) fn deflection(&self, element: usize, e: f64, q: &[f64]) -> f64 {
+    /// Deflection δ of a spring of one coordinate e (rad, m), with the joints at `q`: e less the transmission error, if there is one.
+    pub fn deflection(&self, element: usize, e: f64, q: &[f64]) -> f64 {
         let errors = self.transmission.iter().filter(|error| error.element == element);
         errors.fold(e, |delta, error| delta - error.at(q[error.motor]))
     }
