@@ -175,7 +175,7 @@ pub(crate) fn link_frames(robot: &Robot, model: &Model) -> Vec<Frame> {
 const AS_FILED: &str = "as the robot file says";
 
 /// A path for people: without `folder/..` in it. The file system is not asked, so that the answer is the same anywhere.
-fn straight(path: &Path) -> String {
+pub(crate) fn straight(path: &Path) -> String {
     let mut parts: Vec<Component<'_>> = Vec::new();
     for part in path.components() {
         match (part, parts.last()) {

@@ -278,7 +278,7 @@ fn attempt(
     let curves = job.times.iter().zip(before.distance.iter().zip(&after.distance)).map(|(t, (a, b))| [*t, *a, *b]);
     let mut answer = Compensation {
         robot: robot.name.clone(),
-        motion: scenario.motion.path.display().to_string(),
+        motion: crate::record::straight(&scenario.motion.path),
         method: if request.method == Method::Dynamic { "dynamic" } else { "static" },
         before: before.figures,
         after: after.figures,
