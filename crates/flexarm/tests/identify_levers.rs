@@ -143,14 +143,14 @@ fn dampers_of_coupled_motors_are_found_from_the_response_of_the_arm_that_has_the
         let H = again.response(0, 1, Answer::Accelerance, &omega).unwrap().values;
         DVector::from_iterator(2 * H.len(), H.iter().flat_map(|h| [h.re, h.im]))
     };
-    for k in 0..3 {
+    for (k, parameter) in parameters.iter().enumerate() {
         let d = |h: f64| (at(k, h) - at(k, -h)) / (2.0 * h);
         let (a, b, c) = (d(0.1), d(0.05), d(0.025));
         let (ab, bc) = ((&b * 4.0 - &a) / 3.0, (&c * 4.0 - &b) / 3.0);
         let truth = (bc * 16.0 - ab) / 15.0;
         let own = DVector::from_iterator(2 * omega.len(), slopes.column(k).iter().flat_map(|h| [h.re, h.im]));
         let error = (own - &truth).amax() / truth.amax();
-        eprintln!("{}: {error:.1e} of {:.1e}", parameters[k].name, truth.amax());
+        eprintln!("{}: {error:.1e} of {:.1e}", parameter.name, truth.amax());
         assert!(error < 1e-8, "{k}: {error:e}");
     }
     let truth = [0.4, -0.3, 0.25];

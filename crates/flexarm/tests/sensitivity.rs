@@ -216,11 +216,11 @@ impl Changed {
         let robot = Robot::load(&file).unwrap();
         let motion_file = Motion::load(place(&format!("trajectories/{motion}.toml")), &robot).unwrap();
         let parameters = all.iter().map(|own| own.name.to_owned()).collect();
-        let table = Some(self.folder.join("slopes.csv"));
-        let request = SensitivityRequest { run: run.clone(), parameters, table: table.clone(), overwrite: true };
+        let table = self.folder.join("slopes.csv");
+        let request = SensitivityRequest { run: run.clone(), parameters, table: Some(table.clone()), overwrite: true };
         let found = sensitivity(&robot, &motion_file, &request).unwrap();
         assert_eq!(found.parameters.len(), all.len());
-        let table = std::fs::read_to_string(table.unwrap()).unwrap();
+        let table = std::fs::read_to_string(table).unwrap();
         let mut lines = table.lines();
         let head: Vec<&str> = lines.next().unwrap().split(',').collect();
         let rows: Vec<Vec<f64>> = lines.map(|row| row.split(',').map(|x| x.parse().unwrap()).collect()).collect();

@@ -203,7 +203,7 @@ impl McapFile {
         for file in urdf.iter().chain(meshes).chain(&header.attachments).chain(&crate::run_json::files(header)?) {
             output.attach(start, file)?;
         }
-        Ok(output.flush()?)
+        output.flush()
     }
 
     fn sample(&mut self, stamp: Stamp, sample: &Sample) -> io::Result<()> {
