@@ -186,7 +186,7 @@ pub struct BentPieces {
     pub near: LinkMesh,
     /// Between the stations.
     pub middle: BentMesh,
-    /// Beyond the last station; moves by [`BentLine::section`] of the end.
+    /// Beyond the last station; moves by `section` of the end.
     pub far: LinkMesh,
 }
 
