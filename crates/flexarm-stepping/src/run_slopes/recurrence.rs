@@ -271,16 +271,7 @@ impl<'a> Recurrence<'a> {
         system.evaluate(0.0, &now.x, &now.v, &at_rest);
         tangent.compute(&system.arm, 0.0, &system.data, &system.state, &system.qddot, system.gears.as_deref());
         mass_matrix_at_poses(&system.arm.model, &mut system.data);
-        let at = Look {
-            arm: &system.arm,
-            data: &system.data,
-            x: now.x.as_slice(),
-            v: now.v.as_slice(),
-            free: &system.free,
-            rates: system.state.qdot.as_slice(),
-            gears: system.gears.as_deref(),
-            changes: system.events.changes_over(),
-        };
+        let at = Look::at(system, now);
         for (p, direction) in directions.iter().enumerate() {
             own.fill(0.0);
             tangent.add_explicit(&at, (p, direction), room, own);
@@ -326,16 +317,7 @@ impl<'a> Recurrence<'a> {
         let Self { system, integrator, tangent, directions, joints, rhs, room, own, servo, .. } = self;
         let now = Integrator::current(integrator);
         rhs.fill(0.0);
-        let at = Look {
-            arm: &system.arm,
-            data: &system.data,
-            x: now.x.as_slice(),
-            v: now.v.as_slice(),
-            free: &system.free,
-            rates: system.state.qdot.as_slice(),
-            gears: system.gears.as_deref(),
-            changes: system.events.changes_over(),
-        };
+        let at = Look::at(system, now);
         for (k, direction) in directions.iter().enumerate() {
             own.fill(0.0);
             tangent.add_explicit(&at, (k, direction), room, own);

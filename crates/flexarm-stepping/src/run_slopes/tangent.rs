@@ -5,6 +5,8 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::arm::FlexibleArm;
 use crate::gear::GearState;
+use crate::integrator::Current;
+use crate::reduced::ReducedArm;
 use crate::run_slopes::forces::ForceTangent;
 use crate::run_slopes::gears::GearSlopes;
 use crate::run_slopes::{Direction, SpringSlope};
@@ -47,6 +49,22 @@ pub(super) struct Look<'a> {
     pub(super) gears: Option<&'a GearState>,
     /// Changes of inertia that are over.
     pub(super) changes: usize,
+}
+
+impl<'a> Look<'a> {
+    /// At the state of an integrator, which the system was evaluated at last.
+    pub(super) fn at(system: &'a ReducedArm, now: &'a Current) -> Self {
+        Self {
+            arm: &system.arm,
+            data: &system.data,
+            x: now.x.as_slice(),
+            v: now.v.as_slice(),
+            free: &system.free,
+            rates: system.state.qdot.as_slice(),
+            gears: system.gears.as_deref(),
+            changes: system.events.changes_over(),
+        }
+    }
 }
 
 impl Tangent {
