@@ -26,7 +26,7 @@ use crate::steppers::{Method, StepRule, StepperEntry, StepperKind, StepperSettin
 pub(super) static ENTRY: StepperEntry = StepperEntry {
     name: "extrapolated-alpha",
     aliases: &["extrapolated"],
-    help: "Generalised-alpha with the step and its half, extrapolated: third order and more, for errors below 0.1 %",
+    help: "Generalised-alpha with the step and its half, extrapolated: third order and more, for errors below 0.01 %",
     steps: StepRule::AnyLength,
     order: 3,
     maximal: false,
