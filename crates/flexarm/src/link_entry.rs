@@ -150,8 +150,12 @@ fn matrix6(
     let name = entry.link.get_ref();
     let fail = |message: String| Err(source.error(given.span(), format!("stiffness of link {name:?}: {message}")));
     let rows = given.get_ref();
-    if rows.len() != 6 || rows.iter().any(|row| row.len() != 6) {
-        return fail("expected 6 rows of 6 numbers (N/m, N, N m/rad)".into());
+    let expected = "expected 6 rows of 6 numbers (N/m, N, N m/rad)";
+    if rows.len() != 6 {
+        return fail(format!("{expected}, found {} rows", rows.len()));
+    }
+    if let Some((k, row)) = rows.iter().enumerate().find(|(_, row)| row.len() != 6) {
+        return fail(format!("{expected}, found {} in row [{k}]", row.len()));
     }
     if !entry.coupling {
         return fail(

@@ -444,4 +444,9 @@ fn names_that_are_none_are_refused() {
     let request = SensitivityRequest { parameters: vec!["drive.elbow".into()], ..SensitivityRequest::default() };
     let error = sensitivity(&robot, &motion, &request).unwrap_err();
     assert!(error.to_string().contains("motion.joint_1"), "{error}");
+    let (kr210, _, motion) = shipped("kr210", "pick_and_place");
+    let parameters = vec!["link.link_2.stiffness[7][1]".into()];
+    let request = SensitivityRequest { parameters, ..SensitivityRequest::default() };
+    let error = sensitivity(&kr210, &motion, &request).unwrap_err().to_string();
+    assert!(error.contains("stiffness[i][j], i and j from 0 to 5"), "{error}");
 }

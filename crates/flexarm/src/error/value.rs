@@ -118,7 +118,11 @@ pub enum ValueError {
         lowest: f64,
     },
     /// A name of which no number of the robot is called.
-    #[error("no parameter is called {pattern:?}: expected some of {}, * for anything", names.join(", "))]
+    #[error(
+        "no parameter is called {pattern:?}: expected some of {}, * for anything; an entry of a lumped link's 6x6 is \
+         link.LINK.stiffness[i][j], i and j from 0 to 5",
+        names.join(", ")
+    )]
     NoParameter {
         /// The name or pattern.
         pattern: String,

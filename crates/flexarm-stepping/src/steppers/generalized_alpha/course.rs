@@ -13,7 +13,7 @@
 pub(super) const SHORT: f64 = 0.3;
 
 /// Largest ρ of a matrix that is followed: half of what others may have, because `M^-1 K`, which belongs to the scheme, is then as near to
-/// the truth as there (errors of the accuracy table within 2 %; with 3 % they were 8 % larger).
+/// the truth as there (errors of the accuracy table within 4 %; with 3 % they were 8 % larger).
 pub(crate) const FOLLOWED_TO: f64 = 0.015;
 
 /// What is known of the inverse of Newton's matrix and of `M^-1 K`; each n × n.
