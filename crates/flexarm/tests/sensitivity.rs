@@ -83,7 +83,7 @@ fn the_error_of_kr210_depends_on_its_numbers_as_differences_of_runs_say() {
 }
 
 /// All numbers of kr210 at once against one ordinary run; differences would take two or more runs for each. Processor time of this thread,
-/// which others on the machine do not change; measured 17 to 19 runs for 38 numbers.
+/// which others on the machine do not change; measured 23 runs for 38 numbers.
 #[test]
 fn all_numbers_of_a_robot_cost_a_few_runs() {
     let (robot, arm, motion) = shipped("kr210", "pick_and_place");
