@@ -25,7 +25,7 @@ use crate::rnea::nonlinear_effects;
 /// Which joints are prescribed; the rest are free.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Roles {
-    prescribed_body: Vec<bool>,
+    pub(crate) prescribed_body: Vec<bool>,
     prescribed_modal: Vec<bool>,
     free_coordinates: Vec<usize>,
     /// A free coordinate moves several joints, by mimicry or over closed loops: the recursion does not apply, the mass matrix does.

@@ -8,6 +8,7 @@
 use std::ops::Add;
 
 use flexarm_spatial::products::{add, add3, dot, lift, lift3, mul, scaled, scaled3};
+use flexarm_spatial::space::TurnTable;
 use flexarm_spatial::{Pose, Real, Twist, Wrench, skew};
 use nalgebra::{Matrix3, Rotation3, Vector3, Vector6};
 
@@ -151,7 +152,7 @@ impl AxisMotion {
 /// `R_PJ travel value`: where a translation leads, in P axes.
 #[inline(always)]
 fn shifted<T: Real>(X_PJ: &Pose, travel: &Vector3<f64>, value: T) -> Vector3<T> {
-    mul(&lift3(X_PJ.rotation.matrix()), &scaled(&lift(travel), value))
+    scaled(&lift(&mul(X_PJ.rotation.matrix(), travel)), value)
 }
 
 /// `R_PB(q) = K0 + sin q K1 + cos q K2`: Rodrigues' formula with the placement multiplied in.
@@ -167,6 +168,11 @@ impl RevoluteTable {
         let (R, A) = (X_PJ.rotation.matrix(), skew(axis));
         let A2 = axis * axis.transpose() - Matrix3::identity();
         Self { K0: R + R * A2, K1: R * A, K2: -(R * A2) }
+    }
+
+    /// For recursions over [`flexarm_spatial::space::Space`].
+    pub(crate) fn table(&self) -> TurnTable {
+        TurnTable::new([&self.K0, &self.K1, &self.K2])
     }
 
     #[inline(always)]

@@ -172,7 +172,7 @@ pub(crate) fn joint_motion<T: Real>(
             let ddot = Vector3::new(qdot[0], qdot[1], qdot[2]);
             let rates = Vector3::new(qdot[3], qdot[4], qdot[5]);
             let kin = angles.kinematics(&Vector3::new(q[3], q[4], q[5]), &rates);
-            place_elastic(&mut data.X_PB[i], &body.X_PJ, &kin.R, &Vector3::new(q[0], q[1], q[2]));
+            place_elastic(&mut data.X_PB[i], body, &kin.R, &Vector3::new(q[0], q[1], q[2]));
             let L = transposed(&kin.R);
             data.elastic[i] = ElasticSubspace { L, B: kin.B };
             let V = Twist::new(mul(&L, &ddot), mul(&kin.B, &rates));
@@ -185,7 +185,7 @@ pub(crate) fn joint_motion<T: Real>(
             let (d, phi) = shape.times(&q[k..k + modal.n]);
             let (ddot, rates) = shape.times(&qdot[k..k + modal.n]);
             let kin = ElasticAngles::RotationVector.kinematics(&phi, &rates);
-            place_elastic(&mut data.X_PB[i], &body.X_PJ, &kin.R, &d);
+            place_elastic(&mut data.X_PB[i], body, &kin.R, &d);
             let L = transposed(&kin.R);
             data.elastic[i] = ElasticSubspace { L, B: kin.B };
             let V = Twist::new(mul(&L, &ddot), mul(&kin.B, &rates));
@@ -208,14 +208,14 @@ pub(crate) fn joint_position<T: Real>(model: &Model, data: &mut Data<T>, i: usiz
         }
         JointMotion::Elastic(angles) => {
             let (R, B) = angles.pose(&Vector3::new(q[k + 3], q[k + 4], q[k + 5]));
-            place_elastic(&mut data.X_PB[i], &body.X_PJ, &R, &Vector3::new(q[k], q[k + 1], q[k + 2]));
+            place_elastic(&mut data.X_PB[i], body, &R, &Vector3::new(q[k], q[k + 1], q[k + 2]));
             data.elastic[i] = ElasticSubspace { L: transposed(&R), B };
         }
         JointMotion::Interface { modal, interface } => {
             let modal = &model.modal[modal];
             let (d, phi) = modal.tables.shapes.interfaces[interface].times(&q[k..k + modal.n]);
             let (R, B) = ElasticAngles::RotationVector.pose(&phi);
-            place_elastic(&mut data.X_PB[i], &body.X_PJ, &R, &d);
+            place_elastic(&mut data.X_PB[i], body, &R, &d);
             data.elastic[i] = ElasticSubspace { L: transposed(&R), B };
         }
     }
@@ -264,11 +264,19 @@ pub(crate) fn begin<T: Real>(model: &Model, data: &mut Data<T>, q: &[T]) {
     }
 }
 
+/// Pose of a body behind a joint that turns it by R and shifts it by d (m), both in the joint's axes.
 #[inline(always)]
-fn place_elastic<T: Real>(X_PB: &mut Pose<T>, X_PJ: &Pose, R: &Matrix3<T>, d: &Vector3<T>) {
-    let R_PJ = lift3(X_PJ.rotation.matrix());
-    *X_PB.rotation.matrix_mut_unchecked() = mul3(&R_PJ, R);
-    X_PB.translation.vector = add(&lift(&X_PJ.translation.vector), &mul(&R_PJ, d));
+fn place_elastic<T: Real>(X_PB: &mut Pose<T>, body: &Body, R: &Matrix3<T>, d: &Vector3<T>) {
+    let p_PJ = lift(&body.X_PJ.translation.vector);
+    let (R, d) = match body.level {
+        true => (*R, *d),
+        false => {
+            let R_PJ = lift3(body.X_PJ.rotation.matrix());
+            (mul3(&R_PJ, R), mul(&R_PJ, d))
+        }
+    };
+    *X_PB.rotation.matrix_mut_unchecked() = R;
+    X_PB.translation.vector = add(&p_PJ, &d);
 }
 
 /// `S q̈` in B axes.

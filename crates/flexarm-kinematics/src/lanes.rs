@@ -7,12 +7,15 @@
 use std::sync::Arc;
 
 use flexarm_spatial::products::{add, lift, lift3, mul};
+use flexarm_spatial::space::Plain;
 use flexarm_spatial::{ElasticAngles, Pose, Real, SpatialInertia};
 use nalgebra::Vector3;
 
+use crate::aba::Roles;
 use crate::axis_motion::AxisMotion;
 use crate::crba::composite_bodies;
 use crate::data::{Data, State, identity};
+use crate::free_forces::{Motions, PointTree};
 use crate::kinematics::{place_bodies, tree_jacobian};
 use crate::model::{Body, Frame, JointMotion, Model};
 use crate::rnea::{at_rest, newton_euler};
@@ -91,6 +94,30 @@ impl<T: Real> Tree<T> for LaneTree<T> {
     fn inertia(&self, body: usize) -> SpatialInertia<T> {
         self.inertia[body]
     }
+}
+
+/// Workspaces of [`free_forces`]; `None` of trees with balancers or bodies that bend in modes.
+#[inline(always)]
+pub fn point_tree<T: Real>(tree: &LaneTree<T>, roles: &Roles) -> Option<PointTree<Plain<T>>> {
+    PointTree::of(tree, roles)
+}
+
+/// [`crate::FreeForces::compute`] without loads; the poses of bodies on joints of one coordinate are in `data.X_PB` after it.
+#[inline(always)]
+pub fn free_forces<T: Real>(
+    points: &mut PointTree<Plain<T>>,
+    data: &mut Data<T>,
+    motions: Motions<'_, T>,
+    tau: &mut [T],
+) {
+    points.forces(motions, None, tau);
+    points.poses_of_axes(&mut data.X_PB);
+}
+
+/// [`crate::FreeForces::mass`], at the poses of the last [`free_forces`].
+#[inline(always)]
+pub fn free_mass<T: Real>(points: &mut PointTree<Plain<T>>, M: &mut [T]) {
+    points.mass(M);
 }
 
 /// [`crate::inverse_dynamics`] without balancers: `data.tau` has the generalised forces.

@@ -10,7 +10,7 @@
 use std::collections::HashMap;
 
 use flexarm_spatial::{ElasticAngles, Pose, SpatialInertia};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 use crate::axis_motion::{AxisMotion, RevoluteTable};
 use crate::balancer::{PlacedBalancer, place_balancers};
@@ -71,6 +71,8 @@ pub struct Body {
     pub armature: f64,
     /// Whether its coordinates are elastic ones.
     pub elastic: bool,
+    /// Whether the joint frame has the axes of the parent.
+    pub(crate) level: bool,
     /// Number of its modal body, if it bends in modes.
     pub(crate) modal: Option<usize>,
     pub(crate) turn: RevoluteTable,
@@ -307,6 +309,7 @@ impl Model {
             offset: 0.0,
             armature: 0.0,
             elastic: false,
+            level: true,
             modal: None,
             turn: RevoluteTable::new(&Pose::identity(), &Vector3::z()),
             turning: 0,
@@ -598,6 +601,7 @@ impl<'a> Builder<'a> {
             offset,
             armature: joint.armature,
             elastic: joint.kind.is_elastic(),
+            level: *X_BJ.rotation.matrix() == Matrix3::identity(),
             modal: None,
             turn: RevoluteTable::new(&X_BJ, &axis),
             turning: 0,

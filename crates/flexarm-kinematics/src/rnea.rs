@@ -155,13 +155,19 @@ pub(crate) fn newton_euler<T: Real>(tree: &impl Tree<T>, data: &mut Data<T>, q: 
     }
     carry_inward(model, data);
     if let Some(qddot) = qddot {
-        for &(k, armature) in &model.rotors {
-            data.tau[k] += T::splat(armature) * qddot[k];
-        }
-        for &(a, b, inertia) in &model.rotor_couplings {
-            data.tau[a] += T::splat(inertia) * qddot[b];
-            data.tau[b] += T::splat(inertia) * qddot[a];
-        }
+        add_rotors(model, data, qddot);
+    }
+}
+
+/// `tau +=` what the rotors need.
+#[inline(always)]
+fn add_rotors<T: Real>(model: &Model, data: &mut Data<T>, qddot: &[T]) {
+    for &(k, armature) in &model.rotors {
+        data.tau[k] += T::splat(armature) * qddot[k];
+    }
+    for &(a, b, inertia) in &model.rotor_couplings {
+        data.tau[a] += T::splat(inertia) * qddot[b];
+        data.tau[b] += T::splat(inertia) * qddot[a];
     }
 }
 

@@ -107,6 +107,37 @@ proptest! {
         prop_assert!(M.cholesky().is_some());
     }
 
+    /// Over accelerations of points the forces of the free coordinates are those of the recursion over spatial vectors, and packed vectors have
+    /// the bits of numbers; so does the mass matrix. Measured 3e-13 and 2e-14.
+    #[test]
+    fn free_forces_are_those_of_inverse_dynamics(seed in any::<u64>(), n in 1usize..=40, mask in any::<u64>()) {
+        // Balancers and links that bend in modes are not for it.
+        let Case { model, mut data, state, qddot, .. } = case((seed & !1) | 2, n);
+        let tau = inverse_dynamics(&model, &mut data, &state, &qddot).clone();
+        let drawn = Roles::new(&model, |k| (mask >> (k % 64)) & 1 == 1);
+        for roles in [Roles::all_free(&model), Roles::actuated_prescribed(&model), drawn] {
+            let free = roles.free_coordinates();
+            let [mut plain, mut quick] = [vec![0.0; free.len()], vec![0.0; free.len()]];
+            let motions = Motions { q: state.q.as_slice(), qdot: state.qdot.as_slice(), qddot: qddot.as_slice() };
+            let mut numbers = FreeForces::plain(&model, &roles).unwrap();
+            let mut registers = FreeForces::new(&model, &roles).unwrap();
+            numbers.compute(motions, Some(&data.F_ext), &mut plain);
+            registers.compute(motions, Some(&data.F_ext), &mut quick);
+            prop_assert_eq!(&plain, &quick);
+            let error = free.iter().zip(&plain).map(|(k, found)| (tau[*k] - found).abs()).fold(0.0, f64::max);
+            prop_assert!(error <= 1e-11 * tau.amax(), "{:e}", error / tau.amax());
+
+            let [mut M, mut M_quick] = [DMatrix::zeros(free.len(), free.len()), DMatrix::zeros(free.len(), free.len())];
+            numbers.mass(M.as_mut_slice());
+            registers.mass(M_quick.as_mut_slice());
+            prop_assert_eq!(&M, &M_quick);
+            let whole = mass_matrix(&model, &mut data, &state.q);
+            let of_free = DMatrix::from_fn(free.len(), free.len(), |i, j| whole[(free[i], free[j])]);
+            let scale = whole.amax();
+            prop_assert!((&M - &of_free).amax() <= 1e-12 * scale, "{:e}", (&M - &of_free).amax() / scale);
+        }
+    }
+
     /// The tangent of the static forces, with loads that keep their direction and loads that turn along, is what central
     /// differences of them make; measured below 2e-8 of the largest entry, the error of the
     /// differences.

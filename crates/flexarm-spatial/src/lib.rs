@@ -30,12 +30,15 @@
 mod blocks;
 #[cfg(target_arch = "x86_64")]
 pub mod lanes;
+#[cfg(target_arch = "x86_64")]
+pub mod packed;
 pub mod products;
 mod real;
 mod rotation;
+pub mod space;
 mod vectors;
 
 pub use blocks::{Matrix12, symmetric_part, turn6, twice};
 pub use real::{Real, sin_cos_all};
-pub use rotation::{AngleKinematics, ElasticAngles, rotation_vector};
+pub use rotation::{AngleKinematics, AngleMotion, ElasticAngles, rotation_vector};
 pub use vectors::{ArticulatedInertia, Pose, SpatialInertia, Twist, Wrench, adjoint, skew};

@@ -84,7 +84,7 @@ pub fn tr_mul<T: Real>(A: &Matrix3<T>, v: &Vector3<T>) -> Vector3<T> {
 
 /// Matrix of three columns.
 #[inline(always)]
-fn columns<T: Real>(a: Vector3<T>, b: Vector3<T>, c: Vector3<T>) -> Matrix3<T> {
+pub fn columns<T: Real>(a: Vector3<T>, b: Vector3<T>, c: Vector3<T>) -> Matrix3<T> {
     Matrix3::new(a.x, b.x, c.x, a.y, b.y, c.y, a.z, b.z, c.z)
 }
 

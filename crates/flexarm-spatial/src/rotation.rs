@@ -9,6 +9,7 @@ use nalgebra::{Matrix3, Scalar, Vector3};
 
 use crate::products::{add, add3, cross, dot, mul, mul3, scaled, scaled3};
 use crate::real::Real;
+use crate::space::Space;
 use crate::vectors::skew;
 
 /// Below this cosine the axis is taken from the symmetric part of the rotation, above from the skew part.
@@ -35,7 +36,30 @@ pub struct AngleKinematics<T: Scalar = f64> {
     pub bias: Vector3<T>,
 }
 
+/// The same, as a recursion over [`Space`] needs it.
+#[derive(Clone, Copy, Debug)]
+pub struct AngleMotion<S: Space> {
+    /// `R_PQ`.
+    pub R: S::Both,
+    /// `B`.
+    pub B: S::Both,
+    /// `dB/dt rates`.
+    pub bias: S::Vector,
+}
+
 impl ElasticAngles {
+    /// As [`ElasticAngles::kinematics`], to rounding.
+    #[inline(always)]
+    pub fn motion<S: Space>(self, angles: &S::Vector, rates: &S::Vector) -> AngleMotion<S> {
+        match self {
+            Self::RotationVector => rotation_vector_motion(angles, rates),
+            Self::EulerZyx => {
+                let kin = euler_zyx_kinematics(&S::components(angles), &S::components(rates));
+                AngleMotion { R: S::both(&kin.R), B: S::both(&kin.B), bias: S::vector(&kin.bias) }
+            }
+        }
+    }
+
     /// Rotation, rate map and bias at `angles` (rad) and `rates` (rad/s).
     #[inline(always)]
     pub fn kinematics<T: Real>(self, angles: &Vector3<T>, rates: &Vector3<T>) -> AngleKinematics<T> {
@@ -126,11 +150,25 @@ fn exponential_coefficients<T: Real>(x: T) -> [T; 5] {
 #[inline(always)]
 fn coefficients_by_series<T: Real>(x: T) -> [T; 5] {
     let s = T::one() + x * cubic(x, [-1.0 / 6.0, 1.0 / 120.0, -1.0 / 5040.0, 1.0 / 362_880.0]);
-    let a = T::splat(0.5) + x * cubic(x, [-1.0 / 24.0, 1.0 / 720.0, -1.0 / 40_320.0, 1.0 / 3_628_800.0]);
-    let b = T::splat(1.0 / 6.0) + x * cubic(x, [-1.0 / 120.0, 1.0 / 5040.0, -1.0 / 362_880.0, 1.0 / 39_916_800.0]);
-    let da = cubic(x, [-1.0 / 24.0, 1.0 / 360.0, -1.0 / 13_440.0, 1.0 / 907_200.0]);
-    let db = cubic(x, [-1.0 / 120.0, 1.0 / 2520.0, -1.0 / 120_960.0, 1.0 / 9_979_200.0]);
-    [s, a, b, da, db]
+    // Of a, b, da and db, power by power: over numbers they go side by side.
+    const POWERS: [[f64; 4]; 4] = [
+        [-1.0 / 24.0, -1.0 / 120.0, -1.0 / 24.0, -1.0 / 120.0],
+        [1.0 / 720.0, 1.0 / 5040.0, 1.0 / 360.0, 1.0 / 2520.0],
+        [-1.0 / 40_320.0, -1.0 / 362_880.0, -1.0 / 13_440.0, -1.0 / 120_960.0],
+        [1.0 / 3_628_800.0, 1.0 / 39_916_800.0, 1.0 / 907_200.0, 1.0 / 9_979_200.0],
+    ];
+    let [a, b, da, db] = cubics(x, &POWERS);
+    [s, T::splat(0.5) + x * a, T::splat(1.0 / 6.0) + x * b, da, db]
+}
+
+/// [`cubic`] of four polynomials.
+#[inline(always)]
+fn cubics<T: Real>(x: T, powers: &[[f64; 4]; 4]) -> [T; 4] {
+    let mut all = [T::zero(); 4];
+    for (k, polynomial) in all.iter_mut().enumerate() {
+        *polynomial = cubic(x, [powers[0][k], powers[1][k], powers[2][k], powers[3][k]]);
+    }
+    all
 }
 
 /// `p + q x + r x² + s x³`.
@@ -183,6 +221,21 @@ fn rotation_vector_kinematics<T: Real>(phi: &Vector3<T>, rates: &Vector3<T>) -> 
     let first = add(&scaled(&c, -da * xdot), &scaled(&cross(phi, &c), db * xdot));
     let bias = add(&first, &scaled(&cross(rates, &c), b));
     AngleKinematics { R, B, bias }
+}
+
+/// `R = 1 + s [phi]x + a [phi]x²` and `B = 1 - a [phi]x + b [phi]x²` with `[phi]x² = phi phiᵀ - phi·phi 1`; bias as below.
+#[inline(always)]
+fn rotation_vector_motion<S: Space>(phi: &S::Vector, rates: &S::Vector) -> AngleMotion<S> {
+    let one = S::Real::splat(1.0);
+    let square = S::dot(phi, phi);
+    let [s, a, b, da, db] = exponential_coefficients(square);
+    let (phi_a, phi_b) = (S::scaled(phi, a), S::scaled(phi, b));
+    let R = S::dyad_both(phi, &phi_a, &S::scaled(phi, s), one - square * a);
+    let B = S::dyad_both(phi, &phi_b, &S::scaled(phi, -a), one - square * b);
+    let xdot = S::Real::splat(2.0) * S::dot(phi, rates);
+    let c = S::cross(phi, rates);
+    let first = S::add(&S::scaled(&c, -da * xdot), &S::scaled(&S::cross(phi, &c), db * xdot));
+    AngleMotion { R, B, bias: S::add(&first, &S::scaled(&S::cross(rates, &c), b)) }
 }
 
 #[inline(always)]

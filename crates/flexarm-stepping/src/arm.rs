@@ -10,7 +10,7 @@ use std::sync::Arc;
 use flexarm_kinematics::{AxisMotion, Data, JointMotion, Model, SpatialInertia, State, Wrench, mass_matrix};
 use nalgebra::{DMatrix, DVector, Matrix6};
 
-use crate::dense;
+use crate::dense::{self, Loops, quickly};
 use crate::drive::{Friction, ServoAxis, TorqueCurve};
 use crate::error::StepError;
 use crate::events::SAME_TIME;
@@ -112,10 +112,16 @@ impl ElasticElement {
     }
 }
 
-/// `y += A x` for a square A.
-#[inline(always)]
+/// `y += A x` for a square A, with the vector instructions that the processor has.
 pub(crate) fn add_product(A: &DMatrix<f64>, x: &[f64], y: &mut [f64]) {
-    dense::add_product(A.as_slice(), x, y);
+    struct AddProduct<'a>(&'a [f64], &'a [f64], &'a mut [f64]);
+    impl Loops for AddProduct<'_> {
+        #[inline(always)]
+        fn run(self) {
+            dense::add_product(self.0, self.1, self.2);
+        }
+    }
+    quickly(AddProduct(A.as_slice(), x, y));
 }
 
 /// Damping of an elastic element.

@@ -5,6 +5,82 @@
 
 use flexarm_kinematics::Real;
 
+/// Loops over numbers, inlined down to them.
+pub(crate) trait Loops {
+    /// Does them.
+    fn run(self);
+}
+
+/// Runs loops with the vector instructions that the processor has. Operations and their order are the same with and without.
+#[inline(always)]
+pub(crate) fn quickly(loops: impl Loops) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        struct Here<L>(L);
+        impl<L: Loops> flexarm_kinematics::packed::Loops for Here<L> {
+            #[inline(always)]
+            fn run(self) {
+                self.0.run();
+            }
+        }
+        flexarm_kinematics::packed::quickly(Here(loops));
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    loops.run();
+}
+
+/// `y = A x`, with the vector instructions that the processor has.
+pub(crate) fn product_of_numbers(A: &[f64], x: &[f64], y: &mut [f64]) {
+    struct Product<'a>(&'a [f64], &'a [f64], &'a mut [f64]);
+    impl Loops for Product<'_> {
+        #[inline(always)]
+        fn run(self) {
+            product(self.0, self.1, self.2);
+        }
+    }
+    quickly(Product(A, x, y));
+}
+
+/// [`solve_in_place`] with the vector instructions that the processor has.
+pub(crate) fn solve_quickly(A: &mut [f64], Bt: &mut [f64], n: usize) -> bool {
+    struct Solve<'a>(&'a mut [f64], &'a mut [f64], usize, &'a mut bool);
+    impl Loops for Solve<'_> {
+        #[inline(always)]
+        fn run(self) {
+            *self.3 = solve_in_place(self.0, self.1, self.2);
+        }
+    }
+    let mut positive = false;
+    quickly(Solve(A, Bt, n, &mut positive));
+    positive
+}
+
+/// [`congruence`] with the vector instructions that the processor has.
+pub(crate) fn congruence_quickly(c: f64, X: &[f64], C: &[f64], n: usize, room: [&mut [f64]; 2], product: &mut [f64]) {
+    struct Congruence<'a>(f64, &'a [f64], &'a [f64], usize, [&'a mut [f64]; 2], &'a mut [f64]);
+    impl Loops for Congruence<'_> {
+        #[inline(always)]
+        fn run(self) {
+            congruence(self.0, self.1, self.2, self.3, self.4, self.5);
+        }
+    }
+    quickly(Congruence(c, X, C, n, room, product));
+}
+
+/// `|x|`, with the vector instructions that the processor has.
+pub(crate) fn norm(x: &[f64]) -> f64 {
+    struct Square<'a>(&'a [f64], &'a mut f64);
+    impl Loops for Square<'_> {
+        #[inline(always)]
+        fn run(self) {
+            *self.1 = dot(self.0, self.0);
+        }
+    }
+    let mut square = 0.0;
+    quickly(Square(x, &mut square));
+    square.sqrt()
+}
+
 /// `y = A x`.
 #[inline(always)]
 pub(crate) fn product<T: Real>(A: &[T], x: &[T], y: &mut [T]) {
@@ -35,17 +111,21 @@ pub(crate) fn subtract_product<T: Real>(A: &[T], x: &[T], y: &mut [T]) {
     );
 }
 
-/// Rows whose sums are in registers at a time.
-const ROWS: usize = 6;
+/// Rows whose sums are in registers at a time: as many as that, then as many as this.
+const ROWS: [usize; 2] = [12, 6];
 
 /// Adds multiples of columns, to each row one after the other.
 #[inline(always)]
 fn add_columns<T: Real>(A: &[T], factors: impl Iterator<Item = T> + Clone, y: &mut [T]) {
     let n = y.len();
     let mut first = 0;
-    while first + ROWS <= n {
-        add_to_rows::<T, ROWS>(A, factors.clone(), first, y);
-        first += ROWS;
+    while first + ROWS[0] <= n {
+        add_to_rows::<T, { ROWS[0] }>(A, factors.clone(), first, y);
+        first += ROWS[0];
+    }
+    while first + ROWS[1] <= n {
+        add_to_rows::<T, { ROWS[1] }>(A, factors.clone(), first, y);
+        first += ROWS[1];
     }
     while first + 2 <= n {
         add_to_rows::<T, 2>(A, factors.clone(), first, y);
@@ -158,9 +238,10 @@ fn subtract<T: Real>(to: &mut [T], factor: T, from: &[T]) {
     }
 }
 
-/// `S C Sᵀ` with `Sᵀ = 1 + c X` of a symmetric C; `room` is as large.
+/// `S C Sᵀ` with `Sᵀ = 1 + c X` of a symmetric C; both rooms are as large.
 #[inline(always)]
-pub(crate) fn congruence(c: f64, X: &[f64], C: &[f64], n: usize, room: &mut [f64], product: &mut [f64]) {
+pub(crate) fn congruence(c: f64, X: &[f64], C: &[f64], n: usize, room: [&mut [f64]; 2], product: &mut [f64]) {
+    let [room, Xt] = room;
     if n == 0 {
         return;
     }
@@ -170,14 +251,11 @@ pub(crate) fn congruence(c: f64, X: &[f64], C: &[f64], n: usize, room: &mut [f64
         add_columns(C, x.iter().map(|x| c * x), column);
     }
     // P + c Xᵀ P
+    Xt.copy_from_slice(X);
+    transpose(Xt, n);
     product.copy_from_slice(room);
-    for (column, x) in product.chunks_exact_mut(n).zip(room.chunks_exact(n)) {
-        let mut rest = X;
-        for y in column {
-            let Some((a, next)) = rest.split_at_checked(n) else { break };
-            rest = next;
-            *y += c * dot(a, x);
-        }
+    for (column, p) in product.chunks_exact_mut(n).zip(room.chunks_exact(n)) {
+        add_columns(Xt, p.iter().map(|p| c * p), column);
     }
 }
 
@@ -206,6 +284,39 @@ pub(crate) fn largest<T: Real>(x: &[T]) -> T {
         broken += *x * T::zero();
     }
     largest + broken
+}
+
+/// Largest absolute value; infinite if some entry is no number.
+#[inline(always)]
+pub(crate) fn largest_of_numbers(x: &[f64]) -> f64 {
+    let (mut most, mut broken) = ([0.0; 4], [0.0; 4]);
+    let fours = x.chunks_exact(4);
+    for (k, x) in fours.remainder().iter().enumerate() {
+        (most[k], broken[k]) = (x.abs(), x * 0.0);
+    }
+    for x in fours {
+        for k in 0..4 {
+            most[k] = larger(most[k], x[k].abs());
+            broken[k] += x[k] * 0.0;
+        }
+    }
+    let all = larger(larger(most[0], most[1]), larger(most[2], most[3]));
+    let finite = (broken[0] + broken[1]) + (broken[2] + broken[3]) == 0.0;
+    if finite { all } else { f64::INFINITY }
+}
+
+/// [`largest_of_numbers`] with the vector instructions that the processor has.
+pub(crate) fn largest_quickly(x: &[f64]) -> f64 {
+    struct Largest<'a>(&'a [f64], &'a mut f64);
+    impl Loops for Largest<'_> {
+        #[inline(always)]
+        fn run(self) {
+            *self.1 = largest_of_numbers(self.0);
+        }
+    }
+    let mut largest = 0.0;
+    quickly(Largest(x, &mut largest));
+    largest
 }
 
 /// `A = L Lᵀ` of a symmetric matrix, in storage that is filled again and again.
@@ -342,8 +453,9 @@ mod tests {
             assert!((&ours - &theirs).amax() <= 1e-13 * theirs.amax(), "{ours} {theirs}");
 
             let C = B.symmetric_part();
-            let (mut room, mut found) = (A.clone(), A.clone());
-            congruence(0.3, B.as_slice(), C.as_slice(), n, room.as_mut_slice(), found.as_mut_slice());
+            let [mut room, mut turned, mut found] = [A.clone(), A.clone(), A.clone()];
+            let rooms = [room.as_mut_slice(), turned.as_mut_slice()];
+            congruence(0.3, B.as_slice(), C.as_slice(), n, rooms, found.as_mut_slice());
             let St = DMatrix::identity(n, n) + 0.3 * &B;
             let expected = St.transpose() * &C * St;
             assert!((&found - &expected).amax() <= 1e-14 * n as f64 * expected.amax(), "{found} {expected}");
@@ -372,6 +484,21 @@ mod tests {
             factor.reduce(found.as_mut_slice());
             let error = (found.lower_triangle() - truth.lower_triangle()).amax() / truth.amax();
             assert!(error < 1e-12, "{n}: {error:e}");
+        }
+    }
+
+    #[test]
+    fn the_largest_of_numbers_with_what_is_no_number_is_infinite() {
+        for n in 0..13 {
+            let mut x: Vec<f64> = (0..n).map(|k| f64::from(k) - 5.5).collect();
+            assert_eq!(largest_of_numbers(&x), x.iter().fold(0.0f64, |most, x| most.max(x.abs())));
+            for broken in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+                for k in 0..x.len() {
+                    let held = std::mem::replace(&mut x[k], broken);
+                    assert_eq!(largest_quickly(&x), f64::INFINITY, "{n} {k}");
+                    x[k] = held;
+                }
+            }
         }
     }
 

@@ -240,7 +240,7 @@ mod tests {
             fn run<T: Real>(self) -> Self::Output {
                 let n = self.0[0].nrows();
                 let mut A = vec![T::zero(); n * n];
-                for (lane, own) in self.0.iter().enumerate() {
+                for (lane, own) in self.0.iter().cycle().take(T::LANES).enumerate() {
                     A.iter_mut().zip(own).for_each(|(to, x)| to.set_lane(lane, *x));
                 }
                 let (mut d, mut e) = (vec![T::zero(); n], vec![T::zero(); n]);
@@ -263,9 +263,13 @@ mod tests {
                 [random(0.7), random(0.31) * 1e-9, random(1.3), random(2.1) * 1e200],
                 [random(0.7), DMatrix::zeros(n, n), DMatrix::identity(n, n), block],
                 [first, random(0.7), DMatrix::from_element(n, n, f64::NAN), random(1.3)],
-            ] {
-                let Some(together) = with_lanes(Together(&matrices)) else { return };
-                for ((ended, lane), A) in together.iter().zip(&matrices) {
+            ]
+            .into_iter()
+            .flat_map(|matrices| [(4, matrices.clone()), (8, matrices)])
+            {
+                let (lanes, matrices) = matrices;
+                let Some(together) = with_lanes(lanes, Together(&matrices)) else { return };
+                for ((ended, lane), A) in together.iter().zip(matrices.iter().cycle()) {
                     let (mut d, mut e) = (vec![0.0; n], vec![0.0; n]);
                     assert_eq!(symmetric_eigenvalues(A.clone().as_mut_slice(), &mut d, &mut e), *ended);
                     let alone: Vec<u64> = d.iter().map(|x| x.to_bits()).collect();

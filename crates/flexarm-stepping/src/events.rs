@@ -23,6 +23,7 @@ use flexarm_kinematics::mass_matrix;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use crate::arm::{FlexibleArm, InertiaChange};
+use crate::dense::larger;
 use crate::error::StepError;
 use crate::iteration_matrix::storage_of;
 use crate::load::Load;
@@ -32,9 +33,9 @@ use crate::reduced::ReducedArm;
 pub(crate) const SAME_TIME: f64 = 1e-9;
 
 /// By which part of the speed a velocity may change otherwise than accelerations at the ends of a step say.
-const IMPULSE_DEFECT: f64 = 1e-3;
+pub(crate) const IMPULSE_DEFECT: f64 = 1e-3;
 /// Speeds below this are no measure (rad/s or m/s).
-const SLOW: f64 = 0.01;
+pub(crate) const SLOW: f64 = 0.01;
 /// Most halvings of a step.
 const MOST_CUTS: u32 = 7;
 
@@ -224,6 +225,7 @@ impl ReducedArm {
                 std::mem::swap(&mut self.arm.tau, tau);
                 self.arm.proportional = *proportional;
             }
+            self.weigh();
             what = Change::Matrices;
         }
         if let Some((before, after)) = self.events.pass_jumps(t) {
@@ -263,24 +265,34 @@ impl ReducedArm {
 
     /// Whether accelerations by the rule say how the prescribed velocities change from t to `stop`.
     fn meets_impulse(&mut self, t: f64, stop: f64, rule: &[(f64, f64)]) -> bool {
-        let (n, h) = (self.arm.model.n_actuated(), stop - t);
-        // Σ w_i a(t + c_i h)
-        self.step_start.mean.fill(0.0);
+        let h = stop - t;
+        // Σ w_i a(t + c_i h), that of the end last.
+        let start = &mut self.step_start;
+        start.mean.fill(0.0);
+        let mut at_end = 0.0;
         for &(node, weight) in rule {
+            if node == 1.0 {
+                at_end += weight;
+                continue;
+            }
             if node > 0.0 {
-                self.sample_joints(if node == 1.0 { stop } else { t + node * h });
+                self.sample_joints(t + node * h);
             }
             let StepStart { qddot, mean, .. } = &mut self.step_start;
             let accelerations = if node > 0.0 { self.qddot.as_slice() } else { qddot };
             mean.iter_mut().zip(accelerations).for_each(|(mean, a)| *mean += weight * a);
         }
         self.sample_joints(stop);
-        let start = &self.step_start;
-        (0..n).filter(|k| !self.arm.torque_driven.contains(k)).all(|k| {
-            let (before, after) = (start.qdot[k], self.state.qdot[k]);
-            let defect = after - before - h * start.mean[k];
-            defect.abs() <= IMPULSE_DEFECT * start.top[k].max(after.abs())
-        })
+        let StepStart { qdot, mean, top, .. } = &self.step_start;
+        let (after, acceleration) = (self.state.qdot.as_slice(), self.qddot.as_slice());
+        let joints = qdot.iter().zip(after).zip(mean.iter().zip(acceleration)).zip(top);
+        let mut all = true;
+        for (k, (((before, after), (mean, acceleration)), top)) in joints.enumerate() {
+            let defect = after - before - h * (mean + at_end * acceleration);
+            let meets = defect.abs() <= IMPULSE_DEFECT * larger(*top, after.abs());
+            all &= meets || self.arm.torque_driven.contains(&k);
+        }
+        all
     }
 
     /// Joint motion at t into the state, as [`ReducedArm::set`] keeps it.
@@ -298,7 +310,7 @@ impl ReducedArm {
         start.time = t;
         start.qdot.copy_from_slice(&self.state.qdot.as_slice()[..n]);
         start.qddot.copy_from_slice(&self.qddot.as_slice()[..n]);
-        start.top.iter_mut().zip(&start.qdot).for_each(|(top, speed)| *top = top.max(speed.abs()));
+        start.top.iter_mut().zip(&start.qdot).for_each(|(top, speed)| *top = larger(*top, speed.abs()));
     }
 
     /// The impulse of prescribed velocities that jump between two times; see the module page.

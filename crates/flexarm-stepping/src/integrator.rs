@@ -5,6 +5,7 @@
 use nalgebra::DVector;
 
 use crate::arm::FlexibleArm;
+use crate::dense::largest_quickly;
 use crate::error::StepError;
 use crate::events::Change;
 use crate::observation::{Observation, observe_reduced};
@@ -262,6 +263,9 @@ impl<I: Integrator> Stepper for ReducedStepper<I> {
 
 /// Stops a run whose links have come apart.
 pub(crate) fn check_deflection(arm: &FlexibleArm, x: &DVector<f64>, t: f64, h: f64) -> Result<(), StepError> {
+    if largest_quickly(x.as_slice()) <= LARGEST_DEFLECTION {
+        return Ok(());
+    }
     for element in arm.elements.iter().filter(|e| !e.modal || e.size >= 6) {
         let first = arm.torque_driven.len() + arm.offset(element);
         let largest = x.as_slice()[first..first + element.size.min(6)].iter().fold(0.0f64, |m, e| m.max(e.abs()));

@@ -8,7 +8,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use crate::dense::{product, solve_in_place};
+use crate::dense::{norm, product_of_numbers, solve_quickly};
 use crate::error::StepError;
 use crate::mode_matrix::ModeInverse;
 use crate::system::SecondOrderSystem;
@@ -60,14 +60,14 @@ impl DenseInverse {
     fn invert(&mut self, t: f64) -> Result<(), StepError> {
         self.S += &self.C;
         let n = self.S.nrows();
-        match solve_in_place(self.S.as_mut_slice(), self.inverse.as_mut_slice(), n) {
+        match solve_quickly(self.S.as_mut_slice(), self.inverse.as_mut_slice(), n) {
             true => Ok(()),
             false => Err(StepError::Singular { matrix: "iteration matrix", t }),
         }
     }
 
     fn solve(&mut self, r: &mut DVector<f64>) {
-        product(self.inverse.as_slice(), r.as_slice(), self.product.as_mut_slice());
+        product_of_numbers(self.inverse.as_slice(), r.as_slice(), self.product.as_mut_slice());
         r.copy_from(&self.product);
     }
 }
@@ -118,7 +118,7 @@ impl IterationMatrix {
             Way::Tree(tree) => tree.solve(r),
             Way::Modes(modes) => modes.solve(r),
         }
-        r.norm()
+        norm(r.as_slice())
     }
 }
 

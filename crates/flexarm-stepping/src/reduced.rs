@@ -8,11 +8,13 @@
 //! its samples. What happens at discrete times is in `events`. Not here: integration.
 
 use flexarm_kinematics::{
-    Data, JointMotion, Roles, State, Wrench, hybrid_dynamics, inverse_dynamics, mass_matrix_at_poses, world_poses,
+    Data, FreeForces, JointMotion, Motions, Roles, State, Wrench, forward_kinematics, hybrid_dynamics,
+    inverse_dynamics, mass_matrix_at_poses, world_poses,
 };
 use nalgebra::{Cholesky, DMatrix, DMatrixView, DVector, Dyn};
 
-use crate::arm::{ElasticElement, FlexibleArm, GeometricStiffness, add_product};
+use crate::arm::{ElasticElement, FlexibleArm, GeometricStiffness};
+use crate::dense::{Loops, add_product, quickly};
 use crate::elastic_tree::ElasticTree;
 use crate::error::StepError;
 use crate::events::{ArmDamping, EventQueue, StepStart, damping_after_changes};
@@ -54,6 +56,10 @@ pub struct ReducedArm {
     tree: Option<ElasticTree>,
     /// The modes that are eliminated first, where they are enough.
     modes: Option<HeldModes>,
+    /// The equations of motion of the free coordinates alone, where they are enough and the tree is for it.
+    points: Option<FreeForces>,
+    /// Whether the last motion was that of a residual by `points`, which leaves no poses in `data`.
+    of_residual: bool,
 }
 
 /// Which of the free coordinates are modes that are eliminated first.
@@ -108,6 +114,9 @@ impl ReducedArm {
         let n = arm.n_free();
         let driven = arm.torque_driven.clone();
         let roles = Roles::new(model, |k| k < model.n_actuated() && !driven.contains(&k));
+        // Loads on links that stiffen them are in the spatial accelerations.
+        let geometric = arm.elements.iter().any(|e| e.geometric.is_some());
+        let points = FreeForces::new(model, &roles);
         Self {
             data: Data::new(model),
             state: State::zeros(model),
@@ -119,7 +128,7 @@ impl ReducedArm {
             events: EventQueue::of(&arm),
             dampings: damping_after_changes(&arm),
             struck: 0.0,
-            geometric: arm.elements.iter().any(|e| e.geometric.is_some()),
+            geometric,
             sampled_at: f64::NAN,
             step_start: StepStart::new(model.n_actuated()),
             mass_factor: Cholesky::new(DMatrix::identity(n, n)),
@@ -128,6 +137,8 @@ impl ReducedArm {
             gears: GearState::of(&arm),
             tree: ElasticTree::that_pays(&arm),
             modes: HeldModes::that_pay(&arm),
+            points: if geometric { None } else { points },
+            of_residual: false,
             arm,
         }
     }
@@ -180,7 +191,7 @@ impl ReducedArm {
         self.state.q.as_mut_slice()[n..].copy_from_slice(&x.as_slice()[driven..]);
         self.state.qdot.as_mut_slice()[n..].copy_from_slice(&v.as_slice()[driven..]);
         if !self.arm.loads.is_empty() {
-            flexarm_kinematics::forward_kinematics(&self.arm.model, &mut self.data, &self.state.q);
+            forward_kinematics(&self.arm.model, &mut self.data, &self.state.q);
             self.arm.apply_loads(&mut self.data, t);
         }
     }
@@ -194,8 +205,22 @@ impl ReducedArm {
             return Ok(());
         }
         self.set(0.0, x, v);
-        flexarm_kinematics::forward_kinematics(&self.arm.model, &mut self.data, &self.state.q);
+        forward_kinematics(&self.arm.model, &mut self.data, &self.state.q);
         StepError::open_loop(&self.arm.model, &self.data, 0.0).map_or(Ok(()), Err)
+    }
+
+    /// The masses of the arm's bodies have changed.
+    pub(crate) fn weigh(&mut self) {
+        if let Some(points) = &mut self.points {
+            points.weigh(&self.arm.model);
+        }
+    }
+
+    /// Poses of the state into `data`, where a residual left none.
+    fn place(&mut self) {
+        if self.of_residual {
+            forward_kinematics(&self.arm.model, &mut self.data, &self.state.q);
+        }
     }
 
     fn set_accelerations(&mut self, a: &DVector<f64>) {
@@ -221,11 +246,14 @@ impl ReducedArm {
             let first = self.arm.offset(element);
             let range = first..first + element.size;
             if self.arm.proportional && element.curve.is_none() {
-                let y = &mut self.shifted.as_mut_slice()[..element.size];
-                for ((y, x), v) in y.iter_mut().zip(&x[range.clone()]).zip(&v[range.clone()]) {
-                    *y = x + self.arm.tau[k] * v;
-                }
-                add_product(&element.K, y, &mut f[range]);
+                quickly(Damped {
+                    K: element.K.as_slice(),
+                    tau: self.arm.tau[k],
+                    x: &x[range.clone()],
+                    v: &v[range.clone()],
+                    y: &mut self.shifted.as_mut_slice()[..element.size],
+                    f: &mut f[range],
+                });
             } else {
                 element.add_spring_force(&x[range.clone()], &mut f[range.clone()]);
                 if self.arm.proportional {
@@ -291,6 +319,7 @@ impl ReducedArm {
     pub(crate) fn evaluate(&mut self, t: f64, x: &DVector<f64>, v: &DVector<f64>, a: &DVector<f64>) {
         self.set(t, x, v);
         self.set_accelerations(a);
+        self.of_residual = false;
         inverse_dynamics(&self.arm.model, &mut self.data, &self.state, &self.qddot);
         match &self.gears {
             Some(_) => self.add_gear_torques(x, v),
@@ -306,6 +335,27 @@ impl ReducedArm {
     /// Torques that the controller holds now, in the order of [`FlexibleArm::torque_driven`]; empty without one.
     pub(crate) fn held_torques(&self) -> &[f64] {
         self.servo.as_ref().map_or(&[], |s| &s.torque)
+    }
+}
+
+/// `f += K (x + tau v)` of a spring; y is room.
+struct Damped<'a> {
+    K: &'a [f64],
+    tau: f64,
+    x: &'a [f64],
+    v: &'a [f64],
+    y: &'a mut [f64],
+    f: &'a mut [f64],
+}
+
+impl Loops for Damped<'_> {
+    #[inline(always)]
+    fn run(self) {
+        let Self { K, tau, x, v, y, f } = self;
+        for ((y, x), v) in y.iter_mut().zip(x).zip(v) {
+            *y = x + tau * v;
+        }
+        add_product(K, y, f);
     }
 }
 
@@ -379,9 +429,20 @@ impl SecondOrderSystem for ReducedArm {
     fn residual(&mut self, t: f64, x: &DVector<f64>, v: &DVector<f64>, a: &DVector<f64>, r: &mut DVector<f64>) {
         self.set(t, x, v);
         self.set_accelerations(a);
-        inverse_dynamics(&self.arm.model, &mut self.data, &self.state, &self.qddot);
-        for (r, &k) in r.iter_mut().zip(&self.free) {
-            *r = self.data.tau[k];
+        let Self { arm, data, state, qddot, points, .. } = self;
+        match points {
+            Some(points) => {
+                let motions = Motions { q: state.q.as_slice(), qdot: state.qdot.as_slice(), qddot: qddot.as_slice() };
+                let loads = (!arm.loads.is_empty()).then_some(data.F_ext.as_slice());
+                points.compute(motions, loads, r.as_mut_slice());
+                self.of_residual = true;
+            }
+            None => {
+                inverse_dynamics(&arm.model, data, state, qddot);
+                for (r, &k) in r.iter_mut().zip(&self.free) {
+                    *r = data.tau[k];
+                }
+            }
         }
         self.add_forces(x, v, r);
         if self.geometric {
@@ -397,6 +458,7 @@ impl SecondOrderSystem for ReducedArm {
         a: &mut DVector<f64>,
     ) -> Result<(), StepError> {
         self.set(t, x, v);
+        self.of_residual = false;
         let mut forces = std::mem::replace(&mut self.geometric_force, DVector::zeros(0));
         for pass in 0..GEOMETRIC_PASSES {
             forces.fill(0.0);
@@ -425,6 +487,11 @@ impl SecondOrderSystem for ReducedArm {
     }
 
     fn mass(&mut self, M: &mut DMatrix<f64>) {
+        if self.of_residual
+            && let Some(points) = &mut self.points
+        {
+            return points.mass(M.as_mut_slice());
+        }
         mass_matrix_at_poses(&self.arm.model, &mut self.data);
         for (column, &l) in self.free.iter().enumerate() {
             for (row, &k) in self.free.iter().enumerate() {
@@ -501,6 +568,9 @@ impl SecondOrderSystem for ReducedArm {
     }
 
     fn along_tree(&mut self, c_D: f64, c_K: f64, to: &mut TreeMatrices) -> bool {
+        if self.tree.is_some() {
+            self.place();
+        }
         let Some(tree) = &mut self.tree else { return false };
         let placed = tree.place(&self.arm.model, &self.data, &self.state, &mut to.nodes);
         if placed {
@@ -511,6 +581,7 @@ impl SecondOrderSystem for ReducedArm {
 
     fn with_modes(&mut self, c_D: f64, c_K: f64, to: &mut ModeMatrices) -> bool {
         let Some(mut held) = self.modes.take() else { return false };
+        self.place();
         mass_matrix_at_poses(&self.arm.model, &mut self.data);
         self.damping_and_stiffness(c_D, c_K, &mut held.dense);
         self.stiffness(&mut held.K);

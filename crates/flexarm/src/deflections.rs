@@ -1,4 +1,4 @@
-//! How far the tool is off in many runs of one arm, on all cores and four runs at a time in each.
+//! How far the tool is off in many runs of one arm, on all cores and several runs at a time in each.
 //!
 //! For studies: payload, motion, stiffness and damping vary, and of each run the deflection is wanted, not recordings, drives or
 //! settling; these are [`Arm::simulate_batch`]'s. Start at [`Arm::deflections`].
@@ -11,9 +11,6 @@ use crate::error::{Error, ValueError};
 use crate::options::RunOptions;
 use crate::prepare::{loaded, runnable};
 use crate::scenario::Scenario;
-
-/// Runs of which one thread takes care at a time.
-const CHUNK: usize = 4;
 
 /// One run of [`Arm::deflections`]: what happens, and what is different in the arm.
 #[derive(Clone, Debug)]
@@ -50,7 +47,7 @@ impl Arm {
     ///
     /// Figures are taken at the start and at the end of every step, not at the log rate. Runs of one tree (same links and
     /// joints, whatever their inertias, stiffness, damping and motion) go four at a time through the vector instructions of
-    /// processors with AVX2; loads, torque-driven joints, curved springs, motions with corners and other steppers than
+    /// processors with AVX2, eight at a time through those of AVX-512; loads, torque-driven joints, curved springs, motions with corners and other steppers than
     /// generalised-alpha take a run out of that. The numbers are the same to the last bit in any company, order and number of
     /// threads. A run that fails does not stop the others.
     ///
@@ -76,7 +73,7 @@ impl Arm {
         // Side by side go runs that last about equally long.
         let mut order: Vec<usize> = (0..runs.len()).collect();
         order.sort_by(|a, b| runs[*a].scenario.duration_s().total_cmp(&runs[*b].scenario.duration_s()));
-        let found = order.par_chunks(CHUNK).flat_map_iter(|numbers| {
+        let found = order.par_chunks(Batch::most_side_by_side()).flat_map_iter(|numbers| {
             if stop() {
                 let stopped = || Err(Error::Interrupted { t: 0.0, partial: false });
                 return numbers.iter().map(|number| (*number, stopped())).collect::<Vec<_>>();

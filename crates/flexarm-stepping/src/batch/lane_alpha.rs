@@ -4,6 +4,8 @@
 //! one lane needs a matrix, all compute one and the others keep theirs. A lane that would do anything else than take whole
 //! steps, or whose step fails, is left behind ([`LaneAlpha::left_behind`]): its run is to be taken alone.
 
+use std::sync::Arc;
+
 use flexarm_kinematics::{Frame, Real};
 use nalgebra::{DMatrix, DVector, Vector3};
 
@@ -11,8 +13,10 @@ use crate::arm::FlexibleArm;
 use crate::batch::lane_arm::{LaneArm, set_lane};
 use crate::dense::{congruence, dot, larger, product, solve_in_place};
 use crate::error::StepError;
+use crate::events::{IMPULSE_DEFECT, SLOW};
 use crate::implicit::{ImplicitStep, Newton, Search, Sizes};
 use crate::integrator::TimeGrid;
+use crate::motion::PrescribedMotion;
 use crate::reduced::ReducedArm;
 use crate::statics::static_equilibrium;
 use crate::stepper::{LARGEST_DEFLECTION, Start};
@@ -30,9 +34,9 @@ enum Part {
     End,
 }
 
-/// One run: its own view of motion and events, and the memory of its Newton iterations.
+/// One run: its motion, and the memory of its Newton iterations.
 struct Lane {
-    system: ReducedArm,
+    motion: Arc<dyn PrescribedMotion>,
     newton: Newton,
     /// `c_D D + c_K K` and K, which do not change.
     C: DMatrix<f64>,
@@ -43,6 +47,56 @@ struct Lane {
     alive: bool,
 }
 
+/// Prescribed joints at the start of a step, by which it is known whether the step has to be cut, as [`ReducedArm::resolved`] tells.
+struct Joints<T> {
+    /// Room for the motion of one lane.
+    own: [Vec<f64>; 3],
+    qdot: Vec<T>,
+    qddot: Vec<T>,
+    /// Largest speeds so far.
+    top: Vec<T>,
+}
+
+impl<T: Real> Joints<T> {
+    fn new(n: usize) -> Self {
+        let zeros = || vec![T::zero(); n];
+        Self {
+            own: [vec![0.0; n], vec![0.0; n], vec![0.0; n]],
+            qdot: zeros(),
+            qddot: zeros(),
+            top: vec![T::splat(SLOW); n],
+        }
+    }
+
+    /// A step begins with these rates.
+    #[inline(always)]
+    fn begin(&mut self, qdot: &[T], qddot: &[T]) {
+        self.qdot.copy_from_slice(qdot);
+        self.qddot.copy_from_slice(qddot);
+        for (top, speed) in self.top.iter_mut().zip(qdot) {
+            *top = larger(*top, speed.abs());
+        }
+    }
+
+    /// 1 where a step of length h may end with these rates; the next one begins with them.
+    #[inline(always)]
+    fn meets_impulse(&mut self, h: f64, qdot: &[T], qddot: &[T]) -> T {
+        let [(_, at_start), (_, at_end)] = GeneralizedAlpha::ENDS;
+        let mut meets = T::one();
+        for k in 0..qdot.len() {
+            let mean = T::zero() + T::splat(at_start) * self.qddot[k];
+            let defect = qdot[k] - self.qdot[k] - T::splat(h) * (mean + T::splat(at_end) * qddot[k]);
+            let bound = T::splat(IMPULSE_DEFECT) * larger(self.top[k], qdot[k].abs());
+            // No number meets anything.
+            let below = bound.pick_below(defect.abs(), T::zero(), meets);
+            let number = (defect * T::zero()).pick_below(T::splat(0.5), T::one(), T::zero());
+            meets = number.pick_below(T::splat(0.5), T::zero(), below);
+        }
+        self.begin(qdot, qddot);
+        meets
+    }
+}
+
 /// Runs in lanes, at one time.
 pub(super) struct LaneAlpha<T: Real> {
     coefficients: Coefficients,
@@ -51,6 +105,7 @@ pub(super) struct LaneAlpha<T: Real> {
     lanes: Vec<Lane>,
     searches: Vec<Search>,
     arm: LaneArm<T>,
+    joints: Joints<T>,
     pub(super) grid: TimeGrid,
     /// Positions, velocities, accelerations; ẍ one step before, a and x̃.
     x: Vec<T>,
@@ -100,6 +155,7 @@ impl<T: Real> LaneAlpha<T> {
             c_h2: c * h * h,
             lanes: Vec::new(),
             searches: Vec::with_capacity(T::LANES),
+            joints: Joints::new(arm.joints()),
             arm,
             grid: TimeGrid::new(0.0, h),
             x: zeros(),
@@ -127,6 +183,8 @@ impl<T: Real> LaneAlpha<T> {
                 Err(error) => return Some(Err((lane, error))),
             }
         }
+        let [qdot, qddot] = all.arm.joint_rates();
+        all.joints.begin(qdot, qddot);
         all.arm.place_joints();
         all.a.copy_from_slice(&all.acceleration);
         all.x_tilde.copy_from_slice(&all.acceleration);
@@ -169,7 +227,7 @@ impl<T: Real> LaneAlpha<T> {
         if course.is_some() {
             newton = newton.keeping(FOLLOWED_TO);
         }
-        Ok(Lane { system, newton, C, K, course, alive: true })
+        Ok(Lane { motion: arm.motion.clone(), newton, C, K, course, alive: true })
     }
 
     fn place_joints(&mut self, lane: usize, system: &ReducedArm) {
@@ -293,14 +351,18 @@ impl<T: Real> LaneAlpha<T> {
     }
 
     /// Joints of all lanes at the end of the step; a step that has to be cut is none for lanes.
+    #[inline(always)]
     fn sample(&mut self, t: f64) {
-        for k in 0..T::LANES {
-            let lane = &mut self.lanes[k];
-            let stop = lane.system.resolved(self.grid.time(), t, GeneralizedAlpha::MOTION_RULE);
-            lane.alive &= stop == t;
-            lane.system.sample_joints(t);
-            let (q, qdot) = (lane.system.state.q.as_slice(), lane.system.state.qdot.as_slice());
-            self.arm.set_joints(k, q, qdot, lane.system.qddot.as_slice());
+        let joints = &mut self.joints;
+        for (k, lane) in self.lanes.iter().enumerate() {
+            let [q, qdot, qddot] = &mut joints.own;
+            lane.motion.sample(t, q, qdot, qddot);
+            self.arm.set_joints(k, q, qdot, qddot);
+        }
+        let [qdot, qddot] = self.arm.joint_rates();
+        let meets = joints.meets_impulse(t - self.grid.time(), qdot, qddot);
+        for (k, lane) in self.lanes.iter_mut().enumerate() {
+            lane.alive &= meets.lane(k) == 1.0;
         }
     }
 
@@ -408,6 +470,7 @@ struct Matrices {
     /// `S C Sᵀ`.
     product: Vec<f64>,
     L: Vec<f64>,
+    turned: Vec<f64>,
     M_inverse_K: Vec<f64>,
     inverse: Vec<f64>,
 }
@@ -415,19 +478,27 @@ struct Matrices {
 impl Matrices {
     fn new(n: usize) -> Self {
         let square = || vec![0.0; n * n];
-        Self { n, S: square(), product: square(), L: square(), M_inverse_K: square(), inverse: square() }
+        Self {
+            n,
+            S: square(),
+            product: square(),
+            L: square(),
+            turned: square(),
+            M_inverse_K: square(),
+            inverse: square(),
+        }
     }
 
     /// `M^-1 K` and the inverse of Newton's matrix from S and a run's C and K, as the dispersion correction of a single run has them; false
     /// if there is none.
     #[inline(always)]
     fn invert(&mut self, c_h2: f64, C: &[f64], K: &[f64]) -> bool {
-        let Self { n, S, product, L, M_inverse_K, inverse } = self;
+        let Self { n, S, product, L, turned, M_inverse_K, inverse } = self;
         let n = *n;
         L.copy_from_slice(S);
         M_inverse_K.copy_from_slice(K);
         let positive = solve_in_place(L, M_inverse_K, n);
-        congruence(c_h2, M_inverse_K, C, n, L, product);
+        congruence(c_h2, M_inverse_K, C, n, [L, turned], product);
         // M + c h² K + S C Sᵀ, and Sᵀ on the right-hand side, which is kept transposed.
         for ((s, k), c) in S.iter_mut().zip(K).zip(product.iter()) {
             *s += c_h2 * *k;

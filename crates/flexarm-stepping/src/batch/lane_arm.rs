@@ -4,10 +4,12 @@
 //! nothing happens at discrete times.
 
 use flexarm_kinematics::lanes::{
-    LaneTree, forward_kinematics, inverse_dynamics, mass_matrix_at_poses, rigid_and_flexible,
+    LaneTree, forward_kinematics, free_forces, free_mass, inverse_dynamics, mass_matrix_at_poses, point_tree,
+    rigid_and_flexible,
 };
 use flexarm_kinematics::products::sub;
-use flexarm_kinematics::{Data, Frame, Real, State};
+use flexarm_kinematics::space::Plain;
+use flexarm_kinematics::{Data, Frame, Motions, PointTree, Real, Roles, State};
 use nalgebra::Vector3;
 
 use crate::arm::FlexibleArm;
@@ -29,6 +31,8 @@ struct Element<T> {
 /// Arms in lanes, with the workspaces of their equations of motion.
 pub(super) struct LaneArm<T: Real> {
     tree: LaneTree<T>,
+    /// The equations of motion of the elastic coordinates alone, where the tree is for it.
+    points: Option<PointTree<Plain<T>>>,
     data: Data<T>,
     state: State<T>,
     qddot: Vec<T>,
@@ -84,6 +88,7 @@ impl<T: Real> LaneArm<T> {
         let D = (!first.proportional).then(|| (0..n * n).map(|i| gather(arms, |arm| arm.D[i])).collect());
         let model = tree.model();
         Some(Self {
+            points: point_tree(&tree, &Roles::actuated_prescribed(model)),
             data: Data::new(model),
             state: State::zeros(model),
             qddot: vec![T::zero(); model.nv()],
@@ -113,6 +118,12 @@ impl<T: Real> LaneArm<T> {
         set_lane(&mut self.qddot[..n], lane, qddot);
     }
 
+    /// Velocities and accelerations of the joints.
+    pub(super) fn joint_rates(&self) -> [&[T]; 2] {
+        let n = self.joints();
+        [&self.state.qdot.as_slice()[..n], &self.qddot[..n]]
+    }
+
     /// Poses of the joints before any residual.
     #[inline(always)]
     pub(super) fn place_joints(&mut self) {
@@ -134,8 +145,16 @@ impl<T: Real> LaneArm<T> {
         set(active, x, &mut self.state.q.as_mut_slice()[n..]);
         set(active, v, &mut self.state.qdot.as_mut_slice()[n..]);
         set(active, a, &mut self.qddot[n..]);
-        inverse_dynamics(&self.tree, &mut self.data, &self.state, &self.qddot);
-        r.copy_from_slice(&self.data.tau.as_slice()[n..]);
+        match &mut self.points {
+            Some(points) => {
+                let (q, qdot) = (self.state.q.as_slice(), self.state.qdot.as_slice());
+                free_forces(points, &mut self.data, Motions { q, qdot, qddot: &self.qddot }, r);
+            }
+            None => {
+                inverse_dynamics(&self.tree, &mut self.data, &self.state, &self.qddot);
+                r.copy_from_slice(&self.data.tau.as_slice()[n..]);
+            }
+        }
         let (x, v) = (&self.state.q.as_slice()[n..], &self.state.qdot.as_slice()[n..]);
         for element in &self.elements {
             let range = element.first..element.first + element.size;
@@ -156,6 +175,9 @@ impl<T: Real> LaneArm<T> {
     /// Mass matrix at the configuration of the last residual.
     #[inline(always)]
     pub(super) fn mass(&mut self, M: &mut [T]) {
+        if let Some(points) = &mut self.points {
+            return free_mass(points, M);
+        }
         mass_matrix_at_poses(&self.tree, &mut self.data);
         let (n, joints) = (self.dimension(), self.joints());
         for (column, to) in M.chunks_exact_mut(n).enumerate() {

@@ -1,6 +1,6 @@
 //! Many runs of one tree: payload, motion, stiffness, damping and duration differ from run to run.
 //!
-//! Four runs go side by side in the lanes of vector instructions, where the processor has them; what comes out is, to the last
+//! Four or eight runs go side by side in the lanes of vector instructions, where the processor has them; what comes out is, to the last
 //! bit, that of the same run alone ([`Batch::run_alone`]). Runs that lanes do not know (other trees, servos, loads, payloads that
 //! change, curved springs, velocities that jump), and those whose steps have to be cut or do not converge, are taken alone.
 //! What a batch tells of a run is how far the tool is from where the rigid arm has it. Start at [`Batch::run`]; threads are
@@ -84,13 +84,13 @@ impl ToolDeflection {
 }
 
 impl Batch {
-    /// The runs, four side by side where that is possible. Runs that last equally long waste least.
+    /// The runs, as many side by side as [`Batch::most_side_by_side`] where that is possible. Runs that last equally long waste least.
     ///
     /// # Errors
     /// Of each run its own: [`StepError`] as by a stepper.
     pub fn run(&self, runs: &[BatchRun]) -> Vec<Result<ToolDeflection, StepError>> {
         let mut all = Vec::with_capacity(runs.len());
-        for group in runs.chunks(4) {
+        for group in runs.chunks(Self::most_side_by_side()) {
             match self.side_by_side(group) {
                 Some(results) => {
                     let pairs = results.into_iter().zip(group);
@@ -100,6 +100,18 @@ impl Batch {
             }
         }
         all
+    }
+
+    /// Runs that this processor takes side by side: eight with AVX-512, four with AVX2.
+    #[cfg(target_arch = "x86_64")]
+    pub fn most_side_by_side() -> usize {
+        flexarm_kinematics::most_lanes()
+    }
+
+    /// Runs that this processor takes side by side.
+    #[cfg(not(target_arch = "x86_64"))]
+    pub fn most_side_by_side() -> usize {
+        1
     }
 
     /// One run by itself.
@@ -151,7 +163,7 @@ impl Batch {
                 self.0.in_lanes::<T>(self.1)
             }
         }
-        with_lanes(Group(self, runs))?
+        with_lanes(runs.len(), Group(self, runs))?
     }
 
     #[cfg(not(target_arch = "x86_64"))]

@@ -1,4 +1,4 @@
-//! Many poses of one arm, four side by side where the processor and the arm allow it.
+//! Many poses of one arm, four or eight side by side where the processor and the arm allow it.
 
 #[cfg(target_arch = "x86_64")]
 use flexarm_kinematics::{OverLanes, Real, with_lanes};
@@ -9,6 +9,9 @@ use super::OperatingPoint;
 #[cfg(target_arch = "x86_64")]
 use super::lanes::{LanePoints, plain};
 use crate::error::StepError;
+
+/// Most poses side by side.
+const LANES: usize = 8;
 
 /// What is asked of many poses beside their equilibrium: [`OperatingPoint::solve_each`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -72,7 +75,7 @@ impl OperatingPoint {
         mut seen: impl FnMut(usize, Result<&PoseAnswer, StepError>),
     ) {
         let joints = self.arm.model.n_actuated().max(1);
-        let mut answers = vec![PoseAnswer::new(self.r.len()); 4];
+        let mut answers = vec![PoseAnswer::new(self.r.len()); LANES];
         let done = self.in_lanes(poses, F_T_W, asked, &mut answers, &mut seen);
         for (k, pose) in poses.chunks(joints).enumerate().skip(done) {
             let answer = self.alone(pose, F_T_W, asked, &mut answers[0]);
@@ -121,7 +124,7 @@ impl OperatingPoint {
         if joints == 0 || poses.len() < 2 * joints || !finite || !plain(&self.arm) {
             return 0;
         }
-        with_lanes(InLanes { point: self, poses, F_T_W, asked, answers, seen }).unwrap_or(0)
+        with_lanes(poses.len() / joints, InLanes { point: self, poses, F_T_W, asked, answers, seen }).unwrap_or(0)
     }
 
     #[cfg(not(target_arch = "x86_64"))]
@@ -171,7 +174,7 @@ impl OverLanes for InLanes<'_> {
             if !found.any_above(0.5) {
                 break;
             }
-            points.answer(asked, answers);
+            points.answer(asked, &mut answers[..T::LANES]);
             for (lane, (pose, answer)) in group.chunks(joints).zip(answers.iter_mut()).enumerate() {
                 match found.lane(lane) == 1.0 && usable(pose) {
                     true => seen(done, Ok(answer)),

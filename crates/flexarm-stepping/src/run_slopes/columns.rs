@@ -1,42 +1,7 @@
 //! Loops over whole columns, with the vector instructions that the processor has. Operations and their order are the same with and without.
 
+use crate::dense::{Loops, quickly};
 use nalgebra::{DMatrix, Dim, Dyn, IsContiguous, Matrix, RawStorage};
-
-/// Loops over slices, inlined down to them.
-pub(super) trait Work {
-    /// Does it.
-    fn run(self);
-}
-
-/// Does the work.
-#[cfg(target_arch = "x86_64")]
-pub(super) fn quickly(work: impl Work) {
-    use flexarm_kinematics::{OverLanes, Real, with_lanes};
-
-    /// Lanes are the compiler's here.
-    struct Compiled<'a, W>(&'a mut Option<W>);
-    impl<W: Work> OverLanes for Compiled<'_, W> {
-        type Output = ();
-
-        #[inline(always)]
-        fn run<T: Real>(self) {
-            if let Some(work) = self.0.take() {
-                work.run();
-            }
-        }
-    }
-    let mut work = Some(work);
-    with_lanes(Compiled(&mut work));
-    if let Some(work) = work {
-        work.run();
-    }
-}
-
-/// Does the work.
-#[cfg(not(target_arch = "x86_64"))]
-pub(super) fn quickly(work: impl Work) {
-    work.run();
-}
 
 /// `toᵀ += A Xᵀ` for the block of A from this row and column on.
 pub(super) fn add_product<R: Dim, S: RawStorage<f64, R, Dyn> + IsContiguous>(
@@ -60,7 +25,7 @@ struct AddProduct<'a> {
     p: usize,
 }
 
-impl Work for AddProduct<'_> {
+impl Loops for AddProduct<'_> {
     #[inline(always)]
     fn run(self) {
         let Self { A, rows, corner: (row, column), X, to, p } = self;

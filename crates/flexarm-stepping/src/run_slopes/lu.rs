@@ -2,8 +2,8 @@
 
 use nalgebra::DMatrix;
 
+use crate::dense::{Loops, quickly};
 use crate::error::StepError;
-use crate::run_slopes::columns::{self, Work};
 
 /// `P A = L U`.
 #[derive(Clone, Debug)]
@@ -53,7 +53,7 @@ impl Lu {
         for (k, row) in self.rows.iter().enumerate() {
             B.swap_columns(k, *row);
         }
-        columns::quickly(Eliminate { A: &self.A, B: B.as_mut_slice(), p });
+        quickly(Eliminate { A: &self.A, B: B.as_mut_slice(), p });
     }
 }
 
@@ -63,7 +63,7 @@ struct Eliminate<'a> {
     p: usize,
 }
 
-impl Work for Eliminate<'_> {
+impl Loops for Eliminate<'_> {
     #[inline(always)]
     fn run(self) {
         let Self { A, B, p } = self;

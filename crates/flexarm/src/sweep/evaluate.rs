@@ -30,9 +30,6 @@ pub(super) struct Answer {
 /// Values of the metrics, and by how much each constraint is passed.
 pub(super) type Judgement = (Vec<f64>, Vec<f64>);
 
-/// Runs side by side.
-const LANES: usize = 4;
-
 /// A run of the quick way.
 struct QuickRun {
     place: usize,
@@ -146,7 +143,7 @@ impl Sweep {
         // Side by side go runs that last about equally long.
         going.sort_by(|a, b| a.run.duration_s.total_cmp(&b.run.duration_s).then(a.place.cmp(&b.place)));
         for group in going.chunk_by(QuickRun::goes_with) {
-            for few in group.chunks(LANES) {
+            for few in group.chunks(Batch::most_side_by_side()) {
                 if stop.load(Ordering::Relaxed) {
                     return;
                 }

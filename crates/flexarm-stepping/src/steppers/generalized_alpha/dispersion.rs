@@ -10,7 +10,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::dense::{congruence, product, solve_in_place};
+use super::loops::Shifted;
+use crate::dense::{congruence_quickly, product_of_numbers, quickly, solve_quickly};
 use crate::error::StepError;
 use crate::iteration_matrix::{IterationMatrix, Way};
 use crate::system::SecondOrderSystem;
@@ -27,7 +28,7 @@ pub(super) struct DispersionCorrection {
     /// `M^-1 K` at the configuration of the last matrix.
     M_inverse_K: DMatrix<f64>,
     /// Room for the factor of M and products.
-    room: [DMatrix<f64>; 2],
+    room: [DMatrix<f64>; 3],
     /// `M^-1 K` times a vector.
     shift: DVector<f64>,
 }
@@ -41,7 +42,7 @@ impl DispersionCorrection {
             c_h2: c * h * h,
             K: none.clone(),
             M_inverse_K: none.clone(),
-            room: [none.clone(), none],
+            room: [none.clone(), none.clone(), none],
             shift: DVector::zeros(n),
         }
     }
@@ -78,10 +79,10 @@ impl DispersionCorrection {
         kept: bool,
     ) -> Result<(), StepError> {
         let Way::Dense(matrix) = &mut matrix.way else { return Ok(()) };
-        let Self { c_h2, K, M_inverse_K, room: [factor, product], shift, .. } = self;
+        let Self { c_h2, K, M_inverse_K, room: [factor, turned, product], shift, .. } = self;
         let (c_h2, n) = (*c_h2, shift.len());
         if K.nrows() != n {
-            for matrix in [&mut *K, &mut *M_inverse_K, &mut *factor, &mut *product] {
+            for matrix in [&mut *K, &mut *M_inverse_K, &mut *factor, &mut *turned, &mut *product] {
                 *matrix = DMatrix::zeros(n, n);
             }
         }
@@ -90,14 +91,14 @@ impl DispersionCorrection {
         // M^-1 K; K is symmetric.
         if !kept {
             M_inverse_K.copy_from(K);
-            if !solve_in_place(factor.as_mut_slice(), M_inverse_K.as_mut_slice(), n) {
+            if !solve_quickly(factor.as_mut_slice(), M_inverse_K.as_mut_slice(), n) {
                 return Err(StepError::Singular { matrix: "mass matrix", t });
             }
         }
 
         // S C Sᵀ
         let (X, C) = (M_inverse_K.as_slice(), matrix.C.as_slice());
-        congruence(c_h2, X, C, n, factor.as_mut_slice(), product.as_mut_slice());
+        congruence_quickly(c_h2, X, C, n, [factor.as_mut_slice(), turned.as_mut_slice()], product.as_mut_slice());
         matrix.C.copy_from(product);
 
         // M + c h² K, and Sᵀ on the right-hand side, which is kept transposed.
@@ -119,8 +120,8 @@ impl DispersionCorrection {
             Way::Dense(_) => {}
         }
         self.shift_by(acceleration);
-        x_tilde.copy_from(acceleration);
-        x_tilde.axpy(self.c_h2, &self.shift, 1.0);
+        let (a, shift) = (acceleration.as_slice(), self.shift.as_slice());
+        quickly(Shifted { a, c_h2: self.c_h2, shift, to: x_tilde.as_mut_slice() });
     }
 
     /// What a change d of ẍ, the last solution with the matrix, adds to the change of x̃, coordinate by coordinate: a factor and
@@ -137,6 +138,6 @@ impl DispersionCorrection {
 
     /// `M^-1 K d`.
     fn shift_by(&mut self, d: &DVector<f64>) {
-        product(self.M_inverse_K.as_slice(), d.as_slice(), self.shift.as_mut_slice());
+        product_of_numbers(self.M_inverse_K.as_slice(), d.as_slice(), self.shift.as_mut_slice());
     }
 }

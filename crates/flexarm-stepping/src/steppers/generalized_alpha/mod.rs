@@ -34,11 +34,13 @@
 
 mod course;
 mod dispersion;
+mod loops;
 
 use flexarm_kinematics::Real;
 use nalgebra::DVector;
 
 use crate::arm::FlexibleArm;
+use crate::dense::quickly;
 use crate::error::StepError;
 use crate::implicit::{ImplicitStep, Newton, Search, Sizes};
 use crate::integrator::{Current, ReducedStepper};
@@ -238,6 +240,11 @@ impl Coefficients {
 }
 
 impl GeneralizedAlpha {
+    /// Its [`Integrator::MOTION_RULE`]: the ends of a step alone.
+    ///
+    /// [`Integrator::MOTION_RULE`]: crate::Integrator::MOTION_RULE
+    pub(crate) const ENDS: [(f64, f64); 2] = [(0.0, 0.5), (1.0, 0.5)];
+
     /// Starts at `t0` with step `h` (s).
     ///
     /// # Errors
@@ -332,8 +339,8 @@ impl GeneralizedAlpha {
             (&mut self.course, &mut self.correction, &mut self.newton.matrix.way)
         {
             let (change, _) = course.step();
-            add(dense.inverse.as_mut_slice(), &change[0]);
-            add(correction.M_inverse_K_mut(), &change[1]);
+            quickly(loops::Add(dense.inverse.as_mut_slice(), &change[0]));
+            quickly(loops::Add(correction.M_inverse_K_mut(), &change[1]));
         }
     }
 
@@ -344,11 +351,13 @@ impl GeneralizedAlpha {
             Some(correction) => correction.corrected(&mut self.newton.matrix, &self.trial, &mut self.x_tilde_new),
             None => self.x_tilde_new.copy_from(&self.trial),
         }
-        for k in 0..self.now.x.len() {
-            let (x, v, a) = (self.now.x[k], self.now.v[k], self.a[k]);
-            (self.x_new[k], self.v_new[k]) =
-                self.coefficients.advance(h, x, v, a, self.x_tilde[k], self.x_tilde_new[k]);
-        }
+        quickly(loops::Place {
+            coefficients: self.coefficients,
+            h,
+            now: [self.now.x.as_slice(), self.now.v.as_slice(), self.a.as_slice(), self.x_tilde.as_slice()],
+            x_tilde_new: self.x_tilde_new.as_slice(),
+            to: [self.x_new.as_mut_slice(), self.v_new.as_mut_slice()],
+        });
     }
 
     /// `r(t⁺, x⁺, v⁺, ẍ⁺)` of (1).
@@ -358,25 +367,27 @@ impl GeneralizedAlpha {
 
     /// Takes the correction `d = J^-1 r` of ẍ⁺ off everything on trial.
     fn correct(&mut self, mut sizes: Sizes) -> Sizes {
-        let (c_D, c_K) = self.coefficients.derivatives(self.newton.dt);
         let d = &self.newton.r;
         let shift = self.correction.as_mut().map(|correction| correction.shift(&self.newton.matrix, d));
-        for k in 0..d.len() {
-            let d_tilde = d[k] + shift.map_or(0.0, |(c_h2, stiff)| c_h2 * stiff[k]);
-            self.trial[k] -= d[k];
-            self.x_tilde_new[k] -= d_tilde;
-            self.x_new[k] -= c_K * d_tilde;
-            self.v_new[k] -= c_D * d_tilde;
-            sizes.include(d[k], self.trial[k], self.x_new[k]);
-        }
+        let [trial, x_tilde] = [self.trial.as_mut_slice(), self.x_tilde_new.as_mut_slice()];
+        quickly(loops::Correct {
+            d: d.as_slice(),
+            shift: shift.map(|(factor, shift)| (factor, shift.as_slice())),
+            derivatives: self.coefficients.derivatives(self.newton.dt),
+            trial: [trial, x_tilde, self.x_new.as_mut_slice(), self.v_new.as_mut_slice()],
+            sizes: &mut sizes,
+        });
         sizes
     }
 
     /// What was on trial becomes the state at t.
     fn accept(&mut self, t: f64) {
-        for k in 0..self.now.x.len() {
-            self.a[k] = self.coefficients.remembered(self.a[k], self.x_tilde[k], self.x_tilde_new[k]);
-        }
+        quickly(loops::Remember {
+            coefficients: self.coefficients,
+            a: self.a.as_mut_slice(),
+            x_tilde: self.x_tilde.as_slice(),
+            x_tilde_new: self.x_tilde_new.as_slice(),
+        });
         std::mem::swap(&mut self.now.x, &mut self.x_new);
         std::mem::swap(&mut self.now.v, &mut self.v_new);
         std::mem::swap(&mut self.x_tilde, &mut self.x_tilde_new);
@@ -395,8 +406,7 @@ pub(crate) fn add<T: Real>(A: &mut [T], B: &[T]) {
 }
 
 impl ImplicitStep for GeneralizedAlpha {
-    /// At the ends alone.
-    const MOTION_RULE: &'static [(f64, f64)] = &[(0.0, 0.5), (1.0, 0.5)];
+    const MOTION_RULE: &'static [(f64, f64)] = &Self::ENDS;
 
     fn current(&self) -> &Current {
         &self.now
@@ -433,9 +443,8 @@ impl ImplicitStep for GeneralizedAlpha {
         }
 
         // Predict ẍ⁺ by extrapolation.
-        for k in 0..self.now.x.len() {
-            self.trial[k] = 2.0 * self.now.acceleration[k] - self.previous[k];
-        }
+        let (a, b) = (self.now.acceleration.as_slice(), self.previous.as_slice());
+        quickly(loops::Extrapolate { a, b, to: self.trial.as_mut_slice() });
         self.place();
 
         // Newton's method on (1).
