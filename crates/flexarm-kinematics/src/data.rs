@@ -9,6 +9,7 @@ use nalgebra::{DMatrix, DVector, Isometry, Matrix3, Rotation3, Scalar, Translati
 
 use crate::axis_motion::AxisMotion;
 use crate::closure::LoopData;
+use crate::crba::{SixWrenches, Turned};
 use crate::modal::ModalData;
 use crate::model::{Body, Frame, JointMotion, Model};
 
@@ -62,10 +63,14 @@ pub struct Data<T: Scalar = f64> {
     pub(crate) elastic: Vec<ElasticSubspace<T>>,
     pub(crate) bias: Vec<Twist<T>>,
     pub(crate) composite: Vec<SpatialInertia<T>>,
+    /// Bodies in the axes of the mass matrix's recursion, and the wrenches of its columns.
+    pub(crate) turned: Vec<Turned<T>>,
+    pub(crate) single: Vec<Wrench<T>>,
+    pub(crate) six: Vec<SixWrenches<T>>,
     pub(crate) articulated: Vec<ArticulatedInertia>,
     pub(crate) pA: Vec<Wrench>,
     /// One-DoF joints: U = I S, 1/(Sᵀ U), u.
-    pub(crate) U: Vec<Wrench<T>>,
+    pub(crate) U: Vec<Wrench>,
     pub(crate) inverse_d: Vec<f64>,
     pub(crate) u: Vec<f64>,
     /// The caller's external wrenches while those of the balancers are added; none without balancers.
@@ -102,6 +107,9 @@ impl<T: Real> Data<T> {
             elastic: vec![ElasticSubspace { L: Matrix3::identity(), B: Matrix3::identity() }; n],
             bias: vec![zero; n],
             composite: vec![SpatialInertia::lift(&SpatialInertia::zeros()); n],
+            turned: vec![Turned::identity(); n],
+            single: vec![Wrench::zeros(); model.single.len()],
+            six: vec![SixWrenches::zeros(); model.six.len()],
             articulated: vec![ArticulatedInertia::from_rigid(&SpatialInertia::zeros()); n],
             pA: vec![Wrench::zeros(); n],
             U: vec![Wrench::zeros(); n],

@@ -238,17 +238,31 @@ impl<T: Real> SpatialInertia<T> {
     /// The same body about Ao in A axes, for `X_AB`.
     #[inline(always)]
     pub fn at_parent(&self, X_AB: &Pose<T>) -> SpatialInertia<T> {
-        let R = X_AB.rotation.matrix();
-        let p = &X_AB.translation.vector;
-        let h = mul(R, &self.first_moment);
+        self.turned(X_AB.rotation.matrix()).shifted(&X_AB.translation.vector)
+    }
+
+    /// In A axes, for `R_AB`.
+    #[inline(always)]
+    pub fn turned(&self, R: &Matrix3<T>) -> SpatialInertia<T> {
+        let Self { mass, first_moment, rotational } = self;
+        SpatialInertia { mass: *mass, first_moment: mul(R, first_moment), rotational: turn_symmetric(R, rotational) }
+    }
+
+    /// About a point p before this one.
+    #[inline(always)]
+    pub fn shifted(&self, p: &Vector3<T>) -> SpatialInertia<T> {
+        let h = &self.first_moment;
         let (half, two) = (T::splat(0.5), T::splat(2.0));
-        // I_A = R I Rᵀ + (2 p·h + m p·p) 1 - (p hᵀ + h pᵀ + m p pᵀ)
-        let k = add(&h, &scaled(p, self.mass * half));
+        // I_A = I_B + (2 p·h + m p·p) 1 - (p hᵀ + h pᵀ + m p pᵀ)
+        let k = add(h, &scaled(p, self.mass * half));
         let (x, y, z) = (p.x * two * k.x, p.y * two * k.y, p.z * two * k.z);
         let (xy, xz, yz) = (p.x * k.y + k.x * p.y, p.x * k.z + k.x * p.z, p.y * k.z + k.y * p.z);
         let moved = Matrix3::new(y + z, -xy, -xz, -xy, x + z, -yz, -xz, -yz, x + y);
-        let I = add3(&turn_symmetric(R, &self.rotational), &moved);
-        SpatialInertia { mass: self.mass, first_moment: add(&h, &scaled(p, self.mass)), rotational: I }
+        SpatialInertia {
+            mass: self.mass,
+            first_moment: add(h, &scaled(p, self.mass)),
+            rotational: add3(&self.rotational, &moved),
+        }
     }
 
     /// Inertia of a constant body in the scalar of a recursion.
