@@ -314,14 +314,14 @@ fn six<T: Real>(S: &ElasticSubspace<T>, F: &Wrench<T>) -> [T; 6] {
 /// [`six`] of six wrenches: a row for each coordinate.
 #[inline(always)]
 fn six_by_six<T: Real>(S: &ElasticSubspace<T>, F: &SixWrenches<T>) -> [[T; 6]; 6] {
-    [
-        along(&column(&S.L, 0), &F.force).0,
-        along(&column(&S.L, 1), &F.force).0,
-        along(&column(&S.L, 2), &F.force).0,
-        along(&column(&S.B, 0), &F.torque).0,
-        along(&column(&S.B, 1), &F.torque).0,
-        along(&column(&S.B, 2), &F.torque).0,
-    ]
+    let ([a, b, c], [d, e, f]) = (three_by_six(&S.L, &F.force), three_by_six(&S.B, &F.torque));
+    [a, b, c, d, e, f]
+}
+
+/// `Aᵀ` times three rows.
+#[inline(always)]
+fn three_by_six<T: Real>(A: &Matrix3<T>, rows: &[[T; 6]; 3]) -> [[T; 6]; 3] {
+    [along(&column(A, 0), rows).0, along(&column(A, 1), rows).0, along(&column(A, 2), rows).0]
 }
 
 /// A column of shapes times what six coordinates meet.
@@ -342,7 +342,7 @@ fn interface_columns<T: Real>(model: &Model, data: &mut Data<T>, i: usize) {
     let (nv, c, S) = (data.M.nrows(), entry.coordinate, &own.S);
     let shape = &entry.tables.shapes.interfaces[interface];
     let M = data.M.as_mut_slice();
-    for (k, column) in data.modal[modal].columns.iter_mut().enumerate() {
+    for (k, column) in data.modal[modal].columns[..entry.tables.moving[interface]].iter_mut().enumerate() {
         let F = composite.mul_twist(&shape.twist(k, &S.L, &S.B));
         shape.project(&S.L, &S.B, &F, &mut M[(c + k) * nv + c..][..entry.n]);
         *column += Wrench::new(F.force, add(&F.torque, &cross(&own.r, &F.force)));
@@ -399,20 +399,14 @@ impl<'m, T: Real> Lower<'m, T> {
     #[inline(always)]
     fn put_own_block(&mut self, k: usize, mass: T, S: &ElasticSubspace<T>, F: &SixWrenches<T>) {
         let zero = T::zero();
-        let tr =
-            [along(&column(&S.L, 0), &F.force), along(&column(&S.L, 1), &F.force), along(&column(&S.L, 2), &F.force)];
-        let rr = [
-            along(&column(&S.B, 0), &F.torque),
-            along(&column(&S.B, 1), &F.torque),
-            along(&column(&S.B, 2), &F.torque),
-        ];
+        let (tr, rr) = (three_by_six(&S.L, &F.force), three_by_six(&S.B, &F.torque));
         for c in 0..3 {
-            let mut values = tr[c].0;
+            let mut values = tr[c];
             for r in 0..3 {
                 values[r] = if r == c { mass } else { zero };
             }
             self.put_block_column(k, k + c, &values);
-            self.put_block_column(k, k + 3 + c, &rr[c].0);
+            self.put_block_column(k, k + 3 + c, &rr[c]);
         }
     }
 

@@ -180,7 +180,7 @@ pub(crate) fn joint_motion<T: Real>(
             let ddot = Vector3::new(qdot[0], qdot[1], qdot[2]);
             let rates = Vector3::new(qdot[3], qdot[4], qdot[5]);
             let kin = angles.kinematics(&Vector3::new(q[3], q[4], q[5]), &rates);
-            place_elastic(&mut data.X_PB[i], &body.X_PJ, &kin.R, &Vector3::new(q[0], q[1], q[2]));
+            place_elastic(&mut data.X_PB[i], body, &kin.R, &Vector3::new(q[0], q[1], q[2]));
             let L = transposed(&kin.R);
             data.elastic[i] = ElasticSubspace { L, B: kin.B };
             let V = Twist::new(mul(&L, &ddot), mul(&kin.B, &rates));
@@ -190,10 +190,11 @@ pub(crate) fn joint_motion<T: Real>(
         JointMotion::Interface { modal, interface } => {
             let modal = &model.modal[modal];
             let shape = &modal.tables.shapes.interfaces[interface];
-            let (d, phi) = shape.times(&q[k..k + modal.n]);
-            let (ddot, rates) = shape.times(&qdot[k..k + modal.n]);
+            let moving = k..k + modal.tables.moving[interface];
+            let (d, phi) = shape.times(&q[moving.clone()]);
+            let (ddot, rates) = shape.times(&qdot[moving]);
             let kin = ElasticAngles::RotationVector.kinematics(&phi, &rates);
-            place_elastic(&mut data.X_PB[i], &body.X_PJ, &kin.R, &d);
+            place_elastic(&mut data.X_PB[i], body, &kin.R, &d);
             let L = transposed(&kin.R);
             data.elastic[i] = ElasticSubspace { L, B: kin.B };
             let V = Twist::new(mul(&L, &ddot), mul(&kin.B, &rates));
@@ -216,14 +217,15 @@ pub(crate) fn joint_position<T: Real>(model: &Model, data: &mut Data<T>, i: usiz
         }
         JointMotion::Elastic(angles) => {
             let (R, B) = angles.pose(&Vector3::new(q[k + 3], q[k + 4], q[k + 5]));
-            place_elastic(&mut data.X_PB[i], &body.X_PJ, &R, &Vector3::new(q[k], q[k + 1], q[k + 2]));
+            place_elastic(&mut data.X_PB[i], body, &R, &Vector3::new(q[k], q[k + 1], q[k + 2]));
             data.elastic[i] = ElasticSubspace { L: transposed(&R), B };
         }
         JointMotion::Interface { modal, interface } => {
             let modal = &model.modal[modal];
-            let (d, phi) = modal.tables.shapes.interfaces[interface].times(&q[k..k + modal.n]);
+            let moving = k..k + modal.tables.moving[interface];
+            let (d, phi) = modal.tables.shapes.interfaces[interface].times(&q[moving]);
             let (R, B) = ElasticAngles::RotationVector.pose(&phi);
-            place_elastic(&mut data.X_PB[i], &body.X_PJ, &R, &d);
+            place_elastic(&mut data.X_PB[i], body, &R, &d);
             data.elastic[i] = ElasticSubspace { L: transposed(&R), B };
         }
     }
@@ -273,10 +275,16 @@ pub(crate) fn begin<T: Real>(model: &Model, data: &mut Data<T>, q: &[T]) {
 }
 
 #[inline(always)]
-fn place_elastic<T: Real>(X_PB: &mut Pose<T>, X_PJ: &Pose, R: &Matrix3<T>, d: &Vector3<T>) {
-    let R_PJ = lift3(X_PJ.rotation.matrix());
-    *X_PB.rotation.matrix_mut_unchecked() = mul3(&R_PJ, R);
-    X_PB.translation.vector = add(&lift(&X_PJ.translation.vector), &mul(&R_PJ, d));
+fn place_elastic<T: Real>(X_PB: &mut Pose<T>, body: &Body, R: &Matrix3<T>, d: &Vector3<T>) {
+    let p_PJ = lift(&body.X_PJ.translation.vector);
+    if body.is_parallel {
+        *X_PB.rotation.matrix_mut_unchecked() = *R;
+        X_PB.translation.vector = add(&p_PJ, d);
+    } else {
+        let R_PJ = lift3(body.X_PJ.rotation.matrix());
+        *X_PB.rotation.matrix_mut_unchecked() = mul3(&R_PJ, R);
+        X_PB.translation.vector = add(&p_PJ, &mul(&R_PJ, d));
+    }
 }
 
 /// `S q̈` in B axes.
@@ -296,7 +304,8 @@ pub(crate) fn subspace_times<T: Real>(model: &Model, data: &Data<T>, i: usize, q
         }
         JointMotion::Interface { modal, interface } => {
             let (S, modal) = (&data.elastic[i], &model.modal[modal]);
-            let (d, phi) = modal.tables.shapes.interfaces[interface].times(&qddot[k..k + modal.n]);
+            let moving = k..k + modal.tables.moving[interface];
+            let (d, phi) = modal.tables.shapes.interfaces[interface].times(&qddot[moving]);
             Twist::new(mul(&S.L, &d), mul(&S.B, &phi))
         }
     }
@@ -327,7 +336,7 @@ pub(crate) fn add_projection<T: Real>(
         JointMotion::Interface { modal, interface } => {
             let modal = &model.modal[modal];
             let shape = &modal.tables.shapes.interfaces[interface];
-            shape.project(&data_elastic.L, &data_elastic.B, F, &mut tau[k..k + modal.n]);
+            shape.project(&data_elastic.L, &data_elastic.B, F, &mut tau[k..k + modal.tables.moving[interface]]);
         }
     }
 }

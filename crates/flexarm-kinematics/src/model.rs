@@ -9,6 +9,7 @@
 
 use std::collections::HashMap;
 use std::ops::Range;
+use std::slice::ChunksExact;
 
 use flexarm_spatial::{ElasticAngles, Pose, SpatialInertia};
 use nalgebra::{Rotation3, Vector3};
@@ -16,6 +17,7 @@ use nalgebra::{Rotation3, Vector3};
 use crate::axis_motion::{AxisMotion, RevoluteTable};
 use crate::balancer::{PlacedBalancer, place_balancers};
 use crate::closure::{LoopDraft, PlacedLoop, assemble, draft_loops};
+use crate::lanes::along_axis;
 use crate::mechanism::{Joint, JointKind, Limits, Mechanism, RotorCoupling};
 use crate::modal::ModalTables;
 
@@ -123,11 +125,24 @@ pub(crate) struct Modal {
     pub(crate) tables: ModalTables,
 }
 
+impl Body {
+    /// Pose in the parent at the coordinate (rad or m) of its joint, which has one.
+    ///
+    /// # Panics
+    /// If the joint has none or several.
+    #[inline]
+    pub fn X_PB(&self, coordinate: f64) -> Pose {
+        let JointMotion::Axis(motion) = self.motion else { panic!("joint {:?} has not one coordinate", self.joint) };
+        along_axis(self, motion, coordinate)
+    }
+}
+
 impl Modal {
-    /// How an interface moves with each coordinate, six numbers each.
+    /// How an interface moves with each coordinate that moves it, six numbers each.
     #[inline(always)]
-    pub(crate) fn columns_of(&self, interface: usize) -> std::slice::ChunksExact<'_, f64> {
-        self.tables.shapes.interfaces[interface].Phi.as_slice().chunks_exact(6)
+    pub(crate) fn columns_of(&self, interface: usize) -> ChunksExact<'_, f64> {
+        let moving = 6 * self.tables.moving[interface];
+        self.tables.shapes.interfaces[interface].Phi.as_slice()[..moving].chunks_exact(6)
     }
 }
 

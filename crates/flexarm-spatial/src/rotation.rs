@@ -5,7 +5,7 @@
 //!
 //! Source: [Shabana 2013], chapter 2, for Euler angles; [Bullo & Murray 1995] for the exponential map.
 
-use nalgebra::{Matrix3, Scalar, Vector3};
+use nalgebra::{Matrix3, Quaternion, Scalar, UnitQuaternion, Vector3};
 
 use crate::products::{add, add3, cross, dot, mul, mul3, scaled, scaled3};
 use crate::real::Real;
@@ -13,6 +13,9 @@ use crate::vectors::skew;
 
 /// Below this cosine the axis is taken from the symmetric part of the rotation, above from the skew part.
 const NEAR_HALF_TURN: f64 = -0.9;
+
+/// Below this square of the sine a rotation vector is a series.
+const SMALL_SINE_SQUARED: f64 = 5e-4;
 
 /// Which three numbers describe the rotation of an elastic joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -95,7 +98,13 @@ impl ElasticAngles {
 /// At exactly half a turn both `a` and `-a` are right; one of them is returned.
 pub fn rotation_vector(R: &Matrix3<f64>) -> Vector3<f64> {
     let skew = 0.5 * Vector3::new(R[(2, 1)] - R[(1, 2)], R[(0, 2)] - R[(2, 0)], R[(1, 0)] - R[(0, 1)]);
-    let (sine, cosine) = (skew.norm(), 0.5 * (R.trace() - 1.0));
+    let (square, cosine) = (skew.norm_squared(), 0.5 * (R.trace() - 1.0));
+    if square < SMALL_SINE_SQUARED && cosine > 0.0 {
+        // asin s / s; the first omitted term is below 1e-17.
+        let series = 1.0 / 6.0 + square * (3.0 / 40.0 + square * (5.0 / 112.0 + square * (35.0 / 1152.0)));
+        return skew + skew * (square * series);
+    }
+    let sine = square.sqrt();
     let angle = sine.atan2(cosine);
     if cosine > NEAR_HALF_TURN {
         // θ / sin θ tends to 1; where the sine is lost to underflow, the angle is as well.
@@ -106,6 +115,14 @@ pub fn rotation_vector(R: &Matrix3<f64>) -> Vector3<f64> {
     let largest = outer.diagonal().imax();
     let axis = outer.column(largest).normalize();
     if axis.dot(&skew) < 0.0 { -axis * angle } else { axis * angle }
+}
+
+/// Unit quaternion of a rotation vector: `[cos(theta/2), sin(theta/2)/theta phi]`.
+pub fn quaternion(phi: &Vector3<f64>) -> UnitQuaternion<f64> {
+    let x = 0.25 * dot(phi, phi);
+    let [s, a, ..] = exponential_coefficients(x);
+    let vector = scaled(phi, 0.5 * s);
+    UnitQuaternion::new_unchecked(Quaternion::new(1.0 - x * a, vector.x, vector.y, vector.z))
 }
 
 /// Coefficients of the exponential map at `x = theta²`, with the derivatives of the last two by x: `[s, a, b, da, db]`.
@@ -299,6 +316,19 @@ mod tests {
         let above = exponential_coefficients(1.0);
         for (below, above) in below.into_iter().zip(above) {
             assert_relative_eq!(below, above, epsilon = 2e-15);
+        }
+    }
+
+    /// Truth: nalgebra's quaternions, and the rotation vectors of their matrices; measured 2e-16 and 1e-16 relative.
+    #[test]
+    fn quaternions_are_those_of_the_rotation_vector() {
+        let axis = vector![0.48, -0.6, 0.64];
+        for angle in [0.0, 1e-9, 1e-3, 0.02, 0.0223, 0.0224, 0.03, 0.5, 1.9, 2.1, 3.0] {
+            let v = axis * angle;
+            let q = quaternion(&v);
+            assert_relative_eq!(q.coords, UnitQuaternion::from_scaled_axis(v).coords, epsilon = 2e-15);
+            let back = rotation_vector(q.to_rotation_matrix().matrix());
+            assert_relative_eq!(back, v, epsilon = 2e-15 * (1.0 + angle));
         }
     }
 

@@ -6,7 +6,7 @@
 //!
 //! Source: [Featherstone 2008], chapter 2, with linear and angular parts exchanged.
 
-use nalgebra::{IsometryMatrix3, Matrix3, Matrix6, Scalar, Vector3, Vector6};
+use nalgebra::{IsometryMatrix3, Matrix3, Matrix6, Rotation3, Scalar, Vector3, Vector6};
 use std::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 
 use crate::products::{add, add3, cross, cross3, dot, lift, lift3, mul, mul3, scaled, sub, tr_mul, turn_symmetric};
@@ -14,6 +14,14 @@ use crate::real::Real;
 
 /// Pose `X_AB` of frame B in frame A, as rotation matrix and translation (m). `p_A = X_AB * p_B`.
 pub type Pose<T = f64> = IsometryMatrix3<T>;
+
+/// `X_AC = X_AB X_BC`.
+#[inline(always)]
+pub fn composed(X_AB: &Pose, X_BC: &Pose) -> Pose {
+    let R = X_AB.rotation.matrix();
+    let p = add(&X_AB.translation.vector, &mul(R, &X_BC.translation.vector));
+    Pose::from_parts(p.into(), Rotation3::from_matrix_unchecked(mul3(R, X_BC.rotation.matrix())))
+}
 
 /// Velocity (or acceleration) of a frame: linear part of its origin (m/s), angular part (rad/s).
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -358,7 +366,7 @@ impl AddAssign for ArticulatedInertia {
 mod tests {
     use super::*;
     use approx::assert_relative_eq;
-    use nalgebra::{Rotation3, Translation3, vector};
+    use nalgebra::{Translation3, vector};
 
     fn pose() -> Pose {
         Pose::from_parts(Translation3::new(0.3, -0.7, 0.5), Rotation3::from_euler_angles(0.4, -1.1, 2.0))
@@ -388,6 +396,7 @@ mod tests {
         let articulated = ArticulatedInertia::from_rigid(&M).at_parent(&X).to_matrix();
         assert_relative_eq!(articulated, congruent, epsilon = 1e-13);
         assert_relative_eq!(M.inertia_com()[(0, 0)], 2.0, epsilon = 1e-13);
+        assert_relative_eq!(composed(&X, &X).to_homogeneous(), (X * X).to_homogeneous(), epsilon = 1e-13);
     }
 
     /// Power is the same wherever it is reckoned; measured 2e-16.
