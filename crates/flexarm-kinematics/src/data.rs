@@ -9,6 +9,7 @@ use nalgebra::{DMatrix, DVector, Isometry, Matrix3, Rotation3, Scalar, Translati
 
 use crate::axis_motion::AxisMotion;
 use crate::closure::LoopData;
+use crate::crba::{SixWrenches, Turned};
 use crate::modal::ModalData;
 use crate::model::{Body, Frame, JointMotion, Model};
 
@@ -62,10 +63,14 @@ pub struct Data<T: Scalar = f64> {
     pub(crate) elastic: Vec<ElasticSubspace<T>>,
     pub(crate) bias: Vec<Twist<T>>,
     pub(crate) composite: Vec<SpatialInertia<T>>,
+    /// Bodies in the axes of the mass matrix's recursion, and the wrenches of its columns.
+    pub(crate) turned: Vec<Turned<T>>,
+    pub(crate) single: Vec<Wrench<T>>,
+    pub(crate) six: Vec<SixWrenches<T>>,
     pub(crate) articulated: Vec<ArticulatedInertia>,
     pub(crate) pA: Vec<Wrench>,
     /// One-DoF joints: U = I S, 1/(Sᵀ U), u.
-    pub(crate) U: Vec<Wrench<T>>,
+    pub(crate) U: Vec<Wrench>,
     pub(crate) inverse_d: Vec<f64>,
     pub(crate) u: Vec<f64>,
     /// The caller's external wrenches while those of the balancers are added; none without balancers.
@@ -102,6 +107,9 @@ impl<T: Real> Data<T> {
             elastic: vec![ElasticSubspace { L: Matrix3::identity(), B: Matrix3::identity() }; n],
             bias: vec![zero; n],
             composite: vec![SpatialInertia::lift(&SpatialInertia::zeros()); n],
+            turned: vec![Turned::identity(); n],
+            single: vec![Wrench::zeros(); model.single.len()],
+            six: vec![SixWrenches::zeros(); model.six.len()],
             articulated: vec![ArticulatedInertia::from_rigid(&SpatialInertia::zeros()); n],
             pA: vec![Wrench::zeros(); n],
             U: vec![Wrench::zeros(); n],
@@ -182,8 +190,9 @@ pub(crate) fn joint_motion<T: Real>(
         JointMotion::Interface { modal, interface } => {
             let modal = &model.modal[modal];
             let shape = &modal.tables.shapes.interfaces[interface];
-            let (d, phi) = shape.times(&q[k..k + modal.n]);
-            let (ddot, rates) = shape.times(&qdot[k..k + modal.n]);
+            let moving = k..k + modal.tables.moving[interface];
+            let (d, phi) = shape.times(&q[moving.clone()]);
+            let (ddot, rates) = shape.times(&qdot[moving]);
             let kin = ElasticAngles::RotationVector.kinematics(&phi, &rates);
             place_elastic(&mut data.X_PB[i], body, &kin.R, &d);
             let L = transposed(&kin.R);
@@ -213,7 +222,8 @@ pub(crate) fn joint_position<T: Real>(model: &Model, data: &mut Data<T>, i: usiz
         }
         JointMotion::Interface { modal, interface } => {
             let modal = &model.modal[modal];
-            let (d, phi) = modal.tables.shapes.interfaces[interface].times(&q[k..k + modal.n]);
+            let moving = k..k + modal.tables.moving[interface];
+            let (d, phi) = modal.tables.shapes.interfaces[interface].times(&q[moving]);
             let (R, B) = ElasticAngles::RotationVector.pose(&phi);
             place_elastic(&mut data.X_PB[i], body, &R, &d);
             data.elastic[i] = ElasticSubspace { L: transposed(&R), B };
@@ -268,15 +278,14 @@ pub(crate) fn begin<T: Real>(model: &Model, data: &mut Data<T>, q: &[T]) {
 #[inline(always)]
 fn place_elastic<T: Real>(X_PB: &mut Pose<T>, body: &Body, R: &Matrix3<T>, d: &Vector3<T>) {
     let p_PJ = lift(&body.X_PJ.translation.vector);
-    let (R, d) = match body.level {
-        true => (*R, *d),
-        false => {
-            let R_PJ = lift3(body.X_PJ.rotation.matrix());
-            (mul3(&R_PJ, R), mul(&R_PJ, d))
-        }
-    };
-    *X_PB.rotation.matrix_mut_unchecked() = R;
-    X_PB.translation.vector = add(&p_PJ, &d);
+    if body.is_parallel {
+        *X_PB.rotation.matrix_mut_unchecked() = *R;
+        X_PB.translation.vector = add(&p_PJ, d);
+    } else {
+        let R_PJ = lift3(body.X_PJ.rotation.matrix());
+        *X_PB.rotation.matrix_mut_unchecked() = mul3(&R_PJ, R);
+        X_PB.translation.vector = add(&p_PJ, &mul(&R_PJ, d));
+    }
 }
 
 /// `S q̈` in B axes.
@@ -296,7 +305,8 @@ pub(crate) fn subspace_times<T: Real>(model: &Model, data: &Data<T>, i: usize, q
         }
         JointMotion::Interface { modal, interface } => {
             let (S, modal) = (&data.elastic[i], &model.modal[modal]);
-            let (d, phi) = modal.tables.shapes.interfaces[interface].times(&qddot[k..k + modal.n]);
+            let moving = k..k + modal.tables.moving[interface];
+            let (d, phi) = modal.tables.shapes.interfaces[interface].times(&qddot[moving]);
             Twist::new(mul(&S.L, &d), mul(&S.B, &phi))
         }
     }
@@ -327,7 +337,7 @@ pub(crate) fn add_projection<T: Real>(
         JointMotion::Interface { modal, interface } => {
             let modal = &model.modal[modal];
             let shape = &modal.tables.shapes.interfaces[interface];
-            shape.project(&data_elastic.L, &data_elastic.B, F, &mut tau[k..k + modal.n]);
+            shape.project(&data_elastic.L, &data_elastic.B, F, &mut tau[k..k + modal.tables.moving[interface]]);
         }
     }
 }

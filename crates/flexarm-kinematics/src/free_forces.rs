@@ -139,7 +139,7 @@ enum NodeJoint {
     /// Slides along this (P axes).
     Slides { along: Fixed },
     /// Translation, then angles; whether the joint frame has the axes of the parent.
-    Elastic { angles: ElasticAngles, level: bool },
+    Elastic { angles: ElasticAngles, is_parallel: bool },
 }
 
 /// What (1) to (6) need of a body.
@@ -342,7 +342,7 @@ impl<S: Space> Node<S> {
                 let table = Box::new(body.turn.table());
                 NodeJoint::Turns { axis: Fixed::from(&motion.axis()), table, turning: body.turning, along }
             }
-            JointMotion::Elastic(angles) => NodeJoint::Elastic { angles, level: body.level },
+            JointMotion::Elastic(angles) => NodeJoint::Elastic { angles, is_parallel: body.is_parallel },
             JointMotion::Welded | JointMotion::Interface { .. } => return None,
         };
         let fixed = |v: &Vector3<f64>| S::fixed(&Fixed::from(v));
@@ -418,7 +418,7 @@ impl<S: Space> Node<S> {
                 let (rate, acceleration) = (ratio * qdot[k], ratio * qddot[k]);
                 JointRates { turn: None, shift: Some([S::scaled(&along, rate), S::scaled(&along, acceleration)]) }
             }
-            NodeJoint::Elastic { angles, level } => {
+            NodeJoint::Elastic { angles, is_parallel } => {
                 let [d, phi] = pair::<S>(&q[k..k + 6]);
                 let [rate, rates] = pair::<S>(&qdot[k..k + 6]);
                 let [acceleration, accelerations] = pair::<S>(&qddot[k..k + 6]);
@@ -426,7 +426,7 @@ impl<S: Space> Node<S> {
                 self.B = kin.B;
                 let turn = [S::turn(&kin.B, &rates), S::add(&S::turn(&kin.B, &accelerations), &kin.bias)];
                 let p_PJ = S::fixed(&self.p_PJ);
-                if *level {
+                if *is_parallel {
                     self.R = kin.R;
                     self.p = S::add(&p_PJ, &d);
                     return JointRates { turn: Some(turn), shift: Some([rate, acceleration]) };
@@ -492,8 +492,8 @@ impl<S: Space> Node<S> {
                 tau[0] = ratio * own;
             }
             NodeJoint::Slides { along } => tau[0] = ratio * S::dot(&S::fixed(along), force),
-            NodeJoint::Elastic { level, .. } => {
-                let force = if *level { *force } else { S::turn_back(&self.R_PJ, force) };
+            NodeJoint::Elastic { is_parallel, .. } => {
+                let force = if *is_parallel { *force } else { S::turn_back(&self.R_PJ, force) };
                 let (f, t) = (S::components(&force), S::components(&S::turn_back(&self.B, torque)));
                 tau = [f.x, f.y, f.z, t.x, t.y, t.z];
             }
@@ -540,8 +540,8 @@ impl<S: Space> Node<S> {
                 [a, S::scaled(&S::fixed(axis), ratio)]
             }
             NodeJoint::Slides { along } => [S::scaled(&S::turn_back(&self.R, &S::fixed(along)), ratio), zero],
-            NodeJoint::Elastic { level, .. } => match coordinate {
-                0..3 if *level => [S::row(&self.R, coordinate), zero],
+            NodeJoint::Elastic { is_parallel, .. } => match coordinate {
+                0..3 if *is_parallel => [S::row(&self.R, coordinate), zero],
                 0..3 => [S::turn_back(&self.R, &S::column(&self.R_PJ, coordinate)), zero],
                 _ => [zero, S::column(&self.B, coordinate - 3)],
             },

@@ -181,7 +181,7 @@ pub(crate) fn joint_columns<T: Real>(
 
 /// `R_WB S` times the ratio of a mimic joint: a column of the Jacobian at Bo, in W axes.
 #[inline(always)]
-fn turned<T: Real>(motion: AxisMotion, R_WB: &Matrix3<T>, ratio: f64) -> Twist<T> {
+pub(crate) fn turned<T: Real>(motion: AxisMotion, R_WB: &Matrix3<T>, ratio: f64) -> Twist<T> {
     let ratio = T::splat(ratio);
     motion.linear(
         #[inline(always)]

@@ -221,7 +221,7 @@ pub fn rigid_and_flexible<T: Real>(tree: &LaneTree<T>, data: &Data<T>, frame: &F
 
 /// `X_PB` of a joint of one coordinate.
 #[inline(always)]
-fn along_axis<T: Real>(body: &Body, motion: AxisMotion, coordinate: T) -> Pose<T> {
+pub(crate) fn along_axis<T: Real>(body: &Body, motion: AxisMotion, coordinate: T) -> Pose<T> {
     let value = T::splat(body.ratio) * coordinate + T::splat(body.offset);
     let mut X_PB = identity();
     motion.place(&body.X_PJ, &body.turn, value, Real::sin_cos(value), &mut X_PB);

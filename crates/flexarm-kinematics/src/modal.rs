@@ -18,10 +18,13 @@
 //! ```
 //! What turns with the sections (rotary inertia of beams) enters `J_0`, `C_r0` and `M_e` as constants.
 //!
+//! Of `Q_k` the symmetric part is enough, as six numbers: `axial(N_kl)` is `g_lk`, and what the skew part of W adds to T is what
+//! `ω × C_r η̇` adds.
+//!
 //! Start at [`ModalBody`]. Sources: [Shabana 2013], chapter 5; [Wallrapp 1994] for the set of integrals.
 //! Not here: stiffness and damping of the modes, where shapes come from.
 
-use flexarm_spatial::products::{dot, lift, lift3, mul, tr_mul};
+use flexarm_spatial::products::{add, add3, cross, dot, lift, lift3, mul, scaled, tr_mul};
 use flexarm_spatial::{Pose, Real, SpatialInertia, Twist, Wrench};
 use nalgebra::{Cholesky, DMatrix, Dyn, Matrix3, Matrix6xX, Scalar, Vector3};
 
@@ -120,14 +123,14 @@ impl ModalBody {
 #[derive(Clone, Debug)]
 pub(crate) struct ModalTables {
     pub(crate) shapes: ModalBody,
-    /// (2): column l holds `N_kl` of all k, each column-major.
+    /// (2): column l holds `N_kl` of all k, each as its [`symmetric`] part.
     N: Integrals,
     /// Column l holds `g_lk` of all k.
     g: Integrals,
-    /// `P_kᵀ` of all k, column-major.
-    Pt: Vec<f64>,
-    /// `C_r0,k - axial(P_kᵀ)`: what the rotary inertia of sections adds.
-    C_rotary: Vec<Vector3<f64>>,
+    /// `P_k` of all k, likewise.
+    P: Vec<f64>,
+    /// Of each interface, the first coordinates that move it; those that follow do not.
+    pub(crate) moving: Vec<usize>,
 }
 
 /// Second-order integrals of pairs of coordinates, a column for each coordinate.
@@ -191,26 +194,36 @@ fn axial(Q: &Matrix3<f64>) -> Vector3<f64> {
     Vector3::new(Q[(2, 1)] - Q[(1, 2)], Q[(0, 2)] - Q[(2, 0)], Q[(1, 0)] - Q[(0, 1)])
 }
 
+/// Twice the symmetric part off the diagonal: xx, yy, zz, xy + yx, xz + zx, yz + zy.
+#[inline(always)]
+fn symmetric(Q: &Matrix3<f64>) -> [f64; 6] {
+    let off = |a: usize, b: usize| Q[(a, b)] + Q[(b, a)];
+    [Q[(0, 0)], Q[(1, 1)], Q[(2, 2)], off(0, 1), off(0, 2), off(1, 2)]
+}
+
 impl ModalTables {
     pub(crate) fn new(shapes: &ModalBody) -> Self {
         let n = shapes.n();
         let second = !shapes.N.is_empty();
-        let mut N = DMatrix::zeros(if second { 9 * n } else { 0 }, n);
+        let mut N = DMatrix::zeros(if second { 6 * n } else { 0 }, n);
         let mut g = DMatrix::zeros(if second { 3 * n } else { 0 }, n);
         if second {
             for k in 0..n {
                 for l in 0..n {
                     let N_kl = &shapes.N[k * n + l];
-                    N.view_mut((9 * k, l), (9, 1)).copy_from_slice(N_kl.as_slice());
+                    N.view_mut((6 * k, l), (6, 1)).copy_from_slice(&symmetric(N_kl));
                     // ∫ φ_l × φ_k = axial(∫ φ_k φ_lᵀ)
                     g.view_mut((3 * k, l), (3, 1)).copy_from(&axial(N_kl));
                 }
             }
         }
         let (N, g) = (Integrals::new(N, shapes), Integrals::new(g, shapes));
-        let Pt: Vec<f64> = shapes.P.iter().flat_map(|P| P.transpose().as_slice().to_vec()).collect();
-        let C_rotary = shapes.C_r.iter().zip(&shapes.P).map(|(c, P)| c - axial(&P.transpose())).collect();
-        Self { shapes: shapes.clone(), N, g, Pt, C_rotary }
+        let P = shapes.P.iter().flat_map(symmetric).collect();
+        let moves = |shape: &InterfaceShape| {
+            let last = (0..n).rev().find(|k| shape.Phi.column(*k).iter().any(|x| *x != 0.0));
+            last.map_or(0, |k| k + 1)
+        };
+        Self { moving: shapes.interfaces.iter().map(moves).collect(), shapes: shapes.clone(), N, g, P }
     }
 }
 
@@ -221,9 +234,10 @@ pub(crate) struct ModalData<T: Scalar = f64> {
     pub(crate) rates: Vec<T>,
     /// (1) and (3) with the mass: the body as if it were rigid now.
     pub(crate) inertia: SpatialInertia<T>,
-    /// (2), column-major.
+    /// (2), as [`symmetric`] parts.
     Q: Vec<T>,
-    g_rate: Vec<T>,
+    /// `Σ_l axial(N_kl) η_l`, then `Σ_l η̇_l g_lk`.
+    g: Vec<T>,
     /// (4).
     pub(crate) C_r: Vec<Vector3<T>>,
     /// Generalised forces on the coordinates.
@@ -266,8 +280,8 @@ impl<T: Real> ModalData<T> {
         Self {
             rates: vec![T::zero(); n],
             inertia: SpatialInertia::lift(&tables.shapes.undeformed()),
-            Q: tables.Pt.iter().map(|x| T::splat(*x)).collect(),
-            g_rate: vec![T::zero(); 3 * n],
+            Q: tables.P.iter().map(|x| T::splat(*x)).collect(),
+            g: vec![T::zero(); 3 * n],
             C_r: tables.shapes.C_r.iter().map(lift).collect(),
             f: vec![T::zero(); n],
             columns: vec![Wrench::zeros(); n],
@@ -281,24 +295,26 @@ impl<T: Real> ModalData<T> {
     #[inline(always)]
     pub(crate) fn place(&mut self, tables: &ModalTables, eta: &[T]) {
         let shapes = &tables.shapes;
-        for (q, p) in self.Q.iter_mut().zip(&tables.Pt) {
+        for (q, p) in self.Q.iter_mut().zip(&tables.P) {
             *q = T::splat(*p);
         }
         tables.N.add_product(eta, &mut self.Q);
-        // Only the symmetric part of E counts, and P and Pᵀ have the same.
-        let (mut h, mut E) = (lift::<T>(&shapes.first_moment), [T::zero(); 9]);
-        let matrices = self.Q.chunks_exact(9).zip(tables.Pt.chunks_exact(9));
-        for ((k, &eta_k), (Q, Pt)) in eta.iter().enumerate().zip(matrices) {
-            h += lift::<T>(&shapes.C_t[k]) * eta_k;
-            for ((e, p), q) in E.iter_mut().zip(Pt).zip(Q) {
+        self.g.fill(T::zero());
+        tables.g.add_product(eta, &mut self.g);
+        let (mut h, mut E) = (lift::<T>(&shapes.first_moment), [T::zero(); 6]);
+        let matrices = self.Q.chunks_exact(6).zip(tables.P.chunks_exact(6)).zip(self.g.chunks_exact(3));
+        for ((k, &eta_k), ((Q, P), g)) in eta.iter().enumerate().zip(matrices) {
+            h = add(&h, &scaled(&lift::<T>(&shapes.C_t[k]), eta_k));
+            for ((e, p), q) in E.iter_mut().zip(P).zip(Q) {
                 *e += (T::splat(*p) + *q) * eta_k;
             }
-            self.C_r[k] = lift::<T>(&tables.C_rotary[k]) + Vector3::new(Q[5] - Q[7], Q[6] - Q[2], Q[1] - Q[3]);
+            self.C_r[k] = add(&lift::<T>(&shapes.C_r[k]), &Vector3::new(g[0], g[1], g[2]));
         }
         let half = T::splat(0.5);
-        let (xy, xz, yz) = (half * (E[3] + E[1]), half * (E[6] + E[2]), half * (E[7] + E[5]));
-        let (x, y, z) = (E[0], E[4], E[8]);
-        let J = lift3::<T>(&shapes.inertia) + Matrix3::new(y + z, -xy, -xz, -xy, x + z, -yz, -xz, -yz, x + y);
+        let ([x, y, z, ..], [.., xy, xz, yz]) = (E, E);
+        let (xy, xz, yz) = (half * xy, half * xz, half * yz);
+        let moved = Matrix3::new(y + z, -xy, -xz, -xy, x + z, -yz, -xz, -yz, x + y);
+        let J = add3(&lift3::<T>(&shapes.inertia), &moved);
         self.inertia = SpatialInertia { mass: T::splat(shapes.mass), first_moment: h, rotational: J };
     }
 
@@ -307,38 +323,40 @@ impl<T: Real> ModalData<T> {
     pub(crate) fn bias(&mut self, tables: &ModalTables, V: &Twist<T>, rates: &[T]) -> Wrench<T> {
         let (w, v) = (V.angular, V.linear);
         self.rates.copy_from_slice(rates);
-        let second = !tables.shapes.N.is_empty();
-        if second {
-            self.g_rate.fill(T::zero());
-            tables.g.add_product(rates, &mut self.g_rate);
-        }
+        self.g.fill(T::zero());
+        tables.g.add_product(rates, &mut self.g);
         let shapes = &tables.shapes;
-        let (mut Wt, mut c, mut rotary) = ([T::zero(); 9], Vector3::zeros(), Vector3::zeros());
+        let (mut W, mut c_t, mut c_r) = ([T::zero(); 6], Vector3::zeros(), Vector3::zeros());
         let two = T::splat(2.0);
         // ω × v is the part of the origin's acceleration that a spatial acceleration leaves out.
-        let wv = w.cross(&v);
+        let wv = cross(&w, &v);
         // ωᵀ Q ω - tr(Q) ω·ω is a sum over the entries of Q, with these weights.
         let (xx, yy, zz) = (w.x * w.x, w.y * w.y, w.z * w.z);
-        let (xy, xz, yz) = (w.x * w.y, w.x * w.z, w.y * w.z);
-        let weights = [-(yy + zz), xy, xz, xy, -(xx + zz), yz, xz, yz, -(xx + yy)];
-        for ((k, &rate), Q) in rates.iter().enumerate().zip(self.Q.chunks_exact(9)) {
+        let weights = [-(yy + zz), -(xx + zz), -(xx + yy), w.x * w.y, w.x * w.z, w.y * w.z];
+        let w2 = scaled(&w, two);
+        let matrices = self.Q.chunks_exact(6).zip(self.g.chunks_exact(3));
+        for ((k, &rate), (Q, g)) in rates.iter().enumerate().zip(matrices) {
             let C_t = lift::<T>(&shapes.C_t[k]);
-            let mut f = C_t.dot(&wv);
-            for ((W, q), weight) in Wt.iter_mut().zip(Q).zip(&weights) {
+            let mut f = dot(&C_t, &wv) + dot(&w2, &Vector3::new(g[0], g[1], g[2]));
+            for ((W, q), weight) in W.iter_mut().zip(Q).zip(&weights) {
                 *W += *q * rate;
                 f += *q * *weight;
             }
-            c += C_t * rate;
-            rotary += lift::<T>(&tables.C_rotary[k]) * rate;
-            if second {
-                f += two * (w.x * self.g_rate[3 * k] + w.y * self.g_rate[3 * k + 1] + w.z * self.g_rate[3 * k + 2]);
-            }
+            c_t = add(&c_t, &scaled(&C_t, rate));
+            c_r = add(&c_r, &scaled(&self.C_r[k], rate));
             self.f[k] = f;
         }
-        let Wt = Matrix3::from_column_slice(&Wt);
         let SpatialInertia { mass, first_moment: h, rotational: J } = &self.inertia;
-        let force = wv * *mass + w.cross(&(c * two + w.cross(h)));
-        let torque = h.cross(&wv) + w.cross(&(mul(J, &w) + rotary)) + (w * Wt.trace() - mul(&Wt, &w)) * two;
+        let turned = add(&scaled(&c_t, two), &cross(&w, h));
+        let force = add(&scaled(&wv, *mass), &cross(&w, &turned));
+        // 2 (tr W 1 - W) ω for the symmetric part of W; its skew part is in C_r η̇.
+        let [x, y, z, xy, xz, yz] = W;
+        let rest = Vector3::new(
+            two * (y + z) * w.x - xy * w.y - xz * w.z,
+            two * (x + z) * w.y - xy * w.x - yz * w.z,
+            two * (x + y) * w.z - xz * w.x - yz * w.y,
+        );
+        let torque = add(&add(&cross(h, &wv), &cross(&w, &add(&mul(J, &w), &c_r))), &rest);
         Wrench::new(force, torque)
     }
 
@@ -353,12 +371,12 @@ impl<T: Real> ModalData<T> {
         let shapes = &tables.shapes;
         let mut F = self.inertia.mul_twist(A);
         for (k, f) in self.f.iter_mut().enumerate() {
-            *f += lift(&shapes.C_t[k]).dot(&A.linear) + self.C_r[k].dot(&A.angular);
+            *f += dot(&lift(&shapes.C_t[k]), &A.linear) + dot(&self.C_r[k], &A.angular);
         }
         if let Some(accelerations) = accelerations {
             for (k, &a) in accelerations.iter().enumerate() {
-                F.force += lift::<T>(&shapes.C_t[k]) * a;
-                F.torque += self.C_r[k] * a;
+                F.force = add(&F.force, &scaled(&lift::<T>(&shapes.C_t[k]), a));
+                F.torque = add(&F.torque, &scaled(&self.C_r[k], a));
             }
             add_product(&shapes.M, accelerations, &mut self.f);
         }

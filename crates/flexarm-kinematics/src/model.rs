@@ -8,13 +8,16 @@
 //! per elastic joint, n per modal body. [`Model::elastic`] and [`Body::coordinate`] know the offsets.
 
 use std::collections::HashMap;
+use std::ops::Range;
+use std::slice::ChunksExact;
 
 use flexarm_spatial::{ElasticAngles, Pose, SpatialInertia};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Rotation3, Vector3};
 
 use crate::axis_motion::{AxisMotion, RevoluteTable};
 use crate::balancer::{PlacedBalancer, place_balancers};
 use crate::closure::{LoopDraft, PlacedLoop, assemble, draft_loops};
+use crate::lanes::along_axis;
 use crate::mechanism::{Joint, JointKind, Limits, Mechanism, RotorCoupling};
 use crate::modal::ModalTables;
 
@@ -36,12 +39,17 @@ pub struct Model {
     /// Two coordinates and the entry that rotors add to their rows and columns in the mass matrix.
     pub(crate) rotor_couplings: Vec<(usize, usize, f64)>,
     pub(crate) has_mimic: bool,
+    /// Whether entries of the mass matrix are zero or sums: branches, bodies that bend in modes, joints that mimic others.
+    pub(crate) sums_entries: bool,
     /// Closed loops, each after those that it rests on.
     pub(crate) loops: Vec<PlacedLoop>,
     /// Coordinates that follow from the loops; in the tree they come after all others.
     dependent: Vec<Coordinate>,
     /// Bodies on joints of one coordinate that turn.
     pub(crate) turning: Vec<usize>,
+    /// Coordinates of the joints that have one, in the order of the bodies, and the first ones of those that have six.
+    pub(crate) single: Vec<usize>,
+    pub(crate) six: Vec<usize>,
     /// Acceleration of gravity in world axes (m/s²).
     pub gravity: Vector3<f64>,
 }
@@ -71,8 +79,6 @@ pub struct Body {
     pub armature: f64,
     /// Whether its coordinates are elastic ones.
     pub elastic: bool,
-    /// Whether the joint frame has the axes of the parent.
-    pub(crate) level: bool,
     /// Number of its modal body, if it bends in modes.
     pub(crate) modal: Option<usize>,
     pub(crate) turn: RevoluteTable,
@@ -80,6 +86,16 @@ pub struct Body {
     pub(crate) turning: usize,
     /// One past the last body outward of this one; depth-first order makes a subtree a range.
     pub(crate) subtree_end: usize,
+    /// Whether the joint frame's axes are the parent's.
+    pub(crate) is_parallel: bool,
+    pub(crate) columns: Outward,
+}
+
+/// Joints from a body's own one outward, as ranges of the model's lists `single` and `six`.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Outward {
+    pub(crate) single: Range<usize>,
+    pub(crate) six: Range<usize>,
 }
 
 /// Motion of a joint in the recursions.
@@ -107,6 +123,27 @@ pub(crate) struct Modal {
     pub(crate) coordinate: usize,
     pub(crate) n: usize,
     pub(crate) tables: ModalTables,
+}
+
+impl Body {
+    /// Pose in the parent at the coordinate (rad or m) of its joint, which has one.
+    ///
+    /// # Panics
+    /// If the joint has none or several.
+    #[inline]
+    pub fn X_PB(&self, coordinate: f64) -> Pose {
+        let JointMotion::Axis(motion) = self.motion else { panic!("joint {:?} has not one coordinate", self.joint) };
+        along_axis(self, motion, coordinate)
+    }
+}
+
+impl Modal {
+    /// How an interface moves with each coordinate that moves it, six numbers each.
+    #[inline(always)]
+    pub(crate) fn columns_of(&self, interface: usize) -> ChunksExact<'_, f64> {
+        let moving = 6 * self.tables.moving[interface];
+        self.tables.shapes.interfaces[interface].Phi.as_slice()[..moving].chunks_exact(6)
+    }
 }
 
 /// Elastic coordinates that belong together: one elastic joint, or one modal body.
@@ -309,11 +346,12 @@ impl Model {
             offset: 0.0,
             armature: 0.0,
             elastic: false,
-            level: true,
             modal: None,
             turn: RevoluteTable::new(&Pose::identity(), &Vector3::z()),
             turning: 0,
             subtree_end: 0,
+            is_parallel: true,
+            columns: Outward::default(),
         });
         build.grow(base)?;
         build.finish()
@@ -601,11 +639,12 @@ impl<'a> Builder<'a> {
             offset,
             armature: joint.armature,
             elastic: joint.kind.is_elastic(),
-            level: *X_BJ.rotation.matrix() == Matrix3::identity(),
             modal: None,
             turn: RevoluteTable::new(&X_BJ, &axis),
             turning: 0,
             subtree_end: 0,
+            is_parallel: X_BJ.rotation == Rotation3::identity(),
+            columns: Outward::default(),
         });
         Ok((index, Pose::identity()))
     }
@@ -643,6 +682,7 @@ impl<'a> Builder<'a> {
         let nv = coordinates.len();
         let loops = drafts.iter().map(|d| d.placed(&self.bodies, nv, |modal| self.modal[modal].n)).collect();
         self.close_subtrees();
+        let (single, six) = self.list_columns();
         let turns = |b: &Body| matches!(b.motion, JointMotion::Axis(motion) if !motion.slides());
         let turning: Vec<usize> = (1..self.bodies.len()).filter(|i| turns(&self.bodies[*i])).collect();
         for (number, &i) in turning.iter().enumerate() {
@@ -653,12 +693,16 @@ impl<'a> Builder<'a> {
         let rotor_couplings = self.rotor_couplings()?;
         let balancers = place_balancers(self.mechanism, &self.frames, &self.bodies, nv)?;
         let frame_by_name = self.frames.iter().enumerate().map(|(i, f)| (f.name.clone(), i)).collect();
+        let is_chain = (1..self.bodies.len()).all(|i| self.bodies[i].parent + 1 == i);
         let mut model = Model {
             name: self.mechanism.name.clone(),
+            sums_entries: !is_chain || !self.modal.is_empty() || !self.followers.is_empty(),
             has_mimic: !self.followers.is_empty(),
             loops,
             dependent,
             turning,
+            single,
+            six,
             bodies: self.bodies,
             frames: self.frames,
             frame_by_name,
@@ -750,6 +794,25 @@ impl<'a> Builder<'a> {
             }
         }
         Ok(())
+    }
+
+    /// Lists the joints of one and of six coordinates, and says of each body which of them are outward.
+    fn list_columns(&mut self) -> (Vec<usize>, Vec<usize>) {
+        let (mut single, mut six) = (Vec::new(), Vec::new());
+        let mut begins = vec![(0, 0)];
+        for body in &self.bodies {
+            match body.motion {
+                JointMotion::Axis(_) => single.push(body.coordinate),
+                JointMotion::Elastic(_) => six.push(body.coordinate),
+                JointMotion::Welded | JointMotion::Interface { .. } => {}
+            }
+            begins.push((single.len(), six.len()));
+        }
+        for (i, body) in self.bodies.iter_mut().enumerate() {
+            let ((single, six), end) = (begins[i], begins[body.subtree_end]);
+            body.columns = Outward { single: single..end.0, six: six..end.1 };
+        }
+        (single, six)
     }
 
     /// Where the subtree of each body ends.

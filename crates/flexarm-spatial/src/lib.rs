@@ -40,5 +40,5 @@ mod vectors;
 
 pub use blocks::{Matrix12, symmetric_part, turn6, twice};
 pub use real::{Real, sin_cos_all};
-pub use rotation::{AngleKinematics, AngleMotion, ElasticAngles, rotation_vector};
-pub use vectors::{ArticulatedInertia, Pose, SpatialInertia, Twist, Wrench, adjoint, skew};
+pub use rotation::{AngleKinematics, AngleMotion, ElasticAngles, quaternion, rotation_vector};
+pub use vectors::{ArticulatedInertia, Pose, SpatialInertia, Twist, Wrench, adjoint, composed, skew};

@@ -5,7 +5,7 @@
 //!
 //! Source: [Shabana 2013], chapter 2, for Euler angles; [Bullo & Murray 1995] for the exponential map.
 
-use nalgebra::{Matrix3, Scalar, Vector3};
+use nalgebra::{Matrix3, Quaternion, Scalar, UnitQuaternion, Vector3};
 
 use crate::products::{add, add3, cross, dot, mul, mul3, scaled, scaled3};
 use crate::real::Real;
@@ -14,6 +14,9 @@ use crate::vectors::skew;
 
 /// Below this cosine the axis is taken from the symmetric part of the rotation, above from the skew part.
 const NEAR_HALF_TURN: f64 = -0.9;
+
+/// Below this square of the sine a rotation vector is a series.
+const SMALL_SINE_SQUARED: f64 = 5e-4;
 
 /// Which three numbers describe the rotation of an elastic joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -119,7 +122,13 @@ impl ElasticAngles {
 /// At exactly half a turn both `a` and `-a` are right; one of them is returned.
 pub fn rotation_vector(R: &Matrix3<f64>) -> Vector3<f64> {
     let skew = 0.5 * Vector3::new(R[(2, 1)] - R[(1, 2)], R[(0, 2)] - R[(2, 0)], R[(1, 0)] - R[(0, 1)]);
-    let (sine, cosine) = (skew.norm(), 0.5 * (R.trace() - 1.0));
+    let (square, cosine) = (skew.norm_squared(), 0.5 * (R.trace() - 1.0));
+    if square < SMALL_SINE_SQUARED && cosine > 0.0 {
+        // asin s / s; the first omitted term is below 1e-17.
+        let series = 1.0 / 6.0 + square * (3.0 / 40.0 + square * (5.0 / 112.0 + square * (35.0 / 1152.0)));
+        return skew + skew * (square * series);
+    }
+    let sine = square.sqrt();
     let angle = sine.atan2(cosine);
     if cosine > NEAR_HALF_TURN {
         // θ / sin θ tends to 1; where the sine is lost to underflow, the angle is as well.
@@ -132,13 +141,21 @@ pub fn rotation_vector(R: &Matrix3<f64>) -> Vector3<f64> {
     if axis.dot(&skew) < 0.0 { -axis * angle } else { axis * angle }
 }
 
+/// Unit quaternion of a rotation vector: `[cos(theta/2), sin(theta/2)/theta phi]`.
+pub fn quaternion(phi: &Vector3<f64>) -> UnitQuaternion<f64> {
+    let x = 0.25 * dot(phi, phi);
+    let [s, a, ..] = exponential_coefficients(x);
+    let vector = scaled(phi, 0.5 * s);
+    UnitQuaternion::new_unchecked(Quaternion::new(1.0 - x * a, vector.x, vector.y, vector.z))
+}
+
 /// Coefficients of the exponential map at `x = theta²`, with the derivatives of the last two by x: `[s, a, b, da, db]`.
 ///
 /// `s = sin(theta)/theta`, `a = (1 - cos)/theta²`, `b = (theta - sin)/theta³`.
 #[inline(always)]
 fn exponential_coefficients<T: Real>(x: T) -> [T; 5] {
     x.branch_below(
-        0.01,
+        1.0,
         #[inline(always)]
         || coefficients_by_series(x),
         #[inline(always)]
@@ -146,35 +163,49 @@ fn exponential_coefficients<T: Real>(x: T) -> [T; 5] {
     )
 }
 
-/// Taylor series; the first omitted terms are below 1e-17 relative.
+/// All five from the series of two functions; the first omitted terms are below 1e-17 relative.
+///
+/// ```text
+/// c = (1/2 - a)/x = Σ (-x)^k/(2k + 4)!,   d = (1/6 - b)/x = Σ (-x)^k/(2k + 5)!
+/// s = 1 - b x,   da/dx = c - b/2,   db/dx = (3 d - c)/2
+/// ```
 #[inline(always)]
 fn coefficients_by_series<T: Real>(x: T) -> [T; 5] {
-    let s = T::one() + x * cubic(x, [-1.0 / 6.0, 1.0 / 120.0, -1.0 / 5040.0, 1.0 / 362_880.0]);
-    // Of a, b, da and db, power by power: over numbers they go side by side.
-    const POWERS: [[f64; 4]; 4] = [
-        [-1.0 / 24.0, -1.0 / 120.0, -1.0 / 24.0, -1.0 / 120.0],
-        [1.0 / 720.0, 1.0 / 5040.0, 1.0 / 360.0, 1.0 / 2520.0],
-        [-1.0 / 40_320.0, -1.0 / 362_880.0, -1.0 / 13_440.0, -1.0 / 120_960.0],
-        [1.0 / 3_628_800.0, 1.0 / 39_916_800.0, 1.0 / 907_200.0, 1.0 / 9_979_200.0],
+    const C: [f64; 8] = [
+        1.0 / 24.0,
+        -1.0 / 720.0,
+        1.0 / 40_320.0,
+        -1.0 / 3_628_800.0,
+        1.0 / 479_001_600.0,
+        -1.0 / 87_178_291_200.0,
+        1.0 / 20_922_789_888_000.0,
+        -1.0 / 6_402_373_705_728_000.0,
     ];
-    let [a, b, da, db] = cubics(x, &POWERS);
-    [s, T::splat(0.5) + x * a, T::splat(1.0 / 6.0) + x * b, da, db]
+    const D: [f64; 8] = [
+        1.0 / 120.0,
+        -1.0 / 5040.0,
+        1.0 / 362_880.0,
+        -1.0 / 39_916_800.0,
+        1.0 / 6_227_020_800.0,
+        -1.0 / 1_307_674_368_000.0,
+        1.0 / 355_687_428_096_000.0,
+        -1.0 / 121_645_100_408_832_000.0,
+    ];
+    let half = T::splat(0.5);
+    let (c, d) = (polynomial(x, &C), polynomial(x, &D));
+    let (a, b) = (half - x * c, T::splat(1.0 / 6.0) - x * d);
+    [T::one() - x * b, a, b, c - half * b, half * (T::splat(3.0) * d - c)]
 }
 
-/// [`cubic`] of four polynomials.
+/// `Σ p_k x^k`, in pairs and pairs of pairs, which do not wait for each other.
 #[inline(always)]
-fn cubics<T: Real>(x: T, powers: &[[f64; 4]; 4]) -> [T; 4] {
-    let mut all = [T::zero(); 4];
-    for (k, polynomial) in all.iter_mut().enumerate() {
-        *polynomial = cubic(x, [powers[0][k], powers[1][k], powers[2][k], powers[3][k]]);
-    }
-    all
-}
-
-/// `p + q x + r x² + s x³`.
-#[inline(always)]
-fn cubic<T: Real>(x: T, [p, q, r, s]: [f64; 4]) -> T {
-    T::splat(p) + x * (T::splat(q) + x * (T::splat(r) + x * T::splat(s)))
+fn polynomial<T: Real>(x: T, p: &[f64; 8]) -> T {
+    let (x2, pair) = (
+        x * x,
+        #[inline(always)]
+        |k: usize| T::splat(p[k]) + x * T::splat(p[k + 1]),
+    );
+    (pair(0) + x2 * pair(2)) + (x2 * x2) * (pair(4) + x2 * pair(6))
 }
 
 /// Links hardly turn so far: this stays out of the recursions' code.
@@ -317,16 +348,27 @@ mod tests {
         }
     }
 
-    /// The series below theta = 0.1 and the closed form above meet; measured 3e-13 (cancellation in db/dx).
+    /// The series below one radian and the closed form above meet; measured 1.7e-16.
     #[test]
     fn series_and_closed_form_agree_where_they_meet() {
-        let below = exponential_coefficients(0.01 - 1e-15);
-        let above = exponential_coefficients(0.01 + 1e-15);
-        assert_relative_eq!(below[0], above[0], epsilon = 1e-14);
-        assert_relative_eq!(below[1], above[1], epsilon = 1e-13);
-        assert_relative_eq!(below[2], above[2], epsilon = 1e-13);
-        assert_relative_eq!(below[3], above[3], epsilon = 1e-11);
-        assert_relative_eq!(below[4], above[4], epsilon = 1e-10);
+        let below = exponential_coefficients(1.0 - f64::EPSILON);
+        let above = exponential_coefficients(1.0);
+        for (below, above) in below.into_iter().zip(above) {
+            assert_relative_eq!(below, above, epsilon = 2e-15);
+        }
+    }
+
+    /// Truth: nalgebra's quaternions, and the rotation vectors of their matrices; measured 2e-16 and 1e-16 relative.
+    #[test]
+    fn quaternions_are_those_of_the_rotation_vector() {
+        let axis = vector![0.48, -0.6, 0.64];
+        for angle in [0.0, 1e-9, 1e-3, 0.02, 0.0223, 0.0224, 0.03, 0.5, 1.9, 2.1, 3.0] {
+            let v = axis * angle;
+            let q = quaternion(&v);
+            assert_relative_eq!(q.coords, UnitQuaternion::from_scaled_axis(v).coords, epsilon = 2e-15);
+            let back = rotation_vector(q.to_rotation_matrix().matrix());
+            assert_relative_eq!(back, v, epsilon = 2e-15 * (1.0 + angle));
+        }
     }
 
     /// Half a turn about any axis is found again; measured 1e-15.

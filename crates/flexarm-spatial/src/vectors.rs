@@ -6,7 +6,7 @@
 //!
 //! Source: [Featherstone 2008], chapter 2, with linear and angular parts exchanged.
 
-use nalgebra::{IsometryMatrix3, Matrix3, Matrix6, Scalar, Vector3, Vector6};
+use nalgebra::{IsometryMatrix3, Matrix3, Matrix6, Rotation3, Scalar, Vector3, Vector6};
 use std::ops::{Add, AddAssign, Mul, Neg, Sub, SubAssign};
 
 use crate::products::{add, add3, cross, cross3, dot, lift, lift3, mul, mul3, scaled, sub, tr_mul, turn_symmetric};
@@ -14,6 +14,14 @@ use crate::real::Real;
 
 /// Pose `X_AB` of frame B in frame A, as rotation matrix and translation (m). `p_A = X_AB * p_B`.
 pub type Pose<T = f64> = IsometryMatrix3<T>;
+
+/// `X_AC = X_AB X_BC`.
+#[inline(always)]
+pub fn composed(X_AB: &Pose, X_BC: &Pose) -> Pose {
+    let R = X_AB.rotation.matrix();
+    let p = add(&X_AB.translation.vector, &mul(R, &X_BC.translation.vector));
+    Pose::from_parts(p.into(), Rotation3::from_matrix_unchecked(mul3(R, X_BC.rotation.matrix())))
+}
 
 /// Velocity (or acceleration) of a frame: linear part of its origin (m/s), angular part (rad/s).
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -238,17 +246,31 @@ impl<T: Real> SpatialInertia<T> {
     /// The same body about Ao in A axes, for `X_AB`.
     #[inline(always)]
     pub fn at_parent(&self, X_AB: &Pose<T>) -> SpatialInertia<T> {
-        let R = X_AB.rotation.matrix();
-        let p = &X_AB.translation.vector;
-        let h = mul(R, &self.first_moment);
+        self.turned(X_AB.rotation.matrix()).shifted(&X_AB.translation.vector)
+    }
+
+    /// In A axes, for `R_AB`.
+    #[inline(always)]
+    pub fn turned(&self, R: &Matrix3<T>) -> SpatialInertia<T> {
+        let Self { mass, first_moment, rotational } = self;
+        SpatialInertia { mass: *mass, first_moment: mul(R, first_moment), rotational: turn_symmetric(R, rotational) }
+    }
+
+    /// About a point p before this one.
+    #[inline(always)]
+    pub fn shifted(&self, p: &Vector3<T>) -> SpatialInertia<T> {
+        let h = &self.first_moment;
         let (half, two) = (T::splat(0.5), T::splat(2.0));
-        // I_A = R I Rᵀ + (2 p·h + m p·p) 1 - (p hᵀ + h pᵀ + m p pᵀ)
-        let k = add(&h, &scaled(p, self.mass * half));
+        // I_A = I_B + (2 p·h + m p·p) 1 - (p hᵀ + h pᵀ + m p pᵀ)
+        let k = add(h, &scaled(p, self.mass * half));
         let (x, y, z) = (p.x * two * k.x, p.y * two * k.y, p.z * two * k.z);
         let (xy, xz, yz) = (p.x * k.y + k.x * p.y, p.x * k.z + k.x * p.z, p.y * k.z + k.y * p.z);
         let moved = Matrix3::new(y + z, -xy, -xz, -xy, x + z, -yz, -xz, -yz, x + y);
-        let I = add3(&turn_symmetric(R, &self.rotational), &moved);
-        SpatialInertia { mass: self.mass, first_moment: add(&h, &scaled(p, self.mass)), rotational: I }
+        SpatialInertia {
+            mass: self.mass,
+            first_moment: add(h, &scaled(p, self.mass)),
+            rotational: add3(&self.rotational, &moved),
+        }
     }
 
     /// Inertia of a constant body in the scalar of a recursion.
@@ -344,7 +366,7 @@ impl AddAssign for ArticulatedInertia {
 mod tests {
     use super::*;
     use approx::assert_relative_eq;
-    use nalgebra::{Rotation3, Translation3, vector};
+    use nalgebra::{Translation3, vector};
 
     fn pose() -> Pose {
         Pose::from_parts(Translation3::new(0.3, -0.7, 0.5), Rotation3::from_euler_angles(0.4, -1.1, 2.0))
@@ -374,6 +396,7 @@ mod tests {
         let articulated = ArticulatedInertia::from_rigid(&M).at_parent(&X).to_matrix();
         assert_relative_eq!(articulated, congruent, epsilon = 1e-13);
         assert_relative_eq!(M.inertia_com()[(0, 0)], 2.0, epsilon = 1e-13);
+        assert_relative_eq!(composed(&X, &X).to_homogeneous(), (X * X).to_homogeneous(), epsilon = 1e-13);
     }
 
     /// Power is the same wherever it is reckoned; measured 2e-16.
