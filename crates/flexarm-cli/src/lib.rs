@@ -13,6 +13,7 @@ mod failure;
 mod flags;
 mod formats;
 mod identify;
+mod later;
 mod lobes;
 mod map;
 mod motion;
