@@ -83,6 +83,9 @@ enum Times {
     Any,
 }
 
+/// Most kinds of elements in one.
+const MOST_ELEMENTS: usize = 7;
+
 /// An element: its attributes, and whether they must be there; the elements in it, in any order.
 struct Form {
     attributes: &'static [(&'static str, Kind, bool)],
@@ -224,24 +227,29 @@ fn fits(node: Node<'_, '_>, form: &Form) -> bool {
     };
     let attributes = node.attributes().all(|a| takes(a.name(), a.value()))
         && form.attributes.iter().all(|(name, _, needed)| !needed || node.has_attribute(*name));
-    let times = || {
-        form.elements.iter().all(|(name, _, times)| match (count(node, name), times) {
-            (found, Times::Once) => found == 1,
-            (found, Times::AtMostOnce) => found <= 1,
-            (_, Times::Any) => true,
-        })
-    };
-    let known = |name: &str| form.elements.iter().find(|(known, ..)| *known == name);
-    let mut children = node.children();
-    attributes
-        && times()
-        && (form.also)(node)
-        && children.all(|child| match known(child.tag_name().name()) {
-            _ if child.is_comment() => true,
-            _ if child.is_text() => child.text().is_none_or(|text| text.trim().is_empty()),
-            Some((_, form, _)) => fits(child, form),
-            None => form.open && child.is_element(),
-        })
+    if !attributes || !(form.also)(node) {
+        return false;
+    }
+    let mut found = [0; MOST_ELEMENTS];
+    for child in node.children() {
+        let known = form.elements.iter().position(|(name, ..)| child.has_tag_name(*name));
+        let fitting = match known {
+            Some(k) => {
+                found[k] += 1;
+                fits(child, form.elements[k].1)
+            }
+            None if child.is_element() => form.open,
+            None => child.is_comment() || child.text().is_none_or(|text| text.trim().is_empty()),
+        };
+        if !fitting {
+            return false;
+        }
+    }
+    form.elements.iter().zip(found).all(|((.., times), found)| match times {
+        Times::Once => found == 1,
+        Times::AtMostOnce => found <= 1,
+        Times::Any => true,
+    })
 }
 
 #[cfg(test)]
