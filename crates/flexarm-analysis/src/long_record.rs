@@ -54,6 +54,9 @@ pub struct LongRecord {
     path_errors: Vec<[f64; 3]>,
     positions: Vec<[f64; 3]>,
     statics: Vec<[f64; 3]>,
+    /// Whether the static part of every sample is known.
+    statics_known: bool,
+    /// Of all samples once the first are dropped; before, nobody asks for them.
     totals: Totals,
     curve: Curve,
     /// Moves whose samples are no longer kept, and the stops after them.
@@ -86,6 +89,7 @@ impl LongRecord {
             path_errors: Vec::new(),
             positions: Vec::new(),
             statics: Vec::new(),
+            statics_known: true,
             totals: Totals::default(),
             curve: Curve::default(),
             past: 0,
@@ -114,25 +118,44 @@ impl LongRecord {
         self.path_errors.push(sample.path_error);
         self.positions.push(sample.rigid_position);
         self.statics.push(sample.static_m);
+        self.statics_known &= sample.static_m.iter().all(|x| x.is_finite());
+        if self.condensed {
+            self.gather(sample);
+        }
+        if self.times.len() > self.most {
+            self.condense();
+        }
+    }
+
+    /// Adds a sample to the figures of the record as a whole.
+    fn gather(&mut self, sample: &ErrorSample) {
         let begun = self.moves.partition_point(|(start, _)| *start <= sample.time_s);
         let moves = begun > 0 && sample.time_s <= self.moves[begun - 1].1;
         self.totals.add(sample, moves);
         self.curve.add(norm3(&sample.error));
-        if self.times.len() > self.most {
-            self.condense();
+    }
+
+    /// A sample that is kept.
+    fn sample(&self, k: usize) -> ErrorSample {
+        ErrorSample {
+            time_s: self.times[k],
+            error: self.errors[k],
+            path_error: self.path_errors[k],
+            rigid_position: self.positions[k],
+            static_m: self.statics[k],
         }
     }
 
     /// Number of samples that were added.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.totals.count
+        if self.condensed { self.totals.count } else { self.times.len() }
     }
 
     /// Whether there is none.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.totals.count == 0
+        self.len() == 0
     }
 
     /// Time of the last sample, s.
@@ -189,7 +212,7 @@ impl LongRecord {
             return error_parts(&self.times, &self.errors, &self.statics);
         }
         let (totals, statics) = (&self.totals, &self.totals.statics);
-        if !statics.known {
+        if !self.statics_known {
             return Err(RecordError::NotFinite { what: "statics", index: 0 });
         }
         let size = totals.peak.1;
@@ -219,7 +242,7 @@ impl LongRecord {
             times: &self.times[..length],
             errors: &self.errors[..length],
             rigid_positions: &self.positions[..length],
-            quasi_static: (self.rests_there && self.totals.statics.known).then_some(&self.statics[..length]),
+            quasi_static: (self.rests_there && self.statics_known).then_some(&self.statics[..length]),
             moves: &self.moves[moves],
         };
         tcp_metrics_on_path(&record, Some(&self.path_errors[..length]), &self.settings)
@@ -227,7 +250,9 @@ impl LongRecord {
 
     /// Measures the stops that are over and drops their samples; thins what is left if that is still much.
     fn condense(&mut self) {
-        self.condensed = true;
+        if !std::mem::replace(&mut self.condensed, true) {
+            (0..self.times.len()).for_each(|k| self.gather(&self.sample(k)));
+        }
         let now = self.times[self.times.len() - 1];
         // Times of moves and samples come from different sums.
         let slack = 1e-9 * (now - self.totals.start_s);
@@ -303,9 +328,8 @@ struct Totals {
 }
 
 /// The same of the static part and the rest, in the order and by the sums of [`error_parts`].
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 struct StaticTotals {
-    known: bool,
     peak_m: f64,
     /// Static part times error, where the error is largest (m²).
     along_peak: f64,
@@ -316,16 +340,9 @@ struct StaticTotals {
     area: f64,
 }
 
-impl Default for StaticTotals {
-    fn default() -> Self {
-        Self { known: true, peak_m: 0.0, along_peak: 0.0, dynamic_peak: (0.0, 0.0), last: 0.0, area: 0.0 }
-    }
-}
-
 impl StaticTotals {
     /// `since` is the time since the sample before (s), `None` for the first one.
     fn add(&mut self, time_s: f64, since: Option<f64>, error: Vector3<f64>, resting: Vector3<f64>, is_peak: bool) {
-        self.known &= resting.iter().all(|x| x.is_finite());
         let rest = error - resting;
         self.peak_m = if since.is_none() { resting.norm() } else { self.peak_m.max(resting.norm()) };
         if since.is_none() || rest.norm() > self.dynamic_peak.1 {

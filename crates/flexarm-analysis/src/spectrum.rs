@@ -101,9 +101,9 @@ pub fn amplitude_spectrum(times: &[f64], signal: &[[f64; 3]]) -> Option<Amplitud
     }
     let tapered = Tapered::new(times, signal, Taper::Both);
     let bins = (4 * tapered.samples.len()).next_power_of_two();
-    let mut amplitude = vec![[0.0; 3]; bins / 2];
+    let (mut amplitude, twiddles) = (vec![[0.0; 3]; bins / 2], twiddles(bins));
     for component in 0..3 {
-        for (slot, [re, im]) in amplitude.iter_mut().zip(tapered.transform(component, bins)) {
+        for (slot, [re, im]) in amplitude.iter_mut().zip(tapered.transform(component, &twiddles)) {
             slot[component] = 2.0 * re.hypot(im) / tapered.weight;
         }
     }
@@ -142,35 +142,36 @@ impl Tapered {
             Taper::FadeOut => (0.5 * PI * k as f64 / n).cos().powi(2),
             Taper::Both => (PI * (k as f64 + 0.5) / n).sin().powi(2),
         };
-        let weight: f64 = (0..samples.len()).map(shape).sum();
+        let shape: Vec<f64> = (0..samples.len()).map(shape).collect();
+        let weight: f64 = shape.iter().sum();
         for component in 0..3 {
-            let sum: f64 = samples.iter().enumerate().map(|(k, x)| shape(k) * x[component]).sum();
+            let sum: f64 = samples.iter().zip(&shape).map(|(x, shape)| shape * x[component]).sum();
             samples.iter_mut().for_each(|x| x[component] -= sum / weight);
         }
-        for (k, x) in samples.iter_mut().enumerate() {
-            *x = x.map(|value| value * shape(k));
+        for (x, shape) in samples.iter_mut().zip(&shape) {
+            *x = x.map(|value| value * shape);
         }
         Self { samples, step, weight, scale }
     }
 
     /// Squared magnitude of the transform at the first half of `bins` frequencies.
     fn power_spectrum(&self, bins: usize) -> Vec<f64> {
-        let mut power = vec![0.0; bins / 2];
+        let (mut power, twiddles) = (vec![0.0; bins / 2], twiddles(bins));
         for component in 0..3 {
-            for (sum, [re, im]) in power.iter_mut().zip(&self.transform(component, bins)) {
+            for (sum, [re, im]) in power.iter_mut().zip(&self.transform(component, &twiddles)) {
                 *sum += re * re + im * im;
             }
         }
         power
     }
 
-    /// Transform of one component, filled up with zeros to `bins` samples.
-    fn transform(&self, component: usize, bins: usize) -> Vec<[f64; 2]> {
-        let mut data = vec![[0.0; 2]; bins];
+    /// Transform of one component, filled up with zeros to as many samples as the [`twiddles`] are for.
+    fn transform(&self, component: usize, twiddles: &[[f64; 2]]) -> Vec<[f64; 2]> {
+        let mut data = vec![[0.0; 2]; 2 * twiddles.len()];
         for (slot, x) in data.iter_mut().zip(&self.samples) {
             slot[0] = x[component];
         }
-        fft(&mut data);
+        fft(&mut data, twiddles);
         data
     }
 
@@ -210,16 +211,18 @@ fn mean(block: &[[f64; 3]]) -> [f64; 3] {
     std::array::from_fn(|c| block.iter().map(|x| x[c]).sum::<f64>() / block.len() as f64)
 }
 
-/// Radix-2 transform in place, decimation in time; the length is a power of two.
-fn fft(data: &mut [[f64; 2]]) {
-    let n = data.len();
-    let twiddles: Vec<[f64; 2]> = (0..n / 2)
-        .map(|k| {
-            let (sin, cos) = (TAU * k as f64 / n as f64).sin_cos();
-            [cos, -sin]
-        })
-        .collect();
+/// `exp(-2πi k/n)` for `k < n/2`.
+fn twiddles(n: usize) -> Vec<[f64; 2]> {
+    let at = |k: usize| {
+        let (sin, cos) = (TAU * k as f64 / n as f64).sin_cos();
+        [cos, -sin]
+    };
+    (0..n / 2).map(at).collect()
+}
 
+/// Radix-2 transform in place, decimation in time; the length is a power of two, `twiddles` are those for it.
+fn fft(data: &mut [[f64; 2]], twiddles: &[[f64; 2]]) {
+    let n = data.len();
     // Bit reversal, then butterflies of growing span.
     let bits = n.trailing_zeros();
     for i in 0..n {

@@ -11,6 +11,7 @@ use crate::convert::ConvertArgs;
 use crate::exchange_args::{ExportArgs, ImportArgs};
 use crate::formats;
 use crate::identify::IdentifyArgs;
+use crate::later::Later;
 use crate::lobes::LobesArgs;
 use crate::map::MapArgs;
 use crate::motion::{MotionArgs, MotionInputArgs};
@@ -42,49 +43,49 @@ pub(crate) enum Command {
     /// Run the flexible robot beside its rigid twin, log both, measure the TCP error
     ///
     /// Without arguments: the shipped industrial arm on its pick-and-place cycle.
-    Compare(Box<RunArgs>),
+    Compare(Later<RunArgs>),
     /// Run one model along a trajectory and log it
-    Run(Box<RunArgs>),
+    Run(Later<RunArgs>),
     /// Show what was loaded, and kinematics and dynamics at a pose
-    Inspect(InspectArgs),
+    Inspect(Later<InspectArgs>),
     /// Look for everything that is wrong with a robot and a trajectory
-    Check(CheckArgs),
+    Check(Later<CheckArgs>),
     /// Make a robot file, a sample motion and the first run of a URDF or xacro file
-    New(Box<NewArgs>),
+    New(Later<NewArgs>),
     /// Show what is in a motion, against the limits of a robot, and write it in other formats
-    Motion(MotionArgs),
+    Motion(Later<MotionArgs>),
     /// Find a robot's stiffness from measurements, and the poses that are worth measuring
-    Identify(Box<IdentifyArgs>),
+    Identify(Later<IdentifyArgs>),
     /// Find the motion with which the flexible arm's tool follows the rigid one's, and judge it on other plants
-    Compensate(Box<CompensateArgs>),
+    Compensate(Later<CompensateArgs>),
     /// How the tool's error along a motion depends on every number of the robot: derivatives of one run, for all at once
-    Sensitivity(Box<SensitivityArgs>),
+    Sensitivity(Later<SensitivityArgs>),
     /// Sag, stiffness and frequencies over the workspace, over joints or along a motion, and where to put a workpiece
-    Map(Box<MapArgs>),
+    Map(Later<MapArgs>),
     /// Run a study: many runs with other payloads, stiffness, speeds, options; tables, sensitivities, shards
     Sweep(Box<SweepArgs>),
     /// Equilibrium under weight and load at a pose, and the compliance of the TCP
-    Statics(StaticsArgs),
+    Statics(Later<StaticsArgs>),
     /// Natural frequencies, damping and shapes at a pose, drives locked
-    Modes(ModesArgs),
+    Modes(Later<ModesArgs>),
     /// Frequency response of the TCP to forces on it and to motions of joints
-    Response(ResponseArgs),
+    Response(Later<ResponseArgs>),
     /// Limits of depth beyond which a cutting tool on the arm chatters, over the spindle speed
-    Lobes(Box<LobesArgs>),
+    Lobes(Later<LobesArgs>),
     /// Make the HTML report of recorded runs
-    Report(ReportArgs),
+    Report(Later<ReportArgs>),
     #[command(about = formats::about_convert())]
-    Convert(ConvertArgs),
+    Convert(Later<ConvertArgs>),
     /// Make a flexible link of a finite element mesh, with its checks
-    Reduce(Box<ReduceArgs>),
+    Reduce(Later<ReduceArgs>),
     /// Make a flexible link of matrices from another FE program
-    Import(Box<ImportArgs>),
+    Import(Later<ImportArgs>),
     /// Write the matrices of a flexible link for another FE program
-    Export(ExportArgs),
+    Export(Later<ExportArgs>),
     /// Run the case studies against their truths and write the page of the results
-    Verify(VerifyArgs),
+    Verify(Later<VerifyArgs>),
     /// Open a recording in the Rerun viewer
-    View(ViewArgs),
+    View(Later<ViewArgs>),
     /// Print the page of a file format: keys, units, defaults, examples
     Format {
         /// Which file

@@ -78,7 +78,8 @@ mod tests {
 
     #[test]
     fn every_setting_that_a_message_names_is_a_flag_of_some_command() {
-        let program = Cli::command();
+        let mut program = Cli::command();
+        program.build();
         let arguments = || program.get_subcommands().flat_map(|command| command.get_arguments());
         for setting in Setting::ALL {
             let flag = flag(setting);

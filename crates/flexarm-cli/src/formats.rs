@@ -106,7 +106,8 @@ mod tests {
     /// A format is written by default, or there is a word that asks for it.
     #[test]
     fn every_format_can_be_asked_for() {
-        let command = Cli::command();
+        let mut command = Cli::command();
+        command.build();
         let compare = command.find_subcommand("compare").expect("a command");
         let flag = compare.get_arguments().find(|argument| argument.get_id() == "also").expect("a flag");
         let words: Vec<String> = flag.get_possible_values().iter().map(|word| word.get_name().to_owned()).collect();

@@ -13,6 +13,7 @@ mod failure;
 mod flags;
 mod formats;
 mod identify;
+mod later;
 mod lobes;
 mod map;
 mod motion;
@@ -43,8 +44,9 @@ use args::{CheckArgs, Cli, Command, FormName, InspectArgs, MethodName, PresetNam
 use clap::{CommandFactory, Parser};
 use failure::Failure;
 use flexarm::{
-    AlphaSettings, ConstraintForm, InertiaEstimate, LoadOptions, ReadOptions, ReferenceMethod, ReferenceSettings,
-    Robot, RunOptions, Scenario, SpookPreset, SpookSettings, Start, StepperOptions, Variant,
+    AlphaSettings, ConstraintForm, FlexibleRobot, InertiaEstimate, LoadOptions, Modelling, ReadOptions,
+    ReferenceMethod, ReferenceSettings, Robot, RunOptions, Scenario, SpookPreset, SpookSettings, Start, StepperOptions,
+    Variant,
 };
 use indicatif::{ProgressBar, ProgressStyle};
 use shipped::OutputFolder;
@@ -220,9 +222,9 @@ fn run_options(args: &RunArgs, with_twin: bool) -> RunOptions {
     }
 }
 
-/// Robot, motion and choices of a run.
-fn variant(label: String, args: &RunArgs, with_twin: bool) -> Result<Variant, Failure> {
-    let robot = Robot::load_with(&shipped::robot(args.robot.as_deref())?, &load_options(&args.load)?)?;
+/// Robot, motion and choices of a run; the robot as its file models it.
+fn variant(label: String, args: &RunArgs, with_twin: bool) -> Result<(Variant, FlexibleRobot), Failure> {
+    let (robot, as_filed) = Robot::load_modelled(&shipped::robot(args.robot.as_deref())?, &load_options(&args.load)?)?;
     let trajectory = match (&args.trajectory, &robot.default_trajectory) {
         (Some(given), _) => shipped::trajectory(given),
         (None, Some(own)) => own.clone(),
@@ -246,7 +248,7 @@ fn variant(label: String, args: &RunArgs, with_twin: bool) -> Result<Variant, Fa
     let start = if args.from_rest == StartName::Equilibrium { Start::Equilibrium } else { Start::Undeformed };
     let scenario = Scenario::new(motion).with_start(start);
     let scenario = args.loads.iter().try_fold(scenario, |scenario, path| scenario.with_loads_file(path))?;
-    Ok(Variant { label, robot, scenario, options: run_options(args, with_twin) })
+    Ok((Variant { label, robot, scenario, options: run_options(args, with_twin) }, as_filed))
 }
 
 /// `line`: the command line as given.
@@ -261,7 +263,8 @@ fn simulate(cli: &Cli, args: &RunArgs, with_twin: bool, line: &[OsString]) -> Re
             _ => Failure::InStudy { label: part.label.clone(), source: Box::new(error) },
         })
     });
-    let variants = variants.collect::<Result<Vec<Variant>, Failure>>()?;
+    let (variants, mut as_filed): (Vec<Variant>, Vec<FlexibleRobot>) =
+        variants.collect::<Result<Vec<_>, Failure>>()?.into_iter().unzip();
     let Some(Variant { robot, scenario, options, .. }) = variants.first() else {
         return Err(Failure::Usage("there is nothing to run".into()));
     };
@@ -275,8 +278,12 @@ fn simulate(cli: &Cli, args: &RunArgs, with_twin: bool, line: &[OsString]) -> Re
         bar.show(t, total);
         stop()
     };
-    let result = match variants.len() {
-        1 => flexarm::simulate(robot, scenario, options, outputs.as_ref(), &mut progress),
+    let as_filed = as_filed.pop().filter(|_| options.modelling == Modelling::default());
+    let result = match (variants.len(), as_filed) {
+        (1, Some(flexible)) => {
+            flexarm::simulate_modelled(robot, flexible, scenario, options, outputs.as_ref(), &mut progress)
+        }
+        (1, None) => flexarm::simulate(robot, scenario, options, outputs.as_ref(), &mut progress),
         _ => flexarm::compare_study(&variants, outputs.as_ref(), &mut progress).map(|(summary, _)| summary),
     };
     bar.clear();

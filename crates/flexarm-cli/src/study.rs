@@ -119,9 +119,9 @@ fn changed(line: &[OsString], words: &[(String, String, bool)]) -> Result<RunArg
     else {
         return Err("only compare has several runs".into());
     };
-    args.robot = robot.or(args.robot);
-    args.trajectory = trajectory.or(args.trajectory);
-    Ok(*args)
+    args.0.robot = robot.or(args.0.robot);
+    args.0.trajectory = trajectory.or(args.0.trajectory);
+    Ok(*args.0)
 }
 
 /// What the line gives for an option, as a word for a label.

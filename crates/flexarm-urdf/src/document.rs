@@ -4,7 +4,7 @@
 //! `faulty`, so that no second fault follows from the first. Start at [`read_document`].
 //!
 //! `urdf_rs` cannot stand here: it drops the words of a vector that are no numbers, takes a missing
-//! `<inertial>` or `<limit>` for zeros, and has no positions. It is asked at the end, as a second reader.
+//! `<inertial>` or `<limit>` for zeros, and has no positions. It is asked at the end, as a second reader ([`crate::second_reader`]).
 //! Not here: the tree ([`crate::tree`]), physics ([`crate::inertia`]).
 
 use std::collections::HashMap;

@@ -57,6 +57,7 @@ mod raw;
 mod read;
 mod report;
 mod resolve;
+mod second_reader;
 mod shapes;
 mod spelling;
 mod tcp;

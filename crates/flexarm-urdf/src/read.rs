@@ -6,14 +6,14 @@ use flexarm_kinematics::{Link, Mechanism};
 
 use crate::document::read_document;
 use crate::error::UrdfError;
-use crate::finding::{Finding, Place, Severity};
+use crate::finding::{Finding, Severity};
 use crate::geometry::Visual;
 use crate::mesh::UpAxis;
 use crate::raw::{RawKind, RawRobot};
 use crate::report::Report;
 use crate::resolve::Resolver;
 use crate::tcp::tcp_candidates;
-use crate::{inertia, joints, shapes, tree, xacro, xml};
+use crate::{inertia, joints, second_reader, shapes, tree, xacro, xml};
 
 /// How to read. `ReadOptions::default()` reads files as they are and looks into meshes.
 #[derive(Clone, Debug)]
@@ -219,27 +219,19 @@ fn parse_expanded(
     options: &ReadOptions,
     report: &mut Report,
 ) -> Result<UrdfRobot, UrdfError> {
-    let mut deep = false;
-    let raw = match xml::parse(text, &lines) {
-        Ok(document) => {
-            deep = document.descendants().any(|n| n.ancestors().nth(MAX_DEPTH).is_some());
-            read_document(document.root_element(), &lines, report)
-        }
-        Err(issue) => {
-            report.issues.push(*issue);
-            None
-        }
-    };
+    let document = xml::parse(text, &lines).map_err(|issue| report.issues.push(*issue)).ok();
+    let raw = document.as_ref().and_then(|document| read_document(document.root_element(), &lines, report));
     let robot = raw.map(|mut raw| {
         raw.idle_macros = idle_macros.to_vec();
         joints::fix_still_followers(&mut raw, report);
         assemble(&raw, text, resolver, options, report)
     });
-    match robot {
-        Some(mut robot) if report.issues.is_empty() => {
+    match (robot, &document) {
+        (Some(mut robot), Some(document)) if report.issues.is_empty() => {
             // it recurses, and would overflow the stack
-            if !deep {
-                ask_second_reader(text, &robot.mechanism, &lines.place(0), report);
+            if !document.descendants().any(|n| n.ancestors().nth(MAX_DEPTH).is_some()) {
+                let place = lines.place(0);
+                second_reader::ask(text, document.root_element(), &robot.mechanism, &place, report);
             }
             robot.warnings = report.remarks();
             Ok(robot)
@@ -295,19 +287,6 @@ fn assemble(
             .collect(),
         mechanism,
     }
-}
-
-/// Rerun and other tools read URDF with `urdf_rs`: say so if it refuses the file or sees another robot.
-fn ask_second_reader(text: &str, mechanism: &Mechanism, place: &Place, report: &mut Report) {
-    let message = match urdf_rs::read_from_string(text) {
-        Ok(other) if other.links.len() == mechanism.links.len() && other.joints.len() == mechanism.joints.len() => {
-            return;
-        }
-        Ok(_) => "urdf-rs sees other links and joints in this file".to_owned(),
-        Err(error) => format!("urdf-rs refuses this file: {error}"),
-    };
-    let help = "flexarm reads it; Rerun and other viewers built on urdf-rs may not show the robot";
-    report.warning(place, "other-readers", message, help);
 }
 
 impl UrdfRobot {

@@ -146,7 +146,7 @@ pub use response::{
 };
 pub use robot::{LoadOptions, Robot, TCP_FRAME};
 pub use robot_file::RobotFileError;
-pub use run::{Progress, simulate, simulate_traced};
+pub use run::{Progress, simulate, simulate_modelled, simulate_traced};
 pub use scenario::{Disturbances, Scenario};
 pub use settling::Settling;
 pub use statics::{ElementStatics, Statics, record_statics, statics};

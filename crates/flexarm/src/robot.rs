@@ -1,7 +1,7 @@
 //! A robot as loaded: URDF, payload, tool centre point and flexible links, ready to make models from.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use flexarm_kinematics::{Frame, Joint, JointKind, Link, LinkInertia, Mechanism, Model, Pose};
 use flexarm_urdf::{InertiaEstimate, ReadOptions, UrdfRobot, closest, default_tcp, parse_urdf, read_urdf};
@@ -14,7 +14,7 @@ use crate::controller_entry::{RobotAxis, controller_axes};
 use crate::drive_entry::{Drive, drives};
 use crate::error::{Error, ValueError};
 use crate::file_cache::FileCache;
-use crate::flexible::RobotLink;
+use crate::flexible::{FlexibleRobot, RobotLink};
 use crate::gear_entry::{RobotCoupling, coupling};
 use crate::link_entry::{LinkHome, flexible_link};
 use crate::loop_entry::add_loops;
@@ -71,6 +71,8 @@ pub struct Robot {
     pub(crate) controller: Vec<RobotAxis>,
     /// What only the text of the file shows.
     written: Vec<Caveat>,
+    /// The last tree of the rigid robot, with the mechanism that it is of.
+    rigid_tree: Arc<Mutex<Option<(Mechanism, Arc<Model>)>>>,
 }
 
 impl Robot {
@@ -87,13 +89,25 @@ impl Robot {
     /// # Errors
     /// As [`Robot::load`].
     pub fn load_with(path: &Path, options: &LoadOptions) -> Result<Self, Error> {
+        Self::load_modelled(path, options).map(|(robot, _)| robot)
+    }
+
+    /// As [`Robot::load_with`], with its links and drives modelled as the file says ([`Robot::flexible_robot`]): to check a robot is
+    /// to do that, and a run needs not do it again ([`crate::simulate_modelled`]).
+    ///
+    /// # Errors
+    /// As [`Robot::load`].
+    pub fn load_modelled(path: &Path, options: &LoadOptions) -> Result<(Self, FlexibleRobot), Error> {
         let path = if path.is_dir() { path.join("robot.toml") } else { path.to_owned() };
         if !path.exists() {
             let what = "there is no such file; give a robot.toml, a folder with one, or a .urdf or .xacro file".into();
             return Err(Error::File { path, what });
         }
         match path.extension().and_then(|e| e.to_str()) {
-            Some("toml") => Self::from_toml(&flexarm_files::read_text(&path)?, &path, options),
+            Some("toml") => {
+                let text = flexarm_files::read_text(&path)?;
+                Self::of_texts(&path, &text, None, options, &FileCache::default())
+            }
             Some("urdf" | "xacro") => Self::from_urdf(&path, options),
             _ => {
                 let what = "expected a robot.toml, a folder with one, or a file ending in .urdf or .xacro".into();
@@ -102,7 +116,7 @@ impl Robot {
         }
     }
 
-    fn from_urdf(path: &Path, options: &LoadOptions) -> Result<Self, Error> {
+    fn from_urdf(path: &Path, options: &LoadOptions) -> Result<(Self, FlexibleRobot), Error> {
         let urdf = read_urdf(path, &options.urdf)?;
         let name = urdf.mechanism.name.clone();
         let link = options.tcp.clone().or_else(|| default_tcp(&urdf.mechanism).map(str::to_owned));
@@ -124,9 +138,10 @@ impl Robot {
             warnings: Vec::new(),
             controller: Vec::new(),
             written: Vec::new(),
+            rigid_tree: Arc::default(),
         };
-        robot.finish(None)?;
-        Ok(robot)
+        let flexible = robot.finish(None)?;
+        Ok((robot, flexible))
     }
 
     /// A robot of the text of a robot file, which may never have been one.
@@ -146,12 +161,12 @@ impl Robot {
     /// # Errors
     /// As [`Robot::load`].
     pub fn from_texts(text: &str, urdf: &str, path: &Path, options: &LoadOptions) -> Result<Self, Error> {
-        Self::of_texts(path, text, Some(urdf), options, &FileCache::default())
+        Self::of_texts(path, text, Some(urdf), options, &FileCache::default()).map(|(robot, _)| robot)
     }
 
     /// As [`Robot::from_toml`]; what the file names is read through the cache.
     pub(crate) fn of_text(path: &Path, text: &str, options: &LoadOptions, files: &FileCache) -> Result<Self, Error> {
-        Self::of_texts(path, text, None, options, files)
+        Self::of_texts(path, text, None, options, files).map(|(robot, _)| robot)
     }
 
     /// The same, with the text of the description if there is one.
@@ -161,7 +176,7 @@ impl Robot {
         description: Option<&str>,
         options: &LoadOptions,
         files: &FileCache,
-    ) -> Result<Self, Error> {
+    ) -> Result<(Self, FlexibleRobot), Error> {
         let (file, source) = parse_robot_file(text, path)?;
         let folder = path.parent().unwrap_or(Path::new("."));
         let urdf_path = folder.join(file.urdf.get_ref());
@@ -198,7 +213,7 @@ impl Robot {
         source: &Source,
         options: &LoadOptions,
         files: &FileCache,
-    ) -> Result<Self, Error> {
+    ) -> Result<(Self, FlexibleRobot), Error> {
         let folder = path.parent().unwrap_or(Path::new("."));
         let mut faults: Vec<Error> = Vec::new();
         let mut rigid = urdf.mechanism.clone();
@@ -232,6 +247,7 @@ impl Robot {
             warnings: Vec::new(),
             controller: Vec::new(),
             written: written_caveats(file),
+            rigid_tree: Arc::default(),
         };
         if let Some(payload) = &file.payload {
             let link = file.tcp.as_ref().map(|t| t.get_ref().link.get_ref().as_str());
@@ -270,12 +286,12 @@ impl Robot {
             1 => return Err(faults.remove(0)),
             _ => return Err(Error::Several(faults)),
         }
-        robot.finish(Some((file, source)))?;
-        Ok(robot)
+        let flexible = robot.finish(Some((file, source)))?;
+        Ok((robot, flexible))
     }
 
     /// Adds the TCP frame and checks that both trees can be built.
-    fn finish(&mut self, file: Option<(&RobotFile, &Source)>) -> Result<(), Error> {
+    fn finish(&mut self, file: Option<(&RobotFile, &Source)>) -> Result<FlexibleRobot, Error> {
         let (link, X_LT) = self.tcp.clone();
         if self.rigid.link(&link).is_none() {
             let known = self.rigid.links.iter().map(|l| l.name.clone()).collect();
@@ -300,7 +316,7 @@ impl Robot {
                         ));
                     }
                 }
-                Ok(())
+                Ok(flexible)
             }
             (Err(Error::Modelling(fault)), Some((source, span))) => Err(source.error(span, fault.to_string()).into()),
             (Err(error), _) => Err(error),
@@ -430,7 +446,14 @@ impl Robot {
     /// # Errors
     /// [`Error::Model`].
     pub fn rigid_model(&self) -> Result<Arc<Model>, Error> {
-        Model::new(&self.rigid).map(Arc::new).map_err(|source| Error::Model { path: self.urdf_path.clone(), source })
+        let mut kept = self.rigid_tree.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, model)) = kept.as_ref().filter(|(of, _)| *of == self.rigid) {
+            return Ok(model.clone());
+        }
+        let model = Model::new(&self.rigid);
+        let model = model.map(Arc::new).map_err(|source| Error::Model { path: self.urdf_path.clone(), source })?;
+        *kept = Some((self.rigid.clone(), model.clone()));
+        Ok(model)
     }
 }
 

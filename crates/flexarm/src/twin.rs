@@ -1,7 +1,9 @@
 //! The rigid twin: the same robot on the same motion with every elastic coordinate held at zero.
 
+use std::sync::Arc;
+
 use flexarm_kinematics::{
-    Data, Frame, State, forward_kinematics_velocity, frame_jacobian, frame_twist, inverse_dynamics, world_poses,
+    Data, Frame, Model, State, forward_kinematics_velocity, frame_jacobian, frame_twist, inverse_dynamics, world_poses,
 };
 use flexarm_stepping::FlexibleArm;
 use nalgebra::{DVector, Matrix6xX, Vector3};
@@ -17,6 +19,8 @@ pub(crate) struct RigidTwin {
     pub(crate) velocity: Vector3<f64>,
     /// Acceleration of the TCP (m/s²).
     pub(crate) acceleration: Vector3<f64>,
+    /// What stands where, and how it moves, in [`Self::data`] and [`Self::J`]; `None` where other functions were there last.
+    placed: Option<(Arc<Model>, State)>,
 }
 
 impl RigidTwin {
@@ -29,6 +33,7 @@ impl RigidTwin {
             J: Matrix6xX::zeros(model.nv()),
             velocity: Vector3::zeros(),
             acceleration: Vector3::zeros(),
+            placed: None,
         }
     }
 
@@ -43,8 +48,19 @@ impl RigidTwin {
     }
 
     /// Where everything is and how it moves at time t, by the sums of [`RigidTwin::update`]; neither forces nor acceleration.
+    /// While the joints rest it is what it was.
     pub(crate) fn place(&mut self, arm: &FlexibleArm, tcp: &Frame, t: f64) {
         arm.prescribed_state(t, &mut self.state, &mut self.qddot);
+        if let Some((model, state)) = &mut self.placed {
+            if Arc::ptr_eq(model, &arm.model) && *state == self.state {
+                return;
+            }
+            model.clone_from(&arm.model);
+            state.q.copy_from(&self.state.q);
+            state.qdot.copy_from(&self.state.qdot);
+        } else {
+            self.placed = Some((arm.model.clone(), self.state.clone()));
+        }
         forward_kinematics_velocity(&arm.model, &mut self.data, &self.state);
         self.look_at_tool(arm, tcp);
     }
@@ -57,6 +73,7 @@ impl RigidTwin {
 
     /// Everything at time t; `data.tau` holds the torques that the drives must supply.
     pub(crate) fn update(&mut self, arm: &FlexibleArm, tcp: &Frame, t: f64) {
+        self.placed = None;
         let model = &arm.model;
         arm.prescribed_state(t, &mut self.state, &mut self.qddot);
         inverse_dynamics(model, &mut self.data, &self.state, &self.qddot);

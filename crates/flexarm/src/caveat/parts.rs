@@ -58,15 +58,15 @@ pub(crate) fn of_robot(robot: &Robot) -> Vec<Caveat> {
 /// Angles of a file that are more than a turn (rad).
 pub(crate) fn angles(of: &str, values: &[f64]) -> Option<Caveat> {
     let largest = values.iter().fold(0.0f64, |m, x| m.max(x.abs()));
-    let caveat = kinds::ANGLE.found(of, largest, TURN);
-    (largest > TURN + 1e-9).then(|| caveat.likely(slip(largest, &(0.0..=TURN), slip::ANGLE, 1.0)))
+    let caveat = || kinds::ANGLE.found(of, largest, TURN);
+    (largest > TURN + 1e-9).then(|| caveat().likely(slip(largest, &(0.0..=TURN), slip::ANGLE, 1.0)))
 }
 
 /// Something that sits farther from its link than the robot is large.
 fn far(what: &str, distance: f64, size: &Size) -> Option<Caveat> {
     let limit = (FAR.0 * size.extent).max(FAR.1);
-    let caveat = kinds::FAR.found(what, distance, size.extent);
-    (distance > limit).then(|| caveat.likely(slip(distance, &(0.0..=limit), slip::LENGTH, 1.0)))
+    let caveat = || kinds::FAR.found(what, distance, size.extent);
+    (distance > limit).then(|| caveat().likely(slip(distance, &(0.0..=limit), slip::LENGTH, 1.0)))
 }
 
 /// Joints farther apart than any arm is long, or than the rest of this arm allows.
@@ -77,11 +77,11 @@ fn distances<'a>(mechanism: &'a Mechanism, size: &'a Size) -> impl Iterator<Item
         let (own, others) = (length(joint), all - length(joint));
         let sound = 0.0..=others.max(1.0);
         let is_odd = own > LONGEST || (others > 1e-3 && own > ODD_DISTANCE * others && own > FAR.1);
-        let caveat = kinds::JOINT_DISTANCE.found(format!("joint {:?}", joint.name), own, others);
-        is_odd.then(|| caveat.likely(slip(own, &sound, slip::LENGTH, 1.0)))
+        let caveat = || kinds::JOINT_DISTANCE.found(format!("joint {:?}", joint.name), own, others);
+        is_odd.then(|| caveat().likely(slip(own, &sound, slip::LENGTH, 1.0)))
     });
-    let long = kinds::SIZE.found("the arm", size.extent, LONGEST);
-    let long = (size.extent > LONGEST).then(|| long.likely(slip(size.extent, &(0.05..=30.0), slip::LENGTH, 1.0)));
+    let long = || kinds::SIZE.found("the arm", size.extent, LONGEST);
+    let long = (size.extent > LONGEST).then(|| long().likely(slip(size.extent, &(0.05..=30.0), slip::LENGTH, 1.0)));
     odd.chain(long)
 }
 
@@ -154,8 +154,8 @@ pub(crate) fn payload(what: &str, inertia: &LinkInertia, size: &Size, weighs: bo
     moments.sort_by(f64::total_cmp);
     let [low, middle, high] = moments;
     if high == 0.0 {
-        let point = kinds::POINT_PAYLOAD.found(what, inertia.mass, POINT_MASS);
-        caveats.extend((inertia.mass > POINT_MASS).then_some(point));
+        let point = || kinds::POINT_PAYLOAD.found(what, inertia.mass, POINT_MASS);
+        caveats.extend((inertia.mass > POINT_MASS).then(point));
         return caveats;
     }
     if high > (low + middle) * (1.0 + 1e-6) {
@@ -202,14 +202,14 @@ fn strong_drives(model: &Model, size: &Size) -> Option<Caveat> {
     let least = least.map(|k| (effort(*k) / loads.weight[*k], *k)).min_by(|a, b| a.0.total_cmp(&b.0));
     let joint = |k: usize| format!("joint {:?}", model.coordinates()[k].joint);
     if let Some((ratio, k)) = least {
-        let caveat = kinds::EFFORT_LIMIT.found(joint(k), effort(k), loads.weight[k]);
-        return (ratio > STRONG).then(|| caveat.likely(slip(ratio, &(0.5..=100.0), slip::EFFORT, 1.0)));
+        let caveat = || kinds::EFFORT_LIMIT.found(joint(k), effort(k), loads.weight[k]);
+        return (ratio > STRONG).then(|| caveat().likely(slip(ratio, &(0.5..=100.0), slip::EFFORT, 1.0)));
     }
     // Nothing weighs on a joint: by what it could accelerate.
     let heaviest = joints.into_iter().max_by(|a, b| loads.inertia[*a].total_cmp(&loads.inertia[*b]))?;
     let acceleration = effort(heaviest) / loads.inertia[heaviest] * size.extent;
-    let caveat = kinds::TIP_ACCELERATION.found(joint(heaviest), acceleration, TIP_ACCELERATION);
+    let caveat = || kinds::TIP_ACCELERATION.found(joint(heaviest), acceleration, TIP_ACCELERATION);
     let turns = model.coordinates()[heaviest].kind != "prismatic";
     (turns && acceleration > TIP_ACCELERATION)
-        .then(|| caveat.likely(slip(acceleration, &(0.1..=TIP_ACCELERATION), slip::EFFORT, 1.0)))
+        .then(|| caveat().likely(slip(acceleration, &(0.1..=TIP_ACCELERATION), slip::EFFORT, 1.0)))
 }

@@ -21,13 +21,17 @@ pub(crate) struct LinkStrain {
 
 /// An interface of a link on its body.
 struct Interface {
-    frame: Frame,
-    X_FI: Pose,
+    body: usize,
+    X_BI: Pose,
 }
 
 impl Interface {
+    fn new(frame: &Frame, X_FI: Pose) -> Self {
+        Self { body: frame.body, X_BI: frame.X_BF * X_FI }
+    }
+
     fn pose(&self, X_WB: &[Pose]) -> Pose {
-        X_WB[self.frame.body] * self.frame.X_BF * self.X_FI
+        X_WB[self.body] * self.X_BI
     }
 }
 
@@ -49,10 +53,10 @@ pub(crate) struct Strains {
 
 impl Strains {
     pub(crate) fn new(flexible: &FlexibleRobot, model: &Model) -> Self {
-        let frame = |name: &str| model.frame(name).expect("a link of the substitution").clone();
+        let frame = |name: &str| model.frame(name).expect("a link of the substitution");
         let spans = flexible.spans.iter().map(|span| Span {
-            near: Interface { frame: frame(&span.link), X_FI: span.X_LA },
-            far: Interface { frame: frame(&span.distal_link), X_FI: span.X_DB },
+            near: Interface::new(frame(&span.link), span.X_LA),
+            far: Interface::new(frame(&span.distal_link), span.X_DB),
             length: span.length,
             R_AE: None,
         });
@@ -91,7 +95,7 @@ mod tests {
     fn strain_and_rotation_are_those_of_the_link_wherever_the_arm_is() {
         let on = |body: usize, X_FI: Pose| {
             let frame = Frame { name: String::new(), body, X_BF: Pose::identity() };
-            Interface { frame, X_FI }
+            Interface::new(&frame, X_FI)
         };
         let near = on(1, Pose::translation(0.1, 0.0, 0.0));
         let far = on(2, Pose::translation(0.0, 0.0, 0.3));

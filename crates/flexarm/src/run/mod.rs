@@ -65,8 +65,26 @@ pub fn simulate(
     outputs: Option<&Outputs>,
     progress: &mut Progress<'_>,
 ) -> Result<Summary, Error> {
-    let wanted = if outputs.is_some() { Wanted::Curves } else { Wanted::Figures };
-    let together = Together { wanted, ..Together::default() };
+    let together = Together { wanted: Wanted::of(outputs), ..Together::default() };
+    run_traced(robot, &scenario.into(), options, outputs, together, progress).map(|(summary, _)| summary)
+}
+
+/// As [`simulate`], of a robot that is modelled already.
+///
+/// * `flexible`: what [`Robot::modelled`] makes of the options' own modelling.
+///
+/// # Errors
+/// As [`simulate`].
+pub fn simulate_modelled(
+    robot: &Robot,
+    flexible: FlexibleRobot,
+    scenario: impl Into<Scenario>,
+    options: &RunOptions,
+    outputs: Option<&Outputs>,
+    progress: &mut Progress<'_>,
+) -> Result<Summary, Error> {
+    let prepared = Prepared::new(flexible);
+    let together = Together { wanted: Wanted::of(outputs), prepared: Some(&prepared), ..Together::default() };
     run_traced(robot, &scenario.into(), options, outputs, together, progress).map(|(summary, _)| summary)
 }
 
@@ -100,6 +118,13 @@ pub(crate) enum Wanted {
     /// Curves, and all that recordings say of a run.
     #[default]
     Curves,
+}
+
+impl Wanted {
+    /// Of a run that is seen by its files alone.
+    fn of(outputs: Option<&Outputs>) -> Self {
+        if outputs.is_some() { Self::Curves } else { Self::Figures }
+    }
 }
 
 /// What a run shares with others that it is seen with, or gets from who prepared it.
