@@ -152,6 +152,16 @@ impl Real for Four {
     }
 
     #[inline(always)]
+    fn load(from: &[f64]) -> Self {
+        Self::new([from[0], from[1], from[2], from[3]])
+    }
+
+    #[inline(always)]
+    fn store(self, to: &mut [f64]) {
+        to[..4].copy_from_slice(&self.lanes());
+    }
+
+    #[inline(always)]
     fn sqrt(self) -> Self {
         // SAFETY: see the module page.
         Self(unsafe { _mm256_sqrt_pd(self.0) })

@@ -11,15 +11,21 @@
 //! Not here: what the rows mean. Degrees of freedom, ties and boundaries are the business of
 //! [`crate::reduction`].
 
+mod block;
 mod cholesky;
 mod dense;
 mod lanczos;
 mod ordering;
 mod symmetric;
+mod triangular;
+mod vectors;
 
+pub use block::{Block, WIDTH};
 pub use cholesky::{Cholesky, FactorFigures, NotPositiveDefinite, Threads};
-pub use lanczos::{Modes, ModesError, ModesWanted, smallest_modes};
+pub use lanczos::{Modes, ModesError, ModesWanted, Pencil, Released, modes_of_two_supports, smallest_modes};
 pub use ordering::Ordering;
 pub use symmetric::{Pattern, SparseSymmetric};
 
+pub(crate) use block::{Row, grams, subtract_products};
 pub(crate) use dense::{add_product, gram};
+pub(crate) use vectors::{Wide, Work, quickly};
