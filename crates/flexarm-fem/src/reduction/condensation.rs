@@ -9,7 +9,8 @@ use crate::error::Direction;
 use crate::model::FeModel;
 use crate::sparse::{
     Block, Cholesky, FactorFigures, Modes, ModesError, ModesWanted, NotPositiveDefinite, Ordering, Pencil, Released,
-    Row, Threads, WIDTH, add_product, gram, grams, modes_of_two_supports, smallest_modes, subtract_products,
+    Row, Threads, WIDTH, add_product, gram, grams, modes_of_two_supports, orthonormalising, smallest_modes,
+    subtract_products,
 };
 
 /// A pivot this far below its diagonal entry is rounding: a mechanism that passed by its sign. Links of
@@ -256,34 +257,32 @@ impl<'m> Condensation<'m> {
     /// Returns λ, one row per constrained boundary DoF.
     fn solve_constrained(&self, F: &mut Block, g: Option<&DMatrix<f64>>) -> DMatrix<f64> {
         let width = F.width;
-        let mut forces = DMatrix::zeros(0, width);
+        let Some(saddle) = &self.saddle else {
+            self.factor.solve_rows(&mut F.rows, Some(&self.solved));
+            fill_others(&mut F.rows, &self.solved);
+            return DMatrix::zeros(0, width);
+        };
         let mut y = Block { rows: self.solved.iter().map(|dof| F.rows[*dof as usize]).collect(), width };
         self.factor.solve_block(&mut y);
-        let mut motion = None;
-        if let Some(saddle) = &self.saddle {
-            let m = saddle.rows.len();
-            let mut right = DMatrix::zeros(saddle.small.l().nrows(), width);
-            let mut gap = apply_rows(&saddle.rows, width, |at, j| y.rows[at].0[j]);
-            if let Some(g) = g {
-                gap -= g;
-            }
-            right.view_mut((0, 0), (m, width)).copy_from(&(gap / saddle.scale));
-            if let Some(R) = &saddle.rigid {
-                right.view_mut((m, 0), (6, width)).copy_from(&-R.gram(F));
-            }
-            if saddle.small.solve_mut(&mut right) {
-                let lambda = right.rows(0, m).into_owned();
-                subtract_products(&mut y, &saddle.Z, &lambda);
-                forces = lambda;
-                motion = saddle.rigid.as_ref().map(|R| (R, right.rows(m, 6) * -saddle.scale));
-            } else {
-                y.rows.fill(Row([f64::NAN; WIDTH]));
-            }
+        let m = saddle.rows.len();
+        let mut right = DMatrix::zeros(saddle.small.l().nrows(), width);
+        let mut gap = apply_rows(&saddle.rows, width, |at, j| y.rows[at].0[j]);
+        if let Some(g) = g {
+            gap -= g;
         }
-        F.rows.fill(Row::ZERO);
+        right.view_mut((0, 0), (m, width)).copy_from(&(gap / saddle.scale));
+        if let Some(R) = &saddle.rigid {
+            right.view_mut((m, 0), (6, width)).copy_from(&-R.gram(F));
+        }
+        if !saddle.small.solve_mut(&mut right) {
+            right.fill(f64::NAN);
+        }
+        let forces = right.rows(0, m).into_owned();
+        subtract_products(&mut y, &saddle.Z, &forces);
         self.solved.iter().zip(&y.rows).for_each(|(dof, y)| F.rows[*dof as usize] = *y);
-        if let Some((R, minus_a)) = motion {
-            F.subtract_product(R, &minus_a);
+        fill_others(&mut F.rows, &self.solved);
+        if let Some(R) = &saddle.rigid {
+            F.subtract_product(R, &(right.rows(m, 6) * -saddle.scale));
         }
         forces
     }
@@ -514,7 +513,8 @@ impl<'m> Condensation<'m> {
         self.asymmetry
     }
 
-    /// Condition number of `K_ii`: largest over smallest eigenvalue, each by a few power iterations.
+    /// Condition number of `K_ii`: largest over smallest eigenvalue, the one by power iteration, the other by two steps of
+    /// subspace iteration that begin with the static shapes of an interface.
     pub fn condition_estimate(&self) -> f64 {
         let rows = self.model.size();
         let inside = |x: &mut DMatrix<f64>| {
@@ -522,10 +522,9 @@ impl<'m> Condensation<'m> {
             self.solved.iter().for_each(|dof| kept[*dof as usize] = x[*dof as usize]);
             *x = kept;
         };
-        // Neighbouring nodes against each other excite the stiff end, all together the soft one.
+        // Neighbouring nodes against each other excite the stiff end.
         let mut stiff = DMatrix::from_fn(rows, 1, |i, _| if (i * 2_654_435_761) & 64 == 0 { 1.0 } else { -1.0 });
-        let mut soft = DMatrix::from_element(rows, 1, 1.0);
-        let (mut largest, mut smallest) = (0.0, 1.0);
+        let mut largest = 0.0;
         inside(&mut stiff);
         for _ in 0..20 {
             stiff /= stiff.norm();
@@ -533,16 +532,13 @@ impl<'m> Condensation<'m> {
             inside(&mut stiff);
             largest = stiff.norm();
         }
-        for _ in 0..5 {
-            let mut y = DMatrix::from_fn(self.solved.len(), 1, |k, _| soft[self.solved[k] as usize]);
-            y /= y.norm();
-            self.factor.solve_in_place(&mut y);
-            smallest = 1.0 / y.norm();
-            for (k, dof) in self.solved.iter().enumerate() {
-                soft[*dof as usize] = y[k];
-            }
-        }
-        largest / smallest
+        let Some(T_B) = self.T_B.first() else { return f64::NAN };
+        let mut y = Block { rows: self.solved.iter().map(|dof| T_B.rows[*dof as usize]).collect(), width: T_B.width };
+        self.factor.solve_block(&mut y);
+        y.multiply(&orthonormalising(&y.gram(&y), 0.0).0);
+        let Q = y.clone();
+        self.factor.solve_block(&mut y);
+        largest * SymmetricEigen::new(symmetric(Q.gram(&y))).eigenvalues.max()
     }
 
     /// Size of the linear algebra.
@@ -559,6 +555,16 @@ impl<'m> Condensation<'m> {
 /// G times a tall matrix whose entries are `x`.
 fn apply_rows(rows: &[Vec<(u32, f64)>], columns: usize, x: impl Fn(usize, usize) -> f64) -> DMatrix<f64> {
     DMatrix::from_fn(rows.len(), columns, |k, j| rows[k].iter().map(|(at, w)| w * x(*at as usize, j)).sum())
+}
+
+/// Zeros in all rows but those, which ascend.
+fn fill_others(rows: &mut [Row], kept: &[u32]) {
+    let mut next = 0;
+    for row in kept {
+        rows[next..*row as usize].fill(Row::ZERO);
+        next = *row as usize + 1;
+    }
+    rows[next..].fill(Row::ZERO);
 }
 
 /// A tall matrix by blocks.

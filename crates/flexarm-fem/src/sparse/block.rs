@@ -87,11 +87,11 @@ impl Block {
         subtract_products(self, std::slice::from_ref(other), C);
     }
 
-    /// `self C`, of as many columns as C.
-    pub fn product(&self, C: &DMatrix<f64>) -> Self {
-        let mut result = Self::zeros(self.rows.len(), C.ncols());
-        result.subtract_product(self, &-C);
-        result
+    /// `self <- self C`, of as many columns as C.
+    pub fn multiply(&mut self, C: &DMatrix<f64>) {
+        let C_small = small(C, 0, self.width);
+        quickly(Multiply { X: &mut self.rows, C: &C_small });
+        self.width = C.ncols();
     }
 }
 
@@ -117,11 +117,16 @@ pub(crate) fn subtract_products(X: &mut Block, basis: &[Block], C: &DMatrix<f64>
     let mut row = 0;
     let mut factors = Vec::with_capacity(basis.len());
     for V in basis {
-        let entry = |i: usize, j: usize| if i < V.width && j < X.width { C[(row + i, j)] } else { 0.0 };
-        factors.push(std::array::from_fn(|i| Row(std::array::from_fn(|j| entry(i, j)))));
+        factors.push(small(C, row, V.width));
         row += V.width;
     }
     quickly(SubtractProducts { X: &mut X.rows, basis, factors: &factors });
+}
+
+/// Rows `first..first + count` of C.
+fn small(C: &DMatrix<f64>, first: usize, count: usize) -> Small {
+    let entry = |i: usize, j: usize| if i < count && j < C.ncols() { C[(first + i, j)] } else { 0.0 };
+    std::array::from_fn(|i| Row(std::array::from_fn(|j| entry(i, j))))
 }
 
 struct Grams<'a> {
@@ -202,6 +207,26 @@ fn subtract<T: Real, const P: usize, const FIRST: usize>(x: &mut [Row], v: &[Row
     }
 }
 
+struct Multiply<'a> {
+    X: &'a mut [Row],
+    C: &'a Small,
+}
+
+impl Work for Multiply<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<T: Real, const P: usize>(self) {
+        for x in self.X {
+            let mut sum = Wide::<T, P>::zero();
+            for i in 0..WIDTH {
+                sum.add(x.0[i], Wide::<T, P>::load(&self.C[i]));
+            }
+            sum.store(x);
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -221,5 +246,8 @@ mod tests {
         let expected = &X - &AB * &C;
         assert!((x.to_columns() - &expected).amax() < 1e-12 * expected.amax().max(1e3));
         assert!(x.rows.iter().all(|row| row.0[6..] == [0.0; 2]));
+        x.multiply(&C.transpose().columns(0, 5).into_owned());
+        let expected = expected * C.transpose().columns(0, 5);
+        assert!((x.to_columns() - &expected).amax() < 1e-13 * expected.amax());
     }
 }

@@ -158,15 +158,19 @@ impl Cholesky {
     /// If `B` has another number of rows.
     pub fn solve_block(&self, B: &mut Block) {
         assert_eq!(B.rows.len(), self.figures.size, "right-hand side of another size");
-        let symbolic = supernodes(&self.symbolic);
-        match self.symbolic.perm().map(|perm| perm.arrays().0) {
-            Some(order) => {
-                let mut x: Vec<Row> = order.iter().map(|unknown| B.rows[*unknown as usize]).collect();
-                triangular::solve(symbolic, &self.values, &mut x);
-                order.iter().zip(&x).for_each(|(unknown, x)| B.rows[*unknown as usize] = *x);
-            }
-            None => triangular::solve(symbolic, &self.values, &mut B.rows),
-        }
+        self.solve_rows(&mut B.rows, None);
+    }
+
+    /// The same for right-hand sides by rows, of which the unknowns are those in `at`, or all.
+    pub(crate) fn solve_rows(&self, B: &mut [Row], at: Option<&[u32]>) {
+        let order = self.symbolic.perm().map(|perm| perm.arrays().0);
+        let place = |k: usize| {
+            let unknown = order.map_or(k, |order| order[k] as usize);
+            at.map_or(unknown, |at| at[unknown] as usize)
+        };
+        let mut x: Vec<Row> = (0..self.figures.size).map(|k| B[place(k)]).collect();
+        triangular::solve(supernodes(&self.symbolic), &self.values, &mut x);
+        x.iter().enumerate().for_each(|(k, x)| B[place(k)] = *x);
     }
 }
 

@@ -24,6 +24,7 @@ use self::basis::Basis;
 use super::block::Block;
 use super::dense::symmetric_eigen;
 
+pub(crate) use basis::orthonormalising;
 pub use released::Released;
 
 /// Residual `‖K⁻¹ M φ - θ φ‖_M / θ` at which a mode counts as found.

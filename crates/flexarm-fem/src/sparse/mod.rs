@@ -28,4 +28,5 @@ pub use symmetric::{Pattern, SparseSymmetric};
 
 pub(crate) use block::{Row, grams, subtract_products};
 pub(crate) use dense::{add_product, gram};
+pub(crate) use lanczos::orthonormalising;
 pub(crate) use vectors::{Wide, Work, quickly};

@@ -76,7 +76,7 @@ impl Basis {
             solves: W.width,
             next_look: 0,
         };
-        basis.append(W, pencil)?;
+        basis.append(W, MW, pencil)?;
         if basis.is_exhausted() {
             // No vector has mass.
             return Err(ModesError::NotFinite);
@@ -136,12 +136,16 @@ impl Basis {
             H.view_mut((old - before, old), (before, now)).copy_from(&self.coupling.transpose());
         }
         self.projected = H;
-        self.append(W, pencil)
+        self.append(W, MW, pencil)
     }
 
     /// Makes `W` M-orthonormal and takes it as the newest block; directions that vanish are dropped.
-    fn append(&mut self, W: Block, pencil: &mut Pencil<'_>) -> Result<(), ModesError> {
-        let mut MW = Block::zeros(W.rows.len(), W.width);
+    ///
+    /// ```text
+    /// G = Wᵀ M W,   V = W B with Bᵀ G B = 1,   R = Vᵀ M W = Bᵀ G
+    /// ```
+    /// * `MW`: room for M times it.
+    fn append(&mut self, mut W: Block, mut MW: Block, pencil: &mut Pencil<'_>) -> Result<(), ModesError> {
         (pencil.mass)(&W, &mut MW);
         let G = W.gram(&MW);
         if G.iter().any(|x| !x.is_finite()) {
@@ -156,22 +160,27 @@ impl Basis {
             self.mass_newest = self.newest.clone();
             return Ok(());
         }
-        let mut V = W.product(&Q);
-        let mut MV = MW.product(&Q);
-        if smallest < NEAR_DEPENDENT {
-            (pencil.mass)(&V, &mut MV);
-            let C = grams(&self.blocks, &MV);
-            subtract_products(&mut V, &self.blocks, &C);
-            (pencil.mass)(&V, &mut MV);
+        let near_dependent = (smallest < NEAR_DEPENDENT).then(|| MW.clone());
+        W.multiply(&Q);
+        MW.multiply(&Q);
+        if near_dependent.is_some() {
+            (pencil.mass)(&W, &mut MW);
+            let C = grams(&self.blocks, &MW);
+            subtract_products(&mut W, &self.blocks, &C);
+            (pencil.mass)(&W, &mut MW);
         }
-        let G = V.gram(&MV);
-        let Some(R) = ((&G + G.transpose()) * 0.5).cholesky() else {
+        let second = W.gram(&MW);
+        let Some(L) = ((&second + second.transpose()) * 0.5).cholesky() else {
             return Err(ModesError::NotFinite);
         };
-        let inverse = R.l().transpose().try_inverse().ok_or(ModesError::NotFinite)?;
-        self.newest = V.product(&inverse);
-        self.mass_newest = MV.product(&inverse);
-        self.coupling = self.newest.gram(&MW);
+        let inverse = L.l().transpose().try_inverse().ok_or(ModesError::NotFinite)?;
+        W.multiply(&inverse);
+        MW.multiply(&inverse);
+        self.coupling = match near_dependent {
+            Some(product) => W.gram(&product),
+            None => (Q * inverse).transpose() * (&G + G.transpose()) * 0.5,
+        };
+        (self.newest, self.mass_newest) = (W, MW);
         Ok(())
     }
 
@@ -243,7 +252,7 @@ impl Basis {
 
 /// `Q` with `Qᵀ G Q = 1` for a positive semidefinite G whose rows may have different units, and the smallest eigenvalue of the
 /// scaled G that was kept. Directions that depend on the others, or are shorter than `noise`, are dropped.
-pub(super) fn orthonormalising(G: &DMatrix<f64>, noise: f64) -> (DMatrix<f64>, f64) {
+pub(crate) fn orthonormalising(G: &DMatrix<f64>, noise: f64) -> (DMatrix<f64>, f64) {
     let n = G.nrows();
     let scale: Vec<f64> = G.diagonal().iter().map(|g| if *g > 0.0 { 1.0 / g.sqrt() } else { 0.0 }).collect();
     let scaled = DMatrix::from_fn(n, n, |i, j| 0.5 * (G[(i, j)] + G[(j, i)]) * scale[i] * scale[j]);
