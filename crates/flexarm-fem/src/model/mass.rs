@@ -126,10 +126,8 @@ impl Work for NodalProduct<'_> {
                 continue;
             }
             let at = self.first[j] as usize;
-            let mut own = [Wide::<T, P>::zero(); 3];
-            for k in 0..3 {
-                own[k] = Wide::<T, P>::load(&self.X[at + k]);
-            }
+            let [x, y, z] = [&self.X[at], &self.X[at + 1], &self.X[at + 2]];
+            let own = [Wide::<T, P>::load(x), Wide::<T, P>::load(y), Wide::<T, P>::load(z)];
             let mut sum = [Wide::<T, P>::zero(); 3];
             for (row, value) in pattern.rows[entries.clone()].iter().zip(&self.nodal.values[entries]) {
                 let to = self.first[*row as usize] as usize;

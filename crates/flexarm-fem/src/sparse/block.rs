@@ -154,6 +154,7 @@ impl Work for Grams<'_> {
 
 /// Rows `FIRST` to `FIRST + 3` of `sum += vᵀ x`.
 #[inline(always)]
+#[allow(clippy::needless_range_loop, reason = "indices keep the vectors in registers")]
 fn add_gram<T: Real, const P: usize, const FIRST: usize>(v: &[Row], x: &[Row], sum: &mut Small) {
     let mut part = [Wide::<T, P>::zero(); 4];
     for (v, x) in v.iter().zip(x) {
@@ -193,6 +194,7 @@ impl Work for SubtractProducts<'_> {
 
 /// `x -= v C` for the columns `FIRST` to `FIRST + 3` of v.
 #[inline(always)]
+#[allow(clippy::needless_range_loop, reason = "indices keep the vectors in registers")]
 fn subtract<T: Real, const P: usize, const FIRST: usize>(x: &mut [Row], v: &[Row], C: &Small) {
     let mut factors = [Wide::<T, P>::zero(); 4];
     for i in 0..4 {

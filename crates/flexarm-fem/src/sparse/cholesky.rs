@@ -19,7 +19,7 @@ use super::ordering::{Ordering, nested_dissection};
 use super::symmetric::SparseSymmetric;
 use super::triangular;
 
-/// How many threads a factorisation or a solve may use.
+/// How many threads a factorisation may use; solves take one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Threads(pub usize);
 

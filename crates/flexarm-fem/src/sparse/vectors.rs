@@ -28,10 +28,9 @@ pub(crate) fn quickly<W: Work>(work: W) -> W::Output {
             #[inline(always)]
             fn run<T: Real>(self) -> Self::Output {
                 const { assert!(2 * T::LANES == WIDTH, "two vectors are a row") };
-                match self.0.take() {
-                    Some(work) => Some(work.run::<T, 2>()),
-                    None => None,
-                }
+                // No closure: it would lose the instructions.
+                let work = self.0.take()?;
+                Some(work.run::<T, 2>())
             }
         }
         if let Some(Some(done)) = with_lanes(Compiled(&mut kept)) {
